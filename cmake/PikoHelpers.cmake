@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+
+# Flags that every target of the project is built with.
+add_library(piko_options INTERFACE)
+target_compile_options(piko_options INTERFACE
+  -Wall -Wextra -Wno-unused-parameter -ffp-contract=off)
+
+# What a target that uses LLVM, MLIR or Clang needs.
+add_library(piko_llvm INTERFACE)
+target_include_directories(piko_llvm SYSTEM INTERFACE ${LLVM_INCLUDE_DIRS} ${MLIR_INCLUDE_DIRS})
+target_include_directories(piko_llvm INTERFACE
+  ${PROJECT_SOURCE_DIR}/include ${PROJECT_BINARY_DIR}/include)
+separate_arguments(PIKO_LLVM_DEFINITIONS NATIVE_COMMAND "${LLVM_DEFINITIONS}")
+target_compile_definitions(piko_llvm INTERFACE ${PIKO_LLVM_DEFINITIONS})
+if(NOT LLVM_ENABLE_RTTI)
+  target_compile_options(piko_llvm INTERFACE $<$<COMPILE_LANGUAGE:CXX>:-fno-rtti>)
+endif()
+target_link_libraries(piko_llvm INTERFACE
+  ${PIKO_LLVM_PREFIX}/lib/libMLIR.so ${PIKO_LLVM_PREFIX}/lib/libLLVM.so)
+
+add_library(piko_clang INTERFACE)
+target_link_libraries(piko_clang INTERFACE piko_llvm ${PIKO_LLVM_PREFIX}/lib/libclang-cpp.so)
+
+# piko_add_library(PikoX SOURCES... [DEPENDS tablegen targets] [LINK libraries])
+# A static library of the compiler.
+function(piko_add_library name)
+  cmake_parse_arguments(ARG "" "" "DEPENDS;LINK" ${ARGN})
+  add_library(${name} STATIC ${ARG_UNPARSED_ARGUMENTS})
+  target_link_libraries(${name} PRIVATE piko_options PUBLIC piko_llvm ${ARG_LINK})
+  if(ARG_DEPENDS)
+    add_dependencies(${name} ${ARG_DEPENDS})
+  endif()
+endfunction()
+
+# piko_add_tool(name SOURCES... [LINK libraries])
+function(piko_add_tool name)
+  cmake_parse_arguments(ARG "" "" "LINK" ${ARGN})
+  add_executable(${name} ${ARG_UNPARSED_ARGUMENTS})
+  target_link_libraries(${name} PRIVATE piko_options ${ARG_LINK})
+endfunction()
+
+# piko_add_unittest(name SOURCES... [LINK libraries]): a GoogleTest program
+# whose cases CTest runs one by one.
+function(piko_add_unittest name)
+  cmake_parse_arguments(ARG "" "" "LINK" ${ARGN})
+  add_executable(${name} ${ARG_UNPARSED_ARGUMENTS})
+  target_link_libraries(${name} PRIVATE piko_options ${ARG_LINK} GTest::gtest GTest::gtest_main)
+  gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60)
+endfunction()
+if(BUILD_TESTING OR NOT DEFINED BUILD_TESTING)
+  find_package(GTest REQUIRED)
+  include(GoogleTest)
+endif()

@@ -1,0 +1,21 @@
+# SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+#
+# One LLVM release, pinned; MLIR, LLVM and Clang are linked as the shared
+# libraries that Debian packages.
+set(PIKO_LLVM_VERSION 22)
+set(PIKO_LLVM_PREFIX /usr/lib/llvm-${PIKO_LLVM_VERSION} CACHE PATH
+    "Where LLVM, MLIR and Clang are installed")
+list(PREPEND CMAKE_PREFIX_PATH ${PIKO_LLVM_PREFIX})
+
+find_package(MLIR REQUIRED CONFIG PATHS ${PIKO_LLVM_PREFIX}/lib/cmake/mlir NO_DEFAULT_PATH)
+if(NOT LLVM_VERSION_MAJOR EQUAL PIKO_LLVM_VERSION)
+  message(FATAL_ERROR "expected LLVM ${PIKO_LLVM_VERSION}, but got ${LLVM_VERSION}")
+endif()
+find_package(OpenMP REQUIRED COMPONENTS CXX)
+
+list(APPEND CMAKE_MODULE_PATH ${MLIR_CMAKE_DIR} ${LLVM_CMAKE_DIR})
+include(TableGen)
+include(AddLLVM)
+include(AddMLIR)
+
+set(PIKO_CLANG_RESOURCE_DIR ${PIKO_LLVM_PREFIX}/lib/clang/${PIKO_LLVM_VERSION})
