@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Fields of records, and the directives.
+
+#ifndef PIKO_DIALECT_PIKO_IR_PIKOATTRIBUTES_TD
+#define PIKO_DIALECT_PIKO_IR_PIKOATTRIBUTES_TD
+
+include "Piko/Dialect/Piko/IR/PikoBase.td"
+
+def Piko_FieldAttr : AttrDef<Piko_Dialect, "Field"> {
+  let mnemonic = "field";
+  let summary = "a leaf field of a record";
+  let description = [{
+    A number, or an array of numbers, at a fixed place in a record. The name is
+    the C++ path to it (`screenPos.x`). `counts` and `strides` (in bytes)
+    describe an array, outermost dimension first; both are empty for a number.
+    `#piko.field<"w" : f32[16 : 4] at 8>` is sixteen floats in a row, the
+    first of them eight bytes into the record.
+  }];
+  let parameters = (ins
+    StringRefParameter<>:$name, "::mlir::Type":$type, "int64_t":$offset,
+    ArrayRefParameter<"int64_t">:$counts,
+    ArrayRefParameter<"int64_t">:$strides);
+  let hasCustomAssemblyFormat = 1;
+  let genVerifyDecl = 1;
+  let extraClassDeclaration = [{
+    /// How many numbers the field holds.
+    int64_t getElementCount() const;
+    /// The byte offset in the record of element number `i`, counted row-major.
+    int64_t getElementOffset(int64_t i) const;
+  }];
+}
+
+def Piko_FieldArrayAttr : TypedArrayAttrBase<Piko_FieldAttr, "array of fields">;
+
+def Piko_ScheduleKind : I32EnumAttr<"ScheduleKind", "where bins run", [
+  I32EnumAttrCase<"LoadBalance", 0, "load_balance">,
+  I32EnumAttrCase<"DirectMap", 1, "direct_map">,
+  I32EnumAttrCase<"Serialize", 2, "serialize">,
+  I32EnumAttrCase<"All", 3, "all">]> {
+  let cppNamespace = "::piko";
+}
+
+def Piko_AtomicKind : I32EnumAttr<"AtomicKind", "integer atomic operation", [
+  I32EnumAttrCase<"Add", 0, "add">,
+  I32EnumAttrCase<"MinS", 1, "min_signed">,
+  I32EnumAttrCase<"MaxS", 2, "max_signed">,
+  I32EnumAttrCase<"MinU", 3, "min_unsigned">,
+  I32EnumAttrCase<"MaxU", 4, "max_unsigned">,
+  I32EnumAttrCase<"And", 5, "and">,
+  I32EnumAttrCase<"Or", 6, "or">,
+  I32EnumAttrCase<"Xor", 7, "xor">]> {
+  let cppNamespace = "::piko";
+}
+
+#endif // PIKO_DIALECT_PIKO_IR_PIKOATTRIBUTES_TD

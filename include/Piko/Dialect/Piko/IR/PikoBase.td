@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// The `piko` dialect itself, and what its other .td files share.
+
+#ifndef PIKO_DIALECT_PIKO_IR_PIKOBASE_TD
+#define PIKO_DIALECT_PIKO_IR_PIKOBASE_TD
+
+include "mlir/IR/AttrTypeBase.td"
+include "mlir/IR/EnumAttr.td"
+include "mlir/IR/OpBase.td"
+include "mlir/IR/SymbolInterfaces.td"
+include "mlir/Interfaces/SideEffectInterfaces.td"
+
+def Piko_Dialect : Dialect {
+  let name = "piko";
+  let cppNamespace = "::piko";
+  let summary = "Programmable graphics pipelines";
+  let description = [{
+    A pipeline is a directed graph of stages. Each stage groups its input
+    primitives into spatial bins and says in three phases how: *assign* (which
+    bins does a primitive belong to?), *schedule* (when and where does a bin
+    run?), *process* (what is computed, what is emitted?).
+
+    A module goes down four levels, all but the last of them in this dialect:
+
+    | level    | holds |
+    |----------|-------|
+    | authored | `piko.pipeline` with `piko.stage`s, edges and state |
+    | kernels  | `piko.kernel`s that hold the phases that run together |
+    | resolved | `piko.kernel`s that hold loops over bins and their storage |
+    | target   | upstream dialects only |
+  }];
+  let useDefaultTypePrinterParser = 1;
+  let useDefaultAttributePrinterParser = 1;
+}
+
+class Piko_Op<string mnemonic, list<Trait> traits = []>
+    : Op<Piko_Dialect, mnemonic, traits>;
+
+/// What a leaf field of a record may be: a number of a C++ type.
+def Piko_Scalar : AnyTypeOf<[F32, F64, I1, I8, I16, I32, I64],
+                            "number of a C++ arithmetic type">;
+
+/// A cell coordinate, as C++ code computes it.
+def Piko_Coordinate : AnyTypeOf<[I32, I64, Index], "cell coordinate">;
+
+#endif // PIKO_DIALECT_PIKO_IR_PIKOBASE_TD

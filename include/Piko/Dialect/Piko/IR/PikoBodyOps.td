@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// What the bodies of phases do with primitives and bins.
+
+#ifndef PIKO_DIALECT_PIKO_IR_PIKOBODYOPS_TD
+#define PIKO_DIALECT_PIKO_IR_PIKOBODYOPS_TD
+
+include "Piko/Dialect/Piko/IR/PikoAttributes.td"
+include "Piko/Dialect/Piko/IR/PikoTypes.td"
+
+//===----------------------------------------------------------------------===//
+// Primitives
+//===----------------------------------------------------------------------===//
+
+def Piko_GetOp : Piko_Op<"get", [
+    Pure, DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
+  let summary = "reads a field of a primitive";
+  let description = [{
+    `%z = piko.get %f "z" : !piko.prim<@F> -> f32`; an element of an array
+    field takes an index for each dimension:
+    `%w = piko.get %f "w"[%i] : !piko.prim<@F> -> f32`.
+  }];
+  let arguments = (ins Piko_PrimType:$prim, StrAttr:$field,
+                       Variadic<Index>:$elements);
+  let results = (outs Piko_Scalar:$result);
+  let assemblyFormat = [{
+    $prim $field (`[` $elements^ `]`)? attr-dict
+    `:` qualified(type($prim)) `->` type($result)
+  }];
+  let hasCanonicalizer = 1;
+}
+
+def Piko_EmitOp : Piko_Op<"emit"> {
+  let summary = "sends a primitive out of a port";
+  let description = [{
+    Takes the numbers of the port's record: its fields in order, arrays
+    row-major. `piko.emit 0 (%x, %y) : f32, f32`.
+  }];
+  let arguments = (ins ConfinedAttr<I64Attr, [IntNonNegative]>:$port,
+                       Variadic<Piko_Scalar>:$values);
+  let assemblyFormat = [{
+    $port (`(` $values^ `)` `:` type($values))? attr-dict
+  }];
+  let hasVerifier = 1;
+}
+
+//===----------------------------------------------------------------------===//
+// Bins
+//===----------------------------------------------------------------------===//
+
+def Piko_BinOp : Piko_Op<"bin", [Pure]> {
+  let summary = "the bin that is being processed";
+  let description = "`%b = piko.bin` is its number, row-major, x fastest.";
+  let results = (outs Index:$result);
+  let assemblyFormat = "attr-dict";
+}
+
+def Piko_BinAtOp : Piko_Op<"bin_at", [Pure]> {
+  let summary = "the bin that a cell of the domain is in";
+  let description = [{
+    `%b = piko.bin_at %x, %y : i32, i32` is a number of the phase's own stage,
+    or -1 where the cell is outside the domain. Coordinates are signed.
+  }];
+  let arguments = (ins Variadic<Piko_Coordinate>:$coordinates);
+  let results = (outs Index:$result);
+  let assemblyFormat = "$coordinates `:` type($coordinates) attr-dict";
+  let hasVerifier = 1;
+}
+
+class Piko_BinBoundOp<string mnemonic> : Piko_Op<mnemonic, [Pure]> {
+  let arguments = (ins Index:$bin, ConfinedAttr<I64Attr, [IntNonNegative]>:$dim);
+  let results = (outs Index:$result);
+  let assemblyFormat = "$bin `[` $dim `]` attr-dict";
+}
+
+def Piko_BinLoOp : Piko_BinBoundOp<"bin_lo"> {
+  let summary = "the first cell of a bin in a dimension";
+  let description = "`%x0 = piko.bin_lo %b[0]`.";
+}
+
+def Piko_BinHiOp : Piko_BinBoundOp<"bin_hi"> {
+  let summary = "the cell after the last of a bin in a dimension";
+  let description = [{
+    `%x1 = piko.bin_hi %b[0]`; bins at the edge of the domain are cut there.
+  }];
+}
+
+def Piko_DomainOp : Piko_Op<"domain", [Pure]> {
+  let summary = "the extent of the domain in a dimension";
+  let description = "`%w = piko.domain[0]`.";
+  let arguments = (ins ConfinedAttr<I64Attr, [IntNonNegative]>:$dim);
+  let results = (outs Index:$result);
+  let assemblyFormat = "`[` $dim `]` attr-dict";
+}
+
+/// What an assign phase says about its primitive: it must be inside one.
+class Piko_AssignmentOp<string mnemonic, list<Trait> traits = []>
+    : Piko_Op<mnemonic, traits> {
+  let hasVerifier = 1;
+}
+
+def Piko_AssignToOp : Piko_AssignmentOp<"assign_to"> {
+  let summary = "puts the primitive into a bin";
+  let description = [{
+    `piko.assign_to %b`. A bin outside the grid, -1 included, is an error when
+    the pipeline runs.
+  }];
+  let arguments = (ins Index:$bin);
+  let assemblyFormat = "$bin attr-dict";
+}
+
+def Piko_AssignAllOp : Piko_AssignmentOp<"assign_all"> {
+  let summary = "puts the primitive into all bins";
+  let description = "`piko.assign_all`.";
+  let assemblyFormat = "attr-dict";
+}
+
+def Piko_AssignPreviousOp : Piko_AssignmentOp<"assign_previous"> {
+  let summary = "puts the primitive into the bin it was emitted from";
+  let description = [{
+    `piko.assign_previous`. Both stages have bins of one size, and the stage
+    has no source.
+  }];
+  let assemblyFormat = "attr-dict";
+}
+
+def Piko_AssignBoxOp : Piko_AssignmentOp<"assign_box", [AttrSizedOperandSegments]> {
+  let summary = "puts the primitive into the bins that a box touches";
+  let description = [{
+    `piko.assign_box [%x0, %y0 : i32, i32] to [%x1, %y1 : i32, i32]` takes the
+    closed box of cells, cut at the domain; an empty box is no bin.
+  }];
+  let arguments = (ins Variadic<Piko_Coordinate>:$lo,
+                       Variadic<Piko_Coordinate>:$hi);
+  let assemblyFormat = [{
+    `[` $lo `:` type($lo) `]` `to` `[` $hi `:` type($hi) `]` attr-dict
+  }];
+}
+
+def Piko_OwnerOp : Piko_AssignmentOp<"owner"> {
+  let summary = "the pixel whose owner processes the primitive";
+  let description = [{
+    `piko.owner [%x, %y : i32, i32]` in an assign phase says that the process
+    phase writes no other pixel. A bin that is larger than a tile of its stage's
+    `tile` cells a side may then be divided over threads, and each pixel still
+    sees its primitives in order. Made by `piko-own-pixels`.
+  }];
+  let arguments = (ins Variadic<Piko_Coordinate>:$coordinates);
+  let assemblyFormat = "`[` $coordinates `:` type($coordinates) `]` attr-dict";
+}
+
+#endif // PIKO_DIALECT_PIKO_IR_PIKOBODYOPS_TD

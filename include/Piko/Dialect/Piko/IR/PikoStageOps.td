@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Stages and their three phases.
+
+#ifndef PIKO_DIALECT_PIKO_IR_PIKOSTAGEOPS_TD
+#define PIKO_DIALECT_PIKO_IR_PIKOSTAGEOPS_TD
+
+include "Piko/Dialect/Piko/IR/PikoAttributes.td"
+include "Piko/Dialect/Piko/IR/PikoTypes.td"
+
+def Piko_StageOp : Piko_Op<"stage", [
+    Symbol, NoTerminator, SingleBlock, NoRegionArguments,
+    HasParent<"PipelineOp">, DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
+  let summary = "a stage of a pipeline";
+  let description = [{
+    Holds a `piko.process`, at most one `piko.assign` and at most one
+    `piko.schedule`. `bins` gives the extent of a bin in each dimension of
+    the domain; 0 stands for the whole domain. Without an assign phase every
+    primitive is in bin 0, which is legal only where one bin is the whole
+    domain. Without a schedule phase the stage is load-balanced.
+
+    At the kernels level and below, the phases have moved into
+    `piko.kernel`s and the stage's body is empty but for its schedule.
+
+    ```mlir
+    piko.record @F {"z" : f32 at 0} size 4 align 4
+    piko.pipeline @P rank 2 {
+      piko.source @pass
+      piko.stage @pass bins [0, 0] threads 64 : @F -> [] {
+        piko.schedule load_balance
+        piko.process {
+        ^bb0(%f: !piko.prim<@F>):
+          piko.return
+        }
+      }
+    }
+    ```
+  }];
+  let arguments = (ins SymbolNameAttr:$sym_name, DenseI64ArrayAttr:$bins,
+                       ConfinedAttr<I64Attr, [IntPositive]>:$threads,
+                       FlatSymbolRefAttr:$input,
+                       TypedArrayAttrBase<FlatSymbolRefAttr, "records of the ports">:$outputs,
+                       OptionalAttr<I64Attr>:$tile);
+  let regions = (region SizedRegion<1>:$body);
+  let assemblyFormat = [{
+    $sym_name `bins` $bins `threads` $threads (`tile` $tile^)?
+    `:` $input `->` $outputs attr-dict-with-keyword $body
+  }];
+  let hasRegionVerifier = 1;
+  let extraClassDeclaration = [{
+    /// The phases, or null where the stage does not hold them.
+    AssignOp getAssign();
+    ScheduleOp getSchedule();
+    ProcessOp getProcess();
+    /// Whether one bin is the whole domain.
+    bool isWholeDomain();
+    /// Whether the stage runs only when no primitive can still reach it.
+    bool collects();
+    ::mlir::Block *getBodyBlock() { return &getBody().front(); }
+  }];
+}
+
+class Piko_PhaseOp<string mnemonic, list<Trait> traits = []>
+    : Piko_Op<mnemonic, !listconcat(traits, [
+        ParentOneOf<["StageOp", "KernelOp"]>,
+        SingleBlockImplicitTerminator<"ReturnOp">])>;
+
+def Piko_AssignOp : Piko_PhaseOp<"assign", [RecursiveMemoryEffects]> {
+  let summary = "the AssignBin phase";
+  let description = [{
+    Says which bins a primitive belongs to. The bins are a set: a bin that is
+    named twice counts once, and bins are visited in ascending row-major order.
+    A primitive that is assigned to no bin is culled. Inside a `piko.kernel`
+    the phase names its stage.
+
+    ```mlir
+    piko.record @F {"x" : i32 at 0, "y" : i32 at 4} size 8 align 4
+    piko.pipeline @P rank 2 {
+      piko.source @s
+      piko.stage @s bins [8, 8] threads 64 : @F -> [] {
+        piko.assign {
+        ^bb0(%f: !piko.prim<@F>):
+          %x = piko.get %f "x" : !piko.prim<@F> -> i32
+          %y = piko.get %f "y" : !piko.prim<@F> -> i32
+          %b = piko.bin_at %x, %y : i32, i32
+          piko.assign_to %b
+          piko.return
+        }
+        piko.process {
+        ^bb0(%f: !piko.prim<@F>):
+          piko.return
+        }
+      }
+    }
+    ```
+  }];
+  let arguments = (ins OptionalAttr<FlatSymbolRefAttr>:$stage,
+                       OptionalAttr<I64Attr>:$port,
+                       OptionalAttr<I64Attr>:$source);
+  let regions = (region SizedRegion<1>:$body);
+  let assemblyFormat = [{
+    (`of` $stage^)? (`port` $port^)? (`source` $source^)?
+    attr-dict-with-keyword $body
+  }];
+  let hasRegionVerifier = 1;
+}
+
+def Piko_ProcessOp : Piko_PhaseOp<"process", [RecursiveMemoryEffects]> {
+  let summary = "the Process phase";
+  let description = [{
+    Says what is computed for a primitive and what is emitted. Calls are
+    concurrent; what they may write is `piko.update` on pixels of their own
+    bin, `piko.atomic`, and `piko.store` where no two calls write the same
+    element. Inside a `piko.kernel` the phase names its stage.
+
+    ```mlir
+    piko.record @F {"z" : f32 at 0} size 4 align 4
+    piko.pipeline @P rank 2 {
+      piko.source @half
+      piko.edge @half[0] -> @drop
+      piko.stage @half bins [0, 0] threads 64 : @F -> [@F] {
+        piko.process {
+        ^bb0(%f: !piko.prim<@F>):
+          %z = piko.get %f "z" : !piko.prim<@F> -> f32
+          %c = arith.constant 0.5 : f32
+          %h = arith.mulf %z, %c : f32
+          piko.emit 0 (%h) : f32
+          piko.return
+        }
+      }
+      piko.stage @drop bins [0, 0] threads 64 : @F -> [] {
+        piko.process {
+        ^bb0(%f: !piko.prim<@F>):
+          piko.return
+        }
+      }
+    }
+    ```
+  }];
+  let arguments = (ins OptionalAttr<FlatSymbolRefAttr>:$stage);
+  let regions = (region SizedRegion<1>:$body);
+  let assemblyFormat = "(`of` $stage^)? attr-dict-with-keyword $body";
+  let hasRegionVerifier = 1;
+}
+
+def Piko_ScheduleOp : Piko_Op<"schedule", [
+    HasParent<"StageOp">, DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
+  let summary = "the Schedule phase, as directives";
+  let description = [{
+    Where bins run (`load_balance`, `direct_map`, `serialize`, `all` with
+    the `tile_split` size of the chunks that a bin is cut into), what they
+    wait for (`end_stage`, `end_bin`, a `batch` of primitives), and whether
+    the stage gives up the order of its emissions (`unordered`).
+
+    ```mlir
+    piko.record @F {"z" : f32 at 0} size 4 align 4
+    piko.pipeline @P rank 2 {
+      piko.source @a
+      piko.source @b
+      piko.stage @a bins [0, 0] threads 64 : @F -> [] {
+        piko.process {
+        ^bb0(%f: !piko.prim<@F>):
+          piko.return
+        }
+      }
+      piko.stage @b bins [0, 0] threads 64 : @F -> [] {
+        piko.schedule all tile_split 256 end_stage [@a]
+        piko.process {
+        ^bb0(%f: !piko.prim<@F>):
+          piko.return
+        }
+      }
+    }
+    ```
+  }];
+  let arguments = (ins Piko_ScheduleKind:$kind,
+    OptionalAttr<ConfinedAttr<I64Attr, [IntPositive]>>:$tileSplit,
+    OptionalAttr<TypedArrayAttrBase<FlatSymbolRefAttr, "stages to wait for">>:$endStage,
+    UnitAttr:$endBin,
+    OptionalAttr<ConfinedAttr<I64Attr, [IntPositive]>>:$batch,
+    UnitAttr:$everyBin, UnitAttr:$unordered);
+  let assemblyFormat = [{
+    $kind (`tile_split` $tileSplit^)? (`end_stage` $endStage^)?
+    (`end_bin` $endBin^)? (`batch` $batch^)? (`every_bin` $everyBin^)?
+    (`unordered` $unordered^)? attr-dict
+  }];
+}
+
+def Piko_ReturnOp : Piko_Op<"return", [
+    Pure, Terminator, ParentOneOf<["AssignOp", "ProcessOp"]>]> {
+  let summary = "ends a phase";
+  let description = "See `piko.process`.";
+  let assemblyFormat = "attr-dict";
+}
+
+#endif // PIKO_DIALECT_PIKO_IR_PIKOSTAGEOPS_TD

@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Reading and writing a pipeline's state.
+
+#ifndef PIKO_DIALECT_PIKO_IR_PIKOSTATEOPS_TD
+#define PIKO_DIALECT_PIKO_IR_PIKOSTATEOPS_TD
+
+include "Piko/Dialect/Piko/IR/PikoAttributes.td"
+include "Piko/Dialect/Piko/IR/PikoTypes.td"
+
+class Piko_StateAccessOp<string mnemonic, list<Trait> traits = []>
+    : Piko_Op<mnemonic, !listconcat(traits, [
+        AttrSizedOperandSegments,
+        DeclareOpInterfaceMethods<SymbolUserOpInterface>])>;
+
+def Piko_LoadOp : Piko_StateAccessOp<"load", [MemoryEffects<[MemRead]>]> {
+  let summary = "reads a field of a piece of state";
+  let description = [{
+    A constant takes no index, a buffer one, an image one for each dimension;
+    an element of an array field takes further ones behind the field's name.
+
+    ```
+    %w = piko.load @camera "width" : i32
+    %r = piko.load @lights[%i : index] "color.x" : f32
+    %k = piko.load @kernels[%i : index] "w"[%j] : f32
+    ```
+  }];
+  let arguments = (ins FlatSymbolRefAttr:$state,
+                       Variadic<Piko_Coordinate>:$indices, StrAttr:$field,
+                       Variadic<Index>:$elements);
+  let results = (outs Piko_Scalar:$result);
+  let assemblyFormat = [{
+    $state (`[` $indices^ `:` type($indices) `]`)? $field
+    (`[` $elements^ `]`)? attr-dict `:` type($result)
+  }];
+}
+
+def Piko_StoreOp : Piko_StateAccessOp<"store", [MemoryEffects<[MemWrite]>]> {
+  let summary = "writes a field of an element that no other call writes";
+  let description = [{
+    `piko.store %v, @verts[%i : i32] "pos.x" : f32`. An index outside the
+    buffer or image is an error when the pipeline runs.
+  }];
+  let arguments = (ins Piko_Scalar:$value, FlatSymbolRefAttr:$state,
+                       Variadic<Piko_Coordinate>:$indices, StrAttr:$field,
+                       Variadic<Index>:$elements);
+  let assemblyFormat = [{
+    $value `,` $state (`[` $indices^ `:` type($indices) `]`)? $field
+    (`[` $elements^ `]`)? attr-dict `:` type($value)
+  }];
+}
+
+def Piko_AtomicOp : Piko_StateAccessOp<"atomic", [
+    MemoryEffects<[MemRead, MemWrite]>]> {
+  let summary = "changes an integer field so that order does not matter";
+  let description = [{
+    `piko.atomic add @histogram[%i : i32] "value", %one : i32`. The value that
+    was there is not given back, so that no call can see the order.
+  }];
+  let arguments = (ins Piko_AtomicKind:$kind, FlatSymbolRefAttr:$state,
+                       Variadic<Piko_Coordinate>:$indices, StrAttr:$field,
+                       Variadic<Index>:$elements,
+                       AnyTypeOf<[I32, I64]>:$value);
+  let assemblyFormat = [{
+    $kind $state (`[` $indices^ `:` type($indices) `]`)? $field
+    (`[` $elements^ `]`)? `,` $value attr-dict `:` type($value)
+  }];
+}
+
+def Piko_ExtentOp : Piko_Op<"extent", [
+    Pure, DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
+  let summary = "the length of a buffer, or of an image in a dimension";
+  let description = "`%n = piko.extent @lights[0]`.";
+  let arguments = (ins FlatSymbolRefAttr:$state,
+                       ConfinedAttr<I64Attr, [IntNonNegative]>:$dim);
+  let results = (outs Index:$result);
+  let assemblyFormat = "$state `[` $dim `]` attr-dict";
+}
+
+def Piko_UpdateOp : Piko_Op<"update", [
+    RecursiveMemoryEffects, SingleBlock,
+    DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
+  let summary = "changes a pixel of the primitive's own bin";
+  let description = [{
+    The body takes the numbers of the pixel, fields in order, and yields the new
+    ones; `results` leave it. The calls for one pixel run in lineage order. A
+    pixel outside the bin is an error when the pipeline runs.
+
+    ```
+    %passed = piko.update @depth[%x, %y : i32, i32] {
+    ^bb0(%old: f32):
+      %closer = arith.cmpf olt, %z, %old : f32
+      %new = arith.select %closer, %z, %old : f32
+      piko.yield [%new : f32] results [%closer : i1]
+    } -> i1
+    ```
+  }];
+  let arguments = (ins FlatSymbolRefAttr:$image,
+                       Variadic<Piko_Coordinate>:$coordinates);
+  let results = (outs Variadic<AnyType>:$results);
+  let regions = (region SizedRegion<1>:$body);
+  let assemblyFormat = [{
+    $image `[` $coordinates `:` type($coordinates) `]` $body
+    (`->` type($results)^)? attr-dict
+  }];
+  let hasRegionVerifier = 1;
+}
+
+def Piko_YieldOp : Piko_Op<"yield", [
+    Pure, Terminator, HasParent<"UpdateOp">, AttrSizedOperandSegments]> {
+  let summary = "ends the body of an update";
+  let description = "See `piko.update`.";
+  let arguments = (ins Variadic<Piko_Scalar>:$pixel, Variadic<AnyType>:$results);
+  let assemblyFormat = [{
+    (`[` $pixel^ `:` type($pixel) `]`)?
+    (`results` `[` $results^ `:` type($results) `]`)? attr-dict
+  }];
+}
+
+#endif // PIKO_DIALECT_PIKO_IR_PIKOSTATEOPS_TD

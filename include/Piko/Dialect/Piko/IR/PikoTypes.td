@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Types carry the record by symbol, so that fields can be read and written one
+// by one and dead ones removed.
+
+#ifndef PIKO_DIALECT_PIKO_IR_PIKOTYPES_TD
+#define PIKO_DIALECT_PIKO_IR_PIKOTYPES_TD
+
+include "Piko/Dialect/Piko/IR/PikoBase.td"
+
+class Piko_Type<string name, string typeMnemonic>
+    : TypeDef<Piko_Dialect, name> {
+  let mnemonic = typeMnemonic;
+}
+
+def Piko_PrimType : Piko_Type<"Prim", "prim"> {
+  let summary = "a primitive that flows along an edge";
+  let description = [{
+    An immutable value of the record named, for example
+    `!piko.prim<@Fragment>`. `piko.get` reads its fields.
+  }];
+  let parameters = (ins "::mlir::FlatSymbolRefAttr":$record);
+  let assemblyFormat = "`<` $record `>`";
+}
+
+def Piko_BinsType : Piko_Type<"Bins", "bins"> {
+  let summary = "the primitives of a stage, grouped by bin";
+  let description = [{
+    Resolved level: the storage of a stage's input. It holds the primitives in
+    lineage order, a compressed table of the cells they are in, and the units
+    of work that the machine's threads take. A *cell* is a bin, or a tile of a
+    bin that `piko.owner` divides.
+  }];
+  let parameters = (ins "::mlir::FlatSymbolRefAttr":$record);
+  let assemblyFormat = "`<` $record `>`";
+}
+
+def Piko_WriterType : Piko_Type<"Writer", "writer"> {
+  let summary = "where a unit of work leaves what it emits";
+  let description = [{
+    Resolved level: one for each unit of work, so that threads never share one;
+    the units are joined in order when the kernel ends.
+  }];
+}
+
+#endif // PIKO_DIALECT_PIKO_IR_PIKOTYPES_TD

@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Primitives and bins.
+
+#include "Piko/Dialect/Piko/IR/Piko.h"
+
+#include "mlir/IR/Matchers.h"
+#include "mlir/IR/PatternMatch.h"
+
+using namespace mlir;
+using namespace piko;
+
+LogicalResult GetOp::verifySymbolUses(SymbolTableCollection &) {
+  return verifyFieldAccess(*this, getPrim().getType().getRecord(), getField(),
+                           getElements().size(), getResult().getType());
+}
+
+namespace {
+/// A field of what was just stored is the value that was stored.
+struct ForwardAppended : OpRewritePattern<GetOp> {
+  using OpRewritePattern::OpRewritePattern;
+  LogicalResult matchAndRewrite(GetOp get,
+                                PatternRewriter &rewriter) const override {
+    auto append = get.getPrim().getDefiningOp<AppendOp>();
+    if (!append)
+      return rewriter.notifyMatchFailure(get, "not of an appended primitive");
+    RecordOp record = lookupRecord(get, get.getPrim().getType().getRecord());
+    int64_t at = 0;
+    for (auto field : record.getFields().getAsRange<FieldAttr>()) {
+      if (field.getName() != get.getField()) {
+        at += field.getElementCount();
+        continue;
+      }
+      int64_t element = 0;
+      for (auto [index, count] :
+           llvm::zip(get.getElements(), field.getCounts())) {
+        APInt constant;
+        if (!matchPattern(index, m_ConstantInt(&constant)))
+          return rewriter.notifyMatchFailure(get, "the index is not constant");
+        if (constant.getSExtValue() < 0 || constant.getSExtValue() >= count)
+          return rewriter.notifyMatchFailure(get, "the index is out of range");
+        element = element * count + constant.getSExtValue();
+      }
+      rewriter.replaceOp(get, append.getValues()[at + element]);
+      return success();
+    }
+    return failure();
+  }
+};
+} // namespace
+
+void GetOp::getCanonicalizationPatterns(RewritePatternSet &patterns,
+                                        MLIRContext *context) {
+  patterns.add<ForwardAppended>(context);
+}
+
+LogicalResult EmitOp::verify() {
+  auto process = (*this)->getParentOfType<ProcessOp>();
+  if (!process)
+    return emitOpError("expected to be inside a process phase");
+  if ((*this)->getParentOfType<UpdateOp>())
+    return emitOpError("expected to be outside an update");
+  StageOp stage = getPhaseStage(*this);
+  if (!stage)
+    return success(); // the phase reports it
+  if (getPort() >= int64_t(stage.getOutputs().size()))
+    return emitOpError("expected a port below ")
+           << stage.getOutputs().size() << ", which is how many stage '"
+           << stage.getSymName() << "' has, but got " << getPort();
+  auto name = cast<FlatSymbolRefAttr>(stage.getOutputs()[getPort()]);
+  RecordOp record = lookupRecord(*this, name);
+  if (!record)
+    return success(); // the stage reports it
+  SmallVector<Type> types = record.getElementTypes();
+  if (types != getValues().getTypes())
+    return emitOpError("expected the numbers of record ")
+           << name << ", " << types.size() << " of types (" << types
+           << "), but got (" << getValues().getTypes() << ")";
+  return success();
+}
+
+//===----------------------------------------------------------------------===//
+// Bins
+//===----------------------------------------------------------------------===//
+
+static LogicalResult verifyRank(Operation *op, size_t coordinates) {
+  PipelineOp pipeline = getPipeline(op);
+  if (pipeline && int64_t(coordinates) != pipeline.getRank())
+    return op->emitOpError("expected ")
+           << pipeline.getRank()
+           << " coordinates, the rank of the pipeline, but got " << coordinates;
+  return success();
+}
+
+LogicalResult BinAtOp::verify() {
+  return verifyRank(*this, getCoordinates().size());
+}
+
+static LogicalResult verifyInAssign(Operation *op) {
+  if (!op->getParentOfType<AssignOp>())
+    return op->emitOpError("expected to be inside an assign phase");
+  return success();
+}
+
+LogicalResult AssignToOp::verify() { return verifyInAssign(*this); }
+LogicalResult AssignAllOp::verify() { return verifyInAssign(*this); }
+
+LogicalResult AssignPreviousOp::verify() {
+  if (failed(verifyInAssign(*this)))
+    return failure();
+  StageOp stage = getPhaseStage(*this);
+  if (!stage)
+    return success(); // the phase reports it
+  FlatSymbolRefAttr name = FlatSymbolRefAttr::get(stage.getSymNameAttr());
+  PipelineOp pipeline = getPipeline(*this);
+  for (auto source : pipeline.getOps<SourceOp>())
+    if (source.getStageAttr() == name)
+      return emitOpError("expected a previous stage, but stage '")
+             << stage.getSymName() << "' has a source";
+  for (auto edge : pipeline.getOps<EdgeOp>()) {
+    if (edge.getConsumerAttr() != name)
+      continue;
+    auto producer = lookupInPipeline<StageOp>(*this, edge.getProducerAttr());
+    if (producer && producer.getBins() != stage.getBins())
+      return emitOpError("expected stage '")
+             << producer.getSymName() << "' to have bins of the same size as '"
+             << stage.getSymName() << "', [" << stage.getBins()
+             << "], but got [" << producer.getBins() << "]";
+  }
+  return success();
+}
+
+LogicalResult AssignBoxOp::verify() {
+  if (failed(verifyInAssign(*this)) ||
+      failed(verifyRank(*this, getLo().size())))
+    return failure();
+  return verifyRank(*this, getHi().size());
+}
+
+LogicalResult OwnerOp::verify() {
+  if (failed(verifyInAssign(*this)))
+    return failure();
+  return verifyRank(*this, getCoordinates().size());
+}

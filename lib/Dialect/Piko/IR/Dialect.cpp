@@ -1,0 +1,221 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// The dialect's types and attributes, and look-ups that its operations share.
+
+#include "Piko/Dialect/Piko/IR/Piko.h"
+
+#include "mlir/IR/DialectImplementation.h"
+#include "llvm/ADT/TypeSwitch.h"
+
+using namespace mlir;
+using namespace piko;
+
+#include "Piko/Dialect/Piko/IR/PikoDialect.cpp.inc"
+#include "Piko/Dialect/Piko/IR/PikoEnums.cpp.inc"
+#define GET_TYPEDEF_CLASSES
+#include "Piko/Dialect/Piko/IR/PikoTypes.cpp.inc"
+#define GET_ATTRDEF_CLASSES
+#include "Piko/Dialect/Piko/IR/PikoAttributes.cpp.inc"
+
+void PikoDialect::initialize() {
+  addTypes<
+#define GET_TYPEDEF_LIST
+#include "Piko/Dialect/Piko/IR/PikoTypes.cpp.inc"
+      >();
+  addAttributes<
+#define GET_ATTRDEF_LIST
+#include "Piko/Dialect/Piko/IR/PikoAttributes.cpp.inc"
+      >();
+  addOperations<
+#define GET_OP_LIST
+#include "Piko/Dialect/Piko/IR/PikoOps.cpp.inc"
+      >();
+}
+
+//===----------------------------------------------------------------------===//
+// Fields
+//===----------------------------------------------------------------------===//
+
+// "w" : f32[16 : 4] at 8
+Attribute FieldAttr::parse(AsmParser &parser, Type) {
+  std::string name;
+  Type type;
+  int64_t offset;
+  SmallVector<int64_t> counts, strides;
+  auto dimension = [&]() {
+    return failure(parser.parseInteger(counts.emplace_back()) ||
+                   parser.parseColon() ||
+                   parser.parseInteger(strides.emplace_back()));
+  };
+  SMLoc loc = parser.getCurrentLocation();
+  bool braces = succeeded(parser.parseOptionalLess());
+  if (parser.parseString(&name) || parser.parseColon() ||
+      parser.parseType(type) ||
+      parser.parseCommaSeparatedList(AsmParser::Delimiter::OptionalSquare,
+                                     dimension) ||
+      parser.parseKeyword("at") || parser.parseInteger(offset) ||
+      (braces && parser.parseGreater()))
+    return {};
+  return FieldAttr::getChecked([&] { return parser.emitError(loc); },
+                               parser.getContext(), name, type, offset, counts,
+                               strides);
+}
+
+static void printField(AsmPrinter &printer, FieldAttr field) {
+  printer.printString(field.getName());
+  printer << " : " << field.getType();
+  if (!field.getCounts().empty()) {
+    printer << '[';
+    llvm::interleaveComma(llvm::zip(field.getCounts(), field.getStrides()),
+                          printer, [&](auto dimension) {
+                            printer << std::get<0>(dimension) << " : "
+                                    << std::get<1>(dimension);
+                          });
+    printer << ']';
+  }
+  printer << " at " << field.getOffset();
+}
+
+void FieldAttr::print(AsmPrinter &printer) const {
+  printer << '<';
+  printField(printer, *this);
+  printer << '>';
+}
+
+LogicalResult FieldAttr::verify(function_ref<InFlightDiagnostic()> emitError,
+                                StringRef name, Type type, int64_t offset,
+                                ArrayRef<int64_t> counts,
+                                ArrayRef<int64_t> strides) {
+  if (!type.isF32() && !type.isF64() && !type.isInteger(8) &&
+      !type.isInteger(16) && !type.isInteger(32) && !type.isInteger(64))
+    return emitError() << "expected field '" << name
+                       << "' to be f32, f64, i8, i16, i32 or i64, but got "
+                       << type;
+  if (offset < 0)
+    return emitError() << "expected field '" << name
+                       << "' to have an offset of at least 0, but got "
+                       << offset;
+  if (counts.size() != strides.size())
+    return emitError() << "expected a stride for each count of field '" << name
+                       << "', but got " << counts.size() << " counts and "
+                       << strides.size() << " strides";
+  for (auto [count, stride] : llvm::zip(counts, strides))
+    if (count < 1 || stride < 1)
+      return emitError() << "expected the counts and strides of field '" << name
+                         << "' to be positive, but got " << count << " : "
+                         << stride;
+  return success();
+}
+
+int64_t FieldAttr::getElementCount() const {
+  int64_t product = 1;
+  for (int64_t count : getCounts())
+    product *= count;
+  return product;
+}
+
+int64_t FieldAttr::getElementOffset(int64_t i) const {
+  int64_t offset = getOffset();
+  for (auto [count, stride] :
+       llvm::reverse(llvm::zip(getCounts(), getStrides()))) {
+    offset += i % count * stride;
+    i /= count;
+  }
+  return offset;
+}
+
+//===----------------------------------------------------------------------===//
+// Look-ups
+//===----------------------------------------------------------------------===//
+
+PipelineOp piko::getPipeline(Operation *op) {
+  if (auto pipeline = dyn_cast<PipelineOp>(op))
+    return pipeline;
+  return op->getParentOfType<PipelineOp>();
+}
+
+StageOp piko::getPhaseStage(Operation *op) {
+  for (Operation *at = op; at; at = at->getParentOp()) {
+    FlatSymbolRefAttr name;
+    if (auto assign = dyn_cast<AssignOp>(at))
+      name = assign.getStageAttr();
+    else if (auto process = dyn_cast<ProcessOp>(at))
+      name = process.getStageAttr();
+    else
+      continue;
+    return name ? lookupInPipeline<StageOp>(at, name)
+                : dyn_cast_or_null<StageOp>(at->getParentOp());
+  }
+  return {};
+}
+
+RecordOp piko::lookupRecord(Operation *from, FlatSymbolRefAttr name) {
+  auto module = from->getParentOfType<ModuleOp>();
+  return module ? module.lookupSymbol<RecordOp>(name) : RecordOp();
+}
+
+FlatSymbolRefAttr piko::getStateRecord(Operation *state) {
+  return llvm::TypeSwitch<Operation *, FlatSymbolRefAttr>(state)
+      .Case<ConstantOp, BufferOp, ImageOp>(
+          [](auto op) { return op.getRecordAttr(); })
+      .Default([](Operation *) { return FlatSymbolRefAttr(); });
+}
+
+int64_t piko::getStateRank(Operation *state) {
+  return llvm::TypeSwitch<Operation *, int64_t>(state)
+      .Case([](BufferOp) { return 1; })
+      .Case([](ImageOp image) { return image.getRank(); })
+      .Default([](Operation *) { return 0; });
+}
+
+LogicalResult piko::verifyFieldAccess(Operation *op,
+                                      FlatSymbolRefAttr recordName,
+                                      StringRef name, size_t indices,
+                                      Type type) {
+  RecordOp record = lookupRecord(op, recordName);
+  if (!record)
+    return op->emitOpError("expected a record, but got ")
+           << recordName << ", which is none";
+  FieldAttr field = record.getField(name);
+  if (!field) {
+    InFlightDiagnostic error = op->emitOpError("record ")
+                               << recordName << " has no field '" << name
+                               << "'";
+    error.attachNote(record.getLoc()) << "the record is declared here";
+    return error;
+  }
+  if (field.getCounts().size() != indices)
+    return op->emitOpError("expected ")
+           << field.getCounts().size() << " indices into field '" << name
+           << "', but got " << indices;
+  if (field.getType() != type)
+    return op->emitOpError("expected field '")
+           << name << "' to be of type " << field.getType() << ", but got "
+           << type;
+  return success();
+}
+
+//===----------------------------------------------------------------------===//
+// Assembly shared by operations
+//===----------------------------------------------------------------------===//
+
+static ParseResult parseFields(OpAsmParser &parser, ArrayAttr &fields) {
+  SmallVector<Attribute> list;
+  if (parser.parseCommaSeparatedList(AsmParser::Delimiter::Braces, [&] {
+        list.push_back(FieldAttr::parse(parser, {}));
+        return failure(!list.back());
+      }))
+    return failure();
+  fields = parser.getBuilder().getArrayAttr(list);
+  return success();
+}
+
+static void printFields(OpAsmPrinter &printer, Operation *, ArrayAttr fields) {
+  printer << '{';
+  llvm::interleaveComma(fields.getAsRange<FieldAttr>(), printer,
+                        [&](FieldAttr field) { printField(printer, field); });
+  printer << '}';
+}
+
+#define GET_OP_CLASSES
+#include "Piko/Dialect/Piko/IR/PikoOps.cpp.inc"

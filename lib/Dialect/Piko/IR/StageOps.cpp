@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Stages and their phases.
+
+#include "Piko/Dialect/Piko/IR/Piko.h"
+
+using namespace mlir;
+using namespace piko;
+
+template <typename PhaseOp> static PhaseOp getPhase(StageOp stage) {
+  for (auto phase : stage.getOps<PhaseOp>())
+    return phase;
+  return {};
+}
+
+AssignOp StageOp::getAssign() { return getPhase<AssignOp>(*this); }
+ScheduleOp StageOp::getSchedule() { return getPhase<ScheduleOp>(*this); }
+ProcessOp StageOp::getProcess() { return getPhase<ProcessOp>(*this); }
+
+bool StageOp::isWholeDomain() {
+  return llvm::all_of(getBins(), [](int64_t extent) { return extent == 0; });
+}
+
+bool StageOp::collects() {
+  ScheduleOp schedule = getSchedule();
+  return schedule &&
+         (schedule.getEndBin() || schedule.getBatch() ||
+          schedule.getEveryBin() ||
+          (schedule.getEndStageAttr() && !schedule.getEndStageAttr().empty()));
+}
+
+LogicalResult StageOp::verifySymbolUses(SymbolTableCollection &) {
+  SmallVector<FlatSymbolRefAttr> records{getInputAttr()};
+  llvm::append_range(records, getOutputs().getAsRange<FlatSymbolRefAttr>());
+  for (FlatSymbolRefAttr record : records)
+    if (!lookupRecord(*this, record))
+      return emitOpError("expected a record, but got ")
+             << record << ", which is none";
+  return success();
+}
+
+LogicalResult StageOp::verifyRegions() {
+  if (int64_t(getBins().size()) != getPipeline(*this).getRank())
+    return emitOpError("expected bins of the pipeline's rank, ")
+           << getPipeline(*this).getRank() << ", but got " << getBins().size()
+           << " extents";
+  for (int64_t extent : getBins())
+    if (extent < 0)
+      return emitOpError("expected bin extents of at least 0, but got ")
+             << extent;
+  int count[3] = {0, 0, 0};
+  for (Operation &op : *getBodyBlock()) {
+    int kind = isa<AssignOp>(op)     ? 0
+               : isa<ScheduleOp>(op) ? 1
+               : isa<ProcessOp>(op)  ? 2
+                                     : 3;
+    if (kind == 3)
+      return op.emitOpError("expected only phases in a stage");
+    if (++count[kind] == 2)
+      return op.emitOpError("expected at most one phase of a kind in stage '")
+             << getSymName() << "'";
+  }
+  // Below the authored level the phases are in kernels.
+  if (!count[2])
+    return count[0] ? emitOpError("expected a process phase") : success();
+  if (!count[0] && !isWholeDomain())
+    return emitOpError("expected an assign phase, because one bin is not the "
+                       "whole domain");
+  return success();
+}
+
+LogicalResult ScheduleOp::verifySymbolUses(SymbolTableCollection &) {
+  if (getTileSplit() && getKind() != ScheduleKind::All)
+    return emitOpError("expected tile_split only with 'all', but got '")
+           << stringifyScheduleKind(getKind()) << "'";
+  if (!getEndStageAttr())
+    return success();
+  for (auto name : getEndStageAttr().getAsRange<FlatSymbolRefAttr>()) {
+    auto stage = lookupInPipeline<StageOp>(*this, name);
+    if (!stage)
+      return emitOpError("expected a stage to wait for, but got ")
+             << name << ", which is none";
+    if (stage == (*this)->getParentOp())
+      return emitOpError("expected a stage to wait for another, but ")
+             << name << " waits for itself";
+  }
+  return success();
+}
+
+/// A phase outside a stage names its stage; inside one, that one is meant.
+template <typename PhaseOp> static LogicalResult verifyPhase(PhaseOp phase) {
+  Operation *parent = phase->getParentOp();
+  if (isa<StageOp>(parent) == bool(phase.getStageAttr()))
+    return phase.emitOpError(
+        "expected the stage's name inside a kernel, and only there");
+  StageOp stage = getPhaseStage(phase);
+  if (!stage)
+    return phase.emitOpError("expected a stage, but got ")
+           << phase.getStageAttr() << ", which is none";
+  Block &body = phase.getBody().front();
+  auto expected = PrimType::get(phase.getContext(), stage.getInputAttr());
+  if (body.getNumArguments() != 1 || body.getArgument(0).getType() != expected)
+    return phase.emitOpError("expected one block argument of type ")
+           << expected;
+  return success();
+}
+
+LogicalResult AssignOp::verifyRegions() {
+  if (isa<StageOp>((*this)->getParentOp())
+          ? getPort() || getSource()
+          : getPort().has_value() == getSource().has_value())
+    return emitOpError("expected a port or a source inside a kernel, and "
+                       "neither inside a stage");
+  return verifyPhase(*this);
+}
+
+LogicalResult ProcessOp::verifyRegions() { return verifyPhase(*this); }

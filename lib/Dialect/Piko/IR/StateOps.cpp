@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Access to a pipeline's state.
+
+#include "Piko/Dialect/Piko/IR/Piko.h"
+
+using namespace mlir;
+using namespace piko;
+
+/// The piece of state that an access names, after its indices are checked.
+static FailureOr<Operation *> verifyState(Operation *op, FlatSymbolRefAttr name,
+                                          std::optional<size_t> indices) {
+  Operation *state = lookupInPipeline<Operation *>(op, name);
+  if (!state || !getStateRecord(state))
+    return op->emitOpError("expected a constant, buffer or image, but got ")
+           << name << ", which is none";
+  if (indices && int64_t(*indices) != getStateRank(state)) {
+    InFlightDiagnostic error = op->emitOpError("expected ")
+                               << getStateRank(state) << " indices into "
+                               << name << ", but got " << *indices;
+    error.attachNote(state->getLoc()) << "the state is declared here";
+    return error;
+  }
+  return state;
+}
+
+template <typename AccessOp>
+static LogicalResult verifyAccess(AccessOp op, Type type) {
+  auto state = verifyState(op, op.getStateAttr(), op.getIndices().size());
+  if (failed(state))
+    return failure();
+  return verifyFieldAccess(op, getStateRecord(*state), op.getField(),
+                           op.getElements().size(), type);
+}
+
+template <typename AccessOp>
+static LogicalResult verifyWrite(AccessOp op, Type type) {
+  if (lookupInPipeline<ConstantOp>(op, op.getStateAttr()))
+    return op.emitOpError(
+               "expected a buffer or an image, but got the constant ")
+           << op.getStateAttr();
+  return verifyAccess(op, type);
+}
+
+LogicalResult LoadOp::verifySymbolUses(SymbolTableCollection &) {
+  return verifyAccess(*this, getResult().getType());
+}
+
+LogicalResult StoreOp::verifySymbolUses(SymbolTableCollection &) {
+  return verifyWrite(*this, getValue().getType());
+}
+
+LogicalResult AtomicOp::verifySymbolUses(SymbolTableCollection &) {
+  return verifyWrite(*this, getValue().getType());
+}
+
+LogicalResult ExtentOp::verifySymbolUses(SymbolTableCollection &) {
+  auto state = verifyState(*this, getStateAttr(), std::nullopt);
+  if (failed(state))
+    return failure();
+  if (getDim() >= getStateRank(*state))
+    return emitOpError("expected a dimension below ")
+           << getStateRank(*state) << ", but got " << getDim();
+  return success();
+}
+
+LogicalResult UpdateOp::verifySymbolUses(SymbolTableCollection &) {
+  if (!lookupInPipeline<ImageOp>(*this, getImageAttr()))
+    return emitOpError("expected an image, but got ")
+           << getImageAttr() << ", which is none";
+  return failure(
+      failed(verifyState(*this, getImageAttr(), getCoordinates().size())));
+}
+
+LogicalResult UpdateOp::verifyRegions() {
+  auto image = lookupInPipeline<ImageOp>(*this, getImageAttr());
+  RecordOp record =
+      image ? lookupRecord(image, image.getRecordAttr()) : RecordOp();
+  if (!record)
+    return success(); // verifySymbolUses reports it
+  if (!(*this)->getParentOfType<ProcessOp>() &&
+      !(*this)->getParentOfType<KernelOp>())
+    return emitOpError("expected to be inside a process phase");
+  if ((*this)->getParentOfType<AssignOp>())
+    return emitOpError("expected to be inside a process phase");
+  SmallVector<Type> types = record.getElementTypes();
+  Block &body = getBody().front();
+  if (types != body.getArgumentTypes())
+    return emitOpError("expected a block argument for each number of record ")
+           << image.getRecordAttr() << ", (" << types << "), but got ("
+           << body.getArgumentTypes() << ")";
+  auto yield = dyn_cast<YieldOp>(body.getTerminator());
+  if (!yield)
+    return emitOpError("expected its body to end with piko.yield");
+  if (types != yield.getPixel().getTypes())
+    return yield.emitOpError("expected the numbers of record ")
+           << image.getRecordAttr() << ", (" << types << "), but got ("
+           << yield.getPixel().getTypes() << ")";
+  if (yield.getResults().getTypes() != getResultTypes())
+    return yield.emitOpError("expected results of types (")
+           << getResultTypes() << "), but got ("
+           << yield.getResults().getTypes() << ")";
+  return success();
+}
