@@ -1,0 +1,250 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//===- abi.h - The generated code's view of the runtime -------------------===//
+//
+// A program is two functions. `setup` declares records, state, stages, sources
+// and edges, in any order. `run` calls the kernels in stage order, each one
+//
+//   pikoir_begin -> parallel loop over units -> pikoir_end
+//
+// and returns the first status that is not zero. Inside the loop, for a unit:
+//
+//   pikoir_writer *w = pikoir_open(p, stage, u);
+//   for each position:  Process: { pikoir_append, leaves, pikoir_place* }*
+//                       pikoir_next(w);
+//   pikoir_close(w);
+//
+// Every unit is opened exactly once, by any thread; a writer stays on the
+// thread that opened it. The runtime restores lineage order at the join, so
+// that no result depends on the number of threads or on how units are cut.
+// docs/RuntimeABI.md has the rationale.
+//
+//===----------------------------------------------------------------------===//
+
+#ifndef PIKORT_ABI_H
+#define PIKORT_ABI_H
+
+#include "pikort/pikort.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+// --- setup ------------------------------------------------------------------
+
+/// Flags of a stage.
+enum pikoir_stage_flags {
+  PIKOIR_COLLECTS = 1, ///< Emissions start a new lineage (bin, ordinal).
+  PIKOIR_SPLIT = 2,    ///< A bin may be cut into chunks of primitives.
+  PIKOIR_PLACED = 4,   ///< AssignBin places; else all are in bin 0, cell 0.
+  PIKOIR_UNORDERED = 8 ///< The order of its input and output is free.
+};
+
+enum pikoir_schedule {
+  PIKOIR_LOAD_BALANCE = 0,
+  PIKOIR_DIRECT_MAP = 1,
+  PIKOIR_SERIALIZE = 2, ///< One unit.
+  PIKOIR_ALL = 3
+};
+
+PIKORT_API void pikoir_declare_pipeline(pikort_pipeline *p, const char *name,
+                                        int32_t rank);
+PIKORT_API void pikoir_declare_record(pikort_pipeline *p, int32_t id,
+                                      const char *name, int64_t size,
+                                      int64_t align);
+/// A leaf of a record; `type` is a pikort_field_type.
+PIKORT_API void pikoir_declare_field(pikort_pipeline *p, int32_t record,
+                                     const char *leaf, int32_t type,
+                                     int64_t offset, int64_t elements,
+                                     int64_t stride);
+/// `kind` is a pikort_state_kind. `clear` is one record or null for zeros: what
+/// an image is cleared to; the default value of a constant (null = none).
+PIKORT_API void pikoir_declare_state(pikort_pipeline *p, int32_t id,
+                                     const char *name, int32_t kind,
+                                     int32_t record, int32_t rank,
+                                     int32_t per_source, const void *clear);
+/// `bin_size` has one entry for each dimension, 0 = the whole domain.
+/// `cell_size` is the side of owner tiles in a bin, 0 = the bin is one cell.
+PIKORT_API void pikoir_declare_stage(pikort_pipeline *p, int32_t id,
+                                     const char *name, int32_t record,
+                                     const int64_t *bin_size, int32_t schedule,
+                                     int64_t tile_split, int32_t flags,
+                                     int64_t cell_size);
+PIKORT_API void pikoir_declare_source(pikort_pipeline *p, int32_t index,
+                                      int32_t stage);
+PIKORT_API void pikoir_declare_edge(pikort_pipeline *p, int32_t producer,
+                                    int32_t port, int32_t consumer);
+
+// --- queries ----------------------------------------------------------------
+
+typedef struct pikoir_state {
+  uint8_t *data;     ///< Constant: its bytes. Buffer, image: element 0.
+  int64_t extent[4]; ///< Elements in each dimension, x first; unused = 1.
+} pikoir_state;
+
+PIKORT_API const pikoir_state *pikoir_get_state(pikort_pipeline *p, int32_t id);
+/// Four entries each, x first, unused = 1. A grid counts the stage's bins; a
+/// cell grid the owner tiles of one bin. cell = bin * tiles + tile, both
+/// row-major with x fastest.
+PIKORT_API const int64_t *pikoir_domain(pikort_pipeline *p);
+PIKORT_API const int64_t *pikoir_grid(pikort_pipeline *p, int32_t stage);
+PIKORT_API const int64_t *pikoir_cell_grid(pikort_pipeline *p, int32_t stage);
+PIKORT_API int32_t pikoir_threads(pikort_pipeline *p);
+/// The status of the run so far; thread safe.
+PIKORT_API int32_t pikoir_status(pikort_pipeline *p);
+
+// --- kernels ----------------------------------------------------------------
+
+/// Positions [begin, end), which lie in cells [cell_begin, cell_end). A unit
+/// has several cells only if it has them whole; units partition the positions
+/// in order. For a stage that collects they cover all cells, empty ones too.
+typedef struct pikoir_unit {
+  int64_t cell_begin;
+  int64_t cell_end;
+  int64_t begin;
+  int64_t end;
+} pikoir_unit;
+
+/// A stage's input: valid until pikoir_end.
+typedef struct pikoir_input {
+  const uint8_t *items;   ///< Records in lineage order.
+  int64_t count;          ///< Positions: pairs of item and cell.
+  const uint32_t *order;  ///< Position to item; null = identity.
+  const int64_t *offsets; ///< First position of each cell, cells + 1 entries.
+  const pikoir_unit *units;
+  int64_t unit_count;
+  int64_t tiles; ///< Cells in a bin.
+} pikoir_input;
+
+/// One port of a writer. The fields up to `cells` are the fast path's: see the
+/// inline functions below, which generated code may repeat.
+typedef struct pikoir_port {
+  uint8_t *cursor;       ///< Where the next record goes.
+  uint8_t *limit;        ///< There is room if cursor <= limit.
+  int64_t size;          ///< Bytes of a record.
+  int64_t emitted;       ///< Records appended, with those in no cell.
+  int64_t kept;          ///< Placed ports: records that have a cell.
+  uint32_t *cell_cursor; ///< Where the next cell of a record is noted.
+  uint32_t *cell_end;    ///< There is room if cell_cursor < cell_end.
+  int64_t last_cell;     ///< Of the latest record; -1 = it has none yet.
+  int64_t cells;         ///< Cells of the consumer; 0 = a port without places.
+  // What follows belongs to the runtime.
+  uint32_t *ordinal_cursor;
+  uint32_t *ordinal_end;
+  uint32_t *counts;
+  uint32_t *run;
+  int64_t mark;
+  uint32_t ordinal;
+  int32_t flags;
+} pikoir_port;
+
+enum pikoir_port_flags {
+  PIKOIR_PORT_ORDINALS = 1, ///< Each kept record notes its ordinal.
+  PIKOIR_PORT_COUNTS = 2,   ///< Each position notes its number of records.
+  PIKOIR_PORT_SOURCE = 4    ///< Cells of a source's primitives, no records.
+};
+
+typedef struct pikoir_writer {
+  int64_t unit;
+  uint32_t ordinal; ///< Emissions so far at this position, over all ports.
+  int32_t flags;    ///< Union of the ports'; 0 = pikoir_next does nothing.
+  int32_t port_count;
+  int32_t stage;
+  pikoir_port *ports;
+} pikoir_writer;
+
+/// The first entry that a record notes in its list of cells has this bit.
+#define PIKOIR_FIRST_CELL 0x80000000u
+
+/// Orders and bins what the stage's producers emitted. Null on an error.
+PIKORT_API const pikoir_input *pikoir_begin(pikort_pipeline *p, int32_t stage);
+PIKORT_API pikoir_writer *pikoir_open(pikort_pipeline *p, int32_t stage,
+                                      int64_t unit);
+/// Room for the next record of a port, never null. The caller writes all
+/// leaves; padding is zero. A record that is placed in no cell is dropped: its
+/// room is the next record's.
+PIKORT_API uint8_t *pikoir_append(pikoir_writer *writer, int32_t port);
+/// Puts the port's latest record in a cell of the consumer. A cell named twice
+/// counts once. A cell outside the grid is a PIKORT_BIN_OUTSIDE error.
+PIKORT_API void pikoir_place(pikoir_writer *writer, int32_t port, int64_t cell);
+/// Ends a position.
+PIKORT_API void pikoir_next(pikoir_writer *writer);
+PIKORT_API void pikoir_close(pikoir_writer *writer);
+/// Ends the kernel: 0, or the status of the first error in it.
+PIKORT_API int32_t pikoir_end(pikort_pipeline *p, int32_t stage);
+
+/// The AssignBin kernel of a source whose consumer is PLACED. The primitives
+/// stay where the host has them. There is one pikoir_next for each.
+PIKORT_API const pikoir_input *pikoir_begin_source(pikort_pipeline *p,
+                                                   int32_t source);
+PIKORT_API pikoir_writer *pikoir_open_source(pikort_pipeline *p, int32_t source,
+                                             int64_t unit);
+PIKORT_API void pikoir_place_source(pikoir_writer *writer, int64_t cell);
+PIKORT_API int32_t pikoir_end_source(pikort_pipeline *p, int32_t source);
+
+/// Reports an error of generated code; thread safe, and does not return a
+/// value: the kernel goes on and pikoir_end returns `code`, a pikort_status.
+///   PIKORT_BIN_OUTSIDE     a = bin
+///   PIKORT_UPDATE_OUTSIDE  a = x, b = y
+///   PIKORT_INDEX_OUTSIDE   a = index, b = elements
+///   PIKORT_ENDLESS         a = iterations
+///   PIKORT_NOT_A_NUMBER    a = bin, or -1
+PIKORT_API void pikoir_fail(pikort_pipeline *p, int32_t stage, int32_t code,
+                            int64_t a, int64_t b);
+
+// --- the fast path, for generated code that inlines it ----------------------
+
+static inline uint8_t *pikoir_append_inline(pikoir_writer *writer,
+                                            int32_t port) {
+  pikoir_port *out = &writer->ports[port];
+  uint8_t *record = out->cursor;
+  if (record > out->limit || out->cells != 0 || out->flags != 0)
+    return pikoir_append(writer, port);
+  out->cursor = record + out->size;
+  ++out->emitted;
+  return record;
+}
+
+static inline void pikoir_place_inline(pikoir_writer *writer, int32_t port,
+                                       int64_t cell) {
+  pikoir_port *out = &writer->ports[port];
+  if (cell <= out->last_cell || cell >= out->cells ||
+      out->cell_cursor == out->cell_end || out->flags != 0) {
+    pikoir_place(writer, port, cell);
+    return;
+  }
+  uint32_t entry = (uint32_t)cell;
+  if (out->last_cell < 0) {
+    entry |= PIKOIR_FIRST_CELL;
+    out->cursor += out->size;
+    out->run = out->cell_cursor;
+    ++out->kept;
+  }
+  *out->cell_cursor++ = entry;
+  out->last_cell = cell;
+}
+
+static inline void pikoir_next_inline(pikoir_writer *writer) {
+  if (writer->flags != 0)
+    pikoir_next(writer);
+}
+
+#ifdef __cplusplus
+static_assert(sizeof(void *) == 8, "the runtime needs 64-bit pointers");
+static_assert(sizeof(pikoir_state) == 40, "pikoir_state changed");
+static_assert(sizeof(pikoir_unit) == 32, "pikoir_unit changed");
+static_assert(sizeof(pikoir_input) == 56, "pikoir_input changed");
+static_assert(sizeof(pikoir_port) == 120, "pikoir_port changed");
+static_assert(sizeof(pikoir_writer) == 32, "pikoir_writer changed");
+static_assert(sizeof(pikort_program) == 32, "pikort_program changed");
+} // extern "C"
+#else
+_Static_assert(sizeof(void *) == 8, "the runtime needs 64-bit pointers");
+_Static_assert(sizeof(pikoir_state) == 40, "pikoir_state changed");
+_Static_assert(sizeof(pikoir_unit) == 32, "pikoir_unit changed");
+_Static_assert(sizeof(pikoir_input) == 56, "pikoir_input changed");
+_Static_assert(sizeof(pikoir_port) == 120, "pikoir_port changed");
+_Static_assert(sizeof(pikoir_writer) == 32, "pikoir_writer changed");
+_Static_assert(sizeof(pikort_program) == 32, "pikort_program changed");
+#endif
+
+#endif // PIKORT_ABI_H

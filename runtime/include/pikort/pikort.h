@@ -1,0 +1,242 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//===- pikort.h - The host's view of the runtime --------------------------===//
+//
+// What an application needs to run a compiled pipeline: create it from the
+// program that the compiler made, bind its state and sources by name, run it,
+// read its images and statistics.
+//
+// Every function that can fail returns a status: PIKORT_OK or one of
+// pikort_status, with a text in pikort_message. Nothing here exits or throws.
+// A pipeline is used by one thread at a time; different pipelines are
+// independent. Pointers that the host binds must stay valid while they are
+// bound; they are not copied, except for constants.
+//
+//===----------------------------------------------------------------------===//
+
+#ifndef PIKORT_PIKORT_H
+#define PIKORT_PIKORT_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/// Changes whenever generated code and runtime would no longer fit together.
+#define PIKORT_ABI_VERSION 1u
+
+#if defined(_WIN32)
+#define PIKORT_API
+#else
+#define PIKORT_API __attribute__((visibility("default")))
+#endif
+
+typedef struct pikort_pipeline pikort_pipeline;
+
+/// What the compiler makes of one pipeline.
+typedef struct pikort_program {
+  uint32_t abi_version; ///< PIKORT_ABI_VERSION of the compiler's runtime.
+  const char *name;     ///< The pipeline's C++ name.
+  void (*setup)(pikort_pipeline *); ///< Declares records, state and stages.
+  int32_t (*run)(pikort_pipeline *); ///< Runs the kernels once, in order.
+} pikort_program;
+
+enum pikort_status {
+  PIKORT_OK = 0,
+  PIKORT_INVALID_ARGUMENT = 1, ///< A null pointer, a negative count, ...
+  PIKORT_NOT_FOUND = 2,        ///< No state, source, ... of that name.
+  PIKORT_SIZE_MISMATCH = 3,    ///< The record's size is not the one declared.
+  PIKORT_UNBOUND = 4,          ///< Something was not bound before run.
+  PIKORT_OUT_OF_MEMORY = 5,    ///< The system or the limit refused memory.
+  PIKORT_TOO_MANY = 6,         ///< More primitives or bins than 32 bits count.
+  PIKORT_BAD_PROGRAM = 7,      ///< The program's declarations make no sense.
+  PIKORT_VERSION = 8,          ///< Made for another version of the runtime.
+  PIKORT_BIN_OUTSIDE = 16,     ///< AssignBin named a bin outside the grid.
+  PIKORT_UPDATE_OUTSIDE = 17,  ///< An update outside of the call's own bin.
+  PIKORT_INDEX_OUTSIDE = 18,   ///< An element outside a buffer or an image.
+  PIKORT_ENDLESS = 19,         ///< A loop that does not end.
+  PIKORT_NOT_A_NUMBER = 20     ///< A NaN where a position is needed.
+};
+
+// --- Life -------------------------------------------------------------------
+
+/// Makes a pipeline. On an error *pipeline may still be set: it then serves
+/// only pikort_message and pikort_destroy.
+PIKORT_API int32_t pikort_create(const pikort_program *program,
+                                 pikort_pipeline **pipeline);
+/// Frees a pipeline and all its memory; null is allowed.
+PIKORT_API void pikort_destroy(pikort_pipeline *pipeline);
+/// What the latest failed call had to say; "" if none failed. Valid until the
+/// next call with this pipeline.
+PIKORT_API const char *pikort_message(const pikort_pipeline *pipeline);
+PIKORT_API const char *pikort_name(const pikort_pipeline *pipeline);
+
+// --- Options ----------------------------------------------------------------
+
+/// Sets the domain (the screen or the volume, in cells). `rank` is the
+/// pipeline's; each extent is in [1, 2^31 - 1], x first.
+PIKORT_API int32_t pikort_set_domain(pikort_pipeline *pipeline, int32_t rank,
+                                     const int64_t *extent);
+/// Sets the number of threads, in [0, 10000]; 0 = all that OpenMP offers. The
+/// results do not depend on it.
+PIKORT_API int32_t pikort_set_threads(pikort_pipeline *pipeline,
+                                      int32_t threads);
+/// Limits all memory of the pipeline, in bytes; 0 = no limit. A run that needs
+/// more ends with PIKORT_OUT_OF_MEMORY.
+PIKORT_API int32_t pikort_set_memory_limit(pikort_pipeline *pipeline,
+                                           int64_t bytes);
+
+// --- State and sources ------------------------------------------------------
+
+/// Copies the bytes of a constant. `size` must be its record's.
+PIKORT_API int32_t pikort_bind_constant(pikort_pipeline *pipeline,
+                                        const char *name, const void *data,
+                                        int64_t size);
+/// Binds a host's array of `count` records of `record_size` bytes to a buffer.
+PIKORT_API int32_t pikort_bind_buffer(pikort_pipeline *pipeline,
+                                      const char *name, void *data,
+                                      int64_t count, int64_t record_size);
+/// Gives a buffer `count` zeroed records that the pipeline owns.
+PIKORT_API int32_t pikort_allocate_buffer(pikort_pipeline *pipeline,
+                                          const char *name, int64_t count);
+/// Binds the primitives of a source; they are read in place.
+PIKORT_API int32_t pikort_bind_source(pikort_pipeline *pipeline, int32_t source,
+                                      const void *data, int64_t count,
+                                      int64_t record_size);
+
+/// The memory of a piece of state.
+typedef struct pikort_view {
+  void *data;
+  int64_t extent[4];   ///< Elements in each dimension, x first; unused = 1.
+  int64_t record_size; ///< Bytes of an element; elements are contiguous.
+  int32_t rank;        ///< 0 constant, 1 buffer, 1 to 4 image.
+  int32_t record;      ///< Index for pikort_get_record.
+} pikort_view;
+
+/// Where a constant, buffer or image lies. Images and buffers sized by a
+/// source exist after the first run and until the next.
+PIKORT_API int32_t pikort_get_view(pikort_pipeline *pipeline, const char *name,
+                                   pikort_view *view);
+
+// --- Running ----------------------------------------------------------------
+
+/// Clears images, zeroes buffers sized by a source, and runs all kernels.
+PIKORT_API int32_t pikort_run(pikort_pipeline *pipeline);
+
+// --- Reflection -------------------------------------------------------------
+
+enum pikort_state_kind {
+  PIKORT_CONSTANT = 0,
+  PIKORT_BUFFER = 1,
+  PIKORT_IMAGE = 2
+};
+
+enum pikort_field_type {
+  PIKORT_F32 = 0,
+  PIKORT_F64 = 1,
+  PIKORT_I8 = 2,
+  PIKORT_I16 = 3,
+  PIKORT_I32 = 4,
+  PIKORT_I64 = 5
+};
+
+typedef struct pikort_record_info {
+  const char *name;
+  int64_t size;
+  int64_t align;
+  int32_t field_count;
+} pikort_record_info;
+
+/// A leaf of a record: `elements` scalars of `type`, `stride` bytes apart.
+typedef struct pikort_field_info {
+  const char *name;
+  int64_t offset;
+  int64_t elements;
+  int64_t stride;
+  int32_t type; ///< pikort_field_type
+} pikort_field_info;
+
+typedef struct pikort_state_info {
+  const char *name;
+  int32_t kind; ///< pikort_state_kind
+  int32_t record;
+  int32_t rank;
+  int32_t per_source; ///< The source that sizes a buffer, or -1.
+  int32_t bound;      ///< 1 if nothing is left to bind.
+} pikort_state_info;
+
+typedef struct pikort_stage_info {
+  const char *name;
+  int64_t bin_size[4]; ///< Cells, 0 = the whole domain; unused = 0.
+  int64_t tile_split;
+  int64_t cell_size;
+  int32_t record;   ///< Of the primitives that come in.
+  int32_t schedule; ///< As in pikoir_declare_stage.
+  int32_t flags;    ///< As in pikoir_declare_stage.
+  int32_t port_count;
+} pikort_stage_info;
+
+typedef struct pikort_source_info {
+  int32_t stage;
+  int32_t record;
+  int64_t count; ///< Primitives bound, or -1.
+} pikort_source_info;
+
+PIKORT_API int32_t pikort_rank(const pikort_pipeline *pipeline);
+PIKORT_API int32_t pikort_record_count(const pikort_pipeline *pipeline);
+PIKORT_API int32_t pikort_state_count(const pikort_pipeline *pipeline);
+PIKORT_API int32_t pikort_stage_count(const pikort_pipeline *pipeline);
+PIKORT_API int32_t pikort_source_count(const pikort_pipeline *pipeline);
+PIKORT_API int32_t pikort_get_record(pikort_pipeline *pipeline, int32_t index,
+                                     pikort_record_info *info);
+PIKORT_API int32_t pikort_get_field(pikort_pipeline *pipeline, int32_t record,
+                                    int32_t index, pikort_field_info *info);
+PIKORT_API int32_t pikort_get_state_info(pikort_pipeline *pipeline,
+                                         int32_t index,
+                                         pikort_state_info *info);
+PIKORT_API int32_t pikort_get_stage_info(pikort_pipeline *pipeline,
+                                         int32_t index,
+                                         pikort_stage_info *info);
+PIKORT_API int32_t pikort_get_source_info(pikort_pipeline *pipeline,
+                                          int32_t index,
+                                          pikort_source_info *info);
+
+// --- Statistics -------------------------------------------------------------
+
+/// A kernel: a stage's Process, or "<stage>.assign<n>" for the AssignBin of
+/// source n. Sums since the latest reset; divide by pikort_stats_runs.
+typedef struct pikort_kernel_stats {
+  const char *name;
+  double milliseconds;      ///< From begin to end.
+  double join_milliseconds; ///< Of these, ordering and binning its input.
+  int64_t launches;
+} pikort_kernel_stats;
+
+/// A stage's primitives. Sums since the latest reset.
+typedef struct pikort_stage_stats {
+  const char *name;
+  int64_t in;     ///< Primitives that came in.
+  int64_t placed; ///< Pairs of primitive and cell that were processed.
+  int64_t out;    ///< Primitives emitted, over all ports.
+} pikort_stage_stats;
+
+PIKORT_API int64_t pikort_stats_runs(const pikort_pipeline *pipeline);
+PIKORT_API int32_t pikort_kernel_count(const pikort_pipeline *pipeline);
+PIKORT_API int32_t pikort_get_kernel_stats(pikort_pipeline *pipeline,
+                                           int32_t index,
+                                           pikort_kernel_stats *stats);
+PIKORT_API int32_t pikort_get_stage_stats(pikort_pipeline *pipeline,
+                                          int32_t stage,
+                                          pikort_stage_stats *stats);
+/// The most bytes that bins and queues held at one time since the reset.
+PIKORT_API int64_t pikort_peak_bytes(const pikort_pipeline *pipeline);
+/// All bytes that the pipeline holds now, with those kept for later frames.
+PIKORT_API int64_t pikort_reserved_bytes(const pikort_pipeline *pipeline);
+PIKORT_API void pikort_reset_stats(pikort_pipeline *pipeline);
+
+#ifdef __cplusplus
+} // extern "C"
+#endif
+
+#endif // PIKORT_PIKORT_H

@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//===- pikort.hpp - The host API for C++ ----------------------------------===//
+//
+// A thin owner of a pikort_pipeline. No exceptions: a call that can fail
+// returns a Status, which is true when it went well.
+//
+//   piko::rt::Pipeline pipe(program);
+//   if (auto s = pipe.domain({1024, 768}); !s) return report(s.message());
+//   pipe.constant("camera", camera);
+//   pipe.source(0, vertices);
+//   if (auto s = pipe.run(); !s) return report(s.message());
+//   auto color = pipe.view<Color>("color");
+//
+//===----------------------------------------------------------------------===//
+
+#ifndef PIKORT_PIKORT_HPP
+#define PIKORT_PIKORT_HPP
+
+#include "pikort/pikort.h"
+
+#include <initializer_list>
+#include <span>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+namespace piko::rt {
+
+/// PIKORT_OK, or a code and its text.
+class Status {
+public:
+  Status() = default;
+  Status(int32_t code, const char *message)
+      : code_(code), message_(code == PIKORT_OK ? "" : message) {}
+  explicit operator bool() const { return code_ == PIKORT_OK; }
+  int32_t code() const { return code_; }
+  const std::string &message() const { return message_; }
+
+private:
+  int32_t code_ = PIKORT_OK;
+  std::string message_;
+};
+
+/// The elements of a piece of state; empty if it does not exist (yet).
+template <class T> struct View {
+  std::span<T> elements;
+  int64_t extent[4] = {0, 0, 0, 0};
+  T &operator()(int64_t x, int64_t y = 0, int64_t z = 0) const {
+    return elements[static_cast<size_t>((z * extent[1] + y) * extent[0] + x)];
+  }
+};
+
+class Pipeline {
+public:
+  /// Makes a pipeline; see created() for how that went.
+  explicit Pipeline(const pikort_program &program) {
+    int32_t code = pikort_create(&program, &handle_);
+    created_ = status(code);
+  }
+  Pipeline(Pipeline &&other) noexcept
+      : handle_(std::exchange(other.handle_, nullptr)),
+        created_(std::move(other.created_)) {}
+  Pipeline &operator=(Pipeline &&other) noexcept {
+    std::swap(handle_, other.handle_);
+    std::swap(created_, other.created_);
+    return *this;
+  }
+  Pipeline(const Pipeline &) = delete;
+  Pipeline &operator=(const Pipeline &) = delete;
+  ~Pipeline() { pikort_destroy(handle_); }
+
+  /// How the creation went.
+  const Status &created() const { return created_; }
+  /// For the C functions; still owned by this object.
+  pikort_pipeline *get() const { return handle_; }
+
+  Status domain(std::initializer_list<int64_t> extent) {
+    return status(pikort_set_domain(
+        handle_, static_cast<int32_t>(extent.size()), extent.begin()));
+  }
+  Status threads(int32_t count) {
+    return status(pikort_set_threads(handle_, count));
+  }
+  Status memoryLimit(int64_t bytes) {
+    return status(pikort_set_memory_limit(handle_, bytes));
+  }
+  template <class T> Status constant(const char *name, const T &value) {
+    static_assert(std::is_trivially_copyable_v<T>);
+    return status(pikort_bind_constant(handle_, name, &value, sizeof(T)));
+  }
+  /// Binds a host's array, which must outlive the runs.
+  template <class T> Status buffer(const char *name, std::span<T> data) {
+    static_assert(std::is_trivially_copyable_v<T>);
+    return status(pikort_bind_buffer(handle_, name, data.data(),
+                                     static_cast<int64_t>(data.size()),
+                                     sizeof(T)));
+  }
+  template <class T> Status buffer(const char *name, std::vector<T> &data) {
+    return buffer(name, std::span<T>(data));
+  }
+  Status allocate(const char *name, int64_t count) {
+    return status(pikort_allocate_buffer(handle_, name, count));
+  }
+  /// Binds a source's primitives, which must outlive the runs.
+  template <class T> Status source(int32_t index, std::span<const T> data) {
+    static_assert(std::is_trivially_copyable_v<T>);
+    return status(pikort_bind_source(handle_, index, data.data(),
+                                     static_cast<int64_t>(data.size()),
+                                     sizeof(T)));
+  }
+  template <class T> Status source(int32_t index, const std::vector<T> &data) {
+    return source(index, std::span<const T>(data));
+  }
+  Status run() { return status(pikort_run(handle_)); }
+
+  /// A buffer's or image's elements; empty if T has another size.
+  template <class T> View<T> view(const char *name) {
+    pikort_view raw;
+    View<T> result;
+    if (pikort_get_view(handle_, name, &raw) != PIKORT_OK ||
+        raw.record_size != static_cast<int64_t>(sizeof(T)))
+      return result;
+    int64_t count = 1;
+    for (int d = 0; d < 4; ++d)
+      count *= result.extent[d] = raw.extent[d];
+    result.elements = {static_cast<T *>(raw.data), static_cast<size_t>(count)};
+    return result;
+  }
+
+private:
+  Status status(int32_t code) const {
+    return Status(code, pikort_message(handle_));
+  }
+
+  pikort_pipeline *handle_ = nullptr;
+  Status created_;
+};
+
+} // namespace piko::rt
+
+#endif // PIKORT_PIKORT_HPP
