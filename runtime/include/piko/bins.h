@@ -1,0 +1,90 @@
+//===- piko/bins.h - Bins, directives and positions -----------------------===//
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// The vocabulary that the reference executor and compiled pipelines share:
+// bin ids, bin extents, the values of the schedule directives, and how a
+// position becomes a cell. It includes no heavy standard header.
+//
+//===----------------------------------------------------------------------===//
+#ifndef PIKO_BINS_H
+#define PIKO_BINS_H
+
+#if defined(__FAST_MATH__) ||                                                  \
+    (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__ != 0)
+#error "piko.h: pipelines cannot be compiled with -ffast-math"
+#endif
+#if defined(__FLT_EVAL_METHOD__) && __FLT_EVAL_METHOD__ != 0 &&                \
+    !defined(__PIKO__)
+#error "piko.h: floats must be evaluated as floats (use SSE arithmetic)"
+#endif
+#ifdef __clang__
+#pragma STDC FP_CONTRACT OFF
+#endif
+
+#include <stdint.h>
+
+#include <glm/ext/vector_int1.hpp>
+#include <glm/glm.hpp>
+
+namespace piko {
+
+/// The number of a bin in its stage's grid: row-major, x fastest; -1 is no
+/// bin.
+struct BinId {
+  int64_t index = -1;
+
+  friend constexpr bool operator==(BinId, BinId) = default;
+};
+
+/// The extent of a stage's bins in cells (pixels, voxels), one number for each
+/// dimension of the domain; 0 is the whole domain. A pipeline has one to four
+/// dimensions.
+template <int... Size> struct Bins {
+  static_assert(sizeof...(Size) >= 1 && sizeof...(Size) <= 4,
+                "a grid of bins has one to four dimensions");
+  static_assert(((Size >= 0) && ...), "a bin size is at least 0");
+  static constexpr int rank = sizeof...(Size);
+  static constexpr int64_t size[] = {Size...};
+  static constexpr bool wholeDomain = ((Size == 0) && ...);
+};
+
+/// Which cores run the bins of a stage.
+enum SchedulePolicy : int32_t {
+  LoadBalance = 0, ///< any core takes the next bin
+  DirectMap = 1,   ///< bins go to cores in turn
+  Serialize = 2,   ///< one core runs all bins
+  All = 3,         ///< all cores run one bin after the other
+};
+
+/// In which order the primitives of a stage are processed, as far as the
+/// program can tell.
+enum Order : int32_t {
+  InLineage = 0, ///< as the reference executor does
+  Unordered = 1, ///< any
+};
+
+/// The primitives of one bin, or one batch of them, in order.
+template <class T> class List;
+
+/// The state of a pipeline that has none.
+struct NoState {};
+
+/// A position or a size in cells.
+template <int Rank> using Cells = glm::vec<Rank, int, glm::defaultp>;
+/// A position within the domain; cell c spans [c, c + 1).
+template <int Rank> using Position = glm::vec<Rank, float, glm::defaultp>;
+
+namespace detail {
+
+/// The cell that holds the coordinate p, saturated; NaN is in no cell.
+inline int32_t cellOf(float p) {
+  float f = __builtin_floorf(p);
+  if (!(f >= -2147483648.0f))
+    return INT32_MIN;
+  return f >= 2147483648.0f ? INT32_MAX : static_cast<int32_t>(f);
+}
+
+} // namespace detail
+} // namespace piko
+
+#endif // PIKO_BINS_H

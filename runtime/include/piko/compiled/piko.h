@@ -1,0 +1,42 @@
+//===- piko/compiled/piko.h - The language, for the compiler --------------===//
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// The classes that piko/reference/pipe.h executes, here as calls of markers.
+//
+//===----------------------------------------------------------------------===//
+#ifndef PIKO_COMPILED_PIKO_H
+#define PIKO_COMPILED_PIKO_H
+
+#include <piko/compiled/math.h>
+#include <piko/compiled/stage.h>
+#include <piko/compiled/state.h>
+
+namespace piko {
+
+/// The base of pipelines. Stages are members; the constructor connects them.
+template <class S = NoState> class Pipe {
+public:
+  using State = S;
+  Pipe() = default;
+  Pipe(const Pipe &) = delete;
+  Pipe &operator=(const Pipe &) = delete;
+
+  S &state() { return *marker::state<S>(); }
+
+protected:
+  template <class Stage> void source(Stage &stage) { marker::source(&stage); }
+  template <class From, class To>
+  void connect(From &producer, int port, To &consumer) {
+    marker::connect(&producer, port, &consumer);
+  }
+  template <class From, class To> void connect(From &producer, To &consumer) {
+    marker::connect(&producer, 0, &consumer);
+  }
+  template <class T> void allocateForSource(Buffer<T> &buffer, int source) {
+    marker::allocateForSource(&buffer, source);
+  }
+};
+
+} // namespace piko
+
+#endif // PIKO_COMPILED_PIKO_H

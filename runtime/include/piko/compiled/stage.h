@@ -1,0 +1,117 @@
+//===- piko/compiled/stage.h - Stages for the compiler --------------------===//
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+#ifndef PIKO_COMPILED_STAGE_H
+#define PIKO_COMPILED_STAGE_H
+
+#include <piko/compiled/state.h>
+
+namespace piko {
+
+/// Gives a stage access to the state of its pipeline.
+template <class S> class Uses {
+public:
+  S &state() const { return *marker::state<S>(); }
+};
+
+/// The base of stages: bins of B cells, `Threads` threads for a bin, a
+/// primitive type in, and one out for each port.
+template <class B, int Threads, class In, class... Out> class BasicStage {
+  static_assert(Threads > 0, "a bin has at least one thread");
+  static_assert(__is_trivially_copyable(In),
+                "a primitive must be trivially copyable");
+
+public:
+  using Input = In;
+  static constexpr int rank = B::rank;
+
+  BasicStage() = default;
+  BasicStage(const BasicStage &) = delete;
+  BasicStage &operator=(const BasicStage &) = delete;
+
+protected:
+  template <class T> void emit(const T &value, int port = 0) {
+    T copy = value;
+    marker::emit<T>(port, &copy);
+  }
+
+  // AssignBin.
+  void assignToBin(const In &, BinId bin) { marker::assignBin(bin.index); }
+  void assignToAll(const In &) { marker::assignAll(); }
+  void assignToPreviousBins(const In &) { marker::assignPrevious(); }
+  void assignToBoundingBox(const In &, const Cells<rank> &lo,
+                           const Cells<rank> &hi) {
+    using namespace detail;
+    marker::assignBox(coordinate<0, rank>(lo), coordinate<1, rank>(lo),
+                      coordinate<2, rank>(lo), coordinate<3, rank>(lo),
+                      coordinate<0, rank>(hi), coordinate<1, rank>(hi),
+                      coordinate<2, rank>(hi), coordinate<3, rank>(hi));
+  }
+  void assignToBoundingBox(const In &in, const Position<rank> &lo,
+                           const Position<rank> &hi) {
+    assignToBoundingBox(in, cells(lo), cells(hi));
+  }
+
+  // Queries.
+  BinId binFromPosition(const Cells<rank> &at) const {
+    using namespace detail;
+    return BinId{marker::binAt(coordinate<0, rank>(at), coordinate<1, rank>(at),
+                               coordinate<2, rank>(at),
+                               coordinate<3, rank>(at))};
+  }
+  BinId binFromPosition(const Position<rank> &at) const {
+    return binFromPosition(cells(at));
+  }
+  BinId bin() const { return BinId{marker::bin()}; }
+  Cells<rank> domain() const {
+    return make([](int32_t dim) { return marker::domain(dim); });
+  }
+  Cells<rank> binLo() const {
+    return make([](int32_t dim) { return marker::binLo(marker::bin(), dim); });
+  }
+  Cells<rank> binHi() const {
+    return make([](int32_t dim) { return marker::binHi(marker::bin(), dim); });
+  }
+
+  // Schedule.
+  void specifySchedule(SchedulePolicy policy, int64_t tileSplit = 0) {
+    marker::schedule(policy, tileSplit);
+  }
+  template <class S> void endStage() { marker::endStage<S>(); }
+  void endBin() { marker::endBin(); }
+  void batch(int64_t size) { marker::batch(size); }
+  void everyBin() { marker::everyBin(); }
+  void specifyOrder(Order order) { marker::order(order); }
+
+private:
+  static Cells<rank> cells(const Position<rank> &p) {
+    if constexpr (rank == 1)
+      return Cells<1>(detail::cellOf(p.x));
+    else if constexpr (rank == 2)
+      return Cells<2>(detail::cellOf(p.x), detail::cellOf(p.y));
+    else if constexpr (rank == 3)
+      return Cells<3>(detail::cellOf(p.x), detail::cellOf(p.y),
+                      detail::cellOf(p.z));
+    else
+      return Cells<4>(detail::cellOf(p.x), detail::cellOf(p.y),
+                      detail::cellOf(p.z), detail::cellOf(p.w));
+  }
+  template <class F> static Cells<rank> make(F get) {
+    if constexpr (rank == 1)
+      return Cells<1>(static_cast<int>(get(0)));
+    else if constexpr (rank == 2)
+      return Cells<2>(static_cast<int>(get(0)), static_cast<int>(get(1)));
+    else if constexpr (rank == 3)
+      return Cells<3>(static_cast<int>(get(0)), static_cast<int>(get(1)),
+                      static_cast<int>(get(2)));
+    else
+      return Cells<4>(static_cast<int>(get(0)), static_cast<int>(get(1)),
+                      static_cast<int>(get(2)), static_cast<int>(get(3)));
+  }
+};
+
+template <int X, int Y, int Threads, class In, class... Out>
+using Stage = BasicStage<Bins<X, Y>, Threads, In, Out...>;
+
+} // namespace piko
+
+#endif // PIKO_COMPILED_STAGE_H

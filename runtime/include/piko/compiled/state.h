@@ -1,0 +1,138 @@
+//===- piko/compiled/state.h - Buffers, images, atomics for the compiler --===//
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// A Buffer or an Image holds nothing: its address in the state says which one
+// it is. They cannot be copied, so that the address can always be known.
+//
+//===----------------------------------------------------------------------===//
+#ifndef PIKO_COMPILED_STATE_H
+#define PIKO_COMPILED_STATE_H
+
+#include <piko/bins.h>
+#include <piko/markers.h>
+
+namespace piko {
+namespace detail {
+
+/// Coordinate `D` of a cell, and 0 past its last.
+template <int D, int Rank> inline int64_t coordinate(const Cells<Rank> &at) {
+  if constexpr (D >= Rank)
+    return 0;
+  else if constexpr (D == 0)
+    return at.x;
+  else if constexpr (D == 1)
+    return at.y;
+  else if constexpr (D == 2)
+    return at.z;
+  else
+    return at.w;
+}
+
+template <class T, class U> inline constexpr bool isSame = false;
+template <class T> inline constexpr bool isSame<T, T> = true;
+template <class T> struct Identity {
+  using type = T;
+};
+
+} // namespace detail
+
+template <class T> class Buffer final {
+  static_assert(__is_trivially_copyable(T),
+                "the elements of a buffer must be trivially copyable");
+
+public:
+  Buffer() = default;
+  Buffer(const Buffer &) = delete;
+  Buffer &operator=(const Buffer &) = delete;
+
+  int64_t size() const { return marker::extent(this, 0); }
+  T &operator[](int64_t i) const {
+    return *marker::element<T>(this, i, 0, 0, 0);
+  }
+};
+
+template <class T, int Rank = 2> class Image final {
+  static_assert(__is_trivially_copyable(T),
+                "the pixels of an image must be trivially copyable");
+  static_assert(Rank >= 1 && Rank <= 4, "an image has one to four dimensions");
+
+public:
+  Image() = default;
+  Image(const Image &) = delete;
+  Image &operator=(const Image &) = delete;
+
+  const T &operator()(const Cells<Rank> &at) const { return pixel(at); }
+  void store(const Cells<Rank> &at, const T &value) { pixel(at) = value; }
+  Cells<Rank> extent() const {
+    if constexpr (Rank == 1)
+      return Cells<1>(extent(0));
+    else if constexpr (Rank == 2)
+      return Cells<2>(extent(0), extent(1));
+    else if constexpr (Rank == 3)
+      return Cells<3>(extent(0), extent(1), extent(2));
+    else
+      return Cells<4>(extent(0), extent(1), extent(2), extent(3));
+  }
+  T &pixel(const Cells<Rank> &at) const {
+    return *marker::element<T>(
+        this, detail::coordinate<0, Rank>(at), detail::coordinate<1, Rank>(at),
+        detail::coordinate<2, Rank>(at), detail::coordinate<3, Rank>(at));
+  }
+
+private:
+  int extent(int dim) const {
+    return static_cast<int>(marker::extent(this, dim));
+  }
+};
+
+namespace detail {
+/// Says what an image is cleared to when a run begins.
+template <class T, int Rank> inline void clearImage(const Image<T, Rank> &) {
+  T value{};
+  marker::clear<T>(&value);
+}
+} // namespace detail
+
+/// Changes a pixel of the primitive's own bin; the calls for one pixel run in
+/// lineage order.
+template <class T, int Rank, class F>
+inline void update(const Image<T, Rank> &image,
+                   const detail::Identity<Cells<Rank>>::type &at, F &&f) {
+  T pixel;
+  marker::updateBegin<T>(
+      &pixel, &image, detail::coordinate<0, Rank>(at),
+      detail::coordinate<1, Rank>(at), detail::coordinate<2, Rank>(at),
+      detail::coordinate<3, Rank>(at));
+  f(pixel);
+  marker::updateEnd<T>(&pixel);
+}
+
+namespace detail {
+template <class T>
+concept AtomicInteger = isSame<T, int32_t> || isSame<T, uint32_t> ||
+                        isSame<T, int64_t> || isSame<T, uint64_t> ||
+                        isSame<T, long long> || isSame<T, unsigned long long>;
+} // namespace detail
+
+#define PIKO_ATOMIC(NAME, KIND)                                                \
+  template <detail::AtomicInteger T>                                           \
+  inline void NAME(const T &place,                                             \
+                   typename detail::Identity<T>::type value) {                 \
+    marker::atomic<KIND, (static_cast<T>(-1) < static_cast<T>(0)), T>(         \
+        const_cast<T *>(&place), value);                                       \
+  }                                                                            \
+  template <class T>                                                           \
+  void NAME(const T &&place, typename detail::Identity<T>::type value) =       \
+      delete;
+
+PIKO_ATOMIC(atomicAdd, 0)
+PIKO_ATOMIC(atomicMin, 1)
+PIKO_ATOMIC(atomicMax, 2)
+PIKO_ATOMIC(atomicAnd, 3)
+PIKO_ATOMIC(atomicOr, 4)
+PIKO_ATOMIC(atomicXor, 5)
+#undef PIKO_ATOMIC
+
+} // namespace piko
+
+#endif // PIKO_COMPILED_STATE_H

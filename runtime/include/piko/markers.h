@@ -1,0 +1,69 @@
+//===- piko/markers.h - What the compiler recognises ----------------------===//
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Under __PIKO__ the language is written in terms of these functions. None has
+// a body: the front end finds their calls in the LLVM IR of a pipeline and
+// turns them into operations of the piko dialect. They are found by their
+// declarations, so that names and template arguments, not mangled text, say
+// what a call means (lib/Frontend/Markers.cpp lists them all).
+//
+// A marker that takes or returns a pointer to a record is a template over the
+// record's type, whose layout the front end knows from Clang.
+//
+//===----------------------------------------------------------------------===//
+#ifndef PIKO_MARKERS_H
+#define PIKO_MARKERS_H
+
+#include <stdint.h>
+
+namespace piko::marker {
+
+// Memory that is not the function's own. `handle` is the address of the
+// Buffer or Image in the state.
+template <class S> S *state();
+template <class T> const T *input();
+template <class T>
+T *element(const void *handle, int64_t x, int64_t y, int64_t z, int64_t w);
+int64_t extent(const void *handle, int32_t dim);
+
+// Effects.
+template <class T> void emit(int32_t port, const T *record);
+template <class T>
+void updateBegin(T *pixel, const void *handle, int64_t x, int64_t y, int64_t z,
+                 int64_t w);
+template <class T> void updateEnd(const T *pixel);
+template <int Kind, bool Signed, class T> void atomic(T *place, T value);
+
+// The grid of bins.
+int64_t bin();
+int64_t binAt(int64_t x, int64_t y, int64_t z, int64_t w);
+int64_t binLo(int64_t bin, int32_t dim);
+int64_t binHi(int64_t bin, int32_t dim);
+int64_t domain(int32_t dim);
+
+// AssignBin.
+void assignBin(int64_t bin);
+void assignAll();
+void assignPrevious();
+void assignBox(int64_t x0, int64_t y0, int64_t z0, int64_t w0, int64_t x1,
+               int64_t y1, int64_t z1, int64_t w1);
+
+// Schedule.
+void schedule(int32_t policy, int64_t tileSplit);
+template <class S> void endStage();
+void endBin();
+void batch(int64_t size);
+void everyBin();
+void order(int32_t order);
+
+// The graph. Stages are given by their addresses in the pipeline.
+void source(const void *stage);
+void connect(const void *producer, int32_t port, const void *consumer);
+void allocateForSource(const void *handle, int64_t source);
+
+// What an image is cleared to.
+template <class T> void clear(const T *value);
+
+} // namespace piko::marker
+
+#endif // PIKO_MARKERS_H

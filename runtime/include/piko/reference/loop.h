@@ -1,0 +1,107 @@
+//===- piko/reference/loop.h - One parallelFor that is running ------------===//
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Iterations run one after the other on the caller's stack, until iteration 0
+// calls sync(): it then starts the others, each on a fiber, and lets every one
+// run to its own sync(), in order of index. So iteration 0 is also the
+// scheduler, and a loop without sync() costs nothing and reads naturally in a
+// debugger.
+//
+//===----------------------------------------------------------------------===//
+#ifndef PIKO_REFERENCE_LOOP_H
+#define PIKO_REFERENCE_LOOP_H
+
+#include <piko/reference/fiber.h>
+#include <piko/reference/graph.h>
+
+#include <any>
+
+namespace piko::reference {
+
+/// A primitive on its way to a stage.
+struct Emission {
+  Node *to;
+  std::vector<std::byte> primitive;
+};
+
+class Loop {
+public:
+  Loop(Loop *outer, int64_t size, std::function<void(int64_t)> body)
+      : outer(outer), size(size), body(std::move(body)) {}
+
+  /// Runs all iterations. `deliver` takes what iterations emitted while their
+  /// emissions had to be kept.
+  template <class Deliver> void run(const Node &node, Deliver deliver) {
+    for (iteration = 0; iteration < size && fibers.empty(); ++iteration)
+      body(iteration);
+    for (size_t i = 0; i < fibers.size(); ++i) {
+      resume(i);
+      if (!fibers[i]->isDone())
+        failUniform(node);
+    }
+    running = nullptr;
+    for (std::vector<Emission> &list : kept)
+      for (const Emission &emission : list)
+        deliver(emission);
+  }
+
+  /// Called by an iteration: a barrier between all of them.
+  void sync(const Node &node) {
+    if (running) {
+      running->suspend();
+      return;
+    }
+    if (iteration != 0)
+      failUniform(node);
+    if (fibers.empty())
+      start();
+    for (size_t i = 0; i < fibers.size(); ++i) {
+      resume(i);
+      if (fibers[i]->isDone())
+        failUniform(node);
+    }
+    running = nullptr;
+    iteration = 0;
+  }
+
+  /// Where the running iteration keeps its emissions; null if they can be
+  /// delivered at once.
+  std::vector<Emission> *keeper() {
+    return running ? &kept[iteration - 1] : nullptr;
+  }
+
+  Loop *const outer;
+  const int64_t size;
+  int64_t iteration = 0;
+  std::any slots;  ///< what iterations hand in to a collective operation
+  std::any result; ///< and what comes out of it
+
+private:
+  void start() {
+    kept.resize(size - 1);
+    for (int64_t i = 1; i < size; ++i)
+      fibers.push_back(std::make_unique<Fiber>([this, i] { body(i); }));
+  }
+
+  void resume(size_t fiber) {
+    running = fibers[fiber].get();
+    iteration = static_cast<int64_t>(fiber) + 1;
+    running->resume();
+  }
+
+  [[noreturn]] void failUniform(const Node &node) {
+    running = nullptr;
+    node.fail(-1, "expected every iteration of parallelFor to call sync() as "
+                  "often as iteration 0, but iteration " +
+                      std::to_string(iteration) + " does not");
+  }
+
+  std::function<void(int64_t)> body;
+  std::vector<std::vector<Emission>> kept; ///< of iterations 1, 2, ...
+  std::vector<std::unique_ptr<Fiber>> fibers;
+  Fiber *running = nullptr;
+};
+
+} // namespace piko::reference
+
+#endif // PIKO_REFERENCE_LOOP_H

@@ -1,0 +1,177 @@
+//===- piko/reference/state.h - Buffers, images, atomics ------------------===//
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// The state of a pipeline is an aggregate: members of type Buffer and Image
+// are what their names say, any other member is a constant that the host sets
+// before a run.
+//
+//===----------------------------------------------------------------------===//
+#ifndef PIKO_REFERENCE_STATE_H
+#define PIKO_REFERENCE_STATE_H
+
+#include <piko/reference/executor.h>
+
+#include <cstring>
+
+namespace piko {
+namespace reference {
+
+/// Throws for an access outside a buffer or an image.
+[[noreturn]] inline void failAccess(const std::string &message) {
+  Executor *executor = Executor::current();
+  if (executor && executor->frame)
+    executor->frame->node->fail(
+        executor->frame->phase == Phase::Assign ? -1 : executor->frame->bin,
+        message);
+  throw Error(message);
+}
+
+/// What the pipeline has to know of its images.
+class ImageBase {
+public:
+  virtual void prepare(const Cell &domain) = 0;
+
+  /// The images of the pipeline whose state is under construction.
+  static std::vector<ImageBase *> *&registry() {
+    static thread_local std::vector<ImageBase *> *images = nullptr;
+    return images;
+  }
+
+protected:
+  ImageBase() {
+    if (registry())
+      registry()->push_back(this);
+  }
+  ImageBase(const ImageBase &) = delete;
+  ImageBase &operator=(const ImageBase &) = delete;
+  ~ImageBase() = default;
+};
+
+/// What the pipeline has to know of a buffer that it allocates.
+class BufferBase {
+public:
+  virtual void allocateZeroed(int64_t count) = 0;
+
+protected:
+  BufferBase() = default;
+  BufferBase(const BufferBase &) = delete;
+  BufferBase &operator=(const BufferBase &) = delete;
+  ~BufferBase() = default;
+};
+
+} // namespace reference
+
+/// A one-dimensional array: bound by the host, or allocated by the pipeline
+/// (Pipe::allocateForSource).
+template <class T> class Buffer final : public reference::BufferBase {
+  static_assert(std::is_trivially_copyable_v<T>,
+                "the elements of a buffer must be trivially copyable");
+
+public:
+  Buffer() = default;
+
+  int64_t size() const { return count; }
+  T &operator[](int64_t i) const {
+    if (i < 0 || i >= count)
+      reference::failAccess("expected a buffer index in [0, " +
+                            std::to_string(count) + "), but got " +
+                            std::to_string(i));
+    return elements[i];
+  }
+
+  // For the host.
+
+  /// Uses the caller's memory, which must outlive the runs.
+  void bind(T *data, int64_t n) {
+    owned.reset();
+    elements = data;
+    count = n;
+  }
+  /// Copies n elements.
+  void assign(const T *data, int64_t n) {
+    std::unique_ptr<T[]> copy(new T[n]);
+    std::copy(data, data + n, copy.get());
+    owned = std::move(copy);
+    elements = owned.get();
+    count = n;
+  }
+  /// Copies a vector, an array or a span.
+  template <class Range> void assign(const Range &range) {
+    assign(std::data(range), static_cast<int64_t>(std::size(range)));
+  }
+  void assign(std::initializer_list<T> values) {
+    assign(values.begin(), static_cast<int64_t>(values.size()));
+  }
+  /// Makes n elements whose bytes are zero.
+  void allocateZeroed(int64_t n) override {
+    owned.reset(new T[n]);
+    elements = owned.get();
+    count = n;
+    if (n)
+      std::memset(static_cast<void *>(elements), 0, n * sizeof(T));
+  }
+  T *data() const { return elements; }
+  T *begin() const { return elements; }
+  T *end() const { return elements + count; }
+
+private:
+  std::unique_ptr<T[]> owned;
+  T *elements = nullptr;
+  int64_t count = 0;
+};
+
+/// A grid of pixels with the extent of the domain (of its first dimensions, if
+/// the domain has more), cleared to T{} when a run begins.
+template <class T, int Rank = 2>
+class Image final : public reference::ImageBase {
+  static_assert(std::is_trivially_copyable_v<T>,
+                "the pixels of an image must be trivially copyable");
+  static_assert(Rank >= 1 && Rank <= 4, "an image has one to four dimensions");
+
+public:
+  Image() = default;
+
+  const T &operator()(const Cells<Rank> &at) const { return pixel(at); }
+  void store(const Cells<Rank> &at, const T &value) { pixel(at) = value; }
+  Cells<Rank> extent() const { return reference::fromCell<Rank>(cells); }
+
+  // For the host.
+
+  int64_t size() const { return cells[0] * cells[1] * cells[2] * cells[3]; }
+  /// The pixels, row-major, x fastest; for a host to change between runs, too.
+  T *data() const { return pixels.get(); }
+
+  /// Sizes and clears the image.
+  void prepare(const reference::Cell &domain) override {
+    for (int d = 0; d < Rank; ++d)
+      cells[d] = domain[d];
+    pixels.reset(new T[size()]);
+    std::fill_n(pixels.get(), size(), T{});
+  }
+
+  /// The pixel itself: for update() and the atomics.
+  T &pixel(const Cells<Rank> &at) const {
+    int64_t index = 0;
+    for (int d = Rank - 1; d >= 0; --d) {
+      if (at[d] < 0 || at[d] >= cells[d])
+        reference::failAccess("expected an image coordinate in [0, " +
+                              std::to_string(cells[d]) + "), but got " +
+                              std::to_string(at[d]));
+      index = index * cells[d] + at[d];
+    }
+    return pixels[index];
+  }
+
+private:
+  reference::Cell cells = [] {
+    reference::Cell none{1, 1, 1, 1};
+    for (int d = 0; d < Rank; ++d)
+      none[d] = 0;
+    return none;
+  }();
+  std::unique_ptr<T[]> pixels;
+};
+
+} // namespace piko
+
+#endif // PIKO_REFERENCE_STATE_H
