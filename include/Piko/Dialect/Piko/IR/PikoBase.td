@@ -9,6 +9,7 @@ include "mlir/IR/AttrTypeBase.td"
 include "mlir/IR/EnumAttr.td"
 include "mlir/IR/OpBase.td"
 include "mlir/IR/SymbolInterfaces.td"
+include "mlir/Interfaces/InferTypeOpInterface.td"
 include "mlir/Interfaces/SideEffectInterfaces.td"
 
 def Piko_Dialect : Dialect {
@@ -43,5 +44,17 @@ def Piko_Scalar : AnyTypeOf<[F32, F64, I1, I8, I16, I32, I64],
 
 /// A cell coordinate, as C++ code computes it.
 def Piko_Coordinate : AnyTypeOf<[I32, I64, Index], "cell coordinate">;
+
+/// A 64-bit integer that C++ reads as int64_t: sizes and numbers are compared
+/// with other signed ones.
+def Piko_I64Attr : TypedAttrBase<I64, "IntegerAttr",
+    And<[CPred<"::llvm::isa<::mlir::IntegerAttr>($_self)">,
+         CPred<"::llvm::cast<::mlir::IntegerAttr>($_self).getType()."
+               "isSignlessInteger(64)">]>,
+    "64-bit integer attribute"> {
+  let returnType = "int64_t";
+  let convertFromStorage = "$_self.getInt()";
+  let constBuilderCall = "$_builder.getI64IntegerAttr($0)";
+}
 
 #endif // PIKO_DIALECT_PIKO_IR_PIKOBASE_TD

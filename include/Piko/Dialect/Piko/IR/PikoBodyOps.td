@@ -36,7 +36,7 @@ def Piko_EmitOp : Piko_Op<"emit"> {
     Takes the numbers of the port's record: its fields in order, arrays
     row-major. `piko.emit 0 (%x, %y) : f32, f32`.
   }];
-  let arguments = (ins ConfinedAttr<I64Attr, [IntNonNegative]>:$port,
+  let arguments = (ins ConfinedAttr<Piko_I64Attr, [IntNonNegative]>:$port,
                        Variadic<Piko_Scalar>:$values);
   let assemblyFormat = [{
     $port (`(` $values^ `)` `:` type($values))? attr-dict
@@ -68,7 +68,7 @@ def Piko_BinAtOp : Piko_Op<"bin_at", [Pure]> {
 }
 
 class Piko_BinBoundOp<string mnemonic> : Piko_Op<mnemonic, [Pure]> {
-  let arguments = (ins Index:$bin, ConfinedAttr<I64Attr, [IntNonNegative]>:$dim);
+  let arguments = (ins Index:$bin, ConfinedAttr<Piko_I64Attr, [IntNonNegative]>:$dim);
   let results = (outs Index:$result);
   let assemblyFormat = "$bin `[` $dim `]` attr-dict";
 }
@@ -88,7 +88,7 @@ def Piko_BinHiOp : Piko_BinBoundOp<"bin_hi"> {
 def Piko_DomainOp : Piko_Op<"domain", [Pure]> {
   let summary = "the extent of the domain in a dimension";
   let description = "`%w = piko.domain[0]`.";
-  let arguments = (ins ConfinedAttr<I64Attr, [IntNonNegative]>:$dim);
+  let arguments = (ins ConfinedAttr<Piko_I64Attr, [IntNonNegative]>:$dim);
   let results = (outs Index:$result);
   let assemblyFormat = "`[` $dim `]` attr-dict";
 }

@@ -39,7 +39,7 @@ def Piko_OpenBinsOp : Piko_Op<"open_bins", [
     stage's producers left, in lineage order. With `source` the primitives are
     those that the host feeds to that source of the stage, in one bin.
   }];
-  let arguments = (ins FlatSymbolRefAttr:$stage, OptionalAttr<I64Attr>:$source);
+  let arguments = (ins FlatSymbolRefAttr:$stage, OptionalAttr<Piko_I64Attr>:$source);
   let results = (outs Piko_BinsType:$bins);
   let assemblyFormat = [{
     $stage (`source` $source^)? attr-dict `:` qualified(type($bins))
@@ -126,7 +126,7 @@ def Piko_AppendOp : Piko_Op<"append"> {
     `%p = piko.append %w[0] (%x, %y) : f32, f32 -> !piko.prim<@F>`; the result
     is the primitive as it was stored.
   }];
-  let arguments = (ins Piko_WriterType:$writer, I64Attr:$port,
+  let arguments = (ins Piko_WriterType:$writer, Piko_I64Attr:$port,
                        Variadic<Piko_Scalar>:$values);
   let results = (outs Piko_PrimType:$prim);
   let assemblyFormat = [{
@@ -143,7 +143,7 @@ def Piko_PlaceOp : Piko_Op<"place"> {
     tile %t`. Without a port it places the current primitive of a source. A bin
     outside the grid is an error when the pipeline runs.
   }];
-  let arguments = (ins Piko_WriterType:$writer, OptionalAttr<I64Attr>:$port,
+  let arguments = (ins Piko_WriterType:$writer, OptionalAttr<Piko_I64Attr>:$port,
                        FlatSymbolRefAttr:$stage, Index:$bin,
                        Optional<Index>:$tile);
   let assemblyFormat = [{
@@ -158,13 +158,20 @@ def Piko_NextOp : Piko_Op<"next"> {
   let assemblyFormat = "$writer attr-dict";
 }
 
+def Piko_ThreadsOp : Piko_Op<"threads", [Pure]> {
+  let summary = "how many threads the host asked for";
+  let description = "`%n = piko.threads`.";
+  let results = (outs I32:$result);
+  let assemblyFormat = "attr-dict";
+}
+
 def Piko_GridOp : Piko_Op<"grid", [Pure]> {
   let summary = "how many bins a stage has in a dimension";
   let description = [{
     `%n = piko.grid @shade[0]`; with `tiles` it is how many tiles a bin of the
     stage has.
   }];
-  let arguments = (ins FlatSymbolRefAttr:$stage, I64Attr:$dim, UnitAttr:$tiles);
+  let arguments = (ins FlatSymbolRefAttr:$stage, Piko_I64Attr:$dim, UnitAttr:$tiles);
   let results = (outs Index:$result);
   let assemblyFormat = "$stage `[` $dim `]` (`tiles` $tiles^)? attr-dict";
 }

@@ -22,7 +22,7 @@ def Piko_RecordOp : Piko_Op<"record", [Symbol, HasParent<"::mlir::ModuleOp">]> {
     ```
   }];
   let arguments = (ins SymbolNameAttr:$sym_name, Piko_FieldArrayAttr:$fields,
-                       I64Attr:$size, I64Attr:$align);
+                       Piko_I64Attr:$size, Piko_I64Attr:$align);
   let assemblyFormat = [{
     $sym_name custom<Fields>($fields) `size` $size `align` $align attr-dict
   }];
@@ -66,7 +66,7 @@ def Piko_PipelineOp : Piko_Op<"pipeline", [
     ```
   }];
   let arguments = (ins SymbolNameAttr:$sym_name,
-                       ConfinedAttr<I64Attr, [IntMinValue<1>, IntMaxValue<4>]>:$rank);
+                       ConfinedAttr<Piko_I64Attr, [IntMinValue<1>, IntMaxValue<4>]>:$rank);
   let regions = (region SizedRegion<1>:$body);
   let assemblyFormat = [{
     $sym_name `rank` $rank attr-dict-with-keyword $body
@@ -111,7 +111,7 @@ def Piko_BufferOp : Piko_StateOp<"buffer"> {
     ```
   }];
   let arguments = (ins SymbolNameAttr:$sym_name, FlatSymbolRefAttr:$record,
-                       OptionalAttr<I64Attr>:$perSource);
+                       OptionalAttr<Piko_I64Attr>:$perSource);
   let assemblyFormat = [{
     $sym_name `:` $record (`per_source` $perSource^)? attr-dict
   }];
@@ -131,7 +131,7 @@ def Piko_ImageOp : Piko_StateOp<"image"> {
     ```
   }];
   let arguments = (ins SymbolNameAttr:$sym_name, FlatSymbolRefAttr:$record,
-                       ConfinedAttr<I64Attr, [IntMinValue<1>, IntMaxValue<4>]>:$rank,
+                       ConfinedAttr<Piko_I64Attr, [IntMinValue<1>, IntMaxValue<4>]>:$rank,
                        OptionalAttr<ArrayAttr>:$clear);
   let assemblyFormat = [{
     $sym_name `:` $record `rank` $rank (`clear` $clear^)? attr-dict
@@ -171,7 +171,7 @@ def Piko_EdgeOp : Piko_Op<"edge", [
     what `@rast` emits to port 0 is what `@shade` processes.
   }];
   let arguments = (ins FlatSymbolRefAttr:$producer,
-                       ConfinedAttr<I64Attr, [IntNonNegative]>:$port,
+                       ConfinedAttr<Piko_I64Attr, [IntNonNegative]>:$port,
                        FlatSymbolRefAttr:$consumer);
   let assemblyFormat = "$producer `[` $port `]` `->` $consumer attr-dict";
 }

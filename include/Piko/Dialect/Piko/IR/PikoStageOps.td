@@ -19,6 +19,12 @@ def Piko_StageOp : Piko_Op<"stage", [
     primitive is in bin 0, which is legal only where one bin is the whole
     domain. Without a schedule phase the stage is load-balanced.
 
+    `lineage` is the stage's place in the order that lineage roots are numbered
+    in, and is set by `piko-order-stages`, which moves stages. `tile` is the side
+    of the tiles that a bin is divided into where `piko.owner` tells whose they
+    are. At the resolved level, `split` says that a bin's primitives may be
+    divided over threads in any way, and `placed` that kernels place them.
+
     At the kernels level and below, the phases have moved into
     `piko.kernel`s and the stage's body is empty but for its schedule.
 
@@ -37,13 +43,16 @@ def Piko_StageOp : Piko_Op<"stage", [
     ```
   }];
   let arguments = (ins SymbolNameAttr:$sym_name, DenseI64ArrayAttr:$bins,
-                       ConfinedAttr<I64Attr, [IntPositive]>:$threads,
+                       ConfinedAttr<Piko_I64Attr, [IntPositive]>:$threads,
                        FlatSymbolRefAttr:$input,
                        TypedArrayAttrBase<FlatSymbolRefAttr, "records of the ports">:$outputs,
-                       OptionalAttr<I64Attr>:$tile);
+                       OptionalAttr<Piko_I64Attr>:$lineage,
+                       OptionalAttr<Piko_I64Attr>:$tile,
+                       UnitAttr:$split, UnitAttr:$placed);
   let regions = (region SizedRegion<1>:$body);
   let assemblyFormat = [{
-    $sym_name `bins` $bins `threads` $threads (`tile` $tile^)?
+    $sym_name `bins` $bins `threads` $threads (`lineage` $lineage^)?
+    (`tile` $tile^)? (`split` $split^)? (`placed` $placed^)?
     `:` $input `->` $outputs attr-dict-with-keyword $body
   }];
   let hasRegionVerifier = 1;
@@ -95,8 +104,8 @@ def Piko_AssignOp : Piko_PhaseOp<"assign", [RecursiveMemoryEffects]> {
     ```
   }];
   let arguments = (ins OptionalAttr<FlatSymbolRefAttr>:$stage,
-                       OptionalAttr<I64Attr>:$port,
-                       OptionalAttr<I64Attr>:$source);
+                       OptionalAttr<Piko_I64Attr>:$port,
+                       OptionalAttr<Piko_I64Attr>:$source);
   let regions = (region SizedRegion<1>:$body);
   let assemblyFormat = [{
     (`of` $stage^)? (`port` $port^)? (`source` $source^)?
@@ -174,10 +183,10 @@ def Piko_ScheduleOp : Piko_Op<"schedule", [
     ```
   }];
   let arguments = (ins Piko_ScheduleKind:$kind,
-    OptionalAttr<ConfinedAttr<I64Attr, [IntPositive]>>:$tileSplit,
+    OptionalAttr<ConfinedAttr<Piko_I64Attr, [IntPositive]>>:$tileSplit,
     OptionalAttr<TypedArrayAttrBase<FlatSymbolRefAttr, "stages to wait for">>:$endStage,
     UnitAttr:$endBin,
-    OptionalAttr<ConfinedAttr<I64Attr, [IntPositive]>>:$batch,
+    OptionalAttr<ConfinedAttr<Piko_I64Attr, [IntPositive]>>:$batch,
     UnitAttr:$everyBin, UnitAttr:$unordered);
   let assemblyFormat = [{
     $kind (`tile_split` $tileSplit^)? (`end_stage` $endStage^)?

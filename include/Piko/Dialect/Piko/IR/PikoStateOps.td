@@ -39,13 +39,15 @@ def Piko_StoreOp : Piko_StateAccessOp<"store", [MemoryEffects<[MemWrite]>]> {
   let summary = "writes a field of an element that no other call writes";
   let description = [{
     `piko.store %v, @verts[%i : i32] "pos.x" : f32`. An index outside the
-    buffer or image is an error when the pipeline runs.
+    buffer or image is an error when the pipeline runs; `checked` says that the
+    test for it is already there.
   }];
   let arguments = (ins Piko_Scalar:$value, FlatSymbolRefAttr:$state,
                        Variadic<Piko_Coordinate>:$indices, StrAttr:$field,
-                       Variadic<Index>:$elements);
+                       Variadic<Index>:$elements, UnitAttr:$checked);
   let assemblyFormat = [{
-    $value `,` $state (`[` $indices^ `:` type($indices) `]`)? $field
+    $value `,` (`checked` $checked^)? $state
+    (`[` $indices^ `:` type($indices) `]`)? $field
     (`[` $elements^ `]`)? attr-dict `:` type($value)
   }];
 }
@@ -60,9 +62,9 @@ def Piko_AtomicOp : Piko_StateAccessOp<"atomic", [
   let arguments = (ins Piko_AtomicKind:$kind, FlatSymbolRefAttr:$state,
                        Variadic<Piko_Coordinate>:$indices, StrAttr:$field,
                        Variadic<Index>:$elements,
-                       AnyTypeOf<[I32, I64]>:$value);
+                       AnyTypeOf<[I32, I64]>:$value, UnitAttr:$checked);
   let assemblyFormat = [{
-    $kind $state (`[` $indices^ `:` type($indices) `]`)? $field
+    $kind (`checked` $checked^)? $state (`[` $indices^ `:` type($indices) `]`)? $field
     (`[` $elements^ `]`)? `,` $value attr-dict `:` type($value)
   }];
 }
@@ -72,13 +74,13 @@ def Piko_ExtentOp : Piko_Op<"extent", [
   let summary = "the length of a buffer, or of an image in a dimension";
   let description = "`%n = piko.extent @lights[0]`.";
   let arguments = (ins FlatSymbolRefAttr:$state,
-                       ConfinedAttr<I64Attr, [IntNonNegative]>:$dim);
+                       ConfinedAttr<Piko_I64Attr, [IntNonNegative]>:$dim);
   let results = (outs Index:$result);
   let assemblyFormat = "$state `[` $dim `]` attr-dict";
 }
 
 def Piko_UpdateOp : Piko_Op<"update", [
-    RecursiveMemoryEffects, SingleBlock,
+    RecursiveMemoryEffects, SingleBlock, AttrSizedOperandSegments,
     DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
   let summary = "changes a pixel of the primitive's own bin";
   let description = [{
@@ -94,13 +96,17 @@ def Piko_UpdateOp : Piko_Op<"update", [
       piko.yield [%new : f32] results [%closer : i1]
     } -> i1
     ```
+
+    At the resolved level it names the bin that the pixel must be in:
+    `piko.update @depth[%x, %y : i32, i32] in %bin`.
   }];
   let arguments = (ins FlatSymbolRefAttr:$image,
-                       Variadic<Piko_Coordinate>:$coordinates);
+                       Variadic<Piko_Coordinate>:$coordinates,
+                       Optional<Index>:$bin);
   let results = (outs Variadic<AnyType>:$results);
   let regions = (region SizedRegion<1>:$body);
   let assemblyFormat = [{
-    $image `[` $coordinates `:` type($coordinates) `]` $body
+    $image `[` $coordinates `:` type($coordinates) `]` (`in` $bin^)? $body
     (`->` type($results)^)? attr-dict
   }];
   let hasRegionVerifier = 1;
@@ -114,6 +120,20 @@ def Piko_YieldOp : Piko_Op<"yield", [
   let assemblyFormat = [{
     (`[` $pixel^ `:` type($pixel) `]`)?
     (`results` `[` $results^ `:` type($results) `]`)? attr-dict
+  }];
+}
+
+def Piko_FailOp : Piko_Op<"fail"> {
+  let summary = "ends the run with an error that names the stage";
+  let description = [{
+    `piko.fail @depth outside @color (%x, %y)`: an access of the stage to the
+    piece of state at these indices was outside it, or outside the bin. The run
+    goes on to the end of the kernel and then stops.
+  }];
+  let arguments = (ins FlatSymbolRefAttr:$stage, FlatSymbolRefAttr:$state,
+                       Variadic<Index>:$indices);
+  let assemblyFormat = [{
+    $stage `outside` $state `(` $indices `)` attr-dict
   }];
 }
 

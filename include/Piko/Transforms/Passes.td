@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Passes that stay inside the `piko` dialect: from the authored level to
+// kernels and on to loops over storage.
+
+#ifndef PIKO_TRANSFORMS_PASSES_TD
+#define PIKO_TRANSFORMS_PASSES_TD
+
+include "mlir/Pass/PassBase.td"
+
+def OrderStages : Pass<"piko-order-stages", "::piko::PipelineOp"> {
+  let summary = "Put the stages into the order in which they run";
+  let description = [{
+    **Requires** the authored level.
+
+    **Does**: cuts the graph into linear branches, at convergence, divergence
+    and waits, and moves the stages so that branches stand in descending distance
+    of their first stage from the drain; a branch comes later where it depends,
+    by an edge or by `end_stage`, on one that has not come yet. Also numbers
+    the stages (`lineage`) by the language's own rule: producers and stages
+    waited for first, otherwise as declared.
+
+    **Guarantees** that each stage stands behind all stages that feed it or that
+    it waits for.
+
+    Before, with `@a` feeding `@b`:
+    ```
+    piko.stage @b ...
+    piko.stage @a ...
+    ```
+    After:
+    ```
+    piko.stage @a ... lineage 0 ...
+    piko.stage @b ... lineage 1 ...
+    ```
+
+    **Limits**: a graph with a cycle gets an error that names a stage in it.
+  }];
+  let statistics = [
+    Statistic<"branches", "branches", "linear branches found">];
+}
+
+def OwnPixels : Pass<"piko-own-pixels", "::piko::PipelineOp"> {
+  let summary = "Find which pixel a primitive updates, so that bins can be divided";
+  let description = [{
+    **Requires** the authored level.
+
+    **Does**: where all updates of a stage are at one pixel that follows from
+    the primitive's fields and constants alone, copies that computation to the
+    front of the assign phase, with a `piko.owner` behind it. The stage then gets tiles of
+    `tile` cells a side (which bins that are smaller do not have), and threads
+    that each take tiles of a bin still update every pixel in lineage order.
+
+    **Guarantees** that the pixels that a stage changes and the order in which it
+    does so stay as they are.
+
+    Before:
+    ```
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      %x = piko.get %f "x" : !piko.prim<@F> -> i32
+      %y = piko.get %f "y" : !piko.prim<@F> -> i32
+      piko.update @depth[%x, %y : i32, i32] { ... }
+    ```
+    After, in front of it:
+    ```
+    piko.assign {
+    ^bb0(%f: !piko.prim<@F>):
+      %x = piko.get %f "x" : !piko.prim<@F> -> i32
+      %y = piko.get %f "y" : !piko.prim<@F> -> i32
+      piko.owner [%x, %y : i32, i32]
+      %zero = arith.constant 0 : index
+      piko.assign_to %zero
+    ```
+
+    **Limits**: an update at several pixels, or at one that is read from a
+    buffer or an image, is refused with a remark; one thread then takes each bin.
+  }];
+  let options = [
+    Option<"tile", "tile", "int64_t", "32",
+           "Side of a tile, in cells of the domain">];
+  let statistics = [
+    Statistic<"divided", "stages-divided", "stages whose bins can be divided">,
+    Statistic<"refused", "stages-refused", "stages whose updates move">];
+}
+
+def FormKernels : Pass<"piko-form-kernels", "::piko::PipelineOp"> {
+  let summary = "Group phases into kernels, the BASELINE way";
+  let description = [{
+    **Requires** the authored level with stages in order (`piko-order-stages`).
+
+    **Does**: makes a kernel of the process phase of each stage and the assign
+    phases of the stages that its ports feed; and one of the assign phase for
+    each source whose stage has an assign phase. Kernels stand in the order in
+    which they run. A schedule that only says where bins run has no code of its
+    own and stays with the stage.
+
+    **Guarantees** the kernels level: stages hold no process or assign phase.
+
+    Before:
+    ```
+    piko.stage @a ... { piko.process { ... } }
+    piko.stage @b ... { piko.assign { ... } piko.process { ... } }
+    ```
+    After, with an edge from `@a` to `@b`:
+    ```
+    piko.kernel @kernel_a {
+      piko.process of @a { ... }
+      piko.assign of @b port 0 { ... }
+    }
+    piko.kernel @kernel_b { piko.process of @b { ... } }
+    ```
+
+    **Limits**: none; what can be merged further is for other passes.
+  }];
+  let statistics = [Statistic<"kernels", "kernels", "kernels formed">];
+}
+
+def ResolveKernels : Pass<"piko-resolve-kernels", "::piko::PipelineOp"> {
+  let summary = "Turn phases into loops over bins and their storage";
+  let description = [{
+    **Requires** the kernels level.
+
+    **Does**: turns the phases of each kernel into an `scf.forall` over the
+    units of work of the stage's bins, in it a loop over the unit's cells and in
+    that one over the primitives of a cell, marked `piko.lanes`. Emissions
+    become stores into the unit's own writer, followed by the consumer's assign
+    phase, whose assignments become `piko.place`; queries of bins and of the
+    grid become arithmetic.
+
+    **Guarantees** the resolved level: kernels hold no phase, and all storage
+    and synchronisation is explicit.
+
+    Before:
+    ```
+    piko.kernel @kernel_a { piko.process of @a { ... } ... }
+    ```
+    After:
+    ```
+    piko.kernel @kernel_a {
+      %bins = piko.open_bins @a : !piko.bins<@F>
+      %units = piko.unit_count %bins : !piko.bins<@F>
+      scf.forall (%u) in (%units) { ... }
+      piko.close_bins %bins : !piko.bins<@F>
+    }
+    ```
+
+    **Limits**: lists, batches and `every_bin` are not compiled yet and get an
+    error.
+  }];
+  let dependentDialects = ["::mlir::arith::ArithDialect",
+                           "::mlir::scf::SCFDialect"];
+}
+
+#endif // PIKO_TRANSFORMS_PASSES_TD

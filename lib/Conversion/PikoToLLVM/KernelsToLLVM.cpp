@@ -1,0 +1,354 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Bins, writers and primitives, on the runtime's structs (pikort/abi.h).
+
+#include "LoweringContext.h"
+
+#include "mlir/Dialect/SCF/IR/SCF.h"
+
+using namespace mlir;
+using namespace piko;
+
+// Byte offsets of the members of pikoir_input and pikoir_unit.
+namespace layout {
+constexpr int64_t items = 0, order = 16, offsets = 24, units = 32,
+                  unitCount = 40, tiles = 48;
+constexpr int64_t cellBegin = 0, cellEnd = 8, begin = 16, end = 24,
+                  unitSize = 32;
+} // namespace layout
+
+namespace {
+
+template <typename OpT> struct Lowering : OpConversionPattern<OpT> {
+  Lowering(const TypeConverter &converter, MLIRContext *mlir,
+           LoweringContext &context)
+      : OpConversionPattern<OpT>(converter, mlir), context(context) {}
+
+  static Type pointer(OpBuilder &builder) {
+    return LLVM::LLVMPointerType::get(builder.getContext());
+  }
+  static Value loadI64(OpBuilder &builder, Location loc, Value base,
+                       int64_t offset) {
+    return LLVM::LoadOp::create(builder, loc, builder.getI64Type(),
+                                createOffset(builder, loc, base, offset));
+  }
+  static Value loadPointer(OpBuilder &builder, Location loc, Value base,
+                           int64_t offset) {
+    return LLVM::LoadOp::create(builder, loc, pointer(builder),
+                                createOffset(builder, loc, base, offset));
+  }
+  /// The address of entry `index` of an array.
+  static Value entry(OpBuilder &builder, Location loc, Value array, Value index,
+                     int64_t size) {
+    Value bytes =
+        arith::MulIOp::create(builder, loc, toI64(builder, loc, index),
+                              createI64(builder, loc, size));
+    return createOffset(builder, loc, array, bytes);
+  }
+
+  LoweringContext &context;
+};
+
+struct OpenBinsLowering : Lowering<OpenBinsOp> {
+  using Lowering::Lowering;
+  LogicalResult
+  matchAndRewrite(OpenBinsOp op, OpAdaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    Location loc = op.getLoc();
+    bool source = op.getSource().has_value();
+    int32_t number =
+        source ? *op.getSource() : context.stageNumber(op, op.getStage());
+    Value input =
+        context
+            .call(rewriter, loc,
+                  source ? "pikoir_begin_source" : "pikoir_begin",
+                  pointer(rewriter),
+                  {context.frame(op), createI32(rewriter, loc, number)})
+            .getResult();
+    // After an error there is nothing to do; pikoir_end gives its status.
+    Value null = LLVM::ZeroOp::create(rewriter, loc, pointer(rewriter));
+    Value failed = LLVM::ICmpOp::create(rewriter, loc, LLVM::ICmpPredicate::eq,
+                                        input, null);
+    Value empty = LLVM::AddressOfOp::create(rewriter, loc, pointer(rewriter),
+                                            "piko.no_input");
+    rewriter.replaceOpWithNewOp<LLVM::SelectOp>(op, failed, empty, input);
+    return success();
+  }
+};
+
+struct CloseBinsLowering : Lowering<CloseBinsOp> {
+  using Lowering::Lowering;
+  LogicalResult
+  matchAndRewrite(CloseBinsOp op, OpAdaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    auto function = op->getParentOfType<func::FuncOp>();
+    auto number = function->getAttrOfType<IntegerAttr>("piko.number");
+    bool source = function->hasAttr("piko.source");
+    Location loc = op.getLoc();
+    Value status =
+        context
+            .call(
+                rewriter, loc, source ? "pikoir_end_source" : "pikoir_end",
+                rewriter.getI32Type(),
+                {context.frame(op), createI32(rewriter, loc, number.getInt())})
+            .getResult();
+    Operation *end = function.getBody().front().getTerminator();
+    rewriter.modifyOpInPlace(end, [&] { end->setOperand(0, status); });
+    rewriter.eraseOp(op);
+    return success();
+  }
+};
+
+struct UnitCountLowering : Lowering<UnitCountOp> {
+  using Lowering::Lowering;
+  LogicalResult
+  matchAndRewrite(UnitCountOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    Location loc = op.getLoc();
+    rewriter.replaceOp(op, toIndex(rewriter, loc,
+                                   loadI64(rewriter, loc, adaptor.getBins(),
+                                           layout::unitCount)));
+    return success();
+  }
+};
+
+struct UnitCellsLowering : Lowering<UnitCellsOp> {
+  using Lowering::Lowering;
+  LogicalResult
+  matchAndRewrite(UnitCellsOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    Location loc = op.getLoc();
+    Value units = loadPointer(rewriter, loc, adaptor.getBins(), layout::units);
+    Value unit =
+        entry(rewriter, loc, units, adaptor.getUnit(), layout::unitSize);
+    Value first = loadI64(rewriter, loc, unit, layout::cellBegin);
+    Value last = loadI64(rewriter, loc, unit, layout::cellEnd);
+    rewriter.replaceOp(
+        op, {toIndex(rewriter, loc, first), toIndex(rewriter, loc, last)});
+    return success();
+  }
+};
+
+struct CellRangeLowering : Lowering<CellRangeOp> {
+  using Lowering::Lowering;
+  LogicalResult
+  matchAndRewrite(CellRangeOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    Location loc = op.getLoc();
+    Value bins = adaptor.getBins();
+    Value units = loadPointer(rewriter, loc, bins, layout::units);
+    Value unit =
+        entry(rewriter, loc, units, adaptor.getUnit(), layout::unitSize);
+    Value offsets = loadPointer(rewriter, loc, bins, layout::offsets);
+    Value cell = entry(rewriter, loc, offsets, adaptor.getCell(), 8);
+    Value begin =
+        arith::MaxSIOp::create(rewriter, loc, loadI64(rewriter, loc, cell, 0),
+                               loadI64(rewriter, loc, unit, layout::begin));
+    Value end =
+        arith::MinSIOp::create(rewriter, loc, loadI64(rewriter, loc, cell, 8),
+                               loadI64(rewriter, loc, unit, layout::end));
+    rewriter.replaceOp(
+        op, {toIndex(rewriter, loc, begin), toIndex(rewriter, loc, end)});
+    return success();
+  }
+};
+
+struct CellBinLowering : Lowering<CellBinOp> {
+  using Lowering::Lowering;
+  LogicalResult
+  matchAndRewrite(CellBinOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    Location loc = op.getLoc();
+    Value tiles =
+        toIndex(rewriter, loc,
+                loadI64(rewriter, loc, adaptor.getBins(), layout::tiles));
+    rewriter.replaceOpWithNewOp<arith::DivUIOp>(op, adaptor.getCell(), tiles);
+    return success();
+  }
+};
+
+struct ItemLowering : Lowering<ItemOp> {
+  using Lowering::Lowering;
+  LogicalResult
+  matchAndRewrite(ItemOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    Location loc = op.getLoc();
+    Value bins = adaptor.getBins();
+    Value position = toI64(rewriter, loc, adaptor.getPosition());
+    Value order = loadPointer(rewriter, loc, bins, layout::order);
+    Value null = LLVM::ZeroOp::create(rewriter, loc, pointer(rewriter));
+    Value ordered = LLVM::ICmpOp::create(rewriter, loc, LLVM::ICmpPredicate::ne,
+                                         order, null);
+    auto choice = scf::IfOp::create(
+        rewriter, loc, ordered,
+        [&](OpBuilder &builder, Location loc) {
+          Value item =
+              LLVM::LoadOp::create(builder, loc, builder.getI32Type(),
+                                   entry(builder, loc, order, position, 4));
+          Value wide =
+              arith::ExtUIOp::create(builder, loc, builder.getI64Type(), item);
+          scf::YieldOp::create(builder, loc, wide);
+        },
+        [&](OpBuilder &builder, Location loc) {
+          scf::YieldOp::create(builder, loc, position);
+        });
+    Value items = loadPointer(rewriter, loc, bins, layout::items);
+    RecordOp record = context.record(op.getPrim().getType().getRecord());
+    rewriter.replaceOp(
+        op, entry(rewriter, loc, items, choice.getResult(0), record.getSize()));
+    return success();
+  }
+};
+
+struct OpenWriterLowering : Lowering<OpenWriterOp> {
+  using Lowering::Lowering;
+  LogicalResult
+  matchAndRewrite(OpenWriterOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    auto function = op->getParentOfType<func::FuncOp>();
+    auto number = function->getAttrOfType<IntegerAttr>("piko.number");
+    Location loc = op.getLoc();
+    rewriter.replaceOp(
+        op, context.call(rewriter, loc,
+                         function->hasAttr("piko.source") ? "pikoir_open_source"
+                                                          : "pikoir_open",
+                         pointer(rewriter),
+                         {context.frame(op),
+                          createI32(rewriter, loc, number.getInt()),
+                          toI64(rewriter, loc, adaptor.getUnit())}));
+    return success();
+  }
+};
+
+/// An operation that is a call with the writer for its argument.
+template <typename OpT, const char *const *name>
+struct WriterCallLowering : Lowering<OpT> {
+  using Lowering<OpT>::Lowering;
+  LogicalResult
+  matchAndRewrite(OpT op, typename OpT::Adaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    this->context.call(rewriter, op.getLoc(), *name, Type(),
+                       adaptor.getWriter());
+    rewriter.eraseOp(op);
+    return success();
+  }
+};
+constexpr const char *closeName = "pikoir_close";
+constexpr const char *nextName = "pikoir_next";
+
+struct AppendLowering : Lowering<AppendOp> {
+  using Lowering::Lowering;
+  LogicalResult
+  matchAndRewrite(AppendOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    Location loc = op.getLoc();
+    RecordOp record = context.record(op.getPrim().getType().getRecord());
+    Value room =
+        context
+            .call(rewriter, loc, "pikoir_append", pointer(rewriter),
+                  {adaptor.getWriter(), createI32(rewriter, loc, op.getPort())})
+            .getResult();
+    for (auto [value, offset] :
+         llvm::zip(adaptor.getValues(), record.getElementOffsets()))
+      LLVM::StoreOp::create(rewriter, loc, value,
+                            createOffset(rewriter, loc, room, offset));
+    rewriter.replaceOp(op, room);
+    return success();
+  }
+};
+
+struct PlaceLowering : Lowering<PlaceOp> {
+  using Lowering::Lowering;
+  LogicalResult
+  matchAndRewrite(PlaceOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    Location loc = op.getLoc();
+    Value cell = toI64(rewriter, loc, adaptor.getBin());
+    StageOp stage = context.stage(op, op.getStageAttr());
+    if (adaptor.getTile()) {
+      int32_t number = context.stageNumber(op, op.getStage());
+      for (int64_t dim = 0, e = stage.getBins().size(); dim < e; ++dim)
+        cell = arith::MulIOp::create(
+            rewriter, loc, cell,
+            context.query(rewriter, op, "pikoir_cell_grid", number, dim));
+      cell = arith::AddIOp::create(rewriter, loc, cell,
+                                   toI64(rewriter, loc, adaptor.getTile()));
+    }
+    if (op.getPort())
+      context.call(
+          rewriter, loc, "pikoir_place", Type(),
+          {adaptor.getWriter(), createI32(rewriter, loc, *op.getPort()), cell});
+    else
+      context.call(rewriter, loc, "pikoir_place_source", Type(),
+                   {adaptor.getWriter(), cell});
+    rewriter.eraseOp(op);
+    return success();
+  }
+};
+
+struct GetLowering : Lowering<GetOp> {
+  using Lowering::Lowering;
+  LogicalResult
+  matchAndRewrite(GetOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    Location loc = op.getLoc();
+    RecordOp record = context.record(op.getPrim().getType().getRecord());
+    Value address = createFieldAddress(rewriter, loc, adaptor.getPrim(),
+                                       record.getField(op.getField()),
+                                       adaptor.getElements());
+    rewriter.replaceOpWithNewOp<LLVM::LoadOp>(op, op.getResult().getType(),
+                                              address);
+    return success();
+  }
+};
+
+struct GridLowering : Lowering<GridOp> {
+  using Lowering::Lowering;
+  LogicalResult
+  matchAndRewrite(GridOp op, OpAdaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    Value extent = context.query(
+        rewriter, op, op.getTiles() ? "pikoir_cell_grid" : "pikoir_grid",
+        context.stageNumber(op, op.getStage()), op.getDim());
+    rewriter.replaceOp(op, toIndex(rewriter, op.getLoc(), extent));
+    return success();
+  }
+};
+
+struct DomainLowering : Lowering<DomainOp> {
+  using Lowering::Lowering;
+  LogicalResult
+  matchAndRewrite(DomainOp op, OpAdaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    Value extent =
+        context.query(rewriter, op, "pikoir_domain", std::nullopt, op.getDim());
+    rewriter.replaceOp(op, toIndex(rewriter, op.getLoc(), extent));
+    return success();
+  }
+};
+
+struct ThreadsLowering : Lowering<ThreadsOp> {
+  using Lowering::Lowering;
+  LogicalResult
+  matchAndRewrite(ThreadsOp op, OpAdaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    rewriter.replaceOp(op,
+                       context.call(rewriter, op.getLoc(), "pikoir_threads",
+                                    rewriter.getI32Type(), context.frame(op)));
+    return success();
+  }
+};
+
+} // namespace
+
+void piko::populateKernelToLLVMPatterns(const TypeConverter &converter,
+                                        RewritePatternSet &patterns,
+                                        LoweringContext &context) {
+  patterns
+      .add<OpenBinsLowering, CloseBinsLowering, UnitCountLowering,
+           UnitCellsLowering, CellRangeLowering, CellBinLowering, ItemLowering,
+           OpenWriterLowering, WriterCallLowering<CloseWriterOp, &closeName>,
+           WriterCallLowering<NextOp, &nextName>, AppendLowering, PlaceLowering,
+           GetLowering, GridLowering, DomainLowering, ThreadsLowering>(
+          converter, patterns.getContext(), context);
+}

@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// What the patterns of convert-piko-to-llvm share.
+
+#include "LoweringContext.h"
+
+using namespace mlir;
+using namespace piko;
+
+PipelineNumbers::PipelineNumbers(PipelineOp pipeline) : pipeline(pipeline) {
+  // Lineage roots of collecting stages count in the order of their numbers.
+  SmallVector<StageOp> ordered(pipeline.getOps<StageOp>());
+  if (llvm::all_of(ordered, [](StageOp s) { return s.getLineage(); }))
+    llvm::sort(ordered, [](StageOp a, StageOp b) {
+      return *a.getLineage() < *b.getLineage();
+    });
+  for (StageOp stage : ordered)
+    stages[stage.getSymNameAttr()] = stages.size();
+  for (auto record : pipeline->getParentOfType<ModuleOp>().getOps<RecordOp>())
+    records[record.getSymNameAttr()] = records.size();
+  for (Operation &op : *pipeline.getBodyBlock())
+    if (getStateRecord(&op))
+      states[SymbolTable::getSymbolName(&op)] = states.size();
+}
+
+func::FuncOp LoweringContext::outline(KernelOp kernel,
+                                      const PipelineNumbers &numbers) {
+  OpBuilder builder(module.getBodyRegion());
+  builder.setInsertionPointToEnd(module.getBody());
+  Location loc = kernel.getLoc();
+  PipelineOp pipeline = numbers.pipeline;
+  auto type = builder.getFunctionType(
+      LLVM::LLVMPointerType::get(builder.getContext()), builder.getI32Type());
+  auto function = func::FuncOp::create(
+      builder, loc, (pipeline.getSymName() + "." + kernel.getSymName()).str(),
+      type);
+  function.setPrivate();
+  function.getBody().takeBody(kernel.getBody());
+  Block &entry = function.getBody().front();
+  entry.addArgument(type.getInput(0), loc);
+  builder.setInsertionPointToEnd(&entry);
+  func::ReturnOp::create(builder, loc, createI32(builder, loc, 0));
+  functions[function] = &numbers;
+  return function;
+}
+
+const PipelineNumbers &LoweringContext::numbers(Operation *op) const {
+  return *functions.at(op->getParentOfType<func::FuncOp>());
+}
+
+int32_t LoweringContext::stageNumber(Operation *op, StringRef stage) const {
+  return numbers(op).stages.lookup(StringAttr::get(op->getContext(), stage));
+}
+
+StageOp LoweringContext::stage(Operation *op, FlatSymbolRefAttr name) const {
+  return lookupInPipeline<StageOp>(numbers(op).pipeline, name);
+}
+
+Operation *LoweringContext::state(Operation *op, StringRef name) const {
+  return SymbolTable::lookupSymbolIn(numbers(op).pipeline, name);
+}
+
+RecordOp LoweringContext::record(FlatSymbolRefAttr name) const {
+  return ModuleOp(module).lookupSymbol<RecordOp>(name);
+}
+
+Value LoweringContext::frame(Operation *op) const {
+  return op->getParentOfType<func::FuncOp>().getArgument(0);
+}
+
+StateView &LoweringContext::view(OpBuilder &builder, Operation *op,
+                                 StringRef state) {
+  auto function = op->getParentOfType<func::FuncOp>();
+  auto [it, fresh] = views[function].try_emplace(state);
+  if (!fresh)
+    return it->second;
+  OpBuilder::InsertionGuard guard(builder);
+  builder.setInsertionPointToStart(&function.getBody().front());
+  Location loc = function.getLoc();
+  auto pointer = LLVM::LLVMPointerType::get(builder.getContext());
+  int32_t number =
+      numbers(op).states.lookup(StringAttr::get(op->getContext(), state));
+  Value view = call(builder, loc, "pikoir_get_state", pointer,
+                    {frame(op), createI32(builder, loc, number)})
+                   .getResult();
+  it->second.data = LLVM::LoadOp::create(builder, loc, pointer, view);
+  for (int64_t dim = 0; dim < 4; ++dim)
+    it->second.extents.push_back(
+        LLVM::LoadOp::create(builder, loc, builder.getI64Type(),
+                             createOffset(builder, loc, view, 8 + 8 * dim)));
+  return it->second;
+}
+
+Value LoweringContext::query(OpBuilder &builder, Operation *op,
+                             StringRef function, std::optional<int32_t> stage,
+                             int64_t dim) {
+  auto parent = op->getParentOfType<func::FuncOp>();
+  std::string key =
+      (function + "/" + Twine(stage.value_or(-1)) + "/" + Twine(dim)).str();
+  Value &known = queries[parent][key];
+  if (known)
+    return known;
+  OpBuilder::InsertionGuard guard(builder);
+  builder.setInsertionPointToStart(&parent.getBody().front());
+  Location loc = parent.getLoc();
+  SmallVector<Value> arguments{frame(op)};
+  if (stage)
+    arguments.push_back(createI32(builder, loc, *stage));
+  Value entries =
+      call(builder, loc, function,
+           LLVM::LLVMPointerType::get(builder.getContext()), arguments)
+          .getResult();
+  return known =
+             LLVM::LoadOp::create(builder, loc, builder.getI64Type(),
+                                  createOffset(builder, loc, entries, 8 * dim));
+}
+
+LLVM::CallOp LoweringContext::call(OpBuilder &builder, Location loc,
+                                   StringRef function, Type result,
+                                   ValueRange arguments) {
+  auto callee = module.lookupSymbol<LLVM::LLVMFuncOp>(function);
+  if (!callee) {
+    OpBuilder::InsertionGuard guard(builder);
+    builder.setInsertionPointToStart(module.getBody());
+    auto type = LLVM::LLVMFunctionType::get(
+        result ? result : LLVM::LLVMVoidType::get(builder.getContext()),
+        llvm::to_vector(arguments.getTypes()));
+    callee = LLVM::LLVMFuncOp::create(builder, loc, function, type);
+  }
+  return LLVM::CallOp::create(builder, loc, callee, arguments);
+}
+
+Value piko::createI32(OpBuilder &builder, Location loc, int64_t v) {
+  return arith::ConstantOp::create(builder, loc,
+                                   builder.getI32IntegerAttr(int32_t(v)));
+}
+
+Value piko::createI64(OpBuilder &builder, Location loc, int64_t v) {
+  return arith::ConstantOp::create(builder, loc, builder.getI64IntegerAttr(v));
+}
+
+Value piko::toI64(OpBuilder &builder, Location loc, Value v) {
+  Type type = builder.getI64Type();
+  if (v.getType() == type)
+    return v;
+  if (v.getType().isIndex())
+    return arith::IndexCastOp::create(builder, loc, type, v);
+  return arith::ExtSIOp::create(builder, loc, type, v);
+}
+
+Value piko::toIndex(OpBuilder &builder, Location loc, Value v) {
+  return arith::IndexCastOp::create(builder, loc, builder.getIndexType(), v);
+}
+
+Value piko::createOffset(OpBuilder &builder, Location loc, Value pointer,
+                         int64_t bytes) {
+  if (bytes == 0)
+    return pointer;
+  return LLVM::GEPOp::create(
+      builder, loc, pointer.getType(), builder.getI8Type(), pointer,
+      ArrayRef<LLVM::GEPArg>{int32_t(bytes)}, LLVM::GEPNoWrapFlags::inbounds);
+}
+
+Value piko::createOffset(OpBuilder &builder, Location loc, Value pointer,
+                         Value bytes) {
+  return LLVM::GEPOp::create(
+      builder, loc, pointer.getType(), builder.getI8Type(), pointer,
+      ArrayRef<LLVM::GEPArg>{bytes}, LLVM::GEPNoWrapFlags::inbounds);
+}
+
+Value piko::createFieldAddress(OpBuilder &builder, Location loc, Value record,
+                               FieldAttr field, ValueRange elements) {
+  for (auto [element, stride] : llvm::zip(elements, field.getStrides())) {
+    Value bytes =
+        arith::MulIOp::create(builder, loc, toI64(builder, loc, element),
+                              createI64(builder, loc, stride));
+    record = createOffset(builder, loc, record, bytes);
+  }
+  return createOffset(builder, loc, record, field.getOffset());
+}

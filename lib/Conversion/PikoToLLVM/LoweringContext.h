@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// What the patterns of convert-piko-to-llvm share: the numbers that the runtime
+// knows stages and state by, calls of the runtime, and values that a kernel
+// function computes once, in its entry block.
+
+#ifndef PIKO_LIB_CONVERSION_PIKOTOLLVM_LOWERINGCONTEXT_H
+#define PIKO_LIB_CONVERSION_PIKOTOLLVM_LOWERINGCONTEXT_H
+
+#include "Piko/Conversion/Passes.h"
+
+#include "mlir/Transforms/DialectConversion.h"
+#include "llvm/ADT/MapVector.h"
+#include "llvm/ADT/StringMap.h"
+
+namespace piko {
+
+/// What the runtime calls a pipeline's parts.
+struct PipelineNumbers {
+  PipelineOp pipeline;
+  llvm::MapVector<mlir::StringAttr, int32_t> stages, states, records;
+
+  explicit PipelineNumbers(PipelineOp pipeline);
+};
+
+/// Data and extent of a piece of state, loaded when a kernel starts.
+struct StateView {
+  mlir::Value data;
+  llvm::SmallVector<mlir::Value> extents; // i64
+};
+
+class LoweringContext {
+public:
+  explicit LoweringContext(mlir::ModuleOp module) : module(module) {}
+
+  /// Makes a function of a kernel: pipeline in, status out. The function's body
+  /// is the kernel's.
+  mlir::func::FuncOp outline(KernelOp kernel, const PipelineNumbers &numbers);
+
+  /// The numbers that go with the function around an operation.
+  const PipelineNumbers &numbers(mlir::Operation *op) const;
+  int32_t stageNumber(mlir::Operation *op, mlir::StringRef stage) const;
+  StageOp stage(mlir::Operation *op, mlir::FlatSymbolRefAttr name) const;
+  mlir::Operation *state(mlir::Operation *op, mlir::StringRef name) const;
+  RecordOp record(mlir::FlatSymbolRefAttr name) const;
+
+  /// The runtime's pipeline in the function around an operation.
+  mlir::Value frame(mlir::Operation *op) const;
+  StateView &view(mlir::OpBuilder &builder, mlir::Operation *op,
+                  mlir::StringRef state);
+  /// Entry `dim` (i64) of what one of the runtime's queries (the domain, or the
+  /// grid of a stage) points to.
+  mlir::Value query(mlir::OpBuilder &builder, mlir::Operation *op,
+                    mlir::StringRef function, std::optional<int32_t> stage,
+                    int64_t dim);
+
+  /// Calls a function of the runtime, declared on first use.
+  mlir::LLVM::CallOp call(mlir::OpBuilder &builder, mlir::Location loc,
+                          mlir::StringRef function, mlir::Type result,
+                          mlir::ValueRange arguments);
+
+private:
+  mlir::ModuleOp module;
+  llvm::DenseMap<mlir::Operation *, const PipelineNumbers *> functions;
+  /// By function and name.
+  llvm::DenseMap<mlir::Operation *, llvm::StringMap<StateView>> views;
+  llvm::DenseMap<mlir::Operation *, llvm::StringMap<mlir::Value>> queries;
+};
+
+/// Constants and casts.
+mlir::Value createI32(mlir::OpBuilder &builder, mlir::Location loc, int64_t v);
+mlir::Value createI64(mlir::OpBuilder &builder, mlir::Location loc, int64_t v);
+/// An index, i32 or i64 as i64; signed.
+mlir::Value toI64(mlir::OpBuilder &builder, mlir::Location loc, mlir::Value v);
+mlir::Value toIndex(mlir::OpBuilder &builder, mlir::Location loc, mlir::Value v);
+/// A pointer so many bytes behind another.
+mlir::Value createOffset(mlir::OpBuilder &builder, mlir::Location loc,
+                         mlir::Value pointer, int64_t bytes);
+mlir::Value createOffset(mlir::OpBuilder &builder, mlir::Location loc,
+                         mlir::Value pointer, mlir::Value bytes);
+/// The address of an element of a field of a record.
+mlir::Value createFieldAddress(mlir::OpBuilder &builder, mlir::Location loc,
+                               mlir::Value record, FieldAttr field,
+                               mlir::ValueRange elements);
+
+/// Patterns for the storage of bins, and for state.
+void populateKernelToLLVMPatterns(const mlir::TypeConverter &converter,
+                                  mlir::RewritePatternSet &patterns,
+                                  LoweringContext &context);
+void populateStateToLLVMPatterns(const mlir::TypeConverter &converter,
+                                 mlir::RewritePatternSet &patterns,
+                                 LoweringContext &context);
+
+/// Writes NAME.setup and NAME.run; `kernels` run in that order.
+void createProgram(const PipelineNumbers &numbers,
+                   llvm::ArrayRef<mlir::func::FuncOp> kernels,
+                   LoweringContext &context);
+
+} // namespace piko
+
+#endif // PIKO_LIB_CONVERSION_PIKOTOLLVM_LOWERINGCONTEXT_H

@@ -1,0 +1,219 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// The two functions of a program: NAME.setup declares the pipeline to the
+// runtime, NAME.run runs its kernels.
+
+#include "LoweringContext.h"
+
+#include "mlir/Dialect/ControlFlow/IR/ControlFlowOps.h"
+
+using namespace mlir;
+using namespace piko;
+
+namespace {
+
+/// Writes NAME.setup.
+class SetupWriter {
+public:
+  SetupWriter(const PipelineNumbers &numbers, LoweringContext &context,
+              OpBuilder &builder, Value frame)
+      : numbers(numbers), pipeline(numbers.pipeline), context(context),
+        builder(builder), loc(pipeline.getLoc()), frame(frame) {}
+
+  void run();
+
+private:
+  Value i32(int64_t v) { return createI32(builder, loc, v); }
+  Value i64(int64_t v) { return createI64(builder, loc, v); }
+  /// The address of constant bytes.
+  Value bytes(StringRef data);
+  Value text(StringRef s) { return bytes((s + StringRef("\0", 1)).str()); }
+  Value null() {
+    return LLVM::ZeroOp::create(
+        builder, loc, LLVM::LLVMPointerType::get(builder.getContext()));
+  }
+  void call(StringRef function, ArrayRef<Value> arguments) {
+    SmallVector<Value> all{frame};
+    llvm::append_range(all, arguments);
+    context.call(builder, loc, function, Type(), all);
+  }
+
+  void declareRecord(StringAttr name, int32_t number);
+  void declareState(Operation *state, int32_t number);
+  void declareStage(StageOp stage, int32_t number);
+  Value clearBytes(ImageOp image);
+
+  const PipelineNumbers &numbers;
+  PipelineOp pipeline;
+  LoweringContext &context;
+  OpBuilder &builder;
+  Location loc;
+  Value frame;
+};
+
+} // namespace
+
+Value SetupWriter::bytes(StringRef data) {
+  auto module = pipeline->getParentOfType<ModuleOp>();
+  auto type = LLVM::LLVMArrayType::get(builder.getI8Type(), data.size());
+  unsigned counter = 0;
+  SmallString<32> name = SymbolTable::generateSymbolName<32>(
+      (pipeline.getSymName() + ".data").str(),
+      [&](StringRef candidate) { return module.lookupSymbol(candidate); },
+      counter);
+  OpBuilder atStart(module.getBodyRegion());
+  auto global = LLVM::GlobalOp::create(
+      atStart, loc, type, /*isConstant=*/true, LLVM::Linkage::Internal, name,
+      builder.getStringAttr(data), /*alignment=*/16);
+  return LLVM::AddressOfOp::create(builder, loc, global);
+}
+
+static int64_t fieldType(Type type) {
+  if (type.isF32())
+    return 0;
+  if (type.isF64())
+    return 1;
+  switch (type.getIntOrFloatBitWidth()) {
+  case 8:
+    return 2;
+  case 16:
+    return 3;
+  case 32:
+    return 4;
+  default:
+    return 5;
+  }
+}
+
+void SetupWriter::declareRecord(StringAttr name, int32_t number) {
+  RecordOp record = context.record(FlatSymbolRefAttr::get(name));
+  call("pikoir_declare_record", {i32(number), text(name), i64(record.getSize()),
+                                 i64(record.getAlign())});
+  for (auto field : record.getFields().getAsRange<FieldAttr>())
+    call("pikoir_declare_field",
+         {i32(number), text(field.getName()), i32(fieldType(field.getType())),
+          i64(field.getOffset()), i64(field.getElementCount()),
+          i64(field.getStrides().empty() ? 0 : field.getStrides().back())});
+}
+
+Value SetupWriter::clearBytes(ImageOp image) {
+  ArrayAttr clear = image.getClearAttr();
+  if (!clear)
+    return null();
+  RecordOp record = context.record(image.getRecordAttr());
+  std::string data(record.getSize(), '\0');
+  for (auto [value, offset] : llvm::zip(clear, record.getElementOffsets())) {
+    APInt bits = isa<FloatAttr>(value)
+                     ? cast<FloatAttr>(value).getValue().bitcastToAPInt()
+                     : cast<IntegerAttr>(value).getValue();
+    for (unsigned i = 0; i < bits.getBitWidth() / 8; ++i)
+      data[offset + i] = char(bits.extractBitsAsZExtValue(8, 8 * i));
+  }
+  return bytes(data);
+}
+
+void SetupWriter::declareState(Operation *state, int32_t number) {
+  auto image = dyn_cast<ImageOp>(state);
+  auto buffer = dyn_cast<BufferOp>(state);
+  int64_t perSource = buffer ? buffer.getPerSource().value_or(-1) : -1;
+  call("pikoir_declare_state",
+       {i32(number), text(SymbolTable::getSymbolName(state)),
+        i32(image    ? 2
+            : buffer ? 1
+                     : 0),
+        i32(numbers.records.lookup(getStateRecord(state).getAttr())),
+        i32(getStateRank(state)), i32(perSource),
+        image ? clearBytes(image) : null()});
+}
+
+/// pikoir_stage_flags
+static int64_t stageFlags(StageOp stage) {
+  ScheduleOp schedule = stage.getSchedule();
+  return (stage.collects() ? 1 : 0) | (stage.getSplit() ? 2 : 0) |
+         (stage.getPlaced() ? 4 : 0) |
+         (schedule && schedule.getUnordered() ? 8 : 0);
+}
+
+void SetupWriter::declareStage(StageOp stage, int32_t number) {
+  std::string extents;
+  for (int64_t extent : stage.getBins())
+    for (int byte = 0; byte < 8; ++byte)
+      extents += char(uint64_t(extent) >> (8 * byte));
+  ScheduleOp schedule = stage.getSchedule();
+  call("pikoir_declare_stage",
+       {i32(number), text(stage.getSymName()),
+        i32(numbers.records.lookup(stage.getInputAttr().getAttr())),
+        bytes(extents), i32(schedule ? int64_t(schedule.getKind()) : 0),
+        i64(schedule ? schedule.getTileSplit().value_or(0) : 0),
+        i32(stageFlags(stage)), i64(stage.getTile().value_or(0))});
+}
+
+void SetupWriter::run() {
+  call("pikoir_declare_pipeline",
+       {text(pipeline.getSymName()), i32(pipeline.getRank())});
+  for (auto [name, number] : numbers.records)
+    declareRecord(name, number);
+  for (auto [name, number] : numbers.stages)
+    declareStage(cast<StageOp>(SymbolTable::lookupSymbolIn(pipeline, name)),
+                 number);
+  for (auto [index, source] : llvm::enumerate(pipeline.getOps<SourceOp>()))
+    call("pikoir_declare_source",
+         {i32(index),
+          i32(numbers.stages.lookup(source.getStageAttr().getAttr()))});
+  for (auto edge : pipeline.getOps<EdgeOp>())
+    call("pikoir_declare_edge",
+         {i32(numbers.stages.lookup(edge.getProducerAttr().getAttr())),
+          i32(edge.getPort()),
+          i32(numbers.stages.lookup(edge.getConsumerAttr().getAttr()))});
+  for (auto [name, number] : numbers.states)
+    declareState(SymbolTable::lookupSymbolIn(pipeline, name), number);
+}
+
+/// The next kernel runs only if the one before it gave 0.
+static void createRun(PipelineOp pipeline, ArrayRef<func::FuncOp> kernels,
+                      OpBuilder &builder) {
+  Location loc = pipeline.getLoc();
+  auto pointer = LLVM::LLVMPointerType::get(builder.getContext());
+  auto function = func::FuncOp::create(
+      builder, loc, (pipeline.getSymName() + ".run").str(),
+      builder.getFunctionType(pointer, builder.getI32Type()));
+  OpBuilder::InsertionGuard guard(builder);
+  Block *entry = function.addEntryBlock();
+  Block *exit =
+      builder.createBlock(&function.getBody(), {}, builder.getI32Type(), loc);
+  func::ReturnOp::create(builder, loc, exit->getArgument(0));
+  builder.setInsertionPointToEnd(entry);
+  for (func::FuncOp kernel : kernels) {
+    Value status = func::CallOp::create(builder, kernel.getLoc(), kernel,
+                                        entry->getArgument(0))
+                       .getResult(0);
+    Value failed = arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::ne,
+                                         status, createI32(builder, loc, 0));
+    Block *next = builder.createBlock(exit);
+    builder.setInsertionPointAfterValue(failed);
+    cf::CondBranchOp::create(builder, loc, failed, exit, status, next,
+                             ValueRange());
+    builder.setInsertionPointToEnd(next);
+  }
+  cf::BranchOp::create(builder, loc, exit, createI32(builder, loc, 0));
+}
+
+void piko::createProgram(const PipelineNumbers &numbers,
+                         ArrayRef<func::FuncOp> kernels,
+                         LoweringContext &context) {
+  PipelineOp pipeline = numbers.pipeline;
+  auto module = pipeline->getParentOfType<ModuleOp>();
+  OpBuilder builder = OpBuilder::atBlockEnd(module.getBody());
+  auto setup = func::FuncOp::create(
+      builder, pipeline.getLoc(), (pipeline.getSymName() + ".setup").str(),
+      builder.getFunctionType(LLVM::LLVMPointerType::get(builder.getContext()),
+                              {}));
+  {
+    OpBuilder::InsertionGuard guard(builder);
+    Block *body = setup.addEntryBlock();
+    builder.setInsertionPointToEnd(body);
+    SetupWriter(numbers, context, builder, body->getArgument(0)).run();
+    func::ReturnOp::create(builder, pipeline.getLoc());
+  }
+  createRun(pipeline, kernels, builder);
+}

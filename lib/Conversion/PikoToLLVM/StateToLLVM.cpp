@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Constants, buffers and images, as memory that the runtime holds.
+
+#include "LoweringContext.h"
+
+using namespace mlir;
+using namespace piko;
+
+namespace {
+
+template <typename OpT> struct StateLowering : OpConversionPattern<OpT> {
+  StateLowering(const TypeConverter &converter, MLIRContext *mlir,
+                LoweringContext &context)
+      : OpConversionPattern<OpT>(converter, mlir), context(context) {}
+
+  /// The address of the number that an access names.
+  Value address(OpBuilder &builder, OpT op,
+                typename OpT::Adaptor adaptor) const {
+    Location loc = op.getLoc();
+    StateView &view = context.view(builder, op, op.getState());
+    RecordOp record =
+        context.record(getStateRecord(context.state(op, op.getState())));
+    Value element = view.data, index;
+    for (int64_t dim = adaptor.getIndices().size() - 1; dim >= 0; --dim) {
+      Value at = toI64(builder, loc, adaptor.getIndices()[dim]);
+      index =
+          index
+              ? arith::AddIOp::create(builder, loc,
+                                      arith::MulIOp::create(builder, loc, index,
+                                                            view.extents[dim]),
+                                      at)
+              : at;
+    }
+    if (index)
+      element = createOffset(
+          builder, loc, element,
+          arith::MulIOp::create(builder, loc, index,
+                                createI64(builder, loc, record.getSize())));
+    return createFieldAddress(builder, loc, element,
+                              record.getField(op.getField()),
+                              adaptor.getElements());
+  }
+
+  LoweringContext &context;
+};
+
+struct LoadLowering : StateLowering<LoadOp> {
+  using StateLowering::StateLowering;
+  LogicalResult
+  matchAndRewrite(LoadOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    rewriter.replaceOpWithNewOp<LLVM::LoadOp>(op, op.getResult().getType(),
+                                              address(rewriter, op, adaptor));
+    return success();
+  }
+};
+
+struct StoreLowering : StateLowering<StoreOp> {
+  using StateLowering::StateLowering;
+  LogicalResult
+  matchAndRewrite(StoreOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    rewriter.replaceOpWithNewOp<LLVM::StoreOp>(op, adaptor.getValue(),
+                                               address(rewriter, op, adaptor));
+    return success();
+  }
+};
+
+LLVM::AtomicBinOp toLLVM(AtomicKind kind) {
+  switch (kind) {
+  case AtomicKind::Add:
+    return LLVM::AtomicBinOp::add;
+  case AtomicKind::MinS:
+    return LLVM::AtomicBinOp::min;
+  case AtomicKind::MaxS:
+    return LLVM::AtomicBinOp::max;
+  case AtomicKind::MinU:
+    return LLVM::AtomicBinOp::umin;
+  case AtomicKind::MaxU:
+    return LLVM::AtomicBinOp::umax;
+  case AtomicKind::And:
+    return LLVM::AtomicBinOp::_and;
+  case AtomicKind::Or:
+    return LLVM::AtomicBinOp::_or;
+  case AtomicKind::Xor:
+    return LLVM::AtomicBinOp::_xor;
+  }
+  llvm_unreachable("all kinds are handled");
+}
+
+struct AtomicLowering : StateLowering<AtomicOp> {
+  using StateLowering::StateLowering;
+  LogicalResult
+  matchAndRewrite(AtomicOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    // No call sees the value or what it says of others: monotonic is enough,
+    // and the end of the kernel orders it before those that follow.
+    LLVM::AtomicRMWOp::create(rewriter, op.getLoc(), toLLVM(op.getKind()),
+                              address(rewriter, op, adaptor),
+                              adaptor.getValue(),
+                              LLVM::AtomicOrdering::monotonic);
+    rewriter.eraseOp(op);
+    return success();
+  }
+};
+
+struct ExtentLowering : OpConversionPattern<ExtentOp> {
+  ExtentLowering(const TypeConverter &converter, MLIRContext *mlir,
+                 LoweringContext &context)
+      : OpConversionPattern(converter, mlir), context(context) {}
+  LogicalResult
+  matchAndRewrite(ExtentOp op, OpAdaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    StateView &view = context.view(rewriter, op, op.getState());
+    rewriter.replaceOp(
+        op, toIndex(rewriter, op.getLoc(), view.extents[op.getDim()]));
+    return success();
+  }
+  LoweringContext &context;
+};
+
+// pikort_status
+constexpr int64_t updateOutside = 17, indexOutside = 18;
+
+struct FailLowering : OpConversionPattern<FailOp> {
+  FailLowering(const TypeConverter &converter, MLIRContext *mlir,
+               LoweringContext &context)
+      : OpConversionPattern(converter, mlir), context(context) {}
+  LogicalResult
+  matchAndRewrite(FailOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    Location loc = op.getLoc();
+    bool image = isa<ImageOp>(context.state(op, op.getState()));
+    SmallVector<Value> indices;
+    for (Value index : adaptor.getIndices())
+      indices.push_back(toI64(rewriter, loc, index));
+    Value second =
+        indices.size() > 1 ? indices[1] : createI64(rewriter, loc, 0);
+    if (!image)
+      second = context.view(rewriter, op, op.getState()).extents[0];
+    context.call(
+        rewriter, loc, "pikoir_fail", Type(),
+        {context.frame(op),
+         createI32(rewriter, loc, context.stageNumber(op, op.getStage())),
+         createI32(rewriter, loc, image ? updateOutside : indexOutside),
+         indices.front(), second});
+    rewriter.eraseOp(op);
+    return success();
+  }
+  LoweringContext &context;
+};
+
+} // namespace
+
+void piko::populateStateToLLVMPatterns(const TypeConverter &converter,
+                                       RewritePatternSet &patterns,
+                                       LoweringContext &context) {
+  patterns.add<LoadLowering, StoreLowering, AtomicLowering, ExtentLowering,
+               FailLowering>(converter, patterns.getContext(), context);
+}

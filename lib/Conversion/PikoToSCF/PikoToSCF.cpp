@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// convert-piko-to-scf: updates and writes behind tests of where they write.
+
+#include "Piko/Conversion/Passes.h"
+#include "Piko/Transforms/BinArithmetic.h"
+
+#include "mlir/IR/PatternMatch.h"
+#include "mlir/Transforms/GreedyPatternRewriteDriver.h"
+
+namespace piko {
+#define GEN_PASS_DEF_CONVERTPIKOTOSCF
+#include "Piko/Conversion/Passes.h.inc"
+} // namespace piko
+
+using namespace mlir;
+using namespace piko;
+
+/// The stage whose kernel an operation of the resolved level is in, or null.
+static StageOp getKernelStage(Operation *op) {
+  auto kernel = op->getParentOfType<KernelOp>();
+  if (!kernel)
+    return {};
+  for (auto bins : kernel.getOps<OpenBinsOp>())
+    return lookupInPipeline<StageOp>(kernel, bins.getStageAttr());
+  return {};
+}
+
+static SmallVector<Value> toIndices(BinArithmetic &bins, ValueRange values) {
+  return llvm::map_to_vector(values, [&](Value v) { return bins.toIndex(v); });
+}
+
+/// Whether all of lo <= at < hi: a negative difference is a large unsigned one.
+static Value isInside(PatternRewriter &rewriter, Location loc,
+                      ArrayRef<Value> at, ArrayRef<Value> lo,
+                      ArrayRef<Value> hi) {
+  Value inside;
+  for (auto [a, from, to] : llvm::zip(at, lo, hi)) {
+    Value offset = arith::SubIOp::create(rewriter, loc, a, from);
+    Value extent = arith::SubIOp::create(rewriter, loc, to, from);
+    Value ok = arith::CmpIOp::create(rewriter, loc, arith::CmpIPredicate::ult,
+                                     offset, extent);
+    inside = inside ? arith::AndIOp::create(rewriter, loc, inside, ok) : ok;
+  }
+  return inside;
+}
+
+namespace {
+
+struct ConvertUpdate : OpRewritePattern<UpdateOp> {
+  using OpRewritePattern::OpRewritePattern;
+
+  LogicalResult matchAndRewrite(UpdateOp update,
+                                PatternRewriter &rewriter) const override {
+    StageOp stage = getKernelStage(update);
+    if (!stage || !update.getBin())
+      return rewriter.notifyMatchFailure(update, "not at the resolved level");
+    Location loc = update.getLoc();
+    BinArithmetic bins(rewriter, loc, stage);
+    SmallVector<Value> at = toIndices(bins, update.getCoordinates()), lo, hi;
+    for (int64_t dim = 0, e = at.size(); dim < e; ++dim) {
+      lo.push_back(bins.lo(update.getBin(), dim));
+      hi.push_back(bins.hi(update.getBin(), dim));
+    }
+    auto ifOp = scf::IfOp::create(rewriter, loc, update.getResultTypes(),
+                                  isInside(rewriter, loc, at, lo, hi),
+                                  /*addThenBlock=*/true,
+                                  /*addElseBlock=*/true);
+    rewriter.setInsertionPointToStart(ifOp.elseBlock());
+    FailOp::create(rewriter, loc, stage.getSymName(), update.getImage(), at);
+    SmallVector<Value> zeros;
+    for (Type type : update.getResultTypes())
+      zeros.push_back(
+          arith::ConstantOp::create(rewriter, loc, rewriter.getZeroAttr(type)));
+    if (ifOp.getNumResults())
+      scf::YieldOp::create(rewriter, loc, zeros);
+    convertBody(update, ifOp, at, rewriter);
+    rewriter.replaceOp(update, ifOp);
+    return success();
+  }
+
+private:
+  /// Loads of the pixel, the body, stores of what it yields.
+  static void convertBody(UpdateOp update, scf::IfOp ifOp, ArrayRef<Value> at,
+                          PatternRewriter &rewriter) {
+    Location loc = update.getLoc();
+    auto image = lookupInPipeline<ImageOp>(update, update.getImageAttr());
+    RecordOp record = lookupRecord(image, image.getRecordAttr());
+    auto yield = cast<YieldOp>(update.getBody().front().getTerminator());
+    rewriter.setInsertionPointToStart(ifOp.thenBlock());
+    SmallVector<Value> oldValues;
+    forEachElement(rewriter, loc, record, [&](FieldAttr field, ValueRange es) {
+      oldValues.push_back(LoadOp::create(rewriter, loc, field.getType(),
+                                         update.getImage(), at, field.getName(),
+                                         es));
+    });
+    Block *then = ifOp.thenBlock();
+    if (ifOp.getNumResults() == 0)
+      rewriter.setInsertionPoint(then->getTerminator());
+    rewriter.inlineBlockBefore(&update.getBody().front(), then,
+                               rewriter.getInsertionPoint(), oldValues);
+    rewriter.setInsertionPoint(yield);
+    SmallVector<Value> newValues(yield.getPixel());
+    int64_t element = 0;
+    forEachElement(rewriter, loc, record, [&](FieldAttr field, ValueRange es) {
+      int64_t i = element++;
+      if (newValues[i] != oldValues[i])
+        StoreOp::create(rewriter, loc, newValues[i], update.getImage(), at,
+                        field.getName(), es, /*checked=*/true);
+    });
+    if (ifOp.getNumResults())
+      scf::YieldOp::create(rewriter, loc, yield.getResults());
+    rewriter.eraseOp(yield);
+  }
+
+  /// Each number of a record: its field, and its indices into an array.
+  static void
+  forEachElement(PatternRewriter &rewriter, Location loc, RecordOp record,
+                 llvm::function_ref<void(FieldAttr, ValueRange)> body) {
+    for (auto field : record.getFields().getAsRange<FieldAttr>())
+      for (int64_t i = 0, e = field.getElementCount(); i < e; ++i) {
+        SmallVector<Value> indices(field.getCounts().size());
+        int64_t rest = i;
+        for (auto [index, count] :
+             llvm::reverse(llvm::zip(indices, field.getCounts()))) {
+          index = arith::ConstantIndexOp::create(rewriter, loc, rest % count);
+          rest /= count;
+        }
+        body(field, indices);
+      }
+  }
+};
+
+/// Puts a write that is not checked yet behind a test of its indices.
+template <typename WriteOp> struct CheckWrite : OpRewritePattern<WriteOp> {
+  using OpRewritePattern<WriteOp>::OpRewritePattern;
+
+  LogicalResult matchAndRewrite(WriteOp write,
+                                PatternRewriter &rewriter) const override {
+    StageOp stage = getKernelStage(write);
+    if (!stage)
+      return rewriter.notifyMatchFailure(write, "not at the resolved level");
+    if (write.getChecked())
+      return rewriter.notifyMatchFailure(write, "checked already");
+    Location loc = write.getLoc();
+    BinArithmetic bins(rewriter, loc, stage);
+    SmallVector<Value> at = toIndices(bins, write.getIndices()), lo, hi;
+    for (int64_t dim = 0, e = at.size(); dim < e; ++dim) {
+      lo.push_back(bins.constant(0));
+      hi.push_back(ExtentOp::create(rewriter, loc, write.getState(), dim));
+    }
+    auto ifOp =
+        scf::IfOp::create(rewriter, loc, isInside(rewriter, loc, at, lo, hi),
+                          /*withElseRegion=*/true);
+    rewriter.setInsertionPointToStart(ifOp.elseBlock());
+    FailOp::create(rewriter, loc, stage.getSymName(), write.getState(), at);
+    rewriter.modifyOpInPlace(write, [&] {
+      write.setChecked(true);
+      write->moveBefore(ifOp.thenBlock()->getTerminator());
+    });
+    return success();
+  }
+};
+
+struct ConvertPikoToSCFPass
+    : piko::impl::ConvertPikoToSCFBase<ConvertPikoToSCFPass> {
+  void runOnOperation() override {
+    RewritePatternSet patterns(&getContext());
+    populatePikoToSCFPatterns(patterns);
+    if (failed(applyPatternsGreedily(getOperation(), std::move(patterns))))
+      return signalPassFailure();
+    getOperation().walk([&](UpdateOp update) {
+      update.emitOpError("expected to be at the resolved level");
+      signalPassFailure();
+    });
+  }
+};
+
+} // namespace
+
+void piko::populatePikoToSCFPatterns(RewritePatternSet &patterns) {
+  patterns.add<ConvertUpdate, CheckWrite<StoreOp>, CheckWrite<AtomicOp>>(
+      patterns.getContext());
+}
