@@ -24,13 +24,12 @@ struct FormKernelsPass : piko::impl::FormKernelsBase<FormKernelsPass> {
 
 KernelOp FormKernelsPass::createKernel(OpBuilder &builder, Location loc,
                                        const Twine &name) {
-  unsigned counter = 0;
-  SmallString<32> unique = SymbolTable::generateSymbolName<32>(
-      name.str(),
-      [&](StringRef candidate) {
-        return SymbolTable::lookupSymbolIn(getOperation(), candidate);
-      },
-      counter);
+  auto isTaken = [&](StringRef candidate) {
+    return bool(SymbolTable::lookupSymbolIn(getOperation(), candidate));
+  };
+  std::string unique = name.str();
+  for (int i = 0; isTaken(unique); ++i)
+    unique = (name + "_" + Twine(i)).str();
   auto kernel = KernelOp::create(builder, loc, unique);
   kernel.getBody().emplaceBlock();
   ++kernels;

@@ -178,15 +178,12 @@ LogicalResult SourceOp::verifySymbolUses(SymbolTableCollection &) {
 }
 
 LogicalResult EdgeOp::verifySymbolUses(SymbolTableCollection &) {
-  StageOp ends[2];
-  for (auto [end, name] :
-       llvm::zip(ends, ArrayRef{getProducerAttr(), getConsumerAttr()})) {
-    end = lookupInPipeline<StageOp>(*this, name);
-    if (!end)
-      return emitOpError("expected a stage, but got ")
-             << name << ", which is none";
-  }
-  auto [producer, consumer] = ends;
+  auto producer = lookupInPipeline<StageOp>(*this, getProducerAttr());
+  auto consumer = lookupInPipeline<StageOp>(*this, getConsumerAttr());
+  if (!producer || !consumer)
+    return emitOpError("expected a stage, but got ")
+           << (producer ? getConsumerAttr() : getProducerAttr())
+           << ", which is none";
   if (getPort() >= int64_t(producer.getOutputs().size()))
     return emitOpError("expected a port below ")
            << producer.getOutputs().size() << ", which is how many stage '"

@@ -9,7 +9,7 @@ include "Piko/Dialect/Piko/IR/PikoAttributes.td"
 include "Piko/Dialect/Piko/IR/PikoTypes.td"
 
 def Piko_KernelOp : Piko_Op<"kernel", [
-    Symbol, NoTerminator, SingleBlock, NoRegionArguments,
+    Symbol, NoTerminator, SingleBlock, NoRegionArguments, IsolatedFromAbove,
     HasParent<"PipelineOp">]> {
   let summary = "phases that run together";
   let description = [{

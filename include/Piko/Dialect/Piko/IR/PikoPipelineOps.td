@@ -40,7 +40,7 @@ def Piko_RecordOp : Piko_Op<"record", [Symbol, HasParent<"::mlir::ModuleOp">]> {
 
 def Piko_PipelineOp : Piko_Op<"pipeline", [
     Symbol, SymbolTable, NoTerminator, SingleBlock, NoRegionArguments,
-    HasParent<"::mlir::ModuleOp">]> {
+    IsolatedFromAbove, HasParent<"::mlir::ModuleOp">]> {
   let summary = "a graph of stages and the state they share";
   let description = [{
     Holds, at the authored level, state (`piko.constant`, `piko.buffer`,

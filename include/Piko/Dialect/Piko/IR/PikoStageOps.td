@@ -71,7 +71,7 @@ def Piko_StageOp : Piko_Op<"stage", [
 
 class Piko_PhaseOp<string mnemonic, list<Trait> traits = []>
     : Piko_Op<mnemonic, !listconcat(traits, [
-        ParentOneOf<["StageOp", "KernelOp"]>,
+        IsolatedFromAbove, ParentOneOf<["StageOp", "KernelOp"]>,
         SingleBlockImplicitTerminator<"ReturnOp">])>;
 
 def Piko_AssignOp : Piko_PhaseOp<"assign", [RecursiveMemoryEffects]> {
