@@ -1,0 +1,94 @@
+//===- piko/scene.h - Scene types that piko-render understands ------------===//
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// A pipeline that uses these types can be rendered by piko-render, which knows
+// no pipeline by name and binds by type:
+//
+//   what the pipeline declares                what piko-render puts there
+//   ----------------------------------------  ---------------------------------
+//   a constant of type Camera                 the camera
+//   a constant of type Settings               shading constants and switches
+//   a Buffer<Light>                           the lights
+//   a Buffer<Vertex>, a Buffer<Triangle>      the mesh
+//   a source into a stage that takes Vertex   the mesh's vertices, in order
+//   a source into a stage that takes Triangle the mesh's triangles, in order
+//   the Image<Color>                          the result: there is exactly one
+//
+// Each may occur any number of times (the Image<Color> once) or not at all.
+// A host-bound state member or a source of any other type is an error, because
+// nothing could fill it. State that the pipeline allocates or clears itself is
+// left alone. The domain is the image: cell (0, 0) is its top left pixel.
+//
+// All types are trivially copyable; lengths are in the scene's own unit.
+//
+//===----------------------------------------------------------------------===//
+#ifndef PIKO_SCENE_H
+#define PIKO_SCENE_H
+
+#include <stdint.h>
+
+#include <glm/glm.hpp>
+
+namespace piko::scene {
+
+/// A pinhole camera.
+///
+/// The ray through image point (sx, sy), where sx runs from -1 at the left to
+/// 1 at the right and sy from -1 at the bottom to 1 at the top, starts at `eye`
+/// and has the direction `forward + right * sx + up * sy`.
+struct Camera {
+  /// World to clip space as in OpenGL: visible points have -w <= x, y, z <= w,
+  /// and the near plane is z = -w. Column-major.
+  glm::mat4 viewProjection;
+  glm::vec3 eye;
+  glm::vec3 forward; ///< unit length
+  glm::vec3 right;   ///< half the image's width at distance 1
+  glm::vec3 up;      ///< half the image's height at distance 1
+  float nearZ;       ///< distance of the near plane along `forward`, above 0
+  float farZ;        ///< distance of the far plane, beyond the scene
+};
+
+/// A light. It shines from `position.xyz`: a direction (towards the light,
+/// unit length) if `position.w` is 0, a point if it is 1. It does not fall
+/// off with distance.
+struct Light {
+  glm::vec4 position;
+  glm::vec4 color; ///< linear rgb; w is unused
+};
+
+/// What to shade with, and switches. A surface with normal n at p has colour
+///   albedo * (ambient + sum over lights of color * max(0, dot(n, l)) / |l|)
+/// where l = position.xyz - position.w * p. Both sides of a surface have the
+/// same normal.
+struct Settings {
+  float albedo = 0.8f;
+  float ambient = 0.05f;
+  /// Not 0: triangles whose corners run clockwise on the screen are left out.
+  int32_t cullBackFaces = 0;
+};
+
+/// A corner that triangles share.
+struct Vertex {
+  glm::vec3 position;
+  glm::vec3 normal; ///< unit length
+  int32_t index;    ///< its own place among the vertices
+};
+
+/// Three vertices, counterclockwise where the front is seen.
+struct Triangle {
+  glm::ivec3 vertex; ///< places among the vertices
+  int32_t index;     ///< its own place among the triangles
+};
+
+/// A pixel of the result: linear colour and coverage. Alpha is 0 where nothing
+/// was drawn; a new image shows the background everywhere.
+///
+/// 8-bit images hold floor(255 * clamp(c, 0, 1) + 0.5) for each of r, g and b
+/// (no transfer function) and no alpha; float images hold all four as they are.
+struct Color {
+  glm::vec4 rgba = {0.1f, 0.1f, 0.1f, 0.0f};
+};
+
+} // namespace piko::scene
+
+#endif // PIKO_SCENE_H
