@@ -62,11 +62,17 @@ template <class K>
 std::vector<int64_t> sortedIndices(const std::vector<K> &keys) {
   std::vector<int64_t> indices(keys.size());
   std::iota(indices.begin(), indices.end(), int64_t(0));
-  std::stable_sort(indices.begin(), indices.end(), [&](int64_t a, int64_t b) {
+  // NaNs are equal to each other and greater than all else.
+  auto isLess = [](const K &a, const K &b) {
     if constexpr (std::is_floating_point_v<K>)
-      if (keys[b] != keys[b])
-        return keys[a] == keys[a];
-    return keys[a] < keys[b];
+      if (b != b)
+        return a == a;
+    return a < b;
+  };
+  std::sort(indices.begin(), indices.end(), [&](int64_t a, int64_t b) {
+    if (isLess(keys[a], keys[b]))
+      return true;
+    return !isLess(keys[b], keys[a]) && a < b;
   });
   return indices;
 }

@@ -169,7 +169,11 @@ public:
   // Process.
 
   /// Sends a primitive through a port.
-  void emit(const FirstOut &value, int port = 0) { emitAs(value, port); }
+  void emit(const FirstOut &value, int port = 0)
+    requires(sizeof...(Out) > 0)
+  {
+    emitAs(value, port);
+  }
   template <class T> void emit(const T &value, int port = 0) {
     static_assert((std::is_same_v<T, Out> || ...),
                   "emit of a type that no port has");

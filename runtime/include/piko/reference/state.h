@@ -81,6 +81,9 @@ public:
 
   // For the host.
 
+  using value_type = T;
+  using const_iterator = const T *;
+
   /// Uses the caller's memory, which must outlive the runs.
   void bind(T *data, int64_t n) {
     owned.reset();
