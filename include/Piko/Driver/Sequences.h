@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// The sequences of passes that the tools share. Each is registered for
+// piko-opt under the name that its comment gives.
+
+#ifndef PIKO_DRIVER_SEQUENCES_H
+#define PIKO_DRIVER_SEQUENCES_H
+
+#include "mlir/Pass/PassManager.h"
+
+namespace piko {
+
+/// `piko-synthesize`: from the authored to the kernels level.
+void addSynthesisSequence(mlir::OpPassManager &passes);
+
+/// `piko-resolve`: from the kernels to the resolved level.
+void addResolveSequence(mlir::OpPassManager &passes);
+
+/// `piko-to-cpu`: from the resolved level to scf, arith, omp and llvm.
+void addCPUSequence(mlir::OpPassManager &passes);
+
+/// `piko-cpu-to-llvm`: from there to the llvm dialect (and omp) alone.
+void addLLVMSequence(mlir::OpPassManager &passes);
+
+void registerSequences();
+
+} // namespace piko
+
+#endif // PIKO_DRIVER_SEQUENCES_H

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Ordinary C++ for this machine: how the reference executor is loaded.
+
+#ifndef PIKO_FRONTEND_HOSTCOMPILER_H
+#define PIKO_FRONTEND_HOSTCOMPILER_H
+
+#include "Piko/Frontend/Frontend.h"
+
+#include "llvm/IR/LLVMContext.h"
+#include "llvm/IR/Module.h"
+
+#include <memory>
+
+namespace piko {
+
+/// Compiles C++ text, without __PIKO__, to LLVM IR for this machine; null after
+/// diagnostics in `context`'s engine.
+std::unique_ptr<llvm::Module> compileForHost(llvm::StringRef text,
+                                             const FrontendOptions &options,
+                                             llvm::LLVMContext &llvmContext,
+                                             mlir::MLIRContext &context);
+
+} // namespace piko
+
+#endif // PIKO_FRONTEND_HOSTCOMPILER_H

@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Reading a pipeline and taking it down the levels.
+
+#include "Piko/Driver/Compiler.h"
+
+#include "Piko/Conversion/Passes.h"
+#include "Piko/Driver/Sequences.h"
+#include "Piko/Transforms/Passes.h"
+
+#include "mlir/Dialect/ControlFlow/IR/ControlFlow.h"
+#include "mlir/Dialect/DLTI/DLTI.h"
+#include "mlir/Dialect/Math/IR/Math.h"
+#include "mlir/Dialect/MemRef/IR/MemRef.h"
+#include "mlir/Dialect/UB/IR/UBOps.h"
+#include "mlir/Parser/Parser.h"
+#include "mlir/Support/FileUtilities.h"
+#include "mlir/Target/LLVMIR/Dialect/Builtin/BuiltinToLLVMIRTranslation.h"
+#include "mlir/Target/LLVMIR/Dialect/LLVMIR/LLVMToLLVMIRTranslation.h"
+#include "mlir/Target/LLVMIR/Dialect/OpenMP/OpenMPToLLVMIRTranslation.h"
+#include "mlir/Target/LLVMIR/Export.h"
+#include "llvm/ADT/StringExtras.h"
+#include "llvm/IR/Module.h"
+#include "llvm/Support/SourceMgr.h"
+
+using namespace mlir;
+using namespace piko;
+
+void piko::registerPikoDialects(DialectRegistry &registry) {
+  registry.insert<PikoDialect, DLTIDialect, LLVM::LLVMDialect,
+                  arith::ArithDialect, cf::ControlFlowDialect,
+                  func::FuncDialect, math::MathDialect, memref::MemRefDialect,
+                  omp::OpenMPDialect, scf::SCFDialect, ub::UBDialect>();
+  registerBuiltinDialectTranslation(registry);
+  registerLLVMDialectTranslation(registry);
+  registerOpenMPDialectTranslation(registry);
+}
+
+static bool isMLIR(StringRef file) { return file.ends_with(".mlir"); }
+
+/// Parses `.mlir`; null after diagnostics.
+static OwningOpRef<ModuleOp> parseMLIR(StringRef file, MLIRContext &context) {
+  std::string message;
+  std::unique_ptr<llvm::MemoryBuffer> text = openInputFile(file, &message);
+  if (!text) {
+    emitError(UnknownLoc::get(&context)) << message;
+    return {};
+  }
+  llvm::SourceMgr sources;
+  sources.AddNewSourceBuffer(std::move(text), llvm::SMLoc());
+  return parseSourceFile<ModuleOp>(sources, &context);
+}
+
+FrontendOptions piko::getFrontendOptions(const CompileOptions &options) {
+  FrontendOptions result;
+  result.includeDirs = options.includeDirs;
+  result.defines = options.defines;
+  result.pipeName = options.pipeName;
+  result.runtimeIncludeDir = PIKO_RUNTIME_INCLUDE_DIR;
+  return result;
+}
+
+static std::vector<std::string> getNames(ModuleOp module) {
+  std::vector<std::string> names;
+  for (auto pipeline : module.getOps<PipelineOp>())
+    names.push_back(pipeline.getSymName().str());
+  return names;
+}
+
+/// Leaves only the pipeline of that name in a module.
+static LogicalResult selectPipeline(ModuleOp module, StringRef file,
+                                    StringRef name) {
+  std::vector<std::string> names = getNames(module);
+  std::string list = llvm::join(names, "', '");
+  auto error = [&] {
+    return emitError(FileLineColLoc::get(module.getContext(), file, 1, 1));
+  };
+  if (names.empty())
+    return error() << "expected a pipeline, but the file has none";
+  if (name.empty() && names.size() > 1)
+    return error() << "expected the name of a pipeline, because the file has "
+                      "several: '"
+                   << list << "'";
+  if (!name.empty() && !llvm::is_contained(names, name))
+    return error() << "no pipeline is named '" << name << "'; the file has '"
+                   << list << "'";
+  for (auto pipeline : llvm::to_vector(module.getOps<PipelineOp>()))
+    if (!name.empty() && pipeline.getSymName() != name)
+      pipeline.erase();
+  return success();
+}
+
+OwningOpRef<ModuleOp> piko::readPipeline(const CompileOptions &options,
+                                         MLIRContext &context) {
+  context.loadAllAvailableDialects();
+  if (!isMLIR(options.file))
+    return translateCppToPiko(options.file, getFrontendOptions(options),
+                              context);
+  OwningOpRef<ModuleOp> module = parseMLIR(options.file, context);
+  if (!module ||
+      failed(selectPipeline(*module, options.file, options.pipeName)))
+    return {};
+  return module;
+}
+
+FailureOr<std::vector<std::string>>
+piko::readPipelineNames(const CompileOptions &options, MLIRContext &context) {
+  context.loadAllAvailableDialects();
+  if (!isMLIR(options.file))
+    return listPipes(options.file, getFrontendOptions(options), context);
+  OwningOpRef<ModuleOp> module = parseMLIR(options.file, context);
+  if (!module)
+    return failure();
+  return getNames(*module);
+}
+
+LogicalResult piko::lowerPipeline(ModuleOp module, Level level) {
+  PassManager passes(module.getContext());
+  if (level >= Level::Kernels)
+    addSynthesisSequence(passes);
+  if (level >= Level::Resolved)
+    addResolveSequence(passes);
+  if (level >= Level::Target)
+    addCPUSequence(passes);
+  if (level >= Level::LLVM)
+    addLLVMSequence(passes);
+  return passes.run(module);
+}
+
+std::unique_ptr<llvm::Module>
+piko::translateToLLVMIR(ModuleOp module, llvm::LLVMContext &context) {
+  return translateModuleToLLVMIR(module, context, "pipeline");
+}

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// The sequences of passes that the tools share.
+
+#include "Piko/Driver/Sequences.h"
+
+#include "Piko/Conversion/Passes.h"
+#include "Piko/Transforms/Passes.h"
+
+#include "mlir/Conversion/MathToLLVM/MathToLLVM.h"
+#include "mlir/Conversion/OpenMPToLLVM/ConvertOpenMPToLLVM.h"
+#include "mlir/Conversion/ReconcileUnrealizedCasts/ReconcileUnrealizedCasts.h"
+#include "mlir/Conversion/SCFToControlFlow/SCFToControlFlow.h"
+#include "mlir/Conversion/UBToLLVM/UBToLLVM.h"
+#include "mlir/Pass/PassRegistry.h"
+#include "mlir/Transforms/Passes.h"
+
+using namespace mlir;
+using namespace piko;
+
+static void addCleanUp(OpPassManager &passes) {
+  passes.addPass(createCanonicalizerPass());
+  passes.addPass(createCSEPass());
+}
+
+void piko::addSynthesisSequence(OpPassManager &passes) {
+  addCleanUp(passes);
+  OpPassManager &pipeline = passes.nest<PipelineOp>();
+  pipeline.addPass(createOrderStages());
+  pipeline.addPass(createOwnPixels());
+  pipeline.addPass(createFormKernels());
+}
+
+void piko::addResolveSequence(OpPassManager &passes) {
+  passes.nest<PipelineOp>().addPass(createResolveKernels());
+  addCleanUp(passes);
+}
+
+void piko::addCPUSequence(OpPassManager &passes) {
+  passes.nest<PipelineOp>().addPass(createConvertPikoToSCF());
+  addCleanUp(passes);
+  passes.nest<PipelineOp>().addPass(createConvertPikoToOpenMP());
+  passes.addPass(createConvertPikoToLLVM());
+  addCleanUp(passes);
+}
+
+void piko::addLLVMSequence(OpPassManager &passes) {
+  passes.addPass(createSCFToControlFlowPass());
+  passes.addPass(createConvertMathToLLVMPass());
+  passes.addPass(createUBToLLVMConversionPass());
+  passes.addPass(createConvertOpenMPToLLVMPass());
+  passes.addPass(createReconcileUnrealizedCastsPass());
+}
+
+void piko::registerSequences() {
+  PassPipelineRegistration<>("piko-synthesize",
+                             "From the authored to the kernels level",
+                             addSynthesisSequence);
+  PassPipelineRegistration<>("piko-resolve",
+                             "From the kernels to the resolved level",
+                             addResolveSequence);
+  PassPipelineRegistration<>("piko-to-cpu",
+                             "From the resolved level to upstream dialects",
+                             addCPUSequence);
+  PassPipelineRegistration<>("piko-cpu-to-llvm",
+                             "From upstream dialects to llvm and omp",
+                             addLLVMSequence);
+}
