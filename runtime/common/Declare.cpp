@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//===- Declare.cpp - What a program's setup declares ----------------------===//
+//
+// Each function notes one declaration. A wrong one sets the status, which
+// pikort_create returns; relations between declarations are checked once all
+// are there, by pikort_pipeline::finish.
+//
+//===----------------------------------------------------------------------===//
+
+#include "common/Pipeline.h"
+
+#include <bit>
+
+using namespace piko::rt;
+
+/// The entry `id` of a list that grows as needed, marked as declared.
+template <class T>
+static T &declare(std::vector<T> &list, int32_t id, const char *what) {
+  if (id < 0 || id > 1 << 20)
+    throw Failure{PIKORT_BAD_PROGRAM, std::string("expected a small ") + what +
+                                          " number, but got " +
+                                          std::to_string(id)};
+  if (list.size() <= static_cast<size_t>(id))
+    list.resize(static_cast<size_t>(id) + 1);
+  if (list[id].declared)
+    throw Failure{PIKORT_BAD_PROGRAM, std::string("expected ") + what + " " +
+                                          std::to_string(id) +
+                                          " to be declared once"};
+  list[id].declared = true;
+  return list[id];
+}
+
+static void expect(bool condition, const std::string &text) {
+  if (!condition)
+    throw Failure{PIKORT_BAD_PROGRAM, text};
+}
+
+static const char *orEmpty(const char *text) { return text ? text : ""; }
+
+extern "C" {
+
+void pikoir_declare_pipeline(pikort_pipeline *p, const char *name,
+                             int32_t rank) {
+  guarded(p, "setup", [&] {
+    p->name = orEmpty(name);
+    p->rank = rank;
+  });
+}
+
+void pikoir_declare_record(pikort_pipeline *p, int32_t id, const char *name,
+                           int64_t size, int64_t align) {
+  guarded(p, "setup", [&] {
+    Record &record = declare(p->records, id, "record");
+    record.name = orEmpty(name);
+    record.size = size;
+    record.align = align;
+    expect(size > 0 && size <= 1 << 20,
+           "record " + quoted(record.name) +
+               ": expected a size in [1, 1048576], but got " +
+               std::to_string(size));
+    expect(align > 0 && align <= 4096 &&
+               std::has_single_bit(static_cast<uint64_t>(align)) &&
+               size % align == 0,
+           "record " + quoted(record.name) +
+               ": expected an alignment that divides its size, but got " +
+               std::to_string(align));
+  });
+}
+
+void pikoir_declare_field(pikort_pipeline *p, int32_t record, const char *leaf,
+                          int32_t type, int64_t offset, int64_t elements,
+                          int64_t stride) {
+  guarded(p, "setup", [&] {
+    expect(record >= 0 && record < static_cast<int32_t>(p->records.size()),
+           "field " + quoted(orEmpty(leaf)) +
+               ": expected a declared record, but got " +
+               std::to_string(record));
+    expect(type >= PIKORT_F32 && type <= PIKORT_I64 && elements >= 0 &&
+               elements <= 1 << 20,
+           "field " + quoted(orEmpty(leaf)) + ": expected a scalar type");
+    p->records[record].fields.push_back(
+        {orEmpty(leaf), type, offset, elements, stride});
+  });
+}
+
+void pikoir_declare_state(pikort_pipeline *p, int32_t id, const char *name,
+                          int32_t kind, int32_t record, int32_t rank,
+                          int32_t perSource, const void *clear) {
+  guarded(p, "setup", [&] {
+    State &state = declare(p->states, id, "state");
+    state.name = orEmpty(name);
+    state.kind = kind;
+    state.record = record;
+    state.rank = kind == PIKORT_BUFFER ? 1 : kind == PIKORT_CONSTANT ? 0 : rank;
+    state.perSource = kind == PIKORT_BUFFER ? perSource : -1;
+    expect(kind >= PIKORT_CONSTANT && kind <= PIKORT_IMAGE,
+           "state " + quoted(state.name) +
+               ": expected a kind in [0, 2], but got " + std::to_string(kind));
+    expect(kind != PIKORT_IMAGE || (rank >= 1 && rank <= 4),
+           "state " + quoted(state.name) +
+               ": expected a rank in [1, 4], but got " + std::to_string(rank));
+    expect(record >= 0 && record < static_cast<int32_t>(p->records.size()),
+           "state " + quoted(state.name) +
+               ": expected its record to be declared first");
+    int64_t size = p->records[record].size;
+    auto *bytes = static_cast<const uint8_t *>(clear);
+    if (bytes)
+      state.clear.assign(bytes, bytes + size);
+    if (kind != PIKORT_CONSTANT)
+      return;
+    state.bytes.resize(static_cast<size_t>(size));
+    if (bytes)
+      state.bytes = state.clear;
+    state.bound = bytes != nullptr;
+  });
+}
+
+void pikoir_declare_stage(pikort_pipeline *p, int32_t id, const char *name,
+                          int32_t record, const int64_t *binSize,
+                          int32_t schedule, int64_t tileSplit, int32_t flags,
+                          int64_t cellSize) {
+  guarded(p, "setup", [&] {
+    Stage &stage = declare(p->stages, id, "stage");
+    stage.name = orEmpty(name);
+    stage.record = record;
+    stage.schedule = schedule;
+    stage.tileSplit = tileSplit;
+    stage.flags = flags;
+    stage.cellSize = cellSize;
+    std::string who = "stage " + quoted(stage.name);
+    expect(p->rank >= 1 && p->rank <= 4,
+           who + ": expected the pipeline to be declared first");
+    expect(schedule >= PIKOIR_LOAD_BALANCE && schedule <= PIKOIR_ALL,
+           who + ": expected a schedule in [0, 3], but got " +
+               std::to_string(schedule));
+    expect(tileSplit >= 0 && cellSize >= 0,
+           who + ": expected no negative tile size");
+    for (int32_t d = 0; d < p->rank; ++d) {
+      stage.binSize[d] = binSize ? binSize[d] : 0;
+      expect(stage.binSize[d] >= 0,
+             who + ": expected a bin size of at least 0, but got " +
+                 std::to_string(stage.binSize[d]));
+    }
+  });
+}
+
+void pikoir_declare_source(pikort_pipeline *p, int32_t index, int32_t stage) {
+  guarded(p, "setup",
+          [&] { declare(p->sources, index, "source").stage = stage; });
+}
+
+void pikoir_declare_edge(pikort_pipeline *p, int32_t producer, int32_t port,
+                         int32_t consumer) {
+  guarded(p, "setup",
+          [&] { p->edges.push_back({producer, port, consumer, false}); });
+}
+
+} // extern "C"

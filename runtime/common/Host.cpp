@@ -1,0 +1,306 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//===- Host.cpp - The host API: life, binding, running --------------------===//
+
+#include "cpu/Kernel.h"
+
+#include <algorithm>
+#include <cstring>
+#include <omp.h>
+
+using namespace piko::rt;
+
+pikort_pipeline::pikort_pipeline()
+    : threads(std::max(1, omp_get_max_threads())) {}
+pikort_pipeline::~pikort_pipeline() = default;
+
+// --- Checks -----------------------------------------------------------------
+
+/// Runs a host's call: `body` throws what is wrong with its arguments.
+template <class Body>
+static int32_t call(pikort_pipeline *p, Body &&body) noexcept {
+  if (!p)
+    return PIKORT_INVALID_ARGUMENT;
+  p->clearStatus();
+  if (!p->ready)
+    return p->fail(PIKORT_BAD_PROGRAM, "the pipeline was not created");
+  return guarded(p, "pipeline", body);
+}
+
+[[noreturn]] static void invalid(const std::string &text) {
+  throw Failure{PIKORT_INVALID_ARGUMENT, text};
+}
+
+static State &findState(pikort_pipeline &p, const char *name) {
+  if (!name)
+    invalid("expected the name of a state, but got null");
+  for (State &state : p.states)
+    if (state.name == name)
+      return state;
+  throw Failure{PIKORT_NOT_FOUND,
+                "pipeline " + quoted(p.name) + " has no state " + quoted(name)};
+}
+
+static State &findState(pikort_pipeline &p, const char *name, int32_t kind) {
+  static const char *const kinds[] = {"a constant", "a buffer", "an image"};
+  State &state = findState(p, name);
+  if (state.kind != kind)
+    invalid("state " + quoted(state.name) + ": expected " + kinds[kind] +
+            ", but it is " + kinds[state.kind]);
+  return state;
+}
+
+static void checkSize(const pikort_pipeline &p, const std::string &who,
+                      int32_t record, int64_t size) {
+  const Record &wanted = p.records[record];
+  if (wanted.size != size)
+    throw Failure{PIKORT_SIZE_MISMATCH,
+                  who + ": expected " + std::to_string(wanted.size) +
+                      " bytes for a " + quoted(wanted.name) + ", but got " +
+                      std::to_string(size)};
+}
+
+/// Checks an array of records that the host owns.
+static void checkArray(const pikort_pipeline &p, const std::string &who,
+                       int32_t record, const void *data, int64_t count,
+                       int64_t size) {
+  checkSize(p, who, record, size);
+  if (count < 0)
+    invalid(who + ": expected a count of at least 0, but got " +
+            std::to_string(count));
+  if (count > 0 && !data)
+    invalid(who + ": expected " + std::to_string(count) +
+            " records, but got a null pointer");
+  int64_t align = p.records[record].align;
+  if (reinterpret_cast<uintptr_t>(data) % static_cast<uintptr_t>(align))
+    invalid(who + ": expected a pointer aligned to " + std::to_string(align) +
+            " bytes");
+}
+
+extern "C" {
+
+// --- Life -------------------------------------------------------------------
+
+int32_t pikort_create(const pikort_program *program,
+                      pikort_pipeline **pipeline) {
+  if (!program || !pipeline)
+    return PIKORT_INVALID_ARGUMENT;
+  *pipeline = nullptr;
+  pikort_pipeline *p;
+  try {
+    p = *pipeline = new pikort_pipeline;
+  } catch (...) {
+    return PIKORT_OUT_OF_MEMORY;
+  }
+  guarded(p, "pipeline", [&] {
+    p->name = program->name ? program->name : "";
+    if (program->abi_version != PIKORT_ABI_VERSION)
+      throw Failure{PIKORT_VERSION,
+                    "pipeline " + quoted(p->name) +
+                        ": expected a program for runtime version " +
+                        std::to_string(PIKORT_ABI_VERSION) + ", but got " +
+                        std::to_string(program->abi_version)};
+    if (!program->setup || !program->run)
+      throw Failure{PIKORT_BAD_PROGRAM, "pipeline " + quoted(p->name) +
+                                            ": expected a program with setup "
+                                            "and run"};
+    p->runProgram = program->run;
+    program->setup(p);
+    if (p->status != PIKORT_OK)
+      return; // setup noted why
+    p->finish();
+    makeKernels(*p);
+    p->ready = true;
+  });
+  return p->status.load();
+}
+
+void pikort_destroy(pikort_pipeline *pipeline) { delete pipeline; }
+
+const char *pikort_message(const pikort_pipeline *pipeline) {
+  return pipeline ? pipeline->message.c_str() : "expected a pipeline, but got null";
+}
+
+const char *pikort_name(const pikort_pipeline *pipeline) {
+  return pipeline ? pipeline->name.c_str() : "";
+}
+
+// --- Options ----------------------------------------------------------------
+
+int32_t pikort_set_domain(pikort_pipeline *p, int32_t rank,
+                          const int64_t *extent) {
+  return call(p, [&] {
+    if (rank != p->rank)
+      invalid("pipeline " + quoted(p->name) + ": expected a domain of rank " +
+              std::to_string(p->rank) + ", but got " + std::to_string(rank));
+    if (!extent)
+      invalid("expected the domain's extents, but got null");
+    for (int32_t d = 0; d < rank; ++d)
+      if (extent[d] < 1 || extent[d] > INT32_MAX)
+        invalid("expected domain extents in [1, 2147483647], but got " +
+                std::to_string(extent[d]));
+    for (int32_t d = 0; d < 4; ++d)
+      p->domain[d] = d < rank ? extent[d] : 1;
+  });
+}
+
+int32_t pikort_set_threads(pikort_pipeline *p, int32_t threads) {
+  return call(p, [&] {
+    if (threads < 0 || threads > 10000)
+      invalid("expected a number of threads in [0, 10000], but got " +
+              std::to_string(threads));
+    p->threads = threads ? threads : std::max(1, omp_get_max_threads());
+  });
+}
+
+int32_t pikort_set_memory_limit(pikort_pipeline *p, int64_t bytes) {
+  return call(p, [&] {
+    if (bytes < 0)
+      invalid("expected a memory limit of at least 0, but got " +
+              std::to_string(bytes));
+    p->memory.setLimit(bytes);
+  });
+}
+
+// --- State and sources ------------------------------------------------------
+
+int32_t pikort_bind_constant(pikort_pipeline *p, const char *name,
+                             const void *data, int64_t size) {
+  return call(p, [&] {
+    State &state = findState(*p, name, PIKORT_CONSTANT);
+    checkSize(*p, "constant " + quoted(state.name), state.record, size);
+    if (!data)
+      invalid("constant " + quoted(state.name) +
+              ": expected its bytes, but got null");
+    std::memcpy(state.bytes.data(), data, static_cast<size_t>(size));
+    state.bound = true;
+  });
+}
+
+int32_t pikort_bind_buffer(pikort_pipeline *p, const char *name, void *data,
+                           int64_t count, int64_t recordSize) {
+  return call(p, [&] {
+    State &state = findState(*p, name, PIKORT_BUFFER);
+    std::string who = "buffer " + quoted(state.name);
+    if (state.perSource >= 0)
+      invalid(who + " is allocated for source " +
+              std::to_string(state.perSource) + " and cannot be bound");
+    checkArray(*p, who, state.record, data, count, recordSize);
+    state.owned = {};
+    state.view = {static_cast<uint8_t *>(data), {count, 1, 1, 1}};
+    state.bound = true;
+  });
+}
+
+int32_t pikort_allocate_buffer(pikort_pipeline *p, const char *name,
+                               int64_t count) {
+  return call(p, [&] {
+    State &state = findState(*p, name, PIKORT_BUFFER);
+    std::string who = "buffer " + quoted(state.name);
+    if (state.perSource >= 0)
+      invalid(who + " is allocated for source " +
+              std::to_string(state.perSource) + " and cannot be bound");
+    if (count < 0)
+      invalid(who + ": expected a count of at least 0, but got " +
+              std::to_string(count));
+    int64_t bytes;
+    if (__builtin_mul_overflow(count, p->records[state.record].size, &bytes))
+      throw OutOfMemory{INT64_MAX};
+    state.bound = false;
+    state.owned = {};
+    state.owned = Array<uint8_t>(p->memory, bytes, Use::State);
+    std::memset(state.owned.data(), 0, static_cast<size_t>(bytes));
+    state.view = {state.owned.data(), {count, 1, 1, 1}};
+    state.bound = true;
+  });
+}
+
+int32_t pikort_bind_source(pikort_pipeline *p, int32_t index, const void *data,
+                           int64_t count, int64_t recordSize) {
+  return call(p, [&] {
+    if (index < 0 || index >= static_cast<int32_t>(p->sources.size()))
+      throw Failure{PIKORT_NOT_FOUND, "pipeline " + quoted(p->name) +
+                                          " has no source " +
+                                          std::to_string(index)};
+    Source &source = p->sources[index];
+    std::string who = "source " + std::to_string(index);
+    checkArray(*p, who, p->stages[source.stage].record, data, count,
+               recordSize);
+    if (count > UINT32_MAX)
+      throw Failure{PIKORT_TOO_MANY,
+                    who + ": expected at most 4294967295 primitives, but got " +
+                        std::to_string(count)};
+    source.data = static_cast<const uint8_t *>(data);
+    source.count = count;
+  });
+}
+
+int32_t pikort_get_view(pikort_pipeline *p, const char *name,
+                        pikort_view *view) {
+  return call(p, [&] {
+    State &state = findState(*p, name);
+    if (!view)
+      invalid("expected room for a view, but got null");
+    bool atRun = state.kind == PIKORT_IMAGE || state.perSource >= 0;
+    if (atRun && !state.view.data)
+      throw Failure{PIKORT_UNBOUND, "state " + quoted(state.name) +
+                                        " exists only after a run"};
+    if (!atRun && !state.bound)
+      throw Failure{PIKORT_UNBOUND,
+                    "state " + quoted(state.name) + " is not bound"};
+    *view = {state.view.data,
+             {state.view.extent[0], state.view.extent[1], state.view.extent[2],
+              state.view.extent[3]},
+             p->records[state.record].size,
+             state.rank,
+             state.record};
+  });
+}
+
+// --- Running ----------------------------------------------------------------
+
+static void checkBound(const pikort_pipeline &p) {
+  if (p.domain[0] == 0)
+    throw Failure{PIKORT_UNBOUND,
+                  "pipeline " + quoted(p.name) + ": the domain is not set"};
+  for (const State &state : p.states)
+    if (state.kind != PIKORT_IMAGE && state.perSource < 0 && !state.bound)
+      throw Failure{PIKORT_UNBOUND, "pipeline " + quoted(p.name) + ": " +
+                                        (state.kind == PIKORT_BUFFER
+                                             ? "buffer "
+                                             : "constant ") +
+                                        quoted(state.name) + " is not bound"};
+  for (size_t s = 0; s < p.sources.size(); ++s)
+    if (p.sources[s].count < 0)
+      throw Failure{PIKORT_UNBOUND, "pipeline " + quoted(p.name) + ": source " +
+                                        std::to_string(s) + " is not bound"};
+}
+
+int32_t pikort_run(pikort_pipeline *p) {
+  int32_t code = call(p, [&] {
+    checkBound(*p);
+    p->computeGrids();
+    for (State &state : p->states)
+      if (state.kind == PIKORT_CONSTANT)
+        state.view = {state.bytes.data(), {1, 1, 1, 1}};
+    prepareState(*p);
+    int32_t status = p->runProgram(p);
+    p->settle();
+    if (status != PIKORT_OK && p->status == PIKORT_OK)
+      throw Failure{PIKORT_BAD_PROGRAM,
+                    "pipeline " + quoted(p->name) +
+                        ": the program returned status " +
+                        std::to_string(status)};
+  });
+  if (!p || !p->ready)
+    return code;
+  for (Stage &stage : p->stages)
+    stage.kernel->clear();
+  for (Source &source : p->sources)
+    if (source.kernel)
+      source.kernel->clear();
+  p->memory.endFrame();
+  ++p->runs;
+  return p->status.load();
+}
+
+} // extern "C"

@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//===- Memory.cpp - Memory that is kept from frame to frame ---------------===//
+
+#include "common/Memory.h"
+
+#include <algorithm>
+#include <bit>
+#include <sys/mman.h>
+
+using namespace piko::rt;
+
+namespace {
+
+constexpr size_t page = 4096;
+constexpr size_t hugePage = size_t(2) << 20;
+/// A free block is unmapped when this many frames did not need it.
+constexpr int64_t framesKept = 8;
+
+/// Powers of two up to a huge page; above, eight sizes for each doubling. So
+/// sizes that differ a little from frame to frame find the same block.
+size_t roundUp(size_t bytes) {
+  bytes = std::max(bytes, page);
+  size_t below = std::bit_floor(bytes);
+  size_t step = bytes <= hugePage ? below : std::max(below / 8, page);
+  return (bytes + step - 1) / step * step;
+}
+
+/// Maps memory, with large blocks on huge page boundaries; null if refused.
+uint8_t *map(size_t bytes) {
+  bool huge = bytes >= hugePage;
+  size_t mapped = huge ? bytes + hugePage : bytes;
+  void *raw = mmap(nullptr, mapped, PROT_READ | PROT_WRITE,
+                   MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+  if (raw == MAP_FAILED)
+    return nullptr;
+  auto *start = static_cast<uint8_t *>(raw);
+  if (!huge)
+    return start;
+  auto address = reinterpret_cast<uintptr_t>(start);
+  size_t before = (hugePage - address % hugePage) % hugePage;
+  if (before)
+    munmap(start, before);
+  if (size_t after = hugePage - before)
+    munmap(start + before + bytes, after);
+  madvise(start + before, bytes, MADV_HUGEPAGE);
+  return start + before;
+}
+
+} // namespace
+
+Memory::~Memory() { unmapAllFree(); }
+
+void Memory::unmapAllFree() {
+  for (auto &[bytes, block] : free_) {
+    munmap(block.data, bytes);
+    reserved_ -= static_cast<int64_t>(bytes);
+  }
+  free_.clear();
+}
+
+Block Memory::acquire(size_t wanted, Use use) {
+  if (wanted > size_t(INT64_MAX) / 4)
+    throw OutOfMemory{INT64_MAX};
+  size_t bytes = roundUp(wanted);
+  auto signedBytes = static_cast<int64_t>(bytes);
+  std::lock_guard<std::mutex> lock(mutex_);
+  Block block;
+  // The smallest free block that fits, if it does not waste too much.
+  auto found = free_.lower_bound(bytes);
+  if (found != free_.end() && found->first <= bytes + bytes / 2) {
+    // Of equal ones the latest, which may still be in a cache.
+    found = std::prev(free_.upper_bound(found->first));
+    block = {found->second.data, found->first};
+    free_.erase(found);
+  } else {
+    auto over = [&] { return limit_ > 0 && reserved_ + signedBytes > limit_; };
+    if (over())
+      unmapAllFree();
+    if (!over())
+      block = {map(bytes), bytes};
+    if (!block.data)
+      throw OutOfMemory{signedBytes};
+    reserved_ += signedBytes;
+  }
+  if (use == Use::Bins) {
+    binBytes_ += static_cast<int64_t>(block.bytes);
+    peak_ = std::max(peak_, binBytes_);
+  }
+  return block;
+}
+
+void Memory::release(Block block, Use use) {
+  std::lock_guard<std::mutex> lock(mutex_);
+  if (use == Use::Bins)
+    binBytes_ -= static_cast<int64_t>(block.bytes);
+  try {
+    free_.emplace(block.bytes, Free{block.data, frame_});
+  } catch (...) { // no memory to remember it
+    munmap(block.data, block.bytes);
+    reserved_ -= static_cast<int64_t>(block.bytes);
+  }
+}
+
+void Memory::endFrame() {
+  std::lock_guard<std::mutex> lock(mutex_);
+  ++frame_;
+  for (auto it = free_.begin(); it != free_.end();) {
+    if (it->second.frame + framesKept >= frame_) {
+      ++it;
+      continue;
+    }
+    munmap(it->second.data, it->first);
+    reserved_ -= static_cast<int64_t>(it->first);
+    it = free_.erase(it);
+  }
+}
+
+void Memory::setLimit(int64_t bytes) {
+  std::lock_guard<std::mutex> lock(mutex_);
+  limit_ = bytes;
+  if (limit_ > 0 && reserved_ > limit_)
+    unmapAllFree();
+}
+
+int64_t Memory::limit() const {
+  std::lock_guard<std::mutex> lock(mutex_);
+  return limit_;
+}
+
+int64_t Memory::reserved() const {
+  std::lock_guard<std::mutex> lock(mutex_);
+  return reserved_;
+}
+
+int64_t Memory::peak() const {
+  std::lock_guard<std::mutex> lock(mutex_);
+  return peak_;
+}
+
+void Memory::resetPeak() {
+  std::lock_guard<std::mutex> lock(mutex_);
+  peak_ = binBytes_;
+}

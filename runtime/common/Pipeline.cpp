@@ -1,0 +1,257 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//===- Pipeline.cpp - Completes declarations, keeps the status ------------===//
+
+#include "common/Pipeline.h"
+
+#include <algorithm>
+#include <tuple>
+
+using namespace piko::rt;
+
+// --- Completing declarations ------------------------------------------------
+
+[[noreturn]] static void bad(const std::string &text) {
+  throw Failure{PIKORT_BAD_PROGRAM, text};
+}
+
+/// True if some byte of the record belongs to no field.
+static bool hasPadding(const Record &record) {
+  std::vector<bool> covered(static_cast<size_t>(record.size));
+  for (const Field &field : record.fields) {
+    static constexpr int64_t bytes[] = {4, 8, 1, 2, 4, 8};
+    for (int64_t e = 0; e < field.elements; ++e)
+      for (int64_t b = 0; b < bytes[field.type]; ++b) {
+        int64_t at = field.offset + e * field.stride + b;
+        if (at < 0 || at >= record.size)
+          bad("record " + quoted(record.name) + ": expected field " +
+              quoted(field.name) + " inside " + std::to_string(record.size) +
+              " bytes, but got offset " + std::to_string(at));
+        covered[static_cast<size_t>(at)] = true;
+      }
+  }
+  return std::find(covered.begin(), covered.end(), false) != covered.end();
+}
+
+void pikort_pipeline::checkDeclared() {
+  if (rank < 1 || rank > 4)
+    bad("pipeline " + quoted(name) + ": expected a rank in [1, 4], but got " +
+        std::to_string(rank));
+  auto all = [&](const auto &list, const char *what) {
+    for (size_t i = 0; i < list.size(); ++i)
+      if (!list[i].declared)
+        bad("pipeline " + quoted(name) + ": expected " + what + " " +
+            std::to_string(i) + " to be declared");
+  };
+  all(records, "record");
+  all(states, "state");
+  all(stages, "stage");
+  all(sources, "source");
+  auto checkRecord = [&](int32_t id, const std::string &user) {
+    if (id < 0 || id >= static_cast<int32_t>(records.size()))
+      bad(quoted(user) + ": expected a declared record, but got " +
+          std::to_string(id));
+  };
+  for (Record &record : records)
+    record.padded = hasPadding(record);
+  for (const Stage &stage : stages)
+    checkRecord(stage.record, stage.name);
+  for (const State &state : states) {
+    checkRecord(state.record, state.name);
+    if (state.perSource >= static_cast<int32_t>(sources.size()))
+      bad("state " + quoted(state.name) +
+          ": expected a declared source, but got " +
+          std::to_string(state.perSource));
+  }
+}
+
+void pikort_pipeline::connect() {
+  auto exists = [&](int32_t id) { return findStage(id) != nullptr; };
+  for (size_t s = 0; s < sources.size(); ++s) {
+    if (!exists(sources[s].stage))
+      bad("source " + std::to_string(s) +
+          ": expected a declared stage, but got " +
+          std::to_string(sources[s].stage));
+    stages[sources[s].stage].sources.push_back(static_cast<int32_t>(s));
+  }
+  for (size_t e = 0; e < edges.size(); ++e) {
+    const Edge &edge = edges[e];
+    if (!exists(edge.producer) || !exists(edge.consumer) || edge.port < 0 ||
+        edge.port > 1 << 16)
+      bad("pipeline " + quoted(name) + ": edge " + std::to_string(e) +
+          " connects stages that are not declared");
+    auto &outputs = stages[edge.producer].outputs;
+    if (outputs.size() <= static_cast<size_t>(edge.port))
+      outputs.resize(static_cast<size_t>(edge.port) + 1, -1);
+    if (outputs[edge.port] >= 0)
+      bad("stage " + quoted(stages[edge.producer].name) +
+          ": expected one edge from port " + std::to_string(edge.port) +
+          ", but got two");
+    outputs[edge.port] = static_cast<int32_t>(e);
+    stages[edge.consumer].inputs.push_back(static_cast<int32_t>(e));
+  }
+}
+
+/// Topological, ties by declaration.
+void pikort_pipeline::sortStages() {
+  std::vector<size_t> waiting(stages.size());
+  for (size_t s = 0; s < stages.size(); ++s)
+    waiting[s] = stages[s].inputs.size();
+  std::vector<bool> done(stages.size());
+  order.clear();
+  while (order.size() < stages.size()) {
+    size_t next = 0;
+    while (next < stages.size() && (done[next] || waiting[next]))
+      ++next;
+    if (next == stages.size())
+      bad("pipeline " + quoted(name) +
+          ": stages that form a cycle are not supported");
+    done[next] = true;
+    stages[next].root = static_cast<int32_t>(sources.size() + order.size());
+    order.push_back(static_cast<int32_t>(next));
+    for (int32_t e : stages[next].outputs)
+      if (e >= 0)
+        --waiting[edges[e].consumer];
+  }
+}
+
+/// Lineage keys are needed only where a stage merges several inputs, and on
+/// the way there: a stage's items need keys if an edge out of it does, unless
+/// its emissions start a new lineage.
+void pikort_pipeline::findKeys() {
+  for (auto it = order.rbegin(); it != order.rend(); ++it) {
+    Stage &stage = stages[*it];
+    bool itemsKeyed = false;
+    for (int32_t e : stage.outputs)
+      itemsKeyed |= e >= 0 && edges[e].keyed && !stage.collects();
+    bool merges = stage.inputs.size() + stage.sources.size() > 1;
+    for (int32_t e : stage.inputs)
+      edges[e].keyed = itemsKeyed || merges;
+    stage.keyWidth = itemsKeyed ? 1 : 0;
+  }
+  for (int32_t s : order) {
+    Stage &stage = stages[s];
+    if (stage.keyWidth == 0)
+      continue;
+    for (int32_t e : stage.inputs) {
+      const Stage &from = stages[edges[e].producer];
+      int32_t width = from.collects() ? 2 : from.keyWidth + 1;
+      stage.keyWidth = std::max(stage.keyWidth, width);
+    }
+  }
+}
+
+void pikort_pipeline::finish() {
+  checkDeclared();
+  connect();
+  sortStages();
+  findKeys();
+  stageStats.resize(stages.size());
+}
+
+void pikort_pipeline::computeGrids() {
+  for (Stage &stage : stages) {
+    stage.grid = stage.cellGrid = {1, 1, 1, 1};
+    stage.tiles = stage.cells = 1;
+    bool overflow = false;
+    for (int32_t d = 0; d < rank; ++d) {
+      int64_t bin = stage.binSize[d] == 0 ? domain[d]
+                                          : std::min(stage.binSize[d], domain[d]);
+      stage.grid[d] = (domain[d] + bin - 1) / bin;
+      if (stage.cellSize > 0)
+        stage.cellGrid[d] = (bin + stage.cellSize - 1) / stage.cellSize;
+      overflow |= __builtin_mul_overflow(stage.tiles, stage.cellGrid[d],
+                                         &stage.tiles);
+      overflow |= __builtin_mul_overflow(
+          stage.cells, stage.grid[d] * stage.cellGrid[d], &stage.cells);
+    }
+    // Cells are noted in 31 bits, and one value is kept for "none".
+    if (overflow || stage.cells >= INT32_MAX)
+      throw Failure{PIKORT_TOO_MANY,
+                    "stage " + quoted(stage.name) +
+                        ": expected fewer than 2147483647 cells, but the "
+                        "domain has more"};
+  }
+}
+
+// --- Status -----------------------------------------------------------------
+
+int32_t pikort_pipeline::fail(int32_t code, const std::string &text) noexcept {
+  int32_t none = 0;
+  if (!status.compare_exchange_strong(none, code))
+    return code;
+  try {
+    message = text.empty() ? std::string("out of memory") : text;
+  } catch (...) {
+    message.clear();
+  }
+  return code;
+}
+
+void pikort_pipeline::report(const KernelError &found) noexcept {
+  std::lock_guard<std::mutex> lock(errorMutex);
+  auto key = [](const KernelError &e) {
+    return std::tie(e.unit, e.code, e.stage, e.a, e.b);
+  };
+  // In one unit the first report is the first error.
+  bool earlier = found.unit == INT64_MAX ? key(found) < key(error)
+                                         : found.unit < error.unit;
+  if (!hasError || earlier)
+    error = found;
+  hasError = true;
+  reported = found.code;
+}
+
+static std::string describe(const std::string &stage, const KernelError &e) {
+  std::string a = std::to_string(e.a), b = std::to_string(e.b);
+  std::string text = "stage " + quoted(stage) + ": ";
+  switch (e.code) {
+  case PIKORT_BIN_OUTSIDE:
+    text += "expected a bin of the grid";
+    if (e.b > 0)
+      text += ", in [0, " + b + ")";
+    return text + ", but got " + a;
+  case PIKORT_UPDATE_OUTSIDE:
+    return text + "expected an update inside the stage's own bin, but got "
+                  "pixel (" + a + ", " + b + ")";
+  case PIKORT_INDEX_OUTSIDE:
+    return text + "expected an index in [0, " + b + "), but got " + a;
+  case PIKORT_ENDLESS:
+    return text + "expected a loop that ends, but it still runs after " + a +
+           " iterations";
+  case PIKORT_NOT_A_NUMBER:
+    text += "expected a number, but got NaN";
+    return e.a >= 0 ? text + " in bin " + a : text;
+  case PIKORT_OUT_OF_MEMORY:
+    return text + "out of memory: expected " + a + " more bytes" +
+           (e.b > 0 ? ", but the limit is " + b : "");
+  case PIKORT_BAD_PROGRAM:
+    return text + (e.a == 0 ? "expected a record before its place"
+                            : "expected one pikoir_next for each position");
+  default:
+    return text + "failed with status " + std::to_string(e.code) + " (" + a +
+           ", " + b + ")";
+  }
+}
+
+int32_t pikort_pipeline::settle() noexcept {
+  std::lock_guard<std::mutex> lock(errorMutex);
+  if (hasError) {
+    hasError = false;
+    try {
+      Stage *stage = findStage(error.stage);
+      fail(error.code,
+           describe(stage ? stage->name : std::to_string(error.stage), error));
+    } catch (...) {
+      fail(error.code, {});
+    }
+  }
+  return status.load();
+}
+
+void pikort_pipeline::clearStatus() noexcept {
+  std::lock_guard<std::mutex> lock(errorMutex);
+  hasError = false;
+  reported = 0;
+  status = 0;
+  message.clear();
+}

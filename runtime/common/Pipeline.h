@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//===- Pipeline.h - What a pipeline declared, and its status --------------===//
+//
+// The runtime's own form of a pipeline: the program's declarations, checked
+// and completed once by finish(), what the host bound, and the status of the
+// run. How kernels run is in cpu/.
+//
+//===----------------------------------------------------------------------===//
+
+#ifndef PIKO_RUNTIME_COMMON_PIPELINE_H
+#define PIKO_RUNTIME_COMMON_PIPELINE_H
+
+#include "common/Memory.h"
+#include "pikort/abi.h"
+
+#include <array>
+#include <atomic>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+namespace piko::rt {
+
+struct Kernel; // cpu/Kernel.h
+
+/// An error, thrown inside the runtime and caught at its boundary.
+struct Failure {
+  int32_t code;
+  std::string message;
+};
+
+struct Field {
+  std::string name;
+  int32_t type;
+  int64_t offset, elements, stride;
+};
+
+struct Record {
+  bool declared = false;
+  std::string name;
+  int64_t size = 0, align = 1;
+  std::vector<Field> fields;
+  bool padded = true; ///< Some bytes belong to no field.
+};
+
+struct State {
+  bool declared = false;
+  std::string name;
+  int32_t kind = 0, record = 0, rank = 0, perSource = -1;
+  bool bound = false;
+  std::vector<uint8_t> clear; ///< One record, or empty.
+  std::vector<uint8_t> bytes; ///< A constant's.
+  Array<uint8_t> owned;       ///< An image's, or of a buffer that we allocate.
+  pikoir_state view{};
+};
+
+struct Edge {
+  int32_t producer, port, consumer;
+  bool keyed = false; ///< Its primitives carry lineage keys.
+};
+
+struct Source {
+  bool declared = false;
+  int32_t stage = 0;
+  const uint8_t *data = nullptr;
+  int64_t count = -1; ///< -1 = not bound
+  std::shared_ptr<Kernel> kernel; ///< If the consumer is placed.
+};
+
+struct Stage {
+  bool declared = false;
+  std::string name;
+  int32_t record = 0, schedule = 0, flags = 0;
+  int64_t tileSplit = 0, cellSize = 0;
+  std::array<int64_t, 4> binSize{};
+  // Completed by finish():
+  std::vector<int32_t> sources; ///< That feed it, ascending.
+  std::vector<int32_t> inputs;  ///< Edges that end here, as declared.
+  std::vector<int32_t> outputs; ///< The edge of each port, or -1.
+  int32_t root = 0;             ///< Of the lineage that it starts.
+  int32_t keyWidth = 0;         ///< 64-bit words of its items' keys, 0 = none.
+  // Completed by each run:
+  std::array<int64_t, 4> grid{}, cellGrid{};
+  int64_t tiles = 1, cells = 1;
+  std::shared_ptr<Kernel> kernel;
+
+  bool collects() const { return flags & PIKOIR_COLLECTS; }
+  bool placed() const { return flags & PIKOIR_PLACED; }
+  bool unordered() const { return flags & PIKOIR_UNORDERED; }
+};
+
+struct KernelStats {
+  std::string name;
+  double milliseconds = 0, joinMilliseconds = 0;
+  int64_t launches = 0;
+};
+
+struct StageStats {
+  int64_t in = 0, placed = 0, out = 0;
+};
+
+/// An error that a kernel found. Kernels are parallel: the one that the
+/// sequential program would meet first is kept, whoever reports it first.
+struct KernelError {
+  int64_t unit;
+  int32_t code, stage;
+  int64_t a, b;
+};
+
+} // namespace piko::rt
+
+struct pikort_pipeline {
+  pikort_pipeline();
+  ~pikort_pipeline();
+
+  piko::rt::Memory memory; // first: the arrays below go back to it
+  std::string name;
+  int32_t rank = 0;
+  std::vector<piko::rt::Record> records;
+  std::vector<piko::rt::State> states;
+  std::vector<piko::rt::Stage> stages;
+  std::vector<piko::rt::Source> sources;
+  std::vector<piko::rt::Edge> edges;
+  std::vector<int32_t> order; ///< Stages, producers first.
+  int32_t (*runProgram)(pikort_pipeline *) = nullptr;
+
+  bool ready = false; ///< finish() succeeded.
+  std::array<int64_t, 4> domain{0, 1, 1, 1};
+  int32_t threads = 1;
+
+  std::vector<piko::rt::KernelStats> kernelStats;
+  std::vector<piko::rt::StageStats> stageStats;
+  int64_t runs = 0;
+
+  std::string message;
+  std::atomic<int32_t> status{0};
+  std::atomic<int32_t> reported{0}; ///< Some error that report() noted.
+
+  /// Checks and completes the declarations; throws Failure.
+  void finish();
+  /// Computes grids from the domain; throws Failure.
+  void computeGrids();
+
+  /// Keeps the first status of a run and its text. Not from a kernel's loop.
+  int32_t fail(int32_t code, const std::string &text) noexcept;
+  /// Notes an error in a kernel's loop; thread safe.
+  void report(const piko::rt::KernelError &error) noexcept;
+  /// Turns what was reported into the status; returns the status.
+  int32_t settle() noexcept;
+  /// Forgets the status and the message.
+  void clearStatus() noexcept;
+
+  piko::rt::Stage *findStage(int32_t id) {
+    return id >= 0 && id < static_cast<int32_t>(stages.size()) ? &stages[id]
+                                                               : nullptr;
+  }
+
+private:
+  std::mutex errorMutex;
+  bool hasError = false;
+  piko::rt::KernelError error{};
+
+  void checkDeclared();
+  void connect();
+  void sortStages();
+  void findKeys();
+};
+
+namespace piko::rt {
+
+/// Runs `body`, which may throw, and turns what it throws into a status.
+template <class Body>
+int32_t guarded(pikort_pipeline *p, const std::string &who,
+                Body &&body) noexcept {
+  try {
+    body();
+    return PIKORT_OK;
+  } catch (const Failure &failure) {
+    return p->fail(failure.code, failure.message);
+  } catch (const OutOfMemory &refused) {
+    try {
+      std::string text = who + ": out of memory";
+      if (refused.bytes != INT64_MAX)
+        text += ": expected " + std::to_string(refused.bytes) + " more bytes";
+      if (p->memory.limit() > 0)
+        text += ", but the limit is " + std::to_string(p->memory.limit());
+      return p->fail(PIKORT_OUT_OF_MEMORY, text);
+    } catch (...) {
+      return p->fail(PIKORT_OUT_OF_MEMORY, {});
+    }
+  } catch (...) {
+    return p->fail(PIKORT_OUT_OF_MEMORY, {});
+  }
+}
+
+/// 'name', for messages.
+inline std::string quoted(const std::string &name) { return "'" + name + "'"; }
+
+} // namespace piko::rt
+
+#endif // PIKO_RUNTIME_COMMON_PIPELINE_H

@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//===- Reflect.cpp - The host API: descriptions and statistics ------------===//
+
+#include "common/Pipeline.h"
+
+using namespace piko::rt;
+
+/// Fills *info from list[index], or explains why not.
+template <class List, class Info, class Get>
+static int32_t describe(pikort_pipeline *p, const List &list, int32_t index,
+                        const char *what, Info *info, Get &&get) noexcept {
+  p->clearStatus();
+  return guarded(p, "pipeline", [&] {
+    if (!info)
+      throw Failure{PIKORT_INVALID_ARGUMENT,
+                    "expected room for a description, but got null"};
+    if (index < 0 || index >= static_cast<int32_t>(list.size()))
+      throw Failure{PIKORT_NOT_FOUND, "pipeline " + quoted(p->name) +
+                                          " has no " + what + " " +
+                                          std::to_string(index)};
+    *info = get(list[index]);
+  });
+}
+
+static int32_t countOf(const auto &list) {
+  return static_cast<int32_t>(list.size());
+}
+
+extern "C" {
+
+int32_t pikort_rank(const pikort_pipeline *p) { return p ? p->rank : 0; }
+int32_t pikort_record_count(const pikort_pipeline *p) {
+  return p ? countOf(p->records) : 0;
+}
+int32_t pikort_state_count(const pikort_pipeline *p) {
+  return p ? countOf(p->states) : 0;
+}
+int32_t pikort_stage_count(const pikort_pipeline *p) {
+  return p ? countOf(p->stages) : 0;
+}
+int32_t pikort_source_count(const pikort_pipeline *p) {
+  return p ? countOf(p->sources) : 0;
+}
+
+int32_t pikort_get_record(pikort_pipeline *p, int32_t index,
+                          pikort_record_info *info) {
+  if (!p)
+    return PIKORT_INVALID_ARGUMENT;
+  return describe(p, p->records, index, "record", info, [](const Record &r) {
+    return pikort_record_info{r.name.c_str(), r.size, r.align,
+                              countOf(r.fields)};
+  });
+}
+
+int32_t pikort_get_field(pikort_pipeline *p, int32_t record, int32_t index,
+                         pikort_field_info *info) {
+  if (!p)
+    return PIKORT_INVALID_ARGUMENT;
+  static const std::vector<Field> none;
+  bool exists = record >= 0 && record < countOf(p->records);
+  return describe(p, exists ? p->records[record].fields : none, index, "field",
+                  info, [](const Field &f) {
+                    return pikort_field_info{f.name.c_str(), f.offset,
+                                             f.elements, f.stride, f.type};
+                  });
+}
+
+int32_t pikort_get_state_info(pikort_pipeline *p, int32_t index,
+                              pikort_state_info *info) {
+  if (!p)
+    return PIKORT_INVALID_ARGUMENT;
+  return describe(p, p->states, index, "state", info, [](const State &s) {
+    bool bound = s.bound || s.kind == PIKORT_IMAGE || s.perSource >= 0;
+    return pikort_state_info{s.name.c_str(), s.kind,      s.record,
+                             s.rank,         s.perSource, bound};
+  });
+}
+
+int32_t pikort_get_stage_info(pikort_pipeline *p, int32_t index,
+                              pikort_stage_info *info) {
+  if (!p)
+    return PIKORT_INVALID_ARGUMENT;
+  return describe(p, p->stages, index, "stage", info, [](const Stage &s) {
+    return pikort_stage_info{
+        s.name.c_str(),
+        {s.binSize[0], s.binSize[1], s.binSize[2], s.binSize[3]},
+        s.tileSplit,
+        s.cellSize,
+        s.record,
+        s.schedule,
+        s.flags,
+        countOf(s.outputs)};
+  });
+}
+
+int32_t pikort_get_source_info(pikort_pipeline *p, int32_t index,
+                               pikort_source_info *info) {
+  if (!p)
+    return PIKORT_INVALID_ARGUMENT;
+  return describe(p, p->sources, index, "source", info, [&](const Source &s) {
+    return pikort_source_info{s.stage, p->stages[s.stage].record, s.count};
+  });
+}
+
+// --- Statistics -------------------------------------------------------------
+
+int64_t pikort_stats_runs(const pikort_pipeline *p) { return p ? p->runs : 0; }
+
+int32_t pikort_kernel_count(const pikort_pipeline *p) {
+  return p ? countOf(p->kernelStats) : 0;
+}
+
+int32_t pikort_get_kernel_stats(pikort_pipeline *p, int32_t index,
+                                pikort_kernel_stats *stats) {
+  if (!p)
+    return PIKORT_INVALID_ARGUMENT;
+  return describe(p, p->kernelStats, index, "kernel", stats,
+                  [](const KernelStats &k) {
+                    return pikort_kernel_stats{k.name.c_str(), k.milliseconds,
+                                               k.joinMilliseconds, k.launches};
+                  });
+}
+
+int32_t pikort_get_stage_stats(pikort_pipeline *p, int32_t stage,
+                               pikort_stage_stats *stats) {
+  if (!p)
+    return PIKORT_INVALID_ARGUMENT;
+  return describe(p, p->stageStats, stage, "stage", stats,
+                  [&](const StageStats &s) {
+                    return pikort_stage_stats{p->stages[stage].name.c_str(),
+                                              s.in, s.placed, s.out};
+                  });
+}
+
+int64_t pikort_peak_bytes(const pikort_pipeline *p) {
+  return p ? p->memory.peak() : 0;
+}
+
+int64_t pikort_reserved_bytes(const pikort_pipeline *p) {
+  return p ? p->memory.reserved() : 0;
+}
+
+void pikort_reset_stats(pikort_pipeline *p) {
+  if (!p)
+    return;
+  for (KernelStats &stats : p->kernelStats) {
+    stats.milliseconds = stats.joinMilliseconds = 0;
+    stats.launches = 0;
+  }
+  for (StageStats &stats : p->stageStats)
+    stats = {};
+  p->runs = 0;
+  p->memory.resetPeak();
+}
+
+} // extern "C"

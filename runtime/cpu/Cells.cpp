@@ -1,0 +1,247 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//===- Cells.cpp - Bins items by count, scan and scatter ------------------===//
+//
+// Chunks of pairs, in order:
+//   1. count   each chunk counts its pairs for each cell;
+//   2. scan    gives each (cell, chunk) its first position;
+//   3. scatter each chunk writes its pairs' items to their positions.
+// Stable, and without atomics. With owner tiles in a stage that collects, the
+// same is done for bins, which yields the emission order across tiles.
+//
+//===----------------------------------------------------------------------===//
+
+#include "cpu/Kernel.h"
+#include "cpu/Parallel.h"
+
+using namespace piko::rt;
+
+namespace {
+
+constexpr uint32_t cellMask = ~PIKOIR_FIRST_CELL;
+
+class Binning {
+public:
+  Binning(pikort_pipeline &p, const Stage &stage, Kernel &kernel,
+          bool rankNeeded)
+      : p_(p), stage_(stage), kernel_(kernel), pairs_(kernel.stream.pairs),
+        pairCount_(kernel.stream.pairCount), cells_(stage.cells),
+        rankNeeded_(rankNeeded) {
+    // Counters of all chunks should not cost more than the pairs do.
+    int64_t most = std::max<int64_t>(1, pairCount_ / std::max<int64_t>(
+                                                         cells_, 4096));
+    chunks_ = std::min<int64_t>(most, int64_t(p.threads) * 4);
+  }
+
+  void run() {
+    counts_ = zeroed(chunks_ * cells_);
+    pieces_.resize(static_cast<size_t>(chunks_));
+    forChunks([&](int64_t c) { count(c); });
+    summarise();
+    scan();
+    bool identity = sorted_ && kernel_.positions == kernel_.stream.count &&
+                    kernel_.stream.onePairEach();
+    if (!identity)
+      kernel_.order = Array<uint32_t>(p_.memory, kernel_.positions);
+    bool byBin = stage_.collects() && stage_.tiles > 1;
+    bool ranked = rankNeeded_ && !sorted_ && (byBin || !stage_.collects());
+    if (ranked) {
+      kernel_.rank = Array<uint32_t>(p_.memory, kernel_.positions);
+      kernel_.rankSize = byBin ? kernel_.positions : pairCount_;
+      if (byBin)
+        scanBins();
+    }
+    if (!identity)
+      forChunks([&](int64_t c) { scatter(c, ranked, byBin); });
+  }
+
+private:
+  struct Piece {
+    int64_t items = 0; ///< That begin before the piece, after summarise().
+    int64_t holes = 0;
+    bool sorted = true;
+    uint32_t first = noCell, last = noCell; ///< Cells, if there are any.
+  };
+
+  Array<uint32_t> zeroed(int64_t n) {
+    Array<uint32_t> result(p_.memory, n);
+    parallelChunks(p_.threads, n, 1 << 20, [&](int64_t begin, int64_t end) {
+      std::memset(result.data() + begin, 0,
+                  static_cast<size_t>(end - begin) * 4);
+    });
+    return result;
+  }
+
+  void forChunks(auto &&body) { parallelFor(p_.threads, chunks_, body); }
+  int64_t firstPair(int64_t chunk) const {
+    return static_cast<int64_t>(static_cast<__int128>(pairCount_) * chunk /
+                                chunks_);
+  }
+
+  void count(int64_t chunk) {
+    uint32_t *counts = counts_.data() + chunk * cells_;
+    int64_t begin = firstPair(chunk), end = firstPair(chunk + 1);
+    Piece &piece = pieces_[static_cast<size_t>(chunk)];
+    uint32_t last = 0;
+    for (int64_t k = begin; k < end; ++k) {
+      uint32_t entry = pairs_[k];
+      piece.items += entry >> 31;
+      if (entry == noCell) {
+        ++piece.holes;
+        continue;
+      }
+      uint32_t cell = entry & cellMask;
+      if (piece.first == noCell)
+        piece.first = cell;
+      piece.sorted &= cell >= last;
+      last = cell;
+      ++counts[cell];
+    }
+    if (piece.first != noCell)
+      piece.last = last;
+  }
+
+  void summarise() {
+    int64_t items = 0, holes = 0;
+    uint32_t last = 0;
+    for (Piece &piece : pieces_) {
+      items += std::exchange(piece.items, items);
+      holes += piece.holes;
+      sorted_ &= piece.sorted;
+      if (piece.first == noCell)
+        continue;
+      sorted_ &= piece.first >= last;
+      last = piece.last;
+    }
+    kernel_.positions = pairCount_ - holes;
+  }
+
+  /// Counts become first positions.
+  void scan() {
+    kernel_.offsets = Array<int64_t>(p_.memory, cells_ + 1);
+    int64_t position = 0;
+    for (int64_t cell = 0; cell < cells_; ++cell) {
+      kernel_.offsets[cell] = position;
+      for (int64_t c = 0; c < chunks_; ++c)
+        position += std::exchange(counts_[c * cells_ + cell],
+                                  static_cast<uint32_t>(position));
+    }
+    kernel_.offsets[cells_] = position;
+  }
+
+  /// The same for bins: how many pairs of each chunk are in each bin follows
+  /// from the first positions of its cells.
+  void scanBins() {
+    int64_t bins = cells_ / stage_.tiles;
+    binCounts_ = Array<uint32_t>(p_.memory, chunks_ * bins);
+    for (int64_t bin = 0; bin < bins; ++bin) {
+      int64_t position = kernel_.offsets[bin * stage_.tiles];
+      for (int64_t c = 0; c < chunks_; ++c) {
+        binCounts_[c * bins + bin] = static_cast<uint32_t>(position);
+        for (int64_t t = 0; t < stage_.tiles; ++t) {
+          int64_t cell = bin * stage_.tiles + t;
+          int64_t end = c + 1 < chunks_ ? counts_[(c + 1) * cells_ + cell]
+                                        : kernel_.offsets[cell + 1];
+          position += end - counts_[c * cells_ + cell];
+        }
+      }
+    }
+  }
+
+  void scatter(int64_t chunk, bool ranked, bool byBin) {
+    uint32_t *next = counts_.data() + chunk * cells_;
+    int64_t bins = cells_ / stage_.tiles;
+    uint32_t *nextInBin = byBin && ranked ? binCounts_.data() + chunk * bins
+                                          : nullptr;
+    uint32_t *order = kernel_.order.data(), *rank = kernel_.rank.data();
+    auto item = static_cast<uint32_t>(
+        pieces_[static_cast<size_t>(chunk)].items - 1);
+    int64_t end = firstPair(chunk + 1);
+    for (int64_t k = firstPair(chunk); k < end; ++k) {
+      uint32_t entry = pairs_[k];
+      item += entry >> 31;
+      if (entry == noCell)
+        continue;
+      uint32_t cell = entry & cellMask;
+      uint32_t position = next[cell]++;
+      order[position] = item;
+      if (nextInBin)
+        rank[position] = nextInBin[cell / stage_.tiles]++;
+      else if (ranked)
+        rank[position] = static_cast<uint32_t>(k);
+    }
+  }
+
+  pikort_pipeline &p_;
+  const Stage &stage_;
+  Kernel &kernel_;
+  const uint32_t *pairs_;
+  int64_t pairCount_;
+  int64_t cells_;
+  bool rankNeeded_;
+  int64_t chunks_ = 1;
+  bool sorted_ = true; ///< Positions and pairs are in the same order.
+  std::vector<Piece> pieces_;
+  Array<uint32_t> counts_, binCounts_;
+};
+
+} // namespace
+
+void piko::rt::binItems(pikort_pipeline &p, const Stage &stage, Kernel &kernel,
+                        bool rankNeeded) {
+  if (stage.placed()) {
+    Binning(p, stage, kernel, rankNeeded).run();
+    return;
+  }
+  kernel.positions = kernel.stream.count;
+  kernel.offsets = Array<int64_t>(p.memory, stage.cells + 1);
+  kernel.offsets[0] = 0;
+  for (int64_t cell = 1; cell <= stage.cells; ++cell)
+    kernel.offsets[cell] = kernel.positions;
+}
+
+// --- Units ------------------------------------------------------------------
+
+/// Positions in a chunk of a bin that may be split: enough chunks to balance
+/// the threads, enough work in each to be worth it, a multiple of any lanes.
+static int64_t chunkSize(const pikort_pipeline &p, const Stage &stage,
+                         int64_t positions) {
+  if (stage.tileSplit > 0)
+    return stage.tileSplit;
+  int64_t share = positions / (int64_t(p.threads) * 8);
+  return std::clamp<int64_t>((share + 15) / 16 * 16, 16, 1024);
+}
+
+void piko::rt::cutUnits(pikort_pipeline &p, const Stage &stage,
+                        Kernel &kernel) {
+  const int64_t *offsets = kernel.offsets.data();
+  int64_t cells = stage.cells, positions = kernel.positions;
+  kernel.units.clear();
+  auto add = [&](int64_t cellBegin, int64_t cellEnd, int64_t begin,
+                 int64_t end) {
+    // Empty cells matter only to stages that may run them.
+    if (begin < end || stage.collects())
+      kernel.units.push_back({cellBegin, cellEnd, begin, end});
+  };
+  if (stage.schedule == PIKOIR_SERIALIZE)
+    return add(0, cells, 0, positions);
+  bool split = stage.flags & PIKOIR_SPLIT;
+  int64_t chunk = chunkSize(p, stage, positions);
+  // A stage that collects may do much for each cell, whatever its items.
+  int64_t mostCells = stage.collects() ? 16 : 1024;
+  int64_t first = 0; // of the group that is not yet added
+  for (int64_t cell = 0; cell < cells; ++cell) {
+    int64_t begin = offsets[cell], end = offsets[cell + 1];
+    if (split && end - begin > chunk) {
+      if (first < cell)
+        add(first, cell, offsets[first], begin);
+      for (int64_t i = begin; i < end; i += chunk)
+        add(cell, cell + 1, i, std::min(end, i + chunk));
+      first = cell + 1;
+    } else if (end - offsets[first] >= chunk || cell + 1 - first >= mostCells) {
+      add(first, cell + 1, offsets[first], end);
+      first = cell + 1;
+    }
+  }
+  if (first < cells)
+    add(first, cells, offsets[first], positions);
+}

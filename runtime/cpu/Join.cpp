@@ -1,0 +1,528 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//===- Join.cpp - Puts what producers emitted into lineage order ----------===//
+//
+// For each input edge, one of two ways:
+//
+//   concatenate   The producer's units ran its items in emission order: the
+//                 units' segments follow each other. Copies at memory speed.
+//   by position   A slot's records go to the place that its position's rank
+//                 gives: scan the counts in rank order, then copy runs.
+//                 The same walk writes lineage keys where they are needed.
+//
+// Several edges and sources are merged by key: each record's place is its own
+// index plus, for each other stream, the number of records before it there.
+//
+//===----------------------------------------------------------------------===//
+
+#include "cpu/Kernel.h"
+#include "cpu/Parallel.h"
+
+#include <algorithm>
+#include <cstring>
+#include <tuple>
+
+using namespace piko::rt;
+
+static constexpr int64_t mergeChunk = 4096;
+
+namespace {
+
+/// A port's segments of one kind, in unit order.
+struct Segments {
+  std::vector<Segment> list;
+  int64_t bytes = 0;
+};
+
+/// Reads a unit's bytes across its segments.
+class Reader {
+public:
+  Reader(const Segments &all, int64_t unit)
+      : next_(std::lower_bound(
+            all.list.data(), all.list.data() + all.list.size(), unit,
+            [](const Segment &s, int64_t u) { return s.unit < u; })) {}
+
+  void read(uint8_t *to, int64_t bytes) {
+    while (bytes > 0) {
+      if (left_ == 0) {
+        data_ = next_->data;
+        left_ = next_->bytes;
+        ++next_;
+      }
+      int64_t now = std::min(bytes, left_);
+      std::memcpy(to, data_, static_cast<size_t>(now));
+      to += now;
+      data_ += now;
+      left_ -= now;
+      bytes -= now;
+    }
+  }
+  /// The next entry of a log of uint32.
+  uint32_t read() {
+    uint32_t entry;
+    read(reinterpret_cast<uint8_t *>(&entry), 4);
+    return entry;
+  }
+
+private:
+  const Segment *next_;
+  const uint8_t *data_ = nullptr;
+  int64_t left_ = 0;
+};
+
+} // namespace
+
+static Segments collect(Kernel &kernel, size_t port, Log PortLogs::*which) {
+  Segments result;
+  for (auto &lane : kernel.lanes) {
+    const auto &list = (lane->logs[port].*which).segments;
+    result.list.insert(result.list.end(), list.begin(), list.end());
+  }
+  // A unit's segments are all of one lane, and in order there.
+  std::sort(result.list.begin(), result.list.end(),
+            [](const Segment &a, const Segment &b) {
+              return std::tie(a.unit, a.index) < std::tie(b.unit, b.index);
+            });
+  for (const Segment &segment : result.list)
+    result.bytes += segment.bytes;
+  return result;
+}
+
+static void concatenate(int32_t threads, const Segments &from, uint8_t *to) {
+  std::vector<int64_t> at(from.list.size());
+  int64_t bytes = 0;
+  for (size_t i = 0; i < at.size(); ++i) {
+    at[i] = bytes;
+    bytes += from.list[i].bytes;
+  }
+  // Small segments travel together.
+  constexpr int64_t chunk = int64_t(256) << 10;
+  parallelChunks(threads, bytes, chunk, [&](int64_t begin, int64_t end) {
+    auto i = static_cast<size_t>(
+        std::upper_bound(at.begin(), at.end(), begin) - at.begin() - 1);
+    while (begin < end) {
+      int64_t skip = begin - at[i];
+      int64_t now = std::min(end - begin, from.list[i].bytes - skip);
+      std::memcpy(to + begin, from.list[i].data + skip,
+                  static_cast<size_t>(now));
+      begin += now;
+      ++i;
+    }
+  });
+}
+
+static void checkCount(const Stage &stage, int64_t count) {
+  if (count > UINT32_MAX)
+    throw Failure{PIKORT_TOO_MANY,
+                  "stage " + quoted(stage.name) +
+                      ": expected at most 4294967295 primitives, but got " +
+                      std::to_string(count)};
+}
+
+bool piko::rt::byPosition(const pikort_pipeline &p, const Edge &edge) {
+  const Stage &from = p.stages[edge.producer];
+  if (edge.keyed)
+    return true;
+  return from.kernel->rank && !from.unordered() &&
+         !p.stages[edge.consumer].unordered();
+}
+
+// --- By position ------------------------------------------------------------
+
+namespace {
+
+/// Gathers one edge position by position.
+class PositionGather {
+public:
+  PositionGather(pikort_pipeline &p, const Edge &edge, Stream &stream)
+      : p_(p), from_(p.stages[edge.producer]), kernel_(*from_.kernel),
+        port_(static_cast<size_t>(edge.port)), edge_(edge), stream_(stream),
+        size_(p.records[p.stages[edge.consumer].record].size),
+        records_(collect(kernel_, port_, &PortLogs::records)),
+        cells_(collect(kernel_, port_, &PortLogs::cells)),
+        ordinals_(collect(kernel_, port_, &PortLogs::ordinals)) {}
+
+  void run() {
+    stream_.itemStorage = Array<uint8_t>(p_.memory, stream_.count * size_);
+    stream_.items = stream_.itemStorage.data();
+    if (edge_.keyed) {
+      stream_.keys.width = from_.collects() ? 2 : kernel_.keys.width + 1;
+      stream_.keys.words = Array<uint64_t>(
+          p_.memory, stream_.count * stream_.keys.width);
+    }
+    bool placed = p_.stages[edge_.consumer].placed();
+    if (placed) {
+      stream_.pairStorage = Array<uint32_t>(p_.memory, stream_.pairCount);
+      stream_.pairs = stream_.pairStorage.data();
+    }
+    starts_ = startsByRank(kernel_.counts[port_]);
+    if (placed && !stream_.onePairEach())
+      pairStarts_ = startsByRank(countPairs());
+    parallelFor(p_.threads, static_cast<int64_t>(kernel_.units.size()),
+                [&](int64_t unit) { gatherUnit(unit); });
+  }
+
+private:
+  int64_t rankOf(int64_t slot) const {
+    return kernel_.rank ? kernel_.rank[slot] : slot;
+  }
+
+  /// For each rank, the sum of the counts at smaller ranks.
+  Array<uint32_t> startsByRank(const Array<uint32_t> &counts) {
+    int64_t n = kernel_.rank ? kernel_.rankSize : kernel_.slots();
+    Array<uint32_t> starts(p_.memory, n);
+    if (kernel_.rank) {
+      if (n != kernel_.positions)
+        std::memset(starts.data(), 0, static_cast<size_t>(n) * 4);
+      parallelChunks(p_.threads, kernel_.positions, 1 << 16,
+                     [&](int64_t begin, int64_t end) {
+                       for (int64_t i = begin; i < end; ++i)
+                         starts[kernel_.rank[i]] = counts[i];
+                     });
+    }
+    exclusiveScan(p_.threads, kernel_.rank ? starts.data() : counts.data(),
+                  starts.data(), n);
+    return starts;
+  }
+
+  /// For each slot, the cells of all its records.
+  Array<uint32_t> countPairs() {
+    Array<uint32_t> result(p_.memory, kernel_.slots());
+    std::vector<int64_t> entries(kernel_.units.size());
+    for (const Segment &segment : cells_.list)
+      entries[static_cast<size_t>(segment.unit)] += segment.bytes / 4;
+    parallelFor(p_.threads, static_cast<int64_t>(kernel_.units.size()),
+                [&](int64_t u) {
+                  Reader reader(cells_, u);
+                  int64_t left = entries[static_cast<size_t>(u)];
+                  uint32_t entry = left > 0 ? reader.read() : 0;
+                  int64_t end = kernel_.slotBegin(u + 1);
+                  for (int64_t i = kernel_.slotBegin(u); i < end; ++i) {
+                    uint32_t pairs = 0;
+                    for (uint32_t r = kernel_.counts[port_][i]; r > 0; --r)
+                      do {
+                        ++pairs;
+                        entry = --left > 0 ? reader.read() : PIKOIR_FIRST_CELL;
+                      } while (!(entry & PIKOIR_FIRST_CELL));
+                    result[i] = pairs;
+                  }
+                });
+    return result;
+  }
+
+  void gatherUnit(int64_t u) {
+    const Array<uint32_t> &counts = kernel_.counts[port_];
+    Reader records(records_, u), cells(cells_, u), ordinals(ordinals_, u);
+    int64_t cell = kernel_.units[u].cell_begin;
+    int64_t unitEnd = kernel_.slotBegin(u + 1);
+    for (int64_t i = kernel_.slotBegin(u); i < unitEnd; ++i) {
+      uint32_t count = counts[i];
+      if (count == 0)
+        continue;
+      int64_t rank = rankOf(i);
+      int64_t at = starts_[rank];
+      records.read(stream_.itemStorage.data() + at * size_, count * size_);
+      if (pairStarts_) {
+        int64_t begin = pairStarts_[rank];
+        int64_t end = rank + 1 < pairStarts_.size() ? pairStarts_[rank + 1]
+                                                    : stream_.pairCount;
+        cells.read(
+            reinterpret_cast<uint8_t *>(stream_.pairStorage.data() + begin),
+            (end - begin) * 4);
+      } else if (stream_.pairStorage) {
+        cells.read(reinterpret_cast<uint8_t *>(stream_.pairStorage.data() + at),
+                   int64_t(count) * 4);
+      }
+      if (edge_.keyed) {
+        while (!from_.collects() && kernel_.offsets[cell + 1] <= i)
+          ++cell;
+        for (uint32_t r = 0; r < count; ++r)
+          writeKey(at + r, i, cell, ordinals.read());
+      }
+    }
+  }
+
+  void writeKey(int64_t to, int64_t slot, int64_t cell, uint32_t ordinal) {
+    uint64_t *key = &stream_.keys.words[to * stream_.keys.width];
+    if (from_.collects()) { // a new lineage
+      key[0] = uint64_t(from_.root) << 32 |
+               static_cast<uint64_t>(rankOf(slot));
+      key[1] = ordinal;
+      return;
+    }
+    int64_t item = kernel_.order ? kernel_.order[slot] : slot;
+    for (int32_t w = 0; w < kernel_.keys.width; ++w)
+      key[w] = kernel_.keys.word(item, w);
+    key[kernel_.keys.width] = static_cast<uint64_t>(cell) << 32 | ordinal;
+  }
+
+  pikort_pipeline &p_;
+  const Stage &from_;
+  Kernel &kernel_;
+  size_t port_;
+  const Edge &edge_;
+  Stream &stream_;
+  int64_t size_;
+  Segments records_, cells_, ordinals_;
+  Array<uint32_t> starts_, pairStarts_;
+};
+
+} // namespace
+
+// --- One input --------------------------------------------------------------
+
+/// What was gathered is no longer needed where it was.
+static void releasePort(Kernel &kernel, size_t port) {
+  for (auto &lane : kernel.lanes)
+    lane->logs[port].clear();
+  if (port < kernel.counts.size())
+    kernel.counts[port] = {};
+  if (--kernel.pendingOutputs <= 0)
+    kernel.clear();
+}
+
+/// One segment is used where it lies: the stream takes its blocks.
+static void keepBlocks(Kernel &kernel, size_t port, Log PortLogs::*which,
+                       Stream &stream) {
+  for (auto &lane : kernel.lanes)
+    for (auto &block : (lane->logs[port].*which).blocks)
+      stream.blocks.push_back(std::move(block));
+}
+
+/// The cells that a kernel's port logged, in unit order.
+static void concatenateCells(pikort_pipeline &p, Kernel &kernel, size_t port,
+                             Stream &stream) {
+  Segments cells = collect(kernel, port, &PortLogs::cells);
+  stream.pairCount = cells.bytes / 4;
+  checkCount(p.stages[kernel.stage], stream.pairCount);
+  if (cells.list.size() == 1) {
+    stream.pairs = reinterpret_cast<const uint32_t *>(cells.list[0].data);
+    keepBlocks(kernel, port, &PortLogs::cells, stream);
+    return;
+  }
+  stream.pairStorage = Array<uint32_t>(p.memory, stream.pairCount);
+  stream.pairs = stream.pairStorage.data();
+  concatenate(p.threads, cells,
+              reinterpret_cast<uint8_t *>(stream.pairStorage.data()));
+}
+
+static Stream gatherSource(pikort_pipeline &p, const Stage &stage,
+                           int32_t index) {
+  Source &source = p.sources[index];
+  Stream stream;
+  stream.items = source.data;
+  stream.count = source.count;
+  stream.keys.width = 1;
+  stream.keys.base = static_cast<uint64_t>(index) << 32;
+  if (stage.placed()) {
+    if (source.kernel->open || source.kernel->pendingOutputs == 0)
+      throw Failure{PIKORT_BAD_PROGRAM,
+                    "stage " + quoted(stage.name) +
+                        ": expected the bins of source " +
+                        std::to_string(index) + " to be assigned before"};
+    concatenateCells(p, *source.kernel, 0, stream);
+    releasePort(*source.kernel, 0);
+  }
+  return stream;
+}
+
+static Stream gatherEdge(pikort_pipeline &p, const Edge &edge) {
+  Kernel &kernel = *p.stages[edge.producer].kernel;
+  const Stage &to = p.stages[edge.consumer];
+  auto port = static_cast<size_t>(edge.port);
+  Stream stream;
+  if (kernel.open || kernel.pendingOutputs == 0)
+    throw Failure{PIKORT_BAD_PROGRAM,
+                  "stage " + quoted(to.name) + ": expected stage " +
+                      quoted(p.stages[edge.producer].name) +
+                      " to run before it"};
+  Segments records = collect(kernel, port, &PortLogs::records);
+  int64_t size = p.records[to.record].size;
+  stream.count = records.bytes / size;
+  checkCount(to, stream.count);
+  if (byPosition(p, edge)) {
+    if (to.placed())
+      stream.pairCount = collect(kernel, port, &PortLogs::cells).bytes / 4;
+    checkCount(to, stream.pairCount);
+    PositionGather(p, edge, stream).run();
+  } else {
+    if (to.placed())
+      concatenateCells(p, kernel, port, stream);
+    if (records.list.size() == 1) {
+      stream.items = records.list[0].data;
+      keepBlocks(kernel, port, &PortLogs::records, stream);
+    } else {
+      stream.itemStorage = Array<uint8_t>(p.memory, stream.count * size);
+      stream.items = stream.itemStorage.data();
+      concatenate(p.threads, records, stream.itemStorage.data());
+    }
+  }
+  releasePort(kernel, port);
+  return stream;
+}
+
+// --- Several inputs ---------------------------------------------------------
+
+namespace {
+
+/// Merges streams by lineage key.
+class Merge {
+public:
+  Merge(pikort_pipeline &p, const Stage &stage, std::vector<Stream> &from)
+      : p_(p), stage_(stage), from_(from),
+        size_(p.records[stage.record].size) {}
+
+  Stream run() {
+    for (const Stream &stream : from_) {
+      out_.count += stream.count;
+      out_.pairCount += stream.pairCount;
+      out_.keys.width = std::max(out_.keys.width, stream.keys.width);
+    }
+    checkCount(stage_, out_.count);
+    checkCount(stage_, out_.pairCount);
+    out_.itemStorage = Array<uint8_t>(p_.memory, out_.count * size_);
+    out_.items = out_.itemStorage.data();
+    if (stage_.keyWidth > 0)
+      out_.keys.words =
+          Array<uint64_t>(p_.memory, out_.count * out_.keys.width);
+    else
+      out_.keys.width = 0;
+    findPlaces();
+    if (stage_.placed())
+      mergePairs();
+    return std::move(out_);
+  }
+
+private:
+  struct Chunk {
+    size_t stream;
+    int64_t begin, end;
+  };
+
+  static uint64_t word(const Keys &keys, int64_t item, int32_t w) {
+    return w < keys.width ? keys.word(item, w) : 0;
+  }
+
+  /// True if record i of stream a comes before record j of stream b.
+  bool before(size_t a, int64_t i, size_t b, int64_t j) const {
+    const Keys &x = from_[a].keys, &y = from_[b].keys;
+    int32_t width = std::max(x.width, y.width);
+    for (int32_t w = 0; w < width; ++w) {
+      uint64_t u = word(x, i, w), v = word(y, j, w);
+      if (u != v)
+        return u < v;
+    }
+    return a < b;
+  }
+
+  void forChunks(auto &&body) {
+    if (chunks_.empty())
+      for (size_t s = 0; s < from_.size(); ++s)
+        for (int64_t i = 0; i < from_[s].count; i += mergeChunk)
+          chunks_.push_back({s, i, std::min(from_[s].count, i + mergeChunk)});
+    parallelFor(p_.threads, static_cast<int64_t>(chunks_.size()),
+                [&](int64_t c) { body(chunks_[static_cast<size_t>(c)]); });
+  }
+
+  void findPlaces() {
+    for (const Stream &stream : from_)
+      places_.emplace_back(p_.memory, stream.count);
+    size_t streams = from_.size();
+    forChunks([&](const Chunk &chunk) {
+      Array<uint32_t> &places = places_[chunk.stream];
+      for (int64_t i = chunk.begin; i < chunk.end; ++i)
+        places[i] = static_cast<uint32_t>(i);
+      for (size_t other = 0; other < streams; ++other)
+        if (other != chunk.stream)
+          addBefore(chunk, other, places);
+      for (int64_t i = chunk.begin; i < chunk.end; ++i)
+        copyItem(chunk.stream, i, places[i]);
+    });
+  }
+
+  /// Adds to each record's place the records of `other` that precede it.
+  void addBefore(const Chunk &chunk, size_t other, Array<uint32_t> &places) {
+    int64_t low = 0, high = from_[other].count;
+    while (low < high) {
+      int64_t middle = (low + high) / 2;
+      if (before(other, middle, chunk.stream, chunk.begin))
+        low = middle + 1;
+      else
+        high = middle;
+    }
+    for (int64_t i = chunk.begin; i < chunk.end; ++i) {
+      while (low < from_[other].count && before(other, low, chunk.stream, i))
+        ++low;
+      places[i] += static_cast<uint32_t>(low);
+    }
+  }
+
+  void copyItem(size_t s, int64_t i, int64_t to) {
+    std::memcpy(out_.itemStorage.data() + to * size_,
+                from_[s].items + i * size_, static_cast<size_t>(size_));
+    for (int32_t w = 0; w < out_.keys.width; ++w)
+      out_.keys.words[to * out_.keys.width + w] = word(from_[s].keys, i, w);
+  }
+
+  /// The first pair of each item of a stream, and the end.
+  Array<uint32_t> pairStarts(const Stream &stream) {
+    Array<uint32_t> starts(p_.memory, stream.count + 1);
+    int64_t item = 0;
+    for (int64_t k = 0; k < stream.pairCount; ++k)
+      if (stream.pairs[k] & PIKOIR_FIRST_CELL)
+        starts[item++] = static_cast<uint32_t>(k);
+    starts[item] = static_cast<uint32_t>(stream.pairCount);
+    return starts;
+  }
+
+  void mergePairs() {
+    out_.pairStorage = Array<uint32_t>(p_.memory, out_.pairCount);
+    out_.pairs = out_.pairStorage.data();
+    if (out_.onePairEach()) {
+      forChunks([&](const Chunk &chunk) {
+        for (int64_t i = chunk.begin; i < chunk.end; ++i)
+          out_.pairStorage[places_[chunk.stream][i]] =
+              from_[chunk.stream].pairs[i];
+      });
+      return;
+    }
+    std::vector<Array<uint32_t>> starts;
+    for (const Stream &stream : from_)
+      starts.push_back(pairStarts(stream));
+    Array<uint32_t> to(p_.memory, out_.count);
+    forChunks([&](const Chunk &c) {
+      for (int64_t i = c.begin; i < c.end; ++i)
+        to[places_[c.stream][i]] =
+            starts[c.stream][i + 1] - starts[c.stream][i];
+    });
+    exclusiveScan(p_.threads, to.data(), to.data(), out_.count);
+    forChunks([&](const Chunk &c) {
+      for (int64_t i = c.begin; i < c.end; ++i)
+        std::copy(from_[c.stream].pairs + starts[c.stream][i],
+                  from_[c.stream].pairs + starts[c.stream][i + 1],
+                  out_.pairStorage.data() + to[places_[c.stream][i]]);
+    });
+  }
+
+  pikort_pipeline &p_;
+  const Stage &stage_;
+  std::vector<Stream> &from_;
+  int64_t size_;
+  Stream out_;
+  std::vector<Chunk> chunks_;
+  std::vector<Array<uint32_t>> places_;
+};
+
+} // namespace
+
+Stream piko::rt::gatherInputs(pikort_pipeline &p, Stage &stage) {
+  std::vector<Stream> streams;
+  for (int32_t source : stage.sources)
+    streams.push_back(gatherSource(p, stage, source));
+  for (int32_t edge : stage.inputs)
+    streams.push_back(gatherEdge(p, p.edges[edge]));
+  if (streams.empty())
+    return {};
+  if (streams.size() == 1)
+    return std::move(streams.front());
+  return Merge(p, stage, streams).run();
+}

@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//===- Kernel.h - A stage as it runs --------------------------------------===//
+//
+// What a stage (or the AssignBin of a source) holds between begin and end, and
+// from its end until its consumers have gathered what it emitted.
+//
+//   begin:  gather each input edge into a Stream, merge them (Join.cpp),
+//           bin the items (Cells.cpp), cut the positions into units.
+//   loop:   each open unit has a lane, which logs records and cells
+//           (Writer.cpp).
+//   end:    the input goes; logs and lineage stay until they are gathered.
+//
+// An *item* is a primitive of the stage's input, in lineage order. A *pair* is
+// an item in one of its cells, numbered in (item, cell) order. A *position* is
+// a pair, numbered in (cell, item) order: the order of processing. A *slot* is
+// what lies between two calls of pikoir_next: a position, or, where a stage
+// processes whole lists, a cell.
+//
+//===----------------------------------------------------------------------===//
+
+#ifndef PIKO_RUNTIME_CPU_KERNEL_H
+#define PIKO_RUNTIME_CPU_KERNEL_H
+
+#include "common/Pipeline.h"
+
+#include <chrono>
+
+namespace piko::rt {
+
+// --- What a kernel emits ----------------------------------------------------
+
+/// Consecutive bytes that one unit logged.
+struct Segment {
+  int64_t unit;
+  size_t index; ///< In its log.
+  const uint8_t *data;
+  int64_t bytes;
+};
+
+/// Bytes in blocks that grow; a segment of each unit in each block.
+struct Log {
+  std::vector<Array<uint8_t>> blocks;
+  std::vector<Segment> segments;
+  uint8_t *start = nullptr; ///< Of the segment that is being written.
+  bool failed = false;      ///< Out of memory: writes go to a scratch.
+
+  void clear() {
+    blocks.clear();
+    segments.clear();
+    start = nullptr;
+    failed = false;
+  }
+};
+
+/// The three logs of a port. Cells are uint32, the first of each record with
+/// PIKOIR_FIRST_CELL; ordinals are uint32, one for each kept record.
+struct PortLogs {
+  Log records, cells, ordinals;
+  std::vector<uint8_t> scratch;
+  uint8_t *scratchRecord = nullptr; ///< In it, aligned: room for one record.
+  uint32_t *countsEnd = nullptr;
+  bool padded = false; ///< Records have padding, which must be zero.
+  int32_t consumer = 0;
+
+  void clear() {
+    records.clear();
+    cells.clear();
+    ordinals.clear();
+  }
+};
+
+/// In a source's log: the primitive has no cell.
+constexpr uint32_t noCell = 0xffffffffu;
+
+/// A writer and its logs: used by one thread at a time, for many units.
+struct Lane : pikoir_writer {
+  pikort_pipeline *pipeline = nullptr;
+  Kernel *kernel = nullptr;
+  std::vector<pikoir_port> portStorage;
+  std::vector<PortLogs> logs;
+  int64_t emitted = 0; ///< Over all units of this run.
+};
+
+// --- What a kernel reads ----------------------------------------------------
+
+/// Lineage keys: `width` words for each item, compared lexicographically, or
+/// none at all, or, for the primitives of a source, base + index.
+struct Keys {
+  int32_t width = 0;
+  uint64_t base = 0;
+  Array<uint64_t> words;
+
+  uint64_t word(int64_t item, int32_t w) const {
+    return words ? words[item * width + w]
+                 : base + static_cast<uint64_t>(item);
+  }
+};
+
+/// Items in lineage order, with the cells of each.
+struct Stream {
+  const uint8_t *items = nullptr;
+  int64_t count = 0;
+  const uint32_t *pairs = nullptr; ///< If the consumer is placed.
+  int64_t pairCount = 0;
+  Keys keys;
+  // What the pointers point to, if it is ours:
+  Array<uint8_t> itemStorage;
+  Array<uint32_t> pairStorage;
+  std::vector<Array<uint8_t>> blocks;
+
+  bool onePairEach() const { return pairCount == count; }
+};
+
+struct Kernel {
+  int32_t stage = 0;
+  int32_t source = -1; ///< This is the AssignBin of a source.
+  size_t statsIndex = 0;
+  std::chrono::steady_clock::time_point started;
+
+  // From begin to end.
+  Stream stream;
+  pikoir_input input{};
+
+  // From begin until all outputs are gathered.
+  Array<int64_t> offsets;
+  Array<uint32_t> order;
+  std::vector<pikoir_unit> units;
+  int64_t positions = 0;
+  /// Position to its place in emission order; none = identity.
+  Array<uint32_t> rank;
+  int64_t rankSize = 0; ///< Ranks are below.
+  Keys keys;            ///< Of the items.
+  /// For each port, records kept in each slot; none = not needed.
+  std::vector<Array<uint32_t>> counts;
+  int32_t pendingOutputs = 0;
+  bool open = false;
+
+  std::mutex laneMutex;
+  std::vector<std::unique_ptr<Lane>> lanes;
+  std::vector<Lane *> freeLanes;
+
+  /// Slots of unit u are [slotBegin(u), slotBegin(u + 1)). Without a rank a
+  /// stage that collects has room for a slot for each cell too.
+  bool slotsForCells = false;
+  int64_t slotBegin(int64_t unit) const {
+    bool end = unit == static_cast<int64_t>(units.size());
+    if (end && !units.empty()) {
+      const pikoir_unit &last = units.back();
+      return last.end + (slotsForCells ? last.cell_end : 0);
+    }
+    return end ? 0
+               : units[unit].begin + (slotsForCells ? units[unit].cell_begin : 0);
+  }
+  int64_t slots() const { return slotBegin(static_cast<int64_t>(units.size())); }
+
+  /// Frees what a run holds; lanes stay.
+  void clear();
+};
+
+// --- Writer.cpp -------------------------------------------------------------
+
+/// Makes sure that there is a lane for each thread, each with a port for each
+/// of `edges`, and none in use.
+void prepareLanes(pikort_pipeline &p, Kernel &kernel);
+
+// --- Join.cpp ---------------------------------------------------------------
+
+/// True if the edge must be gathered position by position.
+bool byPosition(const pikort_pipeline &p, const Edge &edge);
+/// Everything that comes into a stage, in lineage order.
+Stream gatherInputs(pikort_pipeline &p, Stage &stage);
+
+// --- Cells.cpp --------------------------------------------------------------
+
+/// Sets the kernel's positions, order and offsets, and rank if `rankNeeded`.
+void binItems(pikort_pipeline &p, const Stage &stage, Kernel &kernel,
+              bool rankNeeded);
+/// Cuts the positions into units.
+void cutUnits(pikort_pipeline &p, const Stage &stage, Kernel &kernel);
+
+// --- State.cpp --------------------------------------------------------------
+
+/// Allocates and clears images and buffers sized by sources; throws.
+void prepareState(pikort_pipeline &p);
+
+// --- Run.cpp ----------------------------------------------------------------
+
+/// Makes the kernels of a finished pipeline.
+void makeKernels(pikort_pipeline &p);
+
+} // namespace piko::rt
+
+#endif // PIKO_RUNTIME_CPU_KERNEL_H

@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//===- Run.cpp - Begins and ends kernels ----------------------------------===//
+
+#include "cpu/Kernel.h"
+
+using namespace piko::rt;
+
+static double millisecondsSince(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(
+             std::chrono::steady_clock::now() - start)
+      .count();
+}
+
+void Kernel::clear() {
+  stream = {};
+  input = {};
+  offsets = {};
+  order = {};
+  rank = {};
+  rankSize = 0;
+  positions = 0;
+  keys = {};
+  counts.clear();
+  units.clear();
+  for (auto &lane : lanes)
+    for (PortLogs &logs : lane->logs)
+      logs.clear();
+  pendingOutputs = 0;
+  open = false;
+}
+
+void piko::rt::makeKernels(pikort_pipeline &p) {
+  auto make = [&](int32_t stage, int32_t source) {
+    auto kernel = std::make_shared<Kernel>();
+    kernel->stage = stage;
+    kernel->source = source;
+    kernel->statsIndex = p.kernelStats.size();
+    KernelStats stats;
+    stats.name = p.stages[stage].name;
+    if (source >= 0)
+      stats.name += ".assign" + std::to_string(source);
+    p.kernelStats.push_back(std::move(stats));
+    return kernel;
+  };
+  for (int32_t s : p.order) {
+    Stage &stage = p.stages[s];
+    for (int32_t source : stage.sources)
+      if (stage.placed())
+        p.sources[source].kernel = make(s, source);
+    stage.kernel = make(s, -1);
+  }
+}
+
+/// What generated code sees of a kernel that is ready to run.
+static void publish(const pikort_pipeline &p, Kernel &kernel) {
+  const Stage &stage = p.stages[kernel.stage];
+  kernel.input = {kernel.stream.items,
+                  kernel.positions,
+                  kernel.order.data(),
+                  kernel.offsets.data(),
+                  kernel.units.data(),
+                  static_cast<int64_t>(kernel.units.size()),
+                  kernel.source >= 0 ? 1 : stage.tiles};
+}
+
+/// Units for the AssignBin of a source: any chunks will do.
+static void prepareSource(pikort_pipeline &p, Kernel &kernel) {
+  const Source &source = p.sources[kernel.source];
+  kernel.stream.items = source.data;
+  kernel.stream.count = source.count;
+  Stage whole;
+  whole.flags = PIKOIR_SPLIT;
+  binItems(p, whole, kernel, false);
+  cutUnits(p, whole, kernel);
+  kernel.pendingOutputs = 1;
+}
+
+static void prepareStage(pikort_pipeline &p, Kernel &kernel) {
+  Stage &stage = p.stages[kernel.stage];
+  kernel.stream = gatherInputs(p, stage);
+  if (stage.keyWidth > 0)
+    kernel.keys = std::move(kernel.stream.keys);
+  bool rankNeeded = false;
+  kernel.pendingOutputs = 0;
+  for (int32_t e : stage.outputs) {
+    if (e < 0)
+      continue;
+    ++kernel.pendingOutputs;
+    rankNeeded |= p.edges[e].keyed ||
+                  !(stage.unordered() ||
+                    p.stages[p.edges[e].consumer].unordered());
+  }
+  binItems(p, stage, kernel, rankNeeded);
+  cutUnits(p, stage, kernel);
+  kernel.slotsForCells = stage.collects() && !kernel.rank;
+  kernel.counts.resize(stage.outputs.size());
+  for (size_t port = 0; port < stage.outputs.size(); ++port)
+    if (stage.outputs[port] >= 0 &&
+        byPosition(p, p.edges[stage.outputs[port]]))
+      kernel.counts[port] = Array<uint32_t>(p.memory, kernel.slots());
+  StageStats &stats = p.stageStats[kernel.stage];
+  stats.in += kernel.stream.count;
+  stats.placed += kernel.positions;
+}
+
+static const pikoir_input *begin(pikort_pipeline &p, Kernel &kernel) {
+  if (p.status != PIKORT_OK)
+    return nullptr;
+  int32_t code = guarded(&p, "stage " + quoted(p.stages[kernel.stage].name),
+                         [&] {
+                           kernel.clear();
+                           kernel.started = std::chrono::steady_clock::now();
+                           if (kernel.source >= 0)
+                             prepareSource(p, kernel);
+                           else
+                             prepareStage(p, kernel);
+                           prepareLanes(p, kernel);
+                           publish(p, kernel);
+                           kernel.open = true;
+                         });
+  KernelStats &stats = p.kernelStats[kernel.statsIndex];
+  stats.joinMilliseconds += millisecondsSince(kernel.started);
+  return code == PIKORT_OK ? &kernel.input : nullptr;
+}
+
+static int32_t end(pikort_pipeline &p, Kernel &kernel) {
+  int32_t status = p.settle();
+  if (!kernel.open)
+    return status;
+  if (kernel.source < 0)
+    for (auto &lane : kernel.lanes)
+      p.stageStats[kernel.stage].out += lane->emitted;
+  kernel.open = false;
+  kernel.stream = {};
+  kernel.input = {};
+  if (kernel.pendingOutputs == 0 || status != PIKORT_OK)
+    kernel.clear();
+  KernelStats &stats = p.kernelStats[kernel.statsIndex];
+  stats.milliseconds += millisecondsSince(kernel.started);
+  ++stats.launches;
+  return status;
+}
+
+/// The kernel of a stage or a source, or null and an error.
+static Kernel *find(pikort_pipeline *p, const auto &list, int32_t index,
+                    const char *what) noexcept {
+  if (index >= 0 && index < static_cast<int32_t>(list.size()) &&
+      list[index].kernel)
+    return list[index].kernel.get();
+  guarded(p, "run", [&] {
+    throw Failure{PIKORT_BAD_PROGRAM, std::string("expected the number of a ") +
+                                          what + ", but got " +
+                                          std::to_string(index)};
+  });
+  return nullptr;
+}
+
+extern "C" {
+
+const pikoir_input *pikoir_begin(pikort_pipeline *p, int32_t stage) {
+  Kernel *kernel = find(p, p->stages, stage, "stage");
+  return kernel ? begin(*p, *kernel) : nullptr;
+}
+
+int32_t pikoir_end(pikort_pipeline *p, int32_t stage) {
+  Kernel *kernel = find(p, p->stages, stage, "stage");
+  return kernel ? end(*p, *kernel) : p->status.load();
+}
+
+const pikoir_input *pikoir_begin_source(pikort_pipeline *p, int32_t source) {
+  Kernel *kernel = find(p, p->sources, source, "placed source");
+  return kernel ? begin(*p, *kernel) : nullptr;
+}
+
+int32_t pikoir_end_source(pikort_pipeline *p, int32_t source) {
+  Kernel *kernel = find(p, p->sources, source, "placed source");
+  return kernel ? end(*p, *kernel) : p->status.load();
+}
+
+void pikoir_fail(pikort_pipeline *p, int32_t stage, int32_t code, int64_t a,
+                 int64_t b) {
+  p->report({INT64_MAX, code == PIKORT_OK ? PIKORT_BAD_PROGRAM : code, stage, a,
+             b});
+}
+
+int32_t pikoir_status(pikort_pipeline *p) {
+  int32_t status = p->status.load();
+  return status ? status : p->reported.load();
+}
+
+} // extern "C"

@@ -1,0 +1,353 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//===- Writer.cpp - Logs what a unit emits --------------------------------===//
+//
+// A lane continues its blocks from unit to unit, so that small units cost no
+// memory of their own; segments tell afterwards which bytes are whose. When
+// memory is refused, the port goes on in a scratch whose contents are lost,
+// and the kernel ends with an error.
+//
+//===----------------------------------------------------------------------===//
+
+#include "cpu/Kernel.h"
+
+#include <algorithm>
+#include <cstring>
+#include <thread>
+
+using namespace piko::rt;
+
+static constexpr int64_t firstBlock = int64_t(64) << 10;
+static constexpr int64_t largestBlock = int64_t(2) << 20;
+static constexpr int64_t noRecord = INT64_MAX; // as last_cell
+
+static Lane *laneOf(pikoir_writer *writer) {
+  return static_cast<Lane *>(writer);
+}
+
+static void outOfMemory(Lane *lane, int64_t bytes) {
+  lane->pipeline->report({lane->unit, PIKORT_OUT_OF_MEMORY, lane->stage, bytes,
+                          lane->pipeline->memory.limit()});
+}
+
+/// Ends the segment at `cursor`.
+static void endSegment(Lane *lane, Log &log, uint8_t *cursor) {
+  if (!log.failed && cursor != log.start)
+    log.segments.push_back(
+        {lane->unit, log.segments.size(), log.start, cursor - log.start});
+  log.start = cursor;
+}
+
+/// Replaces the log's block by one with room for `need` bytes, into which the
+/// last `keep` bytes before `cursor` move. False if memory is refused.
+static bool grow(Lane *lane, Log &log, uint8_t *&cursor, uint8_t *&end,
+                 int64_t keep, int64_t need) {
+  if (log.failed)
+    return false;
+  int64_t bytes = std::max(need + 2 * keep, firstBlock);
+  try {
+    if (!log.blocks.empty())
+      bytes = std::max(bytes, std::min(2 * log.blocks.back().capacity(),
+                                       largestBlock));
+    log.blocks.reserve(log.blocks.size() + 1);
+    Array<uint8_t> block(lane->pipeline->memory, bytes);
+    endSegment(lane, log, cursor - keep);
+    if (keep)
+      std::memcpy(block.data(), cursor - keep, static_cast<size_t>(keep));
+    log.start = block.data();
+    cursor = block.data() + keep;
+    end = block.data() + block.capacity();
+    log.blocks.push_back(std::move(block));
+    return true;
+  } catch (const OutOfMemory &refused) {
+    outOfMemory(lane, refused.bytes);
+  } catch (...) {
+    outOfMemory(lane, bytes);
+  }
+  log.failed = true;
+  return false;
+}
+
+// --- Records ----------------------------------------------------------------
+
+/// Makes room for one more record.
+[[gnu::noinline]] static void growRecords(Lane *lane, int32_t port) {
+  pikoir_port &out = lane->ports[port];
+  PortLogs &logs = lane->logs[port];
+  uint8_t *end = nullptr;
+  if (!grow(lane, logs.records, out.cursor, end, 0, out.size)) {
+    out.cursor = out.limit = logs.scratchRecord;
+    return;
+  }
+  out.limit = end - out.size;
+  if (logs.padded)
+    std::memset(out.cursor, 0, static_cast<size_t>(end - out.cursor));
+}
+
+/// Notes the ordinal of the latest record.
+static void noteOrdinal(Lane *lane, int32_t port) {
+  pikoir_port &out = lane->ports[port];
+  Log &log = lane->logs[port].ordinals;
+  if (out.ordinal_cursor == out.ordinal_end) {
+    auto *cursor = reinterpret_cast<uint8_t *>(out.ordinal_cursor);
+    auto *end = cursor;
+    if (!grow(lane, log, cursor, end, 0, 4))
+      return;
+    out.ordinal_cursor = reinterpret_cast<uint32_t *>(cursor);
+    out.ordinal_end = out.ordinal_cursor + (end - cursor) / 4;
+  }
+  *out.ordinal_cursor++ = out.ordinal;
+}
+
+uint8_t *pikoir_append(pikoir_writer *writer, int32_t port) {
+  pikoir_port &out = writer->ports[port];
+  if (out.cursor > out.limit) [[unlikely]]
+    growRecords(laneOf(writer), port);
+  uint8_t *record = out.cursor;
+  ++out.emitted;
+  if (out.flags & PIKOIR_PORT_ORDINALS)
+    out.ordinal = writer->ordinal++;
+  if (out.cells != 0) { // kept by its first place
+    out.last_cell = -1;
+    return record;
+  }
+  out.cursor = record + out.size;
+  if (out.flags & PIKOIR_PORT_ORDINALS)
+    noteOrdinal(laneOf(writer), port);
+  return record;
+}
+
+// --- Cells ------------------------------------------------------------------
+
+/// Makes room for one more cell; a record's cells stay together.
+static bool growCells(Lane *lane, int32_t port) {
+  pikoir_port &out = lane->ports[port];
+  Log &log = lane->logs[port].cells;
+  auto *cursor = reinterpret_cast<uint8_t *>(out.cell_cursor);
+  uint8_t *end = nullptr;
+  int64_t keep = out.last_cell >= 0 ? (out.cell_cursor - out.run) * 4 : 0;
+  if (!grow(lane, log, cursor, end, keep, 4)) {
+    out.cell_cursor = out.cell_end = out.run = nullptr;
+    return false;
+  }
+  out.cell_cursor = reinterpret_cast<uint32_t *>(cursor);
+  out.cell_end = reinterpret_cast<uint32_t *>(end);
+  out.run = out.cell_cursor - keep / 4;
+  return true;
+}
+
+/// A cell that is not above the record's cells so far: into its place.
+static void insertCell(pikoir_port &out, uint32_t cell) {
+  *out.run &= ~PIKOIR_FIRST_CELL;
+  uint32_t *at = std::lower_bound(out.run, out.cell_cursor, cell);
+  if (*at != cell) {
+    std::memmove(at + 1, at,
+                 static_cast<size_t>(out.cell_cursor - at) * sizeof(cell));
+    *at = cell;
+    ++out.cell_cursor;
+  }
+  *out.run |= PIKOIR_FIRST_CELL;
+}
+
+[[gnu::noinline]] static void badPlace(Lane *lane, int32_t port, int64_t cell) {
+  pikoir_port &out = lane->ports[port];
+  if (out.last_cell == noRecord) {
+    lane->pipeline->report(
+        {lane->unit, PIKORT_BAD_PROGRAM, lane->stage, 0, 0});
+    return;
+  }
+  const Stage &to = lane->pipeline->stages[lane->logs[port].consumer];
+  int64_t bin = cell / to.tiles - (cell % to.tiles < 0);
+  lane->pipeline->report({lane->unit, PIKORT_BIN_OUTSIDE,
+                          lane->logs[port].consumer, bin,
+                          to.cells / to.tiles});
+}
+
+void pikoir_place(pikoir_writer *writer, int32_t port, int64_t cell) {
+  pikoir_port &out = writer->ports[port];
+  if (static_cast<uint64_t>(cell) >= static_cast<uint64_t>(out.cells) ||
+      out.last_cell == noRecord) [[unlikely]]
+    return badPlace(laneOf(writer), port, cell);
+  if (cell == out.last_cell)
+    return;
+  if (out.cell_cursor == out.cell_end) [[unlikely]]
+    if (!growCells(laneOf(writer), port)) {
+      if (out.last_cell < 0 && out.cursor <= out.limit)
+        out.cursor += out.size;
+      out.last_cell = cell;
+      return;
+    }
+  auto entry = static_cast<uint32_t>(cell);
+  if (out.last_cell < 0) {
+    entry |= PIKOIR_FIRST_CELL;
+    out.cursor += out.size;
+    out.run = out.cell_cursor;
+    ++out.kept;
+    if (out.flags & PIKOIR_PORT_ORDINALS)
+      noteOrdinal(laneOf(writer), port);
+  } else if (cell < out.last_cell) [[unlikely]] {
+    insertCell(out, entry);
+    return; // last_cell stays the highest
+  }
+  *out.cell_cursor++ = entry;
+  out.last_cell = cell;
+}
+
+void pikoir_place_source(pikoir_writer *writer, int64_t cell) {
+  pikoir_place(writer, 0, cell);
+}
+
+// --- Positions and units ----------------------------------------------------
+
+[[gnu::noinline]] static void badNext(Lane *lane) {
+  lane->pipeline->report({lane->unit, PIKORT_BAD_PROGRAM, lane->stage, 1, 0});
+}
+
+void pikoir_next(pikoir_writer *writer) {
+  if (writer->flags == 0)
+    return;
+  writer->ordinal = 0;
+  for (int32_t i = 0; i < writer->port_count; ++i) {
+    pikoir_port &out = writer->ports[i];
+    if (out.flags & PIKOIR_PORT_COUNTS) {
+      int64_t now = out.cells ? out.kept : out.emitted;
+      if (out.counts == laneOf(writer)->logs[i].countsEnd) [[unlikely]]
+        return badNext(laneOf(writer));
+      *out.counts++ = static_cast<uint32_t>(now - out.mark);
+      out.mark = now;
+    }
+    if (out.flags & PIKOIR_PORT_SOURCE) {
+      if (out.last_cell < 0 &&
+          (out.cell_cursor != out.cell_end || growCells(laneOf(writer), i)))
+        *out.cell_cursor++ = noCell;
+      out.last_cell = -1;
+    }
+  }
+}
+
+static Lane *takeLane(Kernel &kernel) {
+  std::lock_guard<std::mutex> lock(kernel.laneMutex);
+  if (kernel.freeLanes.empty())
+    return nullptr;
+  Lane *lane = kernel.freeLanes.back();
+  kernel.freeLanes.pop_back();
+  return lane;
+}
+
+static pikoir_writer *openUnit(Kernel &kernel, int64_t unit) {
+  // There is a lane for each thread: waiting happens only if a program opens
+  // units from more threads than the pipeline has.
+  Lane *lane = takeLane(kernel);
+  while (!lane) {
+    std::this_thread::yield();
+    lane = takeLane(kernel);
+  }
+  lane->unit = unit;
+  lane->ordinal = 0;
+  for (int32_t i = 0; i < lane->port_count; ++i) {
+    pikoir_port &out = lane->ports[i];
+    out.emitted = out.kept = out.mark = 0;
+    out.last_cell = out.flags & PIKOIR_PORT_SOURCE ? -1 : noRecord;
+    if (out.flags & PIKOIR_PORT_COUNTS) {
+      uint32_t *counts = kernel.counts[i].data();
+      out.counts = counts + kernel.slotBegin(unit);
+      lane->logs[i].countsEnd = counts + kernel.slotBegin(unit + 1);
+    }
+  }
+  return lane;
+}
+
+pikoir_writer *pikoir_open(pikort_pipeline *p, int32_t stage, int64_t unit) {
+  return openUnit(*p->stages[stage].kernel, unit);
+}
+
+pikoir_writer *pikoir_open_source(pikort_pipeline *p, int32_t source,
+                                  int64_t unit) {
+  return openUnit(*p->sources[source].kernel, unit);
+}
+
+void pikoir_close(pikoir_writer *writer) {
+  Lane *lane = laneOf(writer);
+  try {
+    for (int32_t i = 0; i < lane->port_count; ++i) {
+      pikoir_port &out = lane->ports[i];
+      PortLogs &logs = lane->logs[i];
+      lane->emitted += out.emitted;
+      if (out.flags & PIKOIR_PORT_COUNTS)
+        std::fill(out.counts, logs.countsEnd, 0u);
+      endSegment(lane, logs.records, out.cursor);
+      endSegment(lane, logs.cells,
+                 reinterpret_cast<uint8_t *>(out.cell_cursor));
+      endSegment(lane, logs.ordinals,
+                 reinterpret_cast<uint8_t *>(out.ordinal_cursor));
+    }
+  } catch (...) { // no memory for the list of segments
+    outOfMemory(lane, sizeof(Segment));
+  }
+  std::lock_guard<std::mutex> lock(lane->kernel->laneMutex);
+  lane->kernel->freeLanes.push_back(lane); // has room for all lanes
+}
+
+// --- Lanes ------------------------------------------------------------------
+
+static std::unique_ptr<Lane> makeLane(pikort_pipeline &p, Kernel &kernel) {
+  auto lane = std::make_unique<Lane>();
+  bool ofSource = kernel.source >= 0;
+  size_t ports = ofSource ? 1 : p.stages[kernel.stage].outputs.size();
+  lane->pipeline = &p;
+  lane->kernel = &kernel;
+  lane->stage = kernel.stage;
+  lane->portStorage.resize(ports);
+  lane->logs.resize(ports);
+  lane->ports = lane->portStorage.data();
+  lane->port_count = static_cast<int32_t>(ports);
+  return lane;
+}
+
+/// Sets up a port for this run.
+static void preparePort(pikort_pipeline &p, const Kernel &kernel, Lane &lane,
+                        size_t port) {
+  PortLogs &logs = lane.logs[port];
+  pikoir_port &out = lane.portStorage[port];
+  logs.clear();
+  out = {};
+  logs.consumer = kernel.stage;
+  if (kernel.source >= 0) {
+    out.flags = PIKOIR_PORT_SOURCE;
+  } else {
+    int32_t e = p.stages[kernel.stage].outputs[port];
+    logs.consumer = e < 0 ? kernel.stage : p.edges[e].consumer;
+    if (e >= 0 && p.edges[e].keyed)
+      out.flags |= PIKOIR_PORT_ORDINALS;
+    if (kernel.counts[port])
+      out.flags |= PIKOIR_PORT_COUNTS;
+  }
+  const Stage &to = p.stages[logs.consumer];
+  const Record &record = p.records[to.record];
+  if (kernel.source < 0)
+    out.size = record.size;
+  out.cells = to.placed() ? to.cells : 0;
+  logs.padded = record.padded;
+  logs.scratch.resize(static_cast<size_t>(record.size + record.align));
+  auto address = reinterpret_cast<uintptr_t>(logs.scratch.data());
+  auto align = static_cast<uintptr_t>(record.align);
+  logs.scratchRecord = logs.scratch.data() + (align - address % align) % align;
+  // No block yet and no room: the first record makes one.
+  out.limit = logs.scratchRecord;
+  out.cursor = logs.records.start = out.limit + 1;
+}
+
+void piko::rt::prepareLanes(pikort_pipeline &p, Kernel &kernel) {
+  while (kernel.lanes.size() < static_cast<size_t>(p.threads))
+    kernel.lanes.push_back(makeLane(p, kernel));
+  kernel.freeLanes.clear();
+  kernel.freeLanes.reserve(kernel.lanes.size());
+  for (auto &lane : kernel.lanes) {
+    lane->flags = 0;
+    lane->emitted = 0;
+    for (size_t port = 0; port < lane->logs.size(); ++port) {
+      preparePort(p, kernel, *lane, port);
+      lane->flags |= lane->ports[port].flags;
+    }
+    kernel.freeLanes.push_back(lane.get());
+  }
+}

@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//===- Graph.h - Test pipelines, and what they mean -----------------------===//
+//
+// A Graph is a pipeline whose stages do what a hash of their input says: how
+// much is emitted, to which ports, into which cells. It runs in two ways:
+//
+//   model()  the meaning: recursive and sequential, as docs/Language.md has it;
+//   run()    through the ABI, with kernels like those the compiler makes.
+//
+// Both log what reaches every stage, in order; tests compare the logs.
+//
+//===----------------------------------------------------------------------===//
+
+#ifndef PIKO_RUNTIME_TEST_GRAPH_H
+#define PIKO_RUNTIME_TEST_GRAPH_H
+
+#include "pikort/abi.h"
+
+#include <cstdint>
+#include <set>
+#include <string>
+#include <vector>
+
+namespace piko::rt::test {
+
+/// A primitive. It has padding, which must come out as zero.
+struct Item {
+  uint64_t id = 0;
+  uint8_t hops = 0;
+};
+
+struct TestStage {
+  int64_t bin[2] = {0, 0};
+  int flags = 0;
+  int64_t tile = 0; ///< Owner tiles.
+  int64_t split = 0;
+  int schedule = PIKOIR_LOAD_BALANCE;
+  bool list = false;         ///< Processes whole lists (flags has COLLECTS).
+  std::vector<int> ports;    ///< Consumer of each port.
+  int spread = 3;            ///< Most places of one primitive, plus one.
+  int mostEmissions = 2;     ///< Of one call.
+};
+
+/// What reached a stage.
+struct Arrivals {
+  std::vector<uint64_t> items;              ///< In lineage order.
+  std::vector<std::vector<uint64_t>> cells; ///< In each cell, in order.
+  bool operator==(const Arrivals &) const = default;
+};
+
+struct Graph {
+  int64_t domain[2] = {20, 13};
+  std::vector<TestStage> stages;
+  std::vector<int> sources; ///< Stage of each source.
+  std::vector<std::vector<Item>> input;
+
+  // Filled by the runs.
+  std::vector<Arrivals> arrivals;
+  bool paddingSeen = false;
+
+  int64_t tiles(int stage) const;
+  int64_t cells(int stage) const;
+  /// The places of an item in a stage, in the order in which they are named;
+  /// with repetitions.
+  std::vector<int64_t> places(int stage, const Item &item) const;
+  /// The primitives that a call emits: port and item.
+  std::vector<std::pair<int, Item>> emissions(int stage, uint64_t seed,
+                                              int hops) const;
+
+  /// Runs the meaning; returns what reached each stage.
+  std::vector<Arrivals> model() const;
+  /// A graph of `stageCount` stages drawn from `seed`.
+  static Graph random(uint64_t seed, int stageCount, int64_t items);
+};
+
+uint64_t mix(uint64_t a, uint64_t b);
+
+/// A pipeline that runs a graph through the ABI. One at a time.
+class GraphRun {
+public:
+  explicit GraphRun(Graph &graph);
+  ~GraphRun();
+  GraphRun(const GraphRun &) = delete;
+  GraphRun &operator=(const GraphRun &) = delete;
+  pikort_pipeline *get() const { return pipeline_; }
+  int32_t run(int threads);
+
+private:
+  pikort_pipeline *pipeline_ = nullptr;
+};
+
+} // namespace piko::rt::test
+
+#endif // PIKO_RUNTIME_TEST_GRAPH_H

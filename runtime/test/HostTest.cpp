@@ -1,0 +1,348 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//===- HostTest.cpp - The host API, its errors, and state -----------------===//
+
+#include "pikort/abi.h"
+#include "pikort/pikort.hpp"
+
+#include <cstring>
+#include <gtest/gtest.h>
+#include <string>
+#include <vector>
+
+namespace {
+
+struct Pixel {
+  float z;
+  int32_t id;
+};
+
+/// What the kernel of the test program does.
+enum class Act { Nothing, BadBin, NegativeBin, Fail, Status, SkipSource };
+Act act = Act::Nothing;
+
+// A source of Pixel that stage "bin" places in 4x4 bins of an 8x8 domain.
+void setup(pikort_pipeline *p) {
+  pikoir_declare_pipeline(p, "Small", 2);
+  pikoir_declare_record(p, 0, "Pixel", sizeof(Pixel), 4);
+  pikoir_declare_field(p, 0, "z", PIKORT_F32, 0, 1, 0);
+  pikoir_declare_field(p, 0, "id", PIKORT_I32, 4, 1, 0);
+  Pixel clear{1.0f, -1};
+  pikoir_declare_state(p, 0, "scale", PIKORT_CONSTANT, 0, 0, -1, nullptr);
+  pikoir_declare_state(p, 1, "lights", PIKORT_BUFFER, 0, 1, -1, nullptr);
+  pikoir_declare_state(p, 2, "shaded", PIKORT_BUFFER, 0, 1, 0, nullptr);
+  pikoir_declare_state(p, 3, "depth", PIKORT_IMAGE, 0, 2, -1, &clear);
+  pikoir_declare_state(p, 4, "bias", PIKORT_CONSTANT, 0, 0, -1, &clear);
+  int64_t bins[] = {4, 4};
+  pikoir_declare_stage(p, 0, "bin", 0, bins, PIKOIR_LOAD_BALANCE, 0,
+                       PIKOIR_PLACED, 2);
+  pikoir_declare_source(p, 0, 0);
+}
+
+int32_t run(pikort_pipeline *p) {
+  if (act == Act::Status)
+    return 99;
+  if (act != Act::SkipSource) {
+    const pikoir_input *in = pikoir_begin_source(p, 0);
+    if (!in)
+      return pikoir_status(p);
+#pragma omp parallel for num_threads(pikoir_threads(p))
+    for (int64_t u = 0; u < in->unit_count; ++u) {
+      pikoir_writer *w = pikoir_open_source(p, 0, u);
+      for (int64_t i = in->units[u].begin; i < in->units[u].end; ++i) {
+        int64_t bad = act == Act::BadBin        ? 16 + i * 4
+                      : act == Act::NegativeBin ? -4 + i % 4
+                                                : i % 16;
+        pikoir_place_source(w, i < 5 ? 0 : bad);
+        pikoir_next(w);
+      }
+      pikoir_close(w);
+    }
+    if (int32_t status = pikoir_end_source(p, 0))
+      return status;
+  }
+  const pikoir_input *in = pikoir_begin(p, 0);
+  if (!in)
+    return pikoir_status(p);
+  auto *depth = reinterpret_cast<Pixel *>(pikoir_get_state(p, 3)->data);
+  auto *shaded = reinterpret_cast<Pixel *>(pikoir_get_state(p, 2)->data);
+  for (int64_t i = 0; i < in->count; ++i) {
+    int64_t item = in->order ? in->order[i] : i;
+    auto *pixel = reinterpret_cast<const Pixel *>(in->items) + item;
+    depth[pixel->id % 64].z += 1;
+    shaded[item].id += 7;
+  }
+  if (act == Act::Fail)
+    for (int64_t y : {9, 5, 7})
+      pikoir_fail(p, 0, PIKORT_UPDATE_OUTSIDE, 3, y);
+  return pikoir_end(p, 0);
+}
+
+const pikort_program program{PIKORT_ABI_VERSION, "Small", setup, run};
+
+class Host : public testing::Test {
+protected:
+  void SetUp() override {
+    act = Act::Nothing;
+    ASSERT_TRUE(pipe.created()) << pipe.created().message();
+    points.resize(100);
+    for (int i = 0; i < 100; ++i)
+      points[static_cast<size_t>(i)] = {0, i};
+  }
+  void bindAll() {
+    ASSERT_TRUE(pipe.domain({8, 8}));
+    ASSERT_TRUE(pipe.constant("scale", Pixel{2, 0}));
+    ASSERT_TRUE(pipe.allocate("lights", 3));
+    ASSERT_TRUE(pipe.source(0, points));
+  }
+  void expectError(const piko::rt::Status &status, int32_t code,
+                   const std::string &text) {
+    EXPECT_EQ(status.code(), code);
+    EXPECT_EQ(status.message(), text);
+  }
+  piko::rt::Pipeline pipe{program};
+  std::vector<Pixel> points;
+};
+
+TEST_F(Host, RunsAndReadsBack) {
+  bindAll();
+  for (int frame = 0; frame < 3; ++frame) {
+    ASSERT_TRUE(pipe.run());
+    auto depth = pipe.view<Pixel>("depth");
+    ASSERT_EQ(depth.elements.size(), 64u);
+    EXPECT_EQ(depth.extent[1], 8);
+    // Cleared at each run: 100 points on 64 pixels.
+    EXPECT_EQ(depth(0).z, 3.0f);
+    EXPECT_EQ(depth(7, 7).z, 2.0f);
+    EXPECT_EQ(depth(0).id, -1);
+    auto shaded = pipe.view<Pixel>("shaded");
+    ASSERT_EQ(shaded.elements.size(), 100u);
+    EXPECT_EQ(shaded(99).id, 7);
+  }
+  ASSERT_TRUE(pipe.domain({5, 3}));
+  ASSERT_TRUE(pipe.view<Pixel>("bias").elements.data());
+}
+
+TEST_F(Host, FollowsTheDomain) {
+  bindAll();
+  points.resize(10);
+  ASSERT_TRUE(pipe.source(0, points));
+  for (int64_t side : {8, 1000, 9}) {
+    ASSERT_TRUE(pipe.domain({side, side}));
+    ASSERT_TRUE(pipe.run());
+    auto depth = pipe.view<Pixel>("depth");
+    ASSERT_EQ(depth.elements.size(), static_cast<size_t>(side * side));
+    EXPECT_EQ(depth(side - 1, side - 1).z, 1.0f);
+  }
+}
+
+TEST_F(Host, Unbound) {
+  expectError(pipe.run(), PIKORT_UNBOUND,
+              "pipeline 'Small': the domain is not set");
+  ASSERT_TRUE(pipe.domain({8, 8}));
+  expectError(pipe.run(), PIKORT_UNBOUND,
+              "pipeline 'Small': constant 'scale' is not bound");
+  ASSERT_TRUE(pipe.constant("scale", Pixel{}));
+  expectError(pipe.run(), PIKORT_UNBOUND,
+              "pipeline 'Small': buffer 'lights' is not bound");
+  ASSERT_TRUE(pipe.buffer("lights", points));
+  expectError(pipe.run(), PIKORT_UNBOUND,
+              "pipeline 'Small': source 0 is not bound");
+  pikort_view view;
+  EXPECT_EQ(pikort_get_view(pipe.get(), "depth", &view), PIKORT_UNBOUND);
+  EXPECT_STREQ(pikort_message(pipe.get()),
+               "state 'depth' exists only after a run");
+  ASSERT_TRUE(pipe.source(0, points));
+  EXPECT_TRUE(pipe.run());
+  EXPECT_STREQ(pikort_message(pipe.get()), "");
+}
+
+TEST_F(Host, WrongNamesAndSizes) {
+  expectError(pipe.constant("sclae", Pixel{}), PIKORT_NOT_FOUND,
+              "pipeline 'Small' has no state 'sclae'");
+  expectError(pipe.constant("scale", 1.0f), PIKORT_SIZE_MISMATCH,
+              "constant 'scale': expected 8 bytes for a 'Pixel', but got 4");
+  expectError(pipe.constant("lights", Pixel{}), PIKORT_INVALID_ARGUMENT,
+              "state 'lights': expected a constant, but it is a buffer");
+  expectError(pipe.allocate("shaded", 4), PIKORT_INVALID_ARGUMENT,
+              "buffer 'shaded' is allocated for source 0 and cannot be bound");
+  expectError(pipe.allocate("lights", -4), PIKORT_INVALID_ARGUMENT,
+              "buffer 'lights': expected a count of at least 0, but got -4");
+  EXPECT_EQ(pipe.allocate("lights", INT64_MAX).code(), PIKORT_OUT_OF_MEMORY);
+  EXPECT_EQ(pipe.allocate("lights", INT64_MAX / 8).code(),
+            PIKORT_OUT_OF_MEMORY);
+  expectError(pipe.source(1, points), PIKORT_NOT_FOUND,
+              "pipeline 'Small' has no source 1");
+  EXPECT_EQ(pikort_bind_source(pipe.get(), 0, points.data(), int64_t(1) << 32,
+                               8),
+            PIKORT_TOO_MANY);
+  EXPECT_STREQ(pikort_message(pipe.get()),
+               "source 0: expected at most 4294967295 primitives, but got "
+               "4294967296");
+  EXPECT_EQ(pikort_bind_source(pipe.get(), 0, nullptr, 1, 8),
+            PIKORT_INVALID_ARGUMENT);
+  EXPECT_EQ(pikort_bind_source(
+                pipe.get(), 0, reinterpret_cast<char *>(points.data()) + 1, 1,
+                8),
+            PIKORT_INVALID_ARGUMENT);
+  EXPECT_STREQ(pikort_message(pipe.get()),
+               "source 0: expected a pointer aligned to 4 bytes");
+}
+
+TEST_F(Host, BadDomains) {
+  for (int64_t extent : {int64_t(0), int64_t(-3), INT64_MAX})
+    expectError(pipe.domain({extent, 8}), PIKORT_INVALID_ARGUMENT,
+                "expected domain extents in [1, 2147483647], but got " +
+                    std::to_string(extent));
+  expectError(pipe.domain({8}), PIKORT_INVALID_ARGUMENT,
+              "pipeline 'Small': expected a domain of rank 2, but got 1");
+  bindAll();
+  ASSERT_TRUE(pipe.domain({INT32_MAX, INT32_MAX}));
+  expectError(pipe.run(), PIKORT_TOO_MANY,
+              "stage 'bin': expected fewer than 2147483647 cells, but the "
+              "domain has more");
+  // Few enough cells, but an image that no machine holds.
+  ASSERT_TRUE(pipe.memoryLimit(1 << 20));
+  ASSERT_TRUE(pipe.domain({60000, 60000}));
+  EXPECT_EQ(pipe.run().code(), PIKORT_OUT_OF_MEMORY);
+  ASSERT_TRUE(pipe.domain({8, 8}));
+  EXPECT_TRUE(pipe.run());
+}
+
+TEST_F(Host, BadThreads) {
+  for (int threads : {-1, 10001})
+    expectError(pipe.threads(threads), PIKORT_INVALID_ARGUMENT,
+                "expected a number of threads in [0, 10000], but got " +
+                    std::to_string(threads));
+  bindAll();
+  for (int threads : {0, 1, 100}) {
+    ASSERT_TRUE(pipe.threads(threads));
+    EXPECT_TRUE(pipe.run());
+  }
+}
+
+// The first error in item order is reported, whatever the threads.
+TEST_F(Host, BinsOutsideTheGrid) {
+  bindAll();
+  for (int threads : {1, 7}) {
+    ASSERT_TRUE(pipe.threads(threads));
+    act = Act::BadBin;
+    expectError(pipe.run(), PIKORT_BIN_OUTSIDE,
+                "stage 'bin': expected a bin of the grid, in [0, 4), but got "
+                "9");
+    act = Act::NegativeBin;
+    expectError(pipe.run(), PIKORT_BIN_OUTSIDE,
+                "stage 'bin': expected a bin of the grid, in [0, 4), but got "
+                "-1");
+  }
+  act = Act::Nothing;
+  EXPECT_TRUE(pipe.run());
+}
+
+TEST_F(Host, ErrorsOfGeneratedCode) {
+  bindAll();
+  act = Act::Fail;
+  expectError(pipe.run(), PIKORT_UPDATE_OUTSIDE,
+              "stage 'bin': expected an update inside the stage's own bin, but "
+              "got pixel (3, 5)");
+  act = Act::Status;
+  expectError(pipe.run(), PIKORT_BAD_PROGRAM,
+              "pipeline 'Small': the program returned status 99");
+  act = Act::SkipSource;
+  expectError(pipe.run(), PIKORT_BAD_PROGRAM,
+              "stage 'bin': expected the bins of source 0 to be assigned "
+              "before");
+}
+
+TEST_F(Host, Reflection) {
+  pikort_pipeline *p = pipe.get();
+  EXPECT_STREQ(pikort_name(p), "Small");
+  EXPECT_EQ(pikort_rank(p), 2);
+  EXPECT_EQ(pikort_record_count(p), 1);
+  EXPECT_EQ(pikort_state_count(p), 5);
+  EXPECT_EQ(pikort_stage_count(p), 1);
+  EXPECT_EQ(pikort_source_count(p), 1);
+  pikort_record_info record;
+  ASSERT_EQ(pikort_get_record(p, 0, &record), PIKORT_OK);
+  EXPECT_EQ(record.field_count, 2);
+  pikort_field_info field;
+  ASSERT_EQ(pikort_get_field(p, 0, 1, &field), PIKORT_OK);
+  EXPECT_STREQ(field.name, "id");
+  EXPECT_EQ(field.type, PIKORT_I32);
+  EXPECT_EQ(pikort_get_field(p, 1, 1, &field), PIKORT_NOT_FOUND);
+  pikort_state_info state;
+  ASSERT_EQ(pikort_get_state_info(p, 2, &state), PIKORT_OK);
+  EXPECT_STREQ(state.name, "shaded");
+  EXPECT_EQ(state.per_source, 0);
+  EXPECT_EQ(state.bound, 1);
+  pikort_stage_info stage;
+  ASSERT_EQ(pikort_get_stage_info(p, 0, &stage), PIKORT_OK);
+  EXPECT_EQ(stage.bin_size[1], 4);
+  EXPECT_EQ(stage.port_count, 0);
+  EXPECT_EQ(pikort_get_stage_info(p, 1, &stage), PIKORT_NOT_FOUND);
+  EXPECT_EQ(pikort_get_stage_info(p, 0, nullptr), PIKORT_INVALID_ARGUMENT);
+  pikort_source_info source;
+  ASSERT_EQ(pikort_get_source_info(p, 0, &source), PIKORT_OK);
+  EXPECT_EQ(source.count, -1);
+}
+
+TEST_F(Host, Statistics) {
+  bindAll();
+  for (int frame = 0; frame < 3; ++frame)
+    ASSERT_TRUE(pipe.run());
+  pikort_pipeline *p = pipe.get();
+  EXPECT_EQ(pikort_stats_runs(p), 3);
+  ASSERT_EQ(pikort_kernel_count(p), 2);
+  pikort_kernel_stats kernel;
+  ASSERT_EQ(pikort_get_kernel_stats(p, 0, &kernel), PIKORT_OK);
+  EXPECT_STREQ(kernel.name, "bin.assign0");
+  EXPECT_EQ(kernel.launches, 3);
+  EXPECT_GT(kernel.milliseconds, 0);
+  ASSERT_EQ(pikort_get_kernel_stats(p, 1, &kernel), PIKORT_OK);
+  EXPECT_STREQ(kernel.name, "bin");
+  EXPECT_GE(kernel.milliseconds, kernel.join_milliseconds);
+  pikort_stage_stats stage;
+  ASSERT_EQ(pikort_get_stage_stats(p, 0, &stage), PIKORT_OK);
+  EXPECT_EQ(stage.in, 300);
+  EXPECT_EQ(stage.placed, 300);
+  EXPECT_GT(pikort_peak_bytes(p), 0);
+  pikort_reset_stats(p);
+  EXPECT_EQ(pikort_stats_runs(p), 0);
+  ASSERT_EQ(pikort_get_stage_stats(p, 0, &stage), PIKORT_OK);
+  EXPECT_EQ(stage.in, 0);
+}
+
+TEST(Create, RejectsBadPrograms) {
+  pikort_pipeline *p = nullptr;
+  EXPECT_EQ(pikort_create(nullptr, &p), PIKORT_INVALID_ARGUMENT);
+  auto expect = [&](pikort_program bad, int32_t code, const char *text) {
+    EXPECT_EQ(pikort_create(&bad, &p), code);
+    EXPECT_STREQ(pikort_message(p), text);
+    EXPECT_EQ(pikort_run(p), PIKORT_BAD_PROGRAM);
+    pikort_destroy(p);
+  };
+  expect({7, "Old", setup, run}, PIKORT_VERSION,
+         "pipeline 'Old': expected a program for runtime version 1, but got 7");
+  expect({PIKORT_ABI_VERSION, "Empty", nullptr, run}, PIKORT_BAD_PROGRAM,
+         "pipeline 'Empty': expected a program with setup and run");
+  auto cycle = [](pikort_pipeline *p) {
+    setup(p);
+    pikoir_declare_edge(p, 0, 0, 0);
+  };
+  expect({PIKORT_ABI_VERSION, "Loop", cycle, run}, PIKORT_BAD_PROGRAM,
+         "pipeline 'Small': stages that form a cycle are not supported");
+  auto twice = [](pikort_pipeline *p) {
+    setup(p);
+    pikoir_declare_record(p, 0, "Pixel", 8, 4);
+  };
+  expect({PIKORT_ABI_VERSION, "Twice", twice, run}, PIKORT_BAD_PROGRAM,
+         "expected record 0 to be declared once");
+  auto field = [](pikort_pipeline *p) {
+    setup(p);
+    pikoir_declare_field(p, 0, "w", PIKORT_F64, 4, 1, 0);
+  };
+  expect({PIKORT_ABI_VERSION, "Field", field, run}, PIKORT_BAD_PROGRAM,
+         "record 'Pixel': expected field 'w' inside 8 bytes, but got offset 8");
+  pikort_destroy(nullptr);
+}
+
+} // namespace
