@@ -5,21 +5,23 @@ add_library(piko_options INTERFACE)
 target_compile_options(piko_options INTERFACE
   -Wall -Wextra -Wno-unused-parameter -ffp-contract=off)
 
-# What a target that uses LLVM, MLIR or Clang needs.
-add_library(piko_llvm INTERFACE)
-target_include_directories(piko_llvm SYSTEM INTERFACE ${LLVM_INCLUDE_DIRS} ${MLIR_INCLUDE_DIRS})
-target_include_directories(piko_llvm INTERFACE
-  ${PROJECT_SOURCE_DIR}/include ${PROJECT_BINARY_DIR}/include)
-separate_arguments(PIKO_LLVM_DEFINITIONS NATIVE_COMMAND "${LLVM_DEFINITIONS}")
-target_compile_definitions(piko_llvm INTERFACE ${PIKO_LLVM_DEFINITIONS})
-if(NOT LLVM_ENABLE_RTTI)
-  target_compile_options(piko_llvm INTERFACE $<$<COMPILE_LANGUAGE:CXX>:-fno-rtti>)
-endif()
-target_link_libraries(piko_llvm INTERFACE
-  ${PIKO_LLVM_PREFIX}/lib/libMLIR.so ${PIKO_LLVM_PREFIX}/lib/libLLVM.so)
+if(PIKO_ENABLE_COMPILER)
+  # What a target that uses LLVM, MLIR or Clang needs.
+  add_library(piko_llvm INTERFACE)
+  target_include_directories(piko_llvm SYSTEM INTERFACE ${LLVM_INCLUDE_DIRS} ${MLIR_INCLUDE_DIRS})
+  target_include_directories(piko_llvm INTERFACE
+    ${PROJECT_SOURCE_DIR}/include ${PROJECT_BINARY_DIR}/include)
+  separate_arguments(PIKO_LLVM_DEFINITIONS NATIVE_COMMAND "${LLVM_DEFINITIONS}")
+  target_compile_definitions(piko_llvm INTERFACE ${PIKO_LLVM_DEFINITIONS})
+  if(NOT LLVM_ENABLE_RTTI)
+    target_compile_options(piko_llvm INTERFACE $<$<COMPILE_LANGUAGE:CXX>:-fno-rtti>)
+  endif()
+  target_link_libraries(piko_llvm INTERFACE
+    ${PIKO_LLVM_PREFIX}/lib/libMLIR.so ${PIKO_LLVM_PREFIX}/lib/libLLVM.so)
 
-add_library(piko_clang INTERFACE)
-target_link_libraries(piko_clang INTERFACE piko_llvm ${PIKO_LLVM_PREFIX}/lib/libclang-cpp.so)
+  add_library(piko_clang INTERFACE)
+  target_link_libraries(piko_clang INTERFACE piko_llvm ${PIKO_LLVM_PREFIX}/lib/libclang-cpp.so)
+endif()
 
 # piko_add_library(PikoX SOURCES... [DEPENDS tablegen targets] [LINK libraries])
 # A static library of the compiler.

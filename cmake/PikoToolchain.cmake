@@ -7,15 +7,33 @@ set(PIKO_LLVM_PREFIX /usr/lib/llvm-${PIKO_LLVM_VERSION} CACHE PATH
     "Where LLVM, MLIR and Clang are installed")
 list(PREPEND CMAKE_PREFIX_PATH ${PIKO_LLVM_PREFIX})
 
-find_package(MLIR REQUIRED CONFIG PATHS ${PIKO_LLVM_PREFIX}/lib/cmake/mlir NO_DEFAULT_PATH)
-if(NOT LLVM_VERSION_MAJOR EQUAL PIKO_LLVM_VERSION)
-  message(FATAL_ERROR "expected LLVM ${PIKO_LLVM_VERSION}, but got ${LLVM_VERSION}")
+find_program(PIKO_CCACHE ccache)
+if(PIKO_CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
+  set(CMAKE_C_COMPILER_LAUNCHER ${PIKO_CCACHE})
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${PIKO_CCACHE})
 endif()
+
+set(PIKO_SANITIZE "" CACHE STRING
+    "Sanitizers for everything, as -fsanitize takes them")
+if(PIKO_SANITIZE)
+  add_compile_options(-fsanitize=${PIKO_SANITIZE} -fno-omit-frame-pointer
+    -fno-sanitize-recover=undefined)
+  add_link_options(-fsanitize=${PIKO_SANITIZE})
+endif()
+
 find_package(OpenMP REQUIRED COMPONENTS CXX)
 
-list(APPEND CMAKE_MODULE_PATH ${MLIR_CMAKE_DIR} ${LLVM_CMAKE_DIR})
-include(TableGen)
-include(AddLLVM)
-include(AddMLIR)
-
-set(PIKO_CLANG_RESOURCE_DIR ${PIKO_LLVM_PREFIX}/lib/clang/${PIKO_LLVM_VERSION})
+if(PIKO_ENABLE_COMPILER)
+  find_package(MLIR REQUIRED CONFIG
+    PATHS ${PIKO_LLVM_PREFIX}/lib/cmake/mlir NO_DEFAULT_PATH)
+  if(NOT LLVM_VERSION_MAJOR EQUAL PIKO_LLVM_VERSION)
+    message(FATAL_ERROR
+      "expected LLVM ${PIKO_LLVM_VERSION}, but got ${LLVM_VERSION}")
+  endif()
+  list(APPEND CMAKE_MODULE_PATH ${MLIR_CMAKE_DIR} ${LLVM_CMAKE_DIR})
+  include(TableGen)
+  include(AddLLVM)
+  include(AddMLIR)
+  set(PIKO_CLANG_RESOURCE_DIR
+      ${PIKO_LLVM_PREFIX}/lib/clang/${PIKO_LLVM_VERSION})
+endif()

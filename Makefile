@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+#
+# Two commands matter, and each works on a fresh Debian 12 machine:
+#   make demo     render the bunny; says where the image is
+#   make check    build everything and run every test
+# The rest is a thin layer over the presets of CMakePresets.json.
+
+PRESET ?= release
+ifeq ($(PRESET),release)
+BUILD := build
+else
+BUILD := build-$(PRESET)
+endif
+JOBS ?= $(shell nproc)
+BUNNY := /usr/share/glmark2/models/bunny.obj
+PIPE ?= Binned
+
+.DELETE_ON_ERROR:
+.PHONY: all build check clean configure demo deps docs format lint
+
+all: build
+
+deps:
+	@utils/install-deps.sh
+
+configure: deps
+	@cmake --preset $(PRESET)
+
+build: configure
+	@cmake --build $(BUILD) --parallel $(JOBS)
+
+demo: build
+	@mkdir -p $(BUILD)/demo
+	@$(BUILD)/bin/piko-render examples/raster/raster.piko.cpp --pipe $(PIPE) \
+	  $(BUNNY) --width 1024 --height 768 --out $(BUILD)/demo/bunny.png
+	@echo "rendered $(CURDIR)/$(BUILD)/demo/bunny.png"
+
+check: build
+	@ctest --test-dir $(BUILD) --output-on-failure --parallel $(JOBS)
+
+# Formatting, licence headers and paths (also part of `make check`), then
+# clang-tidy over the whole project.
+lint: build
+	@utils/lint.py all
+	@utils/lint.py tidy --build $(BUILD)
+
+format:
+	@utils/lint.py format --fix
+
+docs: configure
+	@cmake --build $(BUILD) --parallel $(JOBS) --target piko-docs
+
+clean:
+	@rm -rf build build-asan build-debug build-tsan

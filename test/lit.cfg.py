@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+"""lit's configuration for Piko.
+
+Tools are found by name: those of this build and LLVM's FileCheck, not and
+split-file. Substitutions:
+
+  %piko_include  folder of piko.h
+  %examples      folder of the example pipelines
+  %bunny         a mesh of 69,666 triangles that a Debian package installs
+  %python        the Python interpreter
+  %utils         folder of the developer scripts
+  %cxx_reference compiler and flags that build a pipeline file with the
+                 reference executor
+
+Features: `bunny` where that mesh is installed, `gpu` where an NVIDIA driver
+is, `asan` and `tsan` in builds with that sanitizer.
+"""
+
+import os
+
+import lit.formats
+
+config.name = "Piko"
+config.test_format = lit.formats.ShTest(execute_external=False)
+config.suffixes = [".mlir", ".cpp", ".test"]
+config.excludes = ["Inputs"]
+config.test_source_root = os.path.dirname(__file__)
+config.test_exec_root = os.path.join(config.piko_binary_root, "test")
+
+path = [config.piko_tools, config.llvm_tools, config.environment["PATH"]]
+config.environment["PATH"] = os.path.pathsep.join(path)
+for name in ("OMP_NUM_THREADS", "ASAN_OPTIONS", "TSAN_OPTIONS", "HOME"):
+    if name in os.environ:
+        config.environment[name] = os.environ[name]
+
+bunny = "/usr/share/glmark2/models/bunny.obj"
+include = os.path.join(config.piko_source_root, "runtime", "include")
+reference = [config.cxx, "-std=c++20", "-O1", "-ffp-contract=off", "-I", include]
+config.substitutions += [
+    ("%piko_include", include),
+    ("%examples", os.path.join(config.piko_source_root, "examples")),
+    ("%bunny", bunny),
+    ("%python", config.python),
+    ("%utils", os.path.join(config.piko_source_root, "utils")),
+    ("%docs", os.path.join(config.piko_source_root, "docs")),
+    ("%cxx_reference", " ".join(reference)),
+]
+
+if os.path.exists(bunny):
+    config.available_features.add("bunny")
+if os.path.exists("/dev/nvidiactl"):
+    config.available_features.add("gpu")
+if "address" in config.sanitize:
+    config.available_features.add("asan")
+if "thread" in config.sanitize:
+    config.available_features.add("tsan")

@@ -1,0 +1,147 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+"""Checks of the source tree; exit status 1 when one finds a fault.
+
+format    every C++ file is formatted as .clang-format says (--fix: make it so)
+licence   every source file has the licence line at its top
+paths     no file holds an absolute path of somebody's machine
+tidy      clang-tidy over the compile commands of a build (--build DIR)
+all       the first three
+"""
+
+import argparse
+import concurrent.futures
+import json
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+LLVM_BIN = "/usr/lib/llvm-22/bin"
+CXX = {".h", ".c", ".cpp", ".inc"}
+LICENSED = CXX | {".td", ".py", ".sh", ".cmake"}
+LICENSED_NAMES = {"CMakeLists.txt", "Makefile", "run"}
+LICENCE = "SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception"
+MACHINE_PATH = re.compile(r"(?<![\w.$}])/(home|root|work|Users|mnt|media)/\w")
+
+
+def tool(name):
+    found = shutil.which(f"{name}-22") or shutil.which(name, path=LLVM_BIN)
+    if not found:
+        sys.exit(f"lint: expected {name} 22, but it is not installed")
+    return found
+
+
+def sources():
+    """The files of the project: known to git, or new and not ignored."""
+    command = ["git", "ls-files", "-z", "-co", "--exclude-standard"]
+    try:
+        out = subprocess.run(
+            command, cwd=ROOT, check=True, capture_output=True
+        ).stdout
+        names = out.decode().split("\0")[:-1]
+    except (OSError, subprocess.CalledProcessError):  # a source archive
+        names = [
+            str(p.relative_to(ROOT))
+            for p in ROOT.rglob("*")
+            if not p.relative_to(ROOT).parts[0].startswith("build")
+        ]
+    return sorted({n for n in names if (ROOT / n).is_file()})
+
+
+def format(fix):
+    files = [f for f in sources() if pathlib.Path(f).suffix in CXX]
+    if not files:
+        return 0
+    mode = ["-i"] if fix else ["--dry-run", "-Werror"]
+    command = [tool("clang-format"), "--style=file", *mode, *files]
+    return subprocess.run(command, cwd=ROOT).returncode
+
+
+def licence():
+    faults = 0
+    for name in sources():
+        path = pathlib.Path(name)
+        if path.suffix not in LICENSED and path.name not in LICENSED_NAMES:
+            continue
+        with open(ROOT / name, errors="replace") as file:
+            top = [file.readline() for _ in range(3)]
+        if not any(LICENCE in line for line in top):
+            print(f"{name}:1: expected '{LICENCE}' in the first three lines")
+            faults += 1
+    return faults
+
+
+def paths():
+    faults = 0
+    for name in sources():
+        try:
+            text = (ROOT / name).read_text()
+        except UnicodeDecodeError:
+            continue
+        for number, line in enumerate(text.splitlines(), 1):
+            match = MACHINE_PATH.search(line)
+            if match and "MACHINE_PATH" not in line:
+                print(f"{name}:{number}: path of a machine: {match.group()}")
+                faults += 1
+    return faults
+
+
+def tidy(build):
+    database = pathlib.Path(build) / "compile_commands.json"
+    if not database.exists():
+        sys.exit(f"lint: expected {database}; configure the build first")
+    folders = [str(ROOT / f) + os.sep for f in ("lib", "tools", "runtime")]
+    files = sorted(
+        {
+            entry["file"]
+            for entry in json.loads(database.read_text())
+            if any(entry["file"].startswith(f) for f in folders)
+        }
+    )
+
+    def check(file):
+        command = [tool("clang-tidy"), "--quiet", "-p", str(build), file]
+        return file, subprocess.run(command, capture_output=True, text=True)
+
+    faults = 0
+    show = sys.stderr.isatty()
+    with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
+        for done, (file, result) in enumerate(pool.map(check, files), 1):
+            if show:
+                print(f"\r{done}/{len(files)}", end="", file=sys.stderr)
+            if result.returncode:
+                print(result.stdout, end="")
+                faults += 1
+    if show:
+        print(file=sys.stderr)
+    print(f"clang-tidy: {len(files)} files, {faults} with faults")
+    return faults
+
+
+def main():
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+    )
+    parser.add_argument(
+        "check", choices=["format", "licence", "paths", "tidy", "all"]
+    )
+    parser.add_argument("--fix", action="store_true")
+    parser.add_argument("--build", default="build")
+    args = parser.parse_args()
+    checks = {
+        "format": lambda: format(args.fix),
+        "licence": licence,
+        "paths": paths,
+        "tidy": lambda: tidy(args.build),
+    }
+    names = ["format", "licence", "paths"] if args.check == "all" else [args.check]
+    faults = [name for name in names if checks[name]()]
+    sys.exit(1 if faults else 0)
+
+
+if __name__ == "__main__":
+    main()
