@@ -10,7 +10,7 @@ include "Piko/Dialect/Piko/IR/PikoTypes.td"
 
 def Piko_KernelOp : Piko_Op<"kernel", [
     Symbol, NoTerminator, SingleBlock, NoRegionArguments, IsolatedFromAbove,
-    HasParent<"PipelineOp">]> {
+    AutomaticAllocationScope, HasParent<"PipelineOp">]> {
   let summary = "phases that run together";
   let description = [{
     Kernels run one after another, in the order in which they stand in the

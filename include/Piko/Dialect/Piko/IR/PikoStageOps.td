@@ -71,10 +71,11 @@ def Piko_StageOp : Piko_Op<"stage", [
 
 class Piko_PhaseOp<string mnemonic, list<Trait> traits = []>
     : Piko_Op<mnemonic, !listconcat(traits, [
-        IsolatedFromAbove, ParentOneOf<["StageOp", "KernelOp"]>,
+        AutomaticAllocationScope, IsolatedFromAbove,
+        ParentOneOf<["StageOp", "KernelOp"]>,
         SingleBlockImplicitTerminator<"ReturnOp">])>;
 
-def Piko_AssignOp : Piko_PhaseOp<"assign", [RecursiveMemoryEffects]> {
+def Piko_AssignOp : Piko_PhaseOp<"assign"> {
   let summary = "the AssignBin phase";
   let description = [{
     Says which bins a primitive belongs to. The bins are a set: a bin that is
@@ -114,7 +115,7 @@ def Piko_AssignOp : Piko_PhaseOp<"assign", [RecursiveMemoryEffects]> {
   let hasRegionVerifier = 1;
 }
 
-def Piko_ProcessOp : Piko_PhaseOp<"process", [RecursiveMemoryEffects]> {
+def Piko_ProcessOp : Piko_PhaseOp<"process"> {
   let summary = "the Process phase";
   let description = [{
     Says what is computed for a primitive and what is emitted. Calls are

@@ -80,7 +80,7 @@ def Piko_ExtentOp : Piko_Op<"extent", [
 }
 
 def Piko_UpdateOp : Piko_Op<"update", [
-    RecursiveMemoryEffects, SingleBlock, AttrSizedOperandSegments,
+    SingleBlock, AttrSizedOperandSegments,
     DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
   let summary = "changes a pixel of the primitive's own bin";
   let description = [{

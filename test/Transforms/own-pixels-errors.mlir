@@ -1,0 +1,50 @@
+// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-own-pixels))' --split-input-file --verify-diagnostics %s
+
+piko.record @F {"x" : i32 at 0, "y" : i32 at 4} size 8 align 4
+piko.pipeline @TwoPixels rank 2 {
+  piko.image @depth : @F rank 2
+  piko.source @test
+  piko.stage @test bins [0, 0] threads 64 : @F -> [] {
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      %x = piko.get %f "x" : !piko.prim<@F> -> i32
+      %y = piko.get %f "y" : !piko.prim<@F> -> i32
+      // expected-remark @below {{stage 'test' runs each bin on one thread}}
+      piko.update @depth[%x, %y : i32, i32] {
+      ^bb0(%a: i32, %b: i32):
+        piko.yield [%b, %a : i32, i32]
+      }
+      // expected-note @below {{this update may be at another pixel}}
+      piko.update @depth[%y, %x : i32, i32] {
+      ^bb0(%a: i32, %b: i32):
+        piko.yield [%b, %a : i32, i32]
+      }
+      piko.return
+    }
+  }
+}
+
+// -----
+
+piko.record @F {"x" : i32 at 0, "y" : i32 at 4} size 8 align 4
+piko.pipeline @MovingPixel rank 2 {
+  piko.image @depth : @F rank 2
+  piko.source @test
+  piko.stage @test bins [0, 0] threads 64 : @F -> [] {
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      %zero = arith.constant 0 : index
+      %one = arith.constant 1 : index
+      %four = arith.constant 4 : index
+      // expected-note @below {{the pixel depends on this, not only on the primitive's fields and on constants}}
+      scf.for %i = %zero to %four step %one {
+        // expected-remark @below {{stage 'test' runs each bin on one thread}}
+        piko.update @depth[%i, %i : index, index] {
+        ^bb0(%a: i32, %b: i32):
+          piko.yield [%b, %a : i32, i32]
+        }
+      }
+      piko.return
+    }
+  }
+}

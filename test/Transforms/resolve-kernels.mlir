@@ -1,0 +1,93 @@
+// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-form-kernels,piko-resolve-kernels),canonicalize,cse)' %s | FileCheck %s
+
+piko.record @F {"x" : i32 at 0, "y" : i32 at 4} size 8 align 4
+
+// Units of work, their cells, the primitives of a cell; emissions are stored,
+// placed by the consumer's assign phase, and come before the lineage boundary.
+// CHECK-LABEL: piko.pipeline @P
+// CHECK:         piko.stage @a {{.*}} split :
+// CHECK:         piko.stage @b {{.*}} placed :
+// CHECK:         piko.kernel @kernel_a
+// CHECK:           %[[BINS:.*]] = piko.open_bins @a : !piko.bins<@F>
+// CHECK:           %[[UNITS:.*]] = piko.unit_count %[[BINS]]
+// CHECK:           scf.forall (%[[UNIT:.*]]) in (%[[UNITS]])
+// CHECK:             %[[W:.*]] = piko.open_writer %[[BINS]][%[[UNIT]]]
+// CHECK:             %[[C0:.*]], %[[C1:.*]] = piko.unit_cells %[[BINS]][%[[UNIT]]]
+// CHECK:             scf.for %[[CELL:.*]] = %[[C0]] to %[[C1]]
+// CHECK:               %[[LO:.*]], %[[HI:.*]] = piko.cell_range %[[BINS]][%[[UNIT]], %[[CELL]]]
+// CHECK:               scf.for %[[I:.*]] = %[[LO]] to %[[HI]]
+// CHECK:                 %[[P:.*]] = piko.item %[[BINS]][%[[I]]]
+// CHECK:                 %[[X:.*]] = piko.get %[[P]] "x"
+// CHECK:                 %[[Y:.*]] = piko.get %[[P]] "y"
+// CHECK:                 piko.append %[[W]][0] (%[[Y]], %[[X]])
+// The bin of cell (y, x): the consumer's assign phase sees what was emitted.
+// CHECK:                 %[[YI:.*]] = arith.index_cast %[[Y]]
+// CHECK:                 arith.cmpi ult, %[[YI]]
+// CHECK:                 piko.place %[[W]][0] of @b in
+// CHECK:                 piko.next %[[W]]
+// CHECK:               } {piko.lanes}
+// CHECK:             piko.close_writer %[[W]]
+// CHECK:           {piko.schedule = "load_balance"}
+// CHECK:           piko.close_bins %[[BINS]]
+// CHECK:         piko.kernel @kernel_b
+// CHECK:           %[[BIN:.*]] = piko.cell_bin
+// CHECK:           piko.update @image{{.*}} in %[[BIN]]
+piko.pipeline @P rank 2 {
+  piko.image @image : @F rank 2
+  piko.source @a
+  piko.edge @a[0] -> @b
+  piko.stage @a bins [0, 0] threads 1 : @F -> [@F] {
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      %x = piko.get %f "x" : !piko.prim<@F> -> i32
+      %y = piko.get %f "y" : !piko.prim<@F> -> i32
+      piko.emit 0 (%y, %x) : i32, i32
+      piko.return
+    }
+  }
+  piko.stage @b bins [8, 8] threads 1 : @F -> [] {
+    piko.assign {
+    ^bb0(%f: !piko.prim<@F>):
+      %x = piko.get %f "x" : !piko.prim<@F> -> i32
+      %y = piko.get %f "y" : !piko.prim<@F> -> i32
+      %bin = piko.bin_at %x, %y : i32, i32
+      piko.assign_to %bin
+      piko.return
+    }
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      %x = piko.get %f "x" : !piko.prim<@F> -> i32
+      %y = piko.get %f "y" : !piko.prim<@F> -> i32
+      piko.update @image[%x, %y : i32, i32] {
+      ^bb0(%a: i32, %b: i32):
+        piko.yield [%b, %a : i32, i32]
+      }
+      piko.return
+    }
+  }
+}
+
+// A box becomes loops over the grid, x innermost, so that bins come ascending.
+// CHECK-LABEL: piko.pipeline @Box
+// CHECK:         piko.kernel @source_0_a
+// CHECK:           piko.item
+// CHECK:           scf.for %[[BY:.*]] =
+// CHECK:             scf.for %[[BX:.*]] =
+// CHECK:               arith.addi {{.*}}%[[BX]]
+// CHECK:               piko.place %{{.*}} of @a in
+piko.pipeline @Box rank 2 {
+  piko.source @a
+  piko.stage @a bins [8, 8] threads 1 : @F -> [] {
+    piko.assign {
+    ^bb0(%f: !piko.prim<@F>):
+      %x = piko.get %f "x" : !piko.prim<@F> -> i32
+      %y = piko.get %f "y" : !piko.prim<@F> -> i32
+      piko.assign_box [%x, %x : i32, i32] to [%y, %y : i32, i32]
+      piko.return
+    }
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      piko.return
+    }
+  }
+}
