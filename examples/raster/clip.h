@@ -73,8 +73,8 @@ inline bool isOutOfView(glm::vec4 a, glm::vec4 b, glm::vec4 c) {
 
 /// Where the edge from a corner inside to one outside meets a plane; the
 /// arguments are their distances.
-inline ClipCorner cut(const ClipCorner &in, const ClipCorner &out,
-                      float inside, float outside) {
+inline ClipCorner cut(const ClipCorner &in, const ClipCorner &out, float inside,
+                      float outside) {
   float t = inside / (inside - outside);
   return {in.position + (out.position - in.position) * t,
           in.weight + (out.weight - in.weight) * t};

@@ -79,8 +79,9 @@ struct PixelBox {
 /// The pixels whose centres lie between the corners lo and hi.
 inline PixelBox pixelsBetween(Point lo, Point hi) {
   constexpr int32_t half = subpixels / 2;
-  return {{(lo.x + half - 1) >> subpixelBits, (lo.y + half - 1) >> subpixelBits},
-          {(hi.x - half) >> subpixelBits, (hi.y - half) >> subpixelBits}};
+  return {
+      {(lo.x + half - 1) >> subpixelBits, (lo.y + half - 1) >> subpixelBits},
+      {(hi.x - half) >> subpixelBits, (hi.y - half) >> subpixelBits}};
 }
 
 } // namespace raster

@@ -3,7 +3,8 @@
 //
 //   vertices ---> Vertex Shader - - - - - - (shaded vertices)
 //                                                  :
-//   triangles --> Rasterizer ---> Fragment Shader ---> Depth Test ---> Composite
+//   triangles --> Rasterizer ---> Fragment Shader ---> Depth Test --->
+//   Composite
 //
 // Two pipelines share the stages: `Baseline`, where every bin is the whole
 // screen, and `Binned`, with bins of 8 x 8 pixels from the Rasterizer on.
@@ -91,10 +92,11 @@ struct Rasterizer : piko::Stage<Bin, Bin, 64, Triangle, Fragment>,
     const ShadedVertex &c = state().vertices[t.vertex.z];
     project(t).rasterize(this->binLo(), this->binHi(), [&](const Sample &s) {
       glm::vec3 w = s.weight;
-      this->emit(Fragment{s.pixel, s.depth,
-                          a.position * w.x + b.position * w.y + c.position * w.z,
-                          a.normal * w.x + b.normal * w.y + c.normal * w.z},
-                 0);
+      this->emit(
+          Fragment{s.pixel, s.depth,
+                   a.position * w.x + b.position * w.y + c.position * w.z,
+                   a.normal * w.x + b.normal * w.y + c.normal * w.z},
+          0);
     });
   }
 
