@@ -1,0 +1,165 @@
+//===- Binding.cpp - A scene into a pipeline that is not known ------------===//
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+#include "Piko/Driver/Scene/Binding.h"
+
+#include <cstring>
+
+using namespace piko;
+using namespace piko::render;
+
+namespace {
+
+/// What a scene has for one type.
+struct Supply {
+  void *data;
+  int64_t count, size;
+};
+
+/// Binds one pipeline.
+class Binder {
+public:
+  Binder(pikort_pipeline *pipeline, SceneInput &scene)
+      : pipeline(pipeline), scene(scene) {}
+
+  Result<std::string> bind() {
+    for (int32_t i = 0; i < pikort_state_count(pipeline); ++i) {
+      pikort_state_info state;
+      if (pikort_get_state_info(pipeline, i, &state) != PIKORT_OK)
+        return lastError();
+      if (auto ok = bindState(state); !ok)
+        return ok.error();
+    }
+    for (int32_t i = 0; i < pikort_source_count(pipeline); ++i)
+      if (auto ok = bindSource(i); !ok)
+        return ok.error();
+    if (output.empty())
+      return fail("expected an image of 'piko::scene::Color' for the result, "
+                  "but it has none");
+    return output;
+  }
+
+private:
+  Error fail(const std::string &message) const {
+    return {"pipeline '" + std::string(pikort_name(pipeline)) +
+            "': " + message};
+  }
+  Error lastError() const { return fail(pikort_message(pipeline)); }
+
+  static std::string unsuitable(const std::string &what,
+                                const std::string &type,
+                                const std::string &expected) {
+    return what + ": expected " + expected + ", but got '" + type + "'";
+  }
+
+  Result<pikort_record_info> recordOf(int32_t index) {
+    pikort_record_info record;
+    if (pikort_get_record(pipeline, index, &record) != PIKORT_OK)
+      return lastError();
+    return record;
+  }
+
+  /// The constants of a scene; no data for other types.
+  Supply constantFor(const char *type) {
+    if (!std::strcmp(type, "piko::scene::Camera"))
+      return {&scene.camera, 1, sizeof(scene::Camera)};
+    if (!std::strcmp(type, "piko::scene::Settings"))
+      return {&scene.settings, 1, sizeof(scene::Settings)};
+    return {};
+  }
+  Supply lightsFor(const char *type) {
+    if (!std::strcmp(type, "piko::scene::Light"))
+      return {scene.lights.data(), int64_t(scene.lights.size()),
+              sizeof(scene::Light)};
+    return {};
+  }
+  Supply meshFor(const char *type) {
+    if (!std::strcmp(type, "piko::scene::Vertex"))
+      return {scene.mesh.vertices.data(), int64_t(scene.mesh.vertices.size()),
+              sizeof(scene::Vertex)};
+    if (!std::strcmp(type, "piko::scene::Triangle"))
+      return {scene.mesh.triangles.data(), int64_t(scene.mesh.triangles.size()),
+              sizeof(scene::Triangle)};
+    return {};
+  }
+
+  Result<Done> bindState(const pikort_state_info &state) {
+    auto record = recordOf(state.record);
+    if (!record)
+      return record.error();
+    if (state.kind == PIKORT_IMAGE)
+      return noteImage(state, *record);
+    if (state.kind == PIKORT_CONSTANT)
+      return bindConstant(state, *record);
+    if (state.per_source >= 0)
+      return Done{};
+    Supply supply = lightsFor(record->name);
+    if (!supply.size)
+      supply = meshFor(record->name);
+    if (!supply.size)
+      return fail(unsuitable("buffer '" + std::string(state.name) + "'",
+                             record->name,
+                             "elements of 'piko::scene::Light', '...::Vertex' "
+                             "or '...::Triangle'"));
+    if (pikort_bind_buffer(pipeline, state.name, supply.data, supply.count,
+                           supply.size) != PIKORT_OK)
+      return lastError();
+    return Done{};
+  }
+
+  Result<Done> bindConstant(const pikort_state_info &state,
+                            const pikort_record_info &record) {
+    Supply supply = constantFor(record.name);
+    if (!supply.size)
+      return fail(unsuitable("constant '" + std::string(state.name) + "'",
+                             record.name,
+                             "'piko::scene::Camera' or '...::Settings'"));
+    if (pikort_bind_constant(pipeline, state.name, supply.data, supply.size) !=
+        PIKORT_OK)
+      return lastError();
+    return Done{};
+  }
+
+  Result<Done> noteImage(const pikort_state_info &state,
+                         const pikort_record_info &record) {
+    if (std::strcmp(record.name, "piko::scene::Color"))
+      return Done{};
+    if (!output.empty())
+      return fail("expected one image of 'piko::scene::Color' for the result, "
+                  "but got '" +
+                  output + "' and '" + state.name + "'");
+    if (state.rank != 2)
+      return fail("image '" + std::string(state.name) +
+                  "': expected 2 dimensions, but got " +
+                  std::to_string(state.rank));
+    output = state.name;
+    return Done{};
+  }
+
+  Result<Done> bindSource(int32_t index) {
+    pikort_source_info source;
+    if (pikort_get_source_info(pipeline, index, &source) != PIKORT_OK)
+      return lastError();
+    auto record = recordOf(source.record);
+    if (!record)
+      return record.error();
+    Supply supply = meshFor(record->name);
+    if (!supply.size)
+      return fail(unsuitable("source " + std::to_string(index), record->name,
+                             "'piko::scene::Vertex' or '...::Triangle'"));
+    if (pikort_bind_source(pipeline, index, supply.data, supply.count,
+                           supply.size) != PIKORT_OK)
+      return lastError();
+    return Done{};
+  }
+
+  pikort_pipeline *pipeline;
+  SceneInput &scene;
+  std::string output;
+};
+
+} // namespace
+
+Result<std::string> render::bindScene(pikort_pipeline *pipeline,
+                                      SceneInput &scene) {
+  return Binder(pipeline, scene).bind();
+}
