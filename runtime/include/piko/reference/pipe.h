@@ -6,6 +6,8 @@
 #include <piko/reference/check.h>
 #include <piko/reference/stage.h>
 
+#include <span>
+
 namespace piko {
 namespace reference {
 
@@ -104,7 +106,10 @@ public:
   /// stage.
   template <class S, class Range>
     requires requires(const Range &range) { std::data(range); }
-  void feed(const S &stage, const Range &primitives) {
+  void feed(const S &stage, Range &&primitives) {
+    static_assert(std::is_lvalue_reference_v<Range> ||
+                      std::ranges::enable_borrowed_range<Range>,
+                  "feed does not copy; the primitives must outlive the run");
     int found = -1;
     for (size_t i = 0; i < sources.size(); ++i)
       if (sources[i].node->address == &stage) {

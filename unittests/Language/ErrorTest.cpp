@@ -1,0 +1,215 @@
+//===- ErrorTest.cpp - Pipelines and hosts that break a rule --------------===//
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+#include "Trace.h"
+
+#include <span>
+
+namespace {
+
+struct Two : Whole<int, int, int> {
+  void process(const int &i) { emit(i, 7); }
+};
+struct Floats : Whole<float> {
+  void process(const float &) {}
+};
+
+/// A pipeline that the test wires.
+struct OpenPipe : piko::Pipe<> {
+  Two two;
+  Sink a, b;
+  Floats floats;
+  using piko::Pipe<>::connect;
+  using piko::Pipe<>::source;
+  OpenPipe() { setDomain({2, 2}); }
+};
+
+TEST(Errors, UnconnectedPort) {
+  OpenPipe pipe;
+  pipe.source(pipe.two);
+  pipe.connect(pipe.two, 0, pipe.a);
+  EXPECT_THAT(messageOf([&] { pipe.run(); }),
+              testing::MatchesRegex("stage '.*Two': port 1 is not connected"));
+}
+
+TEST(Errors, PortConnectedTwice) {
+  OpenPipe pipe;
+  pipe.source(pipe.two);
+  pipe.connect(pipe.two, 0, pipe.a);
+  pipe.connect(pipe.two, 1, pipe.b);
+  pipe.connect(pipe.two, 0, pipe.b);
+  EXPECT_THAT(messageOf([&] { pipe.run(); }),
+              HasSubstr("Two': port 0 is connected twice, to stage '"));
+}
+
+TEST(Errors, MismatchedTypesOnAnEdge) {
+  OpenPipe pipe;
+  pipe.source(pipe.two);
+  pipe.connect(pipe.two, 0, pipe.a);
+  pipe.connect(pipe.two, 1, pipe.floats);
+  EXPECT_THAT(messageOf([&] { pipe.run(); }),
+              testing::MatchesRegex("stage '.*Two': port 1 has type 'int', but "
+                                    "stage '.*Floats' takes 'float'"));
+}
+
+TEST(Errors, PortOutOfRange) {
+  OpenPipe pipe;
+  EXPECT_THAT(messageOf([&] { pipe.connect(pipe.two, 2, pipe.a); }),
+              HasSubstr("Two': expected a port below 2, but got 2"));
+  pipe.source(pipe.two);
+  pipe.connect(pipe.two, 0, pipe.a);
+  pipe.connect(pipe.two, 1, pipe.b);
+  EXPECT_THAT(messageOf([&] { run(pipe, {1}); }),
+              HasSubstr("Two', bin 0: expected a port below 2, but got 7"));
+}
+
+struct WrongPort : Whole<int, int, float> {
+  void process(const int &i) { emit(i, 1); }
+};
+
+TEST(Errors, EmissionOfAnotherTypeThanItsPort) {
+  struct WrongPipe : piko::Pipe<> {
+    WrongPort wrong;
+    Sink sink;
+    Floats floats;
+    WrongPipe() {
+      source(wrong);
+      connect(wrong, 0, sink);
+      connect(wrong, 1, floats);
+      setDomain({1, 1});
+    }
+  } pipe;
+  EXPECT_THAT(messageOf([&] { run(pipe, {1}); }),
+              HasSubstr("bin 0: expected a primitive of type 'float' for port "
+                        "1, but got 'int'"));
+}
+
+TEST(Errors, Domain) {
+  struct NoDomain : piko::Pipe<> {
+    Sink sink;
+    NoDomain() { source(sink); }
+  } pipe;
+  EXPECT_THAT(messageOf([&] { pipe.run(); }), HasSubstr("has no domain"));
+  EXPECT_THAT(messageOf([&] { pipe.setDomain({4, 0}); }),
+              HasSubstr("but got 0"));
+  EXPECT_THAT(messageOf([&] { pipe.setDomain({1, 1, 1, 1, 1}); }),
+              HasSubstr("expected a domain of 1 to 4 dimensions, but got 5"));
+  pipe.setDomain({4, 4, 4});
+  EXPECT_THAT(messageOf([&] { pipe.run(); }),
+              HasSubstr("Sink': expected bins of 3 dimensions as the domain "
+                        "has, but got 2"));
+}
+
+TEST(Errors, Feed) {
+  OpenPipe pipe;
+  pipe.source(pipe.a);
+  std::vector<float> floats{1};
+  EXPECT_THAT(messageOf([&] { pipe.feed(0, floats.data(), 1); }),
+              HasSubstr("expected primitives of type 'int' for source 0, but "
+                        "got 'float'"));
+  EXPECT_THAT(messageOf([&] { pipe.feed(1, floats.data(), 1); }),
+              HasSubstr("expected a source below 1, but got 1"));
+  EXPECT_THAT(messageOf([&] { pipe.feed(pipe.b, floats); }),
+              HasSubstr("has no source"));
+  pipe.source(pipe.a);
+  EXPECT_THAT(messageOf([&] { pipe.feed(pipe.a, std::span<const int>()); }),
+              HasSubstr("has several sources"));
+}
+
+// Bytes without a type, as generated code feeds them.
+TEST(Errors, FeedOfBytesIsNotChecked) {
+  OpenPipe pipe;
+  pipe.source(pipe.a);
+  int values[] = {4, 5};
+  trace.clear();
+  pipe.feed(0, static_cast<const void *>(values), 2);
+  pipe.run();
+  EXPECT_THAT(trace, ElementsAre(4, 5));
+}
+
+struct Confused : Whole<int, int> {
+  void assignBin(const int &i) {
+    if (i == 1)
+      emit(i);
+    if (i == 2)
+      bin();
+    assignToBin(i, {0});
+  }
+  void process(const int &i) {
+    if (i == 3)
+      assignToBin(i, {0});
+    if (i == 4)
+      endBin();
+  }
+};
+
+TEST(Errors, PhasesThatSayWhatIsNotTheirs) {
+  struct ConfusedPipe : piko::Pipe<> {
+    Confused confused;
+    Sink sink;
+    ConfusedPipe() {
+      source(confused);
+      connect(confused, 0, sink);
+      setDomain({1, 1});
+    }
+  } pipe;
+  EXPECT_THAT(messageOf([&] { run(pipe, {1}); }),
+              HasSubstr("emit is for process, but is used in assignBin"));
+  EXPECT_THAT(messageOf([&] { run(pipe, {2}); }),
+              HasSubstr("bin in assignBin"));
+  EXPECT_THAT(messageOf([&] { run(pipe, {3}); }),
+              HasSubstr("is for assignBin, but is used in process"));
+  EXPECT_THAT(messageOf([&] { run(pipe, {4}); }),
+              HasSubstr("endBin is for schedule, but is used in process"));
+  EXPECT_THAT(messageOf([&] { pipe.confused.emit(1); }),
+              "emit outside a running pipeline");
+}
+
+TEST(Errors, ListDirectivesNeedAList) {
+  struct Single : Whole<int> {
+    void schedule(piko::BinId) { batch(4); }
+    void process(const int &) {}
+  };
+  struct SinglePipe : piko::Pipe<> {
+    Single single;
+    SinglePipe() {
+      source(single);
+      setDomain({1, 1});
+    }
+  } pipe;
+  EXPECT_THAT(messageOf([&] { run(pipe, {1}); }),
+              HasSubstr("batch needs a process that takes a list"));
+}
+
+TEST(Errors, ListIndexOutOfRange) {
+  struct Past : Whole<int> {
+    void process(const piko::List<int> &list) { list[1]; }
+  };
+  struct PastPipe : piko::Pipe<> {
+    Past past;
+    PastPipe() {
+      source(past);
+      setDomain({1, 1});
+    }
+  } pipe;
+  EXPECT_THAT(messageOf([&] { run(pipe, {1}); }),
+              HasSubstr("Past', bin 0: expected a list index in [0, 1), but "
+                        "got 1"));
+}
+
+TEST(Errors, AllocateForAMissingSource) {
+  struct State {
+    piko::Buffer<int> buffer;
+  };
+  struct MissingPipe : piko::Pipe<State> {
+    Sink sink;
+    MissingPipe() {
+      source(sink);
+      allocateForSource(state().buffer, 1);
+      setDomain({1, 1});
+    }
+  } pipe;
+  EXPECT_THAT(messageOf([&] { pipe.run(); }),
+              HasSubstr("allocateForSource: expected a source below 1"));
+}
+
+} // namespace
