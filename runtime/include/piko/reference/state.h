@@ -144,11 +144,13 @@ public:
   /// The pixels, row-major, x fastest; for a host to change between runs, too.
   T *data() const { return pixels.get(); }
 
-  /// Sizes and clears the image.
+  /// Sizes and clears the image; its memory stays where its size does.
   void prepare(const reference::Cell &domain) override {
+    int64_t before = size();
     for (int d = 0; d < Rank; ++d)
       cells[d] = domain[d];
-    pixels.reset(new T[size()]);
+    if (size() != before)
+      pixels.reset(new T[size()]);
     std::fill_n(pixels.get(), size(), T{});
   }
 
