@@ -48,10 +48,12 @@ bool JITProgram::findFunctions(llvm::StringRef pipeline, std::string &error) {
     program = *(*entry)();
     return true;
   }
-  auto setup = code->lookup<void(pikort_pipeline *)>((pipeline + ".setup").str());
+  auto setup =
+      code->lookup<void(pikort_pipeline *)>((pipeline + ".setup").str());
   if (!setup)
     return fail(setup.takeError());
-  auto run = code->lookup<int32_t(pikort_pipeline *)>((pipeline + ".run").str());
+  auto run =
+      code->lookup<int32_t(pikort_pipeline *)>((pipeline + ".run").str());
   if (!run)
     return fail(run.takeError());
   name = pipeline.str();
@@ -105,9 +107,9 @@ compileReference(const CompileOptions &options, MLIRContext &context,
                         frontend, llvmContext, context);
 }
 
-std::unique_ptr<LoadedProgram>
-piko::loadPipeline(const std::string &file, const LoadOptions &options,
-                   std::string &diagnostics) {
+std::unique_ptr<LoadedProgram> piko::loadPipeline(const std::string &file,
+                                                  const LoadOptions &options,
+                                                  std::string &diagnostics) {
   auto start = std::chrono::steady_clock::now();
   DialectRegistry registry;
   registerPikoDialects(registry);

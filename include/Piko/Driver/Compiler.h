@@ -5,10 +5,10 @@
 #ifndef PIKO_DRIVER_COMPILER_H
 #define PIKO_DRIVER_COMPILER_H
 
+#include "Piko/Driver/Registration.h"
 #include "Piko/Frontend/Frontend.h"
 
 #include "mlir/IR/BuiltinOps.h"
-#include "mlir/IR/DialectRegistry.h"
 #include "mlir/IR/OwningOpRef.h"
 
 #include <string>
@@ -36,15 +36,13 @@ struct CompileOptions {
 /// The same, for the C++ front end.
 FrontendOptions getFrontendOptions(const CompileOptions &options);
 
-/// All dialects that a pipeline meets on its way, and what takes them to LLVM.
-void registerPikoDialects(mlir::DialectRegistry &registry);
-
 /// Reads the file: a module at the authored level that holds one pipeline, or
 /// null after diagnostics in the context's engine.
 mlir::OwningOpRef<mlir::ModuleOp> readPipeline(const CompileOptions &options,
                                                mlir::MLIRContext &context);
 
-/// The names of the pipelines in a file, in the order in which they stand there.
+/// The names of the pipelines in a file, in the order in which they stand
+/// there.
 llvm::FailureOr<std::vector<std::string>>
 readPipelineNames(const CompileOptions &options, mlir::MLIRContext &context);
 

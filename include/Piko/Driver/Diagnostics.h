@@ -10,9 +10,9 @@
 
 namespace piko {
 
-/// Prints the diagnostics of a context while it lives, as Clang does: file, line
-/// and column, the message, the line of text with a mark, notes below. Remarks
-/// are printed only if asked for.
+/// Prints the diagnostics of a context while it lives, as Clang does: file,
+/// line and column, the message, the line of text with a mark, notes below.
+/// Remarks are printed only if asked for.
 class DiagnosticPrinter : mlir::SourceMgrDiagnosticHandler {
 public:
   DiagnosticPrinter(mlir::MLIRContext &context, llvm::raw_ostream &stream,

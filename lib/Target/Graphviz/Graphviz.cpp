@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Pipelines drawn as graphs. The stages of a pipeline are nodes at every level;
+// once kernels are formed, their phases are, inside a box for each kernel, and
+// an edge of the pipeline runs from a process phase to the assign phase that
+// takes its port, or to the next process phase where there is none.
+
+#include "Piko/Target/Graphviz.h"
+
+#include "Piko/Dialect/Piko/IR/Piko.h"
+#include "Piko/Driver/Registration.h"
+
+#include "mlir/Tools/mlir-translate/Translation.h"
+#include "llvm/ADT/StringExtras.h"
+#include "llvm/ADT/StringSet.h"
+
+using namespace mlir;
+using namespace piko;
+
+namespace {
+
+class DotWriter {
+public:
+  DotWriter(PipelineOp pipeline, raw_ostream &stream)
+      : pipeline(pipeline), stream(stream) {}
+  void write();
+
+private:
+  void writeStage(StageOp stage);
+  void writeKernel(KernelOp kernel);
+  void writeSource(SourceOp source, int64_t number);
+  void writeEdge(EdgeOp edge);
+  void writeDrain(StageOp stage);
+  /// The node of a stage's process phase.
+  std::string processNode(StringRef stage);
+  /// The nodes of assign phases that take a port of a stage on its way to a
+  /// consumer: `from` is "producer.port", or "source.number".
+  std::string assignNode(StringRef stage, StringRef from);
+  bool hasAssignPhase(StringRef stage, StringRef from);
+
+  PipelineOp pipeline;
+  raw_ostream &stream;
+  llvm::StringSet<> assignNodes;
+  bool kernels = false;
+};
+
+} // namespace
+
+/// Text in Graphviz's quotes; `\n` stays a line break.
+static std::string quote(const Twine &text) {
+  std::string result = "\"";
+  for (char c : text.str()) {
+    if (c == '"')
+      result += '\\';
+    if (c == '\n')
+      result += "\\n";
+    else
+      result += c;
+  }
+  return result + "\"";
+}
+
+std::string DotWriter::processNode(StringRef stage) {
+  return quote("process " + stage);
+}
+
+std::string DotWriter::assignNode(StringRef stage, StringRef from) {
+  return quote("assign " + stage + " " + from);
+}
+
+bool DotWriter::hasAssignPhase(StringRef stage, StringRef from) {
+  return assignNodes.contains(assignNode(stage, from));
+}
+
+static std::string describeBins(StageOp stage) {
+  std::string text = "bins ";
+  llvm::raw_string_ostream out(text);
+  if (stage.isWholeDomain())
+    out << "whole domain";
+  else
+    llvm::interleave(
+        stage.getBins(), out,
+        [&](int64_t size) {
+          if (size)
+            out << size;
+          else
+            out << "all";
+        },
+        "x");
+  out << ", " << stage.getThreads() << " threads";
+  if (ScheduleOp schedule = stage.getSchedule())
+    out << "\n" << stringifyScheduleKind(schedule.getKind());
+  return text;
+}
+
+void DotWriter::writeStage(StageOp stage) {
+  stream << "  " << processNode(stage.getSymName())
+         << " [label=" << quote(stage.getSymName() + "\n" + describeBins(stage))
+         << "];\n";
+}
+
+void DotWriter::writeKernel(KernelOp kernel) {
+  stream << "  subgraph " << quote("cluster_" + kernel.getSymName())
+         << " {\n    label=" << quote(kernel.getSymName()) << ";\n";
+  std::string producer;
+  for (Operation &op : *kernel.getBodyBlock()) {
+    if (auto process = dyn_cast<ProcessOp>(op)) {
+      producer = process.getStage().value_or("").str();
+      auto stage = lookupInPipeline<StageOp>(kernel, process.getStageAttr());
+      stream << "    " << processNode(producer) << " [label="
+             << quote("process " + producer + "\n" +
+                      (stage ? describeBins(stage) : ""))
+             << "];\n";
+    }
+    if (auto assign = dyn_cast<AssignOp>(op)) {
+      std::string from =
+          assign.getSource()
+              ? "source." + std::to_string(*assign.getSource())
+              : producer + "." + std::to_string(assign.getPort().value_or(0));
+      StringRef stage = assign.getStage().value_or("");
+      std::string node = assignNode(stage, from);
+      assignNodes.insert(node);
+      stream << "    " << node << " [label=" << quote("assign " + stage)
+             << "];\n";
+    }
+  }
+  stream << "  }\n";
+}
+
+void DotWriter::writeSource(SourceOp source, int64_t number) {
+  StringRef stage = source.getStage();
+  std::string from = "source." + std::to_string(number);
+  std::string node = quote(from);
+  auto consumer = lookupInPipeline<StageOp>(source, source.getStageAttr());
+  std::string label = quote(consumer ? consumer.getInput() : "");
+  stream << "  " << node << " [label=" << quote("source " + Twine(number))
+         << ", shape=invhouse];\n  " << node << " -> ";
+  if (hasAssignPhase(stage, from))
+    stream << assignNode(stage, from) << " [label=" << label << "];\n  "
+           << assignNode(stage, from) << " -> ";
+  stream << processNode(stage) << " [label=" << label << "];\n";
+}
+
+void DotWriter::writeEdge(EdgeOp edge) {
+  auto producer = lookupInPipeline<StageOp>(edge, edge.getProducerAttr());
+  std::string label = "port " + std::to_string(edge.getPort());
+  if (producer && edge.getPort() < int64_t(producer.getOutputs().size()))
+    label +=
+        ": " + cast<FlatSymbolRefAttr>(producer.getOutputs()[edge.getPort()])
+                   .getValue()
+                   .str();
+  std::string from = (edge.getProducer() + "." + Twine(edge.getPort())).str();
+  stream << "  " << processNode(edge.getProducer()) << " -> ";
+  if (hasAssignPhase(edge.getConsumer(), from))
+    stream << assignNode(edge.getConsumer(), from) << " [label=" << quote(label)
+           << "];\n  " << assignNode(edge.getConsumer(), from) << " -> "
+           << processNode(edge.getConsumer()) << ";\n";
+  else
+    stream << processNode(edge.getConsumer()) << " [label=" << quote(label)
+           << "];\n";
+}
+
+void DotWriter::writeDrain(StageOp stage) {
+  std::string node = quote("drain " + stage.getSymName());
+  stream << "  " << node << " [label=\"drain\", shape=house];\n  "
+         << processNode(stage.getSymName()) << " -> " << node
+         << " [style=dashed];\n";
+}
+
+void DotWriter::write() {
+  stream << "digraph " << quote(pipeline.getSymName())
+         << " {\n  node [shape=box];\n";
+  kernels = !pipeline.getOps<KernelOp>().empty();
+  for (auto kernel : pipeline.getOps<KernelOp>())
+    writeKernel(kernel);
+  if (!kernels)
+    for (auto stage : pipeline.getOps<StageOp>())
+      writeStage(stage);
+  int64_t number = 0;
+  for (auto source : pipeline.getOps<SourceOp>())
+    writeSource(source, number++);
+  for (auto edge : pipeline.getOps<EdgeOp>())
+    writeEdge(edge);
+  for (auto stage : pipeline.getOps<StageOp>())
+    if (stage.getOutputs().empty())
+      writeDrain(stage);
+  stream << "}\n";
+}
+
+/// At the resolved level kernels hold loops, and no phase that could be drawn.
+static LogicalResult checkLevel(PipelineOp pipeline) {
+  for (auto kernel : pipeline.getOps<KernelOp>())
+    if (kernel.getBodyBlock()->getOps<ProcessOp>().empty() &&
+        kernel.getBodyBlock()->getOps<AssignOp>().empty())
+      return kernel.emitError("expected a kernel that holds phases, but got "
+                              "one of the resolved level");
+  return success();
+}
+
+LogicalResult piko::writeDot(ModuleOp module, raw_ostream &stream) {
+  for (auto pipeline : module.getOps<PipelineOp>())
+    if (failed(checkLevel(pipeline)))
+      return failure();
+  for (auto pipeline : module.getOps<PipelineOp>())
+    DotWriter(pipeline, stream).write();
+  return success();
+}
+
+static LogicalResult translate(Operation *op, raw_ostream &stream) {
+  auto module = dyn_cast<ModuleOp>(op);
+  if (!module)
+    return op->emitError("expected a module");
+  return writeDot(module, stream);
+}
+
+void piko::registerPikoToDotTranslation() {
+  static TranslateFromMLIRRegistration registration(
+      "piko-to-dot", "draw pipelines as graphs for Graphviz", translate,
+      registerPikoDialects);
+}
