@@ -30,10 +30,10 @@ static_assert(sizeof(Record) == 48);
 /// How the emitted records are placed, and from what the producer emits.
 struct Case {
   const char *name;
-  bool placed;     ///< The consumer is binned: 32 x 24 bins.
-  bool fromBins;   ///< The producer is binned too: counts are permuted back.
-  int64_t cells;   ///< Places of each record.
-  bool coherent;   ///< Neighbours go to the same bin.
+  bool placed;   ///< The consumer is binned: 32 x 24 bins.
+  bool fromBins; ///< The producer is binned too: counts are permuted back.
+  int64_t cells; ///< Places of each record.
+  bool coherent; ///< Neighbours go to the same bin.
 };
 const Case *current;
 double loopMilliseconds;

@@ -117,7 +117,8 @@ int32_t pikort_create(const pikort_program *program,
 void pikort_destroy(pikort_pipeline *pipeline) { delete pipeline; }
 
 const char *pikort_message(const pikort_pipeline *pipeline) {
-  return pipeline ? pipeline->message.c_str() : "expected a pipeline, but got null";
+  return pipeline ? pipeline->message.c_str()
+                  : "expected a pipeline, but got null";
 }
 
 const char *pikort_name(const pikort_pipeline *pipeline) {
@@ -242,8 +243,8 @@ int32_t pikort_get_view(pikort_pipeline *p, const char *name,
       invalid("expected room for a view, but got null");
     bool atRun = state.kind == PIKORT_IMAGE || state.perSource >= 0;
     if (atRun && !state.view.data)
-      throw Failure{PIKORT_UNBOUND, "state " + quoted(state.name) +
-                                        " exists only after a run"};
+      throw Failure{PIKORT_UNBOUND,
+                    "state " + quoted(state.name) + " exists only after a run"};
     if (!atRun && !state.bound)
       throw Failure{PIKORT_UNBOUND,
                     "state " + quoted(state.name) + " is not bound"};
@@ -264,11 +265,11 @@ static void checkBound(const pikort_pipeline &p) {
                   "pipeline " + quoted(p.name) + ": the domain is not set"};
   for (const State &state : p.states)
     if (state.kind != PIKORT_IMAGE && state.perSource < 0 && !state.bound)
-      throw Failure{PIKORT_UNBOUND, "pipeline " + quoted(p.name) + ": " +
-                                        (state.kind == PIKORT_BUFFER
-                                             ? "buffer "
-                                             : "constant ") +
-                                        quoted(state.name) + " is not bound"};
+      throw Failure{
+          PIKORT_UNBOUND,
+          "pipeline " + quoted(p.name) + ": " +
+              (state.kind == PIKORT_BUFFER ? "buffer " : "constant ") +
+              quoted(state.name) + " is not bound"};
   for (size_t s = 0; s < p.sources.size(); ++s)
     if (p.sources[s].count < 0)
       throw Failure{PIKORT_UNBOUND, "pipeline " + quoted(p.name) + ": source " +
@@ -286,10 +287,9 @@ int32_t pikort_run(pikort_pipeline *p) {
     int32_t status = p->runProgram(p);
     p->settle();
     if (status != PIKORT_OK && p->status == PIKORT_OK)
-      throw Failure{PIKORT_BAD_PROGRAM,
-                    "pipeline " + quoted(p->name) +
-                        ": the program returned status " +
-                        std::to_string(status)};
+      throw Failure{PIKORT_BAD_PROGRAM, "pipeline " + quoted(p->name) +
+                                            ": the program returned status " +
+                                            std::to_string(status)};
   });
   if (!p || !p->ready)
     return code;

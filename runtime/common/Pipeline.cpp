@@ -154,13 +154,14 @@ void pikort_pipeline::computeGrids() {
     stage.tiles = stage.cells = 1;
     bool overflow = false;
     for (int32_t d = 0; d < rank; ++d) {
-      int64_t bin = stage.binSize[d] == 0 ? domain[d]
-                                          : std::min(stage.binSize[d], domain[d]);
+      int64_t bin = stage.binSize[d] == 0
+                        ? domain[d]
+                        : std::min(stage.binSize[d], domain[d]);
       stage.grid[d] = (domain[d] + bin - 1) / bin;
       if (stage.cellSize > 0)
         stage.cellGrid[d] = (bin + stage.cellSize - 1) / stage.cellSize;
-      overflow |= __builtin_mul_overflow(stage.tiles, stage.cellGrid[d],
-                                         &stage.tiles);
+      overflow |=
+          __builtin_mul_overflow(stage.tiles, stage.cellGrid[d], &stage.tiles);
       overflow |= __builtin_mul_overflow(
           stage.cells, stage.grid[d] * stage.cellGrid[d], &stage.cells);
     }
@@ -211,8 +212,10 @@ static std::string describe(const std::string &stage, const KernelError &e) {
       text += ", in [0, " + b + ")";
     return text + ", but got " + a;
   case PIKORT_UPDATE_OUTSIDE:
-    return text + "expected an update inside the stage's own bin, but got "
-                  "pixel (" + a + ", " + b + ")";
+    return text +
+           "expected an update inside the stage's own bin, but got "
+           "pixel (" +
+           a + ", " + b + ")";
   case PIKORT_INDEX_OUTSIDE:
     return text + "expected an index in [0, " + b + "), but got " + a;
   case PIKORT_ENDLESS:

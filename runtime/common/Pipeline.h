@@ -64,7 +64,7 @@ struct Source {
   bool declared = false;
   int32_t stage = 0;
   const uint8_t *data = nullptr;
-  int64_t count = -1; ///< -1 = not bound
+  int64_t count = -1;             ///< -1 = not bound
   std::shared_ptr<Kernel> kernel; ///< If the consumer is placed.
 };
 

@@ -27,8 +27,8 @@ public:
         pairCount_(kernel.stream.pairCount), cells_(stage.cells),
         rankNeeded_(rankNeeded) {
     // Counters of all chunks should not cost more than the pairs do.
-    int64_t most = std::max<int64_t>(1, pairCount_ / std::max<int64_t>(
-                                                         cells_, 4096));
+    int64_t most =
+        std::max<int64_t>(1, pairCount_ / std::max<int64_t>(cells_, 4096));
     chunks_ = std::min<int64_t>(most, int64_t(p.threads) * 4);
   }
 
@@ -150,11 +150,11 @@ private:
   void scatter(int64_t chunk, bool ranked, bool byBin) {
     uint32_t *next = counts_.data() + chunk * cells_;
     int64_t bins = cells_ / stage_.tiles;
-    uint32_t *nextInBin = byBin && ranked ? binCounts_.data() + chunk * bins
-                                          : nullptr;
+    uint32_t *nextInBin =
+        byBin && ranked ? binCounts_.data() + chunk * bins : nullptr;
     uint32_t *order = kernel_.order.data(), *rank = kernel_.rank.data();
-    auto item = static_cast<uint32_t>(
-        pieces_[static_cast<size_t>(chunk)].items - 1);
+    auto item =
+        static_cast<uint32_t>(pieces_[static_cast<size_t>(chunk)].items - 1);
     int64_t end = firstPair(chunk + 1);
     for (int64_t k = firstPair(chunk); k < end; ++k) {
       uint32_t entry = pairs_[k];

@@ -97,8 +97,8 @@ static void concatenate(int32_t threads, const Segments &from, uint8_t *to) {
   // Small segments travel together.
   constexpr int64_t chunk = int64_t(256) << 10;
   parallelChunks(threads, bytes, chunk, [&](int64_t begin, int64_t end) {
-    auto i = static_cast<size_t>(
-        std::upper_bound(at.begin(), at.end(), begin) - at.begin() - 1);
+    auto i = static_cast<size_t>(std::upper_bound(at.begin(), at.end(), begin) -
+                                 at.begin() - 1);
     while (begin < end) {
       int64_t skip = begin - at[i];
       int64_t now = std::min(end - begin, from.list[i].bytes - skip);
@@ -146,8 +146,8 @@ public:
     stream_.items = stream_.itemStorage.data();
     if (edge_.keyed) {
       stream_.keys.width = from_.collects() ? 2 : kernel_.keys.width + 1;
-      stream_.keys.words = Array<uint64_t>(
-          p_.memory, stream_.count * stream_.keys.width);
+      stream_.keys.words =
+          Array<uint64_t>(p_.memory, stream_.count * stream_.keys.width);
     }
     bool placed = p_.stages[edge_.consumer].placed();
     if (placed) {
@@ -244,8 +244,7 @@ private:
   void writeKey(int64_t to, int64_t slot, int64_t cell, uint32_t ordinal) {
     uint64_t *key = &stream_.keys.words[to * stream_.keys.width];
     if (from_.collects()) { // a new lineage
-      key[0] = uint64_t(from_.root) << 32 |
-               static_cast<uint64_t>(rankOf(slot));
+      key[0] = uint64_t(from_.root) << 32 | static_cast<uint64_t>(rankOf(slot));
       key[1] = ordinal;
       return;
     }
@@ -315,10 +314,10 @@ static Stream gatherSource(pikort_pipeline &p, const Stage &stage,
   stream.keys.base = static_cast<uint64_t>(index) << 32;
   if (stage.placed()) {
     if (source.kernel->open || source.kernel->pendingOutputs == 0)
-      throw Failure{PIKORT_BAD_PROGRAM,
-                    "stage " + quoted(stage.name) +
-                        ": expected the bins of source " +
-                        std::to_string(index) + " to be assigned before"};
+      throw Failure{PIKORT_BAD_PROGRAM, "stage " + quoted(stage.name) +
+                                            ": expected the bins of source " +
+                                            std::to_string(index) +
+                                            " to be assigned before"};
     concatenateCells(p, *source.kernel, 0, stream);
     releasePort(*source.kernel, 0);
   }
@@ -331,10 +330,10 @@ static Stream gatherEdge(pikort_pipeline &p, const Edge &edge) {
   auto port = static_cast<size_t>(edge.port);
   Stream stream;
   if (kernel.open || kernel.pendingOutputs == 0)
-    throw Failure{PIKORT_BAD_PROGRAM,
-                  "stage " + quoted(to.name) + ": expected stage " +
-                      quoted(p.stages[edge.producer].name) +
-                      " to run before it"};
+    throw Failure{PIKORT_BAD_PROGRAM, "stage " + quoted(to.name) +
+                                          ": expected stage " +
+                                          quoted(p.stages[edge.producer].name) +
+                                          " to run before it"};
   Segments records = collect(kernel, port, &PortLogs::records);
   int64_t size = p.records[to.record].size;
   stream.count = records.bytes / size;
@@ -368,8 +367,8 @@ namespace {
 class Merge {
 public:
   Merge(pikort_pipeline &p, const Stage &stage, std::vector<Stream> &from)
-      : p_(p), stage_(stage), from_(from),
-        size_(p.records[stage.record].size) {}
+      : p_(p), stage_(stage), from_(from), size_(p.records[stage.record].size) {
+  }
 
   Stream run() {
     for (const Stream &stream : from_) {
@@ -486,6 +485,7 @@ private:
       return;
     }
     std::vector<Array<uint32_t>> starts;
+    starts.reserve(from_.size());
     for (const Stream &stream : from_)
       starts.push_back(pairStarts(stream));
     Array<uint32_t> to(p_.memory, out_.count);
@@ -516,6 +516,7 @@ private:
 
 Stream piko::rt::gatherInputs(pikort_pipeline &p, Stage &stage) {
   std::vector<Stream> streams;
+  streams.reserve(stage.sources.size() + stage.inputs.size());
   for (int32_t source : stage.sources)
     streams.push_back(gatherSource(p, stage, source));
   for (int32_t edge : stage.inputs)

@@ -91,8 +91,7 @@ struct Keys {
   Array<uint64_t> words;
 
   uint64_t word(int64_t item, int32_t w) const {
-    return words ? words[item * width + w]
-                 : base + static_cast<uint64_t>(item);
+    return words ? words[item * width + w] : base + static_cast<uint64_t>(item);
   }
 };
 
@@ -149,9 +148,12 @@ struct Kernel {
       return last.end + (slotsForCells ? last.cell_end : 0);
     }
     return end ? 0
-               : units[unit].begin + (slotsForCells ? units[unit].cell_begin : 0);
+               : units[unit].begin +
+                     (slotsForCells ? units[unit].cell_begin : 0);
   }
-  int64_t slots() const { return slotBegin(static_cast<int64_t>(units.size())); }
+  int64_t slots() const {
+    return slotBegin(static_cast<int64_t>(units.size()));
+  }
 
   /// Frees what a run holds; lanes stay.
   void clear();

@@ -86,17 +86,16 @@ static void prepareStage(pikort_pipeline &p, Kernel &kernel) {
     if (e < 0)
       continue;
     ++kernel.pendingOutputs;
-    rankNeeded |= p.edges[e].keyed ||
-                  !(stage.unordered() ||
-                    p.stages[p.edges[e].consumer].unordered());
+    rankNeeded |=
+        p.edges[e].keyed ||
+        !(stage.unordered() || p.stages[p.edges[e].consumer].unordered());
   }
   binItems(p, stage, kernel, rankNeeded);
   cutUnits(p, stage, kernel);
   kernel.slotsForCells = stage.collects() && !kernel.rank;
   kernel.counts.resize(stage.outputs.size());
   for (size_t port = 0; port < stage.outputs.size(); ++port)
-    if (stage.outputs[port] >= 0 &&
-        byPosition(p, p.edges[stage.outputs[port]]))
+    if (stage.outputs[port] >= 0 && byPosition(p, p.edges[stage.outputs[port]]))
       kernel.counts[port] = Array<uint32_t>(p.memory, kernel.slots());
   StageStats &stats = p.stageStats[kernel.stage];
   stats.in += kernel.stream.count;
@@ -106,18 +105,18 @@ static void prepareStage(pikort_pipeline &p, Kernel &kernel) {
 static const pikoir_input *begin(pikort_pipeline &p, Kernel &kernel) {
   if (p.status != PIKORT_OK)
     return nullptr;
-  int32_t code = guarded(&p, "stage " + quoted(p.stages[kernel.stage].name),
-                         [&] {
-                           kernel.clear();
-                           kernel.started = std::chrono::steady_clock::now();
-                           if (kernel.source >= 0)
-                             prepareSource(p, kernel);
-                           else
-                             prepareStage(p, kernel);
-                           prepareLanes(p, kernel);
-                           publish(p, kernel);
-                           kernel.open = true;
-                         });
+  int32_t code =
+      guarded(&p, "stage " + quoted(p.stages[kernel.stage].name), [&] {
+        kernel.clear();
+        kernel.started = std::chrono::steady_clock::now();
+        if (kernel.source >= 0)
+          prepareSource(p, kernel);
+        else
+          prepareStage(p, kernel);
+        prepareLanes(p, kernel);
+        publish(p, kernel);
+        kernel.open = true;
+      });
   KernelStats &stats = p.kernelStats[kernel.statsIndex];
   stats.joinMilliseconds += millisecondsSince(kernel.started);
   return code == PIKORT_OK ? &kernel.input : nullptr;
@@ -179,8 +178,8 @@ int32_t pikoir_end_source(pikort_pipeline *p, int32_t source) {
 
 void pikoir_fail(pikort_pipeline *p, int32_t stage, int32_t code, int64_t a,
                  int64_t b) {
-  p->report({INT64_MAX, code == PIKORT_OK ? PIKORT_BAD_PROGRAM : code, stage, a,
-             b});
+  p->report(
+      {INT64_MAX, code == PIKORT_OK ? PIKORT_BAD_PROGRAM : code, stage, a, b});
 }
 
 int32_t pikoir_status(pikort_pipeline *p) {

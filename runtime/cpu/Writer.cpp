@@ -46,8 +46,8 @@ static bool grow(Lane *lane, Log &log, uint8_t *&cursor, uint8_t *&end,
   int64_t bytes = std::max(need + 2 * keep, firstBlock);
   try {
     if (!log.blocks.empty())
-      bytes = std::max(bytes, std::min(2 * log.blocks.back().capacity(),
-                                       largestBlock));
+      bytes = std::max(
+          bytes, std::min(2 * log.blocks.back().capacity(), largestBlock));
     log.blocks.reserve(log.blocks.size() + 1);
     Array<uint8_t> block(lane->pipeline->memory, bytes);
     endSegment(lane, log, cursor - keep);
@@ -151,15 +151,13 @@ static void insertCell(pikoir_port &out, uint32_t cell) {
 [[gnu::noinline]] static void badPlace(Lane *lane, int32_t port, int64_t cell) {
   pikoir_port &out = lane->ports[port];
   if (out.last_cell == noRecord) {
-    lane->pipeline->report(
-        {lane->unit, PIKORT_BAD_PROGRAM, lane->stage, 0, 0});
+    lane->pipeline->report({lane->unit, PIKORT_BAD_PROGRAM, lane->stage, 0, 0});
     return;
   }
   const Stage &to = lane->pipeline->stages[lane->logs[port].consumer];
   int64_t bin = cell / to.tiles - (cell % to.tiles < 0);
   lane->pipeline->report({lane->unit, PIKORT_BIN_OUTSIDE,
-                          lane->logs[port].consumer, bin,
-                          to.cells / to.tiles});
+                          lane->logs[port].consumer, bin, to.cells / to.tiles});
 }
 
 void pikoir_place(pikoir_writer *writer, int32_t port, int64_t cell) {

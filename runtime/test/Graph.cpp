@@ -7,6 +7,7 @@
 #include <atomic>
 #include <cstring>
 #include <gtest/gtest.h>
+#include <numeric>
 
 using namespace piko::rt::test;
 
@@ -41,12 +42,15 @@ std::vector<int64_t> Graph::places(int stage, const Item &item) const {
   const TestStage &s = stages[stage];
   if (!(s.flags & PIKOIR_PLACED))
     return {0};
+  if (s.runLength > 0)
+    return {(static_cast<int64_t>(item.id) / s.runLength ^ 1) % cells(stage)};
   uint64_t h = mix(item.id, 77 + static_cast<uint64_t>(stage));
   std::vector<int64_t> result;
   auto n = static_cast<int64_t>(h % static_cast<uint64_t>(s.spread + 1));
+  result.reserve(static_cast<size_t>(n) + 1);
   for (int64_t i = 0; i < n; ++i)
-    result.push_back(static_cast<int64_t>(
-        mix(h, static_cast<uint64_t>(i)) % static_cast<uint64_t>(cells(stage))));
+    result.push_back(static_cast<int64_t>(mix(h, static_cast<uint64_t>(i)) %
+                                          static_cast<uint64_t>(cells(stage))));
   if (n > 0 && h & 256)
     result.push_back(result.front());
   if (h & 512)
@@ -136,13 +140,17 @@ private:
   void runCollected(int s) {
     std::vector<Visit> visits = std::move(waiting_[s]);
     int64_t tiles = g_.tiles(s);
-    std::stable_sort(visits.begin(), visits.end(),
-                     [&](const Visit &a, const Visit &b) {
-                       return a.first / tiles < b.first / tiles;
-                     });
+    std::vector<size_t> by(visits.size());
+    std::iota(by.begin(), by.end(), size_t(0));
+    std::sort(by.begin(), by.end(), [&](size_t a, size_t b) {
+      return std::pair(visits[a].first / tiles, a) <
+             std::pair(visits[b].first / tiles, b);
+    });
     if (!g_.stages[s].list) {
-      for (auto &[cell, item] : visits)
-        emit(s, mix(item.id, static_cast<uint64_t>(cell)), item.hops);
+      for (size_t v : by)
+        emit(s,
+             mix(visits[v].second.id, static_cast<uint64_t>(visits[v].first)),
+             visits[v].second.hops);
       return;
     }
     for (int64_t cell = 0; cell < g_.cells(s); ++cell) { // every bin
@@ -222,8 +230,7 @@ static void setup(pikort_pipeline *p) {
     pikoir_declare_stage(p, id, ("s" + std::to_string(s)).c_str(), 0, stage.bin,
                          stage.schedule, stage.split, stage.flags, stage.tile);
     for (size_t port = 0; port < stage.ports.size(); ++port)
-      pikoir_declare_edge(p, id, static_cast<int32_t>(port),
-                          stage.ports[port]);
+      pikoir_declare_edge(p, id, static_cast<int32_t>(port), stage.ports[port]);
   }
   for (size_t i = 0; i < current->sources.size(); ++i)
     pikoir_declare_source(p, static_cast<int32_t>(i), current->sources[i]);
@@ -364,10 +371,9 @@ GraphRun::GraphRun(Graph &graph) {
       << pikort_message(pipeline_);
   pikort_set_domain(pipeline_, 2, graph.domain);
   for (size_t i = 0; i < graph.input.size(); ++i)
-    EXPECT_EQ(pikort_bind_source(pipeline_, static_cast<int32_t>(i),
-                                 graph.input[i].data(),
-                                 static_cast<int64_t>(graph.input[i].size()),
-                                 sizeof(Item)),
+    EXPECT_EQ(pikort_bind_source(
+                  pipeline_, static_cast<int32_t>(i), graph.input[i].data(),
+                  static_cast<int64_t>(graph.input[i].size()), sizeof(Item)),
               PIKORT_OK)
         << pikort_message(pipeline_);
 }

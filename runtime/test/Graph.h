@@ -35,10 +35,11 @@ struct TestStage {
   int64_t tile = 0; ///< Owner tiles.
   int64_t split = 0;
   int schedule = PIKOIR_LOAD_BALANCE;
-  bool list = false;         ///< Processes whole lists (flags has COLLECTS).
-  std::vector<int> ports;    ///< Consumer of each port.
-  int spread = 3;            ///< Most places of one primitive, plus one.
-  int mostEmissions = 2;     ///< Of one call.
+  bool list = false;      ///< Processes whole lists (flags has COLLECTS).
+  std::vector<int> ports; ///< Consumer of each port.
+  int spread = 3;         ///< Most places of one primitive, plus one.
+  int mostEmissions = 2;  ///< Of one call.
+  int64_t runLength = 0;  ///< If not 0: ids in runs share a cell, swapped.
 };
 
 /// What reached a stage.

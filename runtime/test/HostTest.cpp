@@ -172,17 +172,17 @@ TEST_F(Host, WrongNamesAndSizes) {
             PIKORT_OUT_OF_MEMORY);
   expectError(pipe.source(1, points), PIKORT_NOT_FOUND,
               "pipeline 'Small' has no source 1");
-  EXPECT_EQ(pikort_bind_source(pipe.get(), 0, points.data(), int64_t(1) << 32,
-                               8),
-            PIKORT_TOO_MANY);
+  EXPECT_EQ(
+      pikort_bind_source(pipe.get(), 0, points.data(), int64_t(1) << 32, 8),
+      PIKORT_TOO_MANY);
   EXPECT_STREQ(pikort_message(pipe.get()),
                "source 0: expected at most 4294967295 primitives, but got "
                "4294967296");
   EXPECT_EQ(pikort_bind_source(pipe.get(), 0, nullptr, 1, 8),
             PIKORT_INVALID_ARGUMENT);
-  EXPECT_EQ(pikort_bind_source(
-                pipe.get(), 0, reinterpret_cast<char *>(points.data()) + 1, 1,
-                8),
+  EXPECT_EQ(pikort_bind_source(pipe.get(), 0,
+                               reinterpret_cast<char *>(points.data()) + 1, 1,
+                               8),
             PIKORT_INVALID_ARGUMENT);
   EXPECT_STREQ(pikort_message(pipe.get()),
                "source 0: expected a pointer aligned to 4 bytes");

@@ -54,9 +54,9 @@ TEST(Memory, GivesBackWhatSmallerFramesDoNotNeed) {
   GraphRun run(graph);
   ASSERT_EQ(run.run(2), PIKORT_OK);
   int64_t large = pikort_reserved_bytes(run.get());
-  ASSERT_EQ(pikort_bind_source(run.get(), 0, graph.input[0].data(), 50,
-                               sizeof(Item)),
-            PIKORT_OK);
+  ASSERT_EQ(
+      pikort_bind_source(run.get(), 0, graph.input[0].data(), 50, sizeof(Item)),
+      PIKORT_OK);
   for (int frame = 0; frame < 20; ++frame)
     ASSERT_EQ(run.run(2), PIKORT_OK);
   EXPECT_LT(pikort_reserved_bytes(run.get()), large / 4);

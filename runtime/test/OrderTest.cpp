@@ -70,6 +70,18 @@ TEST(Order, PermutesSinglePlaces) {
   check(graph);
 }
 
+// Each chunk of the count is sorted by cell, but the chunks are not.
+TEST(Order, SortedInPieces) {
+  TestStage runs;
+  runs.bin[0] = 4;
+  runs.flags = PIKOIR_PLACED;
+  runs.runLength = 4096;
+  Graph graph = chain(16384, {runs, TestStage(), TestStage()});
+  for (size_t i = 0; i < graph.input[0].size(); ++i)
+    graph.input[0][i].id = i;
+  check(graph);
+}
+
 // Tiles of one bin are merged back by item.
 TEST(Order, MergesTilesOfCollectingStages) {
   TestStage first;

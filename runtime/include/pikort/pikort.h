@@ -38,7 +38,7 @@ typedef struct pikort_pipeline pikort_pipeline;
 typedef struct pikort_program {
   uint32_t abi_version; ///< PIKORT_ABI_VERSION of the compiler's runtime.
   const char *name;     ///< The pipeline's C++ name.
-  void (*setup)(pikort_pipeline *); ///< Declares records, state and stages.
+  void (*setup)(pikort_pipeline *);  ///< Declares records, state and stages.
   int32_t (*run)(pikort_pipeline *); ///< Runs the kernels once, in order.
 } pikort_program;
 
