@@ -64,8 +64,7 @@ struct ConvertUpdate : OpRewritePattern<UpdateOp> {
     }
     auto ifOp = scf::IfOp::create(rewriter, loc, update.getResultTypes(),
                                   isInside(rewriter, loc, at, lo, hi),
-                                  /*addThenBlock=*/true,
-                                  /*addElseBlock=*/true);
+                                  /*withElseRegion=*/true);
     rewriter.setInsertionPointToStart(ifOp.elseBlock());
     FailOp::create(rewriter, loc, stage.getSymName(), update.getImage(), at);
     SmallVector<Value> zeros;
