@@ -30,8 +30,35 @@ public:
 
 protected:
   template <class T> void emit(const T &value, int port = 0) {
+    static_assert((detail::isSame<T, Out> || ...),
+                  "emit of a type that no port has");
     T copy = value;
     marker::emit<T>(port, &copy);
+  }
+  void emit(const typename detail::First<Out..., In>::type &value, int port = 0)
+    requires(sizeof...(Out) > 0)
+  {
+    emit<typename detail::First<Out..., In>::type>(value, port);
+  }
+
+  /// Changes a pixel of the current bin: f(pixel). The calls for one pixel are
+  /// in lineage order.
+  template <class T, int R, class F>
+  auto update(Image<T, R> &image, const Cells<R> &at, F &&f) {
+    using namespace detail;
+    T pixel;
+    marker::updateBegin<T>(&pixel, &image, coordinate<0, R>(at),
+                           coordinate<1, R>(at), coordinate<2, R>(at),
+                           coordinate<3, R>(at));
+    using Result = decltype(f(pixel));
+    if constexpr (isSame<Result, void>) {
+      f(pixel);
+      marker::updateEnd<T>(&pixel);
+    } else {
+      Result result = f(pixel);
+      marker::updateEnd<T>(&pixel);
+      return result;
+    }
   }
 
   // AssignBin.

@@ -30,6 +30,9 @@ template <int D, int Rank> inline int64_t coordinate(const Cells<Rank> &at) {
 
 template <class T, class U> inline constexpr bool isSame = false;
 template <class T> inline constexpr bool isSame<T, T> = true;
+template <class T, class...> struct First {
+  using type = T;
+};
 template <class T> struct Identity {
   using type = T;
 };
@@ -92,20 +95,6 @@ template <class T, int Rank> inline void clearImage(const Image<T, Rank> &) {
   marker::clear<T>(&value);
 }
 } // namespace detail
-
-/// Changes a pixel of the primitive's own bin; the calls for one pixel run in
-/// lineage order.
-template <class T, int Rank, class F>
-inline void update(const Image<T, Rank> &image,
-                   const detail::Identity<Cells<Rank>>::type &at, F &&f) {
-  T pixel;
-  marker::updateBegin<T>(
-      &pixel, &image, detail::coordinate<0, Rank>(at),
-      detail::coordinate<1, Rank>(at), detail::coordinate<2, Rank>(at),
-      detail::coordinate<3, Rank>(at));
-  f(pixel);
-  marker::updateEnd<T>(&pixel);
-}
 
 namespace detail {
 template <class T>

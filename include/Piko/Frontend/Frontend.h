@@ -1,0 +1,69 @@
+//===- Frontend.h - From C++ to the piko dialect ----------------*- C++ -*-===//
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Clang parses a pipeline's C++ and generates LLVM IR for its phases; this
+// library removes C++ from that IR and writes what is left in the piko dialect,
+// at the authored level, with arith, math, scf and memref in the bodies.
+//
+// All diagnostics, Clang's own included, go to the context's diagnostic engine
+// and point at the user's C++.
+//
+//===----------------------------------------------------------------------===//
+
+#ifndef PIKO_FRONTEND_FRONTEND_H
+#define PIKO_FRONTEND_FRONTEND_H
+
+#include "Piko/Frontend/PipelineDescription.h"
+#include "mlir/IR/BuiltinOps.h"
+#include "mlir/IR/OwningOpRef.h"
+
+#include <string>
+#include <vector>
+
+namespace piko {
+
+struct FrontendOptions {
+  /// `-I` and `-D`, without the letter.
+  std::vector<std::string> includeDirs;
+  std::vector<std::string> defines;
+  /// The pipeline to compile; empty = the only one in the file.
+  std::string pipeName;
+  /// Where piko.h is.
+  std::string runtimeIncludeDir;
+  /// Clang's own headers; empty = those of the Clang that Piko was built with.
+  std::string resourceDir;
+};
+
+/// Compiles one pipeline of a C++ file; null after an error.
+mlir::OwningOpRef<mlir::ModuleOp>
+translateCppToPiko(llvm::StringRef file, const FrontendOptions &options,
+                   mlir::MLIRContext &context);
+
+/// The same for text in memory; `name` is what diagnostics call it.
+mlir::OwningOpRef<mlir::ModuleOp>
+translateCppToPiko(llvm::StringRef name, llvm::StringRef text,
+                   const FrontendOptions &options, mlir::MLIRContext &context);
+
+/// The names of the pipelines in a C++ file, in the order of their definition.
+llvm::FailureOr<std::vector<std::string>>
+listPipes(llvm::StringRef file, const FrontendOptions &options,
+          mlir::MLIRContext &context);
+
+/// Reads a pipeline's stages, edges, state and records without compiling its
+/// phases.
+llvm::FailureOr<PipelineDescription>
+describePipe(llvm::StringRef file, const FrontendOptions &options,
+             mlir::MLIRContext &context);
+
+/// The text of a C++ program for the runtime's ABI that runs the pipeline with
+/// the reference executor: `userFile` is included, without __PIKO__. It defines
+/// `extern "C" const pikort_program *piko_reference_program()`.
+std::string generateReferenceAdapter(const PipelineDescription &pipeline,
+                                     llvm::StringRef userFile);
+
+/// Registers `piko-translate --cpp-to-piko`.
+void registerCppToPikoTranslation();
+
+} // namespace piko
+
+#endif // PIKO_FRONTEND_FRONTEND_H

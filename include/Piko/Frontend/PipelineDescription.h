@@ -1,0 +1,124 @@
+//===- PipelineDescription.h - A pipeline as its C++ says it ----*- C++ -*-===//
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// What the front end reads about a pipeline apart from the bodies of its
+// phases. Records are numbered; everything else refers to them by number.
+//
+//===----------------------------------------------------------------------===//
+
+#ifndef PIKO_FRONTEND_PIPELINEDESCRIPTION_H
+#define PIKO_FRONTEND_PIPELINEDESCRIPTION_H
+
+#include "mlir/IR/Location.h"
+#include "llvm/ADT/SmallVector.h"
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace piko {
+
+/// The number types that a leaf field of a record may have; bool is I8.
+enum class ScalarType { F32, F64, I8, I16, I32, I64 };
+
+/// A number or an array of numbers at a fixed place in a record.
+struct LeafField {
+  std::string name;
+  ScalarType type;
+  int64_t offset;
+  /// Outermost dimension first; strides in bytes.
+  llvm::SmallVector<int64_t, 2> counts, strides;
+
+  int64_t getElementCount() const {
+    int64_t count = 1;
+    for (int64_t dimension : counts)
+      count *= dimension;
+    return count;
+  }
+};
+
+/// The layout of a trivially copyable C++ type.
+struct RecordDescription {
+  std::string name;
+  int64_t size = 0, align = 1;
+  std::vector<LeafField> fields;
+
+  int64_t getElementCount() const {
+    int64_t count = 0;
+    for (const LeafField &field : fields)
+      count += field.getElementCount();
+    return count;
+  }
+};
+
+struct StateDescription {
+  enum Kind { Constant, Buffer, Image };
+  std::string name;
+  Kind kind;
+  unsigned record;
+  int64_t rank;
+  /// Bytes from the beginning of the state.
+  int64_t offset;
+  mlir::Location location;
+  /// The source that gives a buffer its length.
+  std::optional<int64_t> perSource = std::nullopt;
+  /// What an image is cleared to: the bits of each number of the record.
+  std::vector<uint64_t> clear = {};
+};
+
+enum class SchedulePolicy { LoadBalance, DirectMap, Serialize, All };
+
+struct ScheduleDescription {
+  SchedulePolicy policy = SchedulePolicy::LoadBalance;
+  int64_t tileSplit = 0, batch = 0;
+  std::vector<unsigned> endStage;
+  bool endBin = false, everyBin = false, unordered = false;
+};
+
+struct StageDescription {
+  /// The member of the pipeline.
+  std::string name = {};
+  std::string typeName = {};
+  std::vector<int64_t> bins = {};
+  int64_t threads = 1;
+  unsigned input = 0;
+  std::vector<unsigned> outputs = {};
+  bool hasAssign = false, hasSchedule = false;
+  ScheduleDescription schedule = {};
+  /// Bytes from the beginning of the pipeline object.
+  int64_t offset = 0;
+  mlir::Location location;
+
+  bool isWholeDomain() const {
+    for (int64_t size : bins)
+      if (size != 0)
+        return false;
+    return true;
+  }
+};
+
+struct EdgeDescription {
+  unsigned producer, port, consumer;
+  mlir::Location location;
+};
+
+struct SourceDescription {
+  unsigned stage;
+  mlir::Location location;
+};
+
+struct PipelineDescription {
+  std::string name = {};
+  mlir::Location location;
+  int64_t rank = 2;
+  std::vector<RecordDescription> records = {};
+  std::vector<StateDescription> state = {};
+  std::vector<StageDescription> stages = {};
+  std::vector<SourceDescription> sources = {};
+  std::vector<EdgeDescription> edges = {};
+};
+
+} // namespace piko
+
+#endif // PIKO_FRONTEND_PIPELINEDESCRIPTION_H

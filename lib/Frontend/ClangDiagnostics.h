@@ -1,0 +1,39 @@
+//===- ClangDiagnostics.h - Clang's diagnostics as MLIR's -------*- C++ -*-===//
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+#ifndef PIKO_LIB_FRONTEND_CLANGDIAGNOSTICS_H
+#define PIKO_LIB_FRONTEND_CLANGDIAGNOSTICS_H
+
+#include "clang/Basic/Diagnostic.h"
+#include "clang/Basic/SourceManager.h"
+#include "mlir/IR/Diagnostics.h"
+
+#include <optional>
+
+namespace piko {
+
+/// The place in the user's text that a Clang location stands for.
+mlir::Location convertLocation(clang::SourceLocation location,
+                               const clang::SourceManager &sources,
+                               mlir::MLIRContext &context);
+
+/// Forwards what Clang reports to the diagnostic engine of a context; notes
+/// are attached to what they explain.
+class ClangDiagnosticForwarder : public clang::DiagnosticConsumer {
+public:
+  explicit ClangDiagnosticForwarder(mlir::MLIRContext &context)
+      : context(context) {}
+  ~ClangDiagnosticForwarder() override { flush(); }
+
+  void HandleDiagnostic(clang::DiagnosticsEngine::Level level,
+                        const clang::Diagnostic &info) override;
+  /// Reports the diagnostic that was waiting for its notes.
+  void flush();
+
+private:
+  mlir::MLIRContext &context;
+  std::optional<mlir::Diagnostic> pending;
+};
+
+} // namespace piko
+
+#endif // PIKO_LIB_FRONTEND_CLANGDIAGNOSTICS_H

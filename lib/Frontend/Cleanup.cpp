@@ -1,0 +1,286 @@
+//===- Cleanup.cpp - Removing C++ from a pipeline's LLVM IR ---------------===//
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// The list of passes is ours. Nothing moves code out of loops, unrolls,
+// vectorizes or numbers values over the whole function: later levels know
+// better what a pipeline needs.
+//
+//===----------------------------------------------------------------------===//
+
+#include "Cleanup.h"
+
+#include "MathCalls.h"
+#include "Wrappers.h"
+#include "llvm/Analysis/CallGraph.h"
+#include "llvm/IR/DebugInfoMetadata.h"
+#include "llvm/IR/InstIterator.h"
+#include "llvm/IR/Instructions.h"
+#include "llvm/IR/IntrinsicInst.h"
+#include "llvm/IR/Module.h"
+#include "llvm/Passes/PassBuilder.h"
+#include "llvm/Transforms/IPO/AlwaysInliner.h"
+#include "llvm/Transforms/IPO/GlobalDCE.h"
+#include "llvm/Transforms/InstCombine/InstCombine.h"
+#include "llvm/Transforms/Scalar/ADCE.h"
+#include "llvm/Transforms/Scalar/EarlyCSE.h"
+#include "llvm/Transforms/Scalar/SROA.h"
+#include "llvm/Transforms/Scalar/SimplifyCFG.h"
+#include "llvm/Transforms/Utils/Mem2Reg.h"
+#include "mlir/IR/Diagnostics.h"
+
+using namespace piko;
+using llvm::dyn_cast;
+
+mlir::Location piko::getUserLocation(const llvm::Instruction *instruction,
+                                     const ParsedUnit &unit,
+                                     mlir::MLIRContext &context) {
+  const llvm::DILocation *outermost = nullptr;
+  for (const llvm::DILocation *at = instruction->getDebugLoc(); at;
+       at = at->getInlinedAt()) {
+    if (unit.userFiles.contains(at->getFilename()) && at->getLine() != 0)
+      return mlir::FileLineColLoc::get(&context, at->getFilename(),
+                                       at->getLine(), at->getColumn());
+    outermost = at;
+  }
+  (void)outermost;
+  return unit.pipeline.location;
+}
+
+//===----------------------------------------------------------------------===//
+// Calls
+//===----------------------------------------------------------------------===//
+
+namespace {
+
+/// Walks all that a wrapper calls and marks it to be inlined.
+class CallChecker {
+public:
+  CallChecker(ParsedUnit &unit, mlir::MLIRContext &context)
+      : unit(unit), context(context) {}
+
+  bool check(llvm::Function &function) {
+    if (llvm::is_contained(stack, &function))
+      return true;
+    if (!visited.insert(&function).second)
+      return true;
+    stack.push_back(&function);
+    for (llvm::Instruction &instruction : llvm::instructions(function)) {
+      auto *call = dyn_cast<llvm::CallBase>(&instruction);
+      if (call && !checkCall(call))
+        return false;
+    }
+    stack.pop_back();
+    return true;
+  }
+
+private:
+  bool fail(const llvm::CallBase *call, const llvm::Twine &what) {
+    mlir::emitError(getCallLocation(call)) << "not supported in Piko: " << what;
+    return false;
+  }
+
+  /// A call in a header is reported where the user's text leads to it.
+  mlir::Location getCallLocation(const llvm::CallBase *call) {
+    const llvm::Instruction *at = call;
+    for (size_t i = stack.size(); i-- > 0;) {
+      if (const llvm::DILocation *location = at->getDebugLoc())
+        if (unit.userFiles.contains(location->getFilename()))
+          return getUserLocation(at, unit, context);
+      at = callers[stack[i]];
+      if (!at)
+        break;
+    }
+    return getUserLocation(call, unit, context);
+  }
+
+  std::string getName(const llvm::Function *function) {
+    auto found = unit.functionNames.find(function->getName().str());
+    return found == unit.functionNames.end() ? function->getName().str()
+                                             : found->second;
+  }
+
+  bool checkCall(llvm::CallBase *call) {
+    if (call->isInlineAsm())
+      return fail(call, "inline assembly");
+    llvm::Function *callee = call->getCalledFunction();
+    if (!callee)
+      return fail(call, "a virtual call or a call through a pointer");
+    if (callee->isIntrinsic() || isMathFunction(*callee) ||
+        getMarker(call, unit.markers))
+      return true;
+    std::string name = getName(callee);
+    if (callee->isDeclaration()) {
+      if (name == "operator new" || name == "operator new[]" ||
+          name == "operator delete" || name == "operator delete[]" ||
+          name == "malloc" || name == "free" || name == "calloc" ||
+          name == "realloc")
+        return fail(call, "dynamic allocation");
+      return fail(call,
+                  "a call of '" + name + "', which has no body in this file");
+    }
+    if (llvm::is_contained(stack, callee))
+      return fail(call, "recursion: '" + name + "' calls itself");
+    callee->removeFnAttr(llvm::Attribute::NoInline);
+    callee->removeFnAttr(llvm::Attribute::OptimizeNone);
+    callee->addFnAttr(llvm::Attribute::AlwaysInline);
+    callers.try_emplace(callee, call);
+    return check(*callee);
+  }
+
+  ParsedUnit &unit;
+  mlir::MLIRContext &context;
+  llvm::SmallVector<llvm::Function *> stack;
+  llvm::DenseSet<llvm::Function *> visited;
+  llvm::DenseMap<llvm::Function *, llvm::CallBase *> callers;
+};
+
+} // namespace
+
+//===----------------------------------------------------------------------===//
+// Passes
+//===----------------------------------------------------------------------===//
+
+namespace {
+
+/// Runs LLVM's passes; one set of analyses for all.
+class PassRunner {
+public:
+  PassRunner() {
+    llvm::PassBuilder builder;
+    builder.registerModuleAnalyses(modules);
+    builder.registerCGSCCAnalyses(components);
+    builder.registerFunctionAnalyses(functions);
+    builder.registerLoopAnalyses(loops);
+    builder.crossRegisterProxies(loops, functions, components, modules);
+  }
+  void run(llvm::ModulePassManager &passes, llvm::Module &module) {
+    passes.run(module, modules);
+  }
+  /// What ran in between may have changed the function.
+  void run(llvm::FunctionPassManager &passes, llvm::Function &function) {
+    functions.invalidate(function, llvm::PreservedAnalyses::none());
+    passes.run(function, functions);
+  }
+
+private:
+  llvm::LoopAnalysisManager loops;
+  llvm::FunctionAnalysisManager functions;
+  llvm::CGSCCAnalysisManager components;
+  llvm::ModuleAnalysisManager modules;
+};
+
+} // namespace
+
+/// Calls that mean nothing here.
+static void dropHints(llvm::Function &function) {
+  for (llvm::Instruction &instruction :
+       llvm::make_early_inc_range(llvm::instructions(function))) {
+    auto *call = dyn_cast<llvm::IntrinsicInst>(&instruction);
+    if (!call)
+      continue;
+    switch (call->getIntrinsicID()) {
+    case llvm::Intrinsic::lifetime_start:
+    case llvm::Intrinsic::lifetime_end:
+    case llvm::Intrinsic::assume:
+    case llvm::Intrinsic::experimental_noalias_scope_decl:
+    case llvm::Intrinsic::stacksave:
+    case llvm::Intrinsic::stackrestore:
+      if (call->use_empty())
+        call->eraseFromParent();
+      break;
+    default:
+      break;
+    }
+  }
+}
+
+static bool cleanUpFunction(llvm::Function &function, ParsedUnit &unit,
+                            MemoryMap &memory, PassRunner &runner,
+                            mlir::MLIRContext &context) {
+  dropHints(function);
+  expandMarkers(function, memory);
+
+  llvm::FunctionPassManager simplify;
+  simplify.addPass(llvm::PromotePass());
+  simplify.addPass(llvm::EarlyCSEPass(/*UseMemorySSA=*/false));
+  simplify.addPass(llvm::SimplifyCFGPass());
+  runner.run(simplify, function);
+  // Each round sees through one more level of references.
+  bool localized = false;
+  for (int round = 0; round < 32; ++round) {
+    bool changed = splitMemory(function, memory);
+    changed |= flattenPointers(function, memory);
+    if (!changed) {
+      if (localized || !localizeTables(function, memory))
+        break;
+      localized = true;
+    }
+    runner.run(simplify, function);
+  }
+  llvm::FunctionPassManager promote;
+  promote.addPass(llvm::SROAPass(llvm::SROAOptions::PreserveCFG));
+  promote.addPass(llvm::EarlyCSEPass(/*UseMemorySSA=*/true));
+  promote.addPass(llvm::SimplifyCFGPass());
+  runner.run(promote, function);
+  if (!resolveAccesses(function, unit, memory, context))
+    return false;
+
+  llvm::FunctionPassManager finish;
+  finish.addPass(llvm::EarlyCSEPass(/*UseMemorySSA=*/true));
+  finish.addPass(llvm::SimplifyCFGPass());
+  finish.addPass(llvm::InstCombinePass());
+  finish.addPass(llvm::EarlyCSEPass(/*UseMemorySSA=*/true));
+  finish.addPass(llvm::SimplifyCFGPass());
+  finish.addPass(llvm::InstCombinePass());
+  finish.addPass(llvm::ADCEPass());
+  finish.addPass(llvm::SimplifyCFGPass());
+  runner.run(finish, function);
+  return true;
+}
+
+bool piko::cleanUp(ParsedUnit &unit, MemoryMap &memory,
+                   mlir::MLIRContext &context) {
+  llvm::Module &module = *unit.module;
+  setMarkerEffects(module, unit.markers);
+  std::vector<llvm::Function *> wrappers, mathFunctions;
+  for (llvm::Function &function : module) {
+    if (function.getName().starts_with("__piko_wrapper_"))
+      wrappers.push_back(&function);
+    else if (function.getName().starts_with(mathPrefix))
+      mathFunctions.push_back(&function);
+    else if (!function.isDeclaration())
+      function.setLinkage(llvm::GlobalValue::InternalLinkage);
+    if (!function.isDeclaration())
+      function.setComdat(nullptr);
+  }
+  if (auto *constructors = module.getNamedGlobal("llvm.global_ctors"))
+    constructors->eraseFromParent();
+  for (const char *used : {"llvm.used", "llvm.compiler.used"})
+    if (auto *list = module.getNamedGlobal(used))
+      list->eraseFromParent();
+
+  CallChecker checker(unit, context);
+  for (llvm::Function *wrapper : wrappers)
+    if (!checker.check(*wrapper))
+      return false;
+  for (llvm::Function *function : mathFunctions)
+    if (!checker.check(*function))
+      return false;
+
+  PassRunner runner;
+  llvm::ModulePassManager inlining;
+  inlining.addPass(llvm::GlobalDCEPass());
+  inlining.addPass(llvm::AlwaysInlinerPass(/*InsertLifetime=*/false));
+  runner.run(inlining, module);
+  for (llvm::Function *wrapper : wrappers)
+    redirectMathCalls(*wrapper, unit, context);
+  for (llvm::Function *function : mathFunctions) {
+    function->addFnAttr(llvm::Attribute::AlwaysInline);
+    function->setLinkage(llvm::GlobalValue::InternalLinkage);
+  }
+  runner.run(inlining, module);
+  for (llvm::Function *wrapper : wrappers)
+    if (!cleanUpFunction(*wrapper, unit, memory, runner, context))
+      return false;
+  return true;
+}

@@ -1,0 +1,65 @@
+//===- Cleanup.h - Removing C++ from a pipeline's LLVM IR -------*- C++ -*-===//
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// The steps, in order, each a file:
+//
+//   1. checkCalls      what a phase cannot call is an error
+//   2. always-inline   the wrappers become one function each
+//   3. expandMarkers   markers take and give numbers, not pointers to records
+//   4. rounds of       splitMemory     copies and variables, number by number
+//                      flattenPointers phis and selects of pointers
+//                      mem2reg, early-cse, simplifycfg
+//   5. SROA
+//   6. resolveAccesses loads and stores outside of local memory become calls
+//                      of accessors, which name the field
+//   7. early-cse, simplifycfg, instcombine, dce
+//
+// What is left: numbers, branches, local arrays of numbers, and calls of
+// markers and accessors.
+//
+//===----------------------------------------------------------------------===//
+
+#ifndef PIKO_LIB_FRONTEND_CLEANUP_H
+#define PIKO_LIB_FRONTEND_CLEANUP_H
+
+#include "Memory.h"
+#include "Parse.h"
+
+namespace piko {
+
+/// Does all of the above; false after an error.
+bool cleanUp(ParsedUnit &unit, MemoryMap &memory, mlir::MLIRContext &context);
+
+/// Where the user's text says what an instruction does.
+mlir::Location getUserLocation(const llvm::Instruction *instruction,
+                               const ParsedUnit &unit,
+                               mlir::MLIRContext &context);
+
+/// Accessors: functions without a body that the steps leave in the IR.
+namespace accessor {
+constexpr llvm::StringLiteral emit = "piko.emit";
+constexpr llvm::StringLiteral clear = "piko.clear";
+constexpr llvm::StringLiteral updateBegin = "piko.update_begin";
+constexpr llvm::StringLiteral updateValue = "piko.update_value.";
+constexpr llvm::StringLiteral updateEnd = "piko.update_end";
+constexpr llvm::StringLiteral load = "piko.load.";
+constexpr llvm::StringLiteral store = "piko.store.";
+constexpr llvm::StringLiteral atomic = "piko.atomic.";
+} // namespace accessor
+
+void expandMarkers(llvm::Function &function, MemoryMap &memory);
+
+/// Both return whether they changed anything.
+bool splitMemory(llvm::Function &function, MemoryMap &memory);
+bool flattenPointers(llvm::Function &function, MemoryMap &memory);
+
+/// Constant tables that are indexed become local arrays.
+bool localizeTables(llvm::Function &function, MemoryMap &memory);
+
+/// False after an error.
+bool resolveAccesses(llvm::Function &function, ParsedUnit &unit,
+                     MemoryMap &memory, mlir::MLIRContext &context);
+
+} // namespace piko
+
+#endif // PIKO_LIB_FRONTEND_CLEANUP_H

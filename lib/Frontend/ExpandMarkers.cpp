@@ -1,0 +1,141 @@
+//===- ExpandMarkers.cpp - From pointers to records to their numbers ------===//
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// A marker that takes a pointer to a record becomes an accessor that takes the
+// record's numbers, loaded one by one: no pointer escapes. An update's pixel
+// is a local variable, filled when it begins and read when it ends.
+//
+//===----------------------------------------------------------------------===//
+
+#include "Cleanup.h"
+
+#include "llvm/IR/InstIterator.h"
+#include "llvm/IR/Instructions.h"
+#include "llvm/IR/Module.h"
+
+using namespace piko;
+
+namespace {
+
+class MarkerExpander {
+public:
+  MarkerExpander(llvm::Function &function, MemoryMap &memory)
+      : function(function), memory(memory), builder(function.getContext()) {}
+
+  void run() {
+    llvm::SmallVector<llvm::CallInst *> calls;
+    for (llvm::Instruction &instruction : llvm::instructions(function))
+      if (auto *call = llvm::dyn_cast<llvm::CallInst>(&instruction))
+        calls.push_back(call);
+    for (llvm::CallInst *call : calls)
+      if (const Marker *marker = getMarker(call, memory.markers))
+        expand(call, *marker);
+  }
+
+private:
+  void expand(llvm::CallInst *call, const Marker &marker) {
+    builder.SetInsertPoint(call);
+    switch (marker.kind) {
+    case MarkerKind::emit: {
+      llvm::SmallVector<llvm::Value *> values = {
+          call->getArgOperand(0), builder.getInt32(marker.record)};
+      loadRecord(call->getArgOperand(1), marker.record, values);
+      callAccessor(accessor::emit, builder.getVoidTy(), values);
+      break;
+    }
+    case MarkerKind::clear: {
+      llvm::SmallVector<llvm::Value *> values;
+      loadRecord(call->getArgOperand(0), marker.record, values);
+      callAccessor(accessor::clear, builder.getVoidTy(), values);
+      break;
+    }
+    case MarkerKind::updateBegin:
+      expandBegin(call, marker);
+      break;
+    case MarkerKind::updateEnd: {
+      llvm::SmallVector<llvm::Value *> values;
+      loadRecord(call->getArgOperand(0), marker.record, values);
+      callAccessor(accessor::updateEnd, builder.getVoidTy(), values);
+      break;
+    }
+    case MarkerKind::source:
+    case MarkerKind::connect:
+    case MarkerKind::allocateForSource:
+      // The pipeline's constructor, run again inside a phase.
+      if (function.getName().contains("_wire_"))
+        return;
+      break;
+    default:
+      return;
+    }
+    call->eraseFromParent();
+  }
+
+  void expandBegin(llvm::CallInst *call, const Marker &marker) {
+    llvm::SmallVector<llvm::Value *> arguments(
+        llvm::drop_begin(call->args()));
+    llvm::Value *token =
+        callAccessor(accessor::updateBegin, builder.getInt64Ty(), arguments);
+    unsigned number = 0;
+    for (const MemoryPiece &piece : getRecordPieces(marker.record)) {
+      std::string name = accessor::updateValue.str();
+      llvm::raw_string_ostream(name) << *piece.type;
+      llvm::Value *value = callAccessor(
+          name, piece.type, {token, builder.getInt32(number++)});
+      builder.CreateStore(value, at(call->getArgOperand(0), piece.offset));
+    }
+  }
+
+  llvm::SmallVector<MemoryPiece> getRecordPieces(unsigned record) {
+    const MemoryLayout &layout = memory.getRecordLayout(record);
+    llvm::SmallVector<MemoryPiece> pieces;
+    for (const MemoryLeaf &leaf : layout.leaves)
+      for (int64_t i = 0, e = leaf.getElementCount(); i < e; ++i) {
+        int64_t offset = leaf.offset, rest = i;
+        for (const MemoryDimension &dimension :
+             llvm::reverse(leaf.dimensions)) {
+          offset += rest % dimension.count * dimension.stride;
+          rest /= dimension.count;
+        }
+        pieces.push_back({offset, leaf.type});
+      }
+    return pieces;
+  }
+
+  llvm::Value *at(llvm::Value *pointer, int64_t offset) {
+    return offset ? builder.CreateConstInBoundsGEP1_64(builder.getInt8Ty(),
+                                                       pointer, offset)
+                  : pointer;
+  }
+
+  void loadRecord(llvm::Value *pointer, unsigned record,
+                  llvm::SmallVectorImpl<llvm::Value *> &values) {
+    for (const MemoryPiece &piece : getRecordPieces(record))
+      values.push_back(
+          builder.CreateLoad(piece.type, at(pointer, piece.offset)));
+  }
+
+  llvm::CallInst *callAccessor(llvm::StringRef name, llvm::Type *result,
+                               llvm::ArrayRef<llvm::Value *> arguments) {
+    llvm::FunctionCallee callee = function.getParent()->getOrInsertFunction(
+        name, llvm::FunctionType::get(result, /*isVarArg=*/true));
+    auto *declaration = llvm::cast<llvm::Function>(callee.getCallee());
+    declaration->setDoesNotThrow();
+    declaration->setWillReturn();
+    declaration->setOnlyAccessesInaccessibleMemory();
+    declaration->addFnAttr(llvm::Attribute::NoDuplicate);
+    declaration->addFnAttr(llvm::Attribute::Convergent);
+    declaration->addFnAttr(llvm::Attribute::NoMerge);
+    return builder.CreateCall(callee, arguments);
+  }
+
+  llvm::Function &function;
+  MemoryMap &memory;
+  llvm::IRBuilder<> builder;
+};
+
+} // namespace
+
+void piko::expandMarkers(llvm::Function &function, MemoryMap &memory) {
+  MarkerExpander(function, memory).run();
+}

@@ -1,0 +1,36 @@
+//===- Import.h - From cleaned LLVM IR to structured MLIR -------*- C++ -*-===//
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// What is left of a phase after the clean-up is small enough to be written in
+// arith, math, memref and piko directly, with cf for its branches, which are
+// then lifted to scf. MLIR's own import of LLVM IR would give a detour by the
+// llvm dialect, in which addresses are harder to follow, for as many patterns.
+//
+//===----------------------------------------------------------------------===//
+
+#ifndef PIKO_LIB_FRONTEND_IMPORT_H
+#define PIKO_LIB_FRONTEND_IMPORT_H
+
+#include "Memory.h"
+#include "Parse.h"
+#include "Wrappers.h"
+#include "mlir/Dialect/Func/IR/FuncOps.h"
+
+namespace piko {
+
+/// Writes the code of a stage's phase into a function of its primitive; null
+/// after an error. An update is still a pair of placeholder calls.
+mlir::OwningOpRef<mlir::func::FuncOp>
+importPhase(llvm::Function &function, WrapperKind phase, unsigned stage,
+            ParsedUnit &unit, MemoryMap &memory, mlir::MLIRContext &context);
+
+/// Lifts branches to scf and makes piko.update of its placeholders.
+llvm::LogicalResult structurePhase(mlir::func::FuncOp function);
+
+/// The placeholders: calls of functions that do not exist.
+constexpr llvm::StringLiteral updateBeginName = "piko.update_begin.";
+constexpr llvm::StringLiteral updateEndName = "piko.update_end";
+
+} // namespace piko
+
+#endif // PIKO_LIB_FRONTEND_IMPORT_H

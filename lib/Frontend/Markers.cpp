@@ -1,0 +1,67 @@
+//===- Markers.cpp - The functions of piko/markers.h ----------------------===//
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+
+#include "Markers.h"
+
+#include "llvm/ADT/StringSwitch.h"
+#include "llvm/IR/InstrTypes.h"
+#include "llvm/IR/Module.h"
+
+using namespace piko;
+
+std::optional<MarkerKind> piko::getMarkerKind(llvm::StringRef name) {
+#define MARKER(NAME) .Case(#NAME, MarkerKind::NAME)
+  return llvm::StringSwitch<std::optional<MarkerKind>>(name)
+      MARKER(state) MARKER(input) MARKER(element) MARKER(extent) MARKER(emit)
+      MARKER(updateBegin) MARKER(updateEnd) MARKER(atomic) MARKER(bin)
+      MARKER(binAt) MARKER(binLo) MARKER(binHi) MARKER(domain)
+      MARKER(assignBin) MARKER(assignAll) MARKER(assignPrevious)
+      MARKER(assignBox) MARKER(schedule) MARKER(endStage) MARKER(endBin)
+      MARKER(batch) MARKER(everyBin) MARKER(order) MARKER(source)
+      MARKER(connect) MARKER(allocateForSource) MARKER(clear)
+      .Default(std::nullopt);
+#undef MARKER
+}
+
+const Marker *piko::getMarker(const llvm::CallBase *call,
+                              const MarkerTable &markers) {
+  const llvm::Function *callee = call->getCalledFunction();
+  if (!callee)
+    return nullptr;
+  auto found = markers.find(callee->getName());
+  return found == markers.end() ? nullptr : &found->second;
+}
+
+void piko::setMarkerEffects(llvm::Module &module, const MarkerTable &markers) {
+  for (llvm::Function &function : module) {
+    auto found = markers.find(function.getName());
+    if (found == markers.end())
+      continue;
+    function.setAttributes({});
+    function.setDoesNotThrow();
+    function.setWillReturn();
+    switch (found->second.kind) {
+    case MarkerKind::state:
+    case MarkerKind::input:
+    case MarkerKind::element:
+      function.setDoesNotAccessMemory();
+      function.addRetAttr(llvm::Attribute::NonNull);
+      break;
+    case MarkerKind::extent:
+    case MarkerKind::bin:
+    case MarkerKind::binAt:
+    case MarkerKind::binLo:
+    case MarkerKind::binHi:
+    case MarkerKind::domain:
+      function.setDoesNotAccessMemory();
+      break;
+    default:
+      // What they read and write is seen by nothing else in the module, but
+      // they stay where they are, and as many as they are.
+      function.addFnAttr(llvm::Attribute::NoDuplicate);
+      function.addFnAttr(llvm::Attribute::Convergent);
+      function.addFnAttr(llvm::Attribute::NoMerge);
+      break;
+    }
+  }
+}

@@ -1,0 +1,74 @@
+//===- Markers.h - The functions of piko/markers.h --------------*- C++ -*-===//
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+#ifndef PIKO_LIB_FRONTEND_MARKERS_H
+#define PIKO_LIB_FRONTEND_MARKERS_H
+
+#include "llvm/ADT/StringRef.h"
+
+#include <map>
+#include <optional>
+#include <string>
+
+namespace llvm {
+class CallBase;
+class Module;
+} // namespace llvm
+
+namespace piko {
+
+/// One for each function in namespace piko::marker, by the same name.
+enum class MarkerKind {
+  state,
+  input,
+  element,
+  extent,
+  emit,
+  updateBegin,
+  updateEnd,
+  atomic,
+  bin,
+  binAt,
+  binLo,
+  binHi,
+  domain,
+  assignBin,
+  assignAll,
+  assignPrevious,
+  assignBox,
+  schedule,
+  endStage,
+  endBin,
+  batch,
+  everyBin,
+  order,
+  source,
+  connect,
+  allocateForSource,
+  clear,
+};
+
+std::optional<MarkerKind> getMarkerKind(llvm::StringRef name);
+
+struct Marker {
+  MarkerKind kind;
+  /// The record that the marker's pointer points to.
+  unsigned record = 0;
+  /// atomic: which operation, and whether on signed numbers.
+  int operation = 0;
+  bool isSigned = false;
+  /// endStage: the stage, by number.
+  unsigned stage = 0;
+};
+
+/// Markers by the name of their function in the module.
+using MarkerTable = std::map<std::string, Marker, std::less<>>;
+
+/// The marker that an instruction calls, or null.
+const Marker *getMarker(const llvm::CallBase *call, const MarkerTable &markers);
+
+/// Tells LLVM what the markers in a module may do to memory.
+void setMarkerEffects(llvm::Module &module, const MarkerTable &markers);
+
+} // namespace piko
+
+#endif // PIKO_LIB_FRONTEND_MARKERS_H

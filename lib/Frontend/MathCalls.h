@@ -1,0 +1,24 @@
+//===- MathCalls.h - Functions with one meaning everywhere ------*- C++ -*-===//
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+#ifndef PIKO_LIB_FRONTEND_MATHCALLS_H
+#define PIKO_LIB_FRONTEND_MATHCALLS_H
+
+#include "Parse.h"
+
+namespace piko {
+
+/// The definitions in piko/compiled/math.h.
+constexpr llvm::StringLiteral mathPrefix = "__piko_math_";
+
+/// Whether a function of the C library is one that redirectMathCalls replaces.
+bool isMathFunction(const llvm::Function &function);
+
+/// Replaces calls of the C library's functions, which differ between machines,
+/// by calls of Piko's own, with a warning for each place in the user's text.
+/// Minima and maxima become comparisons.
+void redirectMathCalls(llvm::Function &function, const ParsedUnit &unit,
+                       mlir::MLIRContext &context);
+
+} // namespace piko
+
+#endif // PIKO_LIB_FRONTEND_MATHCALLS_H

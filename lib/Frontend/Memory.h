@@ -1,0 +1,124 @@
+//===- Memory.h - What pointers in a phase's LLVM IR point to ---*- C++ -*-===//
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// A pointer in a phase points into a local variable, a constant table, or
+// memory that a marker gave. Either way there is a layout: leaves, which are
+// numbers or arrays of numbers at fixed places.
+//
+//===----------------------------------------------------------------------===//
+
+#ifndef PIKO_LIB_FRONTEND_MEMORY_H
+#define PIKO_LIB_FRONTEND_MEMORY_H
+
+#include "Markers.h"
+#include "Piko/Frontend/PipelineDescription.h"
+#include "llvm/ADT/DenseMap.h"
+#include "llvm/ADT/SmallVector.h"
+#include "llvm/IR/IRBuilder.h"
+
+namespace piko {
+
+struct MemoryDimension {
+  int64_t count, stride;
+};
+
+struct MemoryLeaf {
+  llvm::Type *type;
+  int64_t offset;
+  llvm::SmallVector<MemoryDimension, 2> dimensions;
+
+  int64_t getElementCount() const {
+    int64_t count = 1;
+    for (const MemoryDimension &dimension : dimensions)
+      count *= dimension.count;
+    return count;
+  }
+};
+
+struct MemoryLayout {
+  int64_t size = 0;
+  std::vector<MemoryLeaf> leaves;
+};
+
+/// The layouts of LLVM's types.
+MemoryLayout getLayout(llvm::Type *type, const llvm::DataLayout &data);
+/// The LLVM type of a leaf field.
+llvm::Type *getScalarType(ScalarType type, llvm::LLVMContext &context);
+
+/// base + offset + sum of value * scale, in bytes.
+struct Address {
+  llvm::Value *base = nullptr;
+  int64_t offset = 0;
+  llvm::SmallVector<std::pair<llvm::Value *, int64_t>, 2> terms;
+};
+
+/// Follows address arithmetic to where it begins.
+Address getAddress(llvm::Value *pointer, const llvm::DataLayout &data);
+
+/// An index of a leaf array: constant + sum of value * factor.
+struct MemoryIndex {
+  int64_t constant = 0;
+  llvm::SmallVector<std::pair<llvm::Value *, int64_t>, 1> terms;
+
+  /// As an i64.
+  llvm::Value *materialize(llvm::IRBuilderBase &builder) const;
+};
+
+/// One number in memory.
+struct MemoryAccess {
+  unsigned leaf;
+  llvm::SmallVector<MemoryIndex, 2> indices;
+};
+
+/// The number of `size` bytes at an address; none if no leaf is exactly there.
+std::optional<MemoryAccess> resolveAccess(const MemoryLayout &layout,
+                                          const Address &address, int64_t size);
+
+/// A number at a place relative to a pointer.
+struct MemoryPiece {
+  int64_t offset;
+  llvm::Type *type;
+};
+
+/// The numbers in `size` bytes at an address, relative to it; none if a number
+/// lies only partly in them, or if there are more than `limit`.
+std::optional<llvm::SmallVector<MemoryPiece>>
+getPieces(const MemoryLayout &layout, const Address &address, int64_t size,
+          int64_t limit);
+
+/// Where memory begins, and its layout.
+class MemoryMap {
+public:
+  MemoryMap(const PipelineDescription &pipeline, const MarkerTable &markers,
+            const llvm::DataLayout &data, llvm::LLVMContext &context);
+
+  /// The layout of what `base` points to, or null if that is not known.
+  const MemoryLayout *getLayout(const llvm::Value *base);
+  const MemoryLayout &getRecordLayout(unsigned record) const {
+    return recordLayouts[record];
+  }
+  const MemoryLayout &getTypeLayout(llvm::Type *type);
+
+  /// The piece of state at an address that markers give, or null.
+  const StateDescription *getState(llvm::Value *handle) const;
+  /// For leaves of the state's layout: which constant's field it is.
+  std::pair<unsigned, unsigned> getConstantField(unsigned leaf) const {
+    return constantFields[leaf];
+  }
+  /// The marker that gave `base`, or null.
+  const Marker *getBaseMarker(const llvm::Value *base) const;
+
+  const PipelineDescription &pipeline;
+  const MarkerTable &markers;
+  const llvm::DataLayout &data;
+
+private:
+  std::vector<MemoryLayout> recordLayouts;
+  MemoryLayout stateLayout;
+  std::vector<std::pair<unsigned, unsigned>> constantFields;
+  llvm::DenseMap<llvm::Type *, std::unique_ptr<MemoryLayout>> typeLayouts;
+};
+
+} // namespace piko
+
+#endif // PIKO_LIB_FRONTEND_MEMORY_H

@@ -1,0 +1,200 @@
+//===- ModuleBuilder.cpp - A described pipeline as a module ---------------===//
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+
+#include "ModuleBuilder.h"
+
+#include "Import.h"
+#include "Piko/Dialect/Piko/IR/Piko.h"
+
+using namespace piko;
+using llvm::failed;
+
+namespace {
+
+class Builder {
+public:
+  Builder(ParsedUnit &unit, MemoryMap &memory, mlir::MLIRContext &context)
+      : unit(unit), pipeline(unit.pipeline), memory(memory), context(context),
+        builder(&context) {}
+
+  mlir::OwningOpRef<mlir::ModuleOp> run() {
+    mlir::OwningOpRef<mlir::ModuleOp> module =
+        mlir::ModuleOp::create(builder, pipeline.location);
+    builder.setInsertionPointToEnd(module->getBody());
+    for (const RecordDescription &record : pipeline.records)
+      if (isUsed(record))
+        buildRecord(record);
+    auto op = PipelineOp::create(builder, pipeline.location, pipeline.name,
+                                 pipeline.rank);
+    builder.createBlock(&op.getBody());
+    for (const StateDescription &state : pipeline.state)
+      buildState(state);
+    for (const SourceDescription &source : pipeline.sources)
+      SourceOp::create(builder, source.location,
+                       pipeline.stages[source.stage].name);
+    for (const EdgeDescription &edge : pipeline.edges)
+      EdgeOp::create(builder, edge.location,
+                     pipeline.stages[edge.producer].name, edge.port,
+                     pipeline.stages[edge.consumer].name);
+    for (unsigned stage = 0; stage < pipeline.stages.size(); ++stage) {
+      mlir::OpBuilder::InsertionGuard guard(builder);
+      if (!buildStage(stage))
+        return nullptr;
+    }
+    return module;
+  }
+
+private:
+  mlir::FlatSymbolRefAttr getRecordName(unsigned record) {
+    return mlir::FlatSymbolRefAttr::get(&context,
+                                        pipeline.records[record].name);
+  }
+
+  mlir::Type getType(ScalarType type) {
+    switch (type) {
+    case ScalarType::F32:
+      return builder.getF32Type();
+    case ScalarType::F64:
+      return builder.getF64Type();
+    case ScalarType::I8:
+      return builder.getI8Type();
+    case ScalarType::I16:
+      return builder.getI16Type();
+    case ScalarType::I32:
+      return builder.getI32Type();
+    case ScalarType::I64:
+      return builder.getI64Type();
+    }
+    llvm_unreachable("all scalar types are listed");
+  }
+
+  /// Bodies may name types that cross no edge and are not in the state.
+  bool isUsed(const RecordDescription &record) {
+    unsigned number = &record - pipeline.records.data();
+    for (const StateDescription &state : pipeline.state)
+      if (state.record == number)
+        return true;
+    for (const StageDescription &stage : pipeline.stages)
+      if (stage.input == number || llvm::is_contained(stage.outputs, number))
+        return true;
+    return false;
+  }
+
+  void buildRecord(const RecordDescription &record) {
+    llvm::SmallVector<mlir::Attribute> fields;
+    for (const LeafField &field : record.fields)
+      fields.push_back(FieldAttr::get(&context, field.name,
+                                      getType(field.type), field.offset,
+                                      field.counts, field.strides));
+    RecordOp::create(builder, pipeline.location, record.name,
+                     builder.getArrayAttr(fields), record.size, record.align);
+  }
+
+  void buildState(const StateDescription &state) {
+    mlir::StringAttr name = builder.getStringAttr(state.name);
+    mlir::FlatSymbolRefAttr record = getRecordName(state.record);
+    switch (state.kind) {
+    case StateDescription::Constant:
+      ConstantOp::create(builder, state.location, name, record);
+      return;
+    case StateDescription::Buffer:
+      BufferOp::create(builder, state.location, name, record,
+                       state.perSource
+                           ? builder.getI64IntegerAttr(*state.perSource)
+                           : mlir::IntegerAttr());
+      return;
+    case StateDescription::Image:
+      ImageOp::create(builder, state.location, name, record,
+                      builder.getI64IntegerAttr(state.rank),
+                      buildClear(state));
+      return;
+    }
+  }
+
+  mlir::ArrayAttr buildClear(const StateDescription &state) {
+    if (llvm::all_of(state.clear, [](uint64_t bits) { return bits == 0; }))
+      return nullptr;
+    llvm::SmallVector<mlir::Attribute> values;
+    size_t next = 0;
+    for (const LeafField &field : pipeline.records[state.record].fields)
+      for (int64_t i = 0, e = field.getElementCount(); i < e; ++i) {
+        mlir::Type type = getType(field.type);
+        unsigned width = type.getIntOrFloatBitWidth();
+        llvm::APInt bits(width, state.clear[next++]);
+        if (auto real = llvm::dyn_cast<mlir::FloatType>(type))
+          values.push_back(builder.getFloatAttr(
+              type, llvm::APFloat(real.getFloatSemantics(), bits)));
+        else
+          values.push_back(builder.getIntegerAttr(type, bits));
+      }
+    return builder.getArrayAttr(values);
+  }
+
+  bool buildStage(unsigned number) {
+    const StageDescription &stage = pipeline.stages[number];
+    llvm::SmallVector<mlir::Attribute> outputs;
+    for (unsigned output : stage.outputs)
+      outputs.push_back(getRecordName(output));
+    auto op = StageOp::create(
+        builder, stage.location, builder.getStringAttr(stage.name),
+        builder.getDenseI64ArrayAttr(stage.bins),
+        builder.getI64IntegerAttr(stage.threads), getRecordName(stage.input),
+        builder.getArrayAttr(outputs), /*lineage=*/nullptr, /*tile=*/nullptr);
+    builder.createBlock(&op.getBody());
+    if (stage.hasAssign) {
+      auto assign = AssignOp::create(builder, stage.location, nullptr, nullptr,
+                                     nullptr);
+      if (!buildPhase(WrapperKind::Assign, number, assign.getBody()))
+        return false;
+    }
+    buildSchedule(stage);
+    auto process = ProcessOp::create(builder, stage.location, nullptr);
+    return buildPhase(WrapperKind::Process, number, process.getBody());
+  }
+
+  void buildSchedule(const StageDescription &stage) {
+    const ScheduleDescription &schedule = stage.schedule;
+    llvm::SmallVector<mlir::Attribute> waits;
+    for (unsigned other : schedule.endStage)
+      waits.push_back(mlir::FlatSymbolRefAttr::get(
+          &context, pipeline.stages[other].name));
+    auto number = [&](int64_t value) {
+      return value ? builder.getI64IntegerAttr(value) : mlir::IntegerAttr();
+    };
+    ScheduleOp::create(
+        builder, stage.location, static_cast<ScheduleKind>(schedule.policy),
+        number(schedule.tileSplit),
+        waits.empty() ? mlir::ArrayAttr() : builder.getArrayAttr(waits),
+        schedule.endBin, number(schedule.batch), schedule.everyBin,
+        schedule.unordered);
+  }
+
+  bool buildPhase(WrapperKind kind, unsigned stage, mlir::Region &region) {
+    llvm::Function *source =
+        unit.module->getFunction(getWrapperName(kind, stage));
+    mlir::OwningOpRef<mlir::func::FuncOp> function =
+        importPhase(*source, kind, stage, unit, memory, context);
+    if (!function || failed(structurePhase(*function)))
+      return false;
+    region.takeBody(function->getBody());
+    mlir::Operation *end = region.back().getTerminator();
+    mlir::OpBuilder phaseBuilder(end);
+    ReturnOp::create(phaseBuilder, end->getLoc());
+    end->erase();
+    return true;
+  }
+
+  ParsedUnit &unit;
+  PipelineDescription &pipeline;
+  MemoryMap &memory;
+  mlir::MLIRContext &context;
+  mlir::OpBuilder builder;
+};
+
+} // namespace
+
+mlir::OwningOpRef<mlir::ModuleOp>
+piko::buildModule(ParsedUnit &unit, MemoryMap &memory,
+                  mlir::MLIRContext &context) {
+  return Builder(unit, memory, context).run();
+}

@@ -1,0 +1,314 @@
+//===- PipelineReader.cpp - Pipelines in Clang's AST ----------------------===//
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Types are known by their declarations (a class template of that name in
+// namespace piko), never by how a user spells them.
+//
+//===----------------------------------------------------------------------===//
+
+#include "PipelineReader.h"
+
+#include "ClangDiagnostics.h"
+#include "clang/AST/DeclTemplate.h"
+#include "clang/AST/RecordLayout.h"
+#include "clang/Basic/SourceManager.h"
+#include "mlir/IR/Diagnostics.h"
+
+using namespace piko;
+using clang::CXXRecordDecl;
+using clang::QualType;
+using llvm::dyn_cast;
+using llvm::failed;
+using llvm::failure;
+using llvm::LogicalResult;
+using llvm::success;
+using mlir::emitError;
+
+using Specialization = clang::ClassTemplateSpecializationDecl;
+
+/// `decl` as a specialization of piko::`name`, or null.
+static const Specialization *asPikoTemplate(const CXXRecordDecl *decl,
+                                            llvm::StringRef name) {
+  const auto *specialization = llvm::dyn_cast_or_null<Specialization>(decl);
+  if (!specialization || specialization->getName() != name)
+    return nullptr;
+  const auto *space =
+      dyn_cast<clang::NamespaceDecl>(specialization->getDeclContext());
+  bool isPiko = space && space->getName() == "piko" &&
+                space->getParent()->isTranslationUnit();
+  return isPiko ? specialization : nullptr;
+}
+
+/// The base of `decl` that is a specialization of piko::`name`, or null.
+static const Specialization *findPikoBase(const CXXRecordDecl *decl,
+                                          llvm::StringRef name) {
+  if (!decl || !decl->hasDefinition())
+    return nullptr;
+  if (const Specialization *self = asPikoTemplate(decl, name))
+    return self;
+  for (const clang::CXXBaseSpecifier &base : decl->bases())
+    if (const Specialization *found =
+            findPikoBase(base.getType()->getAsCXXRecordDecl(), name))
+      return found;
+  return nullptr;
+}
+
+static QualType getTypeArgument(const Specialization *type, unsigned index) {
+  return type->getTemplateArgs()[index].getAsType();
+}
+
+//===----------------------------------------------------------------------===//
+// Finding pipelines
+//===----------------------------------------------------------------------===//
+
+static void collectPipes(const clang::DeclContext *scope,
+                         clang::ASTContext &ast,
+                         std::vector<PipeCandidate> &pipes) {
+  for (const clang::Decl *decl : scope->decls()) {
+    if (const auto *space = dyn_cast<clang::NamespaceDecl>(decl)) {
+      if (!space->isStdNamespace() && space->getName() != "glm")
+        collectPipes(space, ast, pipes);
+      continue;
+    }
+    if (const auto *link = dyn_cast<clang::LinkageSpecDecl>(decl)) {
+      collectPipes(link, ast, pipes);
+      continue;
+    }
+    if (ast.getSourceManager().isInSystemHeader(decl->getLocation()))
+      continue;
+    const CXXRecordDecl *type = nullptr;
+    if (const auto *alias = dyn_cast<clang::TypedefNameDecl>(decl)) {
+      QualType target = alias->getUnderlyingType();
+      type = target->getAsCXXRecordDecl();
+      if (!type || type->isDependentContext() || !type->hasDefinition() ||
+          !llvm::isa<Specialization>(type))
+        continue;
+    } else if (const auto *record = dyn_cast<CXXRecordDecl>(decl)) {
+      if (!record->isThisDeclarationADefinition() || record->isInvalidDecl() ||
+          record->isDependentContext() || record->isImplicit())
+        continue;
+      type = record;
+    }
+    if (type && findPikoBase(type, "Pipe"))
+      pipes.push_back({llvm::cast<clang::NamedDecl>(decl)->getNameAsString(),
+                       type, decl->getLocation()});
+  }
+}
+
+std::vector<PipeCandidate> piko::findPipes(clang::ASTContext &ast) {
+  std::vector<PipeCandidate> pipes;
+  collectPipes(ast.getTranslationUnitDecl(), ast, pipes);
+  return pipes;
+}
+
+llvm::FailureOr<PipeCandidate>
+piko::selectPipe(const std::vector<PipeCandidate> &pipes, llvm::StringRef name,
+                 mlir::Location file, clang::ASTContext &ast,
+                 mlir::MLIRContext &context) {
+  if (pipes.empty()) {
+    emitError(file) << "expected a pipeline (a class that derives from "
+                       "piko::Pipe), but the file defines none";
+    return failure();
+  }
+  for (const PipeCandidate &pipe : pipes)
+    if (pipe.name == name || (name.empty() && pipes.size() == 1))
+      return pipe;
+
+  mlir::InFlightDiagnostic diagnostic = emitError(file);
+  if (name.empty())
+    diagnostic << "expected the name of one of the file's " << pipes.size()
+               << " pipelines";
+  else
+    diagnostic << "expected the name of a pipeline, but got '" << name << "'";
+  for (const PipeCandidate &pipe : pipes)
+    diagnostic.attachNote(
+        convertLocation(pipe.location, ast.getSourceManager(), context))
+        << "pipeline '" << pipe.name << "' is defined here";
+  return failure();
+}
+
+//===----------------------------------------------------------------------===//
+// Reading one
+//===----------------------------------------------------------------------===//
+
+mlir::Location PipelineReader::locate(clang::SourceLocation location) const {
+  return convertLocation(location, ast.getSourceManager(), context);
+}
+
+LogicalResult PipelineReader::read(const PipeCandidate &pipe) {
+  const Specialization *base = findPikoBase(pipe.type, "Pipe");
+  stateType = getTypeArgument(base, 0);
+  if (failed(readState(stateType)))
+    return failure();
+
+  // Members of base classes first, as they are constructed.
+  llvm::SmallVector<const CXXRecordDecl *> hierarchy;
+  for (const CXXRecordDecl *type = pipe.type; type && type != base;) {
+    hierarchy.push_back(type);
+    const CXXRecordDecl *next = nullptr;
+    for (const clang::CXXBaseSpecifier &specifier : type->bases())
+      if (findPikoBase(specifier.getType()->getAsCXXRecordDecl(), "Pipe"))
+        next = specifier.getType()->getAsCXXRecordDecl()->getDefinition();
+    type = next;
+  }
+  for (const CXXRecordDecl *type : llvm::reverse(hierarchy))
+    for (const clang::FieldDecl *member : type->fields())
+      if (findPikoBase(member->getType()->getAsCXXRecordDecl(), "BasicStage") &&
+          failed(readStage(member)))
+        return failure();
+  if (pipeline.stages.empty())
+    return emitError(pipeline.location)
+           << "expected pipeline '" << pipeline.name
+           << "' to have a stage, but it has none";
+  pipeline.rank = pipeline.stages.front().bins.size();
+  for (const StageDescription &stage : pipeline.stages)
+    if (static_cast<int64_t>(stage.bins.size()) != pipeline.rank) {
+      mlir::InFlightDiagnostic diagnostic = emitError(stage.location);
+      diagnostic << "expected the bins of stage '" << stage.name << "' to have "
+                 << pipeline.rank << " dimensions, but they have "
+                 << stage.bins.size();
+      diagnostic.attachNote(pipeline.stages.front().location)
+          << "stage '" << pipeline.stages.front().name << "' is declared here";
+      return diagnostic;
+    }
+  return success();
+}
+
+LogicalResult PipelineReader::readState(QualType type) {
+  const CXXRecordDecl *decl = type->getAsCXXRecordDecl();
+  if (!decl || !decl->hasDefinition())
+    return emitError(pipeline.location)
+           << "expected the state of pipeline '" << pipeline.name
+           << "' to be a class";
+  decl = decl->getDefinition();
+  const clang::ASTRecordLayout &layout = ast.getASTRecordLayout(decl);
+  if (decl->getNumBases() != 0)
+    return emitError(locate(decl->getLocation()))
+           << "not supported in Piko: a base class of the state";
+  for (const clang::FieldDecl *member : decl->fields()) {
+    StateDescription state{member->getNameAsString(), StateDescription::Constant,
+                           0, 0, 0, locate(member->getLocation())};
+    QualType element = member->getType();
+    const CXXRecordDecl *memberType = element->getAsCXXRecordDecl();
+    if (const Specialization *buffer = asPikoTemplate(memberType, "Buffer")) {
+      state.kind = StateDescription::Buffer;
+      state.rank = 1;
+      element = getTypeArgument(buffer, 0);
+    } else if (const Specialization *image =
+                   asPikoTemplate(memberType, "Image")) {
+      state.kind = StateDescription::Image;
+      state.rank =
+          image->getTemplateArgs()[1].getAsIntegral().getSExtValue();
+      element = getTypeArgument(image, 0);
+    }
+    state.offset = layout.getFieldOffset(member->getFieldIndex()) / 8;
+    llvm::FailureOr<unsigned> record = records.get(element, state.location);
+    if (failed(record))
+      return failure();
+    state.record = *record;
+    pipeline.state.push_back(std::move(state));
+  }
+  return success();
+}
+
+LogicalResult PipelineReader::readStage(const clang::FieldDecl *member) {
+  const CXXRecordDecl *type =
+      member->getType()->getAsCXXRecordDecl()->getDefinition();
+  StageDescription stage{.name = member->getNameAsString(),
+                         .typeName = records.getName(member->getType()),
+                         .location = locate(member->getLocation())};
+  const auto *parent = llvm::cast<CXXRecordDecl>(member->getParent());
+  stage.offset = ast.getASTRecordLayout(parent).getFieldOffset(
+                     member->getFieldIndex()) /
+                 8;
+
+  if (failed(readTemplate(findPikoBase(type, "BasicStage"), stage)) ||
+      failed(readPhases(type, stage)))
+    return failure();
+  if (const Specialization *uses = findPikoBase(type, "Uses")) {
+    QualType used = getTypeArgument(uses, 0);
+    if (!ast.hasSameType(used, stateType))
+      return emitError(stage.location)
+             << "expected stage '" << stage.name << "' to use the state '"
+             << records.getName(stateType) << "' of its pipeline, but it uses '"
+             << records.getName(used) << "'";
+  }
+  stageTypes.push_back(type->getCanonicalDecl());
+  pipeline.stages.push_back(std::move(stage));
+  return success();
+}
+
+LogicalResult PipelineReader::readTemplate(const Specialization *base,
+                                           StageDescription &stage) {
+  const clang::TemplateArgumentList &arguments = base->getTemplateArgs();
+  const auto *bins =
+      llvm::cast<Specialization>(arguments[0].getAsType()->getAsCXXRecordDecl());
+  for (const clang::TemplateArgument &size :
+       bins->getTemplateArgs()[0].pack_elements())
+    stage.bins.push_back(size.getAsIntegral().getSExtValue());
+  stage.threads = arguments[1].getAsIntegral().getSExtValue();
+
+  llvm::FailureOr<unsigned> input =
+      records.get(arguments[2].getAsType(), stage.location);
+  if (failed(input))
+    return failure();
+  stage.input = *input;
+  for (const clang::TemplateArgument &type : arguments[3].pack_elements()) {
+    llvm::FailureOr<unsigned> output =
+        records.get(type.getAsType(), stage.location);
+    if (failed(output))
+      return failure();
+    stage.outputs.push_back(*output);
+  }
+  return success();
+}
+
+/// Whether a class or one of its bases declares a function of that name;
+/// `found` gets it.
+static bool declares(const CXXRecordDecl *type, llvm::StringRef name,
+                     const clang::NamedDecl *&found) {
+  if (!type || !type->hasDefinition())
+    return false;
+  type = type->getDefinition();
+  for (const clang::Decl *decl : type->decls()) {
+    const auto *named = dyn_cast<clang::NamedDecl>(decl);
+    if (named && named->getDeclName().isIdentifier() &&
+        named->getName() == name &&
+        llvm::isa<clang::CXXMethodDecl, clang::FunctionTemplateDecl>(named)) {
+      found = named;
+      return true;
+    }
+  }
+  for (const clang::CXXBaseSpecifier &base : type->bases())
+    if (declares(base.getType()->getAsCXXRecordDecl(), name, found))
+      return true;
+  return false;
+}
+
+LogicalResult PipelineReader::readPhases(const CXXRecordDecl *type,
+                                         StageDescription &stage) {
+  const clang::NamedDecl *process = nullptr, *assign = nullptr,
+                         *schedule = nullptr;
+  mlir::Location where = locate(type->getLocation());
+  if (!declares(type, "process", process))
+    return emitError(where) << "expected stage '" << stage.name
+                            << "' to have a process phase, but '"
+                            << stage.typeName << "' has none";
+  if (const auto *method = dyn_cast<clang::CXXMethodDecl>(process))
+    if (method->getNumParams() == 1) {
+      QualType parameter = method->getParamDecl(0)->getType();
+      if (asPikoTemplate(
+              parameter.getNonReferenceType()->getAsCXXRecordDecl(), "List"))
+        return emitError(locate(process->getLocation()))
+               << "not supported in Piko: stage '" << stage.name
+               << "' processes a list, which the compiler cannot do yet";
+    }
+  stage.hasAssign = declares(type, "assignBin", assign);
+  stage.hasSchedule = declares(type, "schedule", schedule);
+  if (!stage.hasAssign && !stage.isWholeDomain())
+    return emitError(where)
+           << "expected stage '" << stage.name
+           << "' to have an assignBin phase, because its bins are smaller than "
+              "the domain";
+  return success();
+}

@@ -1,0 +1,321 @@
+//===- Wiring.cpp - What a pipeline's code says once ----------------------===//
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Directives are read from simplified IR, where templates, `if constexpr` and
+// helper functions are gone: a marker that is called unconditionally with
+// constant arguments is a fact about the pipeline.
+//
+//===----------------------------------------------------------------------===//
+
+#include "Wiring.h"
+
+#include "Cleanup.h"
+#include "Wrappers.h"
+#include "llvm/IR/Constants.h"
+#include "llvm/IR/InstIterator.h"
+#include "llvm/IR/Instructions.h"
+#include "mlir/IR/Diagnostics.h"
+
+using namespace piko;
+using llvm::dyn_cast;
+using mlir::InFlightDiagnostic;
+
+namespace {
+
+class WiringReader {
+public:
+  WiringReader(ParsedUnit &unit, MemoryMap &memory, mlir::MLIRContext &context)
+      : unit(unit), pipeline(unit.pipeline), memory(memory), context(context) {}
+
+  bool run() {
+    if (!readGraph() || !checkGraph())
+      return false;
+    for (auto [index, stage] : llvm::enumerate(pipeline.stages))
+      if (stage.hasSchedule && !readSchedule(index, stage))
+        return false;
+    for (auto [index, state] : llvm::enumerate(pipeline.state))
+      if (state.kind == StateDescription::Image && !readClear(index, state))
+        return false;
+    return true;
+  }
+
+private:
+  llvm::Function &getWrapper(WrapperKind kind, unsigned index) {
+    return *unit.module->getFunction(getWrapperName(kind, index));
+  }
+  InFlightDiagnostic fail(const llvm::CallInst *call) {
+    return mlir::emitError(getUserLocation(call, unit, context));
+  }
+
+  /// The constant that a marker is given; reports where it is not one.
+  std::optional<int64_t> getConstant(const llvm::CallInst *call,
+                                     unsigned operand, llvm::StringRef what) {
+    if (auto *number =
+            dyn_cast<llvm::ConstantInt>(call->getArgOperand(operand)))
+      return number->getSExtValue();
+    fail(call) << "expected " << what << " to be a constant";
+    return std::nullopt;
+  }
+
+  //===--------------------------------------------------------------------===//
+  // The graph
+  //===--------------------------------------------------------------------===//
+
+  std::optional<unsigned> getStage(const llvm::CallInst *call,
+                                   unsigned operand) {
+    Address address = getAddress(call->getArgOperand(operand), memory.data);
+    if (llvm::isa<llvm::AllocaInst>(address.base) && address.terms.empty())
+      for (auto [index, stage] : llvm::enumerate(pipeline.stages))
+        if (stage.offset == address.offset)
+          return index;
+    fail(call) << "expected a stage that is a member of pipeline '"
+               << pipeline.name << "'";
+    return std::nullopt;
+  }
+
+  bool readGraph() {
+    llvm::Function &function = getWrapper(WrapperKind::Wire, 0);
+    for (llvm::Instruction &instruction : llvm::instructions(function)) {
+      auto *call = dyn_cast<llvm::CallInst>(&instruction);
+      const Marker *marker = call ? getMarker(call, unit.markers) : nullptr;
+      if (!marker || marker->kind == MarkerKind::state)
+        continue;
+      if (!call->getParent()->isEntryBlock()) {
+        fail(call) << "expected a pipeline's constructor to connect its stages "
+                      "unconditionally";
+        return false;
+      }
+      bool ok = true;
+      switch (marker->kind) {
+      case MarkerKind::source:
+        ok = readSource(call);
+        break;
+      case MarkerKind::connect:
+        ok = readEdge(call);
+        break;
+      case MarkerKind::allocateForSource:
+        ok = readAllocation(call);
+        break;
+      default:
+        fail(call) << "expected a pipeline's constructor to connect its stages "
+                      "and nothing else";
+        ok = false;
+        break;
+      }
+      if (!ok)
+        return false;
+    }
+    return true;
+  }
+
+  bool readSource(const llvm::CallInst *call) {
+    std::optional<unsigned> stage = getStage(call, 0);
+    if (!stage)
+      return false;
+    pipeline.sources.push_back({*stage, getUserLocation(call, unit, context)});
+    return true;
+  }
+
+  bool readEdge(const llvm::CallInst *call) {
+    std::optional<unsigned> producer = getStage(call, 0);
+    std::optional<int64_t> port = getConstant(call, 1, "the port of an edge");
+    std::optional<unsigned> consumer = getStage(call, 2);
+    if (!producer || !port || !consumer)
+      return false;
+    const StageDescription &from = pipeline.stages[*producer];
+    const StageDescription &to = pipeline.stages[*consumer];
+    int64_t ports = from.outputs.size();
+    if (*port < 0 || *port >= ports) {
+      fail(call) << "expected one of the " << ports << " ports of stage '"
+                 << from.name << "', but got port " << *port;
+      return false;
+    }
+    for (const EdgeDescription &edge : pipeline.edges)
+      if (edge.producer == *producer && edge.port == *port) {
+        InFlightDiagnostic diagnostic = fail(call);
+        diagnostic << "port " << *port << " of stage '" << from.name
+                   << "' is connected twice";
+        diagnostic.attachNote(edge.location) << "it is connected here";
+        return false;
+      }
+    if (from.outputs[*port] != to.input) {
+      InFlightDiagnostic diagnostic = fail(call);
+      diagnostic << "expected an edge between equal types, but port " << *port
+                 << " of stage '" << from.name << "' emits '"
+                 << pipeline.records[from.outputs[*port]].name
+                 << "' and stage '" << to.name << "' takes '"
+                 << pipeline.records[to.input].name << "'";
+      diagnostic.attachNote(to.location)
+          << "stage '" << to.name << "' is declared here";
+      return false;
+    }
+    pipeline.edges.push_back({*producer, static_cast<unsigned>(*port),
+                              *consumer,
+                              getUserLocation(call, unit, context)});
+    return true;
+  }
+
+  bool readAllocation(const llvm::CallInst *call) {
+    const StateDescription *state = memory.getState(call->getArgOperand(0));
+    std::optional<int64_t> source =
+        getConstant(call, 1, "the source of a buffer");
+    if (!source)
+      return false;
+    if (!state) {
+      fail(call) << "expected a buffer of the pipeline's state";
+      return false;
+    }
+    StateDescription &ours = pipeline.state[state - pipeline.state.data()];
+    ours.perSource = source;
+    allocations.push_back({&ours, call});
+    return true;
+  }
+
+  bool checkGraph() {
+    if (pipeline.sources.empty()) {
+      mlir::emitError(pipeline.location)
+          << "expected pipeline '" << pipeline.name << "' to have a source";
+      return false;
+    }
+    int64_t sources = pipeline.sources.size();
+    for (auto [state, call] : allocations)
+      if (*state->perSource < 0 || *state->perSource >= sources) {
+        fail(call) << "expected one of the " << sources
+                   << " sources of pipeline '" << pipeline.name
+                   << "', but got source " << *state->perSource;
+        return false;
+      }
+    bool ok = true;
+    for (auto [index, stage] : llvm::enumerate(pipeline.stages))
+      for (unsigned port = 0; port < stage.outputs.size(); ++port)
+        if (llvm::none_of(pipeline.edges, [&](const EdgeDescription &edge) {
+              return edge.producer == index && edge.port == port;
+            })) {
+          mlir::emitError(stage.location)
+              << "port " << port << " of stage '" << stage.name
+              << "' is not connected";
+          ok = false;
+        }
+    return ok;
+  }
+
+  //===--------------------------------------------------------------------===//
+  // Schedules
+  //===--------------------------------------------------------------------===//
+
+  bool readSchedule(unsigned index, StageDescription &stage) {
+    llvm::Function &function = getWrapper(WrapperKind::Schedule, index);
+    for (llvm::Instruction &instruction : llvm::instructions(function)) {
+      auto *call = dyn_cast<llvm::CallInst>(&instruction);
+      const Marker *marker = call ? getMarker(call, unit.markers) : nullptr;
+      if (!marker || !readDirective(call, *marker, stage.schedule, stage)) {
+        if (marker)
+          return false;
+        continue;
+      }
+      bool isDirective = !instruction.getType()->isIntegerTy() &&
+                         !instruction.getType()->isPointerTy();
+      if (isDirective && !call->getParent()->isEntryBlock()) {
+        fail(call) << "not supported in Piko: a schedule that depends on the "
+                      "bin, which the compiler cannot do yet";
+        return false;
+      }
+    }
+    return true;
+  }
+
+  /// False after an error.
+  bool readDirective(const llvm::CallInst *call, const Marker &marker,
+                     ScheduleDescription &schedule,
+                     const StageDescription &stage) {
+    std::optional<int64_t> number;
+    switch (marker.kind) {
+    case MarkerKind::schedule:
+      if (!(number = getConstant(call, 0, "a schedule")))
+        return false;
+      schedule.policy = static_cast<SchedulePolicy>(*number);
+      if (!(number = getConstant(call, 1, "a tile split")))
+        return false;
+      schedule.tileSplit = *number;
+      return true;
+    case MarkerKind::endStage:
+      if (marker.stage >= pipeline.stages.size()) {
+        fail(call) << "expected endStage of a stage of pipeline '"
+                   << pipeline.name << "'";
+        return false;
+      }
+      schedule.endStage.push_back(marker.stage);
+      return true;
+    case MarkerKind::endBin:
+      schedule.endBin = true;
+      return true;
+    case MarkerKind::batch:
+      if (!(number = getConstant(call, 0, "a batch size")))
+        return false;
+      schedule.batch = *number;
+      return true;
+    case MarkerKind::everyBin:
+      schedule.everyBin = true;
+      return true;
+    case MarkerKind::order:
+      if (!(number = getConstant(call, 0, "an order")))
+        return false;
+      schedule.unordered = *number != 0;
+      return true;
+    case MarkerKind::emit:
+    case MarkerKind::updateBegin:
+    case MarkerKind::assignBin:
+    case MarkerKind::assignAll:
+    case MarkerKind::assignPrevious:
+    case MarkerKind::assignBox:
+      fail(call) << "expected only directives in the schedule phase of stage '"
+                 << stage.name << "'";
+      return false;
+    default:
+      return true;
+    }
+  }
+
+  //===--------------------------------------------------------------------===//
+  // Clear values
+  //===--------------------------------------------------------------------===//
+
+  bool readClear(unsigned index, StateDescription &state) {
+    llvm::Function &function = getWrapper(WrapperKind::Clear, index);
+    for (llvm::Instruction &instruction : llvm::instructions(function)) {
+      auto *call = dyn_cast<llvm::CallInst>(&instruction);
+      if (!call || !call->getCalledFunction() ||
+          call->getCalledFunction()->getName() != accessor::clear)
+        continue;
+      for (llvm::Value *value : call->args()) {
+        if (auto *number = dyn_cast<llvm::ConstantInt>(value))
+          state.clear.push_back(number->getZExtValue());
+        else if (auto *number = dyn_cast<llvm::ConstantFP>(value))
+          state.clear.push_back(
+              number->getValueAPF().bitcastToAPInt().getZExtValue());
+        else if (llvm::isa<llvm::UndefValue>(value))
+          state.clear.push_back(0);
+        else {
+          mlir::emitError(state.location)
+              << "expected the value that image '" << state.name
+              << "' is cleared to to be a constant";
+          return false;
+        }
+      }
+    }
+    return true;
+  }
+
+  ParsedUnit &unit;
+  PipelineDescription &pipeline;
+  MemoryMap &memory;
+  mlir::MLIRContext &context;
+  std::vector<std::pair<StateDescription *, const llvm::CallInst *>> allocations;
+};
+
+} // namespace
+
+bool piko::readWiring(ParsedUnit &unit, MemoryMap &memory,
+                      mlir::MLIRContext &context) {
+  return WiringReader(unit, memory, context).run();
+}

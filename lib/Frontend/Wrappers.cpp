@@ -1,0 +1,51 @@
+//===- Wrappers.cpp - C++ text around a pipeline's phases -----------------===//
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// A wrapper builds the whole pipeline object locally, so that what its
+// constructors set is known; inlining and SROA dissolve it.
+//
+//===----------------------------------------------------------------------===//
+
+#include "Wrappers.h"
+
+#include "llvm/Support/raw_ostream.h"
+
+using namespace piko;
+
+std::string piko::getWrapperName(WrapperKind kind, unsigned index) {
+  static const char *const names[] = {"wire", "assign", "schedule", "process",
+                                      "clear"};
+  return std::string("__piko_wrapper_") + names[static_cast<int>(kind)] + "_" +
+         std::to_string(index);
+}
+
+std::string piko::generateWrappers(const PipelineDescription &pipeline,
+                                   llvm::StringRef typeName) {
+  std::string text;
+  llvm::raw_string_ostream out(text);
+  auto function = [&](WrapperKind kind, unsigned index, llvm::Twine body) {
+    out << "extern \"C\" void " << getWrapperName(kind, index) << "() { "
+        << body << " }\n";
+  };
+  out << "using __piko_pipe = " << typeName << ";\n";
+  out << "using __piko_state = __piko_pipe::State;\n";
+  function(WrapperKind::Wire, 0, "__piko_pipe pipe;");
+  for (auto [index, stage] : llvm::enumerate(pipeline.stages)) {
+    std::string call = "__piko_pipe pipe; pipe." + stage.name;
+    std::string input = "(*::piko::marker::input<typename decltype(pipe." +
+                        stage.name + ")::Input>());";
+    function(WrapperKind::Process, index, call + ".process" + input);
+    if (stage.hasAssign)
+      function(WrapperKind::Assign, index, call + ".assignBin" + input);
+    if (stage.hasSchedule)
+      function(WrapperKind::Schedule, index,
+               call + ".schedule(::piko::BinId{::piko::marker::bin()});");
+  }
+  for (auto [index, state] : llvm::enumerate(pipeline.state))
+    if (state.kind == StateDescription::Image)
+      function(WrapperKind::Clear, index,
+               "::piko::detail::clearImage(::piko::marker::state<__piko_state>"
+               "()->" +
+                   state.name + ");");
+  return text;
+}

@@ -1,0 +1,25 @@
+//===- Wrappers.h - C++ text around a pipeline's phases ---------*- C++ -*-===//
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+#ifndef PIKO_LIB_FRONTEND_WRAPPERS_H
+#define PIKO_LIB_FRONTEND_WRAPPERS_H
+
+#include "Piko/Frontend/PipelineDescription.h"
+#include "llvm/ADT/StringRef.h"
+
+namespace piko {
+
+/// The functions that the wrapper text defines.
+enum class WrapperKind { Wire, Assign, Schedule, Process, Clear };
+
+/// The name of a wrapper; `index` is a stage's, or a piece of state's.
+std::string getWrapperName(WrapperKind kind, unsigned index = 0);
+
+/// C++ that follows the user's file: one function for the constructor of the
+/// pipeline, one for each phase of each stage, and one for each image's clear
+/// value. `typeName` is how the pipeline's type can be written there.
+std::string generateWrappers(const PipelineDescription &pipeline,
+                             llvm::StringRef typeName);
+
+} // namespace piko
+
+#endif // PIKO_LIB_FRONTEND_WRAPPERS_H
