@@ -25,6 +25,7 @@
 #include "llvm/Transforms/Scalar/EarlyCSE.h"
 #include "llvm/Transforms/Scalar/SROA.h"
 #include "llvm/Transforms/Scalar/SimplifyCFG.h"
+#include "llvm/Transforms/Utils/Cloning.h"
 #include "llvm/Transforms/Utils/Mem2Reg.h"
 #include "mlir/IR/Diagnostics.h"
 
@@ -68,6 +69,8 @@ public:
       auto *call = dyn_cast<llvm::CallBase>(&instruction);
       if (call && !checkCall(call))
         return false;
+      if (!checkReferences(instruction))
+        return false;
     }
     stack.pop_back();
     return true;
@@ -104,7 +107,7 @@ private:
       return fail(call, "inline assembly");
     llvm::Function *callee = call->getCalledFunction();
     if (!callee)
-      return fail(call, "a virtual call or a call through a pointer");
+      return true; // Known, or rejected, after inlining.
     if (callee->isIntrinsic() || isMathFunction(*callee) ||
         getMarker(call, unit.markers))
       return true;
@@ -120,18 +123,36 @@ private:
     }
     if (llvm::is_contained(stack, callee))
       return fail(call, "recursion: '" + name + "' calls itself");
-    callee->removeFnAttr(llvm::Attribute::NoInline);
-    callee->removeFnAttr(llvm::Attribute::OptimizeNone);
-    callee->addFnAttr(llvm::Attribute::AlwaysInline);
-    callers.try_emplace(callee, call);
-    return check(*callee);
+    return checkCallee(*callee, call);
+  }
+
+  bool checkCallee(llvm::Function &callee, llvm::Instruction *user) {
+    callee.removeFnAttr(llvm::Attribute::NoInline);
+    callee.removeFnAttr(llvm::Attribute::OptimizeNone);
+    callee.addFnAttr(llvm::Attribute::AlwaysInline);
+    callers.try_emplace(&callee, user);
+    return check(callee);
+  }
+
+  /// Functions that are passed to others are called, too.
+  bool checkReferences(llvm::Instruction &instruction) {
+    auto *call = dyn_cast<llvm::CallBase>(&instruction);
+    for (llvm::Use &operand : instruction.operands()) {
+      auto *function = dyn_cast<llvm::Function>(operand.get());
+      if (!function || function->isDeclaration() ||
+          (call && call->isCallee(&operand)))
+        continue;
+      if (!checkCallee(*function, &instruction))
+        return false;
+    }
+    return true;
   }
 
   ParsedUnit &unit;
   mlir::MLIRContext &context;
   llvm::SmallVector<llvm::Function *> stack;
   llvm::DenseSet<llvm::Function *> visited;
-  llvm::DenseMap<llvm::Function *, llvm::CallBase *> callers;
+  llvm::DenseMap<llvm::Function *, llvm::Instruction *> callers;
 };
 
 } // namespace
@@ -194,12 +215,38 @@ static void dropHints(llvm::Function &function) {
   }
 }
 
+/// Inlines calls whose callee has become known; whether there were any.
+static bool inlineKnownCalls(llvm::Function &function) {
+  bool changed = false;
+  for (bool again = true; again;) {
+    again = false;
+    for (llvm::Instruction &instruction : llvm::instructions(function)) {
+      auto *call = dyn_cast<llvm::CallInst>(&instruction);
+      llvm::Function *callee = call ? call->getCalledFunction() : nullptr;
+      if (!callee || callee->isDeclaration())
+        continue;
+      llvm::InlineFunctionInfo info;
+      again = llvm::InlineFunction(*call, info).isSuccess();
+      changed |= again;
+      if (again)
+        break;
+    }
+  }
+  return changed;
+}
+
+static void prepareFunction(llvm::Function &function, const ParsedUnit &unit,
+                            MemoryMap &memory, mlir::MLIRContext &context) {
+  redirectMathCalls(function, unit, context);
+  inlineKnownCalls(function);
+  dropHints(function);
+  expandMarkers(function, memory);
+}
+
 static bool cleanUpFunction(llvm::Function &function, ParsedUnit &unit,
                             MemoryMap &memory, PassRunner &runner,
                             mlir::MLIRContext &context) {
-  dropHints(function);
-  expandMarkers(function, memory);
-
+  prepareFunction(function, unit, memory, context);
   llvm::FunctionPassManager simplify;
   simplify.addPass(llvm::PromotePass());
   simplify.addPass(llvm::EarlyCSEPass(/*UseMemorySSA=*/false));
@@ -210,6 +257,10 @@ static bool cleanUpFunction(llvm::Function &function, ParsedUnit &unit,
   for (int round = 0; round < 32; ++round) {
     bool changed = splitMemory(function, memory);
     changed |= flattenPointers(function, memory);
+    if (inlineKnownCalls(function)) {
+      prepareFunction(function, unit, memory, context);
+      changed = true;
+    }
     if (!changed) {
       if (localized || !localizeTables(function, memory))
         break;
@@ -246,9 +297,11 @@ bool piko::cleanUp(ParsedUnit &unit, MemoryMap &memory,
   for (llvm::Function &function : module) {
     if (function.getName().starts_with("__piko_wrapper_"))
       wrappers.push_back(&function);
-    else if (function.getName().starts_with(mathPrefix))
+    else if (function.getName().starts_with(mathPrefix)) {
+      // Kept until calls have been redirected to it.
+      function.setLinkage(llvm::GlobalValue::ExternalLinkage);
       mathFunctions.push_back(&function);
-    else if (!function.isDeclaration())
+    } else if (!function.isDeclaration())
       function.setLinkage(llvm::GlobalValue::InternalLinkage);
     if (!function.isDeclaration())
       function.setComdat(nullptr);
@@ -271,13 +324,6 @@ bool piko::cleanUp(ParsedUnit &unit, MemoryMap &memory,
   llvm::ModulePassManager inlining;
   inlining.addPass(llvm::GlobalDCEPass());
   inlining.addPass(llvm::AlwaysInlinerPass(/*InsertLifetime=*/false));
-  runner.run(inlining, module);
-  for (llvm::Function *wrapper : wrappers)
-    redirectMathCalls(*wrapper, unit, context);
-  for (llvm::Function *function : mathFunctions) {
-    function->addFnAttr(llvm::Attribute::AlwaysInline);
-    function->setLinkage(llvm::GlobalValue::InternalLinkage);
-  }
   runner.run(inlining, module);
   for (llvm::Function *wrapper : wrappers)
     if (!cleanUpFunction(*wrapper, unit, memory, runner, context))

@@ -130,6 +130,8 @@ public:
       llvm::consumeError(entry.takeError());
       return;
     }
+    // Clang expects to know the files that it looks up headers beside.
+    preprocessor.getHeaderSearchInfo().getFileInfo(*entry);
     preprocessor.EnterSourceFile(
         sources.createFileID(*entry, here, clang::SrcMgr::C_User), nullptr,
         here);

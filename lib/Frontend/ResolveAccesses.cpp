@@ -45,7 +45,10 @@ private:
       return resolveStore(store);
     if (llvm::isa<llvm::MemIntrinsic>(instruction))
       return fail(instruction, "copying memory whose layout is not known");
-    if (auto *call = dyn_cast<llvm::CallInst>(instruction))
+    auto *call = dyn_cast<llvm::CallInst>(instruction);
+    if (call && !call->getCalledFunction())
+      return fail(call, "a virtual call or a call through a pointer");
+    if (call)
       if (const Marker *marker = getMarker(call, memory.markers))
         if (marker->kind == MarkerKind::atomic)
           return resolveAtomic(call, *marker);
