@@ -1,0 +1,91 @@
+// RUN: piko-opt %s | piko-opt | FileCheck %s
+// Kernels with phases in them, and kernels that work on the storage of bins.
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+
+// CHECK-LABEL: piko.pipeline @Kernels
+piko.pipeline @Kernels rank 2 {
+  piko.source @a
+  piko.edge @a[0] -> @b
+  piko.stage @a bins [8, 8] threads 64 : @F -> [@F] {}
+  piko.stage @b bins [8, 8] threads 64 : @F -> [] {}
+  // CHECK: piko.kernel @assign_source {
+  // CHECK-NEXT: piko.assign of @a source 0 {
+  piko.kernel @assign_source {
+    piko.assign of @a source 0 {
+    ^bb0(%f: !piko.prim<@F>):
+      piko.assign_all
+      piko.return
+    }
+  }
+  // CHECK: piko.kernel @kernel_a {
+  // CHECK-NEXT: piko.process of @a {
+  // CHECK: piko.assign of @b port 0 {
+  piko.kernel @kernel_a {
+    piko.process of @a {
+    ^bb0(%f: !piko.prim<@F>):
+      piko.return
+    }
+    piko.assign of @b port 0 {
+    ^bb0(%f: !piko.prim<@F>):
+      piko.assign_all
+      piko.return
+    }
+  }
+}
+
+// CHECK-LABEL: piko.pipeline @Resolved
+piko.pipeline @Resolved rank 2 {
+  piko.source @a
+  piko.edge @a[0] -> @b
+  piko.stage @a bins [8, 8] threads 64 : @F -> [@F] {}
+  piko.stage @b bins [8, 8] threads 64 : @F -> [] {}
+  // CHECK: piko.kernel @place_source {
+  piko.kernel @place_source {
+    // CHECK-NEXT: %[[SOURCE:.*]] = piko.open_bins @a source 0 : !piko.bins<@F>
+    // CHECK-NEXT: %[[UNITS:.*]] = piko.unit_count %[[SOURCE]] : !piko.bins<@F>
+    // CHECK-NEXT: %[[W:.*]] = piko.open_writer %[[SOURCE]][%[[UNITS]]] : !piko.bins<@F>
+    // CHECK-NEXT: piko.place %[[W]] of @a in %[[UNITS]]
+    // CHECK-NEXT: piko.next %[[W]]
+    // CHECK-NEXT: piko.close_writer %[[W]]
+    // CHECK-NEXT: piko.close_bins %[[SOURCE]] : !piko.bins<@F>
+    %bins = piko.open_bins @a source 0 : !piko.bins<@F>
+    %n = piko.unit_count %bins : !piko.bins<@F>
+    %w = piko.open_writer %bins[%n] : !piko.bins<@F>
+    piko.place %w of @a in %n
+    piko.next %w
+    piko.close_writer %w
+    piko.close_bins %bins : !piko.bins<@F>
+  }
+  // CHECK: piko.kernel @kernel_a {
+  piko.kernel @kernel_a {
+    // CHECK-NEXT: %[[BINS:.*]] = piko.open_bins @a : !piko.bins<@F>
+    // CHECK-NEXT: %[[UNIT:.*]] = piko.unit_count
+    // CHECK-NEXT: %[[FIRST:.*]], %{{.*}} = piko.unit_cells %[[BINS]][%[[UNIT]]] : !piko.bins<@F>
+    // CHECK-NEXT: %[[AT:.*]], %{{.*}} = piko.cell_range %[[BINS]][%[[UNIT]], %[[FIRST]]] : !piko.bins<@F>
+    // CHECK-NEXT: %[[BIN:.*]] = piko.cell_bin %[[BINS]][%[[FIRST]]] : !piko.bins<@F>
+    // CHECK-NEXT: %[[PRIM:.*]] = piko.item %[[BINS]][%[[AT]]] : !piko.bins<@F> -> !piko.prim<@F>
+    // CHECK-NEXT: %[[X:.*]] = piko.get %[[PRIM]] "x"
+    // CHECK-NEXT: %[[W:.*]] = piko.open_writer
+    // CHECK-NEXT: %{{.*}} = piko.append %[[W]][0] (%[[X]]) : i32 -> !piko.prim<@F>
+    // CHECK-NEXT: %{{.*}} = piko.threads
+    // CHECK-NEXT: %{{.*}} = piko.grid @b[1]
+    // CHECK-NEXT: %[[TILES:.*]] = piko.grid @b[0] tiles
+    // CHECK-NEXT: piko.place %[[W]][0] of @b in %[[BIN]]{{$}}
+    // CHECK-NEXT: piko.place %[[W]][0] of @b in %[[BIN]] tile %[[TILES]]
+    %bins = piko.open_bins @a : !piko.bins<@F>
+    %u = piko.unit_count %bins : !piko.bins<@F>
+    %c0, %c1 = piko.unit_cells %bins[%u] : !piko.bins<@F>
+    %i0, %i1 = piko.cell_range %bins[%u, %c0] : !piko.bins<@F>
+    %b = piko.cell_bin %bins[%c0] : !piko.bins<@F>
+    %p = piko.item %bins[%i0] : !piko.bins<@F> -> !piko.prim<@F>
+    %x = piko.get %p "x" : !piko.prim<@F> -> i32
+    %w = piko.open_writer %bins[%u] : !piko.bins<@F>
+    %q = piko.append %w[0] (%x) : i32 -> !piko.prim<@F>
+    %threads = piko.threads
+    %rows = piko.grid @b[1]
+    %t = piko.grid @b[0] tiles
+    piko.place %w[0] of @b in %b
+    piko.place %w[0] of @b in %b tile %t
+  }
+}
