@@ -182,6 +182,21 @@ void pikoir_fail(pikort_pipeline *p, int32_t stage, int32_t code, int64_t a,
       {INT64_MAX, code == PIKORT_OK ? PIKORT_BAD_PROGRAM : code, stage, a, b});
 }
 
+const void *pikoir_get_source(pikort_pipeline *p, int32_t source,
+                              int64_t *count) {
+  bool exists =
+      source >= 0 && source < static_cast<int32_t>(p->sources.size());
+  *count = exists ? p->sources[source].count : 0;
+  return exists ? p->sources[source].data : nullptr;
+}
+
+int32_t pikoir_fail_text(pikort_pipeline *p, int32_t code, const char *text) {
+  return guarded(p, "run", [&] {
+    throw Failure{code == PIKORT_OK ? PIKORT_BAD_PROGRAM : code,
+                  "pipeline " + quoted(p->name) + ": " + text};
+  });
+}
+
 int32_t pikoir_status(pikort_pipeline *p) {
   int32_t status = p->status.load();
   return status ? status : p->reported.load();

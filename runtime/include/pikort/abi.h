@@ -191,6 +191,16 @@ PIKORT_API int32_t pikoir_end_source(pikort_pipeline *p, int32_t source);
 PIKORT_API void pikoir_fail(pikort_pipeline *p, int32_t stage, int32_t code,
                             int64_t a, int64_t b);
 
+// --- programs that run a pipeline by themselves, as the reference does ------
+
+/// What the host bound to a source; `count` gets the number of primitives.
+PIKORT_API const void *pikoir_get_source(pikort_pipeline *p, int32_t source,
+                                         int64_t *count);
+/// Ends the run with an error in the program's own words; returns the status.
+/// Not from a kernel's loop.
+PIKORT_API int32_t pikoir_fail_text(pikort_pipeline *p, int32_t code,
+                                    const char *text);
+
 // --- the fast path, for generated code that inlines it ----------------------
 
 static inline uint8_t *pikoir_append_inline(pikoir_writer *writer,
