@@ -32,7 +32,7 @@ struct Splat
         for (int x = from.x; x < to.x; ++x) {
           glm::vec3 offset = glm::vec3(x, y, z) - p.position;
           float weight = 1 / (1 + glm::dot(offset, offset));
-          piko::update(state().volume, glm::ivec3(x, y, z), [&](Voxel &v) {
+          update(state().volume, glm::ivec3(x, y, z), [&](Voxel &v) {
             v.density = v.density * 0.9f + weight * p.mass;
             v.count += 1;
           });

@@ -15,10 +15,16 @@ struct State {
 
 struct Split : piko::Stage<0, 0, 64, Point, Point, Point> {
   void process(const Point &p) {
-    emit(p, p.tag % 2);
+    if (p.tag % 2 == 0)
+      emit(p, 0);
+    else
+      emit(p, 1);
     Point q = p;
     q.value += 1;
-    emit(q, (p.tag / 2) % 2 == 0 ? 0 : 1);
+    if (p.tag / 2 % 2 == 0)
+      emit(q, 0);
+    else
+      emit(q, 1);
     emit(q, 0);
   }
 };
@@ -36,7 +42,7 @@ struct Detour : piko::Stage<16, 16, 64, Point, Point> {
 struct Join : piko::Stage<0, 0, 64, Point>, piko::Uses<State> {
   void process(const Point &p) {
     if (isOnScreen(p, domain()))
-      piko::update(state().image, glm::ivec2(p.x, p.y), [&](Pixel &pixel) {
+      update(state().image, glm::ivec2(p.x, p.y), [&](Pixel &pixel) {
         pixel.sum = pixel.sum * 0.75f + p.value;
       });
   }

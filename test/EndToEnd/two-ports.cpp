@@ -35,7 +35,7 @@ struct Draw : piko::Stage<8, 8, 64, Point>, piko::Uses<State> {
       assignToBin(p, binFromPosition(glm::ivec2(p.x, p.y)));
   }
   void process(const Point &p) {
-    piko::update(state().image, glm::ivec2(p.x, p.y), [&](Pixel &pixel) {
+    update(state().image, glm::ivec2(p.x, p.y), [&](Pixel &pixel) {
       pixel.sum = pixel.sum * 0.5f + p.value;
       pixel.last = p.tag;
     });

@@ -40,7 +40,7 @@ template <int Bin> struct Blend : piko::Stage<Bin, Bin, 64, Point, Point>,
   }
   void process(const Point &p) {
     bool passed = false;
-    piko::update(state().image, glm::ivec2(p.x, p.y), [&](Pixel &pixel) {
+    this->update(state().image, glm::ivec2(p.x, p.y), [&](Pixel &pixel) {
       if (p.value > pixel.value) {
         pixel.value = p.value;
         passed = true;
