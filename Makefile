@@ -47,8 +47,8 @@ lint: build
 format:
 	@utils/lint.py format --fix
 
-docs: configure
-	@cmake --build $(BUILD) --parallel $(JOBS) --target piko-docs
+docs: deps
+	@utils/make-reference.py
 
 clean:
 	@rm -rf build build-asan build-debug build-tsan

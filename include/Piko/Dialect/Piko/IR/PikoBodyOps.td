@@ -16,9 +16,12 @@ def Piko_GetOp : Piko_Op<"get", [
     Pure, DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
   let summary = "reads a field of a primitive";
   let description = [{
-    `%z = piko.get %f "z" : !piko.prim<@F> -> f32`; an element of an array
-    field takes an index for each dimension:
-    `%w = piko.get %f "w"[%i] : !piko.prim<@F> -> f32`.
+    An element of an array field takes an index for each dimension.
+
+    ```mlir
+    %z = piko.get %f "z" : !piko.prim<@Fragment> -> f32
+    %w = piko.get %f "w"[%i] : !piko.prim<@Fragment> -> f32
+    ```
   }];
   let arguments = (ins Piko_PrimType:$prim, StrAttr:$field,
                        Variadic<Index>:$elements);
@@ -34,7 +37,11 @@ def Piko_EmitOp : Piko_Op<"emit"> {
   let summary = "sends a primitive out of a port";
   let description = [{
     Takes the numbers of the port's record: its fields in order, arrays
-    row-major. `piko.emit 0 (%x, %y) : f32, f32`.
+    row-major.
+
+    ```mlir
+    piko.emit 0 (%u, %v) : f32, f32
+    ```
   }];
   let arguments = (ins ConfinedAttr<Piko_I64Attr, [IntNonNegative]>:$port,
                        Variadic<Piko_Scalar>:$values);
@@ -50,7 +57,13 @@ def Piko_EmitOp : Piko_Op<"emit"> {
 
 def Piko_BinOp : Piko_Op<"bin", [Pure]> {
   let summary = "the bin that is being processed";
-  let description = "`%b = piko.bin` is its number, row-major, x fastest.";
+  let description = [{
+    Bins are numbered row-major, x fastest.
+
+    ```mlir
+    %b = piko.bin
+    ```
+  }];
   let results = (outs Index:$result);
   let assemblyFormat = "attr-dict";
 }
@@ -58,8 +71,12 @@ def Piko_BinOp : Piko_Op<"bin", [Pure]> {
 def Piko_BinAtOp : Piko_Op<"bin_at", [Pure]> {
   let summary = "the bin that a cell of the domain is in";
   let description = [{
-    `%b = piko.bin_at %x, %y : i32, i32` is a number of the phase's own stage,
-    or -1 where the cell is outside the domain. Coordinates are signed.
+    The result is a bin of the phase's own stage, or -1 where the cell is
+    outside the domain. Coordinates are signed.
+
+    ```mlir
+    %b = piko.bin_at %x, %y : i32, i32
+    ```
   }];
   let arguments = (ins Variadic<Piko_Coordinate>:$coordinates);
   let results = (outs Index:$result);
@@ -75,19 +92,31 @@ class Piko_BinBoundOp<string mnemonic> : Piko_Op<mnemonic, [Pure]> {
 
 def Piko_BinLoOp : Piko_BinBoundOp<"bin_lo"> {
   let summary = "the first cell of a bin in a dimension";
-  let description = "`%x0 = piko.bin_lo %b[0]`.";
+  let description = [{
+    ```mlir
+    %x0 = piko.bin_lo %b[0]
+    ```
+  }];
 }
 
 def Piko_BinHiOp : Piko_BinBoundOp<"bin_hi"> {
   let summary = "the cell after the last of a bin in a dimension";
   let description = [{
-    `%x1 = piko.bin_hi %b[0]`; bins at the edge of the domain are cut there.
+    Bins at the edge of the domain are cut there.
+
+    ```mlir
+    %x1 = piko.bin_hi %b[0]
+    ```
   }];
 }
 
 def Piko_DomainOp : Piko_Op<"domain", [Pure]> {
   let summary = "the extent of the domain in a dimension";
-  let description = "`%w = piko.domain[0]`.";
+  let description = [{
+    ```mlir
+    %width = piko.domain[0]
+    ```
+  }];
   let arguments = (ins ConfinedAttr<Piko_I64Attr, [IntNonNegative]>:$dim);
   let results = (outs Index:$result);
   let assemblyFormat = "`[` $dim `]` attr-dict";
@@ -102,8 +131,11 @@ class Piko_AssignmentOp<string mnemonic, list<Trait> traits = []>
 def Piko_AssignToOp : Piko_AssignmentOp<"assign_to"> {
   let summary = "puts the primitive into a bin";
   let description = [{
-    `piko.assign_to %b`. A bin outside the grid, -1 included, is an error when
-    the pipeline runs.
+    A bin outside the grid, -1 included, is an error when the pipeline runs.
+
+    ```mlir
+    piko.assign_to %b
+    ```
   }];
   let arguments = (ins Index:$bin);
   let assemblyFormat = "$bin attr-dict";
@@ -111,15 +143,22 @@ def Piko_AssignToOp : Piko_AssignmentOp<"assign_to"> {
 
 def Piko_AssignAllOp : Piko_AssignmentOp<"assign_all"> {
   let summary = "puts the primitive into all bins";
-  let description = "`piko.assign_all`.";
+  let description = [{
+    ```mlir
+    piko.assign_all
+    ```
+  }];
   let assemblyFormat = "attr-dict";
 }
 
 def Piko_AssignPreviousOp : Piko_AssignmentOp<"assign_previous"> {
   let summary = "puts the primitive into the bin it was emitted from";
   let description = [{
-    `piko.assign_previous`. Both stages have bins of one size, and the stage
-    has no source.
+    Both stages have bins of one size, and the stage has no source.
+
+    ```mlir
+    piko.assign_previous
+    ```
   }];
   let assemblyFormat = "attr-dict";
 }
@@ -127,8 +166,11 @@ def Piko_AssignPreviousOp : Piko_AssignmentOp<"assign_previous"> {
 def Piko_AssignBoxOp : Piko_AssignmentOp<"assign_box", [AttrSizedOperandSegments]> {
   let summary = "puts the primitive into the bins that a box touches";
   let description = [{
-    `piko.assign_box [%x0, %y0 : i32, i32] to [%x1, %y1 : i32, i32]` takes the
-    closed box of cells, cut at the domain; an empty box is no bin.
+    Takes the closed box of cells, cut at the domain; an empty box is no bin.
+
+    ```mlir
+    piko.assign_box [%x0, %y0 : i32, i32] to [%x1, %y1 : i32, i32]
+    ```
   }];
   let arguments = (ins Variadic<Piko_Coordinate>:$lo,
                        Variadic<Piko_Coordinate>:$hi);
@@ -140,10 +182,14 @@ def Piko_AssignBoxOp : Piko_AssignmentOp<"assign_box", [AttrSizedOperandSegments
 def Piko_OwnerOp : Piko_AssignmentOp<"owner"> {
   let summary = "the pixel whose owner processes the primitive";
   let description = [{
-    `piko.owner [%x, %y : i32, i32]` in an assign phase says that the process
-    phase writes no other pixel. A bin that is larger than a tile of its stage's
-    `tile` cells a side may then be divided over threads, and each pixel still
-    sees its primitives in order. Made by `piko-own-pixels`.
+    Says in an assign phase that the process phase updates no other pixel. A bin
+    that is larger than a tile of its stage's `tile` cells a side may then be
+    divided over threads, and each pixel still sees its primitives in order.
+    Made by `piko-own-pixels`.
+
+    ```mlir
+    piko.owner [%x, %y : i32, i32]
+    ```
   }];
   let arguments = (ins Variadic<Piko_Coordinate>:$coordinates);
   let assemblyFormat = "`[` $coordinates `:` type($coordinates) `]` attr-dict";

@@ -19,6 +19,37 @@ def Piko_KernelOp : Piko_Op<"kernel", [
     phases of the stages that it feeds, or the assign phase of a source. At the
     resolved level it holds loops over the units of work of a stage's bins, the
     first of which is an `scf.forall`, and no phase.
+
+    ```mlir
+    piko.record @F {"x" : i32 at 0} size 4 align 4
+    piko.pipeline @P rank 1 {
+      piko.source @start
+      piko.edge @start[0] -> @drop
+      piko.stage @start bins [0] threads 64 : @F -> [@F] {}
+      piko.stage @drop bins [8] threads 64 : @F -> [] {}
+      piko.kernel @kernel_start {
+        piko.process of @start {
+        ^bb0(%f: !piko.prim<@F>):
+          %x = piko.get %f "x" : !piko.prim<@F> -> i32
+          piko.emit 0 (%x) : i32
+          piko.return
+        }
+        piko.assign of @drop port 0 {
+        ^bb0(%f: !piko.prim<@F>):
+          %x = piko.get %f "x" : !piko.prim<@F> -> i32
+          %b = piko.bin_at %x : i32
+          piko.assign_to %b
+          piko.return
+        }
+      }
+      piko.kernel @kernel_drop {
+        piko.process of @drop {
+        ^bb0(%f: !piko.prim<@F>):
+          piko.return
+        }
+      }
+    }
+    ```
   }];
   let arguments = (ins SymbolNameAttr:$sym_name);
   let regions = (region SizedRegion<1>:$body);
@@ -35,9 +66,14 @@ def Piko_OpenBinsOp : Piko_Op<"open_bins", [
     DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
   let summary = "starts a kernel over the bins of a stage or over a source";
   let description = [{
-    `%bins = piko.open_bins @shade : !piko.bins<@Fragment>` joins what the
-    stage's producers left, in lineage order. With `source` the primitives are
-    those that the host feeds to that source of the stage, in one bin.
+    Joins what the stage's producers left, in lineage order. With `source` the
+    primitives are those that the host feeds to that source of the stage, in one
+    bin.
+
+    ```mlir
+    %bins = piko.open_bins @shade : !piko.bins<@Fragment>
+    %first = piko.open_bins @rasterize source 0 : !piko.bins<@Fragment>
+    ```
   }];
   let arguments = (ins FlatSymbolRefAttr:$stage, OptionalAttr<Piko_I64Attr>:$source);
   let results = (outs Piko_BinsType:$bins);
@@ -49,8 +85,12 @@ def Piko_OpenBinsOp : Piko_Op<"open_bins", [
 def Piko_CloseBinsOp : Piko_Op<"close_bins"> {
   let summary = "ends a kernel";
   let description = [{
-    `piko.close_bins %bins : !piko.bins<@Fragment>` joins what the units of
-    work emitted, in order, into the bins of the stages that come next.
+    Joins what the units of work emitted, in order, into the bins of the stages
+    that come next.
+
+    ```mlir
+    piko.close_bins %bins : !piko.bins<@Fragment>
+    ```
   }];
   let arguments = (ins Piko_BinsType:$bins);
   let assemblyFormat = "$bins attr-dict `:` qualified(type($bins))";
@@ -58,7 +98,11 @@ def Piko_CloseBinsOp : Piko_Op<"close_bins"> {
 
 def Piko_UnitCountOp : Piko_Op<"unit_count", [Pure]> {
   let summary = "how many units of work there are";
-  let description = "`%n = piko.unit_count %bins : !piko.bins<@F>`.";
+  let description = [{
+    ```mlir
+    %n = piko.unit_count %bins : !piko.bins<@Fragment>
+    ```
+  }];
   let arguments = (ins Piko_BinsType:$bins);
   let results = (outs Index:$result);
   let assemblyFormat = "$bins attr-dict `:` qualified(type($bins))";
@@ -67,7 +111,11 @@ def Piko_UnitCountOp : Piko_Op<"unit_count", [Pure]> {
 def Piko_UnitCellsOp : Piko_Op<"unit_cells", [Pure]> {
   let summary = "the cells of a unit of work";
   let description = [{
-    `%c0, %c1 = piko.unit_cells %bins[%u] : !piko.bins<@F>`, half open.
+    The range is half open.
+
+    ```mlir
+    %c0, %c1 = piko.unit_cells %bins[%unit] : !piko.bins<@Fragment>
+    ```
   }];
   let arguments = (ins Piko_BinsType:$bins, Index:$unit);
   let results = (outs Index:$begin, Index:$end);
@@ -77,7 +125,11 @@ def Piko_UnitCellsOp : Piko_Op<"unit_cells", [Pure]> {
 def Piko_CellRangeOp : Piko_Op<"cell_range", [Pure]> {
   let summary = "the positions of a cell that a unit of work holds";
   let description = [{
-    `%lo, %hi = piko.cell_range %bins[%u, %c] : !piko.bins<@F>`, half open.
+    The range is half open.
+
+    ```mlir
+    %lo, %hi = piko.cell_range %bins[%unit, %cell] : !piko.bins<@Fragment>
+    ```
   }];
   let arguments = (ins Piko_BinsType:$bins, Index:$unit, Index:$cell);
   let results = (outs Index:$begin, Index:$end);
@@ -88,7 +140,11 @@ def Piko_CellRangeOp : Piko_Op<"cell_range", [Pure]> {
 
 def Piko_CellBinOp : Piko_Op<"cell_bin", [Pure]> {
   let summary = "the bin that a cell belongs to";
-  let description = "`%b = piko.cell_bin %bins[%c] : !piko.bins<@F>`.";
+  let description = [{
+    ```mlir
+    %b = piko.cell_bin %bins[%cell] : !piko.bins<@Fragment>
+    ```
+  }];
   let arguments = (ins Piko_BinsType:$bins, Index:$cell);
   let results = (outs Index:$result);
   let assemblyFormat = "$bins `[` $cell `]` attr-dict `:` qualified(type($bins))";
@@ -96,7 +152,11 @@ def Piko_CellBinOp : Piko_Op<"cell_bin", [Pure]> {
 
 def Piko_ItemOp : Piko_Op<"item", [Pure]> {
   let summary = "the primitive at a position";
-  let description = "`%p = piko.item %bins[%i] : !piko.bins<@F> -> !piko.prim<@F>`.";
+  let description = [{
+    ```mlir
+    %p = piko.item %bins[%i] : !piko.bins<@Fragment> -> !piko.prim<@Fragment>
+    ```
+  }];
   let arguments = (ins Piko_BinsType:$bins, Index:$position);
   let results = (outs Piko_PrimType:$prim);
   let assemblyFormat = [{
@@ -107,7 +167,11 @@ def Piko_ItemOp : Piko_Op<"item", [Pure]> {
 
 def Piko_OpenWriterOp : Piko_Op<"open_writer"> {
   let summary = "where a unit of work leaves what it emits";
-  let description = "`%w = piko.open_writer %bins[%u] : !piko.bins<@F>`.";
+  let description = [{
+    ```mlir
+    %w = piko.open_writer %bins[%unit] : !piko.bins<@Fragment>
+    ```
+  }];
   let arguments = (ins Piko_BinsType:$bins, Index:$unit);
   let results = (outs Piko_WriterType:$writer);
   let assemblyFormat = "$bins `[` $unit `]` attr-dict `:` qualified(type($bins))";
@@ -115,7 +179,11 @@ def Piko_OpenWriterOp : Piko_Op<"open_writer"> {
 
 def Piko_CloseWriterOp : Piko_Op<"close_writer"> {
   let summary = "the unit of work has ended";
-  let description = "`piko.close_writer %w`.";
+  let description = [{
+    ```mlir
+    piko.close_writer %writer
+    ```
+  }];
   let arguments = (ins Piko_WriterType:$writer);
   let assemblyFormat = "$writer attr-dict";
 }
@@ -123,8 +191,11 @@ def Piko_CloseWriterOp : Piko_Op<"close_writer"> {
 def Piko_AppendOp : Piko_Op<"append"> {
   let summary = "stores a primitive that a port emits";
   let description = [{
-    `%p = piko.append %w[0] (%x, %y) : f32, f32 -> !piko.prim<@F>`; the result
-    is the primitive as it was stored.
+    The result is the primitive as it was stored.
+
+    ```mlir
+    %p = piko.append %writer[0] (%u, %v) : f32, f32 -> !piko.prim<@Point>
+    ```
   }];
   let arguments = (ins Piko_WriterType:$writer, Piko_I64Attr:$port,
                        Variadic<Piko_Scalar>:$values);
@@ -138,10 +209,15 @@ def Piko_AppendOp : Piko_Op<"append"> {
 def Piko_PlaceOp : Piko_Op<"place"> {
   let summary = "puts what a port emitted last into a bin";
   let description = [{
-    `piko.place %w[0] of @shade in %bin`, and where the stage's bins are
-    divided into tiles the tile behind it: `piko.place %w[0] of @depth in %bin
-    tile %t`. Without a port it places the current primitive of a source. A bin
+    Where the stage's bins are divided into tiles, the tile stands behind the
+    bin. Without a port it places the current primitive of a source. A bin
     outside the grid is an error when the pipeline runs.
+
+    ```mlir
+    piko.place %writer[0] of @plot in %bin
+    piko.place %writer[0] of @plot in %bin tile %tile
+    piko.place %writer of @rasterize in %bin
+    ```
   }];
   let arguments = (ins Piko_WriterType:$writer, OptionalAttr<Piko_I64Attr>:$port,
                        FlatSymbolRefAttr:$stage, Index:$bin,
@@ -153,14 +229,22 @@ def Piko_PlaceOp : Piko_Op<"place"> {
 
 def Piko_NextOp : Piko_Op<"next"> {
   let summary = "all that follows comes from the next primitive";
-  let description = "`piko.next %w`.";
+  let description = [{
+    ```mlir
+    piko.next %writer
+    ```
+  }];
   let arguments = (ins Piko_WriterType:$writer);
   let assemblyFormat = "$writer attr-dict";
 }
 
 def Piko_ThreadsOp : Piko_Op<"threads", [Pure]> {
   let summary = "how many threads the host asked for";
-  let description = "`%n = piko.threads`.";
+  let description = [{
+    ```mlir
+    %n = piko.threads
+    ```
+  }];
   let results = (outs I32:$result);
   let assemblyFormat = "attr-dict";
 }
@@ -168,8 +252,12 @@ def Piko_ThreadsOp : Piko_Op<"threads", [Pure]> {
 def Piko_GridOp : Piko_Op<"grid", [Pure]> {
   let summary = "how many bins a stage has in a dimension";
   let description = [{
-    `%n = piko.grid @shade[0]`; with `tiles` it is how many tiles a bin of the
-    stage has.
+    With `tiles` it is how many tiles a bin of the stage has.
+
+    ```mlir
+    %n = piko.grid @shade[0]
+    %t = piko.grid @shade[0] tiles
+    ```
   }];
   let arguments = (ins FlatSymbolRefAttr:$stage, Piko_I64Attr:$dim, UnitAttr:$tiles);
   let results = (outs Index:$result);

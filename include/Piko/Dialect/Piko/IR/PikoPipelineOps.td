@@ -167,8 +167,30 @@ def Piko_EdgeOp : Piko_Op<"edge", [
   let summary = "connects a port of a stage with a stage";
   let description = [{
     Each port of each stage has exactly one edge, and its primitives are of the
-    record that the consumer takes. `piko.edge @rast[0] -> @shade` says that
-    what `@rast` emits to port 0 is what `@shade` processes.
+    record that the consumer takes. Here what `@half` emits to port 0 is what
+    `@drop` processes.
+
+    ```mlir
+    piko.record @F {"z" : f32 at 0} size 4 align 4
+    piko.pipeline @P rank 2 {
+      piko.source @half
+      piko.edge @half[0] -> @drop
+      piko.stage @half bins [0, 0] threads 64 : @F -> [@F] {
+        piko.process {
+        ^bb0(%f: !piko.prim<@F>):
+          %z = piko.get %f "z" : !piko.prim<@F> -> f32
+          piko.emit 0 (%z) : f32
+          piko.return
+        }
+      }
+      piko.stage @drop bins [0, 0] threads 64 : @F -> [] {
+        piko.process {
+        ^bb0(%f: !piko.prim<@F>):
+          piko.return
+        }
+      }
+    }
+    ```
   }];
   let arguments = (ins FlatSymbolRefAttr:$producer,
                        ConfinedAttr<Piko_I64Attr, [IntNonNegative]>:$port,

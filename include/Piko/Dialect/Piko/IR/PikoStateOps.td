@@ -19,10 +19,11 @@ def Piko_LoadOp : Piko_StateAccessOp<"load", [MemoryEffects<[MemRead]>]> {
     A constant takes no index, a buffer one, an image one for each dimension;
     an element of an array field takes further ones behind the field's name.
 
-    ```
-    %w = piko.load @camera "width" : i32
-    %r = piko.load @lights[%i : index] "color.x" : f32
-    %k = piko.load @kernels[%i : index] "w"[%j] : f32
+    ```mlir
+    %width = piko.load @camera "width" : i32
+    %red = piko.load @lights[%i : index] "color.x" : f32
+    %cut = piko.load @lights[%i : index] "cutoff"[%j] : f32
+    %z = piko.load @depth[%x, %y : i32, i32] "z" : f32
     ```
   }];
   let arguments = (ins FlatSymbolRefAttr:$state,
@@ -38,9 +39,13 @@ def Piko_LoadOp : Piko_StateAccessOp<"load", [MemoryEffects<[MemRead]>]> {
 def Piko_StoreOp : Piko_StateAccessOp<"store", [MemoryEffects<[MemWrite]>]> {
   let summary = "writes a field of an element that no other call writes";
   let description = [{
-    `piko.store %v, @verts[%i : i32] "pos.x" : f32`. An index outside the
-    buffer or image is an error when the pipeline runs; `checked` says that the
-    test for it is already there.
+    An index outside the buffer or image is an error when the pipeline runs;
+    `checked` says that the test for it is already there.
+
+    ```mlir
+    piko.store %v, @vertices[%i : index] "position.x" : f32
+    piko.store %v, checked @vertices[%i : index] "position.x" : f32
+    ```
   }];
   let arguments = (ins Piko_Scalar:$value, FlatSymbolRefAttr:$state,
                        Variadic<Piko_Coordinate>:$indices, StrAttr:$field,
@@ -56,8 +61,12 @@ def Piko_AtomicOp : Piko_StateAccessOp<"atomic", [
     MemoryEffects<[MemRead, MemWrite]>]> {
   let summary = "changes an integer field so that order does not matter";
   let description = [{
-    `piko.atomic add @histogram[%i : i32] "value", %one : i32`. The value that
-    was there is not given back, so that no call can see the order.
+    The value that was there is not given back, so that no call can see the
+    order.
+
+    ```mlir
+    piko.atomic add @histogram[%i : index] "value", %one : i32
+    ```
   }];
   let arguments = (ins Piko_AtomicKind:$kind, FlatSymbolRefAttr:$state,
                        Variadic<Piko_Coordinate>:$indices, StrAttr:$field,
@@ -72,7 +81,11 @@ def Piko_AtomicOp : Piko_StateAccessOp<"atomic", [
 def Piko_ExtentOp : Piko_Op<"extent", [
     Pure, DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
   let summary = "the length of a buffer, or of an image in a dimension";
-  let description = "`%n = piko.extent @lights[0]`.";
+  let description = [{
+    ```mlir
+    %n = piko.extent @lights[0]
+    ```
+  }];
   let arguments = (ins FlatSymbolRefAttr:$state,
                        ConfinedAttr<Piko_I64Attr, [IntNonNegative]>:$dim);
   let results = (outs Index:$result);
@@ -86,19 +99,22 @@ def Piko_UpdateOp : Piko_Op<"update", [
   let description = [{
     The body takes the numbers of the pixel, fields in order, and yields the new
     ones; `results` leave it. The calls for one pixel run in lineage order. A
-    pixel outside the bin is an error when the pipeline runs.
+    pixel outside the bin is an error when the pipeline runs. At the resolved
+    level the operation names the bin that the pixel must be in.
 
-    ```
+    ```mlir
     %passed = piko.update @depth[%x, %y : i32, i32] {
     ^bb0(%old: f32):
       %closer = arith.cmpf olt, %z, %old : f32
       %new = arith.select %closer, %z, %old : f32
       piko.yield [%new : f32] results [%closer : i1]
     } -> i1
-    ```
 
-    At the resolved level it names the bin that the pixel must be in:
-    `piko.update @depth[%x, %y : i32, i32] in %bin`.
+    piko.update @depth[%x, %y : i32, i32] in %bin {
+    ^bb0(%old: f32):
+      piko.yield [%z : f32]
+    }
+    ```
   }];
   let arguments = (ins FlatSymbolRefAttr:$image,
                        Variadic<Piko_Coordinate>:$coordinates,
@@ -126,9 +142,13 @@ def Piko_YieldOp : Piko_Op<"yield", [
 def Piko_FailOp : Piko_Op<"fail"> {
   let summary = "ends the run with an error that names the stage";
   let description = [{
-    `piko.fail @depth outside @color (%x, %y)`: an access of the stage to the
-    piece of state at these indices was outside it, or outside the bin. The run
-    goes on to the end of the kernel and then stops.
+    An access of the stage to the piece of state at these indices was outside
+    it, or outside the bin. The run goes on to the end of the kernel and then
+    stops.
+
+    ```mlir
+    piko.fail @shade outside @depth(%i, %j)
+    ```
   }];
   let arguments = (ins FlatSymbolRefAttr:$stage, FlatSymbolRefAttr:$state,
                        Variadic<Index>:$indices);

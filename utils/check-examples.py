@@ -1,0 +1,182 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+"""Runs the ```mlir examples of the dialect's TableGen files and of documents.
+
+Each operation of the dialect has an example in its description, or says "See
+`piko.X`" where X's example shows it. An example that holds a record or a
+pipeline is a module. Any other is a piece of a phase or of a resolved kernel,
+and is put into the pipeline below; names that it does not define have the
+types of NAMES.
+"""
+
+import argparse
+import concurrent.futures
+import json
+import os
+import pathlib
+import re
+import subprocess
+import sys
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+FENCE = re.compile(r"^[ ]*```mlir\n(.*?)^[ ]*```", re.S | re.M)
+
+KERNEL_OPS = re.compile(
+    r"piko\.(open_bins|close_bins|unit_\w+|cell_\w+|item|open_writer"
+    r"|close_writer|append|place|next|threads|grid)\b"
+)
+ASSIGN_OPS = re.compile(r"piko\.(assign_\w+|owner)\b")
+
+NAMES = {
+    "f32": "u v z",
+    "i32": "x y x0 y0 x1 y1 one",
+    "index": "b bin cell i j tile unit",
+}
+
+CONTEXT = """
+piko.record @Fragment {"x" : i32 at 0, "y" : i32 at 4, "z" : f32 at 8,
+                       "w" : f32[4 : 4] at 12} size 28 align 4
+piko.record @Point {"u" : f32 at 0, "v" : f32 at 4} size 8 align 4
+piko.record @Camera {"width" : i32 at 0} size 4 align 4
+piko.record @Light {"color.x" : f32 at 0, "cutoff" : f32[2 : 4] at 4}
+  size 12 align 4
+piko.record @Vertex {"position.x" : f32 at 0} size 4 align 4
+piko.record @Count {"value" : i32 at 0} size 4 align 4
+piko.record @Depth {"z" : f32 at 0} size 4 align 4
+piko.pipeline @Example rank 2 {
+  piko.constant @camera : @Camera
+  piko.buffer @lights : @Light
+  piko.buffer @vertices : @Vertex
+  piko.buffer @histogram : @Count
+  piko.image @depth : @Depth rank 2 clear [1.0 : f32]
+  piko.source @rasterize
+  piko.edge @rasterize[0] -> @shade
+  piko.edge @shade[0] -> @plot
+  piko.stage @rasterize bins [8, 8] threads 64 : @Fragment -> [@Fragment] {}
+  piko.stage @plot bins [8, 8] threads 64 : @Point -> [] {}
+  piko.stage @shade bins [8, 8] threads 64 : @Fragment -> [@Point] {
+    SHADE
+  }
+  KERNEL
+}
+"""
+PHASE = """piko.NAME {
+    ^bb0(%f: !piko.prim<@Fragment>):
+      BODY
+      piko.return
+    }
+"""
+
+
+def definitions(text):
+    """Operations that define what an example uses and does not define."""
+    defined = set()
+    for line in text.splitlines():
+        left = re.match(r"\s*((?:%\w+(?:, )?)+)\s*=", line)
+        if left:
+            defined |= set(re.findall(r"%(\w+)", left[1]))
+        defined |= set(re.findall(r"%(\w+): ", line))
+    used = set(re.findall(r"%(\w+)", text)) - defined
+    bins, writer = "bins" in used, "writer" in used
+    lines = []
+    for kind, names in NAMES.items():
+        value = "1.0" if kind.startswith("f") else "1"
+        lines += [
+            f"%{name} = arith.constant {value} : {kind}"
+            for name in names.split()
+            if name in used or (writer and name == "unit")
+        ]
+    if bins or writer:
+        lines.append("%bins = piko.open_bins @shade : !piko.bins<@Fragment>")
+    if writer:
+        lines.append(
+            "%writer = piko.open_writer %bins[%unit] : !piko.bins<@Fragment>"
+        )
+    return "\n".join(lines)
+
+
+def complete(text):
+    """A module that holds the example."""
+    if re.search(r"^\s*piko\.(record|pipeline) ", text, re.M):
+        return text
+    body = definitions(text) + "\n" + text
+    if KERNEL_OPS.search(text):
+        kernel = "piko.kernel @kernel {\n" + body + "}"
+        return CONTEXT.replace("SHADE", "").replace("KERNEL", kernel)
+
+    def phase(name, inside):
+        return PHASE.replace("NAME", name).replace("BODY", inside)
+
+    if ASSIGN_OPS.search(text):
+        phases = phase("assign", body) + phase("process", "")
+    else:
+        phases = phase("assign", "piko.assign_all") + phase("process", body)
+    return CONTEXT.replace("SHADE", phases).replace("KERNEL", "")
+
+
+def descriptions(tblgen, includes):
+    """(name of the operation or None, name of the record, description)."""
+    file = ROOT / "include/Piko/Dialect/Piko/IR/PikoOps.td"
+    command = [tblgen, "--dump-json", str(file), f"-I{ROOT}/include"]
+    command += [f"-I{path}" for path in includes]
+    records = json.loads(subprocess.check_output(command))
+    for name, record in sorted(records.items()):
+        if not isinstance(record, dict):
+            continue
+        kinds = record.get("!superclasses", [])
+        dialect = (record.get("opDialect") or record.get("dialect") or {}).get(
+            "def"
+        )
+        if dialect != "Piko_Dialect":
+            continue
+        text = record.get("description") or ""
+        op = "piko." + record["opName"] if "Op" in kinds else None
+        yield op, name, text
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--opt", default="piko-opt")
+    parser.add_argument("--tblgen", default="llvm-tblgen")
+    parser.add_argument("-I", dest="includes", action="append", default=[])
+    parser.add_argument("documents", nargs="*", type=pathlib.Path)
+    args = parser.parse_args()
+
+    examples, shown, faults = [], {}, 0
+    described = list(descriptions(args.tblgen, args.includes))
+    for op, name, text in described:
+        fences = FENCE.findall(text)
+        examples += [(name, fence) for fence in fences]
+        if op:
+            shown[op] = set(re.findall(r"piko\.\w+", "".join(fences)))
+    for op, name, text in described:
+        if not op or op in shown[op]:
+            continue
+        see = re.search(r"See `(piko\.\w+)`", text)
+        if not see or op not in shown.get(see[1], ()):
+            print(f"{name}: expected an example of {op} in its description")
+            faults += 1
+    for document in args.documents:
+        for fence in FENCE.findall(document.read_text()):
+            examples.append((document.name, fence))
+
+    def run(example):
+        return subprocess.run(
+            [args.opt, "-o", os.devnull],
+            input=complete(example[1]),
+            capture_output=True,
+            text=True,
+        )
+
+    with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
+        for (where, text), result in zip(examples, pool.map(run, examples)):
+            if result.returncode:
+                print(f"{where}: example does not verify:\n{text}")
+                print(result.stderr)
+                faults += 1
+    print(f"{len(examples)} examples, {faults} faults")
+    sys.exit(1 if faults or not examples else 0)
+
+
+if __name__ == "__main__":
+    main()
