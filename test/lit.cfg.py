@@ -8,7 +8,8 @@ split-file. Substitutions:
   %examples      folder of the example pipelines
   %bunny         a mesh of 69,666 triangles that a Debian package installs
   %python        the Python interpreter
-  %utils         folder of the developer scripts
+  %utils, %docs  folders of the developer scripts and of the documents
+  %readme        the README
   %cxx_reference compiler and flags that build a pipeline file with the
                  reference executor
 
@@ -42,6 +43,7 @@ config.substitutions += [
     ("%bunny", bunny),
     ("%python", config.python),
     ("%utils", os.path.join(config.piko_source_root, "utils")),
+    ("%readme", os.path.join(config.piko_source_root, "README.md")),
     ("%docs", os.path.join(config.piko_source_root, "docs")),
     ("%cxx_reference", " ".join(reference)),
 ]
