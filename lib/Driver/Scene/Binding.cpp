@@ -109,10 +109,13 @@ private:
   Result<Done> bindConstant(const pikort_state_info &state,
                             const pikort_record_info &record) {
     Supply supply = constantFor(record.name);
+    if (!supply.size && state.bound) // it has a value of its own
+      return Done{};
     if (!supply.size)
       return fail(unsuitable("constant '" + std::string(state.name) + "'",
                              record.name,
-                             "'piko::scene::Camera' or '...::Settings'"));
+                             "'piko::scene::Camera', '...::Settings' or a "
+                             "default value"));
     if (pikort_bind_constant(pipeline, state.name, supply.data, supply.size) !=
         PIKORT_OK)
       return lastError();

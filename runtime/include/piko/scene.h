@@ -15,9 +15,9 @@
 //   the Image<Color>                          the result: there is exactly one
 //
 // Each may occur any number of times (the Image<Color> once) or not at all.
-// A host-bound state member or a source of any other type is an error, because
-// nothing could fill it. State that the pipeline allocates or clears itself is
-// left alone. The domain is the image: cell (0, 0) is its top left pixel.
+// A host-bound buffer, a constant without a default value or a source of any
+// other type is an error, because nothing could fill it. State that the pipeline
+// allocates or clears itself and constants with a default value are left alone. The domain is the image: cell (0, 0) is its top left pixel.
 //
 // All types are trivially copyable; lengths are in the scene's own unit.
 //
