@@ -1,0 +1,176 @@
+//===- Options.cpp - The command line of piko-render ----------------------===//
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+#include "Options.h"
+
+#include <charconv>
+#include <cmath>
+#include <functional>
+#include <map>
+
+using namespace piko;
+using namespace piko::render;
+
+const char *const render::usage =
+    R"(usage: piko-render [options] FILE.piko.cpp SCENE
+
+Compiles a pipeline that uses the types of piko/scene.h, renders a scene with
+it, and says how long a frame took.
+
+  --pipe NAME            which pipeline of the file (the only one)
+  --target cpu|reference compiled for this machine, or run by the reference
+                         executor (cpu)
+  -I FOLDER, -D NAME[=VALUE]   for the pipeline's preprocessor
+
+  --width W --height H   image size in pixels (1024 768)
+  --lights L             number of lights, 0 for none (1)
+  --eye x y z --at x y z camera position and target (the scene fits, seen along
+                         -z)
+  --fovy DEGREES         field of view from bottom to top (45)
+  --cull                 leave out back faces
+
+  --threads N            threads, 0 for all (0)
+  --warmup N --frames N  untimed and timed frames (5 30)
+  --seconds S            stop early after so long, but with 3 timed frames at
+                         least (1000)
+  --out IMAGE            write the last frame: .png, .exr, .ppm, ...
+  --json                 print one line of JSON
+  --help                 print this
+)";
+
+namespace {
+
+/// Reads words one by one; the first problem is kept.
+class Parser {
+public:
+  explicit Parser(const std::vector<std::string> &words) : words(words) {}
+
+  Result<Options> parse() {
+    while (next < words.size() && problem.empty())
+      parseWord(words[next++]);
+    if (problem.empty() && !options.help)
+      check();
+    if (!problem.empty())
+      return Error{problem};
+    return options;
+  }
+
+private:
+  void parseWord(const std::string &word) {
+    if (word == "-I" || word.starts_with("-I"))
+      options.load.includeDirs.push_back(attached(word));
+    else if (word == "-D" || word.starts_with("-D"))
+      options.load.defines.push_back(attached(word));
+    else if (word.size() > 1 && word[0] == '-')
+      parseOption(word);
+    else
+      parseArgument(word);
+  }
+
+  void parseOption(const std::string &name) {
+    constexpr int maxInt = 1'000'000'000;
+    const std::map<std::string, std::function<void()>> actions = {
+        {"--help", [&] { options.help = true; }},
+        {"--pipe", [&] { options.load.pipeName = value(name); }},
+        {"--target", [&] { options.load.target = target(value(name)); }},
+        {"--width", [&] { options.view.width = integer(name, 1, 65536); }},
+        {"--height", [&] { options.view.height = integer(name, 1, 65536); }},
+        {"--lights", [&] { options.lights = integer(name, 0, 1'000'000); }},
+        {"--eye", [&] { options.view.eye = vector(name); }},
+        {"--at", [&] { options.view.at = vector(name); }},
+        {"--fovy", [&] { options.view.fovy = float(number(name)); }},
+        {"--cull", [&] { options.cull = true; }},
+        {"--threads", [&] { options.threads = integer(name, 0, 10000); }},
+        {"--warmup", [&] { options.warmup = integer(name, 0, maxInt); }},
+        {"--frames", [&] { options.frames = integer(name, 1, maxInt); }},
+        {"--seconds", [&] { options.seconds = number(name); }},
+        {"--out", [&] { options.out = value(name); }},
+        {"--json", [&] { options.json = true; }},
+    };
+    auto action = actions.find(name);
+    if (action == actions.end())
+      fail("unknown option '" + name + "'");
+    else
+      action->second();
+  }
+
+  void parseArgument(const std::string &word) {
+    if (options.pipeline.empty())
+      options.pipeline = word;
+    else if (options.scene.empty())
+      options.scene = word;
+    else
+      fail("unexpected argument '" + word + "'");
+  }
+
+  void check() {
+    if (options.pipeline.empty() || options.scene.empty())
+      fail("expected a pipeline file and a scene file");
+    else if (!(options.view.fovy > 0 && options.view.fovy < 180))
+      fail("--fovy: expected an angle between 0 and 180 degrees");
+    else if (!(options.seconds >= 0))
+      fail("--seconds: expected a number of at least 0");
+  }
+
+  std::string value(const std::string &name) {
+    if (next < words.size())
+      return words[next++];
+    fail("option '" + name + "' lacks its value");
+    return {};
+  }
+  /// What follows -I or -D, in the same word or the next.
+  std::string attached(const std::string &word) {
+    return word.size() > 2 ? word.substr(2) : value(word);
+  }
+
+  template <class T> T read(const std::string &name, const char *expected) {
+    std::string text = value(name);
+    T result{};
+    auto [end, error] =
+        std::from_chars(text.data(), text.data() + text.size(), result);
+    if (error != std::errc() || end != text.data() + text.size())
+      fail(name + ": expected " + expected + ", but got '" + text + "'");
+    return result;
+  }
+  double number(const std::string &name) {
+    double result = read<double>(name, "a number");
+    if (!std::isfinite(result))
+      fail(name + ": expected a finite number");
+    return result;
+  }
+  int integer(const std::string &name, int least, int most) {
+    int result = read<int>(name, "a whole number");
+    if (result < least || result > most)
+      fail(name + ": expected a number from " + std::to_string(least) + " to " +
+           std::to_string(most) + ", but got " + std::to_string(result));
+    return result;
+  }
+  glm::vec3 vector(const std::string &name) {
+    glm::vec3 v;
+    for (int i = 0; i < 3; ++i)
+      v[i] = float(number(name));
+    return v;
+  }
+  ExecutionTarget target(const std::string &name) {
+    if (name == "reference")
+      return ExecutionTarget::Reference;
+    if (name != "cpu")
+      fail("--target: expected cpu or reference, but got '" + name + "'");
+    return ExecutionTarget::CPU;
+  }
+
+  void fail(const std::string &message) {
+    if (problem.empty())
+      problem = message;
+  }
+
+  const std::vector<std::string> &words;
+  size_t next = 0;
+  Options options;
+  std::string problem;
+};
+
+} // namespace
+
+Result<Options> render::parseOptions(const std::vector<std::string> &words) {
+  return Parser(words).parse();
+}

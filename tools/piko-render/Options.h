@@ -1,0 +1,34 @@
+//===- Options.h - The command line of piko-render --------------*- C++ -*-===//
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+#ifndef PIKO_TOOLS_PIKORENDER_OPTIONS_H
+#define PIKO_TOOLS_PIKORENDER_OPTIONS_H
+
+#include "Piko/Driver/PipelineLoader.h"
+#include "Piko/Driver/Scene/View.h"
+
+#include <string>
+
+namespace piko::render {
+
+struct Options {
+  bool help = false;
+  std::string pipeline, scene;
+  LoadOptions load;
+  ViewOptions view;
+  int lights = 1;
+  bool cull = false;
+  int threads = 0;
+  int warmup = 5, frames = 30;
+  double seconds = 1000;
+  std::string out;
+  bool json = false;
+};
+
+extern const char *const usage;
+
+/// Reads the command line, without the program's name.
+Result<Options> parseOptions(const std::vector<std::string> &words);
+
+} // namespace piko::render
+
+#endif // PIKO_TOOLS_PIKORENDER_OPTIONS_H

@@ -1,0 +1,92 @@
+//===- Report.cpp - What piko-render says of a run ------------------------===//
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+#include "Report.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+
+using namespace piko;
+using namespace piko::render;
+
+namespace {
+
+std::vector<JsonObject> reportKernels(pikort_pipeline *pipeline, double runs) {
+  std::vector<JsonObject> kernels;
+  for (int32_t i = 0; i < pikort_kernel_count(pipeline); ++i) {
+    pikort_kernel_stats stats;
+    if (pikort_get_kernel_stats(pipeline, i, &stats) != PIKORT_OK)
+      continue;
+    kernels.push_back(JsonObject()
+                          .add("name", stats.name)
+                          .add("ms", stats.milliseconds / runs)
+                          .add("join_ms", stats.join_milliseconds / runs));
+  }
+  return kernels;
+}
+
+std::vector<JsonObject> reportStages(pikort_pipeline *pipeline, double runs) {
+  std::vector<JsonObject> stages;
+  for (int32_t i = 0; i < pikort_stage_count(pipeline); ++i) {
+    pikort_stage_stats stats;
+    if (pikort_get_stage_stats(pipeline, i, &stats) != PIKORT_OK)
+      continue;
+    stages.push_back(JsonObject()
+                         .add("name", stats.name)
+                         .add("in", double(stats.in) / runs)
+                         .add("placed", double(stats.placed) / runs)
+                         .add("out", double(stats.out) / runs));
+  }
+  return stages;
+}
+
+double runsOf(pikort_pipeline *pipeline) {
+  return double(std::max<int64_t>(1, pikort_stats_runs(pipeline)));
+}
+
+} // namespace
+
+JsonObject render::makeReport(const Options &options, const RunResult &result,
+                              pikort_pipeline *pipeline) {
+  double runs = runsOf(pipeline);
+  bool isReference = options.load.target == ExecutionTarget::Reference;
+  const char *target = isReference ? "reference" : "cpu";
+  std::string name = pikort_name(pipeline);
+  return JsonObject()
+      .add("peer", "piko")
+      .add("scene", std::filesystem::path(options.scene).filename().string())
+      .add("tris", result.triangles)
+      .add("verts", result.vertices)
+      .add("w", options.view.width)
+      .add("h", options.view.height)
+      .add("lights", options.lights)
+      .add("ms_median", result.times.median)
+      .add("ms_min", result.times.min)
+      .add("ms_max", result.times.max)
+      .add("threads", result.threads)
+      .add("mode", name + (isReference ? "+reference" : ""))
+      .add("pixels", result.pixels)
+      .add("renderer", std::string("Piko, ") + target)
+      .add("pipe", name)
+      .add("target", target)
+      .add("frames", result.times.count)
+      .add("compile_ms", result.compileMilliseconds)
+      .add("load_ms", result.loadMilliseconds)
+      .add("peak_bin_bytes", pikort_peak_bytes(pipeline))
+      .add("kernels", reportKernels(pipeline, runs))
+      .add("stages", reportStages(pipeline, runs));
+}
+
+std::string render::summarize(const RunResult &result,
+                              pikort_pipeline *pipeline) {
+  char text[256];
+  std::snprintf(text, sizeof text,
+                "%s: %.2f ms a frame (median of %d, %.2f to %.2f), "
+                "%lld triangles, %lld pixels, %d threads, compiled in %.0f ms",
+                pikort_name(pipeline), result.times.median, result.times.count,
+                result.times.min, result.times.max,
+                static_cast<long long>(result.triangles),
+                static_cast<long long>(result.pixels), result.threads,
+                result.compileMilliseconds);
+  return text;
+}

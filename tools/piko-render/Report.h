@@ -1,0 +1,38 @@
+//===- Report.h - What piko-render says of a run ----------------*- C++ -*-===//
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+#ifndef PIKO_TOOLS_PIKORENDER_REPORT_H
+#define PIKO_TOOLS_PIKORENDER_REPORT_H
+
+#include "Options.h"
+
+#include "Piko/Driver/Scene/Json.h"
+
+#include <pikort/pikort.h>
+
+namespace piko::render {
+
+/// Times of frames in milliseconds.
+struct FrameTimes {
+  double median, min, max;
+  int count;
+};
+
+struct RunResult {
+  FrameTimes times;
+  double compileMilliseconds, loadMilliseconds;
+  int64_t triangles, vertices;
+  int threads;
+  int64_t pixels; ///< that something was drawn to
+};
+
+/// The JSON line: first what all renderers of the comparison report, then what
+/// the runtime counted, for each frame.
+JsonObject makeReport(const Options &options, const RunResult &result,
+                      pikort_pipeline *pipeline);
+
+/// The same in short, for people.
+std::string summarize(const RunResult &result, pikort_pipeline *pipeline);
+
+} // namespace piko::render
+
+#endif // PIKO_TOOLS_PIKORENDER_REPORT_H

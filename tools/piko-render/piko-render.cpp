@@ -1,0 +1,196 @@
+//===- piko-render.cpp - Render a scene with any pipeline -----------------===//
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// The pipeline is compiled on the spot and bound to the scene by type, as
+// piko/scene.h says.
+//
+//===----------------------------------------------------------------------===//
+#include "Options.h"
+#include "Report.h"
+
+#include "Piko/Driver/Scene/Binding.h"
+#include "Piko/Driver/Scene/ImageFile.h"
+#include "Piko/Driver/Scene/ProgressBar.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <span>
+#include <thread>
+
+using namespace piko;
+using namespace piko::render;
+
+namespace {
+
+class Stopwatch {
+public:
+  double milliseconds() const {
+    return std::chrono::duration<double, std::milli>(Clock::now() - start)
+        .count();
+  }
+
+private:
+  using Clock = std::chrono::steady_clock;
+  Clock::time_point start = Clock::now();
+};
+
+/// A pipeline of the runtime, destroyed at the end.
+struct PipelineOwner {
+  pikort_pipeline *pipeline = nullptr;
+  ~PipelineOwner() { pikort_destroy(pipeline); }
+};
+
+Error errorOf(pikort_pipeline *pipeline) { return {pikort_message(pipeline)}; }
+
+Result<SceneInput> loadScene(const Options &options) {
+  ProgressBar bar("loading");
+  auto mesh = loadMesh(options.scene, [&](double part) { bar.update(part); });
+  if (!mesh)
+    return mesh.error();
+  Sphere bounds = boundingSphere(*mesh);
+  auto camera = makeCamera(options.view, bounds);
+  if (!camera)
+    return Error{"scene '" + options.scene + "': " + camera.error().message};
+  SceneInput scene{
+      *camera, {}, makeLights(options.lights, bounds), std::move(*mesh)};
+  scene.settings.cullBackFaces = options.cull;
+  return scene;
+}
+
+/// Runs the warm-up frames, then the timed ones.
+Result<FrameTimes> timeFrames(const Options &options,
+                              pikort_pipeline *pipeline) {
+  ProgressBar bar("rendering");
+  double limit = 1000 * options.seconds,
+         total = options.warmup + options.frames;
+  Stopwatch warmup;
+  for (int i = 0; i < options.warmup && warmup.milliseconds() < limit / 4;
+       ++i) {
+    if (pikort_run(pipeline) != PIKORT_OK)
+      return errorOf(pipeline);
+    bar.update(i / total);
+  }
+  pikort_reset_stats(pipeline);
+  std::vector<double> times;
+  double spent = 0;
+  while (int(times.size()) < options.frames &&
+         (times.size() < 3 || spent < limit)) {
+    Stopwatch frame;
+    if (pikort_run(pipeline) != PIKORT_OK)
+      return errorOf(pipeline);
+    times.push_back(frame.milliseconds());
+    spent += times.back();
+    bar.update((options.warmup + int(times.size())) / total);
+  }
+  std::sort(times.begin(), times.end());
+  return FrameTimes{times[times.size() / 2], times.front(), times.back(),
+                    int(times.size())};
+}
+
+Result<std::span<const scene::Color>> readImage(pikort_pipeline *pipeline,
+                                                const std::string &name) {
+  pikort_view view;
+  if (pikort_get_view(pipeline, name.c_str(), &view) != PIKORT_OK)
+    return errorOf(pipeline);
+  if (view.record_size != sizeof(scene::Color))
+    return Error{"image '" + name + "': expected pixels of " +
+                 std::to_string(sizeof(scene::Color)) + " bytes, but got " +
+                 std::to_string(view.record_size)};
+  return std::span<const scene::Color>(
+      static_cast<const scene::Color *>(view.data),
+      size_t(view.extent[0] * view.extent[1]));
+}
+
+int64_t countDrawn(std::span<const scene::Color> pixels) {
+  return std::count_if(pixels.begin(), pixels.end(),
+                       [](const auto &pixel) { return pixel.rgba.a != 0; });
+}
+
+Result<std::unique_ptr<LoadedProgram>> loadProgram(const Options &options) {
+  std::string diagnostics;
+  auto program = loadPipeline(options.pipeline, options.load, diagnostics);
+  if (!program && diagnostics.empty())
+    return Error{"cannot load pipeline '" + options.pipeline + "'"};
+  std::fputs(diagnostics.c_str(), stderr);
+  if (!diagnostics.empty() && diagnostics.back() != '\n')
+    std::fputc('\n', stderr);
+  if (!program)
+    return Error{}; // already said
+  return program;
+}
+
+/// Everything after the command line.
+Result<Done> renderScene(const Options &options) {
+  if (!options.out.empty())
+    if (auto ok = checkImageFormat(options.out); !ok)
+      return ok.error();
+  auto program = loadProgram(options);
+  if (!program)
+    return program.error();
+  Stopwatch loading;
+  auto scene = loadScene(options);
+  if (!scene)
+    return scene.error();
+  double loadMilliseconds = loading.milliseconds();
+
+  PipelineOwner owner;
+  int32_t code = pikort_create(&(*program)->get(), &owner.pipeline);
+  pikort_pipeline *pipeline = owner.pipeline;
+  int64_t extent[] = {options.view.width, options.view.height};
+  if (code != PIKORT_OK ||
+      pikort_set_domain(pipeline, 2, extent) != PIKORT_OK ||
+      pikort_set_threads(pipeline, options.threads) != PIKORT_OK)
+    return errorOf(pipeline);
+  auto output = bindScene(pipeline, *scene);
+  if (!output)
+    return output.error();
+
+  auto times = timeFrames(options, pipeline);
+  if (!times)
+    return times.error();
+  auto pixels = readImage(pipeline, *output);
+  if (!pixels)
+    return pixels.error();
+  if (!options.out.empty())
+    if (auto ok = writeImage(options.out, options.view.width,
+                             options.view.height, *pixels);
+        !ok)
+      return ok.error();
+
+  bool isReference = options.load.target == ExecutionTarget::Reference;
+  int cores = int(std::max(1u, std::thread::hardware_concurrency()));
+  int threads = isReference ? 1 : options.threads ? options.threads : cores;
+  RunResult result{*times,
+                   (*program)->compileMilliseconds(),
+                   loadMilliseconds,
+                   int64_t(scene->mesh.triangles.size()),
+                   int64_t(scene->mesh.vertices.size()),
+                   threads,
+                   countDrawn(*pixels)};
+  std::string text = options.json ? makeReport(options, result, pipeline).text()
+                                  : summarize(result, pipeline);
+  std::printf("%s\n", text.c_str());
+  return Done{};
+}
+
+int fail(const Error &error) {
+  if (!error.message.empty())
+    std::fprintf(stderr, "piko-render: error: %s\n", error.message.c_str());
+  return 1;
+}
+
+} // namespace
+
+int main(int argc, char **argv) {
+  auto options = parseOptions({argv + 1, argv + argc});
+  if (!options)
+    return fail(options.error());
+  if (options->help) {
+    std::fputs(usage, stdout);
+    return 0;
+  }
+  if (auto ok = renderScene(*options); !ok)
+    return fail(ok.error());
+  return 0;
+}
