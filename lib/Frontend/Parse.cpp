@@ -192,9 +192,9 @@ private:
     reader.emplace(ast, context, unit.pipeline, *records);
     if (failed(reader->read(*pipe)))
       return false;
-    wrappers = generateWrappers(
-        unit.pipeline,
-        records->getName(ast.getCanonicalTagType(pipe->type)));
+    unit.pipeline.typeName =
+        records->getName(ast.getCanonicalTagType(pipe->type));
+    wrappers = generateWrappers(unit.pipeline, unit.pipeline.typeName);
     return true;
   }
 

@@ -110,6 +110,7 @@ struct SourceDescription {
 
 struct PipelineDescription {
   std::string name = {};
+  std::string typeName = {};
   mlir::Location location;
   int64_t rank = 2;
   std::vector<RecordDescription> records = {};
