@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #include "Piko/Driver/Scene/SceneFile.h"
 
+#include "PlyCheck.h"
+
 #include <assimp/Importer.hpp>
 #include <assimp/ProgressHandler.hpp>
 #include <assimp/postprocess.h>
@@ -60,14 +62,21 @@ struct HashVertexKey {
 
 /// For each mesh of a scene that was just imported, whether no two of its
 /// polygons share a vertex: importers of OBJ and STL give each corner its own,
-/// even where the file shares them.
-std::vector<bool> findUnshared(const aiScene &imported) {
+/// even where the file shares them. The error is an index out of range.
+Result<std::vector<bool>> findUnshared(const aiScene &imported) {
   std::vector<bool> isUnshared;
   for (unsigned m = 0; m < imported.mNumMeshes; ++m) {
     const aiMesh &part = *imported.mMeshes[m];
     size_t corners = 0;
-    for (unsigned f = 0; f < part.mNumFaces; ++f)
-      corners += part.mFaces[f].mNumIndices;
+    for (unsigned f = 0; f < part.mNumFaces; ++f) {
+      const aiFace &face = part.mFaces[f];
+      corners += face.mNumIndices;
+      for (unsigned k = 0; k < face.mNumIndices; ++k)
+        if (face.mIndices[k] >= part.mNumVertices)
+          return Error{"a face names vertex " +
+                       std::to_string(face.mIndices[k]) + " of " +
+                       std::to_string(part.mNumVertices)};
+    }
     isUnshared.push_back(corners == part.mNumVertices);
   }
   return isUnshared;
@@ -121,11 +130,6 @@ private:
       const aiFace &face = part.mFaces[f];
       if (face.mNumIndices != 3) // a point or a line
         continue;
-      for (int k = 0; k < 3; ++k)
-        if (face.mIndices[k] >= part.mNumVertices)
-          return fail("a triangle names vertex " +
-                      std::to_string(face.mIndices[k]) + " of " +
-                      std::to_string(part.mNumVertices));
       glm::ivec3 corners = {place(face.mIndices[0]), place(face.mIndices[1]),
                             place(face.mIndices[2])};
       if (isMirrored)
@@ -202,8 +206,8 @@ private:
   const ProgressFunction &report;
 };
 
-/// The content of a gzipped file.
-Result<std::string> unzip(const std::string &path) {
+/// The content of a file, unpacked if it is gzipped.
+Result<std::string> readFile(const std::string &path) {
   gzFile file = gzopen(path.c_str(), "rb");
   if (!file)
     return Error{std::strerror(errno)};
@@ -219,6 +223,17 @@ Result<std::string> unzip(const std::string &path) {
     return Error{"it does not unpack: " +
                  (message.empty() ? "it is cut short" : message)};
   return content;
+}
+
+/// The extension that says the format, without ".gz": lowercase and with its
+/// dot.
+std::string formatOf(fs::path path) {
+  if (path.extension() == ".gz")
+    path = path.stem();
+  std::string format = path.extension().string();
+  for (char &c : format)
+    c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return format;
 }
 
 /// The first line of what assimp has to say.
@@ -241,25 +256,30 @@ Result<Mesh> load(const std::string &path, const ProgressFunction &progress) {
   Assimp::Importer importer;
   if (progress) // the importer owns it
     importer.SetProgressHandler(new ReportProgress(progress));
+  std::string format = formatOf(path);
   const aiScene *imported;
-  if (path.ends_with(".gz")) {
-    auto content = unzip(path);
+  // Other formats may consist of several files, which the importer finds.
+  if (path.ends_with(".gz") || format == ".ply") {
+    auto content = readFile(path);
     if (!content)
       return content.error();
-    std::string inner = fs::path(path).stem().extension().string();
-    imported =
-        importer.ReadFileFromMemory(content->data(), content->size(), 0,
-                                    inner.empty() ? "" : inner.c_str() + 1);
+    if (format == ".ply")
+      if (std::string problem = checkPly(*content); !problem.empty())
+        return Error{problem};
+    imported = importer.ReadFileFromMemory(content->data(), content->size(), 0,
+                                           format.c_str() + !format.empty());
   } else {
     imported = importer.ReadFile(path, 0);
   }
   if (!imported)
     return Error{messageOf(importer)};
-  std::vector<bool> toJoin = findUnshared(*imported);
+  auto toJoin = findUnshared(*imported);
+  if (!toJoin)
+    return toJoin.error();
   imported = importer.ApplyPostProcessing(aiProcess_Triangulate);
   if (!imported)
     return Error{messageOf(importer)};
-  return MeshBuilder(std::move(toJoin)).build(*imported);
+  return MeshBuilder(std::move(*toJoin)).build(*imported);
 }
 
 } // namespace
