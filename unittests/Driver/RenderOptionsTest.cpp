@@ -1,0 +1,74 @@
+//===- RenderOptionsTest.cpp - The command line of piko-render ------------===//
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+#include "Options.h"
+
+#include <gtest/gtest.h>
+
+using namespace piko;
+using namespace piko::render;
+
+namespace {
+
+std::string errorOf(std::vector<std::string> words) {
+  auto options = parseOptions(words);
+  return options ? "no error" : options.error().message;
+}
+
+TEST(RenderOptions, AllOfThem) {
+  auto o = parseOptions(
+      {"--pipe",   "Binned",    "a.piko.cpp", "--width",   "320",
+       "--height", "200",       "--lights",   "7",         "--eye",
+       "1",        "-2",        "3e1",        "--at",      "0",
+       "0.5",      "0",         "--fovy",     "60",        "--cull",
+       "--target", "reference", "--threads",  "2",         "--warmup",
+       "0",        "--frames",  "4",          "--seconds", "2.5",
+       "--out",    "o.exr",     "--json",     "-I",        "inc",
+       "-Iother",  "-DX=1",     "-D",         "Y",         "scene.obj"});
+  ASSERT_TRUE(o) << o.error().message;
+  EXPECT_EQ(o->pipeline, "a.piko.cpp");
+  EXPECT_EQ(o->scene, "scene.obj");
+  EXPECT_EQ(o->load.pipeName, "Binned");
+  EXPECT_EQ(o->load.target, ExecutionTarget::Reference);
+  EXPECT_EQ(o->load.includeDirs, (std::vector<std::string>{"inc", "other"}));
+  EXPECT_EQ(o->load.defines, (std::vector<std::string>{"X=1", "Y"}));
+  EXPECT_EQ(o->view.width, 320);
+  EXPECT_EQ(o->view.height, 200);
+  EXPECT_EQ(o->view.fovy, 60);
+  EXPECT_EQ(*o->view.eye, glm::vec3(1, -2, 30));
+  EXPECT_EQ(*o->view.at, glm::vec3(0, 0.5f, 0));
+  EXPECT_EQ(o->lights, 7);
+  EXPECT_TRUE(o->cull && o->json && !o->help);
+  EXPECT_EQ(o->threads, 2);
+  EXPECT_EQ(o->warmup, 0);
+  EXPECT_EQ(o->frames, 4);
+  EXPECT_EQ(o->seconds, 2.5);
+  EXPECT_EQ(o->out, "o.exr");
+}
+
+TEST(RenderOptions, HelpNeedsNothingElse) {
+  auto o = parseOptions({"--help"});
+  ASSERT_TRUE(o);
+  EXPECT_TRUE(o->help);
+}
+
+TEST(RenderOptions, Errors) {
+  EXPECT_EQ(errorOf({"a", "b", "--nope"}), "unknown option '--nope'");
+  EXPECT_EQ(errorOf({"a", "b", "-x"}), "unknown option '-x'");
+  EXPECT_EQ(errorOf({"a", "b", "c"}), "unexpected argument 'c'");
+  EXPECT_EQ(errorOf({"a"}), "expected a pipeline file and a scene file");
+  EXPECT_EQ(errorOf({"a", "b", "--width"}), "option '--width' lacks its value");
+  EXPECT_EQ(errorOf({"a", "b", "--width", "12x"}),
+            "--width: expected a whole number, but got '12x'");
+  EXPECT_EQ(errorOf({"a", "b", "--height", "0"}),
+            "--height: expected a number from 1 to 65536, but got 0");
+  EXPECT_EQ(errorOf({"a", "b", "--eye", "1", "2"}),
+            "option '--eye' lacks its value");
+  EXPECT_EQ(errorOf({"a", "b", "--fovy", "nan"}),
+            "--fovy: expected a finite number");
+  EXPECT_EQ(errorOf({"a", "b", "--fovy", "180"}),
+            "--fovy: expected an angle between 0 and 180 degrees");
+  EXPECT_EQ(errorOf({"a", "b", "--target", "gpu"}),
+            "--target: expected cpu or reference, but got 'gpu'");
+}
+
+} // namespace
