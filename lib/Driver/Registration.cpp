@@ -8,7 +8,11 @@
 #include "Piko/Driver/Sequences.h"
 #include "Piko/Transforms/Passes.h"
 
-#include "mlir/Conversion/Passes.h"
+#include "mlir/Conversion/MathToLLVM/MathToLLVM.h"
+#include "mlir/Conversion/OpenMPToLLVM/ConvertOpenMPToLLVM.h"
+#include "mlir/Conversion/ReconcileUnrealizedCasts/ReconcileUnrealizedCasts.h"
+#include "mlir/Conversion/SCFToControlFlow/SCFToControlFlow.h"
+#include "mlir/Conversion/UBToLLVM/UBToLLVM.h"
 #include "mlir/Dialect/ControlFlow/IR/ControlFlow.h"
 #include "mlir/Dialect/DLTI/DLTI.h"
 #include "mlir/Dialect/Math/IR/Math.h"
@@ -37,9 +41,10 @@ void piko::registerPikoPasses() {
   registerPikoConversionPasses();
   registerSequences();
   registerTransformsPasses();
-  registerConvertMathToLLVMPass();
-  registerConvertOpenMPToLLVMPass();
-  registerReconcileUnrealizedCastsPass();
-  registerSCFToControlFlowPass();
-  registerUBToLLVMConversionPass();
+  // One by one: upstream's header for all conversions costs seconds to compile.
+  registerPass([] { return createConvertMathToLLVMPass(); });
+  registerPass([] { return createConvertOpenMPToLLVMPass(); });
+  registerPass([] { return createReconcileUnrealizedCastsPass(); });
+  registerPass([] { return createSCFToControlFlowPass(); });
+  registerPass([] { return createUBToLLVMConversionPass(); });
 }
