@@ -11,11 +11,13 @@
 #include "Cleanup.h"
 
 #include "llvm/ADT/SetVector.h"
+#include "llvm/Analysis/CFG.h"
 #include "llvm/IR/Dominators.h"
 #include "llvm/IR/InstIterator.h"
 #include "llvm/IR/Instructions.h"
 #include "llvm/Transforms/Utils/BasicBlockUtils.h"
 #include "llvm/Transforms/Utils/Local.h"
+#include "llvm/Transforms/Utils/SSAUpdater.h"
 
 #include <numeric>
 
@@ -186,7 +188,7 @@ private:
     }
     llvm::erase_if(accesses, [&](const Access &access) {
       return !llvm::all_of(targets, [&](llvm::Value *target) {
-        return isAvailable(target, access.instruction);
+        return isAvailable(target, access);
       });
     });
     if (accesses.empty())
@@ -215,23 +217,50 @@ private:
   }
 
   /// Whether a pointer can be computed again at an instruction.
-  bool isAvailable(llvm::Value *pointer, llvm::Instruction *at) {
-    auto *definition = dyn_cast<llvm::Instruction>(pointer);
-    if (!definition || dominance.dominates(definition, at))
+  bool isAvailable(llvm::Value *value, const Access &access) {
+    auto *definition = dyn_cast<llvm::Instruction>(value);
+    if (!definition || dominance.dominates(definition, access.instruction))
       return true;
-    auto *step = dyn_cast<llvm::GetElementPtrInst>(definition);
-    return step && llvm::all_of(step->operands(), [&](llvm::Value *operand) {
-             return isAvailable(operand, at);
-           });
+    if (!value->getType()->isPointerTy())
+      return isCarried(definition, access);
+    if (llvm::isa<llvm::AllocaInst>(definition))
+      return false;
+    // Markers that give pointers have no effect, and a layout.
+    if (!memory.getLayout(definition) &&
+        !llvm::isa<llvm::GetElementPtrInst>(definition))
+      return false;
+    return llvm::all_of(definition->operands(), [&](llvm::Value *operand) {
+      return isAvailable(operand, access);
+    });
   }
 
-  llvm::Value *recompute(llvm::Value *pointer, llvm::Instruction *original) {
-    auto *definition = dyn_cast<llvm::Instruction>(pointer);
-    if (!definition || dominance.dominates(definition, original))
-      return pointer;
+  /// Whether a number that the target was computed from is still the latest of
+  /// its kind at the access: whoever computes it anew must choose anew.
+  bool isCarried(llvm::Instruction *number, const Access &access) {
+    auto *choice = llvm::cast<llvm::Instruction>(access.choice);
+    llvm::SmallPtrSet<llvm::BasicBlock *, 1> without = {choice->getParent()};
+    return number->getParent() == choice->getParent() ||
+           access.instruction->getParent() == choice->getParent() ||
+           !llvm::isPotentiallyReachable(number->getParent(),
+                                         access.instruction->getParent(),
+                                         &without, &dominance);
+  }
+
+  llvm::Value *recompute(llvm::Value *value, llvm::Instruction *at) {
+    auto *definition = dyn_cast<llvm::Instruction>(value);
+    if (!definition || dominance.dominates(definition, at))
+      return value;
+    if (!value->getType()->isPointerTy()) {
+      llvm::SSAUpdater updater;
+      updater.Initialize(value->getType(), "");
+      updater.AddAvailableValue(&function.getEntryBlock(),
+                                llvm::PoisonValue::get(value->getType()));
+      updater.AddAvailableValue(definition->getParent(), value);
+      return updater.GetValueInMiddleOfBlock(at->getParent());
+    }
     llvm::Instruction *clone = definition->clone();
     for (llvm::Use &operand : clone->operands())
-      operand.set(recompute(operand.get(), original));
+      operand.set(recompute(operand.get(), at));
     return builder.Insert(clone);
   }
 

@@ -35,24 +35,24 @@ piko::compileForHost(llvm::StringRef text, const FrontendOptions &options,
   for (const std::string &argument : arguments)
     argv.push_back(argument.c_str());
 
-  auto memory = llvm::makeIntrusiveRefCnt<llvm::vfs::InMemoryFileSystem>();
-  memory->addFile(mainName, 0, llvm::MemoryBuffer::getMemBufferCopy(text));
-  auto files = llvm::makeIntrusiveRefCnt<llvm::vfs::OverlayFileSystem>(
-      llvm::vfs::getRealFileSystem());
-  files->pushOverlay(memory);
-
   ClangDiagnosticForwarder forwarder(context);
   clang::DiagnosticOptions diagnosticOptions;
   clang::CreateInvocationOptions createOptions;
-  createOptions.VFS = files;
   createOptions.Diags = clang::CompilerInstance::createDiagnostics(
-      *files, diagnosticOptions, &forwarder, /*ShouldOwnClient=*/false);
+      *llvm::vfs::getRealFileSystem(), diagnosticOptions, &forwarder,
+      /*ShouldOwnClient=*/false);
   std::shared_ptr<clang::CompilerInvocation> invocation =
       clang::createInvocation(argv, createOptions);
   if (!invocation)
     return nullptr;
+  // The text is in memory; nothing is read from a file of that name.
+  std::unique_ptr<llvm::MemoryBuffer> buffer =
+      llvm::MemoryBuffer::getMemBufferCopy(text, mainName);
+  invocation->getFrontendOpts().Inputs = {clang::FrontendInputFile(
+      buffer->getMemBufferRef(), clang::InputKind(clang::Language::CXX))};
   clang::CompilerInstance compiler(invocation);
-  compiler.setVirtualFileSystem(files);
+  compiler.setVirtualFileSystem(llvm::vfs::getRealFileSystem());
+  compiler.setVerboseOutputStream(llvm::nulls());
   compiler.createDiagnostics(&forwarder, /*ShouldOwnClient=*/false);
   clang::EmitLLVMOnlyAction action(&llvmContext);
   bool ok = compiler.ExecuteAction(action);

@@ -334,6 +334,8 @@ std::unique_ptr<ParsedUnit> piko::parseUnit(const ParseRequest &request,
     return nullptr;
   invocation->getFrontendOpts().Inputs.clear();
 
+  // Before Clang, which may still hold LLVM's module when it goes.
+  auto unit = std::make_unique<ParsedUnit>(fileLocation);
   clang::CompilerInstance compiler(invocation);
   compiler.setVirtualFileSystem(files);
   compiler.createDiagnostics(&forwarder, /*ShouldOwnClient=*/false);
@@ -345,7 +347,6 @@ std::unique_ptr<ParsedUnit> piko::parseUnit(const ParseRequest &request,
   sources.setMainFileID(sources.createFileID(llvm::MemoryBuffer::getMemBuffer(
       "#pragma piko_file\n;\n#pragma piko_wrappers\n", mainName)));
 
-  auto unit = std::make_unique<ParsedUnit>(fileLocation);
   compiler.createPreprocessor(clang::TU_Complete);
   clang::Preprocessor &preprocessor = compiler.getPreprocessor();
   preprocessor.getBuiltinInfo().initializeBuiltins(
