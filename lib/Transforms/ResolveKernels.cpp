@@ -147,8 +147,10 @@ void KernelResolver::run() {
                                builder.getInsertionPoint(), place.prim);
     SmallVector<EmitOp> emits;
     kernel.walk([&](EmitOp emit) { emits.push_back(emit); });
-    // Before emissions bring in the assign phases of other stages.
-    expandQueries(kernel.getBodyBlock()->getParentOp(), stage, place.bin);
+    // Before emissions bring in the assign phases of other stages, whose
+    // queries are about other bins.
+    for (auto loop : kernel.getOps<scf::ForallOp>())
+      expandQueries(loop, stage, place.bin);
     for (EmitOp emit : emits)
       resolveEmit(emit, place);
   }

@@ -23,6 +23,7 @@ piko.record @F {"x" : i32 at 0, "y" : i32 at 4} size 8 align 4
 // The bin of cell (y, x): the consumer's assign phase sees what was emitted.
 // CHECK:                 %[[YI:.*]] = arith.index_cast %[[Y]]
 // CHECK:                 arith.cmpi ult, %[[YI]]
+// CHECK:                 arith.divui %[[YI]], %c8
 // CHECK:                 piko.place %[[W]][0] of @b in
 // CHECK:                 piko.next %[[W]]
 // CHECK:               } {piko.lanes}
