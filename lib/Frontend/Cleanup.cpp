@@ -11,7 +11,7 @@
 
 #include "MathCalls.h"
 #include "Wrappers.h"
-#include "llvm/Analysis/CallGraph.h"
+#include "llvm/Analysis/CFG.h"
 #include "llvm/IR/DebugInfoMetadata.h"
 #include "llvm/IR/InstIterator.h"
 #include "llvm/IR/Instructions.h"
@@ -118,6 +118,9 @@ private:
           name == "malloc" || name == "free" || name == "calloc" ||
           name == "realloc")
         return fail(call, "dynamic allocation");
+      if (llvm::StringRef(name).starts_with("piko::"))
+        return fail(call, "'" + llvm::StringRef(name).rsplit("::").second +
+                              "', which the compiler cannot do yet");
       return fail(call,
                   "a call of '" + name + "', which has no body in this file");
     }
@@ -235,7 +238,34 @@ static bool inlineKnownCalls(llvm::Function &function) {
   return changed;
 }
 
-static void prepareFunction(llvm::Function &function, const ParsedUnit &unit,
+/// A phase may read what the pipeline's constructor left in its stage, and no
+/// more: its calls are concurrent. False after an error.
+static bool checkObject(llvm::Function &function, const ParsedUnit &unit,
+                        MemoryMap &memory, mlir::MLIRContext &context) {
+  const llvm::CallInst *begin = nullptr;
+  for (const llvm::Instruction &instruction : llvm::instructions(function))
+    if (auto *call = dyn_cast<llvm::CallInst>(&instruction))
+      if (const Marker *marker = getMarker(call, unit.markers))
+        if (marker->kind == MarkerKind::phase)
+          begin = call;
+  if (!begin)
+    return true;
+  const llvm::AllocaInst *object = memory.objects.lookup(&function);
+  for (llvm::Instruction &instruction : llvm::instructions(function)) {
+    auto *store = dyn_cast<llvm::StoreInst>(&instruction);
+    if (!store ||
+        getAddress(store->getPointerOperand(), memory.data).base != object ||
+        !llvm::isPotentiallyReachable(begin, store))
+      continue;
+    mlir::emitError(getUserLocation(store, unit, context))
+        << "not supported in Piko: changing a member of a stage in a phase, "
+           "whose calls are concurrent";
+    return false;
+  }
+  return true;
+}
+
+static void prepareFunction(llvm::Function &function, ParsedUnit &unit,
                             MemoryMap &memory, mlir::MLIRContext &context) {
   redirectMathCalls(function, unit, context);
   inlineKnownCalls(function);
@@ -255,6 +285,8 @@ static bool cleanUpFunction(llvm::Function &function, ParsedUnit &unit,
   // Each round sees through one more level of references.
   bool localized = false;
   for (int round = 0; round < 32; ++round) {
+    if (!checkObject(function, unit, memory, context))
+      return false;
     bool changed = splitMemory(function, memory);
     changed |= flattenPointers(function, memory);
     if (inlineKnownCalls(function)) {
@@ -312,6 +344,12 @@ bool piko::cleanUp(ParsedUnit &unit, MemoryMap &memory,
     if (auto *list = module.getNamedGlobal(used))
       list->eraseFromParent();
 
+  for (llvm::Function *wrapper : wrappers)
+    for (llvm::Instruction &instruction : wrapper->getEntryBlock())
+      if (auto *variable = dyn_cast<llvm::AllocaInst>(&instruction)) {
+        memory.objects[wrapper] = variable;
+        break;
+      }
   CallChecker checker(unit, context);
   for (llvm::Function *wrapper : wrappers)
     if (!checker.check(*wrapper))

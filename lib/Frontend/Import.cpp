@@ -399,6 +399,7 @@ private:
     case MarkerKind::state:
     case MarkerKind::input:
     case MarkerKind::element:
+    case MarkerKind::phase:
       return success();
     case MarkerKind::extent: {
       const StateDescription *state = getState(call, call->getArgOperand(0));

@@ -18,7 +18,8 @@ std::optional<MarkerKind> piko::getMarkerKind(llvm::StringRef name) {
       MARKER(assignBin) MARKER(assignAll) MARKER(assignPrevious)
       MARKER(assignBox) MARKER(schedule) MARKER(endStage) MARKER(endBin)
       MARKER(batch) MARKER(everyBin) MARKER(order) MARKER(source)
-      MARKER(connect) MARKER(allocateForSource) MARKER(clear)
+      MARKER(connect) MARKER(allocateForSource) MARKER(phase)
+      MARKER(clear)
       .Default(std::nullopt);
 #undef MARKER
 }
@@ -55,6 +56,13 @@ void piko::setMarkerEffects(llvm::Module &module, const MarkerTable &markers) {
     case MarkerKind::domain:
       function.setDoesNotAccessMemory();
       break;
+    case MarkerKind::phase:
+    case MarkerKind::assignBin:
+    case MarkerKind::assignAll:
+    case MarkerKind::assignPrevious:
+    case MarkerKind::assignBox:
+      function.setOnlyAccessesInaccessibleMemory();
+      [[fallthrough]];
     default:
       // What they read and write is seen by nothing else in the module, but
       // they stay where they are, and as many as they are.

@@ -44,6 +44,7 @@ enum class MarkerKind {
   source,
   connect,
   allocateForSource,
+  phase,
   clear,
 };
 

@@ -88,7 +88,7 @@ static bool redirectExtremum(llvm::CallInst *call) {
   return true;
 }
 
-void piko::redirectMathCalls(llvm::Function &function, const ParsedUnit &unit,
+void piko::redirectMathCalls(llvm::Function &function, ParsedUnit &unit,
                              mlir::MLIRContext &context) {
   for (llvm::Instruction &instruction :
        llvm::make_early_inc_range(llvm::instructions(function))) {
@@ -102,9 +102,11 @@ void piko::redirectMathCalls(llvm::Function &function, const ParsedUnit &unit,
         function.getParent()->getFunction((mathPrefix + name).str());
     if (!ours)
       continue;
-    mlir::emitWarning(getUserLocation(call, unit, context))
-        << "'" << name << "' is compiled as piko::" << name
-        << ": a plain C++ build of this file may differ";
+    mlir::Location location = getUserLocation(call, unit, context);
+    if (unit.warned.insert(location).second)
+      mlir::emitWarning(location)
+          << "'" << name << "' is compiled as piko::" << name
+          << ": a plain C++ build of this file may differ";
     call->setCalledFunction(ours);
   }
 }

@@ -16,7 +16,7 @@ bool isMathFunction(const llvm::Function &function);
 /// Replaces calls of the C library's functions, which differ between machines,
 /// by calls of Piko's own, with a warning for each place in the user's text.
 /// Minima and maxima become comparisons.
-void redirectMathCalls(llvm::Function &function, const ParsedUnit &unit,
+void redirectMathCalls(llvm::Function &function, ParsedUnit &unit,
                        mlir::MLIRContext &context);
 
 } // namespace piko

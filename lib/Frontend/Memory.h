@@ -15,6 +15,7 @@
 #include "llvm/ADT/DenseMap.h"
 #include "llvm/ADT/SmallVector.h"
 #include "llvm/IR/IRBuilder.h"
+#include "llvm/IR/Instructions.h"
 
 namespace piko {
 
@@ -111,6 +112,8 @@ public:
   const PipelineDescription &pipeline;
   const MarkerTable &markers;
   const llvm::DataLayout &data;
+  /// The pipeline object of each wrapper.
+  llvm::DenseMap<const llvm::Function *, const llvm::AllocaInst *> objects;
 
 private:
   std::vector<MemoryLayout> recordLayouts;

@@ -38,6 +38,8 @@ struct ParsedUnit {
   std::map<std::string, std::string> functionNames;
   /// The files whose lines diagnostics should point at.
   llvm::StringSet<> userFiles;
+  /// Where a call of the C library has been warned about.
+  llvm::DenseSet<mlir::Attribute> warned;
 };
 
 /// Parses the file and generates LLVM IR for its phases, uncleaned; null after

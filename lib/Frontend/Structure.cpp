@@ -26,14 +26,15 @@ static llvm::LogicalResult makeUpdate(CallOp begin) {
   for (auto &op : llvm::make_range(std::next(begin->getIterator()),
                                    block->end())) {
     if (isBegin(op))
-      return op.emitError("not supported in Piko: an update inside an update");
+      return mlir::emitError(op.getLoc(), "not supported in Piko: an update inside an update");
     if (isEnd(op)) {
       end = &op;
       break;
     }
   }
   if (!end)
-    return begin.emitError(
+    return mlir::emitError(
+        begin.getLoc(),
         "not supported in Piko: leaving an update other than at its end");
 
   llvm::SmallVector<mlir::Operation *> body;
@@ -92,7 +93,7 @@ llvm::LogicalResult piko::structurePhase(mlir::func::FuncOp function) {
   mlir::DominanceInfo dominance(function);
   if (llvm::failed(mlir::transformCFGToSCF(function.getBody(), transformation,
                                            dominance)))
-    return function.emitError("not supported in Piko: this control flow");
+    return mlir::emitError(function.getLoc(), "not supported in Piko: this control flow");
   llvm::SmallVector<CallOp> begins;
   function.walk([&](CallOp call) {
     if (isBegin(*call))

@@ -31,7 +31,8 @@ std::string piko::generateWrappers(const PipelineDescription &pipeline,
   out << "using __piko_state = __piko_pipe::State;\n";
   function(WrapperKind::Wire, 0, "__piko_pipe pipe;");
   for (auto [index, stage] : llvm::enumerate(pipeline.stages)) {
-    std::string call = "__piko_pipe pipe; pipe." + stage.name;
+    std::string call =
+        "__piko_pipe pipe; ::piko::marker::phase(); pipe." + stage.name;
     std::string input = "(*::piko::marker::input<typename decltype(pipe." +
                         stage.name + ")::Input>());";
     function(WrapperKind::Process, index, call + ".process" + input);

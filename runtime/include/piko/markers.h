@@ -61,6 +61,9 @@ void source(const void *stage);
 void connect(const void *producer, int32_t port, const void *consumer);
 void allocateForSource(const void *handle, int64_t source);
 
+// Between the construction of the pipeline object and the call of a phase.
+void phase();
+
 // What an image is cleared to.
 template <class T> void clear(const T *value);
 

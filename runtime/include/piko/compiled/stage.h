@@ -7,6 +7,17 @@
 
 namespace piko {
 
+/// The primitives that a list Process is called with: only the reference
+/// executor can do that yet.
+template <class T> class List {
+public:
+  int64_t size() const;
+  bool empty() const;
+  const T &operator[](int64_t i) const;
+  const T *begin() const;
+  const T *end() const;
+};
+
 /// Gives a stage access to the state of its pipeline.
 template <class S> class Uses {
 public:
@@ -17,8 +28,6 @@ public:
 /// primitive type in, and one out for each port.
 template <class B, int Threads, class In, class... Out> class BasicStage {
   static_assert(Threads > 0, "a bin has at least one thread");
-  static_assert(__is_trivially_copyable(In),
-                "a primitive must be trivially copyable");
 
 public:
   using Input = In;
@@ -98,6 +107,11 @@ protected:
   Cells<rank> binHi() const {
     return make([](int32_t dim) { return marker::binHi(marker::bin(), dim); });
   }
+
+  // What only the reference executor can do yet: the compiler says so.
+  template <class F> void parallelFor(int64_t n, F &&f);
+  template <class F> void parallelForPixels(F &&f);
+  void sync();
 
   // Schedule.
   void specifySchedule(SchedulePolicy policy, int64_t tileSplit = 0) {

@@ -40,9 +40,6 @@ template <class T> struct Identity {
 } // namespace detail
 
 template <class T> class Buffer final {
-  static_assert(__is_trivially_copyable(T),
-                "the elements of a buffer must be trivially copyable");
-
 public:
   Buffer() = default;
   Buffer(const Buffer &) = delete;
@@ -55,8 +52,6 @@ public:
 };
 
 template <class T, int Rank = 2> class Image final {
-  static_assert(__is_trivially_copyable(T),
-                "the pixels of an image must be trivially copyable");
   static_assert(Rank >= 1 && Rank <= 4, "an image has one to four dimensions");
 
 public:
