@@ -52,8 +52,8 @@ JsonObject render::makeReport(const Options &options, const RunResult &result,
   bool isReference = options.load.target == ExecutionTarget::Reference;
   const char *target = isReference ? "reference" : "cpu";
   std::string name = pikort_name(pipeline);
-  return JsonObject()
-      .add("peer", "piko")
+  JsonObject report;
+  report.add("peer", "piko")
       .add("scene", std::filesystem::path(options.scene).filename().string())
       .add("tris", result.triangles)
       .add("verts", result.vertices)
@@ -71,10 +71,12 @@ JsonObject render::makeReport(const Options &options, const RunResult &result,
       .add("target", target)
       .add("frames", result.times.count)
       .add("compile_ms", result.compileMilliseconds)
-      .add("load_ms", result.loadMilliseconds)
-      .add("peak_bin_bytes", pikort_peak_bytes(pipeline))
-      .add("kernels", reportKernels(pipeline, runs))
-      .add("stages", reportStages(pipeline, runs));
+      .add("load_ms", result.loadMilliseconds);
+  if (!isReference) // the runtime does not see inside of it
+    report.add("peak_bin_bytes", pikort_peak_bytes(pipeline))
+        .add("kernels", reportKernels(pipeline, runs))
+        .add("stages", reportStages(pipeline, runs));
+  return report;
 }
 
 std::string render::summarize(const RunResult &result,
