@@ -46,5 +46,7 @@ struct Large : piko::Pipe<> {
   Large() { source(drop); }
 };
 
-// WHICH: error: {{.*}}'Small', 'Large'
-// UNKNOWN: error: {{.*}}'None'
+// WHICH: pikoc-cpp.cpp:1:1: error: expected the name of one of the file's 2
+// WHICH: pikoc-cpp.cpp:[[#@LINE-13]]:8: note: pipeline 'Small' is defined here
+// WHICH: pikoc-cpp.cpp:[[#@LINE-7]]:8: note: pipeline 'Large' is defined here
+// UNKNOWN: pikoc-cpp.cpp:1:1: error: {{.*}}'None'
