@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
 // Another pipeline than the examples': each vertex colours its pixel. The state
 // has other names, and no triangles come in.
 #include <piko.h>
