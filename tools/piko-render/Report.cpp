@@ -66,6 +66,7 @@ JsonObject render::makeReport(const Options &options, const RunResult &result,
       .add("threads", result.threads)
       .add("mode", name + (isReference ? "+reference" : ""))
       .add("pixels", result.pixels)
+      .add("image_hash", result.imageHash)
       .add("renderer", std::string("Piko, ") + target)
       .add("pipe", name)
       .add("target", target)

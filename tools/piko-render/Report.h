@@ -23,6 +23,7 @@ struct RunResult {
   int64_t triangles, vertices;
   int threads;
   int64_t pixels; ///< that something was drawn to
+  std::string imageHash;
 };
 
 /// The JSON line: first what all renderers of the comparison report, then what

@@ -14,6 +14,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstddef>
 #include <cstdio>
 #include <span>
 #include <thread>
@@ -107,6 +108,17 @@ int64_t countDrawn(std::span<const scene::Color> pixels) {
                        [](const auto &pixel) { return pixel.rgba.a != 0; });
 }
 
+/// FNV-1a over the image's bytes: equal images have equal hashes.
+std::string hashOf(std::span<const scene::Color> pixels) {
+  uint64_t hash = 0xcbf29ce484222325;
+  for (std::byte byte : std::as_bytes(pixels))
+    hash = (hash ^ uint64_t(byte)) * 0x100000001b3;
+  char text[17];
+  std::snprintf(text, sizeof text, "%016llx",
+                static_cast<unsigned long long>(hash));
+  return text;
+}
+
 Result<std::unique_ptr<LoadedProgram>> loadProgram(const Options &options) {
   std::string diagnostics;
   auto program = loadPipeline(options.pipeline, options.load, diagnostics);
@@ -167,7 +179,8 @@ Result<Done> renderScene(const Options &options) {
                    int64_t(scene->mesh.triangles.size()),
                    int64_t(scene->mesh.vertices.size()),
                    threads,
-                   countDrawn(*pixels)};
+                   countDrawn(*pixels),
+                   hashOf(*pixels)};
   std::string text = options.json ? makeReport(options, result, pipeline).text()
                                   : summarize(result, pipeline);
   std::printf("%s\n", text.c_str());

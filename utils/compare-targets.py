@@ -1,0 +1,60 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+"""Renders a scene with the reference executor and, over and over, compiled.
+
+  compare-targets.py [--render PATH] [--file PIPELINES] [--pipes A B ..]
+                     [--threads T ..] [--runs N] SCENE [piko-render options]
+
+Each compiled run is a process of its own; its image must equal the reference
+executor's bit for bit. Prints a line for each pipeline and thread count; the
+exit status is 1 if any image differs.
+"""
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+
+ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+
+
+def render(arguments, pipe, rest):
+    command = [arguments.render, arguments.file, "--pipe", pipe]
+    command += [arguments.scene, *arguments.options]
+    command += ["--frames", "1", "--warmup", "0", "--json", *rest]
+    done = subprocess.run(command, capture_output=True, text=True)
+    if done.returncode:
+        sys.exit(f"{' '.join(command)}\n{done.stderr}")
+    return json.loads(done.stdout)
+
+
+def main():
+    parser = argparse.ArgumentParser(allow_abbrev=False)
+    parser.add_argument("--render", default=f"{ROOT}/build/bin/piko-render")
+    parser.add_argument("--file",
+                        default=f"{ROOT}/examples/raster/raster.piko.cpp")
+    parser.add_argument("--pipes", nargs="+", default=["Baseline", "Binned"])
+    parser.add_argument("--threads", nargs="+", default=["1", "2", "7"])
+    parser.add_argument("--runs", type=int, default=10)
+    parser.add_argument("scene")
+    arguments, arguments.options = parser.parse_known_args()
+
+    equal = True
+    for pipe in arguments.pipes:
+        expected = render(arguments, pipe, ["--target", "reference"])
+        for threads in arguments.threads:
+            wrong = 0
+            for _ in range(arguments.runs):
+                actual = render(arguments, pipe, ["--threads", threads])
+                wrong += actual["image_hash"] != expected["image_hash"]
+            equal &= wrong == 0
+            verdict = f"{wrong} differ" if wrong else "all equal the reference"
+            print(f"{expected['scene']} {pipe} threads {threads}: "
+                  f"{arguments.runs} runs, {verdict} "
+                  f"({expected['pixels']} pixels drawn)", flush=True)
+    return 0 if equal else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
