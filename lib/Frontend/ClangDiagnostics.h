@@ -3,9 +3,9 @@
 #ifndef PIKO_LIB_FRONTEND_CLANGDIAGNOSTICS_H
 #define PIKO_LIB_FRONTEND_CLANGDIAGNOSTICS_H
 
+#include "mlir/IR/Diagnostics.h"
 #include "clang/Basic/Diagnostic.h"
 #include "clang/Basic/SourceManager.h"
-#include "mlir/IR/Diagnostics.h"
 
 #include <optional>
 

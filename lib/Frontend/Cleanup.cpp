@@ -11,6 +11,7 @@
 
 #include "MathCalls.h"
 #include "Wrappers.h"
+#include "mlir/IR/Diagnostics.h"
 #include "llvm/Analysis/CFG.h"
 #include "llvm/IR/DebugInfoMetadata.h"
 #include "llvm/IR/InstIterator.h"
@@ -27,7 +28,6 @@
 #include "llvm/Transforms/Scalar/SimplifyCFG.h"
 #include "llvm/Transforms/Utils/Cloning.h"
 #include "llvm/Transforms/Utils/Mem2Reg.h"
-#include "mlir/IR/Diagnostics.h"
 
 using namespace piko;
 using llvm::dyn_cast;

@@ -72,16 +72,15 @@ private:
   }
 
   void expandBegin(llvm::CallInst *call, const Marker &marker) {
-    llvm::SmallVector<llvm::Value *> arguments(
-        llvm::drop_begin(call->args()));
+    llvm::SmallVector<llvm::Value *> arguments(llvm::drop_begin(call->args()));
     llvm::Value *token =
         callAccessor(accessor::updateBegin, builder.getInt64Ty(), arguments);
     unsigned number = 0;
     for (const MemoryPiece &piece : getRecordPieces(marker.record)) {
       std::string name = accessor::updateValue.str();
       llvm::raw_string_ostream(name) << *piece.type;
-      llvm::Value *value = callAccessor(
-          name, piece.type, {token, builder.getInt32(number++)});
+      llvm::Value *value =
+          callAccessor(name, piece.type, {token, builder.getInt32(number++)});
       builder.CreateStore(value, at(call->getArgOperand(0), piece.offset));
     }
   }

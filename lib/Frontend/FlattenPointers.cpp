@@ -193,7 +193,8 @@ private:
     });
     if (accesses.empty())
       return;
-    std::map<llvm::Value *, llvm::Value *> tags = makeTagValues(choices, targets);
+    std::map<llvm::Value *, llvm::Value *> tags =
+        makeTagValues(choices, targets);
     for (const Access &access : accesses)
       rewrite(access, tags[access.choice], targets.getArrayRef());
     changed = true;
@@ -273,8 +274,8 @@ private:
     for (llvm::Value *choice : choices) {
       if (auto *phi = dyn_cast<llvm::PHINode>(choice)) {
         builder.SetInsertPoint(phi);
-        tags[choice] =
-            builder.CreatePHI(builder.getInt32Ty(), phi->getNumIncomingValues());
+        tags[choice] = builder.CreatePHI(builder.getInt32Ty(),
+                                         phi->getNumIncomingValues());
       } else {
         auto *select = llvm::cast<llvm::SelectInst>(choice);
         builder.SetInsertPoint(select);
@@ -306,7 +307,8 @@ private:
     llvm::Instruction *original = access.instruction;
     llvm::SmallVector<llvm::Value *> results;
     llvm::Instruction *at = original;
-    llvm::SmallVector<std::pair<llvm::Instruction *, llvm::Instruction *>> forks;
+    llvm::SmallVector<std::pair<llvm::Instruction *, llvm::Instruction *>>
+        forks;
     // A chain of tests; the last target needs none.
     for (size_t i = 0; i + 1 < targets.size(); ++i) {
       builder.SetInsertPoint(at);

@@ -14,7 +14,9 @@
 #include "mlir/Dialect/MemRef/IR/MemRef.h"
 #include "mlir/Dialect/SCF/IR/SCF.h"
 #include "mlir/Dialect/UB/IR/UBOps.h"
+#include "mlir/IR/Dominance.h"
 #include "mlir/IR/Verifier.h"
+#include "mlir/Transforms/CSE.h"
 #include "mlir/Transforms/GreedyPatternRewriteDriver.h"
 
 using namespace piko;
@@ -37,16 +39,19 @@ static void canonicalize(mlir::ModuleOp module) {
   for (mlir::RegisteredOperationName op : context->getRegisteredOperations())
     op.getCanonicalizationPatterns(patterns, context);
   (void)mlir::applyPatternsGreedily(module, std::move(patterns));
+  mlir::IRRewriter rewriter(context);
+  mlir::DominanceInfo dominance(module);
+  mlir::eliminateCommonSubExpressions(rewriter, dominance, module);
 }
 
-static mlir::OwningOpRef<mlir::ModuleOp>
-translate(const ParseRequest &request, mlir::MLIRContext &context) {
+static mlir::OwningOpRef<mlir::ModuleOp> translate(const ParseRequest &request,
+                                                   mlir::MLIRContext &context) {
   loadDialects(context);
   std::unique_ptr<ParsedUnit> unit = parseUnit(request, context);
   if (!unit)
     return nullptr;
-  MemoryMap memory(unit->pipeline, unit->markers,
-                   unit->module->getDataLayout(), *unit->llvmContext);
+  MemoryMap memory(unit->pipeline, unit->markers, unit->module->getDataLayout(),
+                   *unit->llvmContext);
   if (!cleanUp(*unit, memory, context) || !readWiring(*unit, memory, context))
     return nullptr;
   mlir::OwningOpRef<mlir::ModuleOp> module =
@@ -62,8 +67,8 @@ translate(const ParseRequest &request, mlir::MLIRContext &context) {
 mlir::OwningOpRef<mlir::ModuleOp>
 piko::translateCppToPiko(llvm::StringRef file, const FrontendOptions &options,
                          mlir::MLIRContext &context) {
-  return translate(
-      {file.str(), std::nullopt, options, ParseGoal::CompilePipe}, context);
+  return translate({file.str(), std::nullopt, options, ParseGoal::CompilePipe},
+                   context);
 }
 
 mlir::OwningOpRef<mlir::ModuleOp>
@@ -92,8 +97,8 @@ piko::describePipe(llvm::StringRef file, const FrontendOptions &options,
       {file.str(), std::nullopt, options, ParseGoal::DescribePipe}, context);
   if (!unit)
     return failure();
-  MemoryMap memory(unit->pipeline, unit->markers,
-                   unit->module->getDataLayout(), *unit->llvmContext);
+  MemoryMap memory(unit->pipeline, unit->markers, unit->module->getDataLayout(),
+                   *unit->llvmContext);
   if (!cleanUp(*unit, memory, context) || !readWiring(*unit, memory, context))
     return failure();
   return std::move(unit->pipeline);

@@ -19,8 +19,14 @@ piko::compileForHost(llvm::StringRef text, const FrontendOptions &options,
                      llvm::LLVMContext &llvmContext,
                      mlir::MLIRContext &context) {
   std::vector<std::string> arguments = {
-      "clang++", "-std=c++20", "-fsyntax-only", "-xc++", "-O2",
-      "-ffp-contract=off", "-fPIC", "-resource-dir",
+      "clang++",
+      "-std=c++20",
+      "-fsyntax-only",
+      "-xc++",
+      "-O2",
+      "-ffp-contract=off",
+      "-fPIC",
+      "-resource-dir",
       options.resourceDir.empty() ? PIKO_CLANG_RESOURCE_DIR
                                   : options.resourceDir,
       "-isystem",

@@ -41,9 +41,8 @@ public:
     mlir::Type prim = PrimType::get(
         &context, mlir::FlatSymbolRefAttr::get(
                       &context, unit.pipeline.records[stage.input].name));
-    mlir::OwningOpRef<mlir::func::FuncOp> function =
-        mlir::func::FuncOp::create(stage.location, source.getName(),
-                                   builder.getFunctionType({prim}, {}));
+    mlir::OwningOpRef<mlir::func::FuncOp> function = mlir::func::FuncOp::create(
+        stage.location, source.getName(), builder.getFunctionType({prim}, {}));
     entry = function->addEntryBlock();
     scalars.setEntry(entry);
     llvm::ReversePostOrderTraversal<llvm::Function *> order(&source);
@@ -107,7 +106,8 @@ private:
         return importAccessor(call, name);
     }
     if (instruction->getType()->isPointerTy())
-      return reject(instruction, "a pointer that can point to different places");
+      return reject(instruction,
+                    "a pointer that can point to different places");
     if (mlir::Value value = scalars.import(instruction)) {
       values[instruction] = value;
       return success();
@@ -115,9 +115,8 @@ private:
     if (auto *call = dyn_cast<llvm::IntrinsicInst>(instruction)) {
       if (call->getType()->isVoidTy())
         return success();
-      return reject(instruction, "a call of '" +
-                                     call->getCalledFunction()->getName() +
-                                     "'");
+      return reject(instruction,
+                    "a call of '" + call->getCalledFunction()->getName() + "'");
     }
     return reject(instruction, llvm::Twine("the operation '") +
                                    instruction->getOpcodeName() + "'");
@@ -148,9 +147,10 @@ private:
 
   LogicalResult importArrayAccess(llvm::Instruction *instruction) {
     auto *store = dyn_cast<llvm::StoreInst>(instruction);
-    Address address = getAddress(
-        const_cast<llvm::Value *>(llvm::getLoadStorePointerOperand(instruction)),
-        memory.data);
+    Address address =
+        getAddress(const_cast<llvm::Value *>(
+                       llvm::getLoadStorePointerOperand(instruction)),
+                   memory.data);
     auto found = arrays.find(address.base);
     if (found == arrays.end())
       return reject(instruction, "access through a pointer that can point to "
@@ -160,9 +160,9 @@ private:
         cast<mlir::MemRefType>(array.getType()).getElementType();
     int64_t size = (element.getIntOrFloatBitWidth() + 7) / 8;
     llvm::Type *accessed = llvm::getLoadStoreType(instruction);
-    bool fits = !accessed->isPointerTy() && address.offset % size == 0 &&
-                accessed->getPrimitiveSizeInBits() ==
-                    element.getIntOrFloatBitWidth();
+    bool fits =
+        !accessed->isPointerTy() && address.offset % size == 0 &&
+        accessed->getPrimitiveSizeInBits() == element.getIntOrFloatBitWidth();
     for (auto [value, scale] : address.terms)
       fits &= scale % size == 0;
     if (!fits)
@@ -174,9 +174,9 @@ private:
       if (scale != size)
         term = mlir::arith::MulIOp::create(builder, *location, term,
                                            scalars.makeIndex(scale / size));
-      index = index ? mlir::arith::AddIOp::create(builder, *location, index,
-                                                  term)
-                    : term;
+      index = index
+                  ? mlir::arith::AddIOp::create(builder, *location, index, term)
+                  : term;
     }
     if (!index)
       index = scalars.makeIndex(address.offset / size);
@@ -187,8 +187,8 @@ private:
     if (store) {
       mlir::Value value = scalars.get(store->getValueOperand());
       if (type != element)
-        value = mlir::arith::BitcastOp::create(builder, *location, element,
-                                               value);
+        value =
+            mlir::arith::BitcastOp::create(builder, *location, element, value);
       mlir::memref::StoreOp::create(builder, *location, value, array, index);
       return success();
     }
@@ -216,8 +216,8 @@ private:
   getCoordinates(llvm::iterator_range<llvm::User::op_iterator> operands,
                  int64_t rank) {
     llvm::SmallVector<mlir::Value> coordinates;
-    for (llvm::Value *operand : llvm::make_range(
-             operands.begin(), operands.begin() + rank))
+    for (llvm::Value *operand :
+         llvm::make_range(operands.begin(), operands.begin() + rank))
       coordinates.push_back(scalars.getCoordinate(operand));
     return coordinates;
   }
@@ -248,8 +248,8 @@ private:
       place.state = getState(call, base->getArgOperand(0));
       if (!place.state)
         return failure();
-      place.indices = getCoordinates(llvm::drop_begin(base->args()),
-                                     place.state->rank);
+      place.indices =
+          getCoordinates(llvm::drop_begin(base->args()), place.state->rank);
       break;
     default:
       break;
@@ -285,13 +285,13 @@ private:
         return failure();
       mlir::Type type = scalars.getType(call->getType());
       if (place.state)
-        values[call] = LoadOp::create(
-            builder, *location, type, place.state->name,
-            place.indices, place.field, place.elements);
+        values[call] =
+            LoadOp::create(builder, *location, type, place.state->name,
+                           place.indices, place.field, place.elements);
       else
-        values[call] = GetOp::create(builder, *location, type,
-                                     entry->getArgument(0), place.field,
-                                     place.elements);
+        values[call] =
+            GetOp::create(builder, *location, type, entry->getArgument(0),
+                          place.field, place.elements);
       return success();
     }
     if (phase != WrapperKind::Process)
@@ -308,15 +308,14 @@ private:
     }
     if (failed(getPlace(call, 5, place)))
       return failure();
-    AtomicOp::create(builder, *location, getAtomicKind(call),
-                     place.state->name, place.indices, place.field,
-                     place.elements, scalars.get(call->getArgOperand(4)));
+    AtomicOp::create(builder, *location, getAtomicKind(call), place.state->name,
+                     place.indices, place.field, place.elements,
+                     scalars.get(call->getArgOperand(4)));
     return success();
   }
 
   static AtomicKind getAtomicKind(llvm::CallInst *call) {
-    bool isSigned =
-        !cast<llvm::ConstantInt>(call->getArgOperand(3))->isZero();
+    bool isSigned = !cast<llvm::ConstantInt>(call->getArgOperand(3))->isZero();
     switch (cast<llvm::ConstantInt>(call->getArgOperand(2))->getZExtValue()) {
     case 0:
       return AtomicKind::Add;
@@ -384,8 +383,7 @@ private:
   LogicalResult importMarker(llvm::CallInst *call, const Marker &marker) {
     int64_t rank = unit.pipeline.rank;
     auto set = [&](mlir::Value index) {
-      values[call] =
-          scalars.fromIndex(index, scalars.getType(call->getType()));
+      values[call] = scalars.fromIndex(index, scalars.getType(call->getType()));
       return success();
     };
     auto constant = [&](unsigned operand) -> int64_t {
@@ -401,7 +399,8 @@ private:
     case MarkerKind::element:
     case MarkerKind::phase:
       return success();
-    case MarkerKind::extent: {
+    case MarkerKind::extent:
+    case MarkerKind::imageExtent: {
       const StateDescription *state = getState(call, call->getArgOperand(0));
       if (!state)
         return failure();
@@ -440,10 +439,9 @@ private:
       AssignPreviousOp::create(builder, *location);
       return success();
     case MarkerKind::assignBox:
-      AssignBoxOp::create(builder, *location,
-                          getCoordinates(call->args(), rank),
-                          getCoordinates(llvm::drop_begin(call->args(), 4),
-                                         rank));
+      AssignBoxOp::create(
+          builder, *location, getCoordinates(call->args(), rank),
+          getCoordinates(llvm::drop_begin(call->args(), 4), rank));
       return success();
     default:
       return fail(call) << "expected directives in the phase they are for, but "

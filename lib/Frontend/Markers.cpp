@@ -11,16 +11,17 @@ using namespace piko;
 
 std::optional<MarkerKind> piko::getMarkerKind(llvm::StringRef name) {
 #define MARKER(NAME) .Case(#NAME, MarkerKind::NAME)
-  return llvm::StringSwitch<std::optional<MarkerKind>>(name)
-      MARKER(state) MARKER(input) MARKER(element) MARKER(extent) MARKER(emit)
-      MARKER(updateBegin) MARKER(updateEnd) MARKER(atomic) MARKER(bin)
-      MARKER(binAt) MARKER(binLo) MARKER(binHi) MARKER(domain)
-      MARKER(assignBin) MARKER(assignAll) MARKER(assignPrevious)
-      MARKER(assignBox) MARKER(schedule) MARKER(endStage) MARKER(endBin)
-      MARKER(batch) MARKER(everyBin) MARKER(order) MARKER(source)
-      MARKER(connect) MARKER(allocateForSource) MARKER(phase)
-      MARKER(clear)
-      .Default(std::nullopt);
+  return llvm::StringSwitch<std::optional<MarkerKind>>(name) MARKER(state)
+      MARKER(input) MARKER(element) MARKER(extent) MARKER(imageExtent)
+          MARKER(emit) MARKER(updateBegin) MARKER(updateEnd) MARKER(atomic)
+              MARKER(bin) MARKER(binAt) MARKER(binLo) MARKER(binHi)
+                  MARKER(domain) MARKER(assignBin) MARKER(assignAll)
+                      MARKER(assignPrevious) MARKER(assignBox) MARKER(schedule)
+                          MARKER(endStage) MARKER(endBin) MARKER(batch)
+                              MARKER(everyBin) MARKER(order) MARKER(source)
+                                  MARKER(connect) MARKER(allocateForSource)
+                                      MARKER(phase) MARKER(clear)
+                                          .Default(std::nullopt);
 #undef MARKER
 }
 
@@ -49,6 +50,7 @@ void piko::setMarkerEffects(llvm::Module &module, const MarkerTable &markers) {
       function.addRetAttr(llvm::Attribute::NonNull);
       break;
     case MarkerKind::extent:
+    case MarkerKind::imageExtent:
     case MarkerKind::bin:
     case MarkerKind::binAt:
     case MarkerKind::binLo:

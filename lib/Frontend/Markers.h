@@ -22,6 +22,7 @@ enum class MarkerKind {
   input,
   element,
   extent,
+  imageExtent,
   emit,
   updateBegin,
   updateEnd,

@@ -4,11 +4,11 @@
 #include "MathCalls.h"
 
 #include "Cleanup.h"
+#include "mlir/IR/Diagnostics.h"
 #include "llvm/ADT/StringSwitch.h"
 #include "llvm/IR/InstIterator.h"
 #include "llvm/IR/IntrinsicInst.h"
 #include "llvm/IR/Module.h"
-#include "mlir/IR/Diagnostics.h"
 
 using namespace piko;
 

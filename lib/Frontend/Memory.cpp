@@ -16,10 +16,9 @@ using llvm::dyn_cast;
 // Layouts
 //===----------------------------------------------------------------------===//
 
-static void
-addLeaves(llvm::Type *type, int64_t offset,
-          const llvm::SmallVector<MemoryDimension, 2> &dimensions,
-          const llvm::DataLayout &data, MemoryLayout &layout) {
+static void addLeaves(llvm::Type *type, int64_t offset,
+                      const llvm::SmallVector<MemoryDimension, 2> &dimensions,
+                      const llvm::DataLayout &data, MemoryLayout &layout) {
   if (auto *structure = dyn_cast<llvm::StructType>(type)) {
     const llvm::StructLayout *fields = data.getStructLayout(structure);
     for (unsigned i = 0; i < structure->getNumElements(); ++i)
@@ -27,9 +26,9 @@ addLeaves(llvm::Type *type, int64_t offset,
                 offset + fields->getElementOffset(i), dimensions, data, layout);
   } else if (auto *array = dyn_cast<llvm::ArrayType>(type)) {
     auto inner = dimensions;
-    inner.push_back({static_cast<int64_t>(array->getNumElements()),
-                     static_cast<int64_t>(
-                         data.getTypeAllocSize(array->getElementType()))});
+    inner.push_back(
+        {static_cast<int64_t>(array->getNumElements()),
+         static_cast<int64_t>(data.getTypeAllocSize(array->getElementType()))});
     addLeaves(array->getElementType(), offset, inner, data, layout);
   } else {
     layout.leaves.push_back({type, offset, dimensions});
@@ -101,8 +100,7 @@ Address piko::getAddress(llvm::Value *pointer, const llvm::DataLayout &data) {
 llvm::Value *MemoryIndex::materialize(llvm::IRBuilderBase &builder) const {
   llvm::Value *sum = nullptr;
   for (auto [value, factor] : terms) {
-    llvm::Value *term =
-        builder.CreateSExtOrTrunc(value, builder.getInt64Ty());
+    llvm::Value *term = builder.CreateSExtOrTrunc(value, builder.getInt64Ty());
     if (factor != 1)
       term = builder.CreateMul(term, builder.getInt64(factor));
     sum = sum ? builder.CreateAdd(sum, term) : term;
@@ -114,9 +112,8 @@ llvm::Value *MemoryIndex::materialize(llvm::IRBuilderBase &builder) const {
 
 /// Divides an address among the dimensions of a leaf. `inside` says whether the
 /// constant part is within the array.
-static std::optional<MemoryAccess> matchLeaf(const MemoryLeaf &leaf,
-                                             const Address &address,
-                                             bool &inside) {
+static std::optional<MemoryAccess>
+matchLeaf(const MemoryLeaf &leaf, const Address &address, bool &inside) {
   MemoryAccess access{0, {}};
   int64_t rest = address.offset - leaf.offset;
   inside = true;
@@ -215,8 +212,7 @@ MemoryMap::MemoryMap(const PipelineDescription &pipeline,
       stateLayout.leaves.back().offset += state.offset;
       constantFields.push_back({number, field});
     }
-    stateLayout.size =
-        std::max(stateLayout.size, state.offset + constant.size);
+    stateLayout.size = std::max(stateLayout.size, state.offset + constant.size);
   }
 }
 

@@ -83,9 +83,9 @@ private:
   void buildRecord(const RecordDescription &record) {
     llvm::SmallVector<mlir::Attribute> fields;
     for (const LeafField &field : record.fields)
-      fields.push_back(FieldAttr::get(&context, field.name,
-                                      getType(field.type), field.offset,
-                                      field.counts, field.strides));
+      fields.push_back(FieldAttr::get(&context, field.name, getType(field.type),
+                                      field.offset, field.counts,
+                                      field.strides));
     RecordOp::create(builder, pipeline.location, record.name,
                      builder.getArrayAttr(fields), record.size, record.align);
   }
@@ -105,8 +105,7 @@ private:
       return;
     case StateDescription::Image:
       ImageOp::create(builder, state.location, name, record,
-                      builder.getI64IntegerAttr(state.rank),
-                      buildClear(state));
+                      builder.getI64IntegerAttr(state.rank), buildClear(state));
       return;
     }
   }
@@ -142,8 +141,8 @@ private:
         builder.getArrayAttr(outputs), /*lineage=*/nullptr, /*tile=*/nullptr);
     builder.createBlock(&op.getBody());
     if (stage.hasAssign) {
-      auto assign = AssignOp::create(builder, stage.location, nullptr, nullptr,
-                                     nullptr);
+      auto assign =
+          AssignOp::create(builder, stage.location, nullptr, nullptr, nullptr);
       if (!buildPhase(WrapperKind::Assign, number, assign.getBody()))
         return false;
     }
@@ -156,8 +155,8 @@ private:
     const ScheduleDescription &schedule = stage.schedule;
     llvm::SmallVector<mlir::Attribute> waits;
     for (unsigned other : schedule.endStage)
-      waits.push_back(mlir::FlatSymbolRefAttr::get(
-          &context, pipeline.stages[other].name));
+      waits.push_back(
+          mlir::FlatSymbolRefAttr::get(&context, pipeline.stages[other].name));
     auto number = [&](int64_t value) {
       return value ? builder.getI64IntegerAttr(value) : mlir::IntegerAttr();
     };

@@ -9,9 +9,8 @@
 namespace piko {
 
 /// Writes the pipeline at the authored level; null after an error.
-mlir::OwningOpRef<mlir::ModuleOp> buildModule(ParsedUnit &unit,
-                                              MemoryMap &memory,
-                                              mlir::MLIRContext &context);
+mlir::OwningOpRef<mlir::ModuleOp>
+buildModule(ParsedUnit &unit, MemoryMap &memory, mlir::MLIRContext &context);
 
 } // namespace piko
 

@@ -56,15 +56,29 @@ makeInvocation(const ParseRequest &request,
   std::string runtimeDir = options.runtimeIncludeDir.empty()
                                ? PIKO_RUNTIME_INCLUDE_DIR
                                : options.runtimeIncludeDir;
-  std::vector<std::string> arguments = {
-      "clang++",         "-std=c++20",       "-fsyntax-only",
-      "-xc++",           "-resource-dir",    resourceDir,
-      "-isystem",        runtimeDir,         "-D__PIKO__=1",
-      "-DNDEBUG=1",      "-fno-exceptions",  "-fno-rtti",
-      "-O1",             "-ffp-contract=off", "-fwrapv",
-      "-fno-finite-loops", "-fno-math-errno", "-fno-strict-aliasing",
-      "-gline-tables-only", "-fno-access-control", "-Wno-undefined-internal",
-      "-fno-strict-float-cast-overflow", "-fno-threadsafe-statics"};
+  std::vector<std::string> arguments = {"clang++",
+                                        "-std=c++20",
+                                        "-fsyntax-only",
+                                        "-xc++",
+                                        "-resource-dir",
+                                        resourceDir,
+                                        "-isystem",
+                                        runtimeDir,
+                                        "-D__PIKO__=1",
+                                        "-DNDEBUG=1",
+                                        "-fno-exceptions",
+                                        "-fno-rtti",
+                                        "-O1",
+                                        "-ffp-contract=off",
+                                        "-fwrapv",
+                                        "-fno-finite-loops",
+                                        "-fno-math-errno",
+                                        "-fno-strict-aliasing",
+                                        "-gline-tables-only",
+                                        "-fno-access-control",
+                                        "-Wno-undefined-internal",
+                                        "-fno-strict-float-cast-overflow",
+                                        "-fno-threadsafe-statics"};
   for (const std::string &directory : options.includeDirs)
     arguments.push_back("-I" + directory);
   for (const std::string &macro : options.defines)
@@ -92,8 +106,7 @@ makeInvocation(const ParseRequest &request,
   target.ABI.clear();
   target.FeaturesAsWritten.clear();
   clang::PreprocessorOptions &preprocessor = invocation->getPreprocessorOpts();
-  preprocessor.addMacroDef(host.isAArch64() ? "__aarch64__=1"
-                                            : "__x86_64__=1");
+  preprocessor.addMacroDef(host.isAArch64() ? "__aarch64__=1" : "__x86_64__=1");
   for (const char *macro : {"__linux__=1", "__gnu_linux__=1", "__unix__=1",
                             "_GNU_SOURCE=1", "__ELF__=1"})
     preprocessor.addMacroDef(macro);
@@ -150,8 +163,8 @@ public:
       : PragmaHandler("piko_wrappers"), request(request), context(context),
         compiler(compiler), diagnostics(diagnostics), unit(unit) {}
 
-  void HandlePragma(clang::Preprocessor &preprocessor,
-                    clang::PragmaIntroducer, clang::Token &token) override {
+  void HandlePragma(clang::Preprocessor &preprocessor, clang::PragmaIntroducer,
+                    clang::Token &token) override {
     clang::SourceLocation here = token.getLocation();
     preprocessor.DiscardUntilEndOfDirective();
     if (compiler.getDiagnostics().hasErrorOccurred())
@@ -175,19 +188,18 @@ public:
 private:
   bool read(std::string &wrappers) {
     clang::ASTContext &ast = compiler.getASTContext();
-    std::vector<PipeCandidate> pipes = findPipes(ast);
+    std::vector<PipeCandidate> pipes = findPipes(compiler.getSema());
     for (const PipeCandidate &pipe : pipes)
       unit.pipes.push_back(pipe.name);
     if (request.goal == ParseGoal::ListPipes)
       return true;
-    llvm::FailureOr<PipeCandidate> pipe =
-        selectPipe(pipes, request.options.pipeName, unit.pipeline.location,
-                   ast, context);
+    llvm::FailureOr<PipeCandidate> pipe = selectPipe(
+        pipes, request.options.pipeName, unit.pipeline.location, ast, context);
     if (failed(pipe))
       return false;
     unit.pipeline.name = pipe->name;
-    unit.pipeline.location = convertLocation(
-        pipe->location, compiler.getSourceManager(), context);
+    unit.pipeline.location =
+        convertLocation(pipe->location, compiler.getSourceManager(), context);
     records.emplace(ast, context, unit.pipeline.records);
     reader.emplace(ast, context, unit.pipeline, *records);
     if (failed(reader->read(*pipe)))

@@ -9,10 +9,11 @@
 #include "PipelineReader.h"
 
 #include "ClangDiagnostics.h"
+#include "mlir/IR/Diagnostics.h"
 #include "clang/AST/DeclTemplate.h"
 #include "clang/AST/RecordLayout.h"
 #include "clang/Basic/SourceManager.h"
-#include "mlir/IR/Diagnostics.h"
+#include "clang/Sema/Sema.h"
 
 using namespace piko;
 using clang::CXXRecordDecl;
@@ -61,17 +62,37 @@ static QualType getTypeArgument(const Specialization *type, unsigned index) {
 // Finding pipelines
 //===----------------------------------------------------------------------===//
 
-static void collectPipes(const clang::DeclContext *scope,
-                         clang::ASTContext &ast,
+/// Whether what a template makes will derive from piko::Pipe.
+static bool makesPipes(const clang::TemplateDecl *made) {
+  const auto *pattern = llvm::dyn_cast_or_null<CXXRecordDecl>(
+      made ? made->getTemplatedDecl() : nullptr);
+  if (!pattern || !pattern->hasDefinition())
+    return false;
+  return llvm::any_of(
+      pattern->getDefinition()->bases(),
+      [](const clang::CXXBaseSpecifier &base) {
+        if (findPikoBase(base.getType()->getAsCXXRecordDecl(), "Pipe"))
+          return true;
+        const auto *type =
+            base.getType()->getAs<clang::TemplateSpecializationType>();
+        const clang::TemplateDecl *of =
+            type ? type->getTemplateName().getAsTemplateDecl() : nullptr;
+        return of && (makesPipes(of) ||
+                      of->getQualifiedNameAsString() == "piko::Pipe");
+      });
+}
+
+static void collectPipes(const clang::DeclContext *scope, clang::Sema &sema,
                          std::vector<PipeCandidate> &pipes) {
+  clang::ASTContext &ast = sema.getASTContext();
   for (const clang::Decl *decl : scope->decls()) {
     if (const auto *space = dyn_cast<clang::NamespaceDecl>(decl)) {
       if (!space->isStdNamespace() && space->getName() != "glm")
-        collectPipes(space, ast, pipes);
+        collectPipes(space, sema, pipes);
       continue;
     }
     if (const auto *link = dyn_cast<clang::LinkageSpecDecl>(decl)) {
-      collectPipes(link, ast, pipes);
+      collectPipes(link, sema, pipes);
       continue;
     }
     if (ast.getSourceManager().isInSystemHeader(decl->getLocation()))
@@ -80,8 +101,10 @@ static void collectPipes(const clang::DeclContext *scope,
     if (const auto *alias = dyn_cast<clang::TypedefNameDecl>(decl)) {
       QualType target = alias->getUnderlyingType();
       type = target->getAsCXXRecordDecl();
-      if (!type || type->isDependentContext() || !type->hasDefinition() ||
-          !llvm::isa<Specialization>(type))
+      const auto *made = llvm::dyn_cast_or_null<Specialization>(type);
+      if (!made || type->isDependentContext() || target->isDependentType() ||
+          !makesPipes(made->getSpecializedTemplate()) ||
+          !sema.isCompleteType(decl->getLocation(), target))
         continue;
     } else if (const auto *record = dyn_cast<CXXRecordDecl>(decl)) {
       if (!record->isThisDeclarationADefinition() || record->isInvalidDecl() ||
@@ -95,9 +118,9 @@ static void collectPipes(const clang::DeclContext *scope,
   }
 }
 
-std::vector<PipeCandidate> piko::findPipes(clang::ASTContext &ast) {
+std::vector<PipeCandidate> piko::findPipes(clang::Sema &sema) {
   std::vector<PipeCandidate> pipes;
-  collectPipes(ast.getTranslationUnitDecl(), ast, pipes);
+  collectPipes(sema.getASTContext().getTranslationUnitDecl(), sema, pipes);
   return pipes;
 }
 
@@ -177,17 +200,17 @@ LogicalResult PipelineReader::read(const PipeCandidate &pipe) {
 LogicalResult PipelineReader::readState(QualType type) {
   const CXXRecordDecl *decl = type->getAsCXXRecordDecl();
   if (!decl || !decl->hasDefinition())
-    return emitError(pipeline.location)
-           << "expected the state of pipeline '" << pipeline.name
-           << "' to be a class";
+    return emitError(pipeline.location) << "expected the state of pipeline '"
+                                        << pipeline.name << "' to be a class";
   decl = decl->getDefinition();
   const clang::ASTRecordLayout &layout = ast.getASTRecordLayout(decl);
   if (decl->getNumBases() != 0)
     return emitError(locate(decl->getLocation()))
            << "not supported in Piko: a base class of the state";
   for (const clang::FieldDecl *member : decl->fields()) {
-    StateDescription state{member->getNameAsString(), StateDescription::Constant,
-                           0, 0, 0, locate(member->getLocation())};
+    StateDescription state{
+        member->getNameAsString(),    StateDescription::Constant, 0, 0, 0,
+        locate(member->getLocation())};
     QualType element = member->getType();
     const CXXRecordDecl *memberType = element->getAsCXXRecordDecl();
     if (const Specialization *buffer = asPikoTemplate(memberType, "Buffer")) {
@@ -197,8 +220,7 @@ LogicalResult PipelineReader::readState(QualType type) {
     } else if (const Specialization *image =
                    asPikoTemplate(memberType, "Image")) {
       state.kind = StateDescription::Image;
-      state.rank =
-          image->getTemplateArgs()[1].getAsIntegral().getSExtValue();
+      state.rank = image->getTemplateArgs()[1].getAsIntegral().getSExtValue();
       element = getTypeArgument(image, 0);
     }
     state.offset = layout.getFieldOffset(member->getFieldIndex()) / 8;
@@ -218,9 +240,9 @@ LogicalResult PipelineReader::readStage(const clang::FieldDecl *member) {
                          .typeName = records.getName(member->getType()),
                          .location = locate(member->getLocation())};
   const auto *parent = llvm::cast<CXXRecordDecl>(member->getParent());
-  stage.offset = ast.getASTRecordLayout(parent).getFieldOffset(
-                     member->getFieldIndex()) /
-                 8;
+  stage.offset =
+      ast.getASTRecordLayout(parent).getFieldOffset(member->getFieldIndex()) /
+      8;
 
   if (failed(readTemplate(findPikoBase(type, "BasicStage"), stage)) ||
       failed(readPhases(type, stage)))
@@ -241,8 +263,8 @@ LogicalResult PipelineReader::readStage(const clang::FieldDecl *member) {
 LogicalResult PipelineReader::readTemplate(const Specialization *base,
                                            StageDescription &stage) {
   const clang::TemplateArgumentList &arguments = base->getTemplateArgs();
-  const auto *bins =
-      llvm::cast<Specialization>(arguments[0].getAsType()->getAsCXXRecordDecl());
+  const auto *bins = llvm::cast<Specialization>(
+      arguments[0].getAsType()->getAsCXXRecordDecl());
   for (const clang::TemplateArgument &size :
        bins->getTemplateArgs()[0].pack_elements())
     stage.bins.push_back(size.getAsIntegral().getSExtValue());
@@ -297,8 +319,8 @@ LogicalResult PipelineReader::readPhases(const CXXRecordDecl *type,
   if (const auto *method = dyn_cast<clang::CXXMethodDecl>(process))
     if (method->getNumParams() == 1) {
       QualType parameter = method->getParamDecl(0)->getType();
-      if (asPikoTemplate(
-              parameter.getNonReferenceType()->getAsCXXRecordDecl(), "List"))
+      if (asPikoTemplate(parameter.getNonReferenceType()->getAsCXXRecordDecl(),
+                         "List"))
         return emitError(locate(process->getLocation()))
                << "not supported in Piko: stage '" << stage.name
                << "' processes a list, which the compiler cannot do yet";

@@ -6,6 +6,10 @@
 #include "RecordLayout.h"
 #include "clang/AST/DeclCXX.h"
 
+namespace clang {
+class Sema;
+} // namespace clang
+
 namespace piko {
 
 /// A pipeline type and the name by which the user knows it.
@@ -17,7 +21,7 @@ struct PipeCandidate {
 
 /// The pipelines that a translation unit defines or names by an alias, in
 /// order.
-std::vector<PipeCandidate> findPipes(clang::ASTContext &ast);
+std::vector<PipeCandidate> findPipes(clang::Sema &sema);
 
 /// The pipeline that `name` asks for; reports when there is none or more than
 /// one would do.

@@ -47,10 +47,9 @@ std::string RecordTable::getName(QualType type) const {
 LogicalResult RecordTable::reject(const Path &path,
                                   const RecordDescription &record,
                                   const llvm::Twine &what) {
-  mlir::InFlightDiagnostic diagnostic =
-      mlir::emitError(path.location)
-      << "not supported in Piko: " << what << " in type '" << record.name
-      << "'";
+  mlir::InFlightDiagnostic diagnostic = mlir::emitError(path.location)
+                                        << "not supported in Piko: " << what
+                                        << " in type '" << record.name << "'";
   if (!path.name.empty())
     diagnostic << ", member '" << path.name << "'";
   return diagnostic;
@@ -144,8 +143,8 @@ LogicalResult RecordTable::flattenClass(const clang::RecordDecl *decl,
     }
   }
   for (const clang::FieldDecl *field : decl->fields()) {
-    mlir::Location where = convertLocation(field->getLocation(),
-                                           ast.getSourceManager(), context);
+    mlir::Location where =
+        convertLocation(field->getLocation(), ast.getSourceManager(), context);
     int64_t bits = layout.getFieldOffset(field->getFieldIndex());
     Path member = path.member(field->getName(), bits / 8, where);
     if (field->isBitField())

@@ -4,8 +4,8 @@
 #define PIKO_LIB_FRONTEND_RECORDLAYOUT_H
 
 #include "Piko/Frontend/PipelineDescription.h"
-#include "clang/AST/ASTContext.h"
 #include "mlir/IR/MLIRContext.h"
+#include "clang/AST/ASTContext.h"
 #include "llvm/ADT/DenseMap.h"
 
 namespace piko {

@@ -3,7 +3,8 @@
 //
 // The text declares to the runtime what the compiled pipeline would declare,
 // so that a host cannot tell the two apart. Its run binds the runtime's memory
-// to the pipeline object, runs it, and copies images and allocated buffers back.
+// to the pipeline object, runs it, and copies images and allocated buffers
+// back.
 //
 //===----------------------------------------------------------------------===//
 
@@ -171,9 +172,9 @@ template <class T, int Rank> void save(const piko::Image<T, Rank> &image,
   }
 
   void writeStage(unsigned id, const StageDescription &stage) {
-    static const char *const policies[] = {
-        "PIKOIR_LOAD_BALANCE", "PIKOIR_DIRECT_MAP", "PIKOIR_SERIALIZE",
-        "PIKOIR_ALL"};
+    static const char *const policies[] = {"PIKOIR_LOAD_BALANCE",
+                                           "PIKOIR_DIRECT_MAP",
+                                           "PIKOIR_SERIALIZE", "PIKOIR_ALL"};
     const ScheduleDescription &schedule = stage.schedule;
     int flags = 0;
     if (!schedule.endStage.empty() || schedule.endBin || schedule.batch)
@@ -181,9 +182,10 @@ template <class T, int Rank> void save(const piko::Image<T, Rank> &image,
     if (schedule.unordered)
       flags |= 8; // PIKOIR_UNORDERED
     out << "  static const int64_t bins" << id << "[] = {"
-        << llvm::join(llvm::map_range(stage.bins,
-                                      [](int64_t n) { return std::to_string(n); }),
-                      ", ")
+        << llvm::join(
+               llvm::map_range(stage.bins,
+                               [](int64_t n) { return std::to_string(n); }),
+               ", ")
         << "};\n"
         << "  pikoir_declare_stage(p, " << id << ", " << quote(stage.name)
         << ", " << stage.input << ", bins" << id << ", "

@@ -10,11 +10,11 @@
 
 #include "Cleanup.h"
 
+#include "mlir/IR/Diagnostics.h"
 #include "llvm/IR/InstIterator.h"
 #include "llvm/IR/Instructions.h"
 #include "llvm/IR/IntrinsicInst.h"
 #include "llvm/IR/Module.h"
-#include "mlir/IR/Diagnostics.h"
 
 using namespace piko;
 using llvm::dyn_cast;
@@ -29,6 +29,10 @@ public:
         builder(function.getContext()) {}
 
   bool run() {
+    for (llvm::Instruction &instruction : llvm::instructions(function))
+      if (auto *call = dyn_cast<llvm::CallInst>(&instruction))
+        if (!call->getCalledFunction())
+          return fail(call, "a virtual call or a call through a pointer");
     for (llvm::Instruction &instruction :
          llvm::make_early_inc_range(llvm::instructions(function)))
       if (!resolve(&instruction))
@@ -45,10 +49,7 @@ private:
       return resolveStore(store);
     if (llvm::isa<llvm::MemIntrinsic>(instruction))
       return fail(instruction, "copying memory whose layout is not known");
-    auto *call = dyn_cast<llvm::CallInst>(instruction);
-    if (call && !call->getCalledFunction())
-      return fail(call, "a virtual call or a call through a pointer");
-    if (call)
+    if (auto *call = dyn_cast<llvm::CallInst>(instruction))
       if (const Marker *marker = getMarker(call, memory.markers))
         if (marker->kind == MarkerKind::atomic)
           return resolveAtomic(call, *marker);
@@ -63,10 +64,9 @@ private:
 
   /// The accessor call for a number at `pointer`; null after an error.
   llvm::Value *makeAccess(llvm::Instruction *instruction, llvm::Value *pointer,
-                          llvm::Type *type, llvm::StringRef prefix,
-                          bool writes,
-                          llvm::ArrayRef<llvm::Value *> operands,
-                          bool &isLocal, llvm::Type *&leafType) {
+                          llvm::Type *type, llvm::StringRef prefix, bool writes,
+                          llvm::ArrayRef<llvm::Value *> operands, bool &isLocal,
+                          llvm::Type *&leafType) {
     Address address = getAddress(pointer, memory.data);
     isLocal = llvm::isa<llvm::AllocaInst>(address.base);
     if (isLocal)
@@ -77,8 +77,8 @@ private:
       fail(instruction, describeBase(address.base));
       return nullptr;
     }
-    std::optional<MemoryAccess> access = resolveAccess(
-        *layout, address, memory.data.getTypeStoreSize(type));
+    std::optional<MemoryAccess> access =
+        resolveAccess(*layout, address, memory.data.getTypeStoreSize(type));
     if (!access || type->isPointerTy()) {
       fail(instruction, "access to a record that is not to one of its fields");
       return nullptr;

@@ -107,7 +107,8 @@ Value ScalarImporter::import(llvm::Instruction *instruction) {
   if (!getType(instruction->getType()))
     return Value();
   for (llvm::Value *operand : instruction->operands())
-    if (operand->getType()->isPointerTy() && !llvm::isa<llvm::CallBase>(instruction))
+    if (operand->getType()->isPointerTy() &&
+        !llvm::isa<llvm::CallBase>(instruction))
       return Value();
   if (instruction->isBinaryOp())
     return importBinary(instruction);
@@ -223,8 +224,8 @@ Value ScalarImporter::convertToInteger(Value value, Type type, bool isSigned) {
   Value tooHigh = compare(arith::CmpFPredicate::OGE, above);
   Value tooLow = compare(arith::CmpFPredicate::OLT, below);
   Value isNaN = make<arith::CmpFOp>(arith::CmpFPredicate::UNO, value, value);
-  Value result = make<arith::SelectOp>(tooHigh, makeInteger(type, highest),
-                                       converted);
+  Value result =
+      make<arith::SelectOp>(tooHigh, makeInteger(type, highest), converted);
   result = make<arith::SelectOp>(tooLow, makeInteger(type, lowest), result);
   return make<arith::SelectOp>(
       isNaN, makeInteger(type, llvm::APInt::getZero(bits)), result);
@@ -276,8 +277,7 @@ Value ScalarImporter::importCompare(llvm::CmpInst *compare) {
 /// A part of what an addition or subtraction with overflow gives.
 Value ScalarImporter::importOverflow(llvm::Instruction *instruction) {
   auto *extract = cast<llvm::ExtractValueInst>(instruction);
-  auto *call =
-      dyn_cast<llvm::WithOverflowInst>(extract->getAggregateOperand());
+  auto *call = dyn_cast<llvm::WithOverflowInst>(extract->getAggregateOperand());
   if (!call)
     return Value();
   Value a = get(call->getLHS()), b = get(call->getRHS());
@@ -285,9 +285,8 @@ Value ScalarImporter::importOverflow(llvm::Instruction *instruction) {
   switch (call->getIntrinsicID()) {
   case llvm::Intrinsic::uadd_with_overflow: {
     Value sum = make<arith::AddIOp>(a, b);
-    return wantsResult
-               ? sum
-               : make<arith::CmpIOp>(arith::CmpIPredicate::ult, sum, a);
+    return wantsResult ? sum
+                       : make<arith::CmpIOp>(arith::CmpIPredicate::ult, sum, a);
   }
   case llvm::Intrinsic::usub_with_overflow:
     return wantsResult ? make<arith::SubIOp>(a, b)
@@ -422,8 +421,8 @@ Value ScalarImporter::importIntrinsic(llvm::IntrinsicInst *call) {
   case llvm::Intrinsic::fshr:
     return makeFunnelShift(call, /*left=*/false);
   case llvm::Intrinsic::usub_sat:
-    return make<arith::SubIOp>(
-        make<arith::MaxUIOp>(operand(0), operand(1)), operand(1));
+    return make<arith::SubIOp>(make<arith::MaxUIOp>(operand(0), operand(1)),
+                               operand(1));
   case llvm::Intrinsic::uadd_sat: {
     Value sum = make<arith::AddIOp>(operand(0), operand(1));
     Value wrapped =

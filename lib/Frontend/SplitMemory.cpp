@@ -234,8 +234,7 @@ private:
       leaf = builder.CreateAlloca(leafType);
     }
     for (const Use &use : uses)
-      rewriteUse(use, layout.leaves[use.access.leaf],
-                 leaves[use.access.leaf]);
+      rewriteUse(use, layout.leaves[use.access.leaf], leaves[use.access.leaf]);
     changed = true;
   }
 

@@ -19,14 +19,32 @@ static bool isEnd(mlir::Operation &op) {
   return call && call.getCallee() == updateEndName;
 }
 
+/// Moves what an update does not need to be inside of it to before it.
+static void hoistPureOps(CallOp begin, mlir::Operation *end) {
+  mlir::Block *block = begin->getBlock();
+  for (auto &op : llvm::make_early_inc_range(llvm::make_range(
+           std::next(begin->getIterator()), end->getIterator()))) {
+    if (op.getNumRegions() != 0 || !mlir::isPure(&op))
+      continue;
+    bool isOutside = llvm::all_of(op.getOperands(), [&](mlir::Value operand) {
+      mlir::Operation *definition = operand.getDefiningOp();
+      return !definition || definition->getBlock() != block ||
+             definition->isBeforeInBlock(begin);
+    });
+    if (isOutside)
+      op.moveBefore(begin);
+  }
+}
+
 /// Moves what lies between a begin and its end into an update.
 static llvm::LogicalResult makeUpdate(CallOp begin) {
   mlir::Block *block = begin->getBlock();
   mlir::Operation *end = nullptr;
-  for (auto &op : llvm::make_range(std::next(begin->getIterator()),
-                                   block->end())) {
+  for (auto &op :
+       llvm::make_range(std::next(begin->getIterator()), block->end())) {
     if (isBegin(op))
-      return mlir::emitError(op.getLoc(), "not supported in Piko: an update inside an update");
+      return mlir::emitError(
+          op.getLoc(), "not supported in Piko: an update inside an update");
     if (isEnd(op)) {
       end = &op;
       break;
@@ -37,9 +55,10 @@ static llvm::LogicalResult makeUpdate(CallOp begin) {
         begin.getLoc(),
         "not supported in Piko: leaving an update other than at its end");
 
+  hoistPureOps(begin, end);
   llvm::SmallVector<mlir::Operation *> body;
-  for (auto &op : llvm::make_range(std::next(begin->getIterator()),
-                                   end->getIterator()))
+  for (auto &op :
+       llvm::make_range(std::next(begin->getIterator()), end->getIterator()))
     body.push_back(&op);
   llvm::SmallVector<mlir::Value> leaving;
   for (mlir::Operation *op : body)
@@ -93,7 +112,8 @@ llvm::LogicalResult piko::structurePhase(mlir::func::FuncOp function) {
   mlir::DominanceInfo dominance(function);
   if (llvm::failed(mlir::transformCFGToSCF(function.getBody(), transformation,
                                            dominance)))
-    return mlir::emitError(function.getLoc(), "not supported in Piko: this control flow");
+    return mlir::emitError(function.getLoc(),
+                           "not supported in Piko: this control flow");
   llvm::SmallVector<CallOp> begins;
   function.walk([&](CallOp call) {
     if (isBegin(*call))

@@ -11,15 +11,16 @@ using namespace piko;
 
 void piko::registerCppToPikoTranslation() {
   static llvm::cl::list<std::string> includeDirs(
-      "I", llvm::cl::Prefix, llvm::cl::desc("Search this directory for headers"));
+      "I", llvm::cl::Prefix,
+      llvm::cl::desc("Search this directory for headers"));
   static llvm::cl::list<std::string> defines(
       "D", llvm::cl::Prefix, llvm::cl::desc("Define this macro"));
   static llvm::cl::opt<std::string> pipe(
       "pipe", llvm::cl::desc("The pipeline to compile"));
   static mlir::TranslateToMLIRRegistration registration(
       "cpp-to-piko", "compile a pipeline in C++ to the piko dialect",
-      [](llvm::SourceMgr &sources, mlir::MLIRContext *context)
-          -> mlir::OwningOpRef<mlir::Operation *> {
+      [](llvm::SourceMgr &sources,
+         mlir::MLIRContext *context) -> mlir::OwningOpRef<mlir::Operation *> {
         const llvm::MemoryBuffer *buffer =
             sources.getMemoryBuffer(sources.getMainFileID());
         FrontendOptions options;
@@ -27,9 +28,9 @@ void piko::registerCppToPikoTranslation() {
         options.defines = defines;
         options.pipeName = pipe;
         llvm::StringRef name = buffer->getBufferIdentifier();
-        mlir::OwningOpRef<mlir::ModuleOp> module = translateCppToPiko(
-            name == "-" ? "<stdin>" : name, buffer->getBuffer(), options,
-            *context);
+        mlir::OwningOpRef<mlir::ModuleOp> module =
+            translateCppToPiko(name == "-" ? "<stdin>" : name,
+                               buffer->getBuffer(), options, *context);
         return mlir::OwningOpRef<mlir::Operation *>(
             module ? module.release().getOperation() : nullptr);
       },

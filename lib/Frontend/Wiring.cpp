@@ -11,10 +11,10 @@
 
 #include "Cleanup.h"
 #include "Wrappers.h"
+#include "mlir/IR/Diagnostics.h"
 #include "llvm/IR/Constants.h"
 #include "llvm/IR/InstIterator.h"
 #include "llvm/IR/Instructions.h"
-#include "mlir/IR/Diagnostics.h"
 
 using namespace piko;
 using llvm::dyn_cast;
@@ -150,8 +150,7 @@ private:
       return false;
     }
     pipeline.edges.push_back({*producer, static_cast<unsigned>(*port),
-                              *consumer,
-                              getUserLocation(call, unit, context)});
+                              *consumer, getUserLocation(call, unit, context)});
     return true;
   }
 
@@ -191,9 +190,8 @@ private:
         if (llvm::none_of(pipeline.edges, [&](const EdgeDescription &edge) {
               return edge.producer == index && edge.port == port;
             })) {
-          mlir::emitError(stage.location)
-              << "port " << port << " of stage '" << stage.name
-              << "' is not connected";
+          mlir::emitError(stage.location) << "port " << port << " of stage '"
+                                          << stage.name << "' is not connected";
           ok = false;
         }
     return ok;
@@ -310,7 +308,8 @@ private:
   PipelineDescription &pipeline;
   MemoryMap &memory;
   mlir::MLIRContext &context;
-  std::vector<std::pair<StateDescription *, const llvm::CallInst *>> allocations;
+  std::vector<std::pair<StateDescription *, const llvm::CallInst *>>
+      allocations;
 };
 
 } // namespace

@@ -25,6 +25,7 @@ template <class T> const T *input();
 template <class T>
 T *element(const void *handle, int64_t x, int64_t y, int64_t z, int64_t w);
 int64_t extent(const void *handle, int32_t dim);
+int32_t imageExtent(const void *handle, int32_t dim);
 
 // Effects.
 template <class T> void emit(int32_t port, const T *record);
@@ -37,9 +38,9 @@ template <int Kind, bool Signed, class T> void atomic(T *place, T value);
 // The grid of bins.
 int64_t bin();
 int64_t binAt(int64_t x, int64_t y, int64_t z, int64_t w);
-int64_t binLo(int64_t bin, int32_t dim);
-int64_t binHi(int64_t bin, int32_t dim);
-int64_t domain(int32_t dim);
+int32_t binLo(int64_t bin, int32_t dim);
+int32_t binHi(int64_t bin, int32_t dim);
+int32_t domain(int32_t dim);
 
 // AssignBin.
 void assignBin(int64_t bin);

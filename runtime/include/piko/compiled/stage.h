@@ -138,15 +138,13 @@ private:
   }
   template <class F> static Cells<rank> make(F get) {
     if constexpr (rank == 1)
-      return Cells<1>(static_cast<int>(get(0)));
+      return Cells<1>(get(0));
     else if constexpr (rank == 2)
-      return Cells<2>(static_cast<int>(get(0)), static_cast<int>(get(1)));
+      return Cells<2>(get(0), get(1));
     else if constexpr (rank == 3)
-      return Cells<3>(static_cast<int>(get(0)), static_cast<int>(get(1)),
-                      static_cast<int>(get(2)));
+      return Cells<3>(get(0), get(1), get(2));
     else
-      return Cells<4>(static_cast<int>(get(0)), static_cast<int>(get(1)),
-                      static_cast<int>(get(2)), static_cast<int>(get(3)));
+      return Cells<4>(get(0), get(1), get(2), get(3));
   }
 };
 

@@ -78,9 +78,7 @@ public:
   }
 
 private:
-  int extent(int dim) const {
-    return static_cast<int>(marker::extent(this, dim));
-  }
+  int extent(int dim) const { return marker::imageExtent(this, dim); }
 };
 
 namespace detail {
@@ -100,8 +98,7 @@ concept AtomicInteger = isSame<T, int32_t> || isSame<T, uint32_t> ||
 
 #define PIKO_ATOMIC(NAME, KIND)                                                \
   template <detail::AtomicInteger T>                                           \
-  inline void NAME(const T &place,                                             \
-                   typename detail::Identity<T>::type value) {                 \
+  inline void NAME(const T &place, typename detail::Identity<T>::type value) { \
     marker::atomic<KIND, (static_cast<T>(-1) < static_cast<T>(0)), T>(         \
         const_cast<T *>(&place), value);                                       \
   }                                                                            \

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// What a primitive cannot hold is said at the member that holds it.
+// RUN: not piko-translate --cpp-to-piko --pipe=Pipe1 %s 2>&1 | FileCheck %s --check-prefix=POINTER
+// RUN: not piko-translate --cpp-to-piko --pipe=Pipe2 %s 2>&1 | FileCheck %s --check-prefix=LONGDOUBLE
+// RUN: not piko-translate --cpp-to-piko --pipe=Pipe3 %s 2>&1 | FileCheck %s --check-prefix=BITFIELD
+// RUN: not piko-translate --cpp-to-piko --pipe=Pipe4 %s 2>&1 | FileCheck %s --check-prefix=TRIVIAL
+#include <piko.h>
+
+struct Inner {
+  // POINTER: errors-records.cpp:[[#@LINE + 1]]:10: error: not supported in Piko: a pointer or reference in type 'Outer', member 'inner.next'
+  float *next;
+};
+struct Outer {
+  float x;
+  Inner inner[2];
+};
+struct Long {
+  // LONGDOUBLE: errors-records.cpp:[[#@LINE + 1]]:15: error: not supported in Piko: a value of type 'long double' in type 'Long', member 'value'
+  long double value;
+};
+struct Bits {
+  // BITFIELD: errors-records.cpp:[[#@LINE + 1]]:7: error: not supported in Piko: a bit-field in type 'Bits', member 'flag'
+  int flag : 1;
+};
+struct Owner {
+  Owner(const Owner &);
+};
+template <class T> struct Drain : piko::Stage<0, 0, 1, T> {
+  void process(const T &) {}
+};
+template <class T> struct Pipeline : piko::Pipe<> {
+  // TRIVIAL: errors-records.cpp:[[#@LINE + 1]]:12: error: expected a trivially copyable type, but got 'Owner'
+  Drain<T> drain;
+  Pipeline() { source(drain); }
+};
+using Pipe1 = Pipeline<Outer>;
+using Pipe2 = Pipeline<Long>;
+using Pipe3 = Pipeline<Bits>;
+using Pipe4 = Pipeline<Owner>;

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// What Piko does not have is said at the place that needs it, one error a run.
+// RUN: not piko-translate --cpp-to-piko -DCASE=1 %s 2>&1 | FileCheck %s --check-prefix=THROW
+// RUN: not piko-translate --cpp-to-piko -DCASE=2 %s 2>&1 | FileCheck %s --check-prefix=RECURSION
+// RUN: not piko-translate --cpp-to-piko -DCASE=3 %s 2>&1 | FileCheck %s --check-prefix=NEW
+// RUN: not piko-translate --cpp-to-piko -DCASE=4 %s 2>&1 | FileCheck %s --check-prefix=NOBODY
+// RUN: not piko-translate --cpp-to-piko -DCASE=5 %s 2>&1 | FileCheck %s --check-prefix=GLOBAL
+// RUN: not piko-translate --cpp-to-piko -DCASE=6 %s 2>&1 | FileCheck %s --check-prefix=MEMBER
+// RUN: not piko-translate --cpp-to-piko -DCASE=7 %s 2>&1 | FileCheck %s --check-prefix=CONSTANT
+// RUN: not piko-translate --cpp-to-piko -DCASE=8 %s 2>&1 | FileCheck %s --check-prefix=ASM
+// RUN: not piko-translate --cpp-to-piko -DCASE=9 %s 2>&1 | FileCheck %s --check-prefix=PORT
+// RUN: not piko-translate --cpp-to-piko -DCASE=10 %s 2>&1 | FileCheck %s --check-prefix=NESTED
+// RUN: not piko-translate --cpp-to-piko -DCASE=11 %s 2>&1 | FileCheck %s --check-prefix=PARALLEL
+// RUN: not piko-translate --cpp-to-piko -DCASE=12 %s 2>&1 | FileCheck %s --check-prefix=VIRTUAL
+// RUN: not piko-translate --cpp-to-piko -DCASE=13 %s 2>&1 | FileCheck %s --check-prefix=SYNTAX
+#include <piko.h>
+
+struct A {
+  float x;
+};
+struct State {
+  float constant;
+  piko::Buffer<A> buffer;
+  piko::Image<A> image;
+};
+// RECURSION: errors-unsupported.cpp:[[#@LINE + 1]]:50: error: not supported in Piko: recursion: 'fibonacci' calls itself
+inline int fibonacci(int n) { return n < 2 ? n : fibonacci(n - 1); }
+float outside(float);
+int counter;
+struct Shape {
+  virtual float area() const = 0;
+};
+// VIRTUAL: errors-unsupported.cpp:[[#@LINE + 1]]:58: error: not supported in Piko: a virtual call or a call through a pointer
+inline float getArea(const Shape *shape) { return shape->area(); }
+
+struct Stage : piko::Stage<0, 0, 1, A, A>, piko::Uses<State> {
+  int member = 0;
+
+  void process(const A &a) {
+    A &out = state().buffer[0];
+#if CASE == 1
+    // THROW: errors-unsupported.cpp:[[#@LINE + 1]]:5: error: not supported in Piko: exceptions
+    throw 1;
+#elif CASE == 2
+    out.x = fibonacci(int(a.x));
+#elif CASE == 3
+    // NEW: errors-unsupported.cpp:[[#@LINE + 1]]:14: error: not supported in Piko: dynamic allocation
+    out.x = *new float(a.x);
+#elif CASE == 4
+    // NOBODY: errors-unsupported.cpp:[[#@LINE + 1]]:13: error: not supported in Piko: a call of 'outside', which has no body in this file
+    out.x = outside(a.x);
+#elif CASE == 5
+    // GLOBAL: errors-unsupported.cpp:[[#@LINE + 1]]:5: error: not supported in Piko: access to the variable 'counter', which is outside the pipeline
+    ++counter;
+#elif CASE == 6
+    // MEMBER: errors-unsupported.cpp:[[#@LINE + 1]]:5: error: not supported in Piko: changing a member of a stage in a phase, whose calls are concurrent
+    ++member;
+#elif CASE == 7
+    // CONSTANT: errors-unsupported.cpp:[[#@LINE + 1]]:22: error: not supported in Piko: writing to a constant of the state
+    state().constant = a.x;
+#elif CASE == 8
+    // ASM: errors-unsupported.cpp:[[#@LINE + 1]]:5: error: not supported in Piko: inline assembly
+    asm volatile("nop");
+#elif CASE == 9
+    // PORT: errors-unsupported.cpp:[[#@LINE + 1]]:5: error: expected the port of an emit to be a constant
+    emit(a, int(a.x));
+#elif CASE == 10
+    update(state().image, glm::ivec2(0), [&](A &p) {
+      // NESTED: errors-unsupported.cpp:[[#@LINE + 1]]:7: error: not supported in Piko: an update inside an update
+      update(state().image, glm::ivec2(1), [&](A &q) { q.x = p.x; });
+    });
+#elif CASE == 11
+    // PARALLEL: errors-unsupported.cpp:[[#@LINE + 1]]:5: error: not supported in Piko: 'parallelFor', which the compiler cannot do yet
+    parallelFor(4, [&](int i) { state().buffer[i] = a; });
+#elif CASE == 12
+    out.x = getArea(reinterpret_cast<const Shape *>(&a));
+#else
+    // SYNTAX: errors-unsupported.cpp:[[#@LINE + 1]]:7: error: no member named 'q' in 'A'
+    a.q = 1;
+#endif
+    (void)out;
+  }
+};
+struct Drain : piko::Stage<0, 0, 1, A> {
+  void process(const A &) {}
+};
+struct Pipeline : piko::Pipe<State> {
+  Stage stage;
+  Drain drain;
+  Pipeline() {
+    source(stage);
+    connect(stage, 0, drain);
+  }
+};
