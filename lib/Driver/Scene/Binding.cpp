@@ -124,7 +124,7 @@ private:
 
   Result<Done> noteImage(const pikort_state_info &state,
                          const pikort_record_info &record) {
-    if (std::strcmp(record.name, "piko::scene::Color"))
+    if (std::strcmp(record.name, "piko::scene::Color") != 0)
       return Done{};
     if (!output.empty())
       return fail("expected one image of 'piko::scene::Color' for the result, "
