@@ -184,8 +184,7 @@ void pikoir_fail(pikort_pipeline *p, int32_t stage, int32_t code, int64_t a,
 
 const void *pikoir_get_source(pikort_pipeline *p, int32_t source,
                               int64_t *count) {
-  bool exists =
-      source >= 0 && source < static_cast<int32_t>(p->sources.size());
+  bool exists = source >= 0 && source < static_cast<int32_t>(p->sources.size());
   *count = exists ? p->sources[source].count : 0;
   return exists ? p->sources[source].data : nullptr;
 }

@@ -17,9 +17,8 @@ struct State {
   piko::Image<Voxel, 3> volume;
 };
 
-struct Splat
-    : piko::BasicStage<piko::Bins<8, 8, 4>, 64, Particle>,
-      piko::Uses<State> {
+struct Splat : piko::BasicStage<piko::Bins<8, 8, 4>, 64, Particle>,
+               piko::Uses<State> {
   void assignBin(const Particle &p) {
     assignToBoundingBox(p, p.position - 1.5f, p.position + 1.5f);
   }

@@ -100,7 +100,8 @@ struct Store : piko::Stage<0, 0, 64, Patch>, piko::Uses<State> {
       sorted[j] = p.weight[i];
     }
     for (int i = 0; i < 4; ++i)
-      r.a[i] = sorted[i] + glm::dot(middle, glm::normalize(p.corner[i] + 100.0f));
+      r.a[i] =
+          sorted[i] + glm::dot(middle, glm::normalize(p.corner[i] + 100.0f));
     piko::atomicAdd(state().results[p.kind].code, r.code);
     if (p.weight[0] == sorted[0] && p.flag)
       piko::atomicMax(state().results[(p.kind + 7) % 64].code,

@@ -42,9 +42,8 @@ struct Detour : piko::Stage<16, 16, 64, Point, Point> {
 struct Join : piko::Stage<0, 0, 64, Point>, piko::Uses<State> {
   void process(const Point &p) {
     if (isOnScreen(p, domain()))
-      update(state().image, glm::ivec2(p.x, p.y), [&](Pixel &pixel) {
-        pixel.sum = pixel.sum * 0.75f + p.value;
-      });
+      update(state().image, glm::ivec2(p.x, p.y),
+             [&](Pixel &pixel) { pixel.sum = pixel.sum * 0.75f + p.value; });
   }
 };
 struct JoinPipe : piko::Pipe<State> {

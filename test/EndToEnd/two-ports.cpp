@@ -42,9 +42,7 @@ struct Draw : piko::Stage<8, 8, 64, Point>, piko::Uses<State> {
   }
 };
 struct Add : piko::Stage<0, 0, 64, Count>, piko::Uses<State> {
-  void process(const Count &c) {
-    piko::atomicAdd(state().counts[c.amount], 1);
-  }
+  void process(const Count &c) { piko::atomicAdd(state().counts[c.amount], 1); }
 };
 struct TwoPorts : piko::Pipe<State> {
   Split split;

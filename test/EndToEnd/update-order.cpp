@@ -20,7 +20,8 @@ struct Spread : piko::Stage<16, 16, 64, Point, Point> {
     if (p.tag == 0)
       assignToAll(p);
     else
-      assignToBoundingBox(p, glm::ivec2(p.x - p.tag, p.y), glm::ivec2(p.x, p.y));
+      assignToBoundingBox(p, glm::ivec2(p.x - p.tag, p.y),
+                          glm::ivec2(p.x, p.y));
   }
   void process(const Point &p) {
     glm::ivec2 lo = binLo();
@@ -32,8 +33,8 @@ struct Spread : piko::Stage<16, 16, 64, Point, Point> {
       emit(p);
   }
 };
-template <int Bin> struct Blend : piko::Stage<Bin, Bin, 64, Point, Point>,
-                                  piko::Uses<State> {
+template <int Bin>
+struct Blend : piko::Stage<Bin, Bin, 64, Point, Point>, piko::Uses<State> {
   void assignBin(const Point &p) {
     if (isOnScreen(p, this->domain()))
       this->assignToBin(p, this->binFromPosition(glm::ivec2(p.x, p.y)));

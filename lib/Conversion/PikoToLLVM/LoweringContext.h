@@ -72,7 +72,8 @@ mlir::Value createI32(mlir::OpBuilder &builder, mlir::Location loc, int64_t v);
 mlir::Value createI64(mlir::OpBuilder &builder, mlir::Location loc, int64_t v);
 /// An index, i32 or i64 as i64; signed.
 mlir::Value toI64(mlir::OpBuilder &builder, mlir::Location loc, mlir::Value v);
-mlir::Value toIndex(mlir::OpBuilder &builder, mlir::Location loc, mlir::Value v);
+mlir::Value toIndex(mlir::OpBuilder &builder, mlir::Location loc,
+                    mlir::Value v);
 /// A pointer so many bytes behind another.
 mlir::Value createOffset(mlir::OpBuilder &builder, mlir::Location loc,
                          mlir::Value pointer, int64_t bytes);

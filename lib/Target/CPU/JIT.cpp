@@ -48,9 +48,8 @@ JITCode::create(std::unique_ptr<Module> module,
   module->setDataLayout((*machine)->createDataLayout());
   optimize(*module, **machine);
 
-  auto jit = orc::LLJITBuilder()
-                 .setJITTargetMachineBuilder(std::move(*host))
-                 .create();
+  auto jit =
+      orc::LLJITBuilder().setJITTargetMachineBuilder(std::move(*host)).create();
   if (!jit)
     return jit.takeError();
   auto process = orc::DynamicLibrarySearchGenerator::GetForCurrentProcess(

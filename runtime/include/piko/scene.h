@@ -16,8 +16,9 @@
 //
 // Each may occur any number of times (the Image<Color> once) or not at all.
 // A host-bound buffer, a constant without a default value or a source of any
-// other type is an error, because nothing could fill it. State that the pipeline
-// allocates or clears itself and constants with a default value are left alone. The domain is the image: cell (0, 0) is its top left pixel.
+// other type is an error, because nothing could fill it. State that the
+// pipeline allocates or clears itself and constants with a default value are
+// left alone. The domain is the image: cell (0, 0) is its top left pixel.
 //
 // All types are trivially copyable; lengths are in the scene's own unit.
 //

@@ -94,7 +94,8 @@ private:
     if (status != PIKORT_OK)
       throw std::runtime_error(pikort_message(pipeline));
   }
-  std::string makeRecords(int32_t record, int64_t count, const std::string &who);
+  std::string makeRecords(int32_t record, int64_t count,
+                          const std::string &who);
   void bind();
 
   const Options &options;
@@ -150,8 +151,8 @@ std::string Run::makeRecords(int32_t index, int64_t count,
       pikort_field_info field;
       check(pikort_get_field(pipeline, index, f, &field));
       for (int64_t e = 0; e < field.elements; ++e) {
-        char *at = &bytes[size_t(i * record.size + field.offset +
-                                 e * field.stride)];
+        char *at =
+            &bytes[size_t(i * record.size + field.offset + e * field.stride)];
         unsigned bits = random();
         float real = float(bits % 5120) / 64 - 8;
         double wide = real;
