@@ -121,7 +121,10 @@ private:
     auto *declaration = llvm::cast<llvm::Function>(callee.getCallee());
     declaration->setDoesNotThrow();
     declaration->setWillReturn();
-    declaration->setOnlyAccessesInaccessibleMemory();
+    // An update reads and writes what other calls read: nothing moves past its
+    // ends.
+    if (name != accessor::updateBegin && name != accessor::updateEnd)
+      declaration->setOnlyAccessesInaccessibleMemory();
     declaration->addFnAttr(llvm::Attribute::NoDuplicate);
     declaration->addFnAttr(llvm::Attribute::Convergent);
     declaration->addFnAttr(llvm::Attribute::NoMerge);

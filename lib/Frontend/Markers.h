@@ -3,6 +3,7 @@
 #ifndef PIKO_LIB_FRONTEND_MARKERS_H
 #define PIKO_LIB_FRONTEND_MARKERS_H
 
+#include "llvm/ADT/SmallVector.h"
 #include "llvm/ADT/StringRef.h"
 
 #include <map>
@@ -58,8 +59,8 @@ struct Marker {
   /// atomic: which operation, and whether on signed numbers.
   int operation = 0;
   bool isSigned = false;
-  /// endStage: the stage, by number.
-  unsigned stage = 0;
+  /// endStage: the stages of that type, by number.
+  llvm::SmallVector<unsigned, 1> stages = {};
 };
 
 /// Markers by the name of their function in the module.

@@ -31,11 +31,11 @@ public:
       buildState(state);
     for (const SourceDescription &source : pipeline.sources)
       SourceOp::create(builder, source.location,
-                       pipeline.stages[source.stage].name);
+                       pipeline.stages[source.stage].symbol);
     for (const EdgeDescription &edge : pipeline.edges)
       EdgeOp::create(builder, edge.location,
-                     pipeline.stages[edge.producer].name, edge.port,
-                     pipeline.stages[edge.consumer].name);
+                     pipeline.stages[edge.producer].symbol, edge.port,
+                     pipeline.stages[edge.consumer].symbol);
     for (unsigned stage = 0; stage < pipeline.stages.size(); ++stage) {
       mlir::OpBuilder::InsertionGuard guard(builder);
       if (!buildStage(stage))
@@ -135,7 +135,7 @@ private:
     for (unsigned output : stage.outputs)
       outputs.push_back(getRecordName(output));
     auto op = StageOp::create(
-        builder, stage.location, builder.getStringAttr(stage.name),
+        builder, stage.location, builder.getStringAttr(stage.symbol),
         builder.getDenseI64ArrayAttr(stage.bins),
         builder.getI64IntegerAttr(stage.threads), getRecordName(stage.input),
         builder.getArrayAttr(outputs), /*lineage=*/nullptr, /*tile=*/nullptr);
@@ -155,8 +155,8 @@ private:
     const ScheduleDescription &schedule = stage.schedule;
     llvm::SmallVector<mlir::Attribute> waits;
     for (unsigned other : schedule.endStage)
-      waits.push_back(
-          mlir::FlatSymbolRefAttr::get(&context, pipeline.stages[other].name));
+      waits.push_back(mlir::FlatSymbolRefAttr::get(
+          &context, pipeline.stages[other].symbol));
     auto number = [&](int64_t value) {
       return value ? builder.getI64IntegerAttr(value) : mlir::IntegerAttr();
     };

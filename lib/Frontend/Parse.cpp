@@ -267,9 +267,9 @@ readMarker(const clang::FunctionDecl *function, UnitReader &reader,
         (*arguments)[0].getAsType()->getAsCXXRecordDecl();
     llvm::ArrayRef<const clang::CXXRecordDecl *> types =
         reader.getReader().stageTypes;
-    const auto *found =
-        type ? llvm::find(types, type->getCanonicalDecl()) : types.end();
-    marker.stage = found - types.begin();
+    for (auto [stage, candidate] : llvm::enumerate(types))
+      if (type && candidate == type->getCanonicalDecl())
+        marker.stages.push_back(stage);
     break;
   }
   default:

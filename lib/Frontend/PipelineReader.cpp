@@ -255,6 +255,11 @@ LogicalResult PipelineReader::readStage(const clang::FieldDecl *member) {
              << records.getName(stateType) << "' of its pipeline, but it uses '"
              << records.getName(used) << "'";
   }
+  stage.symbol = stage.name;
+  while (llvm::any_of(pipeline.state, [&](const StateDescription &state) {
+    return state.name == stage.symbol;
+  }))
+    stage.symbol += "_stage";
   stageTypes.push_back(type->getCanonicalDecl());
   pipeline.stages.push_back(std::move(stage));
   return success();

@@ -237,12 +237,13 @@ private:
       schedule.tileSplit = *number;
       return true;
     case MarkerKind::endStage:
-      if (marker.stage >= pipeline.stages.size()) {
+      if (marker.stages.empty()) {
         fail(call) << "expected endStage of a stage of pipeline '"
                    << pipeline.name << "'";
         return false;
       }
-      schedule.endStage.push_back(marker.stage);
+      schedule.endStage.insert(schedule.endStage.end(), marker.stages.begin(),
+                               marker.stages.end());
       return true;
     case MarkerKind::endBin:
       schedule.endBin = true;

@@ -44,8 +44,89 @@ static AssignOp copyAssign(AssignOp assign, KernelOp kernel) {
   return copy;
 }
 
+/// The sources whose primitives can reach a stage without waiting on the way;
+/// fails if a stage on the way, or the stage itself, collects.
+static LogicalResult collectSources(StageOp stage,
+                                    llvm::SmallDenseSet<int64_t> &numbers,
+                                    llvm::SmallPtrSetImpl<Operation *> &seen) {
+  if (!seen.insert(stage).second)
+    return success();
+  if (stage.collects())
+    return failure();
+  auto name = FlatSymbolRefAttr::get(stage.getSymNameAttr());
+  PipelineOp pipeline = getPipeline(stage);
+  for (auto [number, source] : llvm::enumerate(pipeline.getOps<SourceOp>()))
+    if (source.getStageAttr() == name)
+      numbers.insert(number);
+  for (auto edge : pipeline.getOps<EdgeOp>())
+    if (edge.getConsumerAttr() == name &&
+        failed(collectSources(
+            lookupInPipeline<StageOp>(edge, edge.getProducerAttr()), numbers,
+            seen)))
+      return failure();
+  return success();
+}
+
+/// Whether all that `writer` writes is there when `reader`'s primitives are
+/// assigned: they all come from sources, which the reader's kernel places once
+/// its wait is over and which come after the writer's.
+static bool isWrittenBefore(StageOp writer, StageOp reader) {
+  auto name = FlatSymbolRefAttr::get(reader.getSymNameAttr());
+  auto writerName = FlatSymbolRefAttr::get(writer.getSymNameAttr());
+  PipelineOp pipeline = getPipeline(reader);
+  ScheduleOp schedule = reader.getSchedule();
+  if (!schedule || !schedule.getEndStageAttr() ||
+      !llvm::is_contained(schedule.getEndStageAttr(), Attribute(writerName)))
+    return false;
+  for (auto edge : pipeline.getOps<EdgeOp>())
+    if (edge.getConsumerAttr() == name)
+      return false;
+  llvm::SmallDenseSet<int64_t> before;
+  llvm::SmallPtrSet<Operation *, 8> seen;
+  if (failed(collectSources(writer, before, seen)))
+    return false;
+  for (auto [number, source] : llvm::enumerate(pipeline.getOps<SourceOp>()))
+    if (source.getStageAttr() == name)
+      for (int64_t earlier : before)
+        if (earlier >= int64_t(number))
+          return false;
+  return true;
+}
+
+/// An assign phase must not see what it reads change.
+static LogicalResult checkAssignReads(PipelineOp pipeline) {
+  llvm::DenseMap<Attribute, SmallVector<Operation *>> writes;
+  pipeline.walk([&](Operation *op) {
+    if (isa<StoreOp, AtomicOp>(op))
+      writes[op->getAttr("state")].push_back(op);
+    else if (auto update = dyn_cast<UpdateOp>(op))
+      writes[update.getImageAttr()].push_back(op);
+  });
+  WalkResult result = pipeline.walk([&](LoadOp load) {
+    if (!load->getParentOfType<AssignOp>())
+      return WalkResult::advance();
+    StageOp reader = getPhaseStage(load);
+    for (Operation *write : writes.lookup(load.getStateAttr())) {
+      StageOp writer = getPhaseStage(write);
+      if (isWrittenBefore(writer, reader))
+        continue;
+      InFlightDiagnostic error =
+          load.emitError("expected the assign phase of stage '")
+          << reader.getSymName() << "' to read what is complete when its "
+          << "primitives arrive, but stage '" << writer.getSymName()
+          << "' may still write " << load.getStateAttr();
+      error.attachNote(write->getLoc()) << "it is written here";
+      return WalkResult::interrupt();
+    }
+    return WalkResult::advance();
+  });
+  return failure(result.wasInterrupted());
+}
+
 void FormKernelsPass::runOnOperation() {
   PipelineOp pipeline = getOperation();
+  if (failed(checkAssignReads(pipeline)))
+    return signalPassFailure();
   OpBuilder builder = OpBuilder::atBlockEnd(pipeline.getBodyBlock());
   SmallVector<StageOp> stages(pipeline.getOps<StageOp>());
   SmallVector<SourceOp> sources(pipeline.getOps<SourceOp>());

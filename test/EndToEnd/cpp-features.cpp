@@ -18,8 +18,7 @@ struct Matrix {
   float bias[3];
 };
 struct Result {
-  float a[4];
-  int code;
+  int code, most;
 };
 struct State {
   Matrix matrix;
@@ -89,8 +88,6 @@ struct Turn : piko::Stage<0, 0, 64, Patch, Patch>, piko::Uses<State> {
 };
 struct Store : piko::Stage<0, 0, 64, Patch>, piko::Uses<State> {
   void process(const Patch &p) {
-    Result r;
-    r.code = classify(p);
     glm::vec3 middle = sumOf(p.corner) * 0.25f;
     float sorted[4];
     for (int i = 0; i < 4; ++i) {
@@ -99,13 +96,13 @@ struct Store : piko::Stage<0, 0, 64, Patch>, piko::Uses<State> {
         sorted[j] = sorted[j - 1];
       sorted[j] = p.weight[i];
     }
+    float a[4];
     for (int i = 0; i < 4; ++i)
-      r.a[i] =
-          sorted[i] + glm::dot(middle, glm::normalize(p.corner[i] + 100.0f));
-    piko::atomicAdd(state().results[p.kind].code, r.code);
+      a[i] = sorted[i] + glm::dot(middle, glm::normalize(p.corner[i] + 100.0f));
+    piko::atomicAdd(state().results[p.kind].code, classify(p));
     if (p.weight[0] == sorted[0] && p.flag)
-      piko::atomicMax(state().results[(p.kind + 7) % 64].code,
-                      int(glm::max(r.a[2], 0.0f) * 16.0f));
+      piko::atomicMax(state().results[(p.kind + 7) % 64].most,
+                      int(glm::max(a[2], 0.0f) * 16.0f));
   }
 };
 struct Features : piko::Pipe<State> {

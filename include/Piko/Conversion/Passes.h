@@ -15,7 +15,7 @@
 
 namespace piko {
 
-/// Updates and writes of a kernel, as `scf.if`s.
+/// Updates and other access to state, behind tests, as `scf.if`s.
 void populatePikoToSCFPatterns(mlir::RewritePatternSet &patterns);
 
 /// The `scf.forall` of a kernel, as an OpenMP loop.

@@ -8,17 +8,17 @@
 include "mlir/Pass/PassBase.td"
 
 def ConvertPikoToSCF : Pass<"convert-piko-to-scf", "::piko::PipelineOp"> {
-  let summary = "Turn updates and guarded writes into structured control flow";
+  let summary = "Turn updates and checked access into structured control flow";
   let description = [{
     **Requires** the resolved level.
 
     **Does**: turns `piko.update` into an `scf.if` around the loads of the pixel,
-    the update's body and the stores; and puts `piko.store` and `piko.atomic`
-    behind a test of their indices. Where a test fails, `piko.fail` reports it
-    and nothing is written.
+    the update's body and the stores; and puts `piko.load`, `piko.store` and
+    `piko.atomic` behind a test of their indices. Where a test fails,
+    `piko.fail` reports it, nothing is written, and a read gives 0.
 
-    **Guarantees** that no kernel writes outside a buffer, an image, or, in an
-    update, the bin.
+    **Guarantees** that no kernel touches memory outside a buffer, an image, or,
+    in an update, the bin.
 
     Before:
     ```
@@ -35,7 +35,7 @@ def ConvertPikoToSCF : Pass<"convert-piko-to-scf", "::piko::PipelineOp"> {
     }
     ```
 
-    **Limits**: reads are not tested.
+    **Limits**: indices into array fields are not tested.
   }];
   let dependentDialects = ["::mlir::arith::ArithDialect",
                            "::mlir::scf::SCFDialect"];

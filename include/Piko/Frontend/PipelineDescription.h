@@ -77,8 +77,9 @@ struct ScheduleDescription {
 };
 
 struct StageDescription {
-  /// The member of the pipeline.
-  std::string name = {};
+  /// The member of the pipeline, and what the dialect calls it: there, stages
+  /// and state are symbols of one table.
+  std::string name = {}, symbol = {};
   std::string typeName = {};
   std::vector<int64_t> bins = {};
   int64_t threads = 1;

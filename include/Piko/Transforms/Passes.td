@@ -111,7 +111,9 @@ def FormKernels : Pass<"piko-form-kernels", "::piko::PipelineOp"> {
     piko.kernel @kernel_b { piko.process of @b { ... } }
     ```
 
-    **Limits**: none; what can be merged further is for other passes.
+    **Limits**: an assign phase that reads state which a stage may still write
+    when the primitives arrive is an error. What can be merged further is for
+    other passes.
   }];
   let statistics = [Statistic<"kernels", "kernels", "kernels formed">];
 }

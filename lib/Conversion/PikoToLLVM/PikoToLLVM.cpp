@@ -49,6 +49,14 @@ static void noteSubject(func::FuncOp function, const PipelineNumbers &numbers) {
 
 LogicalResult ConvertPikoToLLVMPass::convert(PipelineOp pipeline,
                                              LoweringContext &context) {
+  WalkResult phase = pipeline.walk([](Operation *op) {
+    if (!isa<AssignOp, ProcessOp>(op))
+      return WalkResult::advance();
+    op->emitError("expected the resolved level, but got a phase");
+    return WalkResult::interrupt();
+  });
+  if (phase.wasInterrupted())
+    return failure();
   PipelineNumbers numbers(pipeline);
   SmallVector<func::FuncOp> functions;
   for (auto kernel : llvm::to_vector(pipeline.getOps<KernelOp>())) {

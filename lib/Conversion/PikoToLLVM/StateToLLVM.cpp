@@ -131,20 +131,33 @@ struct FailLowering : OpConversionPattern<FailOp> {
   matchAndRewrite(FailOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
     Location loc = op.getLoc();
-    bool image = isa<ImageOp>(context.state(op, op.getState()));
     SmallVector<Value> indices;
     for (Value index : adaptor.getIndices())
       indices.push_back(toI64(rewriter, loc, index));
+    Value first = indices.front();
     Value second =
         indices.size() > 1 ? indices[1] : createI64(rewriter, loc, 0);
-    if (!image)
-      second = context.view(rewriter, op, op.getState()).extents[0];
+    if (!op.getBin()) {
+      // The first index that is outside, and how many elements there are.
+      StateView &view = context.view(rewriter, op, op.getState());
+      first = indices.back();
+      second = view.extents[indices.size() - 1];
+      for (int64_t dim = indices.size() - 2; dim >= 0; --dim) {
+        Value outside =
+            arith::CmpIOp::create(rewriter, loc, arith::CmpIPredicate::uge,
+                                  indices[dim], view.extents[dim]);
+        first = arith::SelectOp::create(rewriter, loc, outside, indices[dim],
+                                        first);
+        second = arith::SelectOp::create(rewriter, loc, outside,
+                                         view.extents[dim], second);
+      }
+    }
     context.call(
         rewriter, loc, "pikoir_fail", Type(),
         {context.frame(op),
          createI32(rewriter, loc, context.stageNumber(op, op.getStage())),
-         createI32(rewriter, loc, image ? updateOutside : indexOutside),
-         indices.front(), second});
+         createI32(rewriter, loc, op.getBin() ? updateOutside : indexOutside),
+         first, second});
     rewriter.eraseOp(op);
     return success();
   }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// convert-piko-to-scf: updates and writes behind tests of where they write.
+// convert-piko-to-scf: updates and other access to state, behind tests of where
+// they go.
 
 #include "Piko/Conversion/Passes.h"
 #include "Piko/Transforms/BinArithmetic.h"
@@ -66,7 +67,8 @@ struct ConvertUpdate : OpRewritePattern<UpdateOp> {
                                   isInside(rewriter, loc, at, lo, hi),
                                   /*withElseRegion=*/true);
     rewriter.setInsertionPointToStart(ifOp.elseBlock());
-    FailOp::create(rewriter, loc, stage.getSymName(), update.getImage(), at);
+    FailOp::create(rewriter, loc, stage.getSymName(), update.getImage(), at,
+                   /*bin=*/true);
     SmallVector<Value> zeros;
     for (Type type : update.getResultTypes())
       zeros.push_back(
@@ -91,7 +93,7 @@ private:
     forEachElement(rewriter, loc, record, [&](FieldAttr field, ValueRange es) {
       oldValues.push_back(LoadOp::create(rewriter, loc, field.getType(),
                                          update.getImage(), at, field.getName(),
-                                         es));
+                                         es, /*checked=*/true));
     });
     Block *then = ifOp.thenBlock();
     if (ifOp.getNumResults() == 0)
@@ -130,33 +132,42 @@ private:
   }
 };
 
-/// Puts a write that is not checked yet behind a test of its indices.
-template <typename WriteOp> struct CheckWrite : OpRewritePattern<WriteOp> {
-  using OpRewritePattern<WriteOp>::OpRewritePattern;
+/// Puts an access that is not checked yet behind a test of its indices; a read
+/// that fails the test gives 0.
+template <typename AccessOp> struct CheckAccess : OpRewritePattern<AccessOp> {
+  using OpRewritePattern<AccessOp>::OpRewritePattern;
 
-  LogicalResult matchAndRewrite(WriteOp write,
+  LogicalResult matchAndRewrite(AccessOp access,
                                 PatternRewriter &rewriter) const override {
-    StageOp stage = getKernelStage(write);
+    StageOp stage = getKernelStage(access);
     if (!stage)
-      return rewriter.notifyMatchFailure(write, "not at the resolved level");
-    if (write.getChecked())
-      return rewriter.notifyMatchFailure(write, "checked already");
-    Location loc = write.getLoc();
+      return rewriter.notifyMatchFailure(access, "not at the resolved level");
+    if (access.getChecked() || access.getIndices().empty())
+      return rewriter.notifyMatchFailure(access, "nothing to check");
+    Location loc = access.getLoc();
     BinArithmetic bins(rewriter, loc, stage);
-    SmallVector<Value> at = toIndices(bins, write.getIndices()), lo, hi;
+    SmallVector<Value> at = toIndices(bins, access.getIndices()), lo, hi;
     for (int64_t dim = 0, e = at.size(); dim < e; ++dim) {
       lo.push_back(bins.constant(0));
-      hi.push_back(ExtentOp::create(rewriter, loc, write.getState(), dim));
+      hi.push_back(ExtentOp::create(rewriter, loc, access.getState(), dim));
     }
-    auto ifOp =
-        scf::IfOp::create(rewriter, loc, isInside(rewriter, loc, at, lo, hi),
-                          /*withElseRegion=*/true);
+    TypeRange types = access->getResultTypes();
+    auto ifOp = scf::IfOp::create(rewriter, loc, types,
+                                  isInside(rewriter, loc, at, lo, hi),
+                                  /*withElseRegion=*/true);
     rewriter.setInsertionPointToStart(ifOp.elseBlock());
-    FailOp::create(rewriter, loc, stage.getSymName(), write.getState(), at);
-    rewriter.modifyOpInPlace(write, [&] {
-      write.setChecked(true);
-      write->moveBefore(ifOp.thenBlock()->getTerminator());
-    });
+    FailOp::create(rewriter, loc, stage.getSymName(), access.getState(), at);
+    rewriter.setInsertionPointToStart(ifOp.thenBlock());
+    auto checked = cast<AccessOp>(rewriter.clone(*access));
+    checked.setChecked(true);
+    if (!types.empty()) {
+      scf::YieldOp::create(rewriter, loc, checked->getResults());
+      rewriter.setInsertionPointToEnd(ifOp.elseBlock());
+      Value zero = arith::ConstantOp::create(
+          rewriter, loc, rewriter.getZeroAttr(types.front()));
+      scf::YieldOp::create(rewriter, loc, zero);
+    }
+    rewriter.replaceOp(access, ifOp);
     return success();
   }
 };
@@ -178,6 +189,6 @@ struct ConvertPikoToSCFPass
 } // namespace
 
 void piko::populatePikoToSCFPatterns(RewritePatternSet &patterns) {
-  patterns.add<ConvertUpdate, CheckWrite<StoreOp>, CheckWrite<AtomicOp>>(
-      patterns.getContext());
+  patterns.add<ConvertUpdate, CheckAccess<AtomicOp>, CheckAccess<LoadOp>,
+               CheckAccess<StoreOp>>(patterns.getContext());
 }

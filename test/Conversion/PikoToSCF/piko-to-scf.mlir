@@ -13,14 +13,14 @@ piko.record @u32 {"value" : i32 at 0} size 4 align 4
 // CHECK:         %[[W:.*]] = piko.domain[0]
 // CHECK:         %[[IN:.*]] = arith.cmpi ult, %[[XI]], %[[W]]
 // CHECK:         %[[R:.*]] = scf.if %[[IN]] -> (i1) {
-// CHECK:           %[[OLD:.*]] = piko.load @image[%[[XI]] : index] "z"
+// CHECK:           %[[OLD:.*]] = piko.load checked @image[%[[XI]] : index] "z"
 // CHECK:           %[[CLOSER:.*]] = arith.cmpf olt, %[[Z]], %[[OLD]]
 // CHECK:           %[[NEW:.*]] = arith.select %[[CLOSER]], %[[Z]], %[[OLD]]
 // CHECK:           piko.store %[[NEW]], checked @image[%[[XI]] : index] "z"
 // CHECK-NOT:       piko.store
 // CHECK:           scf.yield %[[CLOSER]]
 // CHECK:         } else {
-// CHECK:           piko.fail @a outside @image(%[[XI]])
+// CHECK:           piko.fail @a outside bin of @image(%[[XI]])
 // CHECK:         %[[N:.*]] = piko.extent @counts[0]
 // CHECK:         %[[OK:.*]] = arith.cmpi ult, %[[XI]], %[[N]]
 // CHECK:         scf.if %[[OK]] {

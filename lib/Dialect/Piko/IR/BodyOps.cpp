@@ -92,6 +92,27 @@ static LogicalResult verifyRank(Operation *op, size_t coordinates) {
   return success();
 }
 
+/// A dimension is one of the pipeline's.
+static LogicalResult verifyDim(Operation *op, int64_t dim) {
+  PipelineOp pipeline = getPipeline(op);
+  if (pipeline && dim >= pipeline.getRank())
+    return op->emitOpError("expected a dimension below ")
+           << pipeline.getRank() << ", the rank of the pipeline, but got "
+           << dim;
+  return success();
+}
+
+LogicalResult BinLoOp::verify() { return verifyDim(*this, getDim()); }
+LogicalResult BinHiOp::verify() { return verifyDim(*this, getDim()); }
+LogicalResult DomainOp::verify() { return verifyDim(*this, getDim()); }
+
+LogicalResult GridOp::verify() {
+  if (getDim() < 0)
+    return emitOpError("expected a dimension of at least 0, but got ")
+           << getDim();
+  return verifyDim(*this, getDim());
+}
+
 LogicalResult BinAtOp::verify() {
   return verifyRank(*this, getCoordinates().size());
 }

@@ -26,6 +26,13 @@ LogicalResult KernelOp::verifyRegions() {
   if (processes > 1)
     return emitOpError("expected at most one process phase, but got ")
            << processes;
+  if (!hasPhase || processes)
+    return success();
+  // Without a process phase the kernel places the primitives of one source.
+  auto assigns = getOps<AssignOp>();
+  if (!llvm::hasSingleElement(assigns) || !(*assigns.begin()).getSource())
+    return emitOpError("expected a process phase, or the assign phase of one "
+                       "source alone");
   return success();
 }
 

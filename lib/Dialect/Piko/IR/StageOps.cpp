@@ -114,4 +114,16 @@ LogicalResult AssignOp::verifyRegions() {
   return verifyPhase(*this);
 }
 
-LogicalResult ProcessOp::verifyRegions() { return verifyPhase(*this); }
+LogicalResult ProcessOp::verifyRegions() {
+  if (failed(verifyPhase(*this)))
+    return failure();
+  // Its size would have to be found anew, and stack taken, for each primitive.
+  WalkResult result = walk([](Operation *op) {
+    if (op->getName().getStringRef() != "memref.alloca" ||
+        op->getNumOperands() == 0)
+      return WalkResult::advance();
+    op->emitError("expected a private array of constant size");
+    return WalkResult::interrupt();
+  });
+  return failure(result.wasInterrupted());
+}

@@ -89,6 +89,17 @@ LogicalResult UpdateOp::verifyRegions() {
     return emitOpError("expected a block argument for each number of record ")
            << image.getRecordAttr() << ", (" << types << "), but got ("
            << body.getArgumentTypes() << ")";
+  // The body works on a copy of the pixel, which other access would bypass.
+  WalkResult bypass = walk([&](Operation *op) {
+    auto name = op->getAttrOfType<FlatSymbolRefAttr>("state");
+    if (!isa<LoadOp, StoreOp, AtomicOp>(op) || name != getImageAttr())
+      return WalkResult::advance();
+    op->emitError("expected an update to see ")
+        << name << " only through the pixel that it is given";
+    return WalkResult::interrupt();
+  });
+  if (bypass.wasInterrupted())
+    return failure();
   auto yield = dyn_cast<YieldOp>(body.getTerminator());
   if (!yield)
     return emitOpError("expected its body to end with piko.yield");

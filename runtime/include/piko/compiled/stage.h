@@ -84,7 +84,13 @@ protected:
   }
   void assignToBoundingBox(const In &in, const Position<rank> &lo,
                            const Position<rank> &hi) {
-    assignToBoundingBox(in, cells(lo), cells(hi));
+    bool isNumber = true;
+    for (int dim = 0; dim < rank; ++dim)
+      isNumber = isNumber && lo[dim] == lo[dim] && hi[dim] == hi[dim];
+    if (isNumber)
+      assignToBoundingBox(in, cells(lo), cells(hi));
+    else
+      marker::assignBin(-1); // which is an error, as in the reference
   }
 
   // Queries.

@@ -88,6 +88,7 @@ class Piko_BinBoundOp<string mnemonic> : Piko_Op<mnemonic, [Pure]> {
   let arguments = (ins Index:$bin, ConfinedAttr<Piko_I64Attr, [IntNonNegative]>:$dim);
   let results = (outs Index:$result);
   let assemblyFormat = "$bin `[` $dim `]` attr-dict";
+  let hasVerifier = 1;
 }
 
 def Piko_BinLoOp : Piko_BinBoundOp<"bin_lo"> {
@@ -120,6 +121,7 @@ def Piko_DomainOp : Piko_Op<"domain", [Pure]> {
   let arguments = (ins ConfinedAttr<Piko_I64Attr, [IntNonNegative]>:$dim);
   let results = (outs Index:$result);
   let assemblyFormat = "`[` $dim `]` attr-dict";
+  let hasVerifier = 1;
 }
 
 /// What an assign phase says about its primitive: it must be inside one.

@@ -262,6 +262,7 @@ def Piko_GridOp : Piko_Op<"grid", [Pure]> {
   let arguments = (ins FlatSymbolRefAttr:$stage, Piko_I64Attr:$dim, UnitAttr:$tiles);
   let results = (outs Index:$result);
   let assemblyFormat = "$stage `[` $dim `]` (`tiles` $tiles^)? attr-dict";
+  let hasVerifier = 1;
 }
 
 #endif // PIKO_DIALECT_PIKO_IR_PIKOKERNELOPS_TD

@@ -18,6 +18,8 @@ def Piko_LoadOp : Piko_StateAccessOp<"load", [MemoryEffects<[MemRead]>]> {
   let description = [{
     A constant takes no index, a buffer one, an image one for each dimension;
     an element of an array field takes further ones behind the field's name.
+    An index outside the buffer or image is an error when the pipeline runs;
+    `checked` says that the test for it is already there.
 
     ```mlir
     %width = piko.load @camera "width" : i32
@@ -28,10 +30,10 @@ def Piko_LoadOp : Piko_StateAccessOp<"load", [MemoryEffects<[MemRead]>]> {
   }];
   let arguments = (ins FlatSymbolRefAttr:$state,
                        Variadic<Piko_Coordinate>:$indices, StrAttr:$field,
-                       Variadic<Index>:$elements);
+                       Variadic<Index>:$elements, UnitAttr:$checked);
   let results = (outs Piko_Scalar:$result);
   let assemblyFormat = [{
-    $state (`[` $indices^ `:` type($indices) `]`)? $field
+    (`checked` $checked^)? $state (`[` $indices^ `:` type($indices) `]`)? $field
     (`[` $elements^ `]`)? attr-dict `:` type($result)
   }];
 }
@@ -143,17 +145,18 @@ def Piko_FailOp : Piko_Op<"fail"> {
   let summary = "ends the run with an error that names the stage";
   let description = [{
     An access of the stage to the piece of state at these indices was outside
-    it, or outside the bin. The run goes on to the end of the kernel and then
-    stops.
+    it or, with `bin of`, outside the bin. The run goes on to the end of the
+    kernel and then stops.
 
     ```mlir
-    piko.fail @shade outside @depth(%i, %j)
+    piko.fail @shade outside @lights(%i)
+    piko.fail @shade outside bin of @depth(%i, %j)
     ```
   }];
   let arguments = (ins FlatSymbolRefAttr:$stage, FlatSymbolRefAttr:$state,
-                       Variadic<Index>:$indices);
+                       Variadic<Index>:$indices, UnitAttr:$bin);
   let assemblyFormat = [{
-    $stage `outside` $state `(` $indices `)` attr-dict
+    $stage `outside` (`bin` `of` $bin^)? $state `(` $indices `)` attr-dict
   }];
 }
 
