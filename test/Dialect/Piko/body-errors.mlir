@@ -265,3 +265,50 @@ piko.pipeline @P rank 2 {
     }
   }
 }
+
+// -----
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+piko.pipeline @Dimension rank 1 {
+  piko.source @a
+  piko.stage @a bins [0] threads 1 : @F -> [] {
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      // expected-error @below {{expected a dimension below 1, the rank of the pipeline, but got 3}}
+      %w = piko.domain[3]
+      piko.return
+    }
+  }
+}
+
+// -----
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+piko.pipeline @BinDimension rank 1 {
+  piko.source @a
+  piko.stage @a bins [0] threads 1 : @F -> [] {
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      %b = piko.bin
+      // expected-error @below {{expected a dimension below 1, the rank of the pipeline, but got 5}}
+      %x = piko.bin_lo %b[5]
+      piko.return
+    }
+  }
+}
+
+// -----
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+piko.pipeline @DynamicArray rank 1 {
+  piko.source @a
+  piko.stage @a bins [0] threads 1 : @F -> [] {
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      %n = piko.domain[0]
+      // expected-error @below {{expected a private array of constant size}}
+      %array = memref.alloca(%n) : memref<?xi32>
+      piko.return
+    }
+  }
+}

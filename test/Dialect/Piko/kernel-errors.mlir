@@ -99,3 +99,19 @@ piko.pipeline @P rank 2 {
     %bins = piko.open_bins @a : !piko.bins<@G>
   }
 }
+
+// -----
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+piko.pipeline @NoProcess rank 1 {
+  piko.source @a
+  piko.stage @a bins [0] threads 1 : @F -> [] {}
+  // expected-error @below {{expected a process phase, or the assign phase of one source alone}}
+  piko.kernel @k {
+    piko.assign of @a port 0 {
+    ^bb0(%f: !piko.prim<@F>):
+      piko.assign_all
+      piko.return
+    }
+  }
+}

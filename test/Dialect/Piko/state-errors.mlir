@@ -281,3 +281,24 @@ piko.pipeline @P rank 2 {
     }
   }
 }
+
+// -----
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+piko.pipeline @Bypass rank 1 {
+  piko.image @image : @F rank 1
+  piko.source @a
+  piko.stage @a bins [0] threads 1 : @F -> [] {
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      %x = piko.get %f "x" : !piko.prim<@F> -> i32
+      piko.update @image[%x : i32] {
+      ^bb0(%old: i32):
+        // expected-error @below {{expected an update to see @image only through the pixel that it is given}}
+        %live = piko.load @image[%x : i32] "x" : i32
+        piko.yield [%live : i32]
+      }
+      piko.return
+    }
+  }
+}
