@@ -39,6 +39,7 @@ private:
   }
 
   void declareRecord(StringAttr name, int32_t number);
+  void declareField(FieldAttr field, int32_t record);
   void declareState(Operation *state, int32_t number);
   void declareStage(StageOp stage, int32_t number);
   Value clearBytes(ImageOp image);
@@ -90,10 +91,26 @@ void SetupWriter::declareRecord(StringAttr name, int32_t number) {
   call("pikoir_declare_record", {i32(number), text(name), i64(record.getSize()),
                                  i64(record.getAlign())});
   for (auto field : record.getFields().getAsRange<FieldAttr>())
+    declareField(field, number);
+}
+
+/// The runtime's fields are evenly spaced: an array that is not, such as one
+/// inside the elements of another, is declared row by row.
+void SetupWriter::declareField(FieldAttr field, int32_t record) {
+  ArrayRef<int64_t> counts = field.getCounts(), strides = field.getStrides();
+  bool isEven = true;
+  for (size_t d = 1; d < counts.size(); ++d)
+    isEven &= strides[d - 1] == strides[d] * counts[d];
+  int64_t rowLength = isEven ? field.getElementCount() : counts.back();
+  for (int64_t row = 0; row * rowLength < field.getElementCount(); ++row) {
+    std::string name = field.getName().str();
+    if (!isEven)
+      name += "[" + std::to_string(row) + "]";
     call("pikoir_declare_field",
-         {i32(number), text(field.getName()), i32(fieldType(field.getType())),
-          i64(field.getOffset()), i64(field.getElementCount()),
-          i64(field.getStrides().empty() ? 0 : field.getStrides().back())});
+         {i32(record), text(name), i32(fieldType(field.getType())),
+          i64(field.getElementOffset(row * rowLength)), i64(rowLength),
+          i64(strides.empty() ? 0 : strides.back())});
+  }
 }
 
 Value SetupWriter::clearBytes(ImageOp image) {
