@@ -177,8 +177,12 @@ private:
       return;
     for (llvm::Value *target : targets) {
       Address address = getAddress(target, memory.data);
-      if (isChoice(address.base))
-        return;
+      if (!isChoice(address.base))
+        continue;
+      // A member of one of several things: next time one of several members.
+      if (!choices.contains(address.base))
+        distribute(target);
+      return;
     }
 
     llvm::SmallVector<Access> accesses;
@@ -197,6 +201,44 @@ private:
         makeTagValues(choices, targets);
     for (const Access &access : accesses)
       rewrite(access, tags[access.choice], targets.getArrayRef());
+    changed = true;
+  }
+
+  /// gep (phi a, b) -> phi (gep a), (gep b), for the step nearest to the
+  /// choice.
+  void distribute(llvm::Value *target) {
+    auto *step = dyn_cast<llvm::GetElementPtrInst>(target);
+    while (step && !isChoice(step->getPointerOperand()))
+      step = dyn_cast<llvm::GetElementPtrInst>(step->getPointerOperand());
+    if (!step)
+      return;
+    auto *choice = llvm::cast<llvm::Instruction>(step->getPointerOperand());
+    for (llvm::Value *index : step->indices())
+      if (auto *definition = dyn_cast<llvm::Instruction>(index))
+        if (!dominance.properlyDominates(definition->getParent(),
+                                         choice->getParent()))
+          return;
+    llvm::Instruction *made = choice->clone();
+    made->insertBefore(choice->getIterator());
+    unsigned begin = llvm::isa<llvm::SelectInst>(choice) ? 1 : 0;
+    auto *phi = dyn_cast<llvm::PHINode>(made);
+    std::map<llvm::BasicBlock *, llvm::Value *> parts;
+    for (unsigned i = begin; i < made->getNumOperands(); ++i) {
+      // A switch may come from one block several times.
+      if (phi && parts.count(phi->getIncomingBlock(i))) {
+        made->setOperand(i, parts[phi->getIncomingBlock(i)]);
+        continue;
+      }
+      builder.SetInsertPoint(phi ? phi->getIncomingBlock(i)->getTerminator()
+                                 : made);
+      llvm::Instruction *clone = step->clone();
+      clone->setOperand(0, made->getOperand(i));
+      made->setOperand(i, builder.Insert(clone));
+      if (phi)
+        parts[phi->getIncomingBlock(i)] = clone;
+    }
+    step->replaceAllUsesWith(made);
+    step->eraseFromParent();
     changed = true;
   }
 

@@ -145,6 +145,34 @@ private:
     return success();
   }
 
+  /// An address in an array as the index of an element of `size` bytes.
+  mlir::Value makeElementIndex(const Address &address, int64_t size) {
+    // Not every term need be a multiple of the size, though their sum is.
+    bool divides = llvm::all_of(address.terms, [&](const auto &term) {
+      return term.second % size == 0;
+    });
+    int64_t unit = divides ? size : 1;
+    mlir::Value index;
+    for (auto [value, scale] : address.terms) {
+      mlir::Value term = scalars.toIndex(scalars.get(value));
+      if (scale != unit)
+        term = mlir::arith::MulIOp::create(builder, *location, term,
+                                           scalars.makeIndex(scale / unit));
+      index = index
+                  ? mlir::arith::AddIOp::create(builder, *location, index, term)
+                  : term;
+    }
+    if (!index)
+      return scalars.makeIndex(address.offset / size);
+    if (address.offset)
+      index = mlir::arith::AddIOp::create(
+          builder, *location, index, scalars.makeIndex(address.offset / unit));
+    if (!divides)
+      index = mlir::arith::DivSIOp::create(builder, *location, index,
+                                           scalars.makeIndex(size));
+    return index;
+  }
+
   LogicalResult importArrayAccess(llvm::Instruction *instruction) {
     auto *store = dyn_cast<llvm::StoreInst>(instruction);
     Address address =
@@ -163,26 +191,10 @@ private:
     bool fits =
         !accessed->isPointerTy() && address.offset % size == 0 &&
         accessed->getPrimitiveSizeInBits() == element.getIntOrFloatBitWidth();
-    for (auto [value, scale] : address.terms)
-      fits &= scale % size == 0;
     if (!fits)
       return reject(instruction,
                     "access to an array that is not to one of its elements");
-    mlir::Value index;
-    for (auto [value, scale] : address.terms) {
-      mlir::Value term = scalars.toIndex(scalars.get(value));
-      if (scale != size)
-        term = mlir::arith::MulIOp::create(builder, *location, term,
-                                           scalars.makeIndex(scale / size));
-      index = index
-                  ? mlir::arith::AddIOp::create(builder, *location, index, term)
-                  : term;
-    }
-    if (!index)
-      index = scalars.makeIndex(address.offset / size);
-    else if (address.offset)
-      index = mlir::arith::AddIOp::create(
-          builder, *location, index, scalars.makeIndex(address.offset / size));
+    mlir::Value index = makeElementIndex(address, size);
     mlir::Type type = scalars.getType(accessed);
     if (store) {
       mlir::Value value = scalars.get(store->getValueOperand());

@@ -7,6 +7,7 @@
 #include "llvm/IR/GlobalVariable.h"
 #include "llvm/IR/Instructions.h"
 #include "llvm/IR/Operator.h"
+#include "llvm/IR/PatternMatch.h"
 #include "llvm/Support/MathExtras.h"
 
 using namespace piko;
@@ -77,6 +78,21 @@ static MemoryLayout getLayout(const RecordDescription &record,
 // Addresses
 //===----------------------------------------------------------------------===//
 
+/// x * constant, as a value and a factor.
+static std::pair<llvm::Value *, int64_t> splitFactor(llvm::Value *value) {
+  using namespace llvm::PatternMatch;
+  llvm::Value *inner;
+  const llvm::APInt *constant;
+  if (value->getType()->isIntegerTy(64)) {
+    if (match(value, m_Mul(m_Value(inner), m_APInt(constant))))
+      return {inner, constant->getSExtValue()};
+    if (match(value, m_Shl(m_Value(inner), m_APInt(constant))) &&
+        constant->ult(62))
+      return {inner, int64_t(1) << constant->getZExtValue()};
+  }
+  return {value, 1};
+}
+
 Address piko::getAddress(llvm::Value *pointer, const llvm::DataLayout &data) {
   Address address;
   llvm::MapVector<llvm::Value *, int64_t> terms;
@@ -87,8 +103,10 @@ Address piko::getAddress(llvm::Value *pointer, const llvm::DataLayout &data) {
     if (!step->collectOffset(data, width, variable, constant))
       break;
     address.offset += constant.getSExtValue();
-    for (auto &[value, scale] : variable)
-      terms[value] += scale.getSExtValue();
+    for (auto &[index, scale] : variable) {
+      auto [value, factor] = splitFactor(index);
+      terms[value] += scale.getSExtValue() * factor;
+    }
     pointer = step->getPointerOperand();
   }
   address.base = pointer;
