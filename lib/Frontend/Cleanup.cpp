@@ -35,15 +35,12 @@ using llvm::dyn_cast;
 mlir::Location piko::getUserLocation(const llvm::Instruction *instruction,
                                      const ParsedUnit &unit,
                                      mlir::MLIRContext &context) {
-  const llvm::DILocation *outermost = nullptr;
   for (const llvm::DILocation *at = instruction->getDebugLoc(); at;
        at = at->getInlinedAt()) {
     if (unit.userFiles.contains(at->getFilename()) && at->getLine() != 0)
       return mlir::FileLineColLoc::get(&context, at->getFilename(),
                                        at->getLine(), at->getColumn());
-    outermost = at;
   }
-  (void)outermost;
   return unit.pipeline.location;
 }
 
