@@ -48,7 +48,9 @@ private:
     if (auto *store = dyn_cast<llvm::StoreInst>(instruction))
       return resolveStore(store);
     if (llvm::isa<llvm::MemIntrinsic>(instruction))
-      return fail(instruction, "copying memory whose layout is not known");
+      return fail(instruction,
+                  "copying or filling more than 256 numbers at once, or "
+                  "memory whose layout is not known");
     if (auto *call = dyn_cast<llvm::CallInst>(instruction))
       if (const Marker *marker = getMarker(call, memory.markers))
         if (marker->kind == MarkerKind::atomic)

@@ -17,7 +17,7 @@
 using namespace piko;
 using llvm::dyn_cast;
 
-/// Copies of more numbers than this become loops.
+/// Copies of more numbers than this are not split, and rejected later on.
 static constexpr int64_t unrollLimit = 256;
 
 namespace {
