@@ -115,6 +115,8 @@ makeInvocation(const ParseRequest &request,
   codeGen.DisableLLVMPasses = true;
   codeGen.DisableLifetimeMarkers = true;
   codeGen.DiscardValueNames = true;
+  // File names stay as given: Clang cuts off what they share with this folder.
+  codeGen.DebugCompilationDir = "/";
   clang::LangOptions &language = invocation->getLangOpts();
   language.ThreadsafeStatics = false;
   return invocation;

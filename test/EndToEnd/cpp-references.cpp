@@ -89,17 +89,18 @@ struct Compute : piko::Stage<0, 0, 64, Sample, Out>, piko::Uses<State> {
       w *= s.value;
     for (auto w = local.begin(); w != local.end(); ++w)
       sum += *w;
-    Range<const float> range{local.data() + 1, local.data() + (s.index & 3) + 1};
+    Range<const float> range{local.data() + 1,
+                             local.data() + (s.index & 3) + 1};
     for (float w : range)
       sum -= w;
     Entry copy = state().nested.entries[s.index % 3];
     copy.weight[1][s.index % 3] += 5;
     for (int i = 0; i < 2; ++i)
       for (int j = 0; j < 3; ++j)
-        sum += copy.weight[i][j] * state().nested.entries[j].weight[i][s.bytes[1]];
+        sum +=
+            copy.weight[i][j] * state().nested.entries[j].weight[i][s.bytes[1]];
     glm::vec3 r = copy.m * glm::vec3(s.v) + state().nested.entries[2].m[1];
-    return sum + glm::length(r) + table[s.index % 5] +
-           table[(s.bits >> 3) % 5];
+    return sum + glm::length(r) + table[s.index % 5] + table[(s.bits >> 3) % 5];
   }
 
   int64_t numbers(const Sample &s) {

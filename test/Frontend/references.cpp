@@ -22,8 +22,7 @@ struct Choose : piko::Stage<0, 0, 64, Item>, piko::Uses<State> {
   void process(const Item &item) {
     // CHECK-DAG: piko.load @items[%{{.*}} : i32] "value"
     // CHECK-DAG: piko.get %{{.*}} "value"
-    const Item &nearer =
-        item.index > 3 ? state().items[item.index] : item;
+    const Item &nearer = item.index > 3 ? state().items[item.index] : item;
     // CHECK: scf.while
     // CHECK: piko.load @weights "value"[%{{.*}}]
     float sum = std::max(nearer.value, 0.5f);
