@@ -3,6 +3,8 @@
 
 #include "ModuleBuilder.h"
 
+#include "ScalarImport.h"
+
 #include "Import.h"
 #include "Piko/Dialect/Piko/IR/Piko.h"
 
@@ -50,24 +52,6 @@ private:
                                         pipeline.records[record].name);
   }
 
-  mlir::Type getType(ScalarType type) {
-    switch (type) {
-    case ScalarType::F32:
-      return builder.getF32Type();
-    case ScalarType::F64:
-      return builder.getF64Type();
-    case ScalarType::I8:
-      return builder.getI8Type();
-    case ScalarType::I16:
-      return builder.getI16Type();
-    case ScalarType::I32:
-      return builder.getI32Type();
-    case ScalarType::I64:
-      return builder.getI64Type();
-    }
-    llvm_unreachable("all scalar types are listed");
-  }
-
   /// Bodies may name types that cross no edge and are not in the state.
   bool isUsed(const RecordDescription &record) {
     unsigned number = &record - pipeline.records.data();
@@ -83,9 +67,9 @@ private:
   void buildRecord(const RecordDescription &record) {
     llvm::SmallVector<mlir::Attribute> fields;
     for (const LeafField &field : record.fields)
-      fields.push_back(FieldAttr::get(&context, field.name, getType(field.type),
-                                      field.offset, field.counts,
-                                      field.strides));
+      fields.push_back(FieldAttr::get(
+          &context, field.name, getScalarType(builder, field.type),
+          field.offset, field.counts, field.strides));
     RecordOp::create(builder, pipeline.location, record.name,
                      builder.getArrayAttr(fields), record.size, record.align);
   }
@@ -117,7 +101,7 @@ private:
     size_t next = 0;
     for (const LeafField &field : pipeline.records[state.record].fields)
       for (int64_t i = 0, e = field.getElementCount(); i < e; ++i) {
-        mlir::Type type = getType(field.type);
+        mlir::Type type = getScalarType(builder, field.type);
         unsigned width = type.getIntOrFloatBitWidth();
         llvm::APInt bits(width, state.clear[next++]);
         if (auto real = llvm::dyn_cast<mlir::FloatType>(type))

@@ -20,13 +20,13 @@
 #include "Parse.h"
 
 #include "ClangDiagnostics.h"
+#include "ClangInvocation.h"
 #include "Wrappers.h"
 #include "clang/AST/ASTConsumer.h"
 #include "clang/AST/DeclTemplate.h"
 #include "clang/Basic/DiagnosticSema.h"
 #include "clang/Basic/TargetInfo.h"
 #include "clang/CodeGen/ModuleBuilder.h"
-#include "clang/Driver/CreateInvocationFromArgs.h"
 #include "clang/Frontend/CompilerInstance.h"
 #include "clang/Lex/Preprocessor.h"
 #include "clang/Lex/PreprocessorOptions.h"
@@ -50,48 +50,13 @@ static std::shared_ptr<clang::CompilerInvocation>
 makeInvocation(const ParseRequest &request,
                llvm::IntrusiveRefCntPtr<clang::DiagnosticsEngine> diagnostics) {
   const FrontendOptions &options = request.options;
-  std::string resourceDir = options.resourceDir.empty()
-                                ? PIKO_CLANG_RESOURCE_DIR
-                                : options.resourceDir;
-  std::string runtimeDir = options.runtimeIncludeDir.empty()
-                               ? PIKO_RUNTIME_INCLUDE_DIR
-                               : options.runtimeIncludeDir;
-  std::vector<std::string> arguments = {"clang++",
-                                        "-std=c++20",
-                                        "-fsyntax-only",
-                                        "-xc++",
-                                        "-resource-dir",
-                                        resourceDir,
-                                        "-isystem",
-                                        runtimeDir,
-                                        "-D__PIKO__=1",
-                                        "-DNDEBUG=1",
-                                        "-fno-exceptions",
-                                        "-fno-rtti",
-                                        "-O1",
-                                        "-ffp-contract=off",
-                                        "-fwrapv",
-                                        "-fno-finite-loops",
-                                        "-fno-math-errno",
-                                        "-fno-strict-aliasing",
-                                        "-gline-tables-only",
-                                        "-fno-access-control",
-                                        "-Wno-undefined-internal",
-                                        "-fno-strict-float-cast-overflow",
-                                        "-fno-threadsafe-statics"};
-  for (const std::string &directory : options.includeDirs)
-    arguments.push_back("-I" + directory);
-  for (const std::string &macro : options.defines)
-    arguments.push_back("-D" + macro);
-  arguments.push_back(mainName.str());
-
-  std::vector<const char *> argv;
-  for (const std::string &argument : arguments)
-    argv.push_back(argument.c_str());
-  clang::CreateInvocationOptions createOptions;
-  createOptions.Diags = diagnostics;
-  std::shared_ptr<clang::CompilerInvocation> invocation =
-      clang::createInvocation(argv, createOptions);
+  std::shared_ptr<clang::CompilerInvocation> invocation = createClangInvocation(
+      {"-D__PIKO__=1", "-DNDEBUG=1", "-fno-exceptions", "-fno-rtti", "-O1",
+       "-fwrapv", "-fno-finite-loops", "-fno-math-errno",
+       "-fno-strict-aliasing", "-gline-tables-only", "-fno-access-control",
+       "-Wno-undefined-internal", "-fno-strict-float-cast-overflow",
+       "-fno-threadsafe-statics"},
+      options, mainName, diagnostics);
   if (!invocation)
     return nullptr;
 

@@ -32,7 +32,7 @@ Type ScalarImporter::getType(llvm::Type *type) {
   return Type();
 }
 
-Type ScalarImporter::getType(ScalarType type) {
+Type piko::getScalarType(mlir::Builder &builder, ScalarType type) {
   switch (type) {
   case ScalarType::F32:
     return builder.getF32Type();
@@ -48,6 +48,10 @@ Type ScalarImporter::getType(ScalarType type) {
     return builder.getI64Type();
   }
   llvm_unreachable("all scalar types are listed");
+}
+
+Type ScalarImporter::getType(ScalarType type) {
+  return getScalarType(builder, type);
 }
 
 Value ScalarImporter::makeInteger(Type type, const llvm::APInt &value) {

@@ -11,6 +11,9 @@
 
 namespace piko {
 
+/// The type of a leaf field's numbers.
+mlir::Type getScalarType(mlir::Builder &builder, ScalarType type);
+
 using ValueMap = llvm::DenseMap<llvm::Value *, mlir::Value>;
 
 /// Writes instructions on numbers in arith and math. What LLVM leaves open is
