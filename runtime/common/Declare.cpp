@@ -155,4 +155,14 @@ void pikoir_declare_edge(pikort_pipeline *p, int32_t producer, int32_t port,
           [&] { p->edges.push_back({producer, port, consumer, false}); });
 }
 
+void pikoir_declare_schedule(pikort_pipeline *p, int32_t stage, int64_t batch,
+                             int32_t everyBin) {
+  guarded(p, "setup",
+          [&] { p->schedules.push_back({stage, batch, everyBin != 0}); });
+}
+
+void pikoir_declare_wait(pikort_pipeline *p, int32_t stage, int32_t waitsFor) {
+  guarded(p, "setup", [&] { p->waits.push_back({stage, waitsFor}); });
+}
+
 } // extern "C"

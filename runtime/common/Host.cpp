@@ -162,6 +162,15 @@ int32_t pikort_set_memory_limit(pikort_pipeline *p, int64_t bytes) {
   });
 }
 
+int32_t pikort_set_loop_limit(pikort_pipeline *p, int64_t limit) {
+  return call(p, [&] {
+    if (limit < 0)
+      invalid("expected a loop limit of at least 0, but got " +
+              std::to_string(limit));
+    p->loopLimit = limit;
+  });
+}
+
 // --- State and sources ------------------------------------------------------
 
 int32_t pikort_bind_constant(pikort_pipeline *p, const char *name,

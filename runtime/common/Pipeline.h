@@ -60,6 +60,17 @@ struct Edge {
   bool keyed = false; ///< Its primitives carry lineage keys.
 };
 
+/// What was said of a list stage, or of one of its bins.
+struct ListSchedule {
+  int32_t stage;
+  int64_t batch; ///< 0 = the whole list.
+  bool everyBin;
+};
+
+struct Wait {
+  int32_t stage, waitsFor;
+};
+
 struct Source {
   bool declared = false;
   int32_t stage = 0;
@@ -122,12 +133,15 @@ struct pikort_pipeline {
   std::vector<piko::rt::Stage> stages;
   std::vector<piko::rt::Source> sources;
   std::vector<piko::rt::Edge> edges;
+  std::vector<piko::rt::ListSchedule> schedules;
+  std::vector<piko::rt::Wait> waits;
   std::vector<int32_t> order; ///< Stages, producers first.
   int32_t (*runProgram)(pikort_pipeline *) = nullptr;
 
   bool ready = false; ///< finish() succeeded.
   std::array<int64_t, 4> domain{0, 1, 1, 1};
   int32_t threads = 1;
+  int64_t loopLimit = int64_t(1) << 20; ///< Of hops and of rounds.
 
   std::vector<piko::rt::KernelStats> kernelStats;
   std::vector<piko::rt::StageStats> stageStats;

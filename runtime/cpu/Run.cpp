@@ -60,7 +60,9 @@ static void publish(const pikort_pipeline &p, Kernel &kernel) {
                   kernel.offsets.data(),
                   kernel.units.data(),
                   static_cast<int64_t>(kernel.units.size()),
-                  kernel.source >= 0 ? 1 : stage.tiles};
+                  kernel.source >= 0 ? 1 : stage.tiles,
+                  nullptr,
+                  0};
 }
 
 /// Units for the AssignBin of a source: any chunks will do.

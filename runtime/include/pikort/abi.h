@@ -13,6 +13,12 @@
 //                       pikoir_next(w);
 //   pikoir_close(w);
 //
+// Where Process takes a list (PIKOIR_LIST), the unit's calls take the place of
+// its positions. The stages of a cycle run in the order that the runtime says:
+//
+//   while ((s = pikoir_cycle_step(p, first)) >= 0)
+//     if (int32_t status = kernel[s](p)) return status;
+//
 // Every unit is opened exactly once, by any thread; a writer stays on the
 // thread that opened it. The runtime restores lineage order at the join, so
 // that no result depends on the number of threads or on how units are cut.
@@ -33,10 +39,14 @@ extern "C" {
 
 /// Flags of a stage.
 enum pikoir_stage_flags {
-  PIKOIR_COLLECTS = 1, ///< Emissions start a new lineage (bin, ordinal).
-  PIKOIR_SPLIT = 2,    ///< A bin may be cut into chunks of primitives.
-  PIKOIR_PLACED = 4,   ///< AssignBin places; else all are in bin 0, cell 0.
-  PIKOIR_UNORDERED = 8 ///< The order of its input and output is free.
+  PIKOIR_COLLECTS = 1,  ///< Emissions start a new lineage (bin, ordinal).
+  PIKOIR_SPLIT = 2,     ///< A bin may be cut into chunks of primitives.
+  PIKOIR_PLACED = 4,    ///< AssignBin places; else all are in bin 0, cell 0.
+  PIKOIR_UNORDERED = 8, ///< The order of its input and output is free.
+  PIKOIR_LIST = 16,     ///< Process takes a list; it collects.
+  PIKOIR_ORDERED = 32   ///< The order of its calls in a bin can be seen, as by
+                        ///< updates of pixels: one unit runs a bin's (with
+                        ///< owner tiles, a tile's) positions in order.
 };
 
 enum pikoir_schedule {
@@ -73,6 +83,15 @@ PIKORT_API void pikoir_declare_source(pikort_pipeline *p, int32_t index,
                                       int32_t stage);
 PIKORT_API void pikoir_declare_edge(pikort_pipeline *p, int32_t producer,
                                     int32_t port, int32_t consumer);
+/// Of a LIST stage: how many primitives a call gets, 0 = the whole list, and
+/// whether bins without primitives are called too. Without this declaration: 0
+/// and no.
+PIKORT_API void pikoir_declare_schedule(pikort_pipeline *p, int32_t stage,
+                                        int64_t batch, int32_t every_bin);
+/// `stage` waits until `waits_for` is finished (endStage). Lineage roots follow
+/// the order of stages, for which waits count like edges.
+PIKORT_API void pikoir_declare_wait(pikort_pipeline *p, int32_t stage,
+                                    int32_t waits_for);
 
 // --- queries ----------------------------------------------------------------
 
@@ -97,12 +116,22 @@ PIKORT_API int32_t pikoir_status(pikort_pipeline *p);
 /// Positions [begin, end), which lie in cells [cell_begin, cell_end). A unit
 /// has several cells only if it has them whole; units partition the positions
 /// in order. For a stage that collects they cover all cells, empty ones too.
+/// In a LIST stage cell_begin and cell_end are indices of calls, and units
+/// partition the calls; those of one bin are in one unit unless it is SPLIT.
 typedef struct pikoir_unit {
   int64_t cell_begin;
   int64_t cell_end;
   int64_t begin;
   int64_t end;
 } pikoir_unit;
+
+/// A call of a Process that takes a list: positions [begin, end), which are in
+/// `bin`; none for a bin that is called though it is empty.
+typedef struct pikoir_call {
+  int64_t bin;
+  int64_t begin;
+  int64_t end;
+} pikoir_call;
 
 /// A stage's input: valid until pikoir_end.
 typedef struct pikoir_input {
@@ -113,6 +142,9 @@ typedef struct pikoir_input {
   const pikoir_unit *units;
   int64_t unit_count;
   int64_t tiles; ///< Cells in a bin.
+  /// Of a LIST stage, in order of bin and batch; null and 0 for all others.
+  const pikoir_call *calls;
+  int64_t call_count;
 } pikoir_input;
 
 /// One port of a writer. The fields up to `cells` are the fast path's: see the
@@ -140,7 +172,8 @@ typedef struct pikoir_port {
 enum pikoir_port_flags {
   PIKOIR_PORT_ORDINALS = 1, ///< Each kept record notes its ordinal.
   PIKOIR_PORT_COUNTS = 2,   ///< Each position notes its number of records.
-  PIKOIR_PORT_SOURCE = 4    ///< Cells of a source's primitives, no records.
+  PIKOIR_PORT_SOURCE = 4,   ///< Cells of a source's primitives, no records.
+  PIKOIR_PORT_DEFERRED = 8  ///< Between pikoir_defer_begin and _end.
 };
 
 typedef struct pikoir_writer {
@@ -166,11 +199,30 @@ PIKORT_API uint8_t *pikoir_append(pikoir_writer *writer, int32_t port);
 /// Puts the port's latest record in a cell of the consumer. A cell named twice
 /// counts once. A cell outside the grid is a PIKORT_BIN_OUTSIDE error.
 PIKORT_API void pikoir_place(pikoir_writer *writer, int32_t port, int64_t cell);
-/// Ends a position.
+/// Ends a position; in a LIST stage, a call.
 PIKORT_API void pikoir_next(pikoir_writer *writer);
 PIKORT_API void pikoir_close(pikoir_writer *writer);
 /// Ends the kernel: 0, or the status of the first error in it.
 PIKORT_API int32_t pikoir_end(pikort_pipeline *p, int32_t stage);
+
+/// Emissions of iterations that meet barriers. From defer_begin to defer_end,
+/// appends and places belong to the iteration that was named last, in [0,
+/// iterations), and an iteration may be named many times, in any order. At the
+/// end all are emitted in order of iteration, and within one in the order of
+/// the calls. They do not nest.
+PIKORT_API void pikoir_defer_begin(pikoir_writer *writer, int64_t iterations);
+PIKORT_API void pikoir_defer_iteration(pikoir_writer *writer,
+                                       int64_t iteration);
+PIKORT_API void pikoir_defer_end(pikoir_writer *writer);
+
+/// `bytes` of memory for a call of Process, aligned to 64 bytes and not
+/// initialised; never null for 0 bytes. Null if memory is refused, or if the
+/// size is negative or too large: that is reported, as by pikoir_fail, and the
+/// call must go on without. Memory is freed last in, first out: release frees
+/// what was taken since the mark. What is left is freed by pikoir_close.
+PIKORT_API void *pikoir_scratch(pikoir_writer *writer, int64_t bytes);
+PIKORT_API int64_t pikoir_scratch_mark(pikoir_writer *writer);
+PIKORT_API void pikoir_scratch_release(pikoir_writer *writer, int64_t mark);
 
 /// The AssignBin kernel of a source whose consumer is PLACED. The primitives
 /// stay where the host has them. There is one pikoir_next for each.
@@ -180,6 +232,24 @@ PIKORT_API pikoir_writer *pikoir_open_source(pikort_pipeline *p, int32_t source,
                                              int64_t unit);
 PIKORT_API void pikoir_place_source(pikoir_writer *writer, int64_t cell);
 PIKORT_API int32_t pikoir_end_source(pikort_pipeline *p, int32_t source);
+
+/// Schedules that depend on the bin: before any kernel, begin_schedule, which
+/// returns the stage's number of bins, then schedule_bin for each of them, from
+/// one thread. `batch` is as declared, or PIKOIR_NO_BATCH; any other below 1,
+/// and a negative tile_split, is an error of the run. Bins that are not named
+/// keep what the stage declares.
+#define PIKOIR_NO_BATCH INT64_MIN
+PIKORT_API int64_t pikoir_begin_schedule(pikort_pipeline *p, int32_t stage);
+PIKORT_API void pikoir_schedule_bin(pikort_pipeline *p, int32_t stage,
+                                    int64_t bin, int32_t kind,
+                                    int64_t tile_split, int64_t batch,
+                                    int32_t every_bin);
+
+/// The stage of a cycle whose kernel is to run next, or -1 when the cycle has
+/// come to its end, or on an error (pikoir_status). `stage` is any stage of the
+/// cycle. Call it until it returns -1; the AssignBin kernels of sources that
+/// feed the cycle run before.
+PIKORT_API int32_t pikoir_cycle_step(pikort_pipeline *p, int32_t stage);
 
 /// Reports an error of generated code; thread safe, and does not return a
 /// value: the kernel goes on and pikoir_end returns `code`, a pikort_status.
@@ -196,6 +266,8 @@ PIKORT_API void pikoir_fail(pikort_pipeline *p, int32_t stage, int32_t code,
 /// What the host bound to a source; `count` gets the number of primitives.
 PIKORT_API const void *pikoir_get_source(pikort_pipeline *p, int32_t source,
                                          int64_t *count);
+/// The host's limit of hops and rounds.
+PIKORT_API int64_t pikoir_loop_limit(pikort_pipeline *p);
 /// Ends the run with an error in the program's own words; returns the status.
 /// Not from a kernel's loop.
 PIKORT_API int32_t pikoir_fail_text(pikort_pipeline *p, int32_t code,
@@ -238,23 +310,72 @@ static inline void pikoir_next_inline(pikoir_writer *writer) {
     pikoir_next(writer);
 }
 
+// --- layout -----------------------------------------------------------------
+
 #ifdef __cplusplus
-static_assert(sizeof(void *) == 8, "the runtime needs 64-bit pointers");
-static_assert(sizeof(pikoir_state) == 40, "pikoir_state changed");
-static_assert(sizeof(pikoir_unit) == 32, "pikoir_unit changed");
-static_assert(sizeof(pikoir_input) == 56, "pikoir_input changed");
-static_assert(sizeof(pikoir_port) == 120, "pikoir_port changed");
-static_assert(sizeof(pikoir_writer) == 32, "pikoir_writer changed");
-static_assert(sizeof(pikort_program) == 32, "pikort_program changed");
-} // extern "C"
+#define PIKOIR_ASSERT(condition, text) static_assert(condition, text)
 #else
-_Static_assert(sizeof(void *) == 8, "the runtime needs 64-bit pointers");
-_Static_assert(sizeof(pikoir_state) == 40, "pikoir_state changed");
-_Static_assert(sizeof(pikoir_unit) == 32, "pikoir_unit changed");
-_Static_assert(sizeof(pikoir_input) == 56, "pikoir_input changed");
-_Static_assert(sizeof(pikoir_port) == 120, "pikoir_port changed");
-_Static_assert(sizeof(pikoir_writer) == 32, "pikoir_writer changed");
-_Static_assert(sizeof(pikort_program) == 32, "pikort_program changed");
+#define PIKOIR_ASSERT(condition, text) _Static_assert(condition, text)
+#endif
+#define PIKOIR_ASSERT_SIZE(type, bytes)                                        \
+  PIKOIR_ASSERT(sizeof(type) == (bytes), #type " changed")
+#define PIKOIR_ASSERT_OFFSET(type, member, bytes)                              \
+  PIKOIR_ASSERT(offsetof(type, member) == (bytes), #type "." #member " moved")
+
+PIKOIR_ASSERT(sizeof(void *) == 8, "the runtime needs 64-bit pointers");
+PIKOIR_ASSERT_SIZE(pikort_program, 32);
+PIKOIR_ASSERT_OFFSET(pikort_program, abi_version, 0);
+PIKOIR_ASSERT_OFFSET(pikort_program, name, 8);
+PIKOIR_ASSERT_OFFSET(pikort_program, setup, 16);
+PIKOIR_ASSERT_OFFSET(pikort_program, run, 24);
+PIKOIR_ASSERT_SIZE(pikoir_state, 40);
+PIKOIR_ASSERT_OFFSET(pikoir_state, data, 0);
+PIKOIR_ASSERT_OFFSET(pikoir_state, extent, 8);
+PIKOIR_ASSERT_SIZE(pikoir_unit, 32);
+PIKOIR_ASSERT_OFFSET(pikoir_unit, cell_begin, 0);
+PIKOIR_ASSERT_OFFSET(pikoir_unit, cell_end, 8);
+PIKOIR_ASSERT_OFFSET(pikoir_unit, begin, 16);
+PIKOIR_ASSERT_OFFSET(pikoir_unit, end, 24);
+PIKOIR_ASSERT_SIZE(pikoir_call, 24);
+PIKOIR_ASSERT_OFFSET(pikoir_call, bin, 0);
+PIKOIR_ASSERT_OFFSET(pikoir_call, begin, 8);
+PIKOIR_ASSERT_OFFSET(pikoir_call, end, 16);
+PIKOIR_ASSERT_SIZE(pikoir_input, 72);
+PIKOIR_ASSERT_OFFSET(pikoir_input, items, 0);
+PIKOIR_ASSERT_OFFSET(pikoir_input, count, 8);
+PIKOIR_ASSERT_OFFSET(pikoir_input, order, 16);
+PIKOIR_ASSERT_OFFSET(pikoir_input, offsets, 24);
+PIKOIR_ASSERT_OFFSET(pikoir_input, units, 32);
+PIKOIR_ASSERT_OFFSET(pikoir_input, unit_count, 40);
+PIKOIR_ASSERT_OFFSET(pikoir_input, tiles, 48);
+PIKOIR_ASSERT_OFFSET(pikoir_input, calls, 56);
+PIKOIR_ASSERT_OFFSET(pikoir_input, call_count, 64);
+PIKOIR_ASSERT_SIZE(pikoir_port, 120);
+PIKOIR_ASSERT_OFFSET(pikoir_port, cursor, 0);
+PIKOIR_ASSERT_OFFSET(pikoir_port, limit, 8);
+PIKOIR_ASSERT_OFFSET(pikoir_port, size, 16);
+PIKOIR_ASSERT_OFFSET(pikoir_port, emitted, 24);
+PIKOIR_ASSERT_OFFSET(pikoir_port, kept, 32);
+PIKOIR_ASSERT_OFFSET(pikoir_port, cell_cursor, 40);
+PIKOIR_ASSERT_OFFSET(pikoir_port, cell_end, 48);
+PIKOIR_ASSERT_OFFSET(pikoir_port, last_cell, 56);
+PIKOIR_ASSERT_OFFSET(pikoir_port, cells, 64);
+PIKOIR_ASSERT_OFFSET(pikoir_port, run, 96);
+PIKOIR_ASSERT_OFFSET(pikoir_port, flags, 116);
+PIKOIR_ASSERT_SIZE(pikoir_writer, 32);
+PIKOIR_ASSERT_OFFSET(pikoir_writer, unit, 0);
+PIKOIR_ASSERT_OFFSET(pikoir_writer, ordinal, 8);
+PIKOIR_ASSERT_OFFSET(pikoir_writer, flags, 12);
+PIKOIR_ASSERT_OFFSET(pikoir_writer, port_count, 16);
+PIKOIR_ASSERT_OFFSET(pikoir_writer, stage, 20);
+PIKOIR_ASSERT_OFFSET(pikoir_writer, ports, 24);
+
+#undef PIKOIR_ASSERT_OFFSET
+#undef PIKOIR_ASSERT_SIZE
+#undef PIKOIR_ASSERT
+
+#ifdef __cplusplus
+} // extern "C"
 #endif
 
 #endif // PIKORT_ABI_H

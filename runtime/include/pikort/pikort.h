@@ -24,7 +24,7 @@ extern "C" {
 #endif
 
 /// Changes whenever generated code and runtime would no longer fit together.
-#define PIKORT_ABI_VERSION 1u
+#define PIKORT_ABI_VERSION 2u
 
 #if defined(_WIN32)
 #define PIKORT_API
@@ -86,6 +86,11 @@ PIKORT_API int32_t pikort_set_threads(pikort_pipeline *pipeline,
 /// more ends with PIKORT_OUT_OF_MEMORY.
 PIKORT_API int32_t pikort_set_memory_limit(pikort_pipeline *pipeline,
                                            int64_t bytes);
+/// Limits how many hops a primitive makes on a cycle of stages, and how many
+/// rounds a cycle runs; at least 0. A run that needs more ends with
+/// PIKORT_ENDLESS. Not called: 2^20.
+PIKORT_API int32_t pikort_set_loop_limit(pikort_pipeline *pipeline,
+                                         int64_t limit);
 
 // --- State and sources ------------------------------------------------------
 

@@ -85,6 +85,9 @@ public:
   Status memoryLimit(int64_t bytes) {
     return status(pikort_set_memory_limit(handle_, bytes));
   }
+  Status loopLimit(int64_t limit) {
+    return status(pikort_set_loop_limit(handle_, limit));
+  }
   template <class T> Status constant(const char *name, const T &value) {
     static_assert(std::is_trivially_copyable_v<T>);
     return status(pikort_bind_constant(handle_, name, &value, sizeof(T)));
