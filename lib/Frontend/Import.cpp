@@ -320,8 +320,9 @@ private:
     }
     if (failed(getPlace(call, 5, place)))
       return failure();
-    AtomicOp::create(builder, *location, getAtomicKind(call), place.state->name,
-                     place.indices, place.field, place.elements,
+    AtomicOp::create(builder, *location, /*old=*/mlir::Type(),
+                     getAtomicKind(call), place.state->name, place.indices,
+                     place.field, place.elements,
                      scalars.get(call->getArgOperand(4)));
     return success();
   }

@@ -122,7 +122,8 @@ private:
         builder, stage.location, builder.getStringAttr(stage.symbol),
         builder.getDenseI64ArrayAttr(stage.bins),
         builder.getI64IntegerAttr(stage.threads), getRecordName(stage.input),
-        builder.getArrayAttr(outputs), /*lineage=*/nullptr, /*tile=*/nullptr);
+        builder.getArrayAttr(outputs), /*lineage=*/nullptr, /*tile=*/nullptr,
+        /*cycle=*/nullptr);
     builder.createBlock(&op.getBody());
     if (stage.hasAssign) {
       auto assign =

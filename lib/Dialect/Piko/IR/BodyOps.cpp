@@ -54,6 +54,14 @@ void GetOp::getCanonicalizationPatterns(RewritePatternSet &patterns,
   patterns.add<ForwardAppended>(context);
 }
 
+LogicalResult ListAtOp::verify() {
+  if (getPrim().getType().getRecord() != getList().getType().getRecord())
+    return emitOpError("expected a primitive of record ")
+           << getList().getType().getRecord() << ", but got "
+           << getPrim().getType().getRecord();
+  return success();
+}
+
 LogicalResult EmitOp::verify() {
   auto process = (*this)->getParentOfType<ProcessOp>();
   if (!process)

@@ -141,7 +141,7 @@ StageOp piko::getPhaseStage(Operation *op) {
       name = assign.getStageAttr();
     else if (auto process = dyn_cast<ProcessOp>(at))
       name = process.getStageAttr();
-    else
+    else if (!isa<ScheduleOp>(at))
       continue;
     return name ? lookupInPipeline<StageOp>(at, name)
                 : dyn_cast_or_null<StageOp>(at->getParentOp());

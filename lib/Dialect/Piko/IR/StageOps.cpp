@@ -21,12 +21,18 @@ bool StageOp::isWholeDomain() {
   return llvm::all_of(getBins(), [](int64_t extent) { return extent == 0; });
 }
 
+Type StageOp::getProcessType() {
+  if (getTakesList())
+    return ListType::get(getContext(), getInputAttr());
+  return PrimType::get(getContext(), getInputAttr());
+}
+
 bool StageOp::collects() {
   ScheduleOp schedule = getSchedule();
-  return schedule &&
-         (schedule.getEndBin() || schedule.getBatch() ||
-          schedule.getEveryBin() ||
-          (schedule.getEndStageAttr() && !schedule.getEndStageAttr().empty()));
+  return getTakesList() ||
+         (schedule &&
+          (schedule.getEndBin() || (schedule.getEndStageAttr() &&
+                                    !schedule.getEndStageAttr().empty())));
 }
 
 LogicalResult StageOp::verifySymbolUses(SymbolTableCollection &) {
@@ -73,6 +79,12 @@ LogicalResult ScheduleOp::verifySymbolUses(SymbolTableCollection &) {
   if (getTileSplit() && getKind() != ScheduleKind::All)
     return emitOpError("expected tile_split only with 'all', but got '")
            << stringifyScheduleKind(getKind()) << "'";
+  auto owner = cast<StageOp>((*this)->getParentOp());
+  if ((getBatch() || getEveryBin()) && !owner.getTakesList())
+    return emitOpError("expected ")
+           << (getBatch() ? "batch" : "every_bin")
+           << " only in a stage that takes a list, but '" << owner.getSymName()
+           << "' does not";
   if (!getEndStageAttr())
     return success();
   for (auto name : getEndStageAttr().getAsRange<FlatSymbolRefAttr>()) {
@@ -87,8 +99,43 @@ LogicalResult ScheduleOp::verifySymbolUses(SymbolTableCollection &) {
   return success();
 }
 
+LogicalResult ScheduleOp::verifyRegions() {
+  if (getBody().empty())
+    return success();
+  Block &body = getBody().front();
+  if (body.getNumArguments() != 1 || !body.getArgument(0).getType().isIndex())
+    return emitOpError("expected one block argument of type 'index'");
+  if (!isa<ReturnOp>(body.getTerminator()))
+    return emitOpError("expected its body to end with piko.return");
+  // It runs before the pipeline does.
+  WalkResult result = walk([&](LoadOp load) {
+    if (lookupInPipeline<ConstantOp>(load, load.getStateAttr()))
+      return WalkResult::advance();
+    load.emitOpError("expected a schedule to read constants only, but got ")
+        << load.getStateAttr();
+    return WalkResult::interrupt();
+  });
+  return failure(result.wasInterrupted());
+}
+
+static LogicalResult verifyInSchedule(Operation *op, bool needsList) {
+  auto schedule = op->getParentOfType<ScheduleOp>();
+  if (!schedule)
+    return op->emitOpError("expected to be inside a dynamic schedule");
+  auto stage = cast<StageOp>(schedule->getParentOp());
+  if (needsList && !stage.getTakesList())
+    return op->emitOpError("expected to be in a stage that takes a list, but '")
+           << stage.getSymName() << "' does not";
+  return success();
+}
+
+LogicalResult SetScheduleOp::verify() { return verifyInSchedule(*this, false); }
+LogicalResult SetBatchOp::verify() { return verifyInSchedule(*this, true); }
+LogicalResult SetEveryBinOp::verify() { return verifyInSchedule(*this, true); }
+
 /// A phase outside a stage names its stage; inside one, that one is meant.
-template <typename PhaseOp> static LogicalResult verifyPhase(PhaseOp phase) {
+template <typename PhaseOp>
+static LogicalResult verifyPhase(PhaseOp phase, bool isProcess) {
   Operation *parent = phase->getParentOp();
   if (isa<StageOp>(parent) == bool(phase.getStageAttr()))
     return phase.emitOpError(
@@ -98,7 +145,9 @@ template <typename PhaseOp> static LogicalResult verifyPhase(PhaseOp phase) {
     return phase.emitOpError("expected a stage, but got ")
            << phase.getStageAttr() << ", which is none";
   Block &body = phase.getBody().front();
-  auto expected = PrimType::get(phase.getContext(), stage.getInputAttr());
+  Type expected = isProcess
+                      ? stage.getProcessType()
+                      : PrimType::get(phase.getContext(), stage.getInputAttr());
   if (body.getNumArguments() != 1 || body.getArgument(0).getType() != expected)
     return phase.emitOpError("expected one block argument of type ")
            << expected;
@@ -111,11 +160,11 @@ LogicalResult AssignOp::verifyRegions() {
           : getPort().has_value() == getSource().has_value())
     return emitOpError("expected a port or a source inside a kernel, and "
                        "neither inside a stage");
-  return verifyPhase(*this);
+  return verifyPhase(*this, /*isProcess=*/false);
 }
 
 LogicalResult ProcessOp::verifyRegions() {
-  if (failed(verifyPhase(*this)))
+  if (failed(verifyPhase(*this, /*isProcess=*/true)))
     return failure();
   // Its size would have to be found anew, and stack taken, for each primitive.
   WalkResult result = walk([](Operation *op) {

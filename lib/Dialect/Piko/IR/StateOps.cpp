@@ -51,6 +51,24 @@ LogicalResult StoreOp::verifySymbolUses(SymbolTableCollection &) {
 }
 
 LogicalResult AtomicOp::verifySymbolUses(SymbolTableCollection &) {
+  bool isFloat = isa<FloatType>(getValue().getType());
+  if (isFloat != (getKind() == AtomicKind::AddF))
+    return emitOpError("expected a ")
+           << (isFloat ? "float only for 'add_float'" : "float for 'add_float'")
+           << ", but got '" << stringifyAtomicKind(getKind()) << "' of type "
+           << getValue().getType();
+  if (getOld() && getOld().getType() != getValue().getType())
+    return emitOpError("expected a result of type ")
+           << getValue().getType() << ", but got " << getOld().getType();
+  // The stage is known until its phases have become kernels.
+  if (StageOp stage = getPhaseStage(*this); stage && (getOld() || isFloat)) {
+    ScheduleOp schedule = stage.getSchedule();
+    if (!schedule || !schedule.getUnordered())
+      return emitOpError("expected stage '")
+             << stage.getSymName() << "' to be unordered, because "
+             << (getOld() ? "the result of an atomic" : "a float atomic")
+             << " shows the order of its primitives";
+  }
   return verifyWrite(*this, getValue().getType());
 }
 

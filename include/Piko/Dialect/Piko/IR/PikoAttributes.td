@@ -41,7 +41,7 @@ def Piko_ScheduleKind : I32EnumAttr<"ScheduleKind", "where bins run", [
   let cppNamespace = "::piko";
 }
 
-def Piko_AtomicKind : I32EnumAttr<"AtomicKind", "integer atomic operation", [
+def Piko_AtomicKind : I32EnumAttr<"AtomicKind", "atomic operation", [
   I32EnumAttrCase<"Add", 0, "add">,
   I32EnumAttrCase<"MinS", 1, "min_signed">,
   I32EnumAttrCase<"MaxS", 2, "max_signed">,
@@ -49,7 +49,8 @@ def Piko_AtomicKind : I32EnumAttr<"AtomicKind", "integer atomic operation", [
   I32EnumAttrCase<"MaxU", 4, "max_unsigned">,
   I32EnumAttrCase<"And", 5, "and">,
   I32EnumAttrCase<"Or", 6, "or">,
-  I32EnumAttrCase<"Xor", 7, "xor">]> {
+  I32EnumAttrCase<"Xor", 7, "xor">,
+  I32EnumAttrCase<"AddF", 8, "add_float">]> {
   let cppNamespace = "::piko";
 }
 

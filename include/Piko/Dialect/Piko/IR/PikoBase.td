@@ -45,6 +45,11 @@ def Piko_Scalar : AnyTypeOf<[F32, F64, I1, I8, I16, I32, I64],
 /// A cell coordinate, as C++ code computes it.
 def Piko_Coordinate : AnyTypeOf<[I32, I64, Index], "cell coordinate">;
 
+/// Memory of a size that is known at run time.
+def Piko_Bytes : MemRefRankOf<[I8], [1]>,
+                 BuildableType<"::mlir::MemRefType::get("
+                     "{::mlir::ShapedType::kDynamic}, $_builder.getI8Type())">;
+
 /// A 64-bit integer that C++ reads as int64_t: sizes and numbers are compared
 /// with other signed ones.
 def Piko_I64Attr : TypedAttrBase<I64, "IntegerAttr",

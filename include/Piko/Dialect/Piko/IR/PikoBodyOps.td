@@ -33,6 +33,37 @@ def Piko_GetOp : Piko_Op<"get", [
   let hasCanonicalizer = 1;
 }
 
+def Piko_ListSizeOp : Piko_Op<"list_size", [Pure]> {
+  let summary = "how many primitives a list has";
+  let description = [{
+    ```mlir
+    %n = piko.list_size %list : !piko.list<@Fragment>
+    ```
+  }];
+  let arguments = (ins Piko_ListType:$list);
+  let results = (outs Index:$result);
+  let assemblyFormat = "$list attr-dict `:` qualified(type($list))";
+}
+
+def Piko_ListAtOp : Piko_Op<"list_at", [MemoryEffects<[MemRead]>]> {
+  let summary = "a primitive of a list";
+  let description = [{
+    An index outside the list is an error when the pipeline runs; `checked` says
+    that the test for it is already there.
+
+    ```mlir
+    %f = piko.list_at %list[%i] : !piko.list<@Fragment> -> !piko.prim<@Fragment>
+    ```
+  }];
+  let arguments = (ins UnitAttr:$checked, Piko_ListType:$list, Index:$index);
+  let results = (outs Piko_PrimType:$prim);
+  let assemblyFormat = [{
+    (`checked` $checked^)? $list `[` $index `]` attr-dict
+    `:` qualified(type($list)) `->` qualified(type($prim))
+  }];
+  let hasVerifier = 1;
+}
+
 def Piko_EmitOp : Piko_Op<"emit"> {
   let summary = "sends a primitive out of a port";
   let description = [{

@@ -14,11 +14,13 @@ def Piko_KernelOp : Piko_Op<"kernel", [
   let summary = "phases that run together";
   let description = [{
     Kernels run one after another, in the order in which they stand in the
-    pipeline; a kernel starts when the one before it has ended. At the kernels
+    pipeline; a kernel starts when the one before it has ended. Kernels of stages
+    on a common cycle run again and again, until nothing is left of it. At the kernels
     level the body holds phases: the process phase of a stage and the assign
     phases of the stages that it feeds, or the assign phase of a source. At the
     resolved level it holds loops over the units of work of a stage's bins, the
-    first of which is an `scf.forall`, and no phase.
+    first of which is an `scf.forall`, and no phase. The kernel of a dynamic
+    schedule is a loop over bins and runs before all others.
 
     ```mlir
     piko.record @F {"x" : i32 at 0} size 4 align 4
@@ -111,7 +113,8 @@ def Piko_UnitCountOp : Piko_Op<"unit_count", [Pure]> {
 def Piko_UnitCellsOp : Piko_Op<"unit_cells", [Pure]> {
   let summary = "the cells of a unit of work";
   let description = [{
-    The range is half open.
+    The range is half open. Of a stage that takes lists it is the calls of its
+    process phase.
 
     ```mlir
     %c0, %c1 = piko.unit_cells %bins[%unit] : !piko.bins<@Fragment>
@@ -148,6 +151,48 @@ def Piko_CellBinOp : Piko_Op<"cell_bin", [Pure]> {
   let arguments = (ins Piko_BinsType:$bins, Index:$cell);
   let results = (outs Index:$result);
   let assemblyFormat = "$bins `[` $cell `]` attr-dict `:` qualified(type($bins))";
+}
+
+def Piko_CallRangeOp : Piko_Op<"call_range", [Pure]> {
+  let summary = "the positions that a call of a list Process is for";
+  let description = [{
+    A call is for a bin, or for a batch of it. The range is half open, and empty
+    for an empty bin that runs nevertheless.
+
+    ```mlir
+    %lo, %hi = piko.call_range %bins[%call] : !piko.bins<@Fragment>
+    ```
+  }];
+  let arguments = (ins Piko_BinsType:$bins, Index:$call);
+  let results = (outs Index:$begin, Index:$end);
+  let assemblyFormat = "$bins `[` $call `]` attr-dict `:` qualified(type($bins))";
+}
+
+def Piko_CallBinOp : Piko_Op<"call_bin", [Pure]> {
+  let summary = "the bin that a call of a list Process is for";
+  let description = [{
+    ```mlir
+    %b = piko.call_bin %bins[%call] : !piko.bins<@Fragment>
+    ```
+  }];
+  let arguments = (ins Piko_BinsType:$bins, Index:$call);
+  let results = (outs Index:$result);
+  let assemblyFormat = "$bins `[` $call `]` attr-dict `:` qualified(type($bins))";
+}
+
+def Piko_ListOp : Piko_Op<"list", [Pure]> {
+  let summary = "the primitives at consecutive positions";
+  let description = [{
+    ```mlir
+    %l = piko.list %bins[%lo to %hi] : !piko.bins<@Fragment> -> !piko.list<@Fragment>
+    ```
+  }];
+  let arguments = (ins Piko_BinsType:$bins, Index:$begin, Index:$end);
+  let results = (outs Piko_ListType:$list);
+  let assemblyFormat = [{
+    $bins `[` $begin `to` $end `]` attr-dict
+    `:` qualified(type($bins)) `->` qualified(type($list))
+  }];
 }
 
 def Piko_ItemOp : Piko_Op<"item", [Pure]> {
@@ -236,6 +281,97 @@ def Piko_NextOp : Piko_Op<"next"> {
   }];
   let arguments = (ins Piko_WriterType:$writer);
   let assemblyFormat = "$writer attr-dict";
+}
+
+def Piko_DeferBeginOp : Piko_Op<"defer_begin"> {
+  let summary = "what iterations emit is put in their order later";
+  let description = [{
+    From here to `piko.defer_end`, primitives are kept for each of so many
+    iterations; there they follow each other by iteration, then as they came.
+
+    ```mlir
+    piko.defer_begin %writer[%n]
+    ```
+  }];
+  let arguments = (ins Piko_WriterType:$writer, Index:$iterations);
+  let assemblyFormat = "$writer `[` $iterations `]` attr-dict";
+}
+
+def Piko_DeferIterationOp : Piko_Op<"defer_iteration"> {
+  let summary = "all that follows comes from this iteration";
+  let description = [{
+    ```mlir
+    piko.defer_iteration %writer[%i]
+    ```
+  }];
+  let arguments = (ins Piko_WriterType:$writer, Index:$iteration);
+  let assemblyFormat = "$writer `[` $iteration `]` attr-dict";
+}
+
+def Piko_DeferEndOp : Piko_Op<"defer_end"> {
+  let summary = "emits what iterations have kept";
+  let description = [{
+    ```mlir
+    piko.defer_end %writer
+    ```
+  }];
+  let arguments = (ins Piko_WriterType:$writer);
+  let assemblyFormat = "$writer attr-dict";
+}
+
+def Piko_ScratchMarkOp : Piko_Op<"scratch_mark"> {
+  let summary = "how much scratch memory is in use";
+  let description = [{
+    ```mlir
+    %mark = piko.scratch_mark %writer
+    ```
+  }];
+  let arguments = (ins Piko_WriterType:$writer);
+  let results = (outs I64:$mark);
+  let assemblyFormat = "$writer attr-dict";
+}
+
+def Piko_ScratchOp : Piko_Op<"scratch"> {
+  let summary = "takes scratch memory of so many bytes";
+  let description = [{
+    The second result is false where there was none: the run then ends with an
+    error, and the memory must not be used.
+
+    ```mlir
+    %bytes, %granted = piko.scratch %writer[%n]
+    ```
+  }];
+  let arguments = (ins Piko_WriterType:$writer, Index:$size);
+  let results = (outs Piko_Bytes:$bytes, I1:$granted);
+  let assemblyFormat = "$writer `[` $size `]` attr-dict";
+}
+
+def Piko_ScratchReleaseOp : Piko_Op<"scratch_release"> {
+  let summary = "gives back the scratch memory taken since a mark";
+  let description = [{
+    ```mlir
+    piko.scratch_release %writer[%mark]
+    ```
+  }];
+  let arguments = (ins Piko_WriterType:$writer, I64:$mark);
+  let assemblyFormat = "$writer `[` $mark `]` attr-dict";
+}
+
+def Piko_ScheduleBinOp : Piko_Op<"schedule_bin"> {
+  let summary = "what a dynamic schedule says about a bin";
+  let description = [{
+    Before any kernel runs. A batch of the smallest 64-bit integer is none.
+
+    ```mlir
+    piko.schedule_bin @blend[%bin] kind %kind tile_split %split batch %n every_bin %always
+    ```
+  }];
+  let arguments = (ins FlatSymbolRefAttr:$stage, Index:$bin, I32:$kind,
+                       I64:$tileSplit, I64:$batch, I1:$everyBin);
+  let assemblyFormat = [{
+    $stage `[` $bin `]` `kind` $kind `tile_split` $tileSplit `batch` $batch
+    `every_bin` $everyBin attr-dict
+  }];
 }
 
 def Piko_ThreadsOp : Piko_Op<"threads", [Pure]> {

@@ -9,6 +9,7 @@ include "Piko/Dialect/Piko/IR/PikoPipelineOps.td"
 include "Piko/Dialect/Piko/IR/PikoStageOps.td"
 include "Piko/Dialect/Piko/IR/PikoBodyOps.td"
 include "Piko/Dialect/Piko/IR/PikoStateOps.td"
+include "Piko/Dialect/Piko/IR/PikoLoopOps.td"
 include "Piko/Dialect/Piko/IR/PikoKernelOps.td"
 
 #endif // PIKO_DIALECT_PIKO_IR_PIKOOPS_TD

@@ -22,8 +22,11 @@ def Piko_StageOp : Piko_Op<"stage", [
     `lineage` is the stage's place in the order that lineage roots are numbered
     in, and is set by `piko-order-stages`, which moves stages. `tile` is the side
     of the tiles that a bin is divided into where `piko.owner` tells whose they
-    are. At the resolved level, `split` says that a bin's primitives may be
-    divided over threads in any way, and `placed` that kernels place them.
+    are. `list` says that the process phase takes the list of a bin. Stages with
+    the same `cycle` are on a common cycle of edges; `piko-order-stages` sets it. At the resolved level, `split` says that a bin's primitives (its
+    batches, where the phase takes a list) may be divided over threads in any
+    way, `ordered` that the order in which they are processed shows in the
+    state, and `placed` that kernels place them.
 
     At the kernels level and below, the phases have moved into
     `piko.kernel`s and the stage's body is empty but for its schedule.
@@ -48,12 +51,15 @@ def Piko_StageOp : Piko_Op<"stage", [
                        TypedArrayAttrBase<FlatSymbolRefAttr, "records of the ports">:$outputs,
                        OptionalAttr<Piko_I64Attr>:$lineage,
                        OptionalAttr<Piko_I64Attr>:$tile,
-                       UnitAttr:$split, UnitAttr:$placed);
+                       OptionalAttr<Piko_I64Attr>:$cycle,
+                       UnitAttr:$split, UnitAttr:$ordered, UnitAttr:$placed,
+                       UnitAttr:$takesList);
   let regions = (region SizedRegion<1>:$body);
   let assemblyFormat = [{
     $sym_name `bins` $bins `threads` $threads (`lineage` $lineage^)?
-    (`tile` $tile^)? (`split` $split^)? (`placed` $placed^)?
-    `:` $input `->` $outputs attr-dict-with-keyword $body
+    (`tile` $tile^)? (`cycle` $cycle^)? (`split` $split^)?
+    (`ordered` $ordered^)? (`placed` $placed^)?
+    `:` (`list` $takesList^)? $input `->` $outputs attr-dict-with-keyword $body
   }];
   let hasRegionVerifier = 1;
   let extraClassDeclaration = [{
@@ -63,6 +69,8 @@ def Piko_StageOp : Piko_Op<"stage", [
     ProcessOp getProcess();
     /// Whether one bin is the whole domain.
     bool isWholeDomain();
+    /// The type of what the process phase takes: a primitive or a list.
+    ::mlir::Type getProcessType();
     /// Whether the stage runs only when no primitive can still reach it.
     bool collects();
     ::mlir::Block *getBodyBlock() { return &getBody().front(); }
@@ -123,6 +131,9 @@ def Piko_ProcessOp : Piko_PhaseOp<"process"> {
     bin, `piko.atomic`, and `piko.store` where no two calls write the same
     element. Inside a `piko.kernel` the phase names its stage.
 
+    In a stage that takes a `list` the block argument is a `!piko.list`: all
+    primitives of a bin in lineage order, or a batch of them.
+
     ```mlir
     piko.record @F {"z" : f32 at 0} size 4 align 4
     piko.pipeline @P rank 2 {
@@ -154,13 +165,16 @@ def Piko_ProcessOp : Piko_PhaseOp<"process"> {
 }
 
 def Piko_ScheduleOp : Piko_Op<"schedule", [
-    HasParent<"StageOp">, DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
-  let summary = "the Schedule phase, as directives";
+    AutomaticAllocationScope, HasParent<"StageOp">, IsolatedFromAbove,
+    SingleBlock, DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
+  let summary = "the Schedule phase: directives, and code that gives more";
   let description = [{
     Where bins run (`load_balance`, `direct_map`, `serialize`, `all` with
     the `tile_split` size of the chunks that a bin is cut into), what they
     wait for (`end_stage`, `end_bin`, a `batch` of primitives), and whether
-    the stage gives up the order of its emissions (`unordered`).
+    the stage gives up the order of its emissions (`unordered`). What depends
+    on the bin or on constants is said by a `dynamic` body, which runs for each
+    bin before the pipeline does and overrides the directives.
 
     ```mlir
     piko.record @F {"z" : f32 at 0} size 4 align 4
@@ -189,15 +203,66 @@ def Piko_ScheduleOp : Piko_Op<"schedule", [
     UnitAttr:$endBin,
     OptionalAttr<ConfinedAttr<Piko_I64Attr, [IntPositive]>>:$batch,
     UnitAttr:$everyBin, UnitAttr:$unordered);
+  let regions = (region MaxSizedRegion<1>:$body);
   let assemblyFormat = [{
     $kind (`tile_split` $tileSplit^)? (`end_stage` $endStage^)?
     (`end_bin` $endBin^)? (`batch` $batch^)? (`every_bin` $everyBin^)?
-    (`unordered` $unordered^)? attr-dict
+    (`unordered` $unordered^)? attr-dict-with-keyword (`dynamic` $body^)?
   }];
+  let hasRegionVerifier = 1;
+}
+
+/// What the dynamic body of a schedule says about its bin.
+class Piko_DirectiveOp<string mnemonic> : Piko_Op<mnemonic> {
+  let hasVerifier = 1;
+}
+
+def Piko_SetScheduleOp : Piko_DirectiveOp<"set_schedule"> {
+  let summary = "where the bin runs";
+  let description = [{
+    The last one that is reached counts. It never changes a result. The kind is
+    a number, as in `ScheduleKind`; the tile split is 0 where there is none.
+
+    ```mlir
+    piko.schedule load_balance dynamic {
+    ^bb0(%bin: index):
+      %kind = arith.constant 3 : i32
+      %split = arith.constant 64 : i64
+      piko.set_schedule %kind tile_split %split
+      piko.return
+    }
+    ```
+  }];
+  let arguments = (ins I32:$kind, I64:$tileSplit);
+  let assemblyFormat = "$kind `tile_split` $tileSplit attr-dict";
+}
+
+def Piko_SetBatchOp : Piko_DirectiveOp<"set_batch"> {
+  let summary = "how many primitives a list Process gets at a time";
+  let description = [{
+    The last one that is reached counts. Less than one is an error when the
+    pipeline runs.
+
+    ```mlir
+    piko.set_batch %n
+    ```
+  }];
+  let arguments = (ins I64:$size);
+  let assemblyFormat = "$size attr-dict";
+}
+
+def Piko_SetEveryBinOp : Piko_DirectiveOp<"set_every_bin"> {
+  let summary = "a list Process runs for the bin even if it is empty";
+  let description = [{
+    ```mlir
+    piko.set_every_bin
+    ```
+  }];
+  let assemblyFormat = "attr-dict";
 }
 
 def Piko_ReturnOp : Piko_Op<"return", [
-    Pure, Terminator, ParentOneOf<["AssignOp", "ProcessOp"]>]> {
+    Pure, Terminator, ParentOneOf<["AssignOp", "ProcessOp", "ScheduleOp"]>]> {
   let summary = "ends a phase";
   let description = "See `piko.process`.";
   let assemblyFormat = "attr-dict";

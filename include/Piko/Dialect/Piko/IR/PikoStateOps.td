@@ -61,22 +61,25 @@ def Piko_StoreOp : Piko_StateAccessOp<"store", [MemoryEffects<[MemWrite]>]> {
 
 def Piko_AtomicOp : Piko_StateAccessOp<"atomic", [
     MemoryEffects<[MemRead, MemWrite]>]> {
-  let summary = "changes an integer field so that order does not matter";
+  let summary = "changes a number indivisibly";
   let description = [{
-    The value that was there is not given back, so that no call can see the
-    order.
+    A result is the value that was there. It shows the order of calls, as does
+    the rounding of `add_float`: both need a stage that is `unordered`.
 
     ```mlir
     piko.atomic add @histogram[%i : index] "value", %one : i32
+    %place = piko.atomic add @next[%i : index] "value", %one : i32 -> i32
     ```
   }];
   let arguments = (ins Piko_AtomicKind:$kind, FlatSymbolRefAttr:$state,
                        Variadic<Piko_Coordinate>:$indices, StrAttr:$field,
                        Variadic<Index>:$elements,
-                       AnyTypeOf<[I32, I64]>:$value, UnitAttr:$checked);
+                       AnyTypeOf<[I32, I64, F32, F64]>:$value, UnitAttr:$checked);
+  let results = (outs Optional<AnyTypeOf<[I32, I64, F32, F64]>>:$old);
   let assemblyFormat = [{
     $kind (`checked` $checked^)? $state (`[` $indices^ `:` type($indices) `]`)? $field
     (`[` $elements^ `]`)? `,` $value attr-dict `:` type($value)
+    (`->` type($old)^)?
   }];
 }
 
@@ -131,9 +134,13 @@ def Piko_UpdateOp : Piko_Op<"update", [
 }
 
 def Piko_YieldOp : Piko_Op<"yield", [
-    Pure, Terminator, HasParent<"UpdateOp">, AttrSizedOperandSegments]> {
-  let summary = "ends the body of an update";
-  let description = "See `piko.update`.";
+    Pure, Terminator, AttrSizedOperandSegments,
+    ParentOneOf<["UpdateOp", "ParallelForOp", "ReduceOp", "ScanOp"]>]> {
+  let summary = "ends the body of an operation";
+  let description = [{
+    See `piko.update`, `piko.parallel_for` and `piko.reduce`. Only an update
+    has a pixel to yield.
+  }];
   let arguments = (ins Variadic<Piko_Scalar>:$pixel, Variadic<AnyType>:$results);
   let assemblyFormat = [{
     (`[` $pixel^ `:` type($pixel) `]`)?

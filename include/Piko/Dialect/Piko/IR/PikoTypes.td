@@ -23,6 +23,16 @@ def Piko_PrimType : Piko_Type<"Prim", "prim"> {
   let assemblyFormat = "`<` $record `>`";
 }
 
+def Piko_ListType : Piko_Type<"List", "list"> {
+  let summary = "the primitives of a bin that a process phase is called with";
+  let description = [{
+    An immutable list in lineage order, for example `!piko.list<@Fragment>`.
+    `piko.list_at` reads a primitive of it.
+  }];
+  let parameters = (ins "::mlir::FlatSymbolRefAttr":$record);
+  let assemblyFormat = "`<` $record `>`";
+}
+
 def Piko_BinsType : Piko_Type<"Bins", "bins"> {
   let summary = "the primitives of a stage, grouped by bin";
   let description = [{

@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Work that a bin's threads share, and where its iterations meet.
+
+#ifndef PIKO_DIALECT_PIKO_IR_PIKOLOOPOPS_TD
+#define PIKO_DIALECT_PIKO_IR_PIKOLOOPOPS_TD
+
+include "Piko/Dialect/Piko/IR/PikoBase.td"
+
+def Piko_ParallelForOp : Piko_Op<"parallel_for", [
+    SingleBlock, AutomaticAllocationScope]> {
+  let summary = "independent iterations, spread over the threads of a bin";
+  let description = [{
+    Runs the body for each index from 0 up to the operand, exclusive, and ends
+    when all iterations have ended; a count below 1 is none. Emissions are
+    ordered by iteration, then as they come. A private array that stands in the
+    body belongs to one iteration, one that stands outside to all of them.
+
+    ```mlir
+    piko.parallel_for %n {
+    ^bb0(%i: index):
+      %x = piko.list_at %list[%i] : !piko.list<@F> -> !piko.prim<@F>
+      piko.yield
+    }
+    ```
+  }];
+  let arguments = (ins Index:$count);
+  let regions = (region SizedRegion<1>:$body);
+  let assemblyFormat = "$count attr-dict-with-keyword $body";
+  let hasRegionVerifier = 1;
+  let extraClassDeclaration = [{
+    ::mlir::Block *getBodyBlock() { return &getBody().front(); }
+    ::mlir::Value getIteration() { return getBody().getArgument(0); }
+    /// Whether its iterations meet: a barrier of this loop, not of one inside.
+    bool hasBarriers();
+  }];
+}
+
+/// An operation at which all iterations of the enclosing `piko.parallel_for`
+/// meet. That loop is not nested, and the control flow from it to the operation
+/// is the same in all its iterations.
+class Piko_BarrierOp<string mnemonic, list<Trait> traits = []>
+    : Piko_Op<mnemonic, traits> {
+  let hasVerifier = 1;
+}
+
+def Piko_SyncOp : Piko_BarrierOp<"sync"> {
+  let summary = "a barrier between the iterations";
+  let description = [{
+    Directly inside a `piko.parallel_for` that is not nested, in control flow
+    that is uniform over its iterations.
+
+    ```mlir
+    piko.sync
+    ```
+  }];
+  let assemblyFormat = "attr-dict";
+}
+
+def Piko_ReduceOp : Piko_BarrierOp<"reduce", [
+    SingleBlock, AllTypesMatch<["values", "results"]>]> {
+  let summary = "combines a value of each iteration";
+  let description = [{
+    A barrier, legal where `piko.sync` is. The body combines two values, each of
+    which may be several numbers: first all of the left one, then all of the
+    right one. The values are combined in a binary tree over the index: at
+    distance s = 1, 2, 4, ... the value at i, for each multiple i of 2s with
+    i + s < n, becomes op(v[i], v[i + s]). Every iteration gets v[0].
+
+    ```mlir
+    %sum = piko.reduce %v : f32 {
+    ^bb0(%a: f32, %b: f32):
+      %c = arith.addf %a, %b : f32
+      piko.yield results [%c : f32]
+    }
+    ```
+  }];
+  let arguments = (ins Variadic<Piko_Scalar>:$values);
+  let results = (outs Variadic<Piko_Scalar>:$results);
+  let regions = (region SizedRegion<1>:$body);
+  let assemblyFormat = "$values `:` type($values) attr-dict-with-keyword $body";
+  let hasRegionVerifier = 1;
+}
+
+def Piko_ScanOp : Piko_BarrierOp<"scan", [
+    SingleBlock, SameVariadicOperandSize,
+    AllTypesMatch<["values", "empty", "results"]>]> {
+  let summary = "combines the values of the iterations before each";
+  let description = [{
+    A barrier, legal where `piko.sync` is. Iteration 0 gets `empty`; iteration i
+    gets the largest aligned blocks of 2^k values before it, each combined as by
+    `piko.reduce`, joined from the left.
+
+    ```mlir
+    %before = piko.scan %v empty %zero : i32 {
+    ^bb0(%a: i32, %b: i32):
+      %c = arith.addi %a, %b : i32
+      piko.yield results [%c : i32]
+    }
+    ```
+  }];
+  let arguments = (ins Variadic<Piko_Scalar>:$values,
+                       Variadic<Piko_Scalar>:$empty);
+  let results = (outs Variadic<Piko_Scalar>:$results);
+  let regions = (region SizedRegion<1>:$body);
+  let assemblyFormat = [{
+    $values `empty` $empty `:` type($values) attr-dict-with-keyword $body
+  }];
+  let hasRegionVerifier = 1;
+}
+
+def Piko_SortOp : Piko_BarrierOp<"sort"> {
+  let summary = "ranks the iterations by a key";
+  let description = [{
+    A barrier, legal where `piko.sync` is. Iteration r gets the index of the
+    iteration with the r-th smallest key; equal keys are in order of index, and
+    NaN comes last. Integers are signed unless `unsigned` is said.
+
+    ```mlir
+    %index = piko.sort %depth : f32
+    %other = piko.sort unsigned %id : i32
+    ```
+  }];
+  let arguments = (ins UnitAttr:$isUnsigned, Piko_Scalar:$key);
+  let results = (outs Index:$index);
+  let assemblyFormat = "(`unsigned` $isUnsigned^)? $key attr-dict `:` type($key)";
+}
+
+#endif // PIKO_DIALECT_PIKO_IR_PIKOLOOPOPS_TD
