@@ -13,21 +13,28 @@
 
 using namespace piko::rt;
 
-/// The entry `id` of a list that grows as needed, marked as declared.
+/// The entry `id` of a list that grows as needed.
 template <class T>
-static T &declare(std::vector<T> &list, int32_t id, const char *what) {
+static T &entry(std::vector<T> &list, int32_t id, const char *what) {
   if (id < 0 || id > 1 << 20)
     throw Failure{PIKORT_BAD_PROGRAM, std::string("expected a small ") + what +
                                           " number, but got " +
                                           std::to_string(id)};
   if (list.size() <= static_cast<size_t>(id))
     list.resize(static_cast<size_t>(id) + 1);
-  if (list[id].declared)
+  return list[id];
+}
+
+/// The same, marked as declared.
+template <class T>
+static T &declare(std::vector<T> &list, int32_t id, const char *what) {
+  T &declared = entry(list, id, what);
+  if (declared.declared)
     throw Failure{PIKORT_BAD_PROGRAM, std::string("expected ") + what + " " +
                                           std::to_string(id) +
                                           " to be declared once"};
-  list[id].declared = true;
-  return list[id];
+  declared.declared = true;
+  return declared;
 }
 
 static void expect(bool condition, const std::string &text) {
@@ -123,8 +130,8 @@ void pikoir_declare_stage(pikort_pipeline *p, int32_t id, const char *name,
     Stage &stage = declare(p->stages, id, "stage");
     stage.name = orEmpty(name);
     stage.record = record;
-    stage.schedule = schedule;
-    stage.tileSplit = tileSplit;
+    stage.schedule.kind = schedule;
+    stage.schedule.tileSplit = tileSplit;
     stage.flags = flags;
     stage.cellSize = cellSize;
     std::string who = "stage " + quoted(stage.name);
@@ -151,14 +158,24 @@ void pikoir_declare_source(pikort_pipeline *p, int32_t index, int32_t stage) {
 
 void pikoir_declare_edge(pikort_pipeline *p, int32_t producer, int32_t port,
                          int32_t consumer) {
-  guarded(p, "setup",
-          [&] { p->edges.push_back({producer, port, consumer, false}); });
+  guarded(p, "setup", [&] {
+    Edge &edge = p->edges.emplace_back();
+    edge.producer = producer;
+    edge.port = port;
+    edge.consumer = consumer;
+  });
 }
 
 void pikoir_declare_schedule(pikort_pipeline *p, int32_t stage, int64_t batch,
                              int32_t everyBin) {
-  guarded(p, "setup",
-          [&] { p->schedules.push_back({stage, batch, everyBin != 0}); });
+  guarded(p, "setup", [&] {
+    Stage &declared = entry(p->stages, stage, "stage");
+    expect(batch >= 0, "stage " + quoted(declared.name) +
+                           ": expected a batch of at least 1, but got " +
+                           std::to_string(batch));
+    declared.schedule.batch = batch;
+    declared.schedule.everyBin = everyBin != 0;
+  });
 }
 
 void pikoir_declare_wait(pikort_pipeline *p, int32_t stage, int32_t waitsFor) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //===- Host.cpp - The host API: life, binding, running --------------------===//
 
-#include "cpu/Kernel.h"
+#include "cpu/Cycle.h"
 
 #include <algorithm>
 #include <cstring>
@@ -293,6 +293,7 @@ int32_t pikort_run(pikort_pipeline *p) {
       if (state.kind == PIKORT_CONSTANT)
         state.view = {state.bytes.data(), {1, 1, 1, 1}};
     prepareState(*p);
+    startCycles(*p);
     int32_t status = p->runProgram(p);
     p->settle();
     if (status != PIKORT_OK && p->status == PIKORT_OK)
@@ -302,8 +303,11 @@ int32_t pikort_run(pikort_pipeline *p) {
   });
   if (!p || !p->ready)
     return code;
-  for (Stage &stage : p->stages)
+  endCycles(*p);
+  for (Stage &stage : p->stages) {
     stage.kernel->clear();
+    stage.binSchedules = {};
+  }
   for (Source &source : p->sources)
     if (source.kernel)
       source.kernel->clear();

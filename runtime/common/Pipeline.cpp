@@ -53,8 +53,15 @@ void pikort_pipeline::checkDeclared() {
   };
   for (Record &record : records)
     record.padded = hasPadding(record);
-  for (const Stage &stage : stages)
+  for (const Stage &stage : stages) {
     checkRecord(stage.record, stage.name);
+    if (stage.takesList() && stage.cellSize > 0)
+      bad("stage " + quoted(stage.name) +
+          ": a process that takes a list has no owner tiles");
+    if (!stage.takesList() && (stage.schedule.batch || stage.schedule.everyBin))
+      bad("stage " + quoted(stage.name) +
+          ": a batch needs a process that takes a list");
+  }
   for (const State &state : states) {
     checkRecord(state.record, state.name);
     if (state.perSource >= static_cast<int32_t>(sources.size()))
@@ -89,60 +96,16 @@ void pikort_pipeline::connect() {
     outputs[edge.port] = static_cast<int32_t>(e);
     stages[edge.consumer].inputs.push_back(static_cast<int32_t>(e));
   }
-}
-
-/// Topological, ties by declaration.
-void pikort_pipeline::sortStages() {
-  std::vector<size_t> waiting(stages.size());
-  for (size_t s = 0; s < stages.size(); ++s)
-    waiting[s] = stages[s].inputs.size();
-  std::vector<bool> done(stages.size());
-  order.clear();
-  while (order.size() < stages.size()) {
-    size_t next = 0;
-    while (next < stages.size() && (done[next] || waiting[next]))
-      ++next;
-    if (next == stages.size())
-      bad("pipeline " + quoted(name) +
-          ": stages that form a cycle are not supported");
-    done[next] = true;
-    stages[next].root = static_cast<int32_t>(sources.size() + order.size());
-    order.push_back(static_cast<int32_t>(next));
-    for (int32_t e : stages[next].outputs)
-      if (e >= 0)
-        --waiting[edges[e].consumer];
-  }
-}
-
-/// Lineage keys are needed only where a stage merges several inputs, and on
-/// the way there: a stage's items need keys if an edge out of it does, unless
-/// its emissions start a new lineage.
-void pikort_pipeline::findKeys() {
-  for (auto it = order.rbegin(); it != order.rend(); ++it) {
-    Stage &stage = stages[*it];
-    bool itemsKeyed = false;
-    for (int32_t e : stage.outputs)
-      itemsKeyed |= e >= 0 && edges[e].keyed && !stage.collects();
-    bool merges = stage.inputs.size() + stage.sources.size() > 1;
-    for (int32_t e : stage.inputs)
-      edges[e].keyed = itemsKeyed || merges;
-    stage.keyWidth = itemsKeyed ? 1 : 0;
-  }
-  for (int32_t s : order) {
-    Stage &stage = stages[s];
-    if (stage.keyWidth == 0)
-      continue;
-    for (int32_t e : stage.inputs) {
-      const Stage &from = stages[edges[e].producer];
-      int32_t width = from.collects() ? 2 : from.keyWidth + 1;
-      stage.keyWidth = std::max(stage.keyWidth, width);
-    }
-  }
+  for (const Wait &wait : waits)
+    if (!exists(wait.stage) || !exists(wait.waitsFor))
+      bad("pipeline " + quoted(name) + ": expected a declared stage to wait " +
+          "for, but got " + std::to_string(wait.waitsFor));
 }
 
 void pikort_pipeline::finish() {
   checkDeclared();
   connect();
+  findLoops();
   sortStages();
   findKeys();
   stageStats.resize(stages.size());
@@ -202,6 +165,24 @@ void pikort_pipeline::report(const KernelError &found) noexcept {
   reported = found.code;
 }
 
+static const char *describe(BadCall call) {
+  switch (call) {
+  case BadCall::PlaceFirst:
+    return "expected a record before its place";
+  case BadCall::Next:
+    return "expected one pikoir_next for each position";
+  case BadCall::Nested:
+    return "expected deferred emissions to end before others begin";
+  case BadCall::NotDeferring:
+    return "expected pikoir_defer_begin before an iteration and the end";
+  case BadCall::Iteration:
+    return "expected an iteration of those that pikoir_defer_begin named";
+  case BadCall::StillDeferring:
+    return "expected pikoir_defer_end before the position ends";
+  }
+  return "made a wrong call";
+}
+
 static std::string describe(const std::string &stage, const KernelError &e) {
   std::string a = std::to_string(e.a), b = std::to_string(e.b);
   std::string text = "stage " + quoted(stage) + ": ";
@@ -225,11 +206,12 @@ static std::string describe(const std::string &stage, const KernelError &e) {
     text += "expected a number, but got NaN";
     return e.a >= 0 ? text + " in bin " + a : text;
   case PIKORT_OUT_OF_MEMORY:
+    if (e.a < 0)
+      return text + "expected memory of at least 0 bytes, but got " + a;
     return text + "out of memory: expected " + a + " more bytes" +
            (e.b > 0 ? ", but the limit is " + b : "");
   case PIKORT_BAD_PROGRAM:
-    return text + (e.a == 0 ? "expected a record before its place"
-                            : "expected one pikoir_next for each position");
+    return text + describe(static_cast<BadCall>(e.a));
   default:
     return text + "failed with status " + std::to_string(e.code) + " (" + a +
            ", " + b + ")";

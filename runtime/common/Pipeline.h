@@ -23,6 +23,8 @@
 namespace piko::rt {
 
 struct Kernel; // cpu/Kernel.h
+struct Queue;  // cpu/Queue.h
+class Cycle;   // cpu/Cycle.h
 
 /// An error, thrown inside the runtime and caught at its boundary.
 struct Failure {
@@ -56,15 +58,35 @@ struct State {
 };
 
 struct Edge {
-  int32_t producer, port, consumer;
-  bool keyed = false; ///< Its primitives carry lineage keys.
+  int32_t producer = 0, port = 0, consumer = 0;
+  bool insideLoop = false; ///< Both ends are in one loop.
+  bool keyed = false;      ///< Its primitives carry lineage keys.
+  int32_t keyWidth = 0;    ///< 64-bit words of a key.
+  /// If the producer is on a cycle: what it has emitted so far.
+  std::shared_ptr<Queue> queue;
 };
 
-/// What was said of a list stage, or of one of its bins.
-struct ListSchedule {
-  int32_t stage;
-  int64_t batch; ///< 0 = the whole list.
-  bool everyBin;
+/// Stages on a common cycle of edges, or one stage: a root of lineage.
+struct Component {
+  std::vector<int32_t> stages; ///< In order of declaration.
+  bool cyclic = false;
+  std::shared_ptr<Cycle> cycle; ///< If it is one.
+};
+
+/// A cycle of stages that do not collect.
+struct LoopShape {
+  std::vector<int32_t> stages; ///< In order of declaration.
+  bool ordered = false;        ///< The order across its hops can be seen.
+  bool keyed = false;          ///< What comes in carries lineage keys.
+  int32_t keyWidth = 0;
+};
+
+/// How a stage, or one of its bins, runs.
+struct BinSchedule {
+  int32_t kind = PIKOIR_LOAD_BALANCE;
+  bool everyBin = false;
+  int64_t tileSplit = 0;
+  int64_t batch = 0; ///< 0 = the whole list.
 };
 
 struct Wait {
@@ -82,21 +104,33 @@ struct Source {
 struct Stage {
   bool declared = false;
   std::string name;
-  int32_t record = 0, schedule = 0, flags = 0;
-  int64_t tileSplit = 0, cellSize = 0;
+  int32_t record = 0, flags = 0;
+  int64_t cellSize = 0;
+  BinSchedule schedule; ///< Of all bins.
   std::array<int64_t, 4> binSize{};
   // Completed by finish():
   std::vector<int32_t> sources; ///< That feed it, ascending.
   std::vector<int32_t> inputs;  ///< Edges that end here, as declared.
   std::vector<int32_t> outputs; ///< The edge of each port, or -1.
-  int32_t root = 0;             ///< Of the lineage that it starts.
-  int32_t keyWidth = 0;         ///< 64-bit words of its items' keys, 0 = none.
+  int32_t component = 0;
+  int32_t loop = -1;
+  int32_t root = 0;     ///< Of the lineage that it starts.
+  int32_t keyWidth = 0; ///< 64-bit words of its items' keys, 0 = none.
   // Completed by each run:
   std::array<int64_t, 4> grid{}, cellGrid{};
   int64_t tiles = 1, cells = 1;
   std::shared_ptr<Kernel> kernel;
+  Array<BinSchedule> binSchedules; ///< If they depend on the bin.
 
-  bool collects() const { return flags & PIKOIR_COLLECTS; }
+  int64_t bins() const { return cells / tiles; }
+  const BinSchedule &scheduleOf(int64_t bin) const {
+    return binSchedules ? binSchedules[bin] : schedule;
+  }
+  bool takesList() const { return flags & PIKOIR_LIST; }
+  bool collects() const { return flags & (PIKOIR_COLLECTS | PIKOIR_LIST); }
+  bool ordered() const { return flags & PIKOIR_ORDERED && !unordered(); }
+  /// Positions of a cell may be in several units.
+  bool splits() const { return flags & PIKOIR_SPLIT && !ordered(); }
   bool placed() const { return flags & PIKOIR_PLACED; }
   bool unordered() const { return flags & PIKOIR_UNORDERED; }
 };
@@ -109,6 +143,16 @@ struct KernelStats {
 
 struct StageStats {
   int64_t in = 0, placed = 0, out = 0;
+};
+
+/// What generated code did wrong between open and close; `a` of the error.
+enum class BadCall : int64_t {
+  PlaceFirst,   ///< A place before its record.
+  Next,         ///< Not one pikoir_next for each position.
+  Nested,       ///< pikoir_defer_begin twice.
+  NotDeferring, ///< defer_iteration or defer_end outside.
+  Iteration,    ///< Outside of the range that defer_begin gave.
+  StillDeferring
 };
 
 /// An error that a kernel found. Kernels are parallel: the one that the
@@ -133,14 +177,16 @@ struct pikort_pipeline {
   std::vector<piko::rt::Stage> stages;
   std::vector<piko::rt::Source> sources;
   std::vector<piko::rt::Edge> edges;
-  std::vector<piko::rt::ListSchedule> schedules;
   std::vector<piko::rt::Wait> waits;
-  std::vector<int32_t> order; ///< Stages, producers first.
+  std::vector<piko::rt::Component> components; ///< Producers first.
+  std::vector<piko::rt::LoopShape> loops;
+  std::vector<int32_t> order; ///< Stages, as in components.
   int32_t (*runProgram)(pikort_pipeline *) = nullptr;
 
   bool ready = false; ///< finish() succeeded.
   std::array<int64_t, 4> domain{0, 1, 1, 1};
   int32_t threads = 1;
+  int32_t activeThreads = 1;            ///< That a kernel should use now.
   int64_t loopLimit = int64_t(1) << 20; ///< Of hops and of rounds.
 
   std::vector<piko::rt::KernelStats> kernelStats;
@@ -165,6 +211,10 @@ struct pikort_pipeline {
   /// Forgets the status and the message.
   void clearStatus() noexcept;
 
+  /// The cycle that a stage is on, or null.
+  piko::rt::Cycle *cycleOf(const piko::rt::Stage &stage) const {
+    return components[stage.component].cycle.get();
+  }
   piko::rt::Stage *findStage(int32_t id) {
     return id >= 0 && id < static_cast<int32_t>(stages.size()) ? &stages[id]
                                                                : nullptr;
@@ -177,8 +227,11 @@ private:
 
   void checkDeclared();
   void connect();
+  // StageOrder.cpp:
+  void findLoops();
   void sortStages();
   void findKeys();
+  void findKeyWidths(const std::vector<bool> &itemsKeyed);
 };
 
 namespace piko::rt {

@@ -84,10 +84,10 @@ int32_t pikort_get_stage_info(pikort_pipeline *p, int32_t index,
     return pikort_stage_info{
         s.name.c_str(),
         {s.binSize[0], s.binSize[1], s.binSize[2], s.binSize[3]},
-        s.tileSplit,
+        s.schedule.tileSplit,
         s.cellSize,
         s.record,
-        s.schedule,
+        s.schedule.kind,
         s.flags,
         countOf(s.outputs)};
   });

@@ -1,37 +1,231 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
-//===- Cycle.cpp - Runs the stages of a cycle until nothing is left -------===//
+//===- Cycle.cpp - Runs a cycle of stages until nothing is left -----------===//
 
-#include "cpu/Kernel.h"
+#include "cpu/Cycle.h"
+
+#include <algorithm>
 
 using namespace piko::rt;
+
+// --- The parts of a cycle ---------------------------------------------------
+
+Cycle::Cycle(pikort_pipeline &p, const Component &component)
+    : p_(p), component_(component) {
+  for (int32_t s : component.stages) {
+    const Stage &stage = p.stages[s];
+    if (stage.collects()) {
+      collectors_.push_back(s);
+    } else if (stage.loop < 0) {
+      parts_.push_back({{s}, nullptr});
+    } else if (const LoopShape &loop = p.loops[stage.loop];
+               loop.stages.front() == s) {
+      parts_.push_back({loop.stages, Loop::make(p, loop)});
+    }
+  }
+  sortParts();
+}
+
+Cycle::Part &Cycle::partOf(int32_t stage) {
+  return *std::find_if(parts_.begin(), parts_.end(), [&](const Part &part) {
+    return std::find(part.stages.begin(), part.stages.end(), stage) !=
+           part.stages.end();
+  });
+}
+
+/// Parts form no cycle: a part waits for those that emit into it.
+void Cycle::sortParts() {
+  std::vector<Part> sorted;
+  auto waits = [&](const Part &part) {
+    return std::any_of(p_.edges.begin(), p_.edges.end(), [&](const Edge &edge) {
+      auto holds = [&](const Part &other, int32_t stage) {
+        return std::find(other.stages.begin(), other.stages.end(), stage) !=
+               other.stages.end();
+      };
+      return holds(part, edge.consumer) && !holds(part, edge.producer) &&
+             std::any_of(parts_.begin(), parts_.end(), [&](const Part &other) {
+               return holds(other, edge.producer);
+             });
+    });
+  };
+  while (!parts_.empty()) {
+    auto next = std::find_if(parts_.begin(), parts_.end(),
+                             [&](const Part &part) { return !waits(part); });
+    sorted.push_back(std::move(*next));
+    parts_.erase(next);
+  }
+  parts_ = std::move(sorted);
+}
+
+bool Cycle::comesFromOutside(const Stage &stage) const {
+  return !stage.sources.empty() ||
+         std::any_of(stage.inputs.begin(), stage.inputs.end(), [&](int32_t e) {
+           return p_.stages[p_.edges[e].producer].component != stage.component;
+         });
+}
+
+bool Cycle::hasInput(const Stage &stage, bool fromOutside) const {
+  return (fromOutside && comesFromOutside(stage)) ||
+         std::any_of(stage.inputs.begin(), stage.inputs.end(), [&](int32_t e) {
+           const Edge &edge = p_.edges[e];
+           return p_.stages[edge.producer].component == stage.component &&
+                  edge.queue->count > 0;
+         });
+}
+
+// --- What runs next ---------------------------------------------------------
+
+int32_t Cycle::step() {
+  if (chosen_ >= 0)
+    throw Failure{PIKORT_BAD_PROGRAM,
+                  "stage " + quoted(p_.stages[chosen_].name) +
+                      ": expected its kernel to run before the next step of "
+                      "its cycle"};
+  if (!finished_)
+    chosen_ = choose();
+  begun_ = false;
+  finished_ = chosen_ < 0;
+  return chosen_;
+}
+
+int32_t Cycle::choose() {
+  for (;;) {
+    for (; part_ < parts_.size(); ++part_)
+      if (int32_t stage = runPart(parts_[part_]); stage >= 0)
+        return stage;
+    if (int32_t stage = nextCollector(); stage >= 0)
+      return stage;
+    if (std::none_of(collectors_.begin(), collectors_.end(),
+                     [&](int32_t s) { return hasInput(p_.stages[s], false); }))
+      return -1;
+    beginRound();
+  }
+}
+
+/// The stage of the part that runs next, or -1 if the part has come to rest.
+int32_t Cycle::runPart(Part &part) {
+  if (!part.started) {
+    if (std::none_of(part.stages.begin(), part.stages.end(), [&](int32_t s) {
+          return hasInput(p_.stages[s], fromOutside_);
+        }))
+      return -1;
+    part.started = true;
+    if (!part.loop)
+      return part.stages.front();
+    part.loop->start(fromOutside_);
+  }
+  int32_t stage = part.loop ? part.loop->next() : -1;
+  part.started = stage >= 0;
+  if (!part.started)
+    return -1;
+  // A few primitives are not worth waking threads.
+  constexpr int64_t few = 32;
+  p_.activeThreads = part.loop->inputSize() < few ? 1 : p_.threads;
+  return stage;
+}
+
+int32_t Cycle::nextCollector() {
+  while (collector_ < collectors_.size()) {
+    int32_t s = collectors_[collector_++];
+    const Stage &stage = p_.stages[s];
+    bool everyBin = stage.schedule.everyBin || stage.binSchedules;
+    if (!hasInput(stage, round_ == 0) && !(everyBin && round_ == 0))
+      continue;
+    part_ = 0;
+    fromOutside_ = false;
+    return s;
+  }
+  return -1;
+}
+
+void Cycle::beginRound() {
+  if (round_ == p_.loopLimit)
+    for (int32_t s : component_.stages)
+      if (p_.stages[s].collects() && hasInput(p_.stages[s], false))
+        throw Failure{PIKORT_ENDLESS, "stage " + quoted(p_.stages[s].name) +
+                                          ": a loop did not end within " +
+                                          std::to_string(p_.loopLimit) +
+                                          " rounds"};
+  ++round_;
+  collector_ = 0;
+}
+
+// --- What the kernels take and emit -----------------------------------------
+
+Stream Cycle::takeInput(Kernel &kernel) {
+  const Stage &stage = p_.stages[kernel.stage];
+  if (kernel.stage != chosen_ || begun_)
+    throw Failure{PIKORT_BAD_PROGRAM,
+                  "stage " + quoted(stage.name) +
+                      ": expected pikoir_cycle_step to name it first"};
+  begun_ = true;
+  if (stage.loop >= 0)
+    return partOf(kernel.stage).loop->takeInput();
+  if (stage.collects()) {
+    kernel.firstRound = round_ == 0;
+    if (launches_ > UINT32_MAX)
+      throw Failure{PIKORT_TOO_MANY,
+                    "stage " + quoted(stage.name) +
+                        ": expected at most 4294967296 launches in a cycle"};
+    kernel.launch = static_cast<uint32_t>(launches_++);
+    return gatherInputs(p_, stage, round_ == 0);
+  }
+  return gatherInputs(p_, stage, fromOutside_);
+}
+
+void Cycle::absorb(Kernel &kernel) {
+  const Stage &stage = p_.stages[kernel.stage];
+  p_.activeThreads = p_.threads;
+  if (stage.loop >= 0)
+    partOf(kernel.stage).loop->absorb(kernel);
+  else
+    for (int32_t e : stage.outputs)
+      if (e >= 0) {
+        Edge &edge = p_.edges[e];
+        const Stage &to = p_.stages[edge.consumer];
+        Stream stream = gatherEdge(p_, edge);
+        checkCount(to, edge.queue->count + stream.count);
+        checkCount(to, edge.queue->pairs.size() + stream.pairCount);
+        edge.queue->append(p_.memory, stream, p_.records[to.record].size,
+                           edge.keyed ? edge.keyWidth : 0);
+      }
+  chosen_ = -1;
+}
+
+void piko::rt::startCycles(pikort_pipeline &p) {
+  p.activeThreads = p.threads;
+  for (Component &component : p.components)
+    if (component.cyclic)
+      component.cycle = std::make_shared<Cycle>(p, component);
+  for (Edge &edge : p.edges)
+    if (p.cycleOf(p.stages[edge.producer]))
+      edge.queue = std::make_shared<Queue>();
+}
+
+void piko::rt::endCycles(pikort_pipeline &p) {
+  for (Component &component : p.components)
+    component.cycle.reset();
+  for (Edge &edge : p.edges)
+    edge.queue.reset();
+}
 
 extern "C" {
 
 int32_t pikoir_cycle_step(pikort_pipeline *p, int32_t stage) {
-  guarded(p, "run", [&] {
-    throw Failure{PIKORT_BAD_PROGRAM,
-                  "expected a stage of a cycle, but got stage " +
-                      std::to_string(stage)};
+  if (p->status != PIKORT_OK)
+    return -1;
+  int32_t next = -1;
+  guarded(p, "cycle", [&] {
+    const Stage *found = p->findStage(stage);
+    Cycle *cycle = found ? p->cycleOf(*found) : nullptr;
+    if (!cycle)
+      throw Failure{PIKORT_BAD_PROGRAM,
+                    "expected a stage of a cycle, but got stage " +
+                        std::to_string(stage)};
+    next = cycle->step();
   });
-  return -1;
+  return next;
 }
 
 int64_t pikoir_loop_limit(pikort_pipeline *p) { return p->loopLimit; }
-
-int64_t pikoir_begin_schedule(pikort_pipeline *p, int32_t stage) {
-  const int64_t *grid = pikoir_grid(p, stage);
-  return grid[0] * grid[1] * grid[2] * grid[3];
-}
-
-void pikoir_schedule_bin(pikort_pipeline *, int32_t, int64_t, int32_t, int64_t,
-                         int64_t, int32_t) {}
-
-void pikoir_defer_begin(pikoir_writer *, int64_t) {}
-void pikoir_defer_iteration(pikoir_writer *, int64_t) {}
-void pikoir_defer_end(pikoir_writer *) {}
-
-void *pikoir_scratch(pikoir_writer *, int64_t) { return nullptr; }
-int64_t pikoir_scratch_mark(pikoir_writer *) { return 0; }
-void pikoir_scratch_release(pikoir_writer *, int64_t) {}
 
 } // extern "C"

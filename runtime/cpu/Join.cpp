@@ -14,7 +14,7 @@
 //
 //===----------------------------------------------------------------------===//
 
-#include "cpu/Kernel.h"
+#include "cpu/Cycle.h"
 #include "cpu/Parallel.h"
 
 #include <algorithm>
@@ -110,7 +110,7 @@ static void concatenate(int32_t threads, const Segments &from, uint8_t *to) {
   });
 }
 
-static void checkCount(const Stage &stage, int64_t count) {
+void piko::rt::checkCount(const Stage &stage, int64_t count) {
   if (count > UINT32_MAX)
     throw Failure{PIKORT_TOO_MANY,
                   "stage " + quoted(stage.name) +
@@ -118,9 +118,19 @@ static void checkCount(const Stage &stage, int64_t count) {
                       std::to_string(count)};
 }
 
+Array<uint32_t> piko::rt::pairStarts(Memory &memory, const Stream &stream) {
+  Array<uint32_t> starts(memory, stream.count + 1);
+  int64_t item = 0;
+  for (int64_t k = 0; k < stream.pairCount; ++k)
+    if (stream.pairs[k] & PIKOIR_FIRST_CELL)
+      starts[item++] = static_cast<uint32_t>(k);
+  starts[item] = static_cast<uint32_t>(stream.pairCount);
+  return starts;
+}
+
 bool piko::rt::byPosition(const pikort_pipeline &p, const Edge &edge) {
   const Stage &from = p.stages[edge.producer];
-  if (edge.keyed)
+  if (edge.keyed || from.loop >= 0)
     return true;
   return from.kernel->rank && !from.unordered() &&
          !p.stages[edge.consumer].unordered();
@@ -136,6 +146,7 @@ public:
   PositionGather(pikort_pipeline &p, const Edge &edge, Stream &stream)
       : p_(p), from_(p.stages[edge.producer]), kernel_(*from_.kernel),
         port_(static_cast<size_t>(edge.port)), edge_(edge), stream_(stream),
+        keyed_(edge.keyed && from_.loop < 0),
         size_(p.records[p.stages[edge.consumer].record].size),
         records_(collect(kernel_, port_, &PortLogs::records)),
         cells_(collect(kernel_, port_, &PortLogs::cells)),
@@ -144,7 +155,9 @@ public:
   void run() {
     stream_.itemStorage = Array<uint8_t>(p_.memory, stream_.count * size_);
     stream_.items = stream_.itemStorage.data();
-    if (edge_.keyed) {
+    if (from_.loop >= 0)
+      ordinalStorage_ = Array<uint32_t>(p_.memory, stream_.count);
+    if (keyed_) {
       stream_.keys.width = from_.collects() ? 2 : kernel_.keys.width + 1;
       stream_.keys.words =
           Array<uint64_t>(p_.memory, stream_.count * stream_.keys.width);
@@ -160,6 +173,8 @@ public:
     parallelFor(p_.threads, static_cast<int64_t>(kernel_.units.size()),
                 [&](int64_t unit) { gatherUnit(unit); });
   }
+  Array<uint32_t> takeStarts() { return std::move(starts_); }
+  Array<uint32_t> takeOrdinals() { return std::move(ordinalStorage_); }
 
 private:
   int64_t rankOf(int64_t slot) const {
@@ -232,7 +247,10 @@ private:
         cells.read(reinterpret_cast<uint8_t *>(stream_.pairStorage.data() + at),
                    int64_t(count) * 4);
       }
-      if (edge_.keyed) {
+      if (ordinalStorage_)
+        ordinals.read(reinterpret_cast<uint8_t *>(ordinalStorage_.data() + at),
+                      int64_t(count) * 4);
+      if (keyed_) {
         while (!from_.collects() && kernel_.offsets[cell + 1] <= i)
           ++cell;
         for (uint32_t r = 0; r < count; ++r)
@@ -244,8 +262,8 @@ private:
   void writeKey(int64_t to, int64_t slot, int64_t cell, uint32_t ordinal) {
     uint64_t *key = &stream_.keys.words[to * stream_.keys.width];
     if (from_.collects()) { // a new lineage
-      key[0] = uint64_t(from_.root) << 32 | static_cast<uint64_t>(rankOf(slot));
-      key[1] = ordinal;
+      key[0] = uint64_t(from_.root) << 32 | kernel_.launch;
+      key[1] = static_cast<uint64_t>(rankOf(slot)) << 32 | ordinal;
       return;
     }
     int64_t item = kernel_.order ? kernel_.order[slot] : slot;
@@ -260,9 +278,10 @@ private:
   size_t port_;
   const Edge &edge_;
   Stream &stream_;
+  bool keyed_; ///< A loop makes the keys of what leaves it.
   int64_t size_;
   Segments records_, cells_, ordinals_;
-  Array<uint32_t> starts_, pairStarts_;
+  Array<uint32_t> starts_, pairStarts_, ordinalStorage_;
 };
 
 } // namespace
@@ -324,39 +343,61 @@ static Stream gatherSource(pikort_pipeline &p, const Stage &stage,
   return stream;
 }
 
-static Stream gatherEdge(pikort_pipeline &p, const Edge &edge) {
+[[noreturn]] static void failOrder(const Stage &stage, const Stage &producer) {
+  throw Failure{PIKORT_BAD_PROGRAM,
+                "stage " + quoted(stage.name) + ": expected stage " +
+                    quoted(producer.name) + " to run before it"};
+}
+
+/// Checks that a kernel has run, and counts what it emitted to an edge.
+static Stream countRecords(pikort_pipeline &p, const Edge &edge) {
   Kernel &kernel = *p.stages[edge.producer].kernel;
   const Stage &to = p.stages[edge.consumer];
   auto port = static_cast<size_t>(edge.port);
   Stream stream;
   if (kernel.open || kernel.pendingOutputs == 0)
-    throw Failure{PIKORT_BAD_PROGRAM, "stage " + quoted(to.name) +
-                                          ": expected stage " +
-                                          quoted(p.stages[edge.producer].name) +
-                                          " to run before it"};
-  Segments records = collect(kernel, port, &PortLogs::records);
-  int64_t size = p.records[to.record].size;
-  stream.count = records.bytes / size;
+    failOrder(to, p.stages[edge.producer]);
+  stream.count = collect(kernel, port, &PortLogs::records).bytes /
+                 p.records[to.record].size;
   checkCount(to, stream.count);
+  if (byPosition(p, edge) && to.placed())
+    stream.pairCount = collect(kernel, port, &PortLogs::cells).bytes / 4;
+  checkCount(to, stream.pairCount);
+  return stream;
+}
+
+Stream piko::rt::gatherEdge(pikort_pipeline &p, const Edge &edge) {
+  Kernel &kernel = *p.stages[edge.producer].kernel;
+  const Stage &to = p.stages[edge.consumer];
+  auto port = static_cast<size_t>(edge.port);
+  Stream stream = countRecords(p, edge);
   if (byPosition(p, edge)) {
-    if (to.placed())
-      stream.pairCount = collect(kernel, port, &PortLogs::cells).bytes / 4;
-    checkCount(to, stream.pairCount);
     PositionGather(p, edge, stream).run();
   } else {
+    Segments records = collect(kernel, port, &PortLogs::records);
     if (to.placed())
       concatenateCells(p, kernel, port, stream);
     if (records.list.size() == 1) {
       stream.items = records.list[0].data;
       keepBlocks(kernel, port, &PortLogs::records, stream);
     } else {
-      stream.itemStorage = Array<uint8_t>(p.memory, stream.count * size);
+      stream.itemStorage = Array<uint8_t>(p.memory, records.bytes);
       stream.items = stream.itemStorage.data();
       concatenate(p.threads, records, stream.itemStorage.data());
     }
   }
   releasePort(kernel, port);
   return stream;
+}
+
+PortRecords piko::rt::gatherPort(pikort_pipeline &p, const Edge &edge) {
+  PortRecords result;
+  result.stream = countRecords(p, edge);
+  PositionGather gather(p, edge, result.stream);
+  gather.run();
+  result.starts = gather.takeStarts();
+  result.ordinals = gather.takeOrdinals();
+  return result;
 }
 
 // --- Several inputs ---------------------------------------------------------
@@ -366,27 +407,44 @@ namespace {
 /// Merges streams by lineage key.
 class Merge {
 public:
-  Merge(pikort_pipeline &p, const Stage &stage, std::vector<Stream> &from)
-      : p_(p), stage_(stage), from_(from), size_(p.records[stage.record].size) {
-  }
+  Merge(pikort_pipeline &p, const std::vector<Stream> &from)
+      : p_(p), from_(from) {}
 
-  Stream run() {
+  /// Finds the place of each record, and puts it there if there is room.
+  void findPlaces() {
+    for (const Stream &stream : from_)
+      places_.emplace_back(p_.memory, stream.count);
+    forChunks([&](const Chunk &chunk) {
+      Array<uint32_t> &places = places_[chunk.stream];
+      for (int64_t i = chunk.begin; i < chunk.end; ++i)
+        places[i] = static_cast<uint32_t>(i);
+      for (size_t other = 0; other < from_.size(); ++other)
+        if (other != chunk.stream)
+          addBefore(chunk, other, places);
+      for (int64_t i = chunk.begin; i < chunk.end && out_.items; ++i)
+        copyItem(chunk.stream, i, places[i]);
+    });
+  }
+  std::vector<Array<uint32_t>> takePlaces() { return std::move(places_); }
+
+  Stream run(const Stage &stage) {
+    size_ = p_.records[stage.record].size;
     for (const Stream &stream : from_) {
       out_.count += stream.count;
       out_.pairCount += stream.pairCount;
       out_.keys.width = std::max(out_.keys.width, stream.keys.width);
     }
-    checkCount(stage_, out_.count);
-    checkCount(stage_, out_.pairCount);
+    checkCount(stage, out_.count);
+    checkCount(stage, out_.pairCount);
     out_.itemStorage = Array<uint8_t>(p_.memory, out_.count * size_);
     out_.items = out_.itemStorage.data();
-    if (stage_.keyWidth > 0)
+    if (stage.keyWidth > 0 || stage.loop >= 0)
       out_.keys.words =
           Array<uint64_t>(p_.memory, out_.count * out_.keys.width);
     else
       out_.keys.width = 0;
     findPlaces();
-    if (stage_.placed())
+    if (stage.placed())
       mergePairs();
     return std::move(out_);
   }
@@ -422,22 +480,6 @@ private:
                 [&](int64_t c) { body(chunks_[static_cast<size_t>(c)]); });
   }
 
-  void findPlaces() {
-    for (const Stream &stream : from_)
-      places_.emplace_back(p_.memory, stream.count);
-    size_t streams = from_.size();
-    forChunks([&](const Chunk &chunk) {
-      Array<uint32_t> &places = places_[chunk.stream];
-      for (int64_t i = chunk.begin; i < chunk.end; ++i)
-        places[i] = static_cast<uint32_t>(i);
-      for (size_t other = 0; other < streams; ++other)
-        if (other != chunk.stream)
-          addBefore(chunk, other, places);
-      for (int64_t i = chunk.begin; i < chunk.end; ++i)
-        copyItem(chunk.stream, i, places[i]);
-    });
-  }
-
   /// Adds to each record's place the records of `other` that precede it.
   void addBefore(const Chunk &chunk, size_t other, Array<uint32_t> &places) {
     int64_t low = 0, high = from_[other].count;
@@ -462,17 +504,6 @@ private:
       out_.keys.words[to * out_.keys.width + w] = word(from_[s].keys, i, w);
   }
 
-  /// The first pair of each item of a stream, and the end.
-  Array<uint32_t> pairStarts(const Stream &stream) {
-    Array<uint32_t> starts(p_.memory, stream.count + 1);
-    int64_t item = 0;
-    for (int64_t k = 0; k < stream.pairCount; ++k)
-      if (stream.pairs[k] & PIKOIR_FIRST_CELL)
-        starts[item++] = static_cast<uint32_t>(k);
-    starts[item] = static_cast<uint32_t>(stream.pairCount);
-    return starts;
-  }
-
   void mergePairs() {
     out_.pairStorage = Array<uint32_t>(p_.memory, out_.pairCount);
     out_.pairs = out_.pairStorage.data();
@@ -487,7 +518,7 @@ private:
     std::vector<Array<uint32_t>> starts;
     starts.reserve(from_.size());
     for (const Stream &stream : from_)
-      starts.push_back(pairStarts(stream));
+      starts.push_back(pairStarts(p_.memory, stream));
     Array<uint32_t> to(p_.memory, out_.count);
     forChunks([&](const Chunk &c) {
       for (int64_t i = c.begin; i < c.end; ++i)
@@ -504,9 +535,8 @@ private:
   }
 
   pikort_pipeline &p_;
-  const Stage &stage_;
-  std::vector<Stream> &from_;
-  int64_t size_;
+  const std::vector<Stream> &from_;
+  int64_t size_ = 0;
   Stream out_;
   std::vector<Chunk> chunks_;
   std::vector<Array<uint32_t>> places_;
@@ -514,16 +544,40 @@ private:
 
 } // namespace
 
-Stream piko::rt::gatherInputs(pikort_pipeline &p, Stage &stage) {
+std::vector<Array<uint32_t>>
+piko::rt::mergePlaces(pikort_pipeline &p, const std::vector<Stream> &streams) {
+  Merge merge(p, streams);
+  merge.findPlaces();
+  return merge.takePlaces();
+}
+
+Stream piko::rt::gatherInputs(pikort_pipeline &p, const Stage &stage,
+                              bool fromOutside) {
   std::vector<Stream> streams;
   streams.reserve(stage.sources.size() + stage.inputs.size());
-  for (int32_t source : stage.sources)
-    streams.push_back(gatherSource(p, stage, source));
-  for (int32_t edge : stage.inputs)
-    streams.push_back(gatherEdge(p, p.edges[edge]));
+  auto add = [&](Stream stream) {
+    if (stream.count > 0)
+      streams.push_back(std::move(stream));
+  };
+  if (fromOutside)
+    for (int32_t source : stage.sources)
+      add(gatherSource(p, stage, source));
+  for (int32_t e : stage.inputs) {
+    Edge &edge = p.edges[e];
+    const Stage &from = p.stages[edge.producer];
+    Cycle *cycle = p.cycleOf(from);
+    if (edge.insideLoop)
+      continue; // the loop itself keeps these
+    if (cycle && from.component != stage.component && !cycle->isFinished())
+      failOrder(stage, from);
+    if (cycle)
+      add(edge.queue->take(edge.keyed ? edge.keyWidth : 0));
+    else if (fromOutside)
+      add(gatherEdge(p, edge));
+  }
   if (streams.empty())
     return {};
   if (streams.size() == 1)
     return std::move(streams.front());
-  return Merge(p, stage, streams).run();
+  return Merge(p, streams).run(stage);
 }

@@ -13,8 +13,8 @@
 // An *item* is a primitive of the stage's input, in lineage order. A *pair* is
 // an item in one of its cells, numbered in (item, cell) order. A *position* is
 // a pair, numbered in (cell, item) order: the order of processing. A *slot* is
-// what lies between two calls of pikoir_next: a position, or, where a stage
-// processes whole lists, a cell.
+// what lies between two calls of pikoir_next: a position, or, where Process
+// takes a list, a call.
 //
 //===----------------------------------------------------------------------===//
 
@@ -72,13 +72,31 @@ struct PortLogs {
 /// In a source's log: the primitive has no cell.
 constexpr uint32_t noCell = 0xffffffffu;
 
+struct Deferred; // Defer.cpp
+
+/// Memory of a call of Process: last in, first out. A mark is the number of
+/// bytes below it, over all blocks.
+struct ScratchStack {
+  std::vector<Array<uint8_t>> blocks;
+  size_t block = 0;  ///< That is in use.
+  int64_t below = 0; ///< Bytes in the blocks before it.
+  int64_t used = 0;  ///< In it.
+};
+
 /// A writer and its logs: used by one thread at a time, for many units.
 struct Lane : pikoir_writer {
+  Lane();
+  ~Lane();
   pikort_pipeline *pipeline = nullptr;
   Kernel *kernel = nullptr;
   std::vector<pikoir_port> portStorage;
   std::vector<PortLogs> logs;
   int64_t emitted = 0; ///< Over all units of this run.
+  ScratchStack scratch;
+  std::unique_ptr<Deferred> deferred; ///< If there were any.
+
+  /// Frees what a run holds.
+  void clear();
 };
 
 // --- What a kernel reads ----------------------------------------------------
@@ -123,6 +141,7 @@ struct Kernel {
   // From begin until all outputs are gathered.
   Array<int64_t> offsets;
   Array<uint32_t> order;
+  Array<pikoir_call> calls; ///< If Process takes a list.
   std::vector<pikoir_unit> units;
   int64_t positions = 0;
   /// Position to its place in emission order; none = identity.
@@ -138,18 +157,17 @@ struct Kernel {
   std::vector<std::unique_ptr<Lane>> lanes;
   std::vector<Lane *> freeLanes;
 
-  /// Slots of unit u are [slotBegin(u), slotBegin(u + 1)). Without a rank a
-  /// stage that collects has room for a slot for each cell too.
-  bool slotsForCells = false;
+  // On a cycle.
+  bool firstRound = true;
+  uint32_t launch = 0; ///< Of the stages of the cycle that collect.
+
+  /// Slots of unit u are [slotBegin(u), slotBegin(u + 1)).
   int64_t slotBegin(int64_t unit) const {
-    bool end = unit == static_cast<int64_t>(units.size());
-    if (end && !units.empty()) {
-      const pikoir_unit &last = units.back();
-      return last.end + (slotsForCells ? last.cell_end : 0);
-    }
-    return end ? 0
-               : units[unit].begin +
-                     (slotsForCells ? units[unit].cell_begin : 0);
+    if (units.empty())
+      return 0;
+    if (unit == static_cast<int64_t>(units.size()))
+      return calls ? units.back().cell_end : units.back().end;
+    return calls ? units[unit].cell_begin : units[unit].begin;
   }
   int64_t slots() const {
     return slotBegin(static_cast<int64_t>(units.size()));
@@ -161,23 +179,54 @@ struct Kernel {
 
 // --- Writer.cpp -------------------------------------------------------------
 
-/// Makes sure that there is a lane for each thread, each with a port for each
-/// of `edges`, and none in use.
+/// Makes sure that there is a lane for each thread that can open a unit.
 void prepareLanes(pikort_pipeline &p, Kernel &kernel);
+/// Reports a mistake of generated code.
+void badCall(const Lane &lane, BadCall which);
+/// Reports that `bytes` were refused.
+void outOfMemory(const Lane &lane, int64_t bytes);
+
+// --- Defer.cpp --------------------------------------------------------------
+
+/// What pikoir_append and pikoir_place do in iterations.
+uint8_t *deferAppend(Lane &lane, int32_t port);
+void deferPlace(Lane &lane, int32_t port, int64_t cell);
 
 // --- Join.cpp ---------------------------------------------------------------
 
+/// Throws unless `count` primitives, or pairs, can be numbered.
+void checkCount(const Stage &stage, int64_t count);
+/// The first pair of each item of a stream that has pairs, and the end.
+Array<uint32_t> pairStarts(Memory &memory, const Stream &stream);
 /// True if the edge must be gathered position by position.
 bool byPosition(const pikort_pipeline &p, const Edge &edge);
-/// Everything that comes into a stage, in lineage order.
-Stream gatherInputs(pikort_pipeline &p, Stage &stage);
+/// What a kernel emitted, in lineage order; frees it there.
+Stream gatherEdge(pikort_pipeline &p, const Edge &edge);
+
+/// The same for an edge from a stage of a loop, with what orders the records of
+/// different ports: where those of each rank start, and their ordinals.
+struct PortRecords {
+  Stream stream;
+  Array<uint32_t> starts, ordinals;
+};
+PortRecords gatherPort(pikort_pipeline &p, const Edge &edge);
+
+/// What has come into a stage, in lineage order; inside a cycle only what the
+/// cycle has emitted, unless `fromOutside`.
+Stream gatherInputs(pikort_pipeline &p, const Stage &stage, bool fromOutside);
+/// For each stream, the place of each item in the order of all their keys.
+std::vector<Array<uint32_t>> mergePlaces(pikort_pipeline &p,
+                                         const std::vector<Stream> &streams);
 
 // --- Cells.cpp --------------------------------------------------------------
 
 /// Sets the kernel's positions, order and offsets, and rank if `rankNeeded`.
 void binItems(pikort_pipeline &p, const Stage &stage, Kernel &kernel,
               bool rankNeeded);
-/// Cuts the positions into units.
+
+// --- Units.cpp --------------------------------------------------------------
+
+/// Cuts the positions into calls, if Process takes a list, and units.
 void cutUnits(pikort_pipeline &p, const Stage &stage, Kernel &kernel);
 
 // --- State.cpp --------------------------------------------------------------

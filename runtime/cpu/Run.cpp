@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //===- Run.cpp - Begins and ends kernels ----------------------------------===//
 
-#include "cpu/Kernel.h"
+#include "cpu/Cycle.h"
 
 using namespace piko::rt;
 
@@ -16,6 +16,7 @@ void Kernel::clear() {
   input = {};
   offsets = {};
   order = {};
+  calls = {};
   rank = {};
   rankSize = 0;
   positions = 0;
@@ -23,8 +24,9 @@ void Kernel::clear() {
   counts.clear();
   units.clear();
   for (auto &lane : lanes)
-    for (PortLogs &logs : lane->logs)
-      logs.clear();
+    lane->clear();
+  firstRound = true;
+  launch = 0;
   pendingOutputs = 0;
   open = false;
 }
@@ -61,8 +63,8 @@ static void publish(const pikort_pipeline &p, Kernel &kernel) {
                   kernel.units.data(),
                   static_cast<int64_t>(kernel.units.size()),
                   kernel.source >= 0 ? 1 : stage.tiles,
-                  nullptr,
-                  0};
+                  kernel.calls.data(),
+                  kernel.calls.size()};
 }
 
 /// Units for the AssignBin of a source: any chunks will do.
@@ -79,10 +81,12 @@ static void prepareSource(pikort_pipeline &p, Kernel &kernel) {
 
 static void prepareStage(pikort_pipeline &p, Kernel &kernel) {
   Stage &stage = p.stages[kernel.stage];
-  kernel.stream = gatherInputs(p, stage);
+  Cycle *cycle = p.cycleOf(stage);
+  kernel.stream =
+      cycle ? cycle->takeInput(kernel) : gatherInputs(p, stage, true);
   if (stage.keyWidth > 0)
     kernel.keys = std::move(kernel.stream.keys);
-  bool rankNeeded = false;
+  bool rankNeeded = stage.loop >= 0;
   kernel.pendingOutputs = 0;
   for (int32_t e : stage.outputs) {
     if (e < 0)
@@ -94,7 +98,6 @@ static void prepareStage(pikort_pipeline &p, Kernel &kernel) {
   }
   binItems(p, stage, kernel, rankNeeded);
   cutUnits(p, stage, kernel);
-  kernel.slotsForCells = stage.collects() && !kernel.rank;
   kernel.counts.resize(stage.outputs.size());
   for (size_t port = 0; port < stage.outputs.size(); ++port)
     if (stage.outputs[port] >= 0 && byPosition(p, p.edges[stage.outputs[port]]))
@@ -139,7 +142,11 @@ static int32_t end(pikort_pipeline &p, Kernel &kernel) {
   KernelStats &stats = p.kernelStats[kernel.statsIndex];
   stats.milliseconds += millisecondsSince(kernel.started);
   ++stats.launches;
-  return status;
+  Cycle *cycle = p.cycleOf(p.stages[kernel.stage]);
+  if (!cycle || kernel.source >= 0 || status != PIKORT_OK)
+    return status;
+  return guarded(&p, "stage " + quoted(p.stages[kernel.stage].name),
+                 [&] { cycle->absorb(kernel); });
 }
 
 /// The kernel of a stage or a source, or null and an error.

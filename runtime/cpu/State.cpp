@@ -81,6 +81,6 @@ const int64_t *pikoir_cell_grid(pikort_pipeline *p, int32_t stage) {
   return p->stages[stage].cellGrid.data();
 }
 
-int32_t pikoir_threads(pikort_pipeline *p) { return p->threads; }
+int32_t pikoir_threads(pikort_pipeline *p) { return p->activeThreads; }
 
 } // extern "C"

@@ -24,9 +24,14 @@ static Lane *laneOf(pikoir_writer *writer) {
   return static_cast<Lane *>(writer);
 }
 
-static void outOfMemory(Lane *lane, int64_t bytes) {
-  lane->pipeline->report({lane->unit, PIKORT_OUT_OF_MEMORY, lane->stage, bytes,
-                          lane->pipeline->memory.limit()});
+void piko::rt::outOfMemory(const Lane &lane, int64_t bytes) {
+  lane.pipeline->report({lane.unit, PIKORT_OUT_OF_MEMORY, lane.stage, bytes,
+                         lane.pipeline->memory.limit()});
+}
+
+void piko::rt::badCall(const Lane &lane, BadCall which) {
+  lane.pipeline->report({lane.unit, PIKORT_BAD_PROGRAM, lane.stage,
+                         static_cast<int64_t>(which), 0});
 }
 
 /// Ends the segment at `cursor`.
@@ -59,9 +64,9 @@ static bool grow(Lane *lane, Log &log, uint8_t *&cursor, uint8_t *&end,
     log.blocks.push_back(std::move(block));
     return true;
   } catch (const OutOfMemory &refused) {
-    outOfMemory(lane, refused.bytes);
+    outOfMemory(*lane, refused.bytes);
   } catch (...) {
-    outOfMemory(lane, bytes);
+    outOfMemory(*lane, bytes);
   }
   log.failed = true;
   return false;
@@ -100,6 +105,8 @@ static void noteOrdinal(Lane *lane, int32_t port) {
 
 uint8_t *pikoir_append(pikoir_writer *writer, int32_t port) {
   pikoir_port &out = writer->ports[port];
+  if (out.flags & PIKOIR_PORT_DEFERRED) [[unlikely]]
+    return deferAppend(*laneOf(writer), port);
   if (out.cursor > out.limit) [[unlikely]]
     growRecords(laneOf(writer), port);
   uint8_t *record = out.cursor;
@@ -150,10 +157,8 @@ static void insertCell(pikoir_port &out, uint32_t cell) {
 
 [[gnu::noinline]] static void badPlace(Lane *lane, int32_t port, int64_t cell) {
   pikoir_port &out = lane->ports[port];
-  if (out.last_cell == noRecord) {
-    lane->pipeline->report({lane->unit, PIKORT_BAD_PROGRAM, lane->stage, 0, 0});
-    return;
-  }
+  if (out.last_cell == noRecord)
+    return badCall(*lane, BadCall::PlaceFirst);
   const Stage &to = lane->pipeline->stages[lane->logs[port].consumer];
   int64_t bin = cell / to.tiles - (cell % to.tiles < 0);
   lane->pipeline->report({lane->unit, PIKORT_BIN_OUTSIDE,
@@ -162,6 +167,8 @@ static void insertCell(pikoir_port &out, uint32_t cell) {
 
 void pikoir_place(pikoir_writer *writer, int32_t port, int64_t cell) {
   pikoir_port &out = writer->ports[port];
+  if (out.flags & PIKOIR_PORT_DEFERRED) [[unlikely]]
+    return deferPlace(*laneOf(writer), port, cell);
   if (static_cast<uint64_t>(cell) >= static_cast<uint64_t>(out.cells) ||
       out.last_cell == noRecord) [[unlikely]]
     return badPlace(laneOf(writer), port, cell);
@@ -196,20 +203,20 @@ void pikoir_place_source(pikoir_writer *writer, int64_t cell) {
 
 // --- Positions and units ----------------------------------------------------
 
-[[gnu::noinline]] static void badNext(Lane *lane) {
-  lane->pipeline->report({lane->unit, PIKORT_BAD_PROGRAM, lane->stage, 1, 0});
-}
-
 void pikoir_next(pikoir_writer *writer) {
   if (writer->flags == 0)
     return;
+  if (writer->flags & PIKOIR_PORT_DEFERRED) [[unlikely]] {
+    badCall(*laneOf(writer), BadCall::StillDeferring);
+    pikoir_defer_end(writer);
+  }
   writer->ordinal = 0;
   for (int32_t i = 0; i < writer->port_count; ++i) {
     pikoir_port &out = writer->ports[i];
     if (out.flags & PIKOIR_PORT_COUNTS) {
       int64_t now = out.cells ? out.kept : out.emitted;
       if (out.counts == laneOf(writer)->logs[i].countsEnd) [[unlikely]]
-        return badNext(laneOf(writer));
+        return badCall(*laneOf(writer), BadCall::Next);
       *out.counts++ = static_cast<uint32_t>(now - out.mark);
       out.mark = now;
     }
@@ -265,6 +272,11 @@ pikoir_writer *pikoir_open_source(pikort_pipeline *p, int32_t source,
 
 void pikoir_close(pikoir_writer *writer) {
   Lane *lane = laneOf(writer);
+  if (lane->flags & PIKOIR_PORT_DEFERRED) [[unlikely]] {
+    badCall(*lane, BadCall::StillDeferring);
+    pikoir_defer_end(writer);
+  }
+  pikoir_scratch_release(writer, 0);
   try {
     for (int32_t i = 0; i < lane->port_count; ++i) {
       pikoir_port &out = lane->ports[i];
@@ -279,7 +291,7 @@ void pikoir_close(pikoir_writer *writer) {
                  reinterpret_cast<uint8_t *>(out.ordinal_cursor));
     }
   } catch (...) { // no memory for the list of segments
-    outOfMemory(lane, sizeof(Segment));
+    outOfMemory(*lane, sizeof(Segment));
   }
   std::lock_guard<std::mutex> lock(lane->kernel->laneMutex);
   lane->kernel->freeLanes.push_back(lane); // has room for all lanes
@@ -314,7 +326,7 @@ static void preparePort(pikort_pipeline &p, const Kernel &kernel, Lane &lane,
   } else {
     int32_t e = p.stages[kernel.stage].outputs[port];
     logs.consumer = e < 0 ? kernel.stage : p.edges[e].consumer;
-    if (e >= 0 && p.edges[e].keyed)
+    if (e >= 0 && (p.edges[e].keyed || p.stages[kernel.stage].loop >= 0))
       out.flags |= PIKOIR_PORT_ORDINALS;
     if (kernel.counts[port])
       out.flags |= PIKOIR_PORT_COUNTS;
@@ -335,13 +347,14 @@ static void preparePort(pikort_pipeline &p, const Kernel &kernel, Lane &lane,
 }
 
 void piko::rt::prepareLanes(pikort_pipeline &p, Kernel &kernel) {
-  while (kernel.lanes.size() < static_cast<size_t>(p.threads))
+  size_t needed = std::min(static_cast<size_t>(p.threads), kernel.units.size());
+  while (kernel.lanes.size() < needed)
     kernel.lanes.push_back(makeLane(p, kernel));
   kernel.freeLanes.clear();
-  kernel.freeLanes.reserve(kernel.lanes.size());
-  for (auto &lane : kernel.lanes) {
+  kernel.freeLanes.reserve(needed);
+  for (size_t i = 0; i < needed; ++i) {
+    auto &lane = kernel.lanes[i];
     lane->flags = 0;
-    lane->emitted = 0;
     for (size_t port = 0; port < lane->logs.size(); ++port) {
       preparePort(p, kernel, *lane, port);
       lane->flags |= lane->ports[port].flags;

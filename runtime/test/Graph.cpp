@@ -62,7 +62,7 @@ std::vector<std::pair<int, Item>> Graph::emissions(int stage, uint64_t seed,
                                                    int hops) const {
   const TestStage &s = stages[stage];
   std::vector<std::pair<int, Item>> result;
-  if (s.ports.empty())
+  if (s.ports.empty() || hops >= mostHops)
     return result;
   uint64_t h = mix(seed, 1000 + static_cast<uint64_t>(stage));
   auto n = h % static_cast<uint64_t>(s.mostEmissions + 1);
@@ -72,6 +72,108 @@ std::vector<std::pair<int, Item>> Graph::emissions(int stage, uint64_t seed,
                       {id, static_cast<uint8_t>(hops + 1)}});
   }
   return result;
+}
+
+int Graph::kindOf(int stage, int64_t bin) const {
+  const TestStage &s = stages[stage];
+  return s.perBin ? static_cast<int>(mix(static_cast<uint64_t>(bin), 1) % 4)
+                  : s.schedule;
+}
+
+int64_t Graph::batchOf(int stage, int64_t bin) const {
+  const TestStage &s = stages[stage];
+  return s.perBin ? static_cast<int64_t>(mix(static_cast<uint64_t>(bin), 2) % 4)
+                  : s.batch;
+}
+
+bool Graph::everyBinOf(int stage, int64_t bin) const {
+  const TestStage &s = stages[stage];
+  return s.perBin ? mix(static_cast<uint64_t>(bin), 3) & 1 : s.everyBin;
+}
+
+/// reach[i][j]: some edges that `follow` accepts lead from i to j.
+static std::vector<std::vector<bool>> reachability(const Graph &g,
+                                                   auto &&follow) {
+  size_t n = g.stages.size();
+  std::vector reach(n, std::vector<bool>(n));
+  for (size_t i = 0; i < n; ++i)
+    for (int to : g.stages[i].ports)
+      if (follow(to))
+        reach[i][static_cast<size_t>(to)] = true;
+  for (size_t k = 0; k < n; ++k)
+    for (size_t i = 0; i < n; ++i)
+      for (size_t j = 0; j < n; ++j)
+        if (reach[i][k] && reach[k][j])
+          reach[i][j] = true;
+  return reach;
+}
+
+std::vector<int> Graph::loopOf(int stage) const {
+  auto reach = reachability(*this, [&](int to) { return !collects(to); });
+  auto s = static_cast<size_t>(stage);
+  std::vector<int> loop;
+  for (size_t t = 0; t < stages.size(); ++t)
+    if (reach[s][t] && reach[t][s])
+      loop.push_back(static_cast<int>(t));
+  return loop;
+}
+
+std::vector<TestComponent> Graph::order() const {
+  auto reach = reachability(*this, [](int) { return true; });
+  size_t n = stages.size();
+  auto together = [&](size_t a, size_t b) {
+    return a == b || (reach[a][b] && reach[b][a]);
+  };
+  std::vector<bool> done(n);
+  auto ready = [&](size_t s) {
+    for (size_t t = 0; t < n; ++t) {
+      if (together(s, t) || done[t])
+        continue;
+      for (int to : stages[t].ports)
+        if (together(s, static_cast<size_t>(to)))
+          return false;
+      for (size_t member = 0; member < n; ++member)
+        for (int waitedFor : stages[member].waits)
+          if (together(s, member) && static_cast<int>(t) == waitedFor)
+            return false;
+    }
+    return true;
+  };
+  std::vector<TestComponent> result;
+  for (size_t s = 0; s < n;) {
+    if (done[s] || !ready(s)) {
+      ++s;
+      continue;
+    }
+    TestComponent &component = result.emplace_back();
+    component.cyclic = reach[s][s];
+    for (size_t t = s; t < n; ++t)
+      if (together(s, t)) {
+        done[t] = true;
+        component.stages.push_back(static_cast<int>(t));
+      }
+    s = 0;
+  }
+  return result;
+}
+
+void Graph::normalise(std::vector<Arrivals> &arrivals) const {
+  for (size_t s = 0; s < stages.size(); ++s) {
+    std::vector<int> loop = loopOf(static_cast<int>(s));
+    if (loop.empty())
+      continue;
+    bool ordered = false;
+    for (int member : loop)
+      ordered |= (stages[member].flags & PIKOIR_ORDERED) != 0;
+    Arrivals &log = arrivals[s];
+    if (ordered) {
+      log.items.clear();
+      continue;
+    }
+    std::sort(log.items.begin(), log.items.end());
+    for (auto &cell : log.cells)
+      std::sort(cell.begin(), cell.end());
+  }
 }
 
 namespace {
@@ -89,33 +191,22 @@ public:
     for (size_t i = 0; i < g_.sources.size(); ++i)
       for (const Item &item : g_.input[i])
         arrive(g_.sources[i], item);
-    for (int s : order())
-      if (g_.stages[s].flags & PIKOIR_COLLECTS)
-        runCollected(s);
+    for (const TestComponent &component : g_.order()) {
+      bool more = true;
+      for (int round = 0; more; ++round) {
+        more = false;
+        for (int s : component.stages)
+          if (g_.collects(s))
+            runCollected(s, round == 0);
+        for (int s : component.stages)
+          more |= !waiting_[s].empty();
+      }
+    }
     return std::move(log_);
   }
 
 private:
   using Visit = std::pair<int64_t, Item>; // cell, item
-
-  /// Topological, ties by number.
-  std::vector<int> order() const {
-    std::vector<int> waits(g_.stages.size()), result;
-    for (const TestStage &s : g_.stages)
-      for (int consumer : s.ports)
-        ++waits[consumer];
-    std::vector<bool> done(waits.size());
-    while (result.size() < waits.size())
-      for (size_t s = 0; s < waits.size(); ++s)
-        if (!done[s] && waits[s] == 0) {
-          done[s] = true;
-          result.push_back(static_cast<int>(s));
-          for (int consumer : g_.stages[s].ports)
-            --waits[consumer];
-          break;
-        }
-    return result;
-  }
 
   void arrive(int stage, const Item &item) {
     std::vector<int64_t> named = g_.places(stage, item);
@@ -125,7 +216,7 @@ private:
     log_[stage].items.push_back(item.id);
     for (int64_t cell : cells) {
       log_[stage].cells[static_cast<size_t>(cell)].push_back(item.id);
-      if (g_.stages[stage].flags & PIKOIR_COLLECTS)
+      if (g_.collects(stage))
         waiting_[stage].push_back({cell, item});
       else
         emit(stage, mix(item.id, static_cast<uint64_t>(cell)), item.hops);
@@ -137,27 +228,35 @@ private:
       arrive(g_.stages[stage].ports[port], item);
   }
 
-  void runCollected(int s) {
-    std::vector<Visit> visits = std::move(waiting_[s]);
+  void runCollected(int s, bool firstRound) {
+    std::vector<Visit> visits = std::exchange(waiting_[s], {});
     int64_t tiles = g_.tiles(s);
-    std::vector<size_t> by(visits.size());
-    std::iota(by.begin(), by.end(), size_t(0));
-    std::sort(by.begin(), by.end(), [&](size_t a, size_t b) {
-      return std::pair(visits[a].first / tiles, a) <
-             std::pair(visits[b].first / tiles, b);
-    });
-    if (!g_.stages[s].list) {
-      for (size_t v : by)
-        emit(s,
-             mix(visits[v].second.id, static_cast<uint64_t>(visits[v].first)),
-             visits[v].second.hops);
+    std::ranges::stable_sort(
+        visits, {}, [&](const Visit &visit) { return visit.first / tiles; });
+    if (!g_.takesList(s)) {
+      for (auto &[cell, item] : visits)
+        emit(s, mix(item.id, static_cast<uint64_t>(cell)), item.hops);
       return;
     }
-    for (int64_t cell = 0; cell < g_.cells(s); ++cell) { // every bin
-      uint64_t seed = static_cast<uint64_t>(cell);
-      for (uint64_t id : log_[s].cells[static_cast<size_t>(cell)])
-        seed = mix(seed, id);
-      emit(s, seed, 0);
+    size_t next = 0;
+    for (int64_t bin = 0; bin < g_.cells(s); ++bin) {
+      size_t begin = next;
+      while (next < visits.size() && visits[next].first == bin)
+        ++next;
+      if (begin == next && !(g_.everyBinOf(s, bin) && firstRound))
+        continue;
+      size_t batch = static_cast<size_t>(g_.batchOf(s, bin));
+      do {
+        uint64_t seed = static_cast<uint64_t>(bin);
+        int hops = 0;
+        size_t end = batch ? std::min(next, begin + batch) : next;
+        for (; begin < end; ++begin) {
+          seed = mix(seed, visits[begin].second.id);
+          hops = std::max<int>(hops, visits[begin].second.hops);
+        }
+        log_[s].calls.push_back(seed);
+        emit(s, seed, hops);
+      } while (begin < next);
     }
   }
 
@@ -195,9 +294,15 @@ Graph Graph::random(uint64_t seed, int stageCount, int64_t items) {
     if (draw(4) == 0)
       stage.split = 5;
     stage.schedule = draw(4);
-    stage.list = stage.flags & PIKOIR_COLLECTS && !stage.tile && draw(2);
-    if (stage.list)
-      stage.flags &= ~PIKOIR_SPLIT;
+    if (stage.flags & PIKOIR_COLLECTS && !stage.tile && draw(2)) {
+      stage.flags |= PIKOIR_LIST;
+      if (draw(2))
+        stage.flags &= ~PIKOIR_COLLECTS; // LIST says it all
+      stage.batch = draw(2) ? draw(5) : 0;
+      stage.everyBin = draw(2);
+    }
+    stage.perBin = draw(4) == 0;
+    stage.deferred = draw(4) == 0;
     stage.spread = draw(4) ? 3 : 1;
     int ports = s + 1 < stageCount ? 1 + draw(3) : 0;
     for (int i = 0; i < ports; ++i)
@@ -215,6 +320,25 @@ Graph Graph::random(uint64_t seed, int stageCount, int64_t items) {
   return g;
 }
 
+Graph Graph::randomCyclic(uint64_t seed, int stageCount, int64_t items) {
+  Graph g = random(seed, stageCount, items);
+  uint64_t state = seed;
+  auto draw = [&](int below) {
+    state = mix(state, 6);
+    return static_cast<int>((state >> 8) % static_cast<uint64_t>(below));
+  };
+  for (int s = 0; s < stageCount; ++s) {
+    TestStage &stage = g.stages[s];
+    if (draw(2))
+      stage.ports.push_back(draw(s + 1));
+    if (draw(6) == 0)
+      stage.flags |= PIKOIR_ORDERED;
+    stage.spread = std::min(stage.spread, 2);
+  }
+  g.mostHops = 6;
+  return g;
+}
+
 // --- Through the ABI --------------------------------------------------------
 
 static Graph *current = nullptr;
@@ -229,6 +353,10 @@ static void setup(pikort_pipeline *p) {
     auto id = static_cast<int32_t>(s);
     pikoir_declare_stage(p, id, ("s" + std::to_string(s)).c_str(), 0, stage.bin,
                          stage.schedule, stage.split, stage.flags, stage.tile);
+    if (stage.flags & PIKOIR_LIST)
+      pikoir_declare_schedule(p, id, stage.batch, stage.everyBin);
+    for (int waitedFor : stage.waits)
+      pikoir_declare_wait(p, id, waitedFor);
     for (size_t port = 0; port < stage.ports.size(); ++port)
       pikoir_declare_edge(p, id, static_cast<int32_t>(port), stage.ports[port]);
   }
@@ -249,6 +377,34 @@ static void write(pikoir_writer *w, int stage, int32_t port, const Item &item,
       fast ? pikoir_place_inline(w, port, cell) : pikoir_place(w, port, cell);
 }
 
+/// All emissions of a call, two from each iteration: first one from each, in
+/// order, then, after a barrier, the other from each, in reverse.
+static void writeDeferred(pikoir_writer *w, int stage,
+                          const std::vector<std::pair<int, Item>> &emissions) {
+  auto count = static_cast<int64_t>(emissions.size());
+  int64_t iterations = (count + 1) / 2;
+  auto emit = [&](int64_t iteration, int64_t i) {
+    pikoir_defer_iteration(w, iteration);
+    auto &[port, item] = emissions[static_cast<size_t>(i)];
+    write(w, stage, port, item, i & 2);
+  };
+  pikoir_defer_begin(w, iterations);
+  for (int64_t i = 0; i < iterations; ++i)
+    emit(i, 2 * i);
+  for (int64_t i = iterations - 1; i >= 0; --i)
+    if (2 * i + 1 < count)
+      emit(i, 2 * i + 1);
+  pikoir_defer_end(w);
+}
+
+static uint64_t callSeed(const pikoir_input *in, const pikoir_call &call) {
+  auto *items = reinterpret_cast<const Item *>(in->items);
+  auto seed = static_cast<uint64_t>(call.bin);
+  for (int64_t i = call.begin; i < call.end; ++i)
+    seed = mix(seed, items[in->order ? in->order[i] : i].id);
+  return seed;
+}
+
 static void runUnit(pikort_pipeline *p, int stage, const pikoir_input *in,
                     int64_t u) {
   const pikoir_unit &unit = in->units[u];
@@ -257,22 +413,27 @@ static void runUnit(pikort_pipeline *p, int stage, const pikoir_input *in,
   bool fast = mix(static_cast<uint64_t>(stage), 3) & 1;
   pikoir_writer *w = pikoir_open(p, stage, u);
   auto emit = [&](uint64_t seed, int hops) {
-    for (auto &[port, item] : current->emissions(stage, seed, hops))
-      write(w, stage, port, item, fast);
+    auto emissions = current->emissions(stage, seed, hops);
+    if (s.deferred)
+      writeDeferred(w, stage, emissions);
+    else
+      for (auto &[port, item] : emissions)
+        write(w, stage, port, item, fast);
     fast ? pikoir_next_inline(w) : pikoir_next(w);
   };
   int64_t cell = unit.cell_begin;
-  for (int64_t i = unit.begin; i < unit.end && !s.list; ++i) {
+  for (int64_t i = unit.begin; i < unit.end && !in->calls; ++i) {
     while (in->offsets[cell + 1] <= i)
       ++cell;
     const Item &item = items[in->order ? in->order[i] : i];
     emit(mix(item.id, static_cast<uint64_t>(cell)), item.hops);
   }
-  for (; s.list && cell < unit.cell_end; ++cell) {
-    uint64_t seed = static_cast<uint64_t>(cell);
-    for (int64_t i = in->offsets[cell]; i < in->offsets[cell + 1]; ++i)
-      seed = mix(seed, items[in->order ? in->order[i] : i].id);
-    emit(seed, 0);
+  for (; in->calls && cell < unit.cell_end; ++cell) {
+    const pikoir_call &call = in->calls[cell];
+    int hops = 0;
+    for (int64_t i = call.begin; i < call.end; ++i)
+      hops = std::max<int>(hops, items[in->order ? in->order[i] : i].hops);
+    emit(callSeed(in, call), hops);
   }
   pikoir_close(w);
 }
@@ -286,7 +447,6 @@ static void note(int stage, const pikoir_input *in) {
   EXPECT_EQ(in->offsets[0], 0);
   EXPECT_EQ(in->offsets[cells], in->count);
   int64_t itemCount = 0;
-  log.cells.resize(static_cast<size_t>(cells));
   std::set<int64_t> seen;
   for (int64_t c = 0; c < cells; ++c)
     for (int64_t i = in->offsets[c]; i < in->offsets[c + 1]; ++i) {
@@ -300,25 +460,40 @@ static void note(int stage, const pikoir_input *in) {
     }
   for (int64_t item : seen)
     log.items.push_back(items[item].id);
-  int64_t position = 0, cell = 0;
+  bool list = current->takesList(stage);
+  EXPECT_EQ(in->calls != nullptr, list);
+  int64_t position = 0, next = 0;
   for (int64_t u = 0; u < in->unit_count; ++u) {
     const pikoir_unit &unit = in->units[u];
     EXPECT_EQ(unit.begin, position);
+    position = unit.end;
+    if (list) {
+      EXPECT_EQ(unit.cell_begin, next);
+      next = unit.cell_end;
+      EXPECT_EQ(in->calls[unit.cell_begin].begin, unit.begin);
+      EXPECT_EQ(in->calls[next - 1].end, unit.end);
+      bool splits = (current->stages[stage].flags &
+                     (PIKOIR_SPLIT | PIKOIR_ORDERED)) == PIKOIR_SPLIT;
+      if (next < in->call_count && !splits)
+        EXPECT_LT(in->calls[next - 1].bin, in->calls[next].bin);
+      continue;
+    }
     EXPECT_GE(unit.begin, in->offsets[unit.cell_begin]);
     EXPECT_LE(unit.end, in->offsets[unit.cell_end]);
-    if (unit.cell_end - unit.cell_begin > 1) {
+    if (unit.cell_end - unit.cell_begin > 1 ||
+        current->stages[stage].flags & PIKOIR_ORDERED) {
       EXPECT_EQ(unit.begin, in->offsets[unit.cell_begin]);
       EXPECT_EQ(unit.end, in->offsets[unit.cell_end]);
     }
-    if (current->stages[stage].flags & PIKOIR_COLLECTS) {
-      EXPECT_LE(unit.cell_begin, cell);
-      cell = unit.cell_end;
-    }
-    position = unit.end;
   }
   EXPECT_EQ(position, in->count);
-  if (current->stages[stage].flags & PIKOIR_COLLECTS)
-    EXPECT_EQ(cell, cells);
+  EXPECT_EQ(next, in->call_count);
+  for (int64_t c = 0; c < in->call_count; ++c) {
+    const pikoir_call &call = in->calls[c];
+    EXPECT_GE(call.begin, in->offsets[call.bin]);
+    EXPECT_LE(call.end, in->offsets[call.bin + 1]);
+    log.calls.push_back(callSeed(in, call));
+  }
 }
 
 static int32_t assignSource(pikort_pipeline *p, int32_t source) {
@@ -350,17 +525,44 @@ static int32_t runStage(pikort_pipeline *p, int32_t stage) {
   return pikoir_end(p, stage);
 }
 
+static void scheduleBins(pikort_pipeline *p, int32_t stage) {
+  int64_t bins = pikoir_begin_schedule(p, stage);
+  EXPECT_EQ(bins, current->cells(stage) / current->tiles(stage));
+  for (int64_t bin = 0; bin < bins; ++bin) {
+    int64_t batch =
+        current->takesList(stage) ? current->batchOf(stage, bin) : 0;
+    pikoir_schedule_bin(p, stage, bin, current->kindOf(stage, bin), bin % 3 * 5,
+                        batch ? batch : PIKOIR_NO_BATCH,
+                        current->everyBinOf(stage, bin));
+  }
+}
+
 static int32_t runGraph(pikort_pipeline *p) {
   current->arrivals.assign(current->stages.size(), {});
   current->paddingSeen = false;
+  for (size_t s = 0; s < current->stages.size(); ++s)
+    current->arrivals[s].cells.resize(
+        static_cast<size_t>(current->cells(static_cast<int>(s))));
+  for (size_t s = 0; s < current->stages.size(); ++s)
+    if (current->stages[s].perBin)
+      scheduleBins(p, static_cast<int32_t>(s));
   for (size_t i = 0; i < current->sources.size(); ++i)
     if (current->stages[current->sources[i]].flags & PIKOIR_PLACED)
       if (int32_t status = assignSource(p, static_cast<int32_t>(i)))
         return status;
-  // Stages are numbered producers first.
-  for (size_t s = 0; s < current->stages.size(); ++s)
-    if (int32_t status = runStage(p, static_cast<int32_t>(s)))
+  for (const TestComponent &component : current->order()) {
+    int32_t stage = component.stages.back();
+    if (!component.cyclic) {
+      if (int32_t status = runStage(p, stage))
+        return status;
+      continue;
+    }
+    while ((stage = pikoir_cycle_step(p, component.stages.back())) >= 0)
+      if (int32_t status = runStage(p, stage))
+        return status;
+    if (int32_t status = pikoir_status(p))
       return status;
+  }
   return 0;
 }
 

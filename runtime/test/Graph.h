@@ -35,17 +35,28 @@ struct TestStage {
   int64_t tile = 0; ///< Owner tiles.
   int64_t split = 0;
   int schedule = PIKOIR_LOAD_BALANCE;
-  bool list = false;      ///< Processes whole lists (flags has COLLECTS).
+  int64_t batch = 0;      ///< Of lists; 0 = the whole list.
+  bool everyBin = false;  ///< Of lists.
+  bool perBin = false;    ///< The schedule depends on the bin.
+  bool deferred = false;  ///< Emits from iterations that take turns.
   std::vector<int> ports; ///< Consumer of each port.
+  std::vector<int> waits; ///< Stages that it waits for.
   int spread = 3;         ///< Most places of one primitive, plus one.
   int mostEmissions = 2;  ///< Of one call.
   int64_t runLength = 0;  ///< If not 0: ids in runs share a cell, swapped.
+};
+
+/// Stages on a common cycle, or one stage.
+struct TestComponent {
+  std::vector<int> stages;
+  bool cyclic = false;
 };
 
 /// What reached a stage.
 struct Arrivals {
   std::vector<uint64_t> items;              ///< In lineage order.
   std::vector<std::vector<uint64_t>> cells; ///< In each cell, in order.
+  std::vector<uint64_t> calls; ///< Of lists: a hash of each, in order.
   bool operator==(const Arrivals &) const = default;
 };
 
@@ -54,6 +65,7 @@ struct Graph {
   std::vector<TestStage> stages;
   std::vector<int> sources; ///< Stage of each source.
   std::vector<std::vector<Item>> input;
+  int mostHops = 8; ///< Primitives that have made so many emit nothing.
 
   // Filled by the runs.
   std::vector<Arrivals> arrivals;
@@ -68,10 +80,28 @@ struct Graph {
   std::vector<std::pair<int, Item>> emissions(int stage, uint64_t seed,
                                               int hops) const;
 
+  /// What the schedule says of a bin.
+  int kindOf(int stage, int64_t bin) const;
+  int64_t batchOf(int stage, int64_t bin) const;
+  bool everyBinOf(int stage, int64_t bin) const;
+  bool takesList(int stage) const { return stages[stage].flags & PIKOIR_LIST; }
+  bool collects(int stage) const {
+    return stages[stage].flags & (PIKOIR_LIST | PIKOIR_COLLECTS);
+  }
+  /// The stages on a common cycle with `stage`, of those that do not collect.
+  std::vector<int> loopOf(int stage) const;
+  /// Components in the order in which they run.
+  std::vector<TestComponent> order() const;
+  /// What tests may compare: a loop's stages take their primitives in any
+  /// order, unless that can be seen; then only that in each cell is compared.
+  void normalise(std::vector<Arrivals> &arrivals) const;
+
   /// Runs the meaning; returns what reached each stage.
   std::vector<Arrivals> model() const;
   /// A graph of `stageCount` stages drawn from `seed`.
   static Graph random(uint64_t seed, int stageCount, int64_t items);
+  /// The same with edges to earlier stages.
+  static Graph randomCyclic(uint64_t seed, int stageCount, int64_t items);
 };
 
 uint64_t mix(uint64_t a, uint64_t b);

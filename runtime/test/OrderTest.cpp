@@ -11,13 +11,17 @@ using namespace piko::rt::test;
 /// Runs a graph on 1, 2 and 7 threads, twice each, and compares.
 static void check(Graph &graph) {
   std::vector<Arrivals> expected = graph.model();
+  graph.normalise(expected);
   GraphRun run(graph);
   for (int threads : {1, 2, 7, 2}) {
     ASSERT_EQ(run.run(threads), PIKORT_OK) << pikort_message(run.get());
+    graph.normalise(graph.arrivals);
     for (size_t s = 0; s < expected.size(); ++s) {
       ASSERT_EQ(graph.arrivals[s].items, expected[s].items)
           << "stage " << s << ", " << threads << " threads";
       ASSERT_EQ(graph.arrivals[s].cells, expected[s].cells)
+          << "stage " << s << ", " << threads << " threads";
+      ASSERT_EQ(graph.arrivals[s].calls, expected[s].calls)
           << "stage " << s << ", " << threads << " threads";
     }
     EXPECT_FALSE(graph.paddingSeen);
@@ -99,8 +103,8 @@ TEST(Order, MergesTilesOfCollectingStages) {
 TEST(Order, ListsJoinWithPrimitives) {
   TestStage list;
   list.bin[0] = list.bin[1] = 3;
-  list.flags = PIKOIR_PLACED | PIKOIR_COLLECTS;
-  list.list = true;
+  list.flags = PIKOIR_PLACED | PIKOIR_LIST;
+  list.everyBin = true;
   list.ports = {2, 1};
   list.mostEmissions = 4;
   TestStage middle;
@@ -139,6 +143,17 @@ TEST(Order, RandomGraphs) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     Graph graph = Graph::random(seed, 1 + static_cast<int>(seed % 7),
                                 seed % 5 == 0 ? 1500 : 120);
+    check(graph);
+    if (HasFatalFailure())
+      return;
+  }
+}
+
+TEST(Order, RandomCyclicGraphs) {
+  for (uint64_t seed = 0; seed < 400; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    Graph graph = Graph::randomCyclic(seed, 1 + static_cast<int>(seed % 7),
+                                      seed % 7 == 0 ? 100 : 20);
     check(graph);
     if (HasFatalFailure())
       return;

@@ -115,9 +115,9 @@ PIKORT_API int32_t pikoir_status(pikort_pipeline *p);
 
 /// Positions [begin, end), which lie in cells [cell_begin, cell_end). A unit
 /// has several cells only if it has them whole; units partition the positions
-/// in order. For a stage that collects they cover all cells, empty ones too.
-/// In a LIST stage cell_begin and cell_end are indices of calls, and units
-/// partition the calls; those of one bin are in one unit unless it is SPLIT.
+/// in order. In a LIST stage cell_begin and cell_end are indices of calls, and
+/// units partition the calls; those of one bin are in one unit unless it is
+/// SPLIT.
 typedef struct pikoir_unit {
   int64_t cell_begin;
   int64_t cell_end;

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//===- Cycle.h - Runs a cycle of stages until nothing is left -------------===//
+//
+// A cycle is a component of the graph, and says which kernel runs next. Its
+// stages that do not collect form parts: loops, and stages between them.
+//
+//   1. spread   Parts run, producers first, until all primitives have come to
+//               stages that collect, or have left the cycle.
+//   2. collect  The next stage that collects, in order of declaration, takes
+//               what it has; then 1. When all have had their turn and something
+//               is left, another round begins.
+//
+// What its kernels emit goes to the queues of edges, where it is in lineage
+// order: each launch of a stage that collects begins a new lineage. A cycle of
+// stages that do not collect is one loop, and ends with the first spread.
+//
+//===----------------------------------------------------------------------===//
+
+#ifndef PIKO_RUNTIME_CPU_CYCLE_H
+#define PIKO_RUNTIME_CPU_CYCLE_H
+
+#include "cpu/Loop.h"
+
+namespace piko::rt {
+
+class Cycle {
+public:
+  Cycle(pikort_pipeline &p, const Component &component);
+
+  /// The stage to run next, or -1; throws.
+  int32_t step();
+  bool isFinished() const { return finished_; }
+  /// The input of the stage that step() named, once.
+  Stream takeInput(Kernel &kernel);
+  /// Takes what its kernel emitted.
+  void absorb(Kernel &kernel);
+
+private:
+  /// A loop, or a stage.
+  struct Part {
+    std::vector<int32_t> stages;
+    std::unique_ptr<Loop> loop;
+    bool started = false; ///< In this spread.
+  };
+
+  void sortParts();
+  int32_t choose();
+  int32_t runPart(Part &part);
+  int32_t nextCollector();
+  void beginRound();
+  Part &partOf(int32_t stage);
+  bool hasInput(const Stage &stage, bool fromOutside) const;
+  bool comesFromOutside(const Stage &stage) const;
+
+  pikort_pipeline &p_;
+  const Component &component_;
+  std::vector<Part> parts_;         ///< Producers first.
+  std::vector<int32_t> collectors_; ///< In order of declaration.
+  size_t part_ = 0, collector_ = 0;
+  int64_t round_ = 0;
+  int64_t launches_ = 0;    ///< Of collectors.
+  bool fromOutside_ = true; ///< This spread takes what comes into the cycle.
+  bool finished_ = false;
+  int32_t chosen_ = -1; ///< The stage whose kernel is to run.
+  bool begun_ = false;  ///< It has its input.
+};
+
+/// Makes the cycles of a run, and frees them.
+void startCycles(pikort_pipeline &p);
+void endCycles(pikort_pipeline &p);
+
+} // namespace piko::rt
+
+#endif // PIKO_RUNTIME_CPU_CYCLE_H

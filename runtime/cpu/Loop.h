@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//===- Loop.h - A cycle of stages that do not collect ---------------------===//
+//
+// What comes into a loop, and all that follows from it, is in depth-first
+// order. It runs in one of two ways:
+//
+//   WaveLoop    all primitives of a stage that have made the same number of
+//               hops at once, in parallel; a LineageTree remembers the order;
+//   StackLoop   if the order of some stage's calls can be seen: one position at
+//               a time, from a stack.
+//
+// What leaves the loop goes, in order, to the queues of its edges. Its key is
+// that of the entry that it comes from, and its place among all that left.
+//
+//===----------------------------------------------------------------------===//
+
+#ifndef PIKO_RUNTIME_CPU_LOOP_H
+#define PIKO_RUNTIME_CPU_LOOP_H
+
+#include "cpu/LineageTree.h"
+
+namespace piko::rt {
+
+class Loop {
+public:
+  static std::unique_ptr<Loop> make(pikort_pipeline &p, const LoopShape &shape);
+  virtual ~Loop() = default;
+
+  /// Takes what has come into the loop's stages.
+  void start(bool fromOutside);
+  /// The stage to run next, or -1 if nothing is left: then the queues of the
+  /// edges out of the loop are complete.
+  virtual int32_t next() = 0;
+  /// The input of that stage, once, and how many primitives it has.
+  virtual Stream takeInput() = 0;
+  virtual int64_t inputSize() const = 0;
+  /// Takes what that stage's kernel emitted.
+  void absorb(Kernel &kernel);
+
+protected:
+  /// What one port emitted. All records of a kernel are numbered in the order
+  /// of emission, over all ports.
+  struct Port {
+    int32_t edge;
+    PortRecords records;
+    Array<uint32_t> numbers;
+    int64_t count() const { return records.stream.count; }
+  };
+
+  Loop(pikort_pipeline &p, const LoopShape &shape) : p_(p), shape_(shape) {}
+  virtual void begin() = 0;
+  /// `items[n]` is the item of the kernel's input from which record n comes.
+  virtual void absorb(std::vector<Port> &ports, Array<uint32_t> items) = 0;
+
+  size_t members() const { return shape_.stages.size(); }
+  const Stage &member(size_t m) const { return p_.stages[shape_.stages[m]]; }
+  size_t memberOf(int32_t stage) const;
+  int64_t recordSize(const Stage &stage) const {
+    return p_.records[stage.record].size;
+  }
+  /// The words of the key of what left at `place`, if it has keys.
+  void writeKey(const Edge &edge, uint64_t *key, int64_t entry,
+                uint64_t place) const;
+  [[noreturn]] void failHops(const Stage &stage, int64_t cell) const;
+
+  pikort_pipeline &p_;
+  const LoopShape &shape_;
+  std::vector<Stream> entries_; ///< For each member.
+  /// For each member, the places of its entries among all; none = identity.
+  std::vector<Array<uint32_t>> places_;
+  int64_t entryCount_ = 0;
+
+private:
+  void numberRecords(const Kernel &kernel, std::vector<Port> &ports,
+                     uint32_t *items);
+
+  Array<uint64_t> keys_; ///< Of the entries, by place.
+};
+
+} // namespace piko::rt
+
+#endif // PIKO_RUNTIME_CPU_LOOP_H

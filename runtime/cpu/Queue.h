@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//===- Queue.h - Arrays that grow, and primitives that wait ---------------===//
+
+#ifndef PIKO_RUNTIME_CPU_QUEUE_H
+#define PIKO_RUNTIME_CPU_QUEUE_H
+
+#include "cpu/Kernel.h"
+
+#include <cstring>
+
+namespace piko::rt {
+
+/// An array that grows by doubling.
+template <class T> class Growing {
+public:
+  Growing() = default;
+  Growing(Growing &&other) noexcept
+      : array_(std::move(other.array_)), size_(std::exchange(other.size_, 0)) {}
+  Growing &operator=(Growing &&other) noexcept {
+    array_ = std::move(other.array_);
+    size_ = std::exchange(other.size_, 0);
+    return *this;
+  }
+
+  int64_t size() const { return size_; }
+  T *data() const { return array_.data(); }
+  T &operator[](int64_t i) const { return array_[i]; }
+
+  /// Room for `count` more, not initialised. Throws OutOfMemory.
+  T *extend(Memory &memory, int64_t count) {
+    if (!array_ || size_ + count > array_.capacity()) {
+      Array<T> larger(memory, std::max(size_ + count, 2 * size_));
+      if (size_ > 0)
+        std::memcpy(larger.data(), array_.data(),
+                    static_cast<size_t>(size_) * sizeof(T));
+      array_ = std::move(larger);
+    }
+    size_ += count;
+    return array_.data() + size_ - count;
+  }
+  void append(Memory &memory, const T *from, int64_t count) {
+    if (count > 0)
+      std::memcpy(extend(memory, count), from,
+                  static_cast<size_t>(count) * sizeof(T));
+  }
+  void shrink(int64_t size) { size_ = size; }
+  Array<T> take() {
+    size_ = 0;
+    return std::move(array_);
+  }
+
+private:
+  Array<T> array_;
+  int64_t size_ = 0;
+};
+
+/// Primitives on their way to a stage, in the order in which they came.
+struct Queue {
+  int64_t count = 0;
+  Growing<uint8_t> items;
+  Growing<uint32_t> pairs;
+  Growing<uint64_t> words; ///< Of keys.
+  Growing<uint32_t> nodes; ///< In the tree of a loop, if there is one.
+
+  /// Appends items of `size` bytes with keys of `keyWidth` words (0 = none).
+  void append(Memory &memory, const Stream &stream, int64_t size,
+              int32_t keyWidth) {
+    items.append(memory, stream.items, stream.count * size);
+    pairs.append(memory, stream.pairs, stream.pairCount);
+    if (keyWidth > 0) {
+      uint64_t *to = words.extend(memory, stream.count * keyWidth);
+      for (int64_t i = 0; i < stream.count; ++i)
+        for (int32_t w = 0; w < keyWidth; ++w)
+          *to++ = w < stream.keys.width ? stream.keys.word(i, w) : 0;
+    }
+    count += stream.count;
+  }
+
+  /// All items, without their nodes; the queue is empty then.
+  Stream take(int32_t keyWidth) {
+    Stream stream;
+    stream.count = std::exchange(count, 0);
+    stream.pairCount = pairs.size();
+    stream.itemStorage = items.take();
+    stream.pairStorage = pairs.take();
+    stream.items = stream.itemStorage.data();
+    stream.pairs = stream.pairStorage.data();
+    stream.keys.width = keyWidth;
+    stream.keys.words = words.take();
+    return stream;
+  }
+};
+
+} // namespace piko::rt
+
+#endif // PIKO_RUNTIME_CPU_QUEUE_H
