@@ -192,8 +192,8 @@ TEST(Errors, ListIndexOutOfRange) {
     }
   } pipe;
   EXPECT_THAT(messageOf([&] { run(pipe, {1}); }),
-              HasSubstr("Past', bin 0: expected a list index in [0, 1), but "
-                        "got 1"));
+              HasSubstr("Past', bin 0: expected an index in [0, 1), but got "
+                        "1"));
 }
 
 TEST(Errors, AllocateForAMissingSource) {
@@ -210,6 +210,91 @@ TEST(Errors, AllocateForAMissingSource) {
   } pipe;
   EXPECT_THAT(messageOf([&] { pipe.run(); }),
               HasSubstr("allocateForSource: expected a source below 1"));
+}
+
+// What stages wait for, and whether they keep the order, is the same in all
+// bins.
+enum class Varying { EndStage, EndBin, Order, Nothing };
+Varying varying;
+struct Varied : piko::Stage<1, 1, 1, int> {
+  void assignBin(const int &i) { assignToAll(i); }
+  void schedule(piko::BinId bin) {
+    specifySchedule(bin.index % 2 ? piko::DirectMap : piko::LoadBalance);
+    if (varying == Varying::EndStage && bin.index != 1)
+      endStage<Sink>();
+    if (varying == Varying::EndBin && bin.index == 2)
+      endBin();
+    if (varying == Varying::Order && bin.index == 0)
+      specifyOrder(piko::Unordered);
+  }
+  void process(const int &) {}
+};
+
+TEST(Errors, SchedulesThatDependOnTheBin) {
+  struct VariedPipe : piko::Pipe<> {
+    Varied varied;
+    Sink sink;
+    VariedPipe() {
+      source(varied);
+      source(sink);
+      setDomain({2, 2});
+    }
+  } pipe;
+  varying = Varying::EndStage;
+  EXPECT_THAT(messageOf([&] { run(pipe, {}); }),
+              HasSubstr("Varied', bin 1: expected endStage to be said for all "
+                        "bins or for none"));
+  varying = Varying::EndBin;
+  EXPECT_THAT(messageOf([&] { run(pipe, {}); }),
+              HasSubstr("bin 2: expected endBin to be said for all bins or "
+                        "for none"));
+  varying = Varying::Order;
+  EXPECT_THAT(messageOf([&] { run(pipe, {}); }),
+              HasSubstr("bin 1: expected specifyOrder to be said for all bins "
+                        "or for none"));
+  varying = Varying::Nothing;
+  EXPECT_EQ(messageOf([&] { run(pipe, {}); }), "(no error)");
+}
+
+struct Pixels {
+  piko::Image<int> image;
+};
+struct Nest : Whole<int>, piko::Uses<Pixels> {
+  void process(const int &kind) {
+    if (kind == 1)
+      update(state().image, {0, 0}, [&](int &) {
+        update(state().image, {1, 0}, [](int &i) { ++i; });
+      });
+    auto twice = [](int i) { return 2 * i; };
+    auto add = [](int a, int b) { return a + b; };
+    parallelFor(2, [&](int) {
+      if (kind == 2)
+        any(2, twice);
+      if (kind == 3)
+        all(2, twice);
+      if (kind == 4)
+        count(2, twice);
+      if (kind == 5)
+        reduce<int>(2, twice, add, 0);
+    });
+  }
+};
+
+TEST(Errors, WhatCannotBeInsideAnother) {
+  struct NestPipe : piko::Pipe<Pixels> {
+    Nest nest;
+    NestPipe() {
+      source(nest);
+      setDomain({2, 2});
+    }
+  } pipe;
+  const char *const messages[] = {
+      "update inside update", "any(n, f) inside parallelFor",
+      "all(n, f) inside parallelFor", "count(n, f) inside parallelFor",
+      "reduce(n, f) inside parallelFor"};
+  for (int kind = 1; kind <= 5; ++kind)
+    EXPECT_THAT(messageOf([&] { run(pipe, {kind}); }),
+                HasSubstr(std::string("Nest', bin 0: ") + messages[kind - 1]));
 }
 
 } // namespace

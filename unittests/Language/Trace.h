@@ -29,14 +29,20 @@ std::vector<int> run(Pipe &pipe, std::initializer_list<int> primitives) {
   return run(pipe, std::vector<int>(primitives));
 }
 
-/// The message of the Error that f throws.
-template <class F> std::string messageOf(F f) {
+/// The message of the Error that f throws, with where it happened if it is
+/// known.
+template <class F> std::string reportOf(F f) {
   try {
     f();
   } catch (const piko::Error &error) {
     return error.what();
   }
   return "(no error)";
+}
+/// The message alone.
+template <class F> std::string messageOf(F f) {
+  std::string report = reportOf(f);
+  return report.substr(0, report.find('\n'));
 }
 
 /// A stage with one bin over a two-dimensional domain.

@@ -14,11 +14,12 @@
 namespace piko {
 namespace reference {
 
-inline void expectUnordered(const char *what) {
+inline void expectUnordered(const char *what, const Place &at) {
   Executor *executor = Executor::current();
   if (!executor || !executor->frame)
     throw Error(std::string(what) + " outside a running pipeline");
-  const Frame &call = *executor->frame;
+  Frame &call = *executor->frame;
+  call.at = at;
   if (!call.node->unordered)
     call.node->fail(call.bin, std::string(what) + " needs a stage that is "
                                                   "Unordered");
@@ -35,10 +36,16 @@ concept AtomicFloat = std::is_same_v<T, float> || std::is_same_v<T, double>;
 
 /// Replaces a place in a buffer or an image by f of it; returns the old value.
 /// Pixels are read through const references, but their storage is not const.
-template <class T, class F> T exchange(const T &place, F f) {
-  T old = place;
-  const_cast<T &>(place) = f(old);
-  return old;
+template <class T, class F> T exchange(const T &place, const Place &at, F f) {
+  auto change = [&] {
+    T old = place;
+    const_cast<T &>(place) = f(old);
+    return old;
+  };
+  if (Checker *checker = activeChecker())
+    if (Element *element = checker->find(&place))
+      return checker->access(*element, AccessKind::Atomic, at, change);
+  return change();
 }
 
 template <class T> T wrappingAdd(T a, T b) {
@@ -54,13 +61,16 @@ template <class T> T wrappingAdd(T a, T b) {
 
 #define PIKO_ATOMIC(NAME, EXPRESSION)                                          \
   template <reference::AtomicInteger T>                                        \
-  void NAME(const T &place, std::type_identity_t<T> value) {                   \
-    reference::exchange(place, [&](T old) -> T { return EXPRESSION; });        \
+  void NAME(const T &place, std::type_identity_t<T> value,                     \
+            reference::Place at = reference::Place::current()) {               \
+    reference::exchange(place, at, [&](T old) -> T { return EXPRESSION; });    \
   }                                                                            \
   template <reference::AtomicInteger T>                                        \
-  T NAME##Fetch(const T &place, std::type_identity_t<T> value) {               \
-    reference::expectUnordered(#NAME "Fetch");                                 \
-    return reference::exchange(place, [&](T old) -> T { return EXPRESSION; }); \
+  T NAME##Fetch(const T &place, std::type_identity_t<T> value,                 \
+                reference::Place at = reference::Place::current()) {           \
+    reference::expectUnordered(#NAME "Fetch", at);                             \
+    return reference::exchange(place, at,                                      \
+                               [&](T old) -> T { return EXPRESSION; });        \
   }                                                                            \
   template <class T>                                                           \
   void NAME(const T &&place, std::type_identity_t<T> value) = delete;          \
@@ -77,9 +87,10 @@ PIKO_ATOMIC(atomicXor, old ^ value)
 
 /// Adds to a float; only in a stage that is Unordered.
 template <reference::AtomicFloat T>
-void atomicAdd(const T &place, std::type_identity_t<T> value) {
-  reference::expectUnordered("atomicAdd on a float");
-  reference::exchange(place, [&](T old) { return old + value; });
+void atomicAdd(const T &place, std::type_identity_t<T> value,
+               reference::Place at = reference::Place::current()) {
+  reference::expectUnordered("atomicAdd on a float", at);
+  reference::exchange(place, at, [&](T old) { return old + value; });
 }
 
 } // namespace piko

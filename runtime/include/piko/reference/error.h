@@ -43,13 +43,24 @@ template <class T> const TypeInfo *typeOf() {
   return &info;
 }
 
-/// Throws an Error for a stage and, unless it is -1, a bin.
+/// An error whose message already says where it happened, in further lines.
+class LocatedError final : public Error {
+public:
+  using Error::Error;
+};
+
+/// Throws an Error for a stage and, unless it is -1, a bin. `context` says
+/// where it happened, if that is known.
 [[noreturn]] inline void fail(std::string_view stage, int64_t bin,
-                              const std::string &message) {
+                              const std::string &message,
+                              const std::string &context = "") {
   std::string text = "stage '" + std::string(stage) + "'";
   if (bin >= 0)
     text += ", bin " + std::to_string(bin);
-  throw Error(text + ": " + message);
+  text += ": " + message + context;
+  if (context.empty())
+    throw Error(text);
+  throw LocatedError(text);
 }
 
 } // namespace reference

@@ -10,15 +10,18 @@
 //   * what iterations emit between syncs is kept until the loop ends;
 //   * primitives that reach a collecting stage are kept until it runs.
 //
+// In checking mode (PIKO_CHECK) it tells a Checker what runs, and each error
+// where it happened.
+//
 //===----------------------------------------------------------------------===//
 #ifndef PIKO_REFERENCE_EXECUTOR_H
 #define PIKO_REFERENCE_EXECUTOR_H
 
+#include <piko/reference/checker.h>
 #include <piko/reference/loop.h>
+#include <piko/reference/numbers.h>
 
 namespace piko::reference {
-
-enum class Phase { Assign, Schedule, Process };
 
 /// One call of a phase.
 struct Frame {
@@ -30,12 +33,17 @@ struct Frame {
   std::vector<Emission> *kept = nullptr;    ///< Process, on a cycle
   Loop *loop = nullptr;                     ///< the innermost parallelFor
   bool updating = false;                    ///< inside update()
+  Lineage lineage{};   ///< of the primitive, or of the call that collected
+  int64_t emitted = 0; ///< primitives, so far
+  Place at{};          ///< of the language's call that is running
 };
 
 class Executor {
 public:
   Frame *frame = nullptr; ///< the phase that is running
   int64_t loopLimit = int64_t(1) << 20;
+  Checker checker;                  ///< used in checking mode
+  std::vector<NumberField> numbers; ///< fields that must not be NaN
 
   /// The executor that is running on this thread.
   static Executor *&current() {
@@ -47,26 +55,40 @@ public:
   void scheduleBins(Node &node) {
     node.schedules.assign(node.grid.bins(), {});
     node.collected.assign(node.grid.bins(), {});
-    node.waitsOn.clear();
-    node.waits = node.unordered = false;
+    std::vector<const TypeInfo *> waitsOn;
+    bool endsBin = false, unordered = false;
+    auto expectSame = [&](bool isSame, int64_t bin, const char *directive) {
+      if (bin > 0 && !isSame)
+        node.fail(bin, std::string("expected ") + directive +
+                           " to be said for all bins or for none");
+    };
     for (int64_t bin = 0; bin < node.grid.bins(); ++bin) {
+      node.waitsOn.clear();
+      node.endsBin = node.unordered = false;
       Frame call{.phase = Phase::Schedule, .node = &node, .bin = bin};
-      Enter enter(*this, call);
-      node.schedule(bin);
+      run(call, [&] { node.schedule(bin); });
+      expectSame(std::is_permutation(node.waitsOn.begin(), node.waitsOn.end(),
+                                     waitsOn.begin(), waitsOn.end()),
+                 bin, "endStage");
+      expectSame(node.endsBin == endsBin, bin, "endBin");
+      expectSame(node.unordered == unordered, bin, "specifyOrder");
+      waitsOn = node.waitsOn;
+      endsBin = node.endsBin;
+      unordered = node.unordered;
     }
   }
 
   /// Brings a primitive to a stage.
   void deliver(Node &to, const std::byte *primitive, const Node *producer,
-               int64_t producerBin) {
+               int64_t producerBin, const Lineage &lineage) {
     if (!to.collects() && to.loop >= 0)
-      return runLoop(to, primitive, producer, producerBin);
-    for (int64_t bin : assign(to, primitive, producer, producerBin)) {
+      return runLoop(to, primitive, producer, producerBin, lineage);
+    for (int64_t bin : assign(to, primitive, producer, producerBin, lineage)) {
       if (to.collects()) {
         std::vector<std::byte> &list = to.collected[bin];
         list.insert(list.end(), primitive, primitive + to.inputSize);
       } else {
-        process(to, bin, primitive, nullptr);
+        process(to, bin, primitive, lineage, nullptr);
       }
     }
   }
@@ -84,7 +106,7 @@ public:
         if (holdsPrimitives(*node)) {
           more = true;
           if (++round > loopLimit)
-            failLoop(*node, -1, "rounds");
+            failLoop(*node, -1, "rounds", nullptr);
           break;
         }
     }
@@ -106,11 +128,25 @@ public:
                               std::to_string(port) + ", but got '" +
                               std::string(type->name) + "'");
     const auto *bytes = static_cast<const std::byte *>(primitive);
+    checkNumbers(node, call.bin, type, bytes);
     Node *to = out.to.front();
     if (std::vector<Emission> *keeper = keeperOf(call))
       keeper->push_back({to, {bytes, bytes + to->inputSize}});
     else
-      deliver(*to, bytes, &node, call.bin);
+      deliver(*to, bytes, &node, call.bin, stepFrom(call));
+  }
+
+  /// Fails if a field of a primitive that must be a number is NaN.
+  void checkNumbers(const Node &node, int64_t bin, const TypeInfo *type,
+                    const std::byte *primitive,
+                    const Lineage &lineage = nullptr) const {
+    if constexpr (checking)
+      for (const NumberField &field : numbers)
+        if (field.record == type && field.hasNaN(primitive))
+          node.fail(bin,
+                    "expected a number in field '" + field.name + "' of '" +
+                        std::string(type->name) + "', but got NaN",
+                    contextText({}, lineage));
   }
 
   void assignBin(int64_t bin) {
@@ -127,6 +163,13 @@ public:
     Frame &call = expect(Phase::Process, "parallelFor");
     if (call.updating)
       call.node->fail(call.bin, "parallelFor inside update");
+    if constexpr (checking)
+      body = [this, number = checker.beginLoop(),
+              body = std::move(body)](int64_t i) {
+        checker.beginIteration(number, i);
+        body(i);
+        checker.endIteration();
+      };
     Loop loop(call.loop, size, std::move(body));
     struct Restore {
       Loop *&slot, *saved;
@@ -137,11 +180,21 @@ public:
       if (call.kept)
         call.kept->push_back(emission);
       else
-        deliver(*emission.to, emission.primitive.data(), call.node, call.bin);
+        deliver(*emission.to, emission.primitive.data(), call.node, call.bin,
+                stepFrom(call));
     });
   }
 
-  void sync() { loopForSync("sync()").sync(*frame->node); }
+  void sync() {
+    Loop &loop = loopForSync("sync()");
+    if constexpr (!checking) {
+      loop.sync(*frame->node);
+    } else {
+      std::shared_ptr<Strand> before = checker.beginBarrier();
+      loop.sync(*frame->node);
+      checker.endBarrier(*before);
+    }
+  }
 
   /// The loop that a barrier or a collective operation belongs to.
   Loop &loopForSync(const char *what) {
@@ -181,34 +234,59 @@ private:
     ~Enter() { executor.frame = saved; }
   };
 
+  /// Runs a call of a phase.
+  template <class F> void run(Frame &call, F phase) {
+    Enter enter(*this, call);
+    if constexpr (!checking) {
+      phase();
+    } else {
+      try {
+        std::shared_ptr<Strand> outer =
+            checker.beginCall(call.phase, call.node, call.bin, call.lineage);
+        phase();
+        checker.endCall(std::move(outer));
+      } catch (const LocatedError &) {
+        throw;
+      } catch (const Error &error) {
+        throw LocatedError(error.what() + contextText(call.at, call.lineage));
+      }
+    }
+  }
+
+  /// The lineage of the next primitive that a call emits.
+  static Lineage stepFrom(Frame &call) {
+    return makeStep(call.lineage, call.node->name(), call.bin, call.emitted++);
+  }
+
   std::vector<int64_t> assign(Node &to, const std::byte *primitive,
-                              const Node *producer, int64_t producerBin) {
+                              const Node *producer, int64_t producerBin,
+                              const Lineage &lineage) {
     std::vector<int64_t> bins;
     Frame call{.phase = Phase::Assign,
                .node = &to,
                .bin = producerBin,
                .producer = producer,
-               .assigned = &bins};
-    {
-      Enter enter(*this, call);
-      to.assign(primitive);
-    }
+               .assigned = &bins,
+               .lineage = lineage};
+    run(call, [&] { to.assign(primitive); });
     std::sort(bins.begin(), bins.end());
     bins.erase(std::unique(bins.begin(), bins.end()), bins.end());
     return bins;
   }
 
   void process(Node &node, int64_t bin, const std::byte *primitive,
-               std::vector<Emission> *kept) {
-    Frame call{
-        .phase = Phase::Process, .node = &node, .bin = bin, .kept = kept};
-    Enter enter(*this, call);
-    node.process(primitive);
+               Lineage lineage, std::vector<Emission> *kept) {
+    Frame call{.phase = Phase::Process,
+               .node = &node,
+               .bin = bin,
+               .kept = kept,
+               .lineage = std::move(lineage)};
+    run(call, [&] { node.process(primitive); });
   }
 
   /// Delivers a primitive to a stage on a cycle, and all that follows from it.
   void runLoop(Node &first, const std::byte *primitive, const Node *producer,
-               int64_t producerBin) {
+               int64_t producerBin, const Lineage &lineage) {
     struct Work {
       Node *node;
       int64_t bin; ///< -1: not yet assigned
@@ -216,6 +294,7 @@ private:
       int64_t producerBin;
       int64_t hops;
       std::vector<std::byte> primitive;
+      Lineage lineage;
     };
     std::vector<Work> stack;
     stack.push_back({&first,
@@ -223,27 +302,32 @@ private:
                      producer,
                      producerBin,
                      0,
-                     {primitive, primitive + first.inputSize}});
+                     {primitive, primitive + first.inputSize},
+                     lineage});
     while (!stack.empty()) {
       Work work = std::move(stack.back());
       stack.pop_back();
       if (work.node->loop != first.loop) {
         deliver(*work.node, work.primitive.data(), work.producer,
-                work.producerBin);
+                work.producerBin, work.lineage);
       } else if (work.bin < 0) {
-        std::vector<int64_t> bins = assign(*work.node, work.primitive.data(),
-                                           work.producer, work.producerBin);
+        std::vector<int64_t> bins =
+            assign(*work.node, work.primitive.data(), work.producer,
+                   work.producerBin, work.lineage);
         for (auto bin = bins.rbegin(); bin != bins.rend(); ++bin)
           stack.push_back({work.node, *bin, work.producer, work.producerBin,
-                           work.hops, work.primitive});
+                           work.hops, work.primitive, work.lineage});
       } else {
         if (work.hops > loopLimit)
-          failLoop(*work.node, work.bin, "hops");
+          failLoop(*work.node, work.bin, "hops", work.lineage);
         std::vector<Emission> kept;
-        process(*work.node, work.bin, work.primitive.data(), &kept);
-        for (auto next = kept.rbegin(); next != kept.rend(); ++next)
-          stack.push_back({next->to, -1, work.node, work.bin, work.hops + 1,
-                           std::move(next->primitive)});
+        process(*work.node, work.bin, work.primitive.data(), work.lineage,
+                &kept);
+        for (size_t i = kept.size(); i-- > 0;)
+          stack.push_back({kept[i].to, -1, work.node, work.bin, work.hops + 1,
+                           std::move(kept[i].primitive),
+                           makeStep(work.lineage, work.node->name(), work.bin,
+                                    static_cast<int64_t>(i))});
       }
     }
   }
@@ -252,13 +336,15 @@ private:
   void runCollected(Node &node, bool firstRound) {
     std::vector<std::vector<std::byte>> lists(node.grid.bins());
     lists.swap(node.collected);
+    checker.nextTurn();
     for (int64_t bin = 0; bin < node.grid.bins(); ++bin) {
       const std::byte *list = lists[bin].data();
       int64_t count = lists[bin].size() / node.inputSize;
       const BinSchedule &schedule = node.schedules[bin];
       if (!node.takesList) {
         for (int64_t i = 0; i < count; ++i)
-          process(node, bin, list + i * node.inputSize, nullptr);
+          process(node, bin, list + i * node.inputSize,
+                  makeStep(nullptr, node.name(), bin, i), nullptr);
         continue;
       }
       if (count == 0 && !(schedule.everyBin && firstRound))
@@ -267,9 +353,12 @@ private:
       int64_t begin = 0;
       do {
         Frame call{.phase = Phase::Process, .node = &node, .bin = bin};
-        Enter enter(*this, call);
-        node.processList(list + begin * node.inputSize,
-                         std::min(batch, count - begin));
+        if (batch > 0)
+          call.lineage = makeStep(nullptr, node.name(), bin, begin / batch);
+        run(call, [&] {
+          node.processList(list + begin * node.inputSize,
+                           std::min(batch, count - begin));
+        });
         begin += batch;
       } while (begin < count);
     }
@@ -287,9 +376,12 @@ private:
     return call.kept;
   }
 
-  [[noreturn]] void failLoop(const Node &node, int64_t bin, const char *what) {
-    node.fail(bin, "a loop did not end within " + std::to_string(loopLimit) +
-                       " " + what);
+  [[noreturn]] void failLoop(const Node &node, int64_t bin, const char *what,
+                             const Lineage &lineage) {
+    node.fail(bin,
+              "a loop did not end within " + std::to_string(loopLimit) + " " +
+                  what,
+              contextText({}, lineage));
   }
 };
 

@@ -45,8 +45,9 @@ public:
   virtual void process(const std::byte *primitive) = 0;
   virtual void processList(const std::byte *primitives, int64_t count) = 0;
 
-  [[noreturn]] void fail(int64_t bin, const std::string &message) const {
-    reference::fail(name(), bin, message);
+  [[noreturn]] void fail(int64_t bin, const std::string &message,
+                         const std::string &context = "") const {
+    reference::fail(name(), bin, message, context);
   }
   std::string_view name() const { return type->name; }
 
@@ -62,10 +63,10 @@ public:
   // Set anew for each run.
   Grid grid;
   std::vector<BinSchedule> schedules;    ///< one for each bin
-  std::vector<const TypeInfo *> waitsOn; ///< endStage, from any bin
-  bool waits = false;                    ///< endStage, endBin or a batch
+  std::vector<const TypeInfo *> waitsOn; ///< endStage
+  bool endsBin = false;                  ///< endBin
   bool unordered = false;
-  bool collects() const { return takesList || waits; }
+  bool collects() const { return takesList || endsBin || !waitsOn.empty(); }
   int loop = -1; ///< which cycle of stages that do not collect, or -1
   std::vector<std::vector<std::byte>> collected; ///< primitives of each bin
 };

@@ -123,6 +123,16 @@ public:
          static_cast<int64_t>(std::size(primitives)));
   }
 
+  /// In checking mode: fields, such as &Fragment::z, of which no primitive
+  /// that is fed or emitted may hold a NaN.
+  template <auto... Field> void expectNumbers() {
+    (executor.numbers.push_back(numberField<Field>(Field)), ...);
+  }
+  /// In checking mode: what messages call a buffer or an image.
+  void nameState(const void *handle, std::string name) {
+    executor.checker.nameState(handle, std::move(name));
+  }
+
   /// How many hops a primitive may take on a cycle of stages, and how many
   /// rounds a cycle may run.
   void setLoopLimit(int64_t limit) { executor.loopLimit = limit; }
@@ -172,6 +182,11 @@ private:
     std::vector<reference::ImageBase *> *saved;
   };
 
+  template <auto Field, class Record, class Member>
+  static reference::NumberField numberField(Member Record::*) {
+    return reference::makeNumberField<Record, Member, Field>();
+  }
+
   template <class S> reference::Node &nodeOf(S &stage) {
     for (auto &node : nodes)
       if (node->address == &stage && node->type == reference::typeOf<S>())
@@ -207,6 +222,8 @@ private:
   void checkGraph() const;
   void prepareState();
   std::vector<reference::Component> prepareStages();
+  reference::StageOrder
+  stageOrder(const std::vector<reference::Component> &components) const;
 
   std::vector<reference::ImageBase *> images;
   Scope scope{images};
@@ -279,6 +296,18 @@ std::vector<reference::Component> Pipe<State>::prepareStages() {
   return reference::orderStages(declared);
 }
 
+template <class State>
+reference::StageOrder Pipe<State>::stageOrder(
+    const std::vector<reference::Component> &components) const {
+  std::vector<reference::Node *> declared;
+  for (const auto &node : nodes)
+    declared.push_back(node.get());
+  std::vector<reference::StageOrder::SourceOf> fed;
+  for (size_t s = 0; s < sources.size(); ++s)
+    fed.push_back({static_cast<int64_t>(s), sources[s].node});
+  return {declared, fed, components};
+}
+
 template <class State> void Pipe<State>::run() {
   reference::checkArithmetic();
   checkGraph();
@@ -290,14 +319,25 @@ template <class State> void Pipe<State>::run() {
   } running(&executor);
 
   prepareState();
+  executor.checker.beginRun();
   std::vector<reference::Component> order = prepareStages();
-  for (const Source &source : sources)
-    for (int64_t i = 0; i < source.count; ++i)
-      executor.deliver(*source.node,
-                       source.primitives + i * source.node->inputSize, nullptr,
-                       -1);
+  if constexpr (reference::checking)
+    executor.checker.setOrder(stageOrder(order));
+  for (size_t s = 0; s < sources.size(); ++s) {
+    const Source &source = sources[s];
+    for (int64_t i = 0; i < source.count; ++i) {
+      const std::byte *primitive =
+          source.primitives + i * source.node->inputSize;
+      reference::Lineage lineage = reference::makeStep(nullptr, {}, s, i);
+      executor.checkNumbers(*source.node, -1, source.node->inputType, primitive,
+                            lineage);
+      executor.deliver(*source.node, primitive, nullptr, -1, lineage);
+    }
+  }
   for (const reference::Component &component : order)
     executor.runComponent(component);
+  if constexpr (reference::checking)
+    executor.checker.endRun();
 }
 
 } // namespace piko

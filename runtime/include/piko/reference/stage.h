@@ -19,11 +19,9 @@ public:
       : primitives(primitives), count(count) {}
 
   int64_t size() const { return count; }
-  const T &operator[](int64_t i) const {
+  const T &operator[](reference::Index i) const {
     if (i < 0 || i >= count)
-      reference::failAccess("expected a list index in [0, " +
-                            std::to_string(count) + "), but got " +
-                            std::to_string(i));
+      reference::failAccess(i, count, reference::placeOf(i));
     return primitives[i];
   }
   const T *begin() const { return primitives; }
@@ -62,153 +60,168 @@ template <class B, int Threads, class In, class... Out> class BasicStage {
                 "primitives cannot be over-aligned");
 
   static constexpr int rank = B::rank;
+  using Place = reference::Place;
   using FirstOut = std::tuple_element_t<0, std::tuple<Out..., In>>;
 
 public:
   // Any phase.
 
   /// The bin that holds a position or a cell; BinId{-1} outside the domain.
-  BinId binFromPosition(const Position<rank> &p) const {
-    return {here("binFromPosition").node->grid.binAt(reference::toCell(p))};
+  BinId binFromPosition(const Position<rank> &p,
+                        Place at = Place::current()) const {
+    return {here("binFromPosition", at).node->grid.binAt(reference::toCell(p))};
   }
-  BinId binFromPosition(const Cells<rank> &p) const {
-    return {here("binFromPosition").node->grid.binAt(reference::toCell(p))};
+  BinId binFromPosition(const Cells<rank> &p,
+                        Place at = Place::current()) const {
+    return {here("binFromPosition", at).node->grid.binAt(reference::toCell(p))};
   }
   /// The extent of the domain in cells.
-  Cells<rank> domain() const {
-    return reference::fromCell<rank>(here("domain").node->grid.domain);
+  Cells<rank> domain(Place at = Place::current()) const {
+    return reference::fromCell<rank>(here("domain", at).node->grid.domain);
   }
 
   // Schedule and Process.
 
   /// The bin that is scheduled or processed.
-  BinId bin() const { return {inBin("bin").bin}; }
+  BinId bin(Place at = Place::current()) const {
+    return {inBin("bin", at).bin};
+  }
   /// Its first cell, and one past its last cell.
-  Cells<rank> binLo() const {
-    const reference::Frame &call = inBin("binLo");
+  Cells<rank> binLo(Place at = Place::current()) const {
+    const reference::Frame &call = inBin("binLo", at);
     return reference::fromCell<rank>(call.node->grid.lo(call.bin));
   }
-  Cells<rank> binHi() const {
-    const reference::Frame &call = inBin("binHi");
+  Cells<rank> binHi(Place at = Place::current()) const {
+    const reference::Frame &call = inBin("binHi", at);
     return reference::fromCell<rank>(call.node->grid.hi(call.bin));
   }
 
   // AssignBin. A primitive goes to the set of all bins that are named.
 
-  void assignToBin(const In &, BinId bin) {
-    executor("assignToBin").assignBin(bin.index);
+  void assignToBin(const In &, BinId bin, Place at = Place::current()) {
+    executor("assignToBin", at).assignBin(bin.index);
   }
-  void assignToAll(const In &) {
-    int64_t bins = here("assignToAll").node->grid.bins();
+  void assignToAll(const In &, Place at = Place::current()) {
+    int64_t bins = here("assignToAll", at).node->grid.bins();
     for (int64_t bin = 0; bin < bins; ++bin)
-      executor("assignToAll").assignBin(bin);
+      executor("assignToAll", at).assignBin(bin);
   }
   /// To the bin in which the producer emitted it.
-  void assignToPreviousBins(const In &) {
+  void assignToPreviousBins(const In &, Place at = Place::current()) {
     reference::Frame &call =
-        executor("assignToPreviousBins")
+        executor("assignToPreviousBins", at)
             .expect(reference::Phase::Assign, "assignToPreviousBins");
     if (!call.producer)
       call.node->fail(-1, "assignToPreviousBins of a primitive from a source");
     if (call.producer->grid.size != call.node->grid.size)
       call.node->fail(-1, "assignToPreviousBins needs the bin size of stage '" +
                               std::string(call.producer->name()) + "'");
-    executor("assignToPreviousBins").assignBin(call.bin);
+    executor("assignToPreviousBins", at).assignBin(call.bin);
   }
   /// To all bins that a closed box of cells touches; outside the domain there
   /// are none.
   void assignToBoundingBox(const In &, const Cells<rank> &lo,
-                           const Cells<rank> &hi) {
-    assignBox(reference::toCell(lo), reference::toCell(hi));
+                           const Cells<rank> &hi, Place at = Place::current()) {
+    assignBox(reference::toCell(lo), reference::toCell(hi), at);
   }
   void assignToBoundingBox(const In &, const Position<rank> &lo,
-                           const Position<rank> &hi) {
+                           const Position<rank> &hi,
+                           Place at = Place::current()) {
     for (int d = 0; d < rank; ++d)
       if (lo[d] != lo[d] || hi[d] != hi[d])
-        here("assignToBoundingBox").node->fail(-1, "a bounding box is NaN");
-    assignBox(reference::toCell(lo), reference::toCell(hi));
+        here("assignToBoundingBox", at)
+            .node->fail(-1, "expected a bounding box of numbers, but got NaN");
+    assignBox(reference::toCell(lo), reference::toCell(hi), at);
   }
 
   // Schedule.
 
-  void specifySchedule(SchedulePolicy, int64_t tileSplit = 0) {
-    reference::Frame &call = inSchedule("specifySchedule");
+  void specifySchedule(SchedulePolicy, int64_t tileSplit = 0,
+                       Place at = Place::current()) {
+    reference::Frame &call = inSchedule("specifySchedule", at);
     if (tileSplit < 0)
       call.node->fail(call.bin,
                       "expected a tile split of at least 0, but got " +
                           std::to_string(tileSplit));
   }
   /// Waits until all stages of type X are finished.
-  template <class X> void endStage() {
-    reference::Node &node = *inSchedule("endStage").node;
-    node.waits = true;
+  template <class X> void endStage(Place at = Place::current()) {
+    reference::Node &node = *inSchedule("endStage", at).node;
     const reference::TypeInfo *type = reference::typeOf<X>();
     if (std::find(node.waitsOn.begin(), node.waitsOn.end(), type) ==
         node.waitsOn.end())
       node.waitsOn.push_back(type);
   }
   /// Waits until nothing can reach this bin any more.
-  void endBin() { inSchedule("endBin").node->waits = true; }
+  void endBin(Place at = Place::current()) {
+    inSchedule("endBin", at).node->endsBin = true;
+  }
   /// Calls a list Process with n primitives at a time.
-  void batch(int64_t n) {
-    reference::Frame &call = inList("batch");
+  void batch(int64_t n, Place at = Place::current()) {
+    reference::Frame &call = inList("batch", at);
     if (n < 1)
       call.node->fail(call.bin, "expected a batch of at least 1, but got " +
                                     std::to_string(n));
     call.node->schedules[call.bin].batch = n;
   }
   /// Calls a list Process for empty bins, too.
-  void everyBin() {
-    reference::Frame &call = inList("everyBin");
+  void everyBin(Place at = Place::current()) {
+    reference::Frame &call = inList("everyBin", at);
     call.node->schedules[call.bin].everyBin = true;
   }
-  void specifyOrder(Order order) {
-    inSchedule("specifyOrder").node->unordered = order == Unordered;
+  void specifyOrder(Order order, Place at = Place::current()) {
+    inSchedule("specifyOrder", at).node->unordered = order == Unordered;
   }
 
   // Process.
 
   /// Sends a primitive through a port.
-  void emit(const FirstOut &value, int port = 0)
+  void emit(const FirstOut &value, int port = 0, Place at = Place::current())
     requires(sizeof...(Out) > 0)
   {
-    emitAs(value, port);
+    emitAs(value, port, at);
   }
-  template <class T> void emit(const T &value, int port = 0) {
+  template <class T>
+  void emit(const T &value, int port = 0, Place at = Place::current()) {
     static_assert((std::is_same_v<T, Out> || ...),
                   "emit of a type that no port has");
-    emitAs(value, port);
+    emitAs(value, port, at);
   }
 
   /// Changes a pixel of the current bin: f(pixel). The calls for one pixel are
   /// in lineage order.
   template <class T, int R, class F>
-  auto update(Image<T, R> &image, const Cells<R> &at, F &&f) {
+  auto update(Image<T, R> &image, const Cells<R> &at, F &&f,
+              Place place = Place::current()) {
     reference::Frame &call =
-        executor("update").expect(reference::Phase::Process, "update");
+        executor("update", place).expect(reference::Phase::Process, "update");
+    if (call.updating)
+      call.node->fail(call.bin, "update inside update");
     checkOwnPixel(call, reference::toCell(at));
     struct Updating {
-      bool &flag, saved;
-      ~Updating() { flag = saved; }
-    } updating{call.updating, call.updating};
+      bool &flag;
+      ~Updating() { flag = false; }
+    } updating{call.updating};
     call.updating = true;
-    return f(image.pixel(at));
+    return image.update(at, place, std::forward<F>(f));
   }
 
   /// Calls f(0), ..., f(n - 1), which are independent of one another.
-  template <class F> void parallelFor(int64_t n, F &&f) {
-    executor("parallelFor").parallelFor(n, [&f](int64_t i) {
+  template <class F>
+  void parallelFor(int64_t n, F &&f, Place at = Place::current()) {
+    executor("parallelFor", at).parallelFor(n, [&f](int64_t i) {
       f(static_cast<int>(i));
     });
   }
   /// Calls f(cell) for each cell of the current bin, x fastest.
-  template <class F> void parallelForPixels(F &&f) {
+  template <class F>
+  void parallelForPixels(F &&f, Place at = Place::current()) {
     reference::Cell lo = reference::toCell(binLo());
     reference::Cell hi = reference::toCell(binHi(), 1);
     int64_t n = 1;
     for (int d = 0; d < rank; ++d)
       n *= hi[d] - lo[d];
-    executor("parallelForPixels").parallelFor(n, [&, lo, hi](int64_t i) {
+    executor("parallelForPixels", at).parallelFor(n, [&, lo, hi](int64_t i) {
       Cells<rank> cell;
       for (int d = 0; d < rank; ++d) {
         cell[d] = static_cast<int>(lo[d] + i % (hi[d] - lo[d]));
@@ -218,88 +231,113 @@ public:
     });
   }
   /// In an iteration of parallelFor: a barrier between all iterations.
-  void sync() { executor("sync()").sync(); }
+  void sync(Place at = Place::current()) { executor("sync()", at).sync(); }
 
   // Over the iterations of the enclosing parallelFor; each of them is also a
   // sync(). Every iteration gets the result.
 
-  bool any(bool value) { return count(value) != 0; }
-  bool all(bool value) { return count(!value) == 0; }
-  int64_t count(bool value) {
-    return reduce(int64_t(value), [](int64_t a, int64_t b) { return a + b; });
+  bool any(bool value, Place at = Place::current()) {
+    return count(value, at) != 0;
+  }
+  bool all(bool value, Place at = Place::current()) {
+    return count(!value, at) == 0;
+  }
+  int64_t count(bool value, Place at = Place::current()) {
+    return reduce(
+        int64_t(value), [](int64_t a, int64_t b) { return a + b; }, at);
   }
   /// op over all values, in a fixed binary tree.
-  template <class T, class Op> T reduce(T value, Op op) {
-    return collective<T, T>("reduce", value, [&](const std::vector<T> &v) {
+  template <class T, class Op>
+  T reduce(T value, Op op, Place at = Place::current()) {
+    return collective<T, T>("reduce", at, value, [&](const std::vector<T> &v) {
       return reference::reduceTree(v, op, T{});
     });
   }
   /// op over the values of the iterations before this one; `empty` in the
   /// first.
-  template <class T, class Op> T scan(T value, Op op, T empty = T{}) {
+  template <class T, class Op>
+  T scan(T value, Op op, T empty = T{}, Place at = Place::current()) {
     return collective<T, std::vector<T>>(
-        "scan", value, [&](const std::vector<T> &v) {
+        "scan", at, value, [&](const std::vector<T> &v) {
           return reference::scanTree(v, op, empty);
         })[iteration()];
   }
   /// Iteration r gets the index of the iteration with the r-th smallest key.
-  template <class K> int64_t sort(K key) {
+  template <class K> int64_t sort(K key, Place at = Place::current()) {
+    static_assert(std::is_arithmetic_v<K>, "the key of sort is a number");
     return collective<K, std::vector<int64_t>>(
-        "sort", key, [](const std::vector<K> &keys) {
+        "sort", at, key, [](const std::vector<K> &keys) {
           return reference::sortedIndices(keys);
         })[iteration()];
   }
 
   // Over f(0), ..., f(n - 1), outside parallelFor.
 
-  template <class F> bool any(int64_t n, F &&f) { return count(n, f) != 0; }
-  template <class F> bool all(int64_t n, F &&f) { return count(n, f) == n; }
-  template <class F> int64_t count(int64_t n, F &&f) {
-    int64_t total = 0;
-    parallelFor(n, [&](int i) { total += bool(f(i)); });
-    return total;
+  template <class F> bool any(int64_t n, F &&f, Place at = Place::current()) {
+    return sum("any(n, f)", n, f, at) != 0;
+  }
+  template <class F> bool all(int64_t n, F &&f, Place at = Place::current()) {
+    return sum("all(n, f)", n, f, at) == n;
+  }
+  template <class F>
+  int64_t count(int64_t n, F &&f, Place at = Place::current()) {
+    return sum("count(n, f)", n, f, at);
   }
   template <class T, class F, class Op>
-  T reduce(int64_t n, F &&f, Op op, T empty) {
-    return reference::reduceTree(evaluate<T>(n, f), op, empty);
+  T reduce(int64_t n, F &&f, Op op, T empty, Place at = Place::current()) {
+    std::vector<T> values(n);
+    outside("reduce(n, f)", at).parallelFor(n, [&](int64_t i) {
+      values[i] = f(static_cast<int>(i));
+    });
+    return reference::reduceTree(std::move(values), op, empty);
   }
 
 private:
   template <class> friend class Pipe;
   reference::Node *node = nullptr; ///< set by the pipeline
 
-  reference::Executor &executor(const char *what) const {
+  /// The executor, which is at a call of the language.
+  reference::Executor &executor(const char *what, const Place &at) const {
     reference::Executor *running = reference::Executor::current();
     if (!running || !running->frame)
       throw Error(std::string(what) + " outside a running pipeline");
+    running->frame->at = at;
     return *running;
   }
-  reference::Frame &here(const char *what) const {
-    return *executor(what).frame;
+  /// The same, outside parallelFor.
+  reference::Executor &outside(const char *what, const Place &at) const {
+    reference::Executor &running = executor(what, at);
+    const reference::Frame &call = *running.frame;
+    if (call.loop)
+      call.node->fail(call.bin, std::string(what) + " inside parallelFor");
+    return running;
   }
-  reference::Frame &inBin(const char *what) const {
-    reference::Frame &call = here(what);
+  reference::Frame &here(const char *what, const Place &at) const {
+    return *executor(what, at).frame;
+  }
+  reference::Frame &inBin(const char *what, const Place &at) const {
+    reference::Frame &call = here(what, at);
     if (call.phase == reference::Phase::Assign)
       call.node->fail(-1, std::string(what) + " in assignBin");
     return call;
   }
-  reference::Frame &inSchedule(const char *what) const {
-    return executor(what).expect(reference::Phase::Schedule, what);
+  reference::Frame &inSchedule(const char *what, const Place &at) const {
+    return executor(what, at).expect(reference::Phase::Schedule, what);
   }
-  reference::Frame &inList(const char *what) const {
-    reference::Frame &call = inSchedule(what);
+  reference::Frame &inList(const char *what, const Place &at) const {
+    reference::Frame &call = inSchedule(what, at);
     if (!call.node->takesList)
       call.node->fail(call.bin,
                       std::string(what) + " needs a process that takes a list");
     return call;
   }
 
-  template <class T> void emitAs(const T &value, int port) {
-    executor("emit").emit(port, reference::typeOf<T>(), &value);
+  template <class T> void emitAs(const T &value, int port, const Place &at) {
+    executor("emit", at).emit(port, reference::typeOf<T>(), &value);
   }
 
-  void assignBox(reference::Cell lo, reference::Cell hi) {
-    reference::Executor &running = executor("assignToBoundingBox");
+  void assignBox(reference::Cell lo, reference::Cell hi, const Place &at) {
+    reference::Executor &running = executor("assignToBoundingBox", at);
     const reference::Grid &grid =
         running.expect(reference::Phase::Assign, "assignToBoundingBox")
             .node->grid;
@@ -327,34 +365,40 @@ private:
     for (int d = 0; d < rank; ++d)
       if (at[d] < lo[d] || at[d] >= hi[d])
         call.node->fail(call.bin,
-                        "update of pixel " + reference::toText(at, rank) +
-                            " outside the bin, whose pixels are " +
-                            reference::toText(lo, rank) + " to " +
-                            reference::toText(hi, rank) + " (exclusive)");
+                        "expected an update inside the stage's own bin, but "
+                        "got pixel " +
+                            reference::toText(at, rank));
   }
 
-  int64_t iteration() const { return here("parallelFor").loop->iteration; }
+  int64_t iteration() const {
+    return reference::Executor::current()->frame->loop->iteration;
+  }
 
   /// Gathers one value of each iteration and hands out what `combine` makes of
   /// them.
   template <class T, class Result, class Combine>
-  Result collective(const char *what, const T &value, Combine combine) {
-    reference::Loop &loop = executor(what).loopForSync(what);
+  Result collective(const char *what, const Place &at, const T &value,
+                    Combine combine) {
+    reference::Executor &running = executor(what, at);
+    reference::Loop &loop = running.loopForSync(what);
     bool first = loop.iteration == 0;
     if (first)
       loop.slots = std::vector<T>(loop.size, value);
     else
       std::any_cast<std::vector<T> &>(loop.slots)[loop.iteration] = value;
-    sync();
+    running.sync();
     if (first) // the first to go on
       loop.result = combine(std::any_cast<std::vector<T> &>(loop.slots));
     return std::any_cast<Result &>(loop.result);
   }
 
-  template <class T, class F> std::vector<T> evaluate(int64_t n, F &f) {
-    std::vector<T> values(n);
-    parallelFor(n, [&](int i) { values[i] = f(i); });
-    return values;
+  /// How often f(0), ..., f(n - 1) is true.
+  template <class F>
+  int64_t sum(const char *what, int64_t n, F &f, const Place &at) {
+    int64_t total = 0;
+    outside(what, at).parallelFor(
+        n, [&](int64_t i) { total += bool(f(static_cast<int>(i))); });
+    return total;
   }
 };
 

@@ -17,14 +17,42 @@ namespace piko {
 namespace reference {
 
 /// Throws for an access outside a buffer or an image.
-[[noreturn]] inline void failAccess(const std::string &message) {
+[[noreturn]] inline void failAccess(int64_t index, int64_t count,
+                                    const Place &at) {
+  std::string message = "expected an index in [0, " + std::to_string(count) +
+                        "), but got " + std::to_string(index);
   Executor *executor = Executor::current();
-  if (executor && executor->frame)
-    executor->frame->node->fail(
-        executor->frame->phase == Phase::Assign ? -1 : executor->frame->bin,
-        message);
-  throw Error(message);
+  if (!executor || !executor->frame)
+    throw Error(message);
+  Frame &call = *executor->frame;
+  call.at = at;
+  call.node->fail(call.phase == Phase::Assign ? -1 : call.bin, message);
 }
+
+/// The checker, while a phase runs in checking mode; else null.
+inline Checker *activeChecker() {
+  if constexpr (!checking)
+    return nullptr;
+  Executor *executor = Executor::current();
+  return executor && executor->frame ? &executor->checker : nullptr;
+}
+
+#ifdef PIKO_CHECK
+/// An index, and the place in the user's file where it is used.
+struct Index {
+  template <class I>
+    requires std::is_convertible_v<I, int64_t>
+  Index(I value, Place at = Place::current())
+      : value(static_cast<int64_t>(value)), at(at) {}
+  operator int64_t() const { return value; }
+  int64_t value;
+  Place at;
+};
+inline Place placeOf(const Index &index) { return index.at; }
+#else
+using Index = int64_t;
+inline Place placeOf(Index) { return {}; }
+#endif
 
 /// What the pipeline has to know of its images.
 class ImageBase {
@@ -71,11 +99,12 @@ public:
   Buffer() = default;
 
   int64_t size() const { return count; }
-  T &operator[](int64_t i) const {
+  T &operator[](reference::Index i) const {
+    reference::Place at = reference::placeOf(i);
     if (i < 0 || i >= count)
-      reference::failAccess("expected a buffer index in [0, " +
-                            std::to_string(count) + "), but got " +
-                            std::to_string(i));
+      reference::failAccess(i, count, at);
+    if (reference::Checker *checker = reference::activeChecker())
+      checker->give(checker->element(this, i, [&] { return describe(); }), at);
     return elements[i];
   }
 
@@ -118,6 +147,16 @@ public:
   T *end() const { return elements + count; }
 
 private:
+  reference::Memory describe() const {
+    reference::Memory memory;
+    memory.elementType = reference::typeName<T>();
+    memory.data = reinterpret_cast<std::byte *>(elements);
+    memory.elementSize = sizeof(T);
+    memory.extent[0] = count;
+    memory.elements.resize(count);
+    return memory;
+  }
+
   std::unique_ptr<T[]> owned;
   T *elements = nullptr;
   int64_t count = 0;
@@ -134,8 +173,24 @@ class Image final : public reference::ImageBase {
 public:
   Image() = default;
 
-  const T &operator()(const Cells<Rank> &at) const { return pixel(at); }
-  void store(const Cells<Rank> &at, const T &value) { pixel(at) = value; }
+  const T &
+  operator()(const Cells<Rank> &at,
+             reference::Place place = reference::Place::current()) const {
+    T &found = pixel(at, place);
+    if (reference::Checker *checker = reference::activeChecker())
+      checker->give(element(*checker, found), place);
+    return found;
+  }
+  void store(const Cells<Rank> &at, const T &value,
+             reference::Place place = reference::Place::current()) {
+    T &found = pixel(at, place);
+    auto change = [&] { found = value; };
+    if (reference::Checker *checker = reference::activeChecker())
+      checker->access(element(*checker, found), reference::AccessKind::Store,
+                      place, change);
+    else
+      change();
+  }
   Cells<Rank> extent() const { return reference::fromCell<Rank>(cells); }
 
   // For the host.
@@ -154,20 +209,43 @@ public:
     std::fill_n(pixels.get(), size(), T{});
   }
 
-  /// The pixel itself: for update() and the atomics.
-  T &pixel(const Cells<Rank> &at) const {
+  /// f(pixel), for BasicStage::update.
+  template <class F>
+  auto update(const Cells<Rank> &at, const reference::Place &place, F &&f) {
+    T &found = pixel(at, place);
+    if (reference::Checker *checker = reference::activeChecker())
+      return checker->access(element(*checker, found),
+                             reference::AccessKind::Update, place,
+                             [&] { return f(found); });
+    return f(found);
+  }
+
+private:
+  T &pixel(const Cells<Rank> &at, const reference::Place &place) const {
     int64_t index = 0;
     for (int d = Rank - 1; d >= 0; --d) {
       if (at[d] < 0 || at[d] >= cells[d])
-        reference::failAccess("expected an image coordinate in [0, " +
-                              std::to_string(cells[d]) + "), but got " +
-                              std::to_string(at[d]));
+        reference::failAccess(at[d], cells[d], place);
       index = index * cells[d] + at[d];
     }
     return pixels[index];
   }
 
-private:
+  reference::Element &element(reference::Checker &checker,
+                              const T &pixel) const {
+    return checker.element(this, &pixel - pixels.get(), [&] {
+      reference::Memory memory;
+      memory.elementType = reference::typeName<T>();
+      memory.data = reinterpret_cast<std::byte *>(pixels.get());
+      memory.elementSize = sizeof(T);
+      memory.extent = cells;
+      memory.rank = Rank;
+      memory.isImage = true;
+      memory.elements.resize(size());
+      return memory;
+    });
+  }
+
   reference::Cell cells = [] {
     reference::Cell none{1, 1, 1, 1};
     for (int d = 0; d < Rank; ++d)
