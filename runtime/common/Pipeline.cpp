@@ -188,9 +188,9 @@ static std::string describe(const std::string &stage, const KernelError &e) {
   std::string text = "stage " + quoted(stage) + ": ";
   switch (e.code) {
   case PIKORT_BIN_OUTSIDE:
-    text += "expected a bin of the grid";
+    text += "expected a bin id";
     if (e.b > 0)
-      text += ", in [0, " + b + ")";
+      text += " in [0, " + b + ")";
     return text + ", but got " + a;
   case PIKORT_UPDATE_OUTSIDE:
     return text +

@@ -227,11 +227,11 @@ TEST_F(Host, BinsOutsideTheGrid) {
     ASSERT_TRUE(pipe.threads(threads));
     act = Act::BadBin;
     expectError(pipe.run(), PIKORT_BIN_OUTSIDE,
-                "stage 'bin': expected a bin of the grid, in [0, 4), but got "
+                "stage 'bin': expected a bin id in [0, 4), but got "
                 "9");
     act = Act::NegativeBin;
     expectError(pipe.run(), PIKORT_BIN_OUTSIDE,
-                "stage 'bin': expected a bin of the grid, in [0, 4), but got "
+                "stage 'bin': expected a bin id in [0, 4), but got "
                 "-1");
   }
   act = Act::Nothing;

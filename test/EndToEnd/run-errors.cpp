@@ -36,7 +36,7 @@ struct Write : piko::Pipe<State> {
 };
 
 // BIN: expected: {{.*}}stage 'BinOutside': expected a bin id in [0, 48), but got
-// BIN: got: stage 'stage': expected a bin of the grid, in [0, 48), but got
+// BIN: got: stage 'stage': expected a bin id in [0, 48), but got
 struct BinOutside : piko::Stage<8, 8, 64, Point> {
   void assignBin(const Point &p) { assignToBin(p, {p.tag}); }
   void process(const Point &) {}
@@ -46,8 +46,8 @@ struct Bin : piko::Pipe<State> {
   Bin() { source(stage); }
 };
 
-// BOX: expected: {{.*}}stage 'BoxNaN': a bounding box is NaN
-// BOX: got: stage 'stage': expected a bin of the grid, in [0, 48), but got -1
+// BOX: expected: {{.*}}stage 'BoxNaN': expected a bounding box of numbers, but got NaN
+// BOX: got: stage 'stage': expected a bin id in [0, 48), but got -1
 struct BoxNaN : piko::Stage<8, 8, 64, Point> {
   void assignBin(const Point &p) {
     float zero = p.value - p.value;
