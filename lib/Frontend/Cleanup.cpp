@@ -10,6 +10,7 @@
 #include "Cleanup.h"
 
 #include "MathCalls.h"
+#include "ParallelLoops.h"
 #include "Wrappers.h"
 #include "mlir/IR/Diagnostics.h"
 #include "llvm/Analysis/CFG.h"
@@ -27,7 +28,6 @@
 #include "llvm/Transforms/Scalar/SROA.h"
 #include "llvm/Transforms/Scalar/SimplifyCFG.h"
 #include "llvm/Transforms/Utils/Cloning.h"
-#include "llvm/Transforms/Utils/Mem2Reg.h"
 
 using namespace piko;
 using llvm::dyn_cast;
@@ -266,6 +266,7 @@ static void prepareFunction(llvm::Function &function, ParsedUnit &unit,
                             MemoryMap &memory, mlir::MLIRContext &context) {
   redirectMathCalls(function, unit, context);
   inlineKnownCalls(function);
+  labelLoops(function, memory);
   dropHints(function);
   expandMarkers(function, memory);
 }
@@ -275,9 +276,10 @@ static bool cleanUpFunction(llvm::Function &function, ParsedUnit &unit,
                             mlir::MLIRContext &context) {
   prepareFunction(function, unit, memory, context);
   llvm::FunctionPassManager simplify;
-  simplify.addPass(llvm::PromotePass());
   simplify.addPass(llvm::EarlyCSEPass(/*UseMemorySSA=*/false));
   simplify.addPass(llvm::SimplifyCFGPass());
+  if (!promoteVariables(function, unit, context))
+    return false;
   runner.run(simplify, function);
   // Each round sees through one more level of references.
   bool localized = false;
@@ -295,8 +297,11 @@ static bool cleanUpFunction(llvm::Function &function, ParsedUnit &unit,
         break;
       localized = true;
     }
+    if (!promoteVariables(function, unit, context))
+      return false;
     runner.run(simplify, function);
   }
+  shareArrays(function, memory);
   llvm::FunctionPassManager promote;
   promote.addPass(llvm::SROAPass(llvm::SROAOptions::PreserveCFG));
   promote.addPass(llvm::EarlyCSEPass(/*UseMemorySSA=*/true));
@@ -358,7 +363,7 @@ bool piko::cleanUp(ParsedUnit &unit, MemoryMap &memory,
   PassRunner runner;
   llvm::ModulePassManager inlining;
   inlining.addPass(llvm::GlobalDCEPass());
-  inlining.addPass(llvm::AlwaysInlinerPass(/*InsertLifetime=*/false));
+  inlining.addPass(llvm::AlwaysInlinerPass(/*InsertLifetime=*/true));
   runner.run(inlining, module);
   for (llvm::Function *wrapper : wrappers)
     if (!cleanUpFunction(*wrapper, unit, memory, runner, context))

@@ -6,10 +6,11 @@
 //   1. checkCalls      what a phase cannot call is an error
 //   2. always-inline   the wrappers become one function each
 //   3. expandMarkers   markers take and give numbers, not pointers to records
+//      labelLoops      what belongs to the iterations of a parallelFor
 //   4. rounds of       splitMemory     copies and variables, number by number
 //                      flattenPointers phis and selects of pointers
-//                      mem2reg, early-cse, simplifycfg
-//   5. SROA
+//                      promoteVariables, early-cse, simplifycfg
+//   5. shareArrays, SROA
 //   6. resolveAccesses loads and stores outside of local memory become calls
 //                      of accessors, which name the field
 //   7. early-cse, simplifycfg, instcombine, dce
@@ -45,6 +46,7 @@ constexpr llvm::StringLiteral updateEnd = "piko.update_end";
 constexpr llvm::StringLiteral load = "piko.load.";
 constexpr llvm::StringLiteral store = "piko.store.";
 constexpr llvm::StringLiteral atomic = "piko.atomic.";
+constexpr llvm::StringLiteral share = "piko.share";
 } // namespace accessor
 
 void expandMarkers(llvm::Function &function, MemoryMap &memory);

@@ -125,9 +125,7 @@ private:
     // ends.
     if (name != accessor::updateBegin && name != accessor::updateEnd)
       declaration->setOnlyAccessesInaccessibleMemory();
-    declaration->addFnAttr(llvm::Attribute::NoDuplicate);
-    declaration->addFnAttr(llvm::Attribute::Convergent);
-    declaration->addFnAttr(llvm::Attribute::NoMerge);
+    setInPlace(*declaration);
     return builder.CreateCall(callee, arguments);
   }
 

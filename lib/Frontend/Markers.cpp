@@ -12,16 +12,18 @@ using namespace piko;
 std::optional<MarkerKind> piko::getMarkerKind(llvm::StringRef name) {
 #define MARKER(NAME) .Case(#NAME, MarkerKind::NAME)
   return llvm::StringSwitch<std::optional<MarkerKind>>(name) MARKER(state)
-      MARKER(input) MARKER(element) MARKER(extent) MARKER(imageExtent)
-          MARKER(emit) MARKER(updateBegin) MARKER(updateEnd) MARKER(atomic)
-              MARKER(bin) MARKER(binAt) MARKER(binLo) MARKER(binHi)
-                  MARKER(domain) MARKER(assignBin) MARKER(assignAll)
-                      MARKER(assignPrevious) MARKER(assignBox) MARKER(schedule)
-                          MARKER(endStage) MARKER(endBin) MARKER(batch)
-                              MARKER(everyBin) MARKER(order) MARKER(source)
-                                  MARKER(connect) MARKER(allocateForSource)
-                                      MARKER(phase) MARKER(clear)
-                                          .Default(std::nullopt);
+      MARKER(input) MARKER(element) MARKER(listSize) MARKER(listAt) MARKER(
+             extent) MARKER(imageExtent) MARKER(emit) MARKER(updateBegin)
+          MARKER(updateEnd) MARKER(atomic) MARKER(loopFirst) MARKER(loopMore)
+              MARKER(loopNext) MARKER(sync) MARKER(bin) MARKER(binAt)
+                  MARKER(binLo) MARKER(binHi) MARKER(domain) MARKER(assignBin)
+                      MARKER(assignAll) MARKER(assignPrevious) MARKER(assignBox)
+                          MARKER(schedule) MARKER(endStage) MARKER(endBin)
+                              MARKER(batch) MARKER(everyBin) MARKER(order)
+                                  MARKER(source) MARKER(connect)
+                                      MARKER(allocateForSource) MARKER(phase)
+                                          MARKER(clear)
+                                              .Default(std::nullopt);
 #undef MARKER
 }
 
@@ -32,6 +34,12 @@ const Marker *piko::getMarker(const llvm::CallBase *call,
     return nullptr;
   auto found = markers.find(callee->getName());
   return found == markers.end() ? nullptr : &found->second;
+}
+
+void piko::setInPlace(llvm::Function &function) {
+  function.addFnAttr(llvm::Attribute::NoDuplicate);
+  function.addFnAttr(llvm::Attribute::Convergent);
+  function.addFnAttr(llvm::Attribute::NoMerge);
 }
 
 void piko::setMarkerEffects(llvm::Module &module, const MarkerTable &markers) {
@@ -46,9 +54,11 @@ void piko::setMarkerEffects(llvm::Module &module, const MarkerTable &markers) {
     case MarkerKind::state:
     case MarkerKind::input:
     case MarkerKind::element:
+    case MarkerKind::listAt:
       function.setDoesNotAccessMemory();
       function.addRetAttr(llvm::Attribute::NonNull);
       break;
+    case MarkerKind::listSize:
     case MarkerKind::extent:
     case MarkerKind::imageExtent:
     case MarkerKind::bin:
@@ -57,6 +67,12 @@ void piko::setMarkerEffects(llvm::Module &module, const MarkerTable &markers) {
     case MarkerKind::binHi:
     case MarkerKind::domain:
       function.setDoesNotAccessMemory();
+      break;
+    case MarkerKind::loopFirst:
+    case MarkerKind::loopMore:
+    case MarkerKind::loopNext:
+      function.setDoesNotAccessMemory();
+      setInPlace(function);
       break;
     case MarkerKind::phase:
     case MarkerKind::assignBin:
@@ -68,9 +84,7 @@ void piko::setMarkerEffects(llvm::Module &module, const MarkerTable &markers) {
     default:
       // What they read and write is seen by nothing else in the module, but
       // they stay where they are, and as many as they are.
-      function.addFnAttr(llvm::Attribute::NoDuplicate);
-      function.addFnAttr(llvm::Attribute::Convergent);
-      function.addFnAttr(llvm::Attribute::NoMerge);
+      setInPlace(function);
       break;
     }
   }

@@ -12,6 +12,7 @@
 
 namespace llvm {
 class CallBase;
+class Function;
 class Module;
 } // namespace llvm
 
@@ -22,12 +23,18 @@ enum class MarkerKind {
   state,
   input,
   element,
+  listSize,
+  listAt,
   extent,
   imageExtent,
   emit,
   updateBegin,
   updateEnd,
   atomic,
+  loopFirst,
+  loopMore,
+  loopNext,
+  sync,
   bin,
   binAt,
   binLo,
@@ -68,6 +75,9 @@ using MarkerTable = std::map<std::string, Marker, std::less<>>;
 
 /// The marker that an instruction calls, or null.
 const Marker *getMarker(const llvm::CallBase *call, const MarkerTable &markers);
+
+/// Keeps calls of a function where they are, and as many as they are.
+void setInPlace(llvm::Function &function);
 
 /// Tells LLVM what the markers in a module may do to memory.
 void setMarkerEffects(llvm::Module &module, const MarkerTable &markers);

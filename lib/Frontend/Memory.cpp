@@ -263,6 +263,7 @@ const MemoryLayout *MemoryMap::getLayout(const llvm::Value *base) {
     return &stateLayout;
   case MarkerKind::input:
   case MarkerKind::element:
+  case MarkerKind::listAt:
     return &recordLayouts[marker->record];
   default:
     return nullptr;

@@ -124,6 +124,7 @@ private:
         builder.getI64IntegerAttr(stage.threads), getRecordName(stage.input),
         builder.getArrayAttr(outputs), /*lineage=*/nullptr, /*tile=*/nullptr,
         /*cycle=*/nullptr);
+    op.setTakesList(stage.takesList);
     builder.createBlock(&op.getBody());
     if (stage.hasAssign) {
       auto assign =

@@ -79,7 +79,8 @@ makeInvocation(const ParseRequest &request,
   clang::CodeGenOptions &codeGen = invocation->getCodeGenOpts();
   codeGen.DisableLLVMPasses = true;
   codeGen.DisableLifetimeMarkers = true;
-  codeGen.DiscardValueNames = true;
+  // Errors name variables.
+  codeGen.DiscardValueNames = false;
   // File names stay as given: Clang cuts off what they share with this folder.
   codeGen.DebugCompilationDir = "/";
   clang::LangOptions &language = invocation->getLangOpts();
@@ -214,6 +215,7 @@ readMarker(const clang::FunctionDecl *function, UnitReader &reader,
   switch (*kind) {
   case MarkerKind::input:
   case MarkerKind::element:
+  case MarkerKind::listAt:
   case MarkerKind::emit:
   case MarkerKind::updateBegin:
   case MarkerKind::updateEnd:
@@ -338,7 +340,6 @@ std::unique_ptr<ParsedUnit> piko::parseUnit(const ParseRequest &request,
 
   bool compiles = request.goal != ParseGoal::ListPipes;
   unit->llvmContext = std::make_unique<llvm::LLVMContext>();
-  unit->llvmContext->setDiscardValueNames(true);
   clang::CodeGenerator *generator = nullptr;
   if (compiles) {
     auto consumer =

@@ -324,11 +324,8 @@ LogicalResult PipelineReader::readPhases(const CXXRecordDecl *type,
   if (const auto *method = dyn_cast<clang::CXXMethodDecl>(process))
     if (method->getNumParams() == 1) {
       QualType parameter = method->getParamDecl(0)->getType();
-      if (asPikoTemplate(parameter.getNonReferenceType()->getAsCXXRecordDecl(),
-                         "List"))
-        return emitError(locate(process->getLocation()))
-               << "not supported in Piko: stage '" << stage.name
-               << "' processes a list, which the compiler cannot do yet";
+      stage.takesList = asPikoTemplate(
+          parameter.getNonReferenceType()->getAsCXXRecordDecl(), "List");
     }
   stage.hasAssign = declares(type, "assignBin", assign);
   stage.hasSchedule = declares(type, "schedule", schedule);

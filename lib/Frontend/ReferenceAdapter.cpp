@@ -177,8 +177,10 @@ template <class T, int Rank> void save(const piko::Image<T, Rank> &image,
                                            "PIKOIR_SERIALIZE", "PIKOIR_ALL"};
     const ScheduleDescription &schedule = stage.schedule;
     int flags = 0;
-    if (!schedule.endStage.empty() || schedule.endBin || schedule.batch)
+    if (!schedule.endStage.empty() || schedule.endBin || stage.takesList)
       flags |= 1; // PIKOIR_COLLECTS
+    if (stage.takesList)
+      flags |= 16; // PIKOIR_LIST
     if (schedule.unordered)
       flags |= 8; // PIKOIR_UNORDERED
     out << "  static const int64_t bins" << id << "[] = {"

@@ -87,9 +87,9 @@ private:
     }
     bool isElement = marker->kind == MarkerKind::element;
     if (writes && !isElement) {
-      fail(instruction, marker->kind == MarkerKind::input
-                            ? "writing to the primitive that is processed"
-                            : "writing to a constant of the state");
+      fail(instruction, marker->kind == MarkerKind::state
+                            ? "writing to a constant of the state"
+                            : "writing to the primitive that is processed");
       return nullptr;
     }
     leafType = layout->leaves[access->leaf].type;

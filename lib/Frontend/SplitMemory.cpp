@@ -231,7 +231,10 @@ private:
       llvm::Type *leafType = shape.type;
       if (!shape.dimensions.empty())
         leafType = llvm::ArrayType::get(leafType, shape.getElementCount());
-      leaf = builder.CreateAlloca(leafType);
+      llvm::AllocaInst *part =
+          builder.CreateAlloca(leafType, nullptr, variable->getName());
+      part->copyMetadata(*variable);
+      leaf = part;
     }
     for (const Use &use : uses)
       rewriteUse(use, layout.leaves[use.access.leaf], leaves[use.access.leaf]);

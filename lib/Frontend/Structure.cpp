@@ -107,13 +107,41 @@ static llvm::LogicalResult makeUpdate(CallOp begin) {
   return llvm::success();
 }
 
+namespace {
+
+class Lifting : public mlir::ControlFlowToSCFTransformation {
+public:
+  /// An iteration that never ends, as a phase that never does.
+  llvm::FailureOr<mlir::Operation *>
+  createUnreachableTerminator(mlir::Location location, mlir::OpBuilder &builder,
+                              mlir::Region &region) override {
+    if (!mlir::isa<ParallelForOp>(region.getParentOp()))
+      return ControlFlowToSCFTransformation::createUnreachableTerminator(
+          location, builder, region);
+    return YieldOp::create(builder, location, mlir::ValueRange(),
+                           mlir::ValueRange())
+        .getOperation();
+  }
+};
+
+} // namespace
+
+static llvm::LogicalResult liftBranches(mlir::Region &region) {
+  Lifting lifting;
+  mlir::DominanceInfo dominance(region.getParentOp());
+  if (llvm::succeeded(mlir::transformCFGToSCF(region, lifting, dominance)))
+    return llvm::success();
+  return mlir::emitError(region.getLoc(),
+                         "not supported in Piko: this control flow");
+}
+
 llvm::LogicalResult piko::structurePhase(mlir::func::FuncOp function) {
-  mlir::ControlFlowToSCFTransformation transformation;
-  mlir::DominanceInfo dominance(function);
-  if (llvm::failed(mlir::transformCFGToSCF(function.getBody(), transformation,
-                                           dominance)))
-    return mlir::emitError(function.getLoc(),
-                           "not supported in Piko: this control flow");
+  // Inner loops first.
+  mlir::WalkResult lifted = function.walk([](ParallelForOp loop) {
+    return mlir::WalkResult(liftBranches(loop.getBody()));
+  });
+  if (lifted.wasInterrupted() || llvm::failed(liftBranches(function.getBody())))
+    return llvm::failure();
   llvm::SmallVector<CallOp> begins;
   function.walk([&](CallOp call) {
     if (isBegin(*call))

@@ -33,9 +33,11 @@ std::string piko::generateWrappers(const PipelineDescription &pipeline,
   for (auto [index, stage] : llvm::enumerate(pipeline.stages)) {
     std::string call =
         "__piko_pipe pipe; ::piko::marker::phase(); pipe." + stage.name;
-    std::string input = "(*::piko::marker::input<typename decltype(pipe." +
-                        stage.name + ")::Input>());";
-    function(WrapperKind::Process, index, call + ".process" + input);
+    std::string type = "typename decltype(pipe." + stage.name + ")::Input";
+    std::string input = "(*::piko::marker::input<" + type + ">());";
+    function(WrapperKind::Process, index,
+             call + ".process" +
+                 (stage.takesList ? "(::piko::List<" + type + ">());" : input));
     if (stage.hasAssign)
       function(WrapperKind::Assign, index, call + ".assignBin" + input);
     if (stage.hasSchedule)

@@ -11,9 +11,8 @@
 // RUN: not piko-translate --cpp-to-piko -DCASE=8 %s 2>&1 | FileCheck %s --check-prefix=ASM
 // RUN: not piko-translate --cpp-to-piko -DCASE=9 %s 2>&1 | FileCheck %s --check-prefix=PORT
 // RUN: not piko-translate --cpp-to-piko -DCASE=10 %s 2>&1 | FileCheck %s --check-prefix=NESTED
-// RUN: not piko-translate --cpp-to-piko -DCASE=11 %s 2>&1 | FileCheck %s --check-prefix=PARALLEL
-// RUN: not piko-translate --cpp-to-piko -DCASE=12 %s 2>&1 | FileCheck %s --check-prefix=VIRTUAL
-// RUN: not piko-translate --cpp-to-piko -DCASE=13 %s 2>&1 | FileCheck %s --check-prefix=SYNTAX
+// RUN: not piko-translate --cpp-to-piko -DCASE=11 %s 2>&1 | FileCheck %s --check-prefix=VIRTUAL
+// RUN: not piko-translate --cpp-to-piko -DCASE=12 %s 2>&1 | FileCheck %s --check-prefix=SYNTAX
 #include <piko.h>
 
 struct A {
@@ -71,9 +70,6 @@ struct Stage : piko::Stage<0, 0, 1, A, A>, piko::Uses<State> {
       update(state().image, glm::ivec2(1), [&](A &q) { q.x = p.x; });
     });
 #elif CASE == 11
-    // PARALLEL: errors-unsupported.cpp:[[#@LINE + 1]]:5: error: not supported in Piko: 'parallelFor', which the compiler cannot do yet
-    parallelFor(4, [&](int i) { state().buffer[i] = a; });
-#elif CASE == 12
     out.x = getArea(reinterpret_cast<const Shape *>(&a));
 #else
     // SYNTAX: errors-unsupported.cpp:[[#@LINE + 1]]:7: error: no member named 'q' in 'A'

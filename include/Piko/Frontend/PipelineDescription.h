@@ -86,6 +86,8 @@ struct StageDescription {
   unsigned input = 0;
   std::vector<unsigned> outputs = {};
   bool hasAssign = false, hasSchedule = false;
+  /// Whether process takes the list of a bin.
+  bool takesList = false;
   ScheduleDescription schedule = {};
   /// Bytes from the beginning of the pipeline object.
   int64_t offset = 0;

@@ -24,6 +24,8 @@ template <class S> S *state();
 template <class T> const T *input();
 template <class T>
 T *element(const void *handle, int64_t x, int64_t y, int64_t z, int64_t w);
+int64_t listSize();
+template <class T> const T *listAt(int64_t i);
 int64_t extent(const void *handle, int32_t dim);
 int32_t imageExtent(const void *handle, int32_t dim);
 
@@ -34,6 +36,13 @@ void updateBegin(T *pixel, const void *handle, int64_t x, int64_t y, int64_t z,
                  int64_t w);
 template <class T> void updateEnd(const T *pixel);
 template <int Kind, bool Signed, class T> void atomic(T *place, T value);
+
+// for (i = loopFirst(); loopMore(i, n, 0); i = loopNext(i)): iterations that do
+// not depend on one another. The front end numbers the loops.
+int32_t loopFirst();
+bool loopMore(int32_t i, int64_t n, int32_t loop);
+int32_t loopNext(int32_t i);
+void sync();
 
 // The grid of bins.
 int64_t bin();

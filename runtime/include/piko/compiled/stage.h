@@ -3,20 +3,10 @@
 #ifndef PIKO_COMPILED_STAGE_H
 #define PIKO_COMPILED_STAGE_H
 
+#include <piko/compiled/list.h>
 #include <piko/compiled/state.h>
 
 namespace piko {
-
-/// The primitives that a list Process is called with: only the reference
-/// executor can do that yet.
-template <class T> class List {
-public:
-  int64_t size() const;
-  bool empty() const;
-  const T &operator[](int64_t i) const;
-  const T *begin() const;
-  const T *end() const;
-};
 
 /// Gives a stage access to the state of its pipeline.
 template <class S> class Uses {
@@ -114,10 +104,40 @@ protected:
     return make([](int32_t dim) { return marker::binHi(marker::bin(), dim); });
   }
 
-  // What only the reference executor can do yet: the compiler says so.
-  template <class F> void parallelFor(int64_t n, F &&f);
-  template <class F> void parallelForPixels(F &&f);
-  void sync();
+  /// Calls f(0), ..., f(n - 1), which are independent of one another.
+  template <class F> void parallelFor(int64_t n, F &&f) {
+    for (int32_t i = marker::loopFirst(); marker::loopMore(i, n, 0);
+         i = marker::loopNext(i))
+      iterate(f, i);
+  }
+  /// Calls f(cell) for each cell of the current bin, x fastest.
+  template <class F> void parallelForPixels(F &&f) {
+    Cells<rank> lo = binLo(), hi = binHi();
+    int64_t n = hi.x - lo.x;
+    if constexpr (rank >= 2)
+      n *= hi.y - lo.y;
+    if constexpr (rank >= 3)
+      n *= hi.z - lo.z;
+    if constexpr (rank >= 4)
+      n *= hi.w - lo.w;
+    parallelFor(n, [&](int i) {
+      Cells<rank> cell;
+      auto take = [&](int &at, int first, int end) {
+        at = first + i % (end - first);
+        i /= end - first;
+      };
+      take(cell.x, lo.x, hi.x);
+      if constexpr (rank >= 2)
+        take(cell.y, lo.y, hi.y);
+      if constexpr (rank >= 3)
+        take(cell.z, lo.z, hi.z);
+      if constexpr (rank >= 4)
+        take(cell.w, lo.w, hi.w);
+      f(cell);
+    });
+  }
+  /// In an iteration of parallelFor: a barrier between all iterations.
+  void sync() { marker::sync(); }
 
   // Schedule.
   void specifySchedule(SchedulePolicy policy, int64_t tileSplit = 0) {
@@ -130,6 +150,8 @@ protected:
   void specifyOrder(Order order) { marker::order(order); }
 
 private:
+  /// A function of its own: what it declares belongs to the iteration.
+  template <class F> static void iterate(F &f, int i) { f(i); }
   static Cells<rank> cells(const Position<rank> &p) {
     if constexpr (rank == 1)
       return Cells<1>(detail::cellOf(p.x));

@@ -19,6 +19,7 @@ public:
       : primitives(primitives), count(count) {}
 
   int64_t size() const { return count; }
+  bool empty() const { return count == 0; }
   const T &operator[](reference::Index i) const {
     if (i < 0 || i >= count)
       reference::failAccess(i, count, reference::placeOf(i));

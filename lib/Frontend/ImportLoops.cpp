@@ -1,0 +1,100 @@
+//===- ImportLoops.cpp - parallelFor and barriers -------------------------===//
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+
+#include "Cleanup.h"
+#include "PhaseImporter.h"
+#include "mlir/Dialect/ControlFlow/IR/ControlFlowOps.h"
+#include "llvm/IR/Instructions.h"
+
+using namespace piko;
+using llvm::dyn_cast;
+using llvm::failure;
+using llvm::LogicalResult;
+using llvm::success;
+
+void PhaseImporter::makeLoop(const ParallelLoop *loop) {
+  setLocation(loop->more);
+  LoopRegion &region = loopRegions[loop];
+  region.body = std::make_unique<mlir::Region>();
+  region.entry = &region.body->emplaceBlock();
+  region.entry->addArgument(builder.getIndexType(), *location);
+  region.end = &region.body->emplaceBlock();
+  loopEntries[loop->getNumber()] = region.entry;
+}
+
+/// Reports what goes from one iteration to another, or out of the loop, other
+/// than through an array.
+LogicalResult PhaseImporter::checkLoop(const ParallelLoop *loop) {
+  const llvm::Instruction *carried = nullptr;
+  for (llvm::PHINode &phi : loop->blocks->getHeader()->phis())
+    if (&phi != loop->more->getArgOperand(0))
+      for (auto [value, from] : llvm::zip(phi.incoming_values(), phi.blocks()))
+        if (loop->blocks->contains(from) && !carried) {
+          carried = dyn_cast<llvm::Instruction>(value.get());
+          if (!carried || carried == &phi)
+            carried = loop->more;
+        }
+  for (llvm::BasicBlock *block : loop->blocks->blocks())
+    for (llvm::Instruction &instruction : *block)
+      for (const llvm::User *user : instruction.users())
+        if (!loop->blocks->contains(
+                llvm::cast<llvm::Instruction>(user)->getParent()) &&
+            !carried)
+          carried = &instruction;
+  if (!carried)
+    return success();
+  return fail(carried) << "expected the iterations of parallelFor to be "
+                          "independent, but this one assigns a captured "
+                          "variable";
+}
+
+LogicalResult PhaseImporter::importLoop(const ParallelLoop *loop) {
+  setLocation(loop->more);
+  if (failed(expectPhase(loop->more, WrapperKind::Process, "parallelFor")) ||
+      failed(checkLoop(loop)))
+    return failure();
+  auto *count = dyn_cast<llvm::Instruction>(loop->more->getArgOperand(1));
+  if (count && loop->blocks->contains(count))
+    return reject(count, "a number of iterations that changes with them");
+  mlir::Value number = getIndex(loop->more, 1);
+  auto op = make<ParallelForOp>(number);
+  LoopRegion &region = loopRegions[loop];
+  op.getBody().takeBody(*region.body);
+
+  builder.setInsertionPointToEnd(region.end);
+  make<YieldOp>(mlir::ValueRange(), mlir::ValueRange());
+  builder.setInsertionPointToEnd(region.entry);
+  llvm::Value *index = loop->more->getArgOperand(0);
+  values[index] = scalars.fromIndex(region.entry->getArgument(0),
+                                    scalars.getType(index->getType()));
+  return success();
+}
+
+void PhaseImporter::importLoopExit(const ParallelLoop *loop) {
+  llvm::BasicBlock *header = loop->blocks->getHeader();
+  for (llvm::BasicBlock *to : llvm::successors(header)) {
+    bool stays = loop->blocks->contains(to);
+    builder.setInsertionPointToEnd(stays ? loopRegions[loop].entry
+                                         : blocks[header]);
+    make<mlir::cf::BranchOp>(getTarget(header, to), getArguments(header, to));
+  }
+}
+
+LogicalResult PhaseImporter::checkBarrier(llvm::CallInst *call,
+                                          llvm::StringRef what) {
+  if (failed(expectPhase(call, WrapperKind::Process, what)))
+    return failure();
+  const ParallelLoop *loop = loops.get(call->getParent());
+  if (!loop)
+    return fail(call) << "expected " << what
+                      << " inside a parallelFor, but stage '" << stage.name
+                      << "' has one outside";
+  if (!loop->outer)
+    return success();
+  mlir::InFlightDiagnostic diagnostic = fail(call);
+  diagnostic << "expected " << what
+             << " inside a parallelFor that is not nested";
+  diagnostic.attachNote(getUserLocation(loop->outer->more, unit, context))
+      << "the outer parallelFor is here";
+  return diagnostic;
+}

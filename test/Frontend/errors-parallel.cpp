@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// What iterations may not do is said where they do it.
+// RUN: not piko-translate --cpp-to-piko -DCASE=1 %s 2>&1 | FileCheck %s --check-prefix=SUM
+// RUN: not piko-translate --cpp-to-piko -DCASE=2 %s 2>&1 | FileCheck %s --check-prefix=MEMBER
+// RUN: not piko-translate --cpp-to-piko -DCASE=3 %s 2>&1 | FileCheck %s --check-prefix=ONCE
+// RUN: not piko-translate --cpp-to-piko -DCASE=4 %s 2>&1 | FileCheck %s --check-prefix=INNER
+// RUN: not piko-translate --cpp-to-piko -DCASE=5 %s 2>&1 | FileCheck %s --check-prefix=NESTED
+// RUN: not piko-translate --cpp-to-piko -DCASE=6 %s 2>&1 | FileCheck %s --check-prefix=OUTSIDE
+// RUN: not piko-translate --cpp-to-piko -DCASE=7 %s 2>&1 | FileCheck %s --check-prefix=ASSIGN
+#include <piko.h>
+
+struct A {
+  float x;
+  int n;
+};
+struct State {
+  piko::Buffer<A> buffer;
+};
+
+struct Stage : piko::Stage<0, 0, 64, A>, piko::Uses<State> {
+  void assignBin(const A &a) {
+#if CASE == 7
+    // ASSIGN: errors-parallel.cpp:[[#@LINE + 1]]:5: error: expected parallelFor in a process phase, but stage 'stage' has one in another
+    parallelFor(a.n, [&](int) { assignToAll(a); });
+#endif
+    assignToAll(a);
+  }
+  void process(const A &a) {
+    float sum = 0;
+    glm::vec3 vector(0);
+    // NESTED: errors-parallel.cpp:[[#@LINE + 18]]:33: error: expected sync inside a parallelFor that is not nested
+    // NESTED: errors-parallel.cpp:[[#@LINE + 1]]:5: note: the outer parallelFor is here
+    parallelFor(a.n, [&](int i) {
+      float own = 0;
+#if CASE == 1
+      // SUM: errors-parallel.cpp:[[#@LINE + 1]]:11: error: expected the iterations of parallelFor to be independent, but this one assigns the captured variable 'sum'
+      sum += float(i);
+#elif CASE == 2
+      // MEMBER: errors-parallel.cpp:[[#@LINE + 1]]:16: error: expected the iterations of parallelFor to be independent, but this one assigns the captured variable 'vector'
+      vector.y = float(i);
+#elif CASE == 3
+      // ONCE: errors-parallel.cpp:[[#@LINE + 2]]:13: error: expected the iterations of parallelFor to be independent, but this one assigns the captured variable 'sum'
+      if (i == 3)
+        sum = 7;
+#elif CASE == 4
+      // INNER: errors-parallel.cpp:[[#@LINE + 1]]:39: error: expected the iterations of parallelFor to be independent, but this one assigns the captured variable 'own'
+      parallelFor(3, [&](int j) { own = float(j); });
+#elif CASE == 5
+      parallelFor(3, [&](int) { sync(); });
+#endif
+      state().buffer[i].x = own;
+    });
+#if CASE == 6
+    // OUTSIDE: errors-parallel.cpp:[[#@LINE + 1]]:5: error: expected sync inside a parallelFor, but stage 'stage' has one outside
+    sync();
+#endif
+    state().buffer[a.n].x = sum + vector.y;
+  }
+};
+struct Pipeline : piko::Pipe<State> {
+  Stage stage;
+  Pipeline() { source(stage); }
+};
