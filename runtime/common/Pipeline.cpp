@@ -205,6 +205,11 @@ static std::string describe(const std::string &stage, const KernelError &e) {
   case PIKORT_NOT_A_NUMBER:
     text += "expected a number, but got NaN";
     return e.a >= 0 ? text + " in bin " + a : text;
+  case PIKORT_NOT_UNIFORM:
+    return text +
+           "expected every iteration of parallelFor to call sync() as often "
+           "as iteration 0, but iteration " +
+           a + " does not";
   case PIKORT_OUT_OF_MEMORY:
     if (e.a < 0)
       return text + "expected memory of at least 0 bytes, but got " + a;

@@ -258,6 +258,7 @@ PIKORT_API int32_t pikoir_cycle_step(pikort_pipeline *p, int32_t stage);
 ///   PIKORT_INDEX_OUTSIDE   a = index, b = elements
 ///   PIKORT_ENDLESS         a = iterations
 ///   PIKORT_NOT_A_NUMBER    a = bin, or -1
+///   PIKORT_NOT_UNIFORM     a = iteration
 PIKORT_API void pikoir_fail(pikort_pipeline *p, int32_t stage, int32_t code,
                             int64_t a, int64_t b);
 

@@ -56,7 +56,8 @@ enum pikort_status {
   PIKORT_UPDATE_OUTSIDE = 17,  ///< An update outside of the call's own bin.
   PIKORT_INDEX_OUTSIDE = 18,   ///< An element outside a buffer or an image.
   PIKORT_ENDLESS = 19,         ///< A loop that does not end.
-  PIKORT_NOT_A_NUMBER = 20     ///< A NaN where a position is needed.
+  PIKORT_NOT_A_NUMBER = 20,    ///< A NaN where a position is needed.
+  PIKORT_NOT_UNIFORM = 21      ///< Iterations that do not meet at a barrier.
 };
 
 // --- Life -------------------------------------------------------------------
