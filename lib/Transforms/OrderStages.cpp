@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // piko-order-stages, after section 5.1 of the paper:
-//   1. cut the graph into linear branches;
-//   2. sort the branches by the distance of their first stage from the drain,
+//   1. take the stages of each cycle of edges together, as one node;
+//   2. cut the graph of nodes into linear branches;
+//   3. sort the branches by the distance of their first node from the drain,
 //      farthest first;
-//   3. take the first branch all of whose dependencies have been taken, until
+//   4. take the first branch all of whose dependencies have been taken, until
 //      none is left.
 
 #include "Piko/Transforms/Passes.h"
@@ -21,21 +22,40 @@ using namespace piko;
 
 namespace {
 
+using Lists = SmallVector<SmallVector<int>>;
+
 /// The stages of a pipeline as numbers, in declaration order.
 struct StageGraph {
   SmallVector<StageOp> stages;
-  /// Consumers, in port order; and for each stage the stages that must have run
-  /// before it: its producers, and those it waits for.
-  SmallVector<SmallVector<int>> consumers, producers, waits;
+  /// For each stage its consumers, in port order, and the stages it waits for.
+  Lists consumers, waits;
 
   explicit StageGraph(PipelineOp pipeline);
+  /// Which stages can be reached from each, along one edge or more.
+  SmallVector<SmallVector<bool>> reach() const;
+};
 
-  /// Numbers of the stages so that each comes behind what it depends on, and
-  /// otherwise as declared; fewer than all if there is a cycle.
+/// The graph with each cycle as one node: nodes are numbered in the order of
+/// their first stages.
+struct NodeGraph {
+  Lists nodes;              ///< Stages in declaration order.
+  SmallVector<bool> cyclic; ///< Whether the node is a cycle.
+  /// Between different nodes: consumers in port order, and what must have run
+  /// before each.
+  Lists consumers, producers, waits;
+
+  explicit NodeGraph(const StageGraph &graph);
+
+  /// Nodes so that each comes behind what it depends on, and otherwise as
+  /// declared; fewer than all where nodes wait for each other.
   SmallVector<int> declarationOrder() const;
-  /// The longest path from each stage to one without consumers, in edges.
+  /// The longest path from each node to one without consumers, in edges.
   SmallVector<int> distancesFromDrain(ArrayRef<int> order) const;
-  SmallVector<SmallVector<int>> branches() const;
+  Lists branches() const;
+  /// Takes branches, farthest from the drain first, as their dependencies
+  /// allow; a branch that depends on itself or on others in a circle is left
+  /// out.
+  SmallVector<int> takeBranches(Lists branches) const;
 };
 
 struct OrderStagesPass : piko::impl::OrderStagesBase<OrderStagesPass> {
@@ -51,19 +71,15 @@ StageGraph::StageGraph(PipelineOp pipeline) {
     stages.push_back(stage);
   }
   consumers.resize(stages.size());
-  producers.resize(stages.size());
   waits.resize(stages.size());
   SmallVector<EdgeOp> edges(pipeline.getOps<EdgeOp>());
   llvm::sort(edges, [&](EdgeOp a, EdgeOp b) {
     return std::pair(number.at(a.getProducerAttr().getAttr()), a.getPort()) <
            std::pair(number.at(b.getProducerAttr().getAttr()), b.getPort());
   });
-  for (EdgeOp edge : edges) {
-    int from = number.at(edge.getProducerAttr().getAttr());
-    int to = number.at(edge.getConsumerAttr().getAttr());
-    consumers[from].push_back(to);
-    producers[to].push_back(from);
-  }
+  for (EdgeOp edge : edges)
+    consumers[number.at(edge.getProducerAttr().getAttr())].push_back(
+        number.at(edge.getConsumerAttr().getAttr()));
   for (auto [i, stage] : llvm::enumerate(stages)) {
     ScheduleOp schedule = stage.getSchedule();
     if (!schedule || !schedule.getEndStageAttr())
@@ -73,43 +89,87 @@ StageGraph::StageGraph(PipelineOp pipeline) {
   }
 }
 
-SmallVector<int> StageGraph::declarationOrder() const {
+SmallVector<SmallVector<bool>> StageGraph::reach() const {
+  size_t n = stages.size();
+  SmallVector<SmallVector<bool>> reach(n, SmallVector<bool>(n, false));
+  for (size_t from = 0; from < n; ++from) {
+    SmallVector<int> rest(consumers[from]);
+    while (!rest.empty()) {
+      int stage = rest.pop_back_val();
+      if (reach[from][stage])
+        continue;
+      reach[from][stage] = true;
+      llvm::append_range(rest, consumers[stage]);
+    }
+  }
+  return reach;
+}
+
+NodeGraph::NodeGraph(const StageGraph &graph) {
+  SmallVector<SmallVector<bool>> reach = graph.reach();
+  SmallVector<int> nodeOf(graph.stages.size(), -1);
+  for (int i = 0, e = graph.stages.size(); i < e; ++i) {
+    if (nodeOf[i] >= 0)
+      continue;
+    cyclic.push_back(reach[i][i]);
+    SmallVector<int> &members = nodes.emplace_back();
+    for (int j = i; j < e; ++j)
+      if (j == i || (reach[i][j] && reach[j][i])) {
+        nodeOf[j] = nodes.size() - 1;
+        members.push_back(j);
+      }
+  }
+  consumers.resize(nodes.size());
+  producers.resize(nodes.size());
+  waits.resize(nodes.size());
+  for (int stage = 0, e = graph.stages.size(); stage < e; ++stage) {
+    int node = nodeOf[stage];
+    for (int consumer : graph.consumers[stage])
+      if (nodeOf[consumer] != node) {
+        consumers[node].push_back(nodeOf[consumer]);
+        producers[nodeOf[consumer]].push_back(node);
+      }
+    for (int other : graph.waits[stage])
+      if (nodeOf[other] != node)
+        waits[node].push_back(nodeOf[other]);
+  }
+}
+
+SmallVector<int> NodeGraph::declarationOrder() const {
   SmallVector<int> order;
   llvm::DenseSet<int> placed;
-  auto ready = [&](int stage) {
-    return !placed.contains(stage) &&
-           llvm::all_of(producers[stage],
-                        [&](int s) { return placed.contains(s); }) &&
-           llvm::all_of(waits[stage],
-                        [&](int s) { return placed.contains(s); });
+  auto isPlaced = [&](int node) { return placed.contains(node); };
+  auto ready = [&](int node) {
+    return !isPlaced(node) && llvm::all_of(producers[node], isPlaced) &&
+           llvm::all_of(waits[node], isPlaced);
   };
   for (bool found = true; found;) {
     found = false;
-    for (int stage = 0, e = stages.size(); stage < e && !found; ++stage)
-      if (ready(stage)) {
-        order.push_back(stage);
-        placed.insert(stage);
+    for (int node = 0, e = nodes.size(); node < e && !found; ++node)
+      if (ready(node)) {
+        order.push_back(node);
+        placed.insert(node);
         found = true;
       }
   }
   return order;
 }
 
-SmallVector<int> StageGraph::distancesFromDrain(ArrayRef<int> order) const {
-  SmallVector<int> distance(stages.size(), 0);
-  for (int stage : llvm::reverse(order))
-    for (int consumer : consumers[stage])
-      distance[stage] = std::max(distance[stage], distance[consumer] + 1);
+SmallVector<int> NodeGraph::distancesFromDrain(ArrayRef<int> order) const {
+  SmallVector<int> distance(nodes.size(), 0);
+  for (int node : llvm::reverse(order))
+    for (int consumer : consumers[node])
+      distance[node] = std::max(distance[node], distance[consumer] + 1);
   return distance;
 }
 
-SmallVector<SmallVector<int>> StageGraph::branches() const {
-  auto startsBranch = [&](int stage) {
-    return producers[stage].size() != 1 || !waits[stage].empty() ||
-           consumers[producers[stage].front()].size() != 1;
+Lists NodeGraph::branches() const {
+  auto startsBranch = [&](int node) {
+    return producers[node].size() != 1 || !waits[node].empty() ||
+           consumers[producers[node].front()].size() != 1;
   };
-  SmallVector<SmallVector<int>> result;
-  for (int start = 0, e = stages.size(); start < e; ++start) {
+  Lists result;
+  for (int start = 0, e = nodes.size(); start < e; ++start) {
     if (!startsBranch(start))
       continue;
     SmallVector<int> &branch = result.emplace_back();
@@ -121,19 +181,16 @@ SmallVector<SmallVector<int>> StageGraph::branches() const {
   return result;
 }
 
-/// Takes branches, farthest from the drain first, as their dependencies allow;
-/// a branch that depends on itself or on others in a circle is left out.
-static SmallVector<int> takeBranches(const StageGraph &graph,
-                                     SmallVector<SmallVector<int>> branches) {
+SmallVector<int> NodeGraph::takeBranches(Lists branches) const {
   SmallVector<int> taken;
   llvm::DenseSet<int> isTaken;
   auto ready = [&](ArrayRef<int> branch) {
-    auto met = [&](int stage) {
-      return isTaken.contains(stage) || llvm::is_contained(branch, stage);
+    auto met = [&](int node) {
+      return isTaken.contains(node) || llvm::is_contained(branch, node);
     };
-    return llvm::all_of(branch, [&](int stage) {
-      return llvm::all_of(graph.producers[stage], met) &&
-             llvm::all_of(graph.waits[stage], met);
+    return llvm::all_of(branch, [&](int node) {
+      return llvm::all_of(producers[node], met) &&
+             llvm::all_of(waits[node], met);
     });
   };
   while (!branches.empty()) {
@@ -147,40 +204,77 @@ static SmallVector<int> takeBranches(const StageGraph &graph,
   return taken;
 }
 
+/// A stage cannot wait for what cannot be finished before it has run.
+static LogicalResult checkWaits(StageGraph &graph) {
+  size_t n = graph.stages.size();
+  SmallVector<SmallVector<bool>> reach = graph.reach();
+  for (size_t stage = 0; stage < n; ++stage)
+    for (int other : graph.waits[stage])
+      if (other == int(stage) || reach[stage][other]) {
+        InFlightDiagnostic error = graph.stages[stage].emitError("stage '")
+                                   << graph.stages[stage].getSymName()
+                                   << "' waits for stage '"
+                                   << graph.stages[other].getSymName()
+                                   << "', which cannot finish before it";
+        error.attachNote(graph.stages[other].getLoc())
+            << "it is fed by stage '" << graph.stages[stage].getSymName()
+            << "'";
+        return error;
+      }
+  return success();
+}
+
+/// Reports nodes that wait for each other.
+static void reportCircle(StageGraph &graph, const NodeGraph &nodes,
+                         ArrayRef<int> declared) {
+  SmallVector<int> rest;
+  for (int node = 0, e = nodes.nodes.size(); node < e; ++node)
+    if (!llvm::is_contained(declared, node))
+      llvm::append_range(rest, nodes.nodes[node]);
+  llvm::sort(rest);
+  InFlightDiagnostic error = graph.stages[rest.front()].emitError(
+      "expected waits that can end, but got a circle of edges and waits among");
+  for (int stage : rest)
+    error << " '" << graph.stages[stage].getSymName() << "'";
+}
+
 void OrderStagesPass::runOnOperation() {
   PipelineOp pipeline = getOperation();
   StageGraph graph(pipeline);
-  SmallVector<int> declared = graph.declarationOrder();
-  if (declared.size() != graph.stages.size()) {
-    llvm::SmallSetVector<int, 8> rest;
-    for (int i = 0, e = graph.stages.size(); i < e; ++i)
-      if (!llvm::is_contained(declared, i))
-        rest.insert(i);
-    InFlightDiagnostic error = graph.stages[rest.front()].emitError(
-        "not supported yet: expected a graph of stages without cycles, but got "
-        "a cycle of edges or waits among");
-    for (int stage : rest)
-      error << " '" << graph.stages[stage].getSymName() << "'";
+  if (failed(checkWaits(graph)))
+    return signalPassFailure();
+  NodeGraph nodes(graph);
+  SmallVector<int> declared = nodes.declarationOrder();
+  if (declared.size() != nodes.nodes.size()) {
+    reportCircle(graph, nodes, declared);
     return signalPassFailure();
   }
 
-  SmallVector<int> distance = graph.distancesFromDrain(declared);
-  SmallVector<SmallVector<int>> branches = graph.branches();
+  SmallVector<int> distance = nodes.distancesFromDrain(declared);
+  Lists branches = nodes.branches();
   this->branches = branches.size();
   llvm::sort(branches, [&](ArrayRef<int> a, ArrayRef<int> b) {
     return std::pair(-distance[a.front()], a.front()) <
            std::pair(-distance[b.front()], b.front());
   });
-  SmallVector<int> order = takeBranches(graph, branches);
+  SmallVector<int> order = nodes.takeBranches(branches);
   // Waits between the middles of branches can leave some of them untaken; the
   // declared order meets all dependencies too.
-  if (order.size() != graph.stages.size())
+  if (order.size() != nodes.nodes.size())
     order = declared;
 
-  Builder builder(&getContext());
-  for (auto [place, stage] : llvm::enumerate(declared))
-    graph.stages[stage].setLineageAttr(builder.getI64IntegerAttr(place));
+  int64_t place = 0, cycle = 0;
+  for (int node : declared) {
+    for (int stage : nodes.nodes[node]) {
+      graph.stages[stage].setLineage(place++);
+      if (nodes.cyclic[node])
+        graph.stages[stage].setCycle(cycle);
+    }
+    cycles += nodes.cyclic[node];
+    cycle += nodes.cyclic[node];
+  }
   Block *body = pipeline.getBodyBlock();
-  for (int stage : order)
-    graph.stages[stage]->moveBefore(body, body->end());
+  for (int node : order)
+    for (int stage : nodes.nodes[node])
+      graph.stages[stage]->moveBefore(body, body->end());
 }

@@ -108,3 +108,51 @@ piko.pipeline @Waits rank 2 {
     }
   }
 }
+
+// The stages of a cycle stand together, as declared, and are numbered; a cycle
+// has its place among the branches.
+// CHECK-LABEL: piko.pipeline @Cycles
+// CHECK:         piko.stage @in {{.*}} lineage 0 :
+// CHECK:         piko.stage @self {{.*}} lineage 1 cycle 0 :
+// CHECK:         piko.stage @a {{.*}} lineage 2 cycle 1 :
+// CHECK:         piko.stage @b {{.*}} lineage 3 cycle 1 :
+// CHECK:         piko.stage @out {{.*}} lineage 4 :
+piko.pipeline @Cycles rank 2 {
+  piko.source @in
+  piko.edge @in[0] -> @self
+  piko.edge @self[0] -> @self
+  piko.edge @self[1] -> @b
+  piko.edge @b[0] -> @a
+  piko.edge @a[0] -> @b
+  piko.edge @a[1] -> @out
+  piko.stage @out bins [0, 0] threads 1 : @F -> [] {
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      piko.return
+    }
+  }
+  piko.stage @a bins [0, 0] threads 1 : @F -> [@F, @F] {
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      piko.return
+    }
+  }
+  piko.stage @self bins [0, 0] threads 1 : @F -> [@F, @F] {
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      piko.return
+    }
+  }
+  piko.stage @b bins [0, 0] threads 1 : @F -> [@F] {
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      piko.return
+    }
+  }
+  piko.stage @in bins [0, 0] threads 1 : @F -> [@F] {
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      piko.return
+    }
+  }
+}
