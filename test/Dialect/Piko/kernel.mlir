@@ -39,7 +39,7 @@ piko.pipeline @Resolved rank 2 {
   piko.source @a
   piko.edge @a[0] -> @b
   piko.stage @a bins [8, 8] threads 64 : @F -> [@F] {}
-  piko.stage @b bins [8, 8] threads 64 : @F -> [] {}
+  piko.stage @b bins [8, 8] threads 64 tile 4 : @F -> [] {}
   // CHECK: piko.kernel @place_source {
   piko.kernel @place_source {
     // CHECK-NEXT: %[[SOURCE:.*]] = piko.open_bins @a source 0 : !piko.bins<@F>

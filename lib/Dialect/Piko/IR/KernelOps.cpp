@@ -47,3 +47,102 @@ LogicalResult OpenBinsOp::verifySymbolUses(SymbolTableCollection &) {
            << getBins().getType().getRecord();
   return success();
 }
+
+//===----------------------------------------------------------------------===//
+// What kernels read and write
+//===----------------------------------------------------------------------===//
+
+static LogicalResult verifyStage(Operation *op, FlatSymbolRefAttr name) {
+  if (lookupInPipeline<StageOp>(op, name))
+    return success();
+  return op->emitOpError("expected a stage, but got ")
+         << name << ", which is none";
+}
+
+/// A value and the storage that it is in are of one record.
+static LogicalResult verifyStored(Operation *op, BinsType bins,
+                                  FlatSymbolRefAttr record, StringRef what) {
+  if (bins.getRecord() == record)
+    return success();
+  return op->emitOpError("expected a ")
+         << what << " of record " << bins.getRecord()
+         << ", which the bins hold, but got " << record;
+}
+
+LogicalResult ListOp::verify() {
+  return verifyStored(*this, getBins().getType(),
+                      getList().getType().getRecord(), "list");
+}
+
+LogicalResult ItemOp::verify() {
+  return verifyStored(*this, getBins().getType(),
+                      getPrim().getType().getRecord(), "primitive");
+}
+
+/// The operation that opened the bins that a writer is for, or null.
+static OpenBinsOp getOpenBins(Value writer) {
+  auto open = writer.getDefiningOp<OpenWriterOp>();
+  return open ? open.getBins().getDefiningOp<OpenBinsOp>() : OpenBinsOp();
+}
+
+/// The record that a port of the stage whose kernel opened `writer` emits; null
+/// where that is not known, a failure where there is no such port.
+static FailureOr<FlatSymbolRefAttr> verifyPort(Operation *op, Value writer,
+                                               int64_t port) {
+  OpenBinsOp bins = getOpenBins(writer);
+  auto stage =
+      bins ? lookupInPipeline<StageOp>(bins, bins.getStageAttr()) : StageOp();
+  if (!stage)
+    return FlatSymbolRefAttr();
+  int64_t ports = bins.getSource() ? 0 : stage.getOutputs().size();
+  if (port < 0 || port >= ports)
+    return op->emitOpError("expected a port below ")
+           << ports << ", which is how many the kernel of stage '"
+           << stage.getSymName() << "' has, but got " << port;
+  return cast<FlatSymbolRefAttr>(stage.getOutputs()[port]);
+}
+
+LogicalResult AppendOp::verifySymbolUses(SymbolTableCollection &) {
+  FlatSymbolRefAttr name = getPrim().getType().getRecord();
+  RecordOp record = lookupRecord(*this, name);
+  if (!record)
+    return emitOpError("expected a record, but got ")
+           << name << ", which is none";
+  SmallVector<Type> types = record.getElementTypes();
+  if (types != getValues().getTypes())
+    return emitOpError("expected the numbers of record ")
+           << name << ", (" << types << "), but got (" << getValues().getTypes()
+           << ")";
+  FailureOr<FlatSymbolRefAttr> emitted =
+      verifyPort(*this, getWriter(), getPort());
+  if (failed(emitted))
+    return failure();
+  if (*emitted && *emitted != name)
+    return emitOpError("expected a primitive of record ")
+           << *emitted << ", which port " << getPort() << " emits, but got "
+           << name;
+  return success();
+}
+
+LogicalResult PlaceOp::verifySymbolUses(SymbolTableCollection &) {
+  if (failed(verifyStage(*this, getStageAttr())))
+    return failure();
+  if (getTile() && !lookupInPipeline<StageOp>(*this, getStageAttr()).getTile())
+    return emitOpError("expected a tile only in a stage that is divided into "
+                       "tiles, but ")
+           << getStageAttr() << " is not";
+  if (getPort())
+    return failure(failed(verifyPort(*this, getWriter(), *getPort())));
+  if (OpenBinsOp bins = getOpenBins(getWriter()); bins && !bins.getSource())
+    return emitOpError("expected a port, because the kernel is not that of a "
+                       "source");
+  return success();
+}
+
+LogicalResult BeginScheduleOp::verifySymbolUses(SymbolTableCollection &) {
+  return verifyStage(*this, getStageAttr());
+}
+
+LogicalResult ScheduleBinOp::verifySymbolUses(SymbolTableCollection &) {
+  return verifyStage(*this, getStageAttr());
+}

@@ -181,6 +181,7 @@ def Piko_CallBinOp : Piko_Op<"call_bin", [Pure]> {
 }
 
 def Piko_ListOp : Piko_Op<"list", [Pure]> {
+  let hasVerifier = 1;
   let summary = "the primitives at consecutive positions";
   let description = [{
     ```mlir
@@ -196,6 +197,7 @@ def Piko_ListOp : Piko_Op<"list", [Pure]> {
 }
 
 def Piko_ItemOp : Piko_Op<"item", [Pure]> {
+  let hasVerifier = 1;
   let summary = "the primitive at a position";
   let description = [{
     ```mlir
@@ -233,7 +235,8 @@ def Piko_CloseWriterOp : Piko_Op<"close_writer"> {
   let assemblyFormat = "$writer attr-dict";
 }
 
-def Piko_AppendOp : Piko_Op<"append"> {
+def Piko_AppendOp : Piko_Op<"append", [
+    DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
   let summary = "stores a primitive that a port emits";
   let description = [{
     The result is the primitive as it was stored.
@@ -251,7 +254,8 @@ def Piko_AppendOp : Piko_Op<"append"> {
   }];
 }
 
-def Piko_PlaceOp : Piko_Op<"place"> {
+def Piko_PlaceOp : Piko_Op<"place", [
+    DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
   let summary = "puts what a port emitted last into a bin";
   let description = [{
     Where the stage's bins are divided into tiles, the tile stands behind the
@@ -357,7 +361,63 @@ def Piko_ScratchReleaseOp : Piko_Op<"scratch_release"> {
   let assemblyFormat = "$writer `[` $mark `]` attr-dict";
 }
 
-def Piko_ScheduleBinOp : Piko_Op<"schedule_bin"> {
+def Piko_NoItemOp : Piko_Op<"no_item", [Pure]> {
+  let summary = "a primitive of zeros";
+  let description = [{
+    What a read outside a list gives, in a run that ends with an error.
+
+    ```mlir
+    %p = piko.no_item : !piko.prim<@Fragment>
+    ```
+  }];
+  let results = (outs Piko_PrimType:$prim);
+  let assemblyFormat = "attr-dict `:` qualified(type($prim))";
+}
+
+def Piko_ToAddressOp : Piko_Op<"to_address", [Pure]> {
+  let summary = "where a primitive is, as a number that memory can hold";
+  let description = [{
+    ```mlir
+    %a = piko.to_address %p : !piko.prim<@Fragment>
+    ```
+  }];
+  let arguments = (ins Piko_PrimType:$prim);
+  let results = (outs Index:$address);
+  let assemblyFormat = "$prim attr-dict `:` qualified(type($prim))";
+}
+
+def Piko_FromAddressOp : Piko_Op<"from_address", [Pure]> {
+  let summary = "the primitive that is at an address";
+  let description = [{
+    The address is that of a primitive of the same record, by
+    `piko.to_address`, in the same kernel.
+
+    ```mlir
+    %p = piko.from_address %a : !piko.prim<@Fragment>
+    ```
+  }];
+  let arguments = (ins Index:$address);
+  let results = (outs Piko_PrimType:$prim);
+  let assemblyFormat = "$address attr-dict `:` qualified(type($prim))";
+}
+
+def Piko_BeginScheduleOp : Piko_Op<"begin_schedule", [
+    DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
+  let summary = "starts the kernel of a dynamic schedule";
+  let description = [{
+    The result is the stage's number of bins.
+
+    ```mlir
+    %bins = piko.begin_schedule @blend
+    ```
+  }];
+  let arguments = (ins FlatSymbolRefAttr:$stage);
+  let results = (outs Index:$bins);
+  let assemblyFormat = "$stage attr-dict";
+}
+
+def Piko_ScheduleBinOp : Piko_Op<"schedule_bin", [
+    DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
   let summary = "what a dynamic schedule says about a bin";
   let description = [{
     Before any kernel runs. A batch of the smallest 64-bit integer is none.

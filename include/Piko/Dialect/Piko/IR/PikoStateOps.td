@@ -167,4 +167,31 @@ def Piko_FailOp : Piko_Op<"fail"> {
   }];
 }
 
+def Piko_FailListOp : Piko_Op<"fail_list"> {
+  let summary = "ends the run: an index was outside a list";
+  let description = [{
+    See `piko.fail`; the numbers are the index and the size of the list.
+
+    ```mlir
+    piko.fail_list @blend at %i of %n
+    ```
+  }];
+  let arguments = (ins FlatSymbolRefAttr:$stage, Index:$index, Index:$size);
+  let assemblyFormat = "$stage `at` $index `of` $size attr-dict";
+}
+
+def Piko_FailBarrierOp : Piko_Op<"fail_barrier"> {
+  let summary = "ends the run: an iteration does not meet the others";
+  let description = [{
+    See `piko.fail`. The iteration is the first one that does not reach the
+    same barriers as iteration 0.
+
+    ```mlir
+    piko.fail_barrier @blend iteration %i
+    ```
+  }];
+  let arguments = (ins FlatSymbolRefAttr:$stage, Index:$iteration);
+  let assemblyFormat = "$stage `iteration` $iteration attr-dict";
+}
+
 #endif // PIKO_DIALECT_PIKO_IR_PIKOSTATEOPS_TD
