@@ -33,6 +33,7 @@ void piko::addSynthesisSequence(OpPassManager &passes) {
 
 void piko::addResolveSequence(OpPassManager &passes) {
   passes.nest<PipelineOp>().addPass(createResolveKernels());
+  passes.nest<PipelineOp>().addPass(createSplitLoops());
   addCleanUp(passes);
 }
 

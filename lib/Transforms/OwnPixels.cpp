@@ -112,6 +112,9 @@ void OwnPixelsPass::runOnStage(StageOp stage) {
     remark.attachNote(at->getLoc()) << why;
     ++refused;
   };
+  if (stage.getTakesList())
+    return refuse(process, "the phase takes a list, which may be of primitives "
+                           "that update any pixel");
   for (UpdateOp update : ArrayRef(updates).drop_front())
     for (auto [a, b] :
          llvm::zip(first.getCoordinates(), update.getCoordinates()))

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // piko-resolve-kernels, for each kernel:
-//   1. build the loops: units of work, their cells, the primitives of a cell;
+//   1. build the loops: units of work, their cells, the primitives of a cell
+//      (or the calls of a process phase that takes a list);
 //   2. move the process phase (or, for a source, nothing) into the innermost;
 //   3. turn each emission into an append, followed by a copy of the consumer's
 //      assign phase;
 //   4. turn assignments into placements, and queries into arithmetic.
+
+#include "Resolve.h"
 
 #include "Piko/Transforms/BinArithmetic.h"
 #include "Piko/Transforms/Passes.h"
@@ -30,7 +33,8 @@ struct ResolveKernelsPass : piko::impl::ResolveKernelsBase<ResolveKernelsPass> {
 
 /// Where the statements of a phase find themselves in the loops.
 struct Place {
-  Value writer, bin, prim;
+  Value writer, bin;
+  Value input; ///< the primitive, or the list
 };
 
 class KernelResolver {
@@ -40,6 +44,10 @@ public:
 
 private:
   Place buildLoops(OpBuilder &builder);
+  /// The loops inside that over units, which leave `builder` in the innermost,
+  /// and the place there but for its writer.
+  Place buildCellLoops(OpBuilder &builder, Value bins, Value unit);
+  Place buildCallLoop(OpBuilder &builder, Value bins, Value unit);
   void resolveEmit(EmitOp emit, const Place &place);
   void resolveAssign(OpBuilder &builder, AssignOp assign, Value prim,
                      const Place &place);
@@ -68,9 +76,7 @@ KernelResolver::KernelResolver(KernelOp kernel)
                                 : sourceAssign.getOperation());
 }
 
-/// Replaces queries of bins by arithmetic. `bin` is null where no bin is being
-/// processed.
-static void expandQueries(Operation *root, StageOp stage, Value bin) {
+void piko::expandQueries(Operation *root, StageOp stage, Value bin) {
   root->walk([&](Operation *op) {
     OpBuilder builder(op);
     BinArithmetic bins(builder, op->getLoc(), stage);
@@ -111,12 +117,23 @@ Place KernelResolver::buildLoops(OpBuilder &builder) {
   Value unit = forall.getInductionVar(0);
   builder.setInsertionPoint(forall.getTerminator());
   Value writer = OpenWriterOp::create(builder, loc, bins, unit);
+  auto close = CloseWriterOp::create(builder, loc, writer);
+  builder.setInsertionPoint(close);
+  Place place = process && stage.getTakesList()
+                    ? buildCallLoop(builder, bins, unit)
+                    : buildCellLoops(builder, bins, unit);
+  place.writer = writer;
+  auto next = NextOp::create(builder, loc, writer);
+  builder.setInsertionPoint(next);
+  return place;
+}
+
+Place KernelResolver::buildCellLoops(OpBuilder &builder, Value bins,
+                                     Value unit) {
   auto cells = UnitCellsOp::create(builder, loc, bins, unit);
   Value one = arith::ConstantIndexOp::create(builder, loc, 1);
   auto cellLoop =
       scf::ForOp::create(builder, loc, cells.getBegin(), cells.getEnd(), one);
-  CloseWriterOp::create(builder, loc, writer);
-
   builder.setInsertionPointToStart(cellLoop.getBody());
   Value cell = cellLoop.getInductionVar();
   Value bin = CellBinOp::create(builder, loc, bins, cell);
@@ -124,27 +141,39 @@ Place KernelResolver::buildLoops(OpBuilder &builder) {
   auto itemLoop =
       scf::ForOp::create(builder, loc, range.getBegin(), range.getEnd(), one);
   itemLoop->setAttr("piko.lanes", builder.getUnitAttr());
-
   builder.setInsertionPointToStart(itemLoop.getBody());
   auto primType = PrimType::get(builder.getContext(), stage.getInputAttr());
   Value prim =
       ItemOp::create(builder, loc, primType, bins, itemLoop.getInductionVar());
-  auto next = NextOp::create(builder, loc, writer);
-  builder.setInsertionPoint(next);
-  return {writer, bin, prim};
+  return {Value(), bin, prim};
+}
+
+Place KernelResolver::buildCallLoop(OpBuilder &builder, Value bins,
+                                    Value unit) {
+  auto calls = UnitCellsOp::create(builder, loc, bins, unit);
+  Value one = arith::ConstantIndexOp::create(builder, loc, 1);
+  auto loop =
+      scf::ForOp::create(builder, loc, calls.getBegin(), calls.getEnd(), one);
+  builder.setInsertionPointToStart(loop.getBody());
+  Value call = loop.getInductionVar();
+  Value bin = CallBinOp::create(builder, loc, bins, call);
+  auto range = CallRangeOp::create(builder, loc, bins, call);
+  Value list = ListOp::create(builder, loc, stage.getProcessType(), bins,
+                              range.getBegin(), range.getEnd());
+  return {Value(), bin, list};
 }
 
 void KernelResolver::run() {
   OpBuilder builder = OpBuilder::atBlockEnd(kernel.getBodyBlock());
   Place place = buildLoops(builder);
   if (sourceAssign) {
-    resolveAssign(builder, sourceAssign, place.prim, place);
+    resolveAssign(builder, sourceAssign, place.input, place);
   } else {
     IRRewriter rewriter(builder);
     Block &body = process.getBody().front();
     body.getTerminator()->erase();
     rewriter.inlineBlockBefore(&body, builder.getInsertionBlock(),
-                               builder.getInsertionPoint(), place.prim);
+                               builder.getInsertionPoint(), place.input);
     SmallVector<EmitOp> emits;
     kernel.walk([&](EmitOp emit) { emits.push_back(emit); });
     // Before emissions bring in the assign phases of other stages, whose
@@ -227,39 +256,34 @@ void KernelResolver::resolveAssignment(Operation *op, StageOp consumer,
   op->erase();
 }
 
-/// Reports what a stage asks for that is not compiled yet.
-static LogicalResult checkSchedule(StageOp stage) {
-  ScheduleOp schedule = stage.getSchedule();
-  if (!schedule || (!schedule.getBatch() && !schedule.getEveryBin()))
-    return success();
-  return schedule.emitError("not supported yet: ")
-         << (schedule.getBatch() ? "batch" : "every_bin") << " in stage '"
-         << stage.getSymName() << "'";
-}
-
-/// Notes at the stages what cannot be seen in kernels any more: whether threads
-/// may share a bin's primitives, and whether assign phases place them.
+/// Notes at the stages what cannot be seen in kernels any more: whether the
+/// order of a bin's primitives shows in the state, whether threads may share
+/// them, and whether assign phases place them.
 static void noteStages(PipelineOp pipeline) {
   pipeline.walk([](Operation *op) {
     if (!isa<ProcessOp, AssignOp>(op))
       return;
     StageOp stage = getPhaseStage(op);
+    if (isa<AssignOp>(op)) {
+      stage.setPlaced(true);
+      return;
+    }
     ScheduleOp schedule = stage.getSchedule();
     bool serial = schedule && schedule.getKind() == ScheduleKind::Serialize;
-    if (isa<AssignOp>(op))
-      stage.setPlaced(true);
-    else if (!serial && !op->walk([](UpdateOp) {
-                             return WalkResult::interrupt();
-                           }).wasInterrupted())
-      stage.setSplit(true);
+    bool ordered = op->walk([](UpdateOp) {
+                       return WalkResult::interrupt();
+                     }).wasInterrupted();
+    stage.setOrdered(ordered);
+    stage.setSplit(!serial && !ordered);
   });
 }
 
 void ResolveKernelsPass::runOnOperation() {
   noteStages(getOperation());
   for (auto stage : getOperation().getOps<StageOp>())
-    if (failed(checkSchedule(stage)))
-      return signalPassFailure();
+    if (ScheduleOp schedule = stage.getSchedule();
+        schedule && !schedule.getBody().empty())
+      resolveSchedule(schedule);
   for (auto kernel : getOperation().getOps<KernelOp>())
     if (llvm::any_of(*kernel.getBodyBlock(), [](Operation &op) {
           return isa<ProcessOp, AssignOp>(op);

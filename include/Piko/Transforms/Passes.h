@@ -6,6 +6,8 @@
 #define PIKO_TRANSFORMS_PASSES_H
 
 #include "Piko/Dialect/Piko/IR/Piko.h"
+#include "mlir/Dialect/Arith/IR/Arith.h"
+#include "mlir/Dialect/MemRef/IR/MemRef.h"
 #include "mlir/Pass/Pass.h"
 
 namespace piko {

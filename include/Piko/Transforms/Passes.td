@@ -16,28 +16,34 @@ def OrderStages : Pass<"piko-order-stages", "::piko::PipelineOp"> {
     **Does**: cuts the graph into linear branches, at convergence, divergence
     and waits, and moves the stages so that branches stand in descending distance
     of their first stage from the drain; a branch comes later where it depends,
-    by an edge or by `end_stage`, on one that has not come yet. Also numbers
-    the stages (`lineage`) by the language's own rule: producers and stages
-    waited for first, otherwise as declared.
+    by an edge or by `end_stage`, on one that has not come yet. The stages of a
+    cycle of edges are taken together, in order of declaration, and get the
+    number of their `cycle`. Also numbers the stages (`lineage`) by the
+    language's own rule: producers and stages waited for first, otherwise as
+    declared.
 
     **Guarantees** that each stage stands behind all stages that feed it or that
-    it waits for.
+    it waits for, but for those on a cycle with it.
 
-    Before, with `@a` feeding `@b`:
+    Before, with `@a` feeding `@b`, and `@b` itself and `@c`:
     ```
+    piko.stage @c ...
     piko.stage @b ...
     piko.stage @a ...
     ```
     After:
     ```
     piko.stage @a ... lineage 0 ...
-    piko.stage @b ... lineage 1 ...
+    piko.stage @b ... lineage 1 cycle 0 ...
+    piko.stage @c ... lineage 2 ...
     ```
 
-    **Limits**: a graph with a cycle gets an error that names a stage in it.
+    **Limits**: a stage that waits for itself or for one that it feeds gets an
+    error, as do stages that wait for each other.
   }];
   let statistics = [
-    Statistic<"branches", "branches", "linear branches found">];
+    Statistic<"branches", "branches", "linear branches found">,
+    Statistic<"cycles", "cycles", "cycles of edges found">];
 }
 
 def OwnPixels : Pass<"piko-own-pixels", "::piko::PipelineOp"> {
@@ -73,8 +79,9 @@ def OwnPixels : Pass<"piko-own-pixels", "::piko::PipelineOp"> {
       piko.assign_to %zero
     ```
 
-    **Limits**: an update at several pixels, or at one that is read from a
-    buffer or an image, is refused with a remark; one thread then takes each bin.
+    **Limits**: an update at several pixels, at one that is read from a
+    buffer or an image, or for a list, is refused with a remark; one thread then
+    takes each bin.
   }];
   let options = [
     Option<"tile", "tile", "int64_t", "32",
@@ -125,10 +132,12 @@ def ResolveKernels : Pass<"piko-resolve-kernels", "::piko::PipelineOp"> {
 
     **Does**: turns the phases of each kernel into an `scf.forall` over the
     units of work of the stage's bins, in it a loop over the unit's cells and in
-    that one over the primitives of a cell, marked `piko.lanes`. Emissions
-    become stores into the unit's own writer, followed by the consumer's assign
-    phase, whose assignments become `piko.place`; queries of bins and of the
-    grid become arithmetic.
+    that one over the primitives of a cell, marked `piko.lanes`. Where the
+    process phase takes a list, the inner loop is over the calls of the phase.
+    Emissions become stores into the unit's own writer, followed by the
+    consumer's assign phase, whose assignments become `piko.place`; queries of
+    bins and of the grid become arithmetic. The body of a dynamic schedule
+    becomes a kernel that stands before all others, a loop over bins.
 
     **Guarantees** the resolved level: kernels hold no phase, and all storage
     and synchronisation is explicit.
@@ -147,10 +156,69 @@ def ResolveKernels : Pass<"piko-resolve-kernels", "::piko::PipelineOp"> {
     }
     ```
 
-    **Limits**: lists, batches and `every_bin` are not compiled yet and get an
-    error.
+    **Limits**: the iterations of a `piko.parallel_for` are left to
+    `piko-split-loops`.
   }];
   let dependentDialects = ["::mlir::arith::ArithDialect",
+                           "::mlir::memref::MemRefDialect",
+                           "::mlir::scf::SCFDialect"];
+}
+
+def SplitLoops : Pass<"piko-split-loops", "::piko::PipelineOp"> {
+  let summary = "Turn parallel loops into loops, cut where iterations meet";
+  let description = [{
+    **Requires** the resolved level.
+
+    **Does**: turns a `piko.parallel_for` without barriers into an `scf.for`
+    that is marked `piko.lanes`. One with barriers is cut at them: each piece
+    between two barriers becomes a loop over all iterations, and what lives
+    across a cut, be it a value or a private array, gets a slot for each
+    iteration in scratch memory. Control flow that holds barriers moves around
+    the pieces and follows iteration 0; where the analysis cannot prove that all
+    iterations agree, they are compared when the pipeline runs, and
+    `piko.fail_barrier` reports the first that does not. Reductions, scans and
+    sorts become loops over slots. Where several pieces emit, primitives are put
+    in the order of iterations when the loop ends (`piko.defer_begin`).
+
+    **Guarantees** that nothing is left of parallel loops and barriers, and that
+    each barrier sees all that iterations did before it, in order of iteration.
+
+    Before:
+    ```
+    piko.parallel_for %n {
+    ^bb0(%i: index):
+      %v = ...
+      piko.sync
+      ... %v ...
+      piko.yield
+    }
+    ```
+    After:
+    ```
+    %bytes, %granted = piko.scratch %writer[%size]
+    scf.if %granted {
+      %slots = memref.view %bytes[%zero][%n] : memref<?xi8> to memref<?xf32>
+      scf.for %i = %zero to %n step %one {
+        %v = ...
+        memref.store %v, %slots[%i] : memref<?xf32>
+      } {piko.lanes}
+      scf.for %i = %zero to %n step %one {
+        %v = memref.load %slots[%i] : memref<?xf32>
+        ... %v ...
+      } {piko.lanes}
+    }
+    ```
+
+    **Limits**: a barrier in control flow other than `scf.if`, `scf.for`,
+    `scf.while` and `scf.index_switch` is an error, and so is a value across a
+    barrier that is not a number, a primitive or a private array.
+  }];
+  let statistics = [
+    Statistic<"loops", "loops", "parallel loops that became loops">,
+    Statistic<"cuts", "cuts", "parallel loops that were cut at barriers">,
+    Statistic<"checks", "checks", "conditions compared when the pipeline runs">];
+  let dependentDialects = ["::mlir::arith::ArithDialect",
+                           "::mlir::memref::MemRefDialect",
                            "::mlir::scf::SCFDialect"];
 }
 

@@ -4,17 +4,20 @@
 
 #include "LoweringContext.h"
 
+#include "mlir/Conversion/LLVMCommon/MemRefBuilder.h"
+#include "mlir/Conversion/LLVMCommon/TypeConverter.h"
 #include "mlir/Dialect/SCF/IR/SCF.h"
 
 using namespace mlir;
 using namespace piko;
 
-// Byte offsets of the members of pikoir_input and pikoir_unit.
+// Byte offsets of the members of pikoir_input, pikoir_unit and pikoir_call.
 namespace layout {
 constexpr int64_t items = 0, order = 16, offsets = 24, units = 32,
-                  unitCount = 40, tiles = 48;
+                  unitCount = 40, tiles = 48, calls = 56;
 constexpr int64_t cellBegin = 0, cellEnd = 8, begin = 16, end = 24,
                   unitSize = 32;
+constexpr int64_t callBin = 0, callBegin = 8, callEnd = 16, callSize = 24;
 } // namespace layout
 
 namespace {
@@ -82,8 +85,8 @@ struct CloseBinsLowering : Lowering<CloseBinsOp> {
   matchAndRewrite(CloseBinsOp op, OpAdaptor,
                   ConversionPatternRewriter &rewriter) const override {
     auto function = op->getParentOfType<func::FuncOp>();
-    auto number = function->getAttrOfType<IntegerAttr>("piko.number");
-    bool source = function->hasAttr("piko.source");
+    auto number = function->getAttrOfType<IntegerAttr>(numberAttrName);
+    bool source = function->hasAttr(sourceAttrName);
     Location loc = op.getLoc();
     Value status =
         context
@@ -167,6 +170,46 @@ struct CellBinLowering : Lowering<CellBinOp> {
   }
 };
 
+/// The address of a pikoir_call.
+static Value callEntry(ConversionPatternRewriter &rewriter, Location loc,
+                       Value bins, Value call) {
+  Value calls =
+      LLVM::LoadOp::create(rewriter, loc, bins.getType(),
+                           createOffset(rewriter, loc, bins, layout::calls));
+  Value bytes =
+      arith::MulIOp::create(rewriter, loc, toI64(rewriter, loc, call),
+                            createI64(rewriter, loc, layout::callSize));
+  return createOffset(rewriter, loc, calls, bytes);
+}
+
+struct CallRangeLowering : Lowering<CallRangeOp> {
+  using Lowering::Lowering;
+  LogicalResult
+  matchAndRewrite(CallRangeOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    Location loc = op.getLoc();
+    Value call = callEntry(rewriter, loc, adaptor.getBins(), adaptor.getCall());
+    Value begin = loadI64(rewriter, loc, call, layout::callBegin);
+    Value end = loadI64(rewriter, loc, call, layout::callEnd);
+    rewriter.replaceOp(
+        op, {toIndex(rewriter, loc, begin), toIndex(rewriter, loc, end)});
+    return success();
+  }
+};
+
+struct CallBinLowering : Lowering<CallBinOp> {
+  using Lowering::Lowering;
+  LogicalResult
+  matchAndRewrite(CallBinOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    Location loc = op.getLoc();
+    Value call = callEntry(rewriter, loc, adaptor.getBins(), adaptor.getCall());
+    Value bin = loadI64(rewriter, loc, call, layout::callBin);
+    rewriter.replaceOp(op, toIndex(rewriter, loc, bin));
+    return success();
+  }
+};
+
 struct ItemLowering : Lowering<ItemOp> {
   using Lowering::Lowering;
   LogicalResult
@@ -200,22 +243,60 @@ struct ItemLowering : Lowering<ItemOp> {
   }
 };
 
+struct NoItemLowering : Lowering<NoItemOp> {
+  using Lowering::Lowering;
+  LogicalResult
+  matchAndRewrite(NoItemOp op, OpAdaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    rewriter.replaceOpWithNewOp<LLVM::AddressOfOp>(
+        op, pointer(rewriter),
+        context.zeros(
+            context.record(op.getPrim().getType().getRecord()).getSize()));
+    return success();
+  }
+};
+
+struct ToAddressLowering : Lowering<ToAddressOp> {
+  using Lowering::Lowering;
+  LogicalResult
+  matchAndRewrite(ToAddressOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    Location loc = op.getLoc();
+    Value address = LLVM::PtrToIntOp::create(
+        rewriter, loc, rewriter.getI64Type(), adaptor.getPrim());
+    rewriter.replaceOp(op, toIndex(rewriter, loc, address));
+    return success();
+  }
+};
+
+struct FromAddressLowering : Lowering<FromAddressOp> {
+  using Lowering::Lowering;
+  LogicalResult
+  matchAndRewrite(FromAddressOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    rewriter.replaceOpWithNewOp<LLVM::IntToPtrOp>(
+        op, pointer(rewriter),
+        toI64(rewriter, op.getLoc(), adaptor.getAddress()));
+    return success();
+  }
+};
+
 struct OpenWriterLowering : Lowering<OpenWriterOp> {
   using Lowering::Lowering;
   LogicalResult
   matchAndRewrite(OpenWriterOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
     auto function = op->getParentOfType<func::FuncOp>();
-    auto number = function->getAttrOfType<IntegerAttr>("piko.number");
+    auto number = function->getAttrOfType<IntegerAttr>(numberAttrName);
     Location loc = op.getLoc();
     rewriter.replaceOp(
-        op, context.call(rewriter, loc,
-                         function->hasAttr("piko.source") ? "pikoir_open_source"
-                                                          : "pikoir_open",
-                         pointer(rewriter),
-                         {context.frame(op),
-                          createI32(rewriter, loc, number.getInt()),
-                          toI64(rewriter, loc, adaptor.getUnit())}));
+        op, context.call(
+                rewriter, loc,
+                function->hasAttr(sourceAttrName) ? "pikoir_open_source"
+                                                  : "pikoir_open",
+                pointer(rewriter),
+                {context.frame(op), createI32(rewriter, loc, number.getInt()),
+                 toI64(rewriter, loc, adaptor.getUnit())}));
     return success();
   }
 };
@@ -235,6 +316,117 @@ struct WriterCallLowering : Lowering<OpT> {
 };
 constexpr const char *closeName = "pikoir_close";
 constexpr const char *nextName = "pikoir_next";
+
+constexpr const char *deferEndName = "pikoir_defer_end";
+
+/// An operation that is a call with the writer and a number for its arguments.
+template <typename OpT, const char *const *name>
+struct WriterNumberLowering : Lowering<OpT> {
+  using Lowering<OpT>::Lowering;
+  LogicalResult
+  matchAndRewrite(OpT op, typename OpT::Adaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    Value number = toI64(rewriter, op.getLoc(), adaptor.getOperands().back());
+    this->context.call(rewriter, op.getLoc(), *name, Type(),
+                       {adaptor.getWriter(), number});
+    rewriter.eraseOp(op);
+    return success();
+  }
+};
+constexpr const char *deferBeginName = "pikoir_defer_begin";
+constexpr const char *deferIterationName = "pikoir_defer_iteration";
+constexpr const char *scratchReleaseName = "pikoir_scratch_release";
+
+struct ScratchMarkLowering : Lowering<ScratchMarkOp> {
+  using Lowering::Lowering;
+  LogicalResult
+  matchAndRewrite(ScratchMarkOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    rewriter.replaceOp(
+        op, context.call(rewriter, op.getLoc(), "pikoir_scratch_mark",
+                         rewriter.getI64Type(), adaptor.getWriter()));
+    return success();
+  }
+};
+
+struct ScratchLowering : Lowering<ScratchOp> {
+  using Lowering::Lowering;
+  LogicalResult
+  matchAndRewrite(ScratchOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    Location loc = op.getLoc();
+    Value size = toI64(rewriter, loc, adaptor.getSize());
+    Value memory = context
+                       .call(rewriter, loc, "pikoir_scratch", pointer(rewriter),
+                             {adaptor.getWriter(), size})
+                       .getResult();
+    Value null = LLVM::ZeroOp::create(rewriter, loc, pointer(rewriter));
+    Value granted = LLVM::ICmpOp::create(rewriter, loc, LLVM::ICmpPredicate::ne,
+                                         memory, null);
+    // As the conversion of memrefs will see it.
+    auto bytes = cast<MemRefType>(op.getBytes().getType());
+    LLVMTypeConverter types(rewriter.getContext());
+    auto descriptor =
+        MemRefDescriptor::poison(rewriter, loc, types.convertType(bytes));
+    descriptor.setAllocatedPtr(rewriter, loc, memory);
+    descriptor.setAlignedPtr(rewriter, loc, memory);
+    descriptor.setConstantOffset(rewriter, loc, 0);
+    descriptor.setSize(rewriter, loc, 0, size);
+    descriptor.setConstantStride(rewriter, loc, 0, 1);
+    Value memref = UnrealizedConversionCastOp::create(rewriter, loc, bytes,
+                                                      Value(descriptor))
+                       .getResult(0);
+    rewriter.replaceOp(op, {memref, granted});
+    return success();
+  }
+};
+
+struct BeginScheduleLowering : Lowering<BeginScheduleOp> {
+  using Lowering::Lowering;
+  LogicalResult
+  matchAndRewrite(BeginScheduleOp op, OpAdaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    Location loc = op.getLoc();
+    int32_t number = context.stageNumber(op, op.getStage());
+    Value bins =
+        context
+            .call(rewriter, loc, "pikoir_begin_schedule", rewriter.getI64Type(),
+                  {context.frame(op), createI32(rewriter, loc, number)})
+            .getResult();
+    // The kernel's status is that of what it says about the bins.
+    auto function = op->getParentOfType<func::FuncOp>();
+    Operation *end = function.getBody().front().getTerminator();
+    {
+      OpBuilder::InsertionGuard guard(rewriter);
+      rewriter.setInsertionPoint(end);
+      Value status = context
+                         .call(rewriter, loc, "pikoir_status",
+                               rewriter.getI32Type(), context.frame(op))
+                         .getResult();
+      rewriter.modifyOpInPlace(end, [&] { end->setOperand(0, status); });
+    }
+    rewriter.replaceOp(op, toIndex(rewriter, loc, bins));
+    return success();
+  }
+};
+
+struct ScheduleBinLowering : Lowering<ScheduleBinOp> {
+  using Lowering::Lowering;
+  LogicalResult
+  matchAndRewrite(ScheduleBinOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    Location loc = op.getLoc();
+    int32_t number = context.stageNumber(op, op.getStage());
+    Value everyBin = arith::ExtUIOp::create(
+        rewriter, loc, rewriter.getI32Type(), adaptor.getEveryBin());
+    context.call(rewriter, loc, "pikoir_schedule_bin", Type(),
+                 {context.frame(op), createI32(rewriter, loc, number),
+                  toI64(rewriter, loc, adaptor.getBin()), adaptor.getKind(),
+                  adaptor.getTileSplit(), adaptor.getBatch(), everyBin});
+    rewriter.eraseOp(op);
+    return success();
+  }
+};
 
 struct AppendLowering : Lowering<AppendOp> {
   using Lowering::Lowering;
@@ -344,11 +536,18 @@ struct ThreadsLowering : Lowering<ThreadsOp> {
 void piko::populateKernelToLLVMPatterns(const TypeConverter &converter,
                                         RewritePatternSet &patterns,
                                         LoweringContext &context) {
-  patterns
-      .add<OpenBinsLowering, CloseBinsLowering, UnitCountLowering,
-           UnitCellsLowering, CellRangeLowering, CellBinLowering, ItemLowering,
-           OpenWriterLowering, WriterCallLowering<CloseWriterOp, &closeName>,
-           WriterCallLowering<NextOp, &nextName>, AppendLowering, PlaceLowering,
-           GetLowering, GridLowering, DomainLowering, ThreadsLowering>(
-          converter, patterns.getContext(), context);
+  patterns.add<OpenBinsLowering, CloseBinsLowering, UnitCountLowering,
+               UnitCellsLowering, CellRangeLowering, CellBinLowering,
+               CallRangeLowering, CallBinLowering, ItemLowering, NoItemLowering,
+               ToAddressLowering, FromAddressLowering, OpenWriterLowering,
+               WriterCallLowering<CloseWriterOp, &closeName>,
+               WriterCallLowering<NextOp, &nextName>,
+               WriterCallLowering<DeferEndOp, &deferEndName>,
+               WriterNumberLowering<DeferBeginOp, &deferBeginName>,
+               WriterNumberLowering<DeferIterationOp, &deferIterationName>,
+               WriterNumberLowering<ScratchReleaseOp, &scratchReleaseName>,
+               ScratchMarkLowering, ScratchLowering, BeginScheduleLowering,
+               ScheduleBinLowering, AppendLowering, PlaceLowering, GetLowering,
+               GridLowering, DomainLowering, ThreadsLowering>(
+      converter, patterns.getContext(), context);
 }

@@ -130,6 +130,26 @@ LLVM::CallOp LoweringContext::call(OpBuilder &builder, Location loc,
   return LLVM::CallOp::create(builder, loc, callee, arguments);
 }
 
+StringRef LoweringContext::zeros(int64_t bytes) {
+  constexpr StringRef name = "piko.zeros";
+  auto zeros = module.lookupSymbol<LLVM::GlobalOp>(name);
+  auto size = [&] {
+    return cast<LLVM::LLVMArrayType>(zeros.getGlobalType()).getNumElements();
+  };
+  if (zeros && int64_t(size()) >= bytes)
+    return name;
+  if (zeros)
+    zeros.erase();
+  OpBuilder builder(module.getBodyRegion());
+  auto type = LLVM::LLVMArrayType::get(builder.getI8Type(), bytes);
+  LLVM::GlobalOp::create(
+      builder, module.getLoc(), type, /*isConstant=*/true,
+      LLVM::Linkage::Internal, name,
+      builder.getZeroAttr(RankedTensorType::get(bytes, builder.getI8Type())),
+      /*alignment=*/64);
+  return name;
+}
+
 Value piko::createI32(OpBuilder &builder, Location loc, int64_t v) {
   return arith::ConstantOp::create(builder, loc,
                                    builder.getI32IntegerAttr(int32_t(v)));

@@ -59,6 +59,9 @@ public:
                           mlir::StringRef function, mlir::Type result,
                           mlir::ValueRange arguments);
 
+  /// The name of a constant of at least so many zero bytes.
+  mlir::StringRef zeros(int64_t bytes);
+
 private:
   mlir::ModuleOp module;
   llvm::DenseMap<mlir::Operation *, const PipelineNumbers *> functions;
@@ -91,6 +94,12 @@ void populateKernelToLLVMPatterns(const mlir::TypeConverter &converter,
 void populateStateToLLVMPatterns(const mlir::TypeConverter &converter,
                                  mlir::RewritePatternSet &patterns,
                                  LoweringContext &context);
+
+/// Attributes of a kernel's function, until NAME.run is written: the number of
+/// the stage whose bins or schedule it is for, and whether it places a source.
+constexpr const char *stageAttrName = "piko.stage";
+constexpr const char *numberAttrName = "piko.number";
+constexpr const char *sourceAttrName = "piko.source";
 
 /// Writes NAME.setup and NAME.run; `kernels` run in that order.
 void createProgram(const PipelineNumbers &numbers,

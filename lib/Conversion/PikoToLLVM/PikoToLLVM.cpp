@@ -10,6 +10,7 @@
 #include "mlir/Dialect/ControlFlow/IR/ControlFlow.h"
 #include "mlir/Dialect/MemRef/IR/MemRef.h"
 #include "mlir/Dialect/SCF/IR/SCF.h"
+#include "mlir/Dialect/SCF/Transforms/Patterns.h"
 
 namespace piko {
 #define GEN_PASS_DEF_CONVERTPIKOTOLLVM
@@ -33,18 +34,39 @@ struct ConvertPikoToLLVMPass
 
 } // namespace
 
+namespace {
+struct SelectLowering : OpConversionPattern<arith::SelectOp> {
+  using OpConversionPattern::OpConversionPattern;
+  LogicalResult
+  matchAndRewrite(arith::SelectOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    rewriter.replaceOpWithNewOp<arith::SelectOp>(op, adaptor.getOperands());
+    return success();
+  }
+};
+} // namespace
+
 /// Which stage or source a kernel's function is for: the runtime is told at its
 /// end, where the bins are no longer at hand.
-static void noteSubject(func::FuncOp function, const PipelineNumbers &numbers) {
-  for (auto bins : function.getOps<OpenBinsOp>()) {
-    Builder builder(function.getContext());
-    int64_t number = bins.getSource()
-                         ? *bins.getSource()
-                         : numbers.stages.lookup(bins.getStageAttr().getAttr());
-    function->setAttr("piko.number", builder.getI64IntegerAttr(number));
+static LogicalResult noteSubject(KernelOp kernel, func::FuncOp function,
+                                 const PipelineNumbers &numbers) {
+  Builder builder(function.getContext());
+  auto opened = function.getOps<OpenBinsOp>();
+  auto schedules = function.getOps<BeginScheduleOp>();
+  if (std::distance(opened.begin(), opened.end()) +
+          std::distance(schedules.begin(), schedules.end()) !=
+      1)
+    return kernel.emitOpError("expected to open the bins of one stage or "
+                              "source, or to begin one schedule");
+  for (OpenBinsOp bins : opened) {
+    int64_t stage = numbers.stages.lookup(bins.getStageAttr().getAttr());
+    function->setAttr(stageAttrName, builder.getI64IntegerAttr(stage));
+    function->setAttr(numberAttrName, builder.getI64IntegerAttr(
+                                          bins.getSource().value_or(stage)));
     if (bins.getSource())
-      function->setAttr("piko.source", builder.getUnitAttr());
+      function->setAttr(sourceAttrName, builder.getUnitAttr());
   }
+  return success();
 }
 
 LogicalResult ConvertPikoToLLVMPass::convert(PipelineOp pipeline,
@@ -61,7 +83,8 @@ LogicalResult ConvertPikoToLLVMPass::convert(PipelineOp pipeline,
   SmallVector<func::FuncOp> functions;
   for (auto kernel : llvm::to_vector(pipeline.getOps<KernelOp>())) {
     functions.push_back(context.outline(kernel, numbers));
-    noteSubject(functions.back(), numbers);
+    if (failed(noteSubject(kernel, functions.back(), numbers)))
+      return failure();
     kernel.erase();
   }
 
@@ -79,18 +102,23 @@ LogicalResult ConvertPikoToLLVMPass::convert(PipelineOp pipeline,
   ConversionTarget target(getContext());
   target.addIllegalDialect<PikoDialect>();
   target.markUnknownOpDynamicallyLegal([](Operation *) { return true; });
+  target.addDynamicallyLegalOp<arith::SelectOp>(
+      [&](Operation *op) { return converter.isLegal(op); });
   RewritePatternSet patterns(&getContext());
+  // Primitives are chosen, and carried around loops, like numbers.
+  scf::populateSCFStructuralTypeConversionsAndLegality(converter, patterns,
+                                                       target);
+  patterns.add<SelectLowering>(converter, &getContext());
   populateKernelToLLVMPatterns(converter, patterns, context);
   populateStateToLLVMPatterns(converter, patterns, context);
   FrozenRewritePatternSet frozen(std::move(patterns));
   for (func::FuncOp function : functions)
     if (failed(applyPartialConversion(function, target, frozen)))
       return failure();
-  for (func::FuncOp function : functions) {
-    function->removeAttr("piko.number");
-    function->removeAttr("piko.source");
-  }
   createProgram(numbers, functions, context);
+  for (func::FuncOp function : functions)
+    for (const char *name : {stageAttrName, numberAttrName, sourceAttrName})
+      function->removeAttr(name);
   pipeline.erase();
   return success();
 }
@@ -101,11 +129,12 @@ void ConvertPikoToLLVMPass::runOnOperation() {
   SmallVector<PipelineOp> pipelines(module.getOps<PipelineOp>());
   if (!pipelines.empty()) {
     // The size of pikoir_input: what a kernel works on after an error.
-    auto type = LLVM::LLVMArrayType::get(builder.getI64Type(), 7);
-    LLVM::GlobalOp::create(
-        builder, module.getLoc(), type, /*isConstant=*/true,
-        LLVM::Linkage::Internal, "piko.no_input",
-        builder.getZeroAttr(RankedTensorType::get(7, builder.getI64Type())));
+    constexpr int64_t words = 9;
+    auto type = LLVM::LLVMArrayType::get(builder.getI64Type(), words);
+    LLVM::GlobalOp::create(builder, module.getLoc(), type, /*isConstant=*/true,
+                           LLVM::Linkage::Internal, "piko.no_input",
+                           builder.getZeroAttr(RankedTensorType::get(
+                               words, builder.getI64Type())));
   }
   LoweringContext context(module);
   for (PipelineOp pipeline : pipelines)

@@ -148,7 +148,8 @@ static int64_t stageFlags(StageOp stage) {
   ScheduleOp schedule = stage.getSchedule();
   return (stage.collects() ? 1 : 0) | (stage.getSplit() ? 2 : 0) |
          (stage.getPlaced() ? 4 : 0) |
-         (schedule && schedule.getUnordered() ? 8 : 0);
+         (schedule && schedule.getUnordered() ? 8 : 0) |
+         (stage.getTakesList() ? 16 : 0) | (stage.getOrdered() ? 32 : 0);
 }
 
 void SetupWriter::declareStage(StageOp stage, int32_t number) {
@@ -163,6 +164,16 @@ void SetupWriter::declareStage(StageOp stage, int32_t number) {
         bytes(extents), i32(schedule ? int64_t(schedule.getKind()) : 0),
         i64(schedule ? schedule.getTileSplit().value_or(0) : 0),
         i32(stageFlags(stage)), i64(stage.getTile().value_or(0))});
+  if (!schedule)
+    return;
+  if (schedule.getBatch() || schedule.getEveryBin())
+    call("pikoir_declare_schedule",
+         {i32(number), i64(schedule.getBatch().value_or(0)),
+          i32(schedule.getEveryBin())});
+  if (ArrayAttr waits = schedule.getEndStageAttr())
+    for (auto name : waits.getAsRange<FlatSymbolRefAttr>())
+      call("pikoir_declare_wait",
+           {i32(number), i32(numbers.stages.lookup(name.getAttr()))});
 }
 
 void SetupWriter::run() {
@@ -186,31 +197,135 @@ void SetupWriter::run() {
     declareState(SymbolTable::lookupSymbolIn(pipeline, name), number);
 }
 
-/// The next kernel runs only if the one before it gave 0.
-static void createRun(PipelineOp pipeline, ArrayRef<func::FuncOp> kernels,
-                      OpBuilder &builder) {
-  Location loc = pipeline.getLoc();
+namespace {
+
+/// Writes NAME.run. The next kernel runs only if the one before it gave 0;
+/// those of a cycle run as the runtime says.
+class RunWriter {
+public:
+  RunWriter(const PipelineNumbers &numbers, LoweringContext &context,
+            OpBuilder &builder)
+      : numbers(numbers), pipeline(numbers.pipeline), context(context),
+        builder(builder), loc(pipeline.getLoc()) {}
+
+  void run(ArrayRef<func::FuncOp> kernels);
+
+private:
+  /// The cycle that a kernel is on, if any.
+  std::optional<int64_t> cycleOf(func::FuncOp kernel);
+  Block *createBlock(Block *before) {
+    OpBuilder::InsertionGuard guard(builder);
+    return builder.createBlock(before);
+  }
+  /// Goes on, in `next`, only if a status is 0.
+  void check(Value status, Block *next);
+  void callKernel(func::FuncOp kernel, Block *next);
+  void createCycle(ArrayRef<func::FuncOp> members);
+
+  const PipelineNumbers &numbers;
+  PipelineOp pipeline;
+  LoweringContext &context;
+  OpBuilder &builder;
+  Location loc;
+  Value frame;
+  Block *exit = nullptr;
+};
+
+} // namespace
+
+static int64_t stageNumber(func::FuncOp kernel) {
+  return kernel->getAttrOfType<IntegerAttr>(stageAttrName).getInt();
+}
+
+std::optional<int64_t> RunWriter::cycleOf(func::FuncOp kernel) {
+  if (!kernel->hasAttr(stageAttrName))
+    return std::nullopt;
+  StringAttr name = (numbers.stages.begin() + stageNumber(kernel))->first;
+  return cast<StageOp>(SymbolTable::lookupSymbolIn(pipeline, name)).getCycle();
+}
+
+void RunWriter::check(Value status, Block *next) {
+  builder.setInsertionPointAfterValue(status);
+  Value failed = arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::ne,
+                                       status, createI32(builder, loc, 0));
+  cf::CondBranchOp::create(builder, loc, failed, exit, status, next,
+                           ValueRange());
+  builder.setInsertionPointToEnd(next);
+}
+
+void RunWriter::callKernel(func::FuncOp kernel, Block *next) {
+  check(func::CallOp::create(builder, kernel.getLoc(), kernel, frame)
+            .getResult(0),
+        next);
+}
+
+void RunWriter::createCycle(ArrayRef<func::FuncOp> members) {
+  SmallVector<func::FuncOp> kernels;
+  for (func::FuncOp member : members) {
+    if (member->hasAttr(sourceAttrName))
+      callKernel(member, createBlock(exit));
+    else
+      kernels.push_back(member);
+  }
+  Block *step = createBlock(exit);
+  Block *choose = createBlock(exit);
+  Block *after = createBlock(exit);
+  cf::BranchOp::create(builder, loc, step);
+
+  builder.setInsertionPointToEnd(step);
+  Value next =
+      context
+          .call(builder, loc, "pikoir_cycle_step", builder.getI32Type(),
+                {frame, createI32(builder, loc, stageNumber(members.front()))})
+          .getResult();
+  Value ended = arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::slt,
+                                      next, createI32(builder, loc, 0));
+  cf::CondBranchOp::create(builder, loc, ended, after, choose);
+
+  SmallVector<int32_t> stages;
+  SmallVector<Block *> calls;
+  for (func::FuncOp kernel : kernels) {
+    stages.push_back(stageNumber(kernel));
+    calls.push_back(createBlock(after));
+    builder.setInsertionPointToEnd(calls.back());
+    callKernel(kernel, step);
+  }
+  builder.setInsertionPointToEnd(choose);
+  cf::SwitchOp::create(builder, loc, next, after, ValueRange(), stages, calls,
+                       SmallVector<ValueRange>(calls.size()));
+
+  builder.setInsertionPointToEnd(after);
+  check(context.call(builder, loc, "pikoir_status", builder.getI32Type(), frame)
+            .getResult(),
+        createBlock(exit));
+}
+
+void RunWriter::run(ArrayRef<func::FuncOp> kernels) {
   auto pointer = LLVM::LLVMPointerType::get(builder.getContext());
   auto function = func::FuncOp::create(
       builder, loc, (pipeline.getSymName() + ".run").str(),
       builder.getFunctionType(pointer, builder.getI32Type()));
   OpBuilder::InsertionGuard guard(builder);
   Block *entry = function.addEntryBlock();
-  Block *exit =
+  frame = entry->getArgument(0);
+  exit =
       builder.createBlock(&function.getBody(), {}, builder.getI32Type(), loc);
   func::ReturnOp::create(builder, loc, exit->getArgument(0));
   builder.setInsertionPointToEnd(entry);
+  llvm::SmallDenseSet<int64_t> cyclesDone;
   for (func::FuncOp kernel : kernels) {
-    Value status = func::CallOp::create(builder, kernel.getLoc(), kernel,
-                                        entry->getArgument(0))
-                       .getResult(0);
-    Value failed = arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::ne,
-                                         status, createI32(builder, loc, 0));
-    Block *next = builder.createBlock(exit);
-    builder.setInsertionPointAfterValue(failed);
-    cf::CondBranchOp::create(builder, loc, failed, exit, status, next,
-                             ValueRange());
-    builder.setInsertionPointToEnd(next);
+    std::optional<int64_t> cycle = cycleOf(kernel);
+    if (!cycle) {
+      callKernel(kernel, createBlock(exit));
+      continue;
+    }
+    if (!cyclesDone.insert(*cycle).second)
+      continue;
+    SmallVector<func::FuncOp> members;
+    for (func::FuncOp other : kernels)
+      if (cycleOf(other) == cycle)
+        members.push_back(other);
+    createCycle(members);
   }
   cf::BranchOp::create(builder, loc, exit, createI32(builder, loc, 0));
 }
@@ -232,5 +347,5 @@ void piko::createProgram(const PipelineNumbers &numbers,
     SetupWriter(numbers, context, builder, body->getArgument(0)).run();
     func::ReturnOp::create(builder, pipeline.getLoc());
   }
-  createRun(pipeline, kernels, builder);
+  RunWriter(numbers, context, builder).run(kernels);
 }

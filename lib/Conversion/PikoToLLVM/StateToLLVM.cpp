@@ -85,6 +85,8 @@ LLVM::AtomicBinOp toLLVM(AtomicKind kind) {
     return LLVM::AtomicBinOp::_or;
   case AtomicKind::Xor:
     return LLVM::AtomicBinOp::_xor;
+  case AtomicKind::AddF:
+    return LLVM::AtomicBinOp::fadd;
   }
   llvm_unreachable("all kinds are handled");
 }
@@ -94,13 +96,16 @@ struct AtomicLowering : StateLowering<AtomicOp> {
   LogicalResult
   matchAndRewrite(AtomicOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
-    // No call sees the value or what it says of others: monotonic is enough,
+    // The value says nothing of what others have written: monotonic is enough,
     // and the end of the kernel orders it before those that follow.
-    LLVM::AtomicRMWOp::create(rewriter, op.getLoc(), toLLVM(op.getKind()),
-                              address(rewriter, op, adaptor),
-                              adaptor.getValue(),
-                              LLVM::AtomicOrdering::monotonic);
-    rewriter.eraseOp(op);
+    Value old = LLVM::AtomicRMWOp::create(
+        rewriter, op.getLoc(), toLLVM(op.getKind()),
+        address(rewriter, op, adaptor), adaptor.getValue(),
+        LLVM::AtomicOrdering::monotonic);
+    if (op.getOld())
+      rewriter.replaceOp(op, old);
+    else
+      rewriter.eraseOp(op);
     return success();
   }
 };
@@ -121,7 +126,7 @@ struct ExtentLowering : OpConversionPattern<ExtentOp> {
 };
 
 // pikort_status
-constexpr int64_t updateOutside = 17, indexOutside = 18;
+constexpr int64_t updateOutside = 17, indexOutside = 18, notUniform = 21;
 
 struct FailLowering : OpConversionPattern<FailOp> {
   FailLowering(const TypeConverter &converter, MLIRContext *mlir,
@@ -164,11 +169,38 @@ struct FailLowering : OpConversionPattern<FailOp> {
   LoweringContext &context;
 };
 
+/// An error that is told by numbers alone.
+template <typename OpT, int64_t code>
+struct FailNumbersLowering : OpConversionPattern<OpT> {
+  FailNumbersLowering(const TypeConverter &converter, MLIRContext *mlir,
+                      LoweringContext &context)
+      : OpConversionPattern<OpT>(converter, mlir), context(context) {}
+  LogicalResult
+  matchAndRewrite(OpT op, typename OpT::Adaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    Location loc = op.getLoc();
+    SmallVector<Value> arguments{
+        context.frame(op),
+        createI32(rewriter, loc, context.stageNumber(op, op.getStage())),
+        createI32(rewriter, loc, code)};
+    for (Value number : adaptor.getOperands())
+      arguments.push_back(toI64(rewriter, loc, number));
+    if (arguments.size() == 4)
+      arguments.push_back(createI64(rewriter, loc, 0));
+    context.call(rewriter, loc, "pikoir_fail", Type(), arguments);
+    rewriter.eraseOp(op);
+    return success();
+  }
+  LoweringContext &context;
+};
+
 } // namespace
 
 void piko::populateStateToLLVMPatterns(const TypeConverter &converter,
                                        RewritePatternSet &patterns,
                                        LoweringContext &context) {
   patterns.add<LoadLowering, StoreLowering, AtomicLowering, ExtentLowering,
-               FailLowering>(converter, patterns.getContext(), context);
+               FailLowering, FailNumbersLowering<FailListOp, indexOutside>,
+               FailNumbersLowering<FailBarrierOp, notUniform>>(
+      converter, patterns.getContext(), context);
 }

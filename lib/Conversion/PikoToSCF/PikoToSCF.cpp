@@ -6,6 +6,7 @@
 #include "Piko/Conversion/Passes.h"
 #include "Piko/Transforms/BinArithmetic.h"
 
+#include "mlir/IR/Matchers.h"
 #include "mlir/IR/PatternMatch.h"
 #include "mlir/Transforms/GreedyPatternRewriteDriver.h"
 
@@ -172,6 +173,83 @@ template <typename AccessOp> struct CheckAccess : OpRewritePattern<AccessOp> {
   }
 };
 
+/// The end of a list less its beginning.
+static Value createSize(PatternRewriter &rewriter, Location loc, ListOp list) {
+  return arith::SubIOp::create(rewriter, loc, list.getEnd(), list.getBegin());
+}
+
+struct ConvertListSize : OpRewritePattern<ListSizeOp> {
+  using OpRewritePattern::OpRewritePattern;
+
+  LogicalResult matchAndRewrite(ListSizeOp size,
+                                PatternRewriter &rewriter) const override {
+    auto list = size.getList().getDefiningOp<ListOp>();
+    if (!list)
+      return rewriter.notifyMatchFailure(size, "not of a kernel's list");
+    rewriter.replaceOp(size, createSize(rewriter, size.getLoc(), list));
+    return success();
+  }
+};
+
+/// Turns the read of a list into that of a position, behind a test of the index
+/// unless a loop says that it is inside.
+struct ConvertListAt : OpRewritePattern<ListAtOp> {
+  using OpRewritePattern::OpRewritePattern;
+
+  LogicalResult matchAndRewrite(ListAtOp at,
+                                PatternRewriter &rewriter) const override {
+    auto list = at.getList().getDefiningOp<ListOp>();
+    StageOp stage = getKernelStage(at);
+    if (!list || !stage)
+      return rewriter.notifyMatchFailure(at, "not of a kernel's list");
+    Location loc = at.getLoc();
+    Type type = at.getPrim().getType();
+    auto createItem = [&] {
+      Value position =
+          arith::AddIOp::create(rewriter, loc, list.getBegin(), at.getIndex());
+      return ItemOp::create(rewriter, loc, type, list.getBins(), position);
+    };
+    if (at.getChecked() || isLoopOver(at.getIndex(), list)) {
+      rewriter.replaceOp(at, createItem());
+      return success();
+    }
+    Value size = createSize(rewriter, loc, list);
+    Value inside = arith::CmpIOp::create(
+        rewriter, loc, arith::CmpIPredicate::ult, at.getIndex(), size);
+    auto ifOp = scf::IfOp::create(rewriter, loc, type, inside,
+                                  /*withElseRegion=*/true);
+    rewriter.setInsertionPointToStart(ifOp.thenBlock());
+    scf::YieldOp::create(rewriter, loc, createItem().getResult());
+    rewriter.setInsertionPointToStart(ifOp.elseBlock());
+    FailListOp::create(rewriter, loc, stage.getSymName(), at.getIndex(), size);
+    scf::YieldOp::create(rewriter, loc,
+                         NoItemOp::create(rewriter, loc, type).getResult());
+    rewriter.replaceOp(at, ifOp);
+    return success();
+  }
+
+private:
+  /// Whether `index` counts from 0, or from above, to the size of `list`.
+  static bool isLoopOver(Value index, ListOp list) {
+    auto argument = dyn_cast<BlockArgument>(index);
+    auto loop =
+        argument
+            ? dyn_cast_or_null<scf::ForOp>(argument.getOwner()->getParentOp())
+            : scf::ForOp();
+    APInt first;
+    if (!loop || index != loop.getInductionVar() ||
+        !matchPattern(loop.getLowerBound(), m_ConstantInt(&first)) ||
+        first.isNegative())
+      return false;
+    Operation *bound = loop.getUpperBound().getDefiningOp();
+    if (auto size = dyn_cast_or_null<ListSizeOp>(bound))
+      return size.getList() == list;
+    auto size = dyn_cast_or_null<arith::SubIOp>(bound);
+    return size && size.getLhs() == list.getEnd() &&
+           size.getRhs() == list.getBegin();
+  }
+};
+
 struct ConvertPikoToSCFPass
     : piko::impl::ConvertPikoToSCFBase<ConvertPikoToSCFPass> {
   void runOnOperation() override {
@@ -179,9 +257,13 @@ struct ConvertPikoToSCFPass
     populatePikoToSCFPatterns(patterns);
     if (failed(applyPatternsGreedily(getOperation(), std::move(patterns))))
       return signalPassFailure();
-    getOperation().walk([&](UpdateOp update) {
-      update.emitOpError("expected to be at the resolved level");
-      signalPassFailure();
+    getOperation().walk([&](Operation *op) {
+      if (isa<UpdateOp, ListAtOp, ListSizeOp>(op)) {
+        op->emitOpError("expected to be at the resolved level");
+        signalPassFailure();
+      } else if (auto list = dyn_cast<ListOp>(op); list && list.use_empty()) {
+        list.erase();
+      }
     });
   }
 };
@@ -189,6 +271,7 @@ struct ConvertPikoToSCFPass
 } // namespace
 
 void piko::populatePikoToSCFPatterns(RewritePatternSet &patterns) {
-  patterns.add<ConvertUpdate, CheckAccess<AtomicOp>, CheckAccess<LoadOp>,
-               CheckAccess<StoreOp>>(patterns.getContext());
+  patterns
+      .add<ConvertUpdate, ConvertListAt, ConvertListSize, CheckAccess<AtomicOp>,
+           CheckAccess<LoadOp>, CheckAccess<StoreOp>>(patterns.getContext());
 }

@@ -1,0 +1,209 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// The order of combination is the reference's (piko/reference/collectives.h).
+
+#include "Collectives.h"
+
+#include "mlir/Dialect/Arith/IR/Arith.h"
+#include "mlir/Dialect/MemRef/IR/MemRef.h"
+#include "mlir/IR/IRMapping.h"
+
+using namespace mlir;
+using namespace piko;
+
+namespace {
+
+/// Short names for what the loops below are made of.
+struct Writer {
+  OpBuilder &builder;
+  Location loc;
+
+  Value constant(int64_t value) {
+    return arith::ConstantIndexOp::create(builder, loc, value);
+  }
+  Value add(Value a, Value b) {
+    return arith::AddIOp::create(builder, loc, a, b);
+  }
+  Value sub(Value a, Value b) {
+    return arith::SubIOp::create(builder, loc, a, b);
+  }
+  Value min(Value a, Value b) {
+    return arith::MinSIOp::create(builder, loc, a, b);
+  }
+  Value both(Value a, Value b) {
+    return arith::AndIOp::create(builder, loc, a, b);
+  }
+  Value either(Value a, Value b) {
+    return arith::OrIOp::create(builder, loc, a, b);
+  }
+  Value select(Value condition, Value a, Value b) {
+    return arith::SelectOp::create(builder, loc, condition, a, b);
+  }
+  Value compare(arith::CmpIPredicate predicate, Value a, Value b) {
+    return arith::CmpIOp::create(builder, loc, predicate, a, b);
+  }
+  Value compare(arith::CmpFPredicate predicate, Value a, Value b) {
+    return arith::CmpFOp::create(builder, loc, predicate, a, b);
+  }
+  Value load(Value array, Value index) {
+    return memref::LoadOp::create(builder, loc, array, index);
+  }
+  SmallVector<Value> load(ValueRange arrays, Value index) {
+    return llvm::map_to_vector(arrays,
+                               [&](Value array) { return load(array, index); });
+  }
+  void store(ValueRange values, ValueRange arrays, Value index) {
+    for (auto [value, array] : llvm::zip(values, arrays))
+      memref::StoreOp::create(builder, loc, value, array, index);
+  }
+
+  /// for (i = from; i < to; i += step) body(i)
+  void forEach(Value from, Value to, Value step,
+               llvm::function_ref<void(Value)> body) {
+    auto loop = scf::ForOp::create(builder, loc, from, to, step);
+    OpBuilder::InsertionGuard guard(builder);
+    builder.setInsertionPointToStart(loop.getBody());
+    body(loop.getInductionVar());
+  }
+
+  /// for (s = 1; s < count; s *= 2) state = body(s, state); the last state.
+  SmallVector<Value>
+  forEachPower(Value count, ValueRange state,
+               llvm::function_ref<SmallVector<Value>(Value, ValueRange)> body) {
+    SmallVector<Value> inits{constant(1)};
+    llvm::append_range(inits, state);
+    auto loop = scf::WhileOp::create(
+        builder, loc, ValueRange(inits).getTypes(), inits,
+        [&](OpBuilder &, Location, ValueRange arguments) {
+          scf::ConditionOp::create(
+              builder, loc,
+              compare(arith::CmpIPredicate::slt, arguments.front(), count),
+              arguments);
+        },
+        [&](OpBuilder &, Location, ValueRange arguments) {
+          Value s = arguments.front();
+          SmallVector<Value> next = body(s, arguments.drop_front());
+          next.insert(next.begin(), add(s, s));
+          scf::YieldOp::create(builder, loc, next);
+        });
+    return SmallVector<Value>(loop.getResults().drop_front());
+  }
+
+  SmallVector<Value> combine(Block &body, ValueRange left, ValueRange right) {
+    IRMapping mapping;
+    SmallVector<Value> pair(left);
+    llvm::append_range(pair, right);
+    mapping.map(body.getArguments(), pair);
+    for (Operation &op : body.without_terminator())
+      builder.clone(op, mapping);
+    return llvm::map_to_vector(
+        cast<YieldOp>(body.getTerminator()).getResults(),
+        [&](Value result) { return mapping.lookupOrDefault(result); });
+  }
+
+  /// Whether a < b; NaNs are equal to each other and greater than all else.
+  Value isLess(Value a, Value b, bool isUnsigned) {
+    if (!isa<FloatType>(a.getType()))
+      return compare(isUnsigned || a.getType().isInteger(1)
+                         ? arith::CmpIPredicate::ult
+                         : arith::CmpIPredicate::slt,
+                     a, b);
+    Value isNumber = compare(arith::CmpFPredicate::ORD, a, a);
+    Value isNaN = compare(arith::CmpFPredicate::UNO, b, b);
+    return either(compare(arith::CmpFPredicate::OLT, a, b),
+                  both(isNumber, isNaN));
+  }
+};
+
+} // namespace
+
+/// At distance s = 1, 2, 4, ..., for each multiple i of 2s with i + s < count.
+static void forEachPair(Writer &w, Value count,
+                        llvm::function_ref<void(Value i, Value j)> body) {
+  w.forEachPower(count, {}, [&](Value s, ValueRange) {
+    w.forEach(w.constant(0), w.sub(count, s), w.add(s, s),
+              [&](Value i) { body(i, w.add(i, s)); });
+    return SmallVector<Value>();
+  });
+}
+
+void piko::createReduction(OpBuilder &builder, Location loc, Value count,
+                           ValueRange slots, Block &combine) {
+  Writer w{builder, loc};
+  forEachPair(w, count, [&](Value i, Value j) {
+    w.store(w.combine(combine, w.load(slots, i), w.load(slots, j)), slots, i);
+  });
+}
+
+// The blocks that make up [0, j) end with the one of j's lowest bit s, which is
+// [j - s, j). It is in slot j - s just before the pair (j - s, j) is combined;
+// slot j is not read after that, so the block can wait there.
+void piko::createScan(OpBuilder &builder, Location loc, Value count,
+                      ValueRange slots, Block &combine) {
+  Writer w{builder, loc};
+  forEachPair(w, count, [&](Value i, Value j) {
+    SmallVector<Value> left = w.load(slots, i), right = w.load(slots, j);
+    w.store(w.combine(combine, left, right), slots, i);
+    w.store(left, slots, j);
+  });
+  // Then [0, j) is [0, j - s) and the block.
+  Value zero = w.constant(0), one = w.constant(1);
+  w.forEach(one, count, one, [&](Value j) {
+    Value s = w.both(j, w.sub(zero, j));
+    Value several = w.compare(arith::CmpIPredicate::ne, j, s);
+    auto ifOp = scf::IfOp::create(builder, loc, TypeRange(), several,
+                                  /*addElse=*/false);
+    OpBuilder::InsertionGuard guard(builder);
+    builder.setInsertionPoint(ifOp.thenBlock()->getTerminator());
+    w.store(w.combine(combine, w.load(slots, w.sub(j, s)), w.load(slots, j)),
+            slots, j);
+  });
+}
+
+/// Merges the sorted runs [lo, mid) and [mid, hi) of numbers of keys.
+static void mergeRuns(Writer &w, Value keys, bool isUnsigned, Value room,
+                      Value from, Value to, Value lo, Value mid, Value hi) {
+  OpBuilder &builder = w.builder;
+  Location loc = w.loc;
+  Value one = w.constant(1);
+  auto loop =
+      scf::ForOp::create(builder, loc, lo, hi, one, ValueRange{lo, mid});
+  OpBuilder::InsertionGuard guard(builder);
+  builder.setInsertionPointToStart(loop.getBody());
+  Value left = loop.getRegionIterArg(0), right = loop.getRegionIterArg(1);
+  // Beyond its end a run is read at its last element, for nothing.
+  auto head = [&](Value at, Value end) {
+    return w.load(room, w.add(from, w.min(at, w.sub(end, one))));
+  };
+  Value a = head(left, mid), b = head(right, hi);
+  Value leftEnded = w.compare(arith::CmpIPredicate::sge, left, mid);
+  Value rightLasts = w.compare(arith::CmpIPredicate::slt, right, hi);
+  Value less = w.isLess(w.load(keys, b), w.load(keys, a), isUnsigned);
+  Value takeRight = w.either(leftEnded, w.both(rightLasts, less));
+  w.store(w.select(takeRight, b, a), room, w.add(to, loop.getInductionVar()));
+  scf::YieldOp::create(
+      builder, loc,
+      ValueRange{w.select(takeRight, left, w.add(left, one)),
+                 w.select(takeRight, w.add(right, one), right)});
+}
+
+// A stable merge sort from the bottom up, between the halves of `room`.
+void piko::createSort(OpBuilder &builder, Location loc, Value count, Value keys,
+                      bool isUnsigned, Value room, Value ranks) {
+  Writer w{builder, loc};
+  Value zero = w.constant(0), one = w.constant(1);
+  w.forEach(zero, count, one, [&](Value i) { w.store(i, room, i); });
+  SmallVector<Value> halves =
+      w.forEachPower(count, {zero, count}, [&](Value width, ValueRange halves) {
+        w.forEach(zero, count, w.add(width, width), [&](Value lo) {
+          Value mid = w.min(w.add(lo, width), count);
+          Value hi = w.min(w.add(mid, width), count);
+          mergeRuns(w, keys, isUnsigned, room, halves[0], halves[1], lo, mid,
+                    hi);
+        });
+        return SmallVector<Value>{halves[1], halves[0]};
+      });
+  w.forEach(zero, count, one, [&](Value i) {
+    w.store(w.load(room, w.add(halves[0], i)), ranks, i);
+  });
+}

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Reductions, scans and sorts over the slots of iterations, one or more.
+
+#ifndef PIKO_LIB_TRANSFORMS_COLLECTIVES_H
+#define PIKO_LIB_TRANSFORMS_COLLECTIVES_H
+
+#include "Piko/Dialect/Piko/IR/Piko.h"
+
+namespace piko {
+
+/// Combines the slots: slot 0 of each array gets the result.
+void createReduction(mlir::OpBuilder &builder, mlir::Location loc,
+                     mlir::Value count, mlir::ValueRange slots,
+                     mlir::Block &combine);
+
+/// Slot i of each array gets what the slots before it combine to; slot 0 is
+/// unspecified.
+void createScan(mlir::OpBuilder &builder, mlir::Location loc, mlir::Value count,
+                mlir::ValueRange slots, mlir::Block &combine);
+
+/// Slot i of `ranks` (index) gets the number of the i-th smallest key; `room`
+/// has twice as many elements (index).
+void createSort(mlir::OpBuilder &builder, mlir::Location loc, mlir::Value count,
+                mlir::Value keys, bool isUnsigned, mlir::Value room,
+                mlir::Value ranks);
+
+} // namespace piko
+
+#endif // PIKO_LIB_TRANSFORMS_COLLECTIVES_H
