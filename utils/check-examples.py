@@ -4,9 +4,9 @@
 
 Each operation of the dialect has an example in its description, or says "See
 `piko.X`" where X's example shows it. An example that holds a record or a
-pipeline is a module. Any other is a piece of a phase or of a resolved kernel,
-and is put into the pipeline below; names that it does not define have the
-types of NAMES.
+pipeline is a module. Any other is a piece of a phase, of an iteration or of a
+resolved kernel, and is put into the pipeline below; names that it does not
+define have the types of NAMES.
 """
 
 import argparse
@@ -23,14 +23,21 @@ FENCE = re.compile(r"^[ ]*```mlir\n(.*?)^[ ]*```", re.S | re.M)
 
 KERNEL_OPS = re.compile(
     r"piko\.(open_bins|close_bins|unit_\w+|cell_\w+|item|open_writer"
-    r"|close_writer|append|place|next|threads|grid)\b"
+    r"|close_writer|append|place|next|threads|grid|call_\w+|list|no_item"
+    r"|\w+_address|\w+_schedule|schedule_bin|defer_\w+|scratch\w*"
+    r"|fail\w*)(?= )"
 )
 ASSIGN_OPS = re.compile(r"piko\.(assign_\w+|owner)\b")
+DIRECTIVES = re.compile(r"piko\.set_\w+")
+LIST_OPS = re.compile(r"piko\.(list_\w+|parallel_for)\b")
+BARRIERS = re.compile(r"piko\.(sync|reduce|scan|sort)\b")
 
 NAMES = {
-    "f32": "u v z",
-    "i32": "x y x0 y0 x1 y1 one",
-    "index": "b bin cell i j tile unit",
+    "f32": "u v z depth",
+    "i32": "x y x0 y0 x1 y1 one count zero id kind",
+    "i64": "batch split mark",
+    "i1": "always",
+    "index": "a b bin call cell hi i j lo n tile unit",
 }
 
 CONTEXT = """
@@ -48,23 +55,40 @@ piko.pipeline @Example rank 2 {
   piko.buffer @lights : @Light
   piko.buffer @vertices : @Vertex
   piko.buffer @histogram : @Count
+  piko.buffer @next : @Count
   piko.image @depth : @Depth rank 2 clear [1.0 : f32]
   piko.source @rasterize
+  piko.source @blend
   piko.edge @rasterize[0] -> @shade
   piko.edge @shade[0] -> @plot
   piko.stage @rasterize bins [8, 8] threads 64 : @Fragment -> [@Fragment] {}
-  piko.stage @plot bins [8, 8] threads 64 : @Point -> [] {}
+  piko.stage @plot bins [8, 8] threads 64 tile 4 : @Point -> [] {}
   piko.stage @shade bins [8, 8] threads 64 : @Fragment -> [@Point] {
     SHADE
+  }
+  piko.stage @blend bins [8, 8] threads 64 : list @Fragment -> [] {
+    BLEND
   }
   KERNEL
 }
 """
 PHASE = """piko.NAME {
-    ^bb0(%f: !piko.prim<@Fragment>):
+    ^bb0(%INPUT: !piko.TYPE<@Fragment>):
       BODY
       piko.return
     }
+"""
+SCHEDULE = """piko.schedule load_balance dynamic {
+    ^bb0(%bin: index):
+      BODY
+      piko.return
+    }
+"""
+ITERATIONS = """piko.parallel_for %n {
+      ^bb0(%i: index):
+        BODY
+        piko.yield
+      }
 """
 
 
@@ -77,20 +101,29 @@ def definitions(text):
             defined |= set(re.findall(r"%(\w+)", left[1]))
         defined |= set(re.findall(r"%(\w+): ", line))
     used = set(re.findall(r"%(\w+)", text)) - defined
-    bins, writer = "bins" in used, "writer" in used
+    writer, primitive = "writer" in used, "p" in used
+    bins = "bins" in used or primitive
     lines = []
     for kind, names in NAMES.items():
-        value = "1.0" if kind.startswith("f") else "1"
+        value = {"f32": "1.0", "i1": "true"}.get(kind, "1")
         lines += [
-            f"%{name} = arith.constant {value} : {kind}"
+            f"%{name} = arith.constant {value}"
+            + ("" if kind == "i1" else f" : {kind}")
             for name in names.split()
-            if name in used or (writer and name == "unit")
+            if name in used
+            or (writer and name == "unit")
+            or (primitive and name == "i")
         ]
     if bins or writer:
         lines.append("%bins = piko.open_bins @shade : !piko.bins<@Fragment>")
     if writer:
         lines.append(
             "%writer = piko.open_writer %bins[%unit] : !piko.bins<@Fragment>"
+        )
+    if primitive:
+        lines.append(
+            "%p = piko.item %bins[%i]"
+            " : !piko.bins<@Fragment> -> !piko.prim<@Fragment>"
         )
     return "\n".join(lines)
 
@@ -99,19 +132,44 @@ def complete(text):
     """A module that holds the example."""
     if re.search(r"^\s*piko\.(record|pipeline) ", text, re.M):
         return text
+    def module(shade="", blend="", kernel=""):
+        places = {"SHADE": shade, "BLEND": blend, "KERNEL": kernel}
+        result = CONTEXT
+        for place, content in places.items():
+            result = result.replace(place, content)
+        return result
+
+    def phase(name, inside, takes="prim"):
+        kind = {"TYPE": takes, "INPUT": "list" if takes == "list" else "f"}
+        result = PHASE.replace("NAME", name).replace("BODY", inside)
+        for place, content in kind.items():
+            result = result.replace(place, content)
+        return result
+
+    def blend(schedule, inside):
+        assign = phase("assign", "piko.assign_all")
+        return module(
+            blend=assign + schedule + phase("process", inside, "list")
+        )
+
+    if BARRIERS.search(text):
+        text = ITERATIONS.replace("BODY", text)
     body = definitions(text) + "\n" + text
+    if "piko.schedule " in text:
+        return blend(text, "")
+    if DIRECTIVES.search(text):
+        return blend(SCHEDULE.replace("BODY", body), "")
+    if LIST_OPS.search(text):
+        return blend("", body)
     if KERNEL_OPS.search(text):
-        kernel = "piko.kernel @kernel {\n" + body + "}"
-        return CONTEXT.replace("SHADE", "").replace("KERNEL", kernel)
-
-    def phase(name, inside):
-        return PHASE.replace("NAME", name).replace("BODY", inside)
-
+        return module(kernel="piko.kernel @kernel {\n" + body + "}")
     if ASSIGN_OPS.search(text):
-        phases = phase("assign", body) + phase("process", "")
-    else:
-        phases = phase("assign", "piko.assign_all") + phase("process", body)
-    return CONTEXT.replace("SHADE", phases).replace("KERNEL", "")
+        return module(shade=phase("assign", body) + phase("process", ""))
+    return module(
+        shade=phase("assign", "piko.assign_all")
+        + "piko.schedule load_balance unordered\n"
+        + phase("process", body)
+    )
 
 
 def descriptions(tblgen, includes):

@@ -312,3 +312,19 @@ piko.pipeline @DynamicArray rank 1 {
     }
   }
 }
+
+// -----
+
+piko.record @F {"z" : f32 at 0} size 4 align 4
+piko.pipeline @P rank 1 {
+  piko.source @s
+  piko.stage @s bins [0] threads 1 : list @F -> [] {
+    piko.process {
+    ^bb0(%l: !piko.list<@F>):
+      %zero = arith.constant 0 : index
+      // expected-error@+1 {{expected a primitive of record @F, but got @G}}
+      %g = piko.list_at %l[%zero] : !piko.list<@F> -> !piko.prim<@G>
+      piko.return
+    }
+  }
+}

@@ -115,3 +115,138 @@ piko.pipeline @NoProcess rank 1 {
     }
   }
 }
+
+// -----
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+piko.pipeline @P rank 1 {
+  piko.source @a
+  piko.stage @a bins [0] threads 1 : list @F -> [] {}
+  piko.kernel @k {
+    %bins = piko.open_bins @a : !piko.bins<@F>
+    %zero = arith.constant 0 : index
+    // expected-error @below {{expected a list of record @F, which the bins hold, but got @G}}
+    %l = piko.list %bins[%zero to %zero] : !piko.bins<@F> -> !piko.list<@G>
+  }
+}
+
+// -----
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+piko.pipeline @P rank 1 {
+  piko.source @a
+  piko.stage @a bins [0] threads 1 : @F -> [] {}
+  piko.kernel @k {
+    %bins = piko.open_bins @a : !piko.bins<@F>
+    %zero = arith.constant 0 : index
+    // expected-error @below {{expected a primitive of record @F, which the bins hold, but got @G}}
+    %p = piko.item %bins[%zero] : !piko.bins<@F> -> !piko.prim<@G>
+  }
+}
+
+// -----
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+piko.pipeline @P rank 1 {
+  piko.source @a
+  piko.stage @a bins [0] threads 1 : @F -> [] {}
+  piko.kernel @k {
+    %bins = piko.open_bins @a : !piko.bins<@F>
+    %zero = arith.constant 0 : index
+    %one = arith.constant 1 : i32
+    %w = piko.open_writer %bins[%zero] : !piko.bins<@F>
+    // expected-error @below {{expected a port below 0, which is how many the kernel of stage 'a' has, but got 0}}
+    %p = piko.append %w[0] (%one) : i32 -> !piko.prim<@F>
+  }
+}
+
+// -----
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+piko.record @G {"x" : i32 at 0} size 4 align 4
+piko.pipeline @P rank 1 {
+  piko.source @a
+  piko.edge @a[0] -> @a
+  piko.stage @a bins [0] threads 1 : @F -> [@F] {}
+  piko.kernel @k {
+    %bins = piko.open_bins @a : !piko.bins<@F>
+    %zero = arith.constant 0 : index
+    %one = arith.constant 1 : i32
+    %w = piko.open_writer %bins[%zero] : !piko.bins<@F>
+    // expected-error @below {{expected a primitive of record @F, which port 0 emits, but got @G}}
+    %p = piko.append %w[0] (%one) : i32 -> !piko.prim<@G>
+  }
+}
+
+// -----
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+piko.pipeline @P rank 1 {
+  piko.source @a
+  piko.edge @a[0] -> @a
+  piko.stage @a bins [0] threads 1 : @F -> [@F] {}
+  piko.kernel @k {
+    %bins = piko.open_bins @a : !piko.bins<@F>
+    %zero = arith.constant 0 : index
+    %w = piko.open_writer %bins[%zero] : !piko.bins<@F>
+    %wide = arith.constant 0 : i64
+    // expected-error @below {{expected the numbers of record @F, ('i32'), but got ('i64')}}
+    %p = piko.append %w[0] (%wide) : i64 -> !piko.prim<@F>
+  }
+}
+
+// -----
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+piko.pipeline @P rank 1 {
+  piko.source @a
+  piko.edge @a[0] -> @a
+  piko.stage @a bins [0] threads 1 : @F -> [@F] {}
+  piko.kernel @k {
+    %bins = piko.open_bins @a : !piko.bins<@F>
+    %zero = arith.constant 0 : index
+    %w = piko.open_writer %bins[%zero] : !piko.bins<@F>
+    // expected-error @below {{expected a tile only in a stage that is divided into tiles, but @a is not}}
+    piko.place %w[0] of @a in %zero tile %zero
+  }
+}
+
+// -----
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+piko.pipeline @P rank 1 {
+  piko.source @a
+  piko.edge @a[0] -> @a
+  piko.stage @a bins [0] threads 1 : @F -> [@F] {}
+  piko.kernel @k {
+    %bins = piko.open_bins @a : !piko.bins<@F>
+    %zero = arith.constant 0 : index
+    %w = piko.open_writer %bins[%zero] : !piko.bins<@F>
+    // expected-error @below {{expected a port, because the kernel is not that of a source}}
+    piko.place %w of @a in %zero
+  }
+}
+
+// -----
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+piko.pipeline @P rank 1 {
+  piko.source @a
+  piko.stage @a bins [0] threads 1 : @F -> [] {}
+  piko.kernel @k {
+    %bins = piko.open_bins @a : !piko.bins<@F>
+    %zero = arith.constant 0 : index
+    %w = piko.open_writer %bins[%zero] : !piko.bins<@F>
+    // expected-error @below {{expected a stage, but got @b, which is none}}
+    piko.place %w[0] of @b in %zero
+  }
+}
+
+// -----
+
+piko.pipeline @P rank 1 {
+  piko.kernel @k {
+    // expected-error @below {{expected a stage, but got @b, which is none}}
+    %n = piko.begin_schedule @b
+  }
+}

@@ -89,3 +89,55 @@ piko.pipeline @Resolved rank 2 {
     piko.place %w[0] of @b in %b tile %t
   }
 }
+
+// Calls of a list process, scratch memory, emissions that wait, and the kernel
+// of a dynamic schedule.
+// CHECK-LABEL: piko.pipeline @Lists
+piko.pipeline @Lists rank 1 {
+  piko.source @a
+  piko.stage @a bins [8] threads 64 : list @F -> [] {}
+  // CHECK: piko.kernel @schedule_a
+  piko.kernel @schedule_a {
+    // CHECK-NEXT: %[[N:.*]] = piko.begin_schedule @a
+    %n = piko.begin_schedule @a
+    %kind = arith.constant 3 : i32
+    %size = arith.constant 4 : i64
+    %always = arith.constant true
+    // CHECK: piko.schedule_bin @a[%[[N]]] kind %{{.*}} tile_split %[[SIZE:.*]] batch %[[SIZE]] every_bin %{{.*}}
+    piko.schedule_bin @a[%n] kind %kind tile_split %size batch %size every_bin %always
+  }
+  // CHECK: piko.kernel @kernel_a
+  piko.kernel @kernel_a {
+    %bins = piko.open_bins @a : !piko.bins<@F>
+    %u = piko.unit_count %bins : !piko.bins<@F>
+    // CHECK: %[[LO:.*]], %[[HI:.*]] = piko.call_range %[[BINS:.*]][%[[U:.*]]] : !piko.bins<@F>
+    // CHECK-NEXT: %{{.*}} = piko.call_bin %[[BINS]][%[[U]]] : !piko.bins<@F>
+    // CHECK-NEXT: %{{.*}} = piko.list %[[BINS]][%[[LO]] to %[[HI]]] : !piko.bins<@F> -> !piko.list<@F>
+    %lo, %hi = piko.call_range %bins[%u] : !piko.bins<@F>
+    %b = piko.call_bin %bins[%u] : !piko.bins<@F>
+    %l = piko.list %bins[%lo to %hi] : !piko.bins<@F> -> !piko.list<@F>
+    // CHECK-NEXT: %[[P:.*]] = piko.no_item : !piko.prim<@F>
+    // CHECK-NEXT: %[[A:.*]] = piko.to_address %[[P]] : !piko.prim<@F>
+    // CHECK-NEXT: %{{.*}} = piko.from_address %[[A]] : !piko.prim<@F>
+    %p = piko.no_item : !piko.prim<@F>
+    %address = piko.to_address %p : !piko.prim<@F>
+    %q = piko.from_address %address : !piko.prim<@F>
+    %w = piko.open_writer %bins[%u] : !piko.bins<@F>
+    // CHECK: %[[MARK:.*]] = piko.scratch_mark %[[W:.*]]
+    // CHECK-NEXT: %{{.*}}, %{{.*}} = piko.scratch %[[W]][%[[U]]]
+    // CHECK-NEXT: piko.defer_begin %[[W]][%[[U]]]
+    // CHECK-NEXT: piko.defer_iteration %[[W]][%[[U]]]
+    // CHECK-NEXT: piko.defer_end %[[W]]
+    // CHECK-NEXT: piko.scratch_release %[[W]][%[[MARK]]]
+    %mark = piko.scratch_mark %w
+    %bytes, %granted = piko.scratch %w[%u]
+    piko.defer_begin %w[%u]
+    piko.defer_iteration %w[%u]
+    piko.defer_end %w
+    piko.scratch_release %w[%mark]
+    // CHECK-NEXT: piko.fail_list @a at %[[LO]] of %[[HI]]
+    // CHECK-NEXT: piko.fail_barrier @a iteration %[[U]]
+    piko.fail_list @a at %lo of %hi
+    piko.fail_barrier @a iteration %u
+  }
+}

@@ -47,3 +47,26 @@ piko.pipeline @Phases rank 2 {
     piko.schedule load_balance batch 32 every_bin
   }
 }
+
+// What a schedule says about each bin.
+// CHECK-LABEL: piko.pipeline @Dynamic
+piko.pipeline @Dynamic rank 2 {
+  piko.source @a
+  piko.stage @a bins [8, 8] threads 64 : list @F -> [] {
+    // CHECK: piko.schedule all tile_split 8 batch 4 dynamic {
+    // CHECK-NEXT: ^bb0(%{{.*}}: index):
+    piko.schedule all tile_split 8 batch 4 dynamic {
+    ^bb0(%bin: index):
+      %kind = arith.constant 3 : i32
+      %n = arith.constant 64 : i64
+      // CHECK: piko.set_schedule %[[KIND:.*]] tile_split %[[N:.*]]
+      // CHECK-NEXT: piko.set_batch %[[N]]
+      // CHECK-NEXT: piko.set_every_bin
+      // CHECK-NEXT: piko.return
+      piko.set_schedule %kind tile_split %n
+      piko.set_batch %n
+      piko.set_every_bin
+      piko.return
+    }
+  }
+}

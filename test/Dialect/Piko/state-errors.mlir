@@ -302,3 +302,62 @@ piko.pipeline @Bypass rank 1 {
     }
   }
 }
+
+// -----
+
+piko.record @C {"n" : i32 at 0, "f" : f32 at 4} size 8 align 4
+piko.pipeline @P rank 1 {
+  piko.buffer @b : @C
+  piko.source @a
+  piko.stage @a bins [0] threads 1 : @C -> [] {
+    piko.process {
+    ^bb0(%f: !piko.prim<@C>):
+      %x = piko.get %f "n" : !piko.prim<@C> -> i32
+      // expected-error @below {{expected stage 'a' to be unordered, because the result of an atomic shows the order of its primitives}}
+      %old = piko.atomic add @b[%x : i32] "n", %x : i32 -> i32
+      piko.return
+    }
+  }
+}
+
+// -----
+
+piko.record @C {"n" : i32 at 0, "f" : f32 at 4} size 8 align 4
+piko.pipeline @P rank 1 {
+  piko.buffer @b : @C
+  piko.source @a
+  piko.stage @a bins [0] threads 1 : @C -> [] {
+    piko.process {
+    ^bb0(%f: !piko.prim<@C>):
+      %x = piko.get %f "n" : !piko.prim<@C> -> i32
+      %y = piko.get %f "f" : !piko.prim<@C> -> f32
+      // expected-error @below {{expected stage 'a' to be unordered, because a float atomic shows the order of its primitives}}
+      piko.atomic add_float @b[%x : i32] "f", %y : f32
+      piko.return
+    }
+  }
+}
+
+// -----
+
+piko.record @C {"n" : i32 at 0, "f" : f32 at 4} size 8 align 4
+piko.pipeline @P rank 1 {
+  piko.buffer @b : @C
+  piko.kernel @k {
+    %x = arith.constant 0 : i32
+    // expected-error @below {{expected a float for 'add_float', but got 'add_float' of type 'i32'}}
+    piko.atomic add_float @b[%x : i32] "n", %x : i32
+  }
+}
+
+// -----
+
+piko.record @C {"n" : i32 at 0, "f" : f32 at 4} size 8 align 4
+piko.pipeline @P rank 1 {
+  piko.buffer @b : @C
+  piko.kernel @k {
+    %x = arith.constant 0 : i32
+    // expected-error @below {{expected a result of type 'i32', but got 'i64'}}
+    %old = piko.atomic add @b[%x : i32] "n", %x : i32 -> i64
+  }
+}

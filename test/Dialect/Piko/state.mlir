@@ -1,6 +1,7 @@
 // RUN: piko-opt %s | piko-opt | FileCheck %s
 // Every way to read and write state.
 
+piko.record @Sum {"v" : f64 at 0, "n" : i32 at 8} size 16 align 8
 piko.record @F {"x" : i32 at 0} size 4 align 4
 piko.record @Light {"color.x" : f32 at 0, "w" : f32[4 : 4] at 4} size 20 align 4
 piko.record @Pixel {"z" : f32 at 0, "n" : i32 at 4, "big" : i64 at 8} size 16 align 8
@@ -64,6 +65,27 @@ piko.pipeline @State rank 2 {
       }
       // CHECK: piko.fail @shade outside @lights(%[[N]])
       piko.fail @shade outside @lights(%n)
+      piko.return
+    }
+  }
+}
+
+// Atomics that show their order.
+// CHECK-LABEL: piko.pipeline @Unordered
+piko.pipeline @Unordered rank 2 {
+  piko.buffer @sums : @Sum
+  piko.source @s
+  piko.stage @s bins [0, 0] threads 1 : @Sum -> [] {
+    piko.schedule load_balance unordered
+    piko.process {
+    ^bb0(%f: !piko.prim<@Sum>):
+      %zero = arith.constant 0 : index
+      %v = piko.get %f "v" : !piko.prim<@Sum> -> f64
+      %n = piko.get %f "n" : !piko.prim<@Sum> -> i32
+      // CHECK: piko.atomic add_float @sums[%{{.*}} : index] "v", %{{.*}} : f64
+      piko.atomic add_float @sums[%zero : index] "v", %v : f64
+      // CHECK-NEXT: %{{.*}} = piko.atomic xor @sums[%{{.*}} : index] "n", %{{.*}} : i32 -> i32
+      %old = piko.atomic xor @sums[%zero : index] "n", %n : i32 -> i32
       piko.return
     }
   }

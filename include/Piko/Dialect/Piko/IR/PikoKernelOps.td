@@ -15,12 +15,12 @@ def Piko_KernelOp : Piko_Op<"kernel", [
   let description = [{
     Kernels run one after another, in the order in which they stand in the
     pipeline; a kernel starts when the one before it has ended. Kernels of stages
-    on a common cycle run again and again, until nothing is left of it. At the kernels
-    level the body holds phases: the process phase of a stage and the assign
-    phases of the stages that it feeds, or the assign phase of a source. At the
-    resolved level it holds loops over the units of work of a stage's bins, the
-    first of which is an `scf.forall`, and no phase. The kernel of a dynamic
-    schedule is a loop over bins and runs before all others.
+    on a common cycle run again and again, until nothing is left of it. At the
+    kernels level the body holds phases: the process phase of a stage and the
+    assign phases of the stages that it feeds, or the assign phase of a source.
+    At the resolved level it holds loops over the units of work of a stage's
+    bins, the first of which is an `scf.forall`, and no phase. The kernel of a
+    dynamic schedule is a loop over bins and runs before all others.
 
     ```mlir
     piko.record @F {"x" : i32 at 0} size 4 align 4
@@ -265,7 +265,11 @@ def Piko_PlaceOp : Piko_Op<"place", [
     ```mlir
     piko.place %writer[0] of @plot in %bin
     piko.place %writer[0] of @plot in %bin tile %tile
-    piko.place %writer of @rasterize in %bin
+    ```
+    ```mlir
+    %first = piko.open_bins @rasterize source 0 : !piko.bins<@Fragment>
+    %placer = piko.open_writer %first[%unit] : !piko.bins<@Fragment>
+    piko.place %placer of @rasterize in %bin
     ```
   }];
   let arguments = (ins Piko_WriterType:$writer, OptionalAttr<Piko_I64Attr>:$port,
@@ -423,7 +427,7 @@ def Piko_ScheduleBinOp : Piko_Op<"schedule_bin", [
     Before any kernel runs. A batch of the smallest 64-bit integer is none.
 
     ```mlir
-    piko.schedule_bin @blend[%bin] kind %kind tile_split %split batch %n every_bin %always
+    piko.schedule_bin @blend[%b] kind %kind tile_split %split batch %batch every_bin %always
     ```
   }];
   let arguments = (ins FlatSymbolRefAttr:$stage, Index:$bin, I32:$kind,

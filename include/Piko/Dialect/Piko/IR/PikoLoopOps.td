@@ -19,7 +19,7 @@ def Piko_ParallelForOp : Piko_Op<"parallel_for", [
     ```mlir
     piko.parallel_for %n {
     ^bb0(%i: index):
-      %x = piko.list_at %list[%i] : !piko.list<@F> -> !piko.prim<@F>
+      %f = piko.list_at %list[%i] : !piko.list<@Fragment> -> !piko.prim<@Fragment>
       piko.yield
     }
     ```
@@ -92,7 +92,7 @@ def Piko_ScanOp : Piko_BarrierOp<"scan", [
     `piko.reduce`, joined from the left.
 
     ```mlir
-    %before = piko.scan %v empty %zero : i32 {
+    %before = piko.scan %count empty %zero : i32 {
     ^bb0(%a: i32, %b: i32):
       %c = arith.addi %a, %b : i32
       piko.yield results [%c : i32]

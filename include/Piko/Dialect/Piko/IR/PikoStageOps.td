@@ -23,7 +23,8 @@ def Piko_StageOp : Piko_Op<"stage", [
     in, and is set by `piko-order-stages`, which moves stages. `tile` is the side
     of the tiles that a bin is divided into where `piko.owner` tells whose they
     are. `list` says that the process phase takes the list of a bin. Stages with
-    the same `cycle` are on a common cycle of edges; `piko-order-stages` sets it. At the resolved level, `split` says that a bin's primitives (its
+    the same `cycle` are on a common cycle of edges; `piko-order-stages` sets
+    it. At the resolved level, `split` says that a bin's primitives (its
     batches, where the phase takes a list) may be divided over threads in any
     way, `ordered` that the order in which they are processed shows in the
     state, and `placed` that kernels place them.
@@ -244,7 +245,7 @@ def Piko_SetBatchOp : Piko_DirectiveOp<"set_batch"> {
     pipeline runs.
 
     ```mlir
-    piko.set_batch %n
+    piko.set_batch %batch
     ```
   }];
   let arguments = (ins I64:$size);
