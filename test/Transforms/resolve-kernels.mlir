@@ -92,3 +92,90 @@ piko.pipeline @Box rank 2 {
     }
   }
 }
+
+// A process phase that takes a list runs once for each call of a unit. What is
+// said about a bin last counts: a kernel before all others says it.
+// CHECK-LABEL: piko.pipeline @Lists
+// CHECK:         piko.stage @a {{.*}} split placed : list
+// CHECK-NEXT:      piko.schedule load_balance batch 4{{$}}
+// CHECK:         piko.stage @b {{.*}} ordered placed : list
+// CHECK:         piko.kernel @schedule_a
+// CHECK-DAG:       %[[FOUR:.*]] = arith.constant 4 : i64
+// CHECK-DAG:       %[[NINE:.*]] = arith.constant 9 : i64
+// CHECK-DAG:       %[[YES:.*]] = arith.constant true
+// CHECK-DAG:       %[[NO:.*]] = arith.constant false
+// CHECK:           %[[BINS:.*]] = piko.begin_schedule @a
+// CHECK:           scf.for %[[BIN:.*]] = %c0 to %[[BINS]]
+// CHECK:             memref.store %[[FOUR]], %[[BATCH:.*]][] : memref<i64>
+// CHECK:             memref.store %[[NO]], %[[EVERY:.*]][] : memref<i1>
+// CHECK:             %[[LO:.*]] = arith.muli %{{.*}}, %c8
+// CHECK:             scf.if
+// CHECK-NEXT:          memref.store %[[NINE]], %[[BATCH]][]
+// CHECK-NEXT:          memref.store %[[YES]], %[[EVERY]][]
+// CHECK:             %[[N:.*]] = memref.load %[[BATCH]][]
+// CHECK:             %[[ALWAYS:.*]] = memref.load %[[EVERY]][]
+// CHECK:             piko.schedule_bin @a[%[[BIN]]] kind %{{.*}} tile_split %{{.*}} batch %[[N]] every_bin %[[ALWAYS]]
+// CHECK:         piko.kernel @source_0_a
+// CHECK:         piko.kernel @kernel_a
+// CHECK:           %[[B:.*]] = piko.open_bins @a
+// CHECK:           scf.forall (%[[UNIT:.*]]) in
+// CHECK:             %[[C0:.*]], %[[C1:.*]] = piko.unit_cells %[[B]][%[[UNIT]]]
+// CHECK:             scf.for %[[CALL:.*]] = %[[C0]] to %[[C1]]
+// CHECK:               %[[I0:.*]], %[[I1:.*]] = piko.call_range %[[B]][%[[CALL]]]
+// CHECK:               %[[L:.*]] = piko.list %[[B]][%[[I0]] to %[[I1]]]
+// CHECK:               piko.list_size %[[L]]
+// CHECK:               piko.parallel_for
+// CHECK:                 piko.append
+// CHECK:               piko.next
+// CHECK:             piko.close_writer
+piko.pipeline @Lists rank 2 {
+  piko.image @image : @F rank 2
+  piko.source @a
+  piko.edge @a[0] -> @b
+  piko.stage @a bins [8, 8] threads 1 : list @F -> [@F] {
+    piko.assign {
+    ^bb0(%f: !piko.prim<@F>):
+      piko.assign_all
+      piko.return
+    }
+    piko.schedule load_balance batch 4 dynamic {
+    ^bb0(%bin: index):
+      %zero = arith.constant 0 : index
+      %nine = arith.constant 9 : i64
+      %lo = piko.bin_lo %bin[0]
+      %left = arith.cmpi eq, %lo, %zero : index
+      scf.if %left {
+        piko.set_batch %nine
+        piko.set_every_bin
+      }
+      piko.return
+    }
+    piko.process {
+    ^bb0(%l: !piko.list<@F>):
+      %n = piko.list_size %l : !piko.list<@F>
+      piko.parallel_for %n {
+      ^bb0(%i: index):
+        %i32 = arith.index_cast %i : index to i32
+        piko.emit 0 (%i32, %i32) : i32, i32
+        piko.yield
+      }
+      piko.return
+    }
+  }
+  piko.stage @b bins [8, 8] threads 1 : list @F -> [] {
+    piko.assign {
+    ^bb0(%f: !piko.prim<@F>):
+      piko.assign_previous
+      piko.return
+    }
+    piko.process {
+    ^bb0(%l: !piko.list<@F>):
+      %zero = arith.constant 0 : index
+      piko.update @image[%zero, %zero : index, index] {
+      ^bb0(%a: i32, %b: i32):
+        piko.yield [%b, %a : i32, i32]
+      }
+      piko.return
+    }
+  }
+}

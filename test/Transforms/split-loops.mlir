@@ -1,0 +1,273 @@
+// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-split-loops),canonicalize,cse)' --split-input-file %s | FileCheck %s
+
+piko.record @F {"z" : f32 at 0} size 4 align 4
+
+// Without barriers: a loop, and one in it for the inner one.
+// CHECK-LABEL: piko.pipeline @Plain
+// CHECK:         scf.for %[[I:.*]] = %c0 to %{{.*}} step %c1 {
+// CHECK-NEXT:      scf.for %{{.*}} = %c0 to %[[I]] step %c1 {
+// CHECK-NEXT:        piko.append
+// CHECK-NEXT:      } {piko.lanes}
+// CHECK-NEXT:    } {piko.lanes}
+// CHECK-NOT:     piko.scratch
+piko.pipeline @Plain rank 1 {
+  piko.source @a
+  piko.edge @a[0] -> @b
+  piko.stage @a bins [0] threads 1 : @F -> [@F] {}
+  piko.stage @b bins [0] threads 1 : @F -> [] {}
+  piko.kernel @k {
+    %bins = piko.open_bins @a : !piko.bins<@F>
+    %n = piko.unit_count %bins : !piko.bins<@F>
+    %v = arith.constant 1.0 : f32
+    scf.forall (%u) in (%n) {
+      %w = piko.open_writer %bins[%u] : !piko.bins<@F>
+      piko.parallel_for %n {
+      ^bb0(%i: index):
+        piko.parallel_for %i {
+        ^bb0(%j: index):
+          %p = piko.append %w[0] (%v) : f32 -> !piko.prim<@F>
+          piko.yield
+        }
+        piko.yield
+      }
+      piko.close_writer %w
+    } {piko.schedule = "load_balance"}
+    piko.close_bins %bins : !piko.bins<@F>
+  }
+}
+
+// -----
+
+// A value and a private array across a barrier; what all iterations share needs
+// no slot. Primitives are kept by their addresses. One piece emits, so its order
+// is right.
+piko.record @F {"z" : f32 at 0} size 4 align 4
+// CHECK-LABEL: piko.pipeline @Across
+// CHECK:         %[[SHARED:.*]] = arith.addi
+// CHECK:         %[[ANY:.*]] = arith.cmpi sgt, %[[N:.*]], %c0
+// CHECK:         scf.if %[[ANY]] {
+// CHECK:           %[[MARK:.*]] = piko.scratch_mark %[[W:.*]]
+// CHECK:           %[[BYTES:.*]], %[[GRANTED:.*]] = piko.scratch %[[W]]
+// CHECK:           scf.if %[[GRANTED]] {
+// CHECK-DAG:         %[[VALUES:.*]] = memref.view %[[BYTES]][{{.*}}][%[[N]]] : memref<?xi8> to memref<?xf32>
+// CHECK-DAG:         %[[PRIMS:.*]] = memref.view %[[BYTES]][{{.*}}][%[[N]]] : memref<?xi8> to memref<?xindex>
+// CHECK:             scf.for %[[I:.*]] = %c0 to %[[N]] step %c1 {
+// CHECK:               %[[ARRAY:.*]] = memref.view %[[BYTES]][{{.*}}][] : memref<?xi8> to memref<4xf32>
+// CHECK-DAG:           memref.store %{{.*}}, %[[VALUES]][%[[I]]]
+// CHECK-DAG:           memref.store %{{.*}}, %[[PRIMS]][%[[I]]]
+// CHECK-DAG:           memref.store %{{.*}}, %[[ARRAY]][%[[SHARED]]]
+// CHECK:             } {piko.lanes}
+// CHECK:             scf.for %[[J:.*]] = %c0 to %[[N]] step %c1 {
+// CHECK-DAG:           memref.load %[[VALUES]][%[[J]]]
+// CHECK-DAG:           %[[ADDRESS:.*]] = memref.load %[[PRIMS]][%[[J]]]
+// CHECK-DAG:           piko.from_address %[[ADDRESS]]
+// CHECK-DAG:           %[[SAME:.*]] = memref.view %[[BYTES]][{{.*}}][] : memref<?xi8> to memref<4xf32>
+// CHECK:               memref.load %[[SAME]][%[[SHARED]]]
+// CHECK:               piko.append
+// CHECK:             } {piko.lanes}
+// CHECK:           piko.scratch_release %[[W]][%[[MARK]]]
+// CHECK-NOT:     piko.defer
+piko.pipeline @Across rank 1 {
+  piko.source @a
+  piko.edge @a[0] -> @b
+  piko.stage @a bins [0] threads 1 : list @F -> [@F] {}
+  piko.stage @b bins [0] threads 1 : @F -> [] {}
+  piko.kernel @k {
+    %bins = piko.open_bins @a : !piko.bins<@F>
+    %n = piko.unit_count %bins : !piko.bins<@F>
+    %c1 = arith.constant 1 : index
+    scf.forall (%u) in (%n) {
+      %w = piko.open_writer %bins[%u] : !piko.bins<@F>
+      %l = piko.list %bins[%u to %n] : !piko.bins<@F> -> !piko.list<@F>
+      piko.parallel_for %n {
+      ^bb0(%i: index):
+        %array = memref.alloca() : memref<4xf32>
+        %shared = arith.addi %n, %c1 : index
+        %p = piko.list_at %l[%i] : !piko.list<@F> -> !piko.prim<@F>
+        %z = piko.get %p "z" : !piko.prim<@F> -> f32
+        memref.store %z, %array[%shared] : memref<4xf32>
+        piko.sync
+        %y = memref.load %array[%shared] : memref<4xf32>
+        %x = piko.get %p "z" : !piko.prim<@F> -> f32
+        %s = arith.addf %y, %z : f32
+        %t = arith.addf %s, %x : f32
+        %q = piko.append %w[0] (%t) : f32 -> !piko.prim<@F>
+        piko.yield
+      }
+      piko.close_writer %w
+    } {piko.schedule = "load_balance"}
+    piko.close_bins %bins : !piko.bins<@F>
+  }
+}
+
+// -----
+
+// A loop that holds a barrier moves around the pieces. Its condition is the same
+// in all iterations, because it starts and ends alike: nothing is compared. It
+// emits more than once, so emissions wait for their order.
+piko.record @F {"z" : f32 at 0} size 4 align 4
+// CHECK-LABEL: piko.pipeline @Uniform
+// CHECK:         piko.defer_begin %[[W:.*]][%[[N:.*]]]
+// CHECK:         scf.for %{{.*}} = %c0 to %[[N]]
+// CHECK:         scf.while
+// CHECK:           scf.for
+// CHECK:           scf.condition
+// CHECK:         } do {
+// CHECK:           scf.for %[[I:.*]] = %c0 to %[[N]] step %c1 {
+// CHECK:             piko.defer_iteration %[[W]][%[[I]]]
+// CHECK:             piko.append
+// CHECK:           scf.for
+// CHECK:         piko.defer_end %[[W]]
+// CHECK-NOT:     piko.fail_barrier
+piko.pipeline @Uniform rank 1 {
+  piko.source @a
+  piko.edge @a[0] -> @b
+  piko.stage @a bins [0] threads 1 : @F -> [@F] {}
+  piko.stage @b bins [0] threads 1 : @F -> [] {}
+  piko.kernel @k {
+    %bins = piko.open_bins @a : !piko.bins<@F>
+    %n = piko.unit_count %bins : !piko.bins<@F>
+    %c1 = arith.constant 1 : index
+    scf.forall (%u) in (%n) {
+      %w = piko.open_writer %bins[%u] : !piko.bins<@F>
+      piko.parallel_for %n {
+      ^bb0(%i: index):
+        %end = scf.while (%s = %c1) : (index) -> index {
+          %on = arith.cmpi slt, %s, %n : index
+          scf.condition(%on) %s : index
+        } do {
+        ^bb0(%s: index):
+          %int = arith.index_cast %i : index to i32
+          %z = arith.sitofp %int : i32 to f32
+          %q = piko.append %w[0] (%z) : f32 -> !piko.prim<@F>
+          piko.sync
+          %t = arith.addi %s, %s : index
+          scf.yield %t : index
+        }
+        piko.yield
+      }
+      piko.close_writer %w
+    } {piko.schedule = "load_balance"}
+    piko.close_bins %bins : !piko.bins<@F>
+  }
+}
+
+// -----
+
+// Where iterations may not agree they are compared, and follow iteration 0.
+piko.record @F {"z" : f32 at 0} size 4 align 4
+// CHECK-LABEL: piko.pipeline @Varying
+// CHECK:         scf.for %[[I:.*]] = %c0 to %[[N:.*]] step %c1 {
+// CHECK:           %[[ODD:.*]] = arith.cmpi
+// CHECK:           memref.store %[[ODD]], %[[SLOTS:.*]][%[[I]]]
+// CHECK:         %[[FIRST:.*]] = memref.load %[[SLOTS]][%c0]
+// CHECK:         scf.for %[[J:.*]] = %c1 to %[[N]] step %c1 iter_args(%[[AGREED:.*]] = %true)
+// CHECK:           %[[OWN:.*]] = memref.load %[[SLOTS]][%[[J]]]
+// CHECK:           %[[SAME:.*]] = arith.cmpi eq, %[[OWN]], %[[FIRST]]
+// CHECK:           arith.andi %[[AGREED]], %[[SAME]]
+// CHECK:           scf.if
+// CHECK:             piko.fail_barrier @a iteration %[[J]]
+// CHECK:         %[[CONDITION:.*]] = memref.load %[[SLOTS]][%c0]
+// CHECK:         scf.if %[[CONDITION]]
+// CHECK:           %[[SUM:.*]] = memref.load %{{.*}}[%c0] : memref<?xi32>
+// CHECK:           scf.for
+// CHECK:             memref.store %[[SUM]], %[[RESULTS:.*]][
+// CHECK:         } else {
+// CHECK:           scf.for
+// CHECK:             memref.store %{{.*}}, %[[RESULTS]][
+// CHECK:         scf.for
+// CHECK:           memref.load %[[RESULTS]]
+// CHECK:           piko.append
+piko.pipeline @Varying rank 1 {
+  piko.source @a
+  piko.edge @a[0] -> @b
+  piko.stage @a bins [0] threads 1 : @F -> [@F] {}
+  piko.stage @b bins [0] threads 1 : @F -> [] {}
+  piko.kernel @k {
+    %bins = piko.open_bins @a : !piko.bins<@F>
+    %n = piko.unit_count %bins : !piko.bins<@F>
+    %c1 = arith.constant 1 : i32
+    %c7 = arith.constant 7 : i32
+    scf.forall (%u) in (%n) {
+      %w = piko.open_writer %bins[%u] : !piko.bins<@F>
+      piko.parallel_for %n {
+      ^bb0(%i: index):
+        %int = arith.index_cast %i : index to i32
+        %odd = arith.cmpi sgt, %int, %c7 : i32
+        %r = scf.if %odd -> i32 {
+          %s = piko.reduce %int : i32 {
+          ^bb0(%a: i32, %b: i32):
+            %c = arith.addi %a, %b : i32
+            piko.yield results [%c : i32]
+          }
+          scf.yield %s : i32
+        } else {
+          scf.yield %int : i32
+        }
+        %z = arith.sitofp %r : i32 to f32
+        %q = piko.append %w[0] (%z) : f32 -> !piko.prim<@F>
+        piko.yield
+      }
+      piko.close_writer %w
+    } {piko.schedule = "load_balance"}
+    piko.close_bins %bins : !piko.bins<@F>
+  }
+}
+
+// -----
+
+// A reduction is a tree of doubling distances; a scan keeps the block left of
+// each pair, and then joins the blocks from the left.
+piko.record @F {"z" : f32 at 0} size 4 align 4
+// CHECK-LABEL: piko.pipeline @Scan
+// CHECK:         scf.while (%[[S:.*]] = %c1)
+// CHECK:           arith.cmpi slt, %[[S]], %[[N:.*]] :
+// CHECK:         ^bb0(%[[S:.*]]: index):
+// CHECK-DAG:       %[[LAST:.*]] = arith.subi %[[N]], %[[S]]
+// CHECK-DAG:       %[[STEP:.*]] = arith.addi %[[S]], %[[S]]
+// CHECK:           scf.for %[[I:.*]] = %c0 to %[[LAST]] step %[[STEP]]
+// CHECK-NEXT:        %[[J:.*]] = arith.addi %[[I]], %[[S]]
+// CHECK-NEXT:        %[[A:.*]] = memref.load %[[V:.*]][%[[I]]]
+// CHECK-NEXT:        %[[B:.*]] = memref.load %[[V]][%[[J]]]
+// CHECK-NEXT:        %[[C:.*]] = arith.addf %[[A]], %[[B]]
+// CHECK-NEXT:        memref.store %[[C]], %[[V]][%[[I]]]
+// CHECK-NEXT:        memref.store %[[A]], %[[V]][%[[J]]]
+// CHECK:         scf.for %[[J:.*]] = %c1 to %[[N]] step %c1 {
+// CHECK:           %[[LOW:.*]] = arith.andi %[[J]]
+// CHECK:           arith.cmpi ne, %[[J]], %[[LOW]]
+// CHECK:           scf.if
+// CHECK:             %[[K:.*]] = arith.subi %[[J]], %[[LOW]]
+// CHECK:             memref.load %[[V]][%[[K]]]
+// CHECK:             arith.addf
+// CHECK:         memref.store %cst, %[[V]][%c0]
+// CHECK:         scf.for
+// CHECK:           memref.load %[[V]]
+// CHECK:           piko.append
+piko.pipeline @Scan rank 1 {
+  piko.source @a
+  piko.edge @a[0] -> @b
+  piko.stage @a bins [0] threads 1 : @F -> [@F] {}
+  piko.stage @b bins [0] threads 1 : @F -> [] {}
+  piko.kernel @k {
+    %bins = piko.open_bins @a : !piko.bins<@F>
+    %n = piko.unit_count %bins : !piko.bins<@F>
+    %none = arith.constant 0.0 : f32
+    scf.forall (%u) in (%n) {
+      %w = piko.open_writer %bins[%u] : !piko.bins<@F>
+      piko.parallel_for %n {
+      ^bb0(%i: index):
+        %int = arith.index_cast %i : index to i32
+        %z = arith.sitofp %int : i32 to f32
+        %s = piko.scan %z empty %none : f32 {
+        ^bb0(%a: f32, %b: f32):
+          %c = arith.addf %a, %b : f32
+          piko.yield results [%c : f32]
+        }
+        %q = piko.append %w[0] (%s) : f32 -> !piko.prim<@F>
+        piko.yield
+      }
+      piko.close_writer %w
+    } {piko.schedule = "load_balance"}
+    piko.close_bins %bins : !piko.bins<@F>
+  }
+}
