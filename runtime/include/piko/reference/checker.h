@@ -47,7 +47,7 @@ public:
                                     Lineage lineage) {
     auto strand = std::make_shared<Strand>();
     strand->call = std::make_shared<Call>(
-        Call{phase, node, bin, std::move(lineage), turn, {}});
+        Call{phase, node, bin, std::move(lineage), turn});
     return std::exchange(current, std::move(strand));
   }
   /// `outer` is what beginCall gave.
@@ -115,31 +115,33 @@ public:
   }
   /// The element changes while `change` runs.
   template <class F>
-  decltype(auto) access(Element &element, AccessKind kind, const Place &at,
-                        F &&change) {
+  auto access(Element &element, AccessKind kind, const Place &at, F &&change) {
     checkPhase(element, kind, at);
     checkBypass(element, at);
     settle(element);
     record(element, {kind, current, at});
-    if (kind == AccessKind::Update)
-      current->call->updated.insert(&element);
     Element::Holder &holder = hold(element, at);
     if (kind == AccessKind::Atomic)
       --holder.reads;
     else
       holder.changed = true;
-    struct Finish {
-      Checker &checker;
-      Element &element;
-      const Memory *saved;
-      ~Finish() {
-        checker.updating = saved;
-        element.keepContent();
-      }
-    } finish{*this, element, updating};
+    const Memory *saved = updating;
     if (kind == AccessKind::Update)
       updating = element.memory;
-    return change();
+    auto finish = [&] {
+      updating = saved;
+      element.keepContent();
+      if (kind != AccessKind::Atomic)
+        checkWritten(element, *current, at);
+    };
+    if constexpr (std::is_void_v<decltype(change())>) {
+      change();
+      finish();
+    } else {
+      auto result = change();
+      finish();
+      return result;
+    }
   }
 
   [[noreturn]] void fail(const Strand &by, const Place &at,
@@ -200,7 +202,11 @@ private:
     current->named.clear();
   }
   bool updates(const Element &element) const {
-    return current->call->updated.count(&element) != 0;
+    return std::any_of(element.accesses.begin(), element.accesses.end(),
+                       [&](const Access &access) {
+                         return access.kind == AccessKind::Update &&
+                                access.by->call == current->call;
+                       });
   }
 
   /// Attributes a change since the element was last looked at.
@@ -214,6 +220,7 @@ private:
     holder.changed = true;
     checkPhase(element, AccessKind::Store, holder.at);
     record(element, {AccessKind::Store, holder.strand, holder.at});
+    checkWritten(element, *holder.strand, holder.at);
   }
 
   [[noreturn]] void failKept(const Element &element) const {
@@ -240,6 +247,12 @@ private:
          std::string("expected only process to write state, but ") +
              (phase == Phase::Assign ? "assignBin" : "schedule") + " stores " +
              element.text());
+  }
+
+  void checkWritten(const Element &element, const Strand &by,
+                    const Place &at) const {
+    if (const char *field = element.memory->findUnwritten(element.bytes()))
+      fail(by, at, unwrittenText(field, element.memory->elementType));
   }
 
   void checkBypass(const Element &element, const Place &at) const {

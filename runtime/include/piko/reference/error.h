@@ -8,6 +8,8 @@
 #ifndef PIKO_REFERENCE_ERROR_H
 #define PIKO_REFERENCE_ERROR_H
 
+#include <piko/reference/written.h>
+
 #include <cstdint>
 #include <stdexcept>
 #include <string>
@@ -18,7 +20,9 @@ namespace piko {
 /// What a pipeline did wrong.
 class Error : public std::runtime_error {
 public:
-  using std::runtime_error::runtime_error;
+  explicit Error(const std::string &message) : std::runtime_error(message) {
+    reference::markWritten(what());
+  }
 };
 
 namespace reference {

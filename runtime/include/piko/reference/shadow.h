@@ -13,8 +13,7 @@
 #define PIKO_REFERENCE_SHADOW_H
 
 #include <piko/reference/strand.h>
-
-#include <cstring>
+#include <piko/reference/written.h>
 
 namespace piko::reference {
 
@@ -28,10 +27,24 @@ struct Access {
 
 /// A buffer or an image.
 struct Memory {
+  Memory() = default;
+  template <class T>
+  Memory(T *elements, int64_t count)
+      : elementType(typeName<T>()),
+        data(reinterpret_cast<std::byte *>(elements)), elementSize(sizeof(T)),
+        findUnwritten([](const std::byte *element) {
+          return reference::findUnwritten(
+              *reinterpret_cast<const T *>(element));
+        }),
+        elements(count) {
+    extent[0] = count;
+  }
+
   std::string name; ///< empty where it is not known
   std::string_view elementType;
   std::byte *data = nullptr;
   size_t elementSize = 0;
+  const char *(*findUnwritten)(const std::byte *element) = nullptr;
   Cell extent{1, 1, 1, 1};
   int rank = 1;
   bool isImage = false;
@@ -64,8 +77,12 @@ struct Element {
   std::byte *bytes() const {
     return memory->data + index * memory->elementSize;
   }
-  bool hasChanged() const {
-    return std::memcmp(content.data(), bytes(), content.size()) != 0;
+  PIKO_UNSANITIZED bool hasChanged() const {
+    const std::byte *before = content.data(), *now = bytes();
+    for (size_t i = 0, n = content.size(); i < n; ++i)
+      if (before[i] != now[i])
+        return true;
+    return false;
   }
   void keepContent() { content.assign(bytes(), bytes() + memory->elementSize); }
 

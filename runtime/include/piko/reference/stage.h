@@ -334,7 +334,12 @@ private:
   }
 
   template <class T> void emitAs(const T &value, int port, const Place &at) {
-    executor("emit", at).emit(port, reference::typeOf<T>(), &value);
+    reference::Executor &running = executor("emit", at);
+    if (const char *field = reference::findUnwritten(value))
+      running.frame->node->fail(
+          running.frame->bin,
+          reference::unwrittenText(field, reference::typeName<T>()));
+    running.emit(port, reference::typeOf<T>(), &value);
   }
 
   void assignBox(reference::Cell lo, reference::Cell hi, const Place &at) {

@@ -104,7 +104,10 @@ public:
     if (i < 0 || i >= count)
       reference::failAccess(i, count, at);
     if (reference::Checker *checker = reference::activeChecker())
-      checker->give(checker->element(this, i, [&] { return describe(); }), at);
+      checker->give(
+          checker->element(this, i,
+                           [&] { return reference::Memory(elements, count); }),
+          at);
     return elements[i];
   }
 
@@ -147,16 +150,6 @@ public:
   T *end() const { return elements + count; }
 
 private:
-  reference::Memory describe() const {
-    reference::Memory memory;
-    memory.elementType = reference::typeName<T>();
-    memory.data = reinterpret_cast<std::byte *>(elements);
-    memory.elementSize = sizeof(T);
-    memory.extent[0] = count;
-    memory.elements.resize(count);
-    return memory;
-  }
-
   std::unique_ptr<T[]> owned;
   T *elements = nullptr;
   int64_t count = 0;
@@ -234,14 +227,10 @@ private:
   reference::Element &element(reference::Checker &checker,
                               const T &pixel) const {
     return checker.element(this, &pixel - pixels.get(), [&] {
-      reference::Memory memory;
-      memory.elementType = reference::typeName<T>();
-      memory.data = reinterpret_cast<std::byte *>(pixels.get());
-      memory.elementSize = sizeof(T);
+      reference::Memory memory(pixels.get(), size());
       memory.extent = cells;
       memory.rank = Rank;
       memory.isImage = true;
-      memory.elements.resize(size());
       return memory;
     });
   }

@@ -11,8 +11,6 @@
 #include <piko/reference/graph.h>
 #include <piko/reference/lineage.h>
 
-#include <set>
-
 namespace piko::reference {
 
 enum class Phase { Assign, Schedule, Process };
@@ -26,7 +24,6 @@ struct Call {
   int64_t bin;
   Lineage lineage;
   int64_t turn; ///< how many collecting stages have run, in all rounds
-  std::set<const Element *> updated; ///< pixels
 };
 
 /// What runs in sequence: a call, or an iteration between two barriers.
