@@ -6,7 +6,8 @@
 // pipeline computes the same bits in the reference executor and on every
 // target. Inside, they compute in double, which keeps each within a stated
 // number of units in the last place (ULP) of the exact result; the bound holds
-// for all arguments and is verified by unittests/Language/MathTest.cpp.
+// for all arguments and is verified by
+// unittests/Language/MathBoundTest.cpp.
 //
 // Special cases (infinities, NaN, signed zeros) follow IEEE 754 and C.
 //
@@ -35,6 +36,8 @@ constexpr double halfPi = 0x1.921fb54442d18p+0;
 constexpr double pi = 0x1.921fb54442d18p+1;
 constexpr double ln2 = 0x1.62e42fefa39efp-1;
 constexpr double log2e = 0x1.71547652b82fep+0;
+constexpr double log10e = 0x1.bcb7b1526e50ep-2;
+constexpr double log10of2 = 0x1.34413509f79ffp-2;
 
 /// 2^x by 2^k 2^r with |r| <= 1/2 and the power series of 2^r, whose first
 /// term left out is below 8e-12.
@@ -168,6 +171,28 @@ inline double sinOf(Angle angle, uint32_t quarters) {
   return quadrant & 2 ? -value : value;
 }
 
+/// The hyperbolic sine and cosine: by exponentials, and the sine from its power
+/// series where those cancel.
+inline double sinhOf(double x) {
+  if (x > -1.0 && x < 1.0) {
+    double z = x * x;
+    double p = 1.0 / 1307674368000.0;
+    p = p * z + 1.0 / 6227020800.0;
+    p = p * z + 1.0 / 39916800.0;
+    p = p * z + 1.0 / 362880.0;
+    p = p * z + 1.0 / 5040.0;
+    p = p * z + 1.0 / 120.0;
+    p = p * z + 1.0 / 6.0;
+    return x * (p * z + 1.0);
+  }
+  double power = exp2(x * log2e);
+  return 0.5 * (power - 1.0 / power);
+}
+inline double coshOf(double x) {
+  double power = exp2(x * log2e);
+  return 0.5 * (power + 1.0 / power);
+}
+
 /// The arc tangent of x >= 0, from [0, tan(pi/8)] by its power series.
 inline double atanOf(double x) {
   bool inverted = x > 1.0;
@@ -274,6 +299,15 @@ inline float rsqrt(float x) {
   return static_cast<float>(1.0 / __builtin_sqrt(static_cast<double>(x)));
 }
 
+/// The square root of x * x + y * y; infinite if x or y is. Within 0.501 ULP.
+inline float hypot(float x, float y) {
+  float width = __builtin_fabsf(x), height = __builtin_fabsf(y);
+  if (width == detail::infinity() || height == detail::infinity())
+    return detail::infinity();
+  double a = x, b = y;
+  return static_cast<float>(__builtin_sqrt(a * a + b * b));
+}
+
 /// The cube root. Within 0.501 ULP.
 inline float cbrt(float x) {
   float size = __builtin_fabsf(x);
@@ -320,6 +354,15 @@ inline float log2(float x) {
   return static_cast<float>(l.exponent + l.mantissa * detail::log2e);
 }
 
+/// The logarithm to base 10. Within 0.501 ULP.
+inline float log10(float x) {
+  if (!(x > 0.0f && x < detail::infinity()))
+    return detail::logOutside(x);
+  detail::Logarithm l = detail::logOf(x);
+  return static_cast<float>(l.exponent * detail::log10of2 +
+                            l.mantissa * detail::log10e);
+}
+
 /// x to the power y. Within 0.501 ULP.
 inline float pow(float x, float y) {
   if (y == 0.0f || x == 1.0f)
@@ -357,6 +400,16 @@ inline float tan(float x) {
   detail::Angle angle = detail::reduce(x);
   double s = detail::sinOf(angle.rest), c = detail::cosOf(angle.rest);
   return static_cast<float>(angle.quadrant & 1 ? -c / s : s / c);
+}
+
+/// The hyperbolic sine. Within 0.501 ULP.
+inline float sinh(float x) { return static_cast<float>(detail::sinhOf(x)); }
+/// The hyperbolic cosine. Within 0.501 ULP.
+inline float cosh(float x) { return static_cast<float>(detail::coshOf(x)); }
+/// The hyperbolic tangent. Within 0.501 ULP.
+inline float tanh(float x) {
+  double a = clamp(static_cast<double>(x), -20.0, 20.0);
+  return static_cast<float>(detail::sinhOf(a) / detail::coshOf(a));
 }
 
 /// The arc tangent, in [-pi/2, pi/2]. Within 0.501 ULP.
