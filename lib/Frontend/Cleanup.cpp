@@ -105,8 +105,11 @@ private:
     llvm::Function *callee = call->getCalledFunction();
     if (!callee)
       return true; // Known, or rejected, after inlining.
-    if (callee->isIntrinsic() || isMathFunction(*callee) ||
-        getMarker(call, unit.markers))
+    if (llvm::StringRef math = getMathName(*callee); !math.empty())
+      return callee->getArg(0)->getType()->isFloatTy() ||
+             fail(call,
+                  "'" + math + "' of a double: Piko has only that of a float");
+    if (callee->isIntrinsic() || getMarker(call, unit.markers))
       return true;
     std::string name = getName(callee);
     if (callee->isDeclaration()) {

@@ -133,8 +133,8 @@ LogicalResult PhaseImporter::importInstruction(llvm::Instruction *instruction) {
     values[instruction] = value;
     return success();
   }
-  if (auto *call = dyn_cast<llvm::IntrinsicInst>(instruction)) {
-    if (call->getType()->isVoidTy())
+  if (auto *call = dyn_cast<llvm::CallInst>(instruction)) {
+    if (llvm::isa<llvm::IntrinsicInst>(call) && call->getType()->isVoidTy())
       return success();
     return reject(instruction,
                   "a call of '" + call->getCalledFunction()->getName() + "'");

@@ -5,87 +5,78 @@
 
 #include "Cleanup.h"
 #include "mlir/IR/Diagnostics.h"
-#include "llvm/ADT/StringSwitch.h"
 #include "llvm/IR/InstIterator.h"
 #include "llvm/IR/IntrinsicInst.h"
 #include "llvm/IR/Module.h"
 
 using namespace piko;
 
-/// The C library's name for a transcendental function of floats, without the
-/// f; empty if the function is not one.
-static llvm::StringRef getMathName(const llvm::Function &function) {
-  if (!function.getReturnType()->isFloatTy())
+/// Functions whose last bits differ between machines: piko:: has its own.
+static constexpr llvm::StringLiteral inexact[] = {
+    "acos",  "asin", "atan",  "atan2", "cbrt", "cos", "cosh", "exp", "exp2",
+    "hypot", "log",  "log10", "log2",  "pow",  "sin", "sinh", "tan", "tanh"};
+/// Functions with one correct result.
+static constexpr llvm::StringLiteral exact[] = {
+    "fdim", "frexp", "ldexp", "llrint", "llround", "lrint", "lround", "modf"};
+
+llvm::StringRef piko::getMathName(const llvm::Function &function) {
+  llvm::StringRef name = function.getName();
+  if (name.consume_front("llvm."))
+    name = name.split('.').first;
+  else if (!function.isDeclaration() || function.arg_empty())
     return "";
-  switch (function.getIntrinsicID()) {
-#define MATH(NAME)                                                             \
-  case llvm::Intrinsic::NAME:                                                  \
-    return #NAME;
-    MATH(exp)
-    MATH(exp2)
-    MATH(log)
-    MATH(log2)
-    MATH(pow)
-    MATH(sin)
-    MATH(cos)
-    MATH(tan)
-    MATH(asin)
-    MATH(acos)
-    MATH(atan)
-    MATH(atan2)
-#undef MATH
-  case llvm::Intrinsic::not_intrinsic:
-    break;
-  default:
-    return "";
-  }
-  if (!function.isDeclaration())
-    return "";
-  return llvm::StringSwitch<llvm::StringRef>(function.getName())
-      .Case("expf", "exp")
-      .Case("exp2f", "exp2")
-      .Case("logf", "log")
-      .Case("log2f", "log2")
-      .Case("powf", "pow")
-      .Case("sinf", "sin")
-      .Case("cosf", "cos")
-      .Case("tanf", "tan")
-      .Case("asinf", "asin")
-      .Case("acosf", "acos")
-      .Case("atanf", "atan")
-      .Case("atan2f", "atan2")
-      .Case("cbrtf", "cbrt")
-      .Default("");
+  else if (function.getArg(0)->getType()->isFloatTy())
+    name.consume_back("f");
+  if (name == "scalbn")
+    name = "ldexp";
+  bool found =
+      llvm::is_contained(inexact, name) || llvm::is_contained(exact, name);
+  return found ? name : "";
 }
 
-bool piko::isMathFunction(const llvm::Function &function) {
-  return !getMathName(function).empty();
-}
-
-/// min is b < a ? b : a, max is a < b ? b : a.
-static bool redirectExtremum(llvm::CallInst *call) {
-  bool isMin;
-  switch (call->getIntrinsicID()) {
-  case llvm::Intrinsic::minnum:
-  case llvm::Intrinsic::minimum:
-  case llvm::Intrinsic::minimumnum:
-    isMin = true;
-    break;
-  case llvm::Intrinsic::maxnum:
-  case llvm::Intrinsic::maximum:
-  case llvm::Intrinsic::maximumnum:
-    isMin = false;
-    break;
-  default:
-    return false;
-  }
+/// Minima and maxima as comparisons: the first of equals, and the other number
+/// for a NaN, which is one or two instructions on most machines.
+static llvm::Value *expandExtremum(llvm::CallInst *call) {
+  bool isMin = call->getIntrinsicID() == llvm::Intrinsic::minnum;
+  if (!isMin && call->getIntrinsicID() != llvm::Intrinsic::maxnum)
+    return nullptr;
   llvm::IRBuilder<> builder(call);
   llvm::Value *a = call->getArgOperand(0), *b = call->getArgOperand(1);
-  llvm::Value *takesB =
+  llvm::Value *beats =
       isMin ? builder.CreateFCmpOLT(b, a) : builder.CreateFCmpOLT(a, b);
-  call->replaceAllUsesWith(builder.CreateSelect(takesB, b, a));
-  call->eraseFromParent();
-  return true;
+  llvm::Value *isNaN = builder.CreateFCmpUNO(a, a);
+  return builder.CreateSelect(builder.CreateOr(beats, isNaN), b, a);
+}
+
+/// A call of ours with the same arguments; null if there is no such function.
+static llvm::Value *callOurs(llvm::CallInst *call, llvm::StringRef name) {
+  llvm::Function *ours =
+      call->getModule()->getFunction((mathPrefix + name).str());
+  if (!ours)
+    return nullptr;
+  llvm::SmallVector<llvm::Value *> arguments(call->args());
+  return llvm::IRBuilder<>(call).CreateCall(ours, arguments);
+}
+
+/// The same for a function with one or two results.
+static llvm::Value *expandCall(llvm::CallInst *call, llvm::StringRef name) {
+  if (!call->getType()->isStructTy())
+    return callOurs(call, name);
+  llvm::IRBuilder<> builder(call);
+  llvm::Value *results = llvm::PoisonValue::get(call->getType());
+  for (unsigned i : {0u, 1u})
+    results = builder.CreateInsertValue(
+        results, callOurs(call, (name + llvm::Twine(i)).str()), i);
+  return results;
+}
+
+static void warn(llvm::CallInst *call, llvm::StringRef name, ParsedUnit &unit,
+                 mlir::MLIRContext &context) {
+  mlir::Location location = getUserLocation(call, unit, context);
+  if (unit.warned.insert(location).second)
+    mlir::emitWarning(location)
+        << "'" << name << "' is compiled as piko::" << name
+        << ": a plain C++ build of this file may differ";
 }
 
 void piko::redirectMathCalls(llvm::Function &function, ParsedUnit &unit,
@@ -93,20 +84,18 @@ void piko::redirectMathCalls(llvm::Function &function, ParsedUnit &unit,
   for (llvm::Instruction &instruction :
        llvm::make_early_inc_range(llvm::instructions(function))) {
     auto *call = llvm::dyn_cast<llvm::CallInst>(&instruction);
-    if (!call || !call->getCalledFunction() || redirectExtremum(call))
+    if (!call || !call->getCalledFunction())
       continue;
-    llvm::StringRef name = getMathName(*call->getCalledFunction());
-    if (name.empty())
-      continue;
-    llvm::Function *ours =
-        function.getParent()->getFunction((mathPrefix + name).str());
-    if (!ours)
-      continue;
-    mlir::Location location = getUserLocation(call, unit, context);
-    if (unit.warned.insert(location).second)
-      mlir::emitWarning(location)
-          << "'" << name << "' is compiled as piko::" << name
-          << ": a plain C++ build of this file may differ";
-    call->setCalledFunction(ours);
+    llvm::Value *result = expandExtremum(call);
+    if (!result) {
+      llvm::StringRef name = getMathName(*call->getCalledFunction());
+      if (name.empty())
+        continue;
+      result = expandCall(call, name);
+      if (llvm::is_contained(inexact, name))
+        warn(call, name, unit, context);
+    }
+    call->replaceAllUsesWith(result);
+    call->eraseFromParent();
   }
 }

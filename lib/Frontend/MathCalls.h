@@ -10,12 +10,13 @@ namespace piko {
 /// The definitions in piko/compiled/math.h.
 constexpr llvm::StringLiteral mathPrefix = "__piko_math_";
 
-/// Whether a function of the C library is one that redirectMathCalls replaces.
-bool isMathFunction(const llvm::Function &function);
+/// The C library's name for a function that redirectMathCalls replaces, without
+/// the f of float; empty if the function is not one.
+llvm::StringRef getMathName(const llvm::Function &function);
 
-/// Replaces calls of the C library's functions, which differ between machines,
-/// by calls of Piko's own, with a warning for each place in the user's text.
-/// Minima and maxima become comparisons.
+/// Replaces calls of the C library's functions on float by calls of Piko's own,
+/// with a warning for each place in the user's text where the library's differ
+/// between machines. Minima and maxima become comparisons.
 void redirectMathCalls(llvm::Function &function, ParsedUnit &unit,
                        mlir::MLIRContext &context);
 

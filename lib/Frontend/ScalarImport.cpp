@@ -323,7 +323,8 @@ Value ScalarImporter::makeFunnelShift(llvm::IntrinsicInst *call, bool left) {
       make<arith::ShLIOp>(make<arith::ShLIOp>(a, one), rest));
 }
 
-/// Tests for NaN, infinity, finite numbers and zero, alone or negated.
+/// Tests that are one or two comparisons of the absolute value; the others go
+/// by bits.
 Value ScalarImporter::makeClassTest(llvm::IntrinsicInst *call) {
   Value value = get(call->getArgOperand(0));
   auto classes = static_cast<llvm::FPClassTest>(
@@ -362,8 +363,52 @@ Value ScalarImporter::makeClassTest(llvm::IntrinsicInst *call) {
   case llvm::fcSubnormal:
     return make<arith::AndIOp>(compare(P::OLT, normal), compare(P::ONE, zero));
   default:
-    return Value();
+    return makeClassTestByBits(value, classes);
   }
+}
+
+/// As integers, the numbers of each sign are in order of size, so that
+/// neighbouring classes are a range.
+Value ScalarImporter::makeClassTestByBits(Value value,
+                                          llvm::FPClassTest classes) {
+  using llvm::APFloat;
+  auto type = cast<mlir::FloatType>(value.getType());
+  const llvm::fltSemantics &semantics = type.getFloatSemantics();
+  unsigned bits = type.getWidth();
+  auto integer = builder.getIntegerType(bits);
+  Value number = make<arith::BitcastOp>(integer, value);
+  Value result = makeInteger(builder.getI1Type(), llvm::APInt(1, 0));
+  for (bool negative : {false, true}) {
+    llvm::APInt sign =
+        negative ? llvm::APInt::getSignMask(bits) : llvm::APInt(bits, 0);
+    auto bitsOf = [](const APFloat &bound) { return bound.bitcastToAPInt(); };
+    llvm::APInt infinity = bitsOf(APFloat::getInf(semantics));
+    const std::pair<llvm::FPClassTest, llvm::APInt> begins[] = {
+        {negative ? llvm::fcNegZero : llvm::fcPosZero, llvm::APInt(bits, 0)},
+        {negative ? llvm::fcNegSubnormal : llvm::fcPosSubnormal,
+         llvm::APInt(bits, 1)},
+        {negative ? llvm::fcNegNormal : llvm::fcPosNormal,
+         bitsOf(APFloat::getSmallestNormalized(semantics))},
+        {negative ? llvm::fcNegInf : llvm::fcPosInf, infinity},
+        {llvm::fcSNan, infinity + 1},
+        {llvm::fcQNan, bitsOf(APFloat::getQNaN(semantics))},
+        {llvm::fcNone, llvm::APInt::getSignMask(bits)}};
+    for (unsigned i = 0; i + 1 < std::size(begins);) {
+      unsigned end = i;
+      while (begins[end].first & classes)
+        ++end;
+      if (end != i) {
+        Value offset = make<arith::SubIOp>(
+            number, makeInteger(integer, begins[i].second | sign));
+        Value inside = make<arith::CmpIOp>(
+            arith::CmpIPredicate::ult, offset,
+            makeInteger(integer, begins[end].second - begins[i].second));
+        result = make<arith::OrIOp>(result, inside);
+      }
+      i = std::max(end, i + 1);
+    }
+  }
+  return result;
 }
 
 /// -1, 0 or 1.

@@ -50,6 +50,7 @@ private:
   mlir::Value importOverflow(llvm::Instruction *extract);
   mlir::Value makeFunnelShift(llvm::IntrinsicInst *call, bool left);
   mlir::Value makeClassTest(llvm::IntrinsicInst *call);
+  mlir::Value makeClassTestByBits(mlir::Value value, llvm::FPClassTest classes);
   mlir::Value makeThreeWay(llvm::IntrinsicInst *call, bool isSigned);
   mlir::Value convertToInteger(mlir::Value value, mlir::Type type,
                                bool isSigned);

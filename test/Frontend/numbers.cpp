@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // What C++ leaves open is pinned down: conversions saturate and NaN gives 0,
-// a minimum is b < a ? b : a, and the C library's functions are piko's.
+// fmin gives the other number for a NaN, and the C library's functions are
+// piko's.
 // RUN: piko-translate --cpp-to-piko %s 2>%t.err | FileCheck %s
 // RUN: FileCheck %s --check-prefix=WARNING --input-file=%t.err
 #include <piko.h>
@@ -34,7 +35,9 @@ struct Convert : piko::Stage<0, 0, 64, Item, Item>, piko::Uses<State> {
 
 // CHECK-LABEL: piko.stage @minimum
 // CHECK: %[[LESS:.*]] = arith.cmpf olt, %[[B:.*]], %[[A:.*]] : f32
-// CHECK: arith.select %[[LESS]], %[[B]], %[[A]] : f32
+// CHECK: %[[NAN:.*]] = arith.cmpf uno, %[[A]], %{{.*}} : f32
+// CHECK: %[[TAKES:.*]] = arith.ori %[[LESS]], %[[NAN]] : i1
+// CHECK: arith.select %[[TAKES]], %[[B]], %[[A]] : f32
 struct Minimum : piko::Stage<0, 0, 64, Item, Item>, piko::Uses<State> {
   void process(const Item &item) {
     state().floats[0] = std::fmin(item.a, item.b);
