@@ -49,7 +49,9 @@ TEST(Assign, BoundingBoxOfCells) {
 struct ByPosition : piko::Stage<8, 8, 64, glm::vec2> {
   void assignBin(const glm::vec2 &p) {
     trace.push_back(int(binFromPosition(p).index));
-    trace.push_back(int(binFromPosition(glm::ivec2(glm::floor(p))).index));
+    glm::ivec2 cell(piko::toInt(piko::floor(p.x)),
+                    piko::toInt(piko::floor(p.y)));
+    trace.push_back(int(binFromPosition(cell).index));
   }
   void process(const glm::vec2 &) {}
 };
