@@ -199,7 +199,8 @@ template <class T, int Rank> void save(const piko::Image<T, Rank> &image,
     out << "int32_t run(pikort_pipeline *p) try {\n"
         << "  auto pipe = std::make_unique<Pipeline>();\n"
         << "  auto &state = pipe->state();\n  (void)state;\n"
-        << "  pipe->setDomain(pikoir_domain(p), " << pipeline.rank << ");\n";
+        << "  pipe->setDomain(pikoir_domain(p), " << pipeline.rank << ");\n"
+        << "  pipe->setLoopLimit(pikoir_loop_limit(p));\n";
     for (auto [id, state] : llvm::enumerate(pipeline.state))
       if (state.kind == StateDescription::Constant)
         out << "  load(state." << state.name << ", pikoir_get_state(p, " << id

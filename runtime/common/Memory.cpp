@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <bit>
+#include <fstream>
+#include <string>
 #include <sys/mman.h>
 
 using namespace piko::rt;
@@ -25,8 +27,27 @@ size_t roundUp(size_t bytes) {
   return (bytes + step - 1) / step * step;
 }
 
+/// A mapping that does not fit into memory is granted all the same, and the
+/// process killed when it writes there. So large ones ask first.
+bool isAvailable(size_t bytes) {
+  if (bytes < (size_t(256) << 20))
+    return true;
+  auto fits = [&](const char *path, const char *key, size_t unit) {
+    std::ifstream file(path);
+    std::string word;
+    size_t amount;
+    while (*key && file >> word && word != key)
+      ;
+    return !(file >> amount) || bytes / unit <= amount;
+  };
+  return fits("/proc/meminfo", "MemAvailable:", 1024) &&
+         fits("/sys/fs/cgroup/memory.max", "", 1);
+}
+
 /// Maps memory, with large blocks on huge page boundaries; null if refused.
 uint8_t *map(size_t bytes) {
+  if (!isAvailable(bytes))
+    return nullptr;
   bool huge = bytes >= hugePage;
   size_t mapped = huge ? bytes + hugePage : bytes;
   void *raw = mmap(nullptr, mapped, PROT_READ | PROT_WRITE,

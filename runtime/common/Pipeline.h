@@ -186,7 +186,7 @@ struct pikort_pipeline {
   bool ready = false; ///< finish() succeeded.
   std::array<int64_t, 4> domain{0, 1, 1, 1};
   int32_t threads = 1;
-  int32_t activeThreads = 1;            ///< That a kernel should use now.
+  int32_t activeThreads = 1;            ///< That the open kernel has units for.
   int64_t loopLimit = int64_t(1) << 20; ///< Of hops and of rounds.
 
   std::vector<piko::rt::KernelStats> kernelStats;
@@ -236,6 +236,17 @@ private:
 
 namespace piko::rt {
 
+inline std::string outOfMemoryText(const pikort_pipeline &p,
+                                   const std::string &who,
+                                   const OutOfMemory &refused) {
+  std::string text = who + ": out of memory";
+  if (refused.bytes != INT64_MAX)
+    text += ": expected " + std::to_string(refused.bytes) + " more bytes";
+  if (p.memory.limit() > 0)
+    text += ", but the limit is " + std::to_string(p.memory.limit());
+  return text;
+}
+
 /// Runs `body`, which may throw, and turns what it throws into a status.
 template <class Body>
 int32_t guarded(pikort_pipeline *p, const std::string &who,
@@ -247,12 +258,7 @@ int32_t guarded(pikort_pipeline *p, const std::string &who,
     return p->fail(failure.code, failure.message);
   } catch (const OutOfMemory &refused) {
     try {
-      std::string text = who + ": out of memory";
-      if (refused.bytes != INT64_MAX)
-        text += ": expected " + std::to_string(refused.bytes) + " more bytes";
-      if (p->memory.limit() > 0)
-        text += ", but the limit is " + std::to_string(p->memory.limit());
-      return p->fail(PIKORT_OUT_OF_MEMORY, text);
+      return p->fail(PIKORT_OUT_OF_MEMORY, outOfMemoryText(*p, who, refused));
     } catch (...) {
       return p->fail(PIKORT_OUT_OF_MEMORY, {});
     }

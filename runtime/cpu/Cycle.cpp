@@ -115,11 +115,6 @@ int32_t Cycle::runPart(Part &part) {
   }
   int32_t stage = part.loop ? part.loop->next() : -1;
   part.started = stage >= 0;
-  if (!part.started)
-    return -1;
-  // A few primitives are not worth waking threads.
-  constexpr int64_t few = 32;
-  p_.activeThreads = part.loop->inputSize() < few ? 1 : p_.threads;
   return stage;
 }
 
@@ -174,7 +169,6 @@ Stream Cycle::takeInput(Kernel &kernel) {
 
 void Cycle::absorb(Kernel &kernel) {
   const Stage &stage = p_.stages[kernel.stage];
-  p_.activeThreads = p_.threads;
   if (stage.loop >= 0)
     partOf(kernel.stage).loop->absorb(kernel);
   else

@@ -31,9 +31,8 @@ public:
   /// The stage to run next, or -1 if nothing is left: then the queues of the
   /// edges out of the loop are complete.
   virtual int32_t next() = 0;
-  /// The input of that stage, once, and how many primitives it has.
+  /// The input of that stage, once.
   virtual Stream takeInput() = 0;
-  virtual int64_t inputSize() const = 0;
   /// Takes what that stage's kernel emitted.
   void absorb(Kernel &kernel);
 

@@ -3,6 +3,8 @@
 
 #include "cpu/Cycle.h"
 
+#include <algorithm>
+
 using namespace piko::rt;
 
 static double millisecondsSince(std::chrono::steady_clock::time_point start) {
@@ -121,6 +123,8 @@ static const pikoir_input *begin(pikort_pipeline &p, Kernel &kernel) {
         prepareLanes(p, kernel);
         publish(p, kernel);
         kernel.open = true;
+        p.activeThreads = static_cast<int32_t>(
+            std::clamp<int64_t>(kernel.input.unit_count, 1, p.threads));
       });
   KernelStats &stats = p.kernelStats[kernel.statsIndex];
   stats.joinMilliseconds += millisecondsSince(kernel.started);
@@ -134,6 +138,7 @@ static int32_t end(pikort_pipeline &p, Kernel &kernel) {
   if (kernel.source < 0)
     for (auto &lane : kernel.lanes)
       p.stageStats[kernel.stage].out += lane->emitted;
+  p.activeThreads = p.threads;
   kernel.open = false;
   kernel.stream = {};
   kernel.input = {};

@@ -59,8 +59,10 @@ int64_t pikoir_scratch_mark(pikoir_writer *writer) {
 
 void pikoir_scratch_release(pikoir_writer *writer, int64_t mark) {
   ScratchStack &stack = static_cast<Lane *>(writer)->scratch;
-  while (mark < stack.below)
-    stack.below -= stack.blocks[--stack.block].capacity();
+  while (mark < stack.below) {
+    stack.used = stack.blocks[--stack.block].capacity();
+    stack.below -= stack.used;
+  }
   stack.used = std::clamp<int64_t>(mark - stack.below, 0, stack.used);
 }
 

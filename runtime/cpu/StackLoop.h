@@ -13,7 +13,6 @@ public:
   StackLoop(pikort_pipeline &p, const LoopShape &shape) : Loop(p, shape) {}
   int32_t next() override;
   Stream takeInput() override;
-  int64_t inputSize() const override { return 1; }
 
 private:
   /// An item in one of its cells, or, if it leaves the loop, in all. Its record

@@ -51,18 +51,26 @@ static void allocate(pikort_pipeline &p, State &state) {
        state.kind == PIKORT_IMAGE ? state.clear : std::vector<uint8_t>());
 }
 
-void piko::rt::prepareState(pikort_pipeline &p) {
-  for (State &state : p.states) {
-    if (state.kind == PIKORT_IMAGE) {
-      for (int32_t d = 0; d < 4; ++d)
-        state.view.extent[d] = d < state.rank ? p.domain[d] : 1;
-      state.view.data = nullptr;
-      allocate(p, state);
-    } else if (state.kind == PIKORT_BUFFER && state.perSource >= 0) {
-      state.view = {nullptr, {p.sources[state.perSource].count, 1, 1, 1}};
-      allocate(p, state);
-    }
+static void prepare(pikort_pipeline &p, State &state) {
+  if (state.kind == PIKORT_IMAGE) {
+    for (int32_t d = 0; d < 4; ++d)
+      state.view.extent[d] = d < state.rank ? p.domain[d] : 1;
+    state.view.data = nullptr;
+    allocate(p, state);
+  } else if (state.kind == PIKORT_BUFFER && state.perSource >= 0) {
+    state.view = {nullptr, {p.sources[state.perSource].count, 1, 1, 1}};
+    allocate(p, state);
   }
+}
+
+void piko::rt::prepareState(pikort_pipeline &p) {
+  for (State &state : p.states)
+    try {
+      prepare(p, state);
+    } catch (const OutOfMemory &refused) {
+      throw Failure{PIKORT_OUT_OF_MEMORY,
+                    outOfMemoryText(p, "state " + quoted(state.name), refused)};
+    }
 }
 
 extern "C" {

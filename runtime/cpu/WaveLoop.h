@@ -13,7 +13,6 @@ public:
   WaveLoop(pikort_pipeline &p, const LoopShape &shape) : Loop(p, shape) {}
   int32_t next() override;
   Stream takeInput() override;
-  int64_t inputSize() const override { return now_[running_].count; }
 
 private:
   void begin() override;

@@ -18,6 +18,13 @@ uint64_t piko::rt::test::mix(uint64_t a, uint64_t b) {
   return x ^ (x >> 31);
 }
 
+std::vector<Item> piko::rt::test::makeItems(int64_t count, uint64_t seed) {
+  std::vector<Item> result(static_cast<size_t>(count));
+  for (size_t i = 0; i < result.size(); ++i)
+    result[i].id = mix(seed, i);
+  return result;
+}
+
 // --- The meaning ------------------------------------------------------------
 
 static int64_t ceilDiv(int64_t a, int64_t b) { return (a + b - 1) / b; }
@@ -65,7 +72,8 @@ std::vector<std::pair<int, Item>> Graph::emissions(int stage, uint64_t seed,
   if (s.ports.empty() || hops >= mostHops)
     return result;
   uint64_t h = mix(seed, 1000 + static_cast<uint64_t>(stage));
-  auto n = h % static_cast<uint64_t>(s.mostEmissions + 1);
+  auto most = static_cast<uint64_t>(s.mostEmissions);
+  auto n = alwaysEmits ? most : h % (most + 1);
   for (uint64_t i = 0; i < n; ++i) {
     uint64_t id = mix(h, i);
     result.push_back({static_cast<int>((id >> 20) % s.ports.size()),
@@ -231,8 +239,15 @@ private:
   void runCollected(int s, bool firstRound) {
     std::vector<Visit> visits = std::exchange(waiting_[s], {});
     int64_t tiles = g_.tiles(s);
-    std::ranges::stable_sort(
-        visits, {}, [&](const Visit &visit) { return visit.first / tiles; });
+    std::vector<size_t> order(visits.size());
+    std::iota(order.begin(), order.end(), size_t(0));
+    std::sort(order.begin(), order.end(), [&](size_t a, size_t b) {
+      return std::pair(visits[a].first / tiles, a) <
+             std::pair(visits[b].first / tiles, b);
+    });
+    std::vector<Visit> unsorted = visits;
+    for (size_t i = 0; i < order.size(); ++i)
+      visits[i] = unsorted[order[i]];
     if (!g_.takesList(s)) {
       for (auto &[cell, item] : visits)
         emit(s, mix(item.id, static_cast<uint64_t>(cell)), item.hops);
@@ -518,7 +533,8 @@ static int32_t runStage(pikort_pipeline *p, int32_t stage) {
   const pikoir_input *in = pikoir_begin(p, stage);
   if (!in)
     return pikoir_status(p);
-  note(stage, in);
+  if (current->logs)
+    note(stage, in);
 #pragma omp parallel for schedule(dynamic) num_threads(pikoir_threads(p))
   for (int64_t u = 0; u < in->unit_count; ++u)
     runUnit(p, stage, in, u);
@@ -580,6 +596,17 @@ GraphRun::GraphRun(Graph &graph) {
         << pikort_message(pipeline_);
 }
 
+std::string GraphRun::creationError(Graph &graph) {
+  current = &graph;
+  pikort_program program{PIKORT_ABI_VERSION, "Graph", setup, runGraph};
+  pikort_pipeline *pipeline = nullptr;
+  EXPECT_EQ(pikort_create(&program, &pipeline), PIKORT_BAD_PROGRAM);
+  std::string message = pikort_message(pipeline);
+  pikort_destroy(pipeline);
+  current = nullptr;
+  return message;
+}
+
 GraphRun::~GraphRun() {
   pikort_destroy(pipeline_);
   current = nullptr;
@@ -588,4 +615,25 @@ GraphRun::~GraphRun() {
 int32_t GraphRun::run(int threads) {
   EXPECT_EQ(pikort_set_threads(pipeline_, threads), PIKORT_OK);
   return pikort_run(pipeline_);
+}
+
+// --- Comparison -------------------------------------------------------------
+
+void piko::rt::test::checkOrder(Graph &graph) {
+  std::vector<Arrivals> expected = graph.model();
+  graph.normalise(expected);
+  GraphRun run(graph);
+  for (int threads : {1, 2, 7, 2}) {
+    ASSERT_EQ(run.run(threads), PIKORT_OK) << pikort_message(run.get());
+    graph.normalise(graph.arrivals);
+    for (size_t s = 0; s < expected.size(); ++s) {
+      ASSERT_EQ(graph.arrivals[s].items, expected[s].items)
+          << "stage " << s << ", " << threads << " threads";
+      ASSERT_EQ(graph.arrivals[s].cells, expected[s].cells)
+          << "stage " << s << ", " << threads << " threads";
+      ASSERT_EQ(graph.arrivals[s].calls, expected[s].calls)
+          << "stage " << s << ", " << threads << " threads";
+    }
+    EXPECT_FALSE(graph.paddingSeen);
+  }
 }

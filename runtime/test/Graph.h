@@ -65,7 +65,9 @@ struct Graph {
   std::vector<TestStage> stages;
   std::vector<int> sources; ///< Stage of each source.
   std::vector<std::vector<Item>> input;
-  int mostHops = 8; ///< Primitives that have made so many emit nothing.
+  int mostHops = 8;         ///< Primitives that have made so many emit nothing.
+  bool alwaysEmits = false; ///< As much as a call can.
+  bool logs = true;         ///< Runs note arrivals.
 
   // Filled by the runs.
   std::vector<Arrivals> arrivals;
@@ -105,6 +107,7 @@ struct Graph {
 };
 
 uint64_t mix(uint64_t a, uint64_t b);
+std::vector<Item> makeItems(int64_t count, uint64_t seed = 1);
 
 /// A pipeline that runs a graph through the ABI. One at a time.
 class GraphRun {
@@ -115,10 +118,15 @@ public:
   GraphRun &operator=(const GraphRun &) = delete;
   pikort_pipeline *get() const { return pipeline_; }
   int32_t run(int threads);
+  /// Why a graph makes no pipeline.
+  static std::string creationError(Graph &graph);
 
 private:
   pikort_pipeline *pipeline_ = nullptr;
 };
+
+/// Runs a graph on 1, 2 and 7 threads, and compares with its meaning.
+void checkOrder(Graph &graph);
 
 } // namespace piko::rt::test
 

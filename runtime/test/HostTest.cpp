@@ -203,8 +203,36 @@ TEST_F(Host, BadDomains) {
   // Few enough cells, but an image that no machine holds.
   ASSERT_TRUE(pipe.memoryLimit(1 << 20));
   ASSERT_TRUE(pipe.domain({60000, 60000}));
-  EXPECT_EQ(pipe.run().code(), PIKORT_OUT_OF_MEMORY);
+  expectError(pipe.run(), PIKORT_OUT_OF_MEMORY,
+              "state 'depth': out of memory: expected 30064771072 more bytes, "
+              "but the limit is 1048576");
   ASSERT_TRUE(pipe.domain({8, 8}));
+  EXPECT_TRUE(pipe.run());
+}
+
+// An image is refused before the system has to give it.
+TEST(Images, LargerThanMemory) {
+  auto setup = [](pikort_pipeline *p) {
+    pikoir_declare_pipeline(p, "Huge", 2);
+    pikoir_declare_record(p, 0, "Pixel", sizeof(Pixel), 4);
+    pikoir_declare_state(p, 0, "color", PIKORT_IMAGE, 0, 2, -1, nullptr);
+  };
+  piko::rt::Pipeline pipe(
+      {PIKORT_ABI_VERSION, "Huge", setup, [](pikort_pipeline *) { return 0; }});
+  ASSERT_TRUE(pipe.created());
+  auto expect = [&](int64_t side, const char *text) {
+    ASSERT_TRUE(pipe.domain({side, side}));
+    piko::rt::Status status = pipe.run();
+    EXPECT_EQ(status.code(), PIKORT_OUT_OF_MEMORY);
+    EXPECT_EQ(status.message(), text);
+  };
+  expect(INT32_MAX, "state 'color': out of memory");
+  expect(1 << 22, "state 'color': out of memory: expected 140737488355328 more "
+                  "bytes");
+  ASSERT_TRUE(pipe.memoryLimit(1 << 30));
+  expect(100000, "state 'color': out of memory: expected 85899345920 more "
+                 "bytes, but the limit is 1073741824");
+  ASSERT_TRUE(pipe.domain({1, 1}));
   EXPECT_TRUE(pipe.run());
 }
 
@@ -214,10 +242,18 @@ TEST_F(Host, BadThreads) {
                 "expected a number of threads in [0, 10000], but got " +
                     std::to_string(threads));
   bindAll();
-  for (int threads : {0, 1, 100}) {
+  for (int threads : {0, 1, 100, 10000}) {
     ASSERT_TRUE(pipe.threads(threads));
     EXPECT_TRUE(pipe.run());
   }
+}
+
+TEST_F(Host, LoopLimit) {
+  expectError(pipe.loopLimit(-1), PIKORT_INVALID_ARGUMENT,
+              "expected a loop limit of at least 0, but got -1");
+  EXPECT_EQ(pikoir_loop_limit(pipe.get()), 1 << 20);
+  EXPECT_TRUE(pipe.loopLimit(0));
+  EXPECT_EQ(pikoir_loop_limit(pipe.get()), 0);
 }
 
 // The first error in item order is reported, whatever the threads.
@@ -336,6 +372,30 @@ TEST(Create, RejectsBadPrograms) {
   };
   expect({PIKORT_ABI_VERSION, "Field", field, run}, PIKORT_BAD_PROGRAM,
          "record 'Pixel': expected field 'w' inside 8 bytes, but got offset 8");
+  auto tiles = [](pikort_pipeline *p) {
+    setup(p);
+    pikoir_declare_stage(p, 1, "list", 0, nullptr, 0, 0, PIKOIR_LIST, 2);
+  };
+  expect({PIKORT_ABI_VERSION, "Tiles", tiles, run}, PIKORT_BAD_PROGRAM,
+         "stage 'list': a process that takes a list has no owner tiles");
+  auto batch = [](pikort_pipeline *p) {
+    setup(p);
+    pikoir_declare_schedule(p, 0, 8, 0);
+  };
+  expect({PIKORT_ABI_VERSION, "Batch", batch, run}, PIKORT_BAD_PROGRAM,
+         "stage 'bin': a batch needs a process that takes a list");
+  auto negative = [](pikort_pipeline *p) {
+    setup(p);
+    pikoir_declare_schedule(p, 0, -8, 0);
+  };
+  expect({PIKORT_ABI_VERSION, "Negative", negative, run}, PIKORT_BAD_PROGRAM,
+         "stage 'bin': expected a batch of at least 1, but got -8");
+  auto wait = [](pikort_pipeline *p) {
+    setup(p);
+    pikoir_declare_wait(p, 0, 3);
+  };
+  expect({PIKORT_ABI_VERSION, "Wait", wait, run}, PIKORT_BAD_PROGRAM,
+         "pipeline 'Small': expected a declared stage to wait for, but got 3");
   pikort_destroy(nullptr);
 }
 

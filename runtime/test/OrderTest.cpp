@@ -8,40 +8,13 @@
 
 using namespace piko::rt::test;
 
-/// Runs a graph on 1, 2 and 7 threads, twice each, and compares.
-static void check(Graph &graph) {
-  std::vector<Arrivals> expected = graph.model();
-  graph.normalise(expected);
-  GraphRun run(graph);
-  for (int threads : {1, 2, 7, 2}) {
-    ASSERT_EQ(run.run(threads), PIKORT_OK) << pikort_message(run.get());
-    graph.normalise(graph.arrivals);
-    for (size_t s = 0; s < expected.size(); ++s) {
-      ASSERT_EQ(graph.arrivals[s].items, expected[s].items)
-          << "stage " << s << ", " << threads << " threads";
-      ASSERT_EQ(graph.arrivals[s].cells, expected[s].cells)
-          << "stage " << s << ", " << threads << " threads";
-      ASSERT_EQ(graph.arrivals[s].calls, expected[s].calls)
-          << "stage " << s << ", " << threads << " threads";
-    }
-    EXPECT_FALSE(graph.paddingSeen);
-  }
-}
-
-static std::vector<Item> items(int64_t count, uint64_t seed = 1) {
-  std::vector<Item> result(static_cast<size_t>(count));
-  for (size_t i = 0; i < result.size(); ++i)
-    result[i].id = mix(seed, i);
-  return result;
-}
-
 static Graph chain(int64_t count, std::vector<TestStage> stages) {
   Graph graph;
   for (size_t s = 0; s + 1 < stages.size(); ++s)
     stages[s].ports = {static_cast<int>(s) + 1};
   graph.stages = std::move(stages);
   graph.sources = {0};
-  graph.input = {items(count)};
+  graph.input = {makeItems(count)};
   return graph;
 }
 
@@ -50,7 +23,7 @@ TEST(Order, Concatenates) {
   TestStage stage;
   stage.flags = PIKOIR_SPLIT;
   Graph graph = chain(20000, {stage, stage, stage});
-  check(graph);
+  checkOrder(graph);
 }
 
 // A bin's positions are not in emission order: counts are permuted back.
@@ -60,7 +33,7 @@ TEST(Order, PermutesBackByItem) {
   binned.flags = PIKOIR_PLACED | PIKOIR_SPLIT;
   TestStage whole;
   Graph graph = chain(20000, {binned, binned, binned, whole});
-  check(graph);
+  checkOrder(graph);
 }
 
 // Every primitive in just one cell takes the shorter way.
@@ -71,7 +44,7 @@ TEST(Order, PermutesSinglePlaces) {
   binned.spread = 1;
   TestStage whole;
   Graph graph = chain(20000, {binned, binned, binned, whole});
-  check(graph);
+  checkOrder(graph);
 }
 
 // Each chunk of the count is sorted by cell, but the chunks are not.
@@ -83,7 +56,7 @@ TEST(Order, SortedInPieces) {
   Graph graph = chain(16384, {runs, TestStage(), TestStage()});
   for (size_t i = 0; i < graph.input[0].size(); ++i)
     graph.input[0][i].id = i;
-  check(graph);
+  checkOrder(graph);
 }
 
 // Tiles of one bin are merged back by item.
@@ -95,7 +68,7 @@ TEST(Order, MergesTilesOfCollectingStages) {
   tiled.flags |= PIKOIR_COLLECTS;
   tiled.tile = 2;
   Graph graph = chain(20000, {first, tiled, tiled, first});
-  check(graph);
+  checkOrder(graph);
 }
 
 // A stage that processes lists calls pikoir_next once for each cell, for empty
@@ -115,8 +88,8 @@ TEST(Order, ListsJoinWithPrimitives) {
   Graph graph;
   graph.stages = {list, middle, last};
   graph.sources = {0, 2, 1};
-  graph.input = {items(9), items(50, 2), items(70, 3)};
-  check(graph);
+  graph.input = {makeItems(9), makeItems(50, 2), makeItems(70, 3)};
+  checkOrder(graph);
 }
 
 // Two branches of one stage join: the ordinals over all ports decide.
@@ -134,8 +107,8 @@ TEST(Order, JoinsBranches) {
   Graph graph;
   graph.stages = {split, branch, branch, join};
   graph.sources = {0};
-  graph.input = {items(5000)};
-  check(graph);
+  graph.input = {makeItems(5000)};
+  checkOrder(graph);
 }
 
 TEST(Order, RandomGraphs) {
@@ -143,7 +116,7 @@ TEST(Order, RandomGraphs) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     Graph graph = Graph::random(seed, 1 + static_cast<int>(seed % 7),
                                 seed % 5 == 0 ? 1500 : 120);
-    check(graph);
+    checkOrder(graph);
     if (HasFatalFailure())
       return;
   }
@@ -154,7 +127,7 @@ TEST(Order, RandomCyclicGraphs) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     Graph graph = Graph::randomCyclic(seed, 1 + static_cast<int>(seed % 7),
                                       seed % 7 == 0 ? 100 : 20);
-    check(graph);
+    checkOrder(graph);
     if (HasFatalFailure())
       return;
   }
@@ -166,7 +139,7 @@ TEST(Order, NoPrimitives) {
   binned.flags = PIKOIR_PLACED | PIKOIR_COLLECTS;
   TestStage whole;
   Graph graph = chain(0, {binned, whole, binned});
-  check(graph);
+  checkOrder(graph);
 }
 
 // The same multiset, in any order.
@@ -199,5 +172,5 @@ TEST(Order, ManyCellsOfOnePrimitive) {
   Graph graph = chain(3000, {first, fine, first});
   graph.domain[0] = 300;
   graph.domain[1] = 200;
-  check(graph);
+  checkOrder(graph);
 }

@@ -107,6 +107,7 @@ PIKORT_API const pikoir_state *pikoir_get_state(pikort_pipeline *p, int32_t id);
 PIKORT_API const int64_t *pikoir_domain(pikort_pipeline *p);
 PIKORT_API const int64_t *pikoir_grid(pikort_pipeline *p, int32_t stage);
 PIKORT_API const int64_t *pikoir_cell_grid(pikort_pipeline *p, int32_t stage);
+/// How many threads should run a kernel's units; asked after its begin.
 PIKORT_API int32_t pikoir_threads(pikort_pipeline *p);
 /// The status of the run so far; thread safe.
 PIKORT_API int32_t pikoir_status(pikort_pipeline *p);
