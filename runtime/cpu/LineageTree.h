@@ -31,7 +31,7 @@ public:
     return parents_.extend(memory, count);
   }
   /// True if it pays to flatten a tree that has so many leaves.
-  bool isTall(int64_t leaves) const { return size() > 2 * leaves + (1 << 16); }
+  bool isTall(int64_t leaves) const { return size() > 2 * leaves + 4096; }
   /// Numbers the leaves, which `lists` name, 0, 1, ... in depth-first order and
   /// makes them the roots; what is not a leaf is forgotten.
   void flatten(Memory &memory, const std::vector<Growing<uint32_t> *> &lists);

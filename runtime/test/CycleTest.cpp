@@ -41,6 +41,16 @@ TEST(Cycle, SelfLoop) {
   checkOrder(graph);
 }
 
+// Many hops for each primitive that leaves: the tree is flattened on the way.
+TEST(Cycle, LongLoopsKeepTheOrder) {
+  std::vector<int> ports(14, 0);
+  ports.insert(ports.begin() + 7, {1, 2});
+  Graph graph =
+      makeGraph({whole(ports), whole({0, 2}), binned({})}, {0, 1}, 3000);
+  graph.mostHops = 200;
+  checkOrder(graph);
+}
+
 // Where the order of calls can be seen, they are made one by one.
 TEST(Cycle, OrderedSelfLoop) {
   Graph graph = makeGraph({binned({1, 0, 0}, PIKOIR_ORDERED), binned({})}, {0});
