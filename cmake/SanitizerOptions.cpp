@@ -24,6 +24,11 @@ __ubsan_default_options() {
   return "print_stacktrace=1";
 }
 
+[[gnu::visibility("default"), gnu::used]] const char *__tsan_default_options() {
+  // OpenMP's runtime; libarcher says what it orders.
+  return "ignore_noninstrumented_modules=1";
+}
+
 [[gnu::visibility("default"), gnu::used]] const char *
 __lsan_default_suppressions() {
   // OpenMP's runtime keeps its threads and their memory until the process ends.
