@@ -24,6 +24,12 @@ if(PIKO_SANITIZE)
     -fno-sanitize=vptr,function)
   add_link_options(-fsanitize=${PIKO_SANITIZE})
   add_library(piko_sanitizer_options OBJECT ${CMAKE_CURRENT_LIST_DIR}/SanitizerOptions.cpp)
+  if(PIKO_SANITIZE MATCHES thread)
+    # OpenMP's runtime looks for this tool in the program.
+    find_library(PIKO_ARCHER archer PATHS ${PIKO_LLVM_PREFIX}/lib REQUIRED)
+    add_link_options(LINKER:--push-state,--no-as-needed ${PIKO_ARCHER} LINKER:--pop-state
+      LINKER:-rpath,${PIKO_LLVM_PREFIX}/lib)
+  endif()
 endif()
 
 find_package(OpenMP REQUIRED COMPONENTS CXX)

@@ -25,7 +25,8 @@ __ubsan_default_options() {
 }
 
 [[gnu::visibility("default"), gnu::used]] const char *__tsan_default_options() {
-  // OpenMP's runtime; libarcher says what it orders.
+  // OpenMP's runtime synchronizes by instructions of its own. Archer, which is
+  // linked, tells what comes before what; the runtime's accesses are left out.
   return "ignore_noninstrumented_modules=1";
 }
 
