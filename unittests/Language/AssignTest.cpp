@@ -134,7 +134,7 @@ TEST(Assign, PreviousBins) {
   EXPECT_THAT(run(pipe, {0, 0}), ElementsAre(1, 3, 1, 3));
   PreviousPipe<2> other;
   EXPECT_THAT(messageOf([&] { run(other, {0}); }),
-              HasSubstr("assignToPreviousBins needs the bin size of stage"));
+              HasSubstr("expected bins of the same size as those of stage"));
 }
 
 // Any rank: 3D bins, one of them over the whole depth.

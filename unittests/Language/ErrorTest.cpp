@@ -47,19 +47,21 @@ TEST(Errors, MismatchedTypesOnAnEdge) {
   pipe.connect(pipe.two, 0, pipe.a);
   pipe.connect(pipe.two, 1, pipe.floats);
   EXPECT_THAT(messageOf([&] { pipe.run(); }),
-              testing::MatchesRegex("stage '.*Two': port 1 has type 'int', but "
+              testing::MatchesRegex("stage '.*Two': expected an edge between "
+                                    "equal types, but port 1 emits 'int' and "
                                     "stage '.*Floats' takes 'float'"));
 }
 
 TEST(Errors, PortOutOfRange) {
   OpenPipe pipe;
   EXPECT_THAT(messageOf([&] { pipe.connect(pipe.two, 2, pipe.a); }),
-              HasSubstr("Two': expected a port below 2, but got 2"));
+              HasSubstr("Two': expected one of the 2 ports, but got port 2"));
   pipe.source(pipe.two);
   pipe.connect(pipe.two, 0, pipe.a);
   pipe.connect(pipe.two, 1, pipe.b);
-  EXPECT_THAT(messageOf([&] { run(pipe, {1}); }),
-              HasSubstr("Two', bin 0: expected a port below 2, but got 7"));
+  EXPECT_THAT(
+      messageOf([&] { run(pipe, {1}); }),
+      HasSubstr("Two', bin 0: expected one of the 2 ports, but got port 7"));
 }
 
 struct WrongPort : Whole<int, int, float> {
@@ -107,7 +109,7 @@ TEST(Errors, Feed) {
               HasSubstr("expected primitives of type 'int' for source 0, but "
                         "got 'float'"));
   EXPECT_THAT(messageOf([&] { pipe.feed(1, floats.data(), 1); }),
-              HasSubstr("expected a source below 1, but got 1"));
+              HasSubstr("expected one of the 1 sources, but got source 1"));
   EXPECT_THAT(messageOf([&] { pipe.feed(pipe.b, floats); }),
               HasSubstr("has no source"));
   pipe.source(pipe.a);
@@ -153,13 +155,13 @@ TEST(Errors, PhasesThatSayWhatIsNotTheirs) {
     }
   } pipe;
   EXPECT_THAT(messageOf([&] { run(pipe, {1}); }),
-              HasSubstr("emit is for process, but is used in assignBin"));
+              HasSubstr("expected emit in process, but it is in assignBin"));
   EXPECT_THAT(messageOf([&] { run(pipe, {2}); }),
               HasSubstr("bin in assignBin"));
   EXPECT_THAT(messageOf([&] { run(pipe, {3}); }),
-              HasSubstr("is for assignBin, but is used in process"));
+              HasSubstr("in assignBin, but it is in process"));
   EXPECT_THAT(messageOf([&] { run(pipe, {4}); }),
-              HasSubstr("endBin is for schedule, but is used in process"));
+              HasSubstr("expected endBin in schedule, but it is in process"));
   EXPECT_THAT(messageOf([&] { pipe.confused.emit(1); }),
               "emit outside a running pipeline");
 }
@@ -177,7 +179,7 @@ TEST(Errors, ListDirectivesNeedAList) {
     }
   } pipe;
   EXPECT_THAT(messageOf([&] { run(pipe, {1}); }),
-              HasSubstr("batch needs a process that takes a list"));
+              HasSubstr("expected batch only in a stage that takes a list"));
 }
 
 TEST(Errors, ListIndexOutOfRange) {
@@ -209,7 +211,7 @@ TEST(Errors, AllocateForAMissingSource) {
     }
   } pipe;
   EXPECT_THAT(messageOf([&] { pipe.run(); }),
-              HasSubstr("allocateForSource: expected a source below 1"));
+              HasSubstr("allocateForSource: expected one of the 1 sources"));
 }
 
 // What stages wait for, and whether they keep the order, is the same in all
@@ -289,9 +291,11 @@ TEST(Errors, WhatCannotBeInsideAnother) {
     }
   } pipe;
   const char *const messages[] = {
-      "update inside update", "any(n, f) inside parallelFor",
-      "all(n, f) inside parallelFor", "count(n, f) inside parallelFor",
-      "reduce(n, f) inside parallelFor"};
+      "expected an update outside an update",
+      "expected any(n, f) outside a parallelFor",
+      "expected all(n, f) outside a parallelFor",
+      "expected count(n, f) outside a parallelFor",
+      "expected reduce(n, f) outside a parallelFor"};
   for (int kind = 1; kind <= 5; ++kind)
     EXPECT_THAT(messageOf([&] { run(pipe, {kind}); }),
                 HasSubstr(std::string("Nest', bin 0: ") + messages[kind - 1]));

@@ -138,15 +138,15 @@ TEST(ParallelFor, SyncMustBeUniform) {
 
 TEST(ParallelFor, SyncOnlyDirectlyInside) {
   EXPECT_THAT(messageOf([] { process([](auto &self, int) { self.sync(); }); }),
-              HasSubstr("sync() outside parallelFor"));
-  EXPECT_THAT(messageOf([] {
-                process([](auto &self, int) {
-                  self.parallelFor(2, [&](int) {
-                    self.parallelFor(2, [&](int) { self.sync(); });
-                  });
-                });
-              }),
-              HasSubstr("sync() inside a nested parallelFor"));
+              HasSubstr("expected sync inside a parallelFor"));
+  EXPECT_THAT(
+      messageOf([] {
+        process([](auto &self, int) {
+          self.parallelFor(
+              2, [&](int) { self.parallelFor(2, [&](int) { self.sync(); }); });
+        });
+      }),
+      HasSubstr("expected sync inside a parallelFor that is not nested"));
 }
 
 TEST(ParallelFor, ErrorsLeaveFibersAndUnwindThem) {

@@ -197,11 +197,13 @@ TEST(State, IntegerAtomics) {
 
 TEST(State, AtomicsWhoseOrderShowsNeedUnordered) {
   AtomicPipe<false> ordered;
-  EXPECT_THAT(messageOf([&] { run(ordered, {9}); }),
-              HasSubstr("atomicAddFetch needs a stage that is Unordered"));
+  EXPECT_THAT(
+      messageOf([&] { run(ordered, {9}); }),
+      HasSubstr("expected the stage to be unordered, because the result of an "
+                "atomic shows"));
   EXPECT_THAT(
       messageOf([&] { run(ordered, {10}); }),
-      HasSubstr("atomicAdd on a float needs a stage that is Unordered"));
+      HasSubstr("because a float atomic shows the order of its primitives"));
   AtomicPipe<true> unordered;
   EXPECT_THAT(run(unordered, {9, 10}), ElementsAre(9));
   EXPECT_EQ(unordered.state().cells[0].sum, 0.5f);

@@ -21,8 +21,9 @@ inline void expectUnordered(const char *what, const Place &at) {
   Frame &call = *executor->frame;
   call.at = at;
   if (!call.node->unordered)
-    call.node->fail(call.bin, std::string(what) + " needs a stage that is "
-                                                  "Unordered");
+    call.node->fail(call.bin, std::string("expected the stage to be unordered, "
+                                          "because ") +
+                                  what + " shows the order of its primitives");
 }
 
 template <class T>
@@ -68,7 +69,7 @@ template <class T> T wrappingAdd(T a, T b) {
   template <reference::AtomicInteger T>                                        \
   T NAME##Fetch(const T &place, std::type_identity_t<T> value,                 \
                 reference::Place at = reference::Place::current()) {           \
-    reference::expectUnordered(#NAME "Fetch", at);                             \
+    reference::expectUnordered("the result of an atomic", at);                 \
     return reference::exchange(place, at,                                      \
                                [&](T old) -> T { return EXPRESSION; });        \
   }                                                                            \
@@ -89,7 +90,7 @@ PIKO_ATOMIC(atomicXor, old ^ value)
 template <reference::AtomicFloat T>
 void atomicAdd(const T &place, std::type_identity_t<T> value,
                reference::Place at = reference::Place::current()) {
-  reference::expectUnordered("atomicAdd on a float", at);
+  reference::expectUnordered("a float atomic", at);
   reference::exchange(place, at, [&](T old) { return old + value; });
 }
 

@@ -116,11 +116,9 @@ public:
     Frame &call = expect(Phase::Process, "emit");
     Node &node = *call.node;
     if (call.updating)
-      node.fail(call.bin, "emit inside update");
+      node.fail(call.bin, "expected emit outside an update");
     if (port < 0 || port >= static_cast<int>(node.ports.size()))
-      node.fail(call.bin, "expected a port below " +
-                              std::to_string(node.ports.size()) + ", but got " +
-                              std::to_string(port));
+      node.failPort(call.bin, port);
     const Port &out = node.ports[port];
     if (out.type != type)
       node.fail(call.bin, "expected a primitive of type '" +
@@ -162,7 +160,7 @@ public:
   void parallelFor(int64_t size, std::function<void(int64_t)> body) {
     Frame &call = expect(Phase::Process, "parallelFor");
     if (call.updating)
-      call.node->fail(call.bin, "parallelFor inside update");
+      call.node->fail(call.bin, "expected parallelFor outside an update");
     if constexpr (checking)
       body = [this, number = checker.beginLoop(),
               body = std::move(body)](int64_t i) {
@@ -186,7 +184,7 @@ public:
   }
 
   void sync() {
-    Loop &loop = loopForSync("sync()");
+    Loop &loop = loopForSync("sync");
     if constexpr (!checking) {
       loop.sync(*frame->node);
     } else {
@@ -200,12 +198,14 @@ public:
   Loop &loopForSync(const char *what) {
     Frame &call = expect(Phase::Process, what);
     if (!call.loop)
-      call.node->fail(call.bin, std::string(what) + " outside parallelFor");
+      call.node->fail(call.bin, std::string("expected ") + what +
+                                    " inside a parallelFor");
     if (call.loop->outer)
-      call.node->fail(call.bin,
-                      std::string(what) + " inside a nested parallelFor");
+      call.node->fail(call.bin, std::string("expected ") + what +
+                                    " inside a parallelFor that is not nested");
     if (call.updating)
-      call.node->fail(call.bin, std::string(what) + " inside update");
+      call.node->fail(call.bin,
+                      std::string("expected ") + what + " outside an update");
     return *call.loop;
   }
 
@@ -215,9 +215,9 @@ public:
     if (!frame)
       throw Error(std::string(what) + " outside a running pipeline");
     if (frame->phase != phase)
-      frame->node->fail(frame->bin, std::string(what) + " is for " +
+      frame->node->fail(frame->bin, std::string("expected ") + what + " in " +
                                         names[static_cast<int>(phase)] +
-                                        ", but is used in " +
+                                        ", but it is in " +
                                         names[static_cast<int>(frame->phase)]);
     return *frame;
   }

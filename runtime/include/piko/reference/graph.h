@@ -49,6 +49,10 @@ public:
                          const std::string &context = "") const {
     reference::fail(name(), bin, message, context);
   }
+  [[noreturn]] void failPort(int64_t bin, int port) const {
+    fail(bin, "expected one of the " + std::to_string(ports.size()) +
+                  " ports, but got port " + std::to_string(port));
+  }
   std::string_view name() const { return type->name; }
 
   const void *address = nullptr;  ///< of the user's stage

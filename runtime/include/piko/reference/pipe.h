@@ -89,8 +89,8 @@ public:
   /// The primitives of a source; the memory must stay until the run.
   template <class T> void feed(int source, const T *primitives, int64_t count) {
     if (source < 0 || source >= static_cast<int>(sources.size()))
-      throw Error("expected a source below " + std::to_string(sources.size()) +
-                  ", but got " + std::to_string(source));
+      throw Error("expected one of the " + std::to_string(sources.size()) +
+                  " sources, but got source " + std::to_string(source));
     Source &to = sources[source];
     if constexpr (!std::is_void_v<T>)
       if (to.node->inputType != reference::typeOf<std::remove_cv_t<T>>())
@@ -154,9 +154,7 @@ protected:
   template <class From, class To> void connect(From &from, int port, To &to) {
     reference::Node &producer = nodeOf(from), &consumer = nodeOf(to);
     if (port < 0 || port >= static_cast<int>(producer.ports.size()))
-      producer.fail(-1, "expected a port below " +
-                            std::to_string(producer.ports.size()) +
-                            ", but got " + std::to_string(port));
+      producer.failPort(-1, port);
     producer.ports[port].to.push_back(&consumer);
   }
   /// Gives a buffer as many elements as a source has primitives, zero at the
@@ -254,8 +252,9 @@ template <class State> void Pipe<State>::checkGraph() const {
                            std::string(out.to[0]->name()) + "' and to stage '" +
                            std::string(out.to[1]->name()) + "'");
       if (out.type != out.to[0]->inputType)
-        node->fail(-1, name + " has type '" + std::string(out.type->name) +
-                           "', but stage '" + std::string(out.to[0]->name()) +
+        node->fail(-1, "expected an edge between equal types, but " + name +
+                           " emits '" + std::string(out.type->name) +
+                           "' and stage '" + std::string(out.to[0]->name()) +
                            "' takes '" +
                            std::string(out.to[0]->inputType->name) + "'");
     }
@@ -268,8 +267,8 @@ template <class State> void Pipe<State>::prepareState() {
   for (const Allocation &allocation : allocations) {
     if (allocation.source < 0 ||
         allocation.source >= static_cast<int>(sources.size()))
-      throw Error("allocateForSource: expected a source below " +
-                  std::to_string(sources.size()) + ", but got " +
+      throw Error("allocateForSource: expected one of the " +
+                  std::to_string(sources.size()) + " sources, but got source " +
                   std::to_string(allocation.source));
     allocation.buffer->allocateZeroed(sources[allocation.source].count);
   }

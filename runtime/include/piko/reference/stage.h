@@ -113,9 +113,10 @@ public:
         executor("assignToPreviousBins", at)
             .expect(reference::Phase::Assign, "assignToPreviousBins");
     if (!call.producer)
-      call.node->fail(-1, "assignToPreviousBins of a primitive from a source");
+      call.node->fail(-1, "expected a previous stage, but the primitive is a "
+                          "source's");
     if (call.producer->grid.size != call.node->grid.size)
-      call.node->fail(-1, "assignToPreviousBins needs the bin size of stage '" +
+      call.node->fail(-1, "expected bins of the same size as those of stage '" +
                               std::string(call.producer->name()) + "'");
     executor("assignToPreviousBins", at).assignBin(call.bin);
   }
@@ -197,7 +198,7 @@ public:
     reference::Frame &call =
         executor("update", place).expect(reference::Phase::Process, "update");
     if (call.updating)
-      call.node->fail(call.bin, "update inside update");
+      call.node->fail(call.bin, "expected an update outside an update");
     checkOwnPixel(call, reference::toCell(at));
     struct Updating {
       bool &flag;
@@ -232,7 +233,7 @@ public:
     });
   }
   /// In an iteration of parallelFor: a barrier between all iterations.
-  void sync(Place at = Place::current()) { executor("sync()", at).sync(); }
+  void sync(Place at = Place::current()) { executor("sync", at).sync(); }
 
   // Over the iterations of the enclosing parallelFor; each of them is also a
   // sync(). Every iteration gets the result.
@@ -310,7 +311,8 @@ private:
     reference::Executor &running = executor(what, at);
     const reference::Frame &call = *running.frame;
     if (call.loop)
-      call.node->fail(call.bin, std::string(what) + " inside parallelFor");
+      call.node->fail(call.bin, std::string("expected ") + what +
+                                    " outside a parallelFor");
     return running;
   }
   reference::Frame &here(const char *what, const Place &at) const {
@@ -328,8 +330,8 @@ private:
   reference::Frame &inList(const char *what, const Place &at) const {
     reference::Frame &call = inSchedule(what, at);
     if (!call.node->takesList)
-      call.node->fail(call.bin,
-                      std::string(what) + " needs a process that takes a list");
+      call.node->fail(call.bin, std::string("expected ") + what +
+                                    " only in a stage that takes a list");
     return call;
   }
 
