@@ -26,7 +26,8 @@ public:
   std::string write(llvm::StringRef userFile) {
     out << "#include " << quote(userFile) << "\n"
         << "#include <pikort/abi.h>\n"
-        << "#include <cstring>\n#include <memory>\n#include <utility>\n"
+        << "#include <cstring>\n#include <memory>\n#include <new>\n"
+        << "#include <utility>\n"
         << "namespace piko_adapter {\n"
         << "using Pipeline = ::" << pipeline.typeName << ";\n";
     writeHelpers();
@@ -218,6 +219,9 @@ template <class T, int Rank> void save(const piko::Image<T, Rank> &image,
         out << "  save(state." << state.name << ", pikoir_get_state(p, " << id
             << "));\n";
     out << "  return pikoir_status(p);\n"
+        << "} catch (const std::bad_alloc &) {\n"
+        << "  return pikoir_fail_text(p, PIKORT_OUT_OF_MEMORY, \"out of "
+           "memory\");\n"
         << "} catch (const std::exception &error) {\n"
         << "  return pikoir_fail_text(p, PIKORT_BAD_PROGRAM, error.what());\n"
         << "}\n";
