@@ -5,7 +5,9 @@
 #include "Collectives.h"
 
 #include "mlir/Dialect/Arith/IR/Arith.h"
+#include "mlir/IR/IRMapping.h"
 #include "mlir/Transforms/LoopInvariantCodeMotionUtils.h"
+#include "llvm/ADT/SetVector.h"
 
 using namespace mlir;
 using namespace piko;
@@ -46,12 +48,20 @@ static StageOp findStage(Operation *op) {
   return {};
 }
 
+/// Whether an operation without operands gives the same value everywhere.
+static bool isConstant(Operation *op) {
+  if (op->getNumOperands() != 0 || op->getNumRegions() != 0 ||
+      op->getNumResults() == 0)
+    return false;
+  if (auto load = dyn_cast<LoadOp>(op))
+    return bool(lookupInPipeline<ConstantOp>(op, load.getStateAttr()));
+  return isMemoryEffectFree(op) && isSpeculatable(op);
+}
+
 /// Moves out what needs no slot, because all iterations share it.
 static ParallelForOp hoistInvariants(ParallelForOp parallel) {
   parallel.walk([&](Operation *op) {
-    if (op->getNumOperands() == 0 && op->getNumRegions() == 0 &&
-        op->getNumResults() != 0 && isMemoryEffectFree(op) &&
-        isSpeculatable(op))
+    if (isConstant(op))
       op->moveBefore(parallel);
   });
   moveLoopInvariantCode(
@@ -422,6 +432,28 @@ void LoopSplitter::replaceUses(
   }
 }
 
+/// Whether a value of a piece follows from its iteration and from what all
+/// pieces see, by so few cheap operations that a slot costs more. Adds these to
+/// `slice`, operands first.
+static bool isCheap(Value value, scf::ForOp piece,
+                    llvm::SetVector<Operation *> &slice) {
+  constexpr size_t most = 4;
+  if (value == piece.getInductionVar() ||
+      !piece->isAncestor(value.getParentRegion()->getParentOp()))
+    return true;
+  Operation *op = value.getDefiningOp();
+  if (!isa_and_nonnull<arith::AddIOp, arith::SubIOp, arith::MulIOp,
+                       arith::AndIOp, arith::ShLIOp, arith::IndexCastOp,
+                       arith::IndexCastUIOp, arith::TruncIOp, arith::ExtSIOp,
+                       arith::ExtUIOp, arith::CmpIOp, arith::SIToFPOp>(op))
+    return false;
+  for (Value operand : op->getOperands())
+    if (!isCheap(operand, piece, slice))
+      return false;
+  slice.insert(op);
+  return slice.size() <= most;
+}
+
 LogicalResult LoopSplitter::connectResult(Value value, scf::ForOp piece) {
   auto isOutside = [&](OpOperand &use) {
     return pieceOf(use.getOwner()) != piece;
@@ -433,6 +465,17 @@ LogicalResult LoopSplitter::connectResult(Value value, scf::ForOp piece) {
       array.getType().getLayout().isIdentity() &&
       array.getType().getElementType().isIntOrIndexOrFloat()) {
     connectArray(array, piece);
+    return success();
+  }
+  llvm::SetVector<Operation *> slice;
+  if (isCheap(value, piece, slice)) {
+    replaceUses(value, piece, [&](OpBuilder &at, Value iteration) {
+      IRMapping mapping;
+      mapping.map(piece.getInductionVar(), iteration);
+      for (Operation *op : slice)
+        at.clone(*op, mapping);
+      return mapping.lookup(value);
+    });
     return success();
   }
   if (!Slots::canHold(value.getType()))

@@ -72,7 +72,9 @@ static LogicalResult noteSubject(KernelOp kernel, func::FuncOp function,
 LogicalResult ConvertPikoToLLVMPass::convert(PipelineOp pipeline,
                                              LoweringContext &context) {
   WalkResult phase = pipeline.walk([](Operation *op) {
-    if (!isa<AssignOp, ProcessOp>(op))
+    auto schedule = dyn_cast<ScheduleOp>(op);
+    bool isDynamic = schedule && !schedule.getBody().empty();
+    if (!isa<AssignOp, ProcessOp>(op) && !isDynamic)
       return WalkResult::advance();
     op->emitError("expected the resolved level, but got a phase");
     return WalkResult::interrupt();
