@@ -48,3 +48,50 @@ piko.pipeline @MovingPixel rank 2 {
     }
   }
 }
+
+// -----
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+piko.pipeline @List rank 1 {
+  piko.image @depth : @F rank 1
+  piko.source @test
+  piko.stage @test bins [0] threads 64 : list @F -> [] {
+    // expected-note @below {{the phase takes a list, which may be of primitives that update any pixel}}
+    piko.process {
+    ^bb0(%l: !piko.list<@F>):
+      %zero = arith.constant 0 : index
+      // expected-remark @below {{stage 'test' runs each bin on one thread}}
+      piko.update @depth[%zero : index] {
+      ^bb0(%a: i32):
+        piko.yield [%a : i32]
+      }
+      piko.return
+    }
+  }
+}
+
+// -----
+
+// The pixel of an iteration.
+piko.record @F {"x" : i32 at 0} size 4 align 4
+piko.pipeline @Iterations rank 1 {
+  piko.image @depth : @F rank 1
+  piko.source @test
+  piko.stage @test bins [0] threads 64 : @F -> [] {
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      %n = arith.constant 8 : index
+      // expected-note @below {{the pixel depends on this}}
+      piko.parallel_for %n {
+      ^bb0(%i: index):
+        // expected-remark @below {{stage 'test' runs each bin on one thread}}
+        piko.update @depth[%i : index] {
+        ^bb0(%a: i32):
+          piko.yield [%a : i32]
+        }
+        piko.yield
+      }
+      piko.return
+    }
+  }
+}

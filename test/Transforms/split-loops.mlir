@@ -193,7 +193,8 @@ piko.pipeline @Varying rank 1 {
       piko.parallel_for %n {
       ^bb0(%i: index):
         %int = arith.index_cast %i : index to i32
-        %odd = arith.cmpi sgt, %int, %c7 : i32
+        %rest = arith.remsi %int, %c7 : i32
+        %odd = arith.cmpi sgt, %rest, %c1 : i32
         %r = scf.if %odd -> i32 {
           %s = piko.reduce %int : i32 {
           ^bb0(%a: i32, %b: i32):
@@ -205,6 +206,47 @@ piko.pipeline @Varying rank 1 {
           scf.yield %int : i32
         }
         %z = arith.sitofp %r : i32 to f32
+        %q = piko.append %w[0] (%z) : f32 -> !piko.prim<@F>
+        piko.yield
+      }
+      piko.close_writer %w
+    } {piko.schedule = "load_balance"}
+    piko.close_bins %bins : !piko.bins<@F>
+  }
+}
+
+// -----
+
+// What is cheap to compute from the iteration is computed again.
+piko.record @F {"z" : f32 at 0} size 4 align 4
+// CHECK-LABEL: piko.pipeline @Cheap
+// CHECK-NOT:     piko.scratch
+// CHECK:         scf.for
+// CHECK:           piko.store
+// CHECK:         scf.for %[[I:.*]] = %c0
+// CHECK:           %[[NEXT:.*]] = arith.addi %[[I]], %c1
+// CHECK:           %[[INT:.*]] = arith.index_cast %[[NEXT]]
+// CHECK:           arith.sitofp %[[INT]]
+// CHECK-NOT:     piko.scratch
+piko.pipeline @Cheap rank 1 {
+  piko.buffer @b : @F
+  piko.source @a
+  piko.edge @a[0] -> @b2
+  piko.stage @a bins [0] threads 1 : @F -> [@F] {}
+  piko.stage @b2 bins [0] threads 1 : @F -> [] {}
+  piko.kernel @k {
+    %bins = piko.open_bins @a : !piko.bins<@F>
+    %n = piko.unit_count %bins : !piko.bins<@F>
+    %c1 = arith.constant 1 : index
+    scf.forall (%u) in (%n) {
+      %w = piko.open_writer %bins[%u] : !piko.bins<@F>
+      piko.parallel_for %n {
+      ^bb0(%i: index):
+        %next = arith.addi %i, %c1 : index
+        %int = arith.index_cast %next : index to i32
+        %z = arith.sitofp %int : i32 to f32
+        piko.store %z, @b[%i : index] "z" : f32
+        piko.sync
         %q = piko.append %w[0] (%z) : f32 -> !piko.prim<@F>
         piko.yield
       }

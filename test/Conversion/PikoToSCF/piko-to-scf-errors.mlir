@@ -1,4 +1,4 @@
-// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(convert-piko-to-scf))' --verify-diagnostics %s
+// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(convert-piko-to-scf))' --split-input-file --verify-diagnostics %s
 
 piko.record @F {"x" : i32 at 0} size 4 align 4
 piko.pipeline @P rank 1 {
@@ -15,5 +15,26 @@ piko.pipeline @P rank 1 {
       }
       piko.return
     }
+  }
+}
+
+// -----
+
+// Which list it is must be known.
+piko.record @F {"x" : i32 at 0} size 4 align 4
+piko.pipeline @P rank 1 {
+  piko.source @a
+  piko.stage @a bins [0] threads 1 : list @F -> [] {}
+  piko.kernel @k {
+    %bins = piko.open_bins @a : !piko.bins<@F>
+    %zero = arith.constant 0 : index
+    %n = piko.unit_count %bins : !piko.bins<@F>
+    %some = arith.cmpi sgt, %n, %zero : index
+    %all = piko.list %bins[%zero to %n] : !piko.bins<@F> -> !piko.list<@F>
+    %none = piko.list %bins[%zero to %zero] : !piko.bins<@F> -> !piko.list<@F>
+    %one = arith.select %some, %all, %none : !piko.list<@F>
+    // expected-error @below {{expected to be at the resolved level}}
+    %size = piko.list_size %one : !piko.list<@F>
+    piko.fail_list @a at %size of %size
   }
 }
