@@ -2,30 +2,30 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // A reference that may be to one of several things, such as std::max returns,
-// becomes the number of the thing: each access branches on it. A pointer that
-// walks through an array becomes an index, and pointers into one array are
-// compared and subtracted as offsets.
+// becomes numbers: which kind of thing it is, on which each access branches,
+// and what its address was computed from when it was chosen, such as the index
+// of an element. A pointer that walks through an array becomes an index, and
+// pointers into one array are compared and subtracted as offsets.
 //
 //===----------------------------------------------------------------------===//
 
 #include "Cleanup.h"
 
 #include "llvm/ADT/SetVector.h"
-#include "llvm/Analysis/CFG.h"
+#include "llvm/IR/CFG.h"
 #include "llvm/IR/Dominators.h"
 #include "llvm/IR/InstIterator.h"
 #include "llvm/IR/Instructions.h"
 #include "llvm/Transforms/Utils/BasicBlockUtils.h"
 #include "llvm/Transforms/Utils/Local.h"
-#include "llvm/Transforms/Utils/SSAUpdater.h"
 
 #include <numeric>
 
 using namespace piko;
 using llvm::dyn_cast;
 
-/// A reference to one of more things than this is an error.
-static constexpr size_t targetLimit = 64;
+/// A reference to one of more kinds of things than this is an error.
+static constexpr size_t shapeLimit = 64;
 
 namespace {
 
@@ -62,6 +62,9 @@ public:
   }
 
 private:
+  /// A number for each choice.
+  using Web = llvm::DenseMap<llvm::Value *, llvm::Value *>;
+
   static bool isChoice(const llvm::Value *value) {
     return value->getType()->isPointerTy() &&
            llvm::isa<llvm::PHINode, llvm::SelectInst>(value);
@@ -162,6 +165,19 @@ private:
     llvm::SmallVector<llvm::GetElementPtrInst *> steps;
   };
 
+  /// Targets that are computed in the same way from different numbers.
+  struct Shape {
+    llvm::Value *example;
+    /// The numbers, each for each choice.
+    llvm::SmallVector<Web> numbers;
+  };
+
+  /// Whether a number is the same whenever it is looked at.
+  static bool isSettled(llvm::Value *number) {
+    auto *definition = dyn_cast<llvm::Instruction>(number);
+    return !definition || definition->getParent()->isEntryBlock();
+  }
+
   void makeTags(llvm::Instruction *first,
                 llvm::SmallPtrSet<llvm::Value *, 8> &done) {
     // All choices that lead to this one, and what they choose from.
@@ -171,10 +187,9 @@ private:
       auto *choice = llvm::cast<llvm::User>(choices[i]);
       unsigned begin = llvm::isa<llvm::SelectInst>(choice) ? 1 : 0;
       for (llvm::Value *operand : llvm::drop_begin(choice->operands(), begin))
-        (isChoice(operand) ? choices : targets).insert(operand);
+        if (!llvm::isa<llvm::UndefValue>(operand))
+          (isChoice(operand) ? choices : targets).insert(operand);
     }
-    if (targets.size() > targetLimit)
-      return;
     for (llvm::Value *target : targets) {
       Address address = getAddress(target, memory.data);
       if (!isChoice(address.base))
@@ -186,22 +201,66 @@ private:
     }
 
     llvm::SmallVector<Access> accesses;
+    llvm::SmallVector<llvm::ICmpInst *> tests;
     for (llvm::Value *choice : choices) {
       done.insert(choice);
       collectAccesses(choice, choice, {}, accesses);
+      for (llvm::User *user : choice->users())
+        if (auto *test = dyn_cast<llvm::ICmpInst>(user))
+          if (test->isEquality() &&
+              llvm::isa<llvm::ConstantPointerNull>(test->getOperand(1)))
+            tests.push_back(test);
     }
-    llvm::erase_if(accesses, [&](const Access &access) {
-      return !llvm::all_of(targets, [&](llvm::Value *target) {
-        return isAvailable(target, access);
-      });
-    });
-    if (accesses.empty())
+    if ((accesses.empty() && tests.empty()) ||
+        !llvm::all_of(
+            targets, [&](llvm::Value *target) { return isComputable(target); }))
       return;
-    std::map<llvm::Value *, llvm::Value *> tags =
-        makeTagValues(choices, targets);
-    for (const Access &access : accesses)
-      rewrite(access, tags[access.choice], targets.getArrayRef());
-    changed = true;
+
+    llvm::SmallVector<Shape> shapes;
+    std::map<llvm::Value *, unsigned> shapeOf;
+    for (llvm::Value *target : targets) {
+      unsigned number = 0;
+      while (number < shapes.size() &&
+             !isSameShape(target, shapes[number].example))
+        ++number;
+      if (number == shapes.size())
+        shapes.push_back({target, {}});
+      shapeOf[target] = number;
+    }
+    if (shapes.size() > shapeLimit)
+      return;
+    Web tags = makeWeb(choices, builder.getInt32Ty(), [&](llvm::Value *target) {
+      return builder.getInt32(shapeOf[target]);
+    });
+    for (auto [number, shape] : llvm::enumerate(shapes))
+      for (auto [i, first] : llvm::enumerate(getNumbers(shape.example))) {
+        auto get = [&, number = number,
+                    i = i](llvm::Value *target) -> llvm::Value * {
+          return shapeOf[target] == number ? getNumbers(target)[i] : nullptr;
+        };
+        bool isCommon =
+            isSettled(first) &&
+            llvm::all_of(targets, [&, first = first](llvm::Value *target) {
+              llvm::Value *other = get(target);
+              return !other || other == first;
+            });
+        Web common;
+        for (llvm::Value *choice : choices)
+          common[choice] = first;
+        shape.numbers.push_back(
+            isCommon ? common : makeWeb(choices, first->getType(), get));
+      }
+    for (llvm::ICmpInst *test : tests)
+      rewriteTest(test, tags[test->getOperand(0)], shapes);
+    // Nobody reads through a null pointer.
+    llvm::SmallVector<unsigned> things;
+    for (auto [number, shape] : llvm::enumerate(shapes))
+      if (!llvm::isa<llvm::ConstantPointerNull>(shape.example))
+        things.push_back(number);
+    if (!things.empty())
+      for (const Access &access : accesses)
+        rewrite(access, tags[access.choice], shapes, things);
+    changed |= !tests.empty() || (!things.empty() && !accesses.empty());
   }
 
   /// gep (phi a, b) -> phi (gep a), (gep b), for the step nearest to the
@@ -259,110 +318,177 @@ private:
     }
   }
 
-  /// Whether a pointer can be computed again at an instruction.
-  bool isAvailable(llvm::Value *value, const Access &access) {
-    auto *definition = dyn_cast<llvm::Instruction>(value);
-    if (!definition || dominance.dominates(definition, access.instruction))
+  //===--------------------------------------------------------------------===//
+  // What addresses are computed from
+  //===--------------------------------------------------------------------===//
+
+  static bool isBase(const llvm::Value *pointer) {
+    return !llvm::isa<llvm::Instruction>(pointer) ||
+           llvm::isa<llvm::AllocaInst>(pointer);
+  }
+
+  /// The operands that an address depends on.
+  static llvm::iterator_range<llvm::User::op_iterator>
+  getInputs(llvm::Instruction *definition) {
+    if (auto *call = dyn_cast<llvm::CallBase>(definition))
+      return {call->arg_begin(), call->arg_end()};
+    return definition->operands();
+  }
+  /// Whether an input is the same number for all targets of one shape.
+  static bool isFixed(const llvm::Instruction *definition,
+                      const llvm::Value *input) {
+    return llvm::isa<llvm::GetElementPtrInst>(definition) &&
+           llvm::isa<llvm::Constant>(input);
+  }
+
+  /// Whether a pointer can be computed again, given its numbers.
+  bool isComputable(llvm::Value *pointer) {
+    if (isBase(pointer))
       return true;
-    if (!value->getType()->isPointerTy())
-      return isCarried(definition, access);
-    if (llvm::isa<llvm::AllocaInst>(definition))
-      return false;
+    auto *definition = llvm::cast<llvm::Instruction>(pointer);
     // Markers that give pointers have no effect, and a layout.
     if (!memory.getLayout(definition) &&
         !llvm::isa<llvm::GetElementPtrInst>(definition))
       return false;
-    return llvm::all_of(definition->operands(), [&](llvm::Value *operand) {
-      return isAvailable(operand, access);
+    return llvm::all_of(getInputs(definition), [&](llvm::Value *input) {
+      return !input->getType()->isPointerTy() || isComputable(input);
     });
   }
 
-  /// Whether a number that the target was computed from is still the latest of
-  /// its kind at the access: whoever computes it anew must choose anew.
-  bool isCarried(llvm::Instruction *number, const Access &access) {
-    auto *choice = llvm::cast<llvm::Instruction>(access.choice);
-    llvm::SmallPtrSet<llvm::BasicBlock *, 1> without = {choice->getParent()};
-    return number->getParent() == choice->getParent() ||
-           access.instruction->getParent() == choice->getParent() ||
-           !llvm::isPotentiallyReachable(number->getParent(),
-                                         access.instruction->getParent(),
-                                         &without, &dominance);
+  static bool isSameShape(llvm::Value *left, llvm::Value *right) {
+    if (left == right)
+      return true;
+    if (isBase(left) || isBase(right))
+      return false;
+    auto *a = llvm::cast<llvm::Instruction>(left);
+    auto *b = llvm::cast<llvm::Instruction>(right);
+    if (!a->isSameOperationAs(b) ||
+        (llvm::isa<llvm::CallBase>(a) &&
+         llvm::cast<llvm::CallBase>(a)->getCalledOperand() !=
+             llvm::cast<llvm::CallBase>(b)->getCalledOperand()))
+      return false;
+    for (auto [x, y] : llvm::zip(getInputs(a), getInputs(b))) {
+      if (x->getType() != y->getType())
+        return false;
+      if (x->getType()->isPointerTy()      ? !isSameShape(x, y)
+          : isFixed(a, x) || isFixed(b, y) ? x != y
+                                           : false)
+        return false;
+    }
+    return true;
   }
 
-  llvm::Value *recompute(llvm::Value *value, llvm::Instruction *at) {
-    auto *definition = dyn_cast<llvm::Instruction>(value);
-    if (!definition || dominance.dominates(definition, at))
-      return value;
-    if (!value->getType()->isPointerTy()) {
-      llvm::SSAUpdater updater;
-      updater.Initialize(value->getType(), "");
-      updater.AddAvailableValue(&function.getEntryBlock(),
-                                llvm::PoisonValue::get(value->getType()));
-      updater.AddAvailableValue(definition->getParent(), value);
-      return updater.GetValueInMiddleOfBlock(at->getParent());
-    }
+  static void collectNumbers(llvm::Value *pointer,
+                             llvm::SmallVectorImpl<llvm::Value *> &numbers) {
+    if (isBase(pointer))
+      return;
+    auto *definition = llvm::cast<llvm::Instruction>(pointer);
+    for (llvm::Value *input : getInputs(definition))
+      if (input->getType()->isPointerTy())
+        collectNumbers(input, numbers);
+      else if (!isFixed(definition, input))
+        numbers.push_back(input);
+  }
+  static llvm::SmallVector<llvm::Value *> getNumbers(llvm::Value *pointer) {
+    llvm::SmallVector<llvm::Value *> numbers;
+    collectNumbers(pointer, numbers);
+    return numbers;
+  }
+
+  /// Computes a pointer again, from numbers in the order of getNumbers.
+  llvm::Value *recompute(llvm::Value *pointer,
+                         llvm::ArrayRef<llvm::Value *> &numbers) {
+    if (isBase(pointer))
+      return pointer;
+    auto *definition = llvm::cast<llvm::Instruction>(pointer);
     llvm::Instruction *clone = definition->clone();
-    for (llvm::Use &operand : clone->operands())
-      operand.set(recompute(operand.get(), at));
+    for (llvm::Use &input : getInputs(clone)) {
+      if (input->getType()->isPointerTy()) {
+        input.set(recompute(input.get(), numbers));
+      } else if (!isFixed(definition, input.get())) {
+        input.set(numbers.front());
+        numbers = numbers.drop_front();
+      }
+    }
     return builder.Insert(clone);
   }
 
-  std::map<llvm::Value *, llvm::Value *>
-  makeTagValues(const llvm::SetVector<llvm::Value *> &choices,
-                const llvm::SetVector<llvm::Value *> &targets) {
-    std::map<llvm::Value *, llvm::Value *> tags;
-    for (auto [number, target] : llvm::enumerate(targets))
-      tags[target] = builder.getInt32(number);
+  /// A number for each choice, chosen as the choice is: what `get` says of a
+  /// target, or any number where it says nothing.
+  Web makeWeb(const llvm::SetVector<llvm::Value *> &choices, llvm::Type *type,
+              llvm::function_ref<llvm::Value *(llvm::Value *)> get) {
+    Web web;
+    llvm::Value *unset = llvm::PoisonValue::get(type);
     for (llvm::Value *choice : choices) {
-      if (auto *phi = dyn_cast<llvm::PHINode>(choice)) {
-        builder.SetInsertPoint(phi);
-        tags[choice] = builder.CreatePHI(builder.getInt32Ty(),
-                                         phi->getNumIncomingValues());
-      } else {
-        auto *select = llvm::cast<llvm::SelectInst>(choice);
-        builder.SetInsertPoint(select);
-        // Operands are filled in below: a select may come before its operands'
-        // phis in this list.
-        llvm::Value *zero = builder.getInt32(0);
-        tags[choice] = builder.Insert(
-            llvm::SelectInst::Create(select->getCondition(), zero, zero));
-      }
+      auto *instruction = llvm::cast<llvm::Instruction>(choice);
+      builder.SetInsertPoint(instruction);
+      if (auto *phi = dyn_cast<llvm::PHINode>(choice))
+        web[choice] = builder.CreatePHI(type, phi->getNumIncomingValues());
+      else
+        web[choice] = builder.Insert(
+            llvm::SelectInst::Create(instruction->getOperand(0), unset, unset));
     }
+    auto find = [&](llvm::Value *operand) -> llvm::Value * {
+      if (isChoice(operand))
+        return web[operand];
+      llvm::Value *value =
+          llvm::isa<llvm::UndefValue>(operand) ? nullptr : get(operand);
+      return value ? value : unset;
+    };
     for (llvm::Value *choice : choices) {
       if (auto *phi = dyn_cast<llvm::PHINode>(choice)) {
-        auto *tag = llvm::cast<llvm::PHINode>(tags[choice]);
+        auto *made = llvm::cast<llvm::PHINode>(web[choice]);
         for (unsigned i = 0; i < phi->getNumIncomingValues(); ++i)
-          tag->addIncoming(tags[phi->getIncomingValue(i)],
-                           phi->getIncomingBlock(i));
+          made->addIncoming(find(phi->getIncomingValue(i)),
+                            phi->getIncomingBlock(i));
       } else {
         auto *select = llvm::cast<llvm::SelectInst>(choice);
-        auto *tag = llvm::cast<llvm::SelectInst>(tags[choice]);
-        tag->setTrueValue(tags[select->getTrueValue()]);
-        tag->setFalseValue(tags[select->getFalseValue()]);
+        auto *made = llvm::cast<llvm::SelectInst>(web[choice]);
+        made->setTrueValue(find(select->getTrueValue()));
+        made->setFalseValue(find(select->getFalseValue()));
       }
     }
-    return tags;
+    return web;
   }
 
+  //===--------------------------------------------------------------------===//
+  // Accesses
+  //===--------------------------------------------------------------------===//
+
+  /// Whether a reference is to nothing.
+  void rewriteTest(llvm::ICmpInst *test, llvm::Value *tag,
+                   llvm::ArrayRef<Shape> shapes) {
+    builder.SetInsertPoint(test);
+    llvm::Value *isNull = builder.getFalse();
+    for (auto [number, shape] : llvm::enumerate(shapes))
+      if (llvm::isa<llvm::ConstantPointerNull>(shape.example))
+        isNull = builder.CreateICmpEQ(tag, builder.getInt32(number));
+    test->replaceAllUsesWith(test->getPredicate() == llvm::ICmpInst::ICMP_EQ
+                                 ? isNull
+                                 : builder.CreateNot(isNull));
+    test->eraseFromParent();
+  }
+
+  /// Branches on the tag, one way for each of the shapes that are things.
   void rewrite(const Access &access, llvm::Value *tag,
-               llvm::ArrayRef<llvm::Value *> targets) {
+               llvm::ArrayRef<Shape> shapes, llvm::ArrayRef<unsigned> things) {
     llvm::Instruction *original = access.instruction;
     llvm::SmallVector<llvm::Value *> results;
     llvm::Instruction *at = original;
     llvm::SmallVector<std::pair<llvm::Instruction *, llvm::Instruction *>>
         forks;
-    // A chain of tests; the last target needs none.
-    for (size_t i = 0; i + 1 < targets.size(); ++i) {
+    // A chain of tests; the last one needs none.
+    for (unsigned thing : things.drop_back()) {
       builder.SetInsertPoint(at);
-      llvm::Value *test = builder.CreateICmpEQ(tag, builder.getInt32(i));
+      llvm::Value *test = builder.CreateICmpEQ(tag, builder.getInt32(thing));
       llvm::Instruction *then, *other;
       llvm::SplitBlockAndInsertIfThenElse(test, at, &then, &other);
       dominance.recalculate(function);
-      results.push_back(accessAt(access, targets[i], then));
+      results.push_back(accessAt(access, shapes[thing], then));
       forks.push_back({then, at});
       at = other;
     }
-    llvm::Value *last = accessAt(access, targets.back(), at);
+    llvm::Value *last = accessAt(access, shapes[things.back()], at);
     for (size_t i = forks.size(); i-- > 0 && last;) {
       llvm::Instruction *then = forks[i].first;
       llvm::BasicBlock *join = then->getSuccessor(0);
@@ -380,12 +506,16 @@ private:
     dominance.recalculate(function);
   }
 
-  /// Repeats an access with a target in the place of the choice; null for a
+  /// Repeats an access with a thing in the place of the choice; null for a
   /// store.
-  llvm::Value *accessAt(const Access &access, llvm::Value *target,
+  llvm::Value *accessAt(const Access &access, const Shape &shape,
                         llvm::Instruction *at) {
     builder.SetInsertPoint(at);
-    llvm::Value *pointer = recompute(target, at);
+    llvm::SmallVector<llvm::Value *> values;
+    for (const Web &web : shape.numbers)
+      values.push_back(web.lookup(access.choice));
+    llvm::ArrayRef<llvm::Value *> numbers = values;
+    llvm::Value *pointer = recompute(shape.example, numbers);
     for (llvm::GetElementPtrInst *step : llvm::reverse(access.steps)) {
       llvm::Instruction *clone = step->clone();
       clone->setOperand(0, pointer);
