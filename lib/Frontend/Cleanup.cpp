@@ -25,6 +25,8 @@
 #include "llvm/Transforms/InstCombine/InstCombine.h"
 #include "llvm/Transforms/Scalar/ADCE.h"
 #include "llvm/Transforms/Scalar/EarlyCSE.h"
+#include "llvm/Transforms/Scalar/LoopPassManager.h"
+#include "llvm/Transforms/Scalar/LoopUnrollPass.h"
 #include "llvm/Transforms/Scalar/SROA.h"
 #include "llvm/Transforms/Scalar/SimplifyCFG.h"
 #include "llvm/Transforms/Utils/Cloning.h"
@@ -118,9 +120,6 @@ private:
           name == "malloc" || name == "free" || name == "calloc" ||
           name == "realloc")
         return fail(call, "dynamic allocation");
-      if (llvm::StringRef(name).starts_with("piko::"))
-        return fail(call, "'" + llvm::StringRef(name).rsplit("::").second +
-                              "', which the compiler cannot do yet");
       return fail(call,
                   "a call of '" + name + "', which has no body in this file");
     }
@@ -306,6 +305,12 @@ static bool cleanUpFunction(llvm::Function &function, ParsedUnit &unit,
   }
   shareArrays(function, memory);
   llvm::FunctionPassManager promote;
+  // Initial values are constants, even where they are set in a loop.
+  if (function.getName().contains("_clear_")) {
+    promote.addPass(llvm::InstCombinePass());
+    promote.addPass(llvm::createFunctionToLoopPassAdaptor(
+        llvm::LoopFullUnrollPass(/*OptLevel=*/3)));
+  }
   promote.addPass(llvm::SROAPass(llvm::SROAOptions::PreserveCFG));
   promote.addPass(llvm::EarlyCSEPass(/*UseMemorySSA=*/true));
   promote.addPass(llvm::SimplifyCFGPass());
@@ -326,9 +331,31 @@ static bool cleanUpFunction(llvm::Function &function, ParsedUnit &unit,
   return true;
 }
 
+/// Gives bases of the state as places in it.
+static void rebaseState(llvm::Module &module, MarkerTable &markers) {
+  for (llvm::Function &function : module) {
+    auto found = markers.find(function.getName());
+    if (found == markers.end() || found->second.kind != MarkerKind::state ||
+        found->second.offset == 0)
+      continue;
+    int64_t offset = found->second.offset;
+    llvm::FunctionCallee whole =
+        module.getOrInsertFunction("piko.state", function.getFunctionType());
+    markers["piko.state"] = Marker{MarkerKind::state};
+    for (llvm::User *user : llvm::make_early_inc_range(function.users())) {
+      auto *call = llvm::cast<llvm::CallInst>(user);
+      llvm::IRBuilder<> builder(call);
+      call->replaceAllUsesWith(builder.CreateConstInBoundsGEP1_64(
+          builder.getInt8Ty(), builder.CreateCall(whole), offset));
+      call->eraseFromParent();
+    }
+  }
+}
+
 bool piko::cleanUp(ParsedUnit &unit, MemoryMap &memory,
                    mlir::MLIRContext &context) {
   llvm::Module &module = *unit.module;
+  rebaseState(module, unit.markers);
   setMarkerEffects(module, unit.markers);
   std::vector<llvm::Function *> wrappers, mathFunctions;
   for (llvm::Function &function : module) {

@@ -41,11 +41,16 @@ namespace accessor {
 constexpr llvm::StringLiteral emit = "piko.emit";
 constexpr llvm::StringLiteral clear = "piko.clear";
 constexpr llvm::StringLiteral updateBegin = "piko.update_begin";
-constexpr llvm::StringLiteral updateValue = "piko.update_value.";
 constexpr llvm::StringLiteral updateEnd = "piko.update_end";
+constexpr llvm::StringLiteral reduceBegin = "piko.reduce_begin";
+constexpr llvm::StringLiteral scanBegin = "piko.scan_begin";
+constexpr llvm::StringLiteral combineEnd = "piko.combine_end";
+/// A number that one of the above gives.
+constexpr llvm::StringLiteral given = "piko.given.";
 constexpr llvm::StringLiteral load = "piko.load.";
 constexpr llvm::StringLiteral store = "piko.store.";
 constexpr llvm::StringLiteral atomic = "piko.atomic.";
+constexpr llvm::StringLiteral atomicFetch = "piko.atomic_fetch.";
 constexpr llvm::StringLiteral share = "piko.share";
 } // namespace accessor
 

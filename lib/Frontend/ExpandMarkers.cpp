@@ -52,6 +52,11 @@ private:
     case MarkerKind::updateBegin:
       expandBegin(call, marker);
       break;
+    case MarkerKind::reduceBegin:
+    case MarkerKind::scanBegin:
+    case MarkerKind::combineEnd:
+      expandCombination(call, marker);
+      break;
     case MarkerKind::updateEnd: {
       llvm::SmallVector<llvm::Value *> values;
       loadRecord(call->getArgOperand(0), marker.record, values);
@@ -76,12 +81,36 @@ private:
     llvm::Value *token =
         callAccessor(accessor::updateBegin, builder.getInt64Ty(), arguments);
     unsigned number = 0;
-    for (const MemoryPiece &piece : getRecordPieces(marker.record)) {
-      std::string name = accessor::updateValue.str();
+    storeRecord(call->getArgOperand(0), marker.record, token, number);
+  }
+
+  void expandCombination(llvm::CallInst *call, const Marker &marker) {
+    bool isEnd = marker.kind == MarkerKind::combineEnd;
+    llvm::SmallVector<llvm::Value *> values;
+    loadRecord(call->getArgOperand(isEnd ? 0 : 2), marker.record, values);
+    if (marker.kind == MarkerKind::scanBegin)
+      loadRecord(call->getArgOperand(3), marker.record, values);
+    llvm::Value *token = callAccessor(isEnd ? accessor::combineEnd
+                                      : marker.kind == MarkerKind::scanBegin
+                                          ? accessor::scanBegin
+                                          : accessor::reduceBegin,
+                                      builder.getInt64Ty(), values);
+    unsigned number = 0;
+    storeRecord(call->getArgOperand(isEnd ? 1 : 0), marker.record, token,
+                number);
+    if (!isEnd)
+      storeRecord(call->getArgOperand(1), marker.record, token, number);
+  }
+
+  /// Fills a record with the numbers that an accessor gives, from `number` on.
+  void storeRecord(llvm::Value *pointer, unsigned record, llvm::Value *token,
+                   unsigned &number) {
+    for (const MemoryPiece &piece : getRecordPieces(record)) {
+      std::string name = accessor::given.str();
       llvm::raw_string_ostream(name) << *piece.type;
       llvm::Value *value =
           callAccessor(name, piece.type, {token, builder.getInt32(number++)});
-      builder.CreateStore(value, at(call->getArgOperand(0), piece.offset));
+      builder.CreateStore(value, at(pointer, piece.offset));
     }
   }
 
@@ -121,9 +150,12 @@ private:
     auto *declaration = llvm::cast<llvm::Function>(callee.getCallee());
     declaration->setDoesNotThrow();
     declaration->setWillReturn();
-    // An update reads and writes what other calls read: nothing moves past its
-    // ends.
-    if (name != accessor::updateBegin && name != accessor::updateEnd)
+    // An update reads and writes what other calls read, and other iterations
+    // come to a barrier: nothing moves past their ends.
+    if (!llvm::is_contained({accessor::updateBegin, accessor::updateEnd,
+                             accessor::reduceBegin, accessor::scanBegin,
+                             accessor::combineEnd},
+                            name))
       declaration->setOnlyAccessesInaccessibleMemory();
     setInPlace(*declaration);
     return builder.CreateCall(callee, arguments);

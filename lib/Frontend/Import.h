@@ -19,17 +19,24 @@
 namespace piko {
 
 /// Writes the code of a stage's phase into a function of its primitive; null
-/// after an error. An update is still a pair of placeholder calls.
+/// after an error. Updates, reductions and scans are still pairs of placeholder
+/// calls.
 mlir::OwningOpRef<mlir::func::FuncOp>
 importPhase(llvm::Function &function, WrapperKind phase, unsigned stage,
             ParsedUnit &unit, MemoryMap &memory, mlir::MLIRContext &context);
 
-/// Lifts branches to scf and makes piko.update of its placeholders.
+/// Lifts branches to scf and resolves the placeholders.
 llvm::LogicalResult structurePhase(mlir::func::FuncOp function);
+
+/// Makes piko.update, piko.reduce and piko.scan of their placeholders.
+llvm::LogicalResult resolveBrackets(mlir::func::FuncOp function);
 
 /// The placeholders: calls of functions that do not exist.
 constexpr llvm::StringLiteral updateBeginName = "piko.update_begin.";
 constexpr llvm::StringLiteral updateEndName = "piko.update_end";
+constexpr llvm::StringLiteral reduceBeginName = "piko.reduce_begin";
+constexpr llvm::StringLiteral scanBeginName = "piko.scan_begin";
+constexpr llvm::StringLiteral combineEndName = "piko.combine_end";
 
 } // namespace piko
 

@@ -80,6 +80,38 @@ void PhaseImporter::importLoopExit(const ParallelLoop *loop) {
   }
 }
 
+/// A call that takes the same numbers and gives them `count` times over.
+mlir::func::CallOp PhaseImporter::makePlaceholder(llvm::StringRef name,
+                                                  llvm::CallInst *call,
+                                                  unsigned count) {
+  llvm::SmallVector<mlir::Value> operands;
+  for (llvm::Value *value : call->args())
+    operands.push_back(scalars.get(value));
+  llvm::SmallVector<mlir::Type> types;
+  for (unsigned i = 0; i < count; ++i)
+    llvm::append_range(types, mlir::ValueRange(operands).getTypes());
+  return make<mlir::func::CallOp>(name, types, operands);
+}
+
+LogicalResult PhaseImporter::importCombination(llvm::CallInst *call,
+                                               llvm::StringRef name) {
+  bool isScan = name == accessor::scanBegin;
+  if (failed(checkBarrier(call, isScan ? "scan" : "reduce, any, all or count")))
+    return failure();
+  // A scan takes its value and its empty value, and combines two values.
+  placeholders[call] = makePlaceholder(isScan ? scanBeginName : reduceBeginName,
+                                       call, isScan ? 1 : 2);
+  return success();
+}
+
+LogicalResult PhaseImporter::importSort(llvm::CallInst *call, bool isSigned) {
+  if (failed(checkBarrier(call, "sort")))
+    return failure();
+  mlir::Value key = scalars.get(call->getArgOperand(0));
+  bool isUnsigned = !isSigned && !llvm::isa<mlir::FloatType>(key.getType());
+  return setIndex(call, make<SortOp>(builder.getIndexType(), isUnsigned, key));
+}
+
 LogicalResult PhaseImporter::checkBarrier(llvm::CallInst *call,
                                           llvm::StringRef what) {
   if (failed(expectPhase(call, WrapperKind::Process, what)))

@@ -33,9 +33,12 @@ LogicalResult PhaseImporter::importMarker(llvm::CallInst *call,
   case MarkerKind::element:
   case MarkerKind::phase:
   case MarkerKind::loopFirst:
-  case MarkerKind::loopMore:
   case MarkerKind::loopNext:
     return success();
+  case MarkerKind::loopMore:
+    if (loops.getByHeader(call->getParent()))
+      return success();
+    return reject(call, "a parallelFor whose iterations never end");
   case MarkerKind::listSize:
   case MarkerKind::listAt:
   case MarkerKind::extent:
@@ -51,6 +54,8 @@ LogicalResult PhaseImporter::importMarker(llvm::CallInst *call,
       return failure();
     make<SyncOp>();
     return success();
+  case MarkerKind::sort:
+    return importSort(call, marker.isSigned);
   default:
     return importDirective(call, marker);
   }

@@ -169,9 +169,15 @@ LogicalResult PhaseImporter::importAccessor(llvm::CallInst *call,
     return importEmit(call);
   if (name == accessor::updateBegin)
     return importUpdateBegin(call);
-  if (name.starts_with(accessor::updateValue)) {
-    auto *begin = cast<llvm::CallInst>(call->getArgOperand(0));
-    values[call] = updates[begin].getResult(
+  if (name == accessor::reduceBegin || name == accessor::scanBegin)
+    return importCombination(call, name);
+  if (name == accessor::combineEnd) {
+    placeholders[call] = makePlaceholder(combineEndName, call, 1);
+    return success();
+  }
+  if (name.starts_with(accessor::given)) {
+    auto *giver = cast<llvm::CallInst>(call->getArgOperand(0));
+    values[call] = placeholders[giver].getResult(
         cast<llvm::ConstantInt>(call->getArgOperand(1))->getZExtValue());
     return success();
   }
@@ -275,7 +281,7 @@ LogicalResult PhaseImporter::importUpdateBegin(llvm::CallInst *call) {
   llvm::SmallVector<mlir::Type> types;
   for (const LeafField &field : record.fields)
     types.append(field.getElementCount(), scalars.getType(field.type));
-  updates[call] = mlir::func::CallOp::create(
+  placeholders[call] = mlir::func::CallOp::create(
       builder, *location, (updateBeginName + state->name).str(), types,
       getCoordinates(llvm::drop_begin(call->args()), state->rank));
   return success();

@@ -14,16 +14,18 @@ std::optional<MarkerKind> piko::getMarkerKind(llvm::StringRef name) {
   return llvm::StringSwitch<std::optional<MarkerKind>>(name) MARKER(state)
       MARKER(input) MARKER(element) MARKER(listSize) MARKER(listAt) MARKER(
              extent) MARKER(imageExtent) MARKER(emit) MARKER(updateBegin)
-          MARKER(updateEnd) MARKER(atomic) MARKER(loopFirst) MARKER(loopMore)
-              MARKER(loopNext) MARKER(sync) MARKER(bin) MARKER(binAt)
-                  MARKER(binLo) MARKER(binHi) MARKER(domain) MARKER(assignBin)
-                      MARKER(assignAll) MARKER(assignPrevious) MARKER(assignBox)
-                          MARKER(schedule) MARKER(endStage) MARKER(endBin)
-                              MARKER(batch) MARKER(everyBin) MARKER(order)
-                                  MARKER(source) MARKER(connect)
-                                      MARKER(allocateForSource) MARKER(phase)
-                                          MARKER(clear)
-                                              .Default(std::nullopt);
+          MARKER(updateEnd) MARKER(atomic) MARKER(atomicFetch) MARKER(
+              reduceBegin) MARKER(scanBegin) MARKER(combineEnd) MARKER(sort)
+              MARKER(loopFirst) MARKER(loopMore) MARKER(loopNext) MARKER(sync)
+                  MARKER(bin) MARKER(binAt) MARKER(binLo) MARKER(binHi)
+                      MARKER(domain) MARKER(assignBin) MARKER(assignAll)
+                          MARKER(assignPrevious) MARKER(assignBox)
+                              MARKER(schedule) MARKER(endStage) MARKER(endBin)
+                                  MARKER(batch) MARKER(everyBin) MARKER(order)
+                                      MARKER(source) MARKER(connect)
+                                          MARKER(allocateForSource)
+                                              MARKER(phase) MARKER(clear)
+                                                  .Default(std::nullopt);
 #undef MARKER
 }
 

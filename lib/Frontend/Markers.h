@@ -31,10 +31,15 @@ enum class MarkerKind {
   updateBegin,
   updateEnd,
   atomic,
+  atomicFetch,
   loopFirst,
   loopMore,
   loopNext,
   sync,
+  reduceBegin,
+  scanBegin,
+  combineEnd,
+  sort,
   bin,
   binAt,
   binLo,
@@ -63,9 +68,11 @@ struct Marker {
   MarkerKind kind;
   /// The record that the marker's pointer points to.
   unsigned record = 0;
-  /// atomic: which operation, and whether on signed numbers.
+  /// Atomics: which operation. Those and sort: whether on signed numbers.
   int operation = 0;
   bool isSigned = false;
+  /// state: where what it gives begins in the pipeline's state.
+  int64_t offset = 0;
   /// endStage: the stages of that type, by number.
   llvm::SmallVector<unsigned, 1> stages = {};
 };

@@ -79,7 +79,9 @@ private:
     mlir::FlatSymbolRefAttr record = getRecordName(state.record);
     switch (state.kind) {
     case StateDescription::Constant:
-      ConstantOp::create(builder, state.location, name, record);
+      if (auto op = ConstantOp::create(builder, state.location, name, record);
+          state.hasValue)
+        op->setAttr("value", buildNumbers(state));
       return;
     case StateDescription::Buffer:
       BufferOp::create(builder, state.location, name, record,
@@ -89,14 +91,17 @@ private:
       return;
     case StateDescription::Image:
       ImageOp::create(builder, state.location, name, record,
-                      builder.getI64IntegerAttr(state.rank), buildClear(state));
+                      builder.getI64IntegerAttr(state.rank),
+                      isZero(state) ? mlir::ArrayAttr() : buildNumbers(state));
       return;
     }
   }
 
-  mlir::ArrayAttr buildClear(const StateDescription &state) {
-    if (llvm::all_of(state.clear, [](uint64_t bits) { return bits == 0; }))
-      return nullptr;
+  static bool isZero(const StateDescription &state) {
+    return llvm::all_of(state.clear, [](uint64_t bits) { return bits == 0; });
+  }
+
+  mlir::ArrayAttr buildNumbers(const StateDescription &state) {
     llvm::SmallVector<mlir::Attribute> values;
     size_t next = 0;
     for (const LeafField &field : pipeline.records[state.record].fields)
@@ -132,12 +137,14 @@ private:
       if (!buildPhase(WrapperKind::Assign, number, assign.getBody()))
         return false;
     }
-    buildSchedule(stage);
+    if (!buildSchedule(number))
+      return false;
     auto process = ProcessOp::create(builder, stage.location, nullptr);
     return buildPhase(WrapperKind::Process, number, process.getBody());
   }
 
-  void buildSchedule(const StageDescription &stage) {
+  bool buildSchedule(unsigned stageNumber) {
+    const StageDescription &stage = pipeline.stages[stageNumber];
     const ScheduleDescription &schedule = stage.schedule;
     llvm::SmallVector<mlir::Attribute> waits;
     for (unsigned other : schedule.endStage)
@@ -146,12 +153,14 @@ private:
     auto number = [&](int64_t value) {
       return value ? builder.getI64IntegerAttr(value) : mlir::IntegerAttr();
     };
-    ScheduleOp::create(
+    auto op = ScheduleOp::create(
         builder, stage.location, static_cast<ScheduleKind>(schedule.policy),
         number(schedule.tileSplit),
         waits.empty() ? mlir::ArrayAttr() : builder.getArrayAttr(waits),
         schedule.endBin, number(schedule.batch), schedule.everyBin,
         schedule.unordered);
+    return !schedule.isDynamic ||
+           buildPhase(WrapperKind::Schedule, stageNumber, op.getBody());
   }
 
   bool buildPhase(WrapperKind kind, unsigned stage, mlir::Region &region) {

@@ -219,6 +219,9 @@ readMarker(const clang::FunctionDecl *function, UnitReader &reader,
   case MarkerKind::emit:
   case MarkerKind::updateBegin:
   case MarkerKind::updateEnd:
+  case MarkerKind::reduceBegin:
+  case MarkerKind::scanBegin:
+  case MarkerKind::combineEnd:
   case MarkerKind::clear: {
     llvm::FailureOr<unsigned> record = reader.getRecords().get(
         (*arguments)[0].getAsType(), unit.pipeline.location);
@@ -227,7 +230,15 @@ readMarker(const clang::FunctionDecl *function, UnitReader &reader,
     marker.record = *record;
     break;
   }
+  case MarkerKind::state:
+    marker.offset =
+        reader.getReader().getStateOffset((*arguments)[0].getAsType());
+    break;
+  case MarkerKind::sort:
+    marker.isSigned = (*arguments)[0].getAsIntegral().getBoolValue();
+    break;
   case MarkerKind::atomic:
+  case MarkerKind::atomicFetch:
     marker.operation = (*arguments)[0].getAsIntegral().getSExtValue();
     marker.isSigned = (*arguments)[1].getAsIntegral().getBoolValue();
     break;

@@ -55,6 +55,11 @@ private:
   llvm::LogicalResult checkLoop(const ParallelLoop *loop);
   void importLoopExit(const ParallelLoop *loop);
   llvm::LogicalResult checkBarrier(llvm::CallInst *call, llvm::StringRef what);
+  llvm::LogicalResult importCombination(llvm::CallInst *call,
+                                        llvm::StringRef name);
+  llvm::LogicalResult importSort(llvm::CallInst *call, bool isSigned);
+  mlir::func::CallOp makePlaceholder(llvm::StringRef name, llvm::CallInst *call,
+                                     unsigned count);
 
   // ImportMemory.cpp: local arrays, state and primitives.
   struct Place {
@@ -115,7 +120,7 @@ private:
   /// The first block of the loop of that number.
   llvm::DenseMap<int64_t, mlir::Block *> loopEntries;
   llvm::DenseMap<llvm::Value *, mlir::Value> arrays;
-  llvm::DenseMap<llvm::CallInst *, mlir::func::CallOp> updates;
+  llvm::DenseMap<llvm::CallInst *, mlir::func::CallOp> placeholders;
 };
 
 } // namespace piko

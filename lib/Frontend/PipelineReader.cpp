@@ -202,34 +202,91 @@ LogicalResult PipelineReader::readState(QualType type) {
   if (!decl || !decl->hasDefinition())
     return emitError(pipeline.location) << "expected the state of pipeline '"
                                         << pipeline.name << "' to be a class";
-  decl = decl->getDefinition();
-  const clang::ASTRecordLayout &layout = ast.getASTRecordLayout(decl);
-  if (decl->getNumBases() != 0)
-    return emitError(locate(decl->getLocation()))
-           << "not supported in Piko: a base class of the state";
-  for (const clang::FieldDecl *member : decl->fields()) {
-    StateDescription state{
-        member->getNameAsString(),    StateDescription::Constant, 0, 0, 0,
-        locate(member->getLocation())};
-    QualType element = member->getType();
-    const CXXRecordDecl *memberType = element->getAsCXXRecordDecl();
-    if (const Specialization *buffer = asPikoTemplate(memberType, "Buffer")) {
-      state.kind = StateDescription::Buffer;
-      state.rank = 1;
-      element = getTypeArgument(buffer, 0);
-    } else if (const Specialization *image =
-                   asPikoTemplate(memberType, "Image")) {
-      state.kind = StateDescription::Image;
-      state.rank = image->getTemplateArgs()[1].getAsIntegral().getSExtValue();
-      element = getTypeArgument(image, 0);
-    }
-    state.offset = layout.getFieldOffset(member->getFieldIndex()) / 8;
-    llvm::FailureOr<unsigned> record = records.get(element, state.location);
-    if (failed(record))
-      return failure();
-    state.record = *record;
-    pipeline.state.push_back(std::move(state));
+  return readMembers(decl->getDefinition(), 0);
+}
+
+static int64_t findBase(const CXXRecordDecl *decl, const CXXRecordDecl *wanted,
+                        const clang::ASTContext &ast) {
+  if (decl->getCanonicalDecl() == wanted->getCanonicalDecl())
+    return 0;
+  for (const clang::CXXBaseSpecifier &specifier : decl->bases()) {
+    const CXXRecordDecl *base =
+        specifier.getType()->getAsCXXRecordDecl()->getDefinition();
+    if (int64_t at = findBase(base, wanted, ast); at >= 0)
+      return at + ast.getASTRecordLayout(decl)
+                      .getBaseClassOffset(base)
+                      .getQuantity();
   }
+  return -1;
+}
+
+int64_t PipelineReader::getStateOffset(QualType base) const {
+  return findBase(stateType->getAsCXXRecordDecl()->getDefinition(),
+                  base->getAsCXXRecordDecl(), ast);
+}
+
+LogicalResult PipelineReader::readMembers(const CXXRecordDecl *decl,
+                                          int64_t offset) {
+  const clang::ASTRecordLayout &layout = ast.getASTRecordLayout(decl);
+  if (decl->isDynamicClass())
+    return emitError(locate(decl->getLocation()))
+           << "not supported in Piko: virtual functions or bases of the state";
+  for (const clang::CXXBaseSpecifier &specifier : decl->bases()) {
+    const CXXRecordDecl *base =
+        specifier.getType()->getAsCXXRecordDecl()->getDefinition();
+    int64_t at = layout.getBaseClassOffset(base).getQuantity();
+    if (failed(readMembers(base, offset + at)))
+      return failure();
+  }
+  for (const clang::FieldDecl *member : decl->fields())
+    if (failed(readMember(member, offset)))
+      return failure();
+  return success();
+}
+
+LogicalResult PipelineReader::readMember(const clang::FieldDecl *member,
+                                         int64_t offset) {
+  StateDescription state{
+      member->getNameAsString(),    StateDescription::Constant, 0, 0, 0,
+      locate(member->getLocation())};
+  for (const StateDescription &other : pipeline.state)
+    if (other.name == state.name) {
+      mlir::InFlightDiagnostic diagnostic = emitError(state.location);
+      diagnostic
+          << "expected the members of the state and of its bases to have "
+             "different names, but there are two of the name '"
+          << state.name << "'";
+      diagnostic.attachNote(other.location) << "the other one is here";
+      return diagnostic;
+    }
+  QualType element = member->getType();
+  const CXXRecordDecl *memberType = element->getAsCXXRecordDecl();
+  if (const Specialization *buffer = asPikoTemplate(memberType, "Buffer")) {
+    state.kind = StateDescription::Buffer;
+    state.rank = 1;
+    element = getTypeArgument(buffer, 0);
+  } else if (const Specialization *image =
+                 asPikoTemplate(memberType, "Image")) {
+    state.kind = StateDescription::Image;
+    state.rank = image->getTemplateArgs()[1].getAsIntegral().getSExtValue();
+    element = getTypeArgument(image, 0);
+  } else {
+    const CXXRecordDecl *single =
+        ast.getBaseElementType(element)->getAsCXXRecordDecl();
+    state.hasValue =
+        member->hasInClassInitializer() ||
+        (single && single->hasDefinition() &&
+         single->getDefinition()->hasNonTrivialDefaultConstructor());
+  }
+  const auto *parent = llvm::cast<CXXRecordDecl>(member->getParent());
+  state.offset = offset + ast.getASTRecordLayout(parent).getFieldOffset(
+                              member->getFieldIndex()) /
+                              8;
+  llvm::FailureOr<unsigned> record = records.get(element, state.location);
+  if (failed(record))
+    return failure();
+  state.record = *record;
+  pipeline.state.push_back(std::move(state));
   return success();
 }
 
@@ -249,7 +306,9 @@ LogicalResult PipelineReader::readStage(const clang::FieldDecl *member) {
     return failure();
   if (const Specialization *uses = findPikoBase(type, "Uses")) {
     QualType used = getTypeArgument(uses, 0);
-    if (!ast.hasSameType(used, stateType))
+    const CXXRecordDecl *base = used->getAsCXXRecordDecl();
+    if (!ast.hasSameType(used, stateType) &&
+        !(base && stateType->getAsCXXRecordDecl()->isDerivedFrom(base)))
       return emitError(stage.location)
              << "expected stage '" << stage.name << "' to use the state '"
              << records.getName(stateType) << "' of its pipeline, but it uses '"

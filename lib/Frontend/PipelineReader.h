@@ -44,8 +44,15 @@ public:
   std::vector<const clang::CXXRecordDecl *> stageTypes;
   clang::QualType stateType;
 
+  /// Where a base of the state begins in it, in bytes.
+  int64_t getStateOffset(clang::QualType base) const;
+
 private:
   llvm::LogicalResult readState(clang::QualType type);
+  llvm::LogicalResult readMembers(const clang::CXXRecordDecl *decl,
+                                  int64_t offset);
+  llvm::LogicalResult readMember(const clang::FieldDecl *member,
+                                 int64_t offset);
   llvm::LogicalResult readStage(const clang::FieldDecl *member);
   llvm::LogicalResult
   readTemplate(const clang::ClassTemplateSpecializationDecl *base,

@@ -163,11 +163,16 @@ template <class T, int Rank> void save(const piko::Image<T, Rank> &image,
       out << "  const auto clear" << id << " = clearValue(Pixel<"
           << "std::remove_reference_t<decltype(std::declval<Pipeline &>()"
           << ".state()." << state.name << ")>>());\n";
+    if (state.hasValue)
+      out << "  const auto initial" << id
+          << " = std::make_unique<Pipeline>();\n";
     out << "  pikoir_declare_state(p, " << id << ", " << quote(state.name)
         << ", " << kinds[state.kind] << ", " << state.record << ", "
         << state.rank << ", " << state.perSource.value_or(-1) << ", ";
     if (hasClear)
       out << "&clear" << id << ");\n";
+    else if (state.hasValue)
+      out << "&initial" << id << "->state()." << state.name << ");\n";
     else
       out << "nullptr);\n";
   }

@@ -49,11 +49,12 @@ private:
       return resolveStore(store);
     if (llvm::isa<llvm::MemIntrinsic>(instruction))
       return fail(instruction,
-                  "copying or filling more than 256 numbers at once, or "
+                  "copying or filling more than 4096 numbers at once, or "
                   "memory whose layout is not known");
     if (auto *call = dyn_cast<llvm::CallInst>(instruction))
       if (const Marker *marker = getMarker(call, memory.markers))
-        if (marker->kind == MarkerKind::atomic)
+        if (marker->kind == MarkerKind::atomic ||
+            marker->kind == MarkerKind::atomicFetch)
           return resolveAtomic(call, *marker);
     return true;
   }
@@ -106,7 +107,8 @@ private:
     std::string name = prefix.str();
     llvm::raw_string_ostream(name)
         << *leafType << (isElement ? "" : ".constant");
-    llvm::Type *result = writes ? builder.getVoidTy() : leafType;
+    bool gives = !writes || prefix == accessor::atomicFetch;
+    llvm::Type *result = gives ? leafType : builder.getVoidTy();
     llvm::FunctionCallee callee = function.getParent()->getOrInsertFunction(
         name, llvm::FunctionType::get(result, /*isVarArg=*/true));
     auto *declaration = llvm::cast<llvm::Function>(callee.getCallee());
@@ -163,13 +165,18 @@ private:
     llvm::Value *value = call->getArgOperand(1);
     llvm::Value *operands[] = {builder.getInt32(marker.operation),
                                builder.getInt1(marker.isSigned), value};
-    if (!makeAccess(call, call->getArgOperand(0), value->getType(),
-                    accessor::atomic, /*writes=*/true, operands, isLocal,
-                    leafType)) {
+    bool isFetch = marker.kind == MarkerKind::atomicFetch;
+    llvm::Value *access =
+        makeAccess(call, call->getArgOperand(0), value->getType(),
+                   isFetch ? accessor::atomicFetch : accessor::atomic,
+                   /*writes=*/true, operands, isLocal, leafType);
+    if (!access) {
       if (isLocal)
         fail(call, "an atomic on a local variable");
       return false;
     }
+    if (isFetch)
+      call->replaceAllUsesWith(access);
     call->eraseFromParent();
     return true;
   }

@@ -18,7 +18,7 @@ using namespace piko;
 using llvm::dyn_cast;
 
 /// Copies of more numbers than this are not split, and rejected later on.
-static constexpr int64_t unrollLimit = 256;
+static constexpr int64_t unrollLimit = 4096;
 
 namespace {
 

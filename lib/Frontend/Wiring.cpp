@@ -12,6 +12,7 @@
 #include "Cleanup.h"
 #include "Wrappers.h"
 #include "mlir/IR/Diagnostics.h"
+#include "llvm/Analysis/PostDominators.h"
 #include "llvm/IR/Constants.h"
 #include "llvm/IR/InstIterator.h"
 #include "llvm/IR/Instructions.h"
@@ -34,7 +35,7 @@ public:
       if (stage.hasSchedule && !readSchedule(index, stage))
         return false;
     for (auto [index, state] : llvm::enumerate(pipeline.state))
-      if (state.kind == StateDescription::Image && !readClear(index, state))
+      if (state.hasClear() && !readClear(index, state))
         return false;
     return true;
   }
@@ -201,76 +202,157 @@ private:
   // Schedules
   //===--------------------------------------------------------------------===//
 
+  struct Directive {
+    const llvm::CallInst *call;
+    const Marker *marker;
+  };
+
   bool readSchedule(unsigned index, StageDescription &stage) {
     llvm::Function &function = getWrapper(WrapperKind::Schedule, index);
+    llvm::SmallVector<Directive> directives;
     for (llvm::Instruction &instruction : llvm::instructions(function)) {
       auto *call = dyn_cast<llvm::CallInst>(&instruction);
-      const Marker *marker = call ? getMarker(call, unit.markers) : nullptr;
-      if (!marker || !readDirective(call, *marker, stage.schedule, stage)) {
-        if (marker)
-          return false;
+      if (!call)
         continue;
-      }
-      bool isDirective = !instruction.getType()->isIntegerTy() &&
-                         !instruction.getType()->isPointerTy();
-      if (isDirective && !call->getParent()->isEntryBlock()) {
-        fail(call) << "not supported in Piko: a schedule that depends on the "
-                      "bin, which the compiler cannot do yet";
+      const Marker *marker = getMarker(call, unit.markers);
+      if (!marker && isEffect(call->getCalledFunction()->getName()))
+        return failPhase(call, stage);
+      if (marker && !classify(call, *marker, stage, directives))
+        return false;
+    }
+    llvm::PostDominatorTree ends(function);
+    ScheduleDescription &schedule = stage.schedule;
+    for (Directive directive : directives)
+      schedule.isDynamic |=
+          mayDiffer(*directive.marker) && !isConstant(directive.call);
+    for (auto [call, marker] : directives) {
+      if (mayDiffer(*marker) && schedule.isDynamic)
+        continue; // It stays in the phase's code.
+      if (!mayDiffer(*marker) &&
+          !ends.dominates(call->getParent(), &function.getEntryBlock())) {
+        fail(call) << "expected " << getDirectiveName(*marker)
+                   << " for every bin, because it may not depend on the bin";
         return false;
       }
+      if (!readDirective(call, *marker, schedule))
+        return false;
     }
+    // It is accepted, and has no effect.
+    if (schedule.policy != SchedulePolicy::All)
+      schedule.tileSplit = 0;
     return true;
   }
 
-  /// False after an error.
+  /// Whether an accessor changes something.
+  static bool isEffect(llvm::StringRef name) {
+    return name == accessor::emit || name == accessor::updateBegin ||
+           name == accessor::reduceBegin || name == accessor::scanBegin ||
+           name.starts_with(accessor::store) ||
+           name.starts_with(accessor::atomic) ||
+           name.starts_with(accessor::atomicFetch);
+  }
+  /// Whether a directive may depend on the bin and on constants.
+  static bool mayDiffer(const Marker &marker) {
+    return marker.kind == MarkerKind::schedule ||
+           marker.kind == MarkerKind::batch ||
+           marker.kind == MarkerKind::everyBin;
+  }
+  static bool isConstant(const llvm::CallInst *call) {
+    return call->getParent()->isEntryBlock() &&
+           llvm::all_of(call->args(), [](const llvm::Value *argument) {
+             return llvm::isa<llvm::ConstantInt>(argument);
+           });
+  }
+  static llvm::StringRef getDirectiveName(const Marker &marker) {
+    return marker.kind == MarkerKind::endStage ? "endStage"
+           : marker.kind == MarkerKind::endBin ? "endBin"
+                                               : "specifyOrder";
+  }
+  bool failPhase(const llvm::CallInst *call, const StageDescription &stage) {
+    fail(call) << "expected only directives in the schedule phase of stage '"
+               << stage.name << "'";
+    return false;
+  }
+
+  /// Collects directives and reports what is none; false after an error.
+  bool classify(const llvm::CallInst *call, const Marker &marker,
+                const StageDescription &stage,
+                llvm::SmallVectorImpl<Directive> &directives) {
+    switch (marker.kind) {
+    case MarkerKind::batch:
+    case MarkerKind::everyBin:
+      if (!stage.takesList) {
+        fail(call) << "expected "
+                   << (marker.kind == MarkerKind::batch ? "batch" : "everyBin")
+                   << " in a stage whose process takes a list, but that of "
+                      "stage '"
+                   << stage.name << "' does not";
+        return false;
+      }
+      [[fallthrough]];
+    case MarkerKind::schedule:
+    case MarkerKind::endStage:
+    case MarkerKind::endBin:
+    case MarkerKind::order:
+      directives.push_back({call, &marker});
+      return true;
+    case MarkerKind::assignBin:
+    case MarkerKind::assignAll:
+    case MarkerKind::assignPrevious:
+    case MarkerKind::assignBox:
+    case MarkerKind::loopMore:
+    case MarkerKind::sync:
+    case MarkerKind::sort:
+      return failPhase(call, stage);
+    default:
+      return true;
+    }
+  }
+
+  /// A directive that is the same for all bins; false after an error.
   bool readDirective(const llvm::CallInst *call, const Marker &marker,
-                     ScheduleDescription &schedule,
-                     const StageDescription &stage) {
+                     ScheduleDescription &schedule) {
+    auto constant = [&](unsigned operand) {
+      return llvm::cast<llvm::ConstantInt>(call->getArgOperand(operand))
+          ->getSExtValue();
+    };
     std::optional<int64_t> number;
     switch (marker.kind) {
     case MarkerKind::schedule:
-      if (!(number = getConstant(call, 0, "a schedule")))
-        return false;
-      schedule.policy = static_cast<SchedulePolicy>(*number);
-      if (!(number = getConstant(call, 1, "a tile split")))
-        return false;
-      schedule.tileSplit = *number;
-      return true;
+      schedule.policy = static_cast<SchedulePolicy>(constant(0));
+      schedule.tileSplit = constant(1);
+      if (schedule.tileSplit >= 0)
+        return true;
+      fail(call) << "expected a tile split of at least 0, but got "
+                 << schedule.tileSplit;
+      return false;
     case MarkerKind::endStage:
       if (marker.stages.empty()) {
         fail(call) << "expected endStage of a stage of pipeline '"
                    << pipeline.name << "'";
         return false;
       }
-      schedule.endStage.insert(schedule.endStage.end(), marker.stages.begin(),
-                               marker.stages.end());
+      for (unsigned other : marker.stages)
+        if (!llvm::is_contained(schedule.endStage, other))
+          schedule.endStage.push_back(other);
       return true;
     case MarkerKind::endBin:
       schedule.endBin = true;
       return true;
     case MarkerKind::batch:
-      if (!(number = getConstant(call, 0, "a batch size")))
-        return false;
-      schedule.batch = *number;
-      return true;
+      schedule.batch = constant(0);
+      if (schedule.batch >= 1)
+        return true;
+      fail(call) << "expected a batch of at least 1, but got "
+                 << schedule.batch;
+      return false;
     case MarkerKind::everyBin:
       schedule.everyBin = true;
       return true;
-    case MarkerKind::order:
+    default:
       if (!(number = getConstant(call, 0, "an order")))
         return false;
       schedule.unordered = *number != 0;
-      return true;
-    case MarkerKind::emit:
-    case MarkerKind::updateBegin:
-    case MarkerKind::assignBin:
-    case MarkerKind::assignAll:
-    case MarkerKind::assignPrevious:
-    case MarkerKind::assignBox:
-      fail(call) << "expected only directives in the schedule phase of stage '"
-                 << stage.name << "'";
-      return false;
-    default:
       return true;
     }
   }
@@ -296,8 +378,8 @@ private:
           state.clear.push_back(0);
         else {
           mlir::emitError(state.location)
-              << "expected the value that image '" << state.name
-              << "' is cleared to to be a constant";
+              << "expected the initial value of '" << state.name
+              << "' to be known when the pipeline is compiled";
           return false;
         }
       }

@@ -45,7 +45,12 @@ std::string piko::generateWrappers(const PipelineDescription &pipeline,
                call + ".schedule(::piko::BinId{::piko::marker::bin()});");
   }
   for (auto [index, state] : llvm::enumerate(pipeline.state))
-    if (state.kind == StateDescription::Image)
+    if (state.hasValue)
+      function(
+          WrapperKind::Clear, index,
+          "__piko_state state{}; ::piko::detail::initializeConstant(state." +
+              state.name + ");");
+    else if (state.kind == StateDescription::Image)
       function(WrapperKind::Clear, index,
                "::piko::detail::clearImage(::piko::marker::state<__piko_state>"
                "()->" +

@@ -8,6 +8,10 @@
 // RUN: not piko-translate --cpp-to-piko -DCASE=5 %s 2>&1 | FileCheck %s --check-prefix=NESTED
 // RUN: not piko-translate --cpp-to-piko -DCASE=6 %s 2>&1 | FileCheck %s --check-prefix=OUTSIDE
 // RUN: not piko-translate --cpp-to-piko -DCASE=7 %s 2>&1 | FileCheck %s --check-prefix=ASSIGN
+// RUN: not piko-translate --cpp-to-piko -DCASE=8 %s 2>&1 | FileCheck %s --check-prefix=UPDATE
+// RUN: not piko-translate --cpp-to-piko -DCASE=9 %s 2>&1 | FileCheck %s --check-prefix=COMBINE
+// RUN: not piko-translate --cpp-to-piko -DCASE=10 %s 2>&1 | FileCheck %s --check-prefix=LEAVES
+// RUN: not piko-translate --cpp-to-piko -DCASE=11 %s 2>&1 | FileCheck %s --check-prefix=ENDLESS
 #include <piko.h>
 
 struct A {
@@ -16,6 +20,7 @@ struct A {
 };
 struct State {
   piko::Buffer<A> buffer;
+  piko::Image<A> image;
 };
 
 struct Stage : piko::Stage<0, 0, 64, A>, piko::Uses<State> {
@@ -48,6 +53,25 @@ struct Stage : piko::Stage<0, 0, 64, A>, piko::Uses<State> {
       parallelFor(3, [&](int j) { own = float(j); });
 #elif CASE == 5
       parallelFor(3, [&](int) { sync(); });
+#elif CASE == 8
+      // UPDATE: errors-parallel.cpp:[[#@LINE + 1]]:55: error: not supported in Piko: a barrier inside an update
+      update(state().image, glm::ivec2(i), [&](A &) { sync(); });
+#elif CASE == 9
+      own = reduce(i, [&](int b, int c) {
+        // COMBINE: errors-parallel.cpp:[[#@LINE + 1]]:27: error: not supported in Piko: a change of the state inside the function of a reduction
+        state().buffer[i] = a;
+        return b + c;
+      });
+#elif CASE == 10
+      // LEAVES: errors-parallel.cpp:[[#@LINE + 1]]:7: error: expected the function of a reduction to do nothing but combine two values
+      reduce(i, [&](int b, int c) {
+        own = float(b);
+        return b + c;
+      });
+#elif CASE == 11
+      // ENDLESS: errors-parallel.cpp:[[#@LINE - 33]]:5: error: not supported in Piko: a parallelFor whose iterations never end
+      while (true)
+        ;
 #endif
       state().buffer[i].x = own;
     });

@@ -63,8 +63,13 @@ struct StateDescription {
   mlir::Location location;
   /// The source that gives a buffer its length.
   std::optional<int64_t> perSource = std::nullopt;
-  /// What an image is cleared to: the bits of each number of the record.
+  /// Whether a constant is initialized.
+  bool hasValue = false;
+  /// That value, or what an image is cleared to: the bits of each number of the
+  /// record.
   std::vector<uint64_t> clear = {};
+
+  bool hasClear() const { return kind == Image || hasValue; }
 };
 
 enum class SchedulePolicy { LoadBalance, DirectMap, Serialize, All };
@@ -74,6 +79,9 @@ struct ScheduleDescription {
   int64_t tileSplit = 0, batch = 0;
   std::vector<unsigned> endStage;
   bool endBin = false, everyBin = false, unordered = false;
+  /// Whether the policy, the tile split, batch and everyBin depend on the bin
+  /// or on constants: then the schedule phase is code.
+  bool isDynamic = false;
 };
 
 struct StageDescription {

@@ -42,7 +42,7 @@ private:
   void declareField(FieldAttr field, int32_t record);
   void declareState(Operation *state, int32_t number);
   void declareStage(StageOp stage, int32_t number);
-  Value clearBytes(ImageOp image);
+  Value recordBytes(FlatSymbolRefAttr record, ArrayAttr numbers);
 
   const PipelineNumbers &numbers;
   PipelineOp pipeline;
@@ -113,13 +113,12 @@ void SetupWriter::declareField(FieldAttr field, int32_t record) {
   }
 }
 
-Value SetupWriter::clearBytes(ImageOp image) {
-  ArrayAttr clear = image.getClearAttr();
-  if (!clear)
+Value SetupWriter::recordBytes(FlatSymbolRefAttr name, ArrayAttr numbers) {
+  if (!numbers)
     return null();
-  RecordOp record = context.record(image.getRecordAttr());
+  RecordOp record = context.record(name);
   std::string data(record.getSize(), '\0');
-  for (auto [value, offset] : llvm::zip(clear, record.getElementOffsets())) {
+  for (auto [value, offset] : llvm::zip(numbers, record.getElementOffsets())) {
     APInt bits = isa<FloatAttr>(value)
                      ? cast<FloatAttr>(value).getValue().bitcastToAPInt()
                      : cast<IntegerAttr>(value).getValue();
@@ -132,6 +131,7 @@ Value SetupWriter::clearBytes(ImageOp image) {
 void SetupWriter::declareState(Operation *state, int32_t number) {
   auto image = dyn_cast<ImageOp>(state);
   auto buffer = dyn_cast<BufferOp>(state);
+  auto constant = dyn_cast<ConstantOp>(state);
   int64_t perSource = buffer ? buffer.getPerSource().value_or(-1) : -1;
   call("pikoir_declare_state",
        {i32(number), text(SymbolTable::getSymbolName(state)),
@@ -140,7 +140,10 @@ void SetupWriter::declareState(Operation *state, int32_t number) {
                      : 0),
         i32(numbers.records.lookup(getStateRecord(state).getAttr())),
         i32(getStateRank(state)), i32(perSource),
-        image ? clearBytes(image) : null()});
+        image      ? recordBytes(image.getRecordAttr(), image.getClearAttr())
+        : constant ? recordBytes(constant.getRecordAttr(),
+                                 constant->getAttrOfType<ArrayAttr>("value"))
+                   : null()});
 }
 
 /// pikoir_stage_flags

@@ -36,6 +36,7 @@ void updateBegin(T *pixel, const void *handle, int64_t x, int64_t y, int64_t z,
                  int64_t w);
 template <class T> void updateEnd(const T *pixel);
 template <int Kind, bool Signed, class T> void atomic(T *place, T value);
+template <int Kind, bool Signed, class T> T atomicFetch(T *place, T value);
 
 // for (i = loopFirst(); loopMore(i, n, 0); i = loopNext(i)): iterations that do
 // not depend on one another. The front end numbers the loops.
@@ -43,6 +44,13 @@ int32_t loopFirst();
 bool loopMore(int32_t i, int64_t n, int32_t loop);
 int32_t loopNext(int32_t i);
 void sync();
+
+// In the place of a sync. What is between the beginning and the end combines
+// two values, a and b.
+template <class T> void reduceBegin(T *a, T *b, const T *value);
+template <class T> void scanBegin(T *a, T *b, const T *value, const T *empty);
+template <class T> void combineEnd(const T *combined, T *result);
+template <bool Signed, class K> int64_t sort(K key);
 
 // The grid of bins.
 int64_t bin();

@@ -125,8 +125,32 @@ static LogicalResult verifyRecordExists(Operation *op, FlatSymbolRefAttr name) {
          << name << ", which is none";
 }
 
+/// One number for each number of a record, or nothing.
+static LogicalResult verifyNumbers(Operation *op, FlatSymbolRefAttr record,
+                                   ArrayAttr numbers, StringRef name) {
+  if (failed(verifyRecordExists(op, record)))
+    return failure();
+  if (!numbers)
+    return success();
+  SmallVector<Type> types = lookupRecord(op, record).getElementTypes();
+  if (numbers.size() != types.size())
+    return op->emitOpError("expected ")
+           << types.size() << " " << name << "s, one for each number of record "
+           << record << ", but got " << numbers.size();
+  for (auto [i, value, type] : llvm::enumerate(numbers, types)) {
+    auto typed = dyn_cast<TypedAttr>(value);
+    if (!isa<IntegerAttr, FloatAttr>(value) || typed.getType() != type)
+      return op->emitOpError("expected ")
+             << name << " " << i << " to be of type " << type << ", but got "
+             << value;
+  }
+  return success();
+}
+
 LogicalResult ConstantOp::verifySymbolUses(SymbolTableCollection &) {
-  return verifyRecordExists(*this, getRecordAttr());
+  // What the constant is until the host sets it.
+  return verifyNumbers(*this, getRecordAttr(),
+                       (*this)->getAttrOfType<ArrayAttr>("value"), "value");
 }
 
 LogicalResult BufferOp::verifySymbolUses(SymbolTableCollection &) {
@@ -148,22 +172,7 @@ LogicalResult ImageOp::verifySymbolUses(SymbolTableCollection &) {
   if (getRank() != getPipeline(*this).getRank())
     return emitOpError("expected the rank of the pipeline, ")
            << getPipeline(*this).getRank() << ", but got " << getRank();
-  ArrayAttr clear = getClearAttr();
-  if (!clear)
-    return success();
-  SmallVector<Type> types =
-      lookupRecord(*this, getRecordAttr()).getElementTypes();
-  if (clear.size() != types.size())
-    return emitOpError("expected ")
-           << types.size() << " clear values, one for each number of record "
-           << getRecordAttr() << ", but got " << clear.size();
-  for (auto [i, value, type] : llvm::enumerate(clear, types)) {
-    auto typed = dyn_cast<TypedAttr>(value);
-    if (!isa<IntegerAttr, FloatAttr>(value) || typed.getType() != type)
-      return emitOpError("expected clear value ")
-             << i << " to be of type " << type << ", but got " << value;
-  }
-  return success();
+  return verifyNumbers(*this, getRecordAttr(), getClearAttr(), "clear value");
 }
 
 //===----------------------------------------------------------------------===//

@@ -139,6 +139,56 @@ protected:
   /// In an iteration of parallelFor: a barrier between all iterations.
   void sync() { marker::sync(); }
 
+  // Over the iterations of the enclosing parallelFor; each of them is also a
+  // sync(). Every iteration gets the result.
+
+  bool any(bool value) { return count(value) != 0; }
+  bool all(bool value) { return count(!value) == 0; }
+  int64_t count(bool value) {
+    return reduce(int64_t(value), [](int64_t a, int64_t b) { return a + b; });
+  }
+  /// op over all values, in a fixed binary tree.
+  template <class T, class Op> T reduce(T value, Op op) {
+    T a = value, b = value;
+    marker::reduceBegin<T>(&a, &b, &value);
+    T combined = op(a, b);
+    marker::combineEnd<T>(&combined, &value);
+    return value;
+  }
+  /// op over the values of the iterations before this one; `empty` in the
+  /// first.
+  template <class T, class Op> T scan(T value, Op op, T empty = T{}) {
+    T a = value, b = value;
+    marker::scanBegin<T>(&a, &b, &value, &empty);
+    T combined = op(a, b);
+    marker::combineEnd<T>(&combined, &value);
+    return value;
+  }
+  /// Iteration r gets the index of the iteration with the r-th smallest key.
+  template <class K> int64_t sort(K key) {
+    return marker::sort<(static_cast<K>(-1) < static_cast<K>(0)), K>(key);
+  }
+
+  // Over f(0), ..., f(n - 1), outside parallelFor.
+
+  template <class F> bool any(int64_t n, F &&f) { return count(n, f) != 0; }
+  template <class F> bool all(int64_t n, F &&f) { return count(n, f) == n; }
+  template <class F> int64_t count(int64_t n, F &&f) {
+    return reduce<int64_t>(
+        n, [&](int i) { return int64_t(bool(f(i))); },
+        [](int64_t a, int64_t b) { return a + b; }, 0);
+  }
+  template <class T, class F, class Op>
+  T reduce(int64_t n, F &&f, Op op, T empty) {
+    T result[] = {empty};
+    parallelFor(n, [&](int i) {
+      T value = reduce<T>(f(i), op);
+      if (i == 0)
+        result[0] = value;
+    });
+    return result[0];
+  }
+
   // Schedule.
   void specifySchedule(SchedulePolicy policy, int64_t tileSplit = 0) {
     marker::schedule(policy, tileSplit);

@@ -87,6 +87,10 @@ template <class T, int Rank> inline void clearImage(const Image<T, Rank> &) {
   T value{};
   marker::clear<T>(&value);
 }
+/// Says what a constant is until the host sets it.
+template <class T> inline void initializeConstant(const T &value) {
+  marker::clear<T>(&value);
+}
 } // namespace detail
 
 namespace detail {
@@ -96,14 +100,28 @@ concept AtomicInteger = isSame<T, int32_t> || isSame<T, uint32_t> ||
                         isSame<T, long long> || isSame<T, unsigned long long>;
 } // namespace detail
 
+namespace detail {
+template <class T>
+concept AtomicFloat = isSame<T, float> || isSame<T, double>;
+} // namespace detail
+
 #define PIKO_ATOMIC(NAME, KIND)                                                \
   template <detail::AtomicInteger T>                                           \
   inline void NAME(const T &place, typename detail::Identity<T>::type value) { \
     marker::atomic<KIND, (static_cast<T>(-1) < static_cast<T>(0)), T>(         \
         const_cast<T *>(&place), value);                                       \
   }                                                                            \
+  template <detail::AtomicInteger T>                                           \
+  inline T NAME##Fetch(const T &place,                                         \
+                       typename detail::Identity<T>::type value) {             \
+    return marker::atomicFetch<KIND, (static_cast<T>(-1) < static_cast<T>(0)), \
+                               T>(const_cast<T *>(&place), value);             \
+  }                                                                            \
   template <class T>                                                           \
   void NAME(const T &&place, typename detail::Identity<T>::type value) =       \
+      delete;                                                                  \
+  template <class T>                                                           \
+  T NAME##Fetch(const T &&place, typename detail::Identity<T>::type value) =   \
       delete;
 
 PIKO_ATOMIC(atomicAdd, 0)
@@ -113,6 +131,13 @@ PIKO_ATOMIC(atomicAnd, 3)
 PIKO_ATOMIC(atomicOr, 4)
 PIKO_ATOMIC(atomicXor, 5)
 #undef PIKO_ATOMIC
+
+/// Adds to a float; only in a stage that is Unordered.
+template <detail::AtomicFloat T>
+inline void atomicAdd(const T &place,
+                      typename detail::Identity<T>::type value) {
+  marker::atomic<6, true, T>(const_cast<T *>(&place), value);
+}
 
 } // namespace piko
 
