@@ -1,137 +1,33 @@
 //===- ImageFile.cpp - Images to files ------------------------------------===//
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
-#include "Piko/Driver/Scene/ImageFile.h"
+#include "ImageModule.h"
 
-#include <OpenImageIO/imageio.h>
-
-#include <algorithm>
-#include <cmath>
-#include <filesystem>
-#include <unistd.h>
-#include <vector>
+#include <dlfcn.h>
 
 using namespace piko;
 using namespace piko::render;
-namespace fs = std::filesystem;
 
-namespace {
-
-Error failWith(const std::string &path, std::string why) {
-  if (size_t end = why.find('\n'); end != std::string::npos)
-    why.resize(end);
-  return {"cannot write image '" + path + "': " + why};
-}
-
-/// The extension, in lowercase and without the dot.
-std::string extensionOf(const std::string &path) {
-  std::string extension = fs::path(path).extension().string();
-  if (!extension.empty())
-    extension.erase(0, 1);
-  for (char &c : extension)
-    c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return extension;
-}
-
-Result<std::unique_ptr<OIIO::ImageOutput>> openFormat(const std::string &path) {
-  std::string extension = extensionOf(path);
-  if (extension.empty())
-    return failWith(path,
-                    "expected a name that ends in a format, such as .png");
-  if (auto output = OIIO::ImageOutput::create("image." + extension))
-    return output;
-  OIIO::geterror(); // its text speaks of plugins
-  return failWith(path,
-                  "no image format has the extension '" + extension + "'");
-}
-
-std::vector<uint8_t> toBytes(std::span<const scene::Color> pixels) {
-  std::vector<uint8_t> bytes;
-  bytes.reserve(pixels.size() * 3);
-  for (const scene::Color &pixel : pixels)
-    for (int channel = 0; channel < 3; ++channel)
-      bytes.push_back(toByte(pixel.rgba[channel]));
-  return bytes;
-}
-
-/// Removes a file unless it was renamed before.
-struct TemporaryFile {
-  fs::path path;
-  ~TemporaryFile() {
-    std::error_code ignored;
-    fs::remove(path, ignored);
-  }
-};
-
-Result<Done> writeTo(OIIO::ImageOutput &output, const std::string &path,
-                     const std::string &file, int width, int height,
-                     std::span<const scene::Color> pixels) {
-  std::string format = extensionOf(path);
-  bool isFloat = format == "exr" || format == "hdr" || format == "pfm";
-  int channels = format == "exr" ? 4 : 3;
-  OIIO::TypeDesc type = isFloat ? OIIO::TypeDesc::FLOAT : OIIO::TypeDesc::UINT8;
-  OIIO::ImageSpec spec(width, height, channels, type);
-  if (!output.open(file, spec))
-    return failWith(path, output.geterror());
-  bool ok;
-  if (isFloat)
-    ok = output.write_image(OIIO::TypeDesc::FLOAT, pixels.data(),
-                            sizeof(scene::Color));
-  else
-    ok = output.write_image(OIIO::TypeDesc::UINT8, toBytes(pixels).data());
-  std::string why = ok ? "" : output.geterror();
-  if (!output.close() && ok) {
-    ok = false;
-    why = output.geterror();
-  }
-  if (!ok)
-    return failWith(path, why);
-  return Done{};
-}
-
-} // namespace
-
-uint8_t render::toByte(float value) {
-  float clamped = value > 0 ? std::min(value, 1.0f) : 0.0f; // NaN is 0
-  return static_cast<uint8_t>(clamped * 255 + 0.5f);
+/// Loads the module at the first call.
+static Result<const ImageFunctions *> getFunctions() {
+  static void *module = dlopen(imageModuleFile, RTLD_NOW | RTLD_LOCAL);
+  void *symbol = module ? dlsym(module, imageModuleSymbol) : nullptr;
+  if (!symbol)
+    return Error{std::string("cannot load ") + imageModuleFile +
+                 ", which writes images"};
+  return static_cast<const ImageFunctions *>(symbol);
 }
 
 Result<Done> render::checkImageFormat(const std::string &path) {
-  auto output = openFormat(path);
-  if (!output)
-    return output.error();
-  fs::path folder = fs::path(path).parent_path();
-  std::error_code ignored;
-  if (!folder.empty() && !fs::is_directory(folder, ignored))
-    return failWith(path, "there is no folder '" + folder.string() + "'");
-  return Done{};
+  auto functions = getFunctions();
+  if (!functions)
+    return functions.error();
+  return (*functions)->checkImageFormat(path);
 }
 
 Result<Done> render::writeImage(const std::string &path, int width, int height,
                                 std::span<const scene::Color> pixels) {
-  if (width < 1 || height < 1 || pixels.size() != size_t(width) * height)
-    return failWith(path, "expected " + std::to_string(width) + " x " +
-                              std::to_string(height) + " pixels, but got " +
-                              std::to_string(pixels.size()));
-  if (auto ok = checkImageFormat(path); !ok)
-    return ok.error();
-  auto output = openFormat(path);
-  if (!output)
-    return output.error();
-
-  // Beside the image, so that renaming does not copy; with its extension,
-  // which says the format.
-  fs::path target(path);
-  TemporaryFile temporary{target.parent_path() /
-                          ("." + target.stem().string() + "." +
-                           std::to_string(getpid()) + ".tmp" +
-                           target.extension().string())};
-  if (auto ok = writeTo(**output, path, temporary.path.string(), width, height,
-                        pixels);
-      !ok)
-    return ok.error();
-  std::error_code problem;
-  fs::rename(temporary.path, target, problem);
-  if (problem)
-    return failWith(path, problem.message());
-  return Done{};
+  auto functions = getFunctions();
+  if (!functions)
+    return functions.error();
+  return (*functions)->writeImage(path, width, height, pixels);
 }

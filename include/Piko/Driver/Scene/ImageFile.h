@@ -7,13 +7,17 @@
 
 #include <piko/scene.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <span>
 
 namespace piko::render {
 
 /// 8 bits of a linear value: floor(255 * clamp(value, 0, 1) + 0.5); NaN is 0.
-uint8_t toByte(float value);
+inline uint8_t toByte(float value) {
+  float clamped = value > 0 ? std::min(value, 1.0f) : 0.0f;
+  return static_cast<uint8_t>(clamped * 255 + 0.5f);
+}
 
 /// Writes an image of `width` pixels a row, top row first, in the format that
 /// the file's name ends in (PNG, EXR, PPM, TIFF, JPEG, ...: what OpenImageIO
