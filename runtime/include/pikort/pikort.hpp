@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //===- pikort.hpp - The host API for C++ ----------------------------------===//
 //
-// A thin owner of a pikort_pipeline. No exceptions: a call that can fail
-// returns a Status, which is true when it went well.
+// A thin owner of a pikort_pipeline. A call that can fail returns a Status,
+// which is true when it went well; only Status::orThrow throws.
 //
 //   piko::rt::Pipeline pipe(program);
 //   if (auto s = pipe.domain({1024, 768}); !s) return report(s.message());
@@ -20,6 +20,7 @@
 
 #include <initializer_list>
 #include <span>
+#include <stdexcept>
 #include <string>
 #include <type_traits>
 #include <utility>
@@ -36,11 +37,33 @@ public:
   explicit operator bool() const { return code_ == PIKORT_OK; }
   int32_t code() const { return code_; }
   const std::string &message() const { return message_; }
+#ifdef __cpp_exceptions
+  /// For hosts that use exceptions.
+  void orThrow() const;
+#endif
 
 private:
   int32_t code_ = PIKORT_OK;
   std::string message_;
 };
+
+#ifdef __cpp_exceptions
+/// A status that is not well, as an exception.
+class Error : public std::runtime_error {
+public:
+  explicit Error(const Status &status)
+      : std::runtime_error(status.message()), code_(status.code()) {}
+  int32_t code() const { return code_; }
+
+private:
+  int32_t code_;
+};
+
+inline void Status::orThrow() const {
+  if (code_ != PIKORT_OK)
+    throw Error(*this);
+}
+#endif
 
 /// The elements of a piece of state; empty if it does not exist (yet).
 template <class T> struct View {
