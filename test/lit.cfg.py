@@ -10,6 +10,10 @@ split-file. Substitutions:
   %python        the Python interpreter
   %utils, %docs  folders of the developer scripts and of the documents
   %readme        the README
+  %cmake         the CMake that configured this build
+  %piko          the build tree, which find_package(Piko) can use
+  %cxx_host      compiler and flags that build a host of compiled pipelines
+  %link_host     what such a host links
   %cxx_reference compiler and flags that build a pipeline file with the
                  reference executor
 
@@ -34,9 +38,19 @@ for name in ("OMP_NUM_THREADS", "ASAN_OPTIONS", "TSAN_OPTIONS", "HOME"):
     if name in os.environ:
         config.environment[name] = os.environ[name]
 
+# What the tests compile is kept apart from the user's own.
+config.environment["PIKO_CACHE_DIR"] = os.path.join(
+    config.test_exec_root, "cache"
+)
+
 bunny = "/usr/share/glmark2/models/bunny.obj"
 include = os.path.join(config.piko_source_root, "runtime", "include")
 reference = [config.cxx, "-std=c++20", "-O1", "-ffp-contract=off", "-I", include]
+library_dir = os.path.join(config.piko_binary_root, "lib")
+link_host = [f"-L{library_dir}", f"-Wl,-rpath,{library_dir}", "-lpikort"]
+link_host.append(config.openmp_runtime)
+if config.sanitize:
+    link_host.append(f"-fsanitize={config.sanitize}")
 config.substitutions += [
     ("%piko_include", include),
     ("%examples", os.path.join(config.piko_source_root, "examples")),
@@ -45,6 +59,10 @@ config.substitutions += [
     ("%utils", os.path.join(config.piko_source_root, "utils")),
     ("%readme", os.path.join(config.piko_source_root, "README.md")),
     ("%docs", os.path.join(config.piko_source_root, "docs")),
+    ("%cmake", config.cmake),
+    ("%piko", config.piko_binary_root),
+    ("%cxx_host", f"{config.cxx} -std=c++20 -Wall -Wextra -Werror -I {include}"),
+    ("%link_host", " ".join(link_host)),
     ("%cxx_reference", " ".join(reference)),
 ]
 

@@ -8,10 +8,11 @@
 #include "Piko/Driver/Sequences.h"
 
 #include "mlir/Parser/Parser.h"
-#include "mlir/Support/FileUtilities.h"
 #include "mlir/Target/LLVMIR/Export.h"
 #include "llvm/ADT/StringExtras.h"
 #include "llvm/IR/Module.h"
+#include "llvm/Support/FileSystem.h"
+#include "llvm/Support/Path.h"
 #include "llvm/Support/SourceMgr.h"
 
 using namespace mlir;
@@ -20,16 +21,28 @@ using namespace piko;
 static bool isMLIR(StringRef file) { return file.ends_with(".mlir"); }
 
 /// Parses `.mlir`; null after diagnostics.
-static OwningOpRef<ModuleOp> parseMLIR(StringRef file, MLIRContext &context) {
-  std::string message;
-  std::unique_ptr<llvm::MemoryBuffer> text = openInputFile(file, &message);
+static OwningOpRef<ModuleOp> parseMLIR(StringRef file, MLIRContext &context,
+                                       llvm::vfs::FileSystem &files) {
+  auto text = files.getBufferForFile(file);
   if (!text) {
-    emitError(UnknownLoc::get(&context)) << message;
+    emitError(UnknownLoc::get(&context)) << "cannot open input file '" << file
+                                         << "': " << text.getError().message();
     return {};
   }
   llvm::SourceMgr sources;
-  sources.AddNewSourceBuffer(std::move(text), llvm::SMLoc());
+  sources.AddNewSourceBuffer(std::move(*text), llvm::SMLoc());
   return parseSourceFile<ModuleOp>(sources, &context);
+}
+
+std::string piko::getRuntimeIncludeDir() {
+  llvm::SmallString<128> path(llvm::sys::fs::getMainExecutable(
+      nullptr, reinterpret_cast<void *>(&getRuntimeIncludeDir)));
+  llvm::sys::path::remove_filename(path);
+  llvm::sys::path::append(path, "..", "include");
+  llvm::sys::path::remove_dots(path, /*remove_dot_dot=*/true);
+  if (llvm::sys::fs::exists(path + "/piko.h"))
+    return std::string(path);
+  return PIKO_RUNTIME_INCLUDE_DIR;
 }
 
 FrontendOptions piko::getFrontendOptions(const CompileOptions &options) {
@@ -37,7 +50,7 @@ FrontendOptions piko::getFrontendOptions(const CompileOptions &options) {
   result.includeDirs = options.includeDirs;
   result.defines = options.defines;
   result.pipeName = options.pipeName;
-  result.runtimeIncludeDir = PIKO_RUNTIME_INCLUDE_DIR;
+  result.runtimeIncludeDir = getRuntimeIncludeDir();
   return result;
 }
 
@@ -71,13 +84,15 @@ static LogicalResult selectPipeline(ModuleOp module, StringRef file,
   return success();
 }
 
-OwningOpRef<ModuleOp> piko::readPipeline(const CompileOptions &options,
-                                         MLIRContext &context) {
+OwningOpRef<ModuleOp>
+piko::readPipeline(const CompileOptions &options, MLIRContext &context,
+                   llvm::IntrusiveRefCntPtr<llvm::vfs::FileSystem> files) {
   context.loadAllAvailableDialects();
+  FrontendOptions frontend = getFrontendOptions(options);
+  frontend.files = files;
   if (!isMLIR(options.file))
-    return translateCppToPiko(options.file, getFrontendOptions(options),
-                              context);
-  OwningOpRef<ModuleOp> module = parseMLIR(options.file, context);
+    return translateCppToPiko(options.file, frontend, context);
+  OwningOpRef<ModuleOp> module = parseMLIR(options.file, context, *files);
   if (!module ||
       failed(selectPipeline(*module, options.file, options.pipeName)))
     return {};
@@ -89,7 +104,8 @@ piko::readPipelineNames(const CompileOptions &options, MLIRContext &context) {
   context.loadAllAvailableDialects();
   if (!isMLIR(options.file))
     return listPipes(options.file, getFrontendOptions(options), context);
-  OwningOpRef<ModuleOp> module = parseMLIR(options.file, context);
+  OwningOpRef<ModuleOp> module =
+      parseMLIR(options.file, context, *llvm::vfs::getRealFileSystem());
   if (!module)
     return failure();
   return getNames(*module);

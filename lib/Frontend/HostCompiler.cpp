@@ -18,13 +18,14 @@ std::unique_ptr<llvm::Module>
 piko::compileForHost(llvm::StringRef text, const FrontendOptions &options,
                      llvm::LLVMContext &llvmContext,
                      mlir::MLIRContext &context) {
+  auto files = options.files ? options.files : llvm::vfs::getRealFileSystem();
   ClangDiagnosticForwarder forwarder(context);
   clang::DiagnosticOptions diagnosticOptions;
-  std::shared_ptr<clang::CompilerInvocation> invocation = createClangInvocation(
-      {"-O2", "-fPIC"}, options, mainName,
-      clang::CompilerInstance::createDiagnostics(
-          *llvm::vfs::getRealFileSystem(), diagnosticOptions, &forwarder,
-          /*ShouldOwnClient=*/false));
+  std::shared_ptr<clang::CompilerInvocation> invocation =
+      createClangInvocation({"-O2", "-fPIC"}, options, mainName,
+                            clang::CompilerInstance::createDiagnostics(
+                                *files, diagnosticOptions, &forwarder,
+                                /*ShouldOwnClient=*/false));
   if (!invocation)
     return nullptr;
   // The text is in memory; nothing is read from a file of that name.
@@ -33,7 +34,7 @@ piko::compileForHost(llvm::StringRef text, const FrontendOptions &options,
   invocation->getFrontendOpts().Inputs = {clang::FrontendInputFile(
       buffer->getMemBufferRef(), clang::InputKind(clang::Language::CXX))};
   clang::CompilerInstance compiler(invocation);
-  compiler.setVirtualFileSystem(llvm::vfs::getRealFileSystem());
+  compiler.setVirtualFileSystem(files);
   compiler.setVerboseOutputStream(llvm::nulls());
   compiler.createDiagnostics(&forwarder, /*ShouldOwnClient=*/false);
   clang::EmitLLVMOnlyAction action(&llvmContext);

@@ -306,7 +306,8 @@ std::unique_ptr<ParsedUnit> piko::parseUnit(const ParseRequest &request,
       mlir::FileLineColLoc::get(&context, request.file, 1, 1);
   auto memory = llvm::makeIntrusiveRefCnt<llvm::vfs::InMemoryFileSystem>();
   auto files = llvm::makeIntrusiveRefCnt<llvm::vfs::OverlayFileSystem>(
-      llvm::vfs::getRealFileSystem());
+      request.options.files ? request.options.files
+                            : llvm::vfs::getRealFileSystem());
   files->pushOverlay(memory);
   if (request.text) {
     memory->addFile(request.file, 0,

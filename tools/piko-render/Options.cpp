@@ -20,6 +20,9 @@ it, and says how long a frame took.
   --target cpu|reference compiled for this machine, or run by the reference
                          executor (cpu)
   -I FOLDER, -D NAME[=VALUE]   for the pipeline's preprocessor
+  --no-cache             compile even if nothing changed since the last time
+  --cache-dir FOLDER     where compiled code is kept ($PIKO_CACHE_DIR,
+                         $XDG_CACHE_HOME/piko or ~/.cache/piko)
 
   --width W --height H   image size in pixels (1024 768)
   --lights L             number of lights, 0 for none (1)
@@ -72,6 +75,8 @@ private:
         {"--help", [&] { options.help = true; }},
         {"--pipe", [&] { options.load.pipeName = value(name); }},
         {"--target", [&] { options.load.target = target(value(name)); }},
+        {"--no-cache", [&] { options.load.cache.enabled = false; }},
+        {"--cache-dir", [&] { options.load.cache.directory = value(name); }},
         {"--width", [&] { options.view.width = integer(name, 1, 65536); }},
         {"--height", [&] { options.view.height = integer(name, 1, 65536); }},
         {"--lights", [&] { options.lights = integer(name, 0, 1'000'000); }},

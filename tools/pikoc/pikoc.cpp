@@ -1,24 +1,36 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// The compiler's command: reads a pipeline from C++ or .mlir and writes it at
-// any level.
+// The compiler's command: reads a pipeline from C++ or .mlir and writes an
+// object with its header, or any level on the way.
+
+#include "OutputFiles.h"
 
 #include "Piko/Driver/Compiler.h"
 #include "Piko/Driver/Diagnostics.h"
+#include "Piko/Driver/ObjectCompiler.h"
+#include "Piko/Target/Object.h"
 
 #include "llvm/IR/LLVMContext.h"
 #include "llvm/IR/Module.h"
 #include "llvm/Support/CommandLine.h"
-#include "llvm/Support/FileSystem.h"
 #include "llvm/Support/InitLLVM.h"
-#include "llvm/Support/ToolOutputFile.h"
+#include "llvm/Support/Path.h"
 
 using namespace mlir;
 using namespace piko;
 
 namespace {
 
-enum class Emit { Authored, Kernels, Resolved, Target, LLVM, LLVMIR };
+enum class Emit {
+  Authored,
+  Kernels,
+  Resolved,
+  Target,
+  LLVM,
+  LLVMIR,
+  Assembly,
+  Object
+};
 
 struct CommandLine {
   llvm::cl::OptionCategory category{"pikoc options"};
@@ -30,7 +42,10 @@ struct CommandLine {
       llvm::cl::desc("the pipeline to compile, where a file has several"),
       llvm::cl::cat(category)};
   llvm::cl::opt<Emit> emit{
-      "emit", llvm::cl::desc("the level to write (default: llvmir)"),
+      "emit",
+      llvm::cl::desc("what to write (default: object where -o ends in .o or "
+                     "--header is given, assembly where it ends in .s, or else "
+                     "llvmir)"),
       llvm::cl::init(Emit::LLVMIR), llvm::cl::cat(category),
       llvm::cl::values(
           clEnumValN(Emit::Authored, "authored", "stages with their phases"),
@@ -38,7 +53,38 @@ struct CommandLine {
           clEnumValN(Emit::Resolved, "resolved", "loops over bins"),
           clEnumValN(Emit::Target, "target", "upstream dialects"),
           clEnumValN(Emit::LLVM, "llvm", "the llvm and omp dialects"),
-          clEnumValN(Emit::LLVMIR, "llvmir", "LLVM IR"))};
+          clEnumValN(Emit::LLVMIR, "llvmir", "LLVM IR"),
+          clEnumValN(Emit::Assembly, "assembly", "the processor's language"),
+          clEnumValN(Emit::Object, "object", "an object file to link"))};
+  llvm::cl::opt<std::string> output{
+      "o", llvm::cl::value_desc("file"), llvm::cl::init("-"),
+      llvm::cl::desc("where to write (default: standard output)"),
+      llvm::cl::cat(category)};
+  llvm::cl::opt<std::string> header{
+      "header", llvm::cl::value_desc("file"),
+      llvm::cl::desc("write a C++ header for who links the object"),
+      llvm::cl::cat(category)};
+  llvm::cl::opt<std::string> nameSpace{
+      "namespace", llvm::cl::value_desc("name"), llvm::cl::init("pipelines"),
+      llvm::cl::desc("of the class in the header, and a part of the object's "
+                     "symbol (default: pipelines)"),
+      llvm::cl::cat(category)};
+  llvm::cl::opt<std::string> depfile{
+      "depfile", llvm::cl::value_desc("file"),
+      llvm::cl::desc("write a rule for make or ninja with the files read"),
+      llvm::cl::cat(category)};
+  llvm::cl::opt<std::string> cpu{
+      "cpu", llvm::cl::value_desc("name"),
+      llvm::cl::desc("the processor to make code for, as clang names them, or "
+                     "native (default: x86-64-v3, generic elsewhere)"),
+      llvm::cl::cat(category)};
+  llvm::cl::opt<unsigned> optLevel{
+      "O",
+      llvm::cl::Prefix,
+      llvm::cl::value_desc("level"),
+      llvm::cl::init(3),
+      llvm::cl::desc("how much to optimise, 0 to 3 (default: 3)"),
+      llvm::cl::cat(category)};
   llvm::cl::opt<bool> listPipes{
       "list-pipes", llvm::cl::desc("print the names of the file's pipelines"),
       llvm::cl::cat(category)};
@@ -48,48 +94,140 @@ struct CommandLine {
   llvm::cl::list<std::string> defines{
       "D", llvm::cl::Prefix, llvm::cl::value_desc("name[=value]"),
       llvm::cl::desc("a macro for C++"), llvm::cl::cat(category)};
-  llvm::cl::opt<std::string> output{
-      "o", llvm::cl::value_desc("file"), llvm::cl::init("-"),
-      llvm::cl::desc("where to write (default: standard output)"),
+  llvm::cl::opt<bool> noCache{
+      "no-cache", llvm::cl::desc("compile objects even if nothing changed"),
+      llvm::cl::cat(category)};
+  llvm::cl::opt<std::string> cacheDir{
+      "cache-dir", llvm::cl::value_desc("folder"),
+      llvm::cl::desc("where objects are kept (default: $PIKO_CACHE_DIR, "
+                     "$XDG_CACHE_HOME/piko or ~/.cache/piko)"),
       llvm::cl::cat(category)};
   llvm::cl::opt<bool> remarks{
       "remarks", llvm::cl::desc("print what the passes have to say"),
       llvm::cl::cat(category)};
+
+  Emit getEmit() const {
+    if (emit.getNumOccurrences())
+      return emit;
+    llvm::StringRef extension = llvm::sys::path::extension(output);
+    if (header.getNumOccurrences() || extension == ".o")
+      return Emit::Object;
+    return extension == ".s" ? Emit::Assembly : Emit::LLVMIR;
+  }
+  CompileOptions getSource() const {
+    return {file,
+            pipe,
+            {includeDirs.begin(), includeDirs.end()},
+            {defines.begin(), defines.end()}};
+  }
+  TargetOptions getTarget() const {
+    return {.cpu = cpu, .optLevel = static_cast<int>(optLevel)};
+  }
 };
 
 } // namespace
 
-static Level getLevel(Emit emit) {
-  return emit == Emit::LLVMIR ? Level::LLVM : static_cast<Level>(emit);
+static int fail(const llvm::Twine &message) {
+  llvm::errs() << "error: " << message << "\n";
+  return 1;
 }
 
-static LogicalResult printPipes(const CompileOptions &options,
-                                MLIRContext &context, raw_ostream &stream) {
-  auto names = readPipelineNames(options, context);
-  if (failed(names))
-    return failure();
-  for (const std::string &name : *names)
-    stream << name << "\n";
-  return success();
+/// What is wrong with options that are fine one by one; empty if nothing.
+static std::string checkOptions(const CommandLine &line) {
+  bool isObject = line.getEmit() == Emit::Object && !line.listPipes;
+  if (line.optLevel > 3)
+    return "expected -O0 to -O3, but got -O" + std::to_string(line.optLevel);
+  if (!isObject &&
+      (line.header.getNumOccurrences() || line.depfile.getNumOccurrences()))
+    return "--header and --depfile belong to an object, which --emit=object or "
+           "an -o that ends in .o asks for";
+  if (isObject && line.output == "-" && llvm::outs().is_displayed())
+    return "expected -o, because an object is not for a terminal";
+  return "";
 }
 
-static LogicalResult compile(const CompileOptions &options, Emit emit,
-                             MLIRContext &context, raw_ostream &stream) {
-  OwningOpRef<ModuleOp> module = readPipeline(options, context);
-  if (!module || failed(lowerPipeline(*module, getLevel(emit))))
-    return failure();
-  if (emit != Emit::LLVMIR) {
-    module->print(stream);
-    stream << "\n";
-    return success();
-  }
-  llvm::LLVMContext llvmContext;
-  std::unique_ptr<llvm::Module> translated =
-      translateToLLVMIR(*module, llvmContext);
+static std::string printPipes(const std::vector<std::string> &names) {
+  std::string text;
+  for (const std::string &name : names)
+    text += name + "\n";
+  return text;
+}
+
+static std::string print(ModuleOp module) {
+  std::string text;
+  llvm::raw_string_ostream stream(text);
+  module->print(stream);
+  stream << "\n";
+  return text;
+}
+
+/// LLVM IR as text, or assembly made of it; nothing after an error.
+static std::optional<std::string> translate(const CommandLine &line,
+                                            ModuleOp module) {
+  llvm::LLVMContext context;
+  std::unique_ptr<llvm::Module> translated = translateToLLVMIR(module, context);
   if (!translated)
-    return failure();
-  translated->print(stream, nullptr);
-  return success();
+    return std::nullopt;
+  std::string text;
+  llvm::raw_string_ostream stream(text);
+  if (line.getEmit() == Emit::LLVMIR) {
+    translated->print(stream, nullptr);
+    return text;
+  }
+  auto code = generateCode(*translated, line.getTarget(), CodeFormat::Assembly);
+  if (code)
+    return *code;
+  fail(llvm::toString(code.takeError()));
+  return std::nullopt;
+}
+
+/// What a level looks like, or the file's pipelines; nothing after an error.
+static std::optional<std::string> writeText(const CommandLine &line) {
+  DialectRegistry registry;
+  registerPikoDialects(registry);
+  MLIRContext context(registry);
+  DiagnosticPrinter printer(context, llvm::errs(), line.remarks);
+  if (line.listPipes) {
+    auto names = readPipelineNames(line.getSource(), context);
+    return failed(names) ? std::nullopt : std::optional(printPipes(*names));
+  }
+  Level level = line.getEmit() >= Emit::LLVMIR
+                    ? Level::LLVM
+                    : static_cast<Level>(line.getEmit());
+  OwningOpRef<ModuleOp> module = readPipeline(line.getSource(), context);
+  if (!module || failed(lowerPipeline(*module, level)))
+    return std::nullopt;
+  if (line.getEmit() >= Emit::LLVMIR)
+    return translate(line, *module);
+  return print(*module);
+}
+
+/// The object and what belongs to it; false after an error.
+static bool writeObject(const CommandLine &line, OutputFiles &outputs) {
+  ObjectOptions options{
+      .source = line.getSource(),
+      .target = line.getTarget(),
+      .cache = {.enabled = !line.noCache, .directory = line.cacheDir},
+      .nameSpace = line.nameSpace,
+      .remarks = line.remarks};
+  std::string diagnostics;
+  std::optional<CompiledObject> object = compileObject(options, diagnostics);
+  llvm::errs() << diagnostics;
+  if (!object)
+    return false;
+  std::vector<std::string> targets = {line.output};
+  llvm::Error error = outputs.add(line.output, object->code);
+  if (!error && line.header.getNumOccurrences()) {
+    targets.push_back(line.header);
+    error = outputs.add(line.header, object->header);
+  }
+  if (!error && line.depfile.getNumOccurrences())
+    error =
+        outputs.add(line.depfile, writeDependencies(targets, object->files));
+  if (!error)
+    return true;
+  fail(llvm::toString(std::move(error)));
+  return false;
 }
 
 int main(int argc, char **argv) {
@@ -98,24 +236,20 @@ int main(int argc, char **argv) {
   llvm::cl::HideUnrelatedOptions(line.category);
   llvm::cl::ParseCommandLineOptions(argc, argv,
                                     "Piko's compiler for pipelines\n");
-  std::error_code code;
-  llvm::ToolOutputFile output(line.output, code, llvm::sys::fs::OF_Text);
-  if (code) {
-    llvm::errs() << "error: cannot write '" << line.output
-                 << "': " << code.message() << "\n";
-    return 1;
+  if (std::string wrong = checkOptions(line); !wrong.empty())
+    return fail(wrong);
+  OutputFiles outputs;
+  if (line.getEmit() == Emit::Object && !line.listPipes) {
+    if (!writeObject(line, outputs))
+      return 1;
+  } else {
+    std::optional<std::string> text = writeText(line);
+    if (!text)
+      return 1;
+    if (llvm::Error error = outputs.add(line.output, *text))
+      return fail(llvm::toString(std::move(error)));
   }
-
-  DialectRegistry registry;
-  registerPikoDialects(registry);
-  MLIRContext context(registry);
-  DiagnosticPrinter printer(context, llvm::errs(), line.remarks);
-  CompileOptions options{line.file, line.pipe, line.includeDirs, line.defines};
-  LogicalResult result =
-      line.listPipes ? printPipes(options, context, output.os())
-                     : compile(options, line.emit, context, output.os());
-  if (failed(result))
-    return 1;
-  output.keep();
+  if (llvm::Error error = outputs.keep())
+    return fail(llvm::toString(std::move(error)));
   return 0;
 }

@@ -5,11 +5,13 @@
 #ifndef PIKO_DRIVER_COMPILER_H
 #define PIKO_DRIVER_COMPILER_H
 
+#include "Piko/Driver/Options.h"
 #include "Piko/Driver/Registration.h"
 #include "Piko/Frontend/Frontend.h"
 
 #include "mlir/IR/BuiltinOps.h"
 #include "mlir/IR/OwningOpRef.h"
+#include "llvm/Support/VirtualFileSystem.h"
 
 #include <string>
 #include <vector>
@@ -24,22 +26,19 @@ namespace piko {
 /// The levels that the compiler moves a module down, in order.
 enum class Level { Authored, Kernels, Resolved, Target, LLVM };
 
-struct CompileOptions {
-  /// A pipeline's C++, or `.mlir` at the authored level.
-  std::string file;
-  /// The pipeline to compile; empty = the only one in the file.
-  std::string pipeName;
-  /// `-I` and `-D`, without the letter.
-  std::vector<std::string> includeDirs, defines;
-};
+/// Where piko.h is: beside the tool that is running, as it is installed, or in
+/// the source tree.
+std::string getRuntimeIncludeDir();
 
-/// The same, for the C++ front end.
+/// The options as the C++ front end takes them.
 FrontendOptions getFrontendOptions(const CompileOptions &options);
 
-/// Reads the file: a module at the authored level that holds one pipeline, or
-/// null after diagnostics in the context's engine.
-mlir::OwningOpRef<mlir::ModuleOp> readPipeline(const CompileOptions &options,
-                                               mlir::MLIRContext &context);
+/// Reads the file from among `files`: a module at the authored level that holds
+/// one pipeline, or null after diagnostics in the context's engine.
+mlir::OwningOpRef<mlir::ModuleOp>
+readPipeline(const CompileOptions &options, mlir::MLIRContext &context,
+             llvm::IntrusiveRefCntPtr<llvm::vfs::FileSystem> files =
+                 llvm::vfs::getRealFileSystem());
 
 /// The names of the pipelines in a file, in the order in which they stand
 /// there.

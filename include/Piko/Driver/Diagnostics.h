@@ -26,6 +26,12 @@ public:
     context.printOpOnDiagnostic(false);
   }
 
+  /// Lines of a file that is not on disk are shown from this.
+  void addText(llvm::StringRef file, llvm::StringRef text) {
+    sources.AddNewSourceBuffer(llvm::MemoryBuffer::getMemBufferCopy(text, file),
+                               llvm::SMLoc());
+  }
+
 private:
   llvm::SourceMgr sources;
 };

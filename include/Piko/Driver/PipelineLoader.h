@@ -1,10 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// From a pipeline's file to a program that the runtime can run, for hosts that
+// From a pipeline's text to a program that the runtime can run, for hosts that
 // know nothing of compilers: no header of LLVM is needed here.
+//
+//   piko::LoadOptions options;
+//   options.pipeName = "DrawPipe";
+//   std::string diagnostics;
+//   auto program = piko::loadPipeline("draw.piko.cpp", options, diagnostics);
+//   if (!program) { show diagnostics }
+//   piko::rt::Pipeline pipe(program->get()); // of pikort/pikort.hpp
 
 #ifndef PIKO_DRIVER_PIPELINELOADER_H
 #define PIKO_DRIVER_PIPELINELOADER_H
+
+#include "Piko/Driver/Options.h"
 
 #include "pikort/pikort.h"
 
@@ -14,18 +23,13 @@
 
 namespace piko {
 
-/// What executes a pipeline.
-enum class ExecutionTarget {
-  CPU,      ///< Compiled, on all threads that the host allows.
-  Reference ///< The reference executor of piko.h: sequential, and the measure.
-};
-
 struct LoadOptions {
   /// The pipeline to load; empty = the only one in the file.
-  std::string pipeName;
+  std::string pipeName = {};
   ExecutionTarget target = ExecutionTarget::CPU;
   /// `-I` and `-D`, without the letter.
-  std::vector<std::string> includeDirs, defines;
+  std::vector<std::string> includeDirs = {}, defines = {};
+  CacheOptions cache = {};
 };
 
 /// A program that is ready to run; its code goes when the object goes, so it
@@ -33,22 +37,29 @@ struct LoadOptions {
 class LoadedProgram {
 public:
   virtual ~LoadedProgram() = default;
-  const pikort_program &get() const { return program; }
+  const pikort_program &get() const { return *program; }
   /// From the text to here, in milliseconds.
   double compileMilliseconds() const { return milliseconds; }
 
 protected:
-  pikort_program program{};
+  const pikort_program *program = nullptr;
   double milliseconds = 0;
 };
 
 /// Compiles a pipeline's file, C++ or `.mlir` (which the reference executor
-/// does not read), and loads it. On an error the result is null and
-/// `diagnostics` holds what to show, with file and line where there is one;
-/// warnings are put there too.
+/// does not read), for this machine, or finds its code in the cache, and loads
+/// it. On an error the result is null and `diagnostics` holds what to show,
+/// with file and line where there is one; warnings are put there too.
 std::unique_ptr<LoadedProgram> loadPipeline(const std::string &file,
                                             const LoadOptions &options,
                                             std::string &diagnostics);
+
+/// The same for text in memory. `name` is what diagnostics call it; headers
+/// are looked for as if it were a file of that name.
+std::unique_ptr<LoadedProgram> loadPipelineText(const std::string &name,
+                                                const std::string &text,
+                                                const LoadOptions &options,
+                                                std::string &diagnostics);
 
 } // namespace piko
 

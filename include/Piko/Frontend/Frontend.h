@@ -16,6 +16,7 @@
 #include "Piko/Frontend/PipelineDescription.h"
 #include "mlir/IR/BuiltinOps.h"
 #include "mlir/IR/OwningOpRef.h"
+#include "llvm/Support/VirtualFileSystem.h"
 
 #include <string>
 #include <vector>
@@ -32,6 +33,8 @@ struct FrontendOptions {
   std::string runtimeIncludeDir;
   /// Clang's own headers; empty = those of the Clang that Piko was built with.
   std::string resourceDir;
+  /// Where all files are read; null = the disk.
+  llvm::IntrusiveRefCntPtr<llvm::vfs::FileSystem> files;
 };
 
 /// Compiles one pipeline of a C++ file; null after an error.

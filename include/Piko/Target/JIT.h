@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// LLVM IR to code for this machine, just in time.
+// Machine code in this process.
 
 #ifndef PIKO_TARGET_JIT_H
 #define PIKO_TARGET_JIT_H
 
 #include "llvm/ExecutionEngine/Orc/LLJIT.h"
-#include "llvm/ExecutionEngine/Orc/ThreadSafeModule.h"
 
 #include <memory>
 
@@ -16,18 +15,15 @@ namespace piko {
 /// libraries are the process's own.
 class JITCode {
 public:
-  /// Optimises a module for this machine and compiles it.
-  static llvm::Expected<std::unique_ptr<JITCode>>
-  create(std::unique_ptr<llvm::Module> module,
-         std::unique_ptr<llvm::LLVMContext> context);
+  /// Links an object that generateCode made for this machine.
+  static llvm::Expected<std::unique_ptr<JITCode>> load(llvm::StringRef object);
 
-  /// The address of a function, by its name.
-  template <typename Function>
-  llvm::Expected<Function *> lookup(llvm::StringRef name) {
+  /// The address of a function or a variable, by its name.
+  template <typename T> llvm::Expected<T *> lookup(llvm::StringRef name) {
     auto address = jit->lookup(name);
     if (!address)
       return address.takeError();
-    return address->toPtr<Function *>();
+    return address->toPtr<T *>();
   }
 
 private:

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// From a pipeline's text to an object file in memory, through the cache. No
+// header of LLVM is needed here.
+
+#ifndef PIKO_DRIVER_OBJECTCOMPILER_H
+#define PIKO_DRIVER_OBJECTCOMPILER_H
+
+#include "Piko/Driver/Options.h"
+
+#include <optional>
+
+namespace piko {
+
+struct ObjectOptions {
+  CompileOptions source;
+  ExecutionTarget execution = ExecutionTarget::CPU;
+  TargetOptions target = {};
+  CacheOptions cache = {};
+  /// The C++ namespace of the generated class; a part of the object's symbol.
+  std::string nameSpace = "pipelines";
+  bool remarks = false;
+};
+
+struct CompiledObject {
+  /// The name of the pipeline.
+  std::string pipeline;
+  /// The object's one external definition, a pikort_program; for the reference
+  /// executor, a function that returns the address of one.
+  std::string symbol;
+  std::string code;
+  /// The C++ header for hosts; empty for the reference executor.
+  std::string header;
+  /// The files that were read, sorted.
+  std::vector<std::string> files;
+};
+
+/// Compiles, or finds in the cache what the same text, headers and options gave
+/// before. `diagnostics` gets what there is to show, with file and line where
+/// there is one; the result is empty after an error.
+std::optional<CompiledObject> compileObject(const ObjectOptions &options,
+                                            std::string &diagnostics);
+
+} // namespace piko
+
+#endif // PIKO_DRIVER_OBJECTCOMPILER_H

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// What the driver is asked for. No header of LLVM is needed here.
+
+#ifndef PIKO_DRIVER_OPTIONS_H
+#define PIKO_DRIVER_OPTIONS_H
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace piko {
+
+/// What executes a pipeline.
+enum class ExecutionTarget {
+  CPU,      ///< Compiled, on all threads that the host allows.
+  Reference ///< The reference executor of piko.h: sequential, and the measure.
+};
+
+/// A pipeline and how its text is read.
+struct CompileOptions {
+  /// A pipeline's C++, or `.mlir` at the authored level.
+  std::string file;
+  /// The pipeline to compile; empty = the only one in the file.
+  std::string pipeName = {};
+  /// `-I` and `-D`, without the letter.
+  std::vector<std::string> includeDirs = {}, defines = {};
+  /// The file's text, where it is not on disk; `file` is then only its name.
+  std::optional<std::string> text = {};
+};
+
+/// What code is made for.
+struct TargetOptions {
+  /// As LLVM names processors; "native" is this machine's, with all that it
+  /// offers, and empty is the least that objects are made for.
+  std::string cpu = {};
+  /// 0 to 3, as in -O3.
+  int optLevel = 3;
+};
+
+/// Where compiled code is kept from one process to the next.
+struct CacheOptions {
+  bool enabled = true;
+  /// Empty = $PIKO_CACHE_DIR, $XDG_CACHE_HOME/piko or $HOME/.cache/piko, the
+  /// first that there is.
+  std::string directory = {};
+  /// The oldest entries go when it is larger; 0 = $PIKO_CACHE_SIZE, in bytes,
+  /// or 512 MiB.
+  uint64_t maxBytes = 0;
+};
+
+} // namespace piko
+
+#endif // PIKO_DRIVER_OPTIONS_H

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// LLVM IR to machine code for a CPU, as an object file or as assembly.
+
+#ifndef PIKO_TARGET_OBJECT_H
+#define PIKO_TARGET_OBJECT_H
+
+#include "Piko/Driver/Options.h"
+
+#include "llvm/IR/Module.h"
+#include "llvm/Support/Error.h"
+
+#include <string>
+
+namespace piko {
+
+/// A processor by LLVM's name and the features that are switched on and off
+/// beside it.
+struct Processor {
+  std::string name, features;
+};
+
+/// The processor that TargetOptions::cpu stands for, or an error if there is no
+/// such processor.
+llvm::Expected<Processor> resolveProcessor(llvm::StringRef cpu);
+
+enum class CodeFormat { Object, Assembly };
+
+/// Optimises the module and makes position-independent code of it. Static
+/// initialisers become one function, which JITCode runs.
+llvm::Expected<std::string> generateCode(llvm::Module &module,
+                                         const TargetOptions &options,
+                                         CodeFormat format);
+
+} // namespace piko
+
+#endif // PIKO_TARGET_OBJECT_H

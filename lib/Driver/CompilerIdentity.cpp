@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Which compiler this is, from the notes that linkers leave in its files.
+
+#include "CompilerIdentity.h"
+
+#include "llvm/ADT/StringExtras.h"
+#include "llvm/Support/BLAKE3.h"
+#include "llvm/Support/MathExtras.h"
+#include "llvm/Support/MemoryBuffer.h"
+
+#include <cstring>
+#include <link.h>
+
+using namespace llvm;
+using namespace piko;
+
+/// The build id in a segment of notes; empty if there is none.
+static StringRef findBuildId(StringRef notes) {
+  while (notes.size() >= sizeof(ElfW(Nhdr))) {
+    ElfW(Nhdr) header;
+    std::memcpy(&header, notes.data(), sizeof header);
+    StringRef name =
+        notes.drop_front(sizeof header).take_front(header.n_namesz);
+    size_t begin = sizeof header + alignTo(header.n_namesz, 4);
+    if (header.n_type == NT_GNU_BUILD_ID && name == StringRef("GNU\0", 4))
+      return notes.substr(begin, header.n_descsz);
+    notes = notes.drop_front(
+        std::min(notes.size(), size_t(begin + alignTo(header.n_descsz, 4))));
+  }
+  return {};
+}
+
+static bool contains(const dl_phdr_info &module, const void *address) {
+  auto offset = reinterpret_cast<uintptr_t>(address) - module.dlpi_addr;
+  for (const auto &segment : ArrayRef(module.dlpi_phdr, module.dlpi_phnum))
+    if (segment.p_type == PT_LOAD && offset >= segment.p_vaddr &&
+        offset - segment.p_vaddr < segment.p_memsz)
+      return true;
+  return false;
+}
+
+static std::string identify(const dl_phdr_info &module) {
+  for (const auto &segment : ArrayRef(module.dlpi_phdr, module.dlpi_phnum)) {
+    if (segment.p_type != PT_NOTE)
+      continue;
+    StringRef notes(
+        reinterpret_cast<const char *>(module.dlpi_addr + segment.p_vaddr),
+        segment.p_memsz);
+    if (StringRef id = findBuildId(notes); !id.empty())
+      return toHex(id);
+  }
+  // A linker that was told to leave no id: the whole file tells.
+  const char *path = *module.dlpi_name ? module.dlpi_name : "/proc/self/exe";
+  auto file = MemoryBuffer::getFile(path, /*IsText=*/false,
+                                    /*RequiresNullTerminator=*/false);
+  if (!file)
+    return "unknown";
+  return toHex(BLAKE3::hash(arrayRefFromStringRef((*file)->getBuffer())));
+}
+
+static int visit(dl_phdr_info *module, size_t, void *data) {
+  StringRef name(module->dlpi_name);
+  if (contains(*module, reinterpret_cast<const void *>(&getCompilerIdentity)) ||
+      name.contains("/libLLVM") || name.contains("/libMLIR") ||
+      name.contains("/libclang-cpp"))
+    static_cast<std::string *>(data)->append(identify(*module) + ";");
+  return 0;
+}
+
+std::string piko::getCompilerIdentity() {
+  std::string identity;
+  dl_iterate_phdr(visit, &identity);
+  return identity;
+}

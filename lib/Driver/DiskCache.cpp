@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Bytes on disk by key, shared by processes.
+
+#include "DiskCache.h"
+
+#include "llvm/ADT/StringExtras.h"
+#include "llvm/Support/CachePruning.h"
+#include "llvm/Support/FileSystem.h"
+#include "llvm/Support/MemoryBuffer.h"
+#include "llvm/Support/Path.h"
+#include "llvm/Support/Process.h"
+#include "llvm/Support/raw_ostream.h"
+
+using namespace llvm;
+using namespace piko;
+namespace fs = llvm::sys::fs;
+
+static constexpr StringLiteral magic = "piko cache 1\n";
+static constexpr uint64_t defaultMaxBytes = uint64_t(512) << 20;
+
+KeyBuilder &KeyBuilder::add(StringRef string) {
+  hasher.update(std::to_string(string.size()) + ":");
+  hasher.update(string);
+  return *this;
+}
+
+std::string KeyBuilder::finish() {
+  return toHex(hasher.final(), /*LowerCase=*/true);
+}
+
+static std::string getEnvironment(const char *name) {
+  return sys::Process::GetEnv(name).value_or("");
+}
+
+static std::string findDirectory(const CacheOptions &options) {
+  if (!options.enabled)
+    return "";
+  if (!options.directory.empty())
+    return options.directory;
+  if (std::string own = getEnvironment("PIKO_CACHE_DIR"); !own.empty())
+    return own;
+  SmallString<128> path;
+  if (std::string shared = getEnvironment("XDG_CACHE_HOME");
+      sys::path::is_absolute(shared))
+    sys::path::append(path, shared, "piko");
+  else if (std::string home = getEnvironment("HOME"); !home.empty())
+    sys::path::append(path, home, ".cache", "piko");
+  return std::string(path);
+}
+
+static uint64_t findMaxBytes(const CacheOptions &options) {
+  if (options.maxBytes)
+    return options.maxBytes;
+  uint64_t bytes;
+  if (to_integer(getEnvironment("PIKO_CACHE_SIZE"), bytes) && bytes)
+    return bytes;
+  return defaultMaxBytes;
+}
+
+DiskCache::DiskCache(const CacheOptions &options)
+    : directory(findDirectory(options)), maxBytes(findMaxBytes(options)) {}
+
+std::string DiskCache::getPath(StringRef key) const {
+  SmallString<128> path(directory);
+  // LLVM prunes only files whose names begin so.
+  sys::path::append(path, "llvmcache-" + key);
+  return std::string(path);
+}
+
+std::optional<std::string> DiskCache::read(StringRef key) const {
+  if (!isEnabled())
+    return std::nullopt;
+  Expected<fs::file_t> file = fs::openNativeFileForRead(getPath(key));
+  if (!file) {
+    consumeError(file.takeError());
+    return std::nullopt;
+  }
+  // A mapped file could change while it is read.
+  auto buffer = MemoryBuffer::getOpenFile(*file, key, /*FileSize=*/-1,
+                                          /*RequiresNullTerminator=*/false,
+                                          /*IsVolatile=*/true);
+  // Where it is not ours to touch, it only seems older than it is.
+  (void)fs::setLastAccessAndModificationTime(*file,
+                                             std::chrono::system_clock::now());
+  (void)fs::closeFile(*file);
+  if (!buffer)
+    return std::nullopt;
+  StringRef bytes = (*buffer)->getBuffer();
+  if (!bytes.consume_front(magic) || bytes.size() < 32)
+    return std::nullopt;
+  StringRef sum = bytes.take_front(32);
+  bytes = bytes.drop_front(32);
+  if (toStringRef(BLAKE3::hash(arrayRefFromStringRef(bytes))) != sum)
+    return std::nullopt;
+  return bytes.str();
+}
+
+Error DiskCache::write(StringRef key, StringRef bytes) const {
+  if (!isEnabled())
+    return Error::success();
+  if (std::error_code code = fs::create_directories(directory))
+    return errorCodeToError(code);
+  std::string path = getPath(key);
+  Expected<fs::TempFile> file = fs::TempFile::create(path + ".%%%%%%%%");
+  if (!file)
+    return file.takeError();
+  raw_fd_ostream stream(file->FD, /*shouldClose=*/false);
+  stream << magic << toStringRef(BLAKE3::hash(arrayRefFromStringRef(bytes)))
+         << bytes;
+  stream.flush();
+  if (std::error_code code = stream.error()) {
+    stream.clear_error();
+    return joinErrors(errorCodeToError(code), file->discard());
+  }
+  return file->keep(path);
+}
+
+void DiskCache::prune() const {
+  if (!isEnabled())
+    return;
+  CachePruningPolicy policy;
+  policy.Interval = std::chrono::seconds(0);   // look now
+  policy.Expiration = std::chrono::seconds(0); // age alone is no reason
+  policy.MaxSizePercentageOfAvailableSpace = 100;
+  policy.MaxSizeBytes = maxBytes;
+  pruneCache(directory, policy);
+}

@@ -1,0 +1,307 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// From a pipeline's text to an object file, through the cache.
+//
+// The cache has two kinds of entries. A request (options, names, compiler,
+// processor) leads to the list of what its last compilation asked the file
+// system; the request with the present answers to these questions leads to the
+// object. So nothing is parsed to find that nothing has changed, and an object
+// is found again when a header is changed back.
+
+#include "Piko/Driver/ObjectCompiler.h"
+
+#include "CompilerIdentity.h"
+#include "DiskCache.h"
+#include "HeaderWriter.h"
+#include "Piko/Driver/Compiler.h"
+#include "Piko/Driver/Diagnostics.h"
+#include "Piko/Frontend/HostCompiler.h"
+#include "Piko/Target/Object.h"
+#include "SourceRecorder.h"
+
+#include "llvm/IR/Constants.h"
+#include "llvm/Support/Endian.h"
+#include "llvm/Support/Path.h"
+#include "llvm/Support/Process.h"
+
+#include "pikort/pikort.h"
+
+using namespace mlir;
+using namespace piko;
+
+using Files = llvm::IntrusiveRefCntPtr<llvm::vfs::FileSystem>;
+
+static const char *const referenceEntry = "piko_reference_program";
+
+namespace {
+
+/// An object and what was said when it was made.
+struct Entry {
+  CompiledObject object;
+  std::string diagnostics;
+};
+
+/// Strings, each behind its length.
+class Writer {
+public:
+  Writer &add(llvm::StringRef string) {
+    char length[8];
+    llvm::support::endian::write64le(length, string.size());
+    bytes.append(length, 8).append(string.data(), string.size());
+    return *this;
+  }
+  std::string bytes;
+};
+
+class Reader {
+public:
+  explicit Reader(llvm::StringRef bytes) : bytes(bytes) {}
+  bool atEnd() const { return bytes.empty(); }
+  std::string next() {
+    if (bytes.size() < 8)
+      return "";
+    uint64_t length = llvm::support::endian::read64le(bytes.data());
+    bytes = bytes.drop_front(8);
+    std::string string = bytes.take_front(length).str();
+    bytes = bytes.drop_front(string.size());
+    return string;
+  }
+
+private:
+  llvm::StringRef bytes;
+};
+
+} // namespace
+
+//===----------------------------------------------------------------------===//
+// Entries of the cache
+//===----------------------------------------------------------------------===//
+
+static std::string writeEntry(const Entry &entry) {
+  Writer writer;
+  const CompiledObject &object = entry.object;
+  writer.add(object.pipeline).add(object.symbol).add(object.code);
+  writer.add(object.header).add(entry.diagnostics);
+  for (const std::string &file : object.files)
+    writer.add(file);
+  return writer.bytes;
+}
+
+static Entry readEntry(llvm::StringRef bytes) {
+  Reader reader(bytes);
+  Entry entry;
+  for (std::string *part :
+       {&entry.object.pipeline, &entry.object.symbol, &entry.object.code,
+        &entry.object.header, &entry.diagnostics})
+    *part = reader.next();
+  while (!reader.atEnd())
+    entry.object.files.push_back(reader.next());
+  return entry;
+}
+
+/// All that decides what is compiled, but for what is read from files.
+static std::string makeRequest(const ObjectOptions &options,
+                               const Processor &processor,
+                               llvm::vfs::FileSystem &files) {
+  KeyBuilder key;
+  key.add(getCompilerIdentity());
+  const CompileOptions &source = options.source;
+  key.add(source.file).add(source.pipeName).add(source.text.value_or(""));
+  if (auto folder = files.getCurrentWorkingDirectory())
+    key.add(*folder);
+  for (const auto *list : {&source.includeDirs, &source.defines}) {
+    key.add(std::to_string(list->size()));
+    for (const std::string &item : *list)
+      key.add(item);
+  }
+  key.add(processor.name).add(processor.features);
+  for (int number : {int(source.text.has_value()), int(options.execution),
+                     options.target.optLevel, int(options.remarks)})
+    key.add(std::to_string(number));
+  key.add(options.nameSpace).add(getRuntimeIncludeDir());
+  // What Clang looks at besides its options.
+  for (const char *name : {"CPATH", "CPLUS_INCLUDE_PATH", "SOURCE_DATE_EPOCH"})
+    key.add(llvm::sys::Process::GetEnv(name).value_or(""));
+  return key.finish();
+}
+
+static std::optional<Entry> lookUp(const DiskCache &cache,
+                                   const std::string &request,
+                                   llvm::vfs::FileSystem &files) {
+  std::optional<std::string> questions = cache.read(request);
+  if (!questions)
+    return std::nullopt;
+  KeyBuilder key;
+  key.add(request);
+  for (Reader reader(*questions); !reader.atEnd();) {
+    bool isRead = reader.next() == "read";
+    SourceQuery query{reader.next(), isRead};
+    key.add(query.path).add(answer(files, query));
+  }
+  if (std::optional<std::string> bytes = cache.read(key.finish()))
+    return readEntry(*bytes);
+  return std::nullopt;
+}
+
+static void keep(const DiskCache &cache, const std::string &request,
+                 const SourceRecorder &recorder, const Entry &entry,
+                 std::string &diagnostics) {
+  Writer questions;
+  KeyBuilder key;
+  key.add(request);
+  for (const auto &[path, answer] : recorder.getAnswers()) {
+    questions.add(answer.isRead ? "read" : "find").add(path);
+    key.add(path).add(answer.text);
+  }
+  llvm::Error error = cache.write(key.finish(), writeEntry(entry));
+  if (!error)
+    error = cache.write(request, questions.bytes);
+  if (!error)
+    return cache.prune();
+  diagnostics += "warning: cannot write to the cache '" + cache.getDirectory() +
+                 "': " + llvm::toString(std::move(error)) + "\n";
+}
+
+//===----------------------------------------------------------------------===//
+// Compiling
+//===----------------------------------------------------------------------===//
+
+/// Defines the object's one symbol, the pikort_program of the pipeline whose
+/// functions are in the module, and hides all others.
+static void defineProgram(llvm::Module &module, llvm::StringRef pipeline,
+                          llvm::StringRef symbol) {
+  for (llvm::GlobalValue &value : module.global_values())
+    if (!value.isDeclaration())
+      value.setLinkage(llvm::GlobalValue::InternalLinkage);
+  llvm::LLVMContext &context = module.getContext();
+  auto *name = llvm::ConstantDataArray::getString(context, pipeline);
+  auto *nameVariable =
+      new llvm::GlobalVariable(module, name->getType(), /*isConstant=*/true,
+                               llvm::GlobalValue::PrivateLinkage, name);
+  llvm::Constant *members[] = {
+      llvm::ConstantInt::get(llvm::Type::getInt32Ty(context),
+                             PIKORT_ABI_VERSION),
+      nameVariable, module.getFunction((pipeline + ".setup").str()),
+      module.getFunction((pipeline + ".run").str())};
+  llvm::Constant *program = llvm::ConstantStruct::getAnon(members);
+  new llvm::GlobalVariable(module, program->getType(), /*isConstant=*/true,
+                           llvm::GlobalValue::ExternalLinkage, program, symbol);
+}
+
+/// LLVM IR of the compiled pipeline; null after diagnostics.
+static std::unique_ptr<llvm::Module>
+compilePipeline(const ObjectOptions &options, const Files &files,
+                MLIRContext &context, llvm::LLVMContext &llvmContext,
+                CompiledObject &object) {
+  OwningOpRef<ModuleOp> module = readPipeline(options.source, context, files);
+  if (!module)
+    return nullptr;
+  for (auto pipeline : module->getOps<PipelineOp>()) {
+    object.pipeline = pipeline.getSymName().str();
+    object.header =
+        writeHostHeader(pipeline, options.source.file, options.nameSpace);
+  }
+  object.symbol = getProgramSymbol(options.nameSpace, object.pipeline);
+  if (failed(lowerPipeline(*module, Level::LLVM)))
+    return nullptr;
+  std::unique_ptr<llvm::Module> translated =
+      translateToLLVMIR(*module, llvmContext);
+  if (translated)
+    defineProgram(*translated, object.pipeline, object.symbol);
+  return translated;
+}
+
+/// LLVM IR of the reference executor; null after diagnostics.
+static std::unique_ptr<llvm::Module>
+compileReference(const ObjectOptions &options, const Files &files,
+                 MLIRContext &context, llvm::LLVMContext &llvmContext,
+                 CompiledObject &object) {
+  const std::string &file = options.source.file;
+  if (llvm::StringRef(file).ends_with(".mlir")) {
+    emitError(FileLineColLoc::get(&context, file, 1, 1))
+        << "the reference executor runs C++, not the text of the dialect";
+    return nullptr;
+  }
+  context.loadAllAvailableDialects();
+  FrontendOptions frontend = getFrontendOptions(options.source);
+  frontend.files = files;
+  FailureOr<PipelineDescription> pipeline =
+      describePipe(file, frontend, context);
+  if (failed(pipeline))
+    return nullptr;
+  object.pipeline = pipeline->name;
+  object.symbol = referenceEntry;
+  return compileForHost(generateReferenceAdapter(*pipeline, file), frontend,
+                        llvmContext, context);
+}
+
+/// Fills an entry but for its files; false after diagnostics, which are there
+/// too.
+static bool compile(const ObjectOptions &options, const Files &files,
+                    Entry &entry) {
+  DialectRegistry registry;
+  registerPikoDialects(registry);
+  MLIRContext context(registry);
+  llvm::raw_string_ostream stream(entry.diagnostics);
+  DiagnosticPrinter printer(context, stream, options.remarks);
+  if (options.source.text)
+    printer.addText(options.source.file, *options.source.text);
+  llvm::LLVMContext llvmContext;
+  bool isReference = options.execution == ExecutionTarget::Reference;
+  std::unique_ptr<llvm::Module> module =
+      (isReference ? compileReference : compilePipeline)(
+          options, files, context, llvmContext, entry.object);
+  if (!module)
+    return false;
+  llvm::Expected<std::string> code =
+      generateCode(*module, options.target, CodeFormat::Object);
+  if (!code) {
+    stream << "error: " << llvm::toString(code.takeError()) << "\n";
+    return false;
+  }
+  entry.object.code = std::move(*code);
+  return true;
+}
+
+/// The user's text is a file among those on disk.
+static Files openFiles(const CompileOptions &source) {
+  Files disk = llvm::vfs::getRealFileSystem();
+  if (!source.text)
+    return disk;
+  auto memory = llvm::makeIntrusiveRefCnt<llvm::vfs::InMemoryFileSystem>();
+  llvm::SmallString<128> path(source.file);
+  (void)disk->makeAbsolute(path);
+  memory->addFile(path, 0, llvm::MemoryBuffer::getMemBufferCopy(*source.text));
+  auto files = llvm::makeIntrusiveRefCnt<llvm::vfs::OverlayFileSystem>(disk);
+  files->pushOverlay(memory);
+  return files;
+}
+
+std::optional<CompiledObject> piko::compileObject(const ObjectOptions &options,
+                                                  std::string &diagnostics) {
+  llvm::Expected<Processor> processor = resolveProcessor(options.target.cpu);
+  if (!processor) {
+    diagnostics += "error: " + llvm::toString(processor.takeError()) + "\n";
+    return std::nullopt;
+  }
+  Files files = openFiles(options.source);
+  DiskCache cache(options.cache);
+  std::string request;
+  if (cache.isEnabled()) {
+    request = makeRequest(options, *processor, *files);
+    if (std::optional<Entry> entry = lookUp(cache, request, *files)) {
+      diagnostics += entry->diagnostics;
+      return std::move(entry->object);
+    }
+  }
+  auto recorder = llvm::makeIntrusiveRefCnt<SourceRecorder>(files);
+  Entry entry;
+  bool ok = compile(options, recorder, entry);
+  diagnostics += entry.diagnostics;
+  if (!ok)
+    return std::nullopt;
+  entry.object.files = recorder->getFiles();
+  if (cache.isEnabled())
+    keep(cache, request, *recorder, entry, diagnostics);
+  return std::move(entry.object);
+}

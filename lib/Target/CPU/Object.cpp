@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// LLVM IR to machine code for a CPU.
+
+#include "Piko/Target/Object.h"
+
+#include "llvm/ExecutionEngine/Orc/ExecutionUtils.h"
+#include "llvm/IR/IRBuilder.h"
+#include "llvm/IR/LegacyPassManager.h"
+#include "llvm/MC/MCSubtargetInfo.h"
+#include "llvm/MC/TargetRegistry.h"
+#include "llvm/Passes/PassBuilder.h"
+#include "llvm/Support/TargetSelect.h"
+#include "llvm/Target/TargetMachine.h"
+#include "llvm/TargetParser/Host.h"
+
+#include <map>
+
+using namespace llvm;
+using namespace piko;
+
+/// The CPUs that objects run on where the user does not say more: those since
+/// about 2013 (AVX2, FMA), or what every machine of another family has.
+static StringRef getDefaultProcessor(const Triple &triple) {
+  return triple.getArch() == Triple::x86_64 ? "x86-64-v3" : "generic";
+}
+
+static Expected<const Target *> lookUpTarget(const Triple &triple) {
+  InitializeNativeTarget();
+  InitializeNativeTargetAsmPrinter();
+  std::string message;
+  const Target *target = TargetRegistry::lookupTarget(triple, message);
+  if (!target)
+    return createStringError(message);
+  return target;
+}
+
+Expected<Processor> piko::resolveProcessor(StringRef cpu) {
+  Triple triple(sys::getProcessTriple());
+  if (cpu == "native") {
+    Processor host{sys::getHostCPUName().str(), ""};
+    std::vector<std::string> features;
+    for (const auto &feature : sys::getHostCPUFeatures())
+      features.push_back((feature.second ? "+" : "-") + feature.first().str());
+    llvm::sort(features);
+    host.features = llvm::join(features, ",");
+    return host;
+  }
+  if (cpu.empty())
+    return Processor{getDefaultProcessor(triple).str(), ""};
+  Expected<const Target *> target = lookUpTarget(triple);
+  if (!target)
+    return target.takeError();
+  // Without a processor, or LLVM prints its own complaint.
+  std::unique_ptr<MCSubtargetInfo> info(
+      (*target)->createMCSubtargetInfo(triple, "", ""));
+  if (!info->isCPUStringValid(cpu))
+    return createStringError("there is no processor '" + cpu + "' for " +
+                             triple.getArchName() +
+                             "; expected 'native' or a name that 'clang "
+                             "--print-supported-cpus' lists");
+  return Processor{cpu.str(), ""};
+}
+
+static Expected<std::unique_ptr<TargetMachine>>
+createMachine(const piko::TargetOptions &options) {
+  Triple triple(sys::getProcessTriple());
+  Expected<const Target *> target = lookUpTarget(triple);
+  if (!target)
+    return target.takeError();
+  Expected<Processor> processor = resolveProcessor(options.cpu);
+  if (!processor)
+    return processor.takeError();
+  llvm::TargetOptions flags;
+  // Contraction would give bits that other targets do not.
+  flags.AllowFPOpFusion = FPOpFusion::Strict;
+  auto level = options.optLevel == 0   ? CodeGenOptLevel::None
+               : options.optLevel == 1 ? CodeGenOptLevel::Less
+                                       : CodeGenOptLevel::Default;
+  return std::unique_ptr<TargetMachine>((*target)->createTargetMachine(
+      triple, processor->name, processor->features, flags, Reloc::PIC_,
+      CodeModel::Small, level));
+}
+
+/// What `-O` does. No flag allows arithmetic to change: the IR says what may.
+static void optimize(Module &module, TargetMachine &machine, int level) {
+  static const OptimizationLevel levels[] = {
+      OptimizationLevel::O0, OptimizationLevel::O1, OptimizationLevel::O2,
+      OptimizationLevel::O3};
+  LoopAnalysisManager loops;
+  FunctionAnalysisManager functions;
+  CGSCCAnalysisManager components;
+  ModuleAnalysisManager modules;
+  PassBuilder builder(&machine);
+  builder.registerModuleAnalyses(modules);
+  builder.registerCGSCCAnalyses(components);
+  builder.registerFunctionAnalyses(functions);
+  builder.registerLoopAnalyses(loops);
+  builder.crossRegisterProxies(loops, functions, components, modules);
+  ModulePassManager passes =
+      level == 0 ? builder.buildO0DefaultPipeline(levels[0])
+                 : builder.buildPerModuleDefaultPipeline(levels[level]);
+  passes.run(module, modules);
+}
+
+/// ORC runs the initialisers of an object that it has not seen as IR only where
+/// they are one function of this name.
+static void gatherInitializers(Module &module) {
+  std::map<unsigned, std::vector<Function *>> initializers; // by priority
+  for (orc::CtorDtorIterator::Element element : orc::getConstructors(module))
+    if (element.Func)
+      initializers[element.Priority].push_back(element.Func);
+  if (initializers.empty())
+    return;
+  auto *function = Function::Create(
+      FunctionType::get(Type::getVoidTy(module.getContext()), false),
+      GlobalValue::ExternalLinkage, "__orc_init_func.piko", module);
+  IRBuilder<> builder(
+      BasicBlock::Create(module.getContext(), "entry", function));
+  for (auto &[priority, group] : initializers)
+    for (Function *initializer : group)
+      builder.CreateCall(initializer);
+  builder.CreateRetVoid();
+  module.getGlobalVariable("llvm.global_ctors")->eraseFromParent();
+}
+
+Expected<std::string> piko::generateCode(Module &module,
+                                         const piko::TargetOptions &options,
+                                         CodeFormat format) {
+  Expected<std::unique_ptr<TargetMachine>> machine = createMachine(options);
+  if (!machine)
+    return machine.takeError();
+  module.setTargetTriple((*machine)->getTargetTriple());
+  module.setDataLayout((*machine)->createDataLayout());
+  module.setPICLevel(PICLevel::BigPIC);
+  gatherInitializers(module);
+  optimize(module, **machine, options.optLevel);
+
+  SmallString<0> code;
+  raw_svector_ostream stream(code);
+  legacy::PassManager passes;
+  auto type = format == CodeFormat::Object ? CodeGenFileType::ObjectFile
+                                           : CodeGenFileType::AssemblyFile;
+  if ((*machine)->addPassesToEmitFile(passes, stream, nullptr, type))
+    return createStringError("cannot make code for " +
+                             module.getTargetTriple().str());
+  passes.run(module);
+  return std::string(code);
+}
