@@ -12,6 +12,7 @@ split-file. Substitutions:
   %readme        the README
   %cmake         the CMake that configured this build
   %piko          the build tree, which find_package(Piko) can use
+  %cxx           the C++ compiler of this build
   %cxx_host      compiler and flags that build a host of compiled pipelines
   %link_host     what such a host links
   %cxx_reference compiler and flags that build a pipeline file with the
@@ -64,6 +65,7 @@ config.substitutions += [
     ("%cxx_host", f"{config.cxx} -std=c++20 -Wall -Wextra -Werror -I {include}"),
     ("%link_host", " ".join(link_host)),
     ("%cxx_reference", " ".join(reference)),
+    ("%cxx", config.cxx),
 ]
 
 if os.path.exists(bunny):
