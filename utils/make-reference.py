@@ -45,7 +45,7 @@ def tidy(text):
 
 def documents():
     yield "Dialects/PikoReference.md", tblgen(
-        "-gen-dialect-doc -dialect=piko", "Dialect/Piko/IR/PikoOps.td"
+        "-gen-dialect-doc -dialect=piko", "Dialect/Piko/IR/PikoReference.td"
     )
     yield "Passes.md", "# Passes\n\n" + tblgen(
         "-gen-pass-doc", "Transforms/Passes.td", "Conversion/Passes.td"

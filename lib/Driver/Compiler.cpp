@@ -49,6 +49,8 @@ FrontendOptions piko::getFrontendOptions(const CompileOptions &options) {
   FrontendOptions result;
   result.includeDirs = options.includeDirs;
   result.defines = options.defines;
+  if (options.check.enabled)
+    result.defines.push_back("PIKO_CHECK");
   result.pipeName = options.pipeName;
   result.runtimeIncludeDir = getRuntimeIncludeDir();
   return result;
@@ -111,8 +113,11 @@ piko::readPipelineNames(const CompileOptions &options, MLIRContext &context) {
   return getNames(*module);
 }
 
-LogicalResult piko::lowerPipeline(ModuleOp module, Level level) {
+LogicalResult piko::lowerPipeline(ModuleOp module, Level level,
+                                  const CheckOptions &check) {
   PassManager passes(module.getContext());
+  if (check.enabled)
+    addCheckSequence(passes, check);
   if (level >= Level::Kernels)
     addSynthesisSequence(passes);
   if (level >= Level::Resolved)

@@ -109,14 +109,16 @@ static std::string makeRequest(const ObjectOptions &options,
   key.add(source.file).add(source.pipeName).add(source.text.value_or(""));
   if (auto folder = files.getCurrentWorkingDirectory())
     key.add(*folder);
-  for (const auto *list : {&source.includeDirs, &source.defines}) {
+  for (const auto *list :
+       {&source.includeDirs, &source.defines, &source.check.numbers}) {
     key.add(std::to_string(list->size()));
     for (const std::string &item : *list)
       key.add(item);
   }
   key.add(processor.name).add(processor.features);
-  for (int number : {int(source.text.has_value()), int(options.execution),
-                     options.target.optLevel, int(options.remarks)})
+  for (int number :
+       {int(source.text.has_value()), int(source.check.enabled),
+        int(options.execution), options.target.optLevel, int(options.remarks)})
     key.add(std::to_string(number));
   key.add(options.nameSpace).add(getRuntimeIncludeDir());
   // What Clang looks at besides its options.
@@ -202,7 +204,7 @@ compilePipeline(const ObjectOptions &options, const Files &files,
         writeHostHeader(pipeline, options.source.file, options.nameSpace);
   }
   object.symbol = getProgramSymbol(options.nameSpace, object.pipeline);
-  if (failed(lowerPipeline(*module, Level::LLVM)))
+  if (failed(lowerPipeline(*module, Level::LLVM, options.source.check)))
     return nullptr;
   std::unique_ptr<llvm::Module> translated =
       translateToLLVMIR(*module, llvmContext);
@@ -220,6 +222,12 @@ compileReference(const ObjectOptions &options, const Files &files,
   if (llvm::StringRef(file).ends_with(".mlir")) {
     emitError(FileLineColLoc::get(&context, file, 1, 1))
         << "the reference executor runs C++, not the text of the dialect";
+    return nullptr;
+  }
+  if (!options.source.check.numbers.empty()) {
+    emitError(FileLineColLoc::get(&context, file, 1, 1))
+        << "the reference executor is told of fields that must not be NaN by "
+           "expectNumbers, not by --check=nan";
     return nullptr;
   }
   context.loadAllAvailableDialects();

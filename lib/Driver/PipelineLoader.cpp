@@ -45,6 +45,7 @@ static std::unique_ptr<LoadedProgram> load(CompileOptions source,
   source.pipeName = options.pipeName;
   source.includeDirs = options.includeDirs;
   source.defines = options.defines;
+  source.check = options.check;
   ObjectOptions objectOptions{.source = std::move(source),
                               .execution = options.target,
                               .target = {.cpu = "native"},

@@ -23,6 +23,13 @@ static void addCleanUp(OpPassManager &passes) {
   passes.addPass(createCSEPass());
 }
 
+void piko::addCheckSequence(OpPassManager &passes,
+                            const CheckOptions &options) {
+  AddChecksOptions checks;
+  checks.numbers.assign(options.numbers.begin(), options.numbers.end());
+  passes.addPass(createAddChecks(checks));
+}
+
 void piko::addSynthesisSequence(OpPassManager &passes) {
   addCleanUp(passes);
   OpPassManager &pipeline = passes.nest<PipelineOp>();

@@ -9,6 +9,7 @@
 
 #include "Cleanup.h"
 
+#include "FillVariables.h"
 #include "MathCalls.h"
 #include "ParallelLoops.h"
 #include "Wrappers.h"
@@ -268,6 +269,9 @@ static void prepareFunction(llvm::Function &function, ParsedUnit &unit,
                             MemoryMap &memory, mlir::MLIRContext &context) {
   redirectMathCalls(function, unit, context);
   inlineKnownCalls(function);
+  if (unit.module->getModuleFlag(checkingFlag) &&
+      function.getName().contains("_process_"))
+    fillVariables(function, memory);
   labelLoops(function, memory);
   dropHints(function);
   expandMarkers(function, memory);

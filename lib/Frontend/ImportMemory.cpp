@@ -2,7 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 
 #include "Cleanup.h"
+#include "FillVariables.h"
 #include "PhaseImporter.h"
+#include "Piko/Dialect/Piko/IR/PikoCheck.h"
 #include "mlir/Dialect/Arith/IR/Arith.h"
 #include "mlir/Dialect/MemRef/IR/MemRef.h"
 #include "llvm/IR/Constants.h"
@@ -165,6 +167,11 @@ LogicalResult PhaseImporter::getPlace(llvm::CallInst *call,
 
 LogicalResult PhaseImporter::importAccessor(llvm::CallInst *call,
                                             llvm::StringRef name) {
+  if (name.starts_with(undefinedName)) {
+    values[call] = UndefinedOp::create(builder, *location,
+                                       scalars.getType(call->getType()));
+    return success();
+  }
   if (name == accessor::emit)
     return importEmit(call);
   if (name == accessor::updateBegin)

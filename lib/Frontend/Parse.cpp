@@ -21,6 +21,7 @@
 
 #include "ClangDiagnostics.h"
 #include "ClangInvocation.h"
+#include "FillVariables.h"
 #include "Wrappers.h"
 #include "clang/AST/ASTConsumer.h"
 #include "clang/AST/DeclTemplate.h"
@@ -78,7 +79,7 @@ makeInvocation(const ParseRequest &request,
 
   clang::CodeGenOptions &codeGen = invocation->getCodeGenOpts();
   codeGen.DisableLLVMPasses = true;
-  codeGen.DisableLifetimeMarkers = true;
+  codeGen.DisableLifetimeMarkers = !isChecking(options);
   // Errors name variables.
   codeGen.DiscardValueNames = false;
   // File names stay as given: Clang cuts off what they share with this folder.
@@ -375,6 +376,8 @@ std::unique_ptr<ParsedUnit> piko::parseUnit(const ParseRequest &request,
   if (ok && compiles) {
     unit->module = generator->ReleaseModule();
     ok = unit->module && readFunctions(*generator, reader, *unit);
+    if (ok && isChecking(request.options))
+      unit->module->addModuleFlag(llvm::Module::Override, checkingFlag, 1);
     collectUserFiles(sources, unit->userFiles);
   }
   if (!ok)

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //===- Host.cpp - The host API: life, binding, running --------------------===//
 
+#include "cpu/Check.h"
 #include "cpu/Cycle.h"
 
 #include <algorithm>
@@ -233,8 +234,7 @@ int32_t pikort_bind_source(pikort_pipeline *p, int32_t index, const void *data,
                                           std::to_string(index)};
     Source &source = p->sources[index];
     std::string who = "source " + std::to_string(index);
-    checkArray(*p, who, p->stages[source.stage].record, data, count,
-               recordSize);
+    checkArray(*p, who, p->hostRecord(source.stage), data, count, recordSize);
     if (count > UINT32_MAX)
       throw Failure{PIKORT_TOO_MANY,
                     who + ": expected at most 4294967295 primitives, but got " +
@@ -293,6 +293,10 @@ int32_t pikort_run(pikort_pipeline *p) {
       if (state.kind == PIKORT_CONSTANT)
         state.view = {state.bytes.data(), {1, 1, 1, 1}};
     prepareState(*p);
+    if (p->checker)
+      p->checker->beginRun();
+    if (p->status != PIKORT_OK)
+      return;
     startCycles(*p);
     int32_t status = p->runProgram(p);
     p->settle();
@@ -304,6 +308,8 @@ int32_t pikort_run(pikort_pipeline *p) {
   if (!p || !p->ready)
     return code;
   endCycles(*p);
+  if (p->checker)
+    p->checker->endRun();
   for (Stage &stage : p->stages) {
     stage.kernel->clear();
     stage.binSchedules = {};

@@ -2,6 +2,7 @@
 //===- Pipeline.cpp - Completes declarations, keeps the status ------------===//
 
 #include "common/Pipeline.h"
+#include "cpu/Check.h"
 
 #include <algorithm>
 #include <tuple>
@@ -153,6 +154,11 @@ int32_t pikort_pipeline::fail(int32_t code, const std::string &text) noexcept {
 
 void pikort_pipeline::report(const KernelError &found) noexcept {
   std::lock_guard<std::mutex> lock(errorMutex);
+  if (checker) { // on one thread: the first error is the earliest
+    if (hasError)
+      return;
+    checker->noteError();
+  }
   auto key = [](const KernelError &e) {
     return std::tie(e.unit, e.code, e.stage, e.a, e.b);
   };
@@ -229,8 +235,9 @@ int32_t pikort_pipeline::settle() noexcept {
     hasError = false;
     try {
       Stage *stage = findStage(error.stage);
-      fail(error.code,
-           describe(stage ? stage->name : std::to_string(error.stage), error));
+      std::string text =
+          describe(stage ? stage->name : std::to_string(error.stage), error);
+      fail(error.code, checker ? checker->describe(error.code, text) : text);
     } catch (...) {
       fail(error.code, {});
     }

@@ -22,6 +22,7 @@
 
 namespace piko::rt {
 
+class Checker; // cpu/Check.h
 struct Kernel; // cpu/Kernel.h
 struct Queue;  // cpu/Queue.h
 class Cycle;   // cpu/Cycle.h
@@ -44,6 +45,9 @@ struct Record {
   int64_t size = 0, align = 1;
   std::vector<Field> fields;
   bool padded = true; ///< Some bytes belong to no field.
+  // In checking mode: the record without the lineage, which the host knows.
+  int32_t host = -1;
+  int64_t lineageOffset = 0;
 };
 
 struct State {
@@ -182,6 +186,7 @@ struct pikort_pipeline {
   std::vector<piko::rt::LoopShape> loops;
   std::vector<int32_t> order; ///< Stages, as in components.
   int32_t (*runProgram)(pikort_pipeline *) = nullptr;
+  std::shared_ptr<piko::rt::Checker> checker; ///< In checking mode.
 
   bool ready = false; ///< finish() succeeded.
   std::array<int64_t, 4> domain{0, 1, 1, 1};
@@ -214,6 +219,11 @@ struct pikort_pipeline {
   /// The cycle that a stage is on, or null.
   piko::rt::Cycle *cycleOf(const piko::rt::Stage &stage) const {
     return components[stage.component].cycle.get();
+  }
+  /// The number of a stage's record as the host knows it.
+  int32_t hostRecord(int32_t stage) const {
+    int32_t record = stages[stage].record, host = records[record].host;
+    return host < 0 ? record : host;
   }
   piko::rt::Stage *findStage(int32_t id) {
     return id >= 0 && id < static_cast<int32_t>(stages.size()) ? &stages[id]

@@ -80,13 +80,13 @@ int32_t pikort_get_stage_info(pikort_pipeline *p, int32_t index,
                               pikort_stage_info *info) {
   if (!p)
     return PIKORT_INVALID_ARGUMENT;
-  return describe(p, p->stages, index, "stage", info, [](const Stage &s) {
+  return describe(p, p->stages, index, "stage", info, [&](const Stage &s) {
     return pikort_stage_info{
         s.name.c_str(),
         {s.binSize[0], s.binSize[1], s.binSize[2], s.binSize[3]},
         s.schedule.tileSplit,
         s.cellSize,
-        s.record,
+        p->hostRecord(index),
         s.schedule.kind,
         s.flags,
         countOf(s.outputs)};
@@ -98,7 +98,7 @@ int32_t pikort_get_source_info(pikort_pipeline *p, int32_t index,
   if (!p)
     return PIKORT_INVALID_ARGUMENT;
   return describe(p, p->sources, index, "source", info, [&](const Source &s) {
-    return pikort_source_info{s.stage, p->stages[s.stage].record, s.count};
+    return pikort_source_info{s.stage, p->hostRecord(s.stage), s.count};
   });
 }
 

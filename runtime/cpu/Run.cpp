@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //===- Run.cpp - Begins and ends kernels ----------------------------------===//
 
+#include "cpu/Check.h"
 #include "cpu/Cycle.h"
 
 #include <algorithm>
@@ -172,11 +173,15 @@ extern "C" {
 
 const pikoir_input *pikoir_begin(pikort_pipeline *p, int32_t stage) {
   Kernel *kernel = find(p, p->stages, stage, "stage");
+  if (kernel && p->checker)
+    p->checker->beginStage(stage);
   return kernel ? begin(*p, *kernel) : nullptr;
 }
 
 int32_t pikoir_end(pikort_pipeline *p, int32_t stage) {
   Kernel *kernel = find(p, p->stages, stage, "stage");
+  if (p->checker)
+    p->checker->endStage();
   return kernel ? end(*p, *kernel) : p->status.load();
 }
 

@@ -89,6 +89,8 @@ const int64_t *pikoir_cell_grid(pikort_pipeline *p, int32_t stage) {
   return p->stages[stage].cellGrid.data();
 }
 
-int32_t pikoir_threads(pikort_pipeline *p) { return p->activeThreads; }
+int32_t pikoir_threads(pikort_pipeline *p) {
+  return p->checker ? 1 : p->activeThreads;
+}
 
 } // extern "C"

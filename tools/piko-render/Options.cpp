@@ -31,6 +31,8 @@ it, and says how long a frame took.
   --fovy DEGREES         field of view from bottom to top (45)
   --cull                 leave out back faces
 
+  --check[=nan:RECORD.FIELD,...]   check the rules of state on one thread, and
+                         that these fields are never NaN
   --threads N            threads, 0 for all (0)
   --warmup N --frames N  untimed and timed frames (5 30)
   --seconds S            stop early after so long, but with 3 timed frames at
@@ -63,6 +65,8 @@ private:
       options.load.includeDirs.push_back(attached(word));
     else if (word == "-D" || word.starts_with("-D"))
       options.load.defines.push_back(attached(word));
+    else if (word == "--check" || word.starts_with("--check="))
+      parseCheck(word.substr(7));
     else if (word.size() > 1 && word[0] == '-')
       parseOption(word);
     else
@@ -96,6 +100,14 @@ private:
       fail("unknown option '" + name + "'");
     else
       action->second();
+  }
+
+  void parseCheck(const std::string &text) {
+    if (auto check = parseCheckOptions(text))
+      options.load.check = *check;
+    else
+      fail("--check: expected =nan:RECORD.FIELD,... or nothing, but got '" +
+           text + "'");
   }
 
   void parseArgument(const std::string &word) {

@@ -102,6 +102,12 @@ struct CommandLine {
       llvm::cl::desc("where objects are kept (default: $PIKO_CACHE_DIR, "
                      "$XDG_CACHE_HOME/piko or ~/.cache/piko)"),
       llvm::cl::cat(category)};
+  llvm::cl::opt<std::string> check{
+      "check", llvm::cl::ValueOptional,
+      llvm::cl::value_desc("nan:record.field,..."),
+      llvm::cl::desc("check the rules of state while the pipeline runs, and "
+                     "these fields for NaN"),
+      llvm::cl::cat(category)};
   llvm::cl::opt<bool> remarks{
       "remarks", llvm::cl::desc("print what the passes have to say"),
       llvm::cl::cat(category)};
@@ -114,11 +120,18 @@ struct CommandLine {
       return Emit::Object;
     return extension == ".s" ? Emit::Assembly : Emit::LLVMIR;
   }
+  /// None if its value is wrong.
+  std::optional<CheckOptions> getCheck() const {
+    if (!check.getNumOccurrences())
+      return CheckOptions();
+    return parseCheckOptions(check.empty() ? "" : "=" + check);
+  }
   CompileOptions getSource() const {
-    return {file,
-            pipe,
-            {includeDirs.begin(), includeDirs.end()},
-            {defines.begin(), defines.end()}};
+    return {.file = file,
+            .pipeName = pipe,
+            .includeDirs = {includeDirs.begin(), includeDirs.end()},
+            .defines = {defines.begin(), defines.end()},
+            .check = *getCheck()};
   }
   TargetOptions getTarget() const {
     return {.cpu = cpu, .optLevel = static_cast<int>(optLevel)};
@@ -135,6 +148,9 @@ static int fail(const llvm::Twine &message) {
 /// What is wrong with options that are fine one by one; empty if nothing.
 static std::string checkOptions(const CommandLine &line) {
   bool isObject = line.getEmit() == Emit::Object && !line.listPipes;
+  if (!line.getCheck())
+    return "--check: expected nan:RECORD.FIELD,..., but got '" + line.check +
+           "'";
   if (line.optLevel > 3)
     return "expected -O0 to -O3, but got -O" + std::to_string(line.optLevel);
   if (!isObject &&
@@ -195,7 +211,7 @@ static std::optional<std::string> writeText(const CommandLine &line) {
                     ? Level::LLVM
                     : static_cast<Level>(line.getEmit());
   OwningOpRef<ModuleOp> module = readPipeline(line.getSource(), context);
-  if (!module || failed(lowerPipeline(*module, level)))
+  if (!module || failed(lowerPipeline(*module, level, line.getSource().check)))
     return std::nullopt;
   if (line.getEmit() >= Emit::LLVMIR)
     return translate(line, *module);

@@ -46,7 +46,8 @@ llvm::FailureOr<std::vector<std::string>>
 readPipelineNames(const CompileOptions &options, mlir::MLIRContext &context);
 
 /// Takes a module from the authored level to another one.
-llvm::LogicalResult lowerPipeline(mlir::ModuleOp module, Level level);
+llvm::LogicalResult lowerPipeline(mlir::ModuleOp module, Level level,
+                                  const CheckOptions &check = {});
 
 /// LLVM IR, not optimised, of a module at Level::LLVM; null after diagnostics.
 std::unique_ptr<llvm::Module> translateToLLVMIR(mlir::ModuleOp module,

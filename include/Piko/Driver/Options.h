@@ -5,6 +5,8 @@
 #ifndef PIKO_DRIVER_OPTIONS_H
 #define PIKO_DRIVER_OPTIONS_H
 
+#include "Piko/Driver/CheckOptions.h"
+
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -28,6 +30,7 @@ struct CompileOptions {
   std::vector<std::string> includeDirs = {}, defines = {};
   /// The file's text, where it is not on disk; `file` is then only its name.
   std::optional<std::string> text = {};
+  CheckOptions check = {};
 };
 
 /// What code is made for.

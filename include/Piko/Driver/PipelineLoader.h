@@ -30,6 +30,9 @@ struct LoadOptions {
   /// `-I` and `-D`, without the letter.
   std::vector<std::string> includeDirs = {}, defines = {};
   CacheOptions cache = {};
+  /// What is checked while the pipeline runs. The reference executor is told in
+  /// the pipeline's text of fields that must not be NaN.
+  CheckOptions check = {};
 };
 
 /// A program that is ready to run; its code goes when the object goes, so it

@@ -6,9 +6,14 @@
 #ifndef PIKO_DRIVER_SEQUENCES_H
 #define PIKO_DRIVER_SEQUENCES_H
 
+#include "Piko/Driver/CheckOptions.h"
+
 #include "mlir/Pass/PassManager.h"
 
 namespace piko {
+
+/// `piko-add-checks`: the authored level in checking mode.
+void addCheckSequence(mlir::OpPassManager &passes, const CheckOptions &options);
 
 /// `piko-synthesize`: from the authored to the kernels level.
 void addSynthesisSequence(mlir::OpPassManager &passes);

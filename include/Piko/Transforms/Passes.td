@@ -8,6 +8,46 @@
 
 include "mlir/Pass/PassBase.td"
 
+def AddChecks : Pass<"piko-add-checks", "::mlir::ModuleOp"> {
+  let summary = "Check the rules of state while the pipeline runs";
+  let description = [{
+    **Requires** the authored level, no `piko.check_*` yet.
+
+    **Does**: gives each record of a primitive a longer form whose last field is
+    the primitive's lineage, and tells the runtime of each call, emission, access
+    to a buffer or an image, iteration and barrier. Tests the fields in
+    `numbers` for NaN where they are emitted, and makes flags that follow each
+    `piko.undefined` to where it is emitted or stored.
+
+    **Guarantees** that the results of a run without findings stay as they are,
+    and that no `piko.undefined` is left.
+
+    Before:
+    ```
+    piko.store %v, @verts[%i : index] "x" : f32
+    piko.emit 0 (%z) : f32
+    ```
+    After:
+    ```
+    piko.check_access store @verts[%i : index]
+    piko.store %v, @verts[%i : index] "x" : f32
+    piko.check_place
+    %lineage = piko.check_emit
+    piko.emit 0 (%z, %lineage) : f32, i64
+    ```
+
+    **Limits**: elements of private arrays count as written.
+  }];
+  let options = [
+    ListOption<"numbers", "numbers", "std::string",
+               "Fields that must not be NaN, as Record.field">];
+  let statistics = [
+    Statistic<"accesses", "accesses", "accesses to state that are checked">,
+    Statistic<"unwritten", "unwritten", "numbers that may be unwritten">];
+  let dependentDialects = ["::mlir::arith::ArithDialect",
+                           "::mlir::memref::MemRefDialect"];
+}
+
 def OrderStages : Pass<"piko-order-stages", "::piko::PipelineOp"> {
   let summary = "Put the stages into the order in which they run";
   let description = [{

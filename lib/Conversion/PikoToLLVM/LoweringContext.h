@@ -87,13 +87,16 @@ mlir::Value createFieldAddress(mlir::OpBuilder &builder, mlir::Location loc,
                                mlir::Value record, FieldAttr field,
                                mlir::ValueRange elements);
 
-/// Patterns for the storage of bins, and for state.
+/// Patterns for the storage of bins, for state, and for checking mode.
 void populateKernelToLLVMPatterns(const mlir::TypeConverter &converter,
                                   mlir::RewritePatternSet &patterns,
                                   LoweringContext &context);
 void populateStateToLLVMPatterns(const mlir::TypeConverter &converter,
                                  mlir::RewritePatternSet &patterns,
                                  LoweringContext &context);
+void populateChecksToLLVMPatterns(const mlir::TypeConverter &converter,
+                                  mlir::RewritePatternSet &patterns,
+                                  LoweringContext &context);
 
 /// Attributes of a kernel's function, until NAME.run is written: the number of
 /// the stage whose bins or schedule it is for, and whether it places a source.

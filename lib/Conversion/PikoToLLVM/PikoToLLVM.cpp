@@ -113,6 +113,7 @@ LogicalResult ConvertPikoToLLVMPass::convert(PipelineOp pipeline,
   patterns.add<SelectLowering>(converter, &getContext());
   populateKernelToLLVMPatterns(converter, patterns, context);
   populateStateToLLVMPatterns(converter, patterns, context);
+  populateChecksToLLVMPatterns(converter, patterns, context);
   FrozenRewritePatternSet frozen(std::move(patterns));
   for (func::FuncOp function : functions)
     if (failed(applyPartialConversion(function, target, frozen)))

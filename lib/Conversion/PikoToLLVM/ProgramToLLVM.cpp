@@ -5,6 +5,8 @@
 
 #include "LoweringContext.h"
 
+#include "Piko/Dialect/Piko/IR/PikoCheck.h"
+
 #include "mlir/Dialect/ControlFlow/IR/ControlFlowOps.h"
 
 using namespace mlir;
@@ -40,6 +42,7 @@ private:
 
   void declareRecord(StringAttr name, int32_t number);
   void declareField(FieldAttr field, int32_t record);
+  void declareCheckedRecord(CheckRecordOp record);
   void declareState(Operation *state, int32_t number);
   void declareStage(StageOp stage, int32_t number);
   Value recordBytes(FlatSymbolRefAttr record, ArrayAttr numbers);
@@ -113,6 +116,20 @@ void SetupWriter::declareField(FieldAttr field, int32_t record) {
   }
 }
 
+void SetupWriter::declareCheckedRecord(CheckRecordOp check) {
+  auto number = [&](FlatSymbolRefAttr record) {
+    return i32(numbers.records.lookup(record.getAttr()));
+  };
+  RecordOp record = context.record(check.getRecordAttr());
+  call("pikoir_declare_checked_record",
+       {number(check.getRecordAttr()), number(check.getHostAttr()),
+        i64(record.getField(lineageField).getOffset())});
+  if (ArrayAttr fields = check.getNumbersAttr())
+    for (auto field : fields.getAsRange<StringAttr>())
+      call("pikoir_declare_number",
+           {number(check.getHostAttr()), text(field.getValue())});
+}
+
 Value SetupWriter::recordBytes(FlatSymbolRefAttr name, ArrayAttr numbers) {
   if (!numbers)
     return null();
@@ -184,6 +201,8 @@ void SetupWriter::run() {
        {text(pipeline.getSymName()), i32(pipeline.getRank())});
   for (auto [name, number] : numbers.records)
     declareRecord(name, number);
+  for (auto check : pipeline.getOps<CheckRecordOp>())
+    declareCheckedRecord(check);
   for (auto [name, number] : numbers.stages)
     declareStage(cast<StageOp>(SymbolTable::lookupSymbolIn(pipeline, name)),
                  number);

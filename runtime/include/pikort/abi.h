@@ -263,6 +263,63 @@ PIKORT_API int32_t pikoir_cycle_step(pikort_pipeline *p, int32_t stage);
 PIKORT_API void pikoir_fail(pikort_pipeline *p, int32_t stage, int32_t code,
                             int64_t a, int64_t b);
 
+// --- checking mode ----------------------------------------------------------
+//
+// A program that declares a checked record runs on one thread, and says what it
+// does before it does it. The rules and the texts of findings are in
+// docs/Diagnostics.md. A place is a constant "file:line", or null.
+
+/// Primitives of `record` are the host's `host` with the number of their
+/// lineage, 64 bits, at an offset behind it. The host binds `host`.
+PIKORT_API void pikoir_declare_checked_record(pikort_pipeline *p,
+                                              int32_t record, int32_t host,
+                                              int64_t lineage_offset);
+/// Of the host's record: a field, or the begin of the names of several, of
+/// which no primitive that is fed may hold a NaN.
+PIKORT_API void pikoir_declare_number(pikort_pipeline *p, int32_t record,
+                                      const char *field);
+
+/// A call of Process begins. `lineage` is its primitive's, or
+/// PIKOIR_NO_LINEAGE where it takes a list.
+#define PIKOIR_NO_LINEAGE INT64_MIN
+PIKORT_API void pikoir_check_call(pikort_pipeline *p, int32_t stage,
+                                  int64_t bin, int64_t lineage);
+/// An AssignBin for a primitive begins, or with PIKOIR_NO_LINEAGE ends.
+PIKORT_API void pikoir_check_assign(pikort_pipeline *p, int32_t stage,
+                                    int64_t lineage);
+/// The lineage of what the call emits next.
+PIKORT_API int64_t pikoir_check_emit(pikort_pipeline *p);
+/// What follows is at this place.
+PIKORT_API void pikoir_check_place(pikort_pipeline *p, const char *place);
+
+enum pikoir_check_access {
+  PIKOIR_CHECK_READ = 0,
+  PIKOIR_CHECK_STORE = 1,
+  PIKOIR_CHECK_UPDATE = 2,
+  PIKOIR_CHECK_ATOMIC = 3,
+  /// Added to a kind: the stage updates this image.
+  PIKOIR_CHECK_UPDATES = 4
+};
+/// An element of a buffer or an image; unused indices are 0.
+PIKORT_API void pikoir_check_access(pikort_pipeline *p, int32_t state,
+                                    int32_t kind, int64_t x, int64_t y,
+                                    int64_t z, int64_t w, const char *place);
+
+enum pikoir_check_loop {
+  PIKOIR_CHECK_BEGIN = 0,
+  PIKOIR_CHECK_ITERATION = 1, ///< Its accesses follow.
+  PIKOIR_CHECK_BARRIER = 2,   ///< The same, behind one more barrier.
+  PIKOIR_CHECK_END = 3
+};
+PIKORT_API void pikoir_check_loop(pikort_pipeline *p, int32_t event,
+                                  int64_t iteration);
+
+enum pikoir_check_value { PIKOIR_CHECK_NAN = 0, PIKOIR_CHECK_UNWRITTEN = 1 };
+/// A field of the host's record is wrong if `flag` is not 0.
+PIKORT_API void pikoir_check_value(pikort_pipeline *p, int32_t flag,
+                                   int32_t kind, int32_t record,
+                                   const char *field, const char *place);
+
 // --- programs that run a pipeline by themselves, as the reference does ------
 
 /// What the host bound to a source; `count` gets the number of primitives.

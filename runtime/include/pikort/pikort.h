@@ -57,7 +57,8 @@ enum pikort_status {
   PIKORT_INDEX_OUTSIDE = 18,   ///< An element outside a buffer or an image.
   PIKORT_ENDLESS = 19,         ///< A loop that does not end.
   PIKORT_NOT_A_NUMBER = 20,    ///< A NaN where a position is needed.
-  PIKORT_NOT_UNIFORM = 21      ///< Iterations that do not meet at a barrier.
+  PIKORT_NOT_UNIFORM = 21,     ///< Iterations that do not meet at a barrier.
+  PIKORT_RULE_BROKEN = 22      ///< A finding of checking mode.
 };
 
 // --- Life -------------------------------------------------------------------

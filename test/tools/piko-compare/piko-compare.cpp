@@ -5,7 +5,7 @@
 //
 //   piko-compare FILE [--reference FILE] [--pipe NAME] [--domain W H ..]
 //                [--count N] [--seed S] [--threads T ..] [--runs N]
-//                [--target cpu|reference]
+//                [--target cpu|reference] [--check[=nan:RECORD.FIELD,..]]
 //
 // The input follows from the seed: integer fields are whole numbers from 0 to
 // 63, floats multiples of 1/64 in [-8, 72), bytes 0 or 1. Buffers that no source
@@ -31,6 +31,7 @@ struct Options {
   unsigned seed = 1;
   std::vector<int> threads{1, 2, 7};
   int runs = 3;
+  piko::CheckOptions check;
 };
 
 Options parse(int argc, char **argv) {
@@ -40,6 +41,13 @@ Options parse(int argc, char **argv) {
   };
   for (int i = 1; i < argc;) {
     std::string name = argv[i++];
+    if (name == "--check" || name.rfind("--check=", 0) == 0) {
+      auto check = piko::parseCheckOptions(name.substr(7));
+      if (!check)
+        throw std::runtime_error("expected --check[=nan:RECORD.FIELD,..]");
+      options.check = *check;
+      continue;
+    }
     if (name.rfind("--", 0) != 0) {
       options.file = name;
       continue;
@@ -110,6 +118,9 @@ Run::Run(const std::string &file, const Options &options,
   piko::LoadOptions load;
   load.pipeName = options.pipe;
   load.target = target;
+  load.check = options.check;
+  if (target == ExecutionTarget::Reference)
+    load.check.numbers.clear();
   std::string diagnostics;
   program = piko::loadPipeline(file, load, diagnostics);
   if (!program)

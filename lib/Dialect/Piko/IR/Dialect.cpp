@@ -2,7 +2,7 @@
 //
 // The dialect's types and attributes, and look-ups that its operations share.
 
-#include "Piko/Dialect/Piko/IR/Piko.h"
+#include "Piko/Dialect/Piko/IR/PikoCheck.h"
 
 #include "mlir/IR/DialectImplementation.h"
 #include "llvm/ADT/TypeSwitch.h"
@@ -29,6 +29,10 @@ void PikoDialect::initialize() {
   addOperations<
 #define GET_OP_LIST
 #include "Piko/Dialect/Piko/IR/PikoOps.cpp.inc"
+      >();
+  addOperations<
+#define GET_OP_LIST
+#include "Piko/Dialect/Piko/IR/PikoCheckOps.cpp.inc"
       >();
 }
 

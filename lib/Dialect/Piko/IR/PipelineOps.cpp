@@ -2,7 +2,7 @@
 //
 // Records, pipelines, state and edges.
 
-#include "Piko/Dialect/Piko/IR/Piko.h"
+#include "Piko/Dialect/Piko/IR/PikoCheck.h"
 #include "llvm/ADT/StringSet.h"
 
 using namespace mlir;
@@ -104,8 +104,8 @@ static LogicalResult verifyReached(PipelineOp pipeline) {
 
 LogicalResult PipelineOp::verifyRegions() {
   for (Operation &op : *getBodyBlock())
-    if (!isa<ConstantOp, BufferOp, ImageOp, SourceOp, EdgeOp, StageOp,
-             KernelOp>(op))
+    if (!isa<ConstantOp, BufferOp, ImageOp, SourceOp, EdgeOp, StageOp, KernelOp,
+             CheckRecordOp>(op))
       return op.emitOpError(
           "expected only state, sources, edges, stages and kernels in a "
           "pipeline");

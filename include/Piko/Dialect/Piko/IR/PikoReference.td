@@ -1,0 +1,6 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// All of the dialect, for its reference document.
+
+include "Piko/Dialect/Piko/IR/PikoOps.td"
+include "Piko/Dialect/Piko/IR/PikoCheckOps.td"

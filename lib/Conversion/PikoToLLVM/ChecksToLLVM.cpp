@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// What checking mode tells the runtime, as calls.
+
+#include "LoweringContext.h"
+
+#include "Piko/Dialect/Piko/IR/PikoCheck.h"
+
+using namespace mlir;
+using namespace piko;
+
+namespace {
+
+/// Constant texts of a module, each once.
+class TextTable {
+public:
+  Value get(OpBuilder &builder, Operation *op, StringRef text);
+
+private:
+  llvm::StringMap<LLVM::GlobalOp> globals;
+};
+
+template <typename OpT> struct CheckLowering : OpConversionPattern<OpT> {
+  CheckLowering(const TypeConverter &converter, MLIRContext *mlir,
+                LoweringContext &context, std::shared_ptr<TextTable> texts)
+      : OpConversionPattern<OpT>(converter, mlir), context(context),
+        texts(std::move(texts)) {}
+
+  /// Calls a function of the runtime with its pipeline and the arguments.
+  LLVM::CallOp call(OpBuilder &builder, OpT op, StringRef function,
+                    ArrayRef<Value> arguments, Type result = {}) const {
+    SmallVector<Value> all{context.frame(op)};
+    llvm::append_range(all, arguments);
+    return context.call(builder, op.getLoc(), function, result, all);
+  }
+  Value i32(OpBuilder &builder, OpT op, int64_t v) const {
+    return createI32(builder, op.getLoc(), v);
+  }
+  Value i64(OpBuilder &builder, OpT op, Value v, int64_t otherwise) const {
+    return v ? toI64(builder, op.getLoc(), v)
+             : createI64(builder, op.getLoc(), otherwise);
+  }
+  /// "file:line", or null where the place is not known.
+  Value place(OpBuilder &builder, OpT op) const {
+    if (auto at = op.getLoc()->template findInstanceOf<FileLineColLoc>())
+      return texts->get(
+          builder, op,
+          (at.getFilename().getValue() + ":" + Twine(at.getLine())).str());
+    return LLVM::ZeroOp::create(
+        builder, op.getLoc(), LLVM::LLVMPointerType::get(builder.getContext()));
+  }
+
+  LoweringContext &context;
+  std::shared_ptr<TextTable> texts;
+};
+
+} // namespace
+
+// PIKOIR_NO_LINEAGE
+static constexpr int64_t noLineage = INT64_MIN;
+// PIKOIR_CHECK_UPDATES
+static constexpr int64_t updatesFlag = 4;
+
+Value TextTable::get(OpBuilder &builder, Operation *op, StringRef text) {
+  LLVM::GlobalOp &global = globals[text];
+  if (!global) {
+    auto module = op->getParentOfType<ModuleOp>();
+    OpBuilder atStart(module.getBodyRegion());
+    std::string bytes = (text + StringRef("\0", 1)).str();
+    global = LLVM::GlobalOp::create(
+        atStart, module.getLoc(),
+        LLVM::LLVMArrayType::get(builder.getI8Type(), bytes.size()),
+        /*isConstant=*/true, LLVM::Linkage::Internal,
+        "piko.text." + std::to_string(globals.size()),
+        builder.getStringAttr(bytes));
+  }
+  return LLVM::AddressOfOp::create(builder, op->getLoc(), global);
+}
+
+namespace {
+
+struct CheckCallLowering : CheckLowering<CheckCallOp> {
+  using CheckLowering::CheckLowering;
+  LogicalResult
+  matchAndRewrite(CheckCallOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    call(rewriter, op, "pikoir_check_call",
+         {i32(rewriter, op, context.stageNumber(op, op.getStage())),
+          i64(rewriter, op, adaptor.getBin(), 0),
+          i64(rewriter, op, adaptor.getLineage(), noLineage)});
+    rewriter.eraseOp(op);
+    return success();
+  }
+};
+
+struct CheckAssignLowering : CheckLowering<CheckAssignOp> {
+  using CheckLowering::CheckLowering;
+  LogicalResult
+  matchAndRewrite(CheckAssignOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    call(rewriter, op, "pikoir_check_assign",
+         {i32(rewriter, op, context.stageNumber(op, op.getStage())),
+          i64(rewriter, op, adaptor.getLineage(), noLineage)});
+    rewriter.eraseOp(op);
+    return success();
+  }
+};
+
+struct CheckEmitLowering : CheckLowering<CheckEmitOp> {
+  using CheckLowering::CheckLowering;
+  LogicalResult
+  matchAndRewrite(CheckEmitOp op, OpAdaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    rewriter.replaceOp(
+        op, call(rewriter, op, "pikoir_check_emit", {}, rewriter.getI64Type()));
+    return success();
+  }
+};
+
+struct CheckPlaceLowering : CheckLowering<CheckPlaceOp> {
+  using CheckLowering::CheckLowering;
+  LogicalResult
+  matchAndRewrite(CheckPlaceOp op, OpAdaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    call(rewriter, op, "pikoir_check_place", {place(rewriter, op)});
+    rewriter.eraseOp(op);
+    return success();
+  }
+};
+
+struct CheckAccessLowering : CheckLowering<CheckAccessOp> {
+  using CheckLowering::CheckLowering;
+  LogicalResult
+  matchAndRewrite(CheckAccessOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    int32_t state =
+        context.numbers(op).states.lookup(op.getStateAttr().getAttr());
+    int64_t kind = int64_t(op.getKind()) | (op.getUpdates() ? updatesFlag : 0);
+    SmallVector<Value> arguments{i32(rewriter, op, state),
+                                 i32(rewriter, op, kind)};
+    ValueRange indices = adaptor.getIndices();
+    for (size_t dim = 0; dim < 4; ++dim)
+      arguments.push_back(
+          i64(rewriter, op, dim < indices.size() ? indices[dim] : Value(), 0));
+    arguments.push_back(place(rewriter, op));
+    call(rewriter, op, "pikoir_check_access", arguments);
+    rewriter.eraseOp(op);
+    return success();
+  }
+};
+
+struct CheckLoopLowering : CheckLowering<CheckLoopOp> {
+  using CheckLowering::CheckLowering;
+  LogicalResult
+  matchAndRewrite(CheckLoopOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    call(rewriter, op, "pikoir_check_loop",
+         {i32(rewriter, op, int64_t(op.getEvent())),
+          i64(rewriter, op, adaptor.getIteration(), 0)});
+    rewriter.eraseOp(op);
+    return success();
+  }
+};
+
+struct CheckValueLowering : CheckLowering<CheckValueOp> {
+  using CheckLowering::CheckLowering;
+  LogicalResult
+  matchAndRewrite(CheckValueOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    int32_t record =
+        context.numbers(op).records.lookup(op.getRecordAttr().getAttr());
+    Value flag = arith::ExtUIOp::create(
+        rewriter, op.getLoc(), rewriter.getI32Type(), adaptor.getFlag());
+    call(rewriter, op, "pikoir_check_value",
+         {flag, i32(rewriter, op, int64_t(op.getKind())),
+          i32(rewriter, op, record), texts->get(rewriter, op, op.getField()),
+          place(rewriter, op)});
+    rewriter.eraseOp(op);
+    return success();
+  }
+};
+
+} // namespace
+
+void piko::populateChecksToLLVMPatterns(const TypeConverter &converter,
+                                        RewritePatternSet &patterns,
+                                        LoweringContext &context) {
+  auto texts = std::make_shared<TextTable>();
+  patterns.add<CheckCallLowering, CheckAssignLowering, CheckEmitLowering,
+               CheckPlaceLowering, CheckAccessLowering, CheckLoopLowering,
+               CheckValueLowering>(converter, patterns.getContext(), context,
+                                   texts);
+}

@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Calls, emissions, accesses and iterations are told, and what is unwritten is
+// followed to where it shows.
+// RUN: piko-opt %s --piko-add-checks=numbers=F.z,F.w | FileCheck %s
+
+// CHECK: piko.record @F {"z" : f32 at 0, "w" : f32[2 : 4] at 4} size 12 align 4
+// CHECK: piko.record @F.checked {"z" : f32 at 0, "w" : f32[2 : 4] at 4, "piko.lineage" : i64 at 16} size 24 align 8
+piko.record @F {"z" : f32 at 0, "w" : f32[2 : 4] at 4} size 12 align 4
+piko.record @float {"value" : f32 at 0} size 4 align 4
+
+// CHECK-LABEL: piko.pipeline @P
+// CHECK: piko.check_record @F.checked of @F numbers ["z", "w"]
+piko.pipeline @P rank 1 {
+  piko.buffer @data : @float
+  piko.image @depth : @float rank 1
+  piko.source @start
+  piko.edge @start[0] -> @end
+
+  // CHECK: piko.stage @start {{.*}} : @F.checked -> [@F.checked]
+  piko.stage @start bins [0] threads 64 : @F -> [@F] {
+    // CHECK: piko.process
+    // CHECK-NEXT: ^bb0(%[[PRIM:.*]]: !piko.prim<@F.checked>):
+    // CHECK-NEXT: %[[BIN:.*]] = piko.bin
+    // CHECK-NEXT: %[[OF:.*]] = piko.get %[[PRIM]] "piko.lineage" : !piko.prim<@F.checked> -> i64
+    // CHECK-NEXT: piko.check_call @start in %[[BIN]] of %[[OF]]
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      %zero = arith.constant 0 : index
+      %z = piko.get %f "z" : !piko.prim<@F> -> f32
+      // Two numbers of one element are one access.
+      // CHECK: piko.check_access read @data[%[[ZERO:.*]] : index]
+      // CHECK-NEXT: piko.load @data
+      // CHECK-NEXT: piko.load @data
+      %a = piko.load @data[%zero : index] "value" : f32
+      %b = piko.load @data[%zero : index] "value" : f32
+      // CHECK: piko.check_access store @data
+      // CHECK-NEXT: piko.store
+      piko.store %a, @data[%zero : index] "value" : f32
+      // CHECK: piko.check_access read updates @depth
+      %old = piko.load @depth[%zero : index] "value" : f32
+      // CHECK: piko.check_access update updates @depth
+      // CHECK-NEXT: piko.update
+      piko.update @depth[%zero : index] {
+      ^bb0(%pixel: f32):
+        piko.yield [%z : f32]
+      }
+      // CHECK: arith.cmpf uno, %[[Z:.*]], %[[Z]] : f32
+      // CHECK: piko.check_value nan %{{.*}} "z" of @F
+      // CHECK: arith.ori
+      // CHECK: piko.check_value nan %{{.*}} "w" of @F
+      // CHECK: piko.check_place
+      // CHECK-NEXT: %[[ID:.*]] = piko.check_emit
+      // CHECK-NEXT: piko.emit 0({{.*}}, %[[ID]]) : f32, f32, f32, i64
+      piko.emit 0 (%z, %a, %b) : f32, f32, f32
+      piko.return
+    }
+  }
+
+  piko.stage @end bins [4] threads 64 : @F -> [] {
+    // CHECK: piko.assign
+    // CHECK: piko.check_assign @end of %
+    // CHECK: piko.check_place
+    // CHECK-NEXT: piko.assign_to
+    // CHECK-NEXT: piko.check_assign @end{{$}}
+    piko.assign {
+    ^bb0(%f: !piko.prim<@F>):
+      %zero = arith.constant 0 : index
+      piko.assign_to %zero
+      piko.return
+    }
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      %n = arith.constant 8 : index
+      // The loop inside meets too: what follows a barrier says whose it is.
+      // CHECK: piko.check_loop begin
+      // CHECK-NEXT: piko.parallel_for
+      // CHECK-NEXT: ^bb0(%[[I:.*]]: index):
+      // CHECK-NEXT: piko.check_loop iteration %[[I]]
+      // CHECK: scf.for
+      // CHECK-NEXT: piko.check_loop iteration %[[I]]
+      // CHECK-NEXT: piko.sync
+      // CHECK-NEXT: piko.check_loop barrier %[[I]]
+      // CHECK: piko.check_loop iteration %[[I]]
+      // CHECK: piko.check_loop end
+      piko.parallel_for %n {
+      ^bb0(%i: index):
+        %zero = arith.constant 0 : index
+        %one = arith.constant 1 : index
+        scf.for %k = %zero to %n step %one {
+          piko.sync
+        }
+        piko.yield
+      }
+      piko.return
+    }
+  }
+}
+
+// CHECK-LABEL: piko.pipeline @Unwritten
+// CHECK-NOT: piko.undefined
+piko.pipeline @Unwritten rank 1 {
+  piko.buffer @data : @float
+  piko.source @start
+  piko.stage @start bins [0] threads 64 : @float -> [] {
+    piko.process {
+    ^bb0(%f: !piko.prim<@float>):
+      %zero = arith.constant 0 : index
+      %v = piko.get %f "value" : !piko.prim<@float> -> f32
+      %c = arith.cmpf olt, %v, %v : f32
+      %u = piko.undefined : f32
+      // CHECK: %[[CELL:.*]] = memref.alloca() : memref<1xi1>
+      // CHECK: %[[T:.*]] = arith.constant true
+      // CHECK: scf.if
+      // CHECK: %[[F:.*]] = arith.constant false
+      // CHECK: memref.store %[[F]], %[[CELL]]
+      // CHECK: else
+      // CHECK: memref.store %[[T]], %[[CELL]]
+      // CHECK: %[[FLAG:.*]] = memref.load %[[CELL]]
+      %r = scf.if %c -> f32 {
+        %d = arith.addf %v, %v : f32
+        scf.yield %d : f32
+      } else {
+        scf.yield %u : f32
+      }
+      // CHECK: arith.addf
+      %s = arith.addf %r, %v : f32
+      // CHECK: piko.check_value unwritten %[[FLAG]] "value" of @float
+      // CHECK: piko.store
+      piko.store %s, @data[%zero : index] "value" : f32
+      // What is written needs no flag.
+      // CHECK-NOT: piko.check_value
+      // CHECK: piko.store
+      piko.store %v, @data[%zero : index] "value" : f32
+      piko.return
+    }
+  }
+}
