@@ -51,15 +51,9 @@ private:
   S &stage;
 };
 
-} // namespace reference
-
-/// The base of pipelines. A pipeline has its stages as members; its
-/// constructor names sources and edges.
-template <class State = NoState> class Pipe {
+/// What a pipeline is apart from the types of its state and stages.
+class PipeBase {
 public:
-  State &state() { return memory; }
-  const State &state() const { return memory; }
-
   // For the host.
 
   /// The extent of the domain in cells, one number for each dimension.
@@ -88,19 +82,11 @@ public:
 
   /// The primitives of a source; the memory must stay until the run.
   template <class T> void feed(int source, const T *primitives, int64_t count) {
-    if (source < 0 || source >= static_cast<int>(sources.size()))
-      throw Error("expected one of the " + std::to_string(sources.size()) +
-                  " sources, but got source " + std::to_string(source));
-    Source &to = sources[source];
+    const TypeInfo *type = nullptr;
     if constexpr (!std::is_void_v<T>)
-      if (to.node->inputType != reference::typeOf<std::remove_cv_t<T>>())
-        to.node->fail(-1, "expected primitives of type '" +
-                              std::string(to.node->inputType->name) +
-                              "' for source " + std::to_string(source) +
-                              ", but got '" +
-                              std::string(reference::typeName<T>()) + "'");
-    to.primitives = reinterpret_cast<const std::byte *>(primitives);
-    to.count = count;
+      type = typeOf<std::remove_cv_t<T>>();
+    feedBytes(source, type, reinterpret_cast<const std::byte *>(primitives),
+              count);
   }
   /// The same for a vector, an array or a span, and the only source of a
   /// stage.
@@ -110,16 +96,7 @@ public:
     static_assert(std::is_lvalue_reference_v<Range> ||
                       std::ranges::enable_borrowed_range<Range>,
                   "feed does not copy; the primitives must outlive the run");
-    int found = -1;
-    for (size_t i = 0; i < sources.size(); ++i)
-      if (sources[i].node->address == &stage) {
-        if (found >= 0)
-          sources[i].node->fail(-1, "has several sources; feed them by number");
-        found = static_cast<int>(i);
-      }
-    if (found < 0)
-      reference::fail(reference::typeName<S>(), -1, "has no source");
-    feed(found, std::data(primitives),
+    feed(sourceOf(&stage, typeName<S>()), std::data(primitives),
          static_cast<int64_t>(std::size(primitives)));
   }
 
@@ -141,100 +118,94 @@ public:
   void run();
 
 protected:
-  Pipe() : memory() { reference::ImageBase::registry() = scope.saved; }
-  Pipe(const Pipe &) = delete;
-  Pipe &operator=(const Pipe &) = delete;
-  ~Pipe() = default;
+  PipeBase() = default;
+  PipeBase(const PipeBase &) = delete;
+  PipeBase &operator=(const PipeBase &) = delete;
+  ~PipeBase() = default;
 
-  /// A stage that is fed by the host; sources are numbered as they are named.
-  template <class S> void source(S &stage) {
-    sources.push_back({&nodeOf(stage), nullptr, 0});
-  }
-  /// What leaves `from` through a port goes to `to`.
-  template <class From, class To> void connect(From &from, int port, To &to) {
-    reference::Node &producer = nodeOf(from), &consumer = nodeOf(to);
-    if (port < 0 || port >= static_cast<int>(producer.ports.size()))
-      producer.failPort(-1, port);
-    producer.ports[port].to.push_back(&consumer);
-  }
-  /// Gives a buffer as many elements as a source has primitives, zero at the
-  /// start of each run.
-  template <class T> void allocateForSource(Buffer<T> &buffer, int source) {
-    allocations.push_back({&buffer, source});
-  }
-
-private:
   struct Source {
-    reference::Node *node;
+    Node *node;
     const std::byte *primitives;
     int64_t count;
   };
   struct Allocation {
-    reference::BufferBase *buffer;
+    BufferBase *buffer;
     int source;
   };
   /// Collects the images while the state is constructed.
   struct Scope {
-    explicit Scope(std::vector<reference::ImageBase *> &images)
-        : saved(std::exchange(reference::ImageBase::registry(), &images)) {}
-    std::vector<reference::ImageBase *> *saved;
+    explicit Scope(std::vector<ImageBase *> &images)
+        : saved(std::exchange(ImageBase::registry(), &images)) {}
+    std::vector<ImageBase *> *saved;
   };
 
   template <auto Field, class Record, class Member>
-  static reference::NumberField numberField(Member Record::*) {
-    return reference::makeNumberField<Record, Member, Field>();
+  static NumberField numberField(Member Record::*) {
+    return makeNumberField<Record, Member, Field>();
   }
 
-  template <class S> reference::Node &nodeOf(S &stage) {
-    for (auto &node : nodes)
-      if (node->address == &stage && node->type == reference::typeOf<S>())
-        return *node;
-    return makeNode(stage, stage);
+  Node *findNode(const void *stage, const TypeInfo *type) const {
+    for (const auto &node : nodes)
+      if (node->address == stage && node->type == type)
+        return node.get();
+    return nullptr;
   }
-  template <class S, class B, int Threads, class In, class... Out>
-  reference::Node &makeNode(S &stage,
-                            BasicStage<B, Threads, In, Out...> &base) {
-    static_assert(
-        B::wholeDomain || requires(const In &p) { stage.assignBin(p); },
-        "a stage with several bins needs assignBin");
-    auto node = std::make_unique<reference::TypedNode<S, In>>(stage);
-    node->rank = B::rank;
-    for (int d = 0; d < B::rank; ++d)
-      node->binSize[d] = B::size[d];
-    (node->ports.push_back({reference::typeOf<Out>(), {}}), ...);
-    base.node = node.get();
-    bindState(&stage);
-    // Members lie in memory in order of declaration.
+  /// Members lie in memory in order of declaration.
+  Node &addNode(std::unique_ptr<Node> node) {
     auto at = std::find_if(nodes.begin(), nodes.end(), [&](const auto &other) {
       return std::less<>()(node->address, other->address);
     });
     return **nodes.insert(at, std::move(node));
   }
-  template <class Used> void bindState(Uses<Used> *uses) {
-    static_assert(std::is_base_of_v<Used, State>,
-                  "the stage uses another state than its pipeline has");
-    uses->bound = &memory;
+  static void connectNodes(Node &producer, int port, Node &consumer) {
+    if (port < 0 || port >= static_cast<int>(producer.ports.size()))
+      producer.failPort(-1, port);
+    producer.ports[port].to.push_back(&consumer);
   }
-  void bindState(const void *) {}
-
+  /// The number of the stage's only source.
+  int sourceOf(const void *stage, std::string_view name) const {
+    int found = -1;
+    for (size_t i = 0; i < sources.size(); ++i)
+      if (sources[i].node->address == stage) {
+        if (found >= 0)
+          sources[i].node->fail(-1, "has several sources; feed them by number");
+        found = static_cast<int>(i);
+      }
+    if (found < 0)
+      fail(name, -1, "has no source");
+    return found;
+  }
+  /// Without a type it is not checked.
+  void feedBytes(int source, const TypeInfo *type, const std::byte *primitives,
+                 int64_t count) {
+    if (source < 0 || source >= static_cast<int>(sources.size()))
+      throw Error("expected one of the " + std::to_string(sources.size()) +
+                  " sources, but got source " + std::to_string(source));
+    Source &to = sources[source];
+    if (type && to.node->inputType != type)
+      to.node->fail(-1, "expected primitives of type '" +
+                            std::string(to.node->inputType->name) +
+                            "' for source " + std::to_string(source) +
+                            ", but got '" + std::string(type->name) + "'");
+    to.primitives = primitives;
+    to.count = count;
+  }
   void checkGraph() const;
   void prepareState();
-  std::vector<reference::Component> prepareStages();
-  reference::StageOrder
-  stageOrder(const std::vector<reference::Component> &components) const;
+  std::vector<Component> prepareStages();
+  StageOrder stageOrder(const std::vector<Component> &components) const;
 
-  std::vector<reference::ImageBase *> images;
-  Scope scope{images};
-  State memory;
-  std::vector<std::unique_ptr<reference::Node>> nodes; ///< as declared
+  std::vector<ImageBase *> images;
+  Scope scope{images};                      ///< until the state is constructed
+  std::vector<std::unique_ptr<Node>> nodes; ///< as declared
   std::vector<Source> sources;
   std::vector<Allocation> allocations;
-  reference::Cell domainExtent{0, 1, 1, 1};
+  Cell domainExtent{0, 1, 1, 1};
   int domainRank = 0;
-  reference::Executor executor;
+  Executor executor;
 };
 
-template <class State> void Pipe<State>::checkGraph() const {
+inline void PipeBase::checkGraph() const {
   if (domainRank == 0)
     throw Error("the pipeline has no domain; call setDomain");
   for (const auto &node : nodes) {
@@ -243,7 +214,7 @@ template <class State> void Pipe<State>::checkGraph() const {
                          " dimensions as the domain has, but got " +
                          std::to_string(node->rank));
     for (size_t port = 0; port < node->ports.size(); ++port) {
-      const reference::Port &out = node->ports[port];
+      const Port &out = node->ports[port];
       std::string name = "port " + std::to_string(port);
       if (out.to.empty())
         node->fail(-1, name + " is not connected");
@@ -261,8 +232,8 @@ template <class State> void Pipe<State>::checkGraph() const {
   }
 }
 
-template <class State> void Pipe<State>::prepareState() {
-  for (reference::ImageBase *image : images)
+inline void PipeBase::prepareState() {
+  for (ImageBase *image : images)
     image->prepare(domainExtent);
   for (const Allocation &allocation : allocations) {
     if (allocation.source < 0 ||
@@ -274,70 +245,124 @@ template <class State> void Pipe<State>::prepareState() {
   }
 }
 
-template <class State>
-std::vector<reference::Component> Pipe<State>::prepareStages() {
-  std::vector<reference::Node *> declared;
+inline std::vector<Component> PipeBase::prepareStages() {
+  std::vector<Node *> declared;
   for (const auto &node : nodes) {
-    node->grid = reference::Grid(domainExtent, node->binSize);
+    node->grid = Grid(domainExtent, node->binSize);
     executor.scheduleBins(*node);
     declared.push_back(node.get());
   }
-  auto isDirect = [](const reference::Node &, const reference::Node &to) {
-    return !to.collects();
-  };
+  auto isDirect = [](const Node &, const Node &to) { return !to.collects(); };
   int loop = 0;
-  for (const reference::Component &component :
-       reference::findComponents(declared, isDirect)) {
-    for (reference::Node *node : component.nodes)
+  for (const Component &component : findComponents(declared, isDirect)) {
+    for (Node *node : component.nodes)
       node->loop = component.cyclic ? loop : -1;
     ++loop;
   }
-  return reference::orderStages(declared);
+  return orderStages(declared);
 }
 
-template <class State>
-reference::StageOrder Pipe<State>::stageOrder(
-    const std::vector<reference::Component> &components) const {
-  std::vector<reference::Node *> declared;
+inline StageOrder
+PipeBase::stageOrder(const std::vector<Component> &components) const {
+  std::vector<Node *> declared;
   for (const auto &node : nodes)
     declared.push_back(node.get());
-  std::vector<reference::StageOrder::SourceOf> fed;
+  std::vector<StageOrder::SourceOf> fed;
   for (size_t s = 0; s < sources.size(); ++s)
     fed.push_back({static_cast<int64_t>(s), sources[s].node});
   return {declared, fed, components};
 }
 
-template <class State> void Pipe<State>::run() {
-  reference::checkArithmetic();
+inline void PipeBase::run() {
+  checkArithmetic();
   checkGraph();
   struct Running {
-    reference::Executor *saved;
-    explicit Running(reference::Executor *executor)
-        : saved(std::exchange(reference::Executor::current(), executor)) {}
-    ~Running() { reference::Executor::current() = saved; }
+    Executor *saved;
+    explicit Running(Executor *executor)
+        : saved(std::exchange(Executor::current(), executor)) {}
+    ~Running() { Executor::current() = saved; }
   } running(&executor);
 
   prepareState();
   executor.checker.beginRun();
-  std::vector<reference::Component> order = prepareStages();
-  if constexpr (reference::checking)
+  std::vector<Component> order = prepareStages();
+  if constexpr (checking)
     executor.checker.setOrder(stageOrder(order));
   for (size_t s = 0; s < sources.size(); ++s) {
     const Source &source = sources[s];
     for (int64_t i = 0; i < source.count; ++i) {
       const std::byte *primitive =
           source.primitives + i * source.node->inputSize;
-      reference::Lineage lineage = reference::makeStep(nullptr, {}, s, i);
+      Lineage lineage = makeStep(nullptr, {}, s, i);
       executor.checkNumbers(*source.node, -1, source.node->inputType, primitive,
                             lineage);
       executor.deliver(*source.node, primitive, nullptr, -1, lineage);
     }
   }
-  for (const reference::Component &component : order)
+  for (const Component &component : order)
     executor.runComponent(component);
-  if constexpr (reference::checking)
+  if constexpr (checking)
     executor.checker.endRun();
 }
+
+} // namespace reference
+
+/// The base of pipelines. A pipeline has its stages as members; its
+/// constructor names sources and edges.
+template <class State = NoState> class Pipe : public reference::PipeBase {
+public:
+  State &state() { return memory; }
+  const State &state() const { return memory; }
+
+protected:
+  Pipe() : memory() { reference::ImageBase::registry() = scope.saved; }
+  ~Pipe() = default;
+
+  /// A stage that is fed by the host; sources are numbered as they are named.
+  template <class S> void source(S &stage) {
+    sources.push_back({&nodeOf(stage), nullptr, 0});
+  }
+  /// What leaves `from` through a port goes to `to`.
+  template <class From, class To> void connect(From &from, int port, To &to) {
+    reference::Node &producer = nodeOf(from), &consumer = nodeOf(to);
+    connectNodes(producer, port, consumer);
+  }
+  /// Gives a buffer as many elements as a source has primitives, zero at the
+  /// start of each run.
+  template <class T> void allocateForSource(Buffer<T> &buffer, int source) {
+    allocations.push_back({&buffer, source});
+  }
+
+private:
+  template <class S> reference::Node &nodeOf(S &stage) {
+    reference::Node *node = findNode(&stage, reference::typeOf<S>());
+    return node ? *node : makeNode(stage, stage);
+  }
+  template <class S, class B, int Threads, class In, class... Out>
+  reference::Node &makeNode(S &stage,
+                            BasicStage<B, Threads, In, Out...> &base) {
+    static_assert(
+        B::wholeDomain || requires(const In &p) { stage.assignBin(p); },
+        "a stage with several bins needs assignBin");
+    std::unique_ptr<reference::Node> node(
+        new reference::TypedNode<S, In>(stage));
+    node->rank = B::rank;
+    for (int d = 0; d < B::rank; ++d)
+      node->binSize[d] = B::size[d];
+    (node->ports.push_back({reference::typeOf<Out>(), {}}), ...);
+    base.node = node.get();
+    bindState(&stage);
+    return addNode(std::move(node));
+  }
+  template <class Used> void bindState(Uses<Used> *uses) {
+    static_assert(std::is_base_of_v<Used, State>,
+                  "the stage uses another state than its pipeline has");
+    uses->bound = &memory;
+  }
+  void bindState(const void *) {}
+
+  State memory;
+};
 
 } // namespace piko
 

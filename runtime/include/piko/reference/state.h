@@ -54,6 +54,25 @@ using Index = int64_t;
 inline Place placeOf(Index) { return {}; }
 #endif
 
+/// Memory for elements, which goes with its owner; lighter to compile than
+/// std::unique_ptr, of which every type of state would have its own.
+template <class T> class OwnedArray {
+public:
+  OwnedArray() = default;
+  OwnedArray(const OwnedArray &) = delete;
+  OwnedArray &operator=(const OwnedArray &) = delete;
+  ~OwnedArray() { delete[] elements; }
+  /// Takes over an array that `new` made, or null.
+  void reset(T *array = nullptr) {
+    delete[] elements;
+    elements = array;
+  }
+  T *get() const { return elements; }
+
+private:
+  T *elements = nullptr;
+};
+
 /// What the pipeline has to know of its images.
 class ImageBase {
 public:
@@ -124,9 +143,9 @@ public:
   }
   /// Copies n elements.
   void assign(const T *data, int64_t n) {
-    std::unique_ptr<T[]> copy(new T[n]);
-    std::copy(data, data + n, copy.get());
-    owned = std::move(copy);
+    T *copy = new T[n];
+    std::copy(data, data + n, copy);
+    owned.reset(copy);
     elements = owned.get();
     count = n;
   }
@@ -150,7 +169,7 @@ public:
   T *end() const { return elements + count; }
 
 private:
-  std::unique_ptr<T[]> owned;
+  reference::OwnedArray<T> owned;
   T *elements = nullptr;
   int64_t count = 0;
 };
@@ -221,7 +240,7 @@ private:
         reference::failAccess(at[d], cells[d], place);
       index = index * cells[d] + at[d];
     }
-    return pixels[index];
+    return pixels.get()[index];
   }
 
   reference::Element &element(reference::Checker &checker,
@@ -241,7 +260,7 @@ private:
       none[d] = 0;
     return none;
   }();
-  std::unique_ptr<T[]> pixels;
+  reference::OwnedArray<T> pixels;
 };
 
 } // namespace piko
