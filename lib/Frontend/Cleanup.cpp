@@ -277,6 +277,15 @@ static void prepareFunction(llvm::Function &function, ParsedUnit &unit,
   expandMarkers(function, memory);
 }
 
+/// Clang fills arrays of records in a loop, of which a clear value must be free
+/// to be constants.
+static void unrollLoops(llvm::Function &function, PassRunner &runner) {
+  llvm::FunctionPassManager unroll;
+  unroll.addPass(
+      llvm::createFunctionToLoopPassAdaptor(llvm::LoopFullUnrollPass(3)));
+  runner.run(unroll, function);
+}
+
 static bool cleanUpFunction(llvm::Function &function, ParsedUnit &unit,
                             MemoryMap &memory, PassRunner &runner,
                             mlir::MLIRContext &context) {
@@ -287,6 +296,8 @@ static bool cleanUpFunction(llvm::Function &function, ParsedUnit &unit,
   if (!promoteVariables(function, unit, context))
     return false;
   runner.run(simplify, function);
+  if (function.getName().starts_with("__piko_wrapper_clear_"))
+    unrollLoops(function, runner);
   // Each round sees through one more level of references.
   bool localized = false;
   for (int round = 0; round < 32; ++round) {
