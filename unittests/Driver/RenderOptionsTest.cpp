@@ -51,6 +51,24 @@ TEST(RenderOptions, HelpNeedsNothingElse) {
   EXPECT_TRUE(o->help);
 }
 
+TEST(RenderOptions, Check) {
+  auto o = parseOptions({"a", "b"});
+  ASSERT_TRUE(o);
+  EXPECT_FALSE(o->load.check.enabled);
+  o = parseOptions({"a", "b", "--check"});
+  ASSERT_TRUE(o);
+  EXPECT_TRUE(o->load.check.enabled);
+  EXPECT_TRUE(o->load.check.numbers.empty());
+  o = parseOptions({"a", "b", "--check=nan:F.z,F.at.x"});
+  ASSERT_TRUE(o);
+  EXPECT_EQ(o->load.check.numbers,
+            (std::vector<std::string>{"F.z", "F.at.x"}));
+  for (const char *bad : {"--check=", "--check=inf:F.z", "--check=nan:",
+                          "--check=nan:F", "--check=nan:.z", "--check=nan:F.",
+                          "--check=nan:F.z,"})
+    EXPECT_FALSE(parseOptions({"a", "b", bad})) << bad;
+}
+
 TEST(RenderOptions, Errors) {
   EXPECT_EQ(errorOf({"a", "b", "--nope"}), "unknown option '--nope'");
   EXPECT_EQ(errorOf({"a", "b", "-x"}), "unknown option '-x'");
