@@ -11,6 +11,7 @@
 #include <pikort/pikort.hpp>
 
 #include <algorithm>
+#include <thread>
 #include <vector>
 
 using namespace piko;
@@ -98,6 +99,23 @@ TEST_F(Loader, LoadsTheReferenceOfText) {
     EXPECT_EQ(runTable(*program), (std::vector{100, 103, 106}));
     EXPECT_EQ(countEntries(), 2u);
   }
+}
+
+// The reference executor needs them; a phase cannot have any.
+TEST_F(Loader, EachThreadHasItsThreadLocalVariables) {
+  write("factor.h", "#ifdef __PIKO__\n"
+                    "#define FACTOR 0\n"
+                    "#else\n"
+                    "inline thread_local int factor = 3;\n"
+                    "#define FACTOR factor++\n"
+                    "#endif\n");
+  options.target = ExecutionTarget::Reference;
+  auto program = loadText(text);
+  ASSERT_TRUE(program) << diagnostics;
+  for (int i = 0; i < 2; ++i)
+    std::thread([&] {
+      EXPECT_EQ(runTable(*program), (std::vector{100, 104, 110}));
+    }).join();
 }
 
 TEST_F(Loader, FindsTheSameTextInTheCache) {

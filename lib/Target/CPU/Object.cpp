@@ -72,6 +72,9 @@ createMachine(const piko::TargetOptions &options) {
   if (!processor)
     return processor.takeError();
   llvm::TargetOptions flags;
+  // JITCode has no thread-local storage of the system: the reference executor's
+  // variables would lie in memory that is not theirs.
+  flags.EmulatedTLS = true;
   // Contraction would give bits that other targets do not.
   flags.AllowFPOpFusion = FPOpFusion::Strict;
   auto level = options.optLevel == 0   ? CodeGenOptLevel::None
