@@ -59,9 +59,62 @@ TEST(Errors, PortOutOfRange) {
   pipe.source(pipe.two);
   pipe.connect(pipe.two, 0, pipe.a);
   pipe.connect(pipe.two, 1, pipe.b);
+  pipe.source(pipe.floats);
   EXPECT_THAT(
       messageOf([&] { run(pipe, {1}); }),
       HasSubstr("Two', bin 0: expected one of the 2 ports, but got port 7"));
+}
+
+TEST(Errors, StageWithoutInput) {
+  OpenPipe pipe;
+  pipe.source(pipe.a);
+  EXPECT_THAT(messageOf([&] { pipe.run(); }),
+              HasSubstr("stage 0 of the pipeline, which takes 'int', has no "
+                        "input: expected an edge or a source that feeds it"));
+  pipe.source(pipe.b);
+  pipe.connect(pipe.two, 0, pipe.a);
+  pipe.connect(pipe.two, 1, pipe.b);
+  EXPECT_THAT(
+      messageOf([&] { pipe.run(); }),
+      HasSubstr("stage 3 of the pipeline, which takes 'float', has no"));
+  pipe.source(pipe.floats);
+  EXPECT_THAT(messageOf([&] { pipe.run(); }),
+              testing::MatchesRegex("stage '.*Two': has no input: .*"));
+}
+
+// The stages of one pipeline are not another's, nor are those of none.
+TEST(Errors, StageOfNoPipeline) {
+  OpenPipe outer; // still names no stage
+  struct OnePipe : piko::Pipe<> {
+    Sink sink;
+    OnePipe() {
+      source(sink);
+      setDomain({1, 1});
+    }
+  } pipe;
+  [[maybe_unused]] Sink free;
+  trace.clear();
+  run(pipe, {1});
+  EXPECT_THAT(trace, ElementsAre(1));
+}
+
+struct Impatient : Whole<int> {
+  void schedule(piko::BinId) { endStage<Floats>(); }
+  void process(const int &) {}
+};
+
+TEST(Errors, WaitForAStageOfNoPipeline) {
+  struct ImpatientPipe : piko::Pipe<> {
+    Impatient impatient;
+    ImpatientPipe() {
+      source(impatient);
+      setDomain({1, 1});
+    }
+  } pipe;
+  EXPECT_THAT(messageOf([&] { pipe.run(); }),
+              testing::MatchesRegex("stage '.*Impatient': expected endStage of "
+                                    "a stage of the pipeline, but got "
+                                    "'.*Floats'"));
 }
 
 struct WrongPort : Whole<int, int, float> {
@@ -119,8 +172,13 @@ TEST(Errors, Feed) {
 
 // Bytes without a type, as generated code feeds them.
 TEST(Errors, FeedOfBytesIsNotChecked) {
-  OpenPipe pipe;
-  pipe.source(pipe.a);
+  struct BytesPipe : piko::Pipe<> {
+    Sink sink;
+    BytesPipe() {
+      source(sink);
+      setDomain({1, 1});
+    }
+  } pipe;
   int values[] = {4, 5};
   trace.clear();
   pipe.feed(0, static_cast<const void *>(values), 2);

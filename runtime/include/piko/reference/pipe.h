@@ -121,7 +121,14 @@ protected:
   PipeBase() = default;
   PipeBase(const PipeBase &) = delete;
   PipeBase &operator=(const PipeBase &) = delete;
-  ~PipeBase() = default;
+  ~PipeBase() { endMembers(); }
+
+  /// Stages that are constructed from here on are the pipeline's members.
+  void beginMembers() { membersUnderConstruction() = &members; }
+  void endMembers() {
+    if (membersUnderConstruction() == &members)
+      membersUnderConstruction() = nullptr;
+  }
 
   struct Source {
     Node *node;
@@ -190,11 +197,13 @@ protected:
     to.primitives = primitives;
     to.count = count;
   }
+  bool hasInput(const Node &node) const;
   void checkGraph() const;
   void prepareState();
   std::vector<Component> prepareStages();
   StageOrder stageOrder(const std::vector<Component> &components) const;
 
+  std::vector<Member> members; ///< as declared
   std::vector<ImageBase *> images;
   Scope scope{images};                      ///< until the state is constructed
   std::vector<std::unique_ptr<Node>> nodes; ///< as declared
@@ -230,6 +239,25 @@ inline void PipeBase::checkGraph() const {
                            std::string(out.to[0]->inputType->name) + "'");
     }
   }
+  const char *noInput =
+      "has no input: expected an edge or a source that feeds it";
+  for (size_t i = 0; i < members.size(); ++i)
+    if (!*members[i].node) // never named, so that its type is not known
+      throw Error("stage " + std::to_string(i) +
+                  " of the pipeline, which takes '" +
+                  std::string(members[i].inputType->name) + "', " + noInput);
+  for (const auto &node : nodes)
+    if (!hasInput(*node))
+      node->fail(-1, noInput);
+}
+
+inline bool PipeBase::hasInput(const Node &node) const {
+  auto isFed = [&](const Source &source) { return source.node == &node; };
+  auto leads = [&](const Port &port) { return port.to.front() == &node; };
+  return std::ranges::any_of(sources, isFed) ||
+         std::ranges::any_of(nodes, [&](const auto &producer) {
+           return std::ranges::any_of(producer->ports, leads);
+         });
 }
 
 inline void PipeBase::prepareState() {
@@ -252,6 +280,13 @@ inline std::vector<Component> PipeBase::prepareStages() {
     executor.scheduleBins(*node);
     declared.push_back(node.get());
   }
+  for (const Node *node : declared)
+    for (const TypeInfo *type : node->waitsOn)
+      if (std::ranges::none_of(
+              declared, [&](const Node *other) { return other->type == type; }))
+        node->fail(-1,
+                   "expected endStage of a stage of the pipeline, but got '" +
+                       std::string(type->name) + "'");
   auto isDirect = [](const Node &, const Node &to) { return !to.collects(); };
   int loop = 0;
   for (const Component &component : findComponents(declared, isDirect)) {
@@ -315,7 +350,10 @@ public:
   const State &state() const { return memory; }
 
 protected:
-  Pipe() : memory() { reference::ImageBase::registry() = scope.saved; }
+  Pipe() : memory() {
+    reference::ImageBase::registry() = scope.saved;
+    beginMembers();
+  }
   ~Pipe() = default;
 
   /// A stage that is fed by the host; sources are numbered as they are named.
@@ -335,6 +373,7 @@ protected:
 
 private:
   template <class S> reference::Node &nodeOf(S &stage) {
+    endMembers();
     reference::Node *node = findNode(&stage, reference::typeOf<S>());
     return node ? *node : makeNode(stage, stage);
   }

@@ -12,6 +12,23 @@ namespace piko {
 
 template <class State> class Pipe;
 
+namespace reference {
+
+/// A stage, perhaps one that its pipeline never names.
+struct Member {
+  Node *const *node; ///< null unless it is named
+  const TypeInfo *inputType;
+};
+
+/// Where stages enter themselves that are members of the pipeline under
+/// construction.
+inline std::vector<Member> *&membersUnderConstruction() {
+  static thread_local std::vector<Member> *members = nullptr;
+  return members;
+}
+
+} // namespace reference
+
 /// The primitives that a list Process is called with.
 template <class T> class List {
 public:
@@ -292,6 +309,12 @@ public:
       values[i] = f(static_cast<int>(i));
     });
     return reference::reduceTree(std::move(values), op, empty);
+  }
+
+protected:
+  BasicStage() {
+    if (auto *members = reference::membersUnderConstruction())
+      members->push_back({&node, reference::typeOf<In>()});
   }
 
 private:
