@@ -5,7 +5,7 @@
 //
 //   piko-compare FILE [--reference FILE] [--pipe NAME] [--domain W H ..]
 //                [--count N] [--seed S] [--threads T ..] [--runs N]
-//                [--target cpu|reference] [--check[=nan:RECORD.FIELD,..]]
+//                [--check[=nan:RECORD.FIELD,..]]
 //
 // The input follows from the seed: integer fields are whole numbers from 0 to
 // 63, floats multiples of 1/64 in [-8, 72), bytes 0 or 1. Buffers that no source
