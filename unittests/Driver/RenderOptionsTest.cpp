@@ -61,11 +61,10 @@ TEST(RenderOptions, Check) {
   EXPECT_TRUE(o->load.check.numbers.empty());
   o = parseOptions({"a", "b", "--check=nan:F.z,F.at.x"});
   ASSERT_TRUE(o);
-  EXPECT_EQ(o->load.check.numbers,
-            (std::vector<std::string>{"F.z", "F.at.x"}));
-  for (const char *bad : {"--check=", "--check=inf:F.z", "--check=nan:",
-                          "--check=nan:F", "--check=nan:.z", "--check=nan:F.",
-                          "--check=nan:F.z,"})
+  EXPECT_EQ(o->load.check.numbers, (std::vector<std::string>{"F.z", "F.at.x"}));
+  for (const char *bad :
+       {"--check=", "--check=inf:F.z", "--check=nan:", "--check=nan:F",
+        "--check=nan:.z", "--check=nan:F.", "--check=nan:F.z,"})
     EXPECT_FALSE(parseOptions({"a", "b", bad})) << bad;
 }
 
