@@ -31,6 +31,7 @@
 #include "llvm/Transforms/Scalar/SROA.h"
 #include "llvm/Transforms/Scalar/SimplifyCFG.h"
 #include "llvm/Transforms/Utils/Cloning.h"
+#include "llvm/Transforms/Utils/Local.h"
 
 using namespace piko;
 using llvm::dyn_cast;
@@ -265,6 +266,23 @@ static bool checkObject(llvm::Function &function, const ParsedUnit &unit,
   return true;
 }
 
+/// Where all values have a case, the last case serves as the default: a block
+/// that is never reached would belong to no loop.
+static void dropUnreachableDefaults(llvm::Function &function) {
+  for (llvm::BasicBlock &block : function) {
+    auto *choice = dyn_cast<llvm::SwitchInst>(block.getTerminator());
+    if (!choice || choice->getNumCases() == 0)
+      continue;
+    llvm::BasicBlock *never = choice->getDefaultDest();
+    if (!llvm::isa<llvm::UnreachableInst>(never->front()))
+      continue;
+    auto last = std::prev(choice->case_end());
+    choice->setDefaultDest(last->getCaseSuccessor());
+    choice->removeCase(last);
+  }
+  llvm::removeUnreachableBlocks(function);
+}
+
 static void prepareFunction(llvm::Function &function, ParsedUnit &unit,
                             MemoryMap &memory, mlir::MLIRContext &context) {
   redirectMathCalls(function, unit, context);
@@ -343,6 +361,7 @@ static bool cleanUpFunction(llvm::Function &function, ParsedUnit &unit,
   finish.addPass(llvm::ADCEPass());
   finish.addPass(llvm::SimplifyCFGPass());
   runner.run(finish, function);
+  dropUnreachableDefaults(function);
   return true;
 }
 

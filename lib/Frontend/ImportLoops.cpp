@@ -35,6 +35,11 @@ LogicalResult PhaseImporter::checkLoop(const ParallelLoop *loop) {
             carried = loop->more;
         }
   for (llvm::BasicBlock *block : loop->blocks->blocks())
+    for (llvm::BasicBlock *next : llvm::successors(block))
+      if (block != loop->blocks->getHeader() && !loop->blocks->contains(next))
+        return reject(block->getTerminator(),
+                      "an iteration of parallelFor that does not end");
+  for (llvm::BasicBlock *block : loop->blocks->blocks())
     for (llvm::Instruction &instruction : *block)
       for (const llvm::User *user : instruction.users())
         if (!loop->blocks->contains(
