@@ -240,7 +240,7 @@ compileReference(const ObjectOptions &options, const Files &files,
   object.pipeline = pipeline->name;
   object.symbol = referenceEntry;
   return compileForHost(generateReferenceAdapter(*pipeline, file), frontend,
-                        llvmContext, context);
+                        /*optimize=*/true, llvmContext, context);
 }
 
 /// Fills an entry but for its files; false after diagnostics, which are there

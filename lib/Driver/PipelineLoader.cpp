@@ -32,10 +32,10 @@ static llvm::Expected<const pikort_program *>
 findProgram(JITCode &code, const std::string &symbol, ExecutionTarget target) {
   if (target == ExecutionTarget::CPU)
     return code.lookup<const pikort_program>(symbol);
-  auto entry = code.lookup<const pikort_program *()>(symbol);
+  auto entry = code.lookup<const pikort_program *(int)>(symbol);
   if (!entry)
     return entry.takeError();
-  return (*entry)();
+  return (*entry)(0);
 }
 
 static std::unique_ptr<LoadedProgram> load(CompileOptions source,

@@ -44,62 +44,111 @@ static void canonicalize(mlir::ModuleOp module) {
   mlir::eliminateCommonSubExpressions(rewriter, dominance, module);
 }
 
-static mlir::OwningOpRef<mlir::ModuleOp> translate(const ParseRequest &request,
-                                                   mlir::MLIRContext &context) {
+/// A pipeline whose graph is known and whose phases are not yet translated.
+struct PipelineFile::Unit {
+  Unit(std::unique_ptr<ParsedUnit> unit, mlir::MLIRContext &context)
+      : parsed(std::move(unit)),
+        memory(parsed->pipeline, parsed->markers,
+               parsed->module->getDataLayout(), *parsed->llvmContext) {
+    isRead = cleanUp(*parsed, memory, context) &&
+             readWiring(*parsed, memory, context);
+  }
+
+  mlir::OwningOpRef<mlir::ModuleOp> translate(mlir::MLIRContext &context) {
+    if (!isRead)
+      return nullptr;
+    mlir::OwningOpRef<mlir::ModuleOp> module =
+        buildModule(*parsed, memory, context);
+    if (!module)
+      return nullptr;
+    canonicalize(*module);
+    if (failed(mlir::verify(*module)))
+      return nullptr;
+    return module;
+  }
+
+  std::unique_ptr<ParsedUnit> parsed;
+  MemoryMap memory;
+  bool isRead = false;
+};
+
+PipelineFile::PipelineFile(mlir::MLIRContext &context) : context(context) {}
+PipelineFile::~PipelineFile() = default;
+
+std::unique_ptr<PipelineFile>
+PipelineFile::parse(llvm::StringRef file, const FrontendOptions &options,
+                    mlir::MLIRContext &context) {
+  ParseGoal goal =
+      options.pipeName.empty() ? ParseGoal::CompileAll : ParseGoal::CompilePipe;
+  return parse({file.str(), std::nullopt, options, goal}, context);
+}
+
+std::unique_ptr<PipelineFile> PipelineFile::parse(const ParseRequest &request,
+                                                  mlir::MLIRContext &context) {
   loadDialects(context);
-  std::unique_ptr<ParsedUnit> unit = parseUnit(request, context);
-  if (!unit)
+  llvm::FailureOr<ParsedFile> file = parseFile(request, context);
+  if (failed(file))
     return nullptr;
-  MemoryMap memory(unit->pipeline, unit->markers, unit->module->getDataLayout(),
-                   *unit->llvmContext);
-  if (!cleanUp(*unit, memory, context) || !readWiring(*unit, memory, context))
-    return nullptr;
-  mlir::OwningOpRef<mlir::ModuleOp> module =
-      buildModule(*unit, memory, context);
-  if (!module)
-    return nullptr;
-  canonicalize(*module);
-  if (failed(mlir::verify(*module)))
-    return nullptr;
-  return module;
+  std::unique_ptr<PipelineFile> result(new PipelineFile(context));
+  for (std::unique_ptr<ParsedUnit> &unit : file->units)
+    result->units.push_back(std::make_unique<Unit>(std::move(unit), context));
+  return result;
+}
+
+size_t PipelineFile::size() const { return units.size(); }
+
+llvm::StringRef PipelineFile::getName(size_t index) const {
+  return units[index]->parsed->pipeline.name;
+}
+
+llvm::FailureOr<PipelineDescription>
+PipelineFile::describe(size_t index) const {
+  if (!units[index]->isRead)
+    return failure();
+  return units[index]->parsed->pipeline;
+}
+
+mlir::OwningOpRef<mlir::ModuleOp> PipelineFile::translate(size_t index) {
+  return units[index]->translate(context);
+}
+
+/// The one pipeline that CompilePipe asks for.
+static mlir::OwningOpRef<mlir::ModuleOp>
+translate(std::unique_ptr<PipelineFile> file) {
+  return file ? file->translate(0) : nullptr;
 }
 
 mlir::OwningOpRef<mlir::ModuleOp>
 piko::translateCppToPiko(llvm::StringRef file, const FrontendOptions &options,
                          mlir::MLIRContext &context) {
-  return translate({file.str(), std::nullopt, options, ParseGoal::CompilePipe},
-                   context);
+  return translate(PipelineFile::parse(
+      {file.str(), std::nullopt, options, ParseGoal::CompilePipe}, context));
 }
 
 mlir::OwningOpRef<mlir::ModuleOp>
 piko::translateCppToPiko(llvm::StringRef name, llvm::StringRef text,
                          const FrontendOptions &options,
                          mlir::MLIRContext &context) {
-  return translate({name.str(), text.str(), options, ParseGoal::CompilePipe},
-                   context);
+  return translate(PipelineFile::parse(
+      {name.str(), text.str(), options, ParseGoal::CompilePipe}, context));
 }
 
 llvm::FailureOr<std::vector<std::string>>
 piko::listPipes(llvm::StringRef file, const FrontendOptions &options,
                 mlir::MLIRContext &context) {
-  std::unique_ptr<ParsedUnit> unit = parseUnit(
+  llvm::FailureOr<ParsedFile> parsed = parseFile(
       {file.str(), std::nullopt, options, ParseGoal::ListPipes}, context);
-  if (!unit)
+  if (failed(parsed))
     return failure();
-  return std::move(unit->pipes);
+  return std::move(parsed->pipes);
 }
 
 llvm::FailureOr<PipelineDescription>
 piko::describePipe(llvm::StringRef file, const FrontendOptions &options,
                    mlir::MLIRContext &context) {
-  loadDialects(context);
-  std::unique_ptr<ParsedUnit> unit = parseUnit(
-      {file.str(), std::nullopt, options, ParseGoal::DescribePipe}, context);
-  if (!unit)
+  std::unique_ptr<PipelineFile> parsed = PipelineFile::parse(
+      {file.str(), std::nullopt, options, ParseGoal::CompilePipe}, context);
+  if (!parsed)
     return failure();
-  MemoryMap memory(unit->pipeline, unit->markers, unit->module->getDataLayout(),
-                   *unit->llvmContext);
-  if (!cleanUp(*unit, memory, context) || !readWiring(*unit, memory, context))
-    return failure();
-  return std::move(unit->pipeline);
+  return parsed->describe(0);
 }

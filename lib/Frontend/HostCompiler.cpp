@@ -16,13 +16,15 @@ static constexpr llvm::StringLiteral mainName = "<piko-reference>";
 
 std::unique_ptr<llvm::Module>
 piko::compileForHost(llvm::StringRef text, const FrontendOptions &options,
-                     llvm::LLVMContext &llvmContext,
+                     bool optimize, llvm::LLVMContext &llvmContext,
                      mlir::MLIRContext &context) {
   auto files = options.files ? options.files : llvm::vfs::getRealFileSystem();
   ClangDiagnosticForwarder forwarder(context);
   clang::DiagnosticOptions diagnosticOptions;
   std::shared_ptr<clang::CompilerInvocation> invocation =
-      createClangInvocation({"-O2", "-fPIC"}, options, mainName,
+      createClangInvocation({optimize ? "-O2" : "-O0", "-fPIC", "-fwrapv",
+                             "-fno-strict-float-cast-overflow"},
+                            options, mainName,
                             clang::CompilerInstance::createDiagnostics(
                                 *files, diagnosticOptions, &forwarder,
                                 /*ShouldOwnClient=*/false));

@@ -8,8 +8,9 @@
 //
 // At the first the user's file is entered, under the name that the user gave.
 // At the second the user's declarations are complete: pipelines are found, one
-// is read, and text with a wrapper for each of its phases is entered as if it
-// were included there. Clang then generates code for what the wrappers use.
+// or each is read, and text with a wrapper for each of its phases is entered as
+// if it were included there. Clang then generates code for what the wrappers
+// use; that of several pipelines is divided among their units.
 //
 // The code is for nvptx64, because Clang passes aggregates there as they are;
 // types have the host's layout, since that target copies it, and headers are
@@ -36,6 +37,7 @@
 #include "llvm/Support/VirtualFileSystem.h"
 #include "llvm/TargetParser/Host.h"
 #include "llvm/TargetParser/Triple.h"
+#include "llvm/Transforms/Utils/Cloning.h"
 
 using namespace piko;
 using llvm::failed;
@@ -123,14 +125,30 @@ private:
   llvm::StringRef file;
 };
 
-/// Reads the pipeline when the parser comes to the pragma.
-class UnitReader : public clang::PragmaHandler {
+/// A pipeline that is being read.
+struct UnitReader {
+  UnitReader(mlir::Location file, clang::ASTContext &ast,
+             mlir::MLIRContext &context)
+      : unit(std::make_unique<ParsedUnit>(file)),
+        records(ast, context, unit->pipeline.records),
+        reader(ast, context, unit->pipeline, records) {}
+
+  std::unique_ptr<ParsedUnit> unit;
+  RecordTable records;
+  PipelineReader reader;
+  /// Behind the names of its wrappers.
+  std::string suffix;
+};
+
+/// Reads the pipelines when the parser comes to the pragma.
+class FileUnitsReader : public clang::PragmaHandler {
 public:
-  UnitReader(const ParseRequest &request, mlir::MLIRContext &context,
-             clang::CompilerInstance &compiler,
-             ClangDiagnosticForwarder &diagnostics, ParsedUnit &unit)
-      : PragmaHandler("piko_wrappers"), request(request), context(context),
-        compiler(compiler), diagnostics(diagnostics), unit(unit) {}
+  FileUnitsReader(const ParseRequest &request, mlir::Location fileLocation,
+                  mlir::MLIRContext &context, clang::CompilerInstance &compiler,
+                  ClangDiagnosticForwarder &diagnostics)
+      : PragmaHandler("piko_wrappers"), request(request),
+        fileLocation(fileLocation), context(context), compiler(compiler),
+        diagnostics(diagnostics) {}
 
   void HandlePragma(clang::Preprocessor &preprocessor, clang::PragmaIntroducer,
                     clang::Token &token) override {
@@ -151,41 +169,53 @@ public:
   }
 
   bool succeeded() const { return ok; }
-  RecordTable &getRecords() { return *records; }
-  const PipelineReader &getReader() const { return *reader; }
+  std::vector<std::string> pipes;
+  std::vector<std::unique_ptr<UnitReader>> readers;
 
 private:
   bool read(std::string &wrappers) {
-    clang::ASTContext &ast = compiler.getASTContext();
-    std::vector<PipeCandidate> pipes = findPipes(compiler.getSema());
-    for (const PipeCandidate &pipe : pipes)
-      unit.pipes.push_back(pipe.name);
-    if (request.goal == ParseGoal::ListPipes)
+    std::vector<PipeCandidate> candidates = findPipes(compiler.getSema());
+    for (const PipeCandidate &pipe : candidates)
+      pipes.push_back(pipe.name);
+    switch (request.goal) {
+    case ParseGoal::ListPipes:
       return true;
-    llvm::FailureOr<PipeCandidate> pipe = selectPipe(
-        pipes, request.options.pipeName, unit.pipeline.location, ast, context);
-    if (failed(pipe))
+    case ParseGoal::CompilePipe: {
+      llvm::FailureOr<PipeCandidate> pipe =
+          selectPipe(candidates, request.options.pipeName, fileLocation,
+                     compiler.getASTContext(), context);
+      return llvm::succeeded(pipe) && read(*pipe, wrappers);
+    }
+    case ParseGoal::CompileAll:
+      for (const PipeCandidate &pipe : candidates)
+        (void)read(pipe, wrappers);
+      return true;
+    }
+    llvm_unreachable("all goals are listed");
+  }
+
+  bool read(const PipeCandidate &pipe, std::string &wrappers) {
+    clang::ASTContext &ast = compiler.getASTContext();
+    auto made = std::make_unique<UnitReader>(fileLocation, ast, context);
+    PipelineDescription &pipeline = made->unit->pipeline;
+    pipeline.name = pipe.name;
+    pipeline.location =
+        convertLocation(pipe.location, compiler.getSourceManager(), context);
+    if (failed(made->reader.read(pipe)))
       return false;
-    unit.pipeline.name = pipe->name;
-    unit.pipeline.location =
-        convertLocation(pipe->location, compiler.getSourceManager(), context);
-    records.emplace(ast, context, unit.pipeline.records);
-    reader.emplace(ast, context, unit.pipeline, *records);
-    if (failed(reader->read(*pipe)))
-      return false;
-    unit.pipeline.typeName =
-        records->getName(ast.getCanonicalTagType(pipe->type));
-    wrappers = generateWrappers(unit.pipeline, unit.pipeline.typeName);
+    pipeline.typeName =
+        made->records.getName(ast.getCanonicalTagType(pipe.type));
+    made->suffix = "_of_" + std::to_string(readers.size());
+    wrappers += generateWrappers(pipeline, pipeline.typeName, made->suffix);
+    readers.push_back(std::move(made));
     return true;
   }
 
   const ParseRequest &request;
+  mlir::Location fileLocation;
   mlir::MLIRContext &context;
   clang::CompilerInstance &compiler;
   ClangDiagnosticForwarder &diagnostics;
-  ParsedUnit &unit;
-  std::optional<RecordTable> records;
-  std::optional<PipelineReader> reader;
   bool ok = false;
 };
 
@@ -197,8 +227,7 @@ private:
 
 /// The marker that a function without a body is; none if it is not one.
 static llvm::FailureOr<std::optional<Marker>>
-readMarker(const clang::FunctionDecl *function, UnitReader &reader,
-           ParsedUnit &unit) {
+readMarker(const clang::FunctionDecl *function, UnitReader &reader) {
   const auto *space =
       llvm::dyn_cast<clang::NamespaceDecl>(function->getDeclContext());
   const auto *outer =
@@ -224,16 +253,15 @@ readMarker(const clang::FunctionDecl *function, UnitReader &reader,
   case MarkerKind::scanBegin:
   case MarkerKind::combineEnd:
   case MarkerKind::clear: {
-    llvm::FailureOr<unsigned> record = reader.getRecords().get(
-        (*arguments)[0].getAsType(), unit.pipeline.location);
+    llvm::FailureOr<unsigned> record = reader.records.get(
+        (*arguments)[0].getAsType(), reader.unit->pipeline.location);
     if (failed(record))
       return llvm::failure();
     marker.record = *record;
     break;
   }
   case MarkerKind::state:
-    marker.offset =
-        reader.getReader().getStateOffset((*arguments)[0].getAsType());
+    marker.offset = reader.reader.getStateOffset((*arguments)[0].getAsType());
     break;
   case MarkerKind::sort:
     marker.isSigned = (*arguments)[0].getAsIntegral().getBoolValue();
@@ -247,7 +275,7 @@ readMarker(const clang::FunctionDecl *function, UnitReader &reader,
     const clang::CXXRecordDecl *type =
         (*arguments)[0].getAsType()->getAsCXXRecordDecl();
     llvm::ArrayRef<const clang::CXXRecordDecl *> types =
-        reader.getReader().stageTypes;
+        reader.reader.stageTypes;
     for (auto [stage, candidate] : llvm::enumerate(types))
       if (type && candidate == type->getCanonicalDecl())
         marker.stages.push_back(stage);
@@ -259,8 +287,8 @@ readMarker(const clang::FunctionDecl *function, UnitReader &reader,
   return std::optional<Marker>(marker);
 }
 
-static bool readFunctions(clang::CodeGenerator &generator, UnitReader &reader,
-                          ParsedUnit &unit) {
+static bool readFunctions(clang::CodeGenerator &generator, UnitReader &reader) {
+  ParsedUnit &unit = *reader.unit;
   for (const llvm::Function &function : *unit.module) {
     if (function.isIntrinsic())
       continue;
@@ -269,8 +297,7 @@ static bool readFunctions(clang::CodeGenerator &generator, UnitReader &reader,
     if (!decl)
       continue;
     if (function.isDeclaration()) {
-      llvm::FailureOr<std::optional<Marker>> marker =
-          readMarker(decl, reader, unit);
+      llvm::FailureOr<std::optional<Marker>> marker = readMarker(decl, reader);
       if (failed(marker))
         return false;
       if (*marker) {
@@ -282,6 +309,61 @@ static bool readFunctions(clang::CodeGenerator &generator, UnitReader &reader,
         decl->getQualifiedNameAsString();
   }
   return true;
+}
+
+/// All that the functions whose names end in `suffix` refer to.
+static llvm::DenseSet<const llvm::GlobalValue *>
+findReachable(const llvm::Module &module, llvm::StringRef suffix) {
+  llvm::DenseSet<const llvm::GlobalValue *> reached;
+  llvm::SmallVector<const llvm::User *> work;
+  llvm::DenseSet<const llvm::Constant *> seen;
+  auto visit = [&](const llvm::User &user) {
+    for (const llvm::Value *operand : user.operands())
+      if (auto *constant = llvm::dyn_cast<llvm::Constant>(operand))
+        if (seen.insert(constant).second)
+          work.push_back(constant);
+  };
+  for (const llvm::Function &function : module)
+    if (function.getName().ends_with(suffix))
+      work.push_back(&function);
+  while (!work.empty()) {
+    const llvm::User *user = work.pop_back_val();
+    if (auto *global = llvm::dyn_cast<llvm::GlobalValue>(user))
+      reached.insert(global);
+    visit(*user);
+    if (auto *function = llvm::dyn_cast<llvm::Function>(user))
+      for (const llvm::BasicBlock &block : *function)
+        for (const llvm::Instruction &instruction : block)
+          visit(instruction);
+  }
+  return reached;
+}
+
+/// A module of the one pipeline's wrappers and all that they need.
+static std::unique_ptr<llvm::Module> extractUnit(const llvm::Module &module,
+                                                 llvm::StringRef suffix) {
+  llvm::DenseSet<const llvm::GlobalValue *> reached =
+      findReachable(module, suffix);
+  llvm::ValueToValueMapTy map;
+  std::unique_ptr<llvm::Module> unit =
+      llvm::CloneModule(module, map, [&](const llvm::GlobalValue *value) {
+        return reached.contains(value);
+      });
+  for (llvm::Function &function : llvm::make_early_inc_range(*unit))
+    if (function.isDeclaration() && function.use_empty())
+      function.eraseFromParent();
+  for (llvm::GlobalVariable &global :
+       llvm::make_early_inc_range(unit->globals()))
+    if (global.isDeclaration() && global.use_empty())
+      global.eraseFromParent();
+  return unit;
+}
+
+/// Gives wrappers the names that the rest of the front end finds them by.
+static void dropSuffix(llvm::Module &module, llvm::StringRef suffix) {
+  for (llvm::Function &function : module)
+    if (function.getName().ends_with(suffix))
+      function.setName(function.getName().drop_back(suffix.size()).str());
 }
 
 static void collectUserFiles(const clang::SourceManager &sources,
@@ -301,7 +383,7 @@ static void collectUserFiles(const clang::SourceManager &sources,
 // All of it
 //===----------------------------------------------------------------------===//
 
-std::unique_ptr<ParsedUnit> piko::parseUnit(const ParseRequest &request,
+llvm::FailureOr<ParsedFile> piko::parseFile(const ParseRequest &request,
                                             mlir::MLIRContext &context) {
   mlir::Location fileLocation =
       mlir::FileLineColLoc::get(&context, request.file, 1, 1);
@@ -315,7 +397,7 @@ std::unique_ptr<ParsedUnit> piko::parseUnit(const ParseRequest &request,
                     llvm::MemoryBuffer::getMemBufferCopy(*request.text));
   } else if (!files->exists(request.file)) {
     mlir::emitError(fileLocation) << "cannot open the file";
-    return nullptr;
+    return llvm::failure();
   }
 
   ClangDiagnosticForwarder forwarder(context);
@@ -325,16 +407,16 @@ std::unique_ptr<ParsedUnit> piko::parseUnit(const ParseRequest &request,
   std::shared_ptr<clang::CompilerInvocation> invocation =
       makeInvocation(request, driverDiagnostics);
   if (!invocation)
-    return nullptr;
+    return llvm::failure();
   invocation->getFrontendOpts().Inputs.clear();
 
   // Before Clang, which may still hold LLVM's module when it goes.
-  auto unit = std::make_unique<ParsedUnit>(fileLocation);
+  auto llvmContext = std::make_shared<llvm::LLVMContext>();
   clang::CompilerInstance compiler(invocation);
   compiler.setVirtualFileSystem(files);
   compiler.createDiagnostics(&forwarder, /*ShouldOwnClient=*/false);
   if (!compiler.createTarget())
-    return nullptr;
+    return llvm::failure();
   compiler.createFileManager();
   compiler.createSourceManager();
   clang::SourceManager &sources = compiler.getSourceManager();
@@ -345,18 +427,17 @@ std::unique_ptr<ParsedUnit> piko::parseUnit(const ParseRequest &request,
   clang::Preprocessor &preprocessor = compiler.getPreprocessor();
   preprocessor.getBuiltinInfo().initializeBuiltins(
       preprocessor.getIdentifierTable(), preprocessor.getLangOpts());
-  UnitReader reader(request, context, compiler, forwarder, *unit);
+  FileUnitsReader reader(request, fileLocation, context, compiler, forwarder);
   preprocessor.AddPragmaHandler(&reader);
   FileReader fileReader(request.file);
   preprocessor.AddPragmaHandler(&fileReader);
   compiler.createASTContext();
 
   bool compiles = request.goal != ParseGoal::ListPipes;
-  unit->llvmContext = std::make_unique<llvm::LLVMContext>();
   clang::CodeGenerator *generator = nullptr;
   if (compiles) {
     auto consumer =
-        clang::CreateLLVMCodeGen(compiler, request.file, *unit->llvmContext);
+        clang::CreateLLVMCodeGen(compiler, request.file, *llvmContext);
     generator = consumer.get();
     compiler.setASTConsumer(std::move(consumer));
   } else {
@@ -372,15 +453,31 @@ std::unique_ptr<ParsedUnit> piko::parseUnit(const ParseRequest &request,
   preprocessor.RemovePragmaHandler(&fileReader);
   preprocessor.RemovePragmaHandler(&reader);
 
-  bool ok = !compiler.getDiagnostics().hasErrorOccurred() && reader.succeeded();
-  if (ok && compiles) {
-    unit->module = generator->ReleaseModule();
-    ok = unit->module && readFunctions(*generator, reader, *unit);
-    if (ok && isChecking(request.options))
-      unit->module->addModuleFlag(llvm::Module::Override, checkingFlag, 1);
-    collectUserFiles(sources, unit->userFiles);
+  if (compiler.getDiagnostics().hasErrorOccurred() || !reader.succeeded())
+    return llvm::failure();
+  ParsedFile result;
+  result.pipes = std::move(reader.pipes);
+  if (!compiles)
+    return result;
+  std::unique_ptr<llvm::Module> module(generator->ReleaseModule());
+  if (!module)
+    return llvm::failure();
+  llvm::StringSet<> userFiles;
+  collectUserFiles(sources, userFiles);
+  for (std::unique_ptr<UnitReader> &made : reader.readers) {
+    ParsedUnit &unit = *made->unit;
+    unit.llvmContext = llvmContext;
+    unit.userFiles = userFiles;
+    unit.module = reader.readers.size() == 1
+                      ? std::move(module)
+                      : extractUnit(*module, made->suffix);
+    dropSuffix(*unit.module, made->suffix);
+    if (isChecking(request.options))
+      unit.module->addModuleFlag(llvm::Module::Override, checkingFlag, 1);
+    if (readFunctions(*generator, *made))
+      result.units.push_back(std::move(made->unit));
+    else if (request.goal == ParseGoal::CompilePipe)
+      return llvm::failure();
   }
-  if (!ok)
-    return nullptr;
-  return unit;
+  return result;
 }

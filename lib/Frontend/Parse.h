@@ -13,7 +13,7 @@
 namespace piko {
 
 /// What is asked of a file.
-enum class ParseGoal { ListPipes, DescribePipe, CompilePipe };
+enum class ParseGoal { ListPipes, CompilePipe, CompileAll };
 
 struct ParseRequest {
   std::string file;
@@ -23,14 +23,14 @@ struct ParseRequest {
   ParseGoal goal;
 };
 
-/// What comes out: with ListPipes the names alone.
+/// One pipeline.
 struct ParsedUnit {
   explicit ParsedUnit(mlir::Location file) : pipeline{.location = file} {}
 
-  std::vector<std::string> pipes;
   PipelineDescription pipeline;
-  /// The wrappers and all they need.
-  std::unique_ptr<llvm::LLVMContext> llvmContext;
+  /// Shared by the units of a file.
+  std::shared_ptr<llvm::LLVMContext> llvmContext;
+  /// The wrappers and all they need; null if the pipeline has an error.
   std::unique_ptr<llvm::Module> module;
   /// The meaning of the module's functions without a body.
   MarkerTable markers;
@@ -42,9 +42,17 @@ struct ParsedUnit {
   llvm::DenseSet<mlir::Attribute> warned;
 };
 
-/// Parses the file and generates LLVM IR for its phases, uncleaned; null after
-/// an error.
-std::unique_ptr<ParsedUnit> parseUnit(const ParseRequest &request,
+struct ParsedFile {
+  /// The names of all pipelines, in the order of their definition.
+  std::vector<std::string> pipes;
+  /// The pipelines that were asked for.
+  std::vector<std::unique_ptr<ParsedUnit>> units;
+};
+
+/// Parses the file and generates LLVM IR for the phases of its pipelines,
+/// uncleaned. Fails if there is an error in the file, or in the one pipeline of
+/// CompilePipe.
+llvm::FailureOr<ParsedFile> parseFile(const ParseRequest &request,
                                       mlir::MLIRContext &context);
 
 } // namespace piko

@@ -18,43 +18,17 @@ using namespace piko;
 
 namespace {
 
-class AdapterWriter {
-public:
-  explicit AdapterWriter(const PipelineDescription &pipeline)
-      : pipeline(pipeline), out(text) {}
-
-  std::string write(llvm::StringRef userFile) {
-    out << "#include " << quote(userFile) << "\n"
-        << "#include <pikort/abi.h>\n"
-        << "#include <cstring>\n#include <memory>\n#include <new>\n"
-        << "#include <utility>\n"
-        << "namespace piko_adapter {\n"
-        << "using Pipeline = ::" << pipeline.typeName << ";\n";
-    writeHelpers();
-    writeSetup();
-    writeRun();
-    out << "} // namespace piko_adapter\n"
-        << "extern \"C\" const pikort_program *piko_reference_program() {\n"
-        << "  static const pikort_program program = {PIKORT_ABI_VERSION, "
-        << quote(pipeline.name)
-        << ", piko_adapter::setup, piko_adapter::run};\n"
-        << "  return &program;\n}\n";
-    return text;
+std::string quote(llvm::StringRef string) {
+  std::string quoted = "\"";
+  for (char c : string) {
+    if (c == '"' || c == '\\')
+      quoted += '\\';
+    quoted += c;
   }
+  return quoted + "\"";
+}
 
-private:
-  static std::string quote(llvm::StringRef string) {
-    std::string quoted = "\"";
-    for (char c : string) {
-      if (c == '"' || c == '\\')
-        quoted += '\\';
-      quoted += c;
-    }
-    return quoted + "\"";
-  }
-
-  void writeHelpers() {
-    out << R"(
+constexpr llvm::StringLiteral helpers = R"(
 template <class Image> struct Pixel;
 template <class T, int Rank> struct Pixel<piko::Image<T, Rank>> {};
 template <class T, int Rank> T clearValue(Pixel<piko::Image<T, Rank>>) {
@@ -78,8 +52,24 @@ template <class T, int Rank> void save(const piko::Image<T, Rank> &image,
                 image.size() * sizeof(T));
 }
 )";
+
+/// Writes a namespace for one pipeline.
+class AdapterWriter {
+public:
+  AdapterWriter(const PipelineDescription &pipeline, llvm::raw_ostream &out)
+      : pipeline(pipeline), out(out) {}
+
+  void write(size_t index) {
+    out << "namespace piko_adapter::pipeline" << index << " {\n"
+        << "using Pipeline = ::" << pipeline.typeName << ";\n";
+    writeSetup();
+    writeRun();
+    out << "const pikort_program program = {PIKORT_ABI_VERSION, "
+        << quote(pipeline.name) << ", setup, run};\n"
+        << "} // namespace piko_adapter::pipeline" << index << "\n";
   }
 
+private:
   void writeSetup() {
     out << "void setup(pikort_pipeline *p) {\n"
         << "  pikoir_declare_pipeline(p, " << quote(pipeline.name) << ", "
@@ -239,16 +229,31 @@ template <class T, int Rank> void save(const piko::Image<T, Rank> &image,
   }
 
   const PipelineDescription &pipeline;
-  std::string text;
-  llvm::raw_string_ostream out;
+  llvm::raw_ostream &out;
 };
 
 } // namespace
 
-std::string piko::generateReferenceAdapter(const PipelineDescription &pipeline,
-                                           llvm::StringRef userFile) {
+std::string
+piko::generateReferenceAdapter(llvm::ArrayRef<PipelineDescription> pipelines,
+                               llvm::StringRef userFile) {
   // The text is compiled as a file of no folder.
   llvm::SmallString<128> path(userFile);
   llvm::sys::fs::make_absolute(path);
-  return AdapterWriter(pipeline).write(path);
+  std::string text;
+  llvm::raw_string_ostream out(text);
+  out << "#include " << quote(path) << "\n"
+      << "#include <pikort/abi.h>\n"
+      << "#include <cstring>\n#include <memory>\n#include <new>\n"
+      << "#include <utility>\n"
+      << "namespace piko_adapter {" << helpers
+      << "} // namespace piko_adapter\n";
+  for (auto [index, pipeline] : llvm::enumerate(pipelines))
+    AdapterWriter(pipeline, out).write(index);
+  out << "extern \"C\" const pikort_program *piko_reference_program(int i) {\n"
+      << "  static const pikort_program *const programs[] = {";
+  for (size_t index = 0; index < pipelines.size(); ++index)
+    out << "\n    &piko_adapter::pipeline" << index << "::program,";
+  out << "};\n  return programs[i];\n}\n";
+  return text;
 }

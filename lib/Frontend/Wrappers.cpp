@@ -20,13 +20,15 @@ std::string piko::getWrapperName(WrapperKind kind, unsigned index) {
 }
 
 std::string piko::generateWrappers(const PipelineDescription &pipeline,
-                                   llvm::StringRef typeName) {
+                                   llvm::StringRef typeName,
+                                   llvm::StringRef suffix) {
   std::string text;
   llvm::raw_string_ostream out(text);
   auto function = [&](WrapperKind kind, unsigned index, llvm::Twine body) {
-    out << "extern \"C\" void " << getWrapperName(kind, index) << "() { "
-        << body << " }\n";
+    out << "extern \"C\" void " << getWrapperName(kind, index) << suffix
+        << "() { " << body << " }\n";
   };
+  out << "namespace __piko_wrappers" << suffix << " {\n";
   out << "using __piko_pipe = " << typeName << ";\n";
   out << "using __piko_state = __piko_pipe::State;\n";
   function(WrapperKind::Wire, 0, "__piko_pipe pipe;");
@@ -55,5 +57,6 @@ std::string piko::generateWrappers(const PipelineDescription &pipeline,
                "::piko::detail::clearImage(::piko::marker::state<__piko_state>"
                "()->" +
                    state.name + ");");
+  out << "}\n";
   return text;
 }

@@ -16,9 +16,10 @@ std::string getWrapperName(WrapperKind kind, unsigned index = 0);
 
 /// C++ that follows the user's file: one function for the constructor of the
 /// pipeline, one for each phase of each stage, and one for each image's clear
-/// value. `typeName` is how the pipeline's type can be written there.
+/// value. `typeName` is how the pipeline's type can be written there, `suffix`
+/// tells the functions from those of the file's other pipelines.
 std::string generateWrappers(const PipelineDescription &pipeline,
-                             llvm::StringRef typeName);
+                             llvm::StringRef typeName, llvm::StringRef suffix);
 
 } // namespace piko
 

@@ -18,6 +18,7 @@
 #include "mlir/IR/OwningOpRef.h"
 #include "llvm/Support/VirtualFileSystem.h"
 
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -58,11 +59,44 @@ llvm::FailureOr<PipelineDescription>
 describePipe(llvm::StringRef file, const FrontendOptions &options,
              mlir::MLIRContext &context);
 
-/// The text of a C++ program for the runtime's ABI that runs the pipeline with
+struct ParseRequest;
+
+/// The pipelines of a C++ file, which is parsed once for all of them.
+class PipelineFile {
+public:
+  /// Reads the pipeline that the options name, or all if they name none. Null
+  /// after an error, but not for one of several pipelines.
+  static std::unique_ptr<PipelineFile> parse(llvm::StringRef file,
+                                             const FrontendOptions &options,
+                                             mlir::MLIRContext &context);
+  static std::unique_ptr<PipelineFile> parse(const ParseRequest &request,
+                                             mlir::MLIRContext &context);
+  ~PipelineFile();
+
+  /// Pipelines are numbered in the order of their definition; those with
+  /// errors in their graph have no number.
+  size_t size() const;
+  llvm::StringRef getName(size_t index) const;
+  /// What describePipe gives.
+  llvm::FailureOr<PipelineDescription> describe(size_t index) const;
+  /// What translateCppToPiko gives; to be called once for each pipeline.
+  mlir::OwningOpRef<mlir::ModuleOp> translate(size_t index);
+
+private:
+  struct Unit;
+  explicit PipelineFile(mlir::MLIRContext &context);
+
+  mlir::MLIRContext &context;
+  std::vector<std::unique_ptr<Unit>> units;
+};
+
+/// The text of a C++ program for the runtime's ABI that runs the pipelines with
 /// the reference executor: `userFile` is included, without __PIKO__. It defines
-/// `extern "C" const pikort_program *piko_reference_program()`.
-std::string generateReferenceAdapter(const PipelineDescription &pipeline,
-                                     llvm::StringRef userFile);
+/// `extern "C" const pikort_program *piko_reference_program(int)`, which takes
+/// the place of a pipeline in the list.
+std::string
+generateReferenceAdapter(llvm::ArrayRef<PipelineDescription> pipelines,
+                         llvm::StringRef userFile);
 
 /// Registers `piko-translate --cpp-to-piko`.
 void registerCppToPikoTranslation();

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// What piko-compare is asked for.
+
+#ifndef PIKO_TEST_TOOLS_PIKO_COMPARE_OPTIONS_H
+#define PIKO_TEST_TOOLS_PIKO_COMPARE_OPTIONS_H
+
+#include "Piko/Driver/CheckOptions.h"
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+/// One pipeline and its input.
+struct Case {
+  std::string pipe;
+  std::vector<int64_t> domain{64, 48};
+  /// Primitives of each source; the last number is for all that follow.
+  std::vector<int64_t> counts{1000};
+  unsigned seed = 1;
+  /// Input of all bits, infinities and NaNs among it.
+  bool wide = false;
+
+  int64_t count(size_t source) const {
+    return counts[source < counts.size() ? source : counts.size() - 1];
+  }
+};
+
+struct Options {
+  std::string file;
+  /// The C++ that the reference executor runs.
+  std::string reference;
+  Case one;
+  /// A file with the options of a case in each line; empty = the one case.
+  std::string cases;
+  std::vector<int> threads{1, 2, 7};
+  int runs = 3;
+  unsigned timeout = 0;
+  /// Checking mode, on both sides.
+  piko::CheckOptions check;
+};
+
+/// Both throw std::runtime_error.
+Options parseOptions(int argc, char **argv);
+std::vector<Case> readCases(const std::string &file);
+
+#endif // PIKO_TEST_TOOLS_PIKO_COMPARE_OPTIONS_H

@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+
+#include "Result.h"
+
+#include "pikort/pikort.h"
+
+#include <cstring>
+
+namespace {
+
+template <class T> T read(const char *at) {
+  T value;
+  std::memcpy(&value, at, sizeof(T));
+  return value;
+}
+
+template <class T> bool equalFloats(const char *a, const char *b) {
+  T x = read<T>(a), y = read<T>(b);
+  return (x != x && y != y) || std::memcmp(a, b, sizeof(T)) == 0;
+}
+
+bool areEqual(int32_t type, const char *a, const char *b) {
+  if (type == PIKORT_F32)
+    return equalFloats<float>(a, b);
+  if (type == PIKORT_F64)
+    return equalFloats<double>(a, b);
+  return std::memcmp(a, b, size_t(1) << (type - PIKORT_I8)) == 0;
+}
+
+std::string show(int32_t type, const char *at) {
+  char text[64];
+  switch (type) {
+  case PIKORT_F32:
+    std::snprintf(text, sizeof text, "%.9g", double(read<float>(at)));
+    return text;
+  case PIKORT_F64:
+    std::snprintf(text, sizeof text, "%.17g", read<double>(at));
+    return text;
+  case PIKORT_I8:
+    return std::to_string(read<int8_t>(at));
+  case PIKORT_I16:
+    return std::to_string(read<int16_t>(at));
+  case PIKORT_I32:
+    return std::to_string(read<int32_t>(at));
+  default:
+    return std::to_string(read<int64_t>(at));
+  }
+}
+
+/// What differs between the records of one name; empty if nothing does.
+std::string compareRecords(const Records &expected, const Records &actual) {
+  if (expected.bytes.size() != actual.bytes.size() ||
+      expected.size != actual.size)
+    return " differs in size";
+  int64_t count = 0, records = int64_t(expected.bytes.size()) / expected.size;
+  std::string first;
+  for (int64_t i = 0; i < records; ++i) {
+    bool equal = true;
+    for (const Field &field : expected.fields)
+      for (int64_t e = 0; e < field.elements; ++e) {
+        size_t at = size_t(i * expected.size + field.offset + e * field.stride);
+        const char *a = &expected.bytes[at], *b = &actual.bytes[at];
+        if (areEqual(field.type, a, b))
+          continue;
+        equal = false;
+        if (first.empty())
+          first = "first at " + std::to_string(i) + ": field '" + field.name +
+                  "' should be " + show(field.type, a) + ", but is " +
+                  show(field.type, b);
+      }
+    count += !equal;
+  }
+  if (count == 0)
+    return "";
+  return " differs in " + std::to_string(count) + " of " +
+         std::to_string(records) + " records, " + first;
+}
+
+} // namespace
+
+bool Result::isBlank() const {
+  for (const auto &[name, records] : state)
+    if (records.bytes.find_first_not_of('\0') != std::string::npos)
+      return false;
+  return error.empty();
+}
+
+std::vector<std::string> compareResults(const Result &expected,
+                                        const Result &actual) {
+  std::vector<std::string> differences;
+  if (!expected.error.empty() || !actual.error.empty()) {
+    if (expected.error == actual.error)
+      return {};
+    if (!expected.error.empty())
+      differences.push_back("  expected: " + expected.error);
+    if (!actual.error.empty())
+      differences.push_back("  got: " + actual.error);
+    return differences;
+  }
+  for (const auto &[name, records] : expected.state) {
+    auto found = actual.state.find(name);
+    std::string what = found == actual.state.end()
+                           ? " is missing"
+                           : compareRecords(records, found->second);
+    if (!what.empty())
+      differences.push_back("'" + name + "'" + what);
+  }
+  return differences;
+}

@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+
+#include "Run.h"
+
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <random>
+#include <stdexcept>
+
+namespace {
+
+/// The value of one field.
+class Values {
+public:
+  Values(unsigned seed, bool wide) : random(seed), wide(wide) {}
+
+  void make(int32_t type, char *at) {
+    unsigned bits = random();
+    bool any = wide && random() % 2 == 0;
+    switch (type) {
+    case PIKORT_F32:
+      return write(at, any ? anyFloat<float>() : float(plain(bits)));
+    case PIKORT_F64:
+      return write(at, any ? anyFloat<double>() : plain(bits));
+    case PIKORT_I8: // may be a bool
+      return write(at, int8_t(bits & 1));
+    }
+    int64_t whole = any ? anyInteger() : bits & 63;
+    std::memcpy(at, &whole, size_t(1) << (type - PIKORT_I8));
+  }
+
+private:
+  template <class T> static void write(char *at, T value) {
+    std::memcpy(at, &value, sizeof(T));
+  }
+  static double plain(unsigned bits) { return double(bits % 5120) / 64 - 8; }
+  int64_t anyInteger() {
+    const int64_t special[] = {-1, INT32_MIN, INT32_MAX, INT64_MIN, INT64_MAX};
+    unsigned choice = random() % 10;
+    if (choice < 5)
+      return special[choice];
+    return int64_t(uint64_t(random()) << 32 | random()) >> random() % 64;
+  }
+  template <class T> T anyFloat() {
+    using Limits = std::numeric_limits<T>;
+    const T special[] = {Limits::infinity(),       -Limits::infinity(),
+                         Limits::quiet_NaN(),      T(-0.0),
+                         Limits::denorm_min() * 3, -Limits::max()};
+    unsigned choice = random() % 12;
+    if (choice < 6)
+      return special[choice];
+    T scaled = std::ldexp(T(1 + random() % 1000), int(random() % 60) - 30);
+    return random() % 2 ? scaled : -scaled;
+  }
+
+  std::mt19937 random;
+  bool wide;
+};
+
+} // namespace
+
+void Run::check(int32_t status) {
+  if (status != PIKORT_OK)
+    throw std::runtime_error(pikort_message(pipeline));
+}
+
+Run::Run(Program made, const Case &input)
+    : program(std::move(made)), input(input) {
+  check(pikort_create(&program.program, &pipeline));
+  check(pikort_set_domain(pipeline, int32_t(input.domain.size()),
+                          input.domain.data()));
+  for (int32_t i = 0; i < pikort_source_count(pipeline); ++i) {
+    pikort_source_info info;
+    check(pikort_get_source_info(pipeline, i, &info));
+    std::string name = "source " + std::to_string(i);
+    int64_t count = input.count(size_t(i));
+    memory[name] = makeRecords(info.record, count, name);
+    pikort_record_info record;
+    check(pikort_get_record(pipeline, info.record, &record));
+    check(pikort_bind_source(pipeline, i, memory[name].data(), count,
+                             record.size));
+  }
+  for (int32_t i = 0; i < pikort_state_count(pipeline); ++i) {
+    pikort_state_info info;
+    check(pikort_get_state_info(pipeline, i, &info));
+    if (info.kind != PIKORT_IMAGE && info.per_source < 0)
+      initial[info.name] = makeRecords(
+          info.record, info.kind == PIKORT_BUFFER ? 64 : 1, info.name);
+  }
+}
+
+std::vector<Field> Run::getFields(int32_t index) {
+  pikort_record_info record;
+  check(pikort_get_record(pipeline, index, &record));
+  std::vector<Field> fields;
+  for (int32_t f = 0; f < record.field_count; ++f) {
+    pikort_field_info field;
+    check(pikort_get_field(pipeline, index, f, &field));
+    fields.push_back(
+        {field.name, field.offset, field.elements, field.stride, field.type});
+  }
+  return fields;
+}
+
+std::string Run::makeRecords(int32_t index, int64_t count,
+                             const std::string &who) {
+  pikort_record_info record;
+  check(pikort_get_record(pipeline, index, &record));
+  std::string bytes(size_t(record.size * count), '\0');
+  unsigned hash = input.seed;
+  for (char c : who)
+    hash = hash * 31 + unsigned(c);
+  Values values(hash, input.wide);
+  std::vector<Field> fields = getFields(index);
+  for (int64_t i = 0; i < count; ++i)
+    for (const Field &field : fields)
+      for (int64_t e = 0; e < field.elements; ++e) {
+        char *at =
+            &bytes[size_t(i * record.size + field.offset + e * field.stride)];
+        values.make(field.type, at);
+        if (field.name == "serial")
+          std::memcpy(at, &i, size_t(1) << (field.type - PIKORT_I8));
+      }
+  return bytes;
+}
+
+void Run::bind() {
+  for (int32_t i = 0; i < pikort_state_count(pipeline); ++i) {
+    pikort_state_info info;
+    check(pikort_get_state_info(pipeline, i, &info));
+    if (!initial.count(info.name))
+      continue;
+    std::string &bytes = memory[info.name] = initial[info.name];
+    pikort_record_info record;
+    check(pikort_get_record(pipeline, info.record, &record));
+    if (info.kind == PIKORT_CONSTANT)
+      check(pikort_bind_constant(pipeline, info.name, bytes.data(),
+                                 int64_t(bytes.size())));
+    else
+      check(pikort_bind_buffer(pipeline, info.name, bytes.data(),
+                               int64_t(bytes.size()) / record.size,
+                               record.size));
+  }
+}
+
+Result Run::operator()(int threads) {
+  bind();
+  check(pikort_set_threads(pipeline, threads));
+  Result result;
+  if (pikort_run(pipeline) != PIKORT_OK) {
+    result.error = pikort_message(pipeline);
+    return result;
+  }
+  for (int32_t i = 0; i < pikort_state_count(pipeline); ++i) {
+    pikort_state_info info;
+    check(pikort_get_state_info(pipeline, i, &info));
+    pikort_view view;
+    check(pikort_get_view(pipeline, info.name, &view));
+    int64_t bytes = view.record_size;
+    for (int64_t extent : view.extent)
+      bytes *= extent;
+    if (!bytes)
+      continue;
+    Records &records = result.state[info.name];
+    records.bytes.assign(static_cast<const char *>(view.data), size_t(bytes));
+    records.size = view.record_size;
+    records.fields = getFields(view.record);
+  }
+  return result;
+}

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// A pipeline with made-up input, which follows from the case's seed and from
+// names, not from the order of declarations: integer fields are whole numbers
+// from 0 to 63, floats multiples of 1/64 in [-8, 72), bytes 0 or 1. Of wide
+// input that is half; the rest is any number, the special ones among them. An
+// integer field of the name `serial` numbers the primitives. Buffers that no
+// source sizes get 64 elements, constants one value.
+
+#ifndef PIKO_TEST_TOOLS_PIKO_COMPARE_RUN_H
+#define PIKO_TEST_TOOLS_PIKO_COMPARE_RUN_H
+
+#include "Options.h"
+#include "Programs.h"
+#include "Result.h"
+
+class Run {
+public:
+  Run(Program program, const Case &input);
+  ~Run() { pikort_destroy(pipeline); }
+  Run(const Run &) = delete;
+
+  Result operator()(int threads);
+
+private:
+  void check(int32_t status);
+  std::vector<Field> getFields(int32_t record);
+  std::string makeRecords(int32_t record, int64_t count,
+                          const std::string &who);
+  void bind();
+
+  Program program;
+  const Case &input;
+  pikort_pipeline *pipeline = nullptr;
+  std::map<std::string, std::string> initial, memory;
+};
+
+#endif // PIKO_TEST_TOOLS_PIKO_COMPARE_RUN_H
