@@ -79,7 +79,7 @@ struct Programs::Implementation {
 std::unique_ptr<PipelineFile>
 Programs::Implementation::parse(const std::string &file,
                                 const std::string &pipe) {
-  CompileOptions options{.file = file, .pipeName = pipe};
+  CompileOptions options{.file = file, .pipeName = pipe, .check = check};
   std::unique_ptr<PipelineFile> parsed =
       PipelineFile::parse(file, getFrontendOptions(options), context);
   if (!parsed)
@@ -90,7 +90,7 @@ Programs::Implementation::parse(const std::string &file,
 /// Divides the pipelines of an `.mlir` file.
 void Programs::Implementation::readText(const std::string &file,
                                         const std::string &pipe) {
-  CompileOptions options{.file = file, .pipeName = pipe};
+  CompileOptions options{.file = file, .pipeName = pipe, .check = check};
   FailureOr<std::vector<std::string>> names =
       readPipelineNames(options, context);
   if (failed(names))

@@ -1,0 +1,124 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+"""Compares random pipelines with the reference executor.
+
+  piko-random.py run --tool build/bin/piko-compare --count 10000 --seed 1
+  piko-random.py show --seed 17
+  piko-random.py reduce --tool build/bin/piko-compare --seed 17 --out FILE
+
+A pipeline follows from its number alone: `run --seed 1 --count 100` makes those
+from 1 to 100. `run` says which failed and how often each feature was used; each
+failure can then be shown, or reduced to a short file. Features are left out with
+`--without lists,sync`, or named with `--features`. With `--mlir` each pipeline is
+written in the dialect, too, and that is compiled in place of the C++.
+"""
+
+import argparse
+import concurrent.futures
+import sys
+import time
+from collections import Counter
+
+import cpp
+import pipelines
+from reducer import reduce
+from runner import BLANK, EQUAL, Runner, case_of
+
+
+def features_of(args):
+    chosen = set(args.features.split(",") if args.features else pipelines.FEATURES)
+    left_out = set(args.without.split(",")) if args.without else set()
+    for name in chosen | left_out:
+        if name not in pipelines.FEATURES:
+            sys.exit(f"expected a feature, but got '{name}'; there are: "
+                     + ", ".join(pipelines.FEATURES))
+    return chosen - left_out - (
+        pipelines.CPP_ONLY | pipelines.NOT_IN_TEXT if args.mlir else set())
+
+
+def run_batch(args, first, count):
+    features = features_of(args)
+    pipes = [pipelines.generate(first + i, features, f"P{i}") for i in range(count)]
+    verdicts = Runner(args.tool, args.mlir).run(pipes)
+    used = Counter()
+    for pipe in pipes:
+        used.update(pipe.used)
+    return first, verdicts, used
+
+
+def command_run(args):
+    start = time.time()
+    used, blank, stopped, failures, done = Counter(), 0, 0, [], 0
+    batches = [(first, min(args.batch, args.seed + args.count - first))
+               for first in range(args.seed, args.seed + args.count, args.batch)]
+    with concurrent.futures.ProcessPoolExecutor(args.jobs) as pool:
+        futures = [pool.submit(run_batch, args, *b) for b in batches]
+        for future in concurrent.futures.as_completed(futures):
+            first, verdicts, batch_used = future.result()
+            used.update(batch_used)
+            for i, verdict in enumerate(verdicts):
+                done += 1
+                if verdict == BLANK:
+                    blank += 1
+                elif verdict.startswith("the reference stops"):
+                    stopped += 1
+                elif verdict != EQUAL:
+                    failures.append(first + i)
+                    print(f"pipeline {first + i}: {verdict[:1500]}", flush=True)
+    if args.table:
+        for name, count in sorted(used.items()):
+            print(f"  {count:6} {name}")
+    expected = [f for f in features_of(args) if f not in used and f not in
+                ("gather", "parallelFor", "collecting", "cycles", "dynamic-elements",
+                 "collectives")]
+    print(f"{done} pipelines from {args.seed} on in {time.time() - start:.0f} s: "
+          f"{len(failures)} failed, {blank} wrote nothing, {stopped} stopped with an "
+          f"error in both")
+    if expected and args.count >= 500:
+        print("never used: " + ", ".join(sorted(expected)))
+    if failures:
+        print("failed: " + " ".join(map(str, failures)))
+    return 1 if failures else 0
+
+
+def command_show(args):
+    pipe = pipelines.generate(args.seed, features_of(args), "P0")
+    print(f"// piko-compare FILE {case_of(pipe)}")
+    print(cpp.write_file([pipe]))
+    return 0
+
+
+def command_reduce(args):
+    pipe = pipelines.generate(args.seed, features_of(args), "P0")
+    text = reduce(pipe, Runner(args.tool, args.mlir, timeout=60), log=sys.stderr)
+    if text is None:
+        print("it does not fail")
+        return 1
+    with open(args.out, "w") as file:
+        file.write(text)
+    print(f"wrote {args.out}, {len(text.splitlines())} lines")
+    return 0
+
+
+def main():
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("command", choices=["run", "show", "reduce"])
+    parser.add_argument("--tool", default="build/bin/piko-compare")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--count", type=int, default=200)
+    parser.add_argument("--batch", type=int, default=50, help="pipelines in a file")
+    parser.add_argument("--jobs", type=int, help="files at a time (all cores)")
+    parser.add_argument("--features", default="")
+    parser.add_argument("--without", default="")
+    parser.add_argument("--table", action="store_true", help="count the features")
+    parser.add_argument("--mlir", action="store_true",
+                        help="compile the text of the dialect, not C++")
+    parser.add_argument("--out", default="reduced.cpp")
+    args = parser.parse_args()
+    return {"run": command_run, "show": command_show, "reduce": command_reduce}[
+        args.command](args)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

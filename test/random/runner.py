@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+"""Runs piko-compare on a file of pipelines and says how each of them ended."""
+
+import re
+import subprocess
+import tempfile
+from pathlib import Path
+
+import cpp
+import dialect
+
+EQUAL, BLANK = "equal", "equal, but blank"
+
+
+def case_of(pipe):
+    return (f"--pipe {pipe.name} --domain {' '.join(map(str, pipe.domain))} "
+            f"--count {' '.join(map(str, pipe.counts))} --seed {pipe.input_seed} --wide")
+
+
+def kind_of(verdict):
+    """What makes two failures the same one: the words without what varies."""
+    first = verdict.splitlines()[0] if verdict else ""
+    if "differs" in verdict:
+        return "differs"
+    first = next((l for l in verdict.splitlines() if "error:" in l and ".cpp:" in l
+                  or "expected:" in l or "got:" in l), first)
+    first = re.sub(r"^.*?(error:|got:|expected:)", r"\1", first)
+    return re.sub(r"'[^']*'|\d+", "", first)
+
+
+class Runner:
+    """With `text` what is compiled is the text of the dialect, not the C++."""
+
+    def __init__(self, tool, text=False, threads=(1, 2, 7), timeout=120):
+        self.tool, self.text = tool, text
+        self.threads, self.timeout = threads, timeout
+
+    def run(self, pipes):
+        """The verdict on each pipeline, in their order."""
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / "pipelines.cpp"
+            file.write_text(cpp.write_file(pipes))
+            if self.text:
+                file.with_suffix(".mlir").write_text(dialect.write_file(pipes))
+            verdicts = self.compare(file, pipes)
+            # A crash ends the process, and the pipelines behind it wait.
+            while len(verdicts) < len(pipes):
+                verdicts += self.compare(file, pipes[len(verdicts):])
+            return verdicts
+
+    def compare(self, file, pipes):
+        """At least one verdict, in order; the last one may be of a crash."""
+        cases = file.with_suffix(".cases")
+        cases.write_text("".join(case_of(p) + "\n" for p in pipes))
+        try:
+            done = subprocess.run(
+                [self.tool, file.with_suffix(".mlir") if self.text else file,
+                 "--reference", file, "--cases", cases, "--runs", "1", "--timeout",
+                 str(self.timeout), "--threads", *map(str, self.threads)],
+                stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                errors="replace", timeout=self.timeout * 20)
+            output, errors, status = done.stdout, done.stderr, done.returncode
+        except subprocess.TimeoutExpired:
+            output, errors, status = "", "", -14
+        verdicts = []
+        for line in output.splitlines():
+            if re.fullmatch(r"P\d+:", line):
+                verdicts.append("")
+            elif verdicts:
+                verdicts[-1] += line + "\n"
+        verdicts = [v.strip() for v in verdicts]
+        if len(verdicts) == len(pipes) and verdicts[-1]:
+            return verdicts
+        if verdicts:  # the last one did not end
+            verdicts[-1] = f"error: the process ended with status {status}\n{errors[-2000:]}"
+            return verdicts
+        if len(pipes) == 1:
+            return [f"error: status {status}\n{errors[-3000:]}"]
+        # Something in the file itself: divide it.
+        half = len(pipes) // 2
+        return self.run(pipes[:half]) + self.run(pipes[half:])
