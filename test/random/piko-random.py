@@ -90,14 +90,15 @@ def command_show(args):
 
 def command_reduce(args):
     pipe = pipelines.generate(args.seed, features_of(args), "P0")
-    text = reduce(pipe, Runner(args.tool, args.mlir, timeout=60), log=sys.stderr)
+    text = None
+    # What there is stays if it is stopped.
+    for text in reduce(pipe, Runner(args.tool, args.mlir, timeout=60)):
+        with open(args.out, "w") as file:
+            file.write(text)
+        print(f"{args.out}: {len(text.splitlines())} lines", flush=True)
     if text is None:
         print("it does not fail")
-        return 1
-    with open(args.out, "w") as file:
-        file.write(text)
-    print(f"wrote {args.out}, {len(text.splitlines())} lines")
-    return 0
+    return 0 if text else 1
 
 
 def main():

@@ -340,11 +340,17 @@ def try_edits(pipe, edits, runner, kind):
     return [(e, p) for (e, p), v in zip(candidates, verdicts) if kind_of(v) == kind]
 
 
-def reduce(pipe, runner, log):
-    """A file with what is left of a pipeline that fails; None if it does not."""
+def write(pipe, verdict):
+    comment = "".join(f"// {line}\n" for line in verdict.splitlines()[:6])
+    return f"// piko-compare %s {case_of(pipe)}\n{comment}" + cpp.write_file([pipe])
+
+
+def reduce(pipe, runner):
+    """Ever shorter files that fail as a pipeline does; none if it does not."""
     verdict = runner.run([pipe])[0]
     if verdict.startswith(("equal", "the reference stops")):
-        return None
+        return
+    yield write(pipe, verdict)
     kind = kind_of(verdict)
     progress = True
     while progress:
@@ -369,10 +375,8 @@ def reduce(pipe, runner, log):
             pipe = min([p for _, p in good + together], key=size)
             pipe.name = "P0"
             progress = True
-            print(f"{len(cpp.write_file([pipe]).splitlines())} lines", file=log, flush=True)
+            yield write(pipe, verdict)
             place = at / len(edits)
             edits = list(edits_of(pipe))
             at = int(place * len(edits))
-    verdict = runner.run([pipe])[0]
-    comment = "".join(f"// {line}\n" for line in verdict.splitlines()[:6])
-    return (f"// piko-compare %s {case_of(pipe)}\n{comment}" + cpp.write_file([pipe]))
+    yield write(pipe, runner.run([pipe])[0])
