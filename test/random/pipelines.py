@@ -32,7 +32,7 @@ CPP_ONLY = {"maths", "loop-jumps", "early-returns", "switches", "lambdas", "help
             "template-stages", "bit-tricks", "dynamic-elements", "local-arrays"}
 
 #: What the printer of the dialect does not write yet.
-NOT_IN_TEXT = {"lists", "parallelFor", "gather", "dynamic-schedule"}
+NOT_IN_TEXT = {"lists", "parallelFor", "gather", "dynamic-schedule", "fetch-atomics"}
 
 DOMAINS = {1: [1, 3, 7, 40, 65], 2: [1, 3, 7, 13, 17], 3: [1, 2, 5, 7], 4: [1, 2, 3, 5]}
 LIMIT = 20000  # calls of Process, about
