@@ -25,7 +25,7 @@ FEATURES = [
     "collectives", "gather", "cycles", "unordered", "fetch-atomics", "float-atomics",
     "updates", "atomics", "stores", "maths", "bit-tricks", "float-specials",
     "dynamic-elements", "loop-jumps", "early-returns", "switches", "lambdas",
-    "helpers", "template-stages", "twin-stages", "local-arrays",
+    "helpers", "template-stages", "local-arrays",
 ]
 #: What the dialect's printer does not write: C++ that the front end removes.
 CPP_ONLY = {"maths", "loop-jumps", "early-returns", "switches", "lambdas", "helpers",
