@@ -11,6 +11,7 @@
 #include "mlir/Dialect/MemRef/IR/MemRef.h"
 #include "mlir/Dialect/SCF/IR/SCF.h"
 #include "mlir/Dialect/SCF/Transforms/Patterns.h"
+#include "mlir/Dialect/UB/IR/UBOps.h"
 
 namespace piko {
 #define GEN_PASS_DEF_CONVERTPIKOTOLLVM
@@ -41,6 +42,18 @@ struct SelectLowering : OpConversionPattern<arith::SelectOp> {
   matchAndRewrite(arith::SelectOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
     rewriter.replaceOpWithNewOp<arith::SelectOp>(op, adaptor.getOperands());
+    return success();
+  }
+};
+
+/// A primitive that a branch does not give.
+struct PoisonLowering : OpConversionPattern<ub::PoisonOp> {
+  using OpConversionPattern::OpConversionPattern;
+  LogicalResult
+  matchAndRewrite(ub::PoisonOp op, OpAdaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    rewriter.replaceOpWithNewOp<ub::PoisonOp>(
+        op, typeConverter->convertType(op.getType()), op.getValue());
     return success();
   }
 };
@@ -104,13 +117,13 @@ LogicalResult ConvertPikoToLLVMPass::convert(PipelineOp pipeline,
   ConversionTarget target(getContext());
   target.addIllegalDialect<PikoDialect>();
   target.markUnknownOpDynamicallyLegal([](Operation *) { return true; });
-  target.addDynamicallyLegalOp<arith::SelectOp>(
+  target.addDynamicallyLegalOp<arith::SelectOp, ub::PoisonOp>(
       [&](Operation *op) { return converter.isLegal(op); });
   RewritePatternSet patterns(&getContext());
   // Primitives are chosen, and carried around loops, like numbers.
   scf::populateSCFStructuralTypeConversionsAndLegality(converter, patterns,
                                                        target);
-  patterns.add<SelectLowering>(converter, &getContext());
+  patterns.add<SelectLowering, PoisonLowering>(converter, &getContext());
   populateKernelToLLVMPatterns(converter, patterns, context);
   populateStateToLLVMPatterns(converter, patterns, context);
   populateChecksToLLVMPatterns(converter, patterns, context);

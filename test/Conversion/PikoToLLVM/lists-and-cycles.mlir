@@ -10,8 +10,10 @@ piko.record @F {"x" : i32 at 0, "v" : f32 at 4} size 8 align 4
 // CHECK:         %[[STATUS:.*]] = llvm.call @pikoir_status(%[[P]])
 // CHECK:         return %[[STATUS]]
 
-// A call is an entry of 24 bytes: its bin, and its positions.
+// A call is an entry of 24 bytes: its bin, and its positions. A primitive is a
+// pointer, also one that no branch gives.
 // CHECK-LABEL: func.func private @P.kernel_a
+// CHECK:         ub.poison : !llvm.ptr
 // CHECK:         %[[ZEROS:.*]] = llvm.mlir.addressof @piko.zeros
 // CHECK:         %[[INPUT:.*]] = llvm.select
 // CHECK:         llvm.getelementptr inbounds %[[INPUT]][56]
@@ -106,7 +108,19 @@ piko.pipeline @P rank 1 {
       %zeros = piko.no_item : !piko.prim<@F>
       scf.yield %zeros : !piko.prim<@F>
     }
-    %address = piko.to_address %p : !piko.prim<@F>
+    %unset = ub.poison : !piko.prim<@F>
+    %r = scf.index_switch %b -> !piko.prim<@F>
+    case 1 {
+      scf.yield %p : !piko.prim<@F>
+    }
+    case 2 {
+      %item = piko.item %bins[%u] : !piko.bins<@F> -> !piko.prim<@F>
+      scf.yield %item : !piko.prim<@F>
+    }
+    default {
+      scf.yield %unset : !piko.prim<@F>
+    }
+    %address = piko.to_address %r : !piko.prim<@F>
     %q = piko.from_address %address : !piko.prim<@F>
     %x = piko.get %q "x" : !piko.prim<@F> -> i32
     %v = piko.get %q "v" : !piko.prim<@F> -> f32
