@@ -13,7 +13,8 @@
 #include <piko.h>
 #include <piko/scene.h>
 
-#include "clip.h"
+#include "../common/clip.h"
+#include "../common/lighting.h"
 
 using namespace piko::scene;
 
@@ -121,12 +122,8 @@ struct FragmentShader : piko::Stage<Bin, Bin, 64, Fragment, ShadedFragment>,
   void process(const Fragment &f) {
     glm::vec3 n = glm::normalize(f.normal);
     glm::vec3 sum(state().settings.ambient);
-    for (int64_t i = 0; i < state().lights.size(); ++i) {
-      const Light &light = state().lights[i];
-      glm::vec3 l = glm::vec3(light.position) - light.position.w * f.position;
-      float facing = glm::max(0.0f, glm::dot(n, l));
-      sum += glm::vec3(light.color) * (facing / glm::sqrt(glm::dot(l, l)));
-    }
+    for (int64_t i = 0; i < state().lights.size(); ++i)
+      sum += irradiance(state().lights[i], f.position, n);
     this->emit(ShadedFragment{f.pixel, f.depth, state().settings.albedo * sum},
                0);
   }

@@ -5,7 +5,7 @@
 // is compared with a check in 128-bit integers of the corners as meant.
 //
 //===----------------------------------------------------------------------===//
-#include "clip.h"
+#include "common/clip.h"
 
 #include <gtest/gtest.h>
 

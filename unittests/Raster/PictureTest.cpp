@@ -1,6 +1,6 @@
 //===- PictureTest.cpp - The rasterizer under the reference executor ------===//
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
-#include "raster.piko.cpp"
+#include "raster/raster.piko.cpp"
 
 #include <gtest/gtest.h>
 

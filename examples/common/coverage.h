@@ -10,8 +10,8 @@
 // for images of up to 16384 pixels a side; edge functions are then below 2^57.
 //
 //===----------------------------------------------------------------------===//
-#ifndef RASTER_COVERAGE_H
-#define RASTER_COVERAGE_H
+#ifndef COMMON_COVERAGE_H
+#define COMMON_COVERAGE_H
 
 #include <piko.h>
 
@@ -86,4 +86,4 @@ inline PixelBox pixelsBetween(Point lo, Point hi) {
 
 } // namespace raster
 
-#endif // RASTER_COVERAGE_H
+#endif // COMMON_COVERAGE_H

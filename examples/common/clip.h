@@ -10,8 +10,8 @@
 // seen from the inside, so that neighbours are cut at the same point.
 //
 //===----------------------------------------------------------------------===//
-#ifndef RASTER_CLIP_H
-#define RASTER_CLIP_H
+#ifndef COMMON_CLIP_H
+#define COMMON_CLIP_H
 
 #include "coverage.h"
 
@@ -214,4 +214,4 @@ private:
 
 } // namespace raster
 
-#endif // RASTER_CLIP_H
+#endif // COMMON_CLIP_H
