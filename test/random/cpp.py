@@ -304,7 +304,7 @@ class CppPrinter:
         self.line(f"{TYPES[s.type]} {s.name}[{s.length}];")
 
     def s_Set(self, s):
-        at = self.e(s.at) if isinstance(s.at, Var) else \
+        at = self.e(s.at) if isinstance(s.at, Var) and s.at.solid else \
             f"uint32_t({self.e(s.at)}) % {s.length}u"
         self.line(f"{s.array}[{at}] = {self.e(s.value)};")
 

@@ -68,7 +68,8 @@ def command_run(args):
     if args.table:
         for name, count in sorted(used.items()):
             print(f"  {count:6} {name}")
-    expected = [f for f in features_of(args) if f not in used and f not in
+    expected = [f for f in features_of(args)
+                if not any(name.startswith(f) for name in used) and f not in
                 ("gather", "parallelFor", "collecting", "cycles", "dynamic-elements",
                  "collectives")]
     print(f"{done} pipelines from {args.seed} on in {time.time() - start:.0f} s: "
