@@ -81,8 +81,15 @@ static std::optional<Kind> getKind(mlir::Operation *op) {
   return std::nullopt;
 }
 
+llvm::StringRef piko::getBracketEnd(CallOp begin) {
+  std::optional<Kind> kind = getKind(begin);
+  if (!kind)
+    return "";
+  return *kind == Kind::Update ? updateEndName : combineEndName;
+}
+
 LogicalResult Bracket::findEnd() {
-  llvm::StringRef name = kind == Kind::Update ? updateEndName : combineEndName;
+  llvm::StringRef name = getBracketEnd(begin);
   for (auto &op :
        llvm::make_range(std::next(begin->getIterator()), block->end())) {
     if (getKind(&op))
@@ -93,8 +100,8 @@ LogicalResult Bracket::findEnd() {
         return success();
       }
   }
-  return mlir::emitError(begin.getLoc(), "not supported in Piko: leaving ")
-         << getName() << " other than at its end";
+  return mlir::emitError(begin.getLoc(), "not supported in Piko: ")
+         << getName() << " that never ends";
 }
 
 /// Reports what cannot be done in between.

@@ -31,6 +31,10 @@ llvm::LogicalResult structurePhase(mlir::func::FuncOp function);
 /// Makes piko.update, piko.reduce and piko.scan of their placeholders.
 llvm::LogicalResult resolveBrackets(mlir::func::FuncOp function);
 
+/// The name of the placeholder that ends what this one begins; empty if it
+/// begins nothing.
+llvm::StringRef getBracketEnd(mlir::func::CallOp begin);
+
 /// The placeholders: calls of functions that do not exist.
 constexpr llvm::StringLiteral updateBeginName = "piko.update_begin.";
 constexpr llvm::StringLiteral updateEndName = "piko.update_end";

@@ -11,8 +11,10 @@
 // RUN: not piko-translate --cpp-to-piko -DCASE=8 %s 2>&1 | FileCheck %s --check-prefix=ASM
 // RUN: not piko-translate --cpp-to-piko -DCASE=9 %s 2>&1 | FileCheck %s --check-prefix=PORT
 // RUN: not piko-translate --cpp-to-piko -DCASE=10 %s 2>&1 | FileCheck %s --check-prefix=NESTED
-// RUN: not piko-translate --cpp-to-piko -DCASE=11 %s 2>&1 | FileCheck %s --check-prefix=VIRTUAL
-// RUN: not piko-translate --cpp-to-piko -DCASE=12 %s 2>&1 | FileCheck %s --check-prefix=SYNTAX
+// RUN: not piko-translate --cpp-to-piko -DCASE=11 %s 2>&1 | FileCheck %s --check-prefix=BRANCH
+// RUN: not piko-translate --cpp-to-piko -DCASE=12 %s 2>&1 | FileCheck %s --check-prefix=ENDLESS
+// RUN: not piko-translate --cpp-to-piko -DCASE=13 %s 2>&1 | FileCheck %s --check-prefix=VIRTUAL
+// RUN: not piko-translate --cpp-to-piko -DCASE=14 %s 2>&1 | FileCheck %s --check-prefix=SYNTAX
 #include <piko.h>
 
 struct A {
@@ -70,6 +72,19 @@ struct Stage : piko::Stage<0, 0, 1, A, A>, piko::Uses<State> {
       update(state().image, glm::ivec2(1), [&](A &q) { q.x = p.x; });
     });
 #elif CASE == 11
+    update(state().image, glm::ivec2(0), [&](A &p) {
+      if (p.x < a.x) {
+        // BRANCH: errors-unsupported.cpp:[[#@LINE + 1]]:9: error: not supported in Piko: an update inside an update
+        update(state().image, glm::ivec2(1), [&](A &q) { q.x = p.x; });
+      }
+    });
+#elif CASE == 12
+    // ENDLESS: errors-unsupported.cpp:[[#@LINE + 1]]:5: error: not supported in Piko: an update that never ends
+    update(state().image, glm::ivec2(0), [&](A &p) {
+      for (;;)
+        p.x += a.x;
+    });
+#elif CASE == 13
     out.x = getArea(reinterpret_cast<const Shape *>(&a));
 #else
     // SYNTAX: errors-unsupported.cpp:[[#@LINE + 1]]:7: error: no member named 'q' in 'A'
