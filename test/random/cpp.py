@@ -256,7 +256,8 @@ class CppPrinter:
         self.block(s.body, f"for (int {s.var} = 0; {s.var} < {bound}; ++{s.var})")
 
     def s_Jump(self, s):
-        self.line(s.kind + ";")
+        value = f" {TYPES[s.value.type]}({self.e(s.value)})" if s.value else ""
+        self.line(s.kind + value + ";")
 
     def s_Switch(self, s):
         self.line(f"switch (uint32_t({self.e(s.value)}) % {len(s.cases)}u) {{")

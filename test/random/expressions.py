@@ -31,7 +31,7 @@ class Scope:
         self.maker, self.phase, self.outer = maker, phase, outer
         self.variables, self.records, self.arrays = [], [], []
         for name in ("level", "updating", "loops", "bins", "reads", "stage",
-                     "uniform", "multiplicity", "syncs", "has_size", "is_pure"):
+                     "uniform", "multiplicity", "syncs", "has_size", "is_pure", "returns"):
             setattr(self, name, getattr(outer, name) if outer else None)
         for name, value in changes.items():
             setattr(self, name, value)

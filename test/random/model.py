@@ -239,9 +239,10 @@ class For(Stmt):
 
 @dataclass(eq=False)
 class Jump(Stmt):
-    """break, continue or return."""
+    """break, continue, or return, out of an update with its result."""
 
     kind: str
+    value: Expr = None
 
 
 @dataclass(eq=False)

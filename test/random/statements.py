@@ -43,8 +43,7 @@ class Statements(Expressions):
         kinds = ["let"] * 4 + ["assign"] * 3
         if depth > 0:
             kinds += ["if"] * 2 + ["for"]
-            # The front end refuses some updates that jump.
-            if self.on("switches") and not scope.syncs and not scope.updating:
+            if self.on("switches") and not scope.syncs:
                 kinds.append("switch")
         if scope.phase == "process" and not scope.updating:
             kinds += ["emit"] * 4 + ["write"] * 3
@@ -54,7 +53,7 @@ class Statements(Expressions):
                 kinds += ["update"] * 3
         if self.on("lambdas"):
             kinds.append("lambda")
-        if self.on("helpers") and not scope.updating:
+        if self.on("helpers"):
             kinds.append("helper")
         return getattr(self, "make_" + r.choice(kinds))(scope, depth)
 
@@ -84,6 +83,10 @@ class Statements(Expressions):
                 and not scope.updating and scope.phase == "process" and scope.level == 0:
             self.use("early-returns")
             then.append(Jump("return"))
+        elif scope.updating and self.on("early-returns") and r.random() < 0.3:
+            self.use("update-returns")
+            value = self.expr(scope.returns, scope, 2) if scope.returns else None
+            then.append(Jump("return", value))
         elif scope.loops and self.on("loop-jumps") and r.random() < 0.4:
             self.use("loop-jumps")
             then.append(Jump(r.choice(["break", "continue"])))
@@ -225,30 +228,30 @@ class Statements(Expressions):
         self.use("updates")
         r = self.random
         px = self.fresh("px")
-        inner = self.inside(scope, updating=True, loops=None)
+        kind = r.choice(["b1", "i32", "f32", "u64"]) if r.random() < 0.5 else None
+        inner = self.inside(scope, updating=True, loops=None, returns=kind)
         inner.records = [(px, image.record)]
         body = []
         for leaf in image.record.leaves:
             # Not commutative, and loses nothing.
             index = Lit("i32", r.randrange(leaf.count)) if leaf.count else None
-            kind = wide(leaf.kind)
-            old = Get(kind, px, leaf, index)
-            if kind == "b1":
+            type = wide(leaf.kind)
+            old = Get(type, px, leaf, index)
+            if type == "b1":
                 value = Op("b1", "!=", [old, self.expr("b1", inner, 2)])
-            elif kind in FLOATS:
-                half = Op(kind, "*", [old, Lit(kind, 0.5)])
-                value = Op(kind, "+", [half, self.expr(kind, inner, 2)])
+            elif type in FLOATS:
+                half = Op(type, "*", [old, Lit(type, 0.5)])
+                value = Op(type, "+", [half, self.expr(type, inner, 2)])
             else:
-                old = Op(kind, "*", [old, Lit(kind, 31)])
-                value = Op(kind, "+", [old, self.expr(kind, inner, 2)])
+                old = Op(type, "*", [old, Lit(type, 31)])
+                value = Op(type, "+", [old, self.expr(type, inner, 2)])
             body.append(Put(px, leaf, value, index))
         if r.random() < 0.4:
             body = [If(self.expr("b1", inner, 2), body)] + self.body(
-                self.inside(inner), r.randint(0, 2), 1)
+                self.inside(inner), r.randint(0, 2), 2)
         result, name = None, ""
-        if r.random() < 0.5:
+        if kind:
             self.use("update-results")
-            kind = r.choice(["b1", "i32", "f32", "u64"])
             result, name = self.expr(kind, inner, 2), self.fresh("v")
             scope.variables.append((name, kind))
         return [Update(image, at, body, result, name)]
