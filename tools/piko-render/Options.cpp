@@ -30,6 +30,7 @@ it, and says how long a frame took.
                          -z)
   --fovy DEGREES         field of view from bottom to top (45)
   --cull                 leave out back faces
+  --ground               put a square under the scene
 
   --check[=nan:RECORD.FIELD,...]   check the rules of state on one thread, and
                          that these fields are never NaN
@@ -88,6 +89,7 @@ private:
         {"--at", [&] { options.view.at = vector(name); }},
         {"--fovy", [&] { options.view.fovy = float(number(name)); }},
         {"--cull", [&] { options.cull = true; }},
+        {"--ground", [&] { options.ground = true; }},
         {"--threads", [&] { options.threads = integer(name, 0, 10000); }},
         {"--warmup", [&] { options.warmup = integer(name, 0, maxInt); }},
         {"--frames", [&] { options.frames = integer(name, 1, maxInt); }},

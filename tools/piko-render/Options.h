@@ -17,6 +17,7 @@ struct Options {
   ViewOptions view;
   int lights = 1;
   bool cull = false;
+  bool ground = false;
   int threads = 0;
   int warmup = 5, frames = 30;
   double seconds = 1000;

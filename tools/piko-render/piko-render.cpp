@@ -49,6 +49,8 @@ Result<SceneInput> loadScene(const Options &options) {
   auto mesh = loadMesh(options.scene, [&](double part) { bar.update(part); });
   if (!mesh)
     return mesh.error();
+  if (options.ground)
+    addGround(*mesh);
   Sphere bounds = boundingSphere(*mesh);
   auto camera = makeCamera(options.view, bounds);
   if (!camera)

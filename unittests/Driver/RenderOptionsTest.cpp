@@ -16,14 +16,15 @@ std::string errorOf(std::vector<std::string> words) {
 
 TEST(RenderOptions, AllOfThem) {
   auto o = parseOptions(
-      {"--pipe",   "Binned",    "a.piko.cpp", "--width",   "320",
-       "--height", "200",       "--lights",   "7",         "--eye",
-       "1",        "-2",        "3e1",        "--at",      "0",
-       "0.5",      "0",         "--fovy",     "60",        "--cull",
-       "--target", "reference", "--threads",  "2",         "--warmup",
-       "0",        "--frames",  "4",          "--seconds", "2.5",
-       "--out",    "o.exr",     "--json",     "-I",        "inc",
-       "-Iother",  "-DX=1",     "-D",         "Y",         "scene.obj"});
+      {"--pipe",   "Binned",   "a.piko.cpp", "--width",   "320",
+       "--height", "200",      "--lights",   "7",         "--eye",
+       "1",        "-2",       "3e1",        "--at",      "0",
+       "0.5",      "0",        "--fovy",     "60",        "--cull",
+       "--ground", "--target", "reference",  "--threads", "2",
+       "--warmup", "0",        "--frames",   "4",         "--seconds",
+       "2.5",      "--out",    "o.exr",      "--json",    "-I",
+       "inc",      "-Iother",  "-DX=1",      "-D",        "Y",
+       "scene.obj"});
   ASSERT_TRUE(o) << o.error().message;
   EXPECT_EQ(o->pipeline, "a.piko.cpp");
   EXPECT_EQ(o->scene, "scene.obj");
@@ -37,7 +38,7 @@ TEST(RenderOptions, AllOfThem) {
   EXPECT_EQ(*o->view.eye, glm::vec3(1, -2, 30));
   EXPECT_EQ(*o->view.at, glm::vec3(0, 0.5f, 0));
   EXPECT_EQ(o->lights, 7);
-  EXPECT_TRUE(o->cull && o->json && !o->help);
+  EXPECT_TRUE(o->cull && o->ground && o->json && !o->help);
   EXPECT_EQ(o->threads, 2);
   EXPECT_EQ(o->warmup, 0);
   EXPECT_EQ(o->frames, 4);

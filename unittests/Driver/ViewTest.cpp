@@ -54,6 +54,34 @@ TEST(View, ProjectionAgreesWithTheRays) {
               1e-5);
 }
 
+TEST(View, GroundLiesUnderTheSceneAndFacesUp) {
+  Mesh mesh;
+  mesh.vertices = {{{0, 5, 2}, {}, 0}, {{4, 1, 2}, {}, 1}, {{0, 1, 2}, {}, 2}};
+  mesh.triangles = {{{0, 1, 2}, 0}};
+  Sphere scene = boundingSphere(mesh);
+  addGround(mesh);
+  ASSERT_EQ(mesh.vertices.size(), 7u);
+  ASSERT_EQ(mesh.triangles.size(), 3u);
+  float area = 0;
+  for (int i = 1; i < 3; ++i) {
+    EXPECT_EQ(mesh.triangles[i].index, i);
+    glm::vec3 corner[3];
+    for (int j = 0; j < 3; ++j) {
+      const auto &v = mesh.vertices[mesh.triangles[i].vertex[j]];
+      EXPECT_EQ(v.position.y, 1);
+      EXPECT_EQ(v.normal, glm::vec3(0, 1, 0));
+      EXPECT_EQ(&mesh.vertices[v.index], &v);
+      EXPECT_NEAR(glm::abs(v.position.x - scene.center.x), 2 * scene.radius,
+                  1e-5);
+      corner[j] = v.position;
+    }
+    glm::vec3 up = glm::cross(corner[1] - corner[0], corner[2] - corner[0]);
+    EXPECT_GT(up.y, 0);
+    area += up.y / 2;
+  }
+  EXPECT_NEAR(area, 16 * scene.radius * scene.radius, 1e-3);
+}
+
 TEST(View, PlanesEncloseTheScene) {
   for (glm::vec3 eye : {glm::vec3(1, 2, 30), glm::vec3(1, 2, 4)}) {
     auto camera = makeCamera({.eye = eye, .at = sphere.center}, sphere);

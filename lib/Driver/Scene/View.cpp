@@ -1,4 +1,4 @@
-//===- View.cpp - Camera and lights that suit a scene ---------------------===//
+//===- View.cpp - Camera, lights and ground for a scene -------------------===//
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // Benchmarks compare pictures with those of other renderers, which place
@@ -56,6 +56,21 @@ Sphere render::boundingSphere(const Mesh &mesh) {
     sphere.radius = std::max(sphere.radius, std::sqrt(glm::dot(d, d)));
   }
   return sphere;
+}
+
+void render::addGround(Mesh &mesh) {
+  Sphere scene = boundingSphere(mesh);
+  float reach = 2 * scene.radius, height = scene.center.y;
+  for (const scene::Vertex &v : mesh.vertices)
+    height = std::min(height, v.position.y);
+  auto first = int32_t(mesh.vertices.size());
+  for (glm::vec2 corner : {glm::vec2(-1, -1), {-1, 1}, {1, 1}, {1, -1}})
+    mesh.vertices.push_back({{scene.center.x + corner.x * reach, height,
+                              scene.center.z + corner.y * reach},
+                             {0, 1, 0},
+                             int32_t(mesh.vertices.size())});
+  for (glm::ivec3 corners : {glm::ivec3(0, 1, 2), {0, 2, 3}})
+    mesh.triangles.push_back({corners + first, int32_t(mesh.triangles.size())});
 }
 
 Result<scene::Camera> render::makeCamera(const ViewOptions &options,

@@ -1,4 +1,4 @@
-//===- View.h - Camera and lights that suit a scene -------------*- C++ -*-===//
+//===- View.h - Camera, lights and ground for a scene -----------*- C++ -*-===//
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #ifndef PIKO_DRIVER_SCENE_VIEW_H
 #define PIKO_DRIVER_SCENE_VIEW_H
@@ -16,6 +16,10 @@ struct Sphere {
 
 /// The sphere about the middle of the bounding box that holds all vertices.
 Sphere boundingSphere(const Mesh &mesh);
+
+/// Puts a square under the scene, at its lowest vertex: level, seen from above,
+/// and four radii of the scene wide.
+void addGround(Mesh &mesh);
 
 struct ViewOptions {
   int width = 1024, height = 768; ///< of the image
