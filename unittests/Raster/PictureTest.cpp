@@ -2,51 +2,18 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #include "raster/raster.piko.cpp"
 
+#include "../Examples/TestScene.h"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstring>
-#include <random>
 #include <vector>
 
 namespace {
 
-struct Input {
-  std::vector<Vertex> vertices;
-  std::vector<Triangle> triangles;
-  std::vector<Light> lights;
-  Settings settings;
+using namespace test;
 
-  int addVertex(glm::vec3 position, glm::vec3 normal) {
-    vertices.push_back({position, normal, int32_t(vertices.size())});
-    return vertices.back().index;
-  }
-  void addTriangle(int a, int b, int c) {
-    triangles.push_back({{a, b, c}, int32_t(triangles.size())});
-  }
-};
-
-/// At the origin, looking along -z, 90 degrees wide and high.
-Camera makeCamera() {
-  Camera camera{};
-  const float nearZ = 0.25f, farZ = 100;
-  camera.eye = {0, 0, 0};
-  camera.forward = {0, 0, -1};
-  camera.right = {1, 0, 0};
-  camera.up = {0, 1, 0};
-  camera.nearZ = nearZ;
-  camera.farZ = farZ;
-  camera.viewProjection = glm::mat4(0);
-  camera.viewProjection[0][0] = 1;
-  camera.viewProjection[1][1] = 1;
-  camera.viewProjection[2][2] = -(farZ + nearZ) / (farZ - nearZ);
-  camera.viewProjection[2][3] = -1;
-  camera.viewProjection[3][2] = -2 * farZ * nearZ / (farZ - nearZ);
-  return camera;
-}
-
-template <class Pipeline>
-std::vector<Color> render(Input &input, int w, int h) {
+template <class Pipeline> Picture render(Input &input, int w, int h) {
   Pipeline pipeline;
   pipeline.setDomain({w, h});
   pipeline.state().camera = makeCamera();
@@ -55,40 +22,7 @@ std::vector<Color> render(Input &input, int w, int h) {
   pipeline.feed(pipeline.vertexShader, input.vertices);
   pipeline.feed(pipeline.rasterizer, input.triangles);
   pipeline.run();
-  const Color *pixels = pipeline.state().color.data();
-  return {pixels, pixels + size_t(w) * h};
-}
-
-/// A square of two triangles that faces the camera at a distance.
-void addSquare(Input &input, glm::vec2 center, float half, float distance,
-               glm::vec3 normal = {0, 0, 1}) {
-  int v[4];
-  for (int i = 0; i < 4; ++i) {
-    float x = i == 1 || i == 2 ? half : -half, y = i >= 2 ? half : -half;
-    v[i] = input.addVertex({center.x + x, center.y + y, -distance}, normal);
-  }
-  input.addTriangle(v[0], v[1], v[2]);
-  input.addTriangle(v[0], v[2], v[3]);
-}
-
-/// Triangles everywhere, also behind the camera and far outside of the view.
-Input makeSoup(int count) {
-  Input input;
-  std::mt19937 random(3);
-  std::uniform_real_distribution<float> d(-1, 1);
-  for (int i = 0; i < count; ++i) {
-    glm::vec3 center(8 * d(random), 8 * d(random), 8 * d(random) - 4);
-    float reach = i % 10 == 0 ? 6 : 0.7f;
-    int corner[3];
-    for (int &c : corner)
-      c = input.addVertex(
-          center + reach * glm::vec3(d(random), d(random), d(random)),
-          {d(random), d(random), d(random)});
-    input.addTriangle(corner[0], corner[1], corner[2]);
-  }
-  input.lights = {{{0, 0.6f, 0.8f, 0}, {0.7f, 0.6f, 0.5f, 0}},
-                  {{1, 2, 3, 1}, {0.2f, 0.3f, 0.4f, 0}}};
-  return input;
+  return copy(pipeline.state().color);
 }
 
 TEST(Picture, BinsDoNotChangeIt) {
@@ -98,10 +32,7 @@ TEST(Picture, BinsDoNotChangeIt) {
     // Neither extent is a multiple of a bin's.
     auto baseline = render<Baseline>(input, 203, 101);
     auto binned = render<Binned>(input, 203, 101);
-    ASSERT_EQ(baseline.size(), binned.size());
-    EXPECT_EQ(std::memcmp(baseline.data(), binned.data(),
-                          baseline.size() * sizeof(Color)),
-              0);
+    EXPECT_TRUE(equal(baseline, binned));
   }
 }
 
@@ -190,9 +121,7 @@ TEST(Picture, NaNTrianglesAreDropped) {
   input.addTriangle(v, v, v);
   input.addTriangle(0, 1, v);
   auto after = render<Binned>(input, 64, 48);
-  EXPECT_EQ(
-      std::memcmp(before.data(), after.data(), before.size() * sizeof(Color)),
-      0);
+  EXPECT_TRUE(equal(before, after));
 }
 
 } // namespace

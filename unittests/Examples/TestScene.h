@@ -1,0 +1,98 @@
+//===- TestScene.h - Scenes for tests of pipelines --------------*- C++ -*-===//
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+#ifndef PIKO_UNITTESTS_EXAMPLES_TESTSCENE_H
+#define PIKO_UNITTESTS_EXAMPLES_TESTSCENE_H
+
+#include <piko.h>
+#include <piko/scene.h>
+
+#include <cstring>
+#include <random>
+#include <vector>
+
+namespace test {
+
+using namespace piko::scene;
+
+struct Input {
+  std::vector<Vertex> vertices;
+  std::vector<Triangle> triangles;
+  std::vector<Light> lights;
+  Settings settings;
+
+  int addVertex(glm::vec3 position, glm::vec3 normal) {
+    vertices.push_back({position, normal, int32_t(vertices.size())});
+    return vertices.back().index;
+  }
+  void addTriangle(int a, int b, int c) {
+    triangles.push_back({{a, b, c}, int32_t(triangles.size())});
+  }
+};
+
+/// At the origin, looking along -z, 90 degrees wide and high.
+inline Camera makeCamera() {
+  Camera camera{};
+  const float nearZ = 0.25f, farZ = 100;
+  camera.eye = {0, 0, 0};
+  camera.forward = {0, 0, -1};
+  camera.right = {1, 0, 0};
+  camera.up = {0, 1, 0};
+  camera.nearZ = nearZ;
+  camera.farZ = farZ;
+  camera.viewProjection = glm::mat4(0);
+  camera.viewProjection[0][0] = 1;
+  camera.viewProjection[1][1] = 1;
+  camera.viewProjection[2][2] = -(farZ + nearZ) / (farZ - nearZ);
+  camera.viewProjection[2][3] = -1;
+  camera.viewProjection[3][2] = -2 * farZ * nearZ / (farZ - nearZ);
+  return camera;
+}
+
+/// A square of two triangles that faces the camera at a distance.
+inline void addSquare(Input &input, glm::vec2 center, float half,
+                      float distance, glm::vec3 normal = {0, 0, 1}) {
+  int v[4];
+  for (int i = 0; i < 4; ++i) {
+    float x = i == 1 || i == 2 ? half : -half, y = i >= 2 ? half : -half;
+    v[i] = input.addVertex({center.x + x, center.y + y, -distance}, normal);
+  }
+  input.addTriangle(v[0], v[1], v[2]);
+  input.addTriangle(v[0], v[2], v[3]);
+}
+
+/// Triangles everywhere, also behind the camera and far outside of the view.
+inline Input makeSoup(int count) {
+  Input input;
+  std::mt19937 random(3);
+  std::uniform_real_distribution<float> d(-1, 1);
+  for (int i = 0; i < count; ++i) {
+    glm::vec3 center(8 * d(random), 8 * d(random), 8 * d(random) - 4);
+    float reach = i % 10 == 0 ? 6 : 0.7f;
+    int corner[3];
+    for (int &c : corner)
+      c = input.addVertex(
+          center + reach * glm::vec3(d(random), d(random), d(random)),
+          {d(random), d(random), d(random)});
+    input.addTriangle(corner[0], corner[1], corner[2]);
+  }
+  input.lights = {{{0, 0.6f, 0.8f, 0}, {0.7f, 0.6f, 0.5f, 0}},
+                  {{1, 2, 3, 1}, {0.2f, 0.3f, 0.4f, 0}}};
+  return input;
+}
+
+using Picture = std::vector<Color>;
+
+/// A picture that a pipeline has drawn.
+inline Picture copy(const piko::Image<Color> &image) {
+  return {image.data(),
+          image.data() + size_t(image.extent()[0]) * image.extent()[1]};
+}
+
+inline bool equal(const Picture &a, const Picture &b) {
+  return a.size() == b.size() &&
+         std::memcmp(a.data(), b.data(), a.size() * sizeof(Color)) == 0;
+}
+
+} // namespace test
+
+#endif // PIKO_UNITTESTS_EXAMPLES_TESTSCENE_H
