@@ -184,17 +184,6 @@ void Checker::numberEmissions(const Loop &loop) {
 
 // --- Messages ---------------------------------------------------------------
 
-std::string Checker::lineageText(int64_t lineage) const {
-  if (lineage < 0)
-    return "source " + std::to_string(~lineage >> 32) + " primitive " +
-           std::to_string(~lineage & UINT32_MAX);
-  const Emission &emission = emissions[lineage];
-  const CheckedCall &call = calls[emission.call];
-  return callText(emission.call) + ", " + quoted(p.stages[call.stage].name) +
-         " bin " + std::to_string(call.bin) + " emit " +
-         std::to_string(emission.ordinal);
-}
-
 std::string Checker::callText(int64_t number) const {
   const CheckedCall &call = calls[number];
   const Stage &stage = p.stages[call.stage];
@@ -202,6 +191,48 @@ std::string Checker::callText(int64_t number) const {
     return lineageText(call.parent);
   return quoted(stage.name) + " bin " + std::to_string(call.bin) + " call " +
          std::to_string(call.number);
+}
+
+std::string Checker::hopText(const Emission &emission) const {
+  const CheckedCall &call = calls[emission.call];
+  return ", " + quoted(p.stages[call.stage].name) + " bin " +
+         std::to_string(call.bin) + " emit " + std::to_string(emission.ordinal);
+}
+
+std::string Checker::lineageText(int64_t lineage) const {
+  // Of a long way the first and the last hops, as the reference does.
+  constexpr size_t shown = 8;
+  std::vector<const Emission *> hops;
+  std::string text;
+  while (text.empty()) {
+    if (lineage < 0) {
+      text = "source " + std::to_string(~lineage >> 32) + " primitive " +
+             std::to_string(~lineage & UINT32_MAX);
+      break;
+    }
+    const Emission &emission = emissions[lineage];
+    hops.push_back(&emission);
+    if (p.stages[calls[emission.call].stage].collects())
+      text = callText(emission.call);
+    lineage = calls[emission.call].parent;
+  }
+  for (size_t left = hops.size(); left-- > 0;) {
+    if (left > shown && hops.size() - left > shown) {
+      text += ", ... " + std::to_string(left + 1 - shown) + " hops ...";
+      left = shown;
+      continue;
+    }
+    text += hopText(*hops[left]);
+  }
+  return text;
+}
+
+std::string Checker::contextOf(const Stage &stage,
+                               const uint8_t *record) const {
+  int64_t lineage = 0;
+  std::memcpy(&lineage, record + p.records[stage.record].lineageOffset,
+              sizeof(lineage));
+  return "\n  lineage: " + lineageText(lineage);
 }
 
 std::string Checker::context(const char *at, int64_t call,

@@ -99,6 +99,8 @@ public:
   // --- errors
   /// The first error of the run was found now.
   void noteError();
+  /// The lineage of a primitive that a stage takes, as the end of a message.
+  std::string contextOf(const Stage &stage, const uint8_t *record) const;
   /// The message of an error that is `plain` without checking.
   std::string describe(int32_t code, const std::string &plain) const;
 
@@ -139,6 +141,7 @@ private:
   std::string currentContext() const;
   std::string lineageText(int64_t lineage) const;
   std::string callText(int64_t call) const;
+  std::string hopText(const Emission &emission) const;
 
   pikort_pipeline &p;
   std::unique_ptr<StageRelation> relation;

@@ -2,6 +2,7 @@
 //===- Loop.cpp - What goes into a loop, and what its stages emit ---------===//
 
 #include "cpu/Loop.h"
+#include "cpu/Check.h"
 #include "cpu/Parallel.h"
 #include "cpu/StackLoop.h"
 #include "cpu/WaveLoop.h"
@@ -64,11 +65,15 @@ void Loop::writeKey(const Edge &edge, uint64_t *key, int64_t entry,
                                     : 0;
 }
 
-void Loop::failHops(const Stage &stage, int64_t cell) const {
-  throw Failure{PIKORT_ENDLESS, "stage " + quoted(stage.name) + ", bin " +
-                                    std::to_string(cell / stage.tiles) +
-                                    ": a loop did not end within " +
-                                    std::to_string(p_.loopLimit) + " hops"};
+void Loop::failHops(const Stage &stage, int64_t cell,
+                    const uint8_t *record) const {
+  std::string text = "stage " + quoted(stage.name) + ", bin " +
+                     std::to_string(cell / stage.tiles) +
+                     ": a loop did not end within " +
+                     std::to_string(p_.loopLimit) + " hops";
+  if (p_.checker)
+    text += p_.checker->contextOf(stage, record);
+  throw Failure{PIKORT_ENDLESS, text};
 }
 
 // --- What a kernel emitted --------------------------------------------------

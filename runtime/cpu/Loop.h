@@ -60,7 +60,8 @@ protected:
   /// The words of the key of what left at `place`, if it has keys.
   void writeKey(const Edge &edge, uint64_t *key, int64_t entry,
                 uint64_t place) const;
-  [[noreturn]] void failHops(const Stage &stage, int64_t cell) const;
+  [[noreturn]] void failHops(const Stage &stage, int64_t cell,
+                             const uint8_t *record) const;
 
   pikort_pipeline &p_;
   const LoopShape &shape_;

@@ -81,9 +81,11 @@ int32_t StackLoop::next() {
       if (running_.edge < 0) {
         const Stage &stage = p_.stages[running_.stage];
         if (running_.hops > p_.loopLimit)
-          failHops(stage, running_.cells
-                              ? cells_[cells_.size() - 1] & ~PIKOIR_FIRST_CELL
-                              : 0);
+          failHops(stage,
+                   running_.cells
+                       ? cells_[cells_.size() - 1] & ~PIKOIR_FIRST_CELL
+                       : 0,
+                   records_.data() + records_.size() - recordSize(stage));
         return running_.stage;
       }
       leave();

@@ -156,7 +156,8 @@ void WaveLoop::fail() {
         uint32_t first = 0;
         if (member(m).placed())
           first = now_[m].pairs[pairStarts(p_.memory, now_[m])[i]];
-        failHops(member(m), first & ~PIKOIR_FIRST_CELL);
+        failHops(member(m), first & ~PIKOIR_FIRST_CELL,
+                 now_[m].items + i * recordSize(member(m)));
       }
-  failHops(member(0), 0);
+  throw Failure{PIKORT_BAD_PROGRAM, "expected a loop to hold a primitive"};
 }

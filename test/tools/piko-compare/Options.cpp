@@ -49,6 +49,8 @@ bool readCaseOption(const std::string &name, Words &words, Case &into) {
     into.counts = toNumbers<int64_t>(words.takeValues(name, true));
   else if (name == "--seed")
     into.seed = toNumbers<unsigned>(words.takeValues(name, false))[0];
+  else if (name == "--loop-limit")
+    into.loopLimit = toNumbers<int64_t>(words.takeValues(name, false))[0];
   else if (name == "--wide")
     into.wide = true;
   else

@@ -20,6 +20,8 @@ struct Case {
   unsigned seed = 1;
   /// Input of all bits, infinities and NaNs among it.
   bool wide = false;
+  /// Of hops and rounds; 0 = as it is.
+  int64_t loopLimit = 0;
 
   int64_t count(size_t source) const {
     return counts[source < counts.size() ? source : counts.size() - 1];

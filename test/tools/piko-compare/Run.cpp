@@ -70,6 +70,8 @@ Run::Run(Program made, const Case &input)
   check(pikort_create(&program.program, &pipeline));
   check(pikort_set_domain(pipeline, int32_t(input.domain.size()),
                           input.domain.data()));
+  if (input.loopLimit)
+    check(pikort_set_loop_limit(pipeline, input.loopLimit));
   for (int32_t i = 0; i < pikort_source_count(pipeline); ++i) {
     pikort_source_info info;
     check(pikort_get_source_info(pipeline, i, &info));

@@ -4,14 +4,14 @@
 // on the same made-up input, and compares all state bit for bit.
 //
 //   piko-compare FILE [--reference FILE] [--pipe NAME] [--domain W H ..]
-//                [--count N ..] [--seed S] [--wide] [--cases FILE]
-//                [--threads T ..] [--runs N] [--timeout SECONDS]
-//                [--check[=nan:RECORD.FIELD,..]]
+//                [--count N ..] [--seed S] [--wide] [--loop-limit N]
+//                [--cases FILE] [--threads T ..] [--runs N]
+//                [--timeout SECONDS] [--check[=nan:RECORD.FIELD,..]]
 //
 // Options.h says what the options mean, Run.h what the input is. With --cases
-// each line of that file is a case, with the options --pipe to --wide; a line
-// of output says which case begins, and one how it ends. Exit status 0 if all
-// is equal.
+// each line of that file is a case, with the options --pipe to --loop-limit; a
+// line of output says which case begins, and one how it ends. Exit status 0 if
+// all is equal.
 
 #include "Options.h"
 #include "Programs.h"

@@ -12,6 +12,7 @@
 #include <piko/reference/error.h>
 
 #include <memory>
+#include <vector>
 #ifdef PIKO_CHECK
 #include <source_location>
 #endif
@@ -33,10 +34,16 @@ struct Place {
 /// (no stage), a call of a collecting stage (no step before it), or an
 /// emission.
 struct Step {
-  std::shared_ptr<const Step> before;
+  mutable std::shared_ptr<const Step> before;
   std::string_view stage;
   int64_t place;  ///< the source, or the bin
   int64_t number; ///< of the primitive, the call or the emission
+
+  /// Not by recursion: a lineage may be long.
+  ~Step() {
+    while (before && before.use_count() == 1)
+      before = std::shared_ptr<const Step>(std::move(before->before));
+  }
 };
 using Lineage = std::shared_ptr<const Step>;
 
@@ -51,14 +58,28 @@ inline Lineage makeStep(Lineage before, std::string_view stage, int64_t place,
 inline std::string toText(const Lineage &lineage) {
   if (!lineage)
     return "";
-  std::string number = std::to_string(lineage->number);
-  std::string place = std::to_string(lineage->place);
-  if (lineage->stage.empty())
-    return "source " + place + " primitive " + number;
-  std::string hop = "'" + std::string(lineage->stage) + "' bin " + place;
-  if (!lineage->before)
-    return hop + " call " + number;
-  return toText(lineage->before) + ", " + hop + " emit " + number;
+  constexpr size_t shown = 8; // of a long way the first and the last hops
+  std::vector<const Step *> steps;
+  for (const Step *step = lineage.get(); step; step = step->before.get())
+    steps.push_back(step);
+  std::string text;
+  for (size_t left = steps.size(); left-- > 0;) {
+    const Step &step = *steps[left];
+    if (left > shown && steps.size() - left > shown + 1) {
+      text += ", ... " + std::to_string(left + 1 - shown) + " hops ...";
+      left = shown;
+      continue;
+    }
+    std::string number = std::to_string(step.number);
+    std::string place = std::to_string(step.place);
+    if (step.stage.empty()) {
+      text = "source " + place + " primitive " + number;
+      continue;
+    }
+    text += (text.empty() ? "'" : ", '") + std::string(step.stage) + "' bin " +
+            place + (step.before ? " emit " : " call ") + number;
+  }
+  return text;
 }
 
 /// The lines that follow a message: "\n  at file:line\n  lineage: ...".
