@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Hundreds of layers at a pixel, many of them at equal depths, transparent and
+// opaque ones among them, are blended with the reference executor's bits.
+// RUN: piko-compare %s --pipe Small --domain 9 3 --count 8000 | FileCheck %s
+// RUN: piko-compare %s --pipe Shared --domain 3 2 --count 3000 --wide | FileCheck %s
+// CHECK: equal
+#include "../../examples/oit/oit.piko.cpp"
+
+struct Random {
+  uint32_t x, y, depth, alpha;
+  glm::vec3 color;
+  float anyDepth; // also NaN and infinities
+};
+
+struct MakeLayers : piko::Stage<0, 0, 64, Random, oit::Layer> {
+  void process(const Random &r) {
+    glm::ivec2 pixel(r.x % uint32_t(domain().x), r.y % uint32_t(domain().y));
+    float alpha = r.alpha % 8 == 0   ? 0.0f
+                  : r.alpha % 8 == 1 ? 1.0f
+                                     : float(r.alpha % 64) / 64;
+    float depth = r.depth % 4 == 0 ? r.anyDepth : float(r.depth % 16);
+    emit({pixel, depth, glm::vec4(r.color * alpha, alpha)});
+  }
+};
+
+template <int Bin> struct Layers : piko::Pipe<oit::State> {
+  MakeLayers makeLayers;
+  oit::Blend<Bin> blend;
+  Layers() {
+    source(makeLayers);
+    connect(makeLayers, 0, blend);
+  }
+};
+
+struct Small : Layers<8> {};
+struct Shared : Layers<0> {};
