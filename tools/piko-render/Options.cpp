@@ -31,6 +31,7 @@ it, and says how long a frame took.
   --fovy DEGREES         field of view from bottom to top (45)
   --cull                 leave out back faces
   --ground               put a square under the scene
+  --set NAME=VALUE       a constant of the pipeline, if it is an int or a float
 
   --check[=nan:RECORD.FIELD,...]   check the rules of state on one thread, and
                          that these fields are never NaN
@@ -90,6 +91,7 @@ private:
         {"--fovy", [&] { options.view.fovy = float(number(name)); }},
         {"--cull", [&] { options.cull = true; }},
         {"--ground", [&] { options.ground = true; }},
+        {"--set", [&] { parseSet(value(name)); }},
         {"--threads", [&] { options.threads = integer(name, 0, 10000); }},
         {"--warmup", [&] { options.warmup = integer(name, 0, maxInt); }},
         {"--frames", [&] { options.frames = integer(name, 1, maxInt); }},
@@ -110,6 +112,14 @@ private:
     else
       fail("--check: expected =nan:RECORD.FIELD,... or nothing, but got '" +
            text + "'");
+  }
+
+  void parseSet(const std::string &text) {
+    size_t equals = text.find('=');
+    if (equals == 0 || equals == std::string::npos)
+      return fail("--set: expected NAME=VALUE, but got '" + text + "'");
+    options.values.emplace_back(text.substr(0, equals),
+                                text.substr(equals + 1));
   }
 
   void parseArgument(const std::string &word) {

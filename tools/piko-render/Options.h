@@ -18,6 +18,7 @@ struct Options {
   int lights = 1;
   bool cull = false;
   bool ground = false;
+  std::vector<std::pair<std::string, std::string>> values; ///< of constants
   int threads = 0;
   int warmup = 5, frames = 30;
   double seconds = 1000;

@@ -55,9 +55,13 @@ Result<SceneInput> loadScene(const Options &options) {
   auto camera = makeCamera(options.view, bounds);
   if (!camera)
     return Error{"scene '" + options.scene + "': " + camera.error().message};
-  SceneInput scene{
-      *camera, {}, makeLights(options.lights, bounds), std::move(*mesh)};
+  SceneInput scene{};
+  scene.size = {options.view.width, options.view.height};
+  scene.camera = *camera;
   scene.settings.cullBackFaces = options.cull;
+  scene.lights = makeLights(options.lights, bounds);
+  scene.mesh = std::move(*mesh);
+  scene.values = options.values;
   return scene;
 }
 

@@ -13,7 +13,21 @@ using namespace piko::render;
 
 namespace {
 
-enum Record { CAMERA, SETTINGS, LIGHT, VERTEX, TRIANGLE, COLOR, OTHER };
+enum Record {
+  CAMERA,
+  SETTINGS,
+  LIGHT,
+  VERTEX,
+  TRIANGLE,
+  COLOR,
+  OTHER,
+  PIXEL,
+  BOUNDS,
+  NODE,
+  LEAF,
+  INT,
+  FLOAT
+};
 
 /// What a test's program declares beside the records.
 std::function<void(pikort_pipeline *)> declareRest;
@@ -32,6 +46,13 @@ void setup(pikort_pipeline *p) {
   declareRecord(p, TRIANGLE, "piko::scene::Triangle", sizeof(scene::Triangle));
   declareRecord(p, COLOR, "piko::scene::Color", sizeof(scene::Color));
   declareRecord(p, OTHER, "Other", 4);
+  declareRecord(p, PIXEL, "piko::scene::Pixel", sizeof(scene::Pixel));
+  declareRecord(p, BOUNDS, "piko::scene::Bounds", sizeof(scene::Bounds));
+  declareRecord(p, NODE, "piko::scene::BvhNode", sizeof(scene::BvhNode));
+  declareRecord(p, LEAF, "piko::scene::BvhTriangle",
+                sizeof(scene::BvhTriangle));
+  declareRecord(p, INT, "int", 4);
+  declareRecord(p, FLOAT, "float", 4);
   declareRest(p);
 }
 
@@ -53,8 +74,10 @@ protected:
   Binding() {
     input.lights.resize(3);
     input.mesh.vertices.resize(4);
-    input.mesh.triangles.resize(2);
+    input.mesh.triangles = {{{0, 1, 2}, 0}, {{0, 0, 3}, 1}};
+    input.mesh.vertices[1].position = {1, 2, 3};
     input.settings.cullBackFaces = 1;
+    input.size = {5, 3};
   }
   ~Binding() override { pikort_destroy(pipeline); }
 
@@ -108,6 +131,86 @@ TEST_F(Binding, EverythingByType) {
   EXPECT_EQ(source.count, 2);
 }
 
+TEST_F(Binding, PixelsOfTheImage) {
+  auto output = bind([](pikort_pipeline *p) {
+    declareSource(p, 0, PIXEL);
+    declareState(p, 0, "picture", PIKORT_IMAGE, COLOR, 2);
+  });
+  ASSERT_TRUE(output) << output.error().message;
+  pikort_source_info source;
+  ASSERT_EQ(pikort_get_source_info(pipeline, 0, &source), PIKORT_OK);
+  EXPECT_EQ(source.count, 15);
+  EXPECT_EQ(input.pixels.at(7).at, glm::ivec2(2, 1));
+  EXPECT_FALSE(input.bvh); // not asked for
+}
+
+TEST_F(Binding, TreeOfTheMesh) {
+  auto output = bind([](pikort_pipeline *p) {
+    declareSource(p, 0, VERTEX);
+    declareState(p, 0, "picture", PIKORT_IMAGE, COLOR, 2);
+    declareState(p, 1, "box", PIKORT_CONSTANT, BOUNDS);
+    declareState(p, 2, "nodes", PIKORT_BUFFER, NODE, 1);
+    declareState(p, 3, "leaves", PIKORT_BUFFER, LEAF, 1);
+  });
+  ASSERT_TRUE(output) << output.error().message;
+  int64_t extent[] = {5, 3};
+  ASSERT_EQ(pikort_set_domain(pipeline, 2, extent), PIKORT_OK);
+  ASSERT_EQ(pikort_run(pipeline), PIKORT_OK) << pikort_message(pipeline);
+  pikort_view view;
+  ASSERT_EQ(pikort_get_view(pipeline, "nodes", &view), PIKORT_OK);
+  EXPECT_EQ(view.extent[0], 1);
+  ASSERT_EQ(pikort_get_view(pipeline, "leaves", &view), PIKORT_OK);
+  EXPECT_EQ(view.extent[0], 2);
+  ASSERT_EQ(pikort_get_view(pipeline, "box", &view), PIKORT_OK);
+  EXPECT_EQ(static_cast<scene::Bounds *>(view.data)->hi, glm::vec3(1, 2, 3));
+}
+
+TEST_F(Binding, ValuesOfConstants) {
+  auto rest = [](pikort_pipeline *p) {
+    int value = 5;
+    declareSource(p, 0, VERTEX);
+    declareState(p, 0, "picture", PIKORT_IMAGE, COLOR, 2);
+    declareState(p, 1, "depth", PIKORT_CONSTANT, INT, 0, -1, &value);
+    declareState(p, 2, "part", PIKORT_CONSTANT, FLOAT, 0, -1, &value);
+    declareState(p, 3, "other", PIKORT_CONSTANT, OTHER, 0, -1, &value);
+  };
+  input.values = {{"depth", "-3"}, {"part", "0.25"}};
+  auto output = bind(rest);
+  ASSERT_TRUE(output) << output.error().message;
+  int64_t extent[] = {5, 3};
+  ASSERT_EQ(pikort_set_domain(pipeline, 2, extent), PIKORT_OK);
+  ASSERT_EQ(pikort_run(pipeline), PIKORT_OK) << pikort_message(pipeline);
+  pikort_view view;
+  ASSERT_EQ(pikort_get_view(pipeline, "depth", &view), PIKORT_OK);
+  EXPECT_EQ(*static_cast<int32_t *>(view.data), -3);
+  ASSERT_EQ(pikort_get_view(pipeline, "part", &view), PIKORT_OK);
+  EXPECT_EQ(*static_cast<float *>(view.data), 0.25f);
+}
+
+TEST_F(Binding, WrongValues) {
+  auto errorOfValue = [&](const char *name, const char *value) {
+    pikort_destroy(pipeline);
+    pipeline = nullptr;
+    input.values = {{name, value}};
+    return errorOf([](pikort_pipeline *p) {
+      int value = 5;
+      declareSource(p, 0, VERTEX);
+      declareState(p, 0, "picture", PIKORT_IMAGE, COLOR, 2);
+      declareState(p, 1, "depth", PIKORT_CONSTANT, INT, 0, -1, &value);
+      declareState(p, 2, "other", PIKORT_CONSTANT, OTHER, 0, -1, &value);
+    });
+  };
+  EXPECT_EQ(errorOfValue("depth", "1.5"),
+            "pipeline 'Test': constant 'depth': expected a whole number, but "
+            "got '1.5'");
+  EXPECT_EQ(errorOfValue("other", "1"),
+            "pipeline 'Test': constant 'other': expected an 'int' or a 'float' "
+            "to set, but got 'Other'");
+  EXPECT_EQ(errorOfValue("picture", "1"),
+            "pipeline 'Test': expected a constant 'picture' to set, but it has "
+            "none");
+}
+
 TEST_F(Binding, NoImage) {
   EXPECT_EQ(errorOf([](pikort_pipeline *p) { declareSource(p, 0, VERTEX); }),
             "pipeline 'Test': expected an image of 'piko::scene::Color' for "
@@ -130,7 +233,8 @@ TEST_F(Binding, UnknownConstant) {
               declareState(p, 0, "knob", PIKORT_CONSTANT, OTHER);
             }),
             "pipeline 'Test': constant 'knob': expected 'piko::scene::Camera', "
-            "'...::Settings' or a default value, but got 'Other'");
+            "'...::Settings', '...::Bounds' or a default value, but got "
+            "'Other'");
 }
 
 TEST_F(Binding, UnknownBuffer) {
@@ -139,8 +243,8 @@ TEST_F(Binding, UnknownBuffer) {
               declareState(p, 0, "data", PIKORT_BUFFER, OTHER, 1);
             }),
             "pipeline 'Test': buffer 'data': expected elements of "
-            "'piko::scene::Light', '...::Vertex' or '...::Triangle', but got "
-            "'Other'");
+            "'piko::scene::Light', '...::Vertex', '...::Triangle', "
+            "'...::BvhNode' or '...::BvhTriangle', but got 'Other'");
 }
 
 TEST_F(Binding, UnknownSource) {
@@ -148,8 +252,8 @@ TEST_F(Binding, UnknownSource) {
               declareSource(p, 0, OTHER);
               declareState(p, 0, "color", PIKORT_IMAGE, COLOR, 2);
             }),
-            "pipeline 'Test': source 0: expected 'piko::scene::Vertex' or "
-            "'...::Triangle', but got 'Other'");
+            "pipeline 'Test': source 0: expected 'piko::scene::Vertex', "
+            "'...::Triangle' or '...::Pixel', but got 'Other'");
 }
 
 } // namespace

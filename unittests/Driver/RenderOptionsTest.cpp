@@ -16,15 +16,15 @@ std::string errorOf(std::vector<std::string> words) {
 
 TEST(RenderOptions, AllOfThem) {
   auto o = parseOptions(
-      {"--pipe",   "Binned",   "a.piko.cpp", "--width",   "320",
-       "--height", "200",      "--lights",   "7",         "--eye",
-       "1",        "-2",       "3e1",        "--at",      "0",
-       "0.5",      "0",        "--fovy",     "60",        "--cull",
-       "--ground", "--target", "reference",  "--threads", "2",
-       "--warmup", "0",        "--frames",   "4",         "--seconds",
-       "2.5",      "--out",    "o.exr",      "--json",    "-I",
-       "inc",      "-Iother",  "-DX=1",      "-D",        "Y",
-       "scene.obj"});
+      {"--pipe",    "Binned",   "a.piko.cpp", "--width",   "320",
+       "--height",  "200",      "--lights",   "7",         "--eye",
+       "1",         "-2",       "3e1",        "--at",      "0",
+       "0.5",       "0",        "--fovy",     "60",        "--cull",
+       "--ground",  "--target", "reference",  "--threads", "2",
+       "--warmup",  "0",        "--frames",   "4",         "--seconds",
+       "2.5",       "--out",    "o.exr",      "--json",    "-I",
+       "inc",       "-Iother",  "-DX=1",      "-D",        "Y",
+       "scene.obj", "--set",    "depth=3",    "--set",     "text=a=b"});
   ASSERT_TRUE(o) << o.error().message;
   EXPECT_EQ(o->pipeline, "a.piko.cpp");
   EXPECT_EQ(o->scene, "scene.obj");
@@ -44,6 +44,9 @@ TEST(RenderOptions, AllOfThem) {
   EXPECT_EQ(o->frames, 4);
   EXPECT_EQ(o->seconds, 2.5);
   EXPECT_EQ(o->out, "o.exr");
+  ASSERT_EQ(o->values.size(), 2u);
+  EXPECT_EQ(o->values[0], (std::pair<std::string, std::string>("depth", "3")));
+  EXPECT_EQ(o->values[1], (std::pair<std::string, std::string>("text", "a=b")));
 }
 
 TEST(RenderOptions, HelpNeedsNothingElse) {
@@ -85,6 +88,9 @@ TEST(RenderOptions, Errors) {
             "--fovy: expected a finite number");
   EXPECT_EQ(errorOf({"a", "b", "--fovy", "180"}),
             "--fovy: expected an angle between 0 and 180 degrees");
+  for (const char *bad : {"depth", "=3"})
+    EXPECT_EQ(errorOf({"a", "b", "--set", bad}),
+              "--set: expected NAME=VALUE, but got '" + std::string(bad) + "'");
   EXPECT_EQ(errorOf({"a", "b", "--target", "gpu"}),
             "--target: expected cpu or reference, but got 'gpu'");
 }

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #include "Piko/Driver/Scene/Binding.h"
 
+#include <charconv>
 #include <cstring>
 
 using namespace piko;
@@ -32,6 +33,9 @@ public:
     for (int32_t i = 0; i < pikort_source_count(pipeline); ++i)
       if (auto ok = bindSource(i); !ok)
         return ok.error();
+    for (const auto &[name, value] : scene.values)
+      if (auto ok = setConstant(name, value); !ok)
+        return ok.error();
     if (output.empty())
       return fail("expected an image of 'piko::scene::Color' for the result, "
                   "but it has none");
@@ -58,48 +62,79 @@ private:
     return record;
   }
 
-  /// The constants of a scene; no data for other types.
+  /// Makes what is made only for pipelines that ask for this type.
+  Result<Done> prepare(const char *type) {
+    if (!std::strcmp(type, "piko::scene::Pixel") && scene.pixels.empty())
+      for (int y = 0; y < scene.size.y; ++y)
+        for (int x = 0; x < scene.size.x; ++x)
+          scene.pixels.push_back({{x, y}});
+    bool isOfTree = !std::strcmp(type, "piko::scene::BvhNode") ||
+                    !std::strcmp(type, "piko::scene::BvhTriangle") ||
+                    !std::strcmp(type, "piko::scene::Bounds");
+    if (isOfTree && !scene.bvh) {
+      auto bvh = buildBvh(scene.mesh);
+      if (!bvh)
+        return bvh.error();
+      scene.bvh = std::move(*bvh);
+    }
+    return Done{};
+  }
+
+  template <class T> static Supply supply(std::vector<T> &list) {
+    return {list.data(), int64_t(list.size()), sizeof(T)};
+  }
+
+  /// What a scene has for a type; of size 0 if nothing.
   Supply constantFor(const char *type) {
     if (!std::strcmp(type, "piko::scene::Camera"))
       return {&scene.camera, 1, sizeof(scene::Camera)};
     if (!std::strcmp(type, "piko::scene::Settings"))
       return {&scene.settings, 1, sizeof(scene::Settings)};
-    return {};
-  }
-  Supply lightsFor(const char *type) {
-    if (!std::strcmp(type, "piko::scene::Light"))
-      return {scene.lights.data(), int64_t(scene.lights.size()),
-              sizeof(scene::Light)};
+    if (!std::strcmp(type, "piko::scene::Bounds"))
+      return {&scene.bvh->bounds, 1, sizeof(scene::Bounds)};
     return {};
   }
   Supply meshFor(const char *type) {
     if (!std::strcmp(type, "piko::scene::Vertex"))
-      return {scene.mesh.vertices.data(), int64_t(scene.mesh.vertices.size()),
-              sizeof(scene::Vertex)};
+      return supply(scene.mesh.vertices);
     if (!std::strcmp(type, "piko::scene::Triangle"))
-      return {scene.mesh.triangles.data(), int64_t(scene.mesh.triangles.size()),
-              sizeof(scene::Triangle)};
+      return supply(scene.mesh.triangles);
     return {};
+  }
+  Supply bufferFor(const char *type) {
+    if (!std::strcmp(type, "piko::scene::Light"))
+      return supply(scene.lights);
+    if (!std::strcmp(type, "piko::scene::BvhNode"))
+      return supply(scene.bvh->nodes);
+    if (!std::strcmp(type, "piko::scene::BvhTriangle"))
+      return supply(scene.bvh->triangles);
+    return meshFor(type);
+  }
+  Supply sourceFor(const char *type) {
+    if (!std::strcmp(type, "piko::scene::Pixel"))
+      return supply(scene.pixels);
+    return meshFor(type);
   }
 
   Result<Done> bindState(const pikort_state_info &state) {
     auto record = recordOf(state.record);
     if (!record)
       return record.error();
+    if (auto ok = prepare(record->name); !ok)
+      return ok.error();
     if (state.kind == PIKORT_IMAGE)
       return noteImage(state, *record);
     if (state.kind == PIKORT_CONSTANT)
       return bindConstant(state, *record);
     if (state.per_source >= 0)
       return Done{};
-    Supply supply = lightsFor(record->name);
-    if (!supply.size)
-      supply = meshFor(record->name);
+    Supply supply = bufferFor(record->name);
     if (!supply.size)
       return fail(unsuitable("buffer '" + std::string(state.name) + "'",
                              record->name,
-                             "elements of 'piko::scene::Light', '...::Vertex' "
-                             "or '...::Triangle'"));
+                             "elements of 'piko::scene::Light', "
+                             "'...::Vertex', '...::Triangle', '...::BvhNode' "
+                             "or '...::BvhTriangle'"));
     if (pikort_bind_buffer(pipeline, state.name, supply.data, supply.count,
                            supply.size) != PIKORT_OK)
       return lastError();
@@ -114,12 +149,48 @@ private:
     if (!supply.size)
       return fail(unsuitable("constant '" + std::string(state.name) + "'",
                              record.name,
-                             "'piko::scene::Camera', '...::Settings' or a "
-                             "default value"));
+                             "'piko::scene::Camera', '...::Settings', "
+                             "'...::Bounds' or a default value"));
     if (pikort_bind_constant(pipeline, state.name, supply.data, supply.size) !=
         PIKORT_OK)
       return lastError();
     return Done{};
+  }
+
+  /// Reads a T for a constant and binds it.
+  template <class T>
+  Result<Done> setNumber(const std::string &name, const std::string &text,
+                         const char *expected) {
+    T value{};
+    const char *end = text.data() + text.size();
+    auto [stop, error] = std::from_chars(text.data(), end, value);
+    if (error != std::errc() || stop != end)
+      return fail("constant '" + name + "': expected " + expected +
+                  ", but got '" + text + "'");
+    if (pikort_bind_constant(pipeline, name.c_str(), &value, sizeof value) !=
+        PIKORT_OK)
+      return lastError();
+    return Done{};
+  }
+
+  Result<Done> setConstant(const std::string &name, const std::string &text) {
+    for (int32_t i = 0; i < pikort_state_count(pipeline); ++i) {
+      pikort_state_info state;
+      if (pikort_get_state_info(pipeline, i, &state) != PIKORT_OK)
+        return lastError();
+      if (state.kind != PIKORT_CONSTANT || state.name != name)
+        continue;
+      auto record = recordOf(state.record);
+      if (!record)
+        return record.error();
+      if (!std::strcmp(record->name, "int"))
+        return setNumber<int32_t>(name, text, "a whole number");
+      if (!std::strcmp(record->name, "float"))
+        return setNumber<float>(name, text, "a number");
+      return fail(unsuitable("constant '" + name + "'", record->name,
+                             "an 'int' or a 'float' to set"));
+    }
+    return fail("expected a constant '" + name + "' to set, but it has none");
   }
 
   Result<Done> noteImage(const pikort_state_info &state,
@@ -145,10 +216,13 @@ private:
     auto record = recordOf(source.record);
     if (!record)
       return record.error();
-    Supply supply = meshFor(record->name);
+    if (auto ok = prepare(record->name); !ok)
+      return ok.error();
+    Supply supply = sourceFor(record->name);
     if (!supply.size)
-      return fail(unsuitable("source " + std::to_string(index), record->name,
-                             "'piko::scene::Vertex' or '...::Triangle'"));
+      return fail(
+          unsuitable("source " + std::to_string(index), record->name,
+                     "'piko::scene::Vertex', '...::Triangle' or '...::Pixel'"));
     if (pikort_bind_source(pipeline, index, supply.data, supply.count,
                            supply.size) != PIKORT_OK)
       return lastError();

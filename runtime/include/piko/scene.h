@@ -8,10 +8,13 @@
 //   ----------------------------------------  ---------------------------------
 //   a constant of type Camera                 the camera
 //   a constant of type Settings               shading constants and switches
+//   a constant of type Bounds                 the box of the mesh
 //   a Buffer<Light>                           the lights
 //   a Buffer<Vertex>, a Buffer<Triangle>      the mesh
+//   a Buffer<BvhNode>, a Buffer<BvhTriangle>  a tree of boxes about it
 //   a source into a stage that takes Vertex   the mesh's vertices, in order
 //   a source into a stage that takes Triangle the mesh's triangles, in order
+//   a source into a stage that takes Pixel    the image's pixels, row by row
 //   the Image<Color>                          the result: there is exactly one
 //
 // Each may occur any number of times (the Image<Color> once) or not at all.
@@ -88,6 +91,36 @@ struct Triangle {
 /// (no transfer function) and no alpha; float images hold all four as they are.
 struct Color {
   glm::vec4 rgba = {0.1f, 0.1f, 0.1f, 0.0f};
+};
+
+/// A pixel of the image, by its cell.
+struct Pixel {
+  glm::ivec2 at;
+};
+
+/// The box that holds all triangles of a tree; 0 if there are none.
+struct Bounds {
+  glm::vec3 lo, hi;
+};
+
+/// How many children a node has, and how many nodes a path from the root.
+constexpr int bvhWidth = 8, bvhDepth = 32;
+
+/// A node of a tree of boxes about the triangles. Node 0 is the root; a tree
+/// without triangles has no node.
+struct BvhNode {
+  /// The children's boxes: least x, y and z, then greatest x, y and z. Where
+  /// there is no child, the least is infinity and the greatest -infinity.
+  float bounds[6][bvhWidth];
+  int32_t child[bvhWidth]; ///< the child's place among the nodes, or, of a
+                           ///< leaf, of its first triangle
+  int32_t count[bvhWidth]; ///< of a leaf's triangles; 0: it is no leaf
+};
+
+/// A triangle of the tree.
+struct BvhTriangle {
+  float corner[3][3]; ///< the positions of its vertices
+  int32_t index;      ///< its place among the triangles
 };
 
 } // namespace piko::scene

@@ -7,22 +7,32 @@
 #ifndef PIKO_DRIVER_SCENE_BINDING_H
 #define PIKO_DRIVER_SCENE_BINDING_H
 
-#include "Piko/Driver/Scene/SceneFile.h"
+#include "Piko/Driver/Scene/Bvh.h"
 
 #include <pikort/pikort.h>
+
+#include <optional>
+#include <utility>
 
 namespace piko::render {
 
 struct SceneInput {
+  glm::ivec2 size; ///< of the image, in pixels
   scene::Camera camera;
   scene::Settings settings;
   std::vector<scene::Light> lights;
   Mesh mesh;
+  /// Names of constants that are an int or a float, and their values.
+  std::vector<std::pair<std::string, std::string>> values;
+  // Made for a pipeline that asks for them.
+  std::vector<scene::Pixel> pixels;
+  std::optional<Bvh> bvh;
 };
 
 /// Binds a scene, which must outlive the runs, to all state and sources of a
 /// pipeline, and returns the name of its Image<Color>. Errors: something is of
-/// a type that no scene has, or there is not exactly one Image<Color>.
+/// a type that no scene has, there is not exactly one Image<Color>, a value
+/// fits no constant, or buildBvh fails.
 Result<std::string> bindScene(pikort_pipeline *pipeline, SceneInput &scene);
 
 } // namespace piko::render
