@@ -1,0 +1,205 @@
+//===- raytrace.piko.cpp - A ray tracer whose stages form a cycle ---------===//
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+//                +---- shadow and mirror rays ----+
+//                v                                |
+//   pixels --> Generate --> Trace -----------> Shade
+//                             |                   |
+//                             +--> Accumulate <---+
+//                                   (image)
+//
+// A ray stays in the bin of its pixel, and what the rays of a pixel bring is
+// summed up in order of lineage.
+//
+//===----------------------------------------------------------------------===//
+#include <piko.h>
+#include <piko/scene.h>
+
+#include "../common/lighting.h"
+#include "bvh.h"
+
+using namespace piko::scene;
+
+namespace raytrace {
+
+struct Ray {
+  glm::ivec2 pixel;
+  glm::vec3 origin;
+  glm::vec3 direction;
+  float limit;      ///< hits have t < limit
+  glm::vec3 weight; ///< in the pixel's color
+  int32_t mirrors;  ///< how many it came from; -1: a shadow ray
+};
+
+struct Surface {
+  glm::ivec2 pixel;
+  glm::vec3 direction; ///< of the ray that met it
+  glm::vec3 weight;
+  int32_t mirrors;
+  int32_t triangle;
+  glm::vec3 corners; ///< weights of the triangle's corners
+};
+
+struct Radiance {
+  glm::ivec2 pixel;
+  glm::vec3 color;
+};
+
+struct State {
+  Camera camera;
+  Settings settings;
+  int32_t depth = 2;    ///< how many mirrors are followed
+  float mirror = 0.25f; ///< how much of the light surfaces mirror
+  int32_t shadows = 1;  ///< 0: lights shine through
+  Bounds bounds;
+  piko::Buffer<BvhNode> nodes;
+  piko::Buffer<BvhTriangle> leaves;
+  piko::Buffer<Triangle> triangles;
+  piko::Buffer<Vertex> vertices;
+  piko::Buffer<Light> lights;
+  piko::Image<Color> image;
+};
+
+constexpr int bin = 16;
+
+struct Generate : piko::Stage<bin, bin, 64, Pixel, Ray>, piko::Uses<State> {
+  void assignBin(const Pixel &p) { assignToBin(p, binFromPosition(p.at)); }
+
+  void process(const Pixel &p) {
+    const Camera &c = state().camera;
+    float x = 2 * (float(p.at.x) + 0.5f) / float(domain().x) - 1;
+    float y = 1 - 2 * (float(p.at.y) + 0.5f) / float(domain().y);
+    emit({p.at, c.eye, c.forward + c.right * x + c.up * y, INFINITY,
+          glm::vec3(1), 0});
+  }
+};
+
+struct Trace : piko::Stage<bin, bin, 64, Ray, Surface, Radiance>,
+               piko::Uses<State> {
+  void assignBin(const Ray &r) { assignToPreviousBins(r); }
+
+  void process(const Ray &r) {
+    if (r.mirrors < 0) {
+      if (find<true>(r).triangle < 0)
+        emit(Radiance{r.pixel, r.weight}, 1);
+      return;
+    }
+    Hit hit = find<false>(r);
+    if (hit.triangle >= 0)
+      emit(Surface{r.pixel, r.direction, r.weight, r.mirrors, hit.triangle,
+                   hit.weight},
+           0);
+    else if (r.mirrors > 0)
+      emit(Radiance{r.pixel, r.weight * glm::vec3(Color().rgba)}, 1);
+  }
+
+private:
+  template <bool AnyHit> Hit find(const Ray &r) {
+    return findHit<AnyHit>(r.origin, r.direction, r.limit, state().bounds,
+                           state().nodes, state().leaves);
+  }
+};
+
+struct Shade : piko::Stage<bin, bin, 64, Surface, Ray, Radiance>,
+               piko::Uses<State> {
+  void assignBin(const Surface &s) { assignToPreviousBins(s); }
+
+  void process(const Surface &s) {
+    Point p = pointOf(s);
+    glm::vec3 weight = s.weight;
+    if (s.mirrors < state().depth) {
+      float mirror = state().mirror;
+      emitRay(s, p, mirrored(s.direction, p), INFINITY, weight * mirror,
+              s.mirrors + 1);
+      weight *= 1 - mirror;
+    }
+    weight *= state().settings.albedo;
+    glm::vec3 sum(state().settings.ambient);
+    for (int64_t i = 0; i < state().lights.size(); ++i) {
+      const Light &light = state().lights[i];
+      glm::vec3 color = raster::irradiance(light, p.position, p.normal);
+      if (!glm::any(glm::greaterThan(color, glm::vec3(0))))
+        continue; // it is behind the surface
+      if (state().shadows == 0) {
+        sum += color;
+        continue;
+      }
+      bool isPoint = light.position.w != 0;
+      glm::vec3 l = glm::vec3(light.position) - light.position.w * p.position;
+      emitRay(s, p, l, isPoint ? 1 : INFINITY, weight * color, -1);
+    }
+    emit(Radiance{s.pixel, weight * sum}, 1);
+  }
+
+private:
+  struct Point {
+    glm::vec3 position;
+    glm::vec3 normal; ///< unit length
+    glm::vec3 facet;  ///< a normal of the triangle
+  };
+
+  Point pointOf(const Surface &s) {
+    const Triangle &t = state().triangles[s.triangle];
+    const Vertex &a = state().vertices[t.vertex.x];
+    const Vertex &b = state().vertices[t.vertex.y];
+    const Vertex &c = state().vertices[t.vertex.z];
+    glm::vec3 w = s.corners;
+    return {a.position * w.x + b.position * w.y + c.position * w.z,
+            glm::normalize(a.normal * w.x + b.normal * w.y + c.normal * w.z),
+            glm::cross(b.position - a.position, c.position - a.position)};
+  }
+
+  static glm::vec3 mirrored(glm::vec3 direction, const Point &p) {
+    glm::vec3 d = glm::reflect(direction, p.normal);
+    // A normal between those of the vertices may send it into the triangle.
+    bool goesThrough = glm::dot(d, p.facet) * glm::dot(direction, p.facet) > 0;
+    return goesThrough ? glm::reflect(direction, glm::normalize(p.facet)) : d;
+  }
+
+  void emitRay(const Surface &s, const Point &p, glm::vec3 direction,
+               float limit, glm::vec3 weight, int32_t mirrors) {
+    // It starts beside the triangle, farther than rounding (bvh.h) moves that.
+    glm::vec3 size = glm::abs(p.facet);
+    glm::vec3 mesh =
+        glm::max(glm::abs(state().bounds.lo), glm::abs(state().bounds.hi));
+    float step = 64 * epsilon * greatest(mesh) / greatest(size);
+    glm::vec3 start = p.position;
+    if (step < INFINITY) // the triangle is not degenerate
+      start += p.facet * (glm::dot(direction, p.facet) < 0 ? -step : step);
+    emit(Ray{s.pixel, start, direction, limit, weight, mirrors}, 0);
+  }
+
+  static float greatest(glm::vec3 v) {
+    return piko::max(piko::max(v.x, v.y), v.z);
+  }
+};
+
+struct Accumulate : piko::Stage<bin, bin, 64, Radiance>, piko::Uses<State> {
+  void assignBin(const Radiance &r) { assignToPreviousBins(r); }
+
+  void process(const Radiance &r) {
+    update(state().image, r.pixel, [&](Color &c) {
+      if (c.rgba.a == 0)
+        c.rgba = {0, 0, 0, 1};
+      c.rgba += glm::vec4(r.color, 0);
+    });
+  }
+};
+
+struct Raytracer : piko::Pipe<State> {
+  Generate generate;
+  Trace trace;
+  Shade shade;
+  Accumulate accumulate;
+
+  Raytracer() {
+    source(generate);
+    connect(generate, 0, trace);
+    connect(trace, 0, shade);
+    connect(trace, 1, accumulate);
+    connect(shade, 0, trace);
+    connect(shade, 1, accumulate);
+  }
+};
+
+} // namespace raytrace
