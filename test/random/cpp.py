@@ -369,6 +369,7 @@ class CppPrinter:
 
     @staticmethod
     def type_name(stage):
+        stage = stage.twin_of or stage
         return f"{stage.name}<{stage.template}>" if stage.template else stage.name
 
     def write_record(self, record, done):
@@ -430,9 +431,10 @@ class CppPrinter:
         for m in members:
             self.line("  " + m)
         self.line("};")
-        for s in p.stages:
+        types = [s for s in p.stages if not s.twin_of]
+        for s in types:
             self.line(("template <int K> " if s.template else "") + f"struct {s.name};")
-        for s in p.stages:
+        for s in types:
             self.write_stage(s)
         self.line(f"struct {p.name} : piko::Pipe<State> {{")
         for s in p.stages:

@@ -463,8 +463,10 @@ class DialectPrinter:
             text = f"piko.schedule {POLICIES[specify.policy]}"
             if specify.value:
                 text += f" tile_split {specify.value.value}"
-        waits = [f"@{self.pipe.stages[d.stage].name.lower()}" for d in stage.schedule
-                 if d.kind == "endStage"]
+        targets = [self.pipe.stages[d.stage] for d in stage.schedule
+                   if d.kind == "endStage"]
+        waits = [f"@{s.name.lower()}" for s in self.pipe.stages
+                 if s in targets or s.twin_of in targets]
         if waits:
             text += f" end_stage [{', '.join(waits)}]"
         if "endBin" in directives:

@@ -383,6 +383,7 @@ class Stage:
     schedule: list = field(default_factory=list)
     process: list = field(default_factory=list)
     template: int = 0  # the value of its template parameter
+    twin_of: object = None  # the stage whose type it has
 
 
 @dataclass

@@ -10,10 +10,12 @@ construction:
 * state that is written is read only by stages that wait for all its writers;
 * a stage waits only for stages that it cannot reach, by edges or waits;
 * each way round a cycle has an edge on which `hops` is counted down;
-* what follows an unordered stage changes state only by integer atomics.
+* what follows an unordered stage changes state only by integer atomics;
+* of two stages of one type, none updates or stores state.
 """
 
 import random
+from dataclasses import replace
 
 from statements import *
 
@@ -25,7 +27,7 @@ FEATURES = [
     "collectives", "gather", "cycles", "unordered", "fetch-atomics", "float-atomics",
     "updates", "atomics", "stores", "maths", "bit-tricks", "float-specials",
     "dynamic-elements", "loop-jumps", "early-returns", "switches", "lambdas",
-    "helpers", "template-stages", "local-arrays",
+    "helpers", "template-stages", "local-arrays", "twin-stages",
 ]
 #: What the dialect's printer does not write: C++ that the front end removes.
 CPP_ONLY = {"maths", "loop-jumps", "early-returns", "switches", "lambdas", "helpers",
@@ -404,14 +406,26 @@ class Generator(Statements):
         drawn = Var("i32", name, solid=True)
         out.append(Atomic("atomicAdd", state, [op("&", drawn, lit(63))],
                           state.record.leaf("drawn"), Lit("i32", 1, solid=True)))
+        # With one operand in all calls, what they get is the same set in any order.
+        mark = state.record.leaf("mark")
+        kind, old = self.random.choice(
+            ["atomicAdd", "atomicMin", "atomicMax", "atomicAnd", "atomicOr",
+             "atomicXor"]), self.fresh("v")
+        self.use(f"{kind}Fetch-{mark.kind}")
+        out.append(Atomic(kind, state, [lit(0)], mark, self.literal(mark.kind), old,
+                          solid=True))
+        seen = Op("i32", "cast", [Var(mark.kind, old, solid=True)], solid=True)
+        out.append(Atomic("atomicAdd", state, [op("&", seen, lit(63))],
+                          state.record.leaf("seen"), Lit("i32", 1, solid=True)))
         if self.on("float-atomics"):
-            self.use("float-atomics")
-            # Sums of small whole numbers are exact in any order.
-            whole = Op("f32", "cast", [op("&", self.expr("i32", scope, 2), lit(7))],
-                       solid=True)
-            out.append(Atomic("atomicAdd", state, [op("&", self.expr("i32", scope, 1),
-                                                      lit(63))],
-                              state.record.leaf("sum"), whole, solid=True))
+            for name, kind in [("sum", "f32"), ("wide_sum", "f64")]:
+                self.use("float-atomics-" + kind)
+                # Sums of small whole numbers are exact in any order.
+                whole = Op(kind, "cast", [op("&", self.expr("i32", scope, 2), lit(7))],
+                           solid=True)
+                at = [op("&", self.expr("i32", scope, 1), lit(63))]
+                out.append(Atomic("atomicAdd", state, at, state.record.leaf(name), whole,
+                                  solid=True))
         return out
 
     # --- All of it -----------------------------------------------------------------
@@ -440,7 +454,9 @@ class Generator(Statements):
                 if i in unordered and self.on("fetch-atomics"):
                     state = State(f"tickets{i}", "buffer", Record(
                         f"Tickets{i}", [Member("next", "i32"), Member("drawn", "i32"),
-                                        Member("sum", "f32")]))
+                                        Member("mark", r.choice(INTEGERS)),
+                                        Member("seen", "i32"), Member("sum", "f32"),
+                                        Member("wide_sum", "f64")]))
                     pipe.state.append(state)
                     self.stage_writes[i].append((state, "ticket"))
                 continue
@@ -523,9 +539,40 @@ class Generator(Statements):
                                           key=lambda e: e.port)]
             self.make_process(pipe, i, 1 if stage.is_list else 30)
             emits.append(self.bounds)
+        if self.on("twin-stages") and r.random() < 0.3:
+            self.add_twin(pipe, bounds, emits)
         self.finish(pipe, bounds, emits)
         pipe.used = self.used
         return pipe
+
+    def add_twin(self, pipe, bounds, emits):
+        """A second stage of one type. It takes over an edge to the first or has a
+        source of its own, and emits to the same stages."""
+        r = self.random
+        candidates = [i for i, writes in enumerate(self.stage_writes)
+                      if i not in self.reachable(pipe, i)
+                      and all(how in ("atomic", "ticket") for _, how in writes)]
+        if not candidates:
+            return
+        i = r.choice(candidates)
+        stage, twin = pipe.stages[i], len(pipe.stages)
+        into = [e for e in pipe.edges if e.consumer == i]
+        if into and len(into) + pipe.sources.count(i) > 1:
+            self.use("twin-by-edge")
+            r.choice(into).consumer = twin
+        elif any(isinstance(s, Bins) and s.kind == "previous"
+                 for s in walk(stage.assign or [])):
+            return
+        else:
+            self.use("twin-by-source")
+            pipe.sources.append(twin)
+        self.use("twin-stages")
+        pipe.edges += [Edge(twin, e.port, e.consumer) for e in pipe.edges
+                       if e.producer == i]
+        pipe.stages.append(replace(stage, name=f"{stage.name}Twin", twin_of=stage,
+                                   outputs=list(stage.outputs)))
+        bounds.append(bounds[i])
+        emits.append(emits[i])
 
     def make_unordered(self, pipe):
         """Makes a stage unordered, of which nobody later sees the order."""

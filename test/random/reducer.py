@@ -95,6 +95,7 @@ def is_valid(pipe):
             fed |= {e.consumer for e in pipe.edges if e.producer in fed}
         expect(len(fed) == len(pipe.stages))
         for i, stage in enumerate(pipe.stages):
+            expect(not stage.twin_of or any(s is stage.twin_of for s in pipe.stages))
             checker = Checker(stage)
             checker.body(stage.assign or [], checker.known | {"p"}, 0, False)
             checker.body(stage.schedule, checker.known, 0, False)
