@@ -128,8 +128,10 @@ private:
         builder.getDenseI64ArrayAttr(stage.bins),
         builder.getI64IntegerAttr(stage.threads), getRecordName(stage.input),
         builder.getArrayAttr(outputs), /*lineage=*/nullptr, /*tile=*/nullptr,
-        /*cycle=*/nullptr);
-    op.setTakesList(stage.takesList);
+        /*cycle=*/nullptr, /*split=*/nullptr, /*ordered=*/nullptr,
+        /*placed=*/nullptr,
+        stage.takesList ? builder.getUnitAttr() : mlir::UnitAttr(),
+        /*fused=*/nullptr);
     builder.createBlock(&op.getBody());
     if (stage.hasAssign) {
       auto assign =
@@ -146,6 +148,8 @@ private:
   bool buildSchedule(unsigned stageNumber) {
     const StageDescription &stage = pipeline.stages[stageNumber];
     const ScheduleDescription &schedule = stage.schedule;
+    if (schedule.isEmpty())
+      return true;
     llvm::SmallVector<mlir::Attribute> waits;
     for (unsigned other : schedule.endStage)
       waits.push_back(mlir::FlatSymbolRefAttr::get(
@@ -154,7 +158,8 @@ private:
       return value ? builder.getI64IntegerAttr(value) : mlir::IntegerAttr();
     };
     auto op = ScheduleOp::create(
-        builder, stage.location, static_cast<ScheduleKind>(schedule.policy),
+        builder, stage.location,
+        static_cast<ScheduleKind>(schedule.getPolicy()),
         number(schedule.tileSplit),
         waits.empty() ? mlir::ArrayAttr() : builder.getArrayAttr(waits),
         schedule.endBin, number(schedule.batch), schedule.everyBin,

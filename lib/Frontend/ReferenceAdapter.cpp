@@ -187,7 +187,7 @@ private:
         << "};\n"
         << "  pikoir_declare_stage(p, " << id << ", " << quote(stage.name)
         << ", " << stage.input << ", bins" << id << ", "
-        << policies[static_cast<int>(schedule.policy)] << ", "
+        << policies[static_cast<int>(schedule.getPolicy())] << ", "
         << schedule.tileSplit << ", " << flags << ", 0);\n";
   }
 

@@ -238,7 +238,7 @@ private:
         return false;
     }
     // It is accepted, and has no effect.
-    if (schedule.policy != SchedulePolicy::All)
+    if (schedule.getPolicy() != SchedulePolicy::All)
       schedule.tileSplit = 0;
     return true;
   }

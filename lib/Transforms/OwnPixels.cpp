@@ -5,6 +5,8 @@
 
 #include "Piko/Transforms/Passes.h"
 
+#include "Repeatable.h"
+
 #include "mlir/Analysis/SliceAnalysis.h"
 #include "mlir/Dialect/Arith/IR/Arith.h"
 #include "mlir/IR/IRMapping.h"
@@ -24,15 +26,6 @@ struct OwnPixelsPass : piko::impl::OwnPixelsBase<OwnPixelsPass> {
   void runOnStage(StageOp stage);
 };
 } // namespace
-
-/// Whether an operation gives the same value wherever it runs, as long as its
-/// operands and the pipeline's constants are the same.
-static bool isRepeatable(Operation *op) {
-  if (auto load = dyn_cast<LoadOp>(op))
-    return bool(lookupInPipeline<ConstantOp>(op, load.getStateAttr()));
-  return op->getNumRegions() == 0 && isMemoryEffectFree(op) &&
-         isSpeculatable(op) && !isa<BinOp>(op);
-}
 
 /// Adds to `slice` what `value` is computed from, operands first; fails at an
 /// operation that cannot be repeated, and says which.

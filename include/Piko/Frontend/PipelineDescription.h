@@ -75,13 +75,22 @@ struct StateDescription {
 enum class SchedulePolicy { LoadBalance, DirectMap, Serialize, All };
 
 struct ScheduleDescription {
-  SchedulePolicy policy = SchedulePolicy::LoadBalance;
+  std::optional<SchedulePolicy> policy; ///< none where the text has none
   int64_t tileSplit = 0, batch = 0;
   std::vector<unsigned> endStage;
   bool endBin = false, everyBin = false, unordered = false;
   /// Whether the policy, the tile split, batch and everyBin depend on the bin
   /// or on constants: then the schedule phase is code.
   bool isDynamic = false;
+
+  SchedulePolicy getPolicy() const {
+    return policy.value_or(SchedulePolicy::LoadBalance);
+  }
+  /// Whether the text says nothing.
+  bool isEmpty() const {
+    return !policy && !batch && endStage.empty() && !endBin && !everyBin &&
+           !unordered && !isDynamic;
+  }
 };
 
 struct StageDescription {

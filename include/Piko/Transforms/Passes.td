@@ -86,6 +86,135 @@ def OrderStages : Pass<"piko-order-stages", "::piko::PipelineOp"> {
     Statistic<"cycles", "cycles", "cycles of edges found">];
 }
 
+def InferDirectives : Pass<"piko-infer-directives", "::piko::PipelineOp"> {
+  let summary = "Write down directives that hold without being said";
+  let description = [{
+    **Requires** the authored level with stages in order (`piko-order-stages`).
+
+    **Does**: turns the one `piko.assign_to` of an assign phase into a
+    `piko.assign_previous` where it is proved that the bin is that which the
+    primitive was emitted from. There are two proofs. *By range*: the bin is that
+    of a cell whose coordinates are fields, and wherever a producer emits one
+    they lie between the bounds of its bin, as loops, branches, minimum and
+    maximum show, or because the producer's own bin was chosen by them. *By
+    function*: the bin is computed from fields as the producer's was from its
+    own, and what goes into it is handed on unchanged. A condition around the
+    assignment stays, so that a primitive is in at most that bin.
+
+    **Guarantees** that every primitive stays in the same bins.
+
+    Before, where `@shade` has bins by `x` and hands `x` on:
+    ```
+    piko.stage @test bins [8] ... {
+      piko.assign {
+        %x = piko.get %f "x" : !piko.prim<@F> -> i32
+        %b = piko.bin_at %x : i32
+        piko.assign_to %b
+    ```
+    After:
+    ```
+        piko.assign_previous inferred
+    ```
+
+    **Limits**: producers and the stage have bins of one size, and the stage has
+    no source. On a cycle only what was proved for stages before it is used. A
+    remark says what could not be proved, and where.
+  }];
+  let statistics = [
+    Statistic<"inferred", "inferred", "assignments that are the identity">,
+    Statistic<"refused", "refused", "assign phases without a proof">];
+}
+
+def FuseStages : Pass<"piko-fuse-stages", "::piko::PipelineOp"> {
+  let summary = "Run a stage where its primitives are emitted";
+  let description = [{
+    **Requires** the authored level with stages in order (`piko-order-stages`);
+    best after `piko-infer-directives`.
+
+    **Does**: makes a stage part of the one that feeds it, so that both have one
+    kernel and no primitive is stored between them: each `piko.emit` becomes the
+    body of the consumer's process phase, inside the conditions of its assign
+    phase, with the emitted numbers in place of fields. Both have bins of one
+    size, one edge and no source lead to the consumer, its only assignment is
+    `piko.assign_previous` (or one bin is the whole domain), it does not wait,
+    and both schedules put a bin onto the same core: they are `direct_map`,
+    `serialize` or `all` alike, or the consumer has none. `load_balance` on the
+    consumer keeps it apart, because it asks for any core.
+
+    **Guarantees** that updates of a pixel and emissions keep their lineage
+    order. The stage notes in `fused` whose phases it holds.
+
+    Before:
+    ```
+    piko.edge @a[0] -> @b
+    piko.stage @a bins [8] threads 64 : @F -> [@F] {
+      piko.process { ... piko.emit 0 (%x) : i32 ... }
+    }
+    piko.stage @b bins [8] threads 64 : @F -> [] {
+      piko.assign { ... piko.assign_previous ... }
+      piko.process { ... piko.get %f "x" ... }
+    }
+    ```
+    After:
+    ```
+    piko.stage @a bins [8] threads 64 fused ["b"] : @F -> [] {
+      piko.process { ... the body of @b on %x ... }
+    }
+    ```
+
+    **Limits**: a stage on a cycle, one that collects and one whose iterations
+    meet at barriers are not fused. Neither is one that would be copied to more
+    than `max-copies` places. A remark gives the reason for each edge that stays.
+  }];
+  let options = [
+    Option<"maxCopies", "max-copies", "int64_t", "4",
+           "To how many places a stage may be copied">];
+  let statistics = [
+    Statistic<"fused", "fused", "stages that became part of another">,
+    Statistic<"refused", "refused", "edges that stay">];
+  let dependentDialects = ["::mlir::arith::ArithDialect",
+                           "::mlir::memref::MemRefDialect",
+                           "::mlir::ub::UBDialect"];
+}
+
+def TestEarly : Pass<"piko-test-early", "::piko::PipelineOp"> {
+  let summary = "Move work behind the test that decides whether it is needed";
+  let description = [{
+    **Requires** the authored level; best after `piko-fuse-stages`, which brings
+    a test and the work in front of it together.
+
+    **Does**: moves what a process phase computes into the one branch that uses
+    it, behind whatever decides about the branch, such as the update of a depth.
+    So a fragment that fails the depth test is not shaded.
+
+    **Guarantees** that what moves has no effect and reads no state that the
+    phase writes, so that results stay as they are. It does not matter how the
+    test is written, because it is not repeated but stays where it is.
+
+    Before:
+    ```
+    %c = ...                               // the colour
+    %passed = piko.update @depth[%x : i32] { ... } -> i1
+    scf.if %passed {
+      piko.update @color[%x : i32] { ... %c ... }
+    }
+    ```
+    After:
+    ```
+    %passed = piko.update @depth[%x : i32] { ... } -> i1
+    scf.if %passed {
+      %c = ...
+      piko.update @color[%x : i32] { ... %c ... }
+    }
+    ```
+
+    **Limits**: work in one stage for a test in another that is not fused with it
+    stays; so does what two branches need.
+  }];
+  let statistics = [
+    Statistic<"moved", "moved", "operations that moved">];
+}
+
 def OwnPixels : Pass<"piko-own-pixels", "::piko::PipelineOp"> {
   let summary = "Find which pixel a primitive updates, so that bins can be divided";
   let description = [{

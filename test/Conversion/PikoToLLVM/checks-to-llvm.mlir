@@ -34,6 +34,7 @@ piko.pipeline @P rank 1 {
     }
   }
   piko.stage @b bins [0] threads 64 : @F -> [] {
+    piko.schedule load_balance
     piko.process {
     ^bb0(%f: !piko.prim<@F>):
       piko.return

@@ -48,6 +48,7 @@ piko.pipeline @P rank 2 {
     }
   }
   piko.stage @b bins [0, 0] threads 1 : @F -> [] {
+    piko.schedule load_balance
     piko.process {
     ^bb0(%f: !piko.prim<@F>):
       piko.return

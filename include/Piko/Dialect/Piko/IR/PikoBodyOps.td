@@ -187,13 +187,15 @@ def Piko_AssignAllOp : Piko_AssignmentOp<"assign_all"> {
 def Piko_AssignPreviousOp : Piko_AssignmentOp<"assign_previous"> {
   let summary = "puts the primitive into the bin it was emitted from";
   let description = [{
-    Both stages have bins of one size, and the stage has no source.
+    Both stages have bins of one size, and the stage has no source. `inferred`
+    says that it was found by `piko-infer-directives`.
 
     ```mlir
     piko.assign_previous
     ```
   }];
-  let assemblyFormat = "attr-dict";
+  let arguments = (ins UnitAttr:$inferred);
+  let assemblyFormat = "(`inferred` $inferred^)? attr-dict";
 }
 
 def Piko_AssignBoxOp : Piko_AssignmentOp<"assign_box", [AttrSizedOperandSegments]> {

@@ -24,7 +24,8 @@ def Piko_StageOp : Piko_Op<"stage", [
     of the tiles that a bin is divided into where `piko.owner` tells whose they
     are. `list` says that the process phase takes the list of a bin. Stages with
     the same `cycle` are on a common cycle of edges; `piko-order-stages` sets
-    it. At the resolved level, `split` says that a bin's primitives (its
+    it. `fused` names the stages whose phases `piko-fuse-stages` has made part
+    of this one. At the resolved level, `split` says that a bin's primitives (its
     batches, where the phase takes a list) may be divided over threads in any
     way, `ordered` that the order in which they are processed shows in the
     state, and `placed` that kernels place them.
@@ -54,12 +55,12 @@ def Piko_StageOp : Piko_Op<"stage", [
                        OptionalAttr<Piko_I64Attr>:$tile,
                        OptionalAttr<Piko_I64Attr>:$cycle,
                        UnitAttr:$split, UnitAttr:$ordered, UnitAttr:$placed,
-                       UnitAttr:$takesList);
+                       UnitAttr:$takesList, OptionalAttr<StrArrayAttr>:$fused);
   let regions = (region SizedRegion<1>:$body);
   let assemblyFormat = [{
     $sym_name `bins` $bins `threads` $threads (`lineage` $lineage^)?
     (`tile` $tile^)? (`cycle` $cycle^)? (`split` $split^)?
-    (`ordered` $ordered^)? (`placed` $placed^)?
+    (`ordered` $ordered^)? (`placed` $placed^)? (`fused` $fused^)?
     `:` (`list` $takesList^)? $input `->` $outputs attr-dict-with-keyword $body
   }];
   let hasRegionVerifier = 1;

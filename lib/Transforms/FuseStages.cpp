@@ -1,0 +1,372 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// piko-fuse-stages, for each edge, producers first:
+//   1. check that both stages run for the same bin on the same core;
+//   2. put the consumer's phases where the producer emits, with the emitted
+//      numbers in place of the primitive's fields;
+//   3. give the consumer's ports and edges to the producer, and drop the
+//      consumer.
+
+#include "Piko/Transforms/Passes.h"
+
+#include "BinIdentity.h"
+#include "PhaseGraph.h"
+#include "Uniformity.h"
+
+#include "mlir/Dialect/UB/IR/UBOps.h"
+#include "mlir/IR/IRMapping.h"
+#include "mlir/IR/Matchers.h"
+
+namespace piko {
+#define GEN_PASS_DEF_FUSESTAGES
+#include "Piko/Transforms/Passes.h.inc"
+} // namespace piko
+
+using namespace mlir;
+using namespace piko;
+
+namespace {
+
+struct FuseStagesPass : piko::impl::FuseStagesBase<FuseStagesPass> {
+  using FuseStagesBase::FuseStagesBase;
+  void runOnOperation() override;
+  LogicalResult check(EdgeOp edge, Refusal &refusal);
+};
+
+/// Makes a stage part of the one that feeds it.
+class Fusion {
+public:
+  Fusion(EdgeOp edge)
+      : edge(edge),
+        producer(lookupInPipeline<StageOp>(edge, edge.getProducerAttr())),
+        consumer(lookupInPipeline<StageOp>(edge, edge.getConsumerAttr())),
+        record(lookupRecord(consumer, consumer.getInputAttr())) {}
+  void run();
+
+private:
+  void replaceEmit(EmitOp emit);
+  /// Copies what a phase does to where `builder` stands, for the primitive that
+  /// `emit` emits, and shows each operation to `visit`.
+  void copyBody(OpBuilder &builder, Region &phase, EmitOp emit,
+                llvm::function_ref<void(Operation *)> visit);
+  void replaceFields(Value prim, EmitOp emit);
+  Value createArray(OpBuilder &builder, FieldAttr field, EmitOp emit);
+  int64_t renumber(int64_t port) { return port - (port > fusedPort()); }
+  int64_t fusedPort() { return edge.getPort(); }
+  void takePorts();
+  void takeWaits();
+
+  EdgeOp edge;
+  StageOp producer, consumer;
+  RecordOp record;
+};
+
+} // namespace
+
+//===----------------------------------------------------------------------===//
+// Conditions
+//===----------------------------------------------------------------------===//
+
+/// The schedule kind that a stage's text asks for, if it asks for one.
+static std::optional<ScheduleKind> getKind(StageOp stage) {
+  ScheduleOp schedule = stage.getSchedule();
+  return schedule ? std::optional(schedule.getKind()) : std::nullopt;
+}
+
+/// Two schedules that put one bin onto one core.
+static LogicalResult checkSchedules(StageOp producer, StageOp consumer,
+                                    Refusal &refusal) {
+  auto refuse = [&](StageOp stage, const Twine &why) {
+    ScheduleOp schedule = stage.getSchedule();
+    refusal = {schedule ? schedule.getOperation() : stage.getOperation(),
+               why.str()};
+    return failure();
+  };
+  for (StageOp stage : {producer, consumer})
+    if (ScheduleOp schedule = stage.getSchedule();
+        schedule && !schedule.getBody().empty())
+      return refuse(stage, "the schedule of stage '" + stage.getSymName() +
+                               "' depends on the bin");
+  ScheduleOp first = producer.getSchedule(), second = consumer.getSchedule();
+  if ((first && first.getUnordered()) != (second && second.getUnordered()))
+    return refuse(second ? consumer : producer,
+                  "only one of the stages is unordered");
+  std::optional<ScheduleKind> kind = getKind(consumer);
+  if (!kind)
+    return success(); // wherever its primitives are
+  ScheduleKind before = getKind(producer).value_or(ScheduleKind::LoadBalance);
+  if (*kind == ScheduleKind::LoadBalance)
+    return refuse(consumer, "load_balance lets any core take the bin");
+  if (*kind != before)
+    return refuse(consumer, stringifyScheduleKind(*kind) +
+                                " may choose another core than " +
+                                stringifyScheduleKind(before) + " of stage '" +
+                                producer.getSymName() + "'");
+  if (second.getTileSplit() != first.getTileSplit())
+    return refuse(consumer, "bins are cut at other sizes");
+  return success();
+}
+
+/// The loop around an operation in whose turns an assignment would count once
+/// for all, or null.
+static Operation *getLoopAround(Operation *op) {
+  for (Operation *parent = op->getParentOp(); !isa<AssignOp>(parent);
+       parent = parent->getParentOp())
+    if (!isa<scf::IfOp, scf::IndexSwitchOp>(parent))
+      return parent;
+  return nullptr;
+}
+
+LogicalResult FuseStagesPass::check(EdgeOp edge, Refusal &refusal) {
+  auto producer = lookupInPipeline<StageOp>(edge, edge.getProducerAttr());
+  auto consumer = lookupInPipeline<StageOp>(edge, edge.getConsumerAttr());
+  auto refuse = [&](Operation *at, const Twine &why) {
+    refusal = {at, why.str()};
+    return failure();
+  };
+  for (StageOp stage : {producer, consumer})
+    if (stage.getCycle())
+      return refuse(stage, "stage '" + stage.getSymName() + "' is on a cycle");
+  if (hasSource(consumer) || getEdgesInto(consumer).size() != 1)
+    return refuse(consumer, "it is fed from several places");
+  if (producer.getBins() != consumer.getBins())
+    return refuse(consumer, "its bins are of another size");
+  if (producer.getTile() || consumer.getTile())
+    return refuse(consumer, "bins are divided into tiles");
+  if (consumer.collects())
+    return refuse(consumer, "it waits until no primitive can reach it");
+  if (failed(checkSchedules(producer, consumer, refusal)))
+    return failure();
+
+  AssignOp assign = consumer.getAssign();
+  if (!assign && !consumer.isWholeDomain())
+    return refuse(consumer, "it has no assign phase");
+  if (assign) {
+    Operation *only = getOnlyAssignment(assign);
+    if (!isa_and_nonnull<AssignPreviousOp>(only))
+      return refuse(only ? only : assign.getOperation(),
+                    "the bin is not known to be the same");
+    if (Operation *loop = getLoopAround(only))
+      return refuse(loop, "it is assigned in a loop");
+  }
+
+  SmallVector<EmitOp> emits = getEmits(producer, edge.getPort());
+  if (int64_t(emits.size()) > maxCopies)
+    return refuse(emits.back(),
+                  "it would be copied to " + Twine(emits.size()) + " places");
+  for (Operation *phase : {assign ? assign.getOperation() : nullptr,
+                           consumer.getProcess().getOperation()}) {
+    if (!phase)
+      continue;
+    for (Operation *user : phase->getRegion(0).getArgument(0).getUsers())
+      if (!isa<GetOp>(user))
+        return refuse(user, "the primitive is used whole");
+    WalkResult barrier = phase->walk([&](ParallelForOp loop) {
+      if (!loop.hasBarriers())
+        return WalkResult::advance();
+      refusal = {loop, "its iterations meet"};
+      return WalkResult::interrupt();
+    });
+    if (barrier.wasInterrupted())
+      return failure();
+  }
+  for (EmitOp emit : emits)
+    for (auto loop = emit->getParentOfType<ParallelForOp>(); loop;
+         loop = loop->getParentOfType<ParallelForOp>())
+      if (loop.hasBarriers())
+        return refuse(emit, "it is emitted between iterations that meet");
+  return success();
+}
+
+//===----------------------------------------------------------------------===//
+// Rewriting
+//===----------------------------------------------------------------------===//
+
+/// The numbers of an array field, in memory that an index can choose from.
+Value Fusion::createArray(OpBuilder &builder, FieldAttr field, EmitOp emit) {
+  Location loc = emit.getLoc();
+  int64_t first = getElementIndex(record, field.getName());
+  Value array = memref::AllocaOp::create(
+      builder, loc,
+      MemRefType::get({field.getElementCount()}, field.getType()));
+  for (int64_t i = 0; i < field.getElementCount(); ++i) {
+    Value at = arith::ConstantIndexOp::create(builder, loc, i);
+    memref::StoreOp::create(builder, loc, emit.getValues()[first + i], array,
+                            at);
+  }
+  return array;
+}
+
+/// The number of an element with these indices, if they are constant and in
+/// range.
+static std::optional<int64_t> getConstantElement(GetOp get, FieldAttr field) {
+  int64_t element = 0;
+  for (auto [index, count] : llvm::zip(get.getElements(), field.getCounts())) {
+    APInt constant;
+    if (!matchPattern(index, m_ConstantInt(&constant)) ||
+        constant.getSExtValue() < 0 || constant.getSExtValue() >= count)
+      return std::nullopt;
+    element = element * count + constant.getSExtValue();
+  }
+  return element;
+}
+
+void Fusion::replaceFields(Value prim, EmitOp emit) {
+  llvm::DenseMap<StringAttr, Value> arrays;
+  for (Operation *user : llvm::make_early_inc_range(prim.getUsers())) {
+    auto get = cast<GetOp>(user);
+    FieldAttr field = record.getField(get.getField());
+    int64_t first = getElementIndex(record, get.getField());
+    if (std::optional<int64_t> element = getConstantElement(get, field)) {
+      get.replaceAllUsesWith(emit.getValues()[first + *element]);
+      get.erase();
+      continue;
+    }
+    Value &array = arrays[get.getFieldAttr()];
+    if (!array) {
+      OpBuilder atEmit(prim.getDefiningOp());
+      array = createArray(atEmit, field, emit);
+    }
+    OpBuilder builder(get);
+    Value index;
+    for (auto [element, count] :
+         llvm::zip(get.getElements(), field.getCounts())) {
+      if (!index) {
+        index = element;
+        continue;
+      }
+      Value extent =
+          arith::ConstantIndexOp::create(builder, get.getLoc(), count);
+      index = arith::MulIOp::create(builder, get.getLoc(), index, extent);
+      index = arith::AddIOp::create(builder, get.getLoc(), index, element);
+    }
+    Value number = memref::LoadOp::create(builder, get.getLoc(), array, index);
+    get.replaceAllUsesWith(number);
+    get.erase();
+  }
+}
+
+void Fusion::copyBody(OpBuilder &builder, Region &phase, EmitOp emit,
+                      llvm::function_ref<void(Operation *)> visit) {
+  auto prim = ub::PoisonOp::create(builder, emit.getLoc(),
+                                   phase.getArgument(0).getType(),
+                                   ub::PoisonAttr::get(builder.getContext()));
+  IRMapping mapping;
+  mapping.map(phase.getArgument(0), prim);
+  for (Operation &op : phase.front().without_terminator())
+    builder.clone(op, mapping)->walk(visit);
+  replaceFields(prim, emit);
+  prim.erase();
+}
+
+void Fusion::replaceEmit(EmitOp emit) {
+  OpBuilder builder(emit);
+  AssignPreviousOp assignment;
+  if (AssignOp assign = consumer.getAssign()) {
+    copyBody(builder, assign.getBody(), emit, [&](Operation *op) {
+      if (auto found = dyn_cast<AssignPreviousOp>(op))
+        assignment = found;
+    });
+    builder.setInsertionPoint(assignment);
+  }
+  // The consumer's ports follow the producer's.
+  int64_t ports = producer.getOutputs().size() - 1;
+  copyBody(builder, consumer.getProcess().getBody(), emit, [&](Operation *op) {
+    if (auto inner = dyn_cast<EmitOp>(op))
+      inner.setPort(ports + inner.getPort());
+  });
+  if (assignment)
+    assignment.erase();
+  emit.erase();
+}
+
+void Fusion::takePorts() {
+  SmallVector<Attribute> outputs(producer.getOutputs().getValue());
+  int64_t kept = outputs.size() - 1;
+  outputs.erase(outputs.begin() + fusedPort());
+  llvm::append_range(outputs, consumer.getOutputs());
+  for (EdgeOp other : getEdgesFrom(producer))
+    other.setPort(renumber(other.getPort()));
+  for (EdgeOp other : getEdgesFrom(consumer)) {
+    other.setProducerAttr(edge.getProducerAttr());
+    other.setPort(kept + other.getPort());
+  }
+  producer.setOutputsAttr(ArrayAttr::get(producer.getContext(), outputs));
+}
+
+/// Who waited for the consumer now waits for the producer.
+void Fusion::takeWaits() {
+  for (auto stage : getPipeline(producer).getOps<StageOp>()) {
+    ScheduleOp schedule = stage.getSchedule();
+    if (!schedule || !schedule.getEndStageAttr())
+      continue;
+    SmallVector<Attribute> waits;
+    for (Attribute wait : schedule.getEndStageAttr()) {
+      if (wait == edge.getConsumerAttr())
+        wait = edge.getProducerAttr();
+      if (!llvm::is_contained(waits, wait))
+        waits.push_back(wait);
+    }
+    schedule.setEndStageAttr(ArrayAttr::get(stage.getContext(), waits));
+  }
+}
+
+void Fusion::run() {
+  SmallVector<EmitOp> emits = getEmits(producer, fusedPort());
+  // The producer's own emissions first, as the consumer's are put among them.
+  producer.walk([&](EmitOp emit) {
+    if (!llvm::is_contained(emits, emit))
+      emit.setPort(renumber(emit.getPort()));
+  });
+  for (EmitOp emit : emits)
+    replaceEmit(emit);
+  takeWaits();
+  SmallVector<Attribute> names;
+  if (ArrayAttr before = producer.getFusedAttr())
+    llvm::append_range(names, before);
+  names.push_back(consumer.getSymNameAttr());
+  if (ArrayAttr inside = consumer.getFusedAttr())
+    llvm::append_range(names, inside);
+  producer.setFusedAttr(ArrayAttr::get(producer.getContext(), names));
+  producer.setThreads(std::max(producer.getThreads(), consumer.getThreads()));
+  takePorts();
+  edge.erase();
+  consumer.erase();
+}
+
+void FuseStagesPass::runOnOperation() {
+  SmallVector<StageOp> stages(getOperation().getOps<StageOp>());
+  llvm::SmallDenseSet<Operation *> gone;
+  for (StageOp producer : stages) {
+    if (gone.contains(producer) || !producer.getProcess())
+      continue;
+    for (bool changed = true; changed;) {
+      changed = false;
+      for (EdgeOp edge : getEdgesFrom(producer)) {
+        auto consumer = lookupInPipeline<StageOp>(edge, edge.getConsumerAttr());
+        Refusal refusal;
+        if (failed(check(edge, refusal)))
+          continue;
+        consumer.emitRemark()
+            << "stage '" << consumer.getSymName() << "' runs inside stage '"
+            << producer.getSymName() << "'";
+        gone.insert(consumer);
+        Fusion(edge).run();
+        ++fused;
+        changed = true;
+        break;
+      }
+    }
+    for (EdgeOp edge : getEdgesFrom(producer)) {
+      Refusal refusal;
+      (void)check(edge, refusal);
+      auto consumer = lookupInPipeline<StageOp>(edge, edge.getConsumerAttr());
+      InFlightDiagnostic remark = consumer.emitRemark()
+                                  << "stage '" << consumer.getSymName()
+                                  << "' is not fused with stage '"
+                                  << producer.getSymName() << "'";
+      remark.attachNote(refusal.at->getLoc()) << refusal.why;
+      ++refused;
+    }
+  }
+}

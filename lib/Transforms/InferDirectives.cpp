@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// piko-infer-directives: writes down directives that hold without being said.
+
+#include "Piko/Transforms/Passes.h"
+
+#include "BinIdentity.h"
+#include "PhaseGraph.h"
+
+namespace piko {
+#define GEN_PASS_DEF_INFERDIRECTIVES
+#include "Piko/Transforms/Passes.h.inc"
+} // namespace piko
+
+using namespace mlir;
+using namespace piko;
+
+namespace {
+struct InferDirectivesPass
+    : piko::impl::InferDirectivesBase<InferDirectivesPass> {
+  void runOnOperation() override;
+};
+} // namespace
+
+void InferDirectivesPass::runOnOperation() {
+  BinIdentity identity(getOperation());
+  SmallVector<AssignToOp> proved;
+  for (auto stage : getOperation().getOps<StageOp>()) {
+    AssignOp assign = stage.getAssign();
+    if (!assign || !stage.getProcess() || hasSource(stage))
+      continue;
+    Operation *only = getOnlyAssignment(assign);
+    if (isa_and_nonnull<AssignPreviousOp>(only))
+      continue; // the user said so
+    Refusal refusal;
+    if (succeeded(identity.prove(stage, refusal))) {
+      proved.push_back(cast<AssignToOp>(only));
+      only->emitRemark() << "stage '" << stage.getSymName()
+                         << "' keeps each primitive in the bin that it was "
+                            "emitted from";
+      continue;
+    }
+    InFlightDiagnostic remark = assign.emitRemark()
+                                << "the bins of stage '" << stage.getSymName()
+                                << "' are not known to be those before";
+    remark.attachNote(refusal.at->getLoc()) << refusal.why;
+    ++refused;
+  }
+  // Only now, because the proofs use what the phases say.
+  for (AssignToOp to : proved) {
+    OpBuilder builder(to);
+    AssignPreviousOp::create(builder, to.getLoc(), /*inferred=*/true);
+    to.erase();
+    ++inferred;
+  }
+}

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+#include "PhaseGraph.h"
+
+using namespace mlir;
+using namespace piko;
+
+SmallVector<EdgeOp> piko::getEdgesInto(StageOp stage) {
+  return llvm::to_vector(llvm::make_filter_range(
+      getPipeline(stage).getOps<EdgeOp>(),
+      [&](EdgeOp edge) { return edge.getConsumer() == stage.getSymName(); }));
+}
+
+SmallVector<EdgeOp> piko::getEdgesFrom(StageOp stage) {
+  return llvm::to_vector(llvm::make_filter_range(
+      getPipeline(stage).getOps<EdgeOp>(),
+      [&](EdgeOp edge) { return edge.getProducer() == stage.getSymName(); }));
+}
+
+bool piko::hasSource(StageOp stage) {
+  return llvm::any_of(
+      getPipeline(stage).getOps<SourceOp>(),
+      [&](SourceOp source) { return source.getStage() == stage.getSymName(); });
+}
+
+SmallVector<EmitOp> piko::getEmits(StageOp stage, int64_t port) {
+  SmallVector<EmitOp> emits;
+  stage.walk([&](EmitOp emit) {
+    if (int64_t(emit.getPort()) == port)
+      emits.push_back(emit);
+  });
+  return emits;
+}
+
+int64_t piko::getElementIndex(RecordOp record, StringRef name) {
+  int64_t place = 0;
+  for (auto field : record.getFields().getAsRange<FieldAttr>()) {
+    if (field.getName() == name)
+      return place;
+    place += field.getElementCount();
+  }
+  llvm_unreachable("the verifier knows the field");
+}

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// The graph of a pipeline at the authored level, asked from a stage.
+
+#ifndef PIKO_LIB_TRANSFORMS_PHASEGRAPH_H
+#define PIKO_LIB_TRANSFORMS_PHASEGRAPH_H
+
+#include "Piko/Dialect/Piko/IR/Piko.h"
+
+namespace piko {
+
+llvm::SmallVector<EdgeOp> getEdgesInto(StageOp stage);
+llvm::SmallVector<EdgeOp> getEdgesFrom(StageOp stage);
+bool hasSource(StageOp stage);
+
+/// What a stage emits to a port.
+llvm::SmallVector<EmitOp> getEmits(StageOp stage, int64_t port);
+
+/// The place of a field's first number among those of its record.
+int64_t getElementIndex(RecordOp record, llvm::StringRef field);
+
+} // namespace piko
+
+#endif // PIKO_LIB_TRANSFORMS_PHASEGRAPH_H
