@@ -114,12 +114,15 @@ piko::readPipelineNames(const CompileOptions &options, MLIRContext &context) {
 }
 
 LogicalResult piko::lowerPipeline(ModuleOp module, Level level,
-                                  const CheckOptions &check) {
+                                  const CheckOptions &check,
+                                  const SynthesisOptions &synthesis) {
   PassManager passes(module.getContext());
   if (check.enabled)
     addCheckSequence(passes, check);
   if (level >= Level::Kernels)
-    addSynthesisSequence(passes);
+    // Findings are about the stages as they are written.
+    addSynthesisSequence(passes,
+                         check.enabled ? SynthesisOptions::none() : synthesis);
   if (level >= Level::Resolved)
     addResolveSequence(passes);
   if (level >= Level::Target)

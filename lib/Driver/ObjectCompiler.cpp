@@ -109,8 +109,8 @@ static std::string makeRequest(const ObjectOptions &options,
   key.add(source.file).add(source.pipeName).add(source.text.value_or(""));
   if (auto folder = files.getCurrentWorkingDirectory())
     key.add(*folder);
-  for (const auto *list :
-       {&source.includeDirs, &source.defines, &source.check.numbers}) {
+  for (const auto *list : {&source.includeDirs, &source.defines,
+                           &source.check.numbers, &source.synthesis.without}) {
     key.add(std::to_string(list->size()));
     for (const std::string &item : *list)
       key.add(item);
@@ -204,7 +204,8 @@ compilePipeline(const ObjectOptions &options, const Files &files,
         writeHostHeader(pipeline, options.source.file, options.nameSpace);
   }
   object.symbol = getProgramSymbol(options.nameSpace, object.pipeline);
-  if (failed(lowerPipeline(*module, Level::LLVM, options.source.check)))
+  if (failed(lowerPipeline(*module, Level::LLVM, options.source.check,
+                           options.source.synthesis)))
     return nullptr;
   std::unique_ptr<llvm::Module> translated =
       translateToLLVMIR(*module, llvmContext);

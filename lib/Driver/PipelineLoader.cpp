@@ -46,6 +46,7 @@ static std::unique_ptr<LoadedProgram> load(CompileOptions source,
   source.includeDirs = options.includeDirs;
   source.defines = options.defines;
   source.check = options.check;
+  source.synthesis = options.synthesis;
   ObjectOptions objectOptions{.source = std::move(source),
                               .execution = options.target,
                               .target = {.cpu = "native"},

@@ -30,11 +30,26 @@ void piko::addCheckSequence(OpPassManager &passes,
   passes.addPass(createAddChecks(checks));
 }
 
-void piko::addSynthesisSequence(OpPassManager &passes) {
+void piko::addSynthesisSequence(OpPassManager &passes,
+                                const SynthesisOptions &options) {
+  addCleanUp(passes);
+  // A field that a loop reads is the same field behind it.
+  passes.addPass(createLoopInvariantCodeMotionPass());
+  addCleanUp(passes);
+  {
+    OpPassManager &pipeline = passes.nest<PipelineOp>();
+    pipeline.addPass(createOrderStages());
+    if (options.has("infer-directives"))
+      pipeline.addPass(createInferDirectives());
+    if (options.has("fuse-stages"))
+      pipeline.addPass(createFuseStages());
+  }
   addCleanUp(passes);
   OpPassManager &pipeline = passes.nest<PipelineOp>();
-  pipeline.addPass(createOrderStages());
-  pipeline.addPass(createOwnPixels());
+  if (options.has("test-early"))
+    pipeline.addPass(createTestEarly());
+  if (options.has("own-pixels"))
+    pipeline.addPass(createOwnPixels());
   pipeline.addPass(createFormKernels());
 }
 
@@ -61,9 +76,9 @@ void piko::addLLVMSequence(OpPassManager &passes) {
 }
 
 void piko::registerSequences() {
-  PassPipelineRegistration<>("piko-synthesize",
-                             "From the authored to the kernels level",
-                             addSynthesisSequence);
+  PassPipelineRegistration<>(
+      "piko-synthesize", "From the authored to the kernels level",
+      [](OpPassManager &passes) { addSynthesisSequence(passes); });
   PassPipelineRegistration<>("piko-resolve",
                              "From the kernels to the resolved level",
                              addResolveSequence);

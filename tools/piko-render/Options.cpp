@@ -20,6 +20,7 @@ it, and says how long a frame took.
   --target cpu|reference compiled for this machine, or run by the reference
                          executor (cpu)
   -I FOLDER, -D NAME[=VALUE]   for the pipeline's preprocessor
+  --without PASS,...     passes of synthesis to leave out
   --no-cache             compile even if nothing changed since the last time
   --cache-dir FOLDER     where compiled code is kept ($PIKO_CACHE_DIR,
                          $XDG_CACHE_HOME/piko or ~/.cache/piko)
@@ -83,6 +84,7 @@ private:
         {"--target", [&] { options.load.target = target(value(name)); }},
         {"--no-cache", [&] { options.load.cache.enabled = false; }},
         {"--cache-dir", [&] { options.load.cache.directory = value(name); }},
+        {"--without", [&] { parseWithout(value("--without")); }},
         {"--width", [&] { options.view.width = integer(name, 1, 65536); }},
         {"--height", [&] { options.view.height = integer(name, 1, 65536); }},
         {"--lights", [&] { options.lights = integer(name, 0, 1'000'000); }},
@@ -104,6 +106,13 @@ private:
       fail("unknown option '" + name + "'");
     else
       action->second();
+  }
+
+  void parseWithout(const std::string &text) {
+    if (auto synthesis = parseSynthesisOptions(text))
+      options.load.synthesis = *synthesis;
+    else
+      fail(describeWrongSynthesisOptions(text));
   }
 
   void parseCheck(const std::string &text) {

@@ -108,6 +108,10 @@ struct CommandLine {
       llvm::cl::desc("check the rules of state while the pipeline runs, and "
                      "these fields for NaN"),
       llvm::cl::cat(category)};
+  llvm::cl::opt<std::string> without{
+      "without", llvm::cl::value_desc("pass,..."),
+      llvm::cl::desc("passes of synthesis to leave out"),
+      llvm::cl::cat(category)};
   llvm::cl::opt<bool> remarks{
       "remarks", llvm::cl::desc("print what the passes have to say"),
       llvm::cl::cat(category)};
@@ -126,12 +130,17 @@ struct CommandLine {
       return CheckOptions();
     return parseCheckOptions(check.empty() ? "" : "=" + check);
   }
+  std::optional<SynthesisOptions> getSynthesis() const {
+    return without.empty() ? SynthesisOptions()
+                           : parseSynthesisOptions(without);
+  }
   CompileOptions getSource() const {
     return {.file = file,
             .pipeName = pipe,
             .includeDirs = {includeDirs.begin(), includeDirs.end()},
             .defines = {defines.begin(), defines.end()},
-            .check = *getCheck()};
+            .check = *getCheck(),
+            .synthesis = *getSynthesis()};
   }
   TargetOptions getTarget() const {
     return {.cpu = cpu, .optLevel = static_cast<int>(optLevel)};
@@ -151,6 +160,8 @@ static std::string checkOptions(const CommandLine &line) {
   if (!line.getCheck())
     return "--check: expected nan:RECORD.FIELD,..., but got '" + line.check +
            "'";
+  if (!line.getSynthesis())
+    return describeWrongSynthesisOptions(line.without);
   if (line.optLevel > 3)
     return "expected -O0 to -O3, but got -O" + std::to_string(line.optLevel);
   if (!isObject &&
@@ -211,7 +222,8 @@ static std::optional<std::string> writeText(const CommandLine &line) {
                     ? Level::LLVM
                     : static_cast<Level>(line.getEmit());
   OwningOpRef<ModuleOp> module = readPipeline(line.getSource(), context);
-  if (!module || failed(lowerPipeline(*module, level, line.getSource().check)))
+  if (!module || failed(lowerPipeline(*module, level, line.getSource().check,
+                                      *line.getSynthesis())))
     return std::nullopt;
   if (line.getEmit() >= Emit::LLVMIR)
     return translate(line, *module);

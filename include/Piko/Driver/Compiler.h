@@ -47,7 +47,8 @@ readPipelineNames(const CompileOptions &options, mlir::MLIRContext &context);
 
 /// Takes a module from the authored level to another one.
 llvm::LogicalResult lowerPipeline(mlir::ModuleOp module, Level level,
-                                  const CheckOptions &check = {});
+                                  const CheckOptions &check = {},
+                                  const SynthesisOptions &synthesis = {});
 
 /// LLVM IR, not optimised, of a module at Level::LLVM; null after diagnostics.
 std::unique_ptr<llvm::Module> translateToLLVMIR(mlir::ModuleOp module,

@@ -6,6 +6,7 @@
 #define PIKO_DRIVER_OPTIONS_H
 
 #include "Piko/Driver/CheckOptions.h"
+#include "Piko/Driver/SynthesisOptions.h"
 
 #include <cstdint>
 #include <optional>
@@ -31,6 +32,7 @@ struct CompileOptions {
   /// The file's text, where it is not on disk; `file` is then only its name.
   std::optional<std::string> text = {};
   CheckOptions check = {};
+  SynthesisOptions synthesis = {};
 };
 
 /// What code is made for.

@@ -33,6 +33,7 @@ struct LoadOptions {
   /// What is checked while the pipeline runs. The reference executor is told in
   /// the pipeline's text of fields that must not be NaN.
   CheckOptions check = {};
+  SynthesisOptions synthesis = {};
 };
 
 /// A program that is ready to run; its code goes when the object goes, so it

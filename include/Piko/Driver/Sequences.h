@@ -7,6 +7,7 @@
 #define PIKO_DRIVER_SEQUENCES_H
 
 #include "Piko/Driver/CheckOptions.h"
+#include "Piko/Driver/SynthesisOptions.h"
 
 #include "mlir/Pass/PassManager.h"
 
@@ -16,7 +17,8 @@ namespace piko {
 void addCheckSequence(mlir::OpPassManager &passes, const CheckOptions &options);
 
 /// `piko-synthesize`: from the authored to the kernels level.
-void addSynthesisSequence(mlir::OpPassManager &passes);
+void addSynthesisSequence(mlir::OpPassManager &passes,
+                          const SynthesisOptions &options = {});
 
 /// `piko-resolve`: from the kernels to the resolved level.
 void addResolveSequence(mlir::OpPassManager &passes);

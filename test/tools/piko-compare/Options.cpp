@@ -76,7 +76,13 @@ Options parseOptions(int argc, char **argv) {
       options.reference = words.takeValues(name, false)[0];
     else if (name == "--cases")
       options.cases = words.takeValues(name, false)[0];
-    else if (name == "--threads")
+    else if (name == "--without") {
+      std::string text = words.takeValues(name, false)[0];
+      auto synthesis = piko::parseSynthesisOptions(text);
+      if (!synthesis)
+        throw std::runtime_error(piko::describeWrongSynthesisOptions(text));
+      options.synthesis = *synthesis;
+    } else if (name == "--threads")
       options.threads = toNumbers<int>(words.takeValues(name, true));
     else if (name == "--runs")
       options.runs = toNumbers<int>(words.takeValues(name, false))[0];

@@ -6,6 +6,7 @@
 #define PIKO_TEST_TOOLS_PIKO_COMPARE_OPTIONS_H
 
 #include "Piko/Driver/CheckOptions.h"
+#include "Piko/Driver/SynthesisOptions.h"
 
 #include <cstdint>
 #include <string>
@@ -40,6 +41,7 @@ struct Options {
   unsigned timeout = 0;
   /// Checking mode, on both sides.
   piko::CheckOptions check;
+  piko::SynthesisOptions synthesis;
 };
 
 /// Both throw std::runtime_error.

@@ -69,6 +69,7 @@ struct Programs::Implementation {
   Log log;
   std::string referenceFile;
   CheckOptions check;
+  SynthesisOptions synthesis;
   std::unique_ptr<PipelineFile> file;
   /// Where the compiled file is `.mlir`: a module for each pipeline.
   std::vector<std::pair<std::string, OwningOpRef<ModuleOp>>> modules;
@@ -126,10 +127,12 @@ void Programs::Implementation::compileReference() {
 }
 
 Programs::Programs(const std::string &file, const std::string &reference,
-                   const std::string &pipe, const CheckOptions &check)
+                   const std::string &pipe, const CheckOptions &check,
+                   const SynthesisOptions &synthesis)
     : self(std::make_unique<Implementation>()) {
   self->referenceFile = reference;
   self->check = check;
+  self->synthesis = synthesis;
   self->file = self->parse(reference, pipe);
   if (file != reference)
     self->readText(file, pipe);
@@ -151,7 +154,8 @@ Program Programs::compile(const std::string &pipe) {
     for (size_t i = 0; i < self->file->size(); ++i)
       if (self->file->getName(i) == pipe)
         module = self->file->translate(i);
-  if (!module || failed(lowerPipeline(*module, Level::LLVM, self->check)))
+  if (!module ||
+      failed(lowerPipeline(*module, Level::LLVM, self->check, self->synthesis)))
     self->log.fail("cannot compile " + pipe);
   auto context = std::make_unique<llvm::LLVMContext>();
   std::unique_ptr<llvm::Module> llvmModule =

@@ -7,6 +7,7 @@
 #define PIKO_TEST_TOOLS_PIKO_COMPARE_PROGRAMS_H
 
 #include "Piko/Driver/CheckOptions.h"
+#include "Piko/Driver/SynthesisOptions.h"
 #include "pikort/pikort.h"
 
 #include <functional>
@@ -25,7 +26,8 @@ public:
   /// `pipe` is the only one that is wanted; empty = all. Throws
   /// std::runtime_error, as do all functions.
   Programs(const std::string &file, const std::string &reference,
-           const std::string &pipe, const piko::CheckOptions &check);
+           const std::string &pipe, const piko::CheckOptions &check,
+           const piko::SynthesisOptions &synthesis);
   ~Programs();
 
   /// The pipelines that can be read.

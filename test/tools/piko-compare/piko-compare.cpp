@@ -51,7 +51,7 @@ bool compare(const Options &options, const Case &input, Programs &programs) {
 bool compareAll(const Options &options) {
   Programs programs(options.file, options.reference,
                     options.cases.empty() ? options.one.pipe : "",
-                    options.check);
+                    options.check, options.synthesis);
   if (options.cases.empty()) {
     Case one = options.one;
     std::vector<std::string> names = programs.names();

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Which passes of synthesis to leave out: `--without=PASS,...`.
+
+#ifndef PIKO_DRIVER_SYNTHESISOPTIONS_H
+#define PIKO_DRIVER_SYNTHESISOPTIONS_H
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace piko {
+
+struct SynthesisOptions {
+  /// Names of passes as piko-opt has them, but for `piko-`.
+  std::vector<std::string> without;
+
+  bool has(const std::string &pass) const;
+  /// All passes that can be left out; results are the same without them.
+  static const std::vector<std::string> &getOptional();
+  /// None of them.
+  static SynthesisOptions none() { return {getOptional()}; }
+};
+
+/// Reads names with commas between them; none if one is not of a pass that can
+/// be left out.
+std::optional<SynthesisOptions> parseSynthesisOptions(const std::string &text);
+
+/// What to say then.
+std::string describeWrongSynthesisOptions(const std::string &text);
+
+} // namespace piko
+
+#endif // PIKO_DRIVER_SYNTHESISOPTIONS_H
