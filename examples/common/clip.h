@@ -104,6 +104,14 @@ inline int clipPolygon(ClipCorner (&polygon)[maxCorners], int count) {
   return count;
 }
 
+/// A point in normalised device coordinates on an image of `size` pixels.
+inline Point toPoint(glm::vec2 ndc, glm::ivec2 size) {
+  glm::vec2 half = glm::vec2(size) * 0.5f;
+  // A cut leaves a corner on the guard band or a rounding error beyond.
+  ndc = glm::clamp(ndc, -guardBand, guardBand);
+  return snap({half.x + ndc.x * half.x, half.y - ndc.y * half.y});
+}
+
 /// A pixel that a polygon covers.
 struct Sample {
   glm::ivec2 pixel;
@@ -186,10 +194,7 @@ private:
     if (!(p.w > 0))
       return false;
     float inverse = 1 / p.w;
-    glm::vec2 half = glm::vec2(size) * 0.5f;
-    // A cut leaves a corner on the guard band or a rounding error beyond.
-    glm::vec2 ndc = glm::clamp(glm::vec2(p) * inverse, -guardBand, guardBand);
-    points[i] = snap({half.x + ndc.x * half.x, half.y - ndc.y * half.y});
+    points[i] = toPoint(glm::vec2(p) * inverse, size);
     depths[i] = p.z * inverse;
     shares[i] = {corner.weight * inverse, inverse};
     return true;

@@ -1,29 +1,59 @@
-//===- raster.piko.cpp - A triangle rasterizer in five stages -------------===//
+//===- raster.piko.cpp - A triangle rasterizer, mapped in several ways ----===//
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-//   vertices ---> Vertex Shader - - - - - - (shaded vertices)
-//                                                  :
-//   triangles --> Rasterizer ---> Fragment Shader ---> Depth Test --->
-//   Composite
+//   triangles --> Vertex Shader --> Rasterizer --> Fragment Shader
+//                                                        |
+//                                    Composite <-- Depth Test
 //
-// Two pipelines share the stages: `Baseline`, where every bin is the whole
-// screen, and `Binned`, with bins of 8 x 8 pixels from the Rasterizer on.
+// The pipelines differ in template parameters and directives only:
+//
+//   Baseline     one bin, the whole screen; each stage is a kernel
+//   FreePipe     one bin; each core takes its share through all stages, which
+//                are one kernel
+//   Binned       bins of 8 x 8 pixels; each stage is a kernel
+//   BinnedFused  the Rasterizer and the Fragment Shader are one kernel
+//   Bucketed     all cores share a strip of triangles and finish it
+//
+// and two in which triangles refer to vertices that are shaded once:
+//
+//   Indexed      as Baseline
+//   Fused        Setup finds the pixels of a triangle; bins of 32 x 32 pixels,
+//                and all stages from the Rasterizer on are one kernel
 //
 //===----------------------------------------------------------------------===//
 #include <piko.h>
 #include <piko/scene.h>
 
-#include "../common/clip.h"
+#include "../common/corner.h"
 #include "../common/lighting.h"
 
 using namespace piko::scene;
 
 namespace raster {
 
+// How the stages from the Rasterizer on are mapped.
+struct Mapping {
+  int bin = 0;
+  piko::SchedulePolicy core = piko::LoadBalance;
+  piko::SchedulePolicy rest = core; ///< of the stages behind Fragment Shader
+  int64_t split = 0;                ///< how many primitives `All` cores share
+  bool apart = true; ///< whether stages behind the Rasterizer ask for a core
+};
+
 struct ShadedVertex {
-  glm::vec4 clip;
+  ScreenVertex screen;
   glm::vec3 position;
   glm::vec3 normal;
+};
+
+struct ShadedTriangle {
+  ShadedVertex corner[3];
+};
+
+// A triangle that may cover pixels, and among which they are.
+struct BoxedTriangle {
+  glm::ivec3 vertex;
+  PixelBox box;
 };
 
 struct Fragment {
@@ -52,72 +82,136 @@ struct State {
   Camera camera;
   Settings settings;
   piko::Buffer<Light> lights;
-  piko::Buffer<ShadedVertex> vertices; // one for each Vertex
   piko::Image<Depth> depth;
   piko::Image<Color> color;
 };
 
-// Shades each vertex once, and leaves it where triangles find it.
-struct VertexShader : piko::Stage<0, 0, 64, Vertex>, piko::Uses<State> {
-  void schedule(piko::BinId) { specifySchedule(piko::LoadBalance); }
+inline ShadedVertex shade(const Vertex &v, const Camera &camera,
+                          glm::ivec2 size) {
+  return {toScreen(camera.viewProjection * glm::vec4(v.position, 1), size),
+          v.position, v.normal};
+}
 
-  void process(const Vertex &v) {
-    ShadedVertex &out = state().vertices[v.index];
-    out.clip = state().camera.viewProjection * glm::vec4(v.position, 1);
-    out.position = v.position;
-    out.normal = v.normal;
+//===----------------------------------------------------------------------===//
+// Triangles that carry their vertices
+//===----------------------------------------------------------------------===//
+
+struct LinearState : State {
+  piko::Buffer<Vertex> mesh;
+};
+
+// Shades the vertices of a triangle.
+template <Mapping M>
+struct TriangleShader : piko::Stage<0, 0, 64, Triangle, ShadedTriangle>,
+                        piko::Uses<LinearState> {
+  void schedule(piko::BinId) { this->specifySchedule(M.core, M.split); }
+
+  void process(const Triangle &t) {
+    ShadedTriangle out;
+    for (int i = 0; i < 3; ++i)
+      out.corner[i] = shade(this->state().mesh[t.vertex[i]],
+                            this->state().camera, this->domain());
+    this->emit(out, 0);
   }
 };
 
+//===----------------------------------------------------------------------===//
+// Triangles that refer to vertices
+//===----------------------------------------------------------------------===//
+
+struct IndexedState : State {
+  piko::Buffer<ShadedVertex> vertices; // one for each Vertex
+};
+
+// Shades each vertex once, and leaves it where triangles find it.
+struct VertexShader : piko::Stage<0, 0, 64, Vertex>, piko::Uses<IndexedState> {
+  void process(const Vertex &v) {
+    state().vertices[v.index] = shade(v, state().camera, domain());
+  }
+};
+
+// Finds the triangles that may cover pixels.
+struct Setup : piko::Stage<0, 0, 64, Triangle, BoxedTriangle>,
+               piko::Uses<IndexedState> {
+  void schedule(piko::BinId) { endStage<VertexShader>(); }
+
+  void process(const Triangle &t) {
+    auto corner = [&](int i) -> const ScreenVertex & {
+      return state().vertices[t.vertex[i]].screen;
+    };
+    PixelBox box = boxOf(corner(0), corner(1), corner(2), domain(),
+                         state().settings.cullBackFaces != 0);
+    if (box.lo.x <= box.hi.x && box.lo.y <= box.hi.y)
+      emit(BoxedTriangle{t.vertex, box}, 0);
+  }
+};
+
+//===----------------------------------------------------------------------===//
+// From triangles to pixels
+//===----------------------------------------------------------------------===//
+
 // Finds the pixels of a triangle that lie in the bin.
-template <int Bin>
-struct Rasterizer : piko::Stage<Bin, Bin, 64, Triangle, Fragment>,
-                    piko::Uses<State> {
+template <Mapping M, class Triangle, class UsedState>
+struct Rasterizer : piko::Stage<M.bin, M.bin, 64, Triangle, Fragment>,
+                    piko::Uses<UsedState> {
   void assignBin(const Triangle &t) {
-    if constexpr (Bin == 0) {
+    if constexpr (M.bin == 0) {
       this->assignToBin(t, piko::BinId{0});
     } else {
-      PixelBox box = project(t).box();
+      PixelBox box = boxIn(t);
       this->assignToBoundingBox(t, box.lo, box.hi);
     }
   }
 
-  void schedule(piko::BinId) {
-    this->specifySchedule(piko::LoadBalance);
-    this->template endStage<VertexShader>();
-  }
+  void schedule(piko::BinId) { this->specifySchedule(M.core, M.split); }
 
   void process(const Triangle &t) {
-    const ShadedVertex &a = state().vertices[t.vertex.x];
-    const ShadedVertex &b = state().vertices[t.vertex.y];
-    const ShadedVertex &c = state().vertices[t.vertex.z];
-    project(t).rasterize(this->binLo(), this->binHi(), [&](const Sample &s) {
-      glm::vec3 w = s.weight;
-      this->emit(
-          Fragment{s.pixel, s.depth,
-                   a.position * w.x + b.position * w.y + c.position * w.z,
-                   a.normal * w.x + b.normal * w.y + c.normal * w.z},
-          0);
-    });
+    PixelBox box = boxIn(t);
+    const ShadedVertex &a = corner(t, 0), &b = corner(t, 1), &c = corner(t, 2);
+    rasterize(
+        a.screen, b.screen, c.screen, box, this->binLo(), this->binHi(),
+        this->domain(), cullBackFaces(), [&](const Sample &s) {
+          glm::vec3 w = s.weight;
+          this->emit(
+              Fragment{s.pixel, s.depth,
+                       a.position * w.x + b.position * w.y + c.position * w.z,
+                       a.normal * w.x + b.normal * w.y + c.normal * w.z},
+              0);
+        });
   }
 
 private:
-  ScreenPolygon project(const Triangle &t) {
-    return ScreenPolygon(state().vertices[t.vertex.x].clip,
-                         state().vertices[t.vertex.y].clip,
-                         state().vertices[t.vertex.z].clip, this->domain(),
-                         state().settings.cullBackFaces != 0);
+  static constexpr bool isIndexed = std::is_same_v<Triangle, BoxedTriangle>;
+
+  bool cullBackFaces() { return this->state().settings.cullBackFaces != 0; }
+
+  const ShadedVertex &corner(const Triangle &t, int i) {
+    if constexpr (isIndexed)
+      return this->state().vertices[t.vertex[i]];
+    else
+      return t.corner[i];
+  }
+
+  PixelBox boxIn(const Triangle &t) {
+    if constexpr (isIndexed)
+      return t.box;
+    else
+      return boxOf(t.corner[0].screen, t.corner[1].screen, t.corner[2].screen,
+                   this->domain(), cullBackFaces());
   }
 };
 
 // Sums up the lights at a fragment.
-template <int Bin>
-struct FragmentShader : piko::Stage<Bin, Bin, 64, Fragment, ShadedFragment>,
+template <Mapping M>
+struct FragmentShader : piko::Stage<M.bin, M.bin, 64, Fragment, ShadedFragment>,
                         piko::Uses<State> {
   void assignBin(const Fragment &f) {
     this->assignToBin(f, this->binFromPosition(f.pixel));
   }
-  void schedule(piko::BinId) { this->specifySchedule(piko::LoadBalance); }
+  void schedule(piko::BinId) {
+    if constexpr (M.apart)
+      this->specifySchedule(M.core, M.split);
+  }
 
   void process(const Fragment &f) {
     glm::vec3 n = glm::normalize(f.normal);
@@ -130,13 +224,16 @@ struct FragmentShader : piko::Stage<Bin, Bin, 64, Fragment, ShadedFragment>,
 };
 
 // Lets a fragment pass that is nearer than all before it.
-template <int Bin>
-struct DepthTest : piko::Stage<Bin, Bin, 64, ShadedFragment, PixelColor>,
+template <Mapping M>
+struct DepthTest : piko::Stage<M.bin, M.bin, 64, ShadedFragment, PixelColor>,
                    piko::Uses<State> {
   void assignBin(const ShadedFragment &f) {
     this->assignToBin(f, this->binFromPosition(f.pixel));
   }
-  void schedule(piko::BinId) { this->specifySchedule(piko::LoadBalance); }
+  void schedule(piko::BinId) {
+    if constexpr (M.apart)
+      this->specifySchedule(M.rest, M.split);
+  }
 
   void process(const ShadedFragment &f) {
     bool passed = false;
@@ -151,12 +248,16 @@ struct DepthTest : piko::Stage<Bin, Bin, 64, ShadedFragment, PixelColor>,
 };
 
 // Writes the colours that passed.
-template <int Bin>
-struct Composite : piko::Stage<Bin, Bin, 64, PixelColor>, piko::Uses<State> {
+template <Mapping M>
+struct Composite : piko::Stage<M.bin, M.bin, 64, PixelColor>,
+                   piko::Uses<State> {
   void assignBin(const PixelColor &p) {
     this->assignToBin(p, this->binFromPosition(p.pixel));
   }
-  void schedule(piko::BinId) { this->specifySchedule(piko::LoadBalance); }
+  void schedule(piko::BinId) {
+    if constexpr (M.apart)
+      this->specifySchedule(M.rest, M.split);
+  }
 
   void process(const PixelColor &p) {
     this->update(state().color, p.pixel,
@@ -164,24 +265,58 @@ struct Composite : piko::Stage<Bin, Bin, 64, PixelColor>, piko::Uses<State> {
   }
 };
 
-template <int Bin> struct Raster : piko::Pipe<State> {
-  VertexShader vertexShader;
-  Rasterizer<Bin> rasterizer;
-  FragmentShader<Bin> fragmentShader;
-  DepthTest<Bin> depthTest;
-  Composite<Bin> composite;
+// What follows the Rasterizer.
+template <Mapping M, class UsedState> struct Pixels : piko::Pipe<UsedState> {
+  FragmentShader<M> fragmentShader;
+  DepthTest<M> depthTest;
+  Composite<M> composite;
 
-  Raster() {
-    source(vertexShader);
-    source(rasterizer);
-    connect(rasterizer, 0, fragmentShader);
-    connect(fragmentShader, 0, depthTest);
-    connect(depthTest, 0, composite);
-    allocateForSource(state().vertices, 0);
+  void connectPixels(auto &rasterizer) {
+    this->connect(rasterizer, 0, fragmentShader);
+    this->connect(fragmentShader, 0, depthTest);
+    this->connect(depthTest, 0, composite);
   }
 };
 
+template <Mapping M> struct LinearRaster : Pixels<M, LinearState> {
+  TriangleShader<M> vertexShader;
+  Rasterizer<M, ShadedTriangle, LinearState> rasterizer;
+
+  LinearRaster() {
+    this->source(vertexShader);
+    this->connect(vertexShader, 0, rasterizer);
+    this->connectPixels(rasterizer);
+  }
+};
+
+template <Mapping M> struct IndexedRaster : Pixels<M, IndexedState> {
+  VertexShader vertexShader;
+  Setup setup;
+  Rasterizer<M, BoxedTriangle, IndexedState> rasterizer;
+
+  IndexedRaster() {
+    this->source(vertexShader);
+    this->source(setup);
+    this->connect(setup, 0, rasterizer);
+    this->connectPixels(rasterizer);
+    this->allocateForSource(this->state().vertices, 0);
+  }
+};
+
+using piko::All;
+using piko::DirectMap;
+using piko::LoadBalance;
+
 } // namespace raster
 
-struct Baseline : raster::Raster<0> {};
-struct Binned : raster::Raster<8> {};
+struct Baseline : raster::LinearRaster<{.bin = 0}> {};
+struct FreePipe : raster::LinearRaster<{.bin = 0, .core = raster::DirectMap}> {
+};
+struct Binned : raster::LinearRaster<{.bin = 8}> {};
+struct BinnedFused
+    : raster::LinearRaster<{
+          .bin = 8, .core = raster::DirectMap, .rest = raster::LoadBalance}> {};
+struct Bucketed
+    : raster::LinearRaster<{.bin = 0, .core = raster::All, .split = 4096}> {};
+struct Indexed : raster::IndexedRaster<{.bin = 0}> {};
+struct Fused : raster::IndexedRaster<{.bin = 32, .apart = false}> {};

@@ -26,8 +26,7 @@ template <class Pipeline> Picture render(const Input &input, float alpha) {
   if constexpr (requires { pipeline.state().material; })
     pipeline.state().material.alpha = alpha;
   pipeline.state().lights.assign(input.lights);
-  pipeline.feed(pipeline.vertexShader, input.vertices);
-  pipeline.feed(pipeline.rasterizer, input.triangles);
+  feedMesh(pipeline, input);
   pipeline.run();
   return copy(pipeline.state().color);
 }

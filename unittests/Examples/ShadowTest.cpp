@@ -25,8 +25,7 @@ template <class Pipeline> Picture render(const Input &input) {
     pipeline.feed(pipeline.fit, input.vertices);
     pipeline.feed(pipeline.project, input.triangles);
   }
-  pipeline.feed(pipeline.vertexShader, input.vertices);
-  pipeline.feed(pipeline.rasterizer, input.triangles);
+  feedMesh(pipeline, input);
   pipeline.run();
   return copy(pipeline.state().color);
 }

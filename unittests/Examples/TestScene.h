@@ -93,6 +93,21 @@ inline bool equal(const Picture &a, const Picture &b) {
          std::memcmp(a.data(), b.data(), a.size() * sizeof(Color)) == 0;
 }
 
+/// Gives a mesh to a pipeline, as a buffer of vertices or through sources.
+template <class Pipeline>
+void feedMesh(Pipeline &pipeline, const Input &input) {
+  if constexpr (requires { pipeline.state().mesh; }) {
+    pipeline.state().mesh.assign(input.vertices);
+    pipeline.feed(pipeline.vertexShader, input.triangles);
+  } else {
+    pipeline.feed(pipeline.vertexShader, input.vertices);
+    if constexpr (requires { pipeline.setup; })
+      pipeline.feed(pipeline.setup, input.triangles);
+    else
+      pipeline.feed(pipeline.rasterizer, input.triangles);
+  }
+}
+
 } // namespace test
 
 #endif // PIKO_UNITTESTS_EXAMPLES_TESTSCENE_H

@@ -19,20 +19,23 @@ template <class Pipeline> Picture render(Input &input, int w, int h) {
   pipeline.state().camera = makeCamera();
   pipeline.state().settings = input.settings;
   pipeline.state().lights.assign(input.lights);
-  pipeline.feed(pipeline.vertexShader, input.vertices);
-  pipeline.feed(pipeline.rasterizer, input.triangles);
+  feedMesh(pipeline, input);
   pipeline.run();
   return copy(pipeline.state().color);
 }
 
-TEST(Picture, BinsDoNotChangeIt) {
+TEST(Picture, TheMappingDoesNotChangeIt) {
   for (bool cull : {false, true}) {
     Input input = makeSoup(600);
     input.settings.cullBackFaces = cull;
     // Neither extent is a multiple of a bin's.
     auto baseline = render<Baseline>(input, 203, 101);
-    auto binned = render<Binned>(input, 203, 101);
-    EXPECT_TRUE(equal(baseline, binned));
+    EXPECT_TRUE(equal(baseline, render<FreePipe>(input, 203, 101)));
+    EXPECT_TRUE(equal(baseline, render<Binned>(input, 203, 101)));
+    EXPECT_TRUE(equal(baseline, render<BinnedFused>(input, 203, 101)));
+    EXPECT_TRUE(equal(baseline, render<Bucketed>(input, 203, 101)));
+    EXPECT_TRUE(equal(baseline, render<Indexed>(input, 203, 101)));
+    EXPECT_TRUE(equal(baseline, render<Fused>(input, 203, 101)));
   }
 }
 

@@ -1,0 +1,130 @@
+//===- corner.h - Triangles from vertices that were projected once --------===//
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// What triangles share of their way to the screen is computed for each vertex:
+// where it is on the screen, and which planes it is outside of. A triangle that
+// needs no clipping is then a few integers; clip.h has the others.
+//
+//===----------------------------------------------------------------------===//
+#ifndef COMMON_CORNER_H
+#define COMMON_CORNER_H
+
+#include "clip.h"
+
+namespace raster {
+
+/// Sides of the view, and what keeps a vertex from being used as it is.
+enum Outside : uint32_t {
+  outsideView = 63,   ///< left, right, below, above, near, far
+  outsideGuard = 64,  ///< beyond the guard band, or before the near plane
+  outsideRange = 128, ///< too large, or not a number
+};
+
+/// A vertex on the screen; one that is outside the guard band has only its
+/// place in clip space.
+struct ScreenVertex {
+  glm::vec4 clip;
+  Point at;
+  float depth;   ///< z / w
+  float inverse; ///< 1 / w
+  uint32_t outside;
+};
+
+/// A place in clip space on an image of `size` pixels.
+inline ScreenVertex toScreen(glm::vec4 clip, glm::ivec2 size) {
+  ScreenVertex v{};
+  v.clip = clip;
+  if (!isUsable(clip)) {
+    v.outside = outsideRange;
+    return v;
+  }
+  float w = clip.w;
+  v.outside = uint32_t(clip.x < -w) | uint32_t(clip.x > w) << 1 |
+              uint32_t(clip.y < -w) << 2 | uint32_t(clip.y > w) << 3 |
+              uint32_t(clip.z < -w) << 4 | uint32_t(clip.z > w) << 5;
+  if (!isInside(clip) || !(w > 0)) {
+    v.outside |= outsideGuard;
+    return v;
+  }
+  v.inverse = 1 / w;
+  v.at = toPoint(glm::vec2(clip) * v.inverse, size);
+  v.depth = clip.z * v.inverse;
+  return v;
+}
+
+/// Whether nothing of a triangle can be seen, or it has no place.
+inline bool isGone(const ScreenVertex &a, const ScreenVertex &b,
+                   const ScreenVertex &c) {
+  return (a.outside & b.outside & c.outside & outsideView) ||
+         ((a.outside | b.outside | c.outside) & outsideRange);
+}
+
+inline bool needsClipping(const ScreenVertex &a, const ScreenVertex &b,
+                          const ScreenVertex &c) {
+  return (a.outside | b.outside | c.outside) & outsideGuard;
+}
+
+/// The pixels of the image among which a triangle's are; none of one that is
+/// out of view, degenerate, not finite, or, if `cullBackFaces`, seen from
+/// behind.
+inline PixelBox boxOf(const ScreenVertex &a, const ScreenVertex &b,
+                      const ScreenVertex &c, glm::ivec2 size,
+                      bool cullBackFaces) {
+  constexpr PixelBox none = {{0, 0}, {-1, -1}};
+  if (isGone(a, b, c))
+    return none;
+  PixelBox box;
+  if (needsClipping(a, b, c)) {
+    box = ScreenPolygon(a.clip, b.clip, c.clip, size, cullBackFaces).box();
+  } else {
+    int64_t area = signedArea(a.at, b.at, c.at);
+    if (area == 0 || (cullBackFaces && area > 0))
+      return none;
+    Point lo = {glm::min(glm::min(a.at.x, b.at.x), c.at.x),
+                glm::min(glm::min(a.at.y, b.at.y), c.at.y)};
+    Point hi = {glm::max(glm::max(a.at.x, b.at.x), c.at.x),
+                glm::max(glm::max(a.at.y, b.at.y), c.at.y)};
+    box = pixelsBetween(lo, hi);
+  }
+  return {glm::max(box.lo, 0), glm::min(box.hi, size - 1)};
+}
+
+/// Calls draw(Sample) once for each pixel in `box` that a triangle covers and
+/// that is not below `lo` nor at `hi` or beyond. `box` is from boxOf().
+template <class Draw>
+inline void rasterize(const ScreenVertex &a, const ScreenVertex &b,
+                      const ScreenVertex &c, const PixelBox &box, glm::ivec2 lo,
+                      glm::ivec2 hi, glm::ivec2 size, bool cullBackFaces,
+                      Draw draw) {
+  if (needsClipping(a, b, c)) {
+    ScreenPolygon(a.clip, b.clip, c.clip, size, cullBackFaces)
+        .rasterize(lo, hi, draw);
+    return;
+  }
+  lo = glm::max(lo, box.lo);
+  hi = glm::min(hi, box.hi + 1);
+  int64_t area = signedArea(a.at, b.at, c.at);
+  // Clockwise: a, b, c or a, c, b.
+  bool turned = area < 0;
+  const ScreenVertex &second = turned ? c : b, &third = turned ? b : c;
+  float scale = 1.0f / float(turned ? -area : area);
+  Edges edges(a.at, second.at, third.at);
+  for (int y = lo.y; y < hi.y; ++y)
+    for (int x = lo.x; x < hi.x; ++x) {
+      int64_t e0 = edges.e0.at(x, y), e1 = edges.e1.at(x, y),
+              e2 = edges.e2.at(x, y);
+      if (!edges.e0.holds(e0) || !edges.e1.holds(e1) || !edges.e2.holds(e2))
+        continue;
+      glm::vec3 v = glm::vec3(e0, e1, e2) * scale;
+      glm::vec3 share = {v.x * a.inverse, v.y * second.inverse,
+                         v.z * third.inverse};
+      share *= 1 / (share.x + share.y + share.z);
+      draw(Sample{{x, y},
+                  v.x * a.depth + v.y * second.depth + v.z * third.depth,
+                  turned ? glm::vec3(share.x, share.z, share.y) : share});
+    }
+}
+
+} // namespace raster
+
+#endif // COMMON_CORNER_H
