@@ -40,6 +40,13 @@ std::vector<JsonObject> reportStages(pikort_pipeline *pipeline, double runs) {
   return stages;
 }
 
+JsonObject reportCounts(const std::vector<Count> &counts) {
+  JsonObject report;
+  for (const Count &count : counts)
+    report.add(count.name, count.sum);
+  return report;
+}
+
 double runsOf(pikort_pipeline *pipeline) {
   return double(std::max<int64_t>(1, pikort_stats_runs(pipeline)));
 }
@@ -72,7 +79,9 @@ JsonObject render::makeReport(const Options &options, const RunResult &result,
       .add("target", target)
       .add("frames", result.times.count)
       .add("compile_ms", result.compileMilliseconds)
-      .add("load_ms", result.loadMilliseconds);
+      .add("load_ms", result.loadMilliseconds)
+      .add("patches", result.patches)
+      .add("counters", reportCounts(result.counts));
   if (!isReference) // the runtime does not see inside of it
     report.add("peak_bin_bytes", pikort_peak_bytes(pipeline))
         .add("kernels", reportKernels(pipeline, runs))
@@ -85,10 +94,12 @@ std::string render::summarize(const RunResult &result,
   char text[256];
   std::snprintf(text, sizeof text,
                 "%s: %.2f ms a frame (median of %d, %.2f to %.2f), "
-                "%lld triangles, %lld pixels, %d threads, compiled in %.0f ms",
+                "%lld %s, %lld pixels, %d threads, compiled in %.0f ms",
                 pikort_name(pipeline), result.times.median, result.times.count,
                 result.times.min, result.times.max,
-                static_cast<long long>(result.triangles),
+                static_cast<long long>(result.patches > 0 ? result.patches
+                                                          : result.triangles),
+                result.patches > 0 ? "patches" : "triangles",
                 static_cast<long long>(result.pixels), result.threads,
                 result.compileMilliseconds);
   return text;

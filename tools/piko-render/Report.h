@@ -5,6 +5,7 @@
 
 #include "Options.h"
 
+#include "Piko/Driver/Scene/Binding.h"
 #include "Piko/Driver/Scene/Json.h"
 
 #include <pikort/pikort.h>
@@ -20,10 +21,11 @@ struct FrameTimes {
 struct RunResult {
   FrameTimes times;
   double compileMilliseconds, loadMilliseconds;
-  int64_t triangles, vertices;
+  int64_t triangles, vertices, patches;
   int threads;
   int64_t pixels; ///< that something was drawn to
   std::string imageHash;
+  std::vector<Count> counts;
 };
 
 /// The JSON line: first what all renderers of the comparison report, then what

@@ -176,6 +176,14 @@ Result<Done> renderScene(const Options &options) {
         !ok)
       return ok.error();
 
+  auto counts = readCounters(pipeline);
+  if (!counts)
+    return counts.error();
+  for (const Count &count : *counts)
+    if (count.sum != 0)
+      std::fprintf(stderr, "piko-render: warning: '%s' counts %lld\n",
+                   count.name.c_str(), static_cast<long long>(count.sum));
+
   bool isReference = options.load.target == ExecutionTarget::Reference;
   int cores = int(std::max(1u, std::thread::hardware_concurrency()));
   int threads = isReference ? 1 : options.threads ? options.threads : cores;
@@ -184,9 +192,11 @@ Result<Done> renderScene(const Options &options) {
                    loadMilliseconds,
                    int64_t(scene->mesh.triangles.size()),
                    int64_t(scene->mesh.vertices.size()),
+                   int64_t(scene->mesh.patches.size()),
                    threads,
                    countDrawn(*pixels),
-                   hashOf(*pixels)};
+                   hashOf(*pixels),
+                   std::move(*counts)};
   std::string text = options.json ? makeReport(options, result, pipeline).text()
                                   : summarize(result, pipeline);
   std::printf("%s\n", text.c_str());

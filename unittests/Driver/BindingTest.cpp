@@ -19,6 +19,8 @@ enum Record {
   LIGHT,
   VERTEX,
   TRIANGLE,
+  PATCH,
+  COUNTER,
   COLOR,
   OTHER,
   PIXEL,
@@ -44,6 +46,8 @@ void setup(pikort_pipeline *p) {
   declareRecord(p, LIGHT, "piko::scene::Light", sizeof(scene::Light));
   declareRecord(p, VERTEX, "piko::scene::Vertex", sizeof(scene::Vertex));
   declareRecord(p, TRIANGLE, "piko::scene::Triangle", sizeof(scene::Triangle));
+  declareRecord(p, PATCH, "piko::scene::Patch", sizeof(scene::Patch));
+  declareRecord(p, COUNTER, "piko::scene::Counter", sizeof(scene::Counter));
   declareRecord(p, COLOR, "piko::scene::Color", sizeof(scene::Color));
   declareRecord(p, OTHER, "Other", 4);
   declareRecord(p, PIXEL, "piko::scene::Pixel", sizeof(scene::Pixel));
@@ -238,13 +242,14 @@ TEST_F(Binding, UnknownConstant) {
 }
 
 TEST_F(Binding, UnknownBuffer) {
-  EXPECT_EQ(errorOf([](pikort_pipeline *p) {
-              declareSource(p, 0, VERTEX);
-              declareState(p, 0, "data", PIKORT_BUFFER, OTHER, 1);
-            }),
-            "pipeline 'Test': buffer 'data': expected elements of "
-            "'piko::scene::Light', '...::Vertex', '...::Triangle', "
-            "'...::BvhNode' or '...::BvhTriangle', but got 'Other'");
+  EXPECT_EQ(
+      errorOf([](pikort_pipeline *p) {
+        declareSource(p, 0, VERTEX);
+        declareState(p, 0, "data", PIKORT_BUFFER, OTHER, 1);
+      }),
+      "pipeline 'Test': buffer 'data': expected elements of "
+      "'piko::scene::Light', '...::Vertex', '...::Triangle', "
+      "'...::Patch', '...::BvhNode' or '...::BvhTriangle', but got 'Other'");
 }
 
 TEST_F(Binding, UnknownSource) {
@@ -253,7 +258,64 @@ TEST_F(Binding, UnknownSource) {
               declareState(p, 0, "color", PIKORT_IMAGE, COLOR, 2);
             }),
             "pipeline 'Test': source 0: expected 'piko::scene::Vertex', "
-            "'...::Triangle' or '...::Pixel', but got 'Other'");
+            "'...::Triangle', '...::Patch' or '...::Pixel', but got 'Other'");
+}
+
+TEST_F(Binding, Patches) {
+  input.mesh = {};
+  input.mesh.patches.resize(5);
+  auto output = bind([](pikort_pipeline *p) {
+    declareSource(p, 0, PATCH);
+    declareState(p, 0, "patches", PIKORT_BUFFER, PATCH, 1);
+    declareState(p, 1, "picture", PIKORT_IMAGE, COLOR, 2);
+  });
+  ASSERT_TRUE(output) << output.error().message;
+  pikort_source_info source;
+  ASSERT_EQ(pikort_get_source_info(pipeline, 0, &source), PIKORT_OK);
+  EXPECT_EQ(source.count, 5);
+}
+
+TEST_F(Binding, SceneWithoutPatches) {
+  EXPECT_EQ(errorOf([](pikort_pipeline *p) {
+              declareSource(p, 0, PATCH);
+              declareState(p, 0, "color", PIKORT_IMAGE, COLOR, 2);
+            }),
+            "pipeline 'Test': 'piko::scene::Patch': expected a scene of "
+            "patches, but it has triangles");
+}
+
+TEST_F(Binding, SceneOfPatchesAlone) {
+  input.mesh = {};
+  input.mesh.patches.resize(5);
+  EXPECT_EQ(errorOf([](pikort_pipeline *p) {
+              declareSource(p, 0, PATCH);
+              declareState(p, 0, "mesh", PIKORT_BUFFER, VERTEX, 1);
+            }),
+            "pipeline 'Test': 'piko::scene::Vertex': expected a scene of "
+            "triangles, but it has patches");
+}
+
+// Counted once for each element; a run clears them.
+TEST_F(Binding, Counters) {
+  auto output = bind([](pikort_pipeline *p) {
+    declareSource(p, 0, VERTEX);
+    declareState(p, 0, "lost", PIKORT_BUFFER, COUNTER, 1, 0);
+    declareState(p, 1, "picture", PIKORT_IMAGE, COLOR, 2);
+  });
+  ASSERT_TRUE(output) << output.error().message;
+  int64_t extent[] = {4, 4};
+  ASSERT_EQ(pikort_set_domain(pipeline, 2, extent), PIKORT_OK);
+  ASSERT_EQ(pikort_run(pipeline), PIKORT_OK) << pikort_message(pipeline);
+  pikort_view view;
+  ASSERT_EQ(pikort_get_view(pipeline, "lost", &view), PIKORT_OK);
+  ASSERT_EQ(view.extent[0], 4);
+  static_cast<scene::Counter *>(view.data)[1].count = 2;
+  static_cast<scene::Counter *>(view.data)[3].count = 5;
+  auto counts = readCounters(pipeline);
+  ASSERT_TRUE(counts) << counts.error().message;
+  ASSERT_EQ(counts->size(), 1u);
+  EXPECT_EQ((*counts)[0].name, "lost");
+  EXPECT_EQ((*counts)[0].sum, 7);
 }
 
 } // namespace

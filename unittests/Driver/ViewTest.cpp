@@ -82,6 +82,24 @@ TEST(View, GroundLiesUnderTheSceneAndFacesUp) {
   EXPECT_NEAR(area, 16 * scene.radius * scene.radius, 1e-3);
 }
 
+TEST(View, GroundUnderPatchesIsAPatch) {
+  Mesh mesh;
+  mesh.patches.resize(1);
+  for (int i = 0; i < 16; ++i)
+    mesh.patches[0].points[i] = {i, 3 - i % 5, 2};
+  Sphere scene = boundingSphere(mesh);
+  addGround(mesh);
+  EXPECT_TRUE(mesh.triangles.empty());
+  ASSERT_EQ(mesh.patches.size(), 2u);
+  const auto &ground = mesh.patches[1];
+  EXPECT_EQ(ground.index, 1);
+  for (glm::vec3 p : ground.points)
+    EXPECT_EQ(p.y, -1);
+  glm::vec3 up = glm::cross(ground.points[12] - ground.points[0],
+                            ground.points[3] - ground.points[0]);
+  EXPECT_NEAR(up.y / (16 * scene.radius * scene.radius), 1, 1e-5);
+}
+
 TEST(View, PlanesEncloseTheScene) {
   for (glm::vec3 eye : {glm::vec3(1, 2, 30), glm::vec3(1, 2, 4)}) {
     auto camera = makeCamera({.eye = eye, .at = sphere.center}, sphere);

@@ -62,7 +62,8 @@ private:
     return record;
   }
 
-  /// Makes what is made only for pipelines that ask for this type.
+  /// Makes what is made only for pipelines that ask for this type. The error is
+  /// a scene that has nothing of it.
   Result<Done> prepare(const char *type) {
     if (!std::strcmp(type, "piko::scene::Pixel") && scene.pixels.empty())
       for (int y = 0; y < scene.size.y; ++y)
@@ -71,6 +72,16 @@ private:
     bool isOfTree = !std::strcmp(type, "piko::scene::BvhNode") ||
                     !std::strcmp(type, "piko::scene::BvhTriangle") ||
                     !std::strcmp(type, "piko::scene::Bounds");
+    bool isOfMesh = isOfTree || !std::strcmp(type, "piko::scene::Vertex") ||
+                    !std::strcmp(type, "piko::scene::Triangle");
+    bool isOfPatches = !std::strcmp(type, "piko::scene::Patch");
+    bool hasPatches = !scene.mesh.patches.empty();
+    if (isOfMesh && hasPatches)
+      return fail("'" + std::string(type) +
+                  "': expected a scene of triangles, but it has patches");
+    if (isOfPatches && !hasPatches)
+      return fail("'" + std::string(type) +
+                  "': expected a scene of patches, but it has triangles");
     if (isOfTree && !scene.bvh) {
       auto bvh = buildBvh(scene.mesh);
       if (!bvh)
@@ -99,6 +110,8 @@ private:
       return supply(scene.mesh.vertices);
     if (!std::strcmp(type, "piko::scene::Triangle"))
       return supply(scene.mesh.triangles);
+    if (!std::strcmp(type, "piko::scene::Patch"))
+      return supply(scene.mesh.patches);
     return {};
   }
   Supply bufferFor(const char *type) {
@@ -133,8 +146,8 @@ private:
       return fail(unsuitable("buffer '" + std::string(state.name) + "'",
                              record->name,
                              "elements of 'piko::scene::Light', "
-                             "'...::Vertex', '...::Triangle', '...::BvhNode' "
-                             "or '...::BvhTriangle'"));
+                             "'...::Vertex', '...::Triangle', '...::Patch', "
+                             "'...::BvhNode' or '...::BvhTriangle'"));
     if (pikort_bind_buffer(pipeline, state.name, supply.data, supply.count,
                            supply.size) != PIKORT_OK)
       return lastError();
@@ -220,9 +233,9 @@ private:
       return ok.error();
     Supply supply = sourceFor(record->name);
     if (!supply.size)
-      return fail(
-          unsuitable("source " + std::to_string(index), record->name,
-                     "'piko::scene::Vertex', '...::Triangle' or '...::Pixel'"));
+      return fail(unsuitable("source " + std::to_string(index), record->name,
+                             "'piko::scene::Vertex', '...::Triangle', "
+                             "'...::Patch' or '...::Pixel'"));
     if (pikort_bind_source(pipeline, index, supply.data, supply.count,
                            supply.size) != PIKORT_OK)
       return lastError();
@@ -239,4 +252,26 @@ private:
 Result<std::string> render::bindScene(pikort_pipeline *pipeline,
                                       SceneInput &scene) {
   return Binder(pipeline, scene).bind();
+}
+
+Result<std::vector<Count>> render::readCounters(pikort_pipeline *pipeline) {
+  std::vector<Count> counts;
+  for (int32_t i = 0; i < pikort_state_count(pipeline); ++i) {
+    pikort_state_info state;
+    pikort_record_info record;
+    if (pikort_get_state_info(pipeline, i, &state) != PIKORT_OK ||
+        pikort_get_record(pipeline, state.record, &record) != PIKORT_OK)
+      return Error{pikort_message(pipeline)};
+    if (state.kind != PIKORT_BUFFER ||
+        std::strcmp(record.name, "piko::scene::Counter") != 0)
+      continue;
+    pikort_view view;
+    if (pikort_get_view(pipeline, state.name, &view) != PIKORT_OK)
+      return Error{pikort_message(pipeline)};
+    Count count{state.name, 0};
+    for (int64_t k = 0; k < view.extent[0]; ++k)
+      count.sum += static_cast<const scene::Counter *>(view.data)[k].count;
+    counts.push_back(std::move(count));
+  }
+  return counts;
 }

@@ -1,7 +1,8 @@
-//===- SceneFile.cpp - Meshes from files ----------------------------------===//
+//===- SceneFile.cpp - Meshes and patches from files ----------------------===//
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #include "Piko/Driver/Scene/SceneFile.h"
 
+#include "PatchFile.h"
 #include "PlyCheck.h"
 
 #include <assimp/Importer.hpp>
@@ -244,6 +245,18 @@ std::string messageOf(const Assimp::Importer &importer) {
   return message.empty() ? "no importer reads it" : message;
 }
 
+Result<Mesh> loadPatches(const std::string &path) {
+  auto content = readFile(path);
+  if (!content)
+    return content.error();
+  auto patches = readPatches(*content);
+  if (!patches)
+    return patches.error();
+  Mesh mesh;
+  mesh.patches = std::move(*patches);
+  return mesh;
+}
+
 Result<Mesh> load(const std::string &path, const ProgressFunction &progress) {
   std::error_code ignored;
   if (fs::is_directory(path, ignored))
@@ -253,10 +266,12 @@ Result<Mesh> load(const std::string &path, const ProgressFunction &progress) {
   else
     return Error{std::strerror(errno)};
 
+  std::string format = formatOf(path);
+  if (format == ".bpt")
+    return loadPatches(path);
   Assimp::Importer importer;
   if (progress) // the importer owns it
     importer.SetProgressHandler(new ReportProgress(progress));
-  std::string format = formatOf(path);
   const aiScene *imported;
   // Other formats may consist of several files, which the importer finds.
   if (path.ends_with(".gz") || format == ".ply") {

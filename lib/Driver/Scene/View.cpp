@@ -25,6 +25,15 @@ bool isFinite(glm::vec3 v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
+/// Calls f with all positions of a scene.
+template <class F> void forEachPoint(const Mesh &mesh, F f) {
+  for (const scene::Vertex &v : mesh.vertices)
+    f(v.position);
+  for (const scene::Patch &patch : mesh.patches)
+    for (glm::vec3 p : patch.points)
+      f(p);
+}
+
 /// World to clip space. The rows of the product of projection and view are the
 /// camera's axes, since its right and up already hold the angles of view.
 glm::mat4 viewProjection(const scene::Camera &c) {
@@ -45,30 +54,42 @@ glm::mat4 viewProjection(const scene::Camera &c) {
 } // namespace
 
 Sphere render::boundingSphere(const Mesh &mesh) {
-  glm::vec3 lo = mesh.vertices.at(0).position, hi = lo;
-  for (const scene::Vertex &v : mesh.vertices) {
-    lo = glm::min(lo, v.position);
-    hi = glm::max(hi, v.position);
-  }
+  glm::vec3 lo = mesh.patches.empty() ? mesh.vertices.at(0).position
+                                      : mesh.patches[0].points[0];
+  glm::vec3 hi = lo;
+  forEachPoint(mesh, [&](glm::vec3 p) {
+    lo = glm::min(lo, p);
+    hi = glm::max(hi, p);
+  });
   Sphere sphere{(lo + hi) * 0.5f, 0};
-  for (const scene::Vertex &v : mesh.vertices) {
-    glm::vec3 d = v.position - sphere.center;
+  forEachPoint(mesh, [&](glm::vec3 p) {
+    glm::vec3 d = p - sphere.center;
     sphere.radius = std::max(sphere.radius, std::sqrt(glm::dot(d, d)));
-  }
+  });
   return sphere;
 }
 
 void render::addGround(Mesh &mesh) {
   Sphere scene = boundingSphere(mesh);
   float reach = 2 * scene.radius, height = scene.center.y;
-  for (const scene::Vertex &v : mesh.vertices)
-    height = std::min(height, v.position.y);
+  forEachPoint(mesh, [&](glm::vec3 p) { height = std::min(height, p.y); });
+  auto at = [&](float x, float z) {
+    return glm::vec3(scene.center.x + x * reach, height,
+                     scene.center.z + z * reach);
+  };
+  if (!mesh.patches.empty()) {
+    scene::Patch ground{.points = {}, .index = int32_t(mesh.patches.size())};
+    for (int i = 0; i < 4; ++i)
+      for (int j = 0; j < 4; ++j)
+        ground.points[4 * i + j] =
+            at(float(2 * j - 3) / 3, float(2 * i - 3) / 3);
+    mesh.patches.push_back(ground);
+    return;
+  }
   auto first = int32_t(mesh.vertices.size());
   for (glm::vec2 corner : {glm::vec2(-1, -1), {-1, 1}, {1, 1}, {1, -1}})
-    mesh.vertices.push_back({{scene.center.x + corner.x * reach, height,
-                              scene.center.z + corner.y * reach},
-                             {0, 1, 0},
-                             int32_t(mesh.vertices.size())});
+    mesh.vertices.push_back(
+        {at(corner.x, corner.y), {0, 1, 0}, int32_t(mesh.vertices.size())});
   for (glm::ivec3 corners : {glm::ivec3(0, 1, 2), {0, 2, 3}})
     mesh.triangles.push_back({corners + first, int32_t(mesh.triangles.size())});
 }

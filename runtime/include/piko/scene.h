@@ -11,9 +11,11 @@
 //   a constant of type Bounds                 the box of the mesh
 //   a Buffer<Light>                           the lights
 //   a Buffer<Vertex>, a Buffer<Triangle>      the mesh
+//   a Buffer<Patch>                           the patches
 //   a Buffer<BvhNode>, a Buffer<BvhTriangle>  a tree of boxes about it
 //   a source into a stage that takes Vertex   the mesh's vertices, in order
 //   a source into a stage that takes Triangle the mesh's triangles, in order
+//   a source into a stage that takes Patch    the patches, in order
 //   a source into a stage that takes Pixel    the image's pixels, row by row
 //   the Image<Color>                          the result: there is exactly one
 //
@@ -22,6 +24,9 @@
 // other type is an error, because nothing could fill it. State that the
 // pipeline allocates or clears itself and constants with a default value are
 // left alone. The domain is the image: cell (0, 0) is its top left pixel.
+//
+// A scene has a mesh or patches. A Buffer<Counter> that the pipeline allocates
+// is read after the last frame, and its sum, if not 0, is said to the user.
 //
 // All types are trivially copyable; lengths are in the scene's own unit.
 //
@@ -82,6 +87,19 @@ struct Vertex {
 struct Triangle {
   glm::ivec3 vertex; ///< places among the vertices
   int32_t index;     ///< its own place among the triangles
+};
+
+/// A bicubic Bezier patch: points[4 * i + j] is the control point i along u and
+/// j along v.
+struct Patch {
+  glm::vec3 points[16];
+  int32_t index; ///< its own place among the patches
+};
+
+/// What a pipeline tells of: how often something happened that the picture
+/// does not show.
+struct Counter {
+  int32_t count = 0;
 };
 
 /// A pixel of the result: linear colour and coverage. Alpha is 0 where nothing

@@ -31,9 +31,16 @@ struct SceneInput {
 
 /// Binds a scene, which must outlive the runs, to all state and sources of a
 /// pipeline, and returns the name of its Image<Color>. Errors: something is of
-/// a type that no scene has, there is not exactly one Image<Color>, a value
-/// fits no constant, or buildBvh fails.
+/// a type that no scene or not this one has, there is not exactly one
+/// Image<Color>, a value fits no constant, or buildBvh fails.
 Result<std::string> bindScene(pikort_pipeline *pipeline, SceneInput &scene);
+
+/// The sum of a Buffer<Counter> after a run.
+struct Count {
+  std::string name;
+  int64_t sum;
+};
+Result<std::vector<Count>> readCounters(pikort_pipeline *pipeline);
 
 } // namespace piko::render
 

@@ -14,10 +14,12 @@ struct Sphere {
   float radius;
 };
 
-/// The sphere about the middle of the bounding box that holds all vertices.
+/// The sphere about the middle of the bounding box that holds all vertices and
+/// control points. There must be one.
 Sphere boundingSphere(const Mesh &mesh);
 
-/// Puts a square under the scene, at its lowest vertex: level, seen from above,
+/// Puts a square, of triangles or one patch as the scene itself, under the
+/// scene, at its lowest point: level, seen from above,
 /// and four radii of the scene wide.
 void addGround(Mesh &mesh);
 
