@@ -45,9 +45,11 @@ void piko::addSynthesisSequence(OpPassManager &passes,
       pipeline.addPass(createFuseStages());
   }
   addCleanUp(passes);
-  OpPassManager &pipeline = passes.nest<PipelineOp>();
   if (options.has("test-early"))
-    pipeline.addPass(createTestEarly());
+    passes.nest<PipelineOp>().addPass(createTestEarly());
+  if (options.has("prune"))
+    passes.addPass(createPrune());
+  OpPassManager &pipeline = passes.nest<PipelineOp>();
   if (options.has("own-pixels"))
     pipeline.addPass(createOwnPixels());
   pipeline.addPass(createFormKernels());

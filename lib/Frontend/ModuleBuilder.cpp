@@ -37,7 +37,8 @@ public:
     for (const EdgeDescription &edge : pipeline.edges)
       EdgeOp::create(builder, edge.location,
                      pipeline.stages[edge.producer].symbol, edge.port,
-                     pipeline.stages[edge.consumer].symbol);
+                     pipeline.stages[edge.consumer].symbol,
+                     /*carried=*/mlir::IntegerAttr());
     for (unsigned stage = 0; stage < pipeline.stages.size(); ++stage) {
       mlir::OpBuilder::InsertionGuard guard(builder);
       if (!buildStage(stage))

@@ -215,6 +215,52 @@ def TestEarly : Pass<"piko-test-early", "::piko::PipelineOp"> {
     Statistic<"moved", "moved", "operations that moved">];
 }
 
+def Prune : Pass<"piko-prune", "::mlir::ModuleOp"> {
+  let summary = "Drop fields, ports and stages that nothing depends on";
+  let description = [{
+    **Requires** the authored level with stages in order (`piko-order-stages`).
+
+    **Does**: finds what state, and errors that a stage can end with, depend on,
+    over all of the graph at once, so that a field or a stage that only feeds
+    itself around a cycle is not among it. All else is erased: computations in
+    the phases, stages, and the ports that fed them. Each stage that no source
+    feeds gets a record of its own with the fields it needs, without room
+    between them; what its producers emit shrinks with it. `carried` of each
+    edge is the size of its primitives before. A stage that waits for one that
+    is removed waits for those that this one came after.
+
+    **Guarantees** that state, the order in which it changes, and the sources
+    stay as they are.
+
+    Before, where `@keep` does not read `"y"`:
+    ```
+    piko.record @F {"x" : f32 at 0, "y" : f32 at 4} size 8 align 4
+    piko.edge @move[0] -> @ignore
+    piko.edge @move[1] -> @keep
+    piko.stage @move ... : @F -> [@F, @F] { ... piko.emit 1 (%x, %y) : f32, f32 ... }
+    ```
+    After:
+    ```
+    piko.record @F.keep {"x" : f32 at 0} size 4 align 4
+    piko.edge @move[0] -> @keep carried 8
+    piko.stage @move ... : @F -> [@F.keep] { ... piko.emit 0 (%x) : f32 ... }
+    ```
+
+    **Limits**: an array is needed as a whole or not at all. A stage may end with
+    an error, and is kept, if it is on a cycle, has a dynamic schedule or a
+    barrier, or assigns to a bin that no test of `piko.bin_at` has found to be
+    inside. A stage that a source feeds is emptied, not removed. An access to
+    state that only erased work needs is not made, so it cannot fail; a pipeline
+    that is checked (`piko-add-checks`) is left as it is.
+  }];
+  let statistics = [
+    Statistic<"fields", "fields", "fields that an edge no longer carries">,
+    Statistic<"ports", "ports", "ports removed with their edges">,
+    Statistic<"stages", "stages", "stages removed or emptied">];
+  let dependentDialects = ["::mlir::arith::ArithDialect",
+                           "::mlir::ub::UBDialect"];
+}
+
 def OwnPixels : Pass<"piko-own-pixels", "::piko::PipelineOp"> {
   let summary = "Find which pixel a primitive updates, so that bins can be divided";
   let description = [{

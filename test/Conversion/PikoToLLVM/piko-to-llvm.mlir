@@ -35,6 +35,7 @@ piko.record @F {"x" : i32 at 0, "w" : f32[4 : 4] at 4} size 20 align 4
 
 // IR: define i32 @P.run(ptr %{{.*}})
 piko.pipeline @P rank 2 {
+  piko.buffer @out : @F
   piko.source @a
   piko.edge @a[0] -> @b
   piko.stage @a bins [0, 0] threads 1 : @F -> [@F] {
@@ -51,6 +52,11 @@ piko.pipeline @P rank 2 {
     piko.schedule load_balance
     piko.process {
     ^bb0(%f: !piko.prim<@F>):
+      %x = piko.get %f "x" : !piko.prim<@F> -> i32
+      %i = arith.index_cast %x : i32 to index
+      %two = arith.constant 2 : index
+      %w = piko.get %f "w"[%two] : !piko.prim<@F> -> f32
+      piko.store %w, @out[%i : index] "w"[%two] : f32
       piko.return
     }
   }

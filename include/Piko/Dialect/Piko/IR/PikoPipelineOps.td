@@ -168,7 +168,8 @@ def Piko_EdgeOp : Piko_Op<"edge", [
   let description = [{
     Each port of each stage has exactly one edge, and its primitives are of the
     record that the consumer takes. Here what `@half` emits to port 0 is what
-    `@drop` processes.
+    `@drop` processes. `carried` is set by `piko-prune`, which may give the
+    consumer a smaller record: how many bytes a primitive had before.
 
     ```mlir
     piko.record @F {"z" : f32 at 0} size 4 align 4
@@ -194,8 +195,11 @@ def Piko_EdgeOp : Piko_Op<"edge", [
   }];
   let arguments = (ins FlatSymbolRefAttr:$producer,
                        ConfinedAttr<Piko_I64Attr, [IntNonNegative]>:$port,
-                       FlatSymbolRefAttr:$consumer);
-  let assemblyFormat = "$producer `[` $port `]` `->` $consumer attr-dict";
+                       FlatSymbolRefAttr:$consumer,
+                       OptionalAttr<ConfinedAttr<Piko_I64Attr, [IntPositive]>>:$carried);
+  let assemblyFormat = [{
+    $producer `[` $port `]` `->` $consumer (`carried` $carried^)? attr-dict
+  }];
 }
 
 #endif // PIKO_DIALECT_PIKO_IR_PIKOPIPELINEOPS_TD
