@@ -152,6 +152,9 @@ RTCBuildArguments makeArguments(RTCBVH tree,
   arguments.maxBranchingFactor = scene::bvhWidth;
   arguments.maxDepth = scene::bvhDepth;
   arguments.maxLeafSize = 8;
+  // Relative to a node's. It makes leaves of about two triangles, which are as
+  // quick as leaves of one, in a tree of half the size.
+  arguments.intersectionCost = 0.3f;
   arguments.bvh = tree;
   arguments.primitives = boxes.data();
   arguments.primitiveCount = boxes.size();
