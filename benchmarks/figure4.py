@@ -5,6 +5,9 @@
   figure4.py [options] SCENE..     measures and draws
   figure4.py [options] --redraw    draws what has been measured
 
+A SCENE is a file and, in the same word, what options of piko-render it needs:
+'room.glb --eye 9 11 0 --at 9 0.3 -6.8'.
+
 Renders every scene with the pipelines of examples/raster, with more and more
 lights, on all threads, and with the fewest lights on one thread as well. A
 measurement is a process of piko-render; pipelines take turns in each round.
@@ -18,6 +21,7 @@ import csv
 import json
 import os
 import re
+import shlex
 import statistics
 import subprocess
 import sys
@@ -33,7 +37,7 @@ PANELS = [
     ("(d) Vertices shaded once", ["Indexed", "Fused"], "Baseline"),
 ]
 COLORS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7"]  # told apart by all eyes
-STYLES = [("-", "o"), ("--", "s")]
+STYLES = [("-", "o"), ("--", "s")]  # of the pipelines of a panel
 NUMBERS = {
     "triangles": int, "lights": int, "threads": int, "round": int, "ms": float,
     "bin_bytes": int, "moved_bytes": int,
@@ -92,11 +96,12 @@ def carried_records(arguments, pipe):
 
 
 def measure_once(arguments, scene, pipe, lights, threads):
-    command = [f"{arguments.bin}/piko-render", RASTER, scene, "--json"]
+    command = [f"{arguments.bin}/piko-render", RASTER, *shlex.split(scene)]
     for option in ["warmup", "frames", "seconds"]:
         command += [f"--{option}", str(getattr(arguments, option))]
     command += ["--pipe", pipe, "--lights", str(lights)]
-    return json.loads(output_of([*command, "--threads", str(threads)]))
+    command += ["--threads", str(threads), "--json"]
+    return json.loads(output_of(command))
 
 
 def measure(arguments):
@@ -222,8 +227,6 @@ def draw_panel(axes, results, title, pipes, base):
         axes.legend([plain_line(*style) for style in STYLES], pipes,
                     loc="lower right", fontsize=9)
     axes.axhline(1, color="black", linewidth=1, linestyle=":")
-    axes.annotate(base, (0.99, 1), xycoords=("axes fraction", "data"), ha="right",
-                  xytext=(0, 3), textcoords="offset points", fontsize=8)
     axes.set_title(title, fontsize=11)
     axes.set_xscale("log")
     axes.set_xticks(results.lights, [str(n) for n in results.lights])
