@@ -85,6 +85,14 @@ struct CommandLine {
       llvm::cl::init(3),
       llvm::cl::desc("how much to optimise, 0 to 3 (default: 3)"),
       llvm::cl::cat(category)};
+  llvm::cl::opt<Sanitizer> sanitizer{
+      "sanitize",
+      llvm::cl::desc("instrument the code for a program and a libpikort that "
+                     "are built with this sanitizer"),
+      llvm::cl::init(Sanitizer::None), llvm::cl::cat(category),
+      llvm::cl::values(clEnumValN(Sanitizer::Address, "address",
+                                  "accesses to heap and stack"),
+                       clEnumValN(Sanitizer::Thread, "thread", "data races"))};
   llvm::cl::opt<bool> listPipes{
       "list-pipes", llvm::cl::desc("print the names of the file's pipelines"),
       llvm::cl::cat(category)};
@@ -143,7 +151,9 @@ struct CommandLine {
             .synthesis = *getSynthesis()};
   }
   TargetOptions getTarget() const {
-    return {.cpu = cpu, .optLevel = static_cast<int>(optLevel)};
+    return {.cpu = cpu,
+            .optLevel = static_cast<int>(optLevel),
+            .sanitizer = sanitizer};
   }
 };
 
@@ -168,6 +178,8 @@ static std::string checkOptions(const CommandLine &line) {
       (line.header.getNumOccurrences() || line.depfile.getNumOccurrences()))
     return "--header and --depfile belong to an object, which --emit=object or "
            "an -o that ends in .o asks for";
+  if (line.sanitizer.getNumOccurrences() && line.getEmit() < Emit::Assembly)
+    return "--sanitize belongs to an object or assembly";
   if (isObject && line.output == "-" && llvm::outs().is_displayed())
     return "expected -o, because an object is not for a terminal";
   return "";

@@ -35,6 +35,10 @@ struct CompileOptions {
   SynthesisOptions synthesis = {};
 };
 
+/// Instruments code, which then runs in programs that have the sanitizer's
+/// runtime and a libpikort that is built with it.
+enum class Sanitizer { None, Address, Thread };
+
 /// What code is made for.
 struct TargetOptions {
   /// As LLVM names processors; "native" is this machine's, with all that it
@@ -42,6 +46,7 @@ struct TargetOptions {
   std::string cpu = {};
   /// 0 to 3, as in -O3.
   int optLevel = 3;
+  Sanitizer sanitizer = Sanitizer::None;
 };
 
 /// Where compiled code is kept from one process to the next.

@@ -13,6 +13,8 @@
 #include "llvm/Support/TargetSelect.h"
 #include "llvm/Target/TargetMachine.h"
 #include "llvm/TargetParser/Host.h"
+#include "llvm/Transforms/Instrumentation/AddressSanitizer.h"
+#include "llvm/Transforms/Instrumentation/ThreadSanitizer.h"
 
 #include <map>
 
@@ -85,8 +87,40 @@ createMachine(const piko::TargetOptions &options) {
       CodeModel::Small, level));
 }
 
+/// Asks for the instrumentation of all functions, which also keeps the
+/// optimizer from accesses that the program does not make.
+static void markForSanitizer(Module &module, Sanitizer sanitizer) {
+  if (sanitizer == Sanitizer::None)
+    return;
+  for (Function &function : module)
+    if (!function.isDeclaration())
+      function.addFnAttr(sanitizer == Sanitizer::Address
+                             ? Attribute::SanitizeAddress
+                             : Attribute::SanitizeThread);
+}
+
+/// Without a constructor: the program has initialised the runtime.
+static void instrument(Module &module, ModuleAnalysisManager &analyses,
+                       Sanitizer sanitizer) {
+  if (sanitizer == Sanitizer::Thread)
+    createModuleToFunctionPassAdaptor(ThreadSanitizerPass())
+        .run(module, analyses);
+  if (sanitizer != Sanitizer::Address)
+    return;
+  // Redzones around constants would be registered, and outlive JITCode.
+  for (GlobalVariable &variable : module.globals()) {
+    GlobalValue::SanitizerMetadata metadata;
+    metadata.NoAddress = true;
+    variable.setSanitizerMetadata(metadata);
+  }
+  AddressSanitizerPass({}, /*UseGlobalGC=*/false, /*UseOdrIndicator=*/false,
+                       AsanDtorKind::None, AsanCtorKind::None)
+      .run(module, analyses);
+}
+
 /// What `-O` does. No flag allows arithmetic to change: the IR says what may.
-static void optimize(Module &module, TargetMachine &machine, int level) {
+static void optimize(Module &module, TargetMachine &machine,
+                     const piko::TargetOptions &options) {
   static const OptimizationLevel levels[] = {
       OptimizationLevel::O0, OptimizationLevel::O1, OptimizationLevel::O2,
       OptimizationLevel::O3};
@@ -100,10 +134,13 @@ static void optimize(Module &module, TargetMachine &machine, int level) {
   builder.registerFunctionAnalyses(functions);
   builder.registerLoopAnalyses(loops);
   builder.crossRegisterProxies(loops, functions, components, modules);
-  ModulePassManager passes =
-      level == 0 ? builder.buildO0DefaultPipeline(levels[0])
-                 : builder.buildPerModuleDefaultPipeline(levels[level]);
+  OptimizationLevel level = levels[options.optLevel];
+  markForSanitizer(module, options.sanitizer);
+  ModulePassManager passes = options.optLevel == 0
+                                 ? builder.buildO0DefaultPipeline(level)
+                                 : builder.buildPerModuleDefaultPipeline(level);
   passes.run(module, modules);
+  instrument(module, modules, options.sanitizer);
 }
 
 /// ORC runs the initialisers of an object that it has not seen as IR only where
@@ -137,7 +174,7 @@ Expected<std::string> piko::generateCode(Module &module,
   module.setDataLayout((*machine)->createDataLayout());
   module.setPICLevel(PICLevel::BigPIC);
   gatherInitializers(module);
-  optimize(module, **machine, options.optLevel);
+  optimize(module, **machine, options);
 
   SmallString<0> code;
   raw_svector_ostream stream(code);
