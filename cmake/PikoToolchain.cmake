@@ -16,20 +16,27 @@ endif()
 set(PIKO_SANITIZE "" CACHE STRING
     "Sanitizers for everything, as -fsanitize takes them")
 if(PIKO_SANITIZE)
-  add_compile_options(-fsanitize=${PIKO_SANITIZE} -fno-omit-frame-pointer
+  set(PIKO_SANITIZE_FLAGS -fsanitize=${PIKO_SANITIZE} -fno-omit-frame-pointer
     -fno-sanitize-recover=undefined
     # LLVM, MLIR and Clang are built without the type information that vptr
     # checks compare. A function check reads the eight bytes before a function,
     # which are not mapped where the JIT puts a function first.
     -fno-sanitize=vptr,function)
-  add_link_options(-fsanitize=${PIKO_SANITIZE})
+  set(PIKO_SANITIZE_LINK_FLAGS -fsanitize=${PIKO_SANITIZE})
   add_library(piko_sanitizer_options OBJECT ${CMAKE_CURRENT_LIST_DIR}/SanitizerOptions.cpp)
   if(PIKO_SANITIZE MATCHES thread)
+    # Only the runtime is instrumented, and the code that the compiler makes:
+    # the compiler's threads wait for each other in libLLVM, unseen.
+    set(PIKO_RUNTIME_FLAGS ${PIKO_SANITIZE_FLAGS} -gline-tables-only)
     # OpenMP's runtime looks for this tool in the program.
     find_library(PIKO_ARCHER archer PATHS ${PIKO_LLVM_PREFIX}/lib REQUIRED)
-    add_link_options(LINKER:--push-state,--no-as-needed ${PIKO_ARCHER} LINKER:--pop-state
+    list(APPEND PIKO_SANITIZE_LINK_FLAGS
+      LINKER:--push-state,--no-as-needed ${PIKO_ARCHER} LINKER:--pop-state
       LINKER:-rpath,${PIKO_LLVM_PREFIX}/lib)
+  else()
+    add_compile_options(${PIKO_SANITIZE_FLAGS})
   endif()
+  add_link_options(${PIKO_SANITIZE_LINK_FLAGS})
 endif()
 
 find_package(OpenMP REQUIRED COMPONENTS CXX)

@@ -13,6 +13,7 @@ split-file. Substitutions:
   %cmake         the CMake that configured this build
   %piko          the build tree, which find_package(Piko) can use
   %cxx           the C++ compiler of this build
+  %other_cxx     another C++ compiler, where one can use this build's runtime
   %cxx_host      compiler and flags that build a host of compiled pipelines
   %link_host     what such a host links
   %cxx_reference compiler and flags that build a pipeline file with the
@@ -50,8 +51,17 @@ reference = [config.cxx, "-std=c++20", "-O1", "-ffp-contract=off", "-I", include
 library_dir = os.path.join(config.piko_binary_root, "lib")
 link_host = [f"-L{library_dir}", f"-Wl,-rpath,{library_dir}", "-lpikort"]
 link_host.append(config.openmp_runtime)
+other_cxx = "g++"
 if config.sanitize:
-    link_host.append(f"-fsanitize={config.sanitize}")
+    options = os.path.join(
+        config.piko_source_root, "cmake", "SanitizerOptions.cpp"
+    )
+    link_host += [f"-fsanitize={config.sanitize}", options]
+    # The sanitizer's runtime is the compiler's own.
+    other_cxx = config.cxx
+    if config.archer:
+        link_host += ["-Wl,--no-as-needed", config.archer]
+        link_host.append("-Wl,-rpath," + os.path.dirname(config.archer))
 config.substitutions += [
     ("%piko_include", include),
     ("%examples", os.path.join(config.piko_source_root, "examples")),
@@ -66,6 +76,7 @@ config.substitutions += [
     ("%link_host", " ".join(link_host)),
     ("%cxx_reference", " ".join(reference)),
     ("%cxx", config.cxx),
+    ("%other_cxx", other_cxx),
 ]
 
 if os.path.exists(bunny):
@@ -76,3 +87,7 @@ if "address" in config.sanitize:
     config.available_features.add("asan")
 if "thread" in config.sanitize:
     config.available_features.add("tsan")
+    # The program has this option; Archer looks for it here, and complains.
+    config.environment.setdefault(
+        "TSAN_OPTIONS", "ignore_noninstrumented_modules=1"
+    )

@@ -47,10 +47,14 @@ static std::unique_ptr<LoadedProgram> load(CompileOptions source,
   source.defines = options.defines;
   source.check = options.check;
   source.synthesis = options.synthesis;
-  ObjectOptions objectOptions{.source = std::move(source),
-                              .execution = options.target,
-                              .target = {.cpu = "native"},
-                              .cache = options.cache};
+  bool isReference = options.target == ExecutionTarget::Reference;
+  ObjectOptions objectOptions{
+      .source = std::move(source),
+      .execution = options.target,
+      .target = {.cpu = "native",
+                 .sanitizer =
+                     isReference ? Sanitizer::None : JITCode::getSanitizer()},
+      .cache = options.cache};
   std::optional<CompiledObject> object =
       compileObject(objectOptions, diagnostics);
   if (!object)

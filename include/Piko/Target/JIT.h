@@ -5,6 +5,8 @@
 #ifndef PIKO_TARGET_JIT_H
 #define PIKO_TARGET_JIT_H
 
+#include "Piko/Driver/Options.h"
+
 #include "llvm/ExecutionEngine/Orc/LLJIT.h"
 
 #include <memory>
@@ -15,6 +17,10 @@ namespace piko {
 /// libraries are the process's own.
 class JITCode {
 public:
+  /// What Piko is built with: pipelines that run with its runtime should be
+  /// instrumented for it, too.
+  static Sanitizer getSanitizer();
+
   /// Links an object that generateCode made for this machine.
   static llvm::Expected<std::unique_ptr<JITCode>> load(llvm::StringRef object);
 

@@ -10,6 +10,13 @@
 using namespace llvm;
 using namespace piko;
 
+Sanitizer JITCode::getSanitizer() {
+  StringRef names = PIKO_SANITIZE;
+  return names.contains("address")  ? Sanitizer::Address
+         : names.contains("thread") ? Sanitizer::Thread
+                                    : Sanitizer::None;
+}
+
 Expected<std::unique_ptr<JITCode>> JITCode::load(StringRef object) {
   InitializeNativeTarget();
   InitializeNativeTargetAsmPrinter();

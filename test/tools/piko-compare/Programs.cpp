@@ -32,8 +32,10 @@ private:
   DiagnosticPrinter printer;
 };
 
-std::shared_ptr<JITCode> load(llvm::Module &module, int optLevel) {
-  auto code = generateCode(module, {"native", optLevel}, CodeFormat::Object);
+std::shared_ptr<JITCode> load(llvm::Module &module, int optLevel,
+                              Sanitizer sanitizer) {
+  auto code =
+      generateCode(module, {"native", optLevel, sanitizer}, CodeFormat::Object);
   if (!code)
     throw std::runtime_error(llvm::toString(code.takeError()));
   auto made = JITCode::load(*code);
@@ -123,7 +125,7 @@ void Programs::Implementation::compileReference() {
       /*optimize=*/false, *llvmContext, context);
   if (!module)
     log.fail("cannot compile " + referenceFile + " for the reference executor");
-  reference = load(*module, /*optLevel=*/0);
+  reference = load(*module, /*optLevel=*/0, Sanitizer::None);
 }
 
 Programs::Programs(const std::string &file, const std::string &reference,
@@ -162,7 +164,8 @@ Program Programs::compile(const std::string &pipe) {
       translateToLLVMIR(*module, *context);
   if (!llvmModule)
     self->log.fail("cannot compile " + pipe);
-  std::shared_ptr<JITCode> code = load(*llvmModule, /*optLevel=*/3);
+  std::shared_ptr<JITCode> code =
+      load(*llvmModule, /*optLevel=*/3, JITCode::getSanitizer());
   auto name = std::make_shared<std::string>(pipe);
   Program program{{PIKORT_ABI_VERSION, name->c_str(),
                    find<void(pikort_pipeline *)>(*code, pipe + ".setup"),
