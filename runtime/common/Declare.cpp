@@ -178,6 +178,19 @@ void pikoir_declare_schedule(pikort_pipeline *p, int32_t stage, int64_t batch,
   });
 }
 
+void pikoir_declare_strips(pikort_pipeline *p, int32_t id, int32_t source,
+                           int64_t chunk, const int32_t *stages,
+                           int32_t count) {
+  guarded(p, "setup", [&] {
+    StripGroup &group = declare(p->stripGroups, id, "group of stages");
+    expect(chunk >= 0 && count > 0,
+           "strips: expected stages, and a chunk of at least 0");
+    group.source = source;
+    group.chunk = chunk;
+    group.stages.assign(stages, stages + count);
+  });
+}
+
 void pikoir_declare_wait(pikort_pipeline *p, int32_t stage, int32_t waitsFor) {
   guarded(p, "setup", [&] { p->waits.push_back({stage, waitsFor}); });
 }

@@ -3,6 +3,7 @@
 
 #include "cpu/Check.h"
 #include "cpu/Cycle.h"
+#include "cpu/Strips.h"
 
 #include <algorithm>
 #include <cstring>
@@ -163,6 +164,24 @@ int32_t pikort_set_memory_limit(pikort_pipeline *p, int64_t bytes) {
   });
 }
 
+int32_t pikort_set_memory_budget(pikort_pipeline *p, int64_t bytes) {
+  return call(p, [&] {
+    if (bytes < 0)
+      invalid("expected a memory budget of at least 0, but got " +
+              std::to_string(bytes));
+    p->memory.setBudget(bytes);
+  });
+}
+
+int32_t pikort_set_strip_size(pikort_pipeline *p, int64_t primitives) {
+  return call(p, [&] {
+    if (primitives < 0)
+      invalid("expected a strip of at least 0 primitives, but got " +
+              std::to_string(primitives));
+    p->stripSize = primitives;
+  });
+}
+
 int32_t pikort_set_loop_limit(pikort_pipeline *p, int64_t limit) {
   return call(p, [&] {
     if (limit < 0)
@@ -298,6 +317,7 @@ int32_t pikort_run(pikort_pipeline *p) {
     if (p->status != PIKORT_OK)
       return;
     startCycles(*p);
+    startStrips(*p);
     int32_t status = p->runProgram(p);
     p->settle();
     if (status != PIKORT_OK && p->status == PIKORT_OK)
@@ -307,6 +327,7 @@ int32_t pikort_run(pikort_pipeline *p) {
   });
   if (!p || !p->ready)
     return code;
+  endStrips(*p);
   endCycles(*p);
   if (p->checker)
     p->checker->endRun();

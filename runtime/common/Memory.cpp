@@ -86,9 +86,16 @@ Block Memory::acquire(size_t wanted, Use use) {
   auto signedBytes = static_cast<int64_t>(bytes);
   std::lock_guard<std::mutex> lock(mutex_);
   Block block;
+  auto fitsBins = [&](size_t size) {
+    return use != Use::Bins || binLimit_ == 0 ||
+           binBytes_ + static_cast<int64_t>(size) <= binLimit_;
+  };
+  if (!fitsBins(bytes))
+    throw OutOfMemory{signedBytes};
   // The smallest free block that fits, if it does not waste too much.
   auto found = free_.lower_bound(bytes);
-  if (found != free_.end() && found->first <= bytes + bytes / 2) {
+  if (found != free_.end() && found->first <= bytes + bytes / 2 &&
+      fitsBins(found->first)) {
     // Of equal ones the latest, which may still be in a cache.
     found = std::prev(free_.upper_bound(found->first));
     block = {found->second.data, found->first};
@@ -106,6 +113,7 @@ Block Memory::acquire(size_t wanted, Use use) {
   if (use == Use::Bins) {
     binBytes_ += static_cast<int64_t>(block.bytes);
     peak_ = std::max(peak_, binBytes_);
+    peakSinceMark_ = std::max(peakSinceMark_, binBytes_);
   }
   return block;
 }
@@ -146,6 +154,31 @@ void Memory::setLimit(int64_t bytes) {
 int64_t Memory::limit() const {
   std::lock_guard<std::mutex> lock(mutex_);
   return limit_;
+}
+
+void Memory::setBudget(int64_t bytes) {
+  std::lock_guard<std::mutex> lock(mutex_);
+  budget_ = bytes;
+}
+
+int64_t Memory::budget() const {
+  std::lock_guard<std::mutex> lock(mutex_);
+  return budget_;
+}
+
+void Memory::limitBins(int64_t bytes) {
+  std::lock_guard<std::mutex> lock(mutex_);
+  binLimit_ = bytes;
+}
+
+int64_t Memory::markBins() {
+  std::lock_guard<std::mutex> lock(mutex_);
+  return peakSinceMark_ = binBytes_;
+}
+
+int64_t Memory::peakSinceMark() const {
+  std::lock_guard<std::mutex> lock(mutex_);
+  return peakSinceMark_;
 }
 
 int64_t Memory::reserved() const {

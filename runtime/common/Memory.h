@@ -4,7 +4,7 @@
 // A pipeline's memory. Blocks are mapped from the system once and go back to a
 // free list when released, so that a frame like the one before maps nothing
 // and faults no page. Invariant: reserved() = bytes in use + bytes free, and
-// reserved() never exceeds the limit.
+// reserved() never exceeds the limit, nor what bins hold theirs.
 //
 //===----------------------------------------------------------------------===//
 
@@ -49,6 +49,14 @@ public:
 
   void setLimit(int64_t bytes);
   int64_t limit() const;
+  /// The host's budget for bins; what enforces it is limitBins().
+  void setBudget(int64_t bytes);
+  int64_t budget() const;
+  /// Refuses what would make bins larger; 0 = no limit.
+  void limitBins(int64_t bytes);
+  /// Bytes of bins now; from here on peakSinceMark() counts.
+  int64_t markBins();
+  int64_t peakSinceMark() const;
   int64_t reserved() const;
   int64_t peak() const;
   void resetPeak();
@@ -66,6 +74,9 @@ private:
   int64_t reserved_ = 0;
   int64_t binBytes_ = 0;
   int64_t peak_ = 0;
+  int64_t peakSinceMark_ = 0;
+  int64_t budget_ = 0;
+  int64_t binLimit_ = 0;
   int64_t frame_ = 0;
 };
 

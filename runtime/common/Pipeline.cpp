@@ -47,6 +47,7 @@ void pikort_pipeline::checkDeclared() {
   all(states, "state");
   all(stages, "stage");
   all(sources, "source");
+  all(stripGroups, "group of stages");
   auto checkRecord = [&](int32_t id, const std::string &user) {
     if (id < 0 || id >= static_cast<int32_t>(records.size()))
       bad(quoted(user) + ": expected a declared record, but got " +
@@ -103,11 +104,55 @@ void pikort_pipeline::connect() {
           "for, but got " + std::to_string(wait.waitsFor));
 }
 
+/// Completes the groups of strips, once components are known.
+void pikort_pipeline::findStrips() {
+  for (size_t g = 0; g < stripGroups.size(); ++g) {
+    StripGroup &group = stripGroups[g];
+    if (group.source < 0 ||
+        group.source >= static_cast<int32_t>(sources.size()))
+      bad("strips: expected a declared source, but got " +
+          std::to_string(group.source));
+    for (int32_t s : group.stages) {
+      if (!findStage(s) || stages[s].stripGroup >= 0)
+        bad("strips: expected a declared stage of one group, but got " +
+            std::to_string(s));
+      stages[s].stripGroup = static_cast<int32_t>(g);
+      group.writes |= stages[s].writes();
+    }
+  }
+  for (Edge &edge : edges) {
+    int32_t from = stages[edge.producer].stripGroup;
+    int32_t to = stages[edge.consumer].stripGroup;
+    if (to >= 0 && from != to)
+      bad("stage " + quoted(stages[edge.consumer].name) +
+          ": runs in strips, but gets primitives of stage " +
+          quoted(stages[edge.producer].name) + ", which does not run in them");
+    edge.leavesStrips = from >= 0 && from != to;
+  }
+  for (Stage &stage : stages) {
+    if (stage.stripGroup < 0)
+      continue;
+    if (stage.takesList())
+      bad("stage " + quoted(stage.name) +
+          ": a process that takes a list does not run in strips");
+    const StripGroup &group = stripGroups[stage.stripGroup];
+    for (int32_t source : stage.sources)
+      if (source != group.source)
+        bad("stage " + quoted(stage.name) + ": expected strips of one source");
+    for (int32_t other : components[stage.component].stages)
+      if (stages[other].stripGroup != stage.stripGroup)
+        bad("stage " + quoted(stage.name) +
+            ": expected its cycle to run in strips as a whole");
+    stage.sharesTile = group.chunk > 0 && !stage.sources.empty();
+  }
+}
+
 void pikort_pipeline::finish() {
   checkDeclared();
   connect();
   findLoops();
   sortStages();
+  findStrips();
   findKeys();
   stageStats.resize(stages.size());
 }
@@ -189,7 +234,8 @@ static const char *describe(BadCall call) {
   return "made a wrong call";
 }
 
-static std::string describe(const std::string &stage, const KernelError &e) {
+static std::string describe(const std::string &stage, const KernelError &e,
+                            const std::string &memoryLimit) {
   std::string a = std::to_string(e.a), b = std::to_string(e.b);
   std::string text = "stage " + quoted(stage) + ": ";
   switch (e.code) {
@@ -219,8 +265,7 @@ static std::string describe(const std::string &stage, const KernelError &e) {
   case PIKORT_OUT_OF_MEMORY:
     if (e.a < 0)
       return text + "expected memory of at least 0 bytes, but got " + a;
-    return text + "out of memory: expected " + a + " more bytes" +
-           (e.b > 0 ? ", but the limit is " + b : "");
+    return text + "out of memory: expected " + a + " more bytes" + memoryLimit;
   case PIKORT_BAD_PROGRAM:
     return text + describe(static_cast<BadCall>(e.a));
   default:
@@ -236,7 +281,8 @@ int32_t pikort_pipeline::settle() noexcept {
     try {
       Stage *stage = findStage(error.stage);
       std::string text =
-          describe(stage ? stage->name : std::to_string(error.stage), error);
+          describe(stage ? stage->name : std::to_string(error.stage), error,
+                   memoryLimitText(*this));
       fail(error.code, checker ? checker->describe(error.code, text) : text);
     } catch (...) {
       fail(error.code, {});

@@ -26,6 +26,7 @@ class Checker; // cpu/Check.h
 struct Kernel; // cpu/Kernel.h
 struct Queue;  // cpu/Queue.h
 class Cycle;   // cpu/Cycle.h
+class Strips;  // cpu/Strips.h
 
 /// An error, thrown inside the runtime and caught at its boundary.
 struct Failure {
@@ -63,10 +64,12 @@ struct State {
 
 struct Edge {
   int32_t producer = 0, port = 0, consumer = 0;
-  bool insideLoop = false; ///< Both ends are in one loop.
-  bool keyed = false;      ///< Its primitives carry lineage keys.
-  int32_t keyWidth = 0;    ///< 64-bit words of a key.
-  /// If the producer is on a cycle: what it has emitted so far.
+  bool insideLoop = false;   ///< Both ends are in one loop.
+  bool keyed = false;        ///< Its primitives carry lineage keys.
+  int32_t keyWidth = 0;      ///< 64-bit words of a key.
+  bool leavesStrips = false; ///< Only the producer is in a group of strips.
+  /// If the producer is on a cycle, or the edge leaves strips: what it has
+  /// emitted so far.
   std::shared_ptr<Queue> queue;
 };
 
@@ -83,6 +86,16 @@ struct LoopShape {
   bool ordered = false;        ///< The order across its hops can be seen.
   bool keyed = false;          ///< What comes in carries lineage keys.
   int32_t keyWidth = 0;
+};
+
+/// Stages that take the primitives of a source strip by strip.
+struct StripGroup {
+  bool declared = false;
+  int32_t source = 0;
+  int64_t chunk = 0; ///< Most primitives in a strip; 0 = as memory allows.
+  std::vector<int32_t> stages;
+  bool writes = false;            ///< Some stage writes state.
+  std::shared_ptr<Strips> strips; ///< Of a run.
 };
 
 /// How a stage, or one of its bins, runs.
@@ -102,6 +115,7 @@ struct Source {
   int32_t stage = 0;
   const uint8_t *data = nullptr;
   int64_t count = -1;             ///< -1 = not bound
+  int64_t begin = 0, end = 0;     ///< The strip that runs, or all.
   std::shared_ptr<Kernel> kernel; ///< If the consumer is placed.
 };
 
@@ -118,8 +132,10 @@ struct Stage {
   std::vector<int32_t> outputs; ///< The edge of each port, or -1.
   int32_t component = 0;
   int32_t loop = -1;
-  int32_t root = 0;     ///< Of the lineage that it starts.
-  int32_t keyWidth = 0; ///< 64-bit words of its items' keys, 0 = none.
+  int32_t stripGroup = -1;
+  bool sharesTile = false; ///< A strip is a tile: threads share it.
+  int32_t root = 0;        ///< Of the lineage that it starts.
+  int32_t keyWidth = 0;    ///< 64-bit words of its items' keys, 0 = none.
   // Completed by each run:
   std::array<int64_t, 4> grid{}, cellGrid{};
   int64_t tiles = 1, cells = 1;
@@ -136,6 +152,7 @@ struct Stage {
   /// Positions of a cell may be in several units.
   bool splits() const { return flags & PIKOIR_SPLIT && !ordered(); }
   bool placed() const { return flags & PIKOIR_PLACED; }
+  bool writes() const { return flags & PIKOIR_WRITES; }
   bool unordered() const { return flags & PIKOIR_UNORDERED; }
 };
 
@@ -182,6 +199,7 @@ struct pikort_pipeline {
   std::vector<piko::rt::Source> sources;
   std::vector<piko::rt::Edge> edges;
   std::vector<piko::rt::Wait> waits;
+  std::vector<piko::rt::StripGroup> stripGroups;
   std::vector<piko::rt::Component> components; ///< Producers first.
   std::vector<piko::rt::LoopShape> loops;
   std::vector<int32_t> order; ///< Stages, as in components.
@@ -193,6 +211,7 @@ struct pikort_pipeline {
   int32_t threads = 1;
   int32_t activeThreads = 1;            ///< That the open kernel has units for.
   int64_t loopLimit = int64_t(1) << 20; ///< Of hops and of rounds.
+  int64_t stripSize = 0;                ///< Of all strips; 0 = not said.
 
   std::vector<piko::rt::KernelStats> kernelStats;
   std::vector<piko::rt::StageStats> stageStats;
@@ -220,6 +239,11 @@ struct pikort_pipeline {
   piko::rt::Cycle *cycleOf(const piko::rt::Stage &stage) const {
     return components[stage.component].cycle.get();
   }
+  /// The strips that a stage takes, or null.
+  piko::rt::Strips *stripsOf(const piko::rt::Stage &stage) const {
+    return stage.stripGroup < 0 ? nullptr
+                                : stripGroups[stage.stripGroup].strips.get();
+  }
   /// The number of a stage's record as the host knows it.
   int32_t hostRecord(int32_t stage) const {
     int32_t record = stages[stage].record, host = records[record].host;
@@ -237,6 +261,7 @@ private:
 
   void checkDeclared();
   void connect();
+  void findStrips();
   // StageOrder.cpp:
   void findLoops();
   void sortStages();
@@ -246,15 +271,21 @@ private:
 
 namespace piko::rt {
 
+/// What memory was refused for, if the host said so.
+inline std::string memoryLimitText(const pikort_pipeline &p) {
+  int64_t limit = p.memory.limit(), budget = p.memory.budget();
+  if (budget > 0 && (limit == 0 || budget < limit))
+    return ", but the budget is " + std::to_string(budget);
+  return limit > 0 ? ", but the limit is " + std::to_string(limit) : "";
+}
+
 inline std::string outOfMemoryText(const pikort_pipeline &p,
                                    const std::string &who,
                                    const OutOfMemory &refused) {
   std::string text = who + ": out of memory";
   if (refused.bytes != INT64_MAX)
     text += ": expected " + std::to_string(refused.bytes) + " more bytes";
-  if (p.memory.limit() > 0)
-    text += ", but the limit is " + std::to_string(p.memory.limit());
-  return text;
+  return text + memoryLimitText(p);
 }
 
 /// Runs `body`, which may throw, and turns what it throws into a status.

@@ -173,16 +173,17 @@ void Cycle::absorb(Kernel &kernel) {
     partOf(kernel.stage).loop->absorb(kernel);
   else
     for (int32_t e : stage.outputs)
-      if (e >= 0) {
-        Edge &edge = p_.edges[e];
-        const Stage &to = p_.stages[edge.consumer];
-        Stream stream = gatherEdge(p_, edge);
-        checkCount(to, edge.queue->count + stream.count);
-        checkCount(to, edge.queue->pairs.size() + stream.pairCount);
-        edge.queue->append(p_.memory, stream, p_.records[to.record].size,
-                           edge.keyed ? edge.keyWidth : 0);
-      }
+      if (e >= 0)
+        enqueue(p_, p_.edges[e], gatherEdge(p_, p_.edges[e]));
   chosen_ = -1;
+}
+
+void piko::rt::enqueue(pikort_pipeline &p, Edge &edge, const Stream &stream) {
+  const Stage &to = p.stages[edge.consumer];
+  checkCount(to, edge.queue->count + stream.count);
+  checkCount(to, edge.queue->pairs.size() + stream.pairCount);
+  edge.queue->append(p.memory, stream, p.records[to.record].size,
+                     edge.keyed ? edge.keyWidth : 0);
 }
 
 void piko::rt::startCycles(pikort_pipeline &p) {
@@ -193,6 +194,18 @@ void piko::rt::startCycles(pikort_pipeline &p) {
   for (Edge &edge : p.edges)
     if (p.cycleOf(p.stages[edge.producer]))
       edge.queue = std::make_shared<Queue>();
+}
+
+void piko::rt::restartCycles(pikort_pipeline &p, const StripGroup &group) {
+  for (int32_t s : group.stages)
+    if (Component &component = p.components[p.stages[s].component];
+        component.cyclic && component.stages.front() == s) {
+      component.cycle = std::make_shared<Cycle>(p, component);
+      for (Edge &edge : p.edges)
+        if (p.stages[edge.producer].component == p.stages[s].component &&
+            !edge.leavesStrips)
+          *edge.queue = {};
+    }
 }
 
 void piko::rt::endCycles(pikort_pipeline &p) {

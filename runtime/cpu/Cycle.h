@@ -67,6 +67,8 @@ private:
 
 /// Makes the cycles of a run, and frees them.
 void startCycles(pikort_pipeline &p);
+/// Begins the cycles of a group of stages anew, for another strip.
+void restartCycles(pikort_pipeline &p, const StripGroup &group);
 void endCycles(pikort_pipeline &p);
 
 } // namespace piko::rt

@@ -16,6 +16,7 @@
 
 #include "cpu/Cycle.h"
 #include "cpu/Parallel.h"
+#include "cpu/Strips.h"
 
 #include <algorithm>
 #include <cstring>
@@ -327,10 +328,11 @@ static Stream gatherSource(pikort_pipeline &p, const Stage &stage,
                            int32_t index) {
   Source &source = p.sources[index];
   Stream stream;
-  stream.items = source.data;
-  stream.count = source.count;
+  stream.items = source.data + source.begin * p.records[stage.record].size;
+  stream.count = source.end - source.begin;
   stream.keys.width = 1;
-  stream.keys.base = static_cast<uint64_t>(index) << 32;
+  stream.keys.base = (static_cast<uint64_t>(index) << 32) +
+                     static_cast<uint64_t>(source.begin);
   if (stage.placed()) {
     if (source.kernel->open || source.kernel->pendingOutputs == 0)
       throw Failure{PIKORT_BAD_PROGRAM, "stage " + quoted(stage.name) +
@@ -570,7 +572,10 @@ Stream piko::rt::gatherInputs(pikort_pipeline &p, const Stage &stage,
       continue; // the loop itself keeps these
     if (cycle && from.component != stage.component && !cycle->isFinished())
       failOrder(stage, from);
-    if (cycle)
+    Strips *strips = edge.leavesStrips ? p.stripsOf(from) : nullptr;
+    if (strips && !strips->isFinished())
+      failOrder(stage, from);
+    if (cycle || (strips && strips->isDivided()))
       add(edge.queue->take(edge.keyed ? edge.keyWidth : 0));
     else if (fromOutside)
       add(gatherEdge(p, edge));

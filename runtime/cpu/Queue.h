@@ -76,6 +76,24 @@ struct Queue {
     count += stream.count;
   }
 
+  int64_t bytes() const {
+    return items.size() + 4 * pairs.size() + 8 * words.size();
+  }
+  /// What it held at some time, without nodes.
+  struct Mark {
+    int64_t count = 0, bytes = 0, pairs = 0, words = 0;
+  };
+  Mark mark() const {
+    return {count, items.size(), pairs.size(), words.size()};
+  }
+  /// Drops what came since.
+  void rewind(const Mark &mark) {
+    count = mark.count;
+    items.shrink(mark.bytes);
+    pairs.shrink(mark.pairs);
+    words.shrink(mark.words);
+  }
+
   /// All items, without their nodes; the queue is empty then.
   Stream take(int32_t keyWidth) {
     Stream stream;
@@ -90,6 +108,9 @@ struct Queue {
     return stream;
   }
 };
+
+/// Appends what came along an edge to its queue; throws.
+void enqueue(pikort_pipeline &p, Edge &edge, const Stream &stream);
 
 } // namespace piko::rt
 

@@ -3,6 +3,7 @@
 
 #include "cpu/Check.h"
 #include "cpu/Cycle.h"
+#include "cpu/Strips.h"
 
 #include <algorithm>
 
@@ -73,8 +74,10 @@ static void publish(const pikort_pipeline &p, Kernel &kernel) {
 /// Units for the AssignBin of a source: any chunks will do.
 static void prepareSource(pikort_pipeline &p, Kernel &kernel) {
   const Source &source = p.sources[kernel.source];
-  kernel.stream.items = source.data;
-  kernel.stream.count = source.count;
+  kernel.stream.items =
+      source.data +
+      source.begin * p.records[p.stages[kernel.stage].record].size;
+  kernel.stream.count = source.end - source.begin;
   Stage whole;
   whole.flags = PIKOIR_SPLIT;
   binItems(p, whole, kernel, false);
@@ -89,6 +92,8 @@ static void prepareStage(pikort_pipeline &p, Kernel &kernel) {
       cycle ? cycle->takeInput(kernel) : gatherInputs(p, stage, true);
   if (stage.keyWidth > 0)
     kernel.keys = std::move(kernel.stream.keys);
+  if (Strips *strips = p.stripsOf(stage); strips && stage.collects())
+    kernel.launch = strips->number();
   bool rankNeeded = stage.loop >= 0;
   kernel.pendingOutputs = 0;
   for (int32_t e : stage.outputs) {
@@ -124,6 +129,9 @@ static const pikoir_input *begin(pikort_pipeline &p, Kernel &kernel) {
         prepareLanes(p, kernel);
         publish(p, kernel);
         kernel.open = true;
+        Strips *strips = p.stripsOf(p.stages[kernel.stage]);
+        if (strips && kernel.source < 0 && p.stages[kernel.stage].writes())
+          strips->commit();
         p.activeThreads = static_cast<int32_t>(
             std::clamp<int64_t>(kernel.input.unit_count, 1, p.threads));
       });
@@ -149,8 +157,12 @@ static int32_t end(pikort_pipeline &p, Kernel &kernel) {
   stats.milliseconds += millisecondsSince(kernel.started);
   ++stats.launches;
   Cycle *cycle = p.cycleOf(p.stages[kernel.stage]);
-  if (!cycle || kernel.source >= 0 || status != PIKORT_OK)
+  if (kernel.source >= 0 || status != PIKORT_OK)
     return status;
+  if (Strips *strips = p.stripsOf(p.stages[kernel.stage]); strips && !cycle)
+    strips->absorb(kernel);
+  if (!cycle)
+    return p.status.load();
   return guarded(&p, "stage " + quoted(p.stages[kernel.stage].name),
                  [&] { cycle->absorb(kernel); });
 }

@@ -18,9 +18,9 @@ namespace {
 
 /// Positions in a unit: enough units to balance the threads, enough work in
 /// each to be worth it, a multiple of any lanes.
-int64_t unitSize(const pikort_pipeline &p, const BinSchedule &schedule,
-                 int64_t positions) {
-  if (schedule.tileSplit > 0)
+int64_t unitSize(const pikort_pipeline &p, const Stage &stage,
+                 const BinSchedule &schedule, int64_t positions) {
+  if (schedule.tileSplit > 0 && !stage.sharesTile)
     return schedule.tileSplit;
   int64_t share = positions / (int64_t(p.threads) * 8);
   return std::clamp<int64_t>((share + 15) / 16 * 16, 16, 1024);
@@ -99,7 +99,7 @@ private:
     return stage_.scheduleOf(bin).kind == PIKOIR_SERIALIZE;
   }
   int64_t sizeOf(int64_t bin) const {
-    return unitSize(p_, stage_.scheduleOf(bin), kernel_.positions);
+    return unitSize(p_, stage_, stage_.scheduleOf(bin), kernel_.positions);
   }
   void add(int64_t cellBegin, int64_t cellEnd, int64_t begin, int64_t end) {
     if (begin < end)

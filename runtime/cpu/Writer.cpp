@@ -25,8 +25,8 @@ static Lane *laneOf(pikoir_writer *writer) {
 }
 
 void piko::rt::outOfMemory(const Lane &lane, int64_t bytes) {
-  lane.pipeline->report({lane.unit, PIKORT_OUT_OF_MEMORY, lane.stage, bytes,
-                         lane.pipeline->memory.limit()});
+  lane.pipeline->report(
+      {lane.unit, PIKORT_OUT_OF_MEMORY, lane.stage, bytes, 0});
 }
 
 void piko::rt::badCall(const Lane &lane, BadCall which) {

@@ -165,6 +165,52 @@ std::vector<TestComponent> Graph::order() const {
   return result;
 }
 
+std::pair<size_t, size_t> Graph::stripRange(int source) const {
+  std::vector<TestComponent> components = order();
+  std::vector<bool> inside(stages.size());
+  auto canRun = [&](const TestComponent &component, bool first) {
+    auto isOf = [&](int s) {
+      return std::find(component.stages.begin(), component.stages.end(), s) !=
+             component.stages.end();
+    };
+    int fed = 0;
+    for (size_t i = 0; i < sources.size(); ++i)
+      if (isOf(sources[i]) && (!first || static_cast<int>(i) != source))
+        return false;
+      else
+        fed += isOf(sources[i]);
+    for (size_t from = 0; from < stages.size(); ++from)
+      for (int to : stages[from].ports)
+        if (isOf(to) && !isOf(static_cast<int>(from)) && !inside[from])
+          return false;
+    for (int s : component.stages)
+      if (collects(s) && (takesList(s) || !first || component.cyclic ||
+                          (cells(s) > tiles(s) && !stages[s].ports.empty())))
+        return false;
+    return fed == first;
+  };
+  size_t begin = 0;
+  while (begin < components.size() && !canRun(components[begin], true))
+    ++begin;
+  size_t end = begin;
+  while (end < components.size() && canRun(components[end], end == begin)) {
+    for (int s : components[end].stages)
+      inside[static_cast<size_t>(s)] = true;
+    ++end;
+  }
+  return {begin, end};
+}
+
+std::vector<int> Graph::stripStages(int source) const {
+  std::vector<TestComponent> components = order();
+  std::vector<int> result;
+  auto [begin, end] = stripRange(source);
+  for (size_t c = begin; strips && c < end; ++c)
+    result.insert(result.end(), components[c].stages.begin(),
+                  components[c].stages.end());
+  return result;
+}
+
 void Graph::normalise(std::vector<Arrivals> &arrivals) const {
   for (size_t s = 0; s < stages.size(); ++s) {
     std::vector<int> loop = loopOf(static_cast<int>(s));
@@ -377,6 +423,13 @@ static void setup(pikort_pipeline *p) {
   }
   for (size_t i = 0; i < current->sources.size(); ++i)
     pikoir_declare_source(p, static_cast<int32_t>(i), current->sources[i]);
+  int32_t groups = 0;
+  for (size_t i = 0; i < current->sources.size(); ++i)
+    if (auto members = current->stripStages(static_cast<int>(i));
+        !members.empty())
+      pikoir_declare_strips(p, groups++, static_cast<int32_t>(i), 0,
+                            members.data(),
+                            static_cast<int32_t>(members.size()));
 }
 
 /// One emission, by the inline fast path or by calls.
@@ -553,6 +606,44 @@ static void scheduleBins(pikort_pipeline *p, int32_t stage) {
   }
 }
 
+static bool isPlaced(size_t source) {
+  return current->stages[current->sources[source]].flags & PIKOIR_PLACED;
+}
+
+static int32_t runComponent(pikort_pipeline *p,
+                            const TestComponent &component) {
+  int32_t stage = component.stages.back();
+  if (!component.cyclic)
+    return runStage(p, stage);
+  while ((stage = pikoir_cycle_step(p, component.stages.back())) >= 0)
+    if (int32_t status = runStage(p, stage))
+      return status;
+  return pikoir_status(p);
+}
+
+static int32_t runStrip(pikort_pipeline *p, int source) {
+  if (isPlaced(static_cast<size_t>(source)))
+    if (int32_t status = assignSource(p, source))
+      return status;
+  auto [begin, end] = current->stripRange(source);
+  std::vector<TestComponent> components = current->order();
+  for (size_t c = begin; c < end; ++c)
+    if (int32_t status = runComponent(p, components[c]))
+      return status;
+  return 0;
+}
+
+static int32_t runStrips(pikort_pipeline *p, int source, int32_t group) {
+  std::vector<Arrivals> before = current->arrivals;
+  while (pikoir_strips_next(p, group)) {
+    if (runStrip(p, source))
+      current->arrivals = before; // if it is not the end, it runs again
+    else
+      before = current->arrivals;
+  }
+  return pikoir_status(p);
+}
+
 static int32_t runGraph(pikort_pipeline *p) {
   current->arrivals.assign(current->stages.size(), {});
   current->paddingSeen = false;
@@ -562,22 +653,31 @@ static int32_t runGraph(pikort_pipeline *p) {
   for (size_t s = 0; s < current->stages.size(); ++s)
     if (current->stages[s].perBin)
       scheduleBins(p, static_cast<int32_t>(s));
-  for (size_t i = 0; i < current->sources.size(); ++i)
-    if (current->stages[current->sources[i]].flags & PIKOIR_PLACED)
-      if (int32_t status = assignSource(p, static_cast<int32_t>(i)))
-        return status;
-  for (const TestComponent &component : current->order()) {
-    int32_t stage = component.stages.back();
-    if (!component.cyclic) {
-      if (int32_t status = runStage(p, stage))
+  std::vector<TestComponent> components = current->order();
+  std::vector<int> groupOf(components.size(), -1);
+  std::vector<int> groupSources;
+  for (size_t i = 0; i < current->sources.size(); ++i) {
+    auto source = static_cast<int>(i);
+    if (current->stripStages(source).empty()) {
+      if (int32_t status = isPlaced(i) ? assignSource(p, source) : 0)
         return status;
       continue;
     }
-    while ((stage = pikoir_cycle_step(p, component.stages.back())) >= 0)
-      if (int32_t status = runStage(p, stage))
-        return status;
-    if (int32_t status = pikoir_status(p))
+    auto [begin, end] = current->stripRange(source);
+    for (size_t c = begin; c < end; ++c)
+      groupOf[c] = static_cast<int>(groupSources.size());
+    groupSources.push_back(source);
+  }
+  for (size_t c = 0; c < components.size(); ++c) {
+    int group = groupOf[c];
+    int32_t status =
+        group < 0
+            ? runComponent(p, components[c])
+            : runStrips(p, groupSources[static_cast<size_t>(group)], group);
+    if (status)
       return status;
+    while (group >= 0 && c + 1 < components.size() && groupOf[c + 1] == group)
+      ++c;
   }
   return 0;
 }
@@ -619,21 +719,28 @@ int32_t GraphRun::run(int threads) {
 
 // --- Comparison -------------------------------------------------------------
 
-void piko::rt::test::checkOrder(Graph &graph) {
+void piko::rt::test::checkArrivals(Graph &graph,
+                                   const std::vector<Arrivals> &expected,
+                                   const std::string &what) {
+  graph.normalise(graph.arrivals);
+  for (size_t s = 0; s < expected.size(); ++s) {
+    ASSERT_EQ(graph.arrivals[s].items, expected[s].items)
+        << "stage " << s << ", " << what;
+    ASSERT_EQ(graph.arrivals[s].cells, expected[s].cells)
+        << "stage " << s << ", " << what;
+    ASSERT_EQ(graph.arrivals[s].calls, expected[s].calls)
+        << "stage " << s << ", " << what;
+  }
+  EXPECT_FALSE(graph.paddingSeen);
+}
+
+void piko::rt::test::checkOrder(Graph &graph, int64_t stripSize) {
   std::vector<Arrivals> expected = graph.model();
   graph.normalise(expected);
   GraphRun run(graph);
+  ASSERT_EQ(pikort_set_strip_size(run.get(), stripSize), PIKORT_OK);
   for (int threads : {1, 2, 7, 2}) {
     ASSERT_EQ(run.run(threads), PIKORT_OK) << pikort_message(run.get());
-    graph.normalise(graph.arrivals);
-    for (size_t s = 0; s < expected.size(); ++s) {
-      ASSERT_EQ(graph.arrivals[s].items, expected[s].items)
-          << "stage " << s << ", " << threads << " threads";
-      ASSERT_EQ(graph.arrivals[s].cells, expected[s].cells)
-          << "stage " << s << ", " << threads << " threads";
-      ASSERT_EQ(graph.arrivals[s].calls, expected[s].calls)
-          << "stage " << s << ", " << threads << " threads";
-    }
-    EXPECT_FALSE(graph.paddingSeen);
+    checkArrivals(graph, expected, std::to_string(threads) + " threads");
   }
 }

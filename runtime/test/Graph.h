@@ -68,6 +68,7 @@ struct Graph {
   int mostHops = 8;         ///< Primitives that have made so many emit nothing.
   bool alwaysEmits = false; ///< As much as a call can.
   bool logs = true;         ///< Runs note arrivals.
+  bool strips = false;      ///< Stages that can run in strips do.
 
   // Filled by the runs.
   std::vector<Arrivals> arrivals;
@@ -94,6 +95,10 @@ struct Graph {
   std::vector<int> loopOf(int stage) const;
   /// Components in the order in which they run.
   std::vector<TestComponent> order() const;
+  /// Where stripStages() of a source begin, and end, in order().
+  std::pair<size_t, size_t> stripRange(int source) const;
+  /// The stages that can take a source in strips.
+  std::vector<int> stripStages(int source) const;
   /// What tests may compare: a loop's stages take their primitives in any
   /// order, unless that can be seen; then only that in each cell is compared.
   void normalise(std::vector<Arrivals> &arrivals) const;
@@ -125,8 +130,12 @@ private:
   pikort_pipeline *pipeline_ = nullptr;
 };
 
-/// Runs a graph on 1, 2 and 7 threads, and compares with its meaning.
-void checkOrder(Graph &graph);
+/// Runs a graph on 1, 2 and 7 threads, and compares with its meaning; if the
+/// graph has strips, with strips of so many primitives.
+void checkOrder(Graph &graph, int64_t stripSize = 0);
+/// Compares what the latest run noted.
+void checkArrivals(Graph &graph, const std::vector<Arrivals> &expected,
+                   const std::string &what);
 
 } // namespace piko::rt::test
 

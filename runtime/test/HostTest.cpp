@@ -357,7 +357,7 @@ TEST(Create, RejectsBadPrograms) {
     pikort_destroy(p);
   };
   expect({7, "Old", setup, run}, PIKORT_VERSION,
-         "pipeline 'Old': expected a program for runtime version 2, but got 7");
+         "pipeline 'Old': expected a program for runtime version 3, but got 7");
   expect({PIKORT_ABI_VERSION, "Empty", nullptr, run}, PIKORT_BAD_PROGRAM,
          "pipeline 'Empty': expected a program with setup and run");
   auto twice = [](pikort_pipeline *p) {
@@ -396,6 +396,21 @@ TEST(Create, RejectsBadPrograms) {
   };
   expect({PIKORT_ABI_VERSION, "Wait", wait, run}, PIKORT_BAD_PROGRAM,
          "pipeline 'Small': expected a declared stage to wait for, but got 3");
+  auto noSource = [](pikort_pipeline *p) {
+    setup(p);
+    int32_t stages[] = {0};
+    pikoir_declare_strips(p, 0, 1, 0, stages, 1);
+  };
+  expect({PIKORT_ABI_VERSION, "NoSource", noSource, run}, PIKORT_BAD_PROGRAM,
+         "strips: expected a declared source, but got 1");
+  auto twoGroups = [](pikort_pipeline *p) {
+    setup(p);
+    int32_t stages[] = {0};
+    pikoir_declare_strips(p, 0, 0, 0, stages, 1);
+    pikoir_declare_strips(p, 1, 0, 0, stages, 1);
+  };
+  expect({PIKORT_ABI_VERSION, "TwoGroups", twoGroups, run}, PIKORT_BAD_PROGRAM,
+         "strips: expected a declared stage of one group, but got 0");
   pikort_destroy(nullptr);
 }
 

@@ -19,6 +19,12 @@
 //   while ((s = pikoir_cycle_step(p, first)) >= 0)
 //     if (int32_t status = kernel[s](p)) return status;
 //
+// and those of a group that takes a source in strips once for each strip:
+//
+//   while (pikoir_strips_next(p, group))
+//     kernel[a](p) || kernel[b](p);
+//   if (int32_t status = pikoir_status(p)) return status;
+//
 // Every unit is opened exactly once, by any thread; a writer stays on the
 // thread that opened it. The runtime restores lineage order at the join, so
 // that no result depends on the number of threads or on how units are cut.
@@ -44,9 +50,10 @@ enum pikoir_stage_flags {
   PIKOIR_PLACED = 4,    ///< AssignBin places; else all are in bin 0, cell 0.
   PIKOIR_UNORDERED = 8, ///< The order of its input and output is free.
   PIKOIR_LIST = 16,     ///< Process takes a list; it collects.
-  PIKOIR_ORDERED = 32   ///< The order of its calls in a bin can be seen, as by
+  PIKOIR_ORDERED = 32,  ///< The order of its calls in a bin can be seen, as by
                         ///< updates of pixels: one unit runs a bin's (with
                         ///< owner tiles, a tile's) positions in order.
+  PIKOIR_WRITES = 64    ///< Process may write state.
 };
 
 enum pikoir_schedule {
@@ -92,6 +99,16 @@ PIKORT_API void pikoir_declare_schedule(pikort_pipeline *p, int32_t stage,
 /// the order of stages, for which waits count like edges.
 PIKORT_API void pikoir_declare_wait(pikort_pipeline *p, int32_t stage,
                                     int32_t waits_for);
+
+/// Stages that run strip by strip, with consecutive primitives of a source: it
+/// feeds one of them, and all else that comes into them is from the group. No
+/// bin of theirs is collected, and what one of them writes no other reads or
+/// writes; a cycle is in the group as a whole. Of a stage that waits, all is in
+/// one bin, or nothing is emitted. `chunk` is how many primitives a strip has
+/// at most; 0 = as many as the runtime finds good.
+PIKORT_API void pikoir_declare_strips(pikort_pipeline *p, int32_t id,
+                                      int32_t source, int64_t chunk,
+                                      const int32_t *stages, int32_t count);
 
 // --- queries ----------------------------------------------------------------
 
@@ -251,6 +268,12 @@ PIKORT_API void pikoir_schedule_bin(pikort_pipeline *p, int32_t stage,
 /// cycle. Call it until it returns -1; the AssignBin kernels of sources that
 /// feed the cycle run before.
 PIKORT_API int32_t pikoir_cycle_step(pikort_pipeline *p, int32_t stage);
+
+/// Begins the next strip of a group of stages, the first one to begin with: 1,
+/// and the group's kernels are to run, in stage order, but no more of them once
+/// one has failed; or 0, at the end and on an error (pikoir_status). A strip
+/// for which memory was refused may begin anew, smaller and with a status of 0.
+PIKORT_API int32_t pikoir_strips_next(pikort_pipeline *p, int32_t id);
 
 /// Reports an error of generated code; thread safe, and does not return a
 /// value: the kernel goes on and pikoir_end returns `code`, a pikort_status.

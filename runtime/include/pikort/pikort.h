@@ -24,7 +24,7 @@ extern "C" {
 #endif
 
 /// Changes whenever generated code and runtime would no longer fit together.
-#define PIKORT_ABI_VERSION 2u
+#define PIKORT_ABI_VERSION 3u
 
 #if defined(_WIN32)
 #define PIKORT_API
@@ -88,6 +88,17 @@ PIKORT_API int32_t pikort_set_threads(pikort_pipeline *pipeline,
 /// more ends with PIKORT_OUT_OF_MEMORY.
 PIKORT_API int32_t pikort_set_memory_limit(pikort_pipeline *pipeline,
                                            int64_t bytes);
+/// Sets how many bytes bins and queues should use at most; 0 = no budget. Where
+/// the program allows, sources then run in strips that fit; all else that needs
+/// more ends with PIKORT_OUT_OF_MEMORY. It may be exceeded only by a strip
+/// whose later stages make more of what earlier ones left than they did before.
+/// No result depends on it.
+PIKORT_API int32_t pikort_set_memory_budget(pikort_pipeline *pipeline,
+                                            int64_t bytes);
+/// Sets how many primitives of a source a strip has; 0 = what the memory budget
+/// or the program says, else all. No result depends on it.
+PIKORT_API int32_t pikort_set_strip_size(pikort_pipeline *pipeline,
+                                         int64_t primitives);
 /// Limits how many hops a primitive makes on a cycle of stages, and how many
 /// rounds a cycle runs; at least 0. A run that needs more ends with
 /// PIKORT_ENDLESS. Not called: 2^20.

@@ -108,6 +108,12 @@ public:
   Status memoryLimit(int64_t bytes) {
     return status(pikort_set_memory_limit(handle_, bytes));
   }
+  Status memoryBudget(int64_t bytes) {
+    return status(pikort_set_memory_budget(handle_, bytes));
+  }
+  Status stripSize(int64_t primitives) {
+    return status(pikort_set_strip_size(handle_, primitives));
+  }
   Status loopLimit(int64_t limit) {
     return status(pikort_set_loop_limit(handle_, limit));
   }
