@@ -258,7 +258,7 @@ void KernelResolver::resolveAssignment(Operation *op, StageOp consumer,
 
 /// Notes at the stages what cannot be seen in kernels any more: whether the
 /// order of a bin's primitives shows in the state, whether threads may share
-/// them, and whether assign phases place them.
+/// them, whether assign phases place them, and whether state is written.
 static void noteStages(PipelineOp pipeline) {
   pipeline.walk([](Operation *op) {
     if (!isa<ProcessOp, AssignOp>(op))
@@ -274,6 +274,11 @@ static void noteStages(PipelineOp pipeline) {
                        return WalkResult::interrupt();
                      }).wasInterrupted();
     stage.setOrdered(ordered);
+    stage.setWrites(op->walk([](Operation *inner) {
+                        return isa<UpdateOp, StoreOp, AtomicOp>(inner)
+                                   ? WalkResult::interrupt()
+                                   : WalkResult::advance();
+                      }).wasInterrupted());
     stage.setSplit(!serial && !ordered);
   });
 }

@@ -6,7 +6,7 @@ piko.record @F {"x" : i32 at 0, "y" : i32 at 4} size 8 align 4
 // placed by the consumer's assign phase, and come before the lineage boundary.
 // CHECK-LABEL: piko.pipeline @P
 // CHECK:         piko.stage @a {{.*}} split :
-// CHECK:         piko.stage @b {{.*}} placed :
+// CHECK:         piko.stage @b {{.*}} placed writes :
 // CHECK:         piko.kernel @kernel_a
 // CHECK:           %[[BINS:.*]] = piko.open_bins @a : !piko.bins<@F>
 // CHECK:           %[[UNITS:.*]] = piko.unit_count %[[BINS]]
@@ -98,7 +98,7 @@ piko.pipeline @Box rank 2 {
 // CHECK-LABEL: piko.pipeline @Lists
 // CHECK:         piko.stage @a {{.*}} split placed : list
 // CHECK-NEXT:      piko.schedule load_balance batch 4{{$}}
-// CHECK:         piko.stage @b {{.*}} ordered placed : list
+// CHECK:         piko.stage @b {{.*}} ordered placed writes : list
 // CHECK:         piko.kernel @schedule_a
 // CHECK-DAG:       %[[FOUR:.*]] = arith.constant 4 : i64
 // CHECK-DAG:       %[[NINE:.*]] = arith.constant 9 : i64

@@ -340,6 +340,50 @@ def FormKernels : Pass<"piko-form-kernels", "::piko::PipelineOp"> {
   let statistics = [Statistic<"kernels", "kernels", "kernels formed">];
 }
 
+def FormStrips : Pass<"piko-form-strips", "::piko::PipelineOp"> {
+  let summary = "Find kernels that can take a source strip by strip";
+  let description = [{
+    **Requires** the kernels level, with kernels as they will run.
+
+    **Does**: puts a `piko.strips` in front of kernels in a row that may run for
+    one strip of a source after another, so that what lies between them stays
+    small. All their primitives come from that source, through edges inside the
+    group. A stage that waits, for a stage before the group, may be in it if its
+    bin is the whole domain or it emits nothing. Stages of which one writes state
+    that another one uses are not in one group, unless both only change it
+    atomically. A cycle is in a group as a whole, and only if none of its stages
+    collects. Where the group's first stage has the schedule `all` with a tile
+    split, and one bin, the tile becomes the `chunk`: depth first, several stages
+    for one tile before the next.
+
+    **Guarantees** that kernels and their order stay as they are, and that lineage
+    order does not change, however the source is cut. A remark says of each stage
+    that runs in no strips why.
+
+    Before:
+    ```
+    piko.source @a
+    piko.edge @a[0] -> @b
+    piko.stage @a ... { piko.schedule all tile_split 256 }
+    piko.kernel @kernel_a { ... }
+    piko.kernel @kernel_b { ... }
+    ```
+    After, in front of the kernels:
+    ```
+    piko.strips source 0 [@kernel_a, @kernel_b] chunk 256
+    ```
+
+    **Limits**: strips are of a source's primitives, never of bins, so that a
+    stage that waits and emits from several bins ends a group, as does one that
+    takes a list, or that primitives of two sources reach. Kernels that are not
+    in a row are not moved.
+  }];
+  let statistics = [
+    Statistic<"groups", "groups", "groups of kernels that run in strips">,
+    Statistic<"kernels", "kernels", "kernels in them">,
+    Statistic<"refused", "stages-refused", "stages that run in no strips">];
+}
+
 def ResolveKernels : Pass<"piko-resolve-kernels", "::piko::PipelineOp"> {
   let summary = "Turn phases into loops over bins and their storage";
   let description = [{

@@ -105,7 +105,7 @@ static LogicalResult verifyReached(PipelineOp pipeline) {
 LogicalResult PipelineOp::verifyRegions() {
   for (Operation &op : *getBodyBlock())
     if (!isa<ConstantOp, BufferOp, ImageOp, SourceOp, EdgeOp, StageOp, KernelOp,
-             CheckRecordOp>(op))
+             StripsOp, CheckRecordOp>(op))
       return op.emitOpError(
           "expected only state, sources, edges, stages and kernels in a "
           "pipeline");

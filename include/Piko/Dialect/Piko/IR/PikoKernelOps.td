@@ -64,6 +64,49 @@ def Piko_KernelOp : Piko_Op<"kernel", [
   }];
 }
 
+def Piko_StripsOp : Piko_Op<"strips", [
+    HasParent<"PipelineOp">, DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
+  let summary = "kernels that take a source strip by strip";
+  let description = [{
+    The kernels, which stand in a row, run for one strip of the source, consecutive
+    primitives, before the first of them runs for the next strip. All their
+    primitives come from that source. `chunk` is how many primitives a strip has
+    at most; without it the runtime chooses.
+
+    ```mlir
+    piko.record @F {"x" : i32 at 0} size 4 align 4
+    piko.pipeline @P rank 1 {
+      piko.source @start
+      piko.edge @start[0] -> @drop
+      piko.stage @start bins [0] threads 64 : @F -> [@F] {}
+      piko.stage @drop bins [0] threads 64 : @F -> [] {}
+      piko.strips source 0 [@kernel_start, @kernel_drop] chunk 256
+      piko.kernel @kernel_start {
+        piko.process of @start {
+        ^bb0(%f: !piko.prim<@F>):
+          %x = piko.get %f "x" : !piko.prim<@F> -> i32
+          piko.emit 0 (%x) : i32
+          piko.return
+        }
+      }
+      piko.kernel @kernel_drop {
+        piko.process of @drop {
+        ^bb0(%f: !piko.prim<@F>):
+          piko.return
+        }
+      }
+    }
+    ```
+  }];
+  let arguments = (ins
+    ConfinedAttr<Piko_I64Attr, [IntNonNegative]>:$source,
+    TypedArrayAttrBase<FlatSymbolRefAttr, "kernels in a row">:$kernels,
+    OptionalAttr<ConfinedAttr<Piko_I64Attr, [IntPositive]>>:$chunk);
+  let assemblyFormat = [{
+    `source` $source $kernels (`chunk` $chunk^)? attr-dict
+  }];
+}
+
 def Piko_OpenBinsOp : Piko_Op<"open_bins", [
     DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
   let summary = "starts a kernel over the bins of a stage or over a source";

@@ -28,7 +28,8 @@ def Piko_StageOp : Piko_Op<"stage", [
     of this one. At the resolved level, `split` says that a bin's primitives (its
     batches, where the phase takes a list) may be divided over threads in any
     way, `ordered` that the order in which they are processed shows in the
-    state, and `placed` that kernels place them.
+    state, `placed` that kernels place them, and `writes` that the process phase
+    may write state.
 
     At the kernels level and below, the phases have moved into
     `piko.kernel`s and the stage's body is empty but for its schedule.
@@ -55,12 +56,14 @@ def Piko_StageOp : Piko_Op<"stage", [
                        OptionalAttr<Piko_I64Attr>:$tile,
                        OptionalAttr<Piko_I64Attr>:$cycle,
                        UnitAttr:$split, UnitAttr:$ordered, UnitAttr:$placed,
-                       UnitAttr:$takesList, OptionalAttr<StrArrayAttr>:$fused);
+                       UnitAttr:$writes, UnitAttr:$takesList,
+                       OptionalAttr<StrArrayAttr>:$fused);
   let regions = (region SizedRegion<1>:$body);
   let assemblyFormat = [{
     $sym_name `bins` $bins `threads` $threads (`lineage` $lineage^)?
     (`tile` $tile^)? (`cycle` $cycle^)? (`split` $split^)?
-    (`ordered` $ordered^)? (`placed` $placed^)? (`fused` $fused^)?
+    (`ordered` $ordered^)? (`placed` $placed^)? (`writes` $writes^)?
+    (`fused` $fused^)?
     `:` (`list` $takesList^)? $input `->` $outputs attr-dict-with-keyword $body
   }];
   let hasRegionVerifier = 1;

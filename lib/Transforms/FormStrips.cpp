@@ -1,0 +1,330 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// piko-form-strips: finds kernels in a row that may take a source strip by
+// strip. Kernels of a cycle are one node.
+//
+//   1. a node that one source alone feeds begins a group;
+//   2. the next nodes join it as long as all that feeds them is in the group
+//   and
+//      nothing shows that they run before all primitives have come;
+//   3. a group of two kernels or more becomes a piko.strips.
+
+#include "Piko/Transforms/Passes.h"
+
+#include "llvm/ADT/MapVector.h"
+
+namespace piko {
+#define GEN_PASS_DEF_FORMSTRIPS
+#include "Piko/Transforms/Passes.h.inc"
+} // namespace piko
+
+using namespace mlir;
+using namespace piko;
+
+namespace {
+
+/// A kernel, or all kernels of a cycle.
+struct Node {
+  SmallVector<KernelOp> kernels;
+  llvm::SetVector<Operation *> stages;
+};
+
+/// How a stage uses a piece of state.
+enum Access { reads = 1, writes = 2, changesAtomically = 4 };
+
+/// Why a node is not in a group, and what shows it.
+struct Reason {
+  std::string text;
+  Operation *culprit = nullptr;
+};
+
+/// What each stage does to state.
+using Accesses = llvm::DenseMap<Operation *, llvm::MapVector<Attribute, int>>;
+
+class Group {
+public:
+  Group(PipelineOp pipeline, const Accesses &accesses)
+      : pipeline(pipeline), accesses(&accesses) {}
+
+  /// Whether the node may be the first one, and the source that feeds it.
+  std::optional<Reason> whyNotFirst(const Node &node);
+  /// Whether the node may come next.
+  std::optional<Reason> whyNotNext(const Node &node);
+  void add(const Node &node);
+
+  bool feeds(const Node &node);
+  bool empty() const { return kernels.empty(); }
+  SmallVector<KernelOp> kernels;
+  SmallVector<StageOp> stages; ///< In the order of kernels.
+  int64_t source = 0;
+
+private:
+  std::optional<Reason> whyNotAtAll(const Node &node);
+  std::optional<Reason> findConflict(StageOp stage);
+  SmallVector<int64_t> sourcesOf(StageOp stage);
+  SmallVector<EdgeOp> edgesInto(const Node &node, StageOp stage);
+
+  PipelineOp pipeline;
+  const Accesses *accesses;
+  /// The stage that began the lineage of what a stage of the group emits; null
+  /// = the source.
+  llvm::DenseMap<Operation *, Operation *> roots;
+};
+
+struct FormStripsPass : piko::impl::FormStripsBase<FormStripsPass> {
+  void runOnOperation() override;
+  void finish(const Group &group);
+  void refuse(StageOp stage, const Reason &reason);
+};
+
+} // namespace
+
+//===----------------------------------------------------------------------===//
+// What may run in strips
+//===----------------------------------------------------------------------===//
+
+SmallVector<int64_t> Group::sourcesOf(StageOp stage) {
+  SmallVector<int64_t> numbers;
+  for (auto [number, source] : llvm::enumerate(pipeline.getOps<SourceOp>()))
+    if (source.getStageAttr().getAttr() == stage.getSymNameAttr())
+      numbers.push_back(number);
+  return numbers;
+}
+
+/// The edges into a stage but for those from its own node.
+SmallVector<EdgeOp> Group::edgesInto(const Node &node, StageOp stage) {
+  SmallVector<EdgeOp> edges;
+  for (auto edge : pipeline.getOps<EdgeOp>())
+    if (edge.getConsumerAttr().getAttr() == stage.getSymNameAttr() &&
+        !node.stages.contains(
+            lookupInPipeline<StageOp>(edge, edge.getProducerAttr())))
+      edges.push_back(edge);
+  return edges;
+}
+
+static std::string quote(StageOp stage) {
+  return ("'" + stage.getSymName() + "'").str();
+}
+
+/// What one stage writes and another one sees shows when they run.
+std::optional<Reason> Group::findConflict(StageOp stage) {
+  for (auto [state, mine] : accesses->lookup(stage))
+    for (StageOp other : stages) {
+      int theirs = accesses->lookup(other).lookup(state), both = mine | theirs;
+      if (other == stage || !theirs || both == reads ||
+          both == changesAtomically)
+        continue;
+      return Reason{("it and stage " + quote(other) + " both use @" +
+                     cast<FlatSymbolRefAttr>(state).getValue() +
+                     ", which one of them writes")
+                        .str(),
+                    other};
+    }
+  return std::nullopt;
+}
+
+std::optional<Reason> Group::whyNotAtAll(const Node &node) {
+  for (Operation *op : node.stages) {
+    auto stage = cast<StageOp>(op);
+    ScheduleOp schedule = stage.getSchedule();
+    if (stage.getTakesList())
+      return Reason{"its process phase takes a list, which must be complete"};
+    if (schedule && schedule.getEndBin())
+      return Reason{"it waits until nothing can reach its bins", schedule};
+    if (!stage.collects())
+      continue;
+    if (stage.getCycle())
+      return Reason{"it waits and is on a cycle, which runs in rounds",
+                    schedule};
+    for (auto name :
+         schedule.getEndStageAttr().getAsRange<FlatSymbolRefAttr>()) {
+      auto other = lookupInPipeline<StageOp>(stage, name);
+      if (llvm::is_contained(stages, other))
+        return Reason{"it waits for stage " + quote(other) +
+                          ", which runs in the same strips",
+                      schedule};
+    }
+    if (!stage.isWholeDomain() && !stage.getOutputs().empty())
+      return Reason{"it waits, so that what it emits is in the order of its "
+                    "bins",
+                    schedule};
+  }
+  return std::nullopt;
+}
+
+bool Group::feeds(const Node &node) {
+  return llvm::any_of(node.stages, [&](Operation *stage) {
+    return llvm::any_of(
+        edgesInto(node, cast<StageOp>(stage)), [&](EdgeOp edge) {
+          return llvm::is_contained(
+              stages, lookupInPipeline<StageOp>(edge, edge.getProducerAttr()));
+        });
+  });
+}
+
+std::optional<Reason> Group::whyNotFirst(const Node &node) {
+  SmallVector<int64_t> sources;
+  for (Operation *op : node.stages) {
+    auto stage = cast<StageOp>(op);
+    sources.append(sourcesOf(stage));
+    for (EdgeOp edge : edgesInto(node, stage))
+      return Reason{
+          "stage " +
+              quote(lookupInPipeline<StageOp>(edge, edge.getProducerAttr())) +
+              ", which feeds it, does not run in strips with it",
+          edge};
+  }
+  if (sources.size() > 1)
+    return Reason{"several sources feed it"};
+  if (auto reason = whyNotAtAll(node))
+    return reason;
+  source = sources.front();
+  return std::nullopt;
+}
+
+std::optional<Reason> Group::whyNotNext(const Node &node) {
+  SmallVector<Operation *> lineages;
+  for (Operation *op : node.stages) {
+    auto stage = cast<StageOp>(op);
+    if (empty() || !sourcesOf(stage).empty())
+      return Reason{"a source feeds it, too"};
+    for (EdgeOp edge : edgesInto(node, stage)) {
+      auto producer = lookupInPipeline<StageOp>(edge, edge.getProducerAttr());
+      if (!llvm::is_contained(stages, producer))
+        return Reason{"stage " + quote(producer) +
+                          ", which feeds it, does not run in strips with it",
+                      edge};
+      lineages.push_back(roots.lookup(producer));
+    }
+  }
+  if (!llvm::all_equal(lineages))
+    return Reason{"what reaches it is of several lineages, one of which comes "
+                  "after the other"};
+  if (auto reason = whyNotAtAll(node))
+    return reason;
+  for (Operation *op : node.stages)
+    if (auto reason = findConflict(cast<StageOp>(op)))
+      return reason;
+  return std::nullopt;
+}
+
+void Group::add(const Node &node) {
+  Operation *root = nullptr;
+  for (Operation *op : node.stages)
+    for (EdgeOp edge : edgesInto(node, cast<StageOp>(op)))
+      root =
+          roots.lookup(lookupInPipeline<StageOp>(edge, edge.getProducerAttr()));
+  for (Operation *op : node.stages) {
+    auto stage = cast<StageOp>(op);
+    stages.push_back(stage);
+    roots[stage] = stage.collects() ? op : root;
+  }
+  llvm::append_range(kernels, node.kernels);
+}
+
+//===----------------------------------------------------------------------===//
+// The pass
+//===----------------------------------------------------------------------===//
+
+static StageOp getStage(KernelOp kernel) {
+  if (ProcessOp process = kernel.getProcess())
+    return getPhaseStage(process);
+  return getPhaseStage(*kernel.getOps<AssignOp>().begin());
+}
+
+/// A source's kernel runs right before the stage's own, and is of its node.
+static SmallVector<Node> findNodes(PipelineOp pipeline) {
+  SmallVector<Node> nodes;
+  StageOp last;
+  for (auto kernel : pipeline.getOps<KernelOp>()) {
+    StageOp stage = getStage(kernel);
+    bool sameCycle =
+        last && stage.getCycle() && stage.getCycle() == last.getCycle();
+    if (!last || (stage != last && !sameCycle))
+      nodes.emplace_back();
+    nodes.back().kernels.push_back(kernel);
+    nodes.back().stages.insert(stage);
+    last = stage;
+  }
+  return nodes;
+}
+
+/// What the phases of each stage do, wherever they are.
+static Accesses findAccesses(PipelineOp pipeline) {
+  Accesses accesses;
+  pipeline.walk([&](Operation *op) {
+    Attribute state;
+    int access = 0;
+    if (auto load = dyn_cast<LoadOp>(op))
+      std::tie(state, access) =
+          std::pair(Attribute(load.getStateAttr()), reads);
+    else if (auto update = dyn_cast<UpdateOp>(op))
+      std::tie(state, access) =
+          std::pair(Attribute(update.getImageAttr()), writes);
+    else if (isa<StoreOp, AtomicOp>(op))
+      std::tie(state, access) = std::pair(
+          op->getAttr("state"), isa<StoreOp>(op) ? writes : changesAtomically);
+    if (!state)
+      return;
+    accesses[getPhaseStage(op)][state] |= access;
+  });
+  return accesses;
+}
+
+void FormStripsPass::refuse(StageOp stage, const Reason &reason) {
+  InFlightDiagnostic remark = stage.emitRemark()
+                              << "stage '" << stage.getSymName()
+                              << "' does not run in strips: " << reason.text;
+  if (reason.culprit)
+    remark.attachNote(reason.culprit->getLoc()) << "because of this";
+  ++refused;
+}
+
+/// The tile of `All` is what the whole machine takes at a time.
+static IntegerAttr getChunk(StageOp stage) {
+  ScheduleOp schedule = stage.getSchedule();
+  bool isTiled = schedule && schedule.getKind() == ScheduleKind::All &&
+                 schedule.getBody().empty() && stage.isWholeDomain();
+  return isTiled ? schedule.getTileSplitAttr() : IntegerAttr();
+}
+
+void FormStripsPass::finish(const Group &group) {
+  if (group.empty())
+    return;
+  StageOp first = group.stages.front();
+  if (group.kernels.size() == 1)
+    return refuse(first, {"no stage that could follow it in them takes what it "
+                          "emits"});
+  SmallVector<Attribute> names;
+  for (KernelOp kernel : group.kernels)
+    names.push_back(FlatSymbolRefAttr::get(kernel.getSymNameAttr()));
+  KernelOp kernel = group.kernels.front();
+  OpBuilder builder(kernel);
+  StripsOp::create(builder, first.getLoc(),
+                   builder.getI64IntegerAttr(group.source),
+                   builder.getArrayAttr(names), getChunk(first));
+  ++groups;
+  kernels += group.kernels.size();
+}
+
+void FormStripsPass::runOnOperation() {
+  PipelineOp pipeline = getOperation();
+  Accesses accesses = findAccesses(pipeline);
+  Group group(pipeline, accesses);
+  for (const Node &node : findNodes(pipeline)) {
+    std::optional<Reason> notNext = group.whyNotNext(node);
+    if (!notNext) {
+      group.add(node);
+      continue;
+    }
+    bool isFedByGroup = group.feeds(node);
+    finish(group);
+    group = Group(pipeline, accesses);
+    if (auto notFirst = group.whyNotFirst(node))
+      refuse(cast<StageOp>(node.stages.front()),
+             isFedByGroup ? *notNext : *notFirst);
+    else
+      group.add(node);
+  }
+  finish(group);
+}
