@@ -99,10 +99,12 @@ void populateChecksToLLVMPatterns(const mlir::TypeConverter &converter,
                                   LoweringContext &context);
 
 /// Attributes of a kernel's function, until NAME.run is written: the number of
-/// the stage whose bins or schedule it is for, and whether it places a source.
+/// the stage whose bins or schedule it is for, whether it places a source, ...
 constexpr const char *stageAttrName = "piko.stage";
 constexpr const char *numberAttrName = "piko.number";
 constexpr const char *sourceAttrName = "piko.source";
+/// The number of the group of kernels that runs in strips.
+constexpr const char *stripsAttrName = "piko.strips";
 
 /// Writes NAME.setup and NAME.run; `kernels` run in that order.
 void createProgram(const PipelineNumbers &numbers,

@@ -96,10 +96,19 @@ LogicalResult ConvertPikoToLLVMPass::convert(PipelineOp pipeline,
     return failure();
   PipelineNumbers numbers(pipeline);
   SmallVector<func::FuncOp> functions;
+  llvm::DenseMap<StringAttr, int64_t> groups;
+  for (auto [number, strips] : llvm::enumerate(pipeline.getOps<StripsOp>()))
+    for (auto name : strips.getKernels().getAsRange<FlatSymbolRefAttr>())
+      groups[name.getAttr()] = number;
   for (auto kernel : llvm::to_vector(pipeline.getOps<KernelOp>())) {
     functions.push_back(context.outline(kernel, numbers));
     if (failed(noteSubject(kernel, functions.back(), numbers)))
       return failure();
+    if (auto group = groups.find(kernel.getSymNameAttr());
+        group != groups.end())
+      functions.back()->setAttr(
+          stripsAttrName,
+          IntegerAttr::get(IntegerType::get(&getContext(), 64), group->second));
     kernel.erase();
   }
 
@@ -133,7 +142,8 @@ LogicalResult ConvertPikoToLLVMPass::convert(PipelineOp pipeline,
       return failure();
   createProgram(numbers, functions, context);
   for (func::FuncOp function : functions)
-    for (const char *name : {stageAttrName, numberAttrName, sourceAttrName})
+    for (const char *name :
+         {stageAttrName, numberAttrName, sourceAttrName, stripsAttrName})
       function->removeAttr(name);
   pipeline.erase();
   return success();

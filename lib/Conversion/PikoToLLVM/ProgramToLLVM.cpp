@@ -22,7 +22,7 @@ public:
       : numbers(numbers), pipeline(numbers.pipeline), context(context),
         builder(builder), loc(pipeline.getLoc()), frame(frame) {}
 
-  void run();
+  void run(ArrayRef<func::FuncOp> kernels);
 
 private:
   Value i32(int64_t v) { return createI32(builder, loc, v); }
@@ -45,6 +45,8 @@ private:
   void declareCheckedRecord(CheckRecordOp record);
   void declareState(Operation *state, int32_t number);
   void declareStage(StageOp stage, int32_t number);
+  void declareStrips(StripsOp strips, int32_t number,
+                     ArrayRef<func::FuncOp> kernels);
   Value recordBytes(FlatSymbolRefAttr record, ArrayAttr numbers);
 
   const PipelineNumbers &numbers;
@@ -169,14 +171,20 @@ static int64_t stageFlags(StageOp stage) {
   return (stage.collects() ? 1 : 0) | (stage.getSplit() ? 2 : 0) |
          (stage.getPlaced() ? 4 : 0) |
          (schedule && schedule.getUnordered() ? 8 : 0) |
-         (stage.getTakesList() ? 16 : 0) | (stage.getOrdered() ? 32 : 0);
+         (stage.getTakesList() ? 16 : 0) | (stage.getOrdered() ? 32 : 0) |
+         (stage.getWrites() ? 64 : 0);
+}
+
+/// The bytes of a number.
+static void appendBytes(std::string &to, int64_t number, int count) {
+  for (int byte = 0; byte < count; ++byte)
+    to += char(uint64_t(number) >> (8 * byte));
 }
 
 void SetupWriter::declareStage(StageOp stage, int32_t number) {
   std::string extents;
   for (int64_t extent : stage.getBins())
-    for (int byte = 0; byte < 8; ++byte)
-      extents += char(uint64_t(extent) >> (8 * byte));
+    appendBytes(extents, extent, 8);
   ScheduleOp schedule = stage.getSchedule();
   call("pikoir_declare_stage",
        {i32(number), text(stage.getSymName()),
@@ -196,7 +204,31 @@ void SetupWriter::declareStage(StageOp stage, int32_t number) {
            {i32(number), i32(numbers.stages.lookup(name.getAttr()))});
 }
 
-void SetupWriter::run() {
+static int64_t stageNumber(func::FuncOp kernel) {
+  return kernel->getAttrOfType<IntegerAttr>(stageAttrName).getInt();
+}
+
+/// The group of strips that a kernel is in, if any.
+static std::optional<int64_t> stripsNumber(func::FuncOp kernel) {
+  auto number = kernel->getAttrOfType<IntegerAttr>(stripsAttrName);
+  return number ? std::optional(number.getInt()) : std::nullopt;
+}
+
+void SetupWriter::declareStrips(StripsOp strips, int32_t number,
+                                ArrayRef<func::FuncOp> kernels) {
+  llvm::SmallSetVector<int64_t, 8> stages;
+  for (func::FuncOp kernel : kernels)
+    if (stripsNumber(kernel) == number)
+      stages.insert(stageNumber(kernel));
+  std::string list;
+  for (int64_t stage : stages)
+    appendBytes(list, stage, 4);
+  call("pikoir_declare_strips",
+       {i32(number), i32(strips.getSource()),
+        i64(strips.getChunk().value_or(0)), bytes(list), i32(stages.size())});
+}
+
+void SetupWriter::run(ArrayRef<func::FuncOp> kernels) {
   call("pikoir_declare_pipeline",
        {text(pipeline.getSymName()), i32(pipeline.getRank())});
   for (auto [name, number] : numbers.records)
@@ -217,12 +249,14 @@ void SetupWriter::run() {
           i32(numbers.stages.lookup(edge.getConsumerAttr().getAttr()))});
   for (auto [name, number] : numbers.states)
     declareState(SymbolTable::lookupSymbolIn(pipeline, name), number);
+  for (auto [number, strips] : llvm::enumerate(pipeline.getOps<StripsOp>()))
+    declareStrips(strips, number, kernels);
 }
 
 namespace {
 
 /// Writes NAME.run. The next kernel runs only if the one before it gave 0;
-/// those of a cycle run as the runtime says.
+/// those of a cycle run as the runtime says, those of strips for each strip.
 class RunWriter {
 public:
   RunWriter(const PipelineNumbers &numbers, LoweringContext &context,
@@ -243,6 +277,9 @@ private:
   void check(Value status, Block *next);
   void callKernel(func::FuncOp kernel, Block *next);
   void createCycle(ArrayRef<func::FuncOp> members);
+  /// Kernels that run one after the other, but for those of cycles.
+  void createSequence(ArrayRef<func::FuncOp> kernels);
+  void createStrips(int64_t number, ArrayRef<func::FuncOp> kernels);
 
   const PipelineNumbers &numbers;
   PipelineOp pipeline;
@@ -250,14 +287,10 @@ private:
   OpBuilder &builder;
   Location loc;
   Value frame;
-  Block *exit = nullptr;
+  Block *exit = nullptr; ///< Where a status goes that is not 0.
 };
 
 } // namespace
-
-static int64_t stageNumber(func::FuncOp kernel) {
-  return kernel->getAttrOfType<IntegerAttr>(stageAttrName).getInt();
-}
 
 std::optional<int64_t> RunWriter::cycleOf(func::FuncOp kernel) {
   if (!kernel->hasAttr(stageAttrName))
@@ -322,18 +355,7 @@ void RunWriter::createCycle(ArrayRef<func::FuncOp> members) {
         createBlock(exit));
 }
 
-void RunWriter::run(ArrayRef<func::FuncOp> kernels) {
-  auto pointer = LLVM::LLVMPointerType::get(builder.getContext());
-  auto function = func::FuncOp::create(
-      builder, loc, (pipeline.getSymName() + ".run").str(),
-      builder.getFunctionType(pointer, builder.getI32Type()));
-  OpBuilder::InsertionGuard guard(builder);
-  Block *entry = function.addEntryBlock();
-  frame = entry->getArgument(0);
-  exit =
-      builder.createBlock(&function.getBody(), {}, builder.getI32Type(), loc);
-  func::ReturnOp::create(builder, loc, exit->getArgument(0));
-  builder.setInsertionPointToEnd(entry);
+void RunWriter::createSequence(ArrayRef<func::FuncOp> kernels) {
   llvm::SmallDenseSet<int64_t> cyclesDone;
   for (func::FuncOp kernel : kernels) {
     std::optional<int64_t> cycle = cycleOf(kernel);
@@ -348,6 +370,62 @@ void RunWriter::run(ArrayRef<func::FuncOp> kernels) {
       if (cycleOf(other) == cycle)
         members.push_back(other);
     createCycle(members);
+  }
+}
+
+/// A kernel that fails ends its strip; the runtime knows whether it can be run
+/// again as a smaller one.
+void RunWriter::createStrips(int64_t number, ArrayRef<func::FuncOp> kernels) {
+  Block *next = createBlock(exit);
+  Block *strip = createBlock(exit);
+  Block *after = createBlock(exit);
+  cf::BranchOp::create(builder, loc, next);
+
+  builder.setInsertionPointToEnd(next);
+  Value more =
+      context
+          .call(builder, loc, "pikoir_strips_next", builder.getI32Type(),
+                {frame, createI32(builder, loc, number)})
+          .getResult();
+  Value ended = arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::eq,
+                                      more, createI32(builder, loc, 0));
+  cf::CondBranchOp::create(builder, loc, ended, after, strip);
+
+  Block *failed = builder.createBlock(after, builder.getI32Type(), loc);
+  cf::BranchOp::create(builder, loc, next);
+  Block *outer = std::exchange(exit, failed);
+  builder.setInsertionPointToEnd(strip);
+  createSequence(kernels);
+  cf::BranchOp::create(builder, loc, next);
+  exit = outer;
+
+  builder.setInsertionPointToEnd(after);
+  check(context.call(builder, loc, "pikoir_status", builder.getI32Type(), frame)
+            .getResult(),
+        createBlock(exit));
+}
+
+void RunWriter::run(ArrayRef<func::FuncOp> kernels) {
+  auto pointer = LLVM::LLVMPointerType::get(builder.getContext());
+  auto function = func::FuncOp::create(
+      builder, loc, (pipeline.getSymName() + ".run").str(),
+      builder.getFunctionType(pointer, builder.getI32Type()));
+  OpBuilder::InsertionGuard guard(builder);
+  Block *entry = function.addEntryBlock();
+  frame = entry->getArgument(0);
+  exit =
+      builder.createBlock(&function.getBody(), {}, builder.getI32Type(), loc);
+  func::ReturnOp::create(builder, loc, exit->getArgument(0));
+  builder.setInsertionPointToEnd(entry);
+  while (!kernels.empty()) {
+    std::optional<int64_t> strips = stripsNumber(kernels.front());
+    ArrayRef<func::FuncOp> together = kernels.take_while(
+        [&](func::FuncOp kernel) { return stripsNumber(kernel) == strips; });
+    if (strips)
+      createStrips(*strips, together);
+    else
+      createSequence(together);
+    kernels = kernels.drop_front(together.size());
   }
   cf::BranchOp::create(builder, loc, exit, createI32(builder, loc, 0));
 }
@@ -366,7 +444,7 @@ void piko::createProgram(const PipelineNumbers &numbers,
     OpBuilder::InsertionGuard guard(builder);
     Block *body = setup.addEntryBlock();
     builder.setInsertionPointToEnd(body);
-    SetupWriter(numbers, context, builder, body->getArgument(0)).run();
+    SetupWriter(numbers, context, builder, body->getArgument(0)).run(kernels);
     func::ReturnOp::create(builder, pipeline.getLoc());
   }
   RunWriter(numbers, context, builder).run(kernels);

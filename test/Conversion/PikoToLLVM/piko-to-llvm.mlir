@@ -26,11 +26,12 @@ piko.record @F {"x" : i32 at 0, "w" : f32[4 : 4] at 4} size 20 align 4
 // CHECK:         llvm.call @pikoir_declare_stage
 // CHECK:         llvm.call @pikoir_declare_edge
 
-// A kernel runs only if the one before it succeeded.
+// A kernel runs only if the one before it succeeded; here, both for each strip.
 // CHECK-LABEL: func.func @P.run(%{{.*}}: !llvm.ptr) -> i32
 // CHECK:         %[[A:.*]] = call @P.kernel_a
 // CHECK:         %[[FAILED:.*]] = arith.cmpi ne, %[[A]]
-// CHECK:         cf.cond_br %[[FAILED]], ^[[EXIT:.*]](%[[A]] : i32), ^[[NEXT:.*]]
+// CHECK:         cf.cond_br %[[FAILED]], ^[[STRIPS:.*]], ^[[NEXT:bb[0-9]+]]
+// CHECK:       ^[[NEXT]]:
 // CHECK:         call @P.kernel_b
 
 // IR: define i32 @P.run(ptr %{{.*}})
