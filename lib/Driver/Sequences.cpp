@@ -53,6 +53,7 @@ void piko::addSynthesisSequence(OpPassManager &passes,
   if (options.has("own-pixels"))
     pipeline.addPass(createOwnPixels());
   pipeline.addPass(createFormKernels());
+  pipeline.addPass(createFormStrips());
 }
 
 void piko::addResolveSequence(OpPassManager &passes) {

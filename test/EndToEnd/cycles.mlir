@@ -1,4 +1,5 @@
 // RUN: piko-compare %s --reference %S/Inputs/cycles.cpp --count 300 | FileCheck %s
+// RUN: piko-compare %s --reference %S/Inputs/cycles.cpp --count 300 --runs 1 --strip 7 | FileCheck %s
 // CHECK: equal
 
 piko.record @Point {"x" : i32 at 0, "y" : i32 at 4, "value" : f32 at 8, "tag" : i32 at 12} size 16 align 4

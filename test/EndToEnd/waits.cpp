@@ -2,6 +2,7 @@
 //
 // endStage<X> waits for all stages of type X; a member may have a stage's name.
 // RUN: piko-compare %s --count 2000 | FileCheck %s
+// RUN: piko-compare %s --count 2000 --runs 1 --strip 7 | FileCheck %s
 // CHECK: equal
 #include "Inputs/ports.h"
 

@@ -39,7 +39,7 @@ def features_of(args):
 def run_batch(args, first, count):
     features = features_of(args)
     pipes = [pipelines.generate(first + i, features, f"P{i}") for i in range(count)]
-    verdicts = Runner(args.tool, args.mlir).run(pipes)
+    verdicts = Runner(args.tool, args.mlir, strip=args.strip).run(pipes)
     used = Counter()
     for pipe in pipes:
         used.update(pipe.used)
@@ -93,7 +93,8 @@ def command_reduce(args):
     pipe = pipelines.generate(args.seed, features_of(args), "P0")
     text = None
     # What there is stays if it is stopped.
-    for text in reduce(pipe, Runner(args.tool, args.mlir, timeout=60)):
+    for text in reduce(pipe, Runner(args.tool, args.mlir, timeout=60,
+                                    strip=args.strip)):
         with open(args.out, "w") as file:
             file.write(text)
         print(f"{args.out}: {len(text.splitlines())} lines", flush=True)
@@ -116,6 +117,8 @@ def main():
     parser.add_argument("--table", action="store_true", help="count the features")
     parser.add_argument("--mlir", action="store_true",
                         help="compile the text of the dialect, not C++")
+    parser.add_argument("--strip", type=int, default=0,
+                        help="primitives of a source in a strip (all)")
     parser.add_argument("--out", default="reduced.cpp")
     args = parser.parse_args()
     return {"run": command_run, "show": command_show, "reduce": command_reduce}[

@@ -31,8 +31,9 @@ def kind_of(verdict):
 class Runner:
     """With `text` what is compiled is the text of the dialect, not the C++."""
 
-    def __init__(self, tool, text=False, threads=(1, 2, 7), timeout=120):
-        self.tool, self.text = tool, text
+    def __init__(self, tool, text=False, threads=(1, 2, 7), timeout=120,
+                 strip=0):
+        self.tool, self.text, self.strip = tool, text, strip
         self.threads, self.timeout = threads, timeout
 
     def run(self, pipes):
@@ -56,7 +57,7 @@ class Runner:
             done = subprocess.run(
                 [self.tool, file.with_suffix(".mlir") if self.text else file,
                  "--reference", file, "--cases", cases, "--runs", "1", "--timeout",
-                 str(self.timeout), "--threads", *map(str, self.threads)],
+                 str(self.timeout), "--strip", str(self.strip), "--threads", *map(str, self.threads)],
                 stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
                 errors="replace", timeout=self.timeout * 20)
             output, errors, status = done.stdout, done.stderr, done.returncode

@@ -37,6 +37,9 @@ it, and says how long a frame took.
   --check[=nan:RECORD.FIELD,...]   check the rules of state on one thread, and
                          that these fields are never NaN
   --threads N            threads, 0 for all (0)
+  --memory-budget BYTES  what bins may hold at a time: sources run in strips (0,
+                         no budget)
+  --strip N              primitives of a source in a strip (0, what fits)
   --warmup N --frames N  untimed and timed frames (5 30)
   --seconds S            stop early after so long, but with 3 timed frames at
                          least (1000)
@@ -95,6 +98,8 @@ private:
         {"--ground", [&] { options.ground = true; }},
         {"--set", [&] { parseSet(value(name)); }},
         {"--threads", [&] { options.threads = integer(name, 0, 10000); }},
+        {"--memory-budget", [&] { options.memoryBudget = size(name); }},
+        {"--strip", [&] { options.stripSize = size(name); }},
         {"--warmup", [&] { options.warmup = integer(name, 0, maxInt); }},
         {"--frames", [&] { options.frames = integer(name, 1, maxInt); }},
         {"--seconds", [&] { options.seconds = number(name); }},
@@ -180,6 +185,13 @@ private:
     if (result < least || result > most)
       fail(name + ": expected a number from " + std::to_string(least) + " to " +
            std::to_string(most) + ", but got " + std::to_string(result));
+    return result;
+  }
+  int64_t size(const std::string &name) {
+    auto result = read<int64_t>(name, "a whole number");
+    if (result < 0)
+      fail(name + ": expected a number of at least 0, but got " +
+           std::to_string(result));
     return result;
   }
   glm::vec3 vector(const std::string &name) {

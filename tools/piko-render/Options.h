@@ -20,6 +20,7 @@ struct Options {
   bool ground = false;
   std::vector<std::pair<std::string, std::string>> values; ///< of constants
   int threads = 0;
+  int64_t memoryBudget = 0, stripSize = 0;
   int warmup = 5, frames = 30;
   double seconds = 1000;
   std::string out;

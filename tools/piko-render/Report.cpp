@@ -20,7 +20,8 @@ std::vector<JsonObject> reportKernels(pikort_pipeline *pipeline, double runs) {
     kernels.push_back(JsonObject()
                           .add("name", stats.name)
                           .add("ms", stats.milliseconds / runs)
-                          .add("join_ms", stats.join_milliseconds / runs));
+                          .add("join_ms", stats.join_milliseconds / runs)
+                          .add("launches", double(stats.launches) / runs));
   }
   return kernels;
 }

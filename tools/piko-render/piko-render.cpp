@@ -158,7 +158,9 @@ Result<Done> renderScene(const Options &options) {
   int64_t extent[] = {options.view.width, options.view.height};
   if (code != PIKORT_OK ||
       pikort_set_domain(pipeline, 2, extent) != PIKORT_OK ||
-      pikort_set_threads(pipeline, options.threads) != PIKORT_OK)
+      pikort_set_threads(pipeline, options.threads) != PIKORT_OK ||
+      pikort_set_memory_budget(pipeline, options.memoryBudget) != PIKORT_OK ||
+      pikort_set_strip_size(pipeline, options.stripSize) != PIKORT_OK)
     return errorOf(pipeline);
   auto output = bindScene(pipeline, *scene);
   if (!output)

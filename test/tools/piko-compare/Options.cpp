@@ -86,6 +86,10 @@ Options parseOptions(int argc, char **argv) {
       options.threads = toNumbers<int>(words.takeValues(name, true));
     else if (name == "--runs")
       options.runs = toNumbers<int>(words.takeValues(name, false))[0];
+    else if (name == "--strip")
+      options.strip = toNumbers<int64_t>(words.takeValues(name, false))[0];
+    else if (name == "--budget")
+      options.budget = toNumbers<int64_t>(words.takeValues(name, false))[0];
     else if (name == "--timeout")
       options.timeout = toNumbers<unsigned>(words.takeValues(name, false))[0];
     else if (!readCaseOption(name, words, options.one))

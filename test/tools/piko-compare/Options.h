@@ -38,6 +38,10 @@ struct Options {
   std::string cases;
   std::vector<int> threads{1, 2, 7};
   int runs = 3;
+  /// Primitives of a source in a strip, 0 = all.
+  int64_t strip = 0;
+  /// What bins may hold, in bytes; 0 = no budget.
+  int64_t budget = 0;
   unsigned timeout = 0;
   /// Checking mode, on both sides.
   piko::CheckOptions check;

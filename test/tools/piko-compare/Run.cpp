@@ -146,6 +146,11 @@ void Run::bind() {
   }
 }
 
+void Run::divide(int64_t strip, int64_t budget) {
+  check(pikort_set_strip_size(pipeline, strip));
+  check(pikort_set_memory_budget(pipeline, budget));
+}
+
 Result Run::operator()(int threads) {
   bind();
   check(pikort_set_threads(pipeline, threads));

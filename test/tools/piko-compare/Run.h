@@ -20,6 +20,9 @@ public:
   ~Run() { pikort_destroy(pipeline); }
   Run(const Run &) = delete;
 
+  /// Has sources run in strips of so many primitives, or within so many bytes;
+  /// 0 = not said.
+  void divide(int64_t strip, int64_t budget);
   Result operator()(int threads);
 
 private:

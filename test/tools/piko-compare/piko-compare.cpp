@@ -6,7 +6,8 @@
 //   piko-compare FILE [--reference FILE] [--pipe NAME] [--domain W H ..]
 //                [--count N ..] [--seed S] [--wide] [--loop-limit N]
 //                [--cases FILE] [--threads T ..] [--runs N]
-//                [--timeout SECONDS] [--check[=nan:RECORD.FIELD,..]]
+//                [--timeout SECONDS] [--strip N] [--budget BYTES]
+//                [--check[=nan:RECORD.FIELD,..]]
 //
 // Options.h says what the options mean, Run.h what the input is. With --cases
 // each line of that file is a case, with the options --pipe to --loop-limit; a
@@ -29,6 +30,7 @@ bool compare(const Options &options, const Case &input, Programs &programs) {
   Run reference(programs.reference(input.pipe), input);
   Result expected = reference(1);
   Run compiled(programs.compile(input.pipe), input);
+  compiled.divide(options.strip, options.budget);
   if (expected.isBlank() && options.cases.empty())
     throw std::runtime_error("the reference executor wrote nothing");
   bool equal = true;
