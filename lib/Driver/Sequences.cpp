@@ -53,7 +53,8 @@ void piko::addSynthesisSequence(OpPassManager &passes,
   if (options.has("own-pixels"))
     pipeline.addPass(createOwnPixels());
   pipeline.addPass(createFormKernels());
-  pipeline.addPass(createFormStrips());
+  if (options.has("form-strips"))
+    pipeline.addPass(createFormStrips());
 }
 
 void piko::addResolveSequence(OpPassManager &passes) {
