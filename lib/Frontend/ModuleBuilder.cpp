@@ -130,7 +130,7 @@ private:
         builder.getI64IntegerAttr(stage.threads), getRecordName(stage.input),
         builder.getArrayAttr(outputs), /*lineage=*/nullptr, /*tile=*/nullptr,
         /*cycle=*/nullptr, /*split=*/nullptr, /*ordered=*/nullptr,
-        /*placed=*/nullptr,
+        /*placed=*/nullptr, /*writes=*/nullptr,
         stage.takesList ? builder.getUnitAttr() : mlir::UnitAttr(),
         /*fused=*/nullptr);
     builder.createBlock(&op.getBody());
