@@ -62,6 +62,8 @@ private:
   bool isWhole() { return stage.getBins()[dim] == 0; }
   bool isLo(Value value);
   bool isHi(Value value);
+  /// hi - 1, which is in the bin, because no bin is empty.
+  bool isLast(Value value);
   bool isAtLeastLo(Value value);
   bool isBelowHi(Value value);
   bool isAtMostHi(Value value);
@@ -98,6 +100,17 @@ bool BinBounds::isHi(Value value) {
     return int64_t(hi.getDim()) == dim && hi.getBin().getDefiningOp<BinOp>();
   auto domain = value.getDefiningOp<DomainOp>();
   return domain && isWhole() && int64_t(domain.getDim()) == dim;
+}
+
+bool BinBounds::isLast(Value value) {
+  Operation *op = stripCasts(value).getDefiningOp();
+  if (isa_and_nonnull<arith::AddIOp>(op))
+    return isHi(op->getOperand(0)) &&
+           isConstant(op->getOperand(1),
+                      [](const APInt &c) { return c.isAllOnes(); });
+  return isa_and_nonnull<arith::SubIOp>(op) && isHi(op->getOperand(0)) &&
+         isConstant(op->getOperand(1),
+                    [](const APInt &c) { return c.isOne(); });
 }
 
 bool BinBounds::isKnown(Value value) {
@@ -192,7 +205,7 @@ bool BinBounds::isGuarded(Value value, bool below) {
 
 bool BinBounds::isAtLeastLo(Value value) {
   value = stripCasts(value);
-  if (isLo(value) || isKnown(value) || isWrapped(value) ||
+  if (isLo(value) || isLast(value) || isKnown(value) || isWrapped(value) ||
       assumed.contains(value) || isGuarded(value, /*below=*/false))
     return true;
   if (auto argument = dyn_cast<BlockArgument>(value)) {
@@ -240,7 +253,8 @@ bool BinBounds::isAtLeastLo(Value value) {
 
 bool BinBounds::isBelowHi(Value value) {
   value = stripCasts(value);
-  if (isKnown(value) || isWrapped(value) || isGuarded(value, /*below=*/true))
+  if (isLo(value) || isLast(value) || isKnown(value) || isWrapped(value) ||
+      isGuarded(value, /*below=*/true))
     return true;
   if (auto argument = dyn_cast<BlockArgument>(value)) {
     if (auto range = dyn_cast<scf::ForOp>(argument.getOwner()->getParentOp()))
@@ -258,14 +272,6 @@ bool BinBounds::isBelowHi(Value value) {
   if (auto select = dyn_cast<arith::SelectOp>(op))
     return isBelowHi(select.getTrueValue()) &&
            isBelowHi(select.getFalseValue());
-  if (isa<arith::AddIOp>(op))
-    return isHi(op->getOperand(0)) &&
-           isConstant(op->getOperand(1),
-                      [](const APInt &c) { return c.isAllOnes(); });
-  if (isa<arith::SubIOp>(op))
-    return isHi(op->getOperand(0)) &&
-           isConstant(op->getOperand(1),
-                      [](const APInt &c) { return c.isOne(); });
   return false;
 }
 

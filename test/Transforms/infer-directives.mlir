@@ -92,6 +92,59 @@ piko.pipeline @Range rank 2 {
   }
 }
 
+// By range: both ways to clamp, as no bin is empty.
+// CHECK-LABEL: piko.pipeline @Clamped
+piko.pipeline @Clamped rank 2 {
+  piko.source @a
+  piko.edge @a[0] -> @b
+  piko.stage @a bins [8, 0] threads 64 : @F -> [@F] {
+    piko.assign {
+    ^bb0(%f: !piko.prim<@F>):
+      piko.assign_all
+      piko.return
+    }
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      %x = piko.get %f "x" : !piko.prim<@F> -> i32
+      %y = piko.get %f "y" : !piko.prim<@F> -> i32
+      %minus_one = arith.constant -1 : i32
+      %zero = arith.constant 0 : i32
+      %bin = piko.bin
+      %lo = piko.bin_lo %bin[0]
+      %hi = piko.bin_hi %bin[0]
+      %height = piko.domain[1]
+      %lo32 = arith.index_cast %lo : index to i32
+      %hi32 = arith.index_cast %hi : index to i32
+      %height32 = arith.index_cast %height : index to i32
+      %last_x = arith.addi %hi32, %minus_one : i32
+      %last_y = arith.addi %height32, %minus_one : i32
+      %right = arith.maxsi %x, %lo32 : i32
+      %column = arith.minsi %last_x, %right : i32
+      %above = arith.minsi %y, %last_y : i32
+      %row = arith.maxsi %above, %zero : i32
+      piko.emit 0 (%column, %row) : i32, i32
+      piko.return
+    }
+  }
+  // CHECK: piko.stage @b
+  piko.stage @b bins [8, 0] threads 64 : @F -> [] {
+    piko.assign {
+    ^bb0(%f: !piko.prim<@F>):
+      %x = piko.get %f "x" : !piko.prim<@F> -> i32
+      %y = piko.get %f "y" : !piko.prim<@F> -> i32
+      %b = piko.bin_at %x, %y : i32, i32
+      // CHECK: piko.assign_previous inferred
+      // expected-remark @below {{stage 'b' keeps each primitive in the bin}}
+      piko.assign_to %b
+      piko.return
+    }
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      piko.return
+    }
+  }
+}
+
 // By function: any computation of what is handed on unchanged.
 // CHECK-LABEL: piko.pipeline @Function
 piko.pipeline @Function rank 2 {
