@@ -9,7 +9,8 @@
 A pipeline follows from its number alone: `run --seed 1 --count 100` makes those
 from 1 to 100. `run` says which failed and how often each feature was used; each
 failure can then be shown, or reduced to a short file. Features are left out with
-`--without lists,sync`, or named with `--features`. With `--mlir` each pipeline is
+`--without lists,sync`, or named with `--features`; `--leave-out fuse-stages` leaves
+passes of the compiler out. With `--mlir` each pipeline is
 written in the dialect, too, and that is compiled in place of the C++.
 """
 
@@ -22,7 +23,7 @@ from collections import Counter
 import cpp
 import pipelines
 from reducer import reduce
-from runner import BLANK, EQUAL, Runner, case_of
+from runner import BLANK, EQUAL, PASSES, Runner, case_of, choose_passes, options_of
 
 
 def features_of(args):
@@ -36,14 +37,35 @@ def features_of(args):
         pipelines.CPP_ONLY | pipelines.NOT_IN_TEXT if args.mlir else set())
 
 
+def passes_of(args, seed=None):
+    """What is left out of synthesis: if not said, it follows from the seed."""
+    if args.leave_out is None:
+        return choose_passes(seed) if seed else []
+    passes = args.leave_out.split(",") if args.leave_out else []
+    for name in passes:
+        if name not in PASSES:
+            sys.exit(f"expected a pass, but got '{name}'; there are: " + ", ".join(PASSES))
+    return passes
+
+
 def run_batch(args, first, count):
     features = features_of(args)
     pipes = [pipelines.generate(first + i, features, f"P{i}") for i in range(count)]
-    verdicts = Runner(args.tool, args.mlir, strip=args.strip).run(pipes)
-    used = Counter()
+    passes = passes_of(args, first)
+    verdicts = Runner(args.tool, args.mlir, passes, strip=args.strip).run(pipes)
+    used = Counter(f"without-{p}" for p in passes for _ in pipes)
     for pipe in pipes:
         used.update(pipe.used)
     return first, verdicts, used
+
+
+def command_of(args, first, seed):
+    """What reduces a failure of the file that begins with `first`."""
+    options = [f"--{name} {value}" for name, value in [
+        ("features", args.features), ("without", args.without),
+        ("leave-out", ",".join(passes_of(args, first))), ("strip", args.strip)] if value]
+    return " ".join([f"{sys.argv[0]} reduce --tool {args.tool} --seed {seed}", *options] +
+                    ["--mlir"] * args.mlir)
 
 
 def command_run(args):
@@ -64,7 +86,8 @@ def command_run(args):
                     stopped += 1
                 elif verdict != EQUAL:
                     failures.append(first + i)
-                    print(f"pipeline {first + i}: {verdict[:1500]}", flush=True)
+                    print(f"pipeline {first + i}: {verdict[:1500]}\n"
+                          f"  shorter: {command_of(args, first, first + i)}", flush=True)
     if args.table:
         for name, count in sorted(used.items()):
             print(f"  {count:6} {name}")
@@ -84,7 +107,7 @@ def command_run(args):
 
 def command_show(args):
     pipe = pipelines.generate(args.seed, features_of(args), "P0")
-    print(f"// piko-compare FILE {case_of(pipe)}")
+    print(" ".join(["// piko-compare FILE", case_of(pipe), *options_of(passes_of(args))]))
     print(cpp.write_file([pipe]))
     return 0
 
@@ -93,8 +116,8 @@ def command_reduce(args):
     pipe = pipelines.generate(args.seed, features_of(args), "P0")
     text = None
     # What there is stays if it is stopped.
-    for text in reduce(pipe, Runner(args.tool, args.mlir, timeout=60,
-                                    strip=args.strip)):
+    for text in reduce(pipe, Runner(args.tool, args.mlir, passes_of(args),
+                                    timeout=60, strip=args.strip)):
         with open(args.out, "w") as file:
             file.write(text)
         print(f"{args.out}: {len(text.splitlines())} lines", flush=True)
@@ -114,6 +137,9 @@ def main():
     parser.add_argument("--jobs", type=int, help="files at a time (all cores)")
     parser.add_argument("--features", default="")
     parser.add_argument("--without", default="")
+    parser.add_argument("--leave-out", metavar="PASSES",
+                        help="passes that piko-compare leaves out; 'run' chooses some "
+                             "for each file if this is not given")
     parser.add_argument("--table", action="store_true", help="count the features")
     parser.add_argument("--mlir", action="store_true",
                         help="compile the text of the dialect, not C++")

@@ -12,7 +12,7 @@ from dataclasses import fields
 
 import cpp
 from model import *
-from runner import case_of, kind_of
+from runner import case_of, kind_of, options_of
 
 BATCH = 40
 
@@ -164,8 +164,10 @@ def edits_of(pipe):
         for name in lists_of(node):
             body = getattr(node, name)
             for at in range(len(body)):
-                yield i, "remove", (name, at)
-            if name in ("then", "body", "other") and not isinstance(node, Update):
+                if not (isinstance(body[at], Put) and body[at].solid):
+                    yield i, "remove", (name, at)
+            if name in ("then", "body", "other") and not isinstance(node, Update) and \
+                    not node.solid:
                 yield i, "unwrap", name
         if isinstance(node, Switch):
             for c, case in enumerate(node.cases):
@@ -253,19 +255,24 @@ def apply(pipe, edit):
     if place >= 0:
         node = next((n for i, n in enumerate(walk(pipe)) if i == place), None)
         expect(node is not None)
+        # An edit further back may have put another node here.
         if kind == "remove":
             name, at = argument
-            expect(at < len(getattr(node, name)))
+            expect(at < len(getattr(node, name, [])))
             getattr(node, name).pop(at)
         elif kind == "unwrap":
+            expect(hasattr(node, argument))
             replace(pipe, node, list(getattr(node, argument)))
         elif kind == "case":
             case, at = argument
+            expect(isinstance(node, Switch))
             expect(case < len(node.cases) and at < len(node.cases[case]))
             node.cases[case].pop(at)
         elif kind == "literal":
+            expect(isinstance(node, Expr))
             replace(pipe, node, Lit(node.type, True if node.type == "b1" else argument))
         else:
+            expect(isinstance(node, Expr))
             same = [o for f in fields(node) for o in (
                 getattr(node, f.name) if isinstance(getattr(node, f.name), list)
                 else [getattr(node, f.name)]) if isinstance(o, Expr) and o.type == node.type]
@@ -341,9 +348,10 @@ def try_edits(pipe, edits, runner, kind):
     return [(e, p) for (e, p), v in zip(candidates, verdicts) if kind_of(v) == kind]
 
 
-def write(pipe, verdict):
+def write(pipe, verdict, runner):
     comment = "".join(f"// {line}\n" for line in verdict.splitlines()[:6])
-    return f"// piko-compare %s {case_of(pipe)}\n{comment}" + cpp.write_file([pipe])
+    command = " ".join(["// piko-compare %s", case_of(pipe), *options_of(runner.passes)])
+    return f"{command}\n{comment}" + cpp.write_file([pipe])
 
 
 def reduce(pipe, runner):
@@ -351,7 +359,7 @@ def reduce(pipe, runner):
     verdict = runner.run([pipe])[0]
     if verdict.startswith(("equal", "the reference stops")):
         return
-    yield write(pipe, verdict)
+    yield write(pipe, verdict, runner)
     kind = kind_of(verdict)
     progress = True
     while progress:
@@ -376,8 +384,8 @@ def reduce(pipe, runner):
             pipe = min([p for _, p in good + together], key=size)
             pipe.name = "P0"
             progress = True
-            yield write(pipe, verdict)
+            yield write(pipe, verdict, runner)
             place = at / len(edits)
             edits = list(edits_of(pipe))
             at = int(place * len(edits))
-    yield write(pipe, runner.run([pipe])[0])
+    yield write(pipe, runner.run([pipe])[0], runner)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 """Runs piko-compare on a file of pipelines and says how each of them ended."""
 
+import random
 import re
 import subprocess
 import tempfile
@@ -10,6 +11,21 @@ import cpp
 import dialect
 
 EQUAL, BLANK = "equal", "equal, but blank"
+
+
+#: What piko-compare may leave out of synthesis.
+PASSES = ["infer-directives", "fuse-stages", "test-early", "prune", "own-pixels"]
+
+
+def options_of(passes):
+    return ["--without", ",".join(passes)] if passes else []
+
+
+def choose_passes(seed):
+    """What the file that begins with this pipeline is compiled without: mostly
+    nothing."""
+    r = random.Random(seed)
+    return [p for p in PASSES if r.random() < 0.4] if r.random() < 0.4 else []
 
 
 def case_of(pipe):
@@ -29,11 +45,13 @@ def kind_of(verdict):
 
 
 class Runner:
-    """With `text` what is compiled is the text of the dialect, not the C++."""
+    """With `text` what is compiled is the text of the dialect, not the C++; the
+    `passes` are left out."""
 
-    def __init__(self, tool, text=False, threads=(1, 2, 7), timeout=120,
+    def __init__(self, tool, text=False, passes=(), threads=(1, 2, 7), timeout=120,
                  strip=0):
-        self.tool, self.text, self.strip = tool, text, strip
+        self.tool, self.text, self.passes = tool, text, passes
+        self.strip = strip
         self.threads, self.timeout = threads, timeout
 
     def run(self, pipes):
@@ -57,7 +75,8 @@ class Runner:
             done = subprocess.run(
                 [self.tool, file.with_suffix(".mlir") if self.text else file,
                  "--reference", file, "--cases", cases, "--runs", "1", "--timeout",
-                 str(self.timeout), "--strip", str(self.strip), "--threads", *map(str, self.threads)],
+                 str(self.timeout), "--strip", str(self.strip), "--threads", *map(str, self.threads),
+                 *options_of(self.passes)],
                 stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
                 errors="replace", timeout=self.timeout * 20)
             output, errors, status = done.stdout, done.stderr, done.returncode
