@@ -253,7 +253,8 @@ class CppPrinter:
 
     def s_For(self, s):
         bound = "int(list.size())" if s.list else self.e(s.bound)
-        self.block(s.body, f"for (int {s.var} = 0; {s.var} < {bound}; ++{s.var})")
+        first = self.e(s.first) if s.first else "0"
+        self.block(s.body, f"for (int {s.var} = {first}; {s.var} < {bound}; ++{s.var})")
 
     def s_Jump(self, s):
         value = f" {TYPES[s.value.type]}({self.e(s.value)})" if s.value else ""
@@ -342,6 +343,8 @@ class CppPrinter:
             self.line(f"if (piko::BinId b = binFromPosition({self.cell(s.lo, True)}); "
                       "b.index >= 0)")
             self.line("  assignToBin(p, b);")
+        elif s.kind == "at":
+            self.line(f"assignToBin(p, binFromPosition({self.cell(s.lo, True)}));")
         else:
             vec = "ivec" if s.kind == "box" else "vec"
             lo, hi = (", ".join(self.e(c) for c in corner) for corner in (s.lo, s.hi))

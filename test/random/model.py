@@ -228,13 +228,14 @@ class If(Stmt):
 
 @dataclass(eq=False)
 class For(Stmt):
-    """Counts an int from 0; `bound` is non-negative and small, or `list` is
+    """Counts an int from `first`, or 0, to `bound`, which is small, or `list` is
     true and it goes over the list."""
 
     var: str
     bound: Expr
     body: list
     list: bool = False
+    first: Expr = None
 
 
 @dataclass(eq=False)
@@ -343,7 +344,8 @@ class Lambda(Stmt):
 
 @dataclass(eq=False)
 class Bins(Stmt):
-    """An assign directive: to, box, floatbox, all, previous."""
+    """An assign directive: to, at (known to be in the domain), box, floatbox, all,
+    previous."""
 
     kind: str
     lo: list = field(default_factory=list)

@@ -17,7 +17,7 @@ construction:
 import random
 from dataclasses import replace
 
-from statements import *
+from chains import *
 
 #: All that can be turned on and off. What a pipeline used is counted under
 #: these names and finer ones.
@@ -27,26 +27,28 @@ FEATURES = [
     "collectives", "gather", "cycles", "unordered", "fetch-atomics", "float-atomics",
     "updates", "atomics", "stores", "maths", "bit-tricks", "float-specials",
     "dynamic-elements", "loop-jumps", "early-returns", "switches", "lambdas",
-    "helpers", "template-stages", "local-arrays", "twin-stages",
+    "helpers", "template-stages", "local-arrays", "twin-stages", "chains",
 ]
 #: What the dialect's printer does not write: C++ that the front end removes.
 CPP_ONLY = {"maths", "loop-jumps", "early-returns", "switches", "lambdas", "helpers",
             "template-stages", "bit-tricks", "dynamic-elements", "local-arrays"}
 
 #: What the printer of the dialect does not write yet.
-NOT_IN_TEXT = {"lists", "parallelFor", "gather", "dynamic-schedule", "fetch-atomics"}
+NOT_IN_TEXT = {"lists", "parallelFor", "gather", "dynamic-schedule", "fetch-atomics",
+               "chains"}
 
 DOMAINS = {1: [1, 3, 7, 40, 65], 2: [1, 3, 7, 13, 17], 3: [1, 2, 5, 7], 4: [1, 2, 3, 5]}
 LIMIT = 20000  # calls of Process, about
 
 
-class Generator(Statements):
+class Generator(Chains):
     def __init__(self, seed, features, name):
         self.random = random.Random(seed)
         self.features, self.used = features, set()
         self.names, self.name = 0, name
         self.operations = {}
         self.nonempty = set()
+        self.links = {}  # of stages in a chain
 
     def on(self, feature):
         return feature in self.features
@@ -201,23 +203,25 @@ class Generator(Statements):
         """Decides what a stage is before its bodies are made."""
         r = self.random
         stage = pipe.stages[index]
-        if self.on("lists") and r.random() < 0.3:
+        # What collects is not fused, so that there is less of it in a chain.
+        share = 0.15 if index in self.links else 1
+        if self.on("lists") and r.random() < 0.3 * share:
             stage.is_list = True
             self.use("lists")
         choices = [j for j in range(len(pipe.stages))
                    if j != index and j not in self.reachable(pipe, index, self.waits)
                    and index in range(len(pipe.stages))]
         # Nobody waits for a stage of its own cycle, or for one behind it.
-        if choices and self.on("endStage") and r.random() < 0.3:
+        if choices and self.on("endStage") and r.random() < 0.3 * share:
             for target in r.sample(choices, min(len(choices), r.choice([1, 1, 2]))):
                 self.waits.append((target, index))
                 stage.schedule.append(Directive("endStage", stage=target))
                 self.use("endStage")
-        if self.on("endBin") and r.random() < 0.12:
+        if self.on("endBin") and r.random() < 0.12 * share:
             stage.schedule.append(Directive("endBin"))
             self.use("endBin")
 
-    def make_schedule(self, stage, scope):
+    def make_schedule(self, stage, scope, link=None):
         r = self.random
         policies = ["LoadBalance", "DirectMap", "Serialize", "All"]
 
@@ -231,7 +235,9 @@ class Generator(Statements):
             return Directive("specifySchedule", policy, value)
 
         out = []
-        if r.random() < 0.6:
+        if link and link.schedule is not None:
+            out += [replace(d) for d in link.schedule]
+        elif r.random() < 0.6:
             if self.on("dynamic-schedule") and r.random() < 0.3:
                 self.use("dynamic-schedule")
                 out.append(If(self.expr("b1", scope, 2), [specify()], [specify()]))
@@ -264,12 +270,18 @@ class Generator(Statements):
             all(p.bins == stage.bins for p in producers)
         if all(b == 0 for b in stage.bins) and r.random() < 0.6:
             self.use("no-assign")
+            if index in self.links:
+                self.chain_no_assign(index)
             return 1
         scope = Scope(self, "assign", None, level=0, multiplicity=1, reads=self.readable)
         scope.records.append(("p", stage.input))
         if stage.input.scalar:
             scope.records = [("p", stage.input)]
         stage.assign = self.body(scope, r.randint(0, 2), 1)
+        made = self.chain_assign(pipe, index, scope) if index in self.links else None
+        if made:
+            stage.assign += made
+            return 1
         kind = r.choice(["to", "to", "to", "box", "floatbox", "all", "several", "cond"] +
                         (["previous"] * 4 if previous else []))
         if kind == "all" and bins > 6:
@@ -299,12 +311,7 @@ class Generator(Statements):
         self.use("assign-" + kind)
         if kind in ("all", "previous"):
             return [Bins(kind)]
-        cells = []
-        for d in range(self.rank):
-            cell = Op("u32", "cast", [self.expr("i32", scope, 2)], solid=True)
-            domain = Op("u32", "cast", [Query("i32", "domain", d, solid=True)], solid=True)
-            extent = Op("u32", "umod", [cell, domain], solid=True)
-            cells.append(Op("i32", "cast", [extent], solid=True))
+        cells = self.cells_of(scope)
         if kind == "to":
             if r.random() < 0.3:  # outside at times: culled
                 cells[0] = op("+", cells[0], lit(r.choice([-1, 1, 3])))
@@ -323,8 +330,9 @@ class Generator(Statements):
     def make_process(self, pipe, index, calls_per_bin):
         r = self.random
         stage = pipe.stages[index]
-        self.stage = stage
+        self.stage, self.stage_number = stage, index
         self.bounds = {}
+        self.most_emits = r.choice([1, 2, 4]) if index in self.links else None
         scope = Scope(self, "process", None, level=0, multiplicity=1, bins=True,
                       reads=self.reads[index], has_size=stage.is_list or None)
         body = []
@@ -518,6 +526,10 @@ class Generator(Statements):
         self.domain = [r.choice(DOMAINS[rank]) for _ in range(rank)]
         pipe = Pipeline(self.name, self.domain, self.make_records(), self.make_state())
         self.make_graph(pipe)
+        if self.on("chains") and r.random() < 0.6:
+            if r.random() < 0.5:  # nothing else
+                pipe.stages, pipe.edges, pipe.sources = [], [], []
+            self.add_chain(pipe)
         self.waits = []
         for i in range(len(pipe.stages)):
             self.describe(pipe, i)
@@ -529,15 +541,16 @@ class Generator(Statements):
         for i, stage in enumerate(pipe.stages):
             self.make_schedule(stage, Scope(
                 self, "schedule", None, level=0, bins=True,
-                reads=[s for s in pipe.state if s.kind == "constant"]))
+                reads=[s for s in pipe.state if s.kind == "constant"]), self.links.get(i))
             bounds.append(self.make_assign_phase(pipe, i))
         self.share_state(pipe, bounds)
         for i, stage in enumerate(pipe.stages):
             self.writes = self.stage_writes[i]
-            self.ports = [(stage.outputs[e.port], e.consumer <= i)
+            self.ports = [(stage.outputs[e.port], e.consumer <= i, self.link_of(e))
                           for e in sorted((e for e in pipe.edges if e.producer == i),
                                           key=lambda e: e.port)]
-            self.make_process(pipe, i, 1 if stage.is_list else 30)
+            with self.fewer_barriers(i):
+                self.make_process(pipe, i, 1 if stage.is_list else 30)
             emits.append(self.bounds)
         if self.on("twin-stages") and r.random() < 0.3:
             self.add_twin(pipe, bounds, emits)
@@ -551,6 +564,7 @@ class Generator(Statements):
         r = self.random
         candidates = [i for i, writes in enumerate(self.stage_writes)
                       if i not in self.reachable(pipe, i)
+                      and not (i in self.links and self.links[i].fed)
                       and all(how in ("atomic", "ticket") for _, how in writes)]
         if not candidates:
             return
@@ -584,6 +598,10 @@ class Generator(Statements):
             i = r.choice(candidates)
             pipe.stages[i].schedule.append(Directive("unordered"))
             self.use("unordered")
+            if i in self.links and r.random() < 0.6:
+                self.use("unordered-chains")
+                for j in self.reachable(pipe, i) & set(self.links):
+                    pipe.stages[j].schedule.append(Directive("unordered"))
 
     def finish(self, pipe, bounds, emits):
         r = self.random

@@ -174,7 +174,9 @@ class Statements(Expressions):
         """A primitive through a port. On a way back its hops are counted down,
         and it is not emitted when they are used up."""
         r = self.random
-        record, is_back = self.ports[port]
+        record, is_back, link = self.ports[port]
+        if link:
+            return self.hand_on(port, record, link, scope)
         same = [e for e in scope.all("records") if e[1] is record]
         counted = [e for e in scope.all("records") if e[1].leaf("hops")
                    and not e[0].startswith("q")]
@@ -222,7 +224,8 @@ class Statements(Expressions):
         images = [s for s, how in self.writes if how == "update"]
         if not images or scope.level:
             return self.make_write(scope, depth)
-        return self.update(self.random.choice(images), self.own_cell(scope), scope)
+        at = self.own_pixel(scope) or self.own_cell(scope)
+        return self.update(self.random.choice(images), at, scope)
 
     def update(self, image, at, scope):
         self.use("updates")
