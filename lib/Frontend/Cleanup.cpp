@@ -243,15 +243,15 @@ static bool inlineKnownCalls(llvm::Function &function) {
 /// more: its calls are concurrent. False after an error.
 static bool checkObject(llvm::Function &function, const ParsedUnit &unit,
                         MemoryMap &memory, mlir::MLIRContext &context) {
+  const llvm::Value *object = memory.objects.lookup(&function);
   const llvm::CallInst *begin = nullptr;
   for (const llvm::Instruction &instruction : llvm::instructions(function))
     if (auto *call = dyn_cast<llvm::CallInst>(&instruction))
       if (const Marker *marker = getMarker(call, unit.markers))
         if (marker->kind == MarkerKind::phase)
           begin = call;
-  if (!begin)
+  if (!object || !begin)
     return true;
-  const llvm::AllocaInst *object = memory.objects.lookup(&function);
   for (llvm::Instruction &instruction : llvm::instructions(function)) {
     auto *store = dyn_cast<llvm::StoreInst>(&instruction);
     if (!store ||

@@ -56,7 +56,7 @@ static void fill(llvm::AllocaInst *variable, llvm::Instruction *before,
 void piko::fillVariables(llvm::Function &function, MemoryMap &memory) {
   llvm::StringRef mark = "piko.filled"; // once, though a function grows
   // What the pipeline's constructor leaves is given.
-  const llvm::AllocaInst *object = memory.objects.lookup(&function);
+  const llvm::Value *object = memory.objects.lookup(&function);
   llvm::SmallVector<llvm::AllocaInst *> variables;
   llvm::SmallVector<llvm::IntrinsicInst *> births;
   for (llvm::Instruction &instruction : llvm::instructions(function)) {

@@ -16,6 +16,7 @@
 #include "llvm/ADT/SmallVector.h"
 #include "llvm/IR/IRBuilder.h"
 #include "llvm/IR/Instructions.h"
+#include "llvm/IR/ValueHandle.h"
 
 namespace piko {
 
@@ -112,8 +113,8 @@ public:
   const PipelineDescription &pipeline;
   const MarkerTable &markers;
   const llvm::DataLayout &data;
-  /// The pipeline object of each wrapper.
-  llvm::DenseMap<const llvm::Function *, const llvm::AllocaInst *> objects;
+  /// The pipeline object of each wrapper; null once it is taken apart.
+  llvm::DenseMap<const llvm::Function *, llvm::WeakVH> objects;
 
 private:
   std::vector<MemoryLayout> recordLayouts;
