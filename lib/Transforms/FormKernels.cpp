@@ -6,6 +6,7 @@
 #include "Piko/Transforms/Passes.h"
 
 #include "mlir/IR/IRMapping.h"
+#include "mlir/IR/Matchers.h"
 
 namespace piko {
 #define GEN_PASS_DEF_FORMKERNELS
@@ -123,10 +124,28 @@ static LogicalResult checkAssignReads(PipelineOp pipeline) {
   return failure(result.wasInterrupted());
 }
 
+/// Whether an assign phase only says that each primitive is in the one bin that
+/// there is, which holds without it.
+static bool isTrivial(AssignOp assign, StageOp stage) {
+  bool assigned = false;
+  for (Operation &op : assign.getBody().front().without_terminator()) {
+    auto to = dyn_cast<AssignToOp>(op);
+    bool isFirstBin = to && matchPattern(to.getBin(), m_Zero());
+    if (isFirstBin || isa<AssignPreviousOp, AssignAllOp>(op))
+      assigned = true;
+    else if (!isMemoryEffectFree(&op))
+      return false;
+  }
+  return assigned && stage.isWholeDomain();
+}
+
 void FormKernelsPass::runOnOperation() {
   PipelineOp pipeline = getOperation();
   if (failed(checkAssignReads(pipeline)))
     return signalPassFailure();
+  for (auto stage : pipeline.getOps<StageOp>())
+    if (AssignOp assign = stage.getAssign(); assign && isTrivial(assign, stage))
+      assign.erase();
   OpBuilder builder = OpBuilder::atBlockEnd(pipeline.getBodyBlock());
   SmallVector<StageOp> stages(pipeline.getOps<StageOp>());
   SmallVector<SourceOp> sources(pipeline.getOps<SourceOp>());

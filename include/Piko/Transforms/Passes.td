@@ -316,6 +316,8 @@ def FormKernels : Pass<"piko-form-kernels", "::piko::PipelineOp"> {
     each source whose stage has an assign phase. Kernels stand in the order in
     which they run. A schedule that only says where bins run has no code of its
     own and stays with the stage.
+    An assign phase that puts everything into the one bin that there is needs no
+    code and is left out.
 
     **Guarantees** the kernels level: stages hold no process or assign phase.
 
