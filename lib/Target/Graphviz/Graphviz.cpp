@@ -3,7 +3,9 @@
 // Pipelines drawn as graphs. The stages of a pipeline are nodes at every level;
 // once kernels are formed, their phases are, inside a box for each kernel, and
 // an edge of the pipeline runs from a process phase to the assign phase that
-// takes its port, or to the next process phase where there is none.
+// takes its port, or to the next process phase where there is none. A dotted
+// edge leads to the process phases of the stages that were fused with it. A
+// schedule that has code of its own is a kernel, too.
 
 #include "Piko/Target/Graphviz.h"
 
@@ -28,6 +30,8 @@ public:
 private:
   void writeStage(StageOp stage);
   void writeKernel(KernelOp kernel);
+  void writeFused(StageOp stage);
+  void writeSchedule(StageOp stage);
   void writeSource(SourceOp source, int64_t number);
   void writeEdge(EdgeOp edge);
   void writeDrain(StageOp stage);
@@ -111,6 +115,8 @@ void DotWriter::writeKernel(KernelOp kernel) {
              << quote("process " + producer + "\n" +
                       (stage ? describeBins(stage) : ""))
              << "];\n";
+      if (stage)
+        writeFused(stage);
     }
     if (auto assign = dyn_cast<AssignOp>(op)) {
       std::string from =
@@ -125,6 +131,23 @@ void DotWriter::writeKernel(KernelOp kernel) {
     }
   }
   stream << "  }\n";
+}
+
+void DotWriter::writeFused(StageOp stage) {
+  if (!stage.getFusedAttr())
+    return;
+  for (auto name : stage.getFusedAttr().getAsRange<StringAttr>())
+    stream << "    " << processNode(name)
+           << " [label=" << quote("process " + name.getValue()) << "];\n    "
+           << processNode(stage.getSymName()) << " -> " << processNode(name)
+           << " [style=dotted];\n";
+}
+
+void DotWriter::writeSchedule(StageOp stage) {
+  std::string node = quote("schedule " + stage.getSymName());
+  stream << "  subgraph " << quote("cluster_schedule " + stage.getSymName())
+         << " {\n    " << node << ";\n  }\n  " << node << " -> "
+         << processNode(stage.getSymName()) << " [style=dashed];\n";
 }
 
 void DotWriter::writeSource(SourceOp source, int64_t number) {
@@ -173,9 +196,13 @@ void DotWriter::write() {
   kernels = !pipeline.getOps<KernelOp>().empty();
   for (auto kernel : pipeline.getOps<KernelOp>())
     writeKernel(kernel);
-  if (!kernels)
-    for (auto stage : pipeline.getOps<StageOp>())
+  for (auto stage : pipeline.getOps<StageOp>()) {
+    if (!kernels)
       writeStage(stage);
+    else if (ScheduleOp schedule = stage.getSchedule();
+             schedule && !schedule.getBody().empty())
+      writeSchedule(stage);
+  }
   int64_t number = 0;
   for (auto source : pipeline.getOps<SourceOp>())
     writeSource(source, number++);
