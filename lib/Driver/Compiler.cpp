@@ -113,10 +113,9 @@ piko::readPipelineNames(const CompileOptions &options, MLIRContext &context) {
   return getNames(*module);
 }
 
-LogicalResult piko::lowerPipeline(ModuleOp module, Level level,
-                                  const CheckOptions &check,
-                                  const SynthesisOptions &synthesis) {
-  PassManager passes(module.getContext());
+void piko::addPasses(OpPassManager &passes, Level level,
+                     const CheckOptions &check,
+                     const SynthesisOptions &synthesis) {
   if (check.enabled)
     addCheckSequence(passes, check);
   if (level >= Level::Kernels)
@@ -129,6 +128,13 @@ LogicalResult piko::lowerPipeline(ModuleOp module, Level level,
     addCPUSequence(passes);
   if (level >= Level::LLVM)
     addLLVMSequence(passes);
+}
+
+LogicalResult piko::lowerPipeline(ModuleOp module, Level level,
+                                  const CheckOptions &check,
+                                  const SynthesisOptions &synthesis) {
+  PassManager passes(module.getContext());
+  addPasses(passes, level, check, synthesis);
   return passes.run(module);
 }
 

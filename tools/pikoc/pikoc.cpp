@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // The compiler's command: reads a pipeline from C++ or .mlir and writes an
-// object with its header, or any level on the way.
+// object with its header, any level on the way, or a report.
 
 #include "OutputFiles.h"
 
 #include "Piko/Driver/Compiler.h"
 #include "Piko/Driver/Diagnostics.h"
+#include "Piko/Driver/Explain.h"
 #include "Piko/Driver/ObjectCompiler.h"
 #include "Piko/Target/Object.h"
 
@@ -120,6 +121,9 @@ struct CommandLine {
       "without", llvm::cl::value_desc("pass,..."),
       llvm::cl::desc("passes of synthesis to leave out"),
       llvm::cl::cat(category)};
+  llvm::cl::opt<bool> explain{
+      "explain", llvm::cl::desc("write what synthesis makes of the pipeline"),
+      llvm::cl::cat(category)};
   llvm::cl::opt<bool> remarks{
       "remarks", llvm::cl::desc("print what the passes have to say"),
       llvm::cl::cat(category)};
@@ -180,6 +184,10 @@ static std::string checkOptions(const CommandLine &line) {
            "an -o that ends in .o asks for";
   if (line.sanitizer.getNumOccurrences() && line.getEmit() < Emit::Assembly)
     return "--sanitize belongs to an object or assembly";
+  if (line.explain && (line.emit.getNumOccurrences() || line.listPipes ||
+                       line.getEmit() != Emit::LLVMIR))
+    return "--explain writes a report, and goes without --emit, --list-pipes "
+           "and an -o that ends in .o or .s";
   if (isObject && line.output == "-" && llvm::outs().is_displayed())
     return "expected -o, because an object is not for a terminal";
   return "";
@@ -190,6 +198,16 @@ static std::string printPipes(const std::vector<std::string> &names) {
   for (const std::string &name : names)
     text += name + "\n";
   return text;
+}
+
+static std::optional<std::string> explain(const CommandLine &line,
+                                          MLIRContext &context) {
+  CompileOptions source = line.getSource();
+  OwningOpRef<ModuleOp> module = readPipeline(source, context);
+  if (!module)
+    return std::nullopt;
+  auto report = explainPipeline(*module, source.check, source.synthesis);
+  return failed(report) ? std::nullopt : std::optional(*report);
 }
 
 static std::string print(ModuleOp module) {
@@ -220,7 +238,8 @@ static std::optional<std::string> translate(const CommandLine &line,
   return std::nullopt;
 }
 
-/// What a level looks like, or the file's pipelines; nothing after an error.
+/// What a level looks like, the file's pipelines, or a report; nothing after an
+/// error.
 static std::optional<std::string> writeText(const CommandLine &line) {
   DialectRegistry registry;
   registerPikoDialects(registry);
@@ -230,6 +249,8 @@ static std::optional<std::string> writeText(const CommandLine &line) {
     auto names = readPipelineNames(line.getSource(), context);
     return failed(names) ? std::nullopt : std::optional(printPipes(*names));
   }
+  if (line.explain)
+    return explain(line, context);
   Level level = line.getEmit() >= Emit::LLVMIR
                     ? Level::LLVM
                     : static_cast<Level>(line.getEmit());

@@ -21,6 +21,10 @@ class LLVMContext;
 class Module;
 } // namespace llvm
 
+namespace mlir {
+class OpPassManager;
+} // namespace mlir
+
 namespace piko {
 
 /// The levels that the compiler moves a module down, in order.
@@ -44,6 +48,10 @@ readPipeline(const CompileOptions &options, mlir::MLIRContext &context,
 /// there.
 llvm::FailureOr<std::vector<std::string>>
 readPipelineNames(const CompileOptions &options, mlir::MLIRContext &context);
+
+/// Adds the passes that take a module from the authored level to another one.
+void addPasses(mlir::OpPassManager &passes, Level level,
+               const CheckOptions &check, const SynthesisOptions &synthesis);
 
 /// Takes a module from the authored level to another one.
 llvm::LogicalResult lowerPipeline(mlir::ModuleOp module, Level level,

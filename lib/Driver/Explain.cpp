@@ -1,0 +1,365 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// The report compares two states of the pipeline: as it was written, with its
+// stages in order, and as kernels.
+
+#include "Piko/Driver/Explain.h"
+
+#include "Piko/Dialect/Piko/IR/Piko.h"
+#include "Piko/Driver/Compiler.h"
+
+#include "mlir/Pass/Pass.h"
+#include "mlir/Pass/PassInstrumentation.h"
+#include "mlir/Pass/PassManager.h"
+#include "llvm/ADT/StringExtras.h"
+#include "llvm/ADT/StringMap.h"
+
+using namespace mlir;
+using namespace piko;
+
+namespace {
+
+/// What a run of the passes leaves behind.
+struct Trace {
+  struct Remarks {
+    std::string pass, text;
+  };
+  OwningOpRef<ModuleOp> ordered; ///< as it was behind piko-order-stages
+  std::vector<Remarks> remarks;  ///< of the passes that made any, in order
+  std::string pass;              ///< that is running
+
+  void add(Diagnostic &remark);
+};
+
+/// Keeps a trace of the passes of a manager, which owns it.
+struct Tracer : PassInstrumentation {
+  explicit Tracer(Trace &trace) : trace(trace) {}
+  void runBeforePass(Pass *pass, Operation *) override {
+    trace.pass = pass->getArgument().str();
+  }
+  void runAfterPass(Pass *pass, Operation *op) override {
+    if (pass->getArgument() == "piko-order-stages")
+      trace.ordered = op->getParentOfType<ModuleOp>().clone();
+  }
+  Trace &trace;
+};
+
+class Report {
+public:
+  Report(PipelineOp written, PipelineOp kernels, raw_ostream &out);
+  void write(ArrayRef<Trace::Remarks> remarks);
+
+private:
+  void writeStage(StageOp stage);
+  void writeInputs(StageOp stage);
+  void writeWaits(StageOp stage);
+  void writeKernel(KernelOp kernel);
+  void writeProcess(ProcessOp process);
+  void writeFused(StageOp host);
+  void writeAssign(StageOp stage, bool hasPhase, const Twine &origin = "");
+  /// Whether a kernel is there to assign what a source is fed.
+  bool hasKernel(int64_t source);
+  /// The kernel that runs a stage's process phase, or an empty name.
+  StringRef getKernelOf(StringRef stage);
+
+  PipelineOp written, kernels;
+  raw_ostream &out;
+  /// By the name of a stage as it was written: the stage that it is now or that
+  /// it has become a part of. Without those that were removed.
+  llvm::StringMap<StageOp> hosts;
+};
+
+} // namespace
+
+//===----------------------------------------------------------------------===//
+// Remarks
+//===----------------------------------------------------------------------===//
+
+/// The place in the user's file, or nothing where there is none.
+static std::string describe(Location location) {
+  std::string text;
+  location->walk([&](Location inner) {
+    auto file = dyn_cast<FileLineColLoc>(inner);
+    if (!file)
+      return WalkResult::advance();
+    text = (file.getFilename().getValue() + ":" + Twine(file.getLine()) + ":" +
+            Twine(file.getColumn()) + ": ")
+               .str();
+    return WalkResult::interrupt();
+  });
+  return text;
+}
+
+void Trace::add(Diagnostic &remark) {
+  if (remarks.empty() || remarks.back().pass != pass)
+    remarks.push_back({pass, ""});
+  llvm::raw_string_ostream text(remarks.back().text);
+  text << "    " << describe(remark.getLocation()) << remark << "\n";
+  for (Diagnostic &note : remark.getNotes()) {
+    text << "      ";
+    if (note.getLocation() != remark.getLocation())
+      text << describe(note.getLocation());
+    text << note << "\n";
+  }
+}
+
+//===----------------------------------------------------------------------===//
+// Stages
+//===----------------------------------------------------------------------===//
+
+static std::string describeBins(StageOp stage) {
+  if (stage.isWholeDomain())
+    return "one bin";
+  std::string text = "bins of ";
+  llvm::raw_string_ostream stream(text);
+  llvm::interleave(
+      stage.getBins(),
+      [&](int64_t extent) { extent ? stream << extent : stream << "all"; },
+      [&] { stream << " x "; });
+  return text;
+}
+
+/// Which core a bin goes to, where the stage's text says so for all bins alike.
+static std::string describeKind(StageOp stage) {
+  ScheduleOp schedule = stage.getSchedule();
+  std::string text = stringifyScheduleKind(schedule.getKind()).str();
+  if (auto split = schedule.getTileSplit())
+    text += " in tiles of " + std::to_string(*split) + " primitives";
+  return text;
+}
+
+static bool isDynamic(StageOp stage) {
+  ScheduleOp schedule = stage.getSchedule();
+  return schedule && !schedule.getBody().empty();
+}
+
+static bool isLoadBalanced(StageOp stage) {
+  ScheduleOp schedule = stage.getSchedule();
+  return !schedule || schedule.getKind() == ScheduleKind::LoadBalance;
+}
+
+static std::string describeSchedule(StageOp stage) {
+  if (isDynamic(stage))
+    return "a schedule for each bin";
+  return stage.getSchedule() ? describeKind(stage) : "no schedule";
+}
+
+StringRef Report::getKernelOf(StringRef stage) {
+  StageOp host = hosts.lookup(stage);
+  for (auto kernel : kernels.getOps<KernelOp>())
+    for (auto process : kernel.getOps<ProcessOp>())
+      if (host && process.getStage() == host.getSymName())
+        return kernel.getSymName();
+  return "";
+}
+
+/// How many bytes a primitive of the stage's input has.
+static int64_t getInputSize(StageOp stage) {
+  return lookupRecord(stage, stage.getInputAttr()).getSize();
+}
+
+void Report::writeInputs(StageOp stage) {
+  StageOp now = hosts.lookup(stage.getSymName());
+  if (now.getSymName() != stage.getSymName()) {
+    for (auto edge : written.getOps<EdgeOp>())
+      if (edge.getConsumer() == stage.getSymName())
+        out << "    from " << edge.getProducer()
+            << ": nothing is stored, because both run in "
+            << getKernelOf(stage.getSymName()) << "\n";
+    return;
+  }
+  for (auto [number, source] : llvm::enumerate(kernels.getOps<SourceOp>()))
+    if (source.getStage() == now.getSymName())
+      out << "    from source " << number << ": " << getInputSize(now)
+          << " bytes a primitive\n";
+  for (auto edge : kernels.getOps<EdgeOp>()) {
+    if (edge.getConsumer() != now.getSymName())
+      continue;
+    out << "    from " << edge.getProducer() << " port " << edge.getPort()
+        << ": " << getInputSize(now) << " bytes a primitive";
+    if (auto carried = edge.getCarried();
+        carried && *carried != getInputSize(now))
+      out << ", " << *carried << " before it was pruned";
+    out << "\n";
+  }
+}
+
+void Report::writeWaits(StageOp stage) {
+  ScheduleOp schedule = stage.getSchedule();
+  if (schedule && schedule.getEndStageAttr())
+    for (auto other :
+         schedule.getEndStageAttr().getAsRange<FlatSymbolRefAttr>()) {
+      StringRef kernel = getKernelOf(other.getValue());
+      out << "    waits for the end of stage " << other.getValue() << ": ";
+      if (kernel.empty())
+        out << "it was removed\n";
+      else
+        out << "a kernel break behind " << kernel << "\n";
+    }
+  if (schedule && schedule.getEndBin())
+    out << "    waits until nothing can reach the bin: a kernel break, because "
+           "nothing proves that fewer than all producers can\n";
+  if (!stage.getTakesList())
+    return;
+  out << "    takes lists";
+  if (auto batch = schedule ? schedule.getBatch() : std::nullopt)
+    out << " of " << *batch << " primitives";
+  if (schedule && schedule.getEveryBin())
+    out << ", of empty bins too";
+  out << ": a kernel break, because a bin must be complete\n";
+}
+
+void Report::writeStage(StageOp stage) {
+  out << "  " << stage.getSymName() << ": " << describeBins(stage) << ", "
+      << stage.getThreads() << " threads, " << describeSchedule(stage);
+  if (ScheduleOp schedule = stage.getSchedule();
+      schedule && schedule.getUnordered())
+    out << ", unordered";
+  if (auto cycle = stage.getCycle())
+    out << ", on cycle " << *cycle;
+  if (!hosts.contains(stage.getSymName())) {
+    out << "\n    was removed\n";
+    return;
+  }
+  out << "\n";
+  writeInputs(stage);
+  writeWaits(stage);
+}
+
+//===----------------------------------------------------------------------===//
+// Kernels
+//===----------------------------------------------------------------------===//
+
+bool Report::hasKernel(int64_t source) {
+  return llvm::any_of(kernels.getOps<KernelOp>(), [&](KernelOp kernel) {
+    return llvm::any_of(kernel.getOps<AssignOp>(), [&](AssignOp assign) {
+      return assign.getSource() == source;
+    });
+  });
+}
+
+void Report::writeAssign(StageOp stage, bool hasPhase, const Twine &origin) {
+  out << "    AssignBin " << stage.getSymName() << origin
+      << (hasPhase ? "\n" : ": there is one bin\n");
+  if (!isDynamic(stage) && !isLoadBalanced(stage))
+    out << "    Schedule " << stage.getSymName() << ": " << describeKind(stage)
+        << ", pre-scheduled, because "
+        << (stage.getSchedule().getKind() == ScheduleKind::All
+                ? "all cores take part\n"
+                : "the core follows from the bin\n");
+}
+
+void Report::writeFused(StageOp host) {
+  if (!host.getFusedAttr())
+    return;
+  for (auto name : host.getFusedAttr().getAsRange<StringAttr>())
+    for (auto edge : written.getOps<EdgeOp>()) {
+      if (edge.getConsumer() != name.getValue())
+        continue;
+      out << "      AssignBin " << name.getValue() << ": the same bin\n"
+          << "      Schedule " << name.getValue() << ": with "
+          << host.getSymName() << "\n"
+          << "      Process " << name.getValue() << ", where "
+          << edge.getProducer() << " emits\n";
+    }
+}
+
+void Report::writeProcess(ProcessOp process) {
+  StageOp stage = getPhaseStage(process);
+  for (auto [number, source] : llvm::enumerate(kernels.getOps<SourceOp>()))
+    if (source.getStage() == stage.getSymName() && !hasKernel(number))
+      writeAssign(stage, /*hasPhase=*/false, " for source " + Twine(number));
+  if (!isDynamic(stage) && isLoadBalanced(stage))
+    out << "    Schedule " << stage.getSymName()
+        << ": eliminated, because the OpenMP loop hands bins to any core\n";
+  out << "    Process " << stage.getSymName();
+  if (auto tile = stage.getTile())
+    out << ", by tiles with a side of " << *tile << " cells";
+  out << "\n";
+  writeFused(stage);
+  auto kernel = process->getParentOfType<KernelOp>();
+  for (auto edge : kernels.getOps<EdgeOp>()) {
+    if (edge.getProducer() != stage.getSymName())
+      continue;
+    auto consumer = lookupInPipeline<StageOp>(edge, edge.getConsumerAttr());
+    bool hasPhase =
+        llvm::any_of(kernel.getOps<AssignOp>(), [&](AssignOp assign) {
+          return assign.getStageAttr() == edge.getConsumerAttr() &&
+                 assign.getPort() == edge.getPort();
+        });
+    writeAssign(consumer, hasPhase);
+  }
+}
+
+void Report::writeKernel(KernelOp kernel) {
+  out << "  " << kernel.getSymName();
+  if (ProcessOp process = kernel.getProcess())
+    if (getPhaseStage(process).getCycle())
+      out << ", again until its cycle is empty";
+  out << "\n";
+  for (Operation &op : *kernel.getBodyBlock()) {
+    if (auto process = dyn_cast<ProcessOp>(op))
+      writeProcess(process);
+    auto assign = dyn_cast<AssignOp>(op);
+    if (assign && assign.getSource())
+      writeAssign(getPhaseStage(assign), /*hasPhase=*/true,
+                  " for source " + Twine(*assign.getSource()));
+  }
+}
+
+//===----------------------------------------------------------------------===//
+// The report
+//===----------------------------------------------------------------------===//
+
+Report::Report(PipelineOp written, PipelineOp kernels, raw_ostream &out)
+    : written(written), kernels(kernels), out(out) {
+  for (auto stage : kernels.getOps<StageOp>()) {
+    hosts[stage.getSymName()] = stage;
+    if (stage.getFusedAttr())
+      for (auto name : stage.getFusedAttr().getAsRange<StringAttr>())
+        hosts[name.getValue()] = stage;
+  }
+}
+
+void Report::write(ArrayRef<Trace::Remarks> remarks) {
+  out << "Pipeline " << written.getSymName() << "\n\nStages, in order:\n";
+  for (auto stage : written.getOps<StageOp>())
+    writeStage(stage);
+  out << "\nKernels, in order:\n";
+  for (auto stage : kernels.getOps<StageOp>())
+    if (isDynamic(stage))
+      out << "  before all others\n    Schedule " << stage.getSymName()
+          << ", for each bin\n";
+  for (auto kernel : kernels.getOps<KernelOp>())
+    writeKernel(kernel);
+  if (!remarks.empty())
+    out << "\nWhat the passes did or refused:\n";
+  for (const Trace::Remarks &pass : remarks)
+    out << "  " << pass.pass << "\n" << pass.text;
+}
+
+static PipelineOp getOnlyPipeline(ModuleOp module) {
+  return *module.getOps<PipelineOp>().begin();
+}
+
+FailureOr<std::string>
+piko::explainPipeline(ModuleOp module, const CheckOptions &check,
+                      const SynthesisOptions &synthesis) {
+  MLIRContext *context = module.getContext();
+  Trace trace;
+  ScopedDiagnosticHandler handler(context, [&](Diagnostic &diagnostic) {
+    if (diagnostic.getSeverity() == DiagnosticSeverity::Remark)
+      trace.add(diagnostic);
+    return failure(); // others want to see it, too
+  });
+  PassManager passes(context);
+  passes.addInstrumentation(std::make_unique<Tracer>(trace));
+  addPasses(passes, Level::Kernels, check, synthesis);
+  if (failed(passes.run(module)))
+    return failure();
+  std::string text;
+  llvm::raw_string_ostream out(text);
+  Report(getOnlyPipeline(*trace.ordered), getOnlyPipeline(module), out)
+      .write(trace.remarks);
+  return text;
+}
