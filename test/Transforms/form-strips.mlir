@@ -8,8 +8,8 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 // CHECK-NOT:     piko.strips
 // CHECK:         piko.kernel @kernel_before
 // CHECK-NOT:     piko.strips
-// CHECK:         piko.strips source 1 [@source_1_split, @kernel_split, @kernel_left, @kernel_meet] chunk 256
-// CHECK-NEXT:    piko.kernel @source_1_split
+// CHECK:         piko.strips source 1 [@kernel_split, @kernel_left, @kernel_meet] chunk 256
+// CHECK-NEXT:    piko.kernel @kernel_split
 // CHECK-NOT:     piko.strips
 piko.pipeline @Diamond rank 1 {
   piko.source @before
