@@ -8,8 +8,8 @@
 
 Each compiled run is a process of its own; its image must equal the reference
 executor's bit for bit. With --same-picture the pipelines draw the same, and the
-reference executor runs only the first of them. Prints a line for each pipeline and thread count; the
-exit status is 1 if any image differs.
+reference executor runs only the first of them. Prints a line for each pipeline
+and thread count; the exit status is 1 if any image differs.
 """
 
 import argparse
