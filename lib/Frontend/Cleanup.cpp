@@ -304,6 +304,9 @@ static void unrollLoops(llvm::Function &function, PassRunner &runner) {
   runner.run(unroll, function);
 }
 
+/// References nested deeper than this are an error.
+static constexpr int roundLimit = 32;
+
 static bool cleanUpFunction(llvm::Function &function, ParsedUnit &unit,
                             MemoryMap &memory, PassRunner &runner,
                             mlir::MLIRContext &context) {
@@ -318,7 +321,7 @@ static bool cleanUpFunction(llvm::Function &function, ParsedUnit &unit,
     unrollLoops(function, runner);
   // Each round sees through one more level of references.
   bool localized = false;
-  for (int round = 0; round < 32; ++round) {
+  for (int round = 0; round < roundLimit; ++round) {
     if (!checkObject(function, unit, memory, context))
       return false;
     bool changed = splitMemory(function, memory);
@@ -361,6 +364,11 @@ static bool cleanUpFunction(llvm::Function &function, ParsedUnit &unit,
   finish.addPass(llvm::ADCEPass());
   finish.addPass(llvm::SimplifyCFGPass());
   runner.run(finish, function);
+  // instcombine reads the elements of an array that two branches read once,
+  // through the one of the two addresses that is chosen.
+  for (int round = 0; round < roundLimit && flattenPointers(function, memory);
+       ++round)
+    runner.run(simplify, function);
   dropUnreachableDefaults(function);
   return true;
 }
