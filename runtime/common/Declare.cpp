@@ -166,6 +166,10 @@ void pikoir_declare_edge(pikort_pipeline *p, int32_t producer, int32_t port,
   });
 }
 
+void pikoir_declare_local(pikort_pipeline *p, int32_t producer, int32_t port) {
+  guarded(p, "setup", [&] { p->locals.push_back({producer, port}); });
+}
+
 void pikoir_declare_schedule(pikort_pipeline *p, int32_t stage, int64_t batch,
                              int32_t everyBin) {
   guarded(p, "setup", [&] {

@@ -147,12 +147,48 @@ void pikort_pipeline::findStrips() {
   }
 }
 
+/// Completes local edges, and the stages behind them, producers first.
+void pikort_pipeline::findLocals() {
+  for (const LocalPort &local : locals) {
+    const Stage *from = findStage(local.producer);
+    bool exists = from && local.port >= 0 &&
+                  local.port < static_cast<int32_t>(from->outputs.size()) &&
+                  from->outputs[local.port] >= 0;
+    if (!exists)
+      bad("pipeline " + quoted(name) + ": expected the port of a local edge");
+    Edge &edge = edges[from->outputs[local.port]];
+    const Stage &to = stages[edge.consumer];
+    auto isAlone = [&](const Stage &stage) {
+      return !components[stage.component].cyclic && stage.stripGroup < 0 &&
+             stage.cellSize == 0 && !(stage.flags & PIKOIR_SPLIT);
+    };
+    if (!to.collects() || to.inputs.size() != 1 || !to.sources.empty() ||
+        from->binSize != to.binSize || !isAlone(*from) || !isAlone(to))
+      bad("stage " + quoted(to.name) +
+          ": expected a local edge between stages with the same bins, which "
+          "are not split, the second of which collects what this edge brings");
+    edge.local = true;
+  }
+  for (int32_t s : order) {
+    Stage &stage = stages[s];
+    if (stage.inputs.empty() || !edges[stage.inputs.front()].local)
+      continue;
+    int32_t producer = edges[stage.inputs.front()].producer;
+    const Stage &from = stages[producer];
+    stage.host = from.host < 0 ? producer : from.host;
+    stage.depth = from.depth + 1;
+    stages[stage.host].hosts = true;
+    stages[stage.host].visitsAll |= stage.schedule.everyBin;
+  }
+}
+
 void pikort_pipeline::finish() {
   checkDeclared();
   connect();
   findLoops();
   sortStages();
   findStrips();
+  findLocals();
   findKeys();
   stageStats.resize(stages.size());
 }
@@ -208,8 +244,9 @@ void pikort_pipeline::report(const KernelError &found) noexcept {
     return std::tie(e.unit, e.code, e.stage, e.a, e.b);
   };
   // In one unit the first report is the first error.
-  bool earlier = found.unit == INT64_MAX ? key(found) < key(error)
-                                         : found.unit < error.unit;
+  bool earlier = found.depth != error.depth ? found.depth < error.depth
+                 : found.unit == INT64_MAX  ? key(found) < key(error)
+                                            : found.unit < error.unit;
   if (!hasError || earlier)
     error = found;
   hasError = true;

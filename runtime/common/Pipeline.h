@@ -68,6 +68,7 @@ struct Edge {
   bool keyed = false;        ///< Its primitives carry lineage keys.
   int32_t keyWidth = 0;      ///< 64-bit words of a key.
   bool leavesStrips = false; ///< Only the producer is in a group of strips.
+  bool local = false;        ///< The consumer runs in the producer's kernel.
   /// If the producer is on a cycle, or the edge leaves strips: what it has
   /// emitted so far.
   std::shared_ptr<Queue> queue;
@@ -110,6 +111,11 @@ struct Wait {
   int32_t stage, waitsFor;
 };
 
+/// A port whose edge is local.
+struct LocalPort {
+  int32_t producer, port;
+};
+
 struct Source {
   bool declared = false;
   int32_t stage = 0;
@@ -134,6 +140,10 @@ struct Stage {
   int32_t loop = -1;
   int32_t stripGroup = -1;
   bool sharesTile = false; ///< A strip is a tile: threads share it.
+  int32_t host = -1;       ///< In whose kernel it runs, behind local edges.
+  int32_t depth = 0;       ///< How many local edges lie before it.
+  bool hosts = false;      ///< Other stages run in its kernel, ...
+  bool visitsAll = false;  ///< ... some of them for empty bins, too.
   int32_t root = 0;        ///< Of the lineage that it starts.
   int32_t keyWidth = 0;    ///< 64-bit words of its items' keys, 0 = none.
   // Completed by each run:
@@ -182,6 +192,8 @@ struct KernelError {
   int64_t unit;
   int32_t code, stage;
   int64_t a, b;
+  /// Of the stage that ran: all of one comes before all behind a local edge.
+  int32_t depth = 0;
 };
 
 } // namespace piko::rt
@@ -199,6 +211,7 @@ struct pikort_pipeline {
   std::vector<piko::rt::Source> sources;
   std::vector<piko::rt::Edge> edges;
   std::vector<piko::rt::Wait> waits;
+  std::vector<piko::rt::LocalPort> locals;
   std::vector<piko::rt::StripGroup> stripGroups;
   std::vector<piko::rt::Component> components; ///< Producers first.
   std::vector<piko::rt::LoopShape> loops;
@@ -262,6 +275,7 @@ private:
   void checkDeclared();
   void connect();
   void findStrips();
+  void findLocals();
   // StageOrder.cpp:
   void findLoops();
   void sortStages();

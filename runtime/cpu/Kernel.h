@@ -52,6 +52,15 @@ struct Log {
   }
 };
 
+/// What a port of a local edge has kept for one bin, as its consumer sees it.
+struct LocalBin {
+  pikoir_input input{};
+  pikoir_unit unit{};
+  int64_t offsets[2] = {0, 0};
+  Array<pikoir_call> calls;
+  int64_t received = 0; ///< Over all bins of this run.
+};
+
 /// The three logs of a port. Cells are uint32, the first of each record with
 /// PIKOIR_FIRST_CELL; ordinals are uint32, one for each kept record.
 struct PortLogs {
@@ -61,6 +70,7 @@ struct PortLogs {
   uint32_t *countsEnd = nullptr;
   bool padded = false; ///< Records have padding, which must be zero.
   int32_t consumer = 0;
+  std::unique_ptr<LocalBin> local; ///< If its edge is local.
 
   void clear() {
     records.clear();
@@ -183,14 +193,22 @@ struct Kernel {
 void prepareLanes(pikort_pipeline &p, Kernel &kernel);
 /// Reports a mistake of generated code.
 void badCall(const Lane &lane, BadCall which);
-/// Reports that `bytes` were refused.
-void outOfMemory(const Lane &lane, int64_t bytes);
+/// Reports that `bytes` were refused, to the lane's stage or to another one.
+void outOfMemory(const Lane &lane, int64_t bytes, int32_t stage = -1);
 
 // --- Defer.cpp --------------------------------------------------------------
 
 /// What pikoir_append and pikoir_place do in iterations.
 uint8_t *deferAppend(Lane &lane, int32_t port);
 void deferPlace(Lane &lane, int32_t port, int64_t cell);
+
+// --- Local.cpp --------------------------------------------------------------
+
+/// Opens, and ends, the kernels of the stages that run in this one.
+void beginLocals(pikort_pipeline &p, Kernel &host);
+void endLocals(pikort_pipeline &p, Kernel &host, int32_t status);
+/// Makes room for one more record of a local edge. False if memory is refused.
+bool growLocal(Lane &lane, int32_t port);
 
 // --- Join.cpp ---------------------------------------------------------------
 
@@ -236,6 +254,8 @@ void prepareState(pikort_pipeline &p);
 
 // --- Run.cpp ----------------------------------------------------------------
 
+/// Makes room for what will be gathered from a kernel, once it has units.
+void prepareOutputs(pikort_pipeline &p, const Stage &stage, Kernel &kernel);
 /// Makes the kernels of a finished pipeline.
 void makeKernels(pikort_pipeline &p);
 

@@ -85,6 +85,20 @@ static void prepareSource(pikort_pipeline &p, Kernel &kernel) {
   kernel.pendingOutputs = 1;
 }
 
+void piko::rt::prepareOutputs(pikort_pipeline &p, const Stage &stage,
+                              Kernel &kernel) {
+  kernel.pendingOutputs = 0;
+  kernel.counts.resize(stage.outputs.size());
+  for (size_t port = 0; port < stage.outputs.size(); ++port) {
+    int32_t e = stage.outputs[port];
+    if (e < 0 || p.edges[e].local)
+      continue;
+    ++kernel.pendingOutputs;
+    if (byPosition(p, p.edges[e]))
+      kernel.counts[port] = Array<uint32_t>(p.memory, kernel.slots());
+  }
+}
+
 static void prepareStage(pikort_pipeline &p, Kernel &kernel) {
   Stage &stage = p.stages[kernel.stage];
   Cycle *cycle = p.cycleOf(stage);
@@ -95,21 +109,14 @@ static void prepareStage(pikort_pipeline &p, Kernel &kernel) {
   if (Strips *strips = p.stripsOf(stage); strips && stage.collects())
     kernel.launch = strips->number();
   bool rankNeeded = stage.loop >= 0;
-  kernel.pendingOutputs = 0;
-  for (int32_t e : stage.outputs) {
-    if (e < 0)
-      continue;
-    ++kernel.pendingOutputs;
-    rankNeeded |=
-        p.edges[e].keyed ||
-        !(stage.unordered() || p.stages[p.edges[e].consumer].unordered());
-  }
+  for (int32_t e : stage.outputs)
+    if (e >= 0 && !p.edges[e].local)
+      rankNeeded |=
+          p.edges[e].keyed ||
+          !(stage.unordered() || p.stages[p.edges[e].consumer].unordered());
   binItems(p, stage, kernel, rankNeeded);
   cutUnits(p, stage, kernel);
-  kernel.counts.resize(stage.outputs.size());
-  for (size_t port = 0; port < stage.outputs.size(); ++port)
-    if (stage.outputs[port] >= 0 && byPosition(p, p.edges[stage.outputs[port]]))
-      kernel.counts[port] = Array<uint32_t>(p.memory, kernel.slots());
+  prepareOutputs(p, stage, kernel);
   StageStats &stats = p.stageStats[kernel.stage];
   stats.in += kernel.stream.count;
   stats.placed += kernel.positions;
@@ -127,6 +134,7 @@ static const pikoir_input *begin(pikort_pipeline &p, Kernel &kernel) {
         else
           prepareStage(p, kernel);
         prepareLanes(p, kernel);
+        beginLocals(p, kernel);
         publish(p, kernel);
         kernel.open = true;
         Strips *strips = p.stripsOf(p.stages[kernel.stage]);
@@ -147,6 +155,7 @@ static int32_t end(pikort_pipeline &p, Kernel &kernel) {
   if (kernel.source < 0)
     for (auto &lane : kernel.lanes)
       p.stageStats[kernel.stage].out += lane->emitted;
+  endLocals(p, kernel, status);
   p.activeThreads = p.threads;
   kernel.open = false;
   kernel.stream = {};
@@ -209,8 +218,9 @@ int32_t pikoir_end_source(pikort_pipeline *p, int32_t source) {
 
 void pikoir_fail(pikort_pipeline *p, int32_t stage, int32_t code, int64_t a,
                  int64_t b) {
-  p->report(
-      {INT64_MAX, code == PIKORT_OK ? PIKORT_BAD_PROGRAM : code, stage, a, b});
+  const Stage *found = p->findStage(stage);
+  p->report({INT64_MAX, code == PIKORT_OK ? PIKORT_BAD_PROGRAM : code, stage, a,
+             b, found ? found->depth : 0});
 }
 
 const void *pikoir_get_source(pikort_pipeline *p, int32_t source,

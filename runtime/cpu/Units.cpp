@@ -36,6 +36,8 @@ public:
     if (!stage_.binSchedules && isSerial(0))
       return add(0, stage_.cells, 0, kernel_.positions);
     int64_t chunk = sizeOf(0);
+    // What waits for a bin may do much, whatever there is in it.
+    int64_t most = stage_.hosts ? 16 : 1024;
     int64_t first = 0; // of the group that is not yet added
     bool serial = false;
     auto flush = [&](int64_t cell) {
@@ -59,7 +61,7 @@ public:
         for (int64_t i = begin; i < end; i += chunk)
           add(cell, cell + 1, i, std::min(end, i + chunk));
         first = cell + 1;
-      } else if (end - offsets_[first] >= chunk || cell + 1 - first >= 1024) {
+      } else if (end - offsets_[first] >= chunk || cell + 1 - first >= most) {
         flush(cell + 1);
       }
     }
@@ -102,7 +104,7 @@ private:
     return unitSize(p_, stage_, stage_.scheduleOf(bin), kernel_.positions);
   }
   void add(int64_t cellBegin, int64_t cellEnd, int64_t begin, int64_t end) {
-    if (begin < end)
+    if (begin < end || stage_.visitsAll)
       units_.push_back({cellBegin, cellEnd, begin, end});
   }
 
@@ -196,6 +198,10 @@ void pikoir_schedule_bin(pikort_pipeline *p, int32_t stage, int64_t bin,
       throw Failure{PIKORT_BAD_PROGRAM,
                     who + "expected a bin and a kind of schedule that exist, "
                           "after pikoir_begin_schedule"};
+    if (found->host >= 0 || found->hosts)
+      throw Failure{PIKORT_BAD_PROGRAM,
+                    who + "expected one schedule for all bins, because it is "
+                          "at the end of a local edge"};
     if (tileSplit < 0)
       throw Failure{PIKORT_INVALID_ARGUMENT,
                     who + "expected a tile split of at least 0, but got " +

@@ -24,14 +24,20 @@ static Lane *laneOf(pikoir_writer *writer) {
   return static_cast<Lane *>(writer);
 }
 
-void piko::rt::outOfMemory(const Lane &lane, int64_t bytes) {
-  lane.pipeline->report(
-      {lane.unit, PIKORT_OUT_OF_MEMORY, lane.stage, bytes, 0});
+/// How many local edges lie before the stage that a lane is of.
+static int32_t depthOf(const Lane &lane) {
+  return lane.pipeline->stages[lane.stage].depth;
+}
+
+void piko::rt::outOfMemory(const Lane &lane, int64_t bytes, int32_t stage) {
+  lane.pipeline->report({lane.unit, PIKORT_OUT_OF_MEMORY,
+                         stage < 0 ? lane.stage : stage, bytes, 0,
+                         depthOf(lane)});
 }
 
 void piko::rt::badCall(const Lane &lane, BadCall which) {
   lane.pipeline->report({lane.unit, PIKORT_BAD_PROGRAM, lane.stage,
-                         static_cast<int64_t>(which), 0});
+                         static_cast<int64_t>(which), 0, depthOf(lane)});
 }
 
 /// Ends the segment at `cursor`.
@@ -79,10 +85,13 @@ static bool grow(Lane *lane, Log &log, uint8_t *&cursor, uint8_t *&end,
   pikoir_port &out = lane->ports[port];
   PortLogs &logs = lane->logs[port];
   uint8_t *end = nullptr;
-  if (!grow(lane, logs.records, out.cursor, end, 0, out.size)) {
+  bool room = logs.local
+                  ? growLocal(*lane, port)
+                  : grow(lane, logs.records, out.cursor, end, 0, out.size);
+  if (!room)
     out.cursor = out.limit = logs.scratchRecord;
+  if (!room || logs.local)
     return;
-  }
   out.limit = end - out.size;
   if (logs.padded)
     std::memset(out.cursor, 0, static_cast<size_t>(end - out.cursor));
@@ -162,7 +171,8 @@ static void insertCell(pikoir_port &out, uint32_t cell) {
   const Stage &to = lane->pipeline->stages[lane->logs[port].consumer];
   int64_t bin = cell / to.tiles - (cell % to.tiles < 0);
   lane->pipeline->report({lane->unit, PIKORT_BIN_OUTSIDE,
-                          lane->logs[port].consumer, bin, to.cells / to.tiles});
+                          lane->logs[port].consumer, bin, to.cells / to.tiles,
+                          depthOf(*lane)});
 }
 
 void pikoir_place(pikoir_writer *writer, int32_t port, int64_t cell) {
@@ -174,6 +184,12 @@ void pikoir_place(pikoir_writer *writer, int32_t port, int64_t cell) {
     return badPlace(laneOf(writer), port, cell);
   if (cell == out.last_cell)
     return;
+  if (out.flags & PIKOIR_PORT_LOCAL) { // the only cell is known
+    if (out.last_cell < 0)
+      out.cursor += out.size;
+    out.last_cell = cell;
+    return;
+  }
   if (out.cell_cursor == out.cell_end) [[unlikely]]
     if (!growCells(laneOf(writer), port)) {
       if (out.last_cell < 0 && out.cursor <= out.limit)
@@ -282,6 +298,8 @@ void pikoir_close(pikoir_writer *writer) {
       pikoir_port &out = lane->ports[i];
       PortLogs &logs = lane->logs[i];
       lane->emitted += out.emitted;
+      if (logs.local)
+        continue;
       if (out.flags & PIKOIR_PORT_COUNTS)
         std::fill(out.counts, logs.countsEnd, 0u);
       endSegment(lane, logs.records, out.cursor);
@@ -330,6 +348,11 @@ static void preparePort(pikort_pipeline &p, const Kernel &kernel, Lane &lane,
       out.flags |= PIKOIR_PORT_ORDINALS;
     if (kernel.counts[port])
       out.flags |= PIKOIR_PORT_COUNTS;
+    logs.local.reset();
+    if (e >= 0 && p.edges[e].local) {
+      out.flags |= PIKOIR_PORT_LOCAL;
+      logs.local = std::make_unique<LocalBin>();
+    }
   }
   const Stage &to = p.stages[logs.consumer];
   const Record &record = p.records[to.record];
@@ -357,7 +380,8 @@ void piko::rt::prepareLanes(pikort_pipeline &p, Kernel &kernel) {
     lane->flags = 0;
     for (size_t port = 0; port < lane->logs.size(); ++port) {
       preparePort(p, kernel, *lane, port);
-      lane->flags |= lane->ports[port].flags;
+      // pikoir_next has nothing to do for local edges.
+      lane->flags |= lane->ports[port].flags & ~PIKOIR_PORT_LOCAL;
     }
     kernel.freeLanes.push_back(lane.get());
   }

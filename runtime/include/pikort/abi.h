@@ -25,6 +25,14 @@
 //     kernel[a](p) || kernel[b](p);
 //   if (int32_t status = pikoir_status(p)) return status;
 //
+// A stage of a local edge runs in the kernel of its producer: for a unit its
+// writer is opened as well, and behind the positions of a bin
+//
+//   const pikoir_input *in = pikoir_begin_local(w, port);
+//   for each position, or call, of in:  Process, with the stage's own writer
+//   pikoir_next(own);
+//   pikoir_end_local(w, port);
+//
 // Every unit is opened exactly once, by any thread; a writer stays on the
 // thread that opened it. The runtime restores lineage order at the join, so
 // that no result depends on the number of threads or on how units are cut.
@@ -90,6 +98,11 @@ PIKORT_API void pikoir_declare_source(pikort_pipeline *p, int32_t index,
                                       int32_t stage);
 PIKORT_API void pikoir_declare_edge(pikort_pipeline *p, int32_t producer,
                                     int32_t port, int32_t consumer);
+/// The edge from a port is local: its consumer runs in the producer's kernel,
+/// bin by bin. It collects, has the producer's bins, no other input and no owner
+/// tiles; neither stage is SPLIT, on a cycle or in strips.
+PIKORT_API void pikoir_declare_local(pikort_pipeline *p, int32_t producer,
+                                     int32_t port);
 /// Of a LIST stage: how many primitives a call gets, 0 = the whole list, and
 /// whether bins without primitives are called too. Without this declaration: 0
 /// and no.
@@ -191,7 +204,8 @@ enum pikoir_port_flags {
   PIKOIR_PORT_ORDINALS = 1, ///< Each kept record notes its ordinal.
   PIKOIR_PORT_COUNTS = 2,   ///< Each position notes its number of records.
   PIKOIR_PORT_SOURCE = 4,   ///< Cells of a source's primitives, no records.
-  PIKOIR_PORT_DEFERRED = 8  ///< Between pikoir_defer_begin and _end.
+  PIKOIR_PORT_DEFERRED = 8, ///< Between pikoir_defer_begin and _end.
+  PIKOIR_PORT_LOCAL = 16    ///< Its edge is local.
 };
 
 typedef struct pikoir_writer {
@@ -222,6 +236,13 @@ PIKORT_API void pikoir_next(pikoir_writer *writer);
 PIKORT_API void pikoir_close(pikoir_writer *writer);
 /// Ends the kernel: 0, or the status of the first error in it.
 PIKORT_API int32_t pikoir_end(pikort_pipeline *p, int32_t stage);
+
+/// What a port of a local edge has emitted since the last time, as one unit of
+/// one cell; of a LIST stage, one unit of all calls. Valid until end_local, which
+/// forgets it: no append to the port lies between. Never null.
+PIKORT_API const pikoir_input *pikoir_begin_local(pikoir_writer *writer,
+                                                  int32_t port);
+PIKORT_API void pikoir_end_local(pikoir_writer *writer, int32_t port);
 
 /// Emissions of iterations that meet barriers. From defer_begin to defer_end,
 /// appends and places belong to the iteration that was named last, in [0,
