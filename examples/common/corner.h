@@ -3,7 +3,9 @@
 //
 // What triangles share of their way to the screen is computed for each vertex:
 // where it is on the screen, and which planes it is outside of. A triangle that
-// needs no clipping is then a few integers; clip.h has the others.
+// needs no clipping is then a few integers; clip.h has the others, for which
+// `clip(i)` gives the place of corner i in clip space. It is not kept, because
+// hardly any triangle needs it.
 //
 //===----------------------------------------------------------------------===//
 #ifndef COMMON_CORNER_H
@@ -20,10 +22,9 @@ enum Outside : uint32_t {
   outsideRange = 128, ///< too large, or not a number
 };
 
-/// A vertex on the screen; one that is outside the guard band has only its
-/// place in clip space.
+/// A vertex on the screen, where one that is outside the guard band has no
+/// place.
 struct ScreenVertex {
-  glm::vec4 clip;
   Point at;
   float depth;   ///< z / w
   float inverse; ///< 1 / w
@@ -33,7 +34,6 @@ struct ScreenVertex {
 /// A place in clip space on an image of `size` pixels.
 inline ScreenVertex toScreen(glm::vec4 clip, glm::ivec2 size) {
   ScreenVertex v{};
-  v.clip = clip;
   if (!isUsable(clip)) {
     v.outside = outsideRange;
     return v;
@@ -67,15 +67,16 @@ inline bool needsClipping(const ScreenVertex &a, const ScreenVertex &b,
 /// The pixels of the image among which a triangle's are; none of one that is
 /// out of view, degenerate, not finite, or, if `cullBackFaces`, seen from
 /// behind.
+template <class Clip>
 inline PixelBox boxOf(const ScreenVertex &a, const ScreenVertex &b,
-                      const ScreenVertex &c, glm::ivec2 size,
+                      const ScreenVertex &c, Clip clip, glm::ivec2 size,
                       bool cullBackFaces) {
   constexpr PixelBox none = {{0, 0}, {-1, -1}};
   if (isGone(a, b, c))
     return none;
   PixelBox box;
   if (needsClipping(a, b, c)) {
-    box = ScreenPolygon(a.clip, b.clip, c.clip, size, cullBackFaces).box();
+    box = ScreenPolygon(clip(0), clip(1), clip(2), size, cullBackFaces).box();
   } else {
     int64_t area = signedArea(a.at, b.at, c.at);
     if (area == 0 || (cullBackFaces && area > 0))
@@ -89,15 +90,44 @@ inline PixelBox boxOf(const ScreenVertex &a, const ScreenVertex &b,
   return {glm::max(box.lo, 0), glm::min(box.hi, size - 1)};
 }
 
+/// The edges of a triangle on the screen, whichever way it turns.
+inline Edges edgesOf(const ScreenVertex &a, const ScreenVertex &b,
+                     const ScreenVertex &c) {
+  bool turned = signedArea(a.at, b.at, c.at) < 0;
+  return Edges(a.at, turned ? c.at : b.at, turned ? b.at : c.at);
+}
+
+/// `box`, from boxOf(), without rows and columns at its sides of which the
+/// triangle covers nothing, if it is at most 2 by 2 pixels, of which
+/// many triangles cover none.
+inline PixelBox coveredPart(const ScreenVertex &a, const ScreenVertex &b,
+                            const ScreenVertex &c, const PixelBox &box) {
+  if (box.hi.x - box.lo.x > 1 || box.hi.y - box.lo.y > 1 ||
+      needsClipping(a, b, c))
+    return box;
+  Edges edges = edgesOf(a, b, c);
+  PixelBox part = {box.hi + 1, box.lo - 1};
+  // No branch would be foreseen.
+  for (int i = 0; i < 4; ++i) {
+    glm::ivec2 pixel = box.lo + glm::ivec2(i & 1, i >> 1);
+    bool covered = (pixel.x <= box.hi.x) & (pixel.y <= box.hi.y) &
+                   edges.cover(pixel.x, pixel.y);
+    part.lo = covered ? glm::min(part.lo, pixel) : part.lo;
+    part.hi = covered ? glm::max(part.hi, pixel) : part.hi;
+  }
+  return part;
+}
+
 /// Calls draw(Sample) once for each pixel in `box` that a triangle covers and
-/// that is not below `lo` nor at `hi` or beyond. `box` is from boxOf().
-template <class Draw>
+/// that is not below `lo` nor at `hi` or beyond. `box` is from boxOf() or
+/// coveredPart().
+template <class Clip, class Draw>
 inline void rasterize(const ScreenVertex &a, const ScreenVertex &b,
-                      const ScreenVertex &c, const PixelBox &box, glm::ivec2 lo,
-                      glm::ivec2 hi, glm::ivec2 size, bool cullBackFaces,
-                      Draw draw) {
+                      const ScreenVertex &c, Clip clip, const PixelBox &box,
+                      glm::ivec2 lo, glm::ivec2 hi, glm::ivec2 size,
+                      bool cullBackFaces, Draw draw) {
   if (needsClipping(a, b, c)) {
-    ScreenPolygon(a.clip, b.clip, c.clip, size, cullBackFaces)
+    ScreenPolygon(clip(0), clip(1), clip(2), size, cullBackFaces)
         .rasterize(lo, hi, draw);
     return;
   }

@@ -66,7 +66,7 @@ struct Edges {
   Edges(Point a, Point b, Point c) : e0(b, c), e1(c, a), e2(a, b) {}
 
   bool cover(int x, int y) const {
-    return e0.holds(e0.at(x, y)) && e1.holds(e1.at(x, y)) &&
+    return e0.holds(e0.at(x, y)) & e1.holds(e1.at(x, y)) &
            e2.holds(e2.at(x, y));
   }
 };

@@ -86,31 +86,31 @@ struct State {
   piko::Image<Color> color;
 };
 
-inline ShadedVertex shade(const Vertex &v, const Camera &camera,
-                          glm::ivec2 size) {
-  return {toScreen(camera.viewProjection * glm::vec4(v.position, 1), size),
-          v.position, v.normal};
+inline glm::vec4 project(const Camera &camera, glm::vec3 position) {
+  return camera.viewProjection * glm::vec4(position, 1);
 }
 
 //===----------------------------------------------------------------------===//
 // Triangles that carry their vertices
 //===----------------------------------------------------------------------===//
 
-struct LinearState : State {
+struct MeshState : State {
   piko::Buffer<Vertex> mesh;
 };
 
 // Shades the vertices of a triangle.
 template <Mapping M>
 struct TriangleShader : piko::Stage<0, 0, 64, Triangle, ShadedTriangle>,
-                        piko::Uses<LinearState> {
+                        piko::Uses<MeshState> {
   void schedule(piko::BinId) { this->specifySchedule(M.core, M.split); }
 
   void process(const Triangle &t) {
     ShadedTriangle out;
-    for (int i = 0; i < 3; ++i)
-      out.corner[i] = shade(this->state().mesh[t.vertex[i]],
-                            this->state().camera, this->domain());
+    for (int i = 0; i < 3; ++i) {
+      const Vertex &v = this->state().mesh[t.vertex[i]];
+      glm::vec4 clip = project(this->state().camera, v.position);
+      out.corner[i] = {toScreen(clip, this->domain()), v.position, v.normal};
+    }
     this->emit(out, 0);
   }
 };
@@ -119,14 +119,16 @@ struct TriangleShader : piko::Stage<0, 0, 64, Triangle, ShadedTriangle>,
 // Triangles that refer to vertices
 //===----------------------------------------------------------------------===//
 
-struct IndexedState : State {
-  piko::Buffer<ShadedVertex> vertices; // one for each Vertex
+struct IndexedState : MeshState {
+  piko::Buffer<ScreenVertex> vertices; // one for each Vertex
 };
 
-// Shades each vertex once, and leaves it where triangles find it.
+// Finds each vertex's place on the screen once, and leaves it where triangles
+// find it.
 struct VertexShader : piko::Stage<0, 0, 64, Vertex>, piko::Uses<IndexedState> {
   void process(const Vertex &v) {
-    state().vertices[v.index] = shade(v, state().camera, domain());
+    state().vertices[v.index] =
+        toScreen(project(state().camera, v.position), domain());
   }
 };
 
@@ -137,10 +139,14 @@ struct Setup : piko::Stage<0, 0, 64, Triangle, BoxedTriangle>,
 
   void process(const Triangle &t) {
     auto corner = [&](int i) -> const ScreenVertex & {
-      return state().vertices[t.vertex[i]].screen;
+      return state().vertices[t.vertex[i]];
     };
-    PixelBox box = boxOf(corner(0), corner(1), corner(2), domain(),
+    auto clip = [&](int i) {
+      return project(state().camera, state().mesh[t.vertex[i]].position);
+    };
+    PixelBox box = boxOf(corner(0), corner(1), corner(2), clip, domain(),
                          state().settings.cullBackFaces != 0);
+    box = coveredPart(corner(0), corner(1), corner(2), box);
     if (box.lo.x <= box.hi.x && box.lo.y <= box.hi.y)
       emit(BoxedTriangle{t.vertex, box}, 0);
   }
@@ -167,10 +173,12 @@ struct Rasterizer : piko::Stage<M.bin, M.bin, 64, Triangle, Fragment>,
 
   void process(const Triangle &t) {
     PixelBox box = boxIn(t);
-    const ShadedVertex &a = corner(t, 0), &b = corner(t, 1), &c = corner(t, 2);
+    const auto &a = surface(t, 0), &b = surface(t, 1), &c = surface(t, 2);
     rasterize(
-        a.screen, b.screen, c.screen, box, this->binLo(), this->binHi(),
-        this->domain(), cullBackFaces(), [&](const Sample &s) {
+        screen(t, 0), screen(t, 1), screen(t, 2),
+        [&](int i) { return clip(t, i); }, box, this->binLo(), this->binHi(),
+        this->domain(), cullBackFaces(),
+        [&](const Sample &s) {
           glm::vec3 w = s.weight;
           this->emit(
               Fragment{s.pixel, s.depth,
@@ -185,19 +193,33 @@ private:
 
   bool cullBackFaces() { return this->state().settings.cullBackFaces != 0; }
 
-  const ShadedVertex &corner(const Triangle &t, int i) {
+  // A corner's place on the screen.
+  const ScreenVertex &screen(const Triangle &t, int i) {
     if constexpr (isIndexed)
       return this->state().vertices[t.vertex[i]];
     else
+      return t.corner[i].screen;
+  }
+
+  // What has a corner's position and normal.
+  const auto &surface(const Triangle &t, int i) {
+    if constexpr (isIndexed)
+      return this->state().mesh[t.vertex[i]];
+    else
       return t.corner[i];
+  }
+
+  glm::vec4 clip(const Triangle &t, int i) {
+    return project(this->state().camera, surface(t, i).position);
   }
 
   PixelBox boxIn(const Triangle &t) {
     if constexpr (isIndexed)
       return t.box;
     else
-      return boxOf(t.corner[0].screen, t.corner[1].screen, t.corner[2].screen,
-                   this->domain(), cullBackFaces());
+      return boxOf(
+          screen(t, 0), screen(t, 1), screen(t, 2),
+          [&](int i) { return clip(t, i); }, this->domain(), cullBackFaces());
   }
 };
 
@@ -278,9 +300,9 @@ template <Mapping M, class UsedState> struct Pixels : piko::Pipe<UsedState> {
   }
 };
 
-template <Mapping M> struct LinearRaster : Pixels<M, LinearState> {
+template <Mapping M> struct LinearRaster : Pixels<M, MeshState> {
   TriangleShader<M> vertexShader;
-  Rasterizer<M, ShadedTriangle, LinearState> rasterizer;
+  Rasterizer<M, ShadedTriangle, MeshState> rasterizer;
 
   LinearRaster() {
     this->source(vertexShader);
