@@ -17,10 +17,13 @@
 
 #include "../common/clip.h"
 #include "../common/lighting.h"
+#include "../common/mapping.h"
 
 using namespace piko::scene;
 
 namespace oit {
+
+using raster::Mapping;
 
 struct ShadedVertex {
   glm::vec4 clip;
@@ -63,15 +66,18 @@ struct VertexShader : piko::Stage<0, 0, 64, Vertex>, piko::Uses<State> {
 };
 
 // Finds the pixels of a triangle that lie in the bin and before the far plane.
-template <int Bin>
-struct Rasterizer : piko::Stage<Bin, Bin, 64, Triangle, Fragment>,
+template <Mapping M>
+struct Rasterizer : piko::Stage<M.bin, M.bin, 64, Triangle, Fragment>,
                     piko::Uses<State> {
   void assignBin(const Triangle &t) {
     raster::PixelBox box = project(t).box();
     this->assignToBoundingBox(t, box.lo, box.hi);
   }
 
-  void schedule(piko::BinId) { this->template endStage<VertexShader>(); }
+  void schedule(piko::BinId) {
+    this->template endStage<VertexShader>();
+    this->specifySchedule(M.core, M.split);
+  }
 
   void process(const Triangle &t) {
     const ShadedVertex &a = state().vertices[t.vertex.x];
@@ -96,10 +102,14 @@ private:
   }
 };
 
-template <int Bin>
-struct FragmentShader : piko::Stage<Bin, Bin, 64, Fragment, Layer>,
+template <Mapping M>
+struct FragmentShader : piko::Stage<M.bin, M.bin, 64, Fragment, Layer>,
                         piko::Uses<State> {
   void assignBin(const Fragment &f) { this->assignToPreviousBins(f); }
+  void schedule(piko::BinId) {
+    if constexpr (M.apart)
+      this->specifySchedule(M.core, M.split);
+  }
 
   void process(const Fragment &f) {
     glm::vec3 n = glm::normalize(f.normal);
@@ -119,13 +129,17 @@ struct FragmentShader : piko::Stage<Bin, Bin, 64, Fragment, Layer>,
 };
 
 // Composes the layers of all pixels of a bin, from back to front.
-template <int Bin>
-struct Blend : piko::Stage<Bin, Bin, 64, Layer>, piko::Uses<State> {
+template <Mapping M>
+struct Blend : piko::Stage<M.bin, M.bin, 64, Layer>, piko::Uses<State> {
   void assignBin(const Layer &l) {
     this->assignToBin(l, this->binFromPosition(l.pixel));
   }
 
-  void schedule(piko::BinId) { this->endBin(); }
+  void schedule(piko::BinId) {
+    this->endBin();
+    if constexpr (M.apart)
+      this->specifySchedule(M.rest, M.split);
+  }
 
   void process(const piko::List<Layer> &layers) {
     int last = int(layers.size()) - 1;
@@ -142,11 +156,11 @@ struct Blend : piko::Stage<Bin, Bin, 64, Layer>, piko::Uses<State> {
   }
 };
 
-template <int Bin> struct Oit : piko::Pipe<State> {
+template <Mapping M> struct Oit : piko::Pipe<State> {
   VertexShader vertexShader;
-  Rasterizer<Bin> rasterizer;
-  FragmentShader<Bin> fragmentShader;
-  Blend<Bin> blend;
+  Rasterizer<M> rasterizer;
+  FragmentShader<M> fragmentShader;
+  Blend<M> blend;
 
   Oit() {
     source(vertexShader);
@@ -157,9 +171,9 @@ template <int Bin> struct Oit : piko::Pipe<State> {
   }
 };
 
-struct WholeScreen : Oit<0> {};
-struct Bins8 : Oit<8> {};
-struct Bins16 : Oit<16> {};
-struct Bins32 : Oit<32> {};
+struct WholeScreen : Oit<{.bin = 0, .apart = false}> {};
+struct Bins8 : Oit<{.bin = 8, .apart = false}> {};
+struct Bins16 : Oit<{.bin = 16, .apart = false}> {};
+struct Bins32 : Oit<{.bin = 32, .apart = false}> {};
 
 } // namespace oit

@@ -26,19 +26,11 @@
 
 #include "../common/corner.h"
 #include "../common/lighting.h"
+#include "../common/mapping.h"
 
 using namespace piko::scene;
 
 namespace raster {
-
-// How the stages from the Rasterizer on are mapped.
-struct Mapping {
-  int bin = 0;
-  piko::SchedulePolicy core = piko::LoadBalance;
-  piko::SchedulePolicy rest = core; ///< of the stages behind Fragment Shader
-  int64_t split = 0;                ///< how many primitives `All` cores share
-  bool apart = true; ///< whether stages behind the Rasterizer ask for a core
-};
 
 struct ShadedVertex {
   ScreenVertex screen;

@@ -16,11 +16,14 @@
 #include <piko/scene.h>
 
 #include "../common/lighting.h"
+#include "../common/mapping.h"
 #include "bvh.h"
 
 using namespace piko::scene;
 
 namespace raytrace {
+
+using raster::Mapping;
 
 struct Ray {
   glm::ivec2 pixel;
@@ -60,67 +63,79 @@ struct State {
   piko::Image<Color> image;
 };
 
-constexpr int bin = 16;
-
-struct Generate : piko::Stage<bin, bin, 64, Pixel, Ray>, piko::Uses<State> {
-  void assignBin(const Pixel &p) { assignToBin(p, binFromPosition(p.at)); }
+template <Mapping M>
+struct Generate : piko::Stage<M.bin, M.bin, 64, Pixel, Ray>, piko::Uses<State> {
+  void assignBin(const Pixel &p) {
+    this->assignToBin(p, this->binFromPosition(p.at));
+  }
+  void schedule(piko::BinId) { this->specifySchedule(M.core, M.split); }
 
   void process(const Pixel &p) {
-    const Camera &c = state().camera;
-    float x = 2 * (float(p.at.x) + 0.5f) / float(domain().x) - 1;
-    float y = 1 - 2 * (float(p.at.y) + 0.5f) / float(domain().y);
-    emit({p.at, c.eye, c.forward + c.right * x + c.up * y, INFINITY,
-          glm::vec3(1), 0});
+    const Camera &c = this->state().camera;
+    float x = 2 * (float(p.at.x) + 0.5f) / float(this->domain().x) - 1;
+    float y = 1 - 2 * (float(p.at.y) + 0.5f) / float(this->domain().y);
+    this->emit({p.at, c.eye, c.forward + c.right * x + c.up * y, INFINITY,
+                glm::vec3(1), 0});
   }
 };
 
-struct Trace : piko::Stage<bin, bin, 64, Ray, Surface, Radiance>,
+template <Mapping M>
+struct Trace : piko::Stage<M.bin, M.bin, 64, Ray, Surface, Radiance>,
                piko::Uses<State> {
-  void assignBin(const Ray &r) { assignToPreviousBins(r); }
+  void assignBin(const Ray &r) { this->assignToPreviousBins(r); }
+  void schedule(piko::BinId) {
+    if constexpr (M.apart)
+      this->specifySchedule(M.core, M.split);
+  }
 
   void process(const Ray &r) {
     if (r.mirrors < 0) {
       if (find<true>(r).triangle < 0)
-        emit(Radiance{r.pixel, r.weight}, 1);
+        this->emit(Radiance{r.pixel, r.weight}, 1);
       return;
     }
     Hit hit = find<false>(r);
     if (hit.triangle >= 0)
-      emit(Surface{r.pixel, r.direction, r.weight, r.mirrors, hit.triangle,
-                   hit.weight},
-           0);
+      this->emit(Surface{r.pixel, r.direction, r.weight, r.mirrors,
+                         hit.triangle, hit.weight},
+                 0);
     else if (r.mirrors > 0)
-      emit(Radiance{r.pixel, r.weight * glm::vec3(Color().rgba)}, 1);
+      this->emit(Radiance{r.pixel, r.weight * glm::vec3(Color().rgba)}, 1);
   }
 
 private:
   template <bool AnyHit> Hit find(const Ray &r) {
-    return findHit<AnyHit>(r.origin, r.direction, r.limit, state().bounds,
-                           state().nodes, state().leaves);
+    return findHit<AnyHit>(r.origin, r.direction, r.limit, this->state().bounds,
+                           this->state().nodes, this->state().leaves);
   }
 };
 
-struct Shade : piko::Stage<bin, bin, 64, Surface, Ray, Radiance>,
+template <Mapping M>
+struct Shade : piko::Stage<M.bin, M.bin, 64, Surface, Ray, Radiance>,
                piko::Uses<State> {
-  void assignBin(const Surface &s) { assignToPreviousBins(s); }
+  void assignBin(const Surface &s) { this->assignToPreviousBins(s); }
+  void schedule(piko::BinId) {
+    if constexpr (M.apart)
+      this->specifySchedule(M.rest, M.split);
+  }
 
   void process(const Surface &s) {
     Point p = pointOf(s);
     glm::vec3 weight = s.weight;
-    if (s.mirrors < state().depth) {
-      float mirror = state().mirror;
+    if (s.mirrors < this->state().depth) {
+      float mirror = this->state().mirror;
       emitRay(s, p, mirrored(s.direction, p), INFINITY, weight * mirror,
               s.mirrors + 1);
       weight *= 1 - mirror;
     }
-    weight *= state().settings.albedo;
-    glm::vec3 sum(state().settings.ambient);
-    for (int64_t i = 0; i < state().lights.size(); ++i) {
-      const Light &light = state().lights[i];
+    weight *= this->state().settings.albedo;
+    glm::vec3 sum(this->state().settings.ambient);
+    for (int64_t i = 0; i < this->state().lights.size(); ++i) {
+      const Light &light = this->state().lights[i];
       glm::vec3 color = raster::irradiance(light, p.position, p.normal);
       if (!glm::any(glm::greaterThan(color, glm::vec3(0))))
         continue; // it is behind the surface
-      if (state().shadows == 0) {
+      if (this->state().shadows == 0) {
         sum += color;
         continue;
       }
@@ -128,7 +143,7 @@ struct Shade : piko::Stage<bin, bin, 64, Surface, Ray, Radiance>,
       glm::vec3 l = glm::vec3(light.position) - light.position.w * p.position;
       emitRay(s, p, l, isPoint ? 1 : INFINITY, weight * color, -1);
     }
-    emit(Radiance{s.pixel, weight * sum}, 1);
+    this->emit(Radiance{s.pixel, weight * sum}, 1);
   }
 
 private:
@@ -139,10 +154,10 @@ private:
   };
 
   Point pointOf(const Surface &s) {
-    const Triangle &t = state().triangles[s.triangle];
-    const Vertex &a = state().vertices[t.vertex.x];
-    const Vertex &b = state().vertices[t.vertex.y];
-    const Vertex &c = state().vertices[t.vertex.z];
+    const Triangle &t = this->state().triangles[s.triangle];
+    const Vertex &a = this->state().vertices[t.vertex.x];
+    const Vertex &b = this->state().vertices[t.vertex.y];
+    const Vertex &c = this->state().vertices[t.vertex.z];
     glm::vec3 w = s.corners;
     return {a.position * w.x + b.position * w.y + c.position * w.z,
             glm::normalize(a.normal * w.x + b.normal * w.y + c.normal * w.z),
@@ -160,13 +175,13 @@ private:
                float limit, glm::vec3 weight, int32_t mirrors) {
     // It starts beside the triangle, farther than rounding (bvh.h) moves that.
     glm::vec3 size = glm::abs(p.facet);
-    glm::vec3 mesh =
-        glm::max(glm::abs(state().bounds.lo), glm::abs(state().bounds.hi));
+    glm::vec3 mesh = glm::max(glm::abs(this->state().bounds.lo),
+                              glm::abs(this->state().bounds.hi));
     float step = 64 * epsilon * greatest(mesh) / greatest(size);
     glm::vec3 start = p.position;
     if (step < INFINITY) // the triangle is not degenerate
       start += p.facet * (glm::dot(direction, p.facet) < 0 ? -step : step);
-    emit(Ray{s.pixel, start, direction, limit, weight, mirrors}, 0);
+    this->emit(Ray{s.pixel, start, direction, limit, weight, mirrors}, 0);
   }
 
   static float greatest(glm::vec3 v) {
@@ -174,11 +189,16 @@ private:
   }
 };
 
-struct Accumulate : piko::Stage<bin, bin, 64, Radiance>, piko::Uses<State> {
-  void assignBin(const Radiance &r) { assignToPreviousBins(r); }
+template <Mapping M>
+struct Accumulate : piko::Stage<M.bin, M.bin, 64, Radiance>, piko::Uses<State> {
+  void assignBin(const Radiance &r) { this->assignToPreviousBins(r); }
+  void schedule(piko::BinId) {
+    if constexpr (M.apart)
+      this->specifySchedule(M.rest, M.split);
+  }
 
   void process(const Radiance &r) {
-    update(state().image, r.pixel, [&](Color &c) {
+    this->update(this->state().image, r.pixel, [&](Color &c) {
       if (c.rgba.a == 0)
         c.rgba = {0, 0, 0, 1};
       c.rgba += glm::vec4(r.color, 0);
@@ -186,13 +206,13 @@ struct Accumulate : piko::Stage<bin, bin, 64, Radiance>, piko::Uses<State> {
   }
 };
 
-struct Raytracer : piko::Pipe<State> {
-  Generate generate;
-  Trace trace;
-  Shade shade;
-  Accumulate accumulate;
+template <Mapping M> struct MappedRaytracer : piko::Pipe<State> {
+  Generate<M> generate;
+  Trace<M> trace;
+  Shade<M> shade;
+  Accumulate<M> accumulate;
 
-  Raytracer() {
+  MappedRaytracer() {
     source(generate);
     connect(generate, 0, trace);
     connect(trace, 0, shade);
@@ -201,5 +221,7 @@ struct Raytracer : piko::Pipe<State> {
     connect(shade, 1, accumulate);
   }
 };
+
+struct Raytracer : MappedRaytracer<{.bin = 16, .apart = false}> {};
 
 } // namespace raytrace

@@ -16,11 +16,14 @@
 
 #include "../common/coverage.h"
 #include "../common/lighting.h"
+#include "../common/mapping.h"
 #include "dicing.h"
 
 using namespace piko::scene;
 
 namespace reyes {
+
+using raster::Mapping;
 
 using raster::PixelBox;
 using raster::Point;
@@ -308,18 +311,19 @@ public:
 };
 
 // Finds the pixels that a micropolygon covers.
-struct Sample : piko::Stage<32, 32, 64, Micropolygon, Fragment>,
+template <Mapping M>
+struct Sample : piko::Stage<M.bin, M.bin, 64, Micropolygon, Fragment>,
                 piko::Uses<State> {
   void assignBin(const Micropolygon &m) {
     PixelBox box = Dice::boxOf(m);
-    assignToBoundingBox(m, box.lo, box.hi);
+    this->assignToBoundingBox(m, box.lo, box.hi);
   }
-  void schedule(piko::BinId) { specifySchedule(piko::LoadBalance); }
+  void schedule(piko::BinId) { this->specifySchedule(M.core, M.split); }
 
   void process(const Micropolygon &m) {
     PixelBox box = Dice::boxOf(m);
-    box.lo = glm::max(box.lo, binLo());
-    box.hi = glm::min(box.hi, binHi() - 1);
+    box.lo = glm::max(box.lo, this->binLo());
+    box.hi = glm::min(box.hi, this->binHi() - 1);
     sample(m, 1, 2, box);
     sample(m, 2, 3, box);
   }
@@ -343,50 +347,57 @@ private:
                        float(v2) * m.depths[third]) *
                       inverse;
         if (depth >= -1) // beyond the near plane
-          emit(Fragment{{x, y}, depth, m.position, m.normal});
+          this->emit(Fragment{{x, y}, depth, m.position, m.normal});
       }
   }
 };
 
 // Sums up the lights at the fragments that are nearer than all before them.
-struct Shade : piko::Stage<32, 32, 64, Fragment>, piko::Uses<State> {
-  void assignBin(const Fragment &f) { assignToPreviousBins(f); }
-  void schedule(piko::BinId) { specifySchedule(piko::DirectMap); }
+template <Mapping M>
+struct Shade : piko::Stage<M.bin, M.bin, 64, Fragment>, piko::Uses<State> {
+  void assignBin(const Fragment &f) { this->assignToPreviousBins(f); }
+  void schedule(piko::BinId) {
+    if constexpr (M.apart)
+      this->specifySchedule(M.rest, M.split);
+  }
 
   void process(const Fragment &f) {
-    bool isNearest = update(state().depth, f.pixel, [&](Depth &nearest) {
-      bool passed = f.depth < nearest.z;
-      if (passed)
-        nearest.z = f.depth;
-      return passed;
-    });
+    bool isNearest =
+        this->update(this->state().depth, f.pixel, [&](Depth &nearest) {
+          bool passed = f.depth < nearest.z;
+          if (passed)
+            nearest.z = f.depth;
+          return passed;
+        });
     if (!isNearest)
       return;
-    glm::vec3 sum(state().settings.ambient);
-    for (int64_t i = 0; i < state().lights.size(); ++i)
-      sum += raster::irradiance(state().lights[i], f.position, f.normal);
-    update(state().color, f.pixel, [&](Color &c) {
-      c.rgba = glm::vec4(state().settings.albedo * sum, 1);
+    glm::vec3 sum(this->state().settings.ambient);
+    for (int64_t i = 0; i < this->state().lights.size(); ++i)
+      sum += raster::irradiance(this->state().lights[i], f.position, f.normal);
+    this->update(this->state().color, f.pixel, [&](Color &c) {
+      c.rgba = glm::vec4(this->state().settings.albedo * sum, 1);
     });
   }
 };
 
-struct Reyes : piko::Pipe<State> {
+template <Mapping M> struct MappedReyes : piko::Pipe<State> {
   Load load;
   Split split;
   Dice dice;
-  Sample sample;
-  Shade shade;
+  Sample<M> sample;
+  Shade<M> shade;
 
-  Reyes() {
+  MappedReyes() {
     source(load);
     connect(load, 0, split);
     connect(split, 0, split);
     connect(split, 1, dice);
     connect(dice, 0, sample);
     connect(sample, 0, shade);
-    allocateForSource(state().undrawn, 0);
+    allocateForSource(this->state().undrawn, 0);
   }
 };
+
+struct Reyes : MappedReyes<{.bin = 32, .rest = piko::DirectMap}> {};
 
 } // namespace reyes

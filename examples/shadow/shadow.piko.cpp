@@ -18,11 +18,14 @@
 
 #include "../common/clip.h"
 #include "../common/lighting.h"
+#include "../common/mapping.h"
 #include "light_view.h"
 
 using namespace piko::scene;
 
 namespace shadow {
+
+using raster::Mapping;
 
 struct ShadedVertex {
   glm::vec4 clip;
@@ -103,12 +106,15 @@ struct Project : piko::Stage<0, 0, 64, Triangle, LightTriangle>,
 };
 
 // Draws the depth of what is next to the light.
-template <int Bin>
-struct ShadowMap : piko::Stage<Bin, Bin, 64, LightTriangle>, piko::Uses<State> {
+template <Mapping M>
+struct ShadowMap : piko::Stage<M.bin, M.bin, 64, LightTriangle>,
+                   piko::Uses<State> {
   void assignBin(const LightTriangle &t) {
     raster::PixelBox box = polygon(t).box();
     this->assignToBoundingBox(t, box.lo, box.hi);
   }
+
+  void schedule(piko::BinId) { this->specifySchedule(M.core, M.split); }
 
   void process(const LightTriangle &t) {
     polygon(t).rasterize(
@@ -127,15 +133,18 @@ private:
 };
 
 // Finds the pixels of a triangle that lie in the bin.
-template <int Bin>
-struct Rasterizer : piko::Stage<Bin, Bin, 64, Triangle, Fragment>,
+template <Mapping M>
+struct Rasterizer : piko::Stage<M.bin, M.bin, 64, Triangle, Fragment>,
                     piko::Uses<State> {
   void assignBin(const Triangle &t) {
     raster::PixelBox box = project(t).box();
     this->assignToBoundingBox(t, box.lo, box.hi);
   }
 
-  void schedule(piko::BinId) { this->template endStage<VertexShader>(); }
+  void schedule(piko::BinId) {
+    this->template endStage<VertexShader>();
+    this->specifySchedule(M.core, M.split);
+  }
 
   void process(const Triangle &t) {
     const ShadedVertex &a = state().vertices[t.vertex.x];
@@ -160,12 +169,16 @@ private:
 };
 
 // Sums up the lights at a fragment; the sun as far as it is seen from there.
-template <int MapBin, int Bin>
-struct FragmentShader : piko::Stage<Bin, Bin, 64, Fragment, ShadedFragment>,
+template <Mapping Map, Mapping M>
+struct FragmentShader : piko::Stage<M.bin, M.bin, 64, Fragment, ShadedFragment>,
                         piko::Uses<State> {
   void assignBin(const Fragment &f) { this->assignToPreviousBins(f); }
 
-  void schedule(piko::BinId) { this->template endStage<ShadowMap<MapBin>>(); }
+  void schedule(piko::BinId) {
+    this->template endStage<ShadowMap<Map>>();
+    if constexpr (M.apart)
+      this->specifySchedule(M.core, M.split);
+  }
 
   void process(const Fragment &f) {
     glm::vec3 n = glm::normalize(f.normal);
@@ -211,10 +224,14 @@ private:
 };
 
 // Lets the nearest fragment's colour stay.
-template <int Bin>
-struct DepthTest : piko::Stage<Bin, Bin, 64, ShadedFragment>,
+template <Mapping M>
+struct DepthTest : piko::Stage<M.bin, M.bin, 64, ShadedFragment>,
                    piko::Uses<State> {
   void assignBin(const ShadedFragment &f) { this->assignToPreviousBins(f); }
+  void schedule(piko::BinId) {
+    if constexpr (M.apart)
+      this->specifySchedule(M.rest, M.split);
+  }
 
   void process(const ShadedFragment &f) {
     bool passed = false;
@@ -229,14 +246,14 @@ struct DepthTest : piko::Stage<Bin, Bin, 64, ShadedFragment>,
   }
 };
 
-template <int MapBin, int Bin> struct Shadow : piko::Pipe<State> {
+template <Mapping Map, Mapping M> struct Shadow : piko::Pipe<State> {
   Fit fit;
   VertexShader vertexShader;
   Project project;
-  ShadowMap<MapBin> shadowMap;
-  Rasterizer<Bin> rasterizer;
-  FragmentShader<MapBin, Bin> fragmentShader;
-  DepthTest<Bin> depthTest;
+  ShadowMap<Map> shadowMap;
+  Rasterizer<M> rasterizer;
+  FragmentShader<Map, M> fragmentShader;
+  DepthTest<M> depthTest;
 
   Shadow() {
     source(fit);
@@ -251,10 +268,10 @@ template <int MapBin, int Bin> struct Shadow : piko::Pipe<State> {
   }
 };
 
-struct WholeScreen : Shadow<0, 0> {};
-struct Bins8 : Shadow<8, 8> {};
-struct Bins16 : Shadow<16, 16> {};
-struct Bins32 : Shadow<32, 32> {};
-struct MapBins32 : Shadow<32, 8> {};
+struct WholeScreen : Shadow<{.bin = 0}, {.bin = 0, .apart = false}> {};
+struct Bins8 : Shadow<{.bin = 8}, {.bin = 8, .apart = false}> {};
+struct Bins16 : Shadow<{.bin = 16}, {.bin = 16, .apart = false}> {};
+struct Bins32 : Shadow<{.bin = 32}, {.bin = 32, .apart = false}> {};
+struct MapBins32 : Shadow<{.bin = 32}, {.bin = 8, .apart = false}> {};
 
 } // namespace shadow

@@ -26,7 +26,7 @@ struct MakeLayers : piko::Stage<0, 0, 64, Random, oit::Layer> {
 
 template <int Bin> struct Layers : piko::Pipe<oit::State> {
   MakeLayers makeLayers;
-  oit::Blend<Bin> blend;
+  oit::Blend<{.bin = Bin, .apart = false}> blend;
   Layers() {
     source(makeLayers);
     connect(makeLayers, 0, blend);

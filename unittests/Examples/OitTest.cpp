@@ -93,7 +93,7 @@ TEST(Oit, ClearSheetsAreNotSeen) {
 
 // Layers as they are, without triangles.
 template <int Bin> struct LayersPipe : piko::Pipe<oit::State> {
-  oit::Blend<Bin> blend;
+  oit::Blend<{.bin = Bin, .apart = false}> blend;
   LayersPipe() { source(blend); }
 };
 
