@@ -3,6 +3,9 @@
 
 #include "ClangDiagnostics.h"
 
+#include "Wrappers.h"
+
+#include "mlir/IR/BuiltinAttributes.h"
 #include "clang/Basic/DiagnosticIDs.h"
 #include "clang/Basic/DiagnosticSema.h"
 #include "llvm/ADT/SmallString.h"
@@ -42,6 +45,20 @@ static llvm::StringRef getReplacement(unsigned id) {
   }
 }
 
+/// How the phase is declared that a wrapper calls at a place; nothing
+/// elsewhere.
+static llvm::StringRef getPhase(const clang::Diagnostic &info) {
+  if (!info.hasSourceManager() || !info.getLocation().isValid())
+    return "";
+  clang::SourceManager &sources = info.getSourceManager();
+  auto [file, offset] = sources.getDecomposedExpansionLoc(info.getLocation());
+  if (sources.getBufferOrFake(file).getBufferIdentifier() != wrappersName)
+    return "";
+  llvm::StringRef line =
+      sources.getBufferData(file).substr(offset).split('\n').first;
+  return line.split(wrapperComment).second;
+}
+
 void ClangDiagnosticForwarder::HandleDiagnostic(
     clang::DiagnosticsEngine::Level level, const clang::Diagnostic &info) {
   DiagnosticConsumer::HandleDiagnostic(level, info);
@@ -57,8 +74,16 @@ void ClangDiagnosticForwarder::HandleDiagnostic(
                             context)
           : mlir::UnknownLoc::get(&context);
   if (level == clang::DiagnosticsEngine::Note) {
-    if (pending)
+    if (pending && !phase.empty()) {
+      // The first note has the user's place.
+      std::string error = pending->str();
+      pending.emplace(location, pending->getSeverity());
+      *pending << "expected " << phase;
+      pending->attachNote(location) << error;
+      phase.clear();
+    } else if (pending) {
       pending->attachNote(location) << text.str();
+    }
     return;
   }
   flush();
@@ -66,4 +91,5 @@ void ClangDiagnosticForwarder::HandleDiagnostic(
                                 ? mlir::DiagnosticSeverity::Warning
                                 : mlir::DiagnosticSeverity::Error);
   *pending << text.str();
+  phase = getPhase(info);
 }

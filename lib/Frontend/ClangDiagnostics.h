@@ -32,6 +32,8 @@ public:
 private:
   mlir::MLIRContext &context;
   std::optional<mlir::Diagnostic> pending;
+  /// If it is about a wrapper's call of a phase: how the phase is declared.
+  std::string phase;
 };
 
 } // namespace piko

@@ -43,7 +43,6 @@ using namespace piko;
 using llvm::failed;
 
 static constexpr llvm::StringLiteral mainName = "<piko>";
-static constexpr llvm::StringLiteral wrappersName = "<piko-wrappers>";
 
 //===----------------------------------------------------------------------===//
 // The invocation

@@ -24,9 +24,10 @@ std::string piko::generateWrappers(const PipelineDescription &pipeline,
                                    llvm::StringRef suffix) {
   std::string text;
   llvm::raw_string_ostream out(text);
-  auto function = [&](WrapperKind kind, unsigned index, llvm::Twine body) {
+  auto function = [&](WrapperKind kind, unsigned index, llvm::Twine body,
+                      llvm::Twine phase = "") {
     out << "extern \"C\" void " << getWrapperName(kind, index) << suffix
-        << "() { " << body << " }\n";
+        << "() { " << body << " }" << wrapperComment << phase << "\n";
   };
   out << "namespace __piko_wrappers" << suffix << " {\n";
   out << "using __piko_pipe = " << typeName << ";\n";
@@ -37,14 +38,21 @@ std::string piko::generateWrappers(const PipelineDescription &pipeline,
         "__piko_pipe pipe; ::piko::marker::phase(); pipe." + stage.name;
     std::string type = "typename decltype(pipe." + stage.name + ")::Input";
     std::string input = "(*::piko::marker::input<" + type + ">());";
-    function(WrapperKind::Process, index,
-             call + ".process" +
-                 (stage.takesList ? "(::piko::List<" + type + ">());" : input));
+    std::string primitive = pipeline.records[stage.input].name;
+    function(
+        WrapperKind::Process, index,
+        call + ".process" +
+            (stage.takesList ? "(::piko::List<" + type + ">());" : input),
+        "process(const " +
+            (stage.takesList ? "piko::List<" + primitive + ">" : primitive) +
+            " &)");
     if (stage.hasAssign)
-      function(WrapperKind::Assign, index, call + ".assignBin" + input);
+      function(WrapperKind::Assign, index, call + ".assignBin" + input,
+               "assignBin(const " + primitive + " &)");
     if (stage.hasSchedule)
       function(WrapperKind::Schedule, index,
-               call + ".schedule(::piko::BinId{::piko::marker::bin()});");
+               call + ".schedule(::piko::BinId{::piko::marker::bin()});",
+               "schedule(piko::BinId)");
   }
   for (auto [index, state] : llvm::enumerate(pipeline.state))
     if (state.hasValue)

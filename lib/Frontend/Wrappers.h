@@ -14,6 +14,11 @@ enum class WrapperKind { Wire, Assign, Schedule, Process, Clear };
 /// The name of a wrapper; `index` is a stage's, or a piece of state's.
 std::string getWrapperName(WrapperKind kind, unsigned index = 0);
 
+/// The name of the file that they make. Where a line calls a phase, a comment
+/// says how the phase is declared.
+constexpr llvm::StringLiteral wrappersName = "<piko-wrappers>";
+constexpr llvm::StringLiteral wrapperComment = " // ";
+
 /// C++ that follows the user's file: one function for the constructor of the
 /// pipeline, one for each phase of each stage, and one for each image's clear
 /// value. `typeName` is how the pipeline's type can be written there, `suffix`
