@@ -282,7 +282,8 @@ LogicalResult PipelineReader::readMember(const clang::FieldDecl *member,
   state.offset = offset + ast.getASTRecordLayout(parent).getFieldOffset(
                               member->getFieldIndex()) /
                               8;
-  llvm::FailureOr<unsigned> record = records.get(element, state.location);
+  llvm::FailureOr<unsigned> record =
+      records.get(element, state.location, state.name);
   if (failed(record))
     return failure();
   state.record = *record;

@@ -24,6 +24,8 @@ struct RecordTable::Path {
   int64_t offset = 0;
   llvm::SmallVector<int64_t, 2> counts, strides;
   mlir::Location location;
+  /// Of a value that is no class: what the user calls it, or nothing.
+  std::optional<llvm::StringRef> value = std::nullopt;
 
   Path member(llvm::StringRef field, int64_t at, mlir::Location where) const {
     Path path = *this;
@@ -50,12 +52,19 @@ LogicalResult RecordTable::reject(const Path &path,
   mlir::InFlightDiagnostic diagnostic = mlir::emitError(path.location)
                                         << "not supported in Piko: " << what
                                         << " in type '" << record.name << "'";
-  if (!path.name.empty())
-    diagnostic << ", member '" << path.name << "'";
+  llvm::StringRef name = path.name;
+  std::string called = name.str();
+  if (path.value) {
+    name.consume_front("value");
+    called = (*path.value + name).str();
+  }
+  if (!called.empty())
+    diagnostic << ", member '" << called << "'";
   return diagnostic;
 }
 
-llvm::FailureOr<unsigned> RecordTable::get(QualType type, mlir::Location user) {
+llvm::FailureOr<unsigned> RecordTable::get(QualType type, mlir::Location user,
+                                           llvm::StringRef member) {
   type = ast.getCanonicalType(type).getUnqualifiedType();
   auto known = numbers.find(type);
   if (known != numbers.end())
@@ -71,8 +80,10 @@ llvm::FailureOr<unsigned> RecordTable::get(QualType type, mlir::Location user) {
   record.size = ast.getTypeSizeInChars(type).getQuantity();
   record.align = ast.getTypeAlignInChars(type).getQuantity();
   Path path{"", 0, {}, {}, user};
-  if (!type->isRecordType())
+  if (!type->isRecordType()) {
     path.name = "value";
+    path.value = member;
+  }
   if (llvm::failed(flatten(type, path, record)))
     return failure();
   numbers[type] = records.size();

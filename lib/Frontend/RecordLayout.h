@@ -18,8 +18,10 @@ public:
               std::vector<RecordDescription> &records)
       : ast(ast), context(context), records(records) {}
 
-  /// The number of a type; reports at `user` what cannot be in a record.
-  llvm::FailureOr<unsigned> get(clang::QualType type, mlir::Location user);
+  /// The number of a type; reports at `user`, a member of that name, what
+  /// cannot be in a record.
+  llvm::FailureOr<unsigned> get(clang::QualType type, mlir::Location user,
+                                llvm::StringRef member = "");
 
   /// How the type is written, without sugar.
   std::string getName(clang::QualType type) const;

@@ -5,9 +5,12 @@
 // RUN: not piko-translate --cpp-to-piko --pipe=Pipe2 %s 2>&1 | FileCheck %s --check-prefix=LONGDOUBLE
 // RUN: not piko-translate --cpp-to-piko --pipe=Pipe3 %s 2>&1 | FileCheck %s --check-prefix=BITFIELD
 // RUN: not piko-translate --cpp-to-piko --pipe=Pipe4 %s 2>&1 | FileCheck %s --check-prefix=TRIVIAL
+// RUN: not piko-translate --cpp-to-piko --pipe=Pipe5 %s 2>&1 | FileCheck %s --check-prefix=STATE
+// RUN: not piko-translate --cpp-to-piko --pipe=Pipe6 %s 2>&1 | FileCheck %s --check-prefix=ARRAY
 #include <piko.h>
 
 struct Inner {
+  // ARRAY: errors-records.cpp:[[#@LINE + 2]]:10: error: not supported in Piko: a pointer or reference in type 'Inner[2]', member 'nodes.next'
   // POINTER: errors-records.cpp:[[#@LINE + 1]]:10: error: not supported in Piko: a pointer or reference in type 'Outer', member 'inner.next'
   float *next;
 };
@@ -34,7 +37,21 @@ template <class T> struct Pipeline : piko::Pipe<> {
   Drain<T> drain;
   Pipeline() { source(drain); }
 };
+struct PointerState {
+  // STATE: errors-records.cpp:[[#@LINE + 1]]:10: error: not supported in Piko: a pointer or reference in type 'float *', member 'table'
+  float *table;
+};
+struct ArrayState {
+  piko::Buffer<float> lights;
+  Inner nodes[2];
+};
+template <class S> struct WithState : piko::Pipe<S> {
+  Drain<int> drain;
+  WithState() { this->source(drain); }
+};
 using Pipe1 = Pipeline<Outer>;
 using Pipe2 = Pipeline<Long>;
 using Pipe3 = Pipeline<Bits>;
 using Pipe4 = Pipeline<Owner>;
+using Pipe5 = WithState<PointerState>;
+using Pipe6 = WithState<ArrayState>;
