@@ -80,9 +80,9 @@ private:
     mlir::FlatSymbolRefAttr record = getRecordName(state.record);
     switch (state.kind) {
     case StateDescription::Constant:
-      if (auto op = ConstantOp::create(builder, state.location, name, record);
-          state.hasValue)
-        op->setAttr("value", buildNumbers(state));
+      ConstantOp::create(builder, state.location, name, record,
+                         state.hasValue ? buildNumbers(state)
+                                        : mlir::ArrayAttr());
       return;
     case StateDescription::Buffer:
       BufferOp::create(builder, state.location, name, record,

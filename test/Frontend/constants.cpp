@@ -22,12 +22,12 @@ struct State : First, Second {
   Light light;
 };
 
-// CHECK: piko.constant @threshold : @float {value = [5.000000e-01 : f32]}
-// CHECK: piko.constant @limit : @int {value = [0 : i32]}
+// CHECK: piko.constant @threshold : @float value [5.000000e-01 : f32]
+// CHECK: piko.constant @limit : @int value [0 : i32]
 // CHECK: piko.buffer @counts : @int
 // CHECK: piko.constant @unset : @double{{$}}
-// CHECK: piko.constant @weights : @"int[3]" {value = [1 : i32, 2 : i32, 0 : i32]}
-// CHECK: piko.constant @light : @Light {value = [1.000000e+00 : f32, 5.000000e-01 : f32, 0.000000e+00 : f32, 0 : i32]}
+// CHECK: piko.constant @weights : @"int[3]" value [1 : i32, 2 : i32, 0 : i32]
+// CHECK: piko.constant @light : @Light value [1.000000e+00 : f32, 5.000000e-01 : f32, 0.000000e+00 : f32, 0 : i32]
 
 // CHECK-LABEL: piko.stage @stage
 struct Stage : piko::Stage<0, 0, 64, int>, piko::Uses<Second> {

@@ -9,7 +9,7 @@ struct State {
   int split = 8;
 };
 
-// CHECK: piko.constant @split : @int {value = [8 : i32]}
+// CHECK: piko.constant @split : @int value [8 : i32]
 
 // A tile split on another kind is accepted, and has no effect.
 // CHECK-LABEL: piko.stage @fixed

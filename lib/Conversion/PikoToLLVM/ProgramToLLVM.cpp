@@ -159,10 +159,10 @@ void SetupWriter::declareState(Operation *state, int32_t number) {
                      : 0),
         i32(numbers.records.lookup(getStateRecord(state).getAttr())),
         i32(getStateRank(state)), i32(perSource),
-        image      ? recordBytes(image.getRecordAttr(), image.getClearAttr())
-        : constant ? recordBytes(constant.getRecordAttr(),
-                                 constant->getAttrOfType<ArrayAttr>("value"))
-                   : null()});
+        image ? recordBytes(image.getRecordAttr(), image.getClearAttr())
+        : constant
+            ? recordBytes(constant.getRecordAttr(), constant.getValueAttr())
+            : null()});
 }
 
 /// pikoir_stage_flags

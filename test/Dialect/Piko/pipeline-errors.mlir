@@ -103,6 +103,22 @@ piko.pipeline @P rank 2 {
 
 // -----
 
+piko.record @F {"x" : f32 at 0} size 4 align 4
+piko.pipeline @P rank 2 {
+  // expected-error@+1 {{expected 1 values, one for each number of record @F, but got 2}}
+  piko.constant @c : @F value [1.0 : f32, 2.0 : f32]
+}
+
+// -----
+
+piko.record @F {"x" : f32 at 0} size 4 align 4
+piko.pipeline @P rank 2 {
+  // expected-error@+1 {{expected value 0 to be of type 'f32', but got "a"}}
+  piko.constant @c : @F value ["a"]
+}
+
+// -----
+
 piko.pipeline @P rank 2 {
   // expected-error@+1 {{expected a stage, but got @a, which is none}}
   piko.source @a

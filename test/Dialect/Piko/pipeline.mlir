@@ -14,6 +14,8 @@ piko.record @Depth {"z" : f32 at 0} size 4 align 4
 piko.pipeline @Graph rank 2 {
   // CHECK-NEXT: piko.constant @camera : @Depth
   piko.constant @camera : @Depth
+  // CHECK-NEXT: piko.constant @far : @Depth value [2.000000e+00 : f32]
+  piko.constant @far : @Depth value [2.0 : f32]
   // CHECK-NEXT: piko.buffer @lights : @"scene::Light"
   piko.buffer @lights : @"scene::Light"
   // CHECK-NEXT: piko.buffer @shaded : @Depth per_source 1

@@ -149,8 +149,7 @@ static LogicalResult verifyNumbers(Operation *op, FlatSymbolRefAttr record,
 
 LogicalResult ConstantOp::verifySymbolUses(SymbolTableCollection &) {
   // What the constant is until the host sets it.
-  return verifyNumbers(*this, getRecordAttr(),
-                       (*this)->getAttrOfType<ArrayAttr>("value"), "value");
+  return verifyNumbers(*this, getRecordAttr(), getValueAttr(), "value");
 }
 
 LogicalResult BufferOp::verifySymbolUses(SymbolTableCollection &) {

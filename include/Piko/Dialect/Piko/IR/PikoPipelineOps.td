@@ -85,15 +85,22 @@ class Piko_StateOp<string mnemonic, list<Trait> traits = []>
 def Piko_ConstantOp : Piko_StateOp<"constant"> {
   let summary = "a value that the host sets before a run";
   let description = [{
+    Until the host sets it, it is `value`, one number for each number of the
+    record. Without one the host must set it.
+
     ```mlir
     piko.record @Camera {"eye.x" : f32 at 0} size 4 align 4
     piko.pipeline @P rank 2 {
       piko.constant @camera : @Camera
+      piko.constant @other : @Camera value [1.0 : f32]
     }
     ```
   }];
-  let arguments = (ins SymbolNameAttr:$sym_name, FlatSymbolRefAttr:$record);
-  let assemblyFormat = "$sym_name `:` $record attr-dict";
+  let arguments = (ins SymbolNameAttr:$sym_name, FlatSymbolRefAttr:$record,
+                       OptionalAttr<ArrayAttr>:$value);
+  let assemblyFormat = [{
+    $sym_name `:` $record (`value` $value^)? attr-dict
+  }];
 }
 
 def Piko_BufferOp : Piko_StateOp<"buffer"> {
