@@ -326,6 +326,8 @@ static bool cleanUpFunction(llvm::Function &function, ParsedUnit &unit,
       return false;
     bool changed = splitMemory(function, memory);
     changed |= flattenPointers(function, memory);
+    if (!expandLocalAtomics(function, unit, memory, context, changed))
+      return false;
     if (inlineKnownCalls(function)) {
       prepareFunction(function, unit, memory, context);
       changed = true;

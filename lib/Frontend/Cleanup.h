@@ -9,6 +9,7 @@
 //      labelLoops      what belongs to the iterations of a parallelFor
 //   4. rounds of       splitMemory     copies and variables, number by number
 //                      flattenPointers phis and selects of pointers
+//                      expandLocalAtomics
 //                      promoteVariables, early-cse, simplifycfg
 //   5. shareArrays, SROA
 //   6. resolveAccesses loads and stores outside of local memory become calls
@@ -51,6 +52,8 @@ constexpr llvm::StringLiteral load = "piko.load.";
 constexpr llvm::StringLiteral store = "piko.store.";
 constexpr llvm::StringLiteral atomic = "piko.atomic.";
 constexpr llvm::StringLiteral atomicFetch = "piko.atomic_fetch.";
+/// What follows shows the order of primitives: whether an atomic's result does.
+constexpr llvm::StringLiteral showsOrder = "piko.shows_order";
 constexpr llvm::StringLiteral share = "piko.share";
 } // namespace accessor
 
@@ -59,6 +62,11 @@ void expandMarkers(llvm::Function &function, MemoryMap &memory);
 /// Both return whether they changed anything.
 bool splitMemory(llvm::Function &function, MemoryMap &memory);
 bool flattenPointers(llvm::Function &function, MemoryMap &memory);
+
+/// Atomics on local variables become loads and stores; false after an error.
+bool expandLocalAtomics(llvm::Function &function, const ParsedUnit &unit,
+                        MemoryMap &memory, mlir::MLIRContext &context,
+                        bool &changed);
 
 /// Constant tables that are indexed become local arrays.
 bool localizeTables(llvm::Function &function, MemoryMap &memory);

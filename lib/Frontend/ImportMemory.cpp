@@ -198,6 +198,9 @@ LogicalResult PhaseImporter::importAccessor(llvm::CallInst *call,
   }
   if (name == accessor::share)
     return success();
+  if (name == accessor::showsOrder)
+    return expectUnordered(
+        call, !cast<llvm::ConstantInt>(call->getArgOperand(0))->isZero());
   if (name.starts_with(accessor::load))
     return importLoad(call);
   if (phase != WrapperKind::Process)
@@ -256,6 +259,17 @@ static AtomicKind getAtomicKind(llvm::CallInst *call) {
   }
 }
 
+LogicalResult PhaseImporter::expectUnordered(llvm::CallInst *call,
+                                             bool isFetch) {
+  if (stage.schedule.unordered)
+    return success();
+  return fail(call) << "expected "
+                    << (isFetch ? "an atomic that returns the old value"
+                                : "an atomic on a float")
+                    << " in a stage that is Unordered, but stage '"
+                    << stage.name << "' is not";
+}
+
 LogicalResult PhaseImporter::importAtomic(llvm::CallInst *call) {
   Place place;
   if (failed(getPlace(call, 5, place)))
@@ -264,12 +278,9 @@ LogicalResult PhaseImporter::importAtomic(llvm::CallInst *call) {
   mlir::Type old;
   if (!call->getType()->isVoidTy())
     old = scalars.getType(call->getType());
-  if ((old || kind == AtomicKind::AddF) && !stage.schedule.unordered)
-    return fail(call) << "expected "
-                      << (old ? "an atomic that returns the old value"
-                              : "an atomic on a float")
-                      << " in a stage that is Unordered, but stage '"
-                      << stage.name << "' is not";
+  if ((old || kind == AtomicKind::AddF) &&
+      failed(expectUnordered(call, /*isFetch=*/bool(old))))
+    return failure();
   auto op =
       make<AtomicOp>(old, kind, place.state->name, place.indices, place.field,
                      place.elements, scalars.get(call->getArgOperand(4)));

@@ -81,6 +81,8 @@ private:
                                      llvm::StringRef name);
   llvm::LogicalResult importLoad(llvm::CallInst *call);
   llvm::LogicalResult importStore(llvm::CallInst *call);
+  /// For an atomic that shows the order of primitives.
+  llvm::LogicalResult expectUnordered(llvm::CallInst *call, bool isFetch);
   llvm::LogicalResult importAtomic(llvm::CallInst *call);
   llvm::LogicalResult importUpdateBegin(llvm::CallInst *call);
   llvm::LogicalResult importEmit(llvm::CallInst *call);

@@ -170,11 +170,8 @@ private:
         makeAccess(call, call->getArgOperand(0), value->getType(),
                    isFetch ? accessor::atomicFetch : accessor::atomic,
                    /*writes=*/true, operands, isLocal, leafType);
-    if (!access) {
-      if (isLocal)
-        fail(call, "an atomic on a local variable");
+    if (!access)
       return false;
-    }
     if (isFetch)
       call->replaceAllUsesWith(access);
     call->eraseFromParent();

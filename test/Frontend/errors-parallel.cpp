@@ -12,6 +12,7 @@
 // RUN: not piko-translate --cpp-to-piko -DCASE=9 %s 2>&1 | FileCheck %s --check-prefix=COMBINE
 // RUN: not piko-translate --cpp-to-piko -DCASE=10 %s 2>&1 | FileCheck %s --check-prefix=LEAVES
 // RUN: not piko-translate --cpp-to-piko -DCASE=11 %s 2>&1 | FileCheck %s --check-prefix=ENDLESS
+// RUN: not piko-translate --cpp-to-piko -DCASE=12 %s 2>&1 | FileCheck %s --check-prefix=ATOMIC
 #include <piko.h>
 
 struct A {
@@ -33,8 +34,9 @@ struct Stage : piko::Stage<0, 0, 64, A>, piko::Uses<State> {
   }
   void process(const A &a) {
     float sum = 0;
+    int counts[4] = {};
     glm::vec3 vector(0);
-    // NESTED: errors-parallel.cpp:[[#@LINE + 18]]:33: error: expected sync inside a parallelFor that is not nested
+    // NESTED: errors-parallel.cpp:[[#@LINE + 21]]:33: error: expected sync inside a parallelFor that is not nested
     // NESTED: errors-parallel.cpp:[[#@LINE + 1]]:5: note: the outer parallelFor is here
     parallelFor(a.n, [&](int i) {
       float own = 0;
@@ -51,6 +53,9 @@ struct Stage : piko::Stage<0, 0, 64, A>, piko::Uses<State> {
 #elif CASE == 4
       // INNER: errors-parallel.cpp:[[#@LINE + 1]]:39: error: expected the iterations of parallelFor to be independent, but this one assigns the captured variable 'own'
       parallelFor(3, [&](int j) { own = float(j); });
+#elif CASE == 12
+      // ATOMIC: errors-parallel.cpp:[[#@LINE + 1]]:7: error: expected the iterations of parallelFor to be independent, but this one changes the captured variable 'counts' atomically
+      piko::atomicAdd(counts[i % 4], 1);
 #elif CASE == 5
       parallelFor(3, [&](int) { sync(); });
 #elif CASE == 8
@@ -69,7 +74,7 @@ struct Stage : piko::Stage<0, 0, 64, A>, piko::Uses<State> {
         return b + c;
       });
 #elif CASE == 11
-      // ENDLESS: errors-parallel.cpp:[[#@LINE - 33]]:5: error: not supported in Piko: a parallelFor whose iterations never end
+      // ENDLESS: errors-parallel.cpp:[[#@LINE - 36]]:5: error: not supported in Piko: a parallelFor whose iterations never end
       while (true)
         ;
 #endif

@@ -10,6 +10,7 @@
 // RUN: not piko-translate --cpp-to-piko -DCASE=8 %s 2>&1 | FileCheck %s --check-prefix=STORE
 // RUN: not piko-translate --cpp-to-piko -DCASE=9 %s 2>&1 | FileCheck %s --check-prefix=FETCH
 // RUN: not piko-translate --cpp-to-piko -DCASE=10 %s 2>&1 | FileCheck %s --check-prefix=FLOAT
+// RUN: not piko-translate --cpp-to-piko -DCASE=11 %s 2>&1 | FileCheck %s --check-prefix=LOCAL
 #include <piko.h>
 
 struct State {
@@ -52,6 +53,10 @@ struct One : piko::Stage<8, 8, 64, int, int>, piko::Uses<State> {
 #elif CASE == 10
     // FLOAT: errors-schedule.cpp:[[#@LINE + 1]]:5: error: expected an atomic on a float in a stage that is Unordered, but stage 'one' is not
     piko::atomicAdd(state().floats[0], 2.0f);
+#elif CASE == 11
+    // LOCAL: errors-schedule.cpp:[[#@LINE + 2]]:5: error: expected an atomic that returns the old value in a stage that is Unordered, but stage 'one' is not
+    int local[2] = {i, 1};
+    piko::atomicAddFetch(local[i & 1], i);
 #endif
     emit(i);
   }
