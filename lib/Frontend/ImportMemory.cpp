@@ -226,7 +226,8 @@ LogicalResult PhaseImporter::importLoad(llvm::CallInst *call) {
                          "constants alone, but stage '"
                       << stage.name << "' reads '" << place.state->name << "'";
   values[call] = make<LoadOp>(type, place.state->name, place.indices,
-                              place.field, place.elements);
+                              place.field, place.elements, /*checked=*/false,
+                              /*of=*/nullptr);
   return success();
 }
 
@@ -235,7 +236,8 @@ LogicalResult PhaseImporter::importStore(llvm::CallInst *call) {
   if (failed(getPlace(call, 3, place)))
     return failure();
   make<StoreOp>(scalars.get(call->getArgOperand(2)), place.state->name,
-                place.indices, place.field, place.elements);
+                place.indices, place.field, place.elements, /*checked=*/false,
+                /*of=*/nullptr);
   return success();
 }
 
@@ -283,7 +285,8 @@ LogicalResult PhaseImporter::importAtomic(llvm::CallInst *call) {
     return failure();
   auto op =
       make<AtomicOp>(old, kind, place.state->name, place.indices, place.field,
-                     place.elements, scalars.get(call->getArgOperand(4)));
+                     place.elements, scalars.get(call->getArgOperand(4)),
+                     /*checked=*/false, /*of=*/nullptr);
   if (old)
     values[call] = op.getOld();
   return success();

@@ -143,3 +143,21 @@ void BinArithmetic::forEachBinIn(
   }
   body(builder, bin);
 }
+
+Value piko::findBin(OpBuilder &builder, Operation *op) {
+  for (auto loop = op->getParentOfType<scf::ForOp>(); loop;
+       loop = loop->getParentOfType<scf::ForOp>()) {
+    auto cells = loop.getLowerBound().getDefiningOp<UnitCellsOp>();
+    if (!cells)
+      continue;
+    auto bins = cells.getBins().getDefiningOp<OpenBinsOp>();
+    if (!bins || bins.getSource())
+      return {};
+    auto stage = lookupInPipeline<StageOp>(op, bins.getStageAttr());
+    Value cell = loop.getInductionVar();
+    if (stage.getTakesList())
+      return CallBinOp::create(builder, op->getLoc(), bins, cell);
+    return CellBinOp::create(builder, op->getLoc(), bins, cell);
+  }
+  return {};
+}

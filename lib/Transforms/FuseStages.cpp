@@ -254,7 +254,10 @@ void Fusion::copyBody(OpBuilder &builder, Region &phase, EmitOp emit,
   IRMapping mapping;
   mapping.map(phase.getArgument(0), prim);
   for (Operation &op : phase.front().without_terminator())
-    builder.clone(op, mapping)->walk(visit);
+    builder.clone(op, mapping)->walk([&](Operation *copy) {
+      noteOrigin(copy, consumer, isa<AssignOp>(phase.getParentOp()));
+      visit(copy);
+    });
   replaceFields(prim, emit);
   prim.erase();
 }

@@ -4,6 +4,7 @@
 
 #include "Collectives.h"
 
+#include "Piko/Transforms/BinArithmetic.h"
 #include "mlir/Dialect/Arith/IR/Arith.h"
 #include "mlir/IR/IRMapping.h"
 #include "mlir/Transforms/LoopInvariantCodeMotionUtils.h"
@@ -370,7 +371,7 @@ Value LoopSplitter::compare(Value value) {
   scf::YieldOp::create(builder, loc, agree);
   builder.setInsertionPoint(ifOp.thenBlock()->getTerminator());
   FailBarrierOp::create(builder, loc, stage.getSymName(),
-                        piece.getInductionVar());
+                        piece.getInductionVar(), findBin(builder, piece));
   return piece.getResult(0);
 }
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #include "PhaseGraph.h"
 
+#include "llvm/ADT/TypeSwitch.h"
+
 using namespace mlir;
 using namespace piko;
 
@@ -39,4 +41,20 @@ int64_t piko::getElementIndex(RecordOp record, StringRef name) {
     place += field.getElementCount();
   }
   llvm_unreachable("the verifier knows the field");
+}
+
+void piko::noteOrigin(Operation *op, StageOp stage, bool inAssign) {
+  StringAttr name = stage.getSymNameAttr();
+  llvm::TypeSwitch<Operation *>(op)
+      .Case<LoadOp>([&](LoadOp load) {
+        // Reading a constant does not fail.
+        if (load.getOf() || load.getIndices().empty())
+          return;
+        load.setOfAttr(name);
+        load.setAssign(inAssign);
+      })
+      .Case<StoreOp, AtomicOp, UpdateOp>([&](auto access) {
+        if (!access.getOf())
+          access.setOfAttr(name);
+      });
 }

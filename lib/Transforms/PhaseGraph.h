@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// The graph of a pipeline at the authored level, asked from a stage.
+// The graph of a pipeline at the authored level, asked from a stage, and what
+// passes that move phases along its edges share.
 
 #ifndef PIKO_LIB_TRANSFORMS_PHASEGRAPH_H
 #define PIKO_LIB_TRANSFORMS_PHASEGRAPH_H
@@ -18,6 +19,10 @@ llvm::SmallVector<EmitOp> getEmits(StageOp stage, int64_t port);
 
 /// The place of a field's first number among those of its record.
 int64_t getElementIndex(RecordOp record, llvm::StringRef field);
+
+/// Notes at an access to state whose phase it is from, before the phase becomes
+/// a part of another stage's: an error names its stage.
+void noteOrigin(mlir::Operation *op, StageOp stage, bool inAssign);
 
 } // namespace piko
 

@@ -8,6 +8,7 @@
 //      assign phase;
 //   4. turn assignments into placements, and queries into arithmetic.
 
+#include "PhaseGraph.h"
 #include "Resolve.h"
 
 #include "Piko/Transforms/BinArithmetic.h"
@@ -212,6 +213,7 @@ void KernelResolver::resolveAssign(OpBuilder &builder, AssignOp assign,
   SmallVector<Operation *> assignments;
   for (Operation *copy : copies)
     copy->walk([&](Operation *op) {
+      noteOrigin(op, consumer, /*inAssign=*/true);
       if (auto found = dyn_cast<OwnerOp>(op))
         owner = found;
       else if (isa<AssignToOp, AssignAllOp, AssignPreviousOp, AssignBoxOp>(op))

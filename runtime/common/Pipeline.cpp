@@ -241,7 +241,7 @@ void pikort_pipeline::report(const KernelError &found) noexcept {
     checker->noteError();
   }
   auto key = [](const KernelError &e) {
-    return std::tie(e.unit, e.code, e.stage, e.a, e.b);
+    return std::tie(e.unit, e.code, e.stage, e.name, e.bin, e.a, e.b);
   };
   // In one unit the first report is the first error.
   bool earlier = found.depth != error.depth ? found.depth < error.depth
@@ -274,7 +274,10 @@ static const char *describe(BadCall call) {
 static std::string describe(const std::string &stage, const KernelError &e,
                             const std::string &memoryLimit) {
   std::string a = std::to_string(e.a), b = std::to_string(e.b);
-  std::string text = "stage " + quoted(stage) + ": ";
+  std::string text = "stage " + quoted(stage);
+  if (e.bin >= 0)
+    text += ", bin " + std::to_string(e.bin);
+  text += ": ";
   switch (e.code) {
   case PIKORT_BIN_OUTSIDE:
     text += "expected a bin id";
@@ -292,8 +295,7 @@ static std::string describe(const std::string &stage, const KernelError &e,
     return text + "expected a loop that ends, but it still runs after " + a +
            " iterations";
   case PIKORT_NOT_A_NUMBER:
-    text += "expected a number, but got NaN";
-    return e.a >= 0 ? text + " in bin " + a : text;
+    return text + "expected a bounding box of numbers, but got NaN";
   case PIKORT_NOT_UNIFORM:
     return text +
            "expected every iteration of parallelFor to call sync() as often "
@@ -317,9 +319,10 @@ int32_t pikort_pipeline::settle() noexcept {
     hasError = false;
     try {
       Stage *stage = findStage(error.stage);
-      std::string text =
-          describe(stage ? stage->name : std::to_string(error.stage), error,
-                   memoryLimitText(*this));
+      std::string text = describe(!error.name.empty() ? std::string(error.name)
+                                  : stage ? stage->name
+                                          : std::to_string(error.stage),
+                                  error, memoryLimitText(*this));
       fail(error.code, checker ? checker->describe(error.code, text) : text);
     } catch (...) {
       fail(error.code, {});

@@ -18,6 +18,7 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace piko::rt {
@@ -194,6 +195,8 @@ struct KernelError {
   int64_t a, b;
   /// Of the stage that ran: all of one comes before all behind a local edge.
   int32_t depth = 0;
+  int64_t bin = -1;           ///< Of the call of Process; -1 = none.
+  std::string_view name = {}; ///< Of the stage, if it is part of another.
 };
 
 } // namespace piko::rt

@@ -216,11 +216,11 @@ int32_t pikoir_end_source(pikort_pipeline *p, int32_t source) {
   return kernel ? end(*p, *kernel) : p->status.load();
 }
 
-void pikoir_fail(pikort_pipeline *p, int32_t stage, int32_t code, int64_t a,
-                 int64_t b) {
+void pikoir_fail(pikort_pipeline *p, int32_t stage, const char *name,
+                 int64_t bin, int32_t code, int64_t a, int64_t b) {
   const Stage *found = p->findStage(stage);
   p->report({INT64_MAX, code == PIKORT_OK ? PIKORT_BAD_PROGRAM : code, stage, a,
-             b, found ? found->depth : 0});
+             b, found ? found->depth : 0, bin, name ? name : ""});
 }
 
 const void *pikoir_get_source(pikort_pipeline *p, int32_t source,

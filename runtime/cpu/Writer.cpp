@@ -170,9 +170,10 @@ static void insertCell(pikoir_port &out, uint32_t cell) {
     return badCall(*lane, BadCall::PlaceFirst);
   const Stage &to = lane->pipeline->stages[lane->logs[port].consumer];
   int64_t bin = cell / to.tiles - (cell % to.tiles < 0);
-  lane->pipeline->report({lane->unit, PIKORT_BIN_OUTSIDE,
-                          lane->logs[port].consumer, bin, to.cells / to.tiles,
-                          depthOf(*lane)});
+  lane->pipeline->report(
+      {lane->unit,
+       bin == PIKOIR_NAN_BOX ? PIKORT_NOT_A_NUMBER : PIKORT_BIN_OUTSIDE,
+       lane->logs[port].consumer, bin, to.cells / to.tiles, depthOf(*lane)});
 }
 
 void pikoir_place(pikoir_writer *writer, int32_t port, int64_t cell) {

@@ -80,7 +80,7 @@ const Item &itemAt(const pikoir_input *in, int64_t position) {
 
 void fail(pikort_pipeline *p, int32_t stage) {
   if (failing & 1 << stage)
-    pikoir_fail(p, stage, PIKORT_ENDLESS, stage, 0);
+    pikoir_fail(p, stage, nullptr, -1, PIKORT_ENDLESS, stage, 0);
 }
 
 void runBin(pikort_pipeline *p, pikoir_writer *const (&writers)[3],

@@ -97,7 +97,7 @@ template <bool Mended> struct IterationsPipe : piko::Pipe<State> {
 struct Iterations : IterationsPipe<false> {};
 struct IterationsMended : IterationsPipe<true> {};
 
-// OUTSIDE: got: stage 'draw': expected an update inside the stage's own bin, but got pixel (63, 40)
+// OUTSIDE: got: stage 'draw', bin 0: expected an update inside the stage's own bin, but got pixel (63, 40)
 // OUTSIDE-NEXT: at {{.*}}check.cpp:[[#@LINE+6]]
 // OUTSIDE-NEXT: lineage: source 0 primitive 0
 template <bool Mended>
@@ -114,7 +114,7 @@ template <bool Mended> struct OutsidePipe : piko::Pipe<State> {
 struct Outside : OutsidePipe<false> {};
 struct OutsideMended : OutsidePipe<true> {};
 
-// INDEX: got: stage 'far': expected an index in [0, 64), but got 64
+// INDEX: got: stage 'far', bin 0: expected an index in [0, 64), but got 64
 // INDEX-NEXT: at {{.*}}check.cpp:[[#@LINE+5]]
 // INDEX-NEXT: lineage: source 0 primitive 0
 template <bool Mended>

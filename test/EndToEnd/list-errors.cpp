@@ -11,7 +11,7 @@ struct State {
 };
 
 // READ: expected: {{.*}}stage 'ReadOutside'{{.*}}: expected an index in [0, 1000), but got 1000
-// READ: got: stage 'stage': expected an index in [0, 1000), but got 1000
+// READ: got: stage 'stage', bin 0: expected an index in [0, 1000), but got 1000
 struct ReadOutside : piko::Stage<0, 0, 64, Point>, piko::Uses<State> {
   void process(const piko::List<Point> &list) {
     state().out[0] = list[list.size()].tag;
@@ -23,7 +23,7 @@ struct Read : piko::Pipe<State> {
 };
 
 // PART: expected: {{.*}}stage 'PartWays'{{.*}}: expected every iteration of parallelFor to call sync() as often as iteration 0, but iteration 3 does not
-// PART: got: stage 'stage': expected every iteration of parallelFor to call sync() as often as iteration 0, but iteration 3 does not
+// PART: got: stage 'stage', bin 0: expected every iteration of parallelFor to call sync() as often as iteration 0, but iteration 3 does not
 struct PartWays : piko::Stage<0, 0, 64, Point>, piko::Uses<State> {
   void process(const piko::List<Point> &) {
     parallelFor(8, [&](int i) {
@@ -41,7 +41,7 @@ struct Part : piko::Pipe<State> {
 
 // Iteration 0 would go on for ever.
 // COUNT: expected: {{.*}}stage 'CountApart'{{.*}}: expected every iteration of parallelFor to call sync() as often as iteration 0, but iteration 1 does not
-// COUNT: got: stage 'stage': expected every iteration of parallelFor to call sync() as often as iteration 0, but iteration 1 does not
+// COUNT: got: stage 'stage', bin 0: expected every iteration of parallelFor to call sync() as often as iteration 0, but iteration 1 does not
 struct CountApart : piko::Stage<0, 0, 64, Point>, piko::Uses<State> {
   void process(const piko::List<Point> &) {
     parallelFor(8, [&](int i) {

@@ -28,7 +28,7 @@ piko.pipeline @Chain rank 1 {
   // CHECK:          scf.if %[[SOME]] {
   // CHECK:            %[[I:.*]] = arith.index_cast %[[X]]
   // CHECK:            memref.load %{{.*}}[%[[I]]] : memref<3xf32>
-  // CHECK:            piko.update @count[%[[X]] : i32]
+  // CHECK:            piko.update of "b" @count[%[[X]] : i32]
   // CHECK:            piko.emit 1(%[[W]])
   // CHECK:          }
   // CHECK-NEXT:     }

@@ -15,9 +15,9 @@ def ConvertPikoToSCF : Pass<"convert-piko-to-scf", "::piko::PipelineOp"> {
     **Does**: turns `piko.update` into an `scf.if` around the loads of the pixel,
     the update's body and the stores; and puts `piko.load`, `piko.store` and
     `piko.atomic` behind a test of their indices. Where a test fails,
-    `piko.fail` reports it, nothing is written, and a read gives 0. Reads of a
-    list become reads of positions, behind a test unless the index is that of a
-    loop over the list.
+    `piko.fail` reports it, with the bin of the call, nothing is written, and a
+    read gives 0. Reads of a list become reads of positions, behind a test
+    unless the index is that of a loop over the list.
 
     **Guarantees** that no kernel touches memory outside a buffer, an image, or,
     in an update, the bin.
@@ -33,7 +33,8 @@ def ConvertPikoToSCF : Pass<"convert-piko-to-scf", "::piko::PipelineOp"> {
     scf.if %inside {
       piko.store %v, checked @verts[%i : index] "x" : f32
     } else {
-      piko.fail @stage outside @verts(%i)
+      %bin = piko.cell_bin %bins[%cell] : !piko.bins<@F>
+      piko.fail @stage in %bin outside @verts(%i)
     }
     ```
 

@@ -45,6 +45,10 @@ private:
   StageOp stage;
 };
 
+/// The bin of the call of Process that an operation of the resolved level is
+/// in, or null.
+mlir::Value findBin(mlir::OpBuilder &builder, mlir::Operation *op);
+
 } // namespace piko
 
 #endif // PIKO_TRANSFORMS_BINARITHMETIC_H

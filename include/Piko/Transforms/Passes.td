@@ -142,7 +142,8 @@ def FuseStages : Pass<"piko-fuse-stages", "::piko::PipelineOp"> {
     consumer keeps it apart, because it asks for any core.
 
     **Guarantees** that updates of a pixel and emissions keep their lineage
-    order. The stage notes in `fused` whose phases it holds.
+    order. The stage notes in `fused` whose phases it holds, and each access to
+    state whose phase it is from.
 
     Before:
     ```

@@ -11,20 +11,10 @@ using namespace piko;
 
 namespace {
 
-/// Constant texts of a module, each once.
-class TextTable {
-public:
-  Value get(OpBuilder &builder, Operation *op, StringRef text);
-
-private:
-  llvm::StringMap<LLVM::GlobalOp> globals;
-};
-
 template <typename OpT> struct CheckLowering : OpConversionPattern<OpT> {
   CheckLowering(const TypeConverter &converter, MLIRContext *mlir,
-                LoweringContext &context, std::shared_ptr<TextTable> texts)
-      : OpConversionPattern<OpT>(converter, mlir), context(context),
-        texts(std::move(texts)) {}
+                LoweringContext &context)
+      : OpConversionPattern<OpT>(converter, mlir), context(context) {}
 
   /// Calls a function of the runtime with its pipeline and the arguments.
   LLVM::CallOp call(OpBuilder &builder, OpT op, StringRef function,
@@ -43,15 +33,14 @@ template <typename OpT> struct CheckLowering : OpConversionPattern<OpT> {
   /// "file:line", or null where the place is not known.
   Value place(OpBuilder &builder, OpT op) const {
     if (auto at = op.getLoc()->template findInstanceOf<FileLineColLoc>())
-      return texts->get(
-          builder, op,
+      return context.text(
+          builder, op.getLoc(),
           (at.getFilename().getValue() + ":" + Twine(at.getLine())).str());
     return LLVM::ZeroOp::create(
         builder, op.getLoc(), LLVM::LLVMPointerType::get(builder.getContext()));
   }
 
   LoweringContext &context;
-  std::shared_ptr<TextTable> texts;
 };
 
 } // namespace
@@ -60,22 +49,6 @@ template <typename OpT> struct CheckLowering : OpConversionPattern<OpT> {
 static constexpr int64_t noLineage = INT64_MIN;
 // PIKOIR_CHECK_UPDATES
 static constexpr int64_t updatesFlag = 4;
-
-Value TextTable::get(OpBuilder &builder, Operation *op, StringRef text) {
-  LLVM::GlobalOp &global = globals[text];
-  if (!global) {
-    auto module = op->getParentOfType<ModuleOp>();
-    OpBuilder atStart(module.getBodyRegion());
-    std::string bytes = (text + StringRef("\0", 1)).str();
-    global = LLVM::GlobalOp::create(
-        atStart, module.getLoc(),
-        LLVM::LLVMArrayType::get(builder.getI8Type(), bytes.size()),
-        /*isConstant=*/true, LLVM::Linkage::Internal,
-        "piko.text." + std::to_string(globals.size()),
-        builder.getStringAttr(bytes));
-  }
-  return LLVM::AddressOfOp::create(builder, op->getLoc(), global);
-}
 
 namespace {
 
@@ -173,7 +146,8 @@ struct CheckValueLowering : CheckLowering<CheckValueOp> {
         rewriter, op.getLoc(), rewriter.getI32Type(), adaptor.getFlag());
     call(rewriter, op, "pikoir_check_value",
          {flag, i32(rewriter, op, int64_t(op.getKind())),
-          i32(rewriter, op, record), texts->get(rewriter, op, op.getField()),
+          i32(rewriter, op, record),
+          context.text(rewriter, op.getLoc(), op.getField()),
           place(rewriter, op)});
     rewriter.eraseOp(op);
     return success();
@@ -185,9 +159,7 @@ struct CheckValueLowering : CheckLowering<CheckValueOp> {
 void piko::populateChecksToLLVMPatterns(const TypeConverter &converter,
                                         RewritePatternSet &patterns,
                                         LoweringContext &context) {
-  auto texts = std::make_shared<TextTable>();
   patterns.add<CheckCallLowering, CheckAssignLowering, CheckEmitLowering,
                CheckPlaceLowering, CheckAccessLowering, CheckLoopLowering,
-               CheckValueLowering>(converter, patterns.getContext(), context,
-                                   texts);
+               CheckValueLowering>(converter, patterns.getContext(), context);
 }

@@ -150,6 +150,21 @@ StringRef LoweringContext::zeros(int64_t bytes) {
   return name;
 }
 
+Value LoweringContext::text(OpBuilder &builder, Location loc, StringRef text) {
+  LLVM::GlobalOp &global = texts[text];
+  if (!global) {
+    OpBuilder atStart(module.getBodyRegion());
+    std::string bytes = (text + StringRef("\0", 1)).str();
+    global = LLVM::GlobalOp::create(
+        atStart, module.getLoc(),
+        LLVM::LLVMArrayType::get(builder.getI8Type(), bytes.size()),
+        /*isConstant=*/true, LLVM::Linkage::Internal,
+        "piko.text." + std::to_string(texts.size()),
+        builder.getStringAttr(bytes));
+  }
+  return LLVM::AddressOfOp::create(builder, loc, global);
+}
+
 Value piko::createI32(OpBuilder &builder, Location loc, int64_t v) {
   return arith::ConstantOp::create(builder, loc,
                                    builder.getI32IntegerAttr(int32_t(v)));

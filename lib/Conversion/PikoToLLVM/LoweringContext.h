@@ -62,8 +62,13 @@ public:
   /// The name of a constant of at least so many zero bytes.
   mlir::StringRef zeros(int64_t bytes);
 
+  /// The address of a constant text.
+  mlir::Value text(mlir::OpBuilder &builder, mlir::Location loc,
+                   mlir::StringRef text);
+
 private:
   mlir::ModuleOp module;
+  llvm::StringMap<mlir::LLVM::GlobalOp> texts;
   llvm::DenseMap<mlir::Operation *, const PipelineNumbers *> functions;
   /// By function and name.
   llvm::DenseMap<mlir::Operation *, llvm::StringMap<StateView>> views;

@@ -128,6 +128,15 @@ struct ExtentLowering : OpConversionPattern<ExtentOp> {
 // pikort_status
 constexpr int64_t updateOutside = 17, indexOutside = 18, notUniform = 21;
 
+/// What pikoir_fail takes where no other stage is named, and no bin.
+static Value createNull(OpBuilder &builder, Location loc) {
+  return LLVM::ZeroOp::create(builder, loc,
+                              LLVM::LLVMPointerType::get(builder.getContext()));
+}
+static Value createBin(OpBuilder &builder, Location loc, Value bin) {
+  return bin ? toI64(builder, loc, bin) : createI64(builder, loc, -1);
+}
+
 struct FailLowering : OpConversionPattern<FailOp> {
   FailLowering(const TypeConverter &converter, MLIRContext *mlir,
                LoweringContext &context)
@@ -142,7 +151,7 @@ struct FailLowering : OpConversionPattern<FailOp> {
     Value first = indices.front();
     Value second =
         indices.size() > 1 ? indices[1] : createI64(rewriter, loc, 0);
-    if (!op.getBin()) {
+    if (!op.getOutsideBin()) {
       // The first index that is outside, and how many elements there are.
       StateView &view = context.view(rewriter, op, op.getState());
       first = indices.back();
@@ -161,7 +170,11 @@ struct FailLowering : OpConversionPattern<FailOp> {
         rewriter, loc, "pikoir_fail", Type(),
         {context.frame(op),
          createI32(rewriter, loc, context.stageNumber(op, op.getStage())),
-         createI32(rewriter, loc, op.getBin() ? updateOutside : indexOutside),
+         op.getOf() ? context.text(rewriter, loc, *op.getOf())
+                    : createNull(rewriter, loc),
+         createBin(rewriter, loc, adaptor.getBin()),
+         createI32(rewriter, loc,
+                   op.getOutsideBin() ? updateOutside : indexOutside),
          first, second});
     rewriter.eraseOp(op);
     return success();
@@ -182,10 +195,11 @@ struct FailNumbersLowering : OpConversionPattern<OpT> {
     SmallVector<Value> arguments{
         context.frame(op),
         createI32(rewriter, loc, context.stageNumber(op, op.getStage())),
+        createNull(rewriter, loc), createBin(rewriter, loc, adaptor.getBin()),
         createI32(rewriter, loc, code)};
-    for (Value number : adaptor.getOperands())
+    for (Value number : adaptor.getOperands().drop_back(op.getBin() ? 1 : 0))
       arguments.push_back(toI64(rewriter, loc, number));
-    if (arguments.size() == 4)
+    if (arguments.size() == 6)
       arguments.push_back(createI64(rewriter, loc, 0));
     context.call(rewriter, loc, "pikoir_fail", Type(), arguments);
     rewriter.eraseOp(op);

@@ -69,7 +69,8 @@ struct ConvertUpdate : OpRewritePattern<UpdateOp> {
                                   /*withElseRegion=*/true);
     rewriter.setInsertionPointToStart(ifOp.elseBlock());
     FailOp::create(rewriter, loc, stage.getSymName(), update.getImage(), at,
-                   /*bin=*/true);
+                   /*outside_bin=*/true, findBin(rewriter, update),
+                   update.getOfAttr());
     SmallVector<Value> zeros;
     for (Type type : update.getResultTypes())
       zeros.push_back(
@@ -94,7 +95,7 @@ private:
     forEachElement(rewriter, loc, record, [&](FieldAttr field, ValueRange es) {
       oldValues.push_back(LoadOp::create(rewriter, loc, field.getType(),
                                          update.getImage(), at, field.getName(),
-                                         es, /*checked=*/true));
+                                         es, /*checked=*/true, /*of=*/nullptr));
     });
     Block *then = ifOp.thenBlock();
     if (ifOp.getNumResults() == 0)
@@ -108,7 +109,7 @@ private:
       int64_t i = element++;
       if (newValues[i] != oldValues[i])
         StoreOp::create(rewriter, loc, newValues[i], update.getImage(), at,
-                        field.getName(), es, /*checked=*/true);
+                        field.getName(), es, /*checked=*/true, /*of=*/nullptr);
     });
     if (ifOp.getNumResults())
       scf::YieldOp::create(rewriter, loc, yield.getResults());
@@ -157,10 +158,14 @@ template <typename AccessOp> struct CheckAccess : OpRewritePattern<AccessOp> {
                                   isInside(rewriter, loc, at, lo, hi),
                                   /*withElseRegion=*/true);
     rewriter.setInsertionPointToStart(ifOp.elseBlock());
-    FailOp::create(rewriter, loc, stage.getSymName(), access.getState(), at);
+    FailOp::create(rewriter, loc, stage.getSymName(), access.getState(), at,
+                   /*outside_bin=*/false,
+                   isInAssign(access) ? Value() : findBin(rewriter, access),
+                   access.getOfAttr());
     rewriter.setInsertionPointToStart(ifOp.thenBlock());
     auto checked = cast<AccessOp>(rewriter.clone(*access));
     checked.setChecked(true);
+    checked.removeOfAttr(); // so that equal reads are the same
     if (!types.empty()) {
       scf::YieldOp::create(rewriter, loc, checked->getResults());
       rewriter.setInsertionPointToEnd(ifOp.elseBlock());
@@ -170,6 +175,12 @@ template <typename AccessOp> struct CheckAccess : OpRewritePattern<AccessOp> {
     }
     rewriter.replaceOp(access, ifOp);
     return success();
+  }
+
+private:
+  static bool isInAssign(Operation *access) {
+    auto load = dyn_cast<LoadOp>(access);
+    return load && load.getAssign();
   }
 };
 
@@ -221,7 +232,8 @@ struct ConvertListAt : OpRewritePattern<ListAtOp> {
     rewriter.setInsertionPointToStart(ifOp.thenBlock());
     scf::YieldOp::create(rewriter, loc, createItem().getResult());
     rewriter.setInsertionPointToStart(ifOp.elseBlock());
-    FailListOp::create(rewriter, loc, stage.getSymName(), at.getIndex(), size);
+    FailListOp::create(rewriter, loc, stage.getSymName(), at.getIndex(), size,
+                       findBin(rewriter, at));
     scf::YieldOp::create(rewriter, loc,
                          NoItemOp::create(rewriter, loc, type).getResult());
     rewriter.replaceOp(at, ifOp);

@@ -61,6 +61,8 @@ int32_t domain(int32_t dim);
 
 // AssignBin.
 void assignBin(int64_t bin);
+/// The bin of a bounding box of NaN, an error (PIKOIR_NAN_BOX).
+constexpr int64_t nanBox = -(int64_t(1) << 40);
 void assignAll();
 void assignPrevious();
 void assignBox(int64_t x0, int64_t y0, int64_t z0, int64_t w0, int64_t x1,

@@ -296,16 +296,21 @@ PIKORT_API int32_t pikoir_cycle_step(pikort_pipeline *p, int32_t stage);
 /// for which memory was refused may begin anew, smaller and with a status of 0.
 PIKORT_API int32_t pikoir_strips_next(pikort_pipeline *p, int32_t id);
 
-/// Reports an error of generated code; thread safe, and does not return a
-/// value: the kernel goes on and pikoir_end returns `code`, a pikort_status.
+/// The bin of a bounding box of NaN, for pikoir_place and
+/// pikoir_place_source, times the tiles: PIKORT_NOT_A_NUMBER.
+#define PIKOIR_NAN_BOX (-(INT64_C(1) << 40))
+
+/// Reports an error of generated code in a call for `bin`, or -1; thread safe,
+/// and does not return a value: the kernel goes on and pikoir_end returns
+/// `code`, a pikort_status. `name`, a constant, is that of the stage to name,
+/// where the phase of one is part of another's; or null.
 ///   PIKORT_BIN_OUTSIDE     a = bin
 ///   PIKORT_UPDATE_OUTSIDE  a = x, b = y
 ///   PIKORT_INDEX_OUTSIDE   a = index, b = elements
 ///   PIKORT_ENDLESS         a = iterations
-///   PIKORT_NOT_A_NUMBER    a = bin, or -1
 ///   PIKORT_NOT_UNIFORM     a = iteration
-PIKORT_API void pikoir_fail(pikort_pipeline *p, int32_t stage, int32_t code,
-                            int64_t a, int64_t b);
+PIKORT_API void pikoir_fail(pikort_pipeline *p, int32_t stage, const char *name,
+                            int64_t bin, int32_t code, int64_t a, int64_t b);
 
 // --- checking mode ----------------------------------------------------------
 //

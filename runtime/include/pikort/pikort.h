@@ -24,7 +24,7 @@ extern "C" {
 #endif
 
 /// Changes whenever generated code and runtime would no longer fit together.
-#define PIKORT_ABI_VERSION 3u
+#define PIKORT_ABI_VERSION 4u
 
 #if defined(_WIN32)
 #define PIKORT_API

@@ -38,9 +38,9 @@ piko.record @F {"x" : i32 at 0, "v" : f32 at 4} size 8 align 4
 // CHECK:         llvm.inttoptr
 // CHECK:         %[[OLD:.*]] = llvm.atomicrmw add {{.*}} monotonic
 // CHECK:         llvm.atomicrmw fadd {{.*}} monotonic
-// 18: an index outside; 21: iterations that do not meet.
-// CHECK:         llvm.call @pikoir_fail(%{{.*}}, %c0_i32, %c18_i32, %{{.*}}, %{{.*}})
-// CHECK:         llvm.call @pikoir_fail(%{{.*}}, %c0_i32, %c21_i32, %{{.*}}, %c0_i64)
+// -1: no bin; 18: an index outside; 21: iterations that do not meet.
+// CHECK:         llvm.call @pikoir_fail(%{{.*}}, %c0_i32, %{{.*}}, %c-1_i64, %c18_i32, %{{.*}}, %{{.*}})
+// CHECK:         llvm.call @pikoir_fail(%{{.*}}, %c0_i32, %{{.*}}, %{{.*}}, %c21_i32, %{{.*}}, %c0_i64)
 
 // LIST, UNORDERED and COLLECTS; then COLLECTS alone.
 // CHECK-LABEL: func.func @P.setup
@@ -128,7 +128,7 @@ piko.pipeline @P rank 1 {
     piko.atomic xor checked @counts[%u : index] "x", %old : i32
     piko.atomic add_float checked @counts[%u : index] "v", %v : f32
     piko.fail_list @a at %lo of %hi
-    piko.fail_barrier @a iteration %lo
+    piko.fail_barrier @a in %u iteration %lo
     piko.close_writer %w
     piko.close_bins %bins : !piko.bins<@F>
   }

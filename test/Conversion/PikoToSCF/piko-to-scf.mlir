@@ -20,13 +20,16 @@ piko.record @u32 {"value" : i32 at 0} size 4 align 4
 // CHECK-NOT:       piko.store
 // CHECK:           scf.yield %[[CLOSER]]
 // CHECK:         } else {
-// CHECK:           piko.fail @a outside bin of @image(%[[XI]])
+// The bin of the call is found where it is to be told alone.
+// CHECK-NEXT:      %[[BIN:.*]] = piko.cell_bin
+// CHECK-NEXT:      piko.fail @a in %[[BIN]] outside bin of @image(%[[XI]])
 // CHECK:         %[[N:.*]] = piko.extent @counts[0]
 // CHECK:         %[[OK:.*]] = arith.cmpi ult, %[[XI]], %[[N]]
 // CHECK:         scf.if %[[OK]] {
 // CHECK:           piko.atomic add checked @counts
 // CHECK:         } else {
-// CHECK:           piko.fail @a outside @counts(%[[XI]])
+// CHECK-NEXT:      %[[BIN2:.*]] = piko.cell_bin
+// CHECK-NEXT:      piko.fail @a in %[[BIN2]] outside @counts(%[[XI]])
 piko.pipeline @P rank 1 {
   piko.image @image : @Pixel rank 1
   piko.buffer @counts : @u32

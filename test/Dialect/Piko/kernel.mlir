@@ -137,7 +137,11 @@ piko.pipeline @Lists rank 1 {
     piko.scratch_release %w[%mark]
     // CHECK-NEXT: piko.fail_list @a at %[[LO]] of %[[HI]]
     // CHECK-NEXT: piko.fail_barrier @a iteration %[[U]]
+    // CHECK-NEXT: piko.fail_list @a in %[[U]] at %[[LO]] of %[[HI]]
+    // CHECK-NEXT: piko.fail_barrier @a in %[[U]] iteration %[[U]]
     piko.fail_list @a at %lo of %hi
     piko.fail_barrier @a iteration %u
+    piko.fail_list @a in %u at %lo of %hi
+    piko.fail_barrier @a in %u iteration %u
   }
 }

@@ -65,6 +65,8 @@ piko.pipeline @State rank 2 {
       }
       // CHECK: piko.fail @shade outside @lights(%[[N]])
       piko.fail @shade outside @lights(%n)
+      // CHECK-NEXT: piko.fail @shade in %[[N]] outside bin of @color(%[[N]], %[[N]])
+      piko.fail @shade in %n outside bin of @color(%n, %n)
       piko.return
     }
   }

@@ -80,7 +80,7 @@ protected:
     if (isNumber)
       assignToBoundingBox(in, cells(lo), cells(hi));
     else
-      marker::assignBin(-1); // which is an error, as in the reference
+      marker::assignBin(marker::nanBox);
   }
 
   // Queries.

@@ -168,13 +168,13 @@ public:
         body(i);
         checker.endIteration();
       };
-    Loop loop(call.loop, size, std::move(body));
+    Loop loop(call.loop, *call.node, call.bin, size, std::move(body));
     struct Restore {
       Loop *&slot, *saved;
       ~Restore() { slot = saved; }
     } restore{call.loop, call.loop};
     call.loop = &loop;
-    loop.run(*call.node, [&](const Emission &emission) {
+    loop.run([&](const Emission &emission) {
       if (call.kept)
         call.kept->push_back(emission);
       else
@@ -186,10 +186,10 @@ public:
   void sync() {
     Loop &loop = loopForSync("sync");
     if constexpr (!checking) {
-      loop.sync(*frame->node);
+      loop.sync();
     } else {
       std::shared_ptr<Strand> before = checker.beginBarrier();
-      loop.sync(*frame->node);
+      loop.sync();
       checker.endBarrier(*before);
     }
   }

@@ -26,18 +26,20 @@ struct Emission {
 
 class Loop {
 public:
-  Loop(Loop *outer, int64_t size, std::function<void(int64_t)> body)
-      : outer(outer), size(size), body(std::move(body)) {}
+  /// Of a call of Process for `node` and `bin`.
+  Loop(Loop *outer, const Node &node, int64_t bin, int64_t size,
+       std::function<void(int64_t)> body)
+      : outer(outer), size(size), node(node), bin(bin), body(std::move(body)) {}
 
   /// Runs all iterations. `deliver` takes what iterations emitted while their
   /// emissions had to be kept.
-  template <class Deliver> void run(const Node &node, Deliver deliver) {
+  template <class Deliver> void run(Deliver deliver) {
     for (iteration = 0; iteration < size && fibers.empty(); ++iteration)
       body(iteration);
     for (size_t i = 0; i < fibers.size(); ++i) {
       resume(i);
       if (!fibers[i]->isDone())
-        failUniform(node);
+        failUniform();
     }
     running = nullptr;
     for (std::vector<Emission> &list : kept)
@@ -46,19 +48,19 @@ public:
   }
 
   /// Called by an iteration: a barrier between all of them.
-  void sync(const Node &node) {
+  void sync() {
     if (running) {
       running->suspend();
       return;
     }
     if (iteration != 0)
-      failUniform(node);
+      failUniform();
     if (fibers.empty())
       start();
     for (size_t i = 0; i < fibers.size(); ++i) {
       resume(i);
       if (fibers[i]->isDone())
-        failUniform(node);
+        failUniform();
     }
     running = nullptr;
     iteration = 0;
@@ -89,13 +91,15 @@ private:
     running->resume();
   }
 
-  [[noreturn]] void failUniform(const Node &node) {
+  [[noreturn]] void failUniform() {
     running = nullptr;
-    node.fail(-1, "expected every iteration of parallelFor to call sync() as "
-                  "often as iteration 0, but iteration " +
-                      std::to_string(iteration) + " does not");
+    node.fail(bin, "expected every iteration of parallelFor to call sync() as "
+                   "often as iteration 0, but iteration " +
+                       std::to_string(iteration) + " does not");
   }
 
+  const Node &node;
+  const int64_t bin;
   std::function<void(int64_t)> body;
   std::vector<std::vector<Emission>> kept; ///< of iterations 1, 2, ...
   std::vector<std::unique_ptr<Fiber>> fibers;

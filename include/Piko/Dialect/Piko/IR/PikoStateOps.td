@@ -19,21 +19,26 @@ def Piko_LoadOp : Piko_StateAccessOp<"load", [MemoryEffects<[MemRead]>]> {
     A constant takes no index, a buffer one, an image one for each dimension;
     an element of an array field takes further ones behind the field's name.
     An index outside the buffer or image is an error when the pipeline runs;
-    `checked` says that the test for it is already there.
+    `checked` says that the test for it is already there. Where a phase has
+    become a part of another stage's, `of` names its stage, for that error, and
+    `assign` says that it is an assign phase.
 
     ```mlir
     %width = piko.load @camera "width" : i32
     %red = piko.load @lights[%i : index] "color.x" : f32
     %cut = piko.load @lights[%i : index] "cutoff"[%j] : f32
     %z = piko.load @depth[%x, %y : i32, i32] "z" : f32
+    %c = piko.load of "shade" assign @lights[%i : index] "cutoff"[%j] : f32
     ```
   }];
   let arguments = (ins FlatSymbolRefAttr:$state,
                        Variadic<Piko_Coordinate>:$indices, StrAttr:$field,
-                       Variadic<Index>:$elements, UnitAttr:$checked);
+                       Variadic<Index>:$elements, UnitAttr:$checked,
+                       OptionalAttr<StrAttr>:$of, UnitAttr:$assign);
   let results = (outs Piko_Scalar:$result);
   let assemblyFormat = [{
-    (`checked` $checked^)? $state (`[` $indices^ `:` type($indices) `]`)? $field
+    (`of` $of^)? (`assign` $assign^)? (`checked` $checked^)? $state
+    (`[` $indices^ `:` type($indices) `]`)? $field
     (`[` $elements^ `]`)? attr-dict `:` type($result)
   }];
 }
@@ -42,7 +47,8 @@ def Piko_StoreOp : Piko_StateAccessOp<"store", [MemoryEffects<[MemWrite]>]> {
   let summary = "writes a field of an element that no other call writes";
   let description = [{
     An index outside the buffer or image is an error when the pipeline runs;
-    `checked` says that the test for it is already there.
+    `checked` says that the test for it is already there, `of` is as in
+    `piko.load`.
 
     ```mlir
     piko.store %v, @vertices[%i : index] "position.x" : f32
@@ -51,9 +57,10 @@ def Piko_StoreOp : Piko_StateAccessOp<"store", [MemoryEffects<[MemWrite]>]> {
   }];
   let arguments = (ins Piko_Scalar:$value, FlatSymbolRefAttr:$state,
                        Variadic<Piko_Coordinate>:$indices, StrAttr:$field,
-                       Variadic<Index>:$elements, UnitAttr:$checked);
+                       Variadic<Index>:$elements, UnitAttr:$checked,
+                       OptionalAttr<StrAttr>:$of);
   let assemblyFormat = [{
-    $value `,` (`checked` $checked^)? $state
+    $value `,` (`of` $of^)? (`checked` $checked^)? $state
     (`[` $indices^ `:` type($indices) `]`)? $field
     (`[` $elements^ `]`)? attr-dict `:` type($value)
   }];
@@ -64,7 +71,8 @@ def Piko_AtomicOp : Piko_StateAccessOp<"atomic", [
   let summary = "changes a number indivisibly";
   let description = [{
     A result is the value that was there. It shows the order of calls, as does
-    the rounding of `add_float`: both need a stage that is `unordered`.
+    the rounding of `add_float`: both need a stage that is `unordered`. `of` is
+    as in `piko.load`.
 
     ```mlir
     piko.atomic add @histogram[%i : index] "value", %one : i32
@@ -74,10 +82,12 @@ def Piko_AtomicOp : Piko_StateAccessOp<"atomic", [
   let arguments = (ins Piko_AtomicKind:$kind, FlatSymbolRefAttr:$state,
                        Variadic<Piko_Coordinate>:$indices, StrAttr:$field,
                        Variadic<Index>:$elements,
-                       AnyTypeOf<[I32, I64, F32, F64]>:$value, UnitAttr:$checked);
+                       AnyTypeOf<[I32, I64, F32, F64]>:$value, UnitAttr:$checked,
+                       OptionalAttr<StrAttr>:$of);
   let results = (outs Optional<AnyTypeOf<[I32, I64, F32, F64]>>:$old);
   let assemblyFormat = [{
-    $kind (`checked` $checked^)? $state (`[` $indices^ `:` type($indices) `]`)? $field
+    $kind (`of` $of^)? (`checked` $checked^)? $state
+    (`[` $indices^ `:` type($indices) `]`)? $field
     (`[` $elements^ `]`)? `,` $value attr-dict `:` type($value)
     (`->` type($old)^)?
   }];
@@ -105,7 +115,8 @@ def Piko_UpdateOp : Piko_Op<"update", [
     The body takes the numbers of the pixel, fields in order, and yields the new
     ones; `results` leave it. The calls for one pixel run in lineage order. A
     pixel outside the bin is an error when the pipeline runs. At the resolved
-    level the operation names the bin that the pixel must be in.
+    level the operation names the bin that the pixel must be in. `of` is as in
+    `piko.load`.
 
     ```mlir
     %passed = piko.update @depth[%x, %y : i32, i32] {
@@ -123,12 +134,12 @@ def Piko_UpdateOp : Piko_Op<"update", [
   }];
   let arguments = (ins FlatSymbolRefAttr:$image,
                        Variadic<Piko_Coordinate>:$coordinates,
-                       Optional<Index>:$bin);
+                       Optional<Index>:$bin, OptionalAttr<StrAttr>:$of);
   let results = (outs Variadic<AnyType>:$results);
   let regions = (region SizedRegion<1>:$body);
   let assemblyFormat = [{
-    $image `[` $coordinates `:` type($coordinates) `]` (`in` $bin^)? $body
-    (`->` type($results)^)? attr-dict
+    (`of` $of^)? $image `[` $coordinates `:` type($coordinates) `]`
+    (`in` $bin^)? $body (`->` type($results)^)? attr-dict
   }];
   let hasRegionVerifier = 1;
 }
@@ -148,22 +159,26 @@ def Piko_YieldOp : Piko_Op<"yield", [
   }];
 }
 
-def Piko_FailOp : Piko_Op<"fail"> {
+def Piko_FailOp : Piko_Op<"fail", [AttrSizedOperandSegments]> {
   let summary = "ends the run with an error that names the stage";
   let description = [{
     An access of the stage to the piece of state at these indices was outside
-    it or, with `bin of`, outside the bin. The run goes on to the end of the
-    kernel and then stops.
+    it or, with `bin of`, outside the bin. In a call of Process, `in` says for
+    which bin. The error names the stage of `of`, if there is one, whose phase
+    is a part of this stage's. The run goes on to the end of the kernel and then
+    stops.
 
     ```mlir
     piko.fail @shade outside @lights(%i)
-    piko.fail @shade outside bin of @depth(%i, %j)
+    piko.fail @shade in %b outside bin of @depth(%i, %j)
     ```
   }];
   let arguments = (ins FlatSymbolRefAttr:$stage, FlatSymbolRefAttr:$state,
-                       Variadic<Index>:$indices, UnitAttr:$bin);
+                       Variadic<Index>:$indices, UnitAttr:$outside_bin,
+                       Optional<Index>:$bin, OptionalAttr<StrAttr>:$of);
   let assemblyFormat = [{
-    $stage `outside` (`bin` `of` $bin^)? $state `(` $indices `)` attr-dict
+    $stage (`of` $of^)? (`in` $bin^)? `outside` (`bin` `of` $outside_bin^)? $state
+    `(` $indices `)` attr-dict
   }];
 }
 
@@ -173,11 +188,12 @@ def Piko_FailListOp : Piko_Op<"fail_list"> {
     See `piko.fail`; the numbers are the index and the size of the list.
 
     ```mlir
-    piko.fail_list @blend at %i of %n
+    piko.fail_list @blend in %b at %i of %n
     ```
   }];
-  let arguments = (ins FlatSymbolRefAttr:$stage, Index:$index, Index:$size);
-  let assemblyFormat = "$stage `at` $index `of` $size attr-dict";
+  let arguments = (ins FlatSymbolRefAttr:$stage, Index:$index, Index:$size,
+                       Optional<Index>:$bin);
+  let assemblyFormat = "$stage (`in` $bin^)? `at` $index `of` $size attr-dict";
 }
 
 def Piko_FailBarrierOp : Piko_Op<"fail_barrier"> {
@@ -187,11 +203,12 @@ def Piko_FailBarrierOp : Piko_Op<"fail_barrier"> {
     same barriers as iteration 0.
 
     ```mlir
-    piko.fail_barrier @blend iteration %i
+    piko.fail_barrier @blend in %b iteration %i
     ```
   }];
-  let arguments = (ins FlatSymbolRefAttr:$stage, Index:$iteration);
-  let assemblyFormat = "$stage `iteration` $iteration attr-dict";
+  let arguments = (ins FlatSymbolRefAttr:$stage, Index:$iteration,
+                       Optional<Index>:$bin);
+  let assemblyFormat = "$stage (`in` $bin^)? `iteration` $iteration attr-dict";
 }
 
 #endif // PIKO_DIALECT_PIKO_IR_PIKOSTATEOPS_TD
