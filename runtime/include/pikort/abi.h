@@ -99,8 +99,8 @@ PIKORT_API void pikoir_declare_source(pikort_pipeline *p, int32_t index,
 PIKORT_API void pikoir_declare_edge(pikort_pipeline *p, int32_t producer,
                                     int32_t port, int32_t consumer);
 /// The edge from a port is local: its consumer runs in the producer's kernel,
-/// bin by bin. It collects, has the producer's bins, no other input and no owner
-/// tiles; neither stage is SPLIT, on a cycle or in strips.
+/// bin by bin. It collects, has the producer's bins, no other input and no
+/// owner tiles; neither stage is SPLIT, on a cycle or in strips.
 PIKORT_API void pikoir_declare_local(pikort_pipeline *p, int32_t producer,
                                      int32_t port);
 /// Of a LIST stage: how many primitives a call gets, 0 = the whole list, and
@@ -238,8 +238,8 @@ PIKORT_API void pikoir_close(pikoir_writer *writer);
 PIKORT_API int32_t pikoir_end(pikort_pipeline *p, int32_t stage);
 
 /// What a port of a local edge has emitted since the last time, as one unit of
-/// one cell; of a LIST stage, one unit of all calls. Valid until end_local, which
-/// forgets it: no append to the port lies between. Never null.
+/// one cell; of a LIST stage, one unit of all calls. Valid until end_local,
+/// which forgets it: no append to the port lies between. Never null.
 PIKORT_API const pikoir_input *pikoir_begin_local(pikoir_writer *writer,
                                                   int32_t port);
 PIKORT_API void pikoir_end_local(pikoir_writer *writer, int32_t port);
