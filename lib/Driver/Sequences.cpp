@@ -39,6 +39,8 @@ void piko::addSynthesisSequence(OpPassManager &passes,
   {
     OpPassManager &pipeline = passes.nest<PipelineOp>();
     pipeline.addPass(createOrderStages());
+    if (options.has("pre-schedule"))
+      pipeline.addPass(createPreSchedule());
     if (options.has("infer-directives"))
       pipeline.addPass(createInferDirectives());
     if (options.has("fuse-stages"))
@@ -52,6 +54,8 @@ void piko::addSynthesisSequence(OpPassManager &passes,
   OpPassManager &pipeline = passes.nest<PipelineOp>();
   if (options.has("own-pixels"))
     pipeline.addPass(createOwnPixels());
+  if (options.has("eliminate-schedules"))
+    pipeline.addPass(createEliminateSchedules());
   pipeline.addPass(createFormKernels());
   if (options.has("form-strips"))
     pipeline.addPass(createFormStrips());

@@ -13,8 +13,8 @@ static bool contains(const std::vector<std::string> &names,
 
 const std::vector<std::string> &SynthesisOptions::getOptional() {
   static const std::vector<std::string> names = {
-      "infer-directives", "fuse-stages", "test-early", "prune",
-      "own-pixels",       "form-strips"};
+      "pre-schedule", "infer-directives", "fuse-stages",         "test-early",
+      "prune",        "own-pixels",       "eliminate-schedules", "form-strips"};
   return names;
 }
 

@@ -19,7 +19,7 @@
 // RUN: piko-compare %s --pipe Large --domain 67 35 --count 500 --without infer-directives | FileCheck %s
 // RUN: piko-compare %s --pipe Whole --domain 67 35 --count 500 --without test-early,own-pixels | FileCheck %s
 // RUN: not piko-compare %s --pipe Chain --without fusion 2>&1 | FileCheck %s --check-prefix=WRONG
-// WRONG: --without: expected passes of infer-directives, fuse-stages, {{.*}} but got 'fusion'
+// WRONG: --without: expected passes of pre-schedule, infer-directives, {{.*}} but got 'fusion'
 // CHECK: equal
 #include <piko.h>
 

@@ -32,8 +32,8 @@ SCHEDULES = ["LoadBalance", "DirectMap", "Serialize", "All"]
 SPLITS = [0, 100]
 THREADS = [1, 2, 7]
 STRIPS = [None, 100]
-PASSES = ["infer-directives", "fuse-stages", "test-early", "prune", "own-pixels",
-          "form-strips"]
+PASSES = ["pre-schedule", "infer-directives", "fuse-stages", "test-early", "prune",
+          "own-pixels", "eliminate-schedules", "form-strips"]
 
 SIZE = ["--width", "131", "--height", "99", "--lights", "3"]
 

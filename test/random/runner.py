@@ -14,7 +14,8 @@ EQUAL, BLANK = "equal", "equal, but blank"
 
 
 #: What piko-compare may leave out of synthesis.
-PASSES = ["infer-directives", "fuse-stages", "test-early", "prune", "own-pixels"]
+PASSES = ["pre-schedule", "infer-directives", "fuse-stages", "test-early", "prune",
+          "own-pixels", "eliminate-schedules"]
 
 
 def options_of(passes):

@@ -125,6 +125,48 @@ def InferDirectives : Pass<"piko-infer-directives", "::piko::PipelineOp"> {
     Statistic<"refused", "refused", "assign phases without a proof">];
 }
 
+def PreSchedule : Pass<"piko-pre-schedule", "::piko::PipelineOp"> {
+  let summary = "Choose cores before there are bins";
+  let description = [{
+    **Requires** the authored level; best after canonicalization, which folds
+    what a schedule computes.
+
+    **Does**: follows all ways through the `dynamic` body of each schedule. Where
+    they all end with the same directives, these become the schedule's own, and
+    the body is erased. So the core that a bin runs on follows from its number
+    when primitives are assigned, nothing runs for each bin, and
+    `piko-fuse-stages`, which needs to know the kind, sees it.
+
+    **Guarantees** that each bin has the directives that it had.
+
+    Before:
+    ```
+    piko.schedule load_balance dynamic {
+    ^bb0(%bin: index):
+      %serialize = arith.constant 2 : i32
+      %none = arith.constant 0 : i64
+      scf.if %c {
+        piko.set_schedule %serialize tile_split %none
+      } else {
+        piko.set_schedule %serialize tile_split %none
+      }
+      piko.return
+    }
+    ```
+    After:
+    ```
+    piko.schedule serialize
+    ```
+
+    **Limits**: a schedule that depends on its bin or on the state's constants
+    keeps its body, which runs for each bin, before the pipeline does; a remark
+    says what it depends on. So does one that would end with an error.
+  }];
+  let statistics = [
+    Statistic<"moved", "moved", "schedules that are the same for all bins">,
+    Statistic<"kept", "kept", "schedules that are not">];
+}
+
 def FuseStages : Pass<"piko-fuse-stages", "::piko::PipelineOp"> {
   let summary = "Run a stage where its primitives are emitted";
   let description = [{
@@ -305,6 +347,40 @@ def OwnPixels : Pass<"piko-own-pixels", "::piko::PipelineOp"> {
   let statistics = [
     Statistic<"divided", "stages-divided", "stages whose bins can be divided">,
     Statistic<"refused", "stages-refused", "stages whose updates move">];
+}
+
+def EliminateSchedules
+    : Pass<"piko-eliminate-schedules", "::piko::PipelineOp"> {
+  let summary = "Leave to the machine what it does by itself";
+  let description = [{
+    **Requires** the authored or the kernels level; best after `piko-fuse-stages`,
+    for which it matters whether a stage asks for a core.
+
+    **Does**: erases schedules that say `load_balance` and no more. A loop over
+    bins, of which any core takes the next, is what a stage without a schedule
+    gets.
+
+    **Guarantees** that the stage's bins run as before.
+
+    Before:
+    ```
+    piko.stage @a bins [8, 8] threads 64 : @F -> [] {
+      piko.schedule load_balance
+      piko.process { ... }
+    }
+    ```
+    After:
+    ```
+    piko.stage @a bins [8, 8] threads 64 : @F -> [] {
+      piko.process { ... }
+    }
+    ```
+
+    **Limits**: a schedule that also waits, takes batches or gives up an order
+    stays.
+  }];
+  let statistics = [
+    Statistic<"eliminated", "eliminated", "schedules that went">];
 }
 
 def FormKernels : Pass<"piko-form-kernels", "::piko::PipelineOp"> {
