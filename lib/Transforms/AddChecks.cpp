@@ -323,9 +323,8 @@ void Checker::run() {
   }
   OpBuilder builder = OpBuilder::atBlockBegin(pipeline.getBodyBlock());
   for (auto [host, checked] : records) {
-    SmallVector<StringRef> fields;
-    for (const std::string &field : numbers.lookup(host))
-      fields.push_back(field);
+    auto named = numbers.lookup(host);
+    SmallVector<StringRef> fields(named.begin(), named.end());
     CheckRecordOp::create(
         builder, pipeline.getLoc(), checked, FlatSymbolRefAttr::get(host),
         fields.empty() ? ArrayAttr() : builder.getStrArrayAttr(fields));
