@@ -35,10 +35,12 @@ template <typename OpT> struct Lowering : OpConversionPattern<OpT> {
     return LLVM::LoadOp::create(builder, loc, builder.getI64Type(),
                                 createOffset(builder, loc, base, offset));
   }
-  static Value loadPointer(OpBuilder &builder, Location loc, Value base,
-                           int64_t offset) {
-    return LLVM::LoadOp::create(builder, loc, pointer(builder),
-                                createOffset(builder, loc, base, offset));
+  /// A member of the pikoir_input.
+  Value number(OpBuilder &builder, Value bins, int64_t offset) const {
+    return context.member(builder, bins, offset, builder.getI64Type());
+  }
+  Value array(OpBuilder &builder, Value bins, int64_t offset) const {
+    return context.member(builder, bins, offset, pointer(builder));
   }
   /// The address of entry `index` of an array.
   static Value entry(OpBuilder &builder, Location loc, Value array, Value index,
@@ -108,9 +110,9 @@ struct UnitCountLowering : Lowering<UnitCountOp> {
   matchAndRewrite(UnitCountOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
     Location loc = op.getLoc();
-    rewriter.replaceOp(op, toIndex(rewriter, loc,
-                                   loadI64(rewriter, loc, adaptor.getBins(),
-                                           layout::unitCount)));
+    rewriter.replaceOp(
+        op, toIndex(rewriter, loc,
+                    number(rewriter, adaptor.getBins(), layout::unitCount)));
     return success();
   }
 };
@@ -121,7 +123,7 @@ struct UnitCellsLowering : Lowering<UnitCellsOp> {
   matchAndRewrite(UnitCellsOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
     Location loc = op.getLoc();
-    Value units = loadPointer(rewriter, loc, adaptor.getBins(), layout::units);
+    Value units = array(rewriter, adaptor.getBins(), layout::units);
     Value unit =
         entry(rewriter, loc, units, adaptor.getUnit(), layout::unitSize);
     Value first = loadI64(rewriter, loc, unit, layout::cellBegin);
@@ -139,10 +141,10 @@ struct CellRangeLowering : Lowering<CellRangeOp> {
                   ConversionPatternRewriter &rewriter) const override {
     Location loc = op.getLoc();
     Value bins = adaptor.getBins();
-    Value units = loadPointer(rewriter, loc, bins, layout::units);
+    Value units = array(rewriter, bins, layout::units);
     Value unit =
         entry(rewriter, loc, units, adaptor.getUnit(), layout::unitSize);
-    Value offsets = loadPointer(rewriter, loc, bins, layout::offsets);
+    Value offsets = array(rewriter, bins, layout::offsets);
     Value cell = entry(rewriter, loc, offsets, adaptor.getCell(), 8);
     Value begin =
         arith::MaxSIOp::create(rewriter, loc, loadI64(rewriter, loc, cell, 0),
@@ -162,9 +164,8 @@ struct CellBinLowering : Lowering<CellBinOp> {
   matchAndRewrite(CellBinOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
     Location loc = op.getLoc();
-    Value tiles =
-        toIndex(rewriter, loc,
-                loadI64(rewriter, loc, adaptor.getBins(), layout::tiles));
+    Value tiles = toIndex(rewriter, loc,
+                          number(rewriter, adaptor.getBins(), layout::tiles));
     rewriter.replaceOpWithNewOp<arith::DivUIOp>(op, adaptor.getCell(), tiles);
     return success();
   }
@@ -172,10 +173,8 @@ struct CellBinLowering : Lowering<CellBinOp> {
 
 /// The address of a pikoir_call.
 static Value callEntry(ConversionPatternRewriter &rewriter, Location loc,
-                       Value bins, Value call) {
-  Value calls =
-      LLVM::LoadOp::create(rewriter, loc, bins.getType(),
-                           createOffset(rewriter, loc, bins, layout::calls));
+                       LoweringContext &context, Value bins, Value call) {
+  Value calls = context.member(rewriter, bins, layout::calls, bins.getType());
   Value bytes =
       arith::MulIOp::create(rewriter, loc, toI64(rewriter, loc, call),
                             createI64(rewriter, loc, layout::callSize));
@@ -188,7 +187,8 @@ struct CallRangeLowering : Lowering<CallRangeOp> {
   matchAndRewrite(CallRangeOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
     Location loc = op.getLoc();
-    Value call = callEntry(rewriter, loc, adaptor.getBins(), adaptor.getCall());
+    Value call =
+        callEntry(rewriter, loc, context, adaptor.getBins(), adaptor.getCall());
     Value begin = loadI64(rewriter, loc, call, layout::callBegin);
     Value end = loadI64(rewriter, loc, call, layout::callEnd);
     rewriter.replaceOp(
@@ -203,7 +203,8 @@ struct CallBinLowering : Lowering<CallBinOp> {
   matchAndRewrite(CallBinOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
     Location loc = op.getLoc();
-    Value call = callEntry(rewriter, loc, adaptor.getBins(), adaptor.getCall());
+    Value call =
+        callEntry(rewriter, loc, context, adaptor.getBins(), adaptor.getCall());
     Value bin = loadI64(rewriter, loc, call, layout::callBin);
     rewriter.replaceOp(op, toIndex(rewriter, loc, bin));
     return success();
@@ -218,7 +219,7 @@ struct ItemLowering : Lowering<ItemOp> {
     Location loc = op.getLoc();
     Value bins = adaptor.getBins();
     Value position = toI64(rewriter, loc, adaptor.getPosition());
-    Value order = loadPointer(rewriter, loc, bins, layout::order);
+    Value order = array(rewriter, bins, layout::order);
     Value null = LLVM::ZeroOp::create(rewriter, loc, pointer(rewriter));
     Value ordered = LLVM::ICmpOp::create(rewriter, loc, LLVM::ICmpPredicate::ne,
                                          order, null);
@@ -235,7 +236,7 @@ struct ItemLowering : Lowering<ItemOp> {
         [&](OpBuilder &builder, Location loc) {
           scf::YieldOp::create(builder, loc, position);
         });
-    Value items = loadPointer(rewriter, loc, bins, layout::items);
+    Value items = array(rewriter, bins, layout::items);
     RecordOp record = context.record(op.getPrim().getType().getRecord());
     rewriter.replaceOp(
         op, entry(rewriter, loc, items, choice.getResult(0), record.getSize()));

@@ -115,6 +115,18 @@ Value LoweringContext::query(OpBuilder &builder, Operation *op,
                                   createOffset(builder, loc, entries, 8 * dim));
 }
 
+Value LoweringContext::member(OpBuilder &builder, Value bins, int64_t offset,
+                              Type type) {
+  Value &known = members[{bins, offset}];
+  if (known)
+    return known;
+  OpBuilder::InsertionGuard guard(builder);
+  builder.setInsertionPointAfterValue(bins);
+  Location loc = bins.getLoc();
+  return known = LLVM::LoadOp::create(builder, loc, type,
+                                      createOffset(builder, loc, bins, offset));
+}
+
 LLVM::CallOp LoweringContext::call(OpBuilder &builder, Location loc,
                                    StringRef function, Type result,
                                    ValueRange arguments) {

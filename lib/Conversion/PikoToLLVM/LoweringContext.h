@@ -54,6 +54,11 @@ public:
                     mlir::StringRef function, std::optional<int32_t> stage,
                     int64_t dim);
 
+  /// A member of the pikoir_input that a kernel was given, loaded where it is
+  /// given: a grid of blocks gets it as an argument.
+  mlir::Value member(mlir::OpBuilder &builder, mlir::Value bins, int64_t offset,
+                     mlir::Type type);
+
   /// Calls a function of the runtime, declared on first use.
   mlir::LLVM::CallOp call(mlir::OpBuilder &builder, mlir::Location loc,
                           mlir::StringRef function, mlir::Type result,
@@ -73,6 +78,7 @@ private:
   /// By function and name.
   llvm::DenseMap<mlir::Operation *, llvm::StringMap<StateView>> views;
   llvm::DenseMap<mlir::Operation *, llvm::StringMap<mlir::Value>> queries;
+  llvm::DenseMap<std::pair<mlir::Value, int64_t>, mlir::Value> members;
 };
 
 /// Constants and casts.
