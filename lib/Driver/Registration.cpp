@@ -15,11 +15,16 @@
 #include "mlir/Conversion/UBToLLVM/UBToLLVM.h"
 #include "mlir/Dialect/ControlFlow/IR/ControlFlow.h"
 #include "mlir/Dialect/DLTI/DLTI.h"
+#include "mlir/Dialect/GPU/IR/GPUDialect.h"
+#include "mlir/Dialect/GPU/Transforms/Passes.h"
+#include "mlir/Dialect/LLVMIR/NVVMDialect.h"
 #include "mlir/Dialect/Math/IR/Math.h"
 #include "mlir/Dialect/MemRef/IR/MemRef.h"
 #include "mlir/Dialect/UB/IR/UBOps.h"
 #include "mlir/Target/LLVMIR/Dialect/Builtin/BuiltinToLLVMIRTranslation.h"
+#include "mlir/Target/LLVMIR/Dialect/GPU/GPUToLLVMIRTranslation.h"
 #include "mlir/Target/LLVMIR/Dialect/LLVMIR/LLVMToLLVMIRTranslation.h"
+#include "mlir/Target/LLVMIR/Dialect/NVVM/NVVMToLLVMIRTranslation.h"
 #include "mlir/Target/LLVMIR/Dialect/OpenMP/OpenMPToLLVMIRTranslation.h"
 #include "mlir/Transforms/Passes.h"
 
@@ -27,12 +32,15 @@ using namespace mlir;
 using namespace piko;
 
 void piko::registerPikoDialects(DialectRegistry &registry) {
-  registry.insert<PikoDialect, DLTIDialect, LLVM::LLVMDialect,
-                  arith::ArithDialect, cf::ControlFlowDialect,
-                  func::FuncDialect, math::MathDialect, memref::MemRefDialect,
-                  omp::OpenMPDialect, scf::SCFDialect, ub::UBDialect>();
+  registry
+      .insert<PikoDialect, DLTIDialect, LLVM::LLVMDialect, NVVM::NVVMDialect,
+              arith::ArithDialect, cf::ControlFlowDialect, func::FuncDialect,
+              gpu::GPUDialect, math::MathDialect, memref::MemRefDialect,
+              omp::OpenMPDialect, scf::SCFDialect, ub::UBDialect>();
   registerBuiltinDialectTranslation(registry);
+  registerGPUDialectTranslation(registry);
   registerLLVMDialectTranslation(registry);
+  registerNVVMDialectTranslation(registry);
   registerOpenMPDialectTranslation(registry);
 }
 
@@ -43,6 +51,8 @@ void piko::registerPikoPasses() {
   registerTransformsPasses();
   // One by one: upstream's header for all conversions costs seconds to compile.
   registerPass([] { return createConvertMathToLLVMPass(); });
+  registerPass([] { return createGpuKernelOutliningPass(); });
+  registerPass([] { return createGpuLaunchSinkIndexComputationsPass(); });
   registerPass([] { return createConvertOpenMPToLLVMPass(); });
   registerPass([] { return createReconcileUnrealizedCastsPass(); });
   registerPass([] { return createSCFToControlFlowPass(); });

@@ -1,0 +1,38 @@
+// RUN: piko-opt %s --pass-pipeline='builtin.module(gpu.module(convert-gpu-to-exact-nvvm))' --split-input-file --verify-diagnostics | FileCheck %s
+
+// Functions become LLVM's, which PTX has exactly, and none of libdevice's.
+// CHECK-LABEL: llvm.func @k(
+// CHECK-SAME:      nvvm.kernel
+// CHECK:         nvvm.read.ptx.sreg.tid.x
+// CHECK:         llvm.intr.sqrt({{.*}}) : (f32) -> f32
+// CHECK:         llvm.intr.floor({{.*}}) : (f32) -> f32
+// CHECK:         llvm.intr.fma({{.*}}) : (f64, f64, f64) -> f64
+// CHECK:         nvvm.barrier
+// CHECK-NOT:   __nv_
+gpu.module @kernels {
+  gpu.func @k(%memory: memref<?xf32>, %wide: memref<?xf64>) kernel {
+    %t = gpu.thread_id x
+    %v = memref.load %memory[%t] : memref<?xf32>
+    %s = math.sqrt %v : f32
+    %f = math.floor %s : f32
+    %w = memref.load %wide[%t] : memref<?xf64>
+    %m = math.fma %w, %w, %w : f64
+    gpu.barrier
+    memref.store %f, %memory[%t] : memref<?xf32>
+    memref.store %m, %wide[%t] : memref<?xf64>
+    gpu.return
+  }
+}
+
+// -----
+
+gpu.module @kernels {
+  gpu.func @k(%memory: memref<?xf32>) kernel {
+    %t = gpu.thread_id x
+    %v = memref.load %memory[%t] : memref<?xf32>
+    // expected-error @below {{expected a function that PTX has exactly}}
+    %s = math.sin %v : f32
+    memref.store %s, %memory[%t] : memref<?xf32>
+    gpu.return
+  }
+}

@@ -1,0 +1,107 @@
+// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-resolve-kernels,convert-piko-to-gpu{threads=8}),cse,canonicalize)' | FileCheck %s
+// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-resolve-kernels,convert-piko-to-gpu{threads=1}))' | FileCheck %s --check-prefix=ONE
+// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-resolve-kernels,convert-piko-to-gpu))' | FileCheck %s --check-prefix=STAGE
+
+piko.record @Row {"x" : i32 at 0, "y" : i32 at 4, "to" : i32 at 8} size 12 align 4
+piko.record @Pixel {"n" : i32 at 0} size 4 align 4
+
+// A block runs a unit; errors of its blocks are gathered and reported behind
+// the launch. The stage's 20 threads become 16.
+// CHECK-LABEL: piko.kernel @kernel_draw
+// CHECK:         %[[BINS:.*]] = piko.open_bins @draw
+// CHECK:         %[[UNITS:.*]] = piko.unit_count %[[BINS]]
+// CHECK:         scf.if
+// CHECK:           %[[LIST:.*]] = memref.alloc(
+// CHECK:           gpu.launch blocks(%[[UNIT:[a-z0-9]+]], {{.*}}) in (%{{.*}} = %[[UNITS]], {{.*}}) threads(%[[T:[a-z0-9]+]], {{.*}}) in (%{{.*}} = %c8, %{{[^)]*}})
+// CHECK-SAME:        workgroup(%[[X:.*]] : memref<8xi32, #gpu.address_space<workgroup>>, %[[Y:.*]] : memref<8xi32, #gpu.address_space<workgroup>>, %[[TO:.*]] : memref<8xi32, #gpu.address_space<workgroup>>, %{{.*}} : memref<8xi64, #gpu.address_space<workgroup>>)
+// Threads are 4 wide and 2 high.
+// CHECK:             %[[TX:.*]] = arith.remui %[[T]], %c4
+// CHECK:             %[[ROW:.*]] = arith.divui %[[T]], %c4
+// CHECK:             piko.unit_cells %[[BINS]][%[[UNIT]]]
+// CHECK:             piko.cell_range %[[BINS]][%[[UNIT]],
+// The block copies the fields of 8 primitives.
+// CHECK:             scf.for %[[BASE:.*]] = %{{.*}} to %{{.*}} step %c8
+// CHECK:               piko.item
+// CHECK:               memref.store %{{.*}}, %[[X]][%[[T]]]
+// CHECK:               gpu.barrier
+// CHECK:               scf.for %[[K:.*]] = %c0
+// CHECK:                 memref.load %[[X]][%[[K]]]
+// The row is behind a test of whose it is; the loop along it has a step of 4.
+// CHECK:                 arith.shrui %{{.*}}, %c2_i32
+// CHECK:                 %[[REST:.*]] = arith.andi %{{.*}}, %c1_i32
+// CHECK:                 %[[MINE:.*]] = arith.cmpi eq, %[[REST]], %{{.*}} : i32
+// CHECK:                 scf.if %[[MINE]] {
+// CHECK:                   scf.for %[[STEP:.*]] = %c0
+// CHECK:                     arith.muli %{{.*}}, %c4_i32
+// CHECK:                     piko.load checked @image[
+// CHECK:                     piko.store %{{.*}}, checked @image[
+// CHECK-NOT:     piko.fail
+// CHECK:               gpu.barrier
+// Of the errors that threads have found, the first is kept.
+// CHECK:             gpu.barrier
+// CHECK:             memref.store %{{.*}}, %[[LIST]]
+// CHECK:             gpu.terminator
+// CHECK:           piko.fail @draw in %{{.*}} outside bin of @image(
+// CHECK:           memref.dealloc %[[LIST]]
+// CHECK:         piko.close_bins %[[BINS]]
+
+// A thread that has a block for itself has all its pixels.
+// ONE-LABEL: piko.kernel @kernel_draw
+// ONE:         gpu.launch
+// ONE-NOT:     arith.andi %{{.*}} : i32
+// ONE:         gpu.terminator
+
+// STAGE-LABEL: piko.kernel @kernel_draw
+// STAGE:         workgroup({{.*}} : memref<16xi32, #gpu.address_space<workgroup>>
+piko.pipeline @P rank 2 {
+  piko.image @image : @Pixel rank 2
+  piko.source @draw
+  piko.stage @draw bins [8, 8] threads 20 : @Row -> [] {
+    piko.assign {
+    ^bb0(%f: !piko.prim<@Row>):
+      %x = piko.get %f "x" : !piko.prim<@Row> -> i32
+      %y = piko.get %f "y" : !piko.prim<@Row> -> i32
+      %b = piko.bin_at %x, %y : i32, i32
+      piko.assign_to %b
+      piko.return
+    }
+    piko.process {
+    ^bb0(%f: !piko.prim<@Row>):
+      %x = piko.get %f "x" : !piko.prim<@Row> -> i32
+      %y = piko.get %f "y" : !piko.prim<@Row> -> i32
+      %to = piko.get %f "to" : !piko.prim<@Row> -> i32
+      %one = arith.constant 1 : i32
+      scf.while (%i = %x) : (i32) -> (i32) {
+        %more = arith.cmpi slt, %i, %to : i32
+        scf.condition(%more) %i : i32
+      } do {
+      ^bb0(%i: i32):
+        piko.update @image[%i, %y : i32, i32] {
+        ^bb0(%old: i32):
+          %new = arith.addi %old, %one : i32
+          piko.yield [%new : i32]
+        }
+        %next = arith.addi %i, %one : i32
+        scf.yield %next : i32
+      }
+      piko.return
+    }
+  }
+}
+
+// A kernel that updates no pixel stays as it is.
+// CHECK-LABEL: piko.pipeline @Copy
+// CHECK:         scf.forall
+// CHECK-NOT:     gpu.launch
+piko.pipeline @Copy rank 1 {
+  piko.buffer @sink : @Pixel
+  piko.source @copy
+  piko.stage @copy bins [0] threads 64 : @Pixel -> [] {
+    piko.process {
+    ^bb0(%p: !piko.prim<@Pixel>):
+      %v = piko.get %p "n" : !piko.prim<@Pixel> -> i32
+      piko.store %v, @sink[%v : i32] "n" : i32
+      piko.return
+    }
+  }
+}
