@@ -20,10 +20,12 @@ split-file. Substitutions:
                  reference executor
 
 Features: `bunny` where that mesh is installed, `gpu` where an NVIDIA driver
-is, `asan` and `tsan` in builds with that sanitizer.
+is, `ptxas` where NVIDIA's assembler is, `asan` and `tsan` in builds with that
+sanitizer.
 """
 
 import os
+import shutil
 
 import lit.formats
 
@@ -83,6 +85,8 @@ if os.path.exists(bunny):
     config.available_features.add("bunny")
 if os.path.exists("/dev/nvidiactl"):
     config.available_features.add("gpu")
+if shutil.which("ptxas"):
+    config.available_features.add("ptxas")
 if "address" in config.sanitize:
     config.available_features.add("asan")
 if "thread" in config.sanitize:

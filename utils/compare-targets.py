@@ -3,13 +3,15 @@
 """Renders a scene with the reference executor and, over and over, compiled.
 
   compare-targets.py [--render PATH] [--file PIPELINES] [--pipes A B ..]
-                     [--same-picture] [--threads T ..] [--runs N]
+                     [--same-picture] [--threads T ..] [--blocks T ..]
+                     [--runs N]
                      SCENE [piko-render options]
 
 Each compiled run is a process of its own; its image must equal the reference
 executor's bit for bit. With --same-picture the pipelines draw the same, and the
-reference executor runs only the first of them. Prints a line for each pipeline
-and thread count; the exit status is 1 if any image differs.
+reference executor runs only the first of them. With --blocks, kernels for a GPU
+run on the CPU, in blocks of so many threads. Prints a line for each pipeline and
+thread count; the exit status is 1 if any image differs.
 """
 
 import argparse
@@ -39,22 +41,27 @@ def main():
     parser.add_argument("--pipes", nargs="+", default=["Baseline", "Binned"])
     parser.add_argument("--same-picture", action="store_true")
     parser.add_argument("--threads", nargs="+", default=["1", "2", "7"])
+    parser.add_argument("--blocks", nargs="+", default=[])
     parser.add_argument("--runs", type=int, default=10)
     parser.add_argument("scene")
     arguments, arguments.options = parser.parse_known_args()
 
+    mappings = [(f"threads {t}", ["--threads", t]) for t in arguments.threads]
+    if arguments.blocks:
+        mappings = [(f"blocks of {t}", ["--emulate-gpu", "--gpu-threads", t])
+                    for t in arguments.blocks]
     equal, expected = True, None
     for pipe in arguments.pipes:
         if not (expected and arguments.same_picture):
             expected = render(arguments, pipe, ["--target", "reference"])
-        for threads in arguments.threads:
+        for name, options in mappings:
             wrong = 0
             for _ in range(arguments.runs):
-                actual = render(arguments, pipe, ["--threads", threads])
+                actual = render(arguments, pipe, options)
                 wrong += actual["image_hash"] != expected["image_hash"]
             equal &= wrong == 0
             verdict = f"{wrong} differ" if wrong else "all equal the reference"
-            print(f"{expected['scene']} {pipe} threads {threads}: "
+            print(f"{expected['scene']} {pipe} {name}: "
                   f"{arguments.runs} runs, {verdict} "
                   f"({expected['pixels']} pixels drawn)", flush=True)
     return 0 if equal else 1

@@ -7,6 +7,7 @@
 #include "Piko/Dialect/Piko/IR/Piko.h"
 #include "Piko/Driver/Sequences.h"
 
+#include "mlir/Dialect/GPU/IR/GPUDialect.h"
 #include "mlir/Parser/Parser.h"
 #include "mlir/Target/LLVMIR/Export.h"
 #include "llvm/ADT/StringExtras.h"
@@ -115,7 +116,7 @@ piko::readPipelineNames(const CompileOptions &options, MLIRContext &context) {
 
 void piko::addPasses(OpPassManager &passes, Level level,
                      const CheckOptions &check,
-                     const SynthesisOptions &synthesis) {
+                     const SynthesisOptions &synthesis, const GPUOptions &gpu) {
   if (check.enabled)
     addCheckSequence(passes, check);
   if (level >= Level::Kernels)
@@ -124,18 +125,51 @@ void piko::addPasses(OpPassManager &passes, Level level,
                          check.enabled ? SynthesisOptions::none() : synthesis);
   if (level >= Level::Resolved)
     addResolveSequence(passes);
-  if (level >= Level::Target)
-    addCPUSequence(passes);
+  if (level >= Level::Target) {
+    if (gpu.emulate)
+      addGPUSequence(passes, gpu);
+    else
+      addCPUSequence(passes);
+  }
   if (level >= Level::LLVM)
     addLLVMSequence(passes);
 }
 
 LogicalResult piko::lowerPipeline(ModuleOp module, Level level,
                                   const CheckOptions &check,
-                                  const SynthesisOptions &synthesis) {
+                                  const SynthesisOptions &synthesis,
+                                  const GPUOptions &gpu) {
   PassManager passes(module.getContext());
-  addPasses(passes, level, check, synthesis);
+  addPasses(passes, level, check, synthesis, gpu);
   return passes.run(module);
+}
+
+LogicalResult piko::lowerToGPU(ModuleOp module, const CheckOptions &check,
+                               const SynthesisOptions &synthesis,
+                               const GPUOptions &gpu) {
+  Location loc = module.getLoc();
+  for (auto pipeline : module.getOps<PipelineOp>())
+    loc = pipeline.getLoc();
+  PassManager passes(module.getContext());
+  addPasses(passes, Level::Resolved, check, synthesis);
+  addGPUSequence(passes, gpu);
+  if (failed(passes.run(module)))
+    return failure();
+  if (!module.getOps<gpu::GPUModuleOp>().empty())
+    return success();
+  return emitError(loc) << "expected a kernel that updates pixels, which is "
+                           "what a GPU can have";
+}
+
+std::unique_ptr<llvm::Module>
+piko::translateKernels(ModuleOp module, llvm::LLVMContext &context) {
+  PassManager passes(module.getContext());
+  addNVVMSequence(passes);
+  if (failed(passes.run(module)))
+    return nullptr;
+  for (auto kernels : module.getOps<gpu::GPUModuleOp>())
+    return translateModuleToLLVMIR(kernels, context, kernels.getName());
+  return nullptr;
 }
 
 std::unique_ptr<llvm::Module>

@@ -118,7 +118,9 @@ static std::string makeRequest(const ObjectOptions &options,
   key.add(processor.name).add(processor.features);
   for (int number : {int(source.text.has_value()), int(source.check.enabled),
                      int(options.execution), options.target.optLevel,
-                     int(options.target.sanitizer), int(options.remarks)})
+                     int(options.target.sanitizer), int(options.remarks),
+                     int(source.gpu.emulate), int(source.gpu.reverse),
+                     int(source.gpu.threads)})
     key.add(std::to_string(number));
   key.add(options.nameSpace).add(getRuntimeIncludeDir());
   // What Clang looks at besides its options.
@@ -205,7 +207,7 @@ compilePipeline(const ObjectOptions &options, const Files &files,
   }
   object.symbol = getProgramSymbol(options.nameSpace, object.pipeline);
   if (failed(lowerPipeline(*module, Level::LLVM, options.source.check,
-                           options.source.synthesis)))
+                           options.source.synthesis, options.source.gpu)))
     return nullptr;
   std::unique_ptr<llvm::Module> translated =
       translateToLLVMIR(*module, llvmContext);

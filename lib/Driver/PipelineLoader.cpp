@@ -47,6 +47,7 @@ static std::unique_ptr<LoadedProgram> load(CompileOptions source,
   source.defines = options.defines;
   source.check = options.check;
   source.synthesis = options.synthesis;
+  source.gpu = options.gpu;
   bool isReference = options.target == ExecutionTarget::Reference;
   ObjectOptions objectOptions{
       .source = std::move(source),

@@ -12,6 +12,9 @@
 #include "mlir/Conversion/ReconcileUnrealizedCasts/ReconcileUnrealizedCasts.h"
 #include "mlir/Conversion/SCFToControlFlow/SCFToControlFlow.h"
 #include "mlir/Conversion/UBToLLVM/UBToLLVM.h"
+#include "mlir/Dialect/GPU/IR/GPUDialect.h"
+#include "mlir/Dialect/GPU/Transforms/Passes.h"
+#include "mlir/Pass/PassOptions.h"
 #include "mlir/Pass/PassRegistry.h"
 #include "mlir/Transforms/Passes.h"
 
@@ -83,7 +86,46 @@ void piko::addLLVMSequence(OpPassManager &passes) {
   passes.addPass(createReconcileUnrealizedCastsPass());
 }
 
+void piko::addGPUSequence(OpPassManager &passes, const GPUOptions &options) {
+  ConvertPikoToGPUOptions grids;
+  grids.threads = options.threads;
+  passes.nest<PipelineOp>().addPass(createConvertPikoToGPU(grids));
+  addCPUSequence(passes);
+  // Or constants would be arguments.
+  passes.addPass(createGpuLaunchSinkIndexComputationsPass());
+  passes.addPass(createGpuKernelOutliningPass());
+  if (options.emulate) {
+    ConvertGPUToSCFOptions emulation;
+    emulation.reverse = options.reverse;
+    passes.addPass(createConvertGPUToSCF(emulation));
+  }
+  addCleanUp(passes);
+}
+
+void piko::addNVVMSequence(OpPassManager &passes) {
+  OpPassManager &kernels = passes.nest<gpu::GPUModuleOp>();
+  kernels.addPass(createSCFToControlFlowPass());
+  kernels.addPass(createConvertGPUToExactNVVM());
+  addCleanUp(kernels);
+}
+
+namespace {
+struct GPUSequenceOptions : PassPipelineOptions<GPUSequenceOptions> {
+  Option<int64_t> threads{*this, "threads",
+                          llvm::cl::desc("Threads of a block"),
+                          llvm::cl::init(0)};
+};
+} // namespace
+
 void piko::registerSequences() {
+  PassPipelineRegistration<GPUSequenceOptions>(
+      "piko-to-gpu", "From the resolved level to kernels for a GPU",
+      [](OpPassManager &passes, const GPUSequenceOptions &options) {
+        addGPUSequence(passes, {.threads = options.threads});
+      });
+  PassPipelineRegistration<>("piko-gpu-to-nvvm",
+                             "From kernels for a GPU to llvm and nvvm",
+                             addNVVMSequence);
   PassPipelineRegistration<>(
       "piko-synthesize", "From the authored to the kernels level",
       [](OpPassManager &passes) { addSynthesisSequence(passes); });

@@ -21,6 +21,10 @@ it, and says how long a frame took.
                          executor (cpu)
   -I FOLDER, -D NAME[=VALUE]   for the pipeline's preprocessor
   --without PASS,...     passes of synthesis to leave out
+  --emulate-gpu          run kernels for a GPU on the CPU, block by block and
+                         thread by thread
+  --gpu-threads N        threads of a block then, a power of two up to 1024 (as
+                         many as the stage has)
   --no-cache             compile even if nothing changed since the last time
   --cache-dir FOLDER     where compiled code is kept ($PIKO_CACHE_DIR,
                          $XDG_CACHE_HOME/piko or ~/.cache/piko)
@@ -88,6 +92,9 @@ private:
         {"--no-cache", [&] { options.load.cache.enabled = false; }},
         {"--cache-dir", [&] { options.load.cache.directory = value(name); }},
         {"--without", [&] { parseWithout(value("--without")); }},
+        {"--emulate-gpu", [&] { options.load.gpu.emulate = true; }},
+        {"--gpu-threads",
+         [&] { options.load.gpu.threads = integer(name, 1, 1024); }},
         {"--width", [&] { options.view.width = integer(name, 1, 65536); }},
         {"--height", [&] { options.view.height = integer(name, 1, 65536); }},
         {"--lights", [&] { options.lights = integer(name, 0, 1'000'000); }},

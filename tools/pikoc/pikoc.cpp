@@ -10,6 +10,7 @@
 #include "Piko/Driver/Explain.h"
 #include "Piko/Driver/ObjectCompiler.h"
 #include "Piko/Target/Object.h"
+#include "Piko/Target/PTX.h"
 
 #include "llvm/IR/LLVMContext.h"
 #include "llvm/IR/Module.h"
@@ -30,7 +31,9 @@ enum class Emit {
   LLVM,
   LLVMIR,
   Assembly,
-  Object
+  Object,
+  GPU,
+  PTX
 };
 
 struct CommandLine {
@@ -56,7 +59,10 @@ struct CommandLine {
           clEnumValN(Emit::LLVM, "llvm", "the llvm and omp dialects"),
           clEnumValN(Emit::LLVMIR, "llvmir", "LLVM IR"),
           clEnumValN(Emit::Assembly, "assembly", "the processor's language"),
-          clEnumValN(Emit::Object, "object", "an object file to link"))};
+          clEnumValN(Emit::Object, "object", "an object file to link"),
+          clEnumValN(Emit::GPU, "gpu",
+                     "kernels for a GPU, and what launches them"),
+          clEnumValN(Emit::PTX, "ptx", "kernels as NVIDIA's assembly"))};
   llvm::cl::opt<std::string> output{
       "o", llvm::cl::value_desc("file"), llvm::cl::init("-"),
       llvm::cl::desc("where to write (default: standard output)"),
@@ -77,7 +83,18 @@ struct CommandLine {
   llvm::cl::opt<std::string> cpu{
       "cpu", llvm::cl::value_desc("name"),
       llvm::cl::desc("the processor to make code for, as clang names them, or "
-                     "native (default: x86-64-v3, generic elsewhere)"),
+                     "native (default: x86-64-v3, generic elsewhere, sm_90 for "
+                     "ptx)"),
+      llvm::cl::cat(category)};
+  llvm::cl::opt<bool> emulateGPU{
+      "emulate-gpu",
+      llvm::cl::desc("run kernels for a GPU on the CPU, block by block and "
+                     "thread by thread"),
+      llvm::cl::cat(category)};
+  llvm::cl::opt<int64_t> gpuThreads{
+      "gpu-threads", llvm::cl::value_desc("count"), llvm::cl::init(0),
+      llvm::cl::desc("threads of a block, a power of two up to 1024 (default: "
+                     "as many as the stage has)"),
       llvm::cl::cat(category)};
   llvm::cl::opt<unsigned> optLevel{
       "O",
@@ -152,7 +169,8 @@ struct CommandLine {
             .includeDirs = {includeDirs.begin(), includeDirs.end()},
             .defines = {defines.begin(), defines.end()},
             .check = *getCheck(),
-            .synthesis = *getSynthesis()};
+            .synthesis = *getSynthesis(),
+            .gpu = {.threads = gpuThreads, .emulate = emulateGPU}};
   }
   TargetOptions getTarget() const {
     return {.cpu = cpu,
@@ -182,7 +200,13 @@ static std::string checkOptions(const CommandLine &line) {
       (line.header.getNumOccurrences() || line.depfile.getNumOccurrences()))
     return "--header and --depfile belong to an object, which --emit=object or "
            "an -o that ends in .o asks for";
-  if (line.sanitizer.getNumOccurrences() && line.getEmit() < Emit::Assembly)
+  bool isGPU = line.getEmit() >= Emit::GPU;
+  if (line.emulateGPU && isGPU)
+    return "--emulate-gpu is for code that runs on a CPU";
+  if (line.gpuThreads.getNumOccurrences() && !line.emulateGPU && !isGPU)
+    return "--gpu-threads belongs to --emit=gpu, --emit=ptx or --emulate-gpu";
+  if (line.sanitizer.getNumOccurrences() &&
+      (line.getEmit() < Emit::Assembly || isGPU))
     return "--sanitize belongs to an object or assembly";
   if (line.explain && (line.emit.getNumOccurrences() || line.listPipes ||
                        line.getEmit() != Emit::LLVMIR))
@@ -238,6 +262,28 @@ static std::optional<std::string> translate(const CommandLine &line,
   return std::nullopt;
 }
 
+/// Kernels for a GPU, as a level or as PTX; nothing after an error.
+static std::optional<std::string> writeKernels(const CommandLine &line,
+                                               MLIRContext &context) {
+  CompileOptions source = line.getSource();
+  OwningOpRef<ModuleOp> module = readPipeline(source, context);
+  if (!module ||
+      failed(lowerToGPU(*module, source.check, source.synthesis, source.gpu)))
+    return std::nullopt;
+  if (line.getEmit() == Emit::GPU)
+    return print(*module);
+  llvm::LLVMContext llvmContext;
+  std::unique_ptr<llvm::Module> kernels =
+      translateKernels(*module, llvmContext);
+  if (!kernels)
+    return std::nullopt;
+  auto text = generatePTX(*kernels, line.cpu, static_cast<int>(line.optLevel));
+  if (text)
+    return *text;
+  fail(llvm::toString(text.takeError()));
+  return std::nullopt;
+}
+
 /// What a level looks like, the file's pipelines, or a report; nothing after an
 /// error.
 static std::optional<std::string> writeText(const CommandLine &line) {
@@ -251,12 +297,15 @@ static std::optional<std::string> writeText(const CommandLine &line) {
   }
   if (line.explain)
     return explain(line, context);
+  if (line.getEmit() >= Emit::GPU)
+    return writeKernels(line, context);
   Level level = line.getEmit() >= Emit::LLVMIR
                     ? Level::LLVM
                     : static_cast<Level>(line.getEmit());
   OwningOpRef<ModuleOp> module = readPipeline(line.getSource(), context);
-  if (!module || failed(lowerPipeline(*module, level, line.getSource().check,
-                                      *line.getSynthesis())))
+  if (!module ||
+      failed(lowerPipeline(*module, level, line.getSource().check,
+                           *line.getSynthesis(), line.getSource().gpu)))
     return std::nullopt;
   if (line.getEmit() >= Emit::LLVMIR)
     return translate(line, *module);

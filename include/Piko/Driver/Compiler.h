@@ -51,16 +51,29 @@ readPipelineNames(const CompileOptions &options, mlir::MLIRContext &context);
 
 /// Adds the passes that take a module from the authored level to another one.
 void addPasses(mlir::OpPassManager &passes, Level level,
-               const CheckOptions &check, const SynthesisOptions &synthesis);
+               const CheckOptions &check, const SynthesisOptions &synthesis,
+               const GPUOptions &gpu = {});
 
 /// Takes a module from the authored level to another one.
 llvm::LogicalResult lowerPipeline(mlir::ModuleOp module, Level level,
                                   const CheckOptions &check = {},
-                                  const SynthesisOptions &synthesis = {});
+                                  const SynthesisOptions &synthesis = {},
+                                  const GPUOptions &gpu = {});
 
 /// LLVM IR, not optimised, of a module at Level::LLVM; null after diagnostics.
 std::unique_ptr<llvm::Module> translateToLLVMIR(mlir::ModuleOp module,
                                                 llvm::LLVMContext &context);
+
+/// Takes a module from the authored level to one with a `gpu.module`; an error
+/// if the pipeline has no kernel for a GPU.
+llvm::LogicalResult lowerToGPU(mlir::ModuleOp module, const CheckOptions &check,
+                               const SynthesisOptions &synthesis,
+                               const GPUOptions &gpu);
+
+/// LLVM IR, not optimised, of the kernels for a GPU that lowerToGPU() made;
+/// null after diagnostics.
+std::unique_ptr<llvm::Module> translateKernels(mlir::ModuleOp module,
+                                               llvm::LLVMContext &context);
 
 } // namespace piko
 

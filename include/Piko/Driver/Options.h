@@ -6,6 +6,7 @@
 #define PIKO_DRIVER_OPTIONS_H
 
 #include "Piko/Driver/CheckOptions.h"
+#include "Piko/Driver/GPUOptions.h"
 #include "Piko/Driver/SynthesisOptions.h"
 
 #include <cstdint>
@@ -33,6 +34,7 @@ struct CompileOptions {
   std::optional<std::string> text = {};
   CheckOptions check = {};
   SynthesisOptions synthesis = {};
+  GPUOptions gpu = {};
 };
 
 /// Instruments code, which then runs in programs that have the sanitizer's

@@ -34,6 +34,7 @@ struct LoadOptions {
   /// the pipeline's text of fields that must not be NaN.
   CheckOptions check = {};
   SynthesisOptions synthesis = {};
+  GPUOptions gpu = {};
 };
 
 /// A program that is ready to run; its code goes when the object goes, so it

@@ -7,6 +7,7 @@
 #define PIKO_DRIVER_SEQUENCES_H
 
 #include "Piko/Driver/CheckOptions.h"
+#include "Piko/Driver/GPUOptions.h"
 #include "Piko/Driver/SynthesisOptions.h"
 
 #include "mlir/Pass/PassManager.h"
@@ -28,6 +29,14 @@ void addCPUSequence(mlir::OpPassManager &passes);
 
 /// `piko-cpu-to-llvm`: from there to the llvm dialect (and omp) alone.
 void addLLVMSequence(mlir::OpPassManager &passes);
+
+/// `piko-to-gpu`: from the resolved level to kernels in a `gpu.module`, and
+/// functions that launch them and run the others. Where the options say so,
+/// kernels become functions too.
+void addGPUSequence(mlir::OpPassManager &passes, const GPUOptions &options);
+
+/// `piko-gpu-to-nvvm`: the kernels from there to the llvm and nvvm dialects.
+void addNVVMSequence(mlir::OpPassManager &passes);
 
 void registerSequences();
 

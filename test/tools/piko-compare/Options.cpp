@@ -82,7 +82,13 @@ Options parseOptions(int argc, char **argv) {
       if (!synthesis)
         throw std::runtime_error(piko::describeWrongSynthesisOptions(text));
       options.synthesis = *synthesis;
-    } else if (name == "--threads")
+    } else if (name == "--emulate-gpu") {
+      options.gpu.emulate = true;
+      options.gpu.threads =
+          toNumbers<int64_t>(words.takeValues(name, false))[0];
+    } else if (name == "--reverse")
+      options.gpu.reverse = true;
+    else if (name == "--threads")
       options.threads = toNumbers<int>(words.takeValues(name, true));
     else if (name == "--runs")
       options.runs = toNumbers<int>(words.takeValues(name, false))[0];

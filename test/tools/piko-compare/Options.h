@@ -6,6 +6,7 @@
 #define PIKO_TEST_TOOLS_PIKO_COMPARE_OPTIONS_H
 
 #include "Piko/Driver/CheckOptions.h"
+#include "Piko/Driver/GPUOptions.h"
 #include "Piko/Driver/SynthesisOptions.h"
 
 #include <cstdint>
@@ -46,6 +47,9 @@ struct Options {
   /// Checking mode, on both sides.
   piko::CheckOptions check;
   piko::SynthesisOptions synthesis;
+  /// With --emulate-gpu N: kernels run as blocks of N threads, 0 = as the stage
+  /// says; with --reverse from the last thread to the first.
+  piko::GPUOptions gpu;
 };
 
 /// Both throw std::runtime_error.

@@ -72,6 +72,7 @@ struct Programs::Implementation {
   std::string referenceFile;
   CheckOptions check;
   SynthesisOptions synthesis;
+  GPUOptions gpu;
   std::unique_ptr<PipelineFile> file;
   /// Where the compiled file is `.mlir`: a module for each pipeline.
   std::vector<std::pair<std::string, OwningOpRef<ModuleOp>>> modules;
@@ -130,11 +131,12 @@ void Programs::Implementation::compileReference() {
 
 Programs::Programs(const std::string &file, const std::string &reference,
                    const std::string &pipe, const CheckOptions &check,
-                   const SynthesisOptions &synthesis)
+                   const SynthesisOptions &synthesis, const GPUOptions &gpu)
     : self(std::make_unique<Implementation>()) {
   self->referenceFile = reference;
   self->check = check;
   self->synthesis = synthesis;
+  self->gpu = gpu;
   self->file = self->parse(reference, pipe);
   if (file != reference)
     self->readText(file, pipe);
@@ -156,8 +158,8 @@ Program Programs::compile(const std::string &pipe) {
     for (size_t i = 0; i < self->file->size(); ++i)
       if (self->file->getName(i) == pipe)
         module = self->file->translate(i);
-  if (!module ||
-      failed(lowerPipeline(*module, Level::LLVM, self->check, self->synthesis)))
+  if (!module || failed(lowerPipeline(*module, Level::LLVM, self->check,
+                                      self->synthesis, self->gpu)))
     self->log.fail("cannot compile " + pipe);
   auto context = std::make_unique<llvm::LLVMContext>();
   std::unique_ptr<llvm::Module> llvmModule =

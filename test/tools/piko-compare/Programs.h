@@ -7,6 +7,7 @@
 #define PIKO_TEST_TOOLS_PIKO_COMPARE_PROGRAMS_H
 
 #include "Piko/Driver/CheckOptions.h"
+#include "Piko/Driver/GPUOptions.h"
 #include "Piko/Driver/SynthesisOptions.h"
 #include "pikort/pikort.h"
 
@@ -27,7 +28,8 @@ public:
   /// std::runtime_error, as do all functions.
   Programs(const std::string &file, const std::string &reference,
            const std::string &pipe, const piko::CheckOptions &check,
-           const piko::SynthesisOptions &synthesis);
+           const piko::SynthesisOptions &synthesis,
+           const piko::GPUOptions &gpu);
   ~Programs();
 
   /// The pipelines that can be read.

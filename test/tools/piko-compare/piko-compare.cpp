@@ -8,6 +8,7 @@
 //                [--cases FILE] [--threads T ..] [--runs N]
 //                [--timeout SECONDS] [--strip N] [--budget BYTES]
 //                [--check[=nan:RECORD.FIELD,..]]
+//                [--emulate-gpu THREADS [--reverse]]
 //
 // Options.h says what the options mean, Run.h what the input is. With --cases
 // each line of that file is a case, with the options --pipe to --loop-limit; a
@@ -53,7 +54,7 @@ bool compare(const Options &options, const Case &input, Programs &programs) {
 bool compareAll(const Options &options) {
   Programs programs(options.file, options.reference,
                     options.cases.empty() ? options.one.pipe : "",
-                    options.check, options.synthesis);
+                    options.check, options.synthesis, options.gpu);
   if (options.cases.empty()) {
     Case one = options.one;
     std::vector<std::string> names = programs.names();

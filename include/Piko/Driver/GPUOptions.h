@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// How kernels are mapped to a GPU.
+
+#ifndef PIKO_DRIVER_GPUOPTIONS_H
+#define PIKO_DRIVER_GPUOPTIONS_H
+
+#include <cstdint>
+
+namespace piko {
+
+struct GPUOptions {
+  /// Threads of a block, a power of two; 0 = as many as the stage has.
+  int64_t threads = 0;
+  /// Runs kernels for a GPU on the CPU: blocks, and threads between barriers,
+  /// one after the other.
+  bool emulate = false;
+  /// Threads from the last to the first, for an emulation.
+  bool reverse = false;
+};
+
+} // namespace piko
+
+#endif // PIKO_DRIVER_GPUOPTIONS_H
