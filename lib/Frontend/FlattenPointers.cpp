@@ -314,6 +314,11 @@ private:
       } else if (auto *store = dyn_cast<llvm::StoreInst>(user)) {
         if (store->getPointerOperand() == pointer)
           accesses.push_back({store, choice, steps});
+      } else if (auto *call = dyn_cast<llvm::CallInst>(user)) {
+        const Marker *marker = getMarker(call, memory.markers);
+        if (marker && (marker->kind == MarkerKind::atomic ||
+                       marker->kind == MarkerKind::atomicFetch))
+          accesses.push_back({call, choice, steps});
       }
     }
   }
@@ -506,8 +511,8 @@ private:
     dominance.recalculate(function);
   }
 
-  /// Repeats an access with a thing in the place of the choice; null for a
-  /// store.
+  /// Repeats an access with a thing in the place of the choice; null if it
+  /// gives nothing.
   llvm::Value *accessAt(const Access &access, const Shape &shape,
                         llvm::Instruction *at) {
     builder.SetInsertPoint(at);
@@ -522,10 +527,10 @@ private:
       pointer = builder.Insert(clone);
     }
     llvm::Instruction *clone = access.instruction->clone();
-    bool isStore = llvm::isa<llvm::StoreInst>(clone);
-    clone->setOperand(isStore ? 1 : 0, pointer);
+    // An atomic is a call, with the place as its first argument.
+    clone->setOperand(llvm::isa<llvm::StoreInst>(clone) ? 1 : 0, pointer);
     builder.Insert(clone);
-    return isStore ? nullptr : clone;
+    return clone->getType()->isVoidTy() ? nullptr : clone;
   }
 
   llvm::Function &function;

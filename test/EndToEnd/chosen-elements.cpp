@@ -2,6 +2,7 @@
 //
 // Nested choices among elements of one local record, each with an index of its
 // own: instcombine makes one load of them, through a pointer chosen by a phi.
+// Atomics through references to one of several things.
 // RUN: piko-compare %s --count 3000 --wide | FileCheck %s
 // CHECK: equal
 #include <piko.h>
@@ -19,6 +20,7 @@ struct Result {
 };
 struct State {
   piko::Buffer<Result> results;
+  piko::Buffer<int> even, odd;
 };
 
 struct Choose : piko::Stage<0, 0, 64, Record>, piko::Uses<State> {
@@ -36,6 +38,12 @@ struct Choose : piko::Stage<0, 0, 64, Record>, piko::Uses<State> {
         (p.w & 2) ? chosen.amount
                   : q.entries[half(q.entries[0].flag ? p.x : p.y)].amount;
     amount += 3;
+    int local = 5;
+    piko::atomicMax((p.x & 4) ? local : q.z, p.y);
+    piko::atomicAdd(q.entries[half(local)].amount, int64_t(q.z));
+    piko::atomicAdd(p.serial % 2 ? state().odd[p.serial / 2 & 7]
+                                 : state().even[p.serial / 2 & 7],
+                    p.w);
     state().results[p.serial] = {q.entries[0].amount, q.entries[1].amount};
   }
 };
@@ -44,5 +52,7 @@ struct ChosenElements : piko::Pipe<State> {
   ChosenElements() {
     source(choose);
     allocateForSource(state().results, 0);
+    allocateForSource(state().even, 0);
+    allocateForSource(state().odd, 0);
   }
 };
