@@ -74,6 +74,8 @@ struct Edges {
 /// Pixels from lo to hi, both included; empty if hi is below lo.
 struct PixelBox {
   glm::ivec2 lo, hi;
+
+  bool isEmpty() const { return hi.x < lo.x || hi.y < lo.y; }
 };
 
 /// The pixels whose centres lie between the corners lo and hi.
