@@ -61,6 +61,11 @@ private:
   bool hasKernel(int64_t source);
   /// The kernel that runs a stage's process phase, or an empty name.
   StringRef getKernelOf(StringRef stage);
+  /// The barrier in front of a stage's process phase, or null.
+  LocalBarrierOp getBarrier(StringRef stage);
+  /// How the stage waits until a bin is complete: by a local barrier, or as
+  /// `otherwise` says.
+  std::string describeBinWait(StageOp stage, StringRef otherwise);
 
   PipelineOp written, kernels;
   raw_ostream &out;
@@ -153,6 +158,24 @@ StringRef Report::getKernelOf(StringRef stage) {
   return "";
 }
 
+LocalBarrierOp Report::getBarrier(StringRef stage) {
+  StageOp host = hosts.lookup(stage);
+  for (auto kernel : kernels.getOps<KernelOp>())
+    for (auto barrier : kernel.getOps<LocalBarrierOp>())
+      if (host && barrier.getConsumer() == host.getSymName())
+        return barrier;
+  return {};
+}
+
+std::string Report::describeBinWait(StageOp stage, StringRef otherwise) {
+  LocalBarrierOp barrier = getBarrier(stage.getSymName());
+  if (!barrier)
+    return ("a kernel break, because " + otherwise).str();
+  return ("a local barrier behind " + barrier.getProducer() + " in " +
+          getKernelOf(stage.getSymName()))
+      .str();
+}
+
 /// How many bytes a primitive of the stage's input has.
 static int64_t getInputSize(StageOp stage) {
   return lookupRecord(stage, stage.getInputAttr()).getSize();
@@ -180,6 +203,8 @@ void Report::writeInputs(StageOp stage) {
     if (auto carried = edge.getCarried();
         carried && *carried != getInputSize(now))
       out << ", " << *carried << " before it was pruned";
+    if (getBarrier(now.getSymName()))
+      out << ", stored for one bin at a time";
     out << "\n";
   }
 }
@@ -197,8 +222,10 @@ void Report::writeWaits(StageOp stage) {
         out << "a kernel break behind " << kernel << "\n";
     }
   if (schedule && schedule.getEndBin())
-    out << "    waits until nothing can reach the bin: a kernel break, because "
-           "nothing proves that fewer than all producers can\n";
+    out << "    waits until nothing can reach the bin: "
+        << describeBinWait(stage, "nothing proves that fewer than all "
+                                  "producers can")
+        << "\n";
   if (!stage.getTakesList())
     return;
   out << "    takes lists";
@@ -206,7 +233,7 @@ void Report::writeWaits(StageOp stage) {
     out << " of " << *batch << " primitives";
   if (schedule && schedule.getEveryBin())
     out << ", of empty bins too";
-  out << ": a kernel break, because a bin must be complete\n";
+  out << ": " << describeBinWait(stage, "a bin must be complete") << "\n";
 }
 
 void Report::writeStage(StageOp stage) {
@@ -269,7 +296,11 @@ void Report::writeProcess(ProcessOp process) {
   for (auto [number, source] : llvm::enumerate(kernels.getOps<SourceOp>()))
     if (source.getStage() == stage.getSymName() && !hasKernel(number))
       writeAssign(stage, /*hasPhase=*/false, " for source " + Twine(number));
-  if (!isDynamic(stage) && isLoadBalanced(stage))
+  if (LocalBarrierOp barrier = getBarrier(stage.getSymName()))
+    out << "    Local barrier: what " << barrier.getProducer()
+        << " emits in the bin is complete\n    Schedule " << stage.getSymName()
+        << ": with " << barrier.getProducer() << "\n";
+  else if (!isDynamic(stage) && isLoadBalanced(stage))
     out << "    Schedule " << stage.getSymName()
         << ": eliminated, because the OpenMP loop hands bins to any core\n";
   out << "    Process " << stage.getSymName();
@@ -287,7 +318,10 @@ void Report::writeProcess(ProcessOp process) {
           return assign.getStageAttr() == edge.getConsumerAttr() &&
                  assign.getPort() == edge.getPort();
         });
-    writeAssign(consumer, hasPhase);
+    if (getBarrier(consumer.getSymName()))
+      out << "    AssignBin " << consumer.getSymName() << ": the same bin\n";
+    else
+      writeAssign(consumer, hasPhase);
   }
 }
 

@@ -60,6 +60,8 @@ void piko::addSynthesisSequence(OpPassManager &passes,
   if (options.has("eliminate-schedules"))
     pipeline.addPass(createEliminateSchedules());
   pipeline.addPass(createFormKernels());
+  if (options.has("fuse-kernels"))
+    pipeline.addPass(createFuseKernels());
   if (options.has("form-strips"))
     pipeline.addPass(createFormStrips());
 }

@@ -14,7 +14,8 @@ static bool contains(const std::vector<std::string> &names,
 const std::vector<std::string> &SynthesisOptions::getOptional() {
   static const std::vector<std::string> names = {
       "pre-schedule", "infer-directives", "fuse-stages",         "test-early",
-      "prune",        "own-pixels",       "eliminate-schedules", "form-strips"};
+      "prune",        "own-pixels",       "eliminate-schedules", "fuse-kernels",
+      "form-strips"};
   return names;
 }
 

@@ -151,7 +151,9 @@ Value piko::findBin(OpBuilder &builder, Operation *op) {
     if (!cells)
       continue;
     auto bins = cells.getBins().getDefiningOp<OpenBinsOp>();
-    if (!bins || bins.getSource())
+    if (!bins)
+      continue; // over the calls of a piko.local_bin, which is of one bin
+    if (bins.getSource())
       return {};
     auto stage = lookupInPipeline<StageOp>(op, bins.getStageAttr());
     Value cell = loop.getInductionVar();

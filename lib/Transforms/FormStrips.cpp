@@ -9,6 +9,8 @@
 //      nothing shows that they run before all primitives have come;
 //   3. a group of two kernels or more becomes a piko.strips.
 
+#include "StateAccess.h"
+
 #include "Piko/Transforms/Passes.h"
 
 #include "llvm/ADT/MapVector.h"
@@ -28,9 +30,6 @@ struct Node {
   SmallVector<KernelOp> kernels;
   llvm::SetVector<Operation *> stages;
 };
-
-/// How a stage uses a piece of state.
-enum Access { reads = 1, writes = 2, changesAtomically = 4 };
 
 /// Why a node is not in a group, and what shows it.
 struct Reason {
@@ -111,8 +110,8 @@ std::optional<Reason> Group::findConflict(StageOp stage) {
   for (auto [state, mine] : accesses->lookup(stage))
     for (StageOp other : stages) {
       int theirs = accesses->lookup(other).lookup(state), both = mine | theirs;
-      if (other == stage || !theirs || both == reads ||
-          both == changesAtomically)
+      if (other == stage || !theirs || both == StateAccess::reads ||
+          both == StateAccess::changesAtomically)
         continue;
       return Reason{("it and stage " + quote(other) + " both use @" +
                      cast<FlatSymbolRefAttr>(state).getValue() +
@@ -232,7 +231,8 @@ static StageOp getStage(KernelOp kernel) {
   return getPhaseStage(*kernel.getOps<AssignOp>().begin());
 }
 
-/// A source's kernel runs right before the stage's own, and is of its node.
+/// A source's kernel runs right before the stage's own, and is of its node; so
+/// are all stages of one kernel.
 static SmallVector<Node> findNodes(PipelineOp pipeline) {
   SmallVector<Node> nodes;
   StageOp last;
@@ -244,6 +244,8 @@ static SmallVector<Node> findNodes(PipelineOp pipeline) {
       nodes.emplace_back();
     nodes.back().kernels.push_back(kernel);
     nodes.back().stages.insert(stage);
+    for (auto process : kernel.getOps<ProcessOp>())
+      nodes.back().stages.insert(getPhaseStage(process));
     last = stage;
   }
   return nodes;
@@ -253,20 +255,8 @@ static SmallVector<Node> findNodes(PipelineOp pipeline) {
 static Accesses findAccesses(PipelineOp pipeline) {
   Accesses accesses;
   pipeline.walk([&](Operation *op) {
-    Attribute state;
-    int access = 0;
-    if (auto load = dyn_cast<LoadOp>(op))
-      std::tie(state, access) =
-          std::pair(Attribute(load.getStateAttr()), reads);
-    else if (auto update = dyn_cast<UpdateOp>(op))
-      std::tie(state, access) =
-          std::pair(Attribute(update.getImageAttr()), writes);
-    else if (isa<StoreOp, AtomicOp>(op))
-      std::tie(state, access) = std::pair(
-          op->getAttr("state"), isa<StoreOp>(op) ? writes : changesAtomically);
-    if (!state)
-      return;
-    accesses[getPhaseStage(op)][state] |= access;
+    if (auto [state, access] = getStateAccess(op); state)
+      accesses[getPhaseStage(op)][state] |= access;
   });
   return accesses;
 }

@@ -35,17 +35,12 @@ private:
   scf::ForOp loop;
 };
 
-static OpenWriterOp findWriter(Operation *op) {
-  auto forall = op->getParentOfType<scf::ForallOp>();
-  if (forall)
-    for (auto writer : forall.getOps<OpenWriterOp>())
-      return writer;
-  return {};
-}
-
-static StageOp findStage(Operation *op) {
-  for (auto bins : op->getParentOfType<KernelOp>().getOps<OpenBinsOp>())
-    return lookupInPipeline<StageOp>(bins, bins.getStageAttr());
+static Value findWriter(Operation *op) {
+  if (auto local = op->getParentOfType<LocalBinOp>())
+    return local.getWriter();
+  if (auto forall = op->getParentOfType<scf::ForallOp>())
+    for (auto open : forall.getOps<OpenWriterOp>())
+      return open.getWriter();
   return {};
 }
 
@@ -82,12 +77,11 @@ LoopSplitter::LoopSplitter(ParallelForOp parallel)
       count(parallel.getCount()), uniformity(hoistInvariants(parallel)) {}
 
 LogicalResult LoopSplitter::run() {
-  OpenWriterOp open = findWriter(parallel);
-  stage = findStage(parallel);
-  if (!open || !stage)
+  writer = findWriter(parallel);
+  stage = getKernelStage(parallel);
+  if (!writer || !stage)
     return parallel.emitOpError(
         "expected to be in the loop over a kernel's units");
-  writer = open.getWriter();
   if (failed(checkControlFlow()))
     return failure();
 

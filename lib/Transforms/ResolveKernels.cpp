@@ -6,7 +6,8 @@
 //   2. move the process phase (or, for a source, nothing) into the innermost;
 //   3. turn each emission into an append, followed by a copy of the consumer's
 //      assign phase;
-//   4. turn assignments into placements, and queries into arithmetic.
+//   4. turn assignments into placements, and queries into arithmetic;
+//   5. do the same for each phase behind a local barrier, where a bin ends.
 
 #include "PhaseGraph.h"
 #include "Resolve.h"
@@ -38,6 +39,15 @@ struct Place {
   Value input; ///< the primitive, or the list
 };
 
+/// A process phase and the assign phases that take its ports.
+struct Group {
+  LocalBarrierOp barrier; // null for the first
+  ProcessOp process;
+  llvm::DenseMap<int64_t, AssignOp> assigns; // by port
+  StageOp stage;
+  Value writer;
+};
+
 class KernelResolver {
 public:
   explicit KernelResolver(KernelOp kernel);
@@ -49,7 +59,13 @@ private:
   /// and the place there but for its writer.
   Place buildCellLoops(OpBuilder &builder, Value bins, Value unit);
   Place buildCallLoop(OpBuilder &builder, Value bins, Value unit);
-  void resolveEmit(EmitOp emit, const Place &place);
+  /// A loop over primitives, or over calls, of a list of one bin.
+  Value buildItemLoop(OpBuilder &builder, StageOp of, Value bins, Value begin,
+                      Value end);
+  void buildLocalBin(OpBuilder &builder, Group &group, Value bin);
+  /// Moves a group's process phase to where `builder` stands.
+  void resolveProcess(OpBuilder &builder, Group &group, const Place &place);
+  void resolveEmit(EmitOp emit, Group &group, const Place &place);
   void resolveAssign(OpBuilder &builder, AssignOp assign, Value prim,
                      const Place &place);
   void resolveAssignment(Operation *op, StageOp consumer, OwnerOp owner,
@@ -57,24 +73,31 @@ private:
 
   KernelOp kernel;
   Location loc;
-  ProcessOp process;                         // null in a source's kernel
-  AssignOp sourceAssign;                     // null elsewhere
-  llvm::DenseMap<int64_t, AssignOp> assigns; // by port
-  StageOp stage;
+  SmallVector<Group> groups;   // none in a source's kernel
+  AssignOp sourceAssign;       // null elsewhere
+  StageOp stage;               // whose bins are open
+  Operation *binEnd = nullptr; // in front of which what waits for a bin goes
 };
 
 } // namespace
 
 KernelResolver::KernelResolver(KernelOp kernel)
-    : kernel(kernel), loc(kernel.getLoc()), process(kernel.getProcess()) {
-  for (auto assign : kernel.getOps<AssignOp>()) {
-    if (assign.getPort())
-      assigns[*assign.getPort()] = assign;
-    else
-      sourceAssign = assign;
+    : kernel(kernel), loc(kernel.getLoc()) {
+  for (Operation &op : *kernel.getBodyBlock()) {
+    if (auto process = dyn_cast<ProcessOp>(op)) {
+      Group &group = groups.emplace_back();
+      group.barrier = dyn_cast_or_null<LocalBarrierOp>(op.getPrevNode());
+      group.process = process;
+      group.stage = getPhaseStage(process);
+    }
+    if (auto assign = dyn_cast<AssignOp>(op)) {
+      if (assign.getPort())
+        groups.back().assigns[*assign.getPort()] = assign;
+      else
+        sourceAssign = assign;
+    }
   }
-  stage = getPhaseStage(process ? process.getOperation()
-                                : sourceAssign.getOperation());
+  stage = sourceAssign ? getPhaseStage(sourceAssign) : groups.front().stage;
 }
 
 void piko::expandQueries(Operation *root, StageOp stage, Value bin) {
@@ -117,10 +140,21 @@ Place KernelResolver::buildLoops(OpBuilder &builder) {
 
   Value unit = forall.getInductionVar(0);
   builder.setInsertionPoint(forall.getTerminator());
-  Value writer = OpenWriterOp::create(builder, loc, bins, unit);
-  auto close = CloseWriterOp::create(builder, loc, writer);
+  Value writer =
+      OpenWriterOp::create(builder, loc, bins, unit, FlatSymbolRefAttr());
+  Operation *close = CloseWriterOp::create(builder, loc, writer);
+  for (Group &group : groups) {
+    group.writer = writer;
+    if (!group.barrier)
+      continue;
+    Location at = group.process.getLoc();
+    builder.setInsertionPoint(close);
+    group.writer = OpenWriterOp::create(builder, at, bins, unit,
+                                        group.process.getStageAttr());
+    close = CloseWriterOp::create(builder, at, group.writer);
+  }
   builder.setInsertionPoint(close);
-  Place place = process && stage.getTakesList()
+  Place place = stage.getTakesList() && !source
                     ? buildCallLoop(builder, bins, unit)
                     : buildCellLoops(builder, bins, unit);
   place.writer = writer;
@@ -129,23 +163,29 @@ Place KernelResolver::buildLoops(OpBuilder &builder) {
   return place;
 }
 
+Value KernelResolver::buildItemLoop(OpBuilder &builder, StageOp of, Value bins,
+                                    Value begin, Value end) {
+  Value one = arith::ConstantIndexOp::create(builder, loc, 1);
+  auto loop = scf::ForOp::create(builder, loc, begin, end, one);
+  loop->setAttr("piko.lanes", builder.getUnitAttr());
+  builder.setInsertionPointToStart(loop.getBody());
+  auto type = PrimType::get(builder.getContext(), of.getInputAttr());
+  return ItemOp::create(builder, loc, type, bins, loop.getInductionVar());
+}
+
 Place KernelResolver::buildCellLoops(OpBuilder &builder, Value bins,
                                      Value unit) {
   auto cells = UnitCellsOp::create(builder, loc, bins, unit);
   Value one = arith::ConstantIndexOp::create(builder, loc, 1);
   auto cellLoop =
       scf::ForOp::create(builder, loc, cells.getBegin(), cells.getEnd(), one);
+  binEnd = cellLoop.getBody()->getTerminator();
   builder.setInsertionPointToStart(cellLoop.getBody());
   Value cell = cellLoop.getInductionVar();
   Value bin = CellBinOp::create(builder, loc, bins, cell);
   auto range = CellRangeOp::create(builder, loc, bins, unit, cell);
-  auto itemLoop =
-      scf::ForOp::create(builder, loc, range.getBegin(), range.getEnd(), one);
-  itemLoop->setAttr("piko.lanes", builder.getUnitAttr());
-  builder.setInsertionPointToStart(itemLoop.getBody());
-  auto primType = PrimType::get(builder.getContext(), stage.getInputAttr());
   Value prim =
-      ItemOp::create(builder, loc, primType, bins, itemLoop.getInductionVar());
+      buildItemLoop(builder, stage, bins, range.getBegin(), range.getEnd());
   return {Value(), bin, prim};
 }
 
@@ -161,42 +201,109 @@ Place KernelResolver::buildCallLoop(OpBuilder &builder, Value bins,
   auto range = CallRangeOp::create(builder, loc, bins, call);
   Value list = ListOp::create(builder, loc, stage.getProcessType(), bins,
                               range.getBegin(), range.getEnd());
+  if (groups.size() > 1) {
+    // A bin ends with its last batch: the next call is for another one.
+    Value last = arith::SubIOp::create(builder, loc, calls.getEnd(), one);
+    Value next = arith::AddIOp::create(builder, loc, call, one);
+    Value at = arith::MinUIOp::create(builder, loc, next, last);
+    Value other = CallBinOp::create(builder, loc, bins, at);
+    auto compare = [&](arith::CmpIPredicate predicate, Value a, Value b) {
+      return arith::CmpIOp::create(builder, loc, predicate, a, b).getResult();
+    };
+    Value ends = arith::OrIOp::create(
+        builder, loc, compare(arith::CmpIPredicate::eq, call, last),
+        compare(arith::CmpIPredicate::ne, other, bin));
+    auto choice = scf::IfOp::create(builder, loc, ends,
+                                    /*withElseRegion=*/false);
+    binEnd = choice.thenBlock()->getTerminator();
+    builder.setInsertionPoint(choice);
+  }
   return {Value(), bin, list};
+}
+
+void KernelResolver::buildLocalBin(OpBuilder &builder, Group &group,
+                                   Value bin) {
+  Location at = group.barrier.getLoc();
+  Value source;
+  for (Group &other : groups)
+    if (other.process.getStageAttr() == group.barrier.getProducerAttr())
+      source = other.writer;
+  auto local =
+      LocalBinOp::create(builder, at, group.process.getStageAttr(), source,
+                         group.barrier.getPortAttr(), group.writer);
+  auto type = BinsType::get(builder.getContext(), group.stage.getInputAttr());
+  Block &body = local.getBody().emplaceBlock();
+  Value bins = body.addArgument(type, at);
+  builder.setInsertionPointToEnd(&body);
+  Value zero = arith::ConstantIndexOp::create(builder, at, 0);
+  auto next = NextOp::create(builder, at, group.writer);
+  builder.setInsertionPoint(next);
+  Value input;
+  if (group.stage.getTakesList()) {
+    auto calls = UnitCellsOp::create(builder, at, bins, zero);
+    Value one = arith::ConstantIndexOp::create(builder, at, 1);
+    auto loop =
+        scf::ForOp::create(builder, at, calls.getBegin(), calls.getEnd(), one);
+    builder.setInsertionPointToStart(loop.getBody());
+    auto range = CallRangeOp::create(builder, at, bins, loop.getInductionVar());
+    input = ListOp::create(builder, at, group.stage.getProcessType(), bins,
+                           range.getBegin(), range.getEnd());
+  } else {
+    auto range = CellRangeOp::create(builder, at, bins, zero, zero);
+    input = buildItemLoop(builder, group.stage, bins, range.getBegin(),
+                          range.getEnd());
+  }
+  resolveProcess(builder, group, {group.writer, bin, input});
+  builder.setInsertionPointAfter(local);
+}
+
+void KernelResolver::resolveProcess(OpBuilder &builder, Group &group,
+                                    const Place &place) {
+  SmallVector<EmitOp> emits;
+  group.process.walk([&](EmitOp emit) { emits.push_back(emit); });
+  // Before emissions bring in the assign phases of other stages, whose queries
+  // are about other bins.
+  expandQueries(group.process, group.stage, place.bin);
+  IRRewriter rewriter(builder);
+  Block &body = group.process.getBody().front();
+  body.getTerminator()->erase();
+  rewriter.inlineBlockBefore(&body, builder.getInsertionBlock(),
+                             builder.getInsertionPoint(), place.input);
+  for (EmitOp emit : emits)
+    resolveEmit(emit, group, place);
 }
 
 void KernelResolver::run() {
   OpBuilder builder = OpBuilder::atBlockEnd(kernel.getBodyBlock());
   Place place = buildLoops(builder);
-  if (sourceAssign) {
+  if (sourceAssign)
     resolveAssign(builder, sourceAssign, place.input, place);
-  } else {
-    IRRewriter rewriter(builder);
-    Block &body = process.getBody().front();
-    body.getTerminator()->erase();
-    rewriter.inlineBlockBefore(&body, builder.getInsertionBlock(),
-                               builder.getInsertionPoint(), place.input);
-    SmallVector<EmitOp> emits;
-    kernel.walk([&](EmitOp emit) { emits.push_back(emit); });
-    // Before emissions bring in the assign phases of other stages, whose
-    // queries are about other bins.
-    for (auto loop : kernel.getOps<scf::ForallOp>())
-      expandQueries(loop, stage, place.bin);
-    for (EmitOp emit : emits)
-      resolveEmit(emit, place);
+  for (Group &group : groups) {
+    if (!group.barrier) {
+      resolveProcess(builder, group, place);
+      if (binEnd)
+        builder.setInsertionPoint(binEnd);
+      continue;
+    }
+    buildLocalBin(builder, group, place.bin);
+    for (auto edge : getPipeline(kernel).getOps<EdgeOp>())
+      if (edge.getConsumerAttr() == group.process.getStageAttr())
+        edge.setLocal(true);
   }
-  for (auto assign : llvm::to_vector(kernel.getOps<AssignOp>()))
-    assign.erase();
-  if (process)
-    process.erase();
+  for (Operation &op : llvm::make_early_inc_range(*kernel.getBodyBlock()))
+    if (isa<ProcessOp, AssignOp, LocalBarrierOp>(op))
+      op.erase();
 }
 
-void KernelResolver::resolveEmit(EmitOp emit, const Place &place) {
+void KernelResolver::resolveEmit(EmitOp emit, Group &group,
+                                 const Place &place) {
   OpBuilder builder(emit);
-  auto record = cast<FlatSymbolRefAttr>(stage.getOutputs()[emit.getPort()]);
+  auto record =
+      cast<FlatSymbolRefAttr>(group.stage.getOutputs()[emit.getPort()]);
   Value stored = AppendOp::create(
       builder, emit.getLoc(), PrimType::get(builder.getContext(), record),
       place.writer, emit.getPortAttr(), emit.getValues());
-  if (AssignOp assign = assigns.lookup(emit.getPort()))
+  if (AssignOp assign = group.assigns.lookup(emit.getPort()))
     resolveAssign(builder, assign, stored, place);
   emit.erase();
 }
@@ -281,7 +388,10 @@ static void noteStages(PipelineOp pipeline) {
                                    ? WalkResult::interrupt()
                                    : WalkResult::advance();
                       }).wasInterrupted());
-    stage.setSplit(!serial && !ordered);
+    // Where a bin's end counts, one thread runs it.
+    bool isLocal =
+        !op->getParentOfType<KernelOp>().getOps<LocalBarrierOp>().empty();
+    stage.setSplit(!serial && !ordered && !isLocal);
   });
 }
 

@@ -179,3 +179,91 @@ piko.pipeline @Lists rank 2 {
     }
   }
 }
+
+// A bin of @a is followed by @b, on what port 0 has kept of it, and by @c on
+// what @b has emitted; each has a writer of its own. A bin of @a ends with the
+// last of its calls. One thread runs a bin.
+// CHECK-LABEL: piko.pipeline @Local
+// CHECK:         piko.edge @a[0] -> @b local
+// CHECK:         piko.edge @b[0] -> @c local
+// CHECK-NOT:     split
+// CHECK:         piko.kernel @kernel_a
+// CHECK:           %[[BINS:.*]] = piko.open_bins @a : !piko.bins<@F>
+// CHECK:           scf.forall (%[[UNIT:.*]]) in
+// CHECK:             %[[W:.*]] = piko.open_writer %[[BINS]][%[[UNIT]]] : !piko.bins<@F>
+// CHECK-DAG:         %[[V:.*]] = piko.open_writer %[[BINS]][%[[UNIT]]] of @b
+// CHECK-DAG:         %[[U:.*]] = piko.open_writer %[[BINS]][%[[UNIT]]] of @c
+// CHECK:             %[[C0:.*]], %[[C1:.*]] = piko.unit_cells %[[BINS]]
+// CHECK:             scf.for %[[CALL:.*]] = %[[C0]] to %[[C1]]
+// CHECK:               %[[BIN:.*]] = piko.call_bin %[[BINS]][%[[CALL]]]
+// CHECK:               %[[NEXT:.*]] = piko.call_bin
+// CHECK:               %[[OTHER:.*]] = arith.cmpi ne, %[[NEXT]], %[[BIN]]
+// CHECK:               %[[ENDS:.*]] = arith.ori %{{.*}}, %[[OTHER]]
+// CHECK:               piko.append %[[W]][0]
+// CHECK:               piko.place %[[W]][0] of @b in %[[BIN]]
+// CHECK:               piko.next %[[W]]
+// CHECK:               scf.if %[[ENDS]] {
+// CHECK:                 piko.local_bin @b from %[[W]][0] writer %[[V]] {
+// CHECK-NEXT:            ^bb0(%[[LIST:.*]]: !piko.bins<@F>):
+// CHECK:                   piko.unit_cells %[[LIST]][%c0]
+// CHECK:                   piko.call_range %[[LIST]]
+// CHECK:                   piko.append %[[V]][0]
+// CHECK:                   piko.place %[[V]][0] of @c in %[[BIN]]
+// CHECK:                   piko.next %[[V]]
+// CHECK:                 piko.local_bin @c from %[[V]][0] writer %[[U]] {
+// CHECK-NEXT:            ^bb0(%[[ITEMS:.*]]: !piko.bins<@F>):
+// CHECK:                   piko.cell_range %[[ITEMS]][%c0, %c0]
+// CHECK:                   piko.item %[[ITEMS]]
+// CHECK:                   piko.update @image{{.*}} in %[[BIN]]
+// CHECK:                   piko.next %[[U]]
+// CHECK-DAG:         piko.close_writer %[[U]]
+// CHECK-DAG:         piko.close_writer %[[V]]
+// CHECK-DAG:         piko.close_writer %[[W]]
+piko.pipeline @Local rank 1 {
+  piko.image @image : @F rank 1
+  piko.source @a
+  piko.edge @a[0] -> @b
+  piko.edge @b[0] -> @c
+  piko.stage @a bins [8] threads 1 : list @F -> [@F] {}
+  piko.stage @b bins [8] threads 1 : list @F -> [@F] {}
+  piko.stage @c bins [8] threads 1 : @F -> [] {
+    piko.schedule load_balance end_bin
+  }
+  piko.kernel @kernel_a {
+    piko.process of @a {
+    ^bb0(%l: !piko.list<@F>):
+      %zero = arith.constant 0 : i32
+      piko.emit 0 (%zero, %zero) : i32, i32
+      piko.return
+    }
+    piko.assign of @b port 0 {
+    ^bb0(%f: !piko.prim<@F>):
+      piko.assign_previous
+      piko.return
+    }
+    piko.local_barrier @a[0] -> @b
+    piko.process of @b {
+    ^bb0(%l: !piko.list<@F>):
+      %zero = arith.constant 0 : index
+      %f = piko.list_at %l[%zero] : !piko.list<@F> -> !piko.prim<@F>
+      %x = piko.get %f "x" : !piko.prim<@F> -> i32
+      piko.emit 0 (%x, %x) : i32, i32
+      piko.return
+    }
+    piko.assign of @c port 0 {
+    ^bb0(%f: !piko.prim<@F>):
+      piko.assign_previous
+      piko.return
+    }
+    piko.local_barrier @b[0] -> @c
+    piko.process of @c {
+    ^bb0(%f: !piko.prim<@F>):
+      %x = piko.get %f "x" : !piko.prim<@F> -> i32
+      piko.update @image[%x : i32] {
+      ^bb0(%a: i32, %b: i32):
+        piko.yield [%x, %x : i32, i32]
+      }
+      piko.return
+    }
+  }
+}

@@ -36,6 +36,7 @@ class Chains(Statements):
         r = self.random
         self.use("chains")
         self.function_seed = r.random()
+        self.collecting_share = r.choice([0.15, 0.15, 1.5])
         self.constant = [s for s in pipe.state
                          if s.kind == "constant" or s.name.startswith("table")]
         kind = r.choice(["i32"] * 6 + ["i64", "i16", "u32"])

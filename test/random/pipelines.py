@@ -203,8 +203,10 @@ class Generator(Chains):
         """Decides what a stage is before its bodies are made."""
         r = self.random
         stage = pipe.stages[index]
-        # What collects is not fused, so that there is less of it in a chain.
-        share = 0.15 if index in self.links else 1
+        # What collects is not fused into a stage, so that there is less of it in
+        # most chains; in the others, what waits for its bin follows it.
+        inside = index in self.links
+        share = self.collecting_share if inside else 1
         if self.on("lists") and r.random() < 0.3 * share:
             stage.is_list = True
             self.use("lists")
@@ -212,7 +214,7 @@ class Generator(Chains):
                    if j != index and j not in self.reachable(pipe, index, self.waits)
                    and index in range(len(pipe.stages))]
         # Nobody waits for a stage of its own cycle, or for one behind it.
-        if choices and self.on("endStage") and r.random() < 0.3 * share:
+        if choices and self.on("endStage") and r.random() < (0.045 if inside else 0.3):
             for target in r.sample(choices, min(len(choices), r.choice([1, 1, 2]))):
                 self.waits.append((target, index))
                 stage.schedule.append(Directive("endStage", stage=target))

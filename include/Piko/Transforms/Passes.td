@@ -205,9 +205,10 @@ def FuseStages : Pass<"piko-fuse-stages", "::piko::PipelineOp"> {
     }
     ```
 
-    **Limits**: a stage on a cycle, one that collects and one whose iterations
-    meet at barriers are not fused. Neither is one that would be copied to more
-    than `max-copies` places. A remark gives the reason for each edge that stays.
+    **Limits**: a stage on a cycle, one that collects (see `piko-fuse-kernels`)
+    and one whose iterations meet at barriers are not fused. Neither is one that
+    would be copied to more than `max-copies` places. A remark gives the reason
+    for each edge that stays.
   }];
   let options = [
     Option<"maxCopies", "max-copies", "int64_t", "4",
@@ -419,6 +420,59 @@ def FormKernels : Pass<"piko-form-kernels", "::piko::PipelineOp"> {
   let statistics = [Statistic<"kernels", "kernels", "kernels formed">];
 }
 
+def FuseKernels : Pass<"piko-fuse-kernels", "::piko::PipelineOp"> {
+  let summary = "Run stages for a bin, one after another, before the next bin";
+  let description = [{
+    **Requires** the kernels level, before `piko-form-strips`; best after
+    `piko-infer-directives`.
+
+    **Does**: merges the kernel of a stage that takes a list, or waits with
+    `end_bin`, into the kernel of the stage that feeds it, behind a
+    `piko.local_barrier`. So the wait is for the bin alone, the primitives
+    between the two are stored for one bin of each thread at a time, and as many
+    successive stages as possible run for one bin before the next. Both stages
+    have bins of one size, one edge and no source lead to the consumer, and
+    `piko.assign_previous` is all that assigns it. Schedules put a bin onto one
+    core for both: they are alike, or the consumer's is `load_balance` and the
+    producer does not have `serialize`.
+
+    **Guarantees** that lists, updates of a pixel and emissions keep their lineage
+    order.
+
+    Before:
+    ```
+    piko.kernel @kernel_a {
+      piko.process of @a { ... piko.emit 0 (%x) : i32 ... }
+      piko.assign of @b port 0 { ... piko.assign_previous ... }
+    }
+    piko.kernel @kernel_b { piko.process of @b { ... } }
+    ```
+    After:
+    ```
+    piko.kernel @kernel_a {
+      piko.process of @a { ... piko.emit 0 (%x) : i32 ... }
+      piko.assign of @b port 0 { ... piko.assign_previous ... }
+      piko.local_barrier @a[0] -> @b
+      piko.process of @b { ... }
+    }
+    ```
+
+    **Limits**: one thread runs a bin, so that a bin that is the whole domain, or
+    that is cut into tiles, stays with several threads and a kernel break, unless
+    it has `serialize`. So do a stage on a cycle, one that waits with `end_stage`
+    for what runs later than its producer, one with a schedule for each bin, and
+    one that runs for empty bins behind a list that does not. Stages of which one writes state that
+    another one uses are not merged, and no kernel is moved past another such
+    one, unless both only change it atomically; two stages of one kernel may
+    update the same image. Merged kernels do not run in strips. A pipeline that
+    is checked is left as it is. A remark gives the reason for each stage that
+    stays.
+  }];
+  let statistics = [
+    Statistic<"fused", "fused", "stages that run behind a local barrier">,
+    Statistic<"refused", "refused", "edges that stay a kernel break">];
+}
+
 def FormStrips : Pass<"piko-form-strips", "::piko::PipelineOp"> {
   let summary = "Find kernels that can take a source strip by strip";
   let description = [{
@@ -472,6 +526,8 @@ def ResolveKernels : Pass<"piko-resolve-kernels", "::piko::PipelineOp"> {
     units of work of the stage's bins, in it a loop over the unit's cells and in
     that one over the primitives of a cell, marked `piko.lanes`. Where the
     process phase takes a list, the inner loop is over the calls of the phase.
+    What stands behind a `piko.local_barrier` follows when a bin is done, as a
+    `piko.local_bin`.
     Emissions become stores into the unit's own writer, followed by the
     consumer's assign phase, whose assignments become `piko.place`; queries of
     bins and of the grid become arithmetic. The body of a dynamic schedule

@@ -289,15 +289,36 @@ struct OpenWriterLowering : Lowering<OpenWriterOp> {
                   ConversionPatternRewriter &rewriter) const override {
     auto function = op->getParentOfType<func::FuncOp>();
     auto number = function->getAttrOfType<IntegerAttr>(numberAttrName);
+    int64_t subject = op.getStage() ? context.stageNumber(op, *op.getStage())
+                                    : number.getInt();
     Location loc = op.getLoc();
     rewriter.replaceOp(
-        op, context.call(
-                rewriter, loc,
-                function->hasAttr(sourceAttrName) ? "pikoir_open_source"
-                                                  : "pikoir_open",
-                pointer(rewriter),
-                {context.frame(op), createI32(rewriter, loc, number.getInt()),
-                 toI64(rewriter, loc, adaptor.getUnit())}));
+        op,
+        context.call(rewriter, loc,
+                     function->hasAttr(sourceAttrName) ? "pikoir_open_source"
+                                                       : "pikoir_open",
+                     pointer(rewriter),
+                     {context.frame(op), createI32(rewriter, loc, subject),
+                      toI64(rewriter, loc, adaptor.getUnit())}));
+    return success();
+  }
+};
+
+struct LocalBinLowering : Lowering<LocalBinOp> {
+  using Lowering::Lowering;
+  LogicalResult
+  matchAndRewrite(LocalBinOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    Location loc = op.getLoc();
+    Value port = createI32(rewriter, loc, op.getPort());
+    Value bins = context
+                     .call(rewriter, loc, "pikoir_begin_local",
+                           pointer(rewriter), {adaptor.getSource(), port})
+                     .getResult();
+    rewriter.inlineBlockBefore(op.getBodyBlock(), op, bins);
+    context.call(rewriter, loc, "pikoir_end_local", Type(),
+                 {adaptor.getSource(), port});
+    rewriter.eraseOp(op);
     return success();
   }
 };
@@ -541,7 +562,7 @@ void piko::populateKernelToLLVMPatterns(const TypeConverter &converter,
                UnitCellsLowering, CellRangeLowering, CellBinLowering,
                CallRangeLowering, CallBinLowering, ItemLowering, NoItemLowering,
                ToAddressLowering, FromAddressLowering, OpenWriterLowering,
-               WriterCallLowering<CloseWriterOp, &closeName>,
+               LocalBinLowering, WriterCallLowering<CloseWriterOp, &closeName>,
                WriterCallLowering<NextOp, &nextName>,
                WriterCallLowering<DeferEndOp, &deferEndName>,
                WriterNumberLowering<DeferBeginOp, &deferBeginName>,

@@ -242,11 +242,14 @@ void SetupWriter::run(ArrayRef<func::FuncOp> kernels) {
     call("pikoir_declare_source",
          {i32(index),
           i32(numbers.stages.lookup(source.getStageAttr().getAttr()))});
-  for (auto edge : pipeline.getOps<EdgeOp>())
+  for (auto edge : pipeline.getOps<EdgeOp>()) {
+    int32_t producer = numbers.stages.lookup(edge.getProducerAttr().getAttr());
     call("pikoir_declare_edge",
-         {i32(numbers.stages.lookup(edge.getProducerAttr().getAttr())),
-          i32(edge.getPort()),
+         {i32(producer), i32(edge.getPort()),
           i32(numbers.stages.lookup(edge.getConsumerAttr().getAttr()))});
+    if (edge.getLocal())
+      call("pikoir_declare_local", {i32(producer), i32(edge.getPort())});
+  }
   for (auto [name, number] : numbers.states)
     declareState(SymbolTable::lookupSymbolIn(pipeline, name), number);
   for (auto [number, strips] : llvm::enumerate(pipeline.getOps<StripsOp>()))

@@ -18,16 +18,6 @@ namespace piko {
 using namespace mlir;
 using namespace piko;
 
-/// The stage whose kernel an operation of the resolved level is in, or null.
-static StageOp getKernelStage(Operation *op) {
-  auto kernel = op->getParentOfType<KernelOp>();
-  if (!kernel)
-    return {};
-  for (auto bins : kernel.getOps<OpenBinsOp>())
-    return lookupInPipeline<StageOp>(kernel, bins.getStageAttr());
-  return {};
-}
-
 static SmallVector<Value> toIndices(BinArithmetic &bins, ValueRange values) {
   return llvm::map_to_vector(values, [&](Value v) { return bins.toIndex(v); });
 }

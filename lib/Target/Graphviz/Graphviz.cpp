@@ -3,9 +3,10 @@
 // Pipelines drawn as graphs. The stages of a pipeline are nodes at every level;
 // once kernels are formed, their phases are, inside a box for each kernel, and
 // an edge of the pipeline runs from a process phase to the assign phase that
-// takes its port, or to the next process phase where there is none. A dotted
-// edge leads to the process phases of the stages that were fused with it. A
-// schedule that has code of its own is a kernel, too.
+// takes its port, or to the next process phase where there is none; it is bold
+// where a local barrier keeps what it carries in a bin. A dotted edge leads to
+// the process phases of the stages that were fused with it. A schedule that has
+// code of its own is a kernel, too.
 
 #include "Piko/Target/Graphviz.h"
 
@@ -41,6 +42,7 @@ private:
   /// consumer: `from` is "producer.port", or "source.number".
   std::string assignNode(StringRef stage, StringRef from);
   bool hasAssignPhase(StringRef stage, StringRef from);
+  bool isLocal(EdgeOp edge);
 
   PipelineOp pipeline;
   raw_ostream &stream;
@@ -164,7 +166,16 @@ void DotWriter::writeSource(SourceOp source, int64_t number) {
   stream << processNode(stage) << " [label=" << label << "];\n";
 }
 
+bool DotWriter::isLocal(EdgeOp edge) {
+  for (auto kernel : pipeline.getOps<KernelOp>())
+    for (auto barrier : kernel.getOps<LocalBarrierOp>())
+      if (barrier.getConsumerAttr() == edge.getConsumerAttr())
+        return true;
+  return false;
+}
+
 void DotWriter::writeEdge(EdgeOp edge) {
+  StringRef style = isLocal(edge) ? ", style=bold" : "";
   auto producer = lookupInPipeline<StageOp>(edge, edge.getProducerAttr());
   std::string label = "port " + std::to_string(edge.getPort());
   if (producer && edge.getPort() < int64_t(producer.getOutputs().size()))
@@ -176,11 +187,12 @@ void DotWriter::writeEdge(EdgeOp edge) {
   stream << "  " << processNode(edge.getProducer()) << " -> ";
   if (hasAssignPhase(edge.getConsumer(), from))
     stream << assignNode(edge.getConsumer(), from) << " [label=" << quote(label)
-           << "];\n  " << assignNode(edge.getConsumer(), from) << " -> "
-           << processNode(edge.getConsumer()) << ";\n";
+           << style << "];\n  " << assignNode(edge.getConsumer(), from)
+           << " -> " << processNode(edge.getConsumer())
+           << (style.empty() ? "" : " [style=bold]") << ";\n";
   else
     stream << processNode(edge.getConsumer()) << " [label=" << quote(label)
-           << "];\n";
+           << style << "];\n";
 }
 
 void DotWriter::writeDrain(StageOp stage) {

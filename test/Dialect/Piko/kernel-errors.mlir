@@ -20,12 +20,12 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 piko.pipeline @P rank 2 {
   piko.source @a
   piko.stage @a bins [0, 0] threads 1 : @F -> [] {}
-  // expected-error@+1 {{expected at most one process phase, but got 2}}
   piko.kernel @k {
     piko.process of @a {
     ^bb0(%f: !piko.prim<@F>):
       piko.return
     }
+    // expected-error@+1 {{expected to be the first of its kernel, or behind a local barrier that names @a}}
     piko.process of @a {
     ^bb0(%f: !piko.prim<@F>):
       piko.return
@@ -311,4 +311,180 @@ piko.pipeline @P rank 1 {
   // expected-note @below {{it is here, too}}
   piko.strips source 0 [@l, @m]
   piko.kernel @m {}
+}
+
+// -----
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+piko.pipeline @P rank 1 {
+  piko.source @a
+  piko.edge @a[0] -> @b
+  piko.stage @a bins [8] threads 1 : @F -> [@F] {}
+  piko.stage @b bins [8] threads 1 : list @F -> [] {}
+  piko.kernel @k {
+    // expected-error @below {{expected the process phase of @a in front of it}}
+    piko.local_barrier @a[0] -> @b
+    piko.process of @b {
+    ^bb0(%l: !piko.list<@F>):
+      piko.return
+    }
+  }
+}
+
+// -----
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+piko.pipeline @P rank 1 {
+  piko.source @a
+  piko.edge @a[0] -> @b
+  piko.stage @a bins [8] threads 1 : @F -> [@F] {}
+  piko.stage @b bins [8] threads 1 : list @F -> [] {}
+  piko.kernel @k {
+    piko.process of @a {
+    ^bb0(%f: !piko.prim<@F>):
+      piko.return
+    }
+    // expected-error @below {{expected to stand in front of a process phase}}
+    piko.local_barrier @a[0] -> @b
+  }
+}
+
+// -----
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+piko.pipeline @P rank 1 {
+  piko.source @a
+  piko.edge @a[0] -> @b
+  piko.stage @a bins [8] threads 1 : @F -> [@F] {}
+  piko.stage @b bins [8] threads 1 : list @F -> [] {}
+  piko.kernel @k {
+    piko.process of @a {
+    ^bb0(%f: !piko.prim<@F>):
+      piko.return
+    }
+    // expected-error @below {{expected an edge from port 1 of @a to @b, but there is none}}
+    piko.local_barrier @a[1] -> @b
+    piko.process of @b {
+    ^bb0(%l: !piko.list<@F>):
+      piko.return
+    }
+  }
+}
+
+// -----
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+piko.pipeline @P rank 1 {
+  piko.source @a
+  piko.edge @a[0] -> @b
+  piko.stage @a bins [8] threads 1 : @F -> [@F] {}
+  piko.stage @b bins [4] threads 1 : list @F -> [] {}
+  piko.kernel @k {
+    piko.process of @a {
+    ^bb0(%f: !piko.prim<@F>):
+      piko.return
+    }
+    // expected-error @below {{expected stages with bins of one size, but got [8] and [4]}}
+    piko.local_barrier @a[0] -> @b
+    piko.process of @b {
+    ^bb0(%l: !piko.list<@F>):
+      piko.return
+    }
+  }
+}
+
+// -----
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+piko.pipeline @P rank 1 {
+  piko.source @a
+  piko.edge @a[0] -> @b
+  piko.stage @a bins [8] threads 1 : @F -> [@F] {}
+  piko.stage @b bins [8] threads 1 : @F -> [] {}
+  piko.kernel @k {
+    piko.process of @a {
+    ^bb0(%f: !piko.prim<@F>):
+      piko.return
+    }
+    // expected-error @below {{expected a stage that waits for its bin, but @b does not}}
+    piko.local_barrier @a[0] -> @b
+    piko.process of @b {
+    ^bb0(%l: !piko.prim<@F>):
+      piko.return
+    }
+  }
+}
+
+// -----
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+piko.pipeline @P rank 1 {
+  piko.source @a
+  piko.edge @a[0] -> @b
+  piko.stage @a bins [8] threads 1 : @F -> [@F] {}
+  piko.stage @b bins [8] threads 1 : list @F -> [] {}
+  piko.kernel @k {
+    %bins = piko.open_bins @a : !piko.bins<@F>
+    %u = piko.unit_count %bins : !piko.bins<@F>
+    %w = piko.open_writer %bins[%u] : !piko.bins<@F>
+    // expected-error @below {{expected a stage, but got @c, which is none}}
+    %v = piko.open_writer %bins[%u] of @c : !piko.bins<@F>
+  }
+}
+
+// -----
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+piko.pipeline @P rank 1 {
+  piko.source @a
+  piko.edge @a[0] -> @b
+  piko.stage @a bins [8] threads 1 : @F -> [@F] {}
+  piko.stage @b bins [8] threads 1 : list @F -> [] {}
+  piko.kernel @k {
+    %bins = piko.open_bins @a : !piko.bins<@F>
+    %u = piko.unit_count %bins : !piko.bins<@F>
+    %w = piko.open_writer %bins[%u] : !piko.bins<@F>
+    // expected-error @below {{expected a writer of @b, but got one of 'a'}}
+    piko.local_bin @b from %w[0] writer %w {
+    ^bb0(%local: !piko.bins<@F>):
+    }
+  }
+}
+
+// -----
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+piko.pipeline @P rank 1 {
+  piko.source @a
+  piko.edge @a[0] -> @b
+  piko.stage @a bins [8] threads 1 : @F -> [@F] {}
+  piko.stage @b bins [8] threads 1 : list @F -> [] {}
+  piko.kernel @k {
+    %bins = piko.open_bins @a : !piko.bins<@F>
+    %u = piko.unit_count %bins : !piko.bins<@F>
+    %w = piko.open_writer %bins[%u] : !piko.bins<@F>
+    // expected-error @below {{expected a port below 1, which is how many the kernel of stage 'a' has, but got 1}}
+    piko.local_bin @b from %w[1] writer %w {
+    ^bb0(%local: !piko.bins<@F>):
+    }
+  }
+}
+
+// -----
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+piko.pipeline @P rank 1 {
+  piko.source @a
+  piko.edge @a[0] -> @b
+  piko.stage @a bins [8] threads 1 : @F -> [@F] {}
+  piko.stage @b bins [8] threads 1 : list @F -> [] {}
+  piko.kernel @k {
+    %bins = piko.open_bins @a : !piko.bins<@F>
+    %u = piko.unit_count %bins : !piko.bins<@F>
+    %w = piko.open_writer %bins[%u] : !piko.bins<@F>
+    // expected-error @below {{expected one block argument of type '!piko.bins<@F>'}}
+    piko.local_bin @b from %w[0] writer %w {
+    ^bb0(%local: index):
+    }
+  }
 }

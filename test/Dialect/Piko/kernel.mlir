@@ -90,6 +90,46 @@ piko.pipeline @Resolved rank 2 {
   }
 }
 
+// A stage behind a local barrier, and how it works on the storage of one bin.
+// CHECK-LABEL: piko.pipeline @Local
+piko.pipeline @Local rank 1 {
+  piko.source @a
+  // CHECK: piko.edge @a[0] -> @b local
+  piko.edge @a[0] -> @b local
+  piko.stage @a bins [8] threads 64 : @F -> [@F] {}
+  piko.stage @b bins [8] threads 64 : list @F -> [] {}
+  // CHECK: piko.kernel @phases {
+  piko.kernel @phases {
+    piko.process of @a {
+    ^bb0(%f: !piko.prim<@F>):
+      piko.return
+    }
+    // CHECK: piko.local_barrier @a[0] -> @b
+    piko.local_barrier @a[0] -> @b
+    piko.process of @b {
+    ^bb0(%l: !piko.list<@F>):
+      piko.return
+    }
+  }
+  // CHECK: piko.kernel @loops {
+  piko.kernel @loops {
+    %bins = piko.open_bins @a : !piko.bins<@F>
+    %u = piko.unit_count %bins : !piko.bins<@F>
+    %w = piko.open_writer %bins[%u] : !piko.bins<@F>
+    // CHECK: %[[V:.*]] = piko.open_writer %{{.*}}[%{{.*}}] of @b : !piko.bins<@F>
+    %v = piko.open_writer %bins[%u] of @b : !piko.bins<@F>
+    // CHECK-NEXT: piko.local_bin @b from %{{.*}}[0] writer %[[V]] {
+    // CHECK-NEXT: ^bb0(%[[LOCAL:.*]]: !piko.bins<@F>):
+    // CHECK-NEXT: piko.unit_cells %[[LOCAL]]
+    // CHECK-NEXT: piko.next %[[V]]
+    piko.local_bin @b from %w[0] writer %v {
+    ^bb0(%local: !piko.bins<@F>):
+      %c0, %c1 = piko.unit_cells %local[%u] : !piko.bins<@F>
+      piko.next %v
+    }
+  }
+}
+
 // Calls of a list process, scratch memory, emissions that wait, and the kernel
 // of a dynamic schedule.
 // CHECK-LABEL: piko.pipeline @Lists

@@ -96,3 +96,46 @@ piko.pipeline @Draw rank 1 {
     }
   }
 }
+
+// What a local barrier keeps in a bin is bold, and in one box.
+// CHECK: digraph "Local" {
+// CHECK: subgraph "cluster_kernel_spread" {
+// CHECK: "process spread" [label=
+// CHECK-NEXT: "assign sort spread.0" [label="assign sort"];
+// CHECK-NEXT: "process sort" [label="process sort\nbins 8, 64 threads"];
+// CHECK-NEXT: }
+// CHECK: "process spread" -> "assign sort spread.0" [label="port 0: Point", style=bold];
+// CHECK-NEXT: "assign sort spread.0" -> "process sort" [style=bold];
+piko.pipeline @Local rank 1 {
+  piko.buffer @sums : @Point
+  piko.source @spread
+  piko.edge @spread[0] -> @sort
+  piko.stage @spread bins [8] threads 64 : @Point -> [@Point] {
+    piko.assign {
+    ^bb0(%p: !piko.prim<@Point>):
+      piko.assign_all
+      piko.return
+    }
+    piko.process {
+    ^bb0(%p: !piko.prim<@Point>):
+      %x = piko.get %p "x" : !piko.prim<@Point> -> i32
+      piko.emit 0 (%x) : i32
+      piko.return
+    }
+  }
+  piko.stage @sort bins [8] threads 64 : list @Point -> [] {
+    piko.assign {
+    ^bb0(%p: !piko.prim<@Point>):
+      piko.assign_previous
+      piko.return
+    }
+    piko.process {
+    ^bb0(%l: !piko.list<@Point>):
+      %zero = arith.constant 0 : index
+      %p = piko.list_at %l[%zero] : !piko.list<@Point> -> !piko.prim<@Point>
+      %x = piko.get %p "x" : !piko.prim<@Point> -> i32
+      piko.atomic add @sums[%zero : index] "x", %x : i32
+      piko.return
+    }
+  }
+}

@@ -153,6 +153,17 @@ StageOp piko::getPhaseStage(Operation *op) {
   return {};
 }
 
+StageOp piko::getKernelStage(Operation *op) {
+  if (auto local = op->getParentOfType<LocalBinOp>())
+    return lookupInPipeline<StageOp>(local, local.getStageAttr());
+  auto kernel = op->getParentOfType<KernelOp>();
+  if (!kernel)
+    return {};
+  for (auto bins : kernel.getOps<OpenBinsOp>())
+    return lookupInPipeline<StageOp>(kernel, bins.getStageAttr());
+  return {};
+}
+
 RecordOp piko::lookupRecord(Operation *from, FlatSymbolRefAttr name) {
   auto module = from->getParentOfType<ModuleOp>();
   return module ? module.lookupSymbol<RecordOp>(name) : RecordOp();

@@ -13,20 +13,44 @@ ProcessOp KernelOp::getProcess() {
   return {};
 }
 
+/// Each process phase but the first stands behind a barrier that names it.
+static LogicalResult verifyBarriers(KernelOp kernel) {
+  llvm::SmallDenseSet<Attribute> before;
+  for (Operation &op : *kernel.getBodyBlock()) {
+    if (auto process = dyn_cast<ProcessOp>(op)) {
+      auto barrier = dyn_cast_or_null<LocalBarrierOp>(op.getPrevNode());
+      if (!before.empty() &&
+          (!barrier || barrier.getConsumerAttr() != process.getStageAttr()))
+        return process.emitOpError("expected to be the first of its kernel, or "
+                                   "behind a local barrier that names ")
+               << process.getStageAttr();
+      if (!before.insert(process.getStageAttr()).second)
+        return process.emitOpError("expected one process phase of ")
+               << process.getStageAttr();
+    }
+    auto barrier = dyn_cast<LocalBarrierOp>(op);
+    if (!barrier)
+      continue;
+    if (!before.contains(barrier.getProducerAttr()))
+      return barrier.emitOpError("expected the process phase of ")
+             << barrier.getProducerAttr() << " in front of it";
+    if (!isa_and_nonnull<ProcessOp>(op.getNextNode()))
+      return barrier.emitOpError("expected to stand in front of a process "
+                                 "phase");
+  }
+  return success();
+}
+
 LogicalResult KernelOp::verifyRegions() {
   bool hasPhase = false, hasOther = false;
-  int processes = 0;
-  for (Operation &op : *getBodyBlock()) {
-    (isa<AssignOp, ProcessOp>(op) ? hasPhase : hasOther) = true;
-    processes += isa<ProcessOp>(op);
-  }
+  for (Operation &op : *getBodyBlock())
+    (isa<AssignOp, ProcessOp, LocalBarrierOp>(op) ? hasPhase : hasOther) = true;
   if (hasPhase && hasOther)
     return emitOpError("expected phases (the kernels level) or loops (the "
                        "resolved level), but got both");
-  if (processes > 1)
-    return emitOpError("expected at most one process phase, but got ")
-           << processes;
-  if (!hasPhase || processes)
+  if (failed(verifyBarriers(*this)))
+    return failure();
+  if (!hasPhase || getProcess())
     return success();
   // Without a process phase the kernel places the primitives of one source.
   auto assigns = getOps<AssignOp>();
@@ -34,6 +58,30 @@ LogicalResult KernelOp::verifyRegions() {
     return emitOpError("expected a process phase, or the assign phase of one "
                        "source alone");
   return success();
+}
+
+LogicalResult LocalBarrierOp::verifySymbolUses(SymbolTableCollection &) {
+  for (auto edge : getPipeline(*this).getOps<EdgeOp>()) {
+    if (edge.getProducerAttr() != getProducerAttr() ||
+        edge.getPort() != getPort() ||
+        edge.getConsumerAttr() != getConsumerAttr())
+      continue;
+    auto producer = lookupInPipeline<StageOp>(*this, getProducerAttr());
+    auto consumer = lookupInPipeline<StageOp>(*this, getConsumerAttr());
+    if (!producer || !consumer)
+      break; // the edge has an error
+    if (producer.getBins() != consumer.getBins())
+      return emitOpError("expected stages with bins of one size, but got ")
+             << "[" << producer.getBins() << "] and [" << consumer.getBins()
+             << "]";
+    if (!consumer.collects())
+      return emitOpError("expected a stage that waits for its bin, but ")
+             << getConsumerAttr() << " does not";
+    return success();
+  }
+  return emitOpError("expected an edge from port ")
+         << getPort() << " of " << getProducerAttr() << " to "
+         << getConsumerAttr() << ", but there is none";
 }
 
 LogicalResult StripsOp::verifySymbolUses(SymbolTableCollection &) {
@@ -116,19 +164,32 @@ LogicalResult ItemOp::verify() {
                       getPrim().getType().getRecord(), "primitive");
 }
 
+LogicalResult OpenWriterOp::verifySymbolUses(SymbolTableCollection &) {
+  return getStageAttr() ? verifyStage(*this, getStageAttr()) : success();
+}
+
 /// The operation that opened the bins that a writer is for, or null.
 static OpenBinsOp getOpenBins(Value writer) {
   auto open = writer.getDefiningOp<OpenWriterOp>();
   return open ? open.getBins().getDefiningOp<OpenBinsOp>() : OpenBinsOp();
 }
 
-/// The record that a port of the stage whose kernel opened `writer` emits; null
-/// where that is not known, a failure where there is no such port.
+/// The stage whose emissions a writer is for, or null.
+static StageOp getWriterStage(Value writer) {
+  OpenBinsOp bins = getOpenBins(writer);
+  if (!bins)
+    return {};
+  auto open = writer.getDefiningOp<OpenWriterOp>();
+  return lookupInPipeline<StageOp>(
+      bins, open.getStageAttr() ? open.getStageAttr() : bins.getStageAttr());
+}
+
+/// The record that a port of the stage that `writer` is for emits; null where
+/// that is not known, a failure where there is no such port.
 static FailureOr<FlatSymbolRefAttr> verifyPort(Operation *op, Value writer,
                                                int64_t port) {
   OpenBinsOp bins = getOpenBins(writer);
-  auto stage =
-      bins ? lookupInPipeline<StageOp>(bins, bins.getStageAttr()) : StageOp();
+  StageOp stage = getWriterStage(writer);
   if (!stage)
     return FlatSymbolRefAttr();
   int64_t ports = bins.getSource() ? 0 : stage.getOutputs().size();
@@ -137,6 +198,28 @@ static FailureOr<FlatSymbolRefAttr> verifyPort(Operation *op, Value writer,
            << ports << ", which is how many the kernel of stage '"
            << stage.getSymName() << "' has, but got " << port;
   return cast<FlatSymbolRefAttr>(stage.getOutputs()[port]);
+}
+
+LogicalResult LocalBinOp::verifySymbolUses(SymbolTableCollection &) {
+  if (failed(verifyStage(*this, getStageAttr())))
+    return failure();
+  auto stage = lookupInPipeline<StageOp>(*this, getStageAttr());
+  auto expected = BinsType::get(getContext(), stage.getInputAttr());
+  if (getBodyBlock()->getNumArguments() != 1 || getBins().getType() != expected)
+    return emitOpError("expected one block argument of type ") << expected;
+  FailureOr<FlatSymbolRefAttr> emitted =
+      verifyPort(*this, getSource(), getPort());
+  if (failed(emitted))
+    return failure();
+  if (*emitted && *emitted != stage.getInputAttr())
+    return emitOpError("expected a port of record ")
+           << stage.getInputAttr() << ", which " << getStageAttr()
+           << " takes, but got " << *emitted;
+  if (StageOp other = getWriterStage(getWriter()); other && other != stage)
+    return emitOpError("expected a writer of ")
+           << getStageAttr() << ", but got one of '" << other.getSymName()
+           << "'";
+  return success();
 }
 
 LogicalResult AppendOp::verifySymbolUses(SymbolTableCollection &) {

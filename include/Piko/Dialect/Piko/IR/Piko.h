@@ -43,6 +43,10 @@ PipelineOp getPipeline(mlir::Operation *op);
 /// or null.
 StageOp getPhaseStage(mlir::Operation *op);
 
+/// The stage that an operation of the resolved level is of: that of the
+/// `piko.local_bin` around it, or whose bins the kernel opens; or null.
+StageOp getKernelStage(mlir::Operation *op);
+
 /// The record of that name, seen from `from`, or null.
 RecordOp lookupRecord(mlir::Operation *from, mlir::FlatSymbolRefAttr name);
 

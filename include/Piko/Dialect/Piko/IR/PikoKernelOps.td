@@ -16,8 +16,9 @@ def Piko_KernelOp : Piko_Op<"kernel", [
     Kernels run one after another, in the order in which they stand in the
     pipeline; a kernel starts when the one before it has ended. Kernels of stages
     on a common cycle run again and again, until nothing is left of it. At the
-    kernels level the body holds phases: the process phase of a stage and the
-    assign phases of the stages that it feeds, or the assign phase of a source.
+    kernels level the body holds phases: the process phase of a stage and, behind
+    it, the assign phases of the stages that it feeds, or the assign phase of a
+    source. More process phases may follow, each behind a `piko.local_barrier`.
     At the resolved level it holds loops over the units of work of a stage's
     bins, the first of which is an `scf.forall`, and no phase. The kernel of a
     dynamic schedule is a loop over bins and runs before all others.
@@ -59,9 +60,56 @@ def Piko_KernelOp : Piko_Op<"kernel", [
   let hasRegionVerifier = 1;
   let extraClassDeclaration = [{
     ::mlir::Block *getBodyBlock() { return &getBody().front(); }
-    /// The process phase, or null (a source's kernel, or the resolved level).
+    /// The first process phase, or null (a source's kernel, or the resolved
+    /// level).
     ProcessOp getProcess();
   }];
+}
+
+def Piko_LocalBarrierOp : Piko_Op<"local_barrier", [
+    HasParent<"KernelOp">, DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
+  let summary = "what a port emits stays in its bin, for the next phase";
+  let description = [{
+    Stands in front of a process phase that runs in the kernel of the stage that
+    feeds it. For each bin, the phases in front of the barrier run for all that is
+    in the bin, then the phase behind it runs for what they have emitted to the
+    port. The consumer collects, has bins of the same size, and has this edge
+    alone.
+
+    ```mlir
+    piko.record @F {"x" : i32 at 0} size 4 align 4
+    piko.pipeline @P rank 1 {
+      piko.source @start
+      piko.edge @start[0] -> @last
+      piko.stage @start bins [8] threads 64 : @F -> [@F] {}
+      piko.stage @last bins [8] threads 64 : list @F -> [] {
+        piko.schedule load_balance end_bin
+      }
+      piko.kernel @kernel_start {
+        piko.process of @start {
+        ^bb0(%f: !piko.prim<@F>):
+          %x = piko.get %f "x" : !piko.prim<@F> -> i32
+          piko.emit 0 (%x) : i32
+          piko.return
+        }
+        piko.assign of @last port 0 {
+        ^bb0(%f: !piko.prim<@F>):
+          piko.assign_previous
+          piko.return
+        }
+        piko.local_barrier @start[0] -> @last
+        piko.process of @last {
+        ^bb0(%l: !piko.list<@F>):
+          piko.return
+        }
+      }
+    }
+    ```
+  }];
+  let arguments = (ins FlatSymbolRefAttr:$producer,
+                       ConfinedAttr<Piko_I64Attr, [IntNonNegative]>:$port,
+                       FlatSymbolRefAttr:$consumer);
+  let assemblyFormat = "$producer `[` $port `]` `->` $consumer attr-dict";
 }
 
 def Piko_StripsOp : Piko_Op<"strips", [
@@ -255,16 +303,56 @@ def Piko_ItemOp : Piko_Op<"item", [Pure]> {
   }];
 }
 
-def Piko_OpenWriterOp : Piko_Op<"open_writer"> {
+def Piko_OpenWriterOp : Piko_Op<"open_writer", [
+    DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
   let summary = "where a unit of work leaves what it emits";
   let description = [{
+    With `of` it is for the emissions of another stage, which runs in the same
+    kernel (`piko.local_bin`).
+
     ```mlir
     %w = piko.open_writer %bins[%unit] : !piko.bins<@Fragment>
+    %v = piko.open_writer %bins[%unit] of @shade : !piko.bins<@Fragment>
     ```
   }];
-  let arguments = (ins Piko_BinsType:$bins, Index:$unit);
+  let arguments = (ins Piko_BinsType:$bins, Index:$unit,
+                       OptionalAttr<FlatSymbolRefAttr>:$stage);
   let results = (outs Piko_WriterType:$writer);
-  let assemblyFormat = "$bins `[` $unit `]` attr-dict `:` qualified(type($bins))";
+  let assemblyFormat = [{
+    $bins `[` $unit `]` (`of` $stage^)? attr-dict `:` qualified(type($bins))
+  }];
+}
+
+def Piko_LocalBinOp : Piko_Op<"local_bin", [
+    SingleBlock, NoTerminator,
+    DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
+  let summary = "runs a stage on what a port has emitted in a bin";
+  let description = [{
+    A local barrier: the body is the stage's, and its argument holds all that the
+    port of the first writer has kept since the last time, in the order of its
+    emission, as the one unit, and the one cell, of a bin. Of a stage that takes
+    a list, the cells of the unit are the calls. It is gone at the end. What the
+    stage emits goes to the second writer.
+
+    ```mlir
+    piko.local_bin @shade from %writer[0] writer %other {
+    ^bb0(%bins: !piko.bins<@Fragment>):
+      %c0, %c1 = piko.unit_cells %bins[%zero] : !piko.bins<@Fragment>
+      piko.next %other
+    }
+    ```
+  }];
+  let arguments = (ins FlatSymbolRefAttr:$stage, Piko_WriterType:$source,
+                       Piko_I64Attr:$port, Piko_WriterType:$writer);
+  let regions = (region SizedRegion<1>:$body);
+  let assemblyFormat = [{
+    $stage `from` $source `[` $port `]` `writer` $writer
+    attr-dict-with-keyword $body
+  }];
+  let extraClassDeclaration = [{
+    ::mlir::Block *getBodyBlock() { return &getBody().front(); }
+    ::mlir::Value getBins() { return getBody().getArgument(0); }
+  }];
 }
 
 def Piko_CloseWriterOp : Piko_Op<"close_writer"> {

@@ -176,7 +176,9 @@ def Piko_EdgeOp : Piko_Op<"edge", [
     Each port of each stage has exactly one edge, and its primitives are of the
     record that the consumer takes. Here what `@half` emits to port 0 is what
     `@drop` processes. `carried` is set by `piko-prune`, which may give the
-    consumer a smaller record: how many bytes a primitive had before.
+    consumer a smaller record: how many bytes a primitive had before. At the
+    resolved level, `local` says that the consumer runs in the producer's kernel
+    (`piko.local_bin`).
 
     ```mlir
     piko.record @F {"z" : f32 at 0} size 4 align 4
@@ -203,9 +205,11 @@ def Piko_EdgeOp : Piko_Op<"edge", [
   let arguments = (ins FlatSymbolRefAttr:$producer,
                        ConfinedAttr<Piko_I64Attr, [IntNonNegative]>:$port,
                        FlatSymbolRefAttr:$consumer,
-                       OptionalAttr<ConfinedAttr<Piko_I64Attr, [IntPositive]>>:$carried);
+                       OptionalAttr<ConfinedAttr<Piko_I64Attr, [IntPositive]>>:$carried,
+                       UnitAttr:$local);
   let assemblyFormat = [{
-    $producer `[` $port `]` `->` $consumer (`carried` $carried^)? attr-dict
+    $producer `[` $port `]` `->` $consumer (`carried` $carried^)?
+    (`local` $local^)? attr-dict
   }];
 }
 

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// How phases use state.
+
+#ifndef PIKO_LIB_TRANSFORMS_STATEACCESS_H
+#define PIKO_LIB_TRANSFORMS_STATEACCESS_H
+
+#include "Piko/Dialect/Piko/IR/Piko.h"
+
+namespace piko {
+
+namespace StateAccess {
+/// Bits, of which a phase may have several.
+enum Kind { reads = 1, stores = 2, changesAtomically = 4, updates = 8 };
+} // namespace StateAccess
+
+/// The state that an operation of a phase uses, and how; null if it uses none.
+std::pair<mlir::FlatSymbolRefAttr, int> getStateAccess(mlir::Operation *op);
+
+} // namespace piko
+
+#endif // PIKO_LIB_TRANSFORMS_STATEACCESS_H
