@@ -13,7 +13,7 @@ using namespace piko;
 
 /// What is wrong with an operation by itself; empty if nothing.
 static std::string findObstacle(Operation *op) {
-  if (isa<AppendOp, PlaceOp>(op))
+  if (isa<AppendOp, PlaceOp, LocalBinOp>(op))
     return "emits primitives";
   if (isa<ListOp, ListSizeOp, ListAtOp, CallRangeOp, CallBinOp>(op))
     return "takes a list of primitives";
