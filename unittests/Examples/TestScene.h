@@ -96,15 +96,17 @@ inline bool equal(const Picture &a, const Picture &b) {
 /// Gives a mesh to a pipeline, as a buffer of vertices or through sources.
 template <class Pipeline>
 void feedMesh(Pipeline &pipeline, const Input &input) {
-  if constexpr (requires { pipeline.state().mesh; }) {
+  constexpr bool hasMesh = requires { pipeline.state().mesh; };
+  if constexpr (hasMesh)
     pipeline.state().mesh.assign(input.vertices);
+  if constexpr (requires { pipeline.setup; }) {
+    pipeline.feed(pipeline.vertexShader, input.vertices);
+    pipeline.feed(pipeline.setup, input.triangles);
+  } else if constexpr (hasMesh) {
     pipeline.feed(pipeline.vertexShader, input.triangles);
   } else {
     pipeline.feed(pipeline.vertexShader, input.vertices);
-    if constexpr (requires { pipeline.setup; })
-      pipeline.feed(pipeline.setup, input.triangles);
-    else
-      pipeline.feed(pipeline.rasterizer, input.triangles);
+    pipeline.feed(pipeline.rasterizer, input.triangles);
   }
 }
 

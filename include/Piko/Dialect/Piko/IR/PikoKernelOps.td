@@ -336,8 +336,8 @@ def Piko_LocalBinOp : Piko_Op<"local_bin", [
 
     ```mlir
     piko.local_bin @shade from %writer[0] writer %other {
-    ^bb0(%bins: !piko.bins<@Fragment>):
-      %c0, %c1 = piko.unit_cells %bins[%zero] : !piko.bins<@Fragment>
+    ^bb0(%local: !piko.bins<@Fragment>):
+      %c0, %c1 = piko.unit_cells %local[%zero] : !piko.bins<@Fragment>
       piko.next %other
     }
     ```
