@@ -271,8 +271,8 @@ void FuseKernelsPass::runOnOperation() {
   if (!getOperation().getOps<CheckRecordOp>().empty())
     return;
   // Those behind a kernel may become part of it.
-  for (Operation *op = &getOperation().getBodyBlock()->front(); op;
-       op = op->getNextNode())
-    if (auto kernel = dyn_cast<KernelOp>(op); kernel && kernel.getProcess())
+  Block &body = *getOperation().getBodyBlock();
+  for (auto op = body.begin(); op != body.end(); ++op)
+    if (auto kernel = dyn_cast<KernelOp>(*op); kernel && kernel.getProcess())
       fuseInto(kernel);
 }

@@ -335,9 +335,10 @@ def Piko_LocalBinOp : Piko_Op<"local_bin", [
     stage emits goes to the second writer.
 
     ```mlir
-    piko.local_bin @shade from %writer[0] writer %other {
-    ^bb0(%local: !piko.bins<@Fragment>):
-      %c0, %c1 = piko.unit_cells %local[%zero] : !piko.bins<@Fragment>
+    %other = piko.open_writer %bins[%unit] of @plot : !piko.bins<@Fragment>
+    piko.local_bin @plot from %writer[0] writer %other {
+    ^bb0(%local: !piko.bins<@Point>):
+      %c0, %c1 = piko.unit_cells %local[%unit] : !piko.bins<@Point>
       piko.next %other
     }
     ```
