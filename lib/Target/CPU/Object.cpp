@@ -4,12 +4,11 @@
 
 #include "Piko/Target/Object.h"
 
+#include "Piko/Target/CodeGeneration.h"
+
 #include "llvm/ExecutionEngine/Orc/ExecutionUtils.h"
 #include "llvm/IR/IRBuilder.h"
-#include "llvm/IR/LegacyPassManager.h"
-#include "llvm/MC/MCSubtargetInfo.h"
 #include "llvm/MC/TargetRegistry.h"
-#include "llvm/Passes/PassBuilder.h"
 #include "llvm/Support/TargetSelect.h"
 #include "llvm/Target/TargetMachine.h"
 #include "llvm/TargetParser/Host.h"
@@ -27,14 +26,10 @@ static StringRef getDefaultProcessor(const Triple &triple) {
   return triple.getArch() == Triple::x86_64 ? "x86-64-v3" : "generic";
 }
 
-static Expected<const Target *> lookUpTarget(const Triple &triple) {
+static Expected<const Target *> lookUpHost(const Triple &triple) {
   InitializeNativeTarget();
   InitializeNativeTargetAsmPrinter();
-  std::string message;
-  const Target *target = TargetRegistry::lookupTarget(triple, message);
-  if (!target)
-    return createStringError(message);
-  return target;
+  return lookUpTarget(triple);
 }
 
 Expected<Processor> piko::resolveProcessor(StringRef cpu) {
@@ -50,13 +45,10 @@ Expected<Processor> piko::resolveProcessor(StringRef cpu) {
   }
   if (cpu.empty())
     return Processor{getDefaultProcessor(triple).str(), ""};
-  Expected<const Target *> target = lookUpTarget(triple);
+  Expected<const Target *> target = lookUpHost(triple);
   if (!target)
     return target.takeError();
-  // Without a processor, or LLVM prints its own complaint.
-  std::unique_ptr<MCSubtargetInfo> info(
-      (*target)->createMCSubtargetInfo(triple, "", ""));
-  if (!info->isCPUStringValid(cpu))
+  if (!hasProcessor(**target, triple, cpu))
     return createStringError("there is no processor '" + cpu + "' for " +
                              triple.getArchName() +
                              "; expected 'native' or a name that 'clang "
@@ -67,7 +59,7 @@ Expected<Processor> piko::resolveProcessor(StringRef cpu) {
 static Expected<std::unique_ptr<TargetMachine>>
 createMachine(const piko::TargetOptions &options) {
   Triple triple(sys::getProcessTriple());
-  Expected<const Target *> target = lookUpTarget(triple);
+  Expected<const Target *> target = lookUpHost(triple);
   if (!target)
     return target.takeError();
   Expected<Processor> processor = resolveProcessor(options.cpu);
@@ -99,48 +91,34 @@ static void markForSanitizer(Module &module, Sanitizer sanitizer) {
                              : Attribute::SanitizeThread);
 }
 
-/// Without a constructor: the program has initialised the runtime.
-static void instrument(Module &module, ModuleAnalysisManager &analyses,
-                       Sanitizer sanitizer) {
-  if (sanitizer == Sanitizer::Thread)
-    createModuleToFunctionPassAdaptor(ThreadSanitizerPass())
-        .run(module, analyses);
-  if (sanitizer != Sanitizer::Address)
-    return;
-  // Redzones around constants would be registered, and outlive JITCode.
-  for (GlobalVariable &variable : module.globals()) {
-    GlobalValue::SanitizerMetadata metadata;
-    metadata.NoAddress = true;
-    variable.setSanitizerMetadata(metadata);
+namespace {
+/// Keeps redzones from constants: they would be registered, and outlive
+/// JITCode.
+struct LeaveOutGlobals : PassInfoMixin<LeaveOutGlobals> {
+  PreservedAnalyses run(Module &module, ModuleAnalysisManager &) {
+    for (GlobalVariable &variable : module.globals()) {
+      GlobalValue::SanitizerMetadata metadata;
+      metadata.NoAddress = true;
+      variable.setSanitizerMetadata(metadata);
+    }
+    return PreservedAnalyses::all();
   }
-  AddressSanitizerPass({}, /*UseGlobalGC=*/false, /*UseOdrIndicator=*/false,
-                       AsanDtorKind::None, AsanCtorKind::None)
-      .run(module, analyses);
-}
+};
+} // namespace
 
-/// What `-O` does. No flag allows arithmetic to change: the IR says what may.
-static void optimize(Module &module, TargetMachine &machine,
-                     const piko::TargetOptions &options) {
-  static const OptimizationLevel levels[] = {
-      OptimizationLevel::O0, OptimizationLevel::O1, OptimizationLevel::O2,
-      OptimizationLevel::O3};
-  LoopAnalysisManager loops;
-  FunctionAnalysisManager functions;
-  CGSCCAnalysisManager components;
-  ModuleAnalysisManager modules;
-  PassBuilder builder(&machine);
-  builder.registerModuleAnalyses(modules);
-  builder.registerCGSCCAnalyses(components);
-  builder.registerFunctionAnalyses(functions);
-  builder.registerLoopAnalyses(loops);
-  builder.crossRegisterProxies(loops, functions, components, modules);
-  OptimizationLevel level = levels[options.optLevel];
-  markForSanitizer(module, options.sanitizer);
-  ModulePassManager passes = options.optLevel == 0
-                                 ? builder.buildO0DefaultPipeline(level)
-                                 : builder.buildPerModuleDefaultPipeline(level);
-  passes.run(module, modules);
-  instrument(module, modules, options.sanitizer);
+/// The instrumentation, without a constructor: the program has initialised the
+/// runtime.
+static ModulePassManager instrument(Sanitizer sanitizer) {
+  ModulePassManager passes;
+  if (sanitizer == Sanitizer::Thread)
+    passes.addPass(createModuleToFunctionPassAdaptor(ThreadSanitizerPass()));
+  if (sanitizer == Sanitizer::Address) {
+    passes.addPass(LeaveOutGlobals());
+    passes.addPass(AddressSanitizerPass(
+        {}, /*UseGlobalGC=*/false,
+        /*UseOdrIndicator=*/false, AsanDtorKind::None, AsanCtorKind::None));
+  }
+  return passes;
 }
 
 /// ORC runs the initialisers of an object that it has not seen as IR only where
@@ -170,20 +148,11 @@ Expected<std::string> piko::generateCode(Module &module,
   Expected<std::unique_ptr<TargetMachine>> machine = createMachine(options);
   if (!machine)
     return machine.takeError();
-  module.setTargetTriple((*machine)->getTargetTriple());
-  module.setDataLayout((*machine)->createDataLayout());
   module.setPICLevel(PICLevel::BigPIC);
   gatherInitializers(module);
-  optimize(module, **machine, options);
-
-  SmallString<0> code;
-  raw_svector_ostream stream(code);
-  legacy::PassManager passes;
-  auto type = format == CodeFormat::Object ? CodeGenFileType::ObjectFile
-                                           : CodeGenFileType::AssemblyFile;
-  if ((*machine)->addPassesToEmitFile(passes, stream, nullptr, type))
-    return createStringError("cannot make code for " +
-                             module.getTargetTriple().str());
-  passes.run(module);
-  return std::string(code);
+  markForSanitizer(module, options.sanitizer);
+  return emitCode(module, **machine, options.optLevel,
+                  format == CodeFormat::Object ? CodeGenFileType::ObjectFile
+                                               : CodeGenFileType::AssemblyFile,
+                  instrument(options.sanitizer));
 }
