@@ -3,6 +3,7 @@
 // Bins, writers and primitives, on the runtime's structs (pikort/abi.h).
 
 #include "LoweringContext.h"
+#include "WriterPaths.h"
 
 #include "mlir/Conversion/LLVMCommon/MemRefBuilder.h"
 #include "mlir/Conversion/LLVMCommon/TypeConverter.h"
@@ -337,9 +338,18 @@ struct WriterCallLowering : Lowering<OpT> {
   }
 };
 constexpr const char *closeName = "pikoir_close";
-constexpr const char *nextName = "pikoir_next";
-
 constexpr const char *deferEndName = "pikoir_defer_end";
+
+struct NextLowering : Lowering<NextOp> {
+  using Lowering::Lowering;
+  LogicalResult
+  matchAndRewrite(NextOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    createNext(rewriter, op.getLoc(), context, adaptor.getWriter());
+    rewriter.eraseOp(op);
+    return success();
+  }
+};
 
 /// An operation that is a call with the writer and a number for its arguments.
 template <typename OpT, const char *const *name>
@@ -458,10 +468,7 @@ struct AppendLowering : Lowering<AppendOp> {
     Location loc = op.getLoc();
     RecordOp record = context.record(op.getPrim().getType().getRecord());
     Value room =
-        context
-            .call(rewriter, loc, "pikoir_append", pointer(rewriter),
-                  {adaptor.getWriter(), createI32(rewriter, loc, op.getPort())})
-            .getResult();
+        createAppend(rewriter, loc, context, adaptor.getWriter(), op.getPort());
     for (auto [value, offset] :
          llvm::zip(adaptor.getValues(), record.getElementOffsets()))
       LLVM::StoreOp::create(rewriter, loc, value,
@@ -489,9 +496,8 @@ struct PlaceLowering : Lowering<PlaceOp> {
                                    toI64(rewriter, loc, adaptor.getTile()));
     }
     if (op.getPort())
-      context.call(
-          rewriter, loc, "pikoir_place", Type(),
-          {adaptor.getWriter(), createI32(rewriter, loc, *op.getPort()), cell});
+      createPlace(rewriter, loc, context, adaptor.getWriter(), *op.getPort(),
+                  cell);
     else
       context.call(rewriter, loc, "pikoir_place_source", Type(),
                    {adaptor.getWriter(), cell});
@@ -563,8 +569,7 @@ void piko::populateKernelToLLVMPatterns(const TypeConverter &converter,
                CallRangeLowering, CallBinLowering, ItemLowering, NoItemLowering,
                ToAddressLowering, FromAddressLowering, OpenWriterLowering,
                LocalBinLowering, WriterCallLowering<CloseWriterOp, &closeName>,
-               WriterCallLowering<NextOp, &nextName>,
-               WriterCallLowering<DeferEndOp, &deferEndName>,
+               NextLowering, WriterCallLowering<DeferEndOp, &deferEndName>,
                WriterNumberLowering<DeferBeginOp, &deferBeginName>,
                WriterNumberLowering<DeferIterationOp, &deferIterationName>,
                WriterNumberLowering<ScratchReleaseOp, &scratchReleaseName>,

@@ -179,7 +179,7 @@ typedef struct pikoir_input {
 } pikoir_input;
 
 /// One port of a writer. The fields up to `cells` are the fast path's: see the
-/// inline functions below, which generated code may repeat.
+/// inline functions below, which generated code repeats.
 typedef struct pikoir_port {
   uint8_t *cursor;       ///< Where the next record goes.
   uint8_t *limit;        ///< There is room if cursor <= limit.
@@ -381,16 +381,19 @@ PIKORT_API int64_t pikoir_loop_limit(pikort_pipeline *p);
 PIKORT_API int32_t pikoir_fail_text(pikort_pipeline *p, int32_t code,
                                     const char *text);
 
-// --- the fast path, for generated code that inlines it ----------------------
+// --- the fast path, which generated code has inline --------------------------
 
 static inline uint8_t *pikoir_append_inline(pikoir_writer *writer,
                                             int32_t port) {
   pikoir_port *out = &writer->ports[port];
   uint8_t *record = out->cursor;
-  if (record > out->limit || out->cells != 0 || out->flags != 0)
+  if (record > out->limit || out->flags != 0)
     return pikoir_append(writer, port);
-  out->cursor = record + out->size;
   ++out->emitted;
+  if (out->cells != 0) // kept by its first place
+    out->last_cell = -1;
+  else
+    out->cursor = record + out->size;
   return record;
 }
 
