@@ -117,19 +117,20 @@ piko::readPipelineNames(const CompileOptions &options, MLIRContext &context) {
 void piko::addPasses(OpPassManager &passes, Level level,
                      const CheckOptions &check,
                      const SynthesisOptions &synthesis, const GPUOptions &gpu) {
+  // Findings are about the stages as they are written.
+  SynthesisOptions chosen =
+      check.enabled ? SynthesisOptions::none() : synthesis;
   if (check.enabled)
     addCheckSequence(passes, check);
   if (level >= Level::Kernels)
-    // Findings are about the stages as they are written.
-    addSynthesisSequence(passes,
-                         check.enabled ? SynthesisOptions::none() : synthesis);
+    addSynthesisSequence(passes, chosen);
   if (level >= Level::Resolved)
     addResolveSequence(passes);
   if (level >= Level::Target) {
     if (gpu.emulate)
       addGPUSequence(passes, gpu);
     else
-      addCPUSequence(passes);
+      addCPUSequence(passes, chosen);
   }
   if (level >= Level::LLVM)
     addLLVMSequence(passes);

@@ -72,7 +72,10 @@ void piko::addResolveSequence(OpPassManager &passes) {
   addCleanUp(passes);
 }
 
-void piko::addCPUSequence(OpPassManager &passes) {
+void piko::addCPUSequence(OpPassManager &passes,
+                          const SynthesisOptions &options) {
+  if (options.has("prefetch"))
+    passes.nest<PipelineOp>().addPass(createPrefetch());
   passes.nest<PipelineOp>().addPass(createConvertPikoToSCF());
   addCleanUp(passes);
   passes.nest<PipelineOp>().addPass(createConvertPikoToOpenMP());
@@ -134,9 +137,9 @@ void piko::registerSequences() {
   PassPipelineRegistration<>("piko-resolve",
                              "From the kernels to the resolved level",
                              addResolveSequence);
-  PassPipelineRegistration<>("piko-to-cpu",
-                             "From the resolved level to upstream dialects",
-                             addCPUSequence);
+  PassPipelineRegistration<>(
+      "piko-to-cpu", "From the resolved level to upstream dialects",
+      [](OpPassManager &passes) { addCPUSequence(passes); });
   PassPipelineRegistration<>("piko-cpu-to-llvm",
                              "From upstream dialects to llvm and omp",
                              addLLVMSequence);

@@ -25,7 +25,8 @@ void addSynthesisSequence(mlir::OpPassManager &passes,
 void addResolveSequence(mlir::OpPassManager &passes);
 
 /// `piko-to-cpu`: from the resolved level to scf, arith, omp and llvm.
-void addCPUSequence(mlir::OpPassManager &passes);
+void addCPUSequence(mlir::OpPassManager &passes,
+                    const SynthesisOptions &options = {});
 
 /// `piko-cpu-to-llvm`: from there to the llvm dialect (and omp) alone.
 void addLLVMSequence(mlir::OpPassManager &passes);

@@ -616,4 +616,48 @@ def SplitLoops : Pass<"piko-split-loops", "::piko::PipelineOp"> {
                            "::mlir::scf::SCFDialect"];
 }
 
+def Prefetch : Pass<"piko-prefetch", "::piko::PipelineOp"> {
+  let summary = "Ask for what later primitives refer to";
+  let description = [{
+    **Requires** the resolved level.
+
+    **Does**: a loop over the primitives of a bin that reads state at indices
+    which are fields of the primitive asks for the elements of a primitive
+    further on (`piko.prefetch`), and for a primitive still further on
+    (`piko.prefetch_item`): neither lies in memory in the order of the bin
+    (S. Ainsworth and T. M. Jones, "Software Prefetching for Indirect Memory
+    Accesses", 2017). A stage with one bin for all takes its primitives as they
+    were made, whose neighbours mostly refer to the same; it is left alone.
+
+    **Guarantees** that nothing changes but time: a prefetch reads nothing and
+    cannot fail.
+
+    Before:
+    ```
+    scf.for %i = %begin to %end step %one {
+      %t = piko.item %bins[%i] ...
+      %k = piko.get %t "vertex" ...
+      ... piko.load @vertices[%k : i32] "x" : f32 ...
+    ```
+    After:
+    ```
+    scf.for %i = %begin to %end step %one {
+      %far = ...                        // %i + 16, or the last one
+      piko.prefetch_item %bins[%far] : !piko.bins<@Triangle>
+      %near = ...                       // %i + 8, or the last one
+      %s = piko.item %bins[%near] ...
+      %j = piko.get %s "vertex" ...
+      piko.prefetch @vertices[%j : i32]
+      %t = piko.item %bins[%i] ...
+    ```
+
+    **Limits**: indices that are computed, and those of reads that only the much
+    longer side of a condition does, are not followed.
+  }];
+  let statistics = [
+    Statistic<"loops", "loops", "loops that ask ahead">,
+    Statistic<"elements", "elements", "elements of state asked for">];
+  let dependentDialects = ["::mlir::arith::ArithDialect"];
+}
+
 #endif // PIKO_TRANSFORMS_PASSES_TD

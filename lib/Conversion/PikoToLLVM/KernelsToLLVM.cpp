@@ -212,11 +212,13 @@ struct CallBinLowering : Lowering<CallBinOp> {
   }
 };
 
-struct ItemLowering : Lowering<ItemOp> {
-  using Lowering::Lowering;
-  LogicalResult
-  matchAndRewrite(ItemOp op, OpAdaptor adaptor,
-                  ConversionPatternRewriter &rewriter) const override {
+/// What takes the address of a primitive.
+template <typename OpT> struct PositionLowering : Lowering<OpT> {
+  using Lowering<OpT>::Lowering, Lowering<OpT>::array, Lowering<OpT>::pointer,
+      Lowering<OpT>::entry;
+
+  Value address(OpT op, typename OpT::Adaptor adaptor,
+                ConversionPatternRewriter &rewriter) const {
     Location loc = op.getLoc();
     Value bins = adaptor.getBins();
     Value position = toI64(rewriter, loc, adaptor.getPosition());
@@ -238,9 +240,30 @@ struct ItemLowering : Lowering<ItemOp> {
           scf::YieldOp::create(builder, loc, position);
         });
     Value items = array(rewriter, bins, layout::items);
-    RecordOp record = context.record(op.getPrim().getType().getRecord());
-    rewriter.replaceOp(
-        op, entry(rewriter, loc, items, choice.getResult(0), record.getSize()));
+    RecordOp record = this->context.record(op.getBins().getType().getRecord());
+    return entry(rewriter, loc, items, choice.getResult(0), record.getSize());
+  }
+};
+
+struct ItemLowering : PositionLowering<ItemOp> {
+  using PositionLowering::PositionLowering;
+  LogicalResult
+  matchAndRewrite(ItemOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    rewriter.replaceOp(op, address(op, adaptor, rewriter));
+    return success();
+  }
+};
+
+struct PrefetchItemLowering : PositionLowering<PrefetchItemOp> {
+  using PositionLowering::PositionLowering;
+  LogicalResult
+  matchAndRewrite(PrefetchItemOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    createPrefetch(
+        rewriter, op.getLoc(), address(op, adaptor, rewriter),
+        context.record(op.getBins().getType().getRecord()).getSize());
+    rewriter.eraseOp(op);
     return success();
   }
 };
@@ -566,10 +589,11 @@ void piko::populateKernelToLLVMPatterns(const TypeConverter &converter,
                                         LoweringContext &context) {
   patterns.add<OpenBinsLowering, CloseBinsLowering, UnitCountLowering,
                UnitCellsLowering, CellRangeLowering, CellBinLowering,
-               CallRangeLowering, CallBinLowering, ItemLowering, NoItemLowering,
-               ToAddressLowering, FromAddressLowering, OpenWriterLowering,
-               LocalBinLowering, WriterCallLowering<CloseWriterOp, &closeName>,
-               NextLowering, WriterCallLowering<DeferEndOp, &deferEndName>,
+               CallRangeLowering, CallBinLowering, ItemLowering,
+               PrefetchItemLowering, NoItemLowering, ToAddressLowering,
+               FromAddressLowering, OpenWriterLowering, LocalBinLowering,
+               WriterCallLowering<CloseWriterOp, &closeName>, NextLowering,
+               WriterCallLowering<DeferEndOp, &deferEndName>,
                WriterNumberLowering<DeferBeginOp, &deferBeginName>,
                WriterNumberLowering<DeferIterationOp, &deferIterationName>,
                WriterNumberLowering<ScratchReleaseOp, &scratchReleaseName>,

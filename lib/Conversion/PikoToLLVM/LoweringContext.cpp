@@ -215,6 +215,18 @@ Value piko::createOffset(OpBuilder &builder, Location loc, Value pointer,
       ArrayRef<LLVM::GEPArg>{bytes}, LLVM::GEPNoWrapFlags::inbounds);
 }
 
+void piko::createPrefetch(OpBuilder &builder, Location loc, Value pointer,
+                          int64_t bytes) {
+  constexpr int32_t read = 0, keep = 3, data = 1;
+  LLVM::Prefetch::create(builder, loc, pointer, read, keep, data);
+  if (bytes == 1)
+    return;
+  Value last =
+      LLVM::GEPOp::create(builder, loc, pointer.getType(), builder.getI8Type(),
+                          pointer, ArrayRef<LLVM::GEPArg>{int32_t(bytes - 1)});
+  LLVM::Prefetch::create(builder, loc, last, read, keep, data);
+}
+
 Value piko::createFieldAddress(OpBuilder &builder, Location loc, Value record,
                                FieldAttr field, ValueRange elements) {
   for (auto [element, stride] : llvm::zip(elements, field.getStrides())) {

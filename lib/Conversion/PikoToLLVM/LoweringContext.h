@@ -93,6 +93,10 @@ mlir::Value createOffset(mlir::OpBuilder &builder, mlir::Location loc,
                          mlir::Value pointer, int64_t bytes);
 mlir::Value createOffset(mlir::OpBuilder &builder, mlir::Location loc,
                          mlir::Value pointer, mlir::Value bytes);
+/// Asks for so many bytes, in one line of the cache or two; the pointer may
+/// lead anywhere.
+void createPrefetch(mlir::OpBuilder &builder, mlir::Location loc,
+                    mlir::Value pointer, int64_t bytes);
 /// The address of an element of a field of a record.
 mlir::Value createFieldAddress(mlir::OpBuilder &builder, mlir::Location loc,
                                mlir::Value record, FieldAttr field,

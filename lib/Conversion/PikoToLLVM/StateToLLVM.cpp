@@ -7,6 +7,26 @@
 using namespace mlir;
 using namespace piko;
 
+/// How many bytes behind the first element of a buffer or image another is;
+/// null for a constant, which has no indices.
+static Value createElementOffset(OpBuilder &builder, Location loc,
+                                 ValueRange indices, const StateView &view,
+                                 int64_t size) {
+  Value index;
+  for (int64_t dim = indices.size() - 1; dim >= 0; --dim) {
+    Value at = toI64(builder, loc, indices[dim]);
+    index =
+        index ? arith::AddIOp::create(builder, loc,
+                                      arith::MulIOp::create(builder, loc, index,
+                                                            view.extents[dim]),
+                                      at)
+              : at;
+  }
+  return index ? arith::MulIOp::create(builder, loc, index,
+                                       createI64(builder, loc, size))
+               : Value();
+}
+
 namespace {
 
 template <typename OpT> struct StateLowering : OpConversionPattern<OpT> {
@@ -21,22 +41,10 @@ template <typename OpT> struct StateLowering : OpConversionPattern<OpT> {
     StateView &view = context.view(builder, op, op.getState());
     RecordOp record =
         context.record(getStateRecord(context.state(op, op.getState())));
-    Value element = view.data, index;
-    for (int64_t dim = adaptor.getIndices().size() - 1; dim >= 0; --dim) {
-      Value at = toI64(builder, loc, adaptor.getIndices()[dim]);
-      index =
-          index
-              ? arith::AddIOp::create(builder, loc,
-                                      arith::MulIOp::create(builder, loc, index,
-                                                            view.extents[dim]),
-                                      at)
-              : at;
-    }
-    if (index)
-      element = createOffset(
-          builder, loc, element,
-          arith::MulIOp::create(builder, loc, index,
-                                createI64(builder, loc, record.getSize())));
+    Value element = view.data;
+    if (Value offset = createElementOffset(builder, loc, adaptor.getIndices(),
+                                           view, record.getSize()))
+      element = createOffset(builder, loc, element, offset);
     return createFieldAddress(builder, loc, element,
                               record.getField(op.getField()),
                               adaptor.getElements());
@@ -108,6 +116,30 @@ struct AtomicLowering : StateLowering<AtomicOp> {
       rewriter.eraseOp(op);
     return success();
   }
+};
+
+struct PrefetchLowering : OpConversionPattern<PrefetchOp> {
+  PrefetchLowering(const TypeConverter &converter, MLIRContext *mlir,
+                   LoweringContext &context)
+      : OpConversionPattern(converter, mlir), context(context) {}
+  LogicalResult
+  matchAndRewrite(PrefetchOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    Location loc = op.getLoc();
+    StateView &view = context.view(rewriter, op, op.getState());
+    RecordOp record =
+        context.record(getStateRecord(context.state(op, op.getState())));
+    Value offset = createElementOffset(rewriter, loc, adaptor.getIndices(),
+                                       view, record.getSize());
+    // Not inbounds: nothing has tested the indices.
+    Value element = LLVM::GEPOp::create(rewriter, loc, view.data.getType(),
+                                        rewriter.getI8Type(), view.data,
+                                        ArrayRef<LLVM::GEPArg>{offset});
+    createPrefetch(rewriter, loc, element, record.getSize());
+    rewriter.eraseOp(op);
+    return success();
+  }
+  LoweringContext &context;
 };
 
 struct ExtentLowering : OpConversionPattern<ExtentOp> {
@@ -214,7 +246,8 @@ void piko::populateStateToLLVMPatterns(const TypeConverter &converter,
                                        RewritePatternSet &patterns,
                                        LoweringContext &context) {
   patterns.add<LoadLowering, StoreLowering, AtomicLowering, ExtentLowering,
-               FailLowering, FailNumbersLowering<FailListOp, indexOutside>,
+               PrefetchLowering, FailLowering,
+               FailNumbersLowering<FailListOp, indexOutside>,
                FailNumbersLowering<FailBarrierOp, notUniform>>(
       converter, patterns.getContext(), context);
 }

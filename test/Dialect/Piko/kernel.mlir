@@ -65,6 +65,7 @@ piko.pipeline @Resolved rank 2 {
     // CHECK-NEXT: %[[AT:.*]], %{{.*}} = piko.cell_range %[[BINS]][%[[UNIT]], %[[FIRST]]] : !piko.bins<@F>
     // CHECK-NEXT: %[[BIN:.*]] = piko.cell_bin %[[BINS]][%[[FIRST]]] : !piko.bins<@F>
     // CHECK-NEXT: %[[PRIM:.*]] = piko.item %[[BINS]][%[[AT]]] : !piko.bins<@F> -> !piko.prim<@F>
+    // CHECK-NEXT: piko.prefetch_item %[[BINS]][%[[AT]]] : !piko.bins<@F>
     // CHECK-NEXT: %[[X:.*]] = piko.get %[[PRIM]] "x"
     // CHECK-NEXT: %[[W:.*]] = piko.open_writer
     // CHECK-NEXT: %{{.*}} = piko.append %[[W]][0] (%[[X]]) : i32 -> !piko.prim<@F>
@@ -79,6 +80,7 @@ piko.pipeline @Resolved rank 2 {
     %i0, %i1 = piko.cell_range %bins[%u, %c0] : !piko.bins<@F>
     %b = piko.cell_bin %bins[%c0] : !piko.bins<@F>
     %p = piko.item %bins[%i0] : !piko.bins<@F> -> !piko.prim<@F>
+    piko.prefetch_item %bins[%i0] : !piko.bins<@F>
     %x = piko.get %p "x" : !piko.prim<@F> -> i32
     %w = piko.open_writer %bins[%u] : !piko.bins<@F>
     %q = piko.append %w[0] (%x) : i32 -> !piko.prim<@F>

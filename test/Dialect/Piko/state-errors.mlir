@@ -173,6 +173,25 @@ piko.pipeline @P rank 2 {
 
 // -----
 
+piko.record @F {"x" : i32 at 0} size 4 align 4
+piko.record @V {"value" : f32 at 0} size 4 align 4
+piko.pipeline @P rank 2 {
+  // expected-note@+1 {{the state is declared here}}
+  piko.buffer @b : @V
+  piko.source @a
+  piko.stage @a bins [0, 0] threads 1 : @F -> [] {
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      %x = piko.get %f "x" : !piko.prim<@F> -> i32
+      // expected-error@+1 {{expected 1 indices into @b, but got 2}}
+      piko.prefetch @b[%x, %x : i32, i32]
+      piko.return
+    }
+  }
+}
+
+// -----
+
 piko.record @F {"x" : i32 at 0, "z" : f32 at 4} size 8 align 4
 piko.record @V {"value" : f32 at 0} size 4 align 4
 piko.pipeline @P rank 2 {

@@ -25,11 +25,15 @@ piko.pipeline @State rank 2 {
       // CHECK-NEXT: %[[RED:.*]] = piko.load @lights[%[[N]] : index] "color.x" : f32
       // CHECK-NEXT: %{{.*}} = piko.load @lights[%[[N]] : index] "w"[%[[N]]] : f32
       // CHECK-NEXT: %[[COUNT:.*]] = piko.load @color[%[[X:.*]], %[[X]] : i32, i32] "n" : i32
+      // CHECK-NEXT: piko.prefetch @lights[%[[N]] : index]
+      // CHECK-NEXT: piko.prefetch @color[%[[X]], %[[X]] : i32, i32]
       %s = piko.load @sun "color.x" : f32
       %t = piko.load @sun "w"[%n] : f32
       %r = piko.load @lights[%n : index] "color.x" : f32
       %w = piko.load @lights[%n : index] "w"[%n] : f32
       %c = piko.load @color[%x, %x : i32, i32] "n" : i32
+      piko.prefetch @lights[%n : index]
+      piko.prefetch @color[%x, %x : i32, i32]
       // CHECK-NEXT: piko.store %[[RED]], @lights[%[[X]] : i32] "color.x" : f32
       // CHECK-NEXT: piko.store %[[RED]], checked @lights[%[[N]] : index] "w"[%[[N]]] : f32
       piko.store %r, @lights[%x : i32] "color.x" : f32

@@ -72,6 +72,11 @@ LogicalResult AtomicOp::verifySymbolUses(SymbolTableCollection &) {
   return verifyWrite(*this, getValue().getType());
 }
 
+LogicalResult PrefetchOp::verifySymbolUses(SymbolTableCollection &) {
+  return failure(
+      failed(verifyState(*this, getStateAttr(), getIndices().size())));
+}
+
 LogicalResult ExtentOp::verifySymbolUses(SymbolTableCollection &) {
   auto state = verifyState(*this, getStateAttr(), std::nullopt);
   if (failed(state))

@@ -303,6 +303,21 @@ def Piko_ItemOp : Piko_Op<"item", [Pure]> {
   }];
 }
 
+def Piko_PrefetchItemOp : Piko_Op<"prefetch_item"> {
+  let summary = "says that the primitive at a position will be read";
+  let description = [{
+    A hint that changes nothing; the position is that of a primitive.
+
+    ```mlir
+    piko.prefetch_item %bins[%i] : !piko.bins<@Fragment>
+    ```
+  }];
+  let arguments = (ins Piko_BinsType:$bins, Index:$position);
+  let assemblyFormat = [{
+    $bins `[` $position `]` attr-dict `:` qualified(type($bins))
+  }];
+}
+
 def Piko_OpenWriterOp : Piko_Op<"open_writer", [
     DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
   let summary = "where a unit of work leaves what it emits";

@@ -93,6 +93,23 @@ def Piko_AtomicOp : Piko_StateAccessOp<"atomic", [
   }];
 }
 
+def Piko_PrefetchOp : Piko_Op<"prefetch", [
+    DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
+  let summary = "says that an element of state will be read";
+  let description = [{
+    A hint that changes nothing; an index may be outside.
+
+    ```mlir
+    piko.prefetch @vertices[%i : i32]
+    ```
+  }];
+  let arguments = (ins FlatSymbolRefAttr:$state,
+                       Variadic<Piko_Coordinate>:$indices);
+  let assemblyFormat = [{
+    $state `[` $indices `:` type($indices) `]` attr-dict
+  }];
+}
+
 def Piko_ExtentOp : Piko_Op<"extent", [
     Pure, DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
   let summary = "the length of a buffer, or of an image in a dimension";

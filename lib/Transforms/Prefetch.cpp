@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// piko-prefetch: what a later primitive refers to is asked for ahead of time.
+
+#include "Piko/Transforms/Passes.h"
+
+#include "mlir/Dialect/Arith/IR/Arith.h"
+#include "mlir/Dialect/SCF/IR/SCF.h"
+#include "mlir/IR/IRMapping.h"
+
+namespace piko {
+#define GEN_PASS_DEF_PREFETCH
+#include "Piko/Transforms/Passes.h.inc"
+} // namespace piko
+
+using namespace mlir;
+using namespace piko;
+
+namespace {
+struct PrefetchPass : piko::impl::PrefetchBase<PrefetchPass> {
+  void runOnOperation() override;
+  void convert(scf::ForOp loop, ItemOp item);
+};
+
+/// An element of state whose indices are fields of the primitive.
+struct Reference {
+  FlatSymbolRefAttr state;
+  SmallVector<GetOp> fields;
+};
+} // namespace
+
+/// How many primitives ahead: some hundred nanoseconds at a few tens each.
+static constexpr int64_t nearDistance = 8, farDistance = 16;
+
+/// The primitive of the loop's iteration.
+static ItemOp findItem(scf::ForOp loop) {
+  for (auto item : loop.getBody()->getOps<ItemOp>())
+    if (item.getPosition() == loop.getInductionVar())
+      return item;
+  return {};
+}
+
+/// The field that is an index as it is, or null.
+static GetOp findField(Value index, ItemOp item) {
+  while (Operation *cast = index.getDefiningOp()) {
+    if (!isa<arith::IndexCastOp, arith::ExtSIOp>(cast))
+      break;
+    index = cast->getOperand(0);
+  }
+  auto get = index.getDefiningOp<GetOp>();
+  return get && get.getPrim() == item && get.getElements().empty() ? get
+                                                                   : GetOp();
+}
+
+static int64_t countOperations(Region &region) {
+  int64_t count = 0;
+  region.walk([&](Operation *) { ++count; });
+  return count;
+}
+
+/// Whether an operation is on a side of a condition that is hardly ever taken:
+/// one that does much more than the other, which does something, too.
+static bool isRare(Operation *op, scf::ForOp loop) {
+  constexpr int64_t trivial = 16, ratio = 2;
+  for (; op->getParentOp() != loop; op = op->getParentOp()) {
+    auto choice = dyn_cast<scf::IfOp>(op->getParentOp());
+    if (!choice || choice.getElseRegion().empty())
+      continue;
+    Region *side = op->getParentRegion();
+    int64_t other = countOperations(side == &choice.getThenRegion()
+                                        ? choice.getElseRegion()
+                                        : choice.getThenRegion());
+    if (other > trivial && countOperations(*side) > ratio * other)
+      return true;
+  }
+  return false;
+}
+
+static SmallVector<Reference> findReferences(scf::ForOp loop, ItemOp item) {
+  SmallVector<Reference> references;
+  llvm::DenseSet<Attribute> known;
+  loop.walk([&](LoadOp load) {
+    Reference reference{load.getStateAttr(), {}};
+    SmallVector<Attribute> names{load.getStateAttr()};
+    for (Value index : load.getIndices()) {
+      GetOp field = findField(index, item);
+      if (!field)
+        return;
+      reference.fields.push_back(field);
+      names.push_back(field.getFieldAttr());
+    }
+    if (!reference.fields.empty() && !isRare(load, loop) &&
+        known.insert(ArrayAttr::get(loop.getContext(), names)).second)
+      references.push_back(reference);
+  });
+  return references;
+}
+
+void PrefetchPass::convert(scf::ForOp loop, ItemOp item) {
+  SmallVector<Reference> references = findReferences(loop, item);
+  if (references.empty())
+    return;
+  Location loc = item.getLoc();
+  OpBuilder builder(loop);
+  Value one = arith::ConstantIndexOp::create(builder, loc, 1);
+  Value last = arith::SubIOp::create(builder, loc, loop.getUpperBound(), one);
+  builder.setInsertionPointToStart(loop.getBody());
+  auto ahead = [&](int64_t distance) -> Value {
+    Value by = arith::ConstantIndexOp::create(builder, loc, distance);
+    Value at = arith::AddIOp::create(builder, loc, loop.getInductionVar(), by);
+    return arith::MinSIOp::create(builder, loc, at, last);
+  };
+  PrefetchItemOp::create(builder, loc, item.getBins(), ahead(farDistance));
+  IRMapping mapping;
+  mapping.map(loop.getInductionVar(), ahead(nearDistance));
+  builder.clone(*item, mapping);
+  for (Reference &reference : references) {
+    SmallVector<Value> indices;
+    for (GetOp field : reference.fields) {
+      if (!mapping.contains(field.getResult()))
+        builder.clone(*field, mapping);
+      indices.push_back(mapping.lookup(field.getResult()));
+    }
+    PrefetchOp::create(builder, loc, reference.state, indices);
+    ++elements;
+  }
+  ++loops;
+}
+
+/// Whether primitives are sorted into bins. Others come as they were made, and
+/// what neighbours refer to is mostly at hand.
+static bool areSorted(ItemOp item) {
+  auto bins = item.getBins().getDefiningOp<OpenBinsOp>();
+  if (!bins || bins.getSource())
+    return false;
+  auto stage = lookupInPipeline<StageOp>(item, bins.getStageAttr());
+  return llvm::any_of(stage.getBins(),
+                      [](int64_t extent) { return extent != 0; });
+}
+
+void PrefetchPass::runOnOperation() {
+  SmallVector<std::pair<scf::ForOp, ItemOp>> found;
+  getOperation().walk([&](scf::ForOp loop) {
+    if (ItemOp item = findItem(loop); item && areSorted(item))
+      found.push_back({loop, item});
+  });
+  for (auto [loop, item] : found)
+    convert(loop, item);
+}
