@@ -13,6 +13,8 @@
 
 #include "clip.h"
 
+#include <utility>
+
 namespace raster {
 
 /// Sides of the view, and what keeps a vertex from being used as it is.
@@ -90,31 +92,36 @@ inline PixelBox boxOf(const ScreenVertex &a, const ScreenVertex &b,
   return {glm::max(box.lo, 0), glm::min(box.hi, size - 1)};
 }
 
-/// The edges of a triangle on the screen, whichever way it turns.
-inline Edges edgesOf(const ScreenVertex &a, const ScreenVertex &b,
-                     const ScreenVertex &c) {
-  bool turned = signedArea(a.at, b.at, c.at) < 0;
-  return Edges(a.at, turned ? c.at : b.at, turned ? b.at : c.at);
-}
-
 /// `box`, from boxOf(), without rows and columns at its sides of which the
 /// triangle covers nothing, if it is at most 2 by 2 pixels, of which
 /// many triangles cover none.
 inline PixelBox coveredPart(const ScreenVertex &a, const ScreenVertex &b,
                             const ScreenVertex &c, const PixelBox &box) {
+  // Relative to the box, which makes small numbers of those of small triangles.
+  auto place = [&](Point p) -> Point {
+    return {p.x - box.lo.x * subpixels, p.y - box.lo.y * subpixels};
+  };
+  Point first = place(a.at), second = place(b.at), third = place(c.at);
   if (box.hi.x - box.lo.x > 1 || box.hi.y - box.lo.y > 1 ||
-      needsClipping(a, b, c))
+      needsClipping(a, b, c) || !isNear(first) || !isNear(second) ||
+      !isNear(third))
     return box;
-  Edges edges = edgesOf(a, b, c);
+  if (signedArea(first, second, third) < 0)
+    std::swap(second, third);
+  NearEdges edges(first, second, third);
   PixelBox part = {box.hi + 1, box.lo - 1};
   // No branch would be foreseen.
-  for (int i = 0; i < 4; ++i) {
-    glm::ivec2 pixel = box.lo + glm::ivec2(i & 1, i >> 1);
-    bool covered = (pixel.x <= box.hi.x) & (pixel.y <= box.hi.y) &
-                   edges.cover(pixel.x, pixel.y);
+  auto add = [&](int x, int y) {
+    glm::ivec2 pixel = box.lo + glm::ivec2(x, y);
+    bool covered =
+        (pixel.x <= box.hi.x) & (pixel.y <= box.hi.y) & edges.cover(x, y);
     part.lo = covered ? glm::min(part.lo, pixel) : part.lo;
     part.hi = covered ? glm::max(part.hi, pixel) : part.hi;
-  }
+  };
+  add(0, 0);
+  add(1, 0);
+  add(0, 1);
+  add(1, 1);
   return part;
 }
 
@@ -136,7 +143,9 @@ inline void rasterize(const ScreenVertex &a, const ScreenVertex &b,
   int64_t area = signedArea(a.at, b.at, c.at);
   // Clockwise: a, b, c or a, c, b.
   bool turned = area < 0;
-  const ScreenVertex &second = turned ? c : b, &third = turned ? b : c;
+  ScreenVertex second = b, third = c;
+  if (turned)
+    std::swap(second, third);
   float scale = 1.0f / float(turned ? -area : area);
   Edges edges(a.at, second.at, third.at);
   for (int y = lo.y; y < hi.y; ++y)

@@ -39,13 +39,13 @@ inline int64_t signedArea(Point a, Point b, Point c) {
 
 /// The line through a and b as a function of the pixel: positive at the
 /// centres of pixels to its right, seen along a -> b with y down.
-struct Edge {
-  int64_t stepX, stepY; ///< its change from one pixel to the next
-  int64_t first;        ///< its value at pixel (0, 0)
-  int64_t least;        ///< from which value on a pixel is inside
+template <class Int> struct BasicEdge {
+  Int stepX, stepY; ///< its change from one pixel to the next
+  Int first;        ///< its value at pixel (0, 0)
+  Int least;        ///< from which value on a pixel is inside
 
-  Edge(Point a, Point b) {
-    int64_t dx = int64_t(b.x) - a.x, dy = int64_t(b.y) - a.y;
+  BasicEdge(Point a, Point b) {
+    Int dx = Int(b.x) - a.x, dy = Int(b.y) - a.y;
     constexpr int32_t half = subpixels / 2;
     stepX = -dy * subpixels;
     stepY = dx * subpixels;
@@ -54,22 +54,34 @@ struct Edge {
     least = isTop || isLeft ? 0 : 1;
   }
 
-  int64_t at(int x, int y) const { return first + stepX * x + stepY * y; }
-  bool holds(int64_t value) const { return value >= least; }
+  Int at(int x, int y) const { return first + stepX * x + stepY * y; }
+  bool holds(Int value) const { return value >= least; }
 };
 
 /// The edges of a triangle whose corners run clockwise on the screen, each
 /// numbered as the corner opposite to it.
-struct Edges {
-  Edge e0, e1, e2;
+template <class Int> struct BasicEdges {
+  BasicEdge<Int> e0, e1, e2;
 
-  Edges(Point a, Point b, Point c) : e0(b, c), e1(c, a), e2(a, b) {}
+  BasicEdges(Point a, Point b, Point c) : e0(b, c), e1(c, a), e2(a, b) {}
 
   bool cover(int x, int y) const {
     return e0.holds(e0.at(x, y)) & e1.holds(e1.at(x, y)) &
            e2.holds(e2.at(x, y));
   }
 };
+
+using Edges = BasicEdges<int64_t>;
+/// For triangles whose corners are near pixel (0, 0), and pixels there.
+using NearEdges = BasicEdges<int32_t>;
+
+/// Whether a point is near enough to pixel (0, 0) for NearEdges: products of
+/// two differences stay below 2^29.
+inline bool isNear(Point p) {
+  constexpr uint32_t reach = 32 * subpixels;
+  return (uint32_t(p.x) + reach <= 2 * reach) &
+         (uint32_t(p.y) + reach <= 2 * reach);
+}
 
 /// Pixels from lo to hi, both included; empty if hi is below lo.
 struct PixelBox {
