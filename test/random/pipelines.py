@@ -428,9 +428,10 @@ class Generator(Chains):
         out.append(Atomic("atomicAdd", state, [op("&", seen, lit(63))],
                           state.record.leaf("seen"), Lit("i32", 1, solid=True)))
         if self.on("float-atomics"):
-            for name, kind in [("sum", "f32"), ("wide_sum", "f64")]:
+            for name, kind in [("exact", "f32"), ("exact_wide", "f64")]:
                 self.use("float-atomics-" + kind)
-                # Sums of small whole numbers are exact in any order.
+                # Sums of small whole numbers are exact in any order, from where
+                # piko-compare lets fields of these names begin.
                 whole = Op(kind, "cast", [op("&", self.expr("i32", scope, 2), lit(7))],
                            solid=True)
                 at = [op("&", self.expr("i32", scope, 1), lit(63))]
@@ -465,8 +466,8 @@ class Generator(Chains):
                     state = State(f"tickets{i}", "buffer", Record(
                         f"Tickets{i}", [Member("next", "i32"), Member("drawn", "i32"),
                                         Member("mark", r.choice(INTEGERS)),
-                                        Member("seen", "i32"), Member("sum", "f32"),
-                                        Member("wide_sum", "f64")]))
+                                        Member("seen", "i32"), Member("exact", "f32"),
+                                        Member("exact_wide", "f64")]))
                     pipe.state.append(state)
                     self.stage_writes[i].append((state, "ticket"))
                 continue

@@ -3,9 +3,10 @@
 // A pipeline with made-up input, which follows from the case's seed and from
 // names, not from the order of declarations: integer fields are whole numbers
 // from 0 to 63, floats multiples of 1/64 in [-8, 72), bytes 0 or 1. Of wide
-// input that is half; the rest is any number, the special ones among them. An
-// integer field of the name `serial` numbers the primitives. Buffers that no
-// source sizes get 64 elements, constants one value.
+// input that is half; the rest is any number, the special ones among them, but in
+// fields whose names begin with `exact`. An integer field of the name `serial`
+// numbers the primitives. Buffers that no source sizes get 64 elements, constants
+// one value.
 
 #ifndef PIKO_TEST_TOOLS_PIKO_COMPARE_RUN_H
 #define PIKO_TEST_TOOLS_PIKO_COMPARE_RUN_H
