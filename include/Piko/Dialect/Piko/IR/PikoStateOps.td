@@ -100,7 +100,7 @@ def Piko_PrefetchOp : Piko_Op<"prefetch", [
     A hint that changes nothing; an index may be outside.
 
     ```mlir
-    piko.prefetch @vertices[%i : i32]
+    piko.prefetch @vertices[%i : index]
     ```
   }];
   let arguments = (ins FlatSymbolRefAttr:$state,
