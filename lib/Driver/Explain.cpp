@@ -13,6 +13,7 @@
 #include "mlir/Pass/PassManager.h"
 #include "llvm/ADT/StringExtras.h"
 #include "llvm/ADT/StringMap.h"
+#include "llvm/ADT/StringSet.h"
 
 using namespace mlir;
 using namespace piko;
@@ -27,6 +28,7 @@ struct Trace {
   OwningOpRef<ModuleOp> ordered; ///< as it was behind piko-order-stages
   std::vector<Remarks> remarks;  ///< of the passes that made any, in order
   std::string pass;              ///< that is running
+  llvm::StringSet<> passes;      ///< that have run
 
   void add(Diagnostic &remark);
 };
@@ -36,6 +38,7 @@ struct Tracer : PassInstrumentation {
   explicit Tracer(Trace &trace) : trace(trace) {}
   void runBeforePass(Pass *pass, Operation *) override {
     trace.pass = pass->getArgument().str();
+    trace.passes.insert(trace.pass);
   }
   void runAfterPass(Pass *pass, Operation *op) override {
     if (pass->getArgument() == "piko-order-stages")
@@ -46,8 +49,8 @@ struct Tracer : PassInstrumentation {
 
 class Report {
 public:
-  Report(PipelineOp written, PipelineOp kernels, raw_ostream &out);
-  void write(ArrayRef<Trace::Remarks> remarks);
+  Report(const Trace &trace, PipelineOp kernels, raw_ostream &out);
+  void write();
 
 private:
   void writeStage(StageOp stage);
@@ -63,10 +66,10 @@ private:
   StringRef getKernelOf(StringRef stage);
   /// The barrier in front of a stage's process phase, or null.
   LocalBarrierOp getBarrier(StringRef stage);
-  /// How the stage waits until a bin is complete: by a local barrier, or as
-  /// `otherwise` says.
-  std::string describeBinWait(StageOp stage, StringRef otherwise);
+  /// How the stage waits until a bin is complete.
+  std::string describeBinWait(StageOp stage);
 
+  const Trace &trace;
   PipelineOp written, kernels;
   raw_ostream &out;
   /// By the name of a stage as it was written: the stage that it is now or that
@@ -167,13 +170,19 @@ LocalBarrierOp Report::getBarrier(StringRef stage) {
   return {};
 }
 
-std::string Report::describeBinWait(StageOp stage, StringRef otherwise) {
-  LocalBarrierOp barrier = getBarrier(stage.getSymName());
-  if (!barrier)
-    return ("a kernel break, because " + otherwise).str();
-  return ("a local barrier behind " + barrier.getProducer() + " in " +
-          getKernelOf(stage.getSymName()))
-      .str();
+std::string Report::describeBinWait(StageOp stage) {
+  if (LocalBarrierOp barrier = getBarrier(stage.getSymName()))
+    return ("a local barrier behind " + barrier.getProducer() + " in " +
+            getKernelOf(stage.getSymName()))
+        .str();
+  std::string text = "a kernel break, ";
+  if (!trace.passes.contains("piko-fuse-kernels"))
+    return text + "because piko-fuse-kernels did not run";
+  bool isFed = llvm::any_of(written.getOps<EdgeOp>(), [&](EdgeOp edge) {
+    return edge.getConsumer() == stage.getSymName();
+  });
+  return text + (isFed ? "for the reason that piko-fuse-kernels gives below"
+                       : "because only the host feeds it");
 }
 
 /// How many bytes a primitive of the stage's input has.
@@ -223,9 +232,7 @@ void Report::writeWaits(StageOp stage) {
     }
   if (schedule && schedule.getEndBin())
     out << "    waits until nothing can reach the bin: "
-        << describeBinWait(stage, "nothing proves that fewer than all "
-                                  "producers can")
-        << "\n";
+        << describeBinWait(stage) << "\n";
   if (!stage.getTakesList())
     return;
   out << "    takes lists";
@@ -233,7 +240,7 @@ void Report::writeWaits(StageOp stage) {
     out << " of " << *batch << " primitives";
   if (schedule && schedule.getEveryBin())
     out << ", of empty bins too";
-  out << ": " << describeBinWait(stage, "a bin must be complete") << "\n";
+  out << ": " << describeBinWait(stage) << "\n";
 }
 
 void Report::writeStage(StageOp stage) {
@@ -302,7 +309,10 @@ void Report::writeProcess(ProcessOp process) {
         << ": with " << barrier.getProducer() << "\n";
   else if (!isDynamic(stage) && isLoadBalanced(stage))
     out << "    Schedule " << stage.getSymName()
-        << ": eliminated, because the OpenMP loop hands bins to any core\n";
+        << (trace.passes.contains("piko-eliminate-schedules")
+                ? ": eliminated, because "
+                : ": ")
+        << "the OpenMP loop hands bins to any core\n";
   out << "    Process " << stage.getSymName();
   if (auto tile = stage.getTile())
     out << ", by tiles with a side of " << *tile << " cells";
@@ -345,8 +355,13 @@ void Report::writeKernel(KernelOp kernel) {
 // The report
 //===----------------------------------------------------------------------===//
 
-Report::Report(PipelineOp written, PipelineOp kernels, raw_ostream &out)
-    : written(written), kernels(kernels), out(out) {
+static PipelineOp getOnlyPipeline(ModuleOp module) {
+  return *module.getOps<PipelineOp>().begin();
+}
+
+Report::Report(const Trace &trace, PipelineOp kernels, raw_ostream &out)
+    : trace(trace), written(getOnlyPipeline(trace.ordered.get())),
+      kernels(kernels), out(out) {
   for (auto stage : kernels.getOps<StageOp>()) {
     hosts[stage.getSymName()] = stage;
     if (stage.getFusedAttr())
@@ -355,7 +370,7 @@ Report::Report(PipelineOp written, PipelineOp kernels, raw_ostream &out)
   }
 }
 
-void Report::write(ArrayRef<Trace::Remarks> remarks) {
+void Report::write() {
   out << "Pipeline " << written.getSymName() << "\n\nStages, in order:\n";
   for (auto stage : written.getOps<StageOp>())
     writeStage(stage);
@@ -366,14 +381,10 @@ void Report::write(ArrayRef<Trace::Remarks> remarks) {
           << ", for each bin\n";
   for (auto kernel : kernels.getOps<KernelOp>())
     writeKernel(kernel);
-  if (!remarks.empty())
+  if (!trace.remarks.empty())
     out << "\nWhat the passes did or refused:\n";
-  for (const Trace::Remarks &pass : remarks)
+  for (const Trace::Remarks &pass : trace.remarks)
     out << "  " << pass.pass << "\n" << pass.text;
-}
-
-static PipelineOp getOnlyPipeline(ModuleOp module) {
-  return *module.getOps<PipelineOp>().begin();
 }
 
 FailureOr<std::string>
@@ -393,7 +404,6 @@ piko::explainPipeline(ModuleOp module, const CheckOptions &check,
     return failure();
   std::string text;
   llvm::raw_string_ostream out(text);
-  Report(getOnlyPipeline(*trace.ordered), getOnlyPipeline(module), out)
-      .write(trace.remarks);
+  Report(trace, getOnlyPipeline(module), out).write();
   return text;
 }

@@ -2,6 +2,11 @@
 //
 // What pikoc says about waits, lists, cycles and schedules with code.
 // RUN: pikoc %s --explain | FileCheck %s
+// RUN: pikoc %s --explain --without eliminate-schedules,fuse-kernels | FileCheck %s --check-prefix=WITHOUT
+
+// WITHOUT: waits until nothing can reach the bin: a kernel break, because piko-fuse-kernels did not run
+// WITHOUT: Schedule repeat: the OpenMP loop hands bins to any core
+
 #include <piko.h>
 
 struct Item {
@@ -44,7 +49,7 @@ struct Repeat : piko::Stage<0, 0, 64, Item, Item, Item>, piko::Uses<State> {
 
 // CHECK-NEXT: {{^  }}gather: bins of 8 x 8, 64 threads, load_balance
 // CHECK-NEXT: from repeat port 0: 12 bytes a primitive, 16 before it was pruned
-// CHECK-NEXT: takes lists of 16 primitives, of empty bins too: a kernel break, because a bin must be complete
+// CHECK-NEXT: takes lists of 16 primitives, of empty bins too: a kernel break, for the reason that piko-fuse-kernels gives below
 struct Gather : piko::Stage<8, 8, 64, Item, Item>, piko::Uses<State> {
   void assignBin(const Item &i) { assignToBin(i, binFromPosition(i.at)); }
   void schedule(piko::BinId) {
@@ -59,7 +64,7 @@ struct Gather : piko::Stage<8, 8, 64, Item, Item>, piko::Uses<State> {
 
 // CHECK-NEXT: {{^  }}late: bins of 8 x 8, 64 threads, a schedule for each bin
 // CHECK-NEXT: from gather port 0: 4 bytes a primitive, 16 before it was pruned
-// CHECK-NEXT: waits until nothing can reach the bin: a kernel break, because nothing proves that fewer than all producers can
+// CHECK-NEXT: waits until nothing can reach the bin: a kernel break, for the reason that piko-fuse-kernels gives below
 struct Late : piko::Stage<8, 8, 64, Item>, piko::Uses<State> {
   void assignBin(const Item &i) { assignToPreviousBins(i); }
   void schedule(piko::BinId bin) {
