@@ -1,0 +1,386 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Passes on stages and their phases.
+
+#ifndef PIKO_TRANSFORMS_AUTHOREDPASSES_TD
+#define PIKO_TRANSFORMS_AUTHOREDPASSES_TD
+
+include "mlir/Pass/PassBase.td"
+
+def AddChecks : Pass<"piko-add-checks", "::mlir::ModuleOp"> {
+  let summary = "Check the rules of state while the pipeline runs";
+  let description = [{
+    **Requires** the authored level, no `piko.check_*` yet.
+
+    **Does**: gives each record of a primitive a longer form whose last field is
+    the primitive's lineage, and tells the runtime of each call, emission, access
+    to a buffer or an image, iteration and barrier. Tests the fields in
+    `numbers` for NaN where they are emitted, and makes flags that follow each
+    `piko.undefined` to where it is emitted or stored.
+
+    **Guarantees** that the results of a run without findings stay as they are,
+    and that no `piko.undefined` is left.
+
+    Before:
+    ```
+    piko.store %v, @verts[%i : index] "x" : f32
+    piko.emit 0 (%z) : f32
+    ```
+    After:
+    ```
+    piko.check_access store @verts[%i : index]
+    piko.store %v, @verts[%i : index] "x" : f32
+    piko.check_place
+    %lineage = piko.check_emit
+    piko.emit 0 (%z, %lineage) : f32, i64
+    ```
+
+    **Limits**: elements of private arrays count as written.
+  }];
+  let options = [
+    ListOption<"numbers", "numbers", "std::string",
+               "Fields that must not be NaN, as Record.field">];
+  let statistics = [
+    Statistic<"accesses", "accesses", "accesses to state that are checked">,
+    Statistic<"unwritten", "unwritten", "numbers that may be unwritten">];
+  let dependentDialects = ["::mlir::arith::ArithDialect",
+                           "::mlir::memref::MemRefDialect"];
+}
+
+def OrderStages : Pass<"piko-order-stages", "::piko::PipelineOp"> {
+  let summary = "Put the stages into the order in which they run";
+  let description = [{
+    **Requires** the authored level.
+
+    **Does**: cuts the graph into linear branches, at convergence, divergence
+    and waits, and moves the stages so that branches stand in descending distance
+    of their first stage from the drain; a branch comes later where it depends,
+    by an edge or by `end_stage`, on one that has not come yet. The stages of a
+    cycle of edges are taken together, in order of declaration, and get the
+    number of their `cycle`. Also numbers the stages (`lineage`) by the
+    language's own rule: producers and stages waited for first, otherwise as
+    declared.
+
+    **Guarantees** that each stage stands behind all stages that feed it or that
+    it waits for, but for those on a cycle with it.
+
+    Before, with `@a` feeding `@b`, and `@b` itself and `@c`:
+    ```
+    piko.stage @c ...
+    piko.stage @b ...
+    piko.stage @a ...
+    ```
+    After:
+    ```
+    piko.stage @a ... lineage 0 ...
+    piko.stage @b ... lineage 1 cycle 0 ...
+    piko.stage @c ... lineage 2 ...
+    ```
+
+    **Limits**: a stage that waits for itself or for one that it feeds gets an
+    error, as do stages that wait for each other.
+  }];
+  let statistics = [
+    Statistic<"branches", "branches", "linear branches found">,
+    Statistic<"cycles", "cycles", "cycles of edges found">];
+}
+
+def InferDirectives : Pass<"piko-infer-directives", "::piko::PipelineOp"> {
+  let summary = "Write down directives that hold without being said";
+  let description = [{
+    **Requires** the authored level with stages in order (`piko-order-stages`).
+
+    **Does**: turns the one `piko.assign_to` of an assign phase into a
+    `piko.assign_previous` where it is proved that the bin is that which the
+    primitive was emitted from. There are two proofs. *By range*: the bin is that
+    of a cell whose coordinates are fields, and wherever a producer emits one
+    they lie between the bounds of its bin, as loops, branches, minimum and
+    maximum show, or because the producer's own bin was chosen by them. *By
+    function*: the bin is computed from fields as the producer's was from its
+    own, and what goes into it is handed on unchanged. A condition around the
+    assignment stays, so that a primitive is in at most that bin.
+
+    **Guarantees** that every primitive stays in the same bins.
+
+    Before, where `@shade` has bins by `x` and hands `x` on:
+    ```
+    piko.stage @test bins [8] ... {
+      piko.assign {
+        %x = piko.get %f "x" : !piko.prim<@F> -> i32
+        %b = piko.bin_at %x : i32
+        piko.assign_to %b
+    ```
+    After:
+    ```
+        piko.assign_previous inferred
+    ```
+
+    **Limits**: producers and the stage have bins of one size, and the stage has
+    no source. On a cycle only what was proved for stages before it is used. A
+    remark says what could not be proved, and where.
+  }];
+  let statistics = [
+    Statistic<"inferred", "inferred", "assignments that are the identity">,
+    Statistic<"refused", "refused", "assign phases without a proof">];
+}
+
+def PreSchedule : Pass<"piko-pre-schedule", "::piko::PipelineOp"> {
+  let summary = "Choose cores before there are bins";
+  let description = [{
+    **Requires** the authored level; best after canonicalization, which folds
+    what a schedule computes.
+
+    **Does**: follows all ways through the `dynamic` body of each schedule. Where
+    they all end with the same directives, these become the schedule's own, and
+    the body is erased. So the core that a bin runs on follows from its number
+    when primitives are assigned, nothing runs for each bin, and
+    `piko-fuse-stages`, which needs to know the kind, sees it.
+
+    **Guarantees** that each bin has the directives that it had.
+
+    Before:
+    ```
+    piko.schedule load_balance dynamic {
+    ^bb0(%bin: index):
+      %serialize = arith.constant 2 : i32
+      %none = arith.constant 0 : i64
+      scf.if %c {
+        piko.set_schedule %serialize tile_split %none
+      } else {
+        piko.set_schedule %serialize tile_split %none
+      }
+      piko.return
+    }
+    ```
+    After:
+    ```
+    piko.schedule serialize
+    ```
+
+    **Limits**: a schedule that depends on its bin or on the state's constants
+    keeps its body, which runs for each bin, before the pipeline does; a remark
+    says what it depends on. So does one that would end with an error.
+  }];
+  let statistics = [
+    Statistic<"moved", "moved", "schedules that are the same for all bins">,
+    Statistic<"kept", "kept", "schedules that are not">];
+}
+
+def FuseStages : Pass<"piko-fuse-stages", "::piko::PipelineOp"> {
+  let summary = "Run a stage where its primitives are emitted";
+  let description = [{
+    **Requires** the authored level with stages in order (`piko-order-stages`);
+    best after `piko-infer-directives`.
+
+    **Does**: makes a stage part of the one that feeds it, so that both have one
+    kernel and no primitive is stored between them: each `piko.emit` becomes the
+    body of the consumer's process phase, inside the conditions of its assign
+    phase, with the emitted numbers in place of fields. Both have bins of one
+    size, one edge and no source lead to the consumer, its only assignment is
+    `piko.assign_previous` (or one bin is the whole domain), it does not wait,
+    and both schedules put a bin onto the same core: they are `direct_map`,
+    `serialize` or `all` alike, or the consumer has none. `load_balance` on the
+    consumer keeps it apart, because it asks for any core.
+
+    **Guarantees** that updates of a pixel and emissions keep their lineage
+    order. The stage notes in `fused` whose phases it holds, and each access to
+    state whose phase it is from.
+
+    Before:
+    ```
+    piko.edge @a[0] -> @b
+    piko.stage @a bins [8] threads 64 : @F -> [@F] {
+      piko.process { ... piko.emit 0 (%x) : i32 ... }
+    }
+    piko.stage @b bins [8] threads 64 : @F -> [] {
+      piko.assign { ... piko.assign_previous ... }
+      piko.process { ... piko.get %f "x" ... }
+    }
+    ```
+    After:
+    ```
+    piko.stage @a bins [8] threads 64 fused ["b"] : @F -> [] {
+      piko.process { ... the body of @b on %x ... }
+    }
+    ```
+
+    **Limits**: a stage on a cycle, one that collects (see `piko-fuse-kernels`)
+    and one whose iterations meet at barriers are not fused. Neither is one that
+    would be copied to more than `max-copies` places. A remark gives the reason
+    for each edge that stays.
+  }];
+  let options = [
+    Option<"maxCopies", "max-copies", "int64_t", "4",
+           "To how many places a stage may be copied">];
+  let statistics = [
+    Statistic<"fused", "fused", "stages that became part of another">,
+    Statistic<"refused", "refused", "edges that stay">];
+  let dependentDialects = ["::mlir::arith::ArithDialect",
+                           "::mlir::memref::MemRefDialect",
+                           "::mlir::ub::UBDialect"];
+}
+
+def TestEarly : Pass<"piko-test-early", "::piko::PipelineOp"> {
+  let summary = "Move work behind the test that decides whether it is needed";
+  let description = [{
+    **Requires** the authored level; best after `piko-fuse-stages`, which brings
+    a test and the work in front of it together.
+
+    **Does**: moves what a process phase computes into the one branch that uses
+    it, behind whatever decides about the branch, such as the update of a depth.
+    So a fragment that fails the depth test is not shaded.
+
+    **Guarantees** that what moves has no effect and reads no state that the
+    phase writes, so that results stay as they are. It does not matter how the
+    test is written, because it is not repeated but stays where it is.
+
+    Before:
+    ```
+    %c = ...                               // the colour
+    %passed = piko.update @depth[%x : i32] { ... } -> i1
+    scf.if %passed {
+      piko.update @color[%x : i32] { ... %c ... }
+    }
+    ```
+    After:
+    ```
+    %passed = piko.update @depth[%x : i32] { ... } -> i1
+    scf.if %passed {
+      %c = ...
+      piko.update @color[%x : i32] { ... %c ... }
+    }
+    ```
+
+    **Limits**: work in one stage for a test in another that is not fused with it
+    stays; so does what two branches need.
+  }];
+  let statistics = [
+    Statistic<"moved", "moved", "operations that moved">];
+}
+
+def Prune : Pass<"piko-prune", "::mlir::ModuleOp"> {
+  let summary = "Drop fields, ports and stages that nothing depends on";
+  let description = [{
+    **Requires** the authored level with stages in order (`piko-order-stages`).
+
+    **Does**: finds what state, and errors that a stage can end with, depend on,
+    over all of the graph at once, so that a field or a stage that only feeds
+    itself around a cycle is not among it. All else is erased: computations in
+    the phases, stages, and the ports that fed them. Each stage that no source
+    feeds gets a record of its own with the fields it needs, without room
+    between them; what its producers emit shrinks with it. `carried` of each
+    edge is the size of its primitives before. A stage that waits for one that
+    is removed waits for those that this one came after.
+
+    **Guarantees** that state, the order in which it changes, and the sources
+    stay as they are.
+
+    Before, where `@keep` does not read `"y"`:
+    ```
+    piko.record @F {"x" : f32 at 0, "y" : f32 at 4} size 8 align 4
+    piko.edge @move[0] -> @ignore
+    piko.edge @move[1] -> @keep
+    piko.stage @move ... : @F -> [@F, @F] { ... piko.emit 1 (%x, %y) : f32, f32 ... }
+    ```
+    After:
+    ```
+    piko.record @F.keep {"x" : f32 at 0} size 4 align 4
+    piko.edge @move[0] -> @keep carried 8
+    piko.stage @move ... : @F -> [@F.keep] { ... piko.emit 0 (%x) : f32 ... }
+    ```
+
+    **Limits**: an array is needed as a whole or not at all. A stage may end with
+    an error, and is kept, if it is on a cycle, has a dynamic schedule or a
+    barrier, or assigns to a bin that no test of `piko.bin_at` has found to be
+    inside. A stage that a source feeds is emptied, not removed. An access to
+    state that only erased work needs is not made, so it cannot fail; a pipeline
+    that is checked (`piko-add-checks`) is left as it is.
+  }];
+  let statistics = [
+    Statistic<"fields", "fields", "fields that an edge no longer carries">,
+    Statistic<"ports", "ports", "ports removed with their edges">,
+    Statistic<"stages", "stages", "stages removed or emptied">];
+  let dependentDialects = ["::mlir::arith::ArithDialect",
+                           "::mlir::ub::UBDialect"];
+}
+
+def OwnPixels : Pass<"piko-own-pixels", "::piko::PipelineOp"> {
+  let summary = "Find which pixel a primitive updates, so that bins can be divided";
+  let description = [{
+    **Requires** the authored level.
+
+    **Does**: where all updates of a stage are at one pixel that follows from
+    the primitive's fields and constants alone, copies that computation to the
+    front of the assign phase, with a `piko.owner` behind it. The stage then gets tiles of
+    `tile` cells a side (which bins that are smaller do not have), and threads
+    that each take tiles of a bin still update every pixel in lineage order.
+
+    **Guarantees** that the pixels that a stage changes and the order in which it
+    does so stay as they are.
+
+    Before:
+    ```
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      %x = piko.get %f "x" : !piko.prim<@F> -> i32
+      %y = piko.get %f "y" : !piko.prim<@F> -> i32
+      piko.update @depth[%x, %y : i32, i32] { ... }
+    ```
+    After, in front of it:
+    ```
+    piko.assign {
+    ^bb0(%f: !piko.prim<@F>):
+      %x = piko.get %f "x" : !piko.prim<@F> -> i32
+      %y = piko.get %f "y" : !piko.prim<@F> -> i32
+      piko.owner [%x, %y : i32, i32]
+      %zero = arith.constant 0 : index
+      piko.assign_to %zero
+    ```
+
+    **Limits**: an update at several pixels, at one that is read from a
+    buffer or an image, or for a list, is refused with a remark; one thread then
+    takes each bin.
+  }];
+  let options = [
+    Option<"tile", "tile", "int64_t", "32",
+           "Side of a tile, in cells of the domain">];
+  let statistics = [
+    Statistic<"divided", "stages-divided", "stages whose bins can be divided">,
+    Statistic<"refused", "stages-refused", "stages whose updates move">];
+}
+
+def EliminateSchedules
+    : Pass<"piko-eliminate-schedules", "::piko::PipelineOp"> {
+  let summary = "Leave to the machine what it does by itself";
+  let description = [{
+    **Requires** the authored or the kernels level; best after `piko-fuse-stages`,
+    for which it matters whether a stage asks for a core.
+
+    **Does**: erases schedules that say `load_balance` and no more. A loop over
+    bins, of which any core takes the next, is what a stage without a schedule
+    gets.
+
+    **Guarantees** that the stage's bins run as before.
+
+    Before:
+    ```
+    piko.stage @a bins [8, 8] threads 64 : @F -> [] {
+      piko.schedule load_balance
+      piko.process { ... }
+    }
+    ```
+    After:
+    ```
+    piko.stage @a bins [8, 8] threads 64 : @F -> [] {
+      piko.process { ... }
+    }
+    ```
+
+    **Limits**: a schedule that also waits, takes batches or gives up an order
+    stays.
+  }];
+  let statistics = [
+    Statistic<"eliminated", "eliminated", "schedules that went">];
+}
+
+#endif // PIKO_TRANSFORMS_AUTHOREDPASSES_TD

@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Passes that turn kernels into loops over storage, and those on loops.
+
+#ifndef PIKO_TRANSFORMS_RESOLVEDPASSES_TD
+#define PIKO_TRANSFORMS_RESOLVEDPASSES_TD
+
+include "mlir/Pass/PassBase.td"
+
+def ResolveKernels : Pass<"piko-resolve-kernels", "::piko::PipelineOp"> {
+  let summary = "Turn phases into loops over bins and their storage";
+  let description = [{
+    **Requires** the kernels level.
+
+    **Does**: turns the phases of each kernel into an `scf.forall` over the
+    units of work of the stage's bins, in it a loop over the unit's cells and in
+    that one over the primitives of a cell, marked `piko.lanes`. Where the
+    process phase takes a list, the inner loop is over the calls of the phase.
+    What stands behind a `piko.local_barrier` follows when a bin is done, as a
+    `piko.local_bin`.
+    Emissions become stores into the unit's own writer, followed by the
+    consumer's assign phase, whose assignments become `piko.place`; queries of
+    bins and of the grid become arithmetic. The body of a dynamic schedule
+    becomes a kernel that stands before all others, a loop over bins.
+
+    **Guarantees** the resolved level: kernels hold no phase, and all storage
+    and synchronisation is explicit.
+
+    Before:
+    ```
+    piko.kernel @kernel_a { piko.process of @a { ... } ... }
+    ```
+    After:
+    ```
+    piko.kernel @kernel_a {
+      %bins = piko.open_bins @a : !piko.bins<@F>
+      %units = piko.unit_count %bins : !piko.bins<@F>
+      scf.forall (%u) in (%units) { ... }
+      piko.close_bins %bins : !piko.bins<@F>
+    }
+    ```
+
+    **Limits**: the iterations of a `piko.parallel_for` are left to
+    `piko-split-loops`.
+  }];
+  let dependentDialects = ["::mlir::arith::ArithDialect",
+                           "::mlir::memref::MemRefDialect",
+                           "::mlir::scf::SCFDialect"];
+}
+
+def SplitLoops : Pass<"piko-split-loops", "::piko::PipelineOp"> {
+  let summary = "Turn parallel loops into loops, cut where iterations meet";
+  let description = [{
+    **Requires** the resolved level.
+
+    **Does**: turns a `piko.parallel_for` without barriers into an `scf.for`
+    that is marked `piko.lanes`. One with barriers is cut at them: each piece
+    between two barriers becomes a loop over all iterations, and what lives
+    across a cut, be it a value or a private array, gets a slot for each
+    iteration in scratch memory. Control flow that holds barriers moves around
+    the pieces and follows iteration 0; where the analysis cannot prove that all
+    iterations agree, they are compared when the pipeline runs, and
+    `piko.fail_barrier` reports the first that does not. Reductions, scans and
+    sorts become loops over slots. Where several pieces emit, primitives are put
+    in the order of iterations when the loop ends (`piko.defer_begin`).
+
+    **Guarantees** that nothing is left of parallel loops and barriers, and that
+    each barrier sees all that iterations did before it, in order of iteration.
+
+    Before:
+    ```
+    piko.parallel_for %n {
+    ^bb0(%i: index):
+      %v = ...
+      piko.sync
+      ... %v ...
+      piko.yield
+    }
+    ```
+    After:
+    ```
+    %bytes, %granted = piko.scratch %writer[%size]
+    scf.if %granted {
+      %slots = memref.view %bytes[%zero][%n] : memref<?xi8> to memref<?xf32>
+      scf.for %i = %zero to %n step %one {
+        %v = ...
+        memref.store %v, %slots[%i] : memref<?xf32>
+      } {piko.lanes}
+      scf.for %i = %zero to %n step %one {
+        %v = memref.load %slots[%i] : memref<?xf32>
+        ... %v ...
+      } {piko.lanes}
+    }
+    ```
+
+    **Limits**: a barrier in control flow other than `scf.if`, `scf.for`,
+    `scf.while` and `scf.index_switch` is an error, and so is a value across a
+    barrier that is not a number, a primitive or a private array.
+  }];
+  let statistics = [
+    Statistic<"loops", "loops", "parallel loops that became loops">,
+    Statistic<"cuts", "cuts", "parallel loops that were cut at barriers">,
+    Statistic<"checks", "checks", "conditions compared when the pipeline runs">];
+  let dependentDialects = ["::mlir::arith::ArithDialect",
+                           "::mlir::memref::MemRefDialect",
+                           "::mlir::scf::SCFDialect"];
+}
+
+def Prefetch : Pass<"piko-prefetch", "::piko::PipelineOp"> {
+  let summary = "Ask for what later primitives refer to";
+  let description = [{
+    **Requires** the resolved level.
+
+    **Does**: a loop over the primitives of a bin that reads state at indices
+    which are fields of the primitive asks for the elements of a primitive
+    further on (`piko.prefetch`), and for a primitive still further on
+    (`piko.prefetch_item`): neither lies in memory in the order of the bin
+    (S. Ainsworth and T. M. Jones, "Software Prefetching for Indirect Memory
+    Accesses", 2017). A stage with one bin for all takes its primitives as they
+    were made, whose neighbours mostly refer to the same; it is left alone.
+
+    **Guarantees** that nothing changes but time: a prefetch reads nothing and
+    cannot fail.
+
+    Before:
+    ```
+    scf.for %i = %begin to %end step %one {
+      %t = piko.item %bins[%i] ...
+      %k = piko.get %t "vertex" ...
+      ... piko.load @vertices[%k : i32] "x" : f32 ...
+    ```
+    After:
+    ```
+    scf.for %i = %begin to %end step %one {
+      %far = ...                        // %i + 16, or the last one
+      piko.prefetch_item %bins[%far] : !piko.bins<@Triangle>
+      %near = ...                       // %i + 8, or the last one
+      %s = piko.item %bins[%near] ...
+      %j = piko.get %s "vertex" ...
+      piko.prefetch @vertices[%j : i32]
+      %t = piko.item %bins[%i] ...
+    ```
+
+    **Limits**: indices that are computed, and those of reads that only the much
+    longer side of a condition does, are not followed.
+  }];
+  let statistics = [
+    Statistic<"loops", "loops", "loops that ask ahead">,
+    Statistic<"elements", "elements", "elements of state asked for">];
+  let dependentDialects = ["::mlir::arith::ArithDialect"];
+}
+
+#endif // PIKO_TRANSFORMS_RESOLVEDPASSES_TD
