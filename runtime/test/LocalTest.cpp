@@ -13,6 +13,8 @@
 #include "pikort/pikort.hpp"
 
 #include <gtest/gtest.h>
+
+#include <atomic>
 #include <mutex>
 #include <set>
 #include <string>
@@ -33,7 +35,7 @@ bool everyBin;
 int32_t failing; ///< The stages, as bits, that report an error.
 std::vector<int64_t> drained;
 std::vector<std::multiset<int64_t>> calls; ///< Sizes of each bin's.
-bool paddingSeen;
+std::atomic<bool> paddingSeen;
 std::mutex mutex;
 
 void declare(pikort_pipeline *p) {
@@ -103,7 +105,8 @@ void runBin(pikort_pipeline *p, pikoir_writer *const (&writers)[3],
   in = pikoir_begin_local(writers[list], 0);
   for (int64_t i = in->units[0].begin; i < in->units[0].end; ++i) {
     for (size_t b = 9; b < sizeof(Item); ++b)
-      paddingSeen |= reinterpret_cast<const char *>(&itemAt(in, i))[b] != 0;
+      if (reinterpret_cast<const char *>(&itemAt(in, i))[b] != 0)
+        paddingSeen = true;
     emit(writers[again], 0, 2000000 + itemAt(in, i).id, cell, false);
   }
   pikoir_next(writers[again]);
