@@ -89,9 +89,11 @@ static SmallVector<Reference> findReferences(scf::ForOp loop, ItemOp item) {
       reference.fields.push_back(field);
       names.push_back(field.getFieldAttr());
     }
-    if (!reference.fields.empty() && !isRare(load, loop) &&
-        known.insert(ArrayAttr::get(loop.getContext(), names)).second)
-      references.push_back(reference);
+    auto key = ArrayAttr::get(loop.getContext(), names);
+    if (reference.fields.empty() || known.contains(key) || isRare(load, loop))
+      return;
+    known.insert(key);
+    references.push_back(reference);
   });
   return references;
 }

@@ -12,7 +12,6 @@
 #include "llvm/Support/Error.h"
 #include "llvm/Target/TargetMachine.h"
 
-#include <memory>
 #include <string>
 
 namespace piko {
