@@ -108,20 +108,18 @@ inline PixelBox coveredPart(const ScreenVertex &a, const ScreenVertex &b,
     return box;
   if (signedArea(first, second, third) < 0)
     std::swap(second, third);
-  NearEdges edges(first, second, third);
-  PixelBox part = {box.hi + 1, box.lo - 1};
-  // No branch would be foreseen.
-  auto add = [&](int x, int y) {
-    glm::ivec2 pixel = box.lo + glm::ivec2(x, y);
-    bool covered =
-        (pixel.x <= box.hi.x) & (pixel.y <= box.hi.y) & edges.cover(x, y);
-    part.lo = covered ? glm::min(part.lo, pixel) : part.lo;
-    part.hi = covered ? glm::max(part.hi, pixel) : part.hi;
-  };
-  add(0, 0);
-  add(1, 0);
-  add(0, 1);
-  add(1, 1);
+  // No branch on any of this would be foreseen.
+  uint32_t columns = (box.lo.x <= box.hi.x ? 0b0101u : 0u) |
+                     (box.lo.x < box.hi.x ? 0b1010u : 0u);
+  uint32_t rows = (box.lo.y <= box.hi.y ? 0b0011u : 0u) |
+                  (box.lo.y < box.hi.y ? 0b1100u : 0u);
+  uint32_t covered =
+      NearEdges(first, second, third).coveredOfFour() & columns & rows;
+  PixelBox part = {box.lo, box.lo};
+  part.lo.x += covered & 0b0101 ? 0 : 1;
+  part.lo.y += covered & 0b0011 ? 0 : 1;
+  part.hi.x += covered & 0b1010 ? 1 : covered ? 0 : -1;
+  part.hi.y += covered & 0b1100 ? 1 : 0;
   return part;
 }
 

@@ -66,8 +66,16 @@ template <class Int> struct BasicEdges {
   BasicEdges(Point a, Point b, Point c) : e0(b, c), e1(c, a), e2(a, b) {}
 
   bool cover(int x, int y) const {
-    return e0.holds(e0.at(x, y)) & e1.holds(e1.at(x, y)) &
-           e2.holds(e2.at(x, y));
+    Int least = (e0.at(x, y) - e0.least) | (e1.at(x, y) - e1.least) |
+                (e2.at(x, y) - e2.least);
+    return least >= 0; // none is negative
+  }
+
+  /// Which of the pixels (0, 0), (1, 0), (0, 1) and (1, 1) are covered: bits 0
+  /// to 3.
+  uint32_t coveredOfFour() const {
+    return uint32_t(cover(0, 0)) | uint32_t(cover(1, 0)) << 1 |
+           uint32_t(cover(0, 1)) << 2 | uint32_t(cover(1, 1)) << 3;
   }
 };
 

@@ -138,8 +138,6 @@ struct Setup : piko::Stage<0, 0, 64, Triangle, BoxedTriangle>,
     };
     PixelBox box = boxOf(corner(0), corner(1), corner(2), clip, domain(),
                          state().settings.cullBackFaces != 0);
-    if (box.isEmpty())
-      return;
     box = coveredPart(corner(0), corner(1), corner(2), box);
     if (!box.isEmpty())
       emit(BoxedTriangle{t.vertex, box}, 0);
