@@ -127,6 +127,13 @@ Value LoweringContext::member(OpBuilder &builder, Value bins, int64_t offset,
                                       createOffset(builder, loc, bins, offset));
 }
 
+/// Whether a function of the runtime is hardly ever called, though there is a
+/// call for each primitive: LLVM then moves out of the way what leads to it.
+static bool isCold(StringRef function) {
+  return function.starts_with("pikoir_fail") || function == "pikoir_append" ||
+         function == "pikoir_place" || function == "pikoir_next";
+}
+
 LLVM::CallOp LoweringContext::call(OpBuilder &builder, Location loc,
                                    StringRef function, Type result,
                                    ValueRange arguments) {
@@ -138,6 +145,9 @@ LLVM::CallOp LoweringContext::call(OpBuilder &builder, Location loc,
         result ? result : LLVM::LLVMVoidType::get(builder.getContext()),
         llvm::to_vector(arguments.getTypes()));
     callee = LLVM::LLVMFuncOp::create(builder, loc, function, type);
+    if (isCold(function))
+      callee.setPassthroughAttr(
+          builder.getArrayAttr(builder.getStringAttr("cold")));
   }
   return LLVM::CallOp::create(builder, loc, callee, arguments);
 }
