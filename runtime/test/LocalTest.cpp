@@ -71,7 +71,11 @@ void emit(pikoir_writer *w, int32_t port, int64_t id, int64_t cell,
   auto *room = reinterpret_cast<Item *>(pikoir_append_inline(w, port));
   room->id = id;
   room->cell = static_cast<int8_t>(cell);
-  if (place)
+  if (!place)
+    return;
+  if (w->ports[port].flags & PIKOIR_PORT_LOCAL)
+    pikoir_place_local_inline(w, port, cell);
+  else
     pikoir_place_inline(w, port, cell);
 }
 

@@ -518,7 +518,10 @@ struct PlaceLowering : Lowering<PlaceOp> {
       cell = arith::AddIOp::create(rewriter, loc, cell,
                                    toI64(rewriter, loc, adaptor.getTile()));
     }
-    if (op.getPort())
+    if (op.getPort() && isLocal(op))
+      createLocalPlace(rewriter, loc, context, adaptor.getWriter(),
+                       *op.getPort(), cell);
+    else if (op.getPort())
       createPlace(rewriter, loc, context, adaptor.getWriter(), *op.getPort(),
                   cell);
     else
@@ -526,6 +529,22 @@ struct PlaceLowering : Lowering<PlaceOp> {
                    {adaptor.getWriter(), cell});
     rewriter.eraseOp(op);
     return success();
+  }
+
+private:
+  /// Whether the edge is local, or each of them if several may be meant.
+  bool isLocal(PlaceOp op) const {
+    bool isLocal = false;
+    PipelineOp pipeline = context.numbers(op).pipeline;
+    for (auto edge : pipeline.getOps<EdgeOp>()) {
+      if (edge.getPort() != *op.getPort() ||
+          edge.getConsumerAttr() != op.getStageAttr())
+        continue;
+      if (!edge.getLocal())
+        return false;
+      isLocal = true;
+    }
+    return isLocal;
   }
 };
 

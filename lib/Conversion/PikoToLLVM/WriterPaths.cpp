@@ -16,6 +16,8 @@ constexpr int64_t cursor = 0, limit = 8, size = 16, emitted = 24, kept = 32,
 } // namespace layout
 /// PIKOIR_FIRST_CELL
 static constexpr int64_t firstCell = int64_t(1) << 31;
+/// PIKOIR_PORT_LOCAL
+static constexpr int64_t localFlag = 16;
 
 namespace {
 
@@ -48,10 +50,11 @@ public:
   Value compare(arith::CmpIPredicate predicate, Value a, Value b) {
     return arith::CmpIOp::create(builder, loc, predicate, a, b);
   }
-  /// Whether flags are set.
-  Value any(int64_t flags) {
-    return compare(arith::CmpIPredicate::ne, load(flags, i32()),
-                   createI32(builder, loc, 0));
+  /// Whether any of these flags is set.
+  Value any(int64_t flags, int64_t mask = -1) {
+    Value set = arith::AndIOp::create(builder, loc, load(flags, i32()),
+                                      createI32(builder, loc, mask));
+    return compare(arith::CmpIPredicate::ne, set, createI32(builder, loc, 0));
   }
   Value either(Value a, Value b) {
     return arith::OrIOp::create(builder, loc, a, b);
@@ -78,7 +81,7 @@ Value piko::createAppend(OpBuilder &builder, Location loc,
   Value record = out.load(layout::cursor, out.pointer());
   Value full = out.comparePointers(LLVM::ICmpPredicate::ugt, record,
                                    out.load(layout::limit, out.pointer()));
-  Value isSlow = out.either(full, out.any(layout::portFlags));
+  Value isSlow = out.either(full, out.any(layout::portFlags, ~localFlag));
   auto path = scf::IfOp::create(builder, loc, out.pointer(), isSlow,
                                 /*withElseRegion=*/true);
   OpBuilder::InsertionGuard guard(builder);
@@ -106,6 +109,29 @@ Value piko::createAppend(OpBuilder &builder, Location loc,
       });
   scf::YieldOp::create(builder, loc, record);
   return path.getResult(0);
+}
+
+void piko::createLocalPlace(OpBuilder &builder, Location loc,
+                            LoweringContext &context, Value writer,
+                            int64_t port, Value cell) {
+  MemberBuilder out = openPort(builder, loc, writer, port);
+  Value zero = createI64(builder, loc, 0);
+  Value last = out.load(layout::lastCell, out.i64());
+  Value isSlow =
+      out.either(out.either(out.compare(arith::CmpIPredicate::ne, cell, zero),
+                            out.compare(arith::CmpIPredicate::ne, last,
+                                        createI64(builder, loc, -1))),
+                 out.any(layout::portFlags, ~localFlag));
+  auto path = scf::IfOp::create(builder, loc, isSlow, /*withElseRegion=*/true);
+  OpBuilder::InsertionGuard guard(builder);
+  builder.setInsertionPointToStart(path.thenBlock());
+  context.call(builder, loc, "pikoir_place", Type(),
+               {writer, createI32(builder, loc, port), cell});
+  builder.setInsertionPointToStart(path.elseBlock());
+  Value cursor = out.load(layout::cursor, out.pointer());
+  Value size = out.load(layout::size, out.i64());
+  out.store(createOffset(builder, loc, cursor, size), layout::cursor);
+  out.store(cell, layout::lastCell);
 }
 
 void piko::createPlace(OpBuilder &builder, Location loc,

@@ -18,6 +18,10 @@ mlir::Value createAppend(mlir::OpBuilder &builder, mlir::Location loc,
 void createPlace(mlir::OpBuilder &builder, mlir::Location loc,
                  LoweringContext &context, mlir::Value writer, int64_t port,
                  mlir::Value cell);
+/// The same where the port's edge is local.
+void createLocalPlace(mlir::OpBuilder &builder, mlir::Location loc,
+                      LoweringContext &context, mlir::Value writer,
+                      int64_t port, mlir::Value cell);
 /// Ends a position (pikoir_next).
 void createNext(mlir::OpBuilder &builder, mlir::Location loc,
                 LoweringContext &context, mlir::Value writer);

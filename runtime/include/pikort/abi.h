@@ -387,7 +387,7 @@ static inline uint8_t *pikoir_append_inline(pikoir_writer *writer,
                                             int32_t port) {
   pikoir_port *out = &writer->ports[port];
   uint8_t *record = out->cursor;
-  if (record > out->limit || out->flags != 0)
+  if (record > out->limit || (out->flags & ~PIKOIR_PORT_LOCAL) != 0)
     return pikoir_append(writer, port);
   ++out->emitted;
   if (out->cells != 0) // kept by its first place
@@ -413,6 +413,19 @@ static inline void pikoir_place_inline(pikoir_writer *writer, int32_t port,
     ++out->kept;
   }
   *out->cell_cursor++ = entry;
+  out->last_cell = cell;
+}
+
+/// pikoir_place for a port whose edge is local.
+static inline void pikoir_place_local_inline(pikoir_writer *writer,
+                                             int32_t port, int64_t cell) {
+  pikoir_port *out = &writer->ports[port];
+  if (cell != 0 || out->last_cell != -1 ||
+      (out->flags & ~PIKOIR_PORT_LOCAL) != 0) {
+    pikoir_place(writer, port, cell);
+    return;
+  }
+  out->cursor += out->size;
   out->last_cell = cell;
 }
 
