@@ -13,6 +13,7 @@
 #include "mlir/Conversion/ReconcileUnrealizedCasts/ReconcileUnrealizedCasts.h"
 #include "mlir/Conversion/SCFToControlFlow/SCFToControlFlow.h"
 #include "mlir/Conversion/UBToLLVM/UBToLLVM.h"
+#include "mlir/Conversion/VectorToLLVM/ConvertVectorToLLVMPass.h"
 #include "mlir/Dialect/ControlFlow/IR/ControlFlow.h"
 #include "mlir/Dialect/DLTI/DLTI.h"
 #include "mlir/Dialect/GPU/IR/GPUDialect.h"
@@ -21,6 +22,7 @@
 #include "mlir/Dialect/Math/IR/Math.h"
 #include "mlir/Dialect/MemRef/IR/MemRef.h"
 #include "mlir/Dialect/UB/IR/UBOps.h"
+#include "mlir/Dialect/Vector/IR/VectorOps.h"
 #include "mlir/Target/LLVMIR/Dialect/Builtin/BuiltinToLLVMIRTranslation.h"
 #include "mlir/Target/LLVMIR/Dialect/GPU/GPUToLLVMIRTranslation.h"
 #include "mlir/Target/LLVMIR/Dialect/LLVMIR/LLVMToLLVMIRTranslation.h"
@@ -32,11 +34,11 @@ using namespace mlir;
 using namespace piko;
 
 void piko::registerPikoDialects(DialectRegistry &registry) {
-  registry
-      .insert<PikoDialect, DLTIDialect, LLVM::LLVMDialect, NVVM::NVVMDialect,
-              arith::ArithDialect, cf::ControlFlowDialect, func::FuncDialect,
-              gpu::GPUDialect, math::MathDialect, memref::MemRefDialect,
-              omp::OpenMPDialect, scf::SCFDialect, ub::UBDialect>();
+  registry.insert<PikoDialect, DLTIDialect, LLVM::LLVMDialect,
+                  NVVM::NVVMDialect, arith::ArithDialect,
+                  cf::ControlFlowDialect, func::FuncDialect, gpu::GPUDialect,
+                  math::MathDialect, memref::MemRefDialect, omp::OpenMPDialect,
+                  scf::SCFDialect, ub::UBDialect, vector::VectorDialect>();
   registerBuiltinDialectTranslation(registry);
   registerGPUDialectTranslation(registry);
   registerLLVMDialectTranslation(registry);
@@ -51,6 +53,7 @@ void piko::registerPikoPasses() {
   registerTransformsPasses();
   // One by one: upstream's header for all conversions costs seconds to compile.
   registerPass([] { return createConvertMathToLLVMPass(); });
+  registerPass([] { return createConvertVectorToLLVMPass(); });
   registerPass([] { return createGpuKernelOutliningPass(); });
   registerPass([] { return createGpuLaunchSinkIndexComputationsPass(); });
   registerPass([] { return createConvertOpenMPToLLVMPass(); });

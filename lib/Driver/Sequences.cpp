@@ -12,6 +12,7 @@
 #include "mlir/Conversion/ReconcileUnrealizedCasts/ReconcileUnrealizedCasts.h"
 #include "mlir/Conversion/SCFToControlFlow/SCFToControlFlow.h"
 #include "mlir/Conversion/UBToLLVM/UBToLLVM.h"
+#include "mlir/Conversion/VectorToLLVM/ConvertVectorToLLVMPass.h"
 #include "mlir/Dialect/GPU/IR/GPUDialect.h"
 #include "mlir/Dialect/GPU/Transforms/Passes.h"
 #include "mlir/Pass/PassOptions.h"
@@ -76,6 +77,10 @@ void piko::addCPUSequence(OpPassManager &passes,
                           const SynthesisOptions &options) {
   if (options.has("prefetch"))
     passes.nest<PipelineOp>().addPass(createPrefetch());
+  if (options.has("compact-loops"))
+    passes.nest<PipelineOp>().addPass(createCompactLoops());
+  if (options.has("vectorize"))
+    passes.nest<PipelineOp>().addPass(createVectorize());
   passes.nest<PipelineOp>().addPass(createConvertPikoToSCF());
   addCleanUp(passes);
   passes.nest<PipelineOp>().addPass(createConvertPikoToOpenMP());
@@ -85,6 +90,7 @@ void piko::addCPUSequence(OpPassManager &passes,
 
 void piko::addLLVMSequence(OpPassManager &passes) {
   passes.addPass(createSCFToControlFlowPass());
+  passes.addPass(createConvertVectorToLLVMPass());
   passes.addPass(createConvertMathToLLVMPass());
   passes.addPass(createUBToLLVMConversionPass());
   passes.addPass(createConvertOpenMPToLLVMPass());

@@ -15,7 +15,7 @@ const std::vector<std::string> &SynthesisOptions::getOptional() {
   static const std::vector<std::string> names = {
       "pre-schedule", "infer-directives", "fuse-stages",         "test-early",
       "prune",        "own-pixels",       "eliminate-schedules", "fuse-kernels",
-      "form-strips",  "prefetch"};
+      "form-strips",  "prefetch",         "compact-loops",       "vectorize"};
   return names;
 }
 

@@ -144,6 +144,29 @@ void BinArithmetic::forEachBinIn(
   body(builder, bin);
 }
 
+Value BinArithmetic::isInside(ValueRange at, ValueRange lo, ValueRange hi) {
+  Value inside;
+  for (auto [a, from, to] : llvm::zip(at, lo, hi)) {
+    // A negative difference is a large unsigned one.
+    Value offset = arith::SubIOp::create(builder, loc, a, from);
+    Value extent = arith::SubIOp::create(builder, loc, to, from);
+    Value ok = arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::ult,
+                                     offset, extent);
+    inside = inside ? arith::AndIOp::create(builder, loc, inside, ok) : ok;
+  }
+  return inside;
+}
+
+Value BinArithmetic::isInState(StringRef state, ValueRange indices) {
+  SmallVector<Value> at, lo, hi;
+  for (auto [dim, index] : llvm::enumerate(indices)) {
+    at.push_back(toIndex(index));
+    lo.push_back(constant(0));
+    hi.push_back(ExtentOp::create(builder, loc, state, dim));
+  }
+  return isInside(at, lo, hi);
+}
+
 Value piko::findBin(OpBuilder &builder, Operation *op) {
   for (auto loop = op->getParentOfType<scf::ForOp>(); loop;
        loop = loop->getParentOfType<scf::ForOp>()) {

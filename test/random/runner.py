@@ -15,7 +15,8 @@ EQUAL, BLANK = "equal", "equal, but blank"
 
 #: What piko-compare may leave out of synthesis.
 PASSES = ["pre-schedule", "infer-directives", "fuse-stages", "test-early", "prune",
-          "own-pixels", "eliminate-schedules", "fuse-kernels", "prefetch"]
+          "own-pixels", "eliminate-schedules", "fuse-kernels", "prefetch",
+          "compact-loops", "vectorize"]
 
 
 def options_of(passes):

@@ -36,6 +36,11 @@ public:
   void
   forEachBinIn(mlir::ValueRange lo, mlir::ValueRange hi,
                llvm::function_ref<void(mlir::OpBuilder &, mlir::Value)> body);
+  /// Whether all of lo <= at < hi.
+  mlir::Value isInside(mlir::ValueRange at, mlir::ValueRange lo,
+                       mlir::ValueRange hi);
+  /// Whether a buffer or image has an element with these indices.
+  mlir::Value isInState(llvm::StringRef state, mlir::ValueRange indices);
 
 private:
   mlir::Value gridCoordinate(mlir::Value bin, int64_t dim);

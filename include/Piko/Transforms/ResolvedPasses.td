@@ -150,4 +150,138 @@ def Prefetch : Pass<"piko-prefetch", "::piko::PipelineOp"> {
   let dependentDialects = ["::mlir::arith::ArithDialect"];
 }
 
+def CompactLoops : Pass<"piko-compact-loops", "::piko::PipelineOp"> {
+  let summary = "Do what a test guards for many primitives together";
+  let description = [{
+    **Requires** the resolved level.
+
+    **Does**: cuts a loop over primitives in front of work that a test with
+    effects guards, as the shading behind a depth test that `piko-test-early` has
+    moved there. For each block of 64 primitives, a first loop does what stands
+    in front and notes which primitives pass; a second one does the work for
+    those alone. `piko-vectorize` can then compute the work in vectors that are
+    full. What the work needs is read or computed again where that has no
+    effects, and kept in arrays where it has.
+
+    **Guarantees** the same operations on the same numbers. Work is done in the
+    same order, behind tests of later primitives: it is put off only where it
+    touches no state that is written in front of it, writes none that is read
+    there, and emits nothing.
+
+    Before:
+    ```
+    scf.for %i = %begin to %end step %one {
+      %f = piko.item %bins[%i] ...
+      %passed = piko.update @depth[...] ...
+      scf.if %passed {
+        ...
+        piko.update @color[...] ...
+      }
+    } {piko.lanes}
+    ```
+    After:
+    ```
+    scf.for %b = %begin to %end step %c64 {
+      memref.store %zero, %count[%zero] : memref<1xindex>
+      scf.for %i = %b to %e step %one {
+        %f = piko.item %bins[%i] ...
+        %passed = piko.update @depth[...] ...
+        scf.if %passed {
+          memref.store %i, %list[%n] : memref<64xindex> ...
+        }
+      } {piko.lanes}
+      %n = memref.load %count[%zero] : memref<1xindex>
+      scf.for %j = %zero to %n step %one {
+        %i = memref.load %list[%j] : memref<64xindex>
+        %f = piko.item %bins[%i] ...
+        ...
+        piko.update @color[...] ...
+      } {piko.lanes}
+    }
+    ```
+
+    **Limits**: work in which vectors would have too little to compute stays
+    where it is, as does work that is not the last of a loop.
+  }];
+  let statistics = [
+    Statistic<"compacted", "compacted", "loops that were cut">];
+  let dependentDialects = ["::mlir::arith::ArithDialect",
+                           "::mlir::memref::MemRefDialect",
+                           "::mlir::scf::SCFDialect"];
+}
+
+def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
+  let summary = "Compute for many primitives at once";
+  let description = [{
+    **Requires** the resolved level.
+
+    **Does**: takes the primitives of a loop over them in blocks of 64, with
+    three loops. The first reads, one primitive after the other, their fields
+    and elements of state that the kernel does not write, and leaves them in
+    arrays. The second computes from them, for 16 primitives at once, in
+    vectors: what depends on nothing else and has no effects. The third does the
+    rest, primitive by primitive in the old order. So nothing that is computed
+    ahead waits for a branch or for another primitive.
+
+    Both sides of a condition are computed. Where one side cannot be, lanes that
+    come to it give up, as do those that read outside of a buffer; their
+    primitives go through the original body, with the errors that it reports.
+    Of a conditional statement, the side that runs ahead is the shorter one if
+    both can.
+
+    **Guarantees** the same operations on the same numbers, and effects in the
+    same order. State that the kernel writes is read where it was.
+
+    Before:
+    ```
+    scf.for %i = %begin to %end step %one {
+      %t = piko.item %bins[%i] ...
+      %k = piko.get %t "vertex" ...
+      %x = piko.load @vertices[%k : i32] "x" : f32
+      %y = arith.mulf %x, %x : f32 ...
+      piko.append %writer, 0 (%y)
+      piko.next %writer
+    } {piko.lanes}
+    ```
+    After:
+    ```
+    scf.for %b = %begin to %end step %c64 {
+      scf.for %i = %b to %e step %one {
+        %k = piko.get ...
+        %x = scf.if %inside -> (f32) {
+          piko.load checked @vertices[%k : i32] "x" : f32 ...
+        memref.store %x, %xs[%at] : memref<64xf32>
+        memref.store %outside, %gave_up[%at] : memref<64xi8>
+      }
+      scf.for %g = %zero to %count step %c16 {
+        %x = vector.load %xs[%g] : memref<64xf32>, vector<16xf32>
+        %y = arith.mulf %x, %x : vector<16xf32> ...
+        vector.store %y, %ys[%g] : memref<64xf32>, vector<16xf32>
+      }
+      scf.for %i = %b to %e step %one {
+        scf.if %gave_up {
+          ...                                // as before
+        } else {
+          %y = memref.load %ys[%at] : memref<64xf32>
+          piko.append %writer, 0 (%y)
+          piko.next %writer
+        }
+      }
+    }
+    ```
+
+    **Limits**: loops inside a phase, also parallel ones, end what runs ahead, as
+    do phases that take lists. Where too little can run ahead for what would
+    have to be kept, the loop stays.
+  }];
+  let statistics = [
+    Statistic<"vectorized", "vectorized", "loops that compute in vectors">,
+    Statistic<"left", "left", "loops with too little to compute ahead">,
+    Statistic<"kept", "kept", "values kept for what is done one by one">];
+  let dependentDialects = ["::mlir::arith::ArithDialect",
+                           "::mlir::memref::MemRefDialect",
+                           "::mlir::scf::SCFDialect",
+                           "::mlir::vector::VectorDialect"];
+}
+
 #endif // PIKO_TRANSFORMS_RESOLVEDPASSES_TD

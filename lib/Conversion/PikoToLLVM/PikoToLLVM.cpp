@@ -82,6 +82,22 @@ static LogicalResult noteSubject(KernelOp kernel, func::FuncOp function,
   return success();
 }
 
+/// Keeps LLVM's vectorizer from loops that only read: to gather into vectors
+/// takes longer than to read one number after the other.
+static void annotateReads(func::FuncOp function) {
+  MLIRContext *context = function.getContext();
+  auto vectorize = LLVM::LoopVectorizeAttr::get(
+      context, /*disable=*/BoolAttr::get(context, true), {}, {}, {}, {}, {},
+      {});
+  auto annotation =
+      LLVM::LoopAnnotationAttr::get(context, {}, vectorize, {}, {}, {}, {}, {},
+                                    {}, {}, {}, {}, {}, {}, {}, {});
+  function.walk([&](scf::ForOp loop) {
+    if (loop->removeAttr("piko.reads"))
+      loop->setAttr("loop_annotation", annotation);
+  });
+}
+
 LogicalResult ConvertPikoToLLVMPass::convert(PipelineOp pipeline,
                                              LoweringContext &context) {
   WalkResult phase = pipeline.walk([](Operation *op) {
@@ -140,6 +156,8 @@ LogicalResult ConvertPikoToLLVMPass::convert(PipelineOp pipeline,
   for (func::FuncOp function : functions)
     if (failed(applyPartialConversion(function, target, frozen)))
       return failure();
+  for (func::FuncOp function : functions)
+    annotateReads(function);
   createProgram(numbers, functions, context);
   for (func::FuncOp function : functions)
     for (const char *name :

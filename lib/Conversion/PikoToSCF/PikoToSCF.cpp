@@ -22,21 +22,6 @@ static SmallVector<Value> toIndices(BinArithmetic &bins, ValueRange values) {
   return llvm::map_to_vector(values, [&](Value v) { return bins.toIndex(v); });
 }
 
-/// Whether all of lo <= at < hi: a negative difference is a large unsigned one.
-static Value isInside(PatternRewriter &rewriter, Location loc,
-                      ArrayRef<Value> at, ArrayRef<Value> lo,
-                      ArrayRef<Value> hi) {
-  Value inside;
-  for (auto [a, from, to] : llvm::zip(at, lo, hi)) {
-    Value offset = arith::SubIOp::create(rewriter, loc, a, from);
-    Value extent = arith::SubIOp::create(rewriter, loc, to, from);
-    Value ok = arith::CmpIOp::create(rewriter, loc, arith::CmpIPredicate::ult,
-                                     offset, extent);
-    inside = inside ? arith::AndIOp::create(rewriter, loc, inside, ok) : ok;
-  }
-  return inside;
-}
-
 namespace {
 
 struct ConvertUpdate : OpRewritePattern<UpdateOp> {
@@ -55,7 +40,7 @@ struct ConvertUpdate : OpRewritePattern<UpdateOp> {
       hi.push_back(bins.hi(update.getBin(), dim));
     }
     auto ifOp = scf::IfOp::create(rewriter, loc, update.getResultTypes(),
-                                  isInside(rewriter, loc, at, lo, hi),
+                                  bins.isInside(at, lo, hi),
                                   /*withElseRegion=*/true);
     rewriter.setInsertionPointToStart(ifOp.elseBlock());
     FailOp::create(rewriter, loc, stage.getSymName(), update.getImage(), at,
@@ -138,14 +123,10 @@ template <typename AccessOp> struct CheckAccess : OpRewritePattern<AccessOp> {
       return rewriter.notifyMatchFailure(access, "nothing to check");
     Location loc = access.getLoc();
     BinArithmetic bins(rewriter, loc, stage);
-    SmallVector<Value> at = toIndices(bins, access.getIndices()), lo, hi;
-    for (int64_t dim = 0, e = at.size(); dim < e; ++dim) {
-      lo.push_back(bins.constant(0));
-      hi.push_back(ExtentOp::create(rewriter, loc, access.getState(), dim));
-    }
+    SmallVector<Value> at = toIndices(bins, access.getIndices());
     TypeRange types = access->getResultTypes();
     auto ifOp = scf::IfOp::create(rewriter, loc, types,
-                                  isInside(rewriter, loc, at, lo, hi),
+                                  bins.isInState(access.getState(), at),
                                   /*withElseRegion=*/true);
     rewriter.setInsertionPointToStart(ifOp.elseBlock());
     FailOp::create(rewriter, loc, stage.getSymName(), access.getState(), at,

@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Which operations of a loop over primitives can run ahead, for many primitives
+// side by side.
+
+#ifndef PIKO_LIB_TRANSFORMS_LANEPLAN_H
+#define PIKO_LIB_TRANSFORMS_LANEPLAN_H
+
+#include "Piko/Dialect/Piko/IR/Piko.h"
+
+#include "mlir/Dialect/SCF/IR/SCF.h"
+#include "llvm/ADT/DenseSet.h"
+#include "llvm/ADT/SetVector.h"
+
+#include <vector>
+
+namespace piko {
+
+struct LaneBranch;
+
+/// Whether a loop of a kernel is over the primitives of a cell.
+bool isOverPrimitives(mlir::scf::ForOp loop);
+
+/// What of a block runs ahead.
+struct LanePlan {
+  mlir::Block *block = nullptr;
+  /// In the order of the block; what they use is outside the loop or in here.
+  llvm::SetVector<mlir::Operation *> ahead;
+  /// Those of `ahead` that are cheaper to repeat than to keep.
+  llvm::SetVector<mlir::Operation *> repeated;
+  /// Results of the others that the rest of the block uses.
+  llvm::SmallVector<mlir::Value> kept;
+  /// Conditional statements of which one side goes on with a plan of its own.
+  std::vector<LaneBranch> branches;
+
+  /// How many values are kept, here and in branches.
+  int64_t countKept() const;
+  /// Calls `visit` with each operation that runs ahead, also inside of others
+  /// and in branches.
+  void walk(llvm::function_ref<void(mlir::Operation *)> visit) const;
+};
+
+struct LaneBranch {
+  mlir::scf::IfOp choice;
+  unsigned region;
+  LanePlan plan;
+};
+
+/// What a plan saves and costs.
+struct LaneCost {
+  int64_t operations = 0; ///< that run ahead; those of inner loops count more
+  int64_t values = 0;     ///< that are kept in between
+
+  /// Whether what runs ahead is worth what is stored and loaded for it.
+  bool isWorthwhile() const;
+};
+
+/// Makes the plan of a loop over primitives, and tells how its operations run
+/// ahead.
+class LanePlanner {
+public:
+  explicit LanePlanner(mlir::scf::ForOp loop);
+
+  LanePlan run();
+  LaneCost getCost(const LanePlan &plan) const;
+
+  mlir::scf::ForOp getLoop() const { return loop; }
+
+  /// Whether a value is the same for all primitives.
+  bool isInvariant(mlir::Value value) const;
+  /// Whether a value is read, from a primitive or from state, before anything
+  /// is computed from it.
+  bool isFetched(mlir::Value value) const {
+    return value.getDefiningOp() && fetched.contains(value.getDefiningOp());
+  }
+  /// Of all reads that read the same, the first.
+  mlir::Value getFirst(mlir::Value value) const {
+    mlir::Value first = same.lookup(value);
+    return first ? first : value;
+  }
+  /// Whether a side of a condition does not run ahead, though the other does.
+  bool isRare(mlir::Region &region) const { return rare.contains(&region); }
+  /// What asks the memory for what later primitives need.
+  llvm::ArrayRef<mlir::Operation *> getPrefetches() const { return prefetches; }
+
+private:
+  /// Whether vectors compute an operation.
+  bool isComputed(mlir::Operation *op) const;
+  LanePlan makePlan(mlir::Block &block);
+  void addBranch(LanePlan &plan, mlir::scf::IfOp choice);
+  void findPrefetches();
+  /// Leaves reads where they are that nothing that runs ahead needs.
+  void dropUseless(LanePlan &plan);
+  bool isNeeded(mlir::Operation *read, const LanePlan &plan) const;
+  void findRepeated(LanePlan &plan);
+  void findKept(LanePlan &plan);
+
+  /// Notes that an operation runs ahead, if it can.
+  bool take(mlir::Operation *op);
+  bool takeCondition(mlir::scf::IfOp choice);
+  bool takeLoop(mlir::scf::WhileOp inner);
+  /// Tries with these variables of the loop as the same for all primitives; at
+  /// the end they are those that can be.
+  bool takeLoop(mlir::scf::WhileOp inner, llvm::SmallVector<bool> &uniform);
+  bool takeRegion(mlir::Region &region);
+  void forget(mlir::Operation *op);
+  void noteRead(LoadOp load);
+  bool isAvailable(mlir::Value value) const;
+  /// Whether an operation gives the same for all primitives.
+  bool isUniform(mlir::Operation *op) const;
+  /// Whether an operation reads what nothing but reads leads to.
+  bool isFetch(mlir::Operation *op) const;
+  /// Whether a value can lead to what is read.
+  bool isAddress(mlir::Value value) const;
+  bool readsFixedState(mlir::Operation *op) const;
+  /// Whether the loop only reads an array.
+  bool isFixed(mlir::Value array) const;
+  /// Whether a side of a condition changes nothing but arrays of its own, so
+  /// that it may run before what stands in front of it.
+  bool isPrivate(mlir::Region &region) const;
+
+  mlir::scf::ForOp loop;
+  llvm::DenseSet<mlir::StringAttr> written; // state
+  /// Variables and results of inner loops, and those of them that are the same
+  /// for all primitives.
+  llvm::DenseSet<mlir::Value> variables, uniform;
+  int64_t conditions = 0; // around what is taken
+  llvm::DenseSet<mlir::Operation *> taken;
+  llvm::DenseSet<mlir::Operation *> invariant; // of them
+  llvm::DenseSet<mlir::Operation *> fetched;   // of them
+  llvm::DenseSet<mlir::Operation *> addresses; // computed from fetched ones
+  llvm::DenseSet<mlir::Operation *> repeated;
+  llvm::DenseMap<mlir::Attribute, llvm::SmallVector<LoadOp>> loads;
+  llvm::DenseMap<mlir::Value, mlir::Value> same;
+  llvm::DenseSet<mlir::Region *> rare;
+  llvm::SmallVector<mlir::Operation *> prefetches;
+};
+
+} // namespace piko
+
+#endif // PIKO_LIB_TRANSFORMS_LANEPLAN_H
