@@ -4,6 +4,7 @@
 // that passed it, together.
 
 #include "LanePlan.h"
+#include "StateAccess.h"
 
 #include "Piko/Transforms/Passes.h"
 
@@ -79,14 +80,9 @@ private:
 //===----------------------------------------------------------------------===//
 
 void Touched::add(Operation *op) {
-  llvm::TypeSwitch<Operation *>(op)
-      .Case<LoadOp>(
-          [&](auto load) { read.insert(load.getStateAttr().getAttr()); })
-      .Case<StoreOp, AtomicOp>(
-          [&](auto access) { written.insert(access.getStateAttr().getAttr()); })
-      .Case<UpdateOp>([&](auto update) {
-        written.insert(update.getImageAttr().getAttr());
-      });
+  auto [state, kind] = getStateAccess(op);
+  if (state)
+    (kind == StateAccess::reads ? read : written).insert(state.getAttr());
 }
 
 bool GuardedLoop::isWorkAlone() const {

@@ -3,6 +3,7 @@
 #include "LanePlan.h"
 
 #include "Repeatable.h"
+#include "StateAccess.h"
 
 #include "mlir/Dialect/Arith/IR/Arith.h"
 #include "mlir/Dialect/Math/IR/Math.h"
@@ -34,14 +35,8 @@ void LanePlan::walk(llvm::function_ref<void(Operation *)> visit) const {
     branch.plan.walk(visit);
 }
 
-LanePlanner::LanePlanner(scf::ForOp loop) : loop(loop) {
-  loop->getParentOfType<KernelOp>().walk([&](Operation *op) {
-    llvm::TypeSwitch<Operation *>(op).Case<StoreOp, AtomicOp>(
-        [&](auto access) { written.insert(access.getStateAttr().getAttr()); });
-    if (auto update = dyn_cast<UpdateOp>(op))
-      written.insert(update.getImageAttr().getAttr());
-  });
-}
+LanePlanner::LanePlanner(scf::ForOp loop)
+    : loop(loop), written(getWrittenState(loop->getParentOfType<KernelOp>())) {}
 
 LanePlan LanePlanner::run() {
   LanePlan plan = makePlan(*loop.getBody());

@@ -23,3 +23,13 @@ std::pair<FlatSymbolRefAttr, int> piko::getStateAccess(Operation *op) {
       })
       .Default([](Operation *) { return Access(); });
 }
+
+llvm::DenseSet<StringAttr> piko::getWrittenState(Operation *root) {
+  llvm::DenseSet<StringAttr> written;
+  root->walk([&](Operation *op) {
+    if (auto [state, kind] = getStateAccess(op);
+        state && kind != StateAccess::reads)
+      written.insert(state.getAttr());
+  });
+  return written;
+}

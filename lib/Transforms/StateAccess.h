@@ -7,6 +7,8 @@
 
 #include "Piko/Dialect/Piko/IR/Piko.h"
 
+#include "llvm/ADT/DenseSet.h"
+
 namespace piko {
 
 namespace StateAccess {
@@ -16,6 +18,9 @@ enum Kind { reads = 1, stores = 2, changesAtomically = 4, updates = 8 };
 
 /// The state that an operation of a phase uses, and how; null if it uses none.
 std::pair<mlir::FlatSymbolRefAttr, int> getStateAccess(mlir::Operation *op);
+
+/// The state that operations in `root` change.
+llvm::DenseSet<mlir::StringAttr> getWrittenState(mlir::Operation *root);
 
 } // namespace piko
 
