@@ -28,13 +28,14 @@ import sys
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 RASTER = f"{ROOT}/examples/raster/raster.piko.cpp"
-PIPES = ["Baseline", "FreePipe", "Binned", "BinnedFused", "Indexed", "Fused"]
+PIPES = ["Baseline", "FreePipe", "Binned", "BinnedFused", "Indexed", "Fused",
+         "Tiled"]
 # Title, pipelines, and the pipeline that they are relative to.
 PANELS = [
     ("(a) FreePipe: one kernel", ["FreePipe"], "Baseline"),
     ("(b) Binned: bins of 8 x 8 pixels", ["Binned"], "Baseline"),
     ("(c) BinnedFused: two stages are one", ["BinnedFused"], "Binned"),
-    ("(d) Vertices shaded once", ["Indexed", "Fused"], "Baseline"),
+    ("(d) Vertices shaded once", ["Indexed", "Fused", "Tiled"], "Baseline"),
 ]
 COLORS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7"]  # told apart by all eyes
 STYLES = [("-", "o"), ("--", "s")]  # of the pipelines of a panel
@@ -87,7 +88,10 @@ def carried_records(arguments, pipe):
     record = r'@(?:"[^"]+"|\w+)'
     sizes = dict(re.findall(rf"piko\.record ({record}) .* size (\d+)", text))
     takes = dict(re.findall(rf"piko\.stage @(\w+) .* : ({record}) ->", text))
-    consumers = re.findall(r"piko\.edge @\w+\[\d+\] -> @(\w+)", text)
+    edge = r"@\w+\[\d+\] -> @(\w+)"
+    local = re.findall(rf"piko\.local_barrier {edge}", text)
+    consumers = [stage for stage in re.findall(rf"piko\.edge {edge}", text)
+                 if stage not in local]
     sources = re.findall(r"piko\.source @(\w+)", text)
     buffers = re.findall(rf"piko\.buffer @\w+ : ({record}) per_source (\d+)", text)
     carried = [(stage, takes[stage]) for stage in dict.fromkeys(consumers)]

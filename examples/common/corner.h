@@ -145,11 +145,17 @@ inline void rasterize(const ScreenVertex &a, const ScreenVertex &b,
   if (turned)
     std::swap(second, third);
   float scale = 1.0f / float(turned ? -area : area);
-  Edges edges(a.at, second.at, third.at);
-  for (int y = lo.y; y < hi.y; ++y)
-    for (int x = lo.x; x < hi.x; ++x) {
-      int64_t e0 = edges.e0.at(x, y), e1 = edges.e1.at(x, y),
-              e2 = edges.e2.at(x, y);
+  // Relative to the first pixel, where most triangles end.
+  auto place = [&](Point p) -> Point {
+    return {p.x - lo.x * subpixels, p.y - lo.y * subpixels};
+  };
+  Edges edges(place(a.at), place(second.at), place(third.at));
+  int64_t row0 = edges.e0.first, row1 = edges.e1.first, row2 = edges.e2.first;
+  for (int y = lo.y; y < hi.y; ++y, row0 += edges.e0.stepY,
+           row1 += edges.e1.stepY, row2 += edges.e2.stepY) {
+    int64_t e0 = row0, e1 = row1, e2 = row2;
+    for (int x = lo.x; x < hi.x; ++x, e0 += edges.e0.stepX,
+             e1 += edges.e1.stepX, e2 += edges.e2.stepX) {
       if (!edges.e0.holds(e0) || !edges.e1.holds(e1) || !edges.e2.holds(e2))
         continue;
       glm::vec3 v = glm::vec3(e0, e1, e2) * scale;
@@ -160,6 +166,7 @@ inline void rasterize(const ScreenVertex &a, const ScreenVertex &b,
                   v.x * a.depth + v.y * second.depth + v.z * third.depth,
                   turned ? glm::vec3(share.x, share.z, share.y) : share});
     }
+  }
 }
 
 } // namespace raster

@@ -14,11 +14,13 @@
 //   BinnedFused  the Rasterizer and the Fragment Shader are one kernel
 //   Bucketed     all cores share a strip of triangles and finish it
 //
-// and two in which triangles refer to vertices that are shaded once:
+// and three in which triangles refer to vertices that are shaded once:
 //
 //   Indexed      as Baseline
 //   Fused        Setup finds the pixels of a triangle; bins of 32 x 32 pixels,
 //                and all stages from the Rasterizer on are one kernel
+//   Tiled        as Fused; the fragments of a bin are shaded when all of them
+//                are there
 //
 //===----------------------------------------------------------------------===//
 #include <piko.h>
@@ -45,7 +47,7 @@ struct ShadedTriangle {
 // A triangle that may cover pixels, and among which they are.
 struct BoxedTriangle {
   glm::ivec3 vertex;
-  PixelBox box;
+  glm::i16vec2 lo, hi;
 };
 
 struct Fragment {
@@ -140,7 +142,8 @@ struct Setup : piko::Stage<0, 0, 64, Triangle, BoxedTriangle>,
                          state().settings.cullBackFaces != 0);
     box = coveredPart(corner(0), corner(1), corner(2), box);
     if (!box.isEmpty())
-      emit(BoxedTriangle{t.vertex, box}, 0);
+      emit(BoxedTriangle{t.vertex, glm::i16vec2(box.lo), glm::i16vec2(box.hi)},
+           0);
   }
 };
 
@@ -207,7 +210,7 @@ private:
 
   PixelBox boxIn(const Triangle &t) {
     if constexpr (isIndexed)
-      return t.box;
+      return {glm::ivec2(t.lo), glm::ivec2(t.hi)};
     else
       return boxOf(
           screen(t, 0), screen(t, 1), screen(t, 2),
@@ -225,6 +228,8 @@ struct FragmentShader : piko::Stage<M.bin, M.bin, 64, Fragment, ShadedFragment>,
   void schedule(piko::BinId) {
     if constexpr (M.apart)
       this->specifySchedule(M.core, M.split);
+    if constexpr (M.waits)
+      this->endBin();
   }
 
   void process(const Fragment &f) {
@@ -334,3 +339,5 @@ struct Bucketed
     : raster::LinearRaster<{.bin = 0, .core = raster::All, .split = 4096}> {};
 struct Indexed : raster::IndexedRaster<{.bin = 0}> {};
 struct Fused : raster::IndexedRaster<{.bin = 32, .apart = false}> {};
+struct Tiled
+    : raster::IndexedRaster<{.bin = 32, .apart = false, .waits = true}> {};

@@ -80,21 +80,22 @@ EXAMPLES = [
 ]
 
 
-def mapping_text(bin_size, core, rest, split, apart):
+def mapping_text(bin_size, core, rest, split, apart, waits):
     return (f"raster::Mapping{{.bin = {bin_size}, .core = piko::{core}, "
             f".rest = piko::{rest}, .split = {split}, "
-            f".apart = {'true' if apart else 'false'}}}")
+            f".apart = {'true' if apart else 'false'}, "
+            f".waits = {'true' if waits else 'false'}}}")
 
 
 def mappings():
     """All that a pipeline can say about its stages."""
-    for bin_size, core, rest, split, apart in itertools.product(
-            BINS, SCHEDULES, SCHEDULES, SPLITS, [True, False]):
+    for bin_size, core, rest, split, apart, waits in itertools.product(
+            BINS, SCHEDULES, SCHEDULES, SPLITS, [True, False], [True, False]):
         if split and "All" not in (core, rest):
             continue  # only All is split
         if not apart and rest != core:
             continue  # nobody says it
-        yield bin_size, core, rest, split, apart
+        yield bin_size, core, rest, split, apart, waits
 
 
 def combinations(example):
@@ -180,7 +181,7 @@ def main():
         folder.mkdir(parents=True, exist_ok=True)
         write_torus(folder / "torus.ply")
         render = str(pathlib.Path(arguments.render).resolve())
-        whole = mapping_text(0, "LoadBalance", "LoadBalance", 0, True)
+        whole = mapping_text(0, "LoadBalance", "LoadBalance", 0, True, False)
         references = {
             example.name: pool.submit(
                 draw, render, folder,

@@ -36,6 +36,7 @@ TEST(Picture, TheMappingDoesNotChangeIt) {
     EXPECT_TRUE(equal(baseline, render<Bucketed>(input, 203, 101)));
     EXPECT_TRUE(equal(baseline, render<Indexed>(input, 203, 101)));
     EXPECT_TRUE(equal(baseline, render<Fused>(input, 203, 101)));
+    EXPECT_TRUE(equal(baseline, render<Tiled>(input, 203, 101)));
   }
 }
 
