@@ -38,7 +38,7 @@ PANELS = [
     ("(d) Vertices shaded once", ["Indexed", "Fused", "Tiled"], "Baseline"),
 ]
 COLORS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7"]  # told apart by all eyes
-STYLES = [("-", "o"), ("--", "s")]  # of the pipelines of a panel
+STYLES = [("-", "o"), ("--", "s"), (":", "^")]  # of the pipelines of a panel
 NUMBERS = {
     "triangles": int, "lights": int, "threads": int, "round": int, "ms": float,
     "bin_bytes": int, "moved_bytes": int,
@@ -229,7 +229,7 @@ def draw_panel(axes, results, title, pipes, base):
                       label=results.label(scene))
     if len(pipes) > 1:
         axes.legend([plain_line(*style) for style in STYLES], pipes,
-                    loc="lower right", fontsize=9)
+                    loc="upper left", fontsize=9)
     axes.axhline(1, color="black", linewidth=1, linestyle=":")
     axes.set_title(title, fontsize=11)
     axes.set_xscale("log")
