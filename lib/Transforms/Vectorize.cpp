@@ -97,10 +97,12 @@ class VectorWriter {
 public:
   /// Takes what was read from `slots`, and adds arrays of what else is read.
   VectorWriter(OpBuilder &builder, StageOp stage, const LanePlanner &planner,
-               LaneSlots &slots, Value begin, Value place)
+               LaneSlots &slots, Value begin, Value count, Value place,
+               Value outside)
       : builder(builder), top(place.getParentBlock()),
         loc(planner.getLoop().getLoc()), stage(stage), planner(planner),
-        slots(slots), begin(begin), place(place) {}
+        slots(slots), begin(begin), count(count), place(place),
+        outside(outside) {}
 
   /// Computes what a plan computes, whatever the conditions around it say.
   void write(const LanePlan &plan);
@@ -120,6 +122,8 @@ private:
   /// A read of the same element for all.
   void writeUniform(LoadOp load);
   void giveUp(Value lanes);
+  /// The lanes that have a primitive, and have read it.
+  Value getPresent();
   /// What `write` does is for these lanes alone.
   void writeFor(Value lanes, llvm::function_ref<void()> write);
   Value getUniform(Value value);
@@ -138,9 +142,11 @@ private:
   StageOp stage;
   const LanePlanner &planner;
   LaneSlots &slots;
-  Value begin, place;
+  Value begin, count, place;
+  Value outside; // an array: whether a primitive read outside of a buffer
   IRMapping vectors, scalars;
-  Value active; // null: all
+  Value present; // null if nothing asked yet
+  Value active;  // null: all
   Value rare;
 };
 
@@ -376,6 +382,21 @@ void VectorWriter::giveUp(Value lanes) {
   rare = rare ? arith::OrIOp::create(builder, loc, rare, lanes) : lanes;
 }
 
+Value VectorWriter::getPresent() {
+  if (present)
+    return present;
+  OpBuilder::InsertionGuard guard(builder);
+  builder.setInsertionPointToStart(top);
+  Value steps = vector::StepOp::create(builder, loc,
+                                       getVectorType(builder.getIndexType()));
+  Value left = arith::SubIOp::create(builder, loc, count, place);
+  Value isThere = arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::slt,
+                                        steps, splat(left));
+  Value isRead = invert(
+      slots.load(builder, outside, place, getVectorType(builder.getI1Type())));
+  return present = arith::AndIOp::create(builder, loc, isThere, isRead);
+}
+
 void VectorWriter::write(const LanePlan &plan) {
   for (Operation *op : plan.ahead)
     writeOperation(op);
@@ -503,8 +524,12 @@ void VectorWriter::writeLoop(scf::WhileOp loop) {
 void VectorWriter::writeLoopIfNeeded(scf::WhileOp loop) {
   if (!active)
     return writeLoop(loop);
+  // A lane without numbers of its own must not enter it: it may not end.
+  Value entering = arith::AndIOp::create(builder, loc, active, getPresent());
+  if (rare)
+    entering = arith::AndIOp::create(builder, loc, entering, invert(rare));
   Value isNeeded = vector::ReductionOp::create(
-      builder, loc, vector::CombiningKind::OR, active);
+      builder, loc, vector::CombiningKind::OR, entering);
   SmallVector<Type> types = getTypesFor(loop.getResults());
   auto choice = scf::IfOp::create(builder, loc, types, isNeeded,
                                   /*addThenBlock=*/true, /*addElseBlock=*/true);
@@ -540,7 +565,10 @@ void LoopVectorizer::createVectors(Value begin, Value end) {
   OpBuilder::InsertionGuard guard(builder);
   builder.setInsertionPointToStart(groups.getBody());
   Value place = groups.getInductionVar();
-  VectorWriter writer(builder, stage, planner, slots, begin, place);
+  Type bit = builder.getI1Type();
+  outside = slots.create(bit);
+  VectorWriter writer(builder, stage, planner, slots, begin, count, place,
+                      outside);
   writer.write(plan);
   SmallVector<Value> kept;
   auto collect = [&](auto &self, const LanePlan &plan) -> void {
@@ -560,14 +588,13 @@ void LoopVectorizer::createVectors(Value begin, Value end) {
   bool reads = llvm::any_of(slots.getAll(), [](auto &entry) {
     return isa<LoadOp>(entry.first.getDefiningOp());
   });
-  Type bit = builder.getI1Type();
   if (reads)
-    gaveUp = outside = slots.create(bit);
+    gaveUp = outside;
   if (Value rare = writer.getRare()) {
-    if (reads) {
-      Value left = slots.load(builder, outside, place, getVectorType(bit));
-      rare = arith::OrIOp::create(builder, loc, rare, left);
-    }
+    if (reads)
+      rare = arith::OrIOp::create(
+          builder, loc, rare,
+          slots.load(builder, outside, place, getVectorType(bit)));
     gaveUp = slots.create(bit);
     slots.store(builder, rare, gaveUp, place);
   }
@@ -603,12 +630,13 @@ void LoopVectorizer::createFetches(Value begin, Value end) {
   for (auto [value, slot] : slots.getAll())
     if (planner.isFetched(value))
       slots.store(builder, writer.get(value), slot, place);
-  if (!outside)
+  Value inside = writer.getInside();
+  if (!inside && outside.use_empty())
     return;
   Value yes =
       arith::ConstantOp::create(builder, loc, builder.getBoolAttr(true));
   slots.store(builder,
-              arith::XOrIOp::create(builder, loc, writer.getInside(), yes),
+              arith::XOrIOp::create(builder, loc, inside ? inside : yes, yes),
               outside, place);
 }
 

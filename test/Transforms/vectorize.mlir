@@ -11,6 +11,7 @@ piko.pipeline @P rank 1 {
   piko.source @reads
   piko.source @sums
   piko.source @chooses
+  piko.source @enters
   piko.source @little
   piko.source @written
 
@@ -204,6 +205,47 @@ piko.pipeline @P rank 1 {
         %8 = arith.mulf %7, %x : f32
         %9 = arith.addf %8, %x : f32
         piko.store %9, @out[%v : i32] "x" : f32
+      }
+      piko.return
+    }
+  }
+
+  // A loop behind a condition is entered for a lane that would enter it, and has
+  // a primitive.
+  // CHECK:       piko.kernel @kernel_enters
+  // CHECK:         scf.for %[[G:.*]] = %c0 to %[[COUNT:.*]] step %c16
+  // CHECK-DAG:       %[[LANES:.*]] = vector.step
+  // CHECK-DAG:       %[[LEFT:.*]] = arith.subi %[[COUNT]], %[[G]]
+  // CHECK-DAG:       %[[ALL:.*]] = vector.broadcast %[[LEFT]]
+  // CHECK:           arith.cmpi slt, %[[LANES]], %[[ALL]]
+  // CHECK:           %[[ANY:.*]] = vector.reduction <or>
+  // CHECK:           scf.if %[[ANY]] -> (vector<16xf32>)
+  // CHECK:             scf.while
+  piko.stage @enters bins [0] threads 1 : @F -> [] {
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      %v = piko.get %f "v" : !piko.prim<@F> -> i32
+      %w = piko.get %f "w" : !piko.prim<@F> -> i32
+      %c0 = arith.constant 0 : i32
+      %c1 = arith.constant 1 : i32
+      %n = arith.constant 9 : i32
+      %x = arith.sitofp %w : i32 to f32
+      %is_positive = arith.cmpi sgt, %w, %c0 : i32
+      scf.if %is_positive {
+        %sum:2 = scf.while (%s = %x, %k = %c0) : (f32, i32) -> (f32, i32) {
+          %more = arith.cmpi slt, %k, %n : i32
+          scf.condition(%more) %s, %k : f32, i32
+        } do {
+        ^bb0(%s: f32, %k: i32):
+          %0 = arith.mulf %s, %x : f32
+          %1 = arith.addf %0, %x : f32
+          %2 = arith.mulf %1, %x : f32
+          %3 = arith.addf %2, %x : f32
+          %4 = arith.mulf %3, %x : f32
+          %5 = arith.addi %k, %c1 : i32
+          scf.yield %4, %5 : f32, i32
+        }
+        piko.store %sum#0, @out[%v : i32] "x" : f32
       }
       piko.return
     }
