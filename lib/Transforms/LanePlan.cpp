@@ -18,6 +18,7 @@ using namespace piko;
 bool piko::isOverPrimitives(scf::ForOp loop) {
   return loop->hasAttr("piko.lanes") &&
          loop->getParentOfType<scf::ForallOp>() && getKernelStage(loop) &&
+         !loop.getNumResults() && matchPattern(loop.getStep(), m_One()) &&
          !loop.getBody()->getOps<ItemOp>().empty();
 }
 
@@ -38,6 +39,10 @@ void LanePlan::walk(llvm::function_ref<void(Operation *)> visit) const {
 LanePlanner::LanePlanner(scf::ForOp loop)
     : loop(loop), written(getWrittenState(loop->getParentOfType<KernelOp>())) {}
 
+bool LanePlanner::readsState() const {
+  return llvm::any_of(fetched, [](Operation *op) { return isa<LoadOp>(op); });
+}
+
 LanePlan LanePlanner::run() {
   LanePlan plan = makePlan(*loop.getBody());
   findPrefetches();
@@ -52,6 +57,8 @@ bool LaneCost::isWorthwhile() const {
 LaneCost LanePlanner::getCost(const LanePlan &plan) const {
   constexpr int64_t weightInLoop = 8;
   LaneCost cost;
+  if (keepsOther)
+    return cost;
   llvm::DenseSet<Value> read;
   plan.walk([&](Operation *op) {
     if (!isComputed(op))
@@ -85,6 +92,11 @@ bool LanePlanner::isComputed(Operation *op) const {
   return true;
 }
 
+bool LanePlanner::isGlobal(Value value) const {
+  return !getLoop().getRegion().isAncestor(value.getParentRegion()) ||
+         global.contains(value.getDefiningOp());
+}
+
 bool LanePlanner::isAvailable(Value value) const {
   return isInvariant(value) || value == getLoop().getInductionVar() ||
          variables.contains(value) || taken.contains(value.getDefiningOp());
@@ -101,17 +113,15 @@ static bool areConstant(ValueRange values) {
 }
 
 bool LanePlanner::isAddress(Value value) const {
-  // What varies in an inner loop is not known before it.
-  if (value.getParentRegion()->getParentOfType<scf::WhileOp>())
-    return isFetched(value);
-  return isInvariant(value) || value == getLoop().getInductionVar() ||
+  return isGlobal(value) || value == getLoop().getInductionVar() ||
          isFetched(value) || addresses.contains(value.getDefiningOp());
 }
 
 bool LanePlanner::isFixed(Value array) const {
   return array.getDefiningOp<memref::AllocaOp>() && isInvariant(array) &&
          llvm::all_of(array.getUsers(), [&](Operation *user) {
-           return isa<memref::LoadOp>(user) || !getLoop()->isAncestor(user);
+           return isa<memref::LoadOp>(user) ||
+                  (isa<memref::StoreOp>(user) && !getLoop()->isAncestor(user));
          });
 }
 
@@ -121,7 +131,8 @@ bool LanePlanner::isFetch(Operation *op) const {
   if (auto get = dyn_cast<GetOp>(op))
     return isFetched(get.getPrim()) && areConstant(get.getElements());
   if (auto kept = dyn_cast<memref::LoadOp>(op))
-    return isFixed(kept.getMemRef()) &&
+    return kept->getBlock() == getLoop().getBody() &&
+           isFixed(kept.getMemRef()) &&
            llvm::all_of(kept.getIndices(),
                         [&](Value index) { return isAddress(index); });
   auto load = dyn_cast<LoadOp>(op);
@@ -129,6 +140,11 @@ bool LanePlanner::isFetch(Operation *op) const {
          areConstant(load.getElements()) &&
          llvm::all_of(load.getIndices(),
                       [&](Value index) { return isAddress(index); });
+}
+
+static bool areScalar(TypeRange types) {
+  return llvm::all_of(types,
+                      [](Type type) { return type.isIntOrIndexOrFloat(); });
 }
 
 /// Whether vectors can do what an operation does, whether its result is wanted
@@ -140,9 +156,7 @@ static bool isForLanes(Operation *op) {
                      math::SqrtOp, math::TruncOp>(op);
   if (!isKnown || !isSpeculatable(op) || !op->hasTrait<OpTrait::Elementwise>())
     return false;
-  return llvm::all_of(op->getResultTypes(), [](Type type) {
-    return type.isIndex() || type.isIntOrFloat();
-  });
+  return areScalar(op->getResultTypes());
 }
 
 /// Whether an operation is cheap enough to compute what is read next.
@@ -186,6 +200,8 @@ bool LanePlanner::take(Operation *op) {
     return false;
   } else if (isUniform(op)) {
     invariant.insert(op);
+    if (llvm::all_of(op->getOperands(), [&](Value v) { return isGlobal(v); }))
+      global.insert(op);
   } else if (isFetch(op)) {
     fetched.insert(op);
     if (auto load = dyn_cast<LoadOp>(op))
@@ -204,8 +220,12 @@ bool LanePlanner::take(Operation *op) {
 void LanePlanner::forget(Operation *op) {
   op->walk([&](Operation *inner) {
     for (llvm::DenseSet<Operation *> *set :
-         {&taken, &invariant, &fetched, &addresses})
+         {&taken, &invariant, &global, &fetched, &addresses})
       set->erase(inner);
+    if (auto load = dyn_cast<LoadOp>(inner)) {
+      llvm::erase(loads[load.getFieldAttr()], load);
+      same.erase(load);
+    }
     SmallVector<Value> values(inner->getResults());
     for (Region &region : inner->getRegions())
       llvm::append_range(values, region.getArguments());
@@ -219,7 +239,8 @@ void LanePlanner::forget(Operation *op) {
 bool LanePlanner::takeLoop(scf::WhileOp inner) {
   // Of a loop that is entered only now and then, not even the number of its
   // iterations would be known to be finite elsewhere.
-  if (conditions ||
+  if (conditions || !areScalar(inner.getInits().getTypes()) ||
+      !areScalar(inner.getResultTypes()) ||
       !llvm::all_of(inner.getInits(), [&](Value v) { return isAvailable(v); }))
     return false;
   SmallVector<bool> same;
@@ -265,7 +286,8 @@ bool LanePlanner::takeLoop(scf::WhileOp inner, SmallVector<bool> &same) {
 }
 
 bool LanePlanner::takeCondition(scf::IfOp choice) {
-  if (!choice.getNumResults() || !isAvailable(choice.getCondition()))
+  if (!choice.getNumResults() || !areScalar(choice.getResultTypes()) ||
+      !isAvailable(choice.getCondition()))
     return false;
   Region &then = choice.getThenRegion(), &other = choice.getElseRegion();
   ++conditions;
@@ -389,11 +411,11 @@ void LanePlanner::dropUseless(LanePlan &plan) {
 
 void LanePlanner::findRepeated(LanePlan &plan) {
   auto isAtHand = [&](Value value) {
-    return isInvariant(value) || value == getLoop().getInductionVar() ||
+    return isGlobal(value) || value == getLoop().getInductionVar() ||
            repeated.contains(value.getDefiningOp());
   };
   for (Operation *op : plan.ahead)
-    if (isa<ItemOp, GetOp>(op) || invariant.contains(op))
+    if (isa<ItemOp, GetOp, memref::LoadOp>(op) || invariant.contains(op))
       if (llvm::all_of(op->getOperands(), isAtHand)) {
         plan.repeated.insert(op);
         repeated.insert(op);
@@ -409,6 +431,8 @@ void LanePlanner::findKept(LanePlan &plan) {
   for (Operation *op : plan.ahead)
     if (!plan.repeated.contains(op))
       for (Value result : op->getResults())
-        if (!llvm::all_of(result.getUsers(), isAhead))
+        if (!llvm::all_of(result.getUsers(), isAhead)) {
           plan.kept.push_back(result);
+          keepsOther |= !areScalar(result.getType());
+        }
 }

@@ -73,6 +73,8 @@ public:
   bool isFetched(mlir::Value value) const {
     return value.getDefiningOp() && fetched.contains(value.getDefiningOp());
   }
+  /// Whether state is read ahead, with tests of indices.
+  bool readsState() const;
   /// Of all reads that read the same, the first.
   mlir::Value getFirst(mlir::Value value) const {
     mlir::Value first = same.lookup(value);
@@ -106,6 +108,9 @@ private:
   void forget(mlir::Operation *op);
   void noteRead(LoadOp load);
   bool isAvailable(mlir::Value value) const;
+  /// Whether a value is the same for all primitives and all iterations of inner
+  /// loops, and known before them.
+  bool isGlobal(mlir::Value value) const;
   /// Whether an operation gives the same for all primitives.
   bool isUniform(mlir::Operation *op) const;
   /// Whether an operation reads what nothing but reads leads to.
@@ -124,9 +129,11 @@ private:
   /// Variables and results of inner loops, and those of them that are the same
   /// for all primitives.
   llvm::DenseSet<mlir::Value> variables, uniform;
-  int64_t conditions = 0; // around what is taken
+  int64_t conditions = 0;  // around what is taken
+  bool keepsOther = false; // what is no number would have to be kept
   llvm::DenseSet<mlir::Operation *> taken;
   llvm::DenseSet<mlir::Operation *> invariant; // of them
+  llvm::DenseSet<mlir::Operation *> global;    // of those
   llvm::DenseSet<mlir::Operation *> fetched;   // of them
   llvm::DenseSet<mlir::Operation *> addresses; // computed from fetched ones
   llvm::DenseSet<mlir::Operation *> repeated;

@@ -135,6 +135,8 @@ private:
   Value splat(Value scalar);
   Value zeros(Type type);
   Value invert(Value mask);
+  /// Both masks, where the other one may be poison unless the first is true.
+  Value both(Value mask, Value other);
 
   OpBuilder &builder;
   Block *top;
@@ -376,9 +378,14 @@ void VectorWriter::set(ValueRange variables, ValueRange carried) {
   rare = carried.back();
 }
 
+Value VectorWriter::both(Value mask, Value other) {
+  return arith::SelectOp::create(builder, loc, mask, other,
+                                 zeros(other.getType()));
+}
+
 void VectorWriter::giveUp(Value lanes) {
   if (active)
-    lanes = arith::AndIOp::create(builder, loc, active, lanes);
+    lanes = both(active, lanes);
   rare = rare ? arith::OrIOp::create(builder, loc, rare, lanes) : lanes;
 }
 
@@ -410,7 +417,7 @@ void VectorWriter::write(const LanePlan &plan) {
 
 void VectorWriter::writeFor(Value lanes, llvm::function_ref<void()> write) {
   Value outer = active;
-  active = outer ? arith::AndIOp::create(builder, loc, outer, lanes) : lanes;
+  active = outer ? both(outer, lanes) : lanes;
   write();
   active = outer;
 }
@@ -525,9 +532,8 @@ void VectorWriter::writeLoopIfNeeded(scf::WhileOp loop) {
   if (!active)
     return writeLoop(loop);
   // A lane without numbers of its own must not enter it: it may not end.
-  Value entering = arith::AndIOp::create(builder, loc, active, getPresent());
-  if (rare)
-    entering = arith::AndIOp::create(builder, loc, entering, invert(rare));
+  Value entering = rare ? both(invert(rare), active) : active;
+  entering = both(getPresent(), entering);
   Value isNeeded = vector::ReductionOp::create(
       builder, loc, vector::CombiningKind::OR, entering);
   SmallVector<Type> types = getTypesFor(loop.getResults());
@@ -585,9 +591,7 @@ void LoopVectorizer::createVectors(Value begin, Value end) {
     slots.add(value);
     slots.store(builder, computed, slots.get(value), place);
   }
-  bool reads = llvm::any_of(slots.getAll(), [](auto &entry) {
-    return isa<LoadOp>(entry.first.getDefiningOp());
-  });
+  bool reads = planner.readsState();
   if (reads)
     gaveUp = outside;
   if (Value rare = writer.getRare()) {
@@ -631,7 +635,7 @@ void LoopVectorizer::createFetches(Value begin, Value end) {
     if (planner.isFetched(value))
       slots.store(builder, writer.get(value), slot, place);
   Value inside = writer.getInside();
-  if (!inside && outside.use_empty())
+  if (outside.use_empty() && gaveUp != outside)
     return;
   Value yes =
       arith::ConstantOp::create(builder, loc, builder.getBoolAttr(true));
