@@ -246,12 +246,7 @@ bool GuardedLoop::split() {
 //===----------------------------------------------------------------------===//
 
 void CompactLoopsPass::runOnOperation() {
-  SmallVector<scf::ForOp> loops;
-  getOperation().walk([&](scf::ForOp loop) {
-    if (isOverPrimitives(loop))
-      loops.push_back(loop);
-  });
-  for (scf::ForOp loop : loops) {
+  for (scf::ForOp loop : findLoopsOverPrimitives(getOperation())) {
     GuardedLoop guarded(loop);
     if (!guarded.find() || !guarded.split())
       continue;

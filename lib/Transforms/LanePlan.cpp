@@ -15,11 +15,20 @@
 using namespace mlir;
 using namespace piko;
 
-bool piko::isOverPrimitives(scf::ForOp loop) {
+static bool isOverPrimitives(scf::ForOp loop) {
   return loop->hasAttr("piko.lanes") &&
          loop->getParentOfType<scf::ForallOp>() && getKernelStage(loop) &&
          !loop.getNumResults() && matchPattern(loop.getStep(), m_One()) &&
          !loop.getBody()->getOps<ItemOp>().empty();
+}
+
+SmallVector<scf::ForOp> piko::findLoopsOverPrimitives(PipelineOp pipeline) {
+  SmallVector<scf::ForOp> loops;
+  pipeline.walk([&](scf::ForOp loop) {
+    if (isOverPrimitives(loop))
+      loops.push_back(loop);
+  });
+  return loops;
 }
 
 int64_t LanePlan::countKept() const {

@@ -18,8 +18,9 @@ namespace piko {
 
 struct LaneBranch;
 
-/// Whether a loop of a kernel is over the primitives of a cell.
-bool isOverPrimitives(mlir::scf::ForOp loop);
+/// The loops of kernels that are over the primitives of a cell.
+llvm::SmallVector<mlir::scf::ForOp>
+findLoopsOverPrimitives(PipelineOp pipeline);
 
 /// What of a block runs ahead.
 struct LanePlan {

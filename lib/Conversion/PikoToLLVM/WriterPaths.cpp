@@ -111,6 +111,17 @@ Value piko::createAppend(OpBuilder &builder, Location loc,
   return path.getResult(0);
 }
 
+/// Calls pikoir_place under a condition; what is written next is otherwise.
+static void callPlaceIf(Value isSlow, OpBuilder &builder, Location loc,
+                        LoweringContext &context, Value writer, int64_t port,
+                        Value cell) {
+  auto path = scf::IfOp::create(builder, loc, isSlow, /*withElseRegion=*/true);
+  builder.setInsertionPointToStart(path.thenBlock());
+  context.call(builder, loc, "pikoir_place", Type(),
+               {writer, createI32(builder, loc, port), cell});
+  builder.setInsertionPointToStart(path.elseBlock());
+}
+
 void piko::createLocalPlace(OpBuilder &builder, Location loc,
                             LoweringContext &context, Value writer,
                             int64_t port, Value cell) {
@@ -122,12 +133,8 @@ void piko::createLocalPlace(OpBuilder &builder, Location loc,
                             out.compare(arith::CmpIPredicate::ne, last,
                                         createI64(builder, loc, -1))),
                  out.any(layout::portFlags, ~localFlag));
-  auto path = scf::IfOp::create(builder, loc, isSlow, /*withElseRegion=*/true);
   OpBuilder::InsertionGuard guard(builder);
-  builder.setInsertionPointToStart(path.thenBlock());
-  context.call(builder, loc, "pikoir_place", Type(),
-               {writer, createI32(builder, loc, port), cell});
-  builder.setInsertionPointToStart(path.elseBlock());
+  callPlaceIf(isSlow, builder, loc, context, writer, port, cell);
   Value cursor = out.load(layout::cursor, out.pointer());
   Value size = out.load(layout::size, out.i64());
   out.store(createOffset(builder, loc, cursor, size), layout::cursor);
@@ -147,12 +154,8 @@ void piko::createPlace(OpBuilder &builder, Location loc,
       out.either(out.comparePointers(LLVM::ICmpPredicate::eq, place,
                                      out.load(layout::cellEnd, out.pointer())),
                  out.any(layout::portFlags)));
-  auto path = scf::IfOp::create(builder, loc, isSlow, /*withElseRegion=*/true);
   OpBuilder::InsertionGuard guard(builder);
-  builder.setInsertionPointToStart(path.thenBlock());
-  context.call(builder, loc, "pikoir_place", Type(),
-               {writer, createI32(builder, loc, port), cell});
-  builder.setInsertionPointToStart(path.elseBlock());
+  callPlaceIf(isSlow, builder, loc, context, writer, port, cell);
   Value isFirst =
       out.compare(arith::CmpIPredicate::slt, last, createI64(builder, loc, 0));
   auto first = scf::IfOp::create(builder, loc, isFirst,
