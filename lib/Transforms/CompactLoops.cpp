@@ -248,11 +248,17 @@ bool GuardedLoop::split() {
 void CompactLoopsPass::runOnOperation() {
   for (scf::ForOp loop : findLoopsOverPrimitives(getOperation())) {
     GuardedLoop guarded(loop);
-    if (!guarded.find() || !guarded.split())
+    if (!guarded.find())
       continue;
-    ++compacted;
     StageOp stage = getKernelStage(loop);
-    stage.emitRemark() << "stage '" << stage.getSymName()
-                       << "' does together what passes a test";
+    bool isSplit = guarded.split();
+    InFlightDiagnostic remark = stage.emitRemark()
+                                << "stage '" << stage.getSymName() << "' does "
+                                << (isSplit ? "together" : "one by one")
+                                << " what passes a test";
+    if (isSplit)
+      ++compacted;
+    else
+      remark.attachNote() << "there is too little for vectors to compute";
   }
 }

@@ -28,7 +28,6 @@ Value LaneSlots::create(Type type) {
       arrays.getI64IntegerAttr(lineSize));
 }
 
-/// The type of a vector of these numbers.
 VectorType piko::getVectorType(Type type) {
   return VectorType::get({laneCount}, type);
 }

@@ -63,7 +63,7 @@ public:
 
   /// The value of this primitive.
   mlir::Value get(mlir::Value value);
-  /// Repeats an operation without results.
+  /// Does for this primitive what an operation does, and what leads to it.
   void repeat(mlir::Operation *op);
   /// All of `loads` read the same element: one test holds for all.
   void getElement(llvm::ArrayRef<LoadOp> loads);

@@ -110,13 +110,6 @@ using Repeats = Buffers<Repeat>;
 struct Guard : piko::Stage<0, 0, 64, Particle>, piko::Uses<State> {
   void process(const Particle &p) {
     float sum = workMore(p.value, state().in[p.serial]);
-    if ((p.serial & 1) + (~p.serial & 1) == 2) {
-      int i = 0;
-      do {
-        sum = work(sum, p.value);
-        i += state().count - 4;
-      } while (i != 7);
-    }
     state().out[p.serial] = sum;
     int twice = 2 * p.serial;
     if ((twice ^ state().counts[p.serial]) & 1) {

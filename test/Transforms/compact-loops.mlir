@@ -1,4 +1,10 @@
 // RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-form-kernels,piko-resolve-kernels,piko-compact-loops),canonicalize,cse)' %s | FileCheck %s
+// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-form-kernels,piko-resolve-kernels,piko-compact-loops),canonicalize,cse)' %s 2>&1 >/dev/null | FileCheck %s --check-prefix=REMARKS
+
+// REMARKS: remark: stage 'tests' does together what passes a test
+// REMARKS: remark: stage 'little' does one by one what passes a test
+// REMARKS: note: there is too little for vectors to compute
+// REMARKS-NOT: stage 'again'
 
 piko.record @F {"at" : i32 at 0, "z" : f32 at 4} size 8 align 4
 piko.record @Pixel {"z" : f32 at 0} size 4 align 4
