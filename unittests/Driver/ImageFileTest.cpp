@@ -6,7 +6,9 @@
 
 #include <OpenImageIO/imageio.h>
 
+#include <chrono>
 #include <limits>
+#include <thread>
 #include <vector>
 
 using namespace piko::render;
@@ -80,6 +82,25 @@ TEST_F(ImageFile, ExrHoldsFloatsAndAlpha) {
   for (size_t i = 0; i < pixels.size(); ++i)
     for (int c = 0; c < 4; ++c)
       EXPECT_EQ(floats[4 * i + c], pixels[i].rgba[c]);
+}
+
+/// Seconds apart, so that a date would show.
+TEST_F(ImageFile, EqualPicturesAreEqualFiles) {
+  auto contentOf = [&](const std::string &name) {
+    EXPECT_TRUE(writeImage(pathOf(name), width, height, pixels)) << name;
+    std::ifstream stream(pathOf(name), std::ios::binary);
+    return std::string((std::istreambuf_iterator<char>(stream)), {});
+  };
+  const std::vector<std::string> formats = {"exr", "tif", "png",
+                                            "jpg", "ppm", "hdr"};
+  std::vector<std::string> before;
+  for (const std::string &format : formats)
+    before.push_back(contentOf("before." + format));
+  std::this_thread::sleep_for(std::chrono::milliseconds(1100));
+  for (size_t i = 0; i < formats.size(); ++i) {
+    EXPECT_FALSE(before[i].empty());
+    EXPECT_TRUE(contentOf("after." + formats[i]) == before[i]) << formats[i];
+  }
 }
 
 TEST_F(ImageFile, ReplacesAnOlderImage) {
