@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <sstream>
+#include <string_view>
 
 using namespace piko;
 
@@ -23,14 +24,29 @@ bool SynthesisOptions::has(const std::string &pass) const {
   return !contains(without, pass);
 }
 
+/// What lies between commas.
+static std::vector<std::string> split(const std::string &text) {
+  std::vector<std::string> words;
+  std::istringstream stream(text);
+  for (std::string word; std::getline(stream, word, ',');)
+    words.push_back(word);
+  return words;
+}
+
+/// The name of a pass as reports and piko-opt have it may stand for the short
+/// one.
+static std::string shorten(const std::string &name) {
+  constexpr std::string_view prefix = "piko-";
+  return name.starts_with(prefix) ? name.substr(prefix.size()) : name;
+}
+
 std::optional<SynthesisOptions>
 piko::parseSynthesisOptions(const std::string &text) {
   SynthesisOptions options;
-  std::istringstream names(text);
-  for (std::string name; std::getline(names, name, ',');) {
-    if (!contains(SynthesisOptions::getOptional(), name))
+  for (const std::string &name : split(text)) {
+    options.without.push_back(shorten(name));
+    if (!contains(SynthesisOptions::getOptional(), options.without.back()))
       return std::nullopt;
-    options.without.push_back(name);
   }
   return options;
 }
@@ -39,5 +55,9 @@ std::string piko::describeWrongSynthesisOptions(const std::string &text) {
   std::string message = "--without: expected passes of";
   for (const std::string &name : SynthesisOptions::getOptional())
     message += " " + name + ",";
-  return message + " but got '" + text + "'";
+  std::string wrong;
+  for (const std::string &name : split(text))
+    if (wrong.empty() && !parseSynthesisOptions(name))
+      wrong = name;
+  return message + " but got '" + wrong + "'";
 }

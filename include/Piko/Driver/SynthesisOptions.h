@@ -22,8 +22,8 @@ struct SynthesisOptions {
   static SynthesisOptions none() { return {getOptional()}; }
 };
 
-/// Reads names with commas between them; none if one is not of a pass that can
-/// be left out.
+/// Reads names with commas between them, with or without `piko-`; none if one
+/// is not of a pass that can be left out.
 std::optional<SynthesisOptions> parseSynthesisOptions(const std::string &text);
 
 /// What to say then.
