@@ -209,6 +209,91 @@ TEST_F(SceneFile, BrokenPly) {
   fails(start + rest + "0 0 0\n1 0 0\n0 1 0\n3 0 1 7\n", "vertex 7 of 3");
 }
 
+/// A PLY file of two vertices without faces, each with these floats.
+std::string makePoints(const std::vector<std::string> &properties,
+                       const std::string &before = "") {
+  std::string header =
+      "ply\nformat binary_little_endian 1.0\n" + before + "element vertex 2\n";
+  for (const std::string &name : properties)
+    header += "property float " + name + "\n";
+  return header + "end_header\n" + std::string(1000, '\0');
+}
+
+TEST_F(SceneFile, PlyWithoutFaces) {
+  auto fails = [&](const std::string &content, const std::string &kind) {
+    std::string error = errorOf(write("points.ply", content));
+    EXPECT_TRUE(contains(error, "expected triangles, but it holds 2 " + kind +
+                                    ", which are not supported as a scene: "
+                                    "feed them to a pipeline from an "
+                                    "application"))
+        << error;
+  };
+  fails(makePoints({"x", "y", "z"}), "points without faces");
+  fails(makePoints({"x", "y", "z"}, "element face 0\n"
+                                    "property list uchar int vertex_indices\n"),
+        "points without faces");
+  fails(makePoints({"x", "y", "z", "scale_0", "scale_1", "scale_2", "f_dc_0",
+                    "f_dc_1", "f_dc_2", "opacity", "rot_0", "rot_1", "rot_2",
+                    "rot_3"}),
+        "Gaussian splats");
+  fails(makePoints({"packed_position", "packed_rotation", "packed_scale",
+                    "packed_color"},
+                   "element chunk 1\nproperty float min_x\n"),
+        "packed Gaussian splats (.compressed.ply)");
+  // A mesh may have more to its vertices.
+  auto mesh = loadMesh(write(
+      "mesh.ply", "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\n"
+                  "property float y\nproperty float z\nproperty float opacity\n"
+                  "element face 1\nproperty list uchar int vertex_indices\n"
+                  "end_header\n0 0 0 1\n1 0 0 1\n0 1 0 1\n3 0 1 2\n"));
+  EXPECT_TRUE(mesh) << mesh.error().message;
+}
+
+/// A glTF file of one triangle that requires an extension.
+std::string makeGltf(const std::string &extension) {
+  return R"({"asset": {"version": "2.0"}, "extensionsUsed": [")" + extension +
+         R"("], "extensionsRequired": [")" + extension +
+         R"("],
+    "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+    "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+    "buffers": [{"byteLength": 36, "uri": "data:application/octet-stream;)"
+         R"(base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}],
+    "bufferViews": [{"buffer": 0, "byteLength": 36}],
+    "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3,
+      "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0]}]})";
+}
+
+/// The JSON as the first chunk of a GLB file.
+std::string makeGlb(std::string json) {
+  json.resize((json.size() + 3) / 4 * 4, ' ');
+  auto word = [](uint32_t number) {
+    return std::string(reinterpret_cast<const char *>(&number), 4);
+  };
+  uint32_t size = uint32_t(json.size());
+  return "glTF" + word(2) + word(20 + size) + word(size) + "JSON" + json;
+}
+
+TEST_F(SceneFile, GltfExtensions) {
+  const std::string remedy = ": convert it, as with 'gltf-transform ";
+  const std::pair<const char *, std::string> extensions[] = {
+      {"KHR_draco_mesh_compression", remedy + "cp in.glb out.glb'"},
+      {"EXT_meshopt_compression", remedy + "cp in.glb out.glb'"},
+      {"KHR_mesh_quantization", remedy + "dequantize in.glb out.glb'"},
+      {"EXT_mesh_gpu_instancing", ""}};
+  for (const auto &[name, hint] : extensions) {
+    std::string expected = std::string("it requires the glTF extension '") +
+                           name + "', which is not supported" + hint;
+    std::string json = makeGltf(name);
+    EXPECT_TRUE(errorOf(write("a.gltf", json)).ends_with(expected));
+    EXPECT_TRUE(errorOf(write("a.glb", makeGlb(json))).ends_with(expected));
+  }
+  // Textures and materials are not taken from a scene.
+  for (const char *name : {"KHR_texture_basisu", "KHR_materials_unlit"}) {
+    auto mesh = loadMesh(write("a.gltf", makeGltf(name)));
+    EXPECT_TRUE(mesh) << mesh.error().message;
+  }
+}
+
 TEST_F(SceneFile, BrokenGzip) {
   std::string whole = pathOf("roof.obj.gz");
   gzFile file = gzopen(whole.c_str(), "wb");

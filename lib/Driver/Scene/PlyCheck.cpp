@@ -1,4 +1,4 @@
-//===- PlyCheck.cpp - Whether a PLY file is whole -------------------------===//
+//===- PlyCheck.cpp - Whether a PLY file is a whole mesh ------------------===//
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // Reads the header, then walks over the data without keeping any of it.
@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
+#include <initializer_list>
 #include <sstream>
 #include <vector>
 
@@ -17,11 +18,13 @@ using namespace piko;
 namespace {
 
 struct Property {
+  std::string name;
   int countSize = 0; ///< bytes of a list's length; 0 = no list
   int size = 0;      ///< bytes of a value
 };
 
 struct Element {
+  std::string name;
   uint64_t count = 0;
   std::vector<Property> properties;
 };
@@ -55,7 +58,7 @@ std::string readLine(const std::string &line, Header &header) {
     words >> header.format;
   } else if (word == "element") {
     Element element;
-    words >> word >> element.count;
+    words >> element.name >> element.count;
     if (!words)
       return "its header has an element without a count";
     header.elements.push_back(element);
@@ -72,6 +75,7 @@ std::string readLine(const std::string &line, Header &header) {
     property.size = sizeOfType(word);
     if (property.size == 0)
       return "its header has a property of the unknown type '" + word + "'";
+    words >> property.name;
     if (header.elements.empty())
       return "its header has a property before any element";
     header.elements.back().properties.push_back(property);
@@ -140,6 +144,38 @@ bool isTextWhole(std::string_view data, const std::vector<Element> &elements) {
          expected;
 }
 
+const Element *find(const Header &header, std::string_view name) {
+  auto found = std::ranges::find(header.elements, name, &Element::name);
+  return found == header.elements.end() ? nullptr : &*found;
+}
+
+bool hasProperties(const Element &element,
+                   std::initializer_list<std::string_view> names) {
+  return std::ranges::all_of(names, [&](std::string_view name) {
+    return std::ranges::count(element.properties, name, &Property::name) > 0;
+  });
+}
+
+/// What a file without faces holds instead; "" if it has faces.
+std::string findNoMesh(const Header &header) {
+  for (const char *name : {"face", "tristrips"})
+    if (const Element *faces = find(header, name); faces && faces->count)
+      return {};
+  const Element *vertices = find(header, "vertex");
+  if (!vertices || !vertices->count)
+    return {};
+  std::string kind = "points without faces";
+  if (hasProperties(*vertices, {"f_dc_0", "opacity", "scale_0", "rot_0"}))
+    kind = "Gaussian splats";
+  else if (find(header, "chunk") &&
+           hasProperties(*vertices, {"packed_position", "packed_scale"}))
+    kind = "packed Gaussian splats (.compressed.ply)";
+  return "expected triangles, but it holds " + std::to_string(vertices->count) +
+         " " + kind +
+         ", which are not supported as a scene: feed them to a pipeline from "
+         "an application";
+}
+
 } // namespace
 
 std::string render::checkPly(std::string_view content) {
@@ -150,6 +186,8 @@ std::string render::checkPly(std::string_view content) {
   bool isBigEndian = header.format == "binary_big_endian";
   if (!isText && !isBigEndian && header.format != "binary_little_endian")
     return "its header has the unknown format '" + header.format + "'";
+  if (std::string problem = findNoMesh(header); !problem.empty())
+    return problem;
   bool isWhole = isText
                      ? isTextWhole(header.data, header.elements)
                      : isBinaryWhole(header.data, header.elements, isBigEndian);

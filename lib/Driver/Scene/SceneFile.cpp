@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #include "Piko/Driver/Scene/SceneFile.h"
 
+#include "GltfCheck.h"
 #include "PatchFile.h"
 #include "PlyCheck.h"
 
@@ -257,6 +258,13 @@ Result<Mesh> loadPatches(const std::string &path) {
   return mesh;
 }
 
+/// What is wrong with a file that assimp would not say; "" if nothing is.
+std::string check(const std::string &format, const std::string &content) {
+  if (format == ".ply")
+    return checkPly(content);
+  return format == ".gltf" || format == ".glb" ? checkGltf(content) : "";
+}
+
 Result<Mesh> load(const std::string &path, const ProgressFunction &progress) {
   std::error_code ignored;
   if (fs::is_directory(path, ignored))
@@ -273,15 +281,19 @@ Result<Mesh> load(const std::string &path, const ProgressFunction &progress) {
   if (progress) // the importer owns it
     importer.SetProgressHandler(new ReportProgress(progress));
   const aiScene *imported;
+  bool isPacked = path.ends_with(".gz"), isPly = format == ".ply";
+  std::string content;
+  if (isPacked || isPly || format == ".gltf" || format == ".glb") {
+    auto read = readFile(path);
+    if (!read)
+      return read.error();
+    content = std::move(*read);
+    if (std::string problem = check(format, content); !problem.empty())
+      return Error{problem};
+  }
   // Other formats may consist of several files, which the importer finds.
-  if (path.ends_with(".gz") || format == ".ply") {
-    auto content = readFile(path);
-    if (!content)
-      return content.error();
-    if (format == ".ply")
-      if (std::string problem = checkPly(*content); !problem.empty())
-        return Error{problem};
-    imported = importer.ReadFileFromMemory(content->data(), content->size(), 0,
+  if (isPacked || isPly) {
+    imported = importer.ReadFileFromMemory(content.data(), content.size(), 0,
                                            format.c_str() + !format.empty());
   } else {
     imported = importer.ReadFile(path, 0);

@@ -33,7 +33,9 @@ using ProgressFunction = std::function<void(double)>;
 /// of those of the triangles around them.
 ///
 /// Errors: the file cannot be read, is no scene, holds no triangle and no
-/// patch, or has a position that is not finite.
+/// patch (as point clouds and Gaussian splats do), requires a glTF extension
+/// that is not supported (as compressed and quantized meshes do), or has a
+/// position that is not finite.
 Result<Mesh> loadMesh(const std::string &path,
                       const ProgressFunction &progress = {});
 
