@@ -225,6 +225,8 @@ def ConvertPikoToLLVM : Pass<"convert-piko-to-llvm", "::mlir::ModuleOp"> {
     declares the pipeline to the runtime and `NAME.run` that calls the kernels in
     order; turns primitives, bins and writers into pointers, and operations on
     them into loads, stores and calls of the runtime's `pikoir_*` functions.
+    The units of a kernel on a cycle become calls of a function, `KERNEL.unit`,
+    without a parallel region where there is one thread for them.
 
     **Guarantees** that nothing of the `piko` dialect is left.
 

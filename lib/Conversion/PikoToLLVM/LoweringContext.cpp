@@ -23,6 +23,14 @@ PipelineNumbers::PipelineNumbers(PipelineOp pipeline) : pipeline(pipeline) {
       states[SymbolTable::getSymbolName(&op)] = states.size();
 }
 
+std::optional<int64_t> PipelineNumbers::cycleOf(func::FuncOp kernel) const {
+  auto stage = kernel->getAttrOfType<IntegerAttr>(stageAttrName);
+  if (!stage)
+    return std::nullopt;
+  StringAttr name = (stages.begin() + stage.getInt())->first;
+  return cast<StageOp>(SymbolTable::lookupSymbolIn(pipeline, name)).getCycle();
+}
+
 func::FuncOp LoweringContext::outline(KernelOp kernel,
                                       const PipelineNumbers &numbers) {
   OpBuilder builder(module.getBodyRegion());

@@ -21,6 +21,9 @@ struct PipelineNumbers {
   llvm::MapVector<mlir::StringAttr, int32_t> stages, states, records;
 
   explicit PipelineNumbers(PipelineOp pipeline);
+
+  /// The cycle that a kernel's function is on, if any.
+  std::optional<int64_t> cycleOf(mlir::func::FuncOp kernel) const;
 };
 
 /// Data and extent of a piece of state, loaded when a kernel starts.
@@ -120,6 +123,10 @@ constexpr const char *numberAttrName = "piko.number";
 constexpr const char *sourceAttrName = "piko.source";
 /// The number of the group of kernels that runs in strips.
 constexpr const char *stripsAttrName = "piko.strips";
+
+/// Lets a kernel for which there is one thread run its units without a parallel
+/// region, as calls of a function.
+void outlineUnits(mlir::func::FuncOp kernel);
 
 /// Writes NAME.setup and NAME.run; `kernels` run in that order.
 void createProgram(const PipelineNumbers &numbers,

@@ -158,6 +158,9 @@ LogicalResult ConvertPikoToLLVMPass::convert(PipelineOp pipeline,
       return failure();
   for (func::FuncOp function : functions)
     annotateReads(function);
+  for (func::FuncOp function : functions)
+    if (!function->hasAttr(sourceAttrName) && numbers.cycleOf(function))
+      outlineUnits(function);
   createProgram(numbers, functions, context);
   for (func::FuncOp function : functions)
     for (const char *name :

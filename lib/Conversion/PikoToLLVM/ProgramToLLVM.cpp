@@ -270,8 +270,6 @@ public:
   void run(ArrayRef<func::FuncOp> kernels);
 
 private:
-  /// The cycle that a kernel is on, if any.
-  std::optional<int64_t> cycleOf(func::FuncOp kernel);
   Block *createBlock(Block *before) {
     OpBuilder::InsertionGuard guard(builder);
     return builder.createBlock(before);
@@ -294,13 +292,6 @@ private:
 };
 
 } // namespace
-
-std::optional<int64_t> RunWriter::cycleOf(func::FuncOp kernel) {
-  if (!kernel->hasAttr(stageAttrName))
-    return std::nullopt;
-  StringAttr name = (numbers.stages.begin() + stageNumber(kernel))->first;
-  return cast<StageOp>(SymbolTable::lookupSymbolIn(pipeline, name)).getCycle();
-}
 
 void RunWriter::check(Value status, Block *next) {
   builder.setInsertionPointAfterValue(status);
@@ -361,7 +352,7 @@ void RunWriter::createCycle(ArrayRef<func::FuncOp> members) {
 void RunWriter::createSequence(ArrayRef<func::FuncOp> kernels) {
   llvm::SmallDenseSet<int64_t> cyclesDone;
   for (func::FuncOp kernel : kernels) {
-    std::optional<int64_t> cycle = cycleOf(kernel);
+    std::optional<int64_t> cycle = numbers.cycleOf(kernel);
     if (!cycle) {
       callKernel(kernel, createBlock(exit));
       continue;
@@ -370,7 +361,7 @@ void RunWriter::createSequence(ArrayRef<func::FuncOp> kernels) {
       continue;
     SmallVector<func::FuncOp> members;
     for (func::FuncOp other : kernels)
-      if (cycleOf(other) == cycle)
+      if (numbers.cycleOf(other) == cycle)
         members.push_back(other);
     createCycle(members);
   }

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// A unit of work as a function: a kernel of a cycle may have next to nothing to
+// do, and then calls it without a parallel region, which takes longer.
+
+#include "LoweringContext.h"
+
+#include "mlir/Dialect/MemRef/IR/MemRef.h"
+#include "mlir/Dialect/OpenMP/OpenMPDialect.h"
+#include "mlir/Dialect/SCF/IR/SCF.h"
+#include "mlir/IR/IRMapping.h"
+#include "mlir/Transforms/RegionUtils.h"
+
+using namespace mlir;
+using namespace piko;
+
+/// Splits what a loop's body takes from around the threads into what can be
+/// made again in it, and what cannot.
+static void splitCaptures(omp::LoopNestOp nest, Region &threads,
+                          SmallVector<Operation *> &constants,
+                          SmallVector<Value> &arguments) {
+  llvm::SetVector<Value> captures;
+  getUsedValuesDefinedAbove(nest.getRegion(), captures);
+  for (Value capture : captures) {
+    Operation *made = capture.getDefiningOp();
+    if (made && threads.isAncestor(made->getParentRegion()))
+      continue; // a private array
+    if (made && (made->hasTrait<OpTrait::ConstantLike>() ||
+                 isa<LLVM::AddressOfOp, LLVM::ZeroOp>(made)))
+      constants.push_back(made);
+    else
+      arguments.push_back(capture);
+  }
+}
+
+/// Makes a function of the body of a parallel loop; its arguments are what
+/// `arguments` says, and the unit.
+static func::FuncOp createUnit(func::FuncOp kernel, omp::LoopNestOp nest,
+                               ArrayRef<Operation *> constants,
+                               ArrayRef<Value> arguments) {
+  OpBuilder builder(kernel);
+  SmallVector<Type> types = llvm::map_to_vector(
+      arguments, [](Value argument) { return argument.getType(); });
+  types.push_back(builder.getIndexType());
+  Location loc = nest.getLoc();
+  auto unit =
+      func::FuncOp::create(builder, loc, (kernel.getSymName() + ".unit").str(),
+                           builder.getFunctionType(types, {}));
+  unit.setPrivate();
+  Block *entry = unit.addEntryBlock();
+  Block &body = nest.getRegion().front();
+  omp::YieldOp yield = cast<omp::YieldOp>(body.getTerminator());
+  builder.setInsertionPointToEnd(entry);
+  IRMapping copies;
+  for (Operation *constant : constants)
+    builder.clone(*constant, copies);
+  for (auto [from, to] : llvm::zip(arguments, entry->getArguments()))
+    copies.map(from, to);
+  // Private arrays, which lie before the loop.
+  Operation *loop = nest->getParentOp();
+  for (Operation &op : llvm::make_early_inc_range(*loop->getBlock())) {
+    if (&op == loop)
+      break;
+    op.moveBefore(entry, entry->end());
+  }
+  body.getArgument(0).replaceAllUsesWith(entry->getArguments().back());
+  entry->getOperations().splice(entry->end(), body.getOperations(),
+                                body.begin(), yield->getIterator());
+  for (auto [from, to] : copies.getValueMap())
+    replaceAllUsesInRegionWith(from, to, unit.getBody());
+  func::ReturnOp::create(builder, loc);
+  return unit;
+}
+
+void piko::outlineUnits(func::FuncOp kernel) {
+  auto loops = kernel.getOps<omp::ParallelOp>();
+  if (loops.empty())
+    return; // a serial schedule
+  omp::ParallelOp parallel = *loops.begin();
+  auto wsloop = *parallel.getOps<omp::WsloopOp>().begin();
+  auto nest = cast<omp::LoopNestOp>(wsloop.getWrappedLoop());
+  SmallVector<Operation *> constants;
+  SmallVector<Value> arguments;
+  splitCaptures(nest, parallel.getRegion(), constants, arguments);
+  func::FuncOp unit = createUnit(kernel, nest, constants, arguments);
+
+  auto call = [&](OpBuilder &builder, Location loc, Value number) {
+    SmallVector<Value> operands(arguments);
+    operands.push_back(number);
+    func::CallOp::create(builder, loc, unit, operands);
+  };
+  Block &body = nest.getRegion().front();
+  OpBuilder builder(body.getTerminator());
+  Location loc = parallel.getLoc();
+  call(builder, loc, body.getArgument(0));
+
+  builder.setInsertionPoint(parallel);
+  Value threads = parallel.getNumThreads();
+  Value several = arith::CmpIOp::create(
+      builder, loc, arith::CmpIPredicate::sgt, threads,
+      arith::ConstantIntOp::create(builder, loc, threads.getType(), 1));
+  auto choice = scf::IfOp::create(builder, loc, several, /*withElse=*/true);
+  parallel->moveBefore(choice.thenYield());
+  builder.setInsertionPoint(choice.elseYield());
+  auto serial = scf::ForOp::create(
+      builder, loc, nest.getLoopLowerBounds().front(),
+      nest.getLoopUpperBounds().front(), nest.getLoopSteps().front());
+  builder.setInsertionPoint(serial.getBody()->getTerminator());
+  call(builder, loc, serial.getInductionVar());
+}

@@ -1,0 +1,66 @@
+// RUN: piko-opt --convert-piko-to-openmp --convert-piko-to-llvm --canonicalize %s | FileCheck %s
+
+// A kernel of a cycle may have next to nothing to do. Its units are calls of a
+// function, so that it has no parallel region where there is one thread.
+
+piko.record @F {"v" : f32 at 0} size 4 align 4
+
+// The unit has the private array, and what it needs of the kernel.
+// CHECK-LABEL: func.func private @P.kernel_a.unit(
+// CHECK-SAME:    %[[P:[a-z0-9]+]]: !llvm.ptr{{.*}}, %[[U:[a-z0-9]+]]: index) {
+// CHECK:         memref.alloca() : memref<4xf32>
+// CHECK:         %[[NUMBER:.*]] = arith.index_cast %[[U]] : index to i64
+// CHECK:         llvm.call @pikoir_open(%[[P]], %{{.*}}, %[[NUMBER]])
+// CHECK:         llvm.call @pikoir_close
+// CHECK:         return
+
+// CHECK-LABEL: func.func private @P.kernel_a(
+// CHECK-NOT:     pikoir_open
+// CHECK:         %[[THREADS:.*]] = llvm.call @pikoir_threads
+// CHECK:         %[[SEVERAL:.*]] = arith.cmpi sgt, %[[THREADS]], %c1_i32
+// CHECK:         scf.if %[[SEVERAL]] {
+// CHECK-NEXT:      omp.parallel num_threads(%[[THREADS]] : i32) {
+// CHECK-NEXT:        omp.wsloop schedule(dynamic) {
+// CHECK-NEXT:          omp.loop_nest (%[[I:.*]]) : index
+// CHECK-NEXT:            func.call @P.kernel_a.unit({{.*}}, %[[I]])
+// CHECK:         } else {
+// CHECK-NEXT:      scf.for %[[I:.*]] = %c0 to %{{.*}} step %c1 {
+// CHECK-NEXT:        func.call @P.kernel_a.unit({{.*}}, %[[I]])
+
+// Outside of cycles a kernel is as it was.
+// CHECK-LABEL: func.func private @P.kernel_b(
+// CHECK:         omp.loop_nest
+// CHECK-NEXT:      arith.index_cast
+// CHECK:           llvm.call @pikoir_open
+// CHECK-NOT:   @P.kernel_b.unit
+piko.pipeline @P rank 1 {
+  piko.buffer @sums : @F
+  piko.source @a
+  piko.edge @a[0] -> @a
+  piko.edge @a[1] -> @b
+  piko.stage @a bins [0] threads 1 lineage 0 cycle 0 : @F -> [@F, @F] {}
+  piko.stage @b bins [0] threads 1 lineage 1 : @F -> [] {}
+  piko.kernel @kernel_a {
+    %bins = piko.open_bins @a : !piko.bins<@F>
+    %units = piko.unit_count %bins : !piko.bins<@F>
+    scf.forall (%u) in (%units) {
+      %w = piko.open_writer %bins[%u] : !piko.bins<@F>
+      %array = memref.alloca() : memref<4xf32>
+      %zero = arith.constant 0.0 : f32
+      memref.store %zero, %array[%u] : memref<4xf32>
+      %v = memref.load %array[%units] : memref<4xf32>
+      piko.atomic add_float checked @sums[%u : index] "v", %v : f32
+      piko.close_writer %w
+    } {piko.schedule = "load_balance"}
+    piko.close_bins %bins : !piko.bins<@F>
+  }
+  piko.kernel @kernel_b {
+    %bins = piko.open_bins @b : !piko.bins<@F>
+    %units = piko.unit_count %bins : !piko.bins<@F>
+    scf.forall (%u) in (%units) {
+      %w = piko.open_writer %bins[%u] : !piko.bins<@F>
+      piko.close_writer %w
+    } {piko.schedule = "load_balance"}
+    piko.close_bins %bins : !piko.bins<@F>
+  }
+}
