@@ -305,6 +305,8 @@ static void checkBound(const pikort_pipeline &p) {
 }
 
 int32_t pikort_run(pikort_pipeline *p) {
+  if (p)
+    p->profile.begin();
   int32_t code = call(p, [&] {
     checkBound(*p);
     p->computeGrids();
@@ -312,6 +314,7 @@ int32_t pikort_run(pikort_pipeline *p) {
       if (state.kind == PIKORT_CONSTANT)
         state.view = {state.bytes.data(), {1, 1, 1, 1}};
     prepareState(*p);
+    p->profile.enter(Part::Program);
     if (p->checker)
       p->checker->beginRun();
     if (p->status != PIKORT_OK)
@@ -340,6 +343,9 @@ int32_t pikort_run(pikort_pipeline *p) {
       source.kernel->clear();
   p->memory.endFrame();
   ++p->runs;
+  p->ticksPerMillisecond = p->profile.end();
+  for (KernelStats &stats : p->kernelStats)
+    stats.endRun(p->ticksPerMillisecond);
   return p->status.load();
 }
 

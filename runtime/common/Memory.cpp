@@ -2,6 +2,7 @@
 //===- Memory.cpp - Memory that is kept from frame to frame ---------------===//
 
 #include "common/Memory.h"
+#include "common/Clock.h"
 
 #include <algorithm>
 #include <bit>
@@ -45,7 +46,7 @@ bool isAvailable(size_t bytes) {
 }
 
 /// Maps memory, with large blocks on huge page boundaries; null if refused.
-uint8_t *map(size_t bytes) {
+uint8_t *mapSystem(size_t bytes) {
   if (!isAvailable(bytes))
     return nullptr;
   bool huge = bytes >= hugePage;
@@ -71,9 +72,46 @@ uint8_t *map(size_t bytes) {
 
 Memory::~Memory() { unmapAllFree(); }
 
+// --- What the system takes --------------------------------------------------
+
+class Memory::MappingTimer {
+public:
+  explicit MappingTimer(Memory &memory)
+      : ticks_(std::this_thread::get_id() == memory.counted_
+                   ? &memory.mappingTicks_
+                   : nullptr),
+        start_(ticks()) {}
+  ~MappingTimer() {
+    if (ticks_)
+      *ticks_ += ticks() - start_;
+  }
+
+private:
+  int64_t *ticks_;
+  int64_t start_;
+};
+
+int64_t Memory::countMapping() {
+  std::lock_guard<std::mutex> lock(mutex_);
+  counted_ = std::this_thread::get_id();
+  return mappingTicks_;
+}
+
+uint8_t *Memory::map(size_t bytes) {
+  MappingTimer timer(*this);
+  return mapSystem(bytes);
+}
+
+void Memory::unmap(uint8_t *data, size_t bytes) {
+  MappingTimer timer(*this);
+  munmap(data, bytes);
+}
+
+// --- Blocks -----------------------------------------------------------------
+
 void Memory::unmapAllFree() {
   for (auto &[bytes, block] : free_) {
-    munmap(block.data, bytes);
+    unmap(block.data, bytes);
     reserved_ -= static_cast<int64_t>(bytes);
   }
   free_.clear();
@@ -125,7 +163,7 @@ void Memory::release(Block block, Use use) {
   try {
     free_.emplace(block.bytes, Free{block.data, frame_});
   } catch (...) { // no memory to remember it
-    munmap(block.data, block.bytes);
+    unmap(block.data, block.bytes);
     reserved_ -= static_cast<int64_t>(block.bytes);
   }
 }
@@ -138,7 +176,7 @@ void Memory::endFrame() {
       ++it;
       continue;
     }
-    munmap(it->second.data, it->first);
+    unmap(it->second.data, it->first);
     reserved_ -= static_cast<int64_t>(it->first);
     it = free_.erase(it);
   }

@@ -15,6 +15,7 @@
 #include <cstdint>
 #include <map>
 #include <mutex>
+#include <thread>
 #include <utility>
 
 namespace piko::rt {
@@ -47,6 +48,11 @@ public:
   /// Unmaps blocks that no recent frame used.
   void endFrame();
 
+  /// From here on what this thread takes to map and unmap is counted.
+  int64_t countMapping();
+  /// Ticks so far; for that thread.
+  int64_t mappingTicks() const { return mappingTicks_; }
+
   void setLimit(int64_t bytes);
   int64_t limit() const;
   /// The host's budget for bins; what enforces it is limitBins().
@@ -66,6 +72,9 @@ private:
     uint8_t *data;
     int64_t frame; ///< When it was last in use.
   };
+  class MappingTimer;
+  uint8_t *map(size_t bytes);
+  void unmap(uint8_t *data, size_t bytes);
   void unmapAllFree();
 
   mutable std::mutex mutex_;
@@ -78,6 +87,8 @@ private:
   int64_t budget_ = 0;
   int64_t binLimit_ = 0;
   int64_t frame_ = 0;
+  std::thread::id counted_; ///< Whose mapping is counted.
+  int64_t mappingTicks_ = 0;
 };
 
 /// An array of trivial elements in a block. Uninitialised when made.

@@ -313,7 +313,7 @@ static std::string describe(const std::string &stage, const KernelError &e,
   }
 }
 
-int32_t pikort_pipeline::settle() noexcept {
+void pikort_pipeline::settleReported() noexcept {
   std::lock_guard<std::mutex> lock(errorMutex);
   if (hasError) {
     hasError = false;
@@ -328,7 +328,6 @@ int32_t pikort_pipeline::settle() noexcept {
       fail(error.code, {});
     }
   }
-  return status.load();
 }
 
 void pikort_pipeline::clearStatus() noexcept {

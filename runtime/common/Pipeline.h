@@ -10,7 +10,7 @@
 #ifndef PIKO_RUNTIME_COMMON_PIPELINE_H
 #define PIKO_RUNTIME_COMMON_PIPELINE_H
 
-#include "common/Memory.h"
+#include "common/Profile.h"
 #include "pikort/abi.h"
 
 #include <array>
@@ -19,6 +19,7 @@
 #include <mutex>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <vector>
 
 namespace piko::rt {
@@ -169,8 +170,13 @@ struct Stage {
 
 struct KernelStats {
   std::string name;
-  double milliseconds = 0, joinMilliseconds = 0;
-  int64_t launches = 0;
+  double milliseconds = 0, joinMilliseconds = 0, waitMilliseconds = 0;
+  int64_t launches = 0, parallelLaunches = 0;
+  /// Of this run, not yet in the sums.
+  int64_t ticks = 0, joinTicks = 0, waitTicks = 0;
+
+  void endRun(double ticksPerMillisecond);
+  void reset();
 };
 
 struct StageStats {
@@ -225,10 +231,13 @@ struct pikort_pipeline {
   bool ready = false; ///< finish() succeeded.
   std::array<int64_t, 4> domain{0, 1, 1, 1};
   int32_t threads = 1;
-  int32_t activeThreads = 1;            ///< That the open kernel has units for.
+  int32_t activeThreads = 1; ///< That the open kernel has units for.
+  double ticksPerMillisecond =
+      piko::rt::defaultTickRate;        ///< As the latest run had it.
   int64_t loopLimit = int64_t(1) << 20; ///< Of hops and of rounds.
   int64_t stripSize = 0;                ///< Of all strips; 0 = not said.
 
+  piko::rt::Profile profile{memory};
   std::vector<piko::rt::KernelStats> kernelStats;
   std::vector<piko::rt::StageStats> stageStats;
   int64_t runs = 0;
@@ -247,7 +256,11 @@ struct pikort_pipeline {
   /// Notes an error in a kernel's loop; thread safe.
   void report(const piko::rt::KernelError &error) noexcept;
   /// Turns what was reported into the status; returns the status.
-  int32_t settle() noexcept;
+  int32_t settle() noexcept {
+    if (reported.load(std::memory_order_relaxed) != PIKORT_OK) [[unlikely]]
+      settleReported();
+    return status.load(std::memory_order_relaxed);
+  }
   /// Forgets the status and the message.
   void clearStatus() noexcept;
 
@@ -275,6 +288,7 @@ private:
   bool hasError = false;
   piko::rt::KernelError error{};
 
+  void settleReported() noexcept;
   void checkDeclared();
   void connect();
   void findStrips();
@@ -305,10 +319,10 @@ inline std::string outOfMemoryText(const pikort_pipeline &p,
   return text + memoryLimitText(p);
 }
 
-/// Runs `body`, which may throw, and turns what it throws into a status.
-template <class Body>
-int32_t guarded(pikort_pipeline *p, const std::string &who,
-                Body &&body) noexcept {
+/// Runs `body`, which may throw, and turns what it throws into a status. `who`
+/// is a text, or a function that makes one.
+template <class Who, class Body>
+int32_t guarded(pikort_pipeline *p, const Who &who, Body &&body) noexcept {
   try {
     body();
     return PIKORT_OK;
@@ -316,7 +330,11 @@ int32_t guarded(pikort_pipeline *p, const std::string &who,
     return p->fail(failure.code, failure.message);
   } catch (const OutOfMemory &refused) {
     try {
-      return p->fail(PIKORT_OUT_OF_MEMORY, outOfMemoryText(*p, who, refused));
+      if constexpr (std::is_invocable_v<const Who &>)
+        return p->fail(PIKORT_OUT_OF_MEMORY,
+                       outOfMemoryText(*p, who(), refused));
+      else
+        return p->fail(PIKORT_OUT_OF_MEMORY, outOfMemoryText(*p, who, refused));
     } catch (...) {
       return p->fail(PIKORT_OUT_OF_MEMORY, {});
     }

@@ -104,6 +104,24 @@ int32_t pikort_get_source_info(pikort_pipeline *p, int32_t index,
 
 // --- Statistics -------------------------------------------------------------
 
+} // extern "C"
+
+void KernelStats::endRun(double ticksPerMillisecond) {
+  auto add = [&](double &sum, int64_t &now) {
+    sum += static_cast<double>(std::exchange(now, 0)) / ticksPerMillisecond;
+  };
+  add(milliseconds, ticks);
+  add(joinMilliseconds, joinTicks);
+  add(waitMilliseconds, waitTicks);
+}
+
+void KernelStats::reset() {
+  milliseconds = joinMilliseconds = waitMilliseconds = 0;
+  launches = parallelLaunches = 0;
+}
+
+extern "C" {
+
 int64_t pikort_stats_runs(const pikort_pipeline *p) { return p ? p->runs : 0; }
 
 int32_t pikort_kernel_count(const pikort_pipeline *p) {
@@ -114,11 +132,30 @@ int32_t pikort_get_kernel_stats(pikort_pipeline *p, int32_t index,
                                 pikort_kernel_stats *stats) {
   if (!p)
     return PIKORT_INVALID_ARGUMENT;
-  return describe(p, p->kernelStats, index, "kernel", stats,
-                  [](const KernelStats &k) {
-                    return pikort_kernel_stats{k.name.c_str(), k.milliseconds,
-                                               k.joinMilliseconds, k.launches};
-                  });
+  return describe(
+      p, p->kernelStats, index, "kernel", stats, [](const KernelStats &k) {
+        return pikort_kernel_stats{k.name.c_str(),     k.milliseconds,
+                                   k.joinMilliseconds, k.waitMilliseconds,
+                                   k.launches,         k.parallelLaunches};
+      });
+}
+
+int32_t pikort_get_time_stats(pikort_pipeline *p, pikort_time_stats *stats) {
+  if (!p || !stats)
+    return PIKORT_INVALID_ARGUMENT;
+  auto part = [&](Part part) { return p->profile.milliseconds(part); };
+  double waiting = 0;
+  for (const KernelStats &kernel : p->kernelStats)
+    waiting += kernel.waitMilliseconds;
+  waiting = std::min(waiting, part(Part::Kernel));
+  *stats = {part(Part::Kernel) - waiting,
+            waiting,
+            part(Part::Join),
+            part(Part::Cycle),
+            part(Part::State),
+            part(Part::Allocation),
+            part(Part::Program)};
+  return PIKORT_OK;
 }
 
 int32_t pikort_get_stage_stats(pikort_pipeline *p, int32_t stage,
@@ -143,10 +180,9 @@ int64_t pikort_reserved_bytes(const pikort_pipeline *p) {
 void pikort_reset_stats(pikort_pipeline *p) {
   if (!p)
     return;
-  for (KernelStats &stats : p->kernelStats) {
-    stats.milliseconds = stats.joinMilliseconds = 0;
-    stats.launches = 0;
-  }
+  for (KernelStats &stats : p->kernelStats)
+    stats.reset();
+  p->profile.reset();
   for (StageStats &stats : p->stageStats)
     stats = {};
   p->runs = 0;

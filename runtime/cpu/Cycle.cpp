@@ -25,13 +25,6 @@ Cycle::Cycle(pikort_pipeline &p, const Component &component)
   sortParts();
 }
 
-Cycle::Part &Cycle::partOf(int32_t stage) {
-  return *std::find_if(parts_.begin(), parts_.end(), [&](const Part &part) {
-    return std::find(part.stages.begin(), part.stages.end(), stage) !=
-           part.stages.end();
-  });
-}
-
 /// Parts form no cycle: a part waits for those that emit into it.
 void Cycle::sortParts() {
   std::vector<Part> sorted;
@@ -80,11 +73,21 @@ int32_t Cycle::step() {
                   "stage " + quoted(p_.stages[chosen_].name) +
                       ": expected its kernel to run before the next step of "
                       "its cycle"};
+  loop_ = nullptr;
   if (!finished_)
     chosen_ = choose();
   begun_ = false;
-  finished_ = chosen_ < 0;
+  if (!finished_ && chosen_ < 0)
+    finish();
   return chosen_;
+}
+
+/// What serial launches kept for the next one is no longer needed.
+void Cycle::finish() {
+  finished_ = true;
+  for (int32_t s : component_.stages)
+    if (Kernel &kernel = *p_.stages[s].kernel; kernel.serial)
+      kernel.clear();
 }
 
 int32_t Cycle::choose() {
@@ -92,6 +95,7 @@ int32_t Cycle::choose() {
     for (; part_ < parts_.size(); ++part_)
       if (int32_t stage = runPart(parts_[part_]); stage >= 0)
         return stage;
+    loop_ = nullptr;
     if (int32_t stage = nextCollector(); stage >= 0)
       return stage;
     if (std::none_of(collectors_.begin(), collectors_.end(),
@@ -103,6 +107,7 @@ int32_t Cycle::choose() {
 
 /// The stage of the part that runs next, or -1 if the part has come to rest.
 int32_t Cycle::runPart(Part &part) {
+  loop_ = part.loop.get();
   if (!part.started) {
     if (std::none_of(part.stages.begin(), part.stages.end(), [&](int32_t s) {
           return hasInput(p_.stages[s], fromOutside_);
@@ -146,36 +151,120 @@ void Cycle::beginRound() {
 
 // --- What the kernels take and emit -----------------------------------------
 
-Stream Cycle::takeInput(Kernel &kernel) {
-  const Stage &stage = p_.stages[kernel.stage];
+void Cycle::expectChosen(const Kernel &kernel) const {
   if (kernel.stage != chosen_ || begun_)
     throw Failure{PIKORT_BAD_PROGRAM,
-                  "stage " + quoted(stage.name) +
+                  "stage " + quoted(p_.stages[kernel.stage].name) +
                       ": expected pikoir_cycle_step to name it first"};
-  begun_ = true;
-  if (stage.loop >= 0)
-    return partOf(kernel.stage).loop->takeInput();
-  if (stage.collects()) {
-    kernel.firstRound = round_ == 0;
-    if (launches_ > UINT32_MAX)
-      throw Failure{PIKORT_TOO_MANY,
-                    "stage " + quoted(stage.name) +
-                        ": expected at most 4294967296 launches in a cycle"};
-    kernel.launch = static_cast<uint32_t>(launches_++);
-    return gatherInputs(p_, stage, round_ == 0);
-  }
-  return gatherInputs(p_, stage, fromOutside_);
 }
 
-void Cycle::absorb(Kernel &kernel) {
+bool Cycle::takesFromOutside(const Stage &stage) const {
+  return stage.collects() ? round_ == 0 : fromOutside_;
+}
+
+/// The edge whose queue is all that comes into a stage, or null.
+Edge *Cycle::onlyInput(const Stage &stage) const {
+  Edge *only = nullptr;
+  if (takesFromOutside(stage) && comesFromOutside(stage))
+    return nullptr;
+  for (int32_t e : stage.inputs) {
+    Edge &edge = p_.edges[e];
+    if (p_.stages[edge.producer].component != stage.component ||
+        edge.queue->count == 0)
+      continue;
+    if (only)
+      return nullptr;
+    only = &edge;
+  }
+  return only;
+}
+
+/// Serial launches emit in the order of processing. That must be the order of
+/// lineage, too, and what they emit must not need keys that tell cells.
+bool Cycle::runsSerially(Kernel &kernel) const {
+  expectChosen(kernel);
+  if (loop_)
+    return loop_->runsSerially(kernel);
   const Stage &stage = p_.stages[kernel.stage];
-  if (stage.loop >= 0)
-    partOf(kernel.stage).loop->absorb(kernel);
+  const Edge *edge = onlyInput(stage);
+  if (!edge)
+    return false;
+  const Queue &queue = *edge->queue;
+  if (!Serial::takes(p_, kernel, std::max(queue.count, queue.pairs.size())))
+    return false;
+  if (stage.collects())
+    return stage.tiles == 1 && round_ > 0;
+  return PairOrder::isSorted(queue.view()) &&
+         std::none_of(stage.outputs.begin(), stage.outputs.end(),
+                      [&](int32_t e) { return e >= 0 && p_.edges[e].keyed; });
+}
+
+/// A collecting stage begins a new lineage.
+void Cycle::startLaunch(Kernel &kernel) {
+  kernel.firstRound = round_ == 0;
+  if (launches_ > UINT32_MAX)
+    throw Failure{PIKORT_TOO_MANY,
+                  "stage " + quoted(p_.stages[kernel.stage].name) +
+                      ": expected at most 4294967296 launches in a cycle"};
+  kernel.launch = static_cast<uint32_t>(launches_++);
+}
+
+Stream Cycle::takeInput(Kernel &kernel) {
+  const Stage &stage = p_.stages[kernel.stage];
+  begun_ = true;
+  if (loop_)
+    return loop_->takeInput();
+  if (stage.collects())
+    startLaunch(kernel);
+  return gatherInputs(p_, stage, takesFromOutside(stage));
+}
+
+Items Cycle::serialInput(Kernel &kernel) {
+  begun_ = true;
+  if (loop_)
+    return loop_->serialInput();
+  const Stage &stage = p_.stages[kernel.stage];
+  if (stage.collects())
+    startLaunch(kernel);
+  input_.reset();
+  std::swap(input_, *onlyInput(stage)->queue);
+  return input_.view();
+}
+
+void Cycle::absorb(Kernel &kernel, bool serial) {
+  if (serial)
+    kernel.serial->end();
+  if (loop_ && serial)
+    loop_->absorb(*kernel.serial);
+  else if (loop_)
+    loop_->absorb(kernel);
+  else if (serial)
+    absorb(kernel, *kernel.serial);
   else
-    for (int32_t e : stage.outputs)
+    for (int32_t e : p_.stages[kernel.stage].outputs)
       if (e >= 0)
         enqueue(p_, p_.edges[e], gatherEdge(p_, p_.edges[e]));
   chosen_ = -1;
+}
+
+void Cycle::absorb(const Kernel &kernel, const Serial &launch) {
+  const Stage &stage = p_.stages[kernel.stage];
+  for (size_t port = 0; port < stage.outputs.size(); ++port) {
+    int32_t e = stage.outputs[port];
+    const Serial::Emitted &emitted = launch.ports()[port];
+    if (emitted.count == 0)
+      continue;
+    Stream stream{emitted, {}, {}, {}, {}};
+    if (p_.edges[e].keyed) { // a new lineage
+      stream.keys.width = 2;
+      stream.keys.words = Array<uint64_t>(p_.memory, 2 * stream.count);
+      for (int64_t i = 0; i < stream.count; ++i) {
+        stream.keys.words[2 * i] = uint64_t(stage.root) << 32 | kernel.launch;
+        stream.keys.words[2 * i + 1] = emitted.numbers[i];
+      }
+    }
+    enqueue(p_, p_.edges[e], stream);
+  }
 }
 
 void piko::rt::enqueue(pikort_pipeline &p, Edge &edge, const Stream &stream) {
@@ -228,8 +317,12 @@ int32_t pikoir_cycle_step(pikort_pipeline *p, int32_t stage) {
       throw Failure{PIKORT_BAD_PROGRAM,
                     "expected a stage of a cycle, but got stage " +
                         std::to_string(stage)};
+    if (p->profile.part() != Part::Cycle)
+      p->profile.enter(Part::Cycle);
     next = cycle->step();
   });
+  if (next < 0)
+    p->profile.enter(Part::Program);
   return next;
 }
 

@@ -30,10 +30,13 @@ public:
   /// The stage to run next, or -1; throws.
   int32_t step();
   bool isFinished() const { return finished_; }
-  /// The input of the stage that step() named, once.
+  /// Whether the launch of the stage that step() named is serial.
+  bool runsSerially(Kernel &kernel) const;
+  /// The input of that stage, once; that of a serial launch stays here.
   Stream takeInput(Kernel &kernel);
+  Items serialInput(Kernel &kernel);
   /// Takes what its kernel emitted.
-  void absorb(Kernel &kernel);
+  void absorb(Kernel &kernel, bool serial);
 
 private:
   /// A loop, or a stage.
@@ -45,10 +48,15 @@ private:
 
   void sortParts();
   int32_t choose();
+  void finish();
   int32_t runPart(Part &part);
   int32_t nextCollector();
   void beginRound();
-  Part &partOf(int32_t stage);
+  void expectChosen(const Kernel &kernel) const;
+  bool takesFromOutside(const Stage &stage) const;
+  Edge *onlyInput(const Stage &stage) const;
+  void startLaunch(Kernel &kernel);
+  void absorb(const Kernel &kernel, const Serial &launch);
   bool hasInput(const Stage &stage, bool fromOutside) const;
   bool comesFromOutside(const Stage &stage) const;
 
@@ -61,8 +69,10 @@ private:
   int64_t launches_ = 0;    ///< Of collectors.
   bool fromOutside_ = true; ///< This spread takes what comes into the cycle.
   bool finished_ = false;
-  int32_t chosen_ = -1; ///< The stage whose kernel is to run.
-  bool begun_ = false;  ///< It has its input.
+  int32_t chosen_ = -1;  ///< The stage whose kernel is to run.
+  Loop *loop_ = nullptr; ///< Its loop, if it is of one.
+  Queue input_;          ///< What a serial launch outside of loops takes.
+  bool begun_ = false;   ///< It has its input.
 };
 
 /// Makes the cycles of a run, and frees them.

@@ -56,7 +56,7 @@ Lane::~Lane() = default;
 void Lane::clear() {
   for (PortLogs &log : logs)
     log.clear();
-  emitted = 0;
+  emitted = busy = 0;
   scratch = {};
   deferred.reset();
 }

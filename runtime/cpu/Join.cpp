@@ -111,21 +111,20 @@ static void concatenate(int32_t threads, const Segments &from, uint8_t *to) {
   });
 }
 
-void piko::rt::checkCount(const Stage &stage, int64_t count) {
-  if (count > UINT32_MAX)
-    throw Failure{PIKORT_TOO_MANY,
-                  "stage " + quoted(stage.name) +
-                      ": expected at most 4294967295 primitives, but got " +
-                      std::to_string(count)};
+void piko::rt::failCount(const Stage &stage, int64_t count) {
+  throw Failure{PIKORT_TOO_MANY,
+                "stage " + quoted(stage.name) +
+                    ": expected at most 4294967295 primitives, but got " +
+                    std::to_string(count)};
 }
 
-Array<uint32_t> piko::rt::pairStarts(Memory &memory, const Stream &stream) {
-  Array<uint32_t> starts(memory, stream.count + 1);
+Array<uint32_t> piko::rt::pairStarts(Memory &memory, const Items &items) {
+  Array<uint32_t> starts(memory, items.count + 1);
   int64_t item = 0;
-  for (int64_t k = 0; k < stream.pairCount; ++k)
-    if (stream.pairs[k] & PIKOIR_FIRST_CELL)
+  for (int64_t k = 0; k < items.pairCount; ++k)
+    if (items.pairs[k] & PIKOIR_FIRST_CELL)
       starts[item++] = static_cast<uint32_t>(k);
-  starts[item] = static_cast<uint32_t>(stream.pairCount);
+  starts[item] = static_cast<uint32_t>(items.pairCount);
   return starts;
 }
 

@@ -23,8 +23,6 @@
 
 #include "common/Pipeline.h"
 
-#include <chrono>
-
 namespace piko::rt {
 
 // --- What a kernel emits ----------------------------------------------------
@@ -102,6 +100,11 @@ struct Lane : pikoir_writer {
   std::vector<pikoir_port> portStorage;
   std::vector<PortLogs> logs;
   int64_t emitted = 0; ///< Over all units of this run.
+  int64_t opened = 0;  ///< The unit, in ticks.
+  int64_t busy = 0;    ///< Ticks of all units of this run.
+  /// In a serial launch: where the number of what was emitted goes at the end
+  /// of the next slot, and behind the unit's last.
+  uint32_t *slotEnd = nullptr, *slotLimit = nullptr;
   ScratchStack scratch;
   std::unique_ptr<Deferred> deferred; ///< If there were any.
 
@@ -124,25 +127,32 @@ struct Keys {
 };
 
 /// Items in lineage order, with the cells of each.
-struct Stream {
+struct Items {
   const uint8_t *items = nullptr;
   int64_t count = 0;
   const uint32_t *pairs = nullptr; ///< If the consumer is placed.
   int64_t pairCount = 0;
+
+  bool onePairEach() const { return pairCount == count; }
+};
+
+/// The same, with keys.
+struct Stream : Items {
   Keys keys;
   // What the pointers point to, if it is ours:
   Array<uint8_t> itemStorage;
   Array<uint32_t> pairStorage;
   std::vector<Array<uint8_t>> blocks;
-
-  bool onePairEach() const { return pairCount == count; }
 };
+
+class Serial; // Serial.h
 
 struct Kernel {
   int32_t stage = 0;
   int32_t source = -1; ///< This is the AssignBin of a source.
   size_t statsIndex = 0;
-  std::chrono::steady_clock::time_point started;
+  // In ticks: when begin was called, when it and the units had ended.
+  int64_t started = 0, begun = 0, ended = 0;
 
   // From begin to end.
   Stream stream;
@@ -169,7 +179,10 @@ struct Kernel {
 
   // On a cycle.
   bool firstRound = true;
-  uint32_t launch = 0; ///< Of the stages of the cycle that collect.
+  uint32_t launch = 0;            ///< Of the stages of the cycle that collect.
+  std::shared_ptr<Serial> serial; ///< Warm, if such launches have been.
+  bool runsSerially = false;      ///< This launch is one.
+  double positionTicks = 0;       ///< What a position takes in them, about.
 
   /// Slots of unit u are [slotBegin(u), slotBegin(u + 1)).
   int64_t slotBegin(int64_t unit) const {
@@ -191,6 +204,8 @@ struct Kernel {
 
 /// Makes sure that there is a lane for each thread that can open a unit.
 void prepareLanes(pikort_pipeline &p, Kernel &kernel);
+/// The lane of serial launches, ready for the first one.
+Lane &prepareSerialLane(pikort_pipeline &p, Kernel &kernel);
 /// Reports a mistake of generated code.
 void badCall(const Lane &lane, BadCall which);
 /// Reports that `bytes` were refused, to the lane's stage or to another one.
@@ -213,9 +228,13 @@ bool growLocal(Lane &lane, int32_t port);
 // --- Join.cpp ---------------------------------------------------------------
 
 /// Throws unless `count` primitives, or pairs, can be numbered.
-void checkCount(const Stage &stage, int64_t count);
+[[noreturn]] void failCount(const Stage &stage, int64_t count);
+inline void checkCount(const Stage &stage, int64_t count) {
+  if (count > UINT32_MAX) [[unlikely]]
+    failCount(stage, count);
+}
 /// The first pair of each item of a stream that has pairs, and the end.
-Array<uint32_t> pairStarts(Memory &memory, const Stream &stream);
+Array<uint32_t> pairStarts(Memory &memory, const Items &items);
 /// True if the edge must be gathered position by position.
 bool byPosition(const pikort_pipeline &p, const Edge &edge);
 /// What a kernel emitted, in lineage order; frees it there.

@@ -18,6 +18,7 @@
 #define PIKO_RUNTIME_CPU_LOOP_H
 
 #include "cpu/LineageTree.h"
+#include "cpu/Serial.h"
 
 namespace piko::rt {
 
@@ -31,25 +32,18 @@ public:
   /// The stage to run next, or -1 if nothing is left: then the queues of the
   /// edges out of the loop are complete.
   virtual int32_t next() = 0;
-  /// The input of that stage, once.
+  /// Whether its launch is serial.
+  virtual bool runsSerially(Kernel &kernel) const = 0;
+  /// The input of that stage, once; that of a serial launch stays in the loop.
   virtual Stream takeInput() = 0;
+  virtual Items serialInput() = 0;
   /// Takes what that stage's kernel emitted.
-  void absorb(Kernel &kernel);
+  virtual void absorb(Kernel &kernel) = 0;
+  virtual void absorb(const Serial &launch) = 0;
 
 protected:
-  /// What one port emitted. All records of a kernel are numbered in the order
-  /// of emission, over all ports.
-  struct Port {
-    int32_t edge;
-    PortRecords records;
-    Array<uint32_t> numbers;
-    int64_t count() const { return records.stream.count; }
-  };
-
   Loop(pikort_pipeline &p, const LoopShape &shape) : p_(p), shape_(shape) {}
   virtual void begin() = 0;
-  /// `items[n]` is the item of the kernel's input from which record n comes.
-  virtual void absorb(std::vector<Port> &ports, Array<uint32_t> items) = 0;
 
   size_t members() const { return shape_.stages.size(); }
   const Stage &member(size_t m) const { return p_.stages[shape_.stages[m]]; }
@@ -71,9 +65,6 @@ protected:
   int64_t entryCount_ = 0;
 
 private:
-  void numberRecords(const Kernel &kernel, std::vector<Port> &ports,
-                     uint32_t *items);
-
   Array<uint64_t> keys_; ///< Of the entries, by place.
 };
 

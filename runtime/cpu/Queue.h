@@ -28,13 +28,8 @@ public:
 
   /// Room for `count` more, not initialised. Throws OutOfMemory.
   T *extend(Memory &memory, int64_t count) {
-    if (!array_ || size_ + count > array_.capacity()) {
-      Array<T> larger(memory, std::max(size_ + count, 2 * size_));
-      if (size_ > 0)
-        std::memcpy(larger.data(), array_.data(),
-                    static_cast<size_t>(size_) * sizeof(T));
-      array_ = std::move(larger);
-    }
+    if (size_ + count > array_.capacity()) [[unlikely]]
+      grow(memory, size_ + count);
     size_ += count;
     return array_.data() + size_ - count;
   }
@@ -44,12 +39,27 @@ public:
                   static_cast<size_t>(count) * sizeof(T));
   }
   void shrink(int64_t size) { size_ = size; }
+  /// Drops all elements, but no memory that is worth keeping.
+  void reset() {
+    constexpr int64_t kept = int64_t(64) << 10;
+    if (array_.capacity() * static_cast<int64_t>(sizeof(T)) > kept)
+      array_ = {};
+    size_ = 0;
+  }
   Array<T> take() {
     size_ = 0;
     return std::move(array_);
   }
 
 private:
+  [[gnu::noinline]] void grow(Memory &memory, int64_t size) {
+    Array<T> larger(memory, std::max(size, 2 * size_));
+    if (size_ > 0)
+      std::memcpy(larger.data(), array_.data(),
+                  static_cast<size_t>(size_) * sizeof(T));
+    array_ = std::move(larger);
+  }
+
   Array<T> array_;
   int64_t size_ = 0;
 };
@@ -65,15 +75,18 @@ struct Queue {
   /// Appends items of `size` bytes with keys of `keyWidth` words (0 = none).
   void append(Memory &memory, const Stream &stream, int64_t size,
               int32_t keyWidth) {
-    items.append(memory, stream.items, stream.count * size);
-    pairs.append(memory, stream.pairs, stream.pairCount);
+    append(memory, stream, size);
     if (keyWidth > 0) {
       uint64_t *to = words.extend(memory, stream.count * keyWidth);
       for (int64_t i = 0; i < stream.count; ++i)
         for (int32_t w = 0; w < keyWidth; ++w)
           *to++ = w < stream.keys.width ? stream.keys.word(i, w) : 0;
     }
-    count += stream.count;
+  }
+  void append(Memory &memory, const Items &added, int64_t size) {
+    items.append(memory, added.items, added.count * size);
+    pairs.append(memory, added.pairs, added.pairCount);
+    count += added.count;
   }
 
   int64_t bytes() const {
@@ -92,6 +105,19 @@ struct Queue {
     items.shrink(mark.bytes);
     pairs.shrink(mark.pairs);
     words.shrink(mark.words);
+  }
+
+  void reset() {
+    count = 0;
+    items.reset();
+    pairs.reset();
+    words.reset();
+    nodes.reset();
+  }
+
+  /// All items, which stay here.
+  Items view() const {
+    return {items.data(), count, pairs.data(), pairs.size()};
   }
 
   /// All items, without their nodes; the queue is empty then.

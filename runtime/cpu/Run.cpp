@@ -9,12 +9,6 @@
 
 using namespace piko::rt;
 
-static double millisecondsSince(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double, std::milli>(
-             std::chrono::steady_clock::now() - start)
-      .count();
-}
-
 void Kernel::clear() {
   stream = {};
   input = {};
@@ -31,6 +25,8 @@ void Kernel::clear() {
     lane->clear();
   firstRound = true;
   launch = 0;
+  serial.reset();
+  runsSerially = false;
   pendingOutputs = 0;
   open = false;
 }
@@ -71,6 +67,12 @@ static void publish(const pikort_pipeline &p, Kernel &kernel) {
                   kernel.calls.size()};
 }
 
+static void openLanes(pikort_pipeline &p, Kernel &kernel) {
+  prepareLanes(p, kernel);
+  beginLocals(p, kernel);
+  publish(p, kernel);
+}
+
 /// Units for the AssignBin of a source: any chunks will do.
 static void prepareSource(pikort_pipeline &p, Kernel &kernel) {
   const Source &source = p.sources[kernel.source];
@@ -83,6 +85,7 @@ static void prepareSource(pikort_pipeline &p, Kernel &kernel) {
   binItems(p, whole, kernel, false);
   cutUnits(p, whole, kernel);
   kernel.pendingOutputs = 1;
+  openLanes(p, kernel);
 }
 
 void piko::rt::prepareOutputs(pikort_pipeline &p, const Stage &stage,
@@ -99,15 +102,23 @@ void piko::rt::prepareOutputs(pikort_pipeline &p, const Stage &stage,
   }
 }
 
-static void prepareStage(pikort_pipeline &p, Kernel &kernel) {
-  Stage &stage = p.stages[kernel.stage];
-  Cycle *cycle = p.cycleOf(stage);
-  kernel.stream =
-      cycle ? cycle->takeInput(kernel) : gatherInputs(p, stage, true);
+/// Decides how a kernel is launched, and drops what no launch needs.
+static void chooseLaunch(pikort_pipeline &p, Kernel &kernel) {
+  Cycle *cycle =
+      kernel.source < 0 ? p.cycleOf(p.stages[kernel.stage]) : nullptr;
+  bool serially = cycle && cycle->runsSerially(kernel);
+  if (!serially || !kernel.serial)
+    kernel.clear();
+  if (serially && !kernel.serial)
+    kernel.serial = std::make_shared<Serial>(p, kernel);
+  kernel.runsSerially = serially;
+}
+
+/// Orders and bins the input over threads.
+static void prepareThreads(pikort_pipeline &p, const Stage &stage,
+                           Kernel &kernel) {
   if (stage.keyWidth > 0)
     kernel.keys = std::move(kernel.stream.keys);
-  if (Strips *strips = p.stripsOf(stage); strips && stage.collects())
-    kernel.launch = strips->number();
   bool rankNeeded = stage.loop >= 0;
   for (int32_t e : stage.outputs)
     if (e >= 0 && !p.edges[e].local)
@@ -117,71 +128,130 @@ static void prepareStage(pikort_pipeline &p, Kernel &kernel) {
   binItems(p, stage, kernel, rankNeeded);
   cutUnits(p, stage, kernel);
   prepareOutputs(p, stage, kernel);
+  openLanes(p, kernel);
+}
+
+static void prepareStage(pikort_pipeline &p, Kernel &kernel) {
+  Stage &stage = p.stages[kernel.stage];
+  Cycle *cycle = p.cycleOf(stage);
+  Strips *strips = p.stripsOf(stage);
   StageStats &stats = p.stageStats[kernel.stage];
-  stats.in += kernel.stream.count;
+  if (kernel.runsSerially) {
+    Items input = cycle->serialInput(kernel);
+    kernel.serial->begin(input);
+    stats.in += input.count;
+  } else {
+    kernel.stream =
+        cycle ? cycle->takeInput(kernel) : gatherInputs(p, stage, true);
+    stats.in += kernel.stream.count;
+  }
+  if (strips && stage.collects())
+    kernel.launch = strips->number();
+  if (!kernel.runsSerially)
+    prepareThreads(p, stage, kernel);
+  if (strips && stage.writes())
+    strips->commit();
   stats.placed += kernel.positions;
+}
+
+/// The name of a kernel, for errors.
+static auto nameOf(const pikort_pipeline &p, const Kernel &kernel) {
+  return
+      [&p, &kernel] { return "stage " + quoted(p.stages[kernel.stage].name); };
 }
 
 static const pikoir_input *begin(pikort_pipeline &p, Kernel &kernel) {
   if (p.status != PIKORT_OK)
     return nullptr;
-  int32_t code =
-      guarded(&p, "stage " + quoted(p.stages[kernel.stage].name), [&] {
-        kernel.clear();
-        kernel.started = std::chrono::steady_clock::now();
-        if (kernel.source >= 0)
-          prepareSource(p, kernel);
-        else
-          prepareStage(p, kernel);
-        prepareLanes(p, kernel);
-        beginLocals(p, kernel);
-        publish(p, kernel);
-        kernel.open = true;
-        Strips *strips = p.stripsOf(p.stages[kernel.stage]);
-        if (strips && kernel.source < 0 && p.stages[kernel.stage].writes())
-          strips->commit();
-        p.activeThreads = static_cast<int32_t>(
-            std::clamp<int64_t>(kernel.input.unit_count, 1, p.threads));
-      });
-  KernelStats &stats = p.kernelStats[kernel.statsIndex];
-  stats.joinMilliseconds += millisecondsSince(kernel.started);
+  int32_t code = guarded(&p, nameOf(p, kernel), [&] {
+    chooseLaunch(p, kernel);
+    // What a serial launch takes is its cycle's time.
+    if (!kernel.runsSerially)
+      kernel.started = p.profile.enter(Part::Join);
+    if (kernel.source >= 0)
+      prepareSource(p, kernel);
+    else
+      prepareStage(p, kernel);
+    kernel.open = true;
+    p.activeThreads = kernel.runsSerially
+                          ? 1
+                          : static_cast<int32_t>(std::clamp<int64_t>(
+                                kernel.input.unit_count, 1, p.threads));
+  });
+  kernel.begun =
+      p.profile.enter(code == PIKORT_OK ? Part::Kernel : Part::Program);
   return code == PIKORT_OK ? &kernel.input : nullptr;
+}
+
+/// Counts what a launch over threads emitted and how long they waited, and
+/// frees what nothing needs that comes after.
+static void endThreads(pikort_pipeline &p, Kernel &kernel, int32_t status) {
+  KernelStats &stats = p.kernelStats[kernel.statsIndex];
+  int64_t busy = 0;
+  for (auto &lane : kernel.lanes) {
+    busy += lane->busy;
+    if (kernel.source < 0)
+      p.stageStats[kernel.stage].out += lane->emitted;
+  }
+  if (p.activeThreads > 1) {
+    ++stats.parallelLaunches;
+    stats.waitTicks += std::max<int64_t>(0, kernel.ended - kernel.begun -
+                                                busy / p.activeThreads);
+  }
+  endLocals(p, kernel, status);
+  kernel.stream = {};
+  kernel.input = {};
+  if (kernel.pendingOutputs == 0 || status != PIKORT_OK)
+    kernel.clear();
+}
+
+/// Takes what was emitted to where it waits; returns the status.
+static int32_t takeOutputs(pikort_pipeline &p, Kernel &kernel, bool serially) {
+  Cycle *cycle = p.cycleOf(p.stages[kernel.stage]);
+  if (cycle)
+    return guarded(&p, nameOf(p, kernel),
+                   [&] { cycle->absorb(kernel, serially); });
+  if (Strips *strips = p.stripsOf(p.stages[kernel.stage]))
+    strips->absorb(kernel);
+  return p.status.load();
 }
 
 static int32_t end(pikort_pipeline &p, Kernel &kernel) {
   int32_t status = p.settle();
   if (!kernel.open)
     return status;
-  if (kernel.source < 0)
-    for (auto &lane : kernel.lanes)
-      p.stageStats[kernel.stage].out += lane->emitted;
-  endLocals(p, kernel, status);
-  p.activeThreads = p.threads;
-  kernel.open = false;
-  kernel.stream = {};
-  kernel.input = {};
-  if (kernel.pendingOutputs == 0 || status != PIKORT_OK)
-    kernel.clear();
+  bool serially = std::exchange(kernel.runsSerially, false);
   KernelStats &stats = p.kernelStats[kernel.statsIndex];
-  stats.milliseconds += millisecondsSince(kernel.started);
   ++stats.launches;
-  Cycle *cycle = p.cycleOf(p.stages[kernel.stage]);
-  if (kernel.source >= 0 || status != PIKORT_OK)
+  kernel.open = false;
+  kernel.ended = p.profile.enter(serially ? Part::Cycle : Part::Join);
+  if (serially) {
+    kernel.serial->noteTicks(kernel.ended - kernel.begun);
+    if (status != PIKORT_OK)
+      kernel.clear();
+  } else {
+    endThreads(p, kernel, status);
+  }
+  p.activeThreads = p.threads;
+  if (kernel.source < 0 && status == PIKORT_OK)
+    status = takeOutputs(p, kernel, serially);
+  if (serially) {
+    stats.ticks += kernel.ended - kernel.begun;
     return status;
-  if (Strips *strips = p.stripsOf(p.stages[kernel.stage]); strips && !cycle)
-    strips->absorb(kernel);
-  if (!cycle)
-    return p.status.load();
-  return guarded(&p, "stage " + quoted(p.stages[kernel.stage].name),
-                 [&] { cycle->absorb(kernel); });
+  }
+  int64_t now = p.profile.enter(
+      p.cycleOf(p.stages[kernel.stage]) ? Part::Cycle : Part::Program);
+  stats.ticks += now - kernel.started;
+  stats.joinTicks += kernel.begun - kernel.started + now - kernel.ended;
+  return status;
 }
 
 /// The kernel of a stage or a source, or null and an error.
-static Kernel *find(pikort_pipeline *p, const auto &list, int32_t index,
+static Kernel *find(pikort_pipeline *p, auto &list, int32_t index,
                     const char *what) noexcept {
-  if (index >= 0 && index < static_cast<int32_t>(list.size()) &&
-      list[index].kernel)
-    return list[index].kernel.get();
+  if (static_cast<size_t>(index) < list.size())
+    if (Kernel *kernel = list[index].kernel.get()) [[likely]]
+      return kernel;
   guarded(p, "run", [&] {
     throw Failure{PIKORT_BAD_PROGRAM, std::string("expected the number of a ") +
                                           what + ", but got " +

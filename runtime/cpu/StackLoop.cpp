@@ -33,45 +33,53 @@ void StackLoop::push(const Waiting &waiting, const uint8_t *record,
 }
 
 /// Pushes an item in each of its cells, the last one first.
-void StackLoop::pushCells(int32_t stage, int64_t hops, const Stream &stream,
-                          int64_t item, const Array<uint32_t> &pairStarts) {
-  const uint8_t *record = stream.items + item * recordSize(p_.stages[stage]);
+void StackLoop::pushCells(int32_t stage, int64_t hops, const uint8_t *record,
+                          const uint32_t *cells, int64_t count) {
   if (!p_.stages[stage].placed())
     return push({-1, stage, hops, 0}, record, nullptr);
-  for (uint32_t k = pairStarts[item + 1]; k-- > pairStarts[item];)
-    if (uint32_t cell = stream.pairs[k]; cell != noCell) {
+  while (count-- > 0)
+    if (uint32_t cell = cells[count]; cell != noCell) {
       cell |= PIKOIR_FIRST_CELL;
       push({-1, stage, hops, 1}, record, &cell);
     }
 }
 
-Stream StackLoop::pop() {
+Items StackLoop::pop() {
   Waiting top = stack_[stack_.size() - 1];
   stack_.shrink(stack_.size() - 1);
-  Stream stream;
-  stream.count = 1;
-  stream.pairCount = top.cells;
-  int64_t size = recordSize(p_.stages[top.stage]);
-  records_.shrink(records_.size() - size);
+  records_.shrink(records_.size() - recordSize(p_.stages[top.stage]));
   cells_.shrink(cells_.size() - top.cells);
-  stream.items = records_.data() + records_.size();
-  stream.pairs = cells_.data() + cells_.size();
-  return stream;
+  return {records_.data() + records_.size(), 1, cells_.data() + cells_.size(),
+          top.cells};
 }
 
 /// The top of the stack leaves the loop.
 void StackLoop::leave() {
   const Edge &edge = p_.edges[stack_[stack_.size() - 1].edge];
-  Stream stream = pop();
+  Stream stream{pop(), {}, {}, {}, {}};
   if (edge.keyed) {
     stream.keys.width = edge.keyWidth;
-    stream.keys.words = Array<uint64_t>(p_.memory, edge.keyWidth);
+    stream.keys.words = std::move(key_);
+    if (stream.keys.words.capacity() < edge.keyWidth)
+      stream.keys.words = Array<uint64_t>(p_.memory, edge.keyWidth);
     writeKey(edge, stream.keys.words.data(), nextEntry_ - 1, left_++);
   }
   const Stage &to = p_.stages[edge.consumer];
   checkCount(to, edge.queue->count + 1);
   checkCount(to, edge.queue->pairs.size() + stream.pairCount);
   edge.queue->append(p_.memory, stream, recordSize(to), stream.keys.width);
+  if (edge.keyed)
+    key_ = std::move(stream.keys.words);
+}
+
+void StackLoop::pushEntry(const Entry &entry) {
+  const Stream &stream = entries_[entry.member];
+  int32_t stage = shape_.stages[entry.member];
+  const Array<uint32_t> &starts = starts_[entry.member];
+  int64_t begin = starts ? starts[entry.item] : 0;
+  int64_t end = starts ? starts[entry.item + 1] : 0;
+  pushCells(stage, 0, stream.items + entry.item * recordSize(p_.stages[stage]),
+            stream.pairs + begin, end - begin);
 }
 
 int32_t StackLoop::next() {
@@ -95,51 +103,56 @@ int32_t StackLoop::next() {
       return -1;
     }
     const Entry &entry = order_[nextEntry_++];
-    pushCells(shape_.stages[entry.member], 0, entries_[entry.member],
-              entry.item, starts_[entry.member]);
+    pushEntry(entry);
   }
 }
 
-Stream StackLoop::takeInput() {
-  Stream top = pop(), stream;
+Items StackLoop::serialInput() {
+  Items input = pop();
   int64_t size = recordSize(p_.stages[running_.stage]);
-  stream.count = 1;
-  stream.itemStorage = Array<uint8_t>(p_.memory, size);
-  std::memcpy(stream.itemStorage.data(), top.items, static_cast<size_t>(size));
-  stream.items = stream.itemStorage.data();
-  stream.pairCount = top.pairCount;
-  stream.pairStorage = Array<uint32_t>(p_.memory, 1);
-  std::copy_n(top.pairs, top.pairCount, stream.pairStorage.data());
-  stream.pairs = stream.pairStorage.data();
-  return stream;
+  input_.shrink(0); // in its own memory, a record is aligned
+  input_.append(p_.memory, input.items, size);
+  input.items = input_.data();
+  inputCell_ = input.pairCount > 0 ? *input.pairs : 0;
+  input.pairs = &inputCell_;
+  return input;
 }
 
 /// Pushes what the position emitted, the last one first.
-void StackLoop::absorb(std::vector<Port> &ports, Array<uint32_t> items) {
-  struct Place {
-    size_t port;
-    int64_t item;
+void StackLoop::absorb(const Serial &launch) {
+  tails_.clear();
+  const std::vector<int32_t> &outputs = p_.stages[running_.stage].outputs;
+  for (size_t port = 0; port < outputs.size(); ++port)
+    if (const Serial::Emitted &emitted = launch.ports()[port];
+        emitted.count > 0)
+      tails_.push_back(
+          {outputs[port], &emitted, emitted.count, emitted.pairCount});
+  auto number = [](const Tail &tail) {
+    return tail.emitted->numbers[tail.count - 1];
   };
-  std::vector<Place> order(static_cast<size_t>(items.size()));
-  std::vector<Array<uint32_t>> starts(ports.size());
-  for (size_t q = 0; q < ports.size(); ++q) {
-    if (p_.stages[p_.edges[ports[q].edge].consumer].placed())
-      starts[q] = pairStarts(p_.memory, ports[q].records.stream);
-    for (int64_t i = 0; i < ports[q].count(); ++i)
-      order[ports[q].numbers[i]] = {q, i};
+  while (!tails_.empty()) {
+    auto last = std::max_element(
+        tails_.begin(), tails_.end(),
+        [&](const Tail &a, const Tail &b) { return number(a) < number(b); });
+    pushLast(*last);
+    if (last->count == 0)
+      tails_.erase(last);
   }
-  for (size_t n = order.size(); n-- > 0;) {
-    auto [q, item] = order[n];
-    const Edge &edge = p_.edges[ports[q].edge];
-    const Stream &stream = ports[q].records.stream;
-    if (edge.insideLoop) {
-      pushCells(edge.consumer, running_.hops + 1, stream, item, starts[q]);
-      continue;
-    }
-    int64_t begin = starts[q] ? starts[q][item] : 0;
-    int64_t end = starts[q] ? starts[q][item + 1] : 0;
-    push({ports[q].edge, edge.consumer, 0, end - begin},
-         stream.items + item * recordSize(p_.stages[edge.consumer]),
-         stream.pairs + begin);
-  }
+}
+
+void StackLoop::pushLast(Tail &tail) {
+  const Edge &edge = p_.edges[tail.edge];
+  const Stage &to = p_.stages[edge.consumer];
+  const Items &emitted = *tail.emitted;
+  const uint8_t *record = emitted.items + --tail.count * recordSize(to);
+  int64_t end = tail.pairs;
+  if (to.placed())
+    while (!(emitted.pairs[--tail.pairs] & PIKOIR_FIRST_CELL))
+      ;
+  const uint32_t *cells = emitted.pairs + tail.pairs;
+  if (edge.insideLoop)
+    pushCells(edge.consumer, running_.hops + 1, record, cells,
+              end - tail.pairs);
+  else
+    push({tail.edge, edge.consumer, 0, end - tail.pairs}, record, cells);
 }

@@ -12,7 +12,11 @@ class StackLoop : public Loop {
 public:
   StackLoop(pikort_pipeline &p, const LoopShape &shape) : Loop(p, shape) {}
   int32_t next() override;
-  Stream takeInput() override;
+  bool runsSerially(Kernel &) const override { return true; }
+  Stream takeInput() override { return {}; } // no launch is another
+  Items serialInput() override;
+  void absorb(const Serial &launch) override;
+  void absorb(Kernel &) override {}
 
 private:
   /// An item in one of its cells, or, if it leaves the loop, in all. Its record
@@ -26,25 +30,36 @@ private:
   struct Entry {
     uint32_t member, item;
   };
+  /// What is left of what a port emitted; it is taken from the back.
+  struct Tail {
+    int32_t edge;
+    const Serial::Emitted *emitted;
+    int64_t count, pairs;
+  };
 
   void begin() override;
-  void absorb(std::vector<Port> &ports, Array<uint32_t> items) override;
   void push(const Waiting &waiting, const uint8_t *record,
             const uint32_t *cells);
-  void pushCells(int32_t stage, int64_t hops, const Stream &stream,
-                 int64_t item, const Array<uint32_t> &pairStarts);
+  void pushCells(int32_t stage, int64_t hops, const uint8_t *record,
+                 const uint32_t *cells, int64_t count);
   /// Takes the top of the stack.
-  Stream pop();
+  Items pop();
   void leave();
+  void pushEntry(const Entry &entry);
+  void pushLast(Tail &tail);
 
   Growing<Waiting> stack_;
   Growing<uint8_t> records_;
   Growing<uint32_t> cells_;
   Waiting running_{};
+  Growing<uint8_t> input_; ///< Its record.
+  uint32_t inputCell_ = 0;
+  std::vector<Tail> tails_;
   Array<Entry> order_;                  ///< Of all entries.
   std::vector<Array<uint32_t>> starts_; ///< Of the pairs of the entries.
   int64_t nextEntry_ = 0;
-  uint64_t left_ = 0; ///< Records that have left the loop.
+  Array<uint64_t> key_; ///< Of what leaves.
+  uint64_t left_ = 0;   ///< Records that have left the loop.
 };
 
 } // namespace piko::rt

@@ -8,7 +8,7 @@
 //
 //===----------------------------------------------------------------------===//
 
-#include "cpu/Kernel.h"
+#include "cpu/Serial.h"
 
 #include <algorithm>
 #include <cstring>
@@ -227,6 +227,13 @@ void pikoir_next(pikoir_writer *writer) {
     badCall(*laneOf(writer), BadCall::StillDeferring);
     pikoir_defer_end(writer);
   }
+  if (writer->flags & PIKOIR_PORT_SERIAL) {
+    Lane &lane = *laneOf(writer);
+    if (lane.slotEnd == lane.slotLimit) [[unlikely]]
+      return badCall(lane, BadCall::Next);
+    *lane.slotEnd++ = lane.ordinal;
+    return;
+  }
   writer->ordinal = 0;
   for (int32_t i = 0; i < writer->port_count; ++i) {
     pikoir_port &out = writer->ports[i];
@@ -256,6 +263,8 @@ static Lane *takeLane(Kernel &kernel) {
 }
 
 static pikoir_writer *openUnit(Kernel &kernel, int64_t unit) {
+  if (kernel.runsSerially)
+    return kernel.serial->open(unit);
   // There is a lane for each thread: waiting happens only if a program opens
   // units from more threads than the pipeline has.
   Lane *lane = takeLane(kernel);
@@ -264,6 +273,7 @@ static pikoir_writer *openUnit(Kernel &kernel, int64_t unit) {
     lane = takeLane(kernel);
   }
   lane->unit = unit;
+  lane->opened = ticks();
   lane->ordinal = 0;
   for (int32_t i = 0; i < lane->port_count; ++i) {
     pikoir_port &out = lane->ports[i];
@@ -294,6 +304,11 @@ void pikoir_close(pikoir_writer *writer) {
     pikoir_defer_end(writer);
   }
   pikoir_scratch_release(writer, 0);
+  if (lane->flags & PIKOIR_PORT_SERIAL) {
+    lane->slotEnd = std::fill_n(lane->slotEnd, lane->slotLimit - lane->slotEnd,
+                                lane->ordinal);
+    return;
+  }
   try {
     for (int32_t i = 0; i < lane->port_count; ++i) {
       pikoir_port &out = lane->ports[i];
@@ -312,6 +327,7 @@ void pikoir_close(pikoir_writer *writer) {
   } catch (...) { // no memory for the list of segments
     outOfMemory(*lane, sizeof(Segment));
   }
+  lane->busy += ticks() - lane->opened;
   std::lock_guard<std::mutex> lock(lane->kernel->laneMutex);
   lane->kernel->freeLanes.push_back(lane); // has room for all lanes
 }
@@ -368,6 +384,20 @@ static void preparePort(pikort_pipeline &p, const Kernel &kernel, Lane &lane,
   // No block yet and no room: the first record makes one.
   out.limit = logs.scratchRecord;
   out.cursor = logs.records.start = out.limit + 1;
+}
+
+Lane &piko::rt::prepareSerialLane(pikort_pipeline &p, Kernel &kernel) {
+  if (kernel.lanes.empty())
+    kernel.lanes.push_back(makeLane(p, kernel));
+  Lane &lane = *kernel.lanes.front();
+  kernel.counts.clear();
+  kernel.counts.resize(lane.logs.size()); // none are needed
+  lane.flags = PIKOIR_PORT_SERIAL;
+  for (size_t port = 0; port < lane.logs.size(); ++port) {
+    preparePort(p, kernel, lane, port);
+    lane.flags |= lane.ports[port].flags;
+  }
+  return lane;
 }
 
 void piko::rt::prepareLanes(pikort_pipeline &p, Kernel &kernel) {

@@ -3,6 +3,7 @@
 
 #include "Graph.h"
 
+#include <functional>
 #include <gtest/gtest.h>
 
 using namespace piko::rt::test;
@@ -104,6 +105,71 @@ TEST(Cycle, WaitsDecideTheOrder) {
   graph.stages[0].waits = {1};
   checkOrder(graph);
   EXPECT_NE(graph.arrivals[2].items, first[2].items);
+}
+
+/// How often the kernels of a graph's stages ran, and on several threads.
+static pikort_kernel_stats sumLaunches(pikort_pipeline *p) {
+  pikort_kernel_stats sum{};
+  for (int32_t k = 0; k < pikort_kernel_count(p); ++k) {
+    pikort_kernel_stats stats;
+    EXPECT_EQ(pikort_get_kernel_stats(p, k, &stats), PIKORT_OK);
+    sum.launches += stats.launches;
+    sum.parallel_launches += stats.parallel_launches;
+  }
+  return sum;
+}
+
+/// Runs a cycle of few primitives on many threads.
+static void runFew(std::vector<TestStage> stages) {
+  for (TestStage &stage : stages)
+    stage.mostEmissions = 1;
+  Graph graph = makeGraph(std::move(stages), {0}, 12);
+  graph.alwaysEmits = true;
+  graph.mostHops = 200;
+  checkOrder(graph);
+  graph.logs = false;
+  GraphRun run(graph);
+  ASSERT_EQ(run.run(7), PIKORT_OK) << pikort_message(run.get());
+  pikort_kernel_stats sum = sumLaunches(run.get());
+  EXPECT_GE(sum.launches, 200);
+  EXPECT_EQ(sum.parallel_launches, 0);
+}
+
+// What is in a wave is too little for threads, however many bins there are.
+TEST(Cycle, FewPrimitivesTakeNoThreads) {
+  runFew({whole({0})});
+  runFew({whole({1}), whole({0})});
+  runFew({whole({0}, PIKOIR_ORDERED)});
+  runFew({whole({1}), whole({0}, PIKOIR_LIST)});
+  runFew({whole({0}, PIKOIR_COLLECTS)});
+}
+
+// Many primitives do take them.
+TEST(Cycle, ManyPrimitivesTakeThreads) {
+  Graph graph = makeGraph({whole({0}, PIKOIR_SPLIT)}, {0}, 5000);
+  graph.alwaysEmits = true;
+  graph.stages[0].mostEmissions = 1;
+  GraphRun run(graph);
+  ASSERT_EQ(run.run(2), PIKORT_OK) << pikort_message(run.get());
+  pikort_kernel_stats sum = sumLaunches(run.get());
+  EXPECT_EQ(sum.launches, graph.mostHops + 1);
+  EXPECT_EQ(sum.parallel_launches, sum.launches);
+}
+
+// Bins without primitives cost nothing: a launch that shows them all to the
+// kernel has many units, one that does not has few.
+TEST(Cycle, FewPrimitivesInManyBins) {
+  TestStage stage = binned({0, 1});
+  stage.bin[0] = stage.bin[1] = 1;
+  TestStage list = stage;
+  list.flags |= PIKOIR_LIST;
+  list.ports = {0, 1, 1};
+  for (TestStage &loop : {std::ref(stage), std::ref(list)}) {
+    Graph graph = makeGraph({loop, binned({})}, {0}, 9);
+    graph.domain[0] = graph.domain[1] = 300;
+    graph.mostHops = 40;
+    checkOrder(graph);
+  }
 }
 
 // --- Errors -----------------------------------------------------------------

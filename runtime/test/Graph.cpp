@@ -510,21 +510,30 @@ static void runUnit(pikort_pipeline *p, int stage, const pikoir_input *in,
 static void note(int stage, const pikoir_input *in) {
   Arrivals &log = current->arrivals[stage];
   auto *items = reinterpret_cast<const Item *>(in->items);
-  int64_t cells = current->cells(stage);
   EXPECT_EQ(in->tiles, current->tiles(stage));
-  EXPECT_EQ(in->offsets[0], 0);
-  EXPECT_EQ(in->offsets[cells], in->count);
   int64_t itemCount = 0;
   std::set<int64_t> seen;
-  for (int64_t c = 0; c < cells; ++c)
-    for (int64_t i = in->offsets[c]; i < in->offsets[c + 1]; ++i) {
-      int64_t item = in->order ? in->order[i] : i;
-      itemCount = std::max(itemCount, item + 1);
-      seen.insert(item);
-      log.cells[static_cast<size_t>(c)].push_back(items[item].id);
-      static const char zeros[7] = {};
-      current->paddingSeen |=
-          std::memcmp(&items[item].hops + 1, zeros, sizeof(zeros)) != 0;
+  auto noteCells = [&](int64_t begin, int64_t end) {
+    for (int64_t c = begin; c < end; ++c)
+      for (int64_t i = in->offsets[c]; i < in->offsets[c + 1]; ++i) {
+        int64_t item = in->order ? in->order[i] : i;
+        itemCount = std::max(itemCount, item + 1);
+        seen.insert(item);
+        log.cells[static_cast<size_t>(c)].push_back(items[item].id);
+        static const char zeros[7] = {};
+        current->paddingSeen |=
+            std::memcmp(&items[item].hops + 1, zeros, sizeof(zeros)) != 0;
+      }
+  };
+  int64_t cell = 0; // up to which cells are noted; several units may share one
+  for (int64_t u = 0; u < in->unit_count && !in->calls; ++u) {
+    noteCells(std::max(cell, in->units[u].cell_begin), in->units[u].cell_end);
+    cell = in->units[u].cell_end;
+  }
+  for (int64_t c = 0; c < in->call_count; ++c)
+    if (c == 0 || in->calls[c].bin != in->calls[c - 1].bin) {
+      int64_t tiles = in->tiles, bin = in->calls[c].bin;
+      noteCells(bin * tiles, (bin + 1) * tiles);
     }
   for (int64_t item : seen)
     log.items.push_back(items[item].id);

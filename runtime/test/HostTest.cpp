@@ -4,6 +4,7 @@
 #include "pikort/abi.h"
 #include "pikort/pikort.hpp"
 
+#include <chrono>
 #include <cstring>
 #include <gtest/gtest.h>
 #include <string>
@@ -319,6 +320,34 @@ TEST_F(Host, Reflection) {
   pikort_source_info source;
   ASSERT_EQ(pikort_get_source_info(p, 0, &source), PIKORT_OK);
   EXPECT_EQ(source.count, -1);
+}
+
+// The parts of a run's time sum to what the host sees of it.
+TEST_F(Host, TimeStatistics) {
+  bindAll();
+  pikort_pipeline *p = pipe.get();
+  auto start = std::chrono::steady_clock::now();
+  while (std::chrono::steady_clock::now() - start <
+         std::chrono::milliseconds(200))
+    ASSERT_TRUE(pipe.run());
+  double seen = std::chrono::duration<double, std::milli>(
+                    std::chrono::steady_clock::now() - start)
+                    .count();
+  pikort_time_stats time;
+  ASSERT_EQ(pikort_get_time_stats(p, &time), PIKORT_OK);
+  double sum = 0;
+  for (double part : {time.kernels, time.waiting, time.joins, time.cycles,
+                      time.clears, time.allocation, time.program}) {
+    EXPECT_GE(part, 0);
+    sum += part;
+  }
+  EXPECT_LE(sum, 1.02 * seen);
+  EXPECT_GE(sum, 0.5 * seen); // short runs: the host's own time counts
+  EXPECT_EQ(time.cycles, 0);
+  pikort_reset_stats(p);
+  ASSERT_EQ(pikort_get_time_stats(p, &time), PIKORT_OK);
+  EXPECT_EQ(time.kernels + time.joins + time.program, 0);
+  EXPECT_EQ(pikort_get_time_stats(p, nullptr), PIKORT_INVALID_ARGUMENT);
 }
 
 TEST_F(Host, Statistics) {

@@ -17,11 +17,14 @@ std::vector<JsonObject> reportKernels(pikort_pipeline *pipeline, double runs) {
     pikort_kernel_stats stats;
     if (pikort_get_kernel_stats(pipeline, i, &stats) != PIKORT_OK)
       continue;
-    kernels.push_back(JsonObject()
-                          .add("name", stats.name)
-                          .add("ms", stats.milliseconds / runs)
-                          .add("join_ms", stats.join_milliseconds / runs)
-                          .add("launches", double(stats.launches) / runs));
+    kernels.push_back(
+        JsonObject()
+            .add("name", stats.name)
+            .add("ms", stats.milliseconds / runs)
+            .add("join_ms", stats.join_milliseconds / runs)
+            .add("wait_ms", stats.wait_milliseconds / runs)
+            .add("launches", double(stats.launches) / runs)
+            .add("parallel_launches", double(stats.parallel_launches) / runs));
   }
   return kernels;
 }
@@ -39,6 +42,20 @@ std::vector<JsonObject> reportStages(pikort_pipeline *pipeline, double runs) {
                          .add("out", double(stats.out) / runs));
   }
   return stages;
+}
+
+/// The parts of a mean frame, which sum to ms_mean.
+JsonObject reportTime(pikort_pipeline *pipeline, double runs) {
+  pikort_time_stats stats{};
+  pikort_get_time_stats(pipeline, &stats);
+  return JsonObject()
+      .add("kernels_ms", stats.kernels / runs)
+      .add("waiting_ms", stats.waiting / runs)
+      .add("joins_ms", stats.joins / runs)
+      .add("cycles_ms", stats.cycles / runs)
+      .add("clears_ms", stats.clears / runs)
+      .add("allocation_ms", stats.allocation / runs)
+      .add("program_ms", stats.program / runs);
 }
 
 JsonObject reportCounts(const std::vector<Count> &counts) {
@@ -71,6 +88,7 @@ JsonObject render::makeReport(const Options &options, const RunResult &result,
       .add("ms_median", result.times.median)
       .add("ms_min", result.times.min)
       .add("ms_max", result.times.max)
+      .add("ms_mean", result.times.mean)
       .add("threads", result.threads)
       .add("mode", name + (isReference ? "+reference" : ""))
       .add("pixels", result.pixels)
@@ -85,6 +103,7 @@ JsonObject render::makeReport(const Options &options, const RunResult &result,
       .add("counters", reportCounts(result.counts));
   if (!isReference) // the runtime does not see inside of it
     report.add("peak_bin_bytes", pikort_peak_bytes(pipeline))
+        .add("time", reportTime(pipeline, runs))
         .add("kernels", reportKernels(pipeline, runs))
         .add("stages", reportStages(pipeline, runs));
   return report;

@@ -14,7 +14,7 @@ namespace piko::render {
 
 /// Times of frames in milliseconds.
 struct FrameTimes {
-  double median, min, max;
+  double median, min, max, mean;
   int count;
 };
 

@@ -92,7 +92,7 @@ Result<FrameTimes> timeFrames(const Options &options,
   }
   std::sort(times.begin(), times.end());
   return FrameTimes{times[times.size() / 2], times.front(), times.back(),
-                    int(times.size())};
+                    spent / double(times.size()), int(times.size())};
 }
 
 Result<std::span<const scene::Color>> readImage(pikort_pipeline *pipeline,

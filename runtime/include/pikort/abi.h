@@ -205,7 +205,8 @@ enum pikoir_port_flags {
   PIKOIR_PORT_COUNTS = 2,   ///< Each position notes its number of records.
   PIKOIR_PORT_SOURCE = 4,   ///< Cells of a source's primitives, no records.
   PIKOIR_PORT_DEFERRED = 8, ///< Between pikoir_defer_begin and _end.
-  PIKOIR_PORT_LOCAL = 16    ///< Its edge is local.
+  PIKOIR_PORT_LOCAL = 16,   ///< Its edge is local.
+  PIKOIR_PORT_SERIAL = 32   ///< Of a writer: its launch is serial.
 };
 
 typedef struct pikoir_writer {

@@ -227,9 +227,23 @@ PIKORT_API int32_t pikort_get_source_info(pikort_pipeline *pipeline,
 typedef struct pikort_kernel_stats {
   const char *name;
   double milliseconds;      ///< From begin to end.
-  double join_milliseconds; ///< Of these, ordering and binning its input.
+  double join_milliseconds; ///< Of these, ordering and binning.
+  double wait_milliseconds; ///< Of these, threads without work, on average.
   int64_t launches;
+  int64_t parallel_launches; ///< Of these, on several threads.
 } pikort_kernel_stats;
+
+/// Where the time of runs went, in milliseconds since the latest reset, as the
+/// thread sees it that called pikort_run. The parts sum to the runs' time.
+typedef struct pikort_time_stats {
+  double kernels;    ///< Units of work.
+  double waiting;    ///< Threads of a kernel without work, on average.
+  double joins;      ///< Ordering and binning what kernels take.
+  double cycles;     ///< The same in cycles, and what runs next.
+  double clears;     ///< Allocating and clearing images and buffers.
+  double allocation; ///< Mapping memory, in whatever part.
+  double program;    ///< All else: the program between kernels, strips.
+} pikort_time_stats;
 
 /// A stage's primitives. Sums since the latest reset.
 typedef struct pikort_stage_stats {
@@ -244,6 +258,8 @@ PIKORT_API int32_t pikort_kernel_count(const pikort_pipeline *pipeline);
 PIKORT_API int32_t pikort_get_kernel_stats(pikort_pipeline *pipeline,
                                            int32_t index,
                                            pikort_kernel_stats *stats);
+PIKORT_API int32_t pikort_get_time_stats(pikort_pipeline *pipeline,
+                                         pikort_time_stats *stats);
 PIKORT_API int32_t pikort_get_stage_stats(pikort_pipeline *pipeline,
                                           int32_t stage,
                                           pikort_stage_stats *stats);

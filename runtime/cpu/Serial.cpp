@@ -1,0 +1,242 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//===- Serial.cpp - Launches that are too small for threads ---------------===//
+
+#include "cpu/Serial.h"
+
+#include <algorithm>
+#include <span>
+
+using namespace piko::rt;
+
+// --- Few pairs in many cells ------------------------------------------------
+
+void PairOrder::sort(const Items &input) {
+  entries_.clear();
+  items_.clear();
+  sorted_ = true;
+  uint32_t item = UINT32_MAX;
+  uint64_t last = 0;
+  bool several = !input.onePairEach();
+  for (int64_t k = 0; k < input.pairCount; ++k) {
+    uint32_t pair = input.pairs[k];
+    if (several) {
+      item += pair >> 31;
+      items_.push_back(item);
+    }
+    if (pair == noCell)
+      continue;
+    uint64_t entry =
+        uint64_t(pair & ~PIKOIR_FIRST_CELL) << 32 | static_cast<uint32_t>(k);
+    sorted_ &= entry > last || entries_.empty();
+    last = entry;
+    entries_.push_back(entry);
+  }
+  if (!sorted_)
+    std::sort(entries_.begin(), entries_.end());
+}
+
+bool PairOrder::isSorted(const Items &input) {
+  uint32_t last = 0;
+  for (int64_t k = 0; k < input.pairCount; ++k) {
+    uint32_t pair = input.pairs[k];
+    uint32_t cell = pair == noCell ? last : pair & ~PIKOIR_FIRST_CELL;
+    if (cell < last)
+      return false;
+    last = cell;
+  }
+  return true;
+}
+
+void piko::rt::cutRuns(const std::vector<uint64_t> &entries, int64_t *offsets,
+                       std::vector<pikoir_unit> &runs) {
+  // To pass by a cell takes less than to open another unit.
+  constexpr int64_t near = 16;
+  auto count = static_cast<int64_t>(entries.size());
+  for (int64_t i = 0; i < count; ++i) {
+    int64_t cell = PairOrder::cellOf(entries[static_cast<size_t>(i)]);
+    int64_t end = runs.empty() ? -near : runs.back().cell_end;
+    if (cell >= end + near)
+      runs.push_back({cell, cell, i, i});
+    pikoir_unit &run = runs.back();
+    for (; run.cell_end <= cell; ++run.cell_end)
+      offsets[run.cell_end] = i;
+    offsets[run.cell_end] = run.end = i + 1;
+  }
+}
+
+// --- The launch -------------------------------------------------------------
+
+Serial::Serial(pikort_pipeline &p, Kernel &kernel)
+    : p_(p), kernel_(kernel), stage_(p.stages[kernel.stage]),
+      lane_(prepareSerialLane(p, kernel)), offsets_(p.memory, stage_.cells + 1),
+      ports_(stage_.outputs.size()), pieces_(stage_.outputs.size()) {}
+
+bool Serial::takes(const pikort_pipeline &p, Kernel &kernel, int64_t count) {
+  constexpr double worthThreads = 0.1; // milliseconds
+  if (count > most)
+    return false;
+  if (count <= fewest || p.threads == 1 ||
+      kernel.positionTicks * static_cast<double>(count) <=
+          worthThreads * p.ticksPerMillisecond)
+    return true;
+  // It may have become less: try again some day.
+  kernel.positionTicks *= 31.0 / 32;
+  return false;
+}
+
+void Serial::noteTicks(int64_t ticks) {
+  if (kernel_.positions <= fewest)
+    return;
+  double now =
+      static_cast<double>(ticks) / static_cast<double>(kernel_.positions);
+  double &mean = kernel_.positionTicks;
+  // An interrupt is not the kernel's time.
+  mean = mean == 0 ? now : mean + (std::min(now, 4 * mean) - mean) / 8;
+}
+
+void Serial::begin(const Items &input) {
+  for (size_t port = 0; port < ports_.size(); ++port)
+    if (lane_.portStorage[port].emitted > 0)
+      rewind(port);
+  kernel_.units.clear();
+  order_.clear();
+  calls_.clear();
+  if (stage_.placed()) {
+    binPairs(input);
+  } else {
+    kernel_.positions = input.count;
+    offsets_[0] = 0;
+    offsets_[1] = input.count;
+    if (input.count > 0)
+      kernel_.units.push_back({0, 1, 0, input.count});
+  }
+  if (stage_.takesList())
+    makeCalls();
+  slotEnds_.resize(static_cast<size_t>(slots()));
+  lane_.slotEnd = slotEnds_.data();
+  lane_.ordinal = 0;
+  kernel_.input = {input.items,
+                   kernel_.positions,
+                   order_.empty() ? nullptr : order_.data(),
+                   offsets_.data(),
+                   kernel_.units.data(),
+                   static_cast<int64_t>(kernel_.units.size()),
+                   stage_.tiles,
+                   stage_.takesList() ? calls_.data() : nullptr,
+                   static_cast<int64_t>(calls_.size())};
+}
+
+void Serial::binPairs(const Items &input) {
+  pairs_.sort(input);
+  const std::vector<uint64_t> &entries = pairs_.entries();
+  kernel_.positions = static_cast<int64_t>(entries.size());
+  bool identity = pairs_.wasSorted() && input.onePairEach() &&
+                  kernel_.positions == input.count;
+  for (size_t i = 0; i < entries.size() && !identity; ++i)
+    order_.push_back(pairs_.itemOf(PairOrder::pairOf(entries[i])));
+  cutRuns(entries, offsets_.data(), kernel_.units);
+}
+
+/// One unit of all calls takes the place of runs of cells.
+void Serial::makeCalls() {
+  for (const pikoir_unit &run : kernel_.units)
+    for (int64_t cell = run.cell_begin; cell < run.cell_end; ++cell) {
+      int64_t batch = stage_.scheduleOf(cell).batch;
+      int64_t end = offsets_[cell + 1];
+      for (int64_t i = offsets_[cell]; i < end;) {
+        int64_t next = batch > 0 ? std::min(i + batch, end) : end;
+        calls_.push_back({cell, i, next});
+        i = next;
+      }
+    }
+  kernel_.units.clear();
+  if (!calls_.empty())
+    kernel_.units.push_back(
+        {0, static_cast<int64_t>(calls_.size()), 0, kernel_.positions});
+}
+
+int64_t Serial::slots() const {
+  return stage_.takesList() ? static_cast<int64_t>(calls_.size())
+                            : kernel_.positions;
+}
+
+pikoir_writer *Serial::open(int64_t unit) {
+  const pikoir_unit &opened = kernel_.units[static_cast<size_t>(unit)];
+  lane_.unit = unit;
+  lane_.slotLimit =
+      slotEnds_.data() + (stage_.takesList() ? opened.cell_end : opened.end);
+  for (pikoir_port &port : lane_.portStorage)
+    port.last_cell = INT64_MAX;
+  return &lane_;
+}
+
+// --- What it emitted --------------------------------------------------------
+
+/// The latest block of a log, which is the largest, serves again.
+static uint8_t *rewindLog(Log &log) {
+  if (log.blocks.size() > 1)
+    log.blocks.erase(log.blocks.begin(), log.blocks.end() - 1);
+  log.segments.clear();
+  return log.start = log.blocks.front().data();
+}
+
+void Serial::rewind(size_t port) {
+  PortLogs &logs = lane_.logs[port];
+  pikoir_port &out = lane_.portStorage[port];
+  auto words = [](const Log &log) { return log.blocks.front().capacity() / 4; };
+  if (!logs.records.blocks.empty()) {
+    out.cursor = rewindLog(logs.records);
+    out.limit = out.cursor + logs.records.blocks.front().capacity() - out.size;
+  }
+  if (!logs.cells.blocks.empty()) {
+    out.cell_cursor = reinterpret_cast<uint32_t *>(rewindLog(logs.cells));
+    out.cell_end = out.cell_cursor + words(logs.cells);
+  }
+  if (!logs.ordinals.blocks.empty()) {
+    out.ordinal_cursor = reinterpret_cast<uint32_t *>(rewindLog(logs.ordinals));
+    out.ordinal_end = out.ordinal_cursor + words(logs.ordinals);
+  }
+  out.emitted = out.kept = 0;
+}
+
+/// What a log holds up to its cursor, in one piece.
+static std::span<const uint8_t> join(Memory &memory, const Log &log,
+                                     const void *cursor,
+                                     Growing<uint8_t> &piece) {
+  int64_t last = static_cast<const uint8_t *>(cursor) - log.start;
+  if (log.segments.empty()) [[likely]]
+    return {log.start, static_cast<size_t>(last)};
+  piece.shrink(0);
+  for (const Segment &segment : log.segments)
+    piece.append(memory, segment.data, segment.bytes);
+  piece.append(memory, log.start, last);
+  return {piece.data(), static_cast<size_t>(piece.size())};
+}
+
+void Serial::collect(size_t port) {
+  const PortLogs &logs = lane_.logs[port];
+  const pikoir_port &out = lane_.portStorage[port];
+  Pieces &pieces = pieces_[port];
+  Emitted &emitted = ports_[port];
+  emitted.count = out.cells != 0 ? out.kept : out.emitted;
+  emitted.items =
+      join(p_.memory, logs.records, out.cursor, pieces.records).data();
+  auto cells = join(p_.memory, logs.cells, out.cell_cursor, pieces.cells);
+  emitted.pairs = reinterpret_cast<const uint32_t *>(cells.data());
+  emitted.pairCount = static_cast<int64_t>(cells.size()) / 4;
+  emitted.numbers = reinterpret_cast<const uint32_t *>(
+      join(p_.memory, logs.ordinals, out.ordinal_cursor, pieces.ordinals)
+          .data());
+}
+
+void Serial::end() {
+  StageStats &stats = p_.stageStats[kernel_.stage];
+  for (size_t port = 0; port < ports_.size(); ++port) {
+    int64_t emitted = lane_.portStorage[port].emitted;
+    stats.out += emitted;
+    if (emitted > 0 && stage_.outputs[port] >= 0)
+      collect(port);
+    else
+      ports_[port] = {};
+  }
+}
