@@ -224,7 +224,10 @@ def ConvertPikoToLLVM : Pass<"convert-piko-to-llvm", "::mlir::ModuleOp"> {
     and gives back a status, of each pipeline two more, `NAME.setup` that
     declares the pipeline to the runtime and `NAME.run` that calls the kernels in
     order; turns primitives, bins and writers into pointers, and operations on
-    them into loads, stores and calls of the runtime's `pikoir_*` functions.
+    them into loads, stores and calls of the runtime's `pikoir_*` functions. Each
+    load, store and call says in TBAA what it touches, of state and of
+    primitives each field by itself, so that LLVM keeps in registers what it
+    does not.
     The units of a kernel on a cycle become calls of a function, `KERNEL.unit`,
     without a parallel region where there is one thread for them.
 
@@ -237,7 +240,7 @@ def ConvertPikoToLLVM : Pass<"convert-piko-to-llvm", "::mlir::ModuleOp"> {
     After:
     ```
     %p = llvm.getelementptr inbounds %f[8] : (!llvm.ptr) -> !llvm.ptr, i8
-    %z = llvm.load %p {alignment = 4 : i64} : !llvm.ptr -> f32
+    %z = llvm.load %p {tbaa = [#field_z]} : !llvm.ptr -> f32
     ```
 
     **Limits**: other dialects are left as they are; upstream's conversions take

@@ -31,10 +31,11 @@ template <typename OpT> struct Lowering : OpConversionPattern<OpT> {
   static Type pointer(OpBuilder &builder) {
     return LLVM::LLVMPointerType::get(builder.getContext());
   }
-  static Value loadI64(OpBuilder &builder, Location loc, Value base,
-                       int64_t offset) {
-    return LLVM::LoadOp::create(builder, loc, builder.getI64Type(),
-                                createOffset(builder, loc, base, offset));
+  Value loadI64(OpBuilder &builder, Location loc, Value base,
+                int64_t offset) const {
+    return createLoad(builder, loc, builder.getI64Type(),
+                      createOffset(builder, loc, base, offset),
+                      context.tags.input());
   }
   /// A member of the pikoir_input.
   Value number(OpBuilder &builder, Value bins, int64_t offset) const {
@@ -229,9 +230,9 @@ template <typename OpT> struct PositionLowering : Lowering<OpT> {
     auto choice = scf::IfOp::create(
         rewriter, loc, ordered,
         [&](OpBuilder &builder, Location loc) {
-          Value item =
-              LLVM::LoadOp::create(builder, loc, builder.getI32Type(),
-                                   entry(builder, loc, order, position, 4));
+          Value item = createLoad(builder, loc, builder.getI32Type(),
+                                  entry(builder, loc, order, position, 4),
+                                  this->context.tags.input());
           Value wide =
               arith::ExtUIOp::create(builder, loc, builder.getI64Type(), item);
           scf::YieldOp::create(builder, loc, wide);
@@ -492,10 +493,14 @@ struct AppendLowering : Lowering<AppendOp> {
     RecordOp record = context.record(op.getPrim().getType().getRecord());
     Value room =
         createAppend(rewriter, loc, context, adaptor.getWriter(), op.getPort());
-    for (auto [value, offset] :
-         llvm::zip(adaptor.getValues(), record.getElementOffsets()))
-      LLVM::StoreOp::create(rewriter, loc, value,
-                            createOffset(rewriter, loc, room, offset));
+    SmallVector<ArrayAttr> tags; // of each number
+    for (auto field : record.getFields().getAsRange<FieldAttr>())
+      tags.append(field.getElementCount(),
+                  context.tags.primitive(record.getSymName(), field.getName()));
+    for (auto [value, offset, tag] :
+         llvm::zip(adaptor.getValues(), record.getElementOffsets(), tags))
+      createStore(rewriter, loc, value,
+                  createOffset(rewriter, loc, room, offset), tag);
     rewriter.replaceOp(op, room);
     return success();
   }
@@ -558,8 +563,10 @@ struct GetLowering : Lowering<GetOp> {
     Value address = createFieldAddress(rewriter, loc, adaptor.getPrim(),
                                        record.getField(op.getField()),
                                        adaptor.getElements());
-    rewriter.replaceOpWithNewOp<LLVM::LoadOp>(op, op.getResult().getType(),
-                                              address);
+    rewriter.replaceOp(
+        op,
+        createLoad(rewriter, loc, op.getResult().getType(), address,
+                   context.tags.primitive(record.getSymName(), op.getField())));
     return success();
   }
 };

@@ -131,8 +131,9 @@ Value LoweringContext::member(OpBuilder &builder, Value bins, int64_t offset,
   OpBuilder::InsertionGuard guard(builder);
   builder.setInsertionPointAfterValue(bins);
   Location loc = bins.getLoc();
-  return known = LLVM::LoadOp::create(builder, loc, type,
-                                      createOffset(builder, loc, bins, offset));
+  return known =
+             createLoad(builder, loc, type,
+                        createOffset(builder, loc, bins, offset), tags.input());
 }
 
 /// Whether a function of the runtime is hardly ever called, though there is a
@@ -157,7 +158,10 @@ LLVM::CallOp LoweringContext::call(OpBuilder &builder, Location loc,
       callee.setPassthroughAttr(
           builder.getArrayAttr(builder.getStringAttr("cold")));
   }
-  return LLVM::CallOp::create(builder, loc, callee, arguments);
+  auto call = LLVM::CallOp::create(builder, loc, callee, arguments);
+  if (ArrayAttr tag = tags.call(function))
+    call.setTbaaAttr(tag);
+  return call;
 }
 
 StringRef LoweringContext::zeros(int64_t bytes) {
@@ -193,6 +197,18 @@ Value LoweringContext::text(OpBuilder &builder, Location loc, StringRef text) {
         builder.getStringAttr(bytes));
   }
   return LLVM::AddressOfOp::create(builder, loc, global);
+}
+
+Value piko::createLoad(OpBuilder &builder, Location loc, Type type,
+                       Value address, ArrayAttr tag) {
+  auto load = LLVM::LoadOp::create(builder, loc, type, address);
+  load.setTbaaAttr(tag);
+  return load;
+}
+
+void piko::createStore(OpBuilder &builder, Location loc, Value value,
+                       Value address, ArrayAttr tag) {
+  LLVM::StoreOp::create(builder, loc, value, address).setTbaaAttr(tag);
 }
 
 Value piko::createI32(OpBuilder &builder, Location loc, int64_t v) {

@@ -7,6 +7,7 @@
 #ifndef PIKO_LIB_CONVERSION_PIKOTOLLVM_LOWERINGCONTEXT_H
 #define PIKO_LIB_CONVERSION_PIKOTOLLVM_LOWERINGCONTEXT_H
 
+#include "AliasTags.h"
 #include "Piko/Conversion/Passes.h"
 
 #include "mlir/Transforms/DialectConversion.h"
@@ -34,7 +35,8 @@ struct StateView {
 
 class LoweringContext {
 public:
-  explicit LoweringContext(mlir::ModuleOp module) : module(module) {}
+  explicit LoweringContext(mlir::ModuleOp module)
+      : tags(module.getContext()), module(module) {}
 
   /// Makes a function of a kernel: pipeline in, status out. The function's body
   /// is the kernel's.
@@ -74,6 +76,8 @@ public:
   mlir::Value text(mlir::OpBuilder &builder, mlir::Location loc,
                    mlir::StringRef text);
 
+  const AliasTags tags;
+
 private:
   mlir::ModuleOp module;
   llvm::StringMap<mlir::LLVM::GlobalOp> texts;
@@ -84,6 +88,12 @@ private:
   llvm::DenseMap<std::pair<mlir::Value, int64_t>, mlir::Value> members;
 };
 
+/// A load or a store with a tag that says what it touches.
+mlir::Value createLoad(mlir::OpBuilder &builder, mlir::Location loc,
+                       mlir::Type type, mlir::Value address,
+                       mlir::ArrayAttr tag);
+void createStore(mlir::OpBuilder &builder, mlir::Location loc,
+                 mlir::Value value, mlir::Value address, mlir::ArrayAttr tag);
 /// Constants and casts.
 mlir::Value createI32(mlir::OpBuilder &builder, mlir::Location loc, int64_t v);
 mlir::Value createI64(mlir::OpBuilder &builder, mlir::Location loc, int64_t v);

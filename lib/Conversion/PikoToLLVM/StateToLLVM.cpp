@@ -50,6 +50,11 @@ template <typename OpT> struct StateLowering : OpConversionPattern<OpT> {
                               adaptor.getElements());
   }
 
+  ArrayAttr tag(OpT op) const {
+    bool isConstant = isa<ConstantOp>(context.state(op, op.getState()));
+    return context.tags.state(op.getState(), op.getField(), isConstant);
+  }
+
   LoweringContext &context;
 };
 
@@ -58,8 +63,9 @@ struct LoadLowering : StateLowering<LoadOp> {
   LogicalResult
   matchAndRewrite(LoadOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
-    rewriter.replaceOpWithNewOp<LLVM::LoadOp>(op, op.getResult().getType(),
-                                              address(rewriter, op, adaptor));
+    rewriter.replaceOp(op, createLoad(rewriter, op.getLoc(),
+                                      op.getResult().getType(),
+                                      address(rewriter, op, adaptor), tag(op)));
     return success();
   }
 };
@@ -69,8 +75,9 @@ struct StoreLowering : StateLowering<StoreOp> {
   LogicalResult
   matchAndRewrite(StoreOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
-    rewriter.replaceOpWithNewOp<LLVM::StoreOp>(op, adaptor.getValue(),
-                                               address(rewriter, op, adaptor));
+    createStore(rewriter, op.getLoc(), adaptor.getValue(),
+                address(rewriter, op, adaptor), tag(op));
+    rewriter.eraseOp(op);
     return success();
   }
 };
@@ -106,10 +113,11 @@ struct AtomicLowering : StateLowering<AtomicOp> {
                   ConversionPatternRewriter &rewriter) const override {
     // The value says nothing of what others have written: monotonic is enough,
     // and the end of the kernel orders it before those that follow.
-    Value old = LLVM::AtomicRMWOp::create(
+    auto old = LLVM::AtomicRMWOp::create(
         rewriter, op.getLoc(), toLLVM(op.getKind()),
         address(rewriter, op, adaptor), adaptor.getValue(),
         LLVM::AtomicOrdering::monotonic);
+    old.setTbaaAttr(tag(op));
     if (op.getOld())
       rewriter.replaceOp(op, old);
     else

@@ -24,20 +24,20 @@ namespace {
 /// Writes loads and stores of a struct's members, and conditions on them.
 class MemberBuilder {
 public:
-  MemberBuilder(OpBuilder &builder, Location loc, Value base)
-      : builder(builder), loc(loc), base(base) {}
+  MemberBuilder(OpBuilder &builder, Location loc, Value base, ArrayAttr tag)
+      : builder(builder), loc(loc), base(base), tag(tag) {}
 
   Type pointer() { return LLVM::LLVMPointerType::get(builder.getContext()); }
   Type i64() { return builder.getI64Type(); }
   Type i32() { return builder.getI32Type(); }
 
   Value load(int64_t member, Type type) {
-    return LLVM::LoadOp::create(builder, loc, type,
-                                createOffset(builder, loc, base, member));
+    return createLoad(builder, loc, type,
+                      createOffset(builder, loc, base, member), tag);
   }
   void store(Value value, int64_t member) {
-    LLVM::StoreOp::create(builder, loc, value,
-                          createOffset(builder, loc, base, member));
+    createStore(builder, loc, value, createOffset(builder, loc, base, member),
+                tag);
   }
   void increment(int64_t member) {
     Value one = createI64(builder, loc, 1);
@@ -63,21 +63,24 @@ public:
   OpBuilder &builder;
   Location loc;
   Value base;
+  ArrayAttr tag; // of what a writer holds
 };
 
 } // namespace
 
-static MemberBuilder openPort(OpBuilder &builder, Location loc, Value writer,
+static MemberBuilder openPort(OpBuilder &builder, Location loc,
+                              LoweringContext &context, Value writer,
                               int64_t port) {
-  MemberBuilder members(builder, loc, writer);
+  MemberBuilder members(builder, loc, writer, context.tags.writer());
   Value ports = members.load(layout::ports, members.pointer());
   return {builder, loc,
-          createOffset(builder, loc, ports, port * layout::portSize)};
+          createOffset(builder, loc, ports, port * layout::portSize),
+          members.tag};
 }
 
 Value piko::createAppend(OpBuilder &builder, Location loc,
                          LoweringContext &context, Value writer, int64_t port) {
-  MemberBuilder out = openPort(builder, loc, writer, port);
+  MemberBuilder out = openPort(builder, loc, context, writer, port);
   Value record = out.load(layout::cursor, out.pointer());
   Value full = out.comparePointers(LLVM::ICmpPredicate::ugt, record,
                                    out.load(layout::limit, out.pointer()));
@@ -125,7 +128,7 @@ static void callPlaceIf(Value isSlow, OpBuilder &builder, Location loc,
 void piko::createLocalPlace(OpBuilder &builder, Location loc,
                             LoweringContext &context, Value writer,
                             int64_t port, Value cell) {
-  MemberBuilder out = openPort(builder, loc, writer, port);
+  MemberBuilder out = openPort(builder, loc, context, writer, port);
   Value zero = createI64(builder, loc, 0);
   Value last = out.load(layout::lastCell, out.i64());
   Value isSlow =
@@ -144,7 +147,7 @@ void piko::createLocalPlace(OpBuilder &builder, Location loc,
 void piko::createPlace(OpBuilder &builder, Location loc,
                        LoweringContext &context, Value writer, int64_t port,
                        Value cell) {
-  MemberBuilder out = openPort(builder, loc, writer, port);
+  MemberBuilder out = openPort(builder, loc, context, writer, port);
   Value last = out.load(layout::lastCell, out.i64());
   Value place = out.load(layout::cellCursor, out.pointer());
   Value isSlow = out.either(
@@ -172,14 +175,14 @@ void piko::createPlace(OpBuilder &builder, Location loc,
                                        createI32(builder, loc, 0));
   Value entry = arith::TruncIOp::create(builder, loc, out.i32(), cell);
   entry = arith::OrIOp::create(builder, loc, entry, mark);
-  LLVM::StoreOp::create(builder, loc, entry, place);
+  createStore(builder, loc, entry, place, out.tag);
   out.store(createOffset(builder, loc, place, 4), layout::cellCursor);
   out.store(cell, layout::lastCell);
 }
 
 void piko::createNext(OpBuilder &builder, Location loc,
                       LoweringContext &context, Value writer) {
-  MemberBuilder members(builder, loc, writer);
+  MemberBuilder members(builder, loc, writer, context.tags.writer());
   auto path = scf::IfOp::create(builder, loc, members.any(layout::writerFlags),
                                 /*withElseRegion=*/false);
   OpBuilder::InsertionGuard guard(builder);

@@ -18,7 +18,7 @@ piko.record @F {"x" : i32 at 0, "v" : f32 at 4} size 8 align 4
 // CHECK:         %[[INPUT:.*]] = llvm.select
 // CHECK:         llvm.getelementptr inbounds %[[INPUT]][56]
 // CHECK:         %[[CALLS:.*]] = llvm.load
-// CHECK:         llvm.load %[[CALLS]] : !llvm.ptr -> i64
+// CHECK:         llvm.load %[[CALLS]] {{.*}}: !llvm.ptr -> i64
 // CHECK:         llvm.getelementptr inbounds %{{.*}}[8]
 // CHECK:         llvm.getelementptr inbounds %{{.*}}[16]
 // CHECK:         %[[W:.*]] = llvm.call @pikoir_open

@@ -11,7 +11,7 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 // places the cursor behind the record.
 // CHECK:         %[[PORTS:.*]] = llvm.getelementptr inbounds %[[W]][24]
 // CHECK:         %[[PORT:.*]] = llvm.load %[[PORTS]]
-// CHECK:         %[[CURSOR:.*]] = llvm.load %[[PORT]] : !llvm.ptr -> !llvm.ptr
+// CHECK:         %[[CURSOR:.*]] = llvm.load %[[PORT]] {{.*}}: !llvm.ptr -> !llvm.ptr
 // CHECK:         %[[LIMIT_AT:.*]] = llvm.getelementptr inbounds %[[PORT]][8]
 // CHECK:         %[[LIMIT:.*]] = llvm.load %[[LIMIT_AT]]
 // CHECK:         %[[FULL:.*]] = llvm.icmp "ugt" %[[CURSOR]], %[[LIMIT]]
@@ -27,9 +27,9 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 // CHECK:             llvm.store %c-1_i64, %[[LAST]]
 // CHECK:           } else {
 // CHECK:             llvm.getelementptr inbounds %[[PORT]][16]
-// CHECK:             llvm.store %{{.*}}, %[[PORT]] : !llvm.ptr
+// CHECK:             llvm.store %{{.*}}, %[[PORT]] {{.*}}: !llvm.ptr
 // CHECK:           scf.yield %[[CURSOR]]
-// CHECK:         llvm.store %{{.*}}, %[[ROOM]] : i32
+// CHECK:         llvm.store %{{.*}}, %[[ROOM]] {{.*}}: i32
 
 // A place: the first one keeps the record and is marked.
 // CHECK:         %[[CELLS_AT:.*]] = llvm.getelementptr inbounds %{{.*}}[40]
@@ -43,11 +43,11 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 // CHECK:           %[[MARK:.*]] = arith.select %[[FIRST]], %c-2147483648_i32, %c0_i32
 // CHECK:           %[[LOW:.*]] = arith.trunci %[[CELL]]
 // CHECK:           %[[WORD:.*]] = arith.ori %[[LOW]], %[[MARK]]
-// CHECK:           llvm.store %[[WORD]], %[[ENTRY]] : i32
+// CHECK:           llvm.store %[[WORD]], %[[ENTRY]] {{.*}}: i32
 
 // The end of a position: a call where flags ask for it.
 // CHECK:         %[[FLAGS_AT:.*]] = llvm.getelementptr inbounds %[[W]][12]
-// CHECK:         %[[FLAGS:.*]] = llvm.load %[[FLAGS_AT]] : !llvm.ptr -> i32
+// CHECK:         %[[FLAGS:.*]] = llvm.load %[[FLAGS_AT]] {{.*}}: !llvm.ptr -> i32
 // CHECK:         %[[ANY:.*]] = arith.cmpi ne, %[[FLAGS]], %c0_i32
 // CHECK:         scf.if %[[ANY]] {
 // CHECK-NEXT:      llvm.call @pikoir_next(%[[W]])

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+
+#include "AliasTags.h"
+
+using namespace mlir;
+using namespace piko;
+
+LLVM::TBAANodeAttr AliasTags::root() const {
+  return LLVM::TBAARootAttr::get(context, StringAttr::get(context, "piko"));
+}
+
+LLVM::TBAATypeDescriptorAttr AliasTags::node(const Twine &name,
+                                             LLVM::TBAANodeAttr parent) const {
+  return LLVM::TBAATypeDescriptorAttr::get(
+      context, StringAttr::get(context, name).getValue(),
+      LLVM::TBAAMemberAttr::get(parent, 0));
+}
+
+LLVM::TBAATypeDescriptorAttr AliasTags::runtime() const {
+  return node("runtime", root());
+}
+
+ArrayAttr AliasTags::tag(LLVM::TBAATypeDescriptorAttr node,
+                         bool isConstant) const {
+  return ArrayAttr::get(
+      context,
+      {LLVM::TBAATagAttr::get(context, node, node, /*offset=*/0, isConstant)});
+}
+
+ArrayAttr AliasTags::state(StringRef name, StringRef field,
+                           bool isConstant) const {
+  return tag(node("state " + name + "." + field, root()), isConstant);
+}
+
+ArrayAttr AliasTags::primitive(StringRef record, StringRef field) const {
+  return tag(node("primitive " + record + "." + field, runtime()));
+}
+
+ArrayAttr AliasTags::writer() const { return tag(node("writer", runtime())); }
+
+ArrayAttr AliasTags::input() const { return tag(node("input", runtime())); }
+
+ArrayAttr AliasTags::call(StringRef function) const {
+  if (function == "pikoir_fail")
+    return tag(node("failure", root()));
+  static constexpr StringRef emissions[] = {
+      "pikoir_append",          "pikoir_place",        "pikoir_next",
+      "pikoir_place_source",    "pikoir_defer_begin",  "pikoir_defer_end",
+      "pikoir_defer_iteration", "pikoir_scratch_mark", "pikoir_scratch",
+      "pikoir_scratch_release"};
+  if (llvm::is_contained(emissions, function))
+    return tag(runtime());
+  return ArrayAttr();
+}
