@@ -1,0 +1,130 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+"""Compiled bodies against what C++ compilers make of the same text.
+
+  bodies.py [options] [NAME..]
+
+Builds each pipeline of benchmarks/bodies by pikoc and, as the reference
+executor, by g++ and clang++, and prints a table in Markdown: the processor time
+of the fastest warm frame on one thread, and how many times as fast pikoc's code
+is. The first frames of all builds must give the same bits, or this ends with an
+error. Builds take turns in each round.
+"""
+
+import argparse
+import glob
+import os
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+
+ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+BODIES = f"{ROOT}/benchmarks/bodies"
+CXX = ["-std=c++20", "-O2", "-ffp-contract=off", "-DPIKO_BODY", "-w",
+       f"-I{ROOT}/runtime/include", f"-I{BODIES}"]
+# Those that pikoc's code is compared with, by name.
+REFERENCES = {
+    "g++ -O2": ["g++"],
+    "clang++ -O2": ["clang++-22"],
+}
+COMPILED = {"scalar": ["--without=vectorize,compact-loops"], "default": []}
+
+
+def parse_arguments():
+    parser = argparse.ArgumentParser(
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("bodies", nargs="*", metavar="NAME")
+    parser.add_argument("--bin", default=f"{ROOT}/build/bin",
+                        help="where pikoc is")
+    parser.add_argument("--lib", default=f"{ROOT}/build/lib",
+                        help="where libpikort is")
+    parser.add_argument("--work", default=f"{ROOT}/build/bodies",
+                        help="where to build")
+    parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--seconds", type=float, default=0.3,
+                        help="of frames, for each build in each round")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count())
+    parser.add_argument("--march", help="of the references, as x86-64-v3")
+    arguments = parser.parse_args()
+    arguments.flags = [f"-march={arguments.march}"] if arguments.march else []
+    return arguments
+
+
+def call(command):
+    result = subprocess.run(command, capture_output=True, text=True)
+    if result.returncode:
+        sys.exit(f"{' '.join(command)}\n{result.stderr}")
+    return result.stdout
+
+
+def get_program(arguments, body, build):
+    march = arguments.march or ""
+    name = build.replace(" ", "") + (march if build in REFERENCES else "")
+    return f"{arguments.work}/{body}.{name}"
+
+
+def get_openmp():
+    """The runtime that clang links."""
+    return call(["clang++-22", "-print-file-name=libomp.so"]).strip()
+
+
+def build_compiled(arguments, body, build):
+    program = get_program(arguments, body, build)
+    source = f"{BODIES}/{body}.piko.cpp"
+    call([f"{arguments.bin}/pikoc", source, "-o", f"{program}.o", "--header",
+          f"{program}.h", *COMPILED[build]])
+    call(["g++", *CXX, f'-DPIKO_BODY_HEADER="{program}.h"', "-x", "c++", source,
+          "-x", "none", f"{program}.o", f"-L{arguments.lib}", "-lpikort",
+          get_openmp(), f"-Wl,-rpath,{arguments.lib}", "-o", program])
+
+
+def build_reference(arguments, body, build):
+    program = get_program(arguments, body, build)
+    source = f"{BODIES}/{body}.piko.cpp"
+    if (os.path.exists(program)
+            and os.path.getmtime(program) > os.path.getmtime(source)):
+        return # the header that they share changes too seldom to look
+    call([*REFERENCES[build], *arguments.flags, *CXX, source, "-o", program])
+
+
+def measure(arguments, body):
+    """The milliseconds of a frame, by build."""
+    best, results = {}, {}
+    for _ in range(arguments.rounds):
+        for build in [*REFERENCES, *COMPILED]:
+            line = call([get_program(arguments, body, build),
+                         str(arguments.seconds)])
+            results[build], milliseconds = line.split()
+            best[build] = min(best.get(build, 1e9), float(milliseconds))
+    if len(set(results.values())) != 1:
+        sys.exit(f"{body}: expected the same bits of all builds, but got "
+                 f"{results}")
+    return best
+
+
+def main():
+    arguments = parse_arguments()
+    os.makedirs(arguments.work, exist_ok=True)
+    bodies = arguments.bodies or sorted(
+        os.path.basename(file).removesuffix(".piko.cpp")
+        for file in glob.glob(f"{BODIES}/*.piko.cpp"))
+    with ThreadPoolExecutor(arguments.jobs) as pool:
+        jobs = [pool.submit(build_compiled, arguments, body, build)
+                for body in bodies for build in COMPILED]
+        jobs += [pool.submit(build_reference, arguments, body, build)
+                 for body in bodies for build in REFERENCES]
+        for job in jobs:
+            job.result()
+    names = list(REFERENCES)
+    print("| body | scalar, ms | default, ms | " + " | ".join(names) + " |")
+    print("|---" * (3 + len(names)) + "|")
+    for body in bodies:
+        best = measure(arguments, body)
+        ratios = [f"{best[name] / best['scalar']:.2f}" for name in names]
+        print(f"| {body} | {best['scalar']:.3f} | {best['default']:.3f} | "
+              + " | ".join(ratios) + " |", flush=True)
+
+
+if __name__ == "__main__":
+    main()
