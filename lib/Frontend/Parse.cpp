@@ -12,9 +12,12 @@
 // if it were included there. Clang then generates code for what the wrappers
 // use; that of several pipelines is divided among their units.
 //
-// The code is for nvptx64, because Clang passes aggregates there as they are;
-// types have the host's layout, since that target copies it, and headers are
-// the host's.
+// The text is parsed for this machine, whose headers are full of its builtins,
+// registers and attributes. What they contain is not judged: exceptions and
+// run-time type information are on, and what a phase may not call is found in
+// the code of the phases. Only the calling convention is another machine's:
+// nvptx64 passes aggregates as they are, where this machine's takes them apart
+// and joins fields that have nothing to do with each other.
 //
 //===----------------------------------------------------------------------===//
 
@@ -34,8 +37,8 @@
 #include "clang/Lex/PreprocessorOptions.h"
 #include "clang/Parse/ParseAST.h"
 #include "clang/Sema/Sema.h"
+#include "llvm/IR/InstIterator.h"
 #include "llvm/Support/VirtualFileSystem.h"
-#include "llvm/TargetParser/Host.h"
 #include "llvm/TargetParser/Triple.h"
 #include "llvm/Transforms/Utils/Cloning.h"
 
@@ -53,30 +56,13 @@ makeInvocation(const ParseRequest &request,
                llvm::IntrusiveRefCntPtr<clang::DiagnosticsEngine> diagnostics) {
   const FrontendOptions &options = request.options;
   std::shared_ptr<clang::CompilerInvocation> invocation = createClangInvocation(
-      {"-D__PIKO__=1", "-DNDEBUG=1", "-fno-exceptions", "-fno-rtti", "-O1",
-       "-fwrapv", "-fno-finite-loops", "-fno-math-errno",
-       "-fno-strict-aliasing", "-gline-tables-only", "-fno-access-control",
-       "-Wno-undefined-internal", "-fno-strict-float-cast-overflow",
-       "-fno-threadsafe-statics"},
+      {"-D__PIKO__=1", "-DNDEBUG=1", "-fignore-exceptions", "-O1", "-fwrapv",
+       "-fno-finite-loops", "-fno-math-errno", "-fno-strict-aliasing",
+       "-gline-tables-only", "-Wno-undefined-internal",
+       "-fno-strict-float-cast-overflow", "-fno-threadsafe-statics"},
       options, mainName, diagnostics);
   if (!invocation)
     return nullptr;
-
-  // Headers see the host; code is generated for a target that keeps records
-  // whole.
-  llvm::Triple host(llvm::sys::getDefaultTargetTriple());
-  clang::TargetOptions &target = invocation->getTargetOpts();
-  target.HostTriple = host.str();
-  target.Triple = "nvptx64-nvidia-cuda";
-  target.CPU = "sm_90";
-  target.TuneCPU.clear();
-  target.ABI.clear();
-  target.FeaturesAsWritten.clear();
-  clang::PreprocessorOptions &preprocessor = invocation->getPreprocessorOpts();
-  preprocessor.addMacroDef(host.isAArch64() ? "__aarch64__=1" : "__x86_64__=1");
-  for (const char *macro : {"__linux__=1", "__gnu_linux__=1", "__unix__=1",
-                            "_GNU_SOURCE=1", "__ELF__=1"})
-    preprocessor.addMacroDef(macro);
 
   clang::CodeGenOptions &codeGen = invocation->getCodeGenOpts();
   codeGen.DisableLLVMPasses = true;
@@ -85,9 +71,25 @@ makeInvocation(const ParseRequest &request,
   codeGen.DiscardValueNames = false;
   // File names stay as given: Clang cuts off what they share with this folder.
   codeGen.DebugCompilationDir = "/";
+  // A call of an alias would not show what it calls.
+  codeGen.CXXCtorDtorAliases = false;
   clang::LangOptions &language = invocation->getLangOpts();
   language.ThreadsafeStatics = false;
+  // Each operation on a _Float16 rounds.
+  language.setFloat16ExcessPrecision(clang::LangOptions::FPP_None);
+  language.setBFloat16ExcessPrecision(clang::LangOptions::FPP_None);
   return invocation;
+}
+
+/// Sets up code generation with the calling convention of a target that keeps
+/// records whole, which is the only thing that it asks the triple for so early.
+static void initializeConsumer(clang::CompilerInstance &compiler) {
+  // No member of the target gives a way to change it.
+  auto &triple = const_cast<llvm::Triple &>(compiler.getTarget().getTriple());
+  llvm::Triple host =
+      std::exchange(triple, llvm::Triple("nvptx64-nvidia-cuda"));
+  compiler.getASTConsumer().Initialize(compiler.getASTContext());
+  triple = std::move(host);
 }
 
 //===----------------------------------------------------------------------===//
@@ -156,6 +158,8 @@ public:
     if (compiler.getDiagnostics().hasErrorOccurred())
       return;
     diagnostics.flush();
+    // Stages and phases may be private.
+    compiler.getLangOpts().AccessControl = false;
     std::string wrappers;
     ok = read(wrappers);
     if (!ok || wrappers.empty())
@@ -365,6 +369,22 @@ static void dropSuffix(llvm::Module &module, llvm::StringRef suffix) {
       function.setName(function.getName().drop_back(suffix.size()).str());
 }
 
+/// Passes choose widths of numbers as for the target of the calling convention;
+/// nothing throws, since what would is refused.
+static void adaptModule(llvm::Module &module) {
+  module.setDataLayout(module.getTargetTriple().computeDataLayout());
+  for (llvm::Function &function : module) {
+    function.setDoesNotThrow();
+    for (llvm::Instruction &instruction : llvm::instructions(function))
+      if (auto *call = llvm::dyn_cast<llvm::CallBase>(&instruction))
+        call->setDoesNotThrow();
+  }
+  // That target casts null pointers between what are two address spaces there.
+  auto *pointer = llvm::PointerType::getUnqual(module.getContext());
+  auto *null = llvm::ConstantPointerNull::get(pointer);
+  llvm::ConstantExpr::getAddrSpaceCast(null, pointer)->replaceAllUsesWith(null);
+}
+
 static void collectUserFiles(const clang::SourceManager &sources,
                              llvm::StringSet<> &files) {
   for (unsigned i = 0, e = sources.local_sloc_entry_size(); i != e; ++i) {
@@ -442,7 +462,7 @@ llvm::FailureOr<ParsedFile> piko::parseFile(const ParseRequest &request,
   } else {
     compiler.setASTConsumer(std::make_unique<clang::ASTConsumer>());
   }
-  compiler.getASTConsumer().Initialize(compiler.getASTContext());
+  initializeConsumer(compiler);
   compiler.createSema(clang::TU_Complete, nullptr);
 
   forwarder.BeginSourceFile(compiler.getLangOpts(), &preprocessor);
@@ -461,6 +481,7 @@ llvm::FailureOr<ParsedFile> piko::parseFile(const ParseRequest &request,
   std::unique_ptr<llvm::Module> module(generator->ReleaseModule());
   if (!module)
     return llvm::failure();
+  adaptModule(*module);
   llvm::StringSet<> userFiles;
   collectUserFiles(sources, userFiles);
   for (std::unique_ptr<UnitReader> &made : reader.readers) {
