@@ -95,6 +95,7 @@ LogicalResult LoopSplitter::run() {
   if (failed(connect()))
     return failure();
   orderEmissions();
+  stopAtDisagreement();
   slots->finish();
   parallel.erase();
   return success();
@@ -276,6 +277,7 @@ void LoopSplitter::splitFor(scf::ForOp op, Piece &piece) {
     compare(trips);
     loop = scf::ForOp::create(builder, op.getLoc(), zero, trips, one);
   }
+  loops.push_back(loop);
   builder.setInsertionPoint(loop.getBody()->getTerminator());
   splitForBody(op, loop, iterationVar, arrays);
   readFrom(op.getResults(), arrays);
@@ -310,6 +312,7 @@ void LoopSplitter::splitWhile(scf::WhileOp op, Piece &piece) {
   SmallVector<Value> after = addSlots(op.getResultTypes());
   store(piece, op.getInits(), before);
   auto loop = scf::WhileOp::create(builder, loc, TypeRange(), ValueRange());
+  loops.push_back(loop);
   OpBuilder::InsertionGuard guard(builder);
   builder.createBlock(&loop.getBefore());
   readFrom(op.getBeforeArguments(), before);
@@ -318,14 +321,7 @@ void LoopSplitter::splitWhile(scf::WhileOp op, Piece &piece) {
     auto condition = cast<scf::ConditionOp>(terminator);
     store(piece, condition.getArgs(), after);
     Value goesOn = condition.getCondition();
-    // Without agreement iteration 0 might never end.
-    if (Value agree = compare(goesOn)) {
-      Value first = UnrealizedConversionCastOp::create(builder, loc,
-                                                       goesOn.getType(), goesOn)
-                        .getResult(0);
-      copies.push_back(first.getDefiningOp());
-      goesOn = arith::AndIOp::create(builder, loc, first, agree);
-    }
+    compare(goesOn);
     scf::ConditionOp::create(builder, loc, goesOn, ValueRange());
   });
   builder.createBlock(&loop.getAfter());
@@ -338,9 +334,9 @@ void LoopSplitter::splitWhile(scf::WhileOp op, Piece &piece) {
   readFrom(op.getResults(), after);
 }
 
-Value LoopSplitter::compare(Value value) {
+void LoopSplitter::compare(Value value) {
   if (!uniformity.isVarying(value))
-    return {};
+    return;
   ++checks;
   Location loc = value.getLoc();
   auto first =
@@ -364,9 +360,9 @@ Value LoopSplitter::compare(Value value) {
                                 /*withElseRegion=*/false);
   scf::YieldOp::create(builder, loc, agree);
   builder.setInsertionPoint(ifOp.thenBlock()->getTerminator());
-  FailBarrierOp::create(builder, loc, stage.getSymName(),
-                        piece.getInductionVar(), findBin(builder, piece));
-  return piece.getResult(0);
+  failures.push_back(FailBarrierOp::create(builder, loc, stage.getSymName(),
+                                           piece.getInductionVar(),
+                                           findBin(builder, piece)));
 }
 
 //===----------------------------------------------------------------------===//
@@ -555,5 +551,47 @@ void LoopSplitter::orderEmissions() {
   for (scf::ForOp piece : emitting) {
     at.setInsertionPointToStart(piece.getBody());
     DeferIterationOp::create(at, loc, writer, piece.getInductionVar());
+  }
+}
+
+//===----------------------------------------------------------------------===//
+// Failures
+//===----------------------------------------------------------------------===//
+
+/// What comes behind such a barrier has no meaning: the way there was
+/// iteration 0's, and slots may never have been written.
+void LoopSplitter::stopAtDisagreement() {
+  if (failures.empty())
+    return;
+  Value left = slots->add(builder.getIndexType()); // iterations to run
+  auto load = [&](OpBuilder &at) {
+    return Slots::load(at, loc, at.getIndexType(), left, zero);
+  };
+  auto isRunning = [&](OpBuilder &at) {
+    return arith::CmpIOp::create(at, loc, arith::CmpIPredicate::ne, load(at),
+                                 zero);
+  };
+  OpBuilder at(parallel);
+  at.setInsertionPointAfterValue(left);
+  Slots::store(at, loc, count, left, zero);
+  for (FailBarrierOp failure : failures) {
+    at.setInsertionPoint(failure);
+    Slots::store(at, loc, zero, left, zero);
+  }
+  for (scf::ForOp piece : pieces) {
+    at.setInsertionPoint(piece);
+    piece.setUpperBound(load(at));
+  }
+  for (Operation *op : loops) {
+    if (auto loop = dyn_cast<scf::ForOp>(op)) {
+      at.setInsertionPoint(loop);
+      loop.setUpperBound(arith::SelectOp::create(
+          at, loc, isRunning(at), loop.getUpperBound(), loop.getLowerBound()));
+      continue;
+    }
+    scf::ConditionOp condition = cast<scf::WhileOp>(op).getConditionOp();
+    at.setInsertionPoint(condition);
+    condition.getConditionMutable().assign(arith::AndIOp::create(
+        at, loc, condition.getCondition(), isRunning(at)));
   }
 }

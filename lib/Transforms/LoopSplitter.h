@@ -45,9 +45,8 @@ private:
   /// The rest of `splitFor`, inside the new loop.
   void splitForBody(mlir::scf::ForOp op, mlir::scf::ForOp loop,
                     mlir::Value iterationVar, mlir::ValueRange slots);
-  /// Where iterations may not agree on a value, compares them; the result, if
-  /// there is one, is whether they do.
-  mlir::Value compare(mlir::Value value);
+  /// Where iterations may not agree on a value, compares them.
+  void compare(mlir::Value value);
 
   // Values across cuts.
   llvm::SmallVector<mlir::Value> addSlots(mlir::TypeRange types);
@@ -66,6 +65,8 @@ private:
       llvm::function_ref<mlir::Value(mlir::OpBuilder &, mlir::Value)> read);
 
   void orderEmissions();
+  /// Lets no piece run any more once iterations have not agreed.
+  void stopAtDisagreement();
 
   ParallelForOp parallel;
   mlir::Location loc;
@@ -76,6 +77,8 @@ private:
   std::optional<Slots> slots;
   llvm::SmallVector<mlir::scf::ForOp> pieces;
   llvm::DenseSet<mlir::Operation *> isPiece;
+  llvm::SmallVector<mlir::Operation *> loops; ///< Around pieces.
+  llvm::SmallVector<FailBarrierOp> failures;
   /// Values that are read from slots, and copies of iteration 0's.
   llvm::SmallVector<std::pair<mlir::Operation *, mlir::Value>> placeholders;
   llvm::SmallVector<mlir::Operation *> copies;

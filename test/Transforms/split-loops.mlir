@@ -154,23 +154,29 @@ piko.pipeline @Uniform rank 1 {
 
 // -----
 
-// Where iterations may not agree they are compared, and follow iteration 0.
+// Where iterations may not agree they are compared, and follow iteration 0; where
+// they do not, none runs any more.
 piko.record @F {"z" : f32 at 0} size 4 align 4
 // CHECK-LABEL: piko.pipeline @Varying
-// CHECK:         scf.for %[[I:.*]] = %c0 to %[[N:.*]] step %c1 {
+// CHECK:         memref.store %{{.*}}, %[[LEFT:.*]][%c0] : memref<?xindex>
+// CHECK:         %[[N:.*]] = memref.load %[[LEFT]][%c0]
+// CHECK:         scf.for %[[I:.*]] = %c0 to %[[N]] step %c1 {
 // CHECK:           %[[ODD:.*]] = arith.cmpi
 // CHECK:           memref.store %[[ODD]], %[[SLOTS:.*]][%[[I]]]
 // CHECK:         %[[FIRST:.*]] = memref.load %[[SLOTS]][%c0]
-// CHECK:         scf.for %[[J:.*]] = %c1 to %[[N]] step %c1 iter_args(%[[AGREED:.*]] = %true)
+// CHECK:         %[[M:.*]] = memref.load %[[LEFT]][%c0]
+// CHECK:         scf.for %[[J:.*]] = %c1 to %[[M]] step %c1 iter_args(%[[AGREED:.*]] = %true)
 // CHECK:           %[[OWN:.*]] = memref.load %[[SLOTS]][%[[J]]]
 // CHECK:           %[[SAME:.*]] = arith.cmpi eq, %[[OWN]], %[[FIRST]]
 // CHECK:           arith.andi %[[AGREED]], %[[SAME]]
 // CHECK:           scf.if
-// CHECK:             piko.fail_barrier @a iteration %[[J]]
+// CHECK:             memref.store %c0, %[[LEFT]][%c0]
+// CHECK-NEXT:        piko.fail_barrier @a iteration %[[J]]
 // CHECK:         %[[CONDITION:.*]] = memref.load %[[SLOTS]][%c0]
 // CHECK:         scf.if %[[CONDITION]]
 // CHECK:           %[[SUM:.*]] = memref.load %{{.*}}[%c0] : memref<?xi32>
-// CHECK:           scf.for
+// CHECK:           %[[SOME:.*]] = memref.load %[[LEFT]][%c0]
+// CHECK:           scf.for %{{.*}} = %c0 to %[[SOME]]
 // CHECK:             memref.store %[[SUM]], %[[RESULTS:.*]][
 // CHECK:         } else {
 // CHECK:           scf.for

@@ -60,8 +60,9 @@ def SplitLoops : Pass<"piko-split-loops", "::piko::PipelineOp"> {
     iteration in scratch memory. Control flow that holds barriers moves around
     the pieces and follows iteration 0; where the analysis cannot prove that all
     iterations agree, they are compared when the pipeline runs, and
-    `piko.fail_barrier` reports the first that does not. Reductions, scans and
-    sorts become loops over slots. Where several pieces emit, primitives are put
+    `piko.fail_barrier` reports the first that does not, and then none goes on.
+    Reductions, scans and sorts become loops over slots. Where several pieces
+    emit, primitives are put
     in the order of iterations when the loop ends (`piko.defer_begin`).
 
     **Guarantees** that nothing is left of parallel loops and barriers, and that
