@@ -8,6 +8,9 @@
 #include "Piko/Driver/Sequences.h"
 
 #include "mlir/Dialect/GPU/IR/GPUDialect.h"
+#include "mlir/Dialect/LLVMIR/LLVMDialect.h"
+#include "mlir/Dialect/OpenMP/OpenMPDialect.h"
+#include "mlir/Interfaces/FunctionInterfaces.h"
 #include "mlir/Parser/Parser.h"
 #include "mlir/Target/LLVMIR/Export.h"
 #include "llvm/ADT/StringExtras.h"
@@ -57,11 +60,62 @@ FrontendOptions piko::getFrontendOptions(const CompileOptions &options) {
   return result;
 }
 
+static bool hasGPUKernels(ModuleOp module) {
+  return !module.getOps<gpu::GPUModuleOp>().empty();
+}
+
+/// Whether a kernel still has phases.
+static bool hasPhases(KernelOp kernel) {
+  return llvm::any_of(*kernel.getBodyBlock(), [](Operation &op) {
+    return isa<ProcessOp, AssignOp>(op);
+  });
+}
+
+Level piko::getLevel(ModuleOp module) {
+  bool hasPipelines = false;
+  Level level = Level::Authored;
+  for (auto pipeline : module.getOps<PipelineOp>()) {
+    hasPipelines = true;
+    for (auto kernel : pipeline.getOps<KernelOp>())
+      level =
+          std::max(level, hasPhases(kernel) ? Level::Kernels : Level::Resolved);
+  }
+  if (hasPipelines)
+    return level;
+  // What is left to convert is in other dialects.
+  WalkResult result = module.walk([](Operation *op) {
+    return isa<ModuleOp>(op) ||
+                   isa<LLVM::LLVMDialect, omp::OpenMPDialect>(op->getDialect())
+               ? WalkResult::advance()
+               : WalkResult::interrupt();
+  });
+  return result.wasInterrupted() ? Level::Target : Level::LLVM;
+}
+
+StringRef piko::getName(Level level) {
+  constexpr StringRef names[] = {"authored", "kernels", "resolved", "target",
+                                 "llvm"};
+  return names[static_cast<int>(level)];
+}
+
+/// The pipelines of a module, or the programs that they have become.
 static std::vector<std::string> getNames(ModuleOp module) {
   std::vector<std::string> names;
   for (auto pipeline : module.getOps<PipelineOp>())
     names.push_back(pipeline.getSymName().str());
+  for (auto function : module.getOps<FunctionOpInterface>()) {
+    StringRef name = function.getName();
+    if (name.consume_back(".run") &&
+        module.lookupSymbol((name + ".setup").str()))
+      names.push_back(name.str());
+  }
   return names;
+}
+
+std::string piko::getPipelineName(ModuleOp module,
+                                  const CompileOptions &options) {
+  std::vector<std::string> names = getNames(module);
+  return names.size() == 1 ? names.front() : options.pipeName;
 }
 
 /// Leaves only the pipeline of that name in a module.
@@ -114,49 +168,90 @@ piko::readPipelineNames(const CompileOptions &options, MLIRContext &context) {
   return getNames(*module);
 }
 
-void piko::addPasses(OpPassManager &passes, Level level,
+void piko::addPasses(OpPassManager &passes, Level from, Level to,
                      const CheckOptions &check,
                      const SynthesisOptions &synthesis, const GPUOptions &gpu) {
   // Findings are about the stages as they are written.
   SynthesisOptions chosen =
       check.enabled ? SynthesisOptions::none() : synthesis;
-  if (check.enabled)
+  auto goes = [&](Level level) { return from < level && level <= to; };
+  if (check.enabled && from == Level::Authored)
     addCheckSequence(passes, check);
-  if (level >= Level::Kernels)
+  if (goes(Level::Kernels))
     addSynthesisSequence(passes, chosen);
-  if (level >= Level::Resolved)
+  if (goes(Level::Resolved))
     addResolveSequence(passes);
-  if (level >= Level::Target) {
+  else if (from == Level::Resolved && to > from)
+    addSplitSequence(passes); // perhaps only kernels are resolved
+  if (goes(Level::Target)) {
     if (gpu.emulate)
       addGPUSequence(passes, gpu);
     else
       addCPUSequence(passes, chosen);
   }
-  if (level >= Level::LLVM)
+  if (to >= Level::LLVM)
     addLLVMSequence(passes);
+}
+
+/// Whether the passes that are asked for can start from where a module is.
+static LogicalResult checkStart(ModuleOp module, Level from, Level to,
+                                const CheckOptions &check,
+                                const GPUOptions &gpu) {
+  if (from > to)
+    return emitError(module.getLoc())
+           << "expected the " << getName(to)
+           << " level or one above it, but the file is at the " << getName(from)
+           << " level";
+  if (check.enabled && from != Level::Authored)
+    return emitError(module.getLoc())
+           << "--check: expected the authored level, but the file is at the "
+           << getName(from) << " level";
+  if (hasGPUKernels(module) && !gpu.emulate)
+    return emitError(module.getLoc())
+           << "expected kernels for a CPU, but the file has some for a GPU, "
+              "which --emulate-gpu runs and --emit=ptx writes";
+  if (!hasGPUKernels(module) && gpu.emulate && from > Level::Resolved)
+    return emitError(module.getLoc())
+           << "--emulate-gpu: expected kernels for a GPU, or the resolved "
+              "level "
+              "or one above it, but the file is at the "
+           << getName(from) << " level";
+  return success();
 }
 
 LogicalResult piko::lowerPipeline(ModuleOp module, Level level,
                                   const CheckOptions &check,
                                   const SynthesisOptions &synthesis,
                                   const GPUOptions &gpu) {
+  Level from = getLevel(module);
+  if (failed(checkStart(module, from, level, check, gpu)))
+    return failure();
   PassManager passes(module.getContext());
-  addPasses(passes, level, check, synthesis, gpu);
+  if (hasGPUKernels(module))
+    addEmulationSequence(passes, gpu);
+  addPasses(passes, from, level, check, synthesis, gpu);
   return passes.run(module);
 }
 
 LogicalResult piko::lowerToGPU(ModuleOp module, const CheckOptions &check,
                                const SynthesisOptions &synthesis,
                                const GPUOptions &gpu) {
+  if (hasGPUKernels(module))
+    return success();
+  Level from = getLevel(module);
+  if (failed(checkStart(module, from, Level::Resolved, check, {})))
+    return failure();
   Location loc = module.getLoc();
   for (auto pipeline : module.getOps<PipelineOp>())
     loc = pipeline.getLoc();
   PassManager passes(module.getContext());
-  addPasses(passes, Level::Resolved, check, synthesis);
+  addPasses(passes, from, Level::Resolved, check, synthesis);
+  if (from == Level::Resolved)
+    addSplitSequence(passes);
   addGPUSequence(passes, gpu);
   if (failed(passes.run(module)))
     return failure();
-  if (!module.getOps<gpu::GPUModuleOp>().empty())
+  if (hasGPUKernels(module))
     return success();
   return emitError(loc) << "expected a kernel that updates pixels, which is "
                            "what a GPU can have";

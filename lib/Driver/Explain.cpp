@@ -397,13 +397,24 @@ piko::explainPipeline(ModuleOp module, const CheckOptions &check,
       trace.add(diagnostic);
     return failure(); // others want to see it, too
   });
-  PassManager passes(context);
-  passes.addInstrumentation(std::make_unique<Tracer>(trace));
-  addPasses(passes, Level::Kernels, check, synthesis);
-  if (failed(passes.run(module)))
+  if (Level level = getLevel(module); level != Level::Authored)
+    return emitError(module.getLoc())
+           << "--explain: expected the authored level, but the file is at the "
+           << getName(level) << " level";
+  auto run = [&](Level from, Level to) {
+    PassManager passes(context);
+    passes.addInstrumentation(std::make_unique<Tracer>(trace));
+    addPasses(passes, from, to, check, synthesis);
+    return passes.run(module);
+  };
+  if (failed(run(Level::Authored, Level::Kernels)))
+    return failure();
+  OwningOpRef<ModuleOp> kernels = module.clone();
+  // What is below has remarks alone.
+  if (failed(run(Level::Kernels, Level::Target)))
     return failure();
   std::string text;
   llvm::raw_string_ostream out(text);
-  Report(trace, getOnlyPipeline(module), out).write();
+  Report(trace, getOnlyPipeline(*kernels), out).write();
   return text;
 }

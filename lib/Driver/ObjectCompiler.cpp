@@ -200,11 +200,10 @@ compilePipeline(const ObjectOptions &options, const Files &files,
   OwningOpRef<ModuleOp> module = readPipeline(options.source, context, files);
   if (!module)
     return nullptr;
-  for (auto pipeline : module->getOps<PipelineOp>()) {
-    object.pipeline = pipeline.getSymName().str();
+  object.pipeline = getPipelineName(*module, options.source);
+  for (auto pipeline : module->getOps<PipelineOp>())
     object.header =
         writeHostHeader(pipeline, options.source.file, options.nameSpace);
-  }
   object.symbol = getProgramSymbol(options.nameSpace, object.pipeline);
   if (failed(lowerPipeline(*module, Level::LLVM, options.source.check,
                            options.source.synthesis, options.source.gpu)))

@@ -69,6 +69,10 @@ void piko::addSynthesisSequence(OpPassManager &passes,
 
 void piko::addResolveSequence(OpPassManager &passes) {
   passes.nest<PipelineOp>().addPass(createResolveKernels());
+  addSplitSequence(passes);
+}
+
+void piko::addSplitSequence(OpPassManager &passes) {
   passes.nest<PipelineOp>().addPass(createSplitLoops());
   addCleanUp(passes);
 }
@@ -105,11 +109,17 @@ void piko::addGPUSequence(OpPassManager &passes, const GPUOptions &options) {
   // Or constants would be arguments.
   passes.addPass(createGpuLaunchSinkIndexComputationsPass());
   passes.addPass(createGpuKernelOutliningPass());
-  if (options.emulate) {
-    ConvertGPUToSCFOptions emulation;
-    emulation.reverse = options.reverse;
-    passes.addPass(createConvertGPUToSCF(emulation));
-  }
+  if (options.emulate)
+    addEmulationSequence(passes, options);
+  else
+    addCleanUp(passes);
+}
+
+void piko::addEmulationSequence(OpPassManager &passes,
+                                const GPUOptions &options) {
+  ConvertGPUToSCFOptions emulation;
+  emulation.reverse = options.reverse;
+  passes.addPass(createConvertGPUToSCF(emulation));
   addCleanUp(passes);
 }
 

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// The compiler's command: reads a pipeline from C++ or .mlir and writes an
-// object with its header, any level on the way, or a report.
+// The compiler's command: reads a pipeline from C++ or, at any level, from
+// .mlir and writes an object with its header, any level on the way, or a
+// report.
 
 #include "OutputFiles.h"
 
@@ -325,6 +326,11 @@ static bool writeObject(const CommandLine &line, OutputFiles &outputs) {
   llvm::errs() << diagnostics;
   if (!object)
     return false;
+  if (line.header.getNumOccurrences() && object->header.empty()) {
+    fail("--header: expected the resolved level or one above it, because below "
+         "it nothing says what the pipeline takes");
+    return false;
+  }
   std::vector<std::string> targets = {line.output};
   llvm::Error error = outputs.add(line.output, object->code);
   if (!error && line.header.getNumOccurrences()) {

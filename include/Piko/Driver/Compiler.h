@@ -30,6 +30,14 @@ namespace piko {
 /// The levels that the compiler moves a module down, in order.
 enum class Level { Authored, Kernels, Resolved, Target, LLVM };
 
+/// The level that a module is at, as its operations show. Passes in between
+/// make modules of the level above: taking those down does again what is done,
+/// which changes nothing.
+Level getLevel(mlir::ModuleOp module);
+
+/// What `--emit` calls it.
+llvm::StringRef getName(Level level);
+
 /// Where piko.h is: beside the tool that is running, as it is installed, or in
 /// the source tree.
 std::string getRuntimeIncludeDir();
@@ -37,24 +45,30 @@ std::string getRuntimeIncludeDir();
 /// The options as the C++ front end takes them.
 FrontendOptions getFrontendOptions(const CompileOptions &options);
 
-/// Reads the file from among `files`: a module at the authored level that holds
-/// one pipeline, or null after diagnostics in the context's engine.
+/// Reads the file from among `files`: a module that holds one pipeline, at the
+/// authored level or, from `.mlir`, at any; or null after diagnostics in the
+/// context's engine.
 mlir::OwningOpRef<mlir::ModuleOp>
 readPipeline(const CompileOptions &options, mlir::MLIRContext &context,
              llvm::IntrusiveRefCntPtr<llvm::vfs::FileSystem> files =
                  llvm::vfs::getRealFileSystem());
+
+/// The name of a pipeline that readPipeline() read. At the target level and
+/// below, a module may still hold others; then it must be given.
+std::string getPipelineName(mlir::ModuleOp module,
+                            const CompileOptions &options);
 
 /// The names of the pipelines in a file, in the order in which they stand
 /// there.
 llvm::FailureOr<std::vector<std::string>>
 readPipelineNames(const CompileOptions &options, mlir::MLIRContext &context);
 
-/// Adds the passes that take a module from the authored level to another one.
-void addPasses(mlir::OpPassManager &passes, Level level,
+/// Adds the passes that take a module from one level to another one.
+void addPasses(mlir::OpPassManager &passes, Level from, Level to,
                const CheckOptions &check, const SynthesisOptions &synthesis,
                const GPUOptions &gpu = {});
 
-/// Takes a module from the authored level to another one.
+/// Takes a module from its level to another one; an error if it is below that.
 llvm::LogicalResult lowerPipeline(mlir::ModuleOp module, Level level,
                                   const CheckOptions &check = {},
                                   const SynthesisOptions &synthesis = {},
@@ -64,8 +78,8 @@ llvm::LogicalResult lowerPipeline(mlir::ModuleOp module, Level level,
 std::unique_ptr<llvm::Module> translateToLLVMIR(mlir::ModuleOp module,
                                                 llvm::LLVMContext &context);
 
-/// Takes a module from the authored level to one with a `gpu.module`; an error
-/// if the pipeline has no kernel for a GPU.
+/// Takes a module from the resolved level or above to one with a `gpu.module`,
+/// unless it has one; an error if the pipeline has no kernel for a GPU.
 llvm::LogicalResult lowerToGPU(mlir::ModuleOp module, const CheckOptions &check,
                                const SynthesisOptions &synthesis,
                                const GPUOptions &gpu);

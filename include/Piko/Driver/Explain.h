@@ -14,7 +14,7 @@
 
 namespace piko {
 
-/// Takes a module that holds one pipeline from the authored to the kernels
+/// Takes a module that holds one pipeline from the authored to the target
 /// level, and reports on it; fails after diagnostics in the context's engine.
 llvm::FailureOr<std::string>
 explainPipeline(mlir::ModuleOp module, const CheckOptions &check = {},

@@ -29,7 +29,8 @@ struct CompiledObject {
   /// executor, a function that returns the address of one.
   std::string symbol;
   std::string code;
-  /// The C++ header for hosts; empty for the reference executor.
+  /// The C++ header for hosts; empty for the reference executor, and for
+  /// `.mlir` below the resolved level, where nothing is left to make it of.
   std::string header;
   /// The files that were read, sorted.
   std::vector<std::string> files;

@@ -24,6 +24,9 @@ void addSynthesisSequence(mlir::OpPassManager &passes,
 /// `piko-resolve`: from the kernels to the resolved level.
 void addResolveSequence(mlir::OpPassManager &passes);
 
+/// Its last part, which does nothing to what has gone through it.
+void addSplitSequence(mlir::OpPassManager &passes);
+
 /// `piko-to-cpu`: from the resolved level to scf, arith, omp and llvm.
 void addCPUSequence(mlir::OpPassManager &passes,
                     const SynthesisOptions &options = {});
@@ -35,6 +38,10 @@ void addLLVMSequence(mlir::OpPassManager &passes);
 /// functions that launch them and run the others. Where the options say so,
 /// kernels become functions too.
 void addGPUSequence(mlir::OpPassManager &passes, const GPUOptions &options);
+
+/// Kernels in a `gpu.module` as functions, which a CPU runs.
+void addEmulationSequence(mlir::OpPassManager &passes,
+                          const GPUOptions &options);
 
 /// `piko-gpu-to-nvvm`: the kernels from there to the llvm and nvvm dialects.
 void addNVVMSequence(mlir::OpPassManager &passes);

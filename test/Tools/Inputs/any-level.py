@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+"""Takes a module down pass by pass with piko-opt; what piko-render makes of it
+after each is the same picture."""
+
+import json
+import pathlib
+import subprocess
+import sys
+
+module, scene = sys.argv[1:]
+
+IN_PIPELINE = """
+    order-stages pre-schedule infer-directives fuse-stages test-early own-pixels
+    eliminate-schedules form-kernels fuse-kernels form-strips resolve-kernels
+    split-loops prefetch compact-loops vectorize""".split()
+STEPS = [f"piko.pipeline(piko-{name})" for name in IN_PIPELINE]
+STEPS.insert(5, "piko-prune")
+STEPS += ["piko.pipeline(convert-piko-to-scf)"]
+STEPS += ["piko.pipeline(convert-piko-to-openmp)", "convert-piko-to-llvm"]
+STEPS += ["convert-scf-to-cf,convert-vector-to-llvm,convert-math-to-llvm"]
+STEPS += ["convert-ub-to-llvm,convert-openmp-to-llvm"]
+STEPS += ["reconcile-unrealized-casts"]
+
+
+def draw():
+    size = "--width 203 --height 155 --warmup 0 --frames 1 --json".split()
+    command = ["piko-render", module, scene, "--no-cache", *size]
+    return json.loads(subprocess.check_output(command))["image_hash"]
+
+
+expected = draw()
+for step in STEPS:
+    passes = f"--pass-pipeline=builtin.module({step})"
+    result = subprocess.run(["piko-opt", module, passes], capture_output=True)
+    assert result.returncode == 0, result.stderr.decode()
+    pathlib.Path(module).write_bytes(result.stdout)
+    picture = draw()
+    assert picture == expected, f"{step}: {picture} instead of {expected}"
