@@ -135,14 +135,14 @@ private:
         /*fused=*/nullptr);
     builder.createBlock(&op.getBody());
     if (stage.hasAssign) {
-      auto assign =
-          AssignOp::create(builder, stage.location, nullptr, nullptr, nullptr);
+      auto assign = AssignOp::create(builder, *stage.assignLocation, nullptr,
+                                     nullptr, nullptr);
       if (!buildPhase(WrapperKind::Assign, number, assign.getBody()))
         return false;
     }
     if (!buildSchedule(number))
       return false;
-    auto process = ProcessOp::create(builder, stage.location, nullptr);
+    auto process = ProcessOp::create(builder, *stage.processLocation, nullptr);
     return buildPhase(WrapperKind::Process, number, process.getBody());
   }
 

@@ -381,6 +381,7 @@ LogicalResult PipelineReader::readPhases(const CXXRecordDecl *type,
     return emitError(where) << "expected stage '" << stage.name
                             << "' to have a process phase, but '"
                             << stage.typeName << "' has none";
+  stage.processLocation = locate(process->getLocation());
   if (const auto *method = dyn_cast<clang::CXXMethodDecl>(process))
     if (method->getNumParams() == 1) {
       QualType parameter = method->getParamDecl(0)->getType();
@@ -388,6 +389,8 @@ LogicalResult PipelineReader::readPhases(const CXXRecordDecl *type,
           parameter.getNonReferenceType()->getAsCXXRecordDecl(), "List");
     }
   stage.hasAssign = declares(type, "assignBin", assign);
+  if (stage.hasAssign)
+    stage.assignLocation = locate(assign->getLocation());
   stage.hasSchedule = declares(type, "schedule", schedule);
   if (!stage.hasAssign && !stage.isWholeDomain())
     return emitError(where)

@@ -3,7 +3,7 @@
 // piko-compact-loops: what a test guards is done for the primitives of a block
 // that passed it, together.
 
-#include "LanePlan.h"
+#include "LaneReport.h"
 #include "StateAccess.h"
 
 #include "Piko/Transforms/Passes.h"
@@ -53,9 +53,10 @@ public:
 
   /// Whether the work can be put off until others have taken the test.
   bool find();
-  /// Makes a loop of the work; false, and nothing has changed, if that would
-  /// not be worth it.
-  bool split();
+  /// Makes a loop of the work, unless that would not be worth it: then nothing
+  /// has changed. The result says what vectors would have to do.
+  LaneCost split();
+  Location getTest() { return test.getLoc(); }
 
 private:
   bool isWorkAlone() const;
@@ -170,8 +171,9 @@ void GuardedLoop::createWork() {
   Value zero = arith::ConstantIndexOp::create(builder, loc, 0);
   Value one = arith::ConstantIndexOp::create(builder, loc, 1);
   Value size = memref::LoadOp::create(builder, loc, count, zero);
-  workLoop = scf::ForOp::create(builder, loc, zero, size, one);
+  workLoop = scf::ForOp::create(builder, test.getLoc(), zero, size, one);
   workLoop->setAttr("piko.lanes", builder.getUnitAttr());
+  workLoop->setAttr("piko.passed", builder.getUnitAttr());
   builder.setInsertionPointToStart(workLoop.getBody());
   Value place = workLoop.getInductionVar();
   IRMapping mapping;
@@ -224,10 +226,11 @@ void GuardedLoop::createTest() {
                           count, zero);
 }
 
-bool GuardedLoop::split() {
+LaneCost GuardedLoop::split() {
   createWork();
   LanePlanner planner(workLoop);
-  if (!planner.getCost(planner.run()).isWorthwhile()) {
+  LaneCost cost = planner.getCost(planner.run());
+  if (!cost.isWorthwhile()) {
     Operation *size = workLoop.getUpperBound().getDefiningOp();
     workLoop->erase();
     size->erase();
@@ -235,10 +238,10 @@ bool GuardedLoop::split() {
       array.getDefiningOp()->erase();
     list.getDefiningOp()->erase();
     count.getDefiningOp()->erase();
-    return false;
+    return cost;
   }
   createTest();
-  return true;
+  return cost;
 }
 
 //===----------------------------------------------------------------------===//
@@ -251,14 +254,19 @@ void CompactLoopsPass::runOnOperation() {
     if (!guarded.find())
       continue;
     StageOp stage = getKernelStage(loop);
-    bool isSplit = guarded.split();
-    InFlightDiagnostic remark = stage.emitRemark()
-                                << "stage '" << stage.getSymName() << "' does "
-                                << (isSplit ? "together" : "one by one")
-                                << " what passes a test";
-    if (isSplit)
+    StringRef phase = getLoopPhase(loop);
+    LaneCost cost = guarded.split();
+    InFlightDiagnostic remark = emitRemark(guarded.getTest())
+                                << "stage '" << stage.getSymName()
+                                << "': " << phase;
+    if (cost.isWorthwhile()) {
+      remark << " puts off what passes this test, to do it together";
       ++compacted;
-    else
-      remark.attachNote() << "there is too little for vectors to compute";
+      continue;
+    }
+    remark << " does what passes this test without delay";
+    remark.attachNote(guarded.getTest())
+        << "too little is computed behind it: expected at least "
+        << cost.getLeast() << " operations, but got " << cost.operations;
   }
 }

@@ -58,15 +58,15 @@ LanePlan LanePlanner::run() {
   return plan;
 }
 
-bool LaneCost::isWorthwhile() const {
+int64_t LaneCost::getLeast() const {
   constexpr int64_t leastOperations = 32, leastForValue = 6;
-  return operations >= leastOperations && operations >= leastForValue * values;
+  return std::max(leastOperations, leastForValue * values);
 }
 
 LaneCost LanePlanner::getCost(const LanePlan &plan) const {
   constexpr int64_t weightInLoop = 8;
   LaneCost cost;
-  if (keepsOther)
+  if (other)
     return cost;
   llvm::DenseSet<Value> read;
   plan.walk([&](Operation *op) {
@@ -216,6 +216,7 @@ bool LanePlanner::take(Operation *op) {
     if (auto load = dyn_cast<LoadOp>(op))
       noteRead(load);
   } else if (!isForLanes(op)) {
+    obstacles.push_back({op});
     return false;
   } else if (isForAddresses(op) &&
              llvm::all_of(op->getOperands(),
@@ -246,12 +247,17 @@ void LanePlanner::forget(Operation *op) {
 }
 
 bool LanePlanner::takeLoop(scf::WhileOp inner) {
+  if (!llvm::all_of(inner.getInits(), [&](Value v) { return isAvailable(v); }))
+    return false;
+  bool isScalar = areScalar(inner.getInits().getTypes()) &&
+                  areScalar(inner.getResultTypes());
   // Of a loop that is entered only now and then, not even the number of its
   // iterations would be known to be finite elsewhere.
-  if (conditions || !areScalar(inner.getInits().getTypes()) ||
-      !areScalar(inner.getResultTypes()) ||
-      !llvm::all_of(inner.getInits(), [&](Value v) { return isAvailable(v); }))
+  if (conditions || !isScalar) {
+    addObstacle(inner,
+                isScalar ? LaneObstacle::isEntered : LaneObstacle::holds);
     return false;
+  }
   SmallVector<bool> same;
   for (Value init : inner.getInits())
     same.push_back(isInvariant(init));
@@ -278,16 +284,24 @@ bool LanePlanner::takeLoop(scf::WhileOp inner, SmallVector<bool> &same) {
        llvm::zip_equal(inner.getBeforeArguments(), same))
     add(argument, isSame);
   scf::ConditionOp condition = inner.getConditionOp();
-  if (!takeRegion(inner.getBefore()) || !isInvariant(condition.getCondition()))
+  if (!takeRegion(inner.getBefore())) {
+    addObstacle(inner, LaneObstacle::holds);
     return false;
+  }
+  if (!isInvariant(condition.getCondition())) {
+    addObstacle(inner, LaneObstacle::differs);
+    return false;
+  }
   for (auto [value, argument, result] :
        llvm::zip_equal(condition.getArgs(), inner.getAfterArguments(),
                        inner.getResults())) {
     add(argument, isInvariant(value));
     add(result, isInvariant(value));
   }
-  if (!takeRegion(inner.getAfter()))
+  if (!takeRegion(inner.getAfter())) {
+    addObstacle(inner, LaneObstacle::holds);
     return false;
+  }
   for (auto [value, isSame] :
        llvm::zip_equal(inner.getYieldOp().getResults(), same))
     isSame = isSame && isInvariant(value);
@@ -349,6 +363,80 @@ bool LanePlanner::isPrivate(Region &region) const {
   return llvm::all_of(used, [&](Value v) {
     return isAvailable(v) || v.getDefiningOp<memref::AllocaOp>();
   });
+}
+
+//===----------------------------------------------------------------------===//
+// What cannot
+//===----------------------------------------------------------------------===//
+
+void LanePlanner::addObstacle(scf::WhileOp loop, LaneObstacle::Reason reason) {
+  LaneObstacle obstacle{loop, reason};
+  // One obstacle stands for all that the loop holds, and an effect for those
+  // that could go if it did.
+  llvm::erase_if(obstacles, [&](const LaneObstacle &other) {
+    bool isInside = loop->isProperAncestor(other.op);
+    if (isInside)
+      obstacle.inner = other.inner ? other.inner : other.op;
+    return isInside;
+  });
+  loop->walk([&](Operation *op) {
+    bool isEffect = !op->getNumRegions() && !isMemoryEffectFree(op) &&
+                    !isa<LoadOp, memref::LoadOp, memref::StoreOp>(op);
+    if (!isEffect && !isa<UpdateOp>(op))
+      return WalkResult::advance();
+    obstacle.inner = op;
+    return WalkResult::interrupt();
+  });
+  // Or else what it needs is not there.
+  if (obstacle.inner || reason != LaneObstacle::holds)
+    obstacles.push_back(obstacle);
+}
+
+int64_t LanePlanner::countHeldUp(Operation *obstacle) const {
+  int64_t count = 0;
+  llvm::DenseSet<Operation *> seen;
+  SmallVector<Operation *> next = {obstacle};
+  while (!next.empty()) {
+    Operation *op = next.pop_back_val();
+    if (!seen.insert(op).second)
+      continue;
+    count += op != obstacle && isForLanes(op) && !isComputed(op);
+    for (Region &region : op->getRegions())
+      for (Operation &inner : region.getOps())
+        next.push_back(&inner);
+    llvm::append_range(next, op->getUsers());
+  }
+  return count;
+}
+
+SmallVector<LaneObstacle> LanePlanner::getObstacles() const {
+  constexpr size_t most = 3;
+  llvm::DenseMap<Operation *, int64_t> held;
+  SmallVector<LaneObstacle> result;
+  for (const LaneObstacle &obstacle : obstacles) {
+    bool isTaken = false;
+    for (Operation *op = obstacle.op; op != loop && !isTaken;
+         op = op->getParentOp())
+      isTaken = taken.contains(op);
+    if (isTaken || held.contains(obstacle.op))
+      continue;
+    held[obstacle.op] = countHeldUp(obstacle.op);
+    if (held[obstacle.op])
+      result.push_back(obstacle);
+  }
+  llvm::DenseMap<Operation *, int64_t> places;
+  loop->walk<WalkOrder::PreOrder>(
+      [&](Operation *op) { places.try_emplace(op, places.size()); });
+  llvm::sort(result, [&](const LaneObstacle &a, const LaneObstacle &b) {
+    return std::pair(-held.lookup(a.op), places.lookup(a.op)) <
+           std::pair(-held.lookup(b.op), places.lookup(b.op));
+  });
+  result.truncate(std::min(result.size(), most));
+  // The order in which the loop holds them.
+  llvm::sort(result, [&](const LaneObstacle &a, const LaneObstacle &b) {
+    return places.lookup(a.op) < places.lookup(b.op);
+  });
+  return result;
 }
 
 void LanePlanner::findPrefetches() {
@@ -442,6 +530,7 @@ void LanePlanner::findKept(LanePlan &plan) {
       for (Value result : op->getResults())
         if (!llvm::all_of(result.getUsers(), isAhead)) {
           plan.kept.push_back(result);
-          keepsOther |= !areScalar(result.getType());
+          if (!areScalar(result.getType()))
+            other = result;
         }
 }

@@ -52,8 +52,24 @@ struct LaneCost {
   int64_t operations = 0; ///< that run ahead; those of inner loops count more
   int64_t values = 0;     ///< that are kept in between
 
-  /// Whether what runs ahead is worth what is stored and loaded for it.
-  bool isWorthwhile() const;
+  /// With how many operations what runs ahead is worth what is stored and
+  /// loaded for it.
+  int64_t getLeast() const;
+  bool isWorthwhile() const { return operations >= getLeast(); }
+};
+
+/// An operation that cannot run ahead, though all that it needs can, and why.
+struct LaneObstacle {
+  enum Reason {
+    isItself, ///< lanes cannot do it
+    holds,    ///< the loop holds `inner`
+    carries,  ///< the loop carries what is no number
+    differs,  ///< the loop's number of iterations differs between primitives
+    isEntered ///< some primitives alone enter the loop
+  };
+  mlir::Operation *op;
+  Reason reason = isItself;
+  mlir::Operation *inner = nullptr;
 };
 
 /// Makes the plan of a loop over primitives, and tells how its operations run
@@ -64,6 +80,11 @@ public:
 
   LanePlan run();
   LaneCost getCost(const LanePlan &plan) const;
+  /// What keeps most operations from running ahead, in the loop's order.
+  llvm::SmallVector<LaneObstacle> getObstacles() const;
+  /// What is no number but would have to be kept; null if there is nothing.
+  mlir::Value getOther() const { return other; }
+  bool readsFixedState(mlir::Operation *op) const;
 
   mlir::scf::ForOp getLoop() const { return loop; }
 
@@ -107,6 +128,10 @@ private:
   bool takeLoop(mlir::scf::WhileOp inner, llvm::SmallVector<bool> &uniform);
   bool takeRegion(mlir::Region &region);
   void forget(mlir::Operation *op);
+  /// Notes why a loop is not taken.
+  void addObstacle(mlir::scf::WhileOp loop, LaneObstacle::Reason reason);
+  /// How many operations for vectors would run ahead if an obstacle did.
+  int64_t countHeldUp(mlir::Operation *obstacle) const;
   void noteRead(LoadOp load);
   bool isAvailable(mlir::Value value) const;
   /// Whether a value is the same for all primitives and all iterations of inner
@@ -118,7 +143,6 @@ private:
   bool isFetch(mlir::Operation *op) const;
   /// Whether a value can lead to what is read.
   bool isAddress(mlir::Value value) const;
-  bool readsFixedState(mlir::Operation *op) const;
   /// Whether the loop only reads an array.
   bool isFixed(mlir::Value array) const;
   /// Whether a side of a condition changes nothing but arrays of its own, so
@@ -130,8 +154,9 @@ private:
   /// Variables and results of inner loops, and those of them that are the same
   /// for all primitives.
   llvm::DenseSet<mlir::Value> variables, uniform;
-  int64_t conditions = 0;  // around what is taken
-  bool keepsOther = false; // what is no number would have to be kept
+  int64_t conditions = 0; // around what is taken
+  mlir::Value other;      // is no number, but would have to be kept
+  std::vector<LaneObstacle> obstacles;
   llvm::DenseSet<mlir::Operation *> taken;
   llvm::DenseSet<mlir::Operation *> invariant; // of them
   llvm::DenseSet<mlir::Operation *> global;    // of those

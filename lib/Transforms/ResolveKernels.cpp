@@ -63,6 +63,8 @@ private:
   Value buildItemLoop(OpBuilder &builder, StageOp of, Value bins, Value begin,
                       Value end);
   void buildLocalBin(OpBuilder &builder, Group &group, Value bin);
+  /// Where the phase is that takes the primitives of the stage's bins.
+  Location getPhaseLoc(StageOp of);
   /// Moves a group's process phase to where `builder` stands.
   void resolveProcess(OpBuilder &builder, Group &group, const Place &place);
   void resolveEmit(EmitOp emit, Group &group, const Place &place);
@@ -163,14 +165,24 @@ Place KernelResolver::buildLoops(OpBuilder &builder) {
   return place;
 }
 
+Location KernelResolver::getPhaseLoc(StageOp of) {
+  if (sourceAssign)
+    return sourceAssign.getLoc();
+  for (Group &group : groups)
+    if (group.stage == of)
+      return group.process.getLoc();
+  return loc;
+}
+
 Value KernelResolver::buildItemLoop(OpBuilder &builder, StageOp of, Value bins,
                                     Value begin, Value end) {
-  Value one = arith::ConstantIndexOp::create(builder, loc, 1);
-  auto loop = scf::ForOp::create(builder, loc, begin, end, one);
+  Location at = getPhaseLoc(of);
+  Value one = arith::ConstantIndexOp::create(builder, at, 1);
+  auto loop = scf::ForOp::create(builder, at, begin, end, one);
   loop->setAttr("piko.lanes", builder.getUnitAttr());
   builder.setInsertionPointToStart(loop.getBody());
   auto type = PrimType::get(builder.getContext(), of.getInputAttr());
-  return ItemOp::create(builder, loc, type, bins, loop.getInductionVar());
+  return ItemOp::create(builder, at, type, bins, loop.getInductionVar());
 }
 
 Place KernelResolver::buildCellLoops(OpBuilder &builder, Value bins,
@@ -199,8 +211,9 @@ Place KernelResolver::buildCallLoop(OpBuilder &builder, Value bins,
   Value call = loop.getInductionVar();
   Value bin = CallBinOp::create(builder, loc, bins, call);
   auto range = CallRangeOp::create(builder, loc, bins, call);
-  Value list = ListOp::create(builder, loc, stage.getProcessType(), bins,
-                              range.getBegin(), range.getEnd());
+  Value list =
+      ListOp::create(builder, getPhaseLoc(stage), stage.getProcessType(), bins,
+                     range.getBegin(), range.getEnd());
   if (groups.size() > 1) {
     // A bin ends with its last batch: the next call is for another one.
     Value last = arith::SubIOp::create(builder, loc, calls.getEnd(), one);
@@ -246,8 +259,9 @@ void KernelResolver::buildLocalBin(OpBuilder &builder, Group &group,
         scf::ForOp::create(builder, at, calls.getBegin(), calls.getEnd(), one);
     builder.setInsertionPointToStart(loop.getBody());
     auto range = CallRangeOp::create(builder, at, bins, loop.getInductionVar());
-    input = ListOp::create(builder, at, group.stage.getProcessType(), bins,
-                           range.getBegin(), range.getEnd());
+    input = ListOp::create(builder, group.process.getLoc(),
+                           group.stage.getProcessType(), bins, range.getBegin(),
+                           range.getEnd());
   } else {
     auto range = CellRangeOp::create(builder, at, bins, zero, zero);
     input = buildItemLoop(builder, group.stage, bins, range.getBegin(),

@@ -7,6 +7,7 @@
 // condition, gives up: its primitive goes through the original body, with all
 // that it says about errors.
 
+#include "LaneReport.h"
 #include "LaneWriter.h"
 
 #include "Piko/Transforms/Passes.h"
@@ -259,26 +260,15 @@ static void simplifySwitches(scf::ForOp loop) {
   });
 }
 
-static void explain(StageOp stage, const LaneCost &cost) {
-  InFlightDiagnostic remark = stage.emitRemark()
-                              << "stage '" << stage.getSymName() << "' ";
-  if (cost.isWorthwhile())
-    remark << "computes for " << laneCount << " primitives at once";
-  else
-    remark << "computes for one primitive after the other";
-  remark.attachNote() << "ahead of what has effects, " << cost.operations
-                      << " operations could run, with " << cost.values
-                      << " values to keep";
-}
-
 void VectorizePass::runOnOperation() {
+  LaneReport report(getOperation());
   for (scf::ForOp loop : findLoopsOverPrimitives(getOperation())) {
     StageOp stage = getKernelStage(loop);
     simplifySwitches(loop);
     LanePlanner planner(loop);
     LanePlan plan = planner.run();
     LaneCost cost = planner.getCost(plan);
-    explain(stage, cost);
+    report.add(loop, planner, cost);
     if (!cost.isWorthwhile()) {
       ++left;
       continue;
@@ -287,4 +277,5 @@ void VectorizePass::runOnOperation() {
     LoopVectorizer(loop, stage, std::move(plan), planner).run();
     ++vectorized;
   }
+  report.emit();
 }

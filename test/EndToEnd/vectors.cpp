@@ -18,7 +18,7 @@
 // RUN: pikoc %s --pipe Guards --no-cache --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=VECTORS
 // RUN: pikoc %s --pipe Tests --no-cache --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=VECTORS
 // RUN: pikoc %s --pipe Outside --no-cache --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=VECTORS
-// VECTORS: remark: stage 'stage' computes for 16 primitives at once
+// VECTORS: remark: stage 'stage': process is vectorized for 16 primitives at once
 #include <piko.h>
 
 struct Particle {

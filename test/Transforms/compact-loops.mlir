@@ -1,9 +1,10 @@
 // RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-form-kernels,piko-resolve-kernels,piko-compact-loops),canonicalize,cse)' %s | FileCheck %s
 // RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-form-kernels,piko-resolve-kernels,piko-compact-loops),canonicalize,cse)' %s 2>&1 >/dev/null | FileCheck %s --check-prefix=REMARKS
 
-// REMARKS: remark: stage 'tests' does together what passes a test
-// REMARKS: remark: stage 'little' does one by one what passes a test
-// REMARKS: note: there is too little for vectors to compute
+// The remarks are at the tests.
+// REMARKS: {{[0-9]+}}:7: remark: stage 'tests': process puts off what passes this test, to do it together
+// REMARKS: remark: stage 'little': process does what passes this test without delay
+// REMARKS: note: too little is computed behind it: expected at least 32 operations, but got 0
 // REMARKS-NOT: stage 'again'
 
 piko.record @F {"at" : i32 at 0, "z" : f32 at 4} size 8 align 4

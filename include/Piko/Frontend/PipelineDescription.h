@@ -109,6 +109,9 @@ struct StageDescription {
   /// Bytes from the beginning of the pipeline object.
   int64_t offset = 0;
   mlir::Location location;
+  /// Where its class, or a base of it, declares them.
+  std::optional<mlir::Location> assignLocation = std::nullopt,
+                                processLocation = std::nullopt;
 
   bool isWholeDomain() const {
     for (int64_t size : bins)

@@ -273,7 +273,8 @@ def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
 
     **Limits**: loops inside a phase, also parallel ones, end what runs ahead, as
     do phases that take lists. Where too little can run ahead for what would
-    have to be kept, the loop stays.
+    have to be kept, the loop stays. A remark for each phase has the verdict,
+    with what was in the way.
   }];
   let statistics = [
     Statistic<"vectorized", "vectorized", "loops that compute in vectors">,
