@@ -142,6 +142,27 @@ piko.pipeline @P rank 3 {
 
 // -----
 
+piko.record @F {"x" : f32 at 0} size 4 align 4
+piko.pipeline @P rank 1 {
+  piko.source @a
+  piko.stage @a bins [8] threads 1 : @F -> [] {
+    piko.assign {
+    ^bb0(%f: !piko.prim<@F>):
+      %x = piko.get %f "x" : !piko.prim<@F> -> f32
+      // expected-error@+1 {{must be variadic of cell coordinate (i32, i64 or index), but got 'f32'}}
+      %b = piko.bin_at %x : f32
+      piko.assign_to %b
+      piko.return
+    }
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      piko.return
+    }
+  }
+}
+
+// -----
+
 piko.record @F {"x" : i32 at 0} size 4 align 4
 piko.pipeline @P rank 2 {
   piko.source @a

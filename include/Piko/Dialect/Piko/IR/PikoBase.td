@@ -43,7 +43,8 @@ def Piko_Scalar : AnyTypeOf<[F32, F64, I1, I8, I16, I32, I64],
                             "number of a C++ arithmetic type">;
 
 /// A cell coordinate, as C++ code computes it.
-def Piko_Coordinate : AnyTypeOf<[I32, I64, Index], "cell coordinate">;
+def Piko_Coordinate : AnyTypeOf<[I32, I64, Index],
+                                "cell coordinate (i32, i64 or index)">;
 
 /// Memory of a size that is known at run time.
 def Piko_Bytes : MemRefRankOf<[I8], [1]>,
