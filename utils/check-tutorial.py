@@ -1,11 +1,13 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
-"""Does what docs/Tutorial.md says, in an empty folder, and checks the image.
+"""Does what docs/Tutorial.md or docs/Levels.md says, in an empty folder, and
+checks the image or what is printed.
 
-The last file named in backquotes before a ```cpp or ```cmake fence, but for
-headers, is the one that the fence holds. The ```sh fence is run. The words of the tutorial are
-not changed; the generator, the compiler and where Piko is come from variables
-of the environment.
+The last file named in backquotes before a ```cpp, ```cmake or ```mlir fence, but
+for headers, is the one that the fence holds. The ```sh fences are run; a ```text
+fence is what the last command before it prints. The words of the document are not
+changed; the generator, the compiler and where Piko is come from variables of the
+environment.
 """
 
 import argparse
@@ -16,23 +18,29 @@ import shutil
 import subprocess
 import sys
 
-FENCE = re.compile(r"^```(cpp|cmake|sh)\n(.*?)^```", re.S | re.M)
+FENCE = re.compile(r"^```(cpp|cmake|mlir|sh|text)\n(.*?)^```", re.S | re.M)
+FILES = {
+    "Tutorial": {"spheres.piko.cpp", "main.cpp", "CMakeLists.txt"},
+    "Levels": {"dots.mlir", "main.cpp", "CMakeLists.txt"},
+}
 NAME = re.compile(r"`([\w.]+\.\w+)`")
 
 
 def read(document):
-    """Files by name, and the commands."""
-    files, commands, end = {}, "", 0
+    """Files by name, the commands, and lines that these print."""
+    files, commands, printed, end = {}, "", [], 0
     for fence in FENCE.finditer(document):
         kind, body = fence.groups()
         if kind == "sh":
             commands += body
+        elif kind == "text":
+            printed += body.splitlines()
         else:
             names = NAME.findall(document[end : fence.start()])
             names = [n for n in names if not n.endswith(".h")]
             files[names[-1]] = body
         end = fence.end()
-    return files, commands
+    return files, commands, printed
 
 
 def check(image):
@@ -66,8 +74,8 @@ def main():
     parser.add_argument("--work", required=True, type=pathlib.Path)
     parser.add_argument("document", type=pathlib.Path)
     args = parser.parse_args()
-    files, commands = read(args.document.read_text())
-    expected = {"spheres.piko.cpp", "main.cpp", "CMakeLists.txt"}
+    files, commands, printed = read(args.document.read_text())
+    expected = FILES[args.document.stem]
     if set(files) != expected or not commands:
         sys.exit(f"expected {expected} and commands, but got {set(files)}")
     shutil.rmtree(args.work, ignore_errors=True)
@@ -75,14 +83,19 @@ def main():
     for name, text in files.items():
         (args.work / name).write_text(text)
     environment = dict(os.environ, PIKO=args.piko)
-    subprocess.run(
+    output = subprocess.run(
         ["sh", "-e"],
-        input=commands.encode(),
+        input=commands,
         cwd=args.work,
         env=environment,
         check=True,
-    )
-    check(args.work / "spheres.ppm")
+        stdout=subprocess.PIPE,
+        text=True,
+    ).stdout
+    for line in printed:
+        assert line in output.splitlines(), f"expected '{line}' in:\n{output}"
+    if args.document.stem == "Tutorial":
+        check(args.work / "spheres.ppm")
 
 
 if __name__ == "__main__":
