@@ -73,8 +73,11 @@ int32_t Cycle::step() {
                   "stage " + quoted(p_.stages[chosen_].name) +
                       ": expected its kernel to run before the next step of "
                       "its cycle"};
-  loop_ = nullptr;
-  if (!finished_)
+  if (loop_ && (chosen_ = loop_->next()) < 0) { // most often it goes on
+    parts_[part_++].started = false;
+    loop_ = nullptr;
+  }
+  if (chosen_ < 0 && !finished_)
     chosen_ = choose();
   begun_ = false;
   if (!finished_ && chosen_ < 0)
@@ -95,7 +98,6 @@ int32_t Cycle::choose() {
     for (; part_ < parts_.size(); ++part_)
       if (int32_t stage = runPart(parts_[part_]); stage >= 0)
         return stage;
-    loop_ = nullptr;
     if (int32_t stage = nextCollector(); stage >= 0)
       return stage;
     if (std::none_of(collectors_.begin(), collectors_.end(),
@@ -107,7 +109,6 @@ int32_t Cycle::choose() {
 
 /// The stage of the part that runs next, or -1 if the part has come to rest.
 int32_t Cycle::runPart(Part &part) {
-  loop_ = part.loop.get();
   if (!part.started) {
     if (std::none_of(part.stages.begin(), part.stages.end(), [&](int32_t s) {
           return hasInput(p_.stages[s], fromOutside_);
@@ -120,6 +121,8 @@ int32_t Cycle::runPart(Part &part) {
   }
   int32_t stage = part.loop ? part.loop->next() : -1;
   part.started = stage >= 0;
+  if (part.started)
+    loop_ = part.loop.get();
   return stage;
 }
 

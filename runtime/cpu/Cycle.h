@@ -70,7 +70,7 @@ private:
   bool fromOutside_ = true; ///< This spread takes what comes into the cycle.
   bool finished_ = false;
   int32_t chosen_ = -1;  ///< The stage whose kernel is to run.
-  Loop *loop_ = nullptr; ///< Its loop, if it is of one.
+  Loop *loop_ = nullptr; ///< Its loop, if it is of one: parts_[part_]'s.
   Queue input_;          ///< What a serial launch outside of loops takes.
   bool begun_ = false;   ///< It has its input.
 };

@@ -17,12 +17,6 @@ std::unique_ptr<Loop> Loop::make(pikort_pipeline &p, const LoopShape &shape) {
   return std::make_unique<WaveLoop>(p, shape);
 }
 
-size_t Loop::memberOf(int32_t stage) const {
-  return static_cast<size_t>(
-      std::find(shape_.stages.begin(), shape_.stages.end(), stage) -
-      shape_.stages.begin());
-}
-
 void Loop::start(bool fromOutside) {
   entries_.clear();
   places_.clear();

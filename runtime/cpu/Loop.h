@@ -47,7 +47,12 @@ protected:
 
   size_t members() const { return shape_.stages.size(); }
   const Stage &member(size_t m) const { return p_.stages[shape_.stages[m]]; }
-  size_t memberOf(int32_t stage) const;
+  size_t memberOf(int32_t stage) const {
+    size_t m = 0;
+    while (shape_.stages[m] != stage)
+      ++m;
+    return m;
+  }
   int64_t recordSize(const Stage &stage) const {
     return p_.records[stage.record].size;
   }

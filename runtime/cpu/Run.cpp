@@ -246,17 +246,22 @@ static int32_t end(pikort_pipeline &p, Kernel &kernel) {
   return status;
 }
 
-/// The kernel of a stage or a source, or null and an error.
-static Kernel *find(pikort_pipeline *p, auto &list, int32_t index,
-                    const char *what) noexcept {
-  if (static_cast<size_t>(index) < list.size())
-    if (Kernel *kernel = list[index].kernel.get()) [[likely]]
-      return kernel;
+[[gnu::cold, gnu::noinline]] static void
+failFind(pikort_pipeline *p, int32_t index, const char *what) noexcept {
   guarded(p, "run", [&] {
     throw Failure{PIKORT_BAD_PROGRAM, std::string("expected the number of a ") +
                                           what + ", but got " +
                                           std::to_string(index)};
   });
+}
+
+/// The kernel of a stage or a source, or null and an error.
+static inline Kernel *find(pikort_pipeline *p, auto &list, int32_t index,
+                           const char *what) noexcept {
+  if (static_cast<size_t>(index) < list.size())
+    if (Kernel *kernel = list[index].kernel.get()) [[likely]]
+      return kernel;
+  failFind(p, index, what);
   return nullptr;
 }
 

@@ -4,7 +4,6 @@
 #include "cpu/Serial.h"
 
 #include <algorithm>
-#include <span>
 
 using namespace piko::rt;
 
@@ -127,6 +126,8 @@ void Serial::begin(const Items &input) {
 }
 
 void Serial::binPairs(const Items &input) {
+  if (input.pairCount == 1 && *input.pairs != noCell)
+    return binPair(*input.pairs & ~PIKOIR_FIRST_CELL);
   pairs_.sort(input);
   const std::vector<uint64_t> &entries = pairs_.entries();
   kernel_.positions = static_cast<int64_t>(entries.size());
@@ -135,6 +136,14 @@ void Serial::binPairs(const Items &input) {
   for (size_t i = 0; i < entries.size() && !identity; ++i)
     order_.push_back(pairs_.itemOf(PairOrder::pairOf(entries[i])));
   cutRuns(entries, offsets_.data(), kernel_.units);
+}
+
+/// The same for a single pair.
+void Serial::binPair(int64_t cell) {
+  kernel_.positions = 1;
+  offsets_[cell] = 0;
+  offsets_[cell + 1] = 1;
+  kernel_.units.push_back({cell, cell + 1, 0, 1});
 }
 
 /// One unit of all calls takes the place of runs of cells.
@@ -172,61 +181,61 @@ pikoir_writer *Serial::open(int64_t unit) {
 
 // --- What it emitted --------------------------------------------------------
 
+static bool isInOnePiece(const PortLogs &logs) {
+  return logs.records.segments.empty() && logs.cells.segments.empty() &&
+         logs.ordinals.segments.empty();
+}
+
 /// The latest block of a log, which is the largest, serves again.
-static uint8_t *rewindLog(Log &log) {
+static void dropPieces(Log &log) {
   if (log.blocks.size() > 1)
     log.blocks.erase(log.blocks.begin(), log.blocks.end() - 1);
   log.segments.clear();
-  return log.start = log.blocks.front().data();
 }
 
 void Serial::rewind(size_t port) {
   PortLogs &logs = lane_.logs[port];
   pikoir_port &out = lane_.portStorage[port];
-  auto words = [](const Log &log) { return log.blocks.front().capacity() / 4; };
-  if (!logs.records.blocks.empty()) {
-    out.cursor = rewindLog(logs.records);
-    out.limit = out.cursor + logs.records.blocks.front().capacity() - out.size;
-  }
-  if (!logs.cells.blocks.empty()) {
-    out.cell_cursor = reinterpret_cast<uint32_t *>(rewindLog(logs.cells));
-    out.cell_end = out.cell_cursor + words(logs.cells);
-  }
-  if (!logs.ordinals.blocks.empty()) {
-    out.ordinal_cursor = reinterpret_cast<uint32_t *>(rewindLog(logs.ordinals));
-    out.ordinal_end = out.ordinal_cursor + words(logs.ordinals);
-  }
+  if (!isInOnePiece(logs)) [[unlikely]]
+    for (Log *log : {&logs.records, &logs.cells, &logs.ordinals})
+      dropPieces(*log);
+  out.cursor = logs.records.start;
+  out.cell_cursor = reinterpret_cast<uint32_t *>(logs.cells.start);
+  out.ordinal_cursor = reinterpret_cast<uint32_t *>(logs.ordinals.start);
   out.emitted = out.kept = 0;
 }
 
 /// What a log holds up to its cursor, in one piece.
-static std::span<const uint8_t> join(Memory &memory, const Log &log,
-                                     const void *cursor,
-                                     Growing<uint8_t> &piece) {
-  int64_t last = static_cast<const uint8_t *>(cursor) - log.start;
-  if (log.segments.empty()) [[likely]]
-    return {log.start, static_cast<size_t>(last)};
+static const uint8_t *join(Memory &memory, const Log &log, const void *cursor,
+                           Growing<uint8_t> &piece) {
   piece.shrink(0);
   for (const Segment &segment : log.segments)
     piece.append(memory, segment.data, segment.bytes);
-  piece.append(memory, log.start, last);
-  return {piece.data(), static_cast<size_t>(piece.size())};
+  piece.append(memory, log.start,
+               static_cast<const uint8_t *>(cursor) - log.start);
+  return piece.data();
 }
 
 void Serial::collect(size_t port) {
   const PortLogs &logs = lane_.logs[port];
   const pikoir_port &out = lane_.portStorage[port];
-  Pieces &pieces = pieces_[port];
   Emitted &emitted = ports_[port];
   emitted.count = out.cells != 0 ? out.kept : out.emitted;
-  emitted.items =
-      join(p_.memory, logs.records, out.cursor, pieces.records).data();
-  auto cells = join(p_.memory, logs.cells, out.cell_cursor, pieces.cells);
-  emitted.pairs = reinterpret_cast<const uint32_t *>(cells.data());
-  emitted.pairCount = static_cast<int64_t>(cells.size()) / 4;
-  emitted.numbers = reinterpret_cast<const uint32_t *>(
-      join(p_.memory, logs.ordinals, out.ordinal_cursor, pieces.ordinals)
-          .data());
+  const uint8_t *pairs = logs.cells.start, *numbers = logs.ordinals.start;
+  emitted.items = logs.records.start;
+  emitted.pairCount =
+      out.cell_cursor - reinterpret_cast<const uint32_t *>(pairs);
+  if (!isInOnePiece(logs)) [[unlikely]] {
+    Pieces &pieces = pieces_[port];
+    emitted.items =
+        join(p_.memory, logs.records, out.cursor, pieces.records);
+    pairs = join(p_.memory, logs.cells, out.cell_cursor, pieces.cells);
+    emitted.pairCount = pieces.cells.size() / 4;
+    numbers =
+        join(p_.memory, logs.ordinals, out.ordinal_cursor, pieces.ordinals);
+  }
+  emitted.pairs = reinterpret_cast<const uint32_t *>(pairs);
+  emitted.numbers = reinterpret_cast<const uint32_t *>(numbers);
 }
 
 void Serial::end() {

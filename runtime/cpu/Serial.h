@@ -100,6 +100,7 @@ private:
   };
 
   void binPairs(const Items &input);
+  void binPair(int64_t cell);
   void makeCalls();
   void rewind(size_t port);
   void collect(size_t port);

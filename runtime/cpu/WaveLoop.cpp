@@ -101,6 +101,8 @@ void WaveLoop::put(int32_t e, const Items &emitted, int64_t base,
 /// Children of a node are numbered as they were emitted, since its cells were
 /// taken in order.
 void WaveLoop::absorb(const Serial &launch) {
+  if (launch.emitted() == 1 && launch.slots() == 1)
+    return absorbOne(launch);
   int64_t base = tree_.size();
   checkCount(member(running_), base + launch.emitted());
   uint32_t *parents = tree_.extend(p_.memory, launch.emitted());
@@ -117,6 +119,19 @@ void WaveLoop::absorb(const Serial &launch) {
       put(outputs[port], emitted, base, emitted.numbers);
   }
   nodes.shrink(0);
+}
+
+/// An only child takes its parent's place in the tree.
+void WaveLoop::absorbOne(const Serial &launch) {
+  static constexpr uint32_t first = 0;
+  Growing<uint32_t> &nodes = current()[running_].nodes;
+  uint32_t node = nodes[launch.itemAt(0)];
+  nodes.shrink(0);
+  const std::vector<int32_t> &outputs = member(running_).outputs;
+  for (size_t port = 0; port < outputs.size(); ++port)
+    if (const Serial::Emitted &emitted = launch.ports()[port];
+        emitted.count > 0)
+      return put(outputs[port], emitted, node, &first);
 }
 
 // --- What other launches emitted --------------------------------------------

@@ -29,6 +29,7 @@ private:
   };
 
   void begin() override;
+  void absorbOne(const Serial &launch);
   void numberRecords(const Kernel &kernel, std::vector<Port> &ports,
                      uint32_t *items);
   /// `items[n]` is the item of the kernel's input from which record n comes.
