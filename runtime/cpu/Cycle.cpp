@@ -197,7 +197,7 @@ bool Cycle::runsSerially(Kernel &kernel) const {
     return false;
   if (stage.collects())
     return stage.tiles == 1 && round_ > 0;
-  return PairOrder::isSorted(queue.view()) &&
+  return isSorted(queue.view()) &&
          std::none_of(stage.outputs.begin(), stage.outputs.end(),
                       [&](int32_t e) { return e >= 0 && p_.edges[e].keyed; });
 }

@@ -9,7 +9,7 @@ using namespace piko::rt;
 
 // --- Few pairs in many cells ------------------------------------------------
 
-void PairOrder::sort(const Items &input) {
+void PairOrder::read(const Items &input) {
   entries_.clear();
   items_.clear();
   sorted_ = true;
@@ -30,11 +30,14 @@ void PairOrder::sort(const Items &input) {
     last = entry;
     entries_.push_back(entry);
   }
+}
+
+void PairOrder::sort() {
   if (!sorted_)
     std::sort(entries_.begin(), entries_.end());
 }
 
-bool PairOrder::isSorted(const Items &input) {
+bool piko::rt::isSorted(const Items &input) {
   uint32_t last = 0;
   for (int64_t k = 0; k < input.pairCount; ++k) {
     uint32_t pair = input.pairs[k];
@@ -71,7 +74,7 @@ Serial::Serial(pikort_pipeline &p, Kernel &kernel)
       ports_(stage_.outputs.size()), pieces_(stage_.outputs.size()) {}
 
 bool Serial::takes(const pikort_pipeline &p, Kernel &kernel, int64_t count) {
-  constexpr double worthThreads = 0.1; // milliseconds
+  constexpr double worthThreads = 0.2; // milliseconds
   if (count > most)
     return false;
   if (count <= fewest || p.threads == 1 ||
@@ -128,14 +131,36 @@ void Serial::begin(const Items &input) {
 void Serial::binPairs(const Items &input) {
   if (input.pairCount == 1 && *input.pairs != noCell)
     return binPair(*input.pairs & ~PIKOIR_FIRST_CELL);
-  pairs_.sort(input);
+  pairs_.read(input);
   const std::vector<uint64_t> &entries = pairs_.entries();
-  kernel_.positions = static_cast<int64_t>(entries.size());
-  bool identity = pairs_.wasSorted() && input.onePairEach() &&
-                  kernel_.positions == input.count;
-  for (size_t i = 0; i < entries.size() && !identity; ++i)
-    order_.push_back(pairs_.itemOf(PairOrder::pairOf(entries[i])));
-  cutRuns(entries, offsets_.data(), kernel_.units);
+  auto count = static_cast<int64_t>(entries.size());
+  kernel_.positions = count;
+  if (pairs_.isSorted() || stage_.cells > 8 * count) {
+    pairs_.sort();
+    bool identity =
+        pairs_.isSorted() && input.onePairEach() && count == input.count;
+    for (size_t i = 0; i < entries.size() && !identity; ++i)
+      order_.push_back(pairs_.itemOf(PairOrder::pairOf(entries[i])));
+    cutRuns(entries, offsets_.data(), kernel_.units);
+    return;
+  }
+  countPairs();
+  kernel_.units.push_back({0, stage_.cells, 0, count});
+}
+
+/// The order of many pairs in few cells.
+void Serial::countPairs() {
+  int64_t *next = offsets_.data() + 1; // of each cell, in the end its end
+  std::fill_n(offsets_.data(), stage_.cells + 1, 0);
+  for (uint64_t entry : pairs_.entries())
+    ++next[PairOrder::cellOf(entry)];
+  int64_t sum = 0;
+  for (int64_t cell = 0; cell < stage_.cells; ++cell)
+    sum += std::exchange(next[cell], sum);
+  order_.resize(pairs_.entries().size());
+  for (uint64_t entry : pairs_.entries())
+    order_[static_cast<size_t>(next[PairOrder::cellOf(entry)]++)] =
+        pairs_.itemOf(PairOrder::pairOf(entry));
 }
 
 /// The same for a single pair.
@@ -227,8 +252,7 @@ void Serial::collect(size_t port) {
       out.cell_cursor - reinterpret_cast<const uint32_t *>(pairs);
   if (!isInOnePiece(logs)) [[unlikely]] {
     Pieces &pieces = pieces_[port];
-    emitted.items =
-        join(p_.memory, logs.records, out.cursor, pieces.records);
+    emitted.items = join(p_.memory, logs.records, out.cursor, pieces.records);
     pairs = join(p_.memory, logs.cells, out.cell_cursor, pieces.cells);
     emitted.pairCount = pieces.cells.size() / 4;
     numbers =

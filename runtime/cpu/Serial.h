@@ -18,8 +18,7 @@
 
 namespace piko::rt {
 
-/// Pairs of a stream in the order of processing, sorted: for streams that are
-/// small in comparison with the number of cells.
+/// Pairs by cell, for what is little in comparison with the number of cells.
 class PairOrder {
 public:
   /// The entries of one that is sorted: the cell and the pair's number.
@@ -30,20 +29,24 @@ public:
     return static_cast<uint32_t>(entry);
   }
 
-  void sort(const Items &input);
-  static bool isSorted(const Items &input);
+  /// Takes the pairs as they come.
+  void read(const Items &input);
+  void sort();
   const std::vector<uint64_t> &entries() const { return entries_; }
   uint32_t itemOf(uint32_t pair) const {
     return items_.empty() ? pair : items_[pair];
   }
-  /// Positions and pairs are in the same order.
-  bool wasSorted() const { return sorted_; }
+  /// They came in the order of processing.
+  bool isSorted() const { return sorted_; }
 
 private:
   std::vector<uint64_t> entries_;
   std::vector<uint32_t> items_; ///< Of each pair; none = one pair each.
   bool sorted_ = true;
 };
+
+/// Whether pairs are in the order of processing.
+bool isSorted(const Items &input);
 
 /// Cuts sorted pairs into runs of neighbouring cells, and sets the first
 /// position of each of these cells and of the one behind.
@@ -53,7 +56,7 @@ void cutRuns(const std::vector<uint64_t> &entries, int64_t *offsets,
 class Serial {
 public:
   /// The most primitives, or pairs, of a launch.
-  static constexpr int64_t most = 1024;
+  static constexpr int64_t most = int64_t(1) << 14;
   /// Up to here, threads cost more than they could bring.
   static constexpr int64_t fewest = 32;
 
@@ -101,6 +104,7 @@ private:
 
   void binPairs(const Items &input);
   void binPair(int64_t cell);
+  void countPairs();
   void makeCalls();
   void rewind(size_t port);
   void collect(size_t port);

@@ -146,8 +146,9 @@ TEST(Cycle, FewPrimitivesTakeNoThreads) {
 
 // Many primitives do take them.
 TEST(Cycle, ManyPrimitivesTakeThreads) {
-  Graph graph = makeGraph({whole({0}, PIKOIR_SPLIT)}, {0}, 5000);
+  Graph graph = makeGraph({whole({0}, PIKOIR_SPLIT)}, {0}, 20000);
   graph.alwaysEmits = true;
+  graph.logs = false;
   graph.stages[0].mostEmissions = 1;
   GraphRun run(graph);
   ASSERT_EQ(run.run(2), PIKORT_OK) << pikort_message(run.get());
