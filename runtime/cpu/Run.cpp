@@ -74,7 +74,8 @@ static void openLanes(pikort_pipeline &p, Kernel &kernel) {
 }
 
 /// Units for the AssignBin of a source: any chunks will do.
-static void prepareSource(pikort_pipeline &p, Kernel &kernel) {
+[[gnu::noinline]] static void prepareSource(pikort_pipeline &p,
+                                            Kernel &kernel) {
   const Source &source = p.sources[kernel.source];
   kernel.stream.items =
       source.data +
@@ -115,8 +116,8 @@ static void chooseLaunch(pikort_pipeline &p, Kernel &kernel) {
 }
 
 /// Orders and bins the input over threads.
-static void prepareThreads(pikort_pipeline &p, const Stage &stage,
-                           Kernel &kernel) {
+[[gnu::noinline]] static void
+prepareThreads(pikort_pipeline &p, const Stage &stage, Kernel &kernel) {
   if (stage.keyWidth > 0)
     kernel.keys = std::move(kernel.stream.keys);
   bool rankNeeded = stage.loop >= 0;
@@ -185,7 +186,8 @@ static const pikoir_input *begin(pikort_pipeline &p, Kernel &kernel) {
 
 /// Counts what a launch over threads emitted and how long they waited, and
 /// frees what nothing needs that comes after.
-static void endThreads(pikort_pipeline &p, Kernel &kernel, int32_t status) {
+[[gnu::noinline]] static void endThreads(pikort_pipeline &p, Kernel &kernel,
+                                         int32_t status) {
   KernelStats &stats = p.kernelStats[kernel.statsIndex];
   int64_t busy = 0;
   for (auto &lane : kernel.lanes) {

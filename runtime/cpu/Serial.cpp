@@ -114,7 +114,8 @@ void Serial::begin(const Items &input) {
   }
   if (stage_.takesList())
     makeCalls();
-  slotEnds_.resize(static_cast<size_t>(slots()));
+  if (auto needed = static_cast<size_t>(slots()); needed > slotEnds_.size())
+    slotEnds_.resize(needed);
   lane_.slotEnd = slotEnds_.data();
   lane_.ordinal = 0;
   kernel_.input = {input.items,
@@ -270,6 +271,6 @@ void Serial::end() {
     if (emitted > 0 && stage_.outputs[port] >= 0)
       collect(port);
     else
-      ports_[port] = {};
+      ports_[port].count = 0;
   }
 }
