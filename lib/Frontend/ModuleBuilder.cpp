@@ -6,6 +6,7 @@
 #include "ScalarImport.h"
 
 #include "Import.h"
+#include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "Piko/Dialect/Piko/IR/Piko.h"
 
 using namespace piko;
@@ -71,8 +72,41 @@ private:
       fields.push_back(FieldAttr::get(
           &context, field.name, getScalarType(builder, field.type),
           field.offset, field.counts, field.strides));
-    RecordOp::create(builder, pipeline.location, record.name,
-                     builder.getArrayAttr(fields), record.size, record.align);
+    auto op = RecordOp::create(builder, pipeline.location, record.name,
+                               builder.getArrayAttr(fields), record.size,
+                               record.align);
+    llvm::SmallVector<mlir::NamedAttribute> types;
+    for (const CppTypeDescription &type : record.types)
+      types.push_back(builder.getNamedAttr(type.path, buildCppType(type)));
+    if (!types.empty())
+      op->setAttr(cppTypesAttr, builder.getDictionaryAttr(types));
+  }
+
+  mlir::Attribute buildCppType(const CppTypeDescription &type) {
+    llvm::SmallVector<mlir::NamedAttribute> parts;
+    if (type.size != 0) {
+      parts.push_back(
+          builder.getNamedAttr("size", builder.getI64IntegerAttr(type.size)));
+      parts.push_back(
+          builder.getNamedAttr("align", builder.getI64IntegerAttr(type.align)));
+    }
+    if (!type.underlying.empty()) {
+      parts.push_back(builder.getNamedAttr(
+          "underlying", builder.getStringAttr(type.underlying)));
+      llvm::SmallVector<mlir::NamedAttribute> values;
+      for (const auto &[name, value] : type.enumerators)
+        values.push_back(
+            builder.getNamedAttr(name, builder.getI64IntegerAttr(value)));
+      parts.push_back(
+          builder.getNamedAttr("values", builder.getDictionaryAttr(values)));
+    }
+    if (type.isScoped)
+      parts.push_back(builder.getNamedAttr("scoped", builder.getUnitAttr()));
+    mlir::StringAttr name = builder.getStringAttr(type.type);
+    if (parts.empty())
+      return name;
+    parts.push_back(builder.getNamedAttr("type", name));
+    return builder.getDictionaryAttr(parts);
   }
 
   void buildState(const StateDescription &state) {
@@ -133,6 +167,8 @@ private:
         /*placed=*/nullptr, /*writes=*/nullptr,
         stage.takesList ? builder.getUnitAttr() : mlir::UnitAttr(),
         /*fused=*/nullptr);
+    if (stage.symbol != stage.name)
+      op->setAttr(cppNameAttr, builder.getStringAttr(stage.name));
     builder.createBlock(&op.getBody());
     if (stage.hasAssign) {
       auto assign = AssignOp::create(builder, *stage.assignLocation, nullptr,

@@ -2,13 +2,15 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // Walks a type as Clang lays it out and lists its numbers. Of a union whose
-// members have one size and place, as GLM's have, the first member counts.
+// members have one size and place, as GLM's have, the first member counts. On
+// the way it notes what C++ calls the types that the numbers do not tell.
 //
 //===----------------------------------------------------------------------===//
 
 #include "RecordLayout.h"
 
 #include "ClangDiagnostics.h"
+#include "CppTypes.h"
 #include "clang/AST/DeclCXX.h"
 #include "clang/AST/RecordLayout.h"
 
@@ -26,11 +28,17 @@ struct RecordTable::Path {
   mlir::Location location;
   /// Of a value that is no class: what the user calls it, or nothing.
   std::optional<llvm::StringRef> value = std::nullopt;
+  /// Of the arrays between this and the class around it: "[2][4]".
+  std::string extents = {};
+  /// Whether this is in a type of a library that hosts know.
+  bool isKnown = false;
 
   Path member(llvm::StringRef field, int64_t at, mlir::Location where) const {
     Path path = *this;
-    if (!field.empty())
+    if (!field.empty()) {
       path.name = name.empty() ? field.str() : name + "." + field.str();
+      path.extents.clear();
+    }
     path.offset += at;
     path.location = where;
     return path;
@@ -38,12 +46,7 @@ struct RecordTable::Path {
 };
 
 std::string RecordTable::getName(QualType type) const {
-  clang::PrintingPolicy policy(ast.getLangOpts());
-  policy.SuppressTagKeyword = true;
-  policy.FullyQualifiedName = true;
-  policy.SuppressUnwrittenScope = true;
-  return QualType(ast.getCanonicalType(type).getUnqualifiedType())
-      .getAsString(policy);
+  return getQualifiedName(type, ast);
 }
 
 LogicalResult RecordTable::reject(const Path &path,
@@ -97,12 +100,21 @@ LogicalResult RecordTable::flatten(QualType type, const Path &path,
   if (const auto *array = ast.getAsConstantArrayType(type)) {
     Path element = path;
     element.counts.push_back(array->getZExtSize());
+    element.extents += "[" + std::to_string(array->getZExtSize()) + "]";
     element.strides.push_back(
         ast.getTypeSizeInChars(array->getElementType()).getQuantity());
     return flatten(array->getElementType(), element, record);
   }
-  if (const auto *decl = type->getAsRecordDecl())
-    return flattenClass(decl, path, record);
+  if (const auto *decl = type->getAsRecordDecl()) {
+    Path inside = path;
+    inside.isKnown |= isGlmType(decl);
+    size_t first = record.fields.size();
+    if (llvm::failed(flattenClass(decl, inside, record)))
+      return failure();
+    if (!path.isKnown && record.fields.size() != first)
+      addClass(decl, path, record);
+    return success();
+  }
 
   std::optional<ScalarType> scalar;
   if (type->isSpecificBuiltinType(clang::BuiltinType::Float)) {
@@ -133,7 +145,40 @@ LogicalResult RecordTable::flatten(QualType type, const Path &path,
   }
   record.fields.push_back(
       {path.name, *scalar, path.offset, path.counts, path.strides});
+  if (!path.isKnown)
+    addNumber(type, path, *scalar, record);
   return success();
+}
+
+/// Behind the class's fields.
+void RecordTable::addClass(const clang::RecordDecl *decl, const Path &path,
+                           RecordDescription &record) {
+  CppTypeDescription type = describeClass(decl, ast);
+  type.path = path.name;
+  type.type += path.extents;
+  if (path.name.empty()) {
+    // The record's name says it, unless a library defines the class or the
+    // fields look like those of a plain number.
+    bool isPlain = llvm::all_of(record.fields, [](const LeafField &field) {
+      return llvm::StringRef(field.name).split('.').first == "value";
+    });
+    if (!isPlain && !isLibraryType(decl))
+      return;
+    type.path = "this";
+  }
+  record.types.push_back(std::move(type));
+}
+
+void RecordTable::addNumber(QualType type, const Path &path, ScalarType scalar,
+                            RecordDescription &record) {
+  CppTypeDescription number = describeNumber(type, ast);
+  // A record that is an array is told from a class with one member.
+  bool isArray = path.name == "value" && path.value && !path.extents.empty();
+  if (number.type == getStorageName(scalar) && !isArray)
+    return;
+  number.path = path.name;
+  number.type += path.extents;
+  record.types.push_back(std::move(number));
 }
 
 LogicalResult RecordTable::flattenClass(const clang::RecordDecl *decl,

@@ -32,6 +32,10 @@ private:
                               RecordDescription &record);
   llvm::LogicalResult flattenClass(const clang::RecordDecl *decl,
                                    const Path &path, RecordDescription &record);
+  void addClass(const clang::RecordDecl *decl, const Path &path,
+                RecordDescription &record);
+  void addNumber(clang::QualType type, const Path &path, ScalarType scalar,
+                 RecordDescription &record);
   llvm::LogicalResult reject(const Path &path, const RecordDescription &record,
                              const llvm::Twine &what);
 

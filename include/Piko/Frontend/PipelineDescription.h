@@ -15,6 +15,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace piko {
@@ -38,11 +39,27 @@ struct LeafField {
   }
 };
 
+/// What C++ calls the type of a piece of a record; see `piko.cpp_types`.
+struct CppTypeDescription {
+  /// Of a field, of the class around some, or "this".
+  std::string path;
+  /// With the extents of an array: "Light[4]".
+  std::string type;
+  /// Of a class, where they do not follow from its fields.
+  int64_t size = 0, align = 0;
+  /// Of an enumeration.
+  std::string underlying = {};
+  bool isScoped = false;
+  std::vector<std::pair<std::string, int64_t>> enumerators = {};
+};
+
 /// The layout of a trivially copyable C++ type.
 struct RecordDescription {
   std::string name;
   int64_t size = 0, align = 1;
   std::vector<LeafField> fields;
+  /// The types that the fields do not tell.
+  std::vector<CppTypeDescription> types = {};
 
   int64_t getElementCount() const {
     int64_t count = 0;

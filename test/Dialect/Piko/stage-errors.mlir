@@ -280,3 +280,17 @@ piko.pipeline @P rank 1 {
     }
   }
 }
+
+// -----
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+piko.pipeline @P rank 1 {
+  piko.source @a
+  // expected-error @below {{expected 'piko.cpp_name' to be a string, but got 1 : i64}}
+  piko.stage @a bins [0] threads 1 : @F -> [] attributes {piko.cpp_name = 1} {
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      piko.return
+    }
+  }
+}

@@ -2,6 +2,7 @@
 //
 // Records, pipelines, state and edges.
 
+#include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "Piko/Dialect/Piko/IR/PikoCheck.h"
 #include "llvm/ADT/StringSet.h"
 
@@ -54,7 +55,7 @@ LogicalResult RecordOp::verify() {
              << field.getName() << "' to end within the record's " << size
              << " bytes, but got " << end;
   }
-  return success();
+  return verifyCppTypes(*this);
 }
 
 //===----------------------------------------------------------------------===//

@@ -2,6 +2,7 @@
 //
 // Stages and their phases.
 
+#include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "Piko/Dialect/Piko/IR/Piko.h"
 
 using namespace mlir;
@@ -42,6 +43,10 @@ LogicalResult StageOp::verifySymbolUses(SymbolTableCollection &) {
     if (!lookupRecord(*this, record))
       return emitOpError("expected a record, but got ")
              << record << ", which is none";
+  Attribute name = (*this)->getAttr(cppNameAttr);
+  if (name && !isa<StringAttr>(name))
+    return emitOpError("expected '")
+           << cppNameAttr << "' to be a string, but got " << name;
   return success();
 }
 

@@ -40,6 +40,8 @@ template <class T> struct Identity {
 } // namespace detail
 
 template <class T> class Buffer final {
+  static_assert(sizeof(T) != 0, "the elements of a buffer have a type");
+
 public:
   Buffer() = default;
   Buffer(const Buffer &) = delete;
@@ -53,6 +55,7 @@ public:
 
 template <class T, int Rank = 2> class Image final {
   static_assert(Rank >= 1 && Rank <= 4, "an image has one to four dimensions");
+  static_assert(sizeof(T) != 0, "the pixels of an image have a type");
 
 public:
   Image() = default;
