@@ -118,6 +118,7 @@ void pikoir_declare_state(pikort_pipeline *p, int32_t id, const char *name,
     state.bytes.resize(static_cast<size_t>(size));
     if (bytes)
       state.bytes = state.clear;
+    state.view = {state.bytes.data(), {1, 1, 1, 1}};
     state.bound = bytes != nullptr;
   });
 }

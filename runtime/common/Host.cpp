@@ -310,9 +310,6 @@ int32_t pikort_run(pikort_pipeline *p) {
   int32_t code = call(p, [&] {
     checkBound(*p);
     p->computeGrids();
-    for (State &state : p->states)
-      if (state.kind == PIKORT_CONSTANT)
-        state.view = {state.bytes.data(), {1, 1, 1, 1}};
     prepareState(*p);
     p->profile.enter(Part::Program);
     if (p->checker)

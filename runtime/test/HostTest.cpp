@@ -152,6 +152,8 @@ TEST_F(Host, Unbound) {
   EXPECT_EQ(pikort_get_view(pipe.get(), "depth", &view), PIKORT_UNBOUND);
   EXPECT_STREQ(pikort_message(pipe.get()),
                "state 'depth' exists only after a run");
+  ASSERT_EQ(pikort_get_view(pipe.get(), "scale", &view), PIKORT_OK);
+  EXPECT_EQ(static_cast<const Pixel *>(view.data)->z, 0.0f);
   ASSERT_TRUE(pipe.source(0, points));
   EXPECT_TRUE(pipe.run());
   EXPECT_STREQ(pikort_message(pipe.get()), "");

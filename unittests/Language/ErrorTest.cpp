@@ -170,6 +170,46 @@ TEST(Errors, Feed) {
               HasSubstr("has several sources"));
 }
 
+// A wrong domain leaves the one before it.
+TEST(Errors, DomainStays) {
+  struct SinkPipe : piko::Pipe<> {
+    Sink sink;
+    SinkPipe() { source(sink); }
+  } pipe;
+  pipe.setDomain({2, 2});
+  EXPECT_THAT(messageOf([&] { pipe.setDomain({0, 4, 4}); }),
+              HasSubstr("but got 0"));
+  EXPECT_TRUE(pipe.run());
+}
+
+TEST(Errors, LoopLimit) {
+  OpenPipe pipe;
+  EXPECT_THAT(messageOf([&] { pipe.setLoopLimit(-1); }),
+              "expected a loop limit of at least 0, but got -1");
+}
+
+// What hosts of compiled pipelines write works, and an error can be a status.
+TEST(Errors, Status) {
+  struct StrayPipe : piko::Pipe<> {
+    Sink sink;
+    StrayPipe() { source(sink); }
+  } pipe;
+  piko::Status status = pipe.tryRun();
+  EXPECT_FALSE(status);
+  EXPECT_THAT(status.message(), HasSubstr("has no domain"));
+  EXPECT_EQ(messageOf([&] { status.orThrow(); }), status.message());
+  EXPECT_TRUE(pipe.setDomain({1, 1}));
+  EXPECT_TRUE(pipe.setThreads(2));
+  EXPECT_TRUE(pipe.setMemoryLimit(1));
+  EXPECT_TRUE(pipe.setMemoryBudget(1));
+  EXPECT_TRUE(pipe.setStripSize(1));
+  const std::vector<int> values{4, 5};
+  trace.clear();
+  EXPECT_TRUE(pipe.feed(size_t(0), values));
+  EXPECT_TRUE(pipe.tryRun());
+  EXPECT_THAT(trace, ElementsAre(4, 5));
+}
+
 // Bytes without a type, as generated code feeds them.
 TEST(Errors, FeedOfBytesIsNotChecked) {
   struct BytesPipe : piko::Pipe<> {

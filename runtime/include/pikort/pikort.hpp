@@ -16,54 +16,19 @@
 #ifndef PIKORT_PIKORT_HPP
 #define PIKORT_PIKORT_HPP
 
+#include "piko/status.h"
 #include "pikort/pikort.h"
 
 #include <initializer_list>
 #include <span>
-#include <stdexcept>
-#include <string>
 #include <type_traits>
 #include <utility>
 #include <vector>
 
 namespace piko::rt {
 
-/// PIKORT_OK, or a code and its text.
-class Status {
-public:
-  Status() = default;
-  Status(int32_t code, const char *message)
-      : code_(code), message_(code == PIKORT_OK ? "" : message) {}
-  explicit operator bool() const { return code_ == PIKORT_OK; }
-  int32_t code() const { return code_; }
-  const std::string &message() const { return message_; }
-#ifdef __cpp_exceptions
-  /// For hosts that use exceptions.
-  void orThrow() const;
-#endif
-
-private:
-  int32_t code_ = PIKORT_OK;
-  std::string message_;
-};
-
-#ifdef __cpp_exceptions
-/// A status that is not well, as an exception.
-class Error : public std::runtime_error {
-public:
-  explicit Error(const Status &status)
-      : std::runtime_error(status.message()), code_(status.code()) {}
-  int32_t code() const { return code_; }
-
-private:
-  int32_t code_;
-};
-
-inline void Status::orThrow() const {
-  if (code_ != PIKORT_OK)
-    throw Error(*this);
-}
-#endif
+using piko::Error;
+using piko::Status;
 
 /// The elements of a piece of state; empty if it does not exist (yet).
 template <class T> struct View {

@@ -8,23 +8,13 @@
 #ifndef PIKO_REFERENCE_ERROR_H
 #define PIKO_REFERENCE_ERROR_H
 
-#include <piko/reference/written.h>
+#include <piko/status.h>
 
 #include <cstdint>
-#include <stdexcept>
 #include <string>
 #include <string_view>
 
 namespace piko {
-
-/// What a pipeline did wrong.
-class Error : public std::runtime_error {
-public:
-  explicit Error(const std::string &message) : std::runtime_error(message) {
-    reference::markWritten(what());
-  }
-};
-
 namespace reference {
 
 /// The name of T as the compiler writes it.

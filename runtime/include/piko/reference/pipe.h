@@ -6,8 +6,6 @@
 #include <piko/reference/check.h>
 #include <piko/reference/stage.h>
 
-#include <span>
-
 namespace piko {
 namespace reference {
 
@@ -54,50 +52,60 @@ private:
 /// What a pipeline is apart from the types of its state and stages.
 class PipeBase {
 public:
-  // For the host.
+  // For the host. What goes wrong is thrown, where it happens; the Status that
+  // a call returns always is well. It is there for texts that use compiled
+  // pipelines, too.
 
   /// The extent of the domain in cells, one number for each dimension.
-  void setDomain(std::initializer_list<int64_t> extent) {
-    setDomain(extent.begin(), static_cast<int>(extent.size()));
+  Status setDomain(std::initializer_list<int64_t> extent) {
+    return setDomain(extent.begin(), static_cast<int>(extent.size()));
   }
-  template <int Rank> void setDomain(const glm::vec<Rank, int> &extent) {
+  template <int Rank> Status setDomain(const glm::vec<Rank, int> &extent) {
     int64_t values[Rank];
     for (int d = 0; d < Rank; ++d)
       values[d] = extent[d];
-    setDomain(values, Rank);
+    return setDomain(values, Rank);
   }
-  void setDomain(const int64_t *extent, int rank) {
+  Status setDomain(const int64_t *extent, int rank) {
     if (rank < 1 || rank > 4)
       throw Error("expected a domain of 1 to 4 dimensions, but got " +
                   std::to_string(rank));
-    for (int d = 0; d < 4; ++d) {
-      domainExtent[d] = d < rank ? extent[d] : 1;
-      if (domainExtent[d] < 1 || domainExtent[d] > INT32_MAX)
+    for (int d = 0; d < rank; ++d)
+      if (extent[d] < 1 || extent[d] > INT32_MAX)
         throw Error("expected a domain of 1 to 2147483647 cells in each "
                     "dimension, but got " +
-                    std::to_string(domainExtent[d]));
-    }
+                    std::to_string(extent[d]));
+    for (int d = 0; d < 4; ++d)
+      domainExtent[d] = d < rank ? extent[d] : 1;
     domainRank = rank;
+    return {};
   }
 
   /// The primitives of a source; the memory must stay until the run.
-  template <class T> void feed(int source, const T *primitives, int64_t count) {
+  template <class T>
+  Status feed(int source, const T *primitives, int64_t count) {
     const TypeInfo *type = nullptr;
     if constexpr (!std::is_void_v<T>)
       type = typeOf<std::remove_cv_t<T>>();
     feedBytes(source, type, reinterpret_cast<const std::byte *>(primitives),
               count);
+    return {};
   }
-  /// The same for a vector, an array or a span, and the only source of a
-  /// stage.
-  template <class S, class Range>
-    requires requires(const Range &range) { std::data(range); }
-  void feed(const S &stage, Range &&primitives) {
-    static_assert(std::is_lvalue_reference_v<Range> ||
-                      std::ranges::enable_borrowed_range<Range>,
+  /// The same for a vector, an array or a span.
+  template <HostRange Range> Status feed(int source, Range &&primitives) {
+    static_assert(outlives<Range>,
                   "feed does not copy; the primitives must outlive the run");
-    feed(sourceOf(&stage, typeName<S>()), std::data(primitives),
-         static_cast<int64_t>(std::size(primitives)));
+    return feed(source, std::data(primitives),
+                static_cast<int64_t>(std::size(primitives)));
+  }
+  /// The same for the only source of a stage.
+  template <class S, HostRange Range>
+    requires std::is_class_v<S>
+  Status feed(const S &stage, Range &&primitives) {
+    static_assert(outlives<Range>,
+                  "feed does not copy; the primitives must outlive the run");
+    return feed(sourceOf(&stage, typeName<S>()), std::data(primitives),
+                static_cast<int64_t>(std::size(primitives)));
   }
 
   /// In checking mode: fields, such as &Fragment::z, of which no primitive
@@ -112,10 +120,30 @@ public:
 
   /// How many hops a primitive may take on a cycle of stages, and how many
   /// rounds a cycle may run.
-  void setLoopLimit(int64_t limit) { executor.loopLimit = limit; }
+  Status setLoopLimit(int64_t limit) {
+    if (limit < 0)
+      throw Error("expected a loop limit of at least 0, but got " +
+                  std::to_string(limit));
+    executor.loopLimit = limit;
+    return {};
+  }
+
+  // How a compiled pipeline runs; here they change nothing.
+  Status setThreads(int32_t) { return {}; }
+  Status setMemoryLimit(int64_t) { return {}; }
+  Status setMemoryBudget(int64_t) { return {}; }
+  Status setStripSize(int64_t) { return {}; }
 
   /// Clears the images and runs the pipeline on what was fed.
-  void run();
+  Status run();
+  /// The same, but an Error is returned.
+  Status tryRun() {
+    try {
+      return run();
+    } catch (const Error &error) {
+      return Status(error.code(), error.what());
+    }
+  }
 
 protected:
   PipeBase() = default;
@@ -308,7 +336,7 @@ PipeBase::stageOrder(const std::vector<Component> &components) const {
   return {declared, fed, components};
 }
 
-inline void PipeBase::run() {
+inline Status PipeBase::run() {
   checkArithmetic();
   checkGraph();
   struct Running {
@@ -338,6 +366,7 @@ inline void PipeBase::run() {
     executor.runComponent(component);
   if constexpr (checking)
     executor.checker.endRun();
+  return {};
 }
 
 } // namespace reference

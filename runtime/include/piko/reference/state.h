@@ -12,6 +12,7 @@
 #include <piko/reference/executor.h>
 
 #include <cstring>
+#include <span>
 
 namespace piko {
 namespace reference {
@@ -53,6 +54,18 @@ inline Place placeOf(const Index &index) { return index.at; }
 using Index = int64_t;
 inline Place placeOf(Index) { return {}; }
 #endif
+
+/// A vector, an array or a span.
+template <class Range>
+concept HostRange = requires(const Range &range) {
+  std::data(range);
+  std::size(range);
+};
+
+/// Whether its elements stay when an argument of that type goes.
+template <class Range>
+constexpr bool outlives = std::is_lvalue_reference_v<Range> ||
+                          std::ranges::enable_borrowed_range<Range>;
 
 /// Memory for elements, which goes with its owner; lighter to compile than
 /// std::unique_ptr, of which every type of state would have its own.
@@ -136,27 +149,37 @@ public:
   using const_iterator = const T *;
 
   /// Uses the caller's memory, which must outlive the runs.
-  void bind(T *data, int64_t n) {
+  Status bind(T *data, int64_t n) {
     owned.reset();
     elements = data;
     count = n;
+    return {};
+  }
+  template <reference::HostRange Range> Status bind(Range &&range) {
+    static_assert(reference::outlives<Range>,
+                  "bind does not copy; the elements must outlive the runs");
+    return bind(std::data(range), static_cast<int64_t>(std::size(range)));
   }
   /// Copies n elements.
-  void assign(const T *data, int64_t n) {
+  Status assign(const T *data, int64_t n) {
     T *copy = new T[n];
     std::copy(data, data + n, copy);
     owned.reset(copy);
     elements = owned.get();
     count = n;
+    return {};
   }
-  /// Copies a vector, an array or a span.
-  template <class Range> void assign(const Range &range) {
-    assign(std::data(range), static_cast<int64_t>(std::size(range)));
+  template <class Range> Status assign(const Range &range) {
+    return assign(std::data(range), static_cast<int64_t>(std::size(range)));
   }
-  void assign(std::initializer_list<T> values) {
-    assign(values.begin(), static_cast<int64_t>(values.size()));
+  Status assign(std::initializer_list<T> values) {
+    return assign(values.begin(), static_cast<int64_t>(values.size()));
   }
   /// Makes n elements whose bytes are zero.
+  Status allocate(int64_t n) {
+    allocateZeroed(n);
+    return {};
+  }
   void allocateZeroed(int64_t n) override {
     owned.reset(new T[n]);
     elements = owned.get();

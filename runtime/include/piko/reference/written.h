@@ -8,17 +8,12 @@
 #ifndef PIKO_REFERENCE_WRITTEN_H
 #define PIKO_REFERENCE_WRITTEN_H
 
+#include <piko/status.h>
+
 #include <cstddef>
 #include <string>
 #include <string_view>
 #include <type_traits>
-
-#if defined(PIKO_CHECK) && defined(__has_feature)
-#if __has_feature(memory_sanitizer)
-#include <sanitizer/msan_interface.h>
-#define PIKO_KNOWS_WRITTEN
-#endif
-#endif
 
 // A function that may look at bytes that were not written.
 #ifdef PIKO_KNOWS_WRITTEN
@@ -33,9 +28,6 @@ namespace piko::reference {
 template <class T> bool isWritten(const T &value) {
   return __msan_test_shadow(&value, sizeof(T)) < 0;
 }
-
-/// For a string that a library without the sanitizer wrote.
-inline void markWritten(const char *text) { __msan_unpoison_string(text); }
 
 /// A struct that is not a GLM vector or matrix, whose bytes are all fields'.
 template <class T>
@@ -80,7 +72,6 @@ template <class T> const char *findUnwritten(const T &value) {
   return unwritten;
 }
 #else
-inline void markWritten(const char *) {}
 template <class T> const char *findUnwritten(const T &) { return nullptr; }
 #endif
 
