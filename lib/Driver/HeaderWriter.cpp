@@ -6,8 +6,8 @@
 
 #include "RecordWriter.h"
 
+#include "llvm/ADT/MapVector.h"
 #include "llvm/ADT/StringExtras.h"
-#include "llvm/ADT/StringSet.h"
 #include "llvm/Support/FormatVariadic.h"
 #include "llvm/Support/Path.h"
 #include "llvm/Support/raw_ostream.h"
@@ -41,53 +41,47 @@ std::string piko::getProgramSymbol(StringRef nameSpace, StringRef pipeline) {
 
 namespace {
 
+/// A stage that the host feeds: a member of the pipeline.
 struct Input {
-  std::string member, stage;
+  std::string member;
   RecordOp record;
+  int64_t number; ///< Of its source; -1 if it has several.
 };
-
-/// Sources by stage; a stage with several has a member for each.
-std::vector<Input> getInputs(PipelineOp pipeline) {
-  std::vector<Input> inputs;
-  llvm::StringMap<int> counts;
-  for (auto source : pipeline.getOps<SourceOp>()) {
-    auto stage = lookupInPipeline<StageOp>(source, source.getStageAttr());
-    std::string name = mangle(stage.getSymName());
-    if (int number = ++counts[name]; number > 1)
-      name += std::to_string(number);
-    inputs.push_back({name, name, lookupRecord(stage, stage.getInputAttr())});
-  }
-  return inputs;
-}
 
 class HeaderWriter {
 public:
   HeaderWriter(PipelineOp pipeline, StringRef file, StringRef nameSpace)
       : pipeline(pipeline), file(file), nameSpace(nameSpace),
         symbol(getProgramSymbol(nameSpace, pipeline.getSymName())),
-        className(unscoped(pipeline.getSymName())), inputs(getInputs(pipeline)),
+        className(getUnscopedName(pipeline.getSymName())), records(scope),
         out(text) {
-    // What a record or a source may not be called.
-    for (StringRef name : {StringRef("State"), StringRef(className)})
-      typeNames.insert(name);
-    for (StringRef name : {"state", "run", "feed", "setDomain", "setThreads",
-                           "setMemoryLimit", "setLoopLimit", "created", "get"})
-      memberNames.insert(name);
-    for (Input &input : inputs)
-      input.member = makeUnique(input.member, memberNames);
+    for (StringRef name :
+         {StringRef("State"), StringRef("state"), StringRef("pikoState_"),
+          StringRef("pikoBind_"), StringRef(className)})
+      scope.reserve(name);
+    addInputs();
+    // These would hide records, and records these.
+    for (StringRef name : {"piko", "glm", "std"})
+      scope.reserve(name);
+    for (mlir::Operation &op : pipeline.getOps())
+      if (getStateRecord(&op))
+        scope.reserve(makeIdentifier(getName(&op)));
   }
 
   std::string write() {
+    std::string body = writeClass();
     std::string guard = StringRef(symbol).upper() + "_H";
     out << "// Made by pikoc from " << llvm::sys::path::filename(file)
         << "; changes will be lost.\n"
         << "#ifndef " << guard << "\n#define " << guard << "\n\n"
         << "#include <pikort/compiled.hpp>\n\n"
-        << "#include <cstddef>\n#include <cstdint>\n\n"
-        << "extern \"C\" const pikort_program " << symbol << ";\n\n";
+        << "#include <cstddef>\n#include <cstdint>\n";
+    for (const std::string &include : records.getIncludes())
+      out << "#include <" << include << ">\n";
+    out << "\nextern \"C\" const pikort_program " << symbol << ";\n\n";
     if (!nameSpace.empty())
       out << "namespace " << nameSpace << " {\n\n";
-    writeClass();
+    out << body;
     if (!nameSpace.empty())
       out << "\n} // namespace " << nameSpace << "\n";
     out << "\n#endif // " << guard << "\n";
@@ -95,104 +89,113 @@ public:
   }
 
 private:
-  /// The last name of a C++ path.
-  static std::string unscoped(StringRef name) {
-    if (!name.contains('<'))
-      if (size_t at = name.rfind("::"); at != StringRef::npos)
-        name = name.substr(at + 2);
-    return mangle(name);
-  }
-
-  static std::string makeUnique(const std::string &name,
-                                llvm::StringSet<> &known) {
-    std::string unique = name;
-    for (int i = 2; !known.insert(unique).second; ++i)
-      unique = name + std::to_string(i);
-    return unique;
-  }
-
-  void writeClass() {
-    out << "/// The pipeline '" << pipeline.getSymName() << "', compiled.\n"
-        << "class " << className << " : public piko::rt::CompiledPipeline {\n"
-        << "public:\n";
-    writeRecords();
-    writeState();
-    out << "\n  " << className << "()\n      : CompiledPipeline(" << symbol
-        << ")";
-    for (auto [number, input] : llvm::enumerate(inputs))
-      out << ",\n        " << input.member << "(get(), " << number << ")";
-    out << ",\n        memory(get()) {}\n\n"
-        << "  State &state() { return memory; }\n\n"
-        << "  // Sources, for feed().\n";
-    for (Input &input : inputs)
-      out << "  piko::rt::Source<" << types[input.record] << "> "
-          << input.member << ";\n";
-    out << "\nprivate:\n  State memory;\n};\n";
-  }
-
-  /// Defines the records of state and sources; `use` names one whose own name
-  /// is no identifier.
-  void defineRecord(RecordOp record, std::string use) {
-    if (types.contains(record))
-      return;
-    if (StringRef scalar = getScalarType(record); !scalar.empty()) {
-      types[record] = scalar.str();
-      return;
-    }
-    StringRef own = record.getSymName();
-    if (!own.contains('<'))
-      use = unscoped(own);
-    use[0] = llvm::toUpper(use[0]);
-    std::string name = makeUnique(use, typeNames);
-    out << writeRecord(record, name, "  ") << "\n";
-    types[record] = name;
-  }
-
-  void writeRecords() {
-    for (mlir::Operation &op : pipeline.getOps())
-      if (mlir::FlatSymbolRefAttr record = getStateRecord(&op))
-        defineRecord(lookupRecord(&op, record), mangle(getName(&op)));
-    for (Input &input : inputs)
-      defineRecord(input.record, input.stage + "Input");
-  }
-
   static StringRef getName(mlir::Operation *op) {
+    if (auto name = op->getAttrOfType<mlir::StringAttr>(cppNameAttr))
+      return name.getValue();
     return mlir::SymbolTable::getSymbolName(op).getValue();
   }
 
-  void writeState() {
-    out << "  struct State {\n"
-        << "    explicit State(pikort_pipeline *pipeline)";
-    std::string members;
-    const char *separator = "\n        : ";
+  void addInputs() {
+    llvm::MapVector<mlir::Operation *, Input> byStage;
+    int64_t number = 0;
+    for (auto source : pipeline.getOps<SourceOp>()) {
+      auto stage = lookupInPipeline<StageOp>(source, source.getStageAttr());
+      auto [it, isNew] = byStage.try_emplace(stage);
+      if (isNew)
+        it->second = {scope.declare(makeIdentifier(getName(stage))),
+                      lookupRecord(stage, stage.getInputAttr()), number};
+      else
+        it->second.number = -1;
+      ++number;
+    }
+    for (auto &[stage, input] : byStage)
+      inputs.push_back(input);
+  }
+
+  /// The definitions that the state and the sources need come first.
+  std::string writeClass() {
+    std::string state = writeState(), sources;
+    for (Input &input : inputs)
+      sources += llvm::formatv("  piko::rt::Source<{0}> {1}{{{2}};\n",
+                               getType(input.record, input.member + "Input"),
+                               input.member, input.number);
+    return llvm::formatv(
+        "/// The pipeline '{0}', compiled.\n"
+        "class {1} : public piko::rt::CompiledPipeline {{\n"
+        "public:\n"
+        "{2}{3}\n"
+        "  {1}()\n"
+        "      : piko::rt::CompiledPipeline({4}, pikoBind_),\n"
+        "        pikoState_(\n"
+        "            piko::rt::Member{{piko::rt::CompiledPipeline::get()}) "
+        "{{}\n"
+        "\n"
+        "  State &state() {{ return pikoState_; }\n"
+        "  const State &state() const {{ return pikoState_; }\n"
+        "\n"
+        "  // Sources, for feed().\n"
+        "{5}\n"
+        "private:\n"
+        "  static piko::rt::Status pikoBind_(piko::rt::CompiledPipeline &pipe) "
+        "{{\n"
+        "    return static_cast<{1} &>(pipe).pikoState_.pikoBind_();\n"
+        "  }\n"
+        "\n"
+        "  State pikoState_;\n"
+        "};\n",
+        pipeline.getSymName(), className, records.getDefinitions(), state,
+        symbol, sources);
+  }
+
+  std::string getType(RecordOp record, std::string use) {
+    use[0] = llvm::toUpper(use[0]);
+    return records.getType(record, use);
+  }
+
+  std::string getStateType(mlir::Operation &op, RecordOp record) {
+    std::string type = getType(record, makeIdentifier(getName(&op)));
+    if (auto image = llvm::dyn_cast<ImageOp>(op))
+      return llvm::formatv("Image<{0}, {1}>", type, image.getRank());
+    StringRef kind = "Constant";
+    if (auto buffer = llvm::dyn_cast<BufferOp>(op))
+      kind = buffer.getPerSource() ? "Array" : "Buffer";
+    return llvm::formatv("{0}<{1}>", kind, type);
+  }
+
+  std::string writeState() {
+    std::string members, constants, initializers;
+    CppScope names;
+    names.reserve("pikoBind_");
     for (mlir::Operation &op : pipeline.getOps()) {
       mlir::FlatSymbolRefAttr record = getStateRecord(&op);
       if (!record)
         continue;
-      StringRef kind = "Constant";
-      if (auto buffer = llvm::dyn_cast<BufferOp>(op))
-        kind = buffer.getPerSource() ? "Elements" : "Buffer";
-      else if (llvm::isa<ImageOp>(op))
-        kind = "Elements";
-      std::string name = mangle(getName(&op));
-      out << separator << name << "({pipeline, \"" << getName(&op) << "\"})";
-      separator = ",\n          ";
-      members += llvm::formatv("    piko::rt::{0}<{1}> {2};\n", kind,
-                               types[lookupRecord(&op, record)], name);
+      std::string name = names.declare(makeIdentifier(getName(&op)));
+      initializers +=
+          llvm::formatv("{0}{1}(in(\"{2}\"))",
+                        initializers.empty() ? "\n        : " : ",\n          ",
+                        name, getName(&op));
+      members +=
+          llvm::formatv("    piko::rt::{0} {1};\n",
+                        getStateType(op, lookupRecord(&op, record)), name);
+      if (llvm::isa<ConstantOp>(op))
+        constants += (constants.empty() ? "" : ", ") + name;
     }
-    if (members.empty())
-      out << " { (void)pipeline; }\n";
-    else
-      out << " {}\n" << members;
-    out << "  };\n";
+    std::string state = "  struct State {\n    explicit State(piko::rt::Member";
+    state += initializers.empty() ? ")" : " in)" + initializers;
+    state += " {}\n";
+    state += "    piko::rt::Status pikoBind_() const {\n"
+             "      return piko::rt::bindConstants(" +
+             constants + ");\n    }\n\n" + members + "  };\n";
+    return state;
   }
 
   PipelineOp pipeline;
   StringRef file, nameSpace;
   std::string symbol, className;
   std::vector<Input> inputs;
-  llvm::StringSet<> typeNames, memberNames;
-  llvm::DenseMap<mlir::Operation *, std::string> types;
+  CppScope scope;
+  RecordWriter records;
   std::string text;
   llvm::raw_string_ostream out;
 };

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// Records as C++ structs.
+// Records as C++ types.
 //
 // A record lists its numbers by their paths: `lights.color.x` is four floats,
-// 32 bytes apart. Paths that begin alike become a member that is a struct. The
-// dimensions of an array belong to a member on the path, but the record does
-// not say to which; they go to the innermost where the bytes come out right.
+// 32 bytes apart. Paths that begin alike become a member that is a class. Which
+// dimensions of an array belong to which member on the path is said by
+// piko.cpp_types; where it is not, they go to the innermost where the bytes
+// come out right.
 
 #include "RecordWriter.h"
 
@@ -32,20 +33,28 @@ struct Leaf {
 
 /// The members of a struct, laid out as a C++ compiler does.
 struct Layout {
-  std::string text, lastType = {};
+  std::string text = {}, lastType = {};
   int64_t size = 0, align = 1;
   std::vector<std::pair<std::string, int64_t>> members = {};
 };
 
-/// A member's type and array extents, without its place.
-struct Member {
-  std::string type, extents;
+/// A type without its place. A struct that has no name is its own text.
+struct Type {
+  std::string name;
   int64_t size, align;
+  llvm::SmallVector<int64_t, 2> extents = {};
+  StringRef tag = ""; ///< Of a type that the header defines.
+
+  bool isPlain() const { return extents.empty() && name.back() != '}'; }
 };
 
 } // namespace
 
-static StringRef getCppType(mlir::Type type) {
+/// Members of the class, and of structs in it.
+static const char *const classIndent = "  ";
+static const char *const structIndent = "    ";
+
+static StringRef getStorageType(mlir::Type type) {
   switch (type.getIntOrFloatBitWidth()) {
   case 8:
     return "int8_t";
@@ -58,34 +67,18 @@ static StringRef getCppType(mlir::Type type) {
   }
 }
 
-bool piko::isCppIdentifier(StringRef name) {
-  return !name.empty() && !llvm::isDigit(name[0]) &&
-         llvm::all_of(name,
-                      [](char c) { return llvm::isAlnum(c) || c == '_'; });
+static std::string joinPath(StringRef path, StringRef name) {
+  return path.empty() ? name.str() : (path + "." + name).str();
 }
 
-StringRef piko::getScalarType(RecordOp record) {
-  if (record.getFields().size() != 1)
-    return "";
-  auto field = llvm::cast<FieldAttr>(record.getFields()[0]);
-  bool isScalar =
-      field.getName() == "value" && field.getOffset() == 0 &&
-      field.getCounts().empty() &&
-      int64_t(record.getSize()) * 8 == field.getType().getIntOrFloatBitWidth();
-  return isScalar ? getCppType(field.getType()) : "";
+static std::string writeExtents(ArrayRef<int64_t> counts) {
+  std::string text;
+  for (int64_t count : counts)
+    text += llvm::formatv("[{0}]", count).str();
+  return text;
 }
 
-/// Bytes between members.
-static void pad(Layout &layout, int64_t offset, StringRef indent) {
-  layout.text += llvm::formatv("{0}unsigned char padding{1}_[{2}];\n", indent,
-                               layout.size, offset - layout.size)
-                     .str();
-  layout.size = offset;
-  layout.lastType.clear();
-}
-
-/// How many outer dimensions, down from the first, have the bytes of an array
-/// of elements of that size; none if the dimensions do not fit an array.
+/// Whether dimensions are those of an array of elements of that size.
 static bool isDense(ArrayRef<int64_t> counts, ArrayRef<int64_t> strides,
                     int64_t size) {
   for (size_t d = counts.size(); d-- > 0;) {
@@ -96,30 +89,131 @@ static bool isDense(ArrayRef<int64_t> counts, ArrayRef<int64_t> strides,
   return true;
 }
 
-static std::string writeExtents(ArrayRef<int64_t> counts) {
-  std::string text;
-  for (int64_t count : counts)
-    text += llvm::formatv("[{0}]", count).str();
-  return text;
+/// Bytes up to an offset.
+static void pad(Layout &layout, int64_t offset, StringRef indent) {
+  layout.text += llvm::formatv("{0}unsigned char padding{1}_[{2}];\n", indent,
+                               layout.size, offset - layout.size)
+                     .str();
+  layout.size = offset;
+  layout.lastType.clear();
 }
 
-static std::optional<Layout> layOut(ArrayRef<Leaf> leaves, int64_t base,
-                                    const std::string &indent);
+//===----------------------------------------------------------------------===//
+// The layout of one record
+//===----------------------------------------------------------------------===//
 
-/// A member that is a number or an array of numbers.
-static std::optional<Member> makeNumber(const Leaf &leaf) {
+class RecordWriter::Layouter {
+public:
+  Layouter(RecordWriter &writer, RecordOp record, const std::string &use)
+      : writer(writer), record(record), use(use) {}
+
+  std::string run();
+
+private:
+  std::optional<Type> getNumber(const Leaf &leaf, const std::string &path);
+  std::optional<Type> getClass(ArrayRef<Leaf> leaves, const std::string &path,
+                               const CppType &type, int64_t stride,
+                               const std::string &indent);
+  std::optional<Type> getStdArray(ArrayRef<Leaf> leaves,
+                                  const std::string &path);
+  std::optional<Type> getMember(ArrayRef<Leaf> leaves, const std::string &path,
+                                const std::string &indent);
+  std::optional<Type> getElements(ArrayRef<Leaf> leaves, size_t dims,
+                                  const std::string &path, const CppType &type,
+                                  const std::string &indent);
+  bool place(Layout &layout, const Type &member, StringRef name, int64_t offset,
+             int64_t maxAlign, const std::string &indent);
+  std::optional<Layout> layOut(ArrayRef<Leaf> leaves, const std::string &path,
+                               int64_t maxAlign, const std::string &indent);
+
+  RecordWriter &writer;
+  RecordOp record;
+  const std::string &use;
+};
+
+/// A number or an array of numbers.
+std::optional<Type> RecordWriter::Layouter::getNumber(const Leaf &leaf,
+                                                      const std::string &path) {
   int64_t size = leaf.getElementSize();
   if (!isDense(leaf.counts, leaf.strides, size))
     return std::nullopt;
-  int64_t elements = llvm::product_of(leaf.counts);
-  return Member{getCppType(leaf.type).str(), writeExtents(leaf.counts),
-                size * elements, size};
+  Type number{getStorageType(leaf.type).str(),
+              size * llvm::product_of(leaf.counts), size, leaf.counts};
+  std::optional<CppType> type = lookupCppType(record, path);
+  if (!type)
+    return number;
+  number.name = type->name.str();
+  if (!type->underlying.empty()) {
+    number.name = writer.defineEnum(*type, use);
+    number.tag = "enum";
+  }
+  return number;
 }
 
-/// A member that is a struct or, over its leaves' first `dims` dimensions, an
-/// array of them.
-static std::optional<Member> makeStruct(ArrayRef<Leaf> leaves, size_t dims,
-                                        const std::string &indent) {
+/// What lies in a std::array is an array, its one member.
+std::optional<Type>
+RecordWriter::Layouter::getStdArray(ArrayRef<Leaf> leaves,
+                                    const std::string &path) {
+  StringRef name = leaves[0].path[0];
+  for (const Leaf &leaf : leaves)
+    if (leaf.path[0] != name)
+      return std::nullopt;
+  std::optional<Type> inner =
+      getMember(leaves, joinPath(path, name), structIndent);
+  if (!inner || inner->extents.empty() || inner->name.back() == '}')
+    return std::nullopt;
+  writer.includes.insert("array");
+  inner->name = llvm::formatv(
+      "std::array<{0}{1}, {2}>", inner->name,
+      writeExtents(ArrayRef(inner->extents).drop_front()), inner->extents[0]);
+  inner->extents.clear();
+  inner->tag = "";
+  return inner;
+}
+
+/// A class; its size may be enlarged to the stride of an array, if there is
+/// one.
+std::optional<Type>
+RecordWriter::Layouter::getClass(ArrayRef<Leaf> leaves, const std::string &path,
+                                 const CppType &type, int64_t stride,
+                                 const std::string &indent) {
+  if (type.name == "std::array")
+    return getStdArray(leaves, path);
+  bool isNamed = type.name != "struct";
+  std::string inner = isNamed ? structIndent : indent + "  ";
+  std::optional<Layout> layout = layOut(leaves, path, type.align, inner);
+  if (!layout || (type.align && layout->align > type.align))
+    return std::nullopt;
+  int64_t align = std::max(layout->align, type.align);
+  int64_t size = llvm::alignTo(layout->size, align);
+  int64_t wanted = std::max({size, type.size, stride});
+  if ((type.size && wanted != type.size) || wanted % align != 0)
+    return std::nullopt;
+  if (std::optional<GlmType> glm = parseGlmType(type.name)) {
+    if (!type.size && size != wanted)
+      return std::nullopt;
+    writer.useGlm(type.name, *glm, wanted, layout->members);
+    return Type{type.name.str(), wanted, align};
+  }
+  if (size < wanted)
+    pad(*layout, wanted, inner);
+  if (isNamed)
+    return Type{writer.defineStruct(type.name, use, layout->text, wanted, align,
+                                    layout->members),
+                wanted,
+                align,
+                {},
+                "struct"};
+  std::string head = align > layout->align
+                         ? llvm::formatv("struct alignas({0}) {{\n", align)
+                         : std::string("struct {\n");
+  return Type{head + layout->text + indent + "}", wanted, align};
+}
+
+/// A class or, over its leaves' first `dims` dimensions, an array of them.
+std::optional<Type> RecordWriter::Layouter::getElements(
+    ArrayRef<Leaf> leaves, size_t dims, const std::string &path,
+    const CppType &type, const std::string &indent) {
   const Leaf &first = leaves.front();
   auto counts = ArrayRef(first.counts).take_front(dims);
   auto strides = ArrayRef(first.strides).take_front(dims);
@@ -133,76 +227,89 @@ static std::optional<Member> makeStruct(ArrayRef<Leaf> leaves, size_t dims,
     leaf.counts.erase(leaf.counts.begin(), leaf.counts.begin() + dims);
     leaf.strides.erase(leaf.strides.begin(), leaf.strides.begin() + dims);
   }
-  std::optional<Layout> layout = layOut(inner, first.offset, indent + "  ");
-  if (!layout)
+  int64_t stride = dims ? strides.back() : 0;
+  std::optional<Type> element = getClass(inner, path, type, stride, indent);
+  if (!element || !isDense(counts, strides, element->size))
     return std::nullopt;
-  int64_t size = llvm::alignTo(layout->size, layout->align);
-  if (dims != 0) {
-    if (size > strides.back() || strides.back() % layout->align != 0)
-      return std::nullopt;
-    if (size < strides.back())
-      pad(*layout, strides.back(), indent + "  ");
-    size = strides.back();
-    if (!isDense(counts, strides, size))
-      return std::nullopt;
-  }
-  return Member{"struct {\n" + layout->text + indent + "}",
-                writeExtents(counts), size * llvm::product_of(counts),
-                layout->align};
+  element->extents.assign(counts.begin(), counts.end());
+  element->size *= llvm::product_of(counts);
+  return element;
 }
 
-static std::optional<Member> makeMember(ArrayRef<Leaf> leaves,
-                                        const std::string &indent) {
+std::optional<Type> RecordWriter::Layouter::getMember(
+    ArrayRef<Leaf> leaves, const std::string &path, const std::string &indent) {
   if (leaves.size() == 1 && leaves[0].path.size() == 1)
-    return makeNumber(leaves[0]);
+    return getNumber(leaves[0], path);
+  if (std::optional<CppType> type = lookupCppType(record, path))
+    return getElements(leaves, type->extents.size(), path, *type, indent);
   for (size_t dims = 0; dims <= leaves[0].counts.size(); ++dims)
-    if (std::optional<Member> member = makeStruct(leaves, dims, indent))
+    if (auto member =
+            getElements(leaves, dims, path, CppType{"struct"}, indent))
       return member;
   return std::nullopt;
 }
 
-/// Behind a number of the same type, on its line.
-static void addMember(Layout &layout, const Member &member, StringRef name,
-                      const std::string &indent) {
-  if (member.type == layout.lastType && member.extents.empty()) {
+/// Puts a member at its offset; behind a number of the same type, on its line.
+bool RecordWriter::Layouter::place(Layout &layout, const Type &member,
+                                   StringRef name, int64_t offset,
+                                   int64_t maxAlign,
+                                   const std::string &indent) {
+  if (offset < layout.size || offset % member.align != 0)
+    return false;
+  int64_t align = member.align;
+  while (int64_t(llvm::alignTo(layout.size, align)) < offset &&
+         align * 2 <= maxAlign)
+    align *= 2;
+  if (int64_t(llvm::alignTo(layout.size, align)) != offset) {
+    pad(layout, offset, indent);
+    align = member.align;
+  }
+  bool isPlain = member.isPlain() && align == member.align;
+  if (isPlain && member.name == layout.lastType) {
     layout.text.resize(layout.text.size() - 2); // ";\n"
     layout.text += ", " + name.str() + ";\n";
-    return;
+  } else {
+    layout.text += indent;
+    if (align != member.align)
+      layout.text += llvm::formatv("alignas({0}) ", align);
+    if (member.name == name) // which would hide the type
+      layout.text += (member.tag + " ").str();
+    layout.text +=
+        member.name + " " + name.str() + writeExtents(member.extents) + ";\n";
+    layout.lastType = isPlain ? member.name : "";
   }
-  layout.text +=
-      indent + member.type + " " + name.str() + member.extents + ";\n";
-  bool isLine = member.extents.empty() && member.type.back() != '}';
-  layout.lastType = isLine ? member.type : "";
+  layout.size = offset + member.size;
+  layout.align = std::max(layout.align, align);
+  layout.members.emplace_back(name.str(), offset);
+  return true;
 }
 
-static std::optional<Layout> layOut(ArrayRef<Leaf> leaves, int64_t base,
-                                    const std::string &indent) {
+/// The members of a class that begins with its first number.
+std::optional<Layout>
+RecordWriter::Layouter::layOut(ArrayRef<Leaf> leaves, const std::string &path,
+                               int64_t maxAlign, const std::string &indent) {
   Layout layout;
+  int64_t base = path.empty() ? 0 : leaves[0].offset;
   while (!leaves.empty()) {
     StringRef name = leaves[0].path[0];
     auto together = leaves.take_while(
         [&](const Leaf &leaf) { return leaf.path[0] == name; });
     leaves = leaves.drop_front(together.size());
-    int64_t offset = together[0].offset - base;
-    std::optional<Member> member = makeMember(together, indent);
+    std::optional<Type> member =
+        getMember(together, joinPath(path, name), indent);
     bool isKnown = llvm::any_of(
         layout.members, [&](const auto &other) { return other.first == name; });
-    if (!member || isKnown || !isCppIdentifier(name) || offset < layout.size ||
-        offset % member->align != 0)
+    if (!member || isKnown || !isCppIdentifier(name) ||
+        !place(layout, *member, name, together[0].offset - base, maxAlign,
+               indent))
       return std::nullopt;
-    if (offset != int64_t(llvm::alignTo(layout.size, member->align)))
-      pad(layout, offset, indent);
-    addMember(layout, *member, name, indent);
-    layout.size = offset + member->size;
-    layout.align = std::max(layout.align, member->align);
-    layout.members.emplace_back(name.str(), offset);
   }
   return layout;
 }
 
-static std::optional<Layout> layOutRecord(RecordOp record,
-                                          const std::string &indent) {
+std::string RecordWriter::Layouter::run() {
   std::vector<Leaf> leaves;
+  bool isValue = true;
   for (auto field : record.getFields().getAsRange<FieldAttr>()) {
     Leaf &leaf = leaves.emplace_back();
     field.getName().split(leaf.path, '.');
@@ -210,32 +317,129 @@ static std::optional<Layout> layOutRecord(RecordOp record,
     leaf.offset = field.getOffset();
     leaf.counts.assign(field.getCounts().begin(), field.getCounts().end());
     leaf.strides.assign(field.getStrides().begin(), field.getStrides().end());
+    isValue &= leaf.path[0] == "value";
   }
-  std::optional<Layout> layout = layOut(leaves, 0, indent);
   int64_t size = record.getSize(), align = record.getAlign();
-  if (!layout || layout->align > align || layout->size > size)
-    return std::nullopt;
-  if (int64_t(llvm::alignTo(layout->size, align)) < size)
-    pad(*layout, size, indent);
-  layout->align = align;
-  return layout;
+  std::optional<CppType> whole = lookupCppType(record, "this");
+  isValue &= !whole && !leaves.empty() && leaves[0].offset == 0;
+  // An array without a type may as well be the one member of a class.
+  if (isValue && (lookupCppType(record, "value") ||
+                  (leaves[0].path.size() == 1 && leaves[0].counts.empty())))
+    if (auto type = getMember(leaves, "value", structIndent);
+        type && type->size == size && type->name.back() != '}')
+      return type->name + writeExtents(type->extents);
+  if (!whole)
+    whole = CppType{record.getSymName()};
+  whole->size = size;
+  whole->align = align;
+  if (auto type = getClass(leaves, "", *whole, /*stride=*/0, classIndent))
+    return type->name;
+  return writer.defineStruct(
+      whole->name, use,
+      llvm::formatv("{0}unsigned char bytes[{1}];\n", structIndent, size), size,
+      align, {});
 }
 
-std::string piko::writeRecord(RecordOp record, StringRef name,
-                              StringRef indent) {
-  std::string inner = (indent + "  ").str();
-  int64_t size = record.getSize(), align = record.getAlign();
-  std::optional<Layout> layout = layOutRecord(record, inner);
-  if (!layout)
-    layout = Layout{
-        .text = llvm::formatv("{0}unsigned char bytes[{1}];\n", inner, size),
-        .size = size,
-        .align = align};
-  std::string text = llvm::formatv("{0}struct alignas({1}) {2} {{\n{3}{0}};\n"
-                                   "{0}static_assert(sizeof({2}) == {4});\n",
-                                   indent, align, name, layout->text, size);
-  for (const auto &[member, offset] : layout->members)
-    text += llvm::formatv("{0}static_assert(offsetof({1}, {2}) == {3});\n",
-                          indent, name, member, offset);
-  return text;
+//===----------------------------------------------------------------------===//
+// Definitions
+//===----------------------------------------------------------------------===//
+
+std::string RecordWriter::getType(RecordOp record, const std::string &use) {
+  auto [it, isNew] = types.try_emplace(record);
+  if (isNew)
+    it->second = Layouter(*this, record, use).run();
+  return it->second;
+}
+
+/// The compiler's text for what has no name is none.
+static std::string getHeaderName(StringRef cppName, const std::string &use) {
+  return cppName.contains('(') || cppName == "struct"
+             ? use
+             : getUnscopedName(cppName);
+}
+
+std::string RecordWriter::defineStruct(StringRef cppName,
+                                       const std::string &use,
+                                       const std::string &body, int64_t size,
+                                       int64_t align, const Offsets &members) {
+  std::string key = llvm::formatv("alignas({0}) {1} {2}", align, size, body);
+  auto [it, isNew] = defined.try_emplace({cppName.str(), key});
+  if (!isNew)
+    return it->second;
+  it->second = scope.declare(getHeaderName(cppName, use));
+  const std::string &name = it->second;
+  definitions += llvm::formatv("{0}struct alignas({1}) {2} {{\n{3}{0}};\n"
+                               "{0}static_assert(sizeof({2}) == {4});\n",
+                               classIndent, align, name, body, size);
+  for (const auto &[member, offset] : members)
+    definitions += llvm::formatv("{0}static_assert(offsetof({1}, {2}) == {3});"
+                                 "\n",
+                                 classIndent, name, member, offset);
+  definitions += "\n";
+  return name;
+}
+
+static std::string writeEnumerator(int64_t value, StringRef underlying) {
+  if (underlying == "bool")
+    return value ? "true" : "false";
+  if (underlying.starts_with("u") && value < 0)
+    return llvm::formatv("{0}u", uint64_t(value));
+  if (value == INT64_MIN)
+    return "-9223372036854775807 - 1";
+  return std::to_string(value);
+}
+
+std::string RecordWriter::defineEnum(const CppType &type,
+                                     const std::string &use) {
+  std::vector<std::pair<int64_t, StringRef>> enumerators;
+  if (type.enumerators)
+    for (mlir::NamedAttribute entry : type.enumerators)
+      enumerators.emplace_back(
+          llvm::cast<mlir::IntegerAttr>(entry.getValue()).getInt(),
+          entry.getName().getValue());
+  llvm::sort(enumerators);
+  std::string key = type.isScoped ? "class" : "enum";
+  for (const auto &[value, name] : enumerators)
+    key += llvm::formatv(" {0} = {1}", name, value);
+  auto [it, isNew] =
+      defined.try_emplace({type.name.str(), key + type.underlying.str()});
+  if (!isNew)
+    return it->second;
+  it->second = scope.declare(getHeaderName(type.name, use));
+  definitions +=
+      llvm::formatv("{0}enum {1}{2} : {3} {{", classIndent,
+                    type.isScoped ? "class " : "", it->second, type.underlying);
+  StringRef separator = "\n";
+  for (const auto &[value, name] : enumerators) {
+    if (type.isScoped ? !isCppIdentifier(name) : !scope.isFree(name))
+      continue;
+    if (!type.isScoped)
+      scope.reserve(name);
+    definitions += llvm::formatv("{0}{1}{2} = {3}", separator, structIndent,
+                                 name, writeEnumerator(value, type.underlying));
+    separator = ",\n";
+  }
+  definitions += llvm::formatv("\n{0}};\n\n", classIndent);
+  return it->second;
+}
+
+/// A host may have configured GLM in another way.
+void RecordWriter::useGlm(StringRef name, const GlmType &type, int64_t size,
+                          const Offsets &members) {
+  includes.insert("glm/glm.hpp");
+  if (type.kind == GlmType::Quaternion)
+    includes.insert("glm/gtc/quaternion.hpp");
+  else if (type.count == 1)
+    includes.insert("glm/ext/vector_float1.hpp");
+  auto [it, isNew] = defined.try_emplace({name.str(), "glm"});
+  if (!isNew)
+    return;
+  definitions += llvm::formatv("{0}static_assert(sizeof({1}) == {2});\n",
+                               classIndent, name, size);
+  if (type.kind == GlmType::Quaternion) // of two orders
+    definitions +=
+        llvm::formatv("{0}static_assert(offsetof({1}, {2}) == {3});"
+                      "\n",
+                      classIndent, name, members[0].first, members[0].second);
+  definitions += "\n";
 }
