@@ -182,6 +182,7 @@ struct Kernel {
   uint32_t launch = 0;            ///< Of the stages of the cycle that collect.
   std::shared_ptr<Serial> serial; ///< Warm, if such launches have been.
   bool runsSerially = false;      ///< This launch is one.
+  bool isMeasured = false;        ///< If it is small: by the profile.
   double positionTicks = 0;       ///< What a position takes in them, about.
 
   /// Slots of unit u are [slotBegin(u), slotBegin(u + 1)).

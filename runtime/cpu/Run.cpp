@@ -179,8 +179,12 @@ static const pikoir_input *begin(pikort_pipeline &p, Kernel &kernel) {
                           : static_cast<int32_t>(std::clamp<int64_t>(
                                 kernel.input.unit_count, 1, p.threads));
   });
-  kernel.begun =
-      p.profile.enter(code == PIKORT_OK ? Part::Kernel : Part::Program);
+  if (code == PIKORT_OK && kernel.runsSerially &&
+      kernel.positions <= Serial::fewest)
+    kernel.isMeasured = p.profile.beginSmall();
+  else
+    kernel.begun =
+        p.profile.enter(code == PIKORT_OK ? Part::Kernel : Part::Program);
   return code == PIKORT_OK ? &kernel.input : nullptr;
 }
 
@@ -218,6 +222,18 @@ static int32_t takeOutputs(pikort_pipeline &p, Kernel &kernel, bool serially) {
   return p.status.load();
 }
 
+/// Counts what a serial launch took, or those since one that was measured.
+static void endMeasurement(pikort_pipeline &p, Kernel &kernel) {
+  KernelStats &stats = p.kernelStats[kernel.statsIndex];
+  if (kernel.positions > Serial::fewest) {
+    int64_t took = p.profile.enter(Part::Cycle) - kernel.begun;
+    kernel.serial->noteTicks(took);
+    stats.ticks += took;
+  } else if (kernel.isMeasured) {
+    stats.ticks += p.profile.endSmall();
+  }
+}
+
 static int32_t end(pikort_pipeline &p, Kernel &kernel) {
   int32_t status = p.settle();
   if (!kernel.open)
@@ -226,21 +242,19 @@ static int32_t end(pikort_pipeline &p, Kernel &kernel) {
   KernelStats &stats = p.kernelStats[kernel.statsIndex];
   ++stats.launches;
   kernel.open = false;
-  kernel.ended = p.profile.enter(serially ? Part::Cycle : Part::Join);
   if (serially) {
-    kernel.serial->noteTicks(kernel.ended - kernel.begun);
+    endMeasurement(p, kernel);
     if (status != PIKORT_OK)
       kernel.clear();
   } else {
+    kernel.ended = p.profile.enter(Part::Join);
     endThreads(p, kernel, status);
   }
   p.activeThreads = p.threads;
   if (kernel.source < 0 && status == PIKORT_OK)
     status = takeOutputs(p, kernel, serially);
-  if (serially) {
-    stats.ticks += kernel.ended - kernel.begun;
+  if (serially)
     return status;
-  }
   int64_t now = p.profile.enter(
       p.cycleOf(p.stages[kernel.stage]) ? Part::Cycle : Part::Program);
   stats.ticks += now - kernel.started;

@@ -87,8 +87,6 @@ bool Serial::takes(const pikort_pipeline &p, Kernel &kernel, int64_t count) {
 }
 
 void Serial::noteTicks(int64_t ticks) {
-  if (kernel_.positions <= fewest)
-    return;
   double now =
       static_cast<double>(ticks) / static_cast<double>(kernel_.positions);
   double &mean = kernel_.positionTicks;

@@ -93,7 +93,7 @@ public:
     return slotEnds_[static_cast<size_t>(slot)];
   }
 
-  /// The launch's time, to judge the next one by.
+  /// The time of a launch that threads could have had, to judge the next by.
   void noteTicks(int64_t ticks);
 
 private:
