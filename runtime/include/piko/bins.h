@@ -23,6 +23,7 @@
 
 #include <stdint.h>
 
+#include <glm/ext/vector_float1.hpp>
 #include <glm/ext/vector_int1.hpp>
 #include <glm/glm.hpp>
 
