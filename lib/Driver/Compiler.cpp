@@ -22,12 +22,16 @@
 using namespace mlir;
 using namespace piko;
 
-static bool isMLIR(StringRef file) { return file.ends_with(".mlir"); }
+/// Standard input is `.mlir`, as piko-opt prints it.
+static bool isMLIR(StringRef file) {
+  return file.ends_with(".mlir") || file == "-";
+}
 
 /// Parses `.mlir`; null after diagnostics.
 static OwningOpRef<ModuleOp> parseMLIR(StringRef file, MLIRContext &context,
                                        llvm::vfs::FileSystem &files) {
-  auto text = files.getBufferForFile(file);
+  auto text = file == "-" ? llvm::MemoryBuffer::getSTDIN()
+                          : files.getBufferForFile(file);
   if (!text) {
     emitError(UnknownLoc::get(&context)) << "cannot open input file '" << file
                                          << "': " << text.getError().message();

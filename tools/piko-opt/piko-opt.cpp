@@ -4,9 +4,21 @@
 
 #include "Piko/Driver/Registration.h"
 
+#include "mlir/IR/MLIRContext.h"
 #include "mlir/Tools/mlir-opt/MlirOptMain.h"
+#include "llvm/Support/CommandLine.h"
+
+/// Remarks point at lines: the operations that they are about would be pages.
+/// The option still prints them.
+static void leaveOutOperations() {
+  mlir::registerMLIRContextCLOptions();
+  auto &options = llvm::cl::getRegisteredOptions();
+  auto *print = options.lookup("mlir-print-op-on-diagnostic");
+  static_cast<llvm::cl::opt<bool> *>(print)->setInitialValue(false);
+}
 
 int main(int argc, char **argv) {
+  leaveOutOperations();
   mlir::DialectRegistry registry;
   piko::registerPikoDialects(registry);
   piko::registerPikoPasses();

@@ -40,7 +40,7 @@ enum class Emit {
 struct CommandLine {
   llvm::cl::OptionCategory category{"pikoc options"};
   llvm::cl::opt<std::string> file{llvm::cl::Positional, llvm::cl::Required,
-                                  llvm::cl::desc("FILE.cpp|FILE.mlir"),
+                                  llvm::cl::desc("FILE.cpp|FILE.mlir|-"),
                                   llvm::cl::cat(category)};
   llvm::cl::opt<std::string> pipe{
       "pipe", llvm::cl::value_desc("name"),
@@ -318,7 +318,9 @@ static bool writeObject(const CommandLine &line, OutputFiles &outputs) {
   ObjectOptions options{
       .source = line.getSource(),
       .target = line.getTarget(),
-      .cache = {.enabled = !line.noCache, .directory = line.cacheDir},
+      // Of standard input the cache does not know what was in it.
+      .cache = {.enabled = !line.noCache && line.file != "-",
+                .directory = line.cacheDir},
       .nameSpace = line.nameSpace,
       .remarks = line.remarks};
   std::string diagnostics;
