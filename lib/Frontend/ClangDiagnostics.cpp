@@ -3,11 +3,12 @@
 
 #include "ClangDiagnostics.h"
 
+#include "PipelineReader.h"
 #include "Wrappers.h"
-
 #include "mlir/IR/BuiltinAttributes.h"
 #include "clang/Basic/DiagnosticIDs.h"
 #include "clang/Basic/DiagnosticSema.h"
+#include "clang/Sema/Sema.h"
 #include "llvm/ADT/SmallString.h"
 
 using namespace piko;
@@ -31,18 +32,32 @@ void ClangDiagnosticForwarder::flush() {
   pending.reset();
 }
 
-/// What Piko says instead of what Clang says about constructs that Piko, not
-/// the C++ dialect that it happens to ask Clang for, does not have.
-static llvm::StringRef getReplacement(unsigned id) {
-  switch (id) {
-  case clang::diag::err_exceptions_disabled:
-    return "not supported in Piko: exceptions";
-  case clang::diag::err_no_dynamic_cast_with_fno_rtti:
-  case clang::diag::err_no_typeid_with_fno_rtti:
-    return "not supported in Piko: run-time type information";
-  default:
+/// The stage whose text the parser is in; null if it is in another's.
+static const clang::CXXRecordDecl *findStage(const clang::Sema &sema) {
+  for (const clang::DeclContext *scope = sema.CurContext; scope;
+       scope = scope->getParent())
+    if (const auto *type = llvm::dyn_cast<clang::CXXRecordDecl>(scope))
+      if (isStage(type))
+        return type;
+  return nullptr;
+}
+
+/// What Piko says where Clang only knows that there is no `state`.
+static std::string explainState(unsigned id, llvm::StringRef text,
+                                const clang::Sema *sema) {
+  bool isUnknown = id == clang::diag::err_undeclared_var_use ||
+                   id == clang::diag::err_undeclared_var_use_suggest;
+  if (!isUnknown || !sema ||
+      !text.starts_with("use of undeclared identifier 'state'"))
     return "";
-  }
+  const clang::CXXRecordDecl *stage = findStage(*sema);
+  if (!stage)
+    return "";
+  if (stage->hasAnyDependentBases())
+    return "expected this->state() in a template, whose bases are not known";
+  return "expected stage '" + stage->getNameAsString() +
+         "' to derive from piko::Uses<State>, where State is the state of its "
+         "pipeline, because it calls state()";
 }
 
 /// How the phase is declared that a wrapper calls at a place; nothing
@@ -65,9 +80,17 @@ void ClangDiagnosticForwarder::HandleDiagnostic(
   if (level == clang::DiagnosticsEngine::Ignored ||
       level == clang::DiagnosticsEngine::Remark)
     return;
-  llvm::SmallString<128> text(getReplacement(info.getID()));
-  if (text.empty())
-    info.FormatDiagnostic(text);
+  llvm::SmallString<128> text;
+  info.FormatDiagnostic(text);
+  if (level != clang::DiagnosticsEngine::Note)
+    isExplained = false;
+  else if (isExplained)
+    return;
+  if (std::string better = explainState(info.getID(), text, sema);
+      !better.empty()) {
+    text = better;
+    isExplained = true;
+  }
   mlir::Location location =
       info.hasSourceManager()
           ? convertLocation(info.getLocation(), info.getSourceManager(),

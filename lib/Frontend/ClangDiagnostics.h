@@ -9,6 +9,10 @@
 
 #include <optional>
 
+namespace clang {
+class Sema;
+} // namespace clang
+
 namespace piko {
 
 /// The place in the user's text that a Clang location stands for.
@@ -26,12 +30,17 @@ public:
 
   void HandleDiagnostic(clang::DiagnosticsEngine::Level level,
                         const clang::Diagnostic &info) override;
+  /// Where the parser is says what a name that it does not know is about.
+  void setSema(const clang::Sema *parser) { sema = parser; }
   /// Reports the diagnostic that was waiting for its notes.
   void flush();
 
 private:
   mlir::MLIRContext &context;
+  const clang::Sema *sema = nullptr;
   std::optional<mlir::Diagnostic> pending;
+  /// Whether that has a text of ours, to which Clang's notes do not belong.
+  bool isExplained = false;
   /// If it is about a wrapper's call of a phase: how the phase is declared.
   std::string phase;
 };

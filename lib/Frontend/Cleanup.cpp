@@ -9,6 +9,7 @@
 
 #include "Cleanup.h"
 
+#include "CallChain.h"
 #include "FillVariables.h"
 #include "MathCalls.h"
 #include "ParallelLoops.h"
@@ -35,131 +36,6 @@
 
 using namespace piko;
 using llvm::dyn_cast;
-
-mlir::Location piko::getUserLocation(const llvm::Instruction *instruction,
-                                     const ParsedUnit &unit,
-                                     mlir::MLIRContext &context) {
-  for (const llvm::DILocation *at = instruction->getDebugLoc(); at;
-       at = at->getInlinedAt()) {
-    if (unit.userFiles.contains(at->getFilename()) && at->getLine() != 0)
-      return mlir::FileLineColLoc::get(&context, at->getFilename(),
-                                       at->getLine(), at->getColumn());
-  }
-  return unit.pipeline.location;
-}
-
-//===----------------------------------------------------------------------===//
-// Calls
-//===----------------------------------------------------------------------===//
-
-namespace {
-
-/// Walks all that a wrapper calls and marks it to be inlined.
-class CallChecker {
-public:
-  CallChecker(ParsedUnit &unit, mlir::MLIRContext &context)
-      : unit(unit), context(context) {}
-
-  bool check(llvm::Function &function) {
-    if (llvm::is_contained(stack, &function))
-      return true;
-    if (!visited.insert(&function).second)
-      return true;
-    stack.push_back(&function);
-    for (llvm::Instruction &instruction : llvm::instructions(function)) {
-      auto *call = dyn_cast<llvm::CallBase>(&instruction);
-      if (call && !checkCall(call))
-        return false;
-      if (!checkReferences(instruction))
-        return false;
-    }
-    stack.pop_back();
-    return true;
-  }
-
-private:
-  bool fail(const llvm::CallBase *call, const llvm::Twine &what) {
-    mlir::emitError(getCallLocation(call)) << "not supported in Piko: " << what;
-    return false;
-  }
-
-  /// A call in a header is reported where the user's text leads to it.
-  mlir::Location getCallLocation(const llvm::CallBase *call) {
-    const llvm::Instruction *at = call;
-    for (size_t i = stack.size(); i-- > 0;) {
-      if (const llvm::DILocation *location = at->getDebugLoc())
-        if (unit.userFiles.contains(location->getFilename()))
-          return getUserLocation(at, unit, context);
-      at = callers[stack[i]];
-      if (!at)
-        break;
-    }
-    return getUserLocation(call, unit, context);
-  }
-
-  std::string getName(const llvm::Function *function) {
-    auto found = unit.functionNames.find(function->getName().str());
-    return found == unit.functionNames.end() ? function->getName().str()
-                                             : found->second;
-  }
-
-  bool checkCall(llvm::CallBase *call) {
-    if (call->isInlineAsm())
-      return fail(call, "inline assembly");
-    llvm::Function *callee = call->getCalledFunction();
-    if (!callee)
-      return true; // Known, or rejected, after inlining.
-    if (llvm::StringRef math = getMathName(*callee); !math.empty())
-      return callee->getArg(0)->getType()->isFloatTy() ||
-             fail(call,
-                  "'" + math + "' of a double: Piko has only that of a float");
-    if (callee->isIntrinsic() || getMarker(call, unit.markers))
-      return true;
-    std::string name = getName(callee);
-    if (callee->isDeclaration()) {
-      if (name == "operator new" || name == "operator new[]" ||
-          name == "operator delete" || name == "operator delete[]" ||
-          name == "malloc" || name == "free" || name == "calloc" ||
-          name == "realloc")
-        return fail(call, "dynamic allocation");
-      return fail(call,
-                  "a call of '" + name + "', which has no body in this file");
-    }
-    if (llvm::is_contained(stack, callee))
-      return fail(call, "recursion: '" + name + "' calls itself");
-    return checkCallee(*callee, call);
-  }
-
-  bool checkCallee(llvm::Function &callee, llvm::Instruction *user) {
-    callee.removeFnAttr(llvm::Attribute::NoInline);
-    callee.removeFnAttr(llvm::Attribute::OptimizeNone);
-    callee.addFnAttr(llvm::Attribute::AlwaysInline);
-    callers.try_emplace(&callee, user);
-    return check(callee);
-  }
-
-  /// Functions that are passed to others are called, too.
-  bool checkReferences(llvm::Instruction &instruction) {
-    auto *call = dyn_cast<llvm::CallBase>(&instruction);
-    for (llvm::Use &operand : instruction.operands()) {
-      auto *function = dyn_cast<llvm::Function>(operand.get());
-      if (!function || function->isDeclaration() ||
-          (call && call->isCallee(&operand)))
-        continue;
-      if (!checkCallee(*function, &instruction))
-        return false;
-    }
-    return true;
-  }
-
-  ParsedUnit &unit;
-  mlir::MLIRContext &context;
-  llvm::SmallVector<llvm::Function *> stack;
-  llvm::DenseSet<llvm::Function *> visited;
-  llvm::DenseMap<llvm::Function *, llvm::Instruction *> callers;
-};
-
-} // namespace
 
 //===----------------------------------------------------------------------===//
 // Passes
@@ -258,7 +134,7 @@ static bool checkObject(llvm::Function &function, const ParsedUnit &unit,
         getAddress(store->getPointerOperand(), memory.data).base != object ||
         !llvm::isPotentiallyReachable(begin, store))
       continue;
-    mlir::emitError(getUserLocation(store, unit, context))
+    emitUserError(store, unit, context)
         << "not supported in Piko: changing a member of a stage in a phase, "
            "whose calls are concurrent";
     return false;
@@ -426,13 +302,10 @@ bool piko::cleanUp(ParsedUnit &unit, MemoryMap &memory,
         memory.objects[wrapper] = variable;
         break;
       }
-  CallChecker checker(unit, context);
-  for (llvm::Function *wrapper : wrappers)
-    if (!checker.check(*wrapper))
-      return false;
-  for (llvm::Function *function : mathFunctions)
-    if (!checker.check(*function))
-      return false;
+  std::vector<llvm::Function *> roots = wrappers;
+  llvm::append_range(roots, mathFunctions);
+  if (!checkCalls(roots, unit, context))
+    return false;
 
   PassRunner runner;
   llvm::ModulePassManager inlining;

@@ -57,6 +57,10 @@ constexpr llvm::StringLiteral showsOrder = "piko.shows_order";
 constexpr llvm::StringLiteral share = "piko.share";
 } // namespace accessor
 
+/// Marks all that the functions call to be inlined; false after an error.
+bool checkCalls(llvm::ArrayRef<llvm::Function *> functions, ParsedUnit &unit,
+                mlir::MLIRContext &context);
+
 void expandMarkers(llvm::Function &function, MemoryMap &memory);
 
 /// Both return whether they changed anything.

@@ -1,6 +1,7 @@
 //===- Import.cpp - Blocks and branches of phases -------------------------===//
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 
+#include "CallChain.h"
 #include "Cleanup.h"
 #include "PhaseImporter.h"
 #include "mlir/Dialect/ControlFlow/IR/ControlFlowOps.h"
@@ -42,7 +43,7 @@ mlir::OwningOpRef<mlir::func::FuncOp> PhaseImporter::run() {
 
 mlir::InFlightDiagnostic
 PhaseImporter::fail(const llvm::Instruction *instruction) {
-  return mlir::emitError(getUserLocation(instruction, unit, context));
+  return emitUserError(instruction, unit, context);
 }
 
 LogicalResult PhaseImporter::reject(const llvm::Instruction *instruction,

@@ -21,6 +21,21 @@ using llvm::success;
 // Local arrays
 //===--------------------------------------------------------------------===//
 
+/// The error is where the variable is used: its place has no line.
+LogicalResult PhaseImporter::rejectVariable(llvm::AllocaInst *variable) {
+  llvm::Instruction *place = variable;
+  llvm::SmallVector<llvm::Value *> pointers = {variable};
+  for (size_t i = 0; i < pointers.size() && place == variable; ++i)
+    for (llvm::User *user : pointers[i]->users())
+      if (llvm::isa<llvm::GetElementPtrInst>(user))
+        pointers.push_back(user);
+      else if (llvm::cast<llvm::Instruction>(user)->getDebugLoc())
+        place = llvm::cast<llvm::Instruction>(user);
+  return reject(place, "a local variable" + getVariableName(variable) +
+                           " whose parts are accessed in ways that cannot be "
+                           "told apart");
+}
+
 LogicalResult PhaseImporter::importArray(llvm::AllocaInst *variable) {
   llvm::Type *type = variable->getAllocatedType();
   int64_t count = 1;
@@ -30,8 +45,7 @@ LogicalResult PhaseImporter::importArray(llvm::AllocaInst *variable) {
   }
   if (variable->isArrayAllocation() || type->isStructTy() ||
       type->isPointerTy())
-    return reject(variable, "a local variable whose parts are accessed in "
-                            "ways that cannot be told apart");
+    return rejectVariable(variable);
   // What belongs to an iteration begins with it.
   mlir::OpBuilder::InsertionGuard guard(builder);
   mlir::Block *owner = loopEntries.lookup(getOwner(variable));

@@ -11,6 +11,7 @@
 //
 //===----------------------------------------------------------------------===//
 
+#include "CallChain.h"
 #include "Cleanup.h"
 #include "ParallelLoops.h"
 
@@ -85,7 +86,7 @@ bool piko::expandLocalAtomics(llvm::Function &function, const ParsedUnit &unit,
   for (auto [call, variable] : calls) {
     const ParallelLoop *loop = loops.get(call->getParent());
     if (loop && loop->getNumber() != getOwner(variable)) {
-      mlir::emitError(getUserLocation(call, unit, context))
+      emitUserError(call, unit, context)
           << "expected the iterations of parallelFor to be independent, but "
              "this one changes the captured variable"
           << getVariableName(variable) << " atomically";

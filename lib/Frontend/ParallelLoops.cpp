@@ -3,6 +3,7 @@
 
 #include "ParallelLoops.h"
 
+#include "CallChain.h"
 #include "Cleanup.h"
 #include "mlir/IR/Diagnostics.h"
 #include "llvm/IR/InstIterator.h"
@@ -168,7 +169,7 @@ bool piko::promoteVariables(llvm::Function &function, const ParsedUnit &unit,
         auto *store = dyn_cast<llvm::StoreInst>(user);
         if (!store || !isShared(store, variable, loops) || isStep(store, unit))
           continue;
-        mlir::emitError(getUserLocation(store, unit, context))
+        emitUserError(store, unit, context)
             << "expected the iterations of parallelFor to be independent, but "
                "this one assigns the captured variable"
             << getVariableName(variable);

@@ -26,6 +26,7 @@
 #include "ClangDiagnostics.h"
 #include "ClangInvocation.h"
 #include "FillVariables.h"
+#include "PhaseNames.h"
 #include "Wrappers.h"
 #include "clang/AST/ASTConsumer.h"
 #include "clang/AST/DeclTemplate.h"
@@ -37,6 +38,7 @@
 #include "clang/Lex/PreprocessorOptions.h"
 #include "clang/Parse/ParseAST.h"
 #include "clang/Sema/Sema.h"
+#include "llvm/ADT/SetVector.h"
 #include "llvm/IR/InstIterator.h"
 #include "llvm/Support/VirtualFileSystem.h"
 #include "llvm/TargetParser/Triple.h"
@@ -290,6 +292,22 @@ readMarker(const clang::FunctionDecl *function, UnitReader &reader) {
   return std::optional<Marker>(marker);
 }
 
+/// What a user calls a function. Template arguments, and the namespaces by
+/// which a library tells its versions apart, say more than helps.
+static std::string getUserName(const clang::FunctionDecl *function) {
+  std::string name = function->getNameAsString();
+  for (const clang::DeclContext *scope = function->getDeclContext(); scope;
+       scope = scope->getParent()) {
+    const auto *space = llvm::dyn_cast<clang::NamespaceDecl>(scope);
+    const auto *named = llvm::dyn_cast<clang::NamedDecl>(scope);
+    if (llvm::isa<clang::FunctionDecl>(scope))
+      break;
+    if (named && named->getDeclName() && !(space && space->isInline()))
+      name = named->getNameAsString() + "::" + name;
+  }
+  return name;
+}
+
 static bool readFunctions(clang::CodeGenerator &generator, UnitReader &reader) {
   ParsedUnit &unit = *reader.unit;
   for (const llvm::Function &function : *unit.module) {
@@ -308,8 +326,10 @@ static bool readFunctions(clang::CodeGenerator &generator, UnitReader &reader) {
         continue;
       }
     }
-    unit.functionNames[function.getName().str()] =
-        decl->getQualifiedNameAsString();
+    std::string name = getUserName(decl);
+    if (const llvm::DISubprogram *program = function.getSubprogram())
+      unit.programNames[program] = name;
+    unit.functionNames[function.getName().str()] = std::move(name);
   }
   return true;
 }
@@ -367,6 +387,21 @@ static void dropSuffix(llvm::Module &module, llvm::StringRef suffix) {
   for (llvm::Function &function : module)
     if (function.getName().ends_with(suffix))
       function.setName(function.getName().drop_back(suffix.size()).str());
+}
+
+/// Warns about what is C++ and is hardly meant.
+static void
+warnAboutText(llvm::ArrayRef<std::unique_ptr<UnitReader>> readers,
+              clang::ASTContext &ast, mlir::MLIRContext &context) {
+  llvm::SetVector<const clang::CXXRecordDecl *> stages;
+  for (const std::unique_ptr<UnitReader> &reader : readers) {
+    const PipelineDescription &pipeline = reader->unit->pipeline;
+    for (auto [type, stage] :
+         llvm::zip(reader->reader.stageTypes, pipeline.stages))
+      if (stages.insert(type))
+        warnAboutPhaseNames(type, pipeline.records[stage.input].name, ast,
+                            context);
+  }
 }
 
 /// Passes choose widths of numbers as for the target of the calling convention;
@@ -464,6 +499,7 @@ llvm::FailureOr<ParsedFile> piko::parseFile(const ParseRequest &request,
   }
   initializeConsumer(compiler);
   compiler.createSema(clang::TU_Complete, nullptr);
+  forwarder.setSema(&compiler.getSema());
 
   forwarder.BeginSourceFile(compiler.getLangOpts(), &preprocessor);
   clang::ParseAST(compiler.getSema());
@@ -482,6 +518,7 @@ llvm::FailureOr<ParsedFile> piko::parseFile(const ParseRequest &request,
   if (!module)
     return llvm::failure();
   adaptModule(*module);
+  warnAboutText(reader.readers, compiler.getASTContext(), context);
   llvm::StringSet<> userFiles;
   collectUserFiles(sources, userFiles);
   for (std::unique_ptr<UnitReader> &made : reader.readers) {

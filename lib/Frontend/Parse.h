@@ -7,6 +7,7 @@
 #include "Piko/Frontend/Frontend.h"
 #include "PipelineReader.h"
 #include "llvm/ADT/StringSet.h"
+#include "llvm/IR/DebugInfoMetadata.h"
 #include "llvm/IR/LLVMContext.h"
 #include "llvm/IR/Module.h"
 
@@ -36,6 +37,8 @@ struct ParsedUnit {
   MarkerTable markers;
   /// What a user calls a function, by its name in the module.
   std::map<std::string, std::string> functionNames;
+  /// The same by what is left of a function when it has been inlined.
+  llvm::DenseMap<const llvm::DISubprogram *, std::string> programNames;
   /// The files whose lines diagnostics should point at.
   llvm::StringSet<> userFiles;
   /// Where a call of the C library has been warned about.

@@ -68,6 +68,7 @@ private:
     llvm::SmallVector<mlir::Value> indices, elements;
     llvm::StringRef field;
   };
+  llvm::LogicalResult rejectVariable(llvm::AllocaInst *variable);
   llvm::LogicalResult importArray(llvm::AllocaInst *variable);
   mlir::Value makeElementIndex(const Address &address, int64_t size);
   llvm::LogicalResult importArrayAccess(llvm::Instruction *instruction);

@@ -9,6 +9,7 @@
 #include "PipelineReader.h"
 
 #include "ClangDiagnostics.h"
+#include "PhaseNames.h"
 #include "mlir/IR/Diagnostics.h"
 #include "clang/AST/DeclTemplate.h"
 #include "clang/AST/RecordLayout.h"
@@ -62,24 +63,35 @@ static QualType getTypeArgument(const Specialization *type, unsigned index) {
 // Finding pipelines
 //===----------------------------------------------------------------------===//
 
-/// Whether what a template makes will derive from piko::Pipe.
-static bool makesPipes(const clang::TemplateDecl *made) {
-  const auto *pattern = llvm::dyn_cast_or_null<CXXRecordDecl>(
-      made ? made->getTemplatedDecl() : nullptr);
-  if (!pattern || !pattern->hasDefinition())
+static bool willDeriveFrom(const CXXRecordDecl *pattern, llvm::StringRef name);
+
+/// Whether a type, which may be a template's, will be a piko::`name`.
+static bool willBe(QualType type, llvm::StringRef name) {
+  if (findPikoBase(type->getAsCXXRecordDecl(), name))
+    return true;
+  const auto *made = type->getAs<clang::TemplateSpecializationType>();
+  const clang::TemplateDecl *of =
+      made ? made->getTemplateName().getAsTemplateDecl() : nullptr;
+  if (!of)
     return false;
-  return llvm::any_of(
-      pattern->getDefinition()->bases(),
-      [](const clang::CXXBaseSpecifier &base) {
-        if (findPikoBase(base.getType()->getAsCXXRecordDecl(), "Pipe"))
-          return true;
-        const auto *type =
-            base.getType()->getAs<clang::TemplateSpecializationType>();
-        const clang::TemplateDecl *of =
-            type ? type->getTemplateName().getAsTemplateDecl() : nullptr;
-        return of && (makesPipes(of) ||
-                      of->getQualifiedNameAsString() == "piko::Pipe");
-      });
+  if (const auto *alias = dyn_cast<clang::TypeAliasTemplateDecl>(of))
+    return willBe(alias->getTemplatedDecl()->getUnderlyingType(), name);
+  return of->getQualifiedNameAsString() == ("piko::" + name).str() ||
+         willDeriveFrom(
+             llvm::dyn_cast_or_null<CXXRecordDecl>(of->getTemplatedDecl()),
+             name);
+}
+
+static bool willDeriveFrom(const CXXRecordDecl *pattern, llvm::StringRef name) {
+  return pattern && pattern->hasDefinition() &&
+         llvm::any_of(pattern->getDefinition()->bases(),
+                      [&](const clang::CXXBaseSpecifier &base) {
+                        return willBe(base.getType(), name);
+                      });
+}
+
+bool piko::isStage(const CXXRecordDecl *type) {
+  return willDeriveFrom(type, "BasicStage");
 }
 
 static void collectPipes(const clang::DeclContext *scope, clang::Sema &sema,
@@ -103,7 +115,8 @@ static void collectPipes(const clang::DeclContext *scope, clang::Sema &sema,
       type = target->getAsCXXRecordDecl();
       const auto *made = llvm::dyn_cast_or_null<Specialization>(type);
       if (!made || type->isDependentContext() || target->isDependentType() ||
-          !makesPipes(made->getSpecializedTemplate()) ||
+          !willDeriveFrom(made->getSpecializedTemplate()->getTemplatedDecl(),
+                          "Pipe") ||
           !sema.isCompleteType(decl->getLocation(), target))
         continue;
     } else if (const auto *record = dyn_cast<CXXRecordDecl>(decl)) {
@@ -377,10 +390,14 @@ LogicalResult PipelineReader::readPhases(const CXXRecordDecl *type,
   const clang::NamedDecl *process = nullptr, *assign = nullptr,
                          *schedule = nullptr;
   mlir::Location where = locate(type->getLocation());
-  if (!declares(type, "process", process))
-    return emitError(where) << "expected stage '" << stage.name
-                            << "' to have a process phase, but '"
-                            << stage.typeName << "' has none";
+  if (!declares(type, "process", process)) {
+    mlir::InFlightDiagnostic diagnostic = emitError(where);
+    diagnostic << "expected stage '" << stage.name
+               << "' to have a process phase, but '" << stage.typeName
+               << "' has none";
+    noteSimilarNames(type, "process", ast, diagnostic, context);
+    return diagnostic;
+  }
   stage.processLocation = locate(process->getLocation());
   if (const auto *method = dyn_cast<clang::CXXMethodDecl>(process))
     if (method->getNumParams() == 1) {
@@ -392,10 +409,13 @@ LogicalResult PipelineReader::readPhases(const CXXRecordDecl *type,
   if (stage.hasAssign)
     stage.assignLocation = locate(assign->getLocation());
   stage.hasSchedule = declares(type, "schedule", schedule);
-  if (!stage.hasAssign && !stage.isWholeDomain())
-    return emitError(where)
-           << "expected stage '" << stage.name
-           << "' to have an assignBin phase, because its bins are smaller than "
-              "the domain";
+  if (!stage.hasAssign && !stage.isWholeDomain()) {
+    mlir::InFlightDiagnostic diagnostic = emitError(where);
+    diagnostic << "expected stage '" << stage.name
+               << "' to have an assignBin phase, because its bins are smaller "
+                  "than the domain";
+    noteSimilarNames(type, "assignBin", ast, diagnostic, context);
+    return diagnostic;
+  }
   return success();
 }

@@ -19,6 +19,9 @@ struct PipeCandidate {
   clang::SourceLocation location;
 };
 
+/// Whether a class is a stage, or, being a template's, will be one.
+bool isStage(const clang::CXXRecordDecl *type);
+
 /// The pipelines that a translation unit defines or names by an alias, in
 /// order.
 std::vector<PipeCandidate> findPipes(clang::Sema &sema);

@@ -76,9 +76,11 @@ llvm::FailureOr<unsigned> RecordTable::get(QualType type, mlir::Location user,
   RecordDescription record;
   record.name = getName(type);
   if (!type.isTriviallyCopyableType(ast)) {
-    mlir::emitError(user) << "expected a trivially copyable type, but got '"
-                          << record.name << "'";
-    return failure();
+    mlir::InFlightDiagnostic diagnostic = mlir::emitError(user);
+    diagnostic << "expected a trivially copyable type, but got '" << record.name
+               << "'";
+    explainCopies(type, diagnostic);
+    return diagnostic;
   }
   record.size = ast.getTypeSizeInChars(type).getQuantity();
   record.align = ast.getTypeAlignInChars(type).getQuantity();
@@ -92,6 +94,61 @@ llvm::FailureOr<unsigned> RecordTable::get(QualType type, mlir::Location user,
   numbers[type] = records.size();
   records.push_back(std::move(record));
   return records.size() - 1;
+}
+
+/// What makes copies of a class not trivial by itself, and what it is called.
+static std::pair<const clang::CXXMethodDecl *, llvm::StringRef>
+findCopyFunction(const clang::CXXRecordDecl *decl) {
+  for (const clang::CXXConstructorDecl *constructor : decl->ctors())
+    if (constructor->isCopyOrMoveConstructor() && !constructor->isTrivial())
+      return {constructor, "constructor"};
+  for (const clang::CXXMethodDecl *method : decl->methods())
+    if ((method->isCopyAssignmentOperator() ||
+         method->isMoveAssignmentOperator()) &&
+        !method->isTrivial())
+      return {method, "assignment"};
+  const clang::CXXDestructorDecl *destructor = decl->getDestructor();
+  if (destructor && !destructor->isTrivial())
+    return {destructor, "destructor"};
+  return {nullptr, ""};
+}
+
+bool RecordTable::explainCopies(QualType type,
+                                mlir::InFlightDiagnostic &diagnostic) {
+  const clang::CXXRecordDecl *decl =
+      ast.getBaseElementType(type)->getAsCXXRecordDecl();
+  const clang::SourceManager &sources = ast.getSourceManager();
+  if (!decl || sources.isInSystemHeader(decl->getLocation()))
+    return false;
+  bool found = false;
+  for (const clang::CXXBaseSpecifier &base : decl->bases()) {
+    found |= !base.getType().isTriviallyCopyableType(ast);
+    if (!base.getType().isTriviallyCopyableType(ast) &&
+        !explainCopies(base.getType(), diagnostic))
+      diagnostic.attachNote(
+          convertLocation(base.getBeginLoc(), sources, context))
+          << "base '" << base.getType().getAsString(ast.getPrintingPolicy())
+          << "' is not trivially copyable";
+  }
+  for (const clang::FieldDecl *field : decl->fields()) {
+    if (field->getType().isTriviallyCopyableType(ast))
+      continue;
+    found = true;
+    diagnostic.attachNote(
+        convertLocation(field->getLocation(), sources, context))
+        << "member '" << field->getName() << "' of type '"
+        << field->getType().getAsString(ast.getPrintingPolicy())
+        << "' is not trivially copyable";
+    explainCopies(field->getType(), diagnostic);
+  }
+  if (found)
+    return true;
+  auto [copy, what] = findCopyFunction(decl);
+  if (!copy)
+    return false;
+  diagnostic.attachNote(convertLocation(copy->getLocation(), sources, context))
+      << "this " << what << " of '" << decl->getName() << "' is not trivial";
+  return true;
 }
 
 LogicalResult RecordTable::flatten(QualType type, const Path &path,

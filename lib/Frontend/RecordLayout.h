@@ -36,6 +36,10 @@ private:
                 RecordDescription &record);
   void addNumber(clang::QualType type, const Path &path, ScalarType scalar,
                  RecordDescription &record);
+  /// Notes at the members that keep a type of the user's from being trivially
+  /// copyable; false if there is nothing to say.
+  bool explainCopies(clang::QualType type,
+                     mlir::InFlightDiagnostic &diagnostic);
   llvm::LogicalResult reject(const Path &path, const RecordDescription &record,
                              const llvm::Twine &what);
 

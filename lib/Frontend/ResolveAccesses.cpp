@@ -10,6 +10,7 @@
 
 #include "Cleanup.h"
 
+#include "CallChain.h"
 #include "mlir/IR/Diagnostics.h"
 #include "llvm/IR/InstIterator.h"
 #include "llvm/IR/Instructions.h"
@@ -60,7 +61,7 @@ private:
   }
 
   bool fail(llvm::Instruction *instruction, const llvm::Twine &what) {
-    mlir::emitError(getUserLocation(instruction, unit, context))
+    emitUserError(instruction, unit, context)
         << "not supported in Piko: " << what;
     return false;
   }
@@ -122,9 +123,16 @@ private:
   }
 
   std::string describeBase(llvm::Value *base) {
-    if (auto *table = dyn_cast<llvm::GlobalVariable>(base))
-      return "access to the variable '" + table->getName().str() +
-             "', which is outside the pipeline";
+    if (auto *call = dyn_cast<llvm::IntrinsicInst>(base))
+      if (call->getIntrinsicID() == llvm::Intrinsic::threadlocal_address)
+        base = call->getArgOperand(0);
+    if (auto *variable = dyn_cast<llvm::GlobalVariable>(base)) {
+      llvm::StringRef name = variable->getName();
+      if (name.starts_with("_ZTI"))
+        return "run-time type information";
+      return "access to " + describeVariable(name) +
+             ", which is outside the pipeline";
+    }
     if (llvm::isa<llvm::IntToPtrInst>(base))
       return "a pointer made from an integer";
     if (llvm::isa<llvm::ConstantPointerNull>(base))

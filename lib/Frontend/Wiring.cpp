@@ -9,6 +9,7 @@
 
 #include "Wiring.h"
 
+#include "CallChain.h"
 #include "Cleanup.h"
 #include "Wrappers.h"
 #include "mlir/IR/Diagnostics.h"
@@ -45,7 +46,7 @@ private:
     return *unit.module->getFunction(getWrapperName(kind, index));
   }
   InFlightDiagnostic fail(const llvm::CallInst *call) {
-    return mlir::emitError(getUserLocation(call, unit, context));
+    return emitUserError(call, unit, context);
   }
 
   /// The constant that a marker is given; reports where it is not one.

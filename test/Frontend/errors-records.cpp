@@ -7,7 +7,10 @@
 // RUN: not piko-translate --cpp-to-piko --pipe=Pipe4 %s 2>&1 | FileCheck %s --check-prefix=TRIVIAL
 // RUN: not piko-translate --cpp-to-piko --pipe=Pipe5 %s 2>&1 | FileCheck %s --check-prefix=STATE
 // RUN: not piko-translate --cpp-to-piko --pipe=Pipe6 %s 2>&1 | FileCheck %s --check-prefix=ARRAY
+// RUN: not piko-translate --cpp-to-piko --pipe=Pipe7 %s 2>&1 | FileCheck %s --check-prefix=VECTOR
 #include <piko.h>
+#include <string>
+#include <vector>
 
 struct Inner {
   // ARRAY: errors-records.cpp:[[#@LINE + 2]]:10: error: not supported in Piko: a pointer or reference in type 'Inner[2]', member 'nodes.next'
@@ -27,13 +30,26 @@ struct Bits {
   int flag : 1;
 };
 struct Owner {
+  // TRIVIAL-DAG: errors-records.cpp:[[#@LINE + 1]]:3: note: this constructor of 'Owner' is not trivial
   Owner(const Owner &);
+};
+struct Named {
+  // VECTOR-DAG: errors-records.cpp:[[#@LINE + 1]]:15: note: member 'name' of type 'std::string' is not trivially copyable
+  std::string name;
+};
+struct Mesh {
+  float x;
+  // VECTOR-DAG: errors-records.cpp:[[#@LINE + 1]]:20: note: member 'indices' of type 'std::vector<int>' is not trivially copyable
+  std::vector<int> indices;
+  // VECTOR-DAG: errors-records.cpp:[[#@LINE + 1]]:9: note: member 'parts' of type 'Named[2]' is not trivially copyable
+  Named parts[2];
 };
 template <class T> struct Drain : piko::Stage<0, 0, 1, T> {
   void process(const T &) {}
 };
 template <class T> struct Pipeline : piko::Pipe<> {
-  // TRIVIAL: errors-records.cpp:[[#@LINE + 1]]:12: error: expected a trivially copyable type, but got 'Owner'
+  // TRIVIAL-DAG: errors-records.cpp:[[#@LINE + 2]]:12: error: expected a trivially copyable type, but got 'Owner'
+  // VECTOR-DAG: errors-records.cpp:[[#@LINE + 1]]:12: error: expected a trivially copyable type, but got 'Mesh'
   Drain<T> drain;
   Pipeline() { source(drain); }
 };
@@ -55,3 +71,4 @@ using Pipe3 = Pipeline<Bits>;
 using Pipe4 = Pipeline<Owner>;
 using Pipe5 = WithState<PointerState>;
 using Pipe6 = WithState<ArrayState>;
+using Pipe7 = Pipeline<Mesh>;
