@@ -25,6 +25,7 @@
 
 #include "ClangDiagnostics.h"
 #include "ClangInvocation.h"
+#include "EvaluationOrder.h"
 #include "FillVariables.h"
 #include "PhaseNames.h"
 #include "Wrappers.h"
@@ -390,9 +391,10 @@ static void dropSuffix(llvm::Module &module, llvm::StringRef suffix) {
 }
 
 /// Warns about what is C++ and is hardly meant.
-static void
-warnAboutText(llvm::ArrayRef<std::unique_ptr<UnitReader>> readers,
-              clang::ASTContext &ast, mlir::MLIRContext &context) {
+static void warnAboutText(const llvm::Module &module,
+                          clang::CodeGenerator &generator,
+                          llvm::ArrayRef<std::unique_ptr<UnitReader>> readers,
+                          clang::ASTContext &ast, mlir::MLIRContext &context) {
   llvm::SetVector<const clang::CXXRecordDecl *> stages;
   for (const std::unique_ptr<UnitReader> &reader : readers) {
     const PipelineDescription &pipeline = reader->unit->pipeline;
@@ -402,6 +404,13 @@ warnAboutText(llvm::ArrayRef<std::unique_ptr<UnitReader>> readers,
         warnAboutPhaseNames(type, pipeline.records[stage.input].name, ast,
                             context);
   }
+  std::vector<const clang::FunctionDecl *> wrappers;
+  for (const llvm::Function &function : module)
+    if (function.getName().starts_with("__piko_wrapper_"))
+      if (const auto *decl = llvm::dyn_cast_or_null<clang::FunctionDecl>(
+              generator.GetDeclForMangledName(function.getName())))
+        wrappers.push_back(decl);
+  warnAboutEvaluationOrder(wrappers, ast, context);
 }
 
 /// Passes choose widths of numbers as for the target of the calling convention;
@@ -518,7 +527,8 @@ llvm::FailureOr<ParsedFile> piko::parseFile(const ParseRequest &request,
   if (!module)
     return llvm::failure();
   adaptModule(*module);
-  warnAboutText(reader.readers, compiler.getASTContext(), context);
+  warnAboutText(*module, *generator, reader.readers, compiler.getASTContext(),
+                context);
   llvm::StringSet<> userFiles;
   collectUserFiles(sources, userFiles);
   for (std::unique_ptr<UnitReader> &made : reader.readers) {
