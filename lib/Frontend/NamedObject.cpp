@@ -5,6 +5,7 @@
 
 #include "clang/AST/ExprCXX.h"
 #include "clang/AST/LambdaCapture.h"
+#include "llvm/Support/SaveAndRestore.h"
 
 using namespace piko;
 using clang::Expr;
@@ -12,9 +13,15 @@ using clang::FunctionDecl;
 using llvm::dyn_cast;
 
 bool NamedObject::overlaps(const NamedObject &other) const {
+  const std::vector<Step> &more =
+      steps.size() < other.steps.size() ? other.steps : steps;
   size_t common = std::min(steps.size(), other.steps.size());
+  // A pointer and what it points to are two objects.
   return root == other.root &&
-         std::equal(steps.begin(), steps.begin() + common, other.steps.begin());
+         std::equal(steps.begin(), steps.begin() + common,
+                    other.steps.begin()) &&
+         llvm::none_of(llvm::drop_begin(more, common),
+                       [](Step step) { return step.number == pointee; });
 }
 
 void NamedObject::addStep(Step step) {
@@ -108,7 +115,8 @@ ObjectNamer::getVariable(const clang::DeclRefExpr *reference,
   if (variable->getType()->isReferenceType() && init &&
       !llvm::isa<clang::ParmVarDecl>(variable))
     if (Result target = getObject(init, function))
-      return target;
+      if (!target->decl || !target->decl->isImplicit())
+        return target;
   return NamedObject{variable, variable, {}, name};
 }
 
@@ -174,6 +182,10 @@ ObjectNamer::Result ObjectNamer::getResult(const clang::CallExpr *call,
 
 ObjectNamer::Result ObjectNamer::getObject(const Expr *expr,
                                            const FunctionDecl *function) {
+  constexpr unsigned limit = 64;
+  if (depth == limit)
+    return std::nullopt;
+  llvm::SaveAndRestore deeper(depth, depth + 1);
   expr = strip(expr);
   if (const auto *reference = dyn_cast<clang::DeclRefExpr>(expr))
     return getVariable(reference, function);

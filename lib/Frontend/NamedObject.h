@@ -74,6 +74,8 @@ private:
                    const clang::FunctionDecl *function);
 
   clang::ASTContext &ast;
+  /// Of what a reference is bound to, which may be itself.
+  unsigned depth = 0;
   /// The first of equal calls.
   std::map<llvm::FoldingSetNodeID, const clang::Expr *,
            bool (*)(const llvm::FoldingSetNodeID &,

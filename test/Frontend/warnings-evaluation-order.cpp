@@ -17,6 +17,7 @@ struct Generator {
   void count() { ++calls; }
   int getCalls() const { return int(calls); }
 };
+inline float touch(float &x) { return ++x; }
 inline float nested(Generator &g) { return g.next() + 1; }
 inline float area(const Generator &g) { return float(g.seed); }
 template <class F> float twice(F f) { return f() * 2; }
@@ -65,6 +66,9 @@ struct Warned : piko::Stage<0, 0, 1, Item, Item, Item> {
     glm::vec2 mixed(static_cast<float>(s), rnd(s));
     // CHECK: :[[#@LINE + 1]]:33: warning: primitives are emitted by two operands
     uint32_t emitted = put(1) + put(2);
+    for (float &value : values)
+      // CHECK: :[[#@LINE + 1]]:30: warning: 'value' is changed by two operands
+      value = (value += 1) + touch(value);
     // CHECK: :[[#@LINE + 1]]:51: warning: 'values[0]' is changed by two operands
     float element = (values[0] += 1) * (values[0] *= 2);
 
@@ -79,6 +83,8 @@ struct Warned : piko::Stage<0, 0, 1, Item, Item, Item> {
     glm::vec2 parts(g.getCalls(), g.next());
     float constant = area(g) + area(g) + g.peek() * area(g);
     sum += rnd(s);
+    float *pointer = values;
+    sum += touch(pointer[0]) + touch(pointer[1]);
     values[0] = rnd(s);
     values[int(rnd(s))] = rnd(s);
     glm::vec2 elements(values[0] += 1, values[1] += 1);
