@@ -90,7 +90,9 @@ void Strips::failCollected() const {
   throw Failure{PIKORT_OUT_OF_MEMORY,
                 "stage " + quoted(p_.stages[largest->consumer].name) +
                     ": out of memory: what it collects takes " +
-                    std::to_string(largest->queue->bytes()) + " bytes" +
+                    std::to_string(largest->queue->bytes()) + " of " +
+                    std::to_string(held_) + " bytes in bins, and strips need " +
+                    std::to_string(p_.memory.budget() / 4) + " more" +
                     memoryLimitText(p_)};
 }
 
