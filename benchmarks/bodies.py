@@ -69,22 +69,40 @@ def get_openmp():
     return call(["clang++-22", "-print-file-name=libomp.so"]).strip()
 
 
-def build_compiled(arguments, body, build):
-    program = get_program(arguments, body, build)
+def is_newer(file, *than):
+    return os.path.exists(file) and all(
+        os.path.getmtime(file) > os.path.getmtime(other) for other in than)
+
+
+def read(file):
+    if not os.path.exists(file):
+        return None
+    with open(file) as stream:
+        return stream.read()
+
+
+def build_compiled(arguments, body):
+    """One host, with the object of each build."""
     source = f"{BODIES}/{body}.piko.cpp"
-    call([f"{arguments.bin}/pikoc", source, "-o", f"{program}.o", "--header",
-          f"{program}.h", *COMPILED[build]])
-    call(["g++", *CXX, f'-DPIKO_BODY_HEADER="{program}.h"', "-x", "c++", source,
-          "-x", "none", f"{program}.o", f"-L{arguments.lib}", "-lpikort",
-          get_openmp(), f"-Wl,-rpath,{arguments.lib}", "-o", program])
+    header, host = (f"{arguments.work}/{body}.{end}" for end in ("h", "host.o"))
+    before = read(header)
+    for build, options in COMPILED.items():
+        program = get_program(arguments, body, build)
+        call([f"{arguments.bin}/pikoc", source, "-o", f"{program}.o",
+              "--header", header, *options])
+        if read(header) != before or not is_newer(host, source):
+            call(["g++", *CXX, f'-DPIKO_BODY_HEADER="{header}"', "-c", source,
+                  "-o", host])
+            before = read(header)
+        call(["g++", host, f"{program}.o", f"-L{arguments.lib}", "-lpikort",
+              get_openmp(), f"-Wl,-rpath,{arguments.lib}", "-o", program])
 
 
 def build_reference(arguments, body, build):
     program = get_program(arguments, body, build)
     source = f"{BODIES}/{body}.piko.cpp"
-    if (os.path.exists(program)
-            and os.path.getmtime(program) > os.path.getmtime(source)):
-        return # the header that they share changes too seldom to look
+    if is_newer(program, source):
+        return  # the headers that they share change too seldom to look
     call([*REFERENCES[build], *arguments.flags, *CXX, source, "-o", program])
 
 
@@ -110,8 +128,8 @@ def main():
         os.path.basename(file).removesuffix(".piko.cpp")
         for file in glob.glob(f"{BODIES}/*.piko.cpp"))
     with ThreadPoolExecutor(arguments.jobs) as pool:
-        jobs = [pool.submit(build_compiled, arguments, body, build)
-                for body in bodies for build in COMPILED]
+        jobs = [pool.submit(build_compiled, arguments, body)
+                for body in bodies]
         jobs += [pool.submit(build_reference, arguments, body, build)
                  for body in bodies for build in REFERENCES]
         for job in jobs:

@@ -60,6 +60,8 @@ void piko::addSynthesisSequence(OpPassManager &passes,
     pipeline.addPass(createOwnPixels());
   if (options.has("eliminate-schedules"))
     pipeline.addPass(createEliminateSchedules());
+  if (options.has("prove-bounds"))
+    pipeline.addPass(createProveBounds());
   pipeline.addPass(createFormKernels());
   if (options.has("fuse-kernels"))
     pipeline.addPass(createFuseKernels());
@@ -85,6 +87,8 @@ void piko::addCPUSequence(OpPassManager &passes,
     passes.nest<PipelineOp>().addPass(createCompactLoops());
   if (options.has("vectorize"))
     passes.nest<PipelineOp>().addPass(createVectorize());
+  if (options.has("hoist-bounds"))
+    passes.nest<PipelineOp>().addPass(createHoistBounds());
   passes.nest<PipelineOp>().addPass(createConvertPikoToSCF());
   addCleanUp(passes);
   passes.nest<PipelineOp>().addPass(createConvertPikoToOpenMP());

@@ -16,7 +16,8 @@ const std::vector<std::string> &SynthesisOptions::getOptional() {
   static const std::vector<std::string> names = {
       "pre-schedule", "infer-directives", "fuse-stages",         "test-early",
       "prune",        "own-pixels",       "eliminate-schedules", "fuse-kernels",
-      "form-strips",  "prefetch",         "compact-loops",       "vectorize"};
+      "form-strips",  "prefetch",         "compact-loops",       "vectorize",
+      "prove-bounds", "hoist-bounds"};
   return names;
 }
 

@@ -313,6 +313,11 @@ BinIdentity::BinIdentity(PipelineOp pipeline) : pipeline(pipeline) {
     collectFacts(stage);
 }
 
+bool BinIdentity::isInBin(StageOp stage, int64_t dim, Operation *at,
+                          Value value) const {
+  return BinBounds(*this, stage, dim, at).contains(value);
+}
+
 void BinIdentity::collectFacts(StageOp stage) {
   AssignOp assign = stage.getAssign();
   Operation *only = assign ? getOnlyAssignment(assign) : nullptr;

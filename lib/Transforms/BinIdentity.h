@@ -32,6 +32,11 @@ class BinIdentity {
 public:
   explicit BinIdentity(PipelineOp pipeline);
 
+  /// Whether a value, at a place of the stage's process phase, lies between the
+  /// bounds of the bin that is processed, in one dimension.
+  bool isInBin(StageOp stage, int64_t dim, mlir::Operation *at,
+               mlir::Value value) const;
+
   /// Whether the stage's assignment is the identity; says in `refusal` why not.
   mlir::LogicalResult prove(StageOp consumer, Refusal &refusal);
 

@@ -16,7 +16,7 @@ EQUAL, BLANK = "equal", "equal, but blank"
 #: What piko-compare may leave out of synthesis.
 PASSES = ["pre-schedule", "infer-directives", "fuse-stages", "test-early", "prune",
           "own-pixels", "eliminate-schedules", "fuse-kernels", "prefetch",
-          "compact-loops", "vectorize"]
+          "compact-loops", "vectorize", "prove-bounds", "hoist-bounds"]
 
 
 def options_of(passes):

@@ -258,6 +258,41 @@ def TestEarly : Pass<"piko-test-early", "::piko::PipelineOp"> {
     Statistic<"moved", "moved", "operations that moved">];
 }
 
+def ProveBounds : Pass<"piko-prove-bounds", "::piko::PipelineOp"> {
+  let summary = "Find indices that need no test when the pipeline runs";
+  let description = [{
+    **Requires** the authored level; last, because what moves an access out of
+    the condition that proves something about it would be wrong behind this.
+
+    **Does**: marks accesses to buffers, images and lists as `checked` where
+    loops, conditions, minimum and maximum show that each index is at least 0
+    and less than the extent; and those to images, and updates (`piko.inside`),
+    whose coordinates lie between the bounds of the bin, as
+    `piko-infer-directives` proves it.
+
+    **Guarantees** that no access is outside that was not.
+
+    Before:
+    ```
+    %n = piko.extent @lights[0]
+    scf.for %i = %zero to %n step %one {
+      %x = piko.load @lights[%i : index] "x" : f32
+    ```
+    After:
+    ```
+      %x = piko.load checked @lights[%i : index] "x" : f32
+    ```
+
+    **Limits**: what follows from the contents of buffers, or from constants that
+    the host sets, is not known; nor is it known of a buffer, as it is of the
+    domain, that it has an element at all, so that an index clamped to it, or a
+    remainder, is still tested. A remark names each access that is.
+  }];
+  let statistics = [
+    Statistic<"proved", "proved", "accesses that need no test">,
+    Statistic<"left", "left", "accesses that are tested">];
+}
+
 def Prune : Pass<"piko-prune", "::mlir::ModuleOp"> {
   let summary = "Drop fields, ports and stages that nothing depends on";
   let description = [{

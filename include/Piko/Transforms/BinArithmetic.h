@@ -54,6 +54,9 @@ private:
 /// in, or null.
 mlir::Value findBin(mlir::OpBuilder &builder, mlir::Operation *op);
 
+/// On an update whose pixel piko-prove-bounds has found to be in the bin.
+constexpr const char *insideAttrName = "piko.inside";
+
 } // namespace piko
 
 #endif // PIKO_TRANSFORMS_BINARITHMETIC_H

@@ -211,6 +211,49 @@ def CompactLoops : Pass<"piko-compact-loops", "::piko::PipelineOp"> {
                            "::mlir::scf::SCFDialect"];
 }
 
+def HoistBounds : Pass<"piko-hoist-bounds", "::piko::PipelineOp"> {
+  let summary = "Test the indices of a loop in front of it";
+  let description = [{
+    **Requires** the resolved level; last before `convert-piko-to-scf`, because
+    behind it loops stand there twice.
+
+    **Does**: takes innermost loops that count by one up to a bound that does not
+    change, and in which indices of buffers are the count, or a number that does
+    not change and the count. A test in front of the loop finds whether all these
+    indices are inside, and none wraps around; then a copy of the loop runs whose
+    accesses are `checked`, with indices that LLVM sees to be in a row, so that
+    it can form vectors. Otherwise the loop runs as it was.
+
+    **Guarantees** the same accesses in the same order, and the same errors.
+
+    Before:
+    ```
+    scf.while (%j = %zero) { %j < %n } do {
+      %i = arith.addi %base, %j : i32
+      %x = piko.load @lights[%i : i32] "x" : f32
+    ```
+    After:
+    ```
+    scf.if %all_inside {
+      scf.while (%j = %zero) { %j < %n } do {
+        %i = arith.addi %wide_base, %wide_j : index
+        %x = piko.load checked @lights[%i : index] "x" : f32
+    } else {
+      // as before
+    }
+    ```
+
+    **Limits**: a loop with another index, as one that is read from a buffer, is
+    taken for those that are as above. Long loops, and loops in which nothing is
+    tested, stay.
+  }];
+  let options = [
+    Option<"maxOperations", "max-operations", "int64_t", "64",
+           "How many operations a loop may have to stand there twice">];
+  let statistics = [
+    Statistic<"versioned", "versioned", "loops with a test in front">];
+}
+
 def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
   let summary = "Compute for many primitives at once";
   let description = [{

@@ -126,6 +126,9 @@ void populateChecksToLLVMPatterns(const mlir::TypeConverter &converter,
                                   mlir::RewritePatternSet &patterns,
                                   LoweringContext &context);
 
+/// Makes branches of casts from float to integer that saturate.
+void branchInSaturatingCasts(mlir::func::FuncOp function);
+
 /// Attributes of a kernel's function, until NAME.run is written: the number of
 /// the stage whose bins or schedule it is for, whether it places a source, ...
 constexpr const char *stageAttrName = "piko.stage";

@@ -8,6 +8,7 @@
 #include "LoweringContext.h"
 
 #include "mlir/Dialect/ControlFlow/IR/ControlFlow.h"
+#include "mlir/Dialect/Math/IR/Math.h"
 #include "mlir/Dialect/MemRef/IR/MemRef.h"
 #include "mlir/Dialect/SCF/IR/SCF.h"
 #include "mlir/Dialect/SCF/Transforms/Patterns.h"
@@ -27,7 +28,7 @@ struct ConvertPikoToLLVMPass
     : piko::impl::ConvertPikoToLLVMBase<ConvertPikoToLLVMPass> {
   void getDependentDialects(DialectRegistry &registry) const override {
     ConvertPikoToLLVMBase::getDependentDialects(registry);
-    registry.insert<cf::ControlFlowDialect>();
+    registry.insert<cf::ControlFlowDialect, math::MathDialect>();
   }
   void runOnOperation() override;
   LogicalResult convert(PipelineOp pipeline, LoweringContext &context);
@@ -156,8 +157,10 @@ LogicalResult ConvertPikoToLLVMPass::convert(PipelineOp pipeline,
   for (func::FuncOp function : functions)
     if (failed(applyPartialConversion(function, target, frozen)))
       return failure();
-  for (func::FuncOp function : functions)
+  for (func::FuncOp function : functions) {
     annotateReads(function);
+    branchInSaturatingCasts(function);
+  }
   for (func::FuncOp function : functions)
     if (!function->hasAttr(sourceAttrName) && numbers.cycleOf(function))
       outlineUnits(function);

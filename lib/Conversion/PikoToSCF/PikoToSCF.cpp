@@ -39,9 +39,12 @@ struct ConvertUpdate : OpRewritePattern<UpdateOp> {
       lo.push_back(bins.lo(update.getBin(), dim));
       hi.push_back(bins.hi(update.getBin(), dim));
     }
+    Value inside = update->hasAttr(insideAttrName)
+                       ? arith::ConstantOp::create(rewriter, loc,
+                                                   rewriter.getBoolAttr(true))
+                       : bins.isInside(at, lo, hi);
     auto ifOp = scf::IfOp::create(rewriter, loc, update.getResultTypes(),
-                                  bins.isInside(at, lo, hi),
-                                  /*withElseRegion=*/true);
+                                  inside, /*withElseRegion=*/true);
     rewriter.setInsertionPointToStart(ifOp.elseBlock());
     FailOp::create(rewriter, loc, stage.getSymName(), update.getImage(), at,
                    /*outside_bin=*/true, findBin(rewriter, update),

@@ -120,11 +120,14 @@ protected:
       n *= hi.z - lo.z;
     if constexpr (rank >= 4)
       n *= hi.w - lo.w;
-    parallelFor(n, [&](int i) {
+    parallelFor(n, [&](int index) {
       Cells<rank> cell;
+      // Without a sign, so that each part is seen to be in the bin.
+      unsigned i = index;
       auto take = [&](int &at, int first, int end) {
-        at = first + i % (end - first);
-        i /= end - first;
+        unsigned width = end - first;
+        at = first + static_cast<int>(i % width);
+        i /= width;
       };
       take(cell.x, lo.x, hi.x);
       if constexpr (rank >= 2)
