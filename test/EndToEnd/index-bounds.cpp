@@ -17,10 +17,11 @@ struct State {
   piko::Image<Pixel> image;
 };
 
-/// Rows of 10 of both buffers, which have 1000 elements.
+/// Rows of 10 of both buffers, which are equally long.
 struct Add : piko::Stage<0, 0, 64, Point>, piko::Uses<State> {
   void process(const piko::List<Point> &list) {
-    int rows = int(list.size()) < 100 ? int(list.size()) : 100;
+    int rows = int(state().out.size()) / 10;
+    rows = int(list.size()) < rows ? int(list.size()) : rows;
     for (int row = 0; row < rows; ++row) {
       int base = row * 10;
       for (int j = 0; j < 10; ++j)
@@ -60,13 +61,14 @@ struct Tiles : piko::Pipe<State> {
   Tiles() { source(stage); }
 };
 
-// PAST: expected: {{.*}}stage 'ReadPast'{{.*}}: expected an index in [0, 1000), but got 1000
-// PAST: got: stage 'stage', bin 0: expected an index in [0, 1000), but got 1000
+// PAST: expected: {{.*}}stage 'ReadPast'{{.*}}: expected an index in [0, 64), but got 64
+// PAST: got: stage 'stage', bin 0: expected an index in [0, 64), but got 64
 struct ReadPast : piko::Stage<0, 0, 64, Point>, piko::Uses<State> {
   void process(const piko::List<Point> &) {
     float sum = 0;
+    int end = int(state().in.size()) - 10;
     for (int j = 0; j < 11; ++j)
-      sum += state().in[990 + j];
+      sum += state().in[end + j];
     state().out[0] = sum;
   }
 };
@@ -75,8 +77,8 @@ struct Past : piko::Pipe<State> {
   Past() { source(stage); }
 };
 
-// BELOW: expected: {{.*}}stage 'ReadBelow'{{.*}}: expected an index in [0, 1000), but got -3
-// BELOW: got: stage 'stage', bin 0: expected an index in [0, 1000), but got -3
+// BELOW: expected: {{.*}}stage 'ReadBelow'{{.*}}: expected an index in [0, 64), but got -3
+// BELOW: got: stage 'stage', bin 0: expected an index in [0, 64), but got -3
 struct ReadBelow : piko::Stage<0, 0, 64, Point>, piko::Uses<State> {
   void process(const piko::List<Point> &) {
     for (int j = 0; j < 11; ++j)
