@@ -16,6 +16,7 @@
 #include "Wrappers.h"
 #include "mlir/IR/Diagnostics.h"
 #include "llvm/Analysis/CFG.h"
+#include "llvm/Analysis/LoopInfo.h"
 #include "llvm/IR/DebugInfoMetadata.h"
 #include "llvm/IR/InstIterator.h"
 #include "llvm/IR/Instructions.h"
@@ -159,6 +160,32 @@ static void dropUnreachableDefaults(llvm::Function &function) {
   llvm::removeUnreachableBlocks(function);
 }
 
+/// What runs when the pipeline does; the other wrappers are computed now.
+static bool isPhase(const llvm::Function &function) {
+  llvm::StringRef name = function.getName();
+  return !name.contains("_wire_") && !name.contains("_clear_");
+}
+
+/// Refuses loops that nothing leaves; false after an error.
+static bool checkLoops(llvm::Function &function, const ParsedUnit &unit,
+                       mlir::MLIRContext &context) {
+  llvm::DominatorTree dominance(function);
+  llvm::LoopInfo loops(dominance);
+  for (llvm::Loop *loop : llvm::reverse(loops.getLoopsInPreorder())) {
+    if (!loop->hasNoExitBlocks())
+      continue;
+    const llvm::Instruction *at = loop->getHeader()->getTerminator();
+    for (const llvm::BasicBlock *block : loop->blocks())
+      for (const llvm::Instruction &instruction : *block)
+        if (instruction.getDebugLoc() && !at->getDebugLoc())
+          at = &instruction;
+    mlir::emitError(getUserLocation(at, unit, context))
+        << "expected a loop that can end, but nothing leaves this one";
+    return false;
+  }
+  return true;
+}
+
 static void prepareFunction(llvm::Function &function, ParsedUnit &unit,
                             MemoryMap &memory, mlir::MLIRContext &context) {
   redirectMathCalls(function, unit, context);
@@ -169,6 +196,8 @@ static void prepareFunction(llvm::Function &function, ParsedUnit &unit,
   labelLoops(function, memory);
   dropHints(function);
   expandMarkers(function, memory);
+  if (isPhase(function))
+    holdDivisions(function);
 }
 
 /// Clang fills arrays of records in a loop, of which a clear value must be free
@@ -200,7 +229,8 @@ static bool cleanUpFunction(llvm::Function &function, ParsedUnit &unit,
   for (int round = 0; round < roundLimit; ++round) {
     if (!checkObject(function, unit, memory, context))
       return false;
-    bool changed = splitMemory(function, memory);
+    bool changed = releaseDivisions(function, unit.markers);
+    changed |= splitMemory(function, memory);
     changed |= flattenPointers(function, memory);
     if (!expandLocalAtomics(function, unit, memory, context, changed))
       return false;
@@ -208,6 +238,9 @@ static bool cleanUpFunction(llvm::Function &function, ParsedUnit &unit,
       prepareFunction(function, unit, memory, context);
       changed = true;
     }
+    if (!releasePixels(function, unit, memory, context, /*all=*/!changed,
+                       changed))
+      return false;
     if (!changed) {
       if (localized || !localizeTables(function, memory))
         break;
@@ -217,6 +250,9 @@ static bool cleanUpFunction(llvm::Function &function, ParsedUnit &unit,
       return false;
     runner.run(simplify, function);
   }
+  bool released = false;
+  if (!releasePixels(function, unit, memory, context, /*all=*/true, released))
+    return false;
   shareArrays(function, memory);
   llvm::FunctionPassManager promote;
   // Initial values are constants, even where they are set in a loop.
@@ -231,6 +267,7 @@ static bool cleanUpFunction(llvm::Function &function, ParsedUnit &unit,
   runner.run(promote, function);
   if (!resolveAccesses(function, unit, memory, context))
     return false;
+  releaseDivisions(function, unit.markers);
 
   llvm::FunctionPassManager finish;
   finish.addPass(llvm::EarlyCSEPass(/*UseMemorySSA=*/true));
@@ -248,7 +285,8 @@ static bool cleanUpFunction(llvm::Function &function, ParsedUnit &unit,
        ++round)
     runner.run(simplify, function);
   dropUnreachableDefaults(function);
-  return true;
+  releaseDivisions(function, unit.markers);
+  return checkLoops(function, unit, context);
 }
 
 /// Gives bases of the state as places in it.

@@ -7,9 +7,12 @@
 //   2. always-inline   the wrappers become one function each
 //   3. expandMarkers   markers take and give numbers, not pointers to records
 //      labelLoops      what belongs to the iterations of a parallelFor
+//      holdDivisions   what an integer division without a result is, the run
+//      says
 //   4. rounds of       splitMemory     copies and variables, number by number
 //                      flattenPointers phis and selects of pointers
 //                      expandLocalAtomics
+//                      releasePixels   no reference to a pixel is kept
 //                      promoteVariables, early-cse, simplifycfg
 //   5. shareArrays, SROA
 //   6. resolveAccesses loads and stores outside of local memory become calls
@@ -55,6 +58,11 @@ constexpr llvm::StringLiteral atomicFetch = "piko.atomic_fetch.";
 /// What follows shows the order of primitives: whether an atomic's result does.
 constexpr llvm::StringLiteral showsOrder = "piko.shows_order";
 constexpr llvm::StringLiteral share = "piko.share";
+/// An integer division; which one and of which type follows.
+constexpr llvm::StringLiteral divide = "piko.divide.";
+/// Around an update, with the address of its pixel.
+constexpr llvm::StringLiteral pixelBegin = "piko.pixel_begin";
+constexpr llvm::StringLiteral pixelEnd = "piko.pixel_end";
 } // namespace accessor
 
 /// Marks all that the functions call to be inlined; false after an error.
@@ -71,6 +79,20 @@ bool flattenPointers(llvm::Function &function, MemoryMap &memory);
 bool expandLocalAtomics(llvm::Function &function, const ParsedUnit &unit,
                         MemoryMap &memory, mlir::MLIRContext &context,
                         bool &changed);
+
+/// Refuses what is done with an update's pixel behind the update, and no longer
+/// keeps in memory those of which all is known, or `all`; false after an error.
+bool releasePixels(llvm::Function &function, const ParsedUnit &unit,
+                   MemoryMap &memory, mlir::MLIRContext &context, bool all,
+                   bool &changed);
+
+/// Makes calls of integer divisions.
+void holdDivisions(llvm::Function &function);
+/// Makes divisions again of those calls that are known to have a result;
+/// whether there were any.
+bool releaseDivisions(llvm::Function &function, const MarkerTable &markers);
+/// The opcode of the division that a call of this function is.
+std::optional<unsigned> getDivision(llvm::StringRef callee);
 
 /// Constant tables that are indexed become local arrays.
 bool localizeTables(llvm::Function &function, MemoryMap &memory);

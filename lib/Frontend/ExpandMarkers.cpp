@@ -61,6 +61,8 @@ private:
       llvm::SmallVector<llvm::Value *> values;
       loadRecord(call->getArgOperand(0), marker.record, values);
       callAccessor(accessor::updateEnd, builder.getVoidTy(), values);
+      callAccessor(accessor::pixelEnd, builder.getVoidTy(),
+                   {call->getArgOperand(0)});
       break;
     }
     case MarkerKind::source:
@@ -80,6 +82,8 @@ private:
     llvm::SmallVector<llvm::Value *> arguments(llvm::drop_begin(call->args()));
     llvm::Value *token =
         callAccessor(accessor::updateBegin, builder.getInt64Ty(), arguments);
+    callAccessor(accessor::pixelBegin, builder.getVoidTy(),
+                 {call->getArgOperand(0)});
     unsigned number = 0;
     storeRecord(call->getArgOperand(0), marker.record, token, number);
   }

@@ -21,19 +21,46 @@ using llvm::success;
 // Local arrays
 //===--------------------------------------------------------------------===//
 
-/// The error is where the variable is used: its place has no line.
+/// What the local arrays of a phase may take, in bytes: phases that run inside
+/// one another share a thread's stack, and a fiber of the reference has 1 MiB.
+static constexpr int64_t localLimit = 256 * 1024;
+
+/// The first access to a variable that says where it is: a variable itself does
+/// not.
+static const llvm::Instruction *findLocatedUse(const llvm::Value *pointer) {
+  const llvm::Instruction *found = nullptr;
+  for (const llvm::User *user : pointer->users()) {
+    auto *use = dyn_cast<llvm::Instruction>(user);
+    if (use && llvm::isa<llvm::GetElementPtrInst>(use) && !use->getDebugLoc())
+      use = findLocatedUse(use);
+    if (use && use->getDebugLoc() &&
+        (!found ||
+         use->getDebugLoc().getLine() < found->getDebugLoc().getLine()))
+      found = use;
+  }
+  return found;
+}
+
 LogicalResult PhaseImporter::rejectVariable(llvm::AllocaInst *variable) {
-  llvm::Instruction *place = variable;
-  llvm::SmallVector<llvm::Value *> pointers = {variable};
-  for (size_t i = 0; i < pointers.size() && place == variable; ++i)
-    for (llvm::User *user : pointers[i]->users())
-      if (llvm::isa<llvm::GetElementPtrInst>(user))
-        pointers.push_back(user);
-      else if (llvm::cast<llvm::Instruction>(user)->getDebugLoc())
-        place = llvm::cast<llvm::Instruction>(user);
-  return reject(place, "a local variable" + getVariableName(variable) +
-                           " whose parts are accessed in ways that cannot be "
-                           "told apart");
+  const llvm::Instruction *use = findLocatedUse(variable);
+  return reject(use ? use : variable,
+                "a local variable" + getVariableName(variable) +
+                    " whose parts are accessed in ways that cannot be told "
+                    "apart");
+}
+
+LogicalResult PhaseImporter::checkLocalSize(llvm::AllocaInst *variable) {
+  int64_t size = memory.data.getTypeAllocSize(variable->getAllocatedType());
+  localBytes += size;
+  if (localBytes <= localLimit)
+    return success();
+  const llvm::Instruction *use = findLocatedUse(variable);
+  return fail(use ? use : variable)
+         << "expected the local arrays of a phase to take at most "
+         << localLimit << " bytes, but with"
+         << (getVariableName(variable).empty() ? " one more"
+                                               : getVariableName(variable))
+         << " they take " << localBytes;
 }
 
 LogicalResult PhaseImporter::importArray(llvm::AllocaInst *variable) {
@@ -46,6 +73,8 @@ LogicalResult PhaseImporter::importArray(llvm::AllocaInst *variable) {
   if (variable->isArrayAllocation() || type->isStructTy() ||
       type->isPointerTy())
     return rejectVariable(variable);
+  if (failed(checkLocalSize(variable)))
+    return failure();
   // What belongs to an iteration begins with it.
   mlir::OpBuilder::InsertionGuard guard(builder);
   mlir::Block *owner = loopEntries.lookup(getOwner(variable));
@@ -179,8 +208,34 @@ LogicalResult PhaseImporter::getPlace(llvm::CallInst *call,
   return success();
 }
 
+static DivisionKind getDivisionKind(unsigned opcode) {
+  switch (opcode) {
+  case llvm::Instruction::SDiv:
+    return DivisionKind::QuotientS;
+  case llvm::Instruction::UDiv:
+    return DivisionKind::QuotientU;
+  case llvm::Instruction::SRem:
+    return DivisionKind::RemainderS;
+  default:
+    return DivisionKind::RemainderU;
+  }
+}
+
+LogicalResult PhaseImporter::importDivision(llvm::CallInst *call,
+                                            unsigned opcode) {
+  mlir::Value a = scalars.get(call->getArgOperand(0));
+  mlir::Value b = scalars.get(call->getArgOperand(1));
+  if (!a || !b || a.getType().getIntOrFloatBitWidth() > 64)
+    return reject(call, "a division of integers of more than 64 bits");
+  values[call] = make<DivideOp>(getDivisionKind(opcode), a, b, /*of=*/nullptr,
+                                /*assign=*/false);
+  return success();
+}
+
 LogicalResult PhaseImporter::importAccessor(llvm::CallInst *call,
                                             llvm::StringRef name) {
+  if (std::optional<unsigned> opcode = getDivision(name))
+    return importDivision(call, *opcode);
   if (name.starts_with(undefinedName)) {
     values[call] = UndefinedOp::create(builder, *location,
                                        scalars.getType(call->getType()));

@@ -45,6 +45,8 @@ enum class MarkerKind {
   binLo,
   binHi,
   domain,
+  quotient,
+  remainder,
   assignBin,
   assignAll,
   assignPrevious,
@@ -68,6 +70,8 @@ struct Marker {
   MarkerKind kind;
   /// The record that the marker's pointer points to.
   unsigned record = 0;
+  /// element: whether only atomics may change what it gives.
+  bool isReadOnly = false;
   /// Atomics: which operation. Those and sort: whether on signed numbers.
   int operation = 0;
   bool isSigned = false;

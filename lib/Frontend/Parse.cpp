@@ -264,6 +264,7 @@ readMarker(const clang::FunctionDecl *function, UnitReader &reader) {
     if (failed(record))
       return llvm::failure();
     marker.record = *record;
+    marker.isReadOnly = (*arguments)[0].getAsType().isConstQualified();
     break;
   }
   case MarkerKind::state:

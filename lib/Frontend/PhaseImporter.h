@@ -70,6 +70,8 @@ private:
   };
   llvm::LogicalResult rejectVariable(llvm::AllocaInst *variable);
   llvm::LogicalResult importArray(llvm::AllocaInst *variable);
+  llvm::LogicalResult checkLocalSize(llvm::AllocaInst *variable);
+  llvm::LogicalResult importDivision(llvm::CallInst *call, unsigned opcode);
   mlir::Value makeElementIndex(const Address &address, int64_t size);
   llvm::LogicalResult importArrayAccess(llvm::Instruction *instruction);
   const StateDescription *getState(llvm::CallInst *user, llvm::Value *handle);
@@ -123,6 +125,7 @@ private:
   /// The first block of the loop of that number.
   llvm::DenseMap<int64_t, mlir::Block *> loopEntries;
   llvm::DenseMap<llvm::Value *, mlir::Value> arrays;
+  int64_t localBytes = 0; ///< Of all arrays.
   llvm::DenseMap<llvm::CallInst *, mlir::func::CallOp> placeholders;
 };
 

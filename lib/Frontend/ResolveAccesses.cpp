@@ -94,6 +94,11 @@ private:
                             : "writing to the primitive that is processed");
       return nullptr;
     }
+    if (writes && marker->isReadOnly && !prefix.starts_with("piko.atomic")) {
+      fail(instruction, "changing a pixel through the reference that image(xy) "
+                        "gives; write image.store or update");
+      return nullptr;
+    }
     leafType = layout->leaves[access->leaf].type;
     llvm::SmallVector<llvm::Value *> arguments = {
         address.base, builder.getInt32(access->leaf)};

@@ -31,12 +31,14 @@ std::string piko::generateWrappers(const PipelineDescription &pipeline,
   };
   out << "namespace __piko_wrappers" << suffix << " {\n";
   out << "using __piko_pipe = " << typeName << ";\n";
-  out << "using __piko_state = __piko_pipe::State;\n";
+  out << "using __piko_state = typename decltype(::piko::detail::stateOf("
+         "static_cast<__piko_pipe *>(nullptr)))::type;\n";
   function(WrapperKind::Wire, 0, "__piko_pipe pipe;");
   for (auto [index, stage] : llvm::enumerate(pipeline.stages)) {
     std::string call =
         "__piko_pipe pipe; ::piko::marker::phase(); pipe." + stage.name;
-    std::string type = "typename decltype(pipe." + stage.name + ")::Input";
+    std::string type = "typename decltype(::piko::detail::inputOf(&pipe." +
+                       stage.name + "))::type";
     std::string input = "(*::piko::marker::input<" + type + ">());";
     std::string primitive = pipeline.records[stage.input].name;
     function(

@@ -2,11 +2,13 @@
 //
 // piko-add-checks, for each pipeline:
 //   1. give primitives records with a lineage behind the user's fields;
-//   2. in process phases, test what is emitted and stored;
-//   3. tell the runtime of calls, emissions, accesses, iterations and barriers.
+//   2. test indices of arrays, and how often loops go round;
+//   3. in process phases, test what is emitted and stored;
+//   4. tell the runtime of calls, emissions, accesses, iterations and barriers.
 
 #include "Piko/Transforms/Passes.h"
 
+#include "Bounds.h"
 #include "Piko/Dialect/Piko/IR/PikoCheck.h"
 #include "Unwritten.h"
 
@@ -42,7 +44,7 @@ public:
       : pipeline(pipeline), numbers(numbers) {}
 
   void run();
-  unsigned unwritten = 0, accesses = 0;
+  unsigned unwritten = 0, accesses = 0, indices = 0;
 
 private:
   FlatSymbolRefAttr withLineage(FlatSymbolRefAttr record);
@@ -69,18 +71,19 @@ static bool isBarrier(Operation *op) {
   return isa<SyncOp, ReduceOp, ScanOp, SortOp>(op);
 }
 
-/// Whether iterations of the loop around meet inside.
-static bool holdsBarriers(Operation *op) {
-  if (isa<ParallelForOp>(op))
-    return false;
-  return op
-      ->walk<WalkOrder::PreOrder>([](Operation *inner) {
-        if (isa<ParallelForOp>(inner))
-          return WalkResult::skip();
-        return isBarrier(inner) ? WalkResult::interrupt()
-                                : WalkResult::advance();
-      })
-      .wasInterrupted();
+/// Where iterations of the loop around meet inside; null if they do not.
+static Operation *findBarrier(Operation *op) {
+  Operation *found = nullptr;
+  if (!isa<ParallelForOp>(op))
+    op->walk<WalkOrder::PreOrder>([&](Operation *inner) {
+      if (isa<ParallelForOp>(inner))
+        return WalkResult::skip();
+      if (!isBarrier(inner))
+        return WalkResult::advance();
+      found = inner;
+      return WalkResult::interrupt();
+    });
+  return found;
 }
 
 //===----------------------------------------------------------------------===//
@@ -150,10 +153,12 @@ static Value getLineage(OpBuilder &builder, Location loc, Value prim) {
 }
 
 void Checker::checkAssign(StageOp stage, AssignOp assign) {
+  indices += checkIndices(assign);
+  checkTrips(assign);
   assign.walk([&](Operation *op) {
     auto load = dyn_cast<LoadOp>(op);
     if ((load && !load.getIndices().empty()) ||
-        isa<AssignToOp, AssignBoxOp>(op)) {
+        isa<AssignToOp, AssignBoxOp, DivideOp>(op)) {
       OpBuilder builder(op);
       CheckPlaceOp::create(builder, op->getLoc());
     }
@@ -168,10 +173,12 @@ void Checker::checkAssign(StageOp stage, AssignOp assign) {
 }
 
 void Checker::checkProcess(StageOp stage, ProcessOp process) {
+  indices += checkIndices(process);
   unwritten += checkUnwritten(
       process, [&](FlatSymbolRefAttr record) { return hostOf(record); });
   updated.clear();
   process.walk([&](UpdateOp update) { updated.insert(update.getImageAttr()); });
+  checkTrips(process);
   Block &body = process.getBody().front();
   checkBlock(body, Value());
   OpBuilder builder = OpBuilder::atBlockBegin(&body);
@@ -218,7 +225,9 @@ void Checker::checkBlock(Block &block, Value iteration) {
   for (Operation &op : llvm::make_early_inc_range(block)) {
     Location loc = op.getLoc();
     builder.setInsertionPoint(&op);
-    if (auto emit = dyn_cast<EmitOp>(op)) {
+    if (isa<DivideOp>(op)) {
+      CheckPlaceOp::create(builder, loc);
+    } else if (auto emit = dyn_cast<EmitOp>(op)) {
       checkEmit(emit);
     } else if (std::optional<Access> access = getAccess(&op)) {
       bool isKnown = llvm::any_of(known, [&](CheckAccessOp check) {
@@ -253,7 +262,14 @@ void Checker::checkBlock(Block &block, Value iteration) {
     }
     // Between barriers iterations run one after the other: what follows one
     // may be another's.
-    bool meets = iteration && op.getNumRegions() && holdsBarriers(&op);
+    Operation *meets =
+        iteration && op.getNumRegions() ? findBarrier(&op) : nullptr;
+    if (meets) {
+      // Here it shows whether all of them come to the barrier.
+      auto loop = dyn_cast<scf::WhileOp>(op);
+      OpBuilder ahead(loop ? loop.getConditionOp().getOperation() : &op);
+      CheckPlaceOp::create(ahead, meets->getLoc());
+    }
     for (Region &region : op.getRegions())
       for (Block &inner : region) {
         checkBlock(inner, iteration);
@@ -401,6 +417,7 @@ void AddChecksPass::runOnOperation() {
     Checker checker(pipeline, *fields);
     checker.run();
     accesses += checker.accesses;
+    indices += checker.indices;
     unwritten += checker.unwritten;
   }
 }

@@ -53,6 +53,12 @@ void piko::noteOrigin(Operation *op, StageOp stage, bool inAssign) {
         load.setOfAttr(name);
         load.setAssign(inAssign);
       })
+      .Case<DivideOp>([&](DivideOp divide) {
+        if (divide.getOf())
+          return;
+        divide.setOfAttr(name);
+        divide.setAssign(inAssign);
+      })
       .Case<StoreOp, AtomicOp, UpdateOp>([&](auto access) {
         if (!access.getOf())
           access.setOfAttr(name);

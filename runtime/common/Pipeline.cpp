@@ -301,6 +301,9 @@ static std::string describe(const std::string &stage, const KernelError &e,
            "expected every iteration of parallelFor to call sync() as often "
            "as iteration 0, but iteration " +
            a + " does not";
+  case PIKORT_NO_QUOTIENT:
+    return text + "expected an integer division to have a result, but it "
+                  "divides by 0 or overflows";
   case PIKORT_OUT_OF_MEMORY:
     if (e.a < 0)
       return text + "expected memory of at least 0 bytes, but got " + a;

@@ -25,7 +25,7 @@ void Checker::beginRun() {
   loops.clear();
   reads.clear();
   shadow.clear();
-  turn = loopCount = 0;
+  turn = loopCount = trips = assignTrips = 0;
   strand = 0;
   place = nullptr;
   assignStage = -1;
@@ -122,13 +122,14 @@ void Checker::beginCall(int32_t stage, int64_t bin, int64_t lineage) {
   strands.assign(1, {});
   loops.clear();
   strand = 0;
-  ordinal = 0;
+  ordinal = trips = 0;
   place = nullptr;
 }
 
 void Checker::assign(int32_t stage, int64_t lineage) {
   assignStage = lineage == PIKOIR_NO_LINEAGE ? -1 : stage;
   assignLineage = lineage;
+  assignTrips = 0;
   place = nullptr;
 }
 
@@ -281,8 +282,22 @@ void Checker::wrongValue(int32_t kind, int32_t record, const char *field) {
       kind == PIKOIR_CHECK_NAN
           ? "expected a number in field " + of + ", but got NaN"
           : "expected field " + of + " to be written, but it never was";
-  fail(assignStage >= 0 ? assignStage : calls.back().stage,
-       header() + text + currentContext());
+  fail(currentStage(), header() + text + currentContext());
+}
+
+/// An error that runs without checking know, too.
+void Checker::report(int32_t code, int64_t a, int64_t b) {
+  int64_t bin = assignStage >= 0 ? -1 : calls.back().bin;
+  p.report({0, code, currentStage(), a, b, 0, bin});
+}
+
+void Checker::wrongIndex(int64_t index, int64_t size) {
+  report(PIKORT_INDEX_OUTSIDE, index, size);
+}
+
+void Checker::endless(const char *at) {
+  place = at;
+  report(PIKORT_ENDLESS, PIKOIR_MOST_TRIPS, 0);
 }
 
 // --- What programs call -----------------------------------------------------
@@ -356,6 +371,23 @@ void pikoir_check_access(pikort_pipeline *p, int32_t state, int32_t kind,
 
 void pikoir_check_loop(pikort_pipeline *p, int32_t event, int64_t iteration) {
   checked(p, [&](Checker &checker) { checker.loop(event, iteration); });
+}
+
+int64_t pikoir_check_index(pikort_pipeline *p, int64_t index, int64_t size,
+                           const char *place) {
+  if (index >= 0 && index < size)
+    return index;
+  checked(p, [&](Checker &checker) {
+    checker.at(place);
+    checker.wrongIndex(index, size);
+  });
+  return 0;
+}
+
+int32_t pikoir_check_trip(pikort_pipeline *p, const char *place) {
+  bool may = true;
+  checked(p, [&](Checker &checker) { may = checker.trip(place); });
+  return may;
 }
 
 void pikoir_check_value(pikort_pipeline *p, int32_t flag, int32_t kind,

@@ -94,6 +94,13 @@ public:
   void at(const char *newPlace) { place = newPlace; }
   void access(int32_t state, int32_t kind, const int64_t (&index)[4]);
   void loop(int32_t event, int64_t iteration);
+  void wrongIndex(int64_t index, int64_t size);
+  bool trip(const char *at) {
+    if (!failed &&
+        ++(assignStage >= 0 ? assignTrips : trips) > PIKOIR_MOST_TRIPS)
+      endless(at);
+    return !failed;
+  }
   void wrongValue(int32_t kind, int32_t record, const char *field);
 
   // --- errors
@@ -135,6 +142,11 @@ private:
   void enter(int64_t iteration);
   void numberEmissions(const Loop &loop);
   void fail(int32_t stage, const std::string &text);
+  void endless(const char *at);
+  void report(int32_t code, int64_t a, int64_t b);
+  int32_t currentStage() const {
+    return assignStage >= 0 ? assignStage : calls.back().stage;
+  }
   std::string header() const;
   std::string context(const char *at, int64_t call,
                       const std::string &prefix) const;
@@ -152,6 +164,7 @@ private:
   std::vector<Emission> emissions;
   std::unordered_map<int64_t, int64_t> callsOfBin; ///< Of the stage.
   int64_t turn = 0, ordinal = 0, loopCount = 0;
+  int64_t trips = 0, assignTrips = 0; ///< Of all loops of the call.
   const char *place = nullptr;
   int32_t assignStage = -1; ///< Whose AssignBin runs; -1 = none.
   int64_t assignLineage = 0;

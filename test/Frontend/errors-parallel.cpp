@@ -74,7 +74,7 @@ struct Stage : piko::Stage<0, 0, 64, A>, piko::Uses<State> {
         return b + c;
       });
 #elif CASE == 11
-      // ENDLESS: errors-parallel.cpp:[[#@LINE - 36]]:5: error: not supported in Piko: a parallelFor whose iterations never end
+      // ENDLESS: errors-parallel.cpp:[[#@LINE + 1]]:7: error: expected a loop that can end, but nothing leaves this one
       while (true)
         ;
 #endif

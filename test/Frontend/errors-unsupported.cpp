@@ -15,6 +15,9 @@
 // RUN: not piko-translate --cpp-to-piko -DCASE=12 %s 2>&1 | FileCheck %s --check-prefix=ENDLESS
 // RUN: not piko-translate --cpp-to-piko -DCASE=13 %s 2>&1 | FileCheck %s --check-prefix=VIRTUAL
 // RUN: not piko-translate --cpp-to-piko -DCASE=14 %s 2>&1 | FileCheck %s --check-prefix=SYNTAX
+// RUN: not piko-translate --cpp-to-piko -DCASE=15 %s 2>&1 | FileCheck %s --check-prefix=PLAIN
+// RUN: not piko-translate --cpp-to-piko -DCASE=16 %s 2>&1 | FileCheck %s --check-prefix=COUNTDOWN
+// RUN: not piko-translate --cpp-to-piko -DCASE=17 %s 2>&1 | FileCheck %s --check-prefix=BIG
 #include <piko.h>
 
 struct A {
@@ -79,13 +82,30 @@ struct Stage : piko::Stage<0, 0, 1, A, A>, piko::Uses<State> {
       }
     });
 #elif CASE == 12
-    // ENDLESS: errors-unsupported.cpp:[[#@LINE + 1]]:5: error: not supported in Piko: an update that never ends
     update(state().image, glm::ivec2(0), [&](A &p) {
+      // ENDLESS: errors-unsupported.cpp:[[#@LINE + 1]]:7: error: expected a loop that can end, but nothing leaves this one
       for (;;)
         p.x += a.x;
     });
 #elif CASE == 13
     out.x = getArea(reinterpret_cast<const Shape *>(&a));
+#elif CASE == 15
+    // PLAIN: errors-unsupported.cpp:[[#@LINE + 2]]:7: error: expected a loop that can end, but nothing leaves this one
+    if (a.x > 7)
+      while (true)
+        ;
+#elif CASE == 16
+    // COUNTDOWN: errors-unsupported.cpp:[[#@LINE + 1]]:5: error: expected a loop that can end, but nothing leaves this one
+    for (unsigned i = 10; i >= 0; --i)
+      out.x += float(i);
+#elif CASE == 17
+    float small[1000], big[4000000];
+    for (int i = 0; i < 4000000; ++i) {
+      small[i % 1000] = a.x;
+      // BIG: errors-unsupported.cpp:[[#@LINE + 1]]:7: error: expected the local arrays of a phase to take at most 262144 bytes, but with 'big' they take 1600
+      big[i] = a.x;
+    }
+    out.x = big[int(a.x)] + small[int(a.x)];
 #else
     // SYNTAX: errors-unsupported.cpp:[[#@LINE + 1]]:7: error: no member named 'q' in 'A'
     a.q = 1;

@@ -136,3 +136,56 @@ piko.pipeline @Unwritten rank 1 {
     }
   }
 }
+
+// Indices of arrays are tested unless they are known to be inside, and what
+// loops go round is counted.
+// CHECK-LABEL: piko.pipeline @Bounds
+piko.pipeline @Bounds rank 1 {
+  piko.buffer @data : @F
+  piko.source @start
+  piko.stage @start bins [0] threads 64 : @F -> [] {
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      %zero = arith.constant 0 : index
+      %one = arith.constant 1 : index
+      %four = arith.constant 4 : index
+      // CHECK: %[[I:.*]] = piko.extent @data[0]
+      %i = piko.extent @data[0]
+      // CHECK: memref.alloca
+      %array = memref.alloca() : memref<4xf32>
+      // CHECK: %[[IN:.*]] = piko.check_index %[[I]] of 2
+      // CHECK: %[[W:.*]] = piko.get %{{.*}} "w"[%[[IN]]]
+      %w = piko.get %f "w"[%i] : !piko.prim<@F> -> f32
+      // CHECK-NOT: piko.check_index
+      // CHECK: memref.store %[[W]], %{{.*}}[%{{.*}}]
+      memref.store %w, %array[%one] : memref<4xf32>
+      // CHECK: %[[OUT:.*]] = piko.check_index %{{.*}} of 4
+      // CHECK-NEXT: memref.load %{{.*}}[%[[OUT]]]
+      %v = memref.load %array[%four] : memref<4xf32>
+      // CHECK: scf.while
+      // CHECK: %[[GOES:.*]] = arith.cmpf
+      // CHECK: %[[MAY:.*]] = piko.check_trip
+      // CHECK-NEXT: %[[BOTH:.*]] = arith.andi %[[GOES]], %[[MAY]]
+      // CHECK-NEXT: scf.condition(%[[BOTH]])
+      %r = scf.while (%a = %v) : (f32) -> f32 {
+        %goes = arith.cmpf olt, %a, %w : f32
+        scf.condition(%goes) %a : f32
+      } do {
+      ^bb0(%a: f32):
+        %b = arith.addf %a, %w : f32
+        scf.yield %b : f32
+      }
+      // CHECK: %[[E:.*]] = piko.check_index %[[I]] of 2
+      // CHECK: piko.store %{{.*}}, @data[%{{.*}} : index] "w"[%[[E]]]
+      piko.store %r, @data[%zero : index] "w"[%i] : f32
+      // A division may fail here.
+      // CHECK: piko.check_place
+      // CHECK-NEXT: piko.divide
+      %c = arith.fptosi %r : f32 to i32
+      %q = piko.divide quotient_signed %c, %c : i32
+      %qf = arith.sitofp %q : i32 to f32
+      piko.store %qf, @data[%zero : index] "z" : f32
+      piko.return
+    }
+  }
+}

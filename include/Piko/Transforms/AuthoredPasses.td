@@ -16,7 +16,9 @@ def AddChecks : Pass<"piko-add-checks", "::mlir::ModuleOp"> {
     the primitive's lineage, and tells the runtime of each call, emission, access
     to a buffer or an image, iteration and barrier. Tests the fields in
     `numbers` for NaN where they are emitted, and makes flags that follow each
-    `piko.undefined` to where it is emitted or stored.
+    `piko.undefined` to where it is emitted or stored. Indices of local arrays
+    and of arrays in fields go through a `piko.check_index`, and each
+    `scf.while` ends when a `piko.check_trip` says so.
 
     **Guarantees** that the results of a run without findings stay as they are,
     and that no `piko.undefined` is left.
@@ -35,13 +37,16 @@ def AddChecks : Pass<"piko-add-checks", "::mlir::ModuleOp"> {
     piko.emit 0 (%z, %lineage) : f32, i64
     ```
 
-    **Limits**: elements of private arrays count as written.
+    **Limits**: elements of private arrays count as written; an index into one
+    of several dimensions, which is a single number by then, is tested as such.
+    The trips of an `scf.for` are not counted.
   }];
   let options = [
     ListOption<"numbers", "numbers", "std::string",
                "Fields that must not be NaN, as Record.field">];
   let statistics = [
     Statistic<"accesses", "accesses", "accesses to state that are checked">,
+    Statistic<"indices", "indices", "indices of arrays that are checked">,
     Statistic<"unwritten", "unwritten", "numbers that may be unwritten">];
   let dependentDialects = ["::mlir::arith::ArithDialect",
                            "::mlir::memref::MemRefDialect"];

@@ -52,9 +52,9 @@ private:
     return arith::AddIOp::create(builder, loc, begin, number(builder, i));
   }
 
-  int64_t placeOf(FailOp fail);
-  Value positionOf(FailOp fail, OpBuilder &builder);
-  void note(FailOp fail);
+  int64_t placeOf(Operation *fail);
+  Value positionOf(Operation *fail, OpBuilder &builder);
+  void note(Operation *fail);
   void publish();
   void clear();
   void report();
@@ -62,26 +62,40 @@ private:
   gpu::LaunchOp launch;
   scf::ForOp items;
   Location loc;
-  SmallVector<FailOp> fails;
+  SmallVector<Operation *> fails; ///< FailOp or FailDivideOp.
   /// One of each kind.
-  SmallVector<FailOp> places;
+  SmallVector<Operation *> places;
   int64_t width = 2; ///< Of an entry.
   Value noted, list;
 };
 
 } // namespace
 
-GridErrors::GridErrors(gpu::LaunchOp launch, scf::ForOp items)
-    : launch(launch), items(items), loc(launch.getLoc()) {
-  launch.walk([&](FailOp fail) { fails.push_back(fail); });
-  for (FailOp fail : fails)
-    width = std::max<int64_t>(width, fail.getIndices().size() + 2);
+static ValueRange getIndices(Operation *fail) {
+  auto access = dyn_cast<FailOp>(fail);
+  return access ? ValueRange(access.getIndices()) : ValueRange();
 }
 
-int64_t GridErrors::placeOf(FailOp fail) {
-  auto *known = llvm::find_if(places, [&](FailOp other) {
-    return other->getAttrDictionary() == fail->getAttrDictionary() &&
-           other.getIndices().size() == fail.getIndices().size();
+static Value getBin(Operation *fail) {
+  auto access = dyn_cast<FailOp>(fail);
+  return access ? access.getBin() : cast<FailDivideOp>(fail).getBin();
+}
+
+GridErrors::GridErrors(gpu::LaunchOp launch, scf::ForOp items)
+    : launch(launch), items(items), loc(launch.getLoc()) {
+  launch.walk([&](Operation *op) {
+    if (isa<FailOp, FailDivideOp>(op))
+      fails.push_back(op);
+  });
+  for (Operation *fail : fails)
+    width = std::max<int64_t>(width, getIndices(fail).size() + 2);
+}
+
+int64_t GridErrors::placeOf(Operation *fail) {
+  auto *known = llvm::find_if(places, [&](Operation *other) {
+    return other->getName() == fail->getName() &&
+           other->getAttrDictionary() == fail->getAttrDictionary() &&
+           getIndices(other).size() == getIndices(fail).size();
   });
   if (known == places.end()) {
     places.push_back(fail);
@@ -91,7 +105,7 @@ int64_t GridErrors::placeOf(FailOp fail) {
 }
 
 /// What is in front of the loops over primitives comes first.
-Value GridErrors::positionOf(FailOp fail, OpBuilder &builder) {
+Value GridErrors::positionOf(Operation *fail, OpBuilder &builder) {
   if (!items->isProperAncestor(fail))
     return integer(builder, -1);
   return arith::AddIOp::create(
@@ -99,7 +113,7 @@ Value GridErrors::positionOf(FailOp fail, OpBuilder &builder) {
       items.getInductionVar());
 }
 
-void GridErrors::note(FailOp fail) {
+void GridErrors::note(Operation *fail) {
   OpBuilder builder(fail);
   Value none = compare(builder, arith::CmpIPredicate::eq,
                        load(builder, noted, number(builder, place)),
@@ -109,9 +123,9 @@ void GridErrors::note(FailOp fail) {
   store(builder, integer(builder, placeOf(fail)), noted,
         number(builder, place));
   store(builder, positionOf(fail, builder), noted, number(builder, at));
-  store(builder, fail.getBin() ? fail.getBin() : integer(builder, -1), noted,
+  store(builder, getBin(fail) ? getBin(fail) : integer(builder, -1), noted,
         number(builder, bin));
-  for (auto [i, index] : llvm::enumerate(fail.getIndices()))
+  for (auto [i, index] : llvm::enumerate(getIndices(fail)))
     store(builder, index, noted, number(builder, indices + i));
 }
 
@@ -184,22 +198,29 @@ void GridErrors::report() {
   Value isFirst = compare(builder, arith::CmpIPredicate::ugt, failed, done);
   auto ifOp = scf::IfOp::create(builder, loc, isFirst);
   builder.setInsertionPointToStart(ifOp.thenBlock());
-  for (auto [i, fail] : llvm::enumerate(places)) {
+  for (auto [i, error] : llvm::enumerate(places)) {
     Value same = compare(builder, arith::CmpIPredicate::eq, found,
                          integer(builder, i + 1));
-    auto here = scf::IfOp::create(builder, fail.getLoc(), same);
+    auto here = scf::IfOp::create(builder, error->getLoc(), same);
     OpBuilder body = here.getThenBodyBuilder();
     auto numberAt = [&](int64_t n) {
       return arith::IndexCastOp::create(body, loc, body.getIndexType(),
                                         load(body, list, entry(body, block, n)))
           .getResult();
     };
+    Value inBin = getBin(error) ? numberAt(1) : Value();
+    if (auto divide = dyn_cast<FailDivideOp>(error)) {
+      FailDivideOp::create(body, divide.getLoc(), divide.getStageAttr(), inBin,
+                           divide.getOfAttr());
+      continue;
+    }
+    auto fail = cast<FailOp>(error);
     SmallVector<Value> indices;
     for (int64_t n = 0, e = fail.getIndices().size(); n < e; ++n)
       indices.push_back(numberAt(n + 2));
     FailOp::create(body, fail.getLoc(), fail.getStageAttr(),
                    fail.getStateAttr(), indices, fail.getOutsideBinAttr(),
-                   fail.getBin() ? numberAt(1) : Value(), fail.getOfAttr());
+                   inBin, fail.getOfAttr());
   }
 }
 
@@ -213,12 +234,12 @@ void GridErrors::run() {
   store(builder, integer(builder, 0), noted, number(builder, place));
   store(builder, integer(builder, INT64_MAX), noted, number(builder, at));
   clear();
-  for (FailOp fail : fails)
+  for (Operation *fail : fails)
     note(fail);
   publish();
   report();
-  for (FailOp fail : fails)
-    fail.erase();
+  for (Operation *fail : fails)
+    fail->erase();
 }
 
 void piko::gatherGridErrors(gpu::LaunchOp launch, scf::ForOp items) {

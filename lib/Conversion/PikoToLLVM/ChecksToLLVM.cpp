@@ -154,6 +154,35 @@ struct CheckValueLowering : CheckLowering<CheckValueOp> {
   }
 };
 
+struct CheckIndexLowering : CheckLowering<CheckIndexOp> {
+  using CheckLowering::CheckLowering;
+  LogicalResult
+  matchAndRewrite(CheckIndexOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    Value inside = call(rewriter, op, "pikoir_check_index",
+                        {toI64(rewriter, op.getLoc(), adaptor.getIndex()),
+                         createI64(rewriter, op.getLoc(), op.getSize()),
+                         place(rewriter, op)},
+                        rewriter.getI64Type())
+                       .getResult();
+    rewriter.replaceOp(op, toIndex(rewriter, op.getLoc(), inside));
+    return success();
+  }
+};
+
+struct CheckTripLowering : CheckLowering<CheckTripOp> {
+  using CheckLowering::CheckLowering;
+  LogicalResult
+  matchAndRewrite(CheckTripOp op, OpAdaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    Value may = call(rewriter, op, "pikoir_check_trip", {place(rewriter, op)},
+                     rewriter.getI32Type())
+                    .getResult();
+    rewriter.replaceOpWithNewOp<arith::TruncIOp>(op, rewriter.getI1Type(), may);
+    return success();
+  }
+};
+
 } // namespace
 
 void piko::populateChecksToLLVMPatterns(const TypeConverter &converter,
@@ -161,5 +190,6 @@ void piko::populateChecksToLLVMPatterns(const TypeConverter &converter,
                                         LoweringContext &context) {
   patterns.add<CheckCallLowering, CheckAssignLowering, CheckEmitLowering,
                CheckPlaceLowering, CheckAccessLowering, CheckLoopLowering,
-               CheckValueLowering>(converter, patterns.getContext(), context);
+               CheckValueLowering, CheckIndexLowering, CheckTripLowering>(
+      converter, patterns.getContext(), context);
 }

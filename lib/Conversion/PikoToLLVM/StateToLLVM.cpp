@@ -166,7 +166,8 @@ struct ExtentLowering : OpConversionPattern<ExtentOp> {
 };
 
 // pikort_status
-constexpr int64_t updateOutside = 17, indexOutside = 18, notUniform = 21;
+constexpr int64_t updateOutside = 17, indexOutside = 18, notUniform = 21,
+                  noQuotient = 23;
 
 /// What pikoir_fail takes where no other stage is named, and no bin.
 static Value createNull(OpBuilder &builder, Location loc) {
@@ -248,13 +249,36 @@ struct FailNumbersLowering : OpConversionPattern<OpT> {
   LoweringContext &context;
 };
 
+struct FailDivideLowering : OpConversionPattern<FailDivideOp> {
+  FailDivideLowering(const TypeConverter &converter, MLIRContext *mlir,
+                     LoweringContext &context)
+      : OpConversionPattern(converter, mlir), context(context) {}
+  LogicalResult
+  matchAndRewrite(FailDivideOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    Location loc = op.getLoc();
+    Value zero = createI64(rewriter, loc, 0);
+    context.call(
+        rewriter, loc, "pikoir_fail", Type(),
+        {context.frame(op),
+         createI32(rewriter, loc, context.stageNumber(op, op.getStage())),
+         op.getOf() ? context.text(rewriter, loc, *op.getOf())
+                    : createNull(rewriter, loc),
+         createBin(rewriter, loc, adaptor.getBin()),
+         createI32(rewriter, loc, noQuotient), zero, zero});
+    rewriter.eraseOp(op);
+    return success();
+  }
+  LoweringContext &context;
+};
+
 } // namespace
 
 void piko::populateStateToLLVMPatterns(const TypeConverter &converter,
                                        RewritePatternSet &patterns,
                                        LoweringContext &context) {
   patterns.add<LoadLowering, StoreLowering, AtomicLowering, ExtentLowering,
-               PrefetchLowering, FailLowering,
+               PrefetchLowering, FailLowering, FailDivideLowering,
                FailNumbersLowering<FailListOp, indexOutside>,
                FailNumbersLowering<FailBarrierOp, notUniform>>(
       converter, patterns.getContext(), context);

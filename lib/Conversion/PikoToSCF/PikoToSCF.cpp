@@ -158,6 +158,78 @@ private:
   }
 };
 
+/// Puts an integer division behind a test of whether it has a result.
+struct ConvertDivide : OpRewritePattern<DivideOp> {
+  using OpRewritePattern::OpRewritePattern;
+
+  LogicalResult matchAndRewrite(DivideOp divide,
+                                PatternRewriter &rewriter) const override {
+    StageOp stage = getKernelStage(divide);
+    BeginScheduleOp schedule = findSchedule(divide);
+    if (!stage && !schedule)
+      return rewriter.notifyMatchFailure(divide, "not at the resolved level");
+    Location loc = divide.getLoc();
+    Type type = divide.getType();
+    Value zero =
+        arith::ConstantOp::create(rewriter, loc, rewriter.getZeroAttr(type));
+    auto ifOp = scf::IfOp::create(rewriter, loc, type,
+                                  createTest(divide, zero, rewriter),
+                                  /*withElseRegion=*/true);
+    rewriter.setInsertionPointToStart(ifOp.thenBlock());
+    scf::YieldOp::create(rewriter, loc, divide.createUnchecked(rewriter));
+    rewriter.setInsertionPointToStart(ifOp.elseBlock());
+    Value bin;
+    if (schedule)
+      bin = findScheduledBin(divide, schedule);
+    else if (!divide.getAssign())
+      bin = findBin(rewriter, divide);
+    FailDivideOp::create(rewriter, loc,
+                         schedule ? schedule.getStage() : stage.getSymName(),
+                         bin, divide.getOfAttr());
+    scf::YieldOp::create(rewriter, loc, zero);
+    rewriter.replaceOp(divide, ifOp);
+    return success();
+  }
+
+private:
+  /// The schedule whose body has become the kernel around.
+  static BeginScheduleOp findSchedule(Operation *op) {
+    if (auto kernel = op->getParentOfType<KernelOp>())
+      for (auto schedule : kernel.getOps<BeginScheduleOp>())
+        return schedule;
+    return {};
+  }
+
+  static Value findScheduledBin(Operation *op, BeginScheduleOp schedule) {
+    auto loop = op->getParentOfType<scf::ForOp>();
+    while (loop && loop.getUpperBound() != schedule.getBins())
+      loop = loop->getParentOfType<scf::ForOp>();
+    return loop ? loop.getInductionVar() : Value();
+  }
+
+  static Value createTest(DivideOp divide, Value zero, OpBuilder &builder) {
+    Location loc = divide.getLoc();
+    using P = arith::CmpIPredicate;
+    Value test =
+        arith::CmpIOp::create(builder, loc, P::ne, divide.getRhs(), zero);
+    if (!divide.isSigned())
+      return test;
+    auto type = cast<IntegerType>(divide.getType());
+    auto constant = [&](const APInt &value) -> Value {
+      return arith::ConstantOp::create(builder, loc,
+                                       builder.getIntegerAttr(type, value));
+    };
+    unsigned bits = type.getWidth();
+    Value fits = arith::OrIOp::create(
+        builder, loc,
+        arith::CmpIOp::create(builder, loc, P::ne, divide.getLhs(),
+                              constant(APInt::getSignedMinValue(bits))),
+        arith::CmpIOp::create(builder, loc, P::ne, divide.getRhs(),
+                              constant(APInt::getAllOnes(bits))));
+    return arith::AndIOp::create(builder, loc, test, fits);
+  }
+};
+
 /// The end of a list less its beginning.
 static Value createSize(PatternRewriter &rewriter, Location loc, ListOp list) {
   return arith::SubIOp::create(rewriter, loc, list.getEnd(), list.getBegin());
@@ -258,6 +330,7 @@ struct ConvertPikoToSCFPass
 
 void piko::populatePikoToSCFPatterns(RewritePatternSet &patterns) {
   patterns
-      .add<ConvertUpdate, ConvertListAt, ConvertListSize, CheckAccess<AtomicOp>,
-           CheckAccess<LoadOp>, CheckAccess<StoreOp>>(patterns.getContext());
+      .add<ConvertUpdate, ConvertDivide, ConvertListAt, ConvertListSize,
+           CheckAccess<AtomicOp>, CheckAccess<LoadOp>, CheckAccess<StoreOp>>(
+          patterns.getContext());
 }

@@ -58,6 +58,9 @@ int64_t binAt(int64_t x, int64_t y, int64_t z, int64_t w);
 int32_t binLo(int64_t bin, int32_t dim);
 int32_t binHi(int64_t bin, int32_t dim);
 int32_t domain(int32_t dim);
+// i / n and i % n, for n that the language knows not to be 0 or below.
+int32_t quotient(int32_t i, int32_t n);
+int32_t remainder(int32_t i, int32_t n);
 
 // AssignBin.
 void assignBin(int64_t bin);

@@ -310,6 +310,7 @@ PIKORT_API int32_t pikoir_strips_next(pikort_pipeline *p, int32_t id);
 ///   PIKORT_INDEX_OUTSIDE   a = index, b = elements
 ///   PIKORT_ENDLESS         a = iterations
 ///   PIKORT_NOT_UNIFORM     a = iteration
+///   PIKORT_NO_QUOTIENT
 PIKORT_API void pikoir_fail(pikort_pipeline *p, int32_t stage, const char *name,
                             int64_t bin, int32_t code, int64_t a, int64_t b);
 
@@ -369,6 +370,15 @@ enum pikoir_check_value { PIKOIR_CHECK_NAN = 0, PIKOIR_CHECK_UNWRITTEN = 1 };
 PIKORT_API void pikoir_check_value(pikort_pipeline *p, int32_t flag,
                                    int32_t kind, int32_t record,
                                    const char *field, const char *place);
+
+/// An index into an array of a call's own, or of a field; outside, an error and
+/// 0 instead.
+PIKORT_API int64_t pikoir_check_index(pikort_pipeline *p, int64_t index,
+                                      int64_t size, const char *place);
+/// A loop of the call goes round; 0 if it must not, because the call's loops
+/// have done so PIKOIR_MOST_TRIPS times, which is an error, or had another.
+#define PIKOIR_MOST_TRIPS (INT64_C(1) << 28)
+PIKORT_API int32_t pikoir_check_trip(pikort_pipeline *p, const char *place);
 
 // --- programs that run a pipeline by themselves, as the reference does ------
 

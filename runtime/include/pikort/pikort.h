@@ -58,7 +58,8 @@ enum pikort_status {
   PIKORT_ENDLESS = 19,         ///< A loop that does not end.
   PIKORT_NOT_A_NUMBER = 20,    ///< A NaN where a position is needed.
   PIKORT_NOT_UNIFORM = 21,     ///< Iterations that do not meet at a barrier.
-  PIKORT_RULE_BROKEN = 22      ///< A finding of checking mode.
+  PIKORT_RULE_BROKEN = 22,     ///< A finding of checking mode.
+  PIKORT_NO_QUOTIENT = 23      ///< An integer division that has no result.
 };
 
 // --- Life -------------------------------------------------------------------

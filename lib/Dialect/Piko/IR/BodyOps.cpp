@@ -4,6 +4,7 @@
 
 #include "Piko/Dialect/Piko/IR/Piko.h"
 
+#include "mlir/Dialect/Arith/IR/Arith.h"
 #include "mlir/IR/Matchers.h"
 #include "mlir/IR/PatternMatch.h"
 
@@ -52,6 +53,32 @@ struct ForwardAppended : OpRewritePattern<GetOp> {
 void GetOp::getCanonicalizationPatterns(RewritePatternSet &patterns,
                                         MLIRContext *context) {
   patterns.add<ForwardAppended>(context);
+}
+
+Value DivideOp::createUnchecked(OpBuilder &builder) {
+  Value a = getLhs(), b = getRhs();
+  switch (getKind()) {
+  case DivisionKind::QuotientS:
+    return arith::DivSIOp::create(builder, getLoc(), a, b);
+  case DivisionKind::QuotientU:
+    return arith::DivUIOp::create(builder, getLoc(), a, b);
+  case DivisionKind::RemainderS:
+    return arith::RemSIOp::create(builder, getLoc(), a, b);
+  case DivisionKind::RemainderU:
+    return arith::RemUIOp::create(builder, getLoc(), a, b);
+  }
+  llvm_unreachable("all kinds are handled");
+}
+
+/// A division by a constant that always has a result needs no test.
+LogicalResult DivideOp::canonicalize(DivideOp divide,
+                                     PatternRewriter &rewriter) {
+  APInt divisor;
+  if (!matchPattern(divide.getRhs(), m_ConstantInt(&divisor)) ||
+      divisor.isZero() || (divide.isSigned() && divisor.isAllOnes()))
+    return rewriter.notifyMatchFailure(divide, "it may have no result");
+  rewriter.replaceOp(divide, divide.createUnchecked(rewriter));
+  return success();
 }
 
 LogicalResult ListAtOp::verify() {

@@ -16,7 +16,6 @@ namespace piko {
 /// The base of pipelines. Stages are members; the constructor connects them.
 template <class S = NoState> class Pipe {
 public:
-  using State = S;
   Pipe() = default;
   Pipe(const Pipe &) = delete;
   Pipe &operator=(const Pipe &) = delete;
@@ -29,13 +28,15 @@ protected:
   void connect(From &producer, int port, To &consumer) {
     marker::connect(&producer, port, &consumer);
   }
-  template <class From, class To> void connect(From &producer, To &consumer) {
-    marker::connect(&producer, 0, &consumer);
-  }
   template <class T> void allocateForSource(Buffer<T> &buffer, int source) {
     marker::allocateForSource(&buffer, source);
   }
 };
+
+namespace detail {
+/// For the compiler: the state of a pipeline.
+template <class S> Identity<S> stateOf(const Pipe<S> *);
+} // namespace detail
 
 } // namespace piko
 

@@ -8,6 +8,42 @@
 
 namespace piko {
 
+namespace detail {
+
+/// A function of its own: what f declares belongs to the iteration.
+template <class F> void iterate(F &f, int i) { f(i); }
+
+/// Room for a T that nobody constructs.
+template <class T> union Storage {
+  Storage() {}
+  T value;
+};
+
+template <int Rank> Cells<Rank> cellsOf(const Position<Rank> &p) {
+  if constexpr (Rank == 1)
+    return Cells<1>(cellOf(p.x));
+  else if constexpr (Rank == 2)
+    return Cells<2>(cellOf(p.x), cellOf(p.y));
+  else if constexpr (Rank == 3)
+    return Cells<3>(cellOf(p.x), cellOf(p.y), cellOf(p.z));
+  else
+    return Cells<4>(cellOf(p.x), cellOf(p.y), cellOf(p.z), cellOf(p.w));
+}
+
+/// Of what `get` gives for each dimension.
+template <int Rank, class F> Cells<Rank> makeCells(F get) {
+  if constexpr (Rank == 1)
+    return Cells<1>(get(0));
+  else if constexpr (Rank == 2)
+    return Cells<2>(get(0), get(1));
+  else if constexpr (Rank == 3)
+    return Cells<3>(get(0), get(1), get(2));
+  else
+    return Cells<4>(get(0), get(1), get(2), get(3));
+}
+
+} // namespace detail
+
 /// Gives a stage access to the state of its pipeline.
 template <class S> class Uses {
 public:
@@ -20,9 +56,6 @@ template <class B, int Threads, class In, class... Out> class BasicStage {
   static_assert(Threads > 0, "a bin has at least one thread");
 
 public:
-  using Input = In;
-  static constexpr int rank = B::rank;
-
   BasicStage() = default;
   BasicStage(const BasicStage &) = delete;
   BasicStage &operator=(const BasicStage &) = delete;
@@ -45,17 +78,16 @@ protected:
   template <class T, int R, class F>
   auto update(Image<T, R> &image, const Cells<R> &at, F &&f) {
     using namespace detail;
-    T pixel;
-    marker::updateBegin<T>(&pixel, &image, coordinate<0, R>(at),
+    Storage<T> pixel;
+    marker::updateBegin<T>(&pixel.value, &image, coordinate<0, R>(at),
                            coordinate<1, R>(at), coordinate<2, R>(at),
                            coordinate<3, R>(at));
-    using Result = decltype(f(pixel));
-    if constexpr (isSame<Result, void>) {
-      f(pixel);
-      marker::updateEnd<T>(&pixel);
+    if constexpr (isSame<decltype(f(pixel.value)), void>) {
+      f(pixel.value);
+      marker::updateEnd<T>(&pixel.value);
     } else {
-      Result result = f(pixel);
-      marker::updateEnd<T>(&pixel);
+      auto result = f(pixel.value);
+      marker::updateEnd<T>(&pixel.value);
       return result;
     }
   }
@@ -64,77 +96,78 @@ protected:
   void assignToBin(const In &, BinId bin) { marker::assignBin(bin.index); }
   void assignToAll(const In &) { marker::assignAll(); }
   void assignToPreviousBins(const In &) { marker::assignPrevious(); }
-  void assignToBoundingBox(const In &, const Cells<rank> &lo,
-                           const Cells<rank> &hi) {
+  void assignToBoundingBox(const In &, const Cells<B::rank> &lo,
+                           const Cells<B::rank> &hi) {
     using namespace detail;
-    marker::assignBox(coordinate<0, rank>(lo), coordinate<1, rank>(lo),
-                      coordinate<2, rank>(lo), coordinate<3, rank>(lo),
-                      coordinate<0, rank>(hi), coordinate<1, rank>(hi),
-                      coordinate<2, rank>(hi), coordinate<3, rank>(hi));
+    marker::assignBox(coordinate<0, B::rank>(lo), coordinate<1, B::rank>(lo),
+                      coordinate<2, B::rank>(lo), coordinate<3, B::rank>(lo),
+                      coordinate<0, B::rank>(hi), coordinate<1, B::rank>(hi),
+                      coordinate<2, B::rank>(hi), coordinate<3, B::rank>(hi));
   }
-  void assignToBoundingBox(const In &in, const Position<rank> &lo,
-                           const Position<rank> &hi) {
+  void assignToBoundingBox(const In &in, const Position<B::rank> &lo,
+                           const Position<B::rank> &hi) {
     bool isNumber = true;
-    for (int dim = 0; dim < rank; ++dim)
+    for (int dim = 0; dim < B::rank; ++dim)
       isNumber = isNumber && lo[dim] == lo[dim] && hi[dim] == hi[dim];
     if (isNumber)
-      assignToBoundingBox(in, cells(lo), cells(hi));
+      assignToBoundingBox(in, detail::cellsOf<B::rank>(lo),
+                          detail::cellsOf<B::rank>(hi));
     else
       marker::assignBin(marker::nanBox);
   }
 
   // Queries.
-  BinId binFromPosition(const Cells<rank> &at) const {
+  BinId binFromPosition(const Cells<B::rank> &at) const {
     using namespace detail;
-    return BinId{marker::binAt(coordinate<0, rank>(at), coordinate<1, rank>(at),
-                               coordinate<2, rank>(at),
-                               coordinate<3, rank>(at))};
+    return BinId{
+        marker::binAt(coordinate<0, B::rank>(at), coordinate<1, B::rank>(at),
+                      coordinate<2, B::rank>(at), coordinate<3, B::rank>(at))};
   }
-  BinId binFromPosition(const Position<rank> &at) const {
-    return binFromPosition(cells(at));
+  BinId binFromPosition(const Position<B::rank> &at) const {
+    return binFromPosition(detail::cellsOf<B::rank>(at));
   }
   BinId bin() const { return BinId{marker::bin()}; }
-  Cells<rank> domain() const {
-    return make([](int32_t dim) { return marker::domain(dim); });
+  Cells<B::rank> domain() const {
+    return detail::makeCells<B::rank>(
+        [](int32_t dim) { return marker::domain(dim); });
   }
-  Cells<rank> binLo() const {
-    return make([](int32_t dim) { return marker::binLo(marker::bin(), dim); });
+  Cells<B::rank> binLo() const {
+    return detail::makeCells<B::rank>(
+        [](int32_t dim) { return marker::binLo(marker::bin(), dim); });
   }
-  Cells<rank> binHi() const {
-    return make([](int32_t dim) { return marker::binHi(marker::bin(), dim); });
+  Cells<B::rank> binHi() const {
+    return detail::makeCells<B::rank>(
+        [](int32_t dim) { return marker::binHi(marker::bin(), dim); });
   }
 
   /// Calls f(0), ..., f(n - 1), which are independent of one another.
   template <class F> void parallelFor(int64_t n, F &&f) {
     for (int32_t i = marker::loopFirst(); marker::loopMore(i, n, 0);
          i = marker::loopNext(i))
-      iterate(f, i);
+      detail::iterate(f, i);
   }
   /// Calls f(cell) for each cell of the current bin, x fastest.
   template <class F> void parallelForPixels(F &&f) {
-    Cells<rank> lo = binLo(), hi = binHi();
+    Cells<B::rank> lo = binLo(), hi = binHi();
     int64_t n = hi.x - lo.x;
-    if constexpr (rank >= 2)
+    if constexpr (B::rank >= 2)
       n *= hi.y - lo.y;
-    if constexpr (rank >= 3)
+    if constexpr (B::rank >= 3)
       n *= hi.z - lo.z;
-    if constexpr (rank >= 4)
+    if constexpr (B::rank >= 4)
       n *= hi.w - lo.w;
-    parallelFor(n, [&](int index) {
-      Cells<rank> cell;
-      // Without a sign, so that each part is seen to be in the bin.
-      unsigned i = index;
+    parallelFor(n, [&](int i) {
+      Cells<B::rank> cell;
       auto take = [&](int &at, int first, int end) {
-        unsigned width = end - first;
-        at = first + static_cast<int>(i % width);
-        i /= width;
+        at = first + marker::remainder(i, end - first);
+        i = marker::quotient(i, end - first);
       };
       take(cell.x, lo.x, hi.x);
-      if constexpr (rank >= 2)
+      if constexpr (B::rank >= 2)
         take(cell.y, lo.y, hi.y);
-      if constexpr (rank >= 3)
+      if constexpr (B::rank >= 3)
         take(cell.z, lo.z, hi.z);
-      if constexpr (rank >= 4)
+      if constexpr (B::rank >= 4)
         take(cell.w, lo.w, hi.w);
       f(cell);
     });
@@ -201,36 +234,16 @@ protected:
   void batch(int64_t size) { marker::batch(size); }
   void everyBin() { marker::everyBin(); }
   void specifyOrder(Order order) { marker::order(order); }
-
-private:
-  /// A function of its own: what it declares belongs to the iteration.
-  template <class F> static void iterate(F &f, int i) { f(i); }
-  static Cells<rank> cells(const Position<rank> &p) {
-    if constexpr (rank == 1)
-      return Cells<1>(detail::cellOf(p.x));
-    else if constexpr (rank == 2)
-      return Cells<2>(detail::cellOf(p.x), detail::cellOf(p.y));
-    else if constexpr (rank == 3)
-      return Cells<3>(detail::cellOf(p.x), detail::cellOf(p.y),
-                      detail::cellOf(p.z));
-    else
-      return Cells<4>(detail::cellOf(p.x), detail::cellOf(p.y),
-                      detail::cellOf(p.z), detail::cellOf(p.w));
-  }
-  template <class F> static Cells<rank> make(F get) {
-    if constexpr (rank == 1)
-      return Cells<1>(get(0));
-    else if constexpr (rank == 2)
-      return Cells<2>(get(0), get(1));
-    else if constexpr (rank == 3)
-      return Cells<3>(get(0), get(1), get(2));
-    else
-      return Cells<4>(get(0), get(1), get(2), get(3));
-  }
 };
 
 template <int X, int Y, int Threads, class In, class... Out>
 using Stage = BasicStage<Bins<X, Y>, Threads, In, Out...>;
+
+namespace detail {
+/// For the compiler: what goes into a stage.
+template <class B, int Threads, class In, class... Out>
+Identity<In> inputOf(const BasicStage<B, Threads, In, Out...> *);
+} // namespace detail
 
 } // namespace piko
 

@@ -62,8 +62,10 @@ public:
   Image(const Image &) = delete;
   Image &operator=(const Image &) = delete;
 
-  const T &operator()(const Cells<Rank> &at) const { return pixel(at); }
-  void store(const Cells<Rank> &at, const T &value) { pixel(at) = value; }
+  const T &operator()(const Cells<Rank> &at) const {
+    return *pixel<const T>(at);
+  }
+  void store(const Cells<Rank> &at, const T &value) { *pixel<T>(at) = value; }
   Cells<Rank> extent() const {
     if constexpr (Rank == 1)
       return Cells<1>(extent(0));
@@ -74,13 +76,14 @@ public:
     else
       return Cells<4>(extent(0), extent(1), extent(2), extent(3));
   }
-  T &pixel(const Cells<Rank> &at) const {
-    return *marker::element<T>(
+
+private:
+  /// A pixel; of a const U, only atomics may change it.
+  template <class U> U *pixel(const Cells<Rank> &at) const {
+    return marker::element<U>(
         this, detail::coordinate<0, Rank>(at), detail::coordinate<1, Rank>(at),
         detail::coordinate<2, Rank>(at), detail::coordinate<3, Rank>(at));
   }
-
-private:
   int extent(int dim) const { return marker::imageExtent(this, dim); }
 };
 

@@ -234,16 +234,29 @@ private:
     ~Enter() { executor.frame = saved; }
   };
 
+  /// Calls a phase. A division is no call of the language, so that its place is
+  /// not known.
+  template <class F> static void guard(Frame &call, F &phase) {
+    try {
+      DivisionTrap::guard(phase);
+    } catch (const NoQuotient &) {
+      call.at = {};
+      call.node->fail(call.phase == Phase::Assign ? -1 : call.bin,
+                      "expected an integer division to have a result, but it "
+                      "divides by 0 or overflows");
+    }
+  }
+
   /// Runs a call of a phase.
   template <class F> void run(Frame &call, F phase) {
     Enter enter(*this, call);
     if constexpr (!checking) {
-      phase();
+      guard(call, phase);
     } else {
       try {
         std::shared_ptr<Strand> outer =
             checker.beginCall(call.phase, call.node, call.bin, call.lineage);
-        phase();
+        guard(call, phase);
         checker.endCall(std::move(outer));
       } catch (const LocatedError &) {
         throw;

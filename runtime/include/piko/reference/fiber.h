@@ -8,6 +8,8 @@
 #ifndef PIKO_REFERENCE_FIBER_H
 #define PIKO_REFERENCE_FIBER_H
 
+#include <piko/reference/division.h>
+
 #include <exception>
 #include <functional>
 #include <memory>
@@ -44,7 +46,9 @@ public:
 
   /// Called in the fiber: returns to resume() until the next resume().
   void suspend() {
+    DivisionTrap *trap = DivisionTrap::current();
     swapcontext(&self, &resumer);
+    DivisionTrap::current() = trap;
     if (cancelled)
       throw Cancelled();
   }
@@ -52,7 +56,8 @@ public:
   bool isDone() const { return done; }
 
 private:
-  static constexpr size_t stackSize = 256 * 1024;
+  /// Only what is touched takes memory.
+  static constexpr size_t stackSize = 1024 * 1024;
   struct Cancelled {};
 
   static Fiber *&starting() {
@@ -64,7 +69,9 @@ private:
     if (!started)
       starting() = this;
     started = true;
+    DivisionTrap *trap = DivisionTrap::current();
     swapcontext(&resumer, &self);
+    DivisionTrap::current() = trap;
   }
 
   static void enter() {
@@ -75,7 +82,7 @@ private:
 
   void runBody() {
     try {
-      body();
+      DivisionTrap::guard(body);
     } catch (const Cancelled &) {
     } catch (...) {
       error = std::current_exception();

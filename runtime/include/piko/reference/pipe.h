@@ -49,24 +49,17 @@ private:
   S &stage;
 };
 
-/// What a pipeline is apart from the types of its state and stages.
-class PipeBase {
+/// What a pipeline is apart from the type of its state.
+class Pipeline {
 public:
-  // For the host. What goes wrong is thrown, where it happens; the Status that
-  // a call returns always is well. It is there for texts that use compiled
-  // pipelines, too.
+  Pipeline() = default;
+  Pipeline(const Pipeline &) = delete;
+  Pipeline &operator=(const Pipeline &) = delete;
+  ~Pipeline() { endMembers(); }
 
-  /// The extent of the domain in cells, one number for each dimension.
-  Status setDomain(std::initializer_list<int64_t> extent) {
-    return setDomain(extent.begin(), static_cast<int>(extent.size()));
-  }
-  template <int Rank> Status setDomain(const glm::vec<Rank, int> &extent) {
-    int64_t values[Rank];
-    for (int d = 0; d < Rank; ++d)
-      values[d] = extent[d];
-    return setDomain(values, Rank);
-  }
-  Status setDomain(const int64_t *extent, int rank) {
+  // For the host; see Pipe.
+
+  void setDomain(const int64_t *extent, int rank) {
     if (rank < 1 || rank > 4)
       throw Error("expected a domain of 1 to 4 dimensions, but got " +
                   std::to_string(rank));
@@ -78,85 +71,90 @@ public:
     for (int d = 0; d < 4; ++d)
       domainExtent[d] = d < rank ? extent[d] : 1;
     domainRank = rank;
-    return {};
   }
 
-  /// The primitives of a source; the memory must stay until the run.
-  template <class T>
-  Status feed(int source, const T *primitives, int64_t count) {
+  template <class T> void feed(int source, const T *primitives, int64_t count) {
     const TypeInfo *type = nullptr;
     if constexpr (!std::is_void_v<T>)
       type = typeOf<std::remove_cv_t<T>>();
     feedBytes(source, type, reinterpret_cast<const std::byte *>(primitives),
               count);
-    return {};
   }
-  /// The same for a vector, an array or a span.
-  template <HostRange Range> Status feed(int source, Range &&primitives) {
-    static_assert(outlives<Range>,
-                  "feed does not copy; the primitives must outlive the run");
-    return feed(source, std::data(primitives),
-                static_cast<int64_t>(std::size(primitives)));
-  }
-  /// The same for the only source of a stage.
-  template <class S, HostRange Range>
-    requires std::is_class_v<S>
-  Status feed(const S &stage, Range &&primitives) {
-    static_assert(outlives<Range>,
-                  "feed does not copy; the primitives must outlive the run");
-    return feed(sourceOf(&stage, typeName<S>()), std::data(primitives),
-                static_cast<int64_t>(std::size(primitives)));
+  template <class S> int sourceOf(const S &stage) {
+    return sourceOf(&stage, typeName<S>());
   }
 
-  /// In checking mode: fields, such as &Fragment::z, of which no primitive
-  /// that is fed or emitted may hold a NaN.
   template <auto... Field> void expectNumbers() {
     (executor.numbers.push_back(numberField<Field>(Field)), ...);
   }
-  /// In checking mode: what messages call a buffer or an image.
   void nameState(const void *handle, std::string name) {
     executor.checker.nameState(handle, std::move(name));
   }
 
-  /// How many hops a primitive may take on a cycle of stages, and how many
-  /// rounds a cycle may run.
-  Status setLoopLimit(int64_t limit) {
+  void setLoopLimit(int64_t limit) {
     if (limit < 0)
       throw Error("expected a loop limit of at least 0, but got " +
                   std::to_string(limit));
     executor.loopLimit = limit;
-    return {};
   }
 
-  // How a compiled pipeline runs; here they change nothing.
-  Status setThreads(int32_t) { return {}; }
-  Status setMemoryLimit(int64_t) { return {}; }
-  Status setMemoryBudget(int64_t) { return {}; }
-  Status setStripSize(int64_t) { return {}; }
+  void run();
 
-  /// Clears the images and runs the pipeline on what was fed.
-  Status run();
-  /// The same, but an Error is returned.
-  Status tryRun() {
-    try {
-      return run();
-    } catch (const Error &error) {
-      return Status(error.code(), error.what());
-    }
+  // For the pipeline's constructor.
+
+  /// The state is there: what is constructed from here on are stages.
+  void beginMembers() {
+    ImageBase::registry() = scope.saved;
+    membersUnderConstruction() = &members;
+  }
+  template <class State, class S> void source(S &stage, State &state) {
+    sources.push_back({&nodeOf(stage, state), nullptr, 0});
+  }
+  template <class State, class From, class To>
+  void connect(From &from, int port, To &to, State &state) {
+    Node &producer = nodeOf(from, state), &consumer = nodeOf(to, state);
+    connectNodes(producer, port, consumer);
+  }
+  void allocateForSource(BufferBase &buffer, int source) {
+    allocations.push_back({&buffer, source});
   }
 
-protected:
-  PipeBase() = default;
-  PipeBase(const PipeBase &) = delete;
-  PipeBase &operator=(const PipeBase &) = delete;
-  ~PipeBase() { endMembers(); }
-
-  /// Stages that are constructed from here on are the pipeline's members.
-  void beginMembers() { membersUnderConstruction() = &members; }
+private:
   void endMembers() {
     if (membersUnderConstruction() == &members)
       membersUnderConstruction() = nullptr;
   }
+
+  template <class State, class S> Node &nodeOf(S &stage, State &state) {
+    endMembers();
+    Node *node = findNode(&stage, typeOf<S>());
+    return node ? *node : makeNode(stage, stage, state);
+  }
+  template <class State, class S, class B, int Threads, class In, class... Out>
+  Node &makeNode(S &stage, BasicStage<B, Threads, In, Out...> &base,
+                 State &state) {
+    static_assert(
+        B::wholeDomain || requires(const In &p) { stage.assignBin(p); },
+        "a stage with several bins needs assignBin");
+    std::unique_ptr<Node> node(new TypedNode<S, In>(stage));
+    node->rank = B::rank;
+    for (int d = 0; d < B::rank; ++d)
+      node->binSize[d] = B::size[d];
+    (node->ports.push_back({typeOf<Out>(), {}}), ...);
+    for (Member &member : members)
+      if (member.stage == &base)
+        member.isNamed = true;
+    bindState(&stage, state);
+    return addNode(std::move(node));
+  }
+  template <class Used, class State>
+  static void bindState(piko::Uses<Used> *uses, State &state) {
+    static_assert(std::is_base_of_v<Used, State>,
+                  "the stage uses another state than its pipeline has");
+    reference::Uses<Used> &holder = *uses;
+    holder.state = &state;
+  }
+  template <class State> static void bindState(const void *, const State &) {}
 
   struct Source {
     Node *node;
@@ -242,7 +240,7 @@ protected:
   Executor executor;
 };
 
-inline void PipeBase::checkGraph() const {
+inline void Pipeline::checkGraph() const {
   if (domainRank == 0)
     throw Error("the pipeline has no domain; call setDomain");
   for (const auto &node : nodes) {
@@ -270,7 +268,7 @@ inline void PipeBase::checkGraph() const {
   const char *noInput =
       "has no input: expected an edge or a source that feeds it";
   for (size_t i = 0; i < members.size(); ++i)
-    if (!*members[i].node) // never named, so that its type is not known
+    if (!members[i].isNamed) // never named, so that its type is not known
       throw Error("stage " + std::to_string(i) +
                   " of the pipeline, which takes '" +
                   std::string(members[i].inputType->name) + "', " + noInput);
@@ -279,7 +277,7 @@ inline void PipeBase::checkGraph() const {
       node->fail(-1, noInput);
 }
 
-inline bool PipeBase::hasInput(const Node &node) const {
+inline bool Pipeline::hasInput(const Node &node) const {
   auto isFed = [&](const Source &source) { return source.node == &node; };
   auto leads = [&](const Port &port) { return port.to.front() == &node; };
   return std::ranges::any_of(sources, isFed) ||
@@ -288,7 +286,7 @@ inline bool PipeBase::hasInput(const Node &node) const {
          });
 }
 
-inline void PipeBase::prepareState() {
+inline void Pipeline::prepareState() {
   for (ImageBase *image : images)
     image->prepare(domainExtent);
   for (const Allocation &allocation : allocations) {
@@ -301,7 +299,7 @@ inline void PipeBase::prepareState() {
   }
 }
 
-inline std::vector<Component> PipeBase::prepareStages() {
+inline std::vector<Component> Pipeline::prepareStages() {
   std::vector<Node *> declared;
   for (const auto &node : nodes) {
     node->grid = Grid(domainExtent, node->binSize);
@@ -326,7 +324,7 @@ inline std::vector<Component> PipeBase::prepareStages() {
 }
 
 inline StageOrder
-PipeBase::stageOrder(const std::vector<Component> &components) const {
+Pipeline::stageOrder(const std::vector<Component> &components) const {
   std::vector<Node *> declared;
   for (const auto &node : nodes)
     declared.push_back(node.get());
@@ -336,7 +334,7 @@ PipeBase::stageOrder(const std::vector<Component> &components) const {
   return {declared, fed, components};
 }
 
-inline Status PipeBase::run() {
+inline void Pipeline::run() {
   checkArithmetic();
   checkGraph();
   struct Running {
@@ -345,6 +343,7 @@ inline Status PipeBase::run() {
         : saved(std::exchange(Executor::current(), executor)) {}
     ~Running() { Executor::current() = saved; }
   } running(&executor);
+  DivisionTrap::Handler handler;
 
   prepareState();
   executor.checker.beginRun();
@@ -366,70 +365,122 @@ inline Status PipeBase::run() {
     executor.runComponent(component);
   if constexpr (checking)
     executor.checker.endRun();
-  return {};
 }
+
+/// What a pipeline holds, under names that piko::Pipe hides: the constructor of
+/// a pipeline finds no names but those of the language.
+template <class State> class Pipe {
+public:
+  Pipe() : run(), state() { run.beginMembers(); }
+
+  Pipeline run;
+  State state;
+};
 
 } // namespace reference
 
 /// The base of pipelines. A pipeline has its stages as members; its
 /// constructor names sources and edges.
-template <class State = NoState> class Pipe : public reference::PipeBase {
+template <class State = NoState> class Pipe : private reference::Pipe<State> {
 public:
-  State &state() { return memory; }
-  const State &state() const { return memory; }
+  State &state() { return reference::Pipe<State>::state; }
+  const State &state() const { return reference::Pipe<State>::state; }
+
+  // For the host. What goes wrong is thrown, where it happens; the Status that
+  // a call returns always is well. It is there for texts that use compiled
+  // pipelines, too.
+
+  /// The extent of the domain in cells, one number for each dimension.
+  Status setDomain(std::initializer_list<int64_t> extent) {
+    return setDomain(extent.begin(), static_cast<int>(extent.size()));
+  }
+  template <int Rank> Status setDomain(const glm::vec<Rank, int> &extent) {
+    return setDomain(reference::toCell(extent).data(), Rank);
+  }
+  Status setDomain(const int64_t *extent, int rank) {
+    reference::Pipe<State>::run.setDomain(extent, rank);
+    return {};
+  }
+
+  /// The primitives of a source; the memory must stay until the run.
+  template <class T>
+  Status feed(int source, const T *primitives, int64_t count) {
+    reference::Pipe<State>::run.feed(source, primitives, count);
+    return {};
+  }
+  /// The same for a vector, an array or a span.
+  template <reference::HostRange Range>
+  Status feed(int source, Range &&primitives) {
+    static_assert(reference::outlives<Range>,
+                  "feed does not copy; the primitives must outlive the run");
+    return feed(source, std::data(primitives),
+                static_cast<int64_t>(std::size(primitives)));
+  }
+  /// The same for the only source of a stage.
+  template <class S, reference::HostRange Range>
+    requires std::is_class_v<S>
+  Status feed(const S &stage, Range &&primitives) {
+    static_assert(reference::outlives<Range>,
+                  "feed does not copy; the primitives must outlive the run");
+    return feed(reference::Pipe<State>::run.sourceOf(stage),
+                std::data(primitives),
+                static_cast<int64_t>(std::size(primitives)));
+  }
+
+  /// In checking mode: fields, such as &Fragment::z, of which no primitive
+  /// that is fed or emitted may hold a NaN.
+  template <auto... Field> void expectNumbers() {
+    reference::Pipe<State>::run.template expectNumbers<Field...>();
+  }
+  /// In checking mode: what messages call a buffer or an image.
+  void nameState(const void *handle, std::string name) {
+    reference::Pipe<State>::run.nameState(handle, std::move(name));
+  }
+
+  /// How many hops a primitive may take on a cycle of stages, and how many
+  /// rounds a cycle may run.
+  Status setLoopLimit(int64_t limit) {
+    reference::Pipe<State>::run.setLoopLimit(limit);
+    return {};
+  }
+
+  // How a compiled pipeline runs; here they change nothing.
+  Status setThreads(int32_t) { return {}; }
+  Status setMemoryLimit(int64_t) { return {}; }
+  Status setMemoryBudget(int64_t) { return {}; }
+  Status setStripSize(int64_t) { return {}; }
+
+  /// Clears the images and runs the pipeline on what was fed.
+  Status run() {
+    reference::Pipe<State>::run.run();
+    return {};
+  }
+  /// The same, but an Error is returned.
+  Status tryRun() {
+    try {
+      return run();
+    } catch (const Error &error) {
+      return Status(error.code(), error.what());
+    }
+  }
 
 protected:
-  Pipe() : memory() {
-    reference::ImageBase::registry() = scope.saved;
-    beginMembers();
-  }
+  Pipe() = default;
   ~Pipe() = default;
 
   /// A stage that is fed by the host; sources are numbered as they are named.
   template <class S> void source(S &stage) {
-    sources.push_back({&nodeOf(stage), nullptr, 0});
+    reference::Pipe<State>::run.source(stage, state());
   }
   /// What leaves `from` through a port goes to `to`.
   template <class From, class To> void connect(From &from, int port, To &to) {
-    reference::Node &producer = nodeOf(from), &consumer = nodeOf(to);
-    connectNodes(producer, port, consumer);
+    reference::Pipe<State>::run.connect(from, port, to, state());
   }
   /// Gives a buffer as many elements as a source has primitives, zero at the
   /// start of each run.
   template <class T> void allocateForSource(Buffer<T> &buffer, int source) {
-    allocations.push_back({&buffer, source});
+    reference::Pipe<State>::run.allocateForSource(buffer, source);
   }
-
-private:
-  template <class S> reference::Node &nodeOf(S &stage) {
-    endMembers();
-    reference::Node *node = findNode(&stage, reference::typeOf<S>());
-    return node ? *node : makeNode(stage, stage);
-  }
-  template <class S, class B, int Threads, class In, class... Out>
-  reference::Node &makeNode(S &stage,
-                            BasicStage<B, Threads, In, Out...> &base) {
-    static_assert(
-        B::wholeDomain || requires(const In &p) { stage.assignBin(p); },
-        "a stage with several bins needs assignBin");
-    std::unique_ptr<reference::Node> node(
-        new reference::TypedNode<S, In>(stage));
-    node->rank = B::rank;
-    for (int d = 0; d < B::rank; ++d)
-      node->binSize[d] = B::size[d];
-    (node->ports.push_back({reference::typeOf<Out>(), {}}), ...);
-    base.node = node.get();
-    bindState(&stage);
-    return addNode(std::move(node));
-  }
-  template <class Used> void bindState(Uses<Used> *uses) {
-    static_assert(std::is_base_of_v<Used, State>,
-                  "the stage uses another state than its pipeline has");
-    uses->bound = &memory;
-  }
-  void bindState(const void *) {}
-
-  State memory;
 };
 
 } // namespace piko

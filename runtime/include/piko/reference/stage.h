@@ -10,14 +10,13 @@
 
 namespace piko {
 
-template <class State> class Pipe;
-
 namespace reference {
 
 /// A stage, perhaps one that its pipeline never names.
 struct Member {
-  Node *const *node; ///< null unless it is named
+  const void *stage; ///< its BasicStage
   const TypeInfo *inputType;
+  bool isNamed = false;
 };
 
 /// Where stages enter themselves that are members of the pipeline under
@@ -26,6 +25,125 @@ inline std::vector<Member> *&membersUnderConstruction() {
   static thread_local std::vector<Member> *members = nullptr;
   return members;
 }
+
+//===----------------------------------------------------------------------===//
+// What the calls of a stage do. A stage's phases find no names but those of the
+// language, so that these are no members.
+//===----------------------------------------------------------------------===//
+
+/// The executor, which is at a call of the language.
+inline Executor &executorAt(const char *what, const Place &at) {
+  Executor *running = Executor::current();
+  if (!running || !running->frame)
+    throw Error(std::string(what) + " outside a running pipeline");
+  running->frame->at = at;
+  return *running;
+}
+/// The same, outside parallelFor.
+inline Executor &frameOutsideLoop(const char *what, const Place &at) {
+  Executor &running = executorAt(what, at);
+  const Frame &call = *running.frame;
+  if (call.loop)
+    call.node->fail(call.bin,
+                    std::string("expected ") + what + " outside a parallelFor");
+  return running;
+}
+inline Frame &frameAt(const char *what, const Place &at) {
+  return *executorAt(what, at).frame;
+}
+inline Frame &frameInBin(const char *what, const Place &at) {
+  Frame &call = frameAt(what, at);
+  if (call.phase == Phase::Assign)
+    call.node->fail(-1, std::string(what) + " in assignBin");
+  return call;
+}
+inline Frame &frameInSchedule(const char *what, const Place &at) {
+  return executorAt(what, at).expect(Phase::Schedule, what);
+}
+inline Frame &frameInList(const char *what, const Place &at) {
+  Frame &call = frameInSchedule(what, at);
+  if (!call.node->takesList)
+    call.node->fail(call.bin, std::string("expected ") + what +
+                                  " only in a stage that takes a list");
+  return call;
+}
+
+template <class T> void emit(const T &value, int port, const Place &at) {
+  Executor &running = executorAt("emit", at);
+  if (const char *field = findUnwritten(value))
+    running.frame->node->fail(running.frame->bin,
+                              unwrittenText(field, typeName<T>()));
+  running.emit(port, typeOf<T>(), &value);
+}
+
+inline void assignBox(Cell lo, Cell hi, int rank, const Place &at) {
+  Executor &running = executorAt("assignToBoundingBox", at);
+  const Grid &grid =
+      running.expect(Phase::Assign, "assignToBoundingBox").node->grid;
+  Cell first{}, last{};
+  for (int d = 0; d < 4; ++d) {
+    lo[d] = d < rank ? std::max<int64_t>(lo[d], 0) : 0;
+    hi[d] = d < rank ? std::min<int64_t>(hi[d], grid.domain[d] - 1) : 0;
+    if (lo[d] > hi[d])
+      return;
+    first[d] = lo[d] / grid.size[d];
+    last[d] = hi[d] / grid.size[d];
+  }
+  Cell b;
+  for (b[3] = first[3]; b[3] <= last[3]; ++b[3])
+    for (b[2] = first[2]; b[2] <= last[2]; ++b[2])
+      for (b[1] = first[1]; b[1] <= last[1]; ++b[1])
+        for (b[0] = first[0]; b[0] <= last[0]; ++b[0])
+          running.assignBin(grid.bin(b));
+}
+
+inline void checkOwnPixel(const Frame &call, const Cell &at, int rank) {
+  Cell lo = call.node->grid.lo(call.bin);
+  Cell hi = call.node->grid.hi(call.bin);
+  for (int d = 0; d < rank; ++d)
+    if (at[d] < lo[d] || at[d] >= hi[d])
+      call.node->fail(call.bin,
+                      "expected an update inside the stage's own bin, but "
+                      "got pixel " +
+                          toText(at, rank));
+}
+
+inline int64_t currentIteration() {
+  return Executor::current()->frame->loop->iteration;
+}
+
+/// Gathers one value of each iteration and hands out what `combine` makes of
+/// them.
+template <class T, class Result, class Combine>
+Result collective(const char *what, const Place &at, const T &value,
+                  Combine combine) {
+  Executor &running = executorAt(what, at);
+  Loop &loop = running.loopForSync(what);
+  bool first = loop.iteration == 0;
+  if (first)
+    loop.slots = std::vector<T>(loop.size, value);
+  else
+    std::any_cast<std::vector<T> &>(loop.slots)[loop.iteration] = value;
+  running.sync();
+  if (first) // the first to go on
+    loop.result = combine(std::any_cast<std::vector<T> &>(loop.slots));
+  return std::any_cast<Result &>(loop.result);
+}
+
+/// How often f(0), ..., f(n - 1) is true.
+template <class F>
+int64_t countTrue(const char *what, int64_t n, F &f, const Place &at) {
+  int64_t total = 0;
+  frameOutsideLoop(what, at).parallelFor(
+      n, [&](int64_t i) { total += bool(f(static_cast<int>(i))); });
+  return total;
+}
+
+/// What a stage that uses a state holds, under a name that piko::Uses hides.
+template <class State> class Uses {
+public:
+  State *state = nullptr; ///< set by the pipeline
+};
 
 } // namespace reference
 
@@ -51,17 +169,14 @@ private:
 };
 
 /// The second base of a stage that uses the pipeline's state.
-template <class State> class Uses {
+template <class State> class Uses : public reference::Uses<State> {
 public:
   State &state() const {
+    State *bound = reference::Uses<State>::state;
     if (!bound)
       throw Error("state() of a stage that is in no pipeline");
     return *bound;
   }
-
-private:
-  template <class> friend class Pipe;
-  State *bound = nullptr;
 };
 
 /// The base of all stages: `In` goes in, one `Out` leaves through each port.
@@ -77,57 +192,64 @@ template <class B, int Threads, class In, class... Out> class BasicStage {
   static_assert(alignof(In) <= alignof(std::max_align_t),
                 "primitives cannot be over-aligned");
 
-  static constexpr int rank = B::rank;
-  using Place = reference::Place;
-  using FirstOut = std::tuple_element_t<0, std::tuple<Out..., In>>;
-
 public:
   // Any phase.
 
   /// The bin that holds a position or a cell; BinId{-1} outside the domain.
-  BinId binFromPosition(const Position<rank> &p,
-                        Place at = Place::current()) const {
-    return {here("binFromPosition", at).node->grid.binAt(reference::toCell(p))};
+  BinId
+  binFromPosition(const Position<B::rank> &p,
+                  reference::Place at = reference::Place::current()) const {
+    return {reference::frameAt("binFromPosition", at)
+                .node->grid.binAt(reference::toCell(p))};
   }
-  BinId binFromPosition(const Cells<rank> &p,
-                        Place at = Place::current()) const {
-    return {here("binFromPosition", at).node->grid.binAt(reference::toCell(p))};
+  BinId
+  binFromPosition(const Cells<B::rank> &p,
+                  reference::Place at = reference::Place::current()) const {
+    return {reference::frameAt("binFromPosition", at)
+                .node->grid.binAt(reference::toCell(p))};
   }
   /// The extent of the domain in cells.
-  Cells<rank> domain(Place at = Place::current()) const {
-    return reference::fromCell<rank>(here("domain", at).node->grid.domain);
+  Cells<B::rank>
+  domain(reference::Place at = reference::Place::current()) const {
+    return reference::fromCell<B::rank>(
+        reference::frameAt("domain", at).node->grid.domain);
   }
 
   // Schedule and Process.
 
   /// The bin that is scheduled or processed.
-  BinId bin(Place at = Place::current()) const {
-    return {inBin("bin", at).bin};
+  BinId bin(reference::Place at = reference::Place::current()) const {
+    return {reference::frameInBin("bin", at).bin};
   }
   /// Its first cell, and one past its last cell.
-  Cells<rank> binLo(Place at = Place::current()) const {
-    const reference::Frame &call = inBin("binLo", at);
-    return reference::fromCell<rank>(call.node->grid.lo(call.bin));
+  Cells<B::rank>
+  binLo(reference::Place at = reference::Place::current()) const {
+    const reference::Frame &call = reference::frameInBin("binLo", at);
+    return reference::fromCell<B::rank>(call.node->grid.lo(call.bin));
   }
-  Cells<rank> binHi(Place at = Place::current()) const {
-    const reference::Frame &call = inBin("binHi", at);
-    return reference::fromCell<rank>(call.node->grid.hi(call.bin));
+  Cells<B::rank>
+  binHi(reference::Place at = reference::Place::current()) const {
+    const reference::Frame &call = reference::frameInBin("binHi", at);
+    return reference::fromCell<B::rank>(call.node->grid.hi(call.bin));
   }
 
   // AssignBin. A primitive goes to the set of all bins that are named.
 
-  void assignToBin(const In &, BinId bin, Place at = Place::current()) {
-    executor("assignToBin", at).assignBin(bin.index);
+  void assignToBin(const In &, BinId bin,
+                   reference::Place at = reference::Place::current()) {
+    reference::executorAt("assignToBin", at).assignBin(bin.index);
   }
-  void assignToAll(const In &, Place at = Place::current()) {
-    int64_t bins = here("assignToAll", at).node->grid.bins();
+  void assignToAll(const In &,
+                   reference::Place at = reference::Place::current()) {
+    int64_t bins = reference::frameAt("assignToAll", at).node->grid.bins();
     for (int64_t bin = 0; bin < bins; ++bin)
-      executor("assignToAll", at).assignBin(bin);
+      reference::executorAt("assignToAll", at).assignBin(bin);
   }
   /// To the bin in which the producer emitted it.
-  void assignToPreviousBins(const In &, Place at = Place::current()) {
+  void assignToPreviousBins(const In &,
+                            reference::Place at = reference::Place::current()) {
     reference::Frame &call =
-        executor("assignToPreviousBins", at)
+        reference::executorAt("assignToPreviousBins", at)
             .expect(reference::Phase::Assign, "assignToPreviousBins");
     if (!call.producer)
       call.node->fail(-1, "expected a previous stage, but the primitive is a "
@@ -135,88 +257,96 @@ public:
     if (call.producer->grid.size != call.node->grid.size)
       call.node->fail(-1, "expected bins of the same size as those of stage '" +
                               std::string(call.producer->name()) + "'");
-    executor("assignToPreviousBins", at).assignBin(call.bin);
+    reference::executorAt("assignToPreviousBins", at).assignBin(call.bin);
   }
   /// To all bins that a closed box of cells touches; outside the domain there
   /// are none.
-  void assignToBoundingBox(const In &, const Cells<rank> &lo,
-                           const Cells<rank> &hi, Place at = Place::current()) {
-    assignBox(reference::toCell(lo), reference::toCell(hi), at);
+  void assignToBoundingBox(const In &, const Cells<B::rank> &lo,
+                           const Cells<B::rank> &hi,
+                           reference::Place at = reference::Place::current()) {
+    reference::assignBox(reference::toCell(lo), reference::toCell(hi), B::rank,
+                         at);
   }
-  void assignToBoundingBox(const In &, const Position<rank> &lo,
-                           const Position<rank> &hi,
-                           Place at = Place::current()) {
-    for (int d = 0; d < rank; ++d)
+  void assignToBoundingBox(const In &, const Position<B::rank> &lo,
+                           const Position<B::rank> &hi,
+                           reference::Place at = reference::Place::current()) {
+    for (int d = 0; d < B::rank; ++d)
       if (lo[d] != lo[d] || hi[d] != hi[d])
-        here("assignToBoundingBox", at)
+        reference::frameAt("assignToBoundingBox", at)
             .node->fail(-1, "expected a bounding box of numbers, but got NaN");
-    assignBox(reference::toCell(lo), reference::toCell(hi), at);
+    reference::assignBox(reference::toCell(lo), reference::toCell(hi), B::rank,
+                         at);
   }
 
   // Schedule.
 
   void specifySchedule(SchedulePolicy, int64_t tileSplit = 0,
-                       Place at = Place::current()) {
-    reference::Frame &call = inSchedule("specifySchedule", at);
+                       reference::Place at = reference::Place::current()) {
+    reference::Frame &call = reference::frameInSchedule("specifySchedule", at);
     if (tileSplit < 0)
       call.node->fail(call.bin,
                       "expected a tile split of at least 0, but got " +
                           std::to_string(tileSplit));
   }
   /// Waits until all stages of type X are finished.
-  template <class X> void endStage(Place at = Place::current()) {
-    reference::Node &node = *inSchedule("endStage", at).node;
+  template <class X>
+  void endStage(reference::Place at = reference::Place::current()) {
+    reference::Node &node = *reference::frameInSchedule("endStage", at).node;
     const reference::TypeInfo *type = reference::typeOf<X>();
     if (std::find(node.waitsOn.begin(), node.waitsOn.end(), type) ==
         node.waitsOn.end())
       node.waitsOn.push_back(type);
   }
   /// Waits until nothing can reach this bin any more.
-  void endBin(Place at = Place::current()) {
-    inSchedule("endBin", at).node->endsBin = true;
+  void endBin(reference::Place at = reference::Place::current()) {
+    reference::frameInSchedule("endBin", at).node->endsBin = true;
   }
   /// Calls a list Process with n primitives at a time.
-  void batch(int64_t n, Place at = Place::current()) {
-    reference::Frame &call = inList("batch", at);
+  void batch(int64_t n, reference::Place at = reference::Place::current()) {
+    reference::Frame &call = reference::frameInList("batch", at);
     if (n < 1)
       call.node->fail(call.bin, "expected a batch of at least 1, but got " +
                                     std::to_string(n));
     call.node->schedules[call.bin].batch = n;
   }
   /// Calls a list Process for empty bins, too.
-  void everyBin(Place at = Place::current()) {
-    reference::Frame &call = inList("everyBin", at);
+  void everyBin(reference::Place at = reference::Place::current()) {
+    reference::Frame &call = reference::frameInList("everyBin", at);
     call.node->schedules[call.bin].everyBin = true;
   }
-  void specifyOrder(Order order, Place at = Place::current()) {
-    inSchedule("specifyOrder", at).node->unordered = order == Unordered;
+  void specifyOrder(Order order,
+                    reference::Place at = reference::Place::current()) {
+    reference::frameInSchedule("specifyOrder", at).node->unordered =
+        order == Unordered;
   }
 
   // Process.
 
   /// Sends a primitive through a port.
-  void emit(const FirstOut &value, int port = 0, Place at = Place::current())
+  void emit(const std::tuple_element_t<0, std::tuple<Out..., In>> &value,
+            int port = 0, reference::Place at = reference::Place::current())
     requires(sizeof...(Out) > 0)
   {
-    emitAs(value, port, at);
+    reference::emit(value, port, at);
   }
   template <class T>
-  void emit(const T &value, int port = 0, Place at = Place::current()) {
+  void emit(const T &value, int port = 0,
+            reference::Place at = reference::Place::current()) {
     static_assert((std::is_same_v<T, Out> || ...),
                   "emit of a type that no port has");
-    emitAs(value, port, at);
+    reference::emit(value, port, at);
   }
 
   /// Changes a pixel of the current bin: f(pixel). The calls for one pixel are
   /// in lineage order.
   template <class T, int R, class F>
   auto update(Image<T, R> &image, const Cells<R> &at, F &&f,
-              Place place = Place::current()) {
-    reference::Frame &call =
-        executor("update", place).expect(reference::Phase::Process, "update");
+              reference::Place place = reference::Place::current()) {
+    reference::Frame &call = reference::executorAt("update", place)
+                                 .expect(reference::Phase::Process, "update");
     if (call.updating)
       call.node->fail(call.bin, "expected an update outside an update");
-    checkOwnPixel(call, reference::toCell(at));
+    reference::checkOwnPixel(call, reference::toCell(at), B::rank);
     struct Updating {
       bool &flag;
       ~Updating() { flag = false; }
@@ -227,209 +357,107 @@ public:
 
   /// Calls f(0), ..., f(n - 1), which are independent of one another.
   template <class F>
-  void parallelFor(int64_t n, F &&f, Place at = Place::current()) {
-    executor("parallelFor", at).parallelFor(n, [&f](int64_t i) {
+  void parallelFor(int64_t n, F &&f,
+                   reference::Place at = reference::Place::current()) {
+    reference::executorAt("parallelFor", at).parallelFor(n, [&f](int64_t i) {
       f(static_cast<int>(i));
     });
   }
   /// Calls f(cell) for each cell of the current bin, x fastest.
   template <class F>
-  void parallelForPixels(F &&f, Place at = Place::current()) {
+  void parallelForPixels(F &&f,
+                         reference::Place at = reference::Place::current()) {
     reference::Cell lo = reference::toCell(binLo());
     reference::Cell hi = reference::toCell(binHi(), 1);
     int64_t n = 1;
-    for (int d = 0; d < rank; ++d)
+    for (int d = 0; d < B::rank; ++d)
       n *= hi[d] - lo[d];
-    executor("parallelForPixels", at).parallelFor(n, [&, lo, hi](int64_t i) {
-      Cells<rank> cell;
-      for (int d = 0; d < rank; ++d) {
-        cell[d] = static_cast<int>(lo[d] + i % (hi[d] - lo[d]));
-        i /= hi[d] - lo[d];
-      }
-      f(cell);
-    });
+    reference::executorAt("parallelForPixels", at)
+        .parallelFor(n, [&, lo, hi](int64_t i) {
+          Cells<B::rank> cell;
+          for (int d = 0; d < B::rank; ++d) {
+            cell[d] = static_cast<int>(lo[d] + i % (hi[d] - lo[d]));
+            i /= hi[d] - lo[d];
+          }
+          f(cell);
+        });
   }
   /// In an iteration of parallelFor: a barrier between all iterations.
-  void sync(Place at = Place::current()) { executor("sync", at).sync(); }
+  void sync(reference::Place at = reference::Place::current()) {
+    reference::executorAt("sync", at).sync();
+  }
 
   // Over the iterations of the enclosing parallelFor; each of them is also a
   // sync(). Every iteration gets the result.
 
-  bool any(bool value, Place at = Place::current()) {
+  bool any(bool value, reference::Place at = reference::Place::current()) {
     return count(value, at) != 0;
   }
-  bool all(bool value, Place at = Place::current()) {
+  bool all(bool value, reference::Place at = reference::Place::current()) {
     return count(!value, at) == 0;
   }
-  int64_t count(bool value, Place at = Place::current()) {
+  int64_t count(bool value, reference::Place at = reference::Place::current()) {
     return reduce(
         int64_t(value), [](int64_t a, int64_t b) { return a + b; }, at);
   }
   /// op over all values, in a fixed binary tree.
   template <class T, class Op>
-  T reduce(T value, Op op, Place at = Place::current()) {
-    return collective<T, T>("reduce", at, value, [&](const std::vector<T> &v) {
-      return reference::reduceTree(v, op, T{});
-    });
+  T reduce(T value, Op op, reference::Place at = reference::Place::current()) {
+    return reference::collective<T, T>(
+        "reduce", at, value, [&](const std::vector<T> &v) {
+          return reference::reduceTree(v, op, T{});
+        });
   }
   /// op over the values of the iterations before this one; `empty` in the
   /// first.
   template <class T, class Op>
-  T scan(T value, Op op, T empty = T{}, Place at = Place::current()) {
-    return collective<T, std::vector<T>>(
+  T scan(T value, Op op, T empty = T{},
+         reference::Place at = reference::Place::current()) {
+    return reference::collective<T, std::vector<T>>(
         "scan", at, value, [&](const std::vector<T> &v) {
           return reference::scanTree(v, op, empty);
-        })[iteration()];
+        })[reference::currentIteration()];
   }
   /// Iteration r gets the index of the iteration with the r-th smallest key.
-  template <class K> int64_t sort(K key, Place at = Place::current()) {
+  template <class K>
+  int64_t sort(K key, reference::Place at = reference::Place::current()) {
     static_assert(std::is_arithmetic_v<K>, "the key of sort is a number");
-    return collective<K, std::vector<int64_t>>(
+    return reference::collective<K, std::vector<int64_t>>(
         "sort", at, key, [](const std::vector<K> &keys) {
           return reference::sortedIndices(keys);
-        })[iteration()];
+        })[reference::currentIteration()];
   }
 
   // Over f(0), ..., f(n - 1), outside parallelFor.
 
-  template <class F> bool any(int64_t n, F &&f, Place at = Place::current()) {
-    return sum("any(n, f)", n, f, at) != 0;
-  }
-  template <class F> bool all(int64_t n, F &&f, Place at = Place::current()) {
-    return sum("all(n, f)", n, f, at) == n;
+  template <class F>
+  bool any(int64_t n, F &&f,
+           reference::Place at = reference::Place::current()) {
+    return reference::countTrue("any(n, f)", n, f, at) != 0;
   }
   template <class F>
-  int64_t count(int64_t n, F &&f, Place at = Place::current()) {
-    return sum("count(n, f)", n, f, at);
+  bool all(int64_t n, F &&f,
+           reference::Place at = reference::Place::current()) {
+    return reference::countTrue("all(n, f)", n, f, at) == n;
+  }
+  template <class F>
+  int64_t count(int64_t n, F &&f,
+                reference::Place at = reference::Place::current()) {
+    return reference::countTrue("count(n, f)", n, f, at);
   }
   template <class T, class F, class Op>
-  T reduce(int64_t n, F &&f, Op op, T empty, Place at = Place::current()) {
+  T reduce(int64_t n, F &&f, Op op, T empty,
+           reference::Place at = reference::Place::current()) {
     std::vector<T> values(n);
-    outside("reduce(n, f)", at).parallelFor(n, [&](int64_t i) {
-      values[i] = f(static_cast<int>(i));
-    });
+    reference::frameOutsideLoop("reduce(n, f)", at)
+        .parallelFor(n, [&](int64_t i) { values[i] = f(static_cast<int>(i)); });
     return reference::reduceTree(std::move(values), op, empty);
   }
 
 protected:
   BasicStage() {
     if (auto *members = reference::membersUnderConstruction())
-      members->push_back({&node, reference::typeOf<In>()});
-  }
-
-private:
-  template <class> friend class Pipe;
-  reference::Node *node = nullptr; ///< set by the pipeline
-
-  /// The executor, which is at a call of the language.
-  reference::Executor &executor(const char *what, const Place &at) const {
-    reference::Executor *running = reference::Executor::current();
-    if (!running || !running->frame)
-      throw Error(std::string(what) + " outside a running pipeline");
-    running->frame->at = at;
-    return *running;
-  }
-  /// The same, outside parallelFor.
-  reference::Executor &outside(const char *what, const Place &at) const {
-    reference::Executor &running = executor(what, at);
-    const reference::Frame &call = *running.frame;
-    if (call.loop)
-      call.node->fail(call.bin, std::string("expected ") + what +
-                                    " outside a parallelFor");
-    return running;
-  }
-  reference::Frame &here(const char *what, const Place &at) const {
-    return *executor(what, at).frame;
-  }
-  reference::Frame &inBin(const char *what, const Place &at) const {
-    reference::Frame &call = here(what, at);
-    if (call.phase == reference::Phase::Assign)
-      call.node->fail(-1, std::string(what) + " in assignBin");
-    return call;
-  }
-  reference::Frame &inSchedule(const char *what, const Place &at) const {
-    return executor(what, at).expect(reference::Phase::Schedule, what);
-  }
-  reference::Frame &inList(const char *what, const Place &at) const {
-    reference::Frame &call = inSchedule(what, at);
-    if (!call.node->takesList)
-      call.node->fail(call.bin, std::string("expected ") + what +
-                                    " only in a stage that takes a list");
-    return call;
-  }
-
-  template <class T> void emitAs(const T &value, int port, const Place &at) {
-    reference::Executor &running = executor("emit", at);
-    if (const char *field = reference::findUnwritten(value))
-      running.frame->node->fail(
-          running.frame->bin,
-          reference::unwrittenText(field, reference::typeName<T>()));
-    running.emit(port, reference::typeOf<T>(), &value);
-  }
-
-  void assignBox(reference::Cell lo, reference::Cell hi, const Place &at) {
-    reference::Executor &running = executor("assignToBoundingBox", at);
-    const reference::Grid &grid =
-        running.expect(reference::Phase::Assign, "assignToBoundingBox")
-            .node->grid;
-    reference::Cell first{}, last{};
-    for (int d = 0; d < 4; ++d) {
-      lo[d] = d < rank ? std::max<int64_t>(lo[d], 0) : 0;
-      hi[d] = d < rank ? std::min<int64_t>(hi[d], grid.domain[d] - 1) : 0;
-      if (lo[d] > hi[d])
-        return;
-      first[d] = lo[d] / grid.size[d];
-      last[d] = hi[d] / grid.size[d];
-    }
-    reference::Cell b;
-    for (b[3] = first[3]; b[3] <= last[3]; ++b[3])
-      for (b[2] = first[2]; b[2] <= last[2]; ++b[2])
-        for (b[1] = first[1]; b[1] <= last[1]; ++b[1])
-          for (b[0] = first[0]; b[0] <= last[0]; ++b[0])
-            running.assignBin(grid.bin(b));
-  }
-
-  static void checkOwnPixel(const reference::Frame &call,
-                            const reference::Cell &at) {
-    reference::Cell lo = call.node->grid.lo(call.bin);
-    reference::Cell hi = call.node->grid.hi(call.bin);
-    for (int d = 0; d < rank; ++d)
-      if (at[d] < lo[d] || at[d] >= hi[d])
-        call.node->fail(call.bin,
-                        "expected an update inside the stage's own bin, but "
-                        "got pixel " +
-                            reference::toText(at, rank));
-  }
-
-  int64_t iteration() const {
-    return reference::Executor::current()->frame->loop->iteration;
-  }
-
-  /// Gathers one value of each iteration and hands out what `combine` makes of
-  /// them.
-  template <class T, class Result, class Combine>
-  Result collective(const char *what, const Place &at, const T &value,
-                    Combine combine) {
-    reference::Executor &running = executor(what, at);
-    reference::Loop &loop = running.loopForSync(what);
-    bool first = loop.iteration == 0;
-    if (first)
-      loop.slots = std::vector<T>(loop.size, value);
-    else
-      std::any_cast<std::vector<T> &>(loop.slots)[loop.iteration] = value;
-    running.sync();
-    if (first) // the first to go on
-      loop.result = combine(std::any_cast<std::vector<T> &>(loop.slots));
-    return std::any_cast<Result &>(loop.result);
-  }
-
-  /// How often f(0), ..., f(n - 1) is true.
-  template <class F>
-  int64_t sum(const char *what, int64_t n, F &f, const Place &at) {
-    int64_t total = 0;
-    outside(what, at).parallelFor(
-        n, [&](int64_t i) { total += bool(f(static_cast<int>(i))); });
-    return total;
+      members->push_back({this, reference::typeOf<In>()});
   }
 };
 

@@ -41,6 +41,14 @@ def Piko_ScheduleKind : I32EnumAttr<"ScheduleKind", "where bins run", [
   let cppNamespace = "::piko";
 }
 
+def Piko_DivisionKind : I32EnumAttr<"DivisionKind", "integer division", [
+  I32EnumAttrCase<"QuotientS", 0, "quotient_signed">,
+  I32EnumAttrCase<"QuotientU", 1, "quotient_unsigned">,
+  I32EnumAttrCase<"RemainderS", 2, "remainder_signed">,
+  I32EnumAttrCase<"RemainderU", 3, "remainder_unsigned">]> {
+  let cppNamespace = "::piko";
+}
+
 def Piko_AtomicKind : I32EnumAttr<"AtomicKind", "atomic operation", [
   I32EnumAttrCase<"Add", 0, "add">,
   I32EnumAttrCase<"MinS", 1, "min_signed">,

@@ -42,6 +42,9 @@ class Piko_Op<string mnemonic, list<Trait> traits = []>
 def Piko_Scalar : AnyTypeOf<[F32, F64, I1, I8, I16, I32, I64],
                             "number of a C++ arithmetic type">;
 
+/// What C++ divides as an integer.
+def Piko_Divisible : AnyTypeOf<[I8, I16, I32, I64], "integer to divide">;
+
 /// A cell coordinate, as C++ code computes it.
 def Piko_Coordinate : AnyTypeOf<[I32, I64, Index],
                                 "cell coordinate (i32, i64 or index)">;

@@ -33,6 +33,39 @@ def Piko_GetOp : Piko_Op<"get", [
   let hasCanonicalizer = 1;
 }
 
+def Piko_DivideOp : Piko_Op<"divide", [
+    NoMemoryEffect, AllTypesMatch<["lhs", "rhs", "result"]>]> {
+  let summary = "an integer division, which may have no result";
+  let description = [{
+    A division by 0, and a signed one whose quotient is too large, is an error
+    when the pipeline runs, and gives 0. A division that nobody needs is none.
+    `of` and `assign` are as in `piko.load`. By a constant other than 0 and -1
+    it becomes one of `arith`.
+
+    ```mlir
+    %q = piko.divide quotient_signed %a, %b : i32
+    %r = piko.divide of "shade" remainder_unsigned %a, %b : i64
+    ```
+  }];
+  let arguments = (ins Piko_DivisionKind:$kind, Piko_Divisible:$lhs,
+                       Piko_Divisible:$rhs, OptionalAttr<StrAttr>:$of,
+                       UnitAttr:$assign);
+  let results = (outs Piko_Divisible:$result);
+  let assemblyFormat = [{
+    (`of` $of^)? (`assign` $assign^)? $kind $lhs `,` $rhs attr-dict
+    `:` type($result)
+  }];
+  let extraClassDeclaration = [{
+    bool isSigned() {
+      return getKind() == DivisionKind::QuotientS ||
+             getKind() == DivisionKind::RemainderS;
+    }
+    /// The same operation of arith, for operands with which it has a result.
+    ::mlir::Value createUnchecked(::mlir::OpBuilder &builder);
+  }];
+  let hasCanonicalizeMethod = 1;
+}
+
 def Piko_ListSizeOp : Piko_Op<"list_size", [Pure]> {
   let summary = "how many primitives a list has";
   let description = [{

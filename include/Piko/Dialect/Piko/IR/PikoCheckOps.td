@@ -163,4 +163,33 @@ def Piko_CheckValueOp : Piko_Op<"check_value"> {
   let assemblyFormat = "$kind $flag $field `of` $record attr-dict";
 }
 
+def Piko_CheckIndexOp : Piko_Op<"check_index"> {
+  let summary = "an index into an array, or 0 if it is outside";
+  let description = [{
+    Of a local array or of a field. An index outside is a finding, and what
+    follows goes on with the first element.
+
+    ```mlir
+    %inside = piko.check_index %i of 16
+    ```
+  }];
+  let arguments = (ins Index:$index, I64Attr:$size);
+  let results = (outs Index:$inside);
+  let assemblyFormat = "$index `of` $size attr-dict";
+}
+
+def Piko_CheckTripOp : Piko_Op<"check_trip"> {
+  let summary = "a loop of a phase goes round; whether it may";
+  let description = [{
+    The trips of all loops of a call are counted. Too many of them are a
+    finding, and from there on no loop goes on.
+
+    ```mlir
+    %may = piko.check_trip
+    ```
+  }];
+  let results = (outs I1:$may);
+  let assemblyFormat = "attr-dict";
+}
+
 #endif // PIKO_DIALECT_PIKO_IR_PIKOCHECKOPS_TD

@@ -228,4 +228,19 @@ def Piko_FailBarrierOp : Piko_Op<"fail_barrier"> {
   let assemblyFormat = "$stage (`in` $bin^)? `iteration` $iteration attr-dict";
 }
 
+def Piko_FailDivideOp : Piko_Op<"fail_divide"> {
+  let summary = "ends the run: an integer division has no result";
+  let description = [{
+    See `piko.fail`.
+
+    ```mlir
+    piko.fail_divide @shade in %b
+    piko.fail_divide @shade of "light"
+    ```
+  }];
+  let arguments = (ins FlatSymbolRefAttr:$stage, Optional<Index>:$bin,
+                       OptionalAttr<StrAttr>:$of);
+  let assemblyFormat = "$stage (`of` $of^)? (`in` $bin^)? attr-dict";
+}
+
 #endif // PIKO_DIALECT_PIKO_IR_PIKOSTATEOPS_TD
