@@ -123,6 +123,15 @@ void pikoir_declare_state(pikort_pipeline *p, int32_t id, const char *name,
   });
 }
 
+void pikoir_declare_written(pikort_pipeline *p, int32_t id) {
+  guarded(p, "setup", [&] {
+    expect(id >= 0 && id < static_cast<int32_t>(p->states.size()) &&
+               p->states[id].kind == PIKORT_BUFFER,
+           "expected the number of a buffer, but got " + std::to_string(id));
+    p->states[id].written = true;
+  });
+}
+
 void pikoir_declare_stage(pikort_pipeline *p, int32_t id, const char *name,
                           int32_t record, const int64_t *binSize,
                           int32_t schedule, int64_t tileSplit, int32_t flags,

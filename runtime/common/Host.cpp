@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <functional>
 #include <omp.h>
 
 using namespace piko::rt;
@@ -304,11 +305,56 @@ static void checkBound(const pikort_pipeline &p) {
                                         std::to_string(s) + " is not bound"};
 }
 
+/// Bytes of the host's, from `data` on.
+struct HostMemory {
+  const uint8_t *data;
+  int64_t size;
+};
+
+static HostMemory memoryOf(const pikort_pipeline &p, const State &state) {
+  bool isHosts = state.kind == PIKORT_BUFFER && state.perSource < 0;
+  return isHosts ? HostMemory{state.view.data,
+                              state.view.extent[0] * p.records[state.record].size}
+                 : HostMemory{nullptr, 0};
+}
+
+static bool overlap(HostMemory a, HostMemory b) {
+  std::less<> isBefore; // of unrelated pointers, too
+  return a.size > 0 && b.size > 0 && isBefore(a.data, b.data + b.size) &&
+         isBefore(b.data, a.data + a.size);
+}
+
+/// Generated code takes what it writes to be apart from what else it reads.
+static void checkApart(const pikort_pipeline &p) {
+  auto fail = [&](const State &written, const std::string &other) {
+    throw Failure{PIKORT_INVALID_ARGUMENT,
+                  "pipeline " + quoted(p.name) + ": expected buffer " +
+                      quoted(written.name) +
+                      ", which is written, to be apart from " + other +
+                      ", but they share memory"};
+  };
+  for (const State &written : p.states) {
+    if (!written.written)
+      continue;
+    HostMemory memory = memoryOf(p, written);
+    for (const State &state : p.states)
+      if (&state != &written && overlap(memory, memoryOf(p, state)))
+        fail(written, "buffer " + quoted(state.name));
+    for (size_t s = 0; s < p.sources.size(); ++s) {
+      const Source &source = p.sources[s];
+      int64_t size = p.records[p.stages[source.stage].record].size;
+      if (overlap(memory, {source.data, source.count * size}))
+        fail(written, "source " + std::to_string(s));
+    }
+  }
+}
+
 int32_t pikort_run(pikort_pipeline *p) {
   if (p)
     p->profile.begin();
   int32_t code = call(p, [&] {
     checkBound(*p);
+    checkApart(*p);
     p->computeGrids();
     prepareState(*p);
     p->profile.enter(Part::Program);

@@ -58,6 +58,7 @@ struct State {
   std::string name;
   int32_t kind = 0, record = 0, rank = 0, perSource = -1;
   bool bound = false;
+  bool written = false;       ///< A buffer that kernels change.
   std::vector<uint8_t> clear; ///< One record, or empty.
   std::vector<uint8_t> bytes; ///< A constant's.
   Array<uint8_t> owned;       ///< An image's, or of a buffer that we allocate.

@@ -21,6 +21,12 @@ PipelineNumbers::PipelineNumbers(PipelineOp pipeline) : pipeline(pipeline) {
   for (Operation &op : *pipeline.getBodyBlock())
     if (getStateRecord(&op))
       states[SymbolTable::getSymbolName(&op)] = states.size();
+  auto note = [&](auto access) {
+    if (isa<BufferOp>(SymbolTable::lookupSymbolIn(pipeline, access.getState())))
+      writtenBuffers.insert(access.getStateAttr().getAttr());
+  };
+  pipeline.walk([&](StoreOp store) { note(store); });
+  pipeline.walk([&](AtomicOp atomic) { note(atomic); });
 }
 
 std::optional<int64_t> PipelineNumbers::cycleOf(func::FuncOp kernel) const {

@@ -20,6 +20,8 @@ namespace piko {
 struct PipelineNumbers {
   PipelineOp pipeline;
   llvm::MapVector<mlir::StringAttr, int32_t> stages, states, records;
+  /// Buffers that kernels change.
+  llvm::DenseSet<mlir::StringAttr> writtenBuffers;
 
   explicit PipelineNumbers(PipelineOp pipeline);
 

@@ -163,6 +163,8 @@ void SetupWriter::declareState(Operation *state, int32_t number) {
         : constant
             ? recordBytes(constant.getRecordAttr(), constant.getValueAttr())
             : null()});
+  if (numbers.writtenBuffers.contains(SymbolTable::getSymbolName(state)))
+    call("pikoir_declare_written", {i32(number)});
 }
 
 /// pikoir_stage_flags

@@ -87,6 +87,9 @@ PIKORT_API void pikoir_declare_state(pikort_pipeline *p, int32_t id,
                                      const char *name, int32_t kind,
                                      int32_t record, int32_t rank,
                                      int32_t per_source, const void *clear);
+/// Kernels write the buffer: what the host binds to it must be apart from other
+/// buffers and sources, as generated code takes for granted.
+PIKORT_API void pikoir_declare_written(pikort_pipeline *p, int32_t id);
 /// `bin_size` has one entry for each dimension, 0 = the whole domain.
 /// `cell_size` is the side of owner tiles in a bin, 0 = the bin is one cell.
 PIKORT_API void pikoir_declare_stage(pikort_pipeline *p, int32_t id,

@@ -20,12 +20,13 @@ STAGE = """
     scan sort bin binLo binHi binFromPosition domain state BasicStage Stage
     Uses"""
 PIPE = """
-    source connect allocateForSource state setDomain feed run setLoopLimit
+    source connect allocateForSource state setDomain feed run tryRun
+    setLoopLimit setThreads setMemoryLimit setMemoryBudget setStripSize
     expectNumbers nameState Pipe"""
 NAMESPACE = """
     All BasicStage BinId Bins Buffer Cells DirectMap Error Image InLineage List
     LoadBalance NoState Order Pipe Position SchedulePolicy Serialize Stage
-    Unordered Uses acos asin atan atan2 atomicAdd atomicAddFetch atomicAnd
+    Status Unordered Uses acos asin atan atan2 atomicAdd atomicAddFetch atomicAnd
     atomicMax atomicMin atomicOr atomicXor cbrt cos cosh exp exp2 fma hypot log
     log10 log2 max min pow rsqrt sin sinh sqrt tan tanh toInt toInt64 toUint"""
 # Of namespaces, which are no names for functions; piko.h needs the others.
