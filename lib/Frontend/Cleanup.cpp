@@ -171,7 +171,9 @@ static bool checkLoops(llvm::Function &function, const ParsedUnit &unit,
                        mlir::MLIRContext &context) {
   llvm::DominatorTree dominance(function);
   llvm::LoopInfo loops(dominance);
-  for (llvm::Loop *loop : llvm::reverse(loops.getLoopsInPreorder())) {
+  // The innermost ones first.
+  auto ordered = loops.getLoopsInPreorder();
+  for (llvm::Loop *loop : llvm::reverse(ordered)) {
     if (!loop->hasNoExitBlocks())
       continue;
     const llvm::Instruction *at = loop->getHeader()->getTerminator();

@@ -43,8 +43,8 @@ def Piko_DivideOp : Piko_Op<"divide", [
     it becomes one of `arith`.
 
     ```mlir
-    %q = piko.divide quotient_signed %a, %b : i32
-    %r = piko.divide of "shade" remainder_unsigned %a, %b : i64
+    %q = piko.divide quotient_signed %x, %y : i32
+    %r = piko.divide of "shade" remainder_unsigned %mark, %split : i64
     ```
   }];
   let arguments = (ins Piko_DivisionKind:$kind, Piko_Divisible:$lhs,
