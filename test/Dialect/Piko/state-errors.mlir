@@ -380,3 +380,96 @@ piko.pipeline @P rank 1 {
     %old = piko.atomic add @b[%x : i32] "n", %x : i32 -> i64
   }
 }
+
+// -----
+
+piko.record @C {"n" : i32 at 0} size 4 align 4
+piko.pipeline @P rank 1 {
+  piko.buffer @b : @C
+  piko.source @a
+  piko.stage @a bins [4] threads 1 : @C -> [] {
+    piko.assign {
+    ^bb0(%p: !piko.prim<@C>):
+      %x = piko.get %p "n" : !piko.prim<@C> -> i32
+      // expected-error @below {{'piko.store' op expected to be inside a process phase, because only process phases may change state}}
+      piko.store %x, @b[%x : i32] "n" : i32
+      piko.assign_all
+      piko.return
+    }
+    piko.process {
+    ^bb0(%p: !piko.prim<@C>):
+      piko.return
+    }
+  }
+}
+
+// -----
+
+// A phase in a kernel is told from another as well.
+piko.record @C {"n" : i32 at 0} size 4 align 4
+piko.pipeline @P rank 1 {
+  piko.buffer @b : @C
+  piko.source @a
+  piko.stage @a bins [4] threads 1 : @C -> [] {
+    piko.schedule serialize
+  }
+  piko.kernel @k {
+    piko.assign of @a source 0 {
+    ^bb0(%p: !piko.prim<@C>):
+      %x = piko.get %p "n" : !piko.prim<@C> -> i32
+      %true = arith.constant true
+      scf.if %true {
+        // expected-error @below {{'piko.atomic' op expected to be inside a process phase, because only process phases may change state}}
+        piko.atomic add @b[%x : i32] "n", %x : i32
+      }
+      piko.assign_all
+      piko.return
+    }
+  }
+}
+
+// -----
+
+piko.record @C {"n" : i32 at 0} size 4 align 4
+piko.pipeline @P rank 1 {
+  piko.buffer @b : @C
+  piko.source @a
+  piko.stage @a bins [0] threads 1 : @C -> [] {
+    piko.schedule load_balance dynamic {
+    ^bb0(%bin: index):
+      %x = arith.constant 1 : i32
+      // expected-error @below {{'piko.store' op expected to be inside a process phase, because only process phases may change state}}
+      piko.store %x, @b[%x : i32] "n" : i32
+      piko.return
+    }
+    piko.process {
+    ^bb0(%p: !piko.prim<@C>):
+      piko.return
+    }
+  }
+}
+
+// -----
+
+piko.record @C {"n" : i32 at 0} size 4 align 4
+piko.pipeline @P rank 1 {
+  piko.image @i : @C rank 1
+  piko.source @a
+  piko.stage @a bins [4] threads 1 : @C -> [] {
+    piko.assign {
+    ^bb0(%p: !piko.prim<@C>):
+      %x = piko.get %p "n" : !piko.prim<@C> -> i32
+      // expected-error @below {{'piko.update' op expected to be inside a process phase, because only process phases may change state}}
+      piko.update @i[%x : i32] {
+      ^bb0(%old: i32):
+        piko.yield [%old : i32]
+      }
+      piko.assign_all
+      piko.return
+    }
+    piko.process {
+    ^bb0(%p: !piko.prim<@C>):
+      piko.return
+    }
+  }
+}

@@ -2,6 +2,7 @@
 //
 // Primitives and bins.
 
+#include "FieldAccess.h"
 #include "Piko/Dialect/Piko/IR/Piko.h"
 
 #include "mlir/Dialect/Arith/IR/Arith.h"
@@ -12,8 +13,11 @@ using namespace mlir;
 using namespace piko;
 
 LogicalResult GetOp::verifySymbolUses(SymbolTableCollection &) {
-  return verifyFieldAccess(*this, getPrim().getType().getRecord(), getField(),
-                           getElements().size(), getResult().getType());
+  FlatSymbolRefAttr record = getPrim().getType().getRecord();
+  if (failed(verifyFieldAccess(*this, record, getField(), getElements().size(),
+                               getResult().getType())))
+    return failure();
+  return verifyElement(*this, record, getField(), getElements());
 }
 
 namespace {

@@ -2,9 +2,11 @@
 //
 // The dialect's types and attributes, and look-ups that its operations share.
 
+#include "FieldAccess.h"
 #include "Piko/Dialect/Piko/IR/PikoCheck.h"
 
 #include "mlir/IR/DialectImplementation.h"
+#include "mlir/IR/Matchers.h"
 #include "llvm/ADT/TypeSwitch.h"
 
 using namespace mlir;
@@ -207,6 +209,24 @@ LogicalResult piko::verifyFieldAccess(Operation *op,
     return op->emitOpError("expected field '")
            << name << "' to be of type " << field.getType() << ", but got "
            << type;
+  return success();
+}
+
+LogicalResult piko::verifyElement(Operation *op, FlatSymbolRefAttr record,
+                                  StringRef name, ValueRange indices) {
+  // What a phase reaches only under a condition may never run.
+  if (!isa_and_nonnull<StageOp>(op->getParentOp()->getParentOp()))
+    return success();
+  FieldAttr field = lookupRecord(op, record).getField(name);
+  for (auto [index, count] : llvm::zip(indices, field.getCounts())) {
+    APInt constant;
+    if (!matchPattern(index, m_ConstantInt(&constant)) ||
+        (constant.getSExtValue() >= 0 && constant.getSExtValue() < count))
+      continue;
+    return op->emitOpError("expected an index into field '")
+           << name << "' of at least 0 and below " << count << ", but got "
+           << constant.getSExtValue();
+  }
   return success();
 }
 

@@ -104,6 +104,32 @@ LogicalResult ScheduleOp::verifySymbolUses(SymbolTableCollection &) {
   return success();
 }
 
+/// The dialects of memory and functions may be unknown here, so that their
+/// operations are told by name.
+static LogicalResult verifyInPhase(Operation *op) {
+  StringRef name = op->getName().getStringRef();
+  if (name == "func.call" || name == "func.call_indirect")
+    return op->emitError("expected the body of the function in its place, "
+                         "because a phase cannot call functions");
+  // It would be on the heap, for each primitive.
+  if (name == "memref.alloc" || name == "memref.realloc")
+    return op->emitError("expected a private array, which is a memref.alloca "
+                         "of constant size, but got ")
+           << name;
+  // Its size would have to be found anew, and stack taken, for each primitive.
+  if (name == "memref.alloca" && op->getNumOperands() != 0)
+    return op->emitError("expected a private array of constant size");
+  return success();
+}
+
+static LogicalResult verifyPhaseBody(Operation *phase) {
+  WalkResult result = phase->walk([](Operation *op) {
+    return failed(verifyInPhase(op)) ? WalkResult::interrupt()
+                                     : WalkResult::advance();
+  });
+  return failure(result.wasInterrupted());
+}
+
 LogicalResult ScheduleOp::verifyRegions() {
   if (getBody().empty())
     return success();
@@ -112,6 +138,8 @@ LogicalResult ScheduleOp::verifyRegions() {
     return emitOpError("expected one block argument of type 'index'");
   if (!isa<ReturnOp>(body.getTerminator()))
     return emitOpError("expected its body to end with piko.return");
+  if (failed(verifyPhaseBody(*this)))
+    return failure();
   // It runs before the pipeline does.
   WalkResult result = walk([&](LoadOp load) {
     if (lookupInPipeline<ConstantOp>(load, load.getStateAttr()))
@@ -156,7 +184,7 @@ static LogicalResult verifyPhase(PhaseOp phase, bool isProcess) {
   if (body.getNumArguments() != 1 || body.getArgument(0).getType() != expected)
     return phase.emitOpError("expected one block argument of type ")
            << expected;
-  return success();
+  return verifyPhaseBody(phase);
 }
 
 LogicalResult AssignOp::verifyRegions() {
@@ -169,15 +197,5 @@ LogicalResult AssignOp::verifyRegions() {
 }
 
 LogicalResult ProcessOp::verifyRegions() {
-  if (failed(verifyPhase(*this, /*isProcess=*/true)))
-    return failure();
-  // Its size would have to be found anew, and stack taken, for each primitive.
-  WalkResult result = walk([](Operation *op) {
-    if (op->getName().getStringRef() != "memref.alloca" ||
-        op->getNumOperands() == 0)
-      return WalkResult::advance();
-    op->emitError("expected a private array of constant size");
-    return WalkResult::interrupt();
-  });
-  return failure(result.wasInterrupted());
+  return verifyPhase(*this, /*isProcess=*/true);
 }

@@ -2,6 +2,7 @@
 //
 // Access to a pipeline's state.
 
+#include "FieldAccess.h"
 #include "Piko/Dialect/Piko/IR/Piko.h"
 
 using namespace mlir;
@@ -29,12 +30,25 @@ static LogicalResult verifyAccess(AccessOp op, Type type) {
   auto state = verifyState(op, op.getStateAttr(), op.getIndices().size());
   if (failed(state))
     return failure();
-  return verifyFieldAccess(op, getStateRecord(*state), op.getField(),
-                           op.getElements().size(), type);
+  FlatSymbolRefAttr record = getStateRecord(*state);
+  if (failed(verifyFieldAccess(op, record, op.getField(),
+                               op.getElements().size(), type)))
+    return failure();
+  return verifyElement(op, record, op.getField(), op.getElements());
+}
+
+/// The reference gives assign and schedule phases the state as it is.
+static LogicalResult verifyMayChange(Operation *op) {
+  if (op->getParentOfType<AssignOp>() || op->getParentOfType<ScheduleOp>())
+    return op->emitOpError("expected to be inside a process phase, because "
+                           "only process phases may change state");
+  return success();
 }
 
 template <typename AccessOp>
 static LogicalResult verifyWrite(AccessOp op, Type type) {
+  if (failed(verifyMayChange(op)))
+    return failure();
   if (lookupInPipeline<ConstantOp>(op, op.getStateAttr()))
     return op.emitOpError(
                "expected a buffer or an image, but got the constant ")
@@ -101,10 +115,10 @@ LogicalResult UpdateOp::verifyRegions() {
       image ? lookupRecord(image, image.getRecordAttr()) : RecordOp();
   if (!record)
     return success(); // verifySymbolUses reports it
+  if (failed(verifyMayChange(*this)))
+    return failure();
   if (!(*this)->getParentOfType<ProcessOp>() &&
       !(*this)->getParentOfType<KernelOp>())
-    return emitOpError("expected to be inside a process phase");
-  if ((*this)->getParentOfType<AssignOp>())
     return emitOpError("expected to be inside a process phase");
   SmallVector<Type> types = record.getElementTypes();
   Block &body = getBody().front();
