@@ -20,6 +20,10 @@ def Piko_RecordOp : Piko_Op<"record", [Symbol, HasParent<"::mlir::ModuleOp">]> {
     piko.record @Fragment {"pos.x" : f32 at 0, "pos.y" : f32 at 4,
                            "weights" : f32[4 : 4] at 8} size 24 align 4
     ```
+
+    Each number is aligned to its size, and no byte is of two. What C++ calls the
+    types of the fields, for the headers of hosts, is said by the attribute
+    [`piko.cpp_types`](Piko.md#records-keep-the-byte-layout-of-c).
   }];
   let arguments = (ins SymbolNameAttr:$sym_name, Piko_FieldArrayAttr:$fields,
                        Piko_I64Attr:$size, Piko_I64Attr:$align);
