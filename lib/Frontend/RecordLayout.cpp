@@ -200,6 +200,12 @@ LogicalResult RecordTable::flatten(QualType type, const Path &path,
       return reject(path, record, "a pointer or reference");
     return reject(path, record, "a value of type '" + getName(type) + "'");
   }
+  // Compiled code reads and writes numbers as aligned ones.
+  int64_t size = ast.getTypeSizeInChars(type).getQuantity();
+  auto isAligned = [&](int64_t bytes) { return bytes % size == 0; };
+  if (!isAligned(record.align) || !isAligned(path.offset) ||
+      !llvm::all_of(path.strides, isAligned))
+    return reject(path, record, "a packed member");
   record.fields.push_back(
       {path.name, *scalar, path.offset, path.counts, path.strides});
   if (!path.isKnown)

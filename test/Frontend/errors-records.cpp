@@ -8,6 +8,8 @@
 // RUN: not piko-translate --cpp-to-piko --pipe=Pipe5 %s 2>&1 | FileCheck %s --check-prefix=STATE
 // RUN: not piko-translate --cpp-to-piko --pipe=Pipe6 %s 2>&1 | FileCheck %s --check-prefix=ARRAY
 // RUN: not piko-translate --cpp-to-piko --pipe=Pipe7 %s 2>&1 | FileCheck %s --check-prefix=VECTOR
+// RUN: not piko-translate --cpp-to-piko --pipe=Pipe8 %s 2>&1 | FileCheck %s --check-prefix=PACKED
+// RUN: not piko-translate --cpp-to-piko --pipe=Pipe9 %s 2>&1 | FileCheck %s --check-prefix=PRAGMA
 #include <piko.h>
 #include <string>
 #include <vector>
@@ -29,6 +31,17 @@ struct Bits {
   // BITFIELD: errors-records.cpp:[[#@LINE + 1]]:7: error: not supported in Piko: a bit-field in type 'Bits', member 'flag'
   int flag : 1;
 };
+struct __attribute__((packed)) Packed {
+  char kind;
+  // PACKED: errors-records.cpp:[[#@LINE + 1]]:9: error: not supported in Piko: a packed member in type 'Packed', member 'depth'
+  float depth;
+};
+#pragma pack(push, 4)
+struct Four {
+  // PRAGMA: errors-records.cpp:[[#@LINE + 1]]:10: error: not supported in Piko: a packed member in type 'Four', member 'depth'
+  double depth;
+};
+#pragma pack(pop)
 struct Owner {
   // TRIVIAL-DAG: errors-records.cpp:[[#@LINE + 1]]:3: note: this constructor of 'Owner' is not trivial
   Owner(const Owner &);
@@ -72,3 +85,5 @@ using Pipe4 = Pipeline<Owner>;
 using Pipe5 = WithState<PointerState>;
 using Pipe6 = WithState<ArrayState>;
 using Pipe7 = Pipeline<Mesh>;
+using Pipe8 = Pipeline<Packed>;
+using Pipe9 = Pipeline<Four>;

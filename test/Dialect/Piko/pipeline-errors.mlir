@@ -171,3 +171,40 @@ piko.record @F {} size 12 align 8
 
 // expected-error@+1 {{expected each field once, but got 'x' twice}}
 piko.record @F {"x" : f32 at 0, "x" : f32 at 4} size 8 align 4
+
+// -----
+
+// expected-error@+1 {{expected field 'y' of type 'f32' to be at a multiple of 4, but got 10}}
+piko.record @F {"x" : i32 at 0, "y" : f32 at 10} size 16 align 4
+
+// -----
+
+// expected-error@+1 {{expected an alignment of at least 8, because of field 'x', but got 4}}
+piko.record @F {"x" : f64 at 0} size 8 align 4
+
+// -----
+
+// expected-error@+1 {{expected the strides of field 'x' to be multiples of 4, but got 6}}
+piko.record @F {"x" : f32[3 : 6] at 0} size 20 align 4
+
+// -----
+
+// expected-error@+1 {{expected field 'y' to lie beside field 'x', but both have byte 4}}
+piko.record @F {"x" : i32 at 4, "y" : f32 at 4, "z" : i8 at 0} size 8 align 4
+
+// -----
+
+// A number inside another one.
+// expected-error@+1 {{expected field 'b' to lie beside field 'x', but both have byte 6}}
+piko.record @F {"b" : i8 at 6, "x" : f32 at 4} size 8 align 4
+
+// -----
+
+// The third number of `x` and the second of `y`.
+// expected-error@+1 {{expected field 'y' to lie beside field 'x', but both have byte 16}}
+piko.record @F {"x" : f32[3 : 8] at 0, "y" : f32[2 : 12] at 4} size 20 align 4
+
+// -----
+
+// expected-error@+1 {{expected the numbers of field 'x' to lie side by side, but got two at 4}}
+piko.record @F {"x" : f32[2 : 4, 2 : 4] at 0} size 16 align 4

@@ -35,6 +35,105 @@ SmallVector<int64_t> RecordOp::getElementOffsets() {
   return offsets;
 }
 
+static int64_t getNumberSize(FieldAttr field) {
+  return field.getType().getIntOrFloatBitWidth() / 8;
+}
+
+/// The bytes of a field's numbers, from the first to the last.
+static std::pair<int64_t, int64_t> getExtent(FieldAttr field) {
+  return {field.getOffset(),
+          field.getElementOffset(field.getElementCount() - 1) +
+              getNumberSize(field)};
+}
+
+/// Compiled code reads and writes numbers where the machine does it best.
+static LogicalResult verifyAligned(RecordOp record, FieldAttr field) {
+  int64_t size = getNumberSize(field);
+  if (int64_t(record.getAlign()) % size)
+    return record.emitOpError("expected an alignment of at least ")
+           << size << ", because of field '" << field.getName() << "', but got "
+           << record.getAlign();
+  if (field.getOffset() % size)
+    return record.emitOpError("expected field '")
+           << field.getName() << "' of type " << field.getType()
+           << " to be at a multiple of " << size << ", but got "
+           << field.getOffset();
+  for (int64_t stride : field.getStrides())
+    if (stride % size)
+      return record.emitOpError("expected the strides of field '")
+             << field.getName() << "' to be multiples of " << size
+             << ", but got " << stride;
+  return success();
+}
+
+/// Whether the numbers of a field come in the order of their indices and leave
+/// each other alone.
+static bool isRowMajor(FieldAttr field) {
+  int64_t inner = getNumberSize(field);
+  for (auto [count, stride] :
+       llvm::reverse(llvm::zip(field.getCounts(), field.getStrides()))) {
+    if (stride < inner)
+      return false;
+    inner = (count - 1) * stride + inner;
+  }
+  return true;
+}
+
+/// No byte is of two numbers. `fields` are those between whose first and last
+/// byte others lie, as in an array of structs.
+static LogicalResult verifyDisjoint(RecordOp record,
+                                    ArrayRef<FieldAttr> fields) {
+  struct Number {
+    int64_t begin, end;
+    FieldAttr field;
+  };
+  SmallVector<Number> numbers;
+  for (FieldAttr field : fields)
+    for (int64_t i = 0, e = field.getElementCount(); i < e; ++i) {
+      int64_t begin = field.getElementOffset(i);
+      numbers.push_back({begin, begin + getNumberSize(field), field});
+    }
+  llvm::sort(numbers, [](const Number &a, const Number &b) {
+    return std::pair(a.begin, a.field.getName()) <
+           std::pair(b.begin, b.field.getName());
+  });
+  for (size_t i = 1; i < numbers.size(); ++i) {
+    const Number &before = numbers[i - 1], &number = numbers[i];
+    if (number.begin >= before.end)
+      continue;
+    if (before.field == number.field)
+      return record.emitOpError("expected the numbers of field '")
+             << number.field.getName()
+             << "' to lie side by side, but got two at " << number.begin;
+    return record.emitOpError("expected field '")
+           << number.field.getName() << "' to lie beside field '"
+           << before.field.getName() << "', but both have byte "
+           << number.begin;
+  }
+  return success();
+}
+
+static LogicalResult verifyLayout(RecordOp record) {
+  auto fields = llvm::to_vector(record.getFields().getAsRange<FieldAttr>());
+  llvm::sort(fields, [](FieldAttr a, FieldAttr b) {
+    return std::pair(a.getOffset(), a.getName()) <
+           std::pair(b.getOffset(), b.getName());
+  });
+  // Numbers are looked at one by one only where the whole does not settle it.
+  for (size_t begin = 0, end; begin < fields.size(); begin = end) {
+    int64_t last = getExtent(fields[begin]).second;
+    for (end = begin + 1; end < fields.size() && fields[end].getOffset() < last;
+         ++end)
+      last = std::max(last, getExtent(fields[end]).second);
+    if (end == begin + 1 && isRowMajor(fields[begin]))
+      continue;
+    if (failed(
+            verifyDisjoint(record, ArrayRef(fields).slice(begin, end - begin))))
+      return failure();
+  }
+  return success();
+}
+
 LogicalResult RecordOp::verify() {
   int64_t size = getSize(), align = getAlign();
   if (size < 1)
@@ -48,13 +147,16 @@ LogicalResult RecordOp::verify() {
     if (!names.insert(field.getName()).second)
       return emitOpError("expected each field once, but got '")
              << field.getName() << "' twice";
-    int64_t last = field.getElementOffset(field.getElementCount() - 1);
-    int64_t end = last + (field.getType().getIntOrFloatBitWidth() + 7) / 8;
+    int64_t end = getExtent(field).second;
     if (end > size)
       return emitOpError("expected field '")
              << field.getName() << "' to end within the record's " << size
              << " bytes, but got " << end;
+    if (failed(verifyAligned(*this, field)))
+      return failure();
   }
+  if (failed(verifyLayout(*this)))
+    return failure();
   return verifyCppTypes(*this);
 }
 
