@@ -445,4 +445,17 @@ TEST(Create, RejectsBadPrograms) {
   pikort_destroy(nullptr);
 }
 
+TEST(HostView, HasFourDimensions) {
+  std::vector<int> pixels(2 * 3 * 4 * 5);
+  for (size_t i = 0; i < pixels.size(); ++i)
+    pixels[i] = static_cast<int>(i);
+  piko::rt::View<int> view{pixels, {2, 3, 4, 5}};
+  int next = 0;
+  for (int w = 0; w < 5; ++w)
+    for (int z = 0; z < 4; ++z)
+      for (int y = 0; y < 3; ++y)
+        for (int x = 0; x < 2; ++x)
+          EXPECT_EQ(view(x, y, z, w), next++);
+}
+
 } // namespace

@@ -34,8 +34,9 @@ using piko::Status;
 template <class T> struct View {
   std::span<T> elements;
   int64_t extent[4] = {0, 0, 0, 0};
-  T &operator()(int64_t x, int64_t y = 0, int64_t z = 0) const {
-    return elements[static_cast<size_t>((z * extent[1] + y) * extent[0] + x)];
+  T &operator()(int64_t x, int64_t y = 0, int64_t z = 0, int64_t w = 0) const {
+    int64_t row = (w * extent[2] + z) * extent[1] + y;
+    return elements[static_cast<size_t>(row * extent[0] + x)];
   }
 };
 
