@@ -265,7 +265,8 @@ void FormStripsPass::refuse(StageOp stage, const Reason &reason) {
   InFlightDiagnostic remark = stage.emitRemark()
                               << "stage '" << stage.getSymName()
                               << "' does not run in strips: " << reason.text;
-  if (reason.culprit)
+  // The front end has one place for a stage and its schedule.
+  if (reason.culprit && reason.culprit->getLoc() != stage.getLoc())
     remark.attachNote(reason.culprit->getLoc()) << "because of this";
   ++refused;
 }

@@ -117,6 +117,22 @@ piko.pipeline @EndBin rank 1 {
 
 // -----
 
+// From C++ a schedule has the place of its stage, which the remark has named.
+piko.record @F {"x" : i32 at 0} size 4 align 4
+piko.pipeline @OnePlace rank 1 {
+  piko.source @a
+  // expected-remark @unknown {{stage 'a' does not run in strips: it waits until nothing can reach its bins}}
+  piko.stage @a bins [0] threads 1 : @F -> [] {
+    piko.schedule load_balance end_bin loc(unknown)
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      piko.return
+    }
+  } loc(unknown)
+}
+
+// -----
+
 piko.record @F {"x" : i32 at 0} size 4 align 4
 piko.pipeline @Bins rank 1 {
   piko.source @first
