@@ -22,10 +22,11 @@ struct PrefetchPass : piko::impl::PrefetchBase<PrefetchPass> {
   void convert(scf::ForOp loop, ItemOp item);
 };
 
-/// An element of state whose indices are fields of the primitive.
+/// An element of state whose indices are fields of the primitive, perhaps
+/// converted.
 struct Reference {
   FlatSymbolRefAttr state;
-  SmallVector<GetOp> fields;
+  SmallVector<Value> indices;
 };
 } // namespace
 
@@ -40,16 +41,28 @@ static ItemOp findItem(scf::ForOp loop) {
   return {};
 }
 
-/// The field that is an index as it is, or null.
+/// The field that is an index as it is, but for its width, or null.
 static GetOp findField(Value index, ItemOp item) {
   while (Operation *cast = index.getDefiningOp()) {
-    if (!isa<arith::IndexCastOp, arith::ExtSIOp>(cast))
+    if (!isa<arith::IndexCastOp, arith::IndexCastUIOp, arith::ExtSIOp,
+             arith::ExtUIOp>(cast))
       break;
     index = cast->getOperand(0);
   }
   auto get = index.getDefiningOp<GetOp>();
   return get && get.getPrim() == item && get.getElements().empty() ? get
                                                                    : GetOp();
+}
+
+/// Without conversions that a coordinate does not need.
+static Value dropConversions(Value index) {
+  while (Operation *cast = index.getDefiningOp()) {
+    if (!isa<arith::IndexCastOp, arith::ExtSIOp>(cast) ||
+        cast->getOperand(0).getType().getIntOrFloatBitWidth() < 32)
+      break;
+    index = cast->getOperand(0);
+  }
+  return index;
 }
 
 static int64_t countOperations(Region &region) {
@@ -86,16 +99,26 @@ static SmallVector<Reference> findReferences(scf::ForOp loop, ItemOp item) {
       GetOp field = findField(index, item);
       if (!field)
         return;
-      reference.fields.push_back(field);
+      reference.indices.push_back(dropConversions(index));
       names.push_back(field.getFieldAttr());
     }
     auto key = ArrayAttr::get(loop.getContext(), names);
-    if (reference.fields.empty() || known.contains(key) || isRare(load, loop))
+    if (reference.indices.empty() || known.contains(key) || isRare(load, loop))
       return;
     known.insert(key);
     references.push_back(reference);
   });
   return references;
+}
+
+/// The same index of another primitive.
+static Value cloneIndex(Value index, OpBuilder &builder, IRMapping &mapping) {
+  if (Value known = mapping.lookupOrNull(index))
+    return known;
+  Operation *op = index.getDefiningOp();
+  if (!isa<GetOp>(op))
+    cloneIndex(op->getOperand(0), builder, mapping);
+  return builder.clone(*op, mapping)->getResult(0);
 }
 
 void PrefetchPass::convert(scf::ForOp loop, ItemOp item) {
@@ -118,11 +141,8 @@ void PrefetchPass::convert(scf::ForOp loop, ItemOp item) {
   builder.clone(*item, mapping);
   for (Reference &reference : references) {
     SmallVector<Value> indices;
-    for (GetOp field : reference.fields) {
-      if (!mapping.contains(field.getResult()))
-        builder.clone(*field, mapping);
-      indices.push_back(mapping.lookup(field.getResult()));
-    }
+    for (Value index : reference.indices)
+      indices.push_back(cloneIndex(index, builder, mapping));
     PrefetchOp::create(builder, loc, reference.state, indices);
     ++elements;
   }

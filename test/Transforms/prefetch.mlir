@@ -123,3 +123,58 @@ piko.pipeline @P rank 1 {
     }
   }
 }
+
+piko.record @Narrow {"a" : i8 at 0, "b" : i16 at 2, "c" : i64 at 8} size 16 align 8
+
+// A field of another width is extended as for the access.
+// CHECK-LABEL: piko.pipeline @Widths
+// CHECK:       piko.kernel @kernel_bins
+// CHECK:           piko.prefetch_item
+// CHECK:           %[[ITEM:.*]] = piko.item
+// CHECK-NEXT:      %[[A:.*]] = piko.get %[[ITEM]] "a" : !piko.prim<@Narrow> -> i8
+// CHECK-NEXT:      %[[WIDE_A:.*]] = arith.extsi %[[A]] : i8 to i32
+// CHECK-NEXT:      piko.prefetch @vertices[%[[WIDE_A]] : i32]
+// CHECK-NEXT:      %[[B:.*]] = piko.get %[[ITEM]] "b" : !piko.prim<@Narrow> -> i16
+// CHECK-NEXT:      %[[WIDE_B:.*]] = arith.extui %[[B]] : i16 to i64
+// CHECK-NEXT:      piko.prefetch @vertices[%[[WIDE_B]] : i64]
+// CHECK-NEXT:      %[[C:.*]] = piko.get %[[ITEM]] "c" : !piko.prim<@Narrow> -> i64
+// CHECK-NEXT:      piko.prefetch @vertices[%[[C]] : i64]
+// CHECK-NOT:       piko.prefetch
+piko.pipeline @Widths rank 1 {
+  piko.buffer @vertices : @V
+  piko.buffer @out : @V
+  piko.source @all
+  piko.edge @all[0] -> @bins
+  piko.stage @all bins [0] threads 1 : @Narrow -> [@Narrow] {
+    piko.process {
+    ^bb0(%f: !piko.prim<@Narrow>):
+      %a = piko.get %f "a" : !piko.prim<@Narrow> -> i8
+      %b = piko.get %f "b" : !piko.prim<@Narrow> -> i16
+      %c = piko.get %f "c" : !piko.prim<@Narrow> -> i64
+      piko.emit 0 (%a, %b, %c) : i8, i16, i64
+      piko.return
+    }
+  }
+  piko.stage @bins bins [8] threads 1 : @Narrow -> [] {
+    piko.assign {
+    ^bb0(%f: !piko.prim<@Narrow>):
+      piko.assign_all
+      piko.return
+    }
+    piko.process {
+    ^bb0(%f: !piko.prim<@Narrow>):
+      %a = piko.get %f "a" : !piko.prim<@Narrow> -> i8
+      %wide_a = arith.extsi %a : i8 to i32
+      %b = piko.get %f "b" : !piko.prim<@Narrow> -> i16
+      %wide_b = arith.extui %b : i16 to i64
+      %c = piko.get %f "c" : !piko.prim<@Narrow> -> i64
+      %x = piko.load @vertices[%wide_a : i32] "x" : f32
+      %y = piko.load @vertices[%wide_b : i64] "x" : f32
+      %z = piko.load @vertices[%c : i64] "x" : f32
+      %0 = arith.addf %x, %y : f32
+      %1 = arith.addf %0, %z : f32
+      piko.store %1, @out[%c : i64] "x" : f32
+      piko.return
+    }
+  }
+}
