@@ -73,7 +73,7 @@ private:
 
 } // namespace
 
-/// Calls that mean nothing here.
+/// Calls that mean nothing here: lifetimes, and what optimizers may expect.
 static void dropHints(llvm::Function &function) {
   for (llvm::Instruction &instruction :
        llvm::make_early_inc_range(llvm::instructions(function))) {
@@ -81,6 +81,11 @@ static void dropHints(llvm::Function &function) {
     if (!call)
       continue;
     switch (call->getIntrinsicID()) {
+    case llvm::Intrinsic::expect:
+    case llvm::Intrinsic::expect_with_probability:
+      call->replaceAllUsesWith(call->getArgOperand(0));
+      call->eraseFromParent();
+      break;
     case llvm::Intrinsic::lifetime_start:
     case llvm::Intrinsic::lifetime_end:
     case llvm::Intrinsic::assume:
