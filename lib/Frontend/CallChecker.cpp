@@ -111,9 +111,8 @@ private:
     if (!callee)
       return true; // Known, or rejected, after inlining.
     if (llvm::StringRef math = getMathName(*callee); !math.empty())
-      return onlyAllocation || callee->getArg(0)->getType()->isFloatTy() ||
-             fail(call, math,
-                  "'" + math + "' of a double: Piko has only that of a float");
+      return onlyAllocation || getMissingMath(*callee).empty() ||
+             fail(call, math, getMissingMath(*callee));
     if (callee->isIntrinsic())
       return onlyAllocation || !isMachineBuiltin(*callee) ||
              fail(call, callee->getName(),

@@ -241,6 +241,7 @@ static bool cleanUpFunction(llvm::Function &function, ParsedUnit &unit,
     changed |= flattenPointers(function, memory);
     if (!expandLocalAtomics(function, unit, memory, context, changed))
       return false;
+    changed |= redirectMathCalls(function, unit, context);
     if (inlineKnownCalls(function)) {
       prepareFunction(function, unit, memory, context);
       changed = true;

@@ -3,6 +3,7 @@
 
 #include "CallChain.h"
 #include "Cleanup.h"
+#include "MathCalls.h"
 #include "PhaseImporter.h"
 #include "mlir/Dialect/ControlFlow/IR/ControlFlowOps.h"
 #include "llvm/ADT/PostOrderIterator.h"
@@ -137,6 +138,9 @@ LogicalResult PhaseImporter::importInstruction(llvm::Instruction *instruction) {
   if (auto *call = dyn_cast<llvm::CallInst>(instruction)) {
     if (llvm::isa<llvm::IntrinsicInst>(call) && call->getType()->isVoidTy())
       return success();
+    if (std::string math = getMissingMath(*call->getCalledFunction());
+        !math.empty())
+      return reject(instruction, math);
     return reject(instruction,
                   "a call of '" + call->getCalledFunction()->getName() + "'");
   }

@@ -14,10 +14,13 @@ constexpr llvm::StringLiteral mathPrefix = "__piko_math_";
 /// the f of float; empty if the function is not one.
 llvm::StringRef getMathName(const llvm::Function &function);
 
-/// Replaces calls of the C library's functions on float by calls of Piko's own,
-/// with a warning for each place in the user's text where the library's differ
-/// between machines. Minima and maxima become comparisons.
-void redirectMathCalls(llvm::Function &function, ParsedUnit &unit,
+/// Why such a function is not replaced; empty if it is.
+std::string getMissingMath(const llvm::Function &function);
+
+/// Replaces calls of the C library's functions by calls of Piko's own, with a
+/// warning for each place in the user's text where the library's differ between
+/// machines. Minima and maxima become comparisons. Whether there were any.
+bool redirectMathCalls(llvm::Function &function, ParsedUnit &unit,
                        mlir::MLIRContext &context);
 
 } // namespace piko

@@ -28,15 +28,15 @@ struct Stage : piko::Stage<0, 0, 1, A>, piko::Uses<State> {
     // PROMOTED: errors-math.cpp:[[#@LINE + 1]]:13: error: not supported in Piko: 'sin' of a double: Piko has only that of a float
     out.x = ::sin(a.x);
 #elif CASE == 3
-    // VECTOR: errors-math.cpp:[[#@LINE + 1]]:13: error: not supported in Piko: a call of 'exp'
+    // VECTOR: errors-math.cpp:[[#@LINE + 1]]:13: error: not supported in Piko: 'exp' of a double: Piko has only that of a float
     out.y = glm::exp(glm::dvec3(a.y)).y;
 #elif CASE == 4
     // LIBRARY: errors-math.cpp:[[#@LINE + 1]]:13: error: not supported in Piko: a call of 'erff', which has no body in this file
     out.x = std::erf(a.x);
 #else
     int exponent;
-    // RESULTS: errors-math.cpp:[[#@LINE + 1]]:13: error: not supported in Piko: 'frexp' of a double: Piko has only that of a float
-    out.y = std::frexp(a.y, &exponent);
+    // RESULTS: errors-math.cpp:[[#@LINE + 1]]:20: error: not supported in Piko: 'frexp' of a long double: Piko has only that of a float or a double
+    out.y = double(std::frexp(static_cast<long double>(a.y), &exponent));
 #endif
   }
 };

@@ -38,6 +38,38 @@ inline float fractionOf(float x) {
 
 inline float fdim(float x, float y) { return x <= y ? 0.0f : x - y; }
 
+/// The same of doubles, where no wider type holds the product: up to two exact
+/// steps, which stay away from what is denormal, leave an exponent in range.
+inline int exactStep(int n) { return n > 1023 ? 1023 : n < -1022 ? -969 : 0; }
+inline double powerOfTwo(int n) {
+  return fromBits(static_cast<uint64_t>(1023 + n) << 52);
+}
+inline double ldexp(double x, int n) {
+  int first = exactStep(n), second = exactStep(n - first);
+  int rest = clamp(n - first - second, -1022, 1023);
+  return x * powerOfTwo(first) * powerOfTwo(second) * powerOfTwo(rest);
+}
+inline bool hasExponent(double x) {
+  double size = __builtin_fabs(x);
+  return size > 0.0 && size < __builtin_inf();
+}
+inline bool isDenormal(double x) { return __builtin_fabs(x) < 0x1p-1022; }
+inline double makeNormal(double x) { return isDenormal(x) ? x * 0x1p54 : x; }
+inline int exponentOf(double x) {
+  int scaled = isDenormal(x) ? 54 : 0;
+  int exponent = static_cast<int>((bitsOf(makeNormal(x)) >> 52) & 2047);
+  return hasExponent(x) ? exponent - 1022 - scaled : 0;
+}
+inline double mantissaOf(double x) {
+  uint64_t bits = bitsOf(makeNormal(x)) & ~(uint64_t(2047) << 52);
+  return hasExponent(x) ? fromBits(bits | uint64_t(1022) << 52) : x;
+}
+inline double fractionOf(double x) {
+  double whole = __builtin_trunc(x);
+  return __builtin_copysign(x == whole ? 0.0 : x - whole, x);
+}
+inline double fdim(double x, double y) { return x <= y ? 0.0 : x - y; }
+
 } // namespace piko::detail
 
 #define PIKO_MATH(NAME, RESULT, PARAMETERS, VALUE)                             \
@@ -66,17 +98,27 @@ PIKO_MATH_2(pow)
 PIKO_MATH_2(atan2)
 PIKO_MATH_2(hypot)
 
-PIKO_MATH(fdim, float, (float x, float y), ::piko::detail::fdim(x, y))
-PIKO_MATH(ldexp, float, (float x, int n), ::piko::detail::ldexp(x, n))
-PIKO_MATH(lrint, int64_t, (float x), ::piko::toInt64(::piko::round(x)))
-PIKO_MATH(llrint, int64_t, (float x), ::piko::toInt64(::piko::round(x)))
-PIKO_MATH(lround, int64_t, (float x), ::piko::toInt64(__builtin_roundf(x)))
-PIKO_MATH(llround, int64_t, (float x), ::piko::toInt64(__builtin_roundf(x)))
-// Functions with two results, one by one.
-PIKO_MATH(frexp0, float, (float x), ::piko::detail::mantissaOf(x))
-PIKO_MATH(frexp1, int, (float x), ::piko::detail::exponentOf(x))
-PIKO_MATH(modf0, float, (float x), ::piko::detail::fractionOf(x))
-PIKO_MATH(modf1, float, (float x), __builtin_truncf(x))
+// Of floats and of doubles. A cast to an integer saturates here.
+#define PIKO_MATH_EXACT(TYPE, SUFFIX, ROUND, ROUND_EVEN, TRUNC)                \
+  PIKO_MATH(fdim##SUFFIX, TYPE, (TYPE x, TYPE y), ::piko::detail::fdim(x, y))  \
+  PIKO_MATH(ldexp##SUFFIX, TYPE, (TYPE x, int n), ::piko::detail::ldexp(x, n)) \
+  PIKO_MATH(lrint##SUFFIX, int64_t, (TYPE x),                                  \
+            static_cast<int64_t>(ROUND_EVEN(x)))                               \
+  PIKO_MATH(llrint##SUFFIX, int64_t, (TYPE x),                                 \
+            static_cast<int64_t>(ROUND_EVEN(x)))                               \
+  PIKO_MATH(lround##SUFFIX, int64_t, (TYPE x), static_cast<int64_t>(ROUND(x))) \
+  PIKO_MATH(llround##SUFFIX, int64_t, (TYPE x),                                \
+            static_cast<int64_t>(ROUND(x)))                                    \
+  /* Functions with two results, one by one. */                                \
+  PIKO_MATH(frexp0##SUFFIX, TYPE, (TYPE x), ::piko::detail::mantissaOf(x))     \
+  PIKO_MATH(frexp1##SUFFIX, int, (TYPE x), ::piko::detail::exponentOf(x))      \
+  PIKO_MATH(modf0##SUFFIX, TYPE, (TYPE x), ::piko::detail::fractionOf(x))      \
+  PIKO_MATH(modf1##SUFFIX, TYPE, (TYPE x), TRUNC(x))
+PIKO_MATH_EXACT(float, , __builtin_roundf, __builtin_roundevenf,
+                __builtin_truncf)
+PIKO_MATH_EXACT(double, _double, __builtin_round, __builtin_roundeven,
+                __builtin_trunc)
+#undef PIKO_MATH_EXACT
 #undef PIKO_MATH_1
 #undef PIKO_MATH_2
 #undef PIKO_MATH
