@@ -40,6 +40,7 @@
 #include "clang/Parse/ParseAST.h"
 #include "clang/Sema/Sema.h"
 #include "llvm/ADT/SetVector.h"
+#include "llvm/ADT/StringSet.h"
 #include "llvm/IR/InstIterator.h"
 #include "llvm/Support/VirtualFileSystem.h"
 #include "llvm/TargetParser/Triple.h"
@@ -144,6 +145,22 @@ struct UnitReader {
   std::string suffix;
 };
 
+/// The user's macros are not for our text: directives that end those whose
+/// names occur in it.
+static std::string undefineMacros(llvm::StringRef text,
+                                  clang::Preprocessor &preprocessor) {
+  std::string directives;
+  llvm::StringSet<> known;
+  auto isPart = [](char c) { return llvm::isAlnum(c) || c == '_'; };
+  while (!(text = text.drop_until(isPart)).empty()) {
+    llvm::StringRef word = text.take_while(isPart);
+    text = text.drop_front(word.size());
+    if (known.insert(word).second && preprocessor.isMacroDefined(word))
+      directives += ("#undef " + word + "\n").str();
+  }
+  return directives;
+}
+
 /// Reads the pipelines when the parser comes to the pragma.
 class FileUnitsReader : public clang::PragmaHandler {
 public:
@@ -167,6 +184,7 @@ public:
     ok = read(wrappers);
     if (!ok || wrappers.empty())
       return;
+    wrappers = undefineMacros(wrappers, preprocessor) + wrappers;
     clang::SourceManager &sources = compiler.getSourceManager();
     clang::FileID file = sources.createFileID(
         llvm::MemoryBuffer::getMemBufferCopy(wrappers, wrappersName),

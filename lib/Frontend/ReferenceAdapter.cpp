@@ -61,7 +61,7 @@ public:
 
   void write(size_t index) {
     out << "namespace piko_adapter::pipeline" << index << " {\n"
-        << "using Pipeline = ::" << pipeline.typeName << ";\n";
+        << "using Pipeline = class ::" << pipeline.typeName << ";\n";
     writeSetup();
     writeRun();
     out << "const pikort_program program = {PIKORT_ABI_VERSION, "

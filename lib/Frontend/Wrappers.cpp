@@ -30,7 +30,8 @@ std::string piko::generateWrappers(const PipelineDescription &pipeline,
         << "() { " << body << " }" << wrapperComment << phase << "\n";
   };
   out << "namespace __piko_wrappers" << suffix << " {\n";
-  out << "using __piko_pipe = " << typeName << ";\n";
+  // A variable of the same name may hide the class.
+  out << "using __piko_pipe = class " << typeName << ";\n";
   out << "using __piko_state = typename decltype(::piko::detail::stateOf("
          "static_cast<__piko_pipe *>(nullptr)))::type;\n";
   function(WrapperKind::Wire, 0, "__piko_pipe pipe;");
