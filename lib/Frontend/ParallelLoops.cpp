@@ -152,6 +152,15 @@ static bool isStep(const llvm::StoreInst *store, const ParsedUnit &unit) {
   return marker && marker->kind == MarkerKind::loopNext;
 }
 
+/// What the iterations share; a function object that was given to parallelFor
+/// is a temporary.
+static std::string describeShared(const llvm::AllocaInst *variable) {
+  llvm::StringRef name = variable->getName();
+  if (name.starts_with("ref.tmp") || name.starts_with("agg.tmp"))
+    return "a variable captured by value, of which all share one copy";
+  return "the captured variable" + getVariableName(variable);
+}
+
 bool piko::promoteVariables(llvm::Function &function, const ParsedUnit &unit,
                             mlir::MLIRContext &context) {
   ParallelLoops loops(function, unit.markers);
@@ -169,10 +178,14 @@ bool piko::promoteVariables(llvm::Function &function, const ParsedUnit &unit,
         auto *store = dyn_cast<llvm::StoreInst>(user);
         if (!store || !isShared(store, variable, loops) || isStep(store, unit))
           continue;
-        emitUserError(store, unit, context)
+        mlir::InFlightDiagnostic error = emitUserError(store, unit, context);
+        error
             << "expected the iterations of parallelFor to be independent, but "
-               "this one assigns the captured variable"
-            << getVariableName(variable);
+               "this one assigns "
+            << describeShared(variable);
+        error.attachNote() << "a variable that the iteration declares is its "
+                              "own; reduce, count and atomics on state combine "
+                              "what iterations find";
         return false;
       }
     llvm::PromoteMemToReg(variables, dominance);

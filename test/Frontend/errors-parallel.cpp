@@ -13,6 +13,8 @@
 // RUN: not piko-translate --cpp-to-piko -DCASE=10 %s 2>&1 | FileCheck %s --check-prefix=LEAVES
 // RUN: not piko-translate --cpp-to-piko -DCASE=11 %s 2>&1 | FileCheck %s --check-prefix=ENDLESS
 // RUN: not piko-translate --cpp-to-piko -DCASE=12 %s 2>&1 | FileCheck %s --check-prefix=ATOMIC
+// RUN: not piko-translate --cpp-to-piko -DCASE=13 %s 2>&1 | FileCheck %s --check-prefix=COPY
+// RUN: not piko-translate --cpp-to-piko -DCASE=14 %s 2>&1 | FileCheck %s --check-prefix=COPIES
 #include <piko.h>
 
 struct A {
@@ -83,6 +85,13 @@ struct Stage : piko::Stage<0, 0, 64, A>, piko::Uses<State> {
 #if CASE == 6
     // OUTSIDE: errors-parallel.cpp:[[#@LINE + 1]]:5: error: expected sync inside a parallelFor, but stage 'stage' has one outside
     sync();
+#elif CASE == 13
+    // COPY: errors-parallel.cpp:[[#@LINE + 2]]:47: error: expected the iterations of parallelFor to be independent, but this one assigns a variable captured by value, of which all share one copy
+    // COPY: errors-parallel.cpp:[[#@LINE + 1]]:47: note: a variable that the iteration declares is its own; reduce, count and atomics on state combine what iterations find
+    parallelFor(a.n, [=](int i) mutable { sum += float(i); });
+#elif CASE == 14
+    // COPIES: errors-parallel.cpp:[[#@LINE + 1]]:57: error: expected the iterations of parallelFor to be independent, but this one assigns a variable captured by value, of which all share one copy
+    parallelFor(a.n, [vector](int i) mutable { vector.y = float(i); });
 #endif
     state().buffer[a.n].x = sum + vector.y;
   }
