@@ -74,6 +74,24 @@ static llvm::StringRef getPhase(const clang::Diagnostic &info) {
   return line.split(wrapperComment).second;
 }
 
+/// Whether a place is in what stands in Piko's headers for the language.
+static bool isInLanguage(const clang::Diagnostic &info) {
+  if (!info.hasSourceManager() || !info.getLocation().isValid())
+    return false;
+  const clang::SourceManager &sources = info.getSourceManager();
+  return sources.getFilename(sources.getExpansionLoc(info.getLocation()))
+      .contains("/piko/compiled/");
+}
+
+/// What a failed assertion in these headers says; empty for another error.
+static std::string explainAssertion(const clang::Diagnostic &info,
+                                    llvm::StringRef text) {
+  if (info.getID() != clang::diag::err_static_assert_failed &&
+      info.getID() != clang::diag::err_static_assert_requirement_failed)
+    return "";
+  return isInLanguage(info) ? text.split(": ").second.str() : "";
+}
+
 void ClangDiagnosticForwarder::HandleDiagnostic(
     clang::DiagnosticsEngine::Level level, const clang::Diagnostic &info) {
   DiagnosticConsumer::HandleDiagnostic(level, info);
@@ -82,14 +100,29 @@ void ClangDiagnosticForwarder::HandleDiagnostic(
     return;
   llvm::SmallString<128> text;
   info.FormatDiagnostic(text);
-  if (level != clang::DiagnosticsEngine::Note)
-    isExplained = false;
-  else if (isExplained)
+  if (level != clang::DiagnosticsEngine::Note) {
+    isExplained = isMisplaced = false;
+  } else if (isMisplaced && pending && !isInLanguage(info)) {
+    // The first note outside of the headers is at what the user wrote.
+    std::string error = pending->str();
+    pending.emplace(
+        convertLocation(info.getLocation(), info.getSourceManager(), context),
+        pending->getSeverity());
+    *pending << error;
+    isMisplaced = false;
     return;
+  } else if (isExplained) {
+    return;
+  }
   if (std::string better = explainState(info.getID(), text, sema);
       !better.empty()) {
     text = better;
     isExplained = true;
+  }
+  if (std::string assertion = explainAssertion(info, text);
+      !assertion.empty()) {
+    text = assertion;
+    isExplained = isMisplaced = true;
   }
   mlir::Location location =
       info.hasSourceManager()

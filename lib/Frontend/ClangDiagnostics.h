@@ -41,6 +41,8 @@ private:
   std::optional<mlir::Diagnostic> pending;
   /// Whether that has a text of ours, to which Clang's notes do not belong.
   bool isExplained = false;
+  /// Whether that is about a call in the user's text, which a note will name.
+  bool isMisplaced = false;
   /// If it is about a wrapper's call of a phase: how the phase is declared.
   std::string phase;
 };

@@ -85,6 +85,25 @@ inline int32_t cellOf(float p) {
   return f >= 2147483648.0f ? INT32_MAX : static_cast<int32_t>(f);
 }
 
+/// What a braced list of numbers means: cells, or a position if they have
+/// fractions.
+template <int Rank, class T> auto pointOf(const T (&numbers)[Rank]) {
+  constexpr bool isInteger = T(1) / T(2) == T(0);
+  static_assert(!isInteger || sizeof(T) <= sizeof(int),
+                "expected cells of at most 32 bits");
+  if constexpr (isInteger) {
+    Cells<Rank> cells;
+    for (int d = 0; d < Rank; ++d)
+      cells[d] = static_cast<int>(numbers[d]);
+    return cells;
+  } else {
+    Position<Rank> position;
+    for (int d = 0; d < Rank; ++d)
+      position[d] = static_cast<float>(numbers[d]);
+    return position;
+  }
+}
+
 } // namespace detail
 } // namespace piko
 

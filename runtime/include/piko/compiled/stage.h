@@ -4,7 +4,11 @@
 #define PIKO_COMPILED_STAGE_H
 
 #include <piko/compiled/list.h>
+#include <piko/compiled/messages.h>
 #include <piko/compiled/state.h>
+
+#pragma clang diagnostic push
+#pragma clang diagnostic ignored "-Wc++26-extensions" // computed messages
 
 namespace piko {
 
@@ -63,7 +67,7 @@ public:
 protected:
   template <class T> void emit(const T &value, int port = 0) {
     static_assert((detail::isSame<T, Out> || ...),
-                  "emit of a type that no port has");
+                  detail::portTypes<T, Out...>());
     T copy = value;
     marker::emit<T>(port, &copy);
   }
@@ -90,6 +94,37 @@ protected:
       marker::updateEnd<T>(&pixel.value);
       return result;
     }
+  }
+
+  // Positions and cells as braced lists of numbers.
+  template <class T> BinId binFromPosition(const T (&at)[B::rank]) const {
+    return binFromPosition(detail::pointOf(at));
+  }
+  template <class T>
+  void assignToBoundingBox(const In &in, const T (&lo)[B::rank],
+                           const T (&hi)[B::rank]) {
+    assignToBoundingBox(in, detail::pointOf(lo), detail::pointOf(hi));
+  }
+  // If they are of several types: floats.
+  BinId binFromPosition(const float (&at)[B::rank]) const {
+    return binFromPosition(detail::pointOf(at));
+  }
+  void assignToBoundingBox(const In &in, const float (&lo)[B::rank],
+                           const float (&hi)[B::rank]) {
+    assignToBoundingBox(in, detail::pointOf(lo), detail::pointOf(hi));
+  }
+  // Those of another number of dimensions are no positions.
+  template <int Rank, class T>
+    requires(Rank != B::rank)
+  BinId binFromPosition(const glm::vec<Rank, T> &) const {
+    static_assert(Rank == B::rank, detail::dimensions<B::rank, Rank>());
+    return {};
+  }
+  template <int Rank, class T>
+    requires(Rank != B::rank)
+  void assignToBoundingBox(const In &, const glm::vec<Rank, T> &,
+                           const glm::vec<Rank, T> &) {
+    static_assert(Rank == B::rank, detail::dimensions<B::rank, Rank>());
   }
 
   // AssignBin.
@@ -246,5 +281,7 @@ Identity<In> inputOf(const BasicStage<B, Threads, In, Out...> *);
 } // namespace detail
 
 } // namespace piko
+
+#pragma clang diagnostic pop
 
 #endif // PIKO_COMPILED_STAGE_H

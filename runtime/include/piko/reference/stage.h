@@ -233,6 +233,50 @@ public:
     return reference::fromCell<B::rank>(call.node->grid.hi(call.bin));
   }
 
+  // Positions and cells as braced lists of numbers.
+
+  template <class T>
+  BinId
+  binFromPosition(const T (&p)[B::rank],
+                  reference::Place at = reference::Place::current()) const {
+    return binFromPosition(detail::pointOf(p), at);
+  }
+  template <class T>
+  void assignToBoundingBox(const In &in, const T (&lo)[B::rank],
+                           const T (&hi)[B::rank],
+                           reference::Place at = reference::Place::current()) {
+    assignToBoundingBox(in, detail::pointOf(lo), detail::pointOf(hi), at);
+  }
+
+  // If they are of several types: floats.
+  BinId
+  binFromPosition(const float (&p)[B::rank],
+                  reference::Place at = reference::Place::current()) const {
+    return binFromPosition(detail::pointOf(p), at);
+  }
+  void assignToBoundingBox(const In &in, const float (&lo)[B::rank],
+                           const float (&hi)[B::rank],
+                           reference::Place at = reference::Place::current()) {
+    assignToBoundingBox(in, detail::pointOf(lo), detail::pointOf(hi), at);
+  }
+
+  // Those of another number of dimensions are no positions.
+
+  template <int Rank, class T>
+    requires(Rank != B::rank)
+  BinId binFromPosition(const glm::vec<Rank, T> &) const {
+    static_assert(Rank == B::rank,
+                  "expected as many dimensions as the bins of the stage have");
+    return {};
+  }
+  template <int Rank, class T>
+    requires(Rank != B::rank)
+  void assignToBoundingBox(const In &, const glm::vec<Rank, T> &,
+                           const glm::vec<Rank, T> &) {
+    static_assert(Rank == B::rank,
+                  "expected as many dimensions as the bins of the stage have");
+  }
+
   // AssignBin. A primitive goes to the set of all bins that are named.
 
   void assignToBin(const In &, BinId bin,
