@@ -27,6 +27,7 @@
 #include "llvm/Transforms/IPO/GlobalDCE.h"
 #include "llvm/Transforms/InstCombine/InstCombine.h"
 #include "llvm/Transforms/Scalar/ADCE.h"
+#include "llvm/Transforms/Scalar/DCE.h"
 #include "llvm/Transforms/Scalar/EarlyCSE.h"
 #include "llvm/Transforms/Scalar/LoopPassManager.h"
 #include "llvm/Transforms/Scalar/LoopUnrollPass.h"
@@ -94,6 +95,10 @@ static void dropHints(llvm::Function &function) {
     case llvm::Intrinsic::stackrestore:
       if (call->use_empty())
         call->eraseFromParent();
+      break;
+    case llvm::Intrinsic::is_constant:
+      call->replaceAllUsesWith(llvm::ConstantInt::getFalse(call->getType()));
+      call->eraseFromParent();
       break;
     default:
       break;
@@ -225,6 +230,7 @@ static bool cleanUpFunction(llvm::Function &function, ParsedUnit &unit,
   prepareFunction(function, unit, memory, context);
   llvm::FunctionPassManager simplify;
   simplify.addPass(llvm::EarlyCSEPass(/*UseMemorySSA=*/false));
+  simplify.addPass(llvm::DCEPass()); // a dead copy may hold an address
   simplify.addPass(llvm::SimplifyCFGPass());
   if (!promoteVariables(function, unit, context))
     return false;

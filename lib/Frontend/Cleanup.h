@@ -10,7 +10,8 @@
 //      holdDivisions   what an integer division without a result is, the run
 //      says
 //   4. rounds of       splitMemory     copies and variables, number by number
-//                      flattenPointers phis and selects of pointers
+//                      flattenPointers phis and selects of pointers (first
+//                                      indexPointers: those that walk)
 //                      expandLocalAtomics
 //                      releasePixels   no reference to a pixel is kept
 //                      promoteVariables, early-cse, simplifycfg

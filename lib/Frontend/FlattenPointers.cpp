@@ -4,13 +4,14 @@
 // A reference that may be to one of several things, such as std::max returns,
 // becomes numbers: which kind of thing it is, on which each access branches,
 // and what its address was computed from when it was chosen, such as the index
-// of an element. A pointer that walks through an array becomes an index, and
-// pointers into one array are compared and subtracted as offsets.
+// of an element. Pointers into one array are compared and subtracted as
+// offsets.
 //
 //===----------------------------------------------------------------------===//
 
 #include "Cleanup.h"
 
+#include "PointerChoices.h"
 #include "llvm/ADT/SetVector.h"
 #include "llvm/IR/CFG.h"
 #include "llvm/IR/Dominators.h"
@@ -18,8 +19,6 @@
 #include "llvm/IR/Instructions.h"
 #include "llvm/Transforms/Utils/BasicBlockUtils.h"
 #include "llvm/Transforms/Utils/Local.h"
-
-#include <numeric>
 
 using namespace piko;
 using llvm::dyn_cast;
@@ -35,18 +34,16 @@ public:
       : function(function), memory(memory), builder(function.getContext()) {}
 
   bool run() {
+    changed = indexPointers(function, memory);
     dominance.recalculate(function);
     llvm::SmallVector<llvm::WeakVH> choices, comparisons;
     for (llvm::Instruction &instruction : llvm::instructions(function)) {
-      if (isChoice(&instruction))
+      if (isPointerChoice(&instruction))
         choices.push_back(&instruction);
       else if (llvm::isa<llvm::ICmpInst>(instruction) ||
                instruction.getOpcode() == llvm::Instruction::Sub)
         comparisons.push_back(&instruction);
     }
-    for (llvm::WeakVH &choice : choices)
-      if (auto *phi = dyn_cast_or_null<llvm::PHINode>(choice))
-        makeIndex(phi);
     for (llvm::WeakVH &comparison : comparisons)
       if (auto *instruction = dyn_cast_or_null<llvm::Instruction>(comparison))
         compareOffsets(instruction);
@@ -65,58 +62,9 @@ private:
   /// A number for each choice.
   using Web = llvm::DenseMap<llvm::Value *, llvm::Value *>;
 
-  static bool isChoice(const llvm::Value *value) {
-    return value->getType()->isPointerTy() &&
-           llvm::isa<llvm::PHINode, llvm::SelectInst>(value);
-  }
-
   //===--------------------------------------------------------------------===//
-  // Pointers that walk
+  // Pointers into one array
   //===--------------------------------------------------------------------===//
-
-  void makeIndex(llvm::PHINode *phi) {
-    llvm::Value *begin = nullptr;
-    llvm::SmallVector<std::optional<int64_t>> steps;
-    int64_t unit = 0;
-    for (llvm::Value *incoming : phi->incoming_values()) {
-      Address address = getAddress(incoming, memory.data);
-      if (address.base == phi) {
-        if (!address.terms.empty() || address.offset == 0)
-          return;
-        steps.push_back(address.offset);
-        unit = std::gcd(unit, std::abs(address.offset));
-        continue;
-      }
-      if (begin && begin != incoming)
-        return;
-      begin = incoming;
-      steps.push_back(std::nullopt);
-    }
-    if (!begin || unit == 0)
-      return;
-    if (auto *definition = dyn_cast<llvm::Instruction>(begin))
-      if (!dominance.dominates(definition, phi->getParent()))
-        return;
-    builder.SetInsertPoint(phi);
-    llvm::PHINode *index =
-        builder.CreatePHI(builder.getInt64Ty(), phi->getNumIncomingValues());
-    for (auto [number, step] : llvm::enumerate(steps)) {
-      llvm::BasicBlock *from = phi->getIncomingBlock(number);
-      llvm::Value *value = builder.getInt64(0);
-      if (step) {
-        builder.SetInsertPoint(from->getTerminator());
-        value = builder.CreateAdd(index, builder.getInt64(*step / unit));
-      }
-      index->addIncoming(value, from);
-    }
-    builder.SetInsertPoint(phi->getParent(),
-                           phi->getParent()->getFirstInsertionPt());
-    llvm::Value *pointer = builder.CreateGEP(
-        llvm::ArrayType::get(builder.getInt8Ty(), unit), begin, index);
-    phi->replaceAllUsesWith(pointer);
-    phi->eraseFromParent();
-    changed = true;
-  }
 
   llvm::Value *makeOffset(const Address &address) {
     MemoryIndex offset{address.offset, {}};
@@ -178,25 +126,27 @@ private:
     return !definition || definition->getParent()->isEntryBlock();
   }
 
+  /// All choices that lead to this one, and what they choose from.
+  static void collectChoices(llvm::Value *first,
+                             llvm::SetVector<llvm::Value *> &choices,
+                             llvm::SetVector<llvm::Value *> &targets) {
+    choices.insert(first);
+    for (size_t i = 0; i < choices.size(); ++i)
+      for (llvm::Value *operand : getChoiceOperands(choices[i]))
+        if (!llvm::isa<llvm::UndefValue>(operand))
+          (isPointerChoice(operand) ? choices : targets).insert(operand);
+  }
+
   void makeTags(llvm::Instruction *first,
                 llvm::SmallPtrSet<llvm::Value *, 8> &done) {
-    // All choices that lead to this one, and what they choose from.
     llvm::SetVector<llvm::Value *> choices, targets;
-    choices.insert(first);
-    for (size_t i = 0; i < choices.size(); ++i) {
-      auto *choice = llvm::cast<llvm::User>(choices[i]);
-      unsigned begin = llvm::isa<llvm::SelectInst>(choice) ? 1 : 0;
-      for (llvm::Value *operand : llvm::drop_begin(choice->operands(), begin))
-        if (!llvm::isa<llvm::UndefValue>(operand))
-          (isChoice(operand) ? choices : targets).insert(operand);
-    }
+    collectChoices(first, choices, targets);
     for (llvm::Value *target : targets) {
       Address address = getAddress(target, memory.data);
-      if (!isChoice(address.base))
+      if (!isPointerChoice(address.base))
         continue;
       // A member of one of several things: next time one of several members.
-      if (!choices.contains(address.base))
-        distribute(target);
+      distribute(target);
       return;
     }
 
@@ -264,39 +214,29 @@ private:
   }
 
   /// gep (phi a, b) -> phi (gep a), (gep b), for the step nearest to the
-  /// choice.
+  /// choice, and all choices that lead to it at once: one after the other would
+  /// go round a loop for ever.
   void distribute(llvm::Value *target) {
     auto *step = dyn_cast<llvm::GetElementPtrInst>(target);
-    while (step && !isChoice(step->getPointerOperand()))
+    while (step && !isPointerChoice(step->getPointerOperand()))
       step = dyn_cast<llvm::GetElementPtrInst>(step->getPointerOperand());
     if (!step)
       return;
-    auto *choice = llvm::cast<llvm::Instruction>(step->getPointerOperand());
+    llvm::SetVector<llvm::Value *> choices, targets;
+    collectChoices(step->getPointerOperand(), choices, targets);
     for (llvm::Value *index : step->indices())
       if (auto *definition = dyn_cast<llvm::Instruction>(index))
-        if (!dominance.properlyDominates(definition->getParent(),
-                                         choice->getParent()))
-          return;
-    llvm::Instruction *made = choice->clone();
-    made->insertBefore(choice->getIterator());
-    unsigned begin = llvm::isa<llvm::SelectInst>(choice) ? 1 : 0;
-    auto *phi = dyn_cast<llvm::PHINode>(made);
-    std::map<llvm::BasicBlock *, llvm::Value *> parts;
-    for (unsigned i = begin; i < made->getNumOperands(); ++i) {
-      // A switch may come from one block several times.
-      if (phi && parts.count(phi->getIncomingBlock(i))) {
-        made->setOperand(i, parts[phi->getIncomingBlock(i)]);
-        continue;
-      }
-      builder.SetInsertPoint(phi ? phi->getIncomingBlock(i)->getTerminator()
-                                 : made);
+        for (llvm::Value *choice : choices)
+          if (!dominance.properlyDominates(
+                  definition->getParent(),
+                  llvm::cast<llvm::Instruction>(choice)->getParent()))
+            return;
+    Web parts = makeWeb(choices, step->getType(), [&](llvm::Value *operand) {
       llvm::Instruction *clone = step->clone();
-      clone->setOperand(0, made->getOperand(i));
-      made->setOperand(i, builder.Insert(clone));
-      if (phi)
-        parts[phi->getIncomingBlock(i)] = clone;
-    }
-    step->replaceAllUsesWith(made);
+      clone->setOperand(0, operand);
+      return builder.Insert(clone);
+    });
+    step->replaceAllUsesWith(parts[step->getPointerOperand()]);
     step->eraseFromParent();
     changed = true;
   }
@@ -418,8 +358,9 @@ private:
     return builder.Insert(clone);
   }
 
-  /// A number for each choice, chosen as the choice is: what `get` says of a
-  /// target, or any number where it says nothing.
+  /// A value for each choice, chosen as the choice is: what `get` says of a
+  /// target, or any value where it says nothing. The builder is where the
+  /// choice needs it.
   Web makeWeb(const llvm::SetVector<llvm::Value *> &choices, llvm::Type *type,
               llvm::function_ref<llvm::Value *(llvm::Value *)> get) {
     Web web;
@@ -434,7 +375,7 @@ private:
             llvm::SelectInst::Create(instruction->getOperand(0), unset, unset));
     }
     auto find = [&](llvm::Value *operand) -> llvm::Value * {
-      if (isChoice(operand))
+      if (isPointerChoice(operand))
         return web[operand];
       llvm::Value *value =
           llvm::isa<llvm::UndefValue>(operand) ? nullptr : get(operand);
@@ -443,12 +384,19 @@ private:
     for (llvm::Value *choice : choices) {
       if (auto *phi = dyn_cast<llvm::PHINode>(choice)) {
         auto *made = llvm::cast<llvm::PHINode>(web[choice]);
-        for (unsigned i = 0; i < phi->getNumIncomingValues(); ++i)
-          made->addIncoming(find(phi->getIncomingValue(i)),
-                            phi->getIncomingBlock(i));
+        for (unsigned i = 0; i < phi->getNumIncomingValues(); ++i) {
+          llvm::BasicBlock *from = phi->getIncomingBlock(i);
+          builder.SetInsertPoint(from->getTerminator());
+          // A switch may come from one block several times.
+          int known = made->getBasicBlockIndex(from);
+          made->addIncoming(known < 0 ? find(phi->getIncomingValue(i))
+                                      : made->getIncomingValue(known),
+                            from);
+        }
       } else {
         auto *select = llvm::cast<llvm::SelectInst>(choice);
         auto *made = llvm::cast<llvm::SelectInst>(web[choice]);
+        builder.SetInsertPoint(made);
         made->setTrueValue(find(select->getTrueValue()));
         made->setFalseValue(find(select->getFalseValue()));
       }
