@@ -313,8 +313,8 @@ struct HostMemory {
 
 static HostMemory memoryOf(const pikort_pipeline &p, const State &state) {
   bool isHosts = state.kind == PIKORT_BUFFER && state.perSource < 0;
-  return isHosts ? HostMemory{state.view.data,
-                              state.view.extent[0] * p.records[state.record].size}
+  return isHosts ? HostMemory{state.view.data, state.view.extent[0] *
+                                                   p.records[state.record].size}
                  : HostMemory{nullptr, 0};
 }
 
