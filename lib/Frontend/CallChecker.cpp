@@ -37,6 +37,17 @@ static llvm::StringRef getLanguageFeature(llvm::StringRef name) {
   return "";
 }
 
+/// What to call instead of a function of the standard library.
+static llvm::StringRef getRemedy(llvm::StringRef callee) {
+  static constexpr llvm::StringLiteral sorts[] = {
+      "std::sort", "std::stable_sort", "std::ranges::__sort_fn::operator()",
+      "std::ranges::__stable_sort_fn::operator()"};
+  if (llvm::is_contained(sorts, callee))
+    return "; use std::partial_sort up to the end of the range, or sort(key) "
+           "in a parallelFor";
+  return "";
+}
+
 /// Whether an intrinsic means something on this machine alone. A pause means
 /// nothing anywhere.
 static bool isMachineBuiltin(const llvm::Function &intrinsic) {
@@ -94,7 +105,7 @@ private:
     mlir::InFlightDiagnostic error = chain.emitError(context);
     error << "not supported in Piko: " << what;
     if (llvm::StringRef user = chain.getUserCallee(); !user.empty())
-      error << ", in a call of '" << user << "'";
+      error << ", in a call of '" << user << "'" << getRemedy(user);
     return false;
   }
 

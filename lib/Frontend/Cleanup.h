@@ -98,6 +98,11 @@ std::optional<unsigned> getDivision(llvm::StringRef callee);
 /// Constant tables that are indexed become local arrays.
 bool localizeTables(llvm::Function &function, MemoryMap &memory);
 
+/// What no index and no tag can say where it points, and what to write instead.
+constexpr llvm::StringLiteral manyPlaces =
+    "a pointer that can point to different places; use an index, or a branch "
+    "for each place";
+
 /// False after an error.
 bool resolveAccesses(llvm::Function &function, ParsedUnit &unit,
                      MemoryMap &memory, mlir::MLIRContext &context);

@@ -130,7 +130,7 @@ LogicalResult PhaseImporter::importInstruction(llvm::Instruction *instruction) {
       return importAccessor(call, name);
   }
   if (instruction->getType()->isPointerTy())
-    return reject(instruction, "a pointer that can point to different places");
+    return reject(instruction, manyPlaces);
   if (mlir::Value value = scalars.import(instruction)) {
     values[instruction] = value;
     return success();

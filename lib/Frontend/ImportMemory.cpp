@@ -46,7 +46,9 @@ LogicalResult PhaseImporter::rejectVariable(llvm::AllocaInst *variable) {
   return reject(use ? use : variable,
                 "a local variable" + getVariableName(variable) +
                     " whose parts are accessed in ways that cannot be told "
-                    "apart");
+                    "apart, in stage '" +
+                    stage.name +
+                    "'; access its members by name and its arrays by index");
 }
 
 LogicalResult PhaseImporter::checkLocalSize(llvm::AllocaInst *variable) {
@@ -121,8 +123,7 @@ LogicalResult PhaseImporter::importArrayAccess(llvm::Instruction *instruction) {
       memory.data);
   auto found = arrays.find(address.base);
   if (found == arrays.end())
-    return reject(instruction, "access through a pointer that can point to "
-                               "different places");
+    return reject(instruction, "access through " + manyPlaces);
   mlir::Value array = found->second;
   mlir::Type element = cast<mlir::MemRefType>(array.getType()).getElementType();
   int64_t size = (element.getIntOrFloatBitWidth() + 7) / 8;

@@ -48,10 +48,13 @@ private:
       return resolveLoad(load);
     if (auto *store = dyn_cast<llvm::StoreInst>(instruction))
       return resolveStore(store);
-    if (llvm::isa<llvm::MemIntrinsic>(instruction))
+    if (auto *copy = dyn_cast<llvm::MemIntrinsic>(instruction))
       return fail(instruction,
-                  "copying or filling more than 4096 numbers at once, or "
-                  "memory whose layout is not known");
+                  llvm::isa<llvm::Constant>(copy->getLength())
+                      ? "copying or filling more than 4096 numbers at once, or "
+                        "memory whose layout is not known"
+                      : "copying or filling a number of elements that varies; "
+                        "use a loop over the elements");
     if (auto *call = dyn_cast<llvm::CallInst>(instruction))
       if (const Marker *marker = getMarker(call, memory.markers))
         if (marker->kind == MarkerKind::atomic ||
@@ -142,7 +145,7 @@ private:
       return "a pointer made from an integer";
     if (llvm::isa<llvm::ConstantPointerNull>(base))
       return "access through a null pointer";
-    return "access through a pointer that can point to different places";
+    return ("access through " + manyPlaces).str();
   }
 
   bool resolveLoad(llvm::LoadInst *load) {
