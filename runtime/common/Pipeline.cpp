@@ -271,8 +271,19 @@ static const char *describe(BadCall call) {
   return "made a wrong call";
 }
 
+/// Of a pixel, from numbers that have two each.
+static std::string describeCell(int64_t low, int64_t high, int32_t rank) {
+  std::string text = "(";
+  for (int32_t d = 0; d < rank; ++d) {
+    int64_t pair = d < 2 ? low : high;
+    text += (d ? ", " : "") +
+            std::to_string(static_cast<int32_t>(pair >> (d % 2 * 32)));
+  }
+  return text + ")";
+}
+
 static std::string describe(const std::string &stage, const KernelError &e,
-                            const std::string &memoryLimit) {
+                            int32_t rank, const std::string &memoryLimit) {
   std::string a = std::to_string(e.a), b = std::to_string(e.b);
   std::string text = "stage " + quoted(stage);
   if (e.bin >= 0)
@@ -287,8 +298,8 @@ static std::string describe(const std::string &stage, const KernelError &e,
   case PIKORT_UPDATE_OUTSIDE:
     return text +
            "expected an update inside the stage's own bin, but got "
-           "pixel (" +
-           a + ", " + b + ")";
+           "pixel " +
+           describeCell(e.a, e.b, rank);
   case PIKORT_INDEX_OUTSIDE:
     return text + "expected an index in [0, " + b + "), but got " + a;
   case PIKORT_ENDLESS:
@@ -325,7 +336,7 @@ void pikort_pipeline::settleReported() noexcept {
       std::string text = describe(!error.name.empty() ? std::string(error.name)
                                   : stage ? stage->name
                                           : std::to_string(error.stage),
-                                  error, memoryLimitText(*this));
+                                  error, rank, memoryLimitText(*this));
       fail(error.code, checker ? checker->describe(error.code, text) : text);
     } catch (...) {
       fail(error.code, {});

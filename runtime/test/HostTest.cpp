@@ -74,7 +74,7 @@ int32_t run(pikort_pipeline *p) {
   }
   if (act == Act::Fail)
     for (int64_t y : {9, 5, 7})
-      pikoir_fail(p, 0, nullptr, -1, PIKORT_UPDATE_OUTSIDE, 3, y);
+      pikoir_fail(p, 0, nullptr, -1, PIKORT_UPDATE_OUTSIDE, 3 + (y << 32), 0);
   return pikoir_end(p, 0);
 }
 

@@ -178,6 +178,20 @@ static Value createBin(OpBuilder &builder, Location loc, Value bin) {
   return bin ? toI64(builder, loc, bin) : createI64(builder, loc, -1);
 }
 
+/// Up to two coordinates from `begin` on, of 32 bits each, in one number.
+static Value packCoordinates(OpBuilder &builder, Location loc,
+                             ArrayRef<Value> coordinates, size_t begin) {
+  Value packed = createI64(builder, loc, 0);
+  for (size_t i = begin; i < std::min(begin + 2, coordinates.size()); ++i) {
+    Value low = arith::AndIOp::create(builder, loc, coordinates[i],
+                                      createI64(builder, loc, UINT32_MAX));
+    Value place = arith::ShLIOp::create(
+        builder, loc, low, createI64(builder, loc, 32 * (i - begin)));
+    packed = arith::OrIOp::create(builder, loc, packed, place);
+  }
+  return packed;
+}
+
 struct FailLowering : OpConversionPattern<FailOp> {
   FailLowering(const TypeConverter &converter, MLIRContext *mlir,
                LoweringContext &context)
@@ -189,10 +203,11 @@ struct FailLowering : OpConversionPattern<FailOp> {
     SmallVector<Value> indices;
     for (Value index : adaptor.getIndices())
       indices.push_back(toI64(rewriter, loc, index));
-    Value first = indices.front();
-    Value second =
-        indices.size() > 1 ? indices[1] : createI64(rewriter, loc, 0);
-    if (!op.getOutsideBin()) {
+    Value first, second;
+    if (op.getOutsideBin()) {
+      first = packCoordinates(rewriter, loc, indices, 0);
+      second = packCoordinates(rewriter, loc, indices, 2);
+    } else {
       // The first index that is outside, and how many elements there are.
       StateView &view = context.view(rewriter, op, op.getState());
       first = indices.back();

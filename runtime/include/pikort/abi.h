@@ -309,7 +309,7 @@ PIKORT_API int32_t pikoir_strips_next(pikort_pipeline *p, int32_t id);
 /// `code`, a pikort_status. `name`, a constant, is that of the stage to name,
 /// where the phase of one is part of another's; or null.
 ///   PIKORT_BIN_OUTSIDE     a = bin
-///   PIKORT_UPDATE_OUTSIDE  a = x, b = y
+///   PIKORT_UPDATE_OUTSIDE  a = x + (y << 32), b = z + (w << 32), 32 bits each
 ///   PIKORT_INDEX_OUTSIDE   a = index, b = elements
 ///   PIKORT_ENDLESS         a = iterations
 ///   PIKORT_NOT_UNIFORM     a = iteration
