@@ -81,6 +81,8 @@ void piko::addSplitSequence(OpPassManager &passes) {
 
 void piko::addCPUSequence(OpPassManager &passes,
                           const SynthesisOptions &options) {
+  if (options.has("if-convert"))
+    passes.nest<PipelineOp>().addPass(createIfConvert());
   if (options.has("prefetch"))
     passes.nest<PipelineOp>().addPass(createPrefetch());
   if (options.has("compact-loops"))

@@ -17,7 +17,7 @@ const std::vector<std::string> &SynthesisOptions::getOptional() {
       "pre-schedule", "infer-directives", "fuse-stages",         "test-early",
       "prune",        "own-pixels",       "eliminate-schedules", "fuse-kernels",
       "form-strips",  "prefetch",         "compact-loops",       "vectorize",
-      "prove-bounds", "hoist-bounds"};
+      "prove-bounds", "hoist-bounds",     "if-convert"};
   return names;
 }
 

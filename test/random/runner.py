@@ -16,7 +16,8 @@ EQUAL, BLANK = "equal", "equal, but blank"
 #: What piko-compare may leave out of synthesis.
 PASSES = ["pre-schedule", "infer-directives", "fuse-stages", "test-early", "prune",
           "own-pixels", "eliminate-schedules", "fuse-kernels", "prefetch",
-          "compact-loops", "vectorize", "prove-bounds", "hoist-bounds"]
+          "compact-loops", "vectorize", "prove-bounds", "hoist-bounds",
+          "if-convert"]
 
 
 def options_of(passes):

@@ -254,6 +254,49 @@ def HoistBounds : Pass<"piko-hoist-bounds", "::piko::PipelineOp"> {
     Statistic<"versioned", "versioned", "loops with a test in front">];
 }
 
+def IfConvert : Pass<"piko-if-convert", "::piko::PipelineOp"> {
+  let summary = "Choose values without branches";
+  let description = [{
+    **Requires** the resolved level; before `piko-vectorize`, which has no branches
+    to mask then.
+
+    **Does**: takes `scf.if` and `scf.index_switch` whose arms do nothing but
+    read fields, compare, convert and choose, moves what the arms hold in front,
+    and chooses each result by `arith.select`. `vector[axis]` and `h == 12 || h
+    == 14 ? x : z` come as such switches, and what they choose by is often not
+    predictable.
+
+    **Guarantees** the same values.
+
+    Before:
+    ```
+    %x = scf.index_switch %axis -> f32
+    case 0 {
+      scf.yield %a : f32
+    }
+    default {
+      scf.yield %b : f32
+    }
+    ```
+    After:
+    ```
+    %is_0 = arith.cmpi eq, %axis, %zero : index
+    %x = arith.select %is_0, %a, %b : f32
+    ```
+
+    **Limits**: arms that compute with floats, read state or have an effect stay,
+    as do those of a choice without results.
+  }];
+  let options = [
+    Option<"maxCases", "max-cases", "int64_t", "4",
+           "How many cases, but for the default, a switch may have">,
+    Option<"maxOperations", "max-operations", "int64_t", "8",
+           "How many operations the arms may have together">];
+  let statistics = [
+    Statistic<"converted", "converted", "choices that lost their branches">];
+  let dependentDialects = ["::mlir::arith::ArithDialect"];
+}
+
 def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
   let summary = "Compute for many primitives at once";
   let description = [{
