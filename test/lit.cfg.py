@@ -25,6 +25,7 @@ sanitizer.
 """
 
 import os
+import platform
 import shutil
 
 import lit.formats
@@ -85,6 +86,8 @@ if os.path.exists(bunny):
     config.available_features.add("bunny")
 if os.path.exists("/dev/nvidiactl"):
     config.available_features.add("gpu")
+if platform.machine() in ("x86_64", "AMD64"):
+    config.available_features.add("x86_64")
 if shutil.which("ptxas"):
     config.available_features.add("ptxas")
 if "address" in config.sanitize:

@@ -5,6 +5,7 @@
 #include "Piko/Target/Object.h"
 
 #include "Piko/Target/CodeGeneration.h"
+#include "SelectBits.h"
 
 #include "llvm/ExecutionEngine/Orc/ExecutionUtils.h"
 #include "llvm/IR/IRBuilder.h"
@@ -106,10 +107,13 @@ struct LeaveOutGlobals : PassInfoMixin<LeaveOutGlobals> {
 };
 } // namespace
 
-/// The instrumentation, without a constructor: the program has initialised the
-/// runtime.
-static ModulePassManager instrument(Sanitizer sanitizer) {
+/// What runs behind the optimizer: the instrumentation, without a constructor,
+/// as the program has initialised the runtime.
+static ModulePassManager makeLastPasses(const Triple &triple, int optLevel,
+                                        Sanitizer sanitizer) {
   ModulePassManager passes;
+  if (triple.isX86() && optLevel > 0)
+    passes.addPass(createModuleToFunctionPassAdaptor(SelectBitsPass()));
   if (sanitizer == Sanitizer::Thread)
     passes.addPass(createModuleToFunctionPassAdaptor(ThreadSanitizerPass()));
   if (sanitizer == Sanitizer::Address) {
@@ -154,5 +158,6 @@ Expected<std::string> piko::generateCode(Module &module,
   return emitCode(module, **machine, options.optLevel,
                   format == CodeFormat::Object ? CodeGenFileType::ObjectFile
                                                : CodeGenFileType::AssemblyFile,
-                  instrument(options.sanitizer));
+                  makeLastPasses((*machine)->getTargetTriple(),
+                                 options.optLevel, options.sanitizer));
 }
