@@ -145,8 +145,14 @@ bool IndexBounds::holds(Value condition, bool truth, Value value, bool below) {
 }
 
 bool IndexBounds::isGuarded(Value value, bool below) {
-  if (!assumed.empty())
+  if (!assumed.empty() || !asked.insert({value, below}).second)
     return false;
+  bool found = isGuardedHere(value, below);
+  asked.erase({value, below});
+  return found;
+}
+
+bool IndexBounds::isGuardedHere(Value value, bool below) {
   for (Operation *op = at; op && !isa<ProcessOp, AssignOp>(op);
        op = op->getParentOp()) {
     Operation *parent = op->getParentOp();

@@ -41,6 +41,7 @@ private:
   bool isBelowArgument(mlir::BlockArgument argument);
   /// Whether a comparison that holds at this place says so.
   bool isGuarded(mlir::Value value, bool below);
+  bool isGuardedHere(mlir::Value value, bool below);
   /// Whether the condition, if it is as `truth` says, says so.
   bool holds(mlir::Value condition, bool truth, mlir::Value value, bool below);
   bool holds(mlir::arith::CmpIPredicate predicate, mlir::Value right,
@@ -52,6 +53,8 @@ private:
   /// is about earlier turns of a loop, too, and cannot use what holds only at
   /// this place.
   llvm::SmallDenseSet<mlir::Value> assumed;
+  /// What conditions are being asked about: a bound may be made of the value.
+  llvm::SmallDenseSet<std::pair<mlir::Value, bool>> asked;
 };
 
 } // namespace piko

@@ -4,6 +4,7 @@
 // reference, at the ends of buffers and past them.
 // RUN: piko-compare %s --pipe Rows --count 500 | FileCheck %s
 // RUN: piko-compare %s --pipe Tiles --count 300 | FileCheck %s
+// RUN: piko-compare %s --pipe Clamped --count 200 | FileCheck %s
 // CHECK: equal
 // RUN: not piko-compare %s --pipe Past --count 40 --runs 1 --threads 1 2 | FileCheck %s --check-prefix=PAST
 // RUN: not piko-compare %s --pipe Below --count 40 --runs 1 --threads 1 2 | FileCheck %s --check-prefix=BELOW
@@ -88,4 +89,23 @@ struct ReadBelow : piko::Stage<0, 0, 64, Point>, piko::Uses<State> {
 struct Below : piko::Pipe<State> {
   ReadBelow stage;
   Below() { source(stage); }
+};
+
+// A bound that is made of the index itself.
+struct ReadClamped : piko::Stage<0, 0, 64, Point>, piko::Uses<State> {
+  void process(const piko::List<Point> &list) {
+    float sum = 0;
+    for (int64_t i = 0; i < list.size(); ++i) {
+      int at = list[i].tag - 40, most = int(state().in.size()) - 1;
+      if (at == glm::clamp(at, 0, most))
+        sum += state().in[at];
+      if (glm::max(at, 0) == at && glm::min(most, at) == at)
+        sum -= 0.5f * state().in[at];
+    }
+    state().out[0] = sum;
+  }
+};
+struct Clamped : piko::Pipe<State> {
+  ReadClamped stage;
+  Clamped() { source(stage); }
 };
