@@ -54,7 +54,7 @@ private:
   /// this place.
   llvm::SmallDenseSet<mlir::Value> assumed;
   /// What conditions are being asked about: a bound may be made of the value.
-  llvm::SmallDenseSet<std::pair<mlir::Value, bool>> asked;
+  llvm::SmallDenseSet<std::pair<mlir::Value, unsigned>> asked;
 };
 
 } // namespace piko
