@@ -317,8 +317,8 @@ static void rebaseState(llvm::Module &module, MarkerTable &markers) {
     for (llvm::User *user : llvm::make_early_inc_range(function.users())) {
       auto *call = llvm::cast<llvm::CallInst>(user);
       llvm::IRBuilder<> builder(call);
-      call->replaceAllUsesWith(builder.CreateConstInBoundsGEP1_64(
-          builder.getInt8Ty(), builder.CreateCall(whole), offset));
+      call->replaceAllUsesWith(
+          makeMemberAddress(builder, builder.CreateCall(whole), offset));
       call->eraseFromParent();
     }
   }

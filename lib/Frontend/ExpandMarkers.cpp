@@ -135,9 +135,7 @@ private:
   }
 
   llvm::Value *at(llvm::Value *pointer, int64_t offset) {
-    return offset ? builder.CreateConstInBoundsGEP1_64(builder.getInt8Ty(),
-                                                       pointer, offset)
-                  : pointer;
+    return makeMemberAddress(builder, pointer, offset);
   }
 
   void loadRecord(llvm::Value *pointer, unsigned record,

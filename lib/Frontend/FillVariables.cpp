@@ -36,8 +36,7 @@ static void fill(llvm::AllocaInst *variable, llvm::Instruction *before,
                  MemoryMap &memory) {
   llvm::Type *type = variable->getAllocatedType();
   const MemoryLayout &layout = memory.getTypeLayout(type);
-  auto pieces =
-      getPieces(layout, Address{variable, 0, {}}, layout.size, fillLimit);
+  auto pieces = getPieces(layout, Address{variable}, layout.size, fillLimit);
   if (!pieces || variable->isArrayAllocation())
     return;
   llvm::IRBuilder<> builder(before);
@@ -47,9 +46,8 @@ static void fill(llvm::AllocaInst *variable, llvm::Instruction *before,
       continue;
     llvm::Value *value =
         builder.CreateCall(getUndefined(*variable->getModule(), piece.type));
-    builder.CreateStore(
-        value, builder.CreateConstInBoundsGEP1_64(builder.getInt8Ty(), variable,
-                                                  piece.offset));
+    builder.CreateStore(value,
+                        makeMemberAddress(builder, variable, piece.offset));
   }
 }
 

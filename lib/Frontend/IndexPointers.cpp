@@ -159,12 +159,14 @@ private:
     origin = first->offset;
   }
 
-  /// Whether all begin within one memory.
+  /// Whether all begin within one member of one memory.
   bool haveOneBase() const {
     return !addresses.empty() &&
            llvm::all_of(addresses,
                         [&](const Address &address) {
-                          return address.base == addresses.front().base;
+                          return address.base == addresses.front().base &&
+                                 address.member == addresses.front().member &&
+                                 address.unclear == addresses.front().unclear;
                         }) &&
            dominatesAll(addresses.front().base);
   }
@@ -222,9 +224,12 @@ private:
                                    ->getFunction()
                                    ->getEntryBlock()
                                    .getFirstInsertionPt());
-    root = origin == 0 ? base
-                       : builder.CreateConstInBoundsGEP1_64(builder.getInt8Ty(),
-                                                            base, origin);
+    // Along the elements of the member, even where it begins before them.
+    int64_t member = addresses.front().member + addresses.front().unclear;
+    root = makeMemberAddress(builder, base, member);
+    if (origin != member)
+      root = builder.CreateConstGEP1_64(
+          llvm::ArrayType::get(builder.getInt8Ty(), 1), root, origin - member);
     fromOrigin = true;
   }
 

@@ -4,6 +4,7 @@
 #include "Memory.h"
 
 #include "llvm/ADT/MapVector.h"
+#include "llvm/IR/GetElementPtrTypeIterator.h"
 #include "llvm/IR/GlobalVariable.h"
 #include "llvm/IR/Instructions.h"
 #include "llvm/IR/Operator.h"
@@ -93,9 +94,66 @@ static std::pair<llvm::Value *, int64_t> splitFactor(llvm::Value *value) {
   return {value, 1};
 }
 
+/// Adds the constant indices of a step, as members and elements.
+static void addConstants(llvm::GEPOperator *step, const llvm::DataLayout &data,
+                         Address &address) {
+  for (auto part = llvm::gep_type_begin(step), end = llvm::gep_type_end(step);
+       part != end; ++part) {
+    const auto *number = dyn_cast<llvm::ConstantInt>(part.getOperand());
+    if (!number || number->isZero())
+      continue;
+    if (llvm::StructType *structure = part.getStructTypeOrNull())
+      address.member += data.getStructLayout(structure)->getElementOffset(
+          number->getZExtValue());
+    else
+      address.steps.push_back(
+          {number->getSExtValue(),
+           part.getSequentialElementStride(data).getFixedValue()});
+  }
+}
+
+/// What the steps from the base say about its constant part. Clang writes the
+/// way to a base class like a step along an array of bytes; what the pointer
+/// points to before and after it may tell them apart.
+static void addSteps(llvm::ArrayRef<llvm::GEPOperator *> steps,
+                     const llvm::DataLayout &data, Address &address) {
+  llvm::Type *pointee = nullptr;
+  for (llvm::GEPOperator *step : llvm::reverse(steps)) {
+    llvm::Type *type = step->getSourceElementType();
+    const auto *bytes = dyn_cast<llvm::ConstantInt>(step->getOperand(1));
+    // A step over elements of so many bytes, as indexed pointers are.
+    bool isUntyped = type->isArrayTy() && step->getNumIndices() == 1 &&
+                     type->getArrayElementType()->isIntegerTy(8);
+    if (isUntyped && data.getTypeAllocSize(type) == 1) {
+      addConstants(step, data, address);
+      if (!bytes)
+        pointee = llvm::Type::getInt8Ty(type->getContext());
+      continue;
+    }
+    if (!type->isIntegerTy(8)) {
+      address.member += address.unclear;
+      address.unclear = 0;
+      addConstants(step, data, address);
+      if (!isUntyped)
+        pointee = step->getResultElementType();
+      continue;
+    }
+    if (!bytes)
+      pointee = type;
+    else if (!pointee)
+      address.unclear += bytes->getSExtValue();
+    else if (pointee->isStructTy())
+      address.member += bytes->getSExtValue();
+    else
+      address.steps.push_back({bytes->getSExtValue(), 1});
+    if (pointee && pointee->isStructTy())
+      pointee = nullptr;
+  }
+}
+
 Address piko::getAddress(llvm::Value *pointer, const llvm::DataLayout &data) {
   Address address;
-  llvm::MapVector<llvm::Value *, int64_t> terms;
+  llvm::SmallVector<llvm::GEPOperator *> steps;
   while (auto *step = dyn_cast<llvm::GEPOperator>(pointer)) {
     unsigned width = data.getIndexTypeSizeInBits(step->getType());
     llvm::SmallMapVector<llvm::Value *, llvm::APInt, 4> variable;
@@ -105,14 +163,25 @@ Address piko::getAddress(llvm::Value *pointer, const llvm::DataLayout &data) {
     address.offset += constant.getSExtValue();
     for (auto &[index, scale] : variable) {
       auto [value, factor] = splitFactor(index);
-      terms[value] += scale.getSExtValue() * factor;
+      // One number may be an index of two dimensions: they stay apart.
+      address.terms.push_back({value, scale.getSExtValue() * factor});
     }
+    steps.push_back(step);
     pointer = step->getPointerOperand();
   }
   address.base = pointer;
-  for (auto &[value, scale] : terms)
-    address.terms.push_back({value, scale});
+  addSteps(steps, data, address);
   return address;
+}
+
+llvm::Value *piko::makeMemberAddress(llvm::IRBuilderBase &builder,
+                                     llvm::Value *record, int64_t offset) {
+  if (offset == 0)
+    return record;
+  llvm::Type *byte = builder.getInt8Ty();
+  return builder.CreateStructGEP(
+      llvm::StructType::get(llvm::ArrayType::get(byte, offset), byte), record,
+      1);
 }
 
 llvm::Value *MemoryIndex::materialize(llvm::IRBuilderBase &builder) const {
@@ -128,65 +197,109 @@ llvm::Value *MemoryIndex::materialize(llvm::IRBuilderBase &builder) const {
   return constant ? builder.CreateAdd(sum, builder.getInt64(constant)) : sum;
 }
 
-/// Divides an address among the dimensions of a leaf. `inside` says whether the
-/// constant part is within the array.
-static std::optional<MemoryAccess>
-matchLeaf(const MemoryLeaf &leaf, const Address &address, bool &inside) {
+/// The element of a leaf at an offset in its record.
+static std::optional<MemoryAccess> matchLeaf(const MemoryLeaf &leaf,
+                                             int64_t offset) {
   MemoryAccess access{0, {}};
-  int64_t rest = address.offset - leaf.offset;
-  inside = true;
-  llvm::SmallVector<std::pair<llvm::Value *, int64_t>, 2> terms(
-      address.terms.begin(), address.terms.end());
-  for (const MemoryDimension &dimension : leaf.dimensions) {
-    MemoryIndex index;
-    // A term belongs to the outermost dimension whose stride divides its scale.
-    llvm::erase_if(terms, [&](auto &term) {
-      if (dimension.stride == 0 || term.second % dimension.stride != 0)
-        return false;
-      index.terms.push_back({term.first, term.second / dimension.stride});
-      return true;
-    });
-    index.constant = dimension.stride == 0
-                         ? 0
-                         : llvm::divideFloorSigned(rest, dimension.stride);
-    rest -= index.constant * dimension.stride;
-    inside &= index.constant >= 0 && index.constant < dimension.count;
-    if (!inside && index.terms.empty())
+  int64_t rest = offset - leaf.offset;
+  for (auto [count, stride] : leaf.dimensions) {
+    int64_t index = stride == 0 ? 0 : llvm::divideFloorSigned(rest, stride);
+    rest -= index * stride;
+    if (index < 0 || index >= count)
       return std::nullopt;
-    access.indices.push_back(std::move(index));
+    access.indices.push_back({index, {}});
   }
-  if (rest != 0 || !terms.empty())
+  return rest == 0 ? std::optional(access) : std::nullopt;
+}
+
+/// Adds so many bytes to the indices of a leaf, those of the outer dimensions
+/// first; false if there is a rest.
+static bool addBytes(const MemoryLeaf &leaf, int64_t bytes,
+                     MemoryAccess &access) {
+  for (auto [dimension, index] : llvm::zip(leaf.dimensions, access.indices)) {
+    if (dimension.stride == 0)
+      continue;
+    index.constant += bytes / dimension.stride;
+    bytes %= dimension.stride;
+  }
+  return bytes == 0;
+}
+
+/// Divides what is added to the first element among the dimensions of a leaf.
+static bool addIndices(const MemoryLeaf &leaf, const Address &address,
+                       MemoryAccess &access) {
+  // A term belongs to the outermost dimension whose stride divides its scale.
+  auto find = [&](int64_t scale) -> std::optional<unsigned> {
+    for (auto [number, dimension] : llvm::enumerate(leaf.dimensions))
+      if (dimension.stride != 0 && scale % dimension.stride == 0)
+        return number;
     return std::nullopt;
-  return access;
+  };
+  for (auto [value, scale] : address.terms) {
+    std::optional<unsigned> number = find(scale);
+    if (!number)
+      return false;
+    access.indices[*number].terms.push_back(
+        {value, scale / leaf.dimensions[*number].stride});
+  }
+  int64_t bytes = 0;
+  for (auto [count, scale] : address.steps) {
+    if (std::optional<unsigned> number = find(scale))
+      access.indices[*number].constant +=
+          count * (scale / leaf.dimensions[*number].stride);
+    else
+      bytes += count * scale;
+  }
+  return addBytes(leaf, bytes, access);
+}
+
+/// The access to the array of which an element is at `member`.
+static std::optional<MemoryAccess> resolveElement(const MemoryLayout &layout,
+                                                  const Address &address,
+                                                  int64_t size,
+                                                  int64_t member) {
+  for (auto [number, leaf] : llvm::enumerate(layout.leaves)) {
+    int64_t bytes =
+        leaf.type->isPointerTy()
+            ? 8
+            : static_cast<int64_t>(leaf.type->getPrimitiveSizeInBits() + 7) / 8;
+    if (bytes != size)
+      continue;
+    std::optional<MemoryAccess> access = matchLeaf(leaf, member);
+    if (!access)
+      continue;
+    access->leaf = number;
+    if (addIndices(leaf, address, *access))
+      return access;
+  }
+  return std::nullopt;
 }
 
 std::optional<MemoryAccess> piko::resolveAccess(const MemoryLayout &layout,
                                                 const Address &address,
                                                 int64_t size) {
-  std::optional<MemoryAccess> outside;
-  for (auto [number, leaf] : llvm::enumerate(layout.leaves)) {
-    if (static_cast<int64_t>(leaf.type->getPrimitiveSizeInBits() + 7) / 8 !=
-            size &&
-        !(leaf.type->isPointerTy() && size == 8))
-      continue;
-    bool inside;
-    std::optional<MemoryAccess> access = matchLeaf(leaf, address, inside);
-    if (!access)
-      continue;
-    access->leaf = number;
-    if (inside)
-      return access;
-    if (!outside)
-      outside = access;
-  }
-  return outside;
+  if (address.terms.empty())
+    return resolveElement(layout, Address{address.base}, size, address.offset);
+  std::optional<MemoryAccess> access =
+      resolveElement(layout, address, size, address.member + address.unclear);
+  if (size != 1 || address.unclear == 0)
+    return access;
+  Address along = address;
+  along.steps.push_back({address.unclear, 1});
+  std::optional<MemoryAccess> other =
+      resolveElement(layout, along, size, address.member);
+  if (access && other && access->leaf != other->leaf)
+    return std::nullopt;
+  return access ? access : other;
 }
 
 std::optional<llvm::SmallVector<MemoryPiece>>
 piko::getPieces(const MemoryLayout &layout, const Address &address,
                 int64_t size, int64_t limit) {
   // What a variable index selects looks the same at each index.
-  int64_t begin = address.offset, end = begin + size;
+  int64_t begin =
+      address.terms.empty() ? address.offset : address.member + address.unclear;
+  int64_t end = begin + size;
   llvm::SmallVector<MemoryPiece> pieces;
   for (const MemoryLeaf &leaf : layout.leaves) {
     int64_t bytes = leaf.type->isPointerTy()

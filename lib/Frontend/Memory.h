@@ -47,15 +47,28 @@ MemoryLayout getLayout(llvm::Type *type, const llvm::DataLayout &data);
 /// The LLVM type of a leaf field.
 llvm::Type *getScalarType(ScalarType type, llvm::LLVMContext &context);
 
-/// base + offset + sum of value * scale, in bytes.
+/// base + offset + sum of value * scale, in bytes. The constant part alone does
+/// not say which of a record's arrays a variable index is of: `v[i - 1]` has
+/// one that points before `v`.
 struct Address {
   llvm::Value *base = nullptr;
   int64_t offset = 0;
-  llvm::SmallVector<std::pair<llvm::Value *, int64_t>, 2> terms;
+  llvm::SmallVector<std::pair<llvm::Value *, int64_t>, 2> terms = {};
+
+  /// The part of `offset` that members add: where the first element is.
+  int64_t member = 0;
+  /// The part of it that leads to a base class or along an array of bytes.
+  int64_t unclear = 0;
+  /// The parts of it that elements of a size add, as a count and that size.
+  llvm::SmallVector<std::pair<int64_t, int64_t>, 2> steps = {};
 };
 
 /// Follows address arithmetic to where it begins.
 Address getAddress(llvm::Value *pointer, const llvm::DataLayout &data);
+
+/// The address of what is `offset` bytes into a record: a member of it.
+llvm::Value *makeMemberAddress(llvm::IRBuilderBase &builder,
+                               llvm::Value *record, int64_t offset);
 
 /// An index of a leaf array: constant + sum of value * factor.
 struct MemoryIndex {
@@ -72,7 +85,8 @@ struct MemoryAccess {
   llvm::SmallVector<MemoryIndex, 2> indices;
 };
 
-/// The number of `size` bytes at an address; none if no leaf is exactly there.
+/// The number of `size` bytes at an address; none if no leaf is exactly there,
+/// or if it cannot be told which one's elements a variable index counts.
 std::optional<MemoryAccess> resolveAccess(const MemoryLayout &layout,
                                           const Address &address, int64_t size);
 
