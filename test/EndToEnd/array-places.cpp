@@ -50,7 +50,8 @@ struct Places : piko::Stage<0, 0, 64, Item>, piko::Uses<State> {
     // 1 to 4, 1 to 3.
     int i = (p.i & 3) + 1, j = (p.j & 3) % 3 + 1;
     read(p, out.found, i, j);
-    out.found[8] = *(p.d + i - 1) + 3 * *(p.c + i - 1) + 5 * *(std::end(p.c) - i);
+    out.found[8] =
+        *(p.d + i - 1) + 3 * *(p.c + i - 1) + 5 * *(std::end(p.c) - i);
     write(out, i, j);
     Result copy = {};
     write(copy, j, j);

@@ -4,8 +4,12 @@
 #include <piko.h>
 
 #include <random>
-struct D { int a; };
-struct S { piko::Buffer<int> o; };
+struct D {
+  int a;
+};
+struct S {
+  piko::Buffer<int> o;
+};
 struct T : piko::Stage<0, 0, 1, D>, piko::Uses<S> {
   void process(const D &d) {
     std::mt19937 g(d.a);
@@ -13,4 +17,7 @@ struct T : piko::Stage<0, 0, 1, D>, piko::Uses<S> {
     state().o[0] = int(g());
   }
 };
-struct P : piko::Pipe<S> { T t; P() { source(t); } };
+struct P : piko::Pipe<S> {
+  T t;
+  P() { source(t); }
+};
