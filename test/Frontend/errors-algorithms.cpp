@@ -41,7 +41,7 @@ struct Sorter : piko::Stage<0, 0, 1, A, A> {
       *p += 1;
 #elif CASE == 7
     std::atomic<int> n = 0;
-    // PARTS: errors-algorithms.cpp:[[#@LINE + 1]]:7: error: not supported in Piko: a local variable 'n' whose parts are accessed in ways that cannot be told apart, in stage 'sorter'; access its members by name and its arrays by index{{$}}
+    // PARTS: errors-algorithms.cpp:[[#@LINE - 1]]:26: error: not supported in Piko: a local variable 'n' whose parts are accessed in ways that cannot be told apart, in stage 'sorter'; access its members by name and its arrays by index{{$}}
     n.fetch_add(1);
     out.x = n.load();
 #else

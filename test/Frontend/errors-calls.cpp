@@ -107,7 +107,7 @@ struct Stage : piko::Stage<0, 0, 1, A, A> {
     // FENCE: atomic_base.h:{{.*}}: note: 'std::atomic_thread_fence' does it here
 #elif CASE == 12
     std::atomic<int> n = 0;
-    // ATOMIC: errors-calls.cpp:[[#@LINE + 1]]:7: error: not supported in Piko: a local variable 'n' whose parts are accessed in ways that cannot be told apart
+    // ATOMIC: errors-calls.cpp:[[#@LINE - 1]]:26: error: not supported in Piko: a local variable 'n' whose parts are accessed in ways that cannot be told apart
     n.fetch_add(1);
     out.x = float(n.load());
 #elif CASE == 13
