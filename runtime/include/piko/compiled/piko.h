@@ -15,6 +15,9 @@ namespace piko {
 
 /// The base of pipelines. Stages are members; the constructor connects them.
 template <class S = NoState> class Pipe {
+  // As in the reference, which holds one: an instance of a template is made.
+  static_assert(sizeof(S) > 0);
+
 public:
   Pipe() = default;
   Pipe(const Pipe &) = delete;
