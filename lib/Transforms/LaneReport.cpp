@@ -43,7 +43,8 @@ static std::string describeInner(Operation *op, const LanePlanner &planner) {
       .Case<memref::AllocaOp, memref::LoadOp, memref::StoreOp>(
           [](auto) { return "it uses a local array"; })
       .Case([](scf::ForOp) { return "it holds a parallelFor"; })
-      .Case<arith::DivSIOp, arith::DivUIOp, arith::RemSIOp, arith::RemUIOp>(
+      .Case<DivideOp, arith::DivSIOp, arith::DivUIOp, arith::RemSIOp,
+            arith::RemUIOp>(
           [](auto) { return "it divides integers, perhaps by 0"; })
       .Default([](Operation *other) {
         return "it holds '" + other->getName().getStringRef().str() +

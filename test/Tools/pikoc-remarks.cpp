@@ -95,7 +95,7 @@ struct Emits : piko::Stage<0, 0, 64, Item, Item> {
 struct Divides : piko::Stage<0, 0, 64, Item>, piko::Uses<State> {
   // DIVIDES: :[[#@LINE+1]]:8: remark: stage 'divides': process is not vectorized
   void process(const Item &i) {
-    // DIVIDES: :[[#@LINE+1]]:{{[0-9]+}}: note: 'piko.divide' is not vectorized: it has no vector form
+    // DIVIDES: :[[#@LINE+1]]:{{[0-9]+}}: note: this division of integers is not vectorized: it may be by 0
     int part = 100 / i.count;
     state().numbers[i.at.x] = part * part + i.at.y;
   }
