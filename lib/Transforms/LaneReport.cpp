@@ -75,10 +75,10 @@ static std::string describe(Operation *op, const LanePlanner &planner) {
         return "this parallelFor" + isNot +
                ": its iterations run one after the other";
       })
-      .Case<arith::DivSIOp, arith::DivUIOp, arith::RemSIOp, arith::RemUIOp>(
-          [&](auto) {
-            return "this division of integers" + isNot + ": it may be by 0";
-          })
+      .Case<DivideOp, arith::DivSIOp, arith::DivUIOp, arith::RemSIOp,
+            arith::RemUIOp>([&](auto) {
+        return "this division of integers" + isNot + ": it may be by 0";
+      })
       .Default([&](Operation *other) {
         return "'" + other->getName().getStringRef().str() + "'" + isNot +
                ": it has no vector form";
