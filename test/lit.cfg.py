@@ -16,6 +16,7 @@ split-file. Substitutions:
   %other_cxx     another C++ compiler, where one can use this build's runtime
   %cxx_host      compiler and flags that build a host of compiled pipelines
   %link_host     what such a host links
+  %qt_include    folder of Qt's headers
   %cxx_reference compiler and flags that build a pipeline file with the
                  reference executor
 
@@ -24,6 +25,7 @@ is, `ptxas` where NVIDIA's assembler is, `asan` and `tsan` in builds with that
 sanitizer.
 """
 
+import glob
 import os
 import platform
 import shutil
@@ -70,6 +72,7 @@ config.substitutions += [
     ("%examples", os.path.join(config.piko_source_root, "examples")),
     ("%bunny", bunny),
     ("%python", config.python),
+    ("%qt_include", "".join(glob.glob("/usr/include/*/qt5")[:1])),
     ("%utils", os.path.join(config.piko_source_root, "utils")),
     ("%readme", os.path.join(config.piko_source_root, "README.md")),
     ("%docs", os.path.join(config.piko_source_root, "docs")),

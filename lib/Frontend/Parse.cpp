@@ -27,6 +27,7 @@
 #include "ClangInvocation.h"
 #include "EvaluationOrder.h"
 #include "FillVariables.h"
+#include "HidingMacros.h"
 #include "PhaseNames.h"
 #include "Wrappers.h"
 #include "clang/AST/ASTConsumer.h"
@@ -178,6 +179,9 @@ public:
     if (compiler.getDiagnostics().hasErrorOccurred())
       return;
     diagnostics.flush();
+    if (failed(refuseHidingMacros(preprocessor, compiler.getASTContext(),
+                                  context)))
+      return;
     // Stages and phases may be private.
     compiler.getLangOpts().AccessControl = false;
     std::string wrappers;

@@ -13,6 +13,13 @@
 #ifndef PIKO_H
 #define PIKO_H
 
+// Would make nothing of emissions, without a word.
+#ifdef emit
+#error "a macro called 'emit' hides a function of Piko: with Qt, define \
+QT_NO_KEYWORDS; else write '#undef emit' in front of this header"
+#undef emit
+#endif
+
 #include <piko/bins.h>
 #include <piko/math.h>
 
