@@ -234,9 +234,12 @@ static bool cleanUpFunction(llvm::Function &function, ParsedUnit &unit,
   simplify.addPass(llvm::SimplifyCFGPass());
   if (!promoteVariables(function, unit, context))
     return false;
+  holdMembers(function);
   runner.run(simplify, function);
-  if (function.getName().starts_with("__piko_wrapper_clear_"))
+  if (function.getName().starts_with("__piko_wrapper_clear_")) {
+    releaseMembers(function);
     unrollLoops(function, runner);
+  }
   // Each round sees through one more level of references.
   bool localized = false;
   for (int round = 0; round < roundLimit; ++round) {
@@ -262,6 +265,7 @@ static bool cleanUpFunction(llvm::Function &function, ParsedUnit &unit,
     }
     if (!promoteVariables(function, unit, context))
       return false;
+    holdMembers(function);
     runner.run(simplify, function);
   }
   bool released = false;
@@ -278,9 +282,11 @@ static bool cleanUpFunction(llvm::Function &function, ParsedUnit &unit,
   promote.addPass(llvm::SROAPass(llvm::SROAOptions::PreserveCFG));
   promote.addPass(llvm::EarlyCSEPass(/*UseMemorySSA=*/true));
   promote.addPass(llvm::SimplifyCFGPass());
+  releaseMembers(function, /*onlyLocal=*/true);
   runner.run(promote, function);
   if (!resolveAccesses(function, unit, memory, context))
     return false;
+  releaseMembers(function);
   releaseDivisions(function, unit.markers);
 
   llvm::FunctionPassManager finish;

@@ -225,7 +225,8 @@ private:
     llvm::SetVector<llvm::Value *> choices, targets;
     collectChoices(step->getPointerOperand(), choices, targets);
     for (llvm::Value *index : step->indices())
-      if (auto *definition = dyn_cast<llvm::Instruction>(index))
+      if (auto *definition = dyn_cast<llvm::Instruction>(index);
+          definition && !getConstantIndex(index))
         for (llvm::Value *choice : choices)
           if (!dominance.properlyDominates(
                   definition->getParent(),
@@ -283,7 +284,7 @@ private:
   static bool isFixed(const llvm::Instruction *definition,
                       const llvm::Value *input) {
     return llvm::isa<llvm::GetElementPtrInst>(definition) &&
-           llvm::isa<llvm::Constant>(input);
+           (llvm::isa<llvm::Constant>(input) || getConstantIndex(input));
   }
 
   /// Whether a pointer can be computed again, given its numbers.

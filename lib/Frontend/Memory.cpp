@@ -99,16 +99,15 @@ static void addConstants(llvm::GEPOperator *step, const llvm::DataLayout &data,
                          Address &address) {
   for (auto part = llvm::gep_type_begin(step), end = llvm::gep_type_end(step);
        part != end; ++part) {
-    const auto *number = dyn_cast<llvm::ConstantInt>(part.getOperand());
-    if (!number || number->isZero())
+    std::optional<int64_t> number = getConstantIndex(part.getOperand());
+    if (!number || *number == 0)
       continue;
     if (llvm::StructType *structure = part.getStructTypeOrNull())
       address.member += data.getStructLayout(structure)->getElementOffset(
-          number->getZExtValue());
+          static_cast<unsigned>(*number));
     else
       address.steps.push_back(
-          {number->getSExtValue(),
-           part.getSequentialElementStride(data).getFixedValue()});
+          {*number, part.getSequentialElementStride(data).getFixedValue()});
   }
 }
 
@@ -120,7 +119,7 @@ static void addSteps(llvm::ArrayRef<llvm::GEPOperator *> steps,
   llvm::Type *pointee = nullptr;
   for (llvm::GEPOperator *step : llvm::reverse(steps)) {
     llvm::Type *type = step->getSourceElementType();
-    const auto *bytes = dyn_cast<llvm::ConstantInt>(step->getOperand(1));
+    std::optional<int64_t> bytes = getConstantIndex(step->getOperand(1));
     // A step over elements of so many bytes, as indexed pointers are.
     bool isUntyped = type->isArrayTy() && step->getNumIndices() == 1 &&
                      type->getArrayElementType()->isIntegerTy(8);
@@ -141,11 +140,11 @@ static void addSteps(llvm::ArrayRef<llvm::GEPOperator *> steps,
     if (!bytes)
       pointee = type;
     else if (!pointee)
-      address.unclear += bytes->getSExtValue();
+      address.unclear += *bytes;
     else if (pointee->isStructTy())
-      address.member += bytes->getSExtValue();
+      address.member += *bytes;
     else
-      address.steps.push_back({bytes->getSExtValue(), 1});
+      address.steps.push_back({*bytes, 1});
     if (pointee && pointee->isStructTy())
       pointee = nullptr;
   }
@@ -162,6 +161,10 @@ Address piko::getAddress(llvm::Value *pointer, const llvm::DataLayout &data) {
       break;
     address.offset += constant.getSExtValue();
     for (auto &[index, scale] : variable) {
+      if (std::optional<int64_t> held = getConstantIndex(index)) {
+        address.offset += *held * scale.getSExtValue();
+        continue;
+      }
       auto [value, factor] = splitFactor(index);
       // One number may be an index of two dimensions: they stay apart.
       address.terms.push_back({value, scale.getSExtValue() * factor});

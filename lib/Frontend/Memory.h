@@ -66,6 +66,15 @@ struct Address {
 /// Follows address arithmetic to where it begins.
 Address getAddress(llvm::Value *pointer, const llvm::DataLayout &data);
 
+/// What an index of a step is, if it is known: a constant, also a held one.
+std::optional<int64_t> getConstantIndex(const llvm::Value *index);
+
+/// Keeps LLVM's passes from taking members for elements at the same place;
+/// before each of them that compares addresses.
+void holdMembers(llvm::Function &function);
+/// Ends this, for all memory or for local variables alone.
+void releaseMembers(llvm::Function &function, bool onlyLocal = false);
+
 /// The address of what is `offset` bytes into a record: a member of it.
 llvm::Value *makeMemberAddress(llvm::IRBuilderBase &builder,
                                llvm::Value *record, int64_t offset);

@@ -52,6 +52,8 @@ struct Places : piko::Stage<0, 0, 64, Item>, piko::Uses<State> {
     read(p, out.found, i, j);
     out.found[8] =
         *(p.d + i - 1) + 3 * *(p.c + i - 1) + 5 * *(std::end(p.c) - i);
+    Item local = p;
+    read(local, out.found + 12, i, j);
     write(out, i, j);
     Result copy = {};
     write(copy, j, j);
