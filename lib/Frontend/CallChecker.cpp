@@ -45,6 +45,10 @@ static llvm::StringRef getRemedy(llvm::StringRef callee) {
   if (llvm::is_contained(sorts, callee))
     return "; use std::partial_sort up to the end of the range, or sort(key) "
            "in a parallelFor";
+  if (callee.starts_with("std::") &&
+      callee.ends_with("_distribution::operator()"))
+    return "; compute it from what the engine gives, as in g() % 6 + 1 and "
+           "float(g() >> 8) * 0x1p-24f";
   return "";
 }
 

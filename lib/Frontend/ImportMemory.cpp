@@ -134,10 +134,6 @@ LogicalResult PhaseImporter::importArrayAccess(llvm::Instruction *instruction) {
   if (!fits)
     return reject(instruction,
                   "access to an array that is not to one of its elements");
-  for (auto [value, scale] : address.terms)
-    if (!values.contains(value) && !llvm::isa<llvm::Constant>(value))
-      return reject(instruction,
-                    "an index that is computed from the place of a variable");
   mlir::Value index = makeElementIndex(address, size);
   mlir::Type type = scalars.getType(accessed);
   if (store) {

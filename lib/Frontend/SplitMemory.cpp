@@ -174,8 +174,16 @@ private:
 
   struct Use {
     llvm::Instruction *instruction;
-    MemoryAccess access;
+    unsigned leaf;
   };
+
+  std::optional<MemoryAccess> getAccess(const llvm::Instruction *instruction,
+                                        const MemoryLayout &layout) {
+    const llvm::Value *pointer = llvm::getLoadStorePointerOperand(instruction);
+    return resolveAccess(
+        layout, getAddress(const_cast<llvm::Value *>(pointer), memory.data),
+        memory.data.getTypeStoreSize(llvm::getLoadStoreType(instruction)));
+  }
 
   /// Finds all loads and stores of a variable; false if it is used otherwise,
   /// or if one of them is not of one number.
@@ -195,15 +203,14 @@ private:
         type = store->getValueOperand()->getType();
       if (!type || type->isAggregateType())
         return false;
-      std::optional<MemoryAccess> access =
-          resolveAccess(layout, getAddress(pointer, memory.data),
-                        memory.data.getTypeStoreSize(type));
+      auto *use = llvm::cast<llvm::Instruction>(user);
+      std::optional<MemoryAccess> access = getAccess(use, layout);
       if (!access)
         return false;
       bool isPointer = layout.leaves[access->leaf].type->isPointerTy();
       if (isPointer != type->isPointerTy())
         return false;
-      uses.push_back({llvm::cast<llvm::Instruction>(user), *access});
+      uses.push_back({use, access->leaf});
     }
     return true;
   }
@@ -222,10 +229,10 @@ private:
     builder.SetInsertPoint(variable);
     llvm::SmallVector<llvm::Value *> leaves(layout.leaves.size(), nullptr);
     for (const Use &use : uses) {
-      llvm::Value *&leaf = leaves[use.access.leaf];
+      llvm::Value *&leaf = leaves[use.leaf];
       if (leaf)
         continue;
-      const MemoryLeaf &shape = layout.leaves[use.access.leaf];
+      const MemoryLeaf &shape = layout.leaves[use.leaf];
       llvm::Type *leafType = shape.type;
       if (!shape.dimensions.empty())
         leafType = llvm::ArrayType::get(leafType, shape.getElementCount());
@@ -235,19 +242,22 @@ private:
       leaf = part;
     }
     for (const Use &use : uses)
-      rewriteUse(use, layout.leaves[use.access.leaf], leaves[use.access.leaf]);
+      rewriteUse(use, layout, leaves[use.leaf]);
     changed = true;
   }
 
-  void rewriteUse(const Use &use, const MemoryLeaf &leaf,
+  void rewriteUse(const Use &use, const MemoryLayout &layout,
                   llvm::Value *pointer) {
+    const MemoryLeaf &leaf = layout.leaves[use.leaf];
+    // Anew, since an index may be another number of this variable.
+    MemoryAccess access = *getAccess(use.instruction, layout);
     builder.SetInsertPoint(use.instruction);
     if (!leaf.dimensions.empty()) {
       MemoryIndex linear;
       int64_t factor = 1;
       for (size_t d = leaf.dimensions.size(); d-- > 0;) {
-        linear.constant += use.access.indices[d].constant * factor;
-        for (auto [value, scale] : use.access.indices[d].terms)
+        linear.constant += access.indices[d].constant * factor;
+        for (auto [value, scale] : access.indices[d].terms)
           linear.terms.push_back({value, scale * factor});
         factor *= leaf.dimensions[d].count;
       }
