@@ -247,6 +247,7 @@ static bool cleanUpFunction(llvm::Function &function, ParsedUnit &unit,
       return false;
     bool changed = releaseDivisions(function, unit.markers);
     changed |= splitMemory(function, memory);
+    changed |= expandCopies(function, unit, memory);
     changed |= flattenPointers(function, memory);
     if (!expandLocalAtomics(function, unit, memory, context, changed))
       return false;

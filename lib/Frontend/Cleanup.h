@@ -10,6 +10,7 @@
 //      holdDivisions   what an integer division without a result is, the run
 //      says
 //   4. rounds of       splitMemory     copies and variables, number by number
+//                      expandCopies    copies that are loops
 //                      flattenPointers phis and selects of pointers (first
 //                                      indexPointers: those that walk)
 //                      expandLocalAtomics
@@ -75,6 +76,14 @@ void expandMarkers(llvm::Function &function, MemoryMap &memory);
 /// Both return whether they changed anything.
 bool splitMemory(llvm::Function &function, MemoryMap &memory);
 bool flattenPointers(llvm::Function &function, MemoryMap &memory);
+
+/// Copies and fills of a number of elements that varies become loops; whether
+/// there were any.
+bool expandCopies(llvm::Function &function, const ParsedUnit &unit,
+                  MemoryMap &memory);
+/// A number each byte of which is this one.
+llvm::Value *repeatByte(llvm::IRBuilderBase &builder, llvm::Value *byte,
+                        llvm::Type *type, const llvm::DataLayout &data);
 
 /// Atomics on local variables become loads and stores; false after an error.
 bool expandLocalAtomics(llvm::Function &function, const ParsedUnit &unit,

@@ -17,6 +17,7 @@
 #include "llvm/IR/Dominators.h"
 #include "llvm/IR/InstIterator.h"
 #include "llvm/IR/Instructions.h"
+#include "llvm/IR/IntrinsicInst.h"
 #include "llvm/Transforms/Utils/BasicBlockUtils.h"
 #include "llvm/Transforms/Utils/Local.h"
 
@@ -66,13 +67,6 @@ private:
   // Pointers into one array
   //===--------------------------------------------------------------------===//
 
-  llvm::Value *makeOffset(const Address &address) {
-    MemoryIndex offset{address.offset, {}};
-    for (auto [value, scale] : address.terms)
-      offset.terms.push_back({value, scale});
-    return offset.materialize(builder);
-  }
-
   void compareOffsets(llvm::Instruction *instruction) {
     llvm::Value *left = instruction->getOperand(0);
     llvm::Value *right = instruction->getOperand(1);
@@ -92,7 +86,7 @@ private:
     if (a.base != b.base)
       return;
     builder.SetInsertPoint(instruction);
-    llvm::Value *x = makeOffset(a), *y = makeOffset(b);
+    llvm::Value *x = makeOffset(a, builder), *y = makeOffset(b, builder);
     llvm::Value *result =
         comparison ? builder.CreateICmp(comparison->getSignedPredicate(), x, y)
                    : builder.CreateSExtOrTrunc(builder.CreateSub(x, y),
@@ -109,6 +103,8 @@ private:
   struct Access {
     llvm::Instruction *instruction;
     llvm::Value *choice;
+    /// Which of its operands is the place.
+    unsigned operand;
     /// From the choice to the access, the last step first.
     llvm::SmallVector<llvm::GetElementPtrInst *> steps;
   };
@@ -245,23 +241,37 @@ private:
   void collectAccesses(llvm::Value *choice, llvm::Value *pointer,
                        llvm::SmallVector<llvm::GetElementPtrInst *> steps,
                        llvm::SmallVectorImpl<Access> &accesses) {
-    for (llvm::User *user : pointer->users()) {
+    for (llvm::Use &use : pointer->uses()) {
+      auto *user = llvm::cast<llvm::Instruction>(use.getUser());
       if (auto *step = dyn_cast<llvm::GetElementPtrInst>(user)) {
         auto further = steps;
         further.insert(further.begin(), step);
         collectAccesses(choice, step, further, accesses);
-      } else if (auto *load = dyn_cast<llvm::LoadInst>(user)) {
-        accesses.push_back({load, choice, steps});
-      } else if (auto *store = dyn_cast<llvm::StoreInst>(user)) {
-        if (store->getPointerOperand() == pointer)
-          accesses.push_back({store, choice, steps});
-      } else if (auto *call = dyn_cast<llvm::CallInst>(user)) {
-        const Marker *marker = getMarker(call, memory.markers);
-        if (marker && (marker->kind == MarkerKind::atomic ||
-                       marker->kind == MarkerKind::atomicFetch))
-          accesses.push_back({call, choice, steps});
+      } else if (isAccess(use) && !isKnown(user, accesses)) {
+        accesses.push_back({user, choice, use.getOperandNo(), steps});
       }
     }
+  }
+
+  /// A copy has two places: next time the other one.
+  static bool isKnown(const llvm::Instruction *instruction,
+                      llvm::ArrayRef<Access> accesses) {
+    return llvm::any_of(accesses, [&](const Access &access) {
+      return access.instruction == instruction;
+    });
+  }
+
+  /// Whether an instruction reads or writes at a place.
+  bool isAccess(const llvm::Use &place) const {
+    auto *user = place.getUser();
+    if (llvm::isa<llvm::LoadInst, llvm::MemTransferInst>(user))
+      return true;
+    if (auto *store = dyn_cast<llvm::StoreInst>(user))
+      return place.getOperandNo() == store->getPointerOperandIndex();
+    auto *call = dyn_cast<llvm::CallInst>(user);
+    const Marker *marker = call ? getMarker(call, memory.markers) : nullptr;
+    return marker && (marker->kind == MarkerKind::atomic ||
+                      marker->kind == MarkerKind::atomicFetch);
   }
 
   //===--------------------------------------------------------------------===//
@@ -476,8 +486,7 @@ private:
       pointer = builder.Insert(clone);
     }
     llvm::Instruction *clone = access.instruction->clone();
-    // An atomic is a call, with the place as its first argument.
-    clone->setOperand(llvm::isa<llvm::StoreInst>(clone) ? 1 : 0, pointer);
+    clone->setOperand(access.operand, pointer);
     builder.Insert(clone);
     return clone->getType()->isVoidTy() ? nullptr : clone;
   }

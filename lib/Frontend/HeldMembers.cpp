@@ -59,9 +59,12 @@ class MemberHolder {
 public:
   MemberHolder(llvm::Function &function)
       : function(function), builder(function.getContext()) {
-    for (llvm::Instruction &instruction : function.getEntryBlock())
-      if (const llvm::ConstantInt *index = getHeld(&instruction))
+    llvm::BasicBlock &entry = function.getEntryBlock();
+    for (llvm::Instruction &instruction : llvm::make_early_inc_range(entry))
+      if (const llvm::ConstantInt *index = getHeld(&instruction)) {
         held.try_emplace(index->getSExtValue(), &instruction);
+        instruction.moveBefore(entry, entry.begin());
+      }
   }
 
   void run() {

@@ -200,6 +200,14 @@ llvm::Value *MemoryIndex::materialize(llvm::IRBuilderBase &builder) const {
   return constant ? builder.CreateAdd(sum, builder.getInt64(constant)) : sum;
 }
 
+llvm::Value *piko::makeOffset(const Address &address,
+                              llvm::IRBuilderBase &builder) {
+  MemoryIndex offset{address.offset, {}};
+  for (auto [value, scale] : address.terms)
+    offset.terms.push_back({value, scale});
+  return offset.materialize(builder);
+}
+
 /// The element of a leaf at an offset in its record.
 static std::optional<MemoryAccess> matchLeaf(const MemoryLeaf &leaf,
                                              int64_t offset) {

@@ -88,6 +88,9 @@ struct MemoryIndex {
   llvm::Value *materialize(llvm::IRBuilderBase &builder) const;
 };
 
+/// How many bytes an address is from its base.
+llvm::Value *makeOffset(const Address &address, llvm::IRBuilderBase &builder);
+
 /// One number in memory.
 struct MemoryAccess {
   unsigned leaf;

@@ -53,8 +53,9 @@ private:
                   llvm::isa<llvm::Constant>(copy->getLength())
                       ? "copying or filling more than 4096 numbers at once, or "
                         "memory whose layout is not known"
-                      : "copying or filling a number of elements that varies; "
-                        "use a loop over the elements");
+                      : "copying or filling a number of bytes that varies, of "
+                        "which it is not known that they are whole elements of "
+                        "one type; use a loop over the elements");
     if (auto *call = dyn_cast<llvm::CallInst>(instruction))
       if (const Marker *marker = getMarker(call, memory.markers))
         if (marker->kind == MarkerKind::atomic ||

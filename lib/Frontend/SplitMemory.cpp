@@ -94,24 +94,23 @@ private:
 
   bool splitFill(llvm::MemSetInst *fill) {
     auto *length = dyn_cast<llvm::ConstantInt>(fill->getLength());
-    auto *byte = dyn_cast<llvm::ConstantInt>(fill->getValue());
-    if (!length || !byte)
+    if (!length)
       return false;
     auto pieces = getPieces(fill->getDest(), length->getZExtValue());
     if (!pieces)
       return false;
-    for (const MemoryPiece &piece : *pieces) {
-      unsigned bits = memory.data.getTypeSizeInBits(piece.type);
-      llvm::Constant *value = llvm::Constant::getNullValue(piece.type);
-      if (!byte->isZero()) {
-        if (piece.type->isPointerTy())
-          return false;
-        value = llvm::ConstantExpr::getBitCast(
-            builder.getInt(llvm::APInt::getSplat(bits, byte->getValue())),
-            piece.type);
-      }
-      builder.CreateStore(value, at(fill->getDest(), piece.offset));
-    }
+    auto *byte = dyn_cast<llvm::ConstantInt>(fill->getValue());
+    bool isZero = byte && byte->isZero();
+    auto isPointer = [](const MemoryPiece &piece) {
+      return piece.type->isPointerTy();
+    };
+    if (!isZero && llvm::any_of(*pieces, isPointer))
+      return false;
+    for (const MemoryPiece &piece : *pieces)
+      builder.CreateStore(isZero ? llvm::Constant::getNullValue(piece.type)
+                                 : repeatByte(builder, fill->getValue(),
+                                              piece.type, memory.data),
+                          at(fill->getDest(), piece.offset));
     return true;
   }
 
