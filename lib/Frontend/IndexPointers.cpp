@@ -177,11 +177,48 @@ private:
       if (dominatesAll(begins.front()))
         root = begins.front();
     } else if (haveOneBase() &&
-               llvm::all_of(addresses, [&](const Address &address) {
-                 return getDivisor(address, origin) % unit == 0;
-               })) {
+               llvm::all_of(addresses,
+                            [&](const Address &address) {
+                              return getDivisor(address, origin) % unit == 0;
+                            }) &&
+               isArrayOfUnits()) {
       makeOrigin();
     }
+  }
+
+  /// Whether one index counts the units of the array that all begin in. That
+  /// of an array in a record of an array does not lead to the next record's.
+  bool isArrayOfUnits() {
+    const MemoryLayout *layout = memory.getLayout(addresses.front().base);
+    if (!layout)
+      return false;
+    int64_t member = addresses.front().member + addresses.front().unclear;
+    bool isArray = false;
+    for (const MemoryLeaf &leaf : layout->leaves) {
+      if (!hasElementAt(leaf, member))
+        continue;
+      auto found = llvm::find_if(leaf.dimensions, [&](const auto &dimension) {
+        return dimension.stride != 0 && unit % dimension.stride == 0;
+      });
+      if (found == leaf.dimensions.end())
+        return false;
+      for (auto outer = leaf.dimensions.begin(); outer != found; ++outer)
+        if (outer->stride != outer[1].count * outer[1].stride)
+          return false;
+      isArray = true;
+    }
+    return isArray;
+  }
+
+  static bool hasElementAt(const MemoryLeaf &leaf, int64_t offset) {
+    int64_t rest = offset - leaf.offset;
+    for (auto [count, stride] : leaf.dimensions) {
+      int64_t index = stride == 0 ? 0 : rest / stride;
+      if (rest < 0 || index >= count)
+        return false;
+      rest -= index * stride;
+    }
+    return rest == 0;
   }
 
   /// The array that all are elements of. Steps among the fields of a record
@@ -191,27 +228,10 @@ private:
       return false;
     for (const Address &address : addresses)
       unit = std::gcd(unit, getDivisor(address, origin));
-    const MemoryLayout *layout = memory.getLayout(addresses.front().base);
-    if (unit == 0 || !layout)
+    if (unit == 0 || !isArrayOfUnits())
       return false;
-    bool isArray = false;
-    for (const MemoryLeaf &leaf : layout->leaves) {
-      if (leaf.dimensions.empty())
-        continue;
-      auto [count, stride] = leaf.dimensions.front();
-      int64_t begin = leaf.offset - stride, end = leaf.offset + count * stride;
-      if (!llvm::all_of(addresses, [&](const Address &address) {
-            return !address.terms.empty() ||
-                   (address.offset > begin && address.offset <= end);
-          }))
-        continue;
-      if (stride == 0 || unit % stride != 0)
-        return false;
-      isArray = true;
-    }
-    if (isArray)
-      makeOrigin();
-    return isArray;
+    makeOrigin();
+    return true;
   }
 
   void makeOrigin() {
