@@ -45,6 +45,10 @@ static llvm::StringRef getRemedy(llvm::StringRef callee) {
   if (llvm::is_contained(sorts, callee))
     return "; use std::partial_sort up to the end of the range, or sort(key) "
            "in a parallelFor";
+  if (callee == "std::equal")
+    return "; use a loop over the elements";
+  if (callee == "std::basic_string_view::basic_string_view")
+    return "; write the literal with its length, as in \"text\"sv";
   if (callee.starts_with("std::") &&
       callee.ends_with("_distribution::operator()"))
     return "; compute it from what the engine gives, as in g() % 6 + 1 and "

@@ -144,6 +144,8 @@ LogicalResult PhaseImporter::importInstruction(llvm::Instruction *instruction) {
     return reject(instruction,
                   "a call of '" + call->getCalledFunction()->getName() + "'");
   }
+  if (isPlaceUse(instruction))
+    return reject(instruction, comparedPlaces);
   return reject(instruction, llvm::Twine("the operation '") +
                                  instruction->getOpcodeName() + "'");
 }

@@ -41,7 +41,26 @@ static const llvm::Instruction *findLocatedUse(const llvm::Value *pointer) {
   return found;
 }
 
+/// What keeps a variable whole, if it is a question of where it is.
+static const llvm::Instruction *findPlaceUse(const llvm::Value *pointer,
+                                             int depth = 0) {
+  for (const llvm::User *user : pointer->users()) {
+    const auto *use = dyn_cast<llvm::Instruction>(user);
+    if (!use || depth == 8)
+      continue;
+    if (isPlaceUse(use))
+      return use;
+    if (llvm::isa<llvm::GetElementPtrInst, llvm::PHINode, llvm::SelectInst>(
+            use))
+      if (const llvm::Instruction *found = findPlaceUse(use, depth + 1))
+        return found;
+  }
+  return nullptr;
+}
+
 LogicalResult PhaseImporter::rejectVariable(llvm::AllocaInst *variable) {
+  if (const llvm::Instruction *use = findPlaceUse(variable))
+    return reject(use, comparedPlaces);
   const llvm::Instruction *use = findLocatedUse(variable);
   return reject(use ? use : variable,
                 "a local variable" + getVariableName(variable) +

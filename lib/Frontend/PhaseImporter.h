@@ -17,6 +17,16 @@
 
 namespace piko {
 
+/// Whether an instruction asks where a pointer points to.
+inline bool isPlaceUse(const llvm::Instruction *instruction) {
+  return llvm::isa<llvm::PtrToIntInst>(instruction) ||
+         (llvm::isa<llvm::ICmpInst>(instruction) &&
+          instruction->getOperand(0)->getType()->isPointerTy());
+}
+constexpr llvm::StringLiteral comparedPlaces =
+    "comparing or subtracting pointers that are not known to point into one "
+    "array; compare indices";
+
 class PhaseImporter {
 public:
   PhaseImporter(llvm::Function &source, WrapperKind phase, unsigned stage,

@@ -33,7 +33,8 @@ public:
     for (llvm::Instruction &instruction : llvm::instructions(function))
       if (auto *call = dyn_cast<llvm::CallInst>(&instruction))
         if (!call->getCalledFunction())
-          return fail(call, "a virtual call or a call through a pointer");
+          return fail(call, "a virtual call or a call through a pointer; use a "
+                            "switch that calls each function by its name");
     for (llvm::Instruction &instruction :
          llvm::make_early_inc_range(llvm::instructions(function)))
       if (!resolve(&instruction))

@@ -35,7 +35,7 @@ int counter;
 struct Shape {
   virtual float area() const = 0;
 };
-// VIRTUAL: errors-unsupported.cpp:[[#@LINE + 1]]:58: error: not supported in Piko: a virtual call or a call through a pointer
+// VIRTUAL: errors-unsupported.cpp:[[#@LINE + 1]]:58: error: not supported in Piko: a virtual call or a call through a pointer; use a switch that calls each function by its name
 inline float getArea(const Shape *shape) { return shape->area(); }
 
 struct Stage : piko::Stage<0, 0, 1, A, A>, piko::Uses<State> {
