@@ -65,7 +65,7 @@ public:
       scope.reserve(name);
     for (mlir::Operation &op : pipeline.getOps())
       if (getStateRecord(&op))
-        scope.reserve(makeIdentifier(getName(&op)));
+        scope.reserve(makeIdentifier(getCppName(&op)));
   }
 
   std::string write() {
@@ -89,12 +89,6 @@ public:
   }
 
 private:
-  static StringRef getName(mlir::Operation *op) {
-    if (auto name = op->getAttrOfType<mlir::StringAttr>(cppNameAttr))
-      return name.getValue();
-    return mlir::SymbolTable::getSymbolName(op).getValue();
-  }
-
   void addInputs() {
     llvm::MapVector<mlir::Operation *, Input> byStage;
     int64_t number = 0;
@@ -102,7 +96,7 @@ private:
       auto stage = lookupInPipeline<StageOp>(source, source.getStageAttr());
       auto [it, isNew] = byStage.try_emplace(stage);
       if (isNew)
-        it->second = {scope.declare(makeIdentifier(getName(stage))),
+        it->second = {scope.declare(makeIdentifier(getCppName(stage))),
                       lookupRecord(stage, stage.getInputAttr()), number};
       else
         it->second.number = -1;
@@ -153,7 +147,7 @@ private:
   }
 
   std::string getStateType(mlir::Operation &op, RecordOp record) {
-    std::string type = getType(record, makeIdentifier(getName(&op)));
+    std::string type = getType(record, makeIdentifier(getCppName(&op)));
     if (auto image = llvm::dyn_cast<ImageOp>(op))
       return llvm::formatv("Image<{0}, {1}>", type, image.getRank());
     StringRef kind = "Constant";
@@ -170,11 +164,11 @@ private:
       mlir::FlatSymbolRefAttr record = getStateRecord(&op);
       if (!record)
         continue;
-      std::string name = names.declare(makeIdentifier(getName(&op)));
+      std::string name = names.declare(makeIdentifier(getCppName(&op)));
       initializers +=
           llvm::formatv("{0}{1}(in(\"{2}\"))",
                         initializers.empty() ? "\n        : " : ",\n          ",
-                        name, getName(&op));
+                        name, getCppName(&op));
       members +=
           llvm::formatv("    piko::rt::{0} {1};\n",
                         getStateType(op, lookupRecord(&op, record)), name);

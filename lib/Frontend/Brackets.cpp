@@ -10,7 +10,7 @@
 
 #include "Import.h"
 
-#include "Piko/Dialect/Piko/IR/Piko.h"
+#include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "mlir/Dialect/MemRef/IR/MemRef.h"
 
 using namespace piko;
@@ -233,6 +233,8 @@ LogicalResult Bracket::makeCombination() {
   mlir::Block *inner = builder.createBlock(&op->getRegion(0));
   for (mlir::Value value : begin.getResults())
     inner->addArgument(value.getType(), begin.getLoc());
+  if (mlir::Attribute name = begin->getAttr(cppNameAttr))
+    op->setAttr(cppNameAttr, name);
   moveInto(inner, op, {});
   // Arrays of the function belong to it.
   op->walk([&](mlir::memref::StoreOp store) {

@@ -1,8 +1,10 @@
 //===- ImportLoops.cpp - parallelFor and barriers -------------------------===//
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 
+#include "CallChain.h"
 #include "Cleanup.h"
 #include "PhaseImporter.h"
+#include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "mlir/Dialect/ControlFlow/IR/ControlFlowOps.h"
 #include "llvm/IR/Instructions.h"
 
@@ -98,14 +100,27 @@ mlir::func::CallOp PhaseImporter::makePlaceholder(llvm::StringRef name,
   return make<mlir::func::CallOp>(name, types, operands);
 }
 
+/// Which of the calls that are reductions the user's text makes.
+static std::string getReductionName(llvm::CallInst *call,
+                                    const ParsedUnit &unit) {
+  CallChain chain(call, unit);
+  llvm::StringRef callee = chain.getUserCallee().rsplit("::").second;
+  bool isOther = callee == "any" || callee == "all" || callee == "count";
+  return isOther ? callee.str() : "reduce";
+}
+
 LogicalResult PhaseImporter::importCombination(llvm::CallInst *call,
                                                llvm::StringRef name) {
   bool isScan = name == accessor::scanBegin;
-  if (failed(checkBarrier(call, isScan ? "scan" : "reduce, any, all or count")))
+  std::string callee = isScan ? "scan" : getReductionName(call, unit);
+  if (failed(checkBarrier(call, callee)))
     return failure();
   // A scan takes its value and its empty value, and combines two values.
-  placeholders[call] = makePlaceholder(isScan ? scanBeginName : reduceBeginName,
-                                       call, isScan ? 1 : 2);
+  mlir::func::CallOp begin = makePlaceholder(
+      isScan ? scanBeginName : reduceBeginName, call, isScan ? 1 : 2);
+  if (callee != "reduce" && !isScan)
+    begin->setAttr(cppNameAttr, builder.getStringAttr(callee));
+  placeholders[call] = begin;
   return success();
 }
 

@@ -315,8 +315,9 @@ LogicalResult PipelineReader::readStage(const clang::FieldDecl *member) {
       ast.getASTRecordLayout(parent).getFieldOffset(member->getFieldIndex()) /
       8;
 
-  if (failed(readTemplate(findPikoBase(type, "BasicStage"), stage)) ||
-      failed(readPhases(type, stage)))
+  const Specialization *base = findPikoBase(type, "BasicStage");
+  if (failed(readTemplate(base, stage)) ||
+      failed(readPhases(type, getTypeArgument(base, 2), stage)))
     return failure();
   if (const Specialization *uses = findPikoBase(type, "Uses")) {
     QualType used = getTypeArgument(uses, 0);
@@ -385,7 +386,29 @@ static bool declares(const CXXRecordDecl *type, llvm::StringRef name,
   return false;
 }
 
+/// Expects a phase to take the primitive itself: what that can be converted to
+/// would be another value. What cannot be called at all is reported by Clang.
+LogicalResult PipelineReader::checkParameter(const clang::NamedDecl *phase,
+                                             QualType input) {
+  const auto *method = dyn_cast<clang::CXXMethodDecl>(phase);
+  if (!method || method->getNumParams() != 1)
+    return success();
+  QualType taken = method->getParamDecl(0)->getType().getNonReferenceType();
+  const CXXRecordDecl *base = taken->getAsCXXRecordDecl();
+  const CXXRecordDecl *derived = input->getAsCXXRecordDecl();
+  if (ast.hasSameUnqualifiedType(taken, input) ||
+      (base && derived && base->hasDefinition() && derived->hasDefinition() &&
+       derived->isDerivedFrom(base)))
+    return success();
+  std::string name = phase->getNameAsString();
+  return emitError(locate(method->getParamDecl(0)->getLocation()))
+         << "expected " << name << "(const " << records.getName(input)
+         << " &), but got " << name << "(const " << records.getName(taken)
+         << " &)";
+}
+
 LogicalResult PipelineReader::readPhases(const CXXRecordDecl *type,
+                                         QualType input,
                                          StageDescription &stage) {
   const clang::NamedDecl *process = nullptr, *assign = nullptr,
                          *schedule = nullptr;
@@ -405,9 +428,13 @@ LogicalResult PipelineReader::readPhases(const CXXRecordDecl *type,
       stage.takesList = asPikoTemplate(
           parameter.getNonReferenceType()->getAsCXXRecordDecl(), "List");
     }
+  if (!stage.takesList && failed(checkParameter(process, input)))
+    return failure();
   stage.hasAssign = declares(type, "assignBin", assign);
   if (stage.hasAssign)
     stage.assignLocation = locate(assign->getLocation());
+  if (stage.hasAssign && failed(checkParameter(assign, input)))
+    return failure();
   stage.hasSchedule = declares(type, "schedule", schedule);
   if (!stage.hasAssign && !stage.isWholeDomain()) {
     mlir::InFlightDiagnostic diagnostic = emitError(where);

@@ -61,7 +61,10 @@ private:
   readTemplate(const clang::ClassTemplateSpecializationDecl *base,
                StageDescription &stage);
   llvm::LogicalResult readPhases(const clang::CXXRecordDecl *type,
+                                 clang::QualType input,
                                  StageDescription &stage);
+  llvm::LogicalResult checkParameter(const clang::NamedDecl *phase,
+                                     clang::QualType input);
   mlir::Location locate(clang::SourceLocation location) const;
 
   clang::ASTContext &ast;

@@ -204,12 +204,9 @@ private:
       else if (state.kind == StateDescription::Buffer && !state.perSource)
         out << "  bind(state." << state.name << ", pikoir_get_state(p, " << id
             << "));\n";
-    out << "#ifdef PIKO_CHECK\n";
     for (const StateDescription &state : pipeline.state)
-      if (state.kind != StateDescription::Constant)
-        out << "  pipe->nameState(&state." << state.name << ", "
-            << quote(state.name) << ");\n";
-    out << "#endif\n";
+      out << "  pipe->nameState(&state." << state.name << ", "
+          << quote(state.name) << ");\n";
     for (unsigned i = 0; i < pipeline.sources.size(); ++i)
       out << "  { int64_t count; const void *data = pikoir_get_source(p, " << i
           << ", &count);\n    pipe->template feed<void>(" << i

@@ -10,6 +10,7 @@
 
 #include "Bounds.h"
 #include "Piko/Dialect/Piko/IR/PikoCheck.h"
+#include "Uniformity.h"
 #include "Unwritten.h"
 
 #include "mlir/Dialect/Arith/IR/Arith.h"
@@ -66,25 +67,6 @@ private:
 };
 
 } // namespace
-
-static bool isBarrier(Operation *op) {
-  return isa<SyncOp, ReduceOp, ScanOp, SortOp>(op);
-}
-
-/// Where iterations of the loop around meet inside; null if they do not.
-static Operation *findBarrier(Operation *op) {
-  Operation *found = nullptr;
-  if (!isa<ParallelForOp>(op))
-    op->walk<WalkOrder::PreOrder>([&](Operation *inner) {
-      if (isa<ParallelForOp>(inner))
-        return WalkResult::skip();
-      if (!isBarrier(inner))
-        return WalkResult::advance();
-      found = inner;
-      return WalkResult::interrupt();
-    });
-  return found;
-}
 
 //===----------------------------------------------------------------------===//
 // Records

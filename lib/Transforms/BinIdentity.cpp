@@ -3,10 +3,10 @@
 // Proofs that an assign phase is the identity on bins.
 
 #include "BinIdentity.h"
-
 #include "PhaseGraph.h"
 #include "Repeatable.h"
 
+#include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "mlir/Dialect/Arith/IR/Arith.h"
 #include "mlir/IR/Matchers.h"
 
@@ -431,7 +431,7 @@ LogicalResult BinIdentity::prove(StageOp consumer, Refusal &refusal) {
     if (producer.getBins() != consumer.getBins())
       return refuse(consumer,
                     "its bins are not of the size of those of stage '" +
-                        producer.getSymName() + "'");
+                        getCppName(producer) + "'");
   }
   Operation *only = getOnlyAssignment(assign);
   if (!only)

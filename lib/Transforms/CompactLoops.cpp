@@ -6,6 +6,7 @@
 #include "LaneReport.h"
 #include "StateAccess.h"
 
+#include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "Piko/Transforms/Passes.h"
 
 #include "mlir/Dialect/Arith/IR/Arith.h"
@@ -257,7 +258,7 @@ void CompactLoopsPass::runOnOperation() {
     StringRef phase = getLoopPhase(loop);
     LaneCost cost = guarded.split();
     InFlightDiagnostic remark = emitRemark(guarded.getTest())
-                                << "stage '" << stage.getSymName()
+                                << "stage '" << getCppName(stage)
                                 << "': " << phase;
     if (cost.isWorthwhile()) {
       remark << " puts off what passes this test, to do it together";

@@ -3,6 +3,7 @@
 // piko-form-kernels: BASELINE kernels. A stage's process phase goes together
 // with the assign phases of the stages that it feeds.
 
+#include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "Piko/Transforms/Passes.h"
 
 #include "mlir/IR/IRMapping.h"
@@ -113,8 +114,8 @@ static LogicalResult checkAssignReads(PipelineOp pipeline) {
         continue;
       InFlightDiagnostic error =
           load.emitError("expected the assign phase of stage '")
-          << reader.getSymName() << "' to read what is complete when its "
-          << "primitives arrive, but stage '" << writer.getSymName()
+          << getCppName(reader) << "' to read what is complete when its "
+          << "primitives arrive, but stage '" << getCppName(writer)
           << "' may still write " << load.getStateAttr();
       error.attachNote(write->getLoc()) << "it is written here";
       return WalkResult::interrupt();

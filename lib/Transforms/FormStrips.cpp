@@ -11,6 +11,7 @@
 
 #include "StateAccess.h"
 
+#include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "Piko/Transforms/Passes.h"
 
 #include "llvm/ADT/MapVector.h"
@@ -102,7 +103,7 @@ SmallVector<EdgeOp> Group::edgesInto(const Node &node, StageOp stage) {
 }
 
 static std::string quote(StageOp stage) {
-  return ("'" + stage.getSymName() + "'").str();
+  return ("'" + getCppName(stage) + "'").str();
 }
 
 /// What one stage writes and another one sees shows when they run.
@@ -263,7 +264,7 @@ static Accesses findAccesses(PipelineOp pipeline) {
 
 void FormStripsPass::refuse(StageOp stage, const Reason &reason) {
   InFlightDiagnostic remark = stage.emitRemark()
-                              << "stage '" << stage.getSymName()
+                              << "stage '" << getCppName(stage)
                               << "' does not run in strips: " << reason.text;
   // The front end has one place for a stage and its schedule.
   if (reason.culprit && reason.culprit->getLoc() != stage.getLoc())

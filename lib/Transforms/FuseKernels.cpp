@@ -12,6 +12,7 @@
 #include "PhaseGraph.h"
 #include "StateAccess.h"
 
+#include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "Piko/Dialect/Piko/IR/PikoCheck.h"
 #include "Piko/Transforms/Passes.h"
 
@@ -99,7 +100,7 @@ LogicalResult Candidate::checkBins(Refusal &refusal) {
   if (runsForEmptyBins(consumer) && head().getTakesList() &&
       !runsForEmptyBins(head()))
     return refuse(refusal, head(),
-                  "it runs for empty bins, but stage '" + head().getSymName() +
+                  "it runs for empty bins, but stage '" + getCppName(head()) +
                       "' does not");
   return success();
 }
@@ -109,11 +110,11 @@ LogicalResult Candidate::checkSchedules(Refusal &refusal) {
     ScheduleOp schedule = stage.getSchedule();
     if (schedule && !schedule.getBody().empty())
       return refuse(refusal, schedule,
-                    "the schedule of stage '" + stage.getSymName() +
+                    "the schedule of stage '" + getCppName(stage) +
                         "' depends on the bin");
     if (schedule && schedule.getTileSplit())
       return refuse(refusal, schedule,
-                    "bins of stage '" + stage.getSymName() +
+                    "bins of stage '" + getCppName(stage) +
                         "' are cut into tiles, which several threads take");
   }
   ScheduleKind before = getKind(producer), kind = getKind(consumer);
@@ -126,7 +127,7 @@ LogicalResult Candidate::checkSchedules(Refusal &refusal) {
   return refuse(refusal, schedule ? schedule.getOperation() : consumer,
                 stringifyScheduleKind(kind) + " may choose another core than " +
                     stringifyScheduleKind(before) + " of stage '" +
-                    producer.getSymName() + "'");
+                    getCppName(producer) + "'");
 }
 
 LogicalResult Candidate::checkAssign(Refusal &refusal) {
@@ -154,7 +155,7 @@ LogicalResult Candidate::checkWaits(Refusal &refusal) {
     KernelOp runs = findKernel(other);
     if (runs && (runs == host || !runs->isBeforeInBlock(host)))
       return refuse(refusal, schedule,
-                    "it waits for all of stage '" + other.getSymName() + "'");
+                    "it waits for all of stage '" + getCppName(other) + "'");
   }
   return success();
 }
@@ -193,7 +194,7 @@ LogicalResult Candidate::checkState(Refusal &refusal) {
           both == StateAccess::changesAtomically)
         continue;
       return refuse(refusal, where,
-                    "it and stage '" + getPhaseStage(where).getSymName() +
+                    "it and stage '" + getCppName(getPhaseStage(where)) +
                         "' both use @" +
                         cast<FlatSymbolRefAttr>(state).getValue() +
                         ", which one of them writes");
@@ -206,7 +207,7 @@ LogicalResult Candidate::check(Refusal &refusal) {
   for (StageOp stage : {producer, consumer})
     if (stage.getCycle())
       return refuse(refusal, stage,
-                    "stage '" + stage.getSymName() + "' is on a cycle");
+                    "stage '" + getCppName(stage) + "' is on a cycle");
   return failure(failed(checkBins(refusal)) ||
                  failed(checkSchedules(refusal)) ||
                  failed(checkAssign(refusal)) || failed(checkWaits(refusal)) ||
@@ -250,16 +251,16 @@ void FuseKernelsPass::fuseInto(KernelOp host) {
     Refusal refusal;
     if (failed(candidate.check(refusal))) {
       InFlightDiagnostic remark = consumer.emitRemark()
-                                  << "stage '" << consumer.getSymName()
+                                  << "stage '" << getCppName(consumer)
                                   << "' does not run bin by bin behind stage '"
-                                  << producer.getSymName() << "'";
+                                  << getCppName(producer) << "'";
       remark.attachNote(refusal.at->getLoc()) << refusal.why;
       ++refused;
       continue;
     }
-    consumer.emitRemark() << "stage '" << consumer.getSymName()
+    consumer.emitRemark() << "stage '" << getCppName(consumer)
                           << "' runs bin by bin behind stage '"
-                          << producer.getSymName() << "'";
+                          << getCppName(producer) << "'";
     inside.insert(kernel.getProcess().getStageAttr());
     candidate.fuse();
     ++fused;

@@ -7,6 +7,7 @@
 //   3. give the consumer's ports and edges to the producer, and drop the
 //      consumer.
 
+#include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "Piko/Transforms/Passes.h"
 
 #include "BinIdentity.h"
@@ -85,7 +86,7 @@ static LogicalResult checkSchedules(StageOp producer, StageOp consumer,
   for (StageOp stage : {producer, consumer})
     if (ScheduleOp schedule = stage.getSchedule();
         schedule && !schedule.getBody().empty())
-      return refuse(stage, "the schedule of stage '" + stage.getSymName() +
+      return refuse(stage, "the schedule of stage '" + getCppName(stage) +
                                "' depends on the bin");
   ScheduleOp first = producer.getSchedule(), second = consumer.getSchedule();
   if ((first && first.getUnordered()) != (second && second.getUnordered()))
@@ -101,7 +102,7 @@ static LogicalResult checkSchedules(StageOp producer, StageOp consumer,
     return refuse(consumer, stringifyScheduleKind(*kind) +
                                 " may choose another core than " +
                                 stringifyScheduleKind(before) + " of stage '" +
-                                producer.getSymName() + "'");
+                                getCppName(producer) + "'");
   if (second.getTileSplit() != first.getTileSplit())
     return refuse(consumer, "bins are cut at other sizes");
   return success();
@@ -126,7 +127,7 @@ LogicalResult FuseStagesPass::check(EdgeOp edge, Refusal &refusal) {
   };
   for (StageOp stage : {producer, consumer})
     if (stage.getCycle())
-      return refuse(stage, "stage '" + stage.getSymName() + "' is on a cycle");
+      return refuse(stage, "stage '" + getCppName(stage) + "' is on a cycle");
   if (hasSource(consumer) || getEdgesInto(consumer).size() != 1)
     return refuse(consumer, "it is fed from several places");
   if (producer.getBins() != consumer.getBins())
@@ -351,8 +352,8 @@ void FuseStagesPass::runOnOperation() {
         if (failed(check(edge, refusal)))
           continue;
         consumer.emitRemark()
-            << "stage '" << consumer.getSymName() << "' runs inside stage '"
-            << producer.getSymName() << "'";
+            << "stage '" << getCppName(consumer) << "' runs inside stage '"
+            << getCppName(producer) << "'";
         gone.insert(consumer);
         Fusion(edge).run();
         ++fused;
@@ -365,9 +366,9 @@ void FuseStagesPass::runOnOperation() {
       (void)check(edge, refusal);
       auto consumer = lookupInPipeline<StageOp>(edge, edge.getConsumerAttr());
       InFlightDiagnostic remark = consumer.emitRemark()
-                                  << "stage '" << consumer.getSymName()
+                                  << "stage '" << getCppName(consumer)
                                   << "' is not fused with stage '"
-                                  << producer.getSymName() << "'";
+                                  << getCppName(producer) << "'";
       remark.attachNote(refusal.at->getLoc()) << refusal.why;
       ++refused;
     }

@@ -2,6 +2,7 @@
 //
 // piko-infer-directives: writes down directives that hold without being said.
 
+#include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "Piko/Transforms/Passes.h"
 
 #include "BinIdentity.h"
@@ -35,13 +36,13 @@ void InferDirectivesPass::runOnOperation() {
     Refusal refusal;
     if (succeeded(identity.prove(stage, refusal))) {
       proved.push_back(cast<AssignToOp>(only));
-      only->emitRemark() << "stage '" << stage.getSymName()
+      only->emitRemark() << "stage '" << getCppName(stage)
                          << "' keeps each primitive in the bin that it was "
                             "emitted from";
       continue;
     }
     InFlightDiagnostic remark = assign.emitRemark()
-                                << "the bins of stage '" << stage.getSymName()
+                                << "the bins of stage '" << getCppName(stage)
                                 << "' are not known to be those before";
     remark.attachNote(refusal.at->getLoc()) << refusal.why;
     ++refused;

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 
 #include "LaneReport.h"
-
 #include "LaneWriter.h"
 #include "StateAccess.h"
 
+#include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "mlir/Dialect/Arith/IR/Arith.h"
 #include "mlir/Dialect/MemRef/IR/MemRef.h"
 #include "llvm/ADT/TypeSwitch.h"
@@ -189,7 +189,7 @@ void LaneReport::emit() const {
   for (const auto &[key, verdict] : verdicts) {
     InFlightDiagnostic remark =
         emitRemark(verdict.location)
-        << "stage '" << StageOp(verdict.stage).getSymName() << "'"
+        << "stage '" << getCppName(StageOp(verdict.stage)) << "'"
         << describeFused(verdict.stage) << ": " << verdict.phase << " is ";
     if (!verdict.vectorized)
       remark << "not vectorized";

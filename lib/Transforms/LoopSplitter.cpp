@@ -4,6 +4,7 @@
 
 #include "Collectives.h"
 
+#include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "Piko/Transforms/BinArithmetic.h"
 #include "mlir/Dialect/Arith/IR/Arith.h"
 #include "mlir/IR/IRMapping.h"
@@ -107,7 +108,7 @@ LogicalResult LoopSplitter::run() {
 
 LogicalResult LoopSplitter::checkControlFlow() {
   WalkResult result = parallel.walk([&](Operation *op) {
-    if (!isa<SyncOp, ReduceOp, ScanOp, SortOp>(op))
+    if (!isBarrier(op))
       return WalkResult::advance();
     for (Operation *at = op->getParentOp(); at != parallel;
          at = at->getParentOp()) {
@@ -140,7 +141,7 @@ scf::ForOp LoopSplitter::createPiece() {
 
 void LoopSplitter::split(Block &block, Piece &piece, Terminate terminate) {
   for (Operation &op : llvm::make_early_inc_range(block.without_terminator())) {
-    if (!holdsBarrier(&op)) {
+    if (!findBarrier(&op)) {
       piece.append(&op);
       continue;
     }
@@ -198,7 +199,7 @@ void LoopSplitter::splitSort(SortOp op, Piece &piece) {
 }
 
 void LoopSplitter::splitIf(scf::IfOp op, Piece &piece) {
-  compare(op.getCondition());
+  compare(op.getCondition(), getCppName(findBarrier(op)));
   SmallVector<Value> arrays = addSlots(op.getResultTypes());
   bool hasElse = !op.getElseRegion().empty();
   auto ifOp = scf::IfOp::create(builder, op.getLoc(), TypeRange(),
@@ -217,7 +218,7 @@ void LoopSplitter::splitIf(scf::IfOp op, Piece &piece) {
 }
 
 void LoopSplitter::splitSwitch(scf::IndexSwitchOp op, Piece &piece) {
-  compare(op.getArg());
+  compare(op.getArg(), getCppName(findBarrier(op)));
   SmallVector<Value> arrays = addSlots(op.getResultTypes());
   auto switchOp =
       scf::IndexSwitchOp::create(builder, op.getLoc(), TypeRange(), op.getArg(),
@@ -274,7 +275,7 @@ void LoopSplitter::splitFor(scf::ForOp op, Piece &piece) {
     OpBuilder inPiece = piece.atEnd();
     Value trips = createTripCount(inPiece, op);
     uniformity.replace(parallel.getIteration(), trips);
-    compare(trips);
+    compare(trips, getCppName(findBarrier(op)));
     loop = scf::ForOp::create(builder, op.getLoc(), zero, trips, one);
   }
   loops.push_back(loop);
@@ -307,6 +308,7 @@ void LoopSplitter::splitForBody(scf::ForOp op, scf::ForOp loop,
 
 void LoopSplitter::splitWhile(scf::WhileOp op, Piece &piece) {
   Location loc = op.getLoc();
+  StringRef barrier = getCppName(findBarrier(op));
   SmallVector<Value> before =
       addSlots(ValueRange(op.getBeforeArguments()).getTypes());
   SmallVector<Value> after = addSlots(op.getResultTypes());
@@ -321,7 +323,7 @@ void LoopSplitter::splitWhile(scf::WhileOp op, Piece &piece) {
     auto condition = cast<scf::ConditionOp>(terminator);
     store(piece, condition.getArgs(), after);
     Value goesOn = condition.getCondition();
-    compare(goesOn);
+    compare(goesOn, barrier);
     scf::ConditionOp::create(builder, loc, goesOn, ValueRange());
   });
   builder.createBlock(&loop.getAfter());
@@ -334,7 +336,7 @@ void LoopSplitter::splitWhile(scf::WhileOp op, Piece &piece) {
   readFrom(op.getResults(), after);
 }
 
-void LoopSplitter::compare(Value value) {
+void LoopSplitter::compare(Value value, StringRef barrier) {
   if (!uniformity.isVarying(value))
     return;
   ++checks;
@@ -360,9 +362,11 @@ void LoopSplitter::compare(Value value) {
                                 /*withElseRegion=*/false);
   scf::YieldOp::create(builder, loc, agree);
   builder.setInsertionPoint(ifOp.thenBlock()->getTerminator());
-  failures.push_back(FailBarrierOp::create(builder, loc, stage.getSymName(),
-                                           piece.getInductionVar(),
-                                           findBin(builder, piece)));
+  auto failure =
+      FailBarrierOp::create(builder, loc, stage.getSymName(),
+                            piece.getInductionVar(), findBin(builder, piece));
+  failure->setAttr(cppNameAttr, builder.getStringAttr(barrier));
+  failures.push_back(failure);
 }
 
 //===----------------------------------------------------------------------===//

@@ -45,8 +45,9 @@ private:
   /// The rest of `splitFor`, inside the new loop.
   void splitForBody(mlir::scf::ForOp op, mlir::scf::ForOp loop,
                     mlir::Value iterationVar, mlir::ValueRange slots);
-  /// Where iterations may not agree on a value, compares them.
-  void compare(mlir::Value value);
+  /// Where iterations may not agree on a value, compares them. The barrier is
+  /// the one that some would miss.
+  void compare(mlir::Value value, llvm::StringRef barrier);
 
   // Values across cuts.
   llvm::SmallVector<mlir::Value> addSlots(mlir::TypeRange types);

@@ -8,6 +8,7 @@
 //   4. take the first branch all of whose dependencies have been taken, until
 //      none is left.
 
+#include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "Piko/Transforms/Passes.h"
 
 #include "llvm/ADT/SetVector.h"
@@ -212,13 +213,12 @@ static LogicalResult checkWaits(StageGraph &graph) {
     for (int other : graph.waits[stage])
       if (other == int(stage) || reach[stage][other]) {
         InFlightDiagnostic error = graph.stages[stage].emitError("stage '")
-                                   << graph.stages[stage].getSymName()
+                                   << getCppName(graph.stages[stage])
                                    << "' waits for stage '"
-                                   << graph.stages[other].getSymName()
+                                   << getCppName(graph.stages[other])
                                    << "', which cannot finish before it";
         error.attachNote(graph.stages[other].getLoc())
-            << "it is fed by stage '" << graph.stages[stage].getSymName()
-            << "'";
+            << "it is fed by stage '" << getCppName(graph.stages[stage]) << "'";
         return error;
       }
   return success();
@@ -235,7 +235,7 @@ static void reportCircle(StageGraph &graph, const NodeGraph &nodes,
   InFlightDiagnostic error = graph.stages[rest.front()].emitError(
       "expected waits that can end, but got a circle of edges and waits among");
   for (int stage : rest)
-    error << " '" << graph.stages[stage].getSymName() << "'";
+    error << " '" << getCppName(graph.stages[stage]) << "'";
 }
 
 void OrderStagesPass::runOnOperation() {

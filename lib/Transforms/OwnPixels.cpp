@@ -3,6 +3,7 @@
 // piko-own-pixels: finds the one pixel that a stage updates for a primitive,
 // and tells the assign phase, so that threads can share a bin by its pixels.
 
+#include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "Piko/Transforms/Passes.h"
 
 #include "Repeatable.h"
@@ -100,7 +101,7 @@ void OwnPixelsPass::runOnStage(StageOp stage) {
   UpdateOp first = updates.front();
   auto refuse = [&](Operation *at, const Twine &why) {
     InFlightDiagnostic remark = first.emitRemark()
-                                << "stage '" << stage.getSymName()
+                                << "stage '" << getCppName(stage)
                                 << "' runs each bin on one thread";
     remark.attachNote(at->getLoc()) << why;
     ++refused;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #include "PhaseGraph.h"
 
+#include "Piko/Dialect/Piko/IR/CppTypes.h"
+
 #include "llvm/ADT/TypeSwitch.h"
 
 using namespace mlir;
@@ -44,7 +46,7 @@ int64_t piko::getElementIndex(RecordOp record, StringRef name) {
 }
 
 void piko::noteOrigin(Operation *op, StageOp stage, bool inAssign) {
-  StringAttr name = stage.getSymNameAttr();
+  auto name = StringAttr::get(stage.getContext(), getCppName(stage));
   llvm::TypeSwitch<Operation *>(op)
       .Case<LoadOp>([&](LoadOp load) {
         // Reading a constant does not fail.

@@ -3,6 +3,7 @@
 // piko-pre-schedule: a schedule that says the same of all bins becomes
 // directives, which are known before there are bins.
 
+#include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "Piko/Transforms/Passes.h"
 
 #include "mlir/Dialect/SCF/IR/SCF.h"
@@ -121,7 +122,7 @@ void PreSchedulePass::runOnOperation() {
     if (Operation *unknown = findUnknown(schedule, said)) {
       ++kept;
       InFlightDiagnostic remark = schedule.emitRemark()
-                                  << "stage '" << stage.getSymName()
+                                  << "stage '" << getCppName(stage)
                                   << "' is scheduled bin by bin";
       remark.attachNote(unknown->getLoc())
           << "this may be another for another bin";

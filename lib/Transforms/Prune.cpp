@@ -9,6 +9,7 @@
 
 #include "PipelineLiveness.h"
 
+#include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "Piko/Dialect/Piko/IR/PikoCheck.h"
 #include "Piko/Transforms/Passes.h"
 
@@ -189,7 +190,7 @@ void Pruner::shrinkInput(StageOp stage) {
   fields += dropped;
   for (EdgeOp edge : edges) {
     InFlightDiagnostic remark = edge.emitRemark("edge to stage '")
-                                << stage.getSymName() << "' carries "
+                                << getCppName(stage) << "' carries "
                                 << layout.size << " instead of "
                                 << record.getSize() << " bytes";
     if (dropped == 0)
@@ -334,7 +335,7 @@ void Pruner::removeDeadStages() {
         !(int(clear(stage.getProcess())) | int(clear(stage.getAssign()))))
       continue;
     stage.emitRemark("stage '")
-        << stage.getSymName() << "' is " << (isKept ? "emptied" : "removed")
+        << getCppName(stage) << "' is " << (isKept ? "emptied" : "removed")
         << ", because nothing it does can be observed";
     ++stages;
     if (!isKept)

@@ -8,16 +8,21 @@
 using namespace mlir;
 using namespace piko;
 
-bool piko::holdsBarrier(Operation *op) {
-  return op
-      ->walk<WalkOrder::PreOrder>([&](Operation *inner) {
-        if (isa<ParallelForOp>(inner))
-          return WalkResult::skip();
-        return isa<SyncOp, ReduceOp, ScanOp, SortOp>(inner)
-                   ? WalkResult::interrupt()
-                   : WalkResult::advance();
-      })
-      .wasInterrupted();
+bool piko::isBarrier(Operation *op) {
+  return isa<SyncOp, ReduceOp, ScanOp, SortOp>(op);
+}
+
+Operation *piko::findBarrier(Operation *op) {
+  Operation *found = nullptr;
+  op->walk<WalkOrder::PreOrder>([&](Operation *inner) {
+    if (isa<ParallelForOp>(inner))
+      return WalkResult::skip();
+    if (!isBarrier(inner))
+      return WalkResult::advance();
+    found = inner;
+    return WalkResult::interrupt();
+  });
+  return found;
 }
 
 Uniformity::Uniformity(ParallelForOp loop) {
@@ -48,7 +53,7 @@ bool Uniformity::flow(ValueRange sources, ValueRange targets,
 
 bool Uniformity::visitControlFlow(Operation *op) {
   // Iterations that meet inside are compared; others may part ways.
-  bool parts = !holdsBarrier(op);
+  bool parts = !findBarrier(op);
   if (auto loop = dyn_cast<scf::ForOp>(op)) {
     Value lower = loop.getLowerBound(), step = loop.getStep();
     parts &= anyVarying({lower, loop.getUpperBound(), step});

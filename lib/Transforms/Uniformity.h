@@ -9,8 +9,11 @@
 
 namespace piko {
 
-/// Whether the iterations of the enclosing loop meet inside an operation.
-bool holdsBarrier(mlir::Operation *op);
+bool isBarrier(mlir::Operation *op);
+
+/// The first place inside an operation where the iterations of the enclosing
+/// loop meet; null if they do not.
+mlir::Operation *findBarrier(mlir::Operation *op);
 
 /// Values that may differ between the iterations of a resolved loop. All
 /// iterations are taken to agree on the control flow around barriers: where

@@ -44,6 +44,13 @@ static void expect(bool condition, const std::string &text) {
 
 static const char *orEmpty(const char *text) { return text ? text : ""; }
 
+static State &findBuffer(pikort_pipeline *p, int32_t id) {
+  expect(id >= 0 && id < static_cast<int32_t>(p->states.size()) &&
+             p->states[id].kind == PIKORT_BUFFER,
+         "expected the number of a buffer, but got " + std::to_string(id));
+  return p->states[id];
+}
+
 extern "C" {
 
 void pikoir_declare_pipeline(pikort_pipeline *p, const char *name,
@@ -124,12 +131,11 @@ void pikoir_declare_state(pikort_pipeline *p, int32_t id, const char *name,
 }
 
 void pikoir_declare_written(pikort_pipeline *p, int32_t id) {
-  guarded(p, "setup", [&] {
-    expect(id >= 0 && id < static_cast<int32_t>(p->states.size()) &&
-               p->states[id].kind == PIKORT_BUFFER,
-           "expected the number of a buffer, but got " + std::to_string(id));
-    p->states[id].written = true;
-  });
+  guarded(p, "setup", [&] { findBuffer(p, id).written = true; });
+}
+
+void pikoir_declare_unused(pikort_pipeline *p, int32_t id) {
+  guarded(p, "setup", [&] { findBuffer(p, id).unused = true; });
 }
 
 void pikoir_declare_stage(pikort_pipeline *p, int32_t id, const char *name,

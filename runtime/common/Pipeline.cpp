@@ -241,7 +241,8 @@ void pikort_pipeline::report(const KernelError &found) noexcept {
     checker->noteError();
   }
   auto key = [](const KernelError &e) {
-    return std::tie(e.unit, e.code, e.stage, e.name, e.bin, e.a, e.b);
+    return std::tie(e.unit, e.code, e.stage, e.name, e.bin, e.state, e.a, e.b,
+                    e.barrier);
   };
   // In one unit the first report is the first error.
   bool earlier = found.depth != error.depth ? found.depth < error.depth
@@ -283,7 +284,8 @@ static std::string describeCell(int64_t low, int64_t high, int32_t rank) {
 }
 
 static std::string describe(const std::string &stage, const KernelError &e,
-                            int32_t rank, const std::string &memoryLimit) {
+                            int32_t rank, const State *state,
+                            const std::string &memoryLimit) {
   std::string a = std::to_string(e.a), b = std::to_string(e.b);
   std::string text = "stage " + quoted(stage);
   if (e.bin >= 0)
@@ -301,17 +303,18 @@ static std::string describe(const std::string &stage, const KernelError &e,
            "pixel " +
            describeCell(e.a, e.b, rank);
   case PIKORT_INDEX_OUTSIDE:
-    return text + "expected an index in [0, " + b + "), but got " + a;
+    return text + "expected an index " +
+           (state ? "into " + quoted(state->name) + " " : "") + "in [0, " + b +
+           "), but got " + a;
   case PIKORT_ENDLESS:
     return text + "expected a loop that ends, but it still runs after " + a +
            " iterations";
   case PIKORT_NOT_A_NUMBER:
     return text + "expected a bounding box of numbers, but got NaN";
   case PIKORT_NOT_UNIFORM:
-    return text +
-           "expected every iteration of parallelFor to call sync() as often "
-           "as iteration 0, but iteration " +
-           a + " does not";
+    return text + "expected every iteration of parallelFor to call " +
+           std::string(e.barrier) +
+           "() as often as iteration 0, but iteration " + a + " does not";
   case PIKORT_NO_QUOTIENT:
     return text + "expected an integer division to have a result, but it "
                   "divides by 0 or overflows";
@@ -333,10 +336,14 @@ void pikort_pipeline::settleReported() noexcept {
     hasError = false;
     try {
       Stage *stage = findStage(error.stage);
-      std::string text = describe(!error.name.empty() ? std::string(error.name)
-                                  : stage ? stage->name
-                                          : std::to_string(error.stage),
-                                  error, rank, memoryLimitText(*this));
+      bool hasState =
+          error.state >= 0 && error.state < static_cast<int32_t>(states.size());
+      std::string text =
+          describe(!error.name.empty() ? std::string(error.name)
+                   : stage             ? stage->name
+                                       : std::to_string(error.stage),
+                   error, rank, hasState ? &states[error.state] : nullptr,
+                   memoryLimitText(*this));
       fail(error.code, checker ? checker->describe(error.code, text) : text);
     } catch (...) {
       fail(error.code, {});

@@ -59,6 +59,7 @@ struct State {
   int32_t kind = 0, record = 0, rank = 0, perSource = -1;
   bool bound = false;
   bool written = false;       ///< A buffer that kernels change.
+  bool unused = false;        ///< A buffer that no kernel uses.
   std::vector<uint8_t> clear; ///< One record, or empty.
   std::vector<uint8_t> bytes; ///< A constant's.
   Array<uint8_t> owned;       ///< An image's, or of a buffer that we allocate.
@@ -204,6 +205,8 @@ struct KernelError {
   int32_t depth = 0;
   int64_t bin = -1;           ///< Of the call of Process; -1 = none.
   std::string_view name = {}; ///< Of the stage, if it is part of another.
+  int32_t state = -1;         ///< That an index is outside of.
+  std::string_view barrier = {};
 };
 
 } // namespace piko::rt

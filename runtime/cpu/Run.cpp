@@ -281,6 +281,13 @@ static inline Kernel *find(pikort_pipeline *p, auto &list, int32_t index,
   return nullptr;
 }
 
+/// Reports what generated code has found.
+static void fail(pikort_pipeline &p, KernelError found) {
+  if (const Stage *stage = p.findStage(found.stage))
+    found.depth = stage->depth;
+  p.report(found);
+}
+
 extern "C" {
 
 const pikoir_input *pikoir_begin(pikort_pipeline *p, int32_t stage) {
@@ -309,9 +316,37 @@ int32_t pikoir_end_source(pikort_pipeline *p, int32_t source) {
 
 void pikoir_fail(pikort_pipeline *p, int32_t stage, const char *name,
                  int64_t bin, int32_t code, int64_t a, int64_t b) {
-  const Stage *found = p->findStage(stage);
-  p->report({INT64_MAX, code == PIKORT_OK ? PIKORT_BAD_PROGRAM : code, stage, a,
-             b, found ? found->depth : 0, bin, name ? name : ""});
+  fail(*p, {.unit = INT64_MAX,
+            .code = code == PIKORT_OK ? PIKORT_BAD_PROGRAM : code,
+            .stage = stage,
+            .a = a,
+            .b = b,
+            .bin = bin,
+            .name = name ? name : ""});
+}
+
+void pikoir_fail_index(pikort_pipeline *p, int32_t stage, const char *name,
+                       int64_t bin, int32_t state, int64_t index,
+                       int64_t elements) {
+  fail(*p, {.unit = INT64_MAX,
+            .code = PIKORT_INDEX_OUTSIDE,
+            .stage = stage,
+            .a = index,
+            .b = elements,
+            .bin = bin,
+            .name = name ? name : "",
+            .state = state});
+}
+
+void pikoir_fail_barrier(pikort_pipeline *p, int32_t stage, const char *barrier,
+                         int64_t bin, int64_t iteration) {
+  fail(*p, {.unit = INT64_MAX,
+            .code = PIKORT_NOT_UNIFORM,
+            .stage = stage,
+            .a = iteration,
+            .b = 0,
+            .bin = bin,
+            .barrier = barrier});
 }
 
 const void *pikoir_get_source(pikort_pipeline *p, int32_t source,

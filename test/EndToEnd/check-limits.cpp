@@ -157,7 +157,7 @@ struct TurnApart : Whole {
 };
 struct Turns : One<TurnApart> {};
 
-// COUNTS: got: stage 'only', bin 0: expected every iteration of parallelFor to call sync() as often as iteration 0, but iteration 1 does not
+// COUNTS: got: stage 'only', bin 0: expected every iteration of parallelFor to call any() as often as iteration 0, but iteration 1 does not
 // COUNTS-NEXT: at {{.*}}check-limits.cpp:[[#@LINE+6]]
 struct CountApart : Whole {
   void process(const Point &) {

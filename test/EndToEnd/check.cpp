@@ -114,7 +114,7 @@ template <bool Mended> struct OutsidePipe : piko::Pipe<State> {
 struct Outside : OutsidePipe<false> {};
 struct OutsideMended : OutsidePipe<true> {};
 
-// INDEX: got: stage 'far', bin 0: expected an index in [0, 64), but got 64
+// INDEX: got: stage 'far', bin 0: expected an index into 'cells' in [0, 64), but got 64
 // INDEX-NEXT: at {{.*}}check.cpp:[[#@LINE+5]]
 // INDEX-NEXT: lineage: source 0 primitive 0
 template <bool Mended>

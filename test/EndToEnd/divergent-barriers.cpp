@@ -5,7 +5,7 @@
 // RUN: not piko-compare %s --pipe Guarded --runs 1 --threads 1 2 | FileCheck %s
 // RUN: not piko-compare %s --pipe Loops --runs 1 --threads 1 2 | FileCheck %s
 // RUN: not piko-compare %s --pipe Counts --runs 1 --threads 1 2 | FileCheck %s
-// CHECK: got: stage 'stage', bin {{[0-9]+}}: expected every iteration of parallelFor to call sync() as often as iteration 0, but iteration {{[0-9]+}} does not
+// CHECK: got: stage 'stage', bin {{[0-9]+}}: expected every iteration of parallelFor to call {{sync|count}}() as often as iteration 0, but iteration {{[0-9]+}} does not
 #include "Inputs/ports.h"
 
 struct State {

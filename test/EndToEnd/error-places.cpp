@@ -30,7 +30,7 @@ template <class S> struct One : piko::Pipe<State> {
   One() { source(only); }
 };
 
-// READ: expected: {{.*}}stage 'ReadOutside'[[WHERE:, bin 5: expected an index in \[0, 64\), but got -10000]]{{$}}
+// READ: expected: {{.*}}stage 'ReadOutside'[[WHERE:, bin 5: expected an index into 'in' in \[0, 64\), but got -10000]]{{$}}
 // READ: got: stage 'only'[[WHERE]]{{$}}
 struct ReadOutside : Binned {
   void process(const Point &p) {
@@ -39,7 +39,7 @@ struct ReadOutside : Binned {
 };
 struct Read : One<ReadOutside> {};
 
-// STORE: expected: {{.*}}stage 'StoreOutside'[[WHERE:, bin 5: expected an index in \[0, 48\), but got 99]]{{$}}
+// STORE: expected: {{.*}}stage 'StoreOutside'[[WHERE:, bin 5: expected an index into 'image' in \[0, 48\), but got 99]]{{$}}
 // STORE: got: stage 'only'[[WHERE]]{{$}}
 struct StoreOutside : Binned {
   void process(const Point &) { state().image.store({3, 99}, 1.0f); }
@@ -90,7 +90,7 @@ template <class S> struct Two : piko::Pipe<State> {
   }
 };
 
-// ASSIGN: expected: {{.*}}stage 'AssignOutside'[[WHERE:: expected an index in \[0, 64\), but got 77777]]{{$}}
+// ASSIGN: expected: {{.*}}stage 'AssignOutside'[[WHERE:: expected an index into 'in' in \[0, 64\), but got 77777]]{{$}}
 // ASSIGN: got: stage 'last'[[WHERE]]{{$}}
 struct AssignOutside : piko::Stage<8, 8, 64, Point>, piko::Uses<State> {
   void assignBin(const Point &p) {
@@ -100,7 +100,7 @@ struct AssignOutside : piko::Stage<8, 8, 64, Point>, piko::Uses<State> {
 };
 struct Assign : Two<AssignOutside> {};
 
-// FUSED: expected: {{.*}}stage 'FusedRead'[[WHERE:, bin 5: expected an index in \[0, 64\), but got 77777]]{{$}}
+// FUSED: expected: {{.*}}stage 'FusedRead'[[WHERE:, bin 5: expected an index into 'out' in \[0, 64\), but got 77777]]{{$}}
 // FUSED: got: stage 'last'[[WHERE]]{{$}}
 struct FusedRead : piko::Stage<8, 8, 64, Point>, piko::Uses<State> {
   void assignBin(const Point &p) { assignToPreviousBins(p); }
@@ -110,7 +110,7 @@ struct FusedRead : piko::Stage<8, 8, 64, Point>, piko::Uses<State> {
 };
 struct Fused : Two<FusedRead> {};
 
-// FUSED-ASSIGN: expected: {{.*}}stage 'FusedAssignRead'[[WHERE:: expected an index in \[0, 64\), but got 77777]]{{$}}
+// FUSED-ASSIGN: expected: {{.*}}stage 'FusedAssignRead'[[WHERE:: expected an index into 'in' in \[0, 64\), but got 77777]]{{$}}
 // FUSED-ASSIGN: got: stage 'last'[[WHERE]]{{$}}
 struct FusedAssignRead : piko::Stage<8, 8, 64, Point>, piko::Uses<State> {
   void assignBin(const Point &p) {

@@ -13,7 +13,7 @@
 // Of several errors, it is the first one of the first bin.
 // RUN: not piko-compare %s --pipe Stops --count 500 --runs 1 --emulate-gpu 32 | FileCheck %s --check-prefix=STOPS
 // RUN: not piko-compare %s --pipe Stops --count 500 --runs 1 --emulate-gpu 64 --reverse | FileCheck %s --check-prefix=STOPS
-// STOPS-COUNT-3: got: stage 'draw', bin {{[0-9]+}}: expected an index in [0, 64), but got -2{{$}}
+// STOPS-COUNT-3: got: stage 'draw', bin {{[0-9]+}}: expected an index into 'limits' in [0, 64), but got -2{{$}}
 // A pixel is behind a test, or loops step from one of a thread's own to the next.
 // RUN: pikoc %s --pipe Boxes --emit=gpu --gpu-threads 8 | FileCheck %s --check-prefix=GPU
 // GPU-LABEL: gpu.func @Boxes_draw

@@ -62,8 +62,8 @@ struct Tiles : piko::Pipe<State> {
   Tiles() { source(stage); }
 };
 
-// PAST: expected: {{.*}}stage 'ReadPast'{{.*}}: expected an index in [0, 64), but got 64
-// PAST: got: stage 'stage', bin 0: expected an index in [0, 64), but got 64
+// PAST: expected: {{.*}}stage 'ReadPast'{{.*}}: expected an index into 'in' in [0, 64), but got 64
+// PAST: got: stage 'stage', bin 0: expected an index into 'in' in [0, 64), but got 64
 struct ReadPast : piko::Stage<0, 0, 64, Point>, piko::Uses<State> {
   void process(const piko::List<Point> &) {
     float sum = 0;
@@ -78,8 +78,8 @@ struct Past : piko::Pipe<State> {
   Past() { source(stage); }
 };
 
-// BELOW: expected: {{.*}}stage 'ReadBelow'{{.*}}: expected an index in [0, 64), but got -3
-// BELOW: got: stage 'stage', bin 0: expected an index in [0, 64), but got -3
+// BELOW: expected: {{.*}}stage 'ReadBelow'{{.*}}: expected an index into 'out' in [0, 64), but got -3
+// BELOW: got: stage 'stage', bin 0: expected an index into 'out' in [0, 64), but got -3
 struct ReadBelow : piko::Stage<0, 0, 64, Point>, piko::Uses<State> {
   void process(const piko::List<Point> &) {
     for (int j = 0; j < 11; ++j)

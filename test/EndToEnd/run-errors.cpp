@@ -13,7 +13,7 @@ struct State {
   piko::Image<float> image;
 };
 
-// READ: got: stage 'stage', bin 0: expected an index in [0, 64), but got -10000
+// READ: got: stage 'stage', bin 0: expected an index into 'in' in [0, 64), but got -10000
 struct ReadOutside : piko::Stage<0, 0, 64, Point>, piko::Uses<State> {
   void process(const Point &p) {
     piko::atomicAdd(state().out[p.tag], state().in[p.tag % 2 * 7 - 10000]);
@@ -24,7 +24,7 @@ struct Read : piko::Pipe<State> {
   Read() { source(stage); }
 };
 
-// WRITE: got: stage 'stage', bin 0: expected an index in [0, 48), but got {{48|49|5[0-9]|6[0-3]}}
+// WRITE: got: stage 'stage', bin 0: expected an index into 'image' in [0, 48), but got {{48|49|5[0-9]|6[0-3]}}
 struct WriteOutside : piko::Stage<0, 0, 64, Point>, piko::Uses<State> {
   void process(const Point &p) {
     state().image.store(glm::ivec2(p.x, p.y), 1.0f);

@@ -36,7 +36,8 @@ struct Inside : piko::Stage<0, 0, 64, Item, Item> {
       out.id = unsigned(sort(item.id + unsigned(i)));
       // CHECK: piko.sort %{{.*}} : i32
       out.id += unsigned(sort(i - 3));
-      // CHECK: %[[COUNT:.*]] = piko.reduce %{{.*}} : i64 {
+      // The name is for messages.
+      // CHECK: %[[COUNT:.*]] = piko.reduce %{{.*}} : i64 attributes {piko.cpp_name = "any"} {
       // CHECK: arith.addi
       // CHECK: arith.cmpi {{eq|ne}}, %[[COUNT]]
       if (any(out.depth > 4))

@@ -7,6 +7,9 @@
 // RUN: not piko-translate --cpp-to-piko -DCASE=3 %s 2>&1 | FileCheck %s --check-prefix=NONE
 // RUN: not piko-translate --cpp-to-piko -DCASE=4 %s 2>&1 | FileCheck %s --check-prefix=ASSIGN
 // RUN: not piko-translate --cpp-to-piko -DCASE=5 %s 2>&1 | FileCheck %s --check-prefix=SCHEDULE
+// RUN: not piko-translate --cpp-to-piko -DCASE=6 %s 2>&1 | FileCheck %s --check-prefix=OTHER
+// RUN: not piko-translate --cpp-to-piko -DCASE=7 %s 2>&1 | FileCheck %s --check-prefix=OTHER-ASSIGN
+// RUN: piko-translate --cpp-to-piko -DCASE=8 %s
 #include <piko.h>
 
 struct Stage : piko::Stage<8, 8, 1, float> {
@@ -14,6 +17,11 @@ struct Stage : piko::Stage<8, 8, 1, float> {
   // ASSIGN: errors-signatures.cpp:[[#@LINE + 2]]:25: error: expected assignBin(const float &){{$}}
   // ASSIGN: errors-signatures.cpp:[[#@LINE + 1]]:25: note: binding reference of type 'float' to value of type 'const float' drops 'const' qualifier
   void assignBin(float &f) { assignToAll(f); }
+#elif CASE == 7
+  // OTHER-ASSIGN: errors-signatures.cpp:[[#@LINE + 1]]:25: error: expected assignBin(const float &), but got assignBin(const double &)
+  void assignBin(double f) { assignToAll(float(f)); }
+#elif CASE == 8
+  void assignBin(const auto &f) { assignToAll(f); }
 #else
   void assignBin(const float &f) { assignToAll(f); }
 #endif
@@ -29,6 +37,11 @@ struct Stage : piko::Stage<8, 8, 1, float> {
   // NONE: errors-signatures.cpp:[[#@LINE + 2]]:8: error: expected process(const float &){{$}}
   // NONE: errors-signatures.cpp:[[#@LINE + 1]]:8: note: too many arguments to function call, expected 0, have 1
   void process() {}
+#elif CASE == 6
+  // OTHER: errors-signatures.cpp:[[#@LINE + 1]]:27: error: expected process(const float &), but got process(const int &)
+  void process(const int &i) {}
+#elif CASE == 8
+  void process(float) {}
 #else
   void process(const float &) {}
 #if CASE == 5

@@ -462,12 +462,13 @@ TEST_F(Check, ErrorsSayWhere) {
     if (p.value == 1)
       s.state().data[99] = 1;
   };
-  EXPECT_THAT(reportOfChain(),
-              AllOf(HasSubstr("Step<1>', bin 1: expected an index in [0, 16), "
-                              "but got 99\n  at "),
-                    HasSubstr("CheckTest.cpp:" + std::to_string(line) +
-                              "\n  lineage: source 0 primitive 1, '"),
-                    HasSubstr("Step<0>' bin 1 emit 0")));
+  EXPECT_THAT(
+      reportOfChain(),
+      AllOf(HasSubstr("Step<1>', bin 1: expected an index into 'data' in "
+                      "[0, 16), but got 99\n  at "),
+            HasSubstr("CheckTest.cpp:" + std::to_string(line) +
+                      "\n  lineage: source 0 primitive 1, '"),
+            HasSubstr("Step<0>' bin 1 emit 0")));
 }
 
 TEST_F(Check, BothSidesOfAConflictSayWhere) {

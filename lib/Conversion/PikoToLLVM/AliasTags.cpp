@@ -41,7 +41,7 @@ ArrayAttr AliasTags::writer() const { return tag(node("writer", runtime())); }
 ArrayAttr AliasTags::input() const { return tag(node("input", runtime())); }
 
 ArrayAttr AliasTags::call(StringRef function) const {
-  if (function == "pikoir_fail")
+  if (function.starts_with("pikoir_fail"))
     return tag(node("failure", root()));
   static constexpr StringRef emissions[] = {
       "pikoir_append",          "pikoir_place",        "pikoir_next",

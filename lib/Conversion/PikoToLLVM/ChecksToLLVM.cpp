@@ -11,10 +11,9 @@ using namespace piko;
 
 namespace {
 
-template <typename OpT> struct CheckLowering : OpConversionPattern<OpT> {
-  CheckLowering(const TypeConverter &converter, MLIRContext *mlir,
-                LoweringContext &context)
-      : OpConversionPattern<OpT>(converter, mlir), context(context) {}
+template <typename OpT> struct CheckLowering : ContextPattern<OpT> {
+  using ContextPattern<OpT>::ContextPattern;
+  using ContextPattern<OpT>::context;
 
   /// Calls a function of the runtime with its pipeline and the arguments.
   LLVM::CallOp call(OpBuilder &builder, OpT op, StringRef function,
@@ -39,8 +38,6 @@ template <typename OpT> struct CheckLowering : OpConversionPattern<OpT> {
     return LLVM::ZeroOp::create(
         builder, op.getLoc(), LLVM::LLVMPointerType::get(builder.getContext()));
   }
-
-  LoweringContext &context;
 };
 
 } // namespace

@@ -23,10 +23,9 @@ constexpr int64_t callBin = 0, callBegin = 8, callEnd = 16, callSize = 24;
 
 namespace {
 
-template <typename OpT> struct Lowering : OpConversionPattern<OpT> {
-  Lowering(const TypeConverter &converter, MLIRContext *mlir,
-           LoweringContext &context)
-      : OpConversionPattern<OpT>(converter, mlir), context(context) {}
+template <typename OpT> struct Lowering : ContextPattern<OpT> {
+  using ContextPattern<OpT>::ContextPattern;
+  using ContextPattern<OpT>::context;
 
   static Type pointer(OpBuilder &builder) {
     return LLVM::LLVMPointerType::get(builder.getContext());
@@ -52,8 +51,6 @@ template <typename OpT> struct Lowering : OpConversionPattern<OpT> {
                               createI64(builder, loc, size));
     return createOffset(builder, loc, array, bytes);
   }
-
-  LoweringContext &context;
 };
 
 struct OpenBinsLowering : Lowering<OpenBinsOp> {

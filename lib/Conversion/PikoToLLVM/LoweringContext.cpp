@@ -27,6 +27,9 @@ PipelineNumbers::PipelineNumbers(PipelineOp pipeline) : pipeline(pipeline) {
   };
   pipeline.walk([&](StoreOp store) { note(store); });
   pipeline.walk([&](AtomicOp atomic) { note(atomic); });
+  for (auto buffer : pipeline.getOps<BufferOp>())
+    if (SymbolTable::symbolKnownUseEmpty(buffer, &pipeline.getBody()))
+      unusedBuffers.insert(buffer.getSymNameAttr());
 }
 
 std::optional<int64_t> PipelineNumbers::cycleOf(func::FuncOp kernel) const {

@@ -22,6 +22,8 @@ struct PipelineNumbers {
   llvm::MapVector<mlir::StringAttr, int32_t> stages, states, records;
   /// Buffers that kernels change.
   llvm::DenseSet<mlir::StringAttr> writtenBuffers;
+  /// Buffers that no kernel uses.
+  llvm::DenseSet<mlir::StringAttr> unusedBuffers;
 
   explicit PipelineNumbers(PipelineOp pipeline);
 
@@ -88,6 +90,15 @@ private:
   llvm::DenseMap<mlir::Operation *, llvm::StringMap<StateView>> views;
   llvm::DenseMap<mlir::Operation *, llvm::StringMap<mlir::Value>> queries;
   llvm::DenseMap<std::pair<mlir::Value, int64_t>, mlir::Value> members;
+};
+
+/// A pattern that uses it.
+template <typename OpT> struct ContextPattern : mlir::OpConversionPattern<OpT> {
+  ContextPattern(const mlir::TypeConverter &converter, mlir::MLIRContext *mlir,
+                 LoweringContext &context)
+      : mlir::OpConversionPattern<OpT>(converter, mlir), context(context) {}
+
+  LoweringContext &context;
 };
 
 /// A load or a store with a tag that says what it touches.

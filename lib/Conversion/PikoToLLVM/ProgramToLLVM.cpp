@@ -5,6 +5,7 @@
 
 #include "LoweringContext.h"
 
+#include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "Piko/Dialect/Piko/IR/PikoCheck.h"
 
 #include "mlir/Dialect/ControlFlow/IR/ControlFlowOps.h"
@@ -165,6 +166,8 @@ void SetupWriter::declareState(Operation *state, int32_t number) {
             : null()});
   if (numbers.writtenBuffers.contains(SymbolTable::getSymbolName(state)))
     call("pikoir_declare_written", {i32(number)});
+  if (numbers.unusedBuffers.contains(SymbolTable::getSymbolName(state)))
+    call("pikoir_declare_unused", {i32(number)});
 }
 
 /// pikoir_stage_flags
@@ -189,7 +192,7 @@ void SetupWriter::declareStage(StageOp stage, int32_t number) {
     appendBytes(extents, extent, 8);
   ScheduleOp schedule = stage.getSchedule();
   call("pikoir_declare_stage",
-       {i32(number), text(stage.getSymName()),
+       {i32(number), text(getCppName(stage)),
         i32(numbers.records.lookup(stage.getInputAttr().getAttr())),
         bytes(extents), i32(schedule ? int64_t(schedule.getKind()) : 0),
         i64(schedule ? schedule.getTileSplit().value_or(0) : 0),

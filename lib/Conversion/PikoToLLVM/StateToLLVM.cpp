@@ -4,6 +4,8 @@
 
 #include "LoweringContext.h"
 
+#include "Piko/Dialect/Piko/IR/CppTypes.h"
+
 using namespace mlir;
 using namespace piko;
 
@@ -29,10 +31,9 @@ static Value createElementOffset(OpBuilder &builder, Location loc,
 
 namespace {
 
-template <typename OpT> struct StateLowering : OpConversionPattern<OpT> {
-  StateLowering(const TypeConverter &converter, MLIRContext *mlir,
-                LoweringContext &context)
-      : OpConversionPattern<OpT>(converter, mlir), context(context) {}
+template <typename OpT> struct StateLowering : ContextPattern<OpT> {
+  using ContextPattern<OpT>::ContextPattern;
+  using ContextPattern<OpT>::context;
 
   /// The address of the number that an access names.
   Value address(OpBuilder &builder, OpT op,
@@ -54,8 +55,6 @@ template <typename OpT> struct StateLowering : OpConversionPattern<OpT> {
     bool isConstant = isa<ConstantOp>(context.state(op, op.getState()));
     return context.tags.state(op.getState(), op.getField(), isConstant);
   }
-
-  LoweringContext &context;
 };
 
 struct LoadLowering : StateLowering<LoadOp> {
@@ -126,10 +125,8 @@ struct AtomicLowering : StateLowering<AtomicOp> {
   }
 };
 
-struct PrefetchLowering : OpConversionPattern<PrefetchOp> {
-  PrefetchLowering(const TypeConverter &converter, MLIRContext *mlir,
-                   LoweringContext &context)
-      : OpConversionPattern(converter, mlir), context(context) {}
+struct PrefetchLowering : ContextPattern<PrefetchOp> {
+  using ContextPattern::ContextPattern;
   LogicalResult
   matchAndRewrite(PrefetchOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
@@ -147,13 +144,10 @@ struct PrefetchLowering : OpConversionPattern<PrefetchOp> {
     rewriter.eraseOp(op);
     return success();
   }
-  LoweringContext &context;
 };
 
-struct ExtentLowering : OpConversionPattern<ExtentOp> {
-  ExtentLowering(const TypeConverter &converter, MLIRContext *mlir,
-                 LoweringContext &context)
-      : OpConversionPattern(converter, mlir), context(context) {}
+struct ExtentLowering : ContextPattern<ExtentOp> {
+  using ContextPattern::ContextPattern;
   LogicalResult
   matchAndRewrite(ExtentOp op, OpAdaptor,
                   ConversionPatternRewriter &rewriter) const override {
@@ -162,21 +156,10 @@ struct ExtentLowering : OpConversionPattern<ExtentOp> {
         op, toIndex(rewriter, op.getLoc(), view.extents[op.getDim()]));
     return success();
   }
-  LoweringContext &context;
 };
 
 // pikort_status
-constexpr int64_t updateOutside = 17, indexOutside = 18, notUniform = 21,
-                  noQuotient = 23;
-
-/// What pikoir_fail takes where no other stage is named, and no bin.
-static Value createNull(OpBuilder &builder, Location loc) {
-  return LLVM::ZeroOp::create(builder, loc,
-                              LLVM::LLVMPointerType::get(builder.getContext()));
-}
-static Value createBin(OpBuilder &builder, Location loc, Value bin) {
-  return bin ? toI64(builder, loc, bin) : createI64(builder, loc, -1);
-}
+constexpr int64_t updateOutside = 17, indexOutside = 18, noQuotient = 23;
 
 /// Up to two coordinates from `begin` on, of 32 bits each, in one number.
 static Value packCoordinates(OpBuilder &builder, Location loc,
@@ -192,10 +175,34 @@ static Value packCoordinates(OpBuilder &builder, Location loc,
   return packed;
 }
 
-struct FailLowering : OpConversionPattern<FailOp> {
-  FailLowering(const TypeConverter &converter, MLIRContext *mlir,
-               LoweringContext &context)
-      : OpConversionPattern(converter, mlir), context(context) {}
+/// A call of pikoir_fail or its like.
+template <typename OpT> struct FailPattern : ContextPattern<OpT> {
+  using ContextPattern<OpT>::ContextPattern;
+  using ContextPattern<OpT>::context;
+
+protected:
+  /// Calls it in place of the operation. `name` is the text that it takes, or
+  /// null; `numbers` are its last arguments.
+  void replace(ConversionPatternRewriter &rewriter, OpT op, StringRef function,
+               std::optional<StringRef> name, Value bin,
+               ArrayRef<Value> numbers) const {
+    Location loc = op.getLoc();
+    SmallVector<Value> arguments{
+        context.frame(op),
+        createI32(rewriter, loc, context.stageNumber(op, op.getStage())),
+        name ? context.text(rewriter, loc, *name)
+             : LLVM::ZeroOp::create(
+                   rewriter, loc,
+                   LLVM::LLVMPointerType::get(rewriter.getContext())),
+        bin ? toI64(rewriter, loc, bin) : createI64(rewriter, loc, -1)};
+    llvm::append_range(arguments, numbers);
+    context.call(rewriter, loc, function, Type(), arguments);
+    rewriter.eraseOp(op);
+  }
+};
+
+struct FailLowering : FailPattern<FailOp> {
+  using FailPattern::FailPattern;
   LogicalResult
   matchAndRewrite(FailOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
@@ -203,88 +210,77 @@ struct FailLowering : OpConversionPattern<FailOp> {
     SmallVector<Value> indices;
     for (Value index : adaptor.getIndices())
       indices.push_back(toI64(rewriter, loc, index));
-    Value first, second;
-    if (op.getOutsideBin()) {
-      first = packCoordinates(rewriter, loc, indices, 0);
-      second = packCoordinates(rewriter, loc, indices, 2);
-    } else {
-      // The first index that is outside, and how many elements there are.
-      StateView &view = context.view(rewriter, op, op.getState());
-      first = indices.back();
-      second = view.extents[indices.size() - 1];
-      for (int64_t dim = indices.size() - 2; dim >= 0; --dim) {
-        Value outside =
-            arith::CmpIOp::create(rewriter, loc, arith::CmpIPredicate::uge,
-                                  indices[dim], view.extents[dim]);
-        first = arith::SelectOp::create(rewriter, loc, outside, indices[dim],
-                                        first);
-        second = arith::SelectOp::create(rewriter, loc, outside,
-                                         view.extents[dim], second);
-      }
-    }
-    context.call(
-        rewriter, loc, "pikoir_fail", Type(),
-        {context.frame(op),
-         createI32(rewriter, loc, context.stageNumber(op, op.getStage())),
-         op.getOf() ? context.text(rewriter, loc, *op.getOf())
-                    : createNull(rewriter, loc),
-         createBin(rewriter, loc, adaptor.getBin()),
-         createI32(rewriter, loc,
-                   op.getOutsideBin() ? updateOutside : indexOutside),
-         first, second});
-    rewriter.eraseOp(op);
+    if (op.getOutsideBin())
+      replace(rewriter, op, "pikoir_fail", op.getOf(), adaptor.getBin(),
+              {createI32(rewriter, loc, updateOutside),
+               packCoordinates(rewriter, loc, indices, 0),
+               packCoordinates(rewriter, loc, indices, 2)});
+    else
+      failIndex(rewriter, op, indices, adaptor.getBin());
     return success();
   }
-  LoweringContext &context;
+
+private:
+  /// Names the first index that is outside, and how many elements there are.
+  void failIndex(ConversionPatternRewriter &rewriter, FailOp op,
+                 ArrayRef<Value> indices, Value bin) const {
+    Location loc = op.getLoc();
+    StateView &view = context.view(rewriter, op, op.getState());
+    Value index = indices.back(), count = view.extents[indices.size() - 1];
+    for (int64_t dim = indices.size() - 2; dim >= 0; --dim) {
+      Value outside =
+          arith::CmpIOp::create(rewriter, loc, arith::CmpIPredicate::uge,
+                                indices[dim], view.extents[dim]);
+      index =
+          arith::SelectOp::create(rewriter, loc, outside, indices[dim], index);
+      count = arith::SelectOp::create(rewriter, loc, outside, view.extents[dim],
+                                      count);
+    }
+    int32_t state =
+        context.numbers(op).states.lookup(op.getStateAttr().getAttr());
+    replace(rewriter, op, "pikoir_fail_index", op.getOf(), bin,
+            {createI32(rewriter, loc, state), index, count});
+  }
 };
 
-/// An error that is told by numbers alone.
-template <typename OpT, int64_t code>
-struct FailNumbersLowering : OpConversionPattern<OpT> {
-  FailNumbersLowering(const TypeConverter &converter, MLIRContext *mlir,
-                      LoweringContext &context)
-      : OpConversionPattern<OpT>(converter, mlir), context(context) {}
+struct FailListLowering : FailPattern<FailListOp> {
+  using FailPattern::FailPattern;
   LogicalResult
-  matchAndRewrite(OpT op, typename OpT::Adaptor adaptor,
+  matchAndRewrite(FailListOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
     Location loc = op.getLoc();
-    SmallVector<Value> arguments{
-        context.frame(op),
-        createI32(rewriter, loc, context.stageNumber(op, op.getStage())),
-        createNull(rewriter, loc), createBin(rewriter, loc, adaptor.getBin()),
-        createI32(rewriter, loc, code)};
-    for (Value number : adaptor.getOperands().drop_back(op.getBin() ? 1 : 0))
-      arguments.push_back(toI64(rewriter, loc, number));
-    if (arguments.size() == 6)
-      arguments.push_back(createI64(rewriter, loc, 0));
-    context.call(rewriter, loc, "pikoir_fail", Type(), arguments);
-    rewriter.eraseOp(op);
+    replace(rewriter, op, "pikoir_fail", std::nullopt, adaptor.getBin(),
+            {createI32(rewriter, loc, indexOutside),
+             toI64(rewriter, loc, adaptor.getIndex()),
+             toI64(rewriter, loc, adaptor.getSize())});
     return success();
   }
-  LoweringContext &context;
 };
 
-struct FailDivideLowering : OpConversionPattern<FailDivideOp> {
-  FailDivideLowering(const TypeConverter &converter, MLIRContext *mlir,
-                     LoweringContext &context)
-      : OpConversionPattern(converter, mlir), context(context) {}
+struct FailBarrierLowering : FailPattern<FailBarrierOp> {
+  using FailPattern::FailPattern;
+  LogicalResult
+  matchAndRewrite(FailBarrierOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    auto barrier = op->getAttrOfType<StringAttr>(cppNameAttr);
+    replace(rewriter, op, "pikoir_fail_barrier",
+            barrier ? barrier.getValue() : "sync", adaptor.getBin(),
+            {toI64(rewriter, op.getLoc(), adaptor.getIteration())});
+    return success();
+  }
+};
+
+struct FailDivideLowering : FailPattern<FailDivideOp> {
+  using FailPattern::FailPattern;
   LogicalResult
   matchAndRewrite(FailDivideOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
     Location loc = op.getLoc();
     Value zero = createI64(rewriter, loc, 0);
-    context.call(
-        rewriter, loc, "pikoir_fail", Type(),
-        {context.frame(op),
-         createI32(rewriter, loc, context.stageNumber(op, op.getStage())),
-         op.getOf() ? context.text(rewriter, loc, *op.getOf())
-                    : createNull(rewriter, loc),
-         createBin(rewriter, loc, adaptor.getBin()),
-         createI32(rewriter, loc, noQuotient), zero, zero});
-    rewriter.eraseOp(op);
+    replace(rewriter, op, "pikoir_fail", op.getOf(), adaptor.getBin(),
+            {createI32(rewriter, loc, noQuotient), zero, zero});
     return success();
   }
-  LoweringContext &context;
 };
 
 } // namespace
@@ -293,8 +289,7 @@ void piko::populateStateToLLVMPatterns(const TypeConverter &converter,
                                        RewritePatternSet &patterns,
                                        LoweringContext &context) {
   patterns.add<LoadLowering, StoreLowering, AtomicLowering, ExtentLowering,
-               PrefetchLowering, FailLowering, FailDivideLowering,
-               FailNumbersLowering<FailListOp, indexOutside>,
-               FailNumbersLowering<FailBarrierOp, notUniform>>(
+               PrefetchLowering, FailLowering, FailListLowering,
+               FailBarrierLowering, FailDivideLowering>(
       converter, patterns.getContext(), context);
 }

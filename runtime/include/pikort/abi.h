@@ -90,6 +90,8 @@ PIKORT_API void pikoir_declare_state(pikort_pipeline *p, int32_t id,
 /// Kernels write the buffer: what the host binds to it must be apart from other
 /// buffers and sources, as generated code takes for granted.
 PIKORT_API void pikoir_declare_written(pikort_pipeline *p, int32_t id);
+/// No kernel uses the buffer: the host need not bind it.
+PIKORT_API void pikoir_declare_unused(pikort_pipeline *p, int32_t id);
 /// `bin_size` has one entry for each dimension, 0 = the whole domain.
 /// `cell_size` is the side of owner tiles in a bin, 0 = the bin is one cell.
 PIKORT_API void pikoir_declare_stage(pikort_pipeline *p, int32_t id,
@@ -310,12 +312,20 @@ PIKORT_API int32_t pikoir_strips_next(pikort_pipeline *p, int32_t id);
 /// where the phase of one is part of another's; or null.
 ///   PIKORT_BIN_OUTSIDE     a = bin
 ///   PIKORT_UPDATE_OUTSIDE  a = x + (y << 32), b = z + (w << 32), 32 bits each
-///   PIKORT_INDEX_OUTSIDE   a = index, b = elements
+///   PIKORT_INDEX_OUTSIDE   a = index, b = elements: of a list
 ///   PIKORT_ENDLESS         a = iterations
-///   PIKORT_NOT_UNIFORM     a = iteration
 ///   PIKORT_NO_QUOTIENT
 PIKORT_API void pikoir_fail(pikort_pipeline *p, int32_t stage, const char *name,
                             int64_t bin, int32_t code, int64_t a, int64_t b);
+/// The same for an index outside a buffer or an image.
+PIKORT_API void pikoir_fail_index(pikort_pipeline *p, int32_t stage,
+                                  const char *name, int64_t bin, int32_t state,
+                                  int64_t index, int64_t elements);
+/// The same for an iteration that does not call `barrier`, a constant such as
+/// "sync", as often as iteration 0.
+PIKORT_API void pikoir_fail_barrier(pikort_pipeline *p, int32_t stage,
+                                    const char *barrier, int64_t bin,
+                                    int64_t iteration);
 
 // --- checking mode ----------------------------------------------------------
 //

@@ -29,13 +29,13 @@ piko.record @C {"scale" : f32 at 0} size 4 align 4
 // CHECK:         llvm.load %{{.*}} {tbaa = [#[[SCALE_TAG]]]} : !llvm.ptr -> f32
 // CHECK:         llvm.store %{{.*}} {tbaa = [#[[OUT_V_TAG]]]} : f32
 // CHECK:         llvm.atomicrmw {{.*}} {tbaa = [#[[OUT_X_TAG]]]}
-// CHECK:         llvm.call @pikoir_fail({{.*}}) {tbaa = [#[[FAILURE_TAG]]]}
+// CHECK:         llvm.call @pikoir_fail_index({{.*}}) {tbaa = [#[[FAILURE_TAG]]]}
 // CHECK:         llvm.load %{{.*}} {tbaa = [#[[WRITER_TAG]]]} : !llvm.ptr -> !llvm.ptr
 // CHECK:         llvm.call @pikoir_append({{.*}}) {tbaa = [#[[RUNTIME_TAG]]]}
 // CHECK:         llvm.store %{{.*}} {tbaa = [#[[EMITTED_X_TAG]]]} : i32
 
 // Calls, too: what a failed test calls leaves state as it is.
-// IR: call void @pikoir_fail({{.*}}), !tbaa ![[TAG:[0-9]+]]
+// IR: call void @pikoir_fail_index({{.*}}), !tbaa ![[TAG:[0-9]+]]
 // IR: ![[TAG]] = !{![[FAILURE:[0-9]+]], ![[FAILURE]], i64 0}
 // IR: ![[FAILURE]] = !{!"failure",
 piko.pipeline @P rank 1 {

@@ -38,9 +38,9 @@ piko.record @F {"x" : i32 at 0, "v" : f32 at 4} size 8 align 4
 // CHECK:         llvm.inttoptr
 // CHECK:         %[[OLD:.*]] = llvm.atomicrmw add {{.*}} monotonic
 // CHECK:         llvm.atomicrmw fadd {{.*}} monotonic
-// -1: no bin; 18: an index outside; 21: iterations that do not meet.
+// -1: no bin; 18: an index outside.
 // CHECK:         llvm.call @pikoir_fail(%{{.*}}, %c0_i32, %{{.*}}, %c-1_i64, %c18_i32, %{{.*}}, %{{.*}})
-// CHECK:         llvm.call @pikoir_fail(%{{.*}}, %c0_i32, %{{.*}}, %{{.*}}, %c21_i32, %{{.*}}, %c0_i64)
+// CHECK:         llvm.call @pikoir_fail_barrier(%{{.*}}, %c0_i32, %{{.*}}, %{{.*}}, %{{.*}})
 
 // LIST, UNORDERED and COLLECTS; then COLLECTS alone.
 // CHECK-LABEL: func.func @P.setup

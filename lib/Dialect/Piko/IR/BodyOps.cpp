@@ -3,6 +3,7 @@
 // Primitives and bins.
 
 #include "FieldAccess.h"
+#include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "Piko/Dialect/Piko/IR/Piko.h"
 
 #include "mlir/Dialect/Arith/IR/Arith.h"
@@ -105,7 +106,7 @@ LogicalResult EmitOp::verify() {
   if (getPort() >= int64_t(stage.getOutputs().size()))
     return emitOpError("expected a port below ")
            << stage.getOutputs().size() << ", which is how many stage '"
-           << stage.getSymName() << "' has, but got " << getPort();
+           << getCppName(stage) << "' has, but got " << getPort();
   auto name = cast<FlatSymbolRefAttr>(stage.getOutputs()[getPort()]);
   RecordOp record = lookupRecord(*this, name);
   if (!record)
@@ -176,16 +177,16 @@ LogicalResult AssignPreviousOp::verify() {
   for (auto source : pipeline.getOps<SourceOp>())
     if (source.getStageAttr() == name)
       return emitOpError("expected a previous stage, but stage '")
-             << stage.getSymName() << "' has a source";
+             << getCppName(stage) << "' has a source";
   for (auto edge : pipeline.getOps<EdgeOp>()) {
     if (edge.getConsumerAttr() != name)
       continue;
     auto producer = lookupInPipeline<StageOp>(*this, edge.getProducerAttr());
     if (producer && producer.getBins() != stage.getBins())
       return emitOpError("expected stage '")
-             << producer.getSymName() << "' to have bins of the same size as '"
-             << stage.getSymName() << "', [" << stage.getBins()
-             << "], but got [" << producer.getBins() << "]";
+             << getCppName(producer) << "' to have bins of the same size as '"
+             << getCppName(stage) << "', [" << stage.getBins() << "], but got ["
+             << producer.getBins() << "]";
   }
   return success();
 }

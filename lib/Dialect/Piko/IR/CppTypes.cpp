@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// What C++ calls the types of a record.
+// What C++ calls stages, barriers and the types of records.
 
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
 
@@ -13,6 +13,14 @@ using namespace piko;
 //===----------------------------------------------------------------------===//
 // Names
 //===----------------------------------------------------------------------===//
+
+StringRef piko::getCppName(Operation *op) {
+  if (auto name = op->getAttrOfType<StringAttr>(cppNameAttr))
+    return name.getValue();
+  if (isa<SymbolOpInterface>(op))
+    return SymbolTable::getSymbolName(op).getValue();
+  return op->getName().stripDialect();
+}
 
 Type piko::getCppStorage(StringRef name, MLIRContext *context) {
   if (name == "float")

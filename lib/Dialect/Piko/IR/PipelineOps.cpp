@@ -183,7 +183,7 @@ static LogicalResult verifyPorts(PipelineOp pipeline) {
     for (int64_t port = 0, e = stage.getOutputs().size(); port < e; ++port)
       if (!edges.count({FlatSymbolRefAttr::get(stage.getSymNameAttr()), port}))
         return stage.emitError("port ")
-               << port << " of stage '" << stage.getSymName()
+               << port << " of stage '" << getCppName(stage)
                << "' is not connected";
   return success();
 }
@@ -200,7 +200,7 @@ static LogicalResult verifyReached(PipelineOp pipeline) {
   for (auto stage : pipeline.getOps<StageOp>())
     if (!fed.contains(stage.getSymNameAttr()))
       return stage.emitError("stage '")
-             << stage.getSymName()
+             << getCppName(stage)
              << "' has no input: expected an edge or a source that feeds it";
   return success();
 }

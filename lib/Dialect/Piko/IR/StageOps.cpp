@@ -69,7 +69,7 @@ LogicalResult StageOp::verifyRegions() {
       return op.emitOpError("expected only phases in a stage");
     if (++count[kind] == 2)
       return op.emitOpError("expected at most one phase of a kind in stage '")
-             << getSymName() << "'";
+             << getCppName(*this) << "'";
   }
   // Below the authored level the phases are in kernels.
   if (!count[2])
@@ -88,7 +88,7 @@ LogicalResult ScheduleOp::verifySymbolUses(SymbolTableCollection &) {
   if ((getBatch() || getEveryBin()) && !owner.getTakesList())
     return emitOpError("expected ")
            << (getBatch() ? "batch" : "every_bin")
-           << " only in a stage that takes a list, but '" << owner.getSymName()
+           << " only in a stage that takes a list, but '" << getCppName(owner)
            << "' does not";
   if (!getEndStageAttr())
     return success();
@@ -158,7 +158,7 @@ static LogicalResult verifyInSchedule(Operation *op, bool needsList) {
   auto stage = cast<StageOp>(schedule->getParentOp());
   if (needsList && !stage.getTakesList())
     return op->emitOpError("expected to be in a stage that takes a list, but '")
-           << stage.getSymName() << "' does not";
+           << getCppName(stage) << "' does not";
   return success();
 }
 

@@ -3,6 +3,7 @@
 // Access to a pipeline's state.
 
 #include "FieldAccess.h"
+#include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "Piko/Dialect/Piko/IR/Piko.h"
 
 using namespace mlir;
@@ -79,7 +80,7 @@ LogicalResult AtomicOp::verifySymbolUses(SymbolTableCollection &) {
     ScheduleOp schedule = stage.getSchedule();
     if (!schedule || !schedule.getUnordered())
       return emitOpError("expected stage '")
-             << stage.getSymName() << "' to be unordered, because "
+             << getCppName(stage) << "' to be unordered, because "
              << (getOld() ? "the result of an atomic" : "a float atomic")
              << " shows the order of its primitives";
   }

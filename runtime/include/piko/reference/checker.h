@@ -16,19 +16,35 @@ namespace piko::reference {
 
 class Checker {
 public:
-  /// Names a piece of state by the address of its Buffer or Image.
-  void nameState(const void *handle, std::string name) {
-    names.emplace_back(handle, std::move(name));
+  /// Names a piece of state by its address and size.
+  void nameState(const void *handle, size_t size, std::string name) {
+    names.push_back(
+        {static_cast<const std::byte *>(handle), size, std::move(name)});
+  }
+  /// Of the piece that an address is in; empty where it is not known.
+  std::string nameOf(const void *address) const {
+    const auto *at = static_cast<const std::byte *>(address);
+    for (auto known = names.rbegin(); known != names.rend(); ++known)
+      if (!std::less<>()(at, known->begin) &&
+          std::less<>()(at, known->begin + known->size))
+        return known->name;
+    return "";
   }
 
   void beginRun() {
     memories.clear();
+    fixed.clear();
     updating = nullptr;
     current = nullptr;
     turn = loops = 0;
   }
   /// Once it is known what stages wait for.
   void setOrder(StageOrder stageOrder) { order = std::move(stageOrder); }
+  /// What must stay as it is from now on.
+  void fix(Fixed memory) {
+    memory.keepContent();
+    fixed.push_back(std::move(memory));
+  }
   /// After the last call: no element may have changed since.
   void endRun() {
     for (const auto &[handle, memory] : memories)
@@ -45,6 +61,8 @@ public:
 
   std::shared_ptr<Strand> beginCall(Phase phase, const Node *node, int64_t bin,
                                     Lineage lineage) {
+    if (current)
+      checkFixed();
     auto strand = std::make_shared<Strand>();
     strand->call = std::make_shared<Call>(
         Call{phase, node, bin, std::move(lineage), turn});
@@ -52,6 +70,7 @@ public:
   }
   /// `outer` is what beginCall gave.
   void endCall(std::shared_ptr<Strand> outer) {
+    checkFixed();
     release();
     current = std::move(outer);
   }
@@ -159,11 +178,28 @@ private:
       if (known == handle)
         return *memory;
     auto memory = std::make_unique<Memory>(getMemory());
-    for (const auto &[known, name] : names)
-      if (known == handle)
-        memory->name = name;
+    memory->name = nameOf(handle);
     memories.emplace_back(handle, std::move(memory));
     return *memories.back().second;
+  }
+
+  /// The state comes first, then the stages.
+  void checkFixed() const {
+    for (const Fixed &memory : fixed)
+      if (memory.hasChanged())
+        failFixed(memory, &memory == &fixed.front());
+  }
+  [[noreturn]] void failFixed(const Fixed &memory, bool isState) const {
+    size_t place = memory.findChange();
+    std::string name = nameOf(memory.bytes() + place);
+    std::string what = name.empty()
+                           ? "byte " + std::to_string(place) + " of '" +
+                                 std::string(memory.type) + "'"
+                           : "'" + name + "'";
+    fail(*current, {},
+         std::string("expected phases to leave ") +
+             (isState ? "constants of the state" : "members of a stage") +
+             " as they are, but " + what + " was changed");
   }
 
   void enter(std::shared_ptr<const Strand> outer, int64_t loop,
@@ -336,8 +372,14 @@ private:
     return {a.iteration, b.iteration};
   }
 
-  std::vector<std::pair<const void *, std::string>> names;
+  struct Name {
+    const std::byte *begin;
+    size_t size;
+    std::string name;
+  };
+  std::vector<Name> names;
   std::vector<std::pair<const void *, std::unique_ptr<Memory>>> memories;
+  std::vector<Fixed> fixed;
   StageOrder order;
   const Memory *updating = nullptr;
   int64_t turn = 0, loops = 0;

@@ -183,13 +183,13 @@ public:
     });
   }
 
-  void sync() {
-    Loop &loop = loopForSync("sync");
+  void sync(const Barrier &barrier) {
+    Loop &loop = loopForSync(barrier.call.data());
     if constexpr (!checking) {
-      loop.sync();
+      loop.sync(barrier);
     } else {
       std::shared_ptr<Strand> before = checker.beginBarrier();
-      loop.sync();
+      loop.sync(barrier);
       checker.endBarrier(*before);
     }
   }

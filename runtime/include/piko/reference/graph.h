@@ -56,6 +56,7 @@ public:
   std::string_view name() const { return type->name; }
 
   const void *address = nullptr;  ///< of the user's stage
+  size_t size = 0;                ///< its bytes
   const TypeInfo *type = nullptr; ///< the user's stage type
   const TypeInfo *inputType = nullptr;
   size_t inputSize = 0;

@@ -18,6 +18,14 @@
 
 namespace piko::reference {
 
+/// What iterations meet at: a call of the language and, of one that exchanges
+/// values, what it makes of them.
+struct Barrier {
+  std::string_view call;
+  const TypeInfo *combines = nullptr;
+  bool operator==(const Barrier &) const = default;
+};
+
 /// A primitive on its way to a stage.
 struct Emission {
   Node *to;
@@ -39,7 +47,7 @@ public:
     for (size_t i = 0; i < fibers.size(); ++i) {
       resume(i);
       if (!fibers[i]->isDone())
-        failUniform();
+        failUniform(arrived);
     }
     running = nullptr;
     for (std::vector<Emission> &list : kept)
@@ -48,19 +56,20 @@ public:
   }
 
   /// Called by an iteration: a barrier between all of them.
-  void sync() {
+  void sync(const Barrier &barrier) {
+    arrived = barrier;
     if (running) {
       running->suspend();
       return;
     }
     if (iteration != 0)
-      failUniform();
+      failUniform(barrier);
     if (fibers.empty())
       start();
     for (size_t i = 0; i < fibers.size(); ++i) {
       resume(i);
-      if (fibers[i]->isDone())
-        failUniform();
+      if (fibers[i]->isDone() || arrived != barrier)
+        failUniform(barrier);
     }
     running = nullptr;
     iteration = 0;
@@ -91,10 +100,12 @@ private:
     running->resume();
   }
 
-  [[noreturn]] void failUniform() {
+  /// The running iteration, or iteration 0, does not come to a barrier.
+  [[noreturn]] void failUniform(const Barrier &barrier) {
     running = nullptr;
-    node.fail(bin, "expected every iteration of parallelFor to call sync() as "
-                   "often as iteration 0, but iteration " +
+    node.fail(bin, "expected every iteration of parallelFor to call " +
+                       std::string(barrier.call) +
+                       "() as often as iteration 0, but iteration " +
                        std::to_string(iteration) + " does not");
   }
 
@@ -104,6 +115,7 @@ private:
   std::vector<std::vector<Emission>> kept; ///< of iterations 1, 2, ...
   std::vector<std::unique_ptr<Fiber>> fibers;
   Fiber *running = nullptr;
+  Barrier arrived{}; ///< where an iteration came to last
 };
 
 } // namespace piko::reference

@@ -9,11 +9,26 @@
 namespace piko {
 namespace reference {
 
+/// What a phase takes; not of one that is overloaded or a template.
+template <class S, class Result, class Taken>
+Taken parameterOf(Result (S::*)(Taken));
+template <class S, class Result, class Taken>
+Taken parameterOf(Result (S::*)(Taken) const);
+
+/// A phase takes the primitive itself: what it can be converted to would be
+/// another value.
+template <class Taken, class In> constexpr void expectPrimitive() {
+  static_assert(std::is_same_v<Taken, In> || std::is_base_of_v<Taken, In>,
+                "expected a phase to take the primitive of its stage, but it "
+                "takes another type");
+}
+
 /// A Node that calls the phases of the user's stage S.
 template <class S, class In> class TypedNode final : public Node {
 public:
   explicit TypedNode(S &stage) : stage(stage) {
     address = &stage;
+    size = sizeof(S);
     type = typeOf<S>();
     inputType = typeOf<In>();
     inputSize = sizeof(In);
@@ -21,6 +36,9 @@ public:
   }
 
   void assign(const std::byte *primitive) override {
+    if constexpr (requires { parameterOf(&S::assignBin); })
+      expectPrimitive<std::remove_cvref_t<decltype(parameterOf(&S::assignBin))>,
+                      In>();
     if constexpr (requires(const In &p) { stage.assignBin(p); })
       stage.assignBin(*reinterpret_cast<const In *>(primitive));
     else
@@ -31,6 +49,9 @@ public:
       stage.schedule(BinId{bin});
   }
   void process(const std::byte *primitive) override {
+    if constexpr (takesOne && requires { parameterOf(&S::process); })
+      expectPrimitive<std::remove_cvref_t<decltype(parameterOf(&S::process))>,
+                      In>();
     if constexpr (takesOne)
       stage.process(*reinterpret_cast<const In *>(primitive));
   }
@@ -87,8 +108,8 @@ public:
   template <auto... Field> void expectNumbers() {
     (executor.numbers.push_back(numberField<Field>(Field)), ...);
   }
-  void nameState(const void *handle, std::string name) {
-    executor.checker.nameState(handle, std::move(name));
+  void nameState(const void *piece, size_t size, std::string name) {
+    executor.checker.nameState(piece, size, std::move(name));
   }
 
   void setLoopLimit(int64_t limit) {
@@ -103,7 +124,8 @@ public:
   // For the pipeline's constructor.
 
   /// The state is there: what is constructed from here on are stages.
-  void beginMembers() {
+  template <class State> void beginMembers(const State &state) {
+    stateBytes = {&state, sizeof(State), typeName<State>()};
     ImageBase::registry() = scope.saved;
     membersUnderConstruction() = &members;
   }
@@ -235,6 +257,7 @@ private:
   std::vector<std::unique_ptr<Node>> nodes; ///< as declared
   std::vector<Source> sources;
   std::vector<Allocation> allocations;
+  Fixed stateBytes;
   Cell domainExtent{0, 1, 1, 1};
   int domainRank = 0;
   Executor executor;
@@ -348,8 +371,12 @@ inline void Pipeline::run() {
   prepareState();
   executor.checker.beginRun();
   std::vector<Component> order = prepareStages();
-  if constexpr (checking)
+  if constexpr (checking) {
     executor.checker.setOrder(stageOrder(order));
+    executor.checker.fix(stateBytes);
+    for (const auto &node : nodes)
+      executor.checker.fix({node->address, node->size, node->name()});
+  }
   for (size_t s = 0; s < sources.size(); ++s) {
     const Source &source = sources[s];
     for (int64_t i = 0; i < source.count; ++i) {
@@ -371,7 +398,7 @@ inline void Pipeline::run() {
 /// a pipeline finds no names but those of the language.
 template <class State> class Pipe {
 public:
-  Pipe() : run(), state() { run.beginMembers(); }
+  Pipe() : run(), state() { run.beginMembers(state); }
 
   Pipeline run;
   State state;
@@ -432,9 +459,9 @@ public:
   template <auto... Field> void expectNumbers() {
     reference::Pipe<State>::run.template expectNumbers<Field...>();
   }
-  /// In checking mode: what messages call a buffer or an image.
-  void nameState(const void *handle, std::string name) {
-    reference::Pipe<State>::run.nameState(handle, std::move(name));
+  /// What messages call a piece of the state.
+  template <class T> void nameState(const T *piece, std::string name) {
+    reference::Pipe<State>::run.nameState(piece, sizeof(T), std::move(name));
   }
 
   /// How many hops a primitive may take on a cycle of stages, and how many

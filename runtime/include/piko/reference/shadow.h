@@ -25,6 +25,15 @@ struct Access {
   Place at;
 };
 
+/// "'depth'", or without a name "an image of 'float'".
+inline std::string stateText(const std::string &name, bool isImage,
+                             std::string_view elementType) {
+  if (!name.empty())
+    return "'" + name + "'";
+  return (isImage ? "an image of '" : "a buffer of '") +
+         std::string(elementType) + "'";
+}
+
 /// A buffer or an image.
 struct Memory {
   Memory() = default;
@@ -50,12 +59,37 @@ struct Memory {
   bool isImage = false;
   std::vector<std::unique_ptr<Element>> elements; ///< those that were touched
 
-  /// "'depth'", or "an image of 'float'".
-  std::string text() const {
-    if (!name.empty())
-      return "'" + name + "'";
-    return (isImage ? "an image of '" : "a buffer of '") +
-           std::string(elementType) + "'";
+  std::string text() const { return stateText(name, isImage, elementType); }
+};
+
+/// Whether `count` bytes are not those of `before`.
+PIKO_UNSANITIZED inline bool differ(const std::byte *before,
+                                    const std::byte *now, size_t count) {
+  for (size_t i = 0; i < count; ++i)
+    if (before[i] != now[i])
+      return true;
+  return false;
+}
+
+/// What no phase changes: a stage, or the state but for what is in its buffers
+/// and images.
+struct Fixed {
+  const void *address = nullptr;
+  size_t size = 0;
+  std::string_view type;
+  std::vector<std::byte> content{}; ///< when the run began
+
+  const std::byte *bytes() const {
+    return static_cast<const std::byte *>(address);
+  }
+  void keepContent() { content.assign(bytes(), bytes() + size); }
+  bool hasChanged() const { return differ(content.data(), bytes(), size); }
+  /// Where it did.
+  PIKO_UNSANITIZED size_t findChange() const {
+    size_t i = 0;
+    while (content[i] == bytes()[i])
+      ++i;
+    return i;
   }
 };
 
@@ -77,12 +111,8 @@ struct Element {
   std::byte *bytes() const {
     return memory->data + index * memory->elementSize;
   }
-  PIKO_UNSANITIZED bool hasChanged() const {
-    const std::byte *before = content.data(), *now = bytes();
-    for (size_t i = 0, n = content.size(); i < n; ++i)
-      if (before[i] != now[i])
-        return true;
-    return false;
+  bool hasChanged() const {
+    return differ(content.data(), bytes(), content.size());
   }
   void keepContent() { content.assign(bytes(), bytes() + memory->elementSize); }
 

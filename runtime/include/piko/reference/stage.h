@@ -122,12 +122,20 @@ Result collective(const char *what, const Place &at, const T &value,
   bool first = loop.iteration == 0;
   if (first)
     loop.slots = std::vector<T>(loop.size, value);
-  else
-    std::any_cast<std::vector<T> &>(loop.slots)[loop.iteration] = value;
-  running.sync();
-  if (first) // the first to go on
+  else if (auto *slots = std::any_cast<std::vector<T>>(&loop.slots))
+    (*slots)[loop.iteration] = value;
+  running.sync({what, typeOf<Combine>()}); // fails unless all do the same
+  if (first)                               // the first to go on
     loop.result = combine(std::any_cast<std::vector<T> &>(loop.slots));
   return std::any_cast<Result &>(loop.result);
+}
+
+/// In how many iterations the value is true.
+inline int64_t countIterations(const char *what, bool value, const Place &at) {
+  return collective<int64_t, int64_t>(
+      what, at, value, [](const std::vector<int64_t> &values) {
+        return std::count(values.begin(), values.end(), 1);
+      });
 }
 
 /// How often f(0), ..., f(n - 1) is true.
@@ -157,7 +165,7 @@ public:
   bool empty() const { return count == 0; }
   const T &operator[](reference::Index i) const {
     if (i < 0 || i >= count)
-      reference::failAccess(i, count, reference::placeOf(i));
+      reference::failIndex(i, count, reference::placeOf(i));
     return primitives[i];
   }
   const T *begin() const { return primitives; }
@@ -403,6 +411,9 @@ public:
   template <class F>
   void parallelFor(int64_t n, F &&f,
                    reference::Place at = reference::Place::current()) {
+    static_assert(std::is_invocable_v<const std::remove_reference_t<F> &, int>,
+                  "expected a function that can be called if it is const: "
+                  "iterations share what it has captured by value");
     reference::executorAt("parallelFor", at).parallelFor(n, [&f](int64_t i) {
       f(static_cast<int>(i));
     });
@@ -428,21 +439,20 @@ public:
   }
   /// In an iteration of parallelFor: a barrier between all iterations.
   void sync(reference::Place at = reference::Place::current()) {
-    reference::executorAt("sync", at).sync();
+    reference::executorAt("sync", at).sync({"sync"});
   }
 
   // Over the iterations of the enclosing parallelFor; each of them is also a
   // sync(). Every iteration gets the result.
 
   bool any(bool value, reference::Place at = reference::Place::current()) {
-    return count(value, at) != 0;
+    return reference::countIterations("any", value, at) != 0;
   }
   bool all(bool value, reference::Place at = reference::Place::current()) {
-    return count(!value, at) == 0;
+    return reference::countIterations("all", !value, at) == 0;
   }
   int64_t count(bool value, reference::Place at = reference::Place::current()) {
-    return reduce(
-        int64_t(value), [](int64_t a, int64_t b) { return a + b; }, at);
+    return reference::countIterations("count", value, at);
   }
   /// op over all values, in a fixed binary tree.
   template <class T, class Op>

@@ -17,25 +17,63 @@
 namespace piko {
 namespace reference {
 
-/// Throws for an access outside a buffer or an image.
-[[noreturn]] inline void failAccess(int64_t index, int64_t count,
-                                    const Place &at) {
-  std::string message = "expected an index in [0, " + std::to_string(count) +
-                        "), but got " + std::to_string(index);
+/// The phase that is running; null for the host.
+inline Frame *currentFrame() {
   Executor *executor = Executor::current();
-  if (!executor || !executor->frame)
+  return executor ? executor->frame : nullptr;
+}
+
+/// Throws for an index outside a list or, as `into` says, outside of state.
+[[noreturn]] inline void failIndex(int64_t index, int64_t count,
+                                   const Place &at,
+                                   const std::string &into = "") {
+  std::string message = "expected an index " + into + "in [0, " +
+                        std::to_string(count) + "), but got " +
+                        std::to_string(index);
+  Frame *call = currentFrame();
+  if (!call)
     throw Error(message);
-  Frame &call = *executor->frame;
-  call.at = at;
-  call.node->fail(call.phase == Phase::Assign ? -1 : call.bin, message);
+  call->at = at;
+  call->node->fail(call->phase == Phase::Assign ? -1 : call->bin, message);
+}
+/// The same for the Buffer or the Image at an address.
+[[noreturn]] inline void failAccess(const void *handle, bool isImage,
+                                    std::string_view elementType, int64_t index,
+                                    int64_t count, const Place &at) {
+  std::string into;
+  if (currentFrame())
+    into = "into " +
+           stateText(Executor::current()->checker.nameOf(handle), isImage,
+                     elementType) +
+           " ";
+  failIndex(index, count, at, into);
+}
+
+/// Throws for a phase that uses a Buffer to which the host has bound nothing.
+[[noreturn]] inline void failUnbound(const void *handle,
+                                     std::string_view elementType) {
+  Frame &call = *currentFrame();
+  std::string name = Executor::current()->checker.nameOf(handle);
+  call.node->fail(call.phase == Phase::Assign ? -1 : call.bin,
+                  (name.empty() ? stateText(name, false, elementType)
+                                : "buffer '" + name + "'") +
+                      " is not bound");
+}
+
+/// Throws if a phase makes a call that is the host's.
+inline void expectHost(const char *what) {
+  if (Frame *call = currentFrame())
+    call->node->fail(call->phase == Phase::Assign ? -1 : call->bin,
+                     std::string("expected ") + what +
+                         " on the host's side, but a phase calls it: a phase "
+                         "uses elements by their index");
 }
 
 /// The checker, while a phase runs in checking mode; else null.
 inline Checker *activeChecker() {
   if constexpr (!checking)
     return nullptr;
-  Executor *executor = Executor::current();
-  return executor && executor->frame ? &executor->checker : nullptr;
+  return currentFrame() ? &Executor::current()->checker : nullptr;
 }
 
 #ifdef PIKO_CHECK
@@ -130,11 +168,18 @@ template <class T> class Buffer final : public reference::BufferBase {
 public:
   Buffer() = default;
 
-  int64_t size() const { return count; }
+  int64_t size() const {
+    if (!isBound)
+      expectBound();
+    return count;
+  }
   T &operator[](reference::Index i) const {
     reference::Place at = reference::placeOf(i);
+    if (!isBound)
+      expectBound();
     if (i < 0 || i >= count)
-      reference::failAccess(i, count, at);
+      reference::failAccess(this, /*isImage=*/false, reference::typeName<T>(),
+                            i, count, at);
     if (reference::Checker *checker = reference::activeChecker())
       checker->give(
           checker->element(this, i,
@@ -150,9 +195,16 @@ public:
 
   /// Uses the caller's memory, which must outlive the runs.
   Status bind(T *data, int64_t n) {
+    reference::expectHost("bind()");
     owned.reset();
-    elements = data;
-    count = n;
+    hold(data, n);
+    return {};
+  }
+  template <class U>
+    requires std::is_same_v<U, T>
+  Status bind(const U *, int64_t) {
+    static_assert(!std::is_same_v<U, T>,
+                  "a pipeline may write to a buffer; assign copies");
     return {};
   }
   template <reference::HostRange Range> Status bind(Range &&range) {
@@ -162,11 +214,11 @@ public:
   }
   /// Copies n elements.
   Status assign(const T *data, int64_t n) {
+    reference::expectHost("assign()");
     T *copy = new T[n];
     std::copy(data, data + n, copy);
     owned.reset(copy);
-    elements = owned.get();
-    count = n;
+    hold(copy, n);
     return {};
   }
   template <class Range> Status assign(const Range &range) {
@@ -177,24 +229,42 @@ public:
   }
   /// Makes n elements whose bytes are zero.
   Status allocate(int64_t n) {
+    reference::expectHost("allocate()");
     allocateZeroed(n);
     return {};
   }
   void allocateZeroed(int64_t n) override {
     owned.reset(new T[n]);
-    elements = owned.get();
-    count = n;
+    hold(owned.get(), n);
     if (n)
       std::memset(static_cast<void *>(elements), 0, n * sizeof(T));
   }
-  T *data() const { return elements; }
-  T *begin() const { return elements; }
-  T *end() const { return elements + count; }
+  T *data() const {
+    reference::expectHost("data()");
+    return elements;
+  }
+  T *begin() const {
+    reference::expectHost("begin()");
+    return elements;
+  }
+  T *end() const { return begin() + count; }
 
 private:
+  void hold(T *data, int64_t n) {
+    elements = data;
+    count = n;
+    isBound = true;
+  }
+  /// A phase needs the host's elements.
+  void expectBound() const {
+    if (reference::currentFrame())
+      reference::failUnbound(this, reference::typeName<T>());
+  }
+
   reference::OwnedArray<T> owned;
   T *elements = nullptr;
   int64_t count = 0;
+  bool isBound = false;
 };
 
 /// A grid of pixels with the extent of the domain (of its first dimensions, if
@@ -230,18 +300,25 @@ public:
 
   // For the host.
 
-  int64_t size() const { return cells[0] * cells[1] * cells[2] * cells[3]; }
+  int64_t size() const {
+    reference::expectHost("size() of an image");
+    return countPixels();
+  }
   /// The pixels, row-major, x fastest; for a host to change between runs, too.
-  T *data() const { return pixels.get(); }
+  T *data() const {
+    reference::expectHost("data()");
+    return pixels.get();
+  }
 
   /// Sizes and clears the image; its memory stays where its size does.
   void prepare(const reference::Cell &domain) override {
-    int64_t before = size();
+    int64_t before = countPixels();
     for (int d = 0; d < Rank; ++d)
       cells[d] = domain[d];
-    if (size() != before)
-      pixels.reset(new T[size()]);
-    std::fill_n(pixels.get(), size(), T{});
+    int64_t count = countPixels();
+    if (count != before)
+      pixels.reset(new T[count]);
+    std::fill_n(pixels.get(), count, T{});
   }
 
   /// f(pixel), for BasicStage::update.
@@ -256,11 +333,15 @@ public:
   }
 
 private:
+  int64_t countPixels() const {
+    return cells[0] * cells[1] * cells[2] * cells[3];
+  }
   T &pixel(const Cells<Rank> &at, const reference::Place &place) const {
     int64_t index = 0;
     for (int d = Rank - 1; d >= 0; --d) {
       if (at[d] < 0 || at[d] >= cells[d])
-        reference::failAccess(at[d], cells[d], place);
+        reference::failAccess(this, /*isImage=*/true, reference::typeName<T>(),
+                              at[d], cells[d], place);
       index = index * cells[d] + at[d];
     }
     return pixels.get()[index];
@@ -269,7 +350,7 @@ private:
   reference::Element &element(reference::Checker &checker,
                               const T &pixel) const {
     return checker.element(this, &pixel - pixels.get(), [&] {
-      reference::Memory memory(pixels.get(), size());
+      reference::Memory memory(pixels.get(), countPixels());
       memory.extent = cells;
       memory.rank = Rank;
       memory.isImage = true;

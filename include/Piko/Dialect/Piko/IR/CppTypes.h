@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// What C++ calls the types of a record, for the headers of hosts. Nothing else
-// depends on it, and a pass may drop it: a field has the type of its storage.
+// What C++ calls things, for the headers of hosts and for messages. Nothing
+// else depends on it, and a pass may drop it: a field has the type of its
+// storage.
 
 #ifndef PIKO_DIALECT_PIKO_IR_CPPTYPES_H
 #define PIKO_DIALECT_PIKO_IR_CPPTYPES_H
@@ -16,8 +17,12 @@ namespace piko {
 constexpr llvm::StringLiteral cppTypesAttr = "piko.cpp_types";
 
 /// Of a piko.stage, the name of the pipeline's member where the stage's symbol
-/// is another.
+/// is another. Of a piko.reduce, the call that it was, as "any". Of a
+/// piko.fail_barrier, the call that was not made.
 constexpr llvm::StringLiteral cppNameAttr = "piko.cpp_name";
+
+/// That name; else an operation's symbol, or what its own name says, as "sync".
+llvm::StringRef getCppName(mlir::Operation *op);
 
 /// An entry of piko.cpp_types.
 struct CppType {

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// What the C++ compiler refuses, in words of the language.
+// RUN: %cxx_reference -DCASE=0 -fsyntax-only %s
+// RUN: not %cxx_reference -DCASE=1 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=INT
+// RUN: not %cxx_reference -DCASE=2 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=ASSIGN
+// RUN: not %cxx_reference -DCASE=3 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=MUTABLE
+// RUN: not %cxx_reference -DCASE=4 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=CONST
+// RUN: not %cxx_reference -DCASE=5 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=CONST
+#include <piko.h>
+
+#include <vector>
+
+struct Base {
+  float x;
+};
+struct Derived : Base {
+  int y;
+};
+struct State {
+  piko::Buffer<int> out;
+};
+
+// INT: error: {{.*}}expected a phase to take the primitive of its stage, but it takes another type
+// INT: expectPrimitive{{.*}}int{{.*}}float
+// ASSIGN: error: {{.*}}expected a phase to take the primitive of its stage, but it takes another type
+// ASSIGN: expectPrimitive{{.*}}double{{.*}}float
+struct Take : piko::Stage<0, 0, 4, float>, piko::Uses<State> {
+#if CASE == 1
+  void process(const int &) {}
+#else
+  void process(float) const noexcept {}
+#endif
+#if CASE == 2
+  void assignBin(double) {}
+#endif
+};
+struct TakeBase : piko::Stage<0, 0, 4, Derived> {
+  void process(const Base &) {}
+};
+struct TakeAny : piko::Stage<0, 0, 4, float>, piko::Uses<State> {
+  void process(const auto &value) {
+#if CASE == 3
+    // MUTABLE: error: {{.*}}expected a function that can be called if it is const: iterations share what it has captured by value
+    // MUTABLE: errors-static.cpp:[[#@LINE+1]]:
+    parallelFor(2, [value](int i) mutable { i += int(value); });
+#else
+    parallelFor(2, [&](int i) { state().out[i] = int(value); });
+#endif
+  }
+};
+struct TakePipe : piko::Pipe<State> {
+  Take take;
+  TakeBase takeBase;
+  TakeAny takeAny;
+  TakePipe() {
+    source(take);
+    source(takeBase);
+    source(takeAny);
+  }
+};
+
+int main() {
+  std::vector<int> out(3);
+  const std::vector<int> constant(3);
+  TakePipe pipe;
+  pipe.state().out.bind(out);
+  // CONST: error: {{.*}}a pipeline may write to a buffer; assign copies
+  // CONST: errors-static.cpp:
+#if CASE == 4
+  pipe.state().out.bind(constant);
+#elif CASE == 5
+  pipe.state().out.bind(constant.data(), 3);
+#endif
+}
