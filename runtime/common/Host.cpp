@@ -293,7 +293,8 @@ static void checkBound(const pikort_pipeline &p) {
     throw Failure{PIKORT_UNBOUND,
                   "pipeline " + quoted(p.name) + ": the domain is not set"};
   for (const State &state : p.states)
-    if (state.kind != PIKORT_IMAGE && state.perSource < 0 && !state.bound)
+    if (state.kind != PIKORT_IMAGE && state.perSource < 0 && !state.bound &&
+        !state.unused)
       throw Failure{
           PIKORT_UNBOUND,
           "pipeline " + quoted(p.name) + ": " +
@@ -340,10 +341,10 @@ static void checkApart(const pikort_pipeline &p) {
     for (const State &state : p.states)
       if (&state != &written && overlap(memory, memoryOf(p, state)))
         fail(written, "buffer " + quoted(state.name));
-    // In checking mode a source's record is not the host's, but longer.
-    for (size_t s = 0; s < p.sources.size() && !p.checker; ++s) {
+    for (size_t s = 0; s < p.sources.size(); ++s) {
       const Source &source = p.sources[s];
-      int64_t size = p.records[p.stages[source.stage].record].size;
+      // In checking mode a stage's record is longer than the host's.
+      int64_t size = p.records[p.hostRecord(source.stage)].size;
       if (overlap(memory, {source.data, source.count * size}))
         fail(written, "source " + std::to_string(s));
     }
