@@ -10,6 +10,7 @@
 #include "CallChain.h"
 #include "Cleanup.h"
 #include "MathCalls.h"
+#include "llvm/ADT/StringMap.h"
 #include "llvm/IR/InstIterator.h"
 #include "llvm/IR/Instructions.h"
 #include "llvm/Support/SaveAndRestore.h"
@@ -37,23 +38,50 @@ static llvm::StringRef getLanguageFeature(llvm::StringRef name) {
   return "";
 }
 
-/// What to call instead of a function of the standard library.
+/// What to write instead of a function of a library.
 static llvm::StringRef getRemedy(llvm::StringRef callee) {
-  static constexpr llvm::StringLiteral sorts[] = {
-      "std::sort", "std::stable_sort", "std::ranges::__sort_fn::operator()",
-      "std::ranges::__stable_sort_fn::operator()"};
-  if (llvm::is_contained(sorts, callee))
-    return "; use std::partial_sort up to the end of the range, or sort(key) "
-           "in a parallelFor";
-  if (callee == "std::equal")
-    return "; use a loop over the elements";
-  if (callee == "std::basic_string_view::basic_string_view")
-    return "; write the literal with its length, as in \"text\"sv";
   if (callee.starts_with("std::") &&
       callee.ends_with("_distribution::operator()"))
     return "; compute it from what the engine gives, as in g() % 6 + 1 and "
            "float(g() >> 8) * 0x1p-24f";
-  return "";
+  static const llvm::StringMap<llvm::StringRef> remedies = [] {
+    llvm::StringMap<llvm::StringRef> table;
+    auto add = [&](llvm::StringRef remedy,
+                   std::initializer_list<llvm::StringRef> names) {
+      for (llvm::StringRef name : names)
+        table[name] = remedy;
+    };
+    add("; use std::partial_sort up to the end of the range, or sort(key) in a "
+        "parallelFor",
+        {"qsort", "std::qsort", "std::sort", "std::stable_sort",
+         "std::ranges::__sort_fn::operator()",
+         "std::ranges::__stable_sort_fn::operator()"});
+    add("; use an array of a fixed size, or a buffer of the state",
+        {"operator new", "operator new[]", "malloc", "calloc", "realloc",
+         "aligned_alloc"});
+    add("; write a loop over the elements",
+        {"strlen", "strnlen", "strcmp", "strncmp", "strcpy", "strncpy",
+         "strcat", "strchr", "strrchr", "strstr", "memchr", "memcmp", "bcmp",
+         "bsearch"});
+    add("; compare the character with the first and the last of its kind",
+        {"tolower", "toupper", "isalnum", "isalpha", "isblank", "isdigit",
+         "islower", "isprint", "ispunct", "isspace", "isupper", "isxdigit"});
+    add("; compute it from functions of piko::",
+        {"erf", "erff", "erfc", "erfcf", "tgamma", "tgammaf", "lgamma",
+         "lgammaf", "expm1f", "log1pf", "acoshf", "asinhf", "atanhf"});
+    add("; store in a buffer of the state what the host is to see",
+        {"printf", "puts", "putchar", "fprintf", "fputs", "fputc", "fwrite",
+         "snprintf", "sprintf", "vprintf", "std::operator<<",
+         "std::basic_ostream::operator<<"});
+    add("; compute random numbers from a seed of the primitive's own",
+        {"rand", "srand", "rand_r", "random", "drand48"});
+    add("; let the host set a constant of the state",
+        {"time", "clock", "clock_gettime", "getenv"});
+    add("; return, and let the host see why in a buffer of the state",
+        {"abort", "exit", "_Exit", "quick_exit", "__assert_fail"});
+    return table;
+  }();
+  return remedies.lookup(callee);
 }
 
 /// Whether an intrinsic means something on this machine alone. A pause means
@@ -112,8 +140,11 @@ private:
     CallChain chain = getChain(call, callee);
     mlir::InFlightDiagnostic error = chain.emitError(context);
     error << "not supported in Piko: " << what;
-    if (llvm::StringRef user = chain.getUserCallee(); !user.empty())
-      error << ", in a call of '" << user << "'" << getRemedy(user);
+    llvm::StringRef user = chain.getUserCallee();
+    if (!user.empty())
+      error << ", in a call of '" << user << "'";
+    llvm::StringRef remedy = getRemedy(user);
+    error << (remedy.empty() ? getRemedy(callee) : remedy);
     return false;
   }
 

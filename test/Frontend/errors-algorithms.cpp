@@ -31,7 +31,7 @@ struct Sorter : piko::Stage<0, 0, 1, A, A> {
     // STABLE: errors-algorithms.cpp:[[#@LINE + 1]]:5: error: not supported in Piko: dynamic allocation, in a call of 'std::stable_sort'; use std::partial_sort up to the end of the range, or sort(key) in a parallelFor{{$}}
     std::stable_sort(k, k + 6);
 #elif CASE == 4
-    // BYTES: errors-algorithms.cpp:[[#@LINE + 1]]:5: error: not supported in Piko: copying or filling a number of bytes that varies, of which it is not known that they are whole elements of one type; use a loop over the elements{{$}}
+    // BYTES: errors-algorithms.cpp:[[#@LINE + 1]]:5: error: not supported in Piko: copying or filling a number of bytes that varies, of which it is not known that they are whole elements of one type; write a loop over the elements{{$}}
     std::memcpy(k, k + 3, a.x & 7);
 #elif CASE == 5
     // Behind the first array there is another one.
@@ -39,7 +39,7 @@ struct Sorter : piko::Stage<0, 0, 1, A, A> {
       int first[4];
       float second[4];
     } from = {}, to = {};
-    // MEMBERS: errors-algorithms.cpp:[[#@LINE + 1]]:5: error: not supported in Piko: copying or filling a number of bytes that varies, of which it is not known that they are whole elements of one type; use a loop over the elements{{$}}
+    // MEMBERS: errors-algorithms.cpp:[[#@LINE + 1]]:5: error: not supported in Piko: copying or filling a number of bytes that varies, of which it is not known that they are whole elements of one type; write a loop over the elements{{$}}
     std::memcpy(&to, &from, (a.x & 7) * sizeof(int));
     out.x = to.first[a.x & 3] + from.first[a.y & 3];
 #elif CASE == 6

@@ -37,8 +37,8 @@ struct Derived : Base {
   float x = 1;
 };
 inline void append(std::vector<int> &v) {
-  // PUSH: errors-calls.cpp:[[#@LINE + 2]]:5: error: not supported in Piko: dynamic allocation, in a call of 'std::vector::push_back'{{$}}
-  // LOOP: errors-calls.cpp:[[#@LINE + 1]]:5: error: not supported in Piko: dynamic allocation, in a call of 'std::vector::push_back'{{$}}
+  // PUSH: errors-calls.cpp:[[#@LINE + 2]]:5: error: not supported in Piko: dynamic allocation, in a call of 'std::vector::push_back'; use an array of a fixed size, or a buffer of the state{{$}}
+  // LOOP: errors-calls.cpp:[[#@LINE + 1]]:5: error: not supported in Piko: dynamic allocation, in a call of 'std::vector::push_back'; use an array of a fixed size, or a buffer of the state{{$}}
   v.push_back(1);
 }
 inline void appendTwice(std::vector<int> &v) {

@@ -48,7 +48,7 @@ struct Stage : piko::Stage<0, 0, 1, A, A> {
     std::string_view text = "text";
     out.x = text[i];
 #elif CASE == 5
-    // EQUAL: errors-pointers.cpp:[[#@LINE + 1]]:13: error: not supported in Piko: a call of 'memcmp', {{.*}}; use a loop over the elements{{$}}
+    // EQUAL: errors-pointers.cpp:[[#@LINE + 1]]:13: error: not supported in Piko: a call of 'memcmp', {{.*}}; write a loop over the elements{{$}}
     out.x = std::equal(k, k + 4, l);
 #elif CASE == 6
     // BYTES: errors-pointers.cpp:[[#@LINE + 1]]:11: error: not supported in Piko: a local variable 'bytes' whose parts are accessed in ways that cannot be told apart, in stage 'stage'; access its members by name and its arrays by index{{$}}
