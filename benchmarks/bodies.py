@@ -14,9 +14,10 @@ error. Builds take turns in each round.
 import argparse
 import glob
 import os
-import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
+
+from commands import call
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 BODIES = f"{ROOT}/benchmarks/bodies"
@@ -49,13 +50,6 @@ def parse_arguments():
     arguments = parser.parse_args()
     arguments.flags = [f"-march={arguments.march}"] if arguments.march else []
     return arguments
-
-
-def call(command):
-    result = subprocess.run(command, capture_output=True, text=True)
-    if result.returncode:
-        sys.exit(f"{' '.join(command)}\n{result.stderr}")
-    return result.stdout
 
 
 def get_program(arguments, body, build):

@@ -23,8 +23,9 @@ import os
 import re
 import shlex
 import statistics
-import subprocess
 import sys
+
+from commands import call
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 RASTER = f"{ROOT}/examples/raster/raster.piko.cpp"
@@ -72,19 +73,12 @@ def parse_arguments():
     return arguments
 
 
-def output_of(command):
-    done = subprocess.run(command, capture_output=True, text=True)
-    if done.returncode:
-        sys.exit(f"figure4: {' '.join(command)}\n{done.stderr}")
-    return done.stdout
-
-
 def carried_records(arguments, pipe):
     """What lies between kernels: (stage, bytes) for each record that comes into
     the stage. A buffer with an element for each primitive of a source counts,
     because one kernel writes it and others read it."""
-    text = output_of([f"{arguments.bin}/pikoc", RASTER, "--pipe", pipe,
-                      "--emit=kernels"])
+    text = call([f"{arguments.bin}/pikoc", RASTER, "--pipe", pipe,
+                 "--emit=kernels"])
     record = r'@(?:"[^"]+"|\w+)'
     sizes = dict(re.findall(rf"piko\.record ({record}) .* size (\d+)", text))
     takes = dict(re.findall(rf"piko\.stage @(\w+) .* : ({record}) ->", text))
@@ -105,7 +99,7 @@ def measure_once(arguments, scene, pipe, lights, threads):
         command += [f"--{option}", str(getattr(arguments, option))]
     command += ["--pipe", pipe, "--lights", str(lights)]
     command += ["--threads", str(threads), "--json"]
-    return json.loads(output_of(command))
+    return json.loads(call(command))
 
 
 def measure(arguments):
