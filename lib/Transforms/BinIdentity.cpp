@@ -3,6 +3,7 @@
 // Proofs that an assign phase is the identity on bins.
 
 #include "BinIdentity.h"
+#include "Induction.h"
 #include "PhaseGraph.h"
 #include "Repeatable.h"
 
@@ -138,17 +139,6 @@ bool BinBounds::isWrapped(Value value) {
   return false;
 }
 
-/// The value that an argument of a loop's body stands for in the condition's
-/// region, and the condition that holds in the body.
-static std::pair<Value, Value> getConditioned(BlockArgument argument) {
-  auto loop = dyn_cast<scf::WhileOp>(argument.getOwner()->getParentOp());
-  if (!loop || argument.getOwner() != loop.getAfterBody())
-    return {};
-  scf::ConditionOp condition = loop.getConditionOp();
-  return {condition.getArgs()[argument.getArgNumber()],
-          condition.getCondition()};
-}
-
 bool BinBounds::holds(Value condition, Value value, bool below) {
   Operation *op = condition.getDefiningOp();
   if (!op)
@@ -215,17 +205,8 @@ bool BinBounds::isAtLeastLo(Value value) {
              isAtLeastLo(range.getLowerBound());
     if (Value before = getConditioned(argument).first)
       return isAtLeastLo(before);
-    auto repeat = dyn_cast<scf::WhileOp>(loop);
-    if (!repeat)
-      return false;
-    // By induction over the turns of the loop.
-    unsigned i = argument.getArgNumber();
-    if (!isAtLeastLo(repeat.getInits()[i]))
-      return false;
-    assumed.insert(value);
-    bool steps = isAtLeastLo(repeat.getYieldOp().getResults()[i]);
-    assumed.erase(value);
-    return steps;
+    return holdsByInduction(argument, assumed,
+                            [&](Value value) { return isAtLeastLo(value); });
   }
   Operation *op = value.getDefiningOp();
   if (isa<arith::MaxSIOp>(op))

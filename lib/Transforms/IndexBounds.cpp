@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 
 #include "IndexBounds.h"
+#include "Induction.h"
 
 #include "Piko/Dialect/Piko/IR/Piko.h"
 
@@ -57,17 +58,6 @@ bool IndexBounds::isBoundItself(Value value) {
   else if (auto truncation = value.getDefiningOp<arith::TruncIOp>())
     return isBoundItself(truncation.getIn());
   return isBound(value);
-}
-
-/// What an argument of a loop's body stands for in the condition's region, and
-/// the condition that holds in the body.
-static std::pair<Value, Value> getConditioned(BlockArgument argument) {
-  auto loop = dyn_cast<scf::WhileOp>(argument.getOwner()->getParentOp());
-  if (!loop || argument.getOwner() != loop.getAfterBody())
-    return {};
-  scf::ConditionOp condition = loop.getConditionOp();
-  return {condition.getArgs()[argument.getArgNumber()],
-          condition.getCondition()};
 }
 
 //===----------------------------------------------------------------------===//
@@ -183,17 +173,8 @@ bool IndexBounds::isNonNegativeArgument(BlockArgument argument) {
   if (auto [before, condition] = getConditioned(argument); before)
     return holds(condition, true, stripWidening(before), /*below=*/false) ||
            isNonNegative(before);
-  auto repeat = dyn_cast<scf::WhileOp>(loop);
-  if (!repeat)
-    return false;
-  // By induction over the turns of the loop.
-  unsigned i = argument.getArgNumber();
-  if (!isNonNegative(repeat.getInits()[i]))
-    return false;
-  assumed.insert(argument);
-  bool steps = isNonNegative(repeat.getYieldOp().getResults()[i]);
-  assumed.erase(argument);
-  return steps;
+  return holdsByInduction(argument, assumed,
+                          [&](Value value) { return isNonNegative(value); });
 }
 
 /// Whether a sum is one more than an argument of a loop's body that is below
