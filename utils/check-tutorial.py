@@ -21,7 +21,13 @@ import sys
 FENCE = re.compile(r"^```(cpp|cmake|mlir|sh|text)\n(.*?)^```", re.S | re.M)
 FILES = {
     "Tutorial": {"spheres.piko.cpp", "main.cpp", "CMakeLists.txt"},
-    "Levels": {"dots.mlir", "main.cpp", "CMakeLists.txt"},
+    "Levels": {
+        "dots.mlir",
+        "main.cpp",
+        "CMakeLists.txt",
+        "sums.mlir",
+        "sums.cpp",
+    },
 }
 NAME = re.compile(r"`([\w.]+\.\w+)`")
 
