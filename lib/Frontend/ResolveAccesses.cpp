@@ -56,7 +56,7 @@ private:
                         "memory whose layout is not known"
                       : "copying or filling a number of bytes that varies, of "
                         "which it is not known that they are whole elements of "
-                        "one type; use a loop over the elements");
+                        "one type; write a loop over the elements");
     if (auto *call = dyn_cast<llvm::CallInst>(instruction))
       if (const Marker *marker = getMarker(call, memory.markers))
         if (marker->kind == MarkerKind::atomic ||
