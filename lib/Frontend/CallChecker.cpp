@@ -62,7 +62,9 @@ static llvm::StringRef getRemedy(llvm::StringRef callee) {
     add("; write a loop over the elements",
         {"strlen", "strnlen", "strcmp", "strncmp", "strcpy", "strncpy",
          "strcat", "strchr", "strrchr", "strstr", "memchr", "memcmp", "bcmp",
-         "bsearch"});
+         "bsearch", "std::equal"});
+    add("; write the literal with its length, as in \"text\"sv",
+        {"std::basic_string_view::basic_string_view"});
     add("; compare the character with the first and the last of its kind",
         {"tolower", "toupper", "isalnum", "isalpha", "isblank", "isdigit",
          "islower", "isprint", "ispunct", "isspace", "isupper", "isxdigit"});
