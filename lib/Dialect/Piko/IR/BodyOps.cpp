@@ -55,6 +55,19 @@ struct ForwardAppended : OpRewritePattern<GetOp> {
 };
 } // namespace
 
+Speculation::Speculatability GetOp::getSpeculatability() {
+  if (getElements().empty())
+    return Speculation::Speculatable;
+  FieldAttr field =
+      lookupRecord(*this, getPrim().getType().getRecord()).getField(getField());
+  for (auto [element, count] : llvm::zip(getElements(), field.getCounts())) {
+    APInt index;
+    if (!matchPattern(element, m_ConstantInt(&index)) || index.uge(count))
+      return Speculation::NotSpeculatable;
+  }
+  return Speculation::Speculatable;
+}
+
 void GetOp::getCanonicalizationPatterns(RewritePatternSet &patterns,
                                         MLIRContext *context) {
   patterns.add<ForwardAppended>(context);

@@ -13,10 +13,13 @@ include "Piko/Dialect/Piko/IR/PikoTypes.td"
 //===----------------------------------------------------------------------===//
 
 def Piko_GetOp : Piko_Op<"get", [
-    Pure, DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
+    NoMemoryEffect, DeclareOpInterfaceMethods<ConditionallySpeculatable>,
+    DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
   let summary = "reads a field of a primitive";
   let description = [{
-    An element of an array field takes an index for each dimension.
+    An element of an array field takes an index for each dimension. It runs only
+    where it stands unless the indices are constant: a condition around it may
+    be what keeps them inside.
 
     ```mlir
     %z = piko.get %f "z" : !piko.prim<@Fragment> -> f32
