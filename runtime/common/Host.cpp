@@ -139,8 +139,9 @@ int32_t pikort_set_domain(pikort_pipeline *p, int32_t rank,
     if (!extent)
       invalid("expected the domain's extents, but got null");
     for (int32_t d = 0; d < rank; ++d)
-      if (extent[d] < 1 || extent[d] > INT32_MAX)
-        invalid("expected domain extents in [1, 2147483647], but got " +
+      if (extent[d] < 1 || extent[d] > PIKORT_MAX_EXTENT)
+        invalid("expected domain extents in [1, " +
+                std::to_string(PIKORT_MAX_EXTENT) + "], but got " +
                 std::to_string(extent[d]));
     for (int32_t d = 0; d < 4; ++d)
       p->domain[d] = d < rank ? extent[d] : 1;

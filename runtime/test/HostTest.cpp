@@ -192,14 +192,15 @@ TEST_F(Host, WrongNamesAndSizes) {
 }
 
 TEST_F(Host, BadDomains) {
-  for (int64_t extent : {int64_t(0), int64_t(-3), INT64_MAX})
+  for (int64_t extent :
+       {int64_t(0), int64_t(-3), int64_t(PIKORT_MAX_EXTENT) + 1})
     expectError(pipe.domain({extent, 8}), PIKORT_INVALID_ARGUMENT,
-                "expected domain extents in [1, 2147483647], but got " +
+                "expected domain extents in [1, 1073741824], but got " +
                     std::to_string(extent));
   expectError(pipe.domain({8}), PIKORT_INVALID_ARGUMENT,
               "pipeline 'Small': expected a domain of rank 2, but got 1");
   bindAll();
-  ASSERT_TRUE(pipe.domain({INT32_MAX, INT32_MAX}));
+  ASSERT_TRUE(pipe.domain({PIKORT_MAX_EXTENT, PIKORT_MAX_EXTENT}));
   expectError(pipe.run(), PIKORT_TOO_MANY,
               "stage 'bin': expected fewer than 2147483647 cells, but the "
               "domain has more");

@@ -146,6 +146,8 @@ TEST(Errors, Domain) {
   EXPECT_THAT(messageOf([&] { pipe.run(); }), HasSubstr("has no domain"));
   EXPECT_THAT(messageOf([&] { pipe.setDomain({4, 0}); }),
               HasSubstr("but got 0"));
+  EXPECT_THAT(messageOf([&] { pipe.setDomain({1073741825}); }),
+              HasSubstr("expected a domain of 1 to 1073741824 cells"));
   EXPECT_THAT(messageOf([&] { pipe.setDomain({1, 1, 1, 1, 1}); }),
               HasSubstr("expected a domain of 1 to 4 dimensions, but got 5"));
   pipe.setDomain({4, 4, 4});

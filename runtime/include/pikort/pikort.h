@@ -25,6 +25,9 @@ extern "C" {
 
 /// Changes whenever generated code and runtime would no longer fit together.
 #define PIKORT_ABI_VERSION 4u
+/// The most cells that a domain may have in a dimension, so that sums of
+/// coordinates and small numbers do not wrap around.
+#define PIKORT_MAX_EXTENT 1073741824
 
 #if defined(_WIN32)
 #define PIKORT_API
@@ -78,7 +81,7 @@ PIKORT_API const char *pikort_name(const pikort_pipeline *pipeline);
 // --- Options ----------------------------------------------------------------
 
 /// Sets the domain (the screen or the volume, in cells). `rank` is the
-/// pipeline's; each extent is in [1, 2^31 - 1], x first.
+/// pipeline's; each extent is in [1, PIKORT_MAX_EXTENT], x first.
 PIKORT_API int32_t pikort_set_domain(pikort_pipeline *pipeline, int32_t rank,
                                      const int64_t *extent);
 /// Sets the number of threads, in [0, 10000]; 0 = all that OpenMP offers. The

@@ -48,6 +48,9 @@ inline std::string toText(const Cell &cell, int rank) {
   return text + ")";
 }
 
+/// The most cells of a domain in a dimension, as pikort_set_domain has it.
+inline constexpr int64_t maxExtent = 1073741824;
+
 struct Grid {
   Cell domain{1, 1, 1, 1};
   Cell size{1, 1, 1, 1};  ///< cells of a bin

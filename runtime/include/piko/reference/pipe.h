@@ -85,9 +85,9 @@ public:
       throw Error("expected a domain of 1 to 4 dimensions, but got " +
                   std::to_string(rank));
     for (int d = 0; d < rank; ++d)
-      if (extent[d] < 1 || extent[d] > INT32_MAX)
-        throw Error("expected a domain of 1 to 2147483647 cells in each "
-                    "dimension, but got " +
+      if (extent[d] < 1 || extent[d] > maxExtent)
+        throw Error("expected a domain of 1 to " + std::to_string(maxExtent) +
+                    " cells in each dimension, but got " +
                     std::to_string(extent[d]));
     for (int d = 0; d < 4; ++d)
       domainExtent[d] = d < rank ? extent[d] : 1;
