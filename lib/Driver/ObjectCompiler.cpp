@@ -24,10 +24,13 @@
 #include "llvm/Support/Path.h"
 #include "llvm/Support/Process.h"
 
+#include "Piko/Analysis/LinearFacts.h"
 #include "pikort/pikort.h"
 
 using namespace mlir;
 using namespace piko;
+
+static_assert(maxDomainExtent == PIKORT_MAX_EXTENT);
 
 using Files = llvm::IntrusiveRefCntPtr<llvm::vfs::FileSystem>;
 

@@ -40,6 +40,8 @@ void piko::addSynthesisSequence(OpPassManager &passes,
   // A field that a loop reads is the same field behind it.
   passes.addPass(createLoopInvariantCodeMotionPass());
   addCleanUp(passes);
+  passes.addPass(createNormalizeLoops());
+  addCleanUp(passes);
   {
     OpPassManager &pipeline = passes.nest<PipelineOp>();
     pipeline.addPass(createOrderStages());

@@ -8,8 +8,8 @@
 //      sees that the latter runs earlier;
 //   3. append it, behind a local barrier.
 
-#include "BinIdentity.h"
-#include "PhaseGraph.h"
+#include "Piko/Analysis/BinIdentity.h"
+#include "Piko/Analysis/PhaseGraph.h"
 #include "StateAccess.h"
 
 #include "Piko/Dialect/Piko/IR/CppTypes.h"

@@ -10,8 +10,8 @@
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "Piko/Transforms/Passes.h"
 
-#include "BinIdentity.h"
-#include "PhaseGraph.h"
+#include "Piko/Analysis/BinIdentity.h"
+#include "Piko/Analysis/PhaseGraph.h"
 #include "Uniformity.h"
 
 #include "mlir/Dialect/UB/IR/UBOps.h"

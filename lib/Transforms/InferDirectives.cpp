@@ -5,8 +5,8 @@
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "Piko/Transforms/Passes.h"
 
-#include "BinIdentity.h"
-#include "PhaseGraph.h"
+#include "Piko/Analysis/BinIdentity.h"
+#include "Piko/Analysis/PhaseGraph.h"
 
 namespace piko {
 #define GEN_PASS_DEF_INFERDIRECTIVES
@@ -24,7 +24,7 @@ struct InferDirectivesPass
 } // namespace
 
 void InferDirectivesPass::runOnOperation() {
-  BinIdentity identity(getOperation());
+  BinIdentity identity;
   SmallVector<AssignToOp> proved;
   for (auto stage : getOperation().getOps<StageOp>()) {
     AssignOp assign = stage.getAssign();

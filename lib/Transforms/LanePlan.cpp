@@ -2,7 +2,7 @@
 
 #include "LanePlan.h"
 
-#include "Repeatable.h"
+#include "Piko/Analysis/Repeatable.h"
 #include "StateAccess.h"
 
 #include "mlir/Dialect/Arith/IR/Arith.h"

@@ -6,7 +6,7 @@
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "Piko/Transforms/Passes.h"
 
-#include "Repeatable.h"
+#include "Piko/Analysis/Repeatable.h"
 
 #include "mlir/Analysis/SliceAnalysis.h"
 #include "mlir/Dialect/Arith/IR/Arith.h"

@@ -3,8 +3,7 @@
 // piko-prove-bounds: marks accesses whose indices cannot be outside, so that
 // nothing tests them when the pipeline runs.
 
-#include "BinIdentity.h"
-#include "IndexBounds.h"
+#include "Piko/Analysis/BinIdentity.h"
 
 #include "Piko/Transforms/BinArithmetic.h"
 #include "Piko/Transforms/Passes.h"
@@ -20,105 +19,94 @@ using namespace mlir;
 using namespace piko;
 
 namespace {
+
 struct ProveBoundsPass : piko::impl::ProveBoundsBase<ProveBoundsPass> {
   void runOnOperation() override;
+};
+
+/// Whether indices are inside, from what is known in the block of an operation.
+class Prover {
+public:
+  bool isInBin(UpdateOp update);
+  bool isInState(Operation *access, StringRef state, OperandRange indices);
+  bool isInList(ListAtOp at);
 
 private:
-  template <typename AccessOp> void visit(AccessOp access, StageOp stage);
-  void visit(ListAtOp at);
-  void visit(UpdateOp update, StageOp stage);
-  bool isInState(Operation *access, StringRef state, OperandRange indices,
-                 StageOp stage);
-  bool isInBin(Operation *access, OperandRange indices, StageOp stage);
+  LinearFacts &getFacts(Operation *op);
 
-  std::optional<BinIdentity> identity;
+  BinIdentity identity;
+  llvm::DenseMap<Block *, std::unique_ptr<LinearFacts>> facts;
 };
+
 } // namespace
 
-/// Whether `value` is how many elements a piece of state has in a dimension; an
-/// image has as many as the domain.
-static bool isExtent(Value value, StringRef state, bool isImage, int64_t dim) {
-  if (auto extent = value.getDefiningOp<ExtentOp>())
-    return extent.getState() == state && int64_t(extent.getDim()) == dim;
-  auto domain = value.getDefiningOp<DomainOp>();
-  return isImage && domain && int64_t(domain.getDim()) == dim;
+LinearFacts &Prover::getFacts(Operation *op) {
+  std::unique_ptr<LinearFacts> &known = facts[op->getBlock()];
+  if (!known)
+    known = std::make_unique<LinearFacts>(op, identity);
+  return *known;
 }
 
-bool ProveBoundsPass::isInBin(Operation *access, OperandRange indices,
-                              StageOp stage) {
-  if (!access->getParentOfType<ProcessOp>())
-    return false;
-  for (auto [dim, index] : llvm::enumerate(indices))
-    if (!identity->isInBin(stage, dim, access, index))
+bool Prover::isInBin(UpdateOp update) {
+  LinearFacts &known = getFacts(update);
+  for (auto [dim, coordinate] : llvm::enumerate(update.getCoordinates()))
+    if (!known.isAboveBin(coordinate, dim) ||
+        !known.isBelowBin(coordinate, dim))
       return false;
   return true;
 }
 
-bool ProveBoundsPass::isInState(Operation *access, StringRef state,
-                                OperandRange indices, StageOp stage) {
-  bool isImage = isa<ImageOp>(SymbolTable::lookupSymbolIn(
-      getOperation(), StringAttr::get(&getContext(), state)));
-  if (isImage && isInBin(access, indices, stage))
-    return true;
-  for (auto [dim, index] : llvm::enumerate(indices)) {
-    auto isBound = [&, dim = dim](Value value) {
-      return isExtent(value, state, isImage, dim);
-    };
-    if (!IndexBounds(isBound, access).contains(index))
+bool Prover::isInState(Operation *access, StringRef state,
+                       OperandRange indices) {
+  LinearFacts &known = getFacts(access);
+  for (auto [dim, value] : llvm::enumerate(indices)) {
+    Linear index = known.get(value);
+    if (!known.isAtLeastZero(index) ||
+        !known.isAtLeastZero(known.getExtent(state, dim) - index - Linear(1)))
       return false;
   }
   return true;
 }
 
-template <typename AccessOp>
-void ProveBoundsPass::visit(AccessOp access, StageOp stage) {
-  if (access.getChecked() || access.getIndices().empty())
-    return;
-  if (isInState(access, access.getState(), access.getIndices(), stage)) {
-    access.setChecked(true);
-    ++proved;
-    return;
-  }
-  ++left;
-  access.emitRemark() << "the index of '" << access.getState()
-                      << "' is tested when the pipeline runs";
-}
-
-void ProveBoundsPass::visit(ListAtOp at) {
-  auto isBound = [&](Value value) {
-    auto size = value.getDefiningOp<ListSizeOp>();
-    return size && size.getList() == at.getList();
-  };
-  if (at.getChecked())
-    return;
-  if (IndexBounds(isBound, at).contains(at.getIndex())) {
-    at.setChecked(true);
-    ++proved;
-    return;
-  }
-  ++left;
-  at.emitRemark() << "the index into the list is tested when the pipeline runs";
-}
-
-void ProveBoundsPass::visit(UpdateOp update, StageOp stage) {
-  if (isInBin(update, update.getCoordinates(), stage)) {
-    update->setAttr(insideAttrName, UnitAttr::get(&getContext()));
-    ++proved;
-    return;
-  }
-  ++left;
-  update.emitRemark() << "the pixel of '" << update.getImage()
-                      << "' is tested to be in the bin when the pipeline runs";
+bool Prover::isInList(ListAtOp at) {
+  LinearFacts &known = getFacts(at);
+  Linear index = known.get(at.getIndex());
+  return known.isAtLeastZero(index) &&
+         known.isAtLeastZero(known.getListSize(at.getList()) - index -
+                             Linear(1));
 }
 
 void ProveBoundsPass::runOnOperation() {
-  identity.emplace(getOperation());
+  Prover prover;
+  auto note = [&](Operation *op, bool isInside, const Twine &what) {
+    ++(isInside ? proved : left);
+    if (!isInside)
+      op->emitRemark() << what << " when the pipeline runs";
+    return isInside;
+  };
+  auto visit = [&](auto access) {
+    if (!access.getChecked() && !access.getIndices().empty())
+      access.setChecked(
+          note(access,
+               prover.isInState(access, access.getState(), access.getIndices()),
+               "the index of '" + access.getState() + "' is tested"));
+  };
+  auto visitList = [&](ListAtOp at) {
+    if (!at.getChecked())
+      at.setChecked(
+          note(at, prover.isInList(at), "the index into the list is tested"));
+  };
+  auto visitUpdate = [&](UpdateOp update) {
+    if (note(update, prover.isInBin(update),
+             "the pixel of '" + update.getImage() +
+                 "' is tested to be in the bin"))
+      update->setAttr(insideAttrName, UnitAttr::get(&getContext()));
+  };
   for (auto stage : getOperation().getOps<StageOp>())
     stage.walk([&](Operation *op) {
       llvm::TypeSwitch<Operation *>(op)
-          .Case<LoadOp, StoreOp, AtomicOp>(
-              [&](auto access) { visit(access, stage); })
-          .Case([&](ListAtOp at) { visit(at); })
-          .Case([&](UpdateOp update) { visit(update, stage); });
+          .Case<LoadOp, StoreOp, AtomicOp>(visit)
+          .Case(visitList)
+          .Case(visitUpdate);
     });
 }

@@ -9,7 +9,7 @@
 //   4. turn assignments into placements, and queries into arithmetic;
 //   5. do the same for each phase behind a local barrier, where a bin ends.
 
-#include "PhaseGraph.h"
+#include "Piko/Analysis/PhaseGraph.h"
 #include "Resolve.h"
 
 #include "Piko/Transforms/BinArithmetic.h"

@@ -166,7 +166,7 @@ piko.pipeline @Function rank 2 {
       %lo = piko.get %t "lo" : !piko.prim<@T> -> i32
       %hi = piko.get %t "hi" : !piko.prim<@T> -> i32
       piko.emit 0 (%hi, %lo) : i32, i32
-      // expected-note @below {{'x' is not proved to stay inside the bin here}}
+      // expected-note @below {{'x' is not proved to be at least the bin's lower bound here; if it always is, promise that by assignToPreviousBins}}
       piko.emit 1 (%hi, %lo) : i32, i32
       piko.return
     }
@@ -237,7 +237,7 @@ piko.pipeline @Wrong rank 1 {
       ^bb0(%x: i32, %other: i32):
         %above = arith.cmpi sge, %other, %lo32 : i32
         scf.if %above {
-          // expected-note @below {{'x' is not proved to stay inside the bin here}}
+          // expected-note @below {{'x' is not proved to be at least the bin's lower bound here; if it always is, promise that by assignToPreviousBins}}
           piko.emit 0 (%x, %x) : i32, i32
         }
         %next = arith.addi %other, %one : i32

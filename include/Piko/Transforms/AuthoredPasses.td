@@ -52,6 +52,53 @@ def AddChecks : Pass<"piko-add-checks", "::mlir::ModuleOp"> {
                            "::mlir::memref::MemRefDialect"];
 }
 
+def NormalizeLoops : Pass<"piko-normalize-loops"> {
+  let summary = "Put the work of a loop behind its condition";
+  let description = [{
+    **Requires** nothing in particular; it works on `scf` in any operation.
+
+    **Does**: exchanges the arms of an `scf.if` whose first does nothing; makes
+    truth values of the flags that arms yield as numbers, and conjunctions of
+    those that an arm yields where the other yields false, if they can be
+    computed in front; moves what stands in an `scf.if` with the loop's own
+    condition, in front of that condition, behind it.
+
+    **Guarantees** the same effects in the same order. Loops that were made of
+    branches, with `<=`, with `break` or `continue`, then look like those with a
+    simple condition, which other passes expect.
+
+    Before:
+    ```
+    scf.while (%x = %lo) : (i32) -> i32 {
+      %ends = arith.cmpi sgt, %x, %last : i32
+      %more = arith.cmpi sle, %x, %last : i32
+      %next = scf.if %ends -> (i32) {
+        scf.yield %poison : i32
+      } else {
+        ...
+        scf.yield %y : i32
+      }
+      scf.condition(%more) %next : i32
+    } do { ... }
+    ```
+    After:
+    ```
+    scf.while (%x = %lo) : (i32) -> i32 {
+      %more = arith.cmpi sle, %x, %last : i32
+      scf.condition(%more) %x : i32
+    } do {
+    ^bb0(%x: i32):
+      ...
+      scf.yield %y : i32
+    }
+    ```
+
+    **Limits**: a condition that is known only after an effect, as with a `break`
+    behind an emission, stays in front of its work.
+  }];
+  let dependentDialects = ["::mlir::arith::ArithDialect"];
+}
+
 def OrderStages : Pass<"piko-order-stages", "::piko::PipelineOp"> {
   let summary = "Put the stages into the order in which they run";
   let description = [{
@@ -98,11 +145,14 @@ def InferDirectives : Pass<"piko-infer-directives", "::piko::PipelineOp"> {
     **Does**: turns the one `piko.assign_to` of an assign phase into a
     `piko.assign_previous` where it is proved that the bin is that which the
     primitive was emitted from. There are two proofs. *By range*: the bin is that
-    of a cell whose coordinates are fields, and wherever a producer emits one
-    they lie between the bounds of its bin, as loops, branches, minimum and
-    maximum show, or because the producer's own bin was chosen by them. *By
-    function*: the bin is computed from fields as the producer's was from its
-    own, and what goes into it is handed on unchanged. A condition around the
+    of a cell, and wherever a producer emits a primitive the cell's coordinates
+    lie between the bounds of the producer's bin. That follows from a system of
+    linear inequalities: of loops and how their arguments change from turn to
+    turn, of conditions on the way, minima and maxima, quotients, remainders,
+    shifts and masks, of floats that are whole numbers, and of how the producer's
+    own bin was chosen. *By function*: the bin is computed from fields as the
+    producer's was from its own, and what goes into it is handed on unchanged. A
+    condition around the
     assignment stays, so that a primitive is in at most that bin.
 
     **Guarantees** that every primitive stays in the same bins.
@@ -121,8 +171,10 @@ def InferDirectives : Pass<"piko-infer-directives", "::piko::PipelineOp"> {
     ```
 
     **Limits**: producers and the stage have bins of one size, and the stage has
-    no source. On a cycle only what was proved for stages before it is used. A
-    remark says what could not be proved, and where.
+    no source. On a cycle only what was proved for stages before it is used.
+    Arithmetic that may wrap around proves nothing: of `hi + 1` with any `hi`
+    nothing is known, of `min(hi, end - 1) + 1` all. A remark says which
+    coordinate could not be proved to be inside, where, and at which bound.
   }];
   let statistics = [
     Statistic<"inferred", "inferred", "assignments that are the identity">,
@@ -269,10 +321,9 @@ def ProveBounds : Pass<"piko-prove-bounds", "::piko::PipelineOp"> {
     **Requires** the authored level; last, because what moves an access out of
     the condition that proves something about it would be wrong behind this.
 
-    **Does**: marks accesses to buffers, images and lists as `checked` where
-    loops, conditions, minimum and maximum show that each index is at least 0
-    and less than the extent; and those to images, and updates (`piko.inside`),
-    whose coordinates lie between the bounds of the bin, as
+    **Does**: marks accesses to buffers, images and lists as `checked` where each
+    index is at least 0 and less than the extent, and updates (`piko.inside`)
+    whose coordinates lie between the bounds of the bin; both as
     `piko-infer-directives` proves it.
 
     **Guarantees** that no access is outside that was not.

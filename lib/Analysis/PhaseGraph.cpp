@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
-#include "PhaseGraph.h"
+#include "Piko/Analysis/PhaseGraph.h"
 
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
 

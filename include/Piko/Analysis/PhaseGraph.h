@@ -3,8 +3,8 @@
 // The graph of a pipeline at the authored level, asked from a stage, and what
 // passes that move phases along its edges share.
 
-#ifndef PIKO_LIB_TRANSFORMS_PHASEGRAPH_H
-#define PIKO_LIB_TRANSFORMS_PHASEGRAPH_H
+#ifndef PIKO_ANALYSIS_PHASEGRAPH_H
+#define PIKO_ANALYSIS_PHASEGRAPH_H
 
 #include "Piko/Dialect/Piko/IR/Piko.h"
 
@@ -26,4 +26,4 @@ void noteOrigin(mlir::Operation *op, StageOp stage, bool inAssign);
 
 } // namespace piko
 
-#endif // PIKO_LIB_TRANSFORMS_PHASEGRAPH_H
+#endif // PIKO_ANALYSIS_PHASEGRAPH_H

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
-#ifndef PIKO_LIB_TRANSFORMS_REPEATABLE_H
-#define PIKO_LIB_TRANSFORMS_REPEATABLE_H
+#ifndef PIKO_ANALYSIS_REPEATABLE_H
+#define PIKO_ANALYSIS_REPEATABLE_H
 
 #include "Piko/Dialect/Piko/IR/Piko.h"
 
@@ -17,4 +17,4 @@ inline bool isRepeatable(mlir::Operation *op) {
 
 } // namespace piko
 
-#endif // PIKO_LIB_TRANSFORMS_REPEATABLE_H
+#endif // PIKO_ANALYSIS_REPEATABLE_H

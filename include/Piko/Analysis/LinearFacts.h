@@ -1,0 +1,204 @@
+//===- LinearFacts.h - What is known of integers at a place -----*- C++ -*-===//
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Values of a phase as linear expressions over what cannot be taken apart, and
+// all that holds of them at one place: bounds of loops, conditions passed on
+// the way, minima and maxima, quotients and remainders, floats that are whole
+// numbers, and the bin.
+//
+//===----------------------------------------------------------------------===//
+#ifndef PIKO_ANALYSIS_LINEARFACTS_H
+#define PIKO_ANALYSIS_LINEARFACTS_H
+
+#include "Piko/Analysis/LinearSystem.h"
+#include "Piko/Dialect/Piko/IR/Piko.h"
+
+#include "mlir/Dialect/Arith/IR/Arith.h"
+#include "mlir/Dialect/SCF/IR/SCF.h"
+#include "llvm/ADT/DenseMap.h"
+
+#include <functional>
+#include <map>
+
+namespace piko {
+
+/// The most cells that a domain may have in a dimension: PIKORT_MAX_EXTENT.
+inline constexpr int64_t maxDomainExtent = int64_t(1) << 30;
+
+/// How an argument of a loop changes from turn to turn.
+struct Recurrence {
+  /// What each turn adds, if that is always the same.
+  std::optional<int64_t> step;
+  bool rises = false, falls = false; ///< if not, it may do either
+  /// What stands still while the loop runs, and is never passed.
+  mlir::Value ceiling, floor;
+};
+
+/// What facts about one place may ask about others.
+class FactsProvider {
+public:
+  virtual ~FactsProvider() = default;
+  /// Whether a field of a stage's primitives is, in one dimension, a coordinate
+  /// between the bounds of the bin that is processed.
+  virtual bool isFieldInBin(StageOp, llvm::StringRef /*field*/,
+                            int64_t /*dim*/) {
+    return false;
+  }
+  /// Recurrences by argument, found once.
+  llvm::DenseMap<mlir::Value, Recurrence> recurrences;
+};
+
+/// What is known at a place of a phase.
+class LinearFacts {
+public:
+  LinearFacts(mlir::Operation *at, FactsProvider &provider);
+
+  /// An assign phase seen from the process phase: its primitive is the one that
+  /// is processed, or one that is emitted. The number of such a phase is passed
+  /// with its values.
+  unsigned addAssign(AssignOp assign, EmitOp emit = {});
+  /// Adds what holds where `at` is reached.
+  void assumeReached(mlir::Operation *at, unsigned frame = 0);
+  /// Adds that a condition is true, or false.
+  void assume(mlir::Value condition, bool truth, unsigned frame = 0);
+  /// Adds that one value is at most another.
+  void assumeAtMost(mlir::Value low, mlir::Value high) {
+    facts->addAtLeastZero(get(high) - get(low));
+  }
+
+  Linear get(mlir::Value value, unsigned frame = 0);
+  /// Whether two values are computed alike, from what is the same.
+  bool isSame(mlir::Value a, unsigned frameOfA, mlir::Value b,
+              unsigned frameOfB) {
+    return number(a, frameOfA) == number(b, frameOfB);
+  }
+  Linear getExtent(llvm::StringRef state, int64_t dim);
+  Linear getListSize(mlir::Value list);
+  bool isAtLeastZero(const Linear &value) {
+    return system.isAtLeastZero(value, /*effort=*/40);
+  }
+  /// Whether a coordinate, an integer or a float, is not below the bin that is
+  /// processed, or not above it.
+  bool isAboveBin(mlir::Value coordinate, int64_t dim, unsigned frame = 0);
+  bool isBelowBin(mlir::Value coordinate, int64_t dim, unsigned frame = 0);
+  /// The bounds of the bin that is processed, half open.
+  std::pair<Linear, Linear> getBin(int64_t dim);
+
+private:
+  struct Frame {
+    mlir::Value primitive; ///< null for the phase of the place itself
+    mlir::Value same;      ///< the primitive that it is there
+    EmitOp emit;           ///< or the emission of it
+  };
+  /// A float that is a multiple of 2^-shift.
+  struct Exact {
+    Linear scaled;
+    int shift;
+  };
+  /// A float of which only the floor is known, and whether it is NaN.
+  struct Opaque {
+    Linear floor, isNaN;
+    bool isWhole;
+  };
+  using Id = unsigned;
+
+  // Numbers of values that are computed alike.
+  Id number(mlir::Value value, unsigned frame);
+  Id create(mlir::Value value, unsigned frame);
+  mlir::Value valueOf(Id id) const { return values[id].first; }
+
+  // Values as expressions.
+  Linear expand(Id id);
+  Linear expandArgument(mlir::BlockArgument argument, unsigned frame, Id id);
+  Linear expandCarried(mlir::BlockArgument argument, mlir::Value init,
+                       unsigned frame, Id id);
+  Linear expandOperation(mlir::Operation *op, unsigned frame, Id id);
+  Linear expandArithmetic(mlir::Operation *op, unsigned frame, Id id);
+  Linear expandProduct(mlir::Operation *op, unsigned frame, Id id);
+  Linear expandMask(mlir::Operation *op, unsigned frame, Id id);
+  Linear expandShift(mlir::Operation *op, unsigned frame, Id id);
+  Linear expandQuotient(mlir::Value of, mlir::Value by, bool isSigned,
+                        bool isRemainder, unsigned frame, Id id);
+  Linear expandExtremum(mlir::Operation *op, unsigned frame, Id id);
+  Linear expandBranch(mlir::scf::IfOp choice, unsigned result, unsigned frame,
+                      Id id);
+  Linear expandSelect(mlir::arith::SelectOp select, unsigned frame, Id id);
+  Linear expandField(GetOp get, unsigned frame, Id id);
+  Linear expandFloatCast(mlir::Operation *op, unsigned frame, Id id);
+  /// Whether a value is at least 0, found out on the way to something else.
+  bool isSurelyAtLeastZero(const Linear &value) {
+    return system.isAtLeastZero(value, /*effort=*/10);
+  }
+  /// A variable for the value of an operation, in the range of its type.
+  Linear atom(mlir::Type type);
+  Linear atom(Id id) { return atom(valueOf(id).getType()); }
+  /// The value, if it fits in the type; else a variable.
+  Linear fit(const Linear &value, Id id);
+  bool fits(const Linear &value, mlir::Type type);
+  /// The floor of a value divided by a positive number.
+  Linear divide(const Linear &value, const llvm::DynamicAPInt &by);
+  /// What a quotient by `by` is below, if the dividend is below a product.
+  std::optional<Linear> findOtherFactor(const Linear &of, const Linear &by);
+
+  // Floats.
+  std::optional<Exact> getExact(Id id);
+  std::optional<Exact> findExact(Id id);
+  Opaque getOpaque(Id id);
+  std::optional<Exact> fitExact(Exact number, mlir::Type type);
+  /// The floor of a coordinate; adds to `unknown` what must be 0 for it.
+  Linear getCell(mlir::Value coordinate, unsigned frame,
+                 std::optional<Linear> &unknown);
+
+  // Conditions.
+  LinearFact describe(mlir::Value condition, bool truth, unsigned frame);
+  LinearFact describeInteger(mlir::arith::CmpIOp compare, bool truth,
+                             unsigned frame);
+  LinearFact describeFloat(mlir::arith::CmpFOp compare, bool truth,
+                           unsigned frame);
+  LinearFact describeUnknown(mlir::Value condition, bool truth, unsigned frame);
+  /// Whether a comparison for equality is that of a cell's bin with the bin
+  /// that is processed; the cell's coordinates.
+  BinAtOp getComparedCell(mlir::arith::CmpIOp compare, unsigned frame);
+  LinearFact describeInBin(BinAtOp cell, unsigned frame);
+  /// That the bin that is processed has cells of a closed box.
+  LinearFact describeTouched(AssignBoxOp box, unsigned frame);
+
+  // The bin.
+  /// Adds that the bin that is processed is one that the stage's own assign
+  /// phase chose.
+  void assumeAssigned();
+  Linear getDomain(int64_t dim);
+  Linear addSize();
+  bool isOwnBin(mlir::Value bin, unsigned frame);
+
+  const Recurrence &getRecurrence(mlir::BlockArgument argument);
+
+  mlir::Operation *at;
+  FactsProvider &provider;
+  StageOp stage;
+  PipelineOp pipeline;
+  LinearSystem system;
+  /// Where facts go: all hold, or those of an arm that is looked at.
+  LinearFact *facts;
+  llvm::SmallVector<Frame> frames{1};
+  llvm::SmallVector<std::pair<mlir::Value, unsigned>> values; // by id
+  llvm::DenseMap<std::pair<mlir::Value, unsigned>, Id> ids;
+  std::map<std::vector<uintptr_t>, Id> idsByKey;
+  llvm::DenseMap<Id, Linear> expressions;
+  std::map<Id, std::optional<Exact>> exacts;
+  std::map<Id, Opaque> opaques;
+  llvm::DenseMap<Id, Linear> truths; ///< of conditions that say nothing else
+  std::map<int64_t, Linear> domains;
+  std::map<int64_t, std::pair<Linear, Linear>> bins;
+  std::map<std::pair<std::string, int64_t>, Linear> extents;
+  /// Products of values that are not negative, with their factors.
+  std::vector<std::array<Linear, 3>> products;
+};
+
+/// How an argument of an `scf.while`'s first block changes.
+Recurrence findRecurrence(mlir::BlockArgument argument,
+                          FactsProvider &provider);
+
+} // namespace piko
+
+#endif // PIKO_ANALYSIS_LINEARFACTS_H

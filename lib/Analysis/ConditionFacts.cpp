@@ -1,0 +1,144 @@
+//===- ConditionFacts.cpp - What a condition says -------------------------===//
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+
+#include "Piko/Analysis/LinearFacts.h"
+
+#include "mlir/IR/Matchers.h"
+
+using namespace mlir;
+using namespace piko;
+using Predicate = arith::CmpIPredicate;
+
+/// That both of two facts hold, or one of them.
+static LinearFact combine(bool both, LinearFact a, LinearFact b) {
+  if (both) {
+    a.add(std::move(b));
+    return a;
+  }
+  LinearFact either;
+  either.choices.push_back({std::move(a), std::move(b)});
+  return either;
+}
+
+LinearFact LinearFacts::describeUnknown(Value condition, bool truth,
+                                        unsigned frame) {
+  auto [found, isNew] = truths.try_emplace(number(condition, frame));
+  if (isNew) {
+    found->second = system.addVariable();
+    system.getFacts().addBetween(Linear(0), found->second, Linear(1));
+  }
+  LinearFact fact;
+  fact.addZero(found->second - Linear(truth ? 1 : 0));
+  return fact;
+}
+
+LinearFact LinearFacts::describe(Value condition, bool truth, unsigned frame) {
+  if (APInt constant; matchPattern(condition, m_ConstantInt(&constant))) {
+    LinearFact fact;
+    if (constant.isOne() != truth)
+      fact.addContradiction();
+    return fact;
+  }
+  Operation *op = condition.getDefiningOp();
+  auto of = [&](unsigned operand, bool is) {
+    return describe(op->getOperand(operand), is, frame);
+  };
+  if (isa_and_nonnull<arith::AndIOp, arith::OrIOp>(op))
+    return combine(isa<arith::AndIOp>(op) == truth, of(0, truth), of(1, truth));
+  if (isa_and_nonnull<arith::XOrIOp>(op) &&
+      matchPattern(op->getOperand(1), m_One()))
+    return of(0, !truth);
+  if (auto select = dyn_cast_or_null<arith::SelectOp>(op);
+      select && select.getType().isInteger(1))
+    return combine(false, combine(true, of(0, true), of(1, truth)),
+                   combine(true, of(0, false), of(2, truth)));
+  if (auto compare = dyn_cast_or_null<arith::CmpIOp>(op))
+    return describeInteger(compare, truth, frame);
+  if (auto compare = dyn_cast_or_null<arith::CmpFOp>(op))
+    return describeFloat(compare, truth, frame);
+  return describeUnknown(condition, truth, frame);
+}
+
+BinAtOp LinearFacts::getComparedCell(arith::CmpIOp compare, unsigned frame) {
+  // The number of a bin may not fit in fewer bits.
+  auto strip = [](Value value) {
+    auto isWide = [](Type type) {
+      return type.isIndex() || type.isInteger(64);
+    };
+    while (auto cast = value.getDefiningOp<arith::IndexCastOp>()) {
+      if (!isWide(cast.getType()) || !isWide(cast.getIn().getType()))
+        break;
+      value = cast.getIn();
+    }
+    return value;
+  };
+  Value a = strip(compare.getLhs()), b = strip(compare.getRhs());
+  if (isOwnBin(a, frame))
+    std::swap(a, b);
+  return isOwnBin(b, frame) ? a.getDefiningOp<BinAtOp>() : BinAtOp();
+}
+
+/// That `a < b`, or that it is not, as unsigned numbers.
+static LinearFact describeBelow(const Linear &a, const Linear &b, bool truth) {
+  LinearFact fact;
+  if (truth) {
+    fact.addBetween(Linear(0), a, b - Linear(1));
+    return fact;
+  }
+  LinearFact negative, notBelow;
+  negative.addAtLeastZero(Linear(-1) - a);
+  notBelow.addAtLeastZero(a - b);
+  fact.choices.push_back({negative, notBelow});
+  return fact;
+}
+
+LinearFact LinearFacts::describeInteger(arith::CmpIOp compare, bool truth,
+                                        unsigned frame) {
+  Predicate predicate = compare.getPredicate();
+  if (compare.getLhs().getType().isInteger(1))
+    return describeUnknown(compare, truth, frame);
+  bool isEqual = (predicate == Predicate::eq) == truth;
+  if (predicate == Predicate::eq || predicate == Predicate::ne)
+    if (BinAtOp cell = getComparedCell(compare, frame))
+      return isEqual ? describeInBin(cell, frame)
+                     : describeUnknown(compare, truth, frame);
+  Linear a = get(compare.getLhs(), frame), b = get(compare.getRhs(), frame);
+  LinearFact fact;
+  switch (predicate) {
+  case Predicate::eq:
+  case Predicate::ne:
+    if (isEqual) {
+      fact.addZero(a - b);
+    } else {
+      LinearFact less, more;
+      less.addAtLeastZero(b - a - Linear(1));
+      more.addAtLeastZero(a - b - Linear(1));
+      fact.choices.push_back({less, more});
+    }
+    return fact;
+  case Predicate::sgt:
+  case Predicate::sle:
+    std::swap(a, b);
+    [[fallthrough]];
+  case Predicate::slt:
+  case Predicate::sge: {
+    bool isLess =
+        (predicate == Predicate::slt || predicate == Predicate::sgt) == truth;
+    fact.addAtLeastZero(isLess ? b - a - Linear(1) : a - b);
+    return fact;
+  }
+  case Predicate::ugt:
+  case Predicate::ule:
+    std::swap(a, b);
+    [[fallthrough]];
+  case Predicate::ult:
+  case Predicate::uge: {
+    bool isLess =
+        (predicate == Predicate::ult || predicate == Predicate::ugt) == truth;
+    // As unsigned numbers they are what they are as signed ones, or more.
+    return isSurelyAtLeastZero(b) ? describeBelow(a, b, isLess)
+                                  : describeUnknown(compare, truth, frame);
+  }
+  }
+  llvm_unreachable("all predicates are listed");
+}
