@@ -12,6 +12,7 @@
 
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "mlir/Dialect/MemRef/IR/MemRef.h"
+#include "mlir/IR/Matchers.h"
 
 using namespace piko;
 using llvm::failure;
@@ -55,6 +56,7 @@ private:
   LogicalResult check(mlir::Operation &op);
   bool isOutside(mlir::Operation &op);
   bool isUsedAfter(mlir::Value value);
+  bool isHoistable(mlir::Operation &op);
   void hoist();
   void moveInto(mlir::Block *inner, mlir::Operation *op,
                 llvm::ArrayRef<mlir::Value> leaving);
@@ -147,6 +149,22 @@ bool Bracket::isUsedAfter(mlir::Value value) {
   });
 }
 
+/// Whether an operation may run in front of what it is between. An update runs
+/// once; a loop may run no iteration, and then nothing may be read at an index
+/// that is not known to be inside.
+bool Bracket::isHoistable(mlir::Operation &op) {
+  if (op.getNumRegions() != 0 || !mlir::isMemoryEffectFree(&op))
+    return false;
+  // The records of fields are not known yet.
+  auto get = mlir::dyn_cast<GetOp>(op);
+  if (!get)
+    return mlir::isSpeculatable(&op);
+  return kind == Kind::Update ||
+         llvm::all_of(get.getElements(), [](mlir::Value element) {
+           return mlir::matchPattern(element, mlir::m_Constant());
+         });
+}
+
 void Bracket::hoist() {
   for (auto &op : llvm::make_early_inc_range(between())) {
     // Constants and primitives are read without an effect, and may be read
@@ -155,7 +173,7 @@ void Bracket::hoist() {
                   llvm::any_of(op.getResults(), [&](mlir::Value value) {
                     return isUsedAfter(value);
                   });
-    if (op.getNumRegions() == 0 && (mlir::isPure(&op) || isRead) &&
+    if ((isHoistable(op) || (op.getNumRegions() == 0 && isRead)) &&
         isOutside(op))
       op.moveBefore(begin);
   }

@@ -58,8 +58,10 @@ struct ForwardAppended : OpRewritePattern<GetOp> {
 Speculation::Speculatability GetOp::getSpeculatability() {
   if (getElements().empty())
     return Speculation::Speculatable;
-  FieldAttr field =
-      lookupRecord(*this, getPrim().getType().getRecord()).getField(getField());
+  RecordOp record = lookupRecord(*this, getPrim().getType().getRecord());
+  if (!record) // not in a module yet
+    return Speculation::NotSpeculatable;
+  FieldAttr field = record.getField(getField());
   for (auto [element, count] : llvm::zip(getElements(), field.getCounts())) {
     APInt index;
     if (!matchPattern(element, m_ConstantInt(&index)) || index.uge(count))
