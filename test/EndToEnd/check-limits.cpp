@@ -2,16 +2,28 @@
 //
 // Compiled, checking mode finds indices outside of arrays and loops that do not
 // end, which plain C++ has no way to see; and it says where barriers part.
-// RUN: not piko-compare %s --pipe Local --count 1 --runs 1 --threads 2 --check | FileCheck %s --check-prefix=LOCAL
-// RUN: not piko-compare %s --pipe Standard --count 1 --runs 1 --threads 2 --check | FileCheck %s --check-prefix=STANDARD
-// RUN: not piko-compare %s --pipe Negative --count 1 --runs 1 --threads 2 --check | FileCheck %s --check-prefix=NEGATIVE
-// RUN: not piko-compare %s --pipe Field --count 1 --runs 1 --threads 2 --check | FileCheck %s --check-prefix=FIELD
-// RUN: not piko-compare %s --pipe Assign --count 1 --runs 1 --threads 2 --check | FileCheck %s --check-prefix=ASSIGN
-// RUN: not piko-compare %s --pipe Endless --count 1 --runs 1 --threads 2 --check | FileCheck %s --check-prefix=ENDLESS
-// RUN: not piko-compare %s --pipe Emitting --count 1 --runs 1 --threads 2 --check | FileCheck %s --check-prefix=EMITTING
-// RUN: not piko-compare %s --pipe Part --count 1 --runs 1 --threads 2 --check | FileCheck %s --check-prefix=PART
-// RUN: not piko-compare %s --pipe Turns --count 1 --runs 1 --threads 2 --check | FileCheck %s --check-prefix=TURNS
-// RUN: not piko-compare %s --pipe Counts --count 1 --runs 1 --threads 2 --check | FileCheck %s --check-prefix=COUNTS
+// RUN: sed -n 's|^// STOP: ||p' %s > %t.stops
+// RUN: not piko-compare %s --cases %t.stops --runs 1 --threads 2 --check > %t.out
+// RUN: sed -n '/^Local:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=LOCAL
+// RUN: sed -n '/^Standard:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=STANDARD
+// RUN: sed -n '/^Negative:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=NEGATIVE
+// RUN: sed -n '/^Field:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=FIELD
+// RUN: sed -n '/^Assign:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=ASSIGN
+// RUN: sed -n '/^Endless:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=ENDLESS
+// RUN: sed -n '/^Emitting:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=EMITTING
+// RUN: sed -n '/^Part:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=PART
+// RUN: sed -n '/^Turns:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=TURNS
+// RUN: sed -n '/^Counts:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=COUNTS
+// STOP: --pipe Local --count 1
+// STOP: --pipe Standard --count 1
+// STOP: --pipe Negative --count 1
+// STOP: --pipe Field --count 1
+// STOP: --pipe Assign --count 1
+// STOP: --pipe Endless --count 1
+// STOP: --pipe Emitting --count 1
+// STOP: --pipe Part --count 1
+// STOP: --pipe Turns --count 1
+// STOP: --pipe Counts --count 1
 // RUN: piko-compare %s --pipe Inside --count 40 --runs 1 --threads 2 --check | FileCheck %s --check-prefix=INSIDE
 // INSIDE: {{^equal$}}
 #include "Inputs/ports.h"

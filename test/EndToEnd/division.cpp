@@ -4,18 +4,32 @@
 // reference ("expected") and compiled ("got"), in every phase, with the line in
 // checking mode; one that has a result is the same, and one that is not reached
 // does nothing.
-// RUN: not piko-compare %s --pipe Quotient --count 3 --runs 1 --threads 2 | FileCheck %s --check-prefix=IN-BIN
-// RUN: not piko-compare %s --pipe Remainder --count 3 --runs 1 --threads 2 | FileCheck %s --check-prefix=IN-BIN
-// RUN: not piko-compare %s --pipe Overflow --count 3 --runs 1 --threads 2 | FileCheck %s --check-prefix=IN-BIN
-// RUN: not piko-compare %s --pipe Long --count 3 --runs 1 --threads 2 | FileCheck %s --check-prefix=IN-BIN
-// RUN: not piko-compare %s --pipe Unsigned --count 3 --runs 1 --threads 2 | FileCheck %s --check-prefix=IN-BIN
-// RUN: not piko-compare %s --pipe Update --count 3 --runs 1 --threads 2 | FileCheck %s --check-prefix=IN-BIN
-// RUN: not piko-compare %s --pipe Iteration --count 3 --runs 1 --threads 2 | FileCheck %s --check-prefix=IN-BIN
-// RUN: not piko-compare %s --pipe Fiber --count 3 --runs 1 --threads 2 | FileCheck %s --check-prefix=IN-BIN
-// RUN: not piko-compare %s --pipe Vector --count 3 --runs 1 --threads 2 | FileCheck %s --check-prefix=IN-BIN
-// RUN: not piko-compare %s --pipe Assign --count 3 --runs 1 --threads 2 | FileCheck %s --check-prefix=NO-BIN
-// RUN: not piko-compare %s --pipe Schedule --count 3 --runs 1 --threads 2 | FileCheck %s --check-prefix=SCHEDULE
-// RUN: not piko-compare %s --pipe Fused --count 3 --runs 1 --threads 2 | FileCheck %s --check-prefix=FUSED
+// RUN: sed -n 's|^// STOP: ||p' %s > %t.stops
+// RUN: not piko-compare %s --cases %t.stops --runs 1 --threads 2 > %t.out
+// RUN: sed -n '/^Quotient:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=IN-BIN
+// RUN: sed -n '/^Remainder:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=IN-BIN
+// RUN: sed -n '/^Overflow:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=IN-BIN
+// RUN: sed -n '/^Long:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=IN-BIN
+// RUN: sed -n '/^Unsigned:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=IN-BIN
+// RUN: sed -n '/^Update:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=IN-BIN
+// RUN: sed -n '/^Iteration:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=IN-BIN
+// RUN: sed -n '/^Fiber:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=IN-BIN
+// RUN: sed -n '/^Vector:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=IN-BIN
+// RUN: sed -n '/^Assign:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=NO-BIN
+// RUN: sed -n '/^Schedule:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=SCHEDULE
+// RUN: sed -n '/^Fused:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=FUSED
+// STOP: --pipe Quotient --count 3
+// STOP: --pipe Remainder --count 3
+// STOP: --pipe Overflow --count 3
+// STOP: --pipe Long --count 3
+// STOP: --pipe Unsigned --count 3
+// STOP: --pipe Update --count 3
+// STOP: --pipe Iteration --count 3
+// STOP: --pipe Fiber --count 3
+// STOP: --pipe Vector --count 3
+// STOP: --pipe Assign --count 3
+// STOP: --pipe Schedule --count 3
+// STOP: --pipe Fused --count 3
 // RUN: not piko-compare %s --pipe Fused --count 3 --runs 1 --threads 2 --without fuse-stages | FileCheck %s --check-prefix=FUSED
 // RUN: pikoc %s --pipe Fused --emit=kernels -o - | FileCheck %s --check-prefix=KERNEL
 // KERNEL: piko.stage @pass {{.*}} fused ["last"]

@@ -3,17 +3,29 @@
 // Messages call stages, state and collectives what the user calls them: a stage
 // may have the name of a piece of state, and run inside another one. Of
 // collectives that not all iterations call, the message names the first.
-// RUN: not piko-compare %s --pipe Same --domain 8 8 --runs 1 --threads 1 | FileCheck %s --check-prefix=SAME
+// RUN: sed -n 's|^// STOP: ||p' %s > %t.stops
+// RUN: not piko-compare %s --cases %t.stops --runs 1 --threads 1 > %t.out
+// RUN: sed -n '/^Same:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=SAME
+// RUN: sed -n '/^Any:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=CALL -DCALL=any
+// RUN: sed -n '/^All:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=CALL -DCALL=all
+// RUN: sed -n '/^Count:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=CALL -DCALL=count
+// RUN: sed -n '/^Reduce:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=CALL -DCALL=reduce
+// RUN: sed -n '/^Scan:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=CALL -DCALL=scan
+// RUN: sed -n '/^Sort:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=CALL -DCALL=sort
+// RUN: sed -n '/^Sync:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=CALL -DCALL=sync
+// RUN: sed -n '/^Types:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=CALL -DCALL=scan
+// RUN: sed -n '/^Calls:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=CALL -DCALL=any
+// STOP: --pipe Same --domain 8 8
+// STOP: --pipe Any
+// STOP: --pipe All
+// STOP: --pipe Count
+// STOP: --pipe Reduce
+// STOP: --pipe Scan
+// STOP: --pipe Sort
+// STOP: --pipe Sync
+// STOP: --pipe Types
+// STOP: --pipe Calls
 // RUN: not pikoc %s --pipe Waiting -o %t.o 2>&1 | FileCheck %s --check-prefix=WAIT
-// RUN: not piko-compare %s --pipe Any --runs 1 --threads 1 | FileCheck %s --check-prefix=CALL -DCALL=any
-// RUN: not piko-compare %s --pipe All --runs 1 --threads 1 | FileCheck %s --check-prefix=CALL -DCALL=all
-// RUN: not piko-compare %s --pipe Count --runs 1 --threads 1 | FileCheck %s --check-prefix=CALL -DCALL=count
-// RUN: not piko-compare %s --pipe Reduce --runs 1 --threads 1 | FileCheck %s --check-prefix=CALL -DCALL=reduce
-// RUN: not piko-compare %s --pipe Scan --runs 1 --threads 1 | FileCheck %s --check-prefix=CALL -DCALL=scan
-// RUN: not piko-compare %s --pipe Sort --runs 1 --threads 1 | FileCheck %s --check-prefix=CALL -DCALL=sort
-// RUN: not piko-compare %s --pipe Sync --runs 1 --threads 1 | FileCheck %s --check-prefix=CALL -DCALL=sync
-// RUN: not piko-compare %s --pipe Types --runs 1 --threads 1 | FileCheck %s --check-prefix=CALL -DCALL=scan
-// RUN: not piko-compare %s --pipe Calls --runs 1 --threads 1 | FileCheck %s --check-prefix=CALL -DCALL=any
 #include "Inputs/ports.h"
 
 struct State {
