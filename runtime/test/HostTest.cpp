@@ -230,7 +230,7 @@ TEST(Images, LargerThanMemory) {
     EXPECT_EQ(status.code(), PIKORT_OUT_OF_MEMORY);
     EXPECT_EQ(status.message(), text);
   };
-  expect(INT32_MAX, "state 'color': out of memory");
+  expect(PIKORT_MAX_EXTENT, "state 'color': out of memory");
   expect(1 << 22, "state 'color': out of memory: expected 140737488355328 more "
                   "bytes");
   ASSERT_TRUE(pipe.memoryLimit(1 << 30));

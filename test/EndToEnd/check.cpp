@@ -3,11 +3,18 @@
 // Checking mode finds planted mistakes in accesses, in the reference
 // ("expected") and compiled ("got"), and says where they are; none are found
 // where they are mended.
-// RUN: not piko-compare %s --pipe Race --count 8 --runs 1 --threads 2 --check | FileCheck %s --check-prefix=RACE
-// RUN: not piko-compare %s --pipe Early --count 8 --runs 1 --threads 2 --check | FileCheck %s --check-prefix=EARLY
-// RUN: not piko-compare %s --pipe Iterations --count 1 --runs 1 --threads 2 --check | FileCheck %s --check-prefix=ITERATIONS
-// RUN: not piko-compare %s --pipe Outside --count 8 --runs 1 --threads 2 --check | FileCheck %s --check-prefix=OUTSIDE
-// RUN: not piko-compare %s --pipe Index --count 8 --runs 1 --threads 2 --check | FileCheck %s --check-prefix=INDEX
+// RUN: sed -n 's|^// STOP: ||p' %s > %t.stops
+// RUN: not piko-compare %s --cases %t.stops --runs 1 --threads 2 --check > %t.out
+// RUN: sed -n '/^Race:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=RACE
+// RUN: sed -n '/^Early:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=EARLY
+// RUN: sed -n '/^Iterations:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=ITERATIONS
+// RUN: sed -n '/^Outside:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=OUTSIDE
+// RUN: sed -n '/^Index:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=INDEX
+// STOP: --pipe Race --count 8
+// STOP: --pipe Early --count 8
+// STOP: --pipe Iterations --count 1
+// STOP: --pipe Outside --count 8
+// STOP: --pipe Index --count 8
 // RUN: sed -n 's|^// CASE: ||p' %s > %t
 // RUN: piko-compare %s --cases %t --runs 1 --threads 2 --check | FileCheck %s --check-prefix=MENDED
 // MENDED-COUNT-5: {{^equal$}}

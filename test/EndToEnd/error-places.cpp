@@ -3,14 +3,24 @@
 // An error of a run names the stage, and the bin if it is in a call of Process,
 // in the same words in the reference ("expected") and compiled ("got"): also
 // where a phase runs inside another stage's kernel.
-// RUN: not piko-compare %s --pipe Read --count 1 --runs 1 --threads 2 | FileCheck %s --check-prefix=READ
-// RUN: not piko-compare %s --pipe Store --count 1 --runs 1 --threads 2 | FileCheck %s --check-prefix=STORE
-// RUN: not piko-compare %s --pipe Update --count 1 --runs 1 --threads 2 | FileCheck %s --check-prefix=UPDATE
-// RUN: not piko-compare %s --pipe Item --count 1 --runs 1 --threads 2 | FileCheck %s --check-prefix=ITEM
-// RUN: not piko-compare %s --pipe Part --count 1 --runs 1 --threads 2 | FileCheck %s --check-prefix=PART
-// RUN: not piko-compare %s --pipe Assign --count 1 --runs 1 --threads 2 | FileCheck %s --check-prefix=ASSIGN
-// RUN: not piko-compare %s --pipe Fused --count 1 --runs 1 --threads 2 | FileCheck %s --check-prefix=FUSED
-// RUN: not piko-compare %s --pipe FusedAssign --count 1 --runs 1 --threads 2 | FileCheck %s --check-prefix=FUSED-ASSIGN
+// RUN: sed -n 's|^// STOP: ||p' %s > %t.stops
+// RUN: not piko-compare %s --cases %t.stops --runs 1 --threads 2 > %t.out
+// RUN: sed -n '/^Read:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=READ
+// RUN: sed -n '/^Store:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=STORE
+// RUN: sed -n '/^Update:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=UPDATE
+// RUN: sed -n '/^Item:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=ITEM
+// RUN: sed -n '/^Part:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=PART
+// RUN: sed -n '/^Assign:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=ASSIGN
+// RUN: sed -n '/^Fused:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=FUSED
+// RUN: sed -n '/^FusedAssign:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=FUSED-ASSIGN
+// STOP: --pipe Read --count 1
+// STOP: --pipe Store --count 1
+// STOP: --pipe Update --count 1
+// STOP: --pipe Item --count 1
+// STOP: --pipe Part --count 1
+// STOP: --pipe Assign --count 1
+// STOP: --pipe Fused --count 1
+// STOP: --pipe FusedAssign --count 1
 // RUN: not piko-compare %s --pipe Fused --count 1 --runs 1 --threads 2 --without fuse-stages | FileCheck %s --check-prefix=FUSED
 // RUN: pikoc %s --pipe Fused --emit=kernels -o - | FileCheck %s --check-prefix=KERNEL
 // RUN: pikoc %s --pipe FusedAssign --emit=kernels -o - | FileCheck %s --check-prefix=KERNEL
