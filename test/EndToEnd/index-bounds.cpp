@@ -2,10 +2,12 @@
 //
 // Indices that are tested in front of a loop, or not at all, are those of the
 // reference, at the ends of buffers and past them.
-// RUN: piko-compare %s --pipe Rows --count 500 | FileCheck %s
-// RUN: piko-compare %s --pipe Tiles --count 300 | FileCheck %s
-// RUN: piko-compare %s --pipe Clamped --count 200 | FileCheck %s
-// CHECK: equal
+// RUN: sed -n 's|^// CASE: ||p' %s > %t.cases
+// RUN: piko-compare %s --cases %t.cases | FileCheck %s --check-prefix=EQUAL
+// EQUAL-COUNT-3: {{^equal$}}
+// CASE: --pipe Rows --count 500
+// CASE: --pipe Tiles --count 300
+// CASE: --pipe Clamped --count 200
 // RUN: not piko-compare %s --pipe Past --count 40 --runs 1 --threads 1 2 | FileCheck %s --check-prefix=PAST
 // RUN: not piko-compare %s --pipe Below --count 40 --runs 1 --threads 1 2 | FileCheck %s --check-prefix=BELOW
 #include "Inputs/ports.h"

@@ -2,11 +2,14 @@
 //
 // Stages that compute for 16 primitives at once give the reference executor's
 // numbers, and its errors.
-// RUN: piko-compare %s --pipe Averages --domain 67 35 --count 2000 --runs 1 | FileCheck %s
-// RUN: piko-compare %s --pipe Addresses --domain 67 35 --count 2000 --runs 1 | FileCheck %s
-// RUN: piko-compare %s --pipe Repeats --domain 67 35 --count 2000 --runs 1 | FileCheck %s
-// RUN: piko-compare %s --pipe Guards --domain 67 35 --count 2000 --runs 1 | FileCheck %s
-// RUN: piko-compare %s --pipe Tests --domain 67 35 --count 2000 --runs 1 | FileCheck %s
+// RUN: sed -n 's|^// CASE: ||p' %s > %t.cases
+// RUN: piko-compare %s --cases %t.cases --runs 1 | FileCheck %s --check-prefix=EQUAL
+// EQUAL-COUNT-5: {{^equal$}}
+// CASE: --pipe Averages --domain 67 35 --count 2000
+// CASE: --pipe Addresses --domain 67 35 --count 2000
+// CASE: --pipe Repeats --domain 67 35 --count 2000
+// CASE: --pipe Guards --domain 67 35 --count 2000
+// CASE: --pipe Tests --domain 67 35 --count 2000
 // RUN: piko-compare %s --pipe Tests --domain 67 35 --count 2000 --runs 1 --without compact-loops,vectorize | FileCheck %s
 // CHECK: equal
 // RUN: not piko-compare %s --pipe Outside --domain 67 35 --count 2000 --runs 1 --threads 2 | FileCheck %s --check-prefix=OUTSIDE
