@@ -5,7 +5,7 @@
 Each operation of the dialect has an example in its description, or says "See
 `piko.X`" where X's example shows it. An example that holds a record or a
 pipeline is a module. Any other is a piece of a phase, of an iteration or of a
-resolved kernel, and is put into the pipeline below; names that it does not
+kernel's loops, and is put into the pipeline below; names that it does not
 define have the types of NAMES.
 """
 
@@ -22,10 +22,7 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 FENCE = re.compile(r"^[ ]*```mlir\n(.*?)^[ ]*```", re.S | re.M)
 
 KERNEL_OPS = re.compile(
-    r"piko\.(open_bins|close_bins|unit_\w+|cell_\w+|item|open_writer"
-    r"|close_writer|append|place|next|threads|grid|call_\w+|list|no_item"
-    r"|\w+_address|\w+_schedule|schedule_bin|defer_\w+|scratch\w*"
-    r"|fail\w*)(?= )"
+    r"piko\.(cpu\.\w+|grid|\w+_schedule|schedule_bin|fail\w*)(?= )"
 )
 ASSIGN_OPS = re.compile(r"piko\.(assign_\w+|owner)\b")
 DIRECTIVES = re.compile(r"piko\.set_\w+")
@@ -35,8 +32,8 @@ BARRIERS = re.compile(r"piko\.(sync|reduce|scan|sort)\b")
 NAMES = {
     "f32": "u v z depth",
     "i32": "x y x0 y0 x1 y1 one count zero id kind",
-    "i64": "batch split mark",
-    "i1": "always",
+    "i64": "batch split mark lineage",
+    "i1": "always isNaN isUnwritten",
     "index": "a b bin call cell hi i j lo n tile unit",
 }
 
@@ -44,6 +41,8 @@ CONTEXT = """
 piko.record @Fragment {"x" : i32 at 0, "y" : i32 at 4, "z" : f32 at 8,
                        "w" : f32[4 : 4] at 12} size 28 align 4
 piko.record @Point {"u" : f32 at 0, "v" : f32 at 4} size 8 align 4
+piko.record @Fragment.checked {"z" : f32 at 0, "piko.lineage" : i64 at 8}
+  size 16 align 8
 piko.record @Camera {"width" : i32 at 0} size 4 align 4
 piko.record @Light {"color.x" : f32 at 0, "cutoff" : f32[2 : 4] at 4}
   size 12 align 4
@@ -115,14 +114,14 @@ def definitions(text):
             or (primitive and name == "i")
         ]
     if bins or writer:
-        lines.append("%bins = piko.open_bins @shade : !piko.bins<@Fragment>")
+        lines.append("%bins = piko.cpu.open_bins @shade : !piko.bins<@Fragment>")
     if writer:
         lines.append(
-            "%writer = piko.open_writer %bins[%unit] : !piko.bins<@Fragment>"
+            "%writer = piko.cpu.open_writer %bins[%unit] : !piko.bins<@Fragment>"
         )
     if primitive:
         lines.append(
-            "%p = piko.item %bins[%i]"
+            "%p = piko.cpu.item %bins[%i]"
             " : !piko.bins<@Fragment> -> !piko.prim<@Fragment>"
         )
     return "\n".join(lines)
@@ -155,6 +154,8 @@ def complete(text):
     if BARRIERS.search(text):
         text = ITERATIONS.replace("BODY", text)
     body = definitions(text) + "\n" + text
+    if "piko.check_record" in text:
+        return module(kernel=text)
     if "piko.schedule " in text:
         return blend(text, "")
     if DIRECTIVES.search(text):
@@ -174,7 +175,7 @@ def complete(text):
 
 def descriptions(tblgen, includes):
     """(name of the operation or None, name of the record, description)."""
-    file = ROOT / "include/Piko/Dialect/Piko/IR/PikoOps.td"
+    file = ROOT / "include/Piko/Dialect/Piko/IR/PikoReference.td"
     command = [tblgen, "--dump-json", str(file), f"-I{ROOT}/include"]
     command += [f"-I{path}" for path in includes]
     records = json.loads(subprocess.check_output(command))
@@ -206,11 +207,11 @@ def main():
         fences = FENCE.findall(text)
         examples += [(name, fence) for fence in fences]
         if op:
-            shown[op] = set(re.findall(r"piko\.\w+", "".join(fences)))
+            shown[op] = set(re.findall(r"piko\.[\w.]+", "".join(fences)))
     for op, name, text in described:
         if not op or op in shown[op]:
             continue
-        see = re.search(r"See `(piko\.\w+)`", text)
+        see = re.search(r"See `(piko\.[\w.]+)`", text)
         if not see or op not in shown.get(see[1], ()):
             print(f"{name}: expected an example of {op} in its description")
             faults += 1

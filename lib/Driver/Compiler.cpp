@@ -82,7 +82,7 @@ Level piko::getLevel(ModuleOp module) {
     hasPipelines = true;
     for (auto kernel : pipeline.getOps<KernelOp>())
       level =
-          std::max(level, hasPhases(kernel) ? Level::Kernels : Level::Resolved);
+          std::max(level, hasPhases(kernel) ? Level::Kernels : Level::Machine);
   }
   if (hasPipelines)
     return level;
@@ -97,7 +97,7 @@ Level piko::getLevel(ModuleOp module) {
 }
 
 StringRef piko::getName(Level level) {
-  constexpr StringRef names[] = {"authored", "kernels", "resolved", "target",
+  constexpr StringRef names[] = {"authored", "kernels", "machine", "target",
                                  "llvm"};
   return names[static_cast<int>(level)];
 }
@@ -183,10 +183,8 @@ void piko::addPasses(OpPassManager &passes, Level from, Level to,
     addCheckSequence(passes, check);
   if (goes(Level::Kernels))
     addSynthesisSequence(passes, chosen);
-  if (goes(Level::Resolved))
-    addResolveSequence(passes);
-  else if (from == Level::Resolved && to > from)
-    addSplitSequence(passes); // perhaps only kernels are resolved
+  if (goes(Level::Machine))
+    addMachineSequence(passes);
   if (goes(Level::Target)) {
     if (gpu.emulate)
       addGPUSequence(passes, gpu);
@@ -214,11 +212,10 @@ static LogicalResult checkStart(ModuleOp module, Level from, Level to,
     return emitError(module.getLoc())
            << "expected kernels for a CPU, but the file has some for a GPU, "
               "which --emulate-gpu runs and --emit=ptx writes";
-  if (!hasGPUKernels(module) && gpu.emulate && from > Level::Resolved)
+  if (!hasGPUKernels(module) && gpu.emulate && from > Level::Machine)
     return emitError(module.getLoc())
-           << "--emulate-gpu: expected kernels for a GPU, or the resolved "
-              "level "
-              "or one above it, but the file is at the "
+           << "--emulate-gpu: expected kernels for a GPU, or the machine "
+              "level or one above it, but the file is at the "
            << getName(from) << " level";
   return success();
 }
@@ -243,15 +240,13 @@ LogicalResult piko::lowerToGPU(ModuleOp module, const CheckOptions &check,
   if (hasGPUKernels(module))
     return success();
   Level from = getLevel(module);
-  if (failed(checkStart(module, from, Level::Resolved, check, {})))
+  if (failed(checkStart(module, from, Level::Machine, check, {})))
     return failure();
   Location loc = module.getLoc();
   for (auto pipeline : module.getOps<PipelineOp>())
     loc = pipeline.getLoc();
   PassManager passes(module.getContext());
-  addPasses(passes, from, Level::Resolved, check, synthesis);
-  if (from == Level::Resolved)
-    addSplitSequence(passes);
+  addPasses(passes, from, Level::Machine, check, synthesis);
   addGPUSequence(passes, gpu);
   if (failed(passes.run(module)))
     return failure();

@@ -71,17 +71,20 @@ void piko::addSynthesisSequence(OpPassManager &passes,
     pipeline.addPass(createFormStrips());
 }
 
-void piko::addResolveSequence(OpPassManager &passes) {
-  passes.nest<PipelineOp>().addPass(createResolveKernels());
-  addSplitSequence(passes);
-}
-
-void piko::addSplitSequence(OpPassManager &passes) {
-  passes.nest<PipelineOp>().addPass(createSplitLoops());
+void piko::addMachineSequence(OpPassManager &passes) {
+  passes.nest<PipelineOp>().addPass(createFormWork());
   addCleanUp(passes);
 }
 
-void piko::addCPUSequence(OpPassManager &passes,
+void piko::addUnitSequence(OpPassManager &passes) {
+  OpPassManager &pipeline = passes.nest<PipelineOp>();
+  pipeline.addPass(createFormUnits());
+  pipeline.addPass(createSplitLoops());
+  addCleanUp(passes);
+}
+
+/// From loops over units, some of which may have become grids.
+static void addUnitsToCPU(OpPassManager &passes,
                           const SynthesisOptions &options) {
   if (options.has("if-convert"))
     passes.nest<PipelineOp>().addPass(createIfConvert());
@@ -100,6 +103,12 @@ void piko::addCPUSequence(OpPassManager &passes,
   addCleanUp(passes);
 }
 
+void piko::addCPUSequence(OpPassManager &passes,
+                          const SynthesisOptions &options) {
+  addUnitSequence(passes);
+  addUnitsToCPU(passes, options);
+}
+
 void piko::addLLVMSequence(OpPassManager &passes) {
   passes.addPass(createSCFToControlFlowPass());
   passes.addPass(createConvertVectorToLLVMPass());
@@ -110,10 +119,11 @@ void piko::addLLVMSequence(OpPassManager &passes) {
 }
 
 void piko::addGPUSequence(OpPassManager &passes, const GPUOptions &options) {
+  addUnitSequence(passes);
   ConvertPikoToGPUOptions grids;
   grids.threads = options.threads;
   passes.nest<PipelineOp>().addPass(createConvertPikoToGPU(grids));
-  addCPUSequence(passes);
+  addUnitsToCPU(passes, {});
   // Or constants would be arguments.
   passes.addPass(createGpuLaunchSinkIndexComputationsPass());
   passes.addPass(createGpuKernelOutliningPass());
@@ -148,7 +158,7 @@ struct GPUSequenceOptions : PassPipelineOptions<GPUSequenceOptions> {
 
 void piko::registerSequences() {
   PassPipelineRegistration<GPUSequenceOptions>(
-      "piko-to-gpu", "From the resolved level to kernels for a GPU",
+      "piko-to-gpu", "From the machine level to kernels for a GPU",
       [](OpPassManager &passes, const GPUSequenceOptions &options) {
         addGPUSequence(passes, {.threads = options.threads});
       });
@@ -158,11 +168,14 @@ void piko::registerSequences() {
   PassPipelineRegistration<>(
       "piko-synthesize", "From the authored to the kernels level",
       [](OpPassManager &passes) { addSynthesisSequence(passes); });
-  PassPipelineRegistration<>("piko-resolve",
-                             "From the kernels to the resolved level",
-                             addResolveSequence);
+  PassPipelineRegistration<>("piko-to-machine",
+                             "From the kernels to the machine level",
+                             addMachineSequence);
   PassPipelineRegistration<>(
-      "piko-to-cpu", "From the resolved level to upstream dialects",
+      "piko-to-units", "From the machine level to loops over units of work",
+      addUnitSequence);
+  PassPipelineRegistration<>(
+      "piko-to-cpu", "From the machine level to upstream dialects",
       [](OpPassManager &passes) { addCPUSequence(passes); });
   PassPipelineRegistration<>("piko-cpu-to-llvm",
                              "From upstream dialects to llvm and omp",

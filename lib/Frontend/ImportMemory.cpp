@@ -419,6 +419,6 @@ LogicalResult PhaseImporter::importEmit(llvm::CallInst *call) {
   llvm::SmallVector<mlir::Value> numbers;
   for (llvm::Value *value : llvm::drop_begin(call->args(), 2))
     numbers.push_back(scalars.get(value));
-  EmitOp::create(builder, *location, number, numbers);
+  EmitOp::create(builder, *location, /*prim=*/mlir::Type(), number, numbers);
   return success();
 }

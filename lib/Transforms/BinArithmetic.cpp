@@ -4,6 +4,8 @@
 
 #include "Piko/Transforms/BinArithmetic.h"
 
+#include "Piko/Dialect/Piko/IR/PikoCPU.h"
+
 #include "mlir/Dialect/Arith/IR/Arith.h"
 
 using namespace mlir;
@@ -175,7 +177,7 @@ Value piko::findBin(OpBuilder &builder, Operation *op) {
       continue;
     auto bins = cells.getBins().getDefiningOp<OpenBinsOp>();
     if (!bins)
-      continue; // over the calls of a piko.local_bin, which is of one bin
+      continue; // over the calls of a piko.cpu.local_bin, which is of one bin
     if (bins.getSource())
       return {};
     auto stage = lookupInPipeline<StageOp>(op, bins.getStageAttr());

@@ -3,6 +3,7 @@
 #include "LanePlan.h"
 
 #include "Piko/Analysis/Repeatable.h"
+#include "Piko/Dialect/Piko/IR/PikoCPU.h"
 #include "StateAccess.h"
 
 #include "mlir/Dialect/Arith/IR/Arith.h"

@@ -37,7 +37,7 @@ static std::string describeInner(Operation *op, const LanePlanner &planner) {
                                         : "it changes " + name + " atomically";
   }
   return llvm::TypeSwitch<Operation *, std::string>(op)
-      .Case<AppendOp, PlaceOp>([](auto) { return "it emits"; })
+      .Case<AppendOp, AppendBinOp>([](auto) { return "it emits"; })
       .Case(
           [](GetOp) { return "it reads a field at an index that it computes"; })
       .Case<memref::AllocaOp, memref::LoadOp, memref::StoreOp>(

@@ -8,6 +8,8 @@
 
 #include "LanePlan.h"
 
+#include "Piko/Dialect/Piko/IR/PikoCPU.h"
+
 #include "llvm/ADT/MapVector.h"
 
 namespace piko {

@@ -5,6 +5,7 @@
 #include "Collectives.h"
 
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
+#include "Piko/Dialect/Piko/IR/PikoCPU.h"
 #include "Piko/Transforms/BinArithmetic.h"
 #include "mlir/Dialect/Arith/IR/Arith.h"
 #include "mlir/IR/IRMapping.h"

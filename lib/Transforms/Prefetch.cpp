@@ -2,6 +2,7 @@
 //
 // piko-prefetch: what a later primitive refers to is asked for ahead of time.
 
+#include "Piko/Dialect/Piko/IR/PikoCPU.h"
 #include "Piko/Transforms/Passes.h"
 
 #include "mlir/Dialect/Arith/IR/Arith.h"

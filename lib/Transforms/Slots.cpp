@@ -2,6 +2,8 @@
 
 #include "Slots.h"
 
+#include "Piko/Dialect/Piko/IR/PikoCPU.h"
+
 #include "mlir/Dialect/Arith/IR/Arith.h"
 
 using namespace mlir;

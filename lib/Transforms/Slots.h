@@ -5,7 +5,7 @@
 #ifndef PIKO_LIB_TRANSFORMS_SLOTS_H
 #define PIKO_LIB_TRANSFORMS_SLOTS_H
 
-#include "Piko/Dialect/Piko/IR/Piko.h"
+#include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
 #include "mlir/Dialect/MemRef/IR/MemRef.h"
 

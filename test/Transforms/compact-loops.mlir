@@ -1,5 +1,5 @@
-// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-form-kernels,piko-resolve-kernels,piko-compact-loops),canonicalize,cse)' %s | FileCheck %s
-// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-form-kernels,piko-resolve-kernels,piko-compact-loops),canonicalize,cse)' %s 2>&1 >/dev/null | FileCheck %s --check-prefix=REMARKS
+// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-form-kernels,piko-form-work,piko-form-units,piko-compact-loops),canonicalize,cse)' %s | FileCheck %s
+// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-form-kernels,piko-form-work,piko-form-units,piko-compact-loops),canonicalize,cse)' %s 2>&1 >/dev/null | FileCheck %s --check-prefix=REMARKS
 
 // The remarks are at the tests.
 // REMARKS: {{[0-9]+}}:7: remark: stage 'tests': process puts off what passes this test, to do it together
@@ -38,7 +38,7 @@ piko.pipeline @P rank 1 {
   // CHECK:           scf.for %[[J:.*]] = %c0 to %[[END]] step %c1
   // CHECK:             %[[K:.*]] = memref.load %[[LIST]][%[[J]]]
   // CHECK:             memref.load %[[NEAREST]][%[[J]]]
-  // CHECK:             piko.item %{{.*}}[%[[K]]]
+  // CHECK:             piko.cpu.item %{{.*}}[%[[K]]]
   // CHECK:             scf.while
   // CHECK:             piko.update @color
   // CHECK:           } {piko.lanes}

@@ -1,5 +1,5 @@
-// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-form-kernels,piko-resolve-kernels,piko-hoist-bounds))' %s | FileCheck %s
-// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-form-kernels,piko-resolve-kernels,piko-hoist-bounds{max-operations=4}))' %s | FileCheck %s --check-prefix=SHORT
+// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-form-kernels,piko-form-work,piko-form-units,piko-hoist-bounds))' %s | FileCheck %s
+// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-form-kernels,piko-form-work,piko-form-units,piko-hoist-bounds{max-operations=4}))' %s | FileCheck %s --check-prefix=SHORT
 
 // SHORT-NOT: checked
 

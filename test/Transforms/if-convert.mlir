@@ -1,5 +1,5 @@
-// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-form-kernels,piko-resolve-kernels,piko-if-convert))' %s | FileCheck %s
-// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-form-kernels,piko-resolve-kernels,piko-if-convert{max-cases=1}))' %s | FileCheck %s --check-prefix=FEW
+// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-form-kernels,piko-form-work,piko-form-units,piko-if-convert))' %s | FileCheck %s
+// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-form-kernels,piko-form-work,piko-form-units,piko-if-convert{max-cases=1}))' %s | FileCheck %s --check-prefix=FEW
 
 piko.record @F {"x" : f32 at 0, "y" : f32 at 4, "h" : i32 at 8} size 12 align 4
 piko.record @N {"v" : f32 at 0} size 4 align 4

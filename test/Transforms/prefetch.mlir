@@ -1,4 +1,4 @@
-// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-form-kernels,piko-resolve-kernels,piko-prefetch),canonicalize,cse)' %s | FileCheck %s
+// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-form-kernels,piko-form-work,piko-form-units,piko-prefetch),canonicalize,cse)' %s | FileCheck %s
 
 piko.record @F {"v" : i32 at 0, "w" : i32 at 4} size 8 align 4
 piko.record @V {"x" : f32 at 0, "y" : f32 at 4} size 8 align 4
@@ -30,21 +30,21 @@ piko.pipeline @P rank 1 {
   // Those of a bin are asked for, and what they refer to: once for each element,
   // not where an index is computed, nor on the long side of a condition.
   // CHECK:       piko.kernel @kernel_bins
-  // CHECK:         %[[LO:.*]], %[[HI:.*]] = piko.cell_range
+  // CHECK:         %[[LO:.*]], %[[HI:.*]] = piko.cpu.cell_range
   // CHECK:         %[[LAST:.*]] = arith.subi %[[HI]], %c1
   // CHECK:         scf.for %[[I:.*]] = %[[LO]] to %[[HI]]
   // CHECK:           %[[I16:.*]] = arith.addi %[[I]], %c16
   // CHECK:           %[[FAR:.*]] = arith.minsi %[[I16]], %[[LAST]]
-  // CHECK:           piko.prefetch_item %[[BINS:.*]][%[[FAR]]]
+  // CHECK:           piko.cpu.prefetch_item %[[BINS:.*]][%[[FAR]]]
   // CHECK:           %[[I8:.*]] = arith.addi %[[I]], %c8
   // CHECK:           %[[NEAR:.*]] = arith.minsi %[[I8]], %[[LAST]]
-  // CHECK:           %[[ITEM:.*]] = piko.item %[[BINS]][%[[NEAR]]]
+  // CHECK:           %[[ITEM:.*]] = piko.cpu.item %[[BINS]][%[[NEAR]]]
   // CHECK-NEXT:      %[[V:.*]] = piko.get %[[ITEM]] "v"
   // CHECK-NEXT:      piko.prefetch @vertices[%[[V]] : i32]
   // CHECK-NEXT:      %[[W:.*]] = piko.get %[[ITEM]] "w"
   // CHECK-NEXT:      piko.prefetch @vertices[%[[W]] : i32]
   // CHECK-NOT:       piko.prefetch
-  // CHECK:           piko.item %[[BINS]][%[[I]]]
+  // CHECK:           piko.cpu.item %[[BINS]][%[[I]]]
   // CHECK-NOT:       piko.prefetch
   piko.stage @bins bins [8] threads 1 : @F -> [] {
     piko.assign {
@@ -129,8 +129,8 @@ piko.record @Narrow {"a" : i8 at 0, "b" : i16 at 2, "c" : i64 at 8} size 16 alig
 // A field of another width is extended as for the access.
 // CHECK-LABEL: piko.pipeline @Widths
 // CHECK:       piko.kernel @kernel_bins
-// CHECK:           piko.prefetch_item
-// CHECK:           %[[ITEM:.*]] = piko.item
+// CHECK:           piko.cpu.prefetch_item
+// CHECK:           %[[ITEM:.*]] = piko.cpu.item
 // CHECK-NEXT:      %[[A:.*]] = piko.get %[[ITEM]] "a" : !piko.prim<@Narrow> -> i8
 // CHECK-NEXT:      %[[WIDE_A:.*]] = arith.extsi %[[A]] : i8 to i32
 // CHECK-NEXT:      piko.prefetch @vertices[%[[WIDE_A]] : i32]

@@ -19,10 +19,10 @@ piko.pipeline @OtherControlFlow rank 1 {
   piko.source @a
   piko.stage @a bins [0] threads 1 : @F -> [] {}
   piko.kernel @k {
-    %bins = piko.open_bins @a : !piko.bins<@F>
-    %n = piko.unit_count %bins : !piko.bins<@F>
+    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
+    %n = piko.cpu.unit_count %bins : !piko.bins<@F>
     scf.forall (%u) in (%n) {
-      %w = piko.open_writer %bins[%u] : !piko.bins<@F>
+      %w = piko.cpu.open_writer %bins[%u] : !piko.bins<@F>
       piko.parallel_for %n {
       ^bb0(%i: index):
         // expected-note @below {{the operation is here}}
@@ -33,9 +33,9 @@ piko.pipeline @OtherControlFlow rank 1 {
         }
         piko.yield
       }
-      piko.close_writer %w
+      piko.cpu.close_writer %w
     }
-    piko.close_bins %bins : !piko.bins<@F>
+    piko.cpu.close_bins %bins : !piko.bins<@F>
   }
 }
 
@@ -46,10 +46,10 @@ piko.pipeline @Vector rank 1 {
   piko.source @a
   piko.stage @a bins [0] threads 1 : @F -> [] {}
   piko.kernel @k {
-    %bins = piko.open_bins @a : !piko.bins<@F>
-    %n = piko.unit_count %bins : !piko.bins<@F>
+    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
+    %n = piko.cpu.unit_count %bins : !piko.bins<@F>
     scf.forall (%u) in (%n) {
-      %w = piko.open_writer %bins[%u] : !piko.bins<@F>
+      %w = piko.cpu.open_writer %bins[%u] : !piko.bins<@F>
       piko.parallel_for %n {
       ^bb0(%i: index):
         // expected-error @below {{expected a number, a primitive or a private array to live across a barrier, but got type 'complex<f32>'}}
@@ -58,9 +58,9 @@ piko.pipeline @Vector rank 1 {
         "test.use"(%v) : (complex<f32>) -> ()
         piko.yield
       }
-      piko.close_writer %w
+      piko.cpu.close_writer %w
     }
-    piko.close_bins %bins : !piko.bins<@F>
+    piko.cpu.close_bins %bins : !piko.bins<@F>
   }
 }
 
@@ -71,11 +71,11 @@ piko.pipeline @ResultOfBranch rank 1 {
   piko.source @a
   piko.stage @a bins [0] threads 1 : @F -> [] {}
   piko.kernel @k {
-    %bins = piko.open_bins @a : !piko.bins<@F>
-    %n = piko.unit_count %bins : !piko.bins<@F>
+    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
+    %n = piko.cpu.unit_count %bins : !piko.bins<@F>
     %c = arith.constant true
     scf.forall (%u) in (%n) {
-      %w = piko.open_writer %bins[%u] : !piko.bins<@F>
+      %w = piko.cpu.open_writer %bins[%u] : !piko.bins<@F>
       piko.parallel_for %n {
       ^bb0(%i: index):
         %v = "test.make"(%i) : (index) -> complex<f32>
@@ -89,8 +89,8 @@ piko.pipeline @ResultOfBranch rank 1 {
         "test.use"(%r) : (complex<f32>) -> ()
         piko.yield
       }
-      piko.close_writer %w
+      piko.cpu.close_writer %w
     }
-    piko.close_bins %bins : !piko.bins<@F>
+    piko.cpu.close_bins %bins : !piko.bins<@F>
   }
 }

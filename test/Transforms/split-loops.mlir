@@ -6,33 +6,33 @@ piko.record @F {"z" : f32 at 0} size 4 align 4
 // CHECK-LABEL: piko.pipeline @Plain
 // CHECK:         scf.for %[[I:.*]] = %c0 to %{{.*}} step %c1 {
 // CHECK-NEXT:      scf.for %{{.*}} = %c0 to %[[I]] step %c1 {
-// CHECK-NEXT:        piko.append
+// CHECK-NEXT:        piko.cpu.append
 // CHECK-NEXT:      } {piko.lanes}
 // CHECK-NEXT:    } {piko.lanes}
-// CHECK-NOT:     piko.scratch
+// CHECK-NOT:     piko.cpu.scratch
 piko.pipeline @Plain rank 1 {
   piko.source @a
   piko.edge @a[0] -> @b
   piko.stage @a bins [0] threads 1 : @F -> [@F] {}
   piko.stage @b bins [0] threads 1 : @F -> [] {}
   piko.kernel @k {
-    %bins = piko.open_bins @a : !piko.bins<@F>
-    %n = piko.unit_count %bins : !piko.bins<@F>
+    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
+    %n = piko.cpu.unit_count %bins : !piko.bins<@F>
     %v = arith.constant 1.0 : f32
     scf.forall (%u) in (%n) {
-      %w = piko.open_writer %bins[%u] : !piko.bins<@F>
+      %w = piko.cpu.open_writer %bins[%u] : !piko.bins<@F>
       piko.parallel_for %n {
       ^bb0(%i: index):
         piko.parallel_for %i {
         ^bb0(%j: index):
-          %p = piko.append %w[0] (%v) : f32 -> !piko.prim<@F>
+          %p = piko.cpu.append %w[0] (%v) : f32 -> !piko.prim<@F>
           piko.yield
         }
         piko.yield
       }
-      piko.close_writer %w
+      piko.cpu.close_writer %w
     } {piko.schedule = "load_balance"}
-    piko.close_bins %bins : !piko.bins<@F>
+    piko.cpu.close_bins %bins : !piko.bins<@F>
   }
 }
 
@@ -46,8 +46,8 @@ piko.record @F {"z" : f32 at 0} size 4 align 4
 // CHECK:         %[[SHARED:.*]] = arith.addi
 // CHECK:         %[[ANY:.*]] = arith.cmpi sgt, %[[N:.*]], %c0
 // CHECK:         scf.if %[[ANY]] {
-// CHECK:           %[[MARK:.*]] = piko.scratch_mark %[[W:.*]]
-// CHECK:           %[[BYTES:.*]], %[[GRANTED:.*]] = piko.scratch %[[W]]
+// CHECK:           %[[MARK:.*]] = piko.cpu.scratch_mark %[[W:.*]]
+// CHECK:           %[[BYTES:.*]], %[[GRANTED:.*]] = piko.cpu.scratch %[[W]]
 // CHECK:           scf.if %[[GRANTED]] {
 // CHECK-DAG:         %[[VALUES:.*]] = memref.view %[[BYTES]][{{.*}}][%[[N]]] : memref<?xi8> to memref<?xf32>
 // CHECK-DAG:         %[[PRIMS:.*]] = memref.view %[[BYTES]][{{.*}}][%[[N]]] : memref<?xi8> to memref<?xindex>
@@ -60,12 +60,12 @@ piko.record @F {"z" : f32 at 0} size 4 align 4
 // CHECK:             scf.for %[[J:.*]] = %c0 to %[[N]] step %c1 {
 // CHECK-DAG:           memref.load %[[VALUES]][%[[J]]]
 // CHECK-DAG:           %[[ADDRESS:.*]] = memref.load %[[PRIMS]][%[[J]]]
-// CHECK-DAG:           piko.from_address %[[ADDRESS]]
+// CHECK-DAG:           piko.cpu.from_address %[[ADDRESS]]
 // CHECK-DAG:           %[[SAME:.*]] = memref.view %[[BYTES]][{{.*}}][] : memref<?xi8> to memref<4xf32>
 // CHECK:               memref.load %[[SAME]][%[[SHARED]]]
-// CHECK:               piko.append
+// CHECK:               piko.cpu.append
 // CHECK:             } {piko.lanes}
-// CHECK:           piko.scratch_release %[[W]][%[[MARK]]]
+// CHECK:           piko.cpu.scratch_release %[[W]][%[[MARK]]]
 // CHECK-NOT:     piko.defer
 piko.pipeline @Across rank 1 {
   piko.source @a
@@ -73,12 +73,12 @@ piko.pipeline @Across rank 1 {
   piko.stage @a bins [0] threads 1 : list @F -> [@F] {}
   piko.stage @b bins [0] threads 1 : @F -> [] {}
   piko.kernel @k {
-    %bins = piko.open_bins @a : !piko.bins<@F>
-    %n = piko.unit_count %bins : !piko.bins<@F>
+    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
+    %n = piko.cpu.unit_count %bins : !piko.bins<@F>
     %c1 = arith.constant 1 : index
     scf.forall (%u) in (%n) {
-      %w = piko.open_writer %bins[%u] : !piko.bins<@F>
-      %l = piko.list %bins[%u to %n] : !piko.bins<@F> -> !piko.list<@F>
+      %w = piko.cpu.open_writer %bins[%u] : !piko.bins<@F>
+      %l = piko.cpu.list %bins[%u to %n] : !piko.bins<@F> -> !piko.list<@F>
       piko.parallel_for %n {
       ^bb0(%i: index):
         %array = memref.alloca() : memref<4xf32>
@@ -91,12 +91,12 @@ piko.pipeline @Across rank 1 {
         %x = piko.get %p "z" : !piko.prim<@F> -> f32
         %s = arith.addf %y, %z : f32
         %t = arith.addf %s, %x : f32
-        %q = piko.append %w[0] (%t) : f32 -> !piko.prim<@F>
+        %q = piko.cpu.append %w[0] (%t) : f32 -> !piko.prim<@F>
         piko.yield
       }
-      piko.close_writer %w
+      piko.cpu.close_writer %w
     } {piko.schedule = "load_balance"}
-    piko.close_bins %bins : !piko.bins<@F>
+    piko.cpu.close_bins %bins : !piko.bins<@F>
   }
 }
 
@@ -107,17 +107,17 @@ piko.pipeline @Across rank 1 {
 // emits more than once, so emissions wait for their order.
 piko.record @F {"z" : f32 at 0} size 4 align 4
 // CHECK-LABEL: piko.pipeline @Uniform
-// CHECK:         piko.defer_begin %[[W:.*]][%[[N:.*]]]
+// CHECK:         piko.cpu.defer_begin %[[W:.*]][%[[N:.*]]]
 // CHECK:         scf.for %{{.*}} = %c0 to %[[N]]
 // CHECK:         scf.while
 // CHECK:           scf.for
 // CHECK:           scf.condition
 // CHECK:         } do {
 // CHECK:           scf.for %[[I:.*]] = %c0 to %[[N]] step %c1 {
-// CHECK:             piko.defer_iteration %[[W]][%[[I]]]
-// CHECK:             piko.append
+// CHECK:             piko.cpu.defer_iteration %[[W]][%[[I]]]
+// CHECK:             piko.cpu.append
 // CHECK:           scf.for
-// CHECK:         piko.defer_end %[[W]]
+// CHECK:         piko.cpu.defer_end %[[W]]
 // CHECK-NOT:     piko.fail_barrier
 piko.pipeline @Uniform rank 1 {
   piko.source @a
@@ -125,11 +125,11 @@ piko.pipeline @Uniform rank 1 {
   piko.stage @a bins [0] threads 1 : @F -> [@F] {}
   piko.stage @b bins [0] threads 1 : @F -> [] {}
   piko.kernel @k {
-    %bins = piko.open_bins @a : !piko.bins<@F>
-    %n = piko.unit_count %bins : !piko.bins<@F>
+    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
+    %n = piko.cpu.unit_count %bins : !piko.bins<@F>
     %c1 = arith.constant 1 : index
     scf.forall (%u) in (%n) {
-      %w = piko.open_writer %bins[%u] : !piko.bins<@F>
+      %w = piko.cpu.open_writer %bins[%u] : !piko.bins<@F>
       piko.parallel_for %n {
       ^bb0(%i: index):
         %end = scf.while (%s = %c1) : (index) -> index {
@@ -139,16 +139,16 @@ piko.pipeline @Uniform rank 1 {
         ^bb0(%s: index):
           %int = arith.index_cast %i : index to i32
           %z = arith.sitofp %int : i32 to f32
-          %q = piko.append %w[0] (%z) : f32 -> !piko.prim<@F>
+          %q = piko.cpu.append %w[0] (%z) : f32 -> !piko.prim<@F>
           piko.sync
           %t = arith.addi %s, %s : index
           scf.yield %t : index
         }
         piko.yield
       }
-      piko.close_writer %w
+      piko.cpu.close_writer %w
     } {piko.schedule = "load_balance"}
-    piko.close_bins %bins : !piko.bins<@F>
+    piko.cpu.close_bins %bins : !piko.bins<@F>
   }
 }
 
@@ -183,19 +183,19 @@ piko.record @F {"z" : f32 at 0} size 4 align 4
 // CHECK:             memref.store %{{.*}}, %[[RESULTS]][
 // CHECK:         scf.for
 // CHECK:           memref.load %[[RESULTS]]
-// CHECK:           piko.append
+// CHECK:           piko.cpu.append
 piko.pipeline @Varying rank 1 {
   piko.source @a
   piko.edge @a[0] -> @b
   piko.stage @a bins [0] threads 1 : @F -> [@F] {}
   piko.stage @b bins [0] threads 1 : @F -> [] {}
   piko.kernel @k {
-    %bins = piko.open_bins @a : !piko.bins<@F>
-    %n = piko.unit_count %bins : !piko.bins<@F>
+    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
+    %n = piko.cpu.unit_count %bins : !piko.bins<@F>
     %c1 = arith.constant 1 : i32
     %c7 = arith.constant 7 : i32
     scf.forall (%u) in (%n) {
-      %w = piko.open_writer %bins[%u] : !piko.bins<@F>
+      %w = piko.cpu.open_writer %bins[%u] : !piko.bins<@F>
       piko.parallel_for %n {
       ^bb0(%i: index):
         %int = arith.index_cast %i : index to i32
@@ -212,12 +212,12 @@ piko.pipeline @Varying rank 1 {
           scf.yield %int : i32
         }
         %z = arith.sitofp %r : i32 to f32
-        %q = piko.append %w[0] (%z) : f32 -> !piko.prim<@F>
+        %q = piko.cpu.append %w[0] (%z) : f32 -> !piko.prim<@F>
         piko.yield
       }
-      piko.close_writer %w
+      piko.cpu.close_writer %w
     } {piko.schedule = "load_balance"}
-    piko.close_bins %bins : !piko.bins<@F>
+    piko.cpu.close_bins %bins : !piko.bins<@F>
   }
 }
 
@@ -226,14 +226,14 @@ piko.pipeline @Varying rank 1 {
 // What is cheap to compute from the iteration is computed again.
 piko.record @F {"z" : f32 at 0} size 4 align 4
 // CHECK-LABEL: piko.pipeline @Cheap
-// CHECK-NOT:     piko.scratch
+// CHECK-NOT:     piko.cpu.scratch
 // CHECK:         scf.for
 // CHECK:           piko.store
 // CHECK:         scf.for %[[I:.*]] = %c0
 // CHECK:           %[[NEXT:.*]] = arith.addi %[[I]], %c1
 // CHECK:           %[[INT:.*]] = arith.index_cast %[[NEXT]]
 // CHECK:           arith.sitofp %[[INT]]
-// CHECK-NOT:     piko.scratch
+// CHECK-NOT:     piko.cpu.scratch
 piko.pipeline @Cheap rank 1 {
   piko.buffer @b : @F
   piko.source @a
@@ -241,11 +241,11 @@ piko.pipeline @Cheap rank 1 {
   piko.stage @a bins [0] threads 1 : @F -> [@F] {}
   piko.stage @b2 bins [0] threads 1 : @F -> [] {}
   piko.kernel @k {
-    %bins = piko.open_bins @a : !piko.bins<@F>
-    %n = piko.unit_count %bins : !piko.bins<@F>
+    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
+    %n = piko.cpu.unit_count %bins : !piko.bins<@F>
     %c1 = arith.constant 1 : index
     scf.forall (%u) in (%n) {
-      %w = piko.open_writer %bins[%u] : !piko.bins<@F>
+      %w = piko.cpu.open_writer %bins[%u] : !piko.bins<@F>
       piko.parallel_for %n {
       ^bb0(%i: index):
         %next = arith.addi %i, %c1 : index
@@ -253,12 +253,12 @@ piko.pipeline @Cheap rank 1 {
         %z = arith.sitofp %int : i32 to f32
         piko.store %z, @b[%i : index] "z" : f32
         piko.sync
-        %q = piko.append %w[0] (%z) : f32 -> !piko.prim<@F>
+        %q = piko.cpu.append %w[0] (%z) : f32 -> !piko.prim<@F>
         piko.yield
       }
-      piko.close_writer %w
+      piko.cpu.close_writer %w
     } {piko.schedule = "load_balance"}
-    piko.close_bins %bins : !piko.bins<@F>
+    piko.cpu.close_bins %bins : !piko.bins<@F>
   }
 }
 
@@ -290,18 +290,18 @@ piko.record @F {"z" : f32 at 0} size 4 align 4
 // CHECK:         memref.store %cst, %[[V]][%c0]
 // CHECK:         scf.for
 // CHECK:           memref.load %[[V]]
-// CHECK:           piko.append
+// CHECK:           piko.cpu.append
 piko.pipeline @Scan rank 1 {
   piko.source @a
   piko.edge @a[0] -> @b
   piko.stage @a bins [0] threads 1 : @F -> [@F] {}
   piko.stage @b bins [0] threads 1 : @F -> [] {}
   piko.kernel @k {
-    %bins = piko.open_bins @a : !piko.bins<@F>
-    %n = piko.unit_count %bins : !piko.bins<@F>
+    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
+    %n = piko.cpu.unit_count %bins : !piko.bins<@F>
     %none = arith.constant 0.0 : f32
     scf.forall (%u) in (%n) {
-      %w = piko.open_writer %bins[%u] : !piko.bins<@F>
+      %w = piko.cpu.open_writer %bins[%u] : !piko.bins<@F>
       piko.parallel_for %n {
       ^bb0(%i: index):
         %int = arith.index_cast %i : index to i32
@@ -311,11 +311,11 @@ piko.pipeline @Scan rank 1 {
           %c = arith.addf %a, %b : f32
           piko.yield results [%c : f32]
         }
-        %q = piko.append %w[0] (%s) : f32 -> !piko.prim<@F>
+        %q = piko.cpu.append %w[0] (%s) : f32 -> !piko.prim<@F>
         piko.yield
       }
-      piko.close_writer %w
+      piko.cpu.close_writer %w
     } {piko.schedule = "load_balance"}
-    piko.close_bins %bins : !piko.bins<@F>
+    piko.cpu.close_bins %bins : !piko.bins<@F>
   }
 }

@@ -1,4 +1,4 @@
-// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-form-kernels,piko-resolve-kernels,piko-vectorize),canonicalize,cse)' %s | FileCheck %s
+// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-form-kernels,piko-form-work,piko-form-units,piko-vectorize),canonicalize,cse)' %s | FileCheck %s
 
 piko.record @F {"v" : i32 at 0, "w" : i32 at 4} size 8 align 4
 piko.record @V {"x" : f32 at 0, "y" : f32 at 4} size 8 align 4
@@ -21,7 +21,7 @@ piko.pipeline @P rank 1 {
   // CHECK:         scf.for %[[B:.*]] = %{{.*}} to %{{.*}} step %c64
   // CHECK:           scf.for %[[I:.*]] = %[[B]] to %[[E:.*]] step %c1
   // CHECK:             %[[AT:.*]] = arith.subi %[[I]], %[[B]]
-  // CHECK:             %[[T:.*]] = piko.item %{{.*}}[%[[I]]]
+  // CHECK:             %[[T:.*]] = piko.cpu.item %{{.*}}[%[[I]]]
   // CHECK:             %[[V:.*]] = piko.get %[[T]] "v"
   // CHECK:             %[[INSIDE:.*]] = arith.cmpi ult
   // CHECK:             %[[XY:.*]]:2 = scf.if %[[INSIDE]]

@@ -27,7 +27,7 @@ namespace {
 enum class Emit {
   Authored,
   Kernels,
-  Resolved,
+  Machine,
   Target,
   LLVM,
   LLVMIR,
@@ -55,7 +55,7 @@ struct CommandLine {
       llvm::cl::values(
           clEnumValN(Emit::Authored, "authored", "stages with their phases"),
           clEnumValN(Emit::Kernels, "kernels", "phases that run together"),
-          clEnumValN(Emit::Resolved, "resolved", "loops over bins"),
+          clEnumValN(Emit::Machine, "machine", "structured work on bins"),
           clEnumValN(Emit::Target, "target", "upstream dialects"),
           clEnumValN(Emit::LLVM, "llvm", "the llvm and omp dialects"),
           clEnumValN(Emit::LLVMIR, "llvmir", "LLVM IR"),
@@ -329,7 +329,7 @@ static bool writeObject(const CommandLine &line, OutputFiles &outputs) {
   if (!object)
     return false;
   if (line.header.getNumOccurrences() && object->header.empty()) {
-    fail("--header: expected the resolved level or one above it, because below "
+    fail("--header: expected the machine level or one above it, because below "
          "it nothing says what the pipeline takes");
     return false;
   }

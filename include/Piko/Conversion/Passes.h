@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// Passes and patterns that take resolved kernels to upstream dialects.
+// Passes and patterns that take kernels to upstream dialects.
 
 #ifndef PIKO_CONVERSION_PASSES_H
 #define PIKO_CONVERSION_PASSES_H

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// Passes that take resolved kernels to upstream dialects.
+// Passes that take kernels to upstream dialects.
 
 #ifndef PIKO_CONVERSION_PASSES_TD
 #define PIKO_CONVERSION_PASSES_TD
@@ -10,7 +10,7 @@ include "mlir/Pass/PassBase.td"
 def ConvertPikoToSCF : Pass<"convert-piko-to-scf", "::piko::PipelineOp"> {
   let summary = "Turn updates and checked access into structured control flow";
   let description = [{
-    **Requires** the resolved level.
+    **Requires** loops over units (`piko-form-units`).
 
     **Does**: turns `piko.update` into an `scf.if` around the loads of the pixel,
     the update's body and the stores; and puts `piko.load`, `piko.store` and
@@ -33,7 +33,7 @@ def ConvertPikoToSCF : Pass<"convert-piko-to-scf", "::piko::PipelineOp"> {
     scf.if %inside {
       piko.store %v, checked @verts[%i : index] "x" : f32
     } else {
-      %bin = piko.cell_bin %bins[%cell] : !piko.bins<@F>
+      %bin = piko.cpu.cell_bin %bins[%cell] : !piko.bins<@F>
       piko.fail @stage in %bin outside @verts(%i)
     }
     ```
@@ -47,7 +47,7 @@ def ConvertPikoToSCF : Pass<"convert-piko-to-scf", "::piko::PipelineOp"> {
 def ConvertPikoToOpenMP : Pass<"convert-piko-to-openmp", "::piko::PipelineOp"> {
   let summary = "Spread the units of work over threads";
   let description = [{
-    **Requires** the resolved level.
+    **Requires** loops over units (`piko-form-units`).
 
     **Does**: turns the `scf.forall` of each kernel into an `omp.parallel` with
     the host's thread count around an `omp.wsloop`: with a dynamic schedule for
@@ -61,7 +61,7 @@ def ConvertPikoToOpenMP : Pass<"convert-piko-to-openmp", "::piko::PipelineOp"> {
     ```
     After:
     ```
-    %threads = piko.threads
+    %threads = piko.cpu.threads
     omp.parallel num_threads(%threads : i32) {
       omp.wsloop schedule(dynamic) {
         omp.loop_nest (%u) : index = (%zero) to (%units) step (%one) { ... }
@@ -79,7 +79,7 @@ def ConvertPikoToOpenMP : Pass<"convert-piko-to-openmp", "::piko::PipelineOp"> {
 def ConvertPikoToGPU : Pass<"convert-piko-to-gpu", "::piko::PipelineOp"> {
   let summary = "Turn kernels that update pixels into grids of blocks";
   let description = [{
-    **Requires** the resolved level.
+    **Requires** loops over units (`piko-form-units`).
 
     **Does**: turns the `scf.forall` of each kernel that updates pixels into a
     `gpu.launch`. A block runs a unit of work, which holds whole bins. Its threads
@@ -217,7 +217,7 @@ def ConvertGPUToExactNVVM
 def ConvertPikoToLLVM : Pass<"convert-piko-to-llvm", "::mlir::ModuleOp"> {
   let summary = "Turn kernels into functions on the runtime's storage";
   let description = [{
-    **Requires** resolved kernels whose updates are gone
+    **Requires** kernels of loops whose updates are gone
     (`convert-piko-to-scf`).
 
     **Does**: makes of each kernel a function that takes the runtime's pipeline

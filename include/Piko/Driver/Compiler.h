@@ -28,7 +28,7 @@ class OpPassManager;
 namespace piko {
 
 /// The levels that the compiler moves a module down, in order.
-enum class Level { Authored, Kernels, Resolved, Target, LLVM };
+enum class Level { Authored, Kernels, Machine, Target, LLVM };
 
 /// The level that a module is at, as its operations show. Passes in between
 /// make modules of the level above: taking those down does again what is done,
@@ -78,7 +78,7 @@ llvm::LogicalResult lowerPipeline(mlir::ModuleOp module, Level level,
 std::unique_ptr<llvm::Module> translateToLLVMIR(mlir::ModuleOp module,
                                                 llvm::LLVMContext &context);
 
-/// Takes a module from the resolved level or above to one with a `gpu.module`,
+/// Takes a module from the machine level or above to one with a `gpu.module`,
 /// unless it has one; an error if the pipeline has no kernel for a GPU.
 llvm::LogicalResult lowerToGPU(mlir::ModuleOp module, const CheckOptions &check,
                                const SynthesisOptions &synthesis,

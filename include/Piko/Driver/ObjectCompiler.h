@@ -30,7 +30,7 @@ struct CompiledObject {
   std::string symbol;
   std::string code;
   /// The C++ header for hosts; empty for the reference executor, and for
-  /// `.mlir` below the resolved level, where nothing is left to make it of.
+  /// `.mlir` below the machine level, where nothing is left to make it of.
   std::string header;
   /// The files that were read, sorted.
   std::vector<std::string> files;

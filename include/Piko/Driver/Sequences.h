@@ -21,20 +21,21 @@ void addCheckSequence(mlir::OpPassManager &passes, const CheckOptions &options);
 void addSynthesisSequence(mlir::OpPassManager &passes,
                           const SynthesisOptions &options = {});
 
-/// `piko-resolve`: from the kernels to the resolved level.
-void addResolveSequence(mlir::OpPassManager &passes);
+/// `piko-to-machine`: from the kernels to the machine level.
+void addMachineSequence(mlir::OpPassManager &passes);
 
-/// Its last part, which does nothing to what has gone through it.
-void addSplitSequence(mlir::OpPassManager &passes);
+/// `piko-to-units`: from there to loops over units of work, for the CPU; does
+/// nothing to what has gone through it.
+void addUnitSequence(mlir::OpPassManager &passes);
 
-/// `piko-to-cpu`: from the resolved level to scf, arith, omp and llvm.
+/// `piko-to-cpu`: from the machine level to scf, arith, omp and llvm.
 void addCPUSequence(mlir::OpPassManager &passes,
                     const SynthesisOptions &options = {});
 
 /// `piko-cpu-to-llvm`: from there to the llvm dialect (and omp) alone.
 void addLLVMSequence(mlir::OpPassManager &passes);
 
-/// `piko-to-gpu`: from the resolved level to kernels in a `gpu.module`, and
+/// `piko-to-gpu`: from the machine level to kernels in a `gpu.module`, and
 /// functions that launch them and run the others. Where the options say so,
 /// kernels become functions too.
 void addGPUSequence(mlir::OpPassManager &passes, const GPUOptions &options);

@@ -50,7 +50,7 @@ private:
   StageOp stage;
 };
 
-/// The bin of the call of Process that an operation of the resolved level is
+/// The bin of the call of Process that an operation of a kernel is
 /// in, or null.
 mlir::Value findBin(mlir::OpBuilder &builder, mlir::Operation *op);
 

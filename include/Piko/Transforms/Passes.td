@@ -8,6 +8,6 @@
 
 include "Piko/Transforms/AuthoredPasses.td"
 include "Piko/Transforms/KernelPasses.td"
-include "Piko/Transforms/ResolvedPasses.td"
+include "Piko/Transforms/MachinePasses.td"
 
 #endif // PIKO_TRANSFORMS_PASSES_TD

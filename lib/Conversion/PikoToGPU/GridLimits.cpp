@@ -4,6 +4,8 @@
 
 #include "PikoToGPU.h"
 
+#include "Piko/Dialect/Piko/IR/PikoCPU.h"
+
 #include "../GPUToNVVM/ExactFunctions.h"
 
 #include "llvm/ADT/StringMap.h"
@@ -13,7 +15,7 @@ using namespace piko;
 
 /// What is wrong with an operation by itself; empty if nothing.
 static std::string findObstacle(Operation *op) {
-  if (isa<AppendOp, PlaceOp, LocalBinOp>(op))
+  if (isa<AppendOp, AppendBinOp, LocalBinOp>(op))
     return "emits primitives";
   if (isa<ListOp, ListSizeOp, ListAtOp, CallRangeOp, CallBinOp>(op))
     return "takes a list of primitives";

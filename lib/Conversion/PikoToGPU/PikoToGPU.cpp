@@ -9,6 +9,8 @@
 
 #include "PikoToGPU.h"
 
+#include "Piko/Dialect/Piko/IR/PikoCPU.h"
+
 #include "mlir/Dialect/SCF/Transforms/Transforms.h"
 #include "mlir/Dialect/UB/IR/UBOps.h"
 #include "mlir/IR/PatternMatch.h"
@@ -83,7 +85,7 @@ LogicalResult GridBuilder::findLoops() {
         items = loop;
     });
   if (!items || items.getNumResults())
-    return kernel.emitOpError("expected loops as piko-resolve-kernels makes "
+    return kernel.emitOpError("expected loops as piko-form-units makes "
                               "them, over units, cells and primitives");
   return success();
 }
@@ -280,7 +282,7 @@ LogicalResult ConvertPikoToGPUPass::convert(KernelOp kernel) {
     guarded += counts.guarded;
     return success();
   }
-  return kernel.emitOpError("expected the resolved level");
+  return kernel.emitOpError("expected loops over units");
 }
 
 void ConvertPikoToGPUPass::runOnOperation() {

@@ -3,6 +3,8 @@
 // Bins, writers and primitives, on the runtime's structs (pikort/abi.h).
 
 #include "LoweringContext.h"
+
+#include "Piko/Dialect/Piko/IR/PikoCPU.h"
 #include "WriterPaths.h"
 
 #include "mlir/Conversion/LLVMCommon/MemRefBuilder.h"
@@ -503,10 +505,10 @@ struct AppendLowering : Lowering<AppendOp> {
   }
 };
 
-struct PlaceLowering : Lowering<PlaceOp> {
+struct PlaceLowering : Lowering<AppendBinOp> {
   using Lowering::Lowering;
   LogicalResult
-  matchAndRewrite(PlaceOp op, OpAdaptor adaptor,
+  matchAndRewrite(AppendBinOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
     Location loc = op.getLoc();
     Value cell = toI64(rewriter, loc, adaptor.getBin());
@@ -535,7 +537,7 @@ struct PlaceLowering : Lowering<PlaceOp> {
 
 private:
   /// Whether the edge is local, or each of them if several may be meant.
-  bool isLocal(PlaceOp op) const {
+  bool isLocal(AppendBinOp op) const {
     bool isLocal = false;
     PipelineOp pipeline = context.numbers(op).pipeline;
     for (auto edge : pipeline.getOps<EdgeOp>()) {

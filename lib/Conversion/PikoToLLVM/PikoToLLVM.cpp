@@ -7,6 +7,8 @@
 
 #include "LoweringContext.h"
 
+#include "Piko/Dialect/Piko/IR/PikoCPU.h"
+
 #include "mlir/Dialect/ControlFlow/IR/ControlFlow.h"
 #include "mlir/Dialect/Math/IR/Math.h"
 #include "mlir/Dialect/MemRef/IR/MemRef.h"
@@ -106,7 +108,7 @@ LogicalResult ConvertPikoToLLVMPass::convert(PipelineOp pipeline,
     bool isDynamic = schedule && !schedule.getBody().empty();
     if (!isa<AssignOp, ProcessOp>(op) && !isDynamic)
       return WalkResult::advance();
-    op->emitError("expected the resolved level, but got a phase");
+    op->emitError("expected the machine level, but got a phase");
     return WalkResult::interrupt();
   });
   if (phase.wasInterrupted())

@@ -3,6 +3,7 @@
 // convert-piko-to-openmp: units of work over threads.
 
 #include "Piko/Conversion/Passes.h"
+#include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
 #include "mlir/Dialect/MemRef/IR/MemRef.h"
 #include "mlir/IR/PatternMatch.h"

@@ -4,6 +4,7 @@
 // they go.
 
 #include "Piko/Conversion/Passes.h"
+#include "Piko/Dialect/Piko/IR/PikoCPU.h"
 #include "Piko/Transforms/BinArithmetic.h"
 
 #include "mlir/IR/Matchers.h"
@@ -31,7 +32,7 @@ struct ConvertUpdate : OpRewritePattern<UpdateOp> {
                                 PatternRewriter &rewriter) const override {
     StageOp stage = getKernelStage(update);
     if (!stage || !update.getBin())
-      return rewriter.notifyMatchFailure(update, "not at the resolved level");
+      return rewriter.notifyMatchFailure(update, "not in a kernel of loops");
     Location loc = update.getLoc();
     BinArithmetic bins(rewriter, loc, stage);
     SmallVector<Value> at = toIndices(bins, update.getCoordinates()), lo, hi;
@@ -121,7 +122,7 @@ template <typename AccessOp> struct CheckAccess : OpRewritePattern<AccessOp> {
                                 PatternRewriter &rewriter) const override {
     StageOp stage = getKernelStage(access);
     if (!stage)
-      return rewriter.notifyMatchFailure(access, "not at the resolved level");
+      return rewriter.notifyMatchFailure(access, "not in a kernel of loops");
     if (access.getChecked() || access.getIndices().empty())
       return rewriter.notifyMatchFailure(access, "nothing to check");
     Location loc = access.getLoc();
@@ -167,7 +168,7 @@ struct ConvertDivide : OpRewritePattern<DivideOp> {
     StageOp stage = getKernelStage(divide);
     BeginScheduleOp schedule = findSchedule(divide);
     if (!stage && !schedule)
-      return rewriter.notifyMatchFailure(divide, "not at the resolved level");
+      return rewriter.notifyMatchFailure(divide, "not in a kernel of loops");
     Location loc = divide.getLoc();
     Type type = divide.getType();
     Value zero =
@@ -317,7 +318,8 @@ struct ConvertPikoToSCFPass
       return signalPassFailure();
     getOperation().walk([&](Operation *op) {
       if (isa<UpdateOp, ListAtOp, ListSizeOp>(op)) {
-        op->emitOpError("expected to be at the resolved level");
+        op->emitOpError(
+            "expected loops over units, as piko-form-units makes them");
         signalPassFailure();
       } else if (auto list = dyn_cast<ListOp>(op); list && list.use_empty()) {
         list.erase();

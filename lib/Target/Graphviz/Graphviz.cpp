@@ -226,13 +226,13 @@ void DotWriter::write() {
   stream << "}\n";
 }
 
-/// At the resolved level kernels hold loops, and no phase that could be drawn.
+/// Below the kernels level no phase is left that could be drawn.
 static LogicalResult checkLevel(PipelineOp pipeline) {
   for (auto kernel : pipeline.getOps<KernelOp>())
     if (kernel.getBodyBlock()->getOps<ProcessOp>().empty() &&
         kernel.getBodyBlock()->getOps<AssignOp>().empty())
       return kernel.emitError("expected a kernel that holds phases, but got "
-                              "one of the resolved level");
+                              "none");
   return success();
 }
 

@@ -1,4 +1,4 @@
-// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-resolve-kernels,convert-piko-to-gpu))' --split-input-file --verify-diagnostics %s
+// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,piko-form-units,convert-piko-to-gpu))' --split-input-file --verify-diagnostics %s
 // What a kernel on a GPU cannot do yet, and where it is said.
 
 piko.record @F {"x" : i32 at 0} size 4 align 4

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // Checks become calls of the runtime with the place in the text.
-// RUN: piko-opt %s --piko-add-checks=numbers=F.z --piko-synthesize --piko-resolve --piko-to-cpu | FileCheck %s
+// RUN: piko-opt %s --piko-add-checks=numbers=F.z --piko-synthesize --piko-to-machine --piko-to-cpu | FileCheck %s
 
 piko.record @F {"z" : f32 at 0, "i" : i32 at 4} size 8 align 4
 

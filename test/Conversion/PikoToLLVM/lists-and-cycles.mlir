@@ -88,24 +88,24 @@ piko.pipeline @P rank 1 {
     piko.schedule_bin @a[%bins] kind %kind tile_split %size batch %size every_bin %always
   }
   piko.kernel @kernel_a {
-    %bins = piko.open_bins @a : !piko.bins<@F>
+    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
     %u = arith.constant 0 : index
-    %b = piko.call_bin %bins[%u] : !piko.bins<@F>
-    %lo, %hi = piko.call_range %bins[%u] : !piko.bins<@F>
-    %w = piko.open_writer %bins[%u] : !piko.bins<@F>
-    %mark = piko.scratch_mark %w
-    %bytes, %granted = piko.scratch %w[%hi]
+    %b = piko.cpu.call_bin %bins[%u] : !piko.bins<@F>
+    %lo, %hi = piko.cpu.call_range %bins[%u] : !piko.bins<@F>
+    %w = piko.cpu.open_writer %bins[%u] : !piko.bins<@F>
+    %mark = piko.cpu.scratch_mark %w
+    %bytes, %granted = piko.cpu.scratch %w[%hi]
     %none = arith.constant 0 : i8
     memref.store %none, %bytes[%u] : memref<?xi8>
-    piko.defer_begin %w[%hi]
-    piko.defer_iteration %w[%lo]
-    piko.defer_end %w
-    piko.scratch_release %w[%mark]
+    piko.cpu.defer_begin %w[%hi]
+    piko.cpu.defer_iteration %w[%lo]
+    piko.cpu.defer_end %w
+    piko.cpu.scratch_release %w[%mark]
     %p = scf.if %granted -> !piko.prim<@F> {
-      %item = piko.item %bins[%b] : !piko.bins<@F> -> !piko.prim<@F>
+      %item = piko.cpu.item %bins[%b] : !piko.bins<@F> -> !piko.prim<@F>
       scf.yield %item : !piko.prim<@F>
     } else {
-      %zeros = piko.no_item : !piko.prim<@F>
+      %zeros = piko.cpu.no_item : !piko.prim<@F>
       scf.yield %zeros : !piko.prim<@F>
     }
     %unset = ub.poison : !piko.prim<@F>
@@ -114,14 +114,14 @@ piko.pipeline @P rank 1 {
       scf.yield %p : !piko.prim<@F>
     }
     case 2 {
-      %item = piko.item %bins[%u] : !piko.bins<@F> -> !piko.prim<@F>
+      %item = piko.cpu.item %bins[%u] : !piko.bins<@F> -> !piko.prim<@F>
       scf.yield %item : !piko.prim<@F>
     }
     default {
       scf.yield %unset : !piko.prim<@F>
     }
-    %address = piko.to_address %r : !piko.prim<@F>
-    %q = piko.from_address %address : !piko.prim<@F>
+    %address = piko.cpu.to_address %r : !piko.prim<@F>
+    %q = piko.cpu.from_address %address : !piko.prim<@F>
     %x = piko.get %q "x" : !piko.prim<@F> -> i32
     %v = piko.get %q "v" : !piko.prim<@F> -> f32
     %old = piko.atomic add checked @counts[%u : index] "x", %x : i32 -> i32
@@ -129,15 +129,15 @@ piko.pipeline @P rank 1 {
     piko.atomic add_float checked @counts[%u : index] "v", %v : f32
     piko.fail_list @a at %lo of %hi
     piko.fail_barrier @a in %u iteration %lo
-    piko.close_writer %w
-    piko.close_bins %bins : !piko.bins<@F>
+    piko.cpu.close_writer %w
+    piko.cpu.close_bins %bins : !piko.bins<@F>
   }
   piko.kernel @kernel_b {
-    %bins = piko.open_bins @b : !piko.bins<@F>
-    piko.close_bins %bins : !piko.bins<@F>
+    %bins = piko.cpu.open_bins @b : !piko.bins<@F>
+    piko.cpu.close_bins %bins : !piko.bins<@F>
   }
   piko.kernel @kernel_c {
-    %bins = piko.open_bins @c : !piko.bins<@F>
-    piko.close_bins %bins : !piko.bins<@F>
+    %bins = piko.cpu.open_bins @c : !piko.bins<@F>
+    piko.cpu.close_bins %bins : !piko.bins<@F>
   }
 }

@@ -41,26 +41,26 @@ piko.pipeline @P rank 1 {
   piko.stage @a bins [0] threads 1 lineage 0 cycle 0 : @F -> [@F, @F] {}
   piko.stage @b bins [0] threads 1 lineage 1 : @F -> [] {}
   piko.kernel @kernel_a {
-    %bins = piko.open_bins @a : !piko.bins<@F>
-    %units = piko.unit_count %bins : !piko.bins<@F>
+    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
+    %units = piko.cpu.unit_count %bins : !piko.bins<@F>
     scf.forall (%u) in (%units) {
-      %w = piko.open_writer %bins[%u] : !piko.bins<@F>
+      %w = piko.cpu.open_writer %bins[%u] : !piko.bins<@F>
       %array = memref.alloca() : memref<4xf32>
       %zero = arith.constant 0.0 : f32
       memref.store %zero, %array[%u] : memref<4xf32>
       %v = memref.load %array[%units] : memref<4xf32>
       piko.atomic add_float checked @sums[%u : index] "v", %v : f32
-      piko.close_writer %w
+      piko.cpu.close_writer %w
     } {piko.schedule = "load_balance"}
-    piko.close_bins %bins : !piko.bins<@F>
+    piko.cpu.close_bins %bins : !piko.bins<@F>
   }
   piko.kernel @kernel_b {
-    %bins = piko.open_bins @b : !piko.bins<@F>
-    %units = piko.unit_count %bins : !piko.bins<@F>
+    %bins = piko.cpu.open_bins @b : !piko.bins<@F>
+    %units = piko.cpu.unit_count %bins : !piko.bins<@F>
     scf.forall (%u) in (%units) {
-      %w = piko.open_writer %bins[%u] : !piko.bins<@F>
-      piko.close_writer %w
+      %w = piko.cpu.open_writer %bins[%u] : !piko.bins<@F>
+      piko.cpu.close_writer %w
     } {piko.schedule = "load_balance"}
-    piko.close_bins %bins : !piko.bins<@F>
+    piko.cpu.close_bins %bins : !piko.bins<@F>
   }
 }

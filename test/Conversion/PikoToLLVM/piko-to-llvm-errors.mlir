@@ -4,7 +4,7 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 piko.pipeline @P rank 1 {
   piko.source @a
   piko.stage @a bins [0] threads 1 : @F -> [] {
-    // expected-error @below {{expected the resolved level, but got a phase}}
+    // expected-error @below {{expected the machine level, but got a phase}}
     piko.process {
     ^bb0(%f: !piko.prim<@F>):
       piko.return
@@ -18,7 +18,7 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 piko.pipeline @P rank 1 {
   piko.source @a
   piko.stage @a bins [0] threads 1 : @F -> [] {
-    // expected-error @below {{expected the resolved level, but got a phase}}
+    // expected-error @below {{expected the machine level, but got a phase}}
     piko.schedule load_balance dynamic {
     ^bb0(%bin: index):
       piko.return
@@ -44,7 +44,7 @@ piko.pipeline @P rank 1 {
   piko.source @a
   piko.stage @a bins [0] threads 1 : @F -> [] {}
   piko.kernel @k {
-    %bins = piko.open_bins @a : !piko.bins<@F>
+    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
     %n = arith.constant 8 : index
     // expected-error @below {{failed to legalize operation 'piko.parallel_for'}}
     piko.parallel_for %n {

@@ -1,5 +1,5 @@
-// RUN: piko-opt --piko-synthesize --piko-resolve --piko-to-cpu %s | FileCheck %s
-// RUN: piko-opt --piko-synthesize --piko-resolve --piko-to-cpu --piko-cpu-to-llvm %s | mlir-translate --mlir-to-llvmir | FileCheck %s --check-prefix=IR
+// RUN: piko-opt --piko-synthesize --piko-to-machine --piko-to-cpu %s | FileCheck %s
+// RUN: piko-opt --piko-synthesize --piko-to-machine --piko-to-cpu --piko-cpu-to-llvm %s | mlir-translate --mlir-to-llvmir | FileCheck %s --check-prefix=IR
 
 piko.record @F {"x" : i32 at 0, "w" : f32[4 : 4] at 4} size 20 align 4
 

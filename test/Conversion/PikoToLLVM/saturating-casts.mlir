@@ -1,4 +1,4 @@
-// RUN: piko-opt --piko-synthesize --piko-resolve --piko-to-cpu %s | FileCheck %s
+// RUN: piko-opt --piko-synthesize --piko-to-machine --piko-to-cpu %s | FileCheck %s
 // A cast from float to integer that saturates is one comparison where the number
 // fits; what is no such cast stays as it is.
 

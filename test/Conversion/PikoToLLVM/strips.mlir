@@ -35,16 +35,16 @@ piko.pipeline @P rank 1 {
   piko.stage @b bins [0] threads 1 writes : @F -> [] {}
   piko.stage @before bins [0] threads 1 : @F -> [] {}
   piko.kernel @kernel_before {
-    %bins = piko.open_bins @before : !piko.bins<@F>
-    piko.close_bins %bins : !piko.bins<@F>
+    %bins = piko.cpu.open_bins @before : !piko.bins<@F>
+    piko.cpu.close_bins %bins : !piko.bins<@F>
   }
   piko.strips source 0 [@kernel_a, @kernel_b] chunk 256
   piko.kernel @kernel_a {
-    %bins = piko.open_bins @a : !piko.bins<@F>
-    piko.close_bins %bins : !piko.bins<@F>
+    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
+    piko.cpu.close_bins %bins : !piko.bins<@F>
   }
   piko.kernel @kernel_b {
-    %bins = piko.open_bins @b : !piko.bins<@F>
-    piko.close_bins %bins : !piko.bins<@F>
+    %bins = piko.cpu.open_bins @b : !piko.bins<@F>
+    piko.cpu.close_bins %bins : !piko.bins<@F>
   }
 }

@@ -1,4 +1,4 @@
-// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-form-kernels,piko-resolve-kernels),piko-to-cpu)' %s | FileCheck %s
+// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-form-kernels,piko-form-work,piko-form-units),piko-to-cpu)' %s | FileCheck %s
 // What emissions nearly always do needs no call: members of pikoir_writer and
 // pikoir_port are read and written in place (pikort/abi.h).
 

@@ -1,19 +1,19 @@
-// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-form-kernels,piko-resolve-kernels,convert-piko-to-openmp))' %s | FileCheck %s
+// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-form-kernels,piko-form-work,piko-form-units,convert-piko-to-openmp))' %s | FileCheck %s
 
 piko.record @F {"x" : i32 at 0} size 4 align 4
 
 // A dynamic schedule balances load; private arrays take stack space once a
 // thread.
 // CHECK-LABEL: piko.kernel @kernel_balanced
-// CHECK:         %[[THREADS:.*]] = piko.threads
+// CHECK:         %[[THREADS:.*]] = piko.cpu.threads
 // CHECK:         omp.parallel num_threads(%[[THREADS]] : i32) {
 // CHECK-NEXT:      %[[ARRAY:.*]] = memref.alloca() : memref<4xi32>
 // CHECK-NEXT:      omp.wsloop schedule(dynamic) {
 // CHECK-NEXT:        omp.loop_nest (%[[UNIT:.*]]) : index =
-// CHECK:               piko.open_writer %{{.*}}[%[[UNIT]]]
+// CHECK:               piko.cpu.open_writer %{{.*}}[%[[UNIT]]]
 // CHECK:               memref.store %{{.*}}, %[[ARRAY]]
 // CHECK:               omp.yield
-// CHECK:         piko.close_bins
+// CHECK:         piko.cpu.close_bins
 
 // CHECK-LABEL: piko.kernel @kernel_mapped
 // CHECK:         omp.wsloop schedule(static)

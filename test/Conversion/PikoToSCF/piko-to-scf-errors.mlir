@@ -8,7 +8,7 @@ piko.pipeline @P rank 1 {
     piko.process {
     ^bb0(%f: !piko.prim<@F>):
       %x = piko.get %f "x" : !piko.prim<@F> -> i32
-      // expected-error @below {{expected to be at the resolved level}}
+      // expected-error @below {{expected loops over units, as piko-form-units makes them}}
       piko.update @image[%x : i32] {
       ^bb0(%old: i32):
         piko.yield [%x : i32]
@@ -26,14 +26,14 @@ piko.pipeline @P rank 1 {
   piko.source @a
   piko.stage @a bins [0] threads 1 : list @F -> [] {}
   piko.kernel @k {
-    %bins = piko.open_bins @a : !piko.bins<@F>
+    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
     %zero = arith.constant 0 : index
-    %n = piko.unit_count %bins : !piko.bins<@F>
+    %n = piko.cpu.unit_count %bins : !piko.bins<@F>
     %some = arith.cmpi sgt, %n, %zero : index
-    %all = piko.list %bins[%zero to %n] : !piko.bins<@F> -> !piko.list<@F>
-    %none = piko.list %bins[%zero to %zero] : !piko.bins<@F> -> !piko.list<@F>
+    %all = piko.cpu.list %bins[%zero to %n] : !piko.bins<@F> -> !piko.list<@F>
+    %none = piko.cpu.list %bins[%zero to %zero] : !piko.bins<@F> -> !piko.list<@F>
     %one = arith.select %some, %all, %none : !piko.list<@F>
-    // expected-error @below {{expected to be at the resolved level}}
+    // expected-error @below {{expected loops over units, as piko-form-units makes them}}
     %size = piko.list_size %one : !piko.list<@F>
     piko.fail_list @a at %size of %size
   }

@@ -42,53 +42,53 @@ piko.pipeline @Resolved rank 2 {
   piko.stage @b bins [8, 8] threads 64 tile 4 : @F -> [] {}
   // CHECK: piko.kernel @place_source {
   piko.kernel @place_source {
-    // CHECK-NEXT: %[[SOURCE:.*]] = piko.open_bins @a source 0 : !piko.bins<@F>
-    // CHECK-NEXT: %[[UNITS:.*]] = piko.unit_count %[[SOURCE]] : !piko.bins<@F>
-    // CHECK-NEXT: %[[W:.*]] = piko.open_writer %[[SOURCE]][%[[UNITS]]] : !piko.bins<@F>
-    // CHECK-NEXT: piko.place %[[W]] of @a in %[[UNITS]]
-    // CHECK-NEXT: piko.next %[[W]]
-    // CHECK-NEXT: piko.close_writer %[[W]]
-    // CHECK-NEXT: piko.close_bins %[[SOURCE]] : !piko.bins<@F>
-    %bins = piko.open_bins @a source 0 : !piko.bins<@F>
-    %n = piko.unit_count %bins : !piko.bins<@F>
-    %w = piko.open_writer %bins[%n] : !piko.bins<@F>
-    piko.place %w of @a in %n
-    piko.next %w
-    piko.close_writer %w
-    piko.close_bins %bins : !piko.bins<@F>
+    // CHECK-NEXT: %[[SOURCE:.*]] = piko.cpu.open_bins @a source 0 : !piko.bins<@F>
+    // CHECK-NEXT: %[[UNITS:.*]] = piko.cpu.unit_count %[[SOURCE]] : !piko.bins<@F>
+    // CHECK-NEXT: %[[W:.*]] = piko.cpu.open_writer %[[SOURCE]][%[[UNITS]]] : !piko.bins<@F>
+    // CHECK-NEXT: piko.cpu.append_bin %[[W]] of @a in %[[UNITS]]
+    // CHECK-NEXT: piko.cpu.next %[[W]]
+    // CHECK-NEXT: piko.cpu.close_writer %[[W]]
+    // CHECK-NEXT: piko.cpu.close_bins %[[SOURCE]] : !piko.bins<@F>
+    %bins = piko.cpu.open_bins @a source 0 : !piko.bins<@F>
+    %n = piko.cpu.unit_count %bins : !piko.bins<@F>
+    %w = piko.cpu.open_writer %bins[%n] : !piko.bins<@F>
+    piko.cpu.append_bin %w of @a in %n
+    piko.cpu.next %w
+    piko.cpu.close_writer %w
+    piko.cpu.close_bins %bins : !piko.bins<@F>
   }
   // CHECK: piko.kernel @kernel_a {
   piko.kernel @kernel_a {
-    // CHECK-NEXT: %[[BINS:.*]] = piko.open_bins @a : !piko.bins<@F>
-    // CHECK-NEXT: %[[UNIT:.*]] = piko.unit_count
-    // CHECK-NEXT: %[[FIRST:.*]], %{{.*}} = piko.unit_cells %[[BINS]][%[[UNIT]]] : !piko.bins<@F>
-    // CHECK-NEXT: %[[AT:.*]], %{{.*}} = piko.cell_range %[[BINS]][%[[UNIT]], %[[FIRST]]] : !piko.bins<@F>
-    // CHECK-NEXT: %[[BIN:.*]] = piko.cell_bin %[[BINS]][%[[FIRST]]] : !piko.bins<@F>
-    // CHECK-NEXT: %[[PRIM:.*]] = piko.item %[[BINS]][%[[AT]]] : !piko.bins<@F> -> !piko.prim<@F>
-    // CHECK-NEXT: piko.prefetch_item %[[BINS]][%[[AT]]] : !piko.bins<@F>
+    // CHECK-NEXT: %[[BINS:.*]] = piko.cpu.open_bins @a : !piko.bins<@F>
+    // CHECK-NEXT: %[[UNIT:.*]] = piko.cpu.unit_count
+    // CHECK-NEXT: %[[FIRST:.*]], %{{.*}} = piko.cpu.unit_cells %[[BINS]][%[[UNIT]]] : !piko.bins<@F>
+    // CHECK-NEXT: %[[AT:.*]], %{{.*}} = piko.cpu.cell_range %[[BINS]][%[[UNIT]], %[[FIRST]]] : !piko.bins<@F>
+    // CHECK-NEXT: %[[BIN:.*]] = piko.cpu.cell_bin %[[BINS]][%[[FIRST]]] : !piko.bins<@F>
+    // CHECK-NEXT: %[[PRIM:.*]] = piko.cpu.item %[[BINS]][%[[AT]]] : !piko.bins<@F> -> !piko.prim<@F>
+    // CHECK-NEXT: piko.cpu.prefetch_item %[[BINS]][%[[AT]]] : !piko.bins<@F>
     // CHECK-NEXT: %[[X:.*]] = piko.get %[[PRIM]] "x"
-    // CHECK-NEXT: %[[W:.*]] = piko.open_writer
-    // CHECK-NEXT: %{{.*}} = piko.append %[[W]][0] (%[[X]]) : i32 -> !piko.prim<@F>
-    // CHECK-NEXT: %{{.*}} = piko.threads
+    // CHECK-NEXT: %[[W:.*]] = piko.cpu.open_writer
+    // CHECK-NEXT: %{{.*}} = piko.cpu.append %[[W]][0] (%[[X]]) : i32 -> !piko.prim<@F>
+    // CHECK-NEXT: %{{.*}} = piko.cpu.threads
     // CHECK-NEXT: %{{.*}} = piko.grid @b[1]
     // CHECK-NEXT: %[[TILES:.*]] = piko.grid @b[0] tiles
-    // CHECK-NEXT: piko.place %[[W]][0] of @b in %[[BIN]]{{$}}
-    // CHECK-NEXT: piko.place %[[W]][0] of @b in %[[BIN]] tile %[[TILES]]
-    %bins = piko.open_bins @a : !piko.bins<@F>
-    %u = piko.unit_count %bins : !piko.bins<@F>
-    %c0, %c1 = piko.unit_cells %bins[%u] : !piko.bins<@F>
-    %i0, %i1 = piko.cell_range %bins[%u, %c0] : !piko.bins<@F>
-    %b = piko.cell_bin %bins[%c0] : !piko.bins<@F>
-    %p = piko.item %bins[%i0] : !piko.bins<@F> -> !piko.prim<@F>
-    piko.prefetch_item %bins[%i0] : !piko.bins<@F>
+    // CHECK-NEXT: piko.cpu.append_bin %[[W]][0] of @b in %[[BIN]]{{$}}
+    // CHECK-NEXT: piko.cpu.append_bin %[[W]][0] of @b in %[[BIN]] tile %[[TILES]]
+    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
+    %u = piko.cpu.unit_count %bins : !piko.bins<@F>
+    %c0, %c1 = piko.cpu.unit_cells %bins[%u] : !piko.bins<@F>
+    %i0, %i1 = piko.cpu.cell_range %bins[%u, %c0] : !piko.bins<@F>
+    %b = piko.cpu.cell_bin %bins[%c0] : !piko.bins<@F>
+    %p = piko.cpu.item %bins[%i0] : !piko.bins<@F> -> !piko.prim<@F>
+    piko.cpu.prefetch_item %bins[%i0] : !piko.bins<@F>
     %x = piko.get %p "x" : !piko.prim<@F> -> i32
-    %w = piko.open_writer %bins[%u] : !piko.bins<@F>
-    %q = piko.append %w[0] (%x) : i32 -> !piko.prim<@F>
-    %threads = piko.threads
+    %w = piko.cpu.open_writer %bins[%u] : !piko.bins<@F>
+    %q = piko.cpu.append %w[0] (%x) : i32 -> !piko.prim<@F>
+    %threads = piko.cpu.threads
     %rows = piko.grid @b[1]
     %t = piko.grid @b[0] tiles
-    piko.place %w[0] of @b in %b
-    piko.place %w[0] of @b in %b tile %t
+    piko.cpu.append_bin %w[0] of @b in %b
+    piko.cpu.append_bin %w[0] of @b in %b tile %t
   }
 }
 
@@ -115,19 +115,19 @@ piko.pipeline @Local rank 1 {
   }
   // CHECK: piko.kernel @loops {
   piko.kernel @loops {
-    %bins = piko.open_bins @a : !piko.bins<@F>
-    %u = piko.unit_count %bins : !piko.bins<@F>
-    %w = piko.open_writer %bins[%u] : !piko.bins<@F>
-    // CHECK: %[[V:.*]] = piko.open_writer %{{.*}}[%{{.*}}] of @b : !piko.bins<@F>
-    %v = piko.open_writer %bins[%u] of @b : !piko.bins<@F>
-    // CHECK-NEXT: piko.local_bin @b from %{{.*}}[0] writer %[[V]] {
+    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
+    %u = piko.cpu.unit_count %bins : !piko.bins<@F>
+    %w = piko.cpu.open_writer %bins[%u] : !piko.bins<@F>
+    // CHECK: %[[V:.*]] = piko.cpu.open_writer %{{.*}}[%{{.*}}] of @b : !piko.bins<@F>
+    %v = piko.cpu.open_writer %bins[%u] of @b : !piko.bins<@F>
+    // CHECK-NEXT: piko.cpu.local_bin @b from %{{.*}}[0] writer %[[V]] {
     // CHECK-NEXT: ^bb0(%[[LOCAL:.*]]: !piko.bins<@F>):
-    // CHECK-NEXT: piko.unit_cells %[[LOCAL]]
-    // CHECK-NEXT: piko.next %[[V]]
-    piko.local_bin @b from %w[0] writer %v {
+    // CHECK-NEXT: piko.cpu.unit_cells %[[LOCAL]]
+    // CHECK-NEXT: piko.cpu.next %[[V]]
+    piko.cpu.local_bin @b from %w[0] writer %v {
     ^bb0(%local: !piko.bins<@F>):
-      %c0, %c1 = piko.unit_cells %local[%u] : !piko.bins<@F>
-      piko.next %v
+      %c0, %c1 = piko.cpu.unit_cells %local[%u] : !piko.bins<@F>
+      piko.cpu.next %v
     }
   }
 }
@@ -150,33 +150,33 @@ piko.pipeline @Lists rank 1 {
   }
   // CHECK: piko.kernel @kernel_a
   piko.kernel @kernel_a {
-    %bins = piko.open_bins @a : !piko.bins<@F>
-    %u = piko.unit_count %bins : !piko.bins<@F>
-    // CHECK: %[[LO:.*]], %[[HI:.*]] = piko.call_range %[[BINS:.*]][%[[U:.*]]] : !piko.bins<@F>
-    // CHECK-NEXT: %{{.*}} = piko.call_bin %[[BINS]][%[[U]]] : !piko.bins<@F>
-    // CHECK-NEXT: %{{.*}} = piko.list %[[BINS]][%[[LO]] to %[[HI]]] : !piko.bins<@F> -> !piko.list<@F>
-    %lo, %hi = piko.call_range %bins[%u] : !piko.bins<@F>
-    %b = piko.call_bin %bins[%u] : !piko.bins<@F>
-    %l = piko.list %bins[%lo to %hi] : !piko.bins<@F> -> !piko.list<@F>
-    // CHECK-NEXT: %[[P:.*]] = piko.no_item : !piko.prim<@F>
-    // CHECK-NEXT: %[[A:.*]] = piko.to_address %[[P]] : !piko.prim<@F>
-    // CHECK-NEXT: %{{.*}} = piko.from_address %[[A]] : !piko.prim<@F>
-    %p = piko.no_item : !piko.prim<@F>
-    %address = piko.to_address %p : !piko.prim<@F>
-    %q = piko.from_address %address : !piko.prim<@F>
-    %w = piko.open_writer %bins[%u] : !piko.bins<@F>
-    // CHECK: %[[MARK:.*]] = piko.scratch_mark %[[W:.*]]
-    // CHECK-NEXT: %{{.*}}, %{{.*}} = piko.scratch %[[W]][%[[U]]]
-    // CHECK-NEXT: piko.defer_begin %[[W]][%[[U]]]
-    // CHECK-NEXT: piko.defer_iteration %[[W]][%[[U]]]
-    // CHECK-NEXT: piko.defer_end %[[W]]
-    // CHECK-NEXT: piko.scratch_release %[[W]][%[[MARK]]]
-    %mark = piko.scratch_mark %w
-    %bytes, %granted = piko.scratch %w[%u]
-    piko.defer_begin %w[%u]
-    piko.defer_iteration %w[%u]
-    piko.defer_end %w
-    piko.scratch_release %w[%mark]
+    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
+    %u = piko.cpu.unit_count %bins : !piko.bins<@F>
+    // CHECK: %[[LO:.*]], %[[HI:.*]] = piko.cpu.call_range %[[BINS:.*]][%[[U:.*]]] : !piko.bins<@F>
+    // CHECK-NEXT: %{{.*}} = piko.cpu.call_bin %[[BINS]][%[[U]]] : !piko.bins<@F>
+    // CHECK-NEXT: %{{.*}} = piko.cpu.list %[[BINS]][%[[LO]] to %[[HI]]] : !piko.bins<@F> -> !piko.list<@F>
+    %lo, %hi = piko.cpu.call_range %bins[%u] : !piko.bins<@F>
+    %b = piko.cpu.call_bin %bins[%u] : !piko.bins<@F>
+    %l = piko.cpu.list %bins[%lo to %hi] : !piko.bins<@F> -> !piko.list<@F>
+    // CHECK-NEXT: %[[P:.*]] = piko.cpu.no_item : !piko.prim<@F>
+    // CHECK-NEXT: %[[A:.*]] = piko.cpu.to_address %[[P]] : !piko.prim<@F>
+    // CHECK-NEXT: %{{.*}} = piko.cpu.from_address %[[A]] : !piko.prim<@F>
+    %p = piko.cpu.no_item : !piko.prim<@F>
+    %address = piko.cpu.to_address %p : !piko.prim<@F>
+    %q = piko.cpu.from_address %address : !piko.prim<@F>
+    %w = piko.cpu.open_writer %bins[%u] : !piko.bins<@F>
+    // CHECK: %[[MARK:.*]] = piko.cpu.scratch_mark %[[W:.*]]
+    // CHECK-NEXT: %{{.*}}, %{{.*}} = piko.cpu.scratch %[[W]][%[[U]]]
+    // CHECK-NEXT: piko.cpu.defer_begin %[[W]][%[[U]]]
+    // CHECK-NEXT: piko.cpu.defer_iteration %[[W]][%[[U]]]
+    // CHECK-NEXT: piko.cpu.defer_end %[[W]]
+    // CHECK-NEXT: piko.cpu.scratch_release %[[W]][%[[MARK]]]
+    %mark = piko.cpu.scratch_mark %w
+    %bytes, %granted = piko.cpu.scratch %w[%u]
+    piko.cpu.defer_begin %w[%u]
+    piko.cpu.defer_iteration %w[%u]
+    piko.cpu.defer_end %w
+    piko.cpu.scratch_release %w[%mark]
     // CHECK-NEXT: piko.fail_list @a at %[[LO]] of %[[HI]]
     // CHECK-NEXT: piko.fail_barrier @a iteration %[[U]]
     // CHECK-NEXT: piko.fail_list @a in %[[U]] at %[[LO]] of %[[HI]]

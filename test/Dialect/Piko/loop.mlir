@@ -62,9 +62,9 @@ piko.pipeline @Loops rank 1 {
   }
 }
 
-// Loops stay as they are in resolved kernels, until they are split.
-// CHECK-LABEL: piko.pipeline @Resolved
-piko.pipeline @Resolved rank 1 {
+// Loops stay as they are in kernels, until the CPU's passes split them.
+// CHECK-LABEL: piko.pipeline @Kernels
+piko.pipeline @Kernels rank 1 {
   // CHECK: piko.parallel_for
   // CHECK: piko.sync
   piko.kernel @k {

@@ -1,7 +1,7 @@
 // RUN: piko-translate --piko-to-dot %s | FileCheck %s
 // RUN: piko-opt --piko-synthesize %s | piko-translate --piko-to-dot | FileCheck %s --check-prefix=KERNELS
-// RUN: piko-opt --piko-synthesize --piko-resolve %s -o %t
-// RUN: not piko-translate --piko-to-dot %t 2>&1 | FileCheck %s --check-prefix=RESOLVED
+// RUN: piko-opt --piko-synthesize --piko-to-machine %s -o %t
+// RUN: not piko-translate --piko-to-dot %t 2>&1 | FileCheck %s --check-prefix=MACHINE
 
 piko.record @Point {"x" : i32 at 0, "y" : i32 at 4} size 8 align 4
 
@@ -23,7 +23,7 @@ piko.record @Point {"x" : i32 at 0, "y" : i32 at 4} size 8 align 4
 // KERNELS: "process rast" -> "assign plot rast.0" [label="port 0: Point"];
 // KERNELS-NEXT: "assign plot rast.0" -> "process plot";
 
-// RESOLVED: error: expected a kernel that holds phases, but got one of the resolved level
+// MACHINE: error: expected a kernel that holds phases, but got none
 piko.pipeline @Draw rank 2 {
   piko.source @rast
   piko.edge @rast[0] -> @plot

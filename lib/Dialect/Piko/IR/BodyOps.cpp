@@ -4,7 +4,7 @@
 
 #include "FieldAccess.h"
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
-#include "Piko/Dialect/Piko/IR/Piko.h"
+#include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
 #include "mlir/Dialect/Arith/IR/Arith.h"
 #include "mlir/IR/Matchers.h"
@@ -22,14 +22,18 @@ LogicalResult GetOp::verifySymbolUses(SymbolTableCollection &) {
 }
 
 namespace {
-/// A field of what was just stored is the value that was stored.
-struct ForwardAppended : OpRewritePattern<GetOp> {
+/// A field of what was just emitted is the value that was emitted.
+struct ForwardEmitted : OpRewritePattern<GetOp> {
   using OpRewritePattern::OpRewritePattern;
   LogicalResult matchAndRewrite(GetOp get,
                                 PatternRewriter &rewriter) const override {
-    auto append = get.getPrim().getDefiningOp<AppendOp>();
-    if (!append)
-      return rewriter.notifyMatchFailure(get, "not of an appended primitive");
+    ValueRange values;
+    if (auto emit = get.getPrim().getDefiningOp<EmitOp>())
+      values = emit.getValues();
+    else if (auto append = get.getPrim().getDefiningOp<AppendOp>())
+      values = append.getValues();
+    else
+      return rewriter.notifyMatchFailure(get, "not of an emitted primitive");
     RecordOp record = lookupRecord(get, get.getPrim().getType().getRecord());
     int64_t at = 0;
     for (auto field : record.getFields().getAsRange<FieldAttr>()) {
@@ -47,7 +51,7 @@ struct ForwardAppended : OpRewritePattern<GetOp> {
           return rewriter.notifyMatchFailure(get, "the index is out of range");
         element = element * count + constant.getSExtValue();
       }
-      rewriter.replaceOp(get, append.getValues()[at + element]);
+      rewriter.replaceOp(get, values[at + element]);
       return success();
     }
     return failure();
@@ -72,7 +76,7 @@ Speculation::Speculatability GetOp::getSpeculatability() {
 
 void GetOp::getCanonicalizationPatterns(RewritePatternSet &patterns,
                                         MLIRContext *context) {
-  patterns.add<ForwardAppended>(context);
+  patterns.add<ForwardEmitted>(context);
 }
 
 Value DivideOp::createUnchecked(OpBuilder &builder) {
@@ -110,12 +114,12 @@ LogicalResult ListAtOp::verify() {
 }
 
 LogicalResult EmitOp::verify() {
-  auto process = (*this)->getParentOfType<ProcessOp>();
-  if (!process)
+  bool isPhase = (*this)->getParentOfType<ProcessOp>();
+  if (!isPhase && !(*this)->getParentOfType<BinsOp>())
     return emitOpError("expected to be inside a process phase");
   if ((*this)->getParentOfType<UpdateOp>())
     return emitOpError("expected to be outside an update");
-  StageOp stage = getPhaseStage(*this);
+  StageOp stage = isPhase ? getPhaseStage(*this) : getKernelStage(*this);
   if (!stage)
     return success(); // the phase reports it
   if (getPort() >= int64_t(stage.getOutputs().size()))
@@ -131,6 +135,9 @@ LogicalResult EmitOp::verify() {
     return emitOpError("expected the numbers of record ")
            << name << ", " << types.size() << " of types (" << types
            << "), but got (" << getValues().getTypes() << ")";
+  if (getPrim() && getPrim().getType().getRecord() != name)
+    return emitOpError("expected a result of record ")
+           << name << ", but got " << getPrim().getType().getRecord();
   return success();
 }
 

@@ -3,6 +3,7 @@
 // The dialect's types and attributes, and look-ups that its operations share.
 
 #include "FieldAccess.h"
+#include "Piko/Dialect/Piko/IR/PikoCPU.h"
 #include "Piko/Dialect/Piko/IR/PikoCheck.h"
 
 #include "mlir/IR/DialectImplementation.h"
@@ -35,6 +36,10 @@ void PikoDialect::initialize() {
   addOperations<
 #define GET_OP_LIST
 #include "Piko/Dialect/Piko/IR/PikoCheckOps.cpp.inc"
+      >();
+  addOperations<
+#define GET_OP_LIST
+#include "Piko/Dialect/Piko/IR/PikoCPUOps.cpp.inc"
       >();
 }
 
@@ -156,6 +161,10 @@ StageOp piko::getPhaseStage(Operation *op) {
 }
 
 StageOp piko::getKernelStage(Operation *op) {
+  for (Operation *at = op; at; at = at->getParentOp())
+    if (isa<ItemsOp, ListsOp>(at))
+      return lookupInPipeline<StageOp>(
+          at, at->getAttrOfType<FlatSymbolRefAttr>("stage"));
   if (auto local = op->getParentOfType<LocalBinOp>())
     return lookupInPipeline<StageOp>(local, local.getStageAttr());
   auto kernel = op->getParentOfType<KernelOp>();

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// Kernels and the storage of bins.
+// Kernels, and the phases in them.
 
-#include "Piko/Dialect/Piko/IR/Piko.h"
+#include "Piko/Dialect/Piko/IR/PikoCPU.h"
+
+#include "StageUses.h"
 
 using namespace mlir;
 using namespace piko;
@@ -41,16 +43,41 @@ static LogicalResult verifyBarriers(KernelOp kernel) {
   return success();
 }
 
+/// Kernels hold phases (the kernels level), work (the machine level), or what a
+/// target has made of it.
+static LogicalResult verifyLevel(KernelOp kernel) {
+  Operation *phase = nullptr, *work = nullptr, *other = nullptr;
+  for (Operation &op : *kernel.getBodyBlock()) {
+    if (isa<AssignOp, ProcessOp, LocalBarrierOp>(op))
+      phase = &op;
+    else if (isa<BinsOp, ItemsOp>(op))
+      work = &op;
+    else
+      other = &op;
+  }
+  if (phase && (work || other))
+    return kernel.emitOpError(
+        "expected phases (the kernels level) or work (the "
+        "machine level), but got both");
+  if (!work)
+    return success();
+  WalkResult result = kernel.walk([](Operation *op) {
+    if (!op->hasTrait<CPUOnly>())
+      return WalkResult::advance();
+    op->emitOpError(
+        "expected no operation of the CPU in a kernel of the machine "
+        "level");
+    return WalkResult::interrupt();
+  });
+  return failure(result.wasInterrupted());
+}
+
 LogicalResult KernelOp::verifyRegions() {
-  bool hasPhase = false, hasOther = false;
-  for (Operation &op : *getBodyBlock())
-    (isa<AssignOp, ProcessOp, LocalBarrierOp>(op) ? hasPhase : hasOther) = true;
-  if (hasPhase && hasOther)
-    return emitOpError("expected phases (the kernels level) or loops (the "
-                       "resolved level), but got both");
+  if (failed(verifyLevel(*this)))
+    return failure();
   if (failed(verifyBarriers(*this)))
     return failure();
-  if (!hasPhase || getProcess())
+  if (getProcess() || getOps<AssignOp>().empty())
     return success();
   // Without a process phase the kernel places the primitives of one source.
   auto assigns = getOps<AssignOp>();
@@ -60,28 +87,39 @@ LogicalResult KernelOp::verifyRegions() {
   return success();
 }
 
-LogicalResult LocalBarrierOp::verifySymbolUses(SymbolTableCollection &) {
-  for (auto edge : getPipeline(*this).getOps<EdgeOp>()) {
-    if (edge.getProducerAttr() != getProducerAttr() ||
-        edge.getPort() != getPort() ||
-        edge.getConsumerAttr() != getConsumerAttr())
+LogicalResult piko::verifyStage(Operation *op, FlatSymbolRefAttr name) {
+  if (lookupInPipeline<StageOp>(op, name))
+    return success();
+  return op->emitOpError("expected a stage, but got ")
+         << name << ", which is none";
+}
+
+LogicalResult piko::verifyLocalEdge(Operation *op, FlatSymbolRefAttr from,
+                                    int64_t port, FlatSymbolRefAttr to) {
+  for (auto edge : getPipeline(op).getOps<EdgeOp>()) {
+    if (edge.getProducerAttr() != from || edge.getPort() != port ||
+        edge.getConsumerAttr() != to)
       continue;
-    auto producer = lookupInPipeline<StageOp>(*this, getProducerAttr());
-    auto consumer = lookupInPipeline<StageOp>(*this, getConsumerAttr());
+    auto producer = lookupInPipeline<StageOp>(op, from);
+    auto consumer = lookupInPipeline<StageOp>(op, to);
     if (!producer || !consumer)
       break; // the edge has an error
     if (producer.getBins() != consumer.getBins())
-      return emitOpError("expected stages with bins of one size, but got ")
+      return op->emitOpError("expected stages with bins of one size, but got ")
              << "[" << producer.getBins() << "] and [" << consumer.getBins()
              << "]";
     if (!consumer.collects())
-      return emitOpError("expected a stage that waits for its bin, but ")
-             << getConsumerAttr() << " does not";
+      return op->emitOpError("expected a stage that waits for its bin, but ")
+             << to << " does not";
     return success();
   }
-  return emitOpError("expected an edge from port ")
-         << getPort() << " of " << getProducerAttr() << " to "
-         << getConsumerAttr() << ", but there is none";
+  return op->emitOpError("expected an edge from port ")
+         << port << " of " << from << " to " << to << ", but there is none";
+}
+
+LogicalResult LocalBarrierOp::verifySymbolUses(SymbolTableCollection &) {
+  return verifyLocalEdge(*this, getProducerAttr(), getPort(),
+                         getConsumerAttr());
 }
 
 LogicalResult StripsOp::verifySymbolUses(SymbolTableCollection &) {
@@ -118,144 +156,6 @@ LogicalResult StripsOp::verifySymbolUses(SymbolTableCollection &) {
           error.attachNote(other.getLoc()) << "it is here, too";
           return error;
         }
-  return success();
-}
-
-LogicalResult OpenBinsOp::verifySymbolUses(SymbolTableCollection &) {
-  auto stage = lookupInPipeline<StageOp>(*this, getStageAttr());
-  if (!stage)
-    return emitOpError("expected a stage, but got ")
-           << getStageAttr() << ", which is none";
-  if (stage.getInputAttr() != getBins().getType().getRecord())
-    return emitOpError("expected bins of record ")
-           << stage.getInputAttr() << ", but got "
-           << getBins().getType().getRecord();
-  return success();
-}
-
-//===----------------------------------------------------------------------===//
-// What kernels read and write
-//===----------------------------------------------------------------------===//
-
-static LogicalResult verifyStage(Operation *op, FlatSymbolRefAttr name) {
-  if (lookupInPipeline<StageOp>(op, name))
-    return success();
-  return op->emitOpError("expected a stage, but got ")
-         << name << ", which is none";
-}
-
-/// A value and the storage that it is in are of one record.
-static LogicalResult verifyStored(Operation *op, BinsType bins,
-                                  FlatSymbolRefAttr record, StringRef what) {
-  if (bins.getRecord() == record)
-    return success();
-  return op->emitOpError("expected a ")
-         << what << " of record " << bins.getRecord()
-         << ", which the bins hold, but got " << record;
-}
-
-LogicalResult ListOp::verify() {
-  return verifyStored(*this, getBins().getType(),
-                      getList().getType().getRecord(), "list");
-}
-
-LogicalResult ItemOp::verify() {
-  return verifyStored(*this, getBins().getType(),
-                      getPrim().getType().getRecord(), "primitive");
-}
-
-LogicalResult OpenWriterOp::verifySymbolUses(SymbolTableCollection &) {
-  return getStageAttr() ? verifyStage(*this, getStageAttr()) : success();
-}
-
-/// The operation that opened the bins that a writer is for, or null.
-static OpenBinsOp getOpenBins(Value writer) {
-  auto open = writer.getDefiningOp<OpenWriterOp>();
-  return open ? open.getBins().getDefiningOp<OpenBinsOp>() : OpenBinsOp();
-}
-
-/// The stage whose emissions a writer is for, or null.
-static StageOp getWriterStage(Value writer) {
-  OpenBinsOp bins = getOpenBins(writer);
-  if (!bins)
-    return {};
-  auto open = writer.getDefiningOp<OpenWriterOp>();
-  return lookupInPipeline<StageOp>(
-      bins, open.getStageAttr() ? open.getStageAttr() : bins.getStageAttr());
-}
-
-/// The record that a port of the stage that `writer` is for emits; null where
-/// that is not known, a failure where there is no such port.
-static FailureOr<FlatSymbolRefAttr> verifyPort(Operation *op, Value writer,
-                                               int64_t port) {
-  OpenBinsOp bins = getOpenBins(writer);
-  StageOp stage = getWriterStage(writer);
-  if (!stage)
-    return FlatSymbolRefAttr();
-  int64_t ports = bins.getSource() ? 0 : stage.getOutputs().size();
-  if (port < 0 || port >= ports)
-    return op->emitOpError("expected a port below ")
-           << ports << ", which is how many the kernel of stage '"
-           << stage.getSymName() << "' has, but got " << port;
-  return cast<FlatSymbolRefAttr>(stage.getOutputs()[port]);
-}
-
-LogicalResult LocalBinOp::verifySymbolUses(SymbolTableCollection &) {
-  if (failed(verifyStage(*this, getStageAttr())))
-    return failure();
-  auto stage = lookupInPipeline<StageOp>(*this, getStageAttr());
-  auto expected = BinsType::get(getContext(), stage.getInputAttr());
-  if (getBodyBlock()->getNumArguments() != 1 || getBins().getType() != expected)
-    return emitOpError("expected one block argument of type ") << expected;
-  FailureOr<FlatSymbolRefAttr> emitted =
-      verifyPort(*this, getSource(), getPort());
-  if (failed(emitted))
-    return failure();
-  if (*emitted && *emitted != stage.getInputAttr())
-    return emitOpError("expected a port of record ")
-           << stage.getInputAttr() << ", which " << getStageAttr()
-           << " takes, but got " << *emitted;
-  if (StageOp other = getWriterStage(getWriter()); other && other != stage)
-    return emitOpError("expected a writer of ")
-           << getStageAttr() << ", but got one of '" << other.getSymName()
-           << "'";
-  return success();
-}
-
-LogicalResult AppendOp::verifySymbolUses(SymbolTableCollection &) {
-  FlatSymbolRefAttr name = getPrim().getType().getRecord();
-  RecordOp record = lookupRecord(*this, name);
-  if (!record)
-    return emitOpError("expected a record, but got ")
-           << name << ", which is none";
-  SmallVector<Type> types = record.getElementTypes();
-  if (types != getValues().getTypes())
-    return emitOpError("expected the numbers of record ")
-           << name << ", (" << types << "), but got (" << getValues().getTypes()
-           << ")";
-  FailureOr<FlatSymbolRefAttr> emitted =
-      verifyPort(*this, getWriter(), getPort());
-  if (failed(emitted))
-    return failure();
-  if (*emitted && *emitted != name)
-    return emitOpError("expected a primitive of record ")
-           << *emitted << ", which port " << getPort() << " emits, but got "
-           << name;
-  return success();
-}
-
-LogicalResult PlaceOp::verifySymbolUses(SymbolTableCollection &) {
-  if (failed(verifyStage(*this, getStageAttr())))
-    return failure();
-  if (getTile() && !lookupInPipeline<StageOp>(*this, getStageAttr()).getTile())
-    return emitOpError("expected a tile only in a stage that is divided into "
-                       "tiles, but ")
-           << getStageAttr() << " is not";
-  if (getPort())
-    return failure(failed(verifyPort(*this, getWriter(), *getPort())));
-  if (OpenBinsOp bins = getOpenBins(getWriter()); bins && !bins.getSource())
-    return emitOpError("expected a port, because the kernel is not that of a "
-                       "source");
   return success();
 }
 

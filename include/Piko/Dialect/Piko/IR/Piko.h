@@ -29,6 +29,10 @@ namespace piko {
 class AssignOp;
 class ProcessOp;
 class ScheduleOp;
+
+/// Of operations that only the CPU's lowering makes.
+template <typename OpT>
+class CPUOnly : public mlir::OpTrait::TraitBase<OpT, CPUOnly> {};
 } // namespace piko
 
 #define GET_OP_CLASSES
@@ -43,8 +47,8 @@ PipelineOp getPipeline(mlir::Operation *op);
 /// or null.
 StageOp getPhaseStage(mlir::Operation *op);
 
-/// The stage that an operation of the resolved level is of: that of the
-/// `piko.local_bin` around it, or whose bins the kernel opens; or null.
+/// The stage that an operation of the machine level, or below, is of: that of
+/// the work around it, or whose bins the kernel opens; or null.
 StageOp getKernelStage(mlir::Operation *op);
 
 /// The record of that name, seen from `from`, or null.

@@ -28,7 +28,7 @@ def Piko_Dialect : Dialect {
     |----------|-------|
     | authored | `piko.pipeline` with `piko.stage`s, edges and state |
     | kernels  | `piko.kernel`s that hold the phases that run together |
-    | resolved | `piko.kernel`s that hold loops over bins and their storage |
+    | machine  | `piko.kernel`s that hold structured work: bins, items, lists |
     | target   | upstream dialects only |
   }];
   let useDefaultTypePrinterParser = 1;

@@ -104,7 +104,8 @@ def Piko_EmitOp : Piko_Op<"emit"> {
   let summary = "sends a primitive out of a port";
   let description = [{
     Takes the numbers of the port's record: its fields in order, arrays
-    row-major.
+    row-major. At the machine level the result is the primitive, for
+    `piko.cpu.append_bin`.
 
     ```mlir
     piko.emit 0 (%u, %v) : f32, f32
@@ -112,8 +113,10 @@ def Piko_EmitOp : Piko_Op<"emit"> {
   }];
   let arguments = (ins ConfinedAttr<Piko_I64Attr, [IntNonNegative]>:$port,
                        Variadic<Piko_Scalar>:$values);
+  let results = (outs Optional<Piko_PrimType>:$prim);
   let assemblyFormat = [{
-    $port (`(` $values^ `)` `:` type($values))? attr-dict
+    $port (`(` $values^ `)` `:` type($values))?
+    (`->` qualified(type($prim))^)? attr-dict
   }];
   let hasVerifier = 1;
 }

@@ -11,5 +11,6 @@ include "Piko/Dialect/Piko/IR/PikoBodyOps.td"
 include "Piko/Dialect/Piko/IR/PikoStateOps.td"
 include "Piko/Dialect/Piko/IR/PikoLoopOps.td"
 include "Piko/Dialect/Piko/IR/PikoKernelOps.td"
+include "Piko/Dialect/Piko/IR/PikoMachineOps.td"
 
 #endif // PIKO_DIALECT_PIKO_IR_PIKOOPS_TD

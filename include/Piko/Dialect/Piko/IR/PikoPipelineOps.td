@@ -181,8 +181,8 @@ def Piko_EdgeOp : Piko_Op<"edge", [
     record that the consumer takes. Here what `@half` emits to port 0 is what
     `@drop` processes. `carried` is set by `piko-prune`, which may give the
     consumer a smaller record: how many bytes a primitive had before. At the
-    resolved level, `local` says that the consumer runs in the producer's kernel
-    (`piko.local_bin`).
+    machine level, `local` says that the consumer runs in the producer's
+    kernel.
 
     ```mlir
     piko.record @F {"z" : f32 at 0} size 4 align 4

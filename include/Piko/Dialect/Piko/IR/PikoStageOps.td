@@ -25,7 +25,7 @@ def Piko_StageOp : Piko_Op<"stage", [
     are. `list` says that the process phase takes the list of a bin. Stages with
     the same `cycle` are on a common cycle of edges; `piko-order-stages` sets
     it. `fused` names the stages whose phases `piko-fuse-stages` has made part
-    of this one. At the resolved level, `split` says that a bin's primitives (its
+    of this one. At the machine level, `split` says that a bin's primitives (its
     batches, where the phase takes a list) may be divided over threads in any
     way, `ordered` that the order in which they are processed shows in the
     state, `placed` that kernels place them, and `writes` that the process phase

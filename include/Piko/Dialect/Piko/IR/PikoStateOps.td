@@ -131,7 +131,7 @@ def Piko_UpdateOp : Piko_Op<"update", [
   let description = [{
     The body takes the numbers of the pixel, fields in order, and yields the new
     ones; `results` leave it. The calls for one pixel run in lineage order. A
-    pixel outside the bin is an error when the pipeline runs. At the resolved
+    pixel outside the bin is an error when the pipeline runs. At the machine
     level the operation names the bin that the pixel must be in. `of` is as in
     `piko.load`.
 

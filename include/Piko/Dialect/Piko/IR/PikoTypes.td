@@ -36,7 +36,7 @@ def Piko_ListType : Piko_Type<"List", "list"> {
 def Piko_BinsType : Piko_Type<"Bins", "bins"> {
   let summary = "the primitives of a stage, grouped by bin";
   let description = [{
-    Resolved level: the storage of a stage's input. It holds the primitives in
+    On the CPU, the storage of a stage's input. It holds the primitives in
     lineage order, a compressed table of the cells they are in, and the units
     of work that the machine's threads take. A *cell* is a bin, or a tile of a
     bin that `piko.owner` divides.
@@ -48,7 +48,7 @@ def Piko_BinsType : Piko_Type<"Bins", "bins"> {
 def Piko_WriterType : Piko_Type<"Writer", "writer"> {
   let summary = "where a unit of work leaves what it emits";
   let description = [{
-    Resolved level: one for each unit of work, so that threads never share one;
+    On the CPU, one for each unit of work, so that threads never share one;
     the units are joined in order when the kernel ends.
   }];
 }

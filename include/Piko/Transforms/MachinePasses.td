@@ -1,30 +1,28 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// Passes that turn kernels into loops over storage, and those on loops.
+// Passes that turn kernels into structured work, and that into loops over units
+// of work on the CPU; and those on these loops.
 
-#ifndef PIKO_TRANSFORMS_RESOLVEDPASSES_TD
-#define PIKO_TRANSFORMS_RESOLVEDPASSES_TD
+#ifndef PIKO_TRANSFORMS_MACHINEPASSES_TD
+#define PIKO_TRANSFORMS_MACHINEPASSES_TD
 
 include "mlir/Pass/PassBase.td"
 
-def ResolveKernels : Pass<"piko-resolve-kernels", "::piko::PipelineOp"> {
-  let summary = "Turn phases into loops over bins and their storage";
+def FormWork : Pass<"piko-form-work", "::piko::PipelineOp"> {
+  let summary = "Turn phases into structured work on bins";
   let description = [{
     **Requires** the kernels level.
 
-    **Does**: turns the phases of each kernel into an `scf.forall` over the
-    units of work of the stage's bins, in it a loop over the unit's cells and in
-    that one over the primitives of a cell, marked `piko.lanes`. Where the
-    process phase takes a list, the inner loop is over the calls of the phase.
-    What stands behind a `piko.local_barrier` follows when a bin is done, as a
-    `piko.local_bin`.
-    Emissions become stores into the unit's own writer, followed by the
-    consumer's assign phase, whose assignments become `piko.place`; queries of
-    bins and of the grid become arithmetic. The body of a dynamic schedule
+    **Does**: turns the process phase of each kernel into work on what a bin
+    holds: a `piko.bins` with a `piko.items` in it, or, where the phase takes a
+    list, a `piko.lists`. What stands behind a `piko.local_barrier` follows as
+    work on what the first has emitted in the bin. The consumer's assign phase
+    stands behind each emission, and its assignments become `piko.cpu.append_bin`; queries
+    of bins and of the grid become arithmetic. The body of a dynamic schedule
     becomes a kernel that stands before all others, a loop over bins.
 
-    **Guarantees** the resolved level: kernels hold no phase, and all storage
-    and synchronisation is explicit.
+    **Guarantees** the machine level: kernels hold no phase, and nothing in them
+    says how many threads or lanes there are.
 
     Before:
     ```
@@ -33,25 +31,64 @@ def ResolveKernels : Pass<"piko-resolve-kernels", "::piko::PipelineOp"> {
     After:
     ```
     piko.kernel @kernel_a {
-      %bins = piko.open_bins @a : !piko.bins<@F>
-      %units = piko.unit_count %bins : !piko.bins<@F>
-      scf.forall (%u) in (%units) { ... }
-      piko.close_bins %bins : !piko.bins<@F>
+      piko.bins of @a {
+      ^bb0(%bin: index):
+        piko.items of @a {
+        ^bb0(%f: !piko.prim<@F>):
+          ...
+        }
+      }
     }
     ```
 
-    **Limits**: the iterations of a `piko.parallel_for` are left to
-    `piko-split-loops`.
+    **Limits**: none; what a target cannot do, its own passes refuse.
   }];
   let dependentDialects = ["::mlir::arith::ArithDialect",
                            "::mlir::memref::MemRefDialect",
                            "::mlir::scf::SCFDialect"];
 }
 
+def FormUnits : Pass<"piko-form-units", "::piko::PipelineOp"> {
+  let summary = "Turn structured work into loops over units, for the CPU";
+  let description = [{
+    **Requires** the machine level.
+
+    **Does**: turns the bins of each kernel into an `scf.forall` over the units of
+    work that the runtime cuts them into, in it a loop over the unit's cells and
+    in that one over the primitives of a cell, marked `piko.lanes`. Where work
+    takes lists, the inner loop is over its calls. Work on what was emitted in the
+    bin follows when the bin is done, as a `piko.cpu.local_bin`. Emissions become
+    stores into the unit's own writer.
+
+    **Guarantees** that all storage and synchronisation is explicit, and that no
+    work is left.
+
+    Before:
+    ```
+    piko.bins of @a {
+    ^bb0(%bin: index):
+      piko.items of @a { ... }
+    }
+    ```
+    After:
+    ```
+    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
+    %units = piko.cpu.unit_count %bins : !piko.bins<@F>
+    scf.forall (%u) in (%units) { ... }
+    piko.cpu.close_bins %bins : !piko.bins<@F>
+    ```
+
+    **Limits**: the iterations of a `piko.parallel_for` are left to
+    `piko-split-loops`.
+  }];
+  let dependentDialects = ["::mlir::arith::ArithDialect",
+                           "::mlir::scf::SCFDialect"];
+}
+
 def SplitLoops : Pass<"piko-split-loops", "::piko::PipelineOp"> {
   let summary = "Turn parallel loops into loops, cut where iterations meet";
   let description = [{
-    **Requires** the resolved level.
+    **Requires** loops over units (`piko-form-units`).
 
     **Does**: turns a `piko.parallel_for` without barriers into an `scf.for`
     that is marked `piko.lanes`. One with barriers is cut at them: each piece
@@ -63,7 +100,7 @@ def SplitLoops : Pass<"piko-split-loops", "::piko::PipelineOp"> {
     `piko.fail_barrier` reports the first that does not, and then none goes on.
     Reductions, scans and sorts become loops over slots. Where several pieces
     emit, primitives are put
-    in the order of iterations when the loop ends (`piko.defer_begin`).
+    in the order of iterations when the loop ends (`piko.cpu.defer_begin`).
 
     **Guarantees** that nothing is left of parallel loops and barriers, and that
     each barrier sees all that iterations did before it, in order of iteration.
@@ -80,7 +117,7 @@ def SplitLoops : Pass<"piko-split-loops", "::piko::PipelineOp"> {
     ```
     After:
     ```
-    %bytes, %granted = piko.scratch %writer[%size]
+    %bytes, %granted = piko.cpu.scratch %writer[%size]
     scf.if %granted {
       %slots = memref.view %bytes[%zero][%n] : memref<?xi8> to memref<?xf32>
       scf.for %i = %zero to %n step %one {
@@ -110,12 +147,12 @@ def SplitLoops : Pass<"piko-split-loops", "::piko::PipelineOp"> {
 def Prefetch : Pass<"piko-prefetch", "::piko::PipelineOp"> {
   let summary = "Ask for what later primitives refer to";
   let description = [{
-    **Requires** the resolved level.
+    **Requires** loops over units (`piko-form-units`).
 
     **Does**: a loop over the primitives of a bin that reads state at indices
     which are fields of the primitive asks for the elements of a primitive
     further on (`piko.prefetch`), and for a primitive still further on
-    (`piko.prefetch_item`): neither lies in memory in the order of the bin
+    (`piko.cpu.prefetch_item`): neither lies in memory in the order of the bin
     (S. Ainsworth and T. M. Jones, "Software Prefetching for Indirect Memory
     Accesses", 2017). A stage with one bin for all takes its primitives as they
     were made, whose neighbours mostly refer to the same; it is left alone.
@@ -126,7 +163,7 @@ def Prefetch : Pass<"piko-prefetch", "::piko::PipelineOp"> {
     Before:
     ```
     scf.for %i = %begin to %end step %one {
-      %t = piko.item %bins[%i] ...
+      %t = piko.cpu.item %bins[%i] ...
       %k = piko.get %t "vertex" ...
       ... piko.load @vertices[%k : i32] "x" : f32 ...
     ```
@@ -134,12 +171,12 @@ def Prefetch : Pass<"piko-prefetch", "::piko::PipelineOp"> {
     ```
     scf.for %i = %begin to %end step %one {
       %far = ...                        // %i + 16, or the last one
-      piko.prefetch_item %bins[%far] : !piko.bins<@Triangle>
+      piko.cpu.prefetch_item %bins[%far] : !piko.bins<@Triangle>
       %near = ...                       // %i + 8, or the last one
-      %s = piko.item %bins[%near] ...
+      %s = piko.cpu.item %bins[%near] ...
       %j = piko.get %s "vertex" ...
       piko.prefetch @vertices[%j : i32]
-      %t = piko.item %bins[%i] ...
+      %t = piko.cpu.item %bins[%i] ...
     ```
 
     **Limits**: indices that are computed, and those of reads that only the much
@@ -154,7 +191,7 @@ def Prefetch : Pass<"piko-prefetch", "::piko::PipelineOp"> {
 def CompactLoops : Pass<"piko-compact-loops", "::piko::PipelineOp"> {
   let summary = "Do what a test guards for many primitives together";
   let description = [{
-    **Requires** the resolved level.
+    **Requires** loops over units (`piko-form-units`).
 
     **Does**: cuts a loop over primitives in front of work that a test with
     effects guards, as the shading behind a depth test that `piko-test-early` has
@@ -172,7 +209,7 @@ def CompactLoops : Pass<"piko-compact-loops", "::piko::PipelineOp"> {
     Before:
     ```
     scf.for %i = %begin to %end step %one {
-      %f = piko.item %bins[%i] ...
+      %f = piko.cpu.item %bins[%i] ...
       %passed = piko.update @depth[...] ...
       scf.if %passed {
         ...
@@ -185,7 +222,7 @@ def CompactLoops : Pass<"piko-compact-loops", "::piko::PipelineOp"> {
     scf.for %b = %begin to %end step %c64 {
       memref.store %zero, %count[%zero] : memref<1xindex>
       scf.for %i = %b to %e step %one {
-        %f = piko.item %bins[%i] ...
+        %f = piko.cpu.item %bins[%i] ...
         %passed = piko.update @depth[...] ...
         scf.if %passed {
           memref.store %i, %list[%n] : memref<64xindex> ...
@@ -194,7 +231,7 @@ def CompactLoops : Pass<"piko-compact-loops", "::piko::PipelineOp"> {
       %n = memref.load %count[%zero] : memref<1xindex>
       scf.for %j = %zero to %n step %one {
         %i = memref.load %list[%j] : memref<64xindex>
-        %f = piko.item %bins[%i] ...
+        %f = piko.cpu.item %bins[%i] ...
         ...
         piko.update @color[...] ...
       } {piko.lanes}
@@ -214,7 +251,7 @@ def CompactLoops : Pass<"piko-compact-loops", "::piko::PipelineOp"> {
 def HoistBounds : Pass<"piko-hoist-bounds", "::piko::PipelineOp"> {
   let summary = "Test the indices of a loop in front of it";
   let description = [{
-    **Requires** the resolved level; last before `convert-piko-to-scf`, because
+    **Requires** loops over units (`piko-form-units`); last before `convert-piko-to-scf`, because
     behind it loops stand there twice.
 
     **Does**: takes innermost loops that count by one up to a bound that does not
@@ -257,7 +294,7 @@ def HoistBounds : Pass<"piko-hoist-bounds", "::piko::PipelineOp"> {
 def IfConvert : Pass<"piko-if-convert", "::piko::PipelineOp"> {
   let summary = "Choose values without branches";
   let description = [{
-    **Requires** the resolved level; before `piko-vectorize`, which has no branches
+    **Requires** loops over units (`piko-form-units`); before `piko-vectorize`, which has no branches
     to mask then.
 
     **Does**: takes `scf.if` and `scf.index_switch` whose arms do nothing but
@@ -300,7 +337,7 @@ def IfConvert : Pass<"piko-if-convert", "::piko::PipelineOp"> {
 def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
   let summary = "Compute for many primitives at once";
   let description = [{
-    **Requires** the resolved level.
+    **Requires** loops over units (`piko-form-units`).
 
     **Does**: takes the primitives of a loop over them in blocks of 64, with
     three loops. The first reads, one primitive after the other, their fields
@@ -322,12 +359,12 @@ def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
     Before:
     ```
     scf.for %i = %begin to %end step %one {
-      %t = piko.item %bins[%i] ...
+      %t = piko.cpu.item %bins[%i] ...
       %k = piko.get %t "vertex" ...
       %x = piko.load @vertices[%k : i32] "x" : f32
       %y = arith.mulf %x, %x : f32 ...
-      piko.append %writer, 0 (%y)
-      piko.next %writer
+      piko.cpu.append %writer, 0 (%y)
+      piko.cpu.next %writer
     } {piko.lanes}
     ```
     After:
@@ -350,8 +387,8 @@ def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
           ...                                // as before
         } else {
           %y = memref.load %ys[%at] : memref<64xf32>
-          piko.append %writer, 0 (%y)
-          piko.next %writer
+          piko.cpu.append %writer, 0 (%y)
+          piko.cpu.next %writer
         }
       }
     }
@@ -372,4 +409,4 @@ def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
                            "::mlir::vector::VectorDialect"];
 }
 
-#endif // PIKO_TRANSFORMS_RESOLVEDPASSES_TD
+#endif // PIKO_TRANSFORMS_MACHINEPASSES_TD

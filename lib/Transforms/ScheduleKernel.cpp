@@ -3,7 +3,7 @@
 // Dynamic schedules as kernels: a loop over bins with the body in it. What was
 // said last about a bin is kept in private memory until the body has ended.
 
-#include "Resolve.h"
+#include "FormWork.h"
 
 #include "mlir/Dialect/Arith/IR/Arith.h"
 #include "mlir/Dialect/MemRef/IR/MemRef.h"
@@ -88,7 +88,7 @@ static KernelOp createKernel(StageOp stage) {
   return kernel;
 }
 
-void piko::resolveSchedule(ScheduleOp schedule) {
+void piko::formScheduleKernel(ScheduleOp schedule) {
   auto stage = cast<StageOp>(schedule->getParentOp());
   Location loc = schedule.getLoc();
   OpBuilder builder = OpBuilder::atBlockEnd(createKernel(stage).getBodyBlock());

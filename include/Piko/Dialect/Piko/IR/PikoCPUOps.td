@@ -1,0 +1,427 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// What the CPU's lowering makes of kernels: loops over the storage of bins, cut
+// into units of work, and the writers that units leave what they emit in.
+
+#ifndef PIKO_DIALECT_PIKO_IR_PIKOCPUOPS_TD
+#define PIKO_DIALECT_PIKO_IR_PIKOCPUOPS_TD
+
+include "Piko/Dialect/Piko/IR/PikoTypes.td"
+
+/// Says that an operation is the CPU's: no kernel of the machine level has it.
+def Piko_CPUOnly : NativeOpTrait<"CPUOnly"> {
+  let cppNamespace = "::piko";
+}
+
+class Piko_CPUOp<string mnemonic, list<Trait> traits = []>
+    : Piko_Op<"cpu." # mnemonic, !listconcat([Piko_CPUOnly], traits)>;
+
+def Piko_OpenBinsOp : Piko_CPUOp<"open_bins", [
+    DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
+  let summary = "starts a kernel over the bins of a stage or over a source";
+  let description = [{
+    Joins what the stage's producers left, in lineage order. With `source` the
+    primitives are those that the host feeds to that source of the stage, in one
+    bin.
+
+    ```mlir
+    %bins = piko.cpu.open_bins @shade : !piko.bins<@Fragment>
+    %first = piko.cpu.open_bins @rasterize source 0 : !piko.bins<@Fragment>
+    ```
+  }];
+  let arguments = (ins FlatSymbolRefAttr:$stage, OptionalAttr<Piko_I64Attr>:$source);
+  let results = (outs Piko_BinsType:$bins);
+  let assemblyFormat = [{
+    $stage (`source` $source^)? attr-dict `:` qualified(type($bins))
+  }];
+}
+
+def Piko_CloseBinsOp : Piko_CPUOp<"close_bins"> {
+  let summary = "ends a kernel";
+  let description = [{
+    Joins what the units of work emitted, in order, into the bins of the stages
+    that come next.
+
+    ```mlir
+    piko.cpu.close_bins %bins : !piko.bins<@Fragment>
+    ```
+  }];
+  let arguments = (ins Piko_BinsType:$bins);
+  let assemblyFormat = "$bins attr-dict `:` qualified(type($bins))";
+}
+
+def Piko_UnitCountOp : Piko_CPUOp<"unit_count", [Pure]> {
+  let summary = "how many units of work there are";
+  let description = [{
+    ```mlir
+    %n = piko.cpu.unit_count %bins : !piko.bins<@Fragment>
+    ```
+  }];
+  let arguments = (ins Piko_BinsType:$bins);
+  let results = (outs Index:$result);
+  let assemblyFormat = "$bins attr-dict `:` qualified(type($bins))";
+}
+
+def Piko_UnitCellsOp : Piko_CPUOp<"unit_cells", [Pure]> {
+  let summary = "the cells of a unit of work";
+  let description = [{
+    The range is half open. Of a stage that takes lists it is the calls of its
+    process phase.
+
+    ```mlir
+    %c0, %c1 = piko.cpu.unit_cells %bins[%unit] : !piko.bins<@Fragment>
+    ```
+  }];
+  let arguments = (ins Piko_BinsType:$bins, Index:$unit);
+  let results = (outs Index:$begin, Index:$end);
+  let assemblyFormat = "$bins `[` $unit `]` attr-dict `:` qualified(type($bins))";
+}
+
+def Piko_CellRangeOp : Piko_CPUOp<"cell_range", [Pure]> {
+  let summary = "the positions of a cell that a unit of work holds";
+  let description = [{
+    The range is half open.
+
+    ```mlir
+    %lo, %hi = piko.cpu.cell_range %bins[%unit, %cell] : !piko.bins<@Fragment>
+    ```
+  }];
+  let arguments = (ins Piko_BinsType:$bins, Index:$unit, Index:$cell);
+  let results = (outs Index:$begin, Index:$end);
+  let assemblyFormat = [{
+    $bins `[` $unit `,` $cell `]` attr-dict `:` qualified(type($bins))
+  }];
+}
+
+def Piko_CellBinOp : Piko_CPUOp<"cell_bin", [Pure]> {
+  let summary = "the bin that a cell belongs to";
+  let description = [{
+    ```mlir
+    %b = piko.cpu.cell_bin %bins[%cell] : !piko.bins<@Fragment>
+    ```
+  }];
+  let arguments = (ins Piko_BinsType:$bins, Index:$cell);
+  let results = (outs Index:$result);
+  let assemblyFormat = "$bins `[` $cell `]` attr-dict `:` qualified(type($bins))";
+}
+
+def Piko_CallRangeOp : Piko_CPUOp<"call_range", [Pure]> {
+  let summary = "the positions that a call of a list Process is for";
+  let description = [{
+    A call is for a bin, or for a batch of it. The range is half open, and empty
+    for an empty bin that runs nevertheless.
+
+    ```mlir
+    %lo, %hi = piko.cpu.call_range %bins[%call] : !piko.bins<@Fragment>
+    ```
+  }];
+  let arguments = (ins Piko_BinsType:$bins, Index:$call);
+  let results = (outs Index:$begin, Index:$end);
+  let assemblyFormat = "$bins `[` $call `]` attr-dict `:` qualified(type($bins))";
+}
+
+def Piko_CallBinOp : Piko_CPUOp<"call_bin", [Pure]> {
+  let summary = "the bin that a call of a list Process is for";
+  let description = [{
+    ```mlir
+    %b = piko.cpu.call_bin %bins[%call] : !piko.bins<@Fragment>
+    ```
+  }];
+  let arguments = (ins Piko_BinsType:$bins, Index:$call);
+  let results = (outs Index:$result);
+  let assemblyFormat = "$bins `[` $call `]` attr-dict `:` qualified(type($bins))";
+}
+
+def Piko_ListOp : Piko_CPUOp<"list", [Pure]> {
+  let hasVerifier = 1;
+  let summary = "the primitives at consecutive positions";
+  let description = [{
+    ```mlir
+    %l = piko.cpu.list %bins[%lo to %hi] : !piko.bins<@Fragment> -> !piko.list<@Fragment>
+    ```
+  }];
+  let arguments = (ins Piko_BinsType:$bins, Index:$begin, Index:$end);
+  let results = (outs Piko_ListType:$list);
+  let assemblyFormat = [{
+    $bins `[` $begin `to` $end `]` attr-dict
+    `:` qualified(type($bins)) `->` qualified(type($list))
+  }];
+}
+
+def Piko_ItemOp : Piko_CPUOp<"item", [Pure]> {
+  let hasVerifier = 1;
+  let summary = "the primitive at a position";
+  let description = [{
+    ```mlir
+    %p = piko.cpu.item %bins[%i] : !piko.bins<@Fragment> -> !piko.prim<@Fragment>
+    ```
+  }];
+  let arguments = (ins Piko_BinsType:$bins, Index:$position);
+  let results = (outs Piko_PrimType:$prim);
+  let assemblyFormat = [{
+    $bins `[` $position `]` attr-dict
+    `:` qualified(type($bins)) `->` qualified(type($prim))
+  }];
+}
+
+def Piko_PrefetchItemOp : Piko_CPUOp<"prefetch_item"> {
+  let summary = "says that the primitive at a position will be read";
+  let description = [{
+    A hint that changes nothing; the position is that of a primitive.
+
+    ```mlir
+    piko.cpu.prefetch_item %bins[%i] : !piko.bins<@Fragment>
+    ```
+  }];
+  let arguments = (ins Piko_BinsType:$bins, Index:$position);
+  let assemblyFormat = [{
+    $bins `[` $position `]` attr-dict `:` qualified(type($bins))
+  }];
+}
+
+def Piko_OpenWriterOp : Piko_CPUOp<"open_writer", [
+    DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
+  let summary = "where a unit of work leaves what it emits";
+  let description = [{
+    With `of` it is for the emissions of another stage, which runs in the same
+    kernel (`piko.cpu.local_bin`).
+
+    ```mlir
+    %w = piko.cpu.open_writer %bins[%unit] : !piko.bins<@Fragment>
+    %v = piko.cpu.open_writer %bins[%unit] of @shade : !piko.bins<@Fragment>
+    ```
+  }];
+  let arguments = (ins Piko_BinsType:$bins, Index:$unit,
+                       OptionalAttr<FlatSymbolRefAttr>:$stage);
+  let results = (outs Piko_WriterType:$writer);
+  let assemblyFormat = [{
+    $bins `[` $unit `]` (`of` $stage^)? attr-dict `:` qualified(type($bins))
+  }];
+}
+
+def Piko_LocalBinOp : Piko_CPUOp<"local_bin", [
+    SingleBlock, NoTerminator,
+    DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
+  let summary = "runs a stage on what a port has emitted in a bin";
+  let description = [{
+    A local barrier: the body is the stage's, and its argument holds all that the
+    port of the first writer has kept since the last time, in the order of its
+    emission, as the one unit, and the one cell, of a bin. Of a stage that takes
+    a list, the cells of the unit are the calls. It is gone at the end. What the
+    stage emits goes to the second writer.
+
+    ```mlir
+    %other = piko.cpu.open_writer %bins[%unit] of @plot : !piko.bins<@Fragment>
+    piko.cpu.local_bin @plot from %writer[0] writer %other {
+    ^bb0(%local: !piko.bins<@Point>):
+      %c0, %c1 = piko.cpu.unit_cells %local[%unit] : !piko.bins<@Point>
+      piko.cpu.next %other
+    }
+    ```
+  }];
+  let arguments = (ins FlatSymbolRefAttr:$stage, Piko_WriterType:$source,
+                       Piko_I64Attr:$port, Piko_WriterType:$writer);
+  let regions = (region SizedRegion<1>:$body);
+  let assemblyFormat = [{
+    $stage `from` $source `[` $port `]` `writer` $writer
+    attr-dict-with-keyword $body
+  }];
+  let extraClassDeclaration = [{
+    ::mlir::Block *getBodyBlock() { return &getBody().front(); }
+    ::mlir::Value getBins() { return getBody().getArgument(0); }
+  }];
+}
+
+def Piko_CloseWriterOp : Piko_CPUOp<"close_writer"> {
+  let summary = "the unit of work has ended";
+  let description = [{
+    ```mlir
+    piko.cpu.close_writer %writer
+    ```
+  }];
+  let arguments = (ins Piko_WriterType:$writer);
+  let assemblyFormat = "$writer attr-dict";
+}
+
+def Piko_AppendOp : Piko_CPUOp<"append", [
+    DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
+  let summary = "stores a primitive that a port emits";
+  let description = [{
+    The result is the primitive as it was stored.
+
+    ```mlir
+    %p = piko.cpu.append %writer[0] (%u, %v) : f32, f32 -> !piko.prim<@Point>
+    ```
+  }];
+  let arguments = (ins Piko_WriterType:$writer, Piko_I64Attr:$port,
+                       Variadic<Piko_Scalar>:$values);
+  let results = (outs Piko_PrimType:$prim);
+  let assemblyFormat = [{
+    $writer `[` $port `]` (`(` $values^ `)` `:` type($values))? `->`
+    qualified(type($prim)) attr-dict
+  }];
+}
+
+def Piko_AppendBinOp : Piko_CPUOp<"append_bin", [
+    DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
+  let summary = "puts what a port emitted last into a bin";
+  let description = [{
+    Where the stage's bins are divided into tiles, the tile stands behind the
+    bin. Without a port it places the current primitive of a source. A bin
+    outside the grid is an error when the pipeline runs.
+
+    ```mlir
+    piko.cpu.append_bin %writer[0] of @plot in %bin
+    piko.cpu.append_bin %writer[0] of @plot in %bin tile %tile
+    ```
+    ```mlir
+    %first = piko.cpu.open_bins @rasterize source 0 : !piko.bins<@Fragment>
+    %placer = piko.cpu.open_writer %first[%unit] : !piko.bins<@Fragment>
+    piko.cpu.append_bin %placer of @rasterize in %bin
+    ```
+  }];
+  let arguments = (ins Piko_WriterType:$writer, OptionalAttr<Piko_I64Attr>:$port,
+                       FlatSymbolRefAttr:$stage, Index:$bin,
+                       Optional<Index>:$tile);
+  let assemblyFormat = [{
+    $writer (`[` $port^ `]`)? `of` $stage `in` $bin (`tile` $tile^)? attr-dict
+  }];
+}
+
+def Piko_NextOp : Piko_CPUOp<"next"> {
+  let summary = "all that follows comes from the next primitive";
+  let description = [{
+    ```mlir
+    piko.cpu.next %writer
+    ```
+  }];
+  let arguments = (ins Piko_WriterType:$writer);
+  let assemblyFormat = "$writer attr-dict";
+}
+
+def Piko_DeferBeginOp : Piko_CPUOp<"defer_begin"> {
+  let summary = "what iterations emit is put in their order later";
+  let description = [{
+    From here to `piko.cpu.defer_end`, primitives are kept for each of so many
+    iterations; there they follow each other by iteration, then as they came.
+
+    ```mlir
+    piko.cpu.defer_begin %writer[%n]
+    ```
+  }];
+  let arguments = (ins Piko_WriterType:$writer, Index:$iterations);
+  let assemblyFormat = "$writer `[` $iterations `]` attr-dict";
+}
+
+def Piko_DeferIterationOp : Piko_CPUOp<"defer_iteration"> {
+  let summary = "all that follows comes from this iteration";
+  let description = [{
+    ```mlir
+    piko.cpu.defer_iteration %writer[%i]
+    ```
+  }];
+  let arguments = (ins Piko_WriterType:$writer, Index:$iteration);
+  let assemblyFormat = "$writer `[` $iteration `]` attr-dict";
+}
+
+def Piko_DeferEndOp : Piko_CPUOp<"defer_end"> {
+  let summary = "emits what iterations have kept";
+  let description = [{
+    ```mlir
+    piko.cpu.defer_end %writer
+    ```
+  }];
+  let arguments = (ins Piko_WriterType:$writer);
+  let assemblyFormat = "$writer attr-dict";
+}
+
+def Piko_ScratchMarkOp : Piko_CPUOp<"scratch_mark"> {
+  let summary = "how much scratch memory is in use";
+  let description = [{
+    ```mlir
+    %mark = piko.cpu.scratch_mark %writer
+    ```
+  }];
+  let arguments = (ins Piko_WriterType:$writer);
+  let results = (outs I64:$mark);
+  let assemblyFormat = "$writer attr-dict";
+}
+
+def Piko_ScratchOp : Piko_CPUOp<"scratch"> {
+  let summary = "takes scratch memory of so many bytes";
+  let description = [{
+    The second result is false where there was none: the run then ends with an
+    error, and the memory must not be used.
+
+    ```mlir
+    %bytes, %granted = piko.cpu.scratch %writer[%n]
+    ```
+  }];
+  let arguments = (ins Piko_WriterType:$writer, Index:$size);
+  let results = (outs Piko_Bytes:$bytes, I1:$granted);
+  let assemblyFormat = "$writer `[` $size `]` attr-dict";
+}
+
+def Piko_ScratchReleaseOp : Piko_CPUOp<"scratch_release"> {
+  let summary = "gives back the scratch memory taken since a mark";
+  let description = [{
+    ```mlir
+    piko.cpu.scratch_release %writer[%mark]
+    ```
+  }];
+  let arguments = (ins Piko_WriterType:$writer, I64:$mark);
+  let assemblyFormat = "$writer `[` $mark `]` attr-dict";
+}
+
+def Piko_NoItemOp : Piko_CPUOp<"no_item", [Pure]> {
+  let summary = "a primitive of zeros";
+  let description = [{
+    What a read outside a list gives, in a run that ends with an error.
+
+    ```mlir
+    %p = piko.cpu.no_item : !piko.prim<@Fragment>
+    ```
+  }];
+  let results = (outs Piko_PrimType:$prim);
+  let assemblyFormat = "attr-dict `:` qualified(type($prim))";
+}
+
+def Piko_ToAddressOp : Piko_CPUOp<"to_address", [Pure]> {
+  let summary = "where a primitive is, as a number that memory can hold";
+  let description = [{
+    ```mlir
+    %a = piko.cpu.to_address %p : !piko.prim<@Fragment>
+    ```
+  }];
+  let arguments = (ins Piko_PrimType:$prim);
+  let results = (outs Index:$address);
+  let assemblyFormat = "$prim attr-dict `:` qualified(type($prim))";
+}
+
+def Piko_FromAddressOp : Piko_CPUOp<"from_address", [Pure]> {
+  let summary = "the primitive that is at an address";
+  let description = [{
+    The address is that of a primitive of the same record, by
+    `piko.cpu.to_address`, in the same kernel.
+
+    ```mlir
+    %p = piko.cpu.from_address %a : !piko.prim<@Fragment>
+    ```
+  }];
+  let arguments = (ins Index:$address);
+  let results = (outs Piko_PrimType:$prim);
+  let assemblyFormat = "$address attr-dict `:` qualified(type($prim))";
+}
+
+def Piko_ThreadsOp : Piko_CPUOp<"threads", [Pure]> {
+  let summary = "how many threads the host asked for";
+  let description = [{
+    ```mlir
+    %n = piko.cpu.threads
+    ```
+  }];
+  let results = (outs I32:$result);
+  let assemblyFormat = "attr-dict";
+}
+
+#endif // PIKO_DIALECT_PIKO_IR_PIKOCPUOPS_TD

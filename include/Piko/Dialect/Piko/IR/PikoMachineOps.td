@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Structured work: what kernels hold at the machine level, for every target.
+
+#ifndef PIKO_DIALECT_PIKO_IR_PIKOMACHINEOPS_TD
+#define PIKO_DIALECT_PIKO_IR_PIKOMACHINEOPS_TD
+
+include "Piko/Dialect/Piko/IR/PikoTypes.td"
+
+def Piko_BinsOp : Piko_Op<"bins", [
+    SingleBlock, NoTerminator, HasParent<"KernelOp">,
+    DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
+  let summary = "runs for each bin of a stage";
+  let description = [{
+    The body is for one bin, whose number is its argument, and runs for each bin
+    that holds a primitive, or, where the schedule says `every_bin`, for each bin.
+    Bins are concurrent; the schedule of the stage says where they run. The first
+    `piko.items` or `piko.lists` of the body takes what is in the bin, all others
+    take what one in front of them has emitted there.
+
+    ```mlir
+    piko.record @F {"x" : i32 at 0} size 4 align 4
+    piko.pipeline @P rank 1 {
+      piko.source @split
+      piko.edge @split[0] -> @count
+      piko.edge @count[0] -> @last
+      piko.stage @split bins [8] threads 64 placed : @F -> [@F] {}
+      piko.stage @count bins [8] threads 64 placed : list @F -> [@F] {}
+      piko.stage @last bins [8] threads 64 placed : @F -> [] {}
+      piko.kernel @source_0_split {
+        piko.items of @split source 0 {
+        ^bb0(%f: !piko.prim<@F>):
+          %bin = arith.constant 1 : index
+          piko.place %f of @split in %bin : !piko.prim<@F>
+        }
+      }
+      piko.kernel @kernel_split {
+        piko.bins of @split {
+        ^bb0(%bin: index):
+          piko.items of @split {
+          ^bb0(%f: !piko.prim<@F>):
+            %x = piko.get %f "x" : !piko.prim<@F> -> i32
+            %p = piko.emit 0 (%x) : i32 -> !piko.prim<@F>
+            piko.place %p of @count in %bin : !piko.prim<@F>
+          }
+          piko.lists of @count from @split[0] {
+          ^bb0(%l: !piko.list<@F>):
+            %n = piko.list_size %l : !piko.list<@F>
+          }
+        }
+      }
+    }
+    ```
+  }];
+  let arguments = (ins FlatSymbolRefAttr:$stage);
+  let regions = (region SizedRegion<1>:$body);
+  let assemblyFormat = "`of` $stage attr-dict-with-keyword $body";
+  let hasRegionVerifier = 1;
+  let extraClassDeclaration = [{
+    ::mlir::Block *getBodyBlock() { return &getBody().front(); }
+    ::mlir::Value getBin() { return getBody().getArgument(0); }
+  }];
+}
+
+/// Work on what is in a bin. With `from`, on what a port has emitted in the bin
+/// so far.
+class Piko_WorkOp<string mnemonic> : Piko_Op<mnemonic, [
+    SingleBlock, NoTerminator, AutomaticAllocationScope,
+    ParentOneOf<["BinsOp", "KernelOp"]>,
+    DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
+  let regions = (region SizedRegion<1>:$body);
+  let hasRegionVerifier = 1;
+  code common = [{
+    ::mlir::Block *getBodyBlock() { return &getBody().front(); }
+  }];
+}
+
+def Piko_ItemsOp : Piko_WorkOp<"items"> {
+  let summary = "runs for each primitive of a bin";
+  let description = [{
+    The body processes one primitive, its argument; `piko.emit` in it is the
+    stage's. Primitives are concurrent where that cannot be seen: updates of one
+    pixel are in order of lineage, and so is what is emitted.
+
+    With `source` the primitives are those that the host feeds to that source of
+    the stage, in no bin; the body places them (`piko.place`). With `from` they are
+    those that a port of another stage has emitted in this bin, by what stands in
+    front: a local barrier.
+
+    See `piko.bins`.
+  }];
+  let arguments = (ins FlatSymbolRefAttr:$stage,
+                       OptionalAttr<Piko_I64Attr>:$source,
+                       OptionalAttr<FlatSymbolRefAttr>:$producer,
+                       OptionalAttr<Piko_I64Attr>:$port);
+  let assemblyFormat = [{
+    `of` $stage (`source` $source^)? (`from` $producer^ `[` $port `]`)?
+    attr-dict-with-keyword $body
+  }];
+  let extraClassDeclaration = common # [{
+    ::mlir::Value getPrim() { return getBody().getArgument(0); }
+  }];
+}
+
+def Piko_ListsOp : Piko_WorkOp<"lists"> {
+  let summary = "runs for the list of a bin, or for each of its batches";
+  let description = [{
+    The body is a process phase that takes a list: called once with all that is in
+    the bin, or, where the schedule has a batch size, once for so many
+    consecutive primitives, the last time for fewer.
+
+    See `piko.bins`.
+  }];
+  let arguments = (ins FlatSymbolRefAttr:$stage,
+                       OptionalAttr<FlatSymbolRefAttr>:$producer,
+                       OptionalAttr<Piko_I64Attr>:$port);
+  let assemblyFormat = [{
+    `of` $stage (`from` $producer^ `[` $port `]`)? attr-dict-with-keyword $body
+  }];
+  let extraClassDeclaration = common # [{
+    ::mlir::Value getList() { return getBody().getArgument(0); }
+  }];
+}
+
+def Piko_PlaceOp : Piko_Op<"place", [
+    DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
+  let summary = "puts a primitive into a bin of a stage";
+  let description = [{
+    The primitive is what a `piko.emit` has sent out of a port, or one of a
+    source. Where the stage's bins are divided into tiles, the tile stands behind
+    the bin. A bin outside the grid is an error when the pipeline runs; one that
+    is named twice counts once. See `piko.bins`.
+  }];
+  let arguments = (ins Piko_PrimType:$prim, FlatSymbolRefAttr:$stage,
+                       Index:$bin, Optional<Index>:$tile);
+  let assemblyFormat = [{
+    $prim `of` $stage `in` $bin (`tile` $tile^)? attr-dict
+    `:` qualified(type($prim))
+  }];
+}
+
+#endif // PIKO_DIALECT_PIKO_IR_PIKOMACHINEOPS_TD

@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Loops over the storage of bins, and what units of work leave.
+
+#include "Piko/Dialect/Piko/IR/PikoCPU.h"
+
+#include "StageUses.h"
+
+using namespace mlir;
+using namespace piko;
+
+#define GET_OP_CLASSES
+#include "Piko/Dialect/Piko/IR/PikoCPUOps.cpp.inc"
+
+LogicalResult OpenBinsOp::verifySymbolUses(SymbolTableCollection &) {
+  if (failed(verifyStage(*this, getStageAttr())))
+    return failure();
+  auto stage = lookupInPipeline<StageOp>(*this, getStageAttr());
+  if (stage.getInputAttr() != getBins().getType().getRecord())
+    return emitOpError("expected bins of record ")
+           << stage.getInputAttr() << ", but got "
+           << getBins().getType().getRecord();
+  return success();
+}
+
+/// A value and the storage that it is in are of one record.
+static LogicalResult verifyStored(Operation *op, BinsType bins,
+                                  FlatSymbolRefAttr record, StringRef what) {
+  if (bins.getRecord() == record)
+    return success();
+  return op->emitOpError("expected a ")
+         << what << " of record " << bins.getRecord()
+         << ", which the bins hold, but got " << record;
+}
+
+LogicalResult ListOp::verify() {
+  return verifyStored(*this, getBins().getType(),
+                      getList().getType().getRecord(), "list");
+}
+
+LogicalResult ItemOp::verify() {
+  return verifyStored(*this, getBins().getType(),
+                      getPrim().getType().getRecord(), "primitive");
+}
+
+LogicalResult OpenWriterOp::verifySymbolUses(SymbolTableCollection &) {
+  return getStageAttr() ? verifyStage(*this, getStageAttr()) : success();
+}
+
+/// The operation that opened the bins that a writer is for, or null.
+static OpenBinsOp getOpenBins(Value writer) {
+  auto open = writer.getDefiningOp<OpenWriterOp>();
+  return open ? open.getBins().getDefiningOp<OpenBinsOp>() : OpenBinsOp();
+}
+
+/// The stage whose emissions a writer is for, or null.
+static StageOp getWriterStage(Value writer) {
+  OpenBinsOp bins = getOpenBins(writer);
+  if (!bins)
+    return {};
+  auto open = writer.getDefiningOp<OpenWriterOp>();
+  return lookupInPipeline<StageOp>(
+      bins, open.getStageAttr() ? open.getStageAttr() : bins.getStageAttr());
+}
+
+/// The record that a port of the stage that `writer` is for emits; null where
+/// that is not known, a failure where there is no such port.
+static FailureOr<FlatSymbolRefAttr> verifyPort(Operation *op, Value writer,
+                                               int64_t port) {
+  OpenBinsOp bins = getOpenBins(writer);
+  StageOp stage = getWriterStage(writer);
+  if (!stage)
+    return FlatSymbolRefAttr();
+  int64_t ports = bins.getSource() ? 0 : stage.getOutputs().size();
+  if (port < 0 || port >= ports)
+    return op->emitOpError("expected a port below ")
+           << ports << ", which is how many the kernel of stage '"
+           << stage.getSymName() << "' has, but got " << port;
+  return cast<FlatSymbolRefAttr>(stage.getOutputs()[port]);
+}
+
+LogicalResult LocalBinOp::verifySymbolUses(SymbolTableCollection &) {
+  if (failed(verifyStage(*this, getStageAttr())))
+    return failure();
+  auto stage = lookupInPipeline<StageOp>(*this, getStageAttr());
+  auto expected = BinsType::get(getContext(), stage.getInputAttr());
+  if (getBodyBlock()->getNumArguments() != 1 || getBins().getType() != expected)
+    return emitOpError("expected one block argument of type ") << expected;
+  FailureOr<FlatSymbolRefAttr> emitted =
+      verifyPort(*this, getSource(), getPort());
+  if (failed(emitted))
+    return failure();
+  if (*emitted && *emitted != stage.getInputAttr())
+    return emitOpError("expected a port of record ")
+           << stage.getInputAttr() << ", which " << getStageAttr()
+           << " takes, but got " << *emitted;
+  if (StageOp other = getWriterStage(getWriter()); other && other != stage)
+    return emitOpError("expected a writer of ")
+           << getStageAttr() << ", but got one of '" << other.getSymName()
+           << "'";
+  return success();
+}
+
+LogicalResult AppendOp::verifySymbolUses(SymbolTableCollection &) {
+  FlatSymbolRefAttr name = getPrim().getType().getRecord();
+  RecordOp record = lookupRecord(*this, name);
+  if (!record)
+    return emitOpError("expected a record, but got ")
+           << name << ", which is none";
+  SmallVector<Type> types = record.getElementTypes();
+  if (types != getValues().getTypes())
+    return emitOpError("expected the numbers of record ")
+           << name << ", (" << types << "), but got (" << getValues().getTypes()
+           << ")";
+  FailureOr<FlatSymbolRefAttr> emitted =
+      verifyPort(*this, getWriter(), getPort());
+  if (failed(emitted))
+    return failure();
+  if (*emitted && *emitted != name)
+    return emitOpError("expected a primitive of record ")
+           << *emitted << ", which port " << getPort() << " emits, but got "
+           << name;
+  return success();
+}
+
+LogicalResult AppendBinOp::verifySymbolUses(SymbolTableCollection &) {
+  if (failed(verifyStage(*this, getStageAttr())))
+    return failure();
+  if (getTile() && !lookupInPipeline<StageOp>(*this, getStageAttr()).getTile())
+    return emitOpError("expected a tile only in a stage that is divided into "
+                       "tiles, but ")
+           << getStageAttr() << " is not";
+  if (getPort())
+    return failure(failed(verifyPort(*this, getWriter(), *getPort())));
+  if (OpenBinsOp bins = getOpenBins(getWriter()); bins && !bins.getSource())
+    return emitOpError("expected a port, because the kernel is not that of a "
+                       "source");
+  return success();
+}

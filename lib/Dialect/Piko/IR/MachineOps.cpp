@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// The structured work of kernels.
+
+#include "StageUses.h"
+
+using namespace mlir;
+using namespace piko;
+
+//===----------------------------------------------------------------------===//
+// Bins, and what is in them
+//===----------------------------------------------------------------------===//
+
+/// The stage and the port whose emissions work takes; null where it takes what
+/// the bin holds.
+static FlatSymbolRefAttr getProducer(Operation *work) {
+  return work->getAttrOfType<FlatSymbolRefAttr>("producer");
+}
+
+static bool isWork(Operation &op) { return isa<ItemsOp, ListsOp>(op); }
+
+static LogicalResult verifyArgument(Operation *op, Block &body, Type expected) {
+  if (body.getNumArguments() == 1 && body.getArgument(0).getType() == expected)
+    return success();
+  return op->emitOpError("expected one block argument of type ") << expected;
+}
+
+LogicalResult BinsOp::verifySymbolUses(SymbolTableCollection &) {
+  return verifyStage(*this, getStageAttr());
+}
+
+LogicalResult BinsOp::verifyRegions() {
+  if (failed(
+          verifyArgument(*this, *getBodyBlock(), IndexType::get(getContext()))))
+    return failure();
+  llvm::SmallDenseSet<Attribute> before;
+  for (Operation &op : *getBodyBlock()) {
+    if (!isWork(op))
+      continue;
+    auto stage = op.getAttrOfType<FlatSymbolRefAttr>("stage");
+    FlatSymbolRefAttr producer = getProducer(&op);
+    if (before.empty() && (producer || stage != getStageAttr()))
+      return op.emitOpError("expected to take what the bins of ")
+             << getStageAttr() << " hold, because it is the first work on them";
+    if (!before.empty() && !producer)
+      return op.emitOpError("expected to take what work in front of it emits, "
+                            "because it is not the first");
+    if (producer && !before.contains(producer))
+      return op.emitOpError("expected work of ")
+             << producer << " in front of it";
+    if (!before.insert(stage).second)
+      return op.emitOpError("expected one piece of work of ") << stage;
+  }
+  if (before.empty())
+    return emitOpError("expected work on what the bins hold");
+  return success();
+}
+
+/// What work has in common.
+template <typename WorkOp> static LogicalResult verifyWork(WorkOp op) {
+  if (failed(verifyStage(op, op.getStageAttr())))
+    return failure();
+  auto stage = lookupInPipeline<StageOp>(op, op.getStageAttr());
+  bool takesList = isa<ListsOp>(op.getOperation()), isSource = false;
+  if (auto items = dyn_cast<ItemsOp>(op.getOperation()))
+    isSource = bool(items.getSource());
+  if (stage.getTakesList() != takesList && !isSource)
+    return op.emitOpError("expected ")
+           << (takesList ? "a stage that takes lists"
+                         : "a stage that takes primitives one by one")
+           << ", but got " << op.getStageAttr();
+  if (bool(op.getProducerAttr()) != bool(op.getPortAttr()))
+    return op.emitOpError("expected a producer and its port, or neither");
+  Type input = takesList
+                   ? Type(ListType::get(op.getContext(), stage.getInputAttr()))
+                   : Type(PrimType::get(op.getContext(), stage.getInputAttr()));
+  if (failed(verifyArgument(op, *op.getBodyBlock(), input)))
+    return failure();
+  if (!op.getProducerAttr())
+    return success();
+  return verifyLocalEdge(op, op.getProducerAttr(), *op.getPort(),
+                         op.getStageAttr());
+}
+
+LogicalResult ItemsOp::verifySymbolUses(SymbolTableCollection &) {
+  return verifyWork(*this);
+}
+
+LogicalResult ItemsOp::verifyRegions() {
+  bool inBins = isa<BinsOp>((*this)->getParentOp());
+  if (bool(getSource()) == !inBins)
+    return success();
+  if (inBins)
+    return emitOpError("expected no source inside 'piko.bins'");
+  return emitOpError("expected a source outside of 'piko.bins'");
+}
+
+LogicalResult ListsOp::verifySymbolUses(SymbolTableCollection &) {
+  return verifyWork(*this);
+}
+
+LogicalResult ListsOp::verifyRegions() {
+  if (isa<BinsOp>((*this)->getParentOp()))
+    return success();
+  return emitOpError("expected to be inside 'piko.bins'");
+}
+
+LogicalResult PlaceOp::verifySymbolUses(SymbolTableCollection &) {
+  if (failed(verifyStage(*this, getStageAttr())))
+    return failure();
+  auto stage = lookupInPipeline<StageOp>(*this, getStageAttr());
+  if (stage.getInputAttr() != getPrim().getType().getRecord())
+    return emitOpError("expected a primitive of record ")
+           << stage.getInputAttr() << ", which " << getStageAttr()
+           << " takes, but got " << getPrim().getType().getRecord();
+  if (getTile() && !stage.getTile())
+    return emitOpError("expected a tile only in a stage that is divided into "
+                       "tiles, but ")
+           << getStageAttr() << " is not";
+  if (getPrim().getDefiningOp<EmitOp>())
+    return success();
+  auto argument = dyn_cast<BlockArgument>(getPrim());
+  auto items = argument ? dyn_cast<ItemsOp>(argument.getOwner()->getParentOp())
+                        : ItemsOp();
+  if (items && items.getSource())
+    return success();
+  return emitOpError("expected what 'piko.emit' gives, or a primitive of a "
+                     "source");
+}

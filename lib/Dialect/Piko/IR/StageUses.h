@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Checks of operations that name a stage.
+
+#ifndef PIKO_LIB_DIALECT_PIKO_IR_STAGEUSES_H
+#define PIKO_LIB_DIALECT_PIKO_IR_STAGEUSES_H
+
+#include "Piko/Dialect/Piko/IR/Piko.h"
+
+namespace piko {
+
+/// Reports at `op` unless the pipeline has a stage of that name.
+mlir::LogicalResult verifyStage(mlir::Operation *op,
+                                mlir::FlatSymbolRefAttr name);
+
+/// Reports at `op` unless `consumer` may run, bin by bin, in the kernel of the
+/// stage that feeds it.
+mlir::LogicalResult verifyLocalEdge(mlir::Operation *op,
+                                    mlir::FlatSymbolRefAttr producer,
+                                    int64_t port,
+                                    mlir::FlatSymbolRefAttr consumer);
+
+} // namespace piko
+
+#endif // PIKO_LIB_DIALECT_PIKO_IR_STAGEUSES_H

@@ -1,0 +1,290 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// piko-form-units, for each kernel:
+//   1. build the loops over units of work and their cells, or the calls of a
+//      process phase that takes lists;
+//   2. move work on a bin into the innermost, one after another;
+//   3. turn emissions and placements into what goes to the unit's writers.
+
+#include "Piko/Dialect/Piko/IR/PikoCPU.h"
+#include "Piko/Transforms/Passes.h"
+
+#include "mlir/Dialect/Arith/IR/Arith.h"
+#include "mlir/IR/PatternMatch.h"
+
+namespace piko {
+#define GEN_PASS_DEF_FORMUNITS
+#include "Piko/Transforms/Passes.h.inc"
+} // namespace piko
+
+using namespace mlir;
+using namespace piko;
+
+namespace {
+
+struct FormUnitsPass : piko::impl::FormUnitsBase<FormUnitsPass> {
+  void runOnOperation() override;
+};
+
+class UnitFormer {
+public:
+  /// `work` is the kernel's: a piko.bins, or the piko.items of a source.
+  UnitFormer(KernelOp kernel, Operation *work)
+      : loc(kernel.getLoc()), work(work), rewriter(work) {}
+  void run();
+
+private:
+  void createUnits(StageOp stage, IntegerAttr source);
+  void createWriters();
+  void convertSource(ItemsOp items);
+  void convertBins(BinsOp over);
+  /// A loop over the unit's cells, or its calls.
+  scf::ForOp createUnitLoop();
+  /// Where what follows the last batch of a bin goes.
+  Block *createBinEnd(Value call, Value bin);
+  /// Makes a loop over primitives of work on them, or takes one list.
+  void convertItems(ItemsOp items, Value from, Value begin, Value end,
+                    Value writer);
+  void convertList(ListsOp lists, Value from, Value call, Value writer);
+  void convertLocal(Operation *local);
+  /// What a piece of work emits goes to a writer.
+  void convertEmissions(Operation *piece, Value writer);
+  void convertPlaces(Value prim, Value writer, IntegerAttr port);
+
+  Value constant(int64_t value) {
+    return arith::ConstantIndexOp::create(rewriter, loc, value);
+  }
+
+  Location loc;
+  Operation *work;
+  IRRewriter rewriter;
+  Value bins, unit, unitsEnd;
+  Operation *unitEnd = nullptr; // in front of which a unit's writers close
+  llvm::DenseMap<Attribute, Value> writers; // by stage
+};
+
+} // namespace
+
+static FlatSymbolRefAttr getStageName(Operation *work) {
+  return work->getAttrOfType<FlatSymbolRefAttr>("stage");
+}
+
+void UnitFormer::createUnits(StageOp stage, IntegerAttr source) {
+  auto type = BinsType::get(rewriter.getContext(), stage.getInputAttr());
+  bins = OpenBinsOp::create(rewriter, loc, type, getStageName(work), source);
+  Value count = UnitCountOp::create(rewriter, loc, bins);
+  auto forall = scf::ForallOp::create(
+      rewriter, loc, ArrayRef<OpFoldResult>{count}, ValueRange(), std::nullopt);
+  ScheduleOp schedule = stage.getSchedule();
+  forall->setAttr("piko.schedule",
+                  rewriter.getStringAttr(stringifyScheduleKind(
+                      schedule && !source ? schedule.getKind()
+                                          : ScheduleKind::LoadBalance)));
+  CloseBinsOp::create(rewriter, loc, bins);
+  unit = forall.getInductionVar(0);
+  unitEnd = forall.getTerminator();
+}
+
+/// One for each stage whose work the kernel holds, closed in reverse.
+void UnitFormer::createWriters() {
+  auto create = [&](Location at, FlatSymbolRefAttr stage, bool isOther) {
+    rewriter.setInsertionPoint(unitEnd);
+    Value writer = OpenWriterOp::create(rewriter, at, bins, unit,
+                                        isOther ? stage : FlatSymbolRefAttr());
+    unitEnd = CloseWriterOp::create(rewriter, at, writer);
+    writers[stage] = writer;
+  };
+  create(loc, getStageName(work), /*isOther=*/false);
+  if (auto over = dyn_cast<BinsOp>(work))
+    for (Operation &piece : *over.getBodyBlock())
+      if (isa<ItemsOp, ListsOp>(piece) && piece.hasAttr("producer"))
+        create(piece.getLoc(), getStageName(&piece), /*isOther=*/true);
+  rewriter.setInsertionPoint(unitEnd);
+}
+
+void UnitFormer::run() {
+  auto stage = lookupInPipeline<StageOp>(work, getStageName(work));
+  auto items = dyn_cast<ItemsOp>(work);
+  createUnits(stage, items ? items.getSourceAttr() : nullptr);
+  createWriters();
+  if (items)
+    convertSource(items);
+  else
+    convertBins(cast<BinsOp>(work));
+}
+
+scf::ForOp UnitFormer::createUnitLoop() {
+  auto cells = UnitCellsOp::create(rewriter, loc, bins, unit);
+  unitsEnd = cells.getEnd();
+  return scf::ForOp::create(rewriter, loc, cells.getBegin(), cells.getEnd(),
+                            constant(1));
+}
+
+void UnitFormer::convertSource(ItemsOp items) {
+  scf::ForOp loop = createUnitLoop();
+  items->moveBefore(loop.getBody()->getTerminator());
+  rewriter.setInsertionPoint(items);
+  auto range =
+      CellRangeOp::create(rewriter, loc, bins, unit, loop.getInductionVar());
+  convertItems(items, bins, range.getBegin(), range.getEnd(),
+               writers.lookup(items.getStageAttr()));
+}
+
+void UnitFormer::convertBins(BinsOp over) {
+  scf::ForOp loop = createUnitLoop();
+  Operation *end = loop.getBody()->getTerminator();
+  rewriter.setInsertionPointToStart(loop.getBody());
+  Value at = loop.getInductionVar(),
+        writer = writers.lookup(getStageName(work));
+  auto isPiece = [](Operation &op) { return isa<ItemsOp, ListsOp>(op); };
+  Operation *first = &*llvm::find_if(*over.getBodyBlock(), isPiece);
+  bool takesList = isa<ListsOp>(first);
+  Value bin = takesList
+                  ? CallBinOp::create(rewriter, loc, bins, at).getResult()
+                  : CellBinOp::create(rewriter, loc, bins, at).getResult();
+  Block *behind = loop.getBody();
+  SmallVector<Operation *> locals;
+  for (Operation &op : *over.getBodyBlock())
+    if (isPiece(op) && &op != first)
+      locals.push_back(&op);
+  rewriter.inlineBlockBefore(over.getBodyBlock(), end, bin);
+  rewriter.eraseOp(over);
+  if (takesList && first->getNextNode() != end) {
+    rewriter.setInsertionPointAfter(first);
+    Operation *next = first->getNextNode();
+    behind = createBinEnd(at, bin);
+    behind->getOperations().splice(
+        std::prev(behind->end()), loop.getBody()->getOperations(),
+        next->getIterator(), std::prev(loop.getBody()->end()));
+  }
+  rewriter.setInsertionPoint(first);
+  if (takesList) {
+    convertList(cast<ListsOp>(first), bins, at, writer);
+  } else {
+    auto range = CellRangeOp::create(rewriter, loc, bins, unit, at);
+    convertItems(cast<ItemsOp>(first), bins, range.getBegin(), range.getEnd(),
+                 writer);
+  }
+  for (Operation *local : locals)
+    convertLocal(local);
+}
+
+/// A bin ends with its last batch: the next call is for another one.
+Block *UnitFormer::createBinEnd(Value call, Value bin) {
+  Value one = constant(1);
+  Value last = arith::SubIOp::create(rewriter, loc, unitsEnd, one);
+  Value next = arith::AddIOp::create(rewriter, loc, call, one);
+  Value at = arith::MinUIOp::create(rewriter, loc, next, last);
+  Value other = CallBinOp::create(rewriter, loc, bins, at);
+  auto compare = [&](arith::CmpIPredicate predicate, Value a, Value b) {
+    return arith::CmpIOp::create(rewriter, loc, predicate, a, b).getResult();
+  };
+  Value ends = arith::OrIOp::create(
+      rewriter, loc, compare(arith::CmpIPredicate::eq, call, last),
+      compare(arith::CmpIPredicate::ne, other, bin));
+  return scf::IfOp::create(rewriter, loc, ends, /*withElseRegion=*/false)
+      .thenBlock();
+}
+
+void UnitFormer::convertItems(ItemsOp items, Value from, Value begin, Value end,
+                              Value writer) {
+  Location at = items.getLoc();
+  convertEmissions(items, writer);
+  if (items.getSource())
+    convertPlaces(items.getPrim(), writer, /*port=*/nullptr);
+  rewriter.setInsertionPoint(items);
+  Value one = arith::ConstantIndexOp::create(rewriter, at, 1);
+  auto loop = scf::ForOp::create(rewriter, at, begin, end, one);
+  loop->setAttr("piko.lanes", rewriter.getUnitAttr());
+  rewriter.setInsertionPointToStart(loop.getBody());
+  Value prim = ItemOp::create(rewriter, at, items.getPrim().getType(), from,
+                              loop.getInductionVar());
+  Operation *terminator = loop.getBody()->getTerminator();
+  rewriter.inlineBlockBefore(items.getBodyBlock(), terminator, prim);
+  rewriter.setInsertionPoint(terminator);
+  if (!items.getProducer())
+    NextOp::create(rewriter, loc, writer);
+  rewriter.eraseOp(items);
+}
+
+void UnitFormer::convertList(ListsOp lists, Value from, Value call,
+                             Value writer) {
+  convertEmissions(lists, writer);
+  rewriter.setInsertionPoint(lists);
+  auto range = CallRangeOp::create(rewriter, loc, from, call);
+  Value list = ListOp::create(rewriter, lists.getLoc(),
+                              cast<ListType>(lists.getList().getType()), from,
+                              range.getBegin(), range.getEnd());
+  rewriter.inlineBlockBefore(lists.getBodyBlock(), lists, list);
+  if (!lists.getProducer())
+    NextOp::create(rewriter, loc, writer);
+  rewriter.eraseOp(lists);
+}
+
+void UnitFormer::convertLocal(Operation *local) {
+  Location at = local->getLoc();
+  FlatSymbolRefAttr name = getStageName(local);
+  auto stage = lookupInPipeline<StageOp>(local, name);
+  Value writer = writers.lookup(name);
+  rewriter.setInsertionPoint(local);
+  auto around = LocalBinOp::create(
+      rewriter, at, name, writers.lookup(local->getAttr("producer")),
+      local->getAttrOfType<IntegerAttr>("port"), writer);
+  Block &body = around.getBody().emplaceBlock();
+  Value from = body.addArgument(
+      BinsType::get(rewriter.getContext(), stage.getInputAttr()), at);
+  rewriter.setInsertionPointToEnd(&body);
+  Value zero = arith::ConstantIndexOp::create(rewriter, at, 0);
+  auto next = NextOp::create(rewriter, at, writer);
+  rewriter.setInsertionPoint(next);
+  if (auto lists = dyn_cast<ListsOp>(local)) {
+    auto calls = UnitCellsOp::create(rewriter, at, from, zero);
+    Value one = arith::ConstantIndexOp::create(rewriter, at, 1);
+    auto loop =
+        scf::ForOp::create(rewriter, at, calls.getBegin(), calls.getEnd(), one);
+    lists->moveBefore(loop.getBody()->getTerminator());
+    convertList(lists, from, loop.getInductionVar(), writer);
+    return;
+  }
+  auto range = CellRangeOp::create(rewriter, at, from, zero, zero);
+  local->moveBefore(next);
+  convertItems(cast<ItemsOp>(local), from, range.getBegin(), range.getEnd(),
+               writer);
+}
+
+void UnitFormer::convertEmissions(Operation *piece, Value writer) {
+  SmallVector<EmitOp> emits;
+  piece->walk([&](EmitOp emit) { emits.push_back(emit); });
+  auto stage = lookupInPipeline<StageOp>(piece, getStageName(piece));
+  for (EmitOp emit : emits) {
+    rewriter.setInsertionPoint(emit);
+    auto record = cast<FlatSymbolRefAttr>(stage.getOutputs()[emit.getPort()]);
+    Value stored = AppendOp::create(
+        rewriter, emit.getLoc(), PrimType::get(rewriter.getContext(), record),
+        writer, emit.getPortAttr(), emit.getValues());
+    if (emit.getPrim()) {
+      convertPlaces(emit.getPrim(), writer, emit.getPortAttr());
+      rewriter.replaceAllUsesWith(emit.getPrim(), stored);
+    }
+    rewriter.eraseOp(emit);
+  }
+}
+
+void UnitFormer::convertPlaces(Value prim, Value writer, IntegerAttr port) {
+  for (Operation *user : llvm::make_early_inc_range(prim.getUsers())) {
+    auto place = dyn_cast<PlaceOp>(user);
+    if (!place)
+      continue;
+    rewriter.setInsertionPoint(place);
+    AppendBinOp::create(rewriter, place.getLoc(), writer, port,
+                        place.getStageAttr(), place.getBin(), place.getTile());
+    rewriter.eraseOp(place);
+  }
+}
+
+void FormUnitsPass::runOnOperation() {
+  for (auto kernel : getOperation().getOps<KernelOp>())
+    for (Operation &op : llvm::make_early_inc_range(*kernel.getBodyBlock()))
+      if (isa<BinsOp, ItemsOp>(op))
+        UnitFormer(kernel, &op).run();
+}
