@@ -16,11 +16,11 @@ template <typename OpT> struct CheckLowering : ContextPattern<OpT> {
   using ContextPattern<OpT>::context;
 
   /// Calls a function of the runtime with its pipeline and the arguments.
-  LLVM::CallOp call(OpBuilder &builder, OpT op, StringRef function,
-                    ArrayRef<Value> arguments, Type result = {}) const {
+  LLVM::CallOp call(OpBuilder &builder, OpT op, const RuntimeFunction &function,
+                    ArrayRef<Value> arguments) const {
     SmallVector<Value> all{context.frame(op)};
     llvm::append_range(all, arguments);
-    return context.call(builder, op.getLoc(), function, result, all);
+    return context.call(builder, op.getLoc(), function, all);
   }
   Value i32(OpBuilder &builder, OpT op, int64_t v) const {
     return createI32(builder, op.getLoc(), v);
@@ -42,10 +42,17 @@ template <typename OpT> struct CheckLowering : ContextPattern<OpT> {
 
 } // namespace
 
-// PIKOIR_NO_LINEAGE
-static constexpr int64_t noLineage = INT64_MIN;
-// PIKOIR_CHECK_UPDATES
-static constexpr int64_t updatesFlag = 4;
+// What is checked is the runtime's by number.
+static_assert(int(CheckedAccess::Read) == PIKOIR_CHECK_READ &&
+              int(CheckedAccess::Store) == PIKOIR_CHECK_STORE &&
+              int(CheckedAccess::Update) == PIKOIR_CHECK_UPDATE &&
+              int(CheckedAccess::Atomic) == PIKOIR_CHECK_ATOMIC);
+static_assert(int(CheckedLoop::Begin) == PIKOIR_CHECK_BEGIN &&
+              int(CheckedLoop::Iteration) == PIKOIR_CHECK_ITERATION &&
+              int(CheckedLoop::Barrier) == PIKOIR_CHECK_BARRIER &&
+              int(CheckedLoop::End) == PIKOIR_CHECK_END);
+static_assert(int(CheckedValue::NaN) == PIKOIR_CHECK_NAN &&
+              int(CheckedValue::Unwritten) == PIKOIR_CHECK_UNWRITTEN);
 
 namespace {
 
@@ -54,10 +61,10 @@ struct CheckCallLowering : CheckLowering<CheckCallOp> {
   LogicalResult
   matchAndRewrite(CheckCallOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
-    call(rewriter, op, "pikoir_check_call",
+    call(rewriter, op, PIKO_RUNTIME_FUNCTION(pikoir_check_call),
          {i32(rewriter, op, context.stageNumber(op, op.getStage())),
           i64(rewriter, op, adaptor.getBin(), 0),
-          i64(rewriter, op, adaptor.getLineage(), noLineage)});
+          i64(rewriter, op, adaptor.getLineage(), PIKOIR_NO_LINEAGE)});
     rewriter.eraseOp(op);
     return success();
   }
@@ -68,9 +75,9 @@ struct CheckAssignLowering : CheckLowering<CheckAssignOp> {
   LogicalResult
   matchAndRewrite(CheckAssignOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
-    call(rewriter, op, "pikoir_check_assign",
+    call(rewriter, op, PIKO_RUNTIME_FUNCTION(pikoir_check_assign),
          {i32(rewriter, op, context.stageNumber(op, op.getStage())),
-          i64(rewriter, op, adaptor.getLineage(), noLineage)});
+          i64(rewriter, op, adaptor.getLineage(), PIKOIR_NO_LINEAGE)});
     rewriter.eraseOp(op);
     return success();
   }
@@ -82,7 +89,7 @@ struct CheckEmitLowering : CheckLowering<CheckEmitOp> {
   matchAndRewrite(CheckEmitOp op, OpAdaptor,
                   ConversionPatternRewriter &rewriter) const override {
     rewriter.replaceOp(
-        op, call(rewriter, op, "pikoir_check_emit", {}, rewriter.getI64Type()));
+        op, call(rewriter, op, PIKO_RUNTIME_FUNCTION(pikoir_check_emit), {}));
     return success();
   }
 };
@@ -92,7 +99,8 @@ struct CheckPlaceLowering : CheckLowering<CheckPlaceOp> {
   LogicalResult
   matchAndRewrite(CheckPlaceOp op, OpAdaptor,
                   ConversionPatternRewriter &rewriter) const override {
-    call(rewriter, op, "pikoir_check_place", {place(rewriter, op)});
+    call(rewriter, op, PIKO_RUNTIME_FUNCTION(pikoir_check_place),
+         {place(rewriter, op)});
     rewriter.eraseOp(op);
     return success();
   }
@@ -105,7 +113,8 @@ struct CheckAccessLowering : CheckLowering<CheckAccessOp> {
                   ConversionPatternRewriter &rewriter) const override {
     int32_t state =
         context.numbers(op).states.lookup(op.getStateAttr().getAttr());
-    int64_t kind = int64_t(op.getKind()) | (op.getUpdates() ? updatesFlag : 0);
+    int64_t kind =
+        int64_t(op.getKind()) | (op.getUpdates() ? PIKOIR_CHECK_UPDATES : 0);
     SmallVector<Value> arguments{i32(rewriter, op, state),
                                  i32(rewriter, op, kind)};
     ValueRange indices = adaptor.getIndices();
@@ -113,7 +122,7 @@ struct CheckAccessLowering : CheckLowering<CheckAccessOp> {
       arguments.push_back(
           i64(rewriter, op, dim < indices.size() ? indices[dim] : Value(), 0));
     arguments.push_back(place(rewriter, op));
-    call(rewriter, op, "pikoir_check_access", arguments);
+    call(rewriter, op, PIKO_RUNTIME_FUNCTION(pikoir_check_access), arguments);
     rewriter.eraseOp(op);
     return success();
   }
@@ -124,7 +133,7 @@ struct CheckLoopLowering : CheckLowering<CheckLoopOp> {
   LogicalResult
   matchAndRewrite(CheckLoopOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
-    call(rewriter, op, "pikoir_check_loop",
+    call(rewriter, op, PIKO_RUNTIME_FUNCTION(pikoir_check_loop),
          {i32(rewriter, op, int64_t(op.getEvent())),
           i64(rewriter, op, adaptor.getIteration(), 0)});
     rewriter.eraseOp(op);
@@ -141,7 +150,7 @@ struct CheckValueLowering : CheckLowering<CheckValueOp> {
         context.numbers(op).records.lookup(op.getRecordAttr().getAttr());
     Value flag = arith::ExtUIOp::create(
         rewriter, op.getLoc(), rewriter.getI32Type(), adaptor.getFlag());
-    call(rewriter, op, "pikoir_check_value",
+    call(rewriter, op, PIKO_RUNTIME_FUNCTION(pikoir_check_value),
          {flag, i32(rewriter, op, int64_t(op.getKind())),
           i32(rewriter, op, record),
           context.text(rewriter, op.getLoc(), op.getField()),
@@ -156,11 +165,10 @@ struct CheckIndexLowering : CheckLowering<CheckIndexOp> {
   LogicalResult
   matchAndRewrite(CheckIndexOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
-    Value inside = call(rewriter, op, "pikoir_check_index",
+    Value inside = call(rewriter, op, PIKO_RUNTIME_FUNCTION(pikoir_check_index),
                         {toI64(rewriter, op.getLoc(), adaptor.getIndex()),
                          createI64(rewriter, op.getLoc(), op.getSize()),
-                         place(rewriter, op)},
-                        rewriter.getI64Type())
+                         place(rewriter, op)})
                        .getResult();
     rewriter.replaceOp(op, toIndex(rewriter, op.getLoc(), inside));
     return success();
@@ -172,8 +180,8 @@ struct CheckTripLowering : CheckLowering<CheckTripOp> {
   LogicalResult
   matchAndRewrite(CheckTripOp op, OpAdaptor,
                   ConversionPatternRewriter &rewriter) const override {
-    Value may = call(rewriter, op, "pikoir_check_trip", {place(rewriter, op)},
-                     rewriter.getI32Type())
+    Value may = call(rewriter, op, PIKO_RUNTIME_FUNCTION(pikoir_check_trip),
+                     {place(rewriter, op)})
                     .getResult();
     rewriter.replaceOpWithNewOp<arith::TruncIOp>(op, rewriter.getI1Type(), may);
     return success();

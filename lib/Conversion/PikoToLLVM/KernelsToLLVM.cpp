@@ -1,59 +1,36 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// Bins, writers and primitives, on the runtime's structs (pikort/abi.h).
+// Bins and primitives, on the runtime's structs (pikort/abi.h).
 
-#include "LoweringContext.h"
+#include "KernelLowering.h"
 
-#include "Piko/Dialect/Piko/IR/PikoCPU.h"
-#include "WriterPaths.h"
-
-#include "mlir/Conversion/LLVMCommon/MemRefBuilder.h"
-#include "mlir/Conversion/LLVMCommon/TypeConverter.h"
 #include "mlir/Dialect/SCF/IR/SCF.h"
 
 using namespace mlir;
 using namespace piko;
 
-// Byte offsets of the members of pikoir_input, pikoir_unit and pikoir_call.
+// Members of pikoir_input, pikoir_unit and pikoir_call.
 namespace layout {
-constexpr int64_t items = 0, order = 16, offsets = 24, units = 32,
-                  unitCount = 40, tiles = 48, calls = 56;
-constexpr int64_t cellBegin = 0, cellEnd = 8, begin = 16, end = 24,
-                  unitSize = 32;
-constexpr int64_t callBin = 0, callBegin = 8, callEnd = 16, callSize = 24;
+constexpr RuntimeMember items = PIKO_RUNTIME_MEMBER(pikoir_input, items),
+                        order = PIKO_RUNTIME_MEMBER(pikoir_input, order),
+                        offsets = PIKO_RUNTIME_MEMBER(pikoir_input, offsets),
+                        units = PIKO_RUNTIME_MEMBER(pikoir_input, units),
+                        unitCount =
+                            PIKO_RUNTIME_MEMBER(pikoir_input, unit_count),
+                        tiles = PIKO_RUNTIME_MEMBER(pikoir_input, tiles),
+                        calls = PIKO_RUNTIME_MEMBER(pikoir_input, calls);
+constexpr RuntimeMember cellBegin =
+                            PIKO_RUNTIME_MEMBER(pikoir_unit, cell_begin),
+                        cellEnd = PIKO_RUNTIME_MEMBER(pikoir_unit, cell_end),
+                        begin = PIKO_RUNTIME_MEMBER(pikoir_unit, begin),
+                        end = PIKO_RUNTIME_MEMBER(pikoir_unit, end);
+constexpr RuntimeMember callBin = PIKO_RUNTIME_MEMBER(pikoir_call, bin),
+                        callBegin = PIKO_RUNTIME_MEMBER(pikoir_call, begin),
+                        callEnd = PIKO_RUNTIME_MEMBER(pikoir_call, end);
+constexpr RuntimeMember offset = {0, ABIType::I64}; // an entry of offsets
 } // namespace layout
 
 namespace {
-
-template <typename OpT> struct Lowering : ContextPattern<OpT> {
-  using ContextPattern<OpT>::ContextPattern;
-  using ContextPattern<OpT>::context;
-
-  static Type pointer(OpBuilder &builder) {
-    return LLVM::LLVMPointerType::get(builder.getContext());
-  }
-  Value loadI64(OpBuilder &builder, Location loc, Value base,
-                int64_t offset) const {
-    return createLoad(builder, loc, builder.getI64Type(),
-                      createOffset(builder, loc, base, offset),
-                      context.tags.input());
-  }
-  /// A member of the pikoir_input.
-  Value number(OpBuilder &builder, Value bins, int64_t offset) const {
-    return context.member(builder, bins, offset, builder.getI64Type());
-  }
-  Value array(OpBuilder &builder, Value bins, int64_t offset) const {
-    return context.member(builder, bins, offset, pointer(builder));
-  }
-  /// The address of entry `index` of an array.
-  static Value entry(OpBuilder &builder, Location loc, Value array, Value index,
-                     int64_t size) {
-    Value bytes =
-        arith::MulIOp::create(builder, loc, toI64(builder, loc, index),
-                              createI64(builder, loc, size));
-    return createOffset(builder, loc, array, bytes);
-  }
-};
 
 struct OpenBinsLowering : Lowering<OpenBinsOp> {
   using Lowering::Lowering;
@@ -67,8 +44,8 @@ struct OpenBinsLowering : Lowering<OpenBinsOp> {
     Value input =
         context
             .call(rewriter, loc,
-                  source ? "pikoir_begin_source" : "pikoir_begin",
-                  pointer(rewriter),
+                  source ? PIKO_RUNTIME_FUNCTION(pikoir_begin_source)
+                         : PIKO_RUNTIME_FUNCTION(pikoir_begin),
                   {context.frame(op), createI32(rewriter, loc, number)})
             .getResult();
     // After an error there is nothing to do; pikoir_end gives its status.
@@ -91,13 +68,13 @@ struct CloseBinsLowering : Lowering<CloseBinsOp> {
     auto number = function->getAttrOfType<IntegerAttr>(numberAttrName);
     bool source = function->hasAttr(sourceAttrName);
     Location loc = op.getLoc();
-    Value status =
-        context
-            .call(
-                rewriter, loc, source ? "pikoir_end_source" : "pikoir_end",
-                rewriter.getI32Type(),
-                {context.frame(op), createI32(rewriter, loc, number.getInt())})
-            .getResult();
+    Value status = context
+                       .call(rewriter, loc,
+                             source ? PIKO_RUNTIME_FUNCTION(pikoir_end_source)
+                                    : PIKO_RUNTIME_FUNCTION(pikoir_end),
+                             {context.frame(op),
+                              createI32(rewriter, loc, number.getInt())})
+                       .getResult();
     Operation *end = function.getBody().front().getTerminator();
     rewriter.modifyOpInPlace(end, [&] { end->setOperand(0, status); });
     rewriter.eraseOp(op);
@@ -111,9 +88,9 @@ struct UnitCountLowering : Lowering<UnitCountOp> {
   matchAndRewrite(UnitCountOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
     Location loc = op.getLoc();
-    rewriter.replaceOp(
-        op, toIndex(rewriter, loc,
-                    number(rewriter, adaptor.getBins(), layout::unitCount)));
+    rewriter.replaceOp(op, toIndex(rewriter, loc,
+                                   context.member(rewriter, adaptor.getBins(),
+                                                  layout::unitCount)));
     return success();
   }
 };
@@ -124,11 +101,11 @@ struct UnitCellsLowering : Lowering<UnitCellsOp> {
   matchAndRewrite(UnitCellsOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
     Location loc = op.getLoc();
-    Value units = array(rewriter, adaptor.getBins(), layout::units);
+    Value units = context.member(rewriter, adaptor.getBins(), layout::units);
     Value unit =
-        entry(rewriter, loc, units, adaptor.getUnit(), layout::unitSize);
-    Value first = loadI64(rewriter, loc, unit, layout::cellBegin);
-    Value last = loadI64(rewriter, loc, unit, layout::cellEnd);
+        entry(rewriter, loc, units, adaptor.getUnit(), sizeof(pikoir_unit));
+    Value first = load(rewriter, loc, unit, layout::cellBegin);
+    Value last = load(rewriter, loc, unit, layout::cellEnd);
     rewriter.replaceOp(
         op, {toIndex(rewriter, loc, first), toIndex(rewriter, loc, last)});
     return success();
@@ -142,17 +119,19 @@ struct CellRangeLowering : Lowering<CellRangeOp> {
                   ConversionPatternRewriter &rewriter) const override {
     Location loc = op.getLoc();
     Value bins = adaptor.getBins();
-    Value units = array(rewriter, bins, layout::units);
+    Value units = context.member(rewriter, bins, layout::units);
     Value unit =
-        entry(rewriter, loc, units, adaptor.getUnit(), layout::unitSize);
-    Value offsets = array(rewriter, bins, layout::offsets);
-    Value cell = entry(rewriter, loc, offsets, adaptor.getCell(), 8);
-    Value begin =
-        arith::MaxSIOp::create(rewriter, loc, loadI64(rewriter, loc, cell, 0),
-                               loadI64(rewriter, loc, unit, layout::begin));
-    Value end =
-        arith::MinSIOp::create(rewriter, loc, loadI64(rewriter, loc, cell, 8),
-                               loadI64(rewriter, loc, unit, layout::end));
+        entry(rewriter, loc, units, adaptor.getUnit(), sizeof(pikoir_unit));
+    Value offsets = context.member(rewriter, bins, layout::offsets);
+    Value cell =
+        entry(rewriter, loc, offsets, adaptor.getCell(), sizeof(int64_t));
+    Value begin = arith::MaxSIOp::create(
+        rewriter, loc, load(rewriter, loc, cell, layout::offset),
+        load(rewriter, loc, unit, layout::begin));
+    Value end = arith::MinSIOp::create(
+        rewriter, loc,
+        load(rewriter, loc, cell, layout::offset, sizeof(int64_t)),
+        load(rewriter, loc, unit, layout::end));
     rewriter.replaceOp(
         op, {toIndex(rewriter, loc, begin), toIndex(rewriter, loc, end)});
     return success();
@@ -165,8 +144,9 @@ struct CellBinLowering : Lowering<CellBinOp> {
   matchAndRewrite(CellBinOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
     Location loc = op.getLoc();
-    Value tiles = toIndex(rewriter, loc,
-                          number(rewriter, adaptor.getBins(), layout::tiles));
+    Value tiles =
+        toIndex(rewriter, loc,
+                context.member(rewriter, adaptor.getBins(), layout::tiles));
     rewriter.replaceOpWithNewOp<arith::DivUIOp>(op, adaptor.getCell(), tiles);
     return success();
   }
@@ -175,10 +155,10 @@ struct CellBinLowering : Lowering<CellBinOp> {
 /// The address of a pikoir_call.
 static Value callEntry(ConversionPatternRewriter &rewriter, Location loc,
                        LoweringContext &context, Value bins, Value call) {
-  Value calls = context.member(rewriter, bins, layout::calls, bins.getType());
+  Value calls = context.member(rewriter, bins, layout::calls);
   Value bytes =
       arith::MulIOp::create(rewriter, loc, toI64(rewriter, loc, call),
-                            createI64(rewriter, loc, layout::callSize));
+                            createI64(rewriter, loc, sizeof(pikoir_call)));
   return createOffset(rewriter, loc, calls, bytes);
 }
 
@@ -190,8 +170,8 @@ struct CallRangeLowering : Lowering<CallRangeOp> {
     Location loc = op.getLoc();
     Value call =
         callEntry(rewriter, loc, context, adaptor.getBins(), adaptor.getCall());
-    Value begin = loadI64(rewriter, loc, call, layout::callBegin);
-    Value end = loadI64(rewriter, loc, call, layout::callEnd);
+    Value begin = load(rewriter, loc, call, layout::callBegin);
+    Value end = load(rewriter, loc, call, layout::callEnd);
     rewriter.replaceOp(
         op, {toIndex(rewriter, loc, begin), toIndex(rewriter, loc, end)});
     return success();
@@ -206,7 +186,7 @@ struct CallBinLowering : Lowering<CallBinOp> {
     Location loc = op.getLoc();
     Value call =
         callEntry(rewriter, loc, context, adaptor.getBins(), adaptor.getCall());
-    Value bin = loadI64(rewriter, loc, call, layout::callBin);
+    Value bin = load(rewriter, loc, call, layout::callBin);
     rewriter.replaceOp(op, toIndex(rewriter, loc, bin));
     return success();
   }
@@ -214,7 +194,7 @@ struct CallBinLowering : Lowering<CallBinOp> {
 
 /// What takes the address of a primitive.
 template <typename OpT> struct PositionLowering : Lowering<OpT> {
-  using Lowering<OpT>::Lowering, Lowering<OpT>::array, Lowering<OpT>::pointer,
+  using Lowering<OpT>::Lowering, Lowering<OpT>::context, Lowering<OpT>::pointer,
       Lowering<OpT>::entry;
 
   Value address(OpT op, typename OpT::Adaptor adaptor,
@@ -222,16 +202,17 @@ template <typename OpT> struct PositionLowering : Lowering<OpT> {
     Location loc = op.getLoc();
     Value bins = adaptor.getBins();
     Value position = toI64(rewriter, loc, adaptor.getPosition());
-    Value order = array(rewriter, bins, layout::order);
+    Value order = context.member(rewriter, bins, layout::order);
     Value null = LLVM::ZeroOp::create(rewriter, loc, pointer(rewriter));
     Value ordered = LLVM::ICmpOp::create(rewriter, loc, LLVM::ICmpPredicate::ne,
                                          order, null);
     auto choice = scf::IfOp::create(
         rewriter, loc, ordered,
         [&](OpBuilder &builder, Location loc) {
-          Value item = createLoad(builder, loc, builder.getI32Type(),
-                                  entry(builder, loc, order, position, 4),
-                                  this->context.tags.input());
+          Value item =
+              createLoad(builder, loc, builder.getI32Type(),
+                         entry(builder, loc, order, position, sizeof(uint32_t)),
+                         this->context.tags.input());
           Value wide =
               arith::ExtUIOp::create(builder, loc, builder.getI64Type(), item);
           scf::YieldOp::create(builder, loc, wide);
@@ -239,7 +220,7 @@ template <typename OpT> struct PositionLowering : Lowering<OpT> {
         [&](OpBuilder &builder, Location loc) {
           scf::YieldOp::create(builder, loc, position);
         });
-    Value items = array(rewriter, bins, layout::items);
+    Value items = context.member(rewriter, bins, layout::items);
     RecordOp record = this->context.record(op.getBins().getType().getRecord());
     return entry(rewriter, loc, items, choice.getResult(0), record.getSize());
   }
@@ -306,136 +287,6 @@ struct FromAddressLowering : Lowering<FromAddressOp> {
   }
 };
 
-struct OpenWriterLowering : Lowering<OpenWriterOp> {
-  using Lowering::Lowering;
-  LogicalResult
-  matchAndRewrite(OpenWriterOp op, OpAdaptor adaptor,
-                  ConversionPatternRewriter &rewriter) const override {
-    auto function = op->getParentOfType<func::FuncOp>();
-    auto number = function->getAttrOfType<IntegerAttr>(numberAttrName);
-    int64_t subject = op.getStage() ? context.stageNumber(op, *op.getStage())
-                                    : number.getInt();
-    Location loc = op.getLoc();
-    rewriter.replaceOp(
-        op,
-        context.call(rewriter, loc,
-                     function->hasAttr(sourceAttrName) ? "pikoir_open_source"
-                                                       : "pikoir_open",
-                     pointer(rewriter),
-                     {context.frame(op), createI32(rewriter, loc, subject),
-                      toI64(rewriter, loc, adaptor.getUnit())}));
-    return success();
-  }
-};
-
-struct LocalBinLowering : Lowering<LocalBinOp> {
-  using Lowering::Lowering;
-  LogicalResult
-  matchAndRewrite(LocalBinOp op, OpAdaptor adaptor,
-                  ConversionPatternRewriter &rewriter) const override {
-    Location loc = op.getLoc();
-    Value port = createI32(rewriter, loc, op.getPort());
-    Value bins = context
-                     .call(rewriter, loc, "pikoir_begin_local",
-                           pointer(rewriter), {adaptor.getSource(), port})
-                     .getResult();
-    rewriter.inlineBlockBefore(op.getBodyBlock(), op, bins);
-    context.call(rewriter, loc, "pikoir_end_local", Type(),
-                 {adaptor.getSource(), port});
-    rewriter.eraseOp(op);
-    return success();
-  }
-};
-
-/// An operation that is a call with the writer for its argument.
-template <typename OpT, const char *const *name>
-struct WriterCallLowering : Lowering<OpT> {
-  using Lowering<OpT>::Lowering;
-  LogicalResult
-  matchAndRewrite(OpT op, typename OpT::Adaptor adaptor,
-                  ConversionPatternRewriter &rewriter) const override {
-    this->context.call(rewriter, op.getLoc(), *name, Type(),
-                       adaptor.getWriter());
-    rewriter.eraseOp(op);
-    return success();
-  }
-};
-constexpr const char *closeName = "pikoir_close";
-constexpr const char *deferEndName = "pikoir_defer_end";
-
-struct NextLowering : Lowering<NextOp> {
-  using Lowering::Lowering;
-  LogicalResult
-  matchAndRewrite(NextOp op, OpAdaptor adaptor,
-                  ConversionPatternRewriter &rewriter) const override {
-    createNext(rewriter, op.getLoc(), context, adaptor.getWriter());
-    rewriter.eraseOp(op);
-    return success();
-  }
-};
-
-/// An operation that is a call with the writer and a number for its arguments.
-template <typename OpT, const char *const *name>
-struct WriterNumberLowering : Lowering<OpT> {
-  using Lowering<OpT>::Lowering;
-  LogicalResult
-  matchAndRewrite(OpT op, typename OpT::Adaptor adaptor,
-                  ConversionPatternRewriter &rewriter) const override {
-    Value number = toI64(rewriter, op.getLoc(), adaptor.getOperands().back());
-    this->context.call(rewriter, op.getLoc(), *name, Type(),
-                       {adaptor.getWriter(), number});
-    rewriter.eraseOp(op);
-    return success();
-  }
-};
-constexpr const char *deferBeginName = "pikoir_defer_begin";
-constexpr const char *deferIterationName = "pikoir_defer_iteration";
-constexpr const char *scratchReleaseName = "pikoir_scratch_release";
-
-struct ScratchMarkLowering : Lowering<ScratchMarkOp> {
-  using Lowering::Lowering;
-  LogicalResult
-  matchAndRewrite(ScratchMarkOp op, OpAdaptor adaptor,
-                  ConversionPatternRewriter &rewriter) const override {
-    rewriter.replaceOp(
-        op, context.call(rewriter, op.getLoc(), "pikoir_scratch_mark",
-                         rewriter.getI64Type(), adaptor.getWriter()));
-    return success();
-  }
-};
-
-struct ScratchLowering : Lowering<ScratchOp> {
-  using Lowering::Lowering;
-  LogicalResult
-  matchAndRewrite(ScratchOp op, OpAdaptor adaptor,
-                  ConversionPatternRewriter &rewriter) const override {
-    Location loc = op.getLoc();
-    Value size = toI64(rewriter, loc, adaptor.getSize());
-    Value memory = context
-                       .call(rewriter, loc, "pikoir_scratch", pointer(rewriter),
-                             {adaptor.getWriter(), size})
-                       .getResult();
-    Value null = LLVM::ZeroOp::create(rewriter, loc, pointer(rewriter));
-    Value granted = LLVM::ICmpOp::create(rewriter, loc, LLVM::ICmpPredicate::ne,
-                                         memory, null);
-    // As the conversion of memrefs will see it.
-    auto bytes = cast<MemRefType>(op.getBytes().getType());
-    LLVMTypeConverter types(rewriter.getContext());
-    auto descriptor =
-        MemRefDescriptor::poison(rewriter, loc, types.convertType(bytes));
-    descriptor.setAllocatedPtr(rewriter, loc, memory);
-    descriptor.setAlignedPtr(rewriter, loc, memory);
-    descriptor.setConstantOffset(rewriter, loc, 0);
-    descriptor.setSize(rewriter, loc, 0, size);
-    descriptor.setConstantStride(rewriter, loc, 0, 1);
-    Value memref = UnrealizedConversionCastOp::create(rewriter, loc, bytes,
-                                                      Value(descriptor))
-                       .getResult(0);
-    rewriter.replaceOp(op, {memref, granted});
-    return success();
-  }
-};
-
 struct BeginScheduleLowering : Lowering<BeginScheduleOp> {
   using Lowering::Lowering;
   LogicalResult
@@ -445,7 +296,7 @@ struct BeginScheduleLowering : Lowering<BeginScheduleOp> {
     int32_t number = context.stageNumber(op, op.getStage());
     Value bins =
         context
-            .call(rewriter, loc, "pikoir_begin_schedule", rewriter.getI64Type(),
+            .call(rewriter, loc, PIKO_RUNTIME_FUNCTION(pikoir_begin_schedule),
                   {context.frame(op), createI32(rewriter, loc, number)})
             .getResult();
     // The kernel's status is that of what it says about the bins.
@@ -454,16 +305,20 @@ struct BeginScheduleLowering : Lowering<BeginScheduleOp> {
     {
       OpBuilder::InsertionGuard guard(rewriter);
       rewriter.setInsertionPoint(end);
-      Value status = context
-                         .call(rewriter, loc, "pikoir_status",
-                               rewriter.getI32Type(), context.frame(op))
-                         .getResult();
+      Value status =
+          context
+              .call(rewriter, loc, PIKO_RUNTIME_FUNCTION(pikoir_status),
+                    context.frame(op))
+              .getResult();
       rewriter.modifyOpInPlace(end, [&] { end->setOperand(0, status); });
     }
     rewriter.replaceOp(op, toIndex(rewriter, loc, bins));
     return success();
   }
 };
+
+// piko.schedule_bin says so, too.
+static_assert(PIKOIR_NO_BATCH == std::numeric_limits<int64_t>::min());
 
 struct ScheduleBinLowering : Lowering<ScheduleBinOp> {
   using Lowering::Lowering;
@@ -474,81 +329,12 @@ struct ScheduleBinLowering : Lowering<ScheduleBinOp> {
     int32_t number = context.stageNumber(op, op.getStage());
     Value everyBin = arith::ExtUIOp::create(
         rewriter, loc, rewriter.getI32Type(), adaptor.getEveryBin());
-    context.call(rewriter, loc, "pikoir_schedule_bin", Type(),
+    context.call(rewriter, loc, PIKO_RUNTIME_FUNCTION(pikoir_schedule_bin),
                  {context.frame(op), createI32(rewriter, loc, number),
                   toI64(rewriter, loc, adaptor.getBin()), adaptor.getKind(),
                   adaptor.getTileSplit(), adaptor.getBatch(), everyBin});
     rewriter.eraseOp(op);
     return success();
-  }
-};
-
-struct AppendLowering : Lowering<AppendOp> {
-  using Lowering::Lowering;
-  LogicalResult
-  matchAndRewrite(AppendOp op, OpAdaptor adaptor,
-                  ConversionPatternRewriter &rewriter) const override {
-    Location loc = op.getLoc();
-    RecordOp record = context.record(op.getPrim().getType().getRecord());
-    Value room =
-        createAppend(rewriter, loc, context, adaptor.getWriter(), op.getPort());
-    SmallVector<ArrayAttr> tags; // of each number
-    for (auto field : record.getFields().getAsRange<FieldAttr>())
-      tags.append(field.getElementCount(),
-                  context.tags.primitive(record.getSymName(), field.getName()));
-    for (auto [value, offset, tag] :
-         llvm::zip(adaptor.getValues(), record.getElementOffsets(), tags))
-      createStore(rewriter, loc, value,
-                  createOffset(rewriter, loc, room, offset), tag);
-    rewriter.replaceOp(op, room);
-    return success();
-  }
-};
-
-struct PlaceLowering : Lowering<AppendBinOp> {
-  using Lowering::Lowering;
-  LogicalResult
-  matchAndRewrite(AppendBinOp op, OpAdaptor adaptor,
-                  ConversionPatternRewriter &rewriter) const override {
-    Location loc = op.getLoc();
-    Value cell = toI64(rewriter, loc, adaptor.getBin());
-    StageOp stage = context.stage(op, op.getStageAttr());
-    if (adaptor.getTile()) {
-      int32_t number = context.stageNumber(op, op.getStage());
-      for (int64_t dim = 0, e = stage.getBins().size(); dim < e; ++dim)
-        cell = arith::MulIOp::create(
-            rewriter, loc, cell,
-            context.query(rewriter, op, "pikoir_cell_grid", number, dim));
-      cell = arith::AddIOp::create(rewriter, loc, cell,
-                                   toI64(rewriter, loc, adaptor.getTile()));
-    }
-    if (op.getPort() && isLocal(op))
-      createLocalPlace(rewriter, loc, context, adaptor.getWriter(),
-                       *op.getPort(), cell);
-    else if (op.getPort())
-      createPlace(rewriter, loc, context, adaptor.getWriter(), *op.getPort(),
-                  cell);
-    else
-      context.call(rewriter, loc, "pikoir_place_source", Type(),
-                   {adaptor.getWriter(), cell});
-    rewriter.eraseOp(op);
-    return success();
-  }
-
-private:
-  /// Whether the edge is local, or each of them if several may be meant.
-  bool isLocal(AppendBinOp op) const {
-    bool isLocal = false;
-    PipelineOp pipeline = context.numbers(op).pipeline;
-    for (auto edge : pipeline.getOps<EdgeOp>()) {
-      if (edge.getPort() != *op.getPort() ||
-          edge.getConsumerAttr() != op.getStageAttr())
-        continue;
-      if (!edge.getLocal())
-        return false;
-      isLocal = true;
-    }
-    return isLocal;
   }
 };
 
@@ -575,9 +361,11 @@ struct GridLowering : Lowering<GridOp> {
   LogicalResult
   matchAndRewrite(GridOp op, OpAdaptor,
                   ConversionPatternRewriter &rewriter) const override {
-    Value extent = context.query(
-        rewriter, op, op.getTiles() ? "pikoir_cell_grid" : "pikoir_grid",
-        context.stageNumber(op, op.getStage()), op.getDim());
+    Value extent =
+        context.query(rewriter, op,
+                      op.getTiles() ? PIKO_RUNTIME_FUNCTION(pikoir_cell_grid)
+                                    : PIKO_RUNTIME_FUNCTION(pikoir_grid),
+                      context.stageNumber(op, op.getStage()), op.getDim());
     rewriter.replaceOp(op, toIndex(rewriter, op.getLoc(), extent));
     return success();
   }
@@ -589,7 +377,8 @@ struct DomainLowering : Lowering<DomainOp> {
   matchAndRewrite(DomainOp op, OpAdaptor,
                   ConversionPatternRewriter &rewriter) const override {
     Value extent =
-        context.query(rewriter, op, "pikoir_domain", std::nullopt, op.getDim());
+        context.query(rewriter, op, PIKO_RUNTIME_FUNCTION(pikoir_domain),
+                      std::nullopt, op.getDim());
     rewriter.replaceOp(op, toIndex(rewriter, op.getLoc(), extent));
     return success();
   }
@@ -600,9 +389,9 @@ struct ThreadsLowering : Lowering<ThreadsOp> {
   LogicalResult
   matchAndRewrite(ThreadsOp op, OpAdaptor,
                   ConversionPatternRewriter &rewriter) const override {
-    rewriter.replaceOp(op,
-                       context.call(rewriter, op.getLoc(), "pikoir_threads",
-                                    rewriter.getI32Type(), context.frame(op)));
+    rewriter.replaceOp(op, context.call(rewriter, op.getLoc(),
+                                        PIKO_RUNTIME_FUNCTION(pikoir_threads),
+                                        context.frame(op)));
     return success();
   }
 };
@@ -616,14 +405,9 @@ void piko::populateKernelToLLVMPatterns(const TypeConverter &converter,
                UnitCellsLowering, CellRangeLowering, CellBinLowering,
                CallRangeLowering, CallBinLowering, ItemLowering,
                PrefetchItemLowering, NoItemLowering, ToAddressLowering,
-               FromAddressLowering, OpenWriterLowering, LocalBinLowering,
-               WriterCallLowering<CloseWriterOp, &closeName>, NextLowering,
-               WriterCallLowering<DeferEndOp, &deferEndName>,
-               WriterNumberLowering<DeferBeginOp, &deferBeginName>,
-               WriterNumberLowering<DeferIterationOp, &deferIterationName>,
-               WriterNumberLowering<ScratchReleaseOp, &scratchReleaseName>,
-               ScratchMarkLowering, ScratchLowering, BeginScheduleLowering,
-               ScheduleBinLowering, AppendLowering, PlaceLowering, GetLowering,
+               FromAddressLowering,
+
+               BeginScheduleLowering, ScheduleBinLowering, GetLowering,
                GridLowering, DomainLowering, ThreadsLowering>(
       converter, patterns.getContext(), context);
 }

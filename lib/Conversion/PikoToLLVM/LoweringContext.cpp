@@ -7,6 +7,20 @@
 using namespace mlir;
 using namespace piko;
 
+Type piko::convertType(MLIRContext *context, ABIType type) {
+  switch (type) {
+  case ABIType::None:
+    return LLVM::LLVMVoidType::get(context);
+  case ABIType::I32:
+    return IntegerType::get(context, 32);
+  case ABIType::I64:
+    return IntegerType::get(context, 64);
+  case ABIType::Address:
+    return LLVM::LLVMPointerType::get(context);
+  }
+  llvm_unreachable("a type of the runtime's");
+}
+
 PipelineNumbers::PipelineNumbers(PipelineOp pipeline) : pipeline(pipeline) {
   // Lineage roots of collecting stages count in the order of their numbers.
   SmallVector<StageOp> ordered(pipeline.getOps<StageOp>());
@@ -97,23 +111,27 @@ StateView &LoweringContext::view(OpBuilder &builder, Operation *op,
   auto pointer = LLVM::LLVMPointerType::get(builder.getContext());
   int32_t number =
       numbers(op).states.lookup(StringAttr::get(op->getContext(), state));
-  Value view = call(builder, loc, "pikoir_get_state", pointer,
+  Value view = call(builder, loc, PIKO_RUNTIME_FUNCTION(pikoir_get_state),
                     {frame(op), createI32(builder, loc, number)})
                    .getResult();
-  it->second.data = LLVM::LoadOp::create(builder, loc, pointer, view);
+  auto data = PIKO_RUNTIME_MEMBER(pikoir_state, data);
+  it->second.data = LLVM::LoadOp::create(
+      builder, loc, pointer, createOffset(builder, loc, view, data.offset));
+  constexpr int64_t extent = offsetof(pikoir_state, extent);
   for (int64_t dim = 0; dim < 4; ++dim)
-    it->second.extents.push_back(
-        LLVM::LoadOp::create(builder, loc, builder.getI64Type(),
-                             createOffset(builder, loc, view, 8 + 8 * dim)));
+    it->second.extents.push_back(LLVM::LoadOp::create(
+        builder, loc, builder.getI64Type(),
+        createOffset(builder, loc, view, extent + 8 * dim)));
   return it->second;
 }
 
 Value LoweringContext::query(OpBuilder &builder, Operation *op,
-                             StringRef function, std::optional<int32_t> stage,
-                             int64_t dim) {
+                             const RuntimeFunction &function,
+                             std::optional<int32_t> stage, int64_t dim) {
   auto parent = op->getParentOfType<func::FuncOp>();
   std::string key =
-      (function + "/" + Twine(stage.value_or(-1)) + "/" + Twine(dim)).str();
+      (function.name + "/" + Twine(stage.value_or(-1)) + "/" + Twine(dim))
+          .str();
   Value &known = queries[parent][key];
   if (known)
     return known;
@@ -123,26 +141,23 @@ Value LoweringContext::query(OpBuilder &builder, Operation *op,
   SmallVector<Value> arguments{frame(op)};
   if (stage)
     arguments.push_back(createI32(builder, loc, *stage));
-  Value entries =
-      call(builder, loc, function,
-           LLVM::LLVMPointerType::get(builder.getContext()), arguments)
-          .getResult();
+  Value entries = call(builder, loc, function, arguments).getResult();
   return known =
              LLVM::LoadOp::create(builder, loc, builder.getI64Type(),
                                   createOffset(builder, loc, entries, 8 * dim));
 }
 
-Value LoweringContext::member(OpBuilder &builder, Value bins, int64_t offset,
-                              Type type) {
-  Value &known = members[{bins, offset}];
+Value LoweringContext::member(OpBuilder &builder, Value bins,
+                              const RuntimeMember &which) {
+  Value &known = members[{bins, which.offset}];
   if (known)
     return known;
   OpBuilder::InsertionGuard guard(builder);
   builder.setInsertionPointAfterValue(bins);
   Location loc = bins.getLoc();
-  return known =
-             createLoad(builder, loc, type,
-                        createOffset(builder, loc, bins, offset), tags.input());
+  return known = createLoad(
+             builder, loc, convertType(bins.getContext(), which.type),
+             createOffset(builder, loc, bins, which.offset), tags.input());
 }
 
 /// Whether a function of the runtime is hardly ever called, though there is a
@@ -153,22 +168,27 @@ static bool isCold(StringRef function) {
 }
 
 LLVM::CallOp LoweringContext::call(OpBuilder &builder, Location loc,
-                                   StringRef function, Type result,
+                                   const RuntimeFunction &function,
                                    ValueRange arguments) {
-  auto callee = module.lookupSymbol<LLVM::LLVMFuncOp>(function);
+  assert(arguments.size() == function.count && "as in pikort/abi.h");
+  auto callee = module.lookupSymbol<LLVM::LLVMFuncOp>(function.name);
   if (!callee) {
     OpBuilder::InsertionGuard guard(builder);
     builder.setInsertionPointToStart(module.getBody());
-    auto type = LLVM::LLVMFunctionType::get(
-        result ? result : LLVM::LLVMVoidType::get(builder.getContext()),
-        llvm::to_vector(arguments.getTypes()));
-    callee = LLVM::LLVMFuncOp::create(builder, loc, function, type);
-    if (isCold(function))
+    SmallVector<Type> parameters;
+    for (ABIType type :
+         ArrayRef(function.parameters).take_front(function.count))
+      parameters.push_back(convertType(builder.getContext(), type));
+    callee = LLVM::LLVMFuncOp::create(
+        builder, loc, function.name,
+        LLVM::LLVMFunctionType::get(
+            convertType(builder.getContext(), function.result), parameters));
+    if (isCold(function.name))
       callee.setPassthroughAttr(
           builder.getArrayAttr(builder.getStringAttr("cold")));
   }
   auto call = LLVM::CallOp::create(builder, loc, callee, arguments);
-  if (ArrayAttr tag = tags.call(function))
+  if (ArrayAttr tag = tags.call(function.name))
     call.setTbaaAttr(tag);
   return call;
 }

@@ -8,6 +8,8 @@
 #define PIKO_LIB_CONVERSION_PIKOTOLLVM_LOWERINGCONTEXT_H
 
 #include "AliasTags.h"
+#include "RuntimeABI.h"
+
 #include "Piko/Conversion/Passes.h"
 
 #include "mlir/Transforms/DialectConversion.h"
@@ -60,17 +62,17 @@ public:
   /// Entry `dim` (i64) of what one of the runtime's queries (the domain, or the
   /// grid of a stage) points to.
   mlir::Value query(mlir::OpBuilder &builder, mlir::Operation *op,
-                    mlir::StringRef function, std::optional<int32_t> stage,
-                    int64_t dim);
+                    const RuntimeFunction &function,
+                    std::optional<int32_t> stage, int64_t dim);
 
   /// A member of the pikoir_input that a kernel was given, loaded where it is
   /// given: a grid of blocks gets it as an argument.
-  mlir::Value member(mlir::OpBuilder &builder, mlir::Value bins, int64_t offset,
-                     mlir::Type type);
+  mlir::Value member(mlir::OpBuilder &builder, mlir::Value bins,
+                     const RuntimeMember &which);
 
   /// Calls a function of the runtime, declared on first use.
   mlir::LLVM::CallOp call(mlir::OpBuilder &builder, mlir::Location loc,
-                          mlir::StringRef function, mlir::Type result,
+                          const RuntimeFunction &function,
                           mlir::ValueRange arguments);
 
   /// The name of a constant of at least so many zero bytes.
@@ -128,8 +130,12 @@ mlir::Value createFieldAddress(mlir::OpBuilder &builder, mlir::Location loc,
                                mlir::Value record, FieldAttr field,
                                mlir::ValueRange elements);
 
-/// Patterns for the storage of bins, for state, and for checking mode.
+/// Patterns for the storage of bins, for writers, for state, and for checking
+/// mode.
 void populateKernelToLLVMPatterns(const mlir::TypeConverter &converter,
+                                  mlir::RewritePatternSet &patterns,
+                                  LoweringContext &context);
+void populateWriterToLLVMPatterns(const mlir::TypeConverter &converter,
                                   mlir::RewritePatternSet &patterns,
                                   LoweringContext &context);
 void populateStateToLLVMPatterns(const mlir::TypeConverter &converter,

@@ -153,6 +153,7 @@ LogicalResult ConvertPikoToLLVMPass::convert(PipelineOp pipeline,
                                                        target);
   patterns.add<SelectLowering, PoisonLowering>(converter, &getContext());
   populateKernelToLLVMPatterns(converter, patterns, context);
+  populateWriterToLLVMPatterns(converter, patterns, context);
   populateStateToLLVMPatterns(converter, patterns, context);
   populateChecksToLLVMPatterns(converter, patterns, context);
   FrozenRewritePatternSet frozen(std::move(patterns));
@@ -180,8 +181,8 @@ void ConvertPikoToLLVMPass::runOnOperation() {
   OpBuilder builder(module.getBodyRegion());
   SmallVector<PipelineOp> pipelines(module.getOps<PipelineOp>());
   if (!pipelines.empty()) {
-    // The size of pikoir_input: what a kernel works on after an error.
-    constexpr int64_t words = 9;
+    // What a kernel works on after an error.
+    constexpr int64_t words = sizeof(pikoir_input) / sizeof(int64_t);
     auto type = LLVM::LLVMArrayType::get(builder.getI64Type(), words);
     LLVM::GlobalOp::create(builder, module.getLoc(), type, /*isConstant=*/true,
                            LLVM::Linkage::Internal, "piko.no_input",

@@ -35,10 +35,10 @@ private:
     return LLVM::ZeroOp::create(
         builder, loc, LLVM::LLVMPointerType::get(builder.getContext()));
   }
-  void call(StringRef function, ArrayRef<Value> arguments) {
+  void call(const RuntimeFunction &function, ArrayRef<Value> arguments) {
     SmallVector<Value> all{frame};
     llvm::append_range(all, arguments);
-    context.call(builder, loc, function, Type(), all);
+    context.call(builder, loc, function, all);
   }
 
   void declareRecord(StringAttr name, int32_t number);
@@ -77,25 +77,26 @@ Value SetupWriter::bytes(StringRef data) {
 
 static int64_t fieldType(Type type) {
   if (type.isF32())
-    return 0;
+    return PIKORT_F32;
   if (type.isF64())
-    return 1;
+    return PIKORT_F64;
   switch (type.getIntOrFloatBitWidth()) {
   case 8:
-    return 2;
+    return PIKORT_I8;
   case 16:
-    return 3;
+    return PIKORT_I16;
   case 32:
-    return 4;
+    return PIKORT_I32;
   default:
-    return 5;
+    return PIKORT_I64;
   }
 }
 
 void SetupWriter::declareRecord(StringAttr name, int32_t number) {
   RecordOp record = context.record(FlatSymbolRefAttr::get(name));
-  call("pikoir_declare_record", {i32(number), text(name), i64(record.getSize()),
-                                 i64(record.getAlign())});
+  call(
+      PIKO_RUNTIME_FUNCTION(pikoir_declare_record),
+      {i32(number), text(name), i64(record.getSize()), i64(record.getAlign())});
   for (auto field : record.getFields().getAsRange<FieldAttr>())
     declareField(field, number);
 }
@@ -112,7 +113,7 @@ void SetupWriter::declareField(FieldAttr field, int32_t record) {
     std::string name = field.getName().str();
     if (!isEven)
       name += "[" + std::to_string(row) + "]";
-    call("pikoir_declare_field",
+    call(PIKO_RUNTIME_FUNCTION(pikoir_declare_field),
          {i32(record), text(name), i32(fieldType(field.getType())),
           i64(field.getElementOffset(row * rowLength)), i64(rowLength),
           i64(strides.empty() ? 0 : strides.back())});
@@ -124,12 +125,12 @@ void SetupWriter::declareCheckedRecord(CheckRecordOp check) {
     return i32(numbers.records.lookup(record.getAttr()));
   };
   RecordOp record = context.record(check.getRecordAttr());
-  call("pikoir_declare_checked_record",
+  call(PIKO_RUNTIME_FUNCTION(pikoir_declare_checked_record),
        {number(check.getRecordAttr()), number(check.getHostAttr()),
         i64(record.getField(lineageField).getOffset())});
   if (ArrayAttr fields = check.getNumbersAttr())
     for (auto field : fields.getAsRange<StringAttr>())
-      call("pikoir_declare_number",
+      call(PIKO_RUNTIME_FUNCTION(pikoir_declare_number),
            {number(check.getHostAttr()), text(field.getValue())});
 }
 
@@ -153,11 +154,11 @@ void SetupWriter::declareState(Operation *state, int32_t number) {
   auto buffer = dyn_cast<BufferOp>(state);
   auto constant = dyn_cast<ConstantOp>(state);
   int64_t perSource = buffer ? buffer.getPerSource().value_or(-1) : -1;
-  call("pikoir_declare_state",
+  call(PIKO_RUNTIME_FUNCTION(pikoir_declare_state),
        {i32(number), text(SymbolTable::getSymbolName(state)),
-        i32(image    ? 2
-            : buffer ? 1
-                     : 0),
+        i32(image    ? PIKORT_IMAGE
+            : buffer ? PIKORT_BUFFER
+                     : PIKORT_CONSTANT),
         i32(numbers.records.lookup(getStateRecord(state).getAttr())),
         i32(getStateRank(state)), i32(perSource),
         image ? recordBytes(image.getRecordAttr(), image.getClearAttr())
@@ -165,19 +166,27 @@ void SetupWriter::declareState(Operation *state, int32_t number) {
             ? recordBytes(constant.getRecordAttr(), constant.getValueAttr())
             : null()});
   if (numbers.writtenBuffers.contains(SymbolTable::getSymbolName(state)))
-    call("pikoir_declare_written", {i32(number)});
+    call(PIKO_RUNTIME_FUNCTION(pikoir_declare_written), {i32(number)});
   if (numbers.unusedBuffers.contains(SymbolTable::getSymbolName(state)))
-    call("pikoir_declare_unused", {i32(number)});
+    call(PIKO_RUNTIME_FUNCTION(pikoir_declare_unused), {i32(number)});
 }
+
+// A dialect's schedule is the runtime's by number.
+static_assert(int(ScheduleKind::LoadBalance) == PIKOIR_LOAD_BALANCE &&
+              int(ScheduleKind::DirectMap) == PIKOIR_DIRECT_MAP &&
+              int(ScheduleKind::Serialize) == PIKOIR_SERIALIZE &&
+              int(ScheduleKind::All) == PIKOIR_ALL);
 
 /// pikoir_stage_flags
 static int64_t stageFlags(StageOp stage) {
   ScheduleOp schedule = stage.getSchedule();
-  return (stage.collects() ? 1 : 0) | (stage.getSplit() ? 2 : 0) |
-         (stage.getPlaced() ? 4 : 0) |
-         (schedule && schedule.getUnordered() ? 8 : 0) |
-         (stage.getTakesList() ? 16 : 0) | (stage.getOrdered() ? 32 : 0) |
-         (stage.getWrites() ? 64 : 0);
+  return (stage.collects() ? PIKOIR_COLLECTS : 0) |
+         (stage.getSplit() ? PIKOIR_SPLIT : 0) |
+         (stage.getPlaced() ? PIKOIR_PLACED : 0) |
+         (schedule && schedule.getUnordered() ? PIKOIR_UNORDERED : 0) |
+         (stage.getTakesList() ? PIKOIR_LIST : 0) |
+         (stage.getOrdered() ? PIKOIR_ORDERED : 0) |
+         (stage.getWrites() ? PIKOIR_WRITES : 0);
 }
 
 /// The bytes of a number.
@@ -191,7 +200,7 @@ void SetupWriter::declareStage(StageOp stage, int32_t number) {
   for (int64_t extent : stage.getBins())
     appendBytes(extents, extent, 8);
   ScheduleOp schedule = stage.getSchedule();
-  call("pikoir_declare_stage",
+  call(PIKO_RUNTIME_FUNCTION(pikoir_declare_stage),
        {i32(number), text(getCppName(stage)),
         i32(numbers.records.lookup(stage.getInputAttr().getAttr())),
         bytes(extents), i32(schedule ? int64_t(schedule.getKind()) : 0),
@@ -200,12 +209,12 @@ void SetupWriter::declareStage(StageOp stage, int32_t number) {
   if (!schedule)
     return;
   if (schedule.getBatch() || schedule.getEveryBin())
-    call("pikoir_declare_schedule",
+    call(PIKO_RUNTIME_FUNCTION(pikoir_declare_schedule),
          {i32(number), i64(schedule.getBatch().value_or(0)),
           i32(schedule.getEveryBin())});
   if (ArrayAttr waits = schedule.getEndStageAttr())
     for (auto name : waits.getAsRange<FlatSymbolRefAttr>())
-      call("pikoir_declare_wait",
+      call(PIKO_RUNTIME_FUNCTION(pikoir_declare_wait),
            {i32(number), i32(numbers.stages.lookup(name.getAttr()))});
 }
 
@@ -228,13 +237,13 @@ void SetupWriter::declareStrips(StripsOp strips, int32_t number,
   std::string list;
   for (int64_t stage : stages)
     appendBytes(list, stage, 4);
-  call("pikoir_declare_strips",
+  call(PIKO_RUNTIME_FUNCTION(pikoir_declare_strips),
        {i32(number), i32(strips.getSource()),
         i64(strips.getChunk().value_or(0)), bytes(list), i32(stages.size())});
 }
 
 void SetupWriter::run(ArrayRef<func::FuncOp> kernels) {
-  call("pikoir_declare_pipeline",
+  call(PIKO_RUNTIME_FUNCTION(pikoir_declare_pipeline),
        {text(pipeline.getSymName()), i32(pipeline.getRank())});
   for (auto [name, number] : numbers.records)
     declareRecord(name, number);
@@ -244,16 +253,17 @@ void SetupWriter::run(ArrayRef<func::FuncOp> kernels) {
     declareStage(cast<StageOp>(SymbolTable::lookupSymbolIn(pipeline, name)),
                  number);
   for (auto [index, source] : llvm::enumerate(pipeline.getOps<SourceOp>()))
-    call("pikoir_declare_source",
+    call(PIKO_RUNTIME_FUNCTION(pikoir_declare_source),
          {i32(index),
           i32(numbers.stages.lookup(source.getStageAttr().getAttr()))});
   for (auto edge : pipeline.getOps<EdgeOp>()) {
     int32_t producer = numbers.stages.lookup(edge.getProducerAttr().getAttr());
-    call("pikoir_declare_edge",
+    call(PIKO_RUNTIME_FUNCTION(pikoir_declare_edge),
          {i32(producer), i32(edge.getPort()),
           i32(numbers.stages.lookup(edge.getConsumerAttr().getAttr()))});
     if (edge.getLocal())
-      call("pikoir_declare_local", {i32(producer), i32(edge.getPort())});
+      call(PIKO_RUNTIME_FUNCTION(pikoir_declare_local),
+           {i32(producer), i32(edge.getPort())});
   }
   for (auto [name, number] : numbers.states)
     declareState(SymbolTable::lookupSymbolIn(pipeline, name), number);
@@ -329,7 +339,7 @@ void RunWriter::createCycle(ArrayRef<func::FuncOp> members) {
   builder.setInsertionPointToEnd(step);
   Value next =
       context
-          .call(builder, loc, "pikoir_cycle_step", builder.getI32Type(),
+          .call(builder, loc, PIKO_RUNTIME_FUNCTION(pikoir_cycle_step),
                 {frame, createI32(builder, loc, stageNumber(members.front()))})
           .getResult();
   Value ended = arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::slt,
@@ -349,7 +359,7 @@ void RunWriter::createCycle(ArrayRef<func::FuncOp> members) {
                        SmallVector<ValueRange>(calls.size()));
 
   builder.setInsertionPointToEnd(after);
-  check(context.call(builder, loc, "pikoir_status", builder.getI32Type(), frame)
+  check(context.call(builder, loc, PIKO_RUNTIME_FUNCTION(pikoir_status), frame)
             .getResult(),
         createBlock(exit));
 }
@@ -383,7 +393,7 @@ void RunWriter::createStrips(int64_t number, ArrayRef<func::FuncOp> kernels) {
   builder.setInsertionPointToEnd(next);
   Value more =
       context
-          .call(builder, loc, "pikoir_strips_next", builder.getI32Type(),
+          .call(builder, loc, PIKO_RUNTIME_FUNCTION(pikoir_strips_next),
                 {frame, createI32(builder, loc, number)})
           .getResult();
   Value ended = arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::eq,
@@ -399,7 +409,7 @@ void RunWriter::createStrips(int64_t number, ArrayRef<func::FuncOp> kernels) {
   exit = outer;
 
   builder.setInsertionPointToEnd(after);
-  check(context.call(builder, loc, "pikoir_status", builder.getI32Type(), frame)
+  check(context.call(builder, loc, PIKO_RUNTIME_FUNCTION(pikoir_status), frame)
             .getResult(),
         createBlock(exit));
 }

@@ -158,9 +158,6 @@ struct ExtentLowering : ContextPattern<ExtentOp> {
   }
 };
 
-// pikort_status
-constexpr int64_t updateOutside = 17, indexOutside = 18, noQuotient = 23;
-
 /// Up to two coordinates from `begin` on, of 32 bits each, in one number.
 static Value packCoordinates(OpBuilder &builder, Location loc,
                              ArrayRef<Value> coordinates, size_t begin) {
@@ -183,9 +180,9 @@ template <typename OpT> struct FailPattern : ContextPattern<OpT> {
 protected:
   /// Calls it in place of the operation. `name` is the text that it takes, or
   /// null; `numbers` are its last arguments.
-  void replace(ConversionPatternRewriter &rewriter, OpT op, StringRef function,
-               std::optional<StringRef> name, Value bin,
-               ArrayRef<Value> numbers) const {
+  void replace(ConversionPatternRewriter &rewriter, OpT op,
+               const RuntimeFunction &function, std::optional<StringRef> name,
+               Value bin, ArrayRef<Value> numbers) const {
     Location loc = op.getLoc();
     SmallVector<Value> arguments{
         context.frame(op),
@@ -196,7 +193,7 @@ protected:
                    LLVM::LLVMPointerType::get(rewriter.getContext())),
         bin ? toI64(rewriter, loc, bin) : createI64(rewriter, loc, -1)};
     llvm::append_range(arguments, numbers);
-    context.call(rewriter, loc, function, Type(), arguments);
+    context.call(rewriter, loc, function, arguments);
     rewriter.eraseOp(op);
   }
 };
@@ -211,8 +208,9 @@ struct FailLowering : FailPattern<FailOp> {
     for (Value index : adaptor.getIndices())
       indices.push_back(toI64(rewriter, loc, index));
     if (op.getOutsideBin())
-      replace(rewriter, op, "pikoir_fail", op.getOf(), adaptor.getBin(),
-              {createI32(rewriter, loc, updateOutside),
+      replace(rewriter, op, PIKO_RUNTIME_FUNCTION(pikoir_fail), op.getOf(),
+              adaptor.getBin(),
+              {createI32(rewriter, loc, PIKORT_UPDATE_OUTSIDE),
                packCoordinates(rewriter, loc, indices, 0),
                packCoordinates(rewriter, loc, indices, 2)});
     else
@@ -238,8 +236,8 @@ private:
     }
     int32_t state =
         context.numbers(op).states.lookup(op.getStateAttr().getAttr());
-    replace(rewriter, op, "pikoir_fail_index", op.getOf(), bin,
-            {createI32(rewriter, loc, state), index, count});
+    replace(rewriter, op, PIKO_RUNTIME_FUNCTION(pikoir_fail_index), op.getOf(),
+            bin, {createI32(rewriter, loc, state), index, count});
   }
 };
 
@@ -249,8 +247,9 @@ struct FailListLowering : FailPattern<FailListOp> {
   matchAndRewrite(FailListOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
     Location loc = op.getLoc();
-    replace(rewriter, op, "pikoir_fail", std::nullopt, adaptor.getBin(),
-            {createI32(rewriter, loc, indexOutside),
+    replace(rewriter, op, PIKO_RUNTIME_FUNCTION(pikoir_fail), std::nullopt,
+            adaptor.getBin(),
+            {createI32(rewriter, loc, PIKORT_INDEX_OUTSIDE),
              toI64(rewriter, loc, adaptor.getIndex()),
              toI64(rewriter, loc, adaptor.getSize())});
     return success();
@@ -263,7 +262,7 @@ struct FailBarrierLowering : FailPattern<FailBarrierOp> {
   matchAndRewrite(FailBarrierOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
     auto barrier = op->getAttrOfType<StringAttr>(cppNameAttr);
-    replace(rewriter, op, "pikoir_fail_barrier",
+    replace(rewriter, op, PIKO_RUNTIME_FUNCTION(pikoir_fail_barrier),
             barrier ? barrier.getValue() : "sync", adaptor.getBin(),
             {toI64(rewriter, op.getLoc(), adaptor.getIteration())});
     return success();
@@ -277,8 +276,9 @@ struct FailDivideLowering : FailPattern<FailDivideOp> {
                   ConversionPatternRewriter &rewriter) const override {
     Location loc = op.getLoc();
     Value zero = createI64(rewriter, loc, 0);
-    replace(rewriter, op, "pikoir_fail", op.getOf(), adaptor.getBin(),
-            {createI32(rewriter, loc, noQuotient), zero, zero});
+    replace(rewriter, op, PIKO_RUNTIME_FUNCTION(pikoir_fail), op.getOf(),
+            adaptor.getBin(),
+            {createI32(rewriter, loc, PIKORT_NO_QUOTIENT), zero, zero});
     return success();
   }
 };

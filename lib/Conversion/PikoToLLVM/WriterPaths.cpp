@@ -7,17 +7,23 @@
 using namespace mlir;
 using namespace piko;
 
-// Byte offsets of the members of pikoir_writer and pikoir_port.
+// Members of pikoir_writer and pikoir_port.
 namespace layout {
-constexpr int64_t writerFlags = 12, ports = 24;
-constexpr int64_t cursor = 0, limit = 8, size = 16, emitted = 24, kept = 32,
-                  cellCursor = 40, cellEnd = 48, lastCell = 56, cells = 64,
-                  run = 96, portFlags = 116, portSize = 120;
+constexpr RuntimeMember writerFlags = PIKO_RUNTIME_MEMBER(pikoir_writer, flags),
+                        ports = PIKO_RUNTIME_MEMBER(pikoir_writer, ports);
+constexpr RuntimeMember cursor = PIKO_RUNTIME_MEMBER(pikoir_port, cursor),
+                        limit = PIKO_RUNTIME_MEMBER(pikoir_port, limit),
+                        size = PIKO_RUNTIME_MEMBER(pikoir_port, size),
+                        emitted = PIKO_RUNTIME_MEMBER(pikoir_port, emitted),
+                        kept = PIKO_RUNTIME_MEMBER(pikoir_port, kept),
+                        cellCursor =
+                            PIKO_RUNTIME_MEMBER(pikoir_port, cell_cursor),
+                        cellEnd = PIKO_RUNTIME_MEMBER(pikoir_port, cell_end),
+                        lastCell = PIKO_RUNTIME_MEMBER(pikoir_port, last_cell),
+                        cells = PIKO_RUNTIME_MEMBER(pikoir_port, cells),
+                        run = PIKO_RUNTIME_MEMBER(pikoir_port, run),
+                        portFlags = PIKO_RUNTIME_MEMBER(pikoir_port, flags);
 } // namespace layout
-/// PIKOIR_FIRST_CELL
-static constexpr int64_t firstCell = int64_t(1) << 31;
-/// PIKOIR_PORT_LOCAL
-static constexpr int64_t localFlag = 16;
 
 namespace {
 
@@ -28,21 +34,20 @@ public:
       : builder(builder), loc(loc), base(base), tag(tag) {}
 
   Type pointer() { return LLVM::LLVMPointerType::get(builder.getContext()); }
-  Type i64() { return builder.getI64Type(); }
   Type i32() { return builder.getI32Type(); }
 
-  Value load(int64_t member, Type type) {
-    return createLoad(builder, loc, type,
-                      createOffset(builder, loc, base, member), tag);
+  Value load(const RuntimeMember &member) {
+    return createLoad(builder, loc,
+                      convertType(builder.getContext(), member.type),
+                      createOffset(builder, loc, base, member.offset), tag);
   }
-  void store(Value value, int64_t member) {
-    createStore(builder, loc, value, createOffset(builder, loc, base, member),
-                tag);
+  void store(Value value, const RuntimeMember &member) {
+    createStore(builder, loc, value,
+                createOffset(builder, loc, base, member.offset), tag);
   }
-  void increment(int64_t member) {
+  void increment(const RuntimeMember &member) {
     Value one = createI64(builder, loc, 1);
-    store(arith::AddIOp::create(builder, loc, load(member, i64()), one),
-          member);
+    store(arith::AddIOp::create(builder, loc, load(member), one), member);
   }
   Value comparePointers(LLVM::ICmpPredicate predicate, Value a, Value b) {
     return LLVM::ICmpOp::create(builder, loc, predicate, a, b);
@@ -51,8 +56,8 @@ public:
     return arith::CmpIOp::create(builder, loc, predicate, a, b);
   }
   /// Whether any of these flags is set.
-  Value any(int64_t flags, int64_t mask = -1) {
-    Value set = arith::AndIOp::create(builder, loc, load(flags, i32()),
+  Value any(const RuntimeMember &flags, int64_t mask = -1) {
+    Value set = arith::AndIOp::create(builder, loc, load(flags),
                                       createI32(builder, loc, mask));
     return compare(arith::CmpIPredicate::ne, set, createI32(builder, loc, 0));
   }
@@ -72,32 +77,34 @@ static MemberBuilder openPort(OpBuilder &builder, Location loc,
                               LoweringContext &context, Value writer,
                               int64_t port) {
   MemberBuilder members(builder, loc, writer, context.tags.writer());
-  Value ports = members.load(layout::ports, members.pointer());
-  return {builder, loc,
-          createOffset(builder, loc, ports, port * layout::portSize),
-          members.tag};
+  Value ports = members.load(layout::ports);
+  return {
+      builder, loc,
+      createOffset(builder, loc, ports, port * int64_t(sizeof(pikoir_port))),
+      members.tag};
 }
 
 Value piko::createAppend(OpBuilder &builder, Location loc,
                          LoweringContext &context, Value writer, int64_t port) {
   MemberBuilder out = openPort(builder, loc, context, writer, port);
-  Value record = out.load(layout::cursor, out.pointer());
+  Value record = out.load(layout::cursor);
   Value full = out.comparePointers(LLVM::ICmpPredicate::ugt, record,
-                                   out.load(layout::limit, out.pointer()));
-  Value isSlow = out.either(full, out.any(layout::portFlags, ~localFlag));
+                                   out.load(layout::limit));
+  Value isSlow =
+      out.either(full, out.any(layout::portFlags, ~PIKOIR_PORT_LOCAL));
   auto path = scf::IfOp::create(builder, loc, out.pointer(), isSlow,
                                 /*withElseRegion=*/true);
   OpBuilder::InsertionGuard guard(builder);
   builder.setInsertionPointToStart(path.thenBlock());
   Value room = context
-                   .call(builder, loc, "pikoir_append", out.pointer(),
+                   .call(builder, loc, PIKO_RUNTIME_FUNCTION(pikoir_append),
                          {writer, createI32(builder, loc, port)})
                    .getResult();
   scf::YieldOp::create(builder, loc, room);
   builder.setInsertionPointToStart(path.elseBlock());
   out.increment(layout::emitted);
   Value isPlaced =
-      out.compare(arith::CmpIPredicate::ne, out.load(layout::cells, out.i64()),
+      out.compare(arith::CmpIPredicate::ne, out.load(layout::cells),
                   createI64(builder, loc, 0));
   scf::IfOp::create(
       builder, loc, isPlaced,
@@ -106,7 +113,7 @@ Value piko::createAppend(OpBuilder &builder, Location loc,
         scf::YieldOp::create(builder, loc);
       },
       [&](OpBuilder &, Location) {
-        Value size = out.load(layout::size, out.i64());
+        Value size = out.load(layout::size);
         out.store(createOffset(builder, loc, record, size), layout::cursor);
         scf::YieldOp::create(builder, loc);
       });
@@ -120,7 +127,7 @@ static void callPlaceIf(Value isSlow, OpBuilder &builder, Location loc,
                         Value cell) {
   auto path = scf::IfOp::create(builder, loc, isSlow, /*withElseRegion=*/true);
   builder.setInsertionPointToStart(path.thenBlock());
-  context.call(builder, loc, "pikoir_place", Type(),
+  context.call(builder, loc, PIKO_RUNTIME_FUNCTION(pikoir_place),
                {writer, createI32(builder, loc, port), cell});
   builder.setInsertionPointToStart(path.elseBlock());
 }
@@ -130,16 +137,16 @@ void piko::createLocalPlace(OpBuilder &builder, Location loc,
                             int64_t port, Value cell) {
   MemberBuilder out = openPort(builder, loc, context, writer, port);
   Value zero = createI64(builder, loc, 0);
-  Value last = out.load(layout::lastCell, out.i64());
+  Value last = out.load(layout::lastCell);
   Value isSlow =
       out.either(out.either(out.compare(arith::CmpIPredicate::ne, cell, zero),
                             out.compare(arith::CmpIPredicate::ne, last,
                                         createI64(builder, loc, -1))),
-                 out.any(layout::portFlags, ~localFlag));
+                 out.any(layout::portFlags, ~PIKOIR_PORT_LOCAL));
   OpBuilder::InsertionGuard guard(builder);
   callPlaceIf(isSlow, builder, loc, context, writer, port, cell);
-  Value cursor = out.load(layout::cursor, out.pointer());
-  Value size = out.load(layout::size, out.i64());
+  Value cursor = out.load(layout::cursor);
+  Value size = out.load(layout::size);
   out.store(createOffset(builder, loc, cursor, size), layout::cursor);
   out.store(cell, layout::lastCell);
 }
@@ -148,15 +155,15 @@ void piko::createPlace(OpBuilder &builder, Location loc,
                        LoweringContext &context, Value writer, int64_t port,
                        Value cell) {
   MemberBuilder out = openPort(builder, loc, context, writer, port);
-  Value last = out.load(layout::lastCell, out.i64());
-  Value place = out.load(layout::cellCursor, out.pointer());
-  Value isSlow = out.either(
-      out.either(out.compare(arith::CmpIPredicate::sle, cell, last),
-                 out.compare(arith::CmpIPredicate::sge, cell,
-                             out.load(layout::cells, out.i64()))),
-      out.either(out.comparePointers(LLVM::ICmpPredicate::eq, place,
-                                     out.load(layout::cellEnd, out.pointer())),
-                 out.any(layout::portFlags)));
+  Value last = out.load(layout::lastCell);
+  Value place = out.load(layout::cellCursor);
+  Value isSlow =
+      out.either(out.either(out.compare(arith::CmpIPredicate::sle, cell, last),
+                            out.compare(arith::CmpIPredicate::sge, cell,
+                                        out.load(layout::cells))),
+                 out.either(out.comparePointers(LLVM::ICmpPredicate::eq, place,
+                                                out.load(layout::cellEnd)),
+                            out.any(layout::portFlags)));
   OpBuilder::InsertionGuard guard(builder);
   callPlaceIf(isSlow, builder, loc, context, writer, port, cell);
   Value isFirst =
@@ -164,15 +171,16 @@ void piko::createPlace(OpBuilder &builder, Location loc,
   auto first = scf::IfOp::create(builder, loc, isFirst,
                                  /*withElseRegion=*/false);
   builder.setInsertionPointToStart(first.thenBlock());
-  Value size = out.load(layout::size, out.i64());
-  Value cursor = out.load(layout::cursor, out.pointer());
+  Value size = out.load(layout::size);
+  Value cursor = out.load(layout::cursor);
   out.store(createOffset(builder, loc, cursor, size), layout::cursor);
   out.store(place, layout::run);
   out.increment(layout::kept);
   builder.setInsertionPointAfter(first);
-  Value mark = arith::SelectOp::create(builder, loc, isFirst,
-                                       createI32(builder, loc, firstCell),
-                                       createI32(builder, loc, 0));
+  Value mark = arith::SelectOp::create(
+      builder, loc, isFirst,
+      createI32(builder, loc, int64_t(PIKOIR_FIRST_CELL)),
+      createI32(builder, loc, 0));
   Value entry = arith::TruncIOp::create(builder, loc, out.i32(), cell);
   entry = arith::OrIOp::create(builder, loc, entry, mark);
   createStore(builder, loc, entry, place, out.tag);
@@ -187,5 +195,5 @@ void piko::createNext(OpBuilder &builder, Location loc,
                                 /*withElseRegion=*/false);
   OpBuilder::InsertionGuard guard(builder);
   builder.setInsertionPointToStart(path.thenBlock());
-  context.call(builder, loc, "pikoir_next", Type(), writer);
+  context.call(builder, loc, PIKO_RUNTIME_FUNCTION(pikoir_next), writer);
 }

@@ -1,0 +1,235 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Writers, what is emitted to them, and scratch memory, on the runtime's
+// structs (pikort/abi.h).
+
+#include "KernelLowering.h"
+#include "WriterPaths.h"
+
+#include "mlir/Conversion/LLVMCommon/MemRefBuilder.h"
+#include "mlir/Conversion/LLVMCommon/TypeConverter.h"
+
+using namespace mlir;
+using namespace piko;
+
+namespace {
+
+struct OpenWriterLowering : Lowering<OpenWriterOp> {
+  using Lowering::Lowering;
+  LogicalResult
+  matchAndRewrite(OpenWriterOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    auto function = op->getParentOfType<func::FuncOp>();
+    auto number = function->getAttrOfType<IntegerAttr>(numberAttrName);
+    int64_t subject = op.getStage() ? context.stageNumber(op, *op.getStage())
+                                    : number.getInt();
+    Location loc = op.getLoc();
+    rewriter.replaceOp(
+        op, context.call(rewriter, loc,
+                         function->hasAttr(sourceAttrName)
+                             ? PIKO_RUNTIME_FUNCTION(pikoir_open_source)
+                             : PIKO_RUNTIME_FUNCTION(pikoir_open),
+                         {context.frame(op), createI32(rewriter, loc, subject),
+                          toI64(rewriter, loc, adaptor.getUnit())}));
+    return success();
+  }
+};
+
+struct LocalBinLowering : Lowering<LocalBinOp> {
+  using Lowering::Lowering;
+  LogicalResult
+  matchAndRewrite(LocalBinOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    Location loc = op.getLoc();
+    Value port = createI32(rewriter, loc, op.getPort());
+    Value bins =
+        context
+            .call(rewriter, loc, PIKO_RUNTIME_FUNCTION(pikoir_begin_local),
+                  {adaptor.getSource(), port})
+            .getResult();
+    rewriter.inlineBlockBefore(op.getBodyBlock(), op, bins);
+    context.call(rewriter, loc, PIKO_RUNTIME_FUNCTION(pikoir_end_local),
+                 {adaptor.getSource(), port});
+    rewriter.eraseOp(op);
+    return success();
+  }
+};
+
+/// An operation that is a call with the writer for its argument.
+template <typename OpT, const RuntimeFunction &function>
+struct WriterCallLowering : Lowering<OpT> {
+  using Lowering<OpT>::Lowering;
+  LogicalResult
+  matchAndRewrite(OpT op, typename OpT::Adaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    this->context.call(rewriter, op.getLoc(), function, adaptor.getWriter());
+    rewriter.eraseOp(op);
+    return success();
+  }
+};
+constexpr RuntimeFunction closeWriter = PIKO_RUNTIME_FUNCTION(pikoir_close);
+constexpr RuntimeFunction deferEnd = PIKO_RUNTIME_FUNCTION(pikoir_defer_end);
+
+struct NextLowering : Lowering<NextOp> {
+  using Lowering::Lowering;
+  LogicalResult
+  matchAndRewrite(NextOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    createNext(rewriter, op.getLoc(), context, adaptor.getWriter());
+    rewriter.eraseOp(op);
+    return success();
+  }
+};
+
+/// An operation that is a call with the writer and a number for its arguments.
+template <typename OpT, const RuntimeFunction &function>
+struct WriterNumberLowering : Lowering<OpT> {
+  using Lowering<OpT>::Lowering;
+  LogicalResult
+  matchAndRewrite(OpT op, typename OpT::Adaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    Value number = toI64(rewriter, op.getLoc(), adaptor.getOperands().back());
+    this->context.call(rewriter, op.getLoc(), function,
+                       {adaptor.getWriter(), number});
+    rewriter.eraseOp(op);
+    return success();
+  }
+};
+constexpr RuntimeFunction deferBegin =
+    PIKO_RUNTIME_FUNCTION(pikoir_defer_begin);
+constexpr RuntimeFunction deferIteration =
+    PIKO_RUNTIME_FUNCTION(pikoir_defer_iteration);
+constexpr RuntimeFunction scratchRelease =
+    PIKO_RUNTIME_FUNCTION(pikoir_scratch_release);
+
+struct ScratchMarkLowering : Lowering<ScratchMarkOp> {
+  using Lowering::Lowering;
+  LogicalResult
+  matchAndRewrite(ScratchMarkOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    rewriter.replaceOp(op,
+                       context.call(rewriter, op.getLoc(),
+                                    PIKO_RUNTIME_FUNCTION(pikoir_scratch_mark),
+                                    adaptor.getWriter()));
+    return success();
+  }
+};
+
+struct ScratchLowering : Lowering<ScratchOp> {
+  using Lowering::Lowering;
+  LogicalResult
+  matchAndRewrite(ScratchOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    Location loc = op.getLoc();
+    Value size = toI64(rewriter, loc, adaptor.getSize());
+    Value memory =
+        context
+            .call(rewriter, loc, PIKO_RUNTIME_FUNCTION(pikoir_scratch),
+                  {adaptor.getWriter(), size})
+            .getResult();
+    Value null = LLVM::ZeroOp::create(rewriter, loc, pointer(rewriter));
+    Value granted = LLVM::ICmpOp::create(rewriter, loc, LLVM::ICmpPredicate::ne,
+                                         memory, null);
+    // As the conversion of memrefs will see it.
+    auto bytes = cast<MemRefType>(op.getBytes().getType());
+    LLVMTypeConverter types(rewriter.getContext());
+    auto descriptor =
+        MemRefDescriptor::poison(rewriter, loc, types.convertType(bytes));
+    descriptor.setAllocatedPtr(rewriter, loc, memory);
+    descriptor.setAlignedPtr(rewriter, loc, memory);
+    descriptor.setConstantOffset(rewriter, loc, 0);
+    descriptor.setSize(rewriter, loc, 0, size);
+    descriptor.setConstantStride(rewriter, loc, 0, 1);
+    Value memref = UnrealizedConversionCastOp::create(rewriter, loc, bytes,
+                                                      Value(descriptor))
+                       .getResult(0);
+    rewriter.replaceOp(op, {memref, granted});
+    return success();
+  }
+};
+
+struct AppendLowering : Lowering<AppendOp> {
+  using Lowering::Lowering;
+  LogicalResult
+  matchAndRewrite(AppendOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    Location loc = op.getLoc();
+    RecordOp record = context.record(op.getPrim().getType().getRecord());
+    Value room =
+        createAppend(rewriter, loc, context, adaptor.getWriter(), op.getPort());
+    SmallVector<ArrayAttr> tags; // of each number
+    for (auto field : record.getFields().getAsRange<FieldAttr>())
+      tags.append(field.getElementCount(),
+                  context.tags.primitive(record.getSymName(), field.getName()));
+    for (auto [value, offset, tag] :
+         llvm::zip(adaptor.getValues(), record.getElementOffsets(), tags))
+      createStore(rewriter, loc, value,
+                  createOffset(rewriter, loc, room, offset), tag);
+    rewriter.replaceOp(op, room);
+    return success();
+  }
+};
+
+struct PlaceLowering : Lowering<AppendBinOp> {
+  using Lowering::Lowering;
+  LogicalResult
+  matchAndRewrite(AppendBinOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    Location loc = op.getLoc();
+    Value cell = toI64(rewriter, loc, adaptor.getBin());
+    StageOp stage = context.stage(op, op.getStageAttr());
+    if (adaptor.getTile()) {
+      int32_t number = context.stageNumber(op, op.getStage());
+      for (int64_t dim = 0, e = stage.getBins().size(); dim < e; ++dim)
+        cell = arith::MulIOp::create(
+            rewriter, loc, cell,
+            context.query(rewriter, op, PIKO_RUNTIME_FUNCTION(pikoir_cell_grid),
+                          number, dim));
+      cell = arith::AddIOp::create(rewriter, loc, cell,
+                                   toI64(rewriter, loc, adaptor.getTile()));
+    }
+    if (op.getPort() && isLocal(op))
+      createLocalPlace(rewriter, loc, context, adaptor.getWriter(),
+                       *op.getPort(), cell);
+    else if (op.getPort())
+      createPlace(rewriter, loc, context, adaptor.getWriter(), *op.getPort(),
+                  cell);
+    else
+      context.call(rewriter, loc, PIKO_RUNTIME_FUNCTION(pikoir_place_source),
+                   {adaptor.getWriter(), cell});
+    rewriter.eraseOp(op);
+    return success();
+  }
+
+private:
+  /// Whether the edge is local, or each of them if several may be meant.
+  bool isLocal(AppendBinOp op) const {
+    bool isLocal = false;
+    PipelineOp pipeline = context.numbers(op).pipeline;
+    for (auto edge : pipeline.getOps<EdgeOp>()) {
+      if (edge.getPort() != *op.getPort() ||
+          edge.getConsumerAttr() != op.getStageAttr())
+        continue;
+      if (!edge.getLocal())
+        return false;
+      isLocal = true;
+    }
+    return isLocal;
+  }
+};
+
+} // namespace
+
+void piko::populateWriterToLLVMPatterns(const TypeConverter &converter,
+                                        RewritePatternSet &patterns,
+                                        LoweringContext &context) {
+  patterns
+      .add<OpenWriterLowering, LocalBinLowering,
+           WriterCallLowering<CloseWriterOp, closeWriter>, NextLowering,
+           WriterCallLowering<DeferEndOp, deferEnd>,
+           WriterNumberLowering<DeferBeginOp, deferBegin>,
+           WriterNumberLowering<DeferIterationOp, deferIteration>,
+           WriterNumberLowering<ScratchReleaseOp, scratchRelease>,
+           ScratchMarkLowering, ScratchLowering, AppendLowering, PlaceLowering>(
+          converter, patterns.getContext(), context);
+}
