@@ -208,6 +208,13 @@ Linear LinearFacts::expandArgument(BlockArgument argument, unsigned frame,
                       get(parallel.getCount(), frame) - Linear(1));
     return i;
   }
+  if (auto pixels = dyn_cast<ParallelPixelsOp>(parent)) {
+    unsigned dim = argument.getArgNumber();
+    Linear at = atom(id);
+    facts->addBetween(get(pixels.getLo()[dim], frame), at,
+                      get(pixels.getHi()[dim], frame) - Linear(1));
+    return at;
+  }
   if (auto loop = dyn_cast<scf::ForOp>(parent);
       loop && argument == loop.getInductionVar() && !loop.getUnsignedCmp()) {
     Linear low = get(loop.getLowerBound(), frame);

@@ -116,7 +116,7 @@ LogicalResult Bracket::check(mlir::Operation &op) {
       what = "an update";
     else if (mlir::isa<ReduceOp, ScanOp>(inner))
       what = "a reduction";
-    else if (mlir::isa<ParallelForOp>(inner))
+    else if (mlir::isa<ParallelLoopOpInterface>(inner))
       what = "a parallelFor";
     else if (mlir::isa<SyncOp, SortOp>(inner))
       what = "a barrier";

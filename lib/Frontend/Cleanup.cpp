@@ -245,7 +245,7 @@ static bool cleanUpFunction(llvm::Function &function, ParsedUnit &unit,
   for (int round = 0; round < roundLimit; ++round) {
     if (!checkObject(function, unit, memory, context))
       return false;
-    bool changed = releaseDivisions(function, unit.markers);
+    bool changed = releaseDivisions(function);
     changed |= splitMemory(function, memory);
     changed |= expandCopies(function, unit, memory);
     changed |= flattenPointers(function, memory);
@@ -288,7 +288,7 @@ static bool cleanUpFunction(llvm::Function &function, ParsedUnit &unit,
   if (!resolveAccesses(function, unit, memory, context))
     return false;
   releaseMembers(function);
-  releaseDivisions(function, unit.markers);
+  releaseDivisions(function);
 
   llvm::FunctionPassManager finish;
   finish.addPass(llvm::EarlyCSEPass(/*UseMemorySSA=*/true));
@@ -306,7 +306,7 @@ static bool cleanUpFunction(llvm::Function &function, ParsedUnit &unit,
        ++round)
     runner.run(simplify, function);
   dropUnreachableDefaults(function);
-  releaseDivisions(function, unit.markers);
+  releaseDivisions(function);
   return checkLoops(function, unit, context);
 }
 

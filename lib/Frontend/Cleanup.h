@@ -100,7 +100,7 @@ bool releasePixels(llvm::Function &function, const ParsedUnit &unit,
 void holdDivisions(llvm::Function &function);
 /// Makes divisions again of those calls that are known to have a result;
 /// whether there were any.
-bool releaseDivisions(llvm::Function &function, const MarkerTable &markers);
+bool releaseDivisions(llvm::Function &function);
 /// The opcode of the division that a call of this function is.
 std::optional<unsigned> getDivision(llvm::StringRef callee);
 

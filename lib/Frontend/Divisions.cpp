@@ -92,8 +92,7 @@ static bool hasResult(unsigned opcode, llvm::Value *a, llvm::Value *b,
            !llvm::cast<llvm::ConstantInt>(b)->isMinusOne()));
 }
 
-bool piko::releaseDivisions(llvm::Function &function,
-                            const MarkerTable &markers) {
+bool piko::releaseDivisions(llvm::Function &function) {
   const llvm::DataLayout &data = function.getDataLayout();
   bool changed = false;
   for (Instruction &instruction :
@@ -103,12 +102,6 @@ bool piko::releaseDivisions(llvm::Function &function,
       continue;
     std::optional<unsigned> opcode =
         getDivision(call->getCalledFunction()->getName());
-    const Marker *marker = opcode ? nullptr : getMarker(call, markers);
-    // Without a sign, so that each part of a pixel is seen to be in the bin.
-    if (marker && marker->kind == MarkerKind::quotient)
-      opcode = Instruction::UDiv;
-    else if (marker && marker->kind == MarkerKind::remainder)
-      opcode = Instruction::URem;
     if (!opcode)
       continue;
     llvm::Value *a = call->getArgOperand(0), *b = call->getArgOperand(1);
@@ -120,7 +113,7 @@ bool piko::releaseDivisions(llvm::Function &function,
       result = *opcode == Instruction::SDiv
                    ? builder.CreateNeg(a)
                    : llvm::Constant::getNullValue(a->getType());
-    else if (marker || hasResult(*opcode, a, b, call, data))
+    else if (hasResult(*opcode, a, b, call, data))
       result = builder.CreateBinOp(static_cast<Instruction::BinaryOps>(*opcode),
                                    a, b);
     if (!result)

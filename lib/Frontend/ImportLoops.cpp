@@ -14,12 +14,24 @@ using llvm::failure;
 using llvm::LogicalResult;
 using llvm::success;
 
+llvm::CallInst *PhaseImporter::getBox(const ParallelLoop *loop) {
+  auto *count = dyn_cast<llvm::CallInst>(loop->more->getArgOperand(1));
+  const Marker *marker = count ? getMarker(count, unit.markers) : nullptr;
+  return marker && marker->kind == MarkerKind::cellsOf ? count : nullptr;
+}
+
 void PhaseImporter::makeLoop(const ParallelLoop *loop) {
   setLocation(loop->more);
   LoopRegion &region = loopRegions[loop];
   region.body = std::make_unique<mlir::Region>();
   region.entry = &region.body->emplaceBlock();
-  region.entry->addArgument(builder.getIndexType(), *location);
+  if (!getBox(loop)) {
+    region.entry->addArgument(builder.getIndexType(), *location);
+  } else {
+    cells[loop->more->getArgOperand(0)] = region.entry;
+    for (int64_t dim = 0; dim < getRank(); ++dim)
+      region.entry->addArgument(builder.getI32Type(), *location);
+  }
   region.end = &region.body->emplaceBlock();
   loopEntries[loop->getNumber()] = region.entry;
 }
@@ -63,17 +75,36 @@ LogicalResult PhaseImporter::importLoop(const ParallelLoop *loop) {
   auto *count = dyn_cast<llvm::Instruction>(loop->more->getArgOperand(1));
   if (count && loop->blocks->contains(count))
     return reject(count, "a number of iterations that changes with them");
-  mlir::Value number = getIndex(loop->more, 1);
-  auto op = make<ParallelForOp>(number);
   LoopRegion &region = loopRegions[loop];
-  op.getBody().takeBody(*region.body);
+  llvm::CallInst *box = getBox(loop);
+  mlir::Operation *op =
+      box ? makePixels(box) : make<ParallelForOp>(getIndex(loop->more, 1));
+  op->getRegion(0).takeBody(*region.body);
 
   builder.setInsertionPointToEnd(region.end);
   make<YieldOp>(mlir::ValueRange(), mlir::ValueRange());
   builder.setInsertionPointToEnd(region.entry);
   llvm::Value *index = loop->more->getArgOperand(0);
-  values[index] = scalars.fromIndex(region.entry->getArgument(0),
-                                    scalars.getType(index->getType()));
+  if (!box)
+    values[index] = scalars.fromIndex(region.entry->getArgument(0),
+                                      scalars.getType(index->getType()));
+  return success();
+}
+
+mlir::Operation *PhaseImporter::makePixels(llvm::CallInst *box) {
+  llvm::SmallVector<mlir::Value> lo, hi;
+  for (int64_t dim = 0; dim < getRank(); ++dim) {
+    lo.push_back(scalars.get(box->getArgOperand(dim)));
+    hi.push_back(scalars.get(box->getArgOperand(4 + dim)));
+  }
+  return make<ParallelPixelsOp>(lo, hi);
+}
+
+LogicalResult PhaseImporter::importCellAt(llvm::CallInst *call) {
+  mlir::Block *loop = cells.lookup(call->getArgOperand(0));
+  if (!loop)
+    return reject(call, "a parallelForPixels whose iterations never end");
+  values[call] = loop->getArgument(getConstant(call, 1));
   return success();
 }
 

@@ -34,11 +34,14 @@ LogicalResult PhaseImporter::importMarker(llvm::CallInst *call,
   case MarkerKind::phase:
   case MarkerKind::loopFirst:
   case MarkerKind::loopNext:
+  case MarkerKind::cellsOf:
     return success();
   case MarkerKind::loopMore:
     if (loops.getByHeader(call->getParent()))
       return success();
     return reject(call, "a parallelFor whose iterations never end");
+  case MarkerKind::cellAt:
+    return importCellAt(call);
   case MarkerKind::listSize:
   case MarkerKind::listAt:
   case MarkerKind::extent:

@@ -16,15 +16,15 @@ std::optional<MarkerKind> piko::getMarkerKind(llvm::StringRef name) {
              extent) MARKER(imageExtent) MARKER(emit) MARKER(updateBegin)
           MARKER(updateEnd) MARKER(atomic) MARKER(atomicFetch) MARKER(
               reduceBegin) MARKER(scanBegin) MARKER(combineEnd) MARKER(sort)
-              MARKER(loopFirst) MARKER(loopMore) MARKER(loopNext) MARKER(sync)
-                  MARKER(bin) MARKER(binAt) MARKER(binLo) MARKER(binHi)
-                      MARKER(domain) MARKER(assignBin) MARKER(assignAll) MARKER(
-                          assignPrevious) MARKER(assignBox) MARKER(schedule)
-                          MARKER(endStage) MARKER(endBin) MARKER(batch)
-                              MARKER(everyBin) MARKER(order) MARKER(source)
-                                  MARKER(connect) MARKER(allocateForSource)
-                                      MARKER(phase) MARKER(clear)
-                                          MARKER(quotient) MARKER(remainder)
+              MARKER(loopFirst) MARKER(loopMore) MARKER(loopNext) MARKER(
+                  cellsOf) MARKER(cellAt) MARKER(sync) MARKER(bin) MARKER(binAt)
+                  MARKER(binLo) MARKER(binHi) MARKER(domain) MARKER(assignBin)
+                      MARKER(assignAll) MARKER(assignPrevious) MARKER(assignBox)
+                          MARKER(schedule) MARKER(endStage) MARKER(endBin)
+                              MARKER(batch) MARKER(everyBin) MARKER(order)
+                                  MARKER(source) MARKER(connect)
+                                      MARKER(allocateForSource) MARKER(phase)
+                                          MARKER(clear)
                                               .Default(std::nullopt);
 #undef MARKER
 }
@@ -68,8 +68,8 @@ void piko::setMarkerEffects(llvm::Module &module, const MarkerTable &markers) {
     case MarkerKind::binLo:
     case MarkerKind::binHi:
     case MarkerKind::domain:
-    case MarkerKind::quotient:
-    case MarkerKind::remainder:
+    case MarkerKind::cellsOf:
+    case MarkerKind::cellAt:
       function.setDoesNotAccessMemory();
       break;
     case MarkerKind::loopFirst:

@@ -63,6 +63,10 @@ private:
   void makeLoop(const ParallelLoop *loop);
   llvm::LogicalResult importLoop(const ParallelLoop *loop);
   llvm::LogicalResult checkLoop(const ParallelLoop *loop);
+  /// The box of one over pixels; null for one by number.
+  llvm::CallInst *getBox(const ParallelLoop *loop);
+  mlir::Operation *makePixels(llvm::CallInst *box);
+  llvm::LogicalResult importCellAt(llvm::CallInst *call);
   void importLoopExit(const ParallelLoop *loop);
   llvm::LogicalResult checkBarrier(llvm::CallInst *call, llvm::StringRef what);
   llvm::LogicalResult importCombination(llvm::CallInst *call,
@@ -132,6 +136,8 @@ private:
   /// A loop's header is the block in front of it, with the operation.
   llvm::DenseMap<llvm::BasicBlock *, mlir::Block *> blocks;
   llvm::DenseMap<const ParallelLoop *, LoopRegion> loopRegions;
+  /// The first block of the loop over pixels whose counter it is.
+  llvm::DenseMap<const llvm::Value *, mlir::Block *> cells;
   /// The first block of the loop of that number.
   llvm::DenseMap<int64_t, mlir::Block *> loopEntries;
   llvm::DenseMap<llvm::Value *, mlir::Value> arrays;

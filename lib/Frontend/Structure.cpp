@@ -25,7 +25,7 @@ public:
   llvm::FailureOr<mlir::Operation *>
   createUnreachableTerminator(mlir::Location location, mlir::OpBuilder &builder,
                               mlir::Region &region) override {
-    if (mlir::isa<ParallelForOp>(region.getParentOp()))
+    if (mlir::isa<ParallelLoopOpInterface>(region.getParentOp()))
       return YieldOp::create(builder, location, mlir::ValueRange(),
                              mlir::ValueRange())
           .getOperation();
@@ -174,8 +174,8 @@ static llvm::LogicalResult structureRegion(mlir::Region &region) {
 
 llvm::LogicalResult piko::structurePhase(mlir::func::FuncOp function) {
   // Inner loops first.
-  mlir::WalkResult structured = function.walk([](ParallelForOp loop) {
-    return mlir::WalkResult(structureRegion(loop.getBody()));
+  mlir::WalkResult structured = function.walk([](ParallelLoopOpInterface loop) {
+    return mlir::WalkResult(structureRegion(loop->getRegion(0)));
   });
   if (structured.wasInterrupted() ||
       llvm::failed(structureRegion(function.getBody())))

@@ -227,12 +227,12 @@ void Checker::checkBlock(Block &block, Value iteration) {
         ++accesses;
       }
     }
-    if (auto loop = dyn_cast<ParallelForOp>(op)) {
+    if (auto loop = dyn_cast<ParallelLoopOpInterface>(op)) {
       mark(loc, CheckedLoop::Begin, Value());
-      checkBlock(*loop.getBodyBlock(),
-                 loop.hasBarriers() ? loop.getIteration() : Value());
       builder.setInsertionPointToStart(loop.getBodyBlock());
-      mark(loc, CheckedLoop::Iteration, loop.getIteration());
+      Value number = loop.buildIteration(builder);
+      mark(loc, CheckedLoop::Iteration, number);
+      checkBlock(*loop.getBodyBlock(), loop.hasBarriers() ? number : Value());
       builder.setInsertionPointAfter(loop);
       mark(loc, CheckedLoop::End, Value());
       continue;

@@ -162,7 +162,7 @@ LogicalResult FuseStagesPass::check(EdgeOp edge, Refusal &refusal) {
     for (Operation *user : phase->getRegion(0).getArgument(0).getUsers())
       if (!isa<GetOp>(user))
         return refuse(user, "the primitive is used whole");
-    WalkResult barrier = phase->walk([&](ParallelForOp loop) {
+    WalkResult barrier = phase->walk([&](ParallelLoopOpInterface loop) {
       if (!loop.hasBarriers())
         return WalkResult::advance();
       refusal = {loop, "its iterations meet"};
@@ -172,8 +172,8 @@ LogicalResult FuseStagesPass::check(EdgeOp edge, Refusal &refusal) {
       return failure();
   }
   for (EmitOp emit : emits)
-    for (auto loop = emit->getParentOfType<ParallelForOp>(); loop;
-         loop = loop->getParentOfType<ParallelForOp>())
+    for (auto loop = emit->getParentOfType<ParallelLoopOpInterface>(); loop;
+         loop = loop->getParentOfType<ParallelLoopOpInterface>())
       if (loop.hasBarriers())
         return refuse(emit, "it is emitted between iterations that meet");
   return success();

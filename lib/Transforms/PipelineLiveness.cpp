@@ -18,7 +18,7 @@ using namespace piko;
 /// Control flow that is as live as what is in it or comes out of it.
 static bool isControlFlow(Operation *op) {
   return isa<scf::IfOp, scf::ForOp, scf::WhileOp, scf::IndexSwitchOp,
-             ParallelForOp>(op);
+             ParallelLoopOpInterface>(op);
 }
 
 /// Whether an operation of a live stage is needed even if nobody reads what it

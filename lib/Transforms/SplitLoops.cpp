@@ -9,6 +9,7 @@
 #include "mlir/Dialect/Arith/IR/Arith.h"
 #include "mlir/Dialect/MemRef/IR/MemRef.h"
 #include "mlir/IR/PatternMatch.h"
+#include "mlir/Transforms/LoopInvariantCodeMotionUtils.h"
 
 namespace piko {
 #define GEN_PASS_DEF_SPLITLOOPS
@@ -39,20 +40,85 @@ static void convertLoop(ParallelForOp parallel) {
   rewriter.eraseOp(parallel);
 }
 
+/// The pixels of a box without barriers: rows from the last dimension on, x in
+/// the innermost loop. What a row's pixels share stays out of it.
+static void convertLoop(ParallelPixelsOp pixels) {
+  IRRewriter rewriter(pixels);
+  Location loc = pixels.getLoc();
+  Value one = arith::ConstantIntOp::create(rewriter, loc, 1, /*width=*/32);
+  scf::ForOp loop;
+  SmallVector<Value> cell(pixels.getLo().size());
+  for (unsigned dim = cell.size(); dim-- > 0;) {
+    loop = scf::ForOp::create(rewriter, loc, pixels.getLo()[dim],
+                              pixels.getHi()[dim], one);
+    cell[dim] = loop.getInductionVar();
+    rewriter.setInsertionPoint(loop.getBody()->getTerminator());
+  }
+  loop->setAttr("piko.lanes", rewriter.getUnitAttr());
+  Block *body = pixels.getBodyBlock();
+  rewriter.eraseOp(body->getTerminator());
+  rewriter.inlineBlockBefore(body, loop.getBody()->getTerminator(), cell);
+  rewriter.eraseOp(pixels);
+  if (cell.size() > 1)
+    moveLoopInvariantCode(loop);
+}
+
+/// The same iterations by their numbers.
+static ParallelForOp numberIterations(ParallelPixelsOp pixels) {
+  IRRewriter rewriter(pixels);
+  Location loc = pixels.getLoc();
+  Type index = rewriter.getIndexType();
+  Value count = arith::ConstantIndexOp::create(rewriter, loc, 1);
+  Value none = arith::ConstantIndexOp::create(rewriter, loc, 0);
+  SmallVector<Value> extents;
+  for (auto [lo, hi] : llvm::zip(pixels.getLo(), pixels.getHi())) {
+    Value first = arith::IndexCastOp::create(rewriter, loc, index, lo);
+    Value end = arith::IndexCastOp::create(rewriter, loc, index, hi);
+    Value extent = arith::SubIOp::create(rewriter, loc, end, first);
+    extents.push_back(arith::MaxSIOp::create(rewriter, loc, extent, none));
+    count = arith::MulIOp::create(rewriter, loc, count, extents.back());
+  }
+  auto parallel = ParallelForOp::create(rewriter, loc, count);
+  Block *body = rewriter.createBlock(&parallel.getBody(), {}, index, loc);
+  Value rest = parallel.getIteration();
+  SmallVector<Value> cell;
+  for (auto [lo, extent] : llvm::zip(pixels.getLo(), extents)) {
+    Value offset = rest;
+    if (cell.size() + 1 < extents.size()) {
+      offset = arith::RemUIOp::create(rewriter, loc, rest, extent);
+      rest = arith::DivUIOp::create(rewriter, loc, rest, extent);
+    }
+    offset = arith::IndexCastOp::create(rewriter, loc, lo.getType(), offset);
+    cell.push_back(arith::AddIOp::create(rewriter, loc, lo, offset));
+  }
+  rewriter.mergeBlocks(pixels.getBodyBlock(), body, cell);
+  rewriter.eraseOp(pixels);
+  return parallel;
+}
+
+static void convertLoop(ParallelLoopOpInterface loop) {
+  if (auto pixels = dyn_cast<ParallelPixelsOp>(*loop))
+    convertLoop(pixels);
+  else
+    convertLoop(cast<ParallelForOp>(*loop));
+}
+
 void SplitLoopsPass::runOnOperation() {
   // Those inside others first.
-  SmallVector<ParallelForOp> parallels;
-  getOperation().walk([&](ParallelForOp op) {
+  SmallVector<ParallelLoopOpInterface> parallels;
+  getOperation().walk([&](ParallelLoopOpInterface op) {
     if (op->getParentOfType<KernelOp>())
       parallels.push_back(op);
   });
-  for (ParallelForOp parallel : parallels) {
+  for (ParallelLoopOpInterface parallel : parallels) {
     ++loops;
     if (!parallel.hasBarriers()) {
       convertLoop(parallel);
       continue;
     }
-    LoopSplitter splitter(parallel);
+    auto pixels = dyn_cast<ParallelPixelsOp>(*parallel);
+    LoopSplitter splitter(pixels ? numberIterations(pixels)
+                                 : cast<ParallelForOp>(*parallel));
     if (failed(splitter.run()))
       return signalPassFailure();
     ++cuts;

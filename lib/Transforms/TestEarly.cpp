@@ -49,7 +49,7 @@ Sinker::Sinker(ProcessOp process) : process(process) {
 /// operands, and from state that the phase leaves as it is.
 bool Sinker::isMovable(Operation *op) {
   if (op->hasTrait<OpTrait::IsTerminator>() || op->getNumResults() == 0 ||
-      isa<ParallelForOp>(op))
+      isa<ParallelLoopOpInterface>(op))
     return false;
   return !op->walk([&](Operation *inner) {
               if (auto load = dyn_cast<LoadOp>(inner))

@@ -15,7 +15,7 @@ bool piko::isBarrier(Operation *op) {
 Operation *piko::findBarrier(Operation *op) {
   Operation *found = nullptr;
   op->walk<WalkOrder::PreOrder>([&](Operation *inner) {
-    if (isa<ParallelForOp>(inner))
+    if (isa<ParallelLoopOpInterface>(inner))
       return WalkResult::skip();
     if (!isBarrier(inner))
       return WalkResult::advance();

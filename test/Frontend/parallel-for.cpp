@@ -73,7 +73,7 @@ struct Last : piko::Stage<0, 0, 64, Line, Line> {
 struct Nested : piko::Stage<8, 8, 64, Line>, piko::Uses<State> {
   void assignBin(const Line &line) { assignToAll(line); }
   void process(const Line &line) {
-    // CHECK: piko.parallel_for %{{.*}} {
+    // CHECK: piko.parallel_pixels(%{{.*}}, %{{.*}}) to(%{{.*}}, %{{.*}}) {
     parallelForPixels([&](glm::ivec2 p) {
       // CHECK: %[[PART:.*]] = memref.alloca() : memref<3xf32>
       float part[3];

@@ -312,7 +312,8 @@ class CppPrinter:
 
     def s_Parallel(self, s):
         if s.bound is None:
-            head = f"parallelForPixels([&](glm::ivec{self.pipe.rank} {s.var})"
+            box = "".join(self.cell(at, True) + ", " for at in (s.lo, s.hi) if at)
+            head = f"parallelForPixels({box}[&](glm::ivec{self.pipe.rank} {s.var})"
         else:
             head = f"parallelFor({self.e(s.bound)}, [&](int {s.var})"
         self.block(s.body, head, ");")

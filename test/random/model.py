@@ -308,11 +308,14 @@ class Set(Stmt):
 
 @dataclass(eq=False)
 class Parallel(Stmt):
-    """parallelFor, or parallelForPixels where `bound` is None."""
+    """parallelFor, or parallelForPixels where `bound` is None: over the bin, or
+    over what a box from `lo` to `hi` has of it."""
 
     var: str
     bound: Expr
     body: list
+    lo: list = field(default_factory=list)
+    hi: list = field(default_factory=list)
 
 
 @dataclass(eq=False)

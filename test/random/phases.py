@@ -212,7 +212,13 @@ class Phases(Graphs):
             body += self.store(stored[0], at, inner)
         elif updated:
             body += self.update(updated[0], at, inner)
-        return [Parallel(var, None, body)]
+        if self.random.random() < 0.5:
+            return [Parallel(var, None, body)]
+        self.use("pixels-in-box")
+        lo, hi = ([self.expr("i32", scope, 1) if self.random.random() < 0.3 else
+                   lit(self.random.randint(-2, most)) for most in self.domain]
+                  for _ in range(2))
+        return [Parallel(var, None, body, lo, hi)]
 
     def ticket(self, state, scope):
         """Unordered: each call draws a number; that it is drawn is written, and

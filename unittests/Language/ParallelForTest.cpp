@@ -64,6 +64,22 @@ TEST(ParallelFor, PixelsOfTheBin) {
               ElementsAre(0, 1, 2, 3, 10, 11, 12, 13, 20, 21, 22, 23));
 }
 
+TEST(ParallelFor, PixelsOfABox) {
+  auto cells = [](glm::ivec2 lo, glm::ivec2 hi) {
+    return process([=](auto &self, int) {
+      self.parallelForPixels(lo, hi,
+                             [&](glm::ivec2 p) { self.emit(10 * p.y + p.x); });
+    });
+  };
+  EXPECT_THAT(cells({1, 1}, {2, 2}), ElementsAre(11, 12, 21, 22));
+  EXPECT_THAT(cells({-3, 2}, {0, 9}), ElementsAre(20));
+  EXPECT_THAT(cells({INT32_MIN, 1}, {INT32_MAX, 1}),
+              ElementsAre(10, 11, 12, 13));
+  EXPECT_THAT(cells({2, 1}, {1, 2}), IsEmpty());
+  EXPECT_THAT(cells({INT32_MAX, 0}, {INT32_MIN, 2}), IsEmpty());
+  EXPECT_THAT(cells({4, 0}, {5, 2}), IsEmpty());
+}
+
 TEST(ParallelFor, SyncSeparatesPhases) {
   EXPECT_THAT(process([](auto &self, int) {
                 int shared[4] = {};

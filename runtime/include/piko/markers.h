@@ -43,6 +43,11 @@ template <int Kind, bool Signed, class T> T atomicFetch(T *place, T value);
 int32_t loopFirst();
 bool loopMore(int32_t i, int64_t n, int32_t loop);
 int32_t loopNext(int32_t i);
+// As n: the cells from the first four up to, and not including, the last four;
+// and in an iteration then, a coordinate of its cell.
+int64_t cellsOf(int32_t x0, int32_t y0, int32_t z0, int32_t w0, int32_t x1,
+                int32_t y1, int32_t z1, int32_t w1);
+int32_t cellAt(int32_t i, int32_t dim);
 void sync();
 
 // In the place of a sync. What is between the beginning and the end combines
@@ -58,9 +63,6 @@ int64_t binAt(int64_t x, int64_t y, int64_t z, int64_t w);
 int32_t binLo(int64_t bin, int32_t dim);
 int32_t binHi(int64_t bin, int32_t dim);
 int32_t domain(int32_t dim);
-// i / n and i % n, for n that the language knows not to be 0 or below.
-int32_t quotient(int32_t i, int32_t n);
-int32_t remainder(int32_t i, int32_t n);
 
 // AssignBin.
 void assignBin(int64_t bin);

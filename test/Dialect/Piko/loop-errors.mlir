@@ -186,3 +186,62 @@ piko.pipeline @P rank 1 {
     }
   }
 }
+
+// -----
+
+piko.pipeline @P rank 2 {
+  piko.kernel @k {
+    %n = arith.constant 8 : i32
+    // expected-error@+1 {{expected a box of 2 dimensions, as its pipeline has, but got 1}}
+    piko.parallel_pixels (%n) to (%n) {
+    ^bb0(%x: i32):
+      piko.yield
+    }
+  }
+}
+
+// -----
+
+piko.pipeline @P rank 2 {
+  piko.kernel @k {
+    %n = arith.constant 8 : i32
+    // expected-error@+1 {{expected 2 block arguments of type 'i32', but got ('i32', 'index')}}
+    piko.parallel_pixels (%n, %n) to (%n, %n) {
+    ^bb0(%x: i32, %y: index):
+      piko.yield
+    }
+  }
+}
+
+// -----
+
+piko.pipeline @P rank 1 {
+  piko.kernel @k {
+    %n = arith.constant 8 : i32
+    // expected-error@+1 {{expected its body to end with a piko.yield of nothing}}
+    piko.parallel_pixels (%n) to (%n) {
+    ^bb0(%x: i32):
+      piko.yield results [%x : i32]
+    }
+  }
+}
+
+// -----
+
+piko.pipeline @P rank 1 {
+  piko.kernel @k {
+    %n = arith.constant 8 : i32
+    %m = arith.constant 8 : index
+    // expected-note@+1 {{the outer one is here}}
+    piko.parallel_for %m {
+    ^bb0(%i: index):
+      piko.parallel_pixels (%n) to (%n) {
+      ^bb0(%x: i32):
+        // expected-error@+1 {{expected to be inside a parallel_pixels that is not nested}}
+        piko.sync
+        piko.yield
+      }
+      piko.yield
+    }
+  }
+}

@@ -76,3 +76,36 @@ piko.pipeline @Kernels rank 1 {
     }
   }
 }
+
+// A box of pixels, whose iterations may meet, and one without cells.
+piko.record @D {"z" : f32 at 0} size 4 align 4
+// CHECK-LABEL: piko.pipeline @Pixels rank 2 {
+piko.pipeline @Pixels rank 2 {
+  piko.image @depth : @D rank 2 clear [1.0 : f32]
+  piko.source @s
+  piko.stage @s bins [8, 8] threads 64 : @F -> [] {
+    piko.assign {
+    ^bb0(%f: !piko.prim<@F>):
+      piko.assign_all
+      piko.return
+    }
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      // CHECK: %[[LO:.*]] = arith.constant 2 : i32
+      // CHECK: %[[HI:.*]] = arith.constant 5 : i32
+      %lo = arith.constant 2 : i32
+      %hi = arith.constant 5 : i32
+      // CHECK: piko.parallel_pixels(%[[LO]], %[[LO]]) to(%[[HI]], %[[LO]]) {
+      // CHECK-NEXT: ^bb0(%[[X:.*]]: i32, %[[Y:.*]]: i32):
+      // CHECK-NEXT: piko.load @depth[%[[X]], %[[Y]] : i32, i32] "z" : f32
+      // CHECK-NEXT: piko.sync
+      piko.parallel_pixels (%lo, %lo) to (%hi, %lo) {
+      ^bb0(%x: i32, %y: i32):
+        %z = piko.load @depth[%x, %y : i32, i32] "z" : f32
+        piko.sync
+        piko.yield
+      }
+      piko.return
+    }
+  }
+}

@@ -4,45 +4,105 @@
 
 #include "Piko/Dialect/Piko/IR/Piko.h"
 
+#include "mlir/Dialect/Arith/IR/Arith.h"
+
 using namespace mlir;
 using namespace piko;
+
+#include "Piko/Dialect/Piko/IR/PikoInterfaces.cpp.inc"
+
+//===----------------------------------------------------------------------===//
+// Loops
+//===----------------------------------------------------------------------===//
+
+/// What holds of every parallel loop, whatever its iterations are called.
+static LogicalResult verifyParallelLoop(ParallelLoopOpInterface loop) {
+  Operation *end = loop.getBodyBlock()->getTerminator();
+  if (!isa<YieldOp>(end) || end->getNumOperands() != 0)
+    return loop->emitOpError(
+        "expected its body to end with a piko.yield of nothing");
+  if (loop->getParentOfType<UpdateOp>())
+    return loop->emitOpError("expected to be outside an update");
+  if (!loop->getParentOfType<ProcessOp>() && !loop->getParentOfType<KernelOp>())
+    return loop->emitOpError("expected to be inside a process phase");
+  return success();
+}
 
 LogicalResult ParallelForOp::verifyRegions() {
   Block &body = getBody().front();
   if (body.getNumArguments() != 1 || !body.getArgument(0).getType().isIndex())
     return emitOpError("expected one block argument of type 'index'");
-  if (!isa<YieldOp>(body.getTerminator()) ||
-      body.getTerminator()->getNumOperands() != 0)
-    return emitOpError("expected its body to end with a piko.yield of nothing");
-  if ((*this)->getParentOfType<UpdateOp>())
-    return emitOpError("expected to be outside an update");
-  Operation *phase = (*this)->getParentOfType<ProcessOp>();
-  if (!phase && !(*this)->getParentOfType<KernelOp>())
-    return emitOpError("expected to be inside a process phase");
-  return success();
+  return verifyParallelLoop(*this);
 }
 
-bool ParallelForOp::hasBarriers() {
-  return walk<WalkOrder::PreOrder>([&](Operation *op) {
-           if (op != *this && isa<ParallelForOp>(op))
-             return WalkResult::skip();
-           return isa<SyncOp, ReduceOp, ScanOp, SortOp>(op)
-                      ? WalkResult::interrupt()
-                      : WalkResult::advance();
-         })
+Value ParallelForOp::buildIteration(OpBuilder &) { return getIteration(); }
+
+LogicalResult ParallelPixelsOp::verifyRegions() {
+  int64_t rank = getPipeline(*this).getRank();
+  if (int64_t(getLo().size()) != rank)
+    return emitOpError("expected a box of ")
+           << rank << " dimensions, as its pipeline has, but got "
+           << getLo().size();
+  Block &body = getBody().front();
+  bool areCoordinates = llvm::all_of(
+      body.getArgumentTypes(), [](Type type) { return type.isInteger(32); });
+  if (body.getNumArguments() != rank || !areCoordinates)
+    return emitOpError("expected ")
+           << rank << " block arguments of type 'i32', but got ("
+           << body.getArgumentTypes() << ")";
+  return verifyParallelLoop(*this);
+}
+
+/// (z - z0) * (y1 - y0) + (y - y0), and so on down to x.
+Value ParallelPixelsOp::buildIteration(OpBuilder &builder) {
+  Location loc = getLoc();
+  auto cast = [&](Value value) {
+    return arith::IndexCastOp::create(builder, loc, builder.getIndexType(),
+                                      value);
+  };
+  Value number;
+  for (auto [lo, hi, at] :
+       llvm::reverse(llvm::zip(getLo(), getHi(), getCell()))) {
+    Value low = cast(lo);
+    Value offset = arith::SubIOp::create(builder, loc, cast(at), low);
+    if (number) {
+      Value extent = arith::SubIOp::create(builder, loc, cast(hi), low);
+      number = arith::MulIOp::create(builder, loc, number, extent);
+      offset = arith::AddIOp::create(builder, loc, number, offset);
+    }
+    number = offset;
+  }
+  return number;
+}
+
+bool piko::detail::hasBarriers(Operation *loop) {
+  return loop
+      ->walk<WalkOrder::PreOrder>([&](Operation *op) {
+        if (op != loop && isa<ParallelLoopOpInterface>(op))
+          return WalkResult::skip();
+        return isa<SyncOp, ReduceOp, ScanOp, SortOp>(op)
+                   ? WalkResult::interrupt()
+                   : WalkResult::advance();
+      })
       .wasInterrupted();
 }
+
+//===----------------------------------------------------------------------===//
+// Barriers
+//===----------------------------------------------------------------------===//
 
 /// All iterations of one loop that is not nested meet at the operation.
 static LogicalResult verifyBarrier(Operation *op) {
   if (op->getParentOfType<UpdateOp>())
     return op->emitOpError("expected to be outside an update");
-  auto loop = op->getParentOfType<ParallelForOp>();
+  auto loop = op->getParentOfType<ParallelLoopOpInterface>();
   if (!loop)
-    return op->emitOpError("expected to be inside a parallel_for");
-  if (auto outer = loop->getParentOfType<ParallelForOp>()) {
-    InFlightDiagnostic error = op->emitOpError(
-        "expected to be inside a parallel_for that is not nested");
+    return op->emitOpError(
+        "expected to be inside a parallel_for or a parallel_pixels");
+  if (auto outer = loop->getParentOfType<ParallelLoopOpInterface>()) {
+    InFlightDiagnostic error = op->emitOpError("expected to be inside a ")
+                               << loop->getName().stripDialect()
+                               << " that is not nested";
     error.attachNote(outer.getLoc()) << "the outer one is here";
     return error;
   }
@@ -77,7 +137,8 @@ static LogicalResult verifyCombine(Operation *op, TypeRange types) {
            << types << ")";
   WalkResult effects = op->walk([&](Operation *inner) {
     if (inner == op ||
-        !isa<EmitOp, StoreOp, AtomicOp, UpdateOp, ParallelForOp>(inner))
+        !isa<EmitOp, StoreOp, AtomicOp, UpdateOp, ParallelLoopOpInterface>(
+            inner))
       return WalkResult::advance();
     inner->emitOpError("expected to be outside the function of a ")
         << op->getName().stripDialect();

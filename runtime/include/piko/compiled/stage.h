@@ -46,6 +46,26 @@ template <int Rank, class F> Cells<Rank> makeCells(F get) {
     return Cells<4>(get(0), get(1), get(2), get(3));
 }
 
+/// A function of its own, as iterate() is.
+template <int Rank, class F> void iterateCell(F &f, int32_t i) {
+  Cells<Rank> cell =
+      makeCells<Rank>([i](int32_t dim) { return marker::cellAt(i, dim); });
+  f(cell);
+}
+
+/// Calls f(cell) for each cell from `begin` up to `end`, x fastest.
+template <int Rank, class F>
+void iterateCells(const Cells<Rank> &begin, const Cells<Rank> &end, F &f) {
+  int64_t n =
+      marker::cellsOf(coordinate<0, Rank>(begin), coordinate<1, Rank>(begin),
+                      coordinate<2, Rank>(begin), coordinate<3, Rank>(begin),
+                      coordinate<0, Rank>(end), coordinate<1, Rank>(end),
+                      coordinate<2, Rank>(end), coordinate<3, Rank>(end));
+  for (int32_t i = marker::loopFirst(); marker::loopMore(i, n, 0);
+       i = marker::loopNext(i))
+    iterateCell<Rank>(f, i);
+}
+
 } // namespace detail
 
 /// Gives a stage access to the state of its pipeline.
@@ -183,29 +203,33 @@ protected:
   }
   /// Calls f(cell) for each cell of the current bin, x fastest.
   template <class F> void parallelForPixels(F &&f) {
-    Cells<B::rank> lo = binLo(), hi = binHi();
-    int64_t n = hi.x - lo.x;
-    if constexpr (B::rank >= 2)
-      n *= hi.y - lo.y;
-    if constexpr (B::rank >= 3)
-      n *= hi.z - lo.z;
-    if constexpr (B::rank >= 4)
-      n *= hi.w - lo.w;
-    parallelFor(n, [&](int i) {
-      Cells<B::rank> cell;
-      auto take = [&](int &at, int first, int end) {
-        at = first + marker::remainder(i, end - first);
-        i = marker::quotient(i, end - first);
-      };
-      take(cell.x, lo.x, hi.x);
-      if constexpr (B::rank >= 2)
-        take(cell.y, lo.y, hi.y);
-      if constexpr (B::rank >= 3)
-        take(cell.z, lo.z, hi.z);
-      if constexpr (B::rank >= 4)
-        take(cell.w, lo.w, hi.w);
-      f(cell);
-    });
+    detail::iterateCells<B::rank>(binLo(), binHi(), f);
+  }
+  /// The same for the cells of the closed box from lo to hi that lie in the
+  /// bin.
+  template <class F>
+  void parallelForPixels(const Cells<B::rank> &lo, const Cells<B::rank> &hi,
+                         F &&f) {
+    Cells<B::rank> begin = binLo(), end = binHi();
+    detail::iterateCells<B::rank>(
+        detail::makeCells<B::rank>([&](int dim) {
+          return lo[dim] > begin[dim] ? lo[dim] : begin[dim];
+        }),
+        detail::makeCells<B::rank>([&](int dim) {
+          return (hi[dim] < end[dim] - 1 ? hi[dim] : end[dim] - 1) + 1;
+        }),
+        f);
+  }
+  template <class F>
+    requires(B::rank == 1)
+  void parallelForPixels(int lo, int hi, F &&f) {
+    parallelForPixels(Cells<1>(lo), Cells<1>(hi), f);
+  }
+  template <int Rank, class T, class F>
+    requires(Rank != B::rank)
+  void parallelForPixels(const glm::vec<Rank, T> &, const glm::vec<Rank, T> &,
+                         F &&) {
+    static_assert(Rank == B::rank, detail::dimensions<B::rank, Rank>());
   }
   /// In an iteration of parallelFor: a barrier between all iterations.
   void sync() { marker::sync(); }

@@ -422,20 +422,51 @@ public:
   template <class F>
   void parallelForPixels(F &&f,
                          reference::Place at = reference::Place::current()) {
-    reference::Cell lo = reference::toCell(binLo());
-    reference::Cell hi = reference::toCell(binHi(), 1);
+    Cells<B::rank> lo = binLo(at), hi = binHi(at) - 1;
+    parallelForPixels(lo, hi, std::forward<F>(f), at);
+  }
+  /// The same for the cells of the closed box from lo to hi that lie in the
+  /// bin.
+  template <class F>
+  void parallelForPixels(const Cells<B::rank> &lo, const Cells<B::rank> &hi,
+                         F &&f,
+                         reference::Place at = reference::Place::current()) {
+    static_assert(
+        std::is_invocable_v<const std::remove_reference_t<F> &,
+                            Cells<B::rank> &>,
+        "expected a function that can be called if it is const: iterations "
+        "share what it has captured by value");
+    reference::Cell first = reference::toCell(binLo(at)),
+                    size = reference::toCell(binHi(at), 1);
     int64_t n = 1;
-    for (int d = 0; d < B::rank; ++d)
-      n *= hi[d] - lo[d];
+    for (int d = 0; d < B::rank; ++d) {
+      int64_t end = std::min<int64_t>(size[d], int64_t(hi[d]) + 1);
+      first[d] = std::max<int64_t>(first[d], lo[d]);
+      size[d] = std::max<int64_t>(end - first[d], 0);
+      n *= size[d];
+    }
     reference::executorAt("parallelForPixels", at)
-        .parallelFor(n, [&, lo, hi](int64_t i) {
+        .parallelFor(n, [&f, first, size](int64_t i) {
           Cells<B::rank> cell;
           for (int d = 0; d < B::rank; ++d) {
-            cell[d] = static_cast<int>(lo[d] + i % (hi[d] - lo[d]));
-            i /= hi[d] - lo[d];
+            cell[d] = static_cast<int>(first[d] + i % size[d]);
+            i /= size[d];
           }
           f(cell);
         });
+  }
+  template <class F>
+    requires(B::rank == 1)
+  void parallelForPixels(int lo, int hi, F &&f,
+                         reference::Place at = reference::Place::current()) {
+    parallelForPixels(Cells<1>(lo), Cells<1>(hi), std::forward<F>(f), at);
+  }
+  template <int Rank, class T, class F>
+    requires(Rank != B::rank)
+  void parallelForPixels(const glm::vec<Rank, T> &, const glm::vec<Rank, T> &,
+                         F &&) {
+    static_assert(Rank == B::rank,
+                  "expected as many dimensions as the bins of the stage have");
   }
   /// In an iteration of parallelFor: a barrier between all iterations.
   void sync(reference::Place at = reference::Place::current()) {

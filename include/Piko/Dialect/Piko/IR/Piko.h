@@ -33,7 +33,13 @@ class ScheduleOp;
 /// Of operations that only the CPU's lowering makes.
 template <typename OpT>
 class CPUOnly : public mlir::OpTrait::TraitBase<OpT, CPUOnly> {};
+
+namespace detail {
+bool hasBarriers(mlir::Operation *loop);
+} // namespace detail
 } // namespace piko
+
+#include "Piko/Dialect/Piko/IR/PikoInterfaces.h.inc"
 
 #define GET_OP_CLASSES
 #include "Piko/Dialect/Piko/IR/PikoOps.h.inc"

@@ -6,9 +6,18 @@
 #define PIKO_DIALECT_PIKO_IR_PIKOLOOPOPS_TD
 
 include "Piko/Dialect/Piko/IR/PikoBase.td"
+include "Piko/Dialect/Piko/IR/PikoInterfaces.td"
 
-def Piko_ParallelForOp : Piko_Op<"parallel_for", [
-    SingleBlock, AutomaticAllocationScope]> {
+/// Independent iterations, which the threads of a bin share.
+class Piko_ParallelLoopOp<string mnemonic, list<Trait> traits = []>
+    : Piko_Op<mnemonic, !listconcat(traits, [
+        SingleBlock, AutomaticAllocationScope,
+        DeclareOpInterfaceMethods<Piko_ParallelLoopInterface>])> {
+  let regions = (region SizedRegion<1>:$body);
+  let hasRegionVerifier = 1;
+}
+
+def Piko_ParallelForOp : Piko_ParallelLoopOp<"parallel_for"> {
   let summary = "independent iterations, spread over the threads of a bin";
   let description = [{
     Runs the body for each index from 0 up to the operand, exclusive, and ends
@@ -25,20 +34,47 @@ def Piko_ParallelForOp : Piko_Op<"parallel_for", [
     ```
   }];
   let arguments = (ins Index:$count);
-  let regions = (region SizedRegion<1>:$body);
   let assemblyFormat = "$count attr-dict-with-keyword $body";
-  let hasRegionVerifier = 1;
   let extraClassDeclaration = [{
-    ::mlir::Block *getBodyBlock() { return &getBody().front(); }
     ::mlir::Value getIteration() { return getBody().getArgument(0); }
-    /// Whether its iterations meet: a barrier of this loop, not of one inside.
-    bool hasBarriers();
   }];
 }
 
-/// An operation at which all iterations of the enclosing `piko.parallel_for`
-/// meet. That loop is not nested, and the control flow from it to the operation
-/// is the same in all its iterations.
+def Piko_ParallelPixelsOp : Piko_ParallelLoopOp<"parallel_pixels", [
+    SameVariadicOperandSize]> {
+  let summary = "independent iterations over the pixels of a box";
+  let description = [{
+    Is `piko.parallel_for` over the cells from `lo` up to `hi`, exclusive, x
+    fastest: their coordinates are the arguments of the body, as many as the
+    pipeline has dimensions. A box without cells is no iteration. The box may be
+    any; that its pixels lie in the bin is what its bounds say, as those of
+    `parallelForPixels` do, which are clipped to the bin.
+
+    ```mlir
+    piko.parallel_pixels (%x0, %y0) to (%x1, %y1) {
+    ^bb0(%x: i32, %y: i32):
+      %old = piko.load @depth[%x, %y : i32, i32] "z" : f32
+      piko.yield
+    }
+    ```
+
+    It stays until loops are split, so that a pass finds pixels, and not numbers
+    that it would have to take apart.
+  }];
+  let arguments = (ins Variadic<I32>:$lo, Variadic<I32>:$hi);
+  let assemblyFormat = [{
+    `(` $lo `)` `to` `(` $hi `)` attr-dict-with-keyword $body
+  }];
+  let extraClassDeclaration = [{
+    ::mlir::Block::BlockArgListType getCell() {
+      return getBody().getArguments();
+    }
+  }];
+}
+
+/// An operation at which all iterations of the enclosing parallel loop meet.
+/// That loop is not nested, and the control flow from it to the operation is the
+/// same in all its iterations.
 class Piko_BarrierOp<string mnemonic, list<Trait> traits = []>
     : Piko_Op<mnemonic, traits> {
   let hasVerifier = 1;
@@ -47,8 +83,8 @@ class Piko_BarrierOp<string mnemonic, list<Trait> traits = []>
 def Piko_SyncOp : Piko_BarrierOp<"sync"> {
   let summary = "a barrier between the iterations";
   let description = [{
-    Directly inside a `piko.parallel_for` that is not nested, in control flow
-    that is uniform over its iterations.
+    Directly inside a `piko.parallel_for` or `piko.parallel_pixels` that is not
+    nested, in control flow that is uniform over its iterations.
 
     ```mlir
     piko.sync

@@ -163,11 +163,12 @@ def Piko_UpdateOp : Piko_Op<"update", [
 
 def Piko_YieldOp : Piko_Op<"yield", [
     Pure, Terminator, AttrSizedOperandSegments,
-    ParentOneOf<["UpdateOp", "ParallelForOp", "ReduceOp", "ScanOp"]>]> {
+    ParentOneOf<["UpdateOp", "ParallelForOp", "ParallelPixelsOp", "ReduceOp",
+                 "ScanOp"]>]> {
   let summary = "ends the body of an operation";
   let description = [{
-    See `piko.update`, `piko.parallel_for` and `piko.reduce`. Only an update
-    has a pixel to yield.
+    See `piko.update`, `piko.parallel_for`, `piko.parallel_pixels` and
+    `piko.reduce`. Only an update has a pixel to yield.
   }];
   let arguments = (ins Variadic<Piko_Scalar>:$pixel, Variadic<AnyType>:$results);
   let assemblyFormat = [{
