@@ -42,6 +42,10 @@ void piko::addSynthesisSequence(OpPassManager &passes,
   addCleanUp(passes);
   passes.addPass(createNormalizeLoops());
   addCleanUp(passes);
+  if (options.has("uplift-pixel-loops")) {
+    passes.nest<PipelineOp>().addPass(createUpliftPixelLoops());
+    addCleanUp(passes);
+  }
   {
     OpPassManager &pipeline = passes.nest<PipelineOp>();
     pipeline.addPass(createOrderStages());

@@ -13,11 +13,22 @@ static bool contains(const std::vector<std::string> &names,
 }
 
 const std::vector<std::string> &SynthesisOptions::getOptional() {
-  static const std::vector<std::string> names = {
-      "pre-schedule", "infer-directives", "fuse-stages",         "test-early",
-      "prune",        "own-pixels",       "eliminate-schedules", "fuse-kernels",
-      "form-strips",  "prefetch",         "compact-loops",       "vectorize",
-      "prove-bounds", "hoist-bounds",     "if-convert"};
+  static const std::vector<std::string> names = {"pre-schedule",
+                                                 "infer-directives",
+                                                 "fuse-stages",
+                                                 "test-early",
+                                                 "prune",
+                                                 "own-pixels",
+                                                 "eliminate-schedules",
+                                                 "fuse-kernels",
+                                                 "form-strips",
+                                                 "prefetch",
+                                                 "compact-loops",
+                                                 "vectorize",
+                                                 "prove-bounds",
+                                                 "hoist-bounds",
+                                                 "if-convert",
+                                                 "uplift-pixel-loops"};
   return names;
 }
 

@@ -2,12 +2,14 @@
 //
 // piko-normalize-loops: structured control flow that was made of branches tests
 // more than it must. Until nothing changes,
-//   1. an scf.if whose first arm does nothing has its arms exchanged;
-//   2. a flag that arms yield as a number becomes a truth value;
-//   3. a truth value that one arm yields, where the other yields false, becomes
+//   1. truth values that are chosen or turned round become conjunctions,
+//      disjunctions and opposite comparisons;
+//   2. an scf.if whose first arm does nothing has its arms exchanged;
+//   3. a flag that arms yield as a number becomes a truth value;
+//   4. a truth value that one arm yields, where the other yields false, becomes
 //      a conjunction in front;
-//   4. an scf.if in another, where both yield the same otherwise, becomes one;
-//   5. an scf.while whose work stands in front of its condition, in an scf.if
+//   5. an scf.if in another, where both yield the same otherwise, becomes one;
+//   6. an scf.while whose work stands in front of its condition, in an scf.if
 //      with that condition, has it behind.
 
 #include "Piko/Dialect/Piko/IR/Piko.h"
@@ -60,6 +62,44 @@ Value invert(OpBuilder &builder, Value condition) {
     return arith::OrIOp::create(builder, loc, a, b);
   return arith::AndIOp::create(builder, loc, a, b);
 }
+
+/// select %c, true, %d  =>  %c | %d, and select %c, %d, false  =>  %c & %d, of
+/// comparisons.
+struct JoinConditions : OpRewritePattern<arith::SelectOp> {
+  using OpRewritePattern::OpRewritePattern;
+  LogicalResult matchAndRewrite(arith::SelectOp choice,
+                                PatternRewriter &rewriter) const override {
+    Value condition = choice.getCondition();
+    if (!choice.getType().isInteger(1) || !isInvertible(condition))
+      return failure();
+    if (matchPattern(choice.getTrueValue(), m_One()) &&
+        isInvertible(choice.getFalseValue())) {
+      rewriter.replaceOpWithNewOp<arith::OrIOp>(choice, condition,
+                                                choice.getFalseValue());
+      return success();
+    }
+    if (matchPattern(choice.getFalseValue(), m_Zero()) &&
+        isInvertible(choice.getTrueValue())) {
+      rewriter.replaceOpWithNewOp<arith::AndIOp>(choice, condition,
+                                                 choice.getTrueValue());
+      return success();
+    }
+    return failure();
+  }
+};
+
+/// !(a < b | c < d)  =>  a >= b & c >= d
+struct InvertComparisons : OpRewritePattern<arith::XOrIOp> {
+  using OpRewritePattern::OpRewritePattern;
+  LogicalResult matchAndRewrite(arith::XOrIOp op,
+                                PatternRewriter &rewriter) const override {
+    if (!op.getType().isInteger(1) || !matchPattern(op.getRhs(), m_One()) ||
+        !isInvertible(op.getLhs()))
+      return failure();
+    rewriter.replaceOp(op, invert(rewriter, op.getLhs()));
+    return success();
+  }
+};
 
 /// scf.if %c {} else { .. }  =>  scf.if !%c { .. }
 struct ExchangeArms : OpRewritePattern<scf::IfOp> {
@@ -272,8 +312,8 @@ struct MoveWorkBehind : OpRewritePattern<scf::WhileOp> {
 
 void NormalizeLoopsPass::runOnOperation() {
   RewritePatternSet patterns(&getContext());
-  patterns.add<ExchangeArms, NarrowFlags, HoistConjunction, MergeNested,
-               MoveWorkBehind>(&getContext());
+  patterns.add<JoinConditions, InvertComparisons, ExchangeArms, NarrowFlags,
+               HoistConjunction, MergeNested, MoveWorkBehind>(&getContext());
   scf::IfOp::getCanonicalizationPatterns(patterns, &getContext());
   scf::WhileOp::getCanonicalizationPatterns(patterns, &getContext());
   arith::ExtUIOp::getCanonicalizationPatterns(patterns, &getContext());

@@ -17,7 +17,7 @@ EQUAL, BLANK = "equal", "equal, but blank"
 PASSES = ["pre-schedule", "infer-directives", "fuse-stages", "test-early", "prune",
           "own-pixels", "eliminate-schedules", "fuse-kernels", "prefetch",
           "compact-loops", "vectorize", "prove-bounds", "hoist-bounds",
-          "if-convert"]
+          "if-convert", "uplift-pixel-loops"]
 
 
 def options_of(passes):

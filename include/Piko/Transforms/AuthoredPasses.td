@@ -99,6 +99,58 @@ def NormalizeLoops : Pass<"piko-normalize-loops"> {
   let dependentDialects = ["::mlir::arith::ArithDialect"];
 }
 
+def UpliftPixelLoops : Pass<"piko-uplift-pixel-loops", "::piko::PipelineOp"> {
+  let summary = "Uplift counted loops over pixels to piko.parallel_pixels";
+  let description = [{
+    **Requires** the authored level, and loops as `piko-normalize-loops` leaves
+    them.
+
+    **Does**: makes a `piko.parallel_pixels` of a nest of counted loops in a
+    process phase, as many as the pipeline has dimensions, whose counters are the
+    coordinates of a pixel of the bin, x the fastest. Pure operations between the
+    loops move into the body. Iterations are independent: they hand nothing on,
+    leave the loop nowhere, change state by updates and stores of their own pixel
+    and by atomics that give nothing, read what the loop changes at their own
+    pixel only, and store to their own arrays. A test around the whole body that
+    keeps the pixel in the bin becomes a part of the box.
+
+    **Guarantees** the same emissions and updates, in the same order.
+
+    Before:
+    ```
+    scf.while (%y = %y0) : (i32) -> i32 {
+      %more = arith.cmpi slt, %y, %y1 : i32
+      scf.condition(%more) %y : i32
+    } do {
+    ^bb0(%y: i32):
+      scf.while (%x = %x0) : (i32) -> i32 {
+        ...
+      } do {
+      ^bb0(%x: i32):
+        piko.emit 0 (%x, %y) : i32, i32
+        ...
+      }
+      ...
+    }
+    ```
+    After:
+    ```
+    piko.parallel_pixels (%x0, %y0) to (%x1, %y1) {
+    ^bb0(%x: i32, %y: i32):
+      piko.emit 0 (%x, %y) : i32, i32
+      piko.yield
+    }
+    ```
+
+    **Limits**: loops that count by 1 upwards, x in y. A remark says of any other
+    nest of loops over pixels what is in the way.
+  }];
+  let statistics = [
+    Statistic<"uplifted", "uplifted", "nests of loops uplifted">,
+    Statistic<"refused", "refused", "nests of loops over pixels that stay">];
+  let dependentDialects = ["::mlir::arith::ArithDialect"];
+}
+
 def OrderStages : Pass<"piko-order-stages", "::piko::PipelineOp"> {
   let summary = "Put the stages into the order in which they run";
   let description = [{
