@@ -11,8 +11,9 @@ Linear LinearFacts::getDomain(int64_t dim) {
   auto [found, isNew] = domains.try_emplace(dim);
   if (isNew) {
     found->second = system.addVariable();
+    int64_t most = pipeline.getMaxExtent().value_or(maxDomainExtent);
     system.getFacts().addBetween(Linear(1), found->second,
-                                 Linear(maxDomainExtent));
+                                 Linear(std::min(most, maxDomainExtent)));
   }
   return found->second;
 }

@@ -196,8 +196,9 @@ Linear LinearFacts::expandFloatCast(Operation *op, unsigned frame, Id id) {
   Linear end = Linear(1) * power(std::min(width - 1, 62u));
   LinearFact below, inside, above, nan;
   Linear floor;
-  bool isWhole;
+  bool isWhole, isExact = false;
   if (std::optional<Exact> exact = getExact(from)) {
+    isExact = true;
     floor = exact->shift == 0 ? exact->scaled
                               : divide(exact->scaled, power(exact->shift));
     isWhole = exact->shift == 0;
@@ -212,6 +213,9 @@ Linear LinearFacts::expandFloatCast(Operation *op, unsigned frame, Id id) {
   // With a fraction, and without a sign, it is the floor only from 0 on.
   Linear least =
       isWhole && isa<arith::FPToSIOp>(op) ? Linear(0) - end : Linear(0);
+  if (isExact && isSurelyAtLeastZero(floor - least) &&
+      isSurelyAtLeastZero(end - Linear(1) - floor))
+    return floor;
   below.addAtLeastZero(least - floor - Linear(1));
   inside.addAtLeastZero(floor - least);
   inside.addZero(result - floor);
@@ -335,6 +339,38 @@ static LinearFact compareFloor(Relation relation, const Linear &floor,
   if (relation == Relation::le || relation == Relation::eq)
     return compareToZero(relation, floor - whole);
   return LinearFact(); // something else than a whole number
+}
+
+std::optional<bool> LinearFacts::decide(Value condition, unsigned frame) {
+  using P = arith::CmpFPredicate;
+  auto compare = condition.getDefiningOp<arith::CmpFOp>();
+  if (!compare)
+    return std::nullopt;
+  std::optional<Exact> a = getExact(number(compare.getLhs(), frame)),
+                       b = getExact(number(compare.getRhs(), frame));
+  if (!a || !b)
+    return std::nullopt;
+  P predicate = compare.getPredicate();
+  if (predicate == P::UNO || predicate == P::ORD)
+    return predicate == P::ORD;
+  auto relation = getRelation(predicate);
+  if (!relation || relation->first == Relation::eq ||
+      relation->first == Relation::ne)
+    return std::nullopt;
+  int shift = std::max(a->shift, b->shift);
+  Linear above =
+      a->scaled * power(shift - a->shift) - b->scaled * power(shift - b->shift);
+  bool isLess =
+      relation->first == Relation::lt || relation->first == Relation::le;
+  if (isLess)
+    above = Linear(0) - above;
+  bool isStrict =
+      relation->first == Relation::lt || relation->first == Relation::gt;
+  if (isSurelyAtLeastZero(above - Linear(isStrict)))
+    return true;
+  if (isSurelyAtLeastZero(Linear(isStrict ? 0 : -1) - above))
+    return false;
+  return std::nullopt;
 }
 
 LinearFact LinearFacts::describeFloat(arith::CmpFOp compare, bool truth,

@@ -492,6 +492,9 @@ Linear LinearFacts::expandSelect(arith::SelectOp select, unsigned frame,
                                  Id id) {
   if (!select.getCondition().getType().isInteger(1))
     return atom(id);
+  // A case less, where conversions test what is exact.
+  if (std::optional<bool> truth = decide(select.getCondition(), frame))
+    return get(*truth ? select.getTrueValue() : select.getFalseValue(), frame);
   Linear result = atom(id);
   std::vector<LinearFact> cases;
   for (bool truth : {true, false}) {

@@ -35,6 +35,7 @@ LogicalResult PhaseImporter::importMarker(llvm::CallInst *call,
   case MarkerKind::loopFirst:
   case MarkerKind::loopNext:
   case MarkerKind::cellsOf:
+  case MarkerKind::floatPosition:
     return success();
   case MarkerKind::loopMore:
     if (loops.getByHeader(call->getParent()))

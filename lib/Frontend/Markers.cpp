@@ -12,20 +12,22 @@ using namespace piko;
 std::optional<MarkerKind> piko::getMarkerKind(llvm::StringRef name) {
 #define MARKER(NAME) .Case(#NAME, MarkerKind::NAME)
   return llvm::StringSwitch<std::optional<MarkerKind>>(name) MARKER(state)
-      MARKER(input) MARKER(element) MARKER(listSize) MARKER(listAt) MARKER(
-             extent) MARKER(imageExtent) MARKER(emit) MARKER(updateBegin)
-          MARKER(updateEnd) MARKER(atomic) MARKER(atomicFetch) MARKER(
-              reduceBegin) MARKER(scanBegin) MARKER(combineEnd) MARKER(sort)
-              MARKER(loopFirst) MARKER(loopMore) MARKER(loopNext) MARKER(
-                  cellsOf) MARKER(cellAt) MARKER(sync) MARKER(bin) MARKER(binAt)
-                  MARKER(binLo) MARKER(binHi) MARKER(domain) MARKER(assignBin)
-                      MARKER(assignAll) MARKER(assignPrevious) MARKER(assignBox)
-                          MARKER(schedule) MARKER(endStage) MARKER(endBin)
-                              MARKER(batch) MARKER(everyBin) MARKER(order)
-                                  MARKER(source) MARKER(connect)
-                                      MARKER(allocateForSource) MARKER(phase)
-                                          MARKER(clear)
-                                              .Default(std::nullopt);
+      MARKER(input) MARKER(element) MARKER(listSize) MARKER(listAt)
+          MARKER(extent) MARKER(imageExtent) MARKER(emit) MARKER(updateBegin)
+              MARKER(updateEnd) MARKER(atomic) MARKER(atomicFetch) MARKER(
+                  reduceBegin) MARKER(scanBegin) MARKER(combineEnd) MARKER(sort)
+                  MARKER(loopFirst) MARKER(loopMore) MARKER(loopNext) MARKER(
+                      cellsOf) MARKER(cellAt) MARKER(sync) MARKER(bin)
+                      MARKER(floatPosition) MARKER(binAt) MARKER(binLo)
+                          MARKER(binHi) MARKER(domain) MARKER(assignBin)
+                              MARKER(assignAll) MARKER(assignPrevious) MARKER(
+                                  assignBox) MARKER(schedule) MARKER(endStage)
+                                  MARKER(endBin) MARKER(batch) MARKER(everyBin)
+                                      MARKER(order) MARKER(source)
+                                          MARKER(connect)
+                                              MARKER(allocateForSource)
+                                                  MARKER(phase) MARKER(clear)
+                                                      .Default(std::nullopt);
 #undef MARKER
 }
 
@@ -64,6 +66,7 @@ void piko::setMarkerEffects(llvm::Module &module, const MarkerTable &markers) {
     case MarkerKind::extent:
     case MarkerKind::imageExtent:
     case MarkerKind::bin:
+    case MarkerKind::floatPosition:
     case MarkerKind::binAt:
     case MarkerKind::binLo:
     case MarkerKind::binHi:

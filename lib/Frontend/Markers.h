@@ -43,6 +43,7 @@ enum class MarkerKind {
   combineEnd,
   sort,
   bin,
+  floatPosition,
   binAt,
   binLo,
   binHi,

@@ -28,7 +28,7 @@ public:
       if (isUsed(record))
         buildRecord(record);
     auto op = PipelineOp::create(builder, pipeline.location, pipeline.name,
-                                 pipeline.rank);
+                                 pipeline.rank, getMaxExtent());
     builder.createBlock(&op.getBody());
     for (const StateDescription &state : pipeline.state)
       buildState(state);
@@ -49,6 +49,15 @@ public:
   }
 
 private:
+  /// Where phases take positions that are floats, the domain is limited.
+  mlir::IntegerAttr getMaxExtent() {
+    constexpr int64_t most = int64_t(1) << 23; // of piko/bins.h
+    for (const auto &[name, marker] : unit.markers)
+      if (marker.kind == MarkerKind::floatPosition)
+        return builder.getI64IntegerAttr(most);
+    return {};
+  }
+
   mlir::FlatSymbolRefAttr getRecordName(unsigned record) {
     return mlir::FlatSymbolRefAttr::get(&context,
                                         pipeline.records[record].name);

@@ -61,6 +61,10 @@ void pikoir_declare_pipeline(pikort_pipeline *p, const char *name,
   });
 }
 
+void pikoir_declare_max_extent(pikort_pipeline *p, int64_t cells) {
+  p->maxExtent = cells;
+}
+
 void pikoir_declare_record(pikort_pipeline *p, int32_t id, const char *name,
                            int64_t size, int64_t align) {
   guarded(p, "setup", [&] {

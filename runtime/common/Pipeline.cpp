@@ -194,6 +194,14 @@ void pikort_pipeline::finish() {
 }
 
 void pikort_pipeline::computeGrids() {
+  for (int32_t d = 0; d < rank; ++d)
+    if (domain[d] > maxExtent)
+      throw Failure{PIKORT_INVALID_ARGUMENT,
+                    "pipeline " + quoted(name) + ": expected at most " +
+                        std::to_string(maxExtent) +
+                        " cells in each dimension where positions are floats, "
+                        "but the domain has " +
+                        std::to_string(domain[d])};
   for (Stage &stage : stages) {
     stage.grid = stage.cellGrid = {1, 1, 1, 1};
     stage.tiles = stage.cells = 1;

@@ -234,6 +234,7 @@ struct pikort_pipeline {
 
   bool ready = false; ///< finish() succeeded.
   std::array<int64_t, 4> domain{0, 1, 1, 1};
+  int64_t maxExtent = PIKORT_MAX_EXTENT; ///< of the domain in a dimension
   int32_t threads = 1;
   int32_t activeThreads = 1; ///< That the open kernel has units for.
   double ticksPerMillisecond =

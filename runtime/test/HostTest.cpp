@@ -214,6 +214,24 @@ TEST_F(Host, BadDomains) {
   EXPECT_TRUE(pipe.run());
 }
 
+TEST(Domains, LargerThanDeclared) {
+  auto setup = [](pikort_pipeline *p) {
+    pikoir_declare_pipeline(p, "Small", 2);
+    pikoir_declare_max_extent(p, 100);
+  };
+  piko::rt::Pipeline pipe({PIKORT_ABI_VERSION, "Small", setup,
+                           [](pikort_pipeline *) { return 0; }});
+  ASSERT_TRUE(pipe.created());
+  ASSERT_TRUE(pipe.domain({8, 101}));
+  piko::rt::Status status = pipe.run();
+  EXPECT_EQ(status.code(), PIKORT_INVALID_ARGUMENT);
+  EXPECT_EQ(status.message(),
+            "pipeline 'Small': expected at most 100 cells in each dimension "
+            "where positions are floats, but the domain has 101");
+  ASSERT_TRUE(pipe.domain({8, 100}));
+  EXPECT_TRUE(pipe.run());
+}
+
 // An image is refused before the system has to give it.
 TEST(Images, LargerThanMemory) {
   auto setup = [](pikort_pipeline *p) {

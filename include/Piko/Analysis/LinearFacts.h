@@ -155,6 +155,8 @@ private:
                              unsigned frame);
   LinearFact describeFloat(mlir::arith::CmpFOp compare, bool truth,
                            unsigned frame);
+  /// What a comparison of exact floats surely gives, found out on the way.
+  std::optional<bool> decide(mlir::Value condition, unsigned frame);
   LinearFact describeUnknown(mlir::Value condition, bool truth, unsigned frame);
   /// Whether a comparison for equality is that of a cell's bin with the bin
   /// that is processed; the cell's coordinates.

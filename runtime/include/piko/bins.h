@@ -77,6 +77,10 @@ template <int Rank> using Position = glm::vec<Rank, float, glm::defaultp>;
 
 namespace detail {
 
+/// The most cells of a domain in a dimension where positions are floats, which
+/// are exact so far, and the middles between them, too.
+inline constexpr int64_t maxFloatExtent = int64_t(1) << 23;
+
 /// The cell that holds the coordinate p, saturated; NaN is in no cell.
 inline int32_t cellOf(float p) {
   float f = __builtin_floorf(p);

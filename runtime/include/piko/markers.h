@@ -59,6 +59,8 @@ template <bool Signed, class K> int64_t sort(K key);
 
 // The grid of bins.
 int64_t bin();
+// Positions are floats, for which a domain must not be too large.
+void floatPosition();
 int64_t binAt(int64_t x, int64_t y, int64_t z, int64_t w);
 int32_t binLo(int64_t bin, int32_t dim);
 int32_t binHi(int64_t bin, int32_t dim);

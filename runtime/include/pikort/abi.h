@@ -73,6 +73,9 @@ enum pikoir_schedule {
 
 PIKORT_API void pikoir_declare_pipeline(pikort_pipeline *p, const char *name,
                                         int32_t rank);
+/// The most cells that the domain may have in a dimension, if they are fewer
+/// than PIKORT_MAX_EXTENT.
+PIKORT_API void pikoir_declare_max_extent(pikort_pipeline *p, int64_t cells);
 PIKORT_API void pikoir_declare_record(pikort_pipeline *p, int32_t id,
                                       const char *name, int64_t size,
                                       int64_t align);

@@ -24,6 +24,7 @@ piko.record @F {"x" : i32 at 0, "w" : f32[4 : 4] at 4} size 20 align 4
 
 // CHECK-LABEL: func.func @P.setup(%{{.*}}: !llvm.ptr)
 // CHECK:         llvm.call @pikoir_declare_pipeline
+// CHECK:         llvm.call @pikoir_declare_max_extent
 // CHECK:         llvm.call @pikoir_declare_stage
 // CHECK:         llvm.call @pikoir_declare_edge
 
@@ -36,7 +37,7 @@ piko.record @F {"x" : i32 at 0, "w" : f32[4 : 4] at 4} size 20 align 4
 // CHECK:         call @P.kernel_b
 
 // IR: define i32 @P.run(ptr %{{.*}})
-piko.pipeline @P rank 2 {
+piko.pipeline @P rank 2 max_extent 4096 {
   piko.buffer @out : @F
   piko.source @a
   piko.edge @a[0] -> @b

@@ -208,3 +208,9 @@ piko.record @F {"x" : f32[3 : 8] at 0, "y" : f32[2 : 12] at 4} size 20 align 4
 
 // expected-error@+1 {{expected the numbers of field 'x' to lie side by side, but got two at 4}}
 piko.record @F {"x" : f32[2 : 4, 2 : 4] at 0} size 16 align 4
+
+// -----
+
+// expected-error@+1 {{attribute 'max_extent' failed to satisfy constraint: 64-bit integer attribute whose value is positive}}
+piko.pipeline @P rank 2 max_extent 0 {
+}

@@ -55,3 +55,7 @@ piko.pipeline @Volume rank 3 {
 // The attribute has a form of its own, for use outside of records.
 // CHECK: module attributes {test.field = #piko.field<"w" : f32[16 : 4] at 8>}
 module attributes {test.field = #piko.field<"w" : f32[16 : 4] at 8>} {}
+
+// CHECK: piko.pipeline @Small rank 3 max_extent 4096 {
+piko.pipeline @Small rank 3 max_extent 4096 {
+}

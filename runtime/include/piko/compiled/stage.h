@@ -179,6 +179,7 @@ protected:
                       coordinate<2, B::rank>(at), coordinate<3, B::rank>(at))};
   }
   BinId binFromPosition(const Position<B::rank> &at) const {
+    marker::floatPosition();
     return binFromPosition(detail::cellsOf<B::rank>(at));
   }
   BinId bin() const { return BinId{marker::bin()}; }

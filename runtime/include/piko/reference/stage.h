@@ -108,6 +108,17 @@ inline void checkOwnPixel(const Frame &call, const Cell &at, int rank) {
                           toText(at, rank));
 }
 
+/// Positions that are floats name the cells of a domain that is not too large.
+inline void checkExtent(const Frame &call) {
+  for (int64_t cells : call.node->grid.domain)
+    if (cells > detail::maxFloatExtent)
+      call.node->fail(-1, "expected at most " +
+                              std::to_string(detail::maxFloatExtent) +
+                              " cells in each dimension where positions are "
+                              "floats, but the domain has " +
+                              std::to_string(cells));
+}
+
 inline int64_t currentIteration() {
   return Executor::current()->frame->loop->iteration;
 }
@@ -207,8 +218,9 @@ public:
   BinId
   binFromPosition(const Position<B::rank> &p,
                   reference::Place at = reference::Place::current()) const {
-    return {reference::frameAt("binFromPosition", at)
-                .node->grid.binAt(reference::toCell(p))};
+    const reference::Frame &call = reference::frameAt("binFromPosition", at);
+    reference::checkExtent(call);
+    return {call.node->grid.binAt(reference::toCell(p))};
   }
   BinId
   binFromPosition(const Cells<B::rank> &p,

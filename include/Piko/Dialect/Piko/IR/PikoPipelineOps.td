@@ -50,7 +50,8 @@ def Piko_PipelineOp : Piko_Op<"pipeline", [
     Holds, at the authored level, state (`piko.constant`, `piko.buffer`,
     `piko.image`), stages, sources and edges. Bins are a grid of `rank`
     dimensions over a domain (the screen, or a volume) whose extent the host
-    gives at run time.
+    gives at run time: at most `max_extent` cells in each dimension, if that is
+    said.
 
     ```mlir
     piko.record @float {"value" : f32 at 0} size 4 align 4
@@ -70,10 +71,12 @@ def Piko_PipelineOp : Piko_Op<"pipeline", [
     ```
   }];
   let arguments = (ins SymbolNameAttr:$sym_name,
-                       ConfinedAttr<Piko_I64Attr, [IntMinValue<1>, IntMaxValue<4>]>:$rank);
+                       ConfinedAttr<Piko_I64Attr, [IntMinValue<1>, IntMaxValue<4>]>:$rank,
+                       OptionalAttr<ConfinedAttr<Piko_I64Attr, [IntPositive]>>:$max_extent);
   let regions = (region SizedRegion<1>:$body);
   let assemblyFormat = [{
-    $sym_name `rank` $rank attr-dict-with-keyword $body
+    $sym_name `rank` $rank (`max_extent` $max_extent^)?
+    attr-dict-with-keyword $body
   }];
   let hasRegionVerifier = 1;
   let extraClassDeclaration = [{
