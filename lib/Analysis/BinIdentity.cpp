@@ -13,7 +13,7 @@ using namespace piko;
 Operation *piko::getOnlyAssignment(AssignOp assign) {
   Operation *only = nullptr;
   WalkResult result = assign.walk([&](Operation *op) {
-    if (!isa<AssignToOp, AssignAllOp, AssignPreviousOp, AssignBoxOp>(op))
+    if (!isa<AssignmentOpInterface>(op))
       return WalkResult::advance();
     if (only)
       return WalkResult::interrupt();

@@ -139,8 +139,9 @@ void Checker::checkAssign(StageOp stage, AssignOp assign) {
   checkTrips(assign);
   assign.walk([&](Operation *op) {
     auto load = dyn_cast<LoadOp>(op);
-    if ((load && !load.getIndices().empty()) ||
-        isa<AssignToOp, AssignBoxOp, DivideOp>(op)) {
+    auto assignment = dyn_cast<AssignmentOpInterface>(op);
+    if ((load && !load.getIndices().empty()) || isa<DivideOp>(op) ||
+        (assignment && assignment.canFail())) {
       OpBuilder builder(op);
       CheckPlaceOp::create(builder, op->getLoc());
     }

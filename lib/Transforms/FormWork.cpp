@@ -11,7 +11,7 @@
 #include "FormWork.h"
 
 #include "Piko/Analysis/PhaseGraph.h"
-#include "Piko/Transforms/BinArithmetic.h"
+#include "Piko/Dialect/Piko/IR/BinArithmetic.h"
 #include "Piko/Transforms/Passes.h"
 
 #include "mlir/Dialect/Arith/IR/Arith.h"
@@ -52,8 +52,8 @@ private:
   void formWork(OpBuilder &builder, Group &group);
   void convertEmit(EmitOp emit, Group &group);
   void copyAssign(OpBuilder &builder, AssignOp assign, Value prim);
-  void convertAssignment(Operation *op, StageOp consumer, OwnerOp owner,
-                         Value prim);
+  void convertAssignment(AssignmentOpInterface op, StageOp consumer,
+                         OwnerOp owner, Value prim);
 
   KernelOp kernel;
   Location loc;
@@ -187,51 +187,45 @@ void WorkFormer::copyAssign(OpBuilder &builder, AssignOp assign, Value prim) {
   for (Operation &op : assign.getBody().front().without_terminator())
     copies.push_back(builder.clone(op, mapping));
   OwnerOp owner;
-  SmallVector<Operation *> assignments;
+  SmallVector<AssignmentOpInterface> assignments;
   for (Operation *copy : copies)
     copy->walk([&](Operation *op) {
       noteOrigin(op, consumer, /*inAssign=*/true);
       if (auto found = dyn_cast<OwnerOp>(op))
         owner = found;
-      else if (isa<AssignToOp, AssignAllOp, AssignPreviousOp, AssignBoxOp>(op))
-        assignments.push_back(op);
+      else if (auto assignment = dyn_cast<AssignmentOpInterface>(op))
+        assignments.push_back(assignment);
     });
-  for (Operation *op : assignments)
+  for (AssignmentOpInterface op : assignments) {
+    llvm::erase(copies, op.getOperation());
     convertAssignment(op, consumer, owner, prim);
+  }
   if (owner) {
     llvm::erase(copies, owner.getOperation());
     owner.erase();
   }
   for (Operation *copy : copies)
-    if (!llvm::is_contained(assignments, copy))
-      expandQueries(copy, consumer, /*bin=*/Value());
+    expandQueries(copy, consumer, /*bin=*/Value());
 }
 
-void WorkFormer::convertAssignment(Operation *op, StageOp consumer,
+void WorkFormer::convertAssignment(AssignmentOpInterface op, StageOp consumer,
                                    OwnerOp owner, Value prim) {
   OpBuilder builder(op);
-  BinArithmetic bins(builder, op->getLoc(), consumer);
+  Location at = op.getLoc();
   auto name = FlatSymbolRefAttr::get(consumer.getSymNameAttr());
-  auto put = [&](OpBuilder &at, Value to) {
+  op.buildBins(builder, consumer, bin, [&](OpBuilder &inside, Value to) {
     Value tile;
     if (owner)
-      tile = BinArithmetic(at, op->getLoc(), consumer)
+      tile = BinArithmetic(inside, at, consumer)
                  .tileAt(to, owner.getCoordinates());
-    PlaceOp::create(at, op->getLoc(), prim, name, to, tile);
-  };
-  if (auto to = dyn_cast<AssignToOp>(op)) {
-    put(builder, to.getBin());
-  } else if (isa<AssignPreviousOp>(op)) {
-    put(builder, bin);
-  } else if (auto box = dyn_cast<AssignBoxOp>(op)) {
-    bins.forEachBinIn(box.getLo(), box.getHi(), put);
-  } else {
-    auto loop = scf::ForOp::create(builder, op->getLoc(), bins.constant(0),
-                                   bins.binCount(), bins.constant(1));
-    builder.setInsertionPointToStart(loop.getBody());
-    put(builder, loop.getInductionVar());
-  }
+    PlaceOp::create(inside, at, prim, name, to, tile);
+  });
   op->erase();
+}
+
+static bool changesState(Operation *op) {
+  auto access = dyn_cast<StateAccessOpInterface>(op);
+  return access && access.getAccessKinds() != StateAccess::reads;
 }
 
 /// Notes at the stages what cannot be seen in kernels any more: whether the
@@ -253,9 +247,8 @@ static void noteStages(PipelineOp pipeline) {
                      }).wasInterrupted();
     stage.setOrdered(ordered);
     stage.setWrites(op->walk([](Operation *inner) {
-                        return isa<UpdateOp, StoreOp, AtomicOp>(inner)
-                                   ? WalkResult::interrupt()
-                                   : WalkResult::advance();
+                        return changesState(inner) ? WalkResult::interrupt()
+                                                   : WalkResult::advance();
                       }).wasInterrupted());
     // Where a bin's end counts, one thread runs it.
     bool isLocal =

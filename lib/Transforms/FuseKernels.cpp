@@ -135,7 +135,8 @@ LogicalResult Candidate::checkAssign(Refusal &refusal) {
     if (assign.getStage() != consumer.getSymName())
       continue;
     WalkResult other = assign.walk([&](Operation *op) {
-      if (!isa<AssignToOp, AssignAllOp, AssignBoxOp>(op))
+      auto assignment = dyn_cast<AssignmentOpInterface>(op);
+      if (!assignment || assignment.keepsBin())
         return WalkResult::advance();
       (void)refuse(refusal, op, "the bin is not known to be the same");
       return WalkResult::interrupt();

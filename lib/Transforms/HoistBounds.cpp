@@ -6,7 +6,7 @@
 //   2. if these are all, write a test in front that all are inside;
 //   3. copy the loop, for where they are, with accesses that are not tested.
 
-#include "Piko/Transforms/BinArithmetic.h"
+#include "Piko/Dialect/Piko/IR/BinArithmetic.h"
 #include "Piko/Transforms/Passes.h"
 
 #include "mlir/Dialect/Arith/IR/Arith.h"

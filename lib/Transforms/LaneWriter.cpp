@@ -2,7 +2,7 @@
 
 #include "LaneWriter.h"
 
-#include "Piko/Transforms/BinArithmetic.h"
+#include "Piko/Dialect/Piko/IR/BinArithmetic.h"
 
 #include "mlir/Dialect/Arith/IR/Arith.h"
 #include "mlir/Dialect/MemRef/IR/MemRef.h"

@@ -4,9 +4,9 @@
 
 #include "Collectives.h"
 
+#include "Piko/Dialect/Piko/IR/BinArithmetic.h"
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
-#include "Piko/Transforms/BinArithmetic.h"
 #include "mlir/Dialect/Arith/IR/Arith.h"
 #include "mlir/IR/IRMapping.h"
 #include "mlir/Transforms/LoopInvariantCodeMotionUtils.h"
@@ -111,6 +111,12 @@ LogicalResult LoopSplitter::checkControlFlow() {
   WalkResult result = parallel.walk([&](Operation *op) {
     if (!isBarrier(op))
       return WalkResult::advance();
+    if (!isa<SyncOp, ReduceOp, ScanOp, SortOp>(op)) {
+      op->emitError("expected piko.sync, piko.reduce, piko.scan or piko.sort, "
+                    "which loops can be cut at, but got '")
+          << op->getName() << "'";
+      return WalkResult::interrupt();
+    }
     for (Operation *at = op->getParentOp(); at != parallel;
          at = at->getParentOp()) {
       if (isa<scf::IfOp, scf::ForOp, scf::WhileOp, scf::IndexSwitchOp>(at))

@@ -78,8 +78,9 @@ static bool canBeObserved(StageOp stage) {
     return true;
   return stage
       .walk([](Operation *op) {
-        if (isa<StageOp, ScheduleOp, AssignOp, ProcessOp, OwnerOp, AssignAllOp,
-                AssignBoxOp, AssignPreviousOp>(op))
+        auto assignment = dyn_cast<AssignmentOpInterface>(op);
+        if (isa<StageOp, ScheduleOp, AssignOp, ProcessOp, OwnerOp>(op) ||
+            (assignment && !assignment.canFail()))
           return WalkResult::advance();
         auto assign = dyn_cast<AssignToOp>(op);
         return (assign ? isSurelyInside(assign) : !hasEffect(op))

@@ -5,7 +5,7 @@
 
 #include "Piko/Analysis/BinIdentity.h"
 
-#include "Piko/Transforms/BinArithmetic.h"
+#include "Piko/Dialect/Piko/IR/BinArithmetic.h"
 #include "Piko/Transforms/Passes.h"
 
 #include "llvm/ADT/TypeSwitch.h"

@@ -11,11 +11,6 @@
 
 namespace piko {
 
-namespace StateAccess {
-/// Bits, of which a phase may have several.
-enum Kind { reads = 1, stores = 2, changesAtomically = 4, updates = 8 };
-} // namespace StateAccess
-
 /// The state that an operation of a phase uses, and how; null if it uses none.
 std::pair<mlir::FlatSymbolRefAttr, int> getStateAccess(mlir::Operation *op);
 

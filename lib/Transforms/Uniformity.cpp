@@ -8,9 +8,7 @@
 using namespace mlir;
 using namespace piko;
 
-bool piko::isBarrier(Operation *op) {
-  return isa<SyncOp, ReduceOp, ScanOp, SortOp>(op);
-}
+bool piko::isBarrier(Operation *op) { return isa<BarrierOpInterface>(op); }
 
 Operation *piko::findBarrier(Operation *op) {
   Operation *found = nullptr;

@@ -246,7 +246,7 @@ void SetupWriter::run(ArrayRef<func::FuncOp> kernels) {
   call(PIKO_RUNTIME_FUNCTION(pikoir_declare_pipeline),
        {text(pipeline.getSymName()), i32(pipeline.getRank())});
   if (std::optional<int64_t> cells = pipeline.getMaxExtent())
-    call("pikoir_declare_max_extent", {i64(*cells)});
+    call(PIKO_RUNTIME_FUNCTION(pikoir_declare_max_extent), {i64(*cells)});
   for (auto [name, number] : numbers.records)
     declareRecord(name, number);
   for (auto check : pipeline.getOps<CheckRecordOp>())

@@ -4,8 +4,8 @@
 // they go.
 
 #include "Piko/Conversion/Passes.h"
+#include "Piko/Dialect/Piko/IR/BinArithmetic.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
-#include "Piko/Transforms/BinArithmetic.h"
 
 #include "mlir/IR/Matchers.h"
 #include "mlir/IR/PatternMatch.h"

@@ -3,6 +3,8 @@
 // Primitives and bins.
 
 #include "FieldAccess.h"
+#include "StageUses.h"
+
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
@@ -145,7 +147,7 @@ LogicalResult EmitOp::verify() {
 // Bins
 //===----------------------------------------------------------------------===//
 
-static LogicalResult verifyRank(Operation *op, size_t coordinates) {
+LogicalResult piko::verifyRank(Operation *op, size_t coordinates) {
   PipelineOp pipeline = getPipeline(op);
   if (pipeline && int64_t(coordinates) != pipeline.getRank())
     return op->emitOpError("expected ")
@@ -176,52 +178,5 @@ LogicalResult GridOp::verify() {
 }
 
 LogicalResult BinAtOp::verify() {
-  return verifyRank(*this, getCoordinates().size());
-}
-
-static LogicalResult verifyInAssign(Operation *op) {
-  if (!op->getParentOfType<AssignOp>())
-    return op->emitOpError("expected to be inside an assign phase");
-  return success();
-}
-
-LogicalResult AssignToOp::verify() { return verifyInAssign(*this); }
-LogicalResult AssignAllOp::verify() { return verifyInAssign(*this); }
-
-LogicalResult AssignPreviousOp::verify() {
-  if (failed(verifyInAssign(*this)))
-    return failure();
-  StageOp stage = getPhaseStage(*this);
-  if (!stage)
-    return success(); // the phase reports it
-  FlatSymbolRefAttr name = FlatSymbolRefAttr::get(stage.getSymNameAttr());
-  PipelineOp pipeline = getPipeline(*this);
-  for (auto source : pipeline.getOps<SourceOp>())
-    if (source.getStageAttr() == name)
-      return emitOpError("expected a previous stage, but stage '")
-             << getCppName(stage) << "' has a source";
-  for (auto edge : pipeline.getOps<EdgeOp>()) {
-    if (edge.getConsumerAttr() != name)
-      continue;
-    auto producer = lookupInPipeline<StageOp>(*this, edge.getProducerAttr());
-    if (producer && producer.getBins() != stage.getBins())
-      return emitOpError("expected stage '")
-             << getCppName(producer) << "' to have bins of the same size as '"
-             << getCppName(stage) << "', [" << stage.getBins() << "], but got ["
-             << producer.getBins() << "]";
-  }
-  return success();
-}
-
-LogicalResult AssignBoxOp::verify() {
-  if (failed(verifyInAssign(*this)) ||
-      failed(verifyRank(*this, getLo().size())))
-    return failure();
-  return verifyRank(*this, getHi().size());
-}
-
-LogicalResult OwnerOp::verify() {
-  if (failed(verifyInAssign(*this)))
-    return failure();
   return verifyRank(*this, getCoordinates().size());
 }

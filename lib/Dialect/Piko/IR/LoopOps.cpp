@@ -80,9 +80,8 @@ bool piko::detail::hasBarriers(Operation *loop) {
       ->walk<WalkOrder::PreOrder>([&](Operation *op) {
         if (op != loop && isa<ParallelLoopOpInterface>(op))
           return WalkResult::skip();
-        return isa<SyncOp, ReduceOp, ScanOp, SortOp>(op)
-                   ? WalkResult::interrupt()
-                   : WalkResult::advance();
+        return isa<BarrierOpInterface>(op) ? WalkResult::interrupt()
+                                           : WalkResult::advance();
       })
       .wasInterrupted();
 }

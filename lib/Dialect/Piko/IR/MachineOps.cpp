@@ -76,6 +76,8 @@ template <typename WorkOp> static LogicalResult verifyWork(WorkOp op) {
                    : Type(PrimType::get(op.getContext(), stage.getInputAttr()));
   if (failed(verifyArgument(op, *op.getBodyBlock(), input)))
     return failure();
+  if (failed(verifyPhaseBody(op)))
+    return failure();
   if (!op.getProducerAttr())
     return success();
   return verifyLocalEdge(op, op.getProducerAttr(), *op.getPort(),

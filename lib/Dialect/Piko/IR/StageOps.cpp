@@ -5,6 +5,8 @@
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "Piko/Dialect/Piko/IR/Piko.h"
 
+#include "StageUses.h"
+
 using namespace mlir;
 using namespace piko;
 
@@ -104,6 +106,27 @@ LogicalResult ScheduleOp::verifySymbolUses(SymbolTableCollection &) {
   return success();
 }
 
+/// Whether an operation does nothing but to arrays of a call's own.
+static bool isPrivate(Operation *op) {
+  auto effects = dyn_cast<MemoryEffectOpInterface>(op);
+  if (!effects)
+    return false;
+  SmallVector<MemoryEffects::EffectInstance> found;
+  effects.getEffects(found);
+  return llvm::all_of(found, [](const MemoryEffects::EffectInstance &effect) {
+    return effect.getValue() && isa<MemRefType>(effect.getValue().getType());
+  });
+}
+
+/// Whether passes can know what an operation of a phase does.
+static bool isKnown(Operation *op) {
+  return isa<PikoDialect>(op->getDialect()) ||
+         isa<AssignmentOpInterface, StateAccessOpInterface, BarrierOpInterface,
+             ParallelLoopOpInterface>(op) ||
+         op->hasTrait<OpTrait::HasRecursiveMemoryEffects>() ||
+         op->hasTrait<OpTrait::IsTerminator>() || isPrivate(op);
+}
+
 /// The dialects of memory and functions may be unknown here, so that their
 /// operations are told by name.
 static LogicalResult verifyInPhase(Operation *op) {
@@ -119,13 +142,19 @@ static LogicalResult verifyInPhase(Operation *op) {
   // Its size would have to be found anew, and stack taken, for each primitive.
   if (name == "memref.alloca" && op->getNumOperands() != 0)
     return op->emitError("expected a private array of constant size");
+  if (!isKnown(op))
+    return op->emitError("expected an operation that says what it does, but '")
+           << name
+           << "' may have any effect; let it have those of MLIR's interface, "
+              "or "
+              "one of the piko dialect's interfaces";
   return success();
 }
 
-static LogicalResult verifyPhaseBody(Operation *phase) {
-  WalkResult result = phase->walk([](Operation *op) {
-    return failed(verifyInPhase(op)) ? WalkResult::interrupt()
-                                     : WalkResult::advance();
+LogicalResult piko::verifyPhaseBody(Operation *phase) {
+  WalkResult result = phase->walk([&](Operation *op) {
+    return op != phase && failed(verifyInPhase(op)) ? WalkResult::interrupt()
+                                                    : WalkResult::advance();
   });
   return failure(result.wasInterrupted());
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// Checks of operations that name a stage.
+// Checks that several kinds of operations share.
 
 #ifndef PIKO_LIB_DIALECT_PIKO_IR_STAGEUSES_H
 #define PIKO_LIB_DIALECT_PIKO_IR_STAGEUSES_H
@@ -19,6 +19,13 @@ mlir::LogicalResult verifyLocalEdge(mlir::Operation *op,
                                     mlir::FlatSymbolRefAttr producer,
                                     int64_t port,
                                     mlir::FlatSymbolRefAttr consumer);
+
+/// Reports at `op` unless so many coordinates are its pipeline's rank.
+mlir::LogicalResult verifyRank(mlir::Operation *op, size_t coordinates);
+
+/// Reports operations in a phase, or in work, that cannot be there, or of which
+/// it is not known what they do.
+mlir::LogicalResult verifyPhaseBody(mlir::Operation *phase);
 
 } // namespace piko
 

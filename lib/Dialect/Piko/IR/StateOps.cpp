@@ -151,3 +151,19 @@ LogicalResult UpdateOp::verifyRegions() {
            << yield.getResults().getTypes() << ")";
   return success();
 }
+
+//===----------------------------------------------------------------------===//
+// How state is used
+//===----------------------------------------------------------------------===//
+
+FlatSymbolRefAttr LoadOp::getAccessedState() { return getStateAttr(); }
+int LoadOp::getAccessKinds() { return StateAccess::reads; }
+
+FlatSymbolRefAttr StoreOp::getAccessedState() { return getStateAttr(); }
+int StoreOp::getAccessKinds() { return StateAccess::stores; }
+
+FlatSymbolRefAttr AtomicOp::getAccessedState() { return getStateAttr(); }
+int AtomicOp::getAccessKinds() { return StateAccess::changesAtomically; }
+
+FlatSymbolRefAttr UpdateOp::getAccessedState() { return getImageAttr(); }
+int UpdateOp::getAccessKinds() { return StateAccess::updates; }

@@ -30,6 +30,15 @@ class AssignOp;
 class ProcessOp;
 class ScheduleOp;
 
+/// What is done for a bin of an assignment.
+using PutInBin =
+    llvm::function_ref<void(mlir::OpBuilder &builder, mlir::Value bin)>;
+
+namespace StateAccess {
+/// Bits, of which a phase may have several.
+enum Kind { reads = 1, stores = 2, changesAtomically = 4, updates = 8 };
+} // namespace StateAccess
+
 /// Of operations that only the CPU's lowering makes.
 template <typename OpT>
 class CPUOnly : public mlir::OpTrait::TraitBase<OpT, CPUOnly> {};

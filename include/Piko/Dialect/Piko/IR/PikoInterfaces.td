@@ -7,6 +7,52 @@
 
 include "mlir/IR/OpBase.td"
 
+// An operation of a phase says what it does: it has no effects, or works on the
+// arrays of a call, or has one of these interfaces. The verifier refuses all
+// others, so that no pass meets one that it would mistake for harmless.
+
+def Piko_AssignmentInterface : OpInterface<"AssignmentOpInterface"> {
+  let cppNamespace = "::piko";
+  let description = [{
+    Puts the primitive of an assign phase into bins.
+  }];
+  let methods = [
+    InterfaceMethod<"Calls `put` with each bin, ascending, that the primitive "
+                    "is put into; `stage` is the `piko.stage`, and `previous` "
+                    "the bin that the primitive was emitted from, or null.",
+                    "void", "buildBins",
+                    (ins "::mlir::OpBuilder &":$builder,
+                         "::mlir::Operation *":$stage, "::mlir::Value":$previous,
+                         "::piko::PutInBin":$put)>,
+    InterfaceMethod<"Whether the primitive is put into the bin it was emitted "
+                    "from, and into no other.",
+                    "bool", "keepsBin", (ins), [{}], [{ return false; }]>,
+    InterfaceMethod<"Whether a bin may be outside of the grid, which ends the "
+                    "run with an error.",
+                    "bool", "canFail", (ins), [{}], [{ return true; }]>,
+  ];
+}
+
+def Piko_StateAccessInterface : OpInterface<"StateAccessOpInterface"> {
+  let cppNamespace = "::piko";
+  let description = [{
+    Reads or writes a constant, a buffer or an image.
+  }];
+  let methods = [
+    InterfaceMethod<"The state that it uses.", "::mlir::FlatSymbolRefAttr",
+                    "getAccessedState">,
+    InterfaceMethod<"How it uses it: bits of `StateAccess::Kind`.", "int",
+                    "getAccessKinds">,
+  ];
+}
+
+def Piko_BarrierInterface : OpInterface<"BarrierOpInterface"> {
+  let cppNamespace = "::piko";
+  let description = [{
+    A place at which all iterations of the parallel loop around it meet.
+  }];
+}
+
 def Piko_ParallelLoopInterface : OpInterface<"ParallelLoopOpInterface"> {
   let cppNamespace = "::piko";
   let description = [{

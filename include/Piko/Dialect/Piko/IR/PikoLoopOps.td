@@ -76,7 +76,8 @@ def Piko_ParallelPixelsOp : Piko_ParallelLoopOp<"parallel_pixels", [
 /// That loop is not nested, and the control flow from it to the operation is the
 /// same in all its iterations.
 class Piko_BarrierOp<string mnemonic, list<Trait> traits = []>
-    : Piko_Op<mnemonic, traits> {
+    : Piko_Op<mnemonic, !listconcat(traits, [
+        DeclareOpInterfaceMethods<Piko_BarrierInterface>])> {
   let hasVerifier = 1;
 }
 

@@ -7,6 +7,7 @@
 
 include "Piko/Dialect/Piko/IR/PikoPipelineOps.td"
 include "Piko/Dialect/Piko/IR/PikoStageOps.td"
+include "Piko/Dialect/Piko/IR/PikoAssignOps.td"
 include "Piko/Dialect/Piko/IR/PikoBodyOps.td"
 include "Piko/Dialect/Piko/IR/PikoStateOps.td"
 include "Piko/Dialect/Piko/IR/PikoLoopOps.td"

@@ -6,11 +6,13 @@
 #define PIKO_DIALECT_PIKO_IR_PIKOSTATEOPS_TD
 
 include "Piko/Dialect/Piko/IR/PikoAttributes.td"
+include "Piko/Dialect/Piko/IR/PikoInterfaces.td"
 include "Piko/Dialect/Piko/IR/PikoTypes.td"
 
 class Piko_StateAccessOp<string mnemonic, list<Trait> traits = []>
     : Piko_Op<mnemonic, !listconcat(traits, [
         AttrSizedOperandSegments,
+        DeclareOpInterfaceMethods<Piko_StateAccessInterface>,
         DeclareOpInterfaceMethods<SymbolUserOpInterface>])>;
 
 def Piko_LoadOp : Piko_StateAccessOp<"load", [MemoryEffects<[MemRead]>]> {
@@ -126,6 +128,7 @@ def Piko_ExtentOp : Piko_Op<"extent", [
 
 def Piko_UpdateOp : Piko_Op<"update", [
     SingleBlock, AttrSizedOperandSegments,
+    DeclareOpInterfaceMethods<Piko_StateAccessInterface>,
     DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
   let summary = "changes a pixel of the primitive's own bin";
   let description = [{

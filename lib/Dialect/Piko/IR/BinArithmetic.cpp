@@ -2,7 +2,7 @@
 //
 // Bins as arithmetic.
 
-#include "Piko/Transforms/BinArithmetic.h"
+#include "Piko/Dialect/Piko/IR/BinArithmetic.h"
 
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 

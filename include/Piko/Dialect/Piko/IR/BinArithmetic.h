@@ -2,8 +2,8 @@
 //
 // Bins as arithmetic: from the number of a bin to cells of the domain and back.
 
-#ifndef PIKO_TRANSFORMS_BINARITHMETIC_H
-#define PIKO_TRANSFORMS_BINARITHMETIC_H
+#ifndef PIKO_DIALECT_PIKO_IR_BINARITHMETIC_H
+#define PIKO_DIALECT_PIKO_IR_BINARITHMETIC_H
 
 #include "Piko/Dialect/Piko/IR/Piko.h"
 
@@ -59,4 +59,4 @@ constexpr const char *insideAttrName = "piko.inside";
 
 } // namespace piko
 
-#endif // PIKO_TRANSFORMS_BINARITHMETIC_H
+#endif // PIKO_DIALECT_PIKO_IR_BINARITHMETIC_H
