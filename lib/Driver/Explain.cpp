@@ -5,7 +5,7 @@
 
 #include "Piko/Driver/Explain.h"
 
-#include "Piko/Dialect/Piko/IR/Piko.h"
+#include "Piko/Dialect/Piko/IR/PikoProgram.h"
 #include "Piko/Driver/Compiler.h"
 
 #include "mlir/Pass/Pass.h"
@@ -60,6 +60,9 @@ private:
   void writeProcess(ProcessOp process);
   void writeFused(StageOp host);
   void writeAssign(StageOp stage, bool hasPhase, const Twine &origin = "");
+  void writeStatements(Block &statements, unsigned depth);
+  void writeRegion(Operation *region, unsigned depth);
+  void writeJoin(JoinOp join);
   /// Whether a kernel is there to assign what a source is fed.
   bool hasKernel(int64_t source);
   /// The kernel that runs a stage's process phase, or an empty name.
@@ -352,6 +355,78 @@ void Report::writeKernel(KernelOp kernel) {
 }
 
 //===----------------------------------------------------------------------===//
+// The program
+//===----------------------------------------------------------------------===//
+
+/// Where an edge of a program leads from.
+static std::string describeOrigin(Value edge) {
+  Operation *origin = getOrigin(edge);
+  if (auto from = dyn_cast<EdgeOp>(origin))
+    return (from.getProducer() + " port " + Twine(from.getPort())).str();
+  int64_t number = 0;
+  for (auto source : getPipeline(origin).getOps<SourceOp>()) {
+    if (source == origin)
+      break;
+    ++number;
+  }
+  return "source " + std::to_string(number);
+}
+
+void Report::writeJoin(JoinOp join) {
+  out << " of what comes from ";
+  int64_t words = 0;
+  for (auto [number, edge] : llvm::enumerate(join.getEdges())) {
+    out << (number ? ", " : "") << describeOrigin(edge)
+        << (join.getPermutes()[number] ? ", permuted" : ", concatenated");
+    words = std::max(words, join.getKeys()[number]);
+  }
+  if (join.getMerge())
+    out << "; merged by keys of " << words << (words == 1 ? " word" : " words");
+}
+
+void Report::writeRegion(Operation *region, unsigned depth) {
+  out << std::string(depth, ' ');
+  if (auto strips = dyn_cast<StripsOp>(region)) {
+    out << "in strips of " << describeOrigin(strips.getSource());
+    if (auto chunk = strips.getChunk())
+      out << ", of " << *chunk << " primitives";
+  } else {
+    out << (isa<WavesOp>(region) ? "in waves" : "in rounds")
+        << ", until nothing is left";
+  }
+  out << ":\n";
+  writeStatements(region->getRegion(0).front(), depth + 2);
+}
+
+void Report::writeStatements(Block &statements, unsigned depth) {
+  std::string indent(depth, ' ');
+  for (Operation &op : statements) {
+    if (auto clear = dyn_cast<ClearOp>(op)) {
+      out << indent << "clear ";
+      llvm::interleaveComma(
+          clear.getStates().getAsRange<FlatSymbolRefAttr>(), out,
+          [&](FlatSymbolRefAttr name) { out << name.getValue(); });
+      out << "\n";
+    } else if (auto schedule = dyn_cast<ScheduleBinsOp>(op)) {
+      out << indent << "the schedule of " << schedule.getStage()
+          << ", for each bin\n";
+    } else if (auto wait = dyn_cast<WaitOp>(op)) {
+      out << indent << "wait for " << wait.getStage() << "\n";
+    } else if (auto launch = dyn_cast<LaunchOp>(op)) {
+      out << indent << "launch " << launch.getKernel();
+      if (auto turn = launch.getTurn())
+        out << ", in turn " << *turn;
+      Value bins = launch.getInput();
+      if (auto join = bins ? bins.getDefiningOp<JoinOp>() : JoinOp())
+        writeJoin(join);
+      out << "\n";
+    } else if (isa<StripsOp, WavesOp, RoundsOp>(op)) {
+      writeRegion(&op, depth);
+    }
+  }
+}
+
+//===----------------------------------------------------------------------===//
 // The report
 //===----------------------------------------------------------------------===//
 
@@ -381,6 +456,10 @@ void Report::write() {
           << ", for each bin\n";
   for (auto kernel : kernels.getOps<KernelOp>())
     writeKernel(kernel);
+  if (ProgramOp program = getProgram(kernels)) {
+    out << "\nProgram:\n";
+    writeStatements(*program.getBodyBlock(), 2);
+  }
   if (!trace.remarks.empty())
     out << "\nWhat the passes did or refused:\n";
   for (const Trace::Remarks &pass : trace.remarks)

@@ -71,12 +71,15 @@ void piko::addSynthesisSequence(OpPassManager &passes,
   pipeline.addPass(createFormKernels());
   if (options.has("fuse-kernels"))
     pipeline.addPass(createFuseKernels());
+  pipeline.addPass(createFormProgram());
   if (options.has("form-strips"))
     pipeline.addPass(createFormStrips());
 }
 
 void piko::addMachineSequence(OpPassManager &passes) {
-  passes.nest<PipelineOp>().addPass(createFormWork());
+  OpPassManager &pipeline = passes.nest<PipelineOp>();
+  pipeline.addPass(createFormProgram()); // of what was written by hand
+  pipeline.addPass(createFormWork());
   addCleanUp(passes);
 }
 
@@ -90,6 +93,7 @@ void piko::addUnitSequence(OpPassManager &passes) {
 /// From loops over units, some of which may have become grids.
 static void addUnitsToCPU(OpPassManager &passes,
                           const SynthesisOptions &options) {
+  passes.nest<PipelineOp>().addPass(createFormProgram());
   if (options.has("if-convert"))
     passes.nest<PipelineOp>().addPass(createIfConvert());
   if (options.has("prefetch"))

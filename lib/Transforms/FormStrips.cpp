@@ -1,17 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// piko-form-strips: finds kernels in a row that may take a source strip by
-// strip. Kernels of a cycle are one node.
+// piko-form-strips: finds launches in a row that may take a source strip by
+// strip. A launch is a node, with its join, and so is a cycle.
 //
 //   1. a node that one source alone feeds begins a group;
 //   2. the next nodes join it as long as all that feeds them is in the group
 //   and
 //      nothing shows that they run before all primitives have come;
-//   3. a group of two kernels or more becomes a piko.strips.
+//   3. a group of two launches or more becomes a piko.strips.
 
 #include "StateAccess.h"
 
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
+#include "Piko/Dialect/Piko/IR/PikoProgram.h"
 #include "Piko/Transforms/Passes.h"
 
 #include "llvm/ADT/MapVector.h"
@@ -26,9 +27,10 @@ using namespace piko;
 
 namespace {
 
-/// A kernel, or all kernels of a cycle.
+/// A launch and what leads to it, or a cycle.
 struct Node {
-  SmallVector<KernelOp> kernels;
+  SmallVector<Operation *> statements; ///< In order.
+  int64_t launches = 0;
   llvm::SetVector<Operation *> stages;
 };
 
@@ -53,9 +55,10 @@ public:
   void add(const Node &node);
 
   bool feeds(const Node &node);
-  bool empty() const { return kernels.empty(); }
-  SmallVector<KernelOp> kernels;
-  SmallVector<StageOp> stages; ///< In the order of kernels.
+  bool empty() const { return stages.empty(); }
+  SmallVector<Operation *> statements; ///< In order.
+  int64_t launches = 0;
+  SmallVector<StageOp> stages; ///< In the order of launches.
   int64_t source = 0;
 
 private:
@@ -219,35 +222,47 @@ void Group::add(const Node &node) {
     stages.push_back(stage);
     roots[stage] = stage.collects() ? op : root;
   }
-  llvm::append_range(kernels, node.kernels);
+  llvm::append_range(statements, node.statements);
+  launches += node.launches;
 }
 
 //===----------------------------------------------------------------------===//
 // The pass
 //===----------------------------------------------------------------------===//
 
-static StageOp getStage(KernelOp kernel) {
-  if (ProcessOp process = kernel.getProcess())
-    return getPhaseStage(process);
-  return getPhaseStage(*kernel.getOps<AssignOp>().begin());
+/// The joins, waits and kernels of sources that come before a launch.
+static void addOperands(Operation *op, Node &node) {
+  for (Value operand : op->getOperands())
+    if (Operation *before = operand.getDefiningOp();
+        before && isa<JoinOp, LaunchOp>(before)) {
+      auto launch = dyn_cast<LaunchOp>(before);
+      if (launch && !getAssignedSource(launch.getKernelOp()))
+        continue;
+      node.launches += isa<LaunchOp>(before);
+      addOperands(before, node);
+      node.statements.push_back(before);
+    }
 }
 
-/// A source's kernel runs right before the stage's own, and is of its node; so
-/// are all stages of one kernel.
-static SmallVector<Node> findNodes(PipelineOp pipeline) {
+static SmallVector<Node> findNodes(ProgramOp program) {
   SmallVector<Node> nodes;
-  StageOp last;
-  for (auto kernel : pipeline.getOps<KernelOp>()) {
-    StageOp stage = getStage(kernel);
-    bool sameCycle =
-        last && stage.getCycle() && stage.getCycle() == last.getCycle();
-    if (!last || (stage != last && !sameCycle))
-      nodes.emplace_back();
-    nodes.back().kernels.push_back(kernel);
-    nodes.back().stages.insert(stage);
-    for (auto process : kernel.getOps<ProcessOp>())
-      nodes.back().stages.insert(getPhaseStage(process));
-    last = stage;
+  SmallVector<Operation *> waits;
+  for (Operation &op : *program.getBodyBlock()) {
+    auto launch = dyn_cast<LaunchOp>(op);
+    if (isa<WaitOp>(op))
+      waits.push_back(&op);
+    if (!isa<WavesOp, RoundsOp>(op) &&
+        (!launch || getStages(launch.getKernelOp()).empty()))
+      continue;
+    Node &node = nodes.emplace_back();
+    std::swap(node.statements, waits);
+    addOperands(&op, node);
+    node.statements.push_back(&op);
+    op.walk([&](LaunchOp inner) {
+      ++node.launches;
+      for (StageOp stage : getStages(inner.getKernelOp()))
+        node.stages.insert(stage);
+    });
   }
   return nodes;
 }
@@ -280,30 +295,56 @@ static IntegerAttr getChunk(StageOp stage) {
   return isTiled ? schedule.getTileSplitAttr() : IntegerAttr();
 }
 
+/// What leads from some statements to others.
+static SmallVector<Value> findLeaving(ArrayRef<Operation *> statements) {
+  SmallVector<Value> leaving;
+  for (Operation *op : statements)
+    for (Value result : op->getResults())
+      if (llvm::none_of(result.getUsers(), [&](Operation *user) {
+            return llvm::is_contained(statements, user);
+          }))
+        leaving.push_back(result);
+  return leaving;
+}
+
 void FormStripsPass::finish(const Group &group) {
   if (group.empty())
     return;
   StageOp first = group.stages.front();
-  if (group.kernels.size() == 1)
+  if (group.launches == 1)
     return refuse(first, {"no stage that could follow it in them takes what it "
                           "emits"});
-  SmallVector<Attribute> names;
-  for (KernelOp kernel : group.kernels)
-    names.push_back(FlatSymbolRefAttr::get(kernel.getSymNameAttr()));
-  KernelOp kernel = group.kernels.front();
-  OpBuilder builder(kernel);
-  StripsOp::create(builder, first.getLoc(),
-                   builder.getI64IntegerAttr(group.source),
-                   builder.getArrayAttr(names), getChunk(first));
+  FeedOp feed;
+  for (auto found : getProgram(getOperation()).getOps<FeedOp>())
+    if (found.getSource() == group.source)
+      feed = found;
+  SmallVector<Value> leaving = findLeaving(group.statements);
+  Operation *front = group.statements.front();
+  OpBuilder builder(feed->isBeforeInBlock(front) ? front : feed->getNextNode());
+  auto strips = StripsOp::create(
+      builder, first.getLoc(), llvm::to_vector(ValueRange(leaving).getTypes()),
+      feed.getEdge(), getChunk(first));
+  for (auto [value, result] : llvm::zip(leaving, strips.getEdges()))
+    value.replaceAllUsesWith(result);
+  Block *body = builder.createBlock(&strips.getBody());
+  Value strip = body->addArgument(feed.getEdge().getType(), feed.getLoc());
+  feed.getEdge().replaceUsesWithIf(
+      strip, [&](OpOperand &use) { return use.getOwner() != strips; });
+  for (Operation *statement : group.statements)
+    statement->moveBefore(body, body->end());
+  LeaveOp::create(builder, first.getLoc(), leaving, ValueRange());
   ++groups;
-  kernels += group.kernels.size();
+  kernels += group.launches;
 }
 
 void FormStripsPass::runOnOperation() {
   PipelineOp pipeline = getOperation();
   Accesses accesses = findAccesses(pipeline);
   Group group(pipeline, accesses);
-  for (const Node &node : findNodes(pipeline)) {
+  ProgramOp program = getProgram(pipeline);
+  if (!program)
+    return;
+  for (const Node &node : findNodes(program)) {
     std::optional<Reason> notNext = group.whyNotNext(node);
     if (!notNext) {
       group.add(node);

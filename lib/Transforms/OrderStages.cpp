@@ -8,6 +8,7 @@
 //   4. take the first branch all of whose dependencies have been taken, until
 //      none is left.
 
+#include "Piko/Analysis/StageGraph.h"
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "Piko/Transforms/Passes.h"
 
@@ -23,33 +24,11 @@ using namespace piko;
 
 namespace {
 
-using Lists = SmallVector<SmallVector<int>>;
+/// The nodes of a graph in the order in which they run.
+class NodeOrder {
+public:
+  explicit NodeOrder(const NodeGraph &graph) : graph(graph) {}
 
-/// The stages of a pipeline as numbers, in declaration order.
-struct StageGraph {
-  SmallVector<StageOp> stages;
-  /// For each stage its consumers, in port order, and the stages it waits for.
-  Lists consumers, waits;
-
-  explicit StageGraph(PipelineOp pipeline);
-  /// Which stages can be reached from each, along one edge or more.
-  SmallVector<SmallVector<bool>> reach() const;
-};
-
-/// The graph with each cycle as one node: nodes are numbered in the order of
-/// their first stages.
-struct NodeGraph {
-  Lists nodes;              ///< Stages in declaration order.
-  SmallVector<bool> cyclic; ///< Whether the node is a cycle.
-  /// Between different nodes: consumers in port order, and what must have run
-  /// before each.
-  Lists consumers, producers, waits;
-
-  explicit NodeGraph(const StageGraph &graph);
-
-  /// Nodes so that each comes behind what it depends on, and otherwise as
-  /// declared; fewer than all where nodes wait for each other.
-  SmallVector<int> declarationOrder() const;
   /// The longest path from each node to one without consumers, in edges.
   SmallVector<int> distancesFromDrain(ArrayRef<int> order) const;
   Lists branches() const;
@@ -57,6 +36,9 @@ struct NodeGraph {
   /// allow; a branch that depends on itself or on others in a circle is left
   /// out.
   SmallVector<int> takeBranches(Lists branches) const;
+
+private:
+  const NodeGraph &graph;
 };
 
 struct OrderStagesPass : piko::impl::OrderStagesBase<OrderStagesPass> {
@@ -65,124 +47,33 @@ struct OrderStagesPass : piko::impl::OrderStagesBase<OrderStagesPass> {
 
 } // namespace
 
-StageGraph::StageGraph(PipelineOp pipeline) {
-  llvm::DenseMap<StringAttr, int> number;
-  for (auto stage : pipeline.getOps<StageOp>()) {
-    number[stage.getSymNameAttr()] = stages.size();
-    stages.push_back(stage);
-  }
-  consumers.resize(stages.size());
-  waits.resize(stages.size());
-  SmallVector<EdgeOp> edges(pipeline.getOps<EdgeOp>());
-  llvm::sort(edges, [&](EdgeOp a, EdgeOp b) {
-    return std::pair(number.at(a.getProducerAttr().getAttr()), a.getPort()) <
-           std::pair(number.at(b.getProducerAttr().getAttr()), b.getPort());
-  });
-  for (EdgeOp edge : edges)
-    consumers[number.at(edge.getProducerAttr().getAttr())].push_back(
-        number.at(edge.getConsumerAttr().getAttr()));
-  for (auto [i, stage] : llvm::enumerate(stages)) {
-    ScheduleOp schedule = stage.getSchedule();
-    if (!schedule || !schedule.getEndStageAttr())
-      continue;
-    for (auto name : schedule.getEndStageAttr().getAsRange<FlatSymbolRefAttr>())
-      waits[i].push_back(number.at(name.getAttr()));
-  }
-}
-
-SmallVector<SmallVector<bool>> StageGraph::reach() const {
-  size_t n = stages.size();
-  SmallVector<SmallVector<bool>> reach(n, SmallVector<bool>(n, false));
-  for (size_t from = 0; from < n; ++from) {
-    SmallVector<int> rest(consumers[from]);
-    while (!rest.empty()) {
-      int stage = rest.pop_back_val();
-      if (reach[from][stage])
-        continue;
-      reach[from][stage] = true;
-      llvm::append_range(rest, consumers[stage]);
-    }
-  }
-  return reach;
-}
-
-NodeGraph::NodeGraph(const StageGraph &graph) {
-  SmallVector<SmallVector<bool>> reach = graph.reach();
-  SmallVector<int> nodeOf(graph.stages.size(), -1);
-  for (int i = 0, e = graph.stages.size(); i < e; ++i) {
-    if (nodeOf[i] >= 0)
-      continue;
-    cyclic.push_back(reach[i][i]);
-    SmallVector<int> &members = nodes.emplace_back();
-    for (int j = i; j < e; ++j)
-      if (j == i || (reach[i][j] && reach[j][i])) {
-        nodeOf[j] = nodes.size() - 1;
-        members.push_back(j);
-      }
-  }
-  consumers.resize(nodes.size());
-  producers.resize(nodes.size());
-  waits.resize(nodes.size());
-  for (int stage = 0, e = graph.stages.size(); stage < e; ++stage) {
-    int node = nodeOf[stage];
-    for (int consumer : graph.consumers[stage])
-      if (nodeOf[consumer] != node) {
-        consumers[node].push_back(nodeOf[consumer]);
-        producers[nodeOf[consumer]].push_back(node);
-      }
-    for (int other : graph.waits[stage])
-      if (nodeOf[other] != node)
-        waits[node].push_back(nodeOf[other]);
-  }
-}
-
-SmallVector<int> NodeGraph::declarationOrder() const {
-  SmallVector<int> order;
-  llvm::DenseSet<int> placed;
-  auto isPlaced = [&](int node) { return placed.contains(node); };
-  auto ready = [&](int node) {
-    return !isPlaced(node) && llvm::all_of(producers[node], isPlaced) &&
-           llvm::all_of(waits[node], isPlaced);
-  };
-  for (bool found = true; found;) {
-    found = false;
-    for (int node = 0, e = nodes.size(); node < e && !found; ++node)
-      if (ready(node)) {
-        order.push_back(node);
-        placed.insert(node);
-        found = true;
-      }
-  }
-  return order;
-}
-
-SmallVector<int> NodeGraph::distancesFromDrain(ArrayRef<int> order) const {
-  SmallVector<int> distance(nodes.size(), 0);
+SmallVector<int> NodeOrder::distancesFromDrain(ArrayRef<int> order) const {
+  SmallVector<int> distance(graph.nodes.size(), 0);
   for (int node : llvm::reverse(order))
-    for (int consumer : consumers[node])
+    for (int consumer : graph.consumers[node])
       distance[node] = std::max(distance[node], distance[consumer] + 1);
   return distance;
 }
 
-Lists NodeGraph::branches() const {
+Lists NodeOrder::branches() const {
   auto startsBranch = [&](int node) {
-    return producers[node].size() != 1 || !waits[node].empty() ||
-           consumers[producers[node].front()].size() != 1;
+    return graph.producers[node].size() != 1 || !graph.waits[node].empty() ||
+           graph.consumers[graph.producers[node].front()].size() != 1;
   };
   Lists result;
-  for (int start = 0, e = nodes.size(); start < e; ++start) {
+  for (int start = 0, e = graph.nodes.size(); start < e; ++start) {
     if (!startsBranch(start))
       continue;
     SmallVector<int> &branch = result.emplace_back();
     branch.push_back(start);
-    while (consumers[branch.back()].size() == 1 &&
-           !startsBranch(consumers[branch.back()].front()))
-      branch.push_back(consumers[branch.back()].front());
+    while (graph.consumers[branch.back()].size() == 1 &&
+           !startsBranch(graph.consumers[branch.back()].front()))
+      branch.push_back(graph.consumers[branch.back()].front());
   }
   return result;
 }
 
-SmallVector<int> NodeGraph::takeBranches(Lists branches) const {
+SmallVector<int> NodeOrder::takeBranches(Lists branches) const {
   SmallVector<int> taken;
   llvm::DenseSet<int> isTaken;
   auto ready = [&](ArrayRef<int> branch) {
@@ -190,8 +81,8 @@ SmallVector<int> NodeGraph::takeBranches(Lists branches) const {
       return isTaken.contains(node) || llvm::is_contained(branch, node);
     };
     return llvm::all_of(branch, [&](int node) {
-      return llvm::all_of(producers[node], met) &&
-             llvm::all_of(waits[node], met);
+      return llvm::all_of(graph.producers[node], met) &&
+             llvm::all_of(graph.waits[node], met);
     });
   };
   while (!branches.empty()) {
@@ -240,7 +131,7 @@ static void reportCircle(StageGraph &graph, const NodeGraph &nodes,
 
 void OrderStagesPass::runOnOperation() {
   PipelineOp pipeline = getOperation();
-  StageGraph graph(pipeline);
+  StageGraph graph(pipeline, llvm::to_vector(pipeline.getOps<StageOp>()));
   if (failed(checkWaits(graph)))
     return signalPassFailure();
   NodeGraph nodes(graph);
@@ -250,14 +141,15 @@ void OrderStagesPass::runOnOperation() {
     return signalPassFailure();
   }
 
-  SmallVector<int> distance = nodes.distancesFromDrain(declared);
-  Lists branches = nodes.branches();
+  NodeOrder paper(nodes);
+  SmallVector<int> distance = paper.distancesFromDrain(declared);
+  Lists branches = paper.branches();
   this->branches = branches.size();
   llvm::sort(branches, [&](ArrayRef<int> a, ArrayRef<int> b) {
     return std::pair(-distance[a.front()], a.front()) <
            std::pair(-distance[b.front()], b.front());
   });
-  SmallVector<int> order = nodes.takeBranches(branches);
+  SmallVector<int> order = paper.takeBranches(branches);
   // Waits between the middles of branches can leave some of them untaken; the
   // declared order meets all dependencies too.
   if (order.size() != nodes.nodes.size())

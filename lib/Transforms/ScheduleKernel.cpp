@@ -5,6 +5,8 @@
 
 #include "FormWork.h"
 
+#include "Piko/Dialect/Piko/IR/PikoProgram.h"
+
 #include "mlir/Dialect/Arith/IR/Arith.h"
 #include "mlir/Dialect/MemRef/IR/MemRef.h"
 #include "mlir/IR/PatternMatch.h"
@@ -88,10 +90,27 @@ static KernelOp createKernel(StageOp stage) {
   return kernel;
 }
 
+/// The program runs the kernel where it ran the schedule.
+static void launch(KernelOp kernel, StageOp stage) {
+  ProgramOp program = getProgram(getPipeline(stage));
+  if (!program)
+    return;
+  for (auto bins : llvm::to_vector(program.getOps<ScheduleBinsOp>())) {
+    if (bins.getStage() != stage.getSymName())
+      continue;
+    OpBuilder builder(bins);
+    LaunchOp::create(builder, bins.getLoc(), TypeRange(), kernel.getSymName(),
+                     Value(), IntegerAttr());
+    bins.erase();
+  }
+}
+
 void piko::formScheduleKernel(ScheduleOp schedule) {
   auto stage = cast<StageOp>(schedule->getParentOp());
   Location loc = schedule.getLoc();
-  OpBuilder builder = OpBuilder::atBlockEnd(createKernel(stage).getBodyBlock());
+  KernelOp kernel = createKernel(stage);
+  launch(kernel, stage);
+  OpBuilder builder = OpBuilder::atBlockEnd(kernel.getBodyBlock());
   Value bins = BeginScheduleOp::create(builder, loc, stage.getSymName());
   Directives directives(builder, loc, schedule);
   Value zero = arith::ConstantIndexOp::create(builder, loc, 0);

@@ -1,4 +1,4 @@
-// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-form-kernels,piko-form-strips))' --split-input-file --verify-diagnostics %s
+// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-form-kernels,piko-form-program,piko-form-strips))' --split-input-file --verify-diagnostics %s
 
 piko.record @F {"x" : i32 at 0} size 4 align 4
 piko.pipeline @List rank 1 {
@@ -31,6 +31,13 @@ piko.pipeline @Waits rank 1 {
   // expected-note @below {{because of this}}
   piko.edge @b[0] -> @c
   piko.source @d
+  // expected-remark @below {{stage 'd' does not run in strips: no stage that}}
+  piko.stage @d bins [0] threads 1 : @F -> [] {
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      piko.return
+    }
+  }
   // expected-remark @below {{stage 'a' does not run in strips: no stage that}}
   piko.stage @a bins [0] threads 1 : @F -> [@F] {
     piko.process {
@@ -58,13 +65,6 @@ piko.pipeline @Waits rank 1 {
   }
   // expected-remark @below {{stage 'c' does not run in strips: stage 'b', which feeds it, does not run in strips with it}}
   piko.stage @c bins [0] threads 1 : @F -> [] {
-    piko.process {
-    ^bb0(%f: !piko.prim<@F>):
-      piko.return
-    }
-  }
-  // expected-remark @below {{stage 'd' does not run in strips: no stage that}}
-  piko.stage @d bins [0] threads 1 : @F -> [] {
     piko.process {
     ^bb0(%f: !piko.prim<@F>):
       piko.return
@@ -180,6 +180,7 @@ piko.pipeline @Sources rank 1 {
   piko.source @b
   piko.source @c
   piko.edge @b[0] -> @c
+  // expected-remark @+2 {{what comes to stage 'a' is merged by keys of 1 word: it comes from source 0, source 1}}
   // expected-remark @below {{stage 'a' does not run in strips: several sources feed it}}
   piko.stage @a bins [0] threads 1 : @F -> [] {
     piko.process {
@@ -196,6 +197,7 @@ piko.pipeline @Sources rank 1 {
       piko.return
     }
   }
+  // expected-remark @+2 {{what comes to stage 'c' is merged by keys of 2 words: it comes from source 3, stage 'b'}}
   // expected-remark @below {{stage 'c' does not run in strips: a source feeds it, too}}
   piko.stage @c bins [0] threads 1 : @F -> [] {
     piko.process {
@@ -270,6 +272,7 @@ piko.pipeline @Lineages rank 1 {
       piko.return
     }
   }
+  // expected-remark @+2 {{what comes to stage 'meet' is merged by keys of 2 words: it comes from stage 'a', stage 'waits'}}
   // expected-remark @below {{stage 'meet' does not run in strips: what reaches it is of several lineages, one of which comes after the other}}
   piko.stage @meet bins [0] threads 1 : @F -> [] {
     piko.process {

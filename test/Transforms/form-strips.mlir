@@ -1,16 +1,26 @@
-// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-strips))' %s | FileCheck %s
+// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-program,piko-form-strips))' %s | FileCheck %s
 
 piko.record @F {"x" : i32 at 0} size 4 align 4
 
 // Two branches that come from one primitive meet again: all of it is one group,
 // and the first stage may wait for what runs before. Its tile is the chunk.
 // CHECK-LABEL: piko.pipeline @Diamond
-// CHECK-NOT:     piko.strips
-// CHECK:         piko.kernel @kernel_before
-// CHECK-NOT:     piko.strips
-// CHECK:         piko.strips source 1 [@kernel_split, @kernel_left, @kernel_meet] chunk 256
-// CHECK-NEXT:    piko.kernel @kernel_split
-// CHECK-NOT:     piko.strips
+// CHECK:         piko.program roots [@split] {
+// CHECK-NEXT:      %[[BEFORE:.*]] = piko.feed 0
+// CHECK-NEXT:      piko.join @before
+// CHECK-NEXT:      piko.launch @kernel_before
+// CHECK-NEXT:      %[[IN:.*]] = piko.feed 1
+// CHECK-NEXT:      piko.strips(%[[IN]]) chunk 256 {
+// CHECK-NEXT:      ^bb0(%[[STRIP:.*]]: !piko.edge<@F>):
+// CHECK-NEXT:        piko.wait @before
+// CHECK-NEXT:        %[[SPLIT:.*]] = piko.join @split(concatenate %[[STRIP]])
+// CHECK-NEXT:        %[[OUT:.*]]:2 = piko.launch @kernel_split(%[[SPLIT]])
+// CHECK-NEXT:        piko.join @left(concatenate %[[OUT]]#0 keys 2) keeps 2
+// CHECK-NEXT:        %[[LEFT:.*]] = piko.launch @kernel_left
+// CHECK-NEXT:        piko.join @meet merge(concatenate %[[OUT]]#1 keys 2, concatenate %[[LEFT]] keys 3)
+// CHECK-NEXT:        piko.launch @kernel_meet
+// CHECK-NEXT:        piko.leave
+// CHECK-NEXT:      } : (!piko.edge<@F>) -> ()
 piko.pipeline @Diamond rank 1 {
   piko.source @before
   piko.source @split
@@ -57,10 +67,13 @@ piko.pipeline @Diamond rank 1 {
 // A cycle that collects nothing runs to its end for each strip; the list behind
 // it has all strips.
 // CHECK-LABEL: piko.pipeline @Loop
-// CHECK:         piko.strips source 0 [@kernel_start, @kernel_again]
-// CHECK-NOT:     chunk
-// CHECK:         piko.kernel @kernel_start
-// CHECK:         piko.kernel @kernel_list
+// CHECK:           %[[LEFT:.*]] = piko.strips(%{{.*}}) {
+// CHECK:             piko.launch @kernel_start
+// CHECK-NEXT:        %[[WAVES:.*]] = piko.waves
+// CHECK:             piko.leave %[[WAVES]]
+// CHECK-NEXT:      }
+// CHECK-NEXT:      %[[BINS:.*]] = piko.join @list(concatenate %[[LEFT]])
+// CHECK-NEXT:      piko.launch @kernel_list(%[[BINS]])
 piko.pipeline @Loop rank 1 {
   piko.source @start
   piko.edge @start[0] -> @again

@@ -46,7 +46,7 @@ def FormKernels : Pass<"piko-form-kernels", "::piko::PipelineOp"> {
 def FuseKernels : Pass<"piko-fuse-kernels", "::piko::PipelineOp"> {
   let summary = "Run stages for a bin, one after another, before the next bin";
   let description = [{
-    **Requires** the kernels level, before `piko-form-strips`; best after
+    **Requires** the kernels level, before `piko-form-program`; best after
     `piko-infer-directives`.
 
     **Does**: merges the kernel of a stage that takes a list, or waits with
@@ -96,12 +96,56 @@ def FuseKernels : Pass<"piko-fuse-kernels", "::piko::PipelineOp"> {
     Statistic<"refused", "refused", "edges that stay a kernel break">];
 }
 
-def FormStrips : Pass<"piko-form-strips", "::piko::PipelineOp"> {
-  let summary = "Find kernels that can take a source strip by strip";
+def FormProgram : Pass<"piko-form-program", "::piko::PipelineOp"> {
+  let summary = "Say which kernel runs when, and how edges are joined";
   let description = [{
-    **Requires** the kernels level, with kernels as they will run.
+    **Requires** the kernels level, with kernels as they will run; or the resolved
+    level.
 
-    **Does**: puts a `piko.strips` in front of kernels in a row that may run for
+    **Does**: makes a `piko.program` of a pipeline that has none. Its launches are
+    in the order in which kernels stand in the pipeline, but that stages on a
+    common cycle run together: in a `piko.waves` if none of them collects, else
+    in a `piko.rounds`, which may have waves inside it. A stage that waits for
+    another one has a `piko.wait` in front of its launch. Each
+    `piko.join` says how its edges are gathered and, where several of them meet,
+    how wide the keys are by which they are merged. A remark says of each edge
+    that is permuted, and of each merge, why.
+
+    **Guarantees** that what comes to a stage is in lineage order, and that only
+    primitives have keys that will be merged.
+
+    Before:
+    ```
+    piko.source @a
+    piko.edge @a[0] -> @b
+    piko.kernel @kernel_a { ... }
+    piko.kernel @kernel_b { ... }
+    ```
+    After, behind the kernels:
+    ```
+    piko.program {
+      %0 = piko.feed 0 : !piko.edge<@F>
+      %1 = piko.join @a(concatenate %0) : (!piko.edge<@F>) -> !piko.bins<@F>
+      %2 = piko.launch @kernel_a(%1) : (!piko.bins<@F>) -> !piko.edge<@F>
+      %3 = piko.join @b(permute %2) : (!piko.edge<@F>) -> !piko.bins<@F>
+      piko.launch @kernel_b(%3) : (!piko.bins<@F>) -> ()
+    }
+    ```
+
+    **Limits**: kernels are not moved, but for those of a cycle.
+  }];
+  let statistics = [
+    Statistic<"joins", "joins", "stages that something is joined for">,
+    Statistic<"permuted", "permuted", "edges that are permuted">,
+    Statistic<"merged", "merged", "joins that merge by key">];
+}
+
+def FormStrips : Pass<"piko-form-strips", "::piko::PipelineOp"> {
+  let summary = "Find launches that can take a source strip by strip";
+  let description = [{
+    **Requires** the kernels level with a `piko.program`.
+
+    **Does**: moves launches in a row into a `piko.strips` where they may run for
     one strip of a source after another, so that what lies between them stays
     small. All their primitives come from that source, through edges inside the
     group. A stage that waits, for a stage before the group, may be in it if its
@@ -112,26 +156,34 @@ def FormStrips : Pass<"piko-form-strips", "::piko::PipelineOp"> {
     split, and one bin, the tile becomes the `chunk`: depth first, several stages
     for one tile before the next.
 
-    **Guarantees** that kernels and their order stay as they are, and that lineage
+    **Guarantees** that the order of launches stays as it is, and that lineage
     order does not change, however the source is cut. A remark says of each stage
     that runs in no strips why.
 
     Before:
     ```
-    piko.source @a
-    piko.edge @a[0] -> @b
-    piko.stage @a ... { piko.schedule all tile_split 256 }
-    piko.kernel @kernel_a { ... }
-    piko.kernel @kernel_b { ... }
+    %0 = piko.feed 0 : !piko.edge<@F>
+    %1 = piko.join @a(concatenate %0) : ...
+    %2 = piko.launch @kernel_a(%1) : ...
+    %3 = piko.join @b(concatenate %2) : ...
+    piko.launch @kernel_b(%3) : ...
     ```
-    After, in front of the kernels:
+    After, where `@a` has the schedule `all tile_split 256`:
     ```
-    piko.strips source 0 [@kernel_a, @kernel_b] chunk 256
+    %0 = piko.feed 0 : !piko.edge<@F>
+    piko.strips(%0) chunk 256 {
+    ^bb0(%strip: !piko.edge<@F>):
+      %1 = piko.join @a(concatenate %strip) : ...
+      %2 = piko.launch @kernel_a(%1) : ...
+      %3 = piko.join @b(concatenate %2) : ...
+      piko.launch @kernel_b(%3) : ...
+      piko.leave
+    } : (!piko.edge<@F>) -> ()
     ```
 
     **Limits**: strips are of a source's primitives, never of bins, so that a
     stage that waits and emits from several bins ends a group, as does one that
-    takes a list, or that primitives of two sources reach. Kernels that are not
+    takes a list, or that primitives of two sources reach. Launches that are not
     in a row are not moved.
   }];
   let statistics = [

@@ -4,6 +4,8 @@
 
 #include "LoweringContext.h"
 
+#include "Piko/Analysis/StageGraph.h"
+
 using namespace mlir;
 using namespace piko;
 
@@ -22,13 +24,7 @@ Type piko::convertType(MLIRContext *context, ABIType type) {
 }
 
 PipelineNumbers::PipelineNumbers(PipelineOp pipeline) : pipeline(pipeline) {
-  // Lineage roots of collecting stages count in the order of their numbers.
-  SmallVector<StageOp> ordered(pipeline.getOps<StageOp>());
-  if (llvm::all_of(ordered, [](StageOp s) { return s.getLineage(); }))
-    llvm::sort(ordered, [](StageOp a, StageOp b) {
-      return *a.getLineage() < *b.getLineage();
-    });
-  for (StageOp stage : ordered)
+  for (StageOp stage : getDeclaredStages(pipeline))
     stages[stage.getSymNameAttr()] = stages.size();
   for (auto record : pipeline->getParentOfType<ModuleOp>().getOps<RecordOp>())
     records[record.getSymNameAttr()] = records.size();
@@ -46,12 +42,8 @@ PipelineNumbers::PipelineNumbers(PipelineOp pipeline) : pipeline(pipeline) {
       unusedBuffers.insert(buffer.getSymNameAttr());
 }
 
-std::optional<int64_t> PipelineNumbers::cycleOf(func::FuncOp kernel) const {
-  auto stage = kernel->getAttrOfType<IntegerAttr>(stageAttrName);
-  if (!stage)
-    return std::nullopt;
-  StringAttr name = (stages.begin() + stage.getInt())->first;
-  return cast<StageOp>(SymbolTable::lookupSymbolIn(pipeline, name)).getCycle();
+std::string piko::getFunctionName(KernelOp kernel) {
+  return (getPipeline(kernel).getSymName() + "." + kernel.getSymName()).str();
 }
 
 func::FuncOp LoweringContext::outline(KernelOp kernel,
@@ -59,12 +51,10 @@ func::FuncOp LoweringContext::outline(KernelOp kernel,
   OpBuilder builder(module.getBodyRegion());
   builder.setInsertionPointToEnd(module.getBody());
   Location loc = kernel.getLoc();
-  PipelineOp pipeline = numbers.pipeline;
   auto type = builder.getFunctionType(
       LLVM::LLVMPointerType::get(builder.getContext()), builder.getI32Type());
-  auto function = func::FuncOp::create(
-      builder, loc, (pipeline.getSymName() + "." + kernel.getSymName()).str(),
-      type);
+  auto function =
+      func::FuncOp::create(builder, loc, getFunctionName(kernel), type);
   function.setPrivate();
   function.getBody().takeBody(kernel.getBody());
   Block &entry = function.getBody().front();

@@ -28,9 +28,6 @@ struct PipelineNumbers {
   llvm::DenseSet<mlir::StringAttr> unusedBuffers;
 
   explicit PipelineNumbers(PipelineOp pipeline);
-
-  /// The cycle that a kernel's function is on, if any.
-  std::optional<int64_t> cycleOf(mlir::func::FuncOp kernel) const;
 };
 
 /// Data and extent of a piece of state, loaded when a kernel starts.
@@ -148,22 +145,22 @@ void populateChecksToLLVMPatterns(const mlir::TypeConverter &converter,
 /// Makes branches of casts from float to integer that saturate.
 void branchInSaturatingCasts(mlir::func::FuncOp function);
 
-/// Attributes of a kernel's function, until NAME.run is written: the number of
-/// the stage whose bins or schedule it is for, whether it places a source, ...
-constexpr const char *stageAttrName = "piko.stage";
+/// Attributes of a kernel's function, until it is converted: the number of the
+/// stage whose bins it is for, or of the source that it places.
 constexpr const char *numberAttrName = "piko.number";
 constexpr const char *sourceAttrName = "piko.source";
-/// The number of the group of kernels that runs in strips.
-constexpr const char *stripsAttrName = "piko.strips";
 
 /// Lets a kernel for which there is one thread run its units without a parallel
 /// region, as calls of a function.
 void outlineUnits(mlir::func::FuncOp kernel);
 
-/// Writes NAME.setup and NAME.run; `kernels` run in that order.
-void createProgram(const PipelineNumbers &numbers,
-                   llvm::ArrayRef<mlir::func::FuncOp> kernels,
-                   LoweringContext &context);
+/// The name of a kernel's function.
+std::string getFunctionName(KernelOp kernel);
+
+/// Writes NAME.setup and NAME.run, from a program whose kernels are not yet
+/// functions; returns the first.
+mlir::func::FuncOp createProgram(const PipelineNumbers &numbers,
+                                 LoweringContext &context);
 
 } // namespace piko
 

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // convert-piko-to-llvm: for each pipeline,
-//   1. make a function of each kernel;
-//   2. convert the operations in them;
-//   3. write NAME.setup and NAME.run, and drop the pipeline.
+//   1. write NAME.setup and NAME.run, from its program;
+//   2. make a function of each kernel;
+//   3. convert the operations in them, and drop the pipeline.
 
 #include "LoweringContext.h"
 
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
+#include "Piko/Dialect/Piko/IR/PikoProgram.h"
 
 #include "mlir/Dialect/ControlFlow/IR/ControlFlow.h"
 #include "mlir/Dialect/Math/IR/Math.h"
@@ -62,27 +63,28 @@ struct PoisonLowering : OpConversionPattern<ub::PoisonOp> {
 };
 } // namespace
 
+static LogicalResult checkSubject(KernelOp kernel) {
+  auto opened = kernel.getOps<OpenBinsOp>();
+  auto schedules = kernel.getOps<BeginScheduleOp>();
+  if (std::distance(opened.begin(), opened.end()) +
+          std::distance(schedules.begin(), schedules.end()) ==
+      1)
+    return success();
+  return kernel.emitOpError("expected to open the bins of one stage or "
+                            "source, or to begin one schedule");
+}
+
 /// Which stage or source a kernel's function is for: the runtime is told at its
 /// end, where the bins are no longer at hand.
-static LogicalResult noteSubject(KernelOp kernel, func::FuncOp function,
-                                 const PipelineNumbers &numbers) {
+static void noteSubject(func::FuncOp function, const PipelineNumbers &numbers) {
   Builder builder(function.getContext());
-  auto opened = function.getOps<OpenBinsOp>();
-  auto schedules = function.getOps<BeginScheduleOp>();
-  if (std::distance(opened.begin(), opened.end()) +
-          std::distance(schedules.begin(), schedules.end()) !=
-      1)
-    return kernel.emitOpError("expected to open the bins of one stage or "
-                              "source, or to begin one schedule");
-  for (OpenBinsOp bins : opened) {
+  for (auto bins : function.getOps<OpenBinsOp>()) {
     int64_t stage = numbers.stages.lookup(bins.getStageAttr().getAttr());
-    function->setAttr(stageAttrName, builder.getI64IntegerAttr(stage));
     function->setAttr(numberAttrName, builder.getI64IntegerAttr(
                                           bins.getSource().value_or(stage)));
     if (bins.getSource())
       function->setAttr(sourceAttrName, builder.getUnitAttr());
   }
-  return success();
 }
 
 /// Keeps LLVM's vectorizer from loops that only read: to gather into vectors
@@ -113,21 +115,29 @@ LogicalResult ConvertPikoToLLVMPass::convert(PipelineOp pipeline,
   });
   if (phase.wasInterrupted())
     return failure();
+  for (auto kernel : pipeline.getOps<KernelOp>())
+    if (failed(checkSubject(kernel)))
+      return failure();
+  ProgramOp program = getProgram(pipeline);
+  if (!program)
+    return pipeline.emitError("expected a piko.program, which "
+                              "piko-form-program makes");
   PipelineNumbers numbers(pipeline);
-  SmallVector<func::FuncOp> functions;
-  llvm::DenseMap<StringAttr, int64_t> groups;
-  for (auto [number, strips] : llvm::enumerate(pipeline.getOps<StripsOp>()))
-    for (auto name : strips.getKernels().getAsRange<FlatSymbolRefAttr>())
-      groups[name.getAttr()] = number;
+  func::FuncOp setup = createProgram(numbers, context);
+  SmallVector<func::FuncOp> functions, again;
+  llvm::DenseSet<Attribute> cyclic;
+  program.walk([&](LaunchOp launch) {
+    if (launch->getParentOfType<WavesOp>() ||
+        launch->getParentOfType<RoundsOp>())
+      cyclic.insert(launch.getKernelAttr().getAttr());
+  });
+  program.erase();
   for (auto kernel : llvm::to_vector(pipeline.getOps<KernelOp>())) {
     functions.push_back(context.outline(kernel, numbers));
-    if (failed(noteSubject(kernel, functions.back(), numbers)))
-      return failure();
-    if (auto group = groups.find(kernel.getSymNameAttr());
-        group != groups.end())
-      functions.back()->setAttr(
-          stripsAttrName,
-          IntegerAttr::get(IntegerType::get(&getContext(), 64), group->second));
+    functions.back()->moveBefore(setup);
+    noteSubject(functions.back(), numbers);
+    if (cyclic.contains(kernel.getSymNameAttr()))
+      again.push_back(functions.back());
     kernel.erase();
   }
 
@@ -164,13 +174,10 @@ LogicalResult ConvertPikoToLLVMPass::convert(PipelineOp pipeline,
     annotateReads(function);
     branchInSaturatingCasts(function);
   }
+  for (func::FuncOp function : again)
+    outlineUnits(function);
   for (func::FuncOp function : functions)
-    if (!function->hasAttr(sourceAttrName) && numbers.cycleOf(function))
-      outlineUnits(function);
-  createProgram(numbers, functions, context);
-  for (func::FuncOp function : functions)
-    for (const char *name :
-         {stageAttrName, numberAttrName, sourceAttrName, stripsAttrName})
+    for (const char *name : {numberAttrName, sourceAttrName})
       function->removeAttr(name);
   pipeline.erase();
   return success();

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // The two functions of a program: NAME.setup declares the pipeline to the
-// runtime, NAME.run runs its kernels.
+// runtime, NAME.run is the piko.program as branches between calls of kernels.
 
 #include "LoweringContext.h"
 
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "Piko/Dialect/Piko/IR/PikoCheck.h"
+#include "Piko/Dialect/Piko/IR/PikoProgram.h"
 
 #include "mlir/Dialect/ControlFlow/IR/ControlFlowOps.h"
 
@@ -23,7 +24,7 @@ public:
       : numbers(numbers), pipeline(numbers.pipeline), context(context),
         builder(builder), loc(pipeline.getLoc()), frame(frame) {}
 
-  void run(ArrayRef<func::FuncOp> kernels);
+  void run(ProgramOp program);
 
 private:
   Value i32(int64_t v) { return createI32(builder, loc, v); }
@@ -46,8 +47,7 @@ private:
   void declareCheckedRecord(CheckRecordOp record);
   void declareState(Operation *state, int32_t number);
   void declareStage(StageOp stage, int32_t number);
-  void declareStrips(StripsOp strips, int32_t number,
-                     ArrayRef<func::FuncOp> kernels);
+  void declareStrips(StripsOp strips, int32_t number);
   Value recordBytes(FlatSymbolRefAttr record, ArrayAttr numbers);
 
   const PipelineNumbers &numbers;
@@ -218,32 +218,30 @@ void SetupWriter::declareStage(StageOp stage, int32_t number) {
            {i32(number), i32(numbers.stages.lookup(name.getAttr()))});
 }
 
-static int64_t stageNumber(func::FuncOp kernel) {
-  return kernel->getAttrOfType<IntegerAttr>(stageAttrName).getInt();
+/// The stages whose kernels are launched in a region, in order.
+static llvm::SmallSetVector<int32_t, 8>
+findStages(Operation *region, const PipelineNumbers &numbers) {
+  llvm::SmallSetVector<int32_t, 8> stages;
+  region->walk([&](LaunchOp launch) {
+    for (StageOp stage : getStages(launch.getKernelOp()))
+      stages.insert(numbers.stages.lookup(stage.getSymNameAttr()));
+  });
+  return stages;
 }
 
-/// The group of strips that a kernel is in, if any.
-static std::optional<int64_t> stripsNumber(func::FuncOp kernel) {
-  auto number = kernel->getAttrOfType<IntegerAttr>(stripsAttrName);
-  return number ? std::optional(number.getInt()) : std::nullopt;
-}
-
-void SetupWriter::declareStrips(StripsOp strips, int32_t number,
-                                ArrayRef<func::FuncOp> kernels) {
-  llvm::SmallSetVector<int64_t, 8> stages;
-  for (func::FuncOp kernel : kernels)
-    if (stripsNumber(kernel) == number)
-      stages.insert(stageNumber(kernel));
+void SetupWriter::declareStrips(StripsOp strips, int32_t number) {
+  auto stages = findStages(strips, numbers);
   std::string list;
   for (int64_t stage : stages)
     appendBytes(list, stage, 4);
-  call(PIKO_RUNTIME_FUNCTION(pikoir_declare_strips),
-       {i32(number), i32(strips.getSource()),
-        i64(strips.getChunk().value_or(0)), bytes(list), i32(stages.size())});
+  auto feed = strips.getSource().getDefiningOp<FeedOp>();
+  call("pikoir_declare_strips",
+       {i32(number), i32(feed.getSource()), i64(strips.getChunk().value_or(0)),
+        bytes(list), i32(stages.size())});
 }
 
-void SetupWriter::run(ArrayRef<func::FuncOp> kernels) {
-  call(PIKO_RUNTIME_FUNCTION(pikoir_declare_pipeline),
+void SetupWriter::run(ProgramOp program) {
+  call("pikoir_declare_pipeline",
        {text(pipeline.getSymName()), i32(pipeline.getRank())});
   if (std::optional<int64_t> cells = pipeline.getMaxExtent())
     call(PIKO_RUNTIME_FUNCTION(pikoir_declare_max_extent), {i64(*cells)});
@@ -269,8 +267,8 @@ void SetupWriter::run(ArrayRef<func::FuncOp> kernels) {
   }
   for (auto [name, number] : numbers.states)
     declareState(SymbolTable::lookupSymbolIn(pipeline, name), number);
-  for (auto [number, strips] : llvm::enumerate(pipeline.getOps<StripsOp>()))
-    declareStrips(strips, number, kernels);
+  for (auto [number, strips] : llvm::enumerate(program.getOps<StripsOp>()))
+    declareStrips(strips, number);
 }
 
 namespace {
@@ -284,20 +282,25 @@ public:
       : numbers(numbers), pipeline(numbers.pipeline), context(context),
         builder(builder), loc(pipeline.getLoc()) {}
 
-  void run(ArrayRef<func::FuncOp> kernels);
+  void run(ProgramOp program);
 
 private:
   Block *createBlock(Block *before) {
     OpBuilder::InsertionGuard guard(builder);
     return builder.createBlock(before);
   }
+  Value call(StringRef function, ArrayRef<Value> arguments = {}) {
+    SmallVector<Value> all{frame};
+    llvm::append_range(all, arguments);
+    return context.call(builder, loc, function, builder.getI32Type(), all)
+        .getResult();
+  }
   /// Goes on, in `next`, only if a status is 0.
   void check(Value status, Block *next);
-  void callKernel(func::FuncOp kernel, Block *next);
-  void createCycle(ArrayRef<func::FuncOp> members);
-  /// Kernels that run one after the other, but for those of cycles.
-  void createSequence(ArrayRef<func::FuncOp> kernels);
-  void createStrips(int64_t number, ArrayRef<func::FuncOp> kernels);
+  void launch(LaunchOp launch, Block *next);
+  void createCycle(Operation *cycle);
+  void createStatements(Block &statements);
+  void createStrips(StripsOp strips);
 
   const PipelineNumbers &numbers;
   PipelineOp pipeline;
@@ -306,6 +309,7 @@ private:
   Location loc;
   Value frame;
   Block *exit = nullptr; ///< Where a status goes that is not 0.
+  int64_t stripsCount = 0;
 };
 
 } // namespace
@@ -319,74 +323,56 @@ void RunWriter::check(Value status, Block *next) {
   builder.setInsertionPointToEnd(next);
 }
 
-void RunWriter::callKernel(func::FuncOp kernel, Block *next) {
-  check(func::CallOp::create(builder, kernel.getLoc(), kernel, frame)
-            .getResult(0),
-        next);
+void RunWriter::launch(LaunchOp launch, Block *next) {
+  KernelOp kernel = launch.getKernelOp();
+  auto call =
+      func::CallOp::create(builder, kernel.getLoc(), getFunctionName(kernel),
+                           builder.getI32Type(), frame);
+  check(call.getResult(0), next);
 }
 
-void RunWriter::createCycle(ArrayRef<func::FuncOp> members) {
-  SmallVector<func::FuncOp> kernels;
-  for (func::FuncOp member : members) {
-    if (member->hasAttr(sourceAttrName))
-      callKernel(member, createBlock(exit));
-    else
-      kernels.push_back(member);
-  }
+void RunWriter::createCycle(Operation *cycle) {
   Block *step = createBlock(exit);
   Block *choose = createBlock(exit);
   Block *after = createBlock(exit);
   cf::BranchOp::create(builder, loc, step);
 
+  auto stages = llvm::to_vector(findStages(cycle, numbers));
   builder.setInsertionPointToEnd(step);
   Value next =
-      context
-          .call(builder, loc, PIKO_RUNTIME_FUNCTION(pikoir_cycle_step),
-                {frame, createI32(builder, loc, stageNumber(members.front()))})
-          .getResult();
+      call("pikoir_cycle_step", {createI32(builder, loc, stages.front())});
   Value ended = arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::slt,
                                       next, createI32(builder, loc, 0));
   cf::CondBranchOp::create(builder, loc, ended, after, choose);
 
-  SmallVector<int32_t> stages;
   SmallVector<Block *> calls;
-  for (func::FuncOp kernel : kernels) {
-    stages.push_back(stageNumber(kernel));
+  cycle->walk([&](LaunchOp member) {
     calls.push_back(createBlock(after));
     builder.setInsertionPointToEnd(calls.back());
-    callKernel(kernel, step);
-  }
+    launch(member, step);
+  });
   builder.setInsertionPointToEnd(choose);
   cf::SwitchOp::create(builder, loc, next, after, ValueRange(), stages, calls,
                        SmallVector<ValueRange>(calls.size()));
 
   builder.setInsertionPointToEnd(after);
-  check(context.call(builder, loc, PIKO_RUNTIME_FUNCTION(pikoir_status), frame)
-            .getResult(),
-        createBlock(exit));
+  check(call("pikoir_status"), createBlock(exit));
 }
 
-void RunWriter::createSequence(ArrayRef<func::FuncOp> kernels) {
-  llvm::SmallDenseSet<int64_t> cyclesDone;
-  for (func::FuncOp kernel : kernels) {
-    std::optional<int64_t> cycle = numbers.cycleOf(kernel);
-    if (!cycle) {
-      callKernel(kernel, createBlock(exit));
-      continue;
-    }
-    if (!cyclesDone.insert(*cycle).second)
-      continue;
-    SmallVector<func::FuncOp> members;
-    for (func::FuncOp other : kernels)
-      if (numbers.cycleOf(other) == cycle)
-        members.push_back(other);
-    createCycle(members);
+void RunWriter::createStatements(Block &statements) {
+  for (Operation &op : statements) {
+    if (auto kernel = dyn_cast<LaunchOp>(op))
+      launch(kernel, createBlock(exit));
+    else if (auto strips = dyn_cast<StripsOp>(op))
+      createStrips(strips);
+    else if (isa<WavesOp, RoundsOp>(op))
+      createCycle(&op);
   }
 }
 
 /// A kernel that fails ends its strip; the runtime knows whether it can be run
 /// again as a smaller one.
-void RunWriter::createStrips(int64_t number, ArrayRef<func::FuncOp> kernels) {
+void RunWriter::createStrips(StripsOp strips) {
   Block *next = createBlock(exit);
   Block *strip = createBlock(exit);
   Block *after = createBlock(exit);
@@ -394,10 +380,7 @@ void RunWriter::createStrips(int64_t number, ArrayRef<func::FuncOp> kernels) {
 
   builder.setInsertionPointToEnd(next);
   Value more =
-      context
-          .call(builder, loc, PIKO_RUNTIME_FUNCTION(pikoir_strips_next),
-                {frame, createI32(builder, loc, number)})
-          .getResult();
+      call("pikoir_strips_next", {createI32(builder, loc, stripsCount++)});
   Value ended = arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::eq,
                                       more, createI32(builder, loc, 0));
   cf::CondBranchOp::create(builder, loc, ended, after, strip);
@@ -406,17 +389,15 @@ void RunWriter::createStrips(int64_t number, ArrayRef<func::FuncOp> kernels) {
   cf::BranchOp::create(builder, loc, next);
   Block *outer = std::exchange(exit, failed);
   builder.setInsertionPointToEnd(strip);
-  createSequence(kernels);
+  createStatements(strips.getBody().front());
   cf::BranchOp::create(builder, loc, next);
   exit = outer;
 
   builder.setInsertionPointToEnd(after);
-  check(context.call(builder, loc, PIKO_RUNTIME_FUNCTION(pikoir_status), frame)
-            .getResult(),
-        createBlock(exit));
+  check(call("pikoir_status"), createBlock(exit));
 }
 
-void RunWriter::run(ArrayRef<func::FuncOp> kernels) {
+void RunWriter::run(ProgramOp program) {
   auto pointer = LLVM::LLVMPointerType::get(builder.getContext());
   auto function = func::FuncOp::create(
       builder, loc, (pipeline.getSymName() + ".run").str(),
@@ -428,23 +409,14 @@ void RunWriter::run(ArrayRef<func::FuncOp> kernels) {
       builder.createBlock(&function.getBody(), {}, builder.getI32Type(), loc);
   func::ReturnOp::create(builder, loc, exit->getArgument(0));
   builder.setInsertionPointToEnd(entry);
-  while (!kernels.empty()) {
-    std::optional<int64_t> strips = stripsNumber(kernels.front());
-    ArrayRef<func::FuncOp> together = kernels.take_while(
-        [&](func::FuncOp kernel) { return stripsNumber(kernel) == strips; });
-    if (strips)
-      createStrips(*strips, together);
-    else
-      createSequence(together);
-    kernels = kernels.drop_front(together.size());
-  }
+  createStatements(*program.getBodyBlock());
   cf::BranchOp::create(builder, loc, exit, createI32(builder, loc, 0));
 }
 
-void piko::createProgram(const PipelineNumbers &numbers,
-                         ArrayRef<func::FuncOp> kernels,
-                         LoweringContext &context) {
+func::FuncOp piko::createProgram(const PipelineNumbers &numbers,
+                                 LoweringContext &context) {
   PipelineOp pipeline = numbers.pipeline;
+  ProgramOp program = getProgram(pipeline);
   auto module = pipeline->getParentOfType<ModuleOp>();
   OpBuilder builder = OpBuilder::atBlockEnd(module.getBody());
   auto setup = func::FuncOp::create(
@@ -455,8 +427,9 @@ void piko::createProgram(const PipelineNumbers &numbers,
     OpBuilder::InsertionGuard guard(builder);
     Block *body = setup.addEntryBlock();
     builder.setInsertionPointToEnd(body);
-    SetupWriter(numbers, context, builder, body->getArgument(0)).run(kernels);
+    SetupWriter(numbers, context, builder, body->getArgument(0)).run(program);
     func::ReturnOp::create(builder, pipeline.getLoc());
   }
-  RunWriter(numbers, context, builder).run(kernels);
+  RunWriter(numbers, context, builder).run(program);
+  return setup;
 }

@@ -6,11 +6,12 @@
 // takes its port, or to the next process phase where there is none; it is bold
 // where a local barrier keeps what it carries in a bin. A dotted edge leads to
 // the process phases of the stages that were fused with it. A schedule that has
-// code of its own is a kernel, too.
+// code of its own is a kernel, too. Of the program, strips, waves and rounds
+// are boxes around kernels, and the way to join is said at edges.
 
 #include "Piko/Target/Graphviz.h"
 
-#include "Piko/Dialect/Piko/IR/Piko.h"
+#include "Piko/Dialect/Piko/IR/PikoProgram.h"
 #include "Piko/Driver/Registration.h"
 
 #include "mlir/Tools/mlir-translate/Translation.h"
@@ -31,6 +32,9 @@ public:
 private:
   void writeStage(StageOp stage);
   void writeKernel(KernelOp kernel);
+  void writeStatements(Block &statements);
+  void writeRegion(Operation *region);
+  void noteJoin(JoinOp join);
   void writeFused(StageOp stage);
   void writeSchedule(StageOp stage);
   void writeSource(SourceOp source, int64_t number);
@@ -42,10 +46,11 @@ private:
   /// consumer: `from` is "producer.port", or "source.number".
   std::string assignNode(StringRef stage, StringRef from);
   bool hasAssignPhase(StringRef stage, StringRef from);
-  bool isLocal(EdgeOp edge);
 
   PipelineOp pipeline;
   raw_ostream &stream;
+  llvm::DenseMap<Operation *, std::string> joins; ///< By source or edge.
+  int64_t regions = 0;
   llvm::StringSet<> assignNodes;
   bool kernels = false;
 };
@@ -135,6 +140,45 @@ void DotWriter::writeKernel(KernelOp kernel) {
   stream << "  }\n";
 }
 
+/// How what comes to a stage is joined, by where it comes from.
+void DotWriter::noteJoin(JoinOp join) {
+  for (auto [edge, permute, keys] :
+       llvm::zip(join.getEdges(), join.getPermutes(), join.getKeys())) {
+    std::string text = permute ? "permuted" : "concatenated";
+    if (join.getMerge())
+      text += ", merged";
+    if (keys > 0)
+      text += ", keys of " + std::to_string(keys);
+    joins[getOrigin(edge)] = text;
+  }
+}
+
+void DotWriter::writeRegion(Operation *region) {
+  std::string label = "rounds";
+  if (auto strips = dyn_cast<StripsOp>(region)) {
+    label = "strips";
+    if (auto chunk = strips.getChunk())
+      label += " of " + std::to_string(*chunk);
+  } else if (isa<WavesOp>(region)) {
+    label = "waves";
+  }
+  stream << "  subgraph " << quote("cluster_" + label + Twine(regions++))
+         << " {\n    label=" << quote(label) << "; style=dashed;\n";
+  writeStatements(region->getRegion(0).front());
+  stream << "  }\n";
+}
+
+void DotWriter::writeStatements(Block &statements) {
+  for (Operation &op : statements) {
+    if (auto join = dyn_cast<JoinOp>(op))
+      noteJoin(join);
+    else if (auto launch = dyn_cast<LaunchOp>(op))
+      writeKernel(launch.getKernelOp());
+    else if (isa<StripsOp, WavesOp, RoundsOp>(op))
+      writeRegion(&op);
+  }
+}
+
 void DotWriter::writeFused(StageOp stage) {
   if (!stage.getFusedAttr())
     return;
@@ -157,21 +201,16 @@ void DotWriter::writeSource(SourceOp source, int64_t number) {
   std::string from = "source." + std::to_string(number);
   std::string node = quote(from);
   auto consumer = lookupInPipeline<StageOp>(source, source.getStageAttr());
-  std::string label = quote(consumer ? consumer.getInput() : "");
+  std::string text = (consumer ? consumer.getInput() : "").str();
+  if (auto join = joins.find(source); join != joins.end())
+    text += "\n" + join->second;
+  std::string label = quote(text);
   stream << "  " << node << " [label=" << quote("source " + Twine(number))
          << ", shape=invhouse];\n  " << node << " -> ";
   if (hasAssignPhase(stage, from))
     stream << assignNode(stage, from) << " [label=" << label << "];\n  "
            << assignNode(stage, from) << " -> ";
   stream << processNode(stage) << " [label=" << label << "];\n";
-}
-
-bool DotWriter::isLocal(EdgeOp edge) {
-  for (auto kernel : pipeline.getOps<KernelOp>())
-    for (auto barrier : kernel.getOps<LocalBarrierOp>())
-      if (barrier.getConsumerAttr() == edge.getConsumerAttr())
-        return true;
-  return false;
 }
 
 void DotWriter::writeEdge(EdgeOp edge) {
@@ -183,6 +222,8 @@ void DotWriter::writeEdge(EdgeOp edge) {
         ": " + cast<FlatSymbolRefAttr>(producer.getOutputs()[edge.getPort()])
                    .getValue()
                    .str();
+  if (auto join = joins.find(edge); join != joins.end())
+    label += "\n" + join->second;
   std::string from = (edge.getProducer() + "." + Twine(edge.getPort())).str();
   stream << "  " << processNode(edge.getProducer()) << " -> ";
   if (hasAssignPhase(edge.getConsumer(), from))
@@ -206,8 +247,11 @@ void DotWriter::write() {
   stream << "digraph " << quote(pipeline.getSymName())
          << " {\n  node [shape=box];\n";
   kernels = !pipeline.getOps<KernelOp>().empty();
-  for (auto kernel : pipeline.getOps<KernelOp>())
-    writeKernel(kernel);
+  if (ProgramOp program = getProgram(pipeline))
+    writeStatements(*program.getBodyBlock());
+  else
+    for (auto kernel : pipeline.getOps<KernelOp>())
+      writeKernel(kernel);
   for (auto stage : pipeline.getOps<StageOp>()) {
     if (!kernels)
       writeStage(stage);

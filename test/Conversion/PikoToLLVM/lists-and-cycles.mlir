@@ -1,4 +1,4 @@
-// RUN: piko-opt --convert-piko-to-llvm --canonicalize %s | FileCheck %s
+// RUN: piko-opt --piko-form-program --convert-piko-to-llvm --canonicalize %s | FileCheck %s
 
 piko.record @F {"x" : i32 at 0, "v" : f32 at 4} size 8 align 4
 
@@ -52,18 +52,18 @@ piko.record @F {"x" : i32 at 0, "v" : f32 at 4} size 8 align 4
 // CHECK-LABEL: func.func @P.run(%{{.*}}: !llvm.ptr)
 // CHECK:         call @P.schedule_a
 // CHECK:         ^[[STEP:bb[0-9]+]]:
-// CHECK:         %[[S:.*]] = llvm.call @pikoir_cycle_step(%{{.*}}, %c0_i32)
+// CHECK:         %[[S:.*]] = llvm.call @pikoir_cycle_step(%{{.*}}, %c1_i32)
 // CHECK:         cf.cond_br %{{.*}}, ^[[AFTER:bb[0-9]+]], ^[[CHOOSE:bb[0-9]+]]
 // CHECK:       ^[[CHOOSE]]:
 // CHECK:         cf.switch %[[S]] : i32, [
 // CHECK-NEXT:      default: ^[[AFTER]],
-// CHECK-NEXT:      0: ^[[A:bb[0-9]+]],
-// CHECK-NEXT:      1: ^[[B:bb[0-9]+]]
-// CHECK:       ^[[A]]:
-// CHECK:         call @P.kernel_a
-// CHECK:         cf.cond_br %{{.*}}, ^{{.*}}, ^[[STEP]]
+// CHECK-NEXT:      1: ^[[B:bb[0-9]+]],
+// CHECK-NEXT:      0: ^[[A:bb[0-9]+]]
 // CHECK:       ^[[B]]:
 // CHECK:         call @P.kernel_b
+// CHECK:         cf.cond_br %{{.*}}, ^{{.*}}, ^[[STEP]]
+// CHECK:       ^[[A]]:
+// CHECK:         call @P.kernel_a
 // CHECK:       ^[[AFTER]]:
 // CHECK:         llvm.call @pikoir_status
 // CHECK:         call @P.kernel_c

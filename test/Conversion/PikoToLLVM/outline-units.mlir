@@ -1,4 +1,4 @@
-// RUN: piko-opt --convert-piko-to-openmp --convert-piko-to-llvm --canonicalize %s | FileCheck %s
+// RUN: piko-opt --piko-form-program --convert-piko-to-openmp --convert-piko-to-llvm --canonicalize %s | FileCheck %s
 
 // A kernel of a cycle may have next to nothing to do. Its units are calls of a
 // function, so that it has no parallel region where there is one thread.

@@ -52,4 +52,22 @@ piko.pipeline @P rank 1 {
       piko.yield
     }
   }
+  piko.program {
+    %source = piko.feed 0 : !piko.edge<@F>
+    %bins = piko.join @a(concatenate %source) : (!piko.edge<@F>) -> !piko.bins<@F>
+    piko.launch @k(%bins) : (!piko.bins<@F>) -> ()
+  }
+}
+
+// -----
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+// expected-error @below {{expected a piko.program, which piko-form-program makes}}
+piko.pipeline @P rank 1 {
+  piko.source @a
+  piko.stage @a bins [0] threads 1 : @F -> [] {}
+  piko.kernel @k {
+    %bins = piko.open_bins @a : !piko.bins<@F>
+    piko.close_bins %bins : !piko.bins<@F>
+  }
 }

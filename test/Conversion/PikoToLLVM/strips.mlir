@@ -38,7 +38,6 @@ piko.pipeline @P rank 1 {
     %bins = piko.cpu.open_bins @before : !piko.bins<@F>
     piko.cpu.close_bins %bins : !piko.bins<@F>
   }
-  piko.strips source 0 [@kernel_a, @kernel_b] chunk 256
   piko.kernel @kernel_a {
     %bins = piko.cpu.open_bins @a : !piko.bins<@F>
     piko.cpu.close_bins %bins : !piko.bins<@F>
@@ -46,5 +45,18 @@ piko.pipeline @P rank 1 {
   piko.kernel @kernel_b {
     %bins = piko.cpu.open_bins @b : !piko.bins<@F>
     piko.cpu.close_bins %bins : !piko.bins<@F>
+  }
+  piko.program {
+    %1 = piko.feed 1 : !piko.edge<@F>
+    %before = piko.join @before(concatenate %1) : (!piko.edge<@F>) -> !piko.bins<@F>
+    piko.launch @kernel_before(%before) : (!piko.bins<@F>) -> ()
+    %0 = piko.feed 0 : !piko.edge<@F>
+    piko.strips(%0) chunk 256 {
+    ^bb0(%strip: !piko.edge<@F>):
+      %a = piko.join @a(concatenate %strip) : (!piko.edge<@F>) -> !piko.bins<@F>
+      %out = piko.launch @kernel_a(%a) : (!piko.bins<@F>) -> !piko.edge<@F>
+      %b = piko.join @b(concatenate %out) : (!piko.edge<@F>) -> !piko.bins<@F>
+      piko.launch @kernel_b(%b) : (!piko.bins<@F>) -> ()
+    } : (!piko.edge<@F>) -> ()
   }
 }

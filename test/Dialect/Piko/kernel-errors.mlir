@@ -256,68 +256,6 @@ piko.pipeline @P rank 1 {
 piko.record @F {"x" : i32 at 0} size 4 align 4
 piko.pipeline @P rank 1 {
   piko.source @a
-  piko.stage @a bins [0] threads 1 : @F -> [] {}
-  // expected-error @below {{expected a source below 1, which is how many there are, but got 1}}
-  piko.strips source 1 [@k, @l]
-  piko.kernel @k {}
-  piko.kernel @l {}
-}
-
-// -----
-
-piko.record @F {"x" : i32 at 0} size 4 align 4
-piko.pipeline @P rank 1 {
-  piko.source @a
-  piko.stage @a bins [0] threads 1 : @F -> [] {}
-  // expected-error @below {{expected at least two kernels, but got 1}}
-  piko.strips source 0 [@k]
-  piko.kernel @k {}
-}
-
-// -----
-
-piko.record @F {"x" : i32 at 0} size 4 align 4
-piko.pipeline @P rank 1 {
-  piko.source @a
-  piko.stage @a bins [0] threads 1 : @F -> [] {}
-  // expected-error @below {{expected a kernel, but got @a, which is none}}
-  piko.strips source 0 [@k, @a]
-  piko.kernel @k {}
-}
-
-// -----
-
-piko.record @F {"x" : i32 at 0} size 4 align 4
-piko.pipeline @P rank 1 {
-  piko.source @a
-  piko.stage @a bins [0] threads 1 : @F -> [] {}
-  // expected-error @below {{expected kernels in a row, but @m does not stand behind the one before it}}
-  piko.strips source 0 [@k, @m]
-  piko.kernel @k {}
-  piko.kernel @l {}
-  piko.kernel @m {}
-}
-
-// -----
-
-piko.record @F {"x" : i32 at 0} size 4 align 4
-piko.pipeline @P rank 1 {
-  piko.source @a
-  piko.stage @a bins [0] threads 1 : @F -> [] {}
-  // expected-error @below {{expected each kernel once, but got @l twice}}
-  piko.strips source 0 [@k, @l]
-  piko.kernel @k {}
-  piko.kernel @l {}
-  // expected-note @below {{it is here, too}}
-  piko.strips source 0 [@l, @m]
-  piko.kernel @m {}
-}
-
-// -----
-
-piko.record @F {"x" : i32 at 0} size 4 align 4
-piko.pipeline @P rank 1 {
-  piko.source @a
   piko.edge @a[0] -> @b
   piko.stage @a bins [8] threads 1 : @F -> [@F] {}
   piko.stage @b bins [8] threads 1 : list @F -> [] {}

@@ -56,7 +56,7 @@ piko.pipeline @P rank 2 {
 // -----
 
 piko.pipeline @P rank 2 {
-  // expected-error@+1 {{expected only state, sources, edges, stages and kernels in a pipeline}}
+  // expected-error@+1 {{expected only state, sources, edges, stages, kernels and a program in a pipeline}}
   %c = arith.constant 0 : i32
 }
 

@@ -18,11 +18,12 @@ piko.record @Point {"x" : i32 at 0} size 4 align 4
 // CHECK-NEXT: label="kernel_plot";
 // CHECK-NEXT: "process plot" [label="process plot\n
 // CHECK-NEXT: }
+// CHECK-NEXT: }
 // CHECK-NEXT: subgraph "cluster_schedule plot" {
 // CHECK-NEXT: "schedule plot";
 // CHECK-NEXT: }
 // CHECK-NEXT: "schedule plot" -> "process plot" [style=dashed];
-// CHECK: "process start" -> "assign plot start.0" [label="port 0: Point"];
+// CHECK: "process start" -> "assign plot start.0" [label="port 0: Point\npermuted"];
 // CHECK-NEXT: "assign plot start.0" -> "process plot";
 piko.pipeline @Draw rank 1 {
   piko.buffer @sums : @Point

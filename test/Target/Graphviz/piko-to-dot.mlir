@@ -15,12 +15,15 @@ piko.record @Point {"x" : i32 at 0, "y" : i32 at 4} size 8 align 4
 // CHECK-NEXT: "process plot" -> "drain plot" [style=dashed];
 // CHECK-NEXT: }
 
-// KERNELS: subgraph "cluster_[[KERNEL:.*]]" {
+// KERNELS: subgraph "cluster_strips0" {
+// KERNELS-NEXT: label="strips"; style=dashed;
+// KERNELS-NEXT: subgraph "cluster_[[KERNEL:.*]]" {
 // KERNELS-NEXT: label="[[KERNEL]]";
 // KERNELS-NEXT: "process rast" [label="process rast
 // KERNELS-NEXT: "assign plot rast.0" [label="assign plot"];
 // KERNELS-NEXT: }
-// KERNELS: "process rast" -> "assign plot rast.0" [label="port 0: Point"];
+// KERNELS: "source.0" -> "process rast" [label="Point\nconcatenated"];
+// KERNELS-NEXT: "process rast" -> "assign plot rast.0" [label="port 0: Point\nconcatenated"];
 // KERNELS-NEXT: "assign plot rast.0" -> "process plot";
 
 // MACHINE: error: expected a kernel that holds phases, but got none

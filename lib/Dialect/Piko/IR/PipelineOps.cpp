@@ -4,6 +4,7 @@
 
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "Piko/Dialect/Piko/IR/PikoCheck.h"
+#include "Piko/Dialect/Piko/IR/PikoProgram.h"
 #include "llvm/ADT/StringSet.h"
 
 using namespace mlir;
@@ -208,10 +209,13 @@ static LogicalResult verifyReached(PipelineOp pipeline) {
 LogicalResult PipelineOp::verifyRegions() {
   for (Operation &op : *getBodyBlock())
     if (!isa<ConstantOp, BufferOp, ImageOp, SourceOp, EdgeOp, StageOp, KernelOp,
-             StripsOp, CheckRecordOp>(op))
+             ProgramOp, CheckRecordOp>(op))
       return op.emitOpError(
-          "expected only state, sources, edges, stages and kernels in a "
-          "pipeline");
+          "expected only state, sources, edges, stages, kernels and a program "
+          "in a pipeline");
+  if (auto programs = getOps<ProgramOp>();
+      !programs.empty() && !llvm::hasSingleElement(programs))
+    return emitOpError("expected one program");
   if (failed(verifyPorts(*this)) || failed(verifyReached(*this)))
     return failure();
   return success();

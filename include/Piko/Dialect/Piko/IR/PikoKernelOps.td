@@ -13,9 +13,8 @@ def Piko_KernelOp : Piko_Op<"kernel", [
     AutomaticAllocationScope, HasParent<"PipelineOp">]> {
   let summary = "phases that run together";
   let description = [{
-    Kernels run one after another, in the order in which they stand in the
-    pipeline; a kernel starts when the one before it has ended. Kernels of stages
-    on a common cycle run again and again, until nothing is left of it. At the
+    When a kernel runs is said by the `piko.program`; where there is none yet,
+    kernels stand in the order in which they run. At the
     kernels level the body holds phases: the process phase of a stage and, behind
     it, the assign phases of the stages that it feeds, or the assign phase of a
     source. More process phases may follow, each behind a `piko.local_barrier`.
@@ -111,49 +110,6 @@ def Piko_LocalBarrierOp : Piko_Op<"local_barrier", [
                        ConfinedAttr<Piko_I64Attr, [IntNonNegative]>:$port,
                        FlatSymbolRefAttr:$consumer);
   let assemblyFormat = "$producer `[` $port `]` `->` $consumer attr-dict";
-}
-
-def Piko_StripsOp : Piko_Op<"strips", [
-    HasParent<"PipelineOp">, DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
-  let summary = "kernels that take a source strip by strip";
-  let description = [{
-    The kernels, which stand in a row, run for one strip of the source, consecutive
-    primitives, before the first of them runs for the next strip. All their
-    primitives come from that source. `chunk` is how many primitives a strip has
-    at most; without it the runtime chooses.
-
-    ```mlir
-    piko.record @F {"x" : i32 at 0} size 4 align 4
-    piko.pipeline @P rank 1 {
-      piko.source @start
-      piko.edge @start[0] -> @drop
-      piko.stage @start bins [0] threads 64 : @F -> [@F] {}
-      piko.stage @drop bins [0] threads 64 : @F -> [] {}
-      piko.strips source 0 [@kernel_start, @kernel_drop] chunk 256
-      piko.kernel @kernel_start {
-        piko.process of @start {
-        ^bb0(%f: !piko.prim<@F>):
-          %x = piko.get %f "x" : !piko.prim<@F> -> i32
-          piko.emit 0 (%x) : i32
-          piko.return
-        }
-      }
-      piko.kernel @kernel_drop {
-        piko.process of @drop {
-        ^bb0(%f: !piko.prim<@F>):
-          piko.return
-        }
-      }
-    }
-    ```
-  }];
-  let arguments = (ins
-    ConfinedAttr<Piko_I64Attr, [IntNonNegative]>:$source,
-    TypedArrayAttrBase<FlatSymbolRefAttr, "kernels in a row">:$kernels,
-    OptionalAttr<ConfinedAttr<Piko_I64Attr, [IntPositive]>>:$chunk);
-  let assemblyFormat = [{
-    `source` $source $kernels (`chunk` $chunk^)? attr-dict
-  }];
 }
 
 def Piko_BeginScheduleOp : Piko_Op<"begin_schedule", [

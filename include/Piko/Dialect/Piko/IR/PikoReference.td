@@ -5,3 +5,4 @@
 include "Piko/Dialect/Piko/IR/PikoOps.td"
 include "Piko/Dialect/Piko/IR/PikoCheckOps.td"
 include "Piko/Dialect/Piko/IR/PikoCPUOps.td"
+include "Piko/Dialect/Piko/IR/PikoProgramOps.td"

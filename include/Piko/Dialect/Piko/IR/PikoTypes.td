@@ -45,6 +45,16 @@ def Piko_BinsType : Piko_Type<"Bins", "bins"> {
   let assemblyFormat = "`<` $record `>`";
 }
 
+def Piko_EdgeType : Piko_Type<"Edge", "edge"> {
+  let summary = "primitives on their way to a stage";
+  let description = [{
+    What a source holds, or what kernels have emitted to a port and no kernel has
+    taken yet. A value of a `piko.program`, for example `!piko.edge<@Fragment>`.
+  }];
+  let parameters = (ins "::mlir::FlatSymbolRefAttr":$record);
+  let assemblyFormat = "`<` $record `>`";
+}
+
 def Piko_WriterType : Piko_Type<"Writer", "writer"> {
   let summary = "where a unit of work leaves what it emits";
   let description = [{

@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// A loop is a cycle of stages that do not collect. It is a component of the
+// graph, or a part of one that also has stages that collect. Without its loops,
+// and cut where stages collect, the graph has no cycle.
+
+#include "Piko/Analysis/ProgramPlan.h"
+
+#include "Piko/Dialect/Piko/IR/PikoProgram.h"
+
+using namespace mlir;
+using namespace piko;
+
+ProgramPlan::ProgramPlan(PipelineOp pipeline)
+    : graph(pipeline, getDeclaredStages(pipeline)), components(graph),
+      loops(graph.cutAtCollectors()), reach(graph.reach()) {
+  order = components.declarationOrder();
+  findEdges(pipeline);
+  findGathers(pipeline);
+  findKeyed();
+  findWidths();
+}
+
+void ProgramPlan::findEdges(PipelineOp pipeline) {
+  for (auto [number, source] : llvm::enumerate(pipeline.getOps<SourceOp>()))
+    edges.push_back(
+        {source, -1, int(number), graph.getNumber(source.getStageAttr())});
+  for (auto edge : pipeline.getOps<EdgeOp>())
+    edges.push_back({edge, graph.getNumber(edge.getProducerAttr()),
+                     int(edge.getPort()),
+                     graph.getNumber(edge.getConsumerAttr()), isLocal(edge)});
+}
+
+static bool isUnordered(StageOp stage) {
+  ScheduleOp schedule = stage.getSchedule();
+  return schedule && schedule.getUnordered();
+}
+
+/// A stage that runs bin by bin emits in the order of bins, which is that of
+/// lineage only if it collects, and then only without tiles.
+void ProgramPlan::findGathers(PipelineOp pipeline) {
+  llvm::DenseSet<Attribute> placed;
+  pipeline.walk([&](AssignOp assign) { placed.insert(assign.getStageAttr()); });
+  for (PlannedEdge &edge : edges) {
+    if (edge.producer < 0 || edge.local)
+      continue;
+    StageOp from = graph.getStage(edge.producer);
+    bool isPlaced =
+        from.getPlaced() ||
+        placed.contains(FlatSymbolRefAttr::get(from.getSymNameAttr()));
+    edge.permute = isPlaced && (!from.collects() || from.getTile()) &&
+                   !isUnordered(from) &&
+                   !isUnordered(graph.getStage(edge.consumer));
+  }
+}
+
+SmallVector<const PlannedEdge *> ProgramPlan::getInputs(int stage) const {
+  SmallVector<const PlannedEdge *> inputs;
+  for (const PlannedEdge &edge : edges)
+    if (edge.consumer == stage)
+      inputs.push_back(&edge);
+  return inputs;
+}
+
+//===----------------------------------------------------------------------===//
+// Lineage keys
+//===----------------------------------------------------------------------===//
+
+bool ProgramPlan::isInsideLoop(const PlannedEdge &edge) const {
+  return edge.producer >= 0 && isLoop(getLoop(edge.producer)) &&
+         getLoop(edge.producer) == getLoop(edge.consumer);
+}
+
+int ProgramPlan::countInputs(int stage) const {
+  return llvm::count_if(edges, [&](const PlannedEdge &edge) {
+    return getLoop(edge.consumer) == getLoop(stage) && !isInsideLoop(edge);
+  });
+}
+
+bool ProgramPlan::merges(int stage) const { return countInputs(stage) > 1; }
+
+int64_t &ProgramPlan::widthAt(int stage) {
+  int loop = getLoop(stage);
+  return isLoop(loop) ? loopKeys[loop] : keeps[stage];
+}
+
+/// Keys are needed where several edges or sources come into a stage, or into a
+/// loop, and on the way there: what goes into a stage, or into a loop, needs
+/// keys if what comes out does, unless that starts a new lineage.
+void ProgramPlan::findKeyed() {
+  keeps.assign(graph.stages.size(), 0);
+  loopKeys.assign(loops.nodes.size(), 0);
+  for (auto [loop, stages] : llvm::enumerate(loops.nodes))
+    if (isLoop(loop) && merges(stages.front()))
+      loopKeys[loop] = 1;
+  for (bool changed = true; changed;) {
+    changed = false;
+    for (PlannedEdge &edge : edges) {
+      if (edge.keys > 0 || isInsideLoop(edge) ||
+          (widthAt(edge.consumer) == 0 && !merges(edge.consumer)))
+        continue;
+      edge.keys = 1;
+      changed = true;
+      if (edge.producer >= 0 && !graph.getStage(edge.producer).collects())
+        widthAt(edge.producer) = 1;
+    }
+  }
+}
+
+/// A word for a source's primitives, two for what a stage that collects emits,
+/// one more for each hop; a loop counts as one hop.
+void ProgramPlan::findWidths() {
+  for (bool changed = true; changed;) {
+    changed = false;
+    for (PlannedEdge &edge : edges) {
+      if (edge.keys == 0)
+        continue;
+      int64_t width = edge.producer < 0 ? 1
+                      : graph.getStage(edge.producer).collects()
+                          ? 2
+                          : widthAt(edge.producer) + 1;
+      int64_t &kept = widthAt(edge.consumer);
+      changed |= width > edge.keys || (kept > 0 && width > kept);
+      edge.keys = std::max(edge.keys, width);
+      if (kept > 0)
+        kept = std::max(kept, width);
+    }
+  }
+}
