@@ -42,6 +42,9 @@ static void expect(bool condition, const std::string &text) {
     throw Failure{PIKORT_BAD_PROGRAM, text};
 }
 
+/// A cycle aside, a stage adds a word.
+constexpr int32_t mostKeyWords = 1 << 20;
+
 static const char *orEmpty(const char *text) { return text ? text : ""; }
 
 static State &findBuffer(pikort_pipeline *p, int32_t id) {
@@ -187,7 +190,53 @@ void pikoir_declare_edge(pikort_pipeline *p, int32_t producer, int32_t port,
 }
 
 void pikoir_declare_local(pikort_pipeline *p, int32_t producer, int32_t port) {
-  guarded(p, "setup", [&] { p->locals.push_back({producer, port}); });
+  guarded(p, "setup", [&] { p->joins.push_back({producer, port, true}); });
+}
+
+void pikoir_declare_join(pikort_pipeline *p, int32_t producer, int32_t port,
+                         int32_t gather, int32_t keys) {
+  guarded(p, "setup", [&] {
+    expect(keys >= 0 && keys <= mostKeyWords,
+           "port " + std::to_string(port) +
+               ": expected keys of at least 0 words, but got " +
+               std::to_string(keys));
+    p->joins.push_back({producer, port, false, gather, keys});
+  });
+}
+
+void pikoir_declare_keys(pikort_pipeline *p, int32_t stage, int32_t keys) {
+  guarded(p, "setup", [&] {
+    expect(keys >= 0 && keys <= mostKeyWords,
+           "stage " + std::to_string(stage) +
+               ": expected keys of at least 0 words, but got " +
+               std::to_string(keys));
+    entry(p->stages, stage, "stage").keyWidth = keys;
+  });
+}
+
+void pikoir_declare_root(pikort_pipeline *p, int32_t stage, int32_t root) {
+  guarded(p, "setup", [&] { entry(p->stages, stage, "stage").root = root; });
+}
+
+void pikoir_declare_cycle(pikort_pipeline *p, int32_t id, const int32_t *stages,
+                          int32_t count) {
+  guarded(p, "setup", [&] {
+    CycleShape &cycle = declare(p->cycles, id, "cycle");
+    expect(count > 0, "cycle " + std::to_string(id) + ": expected stages");
+    cycle.stages.assign(stages, stages + count);
+  });
+}
+
+void pikoir_declare_loop(pikort_pipeline *p, int32_t id, const int32_t *stages,
+                         int32_t count, int32_t keys) {
+  guarded(p, "setup", [&] {
+    LoopShape &loop = declare(p->loops, id, "loop");
+    expect(count > 0 && keys >= 0 && keys <= mostKeyWords,
+           "loop " + std::to_string(id) +
+               ": expected stages, and keys of at least 0 words");
+    loop.stages.assign(stages, stages + count);
+    loop.keyWidth = keys;
+  });
 }
 
 void pikoir_declare_schedule(pikort_pipeline *p, int32_t stage, int64_t batch,

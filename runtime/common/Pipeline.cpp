@@ -48,6 +48,8 @@ void pikort_pipeline::checkDeclared() {
   all(stages, "stage");
   all(sources, "source");
   all(stripGroups, "group of stages");
+  all(cycles, "cycle");
+  all(loops, "loop");
   auto checkRecord = [&](int32_t id, const std::string &user) {
     if (id < 0 || id >= static_cast<int32_t>(records.size()))
       bad(quoted(user) + ": expected a declared record, but got " +
@@ -104,7 +106,53 @@ void pikort_pipeline::connect() {
           "for, but got " + std::to_string(wait.waitsFor));
 }
 
-/// Completes the groups of strips, once components are known.
+/// Completes edges by what is said of their ports.
+void pikort_pipeline::findJoins() {
+  for (const PortJoin &join : joins) {
+    const Stage *from = findStage(join.producer);
+    bool exists = from && join.port >= 0 &&
+                  join.port < static_cast<int32_t>(from->outputs.size()) &&
+                  from->outputs[join.port] >= 0;
+    if (!exists)
+      bad("pipeline " + quoted(name) + ": expected the port of " +
+          (join.local ? "a local edge" : "an edge"));
+    Edge &edge = edges[from->outputs[join.port]];
+    edge.local |= join.local;
+    if (!join.local) {
+      edge.gather = join.gather;
+      edge.keyWidth = join.keyWidth;
+    }
+  }
+}
+
+/// Completes cycles, and loops, which are in them.
+void pikort_pipeline::findCycles() {
+  auto note = [&](const auto &list, int32_t Stage::*member, auto &&accepts) {
+    for (size_t i = 0; i < list.size(); ++i)
+      for (int32_t s : list[i].stages) {
+        if (!findStage(s) || stages[s].*member >= 0 || !accepts(stages[s]))
+          bad("pipeline " + quoted(name) +
+              ": expected a declared stage of one cycle or loop, but got " +
+              std::to_string(s));
+        stages[s].*member = static_cast<int32_t>(i);
+      }
+  };
+  note(cycles, &Stage::cycle, [](const Stage &) { return true; });
+  note(loops, &Stage::loop, [](const Stage &stage) {
+    return stage.cycle >= 0 && !stage.collects();
+  });
+  for (LoopShape &loop : loops)
+    for (int32_t s : loop.stages) {
+      loop.cycle = stages[s].cycle;
+      loop.ordered |= stages[s].ordered();
+    }
+  for (Edge &edge : edges) {
+    int32_t loop = stages[edge.producer].loop;
+    edge.insideLoop = loop >= 0 && loop == stages[edge.consumer].loop;
+  }
+}
+
+/// Completes the groups of strips, once cycles are known.
 void pikort_pipeline::findStrips() {
   for (size_t g = 0; g < stripGroups.size(); ++g) {
     StripGroup &group = stripGroups[g];
@@ -139,44 +187,41 @@ void pikort_pipeline::findStrips() {
     for (int32_t source : stage.sources)
       if (source != group.source)
         bad("stage " + quoted(stage.name) + ": expected strips of one source");
-    for (int32_t other : components[stage.component].stages)
-      if (stages[other].stripGroup != stage.stripGroup)
+    for (size_t other = 0; stage.cycle >= 0 && other < stages.size(); ++other)
+      if (stages[other].cycle == stage.cycle &&
+          stages[other].stripGroup != stage.stripGroup)
         bad("stage " + quoted(stage.name) +
             ": expected its cycle to run in strips as a whole");
     stage.sharesTile = group.chunk > 0 && !stage.sources.empty();
   }
 }
 
-/// Completes local edges, and the stages behind them, producers first.
+/// Completes the stages behind local edges.
 void pikort_pipeline::findLocals() {
-  for (const LocalPort &local : locals) {
-    const Stage *from = findStage(local.producer);
-    bool exists = from && local.port >= 0 &&
-                  local.port < static_cast<int32_t>(from->outputs.size()) &&
-                  from->outputs[local.port] >= 0;
-    if (!exists)
-      bad("pipeline " + quoted(name) + ": expected the port of a local edge");
-    Edge &edge = edges[from->outputs[local.port]];
-    const Stage &to = stages[edge.consumer];
-    auto isAlone = [&](const Stage &stage) {
-      return !components[stage.component].cyclic && stage.stripGroup < 0 &&
-             stage.cellSize == 0 && !(stage.flags & PIKOIR_SPLIT);
+  for (const Edge &edge : edges) {
+    if (!edge.local)
+      continue;
+    const Stage &from = stages[edge.producer], &to = stages[edge.consumer];
+    auto isAlone = [](const Stage &stage) {
+      return stage.cycle < 0 && stage.stripGroup < 0 && stage.cellSize == 0 &&
+             !(stage.flags & PIKOIR_SPLIT);
     };
     if (!to.collects() || to.inputs.size() != 1 || !to.sources.empty() ||
-        from->binSize != to.binSize || !isAlone(*from) || !isAlone(to))
+        from.binSize != to.binSize || !isAlone(from) || !isAlone(to))
       bad("stage " + quoted(to.name) +
           ": expected a local edge between stages with the same bins, which "
           "are not split, the second of which collects what this edge brings");
-    edge.local = true;
   }
-  for (int32_t s : order) {
-    Stage &stage = stages[s];
-    if (stage.inputs.empty() || !edges[stage.inputs.front()].local)
+  for (Stage &stage : stages) {
+    const Stage *at = &stage;
+    while (!at->inputs.empty() && edges[at->inputs.front()].local) {
+      stage.host = edges[at->inputs.front()].producer;
+      at = &stages[stage.host];
+      if (++stage.depth > static_cast<int32_t>(stages.size()))
+        bad("stage " + quoted(stage.name) + ": expected local edges to end");
+    }
+    if (stage.host < 0)
       continue;
-    int32_t producer = edges[stage.inputs.front()].producer;
-    const Stage &from = stages[producer];
-    stage.host = from.host < 0 ? producer : from.host;
-    stage.depth = from.depth + 1;
     stages[stage.host].hosts = true;
     stages[stage.host].visitsAll |= stage.schedule.everyBin;
   }
@@ -185,11 +230,10 @@ void pikort_pipeline::findLocals() {
 void pikort_pipeline::finish() {
   checkDeclared();
   connect();
-  findLoops();
-  sortStages();
+  findJoins();
+  findCycles();
   findStrips();
   findLocals();
-  findKeys();
   stageStats.resize(stages.size());
 }
 

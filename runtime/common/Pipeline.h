@@ -68,29 +68,31 @@ struct State {
 
 struct Edge {
   int32_t producer = 0, port = 0, consumer = 0;
+  int32_t gather = PIKOIR_PERMUTE;
+  int32_t keyWidth = 0;      ///< 64-bit words of its primitives' keys.
   bool insideLoop = false;   ///< Both ends are in one loop.
-  bool keyed = false;        ///< Its primitives carry lineage keys.
-  int32_t keyWidth = 0;      ///< 64-bit words of a key.
   bool leavesStrips = false; ///< Only the producer is in a group of strips.
   bool local = false;        ///< The consumer runs in the producer's kernel.
   /// If the producer is on a cycle, or the edge leaves strips: what it has
   /// emitted so far.
   std::shared_ptr<Queue> queue;
+  bool keyed() const { return keyWidth > 0; }
 };
 
-/// Stages on a common cycle of edges, or one stage: a root of lineage.
-struct Component {
-  std::vector<int32_t> stages; ///< In order of declaration.
-  bool cyclic = false;
-  std::shared_ptr<Cycle> cycle; ///< If it is one.
+/// Stages on a common cycle of edges.
+struct CycleShape {
+  bool declared = false;
+  std::vector<int32_t> stages;  ///< Those that collect in the order of turns.
+  std::shared_ptr<Cycle> cycle; ///< Of a run.
 };
 
 /// A cycle of stages that do not collect.
 struct LoopShape {
-  std::vector<int32_t> stages; ///< In order of declaration.
-  bool ordered = false;        ///< The order across its hops can be seen.
-  bool keyed = false;          ///< What comes in carries lineage keys.
-  int32_t keyWidth = 0;
+  bool declared = false;
+  std::vector<int32_t> stages;
+  int32_t keyWidth = 0; ///< Of what comes in; 0 = it has no keys.
+  int32_t cycle = -1;   ///< That it is, or is a part of.
+  bool ordered = false; ///< The order across its hops can be seen.
 };
 
 /// Stages that take the primitives of a source strip by strip.
@@ -115,9 +117,11 @@ struct Wait {
   int32_t stage, waitsFor;
 };
 
-/// A port whose edge is local.
-struct LocalPort {
+/// What is said of a port whose edge may be declared later.
+struct PortJoin {
   int32_t producer, port;
+  bool local;
+  int32_t gather = PIKOIR_PERMUTE, keyWidth = 0;
 };
 
 struct Source {
@@ -136,11 +140,13 @@ struct Stage {
   int64_t cellSize = 0;
   BinSchedule schedule; ///< Of all bins.
   std::array<int64_t, 4> binSize{};
+  int32_t root = 0;     ///< Of the lineage that it starts.
+  int32_t keyWidth = 0; ///< 64-bit words of its items' keys, 0 = none.
   // Completed by finish():
   std::vector<int32_t> sources; ///< That feed it, ascending.
   std::vector<int32_t> inputs;  ///< Edges that end here, as declared.
   std::vector<int32_t> outputs; ///< The edge of each port, or -1.
-  int32_t component = 0;
+  int32_t cycle = -1;
   int32_t loop = -1;
   int32_t stripGroup = -1;
   bool sharesTile = false; ///< A strip is a tile: threads share it.
@@ -148,8 +154,6 @@ struct Stage {
   int32_t depth = 0;       ///< How many local edges lie before it.
   bool hosts = false;      ///< Other stages run in its kernel, ...
   bool visitsAll = false;  ///< ... some of them for empty bins, too.
-  int32_t root = 0;        ///< Of the lineage that it starts.
-  int32_t keyWidth = 0;    ///< 64-bit words of its items' keys, 0 = none.
   // Completed by each run:
   std::array<int64_t, 4> grid{}, cellGrid{};
   int64_t tiles = 1, cells = 1;
@@ -224,11 +228,10 @@ struct pikort_pipeline {
   std::vector<piko::rt::Source> sources;
   std::vector<piko::rt::Edge> edges;
   std::vector<piko::rt::Wait> waits;
-  std::vector<piko::rt::LocalPort> locals;
+  std::vector<piko::rt::PortJoin> joins;
   std::vector<piko::rt::StripGroup> stripGroups;
-  std::vector<piko::rt::Component> components; ///< Producers first.
+  std::vector<piko::rt::CycleShape> cycles;
   std::vector<piko::rt::LoopShape> loops;
-  std::vector<int32_t> order; ///< Stages, as in components.
   int32_t (*runProgram)(pikort_pipeline *) = nullptr;
   std::shared_ptr<piko::rt::Checker> checker; ///< In checking mode.
 
@@ -271,7 +274,7 @@ struct pikort_pipeline {
 
   /// The cycle that a stage is on, or null.
   piko::rt::Cycle *cycleOf(const piko::rt::Stage &stage) const {
-    return components[stage.component].cycle.get();
+    return stage.cycle < 0 ? nullptr : cycles[stage.cycle].cycle.get();
   }
   /// The strips that a stage takes, or null.
   piko::rt::Strips *stripsOf(const piko::rt::Stage &stage) const {
@@ -296,13 +299,10 @@ private:
   void settleReported() noexcept;
   void checkDeclared();
   void connect();
+  void findJoins();
+  void findCycles();
   void findStrips();
   void findLocals();
-  // StageOrder.cpp:
-  void findLoops();
-  void sortStages();
-  void findKeys();
-  void findKeyWidths(const std::vector<bool> &itemsKeyed);
 };
 
 namespace piko::rt {

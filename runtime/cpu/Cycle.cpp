@@ -7,52 +7,20 @@
 
 using namespace piko::rt;
 
-// --- The parts of a cycle ---------------------------------------------------
-
-Cycle::Cycle(pikort_pipeline &p, const Component &component)
-    : p_(p), component_(component) {
-  for (int32_t s : component.stages) {
-    const Stage &stage = p.stages[s];
-    if (stage.collects()) {
-      collectors_.push_back(s);
-    } else if (stage.loop < 0) {
-      parts_.push_back({{s}, nullptr});
-    } else if (const LoopShape &loop = p.loops[stage.loop];
-               loop.stages.front() == s) {
-      parts_.push_back({loop.stages, Loop::make(p, loop)});
-    }
-  }
-  sortParts();
-}
-
-/// Parts form no cycle: a part waits for those that emit into it.
-void Cycle::sortParts() {
-  std::vector<Part> sorted;
-  auto waits = [&](const Part &part) {
-    return std::any_of(p_.edges.begin(), p_.edges.end(), [&](const Edge &edge) {
-      auto holds = [&](const Part &other, int32_t stage) {
-        return std::find(other.stages.begin(), other.stages.end(), stage) !=
-               other.stages.end();
-      };
-      return holds(part, edge.consumer) && !holds(part, edge.producer) &&
-             std::any_of(parts_.begin(), parts_.end(), [&](const Part &other) {
-               return holds(other, edge.producer);
-             });
-    });
-  };
-  while (!parts_.empty()) {
-    auto next = std::find_if(parts_.begin(), parts_.end(),
-                             [&](const Part &part) { return !waits(part); });
-    sorted.push_back(std::move(*next));
-    parts_.erase(next);
-  }
-  parts_ = std::move(sorted);
+Cycle::Cycle(pikort_pipeline &p, int32_t number)
+    : p_(p), number_(number), stages_(p.cycles[number].stages) {
+  for (size_t l = 0; l < p.loops.size(); ++l)
+    if (p.loops[l].cycle == number)
+      loops_.push_back(
+          {static_cast<int32_t>(l), Loop::make(p, p.loops[l]), false});
+  std::copy_if(stages_.begin(), stages_.end(), std::back_inserter(collectors_),
+               [&](int32_t s) { return p.stages[s].collects(); });
 }
 
 bool Cycle::comesFromOutside(const Stage &stage) const {
   return !stage.sources.empty() ||
          std::any_of(stage.inputs.begin(), stage.inputs.end(), [&](int32_t e) {
-           return p_.stages[p_.edges[e].producer].component != stage.component;
+           return p_.stages[p_.edges[e].producer].cycle != number_;
          });
 }
 
@@ -60,70 +28,80 @@ bool Cycle::hasInput(const Stage &stage, bool fromOutside) const {
   return (fromOutside && comesFromOutside(stage)) ||
          std::any_of(stage.inputs.begin(), stage.inputs.end(), [&](int32_t e) {
            const Edge &edge = p_.edges[e];
-           return p_.stages[edge.producer].component == stage.component &&
+           return p_.stages[edge.producer].cycle == number_ &&
                   edge.queue->count > 0;
          });
 }
 
 // --- What runs next ---------------------------------------------------------
 
-int32_t Cycle::step() {
+/// One kernel runs at a time.
+void Cycle::expectNone() const {
   if (chosen_ >= 0)
     throw Failure{PIKORT_BAD_PROGRAM,
                   "stage " + quoted(p_.stages[chosen_].name) +
                       ": expected its kernel to run before the next step of "
                       "its cycle"};
-  if (loop_ && (chosen_ = loop_->next()) < 0) { // most often it goes on
-    parts_[part_++].started = false;
-    loop_ = nullptr;
-  }
-  if (chosen_ < 0 && !finished_)
-    chosen_ = choose();
+}
+
+int32_t Cycle::choose(int32_t stage) {
   begun_ = false;
-  if (!finished_ && chosen_ < 0)
+  return chosen_ = stage;
+}
+
+int32_t Cycle::stepLoop(int32_t number) {
+  expectNone();
+  Part *part = loops_.data();
+  while (part->number != number)
+    ++part;
+  if (!part->started) {
+    const std::vector<int32_t> &stages = p_.loops[number].stages;
+    if (!finished_ && std::any_of(stages.begin(), stages.end(), [&](int32_t s) {
+          return hasInput(p_.stages[s], fromOutside_);
+        })) {
+      part->loop->start(fromOutside_);
+      part->started = true;
+    }
+  }
+  loop_ = part->loop.get();
+  int32_t next = part->started ? loop_->next() : -1;
+  if (next >= 0)
+    return choose(next);
+  part->started = false;
+  loop_ = nullptr;
+  if (collectors_.empty())
     finish();
-  return chosen_;
+  return -1;
+}
+
+bool Cycle::takes(int32_t stage) {
+  expectNone();
+  if (finished_ || !hasInput(p_.stages[stage], fromOutside_))
+    return false;
+  choose(stage);
+  return true;
+}
+
+int32_t Cycle::nextTurn() {
+  expectNone();
+  while (!finished_) {
+    if (int32_t stage = nextCollector(); stage >= 0)
+      return choose(stage);
+    if (std::none_of(collectors_.begin(), collectors_.end(),
+                     [&](int32_t s) { return hasInput(p_.stages[s], false); }))
+      finish();
+    else
+      beginRound();
+  }
+  return -1;
 }
 
 /// What serial launches kept for the next one is no longer needed.
 void Cycle::finish() {
   finished_ = true;
-  for (int32_t s : component_.stages)
+  for (int32_t s : stages_)
     if (Kernel &kernel = *p_.stages[s].kernel; kernel.serial)
       kernel.clear();
-}
-
-int32_t Cycle::choose() {
-  for (;;) {
-    for (; part_ < parts_.size(); ++part_)
-      if (int32_t stage = runPart(parts_[part_]); stage >= 0)
-        return stage;
-    if (int32_t stage = nextCollector(); stage >= 0)
-      return stage;
-    if (std::none_of(collectors_.begin(), collectors_.end(),
-                     [&](int32_t s) { return hasInput(p_.stages[s], false); }))
-      return -1;
-    beginRound();
-  }
-}
-
-/// The stage of the part that runs next, or -1 if the part has come to rest.
-int32_t Cycle::runPart(Part &part) {
-  if (!part.started) {
-    if (std::none_of(part.stages.begin(), part.stages.end(), [&](int32_t s) {
-          return hasInput(p_.stages[s], fromOutside_);
-        }))
-      return -1;
-    part.started = true;
-    if (!part.loop)
-      return part.stages.front();
-    part.loop->start(fromOutside_);
-  }
-  int32_t stage = part.loop ? part.loop->next() : -1;
-  part.started = stage >= 0;
-  if (part.started)
-    loop_ = part.loop.get();
-  return stage;
 }
 
 int32_t Cycle::nextCollector() {
@@ -133,7 +111,6 @@ int32_t Cycle::nextCollector() {
     bool everyBin = stage.schedule.everyBin || stage.binSchedules;
     if (!hasInput(stage, round_ == 0) && !(everyBin && round_ == 0))
       continue;
-    part_ = 0;
     fromOutside_ = false;
     return s;
   }
@@ -142,8 +119,8 @@ int32_t Cycle::nextCollector() {
 
 void Cycle::beginRound() {
   if (round_ == p_.loopLimit)
-    for (int32_t s : component_.stages)
-      if (p_.stages[s].collects() && hasInput(p_.stages[s], false))
+    for (int32_t s : collectors_)
+      if (hasInput(p_.stages[s], false))
         throw Failure{PIKORT_ENDLESS, "stage " + quoted(p_.stages[s].name) +
                                           ": a loop did not end within " +
                                           std::to_string(p_.loopLimit) +
@@ -158,7 +135,7 @@ void Cycle::expectChosen(const Kernel &kernel) const {
   if (kernel.stage != chosen_ || begun_)
     throw Failure{PIKORT_BAD_PROGRAM,
                   "stage " + quoted(p_.stages[kernel.stage].name) +
-                      ": expected pikoir_cycle_step to name it first"};
+                      ": expected a step of its cycle to name it first"};
 }
 
 bool Cycle::takesFromOutside(const Stage &stage) const {
@@ -172,8 +149,7 @@ Edge *Cycle::onlyInput(const Stage &stage) const {
     return nullptr;
   for (int32_t e : stage.inputs) {
     Edge &edge = p_.edges[e];
-    if (p_.stages[edge.producer].component != stage.component ||
-        edge.queue->count == 0)
+    if (p_.stages[edge.producer].cycle != number_ || edge.queue->count == 0)
       continue;
     if (only)
       return nullptr;
@@ -199,7 +175,7 @@ bool Cycle::runsSerially(Kernel &kernel) const {
     return stage.tiles == 1 && round_ > 0;
   return isSorted(queue.view()) &&
          std::none_of(stage.outputs.begin(), stage.outputs.end(),
-                      [&](int32_t e) { return e >= 0 && p_.edges[e].keyed; });
+                      [&](int32_t e) { return e >= 0 && p_.edges[e].keyed(); });
 }
 
 /// A collecting stage begins a new lineage.
@@ -258,7 +234,7 @@ void Cycle::absorb(const Kernel &kernel, const Serial &launch) {
     if (emitted.count == 0)
       continue;
     Stream stream{emitted, {}, {}, {}, {}};
-    if (p_.edges[e].keyed) { // a new lineage
+    if (p_.edges[e].keyed()) { // a new lineage
       stream.keys.width = 2;
       stream.keys.words = Array<uint64_t>(p_.memory, 2 * stream.count);
       for (int64_t i = 0; i < stream.count; ++i) {
@@ -275,58 +251,86 @@ void piko::rt::enqueue(pikort_pipeline &p, Edge &edge, const Stream &stream) {
   checkCount(to, edge.queue->count + stream.count);
   checkCount(to, edge.queue->pairs.size() + stream.pairCount);
   edge.queue->append(p.memory, stream, p.records[to.record].size,
-                     edge.keyed ? edge.keyWidth : 0);
+                     edge.keyWidth);
 }
 
 void piko::rt::startCycles(pikort_pipeline &p) {
   p.activeThreads = p.threads;
-  for (Component &component : p.components)
-    if (component.cyclic)
-      component.cycle = std::make_shared<Cycle>(p, component);
+  for (size_t c = 0; c < p.cycles.size(); ++c)
+    p.cycles[c].cycle = std::make_shared<Cycle>(p, static_cast<int32_t>(c));
   for (Edge &edge : p.edges)
     if (p.cycleOf(p.stages[edge.producer]))
       edge.queue = std::make_shared<Queue>();
 }
 
 void piko::rt::restartCycles(pikort_pipeline &p, const StripGroup &group) {
-  for (int32_t s : group.stages)
-    if (Component &component = p.components[p.stages[s].component];
-        component.cyclic && component.stages.front() == s) {
-      component.cycle = std::make_shared<Cycle>(p, component);
-      for (Edge &edge : p.edges)
-        if (p.stages[edge.producer].component == p.stages[s].component &&
-            !edge.leavesStrips)
-          *edge.queue = {};
-    }
+  for (size_t c = 0; c < p.cycles.size(); ++c) {
+    auto number = static_cast<int32_t>(c);
+    int32_t first = p.cycles[c].stages.front();
+    if (std::find(group.stages.begin(), group.stages.end(), first) ==
+        group.stages.end())
+      continue;
+    p.cycles[c].cycle = std::make_shared<Cycle>(p, number);
+    for (Edge &edge : p.edges)
+      if (p.stages[edge.producer].cycle == number && !edge.leavesStrips)
+        *edge.queue = {};
+  }
 }
 
 void piko::rt::endCycles(pikort_pipeline &p) {
-  for (Component &component : p.components)
-    component.cycle.reset();
+  for (CycleShape &shape : p.cycles)
+    shape.cycle.reset();
   for (Edge &edge : p.edges)
     edge.queue.reset();
 }
 
-extern "C" {
-
-int32_t pikoir_cycle_step(pikort_pipeline *p, int32_t stage) {
+/// Asks the cycle number `number` what is next; -1 at its end, and on an error.
+static int32_t ask(pikort_pipeline *p, int32_t number, auto &&question) {
   if (p->status != PIKORT_OK)
     return -1;
   int32_t next = -1;
+  Cycle *cycle = p->cycles[number].cycle.get();
   guarded(p, "cycle", [&] {
-    const Stage *found = p->findStage(stage);
-    Cycle *cycle = found ? p->cycleOf(*found) : nullptr;
-    if (!cycle)
-      throw Failure{PIKORT_BAD_PROGRAM,
-                    "expected a stage of a cycle, but got stage " +
-                        std::to_string(stage)};
     if (p->profile.part() != Part::Cycle)
       p->profile.enter(Part::Cycle);
-    next = cycle->step();
+    next = question(*cycle);
   });
-  if (next < 0)
+  if (cycle->isFinished() || p->status != PIKORT_OK)
     p->profile.enter(Part::Program);
   return next;
+}
+
+static int32_t failNumber(pikort_pipeline *p, const char *what,
+                          int32_t number) {
+  guarded(p, "cycle", [&] {
+    throw Failure{PIKORT_BAD_PROGRAM, std::string("expected ") + what +
+                                          ", but got " +
+                                          std::to_string(number)};
+  });
+  return -1;
+}
+
+extern "C" {
+
+int32_t pikoir_loop_step(pikort_pipeline *p, int32_t loop) {
+  if (static_cast<size_t>(loop) >= p->loops.size())
+    return failNumber(p, "the number of a loop", loop);
+  return ask(p, p->loops[loop].cycle,
+             [&](Cycle &cycle) { return cycle.stepLoop(loop); });
+}
+
+int32_t pikoir_cycle_takes(pikort_pipeline *p, int32_t stage) {
+  const Stage *found = p->findStage(stage);
+  if (!found || found->cycle < 0 || found->loop >= 0 || found->collects())
+    return failNumber(p, "a stage between the loops of a cycle", stage) > 0;
+  return ask(p, found->cycle,
+             [&](Cycle &cycle) { return cycle.takes(stage) ? 1 : -1; }) > 0;
+}
+
+int32_t pikoir_cycle_turn(pikort_pipeline *p, int32_t cycle) {
+  if (static_cast<size_t>(cycle) >= p->cycles.size())
+    return failNumber(p, "the number of a cycle", cycle);
+  return ask(p, cycle, [](Cycle &cycle) { return cycle.nextTurn(); });
 }
 
 int64_t pikoir_loop_limit(pikort_pipeline *p) { return p->loopLimit; }

@@ -1,18 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //===- Cycle.h - Runs a cycle of stages until nothing is left -------------===//
 //
-// A cycle is a component of the graph, and says which kernel runs next. Its
-// stages that do not collect form parts: loops, and stages between them.
+// A program runs a cycle in rounds of two steps:
 //
-//   1. spread   Parts run, producers first, until all primitives have come to
-//               stages that collect, or have left the cycle.
-//   2. collect  The next stage that collects, in order of declaration, takes
-//               what it has; then 1. When all have had their turn and something
-//               is left, another round begins.
+//   1. spread   Loops, and the stages between them that do not collect, run
+//               until all primitives have come to stages that collect, or have
+//               left the cycle.
+//   2. collect  The next stage that collects, in order, takes what it has; then
+//               1. When all have had their turn and something is left, another
+//               round begins.
 //
-// What its kernels emit goes to the queues of edges, where it is in lineage
-// order: each launch of a stage that collects begins a new lineage. A cycle of
-// stages that do not collect is one loop, and ends with the first spread.
+// The runtime says where something waits. What the cycle's kernels emit goes to
+// the queues of edges, where it is in lineage order: each launch of a stage
+// that collects begins a new lineage. A cycle of stages that do not collect is
+// one loop.
 //
 //===----------------------------------------------------------------------===//
 
@@ -25,12 +26,17 @@ namespace piko::rt {
 
 class Cycle {
 public:
-  Cycle(pikort_pipeline &p, const Component &component);
+  Cycle(pikort_pipeline &p, int32_t number);
 
-  /// The stage to run next, or -1; throws.
-  int32_t step();
+  /// The stage of a loop to run next, or -1 if it has come to rest.
+  int32_t stepLoop(int32_t loop);
+  /// Whether something waits for a stage outside of loops, which is to run
+  /// then.
+  bool takes(int32_t stage);
+  /// The stage that collects whose turn it is, or -1 at the end.
+  int32_t nextTurn();
   bool isFinished() const { return finished_; }
-  /// Whether the launch of the stage that step() named is serial.
+  /// Whether the launch of the stage that was named last is serial.
   bool runsSerially(Kernel &kernel) const;
   /// The input of that stage, once; that of a serial launch stays here.
   Stream takeInput(Kernel &kernel);
@@ -39,17 +45,15 @@ public:
   void absorb(Kernel &kernel, bool serial);
 
 private:
-  /// A loop, or a stage.
   struct Part {
-    std::vector<int32_t> stages;
+    int32_t number; ///< Of the loop.
     std::unique_ptr<Loop> loop;
     bool started = false; ///< In this spread.
   };
 
-  void sortParts();
-  int32_t choose();
+  int32_t choose(int32_t stage);
+  void expectNone() const;
   void finish();
-  int32_t runPart(Part &part);
   int32_t nextCollector();
   void beginRound();
   void expectChosen(const Kernel &kernel) const;
@@ -61,16 +65,17 @@ private:
   bool comesFromOutside(const Stage &stage) const;
 
   pikort_pipeline &p_;
-  const Component &component_;
-  std::vector<Part> parts_;         ///< Producers first.
-  std::vector<int32_t> collectors_; ///< In order of declaration.
-  size_t part_ = 0, collector_ = 0;
+  const int32_t number_;
+  const std::vector<int32_t> &stages_;
+  std::vector<Part> loops_;
+  std::vector<int32_t> collectors_; ///< In order of turns.
+  size_t collector_ = 0;
   int64_t round_ = 0;
   int64_t launches_ = 0;    ///< Of collectors.
   bool fromOutside_ = true; ///< This spread takes what comes into the cycle.
   bool finished_ = false;
   int32_t chosen_ = -1;  ///< The stage whose kernel is to run.
-  Loop *loop_ = nullptr; ///< Its loop, if it is of one: parts_[part_]'s.
+  Loop *loop_ = nullptr; ///< Its loop, if it is of one.
   Queue input_;          ///< What a serial launch outside of loops takes.
   bool begun_ = false;   ///< It has its input.
 };

@@ -130,10 +130,8 @@ Array<uint32_t> piko::rt::pairStarts(Memory &memory, const Items &items) {
 
 bool piko::rt::byPosition(const pikort_pipeline &p, const Edge &edge) {
   const Stage &from = p.stages[edge.producer];
-  if (edge.keyed || from.loop >= 0)
-    return true;
-  return from.kernel->rank && !from.unordered() &&
-         !p.stages[edge.consumer].unordered();
+  return edge.keyed() || from.loop >= 0 ||
+         (edge.gather == PIKOIR_PERMUTE && from.kernel->rank);
 }
 
 // --- By position ------------------------------------------------------------
@@ -146,7 +144,7 @@ public:
   PositionGather(pikort_pipeline &p, const Edge &edge, Stream &stream)
       : p_(p), from_(p.stages[edge.producer]), kernel_(*from_.kernel),
         port_(static_cast<size_t>(edge.port)), edge_(edge), stream_(stream),
-        keyed_(edge.keyed && from_.loop < 0),
+        keyed_(edge.keyed() && from_.loop < 0),
         size_(p.records[p.stages[edge.consumer].record].size),
         records_(collect(kernel_, port_, &PortLogs::records)),
         cells_(collect(kernel_, port_, &PortLogs::cells)),
@@ -569,13 +567,13 @@ Stream piko::rt::gatherInputs(pikort_pipeline &p, const Stage &stage,
     Cycle *cycle = p.cycleOf(from);
     if (edge.insideLoop)
       continue; // the loop itself keeps these
-    if (cycle && from.component != stage.component && !cycle->isFinished())
+    if (cycle && from.cycle != stage.cycle && !cycle->isFinished())
       failOrder(stage, from);
     Strips *strips = edge.leavesStrips ? p.stripsOf(from) : nullptr;
     if (strips && !strips->isFinished())
       failOrder(stage, from);
     if (cycle || (strips && strips->isDivided()))
-      add(edge.queue->take(edge.keyed ? edge.keyWidth : 0));
+      add(edge.queue->take(edge.keyWidth));
     else if (fromOutside)
       add(gatherEdge(p, edge));
   }

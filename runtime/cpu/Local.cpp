@@ -34,9 +34,9 @@ static void beginLocal(pikort_pipeline &p, const Kernel &host, int32_t stage) {
 void piko::rt::beginLocals(pikort_pipeline &p, Kernel &host) {
   if (host.source >= 0 || !p.stages[host.stage].hosts)
     return;
-  for (int32_t s : p.order)
+  for (size_t s = 0; s < p.stages.size(); ++s)
     if (p.stages[s].host == host.stage)
-      beginLocal(p, host, s);
+      beginLocal(p, host, static_cast<int32_t>(s));
 }
 
 /// Frees what local edges from a kernel hold, and counts what they brought.
@@ -57,7 +57,7 @@ void piko::rt::endLocals(pikort_pipeline &p, Kernel &host, int32_t status) {
   if (host.source >= 0 || !p.stages[host.stage].hosts)
     return;
   releaseLocals(p, host);
-  for (int32_t s : p.order) {
+  for (size_t s = 0; s < p.stages.size(); ++s) {
     if (p.stages[s].host != host.stage)
       continue;
     Kernel &kernel = *p.stages[s].kernel;

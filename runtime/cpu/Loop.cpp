@@ -32,8 +32,7 @@ void Loop::start(bool fromOutside) {
     places_ = mergePlaces(p_, entries_);
   else
     places_.resize(members());
-  if (shape_.keyed) {
-    int32_t width = shape_.keyWidth;
+  if (int32_t width = shape_.keyWidth) {
     keys_ = Array<uint64_t>(p_.memory, entryCount_ * width);
     for (size_t m = 0; m < members(); ++m) {
       const Keys &keys = entries_[m].keys;

@@ -44,12 +44,12 @@ void piko::rt::makeKernels(pikort_pipeline &p) {
     p.kernelStats.push_back(std::move(stats));
     return kernel;
   };
-  for (int32_t s : p.order) {
+  for (size_t s = 0; s < p.stages.size(); ++s) {
     Stage &stage = p.stages[s];
     for (int32_t source : stage.sources)
       if (stage.placed())
-        p.sources[source].kernel = make(s, source);
-    stage.kernel = make(s, -1);
+        p.sources[source].kernel = make(static_cast<int32_t>(s), source);
+    stage.kernel = make(static_cast<int32_t>(s), -1);
   }
 }
 
@@ -123,9 +123,7 @@ prepareThreads(pikort_pipeline &p, const Stage &stage, Kernel &kernel) {
   bool rankNeeded = stage.loop >= 0;
   for (int32_t e : stage.outputs)
     if (e >= 0 && !p.edges[e].local)
-      rankNeeded |=
-          p.edges[e].keyed ||
-          !(stage.unordered() || p.stages[p.edges[e].consumer].unordered());
+      rankNeeded |= p.edges[e].keyed() || p.edges[e].gather == PIKOIR_PERMUTE;
   binItems(p, stage, kernel, rankNeeded);
   cutUnits(p, stage, kernel);
   prepareOutputs(p, stage, kernel);

@@ -57,7 +57,7 @@ Items StackLoop::pop() {
 void StackLoop::leave() {
   const Edge &edge = p_.edges[stack_[stack_.size() - 1].edge];
   Stream stream{pop(), {}, {}, {}, {}};
-  if (edge.keyed) {
+  if (edge.keyed()) {
     stream.keys.width = edge.keyWidth;
     stream.keys.words = std::move(key_);
     if (stream.keys.words.capacity() < edge.keyWidth)
@@ -68,7 +68,7 @@ void StackLoop::leave() {
   checkCount(to, edge.queue->count + 1);
   checkCount(to, edge.queue->pairs.size() + stream.pairCount);
   edge.queue->append(p_.memory, stream, recordSize(to), stream.keys.width);
-  if (edge.keyed)
+  if (edge.keyed())
     key_ = std::move(stream.keys.words);
 }
 

@@ -251,7 +251,7 @@ void WaveLoop::sortLeft(Edge &edge, Queue &left) {
   int64_t size = recordSize(to);
   sorted.itemStorage = Array<uint8_t>(p_.memory, from.count * size);
   sorted.items = sorted.itemStorage.data();
-  if (edge.keyed) {
+  if (edge.keyed()) {
     sorted.keys.width = edge.keyWidth;
     sorted.keys.words = Array<uint64_t>(p_.memory, from.count * edge.keyWidth);
   }
@@ -261,7 +261,7 @@ void WaveLoop::sortLeft(Edge &edge, Queue &left) {
           std::memcpy(sorted.itemStorage.data() + i * size,
                       from.items + order[i] * size, static_cast<size_t>(size));
           uint32_t place = places[order[i]];
-          if (edge.keyed)
+          if (edge.keyed())
             writeKey(edge, &sorted.keys.words[i * edge.keyWidth],
                      tree_.entry(place), place);
         }

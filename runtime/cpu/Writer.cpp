@@ -361,7 +361,7 @@ static void preparePort(pikort_pipeline &p, const Kernel &kernel, Lane &lane,
   } else {
     int32_t e = p.stages[kernel.stage].outputs[port];
     logs.consumer = e < 0 ? kernel.stage : p.edges[e].consumer;
-    if (e >= 0 && (p.edges[e].keyed || p.stages[kernel.stage].loop >= 0))
+    if (e >= 0 && (p.edges[e].keyed() || p.stages[kernel.stage].loop >= 0))
       out.flags |= PIKOIR_PORT_ORDINALS;
     if (kernel.counts[port])
       out.flags |= PIKOIR_PORT_COUNTS;

@@ -175,14 +175,6 @@ TEST(Cycle, FewPrimitivesInManyBins) {
 
 // --- Errors -----------------------------------------------------------------
 
-TEST(Cycle, StagesThatWaitForEachOther) {
-  Graph graph =
-      makeGraph({whole({1}, PIKOIR_COLLECTS), whole({}, PIKOIR_COLLECTS)}, {0});
-  graph.stages[0].waits = {1};
-  EXPECT_EQ(GraphRun::creationError(graph),
-            "stage 's0': waits for stage 's1', which cannot finish before it");
-}
-
 /// Runs a loop without end under a limit; returns the message.
 static std::string runEndless(std::vector<TestStage> stages, int64_t limit) {
   for (TestStage &stage : stages)
@@ -245,7 +237,7 @@ TEST(Cycle, LongLoopsStaySmall) {
 }
 
 /// What the program does wrong.
-enum class Wrong { NoCycle, NoStep, TwoSteps, TooEarly };
+enum class Wrong { NoLoop, NoCycle, NoPart, NoStep, TwoSteps, TooEarly };
 static Wrong wrong;
 
 static void setup(pikort_pipeline *p) {
@@ -259,6 +251,9 @@ static void setup(pikort_pipeline *p) {
   pikoir_declare_edge(p, 0, 0, 1);
   pikoir_declare_edge(p, 1, 0, 1);
   pikoir_declare_edge(p, 1, 1, 2);
+  int32_t cycle = 1;
+  pikoir_declare_cycle(p, 0, &cycle, 1);
+  pikoir_declare_loop(p, 0, &cycle, 1, 0);
 }
 
 static int32_t run(pikort_pipeline *p) {
@@ -275,18 +270,24 @@ static int32_t run(pikort_pipeline *p) {
   if (int32_t status = launch(0))
     return status;
   switch (wrong) {
+  case Wrong::NoLoop:
+    EXPECT_EQ(pikoir_loop_step(p, 1), -1);
+    break;
   case Wrong::NoCycle:
-    pikoir_cycle_step(p, 0);
+    EXPECT_EQ(pikoir_cycle_turn(p, -1), -1);
+    break;
+  case Wrong::NoPart:
+    EXPECT_EQ(pikoir_cycle_takes(p, 1), 0);
     break;
   case Wrong::NoStep:
     return launch(1);
   case Wrong::TwoSteps:
-    EXPECT_EQ(pikoir_cycle_step(p, 1), 1);
-    EXPECT_EQ(pikoir_cycle_step(p, 1), -1);
-    EXPECT_EQ(pikoir_cycle_step(p, 99), -1); // the first error is kept
+    EXPECT_EQ(pikoir_loop_step(p, 0), 1);
+    EXPECT_EQ(pikoir_loop_step(p, 0), -1);
+    EXPECT_EQ(pikoir_loop_step(p, 99), -1); // the first error is kept
     break;
   case Wrong::TooEarly:
-    EXPECT_EQ(pikoir_cycle_step(p, 1), 1);
+    EXPECT_EQ(pikoir_loop_step(p, 0), 1);
     if (int32_t status = launch(1))
       return status;
     return launch(2);
@@ -306,9 +307,12 @@ TEST(Cycle, WrongPrograms) {
     EXPECT_EQ(pikort_run(p), PIKORT_BAD_PROGRAM);
     EXPECT_STREQ(pikort_message(p), text);
   };
-  expect(Wrong::NoCycle, "expected a stage of a cycle, but got stage 0");
+  expect(Wrong::NoLoop, "expected the number of a loop, but got 1");
+  expect(Wrong::NoCycle, "expected the number of a cycle, but got -1");
+  expect(Wrong::NoPart,
+         "expected a stage between the loops of a cycle, but got 1");
   expect(Wrong::NoStep,
-         "stage 's1': expected pikoir_cycle_step to name it first");
+         "stage 's1': expected a step of its cycle to name it first");
   expect(Wrong::TwoSteps, "stage 's1': expected its kernel to run before the "
                           "next step of its cycle");
   expect(Wrong::TooEarly, "stage 's2': expected stage 's1' to run before it");

@@ -52,6 +52,22 @@ struct TestComponent {
   bool cyclic = false;
 };
 
+/// What a compiler would plan for a graph, and declare.
+struct TestPlan {
+  /// Stages that run together: a loop, or one that is on none.
+  struct Part {
+    std::vector<int> stages;
+    bool isLoop = false;
+    int keys = 0; ///< Of what comes into a loop.
+  };
+  std::vector<Part> parts; ///< Loops first.
+  std::vector<int> partOf; ///< Of each stage.
+  std::vector<int> roots, keeps;
+  std::vector<std::vector<int>> keys; ///< Of each port.
+
+  int loopCount() const;
+};
+
 /// What reached a stage.
 struct Arrivals {
   std::vector<uint64_t> items;              ///< In lineage order.
@@ -95,6 +111,7 @@ struct Graph {
   std::vector<int> loopOf(int stage) const;
   /// Components in the order in which they run.
   std::vector<TestComponent> order() const;
+  TestPlan plan() const;
   /// Where stripStages() of a source begin, and end, in order().
   std::pair<size_t, size_t> stripRange(int source) const;
   /// The stages that can take a source in strips.
@@ -123,8 +140,6 @@ public:
   GraphRun &operator=(const GraphRun &) = delete;
   pikort_pipeline *get() const { return pipeline_; }
   int32_t run(int threads);
-  /// Why a graph makes no pipeline.
-  static std::string creationError(Graph &graph);
 
 private:
   pikort_pipeline *pipeline_ = nullptr;

@@ -407,7 +407,7 @@ TEST(Create, RejectsBadPrograms) {
     pikort_destroy(p);
   };
   expect({7, "Old", setup, run}, PIKORT_VERSION,
-         "pipeline 'Old': expected a program for runtime version 4, but got 7");
+         "pipeline 'Old': expected a program for runtime version 5, but got 7");
   expect({PIKORT_ABI_VERSION, "Empty", nullptr, run}, PIKORT_BAD_PROGRAM,
          "pipeline 'Empty': expected a program with setup and run");
   auto twice = [](pikort_pipeline *p) {
@@ -461,6 +461,37 @@ TEST(Create, RejectsBadPrograms) {
   };
   expect({PIKORT_ABI_VERSION, "TwoGroups", twoGroups, run}, PIKORT_BAD_PROGRAM,
          "strips: expected a declared stage of one group, but got 0");
+  auto noPort = [](pikort_pipeline *p) {
+    setup(p);
+    pikoir_declare_join(p, 0, 3, PIKOIR_CONCATENATE, 0);
+  };
+  expect({PIKORT_ABI_VERSION, "NoPort", noPort, run}, PIKORT_BAD_PROGRAM,
+         "pipeline 'Small': expected the port of an edge");
+  auto keys = [](pikort_pipeline *p) {
+    setup(p);
+    pikoir_declare_keys(p, 0, -1);
+  };
+  expect({PIKORT_ABI_VERSION, "Keys", keys, run}, PIKORT_BAD_PROGRAM,
+         "stage 0: expected keys of at least 0 words, but got -1");
+  auto twoCycles = [](pikort_pipeline *p) {
+    setup(p);
+    int32_t stages[] = {0};
+    pikoir_declare_cycle(p, 0, stages, 1);
+    pikoir_declare_cycle(p, 1, stages, 1);
+  };
+  expect(
+      {PIKORT_ABI_VERSION, "TwoCycles", twoCycles, run}, PIKORT_BAD_PROGRAM,
+      "pipeline 'Small': expected a declared stage of one cycle or loop, but "
+      "got 0");
+  auto noCycle = [](pikort_pipeline *p) {
+    setup(p);
+    int32_t stages[] = {0};
+    pikoir_declare_loop(p, 0, stages, 1, 0);
+  };
+  expect(
+      {PIKORT_ABI_VERSION, "NoCycle", noCycle, run}, PIKORT_BAD_PROGRAM,
+      "pipeline 'Small': expected a declared stage of one cycle or loop, but "
+      "got 0");
   pikort_destroy(nullptr);
 }
 

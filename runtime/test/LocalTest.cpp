@@ -58,6 +58,12 @@ void declare(pikort_pipeline *p) {
   pikoir_declare_edge(p, list, 0, again);
   pikoir_declare_edge(p, list, 1, drain);
   pikoir_declare_edge(p, again, 0, drain);
+  pikoir_declare_keys(p, work, 1);
+  pikoir_declare_join(p, work, 1, PIKOIR_PERMUTE, 2);
+  pikoir_declare_join(p, list, 1, PIKOIR_CONCATENATE, 2);
+  pikoir_declare_join(p, again, 0, PIKOIR_CONCATENATE, 2);
+  pikoir_declare_root(p, list, 1);
+  pikoir_declare_root(p, again, 2);
 }
 
 void setup(pikort_pipeline *p) {

@@ -47,7 +47,10 @@ private:
   void declareCheckedRecord(CheckRecordOp record);
   void declareState(Operation *state, int32_t number);
   void declareStage(StageOp stage, int32_t number);
-  void declareStrips(StripsOp strips, int32_t number);
+  void declareEdge(EdgeOp edge);
+  void declareJoin(JoinOp join);
+  void declareRoots(ProgramOp program);
+  void declareRegion(Operation *region);
   Value recordBytes(FlatSymbolRefAttr record, ArrayAttr numbers);
 
   const PipelineNumbers &numbers;
@@ -218,6 +221,19 @@ void SetupWriter::declareStage(StageOp stage, int32_t number) {
            {i32(number), i32(numbers.stages.lookup(name.getAttr()))});
 }
 
+void SetupWriter::declareEdge(EdgeOp edge) {
+  Value producer = i32(numbers.stages.lookup(edge.getProducerAttr().getAttr()));
+  call("pikoir_declare_edge",
+       {producer, i32(edge.getPort()),
+        i32(numbers.stages.lookup(edge.getConsumerAttr().getAttr()))});
+  if (edge.getLocal())
+    call("pikoir_declare_local", {producer, i32(edge.getPort())});
+}
+
+//===----------------------------------------------------------------------===//
+// What a program says of stages and edges
+//===----------------------------------------------------------------------===//
+
 /// The stages whose kernels are launched in a region, in order.
 static llvm::SmallSetVector<int32_t, 8>
 findStages(Operation *region, const PipelineNumbers &numbers) {
@@ -229,15 +245,80 @@ findStages(Operation *region, const PipelineNumbers &numbers) {
   return stages;
 }
 
-void SetupWriter::declareStrips(StripsOp strips, int32_t number) {
-  auto stages = findStages(strips, numbers);
+/// The number of a region among those that the runtime counts with it: strips,
+/// waves, or cycles. Cycles are waves and rounds that are not part of others.
+static int32_t getNumber(Operation *region, bool asCycle = false) {
+  auto isCounted = [&](Operation *op) {
+    if (asCycle)
+      return isa<WavesOp, RoundsOp>(op) && !op->getParentOfType<RoundsOp>();
+    return op->getName() == region->getName();
+  };
+  int32_t number = 0;
+  region->getParentOfType<ProgramOp>().walk<WalkOrder::PreOrder>(
+      [&](Operation *op) {
+        if (op == region)
+          return WalkResult::interrupt();
+        number += isCounted(op);
+        return WalkResult::advance();
+      });
+  return number;
+}
+
+/// What a stage emits has keys only if it is merged, and keeps them only then.
+void SetupWriter::declareJoin(JoinOp join) {
+  for (auto [edge, permute, keys] :
+       llvm::zip(join.getEdges(), join.getPermutes(), join.getKeys()))
+    if (auto from = dyn_cast<EdgeOp>(getOrigin(edge)))
+      call("pikoir_declare_join",
+           {i32(numbers.stages.lookup(from.getProducerAttr().getAttr())),
+            i32(from.getPort()), i32(permute), i32(keys)});
+  if (auto keeps = join.getKeeps())
+    call("pikoir_declare_keys",
+         {i32(numbers.stages.lookup(join.getStageAttr().getAttr())),
+          i32(*keeps)});
+}
+
+/// Lineages of the run count behind those of the sources; what one cycle emits
+/// is told apart by its launches.
+void SetupWriter::declareRoots(ProgramOp program) {
+  if (!program.getRootsAttr())
+    return;
+  llvm::DenseMap<int32_t, Operation *> rounds;
+  program.walk([&](RoundsOp op) {
+    for (int32_t stage : findStages(op, numbers))
+      rounds[stage] = op;
+  });
+  llvm::DenseMap<Operation *, int64_t> shared;
+  auto sources = pipeline.getOps<SourceOp>();
+  int64_t next = std::distance(sources.begin(), sources.end());
+  for (auto name : program.getRootsAttr().getAsRange<FlatSymbolRefAttr>()) {
+    int32_t stage = numbers.stages.lookup(name.getAttr());
+    int64_t root = next++;
+    if (Operation *cycle = rounds.lookup(stage))
+      root = shared.try_emplace(cycle, root).first->second;
+    call("pikoir_declare_root", {i32(stage), i32(root)});
+  }
+}
+
+void SetupWriter::declareRegion(Operation *region) {
+  auto stages = findStages(region, numbers);
   std::string list;
-  for (int64_t stage : stages)
+  for (int32_t stage : stages)
     appendBytes(list, stage, 4);
-  auto feed = strips.getSource().getDefiningOp<FeedOp>();
-  call("pikoir_declare_strips",
-       {i32(number), i32(feed.getSource()), i64(strips.getChunk().value_or(0)),
-        bytes(list), i32(stages.size())});
+  Value count = i32(stages.size());
+  if (auto strips = dyn_cast<StripsOp>(region)) {
+    auto feed = strips.getSource().getDefiningOp<FeedOp>();
+    call("pikoir_declare_strips",
+         {i32(getNumber(region)), i32(feed.getSource()),
+          i64(strips.getChunk().value_or(0)), bytes(list), count});
+    return;
+  }
+  if (!region->getParentOfType<RoundsOp>())
+    call("pikoir_declare_cycle",
+         {i32(getNumber(region, /*asCycle=*/true)), bytes(list), count});
+  if (auto waves = dyn_cast<WavesOp>(region))
+    call("pikoir_declare_loop", {i32(getNumber(region)), bytes(list), count,
+                                 i32(waves.getKeys().value_or(0))});
 }
 
 void SetupWriter::run(ProgramOp program) {
@@ -256,25 +337,23 @@ void SetupWriter::run(ProgramOp program) {
     call(PIKO_RUNTIME_FUNCTION(pikoir_declare_source),
          {i32(index),
           i32(numbers.stages.lookup(source.getStageAttr().getAttr()))});
-  for (auto edge : pipeline.getOps<EdgeOp>()) {
-    int32_t producer = numbers.stages.lookup(edge.getProducerAttr().getAttr());
-    call(PIKO_RUNTIME_FUNCTION(pikoir_declare_edge),
-         {i32(producer), i32(edge.getPort()),
-          i32(numbers.stages.lookup(edge.getConsumerAttr().getAttr()))});
-    if (edge.getLocal())
-      call(PIKO_RUNTIME_FUNCTION(pikoir_declare_local),
-           {i32(producer), i32(edge.getPort())});
-  }
+  for (auto edge : pipeline.getOps<EdgeOp>())
+    declareEdge(edge);
   for (auto [name, number] : numbers.states)
     declareState(SymbolTable::lookupSymbolIn(pipeline, name), number);
-  for (auto [number, strips] : llvm::enumerate(program.getOps<StripsOp>()))
-    declareStrips(strips, number);
+  declareRoots(program);
+  program.walk<WalkOrder::PreOrder>([&](Operation *op) {
+    if (auto join = dyn_cast<JoinOp>(op))
+      declareJoin(join);
+    else if (isa<StripsOp, WavesOp, RoundsOp>(op))
+      declareRegion(op);
+  });
 }
 
 namespace {
 
 /// Writes NAME.run. The next kernel runs only if the one before it gave 0;
-/// those of a cycle run as the runtime says, those of strips for each strip.
+/// where a region repeats kernels, the runtime says what there is to do.
 class RunWriter {
 public:
   RunWriter(const PipelineNumbers &numbers, LoweringContext &context,
@@ -298,9 +377,15 @@ private:
   /// Goes on, in `next`, only if a status is 0.
   void check(Value status, Block *next);
   void launch(LaunchOp launch, Block *next);
-  void createCycle(Operation *cycle);
+  /// Calls the kernel of the stage that a step names, and then goes to `next`;
+  /// where it names none, control goes on.
+  void createChoice(Value step, ArrayRef<LaunchOp> launches, Block *next);
+  void createWaves(WavesOp waves);
+  void createRounds(RoundsOp rounds);
+  void createSpread(Operation &statement);
   void createStatements(Block &statements);
   void createStrips(StripsOp strips);
+  void checkStatus() { check(call("pikoir_status"), createBlock(exit)); }
 
   const PipelineNumbers &numbers;
   PipelineOp pipeline;
@@ -309,7 +394,6 @@ private:
   Location loc;
   Value frame;
   Block *exit = nullptr; ///< Where a status goes that is not 0.
-  int64_t stripsCount = 0;
 };
 
 } // namespace
@@ -331,32 +415,67 @@ void RunWriter::launch(LaunchOp launch, Block *next) {
   check(call.getResult(0), next);
 }
 
-void RunWriter::createCycle(Operation *cycle) {
-  Block *step = createBlock(exit);
+void RunWriter::createChoice(Value step, ArrayRef<LaunchOp> launches,
+                             Block *next) {
   Block *choose = createBlock(exit);
   Block *after = createBlock(exit);
-  cf::BranchOp::create(builder, loc, step);
-
-  auto stages = llvm::to_vector(findStages(cycle, numbers));
-  builder.setInsertionPointToEnd(step);
-  Value next =
-      call("pikoir_cycle_step", {createI32(builder, loc, stages.front())});
   Value ended = arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::slt,
-                                      next, createI32(builder, loc, 0));
+                                      step, createI32(builder, loc, 0));
   cf::CondBranchOp::create(builder, loc, ended, after, choose);
-
+  SmallVector<int32_t> stages;
   SmallVector<Block *> calls;
-  cycle->walk([&](LaunchOp member) {
+  for (LaunchOp member : launches) {
+    stages.push_back(findStages(member, numbers).front());
     calls.push_back(createBlock(after));
     builder.setInsertionPointToEnd(calls.back());
-    launch(member, step);
-  });
+    launch(member, next);
+  }
   builder.setInsertionPointToEnd(choose);
-  cf::SwitchOp::create(builder, loc, next, after, ValueRange(), stages, calls,
+  cf::SwitchOp::create(builder, loc, step, after, ValueRange(), stages, calls,
                        SmallVector<ValueRange>(calls.size()));
-
   builder.setInsertionPointToEnd(after);
-  check(call("pikoir_status"), createBlock(exit));
+}
+
+/// The runtime names a stage for which there is something in this wave.
+void RunWriter::createWaves(WavesOp waves) {
+  Block *step = createBlock(exit);
+  cf::BranchOp::create(builder, loc, step);
+  builder.setInsertionPointToEnd(step);
+  Value number = createI32(builder, loc, getNumber(waves));
+  createChoice(call("pikoir_loop_step", {number}),
+               llvm::to_vector(waves.getOps<LaunchOp>()), step);
+}
+
+/// A kernel that does not collect runs if something has come for it.
+void RunWriter::createSpread(Operation &statement) {
+  if (auto waves = dyn_cast<WavesOp>(statement))
+    return createWaves(waves);
+  auto member = dyn_cast<LaunchOp>(statement);
+  if (!member || member.getTurn())
+    return;
+  int32_t stage = findStages(member, numbers).front();
+  Value takes = call("pikoir_cycle_takes", {createI32(builder, loc, stage)});
+  Value none = arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::eq,
+                                     takes, createI32(builder, loc, 0));
+  Block *run = createBlock(exit);
+  Block *after = createBlock(exit);
+  cf::CondBranchOp::create(builder, loc, none, after, run);
+  builder.setInsertionPointToEnd(run);
+  launch(member, after);
+}
+
+void RunWriter::createRounds(RoundsOp rounds) {
+  Block *spread = createBlock(exit);
+  cf::BranchOp::create(builder, loc, spread);
+  builder.setInsertionPointToEnd(spread);
+  SmallVector<LaunchOp> turns;
+  for (Operation &statement : rounds.getBody().front()) {
+    createSpread(statement);
+    if (auto member = dyn_cast<LaunchOp>(statement); member && member.getTurn())
+      turns.push_back(member);
+  }
+  Value number = createI32(builder, loc, getNumber(rounds, /*asCycle=*/true));
+  createChoice(call("pikoir_cycle_turn", {number}), turns, spread);
 }
 
 void RunWriter::createStatements(Block &statements) {
@@ -365,8 +484,12 @@ void RunWriter::createStatements(Block &statements) {
       launch(kernel, createBlock(exit));
     else if (auto strips = dyn_cast<StripsOp>(op))
       createStrips(strips);
-    else if (isa<WavesOp, RoundsOp>(op))
-      createCycle(&op);
+    else if (auto waves = dyn_cast<WavesOp>(op))
+      createWaves(waves);
+    else if (auto rounds = dyn_cast<RoundsOp>(op))
+      createRounds(rounds);
+    if (isa<WavesOp, RoundsOp>(op))
+      checkStatus();
   }
 }
 
@@ -380,7 +503,7 @@ void RunWriter::createStrips(StripsOp strips) {
 
   builder.setInsertionPointToEnd(next);
   Value more =
-      call("pikoir_strips_next", {createI32(builder, loc, stripsCount++)});
+      call("pikoir_strips_next", {createI32(builder, loc, getNumber(strips))});
   Value ended = arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::eq,
                                       more, createI32(builder, loc, 0));
   cf::CondBranchOp::create(builder, loc, ended, after, strip);
@@ -394,7 +517,7 @@ void RunWriter::createStrips(StripsOp strips) {
   exit = outer;
 
   builder.setInsertionPointToEnd(after);
-  check(call("pikoir_status"), createBlock(exit));
+  checkStatus();
 }
 
 void RunWriter::run(ProgramOp program) {

@@ -14,12 +14,24 @@
 //   pikoir_close(w);
 //
 // Where Process takes a list (PIKOIR_LIST), the unit's calls take the place of
-// its positions. The stages of a cycle run in the order that the runtime says:
+// its positions. A loop is a cycle of stages none of which collects: the
+// runtime says which of them has something to do.
 //
-//   while ((s = pikoir_cycle_step(p, first)) >= 0)
+//   while ((s = pikoir_loop_step(p, loop)) >= 0)
 //     if (int32_t status = kernel[s](p)) return status;
 //
-// and those of a group that takes a source in strips once for each strip:
+// Another cycle repeats its loops, and the stages between them, producers
+// first,
+//
+//   if (pikoir_cycle_takes(p, stage))
+//     if (int32_t status = kernel[stage](p)) return status;
+//
+// and then the kernel of a stage that collects, until there is none:
+//
+//   if ((s = pikoir_cycle_turn(p, cycle)) >= 0)
+//     if (int32_t status = kernel[s](p)) return status;
+//
+// Kernels of a group that takes a source in strips run once for each strip:
 //
 //   while (pikoir_strips_next(p, group))
 //     kernel[a](p) || kernel[b](p);
@@ -116,8 +128,34 @@ PIKORT_API void pikoir_declare_local(pikort_pipeline *p, int32_t producer,
 /// and no.
 PIKORT_API void pikoir_declare_schedule(pikort_pipeline *p, int32_t stage,
                                         int64_t batch, int32_t every_bin);
-/// `stage` waits until `waits_for` is finished (endStage). Lineage roots follow
-/// the order of stages, for which waits count like edges.
+/// How what a port emits is gathered: PIKOIR_CONCATENATE where its order is
+/// free, or its units are in the order of emission; and how many 64-bit words
+/// the key has that tells a primitive's lineage, 0 = none. Where several edges
+/// or sources lead into a stage, or into a loop, all that come there have keys,
+/// and so has what comes to the stages on the way. A source gives one word, a
+/// stage that collects two, and a hop adds one. Without this declaration:
+/// PIKOIR_PERMUTE, 0.
+enum pikoir_gather { PIKOIR_CONCATENATE = 0, PIKOIR_PERMUTE = 1 };
+PIKORT_API void pikoir_declare_join(pikort_pipeline *p, int32_t producer,
+                                    int32_t port, int32_t gather, int32_t keys);
+/// How many words of its items' keys a stage keeps, because what it emits needs
+/// them as well. Without this declaration: 0.
+PIKORT_API void pikoir_declare_keys(pikort_pipeline *p, int32_t stage,
+                                    int32_t keys);
+/// The number, behind those of sources, of the lineage that a stage begins
+/// which collects. Stages of one cycle share it. Without this declaration: 0.
+PIKORT_API void pikoir_declare_root(pikort_pipeline *p, int32_t stage,
+                                    int32_t root);
+/// Stages on a common cycle of edges; those that collect have their turns in
+/// this order.
+PIKORT_API void pikoir_declare_cycle(pikort_pipeline *p, int32_t id,
+                                     const int32_t *stages, int32_t count);
+/// A cycle of stages none of which collects: a declared one, or a part of it.
+/// What comes in has keys of so many words.
+PIKORT_API void pikoir_declare_loop(pikort_pipeline *p, int32_t id,
+                                    const int32_t *stages, int32_t count,
+                                    int32_t keys);
+/// `stage` waits until `waits_for` is finished (endStage): for checking mode.
 PIKORT_API void pikoir_declare_wait(pikort_pipeline *p, int32_t stage,
                                     int32_t waits_for);
 
@@ -293,11 +331,16 @@ PIKORT_API void pikoir_schedule_bin(pikort_pipeline *p, int32_t stage,
                                     int64_t tile_split, int64_t batch,
                                     int32_t every_bin);
 
-/// The stage of a cycle whose kernel is to run next, or -1 when the cycle has
-/// come to its end, or on an error (pikoir_status). `stage` is any stage of the
-/// cycle. Call it until it returns -1; the AssignBin kernels of sources that
-/// feed the cycle run before.
-PIKORT_API int32_t pikoir_cycle_step(pikort_pipeline *p, int32_t stage);
+/// The stage of a loop whose kernel is to run next, or -1 when the loop has
+/// come to rest, or on an error (pikoir_status). The AssignBin kernels of
+/// sources that feed a cycle run before.
+PIKORT_API int32_t pikoir_loop_step(pikort_pipeline *p, int32_t loop);
+/// Whether the kernel of a stage of a cycle, which does not collect and is in
+/// no loop, is to run.
+PIKORT_API int32_t pikoir_cycle_takes(pikort_pipeline *p, int32_t stage);
+/// The stage that collects whose kernel is to run, or -1 when the cycle has
+/// come to its end, or on an error.
+PIKORT_API int32_t pikoir_cycle_turn(pikort_pipeline *p, int32_t cycle);
 
 /// Begins the next strip of a group of stages, the first one to begin with: 1,
 /// and the group's kernels are to run, in stage order, but no more of them once

@@ -42,28 +42,40 @@ piko.record @F {"x" : i32 at 0, "v" : f32 at 4} size 8 align 4
 // CHECK:         llvm.call @pikoir_fail(%{{.*}}, %c0_i32, %{{.*}}, %c-1_i64, %c18_i32, %{{.*}}, %{{.*}})
 // CHECK:         llvm.call @pikoir_fail_barrier(%{{.*}}, %c0_i32, %{{.*}}, %{{.*}}, %{{.*}})
 
-// LIST, UNORDERED and COLLECTS; then COLLECTS alone.
+// LIST, UNORDERED and COLLECTS; then COLLECTS alone. The stage that collects
+// begins a lineage, behind those of two sources, and what is merged has keys.
 // CHECK-LABEL: func.func @P.setup
 // CHECK:         llvm.call @pikoir_declare_stage({{.*}}, %c25_i32, %{{.*}})
 // CHECK:         llvm.call @pikoir_declare_schedule(%{{.*}}, %c0_i32, %c4_i64, %c1_i32)
 // CHECK:         llvm.call @pikoir_declare_wait(%{{.*}}, %c2_i32, %c0_i32)
 
-// Schedules first; the kernels of a cycle in the order that the runtime says.
+// CHECK:         llvm.call @pikoir_declare_root(%{{.*}}, %c0_i32, %c2_i32)
+// CHECK:         llvm.call @pikoir_declare_cycle(%{{.*}}, %c0_i32, %{{.*}}, %c2_i32)
+// CHECK:         llvm.call @pikoir_declare_join(%{{.*}}, %c0_i32, %c0_i32, %c0_i32, %c2_i32)
+// CHECK:         llvm.call @pikoir_declare_keys(%{{.*}}, %c1_i32, %c2_i32)
+// CHECK:         llvm.call @pikoir_declare_join(%{{.*}}, %c1_i32, %c0_i32, %c0_i32, %c3_i32)
+
+// Schedules first. In each round what does not collect runs where something has
+// come for it, and then the stage whose turn it is.
 // CHECK-LABEL: func.func @P.run(%{{.*}}: !llvm.ptr)
 // CHECK:         call @P.schedule_a
-// CHECK:         ^[[STEP:bb[0-9]+]]:
-// CHECK:         %[[S:.*]] = llvm.call @pikoir_cycle_step(%{{.*}}, %c1_i32)
+// CHECK:         ^[[SPREAD:bb[0-9]+]]:
+// CHECK:         %[[TAKES:.*]] = llvm.call @pikoir_cycle_takes(%{{.*}}, %c1_i32)
+// CHECK:         %[[NONE:.*]] = arith.cmpi eq, %[[TAKES]], %c0_i32
+// CHECK:         cf.cond_br %[[NONE]], ^[[TURN:bb[0-9]+]], ^[[B:bb[0-9]+]]
+// CHECK:       ^[[B]]:
+// CHECK:         call @P.kernel_b
+// CHECK:         cf.cond_br %{{.*}}, ^{{.*}}, ^[[TURN]]
+// CHECK:       ^[[TURN]]:
+// CHECK:         %[[S:.*]] = llvm.call @pikoir_cycle_turn(%{{.*}}, %c0_i32)
 // CHECK:         cf.cond_br %{{.*}}, ^[[AFTER:bb[0-9]+]], ^[[CHOOSE:bb[0-9]+]]
 // CHECK:       ^[[CHOOSE]]:
 // CHECK:         cf.switch %[[S]] : i32, [
 // CHECK-NEXT:      default: ^[[AFTER]],
-// CHECK-NEXT:      1: ^[[B:bb[0-9]+]],
 // CHECK-NEXT:      0: ^[[A:bb[0-9]+]]
-// CHECK:       ^[[B]]:
-// CHECK:         call @P.kernel_b
-// CHECK:         cf.cond_br %{{.*}}, ^{{.*}}, ^[[STEP]]
 // CHECK:       ^[[A]]:
 // CHECK:         call @P.kernel_a
+// CHECK:         cf.cond_br %{{.*}}, ^{{.*}}, ^[[SPREAD]]
 // CHECK:       ^[[AFTER]]:
 // CHECK:         llvm.call @pikoir_status
 // CHECK:         call @P.kernel_c
