@@ -387,9 +387,7 @@ void ProgramWriter::clearState() {
   SmallVector<Attribute> states;
   for (Operation &op : *pipeline.getBodyBlock()) {
     auto buffer = dyn_cast<BufferOp>(op);
-    if (isa<ImageOp>(op) ||
-        (buffer && buffer.getPerSource() &&
-         !SymbolTable::symbolKnownUseEmpty(buffer, &pipeline.getBody())))
+    if (isa<ImageOp>(op) || (buffer && buffer.getPerSource()))
       states.push_back(FlatSymbolRefAttr::get(SymbolTable::getSymbolName(&op)));
   }
   if (!states.empty())

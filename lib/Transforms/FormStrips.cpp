@@ -342,8 +342,11 @@ void FormStripsPass::runOnOperation() {
   Accesses accesses = findAccesses(pipeline);
   Group group(pipeline, accesses);
   ProgramOp program = getProgram(pipeline);
-  if (!program)
-    return;
+  if (!program) {
+    pipeline.emitError("expected a piko.program, which piko-form-program "
+                       "makes");
+    return signalPassFailure();
+  }
   for (const Node &node : findNodes(program)) {
     std::optional<Reason> notNext = group.whyNotNext(node);
     if (!notNext) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
-//===- State.cpp - Images and buffers at the start of a run ---------------===//
+//===- State.cpp - Images and buffers of a run ----------------------------===//
 
 #include "cpu/Kernel.h"
 #include "cpu/Parallel.h"
@@ -47,8 +47,6 @@ static void allocate(pikort_pipeline &p, State &state) {
     state.owned = Array<uint8_t>(p.memory, bytes, Use::State);
   }
   state.view.data = state.owned.data();
-  fill(p.threads, state.view.data, bytes,
-       state.kind == PIKORT_IMAGE ? state.clear : std::vector<uint8_t>());
 }
 
 static void prepare(pikort_pipeline &p, State &state) {
@@ -74,6 +72,23 @@ void piko::rt::prepareState(pikort_pipeline &p) {
 }
 
 extern "C" {
+
+void pikoir_clear(pikort_pipeline *p, int32_t id) {
+  guarded(p, "run", [&] {
+    State *state =
+        static_cast<size_t>(id) < p->states.size() ? &p->states[id] : nullptr;
+    if (!state || (state->kind != PIKORT_IMAGE && state->perSource < 0))
+      throw Failure{PIKORT_BAD_PROGRAM,
+                    "expected an image, or a buffer that is sized by a source, "
+                    "to clear, but got state " +
+                        std::to_string(id)};
+    Part before = p->profile.part();
+    p->profile.enter(Part::State);
+    fill(p->threads, state->owned.data(), state->owned.size(),
+         state->kind == PIKORT_IMAGE ? state->clear : std::vector<uint8_t>());
+    p->profile.enter(before);
+  });
+}
 
 const pikoir_state *pikoir_get_state(pikort_pipeline *p, int32_t id) {
   return &p->states[id].view;

@@ -18,7 +18,15 @@ struct Pixel {
 };
 
 /// What the kernel of the test program does.
-enum class Act { Nothing, BadBin, NegativeBin, Fail, Status, SkipSource };
+enum class Act {
+  Nothing,
+  BadBin,
+  NegativeBin,
+  BadClear,
+  Fail,
+  Status,
+  SkipSource
+};
 Act act = Act::Nothing;
 
 // A source of Pixel that stage "bin" places in 4x4 bins of an 8x8 domain.
@@ -42,6 +50,12 @@ void setup(pikort_pipeline *p) {
 int32_t run(pikort_pipeline *p) {
   if (act == Act::Status)
     return 99;
+  if (act == Act::BadClear) {
+    pikoir_clear(p, 1);
+    return pikoir_status(p);
+  }
+  pikoir_clear(p, 2);
+  pikoir_clear(p, 3);
   if (act != Act::SkipSource) {
     const pikoir_input *in = pikoir_begin_source(p, 0);
     if (!in)
@@ -305,6 +319,10 @@ TEST_F(Host, ErrorsOfGeneratedCode) {
   act = Act::Status;
   expectError(pipe.run(), PIKORT_BAD_PROGRAM,
               "pipeline 'Small': the program returned status 99");
+  act = Act::BadClear;
+  expectError(pipe.run(), PIKORT_BAD_PROGRAM,
+              "expected an image, or a buffer that is sized by a source, to "
+              "clear, but got state 1");
   act = Act::SkipSource;
   expectError(pipe.run(), PIKORT_BAD_PROGRAM,
               "stage 'bin': expected the bins of source 0 to be assigned "

@@ -8,7 +8,7 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 // a lineage, in the order of its bins.
 // CHECK-LABEL: piko.pipeline @Chain
 // CHECK:         piko.program roots [@list] {
-// CHECK-NEXT:      piko.clear @image, @marks
+// CHECK-NEXT:      piko.clear @image, @marks, @spare
 // CHECK-NEXT:      %[[IN:.*]] = piko.feed 0 : !piko.edge<@F>
 // CHECK-NEXT:      %[[PLACED:.*]] = piko.launch @source_0_binned(%[[IN]]) : (!piko.edge<@F>) -> !piko.edge<@F>
 // CHECK-NEXT:      %[[BINNED:.*]] = piko.join @binned(concatenate %[[PLACED]]) : (!piko.edge<@F>) -> !piko.bins<@F>
@@ -23,7 +23,7 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 piko.pipeline @Chain rank 1 {
   piko.image @image : @F rank 1
   piko.buffer @marks : @F per_source 0
-  piko.buffer @unused : @F per_source 0
+  piko.buffer @spare : @F per_source 0
   piko.buffer @host : @F
   piko.source @binned
   piko.edge @binned[0] -> @list

@@ -1,5 +1,7 @@
+// RUN: not piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-form-strips))' --split-input-file %s 2>&1 | FileCheck %s
 // RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-form-kernels,piko-form-program,piko-form-strips))' --split-input-file --verify-diagnostics %s
 
+// CHECK: error: expected a piko.program, which piko-form-program makes
 piko.record @F {"x" : i32 at 0} size 4 align 4
 piko.pipeline @List rank 1 {
   piko.source @a

@@ -217,13 +217,13 @@ def ConvertGPUToExactNVVM
 def ConvertPikoToLLVM : Pass<"convert-piko-to-llvm", "::mlir::ModuleOp"> {
   let summary = "Turn kernels into functions on the runtime's storage";
   let description = [{
-    **Requires** kernels of loops whose updates are gone
-    (`convert-piko-to-scf`).
+    **Requires** resolved kernels whose updates are gone
+    (`convert-piko-to-scf`), and a `piko.program`.
 
     **Does**: makes of each kernel a function that takes the runtime's pipeline
-    and gives back a status, of each pipeline two more, `NAME.setup` that
-    declares the pipeline to the runtime and `NAME.run` that calls the kernels in
-    order; turns primitives, bins and writers into pointers, and operations on
+    and gives back a status, of each program two more, `NAME.setup` that declares
+    the pipeline and its joins to the runtime and `NAME.run` that clears state and
+    calls the kernels in order, with a loop of branches for each region; turns primitives, bins and writers into pointers, and operations on
     them into loads, stores and calls of the runtime's `pikoir_*` functions. Each
     load, store and call says in TBAA what it touches, of state and of
     primitives each field by itself, so that LLVM keeps in registers what it

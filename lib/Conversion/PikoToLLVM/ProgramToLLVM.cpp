@@ -383,6 +383,7 @@ private:
   void createWaves(WavesOp waves);
   void createRounds(RoundsOp rounds);
   void createSpread(Operation &statement);
+  void createClear(ClearOp clear);
   void createStatements(Block &statements);
   void createStrips(StripsOp strips);
   void checkStatus() { check(call("pikoir_status"), createBlock(exit)); }
@@ -478,9 +479,18 @@ void RunWriter::createRounds(RoundsOp rounds) {
   createChoice(call("pikoir_cycle_turn", {number}), turns, spread);
 }
 
+void RunWriter::createClear(ClearOp clear) {
+  for (auto name : clear.getStates().getAsRange<FlatSymbolRefAttr>())
+    context.call(builder, loc, "pikoir_clear", Type(),
+                 {frame, createI32(builder, loc,
+                                   numbers.states.lookup(name.getAttr()))});
+}
+
 void RunWriter::createStatements(Block &statements) {
   for (Operation &op : statements) {
-    if (auto kernel = dyn_cast<LaunchOp>(op))
+    if (auto clear = dyn_cast<ClearOp>(op))
+      createClear(clear);
+    else if (auto kernel = dyn_cast<LaunchOp>(op))
       launch(kernel, createBlock(exit));
     else if (auto strips = dyn_cast<StripsOp>(op))
       createStrips(strips);

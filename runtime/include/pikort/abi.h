@@ -177,6 +177,10 @@ typedef struct pikoir_state {
 } pikoir_state;
 
 PIKORT_API const pikoir_state *pikoir_get_state(pikort_pipeline *p, int32_t id);
+/// Sets an image to its declared record, or a buffer that is sized by a source
+/// to zeros: before any kernel, as it may hold what the run before left. On one
+/// that is neither, a status.
+PIKORT_API void pikoir_clear(pikort_pipeline *p, int32_t id);
 /// Four entries each, x first, unused = 1. A grid counts the stage's bins; a
 /// cell grid the owner tiles of one bin. cell = bin * tiles + tile, both
 /// row-major with x fastest.

@@ -14,8 +14,10 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 // CHECK:         llvm.call @pikoir_declare_join(%{{.*}}, %c1_i32, %c0_i32, %c0_i32, %c0_i32)
 // CHECK:         llvm.call @pikoir_declare_join(%{{.*}}, %c2_i32, %c1_i32, %c0_i32, %c3_i32)
 
-// The runtime names the kernel for which there is something.
+// State is cleared first. In the loop, the runtime names the kernel for which
+// there is something.
 // CHECK-LABEL: func.func @Waves.run
+// CHECK:         llvm.call @pikoir_clear(%{{.*}}, %c0_i32)
 // CHECK:         call @Waves.kernel_start
 // CHECK:       ^[[STEP:bb[0-9]+]]:
 // CHECK:         %[[S:.*]] = llvm.call @pikoir_loop_step(%{{.*}}, %c0_i32)
@@ -31,6 +33,7 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 // CHECK:         llvm.call @pikoir_status
 // CHECK:         call @Waves.kernel_last
 piko.pipeline @Waves rank 1 {
+  piko.image @seen : @F rank 1
   piko.source @start
   piko.source @b
   piko.source @last
