@@ -162,13 +162,11 @@ public:
     return pixelsBetween(lo, hi);
   }
 
-  /// Calls draw(Sample) once for each covered pixel from `lo` up to and not
-  /// including `hi`.
-  template <class Draw>
-  void rasterize(glm::ivec2 lo, glm::ivec2 hi, Draw draw) const {
+  /// Calls draw(Sample) once for each covered pixel of those that `pixels(lo,
+  /// hi, f)`, a stage's parallelForPixels, calls f for.
+  template <class Pixels, class Draw>
+  void rasterize(Pixels pixels, Draw draw) const {
     PixelBox area = box();
-    lo = glm::max(lo, area.lo);
-    hi = glm::min(hi, area.hi + 1);
     for (int part = 1; part + 1 < count; ++part) {
       // The part's corners, clockwise.
       int i = isClockwise ? part : part + 1, j = isClockwise ? part + 1 : part;
@@ -176,14 +174,12 @@ public:
       if (partArea <= 0) // empty, or a fold of less than 1/256 pixel
         continue;
       Edges edges(points[0], points[i], points[j]);
-      for (int y = lo.y; y < hi.y; ++y)
-        for (int x = lo.x; x < hi.x; ++x) {
-          int64_t v0 = edges.e0.at(x, y), v1 = edges.e1.at(x, y),
-                  v2 = edges.e2.at(x, y);
-          if (!edges.e0.holds(v0) || !edges.e1.holds(v1) || !edges.e2.holds(v2))
-            continue;
-          draw(interpolate({x, y}, i, j, {v0, v1, v2}, partArea));
-        }
+      pixels(area.lo, area.hi, [&](glm::ivec2 p) {
+        int64_t v0 = edges.e0.at(p.x, p.y), v1 = edges.e1.at(p.x, p.y),
+                v2 = edges.e2.at(p.x, p.y);
+        if (edges.e0.holds(v0) && edges.e1.holds(v1) && edges.e2.holds(v2))
+          draw(interpolate(p, i, j, {v0, v1, v2}, partArea));
+      });
     }
   }
 

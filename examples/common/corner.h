@@ -125,15 +125,16 @@ inline PixelBox coveredPart(const ScreenVertex &a, const ScreenVertex &b,
 
 /// Calls draw(Sample) once for each pixel in `box` that a triangle covers and
 /// that is not below `lo` nor at `hi` or beyond. `box` is from boxOf() or
-/// coveredPart().
-template <class Clip, class Draw>
+/// coveredPart(). `pixels(lo, hi, f)`, the stage's parallelForPixels, calls f
+/// for those of a triangle that is clipped.
+template <class Clip, class Pixels, class Draw>
 inline void rasterize(const ScreenVertex &a, const ScreenVertex &b,
                       const ScreenVertex &c, Clip clip, const PixelBox &box,
                       glm::ivec2 lo, glm::ivec2 hi, glm::ivec2 size,
-                      bool cullBackFaces, Draw draw) {
+                      bool cullBackFaces, Pixels pixels, Draw draw) {
   if (needsClipping(a, b, c)) {
     ScreenPolygon(clip(0), clip(1), clip(2), size, cullBackFaces)
-        .rasterize(lo, hi, draw);
+        .rasterize(pixels, draw);
     return;
   }
   lo = glm::max(lo, box.lo);
@@ -150,6 +151,8 @@ inline void rasterize(const ScreenVertex &a, const ScreenVertex &b,
     return {p.x - lo.x * subpixels, p.y - lo.y * subpixels};
   };
   Edges edges(place(a.at), place(second.at), place(third.at));
+  // Each pixel's values are those of the one before it and a step: iterations
+  // that depend on one another, but do not multiply.
   int64_t row0 = edges.e0.first, row1 = edges.e1.first, row2 = edges.e2.first;
   for (int y = lo.y; y < hi.y; ++y, row0 += edges.e0.stepY,
            row1 += edges.e1.stepY, row2 += edges.e2.stepY) {

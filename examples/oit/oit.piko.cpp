@@ -84,7 +84,10 @@ struct Rasterizer : piko::Stage<M.bin, M.bin, 64, Triangle, Fragment>,
     const ShadedVertex &b = state().vertices[t.vertex.y];
     const ShadedVertex &c = state().vertices[t.vertex.z];
     project(t).rasterize(
-        this->binLo(), this->binHi(), [&](const raster::Sample &s) {
+        [&](glm::ivec2 lo, glm::ivec2 hi, auto f) {
+          this->parallelForPixels(lo, hi, f);
+        },
+        [&](const raster::Sample &s) {
           glm::vec3 w = s.weight;
           if (s.depth < 1)
             this->emit({s.pixel, s.depth,

@@ -173,6 +173,9 @@ struct Rasterizer : piko::Stage<M.bin, M.bin, 64, Triangle, Fragment>,
         screen(t, 0), screen(t, 1), screen(t, 2),
         [&](int i) { return clip(t, i); }, box, this->binLo(), this->binHi(),
         this->domain(), cullBackFaces(),
+        [&](glm::ivec2 lo, glm::ivec2 hi, auto f) {
+          this->parallelForPixels(lo, hi, f);
+        },
         [&](const Sample &s) {
           glm::vec3 w = s.weight;
           this->emit(

@@ -322,6 +322,7 @@ struct Sample : piko::Stage<M.bin, M.bin, 64, Micropolygon, Fragment>,
 
   void process(const Micropolygon &m) {
     PixelBox box = Dice::boxOf(m);
+    // Once for both triangles.
     box.lo = glm::max(box.lo, this->binLo());
     box.hi = glm::min(box.hi, this->binHi() - 1);
     sample(m, 1, 2, box);
@@ -337,18 +338,17 @@ private:
     int second = area > 0 ? i : j, third = area > 0 ? j : i;
     raster::Edges edges(m.corners[0], m.corners[second], m.corners[third]);
     float inverse = 1.0f / float(glm::abs(area));
-    for (int y = box.lo.y; y <= box.hi.y; ++y)
-      for (int x = box.lo.x; x <= box.hi.x; ++x) {
-        int64_t v0 = edges.e0.at(x, y), v1 = edges.e1.at(x, y),
-                v2 = edges.e2.at(x, y);
-        if (!edges.e0.holds(v0) || !edges.e1.holds(v1) || !edges.e2.holds(v2))
-          continue;
-        float depth = (float(v0) * m.depths[0] + float(v1) * m.depths[second] +
-                       float(v2) * m.depths[third]) *
-                      inverse;
-        if (depth >= -1) // beyond the near plane
-          this->emit(Fragment{{x, y}, depth, m.position, m.normal});
-      }
+    this->parallelForPixels(box.lo, box.hi, [&](glm::ivec2 p) {
+      int64_t v0 = edges.e0.at(p.x, p.y), v1 = edges.e1.at(p.x, p.y),
+              v2 = edges.e2.at(p.x, p.y);
+      if (!edges.e0.holds(v0) || !edges.e1.holds(v1) || !edges.e2.holds(v2))
+        return;
+      float depth = (float(v0) * m.depths[0] + float(v1) * m.depths[second] +
+                     float(v2) * m.depths[third]) *
+                    inverse;
+      if (depth >= -1) // beyond the near plane
+        this->emit(Fragment{p, depth, m.position, m.normal});
+    });
   }
 };
 

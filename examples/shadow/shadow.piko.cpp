@@ -117,12 +117,14 @@ struct ShadowMap : piko::Stage<M.bin, M.bin, 64, LightTriangle>,
   void schedule(piko::BinId) { this->specifySchedule(M.core, M.split); }
 
   void process(const LightTriangle &t) {
-    polygon(t).rasterize(
-        this->binLo(), this->binHi(), [&](const raster::Sample &s) {
-          this->update(state().map, s.pixel, [&](Depth &nearest) {
-            nearest.z = piko::min(nearest.z, s.depth);
-          });
-        });
+    polygon(t).rasterize([&](glm::ivec2 lo, glm::ivec2 hi,
+                             auto f) { this->parallelForPixels(lo, hi, f); },
+                         [&](const raster::Sample &s) {
+                           this->update(
+                               state().map, s.pixel, [&](Depth &nearest) {
+                                 nearest.z = piko::min(nearest.z, s.depth);
+                               });
+                         });
   }
 
 private:
@@ -151,7 +153,10 @@ struct Rasterizer : piko::Stage<M.bin, M.bin, 64, Triangle, Fragment>,
     const ShadedVertex &b = state().vertices[t.vertex.y];
     const ShadedVertex &c = state().vertices[t.vertex.z];
     project(t).rasterize(
-        this->binLo(), this->binHi(), [&](const raster::Sample &s) {
+        [&](glm::ivec2 lo, glm::ivec2 hi, auto f) {
+          this->parallelForPixels(lo, hi, f);
+        },
+        [&](const raster::Sample &s) {
           glm::vec3 w = s.weight;
           this->emit({s.pixel, s.depth,
                       a.position * w.x + b.position * w.y + c.position * w.z,
