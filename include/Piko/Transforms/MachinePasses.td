@@ -91,7 +91,9 @@ def SplitLoops : Pass<"piko-split-loops", "::piko::PipelineOp"> {
     **Requires** loops over units (`piko-form-units`).
 
     **Does**: turns a `piko.parallel_for` without barriers into an `scf.for`
-    that is marked `piko.lanes`. One with barriers is cut at them: each piece
+    that is marked `piko.lanes`, and a `piko.parallel_pixels` into rows of pixels,
+    of which the innermost loop is so marked; with barriers, its pixels get
+    numbers first. A loop with barriers is cut at them: each piece
     between two barriers becomes a loop over all iterations, and what lives
     across a cut, be it a value or a private array, gets a slot for each
     iteration in scratch memory. Control flow that holds barriers moves around
