@@ -26,6 +26,11 @@ KERNEL_OPS = re.compile(
 )
 ASSIGN_OPS = re.compile(r"piko\.(assign_\w+|owner)\b")
 DIRECTIVES = re.compile(r"piko\.set_\w+")
+# A statement alone, or a region of it, is no program: its values come from
+# others. test/Dialect/Piko/program.mlir has them whole.
+PROGRAM_OPS = re.compile(
+    r"piko\.(clear|feed|join|launch|leave|wait|schedule_bins|strips|waves|rounds)\b"
+)
 LIST_OPS = re.compile(r"piko\.(list_\w+|parallel_for)\b")
 BARRIERS = re.compile(r"piko\.(sync|reduce|scan|sort)\b")
 
@@ -127,9 +132,13 @@ def definitions(text):
     return "\n".join(lines)
 
 
+def is_module(text):
+    return re.search(r"^\s*piko\.(record|pipeline) ", text, re.M)
+
+
 def complete(text):
     """A module that holds the example."""
-    if re.search(r"^\s*piko\.(record|pipeline) ", text, re.M):
+    if is_module(text):
         return text
     def module(shade="", blend="", kernel=""):
         places = {"SHADE": shade, "BLEND": blend, "KERNEL": kernel}
@@ -205,7 +214,11 @@ def main():
     described = list(descriptions(args.tblgen, args.includes))
     for op, name, text in described:
         fences = FENCE.findall(text)
-        examples += [(name, fence) for fence in fences]
+        examples += [
+            (name, fence)
+            for fence in fences
+            if is_module(fence) or not PROGRAM_OPS.search(fence)
+        ]
         if op:
             shown[op] = set(re.findall(r"piko\.[\w.]+", "".join(fences)))
     for op, name, text in described:

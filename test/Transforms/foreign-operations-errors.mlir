@@ -1,4 +1,4 @@
-// RUN: piko-test-opt %s --piko-synthesize --piko-to-machine --piko-to-units --split-input-file --verify-diagnostics
+// RUN: piko-test-opt %s --piko-synthesize --piko-to-machine --piko-to-units --split-input-file --verify-diagnostics=only-expected
 
 piko.record @F {"x" : i32 at 0} size 4 align 4
 piko.pipeline @P rank 1 {

@@ -14,10 +14,10 @@ piko.record @Count {"value" : i32 at 0} size 4 align 4
 // CHECK-LABEL: piko.pipeline @Assign
 // CHECK:         piko.kernel @kernel_a
 // CHECK:           %[[E:.*]] = piko.emit 0
-// CHECK-DAG:       %[[LESS:.*]] = arith.minsi
-// CHECK-DAG:       %[[MORE:.*]] = arith.maxsi
-// CHECK:           piko.place %[[E]] of @b in %[[LESS]]
-// CHECK:           piko.place %[[E]] of @b in %[[MORE]]
+// CHECK:           %[[LESS:.*]] = arith.minsi
+// CHECK-NEXT:      piko.place %[[E]] of @b in %[[LESS]]
+// CHECK-NEXT:      %[[MORE:.*]] = arith.maxsi
+// CHECK-NEXT:      piko.place %[[E]] of @b in %[[MORE]]
 // CHECK:         piko.kernel @kernel_b
 // CHECK:           ^bb0(%[[BIN:.*]]: index):
 // CHECK:             %[[P:.*]] = piko.emit 0

@@ -3,6 +3,7 @@
 #include "oit/oit.piko.cpp"
 #include "raster/raster.piko.cpp"
 
+#include "PixelsIn.h"
 #include "TestScene.h"
 
 #include <gtest/gtest.h>
@@ -42,9 +43,10 @@ bool hasEqualDepths(const Input &input) {
       corner[i] = toClip * glm::vec4(input.vertices[t.vertex[i]].position, 1);
     raster::ScreenPolygon polygon(corner[0], corner[1], corner[2],
                                   {width, height}, false);
-    polygon.rasterize({0, 0}, {width, height}, [&](const raster::Sample &s) {
-      found |= !depths[{s.pixel.x, s.pixel.y}].insert(s.depth).second;
-    });
+    polygon.rasterize(
+        PixelsIn{{0, 0}, {width, height}}, [&](const raster::Sample &s) {
+          found |= !depths[{s.pixel.x, s.pixel.y}].insert(s.depth).second;
+        });
   }
   return found;
 }

@@ -7,6 +7,8 @@
 //===----------------------------------------------------------------------===//
 #include "common/clip.h"
 
+#include "../Examples/PixelsIn.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -74,7 +76,7 @@ public:
       : lo(lo), hi(hi), counts(size_t(hi.x - lo.x) * (hi.y - lo.y)) {}
 
   void draw(const ScreenPolygon &polygon) {
-    polygon.rasterize(lo, hi, [&](const Sample &s) {
+    polygon.rasterize(PixelsIn{lo, hi}, [&](const Sample &s) {
       ASSERT_TRUE(s.pixel.x >= lo.x && s.pixel.x < hi.x);
       ASSERT_TRUE(s.pixel.y >= lo.y && s.pixel.y < hi.y);
       ++at(s.pixel.x, s.pixel.y);
@@ -365,9 +367,10 @@ TEST(Clipping, BadTrianglesAreDropped) {
       for (int k = 0; k < 4; ++k)
         p[k] = odd[random() % std::size(odd)];
     ScreenPolygon polygon(c[0], c[1], c[2], size, false);
-    polygon.rasterize({8000, 8000}, {8008, 8008}, [&](const Sample &s) {
-      ASSERT_TRUE(s.pixel.x >= 8000 && s.pixel.x < 8008);
-    });
+    polygon.rasterize(PixelsIn{{8000, 8000}, {8008, 8008}},
+                      [&](const Sample &s) {
+                        ASSERT_TRUE(s.pixel.x >= 8000 && s.pixel.x < 8008);
+                      });
   }
   ScreenPolygon withNaN({nan, 0, 0, 1}, {1, 0, 0, 1}, {0, 1, 0, 1}, size,
                         false);
@@ -395,7 +398,7 @@ TEST(Interpolation, IsPerspectiveCorrect) {
             c = glm::vec4(-1, 1, 0, 1);
   ScreenPolygon polygon(a, b, c, {512, 512}, false);
   bool seen = false;
-  polygon.rasterize({255, 511}, {256, 512}, [&](const Sample &s) {
+  polygon.rasterize(PixelsIn{{255, 511}, {256, 512}}, [&](const Sample &s) {
     seen = true;
     EXPECT_NEAR(s.weight.x, 0.75f, 0.01f);
     EXPECT_NEAR(s.weight.y, 0.25f, 0.01f);
@@ -416,7 +419,7 @@ TEST(Interpolation, ClippedPartsKeepTheirWeights) {
     clip[i] = {corners[i].x, corners[i].y, k * corners[i].z - l, corners[i].z};
   ScreenPolygon polygon(clip[0], clip[1], clip[2], {64, 64}, false);
   int pixels = 0;
-  polygon.rasterize({0, 0}, {64, 64}, [&](const Sample &s) {
+  polygon.rasterize(PixelsIn{{0, 0}, {64, 64}}, [&](const Sample &s) {
     ++pixels;
     glm::vec3 p = corners[0] * s.weight.x + corners[1] * s.weight.y +
                   corners[2] * s.weight.z;

@@ -217,7 +217,7 @@ def ConvertGPUToExactNVVM
 def ConvertPikoToLLVM : Pass<"convert-piko-to-llvm", "::mlir::ModuleOp"> {
   let summary = "Turn kernels into functions on the runtime's storage";
   let description = [{
-    **Requires** resolved kernels whose updates are gone
+    **Requires** kernels of loops whose updates are gone
     (`convert-piko-to-scf`), and a `piko.program`.
 
     **Does**: makes of each kernel a function that takes the runtime's pipeline

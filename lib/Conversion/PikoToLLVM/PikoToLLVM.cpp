@@ -154,7 +154,9 @@ LogicalResult ConvertPikoToLLVMPass::convert(PipelineOp pipeline,
   });
   ConversionTarget target(getContext());
   target.addIllegalDialect<PikoDialect>();
-  target.markUnknownOpDynamicallyLegal([](Operation *) { return true; });
+  // Of other dialects' accesses only they themselves could make code.
+  target.markUnknownOpDynamicallyLegal(
+      [](Operation *op) { return !isa<StateAccessOpInterface>(op); });
   target.addDynamicallyLegalOp<arith::SelectOp, ub::PoisonOp>(
       [&](Operation *op) { return converter.isLegal(op); });
   RewritePatternSet patterns(&getContext());

@@ -223,11 +223,12 @@ void SetupWriter::declareStage(StageOp stage, int32_t number) {
 
 void SetupWriter::declareEdge(EdgeOp edge) {
   Value producer = i32(numbers.stages.lookup(edge.getProducerAttr().getAttr()));
-  call("pikoir_declare_edge",
+  call(PIKO_RUNTIME_FUNCTION(pikoir_declare_edge),
        {producer, i32(edge.getPort()),
         i32(numbers.stages.lookup(edge.getConsumerAttr().getAttr()))});
   if (edge.getLocal())
-    call("pikoir_declare_local", {producer, i32(edge.getPort())});
+    call(PIKO_RUNTIME_FUNCTION(pikoir_declare_local),
+         {producer, i32(edge.getPort())});
 }
 
 //===----------------------------------------------------------------------===//
@@ -269,11 +270,11 @@ void SetupWriter::declareJoin(JoinOp join) {
   for (auto [edge, permute, keys] :
        llvm::zip(join.getEdges(), join.getPermutes(), join.getKeys()))
     if (auto from = dyn_cast<EdgeOp>(getOrigin(edge)))
-      call("pikoir_declare_join",
+      call(PIKO_RUNTIME_FUNCTION(pikoir_declare_join),
            {i32(numbers.stages.lookup(from.getProducerAttr().getAttr())),
             i32(from.getPort()), i32(permute), i32(keys)});
   if (auto keeps = join.getKeeps())
-    call("pikoir_declare_keys",
+    call(PIKO_RUNTIME_FUNCTION(pikoir_declare_keys),
          {i32(numbers.stages.lookup(join.getStageAttr().getAttr())),
           i32(*keeps)});
 }
@@ -296,7 +297,7 @@ void SetupWriter::declareRoots(ProgramOp program) {
     int64_t root = next++;
     if (Operation *cycle = rounds.lookup(stage))
       root = shared.try_emplace(cycle, root).first->second;
-    call("pikoir_declare_root", {i32(stage), i32(root)});
+    call(PIKO_RUNTIME_FUNCTION(pikoir_declare_root), {i32(stage), i32(root)});
   }
 }
 
@@ -308,21 +309,22 @@ void SetupWriter::declareRegion(Operation *region) {
   Value count = i32(stages.size());
   if (auto strips = dyn_cast<StripsOp>(region)) {
     auto feed = strips.getSource().getDefiningOp<FeedOp>();
-    call("pikoir_declare_strips",
+    call(PIKO_RUNTIME_FUNCTION(pikoir_declare_strips),
          {i32(getNumber(region)), i32(feed.getSource()),
           i64(strips.getChunk().value_or(0)), bytes(list), count});
     return;
   }
   if (!region->getParentOfType<RoundsOp>())
-    call("pikoir_declare_cycle",
+    call(PIKO_RUNTIME_FUNCTION(pikoir_declare_cycle),
          {i32(getNumber(region, /*asCycle=*/true)), bytes(list), count});
   if (auto waves = dyn_cast<WavesOp>(region))
-    call("pikoir_declare_loop", {i32(getNumber(region)), bytes(list), count,
-                                 i32(waves.getKeys().value_or(0))});
+    call(PIKO_RUNTIME_FUNCTION(pikoir_declare_loop),
+         {i32(getNumber(region)), bytes(list), count,
+          i32(waves.getKeys().value_or(0))});
 }
 
 void SetupWriter::run(ProgramOp program) {
-  call("pikoir_declare_pipeline",
+  call(PIKO_RUNTIME_FUNCTION(pikoir_declare_pipeline),
        {text(pipeline.getSymName()), i32(pipeline.getRank())});
   if (std::optional<int64_t> cells = pipeline.getMaxExtent())
     call(PIKO_RUNTIME_FUNCTION(pikoir_declare_max_extent), {i64(*cells)});
@@ -368,11 +370,10 @@ private:
     OpBuilder::InsertionGuard guard(builder);
     return builder.createBlock(before);
   }
-  Value call(StringRef function, ArrayRef<Value> arguments = {}) {
+  Value call(const RuntimeFunction &function, ArrayRef<Value> arguments = {}) {
     SmallVector<Value> all{frame};
     llvm::append_range(all, arguments);
-    return context.call(builder, loc, function, builder.getI32Type(), all)
-        .getResult();
+    return context.call(builder, loc, function, all).getResult();
   }
   /// Goes on, in `next`, only if a status is 0.
   void check(Value status, Block *next);
@@ -386,7 +387,9 @@ private:
   void createClear(ClearOp clear);
   void createStatements(Block &statements);
   void createStrips(StripsOp strips);
-  void checkStatus() { check(call("pikoir_status"), createBlock(exit)); }
+  void checkStatus() {
+    check(call(PIKO_RUNTIME_FUNCTION(pikoir_status)), createBlock(exit));
+  }
 
   const PipelineNumbers &numbers;
   PipelineOp pipeline;
@@ -443,7 +446,7 @@ void RunWriter::createWaves(WavesOp waves) {
   cf::BranchOp::create(builder, loc, step);
   builder.setInsertionPointToEnd(step);
   Value number = createI32(builder, loc, getNumber(waves));
-  createChoice(call("pikoir_loop_step", {number}),
+  createChoice(call(PIKO_RUNTIME_FUNCTION(pikoir_loop_step), {number}),
                llvm::to_vector(waves.getOps<LaunchOp>()), step);
 }
 
@@ -455,7 +458,8 @@ void RunWriter::createSpread(Operation &statement) {
   if (!member || member.getTurn())
     return;
   int32_t stage = findStages(member, numbers).front();
-  Value takes = call("pikoir_cycle_takes", {createI32(builder, loc, stage)});
+  Value takes = call(PIKO_RUNTIME_FUNCTION(pikoir_cycle_takes),
+                     {createI32(builder, loc, stage)});
   Value none = arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::eq,
                                      takes, createI32(builder, loc, 0));
   Block *run = createBlock(exit);
@@ -476,12 +480,13 @@ void RunWriter::createRounds(RoundsOp rounds) {
       turns.push_back(member);
   }
   Value number = createI32(builder, loc, getNumber(rounds, /*asCycle=*/true));
-  createChoice(call("pikoir_cycle_turn", {number}), turns, spread);
+  createChoice(call(PIKO_RUNTIME_FUNCTION(pikoir_cycle_turn), {number}), turns,
+               spread);
 }
 
 void RunWriter::createClear(ClearOp clear) {
   for (auto name : clear.getStates().getAsRange<FlatSymbolRefAttr>())
-    context.call(builder, loc, "pikoir_clear", Type(),
+    context.call(builder, loc, PIKO_RUNTIME_FUNCTION(pikoir_clear),
                  {frame, createI32(builder, loc,
                                    numbers.states.lookup(name.getAttr()))});
 }
@@ -512,8 +517,8 @@ void RunWriter::createStrips(StripsOp strips) {
   cf::BranchOp::create(builder, loc, next);
 
   builder.setInsertionPointToEnd(next);
-  Value more =
-      call("pikoir_strips_next", {createI32(builder, loc, getNumber(strips))});
+  Value more = call(PIKO_RUNTIME_FUNCTION(pikoir_strips_next),
+                    {createI32(builder, loc, getNumber(strips))});
   Value ended = arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::eq,
                                       more, createI32(builder, loc, 0));
   cf::CondBranchOp::create(builder, loc, ended, after, strip);

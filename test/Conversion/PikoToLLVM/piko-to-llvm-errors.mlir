@@ -67,7 +67,7 @@ piko.pipeline @P rank 1 {
   piko.source @a
   piko.stage @a bins [0] threads 1 : @F -> [] {}
   piko.kernel @k {
-    %bins = piko.open_bins @a : !piko.bins<@F>
-    piko.close_bins %bins : !piko.bins<@F>
+    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
+    piko.cpu.close_bins %bins : !piko.bins<@F>
   }
 }

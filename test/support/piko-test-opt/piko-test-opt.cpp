@@ -23,7 +23,7 @@ using namespace mlir;
 using namespace piko;
 using namespace piko::test;
 
-void PikoTestDialect::initialize() {
+void TestDialect::initialize() {
   addOperations<
 #define GET_OP_LIST
 #include "TestOps.cpp.inc"
@@ -53,7 +53,7 @@ int PeekOp::getAccessKinds() { return StateAccess::reads; }
 int main(int argc, char **argv) {
   DialectRegistry registry;
   registerPikoDialects(registry);
-  registry.insert<PikoTestDialect>();
+  registry.insert<TestDialect>();
   registerPikoPasses();
   return asMainReturnCode(
       MlirOptMain(argc, argv, "piko-opt with a dialect of tests\n", registry));

@@ -122,9 +122,6 @@ LogicalResult LocalBarrierOp::verifySymbolUses(SymbolTableCollection &) {
                          getConsumerAttr());
 }
 
-  return success();
-}
-
 LogicalResult BeginScheduleOp::verifySymbolUses(SymbolTableCollection &) {
   return verifyStage(*this, getStageAttr());
 }

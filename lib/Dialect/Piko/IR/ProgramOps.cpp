@@ -2,6 +2,7 @@
 //
 // The run of a pipeline.
 
+#include "Piko/Dialect/Piko/IR/PikoCPU.h"
 #include "Piko/Dialect/Piko/IR/PikoProgram.h"
 
 #include "mlir/IR/OpImplementation.h"
@@ -27,6 +28,10 @@ SmallVector<StageOp> piko::getStages(KernelOp kernel) {
   };
   for (auto process : kernel.getOps<ProcessOp>())
     add(process.getStageAttr());
+  for (auto bins : kernel.getOps<BinsOp>())
+    for (Operation &work : *bins.getBodyBlock())
+      if (isa<ItemsOp, ListsOp>(work))
+        add(work.getAttrOfType<FlatSymbolRefAttr>("stage"));
   for (auto bins : kernel.getOps<OpenBinsOp>()) {
     if (bins.getSource())
       continue;
@@ -44,6 +49,9 @@ std::optional<int64_t> piko::getAssignedSource(KernelOp kernel) {
   for (auto assign : kernel.getOps<AssignOp>())
     if (assign.getSource())
       return *assign.getSource();
+  for (auto items : kernel.getOps<ItemsOp>())
+    if (items.getSource())
+      return *items.getSource();
   for (auto bins : kernel.getOps<OpenBinsOp>())
     if (bins.getSource())
       return *bins.getSource();

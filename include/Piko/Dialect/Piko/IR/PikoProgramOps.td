@@ -119,7 +119,7 @@ def Piko_FeedOp : Piko_ProgramStatement<"feed"> {
 def Piko_ScheduleBinsOp : Piko_ProgramStatement<"schedule_bins"> {
   let summary = "runs the body of a schedule for each bin";
   let description = [{
-    Of a stage whose schedule depends on the bin. `piko-resolve-kernels` makes a
+    Of a stage whose schedule depends on the bin. `piko-form-work` makes a
     kernel of the body, and a launch of this.
 
     ```mlir
