@@ -143,6 +143,9 @@ void pikort_pipeline::findCycles() {
   });
   for (LoopShape &loop : loops)
     for (int32_t s : loop.stages) {
+      if (s != loop.stages.front() && stages[s].cycle != loop.cycle)
+        bad("stage " + quoted(stages[s].name) +
+            ": expected its loop to be part of one cycle");
       loop.cycle = stages[s].cycle;
       loop.ordered |= stages[s].ordered();
     }

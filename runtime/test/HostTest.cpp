@@ -489,6 +489,16 @@ TEST(Create, RejectsBadPrograms) {
     setup(p);
     pikoir_declare_keys(p, 0, -1);
   };
+  auto twoOfLoop = [](pikort_pipeline *p) {
+    setup(p);
+    pikoir_declare_stage(p, 1, "other", 0, nullptr, 0, 0, 0, 0);
+    int32_t stages[] = {0, 1};
+    pikoir_declare_cycle(p, 0, stages, 1);
+    pikoir_declare_cycle(p, 1, stages + 1, 1);
+    pikoir_declare_loop(p, 0, stages, 2, 0);
+  };
+  expect({PIKORT_ABI_VERSION, "TwoOfLoop", twoOfLoop, run}, PIKORT_BAD_PROGRAM,
+         "stage 'other': expected its loop to be part of one cycle");
   expect({PIKORT_ABI_VERSION, "Keys", keys, run}, PIKORT_BAD_PROGRAM,
          "stage 0: expected keys of at least 0 words, but got -1");
   auto twoCycles = [](pikort_pipeline *p) {
