@@ -6,9 +6,11 @@
 
 #include "Piko/Dialect/Piko/IR/Piko.h"
 #include "Piko/Driver/Sequences.h"
+#include "Piko/Target/Emulate.h"
 
 #include "mlir/Dialect/GPU/IR/GPUDialect.h"
 #include "mlir/Dialect/LLVMIR/LLVMDialect.h"
+#include "mlir/Dialect/LLVMIR/NVVMDialect.h"
 #include "mlir/Dialect/OpenMP/OpenMPDialect.h"
 #include "mlir/Interfaces/FunctionInterfaces.h"
 #include "mlir/Parser/Parser.h"
@@ -68,6 +70,13 @@ static bool hasGPUKernels(ModuleOp module) {
   return !module.getOps<gpu::GPUModuleOp>().empty();
 }
 
+/// Whether kernels for a GPU are launched on one.
+static bool hasLaunches(ModuleOp module) {
+  return module
+      .walk([](gpu::LaunchFuncOp) { return WalkResult::interrupt(); })
+      .wasInterrupted();
+}
+
 /// Whether a kernel still has phases.
 static bool hasPhases(KernelOp kernel) {
   return llvm::any_of(*kernel.getBodyBlock(), [](Operation &op) {
@@ -88,8 +97,9 @@ Level piko::getLevel(ModuleOp module) {
     return level;
   // What is left to convert is in other dialects.
   WalkResult result = module.walk([](Operation *op) {
-    return isa<ModuleOp>(op) ||
-                   isa<LLVM::LLVMDialect, omp::OpenMPDialect>(op->getDialect())
+    return isa<ModuleOp, gpu::GPUModuleOp>(op) ||
+                   isa<LLVM::LLVMDialect, NVVM::NVVMDialect,
+                       omp::OpenMPDialect>(op->getDialect())
                ? WalkResult::advance()
                : WalkResult::interrupt();
   });
@@ -178,6 +188,9 @@ void piko::addPasses(OpPassManager &passes, Level from, Level to,
   // Findings are about the stages as they are written.
   SynthesisOptions chosen =
       check.enabled ? SynthesisOptions::none() : synthesis;
+  // A block's threads do not wait for what they have emitted.
+  if (gpu.emulate)
+    chosen.without.push_back("fuse-kernels");
   auto goes = [&](Level level) { return from < level && level <= to; };
   if (check.enabled && from == Level::Authored)
     addCheckSequence(passes, check);
@@ -211,10 +224,10 @@ static LogicalResult checkStart(ModuleOp module, Level from, Level to,
   if (hasGPUKernels(module) && !gpu.emulate)
     return emitError(module.getLoc())
            << "expected kernels for a CPU, but the file has some for a GPU, "
-              "which --emulate-gpu runs and --emit=ptx writes";
+              "which --target gpu-on-cpu runs and --emit=ptx writes";
   if (!hasGPUKernels(module) && gpu.emulate && from > Level::Machine)
     return emitError(module.getLoc())
-           << "--emulate-gpu: expected kernels for a GPU, or the machine "
+           << "--target gpu-on-cpu: expected kernels for a GPU, or the machine "
               "level or one above it, but the file is at the "
            << getName(from) << " level";
   return success();
@@ -228,7 +241,7 @@ LogicalResult piko::lowerPipeline(ModuleOp module, Level level,
   if (failed(checkStart(module, from, level, check, gpu)))
     return failure();
   PassManager passes(module.getContext());
-  if (hasGPUKernels(module))
+  if (hasLaunches(module))
     addEmulationSequence(passes, gpu);
   addPasses(passes, from, level, check, synthesis, gpu);
   return passes.run(module);
@@ -269,5 +282,18 @@ piko::translateKernels(ModuleOp module, llvm::LLVMContext &context) {
 
 std::unique_ptr<llvm::Module>
 piko::translateToLLVMIR(ModuleOp module, llvm::LLVMContext &context) {
-  return translateModuleToLLVMIR(module, context, "pipeline");
+  std::unique_ptr<llvm::Module> host =
+      translateModuleToLLVMIR(module, context, "pipeline");
+  for (auto kernels : module.getOps<gpu::GPUModuleOp>()) {
+    std::unique_ptr<llvm::Module> translated =
+        translateModuleToLLVMIR(kernels, context, kernels.getName());
+    if (!host || !translated)
+      return nullptr;
+    if (llvm::Error error = linkEmulatedKernels(*host, std::move(translated),
+                                                kernels.getName())) {
+      emitError(module.getLoc()) << llvm::toString(std::move(error));
+      return nullptr;
+    }
+  }
+  return host;
 }

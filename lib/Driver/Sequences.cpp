@@ -131,21 +131,21 @@ void piko::addGPUSequence(OpPassManager &passes, const GPUOptions &options) {
   ConvertPikoToGPUOptions grids;
   grids.threads = options.threads;
   passes.nest<PipelineOp>().addPass(createConvertPikoToGPU(grids));
-  addUnitsToCPU(passes, {});
+  addUnitsToCPU(passes, SynthesisOptions::none());
   // Or constants would be arguments.
   passes.addPass(createGpuLaunchSinkIndexComputationsPass());
   passes.addPass(createGpuKernelOutliningPass());
+  addCleanUp(passes);
   if (options.emulate)
     addEmulationSequence(passes, options);
-  else
-    addCleanUp(passes);
 }
 
 void piko::addEmulationSequence(OpPassManager &passes,
                                 const GPUOptions &options) {
-  ConvertGPUToSCFOptions emulation;
-  emulation.reverse = options.reverse;
-  passes.addPass(createConvertGPUToSCF(emulation));
+  addNVVMSequence(passes);
+  ConvertGPUToEmulatorOptions emulation;
+  emulation.seed = options.seed;
+  passes.addPass(createConvertGPUToEmulator(emulation));
   addCleanUp(passes);
 }
 

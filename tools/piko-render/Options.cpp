@@ -17,14 +17,14 @@ Compiles a pipeline that uses the types of piko/scene.h, renders a scene with
 it, and says how long a frame took.
 
   --pipe NAME            which pipeline of the file (the only one)
-  --target cpu|reference compiled for this machine, or run by the reference
-                         executor (cpu)
+  --target cpu|gpu-on-cpu|reference
+                         compiled for this machine; for a GPU, which this
+                         machine plays; or run by the reference executor (cpu)
   -I FOLDER, -D NAME[=VALUE]   for the pipeline's preprocessor
   --without PASS,...     passes of synthesis to leave out
-  --emulate-gpu          run kernels for a GPU on the CPU, block by block and
-                         thread by thread
-  --gpu-threads N        threads of a block then, a power of two up to 1024 (as
-                         many as the stage has)
+  --gpu-threads N        for gpu-on-cpu: threads of a block, a power of two up to
+                         1024 (as many as the stage has)
+  --gpu-seed N           for gpu-on-cpu: permutes the blocks (in order)
   --no-cache             compile even if nothing changed since the last time
   --cache-dir FOLDER     where compiled code is kept ($PIKO_CACHE_DIR,
                          $XDG_CACHE_HOME/piko or ~/.cache/piko)
@@ -88,13 +88,14 @@ private:
     const std::map<std::string, std::function<void()>> actions = {
         {"--help", [&] { options.help = true; }},
         {"--pipe", [&] { options.load.pipeName = value(name); }},
-        {"--target", [&] { options.load.target = target(value(name)); }},
+        {"--target", [&] { parseTarget(value(name)); }},
         {"--no-cache", [&] { options.load.cache.enabled = false; }},
         {"--cache-dir", [&] { options.load.cache.directory = value(name); }},
         {"--without", [&] { parseWithout(value("--without")); }},
-        {"--emulate-gpu", [&] { options.load.gpu.emulate = true; }},
         {"--gpu-threads",
          [&] { options.load.gpu.threads = integer(name, 1, 1024); }},
+        {"--gpu-seed",
+         [&] { options.load.gpu.seed = integer(name, 0, maxInt); }},
         {"--width", [&] { options.view.width = integer(name, 1, 65536); }},
         {"--height", [&] { options.view.height = integer(name, 1, 65536); }},
         {"--lights", [&] { options.lights = integer(name, 0, 1'000'000); }},
@@ -207,12 +208,13 @@ private:
       v[i] = float(number(name));
     return v;
   }
-  ExecutionTarget target(const std::string &name) {
-    if (name == "reference")
-      return ExecutionTarget::Reference;
-    if (name != "cpu")
-      fail("--target: expected cpu or reference, but got '" + name + "'");
-    return ExecutionTarget::CPU;
+  void parseTarget(const std::string &name) {
+    options.load.target = name == "reference" ? ExecutionTarget::Reference
+                                              : ExecutionTarget::CPU;
+    options.load.gpu.emulate = name == "gpu-on-cpu";
+    if (name != "cpu" && name != "gpu-on-cpu" && name != "reference")
+      fail("--target: expected cpu, gpu-on-cpu or reference, but got '" + name +
+           "'");
   }
 
   void fail(const std::string &message) {

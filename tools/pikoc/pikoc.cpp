@@ -37,6 +37,8 @@ enum class Emit {
   PTX
 };
 
+enum class Machine { CPU, GPUOnCPU };
+
 struct CommandLine {
   llvm::cl::OptionCategory category{"pikoc options"};
   llvm::cl::opt<std::string> file{llvm::cl::Positional, llvm::cl::Required,
@@ -87,10 +89,19 @@ struct CommandLine {
                      "native (default: x86-64-v3, generic elsewhere, sm_90 for "
                      "ptx)"),
       llvm::cl::cat(category)};
-  llvm::cl::opt<bool> emulateGPU{
-      "emulate-gpu",
-      llvm::cl::desc("run kernels for a GPU on the CPU, block by block and "
-                     "thread by thread"),
+  llvm::cl::opt<Machine> target{
+      "target",
+      llvm::cl::desc("what code runs on (default: cpu)"),
+      llvm::cl::values(
+          clEnumValN(Machine::CPU, "cpu", "the processor"),
+          clEnumValN(Machine::GPUOnCPU, "gpu-on-cpu",
+                     "kernels for a GPU, on the processor: blocks one after the "
+                     "other, their threads by turns")),
+      llvm::cl::init(Machine::CPU), llvm::cl::cat(category)};
+  llvm::cl::opt<int64_t> gpuSeed{
+      "gpu-seed", llvm::cl::value_desc("number"), llvm::cl::init(0),
+      llvm::cl::desc("permutes the blocks of --target gpu-on-cpu (default: in "
+                     "order)"),
       llvm::cl::cat(category)};
   llvm::cl::opt<int64_t> gpuThreads{
       "gpu-threads", llvm::cl::value_desc("count"), llvm::cl::init(0),
@@ -164,6 +175,7 @@ struct CommandLine {
     return without.empty() ? SynthesisOptions()
                            : parseSynthesisOptions(without);
   }
+  bool isEmulated() const { return target == Machine::GPUOnCPU; }
   CompileOptions getSource() const {
     return {.file = file,
             .pipeName = pipe,
@@ -171,7 +183,9 @@ struct CommandLine {
             .defines = {defines.begin(), defines.end()},
             .check = *getCheck(),
             .synthesis = *getSynthesis(),
-            .gpu = {.threads = gpuThreads, .emulate = emulateGPU}};
+            .gpu = {.threads = gpuThreads,
+                    .emulate = isEmulated(),
+                    .seed = gpuSeed}};
   }
   TargetOptions getTarget() const {
     return {.cpu = cpu,
@@ -202,10 +216,13 @@ static std::string checkOptions(const CommandLine &line) {
     return "--header and --depfile belong to an object, which --emit=object or "
            "an -o that ends in .o asks for";
   bool isGPU = line.getEmit() >= Emit::GPU;
-  if (line.emulateGPU && isGPU)
-    return "--emulate-gpu is for code that runs on a CPU";
-  if (line.gpuThreads.getNumOccurrences() && !line.emulateGPU && !isGPU)
-    return "--gpu-threads belongs to --emit=gpu, --emit=ptx or --emulate-gpu";
+  if (line.isEmulated() && isGPU)
+    return "--target gpu-on-cpu is for code that runs on a CPU";
+  if (line.gpuThreads.getNumOccurrences() && !line.isEmulated() && !isGPU)
+    return "--gpu-threads belongs to --emit=gpu, --emit=ptx or --target "
+           "gpu-on-cpu";
+  if (line.gpuSeed.getNumOccurrences() && !line.isEmulated())
+    return "--gpu-seed belongs to --target gpu-on-cpu";
   if (line.sanitizer.getNumOccurrences() &&
       (line.getEmit() < Emit::Assembly || isGPU))
     return "--sanitize belongs to an object or assembly";

@@ -77,52 +77,56 @@ def ConvertPikoToOpenMP : Pass<"convert-piko-to-openmp", "::piko::PipelineOp"> {
 }
 
 def ConvertPikoToGPU : Pass<"convert-piko-to-gpu", "::piko::PipelineOp"> {
-  let summary = "Turn kernels that update pixels into grids of blocks";
+  let summary = "Turn kernels into grids of blocks and threads";
   let description = [{
-    **Requires** loops over units (`piko-form-units`).
+    **Requires** loops over units (`piko-form-units`, `piko-split-loops`).
 
-    **Does**: turns the `scf.forall` of each kernel that updates pixels into a
-    `gpu.launch`. A block runs a unit of work, which holds whole bins. Its threads
-    share out the pixels of a bin: a pixel is that thread's whose place in a tile
-    of `threads` pixels it has. All threads take all the primitives of the bin in
-    order, so that the updates of a pixel keep their lineage order; what belongs
-    to other threads' pixels is behind a test of the pixel, or, where a loop counts
-    through pixels, stepped over. The block copies fields of as many primitives as
-    it has threads into its own memory, between two `gpu.barrier`s. Updates and
-    other access to state are converted as by `convert-piko-to-scf`; an access
-    outside is noted for the block and reported behind the launch. Kernels that
-    update no pixel stay as they are.
+    **Does**: turns the `scf.forall` of each kernel into a `gpu.launch`: a block
+    runs a unit of work. What its threads do is one of two:
 
-    **Guarantees** that each update, store and atomic happens once, and that the
-    result does not depend on `threads` nor on how threads are scheduled.
+    - Of a kernel whose effects are updates of pixels, its threads share out the
+      pixels of a bin: a pixel is that thread's whose place in a tile of `threads`
+      pixels it has. All threads take all the primitives of the bin in order, so
+      that the updates of a pixel keep their lineage order; what belongs to other
+      threads' pixels is behind a test of the pixel, or, where a loop counts
+      through pixels, stepped over. The block copies fields of as many primitives
+      as it has threads into its own memory, between two `gpu.barrier`s.
+    - Of any other kernel, threads share the iterations of parallel loops, the
+      pieces of those that were cut at barriers, and the primitives of a bin,
+      where no two of these update a pixel. What lies between such loops and has
+      effects is done by the first thread, between two barriers; all else by all
+      threads alike. Arrays that several threads see are in the block's memory.
+
+    Emissions go to the grid's log (`piko.gpu.open_log`), with numbers that say
+    their order. Updates and other access to state are converted as by
+    `convert-piko-to-scf`; an access outside is an entry of the log.
+
+    **Guarantees** that each update, store, atomic and emission happens once, and
+    that the result does not depend on `threads` nor on how threads are scheduled.
 
     Before:
     ```
-    scf.forall (%u) in (%units) {
-      scf.for %i = %begin to %end step %one {
-        ... piko.update @depth[%x, %y : i32, i32] in %bin { ... } ...
-      }
-    }
+    %writer = piko.cpu.open_writer %bins[%u] : !piko.bins<@F>
+    scf.for %i = %begin to %end step %one {
+      %p = piko.cpu.append %writer[0] (%x) : i32 -> !piko.prim<@F>
+      piko.cpu.next %writer
+    } {piko.lanes}
     ```
     After:
     ```
-    gpu.launch blocks(%u, ...) in (%units, ...) threads(%t, ...) in (%c64, ...) {
-      scf.for %base = %begin to %end step %c64 {
-        ... memref.store %field, %fields[%t] ...
-        gpu.barrier
-        scf.for %k = %zero to %count step %one {
-          scf.if %mine { ... piko.load @depth ... piko.store ... }
-        }
-        gpu.barrier
-      }
-    }
+    gpu.barrier
+    %first = arith.addi %begin, %thread : index
+    scf.for %i = %first to %end step %threads {
+      memref.store %i, %order[%c1] : memref<4xi64>
+      %p = piko.cpu.append %log[0] (%x) : i32 -> !piko.prim<@F>
+      piko.cpu.next %log
+    } {piko.lanes}
+    gpu.barrier
     ```
 
-    **Limits**: a kernel that emits, takes lists, meets barriers or reads state
-    that it writes is an error, and so are a store that does not follow from one
-    pixel, an outcome of an update that decides about other pixels, and functions
-    that have no form with the same bits on a GPU. If one primitive's pixels fail
-    in several ways, which of them is reported depends on `threads`.
+    **Limits**: functions that have no form with the same bits on a GPU, and local
+    barriers (`piko-fuse-kernels`), are errors. In checking mode the first thread
+    does all.
   }];
   let options = [
     Option<"threads", "threads", "int64_t", "0",
@@ -130,6 +134,7 @@ def ConvertPikoToGPU : Pass<"convert-piko-to-gpu", "::piko::PipelineOp"> {
            "stage has, rounded down to one)">];
   let statistics = [
     Statistic<"grids", "grids", "kernels that became grids">,
+    Statistic<"shared", "shared", "loops that threads share">,
     Statistic<"strided", "strided", "loops that step over others' pixels">,
     Statistic<"guarded", "guarded", "tests of whose a pixel is">];
   let dependentDialects = ["::mlir::arith::ArithDialect",
@@ -138,52 +143,38 @@ def ConvertPikoToGPU : Pass<"convert-piko-to-gpu", "::piko::PipelineOp"> {
                            "::mlir::scf::SCFDialect"];
 }
 
-def ConvertGPUToSCF : Pass<"convert-gpu-to-scf", "::mlir::ModuleOp"> {
-  let summary = "Run blocks and threads one after the other";
+def ConvertGPUToEmulator : Pass<"convert-gpu-to-emulator", "::mlir::ModuleOp"> {
+  let summary = "Launch kernels on a device that the CPU plays";
   let description = [{
-    **Requires** kernels in `gpu.module`s, launched by `gpu.launch_func`, with
-    structured control flow.
+    **Requires** kernels in `gpu.module`s, launched by `gpu.launch_func`, whose
+    arguments are numbers and pointers.
 
-    **Does**: makes of each kernel a function that runs one block, and of each
-    launch a loop over blocks that calls it. A loop over the block's threads
-    stands for what lies between two barriers. What is the same for all threads is
-    computed once, what is cheap again in each loop; private arrays get a copy for
-    each thread, and memory of the block is allocated by the function.
+    **Does**: makes of each launch a call of the emulator (`pikort/grid.h`), with
+    the arguments in memory and the address of a function that runs one thread of
+    the kernel. That function is made of the kernel's LLVM IR when the module is
+    translated.
 
-    **Guarantees** that no `gpu.module` is left, and that a program without data
-    races has the same result as on a GPU.
+    **Guarantees** that the host's code is for a CPU alone.
 
     Before:
     ```
-    gpu.func @k(%p: !llvm.ptr) kernel {
-      %t = gpu.thread_id x
-      A(%t)
-      gpu.barrier
-      B(%t)
-      gpu.return
-    }
+    gpu.launch_func @m::@k blocks in (%n, %one, %one) threads in (%t, %one, %one)
+        args(%p : !llvm.ptr)
     ```
     After:
     ```
-    func.func private @k(%block: index, %blocks: index, %p: !llvm.ptr) {
-      scf.for %t = %zero to %threads step %one { A(%t) }
-      scf.for %t = %zero to %threads step %one { B(%t) }
-      return
-    }
+    %k = llvm.mlir.addressof @m.k.emulated : !llvm.ptr
+    llvm.store %p, %arguments : !llvm.ptr, !llvm.ptr
+    llvm.call @pikoir_grid_launch(%frame, %k, %n, %t, %arguments, %seed)
     ```
 
-    **Limits**: grids and blocks have one dimension, and a block a constant number
-    of threads. Barriers stand in the kernel's body or in `scf.for`s with the same
-    bounds for all threads; other numbers than those that can be computed again do
-    not live across a barrier.
+    **Limits**: grids and blocks have one dimension.
   }];
   let options = [
-    Option<"reverse", "reverse", "bool", "false",
-           "Run threads from the last to the first">];
+    Option<"seed", "seed", "int64_t", "0",
+           "Permutes the blocks of a grid; 0 runs them in order">];
   let dependentDialects = ["::mlir::arith::ArithDialect",
-                           "::mlir::func::FuncDialect",
-                           "::mlir::memref::MemRefDialect",
-                           "::mlir::scf::SCFDialect"];
+                           "::mlir::LLVM::LLVMDialect"];
 }
 
 def ConvertGPUToExactNVVM

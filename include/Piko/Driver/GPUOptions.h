@@ -12,11 +12,11 @@ namespace piko {
 struct GPUOptions {
   /// Threads of a block, a power of two; 0 = as many as the stage has.
   int64_t threads = 0;
-  /// Runs kernels for a GPU on the CPU: blocks, and threads between barriers,
-  /// one after the other.
+  /// Runs kernels for a GPU on the CPU (--target gpu-on-cpu): blocks one after
+  /// the other, their threads by turns.
   bool emulate = false;
-  /// Threads from the last to the first, for an emulation.
-  bool reverse = false;
+  /// Permutes the blocks then; 0 = in order.
+  int64_t seed = 0;
 };
 
 } // namespace piko

@@ -36,11 +36,11 @@ void addCPUSequence(mlir::OpPassManager &passes,
 void addLLVMSequence(mlir::OpPassManager &passes);
 
 /// `piko-to-gpu`: from the machine level to kernels in a `gpu.module`, and
-/// functions that launch them and run the others. Where the options say so,
-/// kernels become functions too.
+/// functions that launch them. Where the options say so, these launch them on
+/// the emulator, and kernels are in the llvm and nvvm dialects.
 void addGPUSequence(mlir::OpPassManager &passes, const GPUOptions &options);
 
-/// Kernels in a `gpu.module` as functions, which a CPU runs.
+/// From kernels in a `gpu.module` to such for the emulator.
 void addEmulationSequence(mlir::OpPassManager &passes,
                           const GPUOptions &options);
 

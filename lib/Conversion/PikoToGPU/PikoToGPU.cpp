@@ -1,15 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// convert-piko-to-gpu: for each kernel that updates pixels,
-//   1. refuse what a grid cannot do;
-//   2. move the loop over units into a launch with a block for each unit;
-//   3. share the pixels among the block's threads;
-//   4. take primitives in groups, whose fields the block copies to its memory;
-//   5. convert access to state, and gather what errors it has.
+// convert-piko-to-gpu: for each kernel,
+//   1. move the loop over units into a launch with a block for each unit;
+//   2. if all that others see of it are pixels, share these among the block's
+//      threads, and take primitives in groups, whose fields the block copies to
+//      its memory;
+//   3. otherwise map the block's work to its threads (BlockMapping.cpp);
+//   4. convert access to state, and open a log for what the grid leaves.
 
 #include "PikoToGPU.h"
 
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
+#include "Piko/Dialect/Piko/IR/PikoGPU.h"
 
 #include "mlir/Dialect/SCF/Transforms/Transforms.h"
 #include "mlir/Dialect/UB/IR/UBOps.h"
@@ -26,8 +28,14 @@ namespace piko {
 using namespace mlir;
 using namespace piko;
 
-/// What every GPU's blocks have.
-static constexpr int64_t maxThreads = 1024, maxBlockBytes = 48 << 10;
+/// Memory that the threads of a block share.
+static Value addBlockMemory(gpu::LaunchOp launch, int64_t count, Type type) {
+  auto space = gpu::AddressSpaceAttr::get(
+      launch.getContext(), gpu::GPUDialect::getWorkgroupAddressSpace());
+  return launch.addWorkgroupAttribution(
+      MemRefType::get({count}, type, MemRefLayoutAttrInterface(), space),
+      launch.getLoc());
+}
 
 namespace {
 
@@ -36,16 +44,21 @@ public:
   GridBuilder(KernelOp kernel, StageOp stage, int64_t threads)
       : kernel(kernel), stage(stage), threads(threads), loc(kernel.getLoc()) {}
 
-  LogicalResult run(SharingCounts &counts);
+  /// Threads share the pixels of a bin; fails where they cannot.
+  LogicalResult sharePixelsOfBins(SharingCounts &counts);
+  /// Threads do what BlockMapping.cpp says.
+  LogicalResult mapWork(int64_t &sharedLoops);
 
 private:
-  LogicalResult findLoops();
-  void dropWriter();
+  LogicalResult findUnits();
+  LogicalResult findItems();
+  void dropWriters();
   void createLaunch();
   void hoistPrivateArrays();
   void upliftLoops();
   ThreadTile createTile();
   void groupItems();
+  LogicalResult convertAccess();
   /// The fields that are read by name alone, or none if they are too large.
   llvm::MapVector<StringAttr, SmallVector<GetOp>> collectFields(ItemOp item);
 
@@ -53,9 +66,11 @@ private:
   StageOp stage;
   int64_t threads;
   Location loc;
+  OpenBinsOp bins;
   scf::ForallOp units;
   scf::ForOp items;
   gpu::LaunchOp launch;
+  Value log;
 };
 
 struct ConvertPikoToGPUPass
@@ -63,42 +78,53 @@ struct ConvertPikoToGPUPass
   using ConvertPikoToGPUBase::ConvertPikoToGPUBase;
   void runOnOperation() override;
   LogicalResult convert(KernelOp kernel);
+  bool tryToSharePixels(KernelOp kernel, StageOp stage, int64_t count);
 };
 
 } // namespace
 
-Value piko::addBlockMemory(gpu::LaunchOp launch, int64_t count, Type type) {
-  auto space = gpu::AddressSpaceAttr::get(
-      launch.getContext(), gpu::GPUDialect::getWorkgroupAddressSpace());
-  return launch.addWorkgroupAttribution(
-      MemRefType::get({count}, type, MemRefLayoutAttrInterface(), space),
-      launch.getLoc());
-}
-
-LogicalResult GridBuilder::findLoops() {
+LogicalResult GridBuilder::findUnits() {
+  for (auto open : kernel.getOps<OpenBinsOp>())
+    bins = open;
   for (auto loop : kernel.getOps<scf::ForallOp>())
     units = loop;
-  if (units)
-    units.walk([&](scf::ForOp loop) {
-      if (loop->hasAttr("piko.lanes") && loop->getParentOfType<scf::ForOp>() &&
-          !loop->getParentOfType<scf::ForOp>()->getParentOfType<scf::ForOp>())
-        items = loop;
-    });
-  if (!items || items.getNumResults())
-    return kernel.emitOpError("expected loops as piko-form-units makes "
-                              "them, over units, cells and primitives");
+  if (!bins || !units)
+    return kernel.emitOpError(
+        "expected a loop over units, as piko-form-units makes it");
   return success();
 }
 
-/// Nothing is emitted; a block needs no writer.
-void GridBuilder::dropWriter() {
+LogicalResult GridBuilder::findItems() {
+  units.walk([&](scf::ForOp loop) {
+    if (loop->hasAttr("piko.lanes") && loop->getParentOfType<scf::ForOp>() &&
+        !loop->getParentOfType<scf::ForOp>()->getParentOfType<scf::ForOp>())
+      items = loop;
+  });
+  return success(items && !items.getNumResults() &&
+                 !items.getBody()->getOps<ItemOp>().empty());
+}
+
+/// What is emitted goes to the grid's log; what emits nothing needs no
+/// positions.
+void GridBuilder::dropWriters() {
+  bool emits = kernel
+                   .walk([](Operation *op) {
+                     return isa<AppendOp, AppendBinOp>(op)
+                                ? WalkResult::interrupt()
+                                : WalkResult::advance();
+                   })
+                   .wasInterrupted();
   SmallVector<Operation *> calls;
-  units.walk([&](Operation *op) {
-    if (isa<NextOp, CloseWriterOp, OpenWriterOp>(op))
+  launch.walk([&](Operation *op) {
+    if (isa<CloseWriterOp>(op) || (isa<NextOp>(op) && !emits))
       calls.push_back(op);
   });
-  for (Operation *op : llvm::reverse(calls))
+  for (Operation *op : calls)
     op->erase();
+  for (auto open : llvm::to_vector(launch.getOps<OpenWriterOp>())) {
+    open.replaceAllUsesWith(log);
+    open.erase();
+  }
 }
 
 void GridBuilder::createLaunch() {
@@ -112,18 +138,20 @@ void GridBuilder::createLaunch() {
   // A GPU refuses a grid without blocks.
   auto ifAny = scf::IfOp::create(builder, loc, any);
   builder.setInsertionPointToStart(ifAny.thenBlock());
-  StringRef name = stage.getSymName();
   auto pipeline = kernel->getParentOfType<PipelineOp>();
   auto symbol = [&](const Twine &suffix) {
     return FlatSymbolRefAttr::get(builder.getContext(),
                                   (pipeline.getSymName() + suffix).str());
   };
+  log = OpenLogOp::create(builder, loc, WriterType::get(builder.getContext()),
+                          bins);
   launch = gpu::LaunchOp::create(
       builder, loc, count, one, one, size, one, one,
       /*dynamicSharedMemorySize=*/Value(), /*asyncTokenType=*/Type(),
       /*asyncDependencies=*/ValueRange(), /*workgroupAttributions=*/TypeRange(),
       /*privateAttributions=*/TypeRange(), Value(), Value(), Value(),
-      symbol("_gpu"), symbol("_" + name));
+      symbol("_gpu"), symbol("_" + kernel.getSymName()));
+  CloseLogOp::create(builder, loc, log);
   Block &body = launch.getBody().front();
   units.getTerminator()->erase();
   units.getInductionVar(0).replaceAllUsesWith(launch.getBlockIds().x);
@@ -131,6 +159,7 @@ void GridBuilder::createLaunch() {
   units.erase();
   builder.setInsertionPointToEnd(&body);
   gpu::TerminatorOp::create(builder, loc);
+  dropWriters();
 }
 
 /// An alloca in a loop would take more memory each time around.
@@ -238,51 +267,81 @@ void GridBuilder::groupItems() {
       arith::AddIOp::create(builder, loc, base, items.getInductionVar()));
 }
 
-LogicalResult GridBuilder::run(SharingCounts &counts) {
-  if (failed(checkGridLimits(kernel)) || failed(findLoops()))
+LogicalResult GridBuilder::convertAccess() {
+  RewritePatternSet patterns(kernel.getContext());
+  populatePikoToSCFPatterns(patterns);
+  return applyPatternsGreedily(
+      kernel, std::move(patterns),
+      GreedyRewriteConfig()
+          .enableFolding(false)
+          .setRegionSimplificationLevel(GreedySimplifyRegionLevel::Disabled));
+}
+
+LogicalResult GridBuilder::sharePixelsOfBins(SharingCounts &counts) {
+  if (failed(findUnits()) || failed(findItems()))
     return failure();
-  dropWriter();
   createLaunch();
   upliftLoops();
   if (failed(sharePixels(items, createTile(), counts)))
     return failure();
   hoistPrivateArrays();
   groupItems();
-  RewritePatternSet patterns(kernel.getContext());
-  populatePikoToSCFPatterns(patterns);
-  if (failed(
-          applyPatternsGreedily(kernel, std::move(patterns),
-                                GreedyRewriteConfig()
-                                    .enableFolding(false)
-                                    .setRegionSimplificationLevel(
-                                        GreedySimplifyRegionLevel::Disabled))))
+  OpBuilder builder = OpBuilder::atBlockBegin(&launch.getBody().front());
+  Value order = memref::AllocaOp::create(
+      builder, loc, MemRefType::get({4}, builder.getI64Type()));
+  LogOrderOp::create(builder, loc, log, order);
+  return convertAccess();
+}
+
+LogicalResult GridBuilder::mapWork(int64_t &sharedLoops) {
+  if (failed(findUnits()))
     return failure();
-  gatherGridErrors(launch, items);
-  return success();
+  findSharedLoops(kernel);
+  if (failed(convertAccess()))
+    return failure();
+  createLaunch();
+  return mapBlock(launch, log, sharedLoops);
+}
+
+/// On a copy, which takes the kernel's place where it comes out.
+bool ConvertPikoToGPUPass::tryToSharePixels(KernelOp kernel, StageOp stage,
+                                            int64_t count) {
+  if (!canSharePixels(kernel))
+    return false;
+  OpBuilder builder(kernel);
+  auto copy = cast<KernelOp>(builder.clone(*kernel));
+  SharingCounts counts;
+  ScopedDiagnosticHandler quiet(&getContext(),
+                                [](Diagnostic &) { return success(); });
+  if (failed(GridBuilder(copy, stage, count).sharePixelsOfBins(counts))) {
+    copy.erase();
+    return false;
+  }
+  kernel.erase();
+  strided += counts.strided;
+  guarded += counts.guarded;
+  return true;
 }
 
 LogicalResult ConvertPikoToGPUPass::convert(KernelOp kernel) {
-  bool updates = kernel.walk([](UpdateOp) { return WalkResult::interrupt(); })
-                     .wasInterrupted();
-  if (!updates) {
-    kernel.emitRemark("a kernel stays on the CPU, because it updates no pixel");
+  auto opened = kernel.getOps<OpenBinsOp>();
+  if (opened.empty())
+    return success(); // of a schedule
+  auto stage = lookupInPipeline<StageOp>(kernel, (*opened.begin()).getStageAttr());
+  int64_t count = threads;
+  if (!count)
+    count = std::min<int64_t>(maxThreads,
+                              llvm::bit_floor(uint64_t(stage.getThreads())));
+  if (failed(checkGridLimits(kernel)))
+    return failure();
+  ++grids;
+  if (tryToSharePixels(kernel, stage, count))
     return success();
-  }
-  for (auto bins : kernel.getOps<OpenBinsOp>()) {
-    auto stage = lookupInPipeline<StageOp>(kernel, bins.getStageAttr());
-    int64_t count = threads;
-    if (!count)
-      count = std::min<int64_t>(maxThreads,
-                                llvm::bit_floor(uint64_t(stage.getThreads())));
-    SharingCounts counts;
-    if (failed(GridBuilder(kernel, stage, count).run(counts)))
-      return failure();
-    ++grids;
-    strided += counts.strided;
-    guarded += counts.guarded;
-    return success();
-  }
-  return kernel.emitOpError("expected loops over units");
+  int64_t loops = 0;
+  if (failed(GridBuilder(kernel, stage, count).mapWork(loops)))
+    return failure();
+  shared += loops;
+  return success();
 }
 
 void ConvertPikoToGPUPass::runOnOperation() {
@@ -294,7 +353,7 @@ void ConvertPikoToGPUPass::runOnOperation() {
         << threads.getValue();
     return signalPassFailure();
   }
-  for (auto kernel : pipeline.getOps<KernelOp>())
+  for (auto kernel : llvm::to_vector(pipeline.getOps<KernelOp>()))
     if (failed(convert(kernel)))
       return signalPassFailure();
 }

@@ -13,8 +13,12 @@
 
 namespace piko {
 
-/// Fails, with an error, at what a grid of blocks cannot do yet.
+/// Fails, with an error, at what no grid of blocks can do.
 llvm::LogicalResult checkGridLimits(KernelOp kernel);
+
+/// Whether the threads of a block can share the pixels of a bin: the kernel
+/// updates some and does nothing else that other primitives see.
+bool canSharePixels(KernelOp kernel);
 
 /// How the threads of a block share the pixels of a bin: a tile of as many
 /// pixels as there are threads is laid over the domain again and again.
@@ -39,14 +43,19 @@ struct SharingCounts {
 llvm::LogicalResult sharePixels(mlir::scf::ForOp items, const ThreadTile &tile,
                                 SharingCounts &counts);
 
-/// Memory that the threads of a block share.
-mlir::Value addBlockMemory(mlir::gpu::LaunchOp launch, int64_t count,
-                           mlir::Type type);
+/// Marks the loops whose iterations the threads of a block may share: what they
+/// do has no order that shows but that of emissions.
+void findSharedLoops(KernelOp kernel);
+constexpr const char *sharedAttrName = "piko.shared";
 
-/// Notes the first `piko.fail` of each thread, and reports behind the launch
-/// that of the first block, and in it of the first position and thread. `items`
-/// is the loop over a group of primitives, inside that over groups.
-void gatherGridErrors(mlir::gpu::LaunchOp launch, mlir::scf::ForOp items);
+/// Maps a block's work to its threads: the first thread does what has effects,
+/// loops that are marked are shared, and all else is done by all threads alike.
+/// `log` takes what is emitted.
+llvm::LogicalResult mapBlock(mlir::gpu::LaunchOp launch, mlir::Value log,
+                             int64_t &sharedLoops);
+
+/// What every GPU's blocks have.
+constexpr int64_t maxThreads = 1024, maxBlockBytes = 48 << 10;
 
 } // namespace piko
 

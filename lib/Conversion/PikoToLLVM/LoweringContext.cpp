@@ -5,6 +5,9 @@
 #include "LoweringContext.h"
 
 #include "Piko/Analysis/StageGraph.h"
+#include "mlir/Conversion/LLVMCommon/MemRefBuilder.h"
+#include "mlir/Conversion/LLVMCommon/TypeConverter.h"
+#include "mlir/Dialect/GPU/IR/GPUDialect.h"
 
 using namespace mlir;
 using namespace piko;
@@ -87,6 +90,16 @@ RecordOp LoweringContext::record(FlatSymbolRefAttr name) const {
 
 Value LoweringContext::frame(Operation *op) const {
   return op->getParentOfType<func::FuncOp>().getArgument(0);
+}
+
+Grid *LoweringContext::grid(Operation *op) {
+  auto launch = op->getParentOfType<gpu::LaunchOp>();
+  auto found = grids.find(launch);
+  return launch && found != grids.end() ? &found->second : nullptr;
+}
+
+void LoweringContext::noteGrid(Operation *inside, Grid grid) {
+  grids[inside->getParentOfType<gpu::LaunchOp>()] = grid;
 }
 
 StateView &LoweringContext::view(OpBuilder &builder, Operation *op,
@@ -250,6 +263,22 @@ Value piko::toI64(OpBuilder &builder, Location loc, Value v) {
 
 Value piko::toIndex(OpBuilder &builder, Location loc, Value v) {
   return arith::IndexCastOp::create(builder, loc, builder.getIndexType(), v);
+}
+
+Value piko::createBytes(OpBuilder &builder, Location loc, Value pointer,
+                        Value size, MemRefType type) {
+  // As the conversion of memrefs will see it.
+  LLVMTypeConverter types(builder.getContext());
+  auto descriptor =
+      MemRefDescriptor::poison(builder, loc, types.convertType(type));
+  descriptor.setAllocatedPtr(builder, loc, pointer);
+  descriptor.setAlignedPtr(builder, loc, pointer);
+  descriptor.setConstantOffset(builder, loc, 0);
+  descriptor.setSize(builder, loc, 0, size);
+  descriptor.setConstantStride(builder, loc, 0, 1);
+  return UnrealizedConversionCastOp::create(builder, loc, type,
+                                            Value(descriptor))
+      .getResult(0);
 }
 
 Value piko::createOffset(OpBuilder &builder, Location loc, Value pointer,

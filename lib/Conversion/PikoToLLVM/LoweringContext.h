@@ -36,6 +36,13 @@ struct StateView {
   llvm::SmallVector<mlir::Value> extents; // i64
 };
 
+/// What the threads of a grid leave their emissions in.
+struct Grid {
+  mlir::Value log;   ///< pikoir_log *
+  mlir::Value order; ///< memref<4xi64>
+  int32_t places = 0;
+};
+
 class LoweringContext {
 public:
   explicit LoweringContext(mlir::ModuleOp module)
@@ -79,12 +86,17 @@ public:
   mlir::Value text(mlir::OpBuilder &builder, mlir::Location loc,
                    mlir::StringRef text);
 
+  /// The grid that an operation is in, or null on a CPU.
+  Grid *grid(mlir::Operation *op);
+  void noteGrid(mlir::Operation *inside, Grid grid);
+
   const AliasTags tags;
 
 private:
   mlir::ModuleOp module;
   llvm::StringMap<mlir::LLVM::GlobalOp> texts;
   llvm::DenseMap<mlir::Operation *, const PipelineNumbers *> functions;
+  llvm::DenseMap<mlir::Operation *, Grid> grids; // by launch
   /// By function and name.
   llvm::DenseMap<mlir::Operation *, llvm::StringMap<StateView>> views;
   llvm::DenseMap<mlir::Operation *, llvm::StringMap<mlir::Value>> queries;
@@ -127,8 +139,13 @@ mlir::Value createFieldAddress(mlir::OpBuilder &builder, mlir::Location loc,
                                mlir::Value record, FieldAttr field,
                                mlir::ValueRange elements);
 
-/// Patterns for the storage of bins, for writers, for state, and for checking
-/// mode.
+/// So many bytes (i64) at a pointer, as a memref.
+mlir::Value createBytes(mlir::OpBuilder &builder, mlir::Location loc,
+                        mlir::Value pointer, mlir::Value size,
+                        mlir::MemRefType type);
+
+/// Patterns for the storage of bins, for writers, for state, for checking mode,
+/// and for the logs of grids.
 void populateKernelToLLVMPatterns(const mlir::TypeConverter &converter,
                                   mlir::RewritePatternSet &patterns,
                                   LoweringContext &context);
@@ -141,6 +158,10 @@ void populateStateToLLVMPatterns(const mlir::TypeConverter &converter,
 void populateChecksToLLVMPatterns(const mlir::TypeConverter &converter,
                                   mlir::RewritePatternSet &patterns,
                                   LoweringContext &context);
+
+void populateGridToLLVMPatterns(const mlir::TypeConverter &converter,
+                                mlir::RewritePatternSet &patterns,
+                                LoweringContext &context);
 
 /// Makes branches of casts from float to integer that saturate.
 void branchInSaturatingCasts(mlir::func::FuncOp function);

@@ -168,6 +168,7 @@ LogicalResult ConvertPikoToLLVMPass::convert(PipelineOp pipeline,
   populateWriterToLLVMPatterns(converter, patterns, context);
   populateStateToLLVMPatterns(converter, patterns, context);
   populateChecksToLLVMPatterns(converter, patterns, context);
+  populateGridToLLVMPatterns(converter, patterns, context);
   FrozenRewritePatternSet frozen(std::move(patterns));
   for (func::FuncOp function : functions)
     if (failed(applyPartialConversion(function, target, frozen)))

@@ -2,7 +2,7 @@
 //
 // Constants, buffers and images, as memory that the runtime holds.
 
-#include "LoweringContext.h"
+#include "GridLog.h"
 
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
 
@@ -178,22 +178,28 @@ template <typename OpT> struct FailPattern : ContextPattern<OpT> {
   using ContextPattern<OpT>::context;
 
 protected:
-  /// Calls it in place of the operation. `name` is the text that it takes, or
-  /// null; `numbers` are its last arguments.
-  void replace(ConversionPatternRewriter &rewriter, OpT op,
-               const RuntimeFunction &function, std::optional<StringRef> name,
-               Value bin, ArrayRef<Value> numbers) const {
+  /// Calls it in place of the operation, or adds it to the log of a grid.
+  /// `name` is the text that it takes, or null; `code` and `numbers` are its
+  /// last arguments.
+  void replace(ConversionPatternRewriter &rewriter, OpT op, const RuntimeFunction &function,
+               std::optional<StringRef> name, Value bin,
+               std::optional<int32_t> code, ArrayRef<Value> numbers) const {
     Location loc = op.getLoc();
-    SmallVector<Value> arguments{
-        context.frame(op),
-        createI32(rewriter, loc, context.stageNumber(op, op.getStage())),
-        name ? context.text(rewriter, loc, *name)
-             : LLVM::ZeroOp::create(
-                   rewriter, loc,
-                   LLVM::LLVMPointerType::get(rewriter.getContext())),
-        bin ? toI64(rewriter, loc, bin) : createI64(rewriter, loc, -1)};
-    llvm::append_range(arguments, numbers);
-    context.call(rewriter, loc, function, arguments);
+    int32_t stage = context.stageNumber(op, op.getStage());
+    if (!createErrorEntry(rewriter, op, context, function.name, stage, name, bin,
+                          code.value_or(0), numbers)) {
+      SmallVector<Value> arguments{
+          context.frame(op), createI32(rewriter, loc, stage),
+          name ? context.text(rewriter, loc, *name)
+               : LLVM::ZeroOp::create(
+                     rewriter, loc,
+                     LLVM::LLVMPointerType::get(rewriter.getContext())),
+          bin ? toI64(rewriter, loc, bin) : createI64(rewriter, loc, -1)};
+      if (code)
+        arguments.push_back(createI32(rewriter, loc, *code));
+      llvm::append_range(arguments, numbers);
+      context.call(rewriter, loc, function, arguments);
+    }
     rewriter.eraseOp(op);
   }
 };
@@ -208,10 +214,9 @@ struct FailLowering : FailPattern<FailOp> {
     for (Value index : adaptor.getIndices())
       indices.push_back(toI64(rewriter, loc, index));
     if (op.getOutsideBin())
-      replace(rewriter, op, PIKO_RUNTIME_FUNCTION(pikoir_fail), op.getOf(),
-              adaptor.getBin(),
-              {createI32(rewriter, loc, PIKORT_UPDATE_OUTSIDE),
-               packCoordinates(rewriter, loc, indices, 0),
+      replace(rewriter, op, PIKO_RUNTIME_FUNCTION(pikoir_fail), op.getOf(), adaptor.getBin(),
+              PIKORT_UPDATE_OUTSIDE,
+              {packCoordinates(rewriter, loc, indices, 0),
                packCoordinates(rewriter, loc, indices, 2)});
     else
       failIndex(rewriter, op, indices, adaptor.getBin());
@@ -236,8 +241,8 @@ private:
     }
     int32_t state =
         context.numbers(op).states.lookup(op.getStateAttr().getAttr());
-    replace(rewriter, op, PIKO_RUNTIME_FUNCTION(pikoir_fail_index), op.getOf(),
-            bin, {createI32(rewriter, loc, state), index, count});
+    replace(rewriter, op, PIKO_RUNTIME_FUNCTION(pikoir_fail_index), op.getOf(), bin, state,
+            {index, count});
   }
 };
 
@@ -247,10 +252,9 @@ struct FailListLowering : FailPattern<FailListOp> {
   matchAndRewrite(FailListOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
     Location loc = op.getLoc();
-    replace(rewriter, op, PIKO_RUNTIME_FUNCTION(pikoir_fail), std::nullopt,
-            adaptor.getBin(),
-            {createI32(rewriter, loc, PIKORT_INDEX_OUTSIDE),
-             toI64(rewriter, loc, adaptor.getIndex()),
+    replace(rewriter, op, PIKO_RUNTIME_FUNCTION(pikoir_fail), std::nullopt, adaptor.getBin(),
+            PIKORT_INDEX_OUTSIDE,
+            {toI64(rewriter, loc, adaptor.getIndex()),
              toI64(rewriter, loc, adaptor.getSize())});
     return success();
   }
@@ -264,7 +268,7 @@ struct FailBarrierLowering : FailPattern<FailBarrierOp> {
     auto barrier = op->getAttrOfType<StringAttr>(cppNameAttr);
     replace(rewriter, op, PIKO_RUNTIME_FUNCTION(pikoir_fail_barrier),
             barrier ? barrier.getValue() : "sync", adaptor.getBin(),
-            {toI64(rewriter, op.getLoc(), adaptor.getIteration())});
+            /*code=*/std::nullopt, {toI64(rewriter, op.getLoc(), adaptor.getIteration())});
     return success();
   }
 };
@@ -276,9 +280,8 @@ struct FailDivideLowering : FailPattern<FailDivideOp> {
                   ConversionPatternRewriter &rewriter) const override {
     Location loc = op.getLoc();
     Value zero = createI64(rewriter, loc, 0);
-    replace(rewriter, op, PIKO_RUNTIME_FUNCTION(pikoir_fail), op.getOf(),
-            adaptor.getBin(),
-            {createI32(rewriter, loc, PIKORT_NO_QUOTIENT), zero, zero});
+    replace(rewriter, op, PIKO_RUNTIME_FUNCTION(pikoir_fail), op.getOf(), adaptor.getBin(),
+            PIKORT_NO_QUOTIENT, {zero, zero});
     return success();
   }
 };

@@ -3,11 +3,9 @@
 // Writers, what is emitted to them, and scratch memory, on the runtime's
 // structs (pikort/abi.h).
 
+#include "GridLog.h"
 #include "KernelLowering.h"
 #include "WriterPaths.h"
-
-#include "mlir/Conversion/LLVMCommon/MemRefBuilder.h"
-#include "mlir/Conversion/LLVMCommon/TypeConverter.h"
 
 using namespace mlir;
 using namespace piko;
@@ -75,7 +73,11 @@ struct NextLowering : Lowering<NextOp> {
   LogicalResult
   matchAndRewrite(NextOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
-    createNext(rewriter, op.getLoc(), context, adaptor.getWriter());
+    if (Grid *grid = context.grid(op))
+      createEntry(rewriter, op, *grid, EntryKind::Next, /*number=*/0,
+                  /*bytes=*/0);
+    else
+      createNext(rewriter, op.getLoc(), context, adaptor.getWriter());
     rewriter.eraseOp(op);
     return success();
   }
@@ -130,19 +132,9 @@ struct ScratchLowering : Lowering<ScratchOp> {
     Value null = LLVM::ZeroOp::create(rewriter, loc, pointer(rewriter));
     Value granted = LLVM::ICmpOp::create(rewriter, loc, LLVM::ICmpPredicate::ne,
                                          memory, null);
-    // As the conversion of memrefs will see it.
-    auto bytes = cast<MemRefType>(op.getBytes().getType());
-    LLVMTypeConverter types(rewriter.getContext());
-    auto descriptor =
-        MemRefDescriptor::poison(rewriter, loc, types.convertType(bytes));
-    descriptor.setAllocatedPtr(rewriter, loc, memory);
-    descriptor.setAlignedPtr(rewriter, loc, memory);
-    descriptor.setConstantOffset(rewriter, loc, 0);
-    descriptor.setSize(rewriter, loc, 0, size);
-    descriptor.setConstantStride(rewriter, loc, 0, 1);
-    Value memref = UnrealizedConversionCastOp::create(rewriter, loc, bytes,
-                                                      Value(descriptor))
-                       .getResult(0);
+    Value memref =
+        createBytes(rewriter, loc, memory, size,
+                    cast<MemRefType>(op.getBytes().getType()));
     rewriter.replaceOp(op, {memref, granted});
     return success();
   }
@@ -155,8 +147,11 @@ struct AppendLowering : Lowering<AppendOp> {
                   ConversionPatternRewriter &rewriter) const override {
     Location loc = op.getLoc();
     RecordOp record = context.record(op.getPrim().getType().getRecord());
-    Value room =
-        createAppend(rewriter, loc, context, adaptor.getWriter(), op.getPort());
+    Grid *grid = context.grid(op);
+    Value room = grid ? createEntry(rewriter, op, *grid, EntryKind::Record,
+                                    op.getPort(), record.getSize())
+                      : createAppend(rewriter, loc, context,
+                                     adaptor.getWriter(), op.getPort());
     SmallVector<ArrayAttr> tags; // of each number
     for (auto field : record.getFields().getAsRange<FieldAttr>())
       tags.append(field.getElementCount(),
@@ -188,7 +183,11 @@ struct PlaceLowering : Lowering<AppendBinOp> {
       cell = arith::AddIOp::create(rewriter, loc, cell,
                                    toI64(rewriter, loc, adaptor.getTile()));
     }
-    if (op.getPort() && isLocal(op))
+    if (Grid *grid = context.grid(op)) {
+      Value entry = createEntry(rewriter, op, *grid, EntryKind::Cell,
+                                op.getPort().value_or(0), /*bytes=*/8);
+      LLVM::StoreOp::create(rewriter, loc, cell, entry);
+    } else if (op.getPort() && isLocal(op))
       createLocalPlace(rewriter, loc, context, adaptor.getWriter(),
                        *op.getPort(), cell);
     else if (op.getPort())

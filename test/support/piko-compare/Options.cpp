@@ -82,12 +82,16 @@ Options parseOptions(int argc, char **argv) {
       if (!synthesis)
         throw std::runtime_error(piko::describeWrongSynthesisOptions(text));
       options.synthesis = *synthesis;
-    } else if (name == "--emulate-gpu") {
-      options.gpu.emulate = true;
+    } else if (name == "--target") {
+      std::string target = words.takeValues(name, false)[0];
+      if (target != "cpu" && target != "gpu-on-cpu")
+        throw std::runtime_error("expected --target cpu or gpu-on-cpu");
+      options.gpu.emulate = target != "cpu";
+    } else if (name == "--gpu-threads")
       options.gpu.threads =
           toNumbers<int64_t>(words.takeValues(name, false))[0];
-    } else if (name == "--reverse")
-      options.gpu.reverse = true;
+    else if (name == "--gpu-seed")
+      options.gpu.seed = toNumbers<int64_t>(words.takeValues(name, false))[0];
     else if (name == "--threads")
       options.threads = toNumbers<int>(words.takeValues(name, true));
     else if (name == "--runs")

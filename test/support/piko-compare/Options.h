@@ -47,8 +47,7 @@ struct Options {
   /// Checking mode, on both sides.
   piko::CheckOptions check;
   piko::SynthesisOptions synthesis;
-  /// With --emulate-gpu N: kernels run as blocks of N threads, 0 = as the stage
-  /// says; with --reverse from the last thread to the first.
+  /// --target gpu-on-cpu, --gpu-threads N (0 = as the stage says), --gpu-seed N.
   piko::GPUOptions gpu;
 };
 

@@ -8,7 +8,7 @@
 //                [--cases FILE] [--threads T ..] [--runs N]
 //                [--timeout SECONDS] [--strip N] [--budget BYTES]
 //                [--check[=nan:RECORD.FIELD,..]]
-//                [--emulate-gpu THREADS [--reverse]]
+//                [--target gpu-on-cpu] [--gpu-threads N] [--gpu-seed N]
 //
 // Options.h says what the options mean, Run.h what the input is. With --cases
 // each line of that file is a case, with the options --pipe to --loop-limit; a

@@ -5,6 +5,7 @@
 #include "FieldAccess.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 #include "Piko/Dialect/Piko/IR/PikoCheck.h"
+#include "Piko/Dialect/Piko/IR/PikoGPU.h"
 #include "Piko/Dialect/Piko/IR/PikoProgram.h"
 
 #include "mlir/IR/DialectImplementation.h"
@@ -45,6 +46,10 @@ void PikoDialect::initialize() {
   addOperations<
 #define GET_OP_LIST
 #include "Piko/Dialect/Piko/IR/PikoProgramOps.cpp.inc"
+      >();
+  addOperations<
+#define GET_OP_LIST
+#include "Piko/Dialect/Piko/IR/PikoGPUOps.cpp.inc"
       >();
 }
 
