@@ -72,8 +72,7 @@ static bool hasGPUKernels(ModuleOp module) {
 
 /// Whether kernels for a GPU are launched on one.
 static bool hasLaunches(ModuleOp module) {
-  return module
-      .walk([](gpu::LaunchFuncOp) { return WalkResult::interrupt(); })
+  return module.walk([](gpu::LaunchFuncOp) { return WalkResult::interrupt(); })
       .wasInterrupted();
 }
 

@@ -119,11 +119,11 @@ static std::string makeRequest(const ObjectOptions &options,
       key.add(item);
   }
   key.add(processor.name).add(processor.features);
-  for (int number : {int(source.text.has_value()), int(source.check.enabled),
-                     int(options.execution), options.target.optLevel,
-                     int(options.target.sanitizer), int(options.remarks),
-                     int(source.gpu.emulate), int(source.gpu.seed),
-                     int(source.gpu.threads)})
+  for (int number :
+       {int(source.text.has_value()), int(source.check.enabled),
+        int(options.execution), options.target.optLevel,
+        int(options.target.sanitizer), int(options.remarks),
+        int(source.gpu.emulate), int(source.gpu.seed), int(source.gpu.threads)})
     key.add(std::to_string(number));
   key.add(options.nameSpace).add(getRuntimeIncludeDir());
   // What Clang looks at besides its options.

@@ -39,9 +39,9 @@ struct Thread {
   State state = State::Ready;
   bool started = false;
   jmp_buf self;
-  uint32_t mask = 0;  ///< Of a Ballot or a Shuffle.
-  int32_t value = 0;  ///< What it gives, then what it gets.
-  int32_t lane = 0;   ///< That a Shuffle asks.
+  uint32_t mask = 0;    ///< Of a Ballot or a Shuffle.
+  int32_t value = 0;    ///< What it gives, then what it gets.
+  int32_t lane = 0;     ///< That a Shuffle asks.
   void *site = nullptr; ///< Of an Active.
 };
 
@@ -150,8 +150,8 @@ bool Device::resolveMasked(size_t first, size_t end) {
     bool isComplete = true;
     for (size_t j = first; j < first + warpSize; ++j)
       if (mask >> (j - first) & 1)
-        isComplete &= j < end && threads[j].state == state &&
-                      threads[j].mask == mask;
+        isComplete &=
+            j < end && threads[j].state == state && threads[j].mask == mask;
     if (!isComplete || !(mask >> (i - first) & 1))
       continue;
     std::array<int32_t, warpSize> results{};
@@ -187,7 +187,8 @@ bool Device::resolveActive(size_t first, size_t end) {
   void *site = nullptr;
   uint32_t mask = 0;
   for (size_t i = first; i < end; ++i)
-    if (threads[i].state == State::Active && (!site || threads[i].site == site)) {
+    if (threads[i].state == State::Active &&
+        (!site || threads[i].site == site)) {
       site = threads[i].site;
       mask |= 1u << (i - first);
     }
@@ -217,8 +218,7 @@ std::string Device::describe() const {
   return "threads of block " + std::to_string(block) +
          " wait for each other: " + std::to_string(waiting) +
          " at a barrier, " + std::to_string(other) +
-         " for lanes of their warps, " + std::to_string(ended) +
-         " have ended";
+         " for lanes of their warps, " + std::to_string(ended) + " have ended";
 }
 
 std::string Device::runBlock(int64_t number) {

@@ -209,8 +209,8 @@ private:
     return v;
   }
   void parseTarget(const std::string &name) {
-    options.load.target = name == "reference" ? ExecutionTarget::Reference
-                                              : ExecutionTarget::CPU;
+    options.load.target =
+        name == "reference" ? ExecutionTarget::Reference : ExecutionTarget::CPU;
     options.load.gpu.emulate = name == "gpu-on-cpu";
     if (name != "cpu" && name != "gpu-on-cpu" && name != "reference")
       fail("--target: expected cpu, gpu-on-cpu or reference, but got '" + name +

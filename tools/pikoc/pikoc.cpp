@@ -90,13 +90,13 @@ struct CommandLine {
                      "ptx)"),
       llvm::cl::cat(category)};
   llvm::cl::opt<Machine> target{
-      "target",
-      llvm::cl::desc("what code runs on (default: cpu)"),
+      "target", llvm::cl::desc("what code runs on (default: cpu)"),
       llvm::cl::values(
           clEnumValN(Machine::CPU, "cpu", "the processor"),
-          clEnumValN(Machine::GPUOnCPU, "gpu-on-cpu",
-                     "kernels for a GPU, on the processor: blocks one after the "
-                     "other, their threads by turns")),
+          clEnumValN(
+              Machine::GPUOnCPU, "gpu-on-cpu",
+              "kernels for a GPU, on the processor: blocks one after the "
+              "other, their threads by turns")),
       llvm::cl::init(Machine::CPU), llvm::cl::cat(category)};
   llvm::cl::opt<int64_t> gpuSeed{
       "gpu-seed", llvm::cl::value_desc("number"), llvm::cl::init(0),

@@ -9,7 +9,8 @@
 
 namespace piko {
 
-/// The function that runs one thread of a kernel on the CPU: void (const void *)
+/// The function that runs one thread of a kernel on the CPU: void (const void
+/// *)
 inline std::string getEmulatedName(llvm::StringRef module,
                                    llvm::StringRef kernel) {
   return (module + "." + kernel + ".emulated").str();

@@ -62,9 +62,9 @@ private:
     setOrder(builder, which, arith::AddIOp::create(builder, loc, now, one));
   }
   scf::IfOp createFirst(OpBuilder &builder) {
-    Value isFirst = arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::eq,
-                                          launch.getThreadIds().x,
-                                          constant(builder, 0));
+    Value isFirst =
+        arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::eq,
+                              launch.getThreadIds().x, constant(builder, 0));
     auto first = scf::IfOp::create(builder, loc, isFirst);
     firsts.insert(first);
     return first;
@@ -77,9 +77,7 @@ private:
                         MemRefLayoutAttrInterface(), space),
         loc);
   }
-  Value addCell(Type type) {
-    return addMemory(MemRefType::get({1}, type));
-  }
+  Value addCell(Type type) { return addMemory(MemRefType::get({1}, type)); }
 
   gpu::LaunchOp launch;
   Value log, order;
@@ -113,7 +111,8 @@ static bool isShared(Operation *op) {
 /// Whether an operation only reads, apart from arrays that it makes.
 static bool onlyReads(Operation *op) {
   return !contains(op, [](Operation *inner) {
-    if (inner->getNumRegions() && inner->hasTrait<OpTrait::HasRecursiveMemoryEffects>())
+    if (inner->getNumRegions() &&
+        inner->hasTrait<OpTrait::HasRecursiveMemoryEffects>())
       return false;
     return !isMemoryEffectFree(inner) &&
            !hasSingleEffect<MemoryEffects::Read>(inner);
@@ -189,9 +188,8 @@ LogicalResult BlockMapper::mapRun(ArrayRef<Operation *> run) {
     if (front->isBeforeInBlock(op) && op->isBeforeInBlock(taken.back()) &&
         !taken.contains(op))
       op->moveBefore(front);
-  if (llvm::any_of(taken, [](Operation *op) {
-        return contains(op, isEmission);
-      }))
+  if (llvm::any_of(taken,
+                   [](Operation *op) { return contains(op, isEmission); }))
     advanceOrder(builder, step);
   gpu::BarrierOp::create(builder, loc);
   scf::IfOp first = createFirst(builder);
@@ -303,13 +301,14 @@ void BlockMapper::mapScratch(ScratchOp scratch) {
   inside = first.getThenBodyBuilder();
   Value zero = constant(inside, 0), size = scratch.getSize();
   Value now = memref::LoadOp::create(inside, loc, room, zero);
-  Value isSmall = arith::CmpIOp::create(
-      inside, loc, arith::CmpIPredicate::ugt, size, now);
+  Value isSmall =
+      arith::CmpIOp::create(inside, loc, arith::CmpIPredicate::ugt, size, now);
   auto grow = scf::IfOp::create(inside, loc, isSmall);
   inside = grow.getThenBodyBuilder();
-  Value taken = AllocateOp::create(inside, loc, inside.getIndexType(), log, size);
-  Value none = arith::CmpIOp::create(inside, loc, arith::CmpIPredicate::eq,
-                                     taken, zero);
+  Value taken =
+      AllocateOp::create(inside, loc, inside.getIndexType(), log, size);
+  Value none =
+      arith::CmpIOp::create(inside, loc, arith::CmpIPredicate::eq, taken, zero);
   memref::StoreOp::create(inside, loc, taken, address, zero);
   Value has = arith::SelectOp::create(inside, loc, none, zero, size);
   memref::StoreOp::create(inside, loc, has, room, zero);
@@ -317,10 +316,10 @@ void BlockMapper::mapScratch(ScratchOp scratch) {
   zero = constant(builder, 0);
   Value at = memref::LoadOp::create(builder, loc, address, zero);
   now = memref::LoadOp::create(builder, loc, room, zero);
-  Value granted = arith::CmpIOp::create(
-      builder, loc, arith::CmpIPredicate::ule, size, now);
-  Value bytes = BytesAtOp::create(builder, loc, scratch.getBytes().getType(),
-                                  at, size);
+  Value granted =
+      arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::ule, size, now);
+  Value bytes =
+      BytesAtOp::create(builder, loc, scratch.getBytes().getType(), at, size);
   scratch.getBytes().replaceAllUsesWith(bytes);
   scratch.getGranted().replaceAllUsesWith(granted);
   scratch.erase();
@@ -359,8 +358,8 @@ Value BlockMapper::createBlockArray(memref::AllocaOp array) {
       builder, loc, MemRefType::get(type.getShape(), type.getElementType()),
       all, zero, ValueRange());
   // Without memory the block does nothing; the run ends with an error.
-  Value granted = arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::ne,
-                                        at, zero);
+  Value granted =
+      arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::ne, at, zero);
   auto rest = scf::IfOp::create(builder, loc, granted);
   Block &body = launch.getBody().front();
   rest.thenBlock()->getOperations().splice(

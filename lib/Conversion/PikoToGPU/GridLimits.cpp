@@ -16,8 +16,9 @@ using namespace piko;
 LogicalResult piko::checkGridLimits(KernelOp kernel) {
   WalkResult result = kernel.walk([&](Operation *op) -> WalkResult {
     if (isa<LocalBinOp>(op))
-      return op->emitError("a kernel for a GPU has no local barriers; leave out "
-                           "piko-fuse-kernels");
+      return op->emitError(
+          "a kernel for a GPU has no local barriers; leave out "
+          "piko-fuse-kernels");
     if (hasOtherBitsInPTX(op))
       return op->emitError("a kernel for a GPU uses '")
              << op->getName() << "', which has other bits there";
@@ -51,14 +52,13 @@ bool piko::canSharePixels(KernelOp kernel) {
       written.insert(atomic.getState());
     updates |= isa<UpdateOp>(op);
   });
-  return updates && !kernel
-                         .walk([&](Operation *op) {
-                           auto load = dyn_cast<LoadOp>(op);
-                           bool readsOwn =
-                               load && written.contains(load.getState());
-                           return readsOwn || isObstacle(op)
-                                      ? WalkResult::interrupt()
-                                      : WalkResult::advance();
-                         })
-                         .wasInterrupted();
+  return updates &&
+         !kernel
+              .walk([&](Operation *op) {
+                auto load = dyn_cast<LoadOp>(op);
+                bool readsOwn = load && written.contains(load.getState());
+                return readsOwn || isObstacle(op) ? WalkResult::interrupt()
+                                                  : WalkResult::advance();
+              })
+              .wasInterrupted();
 }

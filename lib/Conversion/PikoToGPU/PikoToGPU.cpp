@@ -272,9 +272,8 @@ LogicalResult GridBuilder::convertAccess() {
   populatePikoToSCFPatterns(patterns);
   return applyPatternsGreedily(
       kernel, std::move(patterns),
-      GreedyRewriteConfig()
-          .enableFolding(false)
-          .setRegionSimplificationLevel(GreedySimplifyRegionLevel::Disabled));
+      GreedyRewriteConfig().enableFolding(false).setRegionSimplificationLevel(
+          GreedySimplifyRegionLevel::Disabled));
 }
 
 LogicalResult GridBuilder::sharePixelsOfBins(SharingCounts &counts) {
@@ -327,7 +326,8 @@ LogicalResult ConvertPikoToGPUPass::convert(KernelOp kernel) {
   auto opened = kernel.getOps<OpenBinsOp>();
   if (opened.empty())
     return success(); // of a schedule
-  auto stage = lookupInPipeline<StageOp>(kernel, (*opened.begin()).getStageAttr());
+  auto stage =
+      lookupInPipeline<StageOp>(kernel, (*opened.begin()).getStageAttr());
   int64_t count = threads;
   if (!count)
     count = std::min<int64_t>(maxThreads,

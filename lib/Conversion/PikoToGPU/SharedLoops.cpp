@@ -2,8 +2,9 @@
 //
 // Which loops the threads of a block may share. The iterations of a parallel
 // loop are independent but for the order of their emissions, which the log
-// restores, and of their updates: these must be of one pixel for each iteration.
-// The primitives of a bin are independent unless their stage updates pixels.
+// restores, and of their updates: these must be of one pixel for each
+// iteration. The primitives of a bin are independent unless their stage updates
+// pixels.
 
 #include "PikoToGPU.h"
 
@@ -24,7 +25,8 @@ static bool isCast(Operation *op) {
 /// alike.
 static Value getRoot(Value value, scf::ForOp loop) {
   auto isInvariant = [&](Value other) {
-    return loop.isDefinedOutsideOfLoop(other) || matchPattern(other, m_Constant());
+    return loop.isDefinedOutsideOfLoop(other) ||
+           matchPattern(other, m_Constant());
   };
   while (Operation *op = value.getDefiningOp()) {
     if (isCast(op))
@@ -101,8 +103,8 @@ static bool updatesOwnPixels(scf::ForOp loop) {
   WalkResult result = loop.walk([&](UpdateOp update) -> WalkResult {
     auto [it, isFirst] = known.try_emplace(update.getImage(), update);
     if (!isFirst)
-      return WalkResult(success(llvm::equal(
-          it->second.getCoordinates(), update.getCoordinates())));
+      return WalkResult(success(
+          llvm::equal(it->second.getCoordinates(), update.getCoordinates())));
     SmallVector<Value> roots;
     for (Value coordinate : update.getCoordinates())
       roots.push_back(getRoot(coordinate, loop));
@@ -122,14 +124,14 @@ static bool hasCutLoops(scf::ForOp loop) {
 }
 
 void piko::findSharedLoops(KernelOp kernel) {
-  bool isChecked = kernel
-                       .walk([](Operation *op) {
-                         return op->getName().getStringRef().starts_with(
-                                    "piko.check_")
-                                    ? WalkResult::interrupt()
-                                    : WalkResult::advance();
-                       })
-                       .wasInterrupted();
+  bool isChecked =
+      kernel
+          .walk([](Operation *op) {
+            return op->getName().getStringRef().starts_with("piko.check_")
+                       ? WalkResult::interrupt()
+                       : WalkResult::advance();
+          })
+          .wasInterrupted();
   if (isChecked)
     return; // what is checked is reported in the order of the reference
   kernel.walk<WalkOrder::PreOrder>([&](scf::ForOp loop) {

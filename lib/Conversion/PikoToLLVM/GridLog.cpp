@@ -21,10 +21,20 @@ using namespace piko;
 
 // Byte offsets of the members of pikoir_entry and pikoir_log.
 namespace layout {
-constexpr int64_t bytes = 0, kind = 8, unit = 16, order = 24, header = 64;
-constexpr int64_t cursor = 0, limit = 8, spare = 16;
-constexpr int64_t unitCount = 40; // of pikoir_input
+constexpr int64_t bytes = offsetof(pikoir_entry, bytes),
+                  kind = offsetof(pikoir_entry, kind),
+                  unit = offsetof(pikoir_entry, unit),
+                  order = offsetof(pikoir_entry, order),
+                  header = sizeof(pikoir_entry);
+constexpr int64_t cursor = offsetof(pikoir_log, cursor),
+                  limit = offsetof(pikoir_log, limit),
+                  spare = offsetof(pikoir_log, spare);
 } // namespace layout
+static_assert(int(EntryKind::Record) == PIKOIR_ENTRY_RECORD &&
+              int(EntryKind::Cell) == PIKOIR_ENTRY_CELL &&
+              int(EntryKind::Next) == PIKOIR_ENTRY_NEXT &&
+              int(EntryKind::Error) == PIKOIR_ENTRY_ERROR &&
+              int(EntryKind::Memory) == PIKOIR_ENTRY_MEMORY);
 
 namespace {
 
@@ -66,10 +76,10 @@ struct ThreadCode {
     return arith::CmpIOp::create(builder, loc, predicate, a, b);
   }
   Value addTo(Value log, Value bytes) {
-    return LLVM::AtomicRMWOp::create(builder, loc, LLVM::AtomicBinOp::add,
-                                     createOffset(builder, loc, log,
-                                                  layout::cursor),
-                                     bytes, LLVM::AtomicOrdering::monotonic);
+    return LLVM::AtomicRMWOp::create(
+        builder, loc, LLVM::AtomicBinOp::add,
+        createOffset(builder, loc, log, layout::cursor), bytes,
+        LLVM::AtomicOrdering::monotonic);
   }
   Value shuffle(Value mask, Value value, Value lane) {
     return intrinsic("llvm.nvvm.shfl.sync.idx.i32",
@@ -88,8 +98,8 @@ Value ThreadCode::shuffleWide(Value mask, Value value, Value lane) {
       builder, loc, i32(), arith::ShRUIOp::create(builder, loc, value, half));
   low = extend(shuffle(mask, low, lane));
   high = extend(shuffle(mask, high, lane));
-  return arith::OrIOp::create(
-      builder, loc, low, arith::ShLIOp::create(builder, loc, high, half));
+  return arith::OrIOp::create(builder, loc, low,
+                              arith::ShLIOp::create(builder, loc, high, half));
 }
 
 /// The address of so many bytes for each thread that comes here.
@@ -98,8 +108,8 @@ Value ThreadCode::reserve(Value log, int64_t bytes) {
   Value below = intrinsic("llvm.nvvm.read.ptx.sreg.lanemask.lt");
   Value rank = math::CtPopOp::create(builder, loc, bitAnd(mask, below));
   Value count = math::CtPopOp::create(builder, loc, mask);
-  Value isLeader = compare(arith::CmpIPredicate::eq, rank,
-                           createI32(builder, loc, 0));
+  Value isLeader =
+      compare(arith::CmpIPredicate::eq, rank, createI32(builder, loc, 0));
   auto taken = scf::IfOp::create(
       builder, loc, isLeader,
       [&](OpBuilder &inside, Location) {
@@ -146,8 +156,7 @@ Value piko::createEntry(OpBuilder &builder, Operation *op, const Grid &grid,
 bool piko::createErrorEntry(OpBuilder &builder, Operation *op,
                             LoweringContext &context, StringRef function,
                             int32_t stage, std::optional<StringRef> name,
-                            Value bin, int32_t code,
-                            ArrayRef<Value> numbers) {
+                            Value bin, int32_t code, ArrayRef<Value> numbers) {
   auto launch = op->getParentOfType<gpu::LaunchOp>();
   Grid *grid = context.grid(op);
   if (!grid)
@@ -156,9 +165,9 @@ bool piko::createErrorEntry(OpBuilder &builder, Operation *op,
   int32_t place = grid->places++;
   {
     OpBuilder host(launch);
-    int32_t which = function == "pikoir_fail"         ? 0
-                    : function == "pikoir_fail_index" ? 1
-                                                      : 2;
+    int32_t which = function == "pikoir_fail"         ? PIKOIR_PLACE_FAIL
+                    : function == "pikoir_fail_index" ? PIKOIR_PLACE_INDEX
+                                                      : PIKOIR_PLACE_BARRIER;
     Value text =
         name ? context.text(host, loc, *name)
              : LLVM::ZeroOp::create(
@@ -191,12 +200,15 @@ struct OpenLogLowering : ContextPattern<OpenLogOp> {
     auto number = function->getAttrOfType<IntegerAttr>(numberAttrName);
     Location loc = op.getLoc();
     rewriter.replaceOp(
-        op, context.call(
-                rewriter, loc, PIKO_RUNTIME_FUNCTION(pikoir_log_open),
-                {context.frame(op), createI32(rewriter, loc, number.getInt()),
-                 createI32(rewriter, loc,
-                           function->hasAttr(sourceAttrName) ? 1 : 0),
-                 context.member(rewriter, adaptor.getBins(), PIKO_RUNTIME_MEMBER(pikoir_input, unit_count))}));
+        op,
+        context.call(
+            rewriter, loc, PIKO_RUNTIME_FUNCTION(pikoir_log_open),
+            {context.frame(op), createI32(rewriter, loc, number.getInt()),
+             createI32(rewriter, loc,
+                       function->hasAttr(sourceAttrName) ? PIKOIR_LOG_SOURCE
+                                                         : 0),
+             context.member(rewriter, adaptor.getBins(),
+                            PIKO_RUNTIME_MEMBER(pikoir_input, unit_count))}));
     return success();
   }
 };

@@ -17,9 +17,9 @@ mlir::Value createEntry(mlir::OpBuilder &builder, mlir::Operation *op,
                         const Grid &grid, EntryKind kind, int64_t number,
                         int64_t bytes);
 
-/// Adds an error at a place of the grid; null outside one. `function` is that of
-/// the runtime that a CPU's kernel would call, `code` the number behind the bin,
-/// `numbers` the last two, or one.
+/// Adds an error at a place of the grid; null outside one. `function` is that
+/// of the runtime that a CPU's kernel would call, `code` the number behind the
+/// bin, `numbers` the last two, or one.
 bool createErrorEntry(mlir::OpBuilder &builder, mlir::Operation *op,
                       LoweringContext &context, mlir::StringRef function,
                       int32_t stage, std::optional<mlir::StringRef> name,

@@ -181,13 +181,14 @@ protected:
   /// Calls it in place of the operation, or adds it to the log of a grid.
   /// `name` is the text that it takes, or null; `code` and `numbers` are its
   /// last arguments.
-  void replace(ConversionPatternRewriter &rewriter, OpT op, const RuntimeFunction &function,
-               std::optional<StringRef> name, Value bin,
-               std::optional<int32_t> code, ArrayRef<Value> numbers) const {
+  void replace(ConversionPatternRewriter &rewriter, OpT op,
+               const RuntimeFunction &function, std::optional<StringRef> name,
+               Value bin, std::optional<int32_t> code,
+               ArrayRef<Value> numbers) const {
     Location loc = op.getLoc();
     int32_t stage = context.stageNumber(op, op.getStage());
-    if (!createErrorEntry(rewriter, op, context, function.name, stage, name, bin,
-                          code.value_or(0), numbers)) {
+    if (!createErrorEntry(rewriter, op, context, function.name, stage, name,
+                          bin, code.value_or(0), numbers)) {
       SmallVector<Value> arguments{
           context.frame(op), createI32(rewriter, loc, stage),
           name ? context.text(rewriter, loc, *name)
@@ -214,8 +215,8 @@ struct FailLowering : FailPattern<FailOp> {
     for (Value index : adaptor.getIndices())
       indices.push_back(toI64(rewriter, loc, index));
     if (op.getOutsideBin())
-      replace(rewriter, op, PIKO_RUNTIME_FUNCTION(pikoir_fail), op.getOf(), adaptor.getBin(),
-              PIKORT_UPDATE_OUTSIDE,
+      replace(rewriter, op, PIKO_RUNTIME_FUNCTION(pikoir_fail), op.getOf(),
+              adaptor.getBin(), PIKORT_UPDATE_OUTSIDE,
               {packCoordinates(rewriter, loc, indices, 0),
                packCoordinates(rewriter, loc, indices, 2)});
     else
@@ -241,8 +242,8 @@ private:
     }
     int32_t state =
         context.numbers(op).states.lookup(op.getStateAttr().getAttr());
-    replace(rewriter, op, PIKO_RUNTIME_FUNCTION(pikoir_fail_index), op.getOf(), bin, state,
-            {index, count});
+    replace(rewriter, op, PIKO_RUNTIME_FUNCTION(pikoir_fail_index), op.getOf(),
+            bin, state, {index, count});
   }
 };
 
@@ -252,8 +253,8 @@ struct FailListLowering : FailPattern<FailListOp> {
   matchAndRewrite(FailListOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
     Location loc = op.getLoc();
-    replace(rewriter, op, PIKO_RUNTIME_FUNCTION(pikoir_fail), std::nullopt, adaptor.getBin(),
-            PIKORT_INDEX_OUTSIDE,
+    replace(rewriter, op, PIKO_RUNTIME_FUNCTION(pikoir_fail), std::nullopt,
+            adaptor.getBin(), PIKORT_INDEX_OUTSIDE,
             {toI64(rewriter, loc, adaptor.getIndex()),
              toI64(rewriter, loc, adaptor.getSize())});
     return success();
@@ -268,7 +269,8 @@ struct FailBarrierLowering : FailPattern<FailBarrierOp> {
     auto barrier = op->getAttrOfType<StringAttr>(cppNameAttr);
     replace(rewriter, op, PIKO_RUNTIME_FUNCTION(pikoir_fail_barrier),
             barrier ? barrier.getValue() : "sync", adaptor.getBin(),
-            /*code=*/std::nullopt, {toI64(rewriter, op.getLoc(), adaptor.getIteration())});
+            /*code=*/std::nullopt,
+            {toI64(rewriter, op.getLoc(), adaptor.getIteration())});
     return success();
   }
 };
@@ -280,8 +282,8 @@ struct FailDivideLowering : FailPattern<FailDivideOp> {
                   ConversionPatternRewriter &rewriter) const override {
     Location loc = op.getLoc();
     Value zero = createI64(rewriter, loc, 0);
-    replace(rewriter, op, PIKO_RUNTIME_FUNCTION(pikoir_fail), op.getOf(), adaptor.getBin(),
-            PIKORT_NO_QUOTIENT, {zero, zero});
+    replace(rewriter, op, PIKO_RUNTIME_FUNCTION(pikoir_fail), op.getOf(),
+            adaptor.getBin(), PIKORT_NO_QUOTIENT, {zero, zero});
     return success();
   }
 };

@@ -132,9 +132,8 @@ struct ScratchLowering : Lowering<ScratchOp> {
     Value null = LLVM::ZeroOp::create(rewriter, loc, pointer(rewriter));
     Value granted = LLVM::ICmpOp::create(rewriter, loc, LLVM::ICmpPredicate::ne,
                                          memory, null);
-    Value memref =
-        createBytes(rewriter, loc, memory, size,
-                    cast<MemRefType>(op.getBytes().getType()));
+    Value memref = createBytes(rewriter, loc, memory, size,
+                               cast<MemRefType>(op.getBytes().getType()));
     rewriter.replaceOp(op, {memref, granted});
     return success();
   }

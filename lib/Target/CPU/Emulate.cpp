@@ -48,8 +48,8 @@ static Error replaceIntrinsics(Module &module) {
     FunctionType *type =
         isBarrier ? FunctionType::get(function.getReturnType(), false)
                   : function.getFunctionType();
-    auto *callee = cast<Function>(
-        module.getOrInsertFunction(emulation, type).getCallee());
+    auto *callee =
+        cast<Function>(module.getOrInsertFunction(emulation, type).getCallee());
     callee->addFnAttr(Attribute::NoUnwind);
     callee->addFnAttr(Attribute::Convergent);
     if (function.onlyReadsMemory() && function.doesNotAccessMemory() &&
@@ -113,7 +113,8 @@ Error piko::linkEmulatedKernels(Module &host, std::unique_ptr<Module> kernels,
       function.removeFnAttr(attribute);
     function.setLinkage(GlobalValue::InternalLinkage);
     if (isKernel)
-      createThread(*kernels, function, getEmulatedName(name, function.getName()));
+      createThread(*kernels, function,
+                   getEmulatedName(name, function.getName()));
   }
   SmallVector<GlobalValue *> memory;
   for (GlobalVariable &variable : kernels->globals()) {

@@ -3,7 +3,8 @@
  * What the host's code of a kernel for a GPU calls, and what a grid leaves.
  *
  *   pikoir_log *log = pikoir_log_open(p, stage);
- *   pikoir_log_place(log, i, ...);               // for each place that can fail
+ *   pikoir_log_place(log, i, ...);               // for each place that can
+ * fail
  *   ... launch a block for each unit; threads add entries to the log ...
  *   pikoir_log_close(log);
  *
@@ -64,9 +65,9 @@ PIKORT_API void pikoir_log_close(pikoir_log *log);
 /// Runs `thread(arguments)` for all threads of all blocks, on a device that the
 /// calling thread plays. Not 0: `seed` permutes the blocks.
 PIKORT_API void pikoir_grid_launch(pikort_pipeline *p,
-                                   void (*thread)(const void *),
-                                   int64_t blocks, int64_t threads,
-                                   const void *arguments, int64_t seed);
+                                   void (*thread)(const void *), int64_t blocks,
+                                   int64_t threads, const void *arguments,
+                                   int64_t seed);
 
 /// Intrinsics of threads, only inside of a launch.
 PIKORT_API int32_t pikoir_gpu_thread(void);
