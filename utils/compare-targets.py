@@ -48,7 +48,8 @@ def main():
 
     mappings = [(f"threads {t}", ["--threads", t]) for t in arguments.threads]
     if arguments.blocks:
-        mappings = [(f"blocks of {t}", ["--emulate-gpu", "--gpu-threads", t])
+        mappings = [(f"blocks of {t}", ["--target", "gpu-on-cpu", "--gpu-threads", t,
+                                         "--gpu-seed", t])
                     for t in arguments.blocks]
     equal, expected = True, None
     for pipe in arguments.pipes:

@@ -264,8 +264,7 @@ LogicalResult piko::lowerToGPU(ModuleOp module, const CheckOptions &check,
     return failure();
   if (hasGPUKernels(module))
     return success();
-  return emitError(loc) << "expected a kernel that updates pixels, which is "
-                           "what a GPU can have";
+  return emitError(loc) << "expected a kernel, but the pipeline has none";
 }
 
 std::unique_ptr<llvm::Module>

@@ -2,23 +2,32 @@
 //
 // Kernels for a GPU, run on the CPU by blocks and threads: each thread has
 // pixels of its own, and the updates of a pixel keep their order.
-// RUN: piko-compare %s --pipe Boxes --count 3000 --emulate-gpu 1 --runs 1 --threads 2 | FileCheck %s
-// RUN: piko-compare %s --pipe Boxes --count 3000 --emulate-gpu 32 --runs 1 | FileCheck %s
-// RUN: piko-compare %s --pipe Boxes --count 3000 --emulate-gpu 256 --reverse --runs 1 --threads 2 | FileCheck %s
-// RUN: piko-compare %s --pipe Boxes --count 200 --emulate-gpu 8 --runs 1 --strip 13 --domain 61 43 --wide | FileCheck %s
-// RUN: piko-compare %s --pipe Whole --count 2000 --emulate-gpu 4 --runs 1 --threads 2 | FileCheck %s
-// RUN: piko-compare %S/update-order.cpp --pipe Small --count 9000 --emulate-gpu 16 --runs 1 | FileCheck %s
-// RUN: piko-compare %S/update-order.cpp --pipe Shared --count 9000 --emulate-gpu 64 --runs 1 --reverse | FileCheck %s
+// RUN: piko-compare %s --pipe Boxes --count 3000 --target gpu-on-cpu --gpu-threads 1 --runs 1 --threads 2 | FileCheck %s
+// RUN: piko-compare %s --pipe Boxes --count 3000 --target gpu-on-cpu --gpu-threads 32 --runs 1 | FileCheck %s
+// RUN: piko-compare %s --pipe Boxes --count 3000 --target gpu-on-cpu --gpu-threads 256 --gpu-seed 5 --runs 1 --threads 2 | FileCheck %s
+// RUN: piko-compare %s --pipe Boxes --count 200 --target gpu-on-cpu --gpu-threads 8 --runs 1 --strip 13 --domain 61 43 --wide | FileCheck %s
+// RUN: piko-compare %s --pipe Whole --count 2000 --target gpu-on-cpu --gpu-threads 4 --runs 1 --threads 2 | FileCheck %s
+// RUN: piko-compare %S/update-order.cpp --pipe Small --count 9000 --target gpu-on-cpu --gpu-threads 16 --runs 1 | FileCheck %s
+// RUN: piko-compare %S/update-order.cpp --pipe Shared --count 9000 --target gpu-on-cpu --gpu-threads 64 --runs 1 | FileCheck %s
 // CHECK: equal
-// Of several errors, it is the first one of the first bin.
-// RUN: not piko-compare %s --pipe Stops --count 500 --runs 1 --emulate-gpu 32 | FileCheck %s --check-prefix=STOPS
-// RUN: not piko-compare %s --pipe Stops --count 500 --runs 1 --emulate-gpu 64 --reverse | FileCheck %s --check-prefix=STOPS
+// Of several errors, it is the one that a CPU reports.
+// RUN: not piko-compare %s --pipe Stops --count 500 --runs 1 --target gpu-on-cpu --gpu-threads 32 | FileCheck %s --check-prefix=STOPS
+// RUN: not piko-compare %s --pipe Stops --count 500 --runs 1 --target gpu-on-cpu --gpu-threads 64 --gpu-seed 5 | FileCheck %s --check-prefix=STOPS
 // STOPS-COUNT-3: got: stage 'draw', bin {{[0-9]+}}: expected an index into 'limits' in [0, 64), but got -2{{$}}
 // A pixel is behind a test, or loops step from one of a thread's own to the next.
 // RUN: pikoc %s --pipe Boxes --emit=gpu --gpu-threads 8 | FileCheck %s --check-prefix=GPU
-// GPU-LABEL: gpu.func @Boxes_draw
+// GPU-LABEL: gpu.func @Boxes_kernel_draw
 // GPU-SAME:    workgroup({{.*}}memref<8x{{.*}}, #gpu.address_space<workgroup>>
-// GPU-COUNT-3: gpu.barrier
+// GPU-COUNT-2: gpu.barrier
+//
+// Each kind of kernel: emissions, lists, batches, barriers and collectives with
+// counts below and above the number of threads, waits, cycles and strips.
+// RUN: piko-compare %S/algorithms.cpp --runs 1 --threads 2 --target gpu-on-cpu --gpu-threads 32 --gpu-seed 1 | FileCheck %s
+// RUN: piko-compare %S/parallel.cpp --pipe Pipeline --count 300 --runs 1 --threads 2 --target gpu-on-cpu --gpu-threads 64 --gpu-seed 2 | FileCheck %s
+// RUN: piko-compare %S/barrier-control-flow.cpp --count 200 --runs 1 --threads 2 --target gpu-on-cpu --gpu-threads 32 --gpu-seed 2 | FileCheck %s
+// RUN: piko-compare %S/lists.mlir --reference %S/Inputs/lists.cpp --count 300 --runs 1 --threads 2 --target gpu-on-cpu --gpu-threads 32 --gpu-seed 1 | FileCheck %s
+// RUN: piko-compare %S/cycles.mlir --reference %S/Inputs/cycles.cpp --count 100 --runs 1 --threads 2 --target gpu-on-cpu --gpu-threads 64 --gpu-seed 1 | FileCheck %s
+// RUN: piko-compare %S/strips.cpp --count 300 --strip 7 --runs 1 --threads 2 --target gpu-on-cpu --gpu-threads 32 --gpu-seed 2 | FileCheck %s
 #include "Inputs/ports.h"
 
 struct Pixel {

@@ -11,7 +11,9 @@ from 1 to 100. `run` says which failed and how often each feature was used; each
 failure can then be shown, or reduced to a short file. Features are left out with
 `--without lists,sync`, or named with `--features`; `--leave-out fuse-stages` leaves
 passes of the compiler out. With `--mlir` each pipeline is
-written in the dialect, too, and that is compiled in place of the C++.
+written in the dialect, too, and that is compiled in place of the C++. With
+`--gpu` kernels run as blocks and threads on a GPU that the CPU plays; their number
+and the order of blocks follow from the seed.
 """
 
 import argparse
@@ -23,7 +25,8 @@ from collections import Counter
 import cpp
 import pipelines
 from reducer import reduce
-from runner import BLANK, EQUAL, PASSES, Runner, case_of, choose_passes, options_of
+from runner import (BLANK, EQUAL, PASSES, Runner, case_of, choose_passes, gpu_options,
+                    options_of)
 
 
 def features_of(args):
@@ -48,11 +51,16 @@ def passes_of(args, seed=None):
     return passes
 
 
+def runner_of(args, passes, first, **options):
+    target = gpu_options(first) if args.gpu else ()
+    return Runner(args.tool, args.mlir, passes, strip=args.strip, target=target, **options)
+
+
 def run_batch(args, first, count):
     features = features_of(args)
     pipes = [pipelines.generate(first + i, features, f"P{i}") for i in range(count)]
     passes = passes_of(args, first)
-    verdicts = Runner(args.tool, args.mlir, passes, strip=args.strip).run(pipes)
+    verdicts = runner_of(args, passes, first).run(pipes)
     used = Counter(f"without-{p}" for p in passes for _ in pipes)
     for pipe in pipes:
         used.update(pipe.used)
@@ -65,7 +73,7 @@ def command_of(args, first, seed):
         ("features", args.features), ("without", args.without),
         ("leave-out", ",".join(passes_of(args, first))), ("strip", args.strip)] if value]
     return " ".join([f"{sys.argv[0]} reduce --tool {args.tool} --seed {seed}", *options] +
-                    ["--mlir"] * args.mlir)
+                    ["--mlir"] * args.mlir + ["--gpu"] * args.gpu)
 
 
 def command_run(args):
@@ -116,8 +124,7 @@ def command_reduce(args):
     pipe = pipelines.generate(args.seed, features_of(args), "P0")
     text = None
     # What there is stays if it is stopped.
-    for text in reduce(pipe, Runner(args.tool, args.mlir, passes_of(args),
-                                    timeout=60, strip=args.strip)):
+    for text in reduce(pipe, runner_of(args, passes_of(args), args.seed, timeout=60)):
         with open(args.out, "w") as file:
             file.write(text)
         print(f"{args.out}: {len(text.splitlines())} lines", flush=True)
@@ -143,6 +150,8 @@ def main():
     parser.add_argument("--table", action="store_true", help="count the features")
     parser.add_argument("--mlir", action="store_true",
                         help="compile the text of the dialect, not C++")
+    parser.add_argument("--gpu", action="store_true",
+                        help="run kernels on a GPU that the CPU plays")
     parser.add_argument("--strip", type=int, default=0,
                         help="primitives of a source in a strip (all)")
     parser.add_argument("--out", default="reduced.cpp")

@@ -31,6 +31,13 @@ def choose_passes(seed):
     return [p for p in PASSES if r.random() < 0.4] if r.random() < 0.4 else []
 
 
+def gpu_options(seed):
+    """How the file that begins with this pipeline runs on a GPU."""
+    r = random.Random(seed)
+    return ["--target", "gpu-on-cpu", "--gpu-threads", str(r.choice([1, 32, 64, 128])),
+            "--gpu-seed", str(r.randrange(1000))]
+
+
 def case_of(pipe):
     return (f"--pipe {pipe.name} --domain {' '.join(map(str, pipe.domain))} "
             f"--count {' '.join(map(str, pipe.counts))} --seed {pipe.input_seed} --wide")
@@ -49,10 +56,11 @@ def kind_of(verdict):
 
 class Runner:
     """With `text` what is compiled is the text of the dialect, not the C++; the
-    `passes` are left out."""
+    `passes` are left out; `target` are options that say what it runs on."""
 
     def __init__(self, tool, text=False, passes=(), threads=(1, 2, 7), timeout=120,
-                 strip=0):
+                 strip=0, target=()):
+        self.target = list(target)
         self.tool, self.text, self.passes = tool, text, passes
         self.strip = strip
         self.threads, self.timeout = threads, timeout
@@ -79,7 +87,7 @@ class Runner:
                 [self.tool, file.with_suffix(".mlir") if self.text else file,
                  "--reference", file, "--cases", cases, "--runs", "1", "--timeout",
                  str(self.timeout), "--strip", str(self.strip), "--threads", *map(str, self.threads),
-                 *options_of(self.passes)],
+                 *options_of(self.passes), *self.target],
                 stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
                 errors="replace", timeout=self.timeout * 20)
             output, errors, status = done.stdout, done.stderr, done.returncode

@@ -66,6 +66,7 @@ private:
         arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::eq,
                               launch.getThreadIds().x, constant(builder, 0));
     auto first = scf::IfOp::create(builder, loc, isFirst);
+    first->setAttr(firstAttrName, builder.getUnitAttr());
     firsts.insert(first);
     return first;
   }

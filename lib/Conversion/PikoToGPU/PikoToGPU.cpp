@@ -310,10 +310,21 @@ bool ConvertPikoToGPUPass::tryToSharePixels(KernelOp kernel, StageOp stage,
   OpBuilder builder(kernel);
   auto copy = cast<KernelOp>(builder.clone(*kernel));
   SharingCounts counts;
-  ScopedDiagnosticHandler quiet(&getContext(),
-                                [](Diagnostic &) { return success(); });
-  if (failed(GridBuilder(copy, stage, count).sharePixelsOfBins(counts))) {
+  std::string obstacle;
+  Location at = kernel.getLoc();
+  LogicalResult result = [&] {
+    ScopedDiagnosticHandler handler(&getContext(), [&](Diagnostic &error) {
+      obstacle = error.str();
+      at = error.getLocation();
+      return success();
+    });
+    return GridBuilder(copy, stage, count).sharePixelsOfBins(counts);
+  }();
+  if (failed(result)) {
     copy.erase();
+    if (!obstacle.empty())
+      emitRemark(at, "the threads of a block do not share pixels: ")
+          << obstacle;
     return false;
   }
   kernel.erase();

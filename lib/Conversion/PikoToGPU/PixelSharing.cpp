@@ -206,8 +206,7 @@ PixelSharing::collectDependents(UpdateOp update, Operation *first,
       Operation *dependent = block->findAncestorOpInBlock(*user);
       if (dependent->hasTrait<OpTrait::IsTerminator>()) {
         InFlightDiagnostic error = update.emitError(
-            "the outcome of an update decides about other pixels, which is not "
-            "supported on a GPU yet");
+            "the outcome of an update decides about other pixels");
         error.attachNote(dependent->getLoc()) << "it is needed here";
         return error;
       }
@@ -225,15 +224,14 @@ PixelSharing::checkGroup(UpdateOp update, Value root,
       auto other = dyn_cast<UpdateOp>(op);
       if (other && rootOf(other) != root) {
         InFlightDiagnostic error = other.emitError(
-            "an update follows from that of another pixel, which is not "
-            "supported on a GPU yet");
+            "an update follows from that of another pixel");
         error.attachNote(update.getLoc()) << "the other update";
         return error;
       }
       memref::AllocaOp array = getWrittenArray(op);
       if (array && !member->isAncestor(array))
         return op->emitError("an array outlives the pixel that it is written "
-                             "for, which is not supported on a GPU yet");
+                             "for");
       return WalkResult::advance();
     });
     if (result.wasInterrupted())
@@ -259,8 +257,8 @@ LogicalResult PixelSharing::guard(UpdateOp update, Value root) {
   for (Operation *op = first; op != ordered.back(); op = op->getNextNode())
     if (!group.contains(op) && !isMemoryEffectFree(op) &&
         !hasSingleEffect<MemoryEffects::Read>(op))
-      return op->emitError("expected nothing with an effect between an update "
-                           "and what follows from it, on a GPU");
+      return op->emitError("what stands between an update and what follows "
+                           "from it has an effect");
 
   OpBuilder builder(ordered.back());
   Location loc = update.getLoc();
@@ -285,8 +283,8 @@ LogicalResult PixelSharing::checkEffects() {
           return region.op->isProperAncestor(op);
         }))
       return WalkResult::advance();
-    return op->emitError("expected what a kernel for a GPU writes to follow "
-                         "from the update of a pixel");
+    return op->emitError("what is written does not follow from the update of a "
+                         "pixel");
   });
   return failure(result.wasInterrupted());
 }

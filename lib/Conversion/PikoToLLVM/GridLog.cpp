@@ -86,7 +86,9 @@ struct ThreadCode {
                      {mask, value, lane, createI32(builder, loc, 31)});
   }
   Value shuffleWide(Value mask, Value value, Value lane);
-  Value reserve(Value log, int64_t bytes);
+  /// The address of so many bytes for each thread that comes here.
+  Value reserve(Value log, int64_t bytes, bool isAlone);
+  Value reserveTogether(Value log, int64_t bytes);
 };
 
 } // namespace
@@ -102,8 +104,8 @@ Value ThreadCode::shuffleWide(Value mask, Value value, Value lane) {
                               arith::ShLIOp::create(builder, loc, high, half));
 }
 
-/// The address of so many bytes for each thread that comes here.
-Value ThreadCode::reserve(Value log, int64_t bytes) {
+/// By one atomic operation of all threads of a warp that are active.
+Value ThreadCode::reserveTogether(Value log, int64_t bytes) {
   Value mask = intrinsic("llvm.nvvm.activemask");
   Value below = intrinsic("llvm.nvvm.read.ptx.sreg.lanemask.lt");
   Value rank = math::CtPopOp::create(builder, loc, bitAnd(mask, below));
@@ -122,11 +124,24 @@ Value ThreadCode::reserve(Value log, int64_t bytes) {
       });
   Value leader = math::CountTrailingZerosOp::create(builder, loc, mask);
   Value first = shuffleWide(mask, taken.getResult(0), leader);
-  Value mine = add(first, mul(extend(rank), constant(bytes)));
+  return add(first, mul(extend(rank), constant(bytes)));
+}
+
+Value ThreadCode::reserve(Value log, int64_t bytes, bool isAlone) {
+  Value mine = isAlone ? addTo(log, constant(bytes))
+                       : reserveTogether(log, bytes);
   Value fits = compare(arith::CmpIPredicate::sle, add(mine, constant(bytes)),
                        load(log, layout::limit));
   return arith::SelectOp::create(builder, loc, fits, mine,
                                  load(log, layout::spare));
+}
+
+/// Whether one thread of a block is here.
+static bool isAlone(Operation *op) {
+  for (; !isa<gpu::LaunchOp>(op); op = op->getParentOp())
+    if (op->hasAttr(firstAttrName))
+      return true;
+  return false;
 }
 
 Value piko::createEntry(OpBuilder &builder, Operation *op, const Grid &grid,
@@ -135,7 +150,7 @@ Value piko::createEntry(OpBuilder &builder, Operation *op, const Grid &grid,
   ThreadCode code{builder, loc};
   int64_t size = llvm::alignTo(layout::header + bytes, layout::header);
   Value entry = LLVM::IntToPtrOp::create(builder, loc, code.pointer(),
-                                         code.reserve(grid.log, size));
+                                         code.reserve(grid.log, size, isAlone(op)));
   code.store(code.constant(size), entry, layout::bytes);
   code.store(code.constant(int64_t(kind) | (number << 32)), entry,
              layout::kind);

@@ -5,15 +5,15 @@
 piko.record @Row {"x" : i32 at 0, "y" : i32 at 4, "to" : i32 at 8} size 12 align 4
 piko.record @Pixel {"n" : i32 at 0} size 4 align 4
 
-// A block runs a unit; errors of its blocks are gathered and reported behind
-// the launch. The stage's 20 threads become 16.
+// A block runs a unit; errors go to the log of the grid. The stage's 20 threads
+// become 16.
 // CHECK-LABEL: piko.kernel @kernel_draw
 // CHECK:         %[[BINS:.*]] = piko.cpu.open_bins @draw
 // CHECK:         %[[UNITS:.*]] = piko.cpu.unit_count %[[BINS]]
 // CHECK:         scf.if
-// CHECK:           %[[LIST:.*]] = memref.alloc(
+// CHECK:           %[[LOG:.*]] = piko.gpu.open_log %[[BINS]]
 // CHECK:           gpu.launch blocks(%[[UNIT:[a-z0-9]+]], {{.*}}) in (%{{.*}} = %[[UNITS]], {{.*}}) threads(%[[T:[a-z0-9]+]], {{.*}}) in (%{{.*}} = %c8, %{{[^)]*}})
-// CHECK-SAME:        workgroup(%[[X:.*]] : memref<8xi32, #gpu.address_space<workgroup>>, %[[Y:.*]] : memref<8xi32, #gpu.address_space<workgroup>>, %[[TO:.*]] : memref<8xi32, #gpu.address_space<workgroup>>, %{{.*}} : memref<8xi64, #gpu.address_space<workgroup>>)
+// CHECK-SAME:        workgroup(%[[X:.*]] : memref<8xi32, #gpu.address_space<workgroup>>, %[[Y:.*]] : memref<8xi32, #gpu.address_space<workgroup>>, %[[TO:.*]] : memref<8xi32, #gpu.address_space<workgroup>>)
 // Threads are 4 wide and 2 high.
 // CHECK:             %[[TX:.*]] = arith.remui %[[T]], %c4
 // CHECK:             %[[ROW:.*]] = arith.divui %[[T]], %c4
@@ -35,14 +35,10 @@ piko.record @Pixel {"n" : i32 at 0} size 4 align 4
 // CHECK:                     arith.muli %{{.*}}, %c4_i32
 // CHECK:                     piko.load checked @image[
 // CHECK:                     piko.store %{{.*}}, checked @image[
-// CHECK-NOT:     piko.fail
+// CHECK:                     piko.fail @draw in %{{.*}} outside bin of @image(
 // CHECK:               gpu.barrier
-// Of the errors that threads have found, the first is kept.
-// CHECK:             gpu.barrier
-// CHECK:             memref.store %{{.*}}, %[[LIST]]
 // CHECK:             gpu.terminator
-// CHECK:           piko.fail @draw in %{{.*}} outside bin of @image(
-// CHECK:           memref.dealloc %[[LIST]]
+// CHECK:           piko.gpu.close_log %[[LOG]]
 // CHECK:         piko.cpu.close_bins %[[BINS]]
 
 // A thread that has a block for itself has all its pixels.
@@ -84,23 +80,6 @@ piko.pipeline @P rank 2 {
         %next = arith.addi %i, %one : i32
         scf.yield %next : i32
       }
-      piko.return
-    }
-  }
-}
-
-// A kernel that updates no pixel stays as it is.
-// CHECK-LABEL: piko.pipeline @Copy
-// CHECK:         scf.forall
-// CHECK-NOT:     gpu.launch
-piko.pipeline @Copy rank 1 {
-  piko.buffer @sink : @Pixel
-  piko.source @copy
-  piko.stage @copy bins [0] threads 64 : @Pixel -> [] {
-    piko.process {
-    ^bb0(%p: !piko.prim<@Pixel>):
-      %v = piko.get %p "n" : !piko.prim<@Pixel> -> i32
-      piko.store %v, @sink[%v : i32] "n" : i32
       piko.return
     }
   }
