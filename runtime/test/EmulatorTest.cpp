@@ -66,15 +66,16 @@ std::string launch(Shared &state, int64_t blocks, int64_t threads,
 // A thread sees at a barrier what those behind it have written.
 TEST(Emulator, Barrier) {
   Shared state;
-  EXPECT_EQ(launch(state, 1, 64, 0, [] {
-              int i = pikoir_gpu_thread(), n = pikoir_gpu_threads();
-              for (int round = 0; round < 3; ++round) {
-                shared->values[i] += i + round;
-                pikoir_gpu_barrier();
-                shared->seen[i] += shared->values[(i + 1) % n];
-                pikoir_gpu_barrier();
-              }
-            }),
+  EXPECT_EQ(launch(state, 1, 64, 0,
+                   [] {
+                     int i = pikoir_gpu_thread(), n = pikoir_gpu_threads();
+                     for (int round = 0; round < 3; ++round) {
+                       shared->values[i] += i + round;
+                       pikoir_gpu_barrier();
+                       shared->seen[i] += shared->values[(i + 1) % n];
+                       pikoir_gpu_barrier();
+                     }
+                   }),
             "");
   for (int i = 0; i < 64; ++i) {
     int next = (i + 1) % 64;
@@ -84,20 +85,22 @@ TEST(Emulator, Barrier) {
 
 TEST(Emulator, BarrierThatAThreadNeverReaches) {
   Shared state;
-  EXPECT_EQ(launch(state, 4, 32, 0, [] {
-              if (pikoir_gpu_block() < 2 || pikoir_gpu_thread() != 7)
-                pikoir_gpu_barrier();
-            }),
+  EXPECT_EQ(launch(state, 4, 32, 0,
+                   [] {
+                     if (pikoir_gpu_block() < 2 || pikoir_gpu_thread() != 7)
+                       pikoir_gpu_barrier();
+                   }),
             "pipeline 'Grid': threads of block 2 wait for each other: 31 at a "
             "barrier, 0 for lanes of their warps, 1 have ended");
 }
 
 TEST(Emulator, ShuffleThatALaneNeverReaches) {
   Shared state;
-  EXPECT_EQ(launch(state, 1, 40, 0, [] {
-              if (pikoir_gpu_lane() != 3)
-                pikoir_gpu_shuffle(-1, 1, 0, 31);
-            }),
+  EXPECT_EQ(launch(state, 1, 40, 0,
+                   [] {
+                     if (pikoir_gpu_lane() != 3)
+                       pikoir_gpu_shuffle(-1, 1, 0, 31);
+                   }),
             "pipeline 'Grid': threads of block 0 wait for each other: 0 at a "
             "barrier, 38 for lanes of their warps, 2 have ended");
 }
@@ -105,10 +108,11 @@ TEST(Emulator, ShuffleThatALaneNeverReaches) {
 // Each warp by itself.
 TEST(Emulator, Ballot) {
   Shared state;
-  EXPECT_EQ(launch(state, 1, 64, 0, [] {
-              int i = pikoir_gpu_thread();
-              shared->values[i] = pikoir_gpu_ballot(-1, i % 3 == 0);
-            }),
+  EXPECT_EQ(launch(state, 1, 64, 0,
+                   [] {
+                     int i = pikoir_gpu_thread();
+                     shared->values[i] = pikoir_gpu_ballot(-1, i % 3 == 0);
+                   }),
             "");
   uint32_t first = 0, second = 0;
   for (int lane = 0; lane < 32; ++lane) {
@@ -122,14 +126,15 @@ TEST(Emulator, Ballot) {
 // Lanes that take the same way are active together, and share a value.
 TEST(Emulator, Active) {
   Shared state;
-  EXPECT_EQ(launch(state, 1, 32, 0, [] {
-              int i = pikoir_gpu_thread();
-              if (i % 2 == 0)
-                return;
-              int mask = pikoir_gpu_activemask();
-              shared->values[i] = mask;
-              shared->seen[i] = pikoir_gpu_shuffle(mask, 100 + i, 5, 31);
-            }),
+  EXPECT_EQ(launch(state, 1, 32, 0,
+                   [] {
+                     int i = pikoir_gpu_thread();
+                     if (i % 2 == 0)
+                       return;
+                     int mask = pikoir_gpu_activemask();
+                     shared->values[i] = mask;
+                     shared->seen[i] = pikoir_gpu_shuffle(mask, 100 + i, 5, 31);
+                   }),
             "");
   for (int i = 0; i < 32; ++i) {
     EXPECT_EQ(uint32_t(state.values[i]), i % 2 ? 0xaaaaaaaau : 0u) << i;

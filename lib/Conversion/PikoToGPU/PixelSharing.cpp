@@ -223,8 +223,8 @@ PixelSharing::checkGroup(UpdateOp update, Value root,
     WalkResult result = member->walk([&](Operation *op) -> WalkResult {
       auto other = dyn_cast<UpdateOp>(op);
       if (other && rootOf(other) != root) {
-        InFlightDiagnostic error = other.emitError(
-            "an update follows from that of another pixel");
+        InFlightDiagnostic error =
+            other.emitError("an update follows from that of another pixel");
         error.attachNote(update.getLoc()) << "the other update";
         return error;
       }

@@ -128,8 +128,8 @@ Value ThreadCode::reserveTogether(Value log, int64_t bytes) {
 }
 
 Value ThreadCode::reserve(Value log, int64_t bytes, bool isAlone) {
-  Value mine = isAlone ? addTo(log, constant(bytes))
-                       : reserveTogether(log, bytes);
+  Value mine =
+      isAlone ? addTo(log, constant(bytes)) : reserveTogether(log, bytes);
   Value fits = compare(arith::CmpIPredicate::sle, add(mine, constant(bytes)),
                        load(log, layout::limit));
   return arith::SelectOp::create(builder, loc, fits, mine,
@@ -149,8 +149,8 @@ Value piko::createEntry(OpBuilder &builder, Operation *op, const Grid &grid,
   Location loc = op->getLoc();
   ThreadCode code{builder, loc};
   int64_t size = llvm::alignTo(layout::header + bytes, layout::header);
-  Value entry = LLVM::IntToPtrOp::create(builder, loc, code.pointer(),
-                                         code.reserve(grid.log, size, isAlone(op)));
+  Value entry = LLVM::IntToPtrOp::create(
+      builder, loc, code.pointer(), code.reserve(grid.log, size, isAlone(op)));
   code.store(code.constant(size), entry, layout::bytes);
   code.store(code.constant(int64_t(kind) | (number << 32)), entry,
              layout::kind);
