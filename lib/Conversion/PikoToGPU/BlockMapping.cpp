@@ -260,6 +260,13 @@ LogicalResult BlockMapper::mapOperation(Operation *op) {
   return success();
 }
 
+/// A number as another integer type: loops over pixels count in 32 bits.
+static Value castTo(OpBuilder &builder, Value value, Type type) {
+  if (value.getType() == type)
+    return value;
+  return arith::IndexCastOp::create(builder, value.getLoc(), type, value);
+}
+
 void BlockMapper::share(scf::ForOp loop) {
   loop->removeAttr(sharedAttrName);
   shared.insert(loop);
@@ -271,16 +278,19 @@ void BlockMapper::share(scf::ForOp loop) {
       advanceOrder(builder, step);
     advanceOrder(builder, piece);
     OpBuilder inside = OpBuilder::atBlockBegin(loop.getBody());
-    setOrder(inside, iteration, loop.getInductionVar());
+    setOrder(inside, iteration,
+             castTo(inside, loop.getInductionVar(), inside.getIndexType()));
     setOrder(inside, ordinal, constant(inside, 0));
   }
   for (DeferIterationOp defer : deferred)
     defer.erase(); // it is the loop's
   gpu::BarrierOp::create(builder, loc);
-  Value begin = arith::AddIOp::create(builder, loc, loop.getLowerBound(),
-                                      launch.getThreadIds().x);
+  Type type = loop.getInductionVar().getType();
+  Value begin =
+      arith::AddIOp::create(builder, loc, loop.getLowerBound(),
+                            castTo(builder, launch.getThreadIds().x, type));
   loop.setLowerBound(begin);
-  loop.setStep(launch.getBlockSizeX());
+  loop.setStep(castTo(builder, launch.getBlockSizeX(), type));
   builder.setInsertionPointAfter(loop);
   gpu::BarrierOp::create(builder, loc);
 }
