@@ -2,13 +2,13 @@
 //
 // Kernels for a GPU, run on the CPU by blocks and threads: each thread has
 // pixels of its own, and the updates of a pixel keep their order.
-// RUN: piko-compare %s --pipe Boxes --count 3000 --target gpu-on-cpu --gpu-threads 1 --runs 1 --threads 2 | FileCheck %s
-// RUN: piko-compare %s --pipe Boxes --count 3000 --target gpu-on-cpu --gpu-threads 32 --runs 1 | FileCheck %s
-// RUN: piko-compare %s --pipe Boxes --count 3000 --target gpu-on-cpu --gpu-threads 256 --gpu-seed 5 --runs 1 --threads 2 | FileCheck %s
+// RUN: piko-compare %s --pipe Boxes --count 600 --target gpu-on-cpu --gpu-threads 1 --runs 1 --threads 2 | FileCheck %s
+// RUN: piko-compare %s --pipe Boxes --count 600 --target gpu-on-cpu --gpu-threads 32 --runs 1 | FileCheck %s
+// RUN: piko-compare %s --pipe Boxes --count 600 --target gpu-on-cpu --gpu-threads 256 --gpu-seed 5 --runs 1 --threads 2 | FileCheck %s
 // RUN: piko-compare %s --pipe Boxes --count 200 --target gpu-on-cpu --gpu-threads 8 --runs 1 --strip 13 --domain 61 43 --wide | FileCheck %s
-// RUN: piko-compare %s --pipe Whole --count 2000 --target gpu-on-cpu --gpu-threads 4 --runs 1 --threads 2 | FileCheck %s
-// RUN: piko-compare %S/update-order.cpp --pipe Small --count 9000 --target gpu-on-cpu --gpu-threads 16 --runs 1 | FileCheck %s
-// RUN: piko-compare %S/update-order.cpp --pipe Shared --count 9000 --target gpu-on-cpu --gpu-threads 64 --runs 1 | FileCheck %s
+// RUN: piko-compare %s --pipe Whole --count 400 --target gpu-on-cpu --gpu-threads 4 --runs 1 --threads 2 | FileCheck %s
+// RUN: piko-compare %S/update-order.cpp --pipe Small --count 1500 --target gpu-on-cpu --gpu-threads 16 --runs 1 | FileCheck %s
+// RUN: piko-compare %S/update-order.cpp --pipe Shared --count 1500 --target gpu-on-cpu --gpu-threads 64 --runs 1 | FileCheck %s
 // CHECK: equal
 // Of several errors, it is the one that a CPU reports.
 // RUN: not piko-compare %s --pipe Stops --count 500 --runs 1 --target gpu-on-cpu --gpu-threads 32 | FileCheck %s --check-prefix=STOPS
