@@ -9,7 +9,6 @@
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 #include "mlir/Dialect/Arith/IR/Arith.h"
 #include "mlir/IR/IRMapping.h"
-#include "mlir/Transforms/LoopInvariantCodeMotionUtils.h"
 #include "llvm/ADT/SetVector.h"
 
 using namespace mlir;
@@ -44,34 +43,6 @@ static Value findWriter(Operation *op) {
     for (auto open : forall.getOps<OpenWriterOp>())
       return open.getWriter();
   return {};
-}
-
-/// Whether an operation without operands gives the same value everywhere.
-static bool isConstant(Operation *op) {
-  if (op->getNumOperands() != 0 || op->getNumRegions() != 0 ||
-      op->getNumResults() == 0)
-    return false;
-  if (auto load = dyn_cast<LoadOp>(op))
-    return bool(lookupInPipeline<ConstantOp>(op, load.getStateAttr()));
-  return isMemoryEffectFree(op) && isSpeculatable(op);
-}
-
-/// Moves out what needs no slot, because all iterations share it.
-static ParallelForOp hoistInvariants(ParallelForOp parallel) {
-  parallel.walk([&](Operation *op) {
-    if (isConstant(op))
-      op->moveBefore(parallel);
-  });
-  moveLoopInvariantCode(
-      &parallel.getBody(),
-      [&](Value value, Region *region) {
-        return !region->isAncestor(value.getParentRegion());
-      },
-      [&](Operation *op, Region *) {
-        return isMemoryEffectFree(op) && isSpeculatable(op);
-      },
-      [&](Operation *op, Region *) { op->moveBefore(parallel); });
-  return parallel;
 }
 
 LoopSplitter::LoopSplitter(ParallelForOp parallel)

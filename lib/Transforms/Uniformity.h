@@ -11,6 +11,9 @@ namespace piko {
 
 bool isBarrier(mlir::Operation *op);
 
+/// Moves out of a loop what all its iterations share; returns the loop.
+ParallelForOp hoistInvariants(ParallelForOp parallel);
+
 /// The first place inside an operation where the iterations of the enclosing
 /// loop meet; null if they do not.
 mlir::Operation *findBarrier(mlir::Operation *op);
