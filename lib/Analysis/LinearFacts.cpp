@@ -495,32 +495,17 @@ Linear LinearFacts::expandSelect(arith::SelectOp select, unsigned frame,
   // A case less, where conversions test what is exact.
   if (std::optional<bool> truth = decide(select.getCondition(), frame))
     return get(*truth ? select.getTrueValue() : select.getFalseValue(), frame);
-  Linear result = atom(id);
-  std::vector<LinearFact> cases;
-  for (bool truth : {true, false}) {
-    LinearFact fact = describe(select.getCondition(), truth, frame);
-    Value value = truth ? select.getTrueValue() : select.getFalseValue();
-    LinearFact *outer = std::exchange(facts, &fact);
-    Linear chosen = get(value, frame);
-    facts = outer;
-    fact.addZero(result - chosen);
-    cases.push_back(std::move(fact));
-  }
-  facts->choices.push_back(std::move(cases));
-  return result;
+  return chooseBetween(select.getCondition(), select.getTrueValue(),
+                       select.getFalseValue(), frame, id);
 }
 
-/// What holds of what an arm computes holds only if it runs.
-Linear LinearFacts::expandBranch(scf::IfOp choice, unsigned number,
-                                 unsigned frame, Id id) {
+Linear LinearFacts::chooseBetween(Value condition, Value ifTrue, Value ifFalse,
+                                  unsigned frame, Id id) {
   Linear result = atom(id);
   std::vector<LinearFact> cases;
   for (bool truth : {true, false}) {
-    LinearFact fact = describe(choice.getCondition(), truth, frame);
-    Value value =
-        (truth ? choice.thenYield() : choice.elseYield()).getOperand(number);
-    if (!matchPattern(value, m_Constant()) ||
-        matchPattern(value, m_Op<arith::ConstantOp>())) {
+    LinearFact fact = describe(condition, truth, frame);
+    if (Value value = truth ? ifTrue : ifFalse) {
       LinearFact *outer = std::exchange(facts, &fact);
       Linear chosen = get(value, frame);
       facts = outer;
@@ -530,6 +515,20 @@ Linear LinearFacts::expandBranch(scf::IfOp choice, unsigned number,
   }
   facts->choices.push_back(std::move(cases));
   return result;
+}
+
+/// What holds of what an arm computes holds only if it runs.
+Linear LinearFacts::expandBranch(scf::IfOp choice, unsigned number,
+                                 unsigned frame, Id id) {
+  // Of a constant that is no number, such as poison, nothing is known.
+  auto known = [&](scf::YieldOp yield) {
+    Value value = yield.getOperand(number);
+    bool isOther = matchPattern(value, m_Constant()) &&
+                   !matchPattern(value, m_Op<arith::ConstantOp>());
+    return isOther ? Value() : value;
+  };
+  return chooseBetween(choice.getCondition(), known(choice.thenYield()),
+                       known(choice.elseYield()), frame, id);
 }
 
 Linear LinearFacts::expandField(GetOp get, unsigned frame, Id id) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //===- HostTest.cpp - The host API, its errors, and state -----------------===//
 
+#include "piko/markers.h"
 #include "pikort/abi.h"
 #include "pikort/pikort.hpp"
 
@@ -9,6 +10,9 @@
 #include <gtest/gtest.h>
 #include <string>
 #include <vector>
+
+// The language and the runtime are apart, but mean the same bin.
+static_assert(piko::marker::nanBox == PIKOIR_NAN_BOX);
 
 namespace {
 

@@ -123,6 +123,10 @@ private:
   Linear expandBranch(mlir::scf::IfOp choice, unsigned result, unsigned frame,
                       Id id);
   Linear expandSelect(mlir::arith::SelectOp select, unsigned frame, Id id);
+  /// One of two values, of which null is unknown. What holds of one holds only
+  /// where it is chosen.
+  Linear chooseBetween(mlir::Value condition, mlir::Value ifTrue,
+                       mlir::Value ifFalse, unsigned frame, Id id);
   Linear expandField(GetOp get, unsigned frame, Id id);
   Linear expandFloatCast(mlir::Operation *op, unsigned frame, Id id);
   /// Whether a value is at least 0, found out on the way to something else.

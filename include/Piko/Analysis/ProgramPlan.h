@@ -24,7 +24,7 @@ struct PlannedEdge {
 
 class ProgramPlan {
 public:
-  /// At the kernels or at the resolved level.
+  /// At the kernels level or below.
   explicit ProgramPlan(PipelineOp pipeline);
 
   /// A cycle of stages that do not collect, or one stage.

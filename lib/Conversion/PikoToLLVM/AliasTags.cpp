@@ -2,6 +2,8 @@
 
 #include "AliasTags.h"
 
+#include "RuntimeABI.h"
+
 using namespace mlir;
 using namespace piko;
 
@@ -41,13 +43,19 @@ ArrayAttr AliasTags::writer() const { return tag(node("writer", runtime())); }
 ArrayAttr AliasTags::input() const { return tag(node("input", runtime())); }
 
 ArrayAttr AliasTags::call(StringRef function) const {
-  if (function.starts_with("pikoir_fail"))
+  if (isFailure(function))
     return tag(node("failure", root()));
   static constexpr StringRef emissions[] = {
-      "pikoir_append",          "pikoir_place",        "pikoir_next",
-      "pikoir_place_source",    "pikoir_defer_begin",  "pikoir_defer_end",
-      "pikoir_defer_iteration", "pikoir_scratch_mark", "pikoir_scratch",
-      "pikoir_scratch_release"};
+      PIKO_RUNTIME_FUNCTION(pikoir_append).name,
+      PIKO_RUNTIME_FUNCTION(pikoir_place).name,
+      PIKO_RUNTIME_FUNCTION(pikoir_next).name,
+      PIKO_RUNTIME_FUNCTION(pikoir_place_source).name,
+      PIKO_RUNTIME_FUNCTION(pikoir_defer_begin).name,
+      PIKO_RUNTIME_FUNCTION(pikoir_defer_end).name,
+      PIKO_RUNTIME_FUNCTION(pikoir_defer_iteration).name,
+      PIKO_RUNTIME_FUNCTION(pikoir_scratch_mark).name,
+      PIKO_RUNTIME_FUNCTION(pikoir_scratch).name,
+      PIKO_RUNTIME_FUNCTION(pikoir_scratch_release).name};
   if (llvm::is_contained(emissions, function))
     return tag(runtime());
   return ArrayAttr();

@@ -180,9 +180,11 @@ bool piko::createErrorEntry(OpBuilder &builder, Operation *op,
   int32_t place = grid->places++;
   {
     OpBuilder host(launch);
-    int32_t which = function == "pikoir_fail"         ? PIKOIR_PLACE_FAIL
-                    : function == "pikoir_fail_index" ? PIKOIR_PLACE_INDEX
-                                                      : PIKOIR_PLACE_BARRIER;
+    int32_t which = function == PIKO_RUNTIME_FUNCTION(pikoir_fail).name
+                        ? PIKOIR_PLACE_FAIL
+                    : function == PIKO_RUNTIME_FUNCTION(pikoir_fail_index).name
+                        ? PIKOIR_PLACE_INDEX
+                        : PIKOIR_PLACE_BARRIER;
     Value text =
         name ? context.text(host, loc, *name)
              : LLVM::ZeroOp::create(

@@ -166,8 +166,10 @@ Value LoweringContext::member(OpBuilder &builder, Value bins,
 /// Whether a function of the runtime is hardly ever called, though there is a
 /// call for each primitive: LLVM then moves out of the way what leads to it.
 static bool isCold(StringRef function) {
-  return function.starts_with("pikoir_fail") || function == "pikoir_append" ||
-         function == "pikoir_place" || function == "pikoir_next";
+  return isFailure(function) ||
+         function == PIKO_RUNTIME_FUNCTION(pikoir_append).name ||
+         function == PIKO_RUNTIME_FUNCTION(pikoir_place).name ||
+         function == PIKO_RUNTIME_FUNCTION(pikoir_next).name;
 }
 
 LLVM::CallOp LoweringContext::call(OpBuilder &builder, Location loc,

@@ -57,6 +57,13 @@ constexpr RuntimeFunction describeFunction(llvm::StringLiteral name,
   (::piko::describeFunction(#function,                                         \
                             static_cast<decltype(&function)>(nullptr)))
 
+/// Whether it is one of those that report an error of a kernel's loop.
+inline bool isFailure(llvm::StringRef function) {
+  return function == PIKO_RUNTIME_FUNCTION(pikoir_fail).name ||
+         function == PIKO_RUNTIME_FUNCTION(pikoir_fail_index).name ||
+         function == PIKO_RUNTIME_FUNCTION(pikoir_fail_barrier).name;
+}
+
 /// See PIKO_RUNTIME_MEMBER.
 struct RuntimeMember {
   int64_t offset; ///< In bytes.

@@ -16,7 +16,7 @@ namespace piko {
 ProgramOp getProgram(PipelineOp pipeline);
 
 /// The stages whose process phases run in a kernel, in order; none in that of
-/// a source or of a schedule. At the kernels and at the resolved level.
+/// a source or of a schedule. At the kernels level and below.
 llvm::SmallVector<StageOp> getStages(KernelOp kernel);
 
 /// The source whose primitives a kernel assigns to bins, if it does that.
