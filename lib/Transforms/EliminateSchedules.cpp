@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// piko-eliminate-schedules: what the loop over bins does by itself is said no
-// longer.
+// piko-eliminate-schedules: load balancing is what a parallel loop over bins
+// does by itself, so that no scheduler is asked for it.
 
 #include "Piko/Transforms/Passes.h"
 
@@ -20,19 +20,23 @@ struct EliminateSchedulesPass
 };
 } // namespace
 
-/// Whether any core may take the next bin at any time, which needs no word.
-static bool saysNothing(ScheduleOp schedule) {
-  return schedule.getKind() == ScheduleKind::LoadBalance &&
-         schedule.getBody().empty() && !schedule.getEndStageAttr() &&
-         !schedule.getEndBin() && !schedule.getBatch() &&
-         !schedule.getEveryBin() && !schedule.getUnordered();
+/// Whether the schedule says more than which core takes a bin.
+static bool saysMore(ScheduleOp schedule) {
+  return schedule.getEndStageAttr() || schedule.getEndBin() ||
+         schedule.getBatch() || schedule.getEveryBin() ||
+         schedule.getUnordered();
 }
 
 void EliminateSchedulesPass::runOnOperation() {
-  for (auto stage : getOperation().getOps<StageOp>())
-    if (ScheduleOp schedule = stage.getSchedule();
-        schedule && saysNothing(schedule)) {
+  for (auto stage : getOperation().getOps<StageOp>()) {
+    ScheduleOp schedule = stage.getSchedule();
+    if (!schedule || schedule.getKind() != ScheduleKind::LoadBalance ||
+        !schedule.getBody().empty())
+      continue;
+    if (saysMore(schedule))
+      schedule.setResolved(true);
+    else
       schedule.erase();
-      ++eliminated;
-    }
+    ++eliminated;
+  }
 }

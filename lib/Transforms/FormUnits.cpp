@@ -69,17 +69,33 @@ static FlatSymbolRefAttr getStageName(Operation *work) {
   return work->getAttrOfType<FlatSymbolRefAttr>("stage");
 }
 
+/// What a stage's schedule makes of the loop over its units.
+static UnitLoop chooseLoop(ScheduleOp schedule) {
+  if (!schedule)
+    return UnitLoop::Any;
+  if (!schedule.getResolved())
+    return UnitLoop::Queue;
+  switch (schedule.getKind()) {
+  case ScheduleKind::DirectMap:
+    return UnitLoop::Owned;
+  case ScheduleKind::Serialize:
+    return UnitLoop::Serial;
+  case ScheduleKind::LoadBalance:
+  case ScheduleKind::All:
+    return UnitLoop::Any;
+  }
+  llvm_unreachable("a schedule has a kind");
+}
+
 void UnitFormer::createUnits(StageOp stage, IntegerAttr source) {
   auto type = BinsType::get(rewriter.getContext(), stage.getInputAttr());
   bins = OpenBinsOp::create(rewriter, loc, type, getStageName(work), source);
   Value count = UnitCountOp::create(rewriter, loc, bins);
   auto forall = scf::ForallOp::create(
       rewriter, loc, ArrayRef<OpFoldResult>{count}, ValueRange(), std::nullopt);
-  ScheduleOp schedule = stage.getSchedule();
-  forall->setAttr("piko.schedule",
-                  rewriter.getStringAttr(stringifyScheduleKind(
-                      schedule && !source ? schedule.getKind()
-                                          : ScheduleKind::LoadBalance)));
+  UnitLoop kind = source ? UnitLoop::Any : chooseLoop(stage.getSchedule());
+  forall->setAttr("piko.units",
+                  rewriter.getStringAttr(stringifyUnitLoop(kind)));
   CloseBinsOp::create(rewriter, loc, bins);
   unit = forall.getInductionVar(0);
   unitEnd = forall.getTerminator();

@@ -112,11 +112,21 @@ static Operation *findUnknown(ScheduleOp schedule, const Directives &said) {
   return isValid ? nullptr : schedule.getOperation();
 }
 
+/// The core follows from the bin's number, or does not matter: no scheduler is
+/// asked. Of `load_balance` piko-eliminate-schedules decides.
+static void chooseCores(ScheduleOp schedule) {
+  if (schedule.getKind() != ScheduleKind::LoadBalance)
+    schedule.setResolved(true);
+}
+
 void PreSchedulePass::runOnOperation() {
   for (auto stage : getOperation().getOps<StageOp>()) {
     ScheduleOp schedule = stage.getSchedule();
-    if (!schedule || schedule.getBody().empty())
+    if (!schedule || schedule.getBody().empty()) {
+      if (schedule)
+        chooseCores(schedule);
       continue;
+    }
     Directives said(schedule);
     follow(schedule.getBody().front(), said);
     if (Operation *unknown = findUnknown(schedule, said)) {
@@ -139,6 +149,7 @@ void PreSchedulePass::runOnOperation() {
     schedule.setBatch(orNone(*said.batch.value));
     schedule.setEveryBin(*said.everyBin.value != 0);
     schedule.getBody().getBlocks().clear();
+    chooseCores(schedule);
     ++moved;
   }
 }

@@ -184,6 +184,15 @@ int32_t pikort_set_strip_size(pikort_pipeline *p, int64_t primitives) {
   });
 }
 
+int32_t pikort_set_unit_report(pikort_pipeline *p,
+                               void (*report)(void *, const pikort_unit_run *),
+                               void *data) {
+  return call(p, [&] {
+    p->unitReport = report;
+    p->unitReportData = data;
+  });
+}
+
 int32_t pikort_set_loop_limit(pikort_pipeline *p, int64_t limit) {
   return call(p, [&] {
     if (limit < 0)

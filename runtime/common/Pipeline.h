@@ -245,6 +245,9 @@ struct pikort_pipeline {
   int64_t loopLimit = int64_t(1) << 20; ///< Of hops and of rounds.
   int64_t stripSize = 0;                ///< Of all strips; 0 = not said.
 
+  void (*unitReport)(void *, const pikort_unit_run *) = nullptr;
+  void *unitReportData = nullptr;
+
   piko::rt::Profile profile{memory};
   std::vector<piko::rt::KernelStats> kernelStats;
   std::vector<piko::rt::StageStats> stageStats;

@@ -52,6 +52,7 @@ public:
     return now;
   }
   Part part() const { return part_; }
+  int64_t runStart() const { return first_; }
 
   /// A kernel that takes next to nothing begins in a cycle. To look at the
   /// clock would take longer, so only some are measured, and stand for those

@@ -23,6 +23,8 @@
 
 #include "common/Pipeline.h"
 
+#include <atomic>
+
 namespace piko::rt {
 
 // --- What a kernel emits ----------------------------------------------------
@@ -163,6 +165,8 @@ struct Kernel {
   Array<uint32_t> order;
   Array<pikoir_call> calls; ///< If Process takes a list.
   std::vector<pikoir_unit> units;
+  bool ownsUnits = false; ///< Some belong to a thread that is not the first.
+  std::atomic<int64_t> nextUnit = 0; ///< For any thread.
   int64_t positions = 0;
   /// Position to its place in emission order; none = identity.
   Array<uint32_t> rank;

@@ -172,10 +172,12 @@ static const pikoir_input *begin(pikort_pipeline &p, Kernel &kernel) {
     else
       prepareStage(p, kernel);
     kernel.open = true;
-    p.activeThreads = kernel.runsSerially
-                          ? 1
-                          : static_cast<int32_t>(std::clamp<int64_t>(
-                                kernel.input.unit_count, 1, p.threads));
+    kernel.nextUnit = 0;
+    int64_t useful = kernel.ownsUnits ? p.threads : kernel.input.unit_count;
+    p.activeThreads =
+        kernel.runsSerially
+            ? 1
+            : static_cast<int32_t>(std::clamp<int64_t>(useful, 1, p.threads));
   });
   if (code == PIKORT_OK && kernel.runsSerially &&
       kernel.positions <= Serial::fewest)

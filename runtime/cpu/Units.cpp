@@ -3,14 +3,18 @@
 //
 // A unit is what one thread takes at a time: neighbouring cells until there is
 // enough work in them, or a part of a cell that may be split. Where Process
-// takes a list, calls take the place of cells' positions. How units are cut is
-// never seen in a result.
+// takes a list, calls take the place of cells' positions. Schedules say who
+// runs a unit: bins of DirectMap belong to the cores in turn, those of
+// Serialize to the first. How units are cut, and who runs them, is never seen
+// in a result.
 //
 //===----------------------------------------------------------------------===//
 
 #include "cpu/Kernel.h"
 
 #include <algorithm>
+
+#include <omp.h>
 
 using namespace piko::rt;
 
@@ -26,6 +30,9 @@ int64_t unitSize(const pikort_pipeline &p, const Stage &stage,
   return std::clamp<int64_t>((share + 15) / 16 * 16, 16, 1024);
 }
 
+/// Of a unit that any thread may run.
+constexpr int64_t nobody = -1;
+
 class Cutter {
 public:
   Cutter(pikort_pipeline &p, const Stage &stage, Kernel &kernel)
@@ -33,35 +40,37 @@ public:
         offsets_(kernel.offsets.data()) {}
 
   void cutCells() {
-    if (!stage_.binSchedules && isSerial(0))
-      return add(0, stage_.cells, 0, kernel_.positions);
-    int64_t chunk = sizeOf(0);
+    const BinSchedule &schedule = stage_.scheduleOf(0);
+    if (!stage_.binSchedules && schedule.kind == PIKOIR_SERIALIZE)
+      return add(0, stage_.cells, 0, kernel_.positions, 0);
+    int64_t chunk = sizeOf(schedule);
     // What waits for a bin may do much, whatever there is in it.
     int64_t most = stage_.hosts ? 16 : 1024;
     int64_t first = 0; // of the group that is not yet added
-    bool serial = false;
+    int64_t owner = nobody;
     auto flush = [&](int64_t cell) {
       if (first < cell)
-        add(first, cell, offsets_[first], offsets_[cell]);
+        add(first, cell, offsets_[first], offsets_[cell], owner);
       first = cell;
     };
     for (int64_t cell = 0; cell < stage_.cells; ++cell) {
       int64_t begin = offsets_[cell], end = offsets_[cell + 1];
-      if (stage_.binSchedules) {
-        int64_t bin = cell / stage_.tiles;
-        if (serial != isSerial(bin))
-          flush(cell);
-        serial = isSerial(bin);
-        if (serial)
-          continue;
-        chunk = sizeOf(bin);
-      }
-      if (stage_.splits() && end - begin > chunk) {
+      int64_t bin = cell / stage_.tiles;
+      const BinSchedule &now = stage_.scheduleOf(bin);
+      int64_t nowOwner = ownerOf(now, bin, cell);
+      if (owner != nowOwner)
+        flush(cell);
+      owner = nowOwner;
+      if (stage_.binSchedules)
+        chunk = sizeOf(now);
+      if (end - begin > chunk && splits(now)) {
         flush(cell);
         for (int64_t i = begin; i < end; i += chunk)
-          add(cell, cell + 1, i, std::min(end, i + chunk));
+          add(cell, cell + 1, i, std::min(end, i + chunk),
+              owner == nobody ? nobody : owner++);
         first = cell + 1;
-      } else if (end - offsets_[first] >= chunk || cell + 1 - first >= most) {
+      } else if (now.kind != PIKOIR_SERIALIZE &&
+                 (end - offsets_[first] >= chunk || cell + 1 - first >= most)) {
         flush(cell + 1);
       }
     }
@@ -71,23 +80,26 @@ public:
   void cutCalls() {
     makeCalls();
     int64_t first = 0; // of the group that is not yet added
-    bool serial = false;
+    int64_t owner = nobody;
     auto flush = [&](int64_t call) {
       if (first < call)
-        units_.push_back({first, call, kernel_.calls[first].begin,
-                          kernel_.calls[call - 1].end});
+        add(first, call, kernel_.calls[first].begin,
+            kernel_.calls[call - 1].end, owner, /*calls=*/true);
       first = call;
     };
     int64_t calls = kernel_.calls.size();
     for (int64_t call = 0; call < calls; ++call) {
       const pikoir_call &now = kernel_.calls[call];
-      if (serial != isSerial(now.bin))
+      const BinSchedule &schedule = stage_.scheduleOf(now.bin);
+      int64_t nowOwner =
+          ownerOf(schedule, now.bin, stage_.splits() ? call : now.bin);
+      if (owner != nowOwner)
         flush(call);
-      serial = isSerial(now.bin);
-      if (serial)
+      owner = nowOwner;
+      if (schedule.kind == PIKOIR_SERIALIZE)
         continue;
       // A call may do much, whatever its list.
-      bool enough = now.end - kernel_.calls[first].begin >= sizeOf(now.bin) ||
+      bool enough = now.end - kernel_.calls[first].begin >= sizeOf(schedule) ||
                     call + 1 - first >= 16;
       bool sameBin = call + 1 < calls && kernel_.calls[call + 1].bin == now.bin;
       if (enough && (!sameBin || stage_.splits()))
@@ -97,15 +109,32 @@ public:
   }
 
 private:
-  bool isSerial(int64_t bin) const {
-    return stage_.scheduleOf(bin).kind == PIKOIR_SERIALIZE;
+  /// Who runs a bin, or a part of the only bin.
+  int64_t ownerOf(const BinSchedule &schedule, int64_t bin,
+                  int64_t part) const {
+    switch (schedule.kind) {
+    case PIKOIR_SERIALIZE:
+      return 0;
+    case PIKOIR_DIRECT_MAP:
+      return p_.threads == 1 ? 0 : stage_.bins() == 1 ? part : bin;
+    default:
+      return nobody;
+    }
   }
-  int64_t sizeOf(int64_t bin) const {
-    return unitSize(p_, stage_, stage_.scheduleOf(bin), kernel_.positions);
+  /// Whether threads may share one of its bins.
+  bool splits(const BinSchedule &schedule) const {
+    return stage_.splits() && schedule.kind != PIKOIR_SERIALIZE &&
+           (schedule.kind != PIKOIR_DIRECT_MAP || stage_.bins() == 1);
   }
-  void add(int64_t cellBegin, int64_t cellEnd, int64_t begin, int64_t end) {
-    if (begin < end || stage_.visitsAll)
-      units_.push_back({cellBegin, cellEnd, begin, end});
+  int64_t sizeOf(const BinSchedule &schedule) const {
+    return unitSize(p_, stage_, schedule, kernel_.positions);
+  }
+  void add(int64_t cellBegin, int64_t cellEnd, int64_t begin, int64_t end,
+           int64_t owner, bool calls = false) {
+    if (begin == end && !stage_.visitsAll && !calls)
+      return;
+    units_.push_back({cellBegin, cellEnd, begin, end, owner});
+    kernel_.ownsUnits |= owner > 0;
   }
 
   void makeCalls() {
@@ -149,11 +178,35 @@ private:
 void piko::rt::cutUnits(pikort_pipeline &p, const Stage &stage,
                         Kernel &kernel) {
   kernel.units.clear();
+  kernel.ownsUnits = false;
   Cutter cutter(p, stage, kernel);
   if (stage.takesList())
     cutter.cutCalls();
   else
     cutter.cutCells();
+}
+
+// --- Who runs a unit ---------------------------------------------------------
+
+int64_t pikoir_thread(void) { return omp_get_thread_num(); }
+int64_t pikoir_team(void) { return omp_get_num_threads(); }
+
+int64_t pikoir_next_unit(pikort_pipeline *p, int32_t stage, int64_t last) {
+  Kernel &kernel = *p->stages[stage].kernel;
+  const std::vector<pikoir_unit> &units = kernel.units;
+  auto count = static_cast<int64_t>(units.size());
+  int64_t thread = pikoir_thread(), team = pikoir_team();
+  if (last < 0 || units[last].owner != nobody)
+    for (int64_t unit = last + 1; unit < count; ++unit)
+      if (units[unit].owner != nobody && units[unit].owner % team == thread)
+        return unit;
+  for (;;) {
+    int64_t unit = kernel.nextUnit.fetch_add(1, std::memory_order_relaxed);
+    if (unit >= count)
+      return -1;
+    if (units[unit].owner == nobody)
+      return unit;
+  }
 }
 
 // --- Schedules that depend on the bin ---------------------------------------

@@ -297,6 +297,34 @@ pikoir_writer *pikoir_open_source(pikort_pipeline *p, int32_t source,
   return openUnit(*p->sources[source].kernel, unit);
 }
 
+/// Tells the host which bins a thread has run.
+[[gnu::cold, gnu::noinline]] static void reportUnit(const Lane &lane,
+                                                    int64_t closed) {
+  const pikort_pipeline &p = *lane.pipeline;
+  const Kernel &kernel = *lane.kernel;
+  const Stage &stage = p.stages[kernel.stage];
+  const pikoir_unit &unit = kernel.units[static_cast<size_t>(lane.unit)];
+  auto time = [&](int64_t at) {
+    return static_cast<double>(at - p.profile.runStart()) /
+           p.ticksPerMillisecond;
+  };
+  pikort_unit_run run{p.kernelStats[kernel.statsIndex].name.c_str(),
+                      unit.cell_begin,
+                      unit.cell_end,
+                      unit.end - unit.begin,
+                      static_cast<int32_t>(pikoir_thread()),
+                      time(lane.opened),
+                      time(closed)};
+  if (kernel.calls) {
+    run.bin_begin = kernel.calls[unit.cell_begin].bin;
+    run.bin_end = kernel.calls[unit.cell_end - 1].bin + 1;
+  } else if (kernel.source < 0) {
+    run.bin_begin /= stage.tiles;
+    run.bin_end = (run.bin_end + stage.tiles - 1) / stage.tiles;
+  }
+  p.unitReport(p.unitReportData, &run);
+}
+
 void pikoir_close(pikoir_writer *writer) {
   Lane *lane = laneOf(writer);
   if (lane->flags & PIKOIR_PORT_DEFERRED) [[unlikely]] {
@@ -327,7 +355,10 @@ void pikoir_close(pikoir_writer *writer) {
   } catch (...) { // no memory for the list of segments
     outOfMemory(*lane, sizeof(Segment));
   }
-  lane->busy += ticks() - lane->opened;
+  int64_t closed = ticks();
+  lane->busy += closed - lane->opened;
+  if (lane->pipeline->unitReport) [[unlikely]]
+    reportUnit(*lane, closed);
   std::lock_guard<std::mutex> lock(lane->kernel->laneMutex);
   lane->kernel->freeLanes.push_back(lane); // has room for all lanes
 }

@@ -27,7 +27,7 @@ piko.pipeline @P rank 1 {
     }
   }
   // CHECK: piko.stage @waits
-  // CHECK-NEXT: piko.schedule load_balance end_stage [@any]
+  // CHECK-NEXT: piko.schedule load_balance end_stage [@any] resolved
   piko.stage @waits bins [0] threads 64 : @F -> [] {
     piko.schedule load_balance end_stage [@any]
     piko.process {
@@ -36,7 +36,7 @@ piko.pipeline @P rank 1 {
     }
   }
   // CHECK: piko.stage @lists
-  // CHECK-NEXT: piko.schedule load_balance batch 4
+  // CHECK-NEXT: piko.schedule load_balance batch 4 resolved
   piko.stage @lists bins [0] threads 64 : list @F -> [] {
     piko.schedule load_balance batch 4
     piko.process {

@@ -14,7 +14,7 @@ piko.pipeline @P rank 1 {
   piko.source @never
   // All ways end with the same, whatever was said before.
   // CHECK: piko.stage @same
-  // CHECK-NEXT: piko.schedule all tile_split 16 batch 4 every_bin{{$}}
+  // CHECK-NEXT: piko.schedule all tile_split 16 batch 4 every_bin resolved{{$}}
   piko.stage @same bins [0] threads 64 : list @F -> [] {
     piko.schedule direct_map batch 4 dynamic {
     ^bb0(%bin: index):
@@ -41,7 +41,7 @@ piko.pipeline @P rank 1 {
   }
   // A tile split has no effect on another kind; waits stay.
   // CHECK: piko.stage @fixed
-  // CHECK-NEXT: piko.schedule serialize end_stage [@same]{{$}}
+  // CHECK-NEXT: piko.schedule serialize end_stage [@same] resolved{{$}}
   piko.stage @fixed bins [0] threads 64 : @F -> [] {
     piko.schedule load_balance end_stage [@same] dynamic {
     ^bb0(%bin: index):
@@ -96,7 +96,7 @@ piko.pipeline @P rank 1 {
   }
   // A loop may say nothing, unless that is the same.
   // CHECK: piko.stage @loop
-  // CHECK-NEXT: piko.schedule direct_map{{$}}
+  // CHECK-NEXT: piko.schedule direct_map resolved{{$}}
   piko.stage @loop bins [0] threads 64 : @F -> [] {
     piko.schedule direct_map dynamic {
     ^bb0(%bin: index):

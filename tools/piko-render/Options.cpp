@@ -48,6 +48,8 @@ it, and says how long a frame took.
   --seconds S            stop early after so long, but with 3 timed frames at
                          least (1000)
   --out IMAGE            write the last frame: .png, .exr, .ppm, ...
+  --trace FILE           run one more frame, and write which thread ran which
+                         bins when, for Perfetto or chrome://tracing
   --json                 print one line of JSON
   --help                 print this
 )";
@@ -112,6 +114,7 @@ private:
         {"--frames", [&] { options.frames = integer(name, 1, maxInt); }},
         {"--seconds", [&] { options.seconds = number(name); }},
         {"--out", [&] { options.out = value(name); }},
+        {"--trace", [&] { options.trace = value(name); }},
         {"--json", [&] { options.json = true; }},
     };
     auto action = actions.find(name);

@@ -24,6 +24,7 @@ struct Options {
   int warmup = 5, frames = 30;
   double seconds = 1000;
   std::string out;
+  std::string trace; ///< where to write which thread ran which bins
   bool json = false;
 };
 

@@ -7,6 +7,7 @@
 //===----------------------------------------------------------------------===//
 #include "Options.h"
 #include "Report.h"
+#include "Trace.h"
 
 #include "Piko/Driver/Scene/Binding.h"
 #include "Piko/Driver/Scene/ImageFile.h"
@@ -202,7 +203,7 @@ Result<Done> renderScene(const Options &options) {
   std::string text = options.json ? makeReport(options, result, pipeline).text()
                                   : summarize(result, pipeline);
   std::printf("%s\n", text.c_str());
-  return Done{};
+  return options.trace.empty() ? Done{} : traceFrame(pipeline, options.trace);
 }
 
 int fail(const Error &error) {

@@ -241,9 +241,13 @@ def PreSchedule : Pass<"piko-pre-schedule", "::piko::PipelineOp"> {
 
     **Does**: follows all ways through the `dynamic` body of each schedule. Where
     they all end with the same directives, these become the schedule's own, and
-    the body is erased. So the core that a bin runs on follows from its number
-    when primitives are assigned, nothing runs for each bin, and
-    `piko-fuse-stages`, which needs to know the kind, sees it.
+    the body is erased. A schedule without a body that is `direct_map`,
+    `serialize` or `all` becomes `resolved`: the core that a bin runs on follows
+    from its number when primitives are assigned. So nothing runs for each bin,
+    `piko-fuse-stages`, which needs to know the kind, sees it, and the kernel's
+    loop is one in which a thread takes its own units of work (`direct_map`), a
+    sequential one (`serialize`) or OpenMP's dynamic one (`all`). What is not
+    resolved asks the runtime's scheduler for each unit.
 
     **Guarantees** that each bin has the directives that it had.
 
@@ -263,7 +267,7 @@ def PreSchedule : Pass<"piko-pre-schedule", "::piko::PipelineOp"> {
     ```
     After:
     ```
-    piko.schedule serialize
+    piko.schedule serialize resolved
     ```
 
     **Limits**: a schedule that depends on its bin or on the state's constants
@@ -494,14 +498,16 @@ def OwnPixels : Pass<"piko-own-pixels", "::piko::PipelineOp"> {
 
 def EliminateSchedules
     : Pass<"piko-eliminate-schedules", "::piko::PipelineOp"> {
-  let summary = "Leave to the machine what it does by itself";
+  let summary = "Leave load balancing to the parallel loop";
   let description = [{
     **Requires** the authored or the kernels level; best after `piko-fuse-stages`,
     for which it matters whether a stage asks for a core.
 
-    **Does**: erases schedules that say `load_balance` and no more. A loop over
-    bins, of which any core takes the next, is what a stage without a schedule
-    gets.
+    **Does**: erases schedules that say `load_balance` and no more; one that also
+    waits, takes batches or gives up an order becomes `resolved`. The kernel's
+    loop over units of work is then OpenMP's own with a dynamic schedule, or a
+    GPU's grid; the runtime's scheduler, which looks up who owns a unit, is not
+    asked.
 
     **Guarantees** that the stage's bins run as before.
 
@@ -519,8 +525,8 @@ def EliminateSchedules
     }
     ```
 
-    **Limits**: a schedule that also waits, takes batches or gives up an order
-    stays.
+    **Limits**: a schedule with a `dynamic` body stays with the runtime, which
+    has to look at each bin.
   }];
   let statistics = [
     Statistic<"eliminated", "eliminated", "schedules that went">];

@@ -23,7 +23,8 @@ constexpr RuntimeMember cellBegin =
                             PIKO_RUNTIME_MEMBER(pikoir_unit, cell_begin),
                         cellEnd = PIKO_RUNTIME_MEMBER(pikoir_unit, cell_end),
                         begin = PIKO_RUNTIME_MEMBER(pikoir_unit, begin),
-                        end = PIKO_RUNTIME_MEMBER(pikoir_unit, end);
+                        end = PIKO_RUNTIME_MEMBER(pikoir_unit, end),
+                        owner = PIKO_RUNTIME_MEMBER(pikoir_unit, owner);
 constexpr RuntimeMember callBin = PIKO_RUNTIME_MEMBER(pikoir_call, bin),
                         callBegin = PIKO_RUNTIME_MEMBER(pikoir_call, begin),
                         callEnd = PIKO_RUNTIME_MEMBER(pikoir_call, end);
@@ -108,6 +109,40 @@ struct UnitCellsLowering : Lowering<UnitCellsOp> {
     Value last = load(rewriter, loc, unit, layout::cellEnd);
     rewriter.replaceOp(
         op, {toIndex(rewriter, loc, first), toIndex(rewriter, loc, last)});
+    return success();
+  }
+};
+
+struct UnitOwnerLowering : Lowering<UnitOwnerOp> {
+  using Lowering::Lowering;
+  LogicalResult
+  matchAndRewrite(UnitOwnerOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    Location loc = op.getLoc();
+    Value units = context.member(rewriter, adaptor.getBins(), layout::units);
+    Value unit =
+        entry(rewriter, loc, units, adaptor.getUnit(), sizeof(pikoir_unit));
+    rewriter.replaceOp(op, load(rewriter, loc, unit, layout::owner));
+    return success();
+  }
+};
+
+struct NextUnitLowering : Lowering<NextUnitOp> {
+  using Lowering::Lowering;
+  LogicalResult
+  matchAndRewrite(NextUnitOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    Location loc = op.getLoc();
+    auto number =
+        op->getParentOfType<func::FuncOp>()->getAttrOfType<IntegerAttr>(
+            numberAttrName);
+    Value next =
+        context
+            .call(rewriter, loc, PIKO_RUNTIME_FUNCTION(pikoir_next_unit),
+                  {context.frame(op), createI32(rewriter, loc, number.getInt()),
+                   toI64(rewriter, loc, adaptor.getLast())})
+            .getResult();
+    rewriter.replaceOp(op, toIndex(rewriter, loc, next));
     return success();
   }
 };
@@ -396,6 +431,30 @@ struct ThreadsLowering : Lowering<ThreadsOp> {
   }
 };
 
+struct ThreadLowering : Lowering<ThreadOp> {
+  using Lowering::Lowering;
+  LogicalResult
+  matchAndRewrite(ThreadOp op, OpAdaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    rewriter.replaceOp(op, context.call(rewriter, op.getLoc(),
+                                        PIKO_RUNTIME_FUNCTION(pikoir_thread),
+                                        ValueRange()));
+    return success();
+  }
+};
+
+struct TeamLowering : Lowering<TeamOp> {
+  using Lowering::Lowering;
+  LogicalResult
+  matchAndRewrite(TeamOp op, OpAdaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    rewriter.replaceOp(op, context.call(rewriter, op.getLoc(),
+                                        PIKO_RUNTIME_FUNCTION(pikoir_team),
+                                        ValueRange()));
+    return success();
+  }
+};
+
 } // namespace
 
 void piko::populateKernelToLLVMPatterns(const TypeConverter &converter,
@@ -408,6 +467,7 @@ void piko::populateKernelToLLVMPatterns(const TypeConverter &converter,
                FromAddressLowering,
 
                BeginScheduleLowering, ScheduleBinLowering, GetLowering,
-               GridLowering, DomainLowering, ThreadsLowering>(
+               GridLowering, DomainLowering, ThreadsLowering, ThreadLowering,
+               TeamLowering, UnitOwnerLowering, NextUnitLowering>(
       converter, patterns.getContext(), context);
 }

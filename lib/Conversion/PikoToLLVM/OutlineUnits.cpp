@@ -14,16 +14,49 @@
 using namespace mlir;
 using namespace piko;
 
+namespace {
+/// Where a thread runs a unit, as convert-piko-to-openmp has written it.
+struct UnitBody {
+  Operation *loop; ///< In the parallel region.
+  Block *block;
+  Value unit, count;
+};
+} // namespace
+
+static UnitBody findUnitBody(omp::ParallelOp parallel) {
+  for (Operation &op : parallel.getRegion().front()) {
+    if (auto any = dyn_cast<omp::WsloopOp>(op)) {
+      auto nest = cast<omp::LoopNestOp>(any.getWrappedLoop());
+      Block &body = nest.getRegion().front();
+      return {&op, &body, body.getArgument(0),
+              nest.getLoopUpperBounds().front()};
+    }
+    if (auto queue = dyn_cast<scf::WhileOp>(op)) {
+      Block *body = queue.getAfterBody();
+      auto goesOn =
+          queue.getConditionOp().getCondition().getDefiningOp<arith::CmpIOp>();
+      return {&op, body, body->getArgument(0), goesOn.getRhs()};
+    }
+    if (auto owned = dyn_cast<scf::ForOp>(op)) {
+      auto own = *owned.getBody()->getOps<scf::IfOp>().begin();
+      return {&op, own.thenBlock(), owned.getInductionVar(),
+              owned.getUpperBound()};
+    }
+  }
+  llvm_unreachable("a parallel region has a loop over units");
+}
+
 /// Splits what a loop's body takes from around the threads into what can be
 /// made again in it, and what cannot.
-static void splitCaptures(omp::LoopNestOp nest, Region &threads,
+static void splitCaptures(const UnitBody &body, Region &threads,
                           SmallVector<Operation *> &constants,
                           SmallVector<Value> &arguments) {
   llvm::SetVector<Value> captures;
-  getUsedValuesDefinedAbove(nest.getRegion(), captures);
+  getUsedValuesDefinedAbove(*body.block->getParent(), captures);
   for (Value capture : captures) {
     Operation *made = capture.getDefiningOp();
-    if (made && threads.isAncestor(made->getParentRegion()))
+    if (capture == body.unit ||
+        (made && threads.isAncestor(made->getParentRegion())))
       continue; // a private array
     if (made && (made->hasTrait<OpTrait::ConstantLike>() ||
                  isa<LLVM::AddressOfOp, LLVM::ZeroOp>(made)))
@@ -35,37 +68,38 @@ static void splitCaptures(omp::LoopNestOp nest, Region &threads,
 
 /// Makes a function of the body of a parallel loop; its arguments are what
 /// `arguments` says, and the unit.
-static func::FuncOp createUnit(func::FuncOp kernel, omp::LoopNestOp nest,
+static func::FuncOp createUnit(func::FuncOp kernel, const UnitBody &body,
                                ArrayRef<Operation *> constants,
                                ArrayRef<Value> arguments) {
   OpBuilder builder(kernel);
   SmallVector<Type> types = llvm::map_to_vector(
       arguments, [](Value argument) { return argument.getType(); });
   types.push_back(builder.getIndexType());
-  Location loc = nest.getLoc();
+  Location loc = body.loop->getLoc();
   auto unit =
       func::FuncOp::create(builder, loc, (kernel.getSymName() + ".unit").str(),
                            builder.getFunctionType(types, {}));
   unit.setPrivate();
   Block *entry = unit.addEntryBlock();
-  Block &body = nest.getRegion().front();
-  omp::YieldOp yield = cast<omp::YieldOp>(body.getTerminator());
   builder.setInsertionPointToEnd(entry);
   IRMapping copies;
   for (Operation *constant : constants)
     builder.clone(*constant, copies);
   for (auto [from, to] : llvm::zip(arguments, entry->getArguments()))
     copies.map(from, to);
-  // Private arrays, which lie before the loop.
-  Operation *loop = nest->getParentOp();
-  for (Operation &op : llvm::make_early_inc_range(*loop->getBlock())) {
-    if (&op == loop)
+  // Private arrays, which lie before the loop; who the thread is, the loop
+  // asks.
+  for (Operation &op : llvm::make_early_inc_range(*body.loop->getBlock())) {
+    if (&op == body.loop)
       break;
-    op.moveBefore(entry, entry->end());
+    if (!isa<CallOpInterface>(op))
+      op.moveBefore(entry, entry->end());
   }
-  body.getArgument(0).replaceAllUsesWith(entry->getArguments().back());
-  entry->getOperations().splice(entry->end(), body.getOperations(),
-                                body.begin(), yield->getIterator());
+  entry->getOperations().splice(entry->end(), body.block->getOperations(),
+                                body.block->begin(),
+                                std::prev(body.block->end()));
+  replaceAllUsesInRegionWith(body.unit, entry->getArguments().back(),
+                             unit.getBody());
   for (auto [from, to] : copies.getValueMap())
     replaceAllUsesInRegionWith(from, to, unit.getBody());
   func::ReturnOp::create(builder, loc);
@@ -77,22 +111,20 @@ void piko::outlineUnits(func::FuncOp kernel) {
   if (loops.empty())
     return; // a serial schedule
   omp::ParallelOp parallel = *loops.begin();
-  auto wsloop = *parallel.getOps<omp::WsloopOp>().begin();
-  auto nest = cast<omp::LoopNestOp>(wsloop.getWrappedLoop());
+  UnitBody body = findUnitBody(parallel);
   SmallVector<Operation *> constants;
   SmallVector<Value> arguments;
-  splitCaptures(nest, parallel.getRegion(), constants, arguments);
-  func::FuncOp unit = createUnit(kernel, nest, constants, arguments);
+  splitCaptures(body, parallel.getRegion(), constants, arguments);
+  func::FuncOp unit = createUnit(kernel, body, constants, arguments);
 
   auto call = [&](OpBuilder &builder, Location loc, Value number) {
     SmallVector<Value> operands(arguments);
     operands.push_back(number);
     func::CallOp::create(builder, loc, unit, operands);
   };
-  Block &body = nest.getRegion().front();
-  OpBuilder builder(body.getTerminator());
+  OpBuilder builder(body.block->getTerminator());
   Location loc = parallel.getLoc();
-  call(builder, loc, body.getArgument(0));
+  call(builder, loc, body.unit);
 
   builder.setInsertionPoint(parallel);
   Value threads = parallel.getNumThreads();
@@ -102,9 +134,9 @@ void piko::outlineUnits(func::FuncOp kernel) {
   auto choice = scf::IfOp::create(builder, loc, several, /*withElse=*/true);
   parallel->moveBefore(choice.thenYield());
   builder.setInsertionPoint(choice.elseYield());
-  auto serial = scf::ForOp::create(
-      builder, loc, nest.getLoopLowerBounds().front(),
-      nest.getLoopUpperBounds().front(), nest.getLoopSteps().front());
+  Value zero = arith::ConstantIndexOp::create(builder, loc, 0);
+  Value one = arith::ConstantIndexOp::create(builder, loc, 1);
+  auto serial = scf::ForOp::create(builder, loc, zero, body.count, one);
   builder.setInsertionPoint(serial.getBody()->getTerminator());
   call(builder, loc, serial.getInductionVar());
 }

@@ -31,58 +31,67 @@ static void hoistPrivateArrays(Operation *root, OpBuilder &builder) {
 
 namespace {
 
-struct ConvertForall : OpRewritePattern<scf::ForallOp> {
-  using OpRewritePattern::OpRewritePattern;
+/// A loop over units as threads share it.
+class UnitSharing {
+public:
+  UnitSharing(scf::ForallOp forall, PatternRewriter &rewriter)
+      : forall(forall), loc(forall.getLoc()), rewriter(rewriter) {}
 
-  LogicalResult matchAndRewrite(scf::ForallOp forall,
-                                PatternRewriter &rewriter) const override {
-    auto name = forall->getAttrOfType<StringAttr>("piko.schedule");
-    std::optional<ScheduleKind> kind =
-        name ? symbolizeScheduleKind(name.getValue()) : std::nullopt;
-    if (!kind || forall.getRank() != 1 || !forall.isNormalized())
-      return rewriter.notifyMatchFailure(forall, "not the loop of a kernel");
-    Location loc = forall.getLoc();
-    Value zero = arith::ConstantIndexOp::create(rewriter, loc, 0);
-    Value one = arith::ConstantIndexOp::create(rewriter, loc, 1);
-    Value count = forall.getUpperBound(rewriter).front();
-    if (*kind == ScheduleKind::Serialize) {
+  /// Finds what the units are of.
+  LogicalResult findBins() {
+    auto count = forall.getMixedUpperBound()
+                     .front()
+                     .dyn_cast<Value>()
+                     .getDefiningOp<UnitCountOp>();
+    if (count)
+      bins = count.getBins();
+    return success(bool(count));
+  }
+
+  void convert(UnitLoop kind) {
+    zero = arith::ConstantIndexOp::create(rewriter, loc, 0);
+    one = arith::ConstantIndexOp::create(rewriter, loc, 1);
+    count = forall.getUpperBound(rewriter).front();
+    if (kind == UnitLoop::Serial) {
       hoistPrivateArrays(forall, rewriter);
-      auto loop = scf::ForOp::create(rewriter, loc, zero, count, one);
-      moveBody(forall, loop.getBody(),
-               loop.getBody()->getTerminator()->getIterator(),
-               loop.getInductionVar(), rewriter);
-    } else {
-      createParallel(forall, *kind, zero, count, one, rewriter);
+      moveBody(createLoop().getBody());
+      return;
     }
-    rewriter.eraseOp(forall);
-    return success();
-  }
-
-private:
-  static void moveBody(scf::ForallOp forall, Block *to, Block::iterator before,
-                       Value unit, PatternRewriter &rewriter) {
-    rewriter.eraseOp(forall.getTerminator());
-    rewriter.inlineBlockBefore(forall.getBody(), to, before, unit);
-  }
-
-  static void createParallel(scf::ForallOp forall, ScheduleKind kind,
-                             Value zero, Value count, Value one,
-                             PatternRewriter &rewriter) {
-    Location loc = forall.getLoc();
-    omp::ParallelOperands parallelClauses;
-    Value threads = ThreadsOp::create(rewriter, loc);
-    parallelClauses.numThreads = threads;
-    auto parallel = omp::ParallelOp::create(rewriter, loc, parallelClauses);
+    omp::ParallelOperands clauses;
+    clauses.numThreads = ThreadsOp::create(rewriter, loc);
+    auto parallel = omp::ParallelOp::create(rewriter, loc, clauses);
     rewriter.createBlock(&parallel.getRegion());
     rewriter.setInsertionPoint(omp::TerminatorOp::create(rewriter, loc));
     hoistPrivateArrays(forall, rewriter);
+    switch (kind) {
+    case UnitLoop::Any:
+      return shareAny();
+    case UnitLoop::Owned:
+      return shareOwned();
+    default:
+      return shareQueue();
+    }
+  }
 
-    omp::WsloopOperands loopClauses;
-    loopClauses.scheduleKind = omp::ClauseScheduleKindAttr::get(
-        rewriter.getContext(), kind == ScheduleKind::DirectMap
-                                   ? omp::ClauseScheduleKind::Static
-                                   : omp::ClauseScheduleKind::Dynamic);
-    auto wsloop = omp::WsloopOp::create(rewriter, loc, loopClauses);
+private:
+  scf::ForOp createLoop() {
+    return scf::ForOp::create(rewriter, loc, zero, count, one);
+  }
+
+  /// Moves the body in front of the terminator of `to`, whose argument is the
+  /// unit.
+  void moveBody(Block *to) { moveBody(to, to->getArgument(0)); }
+  void moveBody(Block *to, Value unit) {
+    rewriter.eraseOp(forall.getTerminator());
+    rewriter.inlineBlockBefore(forall.getBody(), to,
+                               to->getTerminator()->getIterator(), unit);
+  }
+
+  void shareAny() {
+    omp::WsloopOperands clauses;
+    clauses.scheduleKind = omp::ClauseScheduleKindAttr::get(
+        rewriter.getContext(), omp::ClauseScheduleKind::Dynamic);
+    auto wsloop = omp::WsloopOp::create(rewriter, loc, clauses);
     rewriter.createBlock(&wsloop.getRegion());
     omp::LoopNestOperands bounds;
     bounds.loopLowerBounds.push_back(zero);
@@ -91,9 +100,63 @@ private:
     auto nest = omp::LoopNestOp::create(rewriter, loc, bounds);
     Block *body = rewriter.createBlock(&nest.getRegion(), {},
                                        rewriter.getIndexType(), loc);
-    auto yield = omp::YieldOp::create(rewriter, loc, ValueRange());
-    moveBody(forall, body, yield->getIterator(), body->getArgument(0),
-             rewriter);
+    omp::YieldOp::create(rewriter, loc, ValueRange());
+    moveBody(body);
+  }
+
+  /// A thread passes by what is not its own.
+  void shareOwned() {
+    Value thread = ThreadOp::create(rewriter, loc);
+    Value team = TeamOp::create(rewriter, loc);
+    scf::ForOp loop = createLoop();
+    rewriter.setInsertionPointToStart(loop.getBody());
+    Value unit = loop.getInductionVar();
+    Value owner = UnitOwnerOp::create(rewriter, loc, bins, unit);
+    Value turn = arith::RemUIOp::create(rewriter, loc, owner, team);
+    Value mine = arith::CmpIOp::create(rewriter, loc, arith::CmpIPredicate::eq,
+                                       turn, thread);
+    auto own = scf::IfOp::create(rewriter, loc, mine);
+    moveBody(own.thenBlock(), unit);
+  }
+
+  void shareQueue() {
+    Value before = arith::ConstantIndexOp::create(rewriter, loc, -1);
+    Type index = rewriter.getIndexType();
+    auto loop = scf::WhileOp::create(rewriter, loc, TypeRange(index),
+                                     ValueRange(before));
+    Block *ask = rewriter.createBlock(&loop.getBefore(), {}, index, loc);
+    Value next = NextUnitOp::create(rewriter, loc, bins, ask->getArgument(0));
+    // It is -1 at the end.
+    Value any = arith::CmpIOp::create(rewriter, loc, arith::CmpIPredicate::ult,
+                                      next, count);
+    scf::ConditionOp::create(rewriter, loc, any, next);
+    Block *run = rewriter.createBlock(&loop.getAfter(), {}, index, loc);
+    scf::YieldOp::create(rewriter, loc, run->getArgument(0));
+    moveBody(run);
+  }
+
+  scf::ForallOp forall;
+  Location loc;
+  PatternRewriter &rewriter;
+  Value bins, zero, one, count;
+};
+
+struct ConvertForall : OpRewritePattern<scf::ForallOp> {
+  using OpRewritePattern::OpRewritePattern;
+
+  LogicalResult matchAndRewrite(scf::ForallOp forall,
+                                PatternRewriter &rewriter) const override {
+    auto name = forall->getAttrOfType<StringAttr>("piko.units");
+    std::optional<UnitLoop> kind =
+        name ? symbolizeUnitLoop(name.getValue()) : std::nullopt;
+    if (!kind || forall.getRank() != 1 || !forall.isNormalized())
+      return rewriter.notifyMatchFailure(forall, "not the loop of a kernel");
+    UnitSharing sharing(forall, rewriter);
+    if (failed(sharing.findBins()))
+      return rewriter.notifyMatchFailure(forall, "not a loop over units");
+    sharing.convert(*kind);
+    rewriter.eraseOp(forall);
+    return success();
   }
 };
 

@@ -79,7 +79,7 @@ enum pikoir_stage_flags {
 enum pikoir_schedule {
   PIKOIR_LOAD_BALANCE = 0,
   PIKOIR_DIRECT_MAP = 1,
-  PIKOIR_SERIALIZE = 2, ///< One unit.
+  PIKOIR_SERIALIZE = 2,
   PIKOIR_ALL = 3
 };
 
@@ -189,6 +189,10 @@ PIKORT_API const int64_t *pikoir_grid(pikort_pipeline *p, int32_t stage);
 PIKORT_API const int64_t *pikoir_cell_grid(pikort_pipeline *p, int32_t stage);
 /// How many threads should run a kernel's units; asked after its begin.
 PIKORT_API int32_t pikoir_threads(pikort_pipeline *p);
+/// The number of the calling thread in the parallel region that it runs, and
+/// how many threads that has.
+PIKORT_API int64_t pikoir_thread(void);
+PIKORT_API int64_t pikoir_team(void);
 /// The status of the run so far; thread safe.
 PIKORT_API int32_t pikoir_status(pikort_pipeline *p);
 
@@ -198,12 +202,15 @@ PIKORT_API int32_t pikoir_status(pikort_pipeline *p);
 /// has several cells only if it has them whole; units partition the positions
 /// in order. In a LIST stage cell_begin and cell_end are indices of calls, and
 /// units partition the calls; those of one bin are in one unit unless it is
-/// SPLIT.
+/// SPLIT. Thread `owner` modulo the size of the team should run it, any if that
+/// is -1: bins of DIRECT_MAP belong to the cores in turn, and so do parts of
+/// the only bin; those of SERIALIZE belong to the first.
 typedef struct pikoir_unit {
   int64_t cell_begin;
   int64_t cell_end;
   int64_t begin;
   int64_t end;
+  int64_t owner;
 } pikoir_unit;
 
 /// A call of a Process that takes a list: positions [begin, end), which are in
@@ -275,6 +282,11 @@ typedef struct pikoir_writer {
 PIKORT_API const pikoir_input *pikoir_begin(pikort_pipeline *p, int32_t stage);
 PIKORT_API pikoir_writer *pikoir_open(pikort_pipeline *p, int32_t stage,
                                       int64_t unit);
+/// The unit that the calling thread should run after `last`, which is -1 at the
+/// start: first its own, in order, then the next of those that are nobody's; -1
+/// if there is none.
+PIKORT_API int64_t pikoir_next_unit(pikort_pipeline *p, int32_t stage,
+                                    int64_t last);
 /// Room for the next record of a port, never null. The caller writes all
 /// leaves; padding is zero. A record that is placed in no cell is dropped: its
 /// room is the next record's.
@@ -529,11 +541,12 @@ PIKOIR_ASSERT_OFFSET(pikort_program, run, 24);
 PIKOIR_ASSERT_SIZE(pikoir_state, 40);
 PIKOIR_ASSERT_OFFSET(pikoir_state, data, 0);
 PIKOIR_ASSERT_OFFSET(pikoir_state, extent, 8);
-PIKOIR_ASSERT_SIZE(pikoir_unit, 32);
+PIKOIR_ASSERT_SIZE(pikoir_unit, 40);
 PIKOIR_ASSERT_OFFSET(pikoir_unit, cell_begin, 0);
 PIKOIR_ASSERT_OFFSET(pikoir_unit, cell_end, 8);
 PIKOIR_ASSERT_OFFSET(pikoir_unit, begin, 16);
 PIKOIR_ASSERT_OFFSET(pikoir_unit, end, 24);
+PIKOIR_ASSERT_OFFSET(pikoir_unit, owner, 32);
 PIKOIR_ASSERT_SIZE(pikoir_call, 24);
 PIKOIR_ASSERT_OFFSET(pikoir_call, bin, 0);
 PIKOIR_ASSERT_OFFSET(pikoir_call, begin, 8);

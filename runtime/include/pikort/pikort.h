@@ -24,7 +24,7 @@ extern "C" {
 #endif
 
 /// Changes whenever generated code and runtime would no longer fit together.
-#define PIKORT_ABI_VERSION 5u
+#define PIKORT_ABI_VERSION 6u
 /// The most cells that a domain may have in a dimension, so that sums of
 /// coordinates and small numbers do not wrap around.
 #define PIKORT_MAX_EXTENT 1073741824
@@ -248,6 +248,23 @@ typedef struct pikort_time_stats {
   double allocation; ///< Mapping memory, in whatever part.
   double program;    ///< All else: the program between kernels, strips.
 } pikort_time_stats;
+
+/// A unit of work: what one thread ran at a time.
+typedef struct pikort_unit_run {
+  const char *stage;
+  int64_t bin_begin, bin_end; ///< The bins that it is of, half open.
+  int64_t primitives;         ///< Pairs of primitive and bin.
+  int32_t thread;             ///< From 0.
+  double begin, end;          ///< Milliseconds since the run began.
+} pikort_unit_run;
+
+/// Has `report` called behind each unit, from the thread that ran it, several
+/// at the same time; null = no more. Launches of a cycle that are too small for
+/// threads have no units. The run is slower for it. Times are exact from the
+/// second run on.
+PIKORT_API int32_t pikort_set_unit_report(
+    pikort_pipeline *pipeline,
+    void (*report)(void *data, const pikort_unit_run *unit), void *data);
 
 /// A stage's primitives. Sums since the latest reset.
 typedef struct pikort_stage_stats {

@@ -2,8 +2,8 @@
 
 piko.record @F {"x" : i32 at 0} size 4 align 4
 
-// A dynamic schedule balances load; private arrays take stack space once a
-// thread.
+// Without a schedule any thread takes the next unit; private arrays take stack
+// space once a thread.
 // CHECK-LABEL: piko.kernel @kernel_balanced
 // CHECK:         %[[THREADS:.*]] = piko.cpu.threads
 // CHECK:         omp.parallel num_threads(%[[THREADS]] : i32) {
@@ -16,15 +16,39 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 // CHECK:         piko.cpu.close_bins
 
 // CHECK-LABEL: piko.kernel @kernel_mapped
-// CHECK:         omp.wsloop schedule(static)
+// CHECK:         %[[BINS:.*]] = piko.cpu.open_bins
+// CHECK:         %[[COUNT:.*]] = piko.cpu.unit_count
+// CHECK:         omp.parallel
+// CHECK:           %[[THREAD:.*]] = piko.cpu.thread
+// CHECK-NEXT:      %[[TEAM:.*]] = piko.cpu.team
+// CHECK-NEXT:      scf.for %[[UNIT:.*]] = %{{.*}} to %[[COUNT]]
+// CHECK-NEXT:        %[[OWNER:.*]] = piko.cpu.unit_owner %[[BINS]][%[[UNIT]]]
+// CHECK-NEXT:        %[[TURN:.*]] = arith.remui %[[OWNER]], %[[TEAM]]
+// CHECK-NEXT:        %[[MINE:.*]] = arith.cmpi eq, %[[TURN]], %[[THREAD]]
+// CHECK-NEXT:        scf.if %[[MINE]] {
+// CHECK-NEXT:          piko.cpu.open_writer %{{.*}}[%[[UNIT]]]
 
 // CHECK-LABEL: piko.kernel @kernel_serial
 // CHECK-NOT:     omp.
 // CHECK:         scf.for
+
+// What no pass has resolved the runtime hands out.
+// CHECK-LABEL: piko.kernel @kernel_queued
+// CHECK-DAG:     %[[COUNT:.*]] = piko.cpu.unit_count %[[BINS:.*]] :
+// CHECK-DAG:     %[[START:.*]] = arith.constant -1 : index
+// CHECK:         omp.parallel
+// CHECK:           scf.while (%[[LAST:.*]] = %[[START]])
+// CHECK-NEXT:        %[[NEXT:.*]] = piko.cpu.next_unit %[[BINS]] after %[[LAST]]
+// CHECK-NEXT:        %[[ANY:.*]] = arith.cmpi ult, %[[NEXT]], %[[COUNT]]
+// CHECK-NEXT:        scf.condition(%[[ANY]]) %[[NEXT]]
+// CHECK:           ^bb0(%[[UNIT:.*]]: index):
+// CHECK-NEXT:        piko.cpu.open_writer %{{.*}}[%[[UNIT]]]
+// CHECK:             scf.yield %[[UNIT]]
 piko.pipeline @P rank 2 {
   piko.source @balanced
   piko.source @mapped
   piko.source @serial
+  piko.source @queued
   piko.stage @balanced bins [0, 0] threads 1 : @F -> [] {
     piko.process {
     ^bb0(%f: !piko.prim<@F>):
@@ -36,14 +60,21 @@ piko.pipeline @P rank 2 {
     }
   }
   piko.stage @mapped bins [0, 0] threads 1 : @F -> [] {
-    piko.schedule direct_map
+    piko.schedule direct_map resolved
     piko.process {
     ^bb0(%f: !piko.prim<@F>):
       piko.return
     }
   }
   piko.stage @serial bins [0, 0] threads 1 : @F -> [] {
-    piko.schedule serialize
+    piko.schedule serialize resolved
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      piko.return
+    }
+  }
+  piko.stage @queued bins [0, 0] threads 1 : @F -> [] {
+    piko.schedule load_balance
     piko.process {
     ^bb0(%f: !piko.prim<@F>):
       piko.return

@@ -294,3 +294,21 @@ piko.pipeline @P rank 1 {
     }
   }
 }
+
+// -----
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+piko.pipeline @P rank 1 {
+  piko.source @a
+  piko.stage @a bins [0] threads 1 : @F -> [] {
+    // expected-error @below {{expected one that is resolved to have no dynamic body}}
+    piko.schedule direct_map resolved dynamic {
+    ^bb0(%bin: index):
+      piko.return
+    }
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      piko.return
+    }
+  }
+}

@@ -102,6 +102,8 @@ Options parseOptions(int argc, char **argv) {
       options.budget = toNumbers<int64_t>(words.takeValues(name, false))[0];
     else if (name == "--timeout")
       options.timeout = toNumbers<unsigned>(words.takeValues(name, false))[0];
+    else if (name == "--owners")
+      options.owners = true;
     else if (!readCaseOption(name, words, options.one))
       throw std::runtime_error("unknown option " + name);
   }

@@ -44,6 +44,8 @@ struct Options {
   /// What bins may hold, in bytes; 0 = no budget.
   int64_t budget = 0;
   unsigned timeout = 0;
+  /// Says which threads ran which bins.
+  bool owners = false;
   /// Checking mode, on both sides.
   piko::CheckOptions check;
   piko::SynthesisOptions synthesis;

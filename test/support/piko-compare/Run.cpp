@@ -151,6 +151,18 @@ void Run::divide(int64_t strip, int64_t budget) {
   check(pikort_set_memory_budget(pipeline, budget));
 }
 
+void Run::recordOwners() {
+  check(pikort_set_unit_report(
+      pipeline,
+      [](void *data, const pikort_unit_run *unit) {
+        Run &run = *static_cast<Run *>(data);
+        std::lock_guard<std::mutex> lock(run.ownersMutex);
+        for (int64_t bin = unit->bin_begin; bin < unit->bin_end; ++bin)
+          run.threadsOf[{unit->stage, bin}].insert(unit->thread);
+      },
+      this));
+}
+
 Result Run::operator()(int threads) {
   bind();
   check(pikort_set_threads(pipeline, threads));

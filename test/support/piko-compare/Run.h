@@ -15,6 +15,10 @@
 #include "Programs.h"
 #include "Result.h"
 
+#include <map>
+#include <mutex>
+#include <set>
+
 class Run {
 public:
   Run(Program program, const Case &input);
@@ -26,6 +30,12 @@ public:
   void divide(int64_t strip, int64_t budget);
   Result operator()(int threads);
 
+  /// Of each bin of each stage, the threads that ran a part of it.
+  using Owners = std::map<std::pair<std::string, int64_t>, std::set<int32_t>>;
+  /// Notes them from now on.
+  void recordOwners();
+  const Owners &owners() const { return threadsOf; }
+
 private:
   void check(int32_t status);
   std::vector<Field> getFields(int32_t record);
@@ -36,6 +46,8 @@ private:
   Program program;
   const Case &input;
   pikort_pipeline *pipeline = nullptr;
+  std::mutex ownersMutex;
+  Owners threadsOf;
   std::map<std::string, std::string> initial, memory;
 };
 

@@ -32,6 +32,8 @@ bool compare(const Options &options, const Case &input, Programs &programs) {
   Result expected = reference(1);
   Run compiled(programs.compile(input.pipe), input);
   compiled.divide(options.strip, options.budget);
+  if (options.owners)
+    compiled.recordOwners();
   if (expected.isBlank() && options.cases.empty())
     throw std::runtime_error("the reference executor wrote nothing");
   bool equal = true;
@@ -44,6 +46,13 @@ bool compare(const Options &options, const Case &input, Programs &programs) {
         std::printf("%d threads, run %d: %s\n", threads, run,
                     difference.c_str());
     }
+  for (const auto &[bin, threads] : compiled.owners()) {
+    std::printf("%s, bin %lld:", bin.first.c_str(),
+                static_cast<long long>(bin.second));
+    for (int32_t thread : threads)
+      std::printf(" %d", thread);
+    std::printf("\n");
+  }
   if (!expected.error.empty())
     std::printf("the reference stops: %s\n", expected.error.c_str());
   else if (equal)

@@ -162,6 +162,8 @@ LogicalResult piko::verifyPhaseBody(Operation *phase) {
 LogicalResult ScheduleOp::verifyRegions() {
   if (getBody().empty())
     return success();
+  if (getResolved())
+    return emitOpError("expected one that is resolved to have no dynamic body");
   Block &body = getBody().front();
   if (body.getNumArguments() != 1 || !body.getArgument(0).getType().isIndex())
     return emitOpError("expected one block argument of type 'index'");

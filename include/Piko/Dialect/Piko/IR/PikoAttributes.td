@@ -41,6 +41,16 @@ def Piko_ScheduleKind : I32EnumAttr<"ScheduleKind", "where bins run", [
   let cppNamespace = "::piko";
 }
 
+/// The `piko.units` of a loop over units of work, by name.
+def Piko_UnitLoop : I32EnumAttr<"UnitLoop", "how threads share units of work", [
+  I32EnumAttrCase<"Any", 0, "any">,       // any thread takes the next one
+  I32EnumAttrCase<"Owned", 1, "owned">,   // each thread runs its own
+  I32EnumAttrCase<"Serial", 2, "serial">, // one thread runs them all
+  I32EnumAttrCase<"Queue", 3, "queue">]> { // the runtime says for each
+  let cppNamespace = "::piko";
+  let genSpecializedAttr = 0;
+}
+
 def Piko_DivisionKind : I32EnumAttr<"DivisionKind", "integer division", [
   I32EnumAttrCase<"QuotientS", 0, "quotient_signed">,
   I32EnumAttrCase<"QuotientU", 1, "quotient_unsigned">,

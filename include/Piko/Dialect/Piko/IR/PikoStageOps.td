@@ -181,6 +181,9 @@ def Piko_ScheduleOp : Piko_Op<"schedule", [
     on the bin or on constants is said by a `dynamic` body, which runs for each
     bin before the pipeline does and overrides the directives.
 
+    Of a `resolved` schedule the compiler makes a loop of its own kind; any
+    other is left to the runtime's scheduler.
+
     ```mlir
     piko.record @F {"z" : f32 at 0} size 4 align 4
     piko.pipeline @P rank 2 {
@@ -207,12 +210,13 @@ def Piko_ScheduleOp : Piko_Op<"schedule", [
     OptionalAttr<TypedArrayAttrBase<FlatSymbolRefAttr, "stages to wait for">>:$endStage,
     UnitAttr:$endBin,
     OptionalAttr<ConfinedAttr<Piko_I64Attr, [IntPositive]>>:$batch,
-    UnitAttr:$everyBin, UnitAttr:$unordered);
+    UnitAttr:$everyBin, UnitAttr:$unordered, UnitAttr:$resolved);
   let regions = (region MaxSizedRegion<1>:$body);
   let assemblyFormat = [{
     $kind (`tile_split` $tileSplit^)? (`end_stage` $endStage^)?
     (`end_bin` $endBin^)? (`batch` $batch^)? (`every_bin` $everyBin^)?
-    (`unordered` $unordered^)? attr-dict-with-keyword (`dynamic` $body^)?
+    (`unordered` $unordered^)? (`resolved` $resolved^)?
+    attr-dict-with-keyword (`dynamic` $body^)?
   }];
   let hasRegionVerifier = 1;
 }

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+#include "Trace.h"
+
+#include "Piko/Driver/Scene/Json.h"
+
+#include <cstring>
+#include <fstream>
+#include <mutex>
+#include <vector>
+
+using namespace piko;
+using namespace piko::render;
+
+namespace {
+
+struct Units {
+  std::mutex mutex;
+  std::vector<pikort_unit_run> list;
+};
+
+JsonObject makeEvent(const pikort_unit_run &unit) {
+  JsonObject bins;
+  bins.add("bins begin", unit.bin_begin)
+      .add("bins end", unit.bin_end)
+      .add("primitives", unit.primitives);
+  return JsonObject()
+      .add("name", unit.stage)
+      .add("ph", "X") // complete: with a duration, in microseconds
+      .add("pid", 0)
+      .add("tid", unit.thread)
+      .add("ts", unit.begin * 1000)
+      .add("dur", (unit.end - unit.begin) * 1000)
+      .add("args", bins);
+}
+
+} // namespace
+
+Result<Done> piko::render::traceFrame(pikort_pipeline *pipeline,
+                                      const std::string &path) {
+  Units units;
+  auto note = [](void *data, const pikort_unit_run *unit) {
+    auto &to = *static_cast<Units *>(data);
+    std::lock_guard<std::mutex> lock(to.mutex);
+    to.list.push_back(*unit);
+  };
+  pikort_set_unit_report(pipeline, note, &units);
+  int32_t status = pikort_run(pipeline);
+  pikort_set_unit_report(pipeline, nullptr, nullptr);
+  if (status != PIKORT_OK)
+    return Error{pikort_message(pipeline)};
+
+  std::vector<JsonObject> events;
+  for (const pikort_unit_run &unit : units.list)
+    events.push_back(makeEvent(unit));
+  std::ofstream file(path);
+  file << JsonObject().add("traceEvents", events).text() << "\n";
+  file.close();
+  if (!file)
+    return Error{"cannot write '" + path + "': " + std::strerror(errno)};
+  return Done{};
+}
