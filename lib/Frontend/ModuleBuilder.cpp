@@ -209,7 +209,7 @@ private:
         number(schedule.tileSplit),
         waits.empty() ? mlir::ArrayAttr() : builder.getArrayAttr(waits),
         schedule.endBin, number(schedule.batch), schedule.everyBin,
-        schedule.unordered, /*resolved=*/false);
+        schedule.unordered, /*resolved=*/false, /*lanes=*/nullptr);
     return !schedule.isDynamic ||
            buildPhase(WrapperKind::Schedule, stageNumber, op.getBody());
   }

@@ -24,7 +24,7 @@ struct EliminateSchedulesPass
 static bool saysMore(ScheduleOp schedule) {
   return schedule.getEndStageAttr() || schedule.getEndBin() ||
          schedule.getBatch() || schedule.getEveryBin() ||
-         schedule.getUnordered();
+         schedule.getUnordered() || schedule.getLanes();
 }
 
 void EliminateSchedulesPass::runOnOperation() {

@@ -119,7 +119,8 @@ void WorkFormer::formSource() {
   StageOp stage = getPhaseStage(sourceAssign);
   auto items = ItemsOp::create(
       builder, at, FlatSymbolRefAttr::get(stage.getSymNameAttr()),
-      sourceAssign.getSourceAttr(), /*producer=*/nullptr, /*port=*/nullptr);
+      sourceAssign.getSourceAttr(), /*producer=*/nullptr, /*port=*/nullptr,
+      /*lanes=*/nullptr);
   Block &body = items.getBody().emplaceBlock();
   Value prim = body.addArgument(
       PrimType::get(builder.getContext(), stage.getInputAttr()), at);
@@ -148,10 +149,11 @@ void WorkFormer::formWork(OpBuilder &builder, Group &group) {
   }
   Operation *work;
   if (group.stage.getTakesList())
-    work = ListsOp::create(builder, at, stage, producer, port);
+    work = ListsOp::create(builder, at, stage, producer, port,
+                           /*lanes=*/nullptr);
   else
-    work =
-        ItemsOp::create(builder, at, stage, /*source=*/nullptr, producer, port);
+    work = ItemsOp::create(builder, at, stage, /*source=*/nullptr, producer,
+                           port, /*lanes=*/nullptr);
 
   SmallVector<EmitOp> emits;
   group.process.walk([&](EmitOp emit) { emits.push_back(emit); });

@@ -194,3 +194,20 @@ piko.pipeline @P rank 1 {
     }
   }
 }
+
+// -----
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+piko.pipeline @P rank 1 {
+  piko.source @a
+  piko.stage @a bins [8] threads 1 placed : list @F -> [] {}
+  piko.kernel @k {
+    piko.bins of @a {
+    ^bb0(%bin: index):
+      // expected-error@+1 {{expected lanes 'iterations' or 'one', because a list is one item, but got 'collapsed'}}
+      piko.lists of @a lanes collapsed {
+      ^bb0(%l: !piko.list<@F>):
+      }
+    }
+  }
+}

@@ -102,9 +102,14 @@ LogicalResult ListsOp::verifySymbolUses(SymbolTableCollection &) {
 }
 
 LogicalResult ListsOp::verifyRegions() {
-  if (isa<BinsOp>((*this)->getParentOp()))
-    return success();
-  return emitOpError("expected to be inside 'piko.bins'");
+  if (!isa<BinsOp>((*this)->getParentOp()))
+    return emitOpError("expected to be inside 'piko.bins'");
+  if (auto lanes = getLanes();
+      lanes && *lanes != LaneMapping::Iterations && *lanes != LaneMapping::One)
+    return emitOpError("expected lanes 'iterations' or 'one', because a list "
+                       "is one item, but got '")
+           << stringifyLaneMapping(*lanes) << "'";
+  return success();
 }
 
 LogicalResult PlaceOp::verifySymbolUses(SymbolTableCollection &) {

@@ -51,6 +51,14 @@ def Piko_UnitLoop : I32EnumAttr<"UnitLoop", "how threads share units of work", [
   let genSpecializedAttr = 0;
 }
 
+def Piko_LaneMapping : I32EnumAttr<"LaneMapping", "what lanes are given", [
+  I32EnumAttrCase<"Items", 0, "items">,
+  I32EnumAttrCase<"Iterations", 1, "iterations">,
+  I32EnumAttrCase<"Collapsed", 2, "collapsed">,
+  I32EnumAttrCase<"One", 3, "one">]> {
+  let cppNamespace = "::piko";
+}
+
 def Piko_DivisionKind : I32EnumAttr<"DivisionKind", "integer division", [
   I32EnumAttrCase<"QuotientS", 0, "quotient_signed">,
   I32EnumAttrCase<"QuotientU", 1, "quotient_unsigned">,

@@ -5,6 +5,7 @@
 #ifndef PIKO_DIALECT_PIKO_IR_PIKOMACHINEOPS_TD
 #define PIKO_DIALECT_PIKO_IR_PIKOMACHINEOPS_TD
 
+include "Piko/Dialect/Piko/IR/PikoAttributes.td"
 include "Piko/Dialect/Piko/IR/PikoTypes.td"
 
 def Piko_BinsOp : Piko_Op<"bins", [
@@ -87,15 +88,29 @@ def Piko_ItemsOp : Piko_WorkOp<"items"> {
     those that a port of another stage has emitted in this bin, by what stands in
     front: a local barrier.
 
+    `lanes` says what a lane (of a vector, a thread of a block) is given, and is
+    set by `piko-map-lanes`: `items`, a primitive each; `iterations`, those of the
+    parallel loops in the body, which all lanes share for one primitive after the
+    other; `collapsed`, pairs of a primitive and an iteration; or `one` lane does
+    everything. What lanes do at the same time is seen in order of lineage.
+
+    ```mlir
+    piko.items of @split lanes items {
+    ^bb0(%f: !piko.prim<@F>):
+      ...
+    }
+    ```
+
     See `piko.bins`.
   }];
   let arguments = (ins FlatSymbolRefAttr:$stage,
                        OptionalAttr<Piko_I64Attr>:$source,
                        OptionalAttr<FlatSymbolRefAttr>:$producer,
-                       OptionalAttr<Piko_I64Attr>:$port);
+                       OptionalAttr<Piko_I64Attr>:$port,
+                       OptionalAttr<Piko_LaneMapping>:$lanes);
   let assemblyFormat = [{
     `of` $stage (`source` $source^)? (`from` $producer^ `[` $port `]`)?
-    attr-dict-with-keyword $body
+    (`lanes` $lanes^)? attr-dict-with-keyword $body
   }];
   let extraClassDeclaration = common # [{
     ::mlir::Value getPrim() { return getBody().getArgument(0); }
@@ -107,15 +122,18 @@ def Piko_ListsOp : Piko_WorkOp<"lists"> {
   let description = [{
     The body is a process phase that takes a list: called once with all that is in
     the bin, or, where the schedule has a batch size, once for so many
-    consecutive primitives, the last time for fewer.
+    consecutive primitives, the last time for fewer. Of the `lanes` of
+    `piko.items` it has `iterations` or `one`: a list is one item.
 
     See `piko.bins`.
   }];
   let arguments = (ins FlatSymbolRefAttr:$stage,
                        OptionalAttr<FlatSymbolRefAttr>:$producer,
-                       OptionalAttr<Piko_I64Attr>:$port);
+                       OptionalAttr<Piko_I64Attr>:$port,
+                       OptionalAttr<Piko_LaneMapping>:$lanes);
   let assemblyFormat = [{
-    `of` $stage (`from` $producer^ `[` $port `]`)? attr-dict-with-keyword $body
+    `of` $stage (`from` $producer^ `[` $port `]`)? (`lanes` $lanes^)?
+    attr-dict-with-keyword $body
   }];
   let extraClassDeclaration = common # [{
     ::mlir::Value getList() { return getBody().getArgument(0); }

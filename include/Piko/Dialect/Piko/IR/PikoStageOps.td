@@ -177,7 +177,8 @@ def Piko_ScheduleOp : Piko_Op<"schedule", [
     Where bins run (`load_balance`, `direct_map`, `serialize`, `all` with
     the `tile_split` size of the chunks that a bin is cut into), what they
     wait for (`end_stage`, `end_bin`, a `batch` of primitives), and whether
-    the stage gives up the order of its emissions (`unordered`). What depends
+    the stage gives up the order of its emissions (`unordered`). `lanes` says what
+    lanes are given (see `piko.items`), in place of `piko-map-lanes`. What depends
     on the bin or on constants is said by a `dynamic` body, which runs for each
     bin before the pipeline does and overrides the directives.
 
@@ -210,12 +211,13 @@ def Piko_ScheduleOp : Piko_Op<"schedule", [
     OptionalAttr<TypedArrayAttrBase<FlatSymbolRefAttr, "stages to wait for">>:$endStage,
     UnitAttr:$endBin,
     OptionalAttr<ConfinedAttr<Piko_I64Attr, [IntPositive]>>:$batch,
-    UnitAttr:$everyBin, UnitAttr:$unordered, UnitAttr:$resolved);
+    UnitAttr:$everyBin, UnitAttr:$unordered, UnitAttr:$resolved,
+    OptionalAttr<Piko_LaneMapping>:$lanes);
   let regions = (region MaxSizedRegion<1>:$body);
   let assemblyFormat = [{
     $kind (`tile_split` $tileSplit^)? (`end_stage` $endStage^)?
     (`end_bin` $endBin^)? (`batch` $batch^)? (`every_bin` $everyBin^)?
-    (`unordered` $unordered^)? (`resolved` $resolved^)?
+    (`unordered` $unordered^)? (`resolved` $resolved^)? (`lanes` $lanes^)?
     attr-dict-with-keyword (`dynamic` $body^)?
   }];
   let hasRegionVerifier = 1;
