@@ -9,8 +9,8 @@
 #include "Piko/Transforms/Passes.h"
 
 #include "Bounds.h"
+#include "Piko/Analysis/Uniformity.h"
 #include "Piko/Dialect/Piko/IR/PikoCheck.h"
-#include "Uniformity.h"
 #include "Unwritten.h"
 
 #include "mlir/Dialect/Arith/IR/Arith.h"

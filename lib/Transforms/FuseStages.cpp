@@ -12,7 +12,7 @@
 
 #include "Piko/Analysis/BinIdentity.h"
 #include "Piko/Analysis/PhaseGraph.h"
-#include "Uniformity.h"
+#include "Piko/Analysis/Uniformity.h"
 
 #include "mlir/Dialect/UB/IR/UBOps.h"
 #include "mlir/IR/IRMapping.h"

@@ -6,9 +6,13 @@
 #define PIKO_LIB_TRANSFORMS_LOOPSPLITTER_H
 
 #include "Slots.h"
-#include "Uniformity.h"
+
+#include "Piko/Analysis/Uniformity.h"
 
 namespace piko {
+
+/// Moves out of a loop what all its iterations share; returns the loop.
+ParallelForOp hoistInvariants(ParallelForOp parallel);
 
 /// Cuts one loop at its barriers. The loop's operations are moved, in order,
 /// into *pieces*, loops over all iterations; control flow that holds barriers

@@ -2,7 +2,8 @@
 #include "PixelLoops.h"
 
 #include "StateAccess.h"
-#include "Uniformity.h"
+
+#include "Piko/Analysis/Uniformity.h"
 
 #include "mlir/Dialect/Arith/IR/Arith.h"
 #include "mlir/Dialect/MemRef/IR/MemRef.h"

@@ -25,6 +25,33 @@ struct SplitLoopsPass : piko::impl::SplitLoopsBase<SplitLoopsPass> {
 };
 } // namespace
 
+/// Whether an operation without operands gives the same value everywhere.
+static bool isConstant(Operation *op) {
+  if (op->getNumOperands() != 0 || op->getNumRegions() != 0 ||
+      op->getNumResults() == 0)
+    return false;
+  if (auto load = dyn_cast<LoadOp>(op))
+    return bool(lookupInPipeline<ConstantOp>(op, load.getStateAttr()));
+  return isMemoryEffectFree(op) && isSpeculatable(op);
+}
+
+ParallelForOp piko::hoistInvariants(ParallelForOp parallel) {
+  parallel.walk([&](Operation *op) {
+    if (isConstant(op))
+      op->moveBefore(parallel);
+  });
+  moveLoopInvariantCode(
+      &parallel.getBody(),
+      [&](Value value, Region *region) {
+        return !region->isAncestor(value.getParentRegion());
+      },
+      [&](Operation *op, Region *) {
+        return isMemoryEffectFree(op) && isSpeculatable(op);
+      },
+      [&](Operation *op, Region *) { op->moveBefore(parallel); });
+  return parallel;
+}
+
 /// A loop without barriers: its iterations one after the other.
 static void convertLoop(ParallelForOp parallel) {
   IRRewriter rewriter(parallel);

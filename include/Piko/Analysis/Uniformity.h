@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Where the values of a kernel's work are the same.
+
+#ifndef PIKO_ANALYSIS_UNIFORMITY_H
+#define PIKO_ANALYSIS_UNIFORMITY_H
+
+#include "Piko/Dialect/Piko/IR/Piko.h"
+
+namespace piko {
+
+/// How far a value is the same, from the widest to the narrowest. An item is a
+/// primitive, or one list.
+enum class Uniform { Bin, Item, Iteration };
+
+bool isBarrier(mlir::Operation *op);
+
+/// The first place inside an operation where the iterations of the enclosing
+/// loop meet; null if they do not.
+mlir::Operation *findBarrier(mlir::Operation *op);
+
+/// How far the values inside an operation are the same. What the analysis does
+/// not know is `Uniform::Iteration`, which promises nothing. All iterations are
+/// taken to agree on the control flow around barriers: where they may not, the
+/// loop that is made of it compares them.
+class Uniformity {
+public:
+  /// Where a value begins to differ.
+  using Root = std::pair<mlir::Value, Uniform>;
+
+  /// Of the values in `root`, which is a `piko.bins`, a `piko.items`, a
+  /// `piko.lists`, or a loop over primitives or iterations with its induction
+  /// variable among `roots`. Work and parallel loops inside are roots by
+  /// themselves.
+  explicit Uniformity(mlir::Operation *root, llvm::ArrayRef<Root> roots = {});
+
+  Uniform get(mlir::Value value) const { return levels.lookup(value); }
+  /// Whether a value is the same for all items of the bin.
+  bool isSameForBin(mlir::Value value) const {
+    return get(value) == Uniform::Bin;
+  }
+  /// Whether a value may differ between the iterations of a parallel loop.
+  bool isVarying(mlir::Value value) const {
+    return get(value) == Uniform::Iteration;
+  }
+  /// A value that takes the place of another.
+  void replace(mlir::Value from, mlir::Value to) { mark(to, get(from)); }
+
+private:
+  /// Narrows what an operation defines; returns whether anything is new.
+  bool visit(mlir::Operation *op);
+  bool visitControlFlow(mlir::Operation *op);
+  bool markArguments(mlir::Block &block, Uniform level);
+  bool mark(mlir::Value value, Uniform level);
+  Uniform get(mlir::ValueRange values) const;
+  /// Narrows each of `targets` to its source, and to `least`.
+  bool flow(mlir::ValueRange sources, mlir::ValueRange targets, Uniform least);
+
+  llvm::DenseMap<mlir::Value, Uniform> levels; ///< What is not in it: Bin.
+  llvm::DenseSet<mlir::Attribute> written; ///< State that the kernel writes.
+};
+
+} // namespace piko
+
+#endif // PIKO_ANALYSIS_UNIFORMITY_H

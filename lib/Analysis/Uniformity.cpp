@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Starts from primitives, lists and the numbers of iterations, and narrows all
+// that follows from them, until nothing is new.
+
+#include "Piko/Analysis/Uniformity.h"
+
+using namespace mlir;
+using namespace piko;
+
+bool piko::isBarrier(Operation *op) { return isa<BarrierOpInterface>(op); }
+
+Operation *piko::findBarrier(Operation *op) {
+  Operation *found = nullptr;
+  op->walk<WalkOrder::PreOrder>([&](Operation *inner) {
+    if (isa<ParallelLoopOpInterface>(inner))
+      return WalkResult::skip();
+    if (!isBarrier(inner))
+      return WalkResult::advance();
+    found = inner;
+    return WalkResult::interrupt();
+  });
+  return found;
+}
+
+Uniformity::Uniformity(Operation *root, ArrayRef<Root> roots) {
+  if (auto kernel = root->getParentOfType<KernelOp>())
+    kernel.walk([&](StateAccessOpInterface access) {
+      if (access.getAccessKinds() != StateAccess::reads)
+        written.insert(access.getAccessedState());
+    });
+  for (auto [value, level] : roots)
+    mark(value, level);
+  for (bool changed = true; changed;) {
+    changed = false;
+    root->walk<WalkOrder::PreOrder>([&](Operation *op) {
+      if (isa<ItemsOp, ListsOp>(op))
+        changed |= markArguments(op->getRegion(0).front(), Uniform::Item);
+      else if (auto loop = dyn_cast<ParallelLoopOpInterface>(op))
+        changed |= markArguments(*loop.getBodyBlock(), Uniform::Iteration);
+      else if (op != root)
+        changed |= visit(op);
+    });
+  }
+}
+
+bool Uniformity::mark(Value value, Uniform level) {
+  if (level <= get(value))
+    return false;
+  levels[value] = level;
+  return true;
+}
+
+bool Uniformity::markArguments(Block &block, Uniform level) {
+  bool changed = false;
+  for (Value argument : block.getArguments())
+    changed |= mark(argument, level);
+  return changed;
+}
+
+Uniform Uniformity::get(ValueRange values) const {
+  Uniform level = Uniform::Bin;
+  for (Value value : values)
+    level = std::max(level, get(value));
+  return level;
+}
+
+bool Uniformity::flow(ValueRange sources, ValueRange targets, Uniform least) {
+  bool changed = false;
+  for (auto [source, target] : llvm::zip(sources, targets))
+    changed |= mark(target, std::max(least, get(source)));
+  return changed;
+}
+
+bool Uniformity::visitControlFlow(Operation *op) {
+  // Iterations that meet inside are compared; others may part ways.
+  auto parting = [&](ValueRange deciding) {
+    Uniform level = get(deciding);
+    return findBarrier(op) ? std::min(level, Uniform::Item) : level;
+  };
+  if (auto loop = dyn_cast<scf::ForOp>(op)) {
+    Value lower = loop.getLowerBound(), step = loop.getStep();
+    Uniform parts = parting({lower, loop.getUpperBound(), step});
+    bool changed = mark(loop.getInductionVar(), get({lower, step}));
+    for (ValueRange targets : {ValueRange(loop.getRegionIterArgs()),
+                               ValueRange(loop.getResults())}) {
+      changed |= flow(loop.getInitArgs(), targets, parts);
+      changed |= flow(loop.getYieldedValues(), targets, parts);
+    }
+    return changed;
+  }
+  if (auto loop = dyn_cast<scf::WhileOp>(op)) {
+    Uniform parts = parting(loop.getConditionOp().getCondition());
+    bool changed = flow(loop.getInits(), loop.getBeforeArguments(), parts);
+    changed |=
+        flow(loop.getYieldOp().getOperands(), loop.getBeforeArguments(), parts);
+    ValueRange leaving = loop.getConditionOp().getArgs();
+    changed |= flow(leaving, loop.getAfterArguments(), parts);
+    return flow(leaving, loop.getResults(), parts) || changed;
+  }
+  // scf.if, scf.index_switch
+  Uniform parts = parting(op->getOperands());
+  bool changed = false;
+  for (Region &region : op->getRegions())
+    if (!region.empty())
+      changed |= flow(region.front().getTerminator()->getOperands(),
+                      op->getResults(), parts);
+  return changed;
+}
+
+bool Uniformity::visit(Operation *op) {
+  if (isa<scf::ForOp, scf::WhileOp, scf::IfOp, scf::IndexSwitchOp>(op))
+    return visitControlFlow(op);
+  Uniform level = get(op->getOperands());
+  auto load = dyn_cast<LoadOp>(op);
+  if (isa<ReduceOp>(op)) // one result for all iterations
+    level = Uniform::Item;
+  else if (load ? written.contains(load.getStateAttr())
+                : (op->getNumRegions() != 0 || isa<ScanOp, SortOp>(op) ||
+                   (!isMemoryEffectFree(op) && !isa<ListAtOp>(op))))
+    level = Uniform::Iteration;
+  bool changed = false;
+  for (Value result : op->getResults())
+    changed |= mark(result, level);
+  return changed;
+}
