@@ -81,6 +81,8 @@ void piko::addMachineSequence(OpPassManager &passes) {
   pipeline.addPass(createFormProgram()); // of what was written by hand
   pipeline.addPass(createFormWork());
   addCleanUp(passes);
+  // Last: it counts what is left to do.
+  passes.nest<PipelineOp>().addPass(createMapLanes());
 }
 
 void piko::addUnitSequence(OpPassManager &passes) {

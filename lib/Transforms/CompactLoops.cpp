@@ -176,6 +176,8 @@ void GuardedLoop::createWork() {
   workLoop = scf::ForOp::create(builder, test.getLoc(), zero, size, one);
   workLoop->setAttr("piko.lanes", builder.getUnitAttr());
   workLoop->setAttr("piko.passed", builder.getUnitAttr());
+  if (Attribute mapping = loop->getAttr("piko.mapping"))
+    workLoop->setAttr("piko.mapping", mapping);
   builder.setInsertionPointToStart(workLoop.getBody());
   Value place = workLoop.getInductionVar();
   IRMapping mapping;
@@ -252,6 +254,8 @@ LaneCost GuardedLoop::split() {
 
 void CompactLoopsPass::runOnOperation() {
   for (scf::ForOp loop : findLoopsOverPrimitives(getOperation())) {
+    if (getLaneMapping(loop) == LaneMapping::One)
+      continue;
     GuardedLoop guarded(loop);
     if (!guarded.find())
       continue;

@@ -212,6 +212,9 @@ void UnitFormer::convertItems(ItemsOp items, Value from, Value begin, Value end,
   Value one = arith::ConstantIndexOp::create(rewriter, at, 1);
   auto loop = scf::ForOp::create(rewriter, at, begin, end, one);
   loop->setAttr("piko.lanes", rewriter.getUnitAttr());
+  if (std::optional<LaneMapping> lanes = items.getLanes())
+    loop->setAttr("piko.mapping",
+                  rewriter.getStringAttr(stringifyLaneMapping(*lanes)));
   rewriter.setInsertionPointToStart(loop.getBody());
   Value prim = ItemOp::create(rewriter, at, items.getPrim().getType(), from,
                               loop.getInductionVar());

@@ -32,6 +32,11 @@ SmallVector<scf::ForOp> piko::findLoopsOverPrimitives(PipelineOp pipeline) {
   return loops;
 }
 
+std::optional<LaneMapping> piko::getLaneMapping(scf::ForOp loop) {
+  auto name = loop->getAttrOfType<StringAttr>("piko.mapping");
+  return name ? symbolizeLaneMapping(name.getValue()) : std::nullopt;
+}
+
 int64_t LanePlan::countKept() const {
   int64_t count = kept.size();
   for (const LaneBranch &branch : branches)
@@ -65,7 +70,6 @@ int64_t LaneCost::getLeast() const {
 }
 
 LaneCost LanePlanner::getCost(const LanePlan &plan) const {
-  constexpr int64_t weightInLoop = 8;
   LaneCost cost;
   if (other)
     return cost;

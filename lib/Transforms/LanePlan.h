@@ -22,6 +22,9 @@ struct LaneBranch;
 llvm::SmallVector<mlir::scf::ForOp>
 findLoopsOverPrimitives(PipelineOp pipeline);
 
+/// What the lanes of a loop over primitives are given, if that is known.
+std::optional<LaneMapping> getLaneMapping(mlir::scf::ForOp loop);
+
 /// What of a block runs ahead.
 struct LanePlan {
   mlir::Block *block = nullptr;
@@ -46,6 +49,9 @@ struct LaneBranch {
   unsigned region;
   LanePlan plan;
 };
+
+/// As how many operations one in a loop counts whose turns are not known.
+constexpr int64_t weightInLoop = 8;
 
 /// What a plan saves and costs.
 struct LaneCost {

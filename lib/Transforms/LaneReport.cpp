@@ -145,20 +145,22 @@ LaneReport::Verdict &LaneReport::getVerdict(Operation *op, StringRef phase) {
   return place->second;
 }
 
-void LaneReport::add(scf::ForOp loop, const LanePlanner &planner,
-                     LaneCost cost) {
+void LaneReport::add(scf::ForOp loop, const LanePlanner &planner, LaneCost cost,
+                     bool isVectorized) {
   Verdict &verdict = getVerdict(loop, getLoopPhase(loop));
-  bool isWorthwhile = cost.isWorthwhile(),
-       isBehindTest = loop->hasAttr("piko.passed");
+  bool isBehindTest = loop->hasAttr("piko.passed");
   ++verdict.loops;
-  verdict.vectorized += isWorthwhile;
-  verdict.isBehindTest |= isWorthwhile && isBehindTest;
+  verdict.vectorized += isVectorized;
+  verdict.isBehindTest |= isVectorized && isBehindTest;
+  verdict.lanes = getLaneMapping(loop);
+  if (verdict.lanes == LaneMapping::One)
+    return;
   std::string text = isBehindTest ? "behind this test, " : "";
   text += std::to_string(cost.operations) + " operations " +
-          (isWorthwhile ? "run ahead of effects, and keep "
+          (isVectorized ? "run ahead of effects, and keep "
                         : "could run ahead of effects, and would keep ") +
           std::to_string(cost.values) + " values";
-  if (!isWorthwhile)
+  if (!isVectorized)
     text += ": expected at least " + std::to_string(cost.getLeast()) +
             " operations";
   verdict.notes.push_back({loop.getLoc(), text});
@@ -197,6 +199,8 @@ void LaneReport::emit() const {
       remark << "vectorized for " << laneCount << " primitives at once";
     if (verdict.vectorized && verdict.vectorized < verdict.loops)
       remark << (verdict.isBehindTest ? " behind a test" : " in part");
+    if (verdict.lanes)
+      remark << "; lanes are given " << stringifyLaneMapping(*verdict.lanes);
     for (const Note &note : verdict.notes)
       remark.attachNote(note.location) << note.text;
   }

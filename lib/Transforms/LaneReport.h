@@ -22,7 +22,8 @@ public:
   /// Phases are in the order of their kernels.
   explicit LaneReport(PipelineOp pipeline);
   /// Takes down what becomes of a loop, before it is changed.
-  void add(mlir::scf::ForOp loop, const LanePlanner &planner, LaneCost cost);
+  void add(mlir::scf::ForOp loop, const LanePlanner &planner, LaneCost cost,
+           bool isVectorized);
   /// Emits the remarks.
   void emit() const;
 
@@ -37,6 +38,7 @@ private:
     mlir::Location location;
     int64_t loops = 0, vectorized = 0;
     bool isBehindTest = false; ///< what is vectorized
+    std::optional<LaneMapping> lanes = std::nullopt;
     llvm::SmallVector<Note> notes = {};
   };
   void add(ListOp list);

@@ -260,6 +260,19 @@ static void simplifySwitches(scf::ForOp loop) {
   });
 }
 
+/// Whether a loop becomes vectors: where lanes are given something by the
+/// schedule, that counts; elsewhere it does if it pays.
+static bool obeyMapping(scf::ForOp loop, StageOp stage, LaneCost cost) {
+  std::optional<LaneMapping> lanes = getLaneMapping(loop);
+  if (lanes == LaneMapping::One)
+    return false;
+  ScheduleOp schedule = stage.getSchedule();
+  bool isSaid = lanes == LaneMapping::Items && schedule &&
+                schedule.getLanes() == LaneMapping::Items &&
+                getLoopPhase(loop) == "process";
+  return isSaid ? cost.operations > 0 : cost.isWorthwhile();
+}
+
 void VectorizePass::runOnOperation() {
   LaneReport report(getOperation());
   for (scf::ForOp loop : findLoopsOverPrimitives(getOperation())) {
@@ -268,8 +281,9 @@ void VectorizePass::runOnOperation() {
     LanePlanner planner(loop);
     LanePlan plan = planner.run();
     LaneCost cost = planner.getCost(plan);
-    report.add(loop, planner, cost);
-    if (!cost.isWorthwhile()) {
+    bool isVectorized = obeyMapping(loop, stage, cost);
+    report.add(loop, planner, cost, isVectorized);
+    if (!isVectorized) {
       ++left;
       continue;
     }

@@ -48,6 +48,50 @@ def FormWork : Pass<"piko-form-work", "::piko::PipelineOp"> {
                            "::mlir::scf::SCFDialect"];
 }
 
+def MapLanes : Pass<"piko-map-lanes", "::piko::PipelineOp"> {
+  let summary = "Choose what lanes are given";
+  let description = [{
+    **Requires** the machine level.
+
+    **Does**: gives each `piko.items` and `piko.lists` its `lanes`: those that the
+    stage's schedule says, or of those that are possible the mapping with the
+    least operations for 32 primitives. *Items*: all take part in as many
+    iterations as the longest has. *Iterations*: work around the loops is done
+    once for each primitive, and the last iterations of each leave lanes idle.
+    *Collapsed*: no lane idles, but each pair of a primitive and an iteration has
+    to be found. Updates of pixels that other lanes may have are put in order.
+    Work without a parallel loop has items; a list without one has one lane. A
+    remark says which mapping, and how the others compare or what rules them out.
+
+    **Guarantees** that all work has `lanes`, and that a target may obey them.
+
+    Before:
+    ```
+    piko.items of @a {
+    ^bb0(%t: !piko.prim<@T>):
+      ...
+      piko.parallel_pixels (%x0, %y0) to (%x1, %y1) { ... }
+    }
+    ```
+    After:
+    ```
+    piko.items of @a lanes collapsed {
+      ...
+    }
+    ```
+
+    **Limits**: how many iterations a loop will have is a guess where a scene
+    decides: a box that differs between primitives is taken to cover a third of
+    the bin in each dimension, as one between two random points does. Iterations
+    that meet at barriers are given to lanes as iterations.
+  }];
+  let statistics = [
+    Statistic<"items", "items", "work whose lanes have items">,
+    Statistic<"iterations", "iterations", "work whose lanes share an item">,
+    Statistic<"collapsed", "collapsed", "work whose lanes have pairs">,
+    Statistic<"one", "one", "work that one lane does">];
+}
+
 def FormUnits : Pass<"piko-form-units", "::piko::PipelineOp"> {
   let summary = "Turn structured work into loops over units, for the CPU";
   let description = [{
@@ -58,7 +102,8 @@ def FormUnits : Pass<"piko-form-units", "::piko::PipelineOp"> {
     in that one over the primitives of a cell, marked `piko.lanes`. Where work
     takes lists, the inner loop is over its calls. Work on what was emitted in the
     bin follows when the bin is done, as a `piko.cpu.local_bin`. Emissions become
-    stores into the unit's own writer.
+    stores into the unit's own writer. Loops over primitives keep the `lanes` of
+    their work as `piko.mapping`.
 
     **Guarantees** that all storage and synchronisation is explicit, and that no
     work is left.
