@@ -23,7 +23,7 @@ std::optional<MarkerKind> piko::getMarkerKind(llvm::StringRef name) {
                               MARKER(assignAll) MARKER(assignPrevious) MARKER(
                                   assignBox) MARKER(schedule) MARKER(endStage)
                                   MARKER(endBin) MARKER(batch) MARKER(everyBin)
-                                      MARKER(order) MARKER(source)
+                                      MARKER(order) MARKER(lanes) MARKER(source)
                                           MARKER(connect)
                                               MARKER(allocateForSource)
                                                   MARKER(phase) MARKER(clear)

@@ -58,6 +58,7 @@ enum class MarkerKind {
   batch,
   everyBin,
   order,
+  lanes,
   source,
   connect,
   allocateForSource,

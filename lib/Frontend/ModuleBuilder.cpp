@@ -203,13 +203,18 @@ private:
     auto number = [&](int64_t value) {
       return value ? builder.getI64IntegerAttr(value) : mlir::IntegerAttr();
     };
+    LaneMappingAttr lanes;
+    if (schedule.lanes)
+      lanes = LaneMappingAttr::get(&context,
+                                   static_cast<LaneMapping>(*schedule.lanes));
+    // Whether the lanes are possible is found much later.
     auto op = ScheduleOp::create(
-        builder, stage.location,
+        builder, schedule.lanesLocation.value_or(stage.location),
         static_cast<ScheduleKind>(schedule.getPolicy()),
         number(schedule.tileSplit),
         waits.empty() ? mlir::ArrayAttr() : builder.getArrayAttr(waits),
         schedule.endBin, number(schedule.batch), schedule.everyBin,
-        schedule.unordered, /*resolved=*/false, /*lanes=*/nullptr);
+        schedule.unordered, /*resolved=*/false, lanes);
     return !schedule.isDynamic ||
            buildPhase(WrapperKind::Schedule, stageNumber, op.getBody());
   }

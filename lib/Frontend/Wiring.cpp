@@ -267,6 +267,7 @@ private:
   static llvm::StringRef getDirectiveName(const Marker &marker) {
     return marker.kind == MarkerKind::endStage ? "endStage"
            : marker.kind == MarkerKind::endBin ? "endBin"
+           : marker.kind == MarkerKind::lanes  ? "specifyLanes"
                                                : "specifyOrder";
   }
   bool failPhase(const llvm::CallInst *call, const StageDescription &stage) {
@@ -295,6 +296,7 @@ private:
     case MarkerKind::endStage:
     case MarkerKind::endBin:
     case MarkerKind::order:
+    case MarkerKind::lanes:
       directives.push_back({call, &marker});
       return true;
     case MarkerKind::assignBin:
@@ -350,6 +352,14 @@ private:
     case MarkerKind::everyBin:
       schedule.everyBin = true;
       return true;
+    case MarkerKind::lanes:
+      schedule.lanes = getConstant(call, 0, "what lanes are given");
+      schedule.lanesLocation = getUserLocation(call, unit, context);
+      if (!schedule.lanes || (*schedule.lanes >= 0 && *schedule.lanes <= 3))
+        return schedule.lanes.has_value();
+      fail(call) << "expected a value of piko::Lanes, but got "
+                 << *schedule.lanes;
+      return false;
     default:
       if (!(number = getConstant(call, 0, "an order")))
         return false;

@@ -92,6 +92,9 @@ static LogicalResult checkSchedules(StageOp producer, StageOp consumer,
   if ((first && first.getUnordered()) != (second && second.getUnordered()))
     return refuse(second ? consumer : producer,
                   "only one of the stages is unordered");
+  if (second && second.getLanes())
+    return refuse(consumer, "the lanes of stage '" + getCppName(consumer) +
+                                "' are specified");
   std::optional<ScheduleKind> kind = getKind(consumer);
   if (!kind)
     return success(); // wherever its primitives are

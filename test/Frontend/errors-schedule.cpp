@@ -11,6 +11,9 @@
 // RUN: not piko-translate --cpp-to-piko -DCASE=9 %s 2>&1 | FileCheck %s --check-prefix=FETCH
 // RUN: not piko-translate --cpp-to-piko -DCASE=10 %s 2>&1 | FileCheck %s --check-prefix=FLOAT
 // RUN: not piko-translate --cpp-to-piko -DCASE=11 %s 2>&1 | FileCheck %s --check-prefix=LOCAL
+// RUN: not piko-translate --cpp-to-piko -DCASE=12 %s 2>&1 | FileCheck %s --check-prefix=LANES
+// RUN: not piko-translate --cpp-to-piko -DCASE=13 %s 2>&1 | FileCheck %s --check-prefix=VARIABLE
+// RUN: not piko-translate --cpp-to-piko -DCASE=14 %s 2>&1 | FileCheck %s --check-prefix=RANGE
 #include <piko.h>
 
 struct State {
@@ -44,6 +47,16 @@ struct One : piko::Stage<8, 8, 64, int, int>, piko::Uses<State> {
 #elif CASE == 8
     // STORE: errors-schedule.cpp:[[#@LINE + 1]]:23: error: expected only directives in the schedule phase of stage 'one'
     state().buffer[0] = 1;
+#elif CASE == 12
+    // LANES: errors-schedule.cpp:[[#@LINE + 2]]:7: error: expected specifyLanes for every bin, because it may not depend on the bin
+    if (bin.index)
+      specifyLanes(piko::Lanes::One);
+#elif CASE == 13
+    // VARIABLE: errors-schedule.cpp:[[#@LINE + 1]]:5: error: expected what lanes are given to be a constant
+    specifyLanes(static_cast<piko::Lanes>(state().constant));
+#elif CASE == 14
+    // RANGE: errors-schedule.cpp:[[#@LINE + 1]]:5: error: expected a value of piko::Lanes, but got 4
+    specifyLanes(static_cast<piko::Lanes>(4));
 #endif
   }
   void process(const int &i) {

@@ -13,17 +13,18 @@ struct State {
 
 // A tile split on another kind is accepted, and has no effect.
 // CHECK-LABEL: piko.stage @fixed
-// CHECK: piko.schedule serialize batch 16{{$}}
+// CHECK: piko.schedule serialize batch 16 lanes one{{$}}
 struct Fixed : piko::Stage<0, 0, 64, int, int> {
   void schedule(piko::BinId) {
     specifySchedule(piko::Serialize, 3);
     batch(16);
+    specifyLanes(piko::Lanes::One);
   }
   void process(const piko::List<int> &list) { emit(list[0]); }
 };
 
 // CHECK-LABEL: piko.stage @dynamic
-// CHECK: piko.schedule load_balance end_stage [@fixed] unordered dynamic {
+// CHECK: piko.schedule load_balance end_stage [@fixed] unordered lanes iterations dynamic {
 // CHECK-NEXT: ^bb0(%[[BIN:.*]]: index):
 struct Dynamic : piko::Stage<8, 8, 64, int>, piko::Uses<State> {
   void assignBin(const int &i) { assignToAll(i); }
@@ -44,6 +45,7 @@ struct Dynamic : piko::Stage<8, 8, 64, int>, piko::Uses<State> {
     // CHECK: piko.set_batch %{{.*}}
     // CHECK: piko.return
     batch(bin.index + 1);
+    specifyLanes(piko::Lanes::Iterations);
   }
   void process(const piko::List<int> &) {}
 };

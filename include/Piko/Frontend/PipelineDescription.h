@@ -99,6 +99,9 @@ struct ScheduleDescription {
   /// Whether the policy, the tile split, batch and everyBin depend on the bin
   /// or on constants: then the schedule phase is code.
   bool isDynamic = false;
+  /// What lanes are given, as piko::Lanes has it, and where the text says so.
+  std::optional<int64_t> lanes = std::nullopt;
+  std::optional<mlir::Location> lanesLocation = std::nullopt;
 
   SchedulePolicy getPolicy() const {
     return policy.value_or(SchedulePolicy::LoadBalance);
@@ -106,7 +109,7 @@ struct ScheduleDescription {
   /// Whether the text says nothing.
   bool isEmpty() const {
     return !policy && !batch && endStage.empty() && !endBin && !everyBin &&
-           !unordered && !isDynamic;
+           !unordered && !isDynamic && !lanes;
   }
 };
 

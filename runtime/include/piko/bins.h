@@ -64,6 +64,14 @@ enum Order : int32_t {
   Unordered = 1, ///< any
 };
 
+/// What a lane is given: of a vector, or a thread of a block.
+enum class Lanes : int32_t {
+  Items = 0,      ///< a primitive each
+  Iterations = 1, ///< iterations of the parallel loops of one primitive or list
+  Collapsed = 2,  ///< pairs of a primitive and an iteration
+  One = 3,        ///< one lane does everything
+};
+
 /// The primitives of one bin, or one batch of them, in order.
 template <class T> class List;
 

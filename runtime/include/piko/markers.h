@@ -82,6 +82,7 @@ void endBin();
 void batch(int64_t size);
 void everyBin();
 void order(int32_t order);
+void lanes(int32_t lanes);
 
 // The graph. Stages are given by their addresses in the pipeline.
 void source(const void *stage);

@@ -16,7 +16,7 @@ import sys
 STAGE = """
     assignBin assignToAll assignToBin assignToBoundingBox assignToPreviousBins
     schedule specifySchedule endStage endBin batch everyBin specifyOrder
-    process emit update parallelFor parallelForPixels sync any all count reduce
+    specifyLanes process emit update parallelFor parallelForPixels sync any all count reduce
     scan sort bin binLo binHi binFromPosition domain state BasicStage Stage
     Uses"""
 PIPE = """
@@ -24,7 +24,7 @@ PIPE = """
     setLoopLimit setThreads setMemoryLimit setMemoryBudget setStripSize
     expectNumbers nameState Pipe"""
 NAMESPACE = """
-    All BasicStage BinId Bins Buffer Cells DirectMap Error Image InLineage List
+    All BasicStage BinId Bins Buffer Cells DirectMap Error Image InLineage Lanes List
     LoadBalance NoState Order Pipe Position SchedulePolicy Serialize Stage
     Status Unordered Uses acos asin atan atan2 atomicAdd atomicAddFetch atomicAnd
     atomicMax atomicMin atomicOr atomicXor cbrt cos cosh exp exp2 fma hypot log

@@ -294,6 +294,7 @@ protected:
   void batch(int64_t size) { marker::batch(size); }
   void everyBin() { marker::everyBin(); }
   void specifyOrder(Order order) { marker::order(order); }
+  void specifyLanes(Lanes lanes) { marker::lanes(static_cast<int>(lanes)); }
 };
 
 template <int X, int Y, int Threads, class In, class... Out>

@@ -383,6 +383,10 @@ public:
     reference::frameInSchedule("specifyOrder", at).node->unordered =
         order == Unordered;
   }
+  /// What lanes are given, instead of what the compiler chooses.
+  void specifyLanes(Lanes, reference::Place at = reference::Place::current()) {
+    reference::frameInSchedule("specifyLanes", at);
+  }
 
   // Process.
 
