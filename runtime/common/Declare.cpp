@@ -251,6 +251,11 @@ void pikoir_declare_schedule(pikort_pipeline *p, int32_t stage, int64_t batch,
   });
 }
 
+void pikoir_declare_clears(pikort_pipeline *p, int32_t stage, int32_t state) {
+  guarded(p, "setup",
+          [&] { entry(p->stages, stage, "stage").clears.push_back(state); });
+}
+
 void pikoir_declare_strips(pikort_pipeline *p, int32_t id, int32_t source,
                            int64_t chunk, const int32_t *stages,
                            int32_t count) {

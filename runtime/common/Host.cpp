@@ -385,6 +385,7 @@ int32_t pikort_run(pikort_pipeline *p) {
   });
   if (!p || !p->ready)
     return code;
+  endClears(*p);
   endStrips(*p);
   endCycles(*p);
   if (p->checker)

@@ -65,6 +65,14 @@ void pikort_pipeline::checkDeclared() {
     if (!stage.takesList() && (stage.schedule.batch || stage.schedule.everyBin))
       bad("stage " + quoted(stage.name) +
           ": a batch needs a process that takes a list");
+    for (int32_t id : stage.clears)
+      if (static_cast<size_t>(id) >= states.size() ||
+          states[id].kind != PIKORT_IMAGE || stage.cellSize > 0 ||
+          stage.flags & PIKOIR_SPLIT)
+        bad("stage " + quoted(stage.name) +
+            ": expected an image to clear, and bins that are not split, but "
+            "got state " +
+            std::to_string(id));
   }
   for (const State &state : states) {
     checkRecord(state.record, state.name);

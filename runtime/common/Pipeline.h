@@ -149,11 +149,13 @@ struct Stage {
   int32_t cycle = -1;
   int32_t loop = -1;
   int32_t stripGroup = -1;
-  bool sharesTile = false; ///< A strip is a tile: threads share it.
-  int32_t host = -1;       ///< In whose kernel it runs, behind local edges.
-  int32_t depth = 0;       ///< How many local edges lie before it.
-  bool hosts = false;      ///< Other stages run in its kernel, ...
-  bool visitsAll = false;  ///< ... some of them for empty bins, too.
+  bool sharesTile = false;     ///< A strip is a tile: threads share it.
+  int32_t host = -1;           ///< In whose kernel it runs, behind local edges.
+  int32_t depth = 0;           ///< How many local edges lie before it.
+  bool hosts = false;          ///< Other stages run in its kernel, ...
+  bool visitsAll = false;      ///< ... some of them for empty bins, too.
+  std::vector<int32_t> clears; ///< Images that its first kernel clears.
+  bool cleared = false;        ///< It has, in this run.
   // Completed by each run:
   std::array<int64_t, 4> grid{}, cellGrid{};
   int64_t tiles = 1, cells = 1;

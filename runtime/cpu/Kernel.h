@@ -273,8 +273,12 @@ void cutUnits(pikort_pipeline &p, const Stage &stage, Kernel &kernel);
 
 // --- State.cpp --------------------------------------------------------------
 
-/// Allocates and clears images and buffers sized by sources; throws.
+/// Allocates images and buffers sized by sources; throws.
 void prepareState(pikort_pipeline &p);
+/// Of a stage that clears images: clears what its first kernel will not.
+void beginClears(pikort_pipeline &p, Kernel &kernel);
+/// Clears the images of stages that had no kernel, as after an error.
+void endClears(pikort_pipeline &p);
 
 // --- Run.cpp ----------------------------------------------------------------
 

@@ -64,7 +64,8 @@ static void publish(const pikort_pipeline &p, Kernel &kernel) {
                   static_cast<int64_t>(kernel.units.size()),
                   kernel.source >= 0 ? 1 : stage.tiles,
                   kernel.calls.data(),
-                  kernel.calls.size()};
+                  kernel.calls.size(),
+                  /*clears=*/0};
 }
 
 static void openLanes(pikort_pipeline &p, Kernel &kernel) {
@@ -171,6 +172,8 @@ static const pikoir_input *begin(pikort_pipeline &p, Kernel &kernel) {
       prepareSource(p, kernel);
     else
       prepareStage(p, kernel);
+    if (kernel.source < 0)
+      beginClears(p, kernel);
     kernel.open = true;
     kernel.nextUnit = 0;
     int64_t useful = kernel.ownsUnits ? p.threads : kernel.input.unit_count;

@@ -35,6 +35,11 @@ static void fill(int32_t threads, uint8_t *to, int64_t bytes,
   });
 }
 
+static void fill(pikort_pipeline &p, State &state) {
+  fill(p.threads, state.owned.data(), state.owned.size(),
+       state.kind == PIKORT_IMAGE ? state.clear : std::vector<uint8_t>());
+}
+
 static void allocate(pikort_pipeline &p, State &state) {
   int64_t bytes = p.records[state.record].size;
   bool overflow = false;
@@ -62,6 +67,8 @@ static void prepare(pikort_pipeline &p, State &state) {
 }
 
 void piko::rt::prepareState(pikort_pipeline &p) {
+  for (Stage &stage : p.stages)
+    stage.cleared = false;
   for (State &state : p.states)
     try {
       prepare(p, state);
@@ -69,6 +76,87 @@ void piko::rt::prepareState(pikort_pipeline &p) {
       throw Failure{PIKORT_OUT_OF_MEMORY,
                     outOfMemoryText(p, "state " + quoted(state.name), refused)};
     }
+}
+
+// --- Images that kernels clear ----------------------------------------------
+
+/// The bins that no unit or call of a kernel is for.
+static std::vector<int64_t> findLeftBins(const Stage &stage,
+                                         const Kernel &kernel) {
+  std::vector<int64_t> left;
+  if (stage.visitsAll && !stage.takesList())
+    return left;
+  std::vector<bool> called(stage.takesList() ? stage.bins() : 0);
+  for (int64_t call = 0; call < kernel.calls.size(); ++call)
+    called[kernel.calls[call].bin] = true;
+  for (int64_t bin = 0; bin < stage.bins(); ++bin)
+    if (stage.takesList() ? !called[bin]
+                          : kernel.offsets[bin] == kernel.offsets[bin + 1])
+      left.push_back(bin);
+  return left;
+}
+
+/// Calls body(first, cells) for each row of cells of a bin.
+static void forRows(const pikort_pipeline &p, const Stage &stage, int64_t bin,
+                    auto &&body) {
+  int64_t lo[4], hi[4];
+  for (int32_t d = 0; d < 4; ++d) {
+    int64_t size = d < p.rank ? stage.binSize[d] : 0;
+    int64_t domain = d < p.rank ? p.domain[d] : 1;
+    lo[d] = size ? bin % stage.grid[d] * size : 0;
+    hi[d] = size ? std::min(lo[d] + size, domain) : domain;
+    bin /= stage.grid[d];
+  }
+  const auto &extent = p.domain;
+  for (int64_t w = lo[3]; w < hi[3]; ++w)
+    for (int64_t z = lo[2]; z < hi[2]; ++z)
+      for (int64_t y = lo[1]; y < hi[1]; ++y)
+        body(((w * extent[2] + z) * extent[1] + y) * extent[0] + lo[0],
+             hi[0] - lo[0]);
+}
+
+/// Clears an image in some bins of a stage.
+static void fillBins(pikort_pipeline &p, const Stage &stage, State &state,
+                     const std::vector<int64_t> &bins) {
+  int64_t size = p.records[state.record].size;
+  int64_t longest =
+      stage.binSize[0] ? std::min(stage.binSize[0], p.domain[0]) : p.domain[0];
+  std::vector<uint8_t> row(static_cast<size_t>(longest * size));
+  fill(1, row.data(), longest * size, state.clear);
+  uint8_t *pixels = state.owned.data();
+  parallelChunks(p.threads, static_cast<int64_t>(bins.size()), 16,
+                 [&](int64_t begin, int64_t end) {
+                   for (int64_t i = begin; i < end; ++i)
+                     forRows(p, stage, bins[i], [&](int64_t at, int64_t cells) {
+                       std::memcpy(pixels + at * size, row.data(),
+                                   static_cast<size_t>(cells * size));
+                     });
+                 });
+}
+
+void piko::rt::beginClears(pikort_pipeline &p, Kernel &kernel) {
+  Stage &stage = p.stages[kernel.stage];
+  if (stage.clears.empty() || stage.cleared)
+    return;
+  Part before = p.profile.part();
+  p.profile.enter(Part::State);
+  std::vector<int64_t> left = findLeftBins(stage, kernel);
+  for (int32_t id : stage.clears)
+    if (static_cast<int64_t>(left.size()) == stage.bins())
+      fill(p, p.states[id]);
+    else
+      fillBins(p, stage, p.states[id], left);
+  stage.cleared = true;
+  kernel.input.clears = 1;
+  p.profile.enter(before);
+}
+
+void piko::rt::endClears(pikort_pipeline &p) {
+  for (Stage &stage : p.stages)
+    if (!std::exchange(stage.cleared, true))
+      for (int32_t id : stage.clears)
+        if (p.states[id].owned)
+          fill(p, p.states[id]);
 }
 
 extern "C" {
@@ -84,8 +172,7 @@ void pikoir_clear(pikort_pipeline *p, int32_t id) {
                         std::to_string(id)};
     Part before = p->profile.part();
     p->profile.enter(Part::State);
-    fill(p->threads, state->owned.data(), state->owned.size(),
-         state->kind == PIKORT_IMAGE ? state->clear : std::vector<uint8_t>());
+    fill(*p, *state);
     p->profile.enter(before);
   });
 }

@@ -429,7 +429,7 @@ TEST(Create, RejectsBadPrograms) {
     pikort_destroy(p);
   };
   expect({7, "Old", setup, run}, PIKORT_VERSION,
-         "pipeline 'Old': expected a program for runtime version 5, but got 7");
+         "pipeline 'Old': expected a program for runtime version 6, but got 7");
   expect({PIKORT_ABI_VERSION, "Empty", nullptr, run}, PIKORT_BAD_PROGRAM,
          "pipeline 'Empty': expected a program with setup and run");
   auto twice = [](pikort_pipeline *p) {

@@ -128,6 +128,13 @@ PIKORT_API void pikoir_declare_local(pikort_pipeline *p, int32_t producer,
 /// and no.
 PIKORT_API void pikoir_declare_schedule(pikort_pipeline *p, int32_t stage,
                                         int64_t batch, int32_t every_bin);
+/// The first kernel of the stage in a run clears the image, for which there is
+/// no pikoir_clear: the runtime in bins that no unit or call holds, the kernel
+/// in all others, if pikoir_input.clears. Units are whole bins, and hold no bin
+/// without positions that is not to be visited; the kernel passes over such
+/// bins. The stage is on no cycle.
+PIKORT_API void pikoir_declare_clears(pikort_pipeline *p, int32_t stage,
+                                      int32_t state);
 /// How what a port emits is gathered: PIKOIR_CONCATENATE where its order is
 /// free, or its units are in the order of emission; and how many 64-bit words
 /// the key has that tells a primitive's lineage, 0 = none. Where several edges
@@ -233,6 +240,7 @@ typedef struct pikoir_input {
   /// Of a LIST stage, in order of bin and batch; null and 0 for all others.
   const pikoir_call *calls;
   int64_t call_count;
+  int64_t clears; ///< Tiles begin with their clear value: 0 or 1.
 } pikoir_input;
 
 /// One port of a writer. The fields up to `cells` are the fast path's: see the
@@ -551,7 +559,7 @@ PIKOIR_ASSERT_SIZE(pikoir_call, 24);
 PIKOIR_ASSERT_OFFSET(pikoir_call, bin, 0);
 PIKOIR_ASSERT_OFFSET(pikoir_call, begin, 8);
 PIKOIR_ASSERT_OFFSET(pikoir_call, end, 16);
-PIKOIR_ASSERT_SIZE(pikoir_input, 72);
+PIKOIR_ASSERT_SIZE(pikoir_input, 80);
 PIKOIR_ASSERT_OFFSET(pikoir_input, items, 0);
 PIKOIR_ASSERT_OFFSET(pikoir_input, count, 8);
 PIKOIR_ASSERT_OFFSET(pikoir_input, order, 16);
@@ -561,6 +569,7 @@ PIKOIR_ASSERT_OFFSET(pikoir_input, unit_count, 40);
 PIKOIR_ASSERT_OFFSET(pikoir_input, tiles, 48);
 PIKOIR_ASSERT_OFFSET(pikoir_input, calls, 56);
 PIKOIR_ASSERT_OFFSET(pikoir_input, call_count, 64);
+PIKOIR_ASSERT_OFFSET(pikoir_input, clears, 72);
 PIKOIR_ASSERT_SIZE(pikoir_port, 120);
 PIKOIR_ASSERT_OFFSET(pikoir_port, cursor, 0);
 PIKOIR_ASSERT_OFFSET(pikoir_port, limit, 8);
