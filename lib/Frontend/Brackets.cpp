@@ -217,7 +217,8 @@ void Bracket::makeUpdate() {
       mlir::FlatSymbolRefAttr::get(
           builder.getContext(),
           begin.getCallee().drop_front(updateBeginName.size())),
-      begin.getOperands(), /*bin=*/mlir::Value(), /*of=*/nullptr);
+      begin.getOperands(), /*bin=*/mlir::Value(), /*tile=*/mlir::Value(),
+      /*of=*/nullptr);
   mlir::Block *inner = builder.createBlock(&update.getBody());
   for (mlir::Value value : begin.getResults())
     inner->addArgument(value.getType(), begin.getLoc());

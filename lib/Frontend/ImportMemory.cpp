@@ -315,7 +315,8 @@ LogicalResult PhaseImporter::importLoad(llvm::CallInst *call) {
                          "constants alone, but stage '"
                       << stage.name << "' reads '" << place.state->name << "'";
   values[call] = make<LoadOp>(type, place.state->name, place.indices,
-                              place.field, place.elements, /*checked=*/false,
+                              place.field, place.elements,
+                              /*tile=*/mlir::Value(), /*checked=*/false,
                               /*of=*/nullptr);
   return success();
 }
@@ -325,8 +326,8 @@ LogicalResult PhaseImporter::importStore(llvm::CallInst *call) {
   if (failed(getPlace(call, 3, place)))
     return failure();
   make<StoreOp>(scalars.get(call->getArgOperand(2)), place.state->name,
-                place.indices, place.field, place.elements, /*checked=*/false,
-                /*of=*/nullptr);
+                place.indices, place.field, place.elements,
+                /*tile=*/mlir::Value(), /*checked=*/false, /*of=*/nullptr);
   return success();
 }
 

@@ -206,7 +206,8 @@ void ProgramWriter::createLaunch(int stage, std::optional<int64_t> turn) {
                           .getInputAttr()));
   auto launch = LaunchOp::create(
       builder, kernel.getLoc(), types, kernel.getSymName(), bins,
-      turn ? builder.getI64IntegerAttr(*turn) : IntegerAttr());
+      turn ? builder.getI64IntegerAttr(*turn) : IntegerAttr(),
+      /*clears=*/nullptr);
   for (auto [edge, value] : llvm::zip(edges, launch.getEdges()))
     setValue(edge, value);
 }
@@ -216,7 +217,8 @@ void ProgramWriter::assignSource(KernelOp kernel) {
   const PlannedEdge &edge = plan.edges[*getAssignedSource(kernel)];
   values[edge.op] =
       LaunchOp::create(builder, kernel.getLoc(), getType(edge),
-                       kernel.getSymName(), takeValue(edge), IntegerAttr())
+                       kernel.getSymName(), takeValue(edge), IntegerAttr(),
+                       /*clears=*/nullptr)
           .getResult(0);
 }
 
@@ -414,7 +416,7 @@ LogicalResult ProgramWriter::createKernel(KernelOp kernel) {
   std::optional<int64_t> source = getAssignedSource(kernel);
   if (stages.empty() && !source) { // of a schedule
     LaunchOp::create(builder, kernel.getLoc(), TypeRange(), kernel.getSymName(),
-                     Value(), IntegerAttr());
+                     Value(), IntegerAttr(), /*clears=*/nullptr);
     return success();
   }
   int stage = source ? plan.edges[*source].consumer

@@ -40,6 +40,7 @@ private:
   void convertBins(BinsOp over);
   /// A loop over the unit's cells, or its calls.
   scf::ForOp createUnitLoop();
+  void passOverEmptyBins(CellRangeOp range, scf::ForOp loop);
   /// Where what follows the last batch of a bin goes.
   Block *createBinEnd(Value call, Value bin);
   /// Makes a loop over primitives of work on them, or takes one list.
@@ -146,6 +147,15 @@ void UnitFormer::convertSource(ItemsOp items) {
                writers.lookup(items.getStageAttr()));
 }
 
+/// Whether work on what is emitted in a bin runs for bins in which nothing is.
+static bool visitsEmptyBins(ArrayRef<Operation *> locals) {
+  return llvm::any_of(locals, [](Operation *local) {
+    auto stage = lookupInPipeline<StageOp>(local, getStageName(local));
+    ScheduleOp schedule = stage.getSchedule();
+    return schedule && schedule.getEveryBin();
+  });
+}
+
 void UnitFormer::convertBins(BinsOp over) {
   scf::ForOp loop = createUnitLoop();
   Operation *end = loop.getBody()->getTerminator();
@@ -153,6 +163,7 @@ void UnitFormer::convertBins(BinsOp over) {
   Value at = loop.getInductionVar(),
         writer = writers.lookup(getStageName(work));
   auto isPiece = [](Operation &op) { return isa<ItemsOp, ListsOp>(op); };
+  bool hasTiles = !over.getBodyBlock()->getOps<TileOp>().empty();
   Operation *first = &*llvm::find_if(*over.getBodyBlock(), isPiece);
   bool takesList = isa<ListsOp>(first);
   Value bin = takesList
@@ -165,7 +176,7 @@ void UnitFormer::convertBins(BinsOp over) {
       locals.push_back(&op);
   rewriter.inlineBlockBefore(over.getBodyBlock(), end, bin);
   rewriter.eraseOp(over);
-  if (takesList && first->getNextNode() != end) {
+  if (takesList && !locals.empty()) {
     rewriter.setInsertionPointAfter(first);
     Operation *next = first->getNextNode();
     behind = createBinEnd(at, bin);
@@ -178,11 +189,30 @@ void UnitFormer::convertBins(BinsOp over) {
     convertList(cast<ListsOp>(first), bins, at, writer);
   } else {
     auto range = CellRangeOp::create(rewriter, loc, bins, unit, at);
+    if (hasTiles && !visitsEmptyBins(locals))
+      passOverEmptyBins(range, loop);
     convertItems(cast<ItemsOp>(first), bins, range.getBegin(), range.getEnd(),
                  writer);
   }
   for (Operation *local : locals)
     convertLocal(local);
+}
+
+/// Puts what a bin runs behind a test of whether there is something in it: a
+/// tile would be filled and written for nothing.
+void UnitFormer::passOverEmptyBins(CellRangeOp range, scf::ForOp loop) {
+  Block *body = loop.getBody();
+  range->moveBefore(body, std::next(body->begin())); // behind its bin
+  rewriter.setInsertionPointAfter(range);
+  Value isFilled =
+      arith::CmpIOp::create(rewriter, loc, arith::CmpIPredicate::ne,
+                            range.getBegin(), range.getEnd());
+  auto choice = scf::IfOp::create(rewriter, loc, isFilled, /*withElse=*/false);
+  Block *rest = choice.thenBlock();
+  rest->getOperations().splice(rest->begin(), body->getOperations(),
+                               std::next(choice->getIterator()),
+                               body->getTerminator()->getIterator());
+  rewriter.setInsertionPointToStart(rest);
 }
 
 /// A bin ends with its last batch: the next call is for another one.

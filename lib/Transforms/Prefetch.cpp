@@ -94,6 +94,8 @@ static SmallVector<Reference> findReferences(scf::ForOp loop, ItemOp item) {
   SmallVector<Reference> references;
   llvm::DenseSet<Attribute> known;
   loop.walk([&](LoadOp load) {
+    if (load.getTile())
+      return; // at hand
     Reference reference{load.getStateAttr(), {}};
     SmallVector<Attribute> names{load.getStateAttr()};
     for (Value index : load.getIndices()) {

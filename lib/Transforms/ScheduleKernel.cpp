@@ -100,7 +100,7 @@ static void launch(KernelOp kernel, StageOp stage) {
       continue;
     OpBuilder builder(bins);
     LaunchOp::create(builder, bins.getLoc(), TypeRange(), kernel.getSymName(),
-                     Value(), IntegerAttr());
+                     Value(), IntegerAttr(), /*clears=*/nullptr);
     bins.erase();
   }
 }

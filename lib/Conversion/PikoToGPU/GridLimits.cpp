@@ -19,6 +19,9 @@ LogicalResult piko::checkGridLimits(KernelOp kernel) {
       return op->emitError(
           "a kernel for a GPU has no local barriers; leave out "
           "piko-fuse-kernels");
+    if (isa<TileOp>(op))
+      return op->emitError("a kernel for a GPU has no tiles; leave out "
+                           "piko-form-tiles");
     if (hasOtherBitsInPTX(op))
       return op->emitError("a kernel for a GPU uses '")
              << op->getName() << "', which has other bits there";

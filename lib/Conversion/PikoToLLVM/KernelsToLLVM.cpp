@@ -18,7 +18,8 @@ constexpr RuntimeMember items = PIKO_RUNTIME_MEMBER(pikoir_input, items),
                         unitCount =
                             PIKO_RUNTIME_MEMBER(pikoir_input, unit_count),
                         tiles = PIKO_RUNTIME_MEMBER(pikoir_input, tiles),
-                        calls = PIKO_RUNTIME_MEMBER(pikoir_input, calls);
+                        calls = PIKO_RUNTIME_MEMBER(pikoir_input, calls),
+                        clears = PIKO_RUNTIME_MEMBER(pikoir_input, clears);
 constexpr RuntimeMember cellBegin =
                             PIKO_RUNTIME_MEMBER(pikoir_unit, cell_begin),
                         cellEnd = PIKO_RUNTIME_MEMBER(pikoir_unit, cell_end),
@@ -92,6 +93,19 @@ struct UnitCountLowering : Lowering<UnitCountOp> {
     rewriter.replaceOp(op, toIndex(rewriter, loc,
                                    context.member(rewriter, adaptor.getBins(),
                                                   layout::unitCount)));
+    return success();
+  }
+};
+
+struct ClearsLowering : Lowering<ClearsOp> {
+  using Lowering::Lowering;
+  LogicalResult
+  matchAndRewrite(ClearsOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    Location loc = op.getLoc();
+    Value clears = context.member(rewriter, adaptor.getBins(), layout::clears);
+    rewriter.replaceOpWithNewOp<arith::CmpIOp>(
+        op, arith::CmpIPredicate::ne, clears, createI64(rewriter, loc, 0));
     return success();
   }
 };
@@ -461,10 +475,10 @@ void piko::populateKernelToLLVMPatterns(const TypeConverter &converter,
                                         RewritePatternSet &patterns,
                                         LoweringContext &context) {
   patterns.add<OpenBinsLowering, CloseBinsLowering, UnitCountLowering,
-               UnitCellsLowering, CellRangeLowering, CellBinLowering,
-               CallRangeLowering, CallBinLowering, ItemLowering,
-               PrefetchItemLowering, NoItemLowering, ToAddressLowering,
-               FromAddressLowering,
+               ClearsLowering, UnitCellsLowering, CellRangeLowering,
+               CellBinLowering, CallRangeLowering, CallBinLowering,
+               ItemLowering, PrefetchItemLowering, NoItemLowering,
+               ToAddressLowering, FromAddressLowering,
 
                BeginScheduleLowering, ScheduleBinLowering, GetLowering,
                GridLowering, DomainLowering, ThreadsLowering, ThreadLowering,

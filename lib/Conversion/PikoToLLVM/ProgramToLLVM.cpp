@@ -49,6 +49,7 @@ private:
   void declareStage(StageOp stage, int32_t number);
   void declareEdge(EdgeOp edge);
   void declareJoin(JoinOp join);
+  void declareClears(LaunchOp launch);
   void declareRoots(ProgramOp program);
   void declareRegion(Operation *region);
   Value recordBytes(FlatSymbolRefAttr record, ArrayAttr numbers);
@@ -301,6 +302,15 @@ void SetupWriter::declareRoots(ProgramOp program) {
   }
 }
 
+void SetupWriter::declareClears(LaunchOp launch) {
+  if (!launch.getClearsAttr())
+    return;
+  Value stage = i32(findStages(launch, numbers).front());
+  for (auto image : launch.getClearsAttr().getAsRange<FlatSymbolRefAttr>())
+    call(PIKO_RUNTIME_FUNCTION(pikoir_declare_clears),
+         {stage, i32(numbers.states.lookup(image.getAttr()))});
+}
+
 void SetupWriter::declareRegion(Operation *region) {
   auto stages = findStages(region, numbers);
   std::string list;
@@ -347,6 +357,8 @@ void SetupWriter::run(ProgramOp program) {
   program.walk<WalkOrder::PreOrder>([&](Operation *op) {
     if (auto join = dyn_cast<JoinOp>(op))
       declareJoin(join);
+    else if (auto launch = dyn_cast<LaunchOp>(op))
+      declareClears(launch);
     else if (isa<StripsOp, WavesOp, RoundsOp>(op))
       declareRegion(op);
   });

@@ -3,6 +3,8 @@
 // convert-piko-to-scf: updates and other access to state, behind tests of where
 // they go.
 
+#include "Tiles.h"
+
 #include "Piko/Conversion/Passes.h"
 #include "Piko/Dialect/Piko/IR/BinArithmetic.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
@@ -74,7 +76,8 @@ private:
     forEachElement(rewriter, loc, record, [&](FieldAttr field, ValueRange es) {
       oldValues.push_back(LoadOp::create(rewriter, loc, field.getType(),
                                          update.getImage(), at, field.getName(),
-                                         es, /*checked=*/true, /*of=*/nullptr));
+                                         es, update.getTile(), /*checked=*/true,
+                                         /*of=*/nullptr));
     });
     Block *then = ifOp.thenBlock();
     if (ifOp.getNumResults() == 0)
@@ -88,28 +91,12 @@ private:
       int64_t i = element++;
       if (newValues[i] != oldValues[i])
         StoreOp::create(rewriter, loc, newValues[i], update.getImage(), at,
-                        field.getName(), es, /*checked=*/true, /*of=*/nullptr);
+                        field.getName(), es, update.getTile(),
+                        /*checked=*/true, /*of=*/nullptr);
     });
     if (ifOp.getNumResults())
       scf::YieldOp::create(rewriter, loc, yield.getResults());
     rewriter.eraseOp(yield);
-  }
-
-  /// Each number of a record: its field, and its indices into an array.
-  static void
-  forEachElement(PatternRewriter &rewriter, Location loc, RecordOp record,
-                 llvm::function_ref<void(FieldAttr, ValueRange)> body) {
-    for (auto field : record.getFields().getAsRange<FieldAttr>())
-      for (int64_t i = 0, e = field.getElementCount(); i < e; ++i) {
-        SmallVector<Value> indices(field.getCounts().size());
-        int64_t rest = i;
-        for (auto [index, count] :
-             llvm::reverse(llvm::zip(indices, field.getCounts()))) {
-          index = arith::ConstantIndexOp::create(rewriter, loc, rest % count);
-          rest /= count;
-        }
-        body(field, indices);
-      }
   }
 };
 
@@ -316,6 +303,7 @@ struct ConvertPikoToSCFPass
     populatePikoToSCFPatterns(patterns);
     if (failed(applyPatternsGreedily(getOperation(), std::move(patterns))))
       return signalPassFailure();
+    lowerTiles(getOperation());
     getOperation().walk([&](Operation *op) {
       if (isa<UpdateOp, ListAtOp, ListSizeOp>(op)) {
         op->emitOpError(

@@ -134,3 +134,47 @@ LogicalResult PlaceOp::verifySymbolUses(SymbolTableCollection &) {
   return emitOpError("expected what 'piko.emit' gives, or a primitive of a "
                      "source");
 }
+
+//===----------------------------------------------------------------------===//
+// The pixels of a bin
+//===----------------------------------------------------------------------===//
+
+LogicalResult TileOp::verifySymbolUses(SymbolTableCollection &) {
+  auto image = lookupInPipeline<ImageOp>(*this, getImageAttr());
+  if (!image)
+    return emitOpError("expected an image, but got ")
+           << getImageAttr() << ", which is none";
+  if (getTile().getType().getRecord() != image.getRecordAttr())
+    return emitOpError("expected a tile of record ")
+           << image.getRecordAttr() << ", but got "
+           << getTile().getType().getRecord();
+  auto isWrite = [](Operation *user) { return isa<WriteTileOp>(user); };
+  if (llvm::count_if(getTile().getUsers(), isWrite) != 1)
+    return emitOpError("expected one 'piko.write_tile' of it");
+  auto bins = dyn_cast<BinsOp>((*this)->getParentOp());
+  if (!bins) // below the machine level
+    return success();
+  auto stage = lookupInPipeline<StageOp>(*this, bins.getStageAttr());
+  ArrayRef<int64_t> extents = getTile().getType().getExtents();
+  if (stage && (stage.getBins() != extents || llvm::is_contained(extents, 0)))
+    return emitOpError("expected the extents of the bins of ")
+           << bins.getStageAttr() << ", [" << stage.getBins()
+           << "], of which none is 0, but got [" << extents << "]";
+  if (getBin() != bins.getBin())
+    return emitOpError("expected the bin that is being run");
+  return success();
+}
+
+LogicalResult WriteTileOp::verifySymbolUses(SymbolTableCollection &) {
+  auto tile = getTile().getDefiningOp<TileOp>();
+  if (tile && tile.getImageAttr() == getImageAttr() &&
+      tile.getBin() == getBin())
+    return success();
+  return emitOpError("expected the image and the bin that the tile is of");
+}
+
+FlatSymbolRefAttr TileOp::getAccessedState() { return getImageAttr(); }
+int TileOp::getAccessKinds() { return StateAccess::reads; }
+
+FlatSymbolRefAttr WriteTileOp::getAccessedState() { return getImageAttr(); }
+int WriteTileOp::getAccessKinds() { return StateAccess::stores; }

@@ -347,6 +347,53 @@ static LogicalResult verifyInput(LaunchOp launch, KernelOp kernel) {
   return success();
 }
 
+/// The images that a kernel's tiles clear, as names.
+static llvm::SmallSetVector<Attribute, 4> findClears(KernelOp kernel) {
+  llvm::SmallSetVector<Attribute, 4> images;
+  kernel.walk([&](TileOp tile) {
+    if (tile.getClear())
+      images.insert(tile.getImageAttr());
+  });
+  return images;
+}
+
+/// Whether a launch clears what the tiles of its kernel do, and nothing else
+/// does.
+static LogicalResult verifyClears(LaunchOp launch) {
+  auto tiles = findClears(launch.getKernelOp());
+  if (!launch.getClearsAttr() && tiles.empty())
+    return success();
+  llvm::SmallSetVector<Attribute, 4> images;
+  if (ArrayAttr clears = launch.getClearsAttr())
+    images.insert(clears.begin(), clears.end());
+  // A target may have made arrays of tiles.
+  bool isLoops = !launch.getKernelOp().getOps<OpenBinsOp>().empty();
+  for (Attribute image : images)
+    if (!isLoops && !tiles.contains(image))
+      return launch.emitOpError("expected a tile in ")
+             << launch.getKernelAttr()
+             << " that begins with the clear value of " << image;
+  for (Attribute image : tiles)
+    if (!images.contains(image))
+      return launch.emitOpError("expected to clear ")
+             << image << ", as the tile in " << launch.getKernelAttr()
+             << " does";
+  if (launch->getParentOfType<WavesOp>() || launch->getParentOfType<RoundsOp>())
+    return launch.emitOpError("expected to clear images only where it is sure "
+                              "to run, but it is in a cycle");
+  WalkResult others =
+      launch->getParentOfType<ProgramOp>().walk([&](ClearOp clear) {
+        for (Attribute image : images)
+          if (llvm::is_contained(clear.getStates(), image)) {
+            launch.emitOpError("expected ")
+                << image << " to be cleared once, but 'piko.clear' does, too";
+            return WalkResult::interrupt();
+          }
+        return WalkResult::advance();
+      });
+  return failure(others.wasInterrupted());
+}
+
 LogicalResult LaunchOp::verify() {
   KernelOp kernel = getKernelOp();
   if (!kernel)
@@ -356,6 +403,8 @@ LogicalResult LaunchOp::verify() {
     return failure();
   if (getTurn() && !isa<RoundsOp>((*this)->getParentOp()))
     return emitOpError("expected a turn in rounds alone");
+  if (failed(verifyClears(*this)))
+    return failure();
   SmallVector<FlatSymbolRefAttr> records;
   if (getAssignedSource(kernel)) {
     records.push_back(cast<EdgeType>(getInput().getType()).getRecord());

@@ -26,6 +26,20 @@ static FailureOr<Operation *> verifyState(Operation *op, FlatSymbolRefAttr name,
   return state;
 }
 
+/// Whether a tile, if there is one, is of the image that an access names.
+static LogicalResult verifyTile(Operation *op, Value tile,
+                                FlatSymbolRefAttr image) {
+  if (!tile)
+    return success();
+  auto made = tile.getDefiningOp<TileOp>();
+  if (made && made.getImageAttr() == image)
+    return success();
+  InFlightDiagnostic error = op->emitOpError("expected the tile of ") << image;
+  if (made)
+    error << ", but got that of " << made.getImageAttr();
+  return error;
+}
+
 template <typename AccessOp>
 static LogicalResult verifyAccess(AccessOp op, Type type) {
   auto state = verifyState(op, op.getStateAttr(), op.getIndices().size());
@@ -58,10 +72,14 @@ static LogicalResult verifyWrite(AccessOp op, Type type) {
 }
 
 LogicalResult LoadOp::verifySymbolUses(SymbolTableCollection &) {
+  if (failed(verifyTile(*this, getTile(), getStateAttr())))
+    return failure();
   return verifyAccess(*this, getResult().getType());
 }
 
 LogicalResult StoreOp::verifySymbolUses(SymbolTableCollection &) {
+  if (failed(verifyTile(*this, getTile(), getStateAttr())))
+    return failure();
   return verifyWrite(*this, getValue().getType());
 }
 
@@ -106,6 +124,8 @@ LogicalResult UpdateOp::verifySymbolUses(SymbolTableCollection &) {
   if (!lookupInPipeline<ImageOp>(*this, getImageAttr()))
     return emitOpError("expected an image, but got ")
            << getImageAttr() << ", which is none";
+  if (failed(verifyTile(*this, getTile(), getImageAttr())))
+    return failure();
   return failure(
       failed(verifyState(*this, getImageAttr(), getCoordinates().size())));
 }

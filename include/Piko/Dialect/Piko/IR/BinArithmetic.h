@@ -54,7 +54,8 @@ private:
 /// in, or null.
 mlir::Value findBin(mlir::OpBuilder &builder, mlir::Operation *op);
 
-/// On an update whose pixel piko-prove-bounds has found to be in the bin.
+/// On an access to an image whose pixel piko-prove-bounds has found to be in
+/// the bin.
 constexpr const char *insideAttrName = "piko.inside";
 
 } // namespace piko

@@ -62,6 +62,20 @@ def Piko_UnitCountOp : Piko_CPUOp<"unit_count", [Pure]> {
   let assemblyFormat = "$bins attr-dict `:` qualified(type($bins))";
 }
 
+def Piko_ClearsOp : Piko_CPUOp<"clears", [Pure]> {
+  let summary = "whether tiles begin with their clear value";
+  let description = [{
+    In the first launch of a kernel that clears images: see `piko.launch`.
+
+    ```mlir
+    %first = piko.cpu.clears %bins : !piko.bins<@Fragment>
+    ```
+  }];
+  let arguments = (ins Piko_BinsType:$bins);
+  let results = (outs I1:$result);
+  let assemblyFormat = "$bins attr-dict `:` qualified(type($bins))";
+}
+
 def Piko_UnitCellsOp : Piko_CPUOp<"unit_cells", [Pure]> {
   let summary = "the cells of a unit of work";
   let description = [{

@@ -6,6 +6,7 @@
 #define PIKO_DIALECT_PIKO_IR_PIKOMACHINEOPS_TD
 
 include "Piko/Dialect/Piko/IR/PikoAttributes.td"
+include "Piko/Dialect/Piko/IR/PikoInterfaces.td"
 include "Piko/Dialect/Piko/IR/PikoTypes.td"
 
 def Piko_BinsOp : Piko_Op<"bins", [
@@ -154,6 +155,67 @@ def Piko_PlaceOp : Piko_Op<"place", [
   let assemblyFormat = [{
     $prim `of` $stage `in` $bin (`tile` $tile^)? attr-dict
     `:` qualified(type($prim))
+  }];
+}
+
+def Piko_TileOp : Piko_Op<"tile", [
+    DeclareOpInterfaceMethods<Piko_StateAccessInterface>,
+    DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
+  let summary = "the pixels of an image in a bin, for who runs the bin";
+  let description = [{
+    From here to `piko.write_tile`, the bin's pixels of the image are in the tile
+    and not in the image. Accesses name the tile, behind the image that it is of;
+    their coordinates stay those of the image. A bin at the end of the domain
+    may be smaller than its tile; what is outside is never read.
+
+    The tile begins as the pixels are in the image, or, with `clear`, as the
+    image is declared to be cleared, in the first launch of the kernel in a run:
+    see `piko.launch`.
+
+    ```mlir
+    piko.record @F {"x" : i32 at 0} size 4 align 4
+    piko.pipeline @P rank 1 {
+      piko.image @count : @F rank 1 clear [0 : i32]
+      piko.source @last
+      piko.stage @last bins [8] threads 64 ordered : @F -> [] {}
+      piko.kernel @kernel_last {
+        piko.bins of @last {
+        ^bb0(%bin: index):
+          %t = piko.tile @count in %bin : !piko.tile<@F, [8]>
+          piko.items of @last {
+          ^bb0(%f: !piko.prim<@F>):
+            %x = piko.get %f "x" : !piko.prim<@F> -> i32
+            piko.update @count[%x : i32] in %bin tile(%t : !piko.tile<@F, [8]>) {
+            ^bb0(%old: i32):
+              %one = arith.constant 1 : i32
+              %new = arith.addi %old, %one : i32
+              piko.yield [%new : i32]
+            }
+          }
+          piko.write_tile %t to @count in %bin : !piko.tile<@F, [8]>
+        }
+      }
+    }
+    ```
+  }];
+  let arguments = (ins FlatSymbolRefAttr:$image, UnitAttr:$clear, Index:$bin);
+  let results = (outs Piko_TileType:$tile);
+  let assemblyFormat = [{
+    $image (`clear` $clear^)? `in` $bin attr-dict `:` qualified(type($tile))
+  }];
+}
+
+def Piko_WriteTileOp : Piko_Op<"write_tile", [
+    DeclareOpInterfaceMethods<Piko_StateAccessInterface>,
+    DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
+  let summary = "writes the pixels of a bin back";
+  let description = [{
+    All of them; the tile is not used any more. See `piko.tile`.
+  }];
+  let arguments = (ins Piko_TileType:$tile, FlatSymbolRefAttr:$image,
+                       Index:$bin);
+  let assemblyFormat = [{
+    $tile `to` $image `in` $bin attr-dict `:` qualified(type($tile))
   }];
 }
 

@@ -177,6 +177,11 @@ def Piko_LaunchOp : Piko_ProgramStatement<"launch"> {
 
     In a `piko.rounds`, a kernel with a `turn` runs in its turn alone.
 
+    With `clears`, the first launch in a run sets the pixels of these images to
+    their clear value: the kernel begins with tiles (`piko.tile`) of this value in
+    bins that it visits, and those of all other bins are set beside it. Such a
+    kernel is launched at least once.
+
     ```mlir
     %fragments = piko.launch @kernel_rasterize(%bins)
       : (!piko.bins<@Triangle>) -> !piko.edge<@Fragment>
@@ -184,10 +189,12 @@ def Piko_LaunchOp : Piko_ProgramStatement<"launch"> {
   }];
   let arguments = (ins FlatSymbolRefAttr:$kernel,
                        Optional<AnyTypeOf<[Piko_EdgeType, Piko_BinsType]>>:$input,
-                       OptionalAttr<ConfinedAttr<Piko_I64Attr, [IntNonNegative]>>:$turn);
+                       OptionalAttr<ConfinedAttr<Piko_I64Attr, [IntNonNegative]>>:$turn,
+                       OptionalAttr<TypedArrayAttrBase<FlatSymbolRefAttr, "images">>:$clears);
   let results = (outs Variadic<Piko_EdgeType>:$edges);
   let assemblyFormat = [{
-    $kernel `` `(` ($input^)? `)` (`turn` $turn^)? attr-dict `:`
+    $kernel `` `(` ($input^)? `)` (`turn` $turn^)?
+    (`clears` custom<Symbols>($clears)^)? attr-dict `:`
     functional-type(operands, results)
   }];
   let hasVerifier = 1;

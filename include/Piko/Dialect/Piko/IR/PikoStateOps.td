@@ -23,7 +23,8 @@ def Piko_LoadOp : Piko_StateAccessOp<"load", [MemoryEffects<[MemRead]>]> {
     An index outside the buffer or image is an error when the pipeline runs;
     `checked` says that the test for it is already there. Where a phase has
     become a part of another stage's, `of` names its stage, for that error, and
-    `assign` says that it is an assign phase.
+    `assign` says that it is an assign phase. At the machine level a pixel may be
+    that of a `piko.tile`.
 
     ```mlir
     %width = piko.load @camera "width" : i32
@@ -35,13 +36,15 @@ def Piko_LoadOp : Piko_StateAccessOp<"load", [MemoryEffects<[MemRead]>]> {
   }];
   let arguments = (ins FlatSymbolRefAttr:$state,
                        Variadic<Piko_Coordinate>:$indices, StrAttr:$field,
-                       Variadic<Index>:$elements, UnitAttr:$checked,
+                       Variadic<Index>:$elements,
+                       Optional<Piko_TileType>:$tile, UnitAttr:$checked,
                        OptionalAttr<StrAttr>:$of, UnitAttr:$assign);
   let results = (outs Piko_Scalar:$result);
   let assemblyFormat = [{
     (`of` $of^)? (`assign` $assign^)? (`checked` $checked^)? $state
-    (`[` $indices^ `:` type($indices) `]`)? $field
-    (`[` $elements^ `]`)? attr-dict `:` type($result)
+    (`[` $indices^ `:` type($indices) `]`)? $field (`[` $elements^ `]`)?
+    (`tile` `(` $tile^ `:` qualified(type($tile)) `)`)?
+    attr-dict `:` type($result)
   }];
 }
 
@@ -49,8 +52,8 @@ def Piko_StoreOp : Piko_StateAccessOp<"store", [MemoryEffects<[MemWrite]>]> {
   let summary = "writes a field of an element that no other call writes";
   let description = [{
     An index outside the buffer or image is an error when the pipeline runs;
-    `checked` says that the test for it is already there, `of` is as in
-    `piko.load`.
+    `checked` says that the test for it is already there, `of` and `tile` are as
+    in `piko.load`.
 
     ```mlir
     piko.store %v, @vertices[%i : index] "position.x" : f32
@@ -59,12 +62,14 @@ def Piko_StoreOp : Piko_StateAccessOp<"store", [MemoryEffects<[MemWrite]>]> {
   }];
   let arguments = (ins Piko_Scalar:$value, FlatSymbolRefAttr:$state,
                        Variadic<Piko_Coordinate>:$indices, StrAttr:$field,
-                       Variadic<Index>:$elements, UnitAttr:$checked,
+                       Variadic<Index>:$elements,
+                       Optional<Piko_TileType>:$tile, UnitAttr:$checked,
                        OptionalAttr<StrAttr>:$of);
   let assemblyFormat = [{
     $value `,` (`of` $of^)? (`checked` $checked^)? $state
-    (`[` $indices^ `:` type($indices) `]`)? $field
-    (`[` $elements^ `]`)? attr-dict `:` type($value)
+    (`[` $indices^ `:` type($indices) `]`)? $field (`[` $elements^ `]`)?
+    (`tile` `(` $tile^ `:` qualified(type($tile)) `)`)?
+    attr-dict `:` type($value)
   }];
 }
 
@@ -135,8 +140,8 @@ def Piko_UpdateOp : Piko_Op<"update", [
     The body takes the numbers of the pixel, fields in order, and yields the new
     ones; `results` leave it. The calls for one pixel run in lineage order. A
     pixel outside the bin is an error when the pipeline runs. At the machine
-    level the operation names the bin that the pixel must be in. `of` is as in
-    `piko.load`.
+    level the operation names the bin that the pixel must be in. `of` and `tile`
+    are as in `piko.load`.
 
     ```mlir
     %passed = piko.update @depth[%x, %y : i32, i32] {
@@ -154,12 +159,14 @@ def Piko_UpdateOp : Piko_Op<"update", [
   }];
   let arguments = (ins FlatSymbolRefAttr:$image,
                        Variadic<Piko_Coordinate>:$coordinates,
-                       Optional<Index>:$bin, OptionalAttr<StrAttr>:$of);
+                       Optional<Index>:$bin, Optional<Piko_TileType>:$tile,
+                       OptionalAttr<StrAttr>:$of);
   let results = (outs Variadic<AnyType>:$results);
   let regions = (region SizedRegion<1>:$body);
   let assemblyFormat = [{
     (`of` $of^)? $image `[` $coordinates `:` type($coordinates) `]`
-    (`in` $bin^)? $body (`->` type($results)^)? attr-dict
+    (`in` $bin^)? (`tile` `(` $tile^ `:` qualified(type($tile)) `)`)?
+    $body (`->` type($results)^)? attr-dict
   }];
   let hasRegionVerifier = 1;
 }

@@ -45,6 +45,18 @@ def Piko_BinsType : Piko_Type<"Bins", "bins"> {
   let assemblyFormat = "`<` $record `>`";
 }
 
+def Piko_TileType : Piko_Type<"Tile", "tile"> {
+  let summary = "the pixels of a bin";
+  let description = [{
+    The part of an image that lies in one bin, kept near who runs the bin:
+    records of the extents that bins have, for example
+    `!piko.tile<@Depth, [32, 32]>`. `piko.tile` makes it.
+  }];
+  let parameters = (ins "::mlir::FlatSymbolRefAttr":$record,
+                        ArrayRefParameter<"int64_t">:$extents);
+  let assemblyFormat = "`<` $record `,` `[` $extents `]` `>`";
+}
+
 def Piko_EdgeType : Piko_Type<"Edge", "edge"> {
   let summary = "primitives on their way to a stage";
   let description = [{
