@@ -115,6 +115,8 @@ static void addUnitsToCPU(OpPassManager &passes,
 
 void piko::addCPUSequence(OpPassManager &passes,
                           const SynthesisOptions &options) {
+  if (options.has("form-tiles"))
+    passes.nest<PipelineOp>().addPass(createFormTiles());
   addUnitSequence(passes);
   addUnitsToCPU(passes, options);
 }

@@ -22,6 +22,7 @@ const std::vector<std::string> &SynthesisOptions::getOptional() {
                                                  "eliminate-schedules",
                                                  "fuse-kernels",
                                                  "form-strips",
+                                                 "form-tiles",
                                                  "prefetch",
                                                  "compact-loops",
                                                  "vectorize",

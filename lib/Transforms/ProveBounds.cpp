@@ -3,6 +3,8 @@
 // piko-prove-bounds: marks accesses whose indices cannot be outside, so that
 // nothing tests them when the pipeline runs.
 
+#include "StateAccess.h"
+
 #include "Piko/Analysis/BinIdentity.h"
 
 #include "Piko/Dialect/Piko/IR/BinArithmetic.h"
@@ -27,7 +29,7 @@ struct ProveBoundsPass : piko::impl::ProveBoundsBase<ProveBoundsPass> {
 /// Whether indices are inside, from what is known in the block of an operation.
 class Prover {
 public:
-  bool isInBin(UpdateOp update);
+  bool isInBin(Operation *access, OperandRange pixel);
   bool isInState(Operation *access, StringRef state, OperandRange indices);
   bool isInList(ListAtOp at);
 
@@ -47,9 +49,9 @@ LinearFacts &Prover::getFacts(Operation *op) {
   return *known;
 }
 
-bool Prover::isInBin(UpdateOp update) {
-  LinearFacts &known = getFacts(update);
-  for (auto [dim, coordinate] : llvm::enumerate(update.getCoordinates()))
+bool Prover::isInBin(Operation *access, OperandRange pixel) {
+  LinearFacts &known = getFacts(access);
+  for (auto [dim, coordinate] : llvm::enumerate(pixel))
     if (!known.isAboveBin(coordinate, dim) ||
         !known.isBelowBin(coordinate, dim))
       return false;
@@ -84,7 +86,21 @@ void ProveBoundsPass::runOnOperation() {
       op->emitRemark() << what << " when the pipeline runs";
     return isInside;
   };
+  UnitAttr unit = UnitAttr::get(&getContext());
+  llvm::DenseSet<StringAttr> written = getWrittenState(getOperation());
+  // What piko-form-tiles asks, of images that may have tiles.
+  auto visitPixel = [&](auto access) {
+    FlatSymbolRefAttr state = access.getStateAttr();
+    auto process = access->template getParentOfType<ProcessOp>();
+    if (process && written.contains(state.getAttr()) &&
+        !llvm::is_contained(getPhaseStage(process).getBins(), 0) &&
+        lookupInPipeline<ImageOp>(access, state) &&
+        prover.isInBin(access, access.getIndices()))
+      access->setAttr(insideAttrName, unit);
+  };
   auto visit = [&](auto access) {
+    if (!isa<AtomicOp>(access.getOperation()))
+      visitPixel(access);
     if (!access.getChecked() && !access.getIndices().empty())
       access.setChecked(
           note(access,
@@ -97,10 +113,10 @@ void ProveBoundsPass::runOnOperation() {
           note(at, prover.isInList(at), "the index into the list is tested"));
   };
   auto visitUpdate = [&](UpdateOp update) {
-    if (note(update, prover.isInBin(update),
+    if (note(update, prover.isInBin(update, update.getCoordinates()),
              "the pixel of '" + update.getImage() +
                  "' is tested to be in the bin"))
-      update->setAttr(insideAttrName, UnitAttr::get(&getContext()));
+      update->setAttr(insideAttrName, unit);
   };
   for (auto stage : getOperation().getOps<StageOp>())
     stage.walk([&](Operation *op) {

@@ -48,6 +48,69 @@ def FormWork : Pass<"piko-form-work", "::piko::PipelineOp"> {
                            "::mlir::scf::SCFDialect"];
 }
 
+def FormTiles : Pass<"piko-form-tiles", "::piko::PipelineOp"> {
+  let summary = "Keep the pixels of a bin near who runs it";
+  let description = [{
+    **Requires** the machine level (`piko-form-work`, with a `piko.program`).
+
+    **Does**: takes images that one kernel alone writes in the whole run, and only
+    at pixels of the bin: the bin's pixels become a tile (`piko.tile`), a value of
+    the kernel that is written to the image once, at the bin's end. Where nothing
+    reads the image before, the tile begins with the clear value, and so does what
+    lies in bins without primitives; then the program does not clear the image
+    any more.
+
+    **Guarantees** that images are the same when the kernel ends.
+
+    Before:
+    ```
+    piko.kernel @kernel_a {
+      piko.bins of @a {
+      ^bb0(%bin: index):
+        piko.items of @a {
+        ^bb0(%f: !piko.prim<@F>):
+          piko.update @depth[%x, %y : i32, i32] in %bin { ... }
+        }
+      }
+    }
+    piko.program {
+      piko.clear @depth ...
+      piko.launch @kernel_a(%bins) : (!piko.bins<@F>) -> ()
+    }
+    ```
+    After:
+    ```
+    piko.kernel @kernel_a {
+      piko.bins of @a {
+      ^bb0(%bin: index):
+        %t = piko.tile @depth clear in %bin : !piko.tile<@Depth, [32, 32]>
+        piko.items of @a {
+        ^bb0(%f: !piko.prim<@F>):
+          piko.update @depth[%x, %y : i32, i32] in %bin tile(%t : ...) { ... }
+        }
+        piko.write_tile %t to @depth in %bin : !piko.tile<@Depth, [32, 32]>
+      }
+    }
+    piko.program { ...
+      piko.launch @kernel_a(%bins) clears @depth : (!piko.bins<@F>) -> ()
+    }
+    ```
+
+    **Limits**: reads and stores need `piko-prove-bounds`, which finds whether their
+    pixels are in the bin; atomics are not taken. A bin that threads may share
+    has no tile, nor has one of the whole domain, or one whose list is cut into
+    batches. Remarks say of other images what is in the way.
+  }];
+  let options = [
+    Option<"budget", "budget", "int64_t", "65536",
+           "Most bytes that the tiles of a kernel may have together">,
+    Option<"loads", "loads", "bool", "false",
+           "Form tiles also where they begin with what is in the image">];
+  let statistics = [
+    Statistic<"formed", "formed", "images with tiles">,
+    Statistic<"refused", "refused", "images that one kernel updates, but without tiles">];
+}
+
 def MapLanes : Pass<"piko-map-lanes", "::piko::PipelineOp"> {
   let summary = "Choose what lanes are given";
   let description = [{
