@@ -259,7 +259,20 @@ static void noteStages(PipelineOp pipeline) {
   });
 }
 
+/// Whether all phases that give work are in kernels.
+static LogicalResult verifyLevel(PipelineOp pipeline) {
+  for (auto stage : pipeline.getOps<StageOp>())
+    for (Operation &phase : *stage.getBodyBlock())
+      if (isa<ProcessOp, AssignOp>(phase))
+        return phase.emitError("expected a phase in a kernel, as "
+                               "piko-form-kernels puts it, but got it in a "
+                               "stage");
+  return success();
+}
+
 void FormWorkPass::runOnOperation() {
+  if (failed(verifyLevel(getOperation())))
+    return signalPassFailure();
   noteStages(getOperation());
   for (auto kernel : getOperation().getOps<KernelOp>())
     for (auto local : kernel.getOps<LocalBarrierOp>())
