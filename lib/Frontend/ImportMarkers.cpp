@@ -109,27 +109,30 @@ LogicalResult PhaseImporter::importDirective(llvm::CallInst *call,
   if (phase == WrapperKind::Schedule)
     return importScheduleDirective(call, marker);
   bool isAssign = phase == WrapperKind::Assign;
-  switch (isAssign ? marker.kind : MarkerKind::phase) {
-  case MarkerKind::assignBin:
-    make<AssignToOp>(getIndex(call, 0));
-    return success();
-  case MarkerKind::assignAll:
-    make<AssignAllOp>();
-    return success();
-  case MarkerKind::assignPrevious:
-    make<AssignPreviousOp>();
-    return success();
-  case MarkerKind::assignBox:
-    make<AssignBoxOp>(
-        getCoordinates(call->args(), getRank()),
-        getCoordinates(llvm::drop_begin(call->args(), 4), getRank()));
-    return success();
-  default:
-    return fail(call) << "expected directives in the phase they are for, but "
-                         "stage '"
-                      << stage.name << "' has one in its "
-                      << (isAssign ? "assignBin" : "process") << " phase";
+  if (isAssign && marker.kind == MarkerKind::assign)
+    return importAssignment(call, *marker.assignment);
+  return fail(call) << "expected directives in the phase they are for, but "
+                       "stage '"
+                    << stage.name << "' has one in its "
+                    << (isAssign ? "assignBin" : "process") << " phase";
+}
+
+LogicalResult
+PhaseImporter::importAssignment(llvm::CallInst *call,
+                                const marker::Assignment &assignment) {
+  mlir::OperationState state(*location, assignment.operation);
+  if (assignment.operands == marker::Assignment::Bin)
+    state.addOperands(getIndex(call, 0));
+  if (assignment.operands == marker::Assignment::TwoPoints) {
+    auto rank = static_cast<int32_t>(getRank());
+    for (unsigned first : {0, 4})
+      state.addOperands(
+          getCoordinates(llvm::drop_begin(call->args(), first), rank));
+    state.addAttribute("operandSegmentSizes",
+                       builder.getDenseI32ArrayAttr({rank, rank}));
   }
+  builder.create(state);
+  return success();
 }
 
 /// Those that are the same for all bins are read by readWiring.

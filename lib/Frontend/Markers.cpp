@@ -3,13 +3,24 @@
 
 #include "Markers.h"
 
+#include "llvm/ADT/STLExtras.h"
 #include "llvm/ADT/StringSwitch.h"
 #include "llvm/IR/InstrTypes.h"
 #include "llvm/IR/Module.h"
 
 using namespace piko;
 
+const marker::Assignment *piko::getAssignment(llvm::StringRef name) {
+  const auto *found =
+      llvm::find_if(marker::assignments, [&](const auto &assignment) {
+        return name == assignment.marker;
+      });
+  return found == std::end(marker::assignments) ? nullptr : found;
+}
+
 std::optional<MarkerKind> piko::getMarkerKind(llvm::StringRef name) {
+  if (getAssignment(name))
+    return MarkerKind::assign;
 #define MARKER(NAME) .Case(#NAME, MarkerKind::NAME)
   return llvm::StringSwitch<std::optional<MarkerKind>>(name) MARKER(state)
       MARKER(input) MARKER(element) MARKER(listSize) MARKER(listAt)
@@ -19,15 +30,13 @@ std::optional<MarkerKind> piko::getMarkerKind(llvm::StringRef name) {
                   MARKER(loopFirst) MARKER(loopMore) MARKER(loopNext) MARKER(
                       cellsOf) MARKER(cellAt) MARKER(sync) MARKER(bin)
                       MARKER(floatPosition) MARKER(binAt) MARKER(binLo)
-                          MARKER(binHi) MARKER(domain) MARKER(assignBin)
-                              MARKER(assignAll) MARKER(assignPrevious) MARKER(
-                                  assignBox) MARKER(schedule) MARKER(endStage)
-                                  MARKER(endBin) MARKER(batch) MARKER(everyBin)
-                                      MARKER(order) MARKER(lanes) MARKER(source)
-                                          MARKER(connect)
-                                              MARKER(allocateForSource)
-                                                  MARKER(phase) MARKER(clear)
-                                                      .Default(std::nullopt);
+                          MARKER(binHi) MARKER(domain) MARKER(schedule)
+                              MARKER(endStage) MARKER(endBin) MARKER(batch)
+                                  MARKER(everyBin) MARKER(order) MARKER(lanes)
+                                      MARKER(source) MARKER(connect)
+                                          MARKER(allocateForSource)
+                                              MARKER(phase) MARKER(clear)
+                                                  .Default(std::nullopt);
 #undef MARKER
 }
 
@@ -82,10 +91,7 @@ void piko::setMarkerEffects(llvm::Module &module, const MarkerTable &markers) {
       setInPlace(function);
       break;
     case MarkerKind::phase:
-    case MarkerKind::assignBin:
-    case MarkerKind::assignAll:
-    case MarkerKind::assignPrevious:
-    case MarkerKind::assignBox:
+    case MarkerKind::assign:
       function.setOnlyAccessesInaccessibleMemory();
       [[fallthrough]];
     default:

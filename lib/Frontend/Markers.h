@@ -3,6 +3,7 @@
 #ifndef PIKO_LIB_FRONTEND_MARKERS_H
 #define PIKO_LIB_FRONTEND_MARKERS_H
 
+#include "piko/markers.h"
 #include "llvm/ADT/SmallVector.h"
 #include "llvm/ADT/StringRef.h"
 
@@ -18,7 +19,8 @@ class Module;
 
 namespace piko {
 
-/// One for each function in namespace piko::marker, by the same name.
+/// One for each function in namespace piko::marker, by the same name; and one
+/// for all that assign.
 enum class MarkerKind {
   state,
   input,
@@ -48,10 +50,7 @@ enum class MarkerKind {
   binLo,
   binHi,
   domain,
-  assignBin,
-  assignAll,
-  assignPrevious,
-  assignBox,
+  assign, ///< one of piko::marker::assignments
   schedule,
   endStage,
   endBin,
@@ -67,6 +66,8 @@ enum class MarkerKind {
 };
 
 std::optional<MarkerKind> getMarkerKind(llvm::StringRef name);
+/// What a marker assigns; null if it does not.
+const marker::Assignment *getAssignment(llvm::StringRef name);
 
 struct Marker {
   MarkerKind kind;
@@ -79,6 +80,7 @@ struct Marker {
   bool isSigned = false;
   /// state: where what it gives begins in the pipeline's state.
   int64_t offset = 0;
+  const marker::Assignment *assignment = nullptr;
   /// endStage: the stages of that type, by number.
   llvm::SmallVector<unsigned, 1> stages = {};
 };

@@ -289,6 +289,9 @@ readMarker(const clang::FunctionDecl *function, UnitReader &reader) {
     marker.isReadOnly = (*arguments)[0].getAsType().isConstQualified();
     break;
   }
+  case MarkerKind::assign:
+    marker.assignment = getAssignment(function->getName());
+    break;
   case MarkerKind::state:
     marker.offset = reader.reader.getStateOffset((*arguments)[0].getAsType());
     break;

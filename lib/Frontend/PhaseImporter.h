@@ -109,6 +109,8 @@ private:
   llvm::LogicalResult importQuery(llvm::CallInst *call, const Marker &marker);
   llvm::LogicalResult importDirective(llvm::CallInst *call,
                                       const Marker &marker);
+  llvm::LogicalResult importAssignment(llvm::CallInst *call,
+                                       const marker::Assignment &assignment);
   llvm::LogicalResult importScheduleDirective(llvm::CallInst *call,
                                               const Marker &marker);
   int64_t getRank() const { return unit.pipeline.rank; }

@@ -299,10 +299,7 @@ private:
     case MarkerKind::lanes:
       directives.push_back({call, &marker});
       return true;
-    case MarkerKind::assignBin:
-    case MarkerKind::assignAll:
-    case MarkerKind::assignPrevious:
-    case MarkerKind::assignBox:
+    case MarkerKind::assign:
     case MarkerKind::loopMore:
     case MarkerKind::sync:
     case MarkerKind::sort:

@@ -373,7 +373,7 @@ static std::string describe(const std::string &stage, const KernelError &e,
     return text + "expected a loop that ends, but it still runs after " + a +
            " iterations";
   case PIKORT_NOT_A_NUMBER:
-    return text + "expected a bounding box of numbers, but got NaN";
+    return text + "expected positions of numbers, but got NaN";
   case PIKORT_NOT_UNIFORM:
     return text + "expected every iteration of parallelFor to call " +
            std::string(e.barrier) +

@@ -12,7 +12,7 @@
 #include <vector>
 
 // The language and the runtime are apart, but mean the same bin.
-static_assert(piko::marker::nanBox == PIKOIR_NAN_BOX);
+static_assert(piko::marker::nanPosition == PIKOIR_NAN_BOX);
 
 namespace {
 

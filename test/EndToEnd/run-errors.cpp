@@ -46,8 +46,8 @@ struct Bin : piko::Pipe<State> {
   Bin() { source(stage); }
 };
 
-// BOX: expected: {{.*}}stage 'BoxNaN': expected a bounding box of numbers, but got NaN
-// BOX: got: stage 'stage': expected a bounding box of numbers, but got NaN
+// BOX: expected: {{.*}}stage 'BoxNaN': expected positions of numbers, but got NaN
+// BOX: got: stage 'stage': expected positions of numbers, but got NaN
 struct BoxNaN : piko::Stage<8, 8, 64, Point> {
   void assignBin(const Point &p) {
     float zero = p.value - p.value;

@@ -36,7 +36,7 @@ TEST(Assign, BoundingBoxIsClosedAndClipped) {
   EXPECT_THAT(bins({-5, 0}, {-0.1f, 9}), IsEmpty());
   EXPECT_THAT(bins({5, 5}, {4, 5}), IsEmpty());
   EXPECT_THAT(messageOf([&] { bins({0, 0}, {NAN, 1}); }),
-              HasSubstr("expected a bounding box of numbers, but got NaN"));
+              HasSubstr("expected positions of numbers, but got NaN"));
 }
 
 TEST(Assign, BoundingBoxOfCells) {

@@ -68,12 +68,24 @@ int32_t domain(int32_t dim);
 
 // AssignBin.
 void assignBin(int64_t bin);
-/// The bin of a bounding box of NaN, an error (PIKOIR_NAN_BOX).
-constexpr int64_t nanBox = -(int64_t(1) << 40);
+/// The bin of positions of NaN, an error (PIKOIR_NAN_BOX).
+constexpr int64_t nanPosition = -(int64_t(1) << 40);
 void assignAll();
 void assignPrevious();
 void assignBox(int64_t x0, int64_t y0, int64_t z0, int64_t w0, int64_t x1,
                int64_t y1, int64_t z1, int64_t w1);
+/// All of them: the operation that each becomes, and what both take. Of four
+/// coordinates a point has as many as the pipeline has dimensions.
+struct Assignment {
+  const char *marker, *operation;
+  enum Operands { Nothing, Bin, TwoPoints } operands;
+};
+inline constexpr Assignment assignments[] = {
+    {"assignBin", "piko.assign_to", Assignment::Bin},
+    {"assignAll", "piko.assign_all", Assignment::Nothing},
+    {"assignPrevious", "piko.assign_previous", Assignment::Nothing},
+    {"assignBox", "piko.assign_box", Assignment::TwoPoints},
+};
 
 // Schedule.
 void schedule(int32_t policy, int64_t tileSplit);

@@ -168,7 +168,7 @@ protected:
       assignToBoundingBox(in, detail::cellsOf<B::rank>(lo),
                           detail::cellsOf<B::rank>(hi));
     else
-      marker::assignBin(marker::nanBox);
+      marker::assignBin(marker::nanPosition);
   }
 
   // Queries.

@@ -76,10 +76,13 @@ template <class T> void emit(const T &value, int port, const Place &at) {
   running.emit(port, typeOf<T>(), &value);
 }
 
-inline void assignBox(Cell lo, Cell hi, int rank, const Place &at) {
-  Executor &running = executorAt("assignToBoundingBox", at);
-  const Grid &grid =
-      running.expect(Phase::Assign, "assignToBoundingBox").node->grid;
+/// Assigns those bins that a box of cells touches for which `touches` is true
+/// of their place in the grid.
+template <class F>
+void assignBoxIf(const char *what, Cell lo, Cell hi, int rank, const Place &at,
+                 F touches) {
+  Executor &running = executorAt(what, at);
+  const Grid &grid = running.expect(Phase::Assign, what).node->grid;
   Cell first{}, last{};
   for (int d = 0; d < 4; ++d) {
     lo[d] = d < rank ? std::max<int64_t>(lo[d], 0) : 0;
@@ -94,7 +97,23 @@ inline void assignBox(Cell lo, Cell hi, int rank, const Place &at) {
     for (b[2] = first[2]; b[2] <= last[2]; ++b[2])
       for (b[1] = first[1]; b[1] <= last[1]; ++b[1])
         for (b[0] = first[0]; b[0] <= last[0]; ++b[0])
-          running.assignBin(grid.bin(b));
+          if (touches(grid, b))
+            running.assignBin(grid.bin(b));
+}
+
+inline void assignBox(const Cell &lo, const Cell &hi, int rank,
+                      const Place &at) {
+  assignBoxIf("assignToBoundingBox", lo, hi, rank, at,
+              [](const Grid &, const Cell &) { return true; });
+}
+
+/// Fails if one of the positions of an assignment is NaN.
+template <class V>
+void expectNumbers(const char *what, const V &a, const V &b, const Place &at) {
+  for (int d = 0; d < V::length(); ++d)
+    if (a[d] != a[d] || b[d] != b[d])
+      frameAt(what, at).node->fail(
+          -1, "expected positions of numbers, but got NaN");
 }
 
 inline void checkOwnPixel(const Frame &call, const Cell &at, int rank) {
@@ -334,10 +353,7 @@ public:
   void assignToBoundingBox(const In &, const Position<B::rank> &lo,
                            const Position<B::rank> &hi,
                            reference::Place at = reference::Place::current()) {
-    for (int d = 0; d < B::rank; ++d)
-      if (lo[d] != lo[d] || hi[d] != hi[d])
-        reference::frameAt("assignToBoundingBox", at)
-            .node->fail(-1, "expected a bounding box of numbers, but got NaN");
+    reference::expectNumbers("assignToBoundingBox", lo, hi, at);
     reference::assignBox(reference::toCell(lo), reference::toCell(hi), B::rank,
                          at);
   }
