@@ -156,9 +156,12 @@ bool LanePlanner::isFetch(Operation *op) const {
                       [&](Value index) { return isAddress(index); });
 }
 
+/// Of numbers as lanes have them: wider ones would be cut into pieces.
 static bool areScalar(TypeRange types) {
-  return llvm::all_of(types,
-                      [](Type type) { return type.isIntOrIndexOrFloat(); });
+  return llvm::all_of(types, [](Type type) {
+    return type.isIndex() ||
+           (type.isIntOrFloat() && type.getIntOrFloatBitWidth() <= 64);
+  });
 }
 
 /// Whether vectors can do what an operation does, whether its result is wanted

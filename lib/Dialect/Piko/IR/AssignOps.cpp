@@ -88,6 +88,8 @@ bool AssignAllOp::canFail() { return false; }
 void AssignBoxOp::buildBins(OpBuilder &builder, Operation *stage, Value,
                             PutInBin put) {
   BinArithmetic(builder, getLoc(), cast<StageOp>(stage))
-      .forEachBinIn(getLo(), getHi(), put);
+      .forEachBinIn(
+          getLo(), getHi(),
+          [&](OpBuilder &inside, Value bin, ValueRange) { put(inside, bin); });
 }
 bool AssignBoxOp::canFail() { return false; }

@@ -46,18 +46,25 @@ Value BinArithmetic::gridCoordinate(Value bin, int64_t dim) {
 }
 
 Value BinArithmetic::lo(Value bin, int64_t dim) {
-  if (!extent(dim))
-    return constant(0);
-  return arith::MulIOp::create(builder, loc, gridCoordinate(bin, dim),
-                               constant(extent(dim)));
+  return loAt(extent(dim) ? gridCoordinate(bin, dim) : Value(), dim);
 }
 
 Value BinArithmetic::hi(Value bin, int64_t dim) {
+  return hiAt(extent(dim) ? gridCoordinate(bin, dim) : Value(), dim);
+}
+
+Value BinArithmetic::loAt(Value place, int64_t dim) {
+  if (!extent(dim))
+    return constant(0);
+  return arith::MulIOp::create(builder, loc, place, constant(extent(dim)));
+}
+
+Value BinArithmetic::hiAt(Value place, int64_t dim) {
   Value domain = DomainOp::create(builder, loc, dim);
   if (!extent(dim))
     return domain;
-  Value end =
-      arith::AddIOp::create(builder, loc, lo(bin, dim), constant(extent(dim)));
+  Value end = arith::AddIOp::create(builder, loc, loAt(place, dim),
+                                    constant(extent(dim)));
   return arith::MinSIOp::create(builder, loc, end, domain);
 }
 
@@ -108,7 +115,7 @@ Value BinArithmetic::tileAt(Value bin, ValueRange coordinates) {
 
 void BinArithmetic::forEachBinIn(
     ValueRange lo, ValueRange hi,
-    llvm::function_ref<void(OpBuilder &, Value)> body) {
+    llvm::function_ref<void(OpBuilder &, Value, ValueRange)> body) {
   // Bounds of the loops over the grid, half open.
   SmallVector<Value> begins, ends;
   Value zero = constant(0), one = constant(1);
@@ -136,14 +143,16 @@ void BinArithmetic::forEachBinIn(
   for (int64_t dim = 1; dim < rank(); ++dim)
     strides.push_back(
         arith::MulIOp::create(builder, loc, strides.back(), grid(dim - 1)));
+  SmallVector<Value> place(rank());
   for (int64_t dim = rank() - 1; dim >= 0; --dim) {
     auto loop = scf::ForOp::create(builder, loc, begins[dim], ends[dim], one);
     builder.setInsertionPointToStart(loop.getBody());
+    place[dim] = loop.getInductionVar();
     Value offset = arith::MulIOp::create(builder, loc, loop.getInductionVar(),
                                          strides[dim]);
     bin = arith::AddIOp::create(builder, loc, bin, offset);
   }
-  body(builder, bin);
+  body(builder, bin, place);
 }
 
 Value BinArithmetic::isInside(ValueRange at, ValueRange lo, ValueRange hi) {

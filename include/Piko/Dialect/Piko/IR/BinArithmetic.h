@@ -28,14 +28,19 @@ public:
   /// The first cell of a bin in a dimension, and the one after its last.
   mlir::Value lo(mlir::Value bin, int64_t dim);
   mlir::Value hi(mlir::Value bin, int64_t dim);
+  /// The same of the bin at a place in the grid.
+  mlir::Value loAt(mlir::Value place, int64_t dim);
+  mlir::Value hiAt(mlir::Value place, int64_t dim);
   /// The bin of a cell, -1 where it is outside the domain.
   mlir::Value binAt(mlir::ValueRange coordinates);
   /// The tile, within `bin`, of a cell; cells outside count as the nearest.
   mlir::Value tileAt(mlir::Value bin, mlir::ValueRange coordinates);
-  /// Calls `body` with each bin that a closed box of cells touches, ascending.
-  void
-  forEachBinIn(mlir::ValueRange lo, mlir::ValueRange hi,
-               llvm::function_ref<void(mlir::OpBuilder &, mlir::Value)> body);
+  /// Calls `body` with each bin that a closed box of cells touches, ascending,
+  /// and its place in the grid.
+  void forEachBinIn(
+      mlir::ValueRange lo, mlir::ValueRange hi,
+      llvm::function_ref<void(mlir::OpBuilder &, mlir::Value, mlir::ValueRange)>
+          body);
   /// Whether all of lo <= at < hi.
   mlir::Value isInside(mlir::ValueRange at, mlir::ValueRange lo,
                        mlir::ValueRange hi);
