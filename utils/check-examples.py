@@ -120,14 +120,14 @@ def definitions(text):
             or (primitive and name == "i")
         ]
     if bins or writer:
-        lines.append("%bins = piko.cpu.open_bins @shade : !piko.bins<@Fragment>")
+        lines.append("%bins = piko.storage.open_bins @shade : !piko.bins<@Fragment>")
     if writer:
         lines.append(
             "%writer = piko.cpu.open_writer %bins[%unit] : !piko.bins<@Fragment>"
         )
     if primitive:
         lines.append(
-            "%p = piko.cpu.item %bins[%i]"
+            "%p = piko.storage.item %bins[%i]"
             " : !piko.bins<@Fragment> -> !piko.prim<@Fragment>"
         )
     return "\n".join(lines)

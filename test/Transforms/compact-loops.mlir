@@ -38,7 +38,7 @@ piko.pipeline @P rank 1 {
   // CHECK:           scf.for %[[J:.*]] = %c0 to %[[END]] step %c1
   // CHECK:             %[[K:.*]] = memref.load %[[LIST]][%[[J]]]
   // CHECK:             memref.load %[[NEAREST]][%[[J]]]
-  // CHECK:             piko.cpu.item %{{.*}}[%[[K]]]
+  // CHECK:             piko.storage.item %{{.*}}[%[[K]]]
   // CHECK:             scf.while
   // CHECK:             piko.update @color
   // CHECK:           } {piko.lanes}

@@ -24,8 +24,8 @@ piko.record @Count {"value" : i32 at 0} size 4 align 4
 // CHECK-NEXT:        piko.place %[[P]] of @c in %[[BIN]]
 // CHECK:         piko.kernel @kernel_c
 // UNITS-LABEL:  piko.pipeline @Assign
-// UNITS-COUNT-2:  piko.cpu.append_bin %{{.*}} of @b in
-// UNITS:          piko.cpu.append_bin %{{.*}} of @c in
+// UNITS-COUNT-2:  piko.storage.append_bin %{{.*}} of @b in
+// UNITS:          piko.storage.append_bin %{{.*}} of @c in
 piko.pipeline @Assign rank 2 {
   piko.image @image : @F rank 2
   piko.source @a

@@ -8,30 +8,30 @@ piko.record @F {"x" : i32 at 0, "y" : i32 at 4} size 8 align 4
 // CHECK:         piko.stage @a {{.*}} split :
 // CHECK:         piko.stage @b {{.*}} placed writes :
 // CHECK:         piko.kernel @kernel_a
-// CHECK:           %[[BINS:.*]] = piko.cpu.open_bins @a : !piko.bins<@F>
-// CHECK:           %[[UNITS:.*]] = piko.cpu.unit_count %[[BINS]]
+// CHECK:           %[[BINS:.*]] = piko.storage.open_bins @a : !piko.bins<@F>
+// CHECK:           %[[UNITS:.*]] = piko.storage.unit_count %[[BINS]]
 // CHECK:           scf.forall (%[[UNIT:.*]]) in (%[[UNITS]])
 // CHECK:             %[[W:.*]] = piko.cpu.open_writer %[[BINS]][%[[UNIT]]]
-// CHECK:             %[[C0:.*]], %[[C1:.*]] = piko.cpu.unit_cells %[[BINS]][%[[UNIT]]]
+// CHECK:             %[[C0:.*]], %[[C1:.*]] = piko.storage.unit_cells %[[BINS]][%[[UNIT]]]
 // CHECK:             scf.for %[[CELL:.*]] = %[[C0]] to %[[C1]]
-// CHECK:               %[[LO:.*]], %[[HI:.*]] = piko.cpu.cell_range %[[BINS]][%[[UNIT]], %[[CELL]]]
+// CHECK:               %[[LO:.*]], %[[HI:.*]] = piko.storage.cell_range %[[BINS]][%[[UNIT]], %[[CELL]]]
 // CHECK:               scf.for %[[I:.*]] = %[[LO]] to %[[HI]]
-// CHECK:                 %[[P:.*]] = piko.cpu.item %[[BINS]][%[[I]]]
+// CHECK:                 %[[P:.*]] = piko.storage.item %[[BINS]][%[[I]]]
 // CHECK:                 %[[X:.*]] = piko.get %[[P]] "x"
 // CHECK:                 %[[Y:.*]] = piko.get %[[P]] "y"
-// CHECK:                 piko.cpu.append %[[W]][0] (%[[Y]], %[[X]])
+// CHECK:                 piko.storage.append %[[W]][0] (%[[Y]], %[[X]])
 // The bin of cell (y, x): the consumer's assign phase sees what was emitted.
 // CHECK:                 %[[YI:.*]] = arith.index_cast %[[Y]]
 // CHECK:                 arith.cmpi ult, %[[YI]]
 // CHECK:                 arith.divui %[[YI]], %c8
-// CHECK:                 piko.cpu.append_bin %[[W]][0] of @b in
-// CHECK:                 piko.cpu.next %[[W]]
+// CHECK:                 piko.storage.append_bin %[[W]][0] of @b in
+// CHECK:                 piko.storage.next %[[W]]
 // CHECK:               } {piko.lanes}
 // CHECK:             piko.cpu.close_writer %[[W]]
 // CHECK:           {piko.units = "any"}
-// CHECK:           piko.cpu.close_bins %[[BINS]]
+// CHECK:           piko.storage.close_bins %[[BINS]]
 // CHECK:         piko.kernel @kernel_b
-// CHECK:           %[[BIN:.*]] = piko.cpu.cell_bin
+// CHECK:           %[[BIN:.*]] = piko.storage.cell_bin
 // CHECK:           piko.update @image{{.*}} in %[[BIN]]
 piko.pipeline @P rank 2 {
   piko.image @image : @F rank 2
@@ -71,11 +71,11 @@ piko.pipeline @P rank 2 {
 // A box becomes loops over the grid, x innermost, so that bins come ascending.
 // CHECK-LABEL: piko.pipeline @Box
 // CHECK:         piko.kernel @source_0_a
-// CHECK:           piko.cpu.item
+// CHECK:           piko.storage.item
 // CHECK:           scf.for %[[BY:.*]] =
 // CHECK:             scf.for %[[BX:.*]] =
 // CHECK:               arith.addi {{.*}}%[[BX]]
-// CHECK:               piko.cpu.append_bin %{{.*}} of @a in
+// CHECK:               piko.storage.append_bin %{{.*}} of @a in
 piko.pipeline @Box rank 2 {
   piko.source @a
   piko.stage @a bins [8, 8] threads 1 : @F -> [] {
@@ -117,16 +117,16 @@ piko.pipeline @Box rank 2 {
 // CHECK:             piko.schedule_bin @a[%[[BIN]]] kind %{{.*}} tile_split %{{.*}} batch %[[N]] every_bin %[[ALWAYS]]
 // CHECK:         piko.kernel @source_0_a
 // CHECK:         piko.kernel @kernel_a
-// CHECK:           %[[B:.*]] = piko.cpu.open_bins @a
+// CHECK:           %[[B:.*]] = piko.storage.open_bins @a
 // CHECK:           scf.forall (%[[UNIT:.*]]) in
-// CHECK:             %[[C0:.*]], %[[C1:.*]] = piko.cpu.unit_cells %[[B]][%[[UNIT]]]
+// CHECK:             %[[C0:.*]], %[[C1:.*]] = piko.storage.unit_cells %[[B]][%[[UNIT]]]
 // CHECK:             scf.for %[[CALL:.*]] = %[[C0]] to %[[C1]]
-// CHECK:               %[[I0:.*]], %[[I1:.*]] = piko.cpu.call_range %[[B]][%[[CALL]]]
-// CHECK:               %[[L:.*]] = piko.cpu.list %[[B]][%[[I0]] to %[[I1]]]
+// CHECK:               %[[I0:.*]], %[[I1:.*]] = piko.storage.call_range %[[B]][%[[CALL]]]
+// CHECK:               %[[L:.*]] = piko.storage.list %[[B]][%[[I0]] to %[[I1]]]
 // CHECK:               piko.list_size %[[L]]
 // CHECK:               piko.parallel_for
-// CHECK:                 piko.cpu.append
-// CHECK:               piko.cpu.next
+// CHECK:                 piko.storage.append
+// CHECK:               piko.storage.next
 // CHECK:             piko.cpu.close_writer
 piko.pipeline @Lists rank 2 {
   piko.image @image : @F rank 2
@@ -188,34 +188,34 @@ piko.pipeline @Lists rank 2 {
 // CHECK:         piko.edge @b[0] -> @c local
 // CHECK-NOT:     split
 // CHECK:         piko.kernel @kernel_a
-// CHECK:           %[[BINS:.*]] = piko.cpu.open_bins @a : !piko.bins<@F>
+// CHECK:           %[[BINS:.*]] = piko.storage.open_bins @a : !piko.bins<@F>
 // CHECK:           scf.forall (%[[UNIT:.*]]) in
 // CHECK:             %[[W:.*]] = piko.cpu.open_writer %[[BINS]][%[[UNIT]]] : !piko.bins<@F>
 // CHECK-DAG:         %[[V:.*]] = piko.cpu.open_writer %[[BINS]][%[[UNIT]]] of @b
 // CHECK-DAG:         %[[U:.*]] = piko.cpu.open_writer %[[BINS]][%[[UNIT]]] of @c
-// CHECK:             %[[C0:.*]], %[[C1:.*]] = piko.cpu.unit_cells %[[BINS]]
+// CHECK:             %[[C0:.*]], %[[C1:.*]] = piko.storage.unit_cells %[[BINS]]
 // CHECK:             scf.for %[[CALL:.*]] = %[[C0]] to %[[C1]]
-// CHECK:               %[[BIN:.*]] = piko.cpu.call_bin %[[BINS]][%[[CALL]]]
-// CHECK:               piko.cpu.append %[[W]][0]
-// CHECK:               piko.cpu.append_bin %[[W]][0] of @b in %[[BIN]]
-// CHECK:               piko.cpu.next %[[W]]
-// CHECK:               %[[NEXT:.*]] = piko.cpu.call_bin
+// CHECK:               %[[BIN:.*]] = piko.storage.call_bin %[[BINS]][%[[CALL]]]
+// CHECK:               piko.storage.append %[[W]][0]
+// CHECK:               piko.storage.append_bin %[[W]][0] of @b in %[[BIN]]
+// CHECK:               piko.storage.next %[[W]]
+// CHECK:               %[[NEXT:.*]] = piko.storage.call_bin
 // CHECK:               %[[OTHER:.*]] = arith.cmpi ne, %[[NEXT]], %[[BIN]]
 // CHECK:               %[[ENDS:.*]] = arith.ori %{{.*}}, %[[OTHER]]
 // CHECK:               scf.if %[[ENDS]] {
-// CHECK:                 piko.cpu.local_bin @b from %[[W]][0] writer %[[V]] {
+// CHECK:                 piko.storage.local_bin @b from %[[W]][0] writer %[[V]] {
 // CHECK-NEXT:            ^bb0(%[[LIST:.*]]: !piko.bins<@F>):
-// CHECK:                   piko.cpu.unit_cells %[[LIST]][%c0]
-// CHECK:                   piko.cpu.call_range %[[LIST]]
-// CHECK:                   piko.cpu.append %[[V]][0]
-// CHECK:                   piko.cpu.append_bin %[[V]][0] of @c in %[[BIN]]
-// CHECK:                   piko.cpu.next %[[V]]
-// CHECK:                 piko.cpu.local_bin @c from %[[V]][0] writer %[[U]] {
+// CHECK:                   piko.storage.unit_cells %[[LIST]][%c0]
+// CHECK:                   piko.storage.call_range %[[LIST]]
+// CHECK:                   piko.storage.append %[[V]][0]
+// CHECK:                   piko.storage.append_bin %[[V]][0] of @c in %[[BIN]]
+// CHECK:                   piko.storage.next %[[V]]
+// CHECK:                 piko.storage.local_bin @c from %[[V]][0] writer %[[U]] {
 // CHECK-NEXT:            ^bb0(%[[ITEMS:.*]]: !piko.bins<@F>):
-// CHECK:                   piko.cpu.cell_range %[[ITEMS]][%c0, %c0]
-// CHECK:                   piko.cpu.item %[[ITEMS]]
+// CHECK:                   piko.storage.cell_range %[[ITEMS]][%c0, %c0]
+// CHECK:                   piko.storage.item %[[ITEMS]]
 // CHECK:                   piko.update @image{{.*}} in %[[BIN]]
-// CHECK:                   piko.cpu.next %[[U]]
+// CHECK:                   piko.storage.next %[[U]]
 // CHECK-DAG:         piko.cpu.close_writer %[[U]]
 // CHECK-DAG:         piko.cpu.close_writer %[[V]]
 // CHECK-DAG:         piko.cpu.close_writer %[[W]]

@@ -30,7 +30,7 @@ piko.pipeline @P rank 1 {
   // Those of a bin are asked for, and what they refer to: once for each element,
   // not where an index is computed, nor on the long side of a condition.
   // CHECK:       piko.kernel @kernel_bins
-  // CHECK:         %[[LO:.*]], %[[HI:.*]] = piko.cpu.cell_range
+  // CHECK:         %[[LO:.*]], %[[HI:.*]] = piko.storage.cell_range
   // CHECK:         %[[LAST:.*]] = arith.subi %[[HI]], %c1
   // CHECK:         scf.for %[[I:.*]] = %[[LO]] to %[[HI]]
   // CHECK:           %[[I16:.*]] = arith.addi %[[I]], %c16
@@ -38,13 +38,13 @@ piko.pipeline @P rank 1 {
   // CHECK:           piko.cpu.prefetch_item %[[BINS:.*]][%[[FAR]]]
   // CHECK:           %[[I8:.*]] = arith.addi %[[I]], %c8
   // CHECK:           %[[NEAR:.*]] = arith.minsi %[[I8]], %[[LAST]]
-  // CHECK:           %[[ITEM:.*]] = piko.cpu.item %[[BINS]][%[[NEAR]]]
+  // CHECK:           %[[ITEM:.*]] = piko.storage.item %[[BINS]][%[[NEAR]]]
   // CHECK-NEXT:      %[[V:.*]] = piko.get %[[ITEM]] "v"
   // CHECK-NEXT:      piko.prefetch @vertices[%[[V]] : i32]
   // CHECK-NEXT:      %[[W:.*]] = piko.get %[[ITEM]] "w"
   // CHECK-NEXT:      piko.prefetch @vertices[%[[W]] : i32]
   // CHECK-NOT:       piko.prefetch
-  // CHECK:           piko.cpu.item %[[BINS]][%[[I]]]
+  // CHECK:           piko.storage.item %[[BINS]][%[[I]]]
   // CHECK-NOT:       piko.prefetch
   piko.stage @bins bins [8] threads 1 : @F -> [] {
     piko.assign {
@@ -130,7 +130,7 @@ piko.record @Narrow {"a" : i8 at 0, "b" : i16 at 2, "c" : i64 at 8} size 16 alig
 // CHECK-LABEL: piko.pipeline @Widths
 // CHECK:       piko.kernel @kernel_bins
 // CHECK:           piko.cpu.prefetch_item
-// CHECK:           %[[ITEM:.*]] = piko.cpu.item
+// CHECK:           %[[ITEM:.*]] = piko.storage.item
 // CHECK-NEXT:      %[[A:.*]] = piko.get %[[ITEM]] "a" : !piko.prim<@Narrow> -> i8
 // CHECK-NEXT:      %[[WIDE_A:.*]] = arith.extsi %[[A]] : i8 to i32
 // CHECK-NEXT:      piko.prefetch @vertices[%[[WIDE_A]] : i32]

@@ -19,8 +19,8 @@ piko.pipeline @OtherControlFlow rank 1 {
   piko.source @a
   piko.stage @a bins [0] threads 1 : @F -> [] {}
   piko.kernel @k {
-    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
-    %n = piko.cpu.unit_count %bins : !piko.bins<@F>
+    %bins = piko.storage.open_bins @a : !piko.bins<@F>
+    %n = piko.storage.unit_count %bins : !piko.bins<@F>
     scf.forall (%u) in (%n) {
       %w = piko.cpu.open_writer %bins[%u] : !piko.bins<@F>
       piko.parallel_for %n {
@@ -35,7 +35,7 @@ piko.pipeline @OtherControlFlow rank 1 {
       }
       piko.cpu.close_writer %w
     }
-    piko.cpu.close_bins %bins : !piko.bins<@F>
+    piko.storage.close_bins %bins : !piko.bins<@F>
   }
 }
 
@@ -46,8 +46,8 @@ piko.pipeline @Vector rank 1 {
   piko.source @a
   piko.stage @a bins [0] threads 1 : @F -> [] {}
   piko.kernel @k {
-    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
-    %n = piko.cpu.unit_count %bins : !piko.bins<@F>
+    %bins = piko.storage.open_bins @a : !piko.bins<@F>
+    %n = piko.storage.unit_count %bins : !piko.bins<@F>
     scf.forall (%u) in (%n) {
       %w = piko.cpu.open_writer %bins[%u] : !piko.bins<@F>
       piko.parallel_for %n {
@@ -60,7 +60,7 @@ piko.pipeline @Vector rank 1 {
       }
       piko.cpu.close_writer %w
     }
-    piko.cpu.close_bins %bins : !piko.bins<@F>
+    piko.storage.close_bins %bins : !piko.bins<@F>
   }
 }
 
@@ -71,8 +71,8 @@ piko.pipeline @ResultOfBranch rank 1 {
   piko.source @a
   piko.stage @a bins [0] threads 1 : @F -> [] {}
   piko.kernel @k {
-    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
-    %n = piko.cpu.unit_count %bins : !piko.bins<@F>
+    %bins = piko.storage.open_bins @a : !piko.bins<@F>
+    %n = piko.storage.unit_count %bins : !piko.bins<@F>
     %c = arith.constant true
     scf.forall (%u) in (%n) {
       %w = piko.cpu.open_writer %bins[%u] : !piko.bins<@F>
@@ -91,6 +91,6 @@ piko.pipeline @ResultOfBranch rank 1 {
       }
       piko.cpu.close_writer %w
     }
-    piko.cpu.close_bins %bins : !piko.bins<@F>
+    piko.storage.close_bins %bins : !piko.bins<@F>
   }
 }

@@ -6,7 +6,7 @@ piko.record @F {"z" : f32 at 0} size 4 align 4
 // CHECK-LABEL: piko.pipeline @Plain
 // CHECK:         scf.for %[[I:.*]] = %c0 to %{{.*}} step %c1 {
 // CHECK-NEXT:      scf.for %{{.*}} = %c0 to %[[I]] step %c1 {
-// CHECK-NEXT:        piko.cpu.append
+// CHECK-NEXT:        piko.storage.append
 // CHECK-NEXT:      } {piko.lanes}
 // CHECK-NEXT:    } {piko.lanes}
 // CHECK-NOT:     piko.cpu.scratch
@@ -16,8 +16,8 @@ piko.pipeline @Plain rank 1 {
   piko.stage @a bins [0] threads 1 : @F -> [@F] {}
   piko.stage @b bins [0] threads 1 : @F -> [] {}
   piko.kernel @k {
-    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
-    %n = piko.cpu.unit_count %bins : !piko.bins<@F>
+    %bins = piko.storage.open_bins @a : !piko.bins<@F>
+    %n = piko.storage.unit_count %bins : !piko.bins<@F>
     %v = arith.constant 1.0 : f32
     scf.forall (%u) in (%n) {
       %w = piko.cpu.open_writer %bins[%u] : !piko.bins<@F>
@@ -25,14 +25,14 @@ piko.pipeline @Plain rank 1 {
       ^bb0(%i: index):
         piko.parallel_for %i {
         ^bb0(%j: index):
-          %p = piko.cpu.append %w[0] (%v) : f32 -> !piko.prim<@F>
+          %p = piko.storage.append %w[0] (%v) : f32 -> !piko.prim<@F>
           piko.yield
         }
         piko.yield
       }
       piko.cpu.close_writer %w
     } {piko.schedule = "load_balance"}
-    piko.cpu.close_bins %bins : !piko.bins<@F>
+    piko.storage.close_bins %bins : !piko.bins<@F>
   }
 }
 
@@ -60,10 +60,10 @@ piko.record @F {"z" : f32 at 0} size 4 align 4
 // CHECK:             scf.for %[[J:.*]] = %c0 to %[[N]] step %c1 {
 // CHECK-DAG:           memref.load %[[VALUES]][%[[J]]]
 // CHECK-DAG:           %[[ADDRESS:.*]] = memref.load %[[PRIMS]][%[[J]]]
-// CHECK-DAG:           piko.cpu.from_address %[[ADDRESS]]
+// CHECK-DAG:           piko.storage.from_address %[[ADDRESS]]
 // CHECK-DAG:           %[[SAME:.*]] = memref.view %[[BYTES]][{{.*}}][] : memref<?xi8> to memref<4xf32>
 // CHECK:               memref.load %[[SAME]][%[[SHARED]]]
-// CHECK:               piko.cpu.append
+// CHECK:               piko.storage.append
 // CHECK:             } {piko.lanes}
 // CHECK:           piko.cpu.scratch_release %[[W]][%[[MARK]]]
 // CHECK-NOT:     piko.defer
@@ -73,12 +73,12 @@ piko.pipeline @Across rank 1 {
   piko.stage @a bins [0] threads 1 : list @F -> [@F] {}
   piko.stage @b bins [0] threads 1 : @F -> [] {}
   piko.kernel @k {
-    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
-    %n = piko.cpu.unit_count %bins : !piko.bins<@F>
+    %bins = piko.storage.open_bins @a : !piko.bins<@F>
+    %n = piko.storage.unit_count %bins : !piko.bins<@F>
     %c1 = arith.constant 1 : index
     scf.forall (%u) in (%n) {
       %w = piko.cpu.open_writer %bins[%u] : !piko.bins<@F>
-      %l = piko.cpu.list %bins[%u to %n] : !piko.bins<@F> -> !piko.list<@F>
+      %l = piko.storage.list %bins[%u to %n] : !piko.bins<@F> -> !piko.list<@F>
       piko.parallel_for %n {
       ^bb0(%i: index):
         %array = memref.alloca() : memref<4xf32>
@@ -91,12 +91,12 @@ piko.pipeline @Across rank 1 {
         %x = piko.get %p "z" : !piko.prim<@F> -> f32
         %s = arith.addf %y, %z : f32
         %t = arith.addf %s, %x : f32
-        %q = piko.cpu.append %w[0] (%t) : f32 -> !piko.prim<@F>
+        %q = piko.storage.append %w[0] (%t) : f32 -> !piko.prim<@F>
         piko.yield
       }
       piko.cpu.close_writer %w
     } {piko.schedule = "load_balance"}
-    piko.cpu.close_bins %bins : !piko.bins<@F>
+    piko.storage.close_bins %bins : !piko.bins<@F>
   }
 }
 
@@ -115,7 +115,7 @@ piko.record @F {"z" : f32 at 0} size 4 align 4
 // CHECK:         } do {
 // CHECK:           scf.for %[[I:.*]] = %c0 to %[[N]] step %c1 {
 // CHECK:             piko.cpu.defer_iteration %[[W]][%[[I]]]
-// CHECK:             piko.cpu.append
+// CHECK:             piko.storage.append
 // CHECK:           scf.for
 // CHECK:         piko.cpu.defer_end %[[W]]
 // CHECK-NOT:     piko.fail_barrier
@@ -125,8 +125,8 @@ piko.pipeline @Uniform rank 1 {
   piko.stage @a bins [0] threads 1 : @F -> [@F] {}
   piko.stage @b bins [0] threads 1 : @F -> [] {}
   piko.kernel @k {
-    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
-    %n = piko.cpu.unit_count %bins : !piko.bins<@F>
+    %bins = piko.storage.open_bins @a : !piko.bins<@F>
+    %n = piko.storage.unit_count %bins : !piko.bins<@F>
     %c1 = arith.constant 1 : index
     scf.forall (%u) in (%n) {
       %w = piko.cpu.open_writer %bins[%u] : !piko.bins<@F>
@@ -139,7 +139,7 @@ piko.pipeline @Uniform rank 1 {
         ^bb0(%s: index):
           %int = arith.index_cast %i : index to i32
           %z = arith.sitofp %int : i32 to f32
-          %q = piko.cpu.append %w[0] (%z) : f32 -> !piko.prim<@F>
+          %q = piko.storage.append %w[0] (%z) : f32 -> !piko.prim<@F>
           piko.sync
           %t = arith.addi %s, %s : index
           scf.yield %t : index
@@ -148,7 +148,7 @@ piko.pipeline @Uniform rank 1 {
       }
       piko.cpu.close_writer %w
     } {piko.schedule = "load_balance"}
-    piko.cpu.close_bins %bins : !piko.bins<@F>
+    piko.storage.close_bins %bins : !piko.bins<@F>
   }
 }
 
@@ -183,15 +183,15 @@ piko.record @F {"z" : f32 at 0} size 4 align 4
 // CHECK:             memref.store %{{.*}}, %[[RESULTS]][
 // CHECK:         scf.for
 // CHECK:           memref.load %[[RESULTS]]
-// CHECK:           piko.cpu.append
+// CHECK:           piko.storage.append
 piko.pipeline @Varying rank 1 {
   piko.source @a
   piko.edge @a[0] -> @b
   piko.stage @a bins [0] threads 1 : @F -> [@F] {}
   piko.stage @b bins [0] threads 1 : @F -> [] {}
   piko.kernel @k {
-    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
-    %n = piko.cpu.unit_count %bins : !piko.bins<@F>
+    %bins = piko.storage.open_bins @a : !piko.bins<@F>
+    %n = piko.storage.unit_count %bins : !piko.bins<@F>
     %c1 = arith.constant 1 : i32
     %c7 = arith.constant 7 : i32
     scf.forall (%u) in (%n) {
@@ -212,12 +212,12 @@ piko.pipeline @Varying rank 1 {
           scf.yield %int : i32
         }
         %z = arith.sitofp %r : i32 to f32
-        %q = piko.cpu.append %w[0] (%z) : f32 -> !piko.prim<@F>
+        %q = piko.storage.append %w[0] (%z) : f32 -> !piko.prim<@F>
         piko.yield
       }
       piko.cpu.close_writer %w
     } {piko.schedule = "load_balance"}
-    piko.cpu.close_bins %bins : !piko.bins<@F>
+    piko.storage.close_bins %bins : !piko.bins<@F>
   }
 }
 
@@ -241,8 +241,8 @@ piko.pipeline @Cheap rank 1 {
   piko.stage @a bins [0] threads 1 : @F -> [@F] {}
   piko.stage @b2 bins [0] threads 1 : @F -> [] {}
   piko.kernel @k {
-    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
-    %n = piko.cpu.unit_count %bins : !piko.bins<@F>
+    %bins = piko.storage.open_bins @a : !piko.bins<@F>
+    %n = piko.storage.unit_count %bins : !piko.bins<@F>
     %c1 = arith.constant 1 : index
     scf.forall (%u) in (%n) {
       %w = piko.cpu.open_writer %bins[%u] : !piko.bins<@F>
@@ -253,12 +253,12 @@ piko.pipeline @Cheap rank 1 {
         %z = arith.sitofp %int : i32 to f32
         piko.store %z, @b[%i : index] "z" : f32
         piko.sync
-        %q = piko.cpu.append %w[0] (%z) : f32 -> !piko.prim<@F>
+        %q = piko.storage.append %w[0] (%z) : f32 -> !piko.prim<@F>
         piko.yield
       }
       piko.cpu.close_writer %w
     } {piko.schedule = "load_balance"}
-    piko.cpu.close_bins %bins : !piko.bins<@F>
+    piko.storage.close_bins %bins : !piko.bins<@F>
   }
 }
 
@@ -290,15 +290,15 @@ piko.record @F {"z" : f32 at 0} size 4 align 4
 // CHECK:         memref.store %cst, %[[V]][%c0]
 // CHECK:         scf.for
 // CHECK:           memref.load %[[V]]
-// CHECK:           piko.cpu.append
+// CHECK:           piko.storage.append
 piko.pipeline @Scan rank 1 {
   piko.source @a
   piko.edge @a[0] -> @b
   piko.stage @a bins [0] threads 1 : @F -> [@F] {}
   piko.stage @b bins [0] threads 1 : @F -> [] {}
   piko.kernel @k {
-    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
-    %n = piko.cpu.unit_count %bins : !piko.bins<@F>
+    %bins = piko.storage.open_bins @a : !piko.bins<@F>
+    %n = piko.storage.unit_count %bins : !piko.bins<@F>
     %none = arith.constant 0.0 : f32
     scf.forall (%u) in (%n) {
       %w = piko.cpu.open_writer %bins[%u] : !piko.bins<@F>
@@ -311,11 +311,11 @@ piko.pipeline @Scan rank 1 {
           %c = arith.addf %a, %b : f32
           piko.yield results [%c : f32]
         }
-        %q = piko.cpu.append %w[0] (%s) : f32 -> !piko.prim<@F>
+        %q = piko.storage.append %w[0] (%s) : f32 -> !piko.prim<@F>
         piko.yield
       }
       piko.cpu.close_writer %w
     } {piko.schedule = "load_balance"}
-    piko.cpu.close_bins %bins : !piko.bins<@F>
+    piko.storage.close_bins %bins : !piko.bins<@F>
   }
 }

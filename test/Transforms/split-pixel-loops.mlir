@@ -7,7 +7,7 @@ piko.record @F {"z" : f32 at 0} size 4 align 4
 // CHECK-NEXT:      %[[SHARED:.*]] = arith.muli %[[Y]], %[[Y]]
 // CHECK-NEXT:      scf.for %[[X:.*]] = %[[X0:.*]] to %{{.*}} step %c1_i32 : i32 {
 // CHECK-NEXT:        %[[SUM:.*]] = arith.addi %[[X]], %[[SHARED]]
-// CHECK:             piko.cpu.append
+// CHECK:             piko.storage.append
 // CHECK-NEXT:      } {piko.lanes}
 // CHECK-NEXT:    }
 piko.pipeline @Rows rank 2 {
@@ -16,8 +16,8 @@ piko.pipeline @Rows rank 2 {
   piko.stage @a bins [0, 0] threads 1 : @F -> [@F] {}
   piko.stage @b bins [0, 0] threads 1 : @F -> [] {}
   piko.kernel @k {
-    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
-    %n = piko.cpu.unit_count %bins : !piko.bins<@F>
+    %bins = piko.storage.open_bins @a : !piko.bins<@F>
+    %n = piko.storage.unit_count %bins : !piko.bins<@F>
     %lo = arith.constant 3 : i32
     %hi = arith.index_cast %n : index to i32
     scf.forall (%u) in (%n) {
@@ -27,12 +27,12 @@ piko.pipeline @Rows rank 2 {
         %square = arith.muli %y, %y : i32
         %sum = arith.addi %x, %square : i32
         %v = arith.sitofp %sum : i32 to f32
-        %p = piko.cpu.append %w[0] (%v) : f32 -> !piko.prim<@F>
+        %p = piko.storage.append %w[0] (%v) : f32 -> !piko.prim<@F>
         piko.yield
       }
       piko.cpu.close_writer %w
     } {piko.schedule = "load_balance"}
-    piko.cpu.close_bins %bins : !piko.bins<@F>
+    piko.storage.close_bins %bins : !piko.bins<@F>
   }
 }
 
@@ -54,8 +54,8 @@ piko.pipeline @Meeting rank 2 {
   piko.stage @a bins [0, 0] threads 1 : @F -> [@F] {}
   piko.stage @b bins [0, 0] threads 1 : @F -> [] {}
   piko.kernel @k {
-    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
-    %n = piko.cpu.unit_count %bins : !piko.bins<@F>
+    %bins = piko.storage.open_bins @a : !piko.bins<@F>
+    %n = piko.storage.unit_count %bins : !piko.bins<@F>
     %lo = arith.constant 3 : i32
     %hi = arith.index_cast %n : index to i32
     scf.forall (%u) in (%n) {
@@ -65,11 +65,11 @@ piko.pipeline @Meeting rank 2 {
         %sum = arith.addi %x, %y : i32
         %v = arith.sitofp %sum : i32 to f32
         piko.sync
-        %p = piko.cpu.append %w[0] (%v) : f32 -> !piko.prim<@F>
+        %p = piko.storage.append %w[0] (%v) : f32 -> !piko.prim<@F>
         piko.yield
       }
       piko.cpu.close_writer %w
     } {piko.schedule = "load_balance"}
-    piko.cpu.close_bins %bins : !piko.bins<@F>
+    piko.storage.close_bins %bins : !piko.bins<@F>
   }
 }

@@ -21,7 +21,7 @@ piko.pipeline @P rank 1 {
   // CHECK:         scf.for %[[B:.*]] = %{{.*}} to %{{.*}} step %c64
   // CHECK:           scf.for %[[I:.*]] = %[[B]] to %[[E:.*]] step %c1
   // CHECK:             %[[AT:.*]] = arith.subi %[[I]], %[[B]]
-  // CHECK:             %[[T:.*]] = piko.cpu.item %{{.*}}[%[[I]]]
+  // CHECK:             %[[T:.*]] = piko.storage.item %{{.*}}[%[[I]]]
   // CHECK:             %[[V:.*]] = piko.get %[[T]] "v"
   // CHECK:             %[[INSIDE:.*]] = arith.cmpi ult
   // CHECK:             %[[XY:.*]]:2 = scf.if %[[INSIDE]]

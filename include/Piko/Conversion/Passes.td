@@ -33,7 +33,7 @@ def ConvertPikoToSCF : Pass<"convert-piko-to-scf", "::piko::PipelineOp"> {
     scf.if %inside {
       piko.store %v, checked @verts[%i : index] "x" : f32
     } else {
-      %bin = piko.cpu.cell_bin %bins[%cell] : !piko.bins<@F>
+      %bin = piko.storage.cell_bin %bins[%cell] : !piko.bins<@F>
       piko.fail @stage in %bin outside @verts(%i)
     }
     ```
@@ -111,8 +111,8 @@ def ConvertPikoToGPU : Pass<"convert-piko-to-gpu", "::piko::PipelineOp"> {
     ```
     %writer = piko.cpu.open_writer %bins[%u] : !piko.bins<@F>
     scf.for %i = %begin to %end step %one {
-      %p = piko.cpu.append %writer[0] (%x) : i32 -> !piko.prim<@F>
-      piko.cpu.next %writer
+      %p = piko.storage.append %writer[0] (%x) : i32 -> !piko.prim<@F>
+      piko.storage.next %writer
     } {piko.lanes}
     ```
     After:
@@ -121,8 +121,8 @@ def ConvertPikoToGPU : Pass<"convert-piko-to-gpu", "::piko::PipelineOp"> {
     %first = arith.addi %begin, %thread : index
     scf.for %i = %first to %end step %threads {
       memref.store %i, %order[%c1] : memref<4xi64>
-      %p = piko.cpu.append %log[0] (%x) : i32 -> !piko.prim<@F>
-      piko.cpu.next %log
+      %p = piko.storage.append %log[0] (%x) : i32 -> !piko.prim<@F>
+      piko.storage.next %log
     } {piko.lanes}
     gpu.barrier
     ```

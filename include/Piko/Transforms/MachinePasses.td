@@ -17,7 +17,7 @@ def FormWork : Pass<"piko-form-work", "::piko::PipelineOp"> {
     holds: a `piko.bins` with a `piko.items` in it, or, where the phase takes a
     list, a `piko.lists`. What stands behind a `piko.local_barrier` follows as
     work on what the first has emitted in the bin. The consumer's assign phase
-    stands behind each emission, and its assignments become `piko.cpu.append_bin`; queries
+    stands behind each emission, and its assignments become `piko.storage.append_bin`; queries
     of bins and of the grid become arithmetic. The body of a dynamic schedule
     becomes a kernel that stands before all others, a loop over bins.
 
@@ -164,7 +164,7 @@ def FormUnits : Pass<"piko-form-units", "::piko::PipelineOp"> {
     work that the runtime cuts them into, in it a loop over the unit's cells and
     in that one over the primitives of a cell, marked `piko.lanes`. Where work
     takes lists, the inner loop is over its calls. Work on what was emitted in the
-    bin follows when the bin is done, as a `piko.cpu.local_bin`. Emissions become
+    bin follows when the bin is done, as a `piko.storage.local_bin`. Emissions become
     stores into the unit's own writer. Loops over primitives keep the `lanes` of
     their work as `piko.mapping`.
 
@@ -180,10 +180,10 @@ def FormUnits : Pass<"piko-form-units", "::piko::PipelineOp"> {
     ```
     After:
     ```
-    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
-    %units = piko.cpu.unit_count %bins : !piko.bins<@F>
+    %bins = piko.storage.open_bins @a : !piko.bins<@F>
+    %units = piko.storage.unit_count %bins : !piko.bins<@F>
     scf.forall (%u) in (%units) { ... }
-    piko.cpu.close_bins %bins : !piko.bins<@F>
+    piko.storage.close_bins %bins : !piko.bins<@F>
     ```
 
     **Limits**: the iterations of a `piko.parallel_for` are left to
@@ -273,7 +273,7 @@ def Prefetch : Pass<"piko-prefetch", "::piko::PipelineOp"> {
     Before:
     ```
     scf.for %i = %begin to %end step %one {
-      %t = piko.cpu.item %bins[%i] ...
+      %t = piko.storage.item %bins[%i] ...
       %k = piko.get %t "vertex" ...
       ... piko.load @vertices[%k : i32] "x" : f32 ...
     ```
@@ -283,10 +283,10 @@ def Prefetch : Pass<"piko-prefetch", "::piko::PipelineOp"> {
       %far = ...                        // %i + 16, or the last one
       piko.cpu.prefetch_item %bins[%far] : !piko.bins<@Triangle>
       %near = ...                       // %i + 8, or the last one
-      %s = piko.cpu.item %bins[%near] ...
+      %s = piko.storage.item %bins[%near] ...
       %j = piko.get %s "vertex" ...
       piko.prefetch @vertices[%j : i32]
-      %t = piko.cpu.item %bins[%i] ...
+      %t = piko.storage.item %bins[%i] ...
     ```
 
     **Limits**: indices that are computed, and those of reads that only the much
@@ -319,7 +319,7 @@ def CompactLoops : Pass<"piko-compact-loops", "::piko::PipelineOp"> {
     Before:
     ```
     scf.for %i = %begin to %end step %one {
-      %f = piko.cpu.item %bins[%i] ...
+      %f = piko.storage.item %bins[%i] ...
       %passed = piko.update @depth[...] ...
       scf.if %passed {
         ...
@@ -332,7 +332,7 @@ def CompactLoops : Pass<"piko-compact-loops", "::piko::PipelineOp"> {
     scf.for %b = %begin to %end step %c64 {
       memref.store %zero, %count[%zero] : memref<1xindex>
       scf.for %i = %b to %e step %one {
-        %f = piko.cpu.item %bins[%i] ...
+        %f = piko.storage.item %bins[%i] ...
         %passed = piko.update @depth[...] ...
         scf.if %passed {
           memref.store %i, %list[%n] : memref<64xindex> ...
@@ -341,7 +341,7 @@ def CompactLoops : Pass<"piko-compact-loops", "::piko::PipelineOp"> {
       %n = memref.load %count[%zero] : memref<1xindex>
       scf.for %j = %zero to %n step %one {
         %i = memref.load %list[%j] : memref<64xindex>
-        %f = piko.cpu.item %bins[%i] ...
+        %f = piko.storage.item %bins[%i] ...
         ...
         piko.update @color[...] ...
       } {piko.lanes}
@@ -469,12 +469,12 @@ def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
     Before:
     ```
     scf.for %i = %begin to %end step %one {
-      %t = piko.cpu.item %bins[%i] ...
+      %t = piko.storage.item %bins[%i] ...
       %k = piko.get %t "vertex" ...
       %x = piko.load @vertices[%k : i32] "x" : f32
       %y = arith.mulf %x, %x : f32 ...
-      piko.cpu.append %writer, 0 (%y)
-      piko.cpu.next %writer
+      piko.storage.append %writer, 0 (%y)
+      piko.storage.next %writer
     } {piko.lanes}
     ```
     After:
@@ -497,8 +497,8 @@ def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
           ...                                // as before
         } else {
           %y = memref.load %ys[%at] : memref<64xf32>
-          piko.cpu.append %writer, 0 (%y)
-          piko.cpu.next %writer
+          piko.storage.append %writer, 0 (%y)
+          piko.storage.next %writer
         }
       }
     }

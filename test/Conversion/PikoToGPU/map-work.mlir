@@ -9,7 +9,7 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 // CHECK:         gpu.launch blocks(%[[UNIT:[a-z0-9]+]], {{.*}}threads(%[[T:[a-z0-9]+]],
 // CHECK:           %[[ORDER:.*]] = memref.alloca() : memref<4xi64>
 // CHECK:           piko.gpu.log_order %[[LOG]] in %[[ORDER]]
-// CHECK:           %[[BEGIN:.*]], %[[END:.*]] = piko.cpu.cell_range
+// CHECK:           %[[BEGIN:.*]], %[[END:.*]] = piko.storage.cell_range
 // CHECK:           memref.store %{{.*}}, %[[ORDER]][%c0]
 // CHECK:           memref.store %{{.*}}, %[[ORDER]][%c2]
 // CHECK:           gpu.barrier
@@ -18,8 +18,8 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 // CHECK:             %[[AT:.*]] = arith.index_cast %[[I]] : index to i64
 // CHECK:             memref.store %[[AT]], %[[ORDER]][%c1]
 // CHECK:             memref.store %c0_i64, %[[ORDER]][%c3]
-// CHECK:             piko.cpu.append %[[LOG]][0]
-// CHECK:             piko.cpu.next %[[LOG]]
+// CHECK:             piko.storage.append %[[LOG]][0]
+// CHECK:             piko.storage.next %[[LOG]]
 // CHECK:           gpu.barrier
 // CHECK:         piko.gpu.close_log %[[LOG]]
 piko.pipeline @Emits rank 1 {
@@ -118,7 +118,7 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 // CHECK:             gpu.barrier
 // CHECK:             scf.for %[[J:.*]] = %{{.*}} step %c32
 // CHECK:               memref.load %[[SLOTS]][%[[J]]]
-// CHECK:               piko.cpu.append
+// CHECK:               piko.storage.append
 // CHECK:             gpu.barrier
 // CHECK-NOT:       piko.cpu.scratch
 piko.pipeline @Cuts rank 1 {

@@ -1,6 +1,6 @@
-// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,piko-form-units,convert-piko-to-gpu{threads=8}),cse,canonicalize)' | FileCheck %s
-// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,piko-form-units,convert-piko-to-gpu{threads=1}))' | FileCheck %s --check-prefix=ONE
-// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,piko-form-units,convert-piko-to-gpu))' | FileCheck %s --check-prefix=STAGE
+// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,piko-form-units,piko-split-loops,convert-piko-to-gpu{threads=8}),cse,canonicalize)' | FileCheck %s
+// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,piko-form-units,piko-split-loops,convert-piko-to-gpu{threads=1}))' | FileCheck %s --check-prefix=ONE
+// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,piko-form-units,piko-split-loops,convert-piko-to-gpu))' | FileCheck %s --check-prefix=STAGE
 
 piko.record @Row {"x" : i32 at 0, "y" : i32 at 4, "to" : i32 at 8} size 12 align 4
 piko.record @Pixel {"n" : i32 at 0} size 4 align 4
@@ -8,8 +8,8 @@ piko.record @Pixel {"n" : i32 at 0} size 4 align 4
 // A block runs a unit; errors go to the log of the grid. The stage's 20 threads
 // become 16.
 // CHECK-LABEL: piko.kernel @kernel_draw
-// CHECK:         %[[BINS:.*]] = piko.cpu.open_bins @draw
-// CHECK:         %[[UNITS:.*]] = piko.cpu.unit_count %[[BINS]]
+// CHECK:         %[[BINS:.*]] = piko.storage.open_bins @draw
+// CHECK:         %[[UNITS:.*]] = piko.storage.unit_count %[[BINS]]
 // CHECK:         scf.if
 // CHECK:           %[[LOG:.*]] = piko.gpu.open_log %[[BINS]]
 // CHECK:           gpu.launch blocks(%[[UNIT:[a-z0-9]+]], {{.*}}) in (%{{.*}} = %[[UNITS]], {{.*}}) threads(%[[T:[a-z0-9]+]], {{.*}}) in (%{{.*}} = %c8, %{{[^)]*}})
@@ -17,11 +17,11 @@ piko.record @Pixel {"n" : i32 at 0} size 4 align 4
 // Threads are 4 wide and 2 high.
 // CHECK:             %[[TX:.*]] = arith.remui %[[T]], %c4
 // CHECK:             %[[ROW:.*]] = arith.divui %[[T]], %c4
-// CHECK:             piko.cpu.unit_cells %[[BINS]][%[[UNIT]]]
-// CHECK:             piko.cpu.cell_range %[[BINS]][%[[UNIT]],
+// CHECK:             piko.storage.unit_cells %[[BINS]][%[[UNIT]]]
+// CHECK:             piko.storage.cell_range %[[BINS]][%[[UNIT]],
 // The block copies the fields of 8 primitives.
 // CHECK:             scf.for %[[BASE:.*]] = %{{.*}} to %{{.*}} step %c8
-// CHECK:               piko.cpu.item
+// CHECK:               piko.storage.item
 // CHECK:               memref.store %{{.*}}, %[[X]][%[[T]]]
 // CHECK:               gpu.barrier
 // CHECK:               scf.for %[[K:.*]] = %c0
@@ -39,7 +39,7 @@ piko.record @Pixel {"n" : i32 at 0} size 4 align 4
 // CHECK:               gpu.barrier
 // CHECK:             gpu.terminator
 // CHECK:           piko.gpu.close_log %[[LOG]]
-// CHECK:         piko.cpu.close_bins %[[BINS]]
+// CHECK:         piko.storage.close_bins %[[BINS]]
 
 // A thread that has a block for itself has all its pixels.
 // ONE-LABEL: piko.kernel @kernel_draw

@@ -100,10 +100,10 @@ piko.pipeline @P rank 1 {
     piko.schedule_bin @a[%bins] kind %kind tile_split %size batch %size every_bin %always
   }
   piko.kernel @kernel_a {
-    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
+    %bins = piko.storage.open_bins @a : !piko.bins<@F>
     %u = arith.constant 0 : index
-    %b = piko.cpu.call_bin %bins[%u] : !piko.bins<@F>
-    %lo, %hi = piko.cpu.call_range %bins[%u] : !piko.bins<@F>
+    %b = piko.storage.call_bin %bins[%u] : !piko.bins<@F>
+    %lo, %hi = piko.storage.call_range %bins[%u] : !piko.bins<@F>
     %w = piko.cpu.open_writer %bins[%u] : !piko.bins<@F>
     %mark = piko.cpu.scratch_mark %w
     %bytes, %granted = piko.cpu.scratch %w[%hi]
@@ -114,10 +114,10 @@ piko.pipeline @P rank 1 {
     piko.cpu.defer_end %w
     piko.cpu.scratch_release %w[%mark]
     %p = scf.if %granted -> !piko.prim<@F> {
-      %item = piko.cpu.item %bins[%b] : !piko.bins<@F> -> !piko.prim<@F>
+      %item = piko.storage.item %bins[%b] : !piko.bins<@F> -> !piko.prim<@F>
       scf.yield %item : !piko.prim<@F>
     } else {
-      %zeros = piko.cpu.no_item : !piko.prim<@F>
+      %zeros = piko.storage.no_item : !piko.prim<@F>
       scf.yield %zeros : !piko.prim<@F>
     }
     %unset = ub.poison : !piko.prim<@F>
@@ -126,14 +126,14 @@ piko.pipeline @P rank 1 {
       scf.yield %p : !piko.prim<@F>
     }
     case 2 {
-      %item = piko.cpu.item %bins[%u] : !piko.bins<@F> -> !piko.prim<@F>
+      %item = piko.storage.item %bins[%u] : !piko.bins<@F> -> !piko.prim<@F>
       scf.yield %item : !piko.prim<@F>
     }
     default {
       scf.yield %unset : !piko.prim<@F>
     }
-    %address = piko.cpu.to_address %r : !piko.prim<@F>
-    %q = piko.cpu.from_address %address : !piko.prim<@F>
+    %address = piko.storage.to_address %r : !piko.prim<@F>
+    %q = piko.storage.from_address %address : !piko.prim<@F>
     %x = piko.get %q "x" : !piko.prim<@F> -> i32
     %v = piko.get %q "v" : !piko.prim<@F> -> f32
     %old = piko.atomic add checked @counts[%u : index] "x", %x : i32 -> i32
@@ -142,14 +142,14 @@ piko.pipeline @P rank 1 {
     piko.fail_list @a at %lo of %hi
     piko.fail_barrier @a in %u iteration %lo
     piko.cpu.close_writer %w
-    piko.cpu.close_bins %bins : !piko.bins<@F>
+    piko.storage.close_bins %bins : !piko.bins<@F>
   }
   piko.kernel @kernel_b {
-    %bins = piko.cpu.open_bins @b : !piko.bins<@F>
-    piko.cpu.close_bins %bins : !piko.bins<@F>
+    %bins = piko.storage.open_bins @b : !piko.bins<@F>
+    piko.storage.close_bins %bins : !piko.bins<@F>
   }
   piko.kernel @kernel_c {
-    %bins = piko.cpu.open_bins @c : !piko.bins<@F>
-    piko.cpu.close_bins %bins : !piko.bins<@F>
+    %bins = piko.storage.open_bins @c : !piko.bins<@F>
+    piko.storage.close_bins %bins : !piko.bins<@F>
   }
 }

@@ -41,8 +41,8 @@ piko.pipeline @P rank 1 {
   piko.stage @a bins [0] threads 1 lineage 0 cycle 0 : @F -> [@F, @F] {}
   piko.stage @b bins [0] threads 1 lineage 1 : @F -> [] {}
   piko.kernel @kernel_a {
-    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
-    %units = piko.cpu.unit_count %bins : !piko.bins<@F>
+    %bins = piko.storage.open_bins @a : !piko.bins<@F>
+    %units = piko.storage.unit_count %bins : !piko.bins<@F>
     scf.forall (%u) in (%units) {
       %w = piko.cpu.open_writer %bins[%u] : !piko.bins<@F>
       %array = memref.alloca() : memref<4xf32>
@@ -52,15 +52,15 @@ piko.pipeline @P rank 1 {
       piko.atomic add_float checked @sums[%u : index] "v", %v : f32
       piko.cpu.close_writer %w
     } {piko.units = "any"}
-    piko.cpu.close_bins %bins : !piko.bins<@F>
+    piko.storage.close_bins %bins : !piko.bins<@F>
   }
   piko.kernel @kernel_b {
-    %bins = piko.cpu.open_bins @b : !piko.bins<@F>
-    %units = piko.cpu.unit_count %bins : !piko.bins<@F>
+    %bins = piko.storage.open_bins @b : !piko.bins<@F>
+    %units = piko.storage.unit_count %bins : !piko.bins<@F>
     scf.forall (%u) in (%units) {
       %w = piko.cpu.open_writer %bins[%u] : !piko.bins<@F>
       piko.cpu.close_writer %w
     } {piko.units = "any"}
-    piko.cpu.close_bins %bins : !piko.bins<@F>
+    piko.storage.close_bins %bins : !piko.bins<@F>
   }
 }

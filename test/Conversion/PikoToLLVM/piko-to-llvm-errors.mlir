@@ -44,7 +44,7 @@ piko.pipeline @P rank 1 {
   piko.source @a
   piko.stage @a bins [0] threads 1 : @F -> [] {}
   piko.kernel @k {
-    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
+    %bins = piko.storage.open_bins @a : !piko.bins<@F>
     %n = arith.constant 8 : index
     // expected-error @below {{failed to legalize operation 'piko.parallel_for'}}
     piko.parallel_for %n {
@@ -67,7 +67,7 @@ piko.pipeline @P rank 1 {
   piko.source @a
   piko.stage @a bins [0] threads 1 : @F -> [] {}
   piko.kernel @k {
-    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
-    piko.cpu.close_bins %bins : !piko.bins<@F>
+    %bins = piko.storage.open_bins @a : !piko.bins<@F>
+    piko.storage.close_bins %bins : !piko.bins<@F>
   }
 }

@@ -35,16 +35,16 @@ piko.pipeline @P rank 1 {
   piko.stage @b bins [0] threads 1 writes : @F -> [] {}
   piko.stage @before bins [0] threads 1 : @F -> [] {}
   piko.kernel @kernel_before {
-    %bins = piko.cpu.open_bins @before : !piko.bins<@F>
-    piko.cpu.close_bins %bins : !piko.bins<@F>
+    %bins = piko.storage.open_bins @before : !piko.bins<@F>
+    piko.storage.close_bins %bins : !piko.bins<@F>
   }
   piko.kernel @kernel_a {
-    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
-    piko.cpu.close_bins %bins : !piko.bins<@F>
+    %bins = piko.storage.open_bins @a : !piko.bins<@F>
+    piko.storage.close_bins %bins : !piko.bins<@F>
   }
   piko.kernel @kernel_b {
-    %bins = piko.cpu.open_bins @b : !piko.bins<@F>
-    piko.cpu.close_bins %bins : !piko.bins<@F>
+    %bins = piko.storage.open_bins @b : !piko.bins<@F>
+    piko.storage.close_bins %bins : !piko.bins<@F>
   }
   piko.program {
     %1 = piko.feed 1 : !piko.edge<@F>

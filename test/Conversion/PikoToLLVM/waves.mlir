@@ -46,23 +46,23 @@ piko.pipeline @Waves rank 1 {
   piko.stage @b bins [0] threads 1 : @F -> [@F, @F] {}
   piko.stage @last bins [0] threads 1 : @F -> [] {}
   piko.kernel @assign_start {
-    %bins = piko.cpu.open_bins @start source 0 : !piko.bins<@F>
-    piko.cpu.close_bins %bins : !piko.bins<@F>
+    %bins = piko.storage.open_bins @start source 0 : !piko.bins<@F>
+    piko.storage.close_bins %bins : !piko.bins<@F>
   }
   piko.kernel @kernel_start {
-    %bins = piko.cpu.open_bins @start : !piko.bins<@F>
-    piko.cpu.close_bins %bins : !piko.bins<@F>
+    %bins = piko.storage.open_bins @start : !piko.bins<@F>
+    piko.storage.close_bins %bins : !piko.bins<@F>
   }
   piko.kernel @kernel_a {
-    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
-    piko.cpu.close_bins %bins : !piko.bins<@F>
+    %bins = piko.storage.open_bins @a : !piko.bins<@F>
+    piko.storage.close_bins %bins : !piko.bins<@F>
   }
   piko.kernel @kernel_b {
-    %bins = piko.cpu.open_bins @b : !piko.bins<@F>
-    piko.cpu.close_bins %bins : !piko.bins<@F>
+    %bins = piko.storage.open_bins @b : !piko.bins<@F>
+    piko.storage.close_bins %bins : !piko.bins<@F>
   }
   piko.kernel @kernel_last {
-    %bins = piko.cpu.open_bins @last : !piko.bins<@F>
-    piko.cpu.close_bins %bins : !piko.bins<@F>
+    %bins = piko.storage.open_bins @last : !piko.bins<@F>
+    piko.storage.close_bins %bins : !piko.bins<@F>
   }
 }

@@ -13,11 +13,11 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 // CHECK:               piko.cpu.open_writer %{{.*}}[%[[UNIT]]]
 // CHECK:               memref.store %{{.*}}, %[[ARRAY]]
 // CHECK:               omp.yield
-// CHECK:         piko.cpu.close_bins
+// CHECK:         piko.storage.close_bins
 
 // CHECK-LABEL: piko.kernel @kernel_mapped
-// CHECK:         %[[BINS:.*]] = piko.cpu.open_bins
-// CHECK:         %[[COUNT:.*]] = piko.cpu.unit_count
+// CHECK:         %[[BINS:.*]] = piko.storage.open_bins
+// CHECK:         %[[COUNT:.*]] = piko.storage.unit_count
 // CHECK:         omp.parallel
 // CHECK:           %[[THREAD:.*]] = piko.cpu.thread
 // CHECK-NEXT:      %[[TEAM:.*]] = piko.cpu.team
@@ -34,7 +34,7 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 
 // What no pass has resolved the runtime hands out.
 // CHECK-LABEL: piko.kernel @kernel_queued
-// CHECK-DAG:     %[[COUNT:.*]] = piko.cpu.unit_count %[[BINS:.*]] :
+// CHECK-DAG:     %[[COUNT:.*]] = piko.storage.unit_count %[[BINS:.*]] :
 // CHECK-DAG:     %[[START:.*]] = arith.constant -1 : index
 // CHECK:         omp.parallel
 // CHECK:           scf.while (%[[LAST:.*]] = %[[START]])

@@ -22,7 +22,7 @@ piko.record @F {"x" : i32 at 0, "y" : i32 at 4} size 8 align 4
 // CHECK-NEXT: %[[Q:.*]] = arith.divsi %[[X]], %[[Y]]
 // CHECK-NEXT: scf.yield %[[Q]]
 // CHECK-NEXT: } else {
-// CHECK-NEXT: %[[BIN:.*]] = piko.cpu.cell_bin
+// CHECK-NEXT: %[[BIN:.*]] = piko.storage.cell_bin
 // CHECK-NEXT: piko.fail_divide @a in %[[BIN]]
 // CHECK-NEXT: scf.yield %[[ZERO]]
 // An unsigned quotient always fits.

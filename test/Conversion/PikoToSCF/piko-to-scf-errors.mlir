@@ -26,12 +26,12 @@ piko.pipeline @P rank 1 {
   piko.source @a
   piko.stage @a bins [0] threads 1 : list @F -> [] {}
   piko.kernel @k {
-    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
+    %bins = piko.storage.open_bins @a : !piko.bins<@F>
     %zero = arith.constant 0 : index
-    %n = piko.cpu.unit_count %bins : !piko.bins<@F>
+    %n = piko.storage.unit_count %bins : !piko.bins<@F>
     %some = arith.cmpi sgt, %n, %zero : index
-    %all = piko.cpu.list %bins[%zero to %n] : !piko.bins<@F> -> !piko.list<@F>
-    %none = piko.cpu.list %bins[%zero to %zero] : !piko.bins<@F> -> !piko.list<@F>
+    %all = piko.storage.list %bins[%zero to %n] : !piko.bins<@F> -> !piko.list<@F>
+    %none = piko.storage.list %bins[%zero to %zero] : !piko.bins<@F> -> !piko.list<@F>
     %one = arith.select %some, %all, %none : !piko.list<@F>
     // expected-error @below {{expected loops over units, as piko-form-units makes them}}
     %size = piko.list_size %one : !piko.list<@F>

@@ -8,13 +8,13 @@ piko.record @Pixel {"z" : f32 at 0, "n" : i32[2 : 4] at 4} size 12 align 4
 piko.record @F {"x" : i32 at 0, "y" : i32 at 4} size 8 align 4
 
 // A bin in which nothing is has no tile.
-// CHECK:         %[[BINS:.*]] = piko.cpu.open_bins @a
-// CHECK:         %[[BEGIN:.*]], %[[END:.*]] = piko.cpu.cell_range
+// CHECK:         %[[BINS:.*]] = piko.storage.open_bins @a
+// CHECK:         %[[BEGIN:.*]], %[[END:.*]] = piko.storage.cell_range
 // CHECK:         %[[FILLED:.*]] = arith.cmpi ne, %[[BEGIN]], %[[END]]
 // CHECK:         scf.if %[[FILLED]] {
 // CHECK-DAG:       %[[Z:.*]] = memref.alloca() {alignment = 64 : i64} : memref<4x8xf32>
 // CHECK-DAG:       %[[N:.*]] = memref.alloca() {alignment = 64 : i64} : memref<2x4x8xi32>
-// CHECK:           %[[CLEARS:.*]] = piko.cpu.clears %[[BINS]]
+// CHECK:           %[[CLEARS:.*]] = piko.storage.clears %[[BINS]]
 // In the first launch the whole array gets the clear value,
 // CHECK:           scf.if %[[CLEARS]] {
 // CHECK:             memref.store %{{.*}}, %[[Z]][%{{.*}}, %{{.*}}]

@@ -19,12 +19,12 @@ piko.pipeline @Forward rank 2 {
     %v3 = arith.constant 13 : i32
     %v4 = arith.constant 14 : i32
     %n = piko.extent @out[0]
-    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
+    %bins = piko.storage.open_bins @a : !piko.bins<@F>
     %w = piko.cpu.open_writer %bins[%c0] : !piko.bins<@F>
-    %p = piko.cpu.append %w[0] (%v0, %v1, %v2, %v3, %v4) : i32, i32, i32, i32, i32 -> !piko.prim<@F>
+    %p = piko.storage.append %w[0] (%v0, %v1, %v2, %v3, %v4) : i32, i32, i32, i32, i32 -> !piko.prim<@F>
     // CHECK-DAG: %[[X:.*]] = arith.constant 10 : i32
     // CHECK-DAG: %[[W10:.*]] = arith.constant 13 : i32
-    // CHECK: %[[P:.*]] = piko.cpu.append
+    // CHECK: %[[P:.*]] = piko.storage.append
     // CHECK: piko.store %[[X]], checked @out
     %x = piko.get %p "x" : !piko.prim<@F> -> i32
     piko.store %x, checked @out[%c0 : index] "x" : i32

@@ -84,7 +84,7 @@ piko.pipeline @P rank 2 {
 piko.pipeline @P rank 2 {
   piko.kernel @k {
     // expected-error@+1 {{expected a stage, but got @a, which is none}}
-    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
+    %bins = piko.storage.open_bins @a : !piko.bins<@F>
   }
 }
 
@@ -96,7 +96,7 @@ piko.pipeline @P rank 2 {
   piko.stage @a bins [0, 0] threads 1 : @F -> [] {}
   piko.kernel @k {
     // expected-error@+1 {{expected bins of record @F, but got @G}}
-    %bins = piko.cpu.open_bins @a : !piko.bins<@G>
+    %bins = piko.storage.open_bins @a : !piko.bins<@G>
   }
 }
 
@@ -123,10 +123,10 @@ piko.pipeline @P rank 1 {
   piko.source @a
   piko.stage @a bins [0] threads 1 : list @F -> [] {}
   piko.kernel @k {
-    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
+    %bins = piko.storage.open_bins @a : !piko.bins<@F>
     %zero = arith.constant 0 : index
     // expected-error @below {{expected a list of record @F, which the bins hold, but got @G}}
-    %l = piko.cpu.list %bins[%zero to %zero] : !piko.bins<@F> -> !piko.list<@G>
+    %l = piko.storage.list %bins[%zero to %zero] : !piko.bins<@F> -> !piko.list<@G>
   }
 }
 
@@ -137,10 +137,10 @@ piko.pipeline @P rank 1 {
   piko.source @a
   piko.stage @a bins [0] threads 1 : @F -> [] {}
   piko.kernel @k {
-    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
+    %bins = piko.storage.open_bins @a : !piko.bins<@F>
     %zero = arith.constant 0 : index
     // expected-error @below {{expected a primitive of record @F, which the bins hold, but got @G}}
-    %p = piko.cpu.item %bins[%zero] : !piko.bins<@F> -> !piko.prim<@G>
+    %p = piko.storage.item %bins[%zero] : !piko.bins<@F> -> !piko.prim<@G>
   }
 }
 
@@ -151,12 +151,12 @@ piko.pipeline @P rank 1 {
   piko.source @a
   piko.stage @a bins [0] threads 1 : @F -> [] {}
   piko.kernel @k {
-    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
+    %bins = piko.storage.open_bins @a : !piko.bins<@F>
     %zero = arith.constant 0 : index
     %one = arith.constant 1 : i32
     %w = piko.cpu.open_writer %bins[%zero] : !piko.bins<@F>
     // expected-error @below {{expected a port below 0, which is how many the kernel of stage 'a' has, but got 0}}
-    %p = piko.cpu.append %w[0] (%one) : i32 -> !piko.prim<@F>
+    %p = piko.storage.append %w[0] (%one) : i32 -> !piko.prim<@F>
   }
 }
 
@@ -169,12 +169,12 @@ piko.pipeline @P rank 1 {
   piko.edge @a[0] -> @a
   piko.stage @a bins [0] threads 1 : @F -> [@F] {}
   piko.kernel @k {
-    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
+    %bins = piko.storage.open_bins @a : !piko.bins<@F>
     %zero = arith.constant 0 : index
     %one = arith.constant 1 : i32
     %w = piko.cpu.open_writer %bins[%zero] : !piko.bins<@F>
     // expected-error @below {{expected a primitive of record @F, which port 0 emits, but got @G}}
-    %p = piko.cpu.append %w[0] (%one) : i32 -> !piko.prim<@G>
+    %p = piko.storage.append %w[0] (%one) : i32 -> !piko.prim<@G>
   }
 }
 
@@ -186,12 +186,12 @@ piko.pipeline @P rank 1 {
   piko.edge @a[0] -> @a
   piko.stage @a bins [0] threads 1 : @F -> [@F] {}
   piko.kernel @k {
-    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
+    %bins = piko.storage.open_bins @a : !piko.bins<@F>
     %zero = arith.constant 0 : index
     %w = piko.cpu.open_writer %bins[%zero] : !piko.bins<@F>
     %wide = arith.constant 0 : i64
     // expected-error @below {{expected the numbers of record @F, ('i32'), but got ('i64')}}
-    %p = piko.cpu.append %w[0] (%wide) : i64 -> !piko.prim<@F>
+    %p = piko.storage.append %w[0] (%wide) : i64 -> !piko.prim<@F>
   }
 }
 
@@ -203,11 +203,11 @@ piko.pipeline @P rank 1 {
   piko.edge @a[0] -> @a
   piko.stage @a bins [0] threads 1 : @F -> [@F] {}
   piko.kernel @k {
-    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
+    %bins = piko.storage.open_bins @a : !piko.bins<@F>
     %zero = arith.constant 0 : index
     %w = piko.cpu.open_writer %bins[%zero] : !piko.bins<@F>
     // expected-error @below {{expected a tile only in a stage that is divided into tiles, but @a is not}}
-    piko.cpu.append_bin %w[0] of @a in %zero tile %zero
+    piko.storage.append_bin %w[0] of @a in %zero tile %zero
   }
 }
 
@@ -219,11 +219,11 @@ piko.pipeline @P rank 1 {
   piko.edge @a[0] -> @a
   piko.stage @a bins [0] threads 1 : @F -> [@F] {}
   piko.kernel @k {
-    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
+    %bins = piko.storage.open_bins @a : !piko.bins<@F>
     %zero = arith.constant 0 : index
     %w = piko.cpu.open_writer %bins[%zero] : !piko.bins<@F>
     // expected-error @below {{expected a port, because the kernel is not that of a source}}
-    piko.cpu.append_bin %w of @a in %zero
+    piko.storage.append_bin %w of @a in %zero
   }
 }
 
@@ -234,11 +234,11 @@ piko.pipeline @P rank 1 {
   piko.source @a
   piko.stage @a bins [0] threads 1 : @F -> [] {}
   piko.kernel @k {
-    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
+    %bins = piko.storage.open_bins @a : !piko.bins<@F>
     %zero = arith.constant 0 : index
     %w = piko.cpu.open_writer %bins[%zero] : !piko.bins<@F>
     // expected-error @below {{expected a stage, but got @b, which is none}}
-    piko.cpu.append_bin %w[0] of @b in %zero
+    piko.storage.append_bin %w[0] of @b in %zero
   }
 }
 
@@ -362,8 +362,8 @@ piko.pipeline @P rank 1 {
   piko.stage @a bins [8] threads 1 : @F -> [@F] {}
   piko.stage @b bins [8] threads 1 : list @F -> [] {}
   piko.kernel @k {
-    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
-    %u = piko.cpu.unit_count %bins : !piko.bins<@F>
+    %bins = piko.storage.open_bins @a : !piko.bins<@F>
+    %u = piko.storage.unit_count %bins : !piko.bins<@F>
     %w = piko.cpu.open_writer %bins[%u] : !piko.bins<@F>
     // expected-error @below {{expected a stage, but got @c, which is none}}
     %v = piko.cpu.open_writer %bins[%u] of @c : !piko.bins<@F>
@@ -379,11 +379,11 @@ piko.pipeline @P rank 1 {
   piko.stage @a bins [8] threads 1 : @F -> [@F] {}
   piko.stage @b bins [8] threads 1 : list @F -> [] {}
   piko.kernel @k {
-    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
-    %u = piko.cpu.unit_count %bins : !piko.bins<@F>
+    %bins = piko.storage.open_bins @a : !piko.bins<@F>
+    %u = piko.storage.unit_count %bins : !piko.bins<@F>
     %w = piko.cpu.open_writer %bins[%u] : !piko.bins<@F>
     // expected-error @below {{expected a writer of @b, but got one of 'a'}}
-    piko.cpu.local_bin @b from %w[0] writer %w {
+    piko.storage.local_bin @b from %w[0] writer %w {
     ^bb0(%local: !piko.bins<@F>):
     }
   }
@@ -398,11 +398,11 @@ piko.pipeline @P rank 1 {
   piko.stage @a bins [8] threads 1 : @F -> [@F] {}
   piko.stage @b bins [8] threads 1 : list @F -> [] {}
   piko.kernel @k {
-    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
-    %u = piko.cpu.unit_count %bins : !piko.bins<@F>
+    %bins = piko.storage.open_bins @a : !piko.bins<@F>
+    %u = piko.storage.unit_count %bins : !piko.bins<@F>
     %w = piko.cpu.open_writer %bins[%u] : !piko.bins<@F>
     // expected-error @below {{expected a port below 1, which is how many the kernel of stage 'a' has, but got 1}}
-    piko.cpu.local_bin @b from %w[1] writer %w {
+    piko.storage.local_bin @b from %w[1] writer %w {
     ^bb0(%local: !piko.bins<@F>):
     }
   }
@@ -417,11 +417,11 @@ piko.pipeline @P rank 1 {
   piko.stage @a bins [8] threads 1 : @F -> [@F] {}
   piko.stage @b bins [8] threads 1 : list @F -> [] {}
   piko.kernel @k {
-    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
-    %u = piko.cpu.unit_count %bins : !piko.bins<@F>
+    %bins = piko.storage.open_bins @a : !piko.bins<@F>
+    %u = piko.storage.unit_count %bins : !piko.bins<@F>
     %w = piko.cpu.open_writer %bins[%u] : !piko.bins<@F>
     // expected-error @below {{expected one block argument of type '!piko.bins<@F>'}}
-    piko.cpu.local_bin @b from %w[0] writer %w {
+    piko.storage.local_bin @b from %w[0] writer %w {
     ^bb0(%local: index):
     }
   }

@@ -42,53 +42,53 @@ piko.pipeline @Resolved rank 2 {
   piko.stage @b bins [8, 8] threads 64 tile 4 : @F -> [] {}
   // CHECK: piko.kernel @place_source {
   piko.kernel @place_source {
-    // CHECK-NEXT: %[[SOURCE:.*]] = piko.cpu.open_bins @a source 0 : !piko.bins<@F>
-    // CHECK-NEXT: %[[UNITS:.*]] = piko.cpu.unit_count %[[SOURCE]] : !piko.bins<@F>
+    // CHECK-NEXT: %[[SOURCE:.*]] = piko.storage.open_bins @a source 0 : !piko.bins<@F>
+    // CHECK-NEXT: %[[UNITS:.*]] = piko.storage.unit_count %[[SOURCE]] : !piko.bins<@F>
     // CHECK-NEXT: %[[W:.*]] = piko.cpu.open_writer %[[SOURCE]][%[[UNITS]]] : !piko.bins<@F>
-    // CHECK-NEXT: piko.cpu.append_bin %[[W]] of @a in %[[UNITS]]
-    // CHECK-NEXT: piko.cpu.next %[[W]]
+    // CHECK-NEXT: piko.storage.append_bin %[[W]] of @a in %[[UNITS]]
+    // CHECK-NEXT: piko.storage.next %[[W]]
     // CHECK-NEXT: piko.cpu.close_writer %[[W]]
-    // CHECK-NEXT: piko.cpu.close_bins %[[SOURCE]] : !piko.bins<@F>
-    %bins = piko.cpu.open_bins @a source 0 : !piko.bins<@F>
-    %n = piko.cpu.unit_count %bins : !piko.bins<@F>
+    // CHECK-NEXT: piko.storage.close_bins %[[SOURCE]] : !piko.bins<@F>
+    %bins = piko.storage.open_bins @a source 0 : !piko.bins<@F>
+    %n = piko.storage.unit_count %bins : !piko.bins<@F>
     %w = piko.cpu.open_writer %bins[%n] : !piko.bins<@F>
-    piko.cpu.append_bin %w of @a in %n
-    piko.cpu.next %w
+    piko.storage.append_bin %w of @a in %n
+    piko.storage.next %w
     piko.cpu.close_writer %w
-    piko.cpu.close_bins %bins : !piko.bins<@F>
+    piko.storage.close_bins %bins : !piko.bins<@F>
   }
   // CHECK: piko.kernel @kernel_a {
   piko.kernel @kernel_a {
-    // CHECK-NEXT: %[[BINS:.*]] = piko.cpu.open_bins @a : !piko.bins<@F>
-    // CHECK-NEXT: %[[UNIT:.*]] = piko.cpu.unit_count
-    // CHECK-NEXT: %[[FIRST:.*]], %{{.*}} = piko.cpu.unit_cells %[[BINS]][%[[UNIT]]] : !piko.bins<@F>
-    // CHECK-NEXT: %[[AT:.*]], %{{.*}} = piko.cpu.cell_range %[[BINS]][%[[UNIT]], %[[FIRST]]] : !piko.bins<@F>
-    // CHECK-NEXT: %[[BIN:.*]] = piko.cpu.cell_bin %[[BINS]][%[[FIRST]]] : !piko.bins<@F>
-    // CHECK-NEXT: %[[PRIM:.*]] = piko.cpu.item %[[BINS]][%[[AT]]] : !piko.bins<@F> -> !piko.prim<@F>
+    // CHECK-NEXT: %[[BINS:.*]] = piko.storage.open_bins @a : !piko.bins<@F>
+    // CHECK-NEXT: %[[UNIT:.*]] = piko.storage.unit_count
+    // CHECK-NEXT: %[[FIRST:.*]], %{{.*}} = piko.storage.unit_cells %[[BINS]][%[[UNIT]]] : !piko.bins<@F>
+    // CHECK-NEXT: %[[AT:.*]], %{{.*}} = piko.storage.cell_range %[[BINS]][%[[UNIT]], %[[FIRST]]] : !piko.bins<@F>
+    // CHECK-NEXT: %[[BIN:.*]] = piko.storage.cell_bin %[[BINS]][%[[FIRST]]] : !piko.bins<@F>
+    // CHECK-NEXT: %[[PRIM:.*]] = piko.storage.item %[[BINS]][%[[AT]]] : !piko.bins<@F> -> !piko.prim<@F>
     // CHECK-NEXT: piko.cpu.prefetch_item %[[BINS]][%[[AT]]] : !piko.bins<@F>
     // CHECK-NEXT: %[[X:.*]] = piko.get %[[PRIM]] "x"
     // CHECK-NEXT: %[[W:.*]] = piko.cpu.open_writer
-    // CHECK-NEXT: %{{.*}} = piko.cpu.append %[[W]][0] (%[[X]]) : i32 -> !piko.prim<@F>
+    // CHECK-NEXT: %{{.*}} = piko.storage.append %[[W]][0] (%[[X]]) : i32 -> !piko.prim<@F>
     // CHECK-NEXT: %{{.*}} = piko.cpu.threads
     // CHECK-NEXT: %{{.*}} = piko.grid @b[1]
     // CHECK-NEXT: %[[TILES:.*]] = piko.grid @b[0] tiles
-    // CHECK-NEXT: piko.cpu.append_bin %[[W]][0] of @b in %[[BIN]]{{$}}
-    // CHECK-NEXT: piko.cpu.append_bin %[[W]][0] of @b in %[[BIN]] tile %[[TILES]]
-    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
-    %u = piko.cpu.unit_count %bins : !piko.bins<@F>
-    %c0, %c1 = piko.cpu.unit_cells %bins[%u] : !piko.bins<@F>
-    %i0, %i1 = piko.cpu.cell_range %bins[%u, %c0] : !piko.bins<@F>
-    %b = piko.cpu.cell_bin %bins[%c0] : !piko.bins<@F>
-    %p = piko.cpu.item %bins[%i0] : !piko.bins<@F> -> !piko.prim<@F>
+    // CHECK-NEXT: piko.storage.append_bin %[[W]][0] of @b in %[[BIN]]{{$}}
+    // CHECK-NEXT: piko.storage.append_bin %[[W]][0] of @b in %[[BIN]] tile %[[TILES]]
+    %bins = piko.storage.open_bins @a : !piko.bins<@F>
+    %u = piko.storage.unit_count %bins : !piko.bins<@F>
+    %c0, %c1 = piko.storage.unit_cells %bins[%u] : !piko.bins<@F>
+    %i0, %i1 = piko.storage.cell_range %bins[%u, %c0] : !piko.bins<@F>
+    %b = piko.storage.cell_bin %bins[%c0] : !piko.bins<@F>
+    %p = piko.storage.item %bins[%i0] : !piko.bins<@F> -> !piko.prim<@F>
     piko.cpu.prefetch_item %bins[%i0] : !piko.bins<@F>
     %x = piko.get %p "x" : !piko.prim<@F> -> i32
     %w = piko.cpu.open_writer %bins[%u] : !piko.bins<@F>
-    %q = piko.cpu.append %w[0] (%x) : i32 -> !piko.prim<@F>
+    %q = piko.storage.append %w[0] (%x) : i32 -> !piko.prim<@F>
     %threads = piko.cpu.threads
     %rows = piko.grid @b[1]
     %t = piko.grid @b[0] tiles
-    piko.cpu.append_bin %w[0] of @b in %b
-    piko.cpu.append_bin %w[0] of @b in %b tile %t
+    piko.storage.append_bin %w[0] of @b in %b
+    piko.storage.append_bin %w[0] of @b in %b tile %t
   }
 }
 
@@ -115,19 +115,19 @@ piko.pipeline @Local rank 1 {
   }
   // CHECK: piko.kernel @loops {
   piko.kernel @loops {
-    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
-    %u = piko.cpu.unit_count %bins : !piko.bins<@F>
+    %bins = piko.storage.open_bins @a : !piko.bins<@F>
+    %u = piko.storage.unit_count %bins : !piko.bins<@F>
     %w = piko.cpu.open_writer %bins[%u] : !piko.bins<@F>
     // CHECK: %[[V:.*]] = piko.cpu.open_writer %{{.*}}[%{{.*}}] of @b : !piko.bins<@F>
     %v = piko.cpu.open_writer %bins[%u] of @b : !piko.bins<@F>
-    // CHECK-NEXT: piko.cpu.local_bin @b from %{{.*}}[0] writer %[[V]] {
+    // CHECK-NEXT: piko.storage.local_bin @b from %{{.*}}[0] writer %[[V]] {
     // CHECK-NEXT: ^bb0(%[[LOCAL:.*]]: !piko.bins<@F>):
-    // CHECK-NEXT: piko.cpu.unit_cells %[[LOCAL]]
-    // CHECK-NEXT: piko.cpu.next %[[V]]
-    piko.cpu.local_bin @b from %w[0] writer %v {
+    // CHECK-NEXT: piko.storage.unit_cells %[[LOCAL]]
+    // CHECK-NEXT: piko.storage.next %[[V]]
+    piko.storage.local_bin @b from %w[0] writer %v {
     ^bb0(%local: !piko.bins<@F>):
-      %c0, %c1 = piko.cpu.unit_cells %local[%u] : !piko.bins<@F>
-      piko.cpu.next %v
+      %c0, %c1 = piko.storage.unit_cells %local[%u] : !piko.bins<@F>
+      piko.storage.next %v
     }
   }
 }
@@ -150,20 +150,20 @@ piko.pipeline @Lists rank 1 {
   }
   // CHECK: piko.kernel @kernel_a
   piko.kernel @kernel_a {
-    %bins = piko.cpu.open_bins @a : !piko.bins<@F>
-    %u = piko.cpu.unit_count %bins : !piko.bins<@F>
-    // CHECK: %[[LO:.*]], %[[HI:.*]] = piko.cpu.call_range %[[BINS:.*]][%[[U:.*]]] : !piko.bins<@F>
-    // CHECK-NEXT: %{{.*}} = piko.cpu.call_bin %[[BINS]][%[[U]]] : !piko.bins<@F>
-    // CHECK-NEXT: %{{.*}} = piko.cpu.list %[[BINS]][%[[LO]] to %[[HI]]] : !piko.bins<@F> -> !piko.list<@F>
-    %lo, %hi = piko.cpu.call_range %bins[%u] : !piko.bins<@F>
-    %b = piko.cpu.call_bin %bins[%u] : !piko.bins<@F>
-    %l = piko.cpu.list %bins[%lo to %hi] : !piko.bins<@F> -> !piko.list<@F>
-    // CHECK-NEXT: %[[P:.*]] = piko.cpu.no_item : !piko.prim<@F>
-    // CHECK-NEXT: %[[A:.*]] = piko.cpu.to_address %[[P]] : !piko.prim<@F>
-    // CHECK-NEXT: %{{.*}} = piko.cpu.from_address %[[A]] : !piko.prim<@F>
-    %p = piko.cpu.no_item : !piko.prim<@F>
-    %address = piko.cpu.to_address %p : !piko.prim<@F>
-    %q = piko.cpu.from_address %address : !piko.prim<@F>
+    %bins = piko.storage.open_bins @a : !piko.bins<@F>
+    %u = piko.storage.unit_count %bins : !piko.bins<@F>
+    // CHECK: %[[LO:.*]], %[[HI:.*]] = piko.storage.call_range %[[BINS:.*]][%[[U:.*]]] : !piko.bins<@F>
+    // CHECK-NEXT: %{{.*}} = piko.storage.call_bin %[[BINS]][%[[U]]] : !piko.bins<@F>
+    // CHECK-NEXT: %{{.*}} = piko.storage.list %[[BINS]][%[[LO]] to %[[HI]]] : !piko.bins<@F> -> !piko.list<@F>
+    %lo, %hi = piko.storage.call_range %bins[%u] : !piko.bins<@F>
+    %b = piko.storage.call_bin %bins[%u] : !piko.bins<@F>
+    %l = piko.storage.list %bins[%lo to %hi] : !piko.bins<@F> -> !piko.list<@F>
+    // CHECK-NEXT: %[[P:.*]] = piko.storage.no_item : !piko.prim<@F>
+    // CHECK-NEXT: %[[A:.*]] = piko.storage.to_address %[[P]] : !piko.prim<@F>
+    // CHECK-NEXT: %{{.*}} = piko.storage.from_address %[[A]] : !piko.prim<@F>
+    %p = piko.storage.no_item : !piko.prim<@F>
+    %address = piko.storage.to_address %p : !piko.prim<@F>
+    %q = piko.storage.from_address %address : !piko.prim<@F>
     %w = piko.cpu.open_writer %bins[%u] : !piko.bins<@F>
     // CHECK: %[[MARK:.*]] = piko.cpu.scratch_mark %[[W:.*]]
     // CHECK-NEXT: %{{.*}}, %{{.*}} = piko.cpu.scratch %[[W]][%[[U]]]

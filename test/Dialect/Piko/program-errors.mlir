@@ -6,8 +6,8 @@ piko.pipeline @P rank 1 {
   piko.edge @a[0] -> @b
   piko.stage @a bins [0] threads 1 : @F -> [@F] {}
   piko.stage @b bins [0] threads 1 : @F -> [] {}
-  piko.kernel @ka { %bins = piko.cpu.open_bins @a : !piko.bins<@F> }
-  piko.kernel @kb { %bins = piko.cpu.open_bins @b : !piko.bins<@F> }
+  piko.kernel @ka { %bins = piko.storage.open_bins @a : !piko.bins<@F> }
+  piko.kernel @kb { %bins = piko.storage.open_bins @b : !piko.bins<@F> }
   piko.program {
     // expected-error @below {{expected a source, but got 1, which is none}}
     %0 = piko.feed 1 : !piko.edge<@F>
@@ -27,8 +27,8 @@ piko.pipeline @P rank 1 {
   piko.edge @a[0] -> @b
   piko.stage @a bins [0] threads 1 : @F -> [@F] {}
   piko.stage @b bins [0] threads 1 : @F -> [] {}
-  piko.kernel @ka { %bins = piko.cpu.open_bins @a : !piko.bins<@F> }
-  piko.kernel @kb { %bins = piko.cpu.open_bins @b : !piko.bins<@F> }
+  piko.kernel @ka { %bins = piko.storage.open_bins @a : !piko.bins<@F> }
+  piko.kernel @kb { %bins = piko.storage.open_bins @b : !piko.bins<@F> }
   piko.program {
     // expected-error @below {{expected record @F, but got @G}}
     %0 = piko.feed 0 : !piko.edge<@G>
@@ -44,8 +44,8 @@ piko.pipeline @P rank 1 {
   piko.edge @a[0] -> @b
   piko.stage @a bins [0] threads 1 : @F -> [@F] {}
   piko.stage @b bins [0] threads 1 : @F -> [] {}
-  piko.kernel @ka { %bins = piko.cpu.open_bins @a : !piko.bins<@F> }
-  piko.kernel @kb { %bins = piko.cpu.open_bins @b : !piko.bins<@F> }
+  piko.kernel @ka { %bins = piko.storage.open_bins @a : !piko.bins<@F> }
+  piko.kernel @kb { %bins = piko.storage.open_bins @b : !piko.bins<@F> }
   piko.program {
     // expected-error @below {{expected an image, or a buffer that is sized by a source, but got @host, which is none}}
     piko.clear @host
@@ -65,8 +65,8 @@ piko.pipeline @P rank 1 {
   piko.edge @a[0] -> @b
   piko.stage @a bins [0] threads 1 : @F -> [@F] {}
   piko.stage @b bins [0] threads 1 : @F -> [] {}
-  piko.kernel @ka { %bins = piko.cpu.open_bins @a : !piko.bins<@F> }
-  piko.kernel @kb { %bins = piko.cpu.open_bins @b : !piko.bins<@F> }
+  piko.kernel @ka { %bins = piko.storage.open_bins @a : !piko.bins<@F> }
+  piko.kernel @kb { %bins = piko.storage.open_bins @b : !piko.bins<@F> }
   piko.program {
     // expected-error @below {{expected the kernel of @b to be launched before}}
     piko.wait @b
@@ -86,8 +86,8 @@ piko.pipeline @P rank 1 {
   piko.edge @a[0] -> @b
   piko.stage @a bins [0] threads 1 : @F -> [@F] {}
   piko.stage @b bins [0] threads 1 : @F -> [] {}
-  piko.kernel @ka { %bins = piko.cpu.open_bins @a : !piko.bins<@F> }
-  piko.kernel @kb { %bins = piko.cpu.open_bins @b : !piko.bins<@F> }
+  piko.kernel @ka { %bins = piko.storage.open_bins @a : !piko.bins<@F> }
+  piko.kernel @kb { %bins = piko.storage.open_bins @b : !piko.bins<@F> }
   piko.program {
     // expected-error @below {{expected a stage, but got @c, which is none}}
     piko.wait @c
@@ -107,8 +107,8 @@ piko.pipeline @P rank 1 {
   piko.edge @a[0] -> @b
   piko.stage @a bins [0] threads 1 : @F -> [@F] {}
   piko.stage @b bins [0] threads 1 : @F -> [] {}
-  piko.kernel @ka { %bins = piko.cpu.open_bins @a : !piko.bins<@F> }
-  piko.kernel @kb { %bins = piko.cpu.open_bins @b : !piko.bins<@F> }
+  piko.kernel @ka { %bins = piko.storage.open_bins @a : !piko.bins<@F> }
+  piko.kernel @kb { %bins = piko.storage.open_bins @b : !piko.bins<@F> }
   piko.program {
     // expected-error @below {{expected a stage whose schedule has a body, but got @a}}
     piko.schedule_bins @a
@@ -128,8 +128,8 @@ piko.pipeline @P rank 1 {
   piko.edge @a[0] -> @b
   piko.stage @a bins [0] threads 1 : @F -> [@F] {}
   piko.stage @b bins [0] threads 1 : @F -> [] {}
-  piko.kernel @ka { %bins = piko.cpu.open_bins @a : !piko.bins<@F> }
-  piko.kernel @kb { %bins = piko.cpu.open_bins @b : !piko.bins<@F> }
+  piko.kernel @ka { %bins = piko.storage.open_bins @a : !piko.bins<@F> }
+  piko.kernel @kb { %bins = piko.storage.open_bins @b : !piko.bins<@F> }
   // expected-error @below {{expected a launch of @ka}}
   piko.program {
   }
@@ -143,8 +143,8 @@ piko.pipeline @P rank 1 {
   piko.edge @a[0] -> @b
   piko.stage @a bins [0] threads 1 : @F -> [@F] {}
   piko.stage @b bins [0] threads 1 : @F -> [] {}
-  piko.kernel @ka { %bins = piko.cpu.open_bins @a : !piko.bins<@F> }
-  piko.kernel @kb { %bins = piko.cpu.open_bins @b : !piko.bins<@F> }
+  piko.kernel @ka { %bins = piko.storage.open_bins @a : !piko.bins<@F> }
+  piko.kernel @kb { %bins = piko.storage.open_bins @b : !piko.bins<@F> }
   piko.program {
     // expected-error @below {{expected only statements of a program}}
     %c = arith.constant 0 : i32
@@ -164,8 +164,8 @@ piko.pipeline @P rank 1 {
   piko.edge @a[0] -> @b
   piko.stage @a bins [0] threads 1 : @F -> [@F] {}
   piko.stage @b bins [0] threads 1 : @F -> [] {}
-  piko.kernel @ka { %bins = piko.cpu.open_bins @a : !piko.bins<@F> }
-  piko.kernel @kb { %bins = piko.cpu.open_bins @b : !piko.bins<@F> }
+  piko.kernel @ka { %bins = piko.storage.open_bins @a : !piko.bins<@F> }
+  piko.kernel @kb { %bins = piko.storage.open_bins @b : !piko.bins<@F> }
   // expected-error @below {{expected a stage that collects, but got @a}}
   piko.program roots [@a] {
     %0 = piko.feed 0 : !piko.edge<@F>
@@ -185,8 +185,8 @@ piko.pipeline @P rank 1 {
   piko.edge @a[0] -> @b
   piko.stage @a bins [0] threads 1 : @F -> [@F] {}
   piko.stage @b bins [0] threads 1 : @F -> [] {}
-  piko.kernel @ka { %bins = piko.cpu.open_bins @a : !piko.bins<@F> }
-  piko.kernel @kb { %bins = piko.cpu.open_bins @b : !piko.bins<@F> }
+  piko.kernel @ka { %bins = piko.storage.open_bins @a : !piko.bins<@F> }
+  piko.kernel @kb { %bins = piko.storage.open_bins @b : !piko.bins<@F> }
   piko.program {
     %0 = piko.feed 0 : !piko.edge<@F>
     %1 = piko.join @a(concatenate %0) : (!piko.edge<@F>) -> !piko.bins<@F>

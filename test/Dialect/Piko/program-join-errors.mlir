@@ -6,8 +6,8 @@ piko.pipeline @P rank 1 {
   piko.edge @a[0] -> @b
   piko.stage @a bins [0] threads 1 : @F -> [@F] {}
   piko.stage @b bins [0] threads 1 : @F -> [] {}
-  piko.kernel @ka { %bins = piko.cpu.open_bins @a : !piko.bins<@F> }
-  piko.kernel @kb { %bins = piko.cpu.open_bins @b : !piko.bins<@F> }
+  piko.kernel @ka { %bins = piko.storage.open_bins @a : !piko.bins<@F> }
+  piko.kernel @kb { %bins = piko.storage.open_bins @b : !piko.bins<@F> }
   piko.program {
     %0 = piko.feed 0 : !piko.edge<@F>
     %1 = piko.join @a(concatenate %0) : (!piko.edge<@F>) -> !piko.bins<@F>
@@ -24,8 +24,8 @@ piko.pipeline @P rank 1 {
   piko.edge @a[0] -> @b
   piko.stage @a bins [0] threads 1 : @F -> [@F] {}
   piko.stage @b bins [0] threads 1 : @F -> [] {}
-  piko.kernel @ka { %bins = piko.cpu.open_bins @a : !piko.bins<@F> }
-  piko.kernel @kb { %bins = piko.cpu.open_bins @b : !piko.bins<@F> }
+  piko.kernel @ka { %bins = piko.storage.open_bins @a : !piko.bins<@F> }
+  piko.kernel @kb { %bins = piko.storage.open_bins @b : !piko.bins<@F> }
   piko.program {
     %0 = piko.feed 0 : !piko.edge<@F>
     // expected-error @below {{expected a stage, but got @c, which is none}}
@@ -45,8 +45,8 @@ piko.pipeline @P rank 1 {
   piko.edge @a[0] -> @b
   piko.stage @a bins [0] threads 1 : @F -> [@F] {}
   piko.stage @b bins [0] threads 1 : @F -> [] {}
-  piko.kernel @ka { %bins = piko.cpu.open_bins @a : !piko.bins<@F> }
-  piko.kernel @kb { %bins = piko.cpu.open_bins @b : !piko.bins<@F> }
+  piko.kernel @ka { %bins = piko.storage.open_bins @a : !piko.bins<@F> }
+  piko.kernel @kb { %bins = piko.storage.open_bins @b : !piko.bins<@F> }
   piko.program {
     %0 = piko.feed 0 : !piko.edge<@F>
     // expected-error @below {{expected record @F, but got @G}}
@@ -62,8 +62,8 @@ piko.pipeline @P rank 1 {
   piko.edge @a[0] -> @b
   piko.stage @a bins [0] threads 1 : @F -> [@F] {}
   piko.stage @b bins [0] threads 1 : @F -> [] {}
-  piko.kernel @ka { %bins = piko.cpu.open_bins @a : !piko.bins<@F> }
-  piko.kernel @kb { %bins = piko.cpu.open_bins @b : !piko.bins<@F> }
+  piko.kernel @ka { %bins = piko.storage.open_bins @a : !piko.bins<@F> }
+  piko.kernel @kb { %bins = piko.storage.open_bins @b : !piko.bins<@F> }
   piko.program {
     %0 = piko.feed 0 : !piko.edge<@F>
     // expected-error @below {{expected edge 0 to lead to @b, and each edge that leads there once}}
@@ -80,8 +80,8 @@ piko.pipeline @P rank 1 {
   piko.edge @a[0] -> @b
   piko.stage @a bins [0] threads 1 : @F -> [@F] {}
   piko.stage @b bins [0] threads 1 : @F -> [] {}
-  piko.kernel @ka { %bins = piko.cpu.open_bins @a : !piko.bins<@F> }
-  piko.kernel @kb { %bins = piko.cpu.open_bins @b : !piko.bins<@F> }
+  piko.kernel @ka { %bins = piko.storage.open_bins @a : !piko.bins<@F> }
+  piko.kernel @kb { %bins = piko.storage.open_bins @b : !piko.bins<@F> }
   piko.program {
     %0 = piko.feed 0 : !piko.edge<@F>
     // expected-error @below {{expected several edges to merge}}
@@ -100,8 +100,8 @@ piko.pipeline @P rank 1 {
   piko.edge @a[0] -> @b
   piko.stage @a bins [0] threads 1 : @F -> [@F] {}
   piko.stage @b bins [0] threads 1 : @F -> [] {}
-  piko.kernel @ka { %bins = piko.cpu.open_bins @a : !piko.bins<@F> }
-  piko.kernel @kb { %bins = piko.cpu.open_bins @b : !piko.bins<@F> }
+  piko.kernel @ka { %bins = piko.storage.open_bins @a : !piko.bins<@F> }
+  piko.kernel @kb { %bins = piko.storage.open_bins @b : !piko.bins<@F> }
   piko.program {
     %0 = piko.feed 0 : !piko.edge<@F>
     %1 = piko.join @a(concatenate %0) : (!piko.edge<@F>) -> !piko.bins<@F>
@@ -120,8 +120,8 @@ piko.pipeline @P rank 1 {
   piko.edge @a[0] -> @b
   piko.stage @a bins [0] threads 1 : @F -> [@F] {}
   piko.stage @b bins [0] threads 1 : @F -> [] {}
-  piko.kernel @ka { %bins = piko.cpu.open_bins @a : !piko.bins<@F> }
-  piko.kernel @kb { %bins = piko.cpu.open_bins @b : !piko.bins<@F> }
+  piko.kernel @ka { %bins = piko.storage.open_bins @a : !piko.bins<@F> }
+  piko.kernel @kb { %bins = piko.storage.open_bins @b : !piko.bins<@F> }
   piko.program {
     %0 = piko.feed 0 : !piko.edge<@F>
     %1 = piko.join @a(concatenate %0) : (!piko.edge<@F>) -> !piko.bins<@F>
@@ -140,8 +140,8 @@ piko.pipeline @P rank 1 {
   piko.edge @a[0] -> @b
   piko.stage @a bins [0] threads 1 : @F -> [@F] {}
   piko.stage @b bins [0] threads 1 : @F -> [] {}
-  piko.kernel @ka { %bins = piko.cpu.open_bins @a : !piko.bins<@F> }
-  piko.kernel @kb { %bins = piko.cpu.open_bins @b : !piko.bins<@F> }
+  piko.kernel @ka { %bins = piko.storage.open_bins @a : !piko.bins<@F> }
+  piko.kernel @kb { %bins = piko.storage.open_bins @b : !piko.bins<@F> }
   piko.program {
     %0 = piko.feed 0 : !piko.edge<@F>
     %1 = piko.join @a(concatenate %0) : (!piko.edge<@F>) -> !piko.bins<@F>
@@ -160,8 +160,8 @@ piko.pipeline @P rank 1 {
   piko.edge @a[0] -> @b
   piko.stage @a bins [0] threads 1 : @F -> [@F] {}
   piko.stage @b bins [0] threads 1 : @F -> [] {}
-  piko.kernel @ka { %bins = piko.cpu.open_bins @a : !piko.bins<@F> }
-  piko.kernel @kb { %bins = piko.cpu.open_bins @b : !piko.bins<@F> }
+  piko.kernel @ka { %bins = piko.storage.open_bins @a : !piko.bins<@F> }
+  piko.kernel @kb { %bins = piko.storage.open_bins @b : !piko.bins<@F> }
   piko.program {
     %0 = piko.feed 0 : !piko.edge<@F>
     %1 = piko.join @a(concatenate %0) : (!piko.edge<@F>) -> !piko.bins<@F>
@@ -180,8 +180,8 @@ piko.pipeline @P rank 1 {
   piko.edge @a[0] -> @b
   piko.stage @a bins [0] threads 1 : @F -> [@F] {}
   piko.stage @b bins [0] threads 1 : @F -> [] {}
-  piko.kernel @ka { %bins = piko.cpu.open_bins @a : !piko.bins<@F> }
-  piko.kernel @kb { %bins = piko.cpu.open_bins @b : !piko.bins<@F> }
+  piko.kernel @ka { %bins = piko.storage.open_bins @a : !piko.bins<@F> }
+  piko.kernel @kb { %bins = piko.storage.open_bins @b : !piko.bins<@F> }
   piko.program {
     %0 = piko.feed 0 : !piko.edge<@F>
     %1 = piko.join @a(concatenate %0) : (!piko.edge<@F>) -> !piko.bins<@F>
@@ -200,8 +200,8 @@ piko.pipeline @P rank 1 {
   piko.edge @a[0] -> @b
   piko.stage @a bins [0] threads 1 : @F -> [@F] {}
   piko.stage @b bins [0] threads 1 : @F -> [] {}
-  piko.kernel @ka { %bins = piko.cpu.open_bins @a : !piko.bins<@F> }
-  piko.kernel @kb { %bins = piko.cpu.open_bins @b : !piko.bins<@F> }
+  piko.kernel @ka { %bins = piko.storage.open_bins @a : !piko.bins<@F> }
+  piko.kernel @kb { %bins = piko.storage.open_bins @b : !piko.bins<@F> }
   piko.program {
     %0 = piko.feed 0 : !piko.edge<@F>
     %1 = piko.join @a(concatenate %0) : (!piko.edge<@F>) -> !piko.bins<@F>
@@ -220,7 +220,7 @@ piko.pipeline @P rank 1 {
   piko.source @a
   piko.source @a
   piko.stage @a bins [0] threads 1 : @F -> [] {}
-  piko.kernel @ka { %bins = piko.cpu.open_bins @a : !piko.bins<@F> }
+  piko.kernel @ka { %bins = piko.storage.open_bins @a : !piko.bins<@F> }
   piko.program {
     %0 = piko.feed 0 : !piko.edge<@F>
     %1 = piko.feed 1 : !piko.edge<@F>
@@ -237,7 +237,7 @@ piko.pipeline @P rank 1 {
   piko.source @a
   piko.source @a
   piko.stage @a bins [0] threads 1 : @F -> [] {}
-  piko.kernel @ka { %bins = piko.cpu.open_bins @a : !piko.bins<@F> }
+  piko.kernel @ka { %bins = piko.storage.open_bins @a : !piko.bins<@F> }
   piko.program {
     %0 = piko.feed 0 : !piko.edge<@F>
     %1 = piko.feed 1 : !piko.edge<@F>
@@ -254,7 +254,7 @@ piko.pipeline @P rank 1 {
   piko.source @a
   piko.source @a
   piko.stage @a bins [0] threads 1 : @F -> [] {}
-  piko.kernel @ka { %bins = piko.cpu.open_bins @a : !piko.bins<@F> }
+  piko.kernel @ka { %bins = piko.storage.open_bins @a : !piko.bins<@F> }
   piko.program {
     %0 = piko.feed 0 : !piko.edge<@F>
     %1 = piko.feed 1 : !piko.edge<@F>
@@ -271,7 +271,7 @@ piko.pipeline @P rank 1 {
   piko.source @a
   piko.source @a
   piko.stage @a bins [0] threads 1 : @F -> [] {}
-  piko.kernel @ka { %bins = piko.cpu.open_bins @a : !piko.bins<@F> }
+  piko.kernel @ka { %bins = piko.storage.open_bins @a : !piko.bins<@F> }
   piko.program {
     %0 = piko.feed 0 : !piko.edge<@F>
     %1 = piko.feed 1 : !piko.edge<@F>

@@ -7,8 +7,8 @@ piko.pipeline @P rank 1 {
   piko.edge @a[0] -> @b
   piko.stage @a bins [0] threads 1 : @F -> [@F] {}
   piko.stage @b bins [0] threads 1 : @F -> [] {}
-  piko.kernel @ka { %bins = piko.cpu.open_bins @a : !piko.bins<@F> }
-  piko.kernel @kb { %bins = piko.cpu.open_bins @b : !piko.bins<@F> }
+  piko.kernel @ka { %bins = piko.storage.open_bins @a : !piko.bins<@F> }
+  piko.kernel @kb { %bins = piko.storage.open_bins @b : !piko.bins<@F> }
   piko.program {
     %0 = piko.feed 0 : !piko.edge<@F>
     // expected-error @below {{expected an argument for each edge that comes in, of its type}}
@@ -26,8 +26,8 @@ piko.pipeline @P rank 1 {
   piko.edge @a[0] -> @b
   piko.stage @a bins [0] threads 1 : @F -> [@F] {}
   piko.stage @b bins [0] threads 1 : @F -> [] {}
-  piko.kernel @ka { %bins = piko.cpu.open_bins @a : !piko.bins<@F> }
-  piko.kernel @kb { %bins = piko.cpu.open_bins @b : !piko.bins<@F> }
+  piko.kernel @ka { %bins = piko.storage.open_bins @a : !piko.bins<@F> }
+  piko.kernel @kb { %bins = piko.storage.open_bins @b : !piko.bins<@F> }
   piko.program {
     %0 = piko.feed 0 : !piko.edge<@F>
     // expected-error @below {{expected a result for each edge that leaves, of its type}}
@@ -46,8 +46,8 @@ piko.pipeline @P rank 1 {
   piko.edge @a[0] -> @b
   piko.stage @a bins [0] threads 1 : @F -> [@F] {}
   piko.stage @b bins [0] threads 1 : @F -> [] {}
-  piko.kernel @ka { %bins = piko.cpu.open_bins @a : !piko.bins<@F> }
-  piko.kernel @kb { %bins = piko.cpu.open_bins @b : !piko.bins<@F> }
+  piko.kernel @ka { %bins = piko.storage.open_bins @a : !piko.bins<@F> }
+  piko.kernel @kb { %bins = piko.storage.open_bins @b : !piko.bins<@F> }
   piko.program {
     %0 = piko.feed 0 : !piko.edge<@F>
     piko.strips(%0) {
@@ -66,8 +66,8 @@ piko.pipeline @P rank 1 {
   piko.edge @a[0] -> @b
   piko.stage @a bins [0] threads 1 : @F -> [@F] {}
   piko.stage @b bins [0] threads 1 : @F -> [] {}
-  piko.kernel @ka { %bins = piko.cpu.open_bins @a : !piko.bins<@F> }
-  piko.kernel @kb { %bins = piko.cpu.open_bins @b : !piko.bins<@F> }
+  piko.kernel @ka { %bins = piko.storage.open_bins @a : !piko.bins<@F> }
+  piko.kernel @kb { %bins = piko.storage.open_bins @b : !piko.bins<@F> }
   piko.program {
     %0 = piko.feed 0 : !piko.edge<@F>
     %1 = piko.join @a(concatenate %0) : (!piko.edge<@F>) -> !piko.bins<@F>
@@ -90,8 +90,8 @@ piko.pipeline @P rank 1 {
   piko.edge @a[0] -> @b
   piko.stage @a bins [0] threads 1 : @F -> [@F] {}
   piko.stage @b bins [0] threads 1 : @F -> [] {}
-  piko.kernel @ka { %bins = piko.cpu.open_bins @a : !piko.bins<@F> }
-  piko.kernel @kb { %bins = piko.cpu.open_bins @b : !piko.bins<@F> }
+  piko.kernel @ka { %bins = piko.storage.open_bins @a : !piko.bins<@F> }
+  piko.kernel @kb { %bins = piko.storage.open_bins @b : !piko.bins<@F> }
   piko.program {
     %0 = piko.feed 0 : !piko.edge<@F>
     %1 = piko.join @a(concatenate %0) : (!piko.edge<@F>) -> !piko.bins<@F>

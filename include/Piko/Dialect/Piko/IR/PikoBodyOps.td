@@ -105,7 +105,7 @@ def Piko_EmitOp : Piko_Op<"emit"> {
   let description = [{
     Takes the numbers of the port's record: its fields in order, arrays
     row-major. At the machine level the result is the primitive, for
-    `piko.cpu.append_bin`.
+    `piko.storage.append_bin`.
 
     ```mlir
     piko.emit 0 (%u, %v) : f32, f32

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// What the CPU's lowering makes of kernels: loops over the storage of bins, cut
-// into units of work, and the writers that units leave what they emit in.
+// What lowerings make of kernels: loops over the storage of bins, cut into units
+// of work (`piko.storage.*`, every target's), and the writers that the CPU's
+// units leave what they emit in (`piko.cpu.*`).
 
 #ifndef PIKO_DIALECT_PIKO_IR_PIKOCPUOPS_TD
 #define PIKO_DIALECT_PIKO_IR_PIKOCPUOPS_TD
@@ -16,7 +17,11 @@ def Piko_CPUOnly : NativeOpTrait<"CPUOnly"> {
 class Piko_CPUOp<string mnemonic, list<Trait> traits = []>
     : Piko_Op<"cpu." # mnemonic, !listconcat([Piko_CPUOnly], traits)>;
 
-def Piko_OpenBinsOp : Piko_CPUOp<"open_bins", [
+/// How bins are stored is the runtime's business, for every target.
+class Piko_StorageOp<string mnemonic, list<Trait> traits = []>
+    : Piko_Op<"storage." # mnemonic, !listconcat([Piko_CPUOnly], traits)>;
+
+def Piko_OpenBinsOp : Piko_StorageOp<"open_bins", [
     DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
   let summary = "starts a kernel over the bins of a stage or over a source";
   let description = [{
@@ -25,8 +30,8 @@ def Piko_OpenBinsOp : Piko_CPUOp<"open_bins", [
     bin.
 
     ```mlir
-    %bins = piko.cpu.open_bins @shade : !piko.bins<@Fragment>
-    %first = piko.cpu.open_bins @rasterize source 0 : !piko.bins<@Fragment>
+    %bins = piko.storage.open_bins @shade : !piko.bins<@Fragment>
+    %first = piko.storage.open_bins @rasterize source 0 : !piko.bins<@Fragment>
     ```
   }];
   let arguments = (ins FlatSymbolRefAttr:$stage, OptionalAttr<Piko_I64Attr>:$source);
@@ -36,25 +41,25 @@ def Piko_OpenBinsOp : Piko_CPUOp<"open_bins", [
   }];
 }
 
-def Piko_CloseBinsOp : Piko_CPUOp<"close_bins"> {
+def Piko_CloseBinsOp : Piko_StorageOp<"close_bins"> {
   let summary = "ends a kernel";
   let description = [{
     Joins what the units of work emitted, in order, into the bins of the stages
     that come next.
 
     ```mlir
-    piko.cpu.close_bins %bins : !piko.bins<@Fragment>
+    piko.storage.close_bins %bins : !piko.bins<@Fragment>
     ```
   }];
   let arguments = (ins Piko_BinsType:$bins);
   let assemblyFormat = "$bins attr-dict `:` qualified(type($bins))";
 }
 
-def Piko_UnitCountOp : Piko_CPUOp<"unit_count", [Pure]> {
+def Piko_UnitCountOp : Piko_StorageOp<"unit_count", [Pure]> {
   let summary = "how many units of work there are";
   let description = [{
     ```mlir
-    %n = piko.cpu.unit_count %bins : !piko.bins<@Fragment>
+    %n = piko.storage.unit_count %bins : !piko.bins<@Fragment>
     ```
   }];
   let arguments = (ins Piko_BinsType:$bins);
@@ -62,13 +67,13 @@ def Piko_UnitCountOp : Piko_CPUOp<"unit_count", [Pure]> {
   let assemblyFormat = "$bins attr-dict `:` qualified(type($bins))";
 }
 
-def Piko_ClearsOp : Piko_CPUOp<"clears", [Pure]> {
+def Piko_ClearsOp : Piko_StorageOp<"clears", [Pure]> {
   let summary = "whether tiles begin with their clear value";
   let description = [{
     In the first launch of a kernel that clears images: see `piko.launch`.
 
     ```mlir
-    %first = piko.cpu.clears %bins : !piko.bins<@Fragment>
+    %first = piko.storage.clears %bins : !piko.bins<@Fragment>
     ```
   }];
   let arguments = (ins Piko_BinsType:$bins);
@@ -76,14 +81,14 @@ def Piko_ClearsOp : Piko_CPUOp<"clears", [Pure]> {
   let assemblyFormat = "$bins attr-dict `:` qualified(type($bins))";
 }
 
-def Piko_UnitCellsOp : Piko_CPUOp<"unit_cells", [Pure]> {
+def Piko_UnitCellsOp : Piko_StorageOp<"unit_cells", [Pure]> {
   let summary = "the cells of a unit of work";
   let description = [{
     The range is half open. Of a stage that takes lists it is the calls of its
     process phase.
 
     ```mlir
-    %c0, %c1 = piko.cpu.unit_cells %bins[%unit] : !piko.bins<@Fragment>
+    %c0, %c1 = piko.storage.unit_cells %bins[%unit] : !piko.bins<@Fragment>
     ```
   }];
   let arguments = (ins Piko_BinsType:$bins, Index:$unit);
@@ -91,13 +96,13 @@ def Piko_UnitCellsOp : Piko_CPUOp<"unit_cells", [Pure]> {
   let assemblyFormat = "$bins `[` $unit `]` attr-dict `:` qualified(type($bins))";
 }
 
-def Piko_CellRangeOp : Piko_CPUOp<"cell_range", [Pure]> {
+def Piko_CellRangeOp : Piko_StorageOp<"cell_range", [Pure]> {
   let summary = "the positions of a cell that a unit of work holds";
   let description = [{
     The range is half open.
 
     ```mlir
-    %lo, %hi = piko.cpu.cell_range %bins[%unit, %cell] : !piko.bins<@Fragment>
+    %lo, %hi = piko.storage.cell_range %bins[%unit, %cell] : !piko.bins<@Fragment>
     ```
   }];
   let arguments = (ins Piko_BinsType:$bins, Index:$unit, Index:$cell);
@@ -107,11 +112,11 @@ def Piko_CellRangeOp : Piko_CPUOp<"cell_range", [Pure]> {
   }];
 }
 
-def Piko_CellBinOp : Piko_CPUOp<"cell_bin", [Pure]> {
+def Piko_CellBinOp : Piko_StorageOp<"cell_bin", [Pure]> {
   let summary = "the bin that a cell belongs to";
   let description = [{
     ```mlir
-    %b = piko.cpu.cell_bin %bins[%cell] : !piko.bins<@Fragment>
+    %b = piko.storage.cell_bin %bins[%cell] : !piko.bins<@Fragment>
     ```
   }];
   let arguments = (ins Piko_BinsType:$bins, Index:$cell);
@@ -119,14 +124,14 @@ def Piko_CellBinOp : Piko_CPUOp<"cell_bin", [Pure]> {
   let assemblyFormat = "$bins `[` $cell `]` attr-dict `:` qualified(type($bins))";
 }
 
-def Piko_CallRangeOp : Piko_CPUOp<"call_range", [Pure]> {
+def Piko_CallRangeOp : Piko_StorageOp<"call_range", [Pure]> {
   let summary = "the positions that a call of a list Process is for";
   let description = [{
     A call is for a bin, or for a batch of it. The range is half open, and empty
     for an empty bin that runs nevertheless.
 
     ```mlir
-    %lo, %hi = piko.cpu.call_range %bins[%call] : !piko.bins<@Fragment>
+    %lo, %hi = piko.storage.call_range %bins[%call] : !piko.bins<@Fragment>
     ```
   }];
   let arguments = (ins Piko_BinsType:$bins, Index:$call);
@@ -134,11 +139,11 @@ def Piko_CallRangeOp : Piko_CPUOp<"call_range", [Pure]> {
   let assemblyFormat = "$bins `[` $call `]` attr-dict `:` qualified(type($bins))";
 }
 
-def Piko_CallBinOp : Piko_CPUOp<"call_bin", [Pure]> {
+def Piko_CallBinOp : Piko_StorageOp<"call_bin", [Pure]> {
   let summary = "the bin that a call of a list Process is for";
   let description = [{
     ```mlir
-    %b = piko.cpu.call_bin %bins[%call] : !piko.bins<@Fragment>
+    %b = piko.storage.call_bin %bins[%call] : !piko.bins<@Fragment>
     ```
   }];
   let arguments = (ins Piko_BinsType:$bins, Index:$call);
@@ -146,12 +151,12 @@ def Piko_CallBinOp : Piko_CPUOp<"call_bin", [Pure]> {
   let assemblyFormat = "$bins `[` $call `]` attr-dict `:` qualified(type($bins))";
 }
 
-def Piko_ListOp : Piko_CPUOp<"list", [Pure]> {
+def Piko_ListOp : Piko_StorageOp<"list", [Pure]> {
   let hasVerifier = 1;
   let summary = "the primitives at consecutive positions";
   let description = [{
     ```mlir
-    %l = piko.cpu.list %bins[%lo to %hi] : !piko.bins<@Fragment> -> !piko.list<@Fragment>
+    %l = piko.storage.list %bins[%lo to %hi] : !piko.bins<@Fragment> -> !piko.list<@Fragment>
     ```
   }];
   let arguments = (ins Piko_BinsType:$bins, Index:$begin, Index:$end);
@@ -162,12 +167,12 @@ def Piko_ListOp : Piko_CPUOp<"list", [Pure]> {
   }];
 }
 
-def Piko_ItemOp : Piko_CPUOp<"item", [Pure]> {
+def Piko_ItemOp : Piko_StorageOp<"item", [Pure]> {
   let hasVerifier = 1;
   let summary = "the primitive at a position";
   let description = [{
     ```mlir
-    %p = piko.cpu.item %bins[%i] : !piko.bins<@Fragment> -> !piko.prim<@Fragment>
+    %p = piko.storage.item %bins[%i] : !piko.bins<@Fragment> -> !piko.prim<@Fragment>
     ```
   }];
   let arguments = (ins Piko_BinsType:$bins, Index:$position);
@@ -198,7 +203,7 @@ def Piko_OpenWriterOp : Piko_CPUOp<"open_writer", [
   let summary = "where a unit of work leaves what it emits";
   let description = [{
     With `of` it is for the emissions of another stage, which runs in the same
-    kernel (`piko.cpu.local_bin`).
+    kernel (`piko.storage.local_bin`).
 
     ```mlir
     %w = piko.cpu.open_writer %bins[%unit] : !piko.bins<@Fragment>
@@ -213,7 +218,7 @@ def Piko_OpenWriterOp : Piko_CPUOp<"open_writer", [
   }];
 }
 
-def Piko_LocalBinOp : Piko_CPUOp<"local_bin", [
+def Piko_LocalBinOp : Piko_StorageOp<"local_bin", [
     SingleBlock, NoTerminator,
     DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
   let summary = "runs a stage on what a port has emitted in a bin";
@@ -226,10 +231,10 @@ def Piko_LocalBinOp : Piko_CPUOp<"local_bin", [
 
     ```mlir
     %other = piko.cpu.open_writer %bins[%unit] of @plot : !piko.bins<@Fragment>
-    piko.cpu.local_bin @plot from %writer[0] writer %other {
+    piko.storage.local_bin @plot from %writer[0] writer %other {
     ^bb0(%local: !piko.bins<@Point>):
-      %c0, %c1 = piko.cpu.unit_cells %local[%unit] : !piko.bins<@Point>
-      piko.cpu.next %other
+      %c0, %c1 = piko.storage.unit_cells %local[%unit] : !piko.bins<@Point>
+      piko.storage.next %other
     }
     ```
   }];
@@ -257,14 +262,14 @@ def Piko_CloseWriterOp : Piko_CPUOp<"close_writer"> {
   let assemblyFormat = "$writer attr-dict";
 }
 
-def Piko_AppendOp : Piko_CPUOp<"append", [
+def Piko_AppendOp : Piko_StorageOp<"append", [
     DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
   let summary = "stores a primitive that a port emits";
   let description = [{
     The result is the primitive as it was stored.
 
     ```mlir
-    %p = piko.cpu.append %writer[0] (%u, %v) : f32, f32 -> !piko.prim<@Point>
+    %p = piko.storage.append %writer[0] (%u, %v) : f32, f32 -> !piko.prim<@Point>
     ```
   }];
   let arguments = (ins Piko_WriterType:$writer, Piko_I64Attr:$port,
@@ -276,7 +281,7 @@ def Piko_AppendOp : Piko_CPUOp<"append", [
   }];
 }
 
-def Piko_AppendBinOp : Piko_CPUOp<"append_bin", [
+def Piko_AppendBinOp : Piko_StorageOp<"append_bin", [
     DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
   let summary = "puts what a port emitted last into a bin";
   let description = [{
@@ -285,13 +290,13 @@ def Piko_AppendBinOp : Piko_CPUOp<"append_bin", [
     outside the grid is an error when the pipeline runs.
 
     ```mlir
-    piko.cpu.append_bin %writer[0] of @plot in %bin
-    piko.cpu.append_bin %writer[0] of @plot in %bin tile %tile
+    piko.storage.append_bin %writer[0] of @plot in %bin
+    piko.storage.append_bin %writer[0] of @plot in %bin tile %tile
     ```
     ```mlir
-    %first = piko.cpu.open_bins @rasterize source 0 : !piko.bins<@Fragment>
+    %first = piko.storage.open_bins @rasterize source 0 : !piko.bins<@Fragment>
     %placer = piko.cpu.open_writer %first[%unit] : !piko.bins<@Fragment>
-    piko.cpu.append_bin %placer of @rasterize in %bin
+    piko.storage.append_bin %placer of @rasterize in %bin
     ```
   }];
   let arguments = (ins Piko_WriterType:$writer, OptionalAttr<Piko_I64Attr>:$port,
@@ -302,11 +307,11 @@ def Piko_AppendBinOp : Piko_CPUOp<"append_bin", [
   }];
 }
 
-def Piko_NextOp : Piko_CPUOp<"next"> {
+def Piko_NextOp : Piko_StorageOp<"next"> {
   let summary = "all that follows comes from the next primitive";
   let description = [{
     ```mlir
-    piko.cpu.next %writer
+    piko.storage.next %writer
     ```
   }];
   let arguments = (ins Piko_WriterType:$writer);
@@ -387,24 +392,24 @@ def Piko_ScratchReleaseOp : Piko_CPUOp<"scratch_release"> {
   let assemblyFormat = "$writer `[` $mark `]` attr-dict";
 }
 
-def Piko_NoItemOp : Piko_CPUOp<"no_item", [Pure]> {
+def Piko_NoItemOp : Piko_StorageOp<"no_item", [Pure]> {
   let summary = "a primitive of zeros";
   let description = [{
     What a read outside a list gives, in a run that ends with an error.
 
     ```mlir
-    %p = piko.cpu.no_item : !piko.prim<@Fragment>
+    %p = piko.storage.no_item : !piko.prim<@Fragment>
     ```
   }];
   let results = (outs Piko_PrimType:$prim);
   let assemblyFormat = "attr-dict `:` qualified(type($prim))";
 }
 
-def Piko_ToAddressOp : Piko_CPUOp<"to_address", [Pure]> {
+def Piko_ToAddressOp : Piko_StorageOp<"to_address", [Pure]> {
   let summary = "where a primitive is, as a number that memory can hold";
   let description = [{
     ```mlir
-    %a = piko.cpu.to_address %p : !piko.prim<@Fragment>
+    %a = piko.storage.to_address %p : !piko.prim<@Fragment>
     ```
   }];
   let arguments = (ins Piko_PrimType:$prim);
@@ -412,14 +417,14 @@ def Piko_ToAddressOp : Piko_CPUOp<"to_address", [Pure]> {
   let assemblyFormat = "$prim attr-dict `:` qualified(type($prim))";
 }
 
-def Piko_FromAddressOp : Piko_CPUOp<"from_address", [Pure]> {
+def Piko_FromAddressOp : Piko_StorageOp<"from_address", [Pure]> {
   let summary = "the primitive that is at an address";
   let description = [{
     The address is that of a primitive of the same record, by
-    `piko.cpu.to_address`, in the same kernel.
+    `piko.storage.to_address`, in the same kernel.
 
     ```mlir
-    %p = piko.cpu.from_address %a : !piko.prim<@Fragment>
+    %p = piko.storage.from_address %a : !piko.prim<@Fragment>
     ```
   }];
   let arguments = (ins Index:$address);

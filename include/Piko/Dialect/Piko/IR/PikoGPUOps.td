@@ -19,7 +19,7 @@ class Piko_GPUOp<string mnemonic, list<Trait> traits = []>
 def Piko_OpenLogOp : Piko_GPUOp<"open_log"> {
   let summary = "what all threads of a grid leave their emissions in";
   let description = [{
-    Takes the place of the writers of a CPU's units: `piko.cpu.append` and its
+    Takes the place of the writers of a CPU's units: `piko.storage.append` and its
     like add entries, in any order. In front of the launch.
 
     ```mlir
