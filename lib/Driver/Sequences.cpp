@@ -131,10 +131,10 @@ void piko::addLLVMSequence(OpPassManager &passes) {
 }
 
 void piko::addGPUSequence(OpPassManager &passes, const GPUOptions &options) {
-  addUnitSequence(passes);
   ConvertPikoToGPUOptions grids;
   grids.threads = options.threads;
   passes.nest<PipelineOp>().addPass(createConvertPikoToGPU(grids));
+  addCleanUp(passes);
   addUnitsToCPU(passes, SynthesisOptions::none());
   // Or constants would be arguments.
   passes.addPass(createGpuLaunchSinkIndexComputationsPass());

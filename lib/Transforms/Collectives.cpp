@@ -117,6 +117,17 @@ struct Writer {
 
 } // namespace
 
+SmallVector<Value> piko::createCombination(OpBuilder &builder, Location loc,
+                                           Block &combine, ValueRange left,
+                                           ValueRange right) {
+  return Writer{builder, loc}.combine(combine, left, right);
+}
+
+Value piko::createLess(OpBuilder &builder, Location loc, Value a, Value b,
+                       bool isUnsigned) {
+  return Writer{builder, loc}.isLess(a, b, isUnsigned);
+}
+
 /// At distance s = 1, 2, 4, ..., for each multiple i of 2s with i + s < count.
 static void forEachPair(Writer &w, Value count,
                         llvm::function_ref<void(Value i, Value j)> body) {

@@ -25,6 +25,17 @@ void createSort(mlir::OpBuilder &builder, mlir::Location loc, mlir::Value count,
                 mlir::Value keys, bool isUnsigned, mlir::Value room,
                 mlir::Value ranks);
 
+/// What the body of a reduction or a scan gives for two values.
+llvm::SmallVector<mlir::Value> createCombination(mlir::OpBuilder &builder,
+                                                 mlir::Location loc,
+                                                 mlir::Block &combine,
+                                                 mlir::ValueRange left,
+                                                 mlir::ValueRange right);
+
+/// Whether a < b; NaNs are equal to each other and greater than all else.
+mlir::Value createLess(mlir::OpBuilder &builder, mlir::Location loc,
+                       mlir::Value a, mlir::Value b, bool isUnsigned);
+
 } // namespace piko
 
 #endif // PIKO_LIB_TRANSFORMS_COLLECTIVES_H

@@ -6,7 +6,8 @@
 //   2. move work on a bin into the innermost, one after another;
 //   3. turn emissions and placements into what goes to the unit's writers.
 
-#include "Piko/Dialect/Piko/IR/PikoCPU.h"
+#include "UnitFormer.h"
+
 #include "Piko/Transforms/Passes.h"
 
 #include "mlir/Dialect/Arith/IR/Arith.h"
@@ -24,44 +25,6 @@ namespace {
 
 struct FormUnitsPass : piko::impl::FormUnitsBase<FormUnitsPass> {
   void runOnOperation() override;
-};
-
-class UnitFormer {
-public:
-  /// `work` is the kernel's: a piko.bins, or the piko.items of a source.
-  UnitFormer(KernelOp kernel, Operation *work)
-      : loc(kernel.getLoc()), work(work), rewriter(work) {}
-  void run();
-
-private:
-  void createUnits(StageOp stage, IntegerAttr source);
-  void createWriters();
-  void convertSource(ItemsOp items);
-  void convertBins(BinsOp over);
-  /// A loop over the unit's cells, or its calls.
-  scf::ForOp createUnitLoop();
-  void passOverEmptyBins(CellRangeOp range, scf::ForOp loop);
-  /// Where what follows the last batch of a bin goes.
-  Block *createBinEnd(Value call, Value bin);
-  /// Makes a loop over primitives of work on them, or takes one list.
-  void convertItems(ItemsOp items, Value from, Value begin, Value end,
-                    Value writer);
-  void convertList(ListsOp lists, Value from, Value call, Value writer);
-  void convertLocal(Operation *local);
-  /// What a piece of work emits goes to a writer.
-  void convertEmissions(Operation *piece, Value writer);
-  void convertPlaces(Value prim, Value writer, IntegerAttr port);
-
-  Value constant(int64_t value) {
-    return arith::ConstantIndexOp::create(rewriter, loc, value);
-  }
-
-  Location loc;
-  Operation *work;
-  IRRewriter rewriter;
-  Value bins, unit, unitsEnd;
-  Operation *unitEnd = nullptr; // in front of which a unit's writers close
-  llvm::DenseMap<Attribute, Value> writers; // by stage
 };
 
 } // namespace
@@ -102,20 +65,21 @@ void UnitFormer::createUnits(StageOp stage, IntegerAttr source) {
   unitEnd = forall.getTerminator();
 }
 
+Value UnitFormer::createWriter(Location at, FlatSymbolRefAttr other) {
+  rewriter.setInsertionPoint(unitEnd);
+  Value writer = OpenWriterOp::create(rewriter, at, bins, unit, other);
+  unitEnd = CloseWriterOp::create(rewriter, at, writer);
+  return writer;
+}
+
 /// One for each stage whose work the kernel holds, closed in reverse.
 void UnitFormer::createWriters() {
-  auto create = [&](Location at, FlatSymbolRefAttr stage, bool isOther) {
-    rewriter.setInsertionPoint(unitEnd);
-    Value writer = OpenWriterOp::create(rewriter, at, bins, unit,
-                                        isOther ? stage : FlatSymbolRefAttr());
-    unitEnd = CloseWriterOp::create(rewriter, at, writer);
-    writers[stage] = writer;
-  };
-  create(loc, getStageName(work), /*isOther=*/false);
+  writers[getStageName(work)] = createWriter(loc, FlatSymbolRefAttr());
   if (auto over = dyn_cast<BinsOp>(work))
     for (Operation &piece : *over.getBodyBlock())
       if (isa<ItemsOp, ListsOp>(piece) && piece.hasAttr("producer"))
-        create(piece.getLoc(), getStageName(&piece), /*isOther=*/true);
+        writers[getStageName(&piece)] =
+            createWriter(piece.getLoc(), getStageName(&piece));
   rewriter.setInsertionPoint(unitEnd);
 }
 
@@ -241,6 +205,7 @@ void UnitFormer::convertItems(ItemsOp items, Value from, Value begin, Value end,
   rewriter.setInsertionPoint(items);
   Value one = arith::ConstantIndexOp::create(rewriter, at, 1);
   auto loop = scf::ForOp::create(rewriter, at, begin, end, one);
+  loop->setAttrs(items->getDiscardableAttrDictionary());
   loop->setAttr("piko.lanes", rewriter.getUnitAttr());
   if (std::optional<LaneMapping> lanes = items.getLanes())
     loop->setAttr("piko.mapping",

@@ -3,6 +3,7 @@
 #include "LoopSplitter.h"
 
 #include "Collectives.h"
+#include "ParallelLoops.h"
 
 #include "Piko/Dialect/Piko/IR/BinArithmetic.h"
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
@@ -45,12 +46,14 @@ static Value findWriter(Operation *op) {
   return {};
 }
 
-LoopSplitter::LoopSplitter(ParallelForOp parallel)
+LoopSplitter::LoopSplitter(ParallelForOp parallel, Value writer)
     : parallel(parallel), loc(parallel.getLoc()), builder(parallel),
-      count(parallel.getCount()), uniformity(hoistInvariants(parallel)) {}
+      count(parallel.getCount()), writer(writer),
+      uniformity(hoistInvariants(parallel)) {}
 
 LogicalResult LoopSplitter::run() {
-  writer = findWriter(parallel);
+  if (!writer)
+    writer = findWriter(parallel);
   stage = getKernelStage(parallel);
   if (!writer || !stage)
     return parallel.emitOpError(
@@ -211,27 +214,6 @@ void LoopSplitter::splitSwitch(scf::IndexSwitchOp op, Piece &piece) {
     });
   }
   readFrom(op.getResults(), arrays);
-}
-
-/// How often a loop runs; its numbers are of any integer type.
-static Value createTripCount(OpBuilder &builder, scf::ForOp loop) {
-  Location loc = loop.getLoc();
-  Value lower = loop.getLowerBound(), upper = loop.getUpperBound();
-  Value any =
-      arith::CmpIOp::create(builder, loc,
-                            loop.getUnsignedCmp() ? arith::CmpIPredicate::ult
-                                                  : arith::CmpIPredicate::slt,
-                            lower, upper);
-  Value distance = arith::SubIOp::create(builder, loc, upper, lower);
-  Value trips =
-      arith::CeilDivUIOp::create(builder, loc, distance, loop.getStep());
-  Value none = arith::ConstantOp::create(builder, loc,
-                                         builder.getZeroAttr(trips.getType()));
-  trips = arith::SelectOp::create(builder, loc, any, trips, none);
-  if (trips.getType().isIndex())
-    return trips;
-  return arith::IndexCastUIOp::create(builder, loc, builder.getIndexType(),
-                                      trips);
 }
 
 void LoopSplitter::splitFor(scf::ForOp op, Piece &piece) {

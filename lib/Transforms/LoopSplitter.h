@@ -21,7 +21,9 @@ ParallelForOp hoistInvariants(ParallelForOp parallel);
 /// of iteration 0.
 class LoopSplitter {
 public:
-  explicit LoopSplitter(ParallelForOp parallel);
+  /// `writer` takes what the loop emits and has its slots; without one it is
+  /// that of the unit around.
+  explicit LoopSplitter(ParallelForOp parallel, mlir::Value writer = {});
 
   /// Fails after an error.
   mlir::LogicalResult run();

@@ -3,6 +3,7 @@
 // piko-split-loops: parallel loops as loops over their iterations.
 
 #include "LoopSplitter.h"
+#include "ParallelLoops.h"
 
 #include "Piko/Transforms/Passes.h"
 
@@ -53,7 +54,7 @@ ParallelForOp piko::hoistInvariants(ParallelForOp parallel) {
 }
 
 /// A loop without barriers: its iterations one after the other.
-static void convertLoop(ParallelForOp parallel) {
+static void convertFor(ParallelForOp parallel) {
   IRRewriter rewriter(parallel);
   Location loc = parallel.getLoc();
   Value zero = arith::ConstantIndexOp::create(rewriter, loc, 0);
@@ -69,7 +70,7 @@ static void convertLoop(ParallelForOp parallel) {
 
 /// The pixels of a box without barriers: rows from the last dimension on, x in
 /// the innermost loop. What a row's pixels share stays out of it.
-static void convertLoop(ParallelPixelsOp pixels) {
+static void convertPixels(ParallelPixelsOp pixels) {
   IRRewriter rewriter(pixels);
   Location loc = pixels.getLoc();
   Value one = arith::ConstantIntOp::create(rewriter, loc, 1, /*width=*/32);
@@ -91,7 +92,7 @@ static void convertLoop(ParallelPixelsOp pixels) {
 }
 
 /// The same iterations by their numbers.
-static ParallelForOp numberIterations(ParallelPixelsOp pixels) {
+ParallelForOp piko::numberIterations(ParallelPixelsOp pixels) {
   IRRewriter rewriter(pixels);
   Location loc = pixels.getLoc();
   Type index = rewriter.getIndexType();
@@ -123,11 +124,31 @@ static ParallelForOp numberIterations(ParallelPixelsOp pixels) {
   return parallel;
 }
 
-static void convertLoop(ParallelLoopOpInterface loop) {
+Value piko::createTripCount(OpBuilder &builder, scf::ForOp loop) {
+  Location loc = loop.getLoc();
+  Value lower = loop.getLowerBound(), upper = loop.getUpperBound();
+  Value any =
+      arith::CmpIOp::create(builder, loc,
+                            loop.getUnsignedCmp() ? arith::CmpIPredicate::ult
+                                                  : arith::CmpIPredicate::slt,
+                            lower, upper);
+  Value distance = arith::SubIOp::create(builder, loc, upper, lower);
+  Value trips =
+      arith::CeilDivUIOp::create(builder, loc, distance, loop.getStep());
+  Value none = arith::ConstantOp::create(builder, loc,
+                                         builder.getZeroAttr(trips.getType()));
+  trips = arith::SelectOp::create(builder, loc, any, trips, none);
+  if (trips.getType().isIndex())
+    return trips;
+  return arith::IndexCastUIOp::create(builder, loc, builder.getIndexType(),
+                                      trips);
+}
+
+void piko::convertLoop(ParallelLoopOpInterface loop) {
   if (auto pixels = dyn_cast<ParallelPixelsOp>(*loop))
-    convertLoop(pixels);
+    convertPixels(pixels);
   else
-    convertLoop(cast<ParallelForOp>(*loop));
+    convertFor(cast<ParallelForOp>(*loop));
 }
 
 void SplitLoopsPass::runOnOperation() {

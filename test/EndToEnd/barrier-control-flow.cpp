@@ -2,9 +2,23 @@
 //
 // Barriers in every kind of control flow: in the test of a loop, in a switch, in
 // branches, and in a loop that iterations count from different numbers.
-// RUN: piko-compare %s --count 400 | FileCheck %s
-// RUN: piko-compare %s --count 20 --seed 5 | FileCheck %s
+// RUN: piko-compare %s --pipe Barriers --count 400 | FileCheck %s
+// RUN: piko-compare %s --pipe Barriers --count 20 --seed 5 | FileCheck %s
+// On a GPU an iteration is a thread where there are enough; otherwise the loop
+// is cut.
+// RUN: piko-compare %s --pipe Barriers --count 200 --runs 1 --threads 2 --target gpu-on-cpu --gpu-threads 32 --gpu-seed 2 | FileCheck %s
+// RUN: piko-compare %s --pipe Few --count 400 --runs 1 --threads 2 --target gpu-on-cpu --gpu-threads 32 | FileCheck %s
+// RUN: piko-compare %s --pipe Few --count 400 --runs 1 --threads 2 --target gpu-on-cpu --gpu-threads 64 --gpu-seed 3 | FileCheck %s
+// RUN: piko-compare %s --pipe Few --count 400 --runs 1 --threads 2 --target gpu-on-cpu --gpu-threads 16 | FileCheck %s
 // CHECK: equal
+// RUN: pikoc %s --pipe Few --emit=gpu --gpu-threads 32 --remarks -o %t.mlir 2>&1 | FileCheck %s --check-prefix=THREADS
+// RUN: FileCheck %s --check-prefix=REGISTERS --input-file=%t.mlir
+// RUN: pikoc %s --pipe Few --emit=gpu --gpu-threads 16 --remarks 2>&1 | FileCheck %s --check-prefix=PIECES
+// THREADS-NOT: remark: what iterations keep across barriers is in memory
+// PIECES: barrier-control-flow.cpp:[[#@LINE+20]]:5: remark: what iterations keep across barriers is in memory: they are not known to be at most 16, the threads of a block
+// REGISTERS-LABEL: gpu.func @Few_kernel_mix
+// REGISTERS-NOT: memref.view
+// REGISTERS: gpu.return
 #include "Inputs/ports.h"
 struct Pixel {
   float sum = 0;
@@ -12,12 +26,13 @@ struct Pixel {
 struct State {
   piko::Image<Pixel> image;
 };
+template <int Most>
 struct Mix : piko::Stage<16, 16, 64, Point, Point>, piko::Uses<State> {
   void assignBin(const Point &p) {
     assignToBoundingBox(p, glm::ivec2(p.x - 5, p.y), glm::ivec2(p.x, p.y));
   }
   void process(const piko::List<Point> &list) {
-    int n = int(list.size());
+    int n = glm::min(int(list.size()), Most);
     float shared[64];
     int kind = list[0].tag % 4;
     parallelFor(n, [&](int i) {
@@ -87,11 +102,13 @@ struct Blend : piko::Stage<8, 8, 64, Point>, piko::Uses<State> {
            [&](Pixel &pixel) { pixel.sum = pixel.sum * 0.75f + p.value; });
   }
 };
-struct Barriers : piko::Pipe<State> {
-  Mix mix;
+template <int Most> struct Mixed : piko::Pipe<State> {
+  Mix<Most> mix;
   Blend blend;
-  Barriers() {
+  Mixed() {
     source(mix);
     connect(mix, 0, blend);
   }
 };
+struct Barriers : Mixed<1 << 30> {};
+struct Few : Mixed<30> {};

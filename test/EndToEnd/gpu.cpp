@@ -24,7 +24,6 @@
 // counts below and above the number of threads, waits, cycles and strips.
 // RUN: piko-compare %S/algorithms.cpp --runs 1 --threads 2 --target gpu-on-cpu --gpu-threads 32 --gpu-seed 1 | FileCheck %s
 // RUN: piko-compare %S/parallel.cpp --pipe Pipeline --count 300 --runs 1 --threads 2 --target gpu-on-cpu --gpu-threads 64 --gpu-seed 2 | FileCheck %s
-// RUN: piko-compare %S/barrier-control-flow.cpp --count 200 --runs 1 --threads 2 --target gpu-on-cpu --gpu-threads 32 --gpu-seed 2 | FileCheck %s
 // RUN: piko-compare %S/lists.mlir --reference %S/Inputs/lists.cpp --count 300 --runs 1 --threads 2 --target gpu-on-cpu --gpu-threads 32 --gpu-seed 1 | FileCheck %s
 // RUN: piko-compare %S/cycles.mlir --reference %S/Inputs/cycles.cpp --count 100 --runs 1 --threads 2 --target gpu-on-cpu --gpu-threads 64 --gpu-seed 1 | FileCheck %s
 // RUN: piko-compare %S/strips.cpp --count 300 --strip 7 --runs 1 --threads 2 --target gpu-on-cpu --gpu-threads 32 --gpu-seed 2 | FileCheck %s

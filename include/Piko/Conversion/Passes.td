@@ -82,10 +82,11 @@ def ConvertPikoToOpenMP : Pass<"convert-piko-to-openmp", "::piko::PipelineOp"> {
 def ConvertPikoToGPU : Pass<"convert-piko-to-gpu", "::piko::PipelineOp"> {
   let summary = "Turn kernels into grids of blocks and threads";
   let description = [{
-    **Requires** loops over units (`piko-form-units`, `piko-split-loops`).
+    **Requires** the machine level (`piko-form-work`).
 
-    **Does**: turns the `scf.forall` of each kernel into a `gpu.launch`: a block
-    runs a unit of work. What its threads do is one of two:
+    **Does**: turns the work of each kernel into a `gpu.launch`: a block runs a unit
+    of the stored bins, which is a bin, several, or a share of the primitives of
+    one. What its threads do is one of two:
 
     - Of a kernel whose effects are updates of pixels, its threads share out the
       pixels of a bin: a pixel is that thread's whose place in a tile of `threads`
@@ -94,11 +95,16 @@ def ConvertPikoToGPU : Pass<"convert-piko-to-gpu", "::piko::PipelineOp"> {
       threads' pixels is behind a test of the pixel, or, where a loop counts
       through pixels, stepped over. The block copies fields of as many primitives
       as it has threads into its own memory, between two `gpu.barrier`s.
-    - Of any other kernel, threads share the iterations of parallel loops, the
-      pieces of those that were cut at barriers, and the primitives of a bin,
-      where no two of these update a pixel. What lies between such loops and has
-      effects is done by the first thread, between two barriers; all else by all
-      threads alike. Arrays that several threads see are in the block's memory.
+    - Of any other kernel, threads share the primitives of a bin, or the iterations
+      of parallel loops, where no two of these update a pixel. Where iterations
+      meet at barriers and are at most as many as the block has threads, each is a
+      thread, barriers are the block's, and what lives across them is in
+      registers; all threads go the way of iteration 0, and collectives take as
+      many steps as the number of threads has binary digits. Where there may be
+      more iterations, the loop is cut at its barriers, as on a CPU, and threads
+      share the pieces. What lies between such loops and has effects is done by
+      the first thread, between two barriers; all else by all threads alike.
+      Arrays that several threads see are in the block's memory.
 
     Emissions go to the grid's log (`piko.gpu.open_log`), with numbers that say
     their order. Updates and other access to state are converted as by
@@ -109,11 +115,13 @@ def ConvertPikoToGPU : Pass<"convert-piko-to-gpu", "::piko::PipelineOp"> {
 
     Before:
     ```
-    %writer = piko.cpu.open_writer %bins[%u] : !piko.bins<@F>
-    scf.for %i = %begin to %end step %one {
-      %p = piko.storage.append %writer[0] (%x) : i32 -> !piko.prim<@F>
-      piko.storage.next %writer
-    } {piko.lanes}
+    piko.bins of @copy {
+    ^bb0(%bin: index):
+      piko.items of @copy {
+      ^bb0(%f: !piko.prim<@F>):
+        %p = piko.emit 0 (%x) : i32 -> !piko.prim<@F>
+      }
+    }
     ```
     After:
     ```
@@ -123,7 +131,7 @@ def ConvertPikoToGPU : Pass<"convert-piko-to-gpu", "::piko::PipelineOp"> {
       memref.store %i, %order[%c1] : memref<4xi64>
       %p = piko.storage.append %log[0] (%x) : i32 -> !piko.prim<@F>
       piko.storage.next %log
-    } {piko.lanes}
+    }
     gpu.barrier
     ```
 
@@ -138,6 +146,8 @@ def ConvertPikoToGPU : Pass<"convert-piko-to-gpu", "::piko::PipelineOp"> {
   let statistics = [
     Statistic<"grids", "grids", "kernels that became grids">,
     Statistic<"shared", "shared", "loops that threads share">,
+    Statistic<"barriers", "barriers", "loops whose iterations are threads">,
+    Statistic<"cut", "cut", "loops that are cut at barriers">,
     Statistic<"strided", "strided", "loops that step over others' pixels">,
     Statistic<"guarded", "guarded", "tests of whose a pixel is">];
   let dependentDialects = ["::mlir::arith::ArithDialect",

@@ -6,7 +6,8 @@
 //      between two barriers; numbers from there that others need go through the
 //      block's memory;
 //   2. a shared loop steps by the number of threads, between two barriers;
-//   3. arrays that more than one thread sees are in the block's memory.
+//   3. iterations that meet at barriers are threads (BarrierLoops.cpp);
+//   4. arrays that more than one thread sees are in the block's memory.
 // The order of what is emitted: the step (of what the first thread does, and of
 // each shared loop), the iteration, the piece of a loop that was cut at
 // barriers, and the number of the entry.
@@ -27,10 +28,10 @@ namespace {
 
 class BlockMapper {
 public:
-  BlockMapper(gpu::LaunchOp launch, Value log)
-      : launch(launch), log(log), loc(launch.getLoc()) {}
+  BlockMapper(gpu::LaunchOp launch, Value log, Value order,
+              MappingCounts &counts)
+      : launch(launch), log(log), order(order), loc(launch.getLoc()), counts(counts) {}
   LogicalResult run();
-  int64_t getSharedLoops() const { return sharedLoops; }
 
 private:
   enum { step = 0, iteration = 1, piece = 2, ordinal = 3 };
@@ -39,6 +40,9 @@ private:
   LogicalResult mapOperation(Operation *op);
   LogicalResult mapRun(ArrayRef<Operation *> run);
   void share(scf::ForOp loop);
+  LogicalResult mapIterations(ParallelForOp loop);
+  /// In front of what threads do together and may emit in.
+  void beginOrder(OpBuilder &builder, Operation *loop, bool isDeferred);
   void mapScratch(ScratchOp scratch);
   FailureOr<Value> broadcast(Value value, OpBuilder &inside, OpBuilder &behind);
   LogicalResult placeArrays();
@@ -70,21 +74,15 @@ private:
     firsts.insert(first);
     return first;
   }
-  Value addMemory(MemRefType type) {
-    auto space = gpu::AddressSpaceAttr::get(
-        launch.getContext(), gpu::GPUDialect::getWorkgroupAddressSpace());
-    return launch.addWorkgroupAttribution(
-        MemRefType::get(type.getShape(), type.getElementType(),
-                        MemRefLayoutAttrInterface(), space),
-        loc);
-  }
-  Value addCell(Type type) { return addMemory(MemRefType::get({1}, type)); }
+  Value addCell(Type type) { return addBlockMemory(launch, 1, type); }
 
   gpu::LaunchOp launch;
   Value log, order;
   Location loc;
-  llvm::DenseSet<Operation *> firsts, shared;
-  int64_t sharedLoops = 0, blockBytes = 0;
+  llvm::DenseSet<Operation *> firsts;
+  ThreadOperations threads; ///< What threads have of their own.
+  MappingCounts &counts;
+  int64_t blockBytes = 0;
 };
 
 } // namespace
@@ -106,7 +104,8 @@ static bool contains(Operation *op, Predicate predicate) {
 
 /// What all threads take part in.
 static bool isShared(Operation *op) {
-  return isa<ScratchOp, DeferBeginOp>(op) || op->hasAttr(sharedAttrName);
+  return isa<ScratchOp, DeferBeginOp, ParallelForOp>(op) ||
+         op->hasAttr(sharedAttrName);
 }
 
 /// Whether an operation only reads, apart from arrays that it makes.
@@ -241,6 +240,8 @@ LogicalResult BlockMapper::mapOperation(Operation *op) {
     share(cast<scf::ForOp>(op));
     return success();
   }
+  if (auto loop = dyn_cast<ParallelForOp>(op))
+    return mapIterations(loop);
   if (auto scratch = dyn_cast<ScratchOp>(op)) {
     mapScratch(scratch);
     return success();
@@ -267,16 +268,23 @@ static Value castTo(OpBuilder &builder, Value value, Type type) {
   return arith::IndexCastOp::create(builder, value.getLoc(), type, value);
 }
 
+void BlockMapper::beginOrder(OpBuilder &builder, Operation *loop,
+                             bool isDeferred) {
+  if (!contains(loop, isEmission))
+    return;
+  if (!isDeferred)
+    advanceOrder(builder, step);
+  advanceOrder(builder, piece);
+}
+
 void BlockMapper::share(scf::ForOp loop) {
   loop->removeAttr(sharedAttrName);
-  shared.insert(loop);
-  ++sharedLoops;
+  threads.ofOne.insert(loop);
+  ++counts.shared;
   OpBuilder builder(loop);
   auto deferred = llvm::to_vector(loop.getBody()->getOps<DeferIterationOp>());
+  beginOrder(builder, loop, !deferred.empty());
   if (contains(loop, isEmission)) {
-    if (deferred.empty())
-      advanceOrder(builder, step);
-    advanceOrder(builder, piece);
     OpBuilder inside = OpBuilder::atBlockBegin(loop.getBody());
     setOrder(inside, iteration,
              castTo(inside, loop.getInductionVar(), inside.getIndexType()));
@@ -293,6 +301,17 @@ void BlockMapper::share(scf::ForOp loop) {
   loop.setStep(castTo(builder, launch.getBlockSizeX(), type));
   builder.setInsertionPointAfter(loop);
   gpu::BarrierOp::create(builder, loc);
+}
+
+LogicalResult BlockMapper::mapIterations(ParallelForOp loop) {
+  OpBuilder builder(loop);
+  beginOrder(builder, loop, /*isDeferred=*/false);
+  if (contains(loop, isEmission)) {
+    setOrder(builder, iteration, launch.getThreadIds().x);
+    setOrder(builder, ordinal, constant(builder, 0));
+  }
+  gpu::BarrierOp::create(builder, loc);
+  return piko::mapIterations(loop, launch, threads);
 }
 
 /// The block keeps what it once has, for all that it does: it takes more where
@@ -349,7 +368,7 @@ Value BlockMapper::createBlockArray(memref::AllocaOp array) {
   if (isPlain && type.getLayout().isIdentity() &&
       blockBytes + bytes <= maxBlockBytes / 2) {
     blockBytes += bytes;
-    return addMemory(type);
+    return addBlockMemory(launch, type.getShape(), type.getElementType());
   }
   OpBuilder builder = OpBuilder::atBlockBegin(&launch.getBody().front());
   Value address = addCell(builder.getIndexType());
@@ -384,7 +403,7 @@ LogicalResult BlockMapper::placeArrays() {
   launch.walk([&](memref::AllocaOp array) { arrays.push_back(array); });
   auto isOfOne = [&](Operation *op) {
     for (; op != launch; op = op->getParentOp())
-      if (firsts.contains(op) || shared.contains(op))
+      if (firsts.contains(op) || threads.ofOne.contains(op))
         return true;
     return false;
   };
@@ -395,7 +414,7 @@ LogicalResult BlockMapper::placeArrays() {
     return false;
   };
   for (memref::AllocaOp array : arrays) {
-    if (array.getResult() == order)
+    if (array.getResult() == order || threads.ownArrays.contains(array))
       continue;
     if (!array.getType().hasStaticShape())
       return array.emitOpError("expected an array of constant size");
@@ -422,13 +441,10 @@ LogicalResult BlockMapper::run() {
   for (Operation *op : llvm::reverse(dropped))
     op->erase();
   Block &body = launch.getBody().front();
-  OpBuilder builder = OpBuilder::atBlockBegin(&body);
-  order = memref::AllocaOp::create(builder, loc,
-                                   MemRefType::get({4}, builder.getI64Type()));
   if (failed(mapBlock(body)))
     return failure();
+  OpBuilder builder(launch);
   builder.setInsertionPointAfter(order.getDefiningOp());
-  LogOrderOp::create(builder, loc, log, order);
   Value zero = arith::ConstantIntOp::create(builder, loc, 0, 64);
   for (int64_t which : {step, iteration, piece, ordinal})
     setOrder(builder, which, zero);
@@ -443,10 +459,7 @@ LogicalResult BlockMapper::run() {
   return placeArrays();
 }
 
-LogicalResult piko::mapBlock(gpu::LaunchOp launch, Value log,
-                             int64_t &sharedLoops) {
-  BlockMapper mapper(launch, log);
-  LogicalResult result = mapper.run();
-  sharedLoops += mapper.getSharedLoops();
-  return result;
+LogicalResult piko::mapBlock(gpu::LaunchOp launch, Value log, Value order,
+                             MappingCounts &counts) {
+  return BlockMapper(launch, log, order, counts).run();
 }

@@ -4,8 +4,6 @@
 
 #include "PikoToGPU.h"
 
-#include "Piko/Dialect/Piko/IR/PikoCPU.h"
-
 #include "../GPUToNVVM/ExactFunctions.h"
 
 #include "llvm/ADT/StringSet.h"
@@ -15,7 +13,7 @@ using namespace piko;
 
 LogicalResult piko::checkGridLimits(KernelOp kernel) {
   WalkResult result = kernel.walk([&](Operation *op) -> WalkResult {
-    if (isa<LocalBinOp>(op))
+    if (isa<ItemsOp, ListsOp>(op) && op->hasAttr("producer"))
       return op->emitError(
           "a kernel for a GPU has no local barriers; leave out "
           "piko-fuse-kernels");
@@ -32,9 +30,7 @@ LogicalResult piko::checkGridLimits(KernelOp kernel) {
 
 /// What pixels cannot be shared with.
 static bool isObstacle(Operation *op) {
-  if (isa<AppendOp, AppendBinOp, ListOp, ListSizeOp, ListAtOp, CallRangeOp,
-          CallBinOp, DeferBeginOp, DeferIterationOp, DeferEndOp, ScratchOp,
-          FailBarrierOp>(op) ||
+  if (isa<EmitOp, PlaceOp, ListsOp, BarrierOpInterface>(op) ||
       op->getName().getStringRef().starts_with("piko.check_"))
     return true;
   if (auto atomic = dyn_cast<AtomicOp>(op))

@@ -1,16 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // convert-piko-to-gpu: for each kernel,
-//   1. move the loop over units into a launch with a block for each unit;
+//   1. make a launch with a block for each unit of the stored bins, and in it
+//      loops over its cells and their primitives (GridFormer);
 //   2. if all that others see of it are pixels, share these among the block's
 //      threads, and take primitives in groups, whose fields the block copies to
 //      its memory;
-//   3. otherwise map the block's work to its threads (BlockMapping.cpp);
+//   3. otherwise choose who takes which loop (SharedLoops.cpp) and map the
+//      block's work to its threads (BlockMapping.cpp);
 //   4. convert access to state, and open a log for what the grid leaves.
 
 #include "PikoToGPU.h"
 
-#include "Piko/Dialect/Piko/IR/PikoCPU.h"
+#include "../../Transforms/LoopSplitter.h"
+#include "../../Transforms/ParallelLoops.h"
+#include "../../Transforms/UnitFormer.h"
+
 #include "Piko/Dialect/Piko/IR/PikoGPU.h"
 
 #include "mlir/Dialect/SCF/Transforms/Transforms.h"
@@ -28,16 +33,34 @@ namespace piko {
 using namespace mlir;
 using namespace piko;
 
-/// Memory that the threads of a block share.
-static Value addBlockMemory(gpu::LaunchOp launch, int64_t count, Type type) {
+Value piko::addBlockMemory(gpu::LaunchOp launch, ArrayRef<int64_t> shape,
+                           Type type) {
   auto space = gpu::AddressSpaceAttr::get(
       launch.getContext(), gpu::GPUDialect::getWorkgroupAddressSpace());
   return launch.addWorkgroupAttribution(
-      MemRefType::get({count}, type, MemRefLayoutAttrInterface(), space),
+      MemRefType::get(shape, type, MemRefLayoutAttrInterface(), space),
       launch.getLoc());
 }
 
 namespace {
+
+/// Makes a launch of a kernel's work; a block runs a unit.
+class GridFormer : public UnitFormer {
+public:
+  GridFormer(KernelOp kernel, Operation *work, int64_t threads)
+      : UnitFormer(kernel, work), kernel(kernel), threads(threads) {}
+
+  gpu::LaunchOp launch;
+  Value log;
+
+protected:
+  void createUnits(StageOp stage, IntegerAttr source) override;
+  Value createWriter(Location, FlatSymbolRefAttr) override { return log; }
+
+private:
+  KernelOp kernel;
+  int64_t threads;
+};
 
 class GridBuilder {
 public:
@@ -46,18 +69,19 @@ public:
 
   /// Threads share the pixels of a bin; fails where they cannot.
   LogicalResult sharePixelsOfBins(SharingCounts &counts);
-  /// Threads do what BlockMapping.cpp says.
-  LogicalResult mapWork(int64_t &sharedLoops);
+  /// Threads do what SharedLoops.cpp and BlockMapping.cpp say.
+  LogicalResult mapWork(MappingCounts &counts);
 
 private:
-  LogicalResult findUnits();
+  void formGrid();
   LogicalResult findItems();
-  void dropWriters();
-  void createLaunch();
+  void dropEnds();
   void hoistPrivateArrays();
   void upliftLoops();
   ThreadTile createTile();
   void groupItems();
+  LogicalResult mapLoop(ParallelLoopOpInterface loop, MappingCounts &counts);
+  LogicalResult mapPieces(ParallelForOp loop);
   LogicalResult convertAccess();
   /// The fields that are read by name alone, or none if they are too large.
   llvm::MapVector<StringAttr, SmallVector<GetOp>> collectFields(ItemOp item);
@@ -66,11 +90,9 @@ private:
   StageOp stage;
   int64_t threads;
   Location loc;
-  OpenBinsOp bins;
-  scf::ForallOp units;
   scf::ForOp items;
   gpu::LaunchOp launch;
-  Value log;
+  Value log, order;
 };
 
 struct ConvertPikoToGPUPass
@@ -83,19 +105,16 @@ struct ConvertPikoToGPUPass
 
 } // namespace
 
-LogicalResult GridBuilder::findUnits() {
-  for (auto open : kernel.getOps<OpenBinsOp>())
-    bins = open;
-  for (auto loop : kernel.getOps<scf::ForallOp>())
-    units = loop;
-  if (!bins || !units)
-    return kernel.emitOpError(
-        "expected a loop over units, as piko-form-units makes it");
-  return success();
+/// The piko.bins of a kernel, or the piko.items of a source.
+static Operation *findWork(KernelOp kernel) {
+  for (Operation &op : *kernel.getBodyBlock())
+    if (isa<BinsOp, ItemsOp>(op))
+      return &op;
+  return nullptr;
 }
 
 LogicalResult GridBuilder::findItems() {
-  units.walk([&](scf::ForOp loop) {
+  launch.walk([&](scf::ForOp loop) {
     if (loop->hasAttr("piko.lanes") && loop->getParentOfType<scf::ForOp>() &&
         !loop->getParentOfType<scf::ForOp>()->getParentOfType<scf::ForOp>())
       items = loop;
@@ -104,62 +123,62 @@ LogicalResult GridBuilder::findItems() {
                  !items.getBody()->getOps<ItemOp>().empty());
 }
 
-/// What is emitted goes to the grid's log; what emits nothing needs no
-/// positions.
-void GridBuilder::dropWriters() {
-  bool emits = kernel
-                   .walk([](Operation *op) {
-                     return isa<AppendOp, AppendBinOp>(op)
-                                ? WalkResult::interrupt()
-                                : WalkResult::advance();
-                   })
-                   .wasInterrupted();
-  SmallVector<Operation *> calls;
-  launch.walk([&](Operation *op) {
-    if (isa<CloseWriterOp>(op) || (isa<NextOp>(op) && !emits))
-      calls.push_back(op);
-  });
-  for (Operation *op : calls)
-    op->erase();
-  for (auto open : llvm::to_vector(launch.getOps<OpenWriterOp>())) {
-    open.replaceAllUsesWith(log);
-    open.erase();
-  }
-}
-
-void GridBuilder::createLaunch() {
-  OpBuilder builder(units);
-  Value zero = arith::ConstantIndexOp::create(builder, loc, 0);
-  Value one = arith::ConstantIndexOp::create(builder, loc, 1);
-  Value size = arith::ConstantIndexOp::create(builder, loc, threads);
-  Value count = units.getUpperBound(builder).front();
-  Value any = arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::ugt,
+void GridFormer::createUnits(StageOp stage, IntegerAttr source) {
+  auto type = BinsType::get(rewriter.getContext(), stage.getInputAttr());
+  bins = OpenBinsOp::create(
+      rewriter, loc, type, FlatSymbolRefAttr::get(stage.getSymNameAttr()),
+      source);
+  Value zero = constant(0), one = constant(1), size = constant(threads);
+  Value count = UnitCountOp::create(rewriter, loc, bins);
+  Value any = arith::CmpIOp::create(rewriter, loc, arith::CmpIPredicate::ugt,
                                     count, zero);
   // A GPU refuses a grid without blocks.
-  auto ifAny = scf::IfOp::create(builder, loc, any);
-  builder.setInsertionPointToStart(ifAny.thenBlock());
+  auto ifAny = scf::IfOp::create(rewriter, loc, any);
+  CloseBinsOp::create(rewriter, loc, bins);
+  rewriter.setInsertionPointToStart(ifAny.thenBlock());
   auto pipeline = kernel->getParentOfType<PipelineOp>();
   auto symbol = [&](const Twine &suffix) {
-    return FlatSymbolRefAttr::get(builder.getContext(),
+    return FlatSymbolRefAttr::get(rewriter.getContext(),
                                   (pipeline.getSymName() + suffix).str());
   };
-  log = OpenLogOp::create(builder, loc, WriterType::get(builder.getContext()),
+  log = OpenLogOp::create(rewriter, loc, WriterType::get(rewriter.getContext()),
                           bins);
   launch = gpu::LaunchOp::create(
-      builder, loc, count, one, one, size, one, one,
+      rewriter, loc, count, one, one, size, one, one,
       /*dynamicSharedMemorySize=*/Value(), /*asyncTokenType=*/Type(),
       /*asyncDependencies=*/ValueRange(), /*workgroupAttributions=*/TypeRange(),
       /*privateAttributions=*/TypeRange(), Value(), Value(), Value(),
       symbol("_gpu"), symbol("_" + kernel.getSymName()));
-  CloseLogOp::create(builder, loc, log);
-  Block &body = launch.getBody().front();
-  units.getTerminator()->erase();
-  units.getInductionVar(0).replaceAllUsesWith(launch.getBlockIds().x);
-  body.getOperations().splice(body.end(), units.getBody()->getOperations());
-  units.erase();
-  builder.setInsertionPointToEnd(&body);
-  gpu::TerminatorOp::create(builder, loc);
-  dropWriters();
+  CloseLogOp::create(rewriter, loc, log);
+  rewriter.setInsertionPointToEnd(&launch.getBody().front());
+  unitEnd = gpu::TerminatorOp::create(rewriter, loc);
+  unit = launch.getBlockIds().x;
+}
+
+/// What emits nothing needs no positions.
+void GridBuilder::dropEnds() {
+  SmallVector<NextOp> ends;
+  WalkResult result = launch.walk([&](Operation *op) {
+    if (auto next = dyn_cast<NextOp>(op))
+      ends.push_back(next);
+    return isa<AppendOp, AppendBinOp>(op) ? WalkResult::interrupt()
+                                          : WalkResult::advance();
+  });
+  if (!result.wasInterrupted())
+    for (NextOp end : ends)
+      end.erase();
+}
+
+void GridBuilder::formGrid() {
+  GridFormer former(kernel, findWork(kernel), threads);
+  former.run();
+  launch = former.launch;
+  log = former.log;
+  dropEnds();
+  OpBuilder builder = OpBuilder::atBlockBegin(&launch.getBody().front());
+  order = memref::AllocaOp::create(
+      builder, loc, MemRefType::get({4}, builder.getI64Type()));
+  LogOrderOp::create(builder, loc, log, order);
 }
 
 /// An alloca in a loop would take more memory each time around.
@@ -277,29 +296,81 @@ LogicalResult GridBuilder::convertAccess() {
 }
 
 LogicalResult GridBuilder::sharePixelsOfBins(SharingCounts &counts) {
-  if (failed(findUnits()) || failed(findItems()))
+  formGrid();
+  SmallVector<ParallelLoopOpInterface> loops;
+  launch.walk([&](ParallelLoopOpInterface loop) { loops.push_back(loop); });
+  for (ParallelLoopOpInterface loop : loops)
+    convertLoop(loop);
+  if (failed(findItems()))
     return failure();
-  createLaunch();
   upliftLoops();
   if (failed(sharePixels(items, createTile(), counts)))
     return failure();
   hoistPrivateArrays();
   groupItems();
-  OpBuilder builder = OpBuilder::atBlockBegin(&launch.getBody().front());
-  Value order = memref::AllocaOp::create(
-      builder, loc, MemRefType::get({4}, builder.getI64Type()));
-  LogOrderOp::create(builder, loc, log, order);
   return convertAccess();
 }
 
-LogicalResult GridBuilder::mapWork(int64_t &sharedLoops) {
-  if (failed(findUnits()))
+/// Cuts a loop whose iterations may be more than the block has threads, which
+/// share each of its pieces.
+LogicalResult GridBuilder::mapPieces(ParallelForOp loop) {
+  loop.emitRemark("what iterations keep across barriers is in memory: they are "
+                  "not known to be at most ")
+      << threads << ", the threads of a block";
+  if (failed(LoopSplitter(loop, log).run()))
     return failure();
-  findSharedLoops(kernel);
+  launch.walk([&](scf::ForOp piece) {
+    if (piece->removeAttr("piko.lanes") &&
+        chooseMapping(piece, threads) == ThreadMapping::Shared)
+      piece->setAttr(sharedAttrName, UnitAttr::get(kernel.getContext()));
+  });
+  return success();
+}
+
+LogicalResult GridBuilder::mapLoop(ParallelLoopOpInterface loop,
+                                   MappingCounts &counts) {
+  ThreadMapping mapping = chooseMapping(loop, threads);
+  bool isNested = loop->getParentOfType<ParallelLoopOpInterface>() ||
+                  hasSharedParent(loop);
+  if (isNested || mapping == ThreadMapping::One) {
+    convertLoop(loop);
+    launch.walk([](scf::ForOp made) { made->removeAttr("piko.lanes"); });
+    return success();
+  }
+  auto pixels = dyn_cast<ParallelPixelsOp>(*loop);
+  auto numbered =
+      pixels ? numberIterations(pixels) : cast<ParallelForOp>(*loop);
+  if (mapping == ThreadMapping::Pieces) {
+    ++counts.cut;
+    return mapPieces(numbered);
+  }
+  if (mapping == ThreadMapping::Threads) {
+    ++counts.threads; // BlockMapping.cpp does the rest
+    return success();
+  }
+  convertLoop(numbered);
+  launch.walk([&](scf::ForOp made) {
+    if (made->removeAttr("piko.lanes"))
+      made->setAttr(sharedAttrName, UnitAttr::get(kernel.getContext()));
+  });
+  return success();
+}
+
+LogicalResult GridBuilder::mapWork(MappingCounts &counts) {
+  kernel.walk([&](ItemsOp work) {
+    if (chooseMapping(work, threads) == ThreadMapping::Shared)
+      work->setAttr(sharedAttrName, UnitAttr::get(kernel.getContext()));
+  });
+  formGrid();
+  launch.walk([](scf::ForOp loop) { loop->removeAttr("piko.lanes"); });
+  SmallVector<ParallelLoopOpInterface> loops; // those inside others first
+  launch.walk([&](ParallelLoopOpInterface loop) { loops.push_back(loop); });
+  for (ParallelLoopOpInterface loop : loops)
+    if (failed(mapLoop(loop, counts)))
+      return failure();
   if (failed(convertAccess()))
     return failure();
-  createLaunch();
-  return mapBlock(launch, log, sharedLoops);
+  return mapBlock(launch, log, order, counts);
 }
 
 /// On a copy, which takes the kernel's place where it comes out.
@@ -334,11 +405,15 @@ bool ConvertPikoToGPUPass::tryToSharePixels(KernelOp kernel, StageOp stage,
 }
 
 LogicalResult ConvertPikoToGPUPass::convert(KernelOp kernel) {
-  auto opened = kernel.getOps<OpenBinsOp>();
-  if (opened.empty())
-    return success(); // of a schedule
-  auto stage =
-      lookupInPipeline<StageOp>(kernel, (*opened.begin()).getStageAttr());
+  Operation *work = findWork(kernel);
+  if (!work) {
+    if (kernel.getOps<BeginScheduleOp>().empty())
+      return kernel.emitOpError(
+          "expected work on bins, as piko-form-work makes it");
+    return success();
+  }
+  auto stage = lookupInPipeline<StageOp>(
+      kernel, work->getAttrOfType<FlatSymbolRefAttr>("stage"));
   int64_t count = threads;
   if (!count)
     count = std::min<int64_t>(maxThreads,
@@ -348,10 +423,12 @@ LogicalResult ConvertPikoToGPUPass::convert(KernelOp kernel) {
   ++grids;
   if (tryToSharePixels(kernel, stage, count))
     return success();
-  int64_t loops = 0;
-  if (failed(GridBuilder(kernel, stage, count).mapWork(loops)))
+  MappingCounts counts;
+  if (failed(GridBuilder(kernel, stage, count).mapWork(counts)))
     return failure();
-  shared += loops;
+  shared += counts.shared;
+  barriers += counts.threads;
+  cut += counts.cut;
   return success();
 }
 

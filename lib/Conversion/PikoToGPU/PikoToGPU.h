@@ -10,6 +10,7 @@
 #include "mlir/Dialect/GPU/IR/GPUDialect.h"
 #include "mlir/Dialect/MemRef/IR/MemRef.h"
 #include "mlir/Dialect/SCF/IR/SCF.h"
+#include "llvm/ADT/DenseSet.h"
 
 namespace piko {
 
@@ -43,16 +44,44 @@ struct SharingCounts {
 llvm::LogicalResult sharePixels(mlir::scf::ForOp items, const ThreadTile &tile,
                                 SharingCounts &counts);
 
-/// Marks the loops whose iterations the threads of a block may share: what they
-/// do has no order that shows but that of emissions.
-void findSharedLoops(KernelOp kernel);
+/// How the threads of a block take a loop over primitives or iterations.
+enum class ThreadMapping {
+  One,     ///< One after the other; loops inside may be shared.
+  Shared,  ///< Each thread takes some, in any order.
+  Threads, ///< An iteration is a thread, and meets others at barriers.
+  Pieces,  ///< It is cut at barriers, and threads share the pieces.
+};
+/// Chooses for `piko.items`, a parallel loop, or a loop of its iterations.
+ThreadMapping chooseMapping(mlir::Operation *loop, int64_t threads);
+
+/// Marks the loops whose iterations threads share.
 constexpr const char *sharedAttrName = "piko.shared";
+/// Whether an operation is in such a loop.
+bool hasSharedParent(mlir::Operation *op);
+
+struct MappingCounts {
+  int64_t shared = 0, threads = 0, cut = 0;
+};
 
 /// Maps a block's work to its threads: the first thread does what has effects,
-/// loops that are marked are shared, and all else is done by all threads alike.
-/// `log` takes what is emitted.
+/// loops that are marked are shared, iterations of parallel loops are threads,
+/// and all else is done by all threads alike. `log` takes what is emitted,
+/// with the numbers in `order`.
 llvm::LogicalResult mapBlock(mlir::gpu::LaunchOp launch, mlir::Value log,
-                             int64_t &sharedLoops);
+                             mlir::Value order, MappingCounts &counts);
+
+/// Memory that the threads of a block share.
+mlir::Value addBlockMemory(mlir::gpu::LaunchOp launch,
+                           llvm::ArrayRef<int64_t> shape, mlir::Type type);
+
+/// Turns a parallel loop of at most as many iterations as the block has threads
+/// into what each of these does. What a thread alone does is behind tests,
+/// which `ofOne` gets; arrays of one iteration go to `ownArrays`.
+struct ThreadOperations {
+  llvm::DenseSet<mlir::Operation *> ofOne, ownArrays;
+};
+llvm::LogicalResult mapIterations(ParallelForOp loop, mlir::gpu::LaunchOp launch,
+                                  ThreadOperations &made);
 
 /// What every GPU's blocks have.
 constexpr int64_t maxThreads = 1024, maxBlockBytes = 48 << 10;

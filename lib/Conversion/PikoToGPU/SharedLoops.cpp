@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// Which loops the threads of a block may share. The iterations of a parallel
-// loop are independent but for the order of their emissions, which the log
-// restores, and of their updates: these must be of one pixel for each
-// iteration. The primitives of a bin are independent unless their stage updates
-// pixels.
+// Who takes which loop. The iterations of a parallel loop are independent but
+// for the order of their emissions, which the log restores, and of their
+// updates: these must be of one pixel for each iteration. The primitives of a
+// bin are independent unless their stage updates pixels. Iterations that meet
+// at barriers are threads where there are enough of these.
 
 #include "PikoToGPU.h"
-
-#include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
 #include "mlir/IR/Matchers.h"
 #include "llvm/ADT/StringMap.h"
@@ -23,9 +21,9 @@ static bool isCast(Operation *op) {
 
 /// A number without casts and without what is added to it in each iteration
 /// alike.
-static Value getRoot(Value value, scf::ForOp loop) {
+static Value getRoot(Value value, Operation *loop) {
   auto isInvariant = [&](Value other) {
-    return loop.isDefinedOutsideOfLoop(other) ||
+    return !loop->isAncestor(other.getParentBlock()->getParentOp()) ||
            matchPattern(other, m_Constant());
   };
   while (Operation *op = value.getDefiningOp()) {
@@ -97,10 +95,11 @@ static bool determine(ArrayRef<Value> roots, Value value, int depth = 0) {
   return false;
 }
 
-/// Whether no two iterations update a pixel.
-static bool updatesOwnPixels(scf::ForOp loop) {
+/// Whether no two iterations, or primitives, update a pixel: its coordinates say
+/// which iteration it is.
+static bool updatesOwnPixels(Operation *loop) {
   llvm::StringMap<UpdateOp> known; // by image
-  WalkResult result = loop.walk([&](UpdateOp update) -> WalkResult {
+  WalkResult result = loop->walk([&](UpdateOp update) -> WalkResult {
     auto [it, isFirst] = known.try_emplace(update.getImage(), update);
     if (!isFirst)
       return WalkResult(success(
@@ -108,37 +107,121 @@ static bool updatesOwnPixels(scf::ForOp loop) {
     SmallVector<Value> roots;
     for (Value coordinate : update.getCoordinates())
       roots.push_back(getRoot(coordinate, loop));
-    return WalkResult(success(determine(roots, loop.getInductionVar())));
+    return WalkResult(success(
+        llvm::all_of(loop->getRegion(0).getArguments(), [&](Value argument) {
+          return determine(roots, argument);
+        })));
   });
   return !result.wasInterrupted();
 }
 
-/// Whether a loop holds some that iterations meet in.
-static bool hasCutLoops(scf::ForOp loop) {
-  return loop
-      .walk([](Operation *op) {
-        return isa<ScratchOp, DeferBeginOp>(op) ? WalkResult::interrupt()
-                                                : WalkResult::advance();
+//===----------------------------------------------------------------------===//
+// How many iterations there are
+//===----------------------------------------------------------------------===//
+
+static constexpr int64_t unbounded = std::numeric_limits<int32_t>::max();
+
+/// A constant that a value is not above.
+static int64_t getBound(Value value, int depth = 0) {
+  APInt constant;
+  if (matchPattern(value, m_ConstantInt(&constant)))
+    return std::clamp<int64_t>(constant.getSExtValue(), 0, unbounded);
+  Operation *op = value.getDefiningOp();
+  if (!op || depth > 8)
+    return unbounded;
+  auto operand = [&](unsigned i) {
+    return getBound(op->getOperand(i), depth + 1);
+  };
+  if (isa<arith::MinSIOp>(op))
+    return std::min(operand(0), operand(1));
+  if (isa<arith::MaxSIOp>(op))
+    return std::max(operand(0), operand(1));
+  if (isa<arith::SelectOp>(op))
+    return std::max(operand(1), operand(2));
+  if (isa<arith::IndexCastOp, arith::ExtSIOp>(op))
+    return operand(0);
+  return unbounded;
+}
+
+/// The operands of a tree of minima, or of maxima, without casts.
+template <typename OpT>
+static void collectOperands(Value value, SmallVectorImpl<Value> &operands) {
+  while (auto cast = value.getDefiningOp<arith::IndexCastOp>())
+    value = cast.getIn();
+  auto choice = value.getDefiningOp<OpT>();
+  if (!choice)
+    return operands.push_back(value);
+  collectOperands<OpT>(choice.getLhs(), operands);
+  collectOperands<OpT>(choice.getRhs(), operands);
+}
+
+/// A constant that `hi - lo` is not above: both are clipped to a bin.
+static int64_t getBound(Value lo, Value hi) {
+  SmallVector<Value> floors, ceilings;
+  collectOperands<arith::MaxSIOp>(lo, floors);
+  collectOperands<arith::MinSIOp>(hi, ceilings);
+  int64_t bound = unbounded;
+  APInt first, last;
+  for (Value ceiling : ceilings) {
+    if (auto sum = ceiling.getDefiningOp<arith::AddIOp>())
+      if (llvm::is_contained(floors, sum.getLhs()))
+        bound = std::min(bound, getBound(sum.getRhs()));
+    for (Value floor : floors)
+      if (matchPattern(floor, m_ConstantInt(&first)) &&
+          matchPattern(ceiling, m_ConstantInt(&last)))
+        bound = std::min(bound, std::max<int64_t>(0, last.getSExtValue() -
+                                                         first.getSExtValue()));
+  }
+  return bound;
+}
+
+static int64_t getMostIterations(ParallelLoopOpInterface loop) {
+  auto pixels = dyn_cast<ParallelPixelsOp>(*loop);
+  if (!pixels)
+    return getBound(cast<ParallelForOp>(*loop).getCount());
+  int64_t product = 1;
+  for (auto [lo, hi] : llvm::zip(pixels.getLo(), pixels.getHi()))
+    product = std::min(product * getBound(lo, hi), unbounded);
+  return product;
+}
+
+//===----------------------------------------------------------------------===//
+// The choice
+//===----------------------------------------------------------------------===//
+
+template <typename Predicate>
+static bool contains(Operation *op, Predicate predicate) {
+  return op
+      ->walk([&](Operation *inner) {
+        return predicate(inner) ? WalkResult::interrupt()
+                                : WalkResult::advance();
       })
       .wasInterrupted();
 }
 
-void piko::findSharedLoops(KernelOp kernel) {
-  bool isChecked =
-      kernel
-          .walk([](Operation *op) {
-            return op->getName().getStringRef().starts_with("piko.check_")
-                       ? WalkResult::interrupt()
-                       : WalkResult::advance();
-          })
-          .wasInterrupted();
-  if (isChecked)
-    return; // what is checked is reported in the order of the reference
-  kernel.walk<WalkOrder::PreOrder>([&](scf::ForOp loop) {
-    if (!loop->hasAttr("piko.lanes") || loop.getNumResults() ||
-        hasCutLoops(loop) || !updatesOwnPixels(loop))
-      return WalkResult::advance();
-    loop->setAttr(sharedAttrName, UnitAttr::get(loop.getContext()));
-    return WalkResult::skip();
+/// What is checked is reported in the order of the reference.
+static bool isChecked(Operation *op) {
+  return contains(op->getParentOfType<KernelOp>(), [](Operation *inner) {
+    return inner->getName().getStringRef().starts_with("piko.check_");
   });
+}
+
+ThreadMapping piko::chooseMapping(Operation *loop, int64_t threads) {
+  bool isOne = isChecked(loop);
+  if (auto parallel = dyn_cast<ParallelLoopOpInterface>(loop);
+      parallel && parallel.hasBarriers())
+    return !isOne && getMostIterations(parallel) <= threads
+               ? ThreadMapping::Threads
+               : ThreadMapping::Pieces;
+  auto meets = [](Operation *inner) { return isa<BarrierOpInterface>(inner); };
+  return isOne || contains(loop, meets) || !updatesOwnPixels(loop)
+             ? ThreadMapping::One
+             : ThreadMapping::Shared;
+}
+
+bool piko::hasSharedParent(Operation *op) {
+  for (; op; op = op->getParentOp())
+    if (op->hasAttr(sharedAttrName))
+      return true;
+  return false;
 }

@@ -1,4 +1,4 @@
-// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,piko-form-units,piko-split-loops,convert-piko-to-gpu{threads=32}),canonicalize,cse)' --split-input-file | FileCheck %s
+// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,convert-piko-to-gpu{threads=32}),canonicalize,cse)' --split-input-file | FileCheck %s
 // What a block's threads do where they do not share the pixels of a bin.
 
 piko.record @F {"x" : i32 at 0} size 4 align 4

@@ -1,4 +1,4 @@
-// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,piko-form-units,piko-split-loops,convert-piko-to-gpu))' --split-input-file --verify-diagnostics %s
+// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,convert-piko-to-gpu))' --split-input-file --verify-diagnostics %s
 // What a kernel on a GPU cannot do, and why threads do not share the pixels of a
 // bin.
 
@@ -156,6 +156,56 @@ piko.pipeline @Local rank 1 {
       // expected-error @below {{a kernel for a GPU has no local barriers; leave out piko-fuse-kernels}}
       piko.lists of @last from @start[0] {
       ^bb0(%l: !piko.list<@F>):
+      }
+    }
+  }
+}
+
+// -----
+
+// What the CPU's lowering makes is no kernel of the machine level.
+piko.record @F {"x" : i32 at 0} size 4 align 4
+piko.pipeline @Units rank 1 {
+  piko.source @a
+  piko.stage @a bins [8] threads 64 : @F -> [] {}
+  // expected-error @below {{expected work on bins, as piko-form-work makes it}}
+  piko.kernel @kernel_a {
+    %bins = piko.storage.open_bins @a : !piko.bins<@F>
+    piko.storage.close_bins %bins : !piko.bins<@F>
+  }
+}
+
+// -----
+
+// Memory of a type that no array has.
+piko.record @F {"x" : i32 at 0} size 4 align 4
+piko.pipeline @Lives rank 1 {
+  piko.buffer @out : @F
+  piko.source @a
+  piko.stage @a bins [8] threads 64 placed : list @F -> [] {}
+  piko.kernel @kernel_a {
+    piko.bins of @a {
+    ^bb0(%bin: index):
+      piko.lists of @a {
+      ^bb0(%l: !piko.list<@F>):
+        %n = arith.constant 8 : index
+        %yes = arith.constant true
+        piko.parallel_for %n {
+        ^bb0(%i: index):
+          %x = arith.index_cast %i : index to i32
+          %v = vector.broadcast %x : i32 to vector<2xi32>
+          // expected-error @below {{expected a number, a primitive or a private array to live across a barrier, but got type 'vector<2xi32>'}}
+          %kept = scf.if %yes -> vector<2xi32> {
+            piko.store %x, @out[%i : index] "x" : i32
+            scf.yield %v : vector<2xi32>
+          } else {
+            scf.yield %v : vector<2xi32>
+          }
+          piko.sync
+          %y = vector.extract %kept[0] : i32 from vector<2xi32>
+          piko.store %y, @out[%i : index] "x" : i32
+          piko.yield
+        }
       }
     }
   }

@@ -1,0 +1,515 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Parallel loops whose iterations are threads of a block:
+//   1. what lies between barriers is done by the threads that have an iteration,
+//      behind a test; what lives across a barrier stays in their registers;
+//   2. a barrier is the block's;
+//   3. control flow around barriers is taken by all threads of the block: what
+//      decides about it is iteration 0's, which others compare theirs with where
+//      it may differ;
+//   4. reductions, scans and sorts are done by all, in the block's memory.
+
+#include "PikoToGPU.h"
+
+#include "../../Transforms/Collectives.h"
+#include "../../Transforms/ParallelLoops.h"
+#include "../../Transforms/Uniformity.h"
+
+#include "Piko/Dialect/Piko/IR/BinArithmetic.h"
+#include "Piko/Dialect/Piko/IR/CppTypes.h"
+#include "Piko/Dialect/Piko/IR/PikoCPU.h"
+
+#include "mlir/Interfaces/SideEffectInterfaces.h"
+#include "llvm/Support/MathExtras.h"
+
+using namespace mlir;
+using namespace piko;
+
+namespace {
+
+class IterationMapper {
+public:
+  IterationMapper(ParallelForOp loop, gpu::LaunchOp launch,
+                  ThreadOperations &made)
+      : loop(loop), launch(launch), made(made), loc(loop.getLoc()),
+        builder(loop), uniformity(hoistInvariants(loop)) {}
+  LogicalResult run();
+
+private:
+  using P = arith::CmpIPredicate;
+
+  LogicalResult map(Block &block);
+  LogicalResult mapBarrier(Operation *op);
+  LogicalResult mapFor(scf::ForOp op);
+  void mapWhile(scf::WhileOp op, StringRef barrierName);
+  /// Puts operations behind a test of whether the thread runs an iteration.
+  LogicalResult guard(ArrayRef<Operation *> run);
+  /// Iteration 0's value, where `builder` stands. The barrier is the one that
+  /// an iteration with another value would miss.
+  Value agree(Value value, StringRef barrierName);
+  void compare(Value value, Value first, StringRef barrier);
+  void reduce(ReduceOp op);
+  void scan(ScanOp op);
+  void sort(SortOp op);
+  /// For each distance 1, 2, 4, ..., or the other way round.
+  void forEachDistance(bool falls, llvm::function_ref<void(Value)> body);
+  SmallVector<Value> shareValues(ValueRange values);
+
+  Value constant(int64_t value) {
+    return arith::ConstantIndexOp::create(builder, loc, value);
+  }
+  Value compare(P predicate, Value a, Value b) {
+    return arith::CmpIOp::create(builder, loc, predicate, a, b);
+  }
+  Value both(Value a, Value b) {
+    return arith::AndIOp::create(builder, loc, a, b);
+  }
+  Value add(Value a, Value b) {
+    return arith::AddIOp::create(builder, loc, a, b);
+  }
+  Value sub(Value a, Value b) {
+    return arith::SubIOp::create(builder, loc, a, b);
+  }
+  Value load(Value array, Value at) {
+    return memref::LoadOp::create(builder, loc, array, at);
+  }
+  void store(Value value, Value array, Value at) {
+    memref::StoreOp::create(builder, loc, value, array, at);
+  }
+  void barrier() { gpu::BarrierOp::create(builder, loc); }
+  /// if (condition) body()
+  void when(Value condition, llvm::function_ref<void()> body) {
+    auto ifOp = scf::IfOp::create(builder, loc, condition);
+    made.ofOne.insert(ifOp);
+    OpBuilder::InsertionGuard guard(builder);
+    builder.setInsertionPointToStart(ifOp.thenBlock());
+    body();
+  }
+  Value isActive() { return load(active, constant(0)); }
+
+  ParallelForOp loop;
+  gpu::LaunchOp launch;
+  ThreadOperations &made;
+  Location loc;
+  OpBuilder builder;
+  Uniformity uniformity;
+  StageOp stage;
+  Value thread, count;
+  Value active;  ///< Whether the thread runs an iteration; an array of one.
+  Value stopped; ///< Whether iterations have not agreed; the block's.
+};
+
+} // namespace
+
+//===----------------------------------------------------------------------===//
+// What threads do alone
+//===----------------------------------------------------------------------===//
+
+/// What may be done without an iteration: it has no effect on anything.
+static bool isFree(Operation *op) {
+  return op->getNumRegions() == 0 && isMemoryEffectFree(op) &&
+         isSpeculatable(op);
+}
+
+/// What a thread without an iteration has for a value, or null.
+static Value createNothing(OpBuilder &builder, Location loc, Type type) {
+  if (isa<PrimType>(type))
+    return NoItemOp::create(builder, loc, type);
+  if (!type.isIntOrIndexOrFloat())
+    return {};
+  return arith::ConstantOp::create(
+      builder, loc, cast<TypedAttr>(builder.getZeroAttr(type)));
+}
+
+LogicalResult IterationMapper::guard(ArrayRef<Operation *> run) {
+  SmallVector<Operation *> guarded;
+  for (Operation *op : run) {
+    if (isa<memref::AllocaOp>(op)) {
+      op->moveBefore(&launch.getBody().front().front());
+      made.ownArrays.insert(op);
+    } else if (!guarded.empty() || !isFree(op)) {
+      guarded.push_back(op);
+    }
+  }
+  if (guarded.empty())
+    return success();
+  SmallVector<Value> leaving;
+  for (Operation *op : guarded)
+    for (Value result : op->getResults())
+      if (llvm::any_of(result.getUsers(), [&](Operation *user) {
+            return !llvm::is_contained(
+                guarded, op->getBlock()->findAncestorOpInBlock(*user));
+          }))
+        leaving.push_back(result);
+  builder.setInsertionPoint(guarded.front());
+  auto ifOp = scf::IfOp::create(builder, loc, ValueRange(leaving).getTypes(),
+                                isActive(), /*withElseRegion=*/true);
+  made.ofOne.insert(ifOp);
+  for (auto [value, result] : llvm::zip(leaving, ifOp.getResults())) {
+    uniformity.replace(value, result);
+    value.replaceUsesWithIf(result, [&](OpOperand &use) {
+      return !llvm::is_contained(
+          guarded, ifOp->getBlock()->findAncestorOpInBlock(*use.getOwner()));
+    });
+  }
+  Block *then = ifOp.thenBlock();
+  for (Operation *op : guarded)
+    op->moveBefore(then, leaving.empty() ? std::prev(then->end()) : then->end());
+  builder.setInsertionPointToStart(ifOp.elseBlock());
+  SmallVector<Value> nothing;
+  for (Value value : leaving) {
+    nothing.push_back(createNothing(builder, loc, value.getType()));
+    if (!nothing.back())
+      return emitError(value.getLoc(),
+                       "expected a number, a primitive or a private array to "
+                       "live across a barrier, but got type ")
+             << value.getType();
+  }
+  if (!leaving.empty()) {
+    scf::YieldOp::create(builder, loc, nothing);
+    builder.setInsertionPointToEnd(then);
+    scf::YieldOp::create(builder, loc, leaving);
+  }
+  return success();
+}
+
+LogicalResult IterationMapper::map(Block &block) {
+  SmallVector<Operation *> run;
+  for (Operation &op : llvm::make_early_inc_range(block.without_terminator())) {
+    if (!findBarrier(&op)) {
+      run.push_back(&op);
+      continue;
+    }
+    if (failed(guard(run)))
+      return failure();
+    run.clear();
+    builder.setInsertionPoint(&op);
+    if (failed(mapBarrier(&op)))
+      return failure();
+  }
+  return guard(run);
+}
+
+//===----------------------------------------------------------------------===//
+// What all threads do
+//===----------------------------------------------------------------------===//
+
+LogicalResult IterationMapper::mapBarrier(Operation *op) {
+  if (isa<SyncOp>(op))
+    barrier();
+  else if (auto reduction = dyn_cast<ReduceOp>(op))
+    reduce(reduction);
+  else if (auto scanning = dyn_cast<ScanOp>(op))
+    scan(scanning);
+  else if (auto sorting = dyn_cast<SortOp>(op))
+    sort(sorting);
+  if (isBarrier(op)) {
+    if (!isa<SyncOp, ReduceOp, ScanOp, SortOp>(op))
+      return op->emitOpError("expected piko.sync, piko.reduce, piko.scan or "
+                             "piko.sort, which threads can meet at");
+    op->erase();
+    return success();
+  }
+  StringRef name = getCppName(findBarrier(op));
+  if (auto choice = dyn_cast<scf::IfOp>(op)) {
+    choice.getConditionMutable().assign(agree(choice.getCondition(), name));
+  } else if (auto choice = dyn_cast<scf::IndexSwitchOp>(op)) {
+    choice.getArgMutable().assign(agree(choice.getArg(), name));
+  } else if (auto counted = dyn_cast<scf::ForOp>(op)) {
+    if (failed(mapFor(counted)))
+      return failure();
+  } else if (!isa<scf::WhileOp>(op)) {
+    InFlightDiagnostic error =
+        findBarrier(op)->emitOpError("expected a barrier inside scf.if, "
+                                     "scf.for, scf.while or scf.index_switch "
+                                     "only, but got '")
+        << op->getName() << "'";
+    error.attachNote(op->getLoc()) << "the operation is here";
+    return error;
+  }
+  for (Region &region : op->getRegions())
+    for (Block &block : region)
+      if (failed(map(block)))
+        return failure();
+  if (auto repeated = dyn_cast<scf::WhileOp>(op))
+    mapWhile(repeated, name);
+  return success();
+}
+
+Value IterationMapper::agree(Value value, StringRef barrierName) {
+  if (!loop->isAncestor(value.getParentBlock()->getParentOp()))
+    return value;
+  Value cell = addBlockMemory(launch, 1, value.getType());
+  Value zero = constant(0);
+  when(compare(P::eq, thread, zero), [&] { store(value, cell, zero); });
+  barrier();
+  Value first = load(cell, zero);
+  if (uniformity.isVarying(value))
+    compare(value, first, barrierName);
+  barrier();
+  return first;
+}
+
+/// What comes behind such a barrier has no meaning, and is left out.
+void IterationMapper::compare(Value value, Value first, StringRef barrierName) {
+  Value zero = constant(0);
+  Value differs = both(isActive(), compare(P::ne, value, first));
+  when(differs, [&] {
+    Value yes =
+        arith::ConstantOp::create(builder, loc, builder.getBoolAttr(true));
+    store(yes, stopped, zero);
+    auto failure = FailBarrierOp::create(
+        builder, loc, stage.getSymName(), thread,
+        findBin(builder, builder.getInsertionBlock()->getParentOp()));
+    failure->setAttr(cppNameAttr, builder.getStringAttr(barrierName));
+  });
+  barrier();
+  when(load(stopped, zero), [&] {
+    Value no =
+        arith::ConstantOp::create(builder, loc, builder.getBoolAttr(false));
+    store(no, active, constant(0));
+  });
+}
+
+/// Iterations may count from different numbers, but equally often.
+LogicalResult IterationMapper::mapFor(scf::ForOp op) {
+  Value lower = op.getLowerBound(), step = op.getStep();
+  if (llvm::none_of(ValueRange{lower, op.getUpperBound(), step},
+                    [&](Value bound) {
+                      return loop->isAncestor(
+                          bound.getParentBlock()->getParentOp());
+                    }))
+    return success();
+  SmallVector<Operation *> counting;
+  Operation *before = op->getPrevNode();
+  Value trips = createTripCount(builder, op);
+  uniformity.replace(loop.getIteration(), trips);
+  for (Operation *made = before ? before->getNextNode()
+                                : &op->getBlock()->front();
+       made != op; made = made->getNextNode())
+    counting.push_back(made);
+  auto none = UnrealizedConversionCastOp::create(builder, loc, trips.getType(),
+                                                 trips); // keeps it alive
+  if (failed(guard(counting)))
+    return failure();
+  builder.setInsertionPoint(op);
+  Value agreed = agree(none.getOperand(0), getCppName(findBarrier(op)));
+  none.erase();
+  op.setLowerBound(constant(0));
+  op.setUpperBound(agreed);
+  op.setStep(constant(1));
+  op.setUnsignedCmp(false);
+  Value trip = op.getInductionVar();
+  Type type = trip.getType();
+  OpBuilder::InsertionGuard insertion(builder);
+  builder.setInsertionPointToStart(op.getBody());
+  trip.setType(builder.getIndexType());
+  Value number = type.isIndex() ? trip
+                                : Value(arith::IndexCastOp::create(
+                                      builder, loc, type, trip));
+  auto distance = arith::MulIOp::create(builder, loc, number, step);
+  Value at = add(lower, distance);
+  uniformity.replace(loop.getIteration(), at);
+  trip.replaceUsesWithIf(at, [&](OpOperand &use) {
+    Operation *user = use.getOwner();
+    return user != distance && user != number.getDefiningOp();
+  });
+  return success();
+}
+
+void IterationMapper::mapWhile(scf::WhileOp op, StringRef barrierName) {
+  scf::ConditionOp condition = op.getConditionOp();
+  builder.setInsertionPoint(condition);
+  Value agreed = agree(condition.getCondition(), barrierName);
+  Value yes =
+      arith::ConstantOp::create(builder, loc, builder.getBoolAttr(true));
+  Value goesOn =
+      arith::XOrIOp::create(builder, loc, load(stopped, constant(0)), yes);
+  condition.getConditionMutable().assign(both(agreed, goesOn));
+}
+
+//===----------------------------------------------------------------------===//
+// Collectives
+//===----------------------------------------------------------------------===//
+
+/// Arrays of the block with a value for each iteration.
+SmallVector<Value> IterationMapper::shareValues(ValueRange values) {
+  int64_t threads = *getConstantIntValue(launch.getBlockSizeX());
+  SmallVector<Value> arrays = llvm::map_to_vector(values, [&](Value value) {
+    return addBlockMemory(launch, threads, value.getType());
+  });
+  when(isActive(), [&] {
+    for (auto [value, array] : llvm::zip(values, arrays))
+      store(value, array, thread);
+  });
+  barrier();
+  return arrays;
+}
+
+void IterationMapper::forEachDistance(bool falls,
+                                      llvm::function_ref<void(Value)> body) {
+  int64_t threads = *getConstantIntValue(launch.getBlockSizeX());
+  int64_t levels = llvm::Log2_64(threads);
+  auto counted = scf::ForOp::create(builder, loc, constant(0),
+                                    constant(levels), constant(1));
+  OpBuilder::InsertionGuard insertion(builder);
+  builder.setInsertionPointToStart(counted.getBody());
+  Value level = counted.getInductionVar();
+  if (falls)
+    level = sub(constant(levels - 1), level);
+  body(arith::ShLIOp::create(builder, loc, constant(1), level));
+  barrier();
+}
+
+static SmallVector<Value> loadAll(OpBuilder &builder, Location loc,
+                                  ValueRange arrays, Value at) {
+  return llvm::map_to_vector(arrays, [&](Value array) -> Value {
+    return memref::LoadOp::create(builder, loc, array, at);
+  });
+}
+
+static void storeAll(OpBuilder &builder, Location loc, ValueRange values,
+                     ValueRange arrays, Value at) {
+  for (auto [value, array] : llvm::zip(values, arrays))
+    memref::StoreOp::create(builder, loc, value, array, at);
+}
+
+/// In the order of the language: at distance s, each multiple of 2s that has
+/// another value so far behind.
+void IterationMapper::reduce(ReduceOp op) {
+  SmallVector<Value> arrays = shareValues(op.getValues());
+  Block &body = op.getBody().front();
+  forEachDistance(/*falls=*/false, [&](Value s) {
+    Value rest = both(thread, sub(add(s, s), constant(1))), with = add(thread, s);
+    Value combines = both(compare(P::eq, rest, constant(0)),
+                          compare(P::slt, with, count));
+    when(combines, [&] {
+      storeAll(builder, loc,
+               createCombination(builder, loc, body,
+                                 loadAll(builder, loc, arrays, thread),
+                                 loadAll(builder, loc, arrays, with)),
+               arrays, thread);
+    });
+  });
+  SmallVector<Value> results = loadAll(builder, loc, arrays, constant(0));
+  barrier(); // before the arrays are written again
+  for (auto [from, to] : llvm::zip(op.getResults(), results))
+    from.replaceAllUsesWith(to);
+}
+
+/// As on a CPU (Collectives.cpp): what is left of a pair waits in the slot of
+/// its right, and then [0, j) is [0, j - s) and the block of j's lowest bit s.
+void IterationMapper::scan(ScanOp op) {
+  SmallVector<Value> arrays = shareValues(op.getValues());
+  Block &body = op.getBody().front();
+  Value runs = compare(P::slt, thread, count);
+  forEachDistance(/*falls=*/false, [&](Value s) {
+    Value rest = both(thread, sub(add(s, s), constant(1))), with = add(thread, s);
+    Value combines = both(compare(P::eq, rest, constant(0)),
+                          compare(P::slt, with, count));
+    when(combines, [&] {
+      SmallVector<Value> left = loadAll(builder, loc, arrays, thread),
+                         right = loadAll(builder, loc, arrays, with);
+      storeAll(builder, loc, createCombination(builder, loc, body, left, right),
+               arrays, thread);
+      storeAll(builder, loc, left, arrays, with);
+    });
+  });
+  forEachDistance(/*falls=*/true, [&](Value s) {
+    Value rest = both(thread, sub(add(s, s), constant(1)));
+    Value isLowest = both(compare(P::eq, rest, s), compare(P::ne, thread, s));
+    when(both(isLowest, runs), [&] {
+      storeAll(builder, loc,
+               createCombination(builder, loc, body,
+                                 loadAll(builder, loc, arrays, sub(thread, s)),
+                                 loadAll(builder, loc, arrays, thread)),
+               arrays, thread);
+    });
+  });
+  SmallVector<Value> before = loadAll(builder, loc, arrays, thread);
+  barrier();
+  Value isFirst = compare(P::eq, thread, constant(0));
+  for (auto [result, empty, value] :
+       llvm::zip(op.getResults(), op.getEmpty(), before)) {
+    Value chosen =
+        arith::SelectOp::create(builder, loc, isFirst, empty, value);
+    uniformity.replace(result, chosen);
+    result.replaceAllUsesWith(chosen);
+  }
+}
+
+/// A thread counts the keys that come before its own.
+void IterationMapper::sort(SortOp op) {
+  Value keys = shareValues(op.getKey()).front(), mine = op.getKey();
+  int64_t threads = *getConstantIntValue(launch.getBlockSizeX());
+  Value ranks = addBlockMemory(launch, threads, builder.getIndexType());
+  when(isActive(), [&] {
+    auto others = scf::ForOp::create(builder, loc, constant(0), count,
+                                     constant(1), ValueRange{constant(0)});
+    OpBuilder::InsertionGuard insertion(builder);
+    builder.setInsertionPointToStart(others.getBody());
+    Value at = others.getInductionVar(), key = load(keys, at);
+    bool isUnsigned = op.getIsUnsigned();
+    Value less = createLess(builder, loc, key, mine, isUnsigned);
+    Value more = createLess(builder, loc, mine, key, isUnsigned);
+    Value ahead = arith::SelectOp::create(builder, loc, more, less,
+                                          compare(P::slt, at, thread));
+    ahead = arith::OrIOp::create(builder, loc, less, ahead);
+    Value counted = add(others.getRegionIterArg(0),
+                        arith::IndexCastUIOp::create(
+                            builder, loc, builder.getIndexType(), ahead));
+    scf::YieldOp::create(builder, loc, counted);
+    builder.setInsertionPointAfter(others);
+    store(thread, ranks, others.getResult(0));
+  });
+  barrier();
+  Value index = load(ranks, thread);
+  barrier();
+  uniformity.replace(op.getIndex(), index);
+  op.getIndex().replaceAllUsesWith(index);
+}
+
+//===----------------------------------------------------------------------===//
+// The loop
+//===----------------------------------------------------------------------===//
+
+LogicalResult IterationMapper::run() {
+  stage = getKernelStage(loop);
+  thread = launch.getThreadIds().x;
+  count = loop.getCount();
+  auto flag = MemRefType::get({1}, builder.getI1Type());
+  {
+    OpBuilder entry = OpBuilder::atBlockBegin(&launch.getBody().front());
+    auto own = memref::AllocaOp::create(entry, loc, flag);
+    made.ownArrays.insert(own);
+    active = own;
+  }
+  stopped = addBlockMemory(launch, 1, builder.getI1Type());
+  Value zero = constant(0), runs = compare(P::slt, thread, count);
+  store(runs, active, zero);
+  when(compare(P::eq, thread, zero), [&] {
+    Value no =
+        arith::ConstantOp::create(builder, loc, builder.getBoolAttr(false));
+    store(no, stopped, constant(0));
+  });
+  barrier();
+  // Iteration 0 is there to say where all go.
+  auto any = scf::IfOp::create(builder, loc, compare(P::sgt, count, zero));
+  loop->moveBefore(any.thenBlock()->getTerminator());
+  if (failed(map(*loop.getBodyBlock())))
+    return failure();
+  Block *body = loop.getBodyBlock();
+  loop.getIteration().replaceAllUsesWith(thread);
+  body->getTerminator()->erase();
+  any.thenBlock()->getOperations().splice(loop->getIterator(),
+                                          body->getOperations());
+  loop.erase();
+  builder.setInsertionPointAfter(any);
+  barrier();
+  return success();
+}
+
+LogicalResult piko::mapIterations(ParallelForOp loop, gpu::LaunchOp launch,
+                                  ThreadOperations &made) {
+  return IterationMapper(loop, launch, made).run();
+}

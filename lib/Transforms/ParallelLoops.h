@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Parallel loops in other forms.
+
+#ifndef PIKO_LIB_TRANSFORMS_PARALLELLOOPS_H
+#define PIKO_LIB_TRANSFORMS_PARALLELLOOPS_H
+
+#include "Piko/Dialect/Piko/IR/Piko.h"
+
+#include "mlir/Dialect/SCF/IR/SCF.h"
+
+namespace piko {
+
+/// A loop without barriers, as loops that run its iterations one after the
+/// other; the innermost is marked with `piko.lanes`.
+void convertLoop(ParallelLoopOpInterface loop);
+
+/// The same iterations by their numbers.
+ParallelForOp numberIterations(ParallelPixelsOp pixels);
+
+/// How often a loop runs (index); its numbers are of any integer type.
+mlir::Value createTripCount(mlir::OpBuilder &builder, mlir::scf::ForOp loop);
+
+} // namespace piko
+
+#endif // PIKO_LIB_TRANSFORMS_PARALLELLOOPS_H

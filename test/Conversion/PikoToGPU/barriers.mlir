@@ -1,0 +1,134 @@
+// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-form-work,convert-piko-to-gpu{threads=32}),canonicalize,cse)' --split-input-file | FileCheck %s --implicit-check-not=piko.cpu. --implicit-check-not=piko.parallel
+// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-form-work,convert-piko-to-gpu{threads=16}))' --split-input-file -o /dev/null 2>&1 | FileCheck %s --check-prefix=PIECES
+// Iterations that meet at barriers are threads of a block.
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+
+// A value that lives across a barrier is in a register of its thread.
+// CHECK-LABEL: piko.pipeline @Registers
+// CHECK:         gpu.launch
+// CHECK-SAME:        threads(%[[T:[a-z0-9]+]],
+// CHECK:           %[[ACTIVE:.*]] = memref.alloca() : memref<1xi1>
+// CHECK:           %[[RUNS:.*]] = arith.cmpi slt, %[[T]], %c24
+// CHECK:           memref.store %[[RUNS]], %[[ACTIVE]][%c0]
+// CHECK:           %[[VALUE:.*]] = scf.if %{{.*}} -> (i32) {
+// CHECK:             piko.atomic
+// CHECK:           } else {
+// CHECK:           } else {
+// CHECK-NEXT:        scf.yield %c0_i32 : i32
+// CHECK:           gpu.barrier
+// CHECK-NEXT:      %[[IS_ACTIVE:.*]] = memref.load %[[ACTIVE]]
+// CHECK-NEXT:      scf.if %[[IS_ACTIVE]] {
+// CHECK:             piko.store %[[VALUE]], checked @out
+//
+// PIECES:      remark: what iterations keep across barriers is in memory: they are not known to be at most 16, the threads of a block
+// PIECES-NEXT: piko.parallel_for
+piko.pipeline @Registers rank 1 {
+  piko.buffer @out : @F
+  piko.source @a
+  piko.stage @a bins [8] threads 64 placed : list @F -> [] {}
+  piko.kernel @kernel_a {
+    piko.bins of @a {
+    ^bb0(%bin: index):
+      piko.lists of @a {
+      ^bb0(%l: !piko.list<@F>):
+        %size = piko.list_size %l : !piko.list<@F>
+        %n = arith.constant 24 : index
+        %one = arith.constant 1 : i32
+        piko.parallel_for %n {
+        ^bb0(%i: index):
+          %v = piko.atomic add @out[%i : index] "x", %one : i32 -> i32
+          piko.sync
+          piko.store %v, @out[%i : index] "x" : i32
+          piko.yield
+        }
+      }
+    }
+  }
+}
+
+// -----
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+
+// All go the way of iteration 0; those who would not are an error. The sum is
+// made in five steps, in the tree of the language.
+// CHECK-LABEL: piko.pipeline @Agrees
+// CHECK:         gpu.launch
+// CHECK-SAME:        threads(%[[T:[a-z0-9]+]],
+// CHECK:           scf.for %[[LEVEL:.*]] = %c0 to %c5 step %c1 {
+// CHECK:             %[[S:.*]] = arith.shli %c1, %[[LEVEL]]
+// CHECK:             %[[WITH:.*]] = arith.addi %[[T]], %[[S]]
+// CHECK:             scf.if
+// CHECK:               arith.addf
+// CHECK:             gpu.barrier
+// CHECK:           %[[SUM:.*]] = memref.load %{{.*}}[%c0] : memref<32xf32, #gpu.address_space<workgroup>>
+// CHECK:           %[[AGREED:.*]] = memref.load %{{.*}}[%c0] : memref<1xi1, #gpu.address_space<workgroup>>
+// CHECK:             piko.fail_barrier
+// CHECK:           scf.if %[[AGREED]] {
+// CHECK:             gpu.barrier
+piko.pipeline @Agrees rank 1 {
+  piko.source @a
+  piko.stage @a bins [8] threads 64 placed : list @F -> [] {}
+  piko.kernel @kernel_a {
+    piko.bins of @a {
+    ^bb0(%bin: index):
+      piko.lists of @a {
+      ^bb0(%l: !piko.list<@F>):
+        %size = piko.list_size %l : !piko.list<@F>
+        %most = arith.constant 32 : index
+        %n = arith.minsi %size, %most : index
+        piko.parallel_for %n {
+        ^bb0(%i: index):
+          %x = arith.index_cast %i : index to i32
+          %f = arith.sitofp %x : i32 to f32
+          %sum = piko.reduce %f : f32 {
+          ^bb0(%a: f32, %b: f32):
+            %c = arith.addf %a, %b : f32
+            piko.yield results [%c : f32]
+          }
+          %here = arith.cmpf ogt, %sum, %f : f32
+          scf.if %here {
+            piko.sync
+          }
+          piko.yield
+        }
+      }
+    }
+  }
+}
+
+// -----
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+
+// As many pixels as a bin has, and no more.
+// CHECK-LABEL: piko.pipeline @Box
+// CHECK-NOT:     memref.view
+// PIECES:      remark: what iterations keep across barriers is in memory
+// PIECES:      remark: what iterations keep across barriers is in memory
+// PIECES-NEXT: piko.parallel_pixels
+piko.pipeline @Box rank 1 {
+  piko.source @a
+  piko.stage @a bins [32] threads 32 placed : list @F -> [] {}
+  piko.kernel @kernel_a {
+    piko.bins of @a {
+    ^bb0(%bin: index):
+      piko.lists of @a {
+      ^bb0(%l: !piko.list<@F>):
+        %size = arith.constant 32 : index
+        %domain = piko.domain[0]
+        %lo = arith.muli %bin, %size : index
+        %end = arith.addi %lo, %size : index
+        %hi = arith.minsi %end, %domain : index
+        %from = arith.index_cast %lo : index to i32
+        %to = arith.index_cast %hi : index to i32
+        piko.parallel_pixels (%from) to (%to) {
+        ^bb0(%x: i32):
+          piko.sync
+          piko.yield
+        }
+      }
+    }
+  }
+}
