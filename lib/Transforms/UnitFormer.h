@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// Structured work as loops over what is stored, for every target: units of work,
-// in them cells or calls, in them primitives.
+// Structured work as loops over what is stored, for every target: units of
+// work, in them cells or calls, in them primitives.
 
 #ifndef PIKO_LIB_TRANSFORMS_UNITFORMER_H
 #define PIKO_LIB_TRANSFORMS_UNITFORMER_H

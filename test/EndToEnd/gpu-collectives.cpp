@@ -40,7 +40,8 @@ struct Collect : piko::Stage<16, 16, 64, Point, Point>, piko::Uses<State> {
       float before =
           scan(p.value, [](float a, float b) { return a * 0.5f + b; });
       float sum = reduce(p.value * 3, [](float a, float b) { return a + b; });
-      double wide = scan(double(p.tag), [](double a, double b) { return a - b; });
+      double wide =
+          scan(double(p.tag), [](double a, double b) { return a - b; });
       Point out = list[rank];
       for (int k = 0; k < 2 + count(p.tag % 3 == 0) % 3; ++k)
         if (any(p.tag % 7 == k) && !all(p.tag % 2 == 0))

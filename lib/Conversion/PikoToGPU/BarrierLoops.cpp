@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // Parallel loops whose iterations are threads of a block:
-//   1. what lies between barriers is done by the threads that have an iteration,
+//   1. what lies between barriers is done by the threads that have an
+//   iteration,
 //      behind a test; what lives across a barrier stays in their registers;
 //   2. a barrier is the block's;
 //   3. control flow around barriers is taken by all threads of the block: what
-//      decides about it is iteration 0's, which others compare theirs with where
-//      it may differ;
+//      decides about it is iteration 0's, which others compare theirs with
+//      where it may differ;
 //   4. reductions, scans and sorts are done by all, in the block's memory.
 
 #include "PikoToGPU.h"
@@ -117,8 +118,8 @@ static Value createNothing(OpBuilder &builder, Location loc, Type type) {
     return NoItemOp::create(builder, loc, type);
   if (!type.isIntOrIndexOrFloat())
     return {};
-  return arith::ConstantOp::create(
-      builder, loc, cast<TypedAttr>(builder.getZeroAttr(type)));
+  return arith::ConstantOp::create(builder, loc,
+                                   cast<TypedAttr>(builder.getZeroAttr(type)));
 }
 
 LogicalResult IterationMapper::guard(ArrayRef<Operation *> run) {
@@ -154,7 +155,8 @@ LogicalResult IterationMapper::guard(ArrayRef<Operation *> run) {
   }
   Block *then = ifOp.thenBlock();
   for (Operation *op : guarded)
-    op->moveBefore(then, leaving.empty() ? std::prev(then->end()) : then->end());
+    op->moveBefore(then,
+                   leaving.empty() ? std::prev(then->end()) : then->end());
   builder.setInsertionPointToStart(ifOp.elseBlock());
   SmallVector<Value> nothing;
   for (Value value : leaving) {
@@ -274,11 +276,10 @@ void IterationMapper::compare(Value value, Value first, StringRef barrierName) {
 /// Iterations may count from different numbers, but equally often.
 LogicalResult IterationMapper::mapFor(scf::ForOp op) {
   Value lower = op.getLowerBound(), step = op.getStep();
-  if (llvm::none_of(ValueRange{lower, op.getUpperBound(), step},
-                    [&](Value bound) {
-                      return loop->isAncestor(
-                          bound.getParentBlock()->getParentOp());
-                    }))
+  if (llvm::none_of(
+          ValueRange{lower, op.getUpperBound(), step}, [&](Value bound) {
+            return loop->isAncestor(bound.getParentBlock()->getParentOp());
+          }))
     return success();
   SmallVector<Operation *> counting;
   Operation *before = op->getPrevNode();
@@ -304,9 +305,10 @@ LogicalResult IterationMapper::mapFor(scf::ForOp op) {
   OpBuilder::InsertionGuard insertion(builder);
   builder.setInsertionPointToStart(op.getBody());
   trip.setType(builder.getIndexType());
-  Value number = type.isIndex() ? trip
-                                : Value(arith::IndexCastOp::create(
-                                      builder, loc, type, trip));
+  Value number =
+      type.isIndex()
+          ? trip
+          : Value(arith::IndexCastOp::create(builder, loc, type, trip));
   auto distance = arith::MulIOp::create(builder, loc, number, step);
   Value at = add(lower, distance);
   uniformity.replace(loop.getIteration(), at);
@@ -350,8 +352,8 @@ void IterationMapper::forEachDistance(bool falls,
                                       llvm::function_ref<void(Value)> body) {
   int64_t threads = *getConstantIntValue(launch.getBlockSizeX());
   int64_t levels = llvm::Log2_64(threads);
-  auto counted = scf::ForOp::create(builder, loc, constant(0),
-                                    constant(levels), constant(1));
+  auto counted = scf::ForOp::create(builder, loc, constant(0), constant(levels),
+                                    constant(1));
   OpBuilder::InsertionGuard insertion(builder);
   builder.setInsertionPointToStart(counted.getBody());
   Value level = counted.getInductionVar();
@@ -380,9 +382,10 @@ void IterationMapper::reduce(ReduceOp op) {
   SmallVector<Value> arrays = shareValues(op.getValues());
   Block &body = op.getBody().front();
   forEachDistance(/*falls=*/false, [&](Value s) {
-    Value rest = both(thread, sub(add(s, s), constant(1))), with = add(thread, s);
-    Value combines = both(compare(P::eq, rest, constant(0)),
-                          compare(P::slt, with, count));
+    Value rest = both(thread, sub(add(s, s), constant(1))),
+          with = add(thread, s);
+    Value combines =
+        both(compare(P::eq, rest, constant(0)), compare(P::slt, with, count));
     when(combines, [&] {
       storeAll(builder, loc,
                createCombination(builder, loc, body,
@@ -404,9 +407,10 @@ void IterationMapper::scan(ScanOp op) {
   Block &body = op.getBody().front();
   Value runs = compare(P::slt, thread, count);
   forEachDistance(/*falls=*/false, [&](Value s) {
-    Value rest = both(thread, sub(add(s, s), constant(1))), with = add(thread, s);
-    Value combines = both(compare(P::eq, rest, constant(0)),
-                          compare(P::slt, with, count));
+    Value rest = both(thread, sub(add(s, s), constant(1))),
+          with = add(thread, s);
+    Value combines =
+        both(compare(P::eq, rest, constant(0)), compare(P::slt, with, count));
     when(combines, [&] {
       SmallVector<Value> left = loadAll(builder, loc, arrays, thread),
                          right = loadAll(builder, loc, arrays, with);
@@ -431,8 +435,7 @@ void IterationMapper::scan(ScanOp op) {
   Value isFirst = compare(P::eq, thread, constant(0));
   for (auto [result, empty, value] :
        llvm::zip(op.getResults(), op.getEmpty(), before)) {
-    Value chosen =
-        arith::SelectOp::create(builder, loc, isFirst, empty, value);
+    Value chosen = arith::SelectOp::create(builder, loc, isFirst, empty, value);
     uniformity.replace(result, chosen);
     result.replaceAllUsesWith(chosen);
   }

@@ -30,7 +30,8 @@ class BlockMapper {
 public:
   BlockMapper(gpu::LaunchOp launch, Value log, Value order,
               MappingCounts &counts)
-      : launch(launch), log(log), order(order), loc(launch.getLoc()), counts(counts) {}
+      : launch(launch), log(log), order(order), loc(launch.getLoc()),
+        counts(counts) {}
   LogicalResult run();
 
 private:

@@ -125,9 +125,9 @@ LogicalResult GridBuilder::findItems() {
 
 void GridFormer::createUnits(StageOp stage, IntegerAttr source) {
   auto type = BinsType::get(rewriter.getContext(), stage.getInputAttr());
-  bins = OpenBinsOp::create(
-      rewriter, loc, type, FlatSymbolRefAttr::get(stage.getSymNameAttr()),
-      source);
+  bins = OpenBinsOp::create(rewriter, loc, type,
+                            FlatSymbolRefAttr::get(stage.getSymNameAttr()),
+                            source);
   Value zero = constant(0), one = constant(1), size = constant(threads);
   Value count = UnitCountOp::create(rewriter, loc, bins);
   Value any = arith::CmpIOp::create(rewriter, loc, arith::CmpIPredicate::ugt,
@@ -176,8 +176,8 @@ void GridBuilder::formGrid() {
   log = former.log;
   dropEnds();
   OpBuilder builder = OpBuilder::atBlockBegin(&launch.getBody().front());
-  order = memref::AllocaOp::create(
-      builder, loc, MemRefType::get({4}, builder.getI64Type()));
+  order = memref::AllocaOp::create(builder, loc,
+                                   MemRefType::get({4}, builder.getI64Type()));
   LogOrderOp::create(builder, loc, log, order);
 }
 
@@ -330,8 +330,8 @@ LogicalResult GridBuilder::mapPieces(ParallelForOp loop) {
 LogicalResult GridBuilder::mapLoop(ParallelLoopOpInterface loop,
                                    MappingCounts &counts) {
   ThreadMapping mapping = chooseMapping(loop, threads);
-  bool isNested = loop->getParentOfType<ParallelLoopOpInterface>() ||
-                  hasSharedParent(loop);
+  bool isNested =
+      loop->getParentOfType<ParallelLoopOpInterface>() || hasSharedParent(loop);
   if (isNested || mapping == ThreadMapping::One) {
     convertLoop(loop);
     launch.walk([](scf::ForOp made) { made->removeAttr("piko.lanes"); });

@@ -80,7 +80,8 @@ mlir::Value addBlockMemory(mlir::gpu::LaunchOp launch,
 struct ThreadOperations {
   llvm::DenseSet<mlir::Operation *> ofOne, ownArrays;
 };
-llvm::LogicalResult mapIterations(ParallelForOp loop, mlir::gpu::LaunchOp launch,
+llvm::LogicalResult mapIterations(ParallelForOp loop,
+                                  mlir::gpu::LaunchOp launch,
                                   ThreadOperations &made);
 
 /// What every GPU's blocks have.

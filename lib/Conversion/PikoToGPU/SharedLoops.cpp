@@ -95,8 +95,8 @@ static bool determine(ArrayRef<Value> roots, Value value, int depth = 0) {
   return false;
 }
 
-/// Whether no two iterations, or primitives, update a pixel: its coordinates say
-/// which iteration it is.
+/// Whether no two iterations, or primitives, update a pixel: its coordinates
+/// say which iteration it is.
 static bool updatesOwnPixels(Operation *loop) {
   llvm::StringMap<UpdateOp> known; // by image
   WalkResult result = loop->walk([&](UpdateOp update) -> WalkResult {

@@ -186,7 +186,8 @@ Value piko::findBin(OpBuilder &builder, Operation *op) {
       continue;
     auto bins = cells.getBins().getDefiningOp<OpenBinsOp>();
     if (!bins)
-      continue; // over the calls of a piko.storage.local_bin, which is of one bin
+      continue; // over the calls of a piko.storage.local_bin, which is of one
+                // bin
     if (bins.getSource())
       return {};
     auto stage = lookupInPipeline<StageOp>(op, bins.getStageAttr());
