@@ -139,6 +139,14 @@ class Fuzzer:
                  if "Assertion" in line or "LLVM ERROR" in line or "UNREACHABLE" in line]
         return f"ends with {done.returncode} {lines[:1]}"
 
+    def keep(self, seeds, passes, modules):
+        """Writes what failed to a file that piko-opt can read."""
+        if self.args.keep:
+            self.args.keep.mkdir(parents=True, exist_ok=True)
+            command = "// piko-opt --split-input-file " + " ".join("--" + p for p in passes)
+            (self.args.keep / f"{seeds[0]}.mlir").write_text(
+                command + "\n" + "\n// -----\n".join(modules))
+
     def batch(self, number):
         """The runs of a batch that fail, and how."""
         size = self.args.batch
@@ -146,13 +154,18 @@ class Fuzzer:
         seeds = [seed for seed in seeds if seed >= self.args.seed]
         passes = self.sequence(number)
         modules = [self.module(seed) for seed in seeds]
-        if not self.run(passes, modules, self.args.timeout * len(modules)):
+        together = self.run(passes, modules, self.args.timeout * len(modules))
+        if not together:
             return []
         failures = []
         for seed, module in zip(seeds, modules):
             if how := self.run(passes, [module], self.args.timeout):
                 failures.append((seed, passes, how))
-        return failures or [(seeds[0], passes, f"only in one process with {len(seeds)}")]
+                self.keep([seed], passes, [module])
+        if not failures:
+            failures = [(seeds[0], passes, f"{together}, one process with {len(seeds)} runs")]
+            self.keep(seeds, passes, modules)
+        return failures
 
 
 def main():
@@ -164,6 +177,7 @@ def main():
     parser.add_argument("--batch", type=int, default=40, help="runs in a process")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--timeout", type=float, default=20, help="seconds a run")
+    parser.add_argument("--keep", type=pathlib.Path, help="a folder for what failed")
     parser.add_argument("--show", action="store_true", help="print runs, do not run them")
     args = parser.parse_args()
     args.end = args.seed + args.count

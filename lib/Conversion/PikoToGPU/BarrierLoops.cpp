@@ -14,7 +14,7 @@
 
 #include "../../Transforms/Collectives.h"
 #include "../../Transforms/ParallelLoops.h"
-#include "../../Transforms/Uniformity.h"
+#include "Piko/Analysis/Uniformity.h"
 
 #include "Piko/Dialect/Piko/IR/BinArithmetic.h"
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
