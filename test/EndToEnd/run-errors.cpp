@@ -6,6 +6,7 @@
 // RUN: not piko-compare %s --pipe Write --runs 1 --threads 1 2 | FileCheck %s --check-prefix=WRITE
 // RUN: not piko-compare %s --pipe Bin --runs 1 --threads 1 2 | FileCheck %s --check-prefix=BIN
 // RUN: not piko-compare %s --pipe Box --runs 1 --threads 1 2 | FileCheck %s --check-prefix=BOX
+// RUN: not piko-compare %s --pipe Line --runs 1 --threads 1 2 | FileCheck %s --check-prefix=LINE
 #include "Inputs/ports.h"
 
 struct State {
@@ -58,4 +59,18 @@ struct BoxNaN : piko::Stage<8, 8, 64, Point> {
 struct Box : piko::Pipe<State> {
   BoxNaN stage;
   Box() { source(stage); }
+};
+
+// LINE: expected: {{.*}}stage 'LineNaN': expected positions of numbers, but got NaN
+// LINE: got: stage 'stage': expected positions of numbers, but got NaN
+struct LineNaN : piko::Stage<8, 8, 64, Point> {
+  void assignBin(const Point &p) {
+    float zero = p.value - p.value;
+    assignToLine(p, glm::vec2(3, 3), glm::vec2(1, zero / zero));
+  }
+  void process(const Point &) {}
+};
+struct Line : piko::Pipe<State> {
+  LineNaN stage;
+  Line() { source(stage); }
 };

@@ -8,6 +8,7 @@
 // RUN: not piko-translate --cpp-to-piko -DCASE=4 %s 2>&1 | FileCheck %s --check-prefix=POSITION --implicit-check-not=note
 // RUN: not piko-translate --cpp-to-piko -DCASE=5 %s 2>&1 | FileCheck %s --check-prefix=CELLS
 // RUN: not piko-translate --cpp-to-piko -DCASE=6 %s 2>&1 | FileCheck %s --check-prefix=BOX
+// RUN: not piko-translate --cpp-to-piko -DCASE=7 %s 2>&1 | FileCheck %s --check-prefix=LINE
 // RUN: piko-translate --cpp-to-piko -DCASE=0 %s | FileCheck %s --check-prefix=WELL
 #include <piko.h>
 
@@ -34,6 +35,9 @@ struct Stage : piko::BasicStage<piko::Bins<8, 8, 8>, 64, scene::Particle,
 #elif CASE == 6
     // BOX: errors-types.cpp:[[#@LINE + 1]]:5: error: expected 3 dimensions, as the bins of the stage have, but got 4
     assignToBoundingBox(p, glm::ivec4(p.at), glm::ivec4(p.at) + 1);
+#elif CASE == 7
+    // LINE: errors-types.cpp:[[#@LINE + 1]]:5: error: expected 3 dimensions, as the bins of the stage have, but got 2
+    assignToLine(p, glm::vec2(p.at), glm::vec2(p.at) + 1.0f);
 #else
     assignToBin(p, binFromPosition(glm::vec3(p.at)));
 #endif

@@ -55,15 +55,30 @@ struct Boxes : piko::Stage<8, 8, 64, Item> {
   }
   void process(const Item &) {}
 };
+// CHECK-LABEL: piko.stage @lines
+// CHECK: math.floor
+// CHECK: piko.assign_line
+// CHECK: piko.assign_line
+// CHECK: piko.assign_line
+struct Lines : piko::Stage<8, 8, 64, Item> {
+  void assignBin(const Item &i) {
+    assignToLine(i, {i.x, i.y}, {i.x + 1, i.y + 1});
+    assignToLine(i, {i.i, 0}, {i.i, 7});
+    assignToLine(i, {0, 0}, glm::vec2(i.x, i.y));
+  }
+  void process(const Item &) {}
+};
 struct Pipeline : piko::Pipe<> {
   Floats floats;
   Integers integers;
   Mixed mixed;
   Boxes boxes;
+  Lines lines;
   Pipeline() {
     source(floats);
     source(integers);
     source(mixed);
     source(boxes);
+    source(lines);
   }
 };

@@ -347,9 +347,10 @@ class CppPrinter:
         elif s.kind == "at":
             self.line(f"assignToBin(p, binFromPosition({self.cell(s.lo, True)}));")
         else:
-            vec = "ivec" if s.kind == "box" else "vec"
+            vec = "vec" if s.kind == "floatbox" else "ivec"
+            to = "Line" if s.kind == "line" else "BoundingBox"
             lo, hi = (", ".join(self.e(c) for c in corner) for corner in (s.lo, s.hi))
-            self.line(f"assignToBoundingBox(p, glm::{vec}{rank}({lo}), "
+            self.line(f"assignTo{to}(p, glm::{vec}{rank}({lo}), "
                       f"glm::{vec}{rank}({hi}));")
 
     def s_Directive(self, s):

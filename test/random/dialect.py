@@ -414,7 +414,8 @@ class DialectPrinter:
             corners.append(", ".join(cells))
         types = ", ".join(["i32"] * len(s.lo))
         if s.kind != "to":
-            return self.line(f"piko.assign_box [{corners[0]} : {types}] to "
+            to = "line" if s.kind == "line" else "box"
+            return self.line(f"piko.assign_{to} [{corners[0]} : {types}] to "
                              f"[{corners[1]} : {types}]")
         bin = self.value(f"piko.bin_at {corners[0]} : {types}")
         zero = self.value("arith.constant 0 : index")

@@ -347,8 +347,8 @@ class Lambda(Stmt):
 
 @dataclass(eq=False)
 class Bins(Stmt):
-    """An assign directive: to, at (known to be in the domain), box, floatbox, all,
-    previous."""
+    """An assign directive: to, at (known to be in the domain), box, floatbox, line,
+    all, previous."""
 
     kind: str
     lo: list = field(default_factory=list)

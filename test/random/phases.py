@@ -128,7 +128,11 @@ class Phases(Graphs):
             return [Bins("to", cells)]
         if kind == "box":
             near = [op("-", c, lit(r.choice([0, 0, 1, 2]))) for c in cells]
-            far = [op("+", c, lit(r.choice([-1, 0, 0, 1, 2]))) for c in cells]
+            steps = [r.choice([-1, 0, 0, 1, 2]) for _ in cells]
+            far = [op("+", c, lit(step)) for c, step in zip(cells, steps)]
+            if steps[0] == -1:  # as a box, mostly empty
+                self.use("assign-line")
+                return [Bins("line", near, far)]
             return [Bins("box", near, far)]
         real = [Op("f32", "cast", [c], solid=True) for c in cells]
         span = Op("f32", "finite", [self.expr("f32", scope, 2)], solid=True)

@@ -243,3 +243,161 @@ TEST(Assign, PartialEdgeBins) {
 }
 
 } // namespace
+
+// Lines, each with its number.
+template <int Rank> struct Line {
+  piko::Cells<Rank> a, b;
+  int number = 0;
+};
+template <class B> struct ByLine : piko::BasicStage<B, 64, Line<B::rank>> {
+  void assignBin(const Line<B::rank> &l) { this->assignToLine(l, l.a, l.b); }
+  void process(const Line<B::rank> &l) {
+    trace.push_back(l.number);
+    trace.push_back(int(this->bin().index));
+  }
+};
+template <class B> struct LinePipe : piko::Pipe<> {
+  ByLine<B> byLine;
+  explicit LinePipe(const piko::Cells<B::rank> &domain) {
+    source(byLine);
+    setDomain(domain);
+  }
+};
+
+/// Whether the segment between the middles of two cells has a point of the
+/// closed box: the places on it, as fractions, at which it is in each of the
+/// box's slabs.
+template <int Rank>
+bool touches(const Line<Rank> &line, const piko::Cells<Rank> &lo,
+             const piko::Cells<Rank> &hi) {
+  struct Fraction {
+    int64_t over, under; // under > 0
+    bool operator<(const Fraction &other) const {
+      return over * other.under < other.over * under;
+    }
+  };
+  Fraction begin{0, 1}, end{1, 1};
+  for (int d = 0; d < Rank; ++d) {
+    int64_t from = 2 * line.a[d] + 1, to = 2 * line.b[d] + 1;
+    int64_t first = 2 * lo[d] - from, last = 2 * hi[d] - from;
+    if (from == to) {
+      if (first > 0 || last < 0)
+        return false;
+      continue;
+    }
+    if (to < from)
+      std::tie(first, last) = std::pair(-last, -first);
+    int64_t length = std::abs(to - from);
+    begin = std::max(begin, Fraction{first, length});
+    end = std::min(end, Fraction{last, length});
+  }
+  return !(end < begin);
+}
+
+/// Calls f with each cell from lo to hi.
+template <int Rank, class F>
+void forEachCell(const piko::Cells<Rank> &lo, const piko::Cells<Rank> &hi,
+                 F f) {
+  piko::Cells<Rank> at = lo;
+  while (true) {
+    f(at);
+    int d = 0;
+    while (d < Rank && ++at[d] > hi[d]) {
+      at[d] = lo[d];
+      ++d;
+    }
+    if (d == Rank)
+      return;
+  }
+}
+
+/// Compares all lines whose cells are at most `around` outside of the domain
+/// with what `touches` says of all bins.
+template <class B>
+void compareAllLines(const piko::Cells<B::rank> &domain, int around) {
+  constexpr int rank = B::rank;
+  using Cell = piko::Cells<rank>;
+  LinePipe<B> pipe(domain);
+  std::vector<Line<rank>> lines;
+  Cell begin(-around), end = domain - 1 + around;
+  forEachCell<rank>(begin, end, [&](const Cell &a) {
+    forEachCell<rank>(begin, end, [&](const Cell &b) {
+      lines.push_back({a, b, int(lines.size())});
+    });
+  });
+  Cell size, count;
+  for (int d = 0; d < rank; ++d) {
+    size[d] = B::size[d] ? int(B::size[d]) : domain[d];
+    count[d] = (domain[d] + size[d] - 1) / size[d];
+  }
+  std::vector<int> expected;
+  for (const Line<rank> &line : lines) {
+    int bin = 0;
+    forEachCell<rank>(Cell(0), count - 1, [&](const Cell &place) {
+      Cell lo = place * size;
+      if (touches(line, lo, glm::min(lo + size, domain))) {
+        expected.push_back(line.number);
+        expected.push_back(bin);
+      }
+      ++bin;
+    });
+  }
+  EXPECT_EQ(run(pipe, lines), expected);
+}
+
+TEST(Assign, LinesOfOneDimension) {
+  compareAllLines<piko::Bins<3>>(glm::ivec1(10), 3);
+}
+TEST(Assign, LinesOfTwoDimensions) {
+  compareAllLines<piko::Bins<2, 3>>({5, 4}, 2);
+  compareAllLines<piko::Bins<0, 1>>({4, 4}, 1);
+  compareAllLines<piko::Bins<0, 0>>({3, 2}, 1);
+}
+TEST(Assign, LinesOfThreeDimensions) {
+  compareAllLines<piko::Bins<2, 1, 2>>({3, 3, 3}, 1);
+}
+TEST(Assign, LinesOfFourDimensions) {
+  compareAllLines<piko::Bins<1, 2, 1, 1>>({2, 2, 2, 2}, 1);
+}
+
+TEST(Assign, LongLinesAreExact) {
+  LinePipe<piko::Bins<4, 4>> pipe({8, 16}); // 2 by 4 bins
+  auto bins = [&](glm::ivec2 a, glm::ivec2 b) {
+    return run(pipe, std::vector<Line<2>>{{a, b, 0}});
+  };
+  // Through the corners of bins, and beside them.
+  EXPECT_THAT(bins({INT32_MIN, INT32_MIN}, {INT32_MAX, INT32_MAX}),
+              ElementsAre(0, 0, 0, 1, 0, 2, 0, 3, 0, 5));
+  // At y = 8 for x = 0, and below it by 1 / (2^32 - 1) for each x.
+  EXPECT_THAT(bins({INT32_MIN, 8}, {INT32_MAX, 7}),
+              ElementsAre(0, 2, 0, 3, 0, 4));
+  EXPECT_THAT(bins({INT32_MAX, 8}, {INT32_MIN, 7}),
+              ElementsAre(0, 2, 0, 4, 0, 5));
+}
+
+struct ByPositions : piko::Stage<4, 4, 64, Box> {
+  void assignBin(const Box &b) { assignToLine(b, b.lo, b.hi); }
+  void process(const Box &) { trace.push_back(int(bin().index)); }
+};
+struct PositionsPipe : piko::Pipe<> {
+  ByPositions byPositions;
+  PositionsPipe() {
+    source(byPositions);
+    setDomain({8, 8}); // 2 by 2 bins
+  }
+};
+
+TEST(Assign, LinesOfPositions) {
+  PositionsPipe pipe;
+  auto bins = [&](glm::vec2 a, glm::vec2 b) {
+    return run(pipe, std::vector<Box>{{a, b}});
+  };
+  // From the middle of a position's cell to that of the other.
+  EXPECT_THAT(bins({0.9f, 0.1f}, {7.1f, 0.9f}), ElementsAre(0, 1));
+  EXPECT_THAT(bins({3.9f, 0}, {3.9f, 3}), ElementsAre(0));
+  EXPECT_THAT(bins({0, 7}, {7, 0}), ElementsAre(0, 1, 2, 3));
+  EXPECT_THAT(bins({-9, 2}, {-0.1f, 2}), IsEmpty());
+  EXPECT_THAT(bins({-1e20f, 2}, {1e20f, 2}), ElementsAre(0, 1));
+  EXPECT_THAT(messageOf([&] { bins({0, 0}, {NAN, 1}); }),
+              HasSubstr("expected positions of numbers, but got NaN"));
+}

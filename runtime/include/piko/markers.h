@@ -74,6 +74,8 @@ void assignAll();
 void assignPrevious();
 void assignBox(int64_t x0, int64_t y0, int64_t z0, int64_t w0, int64_t x1,
                int64_t y1, int64_t z1, int64_t w1);
+void assignLine(int64_t x0, int64_t y0, int64_t z0, int64_t w0, int64_t x1,
+                int64_t y1, int64_t z1, int64_t w1);
 /// All of them: the operation that each becomes, and what both take. Of four
 /// coordinates a point has as many as the pipeline has dimensions.
 struct Assignment {
@@ -85,6 +87,7 @@ inline constexpr Assignment assignments[] = {
     {"assignAll", "piko.assign_all", Assignment::Nothing},
     {"assignPrevious", "piko.assign_previous", Assignment::Nothing},
     {"assignBox", "piko.assign_box", Assignment::TwoPoints},
+    {"assignLine", "piko.assign_line", Assignment::TwoPoints},
 };
 
 // Schedule.

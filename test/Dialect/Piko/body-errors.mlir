@@ -190,6 +190,42 @@ piko.pipeline @P rank 2 {
     piko.assign {
     ^bb0(%f: !piko.prim<@F>):
       %x = piko.get %f "x" : !piko.prim<@F> -> i32
+      // expected-error@+1 {{expected 2 coordinates, the rank of the pipeline, but got 3}}
+      piko.assign_line [%x, %x : i32, i32] to [%x, %x, %x : i32, i32, i32]
+      piko.return
+    }
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      piko.return
+    }
+  }
+}
+
+// -----
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+piko.pipeline @P rank 1 {
+  piko.source @a
+  piko.stage @a bins [0] threads 1 : @F -> [] {
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      %x = piko.get %f "x" : !piko.prim<@F> -> i32
+      // expected-error@+1 {{expected to be inside an assign phase}}
+      piko.assign_line [%x : i32] to [%x : i32]
+      piko.return
+    }
+  }
+}
+
+// -----
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+piko.pipeline @P rank 2 {
+  piko.source @a
+  piko.stage @a bins [8, 8] threads 1 : @F -> [] {
+    piko.assign {
+    ^bb0(%f: !piko.prim<@F>):
+      %x = piko.get %f "x" : !piko.prim<@F> -> i32
       // expected-error@+1 {{expected 2 coordinates, the rank of the pipeline, but got 1}}
       piko.owner [%x : i32]
       piko.return

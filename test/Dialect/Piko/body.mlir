@@ -23,6 +23,8 @@ piko.pipeline @Bodies rank 2 {
       piko.assign_to %b
       // CHECK: piko.assign_box[%[[X]], %[[Y]] : i32, i32] to[%[[X]], %[[Y]] : i32, i32]
       piko.assign_box [%x, %y : i32, i32] to [%x, %y : i32, i32]
+      // CHECK: piko.assign_line[%[[X]], %[[Y]] : i32, i32] to[%[[Y]], %[[X]] : i32, i32]
+      piko.assign_line [%x, %y : i32, i32] to [%y, %x : i32, i32]
       // CHECK: piko.owner[%[[X]], %[[Y]] : i32, i32]
       piko.owner [%x, %y : i32, i32]
       piko.return

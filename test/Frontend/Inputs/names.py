@@ -14,7 +14,8 @@ import re
 import sys
 
 STAGE = """
-    assignBin assignToAll assignToBin assignToBoundingBox assignToPreviousBins
+    assignBin assignToAll assignToBin assignToBoundingBox assignToLine
+    assignToPreviousBins
     schedule specifySchedule endStage endBin batch everyBin specifyOrder
     specifyLanes process emit update parallelFor parallelForPixels sync any all count reduce
     scan sort bin binLo binHi binFromPosition domain state BasicStage Stage

@@ -125,6 +125,11 @@ protected:
                            const T (&hi)[B::rank]) {
     assignToBoundingBox(in, detail::pointOf(lo), detail::pointOf(hi));
   }
+  template <class T>
+  void assignToLine(const In &in, const T (&a)[B::rank],
+                    const T (&b)[B::rank]) {
+    assignToLine(in, detail::pointOf(a), detail::pointOf(b));
+  }
   // If they are of several types: floats.
   BinId binFromPosition(const float (&at)[B::rank]) const {
     return binFromPosition(detail::pointOf(at));
@@ -132,6 +137,10 @@ protected:
   void assignToBoundingBox(const In &in, const float (&lo)[B::rank],
                            const float (&hi)[B::rank]) {
     assignToBoundingBox(in, detail::pointOf(lo), detail::pointOf(hi));
+  }
+  void assignToLine(const In &in, const float (&a)[B::rank],
+                    const float (&b)[B::rank]) {
+    assignToLine(in, detail::pointOf(a), detail::pointOf(b));
   }
   // Those of another number of dimensions are no positions.
   template <int Rank, class T>
@@ -144,6 +153,13 @@ protected:
     requires(Rank != B::rank)
   void assignToBoundingBox(const In &, const glm::vec<Rank, T> &,
                            const glm::vec<Rank, T> &) {
+    static_assert(Rank == B::rank, detail::dimensions<B::rank, Rank>());
+  }
+
+  template <int Rank, class T>
+    requires(Rank != B::rank)
+  void assignToLine(const In &, const glm::vec<Rank, T> &,
+                    const glm::vec<Rank, T> &) {
     static_assert(Rank == B::rank, detail::dimensions<B::rank, Rank>());
   }
 
@@ -167,6 +183,26 @@ protected:
     if (isNumber)
       assignToBoundingBox(in, detail::cellsOf<B::rank>(lo),
                           detail::cellsOf<B::rank>(hi));
+    else
+      marker::assignBin(marker::nanPosition);
+  }
+
+  void assignToLine(const In &, const Cells<B::rank> &a,
+                    const Cells<B::rank> &b) {
+    using namespace detail;
+    marker::assignLine(coordinate<0, B::rank>(a), coordinate<1, B::rank>(a),
+                       coordinate<2, B::rank>(a), coordinate<3, B::rank>(a),
+                       coordinate<0, B::rank>(b), coordinate<1, B::rank>(b),
+                       coordinate<2, B::rank>(b), coordinate<3, B::rank>(b));
+  }
+  void assignToLine(const In &in, const Position<B::rank> &a,
+                    const Position<B::rank> &b) {
+    bool isNumber = true;
+    for (int dim = 0; dim < B::rank; ++dim)
+      isNumber = isNumber && a[dim] == a[dim] && b[dim] == b[dim];
+    if (isNumber)
+      assignToLine(in, detail::cellsOf<B::rank>(a),
+                   detail::cellsOf<B::rank>(b));
     else
       marker::assignBin(marker::nanPosition);
   }

@@ -107,6 +107,44 @@ inline void assignBox(const Cell &lo, const Cell &hi, int rank,
               [](const Grid &, const Cell &) { return true; });
 }
 
+/// Whether the segment between the middles of two cells has a point of the bin
+/// at a place in the grid, which is one of the box around both cells. Seen
+/// along all other dimensions, the corners of the bin may not all be on one
+/// side of the line, in any two. Lengths are doubled, so that middles are
+/// integers.
+inline bool touchesLine(const Grid &grid, const Cell &place, const Cell &a,
+                        const Cell &b, int rank) {
+  __extension__ typedef __int128 Wide;
+  Wide along[4], offset[4], extent[4];
+  for (int d = 0; d < rank; ++d) {
+    int64_t lo = place[d] * grid.size[d];
+    int64_t hi = std::min(lo + grid.size[d], grid.domain[d]);
+    along[d] = b[d] - a[d];
+    offset[d] = lo + hi - (2 * a[d] + 1);
+    extent[d] = hi - lo;
+  }
+  auto magnitude = [](Wide n) { return n < 0 ? -n : n; };
+  for (int d = 0; d < rank; ++d)
+    for (int e = 0; e < d; ++e)
+      if (magnitude(along[e] * offset[d] - along[d] * offset[e]) >
+          magnitude(along[e]) * extent[d] + magnitude(along[d]) * extent[e])
+        return false;
+  return true;
+}
+
+inline void assignLine(const Cell &a, const Cell &b, int rank,
+                       const Place &at) {
+  Cell lo, hi;
+  for (int d = 0; d < 4; ++d) {
+    lo[d] = std::min(a[d], b[d]);
+    hi[d] = std::max(a[d], b[d]);
+  }
+  assignBoxIf("assignToLine", lo, hi, rank, at,
+              [&](const Grid &grid, const Cell &place) {
+                return touchesLine(grid, place, a, b, rank);
+              });
+}
+
 /// Fails if one of the positions of an assignment is NaN.
 template <class V>
 void expectNumbers(const char *what, const V &a, const V &b, const Place &at) {
@@ -286,6 +324,11 @@ public:
                            reference::Place at = reference::Place::current()) {
     assignToBoundingBox(in, detail::pointOf(lo), detail::pointOf(hi), at);
   }
+  template <class T>
+  void assignToLine(const In &in, const T (&a)[B::rank], const T (&b)[B::rank],
+                    reference::Place at = reference::Place::current()) {
+    assignToLine(in, detail::pointOf(a), detail::pointOf(b), at);
+  }
 
   // If they are of several types: floats.
   BinId
@@ -297,6 +340,11 @@ public:
                            const float (&hi)[B::rank],
                            reference::Place at = reference::Place::current()) {
     assignToBoundingBox(in, detail::pointOf(lo), detail::pointOf(hi), at);
+  }
+  void assignToLine(const In &in, const float (&a)[B::rank],
+                    const float (&b)[B::rank],
+                    reference::Place at = reference::Place::current()) {
+    assignToLine(in, detail::pointOf(a), detail::pointOf(b), at);
   }
 
   // Those of another number of dimensions are no positions.
@@ -312,6 +360,13 @@ public:
     requires(Rank != B::rank)
   void assignToBoundingBox(const In &, const glm::vec<Rank, T> &,
                            const glm::vec<Rank, T> &) {
+    static_assert(Rank == B::rank,
+                  "expected as many dimensions as the bins of the stage have");
+  }
+  template <int Rank, class T>
+    requires(Rank != B::rank)
+  void assignToLine(const In &, const glm::vec<Rank, T> &,
+                    const glm::vec<Rank, T> &) {
     static_assert(Rank == B::rank,
                   "expected as many dimensions as the bins of the stage have");
   }
@@ -356,6 +411,21 @@ public:
     reference::expectNumbers("assignToBoundingBox", lo, hi, at);
     reference::assignBox(reference::toCell(lo), reference::toCell(hi), B::rank,
                          at);
+  }
+  /// To all bins that have a point of the segment from the middle of cell a to
+  /// that of cell b.
+  void assignToLine(const In &, const Cells<B::rank> &a,
+                    const Cells<B::rank> &b,
+                    reference::Place at = reference::Place::current()) {
+    reference::assignLine(reference::toCell(a), reference::toCell(b), B::rank,
+                          at);
+  }
+  void assignToLine(const In &, const Position<B::rank> &a,
+                    const Position<B::rank> &b,
+                    reference::Place at = reference::Place::current()) {
+    reference::expectNumbers("assignToLine", a, b, at);
+    reference::assignLine(reference::toCell(a), reference::toCell(b), B::rank,
+                          at);
   }
 
   // Schedule.

@@ -70,6 +70,26 @@ def Piko_AssignBoxOp : Piko_AssignmentOp<"assign_box", ["canFail"], [
   }];
 }
 
+def Piko_AssignLineOp : Piko_AssignmentOp<"assign_line", ["canFail"], [
+    AttrSizedOperandSegments]> {
+  let summary = "puts the primitive into the bins that a line touches";
+  let description = [{
+    Takes the segment from the middle of one cell to that of another, and the bins
+    that have a point of it, those at whose edge or corner it only passes as well.
+    Cells outside of the domain are in no bin. It is exact; coordinates of more
+    than 32 bits are saturated first, as cells of positions are.
+
+    ```mlir
+    piko.assign_line [%x0, %y0 : i32, i32] to [%x1, %y1 : i32, i32]
+    ```
+  }];
+  let arguments = (ins Variadic<Piko_Coordinate>:$from,
+                       Variadic<Piko_Coordinate>:$to);
+  let assemblyFormat = [{
+    `[` $from `:` type($from) `]` `to` `[` $to `:` type($to) `]` attr-dict
+  }];
+}
+
 def Piko_OwnerOp : Piko_Op<"owner"> {
   let summary = "the pixel whose owner processes the primitive";
   let description = [{
