@@ -13,8 +13,8 @@
 #include "PikoToGPU.h"
 
 #include "../../Transforms/Collectives.h"
+#include "../../Transforms/LoopSplitter.h"
 #include "../../Transforms/ParallelLoops.h"
-#include "Piko/Analysis/Uniformity.h"
 
 #include "Piko/Dialect/Piko/IR/BinArithmetic.h"
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
