@@ -363,6 +363,8 @@ class CppPrinter:
             self.line(f"batch({self.e(s.value)});")
         elif s.kind == "unordered":
             self.line("specifyOrder(piko::Unordered);")
+        elif s.kind == "specifyLanes":
+            self.line("specifyLanes(piko::Lanes::One);")
         else:
             self.line(f"{s.kind}();")
 

@@ -472,6 +472,8 @@ class DialectPrinter:
             text += f" end_stage [{', '.join(waits)}]"
         if "endBin" in directives:
             text += " end_bin"
+        if "specifyLanes" in directives:
+            text += " lanes one"
         return text
 
     def phase(self, name, body):

@@ -359,7 +359,8 @@ class Bins(Stmt):
 class Directive(Stmt):
     """A schedule directive, as C++ writes it but for its operands."""
 
-    kind: str  # specifySchedule, endStage, endBin, batch, everyBin, unordered
+    kind: str  # specifySchedule, endStage, endBin, batch, everyBin, unordered,
+    # specifyLanes (of one)
     policy: str = "LoadBalance"
     value: Expr = None
     stage: int = 0

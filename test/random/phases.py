@@ -68,6 +68,9 @@ class Phases(Graphs):
                 self.use("dynamic-everyBin")
                 directive = If(self.expr("b1", scope, 2), [directive])
             out.append(directive)
+        if not out and not link and stage.threads == 8:
+            self.use("one-lane")
+            out.append(Directive("specifyLanes"))
         stage.schedule += out
 
     def make_assign_phase(self, pipe, index):
