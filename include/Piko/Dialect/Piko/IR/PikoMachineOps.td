@@ -93,14 +93,8 @@ def Piko_ItemsOp : Piko_WorkOp<"items"> {
     set by `piko-map-lanes`: `items`, a primitive each; `iterations`, those of the
     parallel loops in the body, which all lanes share for one primitive after the
     other; `collapsed`, pairs of a primitive and an iteration; or `one` lane does
-    everything. What lanes do at the same time is seen in order of lineage.
-
-    ```mlir
-    piko.items of @split lanes items {
-    ^bb0(%f: !piko.prim<@F>):
-      ...
-    }
-    ```
+    everything. What lanes do at the same time is seen in order of lineage. It stands
+    behind what the work takes: `piko.items of @split lanes items`.
 
     See `piko.bins`.
   }];
