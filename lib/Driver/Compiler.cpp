@@ -187,9 +187,6 @@ void piko::addPasses(OpPassManager &passes, Level from, Level to,
   // Findings are about the stages as they are written.
   SynthesisOptions chosen =
       check.enabled ? SynthesisOptions::none() : synthesis;
-  // A block's threads do not wait for what they have emitted.
-  if (gpu.emulate)
-    chosen.without.push_back("fuse-kernels");
   auto goes = [&](Level level) { return from < level && level <= to; };
   if (check.enabled && from == Level::Authored)
     addCheckSequence(passes, check);

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //===- Log.cpp - What a grid has emitted ----------------------------------===//
 //
-// Threads add entries in any order; what is in their headers orders them. At
-// the end each unit is opened, told its entries one after the other, and
-// closed, as the CPU's kernel would do it.
+// The directories of a unit are in the order of its work. At the end each unit
+// is opened, told its entries one after the other, and closed, as the CPU's
+// kernel would do it.
 //
 // Room is address space: the system gives pages where they are written.
 //
@@ -21,7 +21,8 @@ using namespace piko::rt;
 static constexpr size_t mostRoom = size_t(1) << 36, leastRoom = size_t(1) << 28;
 /// For what has no room: more than any entry takes.
 static constexpr int64_t spareRoom = int64_t(1) << 26;
-static_assert(sizeof(pikoir_entry) == 64, "as generated code has it");
+static_assert(sizeof(pikoir_entry) == 16 && sizeof(pikoir_piece) == 64,
+              "as generated code has it");
 
 namespace {
 
@@ -51,14 +52,16 @@ struct GridLog : pikoir_log {
   std::vector<Place> places;
 
 private:
-  std::vector<const pikoir_entry *> sortEntries() const;
+  using Spans = std::vector<pikoir_span>;
+
+  /// What each unit has.
+  std::vector<Spans> collect() const;
+  void replayUnit(int64_t unit, const Spans &spans);
   void replay(pikoir_writer *writer, const pikoir_entry &entry);
   void fail(const pikoir_entry &entry);
 };
 
 } // namespace
-
-static int64_t numberOf(const pikoir_entry &entry) { return entry.kind >> 32; }
 
 GridLog::GridLog(pikort_pipeline &p, int32_t number, bool isSource,
                  int64_t units)
@@ -79,29 +82,25 @@ GridLog::GridLog(pikort_pipeline &p, int32_t number, bool isSource,
   limit = spare + static_cast<int64_t>(room);
 }
 
-std::vector<const pikoir_entry *> GridLog::sortEntries() const {
-  std::vector<const pikoir_entry *> entries;
+std::vector<GridLog::Spans> GridLog::collect() const {
+  std::vector<Spans> found(static_cast<size_t>(units));
   int64_t end = std::min(cursor, limit);
   for (int64_t at = spare + spareRoom; at < end;) {
-    const auto *entry = reinterpret_cast<const pikoir_entry *>(at);
-    if (entry->bytes == 0)
+    const auto *piece = reinterpret_cast<const pikoir_piece *>(at);
+    if (piece->bytes == 0)
       break; // this one had no room
-    if ((entry->kind & 0xff) != PIKOIR_ENTRY_MEMORY)
-      entries.push_back(entry);
-    at += entry->bytes;
+    const auto *first = reinterpret_cast<const pikoir_span *>(piece + 1);
+    if (piece->kind == PIKOIR_PIECE_DIRECTORY) {
+      Spans &spans = found[static_cast<size_t>(piece->unit)];
+      spans.insert(spans.end(), first, first + piece->spans);
+    }
+    at += piece->bytes;
   }
-  std::sort(entries.begin(), entries.end(),
-            [](const pikoir_entry *a, const pikoir_entry *b) {
-              if (a->unit != b->unit)
-                return a->unit < b->unit;
-              return std::lexicographical_compare(a->order, a->order + 4,
-                                                  b->order, b->order + 4);
-            });
-  return entries;
+  return found;
 }
 
 void GridLog::fail(const pikoir_entry &entry) {
-  const Place &place = places[static_cast<size_t>(numberOf(entry))];
+  const Place &place = places[static_cast<size_t>(entry.number)];
   int64_t words[3]; // bin, a, b
   std::memcpy(words, &entry + 1, sizeof(words));
   switch (place.function) {
@@ -118,8 +117,8 @@ void GridLog::fail(const pikoir_entry &entry) {
 }
 
 void GridLog::replay(pikoir_writer *writer, const pikoir_entry &entry) {
-  auto port = static_cast<int32_t>(numberOf(entry));
-  switch (entry.kind & 0xff) {
+  int32_t port = entry.number;
+  switch (entry.kind) {
   case PIKOIR_ENTRY_RECORD: {
     uint8_t *room = pikoir_append(writer, port);
     std::memcpy(room, &entry + 1,
@@ -139,17 +138,36 @@ void GridLog::replay(pikoir_writer *writer, const pikoir_entry &entry) {
   }
 }
 
+void GridLog::replayUnit(int64_t unit, const Spans &spans) {
+  std::vector<std::pair<int32_t, pikoir_writer *>> writers;
+  writers.emplace_back(-1, isSource
+                               ? pikoir_open_source(&pipeline, number, unit)
+                               : pikoir_open(&pipeline, number, unit));
+  for (size_t s = 0; s < pipeline.stages.size() && !isSource; ++s)
+    if (pipeline.stages[s].host == number)
+      writers.emplace_back(
+          static_cast<int32_t>(s),
+          pikoir_open(&pipeline, static_cast<int32_t>(s), unit));
+  for (const pikoir_span &span : spans)
+    for (int64_t at = span.begin; at != span.end;) {
+      const auto *entry = reinterpret_cast<const pikoir_entry *>(at);
+      if (entry->kind == PIKOIR_ENTRY_LINK) {
+        std::memcpy(&at, &entry->number, sizeof(at));
+        continue;
+      }
+      for (auto [stage, writer] : writers)
+        if (stage == entry->stage)
+          replay(writer, *entry);
+      at += entry->bytes;
+    }
+  for (auto it = writers.rbegin(); it != writers.rend(); ++it)
+    pikoir_close(it->second);
+}
+
 void GridLog::close() {
-  std::vector<const pikoir_entry *> entries = sortEntries();
-  size_t next = 0;
-  for (int64_t unit = 0; unit < units; ++unit) {
-    pikoir_writer *writer = isSource
-                                ? pikoir_open_source(&pipeline, number, unit)
-                                : pikoir_open(&pipeline, number, unit);
-    for (; next < entries.size() && entries[next]->unit == unit; ++next)
-      replay(writer, *entries[next]);
-    pikoir_close(writer);
-  }
+  std::vector<Spans> found = collect();
+  for (int64_t unit = 0; unit < units; ++unit)
+    replayUnit(unit, found[static_cast<size_t>(unit)]);
   if (cursor > limit)
     pipeline.report({0, PIKORT_OUT_OF_MEMORY,
                      isSource ? pipeline.sources[number].kernel->stage : number,

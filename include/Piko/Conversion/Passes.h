@@ -21,9 +21,6 @@ void populatePikoToSCFPatterns(mlir::RewritePatternSet &patterns);
 /// The `scf.forall` of a kernel, as an OpenMP loop.
 void populatePikoToOpenMPPatterns(mlir::RewritePatternSet &patterns);
 
-/// Says of an `scf.if` that one thread of a block is in it.
-constexpr const char *firstAttrName = "piko.first";
-
 #define GEN_PASS_DECL
 #define GEN_PASS_REGISTRATION
 #include "Piko/Conversion/Passes.h.inc"

@@ -106,9 +106,12 @@ def ConvertPikoToGPU : Pass<"convert-piko-to-gpu", "::piko::PipelineOp"> {
       the first thread, between two barriers; all else by all threads alike.
       Arrays that several threads see are in the block's memory.
 
-    Emissions go to the grid's log (`piko.gpu.open_log`), with numbers that say
-    their order. Updates and other access to state are converted as by
-    `convert-piko-to-scf`; an access outside is an entry of the log.
+    What a thread emits goes to its outbox (`piko.gpu.outboxes`); behind each round of
+    a loop that threads share the block takes it, in their order (`piko.gpu.flush`),
+    so that what a block emits is in lineage order. Of a local edge the block has the
+    records themselves, for the work that stands behind it. Updates and other access
+    to state are converted as by `convert-piko-to-scf`; an access outside is an entry
+    of the outbox.
 
     **Guarantees** that each update, store, atomic and emission happens once, and
     that the result does not depend on `threads` nor on how threads are scheduled.
@@ -126,11 +129,14 @@ def ConvertPikoToGPU : Pass<"convert-piko-to-gpu", "::piko::PipelineOp"> {
     After:
     ```
     gpu.barrier
-    %first = arith.addi %begin, %thread : index
-    scf.for %i = %first to %end step %threads {
-      memref.store %i, %order[%c1] : memref<4xi64>
-      %p = piko.storage.append %log[0] (%x) : i32 -> !piko.prim<@F>
-      piko.storage.next %log
+    scf.for %round = %begin to %end step %threads {
+      %i = arith.addi %round, %thread : index
+      %has = arith.cmpi slt, %i, %end : index
+      scf.if %has {
+        %p = piko.storage.append %log[0] (%x) : i32 -> !piko.prim<@F>
+        piko.storage.next %log
+      }
+      piko.gpu.flush %log using %cells : memref<33xi64, 3>
     }
     gpu.barrier
     ```

@@ -8,9 +8,9 @@
 //   2. a shared loop steps by the number of threads, between two barriers;
 //   3. iterations that meet at barriers are threads (BarrierLoops.cpp);
 //   4. arrays that more than one thread sees are in the block's memory.
-// The order of what is emitted: the step (of what the first thread does, and of
-// each shared loop), the iteration, the piece of a loop that was cut at
-// barriers, and the number of the entry.
+// What threads emit is in their outboxes; the block takes it (a flush) behind
+// each round of a shared loop, so that it is in the order of iterations. What
+// iterations of a cut loop emit is in outboxes of their own until its end.
 
 #include "PikoToGPU.h"
 
@@ -28,22 +28,29 @@ namespace {
 
 class BlockMapper {
 public:
-  BlockMapper(gpu::LaunchOp launch, Value log, Value order,
-              MappingCounts &counts)
-      : launch(launch), log(log), order(order), loc(launch.getLoc()),
-        counts(counts) {}
+  BlockMapper(GridMemory &memory, MappingCounts &counts)
+      : launch(memory.launch), log(memory.log), memory(memory),
+        loc(memory.launch.getLoc()), counts(counts) {
+    threads.ownArrays.insert(memory.outboxes.getDefiningOp());
+  }
   LogicalResult run();
 
 private:
-  enum { step = 0, iteration = 1, piece = 2, ordinal = 3 };
-
   LogicalResult mapBlock(Block &block);
   LogicalResult mapOperation(Operation *op);
   LogicalResult mapRun(ArrayRef<Operation *> run);
   void share(scf::ForOp loop);
   LogicalResult mapIterations(ParallelForOp loop);
-  /// In front of what threads do together and may emit in.
-  void beginOrder(OpBuilder &builder, Operation *loop, bool isDeferred);
+  void shareInRounds(scf::ForOp loop);
+  LogicalResult mapLocalBin(LocalBinOp local);
+  void deferIterations(DeferBeginOp begin);
+  void defer(DeferIterationOp iteration, Value states, Value has);
+  void endDeferral(DeferEndOp end);
+  /// Copies the outboxes of a thread, or of an iteration, whose words begin at
+  /// `at`.
+  void copyOutboxes(OpBuilder &builder, Value from, Value fromAt, Value to,
+                    Value toAt);
+  Value createOwn(MemRefType type);
   void mapScratch(ScratchOp scratch);
   FailureOr<Value> broadcast(Value value, OpBuilder &inside, OpBuilder &behind);
   LogicalResult placeArrays();
@@ -53,44 +60,35 @@ private:
   Value constant(OpBuilder &builder, int64_t value) {
     return arith::ConstantIndexOp::create(builder, loc, value);
   }
-  void setOrder(OpBuilder &builder, int64_t which, Value value) {
-    if (value.getType().isIndex())
-      value =
-          arith::IndexCastOp::create(builder, loc, builder.getI64Type(), value);
-    memref::StoreOp::create(builder, loc, value, order,
-                            constant(builder, which));
-  }
-  void advanceOrder(OpBuilder &builder, int64_t which) {
-    Value at = constant(builder, which);
-    Value now = memref::LoadOp::create(builder, loc, order, at);
-    Value one = arith::ConstantIntOp::create(builder, loc, 1, 64);
-    setOrder(builder, which, arith::AddIOp::create(builder, loc, now, one));
-  }
   scf::IfOp createFirst(OpBuilder &builder) {
     Value isFirst =
         arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::eq,
                               launch.getThreadIds().x, constant(builder, 0));
     auto first = scf::IfOp::create(builder, loc, isFirst);
-    first->setAttr(firstAttrName, builder.getUnitAttr());
     firsts.insert(first);
     return first;
   }
   Value addCell(Type type) { return addBlockMemory(launch, 1, type); }
 
   gpu::LaunchOp launch;
-  Value log, order;
+  Value log;
+  GridMemory &memory;
   Location loc;
   llvm::DenseSet<Operation *> firsts;
   ThreadOperations threads; ///< What threads have of their own.
   MappingCounts &counts;
   int64_t blockBytes = 0;
+  /// Of the loop whose emissions are deferred: outboxes of its iterations, how
+  /// many, whether there is memory for them, and where a thread's own wait.
+  Value states, iterations, hasStates, own;
 };
 
 } // namespace
 
-/// What adds to the log.
+/// What adds to an outbox.
 static bool isEmission(Operation *op) {
-  return isa<AppendOp, AppendBinOp, NextOp>(op);
+  return isa<AppendOp, AppendBinOp, NextOp>(op) ||
+         op->getName().getStringRef().starts_with("piko.fail");
 }
 
 template <typename Predicate>
@@ -105,7 +103,8 @@ static bool contains(Operation *op, Predicate predicate) {
 
 /// What all threads take part in.
 static bool isShared(Operation *op) {
-  return isa<ScratchOp, DeferBeginOp, ParallelForOp>(op) ||
+  return isa<ScratchOp, DeferBeginOp, DeferEndOp, LocalBinOp, ParallelForOp>(
+             op) ||
          op->hasAttr(sharedAttrName);
 }
 
@@ -120,7 +119,10 @@ static bool onlyReads(Operation *op) {
   });
 }
 
-static bool isLocalArray(Operation *op) { return isa<memref::AllocaOp>(op); }
+/// What a thread has of its own.
+static bool isLocalArray(Operation *op) {
+  return isa<memref::AllocaOp, OutboxesOp>(op);
+}
 
 //===----------------------------------------------------------------------===//
 // What the first thread does
@@ -189,9 +191,6 @@ LogicalResult BlockMapper::mapRun(ArrayRef<Operation *> run) {
     if (front->isBeforeInBlock(op) && op->isBeforeInBlock(taken.back()) &&
         !taken.contains(op))
       op->moveBefore(front);
-  if (llvm::any_of(taken,
-                   [](Operation *op) { return contains(op, isEmission); }))
-    advanceOrder(builder, step);
   gpu::BarrierOp::create(builder, loc);
   scf::IfOp first = createFirst(builder);
   for (Operation *op : taken)
@@ -247,11 +246,16 @@ LogicalResult BlockMapper::mapOperation(Operation *op) {
     mapScratch(scratch);
     return success();
   }
-  if (isa<DeferBeginOp>(op)) {
-    advanceOrder(builder, step);
-    op->erase();
+  if (auto begin = dyn_cast<DeferBeginOp>(op)) {
+    deferIterations(begin);
     return success();
   }
+  if (auto end = dyn_cast<DeferEndOp>(op)) {
+    endDeferral(end);
+    return success();
+  }
+  if (auto local = dyn_cast<LocalBinOp>(op))
+    return mapLocalBin(local);
   if (!isa<scf::IfOp, scf::ForOp, scf::WhileOp, scf::IndexSwitchOp>(op))
     return op->emitOpError("expected loops that threads share inside scf.if, "
                            "scf.for, scf.while or scf.index_switch only");
@@ -269,51 +273,179 @@ static Value castTo(OpBuilder &builder, Value value, Type type) {
   return arith::IndexCastOp::create(builder, value.getLoc(), type, value);
 }
 
-void BlockMapper::beginOrder(OpBuilder &builder, Operation *loop,
-                             bool isDeferred) {
-  if (!contains(loop, isEmission))
-    return;
-  if (!isDeferred)
-    advanceOrder(builder, step);
-  advanceOrder(builder, piece);
+/// All threads come to the end of a round, whether they have an iteration or
+/// not.
+void BlockMapper::shareInRounds(scf::ForOp loop) {
+  OpBuilder builder(loop);
+  Value begin = loop.getLowerBound(), end = loop.getUpperBound();
+  Type type = begin.getType();
+  auto rounds = scf::ForOp::create(
+      builder, loc, begin, end, castTo(builder, launch.getBlockSizeX(), type));
+  builder.setInsertionPointToStart(rounds.getBody());
+  Value at =
+      arith::AddIOp::create(builder, loc, rounds.getInductionVar(),
+                            castTo(builder, launch.getThreadIds().x, type));
+  Value has =
+      arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::slt, at, end);
+  auto ifOp = scf::IfOp::create(builder, loc, has);
+  threads.ofOne.insert(ifOp);
+  loop.getInductionVar().replaceAllUsesWith(at);
+  loop.getBody()->getTerminator()->erase();
+  ifOp.thenBlock()->getOperations().splice(
+      ifOp.thenBlock()->getTerminator()->getIterator(),
+      loop.getBody()->getOperations());
+  memory.flush(builder);
+  loop.erase();
 }
 
 void BlockMapper::share(scf::ForOp loop) {
   loop->removeAttr(sharedAttrName);
-  threads.ofOne.insert(loop);
   ++counts.shared;
   OpBuilder builder(loop);
-  auto deferred = llvm::to_vector(loop.getBody()->getOps<DeferIterationOp>());
-  beginOrder(builder, loop, !deferred.empty());
-  if (contains(loop, isEmission)) {
-    OpBuilder inside = OpBuilder::atBlockBegin(loop.getBody());
-    setOrder(inside, iteration,
-             castTo(inside, loop.getInductionVar(), inside.getIndexType()));
-    setOrder(inside, ordinal, constant(inside, 0));
-  }
-  for (DeferIterationOp defer : deferred)
-    defer.erase(); // it is the loop's
   gpu::BarrierOp::create(builder, loc);
+  builder.setInsertionPointAfter(loop);
+  gpu::BarrierOp::create(builder, loc);
+  if (!loop->removeAttr(deferredAttrName) && contains(loop, isEmission))
+    return shareInRounds(loop);
+  threads.ofOne.insert(loop);
+  builder.setInsertionPoint(loop);
   Type type = loop.getInductionVar().getType();
   Value begin =
       arith::AddIOp::create(builder, loc, loop.getLowerBound(),
                             castTo(builder, launch.getThreadIds().x, type));
   loop.setLowerBound(begin);
   loop.setStep(castTo(builder, launch.getBlockSizeX(), type));
-  builder.setInsertionPointAfter(loop);
-  gpu::BarrierOp::create(builder, loc);
 }
 
 LogicalResult BlockMapper::mapIterations(ParallelForOp loop) {
   OpBuilder builder(loop);
-  beginOrder(builder, loop, /*isDeferred=*/false);
-  if (contains(loop, isEmission)) {
-    setOrder(builder, iteration, launch.getThreadIds().x);
-    setOrder(builder, ordinal, constant(builder, 0));
-  }
   gpu::BarrierOp::create(builder, loc);
-  return piko::mapIterations(loop, launch, threads);
+  bool emits = contains(loop, isEmission);
+  Operation *next = loop->getNextNode();
+  if (failed(piko::mapIterations(loop, launch, threads)))
+    return failure();
+  builder.setInsertionPoint(next);
+  if (emits)
+    memory.flush(builder);
+  return success();
 }
+
+/// The block takes what is to be read there, and forgets it at the end.
+LogicalResult BlockMapper::mapLocalBin(LocalBinOp local) {
+  OpBuilder builder(local);
+  memory.flush(builder);
+  if (failed(mapBlock(*local.getBodyBlock())))
+    return failure();
+  builder.setInsertionPointAfter(local);
+  gpu::BarrierOp::create(builder, loc);
+  scf::IfOp first = createFirst(builder);
+  OpBuilder inside = first.getThenBodyBuilder();
+  memory.setLocalCount(inside, local,
+                       arith::ConstantIntOp::create(inside, loc, 0, 64));
+  gpu::BarrierOp::create(builder, loc);
+  return success();
+}
+
+//===----------------------------------------------------------------------===//
+// Iterations whose emissions wait
+//===----------------------------------------------------------------------===//
+
+Value BlockMapper::createOwn(MemRefType type) {
+  OpBuilder builder = OpBuilder::atBlockBegin(&launch.getBody().front());
+  auto array = memref::AllocaOp::create(builder, loc, type);
+  threads.ownArrays.insert(array);
+  return array;
+}
+
+void BlockMapper::copyOutboxes(OpBuilder &builder, Value from, Value fromAt,
+                               Value to, Value toAt) {
+  for (int64_t i = 0, e = memory.getWords(); i < e; ++i) {
+    auto place = [&](Value at) -> Value {
+      Value which = constant(builder, i);
+      return at ? arith::AddIOp::create(builder, loc, at, which).getResult()
+                : which;
+    };
+    Value word = memref::LoadOp::create(builder, loc, from, place(fromAt));
+    memref::StoreOp::create(builder, loc, word, to, place(toAt));
+  }
+}
+
+void BlockMapper::deferIterations(DeferBeginOp begin) {
+  OpBuilder builder(begin);
+  iterations = begin.getIterations();
+  memory.flush(builder);
+  Value bytes = arith::MulIOp::create(builder, loc, iterations,
+                                      constant(builder, 8 * memory.getWords()));
+  Value cell = addCell(builder.getIndexType());
+  scf::IfOp first = createFirst(builder);
+  OpBuilder inside = first.getThenBodyBuilder();
+  Value taken =
+      AllocateOp::create(inside, loc, inside.getIndexType(), log, bytes);
+  memref::StoreOp::create(inside, loc, taken, cell, constant(inside, 0));
+  gpu::BarrierOp::create(builder, loc);
+  Value zero = constant(builder, 0);
+  Value address = memref::LoadOp::create(builder, loc, cell, zero);
+  hasStates = arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::ne,
+                                    address, zero);
+  auto plain = MemRefType::get({ShapedType::kDynamic}, builder.getI8Type());
+  Value all = BytesAtOp::create(builder, loc, plain, address, bytes);
+  auto type = MemRefType::get({ShapedType::kDynamic}, builder.getI64Type());
+  Value words = arith::MulIOp::create(builder, loc, iterations,
+                                      constant(builder, memory.getWords()));
+  states = memref::ViewOp::create(builder, loc, type, all, zero, words);
+  own = createOwn(cast<MemRefType>(memory.outboxes.getType()));
+  SmallVector<DeferIterationOp> deferred;
+  for (Operation *op = begin; op && !isa<DeferEndOp>(op);
+       op = op->getNextNode())
+    op->walk(
+        [&](DeferIterationOp iteration) { deferred.push_back(iteration); });
+  for (DeferIterationOp iteration : deferred)
+    defer(iteration, states, hasStates);
+  begin.erase();
+}
+
+/// From here to the end of its body a loop's iteration has its own outboxes.
+void BlockMapper::defer(DeferIterationOp iteration, Value states, Value has) {
+  iteration->getParentOp()->setAttr(deferredAttrName,
+                                    UnitAttr::get(launch.getContext()));
+  OpBuilder builder(iteration);
+  Value at = arith::MulIOp::create(builder, loc, iteration.getIteration(),
+                                   constant(builder, memory.getWords()));
+  OpBuilder inside = scf::IfOp::create(builder, loc, has).getThenBodyBuilder();
+  copyOutboxes(inside, memory.outboxes, {}, own, {});
+  copyOutboxes(inside, states, at, memory.outboxes, {});
+  builder.setInsertionPoint(iteration->getBlock()->getTerminator());
+  inside = scf::IfOp::create(builder, loc, has).getThenBodyBuilder();
+  copyOutboxes(inside, memory.outboxes, {}, states, at);
+  copyOutboxes(inside, own, {}, memory.outboxes, {});
+  iteration.erase();
+}
+
+void BlockMapper::endDeferral(DeferEndOp end) {
+  OpBuilder builder(end);
+  copyOutboxes(builder, memory.outboxes, {}, own, {});
+  auto rounds = scf::ForOp::create(builder, loc, constant(builder, 0),
+                                   iterations, launch.getBlockSizeX());
+  OpBuilder inside = OpBuilder::atBlockBegin(rounds.getBody());
+  Value at = arith::AddIOp::create(inside, loc, rounds.getInductionVar(),
+                                   launch.getThreadIds().x);
+  Value runs = arith::CmpIOp::create(inside, loc, arith::CmpIPredicate::slt, at,
+                                     iterations);
+  runs = arith::AndIOp::create(inside, loc, runs, hasStates);
+  auto ifOp = scf::IfOp::create(inside, loc, runs, /*withElseRegion=*/true);
+  OpBuilder then = ifOp.getThenBodyBuilder(), none = ifOp.getElseBodyBuilder();
+  Value words =
+      arith::MulIOp::create(then, loc, at, constant(then, memory.getWords()));
+  copyOutboxes(then, states, words, memory.outboxes, {});
+  memory.clearOutboxes(none);
+  memory.flush(inside);
+  copyOutboxes(builder, own, {}, memory.outboxes, {});
+  end.erase();
+}
+
+//===----------------------------------------------------------------------===//
+// Memory
+//===----------------------------------------------------------------------===//
 
 /// The block keeps what it once has, for all that it does: it takes more where
 /// that is not enough.
@@ -415,7 +547,7 @@ LogicalResult BlockMapper::placeArrays() {
     return false;
   };
   for (memref::AllocaOp array : arrays) {
-    if (array.getResult() == order || threads.ownArrays.contains(array))
+    if (threads.ownArrays.contains(array))
       continue;
     if (!array.getType().hasStaticShape())
       return array.emitOpError("expected an array of constant size");
@@ -436,31 +568,16 @@ LogicalResult BlockMapper::run() {
   // What is kept is given back at the end of the grid.
   SmallVector<Operation *> dropped;
   launch.walk([&](Operation *op) {
-    if (isa<ScratchMarkOp, ScratchReleaseOp, DeferEndOp>(op))
+    if (isa<ScratchMarkOp, ScratchReleaseOp>(op))
       dropped.push_back(op);
   });
   for (Operation *op : llvm::reverse(dropped))
     op->erase();
-  Block &body = launch.getBody().front();
-  if (failed(mapBlock(body)))
+  if (failed(mapBlock(launch.getBody().front())))
     return failure();
-  OpBuilder builder(launch);
-  builder.setInsertionPointAfter(order.getDefiningOp());
-  Value zero = arith::ConstantIntOp::create(builder, loc, 0, 64);
-  for (int64_t which : {step, iteration, piece, ordinal})
-    setOrder(builder, which, zero);
-  // An iteration that runs alone.
-  SmallVector<DeferIterationOp> alone;
-  launch.walk([&](DeferIterationOp defer) { alone.push_back(defer); });
-  for (DeferIterationOp defer : alone) {
-    OpBuilder here(defer);
-    setOrder(here, iteration, defer.getIteration());
-    defer.erase();
-  }
   return placeArrays();
 }
 
-LogicalResult piko::mapBlock(gpu::LaunchOp launch, Value log, Value order,
-                             MappingCounts &counts) {
-  return BlockMapper(launch, log, order, counts).run();
+LogicalResult piko::mapBlock(GridMemory &memory, MappingCounts &counts) {
+  return BlockMapper(memory, counts).run();
 }

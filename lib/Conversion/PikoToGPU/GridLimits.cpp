@@ -11,15 +11,22 @@
 using namespace mlir;
 using namespace piko;
 
+/// Whether work in the same kernel takes what is placed.
+static bool isLocal(PlaceOp place) {
+  auto bins = place->getParentOfType<BinsOp>();
+  return bins && llvm::any_of(*bins.getBodyBlock(), [&](Operation &piece) {
+           return piece.hasAttr("producer") &&
+                  piece.getAttr("stage") == place.getStageAttr();
+         });
+}
+
 LogicalResult piko::checkGridLimits(KernelOp kernel) {
   WalkResult result = kernel.walk([&](Operation *op) -> WalkResult {
-    if (isa<ItemsOp, ListsOp>(op) && op->hasAttr("producer"))
-      return op->emitError(
-          "a kernel for a GPU has no local barriers; leave out "
-          "piko-fuse-kernels");
-    if (isa<TileOp>(op))
-      return op->emitError("a kernel for a GPU has no tiles; leave out "
-                           "piko-form-tiles");
+    auto place = dyn_cast<PlaceOp>(op);
+    if (place && isLocal(place) &&
+        place.getBin() != place->getParentOfType<BinsOp>().getBin())
+      return place.emitError(
+          "a kernel for a GPU places what a local edge takes in the same bin");
     if (hasOtherBitsInPTX(op))
       return op->emitError("a kernel for a GPU uses '")
              << op->getName() << "', which has other bits there";
@@ -31,6 +38,7 @@ LogicalResult piko::checkGridLimits(KernelOp kernel) {
 /// What pixels cannot be shared with.
 static bool isObstacle(Operation *op) {
   if (isa<EmitOp, PlaceOp, ListsOp, BarrierOpInterface>(op) ||
+      op->hasAttr("producer") ||
       op->getName().getStringRef().starts_with("piko.check_"))
     return true;
   if (auto atomic = dyn_cast<AtomicOp>(op))

@@ -18,6 +18,8 @@
 
 #include "Piko/Dialect/Piko/IR/PikoGPU.h"
 
+#include "pikort/grid.h"
+
 #include "mlir/Dialect/SCF/Transforms/Transforms.h"
 #include "mlir/Dialect/UB/IR/UBOps.h"
 #include "mlir/IR/PatternMatch.h"
@@ -55,7 +57,7 @@ public:
 
 protected:
   void createUnits(StageOp stage, IntegerAttr source) override;
-  Value createWriter(Location, FlatSymbolRefAttr) override { return log; }
+  Value createWriter(Location at, FlatSymbolRefAttr other) override;
 
 private:
   KernelOp kernel;
@@ -74,6 +76,10 @@ public:
 
 private:
   void formGrid();
+  /// Opens outboxes; `work` is what the grid was made of.
+  void createMemory();
+  void convertLocal(LocalBinOp local);
+  void finishGrid();
   LogicalResult findItems();
   void dropEnds();
   void hoistPrivateArrays();
@@ -92,7 +98,7 @@ private:
   Location loc;
   scf::ForOp items;
   gpu::LaunchOp launch;
-  Value log, order;
+  GridMemory memory;
 };
 
 struct ConvertPikoToGPUPass
@@ -169,16 +175,102 @@ void GridBuilder::dropEnds() {
       end.erase();
 }
 
+Value GridFormer::createWriter(Location at, FlatSymbolRefAttr other) {
+  rewriter.setInsertionPoint(unitEnd);
+  return other ? LogOfOp::create(rewriter, at, log, other).getResult() : log;
+}
+
 void GridBuilder::formGrid() {
-  GridFormer former(kernel, findWork(kernel), threads);
+  Operation *work = findWork(kernel);
+  work->walk([&](Operation *piece) {
+    if (auto producer = piece->getAttrOfType<FlatSymbolRefAttr>("producer"))
+      memory.locals.push_back(
+          {producer, piece->getAttrOfType<IntegerAttr>("port").getInt()});
+  });
+  memory.stage = work->getAttr("stage");
+  GridFormer former(kernel, work, threads);
   former.run();
-  launch = former.launch;
-  log = former.log;
+  memory.launch = launch = former.launch;
+  memory.log = former.log;
   dropEnds();
+  createMemory();
+  launch.walk([&](LocalBinOp local) { convertLocal(local); });
+}
+
+void GridBuilder::createMemory() {
   OpBuilder builder = OpBuilder::atBlockBegin(&launch.getBody().front());
-  order = memref::AllocaOp::create(builder, loc,
-                                   MemRefType::get({4}, builder.getI64Type()));
-  LogOrderOp::create(builder, loc, log, order);
+  Type i64 = builder.getI64Type();
+  memory.outboxes = memref::AllocaOp::create(
+      builder, loc, MemRefType::get({memory.getWords()}, i64));
+  memory.cells = addBlockMemory(launch, PIKOIR_FLUSH_CELLS, i64);
+  ArrayAttr producers;
+  DenseI64ArrayAttr ports;
+  if (!memory.locals.empty()) {
+    int64_t count = memory.locals.size();
+    memory.kept = addBlockMemory(launch, count * PIKOIR_LOCAL_WORDS, i64);
+    producers = builder.getArrayAttr(llvm::map_to_vector(
+        memory.locals, [](auto edge) -> Attribute { return edge.first; }));
+    ports = builder.getDenseI64ArrayAttr(llvm::map_to_vector(
+        memory.locals, [](auto edge) { return edge.second; }));
+  }
+  OutboxesOp::create(builder, loc, memory.log, memory.outboxes, producers,
+                     ports, memory.kept);
+}
+
+/// What the block has of a local edge is one cell, or as many calls as there
+/// are batches; an empty one is called only if the stage runs for every bin.
+void GridBuilder::convertLocal(LocalBinOp local) {
+  auto stage = lookupInPipeline<StageOp>(local, local.getStageAttr());
+  ScheduleOp schedule = stage.getSchedule();
+  OpBuilder builder = OpBuilder::atBlockBegin(local.getBodyBlock());
+  auto constant = [&](int64_t value) -> Value {
+    return arith::ConstantIndexOp::create(builder, loc, value);
+  };
+  Value count = memory.getLocalCount(builder, local), zero = constant(0);
+  Value batch =
+      schedule && schedule.getBatch() ? constant(*schedule.getBatch()) : count;
+  batch = arith::MaxSIOp::create(builder, loc, batch, constant(1));
+  Value calls = arith::CeilDivUIOp::create(builder, loc, count, batch);
+  if (schedule && schedule.getEveryBin())
+    calls = arith::MaxSIOp::create(builder, loc, calls, constant(1));
+  for (Operation *user :
+       llvm::make_early_inc_range(local.getBins().getUsers())) {
+    builder.setInsertionPoint(user);
+    if (isa<UnitCellsOp>(user)) {
+      user->replaceAllUsesWith(ValueRange{zero, calls});
+    } else if (isa<CellRangeOp>(user)) {
+      user->replaceAllUsesWith(ValueRange{zero, count});
+    } else if (auto range = dyn_cast<CallRangeOp>(user)) {
+      Value begin = arith::MulIOp::create(builder, loc, range.getCall(), batch);
+      Value end = arith::AddIOp::create(builder, loc, begin, batch);
+      end = arith::MinSIOp::create(builder, loc, end, count);
+      user->replaceAllUsesWith(ValueRange{begin, end});
+    } else {
+      continue;
+    }
+    user->erase();
+  }
+}
+
+/// Threads begin with empty outboxes, and leave the last ones at the end.
+void GridBuilder::finishGrid() {
+  auto opened = *memory.outboxes.getUsers().begin();
+  for (Operation *user : memory.outboxes.getUsers())
+    if (isa<OutboxesOp>(user))
+      opened = user;
+  OpBuilder builder(opened);
+  memory.clearOutboxes(builder);
+  if (memory.kept) {
+    Value zero = arith::ConstantIntOp::create(builder, loc, 0, 64);
+    int64_t words = memory.locals.size() * PIKOIR_LOCAL_WORDS;
+    for (int64_t i = 0; i < words; ++i)
+      memref::StoreOp::create(
+          builder, loc, zero, memory.kept,
+          arith::ConstantIndexOp::create(builder, loc, i).getResult());
+    gpu::BarrierOp::create(builder, loc);
+  }
+  builder.setInsertionPoint(opened->getBlock()->getTerminator());
+  memory.flush(builder);
 }
 
 /// An alloca in a loop would take more memory each time around.
@@ -308,7 +400,10 @@ LogicalResult GridBuilder::sharePixelsOfBins(SharingCounts &counts) {
     return failure();
   hoistPrivateArrays();
   groupItems();
-  return convertAccess();
+  if (failed(convertAccess()))
+    return failure();
+  finishGrid();
+  return success();
 }
 
 /// Cuts a loop whose iterations may be more than the block has threads, which
@@ -317,7 +412,7 @@ LogicalResult GridBuilder::mapPieces(ParallelForOp loop) {
   loop.emitRemark("what iterations keep across barriers is in memory: they are "
                   "not known to be at most ")
       << threads << ", the threads of a block";
-  if (failed(LoopSplitter(loop, log).run()))
+  if (failed(LoopSplitter(loop, memory.log).run()))
     return failure();
   launch.walk([&](scf::ForOp piece) {
     if (piece->removeAttr("piko.lanes") &&
@@ -368,9 +463,10 @@ LogicalResult GridBuilder::mapWork(MappingCounts &counts) {
   for (ParallelLoopOpInterface loop : loops)
     if (failed(mapLoop(loop, counts)))
       return failure();
-  if (failed(convertAccess()))
+  if (failed(convertAccess()) || failed(mapBlock(memory, counts)))
     return failure();
-  return mapBlock(launch, log, order, counts);
+  finishGrid();
+  return success();
 }
 
 /// On a copy, which takes the kernel's place where it comes out.

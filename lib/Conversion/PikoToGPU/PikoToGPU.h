@@ -6,6 +6,7 @@
 #define PIKO_LIB_CONVERSION_PIKOTOGPU_PIKOTOGPU_H
 
 #include "Piko/Conversion/Passes.h"
+#include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
 #include "mlir/Dialect/GPU/IR/GPUDialect.h"
 #include "mlir/Dialect/MemRef/IR/MemRef.h"
@@ -56,19 +57,39 @@ ThreadMapping chooseMapping(mlir::Operation *loop, int64_t threads);
 
 /// Marks the loops whose iterations threads share.
 constexpr const char *sharedAttrName = "piko.shared";
-/// Whether an operation is in such a loop.
+/// Marks those whose iterations have outboxes of their own.
+constexpr const char *deferredAttrName = "piko.deferred";
+/// Whether an operation is in a loop that is shared.
 bool hasSharedParent(mlir::Operation *op);
 
 struct MappingCounts {
   int64_t shared = 0, threads = 0, cut = 0;
 };
 
+/// What a grid has for what its threads emit (piko.gpu.outboxes).
+struct GridMemory {
+  mlir::gpu::LaunchOp launch;
+  mlir::Value log;
+  mlir::Value outboxes;    ///< A thread's.
+  mlir::Value kept, cells; ///< The block's.
+  mlir::Attribute stage;   ///< The kernel's.
+  /// Producer and port of each local edge.
+  llvm::SmallVector<std::pair<mlir::FlatSymbolRefAttr, int64_t>> locals;
+
+  int64_t getWords();
+  /// Where the words of a local edge begin.
+  int64_t getLocalBase(LocalBinOp local);
+  void flush(mlir::OpBuilder &builder);
+  void clearOutboxes(mlir::OpBuilder &builder);
+  void setLocalCount(mlir::OpBuilder &builder, LocalBinOp local,
+                     mlir::Value count);
+  mlir::Value getLocalCount(mlir::OpBuilder &builder, LocalBinOp local);
+};
+
 /// Maps a block's work to its threads: the first thread does what has effects,
 /// loops that are marked are shared, iterations of parallel loops are threads,
-/// and all else is done by all threads alike. `log` takes what is emitted,
-/// with the numbers in `order`.
-llvm::LogicalResult mapBlock(mlir::gpu::LaunchOp launch, mlir::Value log,
-                             mlir::Value order, MappingCounts &counts);
+/// and all else is done by all threads alike.
+llvm::LogicalResult mapBlock(GridMemory &memory, MappingCounts &counts);
 
 /// Memory that the threads of a block share.
 mlir::Value addBlockMemory(mlir::gpu::LaunchOp launch,

@@ -1,171 +1,133 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// The log of a grid, and memory of its blocks, on pikort/grid.h. The threads of
-// a warp that add an entry together take room for it by one atomic operation.
+// The log of a grid, and memory of its blocks, on pikort/grid.h. A thread puts
+// entries into its outbox, which is one of its own; where that is full it takes
+// another piece of memory. BlockOutput.cpp is about what the block does.
 
 #include "GridLog.h"
 
-#include "pikort/grid.h"
+#include "GridCode.h"
 
 #include "Piko/Dialect/Piko/IR/PikoGPU.h"
-
-#include "mlir/Conversion/LLVMCommon/MemRefBuilder.h"
-#include "mlir/Conversion/LLVMCommon/TypeConverter.h"
-#include "mlir/Dialect/GPU/IR/GPUDialect.h"
-#include "mlir/Dialect/Math/IR/Math.h"
-#include "mlir/Dialect/MemRef/IR/MemRef.h"
-#include "mlir/Dialect/SCF/IR/SCF.h"
 
 using namespace mlir;
 using namespace piko;
 
-// Byte offsets of the members of pikoir_entry and pikoir_log.
+// Byte offsets of the members of pikoir_entry, pikoir_piece and pikoir_log.
 namespace layout {
-constexpr int64_t bytes = offsetof(pikoir_entry, bytes),
-                  kind = offsetof(pikoir_entry, kind),
-                  unit = offsetof(pikoir_entry, unit),
-                  order = offsetof(pikoir_entry, order),
+constexpr int64_t number = offsetof(pikoir_entry, number),
                   header = sizeof(pikoir_entry);
+constexpr int64_t kind = offsetof(pikoir_piece, kind),
+                  pieceHeader = sizeof(pikoir_piece);
 constexpr int64_t cursor = offsetof(pikoir_log, cursor),
                   limit = offsetof(pikoir_log, limit),
                   spare = offsetof(pikoir_log, spare);
 } // namespace layout
-static_assert(int(EntryKind::Record) == PIKOIR_ENTRY_RECORD &&
-              int(EntryKind::Cell) == PIKOIR_ENTRY_CELL &&
-              int(EntryKind::Next) == PIKOIR_ENTRY_NEXT &&
-              int(EntryKind::Error) == PIKOIR_ENTRY_ERROR &&
-              int(EntryKind::Memory) == PIKOIR_ENTRY_MEMORY);
 
-namespace {
-
-/// Writes what a thread does.
-struct ThreadCode {
-  OpBuilder &builder;
-  Location loc;
-
-  Type i32() { return builder.getI32Type(); }
-  Type i64() { return builder.getI64Type(); }
-  Type pointer() { return LLVM::LLVMPointerType::get(builder.getContext()); }
-  Value load(Value base, int64_t offset) {
-    return LLVM::LoadOp::create(builder, loc, i64(),
-                                createOffset(builder, loc, base, offset));
-  }
-  void store(Value value, Value base, int64_t offset) {
-    LLVM::StoreOp::create(builder, loc, value,
-                          createOffset(builder, loc, base, offset));
-  }
-  Value constant(int64_t value) { return createI64(builder, loc, value); }
-  Value intrinsic(StringRef name, ValueRange arguments = {}) {
-    return LLVM::CallIntrinsicOp::create(builder, loc, i32(),
-                                         builder.getStringAttr(name), arguments)
-        .getResults();
-  }
-  Value add(Value a, Value b) {
-    return arith::AddIOp::create(builder, loc, a, b);
-  }
-  Value mul(Value a, Value b) {
-    return arith::MulIOp::create(builder, loc, a, b);
-  }
-  Value bitAnd(Value a, Value b) {
-    return arith::AndIOp::create(builder, loc, a, b);
-  }
-  Value extend(Value a) {
-    return arith::ExtUIOp::create(builder, loc, i64(), a);
-  }
-  Value compare(arith::CmpIPredicate predicate, Value a, Value b) {
-    return arith::CmpIOp::create(builder, loc, predicate, a, b);
-  }
-  Value addTo(Value log, Value bytes) {
-    return LLVM::AtomicRMWOp::create(
-        builder, loc, LLVM::AtomicBinOp::add,
-        createOffset(builder, loc, log, layout::cursor), bytes,
-        LLVM::AtomicOrdering::monotonic);
-  }
-  Value shuffle(Value mask, Value value, Value lane) {
-    return intrinsic("llvm.nvvm.shfl.sync.idx.i32",
-                     {mask, value, lane, createI32(builder, loc, 31)});
-  }
-  Value shuffleWide(Value mask, Value value, Value lane);
-  /// The address of so many bytes for each thread that comes here.
-  Value reserve(Value log, int64_t bytes, bool isAlone);
-  Value reserveTogether(Value log, int64_t bytes);
-};
-
-} // namespace
-
-Value ThreadCode::shuffleWide(Value mask, Value value, Value lane) {
-  Value half = constant(32);
-  Value low = arith::TruncIOp::create(builder, loc, i32(), value);
-  Value high = arith::TruncIOp::create(
-      builder, loc, i32(), arith::ShRUIOp::create(builder, loc, value, half));
-  low = extend(shuffle(mask, low, lane));
-  high = extend(shuffle(mask, high, lane));
-  return arith::OrIOp::create(builder, loc, low,
-                              arith::ShLIOp::create(builder, loc, high, half));
+static Value loadMember(GridCode &code, Value log, int64_t offset) {
+  return LLVM::LoadOp::create(
+      code.builder, code.loc, code.i64(),
+      createOffset(code.builder, code.loc, log, offset));
 }
 
-/// By one atomic operation of all threads of a warp that are active.
-Value ThreadCode::reserveTogether(Value log, int64_t bytes) {
-  Value mask = intrinsic("llvm.nvvm.activemask");
-  Value below = intrinsic("llvm.nvvm.read.ptx.sreg.lanemask.lt");
-  Value rank = math::CtPopOp::create(builder, loc, bitAnd(mask, below));
-  Value count = math::CtPopOp::create(builder, loc, mask);
-  Value isLeader =
-      compare(arith::CmpIPredicate::eq, rank, createI32(builder, loc, 0));
-  auto taken = scf::IfOp::create(
-      builder, loc, isLeader,
-      [&](OpBuilder &inside, Location) {
-        ThreadCode code{inside, loc};
-        Value all = code.mul(code.extend(count), code.constant(bytes));
-        scf::YieldOp::create(inside, loc, code.addTo(log, all));
-      },
-      [&](OpBuilder &inside, Location) {
-        scf::YieldOp::create(inside, loc, createI64(inside, loc, 0));
-      });
-  Value leader = math::CountTrailingZerosOp::create(builder, loc, mask);
-  Value first = shuffleWide(mask, taken.getResult(0), leader);
-  return add(first, mul(extend(rank), constant(bytes)));
+Value piko::getSpare(GridCode &code, Value log) {
+  return loadMember(code, log, layout::spare);
 }
 
-Value ThreadCode::reserve(Value log, int64_t bytes, bool isAlone) {
+Value GridCode::take(Value log, Value bytes, int64_t kind) {
   Value mine =
-      isAlone ? addTo(log, constant(bytes)) : reserveTogether(log, bytes);
-  Value fits = compare(arith::CmpIPredicate::sle, add(mine, constant(bytes)),
-                       load(log, layout::limit));
-  return arith::SelectOp::create(builder, loc, fits, mine,
-                                 load(log, layout::spare));
+      LLVM::AtomicRMWOp::create(builder, loc, LLVM::AtomicBinOp::add,
+                                createOffset(builder, loc, log, layout::cursor),
+                                bytes, LLVM::AtomicOrdering::monotonic);
+  Value fits =
+      compare(P::sle, add(mine, bytes), loadMember(*this, log, layout::limit));
+  return choose(
+      fits,
+      [&] {
+        store(bytes, mine);
+        store(constant(kind), mine, layout::kind);
+        return mine;
+      },
+      [&] { return constant(0); });
 }
 
-/// Whether one thread of a block is here.
-static bool isAlone(Operation *op) {
-  for (; !isa<gpu::LaunchOp>(op); op = op->getParentOp())
-    if (op->hasAttr(firstAttrName))
-      return true;
-  return false;
+/// Bytes and kind, or number and stage, as eight bytes.
+static Value pack(GridCode &code, int64_t low, int64_t high) {
+  return code.constant(
+      int64_t(uint64_t(uint32_t(low)) | (uint64_t(high) << 32)));
+}
+
+/// Another piece of memory for an outbox, with an entry of `size` bytes at its
+/// front: the entry's address, or that of memory that nobody reads.
+static Value extendOutbox(GridCode &code, Value log, Value words, int64_t base,
+                          int64_t size) {
+  using P = GridCode::P;
+  constexpr int64_t least = 512;
+  int64_t need = llvm::alignTo(
+      std::max(least, layout::pieceHeader + size + layout::header), 64);
+  Value before = code.get(words, base + PIKOIR_OUTBOX_BYTES);
+  Value bytes = arith::MaxUIOp::create(
+      code.builder, code.loc, code.add(before, before), code.constant(need));
+  Value piece = code.take(log, bytes, PIKOIR_PIECE_MEMORY);
+  return code.choose(
+      code.compare(P::ne, piece, code.constant(0)),
+      [&] {
+        Value first = code.add(piece, code.constant(layout::pieceHeader));
+        Value cursor = code.get(words, base + PIKOIR_OUTBOX_CURSOR);
+        Value isNew = code.compare(P::eq, cursor, code.constant(0));
+        code.when(isNew,
+                  [&] { code.set(first, words, base + PIKOIR_OUTBOX_BEGIN); });
+        Value goesOn = code.compare(P::ne, cursor, code.constant(0));
+        code.when(goesOn, [&] {
+          code.store(pack(code, layout::header, PIKOIR_ENTRY_LINK), cursor);
+          code.store(first, cursor, layout::number);
+        });
+        code.set(code.add(first, code.constant(size)), words,
+                 base + PIKOIR_OUTBOX_CURSOR);
+        Value end = code.add(piece, bytes);
+        code.set(code.sub(end, code.constant(layout::header)), words,
+                 base + PIKOIR_OUTBOX_LIMIT);
+        code.set(bytes, words, base + PIKOIR_OUTBOX_BYTES);
+        return first;
+      },
+      [&] { return getSpare(code, log); });
 }
 
 Value piko::createEntry(OpBuilder &builder, Operation *op, const Grid &grid,
-                        EntryKind kind, int64_t number, int64_t bytes) {
-  Location loc = op->getLoc();
-  ThreadCode code{builder, loc};
+                        EntryKind kind, int64_t number, int64_t bytes,
+                        int64_t stage, int64_t outbox) {
+  GridCode code{builder, op->getLoc()};
   int64_t size = llvm::alignTo(layout::header + bytes, layout::header);
-  Value entry = LLVM::IntToPtrOp::create(
-      builder, loc, code.pointer(), code.reserve(grid.log, size, isAlone(op)));
-  code.store(code.constant(size), entry, layout::bytes);
-  code.store(code.constant(int64_t(kind) | (number << 32)), entry,
-             layout::kind);
-  auto launch = op->getParentOfType<gpu::LaunchOp>();
-  code.store(toI64(builder, loc, launch.getBlockIds().x), entry, layout::unit);
-  for (int64_t i = 0; i < 4; ++i) {
-    Value at = arith::ConstantIndexOp::create(builder, loc, i);
-    Value now = memref::LoadOp::create(builder, loc, grid.order, at);
-    code.store(now, entry, layout::order + 8 * i);
-    if (i != 3)
-      continue;
-    Value next = code.add(now, code.constant(1));
-    memref::StoreOp::create(builder, loc, next, grid.order, at);
-  }
-  return createOffset(builder, loc, entry, layout::header);
+  int64_t base = outbox * PIKOIR_OUTBOX_WORDS;
+  Value cursor = code.get(grid.outboxes, base + PIKOIR_OUTBOX_CURSOR);
+  Value end = code.add(cursor, code.constant(size));
+  Value fits =
+      code.compare(GridCode::P::sle, end,
+                   code.get(grid.outboxes, base + PIKOIR_OUTBOX_LIMIT));
+  Value entry = code.choose(
+      fits,
+      [&] {
+        code.set(end, grid.outboxes, base + PIKOIR_OUTBOX_CURSOR);
+        return cursor;
+      },
+      [&] { return extendOutbox(code, grid.log, grid.outboxes, base, size); });
+  code.store(pack(code, size, int64_t(kind)), entry);
+  code.store(pack(code, number, stage), entry, layout::number);
+  if (outbox != 0)
+    code.set(entry, grid.outboxes, base + PIKOIR_OUTBOX_LAST);
+  return code.at(code.add(entry, code.constant(layout::header)));
+}
+
+int64_t piko::getLogStage(Operation *op, Value log, LoweringContext &context) {
+  auto other = log.getDefiningOp<LogOfOp>();
+  return other ? context.stageNumber(op, other.getStage()) : -1;
+}
+
+int64_t piko::findOutbox(const Grid &grid, int64_t stage, int64_t port) {
+  for (auto [i, edge] : llvm::enumerate(grid.locals))
+    if (edge == std::pair<int64_t, int64_t>(stage, port))
+      return i + 1;
+  return 0;
 }
 
 bool piko::createErrorEntry(OpBuilder &builder, Operation *op,
@@ -196,13 +158,13 @@ bool piko::createErrorEntry(OpBuilder &builder, Operation *op,
   }
   Value payload =
       createEntry(builder, op, *grid, EntryKind::Error, place, 3 * 8);
-  ThreadCode thread{builder, loc};
   SmallVector<Value> words{bin ? toI64(builder, loc, bin)
-                               : thread.constant(-1)};
+                               : createI64(builder, loc, -1)};
   llvm::append_range(words, numbers);
-  words.resize(3, thread.constant(0));
+  words.resize(3, createI64(builder, loc, 0));
   for (auto [i, word] : llvm::enumerate(words))
-    thread.store(word, payload, 8 * i);
+    LLVM::StoreOp::create(builder, loc, word,
+                          createOffset(builder, loc, payload, 8 * i));
   return true;
 }
 
@@ -242,12 +204,44 @@ struct CloseLogLowering : ContextPattern<CloseLogOp> {
   }
 };
 
-struct LogOrderLowering : ContextPattern<LogOrderOp> {
+struct LogOfLowering : ContextPattern<LogOfOp> {
   using ContextPattern::ContextPattern;
   LogicalResult
-  matchAndRewrite(LogOrderOp op, OpAdaptor adaptor,
+  matchAndRewrite(LogOfOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
-    context.noteGrid(op, {adaptor.getLog(), adaptor.getOrder()});
+    rewriter.replaceOp(op, adaptor.getLog());
+    return success();
+  }
+};
+
+struct OutboxesLowering : ContextPattern<OutboxesOp> {
+  using ContextPattern::ContextPattern;
+  LogicalResult
+  matchAndRewrite(OutboxesOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    auto function = op->getParentOfType<func::FuncOp>();
+    int64_t head =
+        function->getAttrOfType<IntegerAttr>(numberAttrName).getInt();
+    Grid grid;
+    grid.log = adaptor.getLog();
+    grid.outboxes = adaptor.getState();
+    grid.kept = adaptor.getKept();
+    for (auto [i, port] :
+         llvm::enumerate(op.getPorts().value_or(ArrayRef<int64_t>()))) {
+      auto producer = cast<FlatSymbolRefAttr>((*op.getProducers())[i]);
+      int64_t stage = context.stageNumber(op, producer.getValue());
+      grid.locals.push_back({stage == head ? -1 : stage, port});
+      auto outputs = context.stage(op, producer).getOutputs();
+      grid.recordBytes.push_back(
+          context.record(cast<FlatSymbolRefAttr>(outputs[port])).getSize());
+      bool isPlaced = false;
+      PipelineOp pipeline = context.numbers(op).pipeline;
+      for (auto edge : pipeline.getOps<EdgeOp>())
+        if (edge.getProducerAttr() == producer && edge.getPort() == port)
+          isPlaced = context.stage(op, edge.getConsumerAttr()).getPlaced();
+      grid.placed.push_back(isPlaced);
+    }
+    context.noteGrid(op, std::move(grid));
     rewriter.eraseOp(op);
     return success();
   }
@@ -259,32 +253,18 @@ struct AllocateLowering : ContextPattern<AllocateOp> {
   matchAndRewrite(AllocateOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
     Location loc = op.getLoc();
-    ThreadCode code{rewriter, loc};
+    GridCode code{rewriter, loc};
     // What is too large, or negative, must not wrap.
     Value most = code.constant(int64_t(1) << 48);
     Value size = arith::MinUIOp::create(
         rewriter, loc, toI64(rewriter, loc, adaptor.getSize()), most);
-    size = code.bitAnd(code.add(size, code.constant(2 * layout::header - 1)),
-                       code.constant(-layout::header));
-    Value mine = code.addTo(adaptor.getLog(), size);
-    Value fits = code.compare(arith::CmpIPredicate::sle, code.add(mine, size),
-                              code.load(adaptor.getLog(), layout::limit));
-    auto granted = scf::IfOp::create(
-        rewriter, loc, fits,
-        [&](OpBuilder &builder, Location) {
-          ThreadCode inside{builder, loc};
-          Value entry =
-              LLVM::IntToPtrOp::create(builder, loc, inside.pointer(), mine);
-          inside.store(size, entry, layout::bytes);
-          inside.store(inside.constant(int64_t(EntryKind::Memory)), entry,
-                       layout::kind);
-          scf::YieldOp::create(
-              builder, loc, inside.add(mine, inside.constant(layout::header)));
-        },
-        [&](OpBuilder &builder, Location) {
-          scf::YieldOp::create(builder, loc, createI64(builder, loc, 0));
-        });
-    rewriter.replaceOp(op, toIndex(rewriter, loc, granted.getResult(0)));
+    size = code.both(code.add(size, code.constant(2 * layout::pieceHeader - 1)),
+                     code.constant(-layout::pieceHeader));
+    Value piece = code.take(adaptor.getLog(), size, PIKOIR_PIECE_MEMORY);
+    Value bytes = code.add(piece, code.constant(layout::pieceHeader));
+    Value none = code.compare(GridCode::P::eq, piece, code.constant(0));
+    rewriter.replaceOp(op,
+                       toIndex(rewriter, loc, code.select(none, piece, bytes)));
     return success();
   }
 };
@@ -310,7 +290,8 @@ struct BytesAtLowering : ContextPattern<BytesAtOp> {
 void piko::populateGridToLLVMPatterns(const TypeConverter &converter,
                                       RewritePatternSet &patterns,
                                       LoweringContext &context) {
-  patterns.add<OpenLogLowering, CloseLogLowering, LogOrderLowering,
-               AllocateLowering, BytesAtLowering>(
+  patterns.add<OpenLogLowering, CloseLogLowering, LogOfLowering,
+               OutboxesLowering, AllocateLowering, BytesAtLowering>(
       converter, patterns.getContext(), context);
+  populateBlockOutputPatterns(converter, patterns, context);
 }

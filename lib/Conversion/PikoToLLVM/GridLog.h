@@ -1,23 +1,37 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// What the threads of a grid add to its log: the entries of pikort/grid.h.
+// What the threads of a grid emit: the entries of pikort/grid.h.
 
 #ifndef PIKO_LIB_CONVERSION_PIKOTOLLVM_GRIDLOG_H
 #define PIKO_LIB_CONVERSION_PIKOTOLLVM_GRIDLOG_H
 
 #include "LoweringContext.h"
 
+#include "pikort/grid.h"
+
 namespace piko {
 
-/// Kinds of entries (PIKOIR_ENTRY_RECORD, ...).
-enum class EntryKind : int64_t { Record, Cell, Next, Error, Memory };
+enum class EntryKind : int64_t {
+  Record = PIKOIR_ENTRY_RECORD,
+  Cell = PIKOIR_ENTRY_CELL,
+  Next = PIKOIR_ENTRY_NEXT,
+  Error = PIKOIR_ENTRY_ERROR,
+  Kept = PIKOIR_ENTRY_KEPT
+};
 
-/// Adds an entry, where `op` stands in a grid; the address of its `bytes`.
+/// Adds an entry to an outbox of the thread, where `op` stands in a grid; the
+/// address of its `bytes`. Without a stage it is of the kernel's.
 mlir::Value createEntry(mlir::OpBuilder &builder, mlir::Operation *op,
                         const Grid &grid, EntryKind kind, int64_t number,
-                        int64_t bytes);
+                        int64_t bytes, int64_t stage = -1, int64_t outbox = 0);
 
-/// Adds an error at a place of the grid; null outside one. `function` is that
+/// The number of the stage that leaves something in a log; -1 is the kernel's.
+int64_t getLogStage(mlir::Operation *op, mlir::Value log,
+                    LoweringContext &context);
+/// The outbox of a port: one of a local edge, or that of the log.
+int64_t findOutbox(const Grid &grid, int64_t stage, int64_t port);
+
+/// Adds an error at a place of the grid; false outside one. `function` is that
 /// of the runtime that a CPU's kernel would call, `code` the number behind the
 /// bin, `numbers` the last two, or one.
 bool createErrorEntry(mlir::OpBuilder &builder, mlir::Operation *op,
@@ -25,6 +39,17 @@ bool createErrorEntry(mlir::OpBuilder &builder, mlir::Operation *op,
                       int32_t stage, std::optional<mlir::StringRef> name,
                       mlir::Value bin, int32_t code,
                       llvm::ArrayRef<mlir::Value> numbers);
+
+/// Keeps the last record of a local edge for the bin.
+void createKeep(mlir::OpBuilder &builder, mlir::Location loc, const Grid &grid,
+                int64_t outbox);
+/// What the block has of a local edge, as bins: the address of a pikoir_input.
+mlir::Value createLocalBins(mlir::OpBuilder &builder, mlir::Operation *op,
+                            const Grid &grid, int64_t outbox);
+
+void populateBlockOutputPatterns(const mlir::TypeConverter &converter,
+                                 mlir::RewritePatternSet &patterns,
+                                 LoweringContext &context);
 
 } // namespace piko
 

@@ -38,8 +38,14 @@ struct StateView {
 
 /// What the threads of a grid leave their emissions in.
 struct Grid {
-  mlir::Value log;   ///< pikoir_log *
-  mlir::Value order; ///< memref<4xi64>
+  mlir::Value log;      ///< pikoir_log *
+  mlir::Value outboxes; ///< A thread's, PIKOIR_OUTBOX_WORDS each.
+  mlir::Value kept;     ///< The block's, PIKOIR_LOCAL_WORDS for a local edge.
+  /// Stage (-1 is the kernel's) and port of each local edge, and the size of
+  /// its records.
+  llvm::SmallVector<std::pair<int64_t, int64_t>> locals;
+  llvm::SmallVector<int64_t> recordBytes;
+  llvm::SmallVector<bool> placed; ///< Whether records are kept by placing them.
   int32_t places = 0;
 };
 

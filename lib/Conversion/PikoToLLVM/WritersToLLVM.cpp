@@ -39,6 +39,14 @@ struct LocalBinLowering : Lowering<LocalBinOp> {
   matchAndRewrite(LocalBinOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
     Location loc = op.getLoc();
+    if (Grid *grid = context.grid(op)) {
+      int64_t stage = getLogStage(op, op.getSource(), context);
+      Value bins = createLocalBins(rewriter, op, *grid,
+                                   findOutbox(*grid, stage, op.getPort()));
+      rewriter.inlineBlockBefore(op.getBodyBlock(), op, bins);
+      rewriter.eraseOp(op);
+      return success();
+    }
     Value port = createI32(rewriter, loc, op.getPort());
     Value bins =
         context
@@ -75,7 +83,7 @@ struct NextLowering : Lowering<NextOp> {
                   ConversionPatternRewriter &rewriter) const override {
     if (Grid *grid = context.grid(op))
       createEntry(rewriter, op, *grid, EntryKind::Next, /*number=*/0,
-                  /*bytes=*/0);
+                  /*bytes=*/0, getLogStage(op, op.getWriter(), context));
     else
       createNext(rewriter, op.getLoc(), context, adaptor.getWriter());
     rewriter.eraseOp(op);
@@ -146,11 +154,18 @@ struct AppendLowering : Lowering<AppendOp> {
                   ConversionPatternRewriter &rewriter) const override {
     Location loc = op.getLoc();
     RecordOp record = context.record(op.getPrim().getType().getRecord());
-    Grid *grid = context.grid(op);
-    Value room = grid ? createEntry(rewriter, op, *grid, EntryKind::Record,
-                                    op.getPort(), record.getSize())
-                      : createAppend(rewriter, loc, context,
-                                     adaptor.getWriter(), op.getPort());
+    int64_t port = op.getPort();
+    Value room;
+    if (Grid *grid = context.grid(op)) {
+      int64_t stage = getLogStage(op, op.getWriter(), context);
+      int64_t outbox = findOutbox(*grid, stage, port);
+      room = createEntry(rewriter, op, *grid, EntryKind::Record, port,
+                         record.getSize(), stage, outbox);
+      if (outbox && !grid->placed[outbox - 1])
+        createKeep(rewriter, loc, *grid, outbox);
+    } else {
+      room = createAppend(rewriter, loc, context, adaptor.getWriter(), port);
+    }
     SmallVector<ArrayAttr> tags; // of each number
     for (auto field : record.getFields().getAsRange<FieldAttr>())
       tags.append(field.getElementCount(),
@@ -183,9 +198,15 @@ struct PlaceLowering : Lowering<AppendBinOp> {
                                    toI64(rewriter, loc, adaptor.getTile()));
     }
     if (Grid *grid = context.grid(op)) {
-      Value entry = createEntry(rewriter, op, *grid, EntryKind::Cell,
-                                op.getPort().value_or(0), /*bytes=*/8);
-      LLVM::StoreOp::create(rewriter, loc, cell, entry);
+      int64_t port = op.getPort().value_or(0);
+      int64_t from = getLogStage(op, op.getWriter(), context);
+      if (int64_t outbox = findOutbox(*grid, from, port)) {
+        createKeep(rewriter, loc, *grid, outbox);
+      } else {
+        Value entry = createEntry(rewriter, op, *grid, EntryKind::Cell, port,
+                                  /*bytes=*/8, from);
+        LLVM::StoreOp::create(rewriter, loc, cell, entry);
+      }
     } else if (op.getPort() && isLocal(op))
       createLocalPlace(rewriter, loc, context, adaptor.getWriter(),
                        *op.getPort(), cell);

@@ -62,6 +62,9 @@ static Error replaceIntrinsics(Module &module) {
       if (!isBarrier)
         append_range(arguments, call->args());
       CallInst *replacement = builder.CreateCall(callee, arguments);
+      for (auto [i, argument] : enumerate(arguments))
+        if (argument->getType()->isIntegerTy(1))
+          replacement->addParamAttr(i, Attribute::ZExt); // a C++ bool
       if (isBarrier)
         call->eraseFromParent();
       else {

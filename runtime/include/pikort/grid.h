@@ -5,12 +5,15 @@
  *   pikoir_log *log = pikoir_log_open(p, stage);
  *   pikoir_log_place(log, i, ...);               // for each place that can
  * fail
- *   ... launch a block for each unit; threads add entries to the log ...
+ *   ... launch a block for each unit; blocks take memory of the log ...
  *   pikoir_log_close(log);
  *
- * An entry is a header and what it is about. Threads reserve room by adding to
- * `cursor`; the order of entries is in their headers. Where there is no room,
- * a thread writes to `spare`, and the run ends with an error.
+ * Memory is taken by adding to `cursor`, in pieces that begin with their
+ * length. Threads put entries into pieces of their own, their outboxes; now and
+ * then a block says in a directory what its threads have there, in their order.
+ * So what a unit has emitted is in the order of its directories, and of the
+ * entries in each. Where there is no room, a thread writes to `spare`, and the
+ * run ends with an error.
  */
 #ifndef PIKORT_GRID_H
 #define PIKORT_GRID_H
@@ -26,17 +29,53 @@ enum {
   PIKOIR_ENTRY_CELL = 1,   ///< Of port `number`: int64_t cell.
   PIKOIR_ENTRY_NEXT = 2,
   PIKOIR_ENTRY_ERROR = 3, ///< At place `number`: int64_t bin, a, b.
-  PIKOIR_ENTRY_MEMORY = 4 ///< Of a block.
+  PIKOIR_ENTRY_LINK = 4, ///< It goes on at the address in `number` and `stage`.
+  PIKOIR_ENTRY_KEPT = 5  ///< A record of a local edge that was placed.
 };
 
-/// Entries are aligned to 64 bytes; what they are about follows.
+/// Entries are aligned to 16 bytes; what they are about follows.
 typedef struct pikoir_entry {
-  int64_t bytes; ///< With the header.
-  int64_t kind;  ///< And the number, from bit 32 on.
-  int64_t unit;
-  int64_t order[4]; ///< Step, iteration, piece, ordinal.
-  int64_t reserved;
+  int32_t bytes; ///< With the header.
+  int32_t kind;
+  int32_t number;
+  int32_t stage; ///< That emits it; -1 is the kernel's, or the source.
 } pikoir_entry;
+
+enum { PIKOIR_PIECE_MEMORY = 0, PIKOIR_PIECE_DIRECTORY = 1 };
+
+/// Pieces are aligned to 64 bytes; those of a directory are followed by spans.
+typedef struct pikoir_piece {
+  int64_t bytes; ///< With the header.
+  int64_t kind;
+  int64_t unit, spans;
+  int64_t reserved[4];
+} pikoir_piece;
+
+/// Entries of a thread, from an address to another.
+typedef struct pikoir_span {
+  int64_t begin, end;
+} pikoir_span;
+
+/// What a thread has of an outbox, in words of eight bytes.
+enum {
+  PIKOIR_OUTBOX_BEGIN = 0, ///< Addresses; where it has none yet, 0.
+  PIKOIR_OUTBOX_CURSOR = 1,
+  PIKOIR_OUTBOX_LIMIT = 2, ///< Behind it there is room for a link.
+  PIKOIR_OUTBOX_BYTES = 3, ///< Of the piece that it is in.
+  PIKOIR_OUTBOX_LAST = 4,  ///< The last record.
+  PIKOIR_OUTBOX_KEPT = 5,  ///< How many were placed.
+  PIKOIR_OUTBOX_WORDS = 6
+};
+/// Words of a block that a flush needs: one for each warp, and one.
+#define PIKOIR_FLUSH_CELLS 33
+
+/// What a block has of a local edge.
+enum {
+  PIKOIR_LOCAL_RECORDS = 0, ///< Their address.
+  PIKOIR_LOCAL_COUNT = 1,
+  PIKOIR_LOCAL_ROOM = 2, ///< In bytes.
+  PIKOIR_LOCAL_WORDS = 4
+};
 
 /// What threads see of a log.
 typedef struct pikoir_log {

@@ -1,26 +1,29 @@
-// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,convert-piko-to-gpu{threads=32}),canonicalize,cse)' --split-input-file | FileCheck %s
+// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,convert-piko-to-gpu{threads=32}),canonicalize,cse)' --split-input-file | FileCheck %s --implicit-check-not=piko.cpu.
 // What a block's threads do where they do not share the pixels of a bin.
 
 piko.record @F {"x" : i32 at 0} size 4 align 4
 
-// Threads share the primitives of a bin; the log has the order of what they emit.
+// Threads share the primitives of a bin; behind each round the block takes what
+// they have emitted.
 // CHECK-LABEL: piko.kernel @kernel_copy
 // CHECK:         %[[LOG:.*]] = piko.gpu.open_log
 // CHECK:         gpu.launch blocks(%[[UNIT:[a-z0-9]+]], {{.*}}threads(%[[T:[a-z0-9]+]],
-// CHECK:           %[[ORDER:.*]] = memref.alloca() : memref<4xi64>
-// CHECK:           piko.gpu.log_order %[[LOG]] in %[[ORDER]]
+// CHECK-SAME:        workgroup(%[[CELLS:.*]] : memref<33xi64, #gpu.address_space<workgroup>>)
+// CHECK:           %[[BOX:.*]] = memref.alloca() : memref<6xi64>
+// CHECK-COUNT-6:   memref.store %c0_i64, %[[BOX]]
+// CHECK:           piko.gpu.outboxes %[[LOG]] in %[[BOX]]
 // CHECK:           %[[BEGIN:.*]], %[[END:.*]] = piko.storage.cell_range
-// CHECK:           memref.store %{{.*}}, %[[ORDER]][%c0]
-// CHECK:           memref.store %{{.*}}, %[[ORDER]][%c2]
 // CHECK:           gpu.barrier
-// CHECK:           %[[FIRST:.*]] = arith.addi %[[BEGIN]], %[[T]]
-// CHECK:           scf.for %[[I:.*]] = %[[FIRST]] to %[[END]] step %c32 {
-// CHECK:             %[[AT:.*]] = arith.index_cast %[[I]] : index to i64
-// CHECK:             memref.store %[[AT]], %[[ORDER]][%c1]
-// CHECK:             memref.store %c0_i64, %[[ORDER]][%c3]
-// CHECK:             piko.storage.append %[[LOG]][0]
-// CHECK:             piko.storage.next %[[LOG]]
+// CHECK:           scf.for %[[ROUND:.*]] = %[[BEGIN]] to %[[END]] step %c32 {
+// CHECK:             %[[I:.*]] = arith.addi %[[ROUND]], %[[T]]
+// CHECK:             %[[HAS:.*]] = arith.cmpi slt, %[[I]], %[[END]]
+// CHECK:             scf.if %[[HAS]] {
+// CHECK:               piko.storage.append %[[LOG]][0]
+// CHECK:               piko.storage.next %[[LOG]]
+// CHECK:             }
+// CHECK-NEXT:        piko.gpu.flush %[[LOG]] using %[[CELLS]]
 // CHECK:           gpu.barrier
+// CHECK:           piko.gpu.flush %[[LOG]] using %[[CELLS]]
 // CHECK:         piko.gpu.close_log %[[LOG]]
 piko.pipeline @Emits rank 1 {
   piko.source @copy
@@ -55,7 +58,7 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 // CHECK-LABEL: piko.kernel @kernel_sum
 // CHECK:         gpu.launch
 // CHECK-SAME:        threads(%[[T:[a-z0-9]+]],
-// CHECK-SAME:        workgroup(%[[CELL:.*]] : memref<1xi32, #gpu.address_space<workgroup>>, %[[ARRAY:.*]] : memref<16xi32, #gpu.address_space<workgroup>>)
+// CHECK-SAME:        workgroup({{.*}}, %[[CELL:.*]] : memref<1xi32, #gpu.address_space<workgroup>>, %[[ARRAY:.*]] : memref<16xi32, #gpu.address_space<workgroup>>)
 // CHECK:           gpu.barrier
 // CHECK:           %[[IS_FIRST:.*]] = arith.cmpi eq, %[[T]], %c0
 // CHECK:           scf.if %[[IS_FIRST]] {
@@ -115,10 +118,11 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 // CHECK:             scf.for %[[I:.*]] = %{{.*}} step %c32
 // CHECK:               memref.store %{{.*}}, %[[SLOTS]][%[[I]]]
 // CHECK:             gpu.barrier
-// CHECK:             gpu.barrier
-// CHECK:             scf.for %[[J:.*]] = %{{.*}} step %c32
+// CHECK:             scf.for %[[ROUND:.*]] = %{{.*}} to %{{.*}} step %c32
+// CHECK:               %[[J:.*]] = arith.addi %[[ROUND]]
 // CHECK:               memref.load %[[SLOTS]][%[[J]]]
 // CHECK:               piko.storage.append
+// CHECK:               piko.gpu.flush
 // CHECK:             gpu.barrier
 // CHECK-NOT:       piko.cpu.scratch
 piko.pipeline @Cuts rank 1 {

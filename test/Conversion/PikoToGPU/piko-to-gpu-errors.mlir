@@ -151,9 +151,10 @@ piko.pipeline @Local rank 1 {
       ^bb0(%f: !piko.prim<@F>):
         %x = piko.get %f "x" : !piko.prim<@F> -> i32
         %p = piko.emit 0 (%x) : i32 -> !piko.prim<@F>
-        piko.place %p of @last in %bin : !piko.prim<@F>
+        %other = arith.index_cast %x : i32 to index
+        // expected-error @below {{a kernel for a GPU places what a local edge takes in the same bin}}
+        piko.place %p of @last in %other : !piko.prim<@F>
       }
-      // expected-error @below {{a kernel for a GPU has no local barriers; leave out piko-fuse-kernels}}
       piko.lists of @last from @start[0] {
       ^bb0(%l: !piko.list<@F>):
       }

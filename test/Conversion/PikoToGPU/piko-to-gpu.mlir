@@ -13,7 +13,7 @@ piko.record @Pixel {"n" : i32 at 0} size 4 align 4
 // CHECK:         scf.if
 // CHECK:           %[[LOG:.*]] = piko.gpu.open_log %[[BINS]]
 // CHECK:           gpu.launch blocks(%[[UNIT:[a-z0-9]+]], {{.*}}) in (%{{.*}} = %[[UNITS]], {{.*}}) threads(%[[T:[a-z0-9]+]], {{.*}}) in (%{{.*}} = %c8, %{{[^)]*}})
-// CHECK-SAME:        workgroup(%[[X:.*]] : memref<8xi32, #gpu.address_space<workgroup>>, %[[Y:.*]] : memref<8xi32, #gpu.address_space<workgroup>>, %[[TO:.*]] : memref<8xi32, #gpu.address_space<workgroup>>)
+// CHECK-SAME:        workgroup(%{{.*}} : memref<33xi64, #gpu.address_space<workgroup>>, %[[X:.*]] : memref<8xi32, #gpu.address_space<workgroup>>, %[[Y:.*]] : memref<8xi32, #gpu.address_space<workgroup>>, %[[TO:.*]] : memref<8xi32, #gpu.address_space<workgroup>>)
 // Threads are 4 wide and 2 high.
 // CHECK:             %[[TX:.*]] = arith.remui %[[T]], %c4
 // CHECK:             %[[ROW:.*]] = arith.divui %[[T]], %c4
@@ -37,6 +37,7 @@ piko.record @Pixel {"n" : i32 at 0} size 4 align 4
 // CHECK:                     piko.store %{{.*}}, checked @image[
 // CHECK:                     piko.fail @draw in %{{.*}} outside bin of @image(
 // CHECK:               gpu.barrier
+// CHECK:             piko.gpu.flush %[[LOG]]
 // CHECK:             gpu.terminator
 // CHECK:           piko.gpu.close_log %[[LOG]]
 // CHECK:         piko.storage.close_bins %[[BINS]]

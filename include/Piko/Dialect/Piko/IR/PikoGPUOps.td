@@ -17,10 +17,9 @@ class Piko_GPUOp<string mnemonic, list<Trait> traits = []>
     : Piko_Op<"gpu." # mnemonic, !listconcat([Piko_GPUOnly], traits)>;
 
 def Piko_OpenLogOp : Piko_GPUOp<"open_log"> {
-  let summary = "what all threads of a grid leave their emissions in";
+  let summary = "what the blocks of a grid leave their emissions in";
   let description = [{
-    Takes the place of the writers of a CPU's units: `piko.storage.append` and its
-    like add entries, in any order. In front of the launch.
+    Takes the place of the writers of a CPU's units. In front of the launch.
 
     ```mlir
     %log = piko.gpu.open_log %bins : !piko.bins<@Fragment>
@@ -32,7 +31,7 @@ def Piko_OpenLogOp : Piko_GPUOp<"open_log"> {
 }
 
 def Piko_CloseLogOp : Piko_GPUOp<"close_log"> {
-  let summary = "gives the entries of a grid's log to the runtime, in order";
+  let summary = "gives what a grid has emitted to the runtime, unit by unit";
   let description = [{
     Behind the launch.
 
@@ -44,19 +43,57 @@ def Piko_CloseLogOp : Piko_GPUOp<"close_log"> {
   let assemblyFormat = "$log attr-dict";
 }
 
-def Piko_LogOrderOp : Piko_GPUOp<"log_order"> {
-  let summary = "where a thread keeps the order of what it adds to a log";
+def Piko_LogOfOp : Piko_GPUOp<"log_of", [Pure]> {
+  let summary = "the log, for what another stage of the kernel emits";
   let description = [{
-    Says for the `gpu.launch` around which numbers order the entries of a block:
-    the step that the block has come to, the iteration of a loop that its threads
-    share, the piece of that loop, and the number of the entry there.
+    As `piko.cpu.open_writer` with `of` on a CPU.
 
     ```mlir
-    piko.gpu.log_order %log in %order : memref<4xi64>
+    %other = piko.gpu.log_of %log of @shade
     ```
   }];
-  let arguments = (ins Piko_WriterType:$log, MemRefOf<[I64]>:$order);
-  let assemblyFormat = "$log `in` $order attr-dict `:` type($order)";
+  let arguments = (ins Piko_WriterType:$log, FlatSymbolRefAttr:$stage);
+  let results = (outs Piko_WriterType:$writer);
+  let assemblyFormat = "$log `of` $stage attr-dict";
+}
+
+def Piko_OutboxesOp : Piko_GPUOp<"outboxes"> {
+  let summary = "where a thread keeps what it emits, until the block takes it";
+  let description = [{
+    Says for the `gpu.launch` around where each thread has its outboxes: one for
+    the log and one for each port of a local edge, of six numbers each. What the
+    block has of a local edge is in its memory, four numbers each.
+
+    ```mlir
+    piko.gpu.outboxes %log in %numbers : memref<6xi64>
+    piko.gpu.outboxes %log in %more : memref<12xi64> local [@test] [0] in %kept
+      : memref<4xi64, 3>
+    ```
+  }];
+  let arguments = (ins Piko_WriterType:$log, MemRefOf<[I64]>:$state,
+                       OptionalAttr<FlatSymbolRefArrayAttr>:$producers,
+                       OptionalAttr<DenseI64ArrayAttr>:$ports,
+                       Optional<MemRefOf<[I64]>>:$kept);
+  let assemblyFormat = [{
+    $log `in` $state `:` type($state)
+    (`local` $producers^ $ports `in` $kept `:` type($kept))? attr-dict
+  }];
+}
+
+def Piko_FlushOp : Piko_GPUOp<"flush"> {
+  let summary = "puts what threads have emitted behind what the block has";
+  let description = [{
+    All threads of the block come here; it is a barrier. By one reservation in the
+    log the block takes what is in the outboxes, in the order of threads: a thread's
+    place follows from votes in its warp and a sum over warps, whose numbers are in
+    memory of the block, one for each warp and one more.
+
+    ```mlir
+    piko.gpu.flush %log using %cells : memref<33xi64, 3>
+    ```
+  }];
+  let arguments = (ins Piko_WriterType:$log, MemRefOf<[I64]>:$cells);
+  let assemblyFormat = "$log `using` $cells attr-dict `:` type($cells)";
 }
 
 def Piko_AllocateOp : Piko_GPUOp<"allocate"> {

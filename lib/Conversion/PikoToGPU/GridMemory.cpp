@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// What a grid has for what its threads emit. The numbers of an outbox and of a
+// local edge are those of pikort/grid.h.
+
+#include "PikoToGPU.h"
+
+#include "Piko/Dialect/Piko/IR/PikoGPU.h"
+
+#include "pikort/grid.h"
+
+using namespace mlir;
+using namespace piko;
+
+int64_t GridMemory::getWords() {
+  return (int64_t(locals.size()) + 1) * PIKOIR_OUTBOX_WORDS;
+}
+
+int64_t GridMemory::getLocalBase(LocalBinOp local) {
+  auto other = local.getSource().getDefiningOp<LogOfOp>();
+  for (auto [i, edge] : llvm::enumerate(locals)) {
+    Attribute producer = other ? Attribute(other.getStageAttr()) : stage;
+    if (producer == edge.first && local.getPort() == edge.second)
+      return i * PIKOIR_LOCAL_WORDS;
+  }
+  llvm_unreachable("a local edge of the kernel");
+}
+
+void GridMemory::flush(OpBuilder &builder) {
+  FlushOp::create(builder, launch.getLoc(), log, cells);
+}
+
+void GridMemory::clearOutboxes(OpBuilder &builder) {
+  Location loc = launch.getLoc();
+  Value zero = arith::ConstantIntOp::create(builder, loc, 0, 64);
+  for (int64_t i = 0, e = getWords(); i < e; ++i)
+    memref::StoreOp::create(
+        builder, loc, zero, outboxes,
+        arith::ConstantIndexOp::create(builder, loc, i).getResult());
+}
+
+static Value createPlace(OpBuilder &builder, Location loc, int64_t base) {
+  return arith::ConstantIndexOp::create(builder, loc,
+                                        base + PIKOIR_LOCAL_COUNT);
+}
+
+void GridMemory::setLocalCount(OpBuilder &builder, LocalBinOp local,
+                               Value count) {
+  memref::StoreOp::create(
+      builder, local.getLoc(), count, kept,
+      createPlace(builder, local.getLoc(), getLocalBase(local)));
+}
+
+Value GridMemory::getLocalCount(OpBuilder &builder, LocalBinOp local) {
+  Location loc = local.getLoc();
+  Value count = memref::LoadOp::create(
+      builder, loc, kept, createPlace(builder, loc, getLocalBase(local)));
+  return arith::IndexCastOp::create(builder, loc, builder.getIndexType(),
+                                    count);
+}

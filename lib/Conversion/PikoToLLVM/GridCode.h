@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Writes what a thread of a grid does with the log and with memory.
+
+#ifndef PIKO_LIB_CONVERSION_PIKOTOLLVM_GRIDCODE_H
+#define PIKO_LIB_CONVERSION_PIKOTOLLVM_GRIDCODE_H
+
+#include "LoweringContext.h"
+
+#include "pikort/grid.h"
+
+#include "mlir/Dialect/GPU/IR/GPUDialect.h"
+#include "mlir/Dialect/Math/IR/Math.h"
+#include "mlir/Dialect/MemRef/IR/MemRef.h"
+#include "mlir/Dialect/SCF/IR/SCF.h"
+
+namespace piko {
+
+/// Numbers have 64 bits where nothing else is said; addresses are numbers.
+struct GridCode {
+  using P = mlir::arith::CmpIPredicate;
+
+  mlir::OpBuilder &builder;
+  mlir::Location loc;
+
+  mlir::Type i32() { return builder.getI32Type(); }
+  mlir::Type i64() { return builder.getI64Type(); }
+  mlir::Value constant(int64_t value) { return createI64(builder, loc, value); }
+  mlir::Value index(int64_t value) {
+    return mlir::arith::ConstantIndexOp::create(builder, loc, value);
+  }
+  mlir::Value at(mlir::Value address) {
+    return mlir::LLVM::IntToPtrOp::create(
+        builder, loc, mlir::LLVM::LLVMPointerType::get(builder.getContext()),
+        address);
+  }
+  mlir::Value load(mlir::Type type, mlir::Value address) {
+    return mlir::LLVM::LoadOp::create(builder, loc, type, at(address));
+  }
+  void store(mlir::Value value, mlir::Value address, int64_t offset = 0) {
+    mlir::LLVM::StoreOp::create(
+        builder, loc, value, createOffset(builder, loc, at(address), offset));
+  }
+  /// A word of an array of the thread, or of the block.
+  mlir::Value get(mlir::Value words, int64_t which) {
+    return mlir::memref::LoadOp::create(builder, loc, words, index(which));
+  }
+  void set(mlir::Value value, mlir::Value words, int64_t which) {
+    mlir::memref::StoreOp::create(builder, loc, value, words, index(which));
+  }
+  mlir::Value add(mlir::Value a, mlir::Value b) {
+    return mlir::arith::AddIOp::create(builder, loc, a, b);
+  }
+  mlir::Value sub(mlir::Value a, mlir::Value b) {
+    return mlir::arith::SubIOp::create(builder, loc, a, b);
+  }
+  mlir::Value mul(mlir::Value a, mlir::Value b) {
+    return mlir::arith::MulIOp::create(builder, loc, a, b);
+  }
+  mlir::Value both(mlir::Value a, mlir::Value b) {
+    return mlir::arith::AndIOp::create(builder, loc, a, b);
+  }
+  mlir::Value extend(mlir::Value a) {
+    return mlir::arith::ExtUIOp::create(builder, loc, i64(), a);
+  }
+  mlir::Value select(mlir::Value condition, mlir::Value a, mlir::Value b) {
+    return mlir::arith::SelectOp::create(builder, loc, condition, a, b);
+  }
+  mlir::Value compare(P predicate, mlir::Value a, mlir::Value b) {
+    return mlir::arith::CmpIOp::create(builder, loc, predicate, a, b);
+  }
+  mlir::Value intrinsic(mlir::StringRef name, mlir::ValueRange arguments = {}) {
+    return mlir::LLVM::CallIntrinsicOp::create(
+               builder, loc, i32(), builder.getStringAttr(name), arguments)
+        .getResults();
+  }
+  void barrier() { mlir::gpu::BarrierOp::create(builder, loc); }
+
+  /// if (condition) body()
+  void when(mlir::Value condition, llvm::function_ref<void()> body) {
+    auto ifOp = mlir::scf::IfOp::create(builder, loc, condition);
+    mlir::OpBuilder::InsertionGuard guard(builder);
+    builder.setInsertionPointToStart(ifOp.thenBlock());
+    body();
+  }
+  /// condition ? body() : otherwise()
+  mlir::Value choose(mlir::Value condition,
+                     llvm::function_ref<mlir::Value()> body,
+                     llvm::function_ref<mlir::Value()> otherwise) {
+    auto ifOp = mlir::scf::IfOp::create(builder, loc, i64(), condition,
+                                        /*withElseRegion=*/true);
+    mlir::OpBuilder::InsertionGuard guard(builder);
+    builder.setInsertionPointToStart(ifOp.thenBlock());
+    mlir::scf::YieldOp::create(builder, loc, body());
+    builder.setInsertionPointToStart(ifOp.elseBlock());
+    mlir::scf::YieldOp::create(builder, loc, otherwise());
+    return ifOp.getResult(0);
+  }
+  /// for (i = from; i < to; i += step) body(i), for indices
+  void forEach(mlir::Value from, mlir::Value to, mlir::Value step,
+               llvm::function_ref<void(mlir::Value)> body) {
+    auto loop = mlir::scf::ForOp::create(builder, loc, from, to, step);
+    mlir::OpBuilder::InsertionGuard guard(builder);
+    builder.setInsertionPointToStart(loop.getBody());
+    body(loop.getInductionVar());
+  }
+
+  /// Takes so many bytes, a multiple of 64, of a log (a pointer): the address
+  /// of a piece of this kind, or 0.
+  mlir::Value take(mlir::Value log, mlir::Value bytes, int64_t kind);
+};
+
+/// The memory of a log that nothing is kept in.
+mlir::Value getSpare(GridCode &code, mlir::Value log);
+
+} // namespace piko
+
+#endif // PIKO_LIB_CONVERSION_PIKOTOLLVM_GRIDCODE_H
