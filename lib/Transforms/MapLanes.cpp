@@ -51,6 +51,7 @@ struct LaneLoop {
   int64_t operations = 0; ///< of an iteration
   int64_t values = 0;     ///< what an iteration takes that items differ in
   int64_t updates = 0;    ///< of an iteration
+  int64_t times = 1;      ///< that it runs for a primitive, as far as is known
 };
 
 /// What a primitive or a list asks for.
@@ -118,16 +119,18 @@ static bool isKnown(Operation *op) {
          });
 }
 
-/// Of an operation, for each time that `root` runs.
-static int64_t getWeight(Operation *op, Operation *root) {
-  if (op->getNumRegions() || op->hasTrait<OpTrait::IsTerminator>() ||
-      op->hasTrait<OpTrait::ConstantLike>())
-    return 0;
-  int64_t weight = 1;
+/// How often an operation is taken to run each time that `root` does.
+static int64_t getTimes(Operation *op, Operation *root) {
   for (Operation *at = op->getParentOp(); at != root; at = at->getParentOp())
     if (isa<LoopLikeOpInterface, ParallelLoopOpInterface>(at))
-      weight = weightInLoop;
-  return weight;
+      return weightInLoop;
+  return 1;
+}
+
+static int64_t getWeight(Operation *op, Operation *root) {
+  bool isFree = op->getNumRegions() || op->hasTrait<OpTrait::IsTerminator>() ||
+                op->hasTrait<OpTrait::ConstantLike>();
+  return isFree ? 0 : getTimes(op, root);
 }
 
 LaneWork::LaneWork(Operation *work) : work(work) {
@@ -155,6 +158,7 @@ void LaneWork::count(Operation *op) {
 
 void LaneWork::addLoop(Operation *loop, const Uniformity &uniformity) {
   LaneLoop entry{loop};
+  entry.times = getTimes(loop, work);
   llvm::DenseSet<Value> taken;
   loop->walk([&](Operation *op) {
     if (op == loop)
@@ -241,8 +245,10 @@ std::string LaneWork::getObstacle(LaneMapping mapping) const {
                          : "there are several parallel loops";
   for (Operation *at = loops.front().loop->getParentOp(); at != work;
        at = at->getParentOp())
-    if (!isa<scf::IfOp>(at))
-      return "the parallel loop is inside another loop";
+    if (!isa<scf::IfOp, scf::IndexSwitchOp>(at))
+      return ("the parallel loop is inside '" + at->getName().getStringRef() +
+              "'")
+          .str();
   return effect ? "there are effects outside of the parallel loop" : "";
 }
 
@@ -251,7 +257,7 @@ int64_t LaneWork::getCost(LaneMapping mapping) const {
   if (isOne || mapping == LaneMapping::Iterations) {
     int64_t cost = operations;
     for (const LaneLoop &loop : loops)
-      cost += loop.operations *
+      cost += loop.times * loop.operations *
               (isOne ? loop.expected : llvm::divideCeil(loop.expected, lanes));
     return lanes * cost;
   }
@@ -259,9 +265,9 @@ int64_t LaneWork::getCost(LaneMapping mapping) const {
   for (const LaneLoop &loop : loops) {
     int64_t turn = loop.operations + loop.updates * orderCost;
     if (mapping == LaneMapping::Items)
-      cost += loop.most * turn;
+      cost += loop.times * loop.most * turn;
     else
-      cost += loop.expected * (turn + pairCost + loop.values);
+      cost += loop.times * loop.expected * (turn + pairCost + loop.values);
   }
   return cost;
 }
@@ -367,7 +373,8 @@ LogicalResult MapLanesPass::map(Operation *op, StageOp stage) {
   Operation *at = op;
   std::optional<LaneMapping> said =
       items ? items.getLanes() : cast<ListsOp>(op).getLanes();
-  if (!said && schedule && !isSource) {
+  // What is checked is done in order, whatever the user would like to try.
+  if (!said && schedule && !isSource && !work.unknown) {
     at = schedule;
     said = schedule.getLanes();
   }

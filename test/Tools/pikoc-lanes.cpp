@@ -7,6 +7,9 @@
 // RUN: pikoc %s --pipe Fine --explain | FileCheck %s --check-prefix=EXPLAIN
 // RUN: piko-compare %s --pipe Fine --domain 37 21 --count 500 --runs 1 | FileCheck %s --check-prefix=EQUAL
 // EQUAL: equal
+// What is checked is done in order, whatever is said.
+// RUN: pikoc %s --pipe Fine --check --remarks --emit=machine -o /dev/null 2>&1 | FileCheck %s --check-prefix=CHECKED
+// CHECKED: stage 'forced': lanes are given one, because 'piko.check_call' is done in order of lineage
 // RUN: not pikoc %s --pipe Missing --emit=target -o /dev/null 2>&1 | FileCheck %s --check-prefix=MISSING
 // RUN: not pikoc %s --pipe Meeting --emit=target -o /dev/null 2>&1 | FileCheck %s --check-prefix=MEETING
 // RUN: not pikoc %s --pipe Listed --emit=target -o /dev/null 2>&1 | FileCheck %s --check-prefix=LISTED
