@@ -76,6 +76,7 @@ public:
 
 private:
   LaunchOp findLaunch();
+  bool mayHaveBatches();
   bool isInBin(Operation *access);
   void clear(ImageOp image);
 
@@ -137,6 +138,20 @@ LaunchOp TileFormer::findLaunch() {
 // What is in the way
 //===----------------------------------------------------------------------===//
 
+/// Whether the list of a bin may come in several calls.
+bool TileFormer::mayHaveBatches() {
+  if (ScheduleOp schedule = stage.getSchedule();
+      schedule && (schedule.getBatch() || !schedule.getBody().empty()))
+    return true;
+  // A body that depends on the bin has become a kernel.
+  return llvm::any_of(pipeline.getOps<KernelOp>(), [&](KernelOp other) {
+    return llvm::any_of(other.getOps<BeginScheduleOp>(),
+                        [&](BeginScheduleOp schedule) {
+                          return schedule.getStage() == stage.getSymName();
+                        });
+  });
+}
+
 std::optional<Reason> TileFormer::whyNot() {
   auto reason = [&](const Twine &why) {
     return Reason{stage.getLoc(), why.str()};
@@ -149,9 +164,7 @@ std::optional<Reason> TileFormer::whyNot() {
   if (stage.getSplit())
     return reason("threads share the primitives of a bin; let the stage change "
                   "pixels by update");
-  ScheduleOp schedule = stage.getSchedule();
-  if (stage.getTakesList() && schedule &&
-      (schedule.getBatch() || !schedule.getBody().empty()))
+  if (stage.getTakesList() && mayHaveBatches())
     return reason("its list may be cut into batches; leave out batch");
   return std::nullopt;
 }

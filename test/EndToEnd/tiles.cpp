@@ -20,6 +20,7 @@
 // RUN: piko-compare %s --pipe Waits --domain 67 35 --count 5 --runs 2 | FileCheck %s
 // RUN: piko-compare %s --pipe Waits --domain 67 35 --count 500 --runs 1 --without form-tiles | FileCheck %s
 // RUN: piko-compare %s --pipe Every --domain 67 35 --count 5 --runs 2 | FileCheck %s
+// RUN: piko-compare %s --pipe Batches --domain 35 20 --count 300 --runs 1 | FileCheck %s
 // CHECK: equal
 #include "Inputs/ports.h"
 
@@ -105,3 +106,21 @@ template <bool Every> struct Waiting : piko::Pipe<State> {
 };
 struct Waits : Waiting<false> {};
 struct Every : Waiting<true> {};
+
+// A bin may have several calls, each of which would begin with a tile.
+struct Batch : piko::Stage<16, 16, 64, Point>, piko::Uses<State> {
+  void assignBin(const Point &p) {
+    if (isOnScreen(p, domain()))
+      assignToBin(p, binFromPosition(glm::ivec2(p.x, p.y)));
+  }
+  void schedule(piko::BinId bin) { batch(bin.index % 3 + 1); }
+  void process(const piko::List<Point> &list) {
+    for (const Point &p : list)
+      update(state().image, glm::ivec2(p.x, p.y),
+             [&](Pixel &pixel) { change(pixel, p); });
+  }
+};
+struct Batches : piko::Pipe<State> {
+  Batch batches;
+  Batches() { source(batches); }
+};

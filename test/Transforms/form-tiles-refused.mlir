@@ -122,3 +122,38 @@ piko.pipeline @P rank 1 {
     piko.launch @kernel_last(%bins) : (!piko.bins<@F>) -> ()
   }
 }
+
+// -----
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+// Calls that depend on the bin.
+piko.pipeline @P rank 1 {
+  // expected-remark @below {{stage 'last' has no tiles of 'count'}}
+  piko.image @count : @F rank 1
+  piko.source @last
+  // expected-note @below {{its list may be cut into batches; leave out batch}}
+  piko.stage @last bins [8] threads 1 ordered : list @F -> [] {}
+  piko.kernel @schedule_last {
+    %bins = piko.begin_schedule @last
+  }
+  piko.kernel @kernel_last {
+    piko.bins of @last {
+    ^bb0(%bin: index):
+      piko.lists of @last {
+      ^bb0(%l: !piko.list<@F>):
+        %x = arith.constant 0 : i32
+        piko.update @count[%x : i32] in %bin {
+        ^bb0(%old: i32):
+          piko.yield [%x : i32]
+        }
+      }
+    }
+  }
+  piko.program {
+    piko.clear @count
+    piko.launch @schedule_last() : () -> ()
+    %source = piko.feed 0 : !piko.edge<@F>
+    %bins = piko.join @last(concatenate %source) : (!piko.edge<@F>) -> !piko.bins<@F>
+    piko.launch @kernel_last(%bins) : (!piko.bins<@F>) -> ()
+  }
+}
