@@ -96,15 +96,36 @@ static std::vector<int64_t> findLeftBins(const Stage &stage,
   return left;
 }
 
-/// Calls body(first, cells) for each row of cells of a bin.
-static void forRows(const pikort_pipeline &p, const Stage &stage, int64_t bin,
-                    auto &&body) {
-  int64_t lo[4], hi[4];
+/// Consecutive bins of a row of bins.
+struct BinRun {
+  int64_t first, count;
+};
+
+/// As few runs as possible: long rows of pixels are filled faster.
+static std::vector<BinRun> findRuns(const Stage &stage,
+                                    const std::vector<int64_t> &bins) {
+  std::vector<BinRun> runs;
+  for (int64_t bin : bins) {
+    bool continues = !runs.empty() && bin % stage.grid[0] != 0 &&
+                     runs.back().first + runs.back().count == bin;
+    if (continues)
+      ++runs.back().count;
+    else
+      runs.push_back({bin, 1});
+  }
+  return runs;
+}
+
+/// Calls body(first, cells) for each row of cells of a run of bins.
+static void forRows(const pikort_pipeline &p, const Stage &stage,
+                    const BinRun &run, auto &&body) {
+  int64_t lo[4], hi[4], bin = run.first;
   for (int32_t d = 0; d < 4; ++d) {
     int64_t size = d < p.rank ? stage.binSize[d] : 0;
     int64_t domain = d < p.rank ? p.domain[d] : 1;
+    int64_t bins = d == 0 ? run.count : 1;
     lo[d] = size ? bin % stage.grid[d] * size : 0;
-    hi[d] = size ? std::min(lo[d] + size, domain) : domain;
+    hi[d] = size ? std::min(lo[d] + bins * size, domain) : domain;
     bin /= stage.grid[d];
   }
   const auto &extent = p.domain;
@@ -117,21 +138,17 @@ static void forRows(const pikort_pipeline &p, const Stage &stage, int64_t bin,
 
 /// Clears an image in some bins of a stage.
 static void fillBins(pikort_pipeline &p, const Stage &stage, State &state,
-                     const std::vector<int64_t> &bins) {
+                     const std::vector<BinRun> &runs) {
   int64_t size = p.records[state.record].size;
-  int64_t longest =
-      stage.binSize[0] ? std::min(stage.binSize[0], p.domain[0]) : p.domain[0];
-  std::vector<uint8_t> row(static_cast<size_t>(longest * size));
-  fill(1, row.data(), longest * size, state.clear);
+  std::vector<uint8_t> row(static_cast<size_t>(p.domain[0] * size));
+  fill(1, row.data(), p.domain[0] * size, state.clear);
   uint8_t *pixels = state.owned.data();
-  parallelChunks(p.threads, static_cast<int64_t>(bins.size()), 16,
-                 [&](int64_t begin, int64_t end) {
-                   for (int64_t i = begin; i < end; ++i)
-                     forRows(p, stage, bins[i], [&](int64_t at, int64_t cells) {
-                       std::memcpy(pixels + at * size, row.data(),
-                                   static_cast<size_t>(cells * size));
-                     });
-                 });
+  parallelFor(p.threads, static_cast<int64_t>(runs.size()), [&](int64_t run) {
+    forRows(p, stage, runs[run], [&](int64_t at, int64_t cells) {
+      std::memcpy(pixels + at * size, row.data(),
+                  static_cast<size_t>(cells * size));
+    });
+  });
 }
 
 void piko::rt::beginClears(pikort_pipeline &p, Kernel &kernel) {
@@ -141,11 +158,12 @@ void piko::rt::beginClears(pikort_pipeline &p, Kernel &kernel) {
   Part before = p.profile.part();
   p.profile.enter(Part::State);
   std::vector<int64_t> left = findLeftBins(stage, kernel);
+  std::vector<BinRun> runs = findRuns(stage, left);
   for (int32_t id : stage.clears)
     if (static_cast<int64_t>(left.size()) == stage.bins())
       fill(p, p.states[id]);
     else
-      fillBins(p, stage, p.states[id], left);
+      fillBins(p, stage, p.states[id], runs);
   stage.cleared = true;
   kernel.input.clears = 1;
   p.profile.enter(before);
