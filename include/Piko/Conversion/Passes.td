@@ -17,7 +17,10 @@ def ConvertPikoToSCF : Pass<"convert-piko-to-scf", "::piko::PipelineOp"> {
     `piko.atomic` behind a test of their indices. Where a test fails,
     `piko.fail` reports it, with the bin of the call, nothing is written, and a
     read gives 0. Reads of a list become reads of positions, behind a test
-    unless the index is that of a loop over the list.
+    unless the index is that of a loop over the list. A `piko.tile` stays where
+    it is in the image: in the launch that clears it, its rows get the clear value
+    where the bin begins. With `private-tiles` it becomes arrays of the thread's,
+    which are filled there and written to the image where the bin ends.
 
     **Guarantees** that no kernel touches memory outside a buffer, an image, or,
     in an update, the bin.
@@ -40,6 +43,9 @@ def ConvertPikoToSCF : Pass<"convert-piko-to-scf", "::piko::PipelineOp"> {
 
     **Limits**: indices into array fields are not tested.
   }];
+  let options = [
+    Option<"privateTiles", "private-tiles", "bool", "false",
+           "Copy tiles to arrays of the thread's">];
   let dependentDialects = ["::mlir::arith::ArithDialect",
                            "::mlir::memref::MemRefDialect",
                            "::mlir::scf::SCFDialect"];

@@ -60,7 +60,7 @@ def FormTiles : Pass<"piko-form-tiles", "::piko::PipelineOp"> {
     lies in bins without primitives; then the program does not clear the image
     any more.
 
-    **Guarantees** that images are the same when the kernel ends.
+    **Guarantees** that images are the same when the run ends.
 
     Before:
     ```

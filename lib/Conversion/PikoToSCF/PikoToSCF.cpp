@@ -298,12 +298,13 @@ private:
 
 struct ConvertPikoToSCFPass
     : piko::impl::ConvertPikoToSCFBase<ConvertPikoToSCFPass> {
+  using ConvertPikoToSCFBase::ConvertPikoToSCFBase;
   void runOnOperation() override {
     RewritePatternSet patterns(&getContext());
     populatePikoToSCFPatterns(patterns);
     if (failed(applyPatternsGreedily(getOperation(), std::move(patterns))))
       return signalPassFailure();
-    lowerTiles(getOperation());
+    lowerTiles(getOperation(), privateTiles);
     getOperation().walk([&](Operation *op) {
       if (isa<UpdateOp, ListAtOp, ListSizeOp>(op)) {
         op->emitOpError(

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// For each tile of a kernel:
-//   1. an array for each field, with the rows of pixels in a row;
-//   2. loops that set it to the clear value, or read it from the image;
-//   3. accesses at the pixel's place in the bin;
-//   4. loops that write to the image what of the bin is in the domain.
+// A tile is, for each type of numbers, a private array: pixel behind pixel, row
+// behind row. A pixel's numbers lie together, as LLVM forms vectors of what is
+// computed for them where they are stored in a row. Or the tile stays where it
+// is in the image, whose rows are cleared when the bin begins: they are in the
+// cache from then on, and nothing has to be copied.
 
 #include "Tiles.h"
 
@@ -14,7 +14,9 @@
 #include "mlir/Dialect/Arith/IR/Arith.h"
 #include "mlir/Dialect/MemRef/IR/MemRef.h"
 #include "mlir/Dialect/SCF/IR/SCF.h"
+#include "llvm/ADT/MapVector.h"
 #include "llvm/ADT/StringMap.h"
+#include "llvm/ADT/TypeSwitch.h"
 
 using namespace mlir;
 using namespace piko;
@@ -40,11 +42,22 @@ namespace {
 class TileLowering {
 public:
   explicit TileLowering(TileOp tile);
-  void run();
+  void makePrivate();
+  void leaveInImage();
 
 private:
+  ArrayRef<int64_t> getExtents() {
+    return tile.getTile().getType().getExtents();
+  }
   void createArrays();
+  void findBin();
+  /// A region for what happens if tiles begin with their clear value.
+  scf::IfOp createChoice(bool withElse);
+  /// Calls `body` with each number of the record and its clear value.
+  void
+  forEachClear(llvm::function_ref<void(FieldAttr, ValueRange, Value)> body);
   void createClear();
+  void clearImage();
   void createRead();
   void createWrite();
   void replaceAccess(Operation *access);
@@ -52,8 +65,24 @@ private:
   /// it.
   void forPixels(ValueRange extents,
                  llvm::function_ref<void(ArrayRef<Value>)> body);
-  /// Where a pixel, by its place in the tile, is in a field's array.
-  SmallVector<Value> getPlace(ValueRange elements, ArrayRef<Value> pixel);
+  /// The number of a pixel, by its place in the tile, among all of them.
+  Value getNumber(ArrayRef<Value> pixel);
+  /// Where an element of a field of a pixel is in its array.
+  Value getPlace(FieldAttr field, ValueRange elements, Value number);
+  Value load(FieldAttr field, ValueRange elements, Value number);
+  void store(Value value, FieldAttr field, ValueRange elements, Value number);
+  void storeInImage(Value value, ValueRange at, FieldAttr field,
+                    ValueRange elements) {
+    StoreOp::create(builder, loc, value, tile.getImage(), at, field.getName(),
+                    elements, /*tile=*/Value(), /*checked=*/true,
+                    /*of=*/nullptr);
+  }
+  Value times(Value value, int64_t factor) {
+    return arith::MulIOp::create(builder, loc, value, bins.constant(factor));
+  }
+  Value add(Value a, Value b) {
+    return arith::AddIOp::create(builder, loc, a, b);
+  }
   SmallVector<Value> getCoordinates(ArrayRef<Value> pixel);
 
   TileOp tile;
@@ -62,7 +91,12 @@ private:
   Location loc;
   OpBuilder builder;
   BinArithmetic bins;
-  llvm::StringMap<Value> arrays; // by name of the field
+  struct Array {
+    Value memory;
+    int64_t count = 0; // numbers of a pixel
+  };
+  llvm::MapVector<Type, Array> arrays;
+  llvm::StringMap<int64_t> places; // of fields among the numbers of their type
   /// The first cell of the bin, and how many cells are in the domain.
   SmallVector<Value> first, counts;
 };
@@ -75,15 +109,17 @@ TileLowering::TileLowering(TileOp tile)
       builder(tile), bins(builder, loc, getKernelStage(tile)) {}
 
 void TileLowering::createArrays() {
-  ArrayRef<int64_t> extents = tile.getTile().getType().getExtents();
-  constexpr int64_t lineSize = 64;
   for (auto field : record.getFields().getAsRange<FieldAttr>()) {
-    SmallVector<int64_t> shape(field.getCounts());
-    llvm::append_range(shape, llvm::reverse(extents));
-    arrays[field.getName()] = memref::AllocaOp::create(
-        builder, loc, MemRefType::get(shape, field.getType()),
-        builder.getI64IntegerAttr(lineSize));
+    Array &array = arrays[field.getType()];
+    places[field.getName()] = array.count;
+    array.count += field.getElementCount();
   }
+  constexpr int64_t lineSize = 64;
+  int64_t pixels = ShapedType::getNumElements(getExtents());
+  for (auto &[type, array] : arrays)
+    array.memory = memref::AllocaOp::create(
+        builder, loc, MemRefType::get({pixels * array.count}, type),
+        builder.getI64IntegerAttr(lineSize));
 }
 
 void TileLowering::forPixels(ValueRange extents,
@@ -99,11 +135,22 @@ void TileLowering::forPixels(ValueRange extents,
   body(pixel);
 }
 
-SmallVector<Value> TileLowering::getPlace(ValueRange elements,
-                                          ArrayRef<Value> pixel) {
-  SmallVector<Value> place(elements);
-  llvm::append_range(place, llvm::reverse(pixel));
-  return place;
+Value TileLowering::getNumber(ArrayRef<Value> pixel) {
+  Value number = pixel.back();
+  for (auto [at, extent] :
+       llvm::reverse(llvm::zip(pixel.drop_back(), getExtents().drop_back())))
+    number = add(times(number, extent), at);
+  return number;
+}
+
+Value TileLowering::getPlace(FieldAttr field, ValueRange elements,
+                             Value number) {
+  Value element = bins.constant(0);
+  for (auto [at, count] : llvm::zip(elements, field.getCounts()))
+    element = add(times(element, count), at);
+  Value first = add(times(number, arrays.lookup(field.getType()).count),
+                    bins.constant(places.at(field.getName())));
+  return add(first, element);
 }
 
 SmallVector<Value> TileLowering::getCoordinates(ArrayRef<Value> pixel) {
@@ -113,10 +160,8 @@ SmallVector<Value> TileLowering::getCoordinates(ArrayRef<Value> pixel) {
   return coordinates;
 }
 
-void TileLowering::createClear() {
-  SmallVector<Value> extents;
-  for (int64_t extent : tile.getTile().getType().getExtents())
-    extents.push_back(bins.constant(extent));
+void TileLowering::forEachClear(
+    llvm::function_ref<void(FieldAttr, ValueRange, Value)> body) {
   SmallVector<TypedAttr> numbers;
   for (Type type : record.getElementTypes())
     numbers.push_back(builder.getZeroAttr(type));
@@ -125,10 +170,28 @@ void TileLowering::createClear() {
         clear, [](Attribute number) { return cast<TypedAttr>(number); });
   size_t next = 0;
   forEachElement(builder, loc, record, [&](FieldAttr field, ValueRange es) {
-    Value number = arith::ConstantOp::create(builder, loc, numbers[next++]);
-    forPixels(extents, [&](ArrayRef<Value> pixel) {
-      memref::StoreOp::create(builder, loc, number, arrays.at(field.getName()),
-                              getPlace(es, pixel));
+    body(field, es, arith::ConstantOp::create(builder, loc, numbers[next++]));
+  });
+}
+
+void TileLowering::createClear() {
+  // One loop, or LLVM would unroll the inner one and scatter over rows.
+  auto loop = scf::ForOp::create(
+      builder, loc, bins.constant(0),
+      bins.constant(ShapedType::getNumElements(getExtents())),
+      bins.constant(1));
+  OpBuilder::InsertionGuard guard(builder);
+  builder.setInsertionPointToStart(loop.getBody());
+  forEachClear([&](FieldAttr field, ValueRange es, Value value) {
+    store(value, field, es, loop.getInductionVar());
+  });
+}
+
+void TileLowering::clearImage() {
+  forPixels(counts, [&](ArrayRef<Value> pixel) {
+    SmallVector<Value> at = getCoordinates(pixel);
+    forEachClear([&](FieldAttr field, ValueRange es, Value value) {
+      storeInImage(value, at, field, es);
     });
   });
 }
@@ -136,13 +199,13 @@ void TileLowering::createClear() {
 void TileLowering::createRead() {
   forPixels(counts, [&](ArrayRef<Value> pixel) {
     SmallVector<Value> at = getCoordinates(pixel);
+    Value number = getNumber(pixel);
     forEachElement(builder, loc, record, [&](FieldAttr field, ValueRange es) {
-      Value number = LoadOp::create(builder, loc, field.getType(),
-                                    tile.getImage(), at, field.getName(), es,
-                                    /*tile=*/Value(), /*checked=*/true,
-                                    /*of=*/nullptr);
-      memref::StoreOp::create(builder, loc, number, arrays.at(field.getName()),
-                              getPlace(es, pixel));
+      Value value = LoadOp::create(builder, loc, field.getType(),
+                                   tile.getImage(), at, field.getName(), es,
+                                   /*tile=*/Value(), /*checked=*/true,
+                                   /*of=*/nullptr);
+      store(value, field, es, number);
     });
   });
 }
@@ -150,55 +213,73 @@ void TileLowering::createRead() {
 void TileLowering::createWrite() {
   forPixels(counts, [&](ArrayRef<Value> pixel) {
     SmallVector<Value> at = getCoordinates(pixel);
+    Value number = getNumber(pixel);
     forEachElement(builder, loc, record, [&](FieldAttr field, ValueRange es) {
-      Value number = memref::LoadOp::create(
-          builder, loc, arrays.at(field.getName()), getPlace(es, pixel));
-      StoreOp::create(builder, loc, number, tile.getImage(), at,
-                      field.getName(), es, /*tile=*/Value(), /*checked=*/true,
-                      /*of=*/nullptr);
+      storeInImage(load(field, es, number), at, field, es);
     });
   });
 }
 
+Value TileLowering::load(FieldAttr field, ValueRange elements, Value number) {
+  return memref::LoadOp::create(builder, loc,
+                                arrays.lookup(field.getType()).memory,
+                                getPlace(field, elements, number));
+}
+
+void TileLowering::store(Value value, FieldAttr field, ValueRange elements,
+                         Value number) {
+  memref::StoreOp::create(builder, loc, value,
+                          arrays.lookup(field.getType()).memory,
+                          getPlace(field, elements, number));
+}
+
 void TileLowering::replaceAccess(Operation *access) {
   builder.setInsertionPoint(access);
-  auto getPlaceOf = [&](auto op) {
+  auto getNumberOf = [&](auto op) {
     SmallVector<Value> pixel;
     for (auto [from, index] : llvm::zip(first, op.getIndices()))
       pixel.push_back(
           arith::SubIOp::create(builder, loc, bins.toIndex(index), from));
-    return getPlace(op.getElements(), pixel);
+    return getNumber(pixel);
   };
-  if (auto load = dyn_cast<LoadOp>(access)) {
-    Value number = memref::LoadOp::create(
-        builder, load.getLoc(), arrays.at(load.getField()), getPlaceOf(load));
-    load.replaceAllUsesWith(number);
+  if (auto read = dyn_cast<LoadOp>(access)) {
+    Value number = getNumberOf(read);
+    read.replaceAllUsesWith(
+        load(record.getField(read.getField()), read.getElements(), number));
   } else {
-    auto store = cast<StoreOp>(access);
-    memref::StoreOp::create(builder, store.getLoc(), store.getValue(),
-                            arrays.at(store.getField()), getPlaceOf(store));
+    auto write = cast<StoreOp>(access);
+    Value number = getNumberOf(write);
+    store(write.getValue(), record.getField(write.getField()),
+          write.getElements(), number);
   }
   access->erase();
 }
 
-void TileLowering::run() {
-  createArrays();
+void TileLowering::findBin() {
   for (int64_t dim = 0, rank = bins.rank(); dim < rank; ++dim) {
     first.push_back(bins.lo(tile.getBin(), dim));
     Value end = bins.hi(tile.getBin(), dim);
     counts.push_back(arith::SubIOp::create(builder, loc, end, first.back()));
   }
+}
+
+scf::IfOp TileLowering::createChoice(bool withElse) {
+  auto open = *tile->getParentOfType<KernelOp>().getOps<OpenBinsOp>().begin();
+  Value clears = ClearsOp::create(builder, loc, open);
+  auto choice = scf::IfOp::create(builder, loc, clears, withElse);
+  builder.setInsertionPointToStart(choice.thenBlock());
+  return choice;
+}
+
+void TileLowering::makePrivate() {
+  createArrays();
+  findBin();
   if (tile.getClear()) {
-    auto open = *tile->getParentOfType<KernelOp>().getOps<OpenBinsOp>().begin();
-    Value clears = ClearsOp::create(builder, loc, open);
-    auto choice = scf::IfOp::create(builder, loc, clears, /*withElse=*/true);
-    builder.setInsertionPointToStart(choice.thenBlock());
+    scf::IfOp choice = createChoice(/*withElse=*/true);
     createClear();
     builder.setInsertionPointToStart(choice.elseBlock());
-    createRead();
-  } else {
-    createRead();
   }
+  createRead();
   for (Operation *user : llvm::make_early_inc_range(tile->getUsers())) {
     if (!isa<WriteTileOp>(user)) {
       replaceAccess(user);
@@ -211,9 +292,26 @@ void TileLowering::run() {
   tile.erase();
 }
 
-void piko::lowerTiles(PipelineOp pipeline) {
+void TileLowering::leaveInImage() {
+  if (tile.getClear()) {
+    findBin();
+    createChoice(/*withElse=*/false);
+    clearImage();
+  }
+  for (Operation *user : llvm::make_early_inc_range(tile->getUsers()))
+    llvm::TypeSwitch<Operation *>(user)
+        .Case<LoadOp, StoreOp>(
+            [](auto access) { access.getTileMutable().clear(); })
+        .Default([](Operation *write) { write->erase(); });
+  tile.erase();
+}
+
+void piko::lowerTiles(PipelineOp pipeline, bool arePrivate) {
   SmallVector<TileOp> tiles;
   pipeline.walk([&](TileOp tile) { tiles.push_back(tile); });
   for (TileOp tile : tiles)
-    TileLowering(tile).run();
+    if (TileLowering lowering(tile); arePrivate)
+      lowering.makePrivate();
+    else
+      lowering.leaveInImage();
 }

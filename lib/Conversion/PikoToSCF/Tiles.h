@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// Tiles as private arrays of the thread that runs a bin.
+// Where the CPU has tiles.
 
 #ifndef PIKO_LIB_CONVERSION_PIKOTOSCF_TILES_H
 #define PIKO_LIB_CONVERSION_PIKOTOSCF_TILES_H
@@ -15,9 +15,10 @@ void forEachElement(mlir::OpBuilder &builder, mlir::Location loc,
                     RecordOp record,
                     llvm::function_ref<void(FieldAttr, mlir::ValueRange)> body);
 
-/// Makes arrays of tiles, one a field, and loops of what fills them and writes
-/// them back. Updates have become loads and stores.
-void lowerTiles(PipelineOp pipeline);
+/// Makes private arrays of tiles, with loops that fill them and write them
+/// back; or leaves them where they are in their image, and clears that. Updates
+/// have become loads and stores.
+void lowerTiles(PipelineOp pipeline, bool arePrivate);
 
 } // namespace piko
 

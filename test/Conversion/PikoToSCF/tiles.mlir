@@ -1,36 +1,54 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// A tile is an array for each field, with the rows of pixels in a row.
+// A tile stays in the image, and its rows are cleared when the bin begins; or it
+// is an array for each type of numbers.
 // RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-form-units,convert-piko-to-scf),canonicalize,cse)' %s | FileCheck %s
+// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-form-units,convert-piko-to-scf{private-tiles=true}),canonicalize,cse)' %s | FileCheck %s --check-prefix=PRIVATE
 // RUN: piko-opt --piko-to-cpu %s | FileCheck %s --check-prefix=LLVM
 
 piko.record @Pixel {"z" : f32 at 0, "n" : i32[2 : 4] at 4} size 12 align 4
 piko.record @F {"x" : i32 at 0, "y" : i32 at 4} size 8 align 4
 
-// A bin in which nothing is has no tile.
+// A bin in which nothing is is passed over: the runtime has cleared it.
+// CHECK-DAG:     %[[ONE:.*]] = arith.constant 1.000000e+00 : f32
+// CHECK-DAG:     %[[THREE:.*]] = arith.constant 3 : i32
 // CHECK:         %[[BINS:.*]] = piko.storage.open_bins @a
 // CHECK:         %[[BEGIN:.*]], %[[END:.*]] = piko.storage.cell_range
 // CHECK:         %[[FILLED:.*]] = arith.cmpi ne, %[[BEGIN]], %[[END]]
 // CHECK:         scf.if %[[FILLED]] {
-// CHECK-DAG:       %[[Z:.*]] = memref.alloca() {alignment = 64 : i64} : memref<4x8xf32>
-// CHECK-DAG:       %[[N:.*]] = memref.alloca() {alignment = 64 : i64} : memref<2x4x8xi32>
+// CHECK-NOT:       memref.alloca
 // CHECK:           %[[CLEARS:.*]] = piko.storage.clears %[[BINS]]
-// In the first launch the whole array gets the clear value,
 // CHECK:           scf.if %[[CLEARS]] {
-// CHECK:             memref.store %{{.*}}, %[[Z]][%{{.*}}, %{{.*}}]
-// in others what of the bin is in the domain is read.
-// CHECK:           } else {
-// CHECK:             %[[OLD:.*]] = piko.load checked @image[%{{.*}}, %{{.*}} : index, index] "z" : f32
-// CHECK:             memref.store %[[OLD]], %[[Z]][%[[ROW:.*]], %[[COLUMN:.*]]]
-// An access is at the place in the bin.
-// CHECK:             %[[COLUMN:.*]] = arith.subi
-// CHECK:             %[[ROW:.*]] = arith.subi
-// CHECK:             memref.load %[[Z]][%[[ROW]], %[[COLUMN]]]
-// CHECK:             memref.store %{{.*}}, %[[Z]][%[[ROW]], %[[COLUMN]]]
+// CHECK:             piko.store %[[ONE]], checked @image[%[[X:.*]], %[[Y:.*]] : index, index] "z" : f32
+// CHECK:             piko.store %[[THREE]], checked @image[%[[X]], %[[Y]] : index, index] "n"[%c1] : i32
+// CHECK:             piko.load checked @image[%{{.*}}, %{{.*}} : index, index] "z" : f32
 // CHECK:           } {piko.lanes}
+// CHECK-NOT:       piko.store
+
+// PRIVATE:       scf.if %{{.*}} {
+// PRIVATE-DAG:     %[[Z:.*]] = memref.alloca() {alignment = 64 : i64} : memref<32xf32>
+// PRIVATE-DAG:     %[[N:.*]] = memref.alloca() {alignment = 64 : i64} : memref<64xi32>
+// PRIVATE:         %[[CLEARS:.*]] = piko.storage.clears
+// In the first launch the whole array gets the clear value,
+// PRIVATE:         scf.if %[[CLEARS]] {
+// PRIVATE:           memref.store %{{.*}}, %[[Z]][%{{.*}}] : memref
+// in others what of the bin is in the domain is read.
+// PRIVATE:         } else {
+// PRIVATE:           %[[OLD:.*]] = piko.load checked @image[%{{.*}}, %{{.*}} : index, index] "z" : f32
+// PRIVATE:           memref.store %[[OLD]], %[[Z]][%{{.*}}]
+// An access is at the place in the bin.
+// PRIVATE:           %[[COLUMN:.*]] = arith.subi
+// PRIVATE:           %[[ROW:.*]] = arith.subi
+// PRIVATE:           %[[BEFORE:.*]] = arith.muli %[[ROW]], %c8
+// PRIVATE:           %[[AT:.*]] = arith.addi %[[BEFORE]], %[[COLUMN]]
+// PRIVATE:           memref.load %[[Z]][%[[AT]]]
+// PRIVATE:           memref.store %{{.*}}, %[[Z]][%[[AT]]]
+// PRIVATE:         } {piko.lanes}
 // At the end all of the bin is written.
-// CHECK:             %[[NEW:.*]] = memref.load %[[N]][%c1, %{{.*}}, %{{.*}}]
-// CHECK:             piko.store %[[NEW]], checked @image[%{{.*}}, %{{.*}} : index, index] "n"[%c1] : i32
+// PRIVATE:           %[[TWICE:.*]] = arith.muli %{{.*}}, %c2
+// PRIVATE:           %[[SECOND:.*]] = arith.addi %[[TWICE]], %c1
+// PRIVATE:           %[[NEW:.*]] = memref.load %[[N]][%[[SECOND]]]
+// PRIVATE:           piko.store %[[NEW]], checked @image[%{{.*}}, %{{.*}} : index, index] "n"[%c1] : i32
 
 // LLVM:        call @pikoir_declare_clears
 // LLVM-NOT:    @pikoir_clear(

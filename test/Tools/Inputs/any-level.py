@@ -15,7 +15,8 @@ IN_PIPELINE = """
     form-work form-tiles form-units split-loops prefetch compact-loops vectorize""".split()
 STEPS = [f"piko.pipeline(piko-{name})" for name in IN_PIPELINE]
 STEPS.insert(5, "piko-prune")
-STEPS += ["piko.pipeline(convert-piko-to-scf)"]
+# Where tiles are does not show.
+STEPS += ["piko.pipeline(convert-piko-to-scf{private-tiles=true})"]
 STEPS += ["piko.pipeline(convert-piko-to-openmp)", "convert-piko-to-llvm"]
 STEPS += ["convert-scf-to-cf,convert-vector-to-llvm,convert-math-to-llvm"]
 STEPS += ["convert-ub-to-llvm,convert-openmp-to-llvm"]
