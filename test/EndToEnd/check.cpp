@@ -10,6 +10,9 @@
 // RUN: sed -n '/^Iterations:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=ITERATIONS
 // RUN: sed -n '/^Outside:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=OUTSIDE
 // RUN: sed -n '/^Index:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=INDEX
+// A GPU finds the same, wherever its blocks begin.
+// RUN: not piko-compare %s --cases %t.stops --runs 1 --threads 2 --check --target gpu-on-cpu --gpu-threads 64 --gpu-seed 3 > %t.gpu
+// RUN: diff %t.out %t.gpu
 // STOP: --pipe Race --count 8
 // STOP: --pipe Early --count 8
 // STOP: --pipe Iterations --count 1

@@ -8,6 +8,7 @@
 
 #include "GridCode.h"
 
+#include "Piko/Dialect/Piko/IR/PikoCheck.h"
 #include "Piko/Dialect/Piko/IR/PikoGPU.h"
 
 using namespace mlir;
@@ -136,7 +137,10 @@ bool piko::createErrorEntry(OpBuilder &builder, Operation *op,
                             Value bin, int32_t code, ArrayRef<Value> numbers) {
   auto launch = op->getParentOfType<gpu::LaunchOp>();
   Grid *grid = context.grid(op);
-  if (!grid)
+  // What is checked is told to the runtime while the grid runs, and so are its
+  // errors: it knows which primitive they are about.
+  PipelineOp pipeline = context.numbers(op).pipeline;
+  if (!grid || !pipeline.getOps<CheckRecordOp>().empty())
     return false;
   Location loc = op->getLoc();
   int32_t place = grid->places++;
