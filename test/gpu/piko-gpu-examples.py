@@ -29,7 +29,7 @@ BLOCKS = [["--gpu-threads", "32", "--gpu-seed", "1"],
           ["--gpu-threads", "64", "--gpu-seed", "2"]]
 SIZE = ["--width", "41", "--height", "29", "--lights", "2", "--frames", "1",
         "--warmup", "0", "--json"]
-SCENES = {"reyes": str(ROOT / "examples/reyes/knot.bpt")}
+SCENES = {"reyes": [str(ROOT / "examples/reyes/knot.bpt"), "--set", "rate=6"]}
 # What piko-render has no scene for, and the size of its domain.
 COMPARED = {"voxelize": ["33", "18", "7"], "bilateral": ["41", "29"],
             "histogram": ["41", "29"]}
@@ -55,8 +55,8 @@ def compare(tools, folder, file, pipe, block):
 
 
 def draw(tools, folder, file, pipe, rest):
-    scene = SCENES.get(file.parent.name, "torus.ply")
-    command = [tools / "piko-render", file, "--pipe", pipe, scene, *SIZE, *rest]
+    scene = SCENES.get(file.parent.name, ["torus.ply"])
+    command = [tools / "piko-render", file, "--pipe", pipe, *scene, *SIZE, *rest]
     return command, json.loads(run(command, folder))
 
 
