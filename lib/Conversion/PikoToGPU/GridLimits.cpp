@@ -27,6 +27,9 @@ LogicalResult piko::checkGridLimits(KernelOp kernel) {
         place.getBin() != place->getParentOfType<BinsOp>().getBin())
       return place.emitError(
           "a kernel for a GPU places what a local edge takes in the same bin");
+    if (isa<TileOp>(op))
+      return op->emitError("a kernel for a GPU has no tiles; leave out "
+                           "piko-form-tiles");
     if (hasOtherBitsInPTX(op))
       return op->emitError("a kernel for a GPU uses '")
              << op->getName() << "', which has other bits there";

@@ -87,7 +87,8 @@ private:
   ThreadTile createTile();
   void groupItems();
   LogicalResult mapLoop(ParallelLoopOpInterface loop, MappingCounts &counts);
-  LogicalResult mapPieces(ParallelForOp loop);
+  void obeyLanes();
+  LogicalResult mapPieces(ParallelForOp loop, bool isOne);
   LogicalResult convertAccess();
   /// The fields that are read by name alone, or none if they are too large.
   llvm::MapVector<StringAttr, SmallVector<GetOp>> collectFields(ItemOp item);
@@ -408,14 +409,14 @@ LogicalResult GridBuilder::sharePixelsOfBins(SharingCounts &counts) {
 
 /// Cuts a loop whose iterations may be more than the block has threads, which
 /// share each of its pieces.
-LogicalResult GridBuilder::mapPieces(ParallelForOp loop) {
+LogicalResult GridBuilder::mapPieces(ParallelForOp loop, bool isOne) {
   loop.emitRemark("what iterations keep across barriers is in memory: they are "
                   "not known to be at most ")
       << threads << ", the threads of a block";
   if (failed(LoopSplitter(loop, memory.log).run()))
     return failure();
   launch.walk([&](scf::ForOp piece) {
-    if (piece->removeAttr("piko.lanes") &&
+    if (piece->removeAttr("piko.lanes") && !isOne &&
         chooseMapping(piece, threads) == ThreadMapping::Shared)
       piece->setAttr(sharedAttrName, UnitAttr::get(kernel.getContext()));
   });
@@ -425,6 +426,10 @@ LogicalResult GridBuilder::mapPieces(ParallelForOp loop) {
 LogicalResult GridBuilder::mapLoop(ParallelLoopOpInterface loop,
                                    MappingCounts &counts) {
   ThreadMapping mapping = chooseMapping(loop, threads);
+  bool isOne = loop->hasAttr(oneAttrName);
+  if (isOne)
+    mapping = mapping == ThreadMapping::Shared ? ThreadMapping::One
+                                               : ThreadMapping::Pieces;
   bool isNested =
       loop->getParentOfType<ParallelLoopOpInterface>() || hasSharedParent(loop);
   if (isNested || mapping == ThreadMapping::One) {
@@ -437,7 +442,7 @@ LogicalResult GridBuilder::mapLoop(ParallelLoopOpInterface loop,
       pixels ? numberIterations(pixels) : cast<ParallelForOp>(*loop);
   if (mapping == ThreadMapping::Pieces) {
     ++counts.cut;
-    return mapPieces(numbered);
+    return mapPieces(numbered, isOne);
   }
   if (mapping == ThreadMapping::Threads) {
     ++counts.threads; // BlockMapping.cpp does the rest
@@ -451,11 +456,31 @@ LogicalResult GridBuilder::mapLoop(ParallelLoopOpInterface loop,
   return success();
 }
 
-LogicalResult GridBuilder::mapWork(MappingCounts &counts) {
+/// Does what piko-map-lanes says. Where lanes would have items whose updates
+/// have to be put in order, they share the iterations of one; where they would
+/// have pairs, they have items if these need no order.
+void GridBuilder::obeyLanes() {
+  auto yes = UnitAttr::get(kernel.getContext());
+  auto keepToOne = [&](Operation *work) {
+    work->walk(
+        [&](ParallelLoopOpInterface loop) { loop->setAttr(oneAttrName, yes); });
+  };
   kernel.walk([&](ItemsOp work) {
-    if (chooseMapping(work, threads) == ThreadMapping::Shared)
-      work->setAttr(sharedAttrName, UnitAttr::get(kernel.getContext()));
+    LaneMapping lanes = work.getLanes().value_or(LaneMapping::Items);
+    if (lanes == LaneMapping::One)
+      keepToOne(work);
+    else if (lanes != LaneMapping::Iterations &&
+             chooseMapping(work, threads) == ThreadMapping::Shared)
+      work->setAttr(sharedAttrName, yes);
   });
+  kernel.walk([&](ListsOp work) {
+    if (work.getLanes() == LaneMapping::One)
+      keepToOne(work);
+  });
+}
+
+LogicalResult GridBuilder::mapWork(MappingCounts &counts) {
+  obeyLanes();
   formGrid();
   launch.walk([](scf::ForOp loop) { loop->removeAttr("piko.lanes"); });
   SmallVector<ParallelLoopOpInterface> loops; // those inside others first
@@ -472,7 +497,14 @@ LogicalResult GridBuilder::mapWork(MappingCounts &counts) {
 /// On a copy, which takes the kernel's place where it comes out.
 bool ConvertPikoToGPUPass::tryToSharePixels(KernelOp kernel, StageOp stage,
                                             int64_t count) {
-  if (!canSharePixels(kernel))
+  bool isOne = kernel
+                   ->walk([](ItemsOp items) {
+                     return items.getLanes() == LaneMapping::One
+                                ? WalkResult::interrupt()
+                                : WalkResult::advance();
+                   })
+                   .wasInterrupted();
+  if (isOne || !canSharePixels(kernel))
     return false;
   OpBuilder builder(kernel);
   auto copy = cast<KernelOp>(builder.clone(*kernel));
