@@ -196,8 +196,7 @@ PIKORT_API const int64_t *pikoir_grid(pikort_pipeline *p, int32_t stage);
 PIKORT_API const int64_t *pikoir_cell_grid(pikort_pipeline *p, int32_t stage);
 /// How many threads should run a kernel's units; asked after its begin.
 PIKORT_API int32_t pikoir_threads(pikort_pipeline *p);
-/// The number of the calling thread in the parallel region that it runs, and
-/// how many threads that has.
+/// The calling thread's number in its parallel region, and how many there are.
 PIKORT_API int64_t pikoir_thread(void);
 PIKORT_API int64_t pikoir_team(void);
 /// The status of the run so far; thread safe.
