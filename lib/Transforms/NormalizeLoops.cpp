@@ -12,7 +12,7 @@
 //   6. an scf.while whose work stands in front of its condition, in an scf.if
 //      with that condition, has it behind.
 
-#include "Piko/Dialect/Piko/IR/Piko.h"
+#include "Piko/Dialect/Piko/IR/BinArithmetic.h"
 #include "Piko/Transforms/Passes.h"
 
 #include "mlir/Dialect/Arith/IR/Arith.h"
@@ -58,13 +58,18 @@ Value invert(OpBuilder &builder, Value condition) {
                                  compare.getLhs(), compare.getRhs());
   Value a = invert(builder, op->getOperand(0));
   Value b = invert(builder, op->getOperand(1));
+  Operation *inverse;
   if (isa<arith::AndIOp>(op))
-    return arith::OrIOp::create(builder, loc, a, b);
-  return arith::AndIOp::create(builder, loc, a, b);
+    inverse = arith::OrIOp::create(builder, loc, a, b);
+  else
+    inverse = arith::AndIOp::create(builder, loc, a, b);
+  if (op->hasAttr(shortCircuitAttrName))
+    inverse->setAttr(shortCircuitAttrName, builder.getUnitAttr());
+  return inverse->getResult(0);
 }
 
 /// select %c, true, %d  =>  %c | %d, and select %c, %d, false  =>  %c & %d, of
-/// comparisons.
+/// comparisons. What is not needed need not be computed, as it was written.
 struct JoinConditions : OpRewritePattern<arith::SelectOp> {
   using OpRewritePattern::OpRewritePattern;
   LogicalResult matchAndRewrite(arith::SelectOp choice,
@@ -74,14 +79,18 @@ struct JoinConditions : OpRewritePattern<arith::SelectOp> {
       return failure();
     if (matchPattern(choice.getTrueValue(), m_One()) &&
         isInvertible(choice.getFalseValue())) {
-      rewriter.replaceOpWithNewOp<arith::OrIOp>(choice, condition,
-                                                choice.getFalseValue());
+      rewriter
+          .replaceOpWithNewOp<arith::OrIOp>(choice, condition,
+                                            choice.getFalseValue())
+          ->setAttr(shortCircuitAttrName, rewriter.getUnitAttr());
       return success();
     }
     if (matchPattern(choice.getFalseValue(), m_Zero()) &&
         isInvertible(choice.getTrueValue())) {
-      rewriter.replaceOpWithNewOp<arith::AndIOp>(choice, condition,
-                                                 choice.getTrueValue());
+      rewriter
+          .replaceOpWithNewOp<arith::AndIOp>(choice, condition,
+                                             choice.getTrueValue())
+          ->setAttr(shortCircuitAttrName, rewriter.getUnitAttr());
       return success();
     }
     return failure();

@@ -76,14 +76,15 @@ def mutate(text, pool, rng):
             action = rng.randrange(3)
             if action == 0:
                 del lines[at]
-            elif action == 1:
+            elif action == 1 and "^" not in lines[at]:
                 lines.insert(rng.randrange(len(lines) + 1), lines[at])
             else:
                 other = rng.randrange(len(lines))
                 lines[at], lines[other] = lines[other], lines[at]
             text = "\n".join(lines)
             continue
-        tokens = list(TOKEN.finditer(text))
+        # Upstream's parser writes to freed memory where a label is repeated.
+        tokens = [t for t in TOKEN.finditer(text) if t.group()[0] != "^"]
         if not tokens:
             return text
         token = rng.choice(tokens)
@@ -110,7 +111,8 @@ class Fuzzer:
         self.args = args
         self.passes = passes_of(args.opt)
         self.corpus = corpus_of(args.pikoc)
-        self.pool = sorted({t for module in self.corpus for t in TOKEN.findall(module)})
+        tokens = {t for module in self.corpus for t in TOKEN.findall(module)}
+        self.pool = sorted(t for t in tokens if t[0] != "^")
 
     def sequence(self, batch):
         """The passes of a batch."""

@@ -299,12 +299,37 @@ private:
 struct ConvertPikoToSCFPass
     : piko::impl::ConvertPikoToSCFBase<ConvertPikoToSCFPass> {
   using ConvertPikoToSCFBase::ConvertPikoToSCFBase;
+  /// LLVM branches where a second condition is chosen, and computes both where
+  /// they are joined: of a rasterizer's bounds that took 8 % of a frame.
+  static void restoreShortCircuits(PipelineOp pipeline) {
+    SmallVector<Operation *> joined;
+    pipeline.walk([&](Operation *op) {
+      if (op->hasAttr(shortCircuitAttrName) &&
+          isa<arith::AndIOp, arith::OrIOp>(op))
+        joined.push_back(op);
+    });
+    for (Operation *op : joined) {
+      OpBuilder builder(op);
+      Value first = op->getOperand(0), second = op->getOperand(1);
+      bool isOr = isa<arith::OrIOp>(op);
+      Value known = arith::ConstantOp::create(builder, op->getLoc(),
+                                              builder.getBoolAttr(isOr));
+      Value choice =
+          arith::SelectOp::create(builder, op->getLoc(), first,
+                                  isOr ? known : second, isOr ? second : known);
+      op->getResult(0).replaceAllUsesWith(choice);
+      op->erase();
+    }
+  }
+
   void runOnOperation() override {
     RewritePatternSet patterns(&getContext());
     populatePikoToSCFPatterns(patterns);
     if (failed(applyPatternsGreedily(getOperation(), std::move(patterns))))
       return signalPassFailure();
-    lowerTiles(getOperation(), privateTiles);
+    if (failed(lowerTiles(getOperation(), privateTiles)))
+      return signalPassFailure();
+    restoreShortCircuits(getOperation());
     getOperation().walk([&](Operation *op) {
       if (isa<UpdateOp, ListAtOp, ListSizeOp>(op)) {
         op->emitOpError(

@@ -306,12 +306,19 @@ void TileLowering::leaveInImage() {
   tile.erase();
 }
 
-void piko::lowerTiles(PipelineOp pipeline, bool arePrivate) {
+LogicalResult piko::lowerTiles(PipelineOp pipeline, bool arePrivate) {
   SmallVector<TileOp> tiles;
   pipeline.walk([&](TileOp tile) { tiles.push_back(tile); });
+  for (TileOp tile : tiles) {
+    auto kernel = tile->getParentOfType<KernelOp>();
+    if (kernel.getOps<OpenBinsOp>().empty() || !getKernelStage(tile))
+      return tile.emitOpError(
+          "expected loops over units, as piko-form-units makes them");
+  }
   for (TileOp tile : tiles)
     if (TileLowering lowering(tile); arePrivate)
       lowering.makePrivate();
     else
       lowering.leaveInImage();
+  return success();
 }

@@ -18,7 +18,7 @@ void forEachElement(mlir::OpBuilder &builder, mlir::Location loc,
 /// Makes private arrays of tiles, with loops that fill them and write them
 /// back; or leaves them where they are in their image, and clears that. Updates
 /// have become loads and stores.
-void lowerTiles(PipelineOp pipeline, bool arePrivate);
+llvm::LogicalResult lowerTiles(PipelineOp pipeline, bool arePrivate);
 
 } // namespace piko
 

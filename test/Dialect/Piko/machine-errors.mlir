@@ -211,3 +211,17 @@ piko.pipeline @P rank 1 {
     }
   }
 }
+
+// -----
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+piko.pipeline @P rank 1 {
+  piko.source @a
+  piko.stage @a bins [8] threads 1 placed : @F -> [] {}
+  piko.kernel @k {
+    // expected-error@+1 {{expected the number of a source of @a, but got 1}}
+    piko.items of @a source 1 {
+    ^bb0(%f: !piko.prim<@F>):
+    }
+  }
+}

@@ -10,6 +10,11 @@ piko.record @F {"x" : f32 at -4} size 4 align 4
 
 // -----
 
+// expected-error@+1 {{expected field 'x' to end within 281474976710656 bytes}}
+piko.record @Wraps {"x" : f32[9223372036854775807 : 12] at 4} size 20 align 4
+
+// -----
+
 // expected-error@+1 {{expected the counts and strides of field 'x' to be positive, but got 0 : 4}}
 piko.record @F {"x" : f32[0 : 4] at 0} size 4 align 4
 

@@ -11,6 +11,7 @@
 #include "mlir/IR/DialectImplementation.h"
 #include "mlir/IR/Matchers.h"
 #include "llvm/ADT/TypeSwitch.h"
+#include "llvm/Support/MathExtras.h"
 
 using namespace mlir;
 using namespace piko;
@@ -125,6 +126,18 @@ LogicalResult FieldAttr::verify(function_ref<InFlightDiagnostic()> emitError,
       return emitError() << "expected the counts and strides of field '" << name
                          << "' to be positive, but got " << count << " : "
                          << stride;
+  // So that no offset in it wraps.
+  constexpr int64_t mostBytes = int64_t(1) << 48;
+  int64_t numbers = 1, end = offset;
+  for (auto [count, stride] : llvm::zip(counts, strides)) {
+    int64_t extent;
+    if (llvm::MulOverflow(numbers, count, numbers) ||
+        llvm::MulOverflow(count - 1, stride, extent) ||
+        llvm::AddOverflow(end, extent, end) || numbers > mostBytes ||
+        end > mostBytes)
+      return emitError() << "expected field '" << name << "' to end within "
+                         << mostBytes << " bytes";
+  }
   return success();
 }
 

@@ -85,7 +85,9 @@ template <typename WorkOp> static LogicalResult verifyWork(WorkOp op) {
 }
 
 LogicalResult ItemsOp::verifySymbolUses(SymbolTableCollection &) {
-  return verifyWork(*this);
+  if (failed(verifyWork(*this)))
+    return failure();
+  return verifySource(*this, getSource(), getStageAttr());
 }
 
 LogicalResult ItemsOp::verifyRegions() {

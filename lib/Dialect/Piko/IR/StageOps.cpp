@@ -218,13 +218,27 @@ static LogicalResult verifyPhase(PhaseOp phase, bool isProcess) {
   return verifyPhaseBody(phase);
 }
 
+LogicalResult piko::verifySource(Operation *op, std::optional<int64_t> number,
+                                 FlatSymbolRefAttr stage) {
+  if (!number)
+    return success();
+  int64_t next = 0;
+  for (auto source : getPipeline(op).getOps<SourceOp>())
+    if (next++ == *number && source.getStageAttr() == stage)
+      return success();
+  return op->emitOpError("expected the number of a source of ")
+         << stage << ", but got " << *number;
+}
+
 LogicalResult AssignOp::verifyRegions() {
   if (isa<StageOp>((*this)->getParentOp())
           ? getPort() || getSource()
           : getPort().has_value() == getSource().has_value())
     return emitOpError("expected a port or a source inside a kernel, and "
                        "neither inside a stage");
-  return verifyPhase(*this, /*isProcess=*/false);
+  if (failed(verifyPhase(*this, /*isProcess=*/false)))
+    return failure();
+  return verifySource(*this, getSource(), getStageAttr());
 }
 
 LogicalResult ProcessOp::verifyRegions() {

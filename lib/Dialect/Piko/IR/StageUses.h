@@ -20,6 +20,12 @@ mlir::LogicalResult verifyLocalEdge(mlir::Operation *op,
                                     int64_t port,
                                     mlir::FlatSymbolRefAttr consumer);
 
+/// Reports at `op` unless the pipeline's source of that number, if any is said,
+/// feeds the stage.
+mlir::LogicalResult verifySource(mlir::Operation *op,
+                                 std::optional<int64_t> number,
+                                 mlir::FlatSymbolRefAttr stage);
+
 /// Reports at `op` unless so many coordinates are its pipeline's rank.
 mlir::LogicalResult verifyRank(mlir::Operation *op, size_t coordinates);
 

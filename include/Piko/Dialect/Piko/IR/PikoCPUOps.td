@@ -489,11 +489,11 @@ def Piko_NextUnitOp : Piko_CPUOp<"next_unit", [
   let summary = "the unit of work that a thread runs next";
   let description = [{
     First those that belong to the thread, in order, then the next one of those
-    that any thread may run. `last` is what it ran before, -1 at the start; the
+    that any thread may run. The operand is what it ran before, -1 at the start; the
     result is -1 at the end.
 
     ```mlir
-    %u = piko.cpu.next_unit %bins after %last : !piko.bins<@Fragment>
+    %u = piko.cpu.next_unit %bins after %unit : !piko.bins<@Fragment>
     ```
   }];
   let arguments = (ins Piko_BinsType:$bins, Index:$last);
