@@ -14,6 +14,7 @@ files and the list of passes; those with one sequence of passes share a process.
 
 import argparse
 import concurrent.futures
+import itertools
 import pathlib
 import random
 import re
@@ -83,7 +84,6 @@ def mutate(text, pool, rng):
                 lines[at], lines[other] = lines[other], lines[at]
             text = "\n".join(lines)
             continue
-        # Upstream's parser writes to freed memory where a label is repeated.
         tokens = [t for t in TOKEN.finditer(text) if t.group()[0] != "^"]
         if not tokens:
             return text
@@ -106,6 +106,14 @@ def mutate(text, pool, rng):
     return text
 
 
+def rename_labels(text):
+    """Gives blocks names of their own: where one is repeated in a region, upstream's
+    parser writes to freed memory."""
+    numbers = itertools.count()
+    return re.sub(r"^(\s*)\^\w+(?=\s*[(:])", lambda m: f"{m[1]}^bb{next(numbers)}", text,
+                  flags=re.M)
+
+
 class Fuzzer:
     def __init__(self, args):
         self.args = args
@@ -121,7 +129,7 @@ class Fuzzer:
 
     def module(self, seed):
         rng = random.Random(f"module {seed}")
-        return mutate(rng.choice(self.corpus), self.pool, rng)
+        return rename_labels(mutate(rng.choice(self.corpus), self.pool, rng))
 
     def run(self, passes, modules, seconds):
         """How piko-opt ends: "" if as it should."""

@@ -304,8 +304,10 @@ struct ConvertPikoToSCFPass
   static void restoreShortCircuits(PipelineOp pipeline) {
     SmallVector<Operation *> joined;
     pipeline.walk([&](Operation *op) {
+      // Lanes do not branch.
       if (op->hasAttr(shortCircuitAttrName) &&
-          isa<arith::AndIOp, arith::OrIOp>(op))
+          isa<arith::AndIOp, arith::OrIOp>(op) &&
+          op->getResult(0).getType().isInteger(1))
         joined.push_back(op);
     });
     for (Operation *op : joined) {
