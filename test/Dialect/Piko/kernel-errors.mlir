@@ -210,3 +210,15 @@ piko.pipeline @P rank 1 {
     piko.storage.append_bin %w[0] of @a in %zero tile %zero
   }
 }
+
+// -----
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+piko.pipeline @P rank 1 {
+  piko.source @a
+  piko.stage @a bins [8] threads 1 placed : @F -> [] {}
+  piko.kernel @k {
+    // expected-error@+1 {{expected the number of a source of @a, but got 65536}}
+    %bins = piko.storage.open_bins @a source 65536 : !piko.bins<@F>
+  }
+}

@@ -245,3 +245,14 @@ piko.pipeline @P rank 1 {
     }
   }
 }
+
+// -----
+
+func.func @no_pipeline(%n: i32) {
+  // expected-error@+1 {{expected to be inside a pipeline}}
+  piko.parallel_pixels (%n) to (%n) {
+  ^bb0(%x: i32):
+    piko.yield
+  }
+  return
+}

@@ -20,7 +20,7 @@ LogicalResult OpenBinsOp::verifySymbolUses(SymbolTableCollection &) {
     return emitOpError("expected bins of record ")
            << stage.getInputAttr() << ", but got "
            << getBins().getType().getRecord();
-  return success();
+  return verifySource(*this, getSource(), getStageAttr());
 }
 
 /// A value and the storage that it is in are of one record.

@@ -38,7 +38,10 @@ LogicalResult ParallelForOp::verifyRegions() {
 Value ParallelForOp::buildIteration(OpBuilder &) { return getIteration(); }
 
 LogicalResult ParallelPixelsOp::verifyRegions() {
-  int64_t rank = getPipeline(*this).getRank();
+  PipelineOp pipeline = getPipeline(*this);
+  if (!pipeline)
+    return emitOpError("expected to be inside a pipeline");
+  int64_t rank = pipeline.getRank();
   if (int64_t(getLo().size()) != rank)
     return emitOpError("expected a box of ")
            << rank << " dimensions, as its pipeline has, but got "
