@@ -91,16 +91,6 @@ static bool isEmission(Operation *op) {
          op->getName().getStringRef().starts_with("piko.fail");
 }
 
-template <typename Predicate>
-static bool contains(Operation *op, Predicate predicate) {
-  return op
-      ->walk([&](Operation *inner) {
-        return predicate(inner) ? WalkResult::interrupt()
-                                : WalkResult::advance();
-      })
-      .wasInterrupted();
-}
-
 /// What all threads take part in.
 static bool isShared(Operation *op) {
   return isa<ScratchOp, DeferBeginOp, DeferEndOp, LocalBinOp, ParallelForOp>(

@@ -497,13 +497,10 @@ LogicalResult GridBuilder::mapWork(MappingCounts &counts) {
 /// On a copy, which takes the kernel's place where it comes out.
 bool ConvertPikoToGPUPass::tryToSharePixels(KernelOp kernel, StageOp stage,
                                             int64_t count) {
-  bool isOne = kernel
-                   ->walk([](ItemsOp items) {
-                     return items.getLanes() == LaneMapping::One
-                                ? WalkResult::interrupt()
-                                : WalkResult::advance();
-                   })
-                   .wasInterrupted();
+  bool isOne = contains(kernel, [](Operation *op) {
+    auto items = dyn_cast<ItemsOp>(op);
+    return items && items.getLanes() == LaneMapping::One;
+  });
   if (isOne || !canSharePixels(kernel))
     return false;
   OpBuilder builder(kernel);

@@ -18,6 +18,17 @@ namespace piko {
 /// Fails, with an error, at what no grid of blocks can do.
 llvm::LogicalResult checkGridLimits(KernelOp kernel);
 
+/// Whether an operation, or one inside it, is one of those.
+template <typename Predicate>
+bool contains(mlir::Operation *op, Predicate predicate) {
+  return op
+      ->walk([&](mlir::Operation *inner) {
+        return predicate(inner) ? mlir::WalkResult::interrupt()
+                                : mlir::WalkResult::advance();
+      })
+      .wasInterrupted();
+}
+
 /// Whether the threads of a block can share the pixels of a bin: the kernel
 /// updates some and does nothing else that other primitives see.
 bool canSharePixels(KernelOp kernel);

@@ -189,16 +189,6 @@ static int64_t getMostIterations(ParallelLoopOpInterface loop) {
 // The choice
 //===----------------------------------------------------------------------===//
 
-template <typename Predicate>
-static bool contains(Operation *op, Predicate predicate) {
-  return op
-      ->walk([&](Operation *inner) {
-        return predicate(inner) ? WalkResult::interrupt()
-                                : WalkResult::advance();
-      })
-      .wasInterrupted();
-}
-
 /// What is checked is reported in the order of the reference.
 static bool isChecked(Operation *op) {
   return contains(op->getParentOfType<KernelOp>(), [](Operation *inner) {
