@@ -3,10 +3,10 @@
 
 #include "Piko/Frontend/Frontend.h"
 
-#include "Cleanup.h"
-#include "ModuleBuilder.h"
+#include "Cleanup/Cleanup.h"
+#include "Import/ModuleBuilder.h"
+#include "Import/Wiring.h"
 #include "Piko/Dialect/Piko/IR/Piko.h"
-#include "Wiring.h"
 #include "mlir/Dialect/Arith/IR/Arith.h"
 #include "mlir/Dialect/ControlFlow/IR/ControlFlow.h"
 #include "mlir/Dialect/Func/IR/FuncOps.h"

@@ -4,8 +4,8 @@
 
 #include "Piko/Frontend/HostCompiler.h"
 
-#include "ClangDiagnostics.h"
-#include "ClangInvocation.h"
+#include "Parse/ClangDiagnostics.h"
+#include "Parse/ClangInvocation.h"
 #include "clang/CodeGen/CodeGenAction.h"
 #include "clang/Frontend/CompilerInstance.h"
 #include "llvm/Support/VirtualFileSystem.h"

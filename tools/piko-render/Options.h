@@ -4,7 +4,7 @@
 #define PIKO_TOOLS_PIKORENDER_OPTIONS_H
 
 #include "Piko/Driver/PipelineLoader.h"
-#include "Piko/Driver/Scene/View.h"
+#include "Piko/Scene/View.h"
 
 #include <string>
 

@@ -5,8 +5,8 @@
 
 #include "Options.h"
 
-#include "Piko/Driver/Scene/Binding.h"
-#include "Piko/Driver/Scene/Json.h"
+#include "Piko/Scene/Binding.h"
+#include "Piko/Scene/Json.h"
 
 #include <pikort/pikort.h>
 

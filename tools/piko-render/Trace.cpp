@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #include "Trace.h"
 
-#include "Piko/Driver/Scene/Json.h"
+#include "Piko/Scene/Json.h"
 
 #include <cstring>
 #include <fstream>

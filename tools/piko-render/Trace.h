@@ -7,7 +7,7 @@
 #ifndef PIKO_TOOLS_PIKORENDER_TRACE_H
 #define PIKO_TOOLS_PIKORENDER_TRACE_H
 
-#include "Piko/Driver/Scene/Result.h"
+#include "Piko/Scene/Result.h"
 #include "pikort/pikort.h"
 
 #include <string>

@@ -9,9 +9,9 @@
 #include "Report.h"
 #include "Trace.h"
 
-#include "Piko/Driver/Scene/Binding.h"
-#include "Piko/Driver/Scene/ImageFile.h"
-#include "Piko/Driver/Scene/ProgressBar.h"
+#include "Piko/Scene/Binding.h"
+#include "Piko/Scene/ImageFile.h"
+#include "Piko/Scene/ProgressBar.h"
 
 #include <algorithm>
 #include <chrono>

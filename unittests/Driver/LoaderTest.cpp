@@ -3,7 +3,7 @@
 // Pipelines that an application compiles while it runs. It is built without
 // LLVM's headers, as such an application is.
 
-#include "TemporaryFolder.h"
+#include "../Support/TemporaryFolder.h"
 
 #include "Piko/Driver/ObjectCompiler.h"
 #include "Piko/Driver/PipelineLoader.h"

@@ -4,7 +4,7 @@
 
 #include "FineTessellation.h"
 
-#include "Piko/Driver/Scene/View.h"
+#include "Piko/Scene/View.h"
 
 #include <gtest/gtest.h>
 

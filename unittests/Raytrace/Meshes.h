@@ -3,7 +3,7 @@
 #ifndef PIKO_UNITTESTS_RAYTRACE_MESHES_H
 #define PIKO_UNITTESTS_RAYTRACE_MESHES_H
 
-#include "Piko/Driver/Scene/Bvh.h"
+#include "Piko/Scene/Bvh.h"
 
 #include <cmath>
 #include <random>

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// How Clang is called on a pipeline's C++.
+
+#include "Parse/ClangInvocation.h"
+
+#include "clang/Driver/CreateInvocationFromArgs.h"
+
+using namespace piko;
+
+std::shared_ptr<clang::CompilerInvocation> piko::createClangInvocation(
+    llvm::ArrayRef<const char *> flags, const FrontendOptions &options,
+    llvm::StringRef mainName,
+    llvm::IntrusiveRefCntPtr<clang::DiagnosticsEngine> diagnostics) {
+  std::vector<std::string> arguments = {
+      "clang++",
+      "-std=c++20",
+      "-fsyntax-only",
+      "-xc++",
+      "-ffp-contract=off",
+      "-resource-dir",
+      options.resourceDir.empty() ? PIKO_CLANG_RESOURCE_DIR
+                                  : options.resourceDir,
+      "-isystem",
+      options.runtimeIncludeDir.empty() ? PIKO_RUNTIME_INCLUDE_DIR
+                                        : options.runtimeIncludeDir};
+  arguments.insert(arguments.end(), flags.begin(), flags.end());
+  for (const std::string &directory : options.includeDirs)
+    arguments.push_back("-I" + directory);
+  for (const std::string &macro : options.defines)
+    arguments.push_back("-D" + macro);
+  arguments.push_back(mainName.str());
+  std::vector<const char *> argv;
+  for (const std::string &argument : arguments)
+    argv.push_back(argument.c_str());
+  clang::CreateInvocationOptions createOptions;
+  createOptions.Diags = diagnostics;
+  return clang::createInvocation(argv, createOptions);
+}

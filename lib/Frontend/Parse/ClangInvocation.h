@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// How Clang is called on a pipeline's C++, whatever the code is for.
+
+#ifndef PIKO_LIB_FRONTEND_PARSE_CLANGINVOCATION_H
+#define PIKO_LIB_FRONTEND_PARSE_CLANGINVOCATION_H
+
+#include "Piko/Frontend/Frontend.h"
+
+#include "clang/Basic/Diagnostic.h"
+#include "clang/Frontend/CompilerInvocation.h"
+
+#include <memory>
+
+namespace piko {
+
+/// The invocation for C++20 without contraction, with the user's folders and
+/// macros, piko.h's folder and Clang's own headers, and `flags`; null after an
+/// error.
+std::shared_ptr<clang::CompilerInvocation> createClangInvocation(
+    llvm::ArrayRef<const char *> flags, const FrontendOptions &options,
+    llvm::StringRef mainName,
+    llvm::IntrusiveRefCntPtr<clang::DiagnosticsEngine> diagnostics);
+
+} // namespace piko
+
+#endif // PIKO_LIB_FRONTEND_PARSE_CLANGINVOCATION_H

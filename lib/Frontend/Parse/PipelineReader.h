@@ -1,0 +1,78 @@
+//===- PipelineReader.h - Pipelines in Clang's AST --------------*- C++ -*-===//
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+#ifndef PIKO_LIB_FRONTEND_PARSE_PIPELINEREADER_H
+#define PIKO_LIB_FRONTEND_PARSE_PIPELINEREADER_H
+
+#include "Parse/RecordLayout.h"
+#include "clang/AST/DeclCXX.h"
+
+namespace clang {
+class Sema;
+} // namespace clang
+
+namespace piko {
+
+/// A pipeline type and the name by which the user knows it.
+struct PipeCandidate {
+  std::string name;
+  const clang::CXXRecordDecl *type;
+  clang::SourceLocation location;
+};
+
+/// Whether a class is a stage, or, being a template's, will be one.
+bool isStage(const clang::CXXRecordDecl *type);
+
+/// The pipelines that a translation unit defines or names by an alias, in
+/// order.
+std::vector<PipeCandidate> findPipes(clang::Sema &sema);
+
+/// The pipeline that `name` asks for; reports when there is none or more than
+/// one would do.
+llvm::FailureOr<PipeCandidate>
+selectPipe(const std::vector<PipeCandidate> &pipes, llvm::StringRef name,
+           mlir::Location file, clang::ASTContext &ast,
+           mlir::MLIRContext &context);
+
+/// Reads what declarations say about a pipeline: its state, and its stages with
+/// their ports and phases. Edges are read from the constructor's code, later.
+class PipelineReader {
+public:
+  PipelineReader(clang::ASTContext &ast, mlir::MLIRContext &context,
+                 PipelineDescription &pipeline, RecordTable &records)
+      : ast(ast), context(context), pipeline(pipeline), records(records) {}
+
+  llvm::LogicalResult read(const PipeCandidate &pipe);
+
+  /// The C++ types of the stages, by number, and of the state.
+  std::vector<const clang::CXXRecordDecl *> stageTypes;
+  clang::QualType stateType;
+
+  /// Where a base of the state begins in it, in bytes.
+  int64_t getStateOffset(clang::QualType base) const;
+
+private:
+  llvm::LogicalResult readState(clang::QualType type);
+  llvm::LogicalResult readMembers(const clang::CXXRecordDecl *decl,
+                                  int64_t offset);
+  llvm::LogicalResult readMember(const clang::FieldDecl *member,
+                                 int64_t offset);
+  llvm::LogicalResult readStage(const clang::FieldDecl *member);
+  llvm::LogicalResult
+  readTemplate(const clang::ClassTemplateSpecializationDecl *base,
+               StageDescription &stage);
+  llvm::LogicalResult readPhases(const clang::CXXRecordDecl *type,
+                                 clang::QualType input,
+                                 StageDescription &stage);
+  llvm::LogicalResult checkParameter(const clang::NamedDecl *phase,
+                                     clang::QualType input);
+  mlir::Location locate(clang::SourceLocation location) const;
+
+  clang::ASTContext &ast;
+  mlir::MLIRContext &context;
+  PipelineDescription &pipeline;
+  RecordTable &records;
+};
+
+} // namespace piko
+
+#endif // PIKO_LIB_FRONTEND_PARSE_PIPELINEREADER_H

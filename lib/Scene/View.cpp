@@ -1,0 +1,152 @@
+//===- View.cpp - Camera, lights and ground for a scene -------------------===//
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Benchmarks compare pictures with those of other renderers, which place
+// camera and lights by the same formulas: keep the operations as they are.
+//
+//===----------------------------------------------------------------------===//
+#include "Piko/Scene/View.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+using namespace piko;
+using namespace piko::render;
+
+namespace {
+
+constexpr float pi = std::numbers::pi_v<float>;
+constexpr float goldenAngle = 2.39996323f;
+
+glm::vec3 unit(glm::vec3 v) { return v * (1 / std::sqrt(glm::dot(v, v))); }
+
+bool isFinite(glm::vec3 v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+
+/// Calls f with all positions of a scene.
+template <class F> void forEachPoint(const Mesh &mesh, F f) {
+  for (const scene::Vertex &v : mesh.vertices)
+    f(v.position);
+  for (const scene::Patch &patch : mesh.patches)
+    for (glm::vec3 p : patch.points)
+      f(p);
+}
+
+/// World to clip space. The rows of the product of projection and view are the
+/// camera's axes, since its right and up already hold the angles of view.
+glm::mat4 viewProjection(const scene::Camera &c) {
+  glm::vec3 x = c.right * (1 / glm::dot(c.right, c.right));
+  glm::vec3 y = c.up * (1 / glm::dot(c.up, c.up));
+  glm::vec3 z = c.forward;
+  float depth = c.farZ - c.nearZ;
+  float scale = (c.farZ + c.nearZ) / depth;
+  float shift = 2 * c.farZ * c.nearZ / depth;
+  glm::mat4 m;
+  for (int i = 0; i < 3; ++i)
+    m[i] = {x[i], y[i], scale * z[i], z[i]};
+  m[3] = {-glm::dot(x, c.eye), -glm::dot(y, c.eye),
+          -scale * glm::dot(z, c.eye) - shift, -glm::dot(z, c.eye)};
+  return m;
+}
+
+} // namespace
+
+Sphere render::boundingSphere(const Mesh &mesh) {
+  glm::vec3 lo = mesh.patches.empty() ? mesh.vertices.at(0).position
+                                      : mesh.patches[0].points[0];
+  glm::vec3 hi = lo;
+  forEachPoint(mesh, [&](glm::vec3 p) {
+    lo = glm::min(lo, p);
+    hi = glm::max(hi, p);
+  });
+  Sphere sphere{(lo + hi) * 0.5f, 0};
+  forEachPoint(mesh, [&](glm::vec3 p) {
+    glm::vec3 d = p - sphere.center;
+    sphere.radius = std::max(sphere.radius, std::sqrt(glm::dot(d, d)));
+  });
+  return sphere;
+}
+
+void render::addGround(Mesh &mesh) {
+  Sphere scene = boundingSphere(mesh);
+  float reach = 2 * scene.radius, height = scene.center.y;
+  forEachPoint(mesh, [&](glm::vec3 p) { height = std::min(height, p.y); });
+  auto at = [&](float x, float z) {
+    return glm::vec3(scene.center.x + x * reach, height,
+                     scene.center.z + z * reach);
+  };
+  if (!mesh.patches.empty()) {
+    scene::Patch ground{.points = {}, .index = int32_t(mesh.patches.size())};
+    for (int i = 0; i < 4; ++i)
+      for (int j = 0; j < 4; ++j)
+        ground.points[4 * i + j] =
+            at(float(2 * j - 3) / 3, float(2 * i - 3) / 3);
+    mesh.patches.push_back(ground);
+    return;
+  }
+  auto first = int32_t(mesh.vertices.size());
+  for (glm::vec2 corner : {glm::vec2(-1, -1), {-1, 1}, {1, 1}, {1, -1}})
+    mesh.vertices.push_back(
+        {at(corner.x, corner.y), {0, 1, 0}, int32_t(mesh.vertices.size())});
+  for (glm::ivec3 corners : {glm::ivec3(0, 1, 2), {0, 2, 3}})
+    mesh.triangles.push_back({corners + first, int32_t(mesh.triangles.size())});
+}
+
+Result<scene::Camera> render::makeCamera(const ViewOptions &options,
+                                         const Sphere &scene) {
+  if (!(scene.radius > 0) || !std::isfinite(scene.radius))
+    return Error{"expected a scene with an extent, but all of it is one point"
+                 " or beyond the range of floats"};
+  if (!(options.fovy > 0 && options.fovy < 180))
+    return Error{"expected a field of view between 0 and 180 degrees"};
+  float aspect = float(options.width) / float(options.height);
+  float tangent = std::tan(options.fovy * pi / 360);
+  // The narrower of the two angles holds the sphere.
+  float half = std::atan(tangent * std::min(1.0f, aspect));
+
+  scene::Camera camera;
+  glm::vec3 at = options.at.value_or(scene.center);
+  camera.eye =
+      options.eye.value_or(at + glm::vec3(0, 0, scene.radius / std::sin(half)));
+  camera.forward = unit(at - camera.eye);
+  if (!isFinite(camera.forward))
+    return Error{"expected a camera that looks somewhere, but its eye is where "
+                 "it looks at"};
+  glm::vec3 upwards = std::fabs(camera.forward.y) > 0.999f ? glm::vec3(0, 0, -1)
+                                                           : glm::vec3(0, 1, 0);
+  glm::vec3 right = unit(glm::cross(camera.forward, upwards));
+  camera.right = right * (tangent * aspect);
+  camera.up = glm::cross(right, camera.forward) * tangent;
+
+  float distance = glm::dot(scene.center - camera.eye, camera.forward);
+  float least = 1e-3f * scene.radius;
+  camera.nearZ = std::max((distance - scene.radius) * 0.999f, least);
+  camera.farZ = std::max(distance + scene.radius, least) * 1.001f;
+  camera.viewProjection = viewProjection(camera);
+  return camera;
+}
+
+std::vector<scene::Light> render::makeLights(int count, const Sphere &scene) {
+  std::vector<scene::Light> lights;
+  float power = (count == 1 ? 1.0f : 3.0f) / float(count);
+  for (int i = 0; i < count; ++i) {
+    // From the top of a sphere downwards, turning by the golden angle.
+    float z = 1 - (i + 0.5f) / count * 1.4f;
+    float r = std::sqrt(std::max(0.0f, 1 - z * z));
+    float angle = i * goldenAngle + 0.8f;
+    glm::vec3 direction = {r * std::cos(angle), r * std::sin(angle), z};
+    if (i == 0)
+      direction = unit({0.4f, 0.6f, 0.7f});
+    bool isPoint = i % 2 == 1;
+    glm::vec3 position =
+        isPoint ? scene.center + direction * (2 * scene.radius) : direction;
+    auto hue = [&](float shift) {
+      return power * (0.7f + 0.3f * std::cos(i * 0.7f + shift));
+    };
+    lights.push_back({glm::vec4(position, isPoint ? 1.0f : 0.0f),
+                      glm::vec4(hue(0), hue(2), hue(4), 0)});
+  }
+  return lights;
+}

@@ -1,0 +1,137 @@
+//===- ImageFileTest.cpp - Images of all formats, and failures ------------===//
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+#include "../Support/TemporaryFolder.h"
+
+#include "Piko/Scene/ImageFile.h"
+
+#include <OpenImageIO/imageio.h>
+
+#include <chrono>
+#include <limits>
+#include <thread>
+#include <vector>
+
+using namespace piko::render;
+using piko::scene::Color;
+namespace fs = std::filesystem;
+
+namespace {
+
+class ImageFile : public TemporaryFolder {
+protected:
+  static constexpr int width = 3, height = 2;
+  std::vector<Color> pixels{{{0, 0.5f, 1, 1}},        {{0.1f, 0.1f, 0.1f, 0}},
+                            {{-1, 2, 1e30f, 1}},      {{0.25f, 0.75f, 0, 1}},
+                            {{0.998f, 0.999f, 1, 1}}, {{1e-3f, 0, 0, 0.5f}}};
+
+  /// Why an image could not be written; the message must name it.
+  std::string errorOf(const std::string &path) {
+    auto result = writeImage(path, width, height, pixels);
+    if (result)
+      return "no error";
+    EXPECT_NE(result.error().message.find("'" + path + "'"), std::string::npos)
+        << result.error().message;
+    return result.error().message;
+  }
+  size_t countFiles() const {
+    return size_t(std::distance(fs::directory_iterator(folder), {}));
+  }
+};
+
+template <class T>
+std::vector<T> readBack(const std::string &path, int channels,
+                        OIIO::TypeDesc type) {
+  auto input = OIIO::ImageInput::open(path);
+  if (!input || input->spec().nchannels != channels) {
+    ADD_FAILURE() << path;
+    return {};
+  }
+  const OIIO::ImageSpec &spec = input->spec();
+  std::vector<T> data(size_t(spec.width) * spec.height * channels);
+  EXPECT_TRUE(input->read_image(0, 0, 0, channels, type, data.data()));
+  return data;
+}
+
+TEST(ToByte, RoundsAndClamps) {
+  EXPECT_EQ(toByte(0), 0);
+  EXPECT_EQ(toByte(1), 255);
+  EXPECT_EQ(toByte(0.1f), 26); // 25.5 goes up
+  EXPECT_EQ(toByte(-5), 0);
+  EXPECT_EQ(toByte(7), 255);
+  EXPECT_EQ(toByte(std::numeric_limits<float>::infinity()), 255);
+  EXPECT_EQ(toByte(std::numeric_limits<float>::quiet_NaN()), 0);
+}
+
+TEST_F(ImageFile, EightBitFormats) {
+  for (const char *name : {"a.png", "a.ppm", "A.PNG", "a.bmp", "a.tif"}) {
+    auto written = writeImage(pathOf(name), width, height, pixels);
+    ASSERT_TRUE(written) << written.error().message;
+    auto bytes = readBack<uint8_t>(pathOf(name), 3, OIIO::TypeDesc::UINT8);
+    ASSERT_EQ(bytes.size(), pixels.size() * 3) << name;
+    for (size_t i = 0; i < pixels.size(); ++i)
+      for (int c = 0; c < 3; ++c)
+        EXPECT_EQ(bytes[3 * i + c], toByte(pixels[i].rgba[c])) << name;
+  }
+  EXPECT_EQ(countFiles(), 5u); // nothing else is left
+}
+
+TEST_F(ImageFile, ExrHoldsFloatsAndAlpha) {
+  ASSERT_TRUE(writeImage(pathOf("a.exr"), width, height, pixels));
+  auto floats = readBack<float>(pathOf("a.exr"), 4, OIIO::TypeDesc::FLOAT);
+  ASSERT_EQ(floats.size(), pixels.size() * 4);
+  for (size_t i = 0; i < pixels.size(); ++i)
+    for (int c = 0; c < 4; ++c)
+      EXPECT_EQ(floats[4 * i + c], pixels[i].rgba[c]);
+}
+
+/// Seconds apart, so that a date would show.
+TEST_F(ImageFile, EqualPicturesAreEqualFiles) {
+  auto contentOf = [&](const std::string &name) {
+    EXPECT_TRUE(writeImage(pathOf(name), width, height, pixels)) << name;
+    std::ifstream stream(pathOf(name), std::ios::binary);
+    return std::string((std::istreambuf_iterator<char>(stream)), {});
+  };
+  const std::vector<std::string> formats = {"exr", "tif", "png",
+                                            "jpg", "ppm", "hdr"};
+  std::vector<std::string> before;
+  for (const std::string &format : formats)
+    before.push_back(contentOf("before." + format));
+  std::this_thread::sleep_for(std::chrono::milliseconds(1100));
+  for (size_t i = 0; i < formats.size(); ++i) {
+    EXPECT_FALSE(before[i].empty());
+    EXPECT_TRUE(contentOf("after." + formats[i]) == before[i]) << formats[i];
+  }
+}
+
+TEST_F(ImageFile, ReplacesAnOlderImage) {
+  write("a.png", "old");
+  ASSERT_TRUE(writeImage(pathOf("a.png"), width, height, pixels));
+  readBack<uint8_t>(pathOf("a.png"), 3, OIIO::TypeDesc::UINT8);
+  EXPECT_EQ(countFiles(), 1u);
+}
+
+TEST_F(ImageFile, UnknownFormats) {
+  EXPECT_NE(errorOf(pathOf("a.nope")).find("extension 'nope'"),
+            std::string::npos);
+  EXPECT_NE(errorOf(pathOf("image")).find("ends in a format"),
+            std::string::npos);
+  EXPECT_FALSE(checkImageFormat(pathOf("a.nope")));
+  EXPECT_TRUE(checkImageFormat(pathOf("a.png")));
+  EXPECT_EQ(countFiles(), 0u);
+}
+
+TEST_F(ImageFile, PlacesThatCannotBeWritten) {
+  EXPECT_NE(errorOf(pathOf("none/a.png")).find("no folder"), std::string::npos);
+  fs::create_directories(pathOf("folder.png"));
+  EXPECT_NE(errorOf(pathOf("folder.png")), "no error");
+  write("file", "");
+  EXPECT_NE(errorOf(pathOf("file/a.png")), "no error");
+  EXPECT_EQ(countFiles(), 2u); // no partial file
+}
+
+TEST_F(ImageFile, WrongNumberOfPixels) {
+  EXPECT_FALSE(writeImage(pathOf("a.png"), 4, 4, pixels));
+  EXPECT_FALSE(writeImage(pathOf("a.png"), 0, 0, {}));
+}
+
+} // namespace
