@@ -20,7 +20,7 @@
 
 #include <algorithm>
 #include <cstring>
-#include <tuple>
+#include <utility>
 
 using namespace piko::rt;
 
@@ -73,18 +73,24 @@ private:
 } // namespace
 
 static Segments collect(Kernel &kernel, size_t port, Log PortLogs::*which) {
-  Segments result;
-  for (auto &lane : kernel.lanes) {
-    const auto &list = (lane->logs[port].*which).segments;
-    result.list.insert(result.list.end(), list.begin(), list.end());
-  }
   // A unit's segments are all of one lane, and in order there.
-  std::sort(result.list.begin(), result.list.end(),
-            [](const Segment &a, const Segment &b) {
-              return std::tie(a.unit, a.index) < std::tie(b.unit, b.index);
-            });
-  for (const Segment &segment : result.list)
-    result.bytes += segment.bytes;
+  std::vector<size_t> at;
+  for (auto &lane : kernel.lanes)
+    for (const Segment &segment : (lane->logs[port].*which).segments) {
+      auto unit = static_cast<size_t>(segment.unit);
+      at.resize(std::max(at.size(), unit + 1));
+      ++at[unit];
+    }
+  size_t count = 0;
+  for (size_t &next : at)
+    count += std::exchange(next, count);
+  Segments result;
+  result.list.resize(count);
+  for (auto &lane : kernel.lanes)
+    for (const Segment &segment : (lane->logs[port].*which).segments) {
+      result.list[at[static_cast<size_t>(segment.unit)]++] = segment;
+      result.bytes += segment.bytes;
+    }
   return result;
 }
 
@@ -168,8 +174,7 @@ public:
     starts_ = startsByRank(kernel_.counts[port_]);
     if (placed && !stream_.onePairEach())
       pairStarts_ = startsByRank(countPairs());
-    parallelFor(p_.threads, static_cast<int64_t>(kernel_.units.size()),
-                [&](int64_t unit) { gatherUnit(unit); });
+    forUnits([&](int64_t begin, int64_t end) { gatherUnits(begin, end); });
   }
   Array<uint32_t> takeStarts() { return std::move(starts_); }
   Array<uint32_t> takeOrdinals() { return std::move(ordinalStorage_); }
@@ -197,64 +202,85 @@ private:
     return starts;
   }
 
+  /// Calls body(begin, end) for ranges of units; small ones travel together.
+  template <class Body> void forUnits(const Body &body) {
+    auto units = static_cast<int64_t>(kernel_.units.size());
+    parallelChunks(p_.threads, units, units / (int64_t(p_.threads) * 16) + 1,
+                   body);
+  }
+
   /// For each slot, the cells of all its records.
   Array<uint32_t> countPairs() {
     Array<uint32_t> result(p_.memory, kernel_.slots());
     std::vector<int64_t> entries(kernel_.units.size());
     for (const Segment &segment : cells_.list)
       entries[static_cast<size_t>(segment.unit)] += segment.bytes / 4;
-    parallelFor(p_.threads, static_cast<int64_t>(kernel_.units.size()),
-                [&](int64_t u) {
-                  Reader reader(cells_, u);
-                  int64_t left = entries[static_cast<size_t>(u)];
-                  uint32_t entry = left > 0 ? reader.read() : 0;
-                  int64_t end = kernel_.slotBegin(u + 1);
-                  for (int64_t i = kernel_.slotBegin(u); i < end; ++i) {
-                    uint32_t pairs = 0;
-                    for (uint32_t r = kernel_.counts[port_][i]; r > 0; --r)
-                      do {
-                        ++pairs;
-                        entry = --left > 0 ? reader.read() : PIKOIR_FIRST_CELL;
-                      } while (!(entry & PIKOIR_FIRST_CELL));
-                    result[i] = pairs;
-                  }
-                });
+    forUnits([&](int64_t begin, int64_t end) {
+      for (int64_t u = begin; u < end; ++u)
+        countPairs(u, entries[static_cast<size_t>(u)], result);
+    });
     return result;
   }
 
-  void gatherUnit(int64_t u) {
-    const Array<uint32_t> &counts = kernel_.counts[port_];
-    Reader records(records_, u), cells(cells_, u), ordinals(ordinals_, u);
-    int64_t cell = kernel_.units[u].cell_begin;
-    int64_t unitEnd = kernel_.slotBegin(u + 1);
-    for (int64_t i = kernel_.slotBegin(u); i < unitEnd; ++i) {
-      uint32_t count = counts[i];
-      if (count == 0)
-        continue;
-      int64_t rank = rankOf(i);
-      int64_t at = starts_[rank];
-      records.read(stream_.itemStorage.data() + at * size_, count * size_);
-      if (pairStarts_) {
-        int64_t begin = pairStarts_[rank];
-        int64_t end = rank + 1 < pairStarts_.size() ? pairStarts_[rank + 1]
-                                                    : stream_.pairCount;
-        cells.read(
-            reinterpret_cast<uint8_t *>(stream_.pairStorage.data() + begin),
-            (end - begin) * 4);
-      } else if (stream_.pairStorage) {
-        cells.read(reinterpret_cast<uint8_t *>(stream_.pairStorage.data() + at),
-                   int64_t(count) * 4);
-      }
-      if (ordinalStorage_)
-        ordinals.read(reinterpret_cast<uint8_t *>(ordinalStorage_.data() + at),
-                      int64_t(count) * 4);
-      if (keyed_) {
-        while (!from_.collects() && kernel_.offsets[cell + 1] <= i)
-          ++cell;
-        for (uint32_t r = 0; r < count; ++r)
-          writeKey(at + r, i, cell, ordinals.read());
-      }
+  /// Of a unit that logged `left` entries.
+  void countPairs(int64_t u, int64_t left, Array<uint32_t> &result) const {
+    Reader reader(cells_, u);
+    uint32_t entry = left > 0 ? reader.read() : 0;
+    int64_t end = kernel_.slotBegin(u + 1);
+    for (int64_t i = kernel_.slotBegin(u); i < end; ++i) {
+      uint32_t pairs = 0;
+      for (uint32_t r = kernel_.counts[port_][i]; r > 0; --r)
+        do {
+          ++pairs;
+          entry = --left > 0 ? reader.read() : PIKOIR_FIRST_CELL;
+        } while (!(entry & PIKOIR_FIRST_CELL));
+      result[i] = pairs;
     }
+  }
+
+  void gatherUnits(int64_t begin, int64_t end) {
+    Readers from{{records_, begin}, {cells_, begin}, {ordinals_, begin}};
+    for (int64_t u = begin; u < end; ++u) {
+      int64_t cell = kernel_.units[u].cell_begin;
+      int64_t unitEnd = kernel_.slotBegin(u + 1);
+      for (int64_t i = kernel_.slotBegin(u); i < unitEnd; ++i)
+        if (kernel_.counts[port_][i] > 0)
+          gatherSlot(i, cell, from);
+    }
+  }
+
+  struct Readers {
+    Reader records, cells, ordinals;
+  };
+
+  /// `cell` is the slot's, or one before it.
+  void gatherSlot(int64_t i, int64_t &cell, Readers &from) {
+    uint32_t count = kernel_.counts[port_][i];
+    int64_t rank = rankOf(i);
+    int64_t at = starts_[rank];
+    from.records.read(stream_.itemStorage.data() + at * size_, count * size_);
+    if (pairStarts_) {
+      int64_t begin = pairStarts_[rank];
+      int64_t end = rank + 1 < pairStarts_.size() ? pairStarts_[rank + 1]
+                                                  : stream_.pairCount;
+      from.cells.read(
+          reinterpret_cast<uint8_t *>(stream_.pairStorage.data() + begin),
+          (end - begin) * 4);
+    } else if (stream_.pairStorage) {
+      from.cells.read(
+          reinterpret_cast<uint8_t *>(stream_.pairStorage.data() + at),
+          int64_t(count) * 4);
+    }
+    if (ordinalStorage_)
+      from.ordinals.read(
+          reinterpret_cast<uint8_t *>(ordinalStorage_.data() + at),
+          int64_t(count) * 4);
+    if (!keyed_)
+      return;
+    while (!from_.collects() && kernel_.offsets[cell + 1] <= i)
+      ++cell;
+    for (uint32_t r = 0; r < count; ++r)
+      writeKey(at + r, i, cell, from.ordinals.read());
   }
 
   void writeKey(int64_t to, int64_t slot, int64_t cell, uint32_t ordinal) {

@@ -32,7 +32,6 @@ namespace piko::rt {
 /// Consecutive bytes that one unit logged.
 struct Segment {
   int64_t unit;
-  size_t index; ///< In its log.
   const uint8_t *data;
   int64_t bytes;
 };

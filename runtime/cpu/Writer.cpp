@@ -43,8 +43,7 @@ void piko::rt::badCall(const Lane &lane, BadCall which) {
 /// Ends the segment at `cursor`.
 static void endSegment(Lane *lane, Log &log, uint8_t *cursor) {
   if (!log.failed && cursor != log.start)
-    log.segments.push_back(
-        {lane->unit, log.segments.size(), log.start, cursor - log.start});
+    log.segments.push_back({lane->unit, log.start, cursor - log.start});
   log.start = cursor;
 }
 
