@@ -3,6 +3,7 @@
 // The dialect's types and attributes, and look-ups that its operations share.
 
 #include "FieldAccess.h"
+#include "IsolatedBody.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 #include "Piko/Dialect/Piko/IR/PikoCheck.h"
 #include "Piko/Dialect/Piko/IR/PikoGPU.h"

@@ -2,6 +2,7 @@
 //
 // The run of a pipeline.
 
+#include "IsolatedBody.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 #include "Piko/Dialect/Piko/IR/PikoProgram.h"
 

@@ -76,7 +76,7 @@ def Piko_PipelineOp : Piko_Op<"pipeline", [
   let regions = (region SizedRegion<1>:$body);
   let assemblyFormat = [{
     $sym_name `rank` $rank (`max_extent` $max_extent^)?
-    attr-dict-with-keyword $body
+    attr-dict-with-keyword custom<IsolatedBody>($body)
   }];
   let hasRegionVerifier = 1;
   let extraClassDeclaration = [{

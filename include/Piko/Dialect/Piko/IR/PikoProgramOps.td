@@ -8,7 +8,8 @@
 include "Piko/Dialect/Piko/IR/PikoTypes.td"
 
 def Piko_ProgramOp : Piko_Op<"program", [
-    NoTerminator, SingleBlock, NoRegionArguments, HasParent<"PipelineOp">]> {
+    NoTerminator, SingleBlock, NoRegionArguments, IsolatedFromAbove,
+    HasParent<"PipelineOp">]> {
   let summary = "the run of a pipeline";
   let description = [{
     Says which kernel runs when, and how what one has emitted comes to the next.
@@ -70,7 +71,9 @@ def Piko_ProgramOp : Piko_Op<"program", [
   let arguments = (ins OptionalAttr<
     TypedArrayAttrBase<FlatSymbolRefAttr, "stages that begin a lineage">>:$roots);
   let regions = (region SizedRegion<1>:$body);
-  let assemblyFormat = "(`roots` $roots^)? attr-dict-with-keyword $body";
+  let assemblyFormat = [{
+    (`roots` $roots^)? attr-dict-with-keyword custom<IsolatedBody>($body)
+  }];
   let hasRegionVerifier = 1;
   let extraClassDeclaration = [{
     ::mlir::Block *getBodyBlock() { return &getBody().front(); }

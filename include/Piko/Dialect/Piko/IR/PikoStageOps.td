@@ -10,7 +10,8 @@ include "Piko/Dialect/Piko/IR/PikoTypes.td"
 
 def Piko_StageOp : Piko_Op<"stage", [
     Symbol, NoTerminator, SingleBlock, NoRegionArguments,
-    HasParent<"PipelineOp">, DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
+    IsolatedFromAbove, HasParent<"PipelineOp">,
+    DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
   let summary = "a stage of a pipeline";
   let description = [{
     Holds a `piko.process`, at most one `piko.assign` and at most one
@@ -64,7 +65,8 @@ def Piko_StageOp : Piko_Op<"stage", [
     (`tile` $tile^)? (`cycle` $cycle^)? (`split` $split^)?
     (`ordered` $ordered^)? (`placed` $placed^)? (`writes` $writes^)?
     (`fused` $fused^)?
-    `:` (`list` $takesList^)? $input `->` $outputs attr-dict-with-keyword $body
+    `:` (`list` $takesList^)? $input `->` $outputs attr-dict-with-keyword
+    custom<IsolatedBody>($body)
   }];
   let hasRegionVerifier = 1;
   let extraClassDeclaration = [{
@@ -123,7 +125,7 @@ def Piko_AssignOp : Piko_PhaseOp<"assign"> {
   let regions = (region SizedRegion<1>:$body);
   let assemblyFormat = [{
     (`of` $stage^)? (`port` $port^)? (`source` $source^)?
-    attr-dict-with-keyword $body
+    attr-dict-with-keyword custom<PhaseBody>($body)
   }];
   let hasRegionVerifier = 1;
 }
@@ -165,7 +167,7 @@ def Piko_ProcessOp : Piko_PhaseOp<"process"> {
   }];
   let arguments = (ins OptionalAttr<FlatSymbolRefAttr>:$stage);
   let regions = (region SizedRegion<1>:$body);
-  let assemblyFormat = "(`of` $stage^)? attr-dict-with-keyword $body";
+  let assemblyFormat = "(`of` $stage^)? attr-dict-with-keyword custom<PhaseBody>($body)";
   let hasRegionVerifier = 1;
 }
 
@@ -218,7 +220,7 @@ def Piko_ScheduleOp : Piko_Op<"schedule", [
     $kind (`tile_split` $tileSplit^)? (`end_stage` $endStage^)?
     (`end_bin` $endBin^)? (`batch` $batch^)? (`every_bin` $everyBin^)?
     (`unordered` $unordered^)? (`resolved` $resolved^)? (`lanes` $lanes^)?
-    attr-dict-with-keyword (`dynamic` $body^)?
+    attr-dict-with-keyword (`dynamic` custom<IsolatedBody>($body)^)?
   }];
   let hasRegionVerifier = 1;
 }
