@@ -4,8 +4,8 @@
 
 #include "Collectives.h"
 
-#include "mlir/Dialect/Arith/IR/Arith.h"
-#include "mlir/Dialect/MemRef/IR/MemRef.h"
+#include "Piko/Dialect/Piko/IR/CodeBuilder.h"
+
 #include "mlir/IR/IRMapping.h"
 
 using namespace mlir;
@@ -13,72 +13,21 @@ using namespace piko;
 
 namespace {
 
-/// Short names for what the loops below are made of.
-struct Writer {
-  OpBuilder &builder;
-  Location loc;
-
-  Value constant(int64_t value) {
-    return arith::ConstantIndexOp::create(builder, loc, value);
-  }
-  Value add(Value a, Value b) {
-    return arith::AddIOp::create(builder, loc, a, b);
-  }
-  Value sub(Value a, Value b) {
-    return arith::SubIOp::create(builder, loc, a, b);
-  }
-  Value min(Value a, Value b) {
-    return arith::MinSIOp::create(builder, loc, a, b);
-  }
-  Value both(Value a, Value b) {
-    return arith::AndIOp::create(builder, loc, a, b);
-  }
-  Value either(Value a, Value b) {
-    return arith::OrIOp::create(builder, loc, a, b);
-  }
-  Value select(Value condition, Value a, Value b) {
-    return arith::SelectOp::create(builder, loc, condition, a, b);
-  }
-  Value compare(arith::CmpIPredicate predicate, Value a, Value b) {
-    return arith::CmpIOp::create(builder, loc, predicate, a, b);
-  }
-  Value compare(arith::CmpFPredicate predicate, Value a, Value b) {
-    return arith::CmpFOp::create(builder, loc, predicate, a, b);
-  }
-  Value load(Value array, Value index) {
-    return memref::LoadOp::create(builder, loc, array, index);
-  }
-  SmallVector<Value> load(ValueRange arrays, Value index) {
-    return llvm::map_to_vector(arrays,
-                               [&](Value array) { return load(array, index); });
-  }
-  void store(ValueRange values, ValueRange arrays, Value index) {
-    for (auto [value, array] : llvm::zip(values, arrays))
-      memref::StoreOp::create(builder, loc, value, array, index);
-  }
-
-  /// for (i = from; i < to; i += step) body(i)
-  void forEach(Value from, Value to, Value step,
-               llvm::function_ref<void(Value)> body) {
-    auto loop = scf::ForOp::create(builder, loc, from, to, step);
-    OpBuilder::InsertionGuard guard(builder);
-    builder.setInsertionPointToStart(loop.getBody());
-    body(loop.getInductionVar());
-  }
+struct Writer : CodeBuilder {
+  using CodeBuilder::CodeBuilder;
 
   /// for (s = 1; s < count; s *= 2) state = body(s, state); the last state.
   SmallVector<Value>
   forEachPower(Value count, ValueRange state,
                llvm::function_ref<SmallVector<Value>(Value, ValueRange)> body) {
-    SmallVector<Value> inits{constant(1)};
+    SmallVector<Value> inits{index(1)};
     llvm::append_range(inits, state);
     auto loop = scf::WhileOp::create(
         builder, loc, ValueRange(inits).getTypes(), inits,
         [&](OpBuilder &, Location, ValueRange arguments) {
-          scf::ConditionOp::create(
-              builder, loc,
-              compare(arith::CmpIPredicate::slt, arguments.front(), count),
-              arguments);
+          scf::ConditionOp::create(builder, loc,
+                                   compare(P::slt, arguments.front(), count),
+                                   arguments);
         },
         [&](OpBuilder &, Location, ValueRange arguments) {
           Value s = arguments.front();
@@ -104,9 +53,7 @@ struct Writer {
   /// Whether a < b; NaNs are equal to each other and greater than all else.
   Value isLess(Value a, Value b, bool isUnsigned) {
     if (!isa<FloatType>(a.getType()))
-      return compare(isUnsigned || a.getType().isInteger(1)
-                         ? arith::CmpIPredicate::ult
-                         : arith::CmpIPredicate::slt,
+      return compare(isUnsigned || a.getType().isInteger(1) ? P::ult : P::slt,
                      a, b);
     Value isNumber = compare(arith::CmpFPredicate::ORD, a, a);
     Value isNaN = compare(arith::CmpFPredicate::UNO, b, b);
@@ -120,19 +67,19 @@ struct Writer {
 SmallVector<Value> piko::createCombination(OpBuilder &builder, Location loc,
                                            Block &combine, ValueRange left,
                                            ValueRange right) {
-  return Writer{builder, loc}.combine(combine, left, right);
+  return Writer(builder, loc).combine(combine, left, right);
 }
 
 Value piko::createLess(OpBuilder &builder, Location loc, Value a, Value b,
                        bool isUnsigned) {
-  return Writer{builder, loc}.isLess(a, b, isUnsigned);
+  return Writer(builder, loc).isLess(a, b, isUnsigned);
 }
 
 /// At distance s = 1, 2, 4, ..., for each multiple i of 2s with i + s < count.
 static void forEachPair(Writer &w, Value count,
                         llvm::function_ref<void(Value i, Value j)> body) {
   w.forEachPower(count, {}, [&](Value s, ValueRange) {
-    w.forEach(w.constant(0), w.sub(count, s), w.add(s, s),
+    w.forEach(w.index(0), w.sub(count, s), w.add(s, s),
               [&](Value i) { body(i, w.add(i, s)); });
     return SmallVector<Value>();
   });
@@ -140,7 +87,7 @@ static void forEachPair(Writer &w, Value count,
 
 void piko::createReduction(OpBuilder &builder, Location loc, Value count,
                            ValueRange slots, Block &combine) {
-  Writer w{builder, loc};
+  Writer w(builder, loc);
   forEachPair(w, count, [&](Value i, Value j) {
     w.store(w.combine(combine, w.load(slots, i), w.load(slots, j)), slots, i);
   });
@@ -151,23 +98,21 @@ void piko::createReduction(OpBuilder &builder, Location loc, Value count,
 // slot j is not read after that, so the block can wait there.
 void piko::createScan(OpBuilder &builder, Location loc, Value count,
                       ValueRange slots, Block &combine) {
-  Writer w{builder, loc};
+  Writer w(builder, loc);
   forEachPair(w, count, [&](Value i, Value j) {
     SmallVector<Value> left = w.load(slots, i), right = w.load(slots, j);
     w.store(w.combine(combine, left, right), slots, i);
     w.store(left, slots, j);
   });
   // Then [0, j) is [0, j - s) and the block.
-  Value zero = w.constant(0), one = w.constant(1);
+  Value zero = w.index(0), one = w.index(1);
   w.forEach(one, count, one, [&](Value j) {
     Value s = w.both(j, w.sub(zero, j));
-    Value several = w.compare(arith::CmpIPredicate::ne, j, s);
-    auto ifOp = scf::IfOp::create(builder, loc, TypeRange(), several,
-                                  /*addElse=*/false);
-    OpBuilder::InsertionGuard guard(builder);
-    builder.setInsertionPoint(ifOp.thenBlock()->getTerminator());
-    w.store(w.combine(combine, w.load(slots, w.sub(j, s)), w.load(slots, j)),
-            slots, j);
+    Value several = w.compare(Writer::P::ne, j, s);
+    w.when(several, [&] {
+      w.store(w.combine(combine, w.load(slots, w.sub(j, s)), w.load(slots, j)),
+              slots, j);
+    });
   });
 }
 
@@ -176,7 +121,7 @@ static void mergeRuns(Writer &w, Value keys, bool isUnsigned, Value room,
                       Value from, Value to, Value lo, Value mid, Value hi) {
   OpBuilder &builder = w.builder;
   Location loc = w.loc;
-  Value one = w.constant(1);
+  Value one = w.index(1);
   auto loop =
       scf::ForOp::create(builder, loc, lo, hi, one, ValueRange{lo, mid});
   OpBuilder::InsertionGuard guard(builder);
@@ -187,8 +132,8 @@ static void mergeRuns(Writer &w, Value keys, bool isUnsigned, Value room,
     return w.load(room, w.add(from, w.min(at, w.sub(end, one))));
   };
   Value a = head(left, mid), b = head(right, hi);
-  Value leftEnded = w.compare(arith::CmpIPredicate::sge, left, mid);
-  Value rightLasts = w.compare(arith::CmpIPredicate::slt, right, hi);
+  Value leftEnded = w.compare(Writer::P::sge, left, mid);
+  Value rightLasts = w.compare(Writer::P::slt, right, hi);
   Value less = w.isLess(w.load(keys, b), w.load(keys, a), isUnsigned);
   Value takeRight = w.either(leftEnded, w.both(rightLasts, less));
   w.store(w.select(takeRight, b, a), room, w.add(to, loop.getInductionVar()));
@@ -201,8 +146,8 @@ static void mergeRuns(Writer &w, Value keys, bool isUnsigned, Value room,
 // A stable merge sort from the bottom up, between the halves of `room`.
 void piko::createSort(OpBuilder &builder, Location loc, Value count, Value keys,
                       bool isUnsigned, Value room, Value ranks) {
-  Writer w{builder, loc};
-  Value zero = w.constant(0), one = w.constant(1);
+  Writer w(builder, loc);
+  Value zero = w.index(0), one = w.index(1);
   w.forEach(zero, count, one, [&](Value i) { w.store(i, room, i); });
   SmallVector<Value> halves =
       w.forEachPower(count, {zero, count}, [&](Value width, ValueRange halves) {

@@ -17,6 +17,7 @@
 #include "../../Transforms/ParallelLoops.h"
 
 #include "Piko/Dialect/Piko/IR/BinArithmetic.h"
+#include "Piko/Dialect/Piko/IR/CodeBuilder.h"
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
@@ -28,17 +29,15 @@ using namespace piko;
 
 namespace {
 
-class IterationMapper {
+class IterationMapper : CodeBuilder {
 public:
-  IterationMapper(ParallelForOp loop, gpu::LaunchOp launch,
+  IterationMapper(OpBuilder &builder, ParallelForOp loop, gpu::LaunchOp launch,
                   ThreadOperations &made)
-      : loop(loop), launch(launch), made(made), loc(loop.getLoc()),
-        builder(loop), uniformity(hoistInvariants(loop)) {}
+      : CodeBuilder(builder, loop.getLoc()), loop(loop), launch(launch),
+        made(made), uniformity(hoistInvariants(loop)) {}
   LogicalResult run();
 
 private:
-  using P = arith::CmpIPredicate;
-
   LogicalResult map(Block &block);
   LogicalResult mapBarrier(Operation *op);
   LogicalResult mapFor(scf::ForOp op);
@@ -48,51 +47,27 @@ private:
   /// Iteration 0's value, where `builder` stands. The barrier is the one that
   /// an iteration with another value would miss.
   Value agree(Value value, StringRef barrierName);
-  void compare(Value value, Value first, StringRef barrier);
+  void checkAgreement(Value value, Value first, StringRef barrier);
   void reduce(ReduceOp op);
   void scan(ScanOp op);
   void sort(SortOp op);
   /// For each distance 1, 2, 4, ..., or the other way round.
   void forEachDistance(bool falls, llvm::function_ref<void(Value)> body);
+  /// For each distance s, in the iterations that are a multiple of 2s and have
+  /// one so far behind them, whose number `body` gets.
+  void forEachPair(llvm::function_ref<void(Value)> body);
   SmallVector<Value> shareValues(ValueRange values);
 
-  Value constant(int64_t value) {
-    return arith::ConstantIndexOp::create(builder, loc, value);
-  }
-  Value compare(P predicate, Value a, Value b) {
-    return arith::CmpIOp::create(builder, loc, predicate, a, b);
-  }
-  Value both(Value a, Value b) {
-    return arith::AndIOp::create(builder, loc, a, b);
-  }
-  Value add(Value a, Value b) {
-    return arith::AddIOp::create(builder, loc, a, b);
-  }
-  Value sub(Value a, Value b) {
-    return arith::SubIOp::create(builder, loc, a, b);
-  }
-  Value load(Value array, Value at) {
-    return memref::LoadOp::create(builder, loc, array, at);
-  }
-  void store(Value value, Value array, Value at) {
-    memref::StoreOp::create(builder, loc, value, array, at);
-  }
   void barrier() { gpu::BarrierOp::create(builder, loc); }
-  /// if (condition) body()
+  /// if (condition) body(), which the thread does alone
   void when(Value condition, llvm::function_ref<void()> body) {
-    auto ifOp = scf::IfOp::create(builder, loc, condition);
-    made.ofOne.insert(ifOp);
-    OpBuilder::InsertionGuard guard(builder);
-    builder.setInsertionPointToStart(ifOp.thenBlock());
-    body();
+    made.ofOne.insert(CodeBuilder::when(condition, body));
   }
-  Value isActive() { return load(active, constant(0)); }
+  Value isActive() { return load(active, index(0)); }
 
   ParallelForOp loop;
   gpu::LaunchOp launch;
   ThreadOperations &made;
-  Location loc;
-  OpBuilder builder;
   Uniformity uniformity;
   StageOp stage;
   Value thread, count;
@@ -242,35 +217,30 @@ Value IterationMapper::agree(Value value, StringRef barrierName) {
   if (!loop->isAncestor(value.getParentBlock()->getParentOp()))
     return value;
   Value cell = addBlockMemory(launch, 1, value.getType());
-  Value zero = constant(0);
+  Value zero = index(0);
   when(compare(P::eq, thread, zero), [&] { store(value, cell, zero); });
   barrier();
   Value first = load(cell, zero);
   if (uniformity.isVarying(value))
-    compare(value, first, barrierName);
+    checkAgreement(value, first, barrierName);
   barrier();
   return first;
 }
 
 /// What comes behind such a barrier has no meaning, and is left out.
-void IterationMapper::compare(Value value, Value first, StringRef barrierName) {
-  Value zero = constant(0);
+void IterationMapper::checkAgreement(Value value, Value first,
+                                     StringRef barrierName) {
+  Value zero = index(0);
   Value differs = both(isActive(), compare(P::ne, value, first));
   when(differs, [&] {
-    Value yes =
-        arith::ConstantOp::create(builder, loc, builder.getBoolAttr(true));
-    store(yes, stopped, zero);
+    store(boolean(true), stopped, zero);
     auto failure = FailBarrierOp::create(
         builder, loc, stage.getSymName(), thread,
         findBin(builder, builder.getInsertionBlock()->getParentOp()));
     failure->setAttr(cppNameAttr, builder.getStringAttr(barrierName));
   });
   barrier();
-  when(load(stopped, zero), [&] {
-    Value no =
-        arith::ConstantOp::create(builder, loc, builder.getBoolAttr(false));
-    store(no, active, constant(0));
-  });
+  when(load(stopped, zero), [&] { store(boolean(false), active, index(0)); });
 }
 
 /// Iterations may count from different numbers, but equally often.
@@ -296,9 +266,9 @@ LogicalResult IterationMapper::mapFor(scf::ForOp op) {
   builder.setInsertionPoint(op);
   Value agreed = agree(none.getOperand(0), getCppName(findBarrier(op)));
   none.erase();
-  op.setLowerBound(constant(0));
+  op.setLowerBound(index(0));
   op.setUpperBound(agreed);
-  op.setStep(constant(1));
+  op.setStep(index(1));
   op.setUnsignedCmp(false);
   Value trip = op.getInductionVar();
   Type type = trip.getType();
@@ -323,10 +293,8 @@ void IterationMapper::mapWhile(scf::WhileOp op, StringRef barrierName) {
   scf::ConditionOp condition = op.getConditionOp();
   builder.setInsertionPoint(condition);
   Value agreed = agree(condition.getCondition(), barrierName);
-  Value yes =
-      arith::ConstantOp::create(builder, loc, builder.getBoolAttr(true));
-  Value goesOn =
-      arith::XOrIOp::create(builder, loc, load(stopped, constant(0)), yes);
+  Value goesOn = arith::XOrIOp::create(builder, loc, load(stopped, index(0)),
+                                       boolean(true));
   condition.getConditionMutable().assign(both(agreed, goesOn));
 }
 
@@ -352,28 +320,24 @@ void IterationMapper::forEachDistance(bool falls,
                                       llvm::function_ref<void(Value)> body) {
   int64_t threads = *getConstantIntValue(launch.getBlockSizeX());
   int64_t levels = llvm::Log2_64(threads);
-  auto counted = scf::ForOp::create(builder, loc, constant(0), constant(levels),
-                                    constant(1));
+  auto counted =
+      scf::ForOp::create(builder, loc, index(0), index(levels), index(1));
   OpBuilder::InsertionGuard insertion(builder);
   builder.setInsertionPointToStart(counted.getBody());
   Value level = counted.getInductionVar();
   if (falls)
-    level = sub(constant(levels - 1), level);
-  body(arith::ShLIOp::create(builder, loc, constant(1), level));
+    level = sub(index(levels - 1), level);
+  body(arith::ShLIOp::create(builder, loc, index(1), level));
   barrier();
 }
 
-static SmallVector<Value> loadAll(OpBuilder &builder, Location loc,
-                                  ValueRange arrays, Value at) {
-  return llvm::map_to_vector(arrays, [&](Value array) -> Value {
-    return memref::LoadOp::create(builder, loc, array, at);
+void IterationMapper::forEachPair(llvm::function_ref<void(Value)> body) {
+  forEachDistance(/*falls=*/false, [&](Value s) {
+    Value rest = both(thread, sub(add(s, s), index(1))), with = add(thread, s);
+    Value combines =
+        both(compare(P::eq, rest, index(0)), compare(P::slt, with, count));
+    when(combines, [&] { body(with); });
   });
-}
-
-static void storeAll(OpBuilder &builder, Location loc, ValueRange values,
-                     ValueRange arrays, Value at) {
-  for (auto [value, array] : llvm::zip(values, arrays))
-    memref::StoreOp::create(builder, loc, value, array, at);
 }
 
 /// In the order of the language: at distance s, each multiple of 2s that has
@@ -381,20 +345,12 @@ static void storeAll(OpBuilder &builder, Location loc, ValueRange values,
 void IterationMapper::reduce(ReduceOp op) {
   SmallVector<Value> arrays = shareValues(op.getValues());
   Block &body = op.getBody().front();
-  forEachDistance(/*falls=*/false, [&](Value s) {
-    Value rest = both(thread, sub(add(s, s), constant(1))),
-          with = add(thread, s);
-    Value combines =
-        both(compare(P::eq, rest, constant(0)), compare(P::slt, with, count));
-    when(combines, [&] {
-      storeAll(builder, loc,
-               createCombination(builder, loc, body,
-                                 loadAll(builder, loc, arrays, thread),
-                                 loadAll(builder, loc, arrays, with)),
-               arrays, thread);
-    });
+  forEachPair([&](Value with) {
+    store(createCombination(builder, loc, body, load(arrays, thread),
+                            load(arrays, with)),
+          arrays, thread);
   });
-  SmallVector<Value> results = loadAll(builder, loc, arrays, constant(0));
+  SmallVector<Value> results = load(arrays, index(0));
   barrier(); // before the arrays are written again
   for (auto [from, to] : llvm::zip(op.getResults(), results))
     from.replaceAllUsesWith(to);
@@ -406,36 +362,26 @@ void IterationMapper::scan(ScanOp op) {
   SmallVector<Value> arrays = shareValues(op.getValues());
   Block &body = op.getBody().front();
   Value runs = compare(P::slt, thread, count);
-  forEachDistance(/*falls=*/false, [&](Value s) {
-    Value rest = both(thread, sub(add(s, s), constant(1))),
-          with = add(thread, s);
-    Value combines =
-        both(compare(P::eq, rest, constant(0)), compare(P::slt, with, count));
-    when(combines, [&] {
-      SmallVector<Value> left = loadAll(builder, loc, arrays, thread),
-                         right = loadAll(builder, loc, arrays, with);
-      storeAll(builder, loc, createCombination(builder, loc, body, left, right),
-               arrays, thread);
-      storeAll(builder, loc, left, arrays, with);
-    });
+  forEachPair([&](Value with) {
+    SmallVector<Value> left = load(arrays, thread), right = load(arrays, with);
+    store(createCombination(builder, loc, body, left, right), arrays, thread);
+    store(left, arrays, with);
   });
   forEachDistance(/*falls=*/true, [&](Value s) {
-    Value rest = both(thread, sub(add(s, s), constant(1)));
+    Value rest = both(thread, sub(add(s, s), index(1)));
     Value isLowest = both(compare(P::eq, rest, s), compare(P::ne, thread, s));
     when(both(isLowest, runs), [&] {
-      storeAll(builder, loc,
-               createCombination(builder, loc, body,
-                                 loadAll(builder, loc, arrays, sub(thread, s)),
-                                 loadAll(builder, loc, arrays, thread)),
-               arrays, thread);
+      store(createCombination(builder, loc, body, load(arrays, sub(thread, s)),
+                              load(arrays, thread)),
+            arrays, thread);
     });
   });
-  SmallVector<Value> before = loadAll(builder, loc, arrays, thread);
+  SmallVector<Value> before = load(arrays, thread);
   barrier();
-  Value isFirst = compare(P::eq, thread, constant(0));
+  Value isFirst = compare(P::eq, thread, index(0));
   for (auto [result, empty, value] :
        llvm::zip(op.getResults(), op.getEmpty(), before)) {
-    Value chosen = arith::SelectOp::create(builder, loc, isFirst, empty, value);
+    Value chosen = select(isFirst, empty, value);
     uniformity.replace(result, chosen);
     result.replaceAllUsesWith(chosen);
   }
@@ -447,17 +393,15 @@ void IterationMapper::sort(SortOp op) {
   int64_t threads = *getConstantIntValue(launch.getBlockSizeX());
   Value ranks = addBlockMemory(launch, threads, builder.getIndexType());
   when(isActive(), [&] {
-    auto others = scf::ForOp::create(builder, loc, constant(0), count,
-                                     constant(1), ValueRange{constant(0)});
+    auto others = scf::ForOp::create(builder, loc, index(0), count, index(1),
+                                     ValueRange{index(0)});
     OpBuilder::InsertionGuard insertion(builder);
     builder.setInsertionPointToStart(others.getBody());
     Value at = others.getInductionVar(), key = load(keys, at);
     bool isUnsigned = op.getIsUnsigned();
     Value less = createLess(builder, loc, key, mine, isUnsigned);
     Value more = createLess(builder, loc, mine, key, isUnsigned);
-    Value ahead = arith::SelectOp::create(builder, loc, more, less,
-                                          compare(P::slt, at, thread));
-    ahead = arith::OrIOp::create(builder, loc, less, ahead);
+    Value ahead = either(less, select(more, less, compare(P::slt, at, thread)));
     Value counted = add(others.getRegionIterArg(0),
                         arith::IndexCastUIOp::create(
                             builder, loc, builder.getIndexType(), ahead));
@@ -488,13 +432,10 @@ LogicalResult IterationMapper::run() {
     active = own;
   }
   stopped = addBlockMemory(launch, 1, builder.getI1Type());
-  Value zero = constant(0), runs = compare(P::slt, thread, count);
+  Value zero = index(0), runs = compare(P::slt, thread, count);
   store(runs, active, zero);
-  when(compare(P::eq, thread, zero), [&] {
-    Value no =
-        arith::ConstantOp::create(builder, loc, builder.getBoolAttr(false));
-    store(no, stopped, constant(0));
-  });
+  when(compare(P::eq, thread, zero),
+       [&] { store(boolean(false), stopped, index(0)); });
   barrier();
   // Iteration 0 is there to say where all go.
   auto any = scf::IfOp::create(builder, loc, compare(P::sgt, count, zero));
@@ -514,5 +455,6 @@ LogicalResult IterationMapper::run() {
 
 LogicalResult piko::mapIterations(ParallelForOp loop, gpu::LaunchOp launch,
                                   ThreadOperations &made) {
-  return IterationMapper(loop, launch, made).run();
+  OpBuilder builder(loop);
+  return IterationMapper(builder, loop, launch, made).run();
 }

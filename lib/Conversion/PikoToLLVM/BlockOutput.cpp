@@ -296,7 +296,7 @@ void BlockOutput::keep(int64_t outbox, int64_t size) {
 
 void piko::createKeep(OpBuilder &builder, Location loc, const Grid &grid,
                       int64_t outbox) {
-  GridCode code{builder, loc};
+  GridCode code(builder, loc);
   int64_t words = outbox * PIKOIR_OUTBOX_WORDS;
   Value last = code.get(grid.outboxes, words + PIKOIR_OUTBOX_LAST);
   Value kind = code.add(last, code.constant(offsetof(pikoir_entry, kind)));
@@ -312,7 +312,7 @@ void piko::createKeep(OpBuilder &builder, Location loc, const Grid &grid,
 
 Value piko::createLocalBins(OpBuilder &builder, Operation *op, const Grid &grid,
                             int64_t outbox) {
-  GridCode code{builder, op->getLoc()};
+  GridCode code(builder, op->getLoc());
   auto pointer = LLVM::LLVMPointerType::get(builder.getContext());
   Value input;
   {

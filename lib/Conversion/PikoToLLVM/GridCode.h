@@ -7,28 +7,21 @@
 
 #include "LoweringContext.h"
 
+#include "Piko/Dialect/Piko/IR/CodeBuilder.h"
 #include "pikort/grid.h"
 
 #include "mlir/Dialect/GPU/IR/GPUDialect.h"
 #include "mlir/Dialect/Math/IR/Math.h"
-#include "mlir/Dialect/MemRef/IR/MemRef.h"
-#include "mlir/Dialect/SCF/IR/SCF.h"
 
 namespace piko {
 
 /// Numbers have 64 bits where nothing else is said; addresses are numbers.
-struct GridCode {
-  using P = mlir::arith::CmpIPredicate;
-
-  mlir::OpBuilder &builder;
-  mlir::Location loc;
+struct GridCode : CodeBuilder {
+  using CodeBuilder::CodeBuilder;
 
   mlir::Type i32() { return builder.getI32Type(); }
   mlir::Type i64() { return builder.getI64Type(); }
   mlir::Value constant(int64_t value) { return createI64(builder, loc, value); }
-  mlir::Value index(int64_t value) {
-    return mlir::arith::ConstantIndexOp::create(builder, loc, value);
-  }
   mlir::Value at(mlir::Value address) {
     return mlir::LLVM::IntToPtrOp::create(
         builder, loc, mlir::LLVM::LLVMPointerType::get(builder.getContext()),
@@ -48,26 +41,8 @@ struct GridCode {
   void set(mlir::Value value, mlir::Value words, int64_t which) {
     mlir::memref::StoreOp::create(builder, loc, value, words, index(which));
   }
-  mlir::Value add(mlir::Value a, mlir::Value b) {
-    return mlir::arith::AddIOp::create(builder, loc, a, b);
-  }
-  mlir::Value sub(mlir::Value a, mlir::Value b) {
-    return mlir::arith::SubIOp::create(builder, loc, a, b);
-  }
-  mlir::Value mul(mlir::Value a, mlir::Value b) {
-    return mlir::arith::MulIOp::create(builder, loc, a, b);
-  }
-  mlir::Value both(mlir::Value a, mlir::Value b) {
-    return mlir::arith::AndIOp::create(builder, loc, a, b);
-  }
   mlir::Value extend(mlir::Value a) {
     return mlir::arith::ExtUIOp::create(builder, loc, i64(), a);
-  }
-  mlir::Value select(mlir::Value condition, mlir::Value a, mlir::Value b) {
-    return mlir::arith::SelectOp::create(builder, loc, condition, a, b);
-  }
-  mlir::Value compare(P predicate, mlir::Value a, mlir::Value b) {
-    return mlir::arith::CmpIOp::create(builder, loc, predicate, a, b);
   }
   mlir::Value intrinsic(mlir::StringRef name, mlir::ValueRange arguments = {}) {
     return mlir::LLVM::CallIntrinsicOp::create(
@@ -76,13 +51,6 @@ struct GridCode {
   }
   void barrier() { mlir::gpu::BarrierOp::create(builder, loc); }
 
-  /// if (condition) body()
-  void when(mlir::Value condition, llvm::function_ref<void()> body) {
-    auto ifOp = mlir::scf::IfOp::create(builder, loc, condition);
-    mlir::OpBuilder::InsertionGuard guard(builder);
-    builder.setInsertionPointToStart(ifOp.thenBlock());
-    body();
-  }
   /// condition ? body() : otherwise()
   mlir::Value choose(mlir::Value condition,
                      llvm::function_ref<mlir::Value()> body,
@@ -95,14 +63,6 @@ struct GridCode {
     builder.setInsertionPointToStart(ifOp.elseBlock());
     mlir::scf::YieldOp::create(builder, loc, otherwise());
     return ifOp.getResult(0);
-  }
-  /// for (i = from; i < to; i += step) body(i), for indices
-  void forEach(mlir::Value from, mlir::Value to, mlir::Value step,
-               llvm::function_ref<void(mlir::Value)> body) {
-    auto loop = mlir::scf::ForOp::create(builder, loc, from, to, step);
-    mlir::OpBuilder::InsertionGuard guard(builder);
-    builder.setInsertionPointToStart(loop.getBody());
-    body(loop.getInductionVar());
   }
 
   /// Takes so many bytes, a multiple of 64, of a log (a pointer): the address

@@ -97,7 +97,7 @@ static Value extendOutbox(GridCode &code, Value log, Value words, int64_t base,
 Value piko::createEntry(OpBuilder &builder, Operation *op, const Grid &grid,
                         EntryKind kind, int64_t number, int64_t bytes,
                         int64_t stage, int64_t outbox) {
-  GridCode code{builder, op->getLoc()};
+  GridCode code(builder, op->getLoc());
   int64_t size = llvm::alignTo(layout::header + bytes, layout::header);
   int64_t base = outbox * PIKOIR_OUTBOX_WORDS;
   Value cursor = code.get(grid.outboxes, base + PIKOIR_OUTBOX_CURSOR);
@@ -257,7 +257,7 @@ struct AllocateLowering : ContextPattern<AllocateOp> {
   matchAndRewrite(AllocateOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
     Location loc = op.getLoc();
-    GridCode code{rewriter, loc};
+    GridCode code(rewriter, loc);
     // What is too large, or negative, must not wrap.
     Value most = code.constant(int64_t(1) << 48);
     Value size = arith::MinUIOp::create(

@@ -2,7 +2,7 @@
 
 #include "WriterPaths.h"
 
-#include "mlir/Dialect/SCF/IR/SCF.h"
+#include "Piko/Dialect/Piko/IR/CodeBuilder.h"
 
 using namespace mlir;
 using namespace piko;
@@ -28,10 +28,9 @@ constexpr RuntimeMember cursor = PIKO_RUNTIME_MEMBER(pikoir_port, cursor),
 namespace {
 
 /// Writes loads and stores of a struct's members, and conditions on them.
-class MemberBuilder {
-public:
+struct MemberBuilder : CodeBuilder {
   MemberBuilder(OpBuilder &builder, Location loc, Value base, ArrayAttr tag)
-      : builder(builder), loc(loc), base(base), tag(tag) {}
+      : CodeBuilder(builder, loc), base(base), tag(tag) {}
 
   Type pointer() { return LLVM::LLVMPointerType::get(builder.getContext()); }
   Type i32() { return builder.getI32Type(); }
@@ -47,26 +46,17 @@ public:
   }
   void increment(const RuntimeMember &member) {
     Value one = createI64(builder, loc, 1);
-    store(arith::AddIOp::create(builder, loc, load(member), one), member);
+    store(add(load(member), one), member);
   }
   Value comparePointers(LLVM::ICmpPredicate predicate, Value a, Value b) {
     return LLVM::ICmpOp::create(builder, loc, predicate, a, b);
   }
-  Value compare(arith::CmpIPredicate predicate, Value a, Value b) {
-    return arith::CmpIOp::create(builder, loc, predicate, a, b);
-  }
   /// Whether any of these flags is set.
   Value any(const RuntimeMember &flags, int64_t mask = -1) {
-    Value set = arith::AndIOp::create(builder, loc, load(flags),
-                                      createI32(builder, loc, mask));
-    return compare(arith::CmpIPredicate::ne, set, createI32(builder, loc, 0));
-  }
-  Value either(Value a, Value b) {
-    return arith::OrIOp::create(builder, loc, a, b);
+    Value set = both(load(flags), createI32(builder, loc, mask));
+    return compare(P::ne, set, createI32(builder, loc, 0));
   }
 
-  OpBuilder &builder;
-  Location loc;
   Value base;
   ArrayAttr tag; // of what a writer holds
 };
@@ -103,9 +93,8 @@ Value piko::createAppend(OpBuilder &builder, Location loc,
   scf::YieldOp::create(builder, loc, room);
   builder.setInsertionPointToStart(path.elseBlock());
   out.increment(layout::emitted);
-  Value isPlaced =
-      out.compare(arith::CmpIPredicate::ne, out.load(layout::cells),
-                  createI64(builder, loc, 0));
+  Value isPlaced = out.compare(MemberBuilder::P::ne, out.load(layout::cells),
+                               createI64(builder, loc, 0));
   scf::IfOp::create(
       builder, loc, isPlaced,
       [&](OpBuilder &, Location) {
@@ -139,8 +128,8 @@ void piko::createLocalPlace(OpBuilder &builder, Location loc,
   Value zero = createI64(builder, loc, 0);
   Value last = out.load(layout::lastCell);
   Value isSlow =
-      out.either(out.either(out.compare(arith::CmpIPredicate::ne, cell, zero),
-                            out.compare(arith::CmpIPredicate::ne, last,
+      out.either(out.either(out.compare(MemberBuilder::P::ne, cell, zero),
+                            out.compare(MemberBuilder::P::ne, last,
                                         createI64(builder, loc, -1))),
                  out.any(layout::portFlags, ~PIKOIR_PORT_LOCAL));
   OpBuilder::InsertionGuard guard(builder);
@@ -158,8 +147,8 @@ void piko::createPlace(OpBuilder &builder, Location loc,
   Value last = out.load(layout::lastCell);
   Value place = out.load(layout::cellCursor);
   Value isSlow =
-      out.either(out.either(out.compare(arith::CmpIPredicate::sle, cell, last),
-                            out.compare(arith::CmpIPredicate::sge, cell,
+      out.either(out.either(out.compare(MemberBuilder::P::sle, cell, last),
+                            out.compare(MemberBuilder::P::sge, cell,
                                         out.load(layout::cells))),
                  out.either(out.comparePointers(LLVM::ICmpPredicate::eq, place,
                                                 out.load(layout::cellEnd)),
@@ -167,7 +156,7 @@ void piko::createPlace(OpBuilder &builder, Location loc,
   OpBuilder::InsertionGuard guard(builder);
   callPlaceIf(isSlow, builder, loc, context, writer, port, cell);
   Value isFirst =
-      out.compare(arith::CmpIPredicate::slt, last, createI64(builder, loc, 0));
+      out.compare(MemberBuilder::P::slt, last, createI64(builder, loc, 0));
   auto first = scf::IfOp::create(builder, loc, isFirst,
                                  /*withElseRegion=*/false);
   builder.setInsertionPointToStart(first.thenBlock());
@@ -177,13 +166,11 @@ void piko::createPlace(OpBuilder &builder, Location loc,
   out.store(place, layout::run);
   out.increment(layout::kept);
   builder.setInsertionPointAfter(first);
-  Value mark = arith::SelectOp::create(
-      builder, loc, isFirst,
-      createI32(builder, loc, int64_t(PIKOIR_FIRST_CELL)),
-      createI32(builder, loc, 0));
+  Value mark =
+      out.select(isFirst, createI32(builder, loc, int64_t(PIKOIR_FIRST_CELL)),
+                 createI32(builder, loc, 0));
   Value entry = arith::TruncIOp::create(builder, loc, out.i32(), cell);
-  entry = arith::OrIOp::create(builder, loc, entry, mark);
-  createStore(builder, loc, entry, place, out.tag);
+  createStore(builder, loc, out.either(entry, mark), place, out.tag);
   out.store(createOffset(builder, loc, place, 4), layout::cellCursor);
   out.store(cell, layout::lastCell);
 }
