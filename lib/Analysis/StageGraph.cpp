@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #include "Piko/Analysis/StageGraph.h"
 
+#include "llvm/ADT/SetVector.h"
+
 using namespace mlir;
 using namespace piko;
 
@@ -11,6 +13,21 @@ SmallVector<StageOp> piko::getDeclaredStages(PipelineOp pipeline) {
       return *a.getLineage() < *b.getLineage();
     });
   return stages;
+}
+
+bool piko::isOnCycle(StageOp stage) {
+  auto edges = getPipeline(stage).getOps<EdgeOp>();
+  llvm::SmallSetVector<StringRef, 8> reached;
+  reached.insert(stage.getSymName());
+  for (size_t i = 0; i < reached.size(); ++i)
+    for (EdgeOp edge : edges) {
+      if (edge.getProducer() != reached[i])
+        continue;
+      if (edge.getConsumer() == stage.getSymName())
+        return true;
+      reached.insert(edge.getConsumer());
+    }
+  return false;
 }
 
 StageGraph::StageGraph(PipelineOp pipeline, ArrayRef<StageOp> stages)

@@ -5,6 +5,7 @@
 
 #include "Piko/Driver/Explain.h"
 
+#include "Piko/Analysis/StageGraph.h"
 #include "Piko/Dialect/Piko/IR/PikoProgram.h"
 #include "Piko/Driver/Compiler.h"
 
@@ -252,8 +253,8 @@ void Report::writeStage(StageOp stage) {
   if (ScheduleOp schedule = stage.getSchedule();
       schedule && schedule.getUnordered())
     out << ", unordered";
-  if (auto cycle = stage.getCycle())
-    out << ", on cycle " << *cycle;
+  if (isOnCycle(stage))
+    out << ", on a cycle";
   if (!hosts.contains(stage.getSymName())) {
     out << "\n    was removed\n";
     return;
@@ -341,7 +342,7 @@ void Report::writeProcess(ProcessOp process) {
 void Report::writeKernel(KernelOp kernel) {
   out << "  " << kernel.getSymName();
   if (ProcessOp process = kernel.getProcess())
-    if (getPhaseStage(process).getCycle())
+    if (isOnCycle(getPhaseStage(process)))
       out << ", again until its cycle is empty";
   out << "\n";
   for (Operation &op : *kernel.getBodyBlock()) {

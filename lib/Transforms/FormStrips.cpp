@@ -11,6 +11,7 @@
 
 #include "StateAccess.h"
 
+#include "Piko/Analysis/StageGraph.h"
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "Piko/Dialect/Piko/IR/PikoProgram.h"
 #include "Piko/Transforms/Passes.h"
@@ -136,7 +137,7 @@ std::optional<Reason> Group::whyNotAtAll(const Node &node) {
       return Reason{"it waits until nothing can reach its bins", schedule};
     if (!stage.collects())
       continue;
-    if (stage.getCycle())
+    if (isOnCycle(stage))
       return Reason{"it waits and is on a cycle, which runs in rounds",
                     schedule};
     for (auto name :

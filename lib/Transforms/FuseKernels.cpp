@@ -10,6 +10,7 @@
 
 #include "Piko/Analysis/BinIdentity.h"
 #include "Piko/Analysis/PhaseGraph.h"
+#include "Piko/Analysis/StageGraph.h"
 #include "StateAccess.h"
 
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
@@ -206,7 +207,7 @@ LogicalResult Candidate::checkState(Refusal &refusal) {
 
 LogicalResult Candidate::check(Refusal &refusal) {
   for (StageOp stage : {producer, consumer})
-    if (stage.getCycle())
+    if (isOnCycle(stage))
       return refuse(refusal, stage,
                     "stage '" + getCppName(stage) + "' is on a cycle");
   return failure(failed(checkBins(refusal)) ||

@@ -12,6 +12,7 @@
 
 #include "Piko/Analysis/BinIdentity.h"
 #include "Piko/Analysis/PhaseGraph.h"
+#include "Piko/Analysis/StageGraph.h"
 #include "Piko/Analysis/Uniformity.h"
 
 #include "mlir/Dialect/UB/IR/UBOps.h"
@@ -129,7 +130,7 @@ LogicalResult FuseStagesPass::check(EdgeOp edge, Refusal &refusal) {
     return failure();
   };
   for (StageOp stage : {producer, consumer})
-    if (stage.getCycle())
+    if (isOnCycle(stage))
       return refuse(stage, "stage '" + getCppName(stage) + "' is on a cycle");
   if (hasSource(consumer) || getEdgesInto(consumer).size() != 1)
     return refuse(consumer, "it is fed from several places");

@@ -155,15 +155,11 @@ void OrderStagesPass::runOnOperation() {
   if (order.size() != nodes.nodes.size())
     order = declared;
 
-  int64_t place = 0, cycle = 0;
+  int64_t place = 0;
   for (int node : declared) {
-    for (int stage : nodes.nodes[node]) {
+    for (int stage : nodes.nodes[node])
       graph.stages[stage].setLineage(place++);
-      if (nodes.cyclic[node])
-        graph.stages[stage].setCycle(cycle);
-    }
     cycles += nodes.cyclic[node];
-    cycle += nodes.cyclic[node];
   }
   Block *body = pipeline.getBodyBlock();
   for (int node : order)

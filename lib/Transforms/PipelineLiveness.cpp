@@ -4,6 +4,8 @@
 
 #include "PipelineLiveness.h"
 
+#include "Piko/Analysis/StageGraph.h"
+
 #include "mlir/Dialect/Arith/IR/Arith.h"
 #include "mlir/Dialect/MemRef/IR/MemRef.h"
 #include "mlir/IR/Matchers.h"
@@ -74,7 +76,7 @@ static bool isSurelyInside(AssignToOp assign) {
 static bool canBeObserved(StageOp stage) {
   // Hops are limited, and so are the numbers that a dynamic schedule gives.
   ScheduleOp schedule = stage.getSchedule();
-  if (stage.getCycle() || (schedule && !schedule.getBody().empty()))
+  if (isOnCycle(stage) || (schedule && !schedule.getBody().empty()))
     return true;
   return stage
       .walk([](Operation *op) {

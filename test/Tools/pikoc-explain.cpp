@@ -34,7 +34,7 @@ struct First : piko::Stage<4, 0, 64, Item, Item, Item>, piko::Uses<State> {
   }
 };
 
-// CHECK-NEXT: {{^  }}repeat: one bin, 64 threads, no schedule, on cycle 0
+// CHECK-NEXT: {{^  }}repeat: one bin, 64 threads, no schedule, on a cycle
 // CHECK-NEXT: from first port 0: 12 bytes a primitive, 16 before it was pruned
 // CHECK-NEXT: from repeat port 1: 12 bytes a primitive, 16 before it was pruned
 struct Repeat : piko::Stage<0, 0, 64, Item, Item, Item>, piko::Uses<State> {

@@ -109,13 +109,13 @@ piko.pipeline @Waits rank 2 {
   }
 }
 
-// The stages of a cycle stand together, as declared, and are numbered; a cycle
+// The stages of a cycle stand together, as declared; a cycle
 // has its place among the branches.
 // CHECK-LABEL: piko.pipeline @Cycles
 // CHECK:         piko.stage @in {{.*}} lineage 0 :
-// CHECK:         piko.stage @self {{.*}} lineage 1 cycle 0 :
-// CHECK:         piko.stage @a {{.*}} lineage 2 cycle 1 :
-// CHECK:         piko.stage @b {{.*}} lineage 3 cycle 1 :
+// CHECK:         piko.stage @self {{.*}} lineage 1 :
+// CHECK:         piko.stage @a {{.*}} lineage 2 :
+// CHECK:         piko.stage @b {{.*}} lineage 3 :
 // CHECK:         piko.stage @out {{.*}} lineage 4 :
 piko.pipeline @Cycles rank 2 {
   piko.source @in

@@ -15,6 +15,9 @@ using Lists = llvm::SmallVector<llvm::SmallVector<int>>;
 /// passes moved them: lineage counts them so.
 llvm::SmallVector<StageOp> getDeclaredStages(PipelineOp pipeline);
 
+/// Whether edges lead from a stage back to it.
+bool isOnCycle(StageOp stage);
+
 /// Stages as numbers.
 struct StageGraph {
   llvm::SmallVector<StageOp> stages;

@@ -160,10 +160,9 @@ def OrderStages : Pass<"piko-order-stages", "::piko::PipelineOp"> {
     and waits, and moves the stages so that branches stand in descending distance
     of their first stage from the drain; a branch comes later where it depends,
     by an edge or by `end_stage`, on one that has not come yet. The stages of a
-    cycle of edges are taken together, in order of declaration, and get the
-    number of their `cycle`. Also numbers the stages (`lineage`) by the
-    language's own rule: producers and stages waited for first, otherwise as
-    declared.
+    cycle of edges are taken together, in order of declaration. Also numbers the
+    stages (`lineage`) by the language's own rule: producers and stages waited
+    for first, otherwise as declared.
 
     **Guarantees** that each stage stands behind all stages that feed it or that
     it waits for, but for those on a cycle with it.
@@ -177,7 +176,7 @@ def OrderStages : Pass<"piko-order-stages", "::piko::PipelineOp"> {
     After:
     ```
     piko.stage @a ... lineage 0 ...
-    piko.stage @b ... lineage 1 cycle 0 ...
+    piko.stage @b ... lineage 1 ...
     piko.stage @c ... lineage 2 ...
     ```
 

@@ -172,7 +172,7 @@ private:
         builder.getDenseI64ArrayAttr(stage.bins),
         builder.getI64IntegerAttr(stage.threads), getRecordName(stage.input),
         builder.getArrayAttr(outputs), /*lineage=*/nullptr, /*tile=*/nullptr,
-        /*cycle=*/nullptr, /*split=*/nullptr, /*ordered=*/nullptr,
+        /*split=*/nullptr, /*ordered=*/nullptr,
         /*placed=*/nullptr, /*writes=*/nullptr,
         stage.takesList ? builder.getUnitAttr() : mlir::UnitAttr(),
         /*fused=*/nullptr);

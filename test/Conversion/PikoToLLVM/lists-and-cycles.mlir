@@ -85,10 +85,10 @@ piko.pipeline @P rank 1 {
   piko.source @c
   piko.edge @a[0] -> @b
   piko.edge @b[0] -> @a
-  piko.stage @a bins [8] threads 1 lineage 0 cycle 0 : list @F -> [@F] {
+  piko.stage @a bins [8] threads 1 lineage 0 : list @F -> [@F] {
     piko.schedule load_balance batch 4 every_bin unordered
   }
-  piko.stage @b bins [0] threads 1 lineage 1 cycle 0 : @F -> [@F] {}
+  piko.stage @b bins [0] threads 1 lineage 1 : @F -> [@F] {}
   piko.stage @c bins [0] threads 1 lineage 2 : @F -> [] {
     piko.schedule load_balance end_stage [@a]
   }

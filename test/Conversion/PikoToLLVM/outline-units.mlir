@@ -38,7 +38,7 @@ piko.pipeline @P rank 1 {
   piko.source @a
   piko.edge @a[0] -> @a
   piko.edge @a[1] -> @b
-  piko.stage @a bins [0] threads 1 lineage 0 cycle 0 : @F -> [@F, @F] {}
+  piko.stage @a bins [0] threads 1 lineage 0 : @F -> [@F, @F] {}
   piko.stage @b bins [0] threads 1 lineage 1 : @F -> [] {}
   piko.kernel @kernel_a {
     %bins = piko.storage.open_bins @a : !piko.bins<@F>

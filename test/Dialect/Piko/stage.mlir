@@ -41,9 +41,9 @@ piko.pipeline @Phases rank 2 {
   piko.stage @serial bins [0, 0] threads 1 : @F -> [] {
     piko.schedule serialize unordered
   }
-  // CHECK: piko.stage @collects bins [0, 0] threads 1 lineage 5 cycle 0 split ordered : list @F -> []
+  // CHECK: piko.stage @collects bins [0, 0] threads 1 lineage 5 split ordered : list @F -> []
   // CHECK-NEXT: piko.schedule load_balance batch 32 every_bin
-  piko.stage @collects bins [0, 0] threads 1 lineage 5 cycle 0 split ordered : list @F -> [] {
+  piko.stage @collects bins [0, 0] threads 1 lineage 5 split ordered : list @F -> [] {
     piko.schedule load_balance batch 32 every_bin
   }
 }

@@ -23,9 +23,7 @@ def Piko_StageOp : Piko_Op<"stage", [
     `lineage` is the stage's place in the order that lineage roots are numbered
     in, and is set by `piko-order-stages`, which moves stages. `tile` is the side
     of the tiles that a bin is divided into where `piko.owner` tells whose they
-    are. `list` says that the process phase takes the list of a bin. Stages with
-    the same `cycle` are on a common cycle of edges; `piko-order-stages` sets
-    it. `fused` names the stages whose phases `piko-fuse-stages` has made part
+    are. `list` says that the process phase takes the list of a bin. `fused` names the stages whose phases `piko-fuse-stages` has made part
     of this one. At the machine level, `split` says that a bin's primitives (its
     batches, where the phase takes a list) may be divided over threads in any
     way, `ordered` that the order in which they are processed shows in the
@@ -55,14 +53,13 @@ def Piko_StageOp : Piko_Op<"stage", [
                        TypedArrayAttrBase<FlatSymbolRefAttr, "records of the ports">:$outputs,
                        OptionalAttr<Piko_I64Attr>:$lineage,
                        OptionalAttr<Piko_I64Attr>:$tile,
-                       OptionalAttr<Piko_I64Attr>:$cycle,
                        UnitAttr:$split, UnitAttr:$ordered, UnitAttr:$placed,
                        UnitAttr:$writes, UnitAttr:$takesList,
                        OptionalAttr<StrArrayAttr>:$fused);
   let regions = (region SizedRegion<1>:$body);
   let assemblyFormat = [{
     $sym_name `bins` $bins `threads` $threads (`lineage` $lineage^)?
-    (`tile` $tile^)? (`cycle` $cycle^)? (`split` $split^)?
+    (`tile` $tile^)? (`split` $split^)?
     (`ordered` $ordered^)? (`placed` $placed^)? (`writes` $writes^)?
     (`fused` $fused^)?
     `:` (`list` $takesList^)? $input `->` $outputs attr-dict-with-keyword
