@@ -7,6 +7,7 @@
 #include "StateAccess.h"
 
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
+#include "Piko/Dialect/Piko/IR/Marks.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 #include "Piko/Transforms/Passes.h"
 
@@ -174,10 +175,10 @@ void GuardedLoop::createWork() {
   Value one = arith::ConstantIndexOp::create(builder, loc, 1);
   Value size = memref::LoadOp::create(builder, loc, count, zero);
   workLoop = scf::ForOp::create(builder, test.getLoc(), zero, size, one);
-  workLoop->setAttr("piko.lanes", builder.getUnitAttr());
-  workLoop->setAttr("piko.passed", builder.getUnitAttr());
-  if (Attribute mapping = loop->getAttr("piko.mapping"))
-    workLoop->setAttr("piko.mapping", mapping);
+  workLoop->setAttr(marks::lanes, builder.getUnitAttr());
+  workLoop->setAttr(marks::passed, builder.getUnitAttr());
+  if (Attribute mapping = loop->getAttr(marks::mapping))
+    workLoop->setAttr(marks::mapping, mapping);
   builder.setInsertionPointToStart(workLoop.getBody());
   Value place = workLoop.getInductionVar();
   IRMapping mapping;

@@ -14,6 +14,7 @@
 
 #include "Piko/Dialect/Piko/IR/BinArithmetic.h"
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
+#include "Piko/Dialect/Piko/IR/Marks.h"
 #include "Piko/Dialect/Piko/IR/PikoProgram.h"
 #include "Piko/Transforms/Passes.h"
 
@@ -174,7 +175,7 @@ std::optional<Reason> TileFormer::whyNot() {
 bool TileFormer::isInBin(Operation *access) {
   if (auto update = dyn_cast<UpdateOp>(access))
     return update.getBin() == bins.getBin();
-  return isa<LoadOp, StoreOp>(access) && access->hasAttr(insideAttrName);
+  return isa<LoadOp, StoreOp>(access) && access->hasAttr(marks::inside);
 }
 
 std::optional<Reason> TileFormer::whyNot(ImageOp image) {

@@ -8,6 +8,7 @@
 
 #include "UnitFormer.h"
 
+#include "Piko/Dialect/Piko/IR/Marks.h"
 #include "Piko/Transforms/Passes.h"
 
 #include "mlir/Dialect/Arith/IR/Arith.h"
@@ -58,8 +59,7 @@ void UnitFormer::createUnits(StageOp stage, IntegerAttr source) {
   auto forall = scf::ForallOp::create(
       rewriter, loc, ArrayRef<OpFoldResult>{count}, ValueRange(), std::nullopt);
   UnitLoop kind = source ? UnitLoop::Any : chooseLoop(stage.getSchedule());
-  forall->setAttr("piko.units",
-                  rewriter.getStringAttr(stringifyUnitLoop(kind)));
+  forall->setAttr(marks::units, UnitLoopAttr::get(rewriter.getContext(), kind));
   CloseBinsOp::create(rewriter, loc, bins);
   unit = forall.getInductionVar(0);
   unitEnd = forall.getTerminator();
@@ -206,10 +206,10 @@ void UnitFormer::convertItems(ItemsOp items, Value from, Value begin, Value end,
   Value one = arith::ConstantIndexOp::create(rewriter, at, 1);
   auto loop = scf::ForOp::create(rewriter, at, begin, end, one);
   loop->setAttrs(items->getDiscardableAttrDictionary());
-  loop->setAttr("piko.lanes", rewriter.getUnitAttr());
+  loop->setAttr(marks::lanes, rewriter.getUnitAttr());
   if (std::optional<LaneMapping> lanes = items.getLanes())
-    loop->setAttr("piko.mapping",
-                  rewriter.getStringAttr(stringifyLaneMapping(*lanes)));
+    loop->setAttr(marks::mapping,
+                  LaneMappingAttr::get(rewriter.getContext(), *lanes));
   rewriter.setInsertionPointToStart(loop.getBody());
   Value prim = ItemOp::create(rewriter, at, items.getPrim().getType(), from,
                               loop.getInductionVar());

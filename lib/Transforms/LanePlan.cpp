@@ -3,6 +3,7 @@
 #include "LanePlan.h"
 
 #include "Piko/Analysis/Repeatable.h"
+#include "Piko/Dialect/Piko/IR/Marks.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 #include "StateAccess.h"
 
@@ -17,7 +18,7 @@ using namespace mlir;
 using namespace piko;
 
 static bool isOverPrimitives(scf::ForOp loop) {
-  return loop->hasAttr("piko.lanes") &&
+  return loop->hasAttr(marks::lanes) &&
          loop->getParentOfType<scf::ForallOp>() && getKernelStage(loop) &&
          !loop.getNumResults() && matchPattern(loop.getStep(), m_One()) &&
          !loop.getBody()->getOps<ItemOp>().empty();
@@ -33,8 +34,8 @@ SmallVector<scf::ForOp> piko::findLoopsOverPrimitives(PipelineOp pipeline) {
 }
 
 std::optional<LaneMapping> piko::getLaneMapping(scf::ForOp loop) {
-  auto name = loop->getAttrOfType<StringAttr>("piko.mapping");
-  return name ? symbolizeLaneMapping(name.getValue()) : std::nullopt;
+  auto mapping = loop->getAttrOfType<LaneMappingAttr>(marks::mapping);
+  return mapping ? std::optional(mapping.getValue()) : std::nullopt;
 }
 
 int64_t LanePlan::countKept() const {

@@ -5,6 +5,7 @@
 #include "StateAccess.h"
 
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
+#include "Piko/Dialect/Piko/IR/Marks.h"
 #include "mlir/Dialect/Arith/IR/Arith.h"
 #include "mlir/Dialect/MemRef/IR/MemRef.h"
 #include "llvm/ADT/TypeSwitch.h"
@@ -148,7 +149,7 @@ LaneReport::Verdict &LaneReport::getVerdict(Operation *op, StringRef phase) {
 void LaneReport::add(scf::ForOp loop, const LanePlanner &planner, LaneCost cost,
                      bool isVectorized) {
   Verdict &verdict = getVerdict(loop, getLoopPhase(loop));
-  bool isBehindTest = loop->hasAttr("piko.passed");
+  bool isBehindTest = loop->hasAttr(marks::passed);
   ++verdict.loops;
   verdict.vectorized += isVectorized;
   verdict.isBehindTest |= isVectorized && isBehindTest;

@@ -7,6 +7,7 @@
 
 #include "Piko/Dialect/Piko/IR/BinArithmetic.h"
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
+#include "Piko/Dialect/Piko/IR/Marks.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 #include "mlir/Dialect/Arith/IR/Arith.h"
 #include "mlir/IR/IRMapping.h"
@@ -114,7 +115,7 @@ LogicalResult LoopSplitter::checkControlFlow() {
 
 scf::ForOp LoopSplitter::createPiece() {
   auto piece = scf::ForOp::create(builder, loc, zero, count, one);
-  piece->setAttr("piko.lanes", builder.getUnitAttr());
+  piece->setAttr(marks::lanes, builder.getUnitAttr());
   pieces.push_back(piece);
   isPiece.insert(piece);
   return piece;

@@ -13,6 +13,7 @@
 //      with that condition, has it behind.
 
 #include "Piko/Dialect/Piko/IR/BinArithmetic.h"
+#include "Piko/Dialect/Piko/IR/Marks.h"
 #include "Piko/Transforms/Passes.h"
 
 #include "mlir/Dialect/Arith/IR/Arith.h"
@@ -63,8 +64,8 @@ Value invert(OpBuilder &builder, Value condition) {
     inverse = arith::OrIOp::create(builder, loc, a, b);
   else
     inverse = arith::AndIOp::create(builder, loc, a, b);
-  if (op->hasAttr(shortCircuitAttrName))
-    inverse->setAttr(shortCircuitAttrName, builder.getUnitAttr());
+  if (op->hasAttr(marks::shortCircuit))
+    inverse->setAttr(marks::shortCircuit, builder.getUnitAttr());
   return inverse->getResult(0);
 }
 
@@ -82,7 +83,7 @@ struct JoinConditions : OpRewritePattern<arith::SelectOp> {
       rewriter
           .replaceOpWithNewOp<arith::OrIOp>(choice, condition,
                                             choice.getFalseValue())
-          ->setAttr(shortCircuitAttrName, rewriter.getUnitAttr());
+          ->setAttr(marks::shortCircuit, rewriter.getUnitAttr());
       return success();
     }
     if (matchPattern(choice.getFalseValue(), m_Zero()) &&
@@ -90,7 +91,7 @@ struct JoinConditions : OpRewritePattern<arith::SelectOp> {
       rewriter
           .replaceOpWithNewOp<arith::AndIOp>(choice, condition,
                                              choice.getTrueValue())
-          ->setAttr(shortCircuitAttrName, rewriter.getUnitAttr());
+          ->setAttr(marks::shortCircuit, rewriter.getUnitAttr());
       return success();
     }
     return failure();

@@ -6,6 +6,7 @@
 #include "StateAccess.h"
 
 #include "Piko/Analysis/BinIdentity.h"
+#include "Piko/Dialect/Piko/IR/Marks.h"
 
 #include "Piko/Dialect/Piko/IR/BinArithmetic.h"
 #include "Piko/Transforms/Passes.h"
@@ -96,7 +97,7 @@ void ProveBoundsPass::runOnOperation() {
         !llvm::is_contained(getPhaseStage(process).getBins(), 0) &&
         lookupInPipeline<ImageOp>(access, state) &&
         prover.isInBin(access, access.getIndices()))
-      access->setAttr(insideAttrName, unit);
+      access->setAttr(marks::inside, unit);
   };
   auto visit = [&](auto access) {
     if (!isa<AtomicOp>(access.getOperation()))
@@ -116,7 +117,7 @@ void ProveBoundsPass::runOnOperation() {
     if (note(update, prover.isInBin(update, update.getCoordinates()),
              "the pixel of '" + update.getImage() +
                  "' is tested to be in the bin"))
-      update->setAttr(insideAttrName, unit);
+      update->setAttr(marks::inside, unit);
   };
   for (auto stage : getOperation().getOps<StageOp>())
     stage.walk([&](Operation *op) {

@@ -5,6 +5,7 @@
 #include "LoopSplitter.h"
 #include "ParallelLoops.h"
 
+#include "Piko/Dialect/Piko/IR/Marks.h"
 #include "Piko/Transforms/Passes.h"
 
 #include "mlir/Dialect/Arith/IR/Arith.h"
@@ -60,7 +61,7 @@ static void convertFor(ParallelForOp parallel) {
   Value zero = arith::ConstantIndexOp::create(rewriter, loc, 0);
   Value one = arith::ConstantIndexOp::create(rewriter, loc, 1);
   auto loop = scf::ForOp::create(rewriter, loc, zero, parallel.getCount(), one);
-  loop->setAttr("piko.lanes", rewriter.getUnitAttr());
+  loop->setAttr(marks::lanes, rewriter.getUnitAttr());
   Block *body = parallel.getBodyBlock();
   rewriter.eraseOp(body->getTerminator());
   rewriter.inlineBlockBefore(body, loop.getBody()->getTerminator(),
@@ -82,7 +83,7 @@ static void convertPixels(ParallelPixelsOp pixels) {
     cell[dim] = loop.getInductionVar();
     rewriter.setInsertionPoint(loop.getBody()->getTerminator());
   }
-  loop->setAttr("piko.lanes", rewriter.getUnitAttr());
+  loop->setAttr(marks::lanes, rewriter.getUnitAttr());
   Block *body = pixels.getBodyBlock();
   rewriter.eraseOp(body->getTerminator());
   rewriter.inlineBlockBefore(body, loop.getBody()->getTerminator(), cell);

@@ -10,6 +10,7 @@
 #include "LaneReport.h"
 #include "LaneWriter.h"
 
+#include "Piko/Dialect/Piko/IR/Marks.h"
 #include "Piko/Transforms/Passes.h"
 
 #include "mlir/Dialect/Arith/IR/Arith.h"
@@ -118,7 +119,7 @@ void LoopVectorizer::createVectors(Value begin, Value end) {
 
 void LoopVectorizer::createFetches(Value begin, Value end) {
   auto fetches = scf::ForOp::create(builder, loc, begin, end, loop.getStep());
-  fetches->setAttr("piko.reads", builder.getUnitAttr());
+  fetches->setAttr(marks::reads, builder.getUnitAttr());
   OpBuilder::InsertionGuard guard(builder);
   builder.setInsertionPointToStart(fetches.getBody());
   Value iteration = fetches.getInductionVar();
@@ -191,7 +192,7 @@ void LoopVectorizer::reduce(LanePlan &plan, Value place) {
 void LoopVectorizer::createRest(Value begin, Value end) {
   loop.getLowerBoundMutable().assign(begin);
   loop.getUpperBoundMutable().assign(end);
-  loop->removeAttr("piko.lanes");
+  loop->removeAttr(marks::lanes);
   for (Operation *op : planner.getPrefetches())
     op->erase();
   Block *body = loop.getBody();

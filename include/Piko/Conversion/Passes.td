@@ -66,7 +66,7 @@ def ConvertPikoToOpenMP : Pass<"convert-piko-to-openmp", "::piko::PipelineOp"> {
 
     Before:
     ```
-    scf.forall (%u) in (%units) { ... } {piko.units = "any"}
+    scf.forall (%u) in (%units) { ... } {piko.units = #piko<units any>}
     ```
     After:
     ```

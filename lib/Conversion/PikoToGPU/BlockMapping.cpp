@@ -14,6 +14,7 @@
 
 #include "PikoToGPU.h"
 
+#include "Piko/Dialect/Piko/IR/Marks.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 #include "Piko/Dialect/Piko/IR/PikoGPU.h"
 
@@ -87,15 +88,14 @@ private:
 
 /// What adds to an outbox.
 static bool isEmission(Operation *op) {
-  return isa<AppendOp, AppendBinOp, NextOp>(op) ||
-         op->getName().getStringRef().starts_with("piko.fail");
+  return isa<AppendOp, AppendBinOp, NextOp>(op) || op->hasTrait<Failure>();
 }
 
 /// What all threads take part in.
 static bool isShared(Operation *op) {
   return isa<ScratchOp, DeferBeginOp, DeferEndOp, LocalBinOp, ParallelForOp>(
              op) ||
-         op->hasAttr(sharedAttrName);
+         op->hasAttr(marks::shared);
 }
 
 /// Whether an operation only reads, apart from arrays that it makes.
@@ -226,7 +226,7 @@ LogicalResult BlockMapper::mapBlock(Block &block) {
 
 LogicalResult BlockMapper::mapOperation(Operation *op) {
   OpBuilder builder(op);
-  if (op->hasAttr(sharedAttrName)) {
+  if (op->hasAttr(marks::shared)) {
     share(cast<scf::ForOp>(op));
     return success();
   }
@@ -289,13 +289,13 @@ void BlockMapper::shareInRounds(scf::ForOp loop) {
 }
 
 void BlockMapper::share(scf::ForOp loop) {
-  loop->removeAttr(sharedAttrName);
+  loop->removeAttr(marks::shared);
   ++counts.shared;
   OpBuilder builder(loop);
   gpu::BarrierOp::create(builder, loc);
   builder.setInsertionPointAfter(loop);
   gpu::BarrierOp::create(builder, loc);
-  if (!loop->removeAttr(deferredAttrName) && contains(loop, isEmission))
+  if (!loop->removeAttr(marks::deferred) && contains(loop, isEmission))
     return shareInRounds(loop);
   threads.ofOne.insert(loop);
   builder.setInsertionPoint(loop);
@@ -396,7 +396,7 @@ void BlockMapper::deferIterations(DeferBeginOp begin) {
 
 /// From here to the end of its body a loop's iteration has its own outboxes.
 void BlockMapper::defer(DeferIterationOp iteration, Value states, Value has) {
-  iteration->getParentOp()->setAttr(deferredAttrName,
+  iteration->getParentOp()->setAttr(marks::deferred,
                                     UnitAttr::get(launch.getContext()));
   OpBuilder builder(iteration);
   Value at = arith::MulIOp::create(builder, loc, iteration.getIteration(),

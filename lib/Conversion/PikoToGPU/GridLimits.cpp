@@ -41,8 +41,7 @@ LogicalResult piko::checkGridLimits(KernelOp kernel) {
 /// What pixels cannot be shared with.
 static bool isObstacle(Operation *op) {
   if (isa<EmitOp, PlaceOp, ListsOp, BarrierOpInterface>(op) ||
-      op->hasAttr("producer") ||
-      op->getName().getStringRef().starts_with("piko.check_"))
+      op->hasAttr("producer") || op->hasTrait<CheckingMode>())
     return true;
   if (auto atomic = dyn_cast<AtomicOp>(op))
     return bool(atomic.getOld());

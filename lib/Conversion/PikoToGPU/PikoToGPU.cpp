@@ -16,6 +16,7 @@
 #include "../../Transforms/ParallelLoops.h"
 #include "../../Transforms/UnitFormer.h"
 
+#include "Piko/Dialect/Piko/IR/Marks.h"
 #include "Piko/Dialect/Piko/IR/PikoGPU.h"
 
 #include "pikort/grid.h"
@@ -122,7 +123,7 @@ static Operation *findWork(KernelOp kernel) {
 
 LogicalResult GridBuilder::findItems() {
   launch.walk([&](scf::ForOp loop) {
-    if (loop->hasAttr("piko.lanes") && loop->getParentOfType<scf::ForOp>() &&
+    if (loop->hasAttr(marks::lanes) && loop->getParentOfType<scf::ForOp>() &&
         !loop->getParentOfType<scf::ForOp>()->getParentOfType<scf::ForOp>())
       items = loop;
   });
@@ -416,9 +417,9 @@ LogicalResult GridBuilder::mapPieces(ParallelForOp loop, bool isOne) {
   if (failed(LoopSplitter(loop, memory.log).run()))
     return failure();
   launch.walk([&](scf::ForOp piece) {
-    if (piece->removeAttr("piko.lanes") && !isOne &&
+    if (piece->removeAttr(marks::lanes) && !isOne &&
         chooseMapping(piece, threads) == ThreadMapping::Shared)
-      piece->setAttr(sharedAttrName, UnitAttr::get(kernel.getContext()));
+      piece->setAttr(marks::shared, UnitAttr::get(kernel.getContext()));
   });
   return success();
 }
@@ -426,7 +427,7 @@ LogicalResult GridBuilder::mapPieces(ParallelForOp loop, bool isOne) {
 LogicalResult GridBuilder::mapLoop(ParallelLoopOpInterface loop,
                                    MappingCounts &counts) {
   ThreadMapping mapping = chooseMapping(loop, threads);
-  bool isOne = loop->hasAttr(oneAttrName);
+  bool isOne = loop->hasAttr(marks::one);
   if (isOne)
     mapping = mapping == ThreadMapping::Shared ? ThreadMapping::One
                                                : ThreadMapping::Pieces;
@@ -434,7 +435,7 @@ LogicalResult GridBuilder::mapLoop(ParallelLoopOpInterface loop,
       loop->getParentOfType<ParallelLoopOpInterface>() || hasSharedParent(loop);
   if (isNested || mapping == ThreadMapping::One) {
     convertLoop(loop);
-    launch.walk([](scf::ForOp made) { made->removeAttr("piko.lanes"); });
+    launch.walk([](scf::ForOp made) { made->removeAttr(marks::lanes); });
     return success();
   }
   auto pixels = dyn_cast<ParallelPixelsOp>(*loop);
@@ -450,8 +451,8 @@ LogicalResult GridBuilder::mapLoop(ParallelLoopOpInterface loop,
   }
   convertLoop(numbered);
   launch.walk([&](scf::ForOp made) {
-    if (made->removeAttr("piko.lanes"))
-      made->setAttr(sharedAttrName, UnitAttr::get(kernel.getContext()));
+    if (made->removeAttr(marks::lanes))
+      made->setAttr(marks::shared, UnitAttr::get(kernel.getContext()));
   });
   return success();
 }
@@ -463,7 +464,7 @@ void GridBuilder::obeyLanes() {
   auto yes = UnitAttr::get(kernel.getContext());
   auto keepToOne = [&](Operation *work) {
     work->walk(
-        [&](ParallelLoopOpInterface loop) { loop->setAttr(oneAttrName, yes); });
+        [&](ParallelLoopOpInterface loop) { loop->setAttr(marks::one, yes); });
   };
   kernel.walk([&](ItemsOp work) {
     LaneMapping lanes = work.getLanes().value_or(LaneMapping::Items);
@@ -471,7 +472,7 @@ void GridBuilder::obeyLanes() {
       keepToOne(work);
     else if (lanes != LaneMapping::Iterations &&
              chooseMapping(work, threads) == ThreadMapping::Shared)
-      work->setAttr(sharedAttrName, yes);
+      work->setAttr(marks::shared, yes);
   });
   kernel.walk([&](ListsOp work) {
     if (work.getLanes() == LaneMapping::One)
@@ -482,7 +483,7 @@ void GridBuilder::obeyLanes() {
 LogicalResult GridBuilder::mapWork(MappingCounts &counts) {
   obeyLanes();
   formGrid();
-  launch.walk([](scf::ForOp loop) { loop->removeAttr("piko.lanes"); });
+  launch.walk([](scf::ForOp loop) { loop->removeAttr(marks::lanes); });
   SmallVector<ParallelLoopOpInterface> loops; // those inside others first
   launch.walk([&](ParallelLoopOpInterface loop) { loops.push_back(loop); });
   for (ParallelLoopOpInterface loop : loops)

@@ -66,12 +66,6 @@ enum class ThreadMapping {
 /// Chooses for `piko.items`, a parallel loop, or a loop of its iterations.
 ThreadMapping chooseMapping(mlir::Operation *loop, int64_t threads);
 
-/// Marks the loops whose iterations threads share.
-constexpr const char *sharedAttrName = "piko.shared";
-/// Marks parallel loops that one thread runs, because its work says so.
-constexpr const char *oneAttrName = "piko.one";
-/// Marks those whose iterations have outboxes of their own.
-constexpr const char *deferredAttrName = "piko.deferred";
 /// Whether an operation is in a loop that is shared.
 bool hasSharedParent(mlir::Operation *op);
 

@@ -8,6 +8,8 @@
 
 #include "PikoToGPU.h"
 
+#include "Piko/Dialect/Piko/IR/Marks.h"
+
 #include "mlir/IR/Matchers.h"
 #include "llvm/ADT/StringMap.h"
 
@@ -192,7 +194,7 @@ static int64_t getMostIterations(ParallelLoopOpInterface loop) {
 /// What is checked is reported in the order of the reference.
 static bool isChecked(Operation *op) {
   return contains(op->getParentOfType<KernelOp>(), [](Operation *inner) {
-    return inner->getName().getStringRef().starts_with("piko.check_");
+    return inner->hasTrait<CheckingMode>();
   });
 }
 
@@ -211,7 +213,7 @@ ThreadMapping piko::chooseMapping(Operation *loop, int64_t threads) {
 
 bool piko::hasSharedParent(Operation *op) {
   for (; op; op = op->getParentOp())
-    if (op->hasAttr(sharedAttrName))
+    if (op->hasAttr(marks::shared))
       return true;
   return false;
 }

@@ -8,6 +8,7 @@
 
 #include "GridCode.h"
 
+#include "Piko/Dialect/Piko/IR/Marks.h"
 #include "Piko/Dialect/Piko/IR/PikoCheck.h"
 #include "Piko/Dialect/Piko/IR/PikoGPU.h"
 
@@ -180,7 +181,7 @@ struct OpenLogLowering : ContextPattern<OpenLogOp> {
   matchAndRewrite(OpenLogOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
     auto function = op->getParentOfType<func::FuncOp>();
-    auto number = function->getAttrOfType<IntegerAttr>(numberAttrName);
+    auto number = function->getAttrOfType<IntegerAttr>(marks::number);
     Location loc = op.getLoc();
     rewriter.replaceOp(
         op,
@@ -188,8 +189,8 @@ struct OpenLogLowering : ContextPattern<OpenLogOp> {
             rewriter, loc, PIKO_RUNTIME_FUNCTION(pikoir_log_open),
             {context.frame(op), createI32(rewriter, loc, number.getInt()),
              createI32(rewriter, loc,
-                       function->hasAttr(sourceAttrName) ? PIKOIR_LOG_SOURCE
-                                                         : 0),
+                       function->hasAttr(marks::source) ? PIKOIR_LOG_SOURCE
+                                                        : 0),
              context.member(rewriter, adaptor.getBins(),
                             PIKO_RUNTIME_MEMBER(pikoir_input, unit_count))}));
     return success();
@@ -224,8 +225,7 @@ struct OutboxesLowering : ContextPattern<OutboxesOp> {
   matchAndRewrite(OutboxesOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
     auto function = op->getParentOfType<func::FuncOp>();
-    int64_t head =
-        function->getAttrOfType<IntegerAttr>(numberAttrName).getInt();
+    int64_t head = function->getAttrOfType<IntegerAttr>(marks::number).getInt();
     Grid grid;
     grid.log = adaptor.getLog();
     grid.outboxes = adaptor.getState();

@@ -4,6 +4,8 @@
 
 #include "KernelLowering.h"
 
+#include "Piko/Dialect/Piko/IR/Marks.h"
+
 #include "mlir/Dialect/SCF/IR/SCF.h"
 
 using namespace mlir;
@@ -67,8 +69,8 @@ struct CloseBinsLowering : Lowering<CloseBinsOp> {
   matchAndRewrite(CloseBinsOp op, OpAdaptor,
                   ConversionPatternRewriter &rewriter) const override {
     auto function = op->getParentOfType<func::FuncOp>();
-    auto number = function->getAttrOfType<IntegerAttr>(numberAttrName);
-    bool source = function->hasAttr(sourceAttrName);
+    auto number = function->getAttrOfType<IntegerAttr>(marks::number);
+    bool source = function->hasAttr(marks::source);
     Location loc = op.getLoc();
     Value status = context
                        .call(rewriter, loc,
@@ -149,7 +151,7 @@ struct NextUnitLowering : Lowering<NextUnitOp> {
     Location loc = op.getLoc();
     auto number =
         op->getParentOfType<func::FuncOp>()->getAttrOfType<IntegerAttr>(
-            numberAttrName);
+            marks::number);
     Value next =
         context
             .call(rewriter, loc, PIKO_RUNTIME_FUNCTION(pikoir_next_unit),

@@ -172,11 +172,6 @@ void populateGridToLLVMPatterns(const mlir::TypeConverter &converter,
 /// Makes branches of casts from float to integer that saturate.
 void branchInSaturatingCasts(mlir::func::FuncOp function);
 
-/// Attributes of a kernel's function, until it is converted: the number of the
-/// stage whose bins it is for, or of the source that it places.
-constexpr const char *numberAttrName = "piko.number";
-constexpr const char *sourceAttrName = "piko.source";
-
 /// Lets a kernel for which there is one thread run its units without a parallel
 /// region, as calls of a function.
 void outlineUnits(mlir::func::FuncOp kernel);

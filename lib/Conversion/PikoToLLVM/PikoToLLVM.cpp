@@ -7,6 +7,7 @@
 
 #include "LoweringContext.h"
 
+#include "Piko/Dialect/Piko/IR/Marks.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 #include "Piko/Dialect/Piko/IR/PikoProgram.h"
 
@@ -80,10 +81,10 @@ static void noteSubject(func::FuncOp function, const PipelineNumbers &numbers) {
   Builder builder(function.getContext());
   for (auto bins : function.getOps<OpenBinsOp>()) {
     int64_t stage = numbers.stages.lookup(bins.getStageAttr().getAttr());
-    function->setAttr(numberAttrName, builder.getI64IntegerAttr(
-                                          bins.getSource().value_or(stage)));
+    function->setAttr(marks::number, builder.getI64IntegerAttr(
+                                         bins.getSource().value_or(stage)));
     if (bins.getSource())
-      function->setAttr(sourceAttrName, builder.getUnitAttr());
+      function->setAttr(marks::source, builder.getUnitAttr());
   }
 }
 
@@ -98,7 +99,7 @@ static void annotateReads(func::FuncOp function) {
       LLVM::LoopAnnotationAttr::get(context, {}, vectorize, {}, {}, {}, {}, {},
                                     {}, {}, {}, {}, {}, {}, {}, {});
   function.walk([&](scf::ForOp loop) {
-    if (loop->removeAttr("piko.reads"))
+    if (loop->removeAttr(marks::reads))
       loop->setAttr("loop_annotation", annotation);
   });
 }
@@ -180,7 +181,7 @@ LogicalResult ConvertPikoToLLVMPass::convert(PipelineOp pipeline,
   for (func::FuncOp function : again)
     outlineUnits(function);
   for (func::FuncOp function : functions)
-    for (const char *name : {numberAttrName, sourceAttrName})
+    for (StringRef name : {marks::number, marks::source})
       function->removeAttr(name);
   pipeline.erase();
   return success();

@@ -7,6 +7,8 @@
 #include "KernelLowering.h"
 #include "WriterPaths.h"
 
+#include "Piko/Dialect/Piko/IR/Marks.h"
+
 using namespace mlir;
 using namespace piko;
 
@@ -18,13 +20,13 @@ struct OpenWriterLowering : Lowering<OpenWriterOp> {
   matchAndRewrite(OpenWriterOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
     auto function = op->getParentOfType<func::FuncOp>();
-    auto number = function->getAttrOfType<IntegerAttr>(numberAttrName);
+    auto number = function->getAttrOfType<IntegerAttr>(marks::number);
     int64_t subject = op.getStage() ? context.stageNumber(op, *op.getStage())
                                     : number.getInt();
     Location loc = op.getLoc();
     rewriter.replaceOp(
         op, context.call(rewriter, loc,
-                         function->hasAttr(sourceAttrName)
+                         function->hasAttr(marks::source)
                              ? PIKO_RUNTIME_FUNCTION(pikoir_open_source)
                              : PIKO_RUNTIME_FUNCTION(pikoir_open),
                          {context.frame(op), createI32(rewriter, loc, subject),

@@ -3,6 +3,7 @@
 // convert-piko-to-openmp: units of work over threads.
 
 #include "Piko/Conversion/Passes.h"
+#include "Piko/Dialect/Piko/IR/Marks.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
 #include "mlir/Dialect/MemRef/IR/MemRef.h"
@@ -146,15 +147,13 @@ struct ConvertForall : OpRewritePattern<scf::ForallOp> {
 
   LogicalResult matchAndRewrite(scf::ForallOp forall,
                                 PatternRewriter &rewriter) const override {
-    auto name = forall->getAttrOfType<StringAttr>("piko.units");
-    std::optional<UnitLoop> kind =
-        name ? symbolizeUnitLoop(name.getValue()) : std::nullopt;
+    auto kind = forall->getAttrOfType<UnitLoopAttr>(marks::units);
     if (!kind || forall.getRank() != 1 || !forall.isNormalized())
       return rewriter.notifyMatchFailure(forall, "not the loop of a kernel");
     UnitSharing sharing(forall, rewriter);
     if (failed(sharing.findBins()))
       return rewriter.notifyMatchFailure(forall, "not a loop over units");
-    sharing.convert(*kind);
+    sharing.convert(kind.getValue());
     rewriter.eraseOp(forall);
     return success();
   }

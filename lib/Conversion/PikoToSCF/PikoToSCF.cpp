@@ -7,6 +7,7 @@
 
 #include "Piko/Conversion/Passes.h"
 #include "Piko/Dialect/Piko/IR/BinArithmetic.h"
+#include "Piko/Dialect/Piko/IR/Marks.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
 #include "mlir/IR/Matchers.h"
@@ -42,7 +43,7 @@ struct ConvertUpdate : OpRewritePattern<UpdateOp> {
       lo.push_back(bins.lo(update.getBin(), dim));
       hi.push_back(bins.hi(update.getBin(), dim));
     }
-    Value inside = update->hasAttr(insideAttrName)
+    Value inside = update->hasAttr(marks::inside)
                        ? arith::ConstantOp::create(rewriter, loc,
                                                    rewriter.getBoolAttr(true))
                        : bins.isInside(at, lo, hi);
@@ -305,7 +306,7 @@ struct ConvertPikoToSCFPass
     SmallVector<Operation *> joined;
     pipeline.walk([&](Operation *op) {
       // Lanes do not branch.
-      if (op->hasAttr(shortCircuitAttrName) &&
+      if (op->hasAttr(marks::shortCircuit) &&
           isa<arith::AndIOp, arith::OrIOp>(op) &&
           op->getResult(0).getType().isInteger(1))
         joined.push_back(op);

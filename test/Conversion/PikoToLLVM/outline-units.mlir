@@ -51,7 +51,7 @@ piko.pipeline @P rank 1 {
       %v = memref.load %array[%units] : memref<4xf32>
       piko.atomic add_float checked @sums[%u : index] "v", %v : f32
       piko.cpu.close_writer %w
-    } {piko.units = "any"}
+    } {piko.units = #piko<units any>}
     piko.storage.close_bins %bins : !piko.bins<@F>
   }
   piko.kernel @kernel_b {
@@ -60,7 +60,7 @@ piko.pipeline @P rank 1 {
     scf.forall (%u) in (%units) {
       %w = piko.cpu.open_writer %bins[%u] : !piko.bins<@F>
       piko.cpu.close_writer %w
-    } {piko.units = "any"}
+    } {piko.units = #piko<units any>}
     piko.storage.close_bins %bins : !piko.bins<@F>
   }
 }

@@ -313,11 +313,6 @@ private:
 } // namespace
 
 LogicalResult piko::verifyCppTypes(RecordOp record) {
-  Attribute types = record->getAttr(cppTypesAttr);
-  if (!types)
-    return success();
-  if (auto entries = dyn_cast<DictionaryAttr>(types))
-    return Verifier(record, entries).verify();
-  return record.emitOpError("expected '")
-         << cppTypesAttr << "' to be a dictionary, but got " << types;
+  auto types = record->getAttrOfType<DictionaryAttr>(cppTypesAttr);
+  return types ? Verifier(record, types).verify() : success();
 }

@@ -4,6 +4,8 @@
 
 #include "FieldAccess.h"
 #include "IsolatedBody.h"
+#include "Piko/Dialect/Piko/IR/CppTypes.h"
+#include "Piko/Dialect/Piko/IR/Marks.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 #include "Piko/Dialect/Piko/IR/PikoCheck.h"
 #include "Piko/Dialect/Piko/IR/PikoGPU.h"
@@ -11,6 +13,7 @@
 
 #include "mlir/IR/DialectImplementation.h"
 #include "mlir/IR/Matchers.h"
+#include "llvm/ADT/StringSwitch.h"
 #include "llvm/ADT/TypeSwitch.h"
 #include "llvm/Support/MathExtras.h"
 
@@ -53,6 +56,54 @@ void PikoDialect::initialize() {
 #define GET_OP_LIST
 #include "Piko/Dialect/Piko/IR/PikoGPUOps.cpp.inc"
       >();
+}
+
+//===----------------------------------------------------------------------===//
+// Discardable attributes
+//===----------------------------------------------------------------------===//
+
+/// What an attribute of that name has to be; null where there is none.
+static StringRef getExpectedKind(StringRef name) {
+  return llvm::StringSwitch<StringRef>(name)
+      .Cases({marks::lanes, marks::passed, marks::reads, marks::shared,
+              marks::one, marks::deferred, marks::shortCircuit, marks::inside,
+              marks::source},
+             "a unit")
+      .Case(marks::mapping, "what lanes are given, as #piko<lanes items>")
+      .Case(marks::units, "how threads share units, as #piko<units any>")
+      .Case(marks::number, "a 64-bit integer")
+      .Case(cppNameAttr, "a string")
+      .Case(cppTypesAttr, "a dictionary")
+      .Default({});
+}
+
+static bool hasExpectedKind(NamedAttribute attribute) {
+  StringRef name = attribute.getName();
+  Attribute value = attribute.getValue();
+  if (name == marks::mapping)
+    return isa<LaneMappingAttr>(value);
+  if (name == marks::units)
+    return isa<UnitLoopAttr>(value);
+  if (name == cppNameAttr)
+    return isa<StringAttr>(value);
+  if (name == cppTypesAttr)
+    return isa<DictionaryAttr>(value);
+  if (auto number = dyn_cast<IntegerAttr>(value))
+    return name == marks::number && number.getType().isInteger(64);
+  return name != marks::number && isa<UnitAttr>(value);
+}
+
+LogicalResult PikoDialect::verifyOperationAttribute(Operation *op,
+                                                    NamedAttribute attribute) {
+  StringRef name = attribute.getName(), kind = getExpectedKind(name);
+  if (kind.empty())
+    return op->emitOpError("expected no attribute '")
+           << name << "', which the dialect does not know";
+  if (!hasExpectedKind(attribute))
+    return op->emitOpError("expected '")
+           << name << "' to be " << kind << ", but got "
+           << attribute.getValue();
+  return success();
 }
 
 //===----------------------------------------------------------------------===//

@@ -45,10 +45,6 @@ LogicalResult StageOp::verifySymbolUses(SymbolTableCollection &) {
     if (!lookupRecord(*this, record))
       return emitOpError("expected a record, but got ")
              << record << ", which is none";
-  Attribute name = (*this)->getAttr(cppNameAttr);
-  if (name && !isa<StringAttr>(name))
-    return emitOpError("expected '")
-           << cppNameAttr << "' to be a string, but got " << name;
   return success();
 }
 

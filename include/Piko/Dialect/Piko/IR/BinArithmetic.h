@@ -59,14 +59,6 @@ private:
 /// in, or null.
 mlir::Value findBin(mlir::OpBuilder &builder, mlir::Operation *op);
 
-/// Says of an arith.andi or arith.ori of truth values that its second operand
-/// counts only where the first does not decide: a processor may branch.
-constexpr const char *shortCircuitAttrName = "piko.short_circuit";
-
-/// On an access to an image whose pixel piko-prove-bounds has found to be in
-/// the bin.
-constexpr const char *insideAttrName = "piko.inside";
-
 } // namespace piko
 
 #endif // PIKO_DIALECT_PIKO_IR_BINARITHMETIC_H

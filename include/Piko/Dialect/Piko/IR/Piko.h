@@ -43,6 +43,14 @@ enum Kind { reads = 1, stores = 2, changesAtomically = 4, updates = 8 };
 template <typename OpT>
 class CPUOnly : public mlir::OpTrait::TraitBase<OpT, CPUOnly> {};
 
+/// Of operations that checking mode alone has.
+template <typename OpT>
+class CheckingMode : public mlir::OpTrait::TraitBase<OpT, CheckingMode> {};
+
+/// Of operations that end the run with an error.
+template <typename OpT>
+class Failure : public mlir::OpTrait::TraitBase<OpT, Failure> {};
+
 namespace detail {
 bool hasBarriers(mlir::Operation *loop);
 } // namespace detail

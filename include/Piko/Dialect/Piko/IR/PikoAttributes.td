@@ -41,7 +41,7 @@ def Piko_ScheduleKind : I32EnumAttr<"ScheduleKind", "where bins run", [
   let cppNamespace = "::piko";
 }
 
-/// The `piko.units` of a loop over units of work, by name.
+/// The `piko.units` of a loop over units of work.
 def Piko_UnitLoop : I32EnumAttr<"UnitLoop", "how threads share units of work", [
   I32EnumAttrCase<"Any", 0, "any">,       // any thread takes the next one
   I32EnumAttrCase<"Owned", 1, "owned">,   // each thread runs its own
@@ -50,6 +50,7 @@ def Piko_UnitLoop : I32EnumAttr<"UnitLoop", "how threads share units of work", [
   let cppNamespace = "::piko";
   let genSpecializedAttr = 0;
 }
+def Piko_UnitLoopAttr : EnumAttr<Piko_Dialect, Piko_UnitLoop, "units">;
 
 def Piko_LaneMapping : I32EnumAttr<"LaneMapping", "what lanes are given", [
   I32EnumAttrCase<"Items", 0, "items">,
@@ -57,7 +58,9 @@ def Piko_LaneMapping : I32EnumAttr<"LaneMapping", "what lanes are given", [
   I32EnumAttrCase<"Collapsed", 2, "collapsed">,
   I32EnumAttrCase<"One", 3, "one">]> {
   let cppNamespace = "::piko";
+  let genSpecializedAttr = 0;
 }
+def Piko_LaneMappingAttr : EnumAttr<Piko_Dialect, Piko_LaneMapping, "lanes">;
 
 def Piko_DivisionKind : I32EnumAttr<"DivisionKind", "integer division", [
   I32EnumAttrCase<"QuotientS", 0, "quotient_signed">,

@@ -33,6 +33,8 @@ def Piko_Dialect : Dialect {
   }];
   let useDefaultTypePrinterParser = 1;
   let useDefaultAttributePrinterParser = 1;
+  // Marks.h names the discardable attributes.
+  let hasOperationAttrVerify = 1;
 }
 
 class Piko_Op<string mnemonic, list<Trait> traits = []>

@@ -8,6 +8,15 @@
 
 include "Piko/Dialect/Piko/IR/PikoTypes.td"
 
+/// Says that checking mode alone has the operation: how the reference reports,
+/// in order, is what matters there.
+def Piko_CheckingMode : NativeOpTrait<"CheckingMode"> {
+  let cppNamespace = "::piko";
+}
+
+class Piko_CheckOp<string mnemonic, list<Trait> traits = []>
+    : Piko_Op<"check_" # mnemonic, !listconcat([Piko_CheckingMode], traits)>;
+
 def Piko_CheckedAccess : I32EnumAttr<"CheckedAccess", "access to state", [
   I32EnumAttrCase<"Read", 0, "read">,
   I32EnumAttrCase<"Store", 1, "store">,
@@ -45,7 +54,7 @@ def Piko_UndefinedOp : Piko_Op<"undefined", [Pure]> {
   let assemblyFormat = "attr-dict `:` type($result)";
 }
 
-def Piko_CheckRecordOp : Piko_Op<"check_record", [
+def Piko_CheckRecordOp : Piko_CheckOp<"record", [
     HasParent<"PipelineOp">, DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
   let summary = "a record with room for a lineage";
   let description = [{
@@ -62,7 +71,7 @@ def Piko_CheckRecordOp : Piko_Op<"check_record", [
   let assemblyFormat = "$record `of` $host (`numbers` $numbers^)? attr-dict";
 }
 
-def Piko_CheckCallOp : Piko_Op<"check_call"> {
+def Piko_CheckCallOp : Piko_CheckOp<"call"> {
   let summary = "a call of a process phase begins";
   let description = [{
     In the bin, for a primitive with that lineage; a list has none.
@@ -76,7 +85,7 @@ def Piko_CheckCallOp : Piko_Op<"check_call"> {
   let assemblyFormat = "$stage `in` $bin (`of` $lineage^)? attr-dict";
 }
 
-def Piko_CheckAssignOp : Piko_Op<"check_assign"> {
+def Piko_CheckAssignOp : Piko_CheckOp<"assign"> {
   let summary = "an assign phase begins or ends";
   let description = [{
     Without a lineage it ends, and what was running before goes on.
@@ -90,7 +99,7 @@ def Piko_CheckAssignOp : Piko_Op<"check_assign"> {
   let assemblyFormat = "$stage (`of` $lineage^)? attr-dict";
 }
 
-def Piko_CheckEmitOp : Piko_Op<"check_emit"> {
+def Piko_CheckEmitOp : Piko_CheckOp<"emit"> {
   let summary = "the lineage of the next primitive that a call emits";
   let description = [{
     ```mlir
@@ -101,7 +110,7 @@ def Piko_CheckEmitOp : Piko_Op<"check_emit"> {
   let assemblyFormat = "attr-dict";
 }
 
-def Piko_CheckPlaceOp : Piko_Op<"check_place"> {
+def Piko_CheckPlaceOp : Piko_CheckOp<"place"> {
   let summary = "what follows may fail here";
   let description = [{
     ```mlir
@@ -111,7 +120,7 @@ def Piko_CheckPlaceOp : Piko_Op<"check_place"> {
   let assemblyFormat = "attr-dict";
 }
 
-def Piko_CheckAccessOp : Piko_Op<"check_access", [
+def Piko_CheckAccessOp : Piko_CheckOp<"access", [
     DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
   let summary = "an element of state is accessed";
   let description = [{
@@ -132,7 +141,7 @@ def Piko_CheckAccessOp : Piko_Op<"check_access", [
   }];
 }
 
-def Piko_CheckLoopOp : Piko_Op<"check_loop"> {
+def Piko_CheckLoopOp : Piko_CheckOp<"loop"> {
   let summary = "a parallel loop, an iteration or what follows a barrier begins";
   let description = [{
     `iteration` says whose the accesses are that follow, `barrier` also that it
@@ -150,7 +159,7 @@ def Piko_CheckLoopOp : Piko_Op<"check_loop"> {
   let hasVerifier = 1;
 }
 
-def Piko_CheckValueOp : Piko_Op<"check_value"> {
+def Piko_CheckValueOp : Piko_CheckOp<"value"> {
   let summary = "a field is wrong if the flag is true";
   let description = [{
     ```mlir
@@ -163,7 +172,7 @@ def Piko_CheckValueOp : Piko_Op<"check_value"> {
   let assemblyFormat = "$kind $flag $field `of` $record attr-dict";
 }
 
-def Piko_CheckIndexOp : Piko_Op<"check_index"> {
+def Piko_CheckIndexOp : Piko_CheckOp<"index"> {
   let summary = "an index into an array, or 0 if it is outside";
   let description = [{
     Of a local array or of a field. An index outside is a finding, and what
@@ -178,7 +187,7 @@ def Piko_CheckIndexOp : Piko_Op<"check_index"> {
   let assemblyFormat = "$index `of` $size attr-dict";
 }
 
-def Piko_CheckTripOp : Piko_Op<"check_trip"> {
+def Piko_CheckTripOp : Piko_CheckOp<"trip"> {
   let summary = "a loop of a phase goes round; whether it may";
   let description = [{
     The trips of all loops of a call are counted. Too many of them are a

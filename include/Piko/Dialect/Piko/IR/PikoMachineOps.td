@@ -102,7 +102,7 @@ def Piko_ItemsOp : Piko_WorkOp<"items"> {
                        OptionalAttr<Piko_I64Attr>:$source,
                        OptionalAttr<FlatSymbolRefAttr>:$producer,
                        OptionalAttr<Piko_I64Attr>:$port,
-                       OptionalAttr<Piko_LaneMapping>:$lanes);
+                       OptionalAttr<Piko_LaneMappingAttr>:$lanes);
   let assemblyFormat = [{
     `of` $stage (`source` $source^)? (`from` $producer^ `[` $port `]`)?
     (`lanes` $lanes^)? attr-dict-with-keyword $body
@@ -125,7 +125,7 @@ def Piko_ListsOp : Piko_WorkOp<"lists"> {
   let arguments = (ins FlatSymbolRefAttr:$stage,
                        OptionalAttr<FlatSymbolRefAttr>:$producer,
                        OptionalAttr<Piko_I64Attr>:$port,
-                       OptionalAttr<Piko_LaneMapping>:$lanes);
+                       OptionalAttr<Piko_LaneMappingAttr>:$lanes);
   let assemblyFormat = [{
     `of` $stage (`from` $producer^ `[` $port `]`)? (`lanes` $lanes^)?
     attr-dict-with-keyword $body

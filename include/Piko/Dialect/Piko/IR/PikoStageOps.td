@@ -211,7 +211,7 @@ def Piko_ScheduleOp : Piko_Op<"schedule", [
     UnitAttr:$endBin,
     OptionalAttr<ConfinedAttr<Piko_I64Attr, [IntPositive]>>:$batch,
     UnitAttr:$everyBin, UnitAttr:$unordered, UnitAttr:$resolved,
-    OptionalAttr<Piko_LaneMapping>:$lanes);
+    OptionalAttr<Piko_LaneMappingAttr>:$lanes);
   let regions = (region MaxSizedRegion<1>:$body);
   let assemblyFormat = [{
     $kind (`tile_split` $tileSplit^)? (`end_stage` $endStage^)?

@@ -187,7 +187,15 @@ def Piko_YieldOp : Piko_Op<"yield", [
   }];
 }
 
-def Piko_FailOp : Piko_Op<"fail", [AttrSizedOperandSegments]> {
+/// Says that an operation ends the run with an error.
+def Piko_Failure : NativeOpTrait<"Failure"> {
+  let cppNamespace = "::piko";
+}
+
+class Piko_FailureOp<string mnemonic, list<Trait> traits = []>
+    : Piko_Op<mnemonic, !listconcat([Piko_Failure], traits)>;
+
+def Piko_FailOp : Piko_FailureOp<"fail", [AttrSizedOperandSegments]> {
   let summary = "ends the run with an error that names the stage";
   let description = [{
     An access of the stage to the piece of state at these indices was outside
@@ -210,7 +218,7 @@ def Piko_FailOp : Piko_Op<"fail", [AttrSizedOperandSegments]> {
   }];
 }
 
-def Piko_FailListOp : Piko_Op<"fail_list"> {
+def Piko_FailListOp : Piko_FailureOp<"fail_list"> {
   let summary = "ends the run: an index was outside a list";
   let description = [{
     See `piko.fail`; the numbers are the index and the size of the list.
@@ -224,7 +232,7 @@ def Piko_FailListOp : Piko_Op<"fail_list"> {
   let assemblyFormat = "$stage (`in` $bin^)? `at` $index `of` $size attr-dict";
 }
 
-def Piko_FailBarrierOp : Piko_Op<"fail_barrier"> {
+def Piko_FailBarrierOp : Piko_FailureOp<"fail_barrier"> {
   let summary = "ends the run: an iteration does not meet the others";
   let description = [{
     See `piko.fail`. The iteration is the first one that does not reach the
@@ -239,7 +247,7 @@ def Piko_FailBarrierOp : Piko_Op<"fail_barrier"> {
   let assemblyFormat = "$stage (`in` $bin^)? `iteration` $iteration attr-dict";
 }
 
-def Piko_FailDivideOp : Piko_Op<"fail_divide"> {
+def Piko_FailDivideOp : Piko_FailureOp<"fail_divide"> {
   let summary = "ends the run: an integer division has no result";
   let description = [{
     See `piko.fail`.

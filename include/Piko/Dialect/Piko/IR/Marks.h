@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Discardable attributes, by which passes tell later ones what they know of an
+// operation. The dialect refuses all others of its name, and values of another
+// kind.
+
+#ifndef PIKO_DIALECT_PIKO_IR_MARKS_H
+#define PIKO_DIALECT_PIKO_IR_MARKS_H
+
+#include "llvm/ADT/StringRef.h"
+
+namespace piko::marks {
+
+/// A loop whose turns lanes may share: over primitives or iterations.
+constexpr llvm::StringLiteral lanes = "piko.lanes";
+/// What lanes are given, a `LaneMappingAttr`, of a loop over primitives.
+constexpr llvm::StringLiteral mapping = "piko.mapping";
+/// A loop over what has passed a test.
+constexpr llvm::StringLiteral passed = "piko.passed";
+/// A loop that only reads ahead.
+constexpr llvm::StringLiteral reads = "piko.reads";
+/// How threads share the loop over units of work, a `UnitLoopAttr`.
+constexpr llvm::StringLiteral units = "piko.units";
+/// A loop whose iterations the threads of a block share.
+constexpr llvm::StringLiteral shared = "piko.shared";
+/// A parallel loop that one thread runs, because its work says so.
+constexpr llvm::StringLiteral one = "piko.one";
+/// A loop whose iterations have outboxes of their own.
+constexpr llvm::StringLiteral deferred = "piko.deferred";
+/// An arith.andi or arith.ori of truth values whose second operand counts only
+/// where the first does not decide: a processor may branch.
+constexpr llvm::StringLiteral shortCircuit = "piko.short_circuit";
+/// An access to an image whose pixel piko-prove-bounds has found to be in the
+/// bin.
+constexpr llvm::StringLiteral inside = "piko.inside";
+/// Of a kernel's function, until it is converted: the number of the stage whose
+/// bins it is for, or of the source that it places.
+constexpr llvm::StringLiteral number = "piko.number";
+/// A kernel's function whose number is that of a source.
+constexpr llvm::StringLiteral source = "piko.source";
+
+} // namespace piko::marks
+
+#endif // PIKO_DIALECT_PIKO_IR_MARKS_H
