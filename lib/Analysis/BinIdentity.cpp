@@ -46,7 +46,7 @@ LogicalResult BinIdentity::proveByRange(EdgeOp edge, AssignToOp to,
                    "producer's was"};
     return failure();
   }
-  for (EmitOp emit : getEmits(producer, edge.getPort())) {
+  for (EmissionOpInterface emit : getEmits(producer, edge.getPort())) {
     LinearFacts facts(emit, *this);
     unsigned frame = facts.addAssign(to->getParentOfType<AssignOp>(), emit);
     facts.assumeReached(to, frame);
@@ -82,12 +82,13 @@ bool BinIdentity::isFieldInBin(StageOp stage, StringRef field, int64_t dim) {
   bool isInBin = llvm::all_of(edges, [&](EdgeOp edge) {
     auto producer = lookupInPipeline<StageOp>(edge, edge.getProducerAttr());
     return producer.getBins() == stage.getBins() &&
-           llvm::all_of(getEmits(producer, edge.getPort()), [&](EmitOp emit) {
-             LinearFacts facts(emit, *this);
-             Value value = emit.getValues()[place];
-             return facts.isAboveBin(value, dim) &&
-                    facts.isBelowBin(value, dim);
-           });
+           llvm::all_of(getEmits(producer, edge.getPort()),
+                        [&](EmissionOpInterface emit) {
+                          LinearFacts facts(emit, *this);
+                          Value value = emit.getNumbers()[place];
+                          return facts.isAboveBin(value, dim) &&
+                                 facts.isBelowBin(value, dim);
+                        });
   });
   return fields[{stage, name, dim}] = isInBin && !edges.empty();
 }
@@ -102,13 +103,14 @@ bool BinIdentity::isSameFunction(EdgeOp edge, AssignToOp to) {
   auto own = dyn_cast_or_null<AssignToOp>(assign ? getOnlyAssignment(assign)
                                                  : nullptr);
   return own && !producer.getTakesList() &&
-         llvm::all_of(getEmits(producer, edge.getPort()), [&](EmitOp emit) {
-           LinearFacts facts(emit, *this);
-           unsigned emitted =
-               facts.addAssign(to->getParentOfType<AssignOp>(), emit);
-           return facts.isSame(to.getBin(), emitted, own.getBin(),
-                               facts.addAssign(assign));
-         });
+         llvm::all_of(
+             getEmits(producer, edge.getPort()), [&](EmissionOpInterface emit) {
+               LinearFacts facts(emit, *this);
+               unsigned emitted =
+                   facts.addAssign(to->getParentOfType<AssignOp>(), emit);
+               return facts.isSame(to.getBin(), emitted, own.getBin(),
+                                   facts.addAssign(assign));
+             });
 }
 
 //===----------------------------------------------------------------------===//

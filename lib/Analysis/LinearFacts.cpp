@@ -32,7 +32,7 @@ LinearFacts::LinearFacts(Operation *at, FactsProvider &provider)
   assumeReached(at);
 }
 
-unsigned LinearFacts::addAssign(AssignOp assign, EmitOp emit) {
+unsigned LinearFacts::addAssign(AssignOp assign, EmissionOpInterface emit) {
   Frame &frame = frames.emplace_back();
   frame.primitive = assign.getBody().getArgument(0);
   frame.emit = emit;
@@ -79,7 +79,7 @@ static bool isComputed(Operation *op) {
 
 /// The value that an emission gives the element of a field; null if the element
 /// is not known.
-static Value getEmitted(EmitOp emit, GetOp get) {
+static Value getEmitted(EmissionOpInterface emit, GetOp get) {
   auto type = cast<PrimType>(get.getPrim().getType());
   RecordOp record = lookupRecord(get, type.getRecord());
   int64_t place = 0, element = 0;
@@ -95,7 +95,7 @@ static Value getEmitted(EmitOp emit, GetOp get) {
         return {};
       element = element * count + constant.getSExtValue();
     }
-    return emit.getValues()[place + element];
+    return emit.getNumbers()[place + element];
   }
   return {};
 }

@@ -26,13 +26,27 @@ bool piko::hasSource(StageOp stage) {
       [&](SourceOp source) { return source.getStage() == stage.getSymName(); });
 }
 
-SmallVector<EmitOp> piko::getEmits(StageOp stage, int64_t port) {
-  SmallVector<EmitOp> emits;
-  stage.walk([&](EmitOp emit) {
-    if (int64_t(emit.getPort()) == port)
+SmallVector<EmissionOpInterface> piko::getEmits(StageOp stage, int64_t port) {
+  SmallVector<EmissionOpInterface> emits;
+  stage.walk([&](EmissionOpInterface emit) {
+    if (emit.getPort() == port)
       emits.push_back(emit);
   });
   return emits;
+}
+
+EmitOp piko::asEmit(EmissionOpInterface emission) {
+  if (auto emit = dyn_cast<EmitOp>(*emission))
+    return emit;
+  OpBuilder builder(emission);
+  Value prim = emission.getPrim();
+  auto emit =
+      EmitOp::create(builder, emission.getLoc(), prim ? prim.getType() : Type(),
+                     emission.getPort(), emission.getNumbers());
+  if (prim)
+    prim.replaceAllUsesWith(emit.getPrim());
+  emission.erase();
+  return emit;
 }
 
 int64_t piko::getElementIndex(RecordOp record, StringRef name) {

@@ -34,7 +34,7 @@ Uniformity::Uniformity(Operation *root, ArrayRef<Root> roots) {
   for (bool changed = true; changed;) {
     changed = false;
     root->walk<WalkOrder::PreOrder>([&](Operation *op) {
-      if (isa<ItemsOp, ListsOp>(op))
+      if (isa<WorkOpInterface>(op))
         changed |= markArguments(op->getRegion(0).front(), Uniform::Item);
       else if (auto loop = dyn_cast<ParallelLoopOpInterface>(op))
         changed |= markArguments(*loop.getBodyBlock(), Uniform::Iteration);

@@ -9,6 +9,7 @@
 #include "Piko/Transforms/Passes.h"
 
 #include "Bounds.h"
+#include "Piko/Analysis/PhaseGraph.h"
 #include "Piko/Analysis/Uniformity.h"
 #include "Piko/Dialect/Piko/IR/PikoCheck.h"
 #include "Unwritten.h"
@@ -162,6 +163,7 @@ void Checker::checkProcess(StageOp stage, ProcessOp process) {
   updated.clear();
   process.walk([&](UpdateOp update) { updated.insert(update.getImageAttr()); });
   checkTrips(process);
+  process.walk([](EmissionOpInterface emit) { asEmit(emit); });
   Block &body = process.getBody().front();
   checkBlock(body, Value());
   OpBuilder builder = OpBuilder::atBlockBegin(&body);
@@ -380,8 +382,25 @@ AddChecksPass::findNumbers(ArrayRef<StringAttr> records) {
   return fields;
 }
 
+/// Whether each access is one whose element can be told to the runtime.
+static LogicalResult verifyAccesses(PipelineOp pipeline) {
+  WalkResult result = pipeline.walk([](StateAccessOpInterface access)
+                                        -> WalkResult {
+    if (isa<LoadOp, StoreOp, AtomicOp, UpdateOp>(*access))
+      return WalkResult::advance();
+    return access->emitError(
+               "expected an access of the piko dialect, because checking mode "
+               "tells which element it is to, but got '")
+           << access->getName() << "'";
+  });
+  return failure(result.wasInterrupted());
+}
+
 void AddChecksPass::runOnOperation() {
   SmallVector<PipelineOp> pipelines(getOperation().getOps<PipelineOp>());
+  for (PipelineOp pipeline : pipelines)
+    if (failed(verifyAccesses(pipeline)))
+      return signalPassFailure();
   SmallVector<StringAttr> records;
   auto add = [&](FlatSymbolRefAttr record) {
     if (!llvm::is_contained(records, record.getAttr()))

@@ -3,6 +3,8 @@
 // piko-form-kernels: BASELINE kernels. A stage's process phase goes together
 // with the assign phases of the stages that it feeds.
 
+#include "StateAccess.h"
+
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "Piko/Transforms/Passes.h"
 
@@ -99,24 +101,23 @@ static bool isWrittenBefore(StageOp writer, StageOp reader) {
 static LogicalResult checkAssignReads(PipelineOp pipeline) {
   llvm::DenseMap<Attribute, SmallVector<Operation *>> writes;
   pipeline.walk([&](Operation *op) {
-    if (isa<StoreOp, AtomicOp>(op))
-      writes[op->getAttr("state")].push_back(op);
-    else if (auto update = dyn_cast<UpdateOp>(op))
-      writes[update.getImageAttr()].push_back(op);
+    if (auto [state, kind] = getStateAccess(op);
+        state && kind != StateAccess::reads)
+      writes[state].push_back(op);
   });
-  WalkResult result = pipeline.walk([&](LoadOp load) {
-    if (!load->getParentOfType<AssignOp>())
+  WalkResult result = pipeline.walk([&](StateAccessOpInterface read) {
+    if (!read->getParentOfType<AssignOp>())
       return WalkResult::advance();
-    StageOp reader = getPhaseStage(load);
-    for (Operation *write : writes.lookup(load.getStateAttr())) {
+    StageOp reader = getPhaseStage(read);
+    for (Operation *write : writes.lookup(read.getAccessedState())) {
       StageOp writer = getPhaseStage(write);
       if (isWrittenBefore(writer, reader))
         continue;
       InFlightDiagnostic error =
-          load.emitError("expected the assign phase of stage '")
+          read->emitError("expected the assign phase of stage '")
           << getCppName(reader) << "' to read what is complete when its "
           << "primitives arrive, but stage '" << getCppName(writer)
-          << "' may still write " << load.getStateAttr();
+          << "' may still write " << read.getAccessedState();
       error.attachNote(write->getLoc()) << "it is written here";
       return WalkResult::interrupt();
     }

@@ -8,6 +8,7 @@
 
 #include "UnitFormer.h"
 
+#include "Piko/Analysis/PhaseGraph.h"
 #include "Piko/Dialect/Piko/IR/Marks.h"
 #include "Piko/Transforms/Passes.h"
 
@@ -30,8 +31,11 @@ struct FormUnitsPass : piko::impl::FormUnitsBase<FormUnitsPass> {
 
 } // namespace
 
-static FlatSymbolRefAttr getStageName(Operation *work) {
-  return work->getAttrOfType<FlatSymbolRefAttr>("stage");
+/// The stage of bins, or of work.
+static FlatSymbolRefAttr getStageName(Operation *op) {
+  if (auto bins = dyn_cast<BinsOp>(op))
+    return bins.getStageAttr();
+  return cast<WorkOpInterface>(op).getStageAttr();
 }
 
 /// What a stage's schedule makes of the loop over its units.
@@ -76,10 +80,10 @@ Value UnitFormer::createWriter(Location at, FlatSymbolRefAttr other) {
 void UnitFormer::createWriters() {
   writers[getStageName(work)] = createWriter(loc, FlatSymbolRefAttr());
   if (auto over = dyn_cast<BinsOp>(work))
-    for (Operation &piece : *over.getBodyBlock())
-      if (isa<ItemsOp, ListsOp>(piece) && piece.hasAttr("producer"))
-        writers[getStageName(&piece)] =
-            createWriter(piece.getLoc(), getStageName(&piece));
+    for (auto piece : over.getOps<WorkOpInterface>())
+      if (piece.getProducerAttr())
+        writers[piece.getStageAttr()] =
+            createWriter(piece.getLoc(), piece.getStageAttr());
   rewriter.setInsertionPoint(unitEnd);
 }
 
@@ -112,9 +116,9 @@ void UnitFormer::convertSource(ItemsOp items) {
 }
 
 /// Whether work on what is emitted in a bin runs for bins in which nothing is.
-static bool visitsEmptyBins(ArrayRef<Operation *> locals) {
-  return llvm::any_of(locals, [](Operation *local) {
-    auto stage = lookupInPipeline<StageOp>(local, getStageName(local));
+static bool visitsEmptyBins(ArrayRef<WorkOpInterface> locals) {
+  return llvm::any_of(locals, [](WorkOpInterface local) {
+    auto stage = lookupInPipeline<StageOp>(local, local.getStageAttr());
     ScheduleOp schedule = stage.getSchedule();
     return schedule && schedule.getEveryBin();
   });
@@ -126,18 +130,15 @@ void UnitFormer::convertBins(BinsOp over) {
   rewriter.setInsertionPointToStart(loop.getBody());
   Value at = loop.getInductionVar(),
         writer = writers.lookup(getStageName(work));
-  auto isPiece = [](Operation &op) { return isa<ItemsOp, ListsOp>(op); };
   bool hasTiles = !over.getBodyBlock()->getOps<TileOp>().empty();
-  Operation *first = &*llvm::find_if(*over.getBodyBlock(), isPiece);
-  bool takesList = isa<ListsOp>(first);
+  SmallVector<WorkOpInterface> locals(over.getOps<WorkOpInterface>());
+  WorkOpInterface first = locals.front();
+  locals.erase(locals.begin());
+  bool takesList = first.takesList();
   Value bin = takesList
                   ? CallBinOp::create(rewriter, loc, bins, at).getResult()
                   : CellBinOp::create(rewriter, loc, bins, at).getResult();
   Block *behind = loop.getBody();
-  SmallVector<Operation *> locals;
-  for (Operation &op : *over.getBodyBlock())
-    if (isPiece(op) && &op != first)
-      locals.push_back(&op);
   rewriter.inlineBlockBefore(over.getBodyBlock(), end, bin);
   rewriter.eraseOp(over);
   if (takesList && !locals.empty()) {
@@ -150,15 +151,15 @@ void UnitFormer::convertBins(BinsOp over) {
   }
   rewriter.setInsertionPoint(first);
   if (takesList) {
-    convertList(cast<ListsOp>(first), bins, at, writer);
+    convertList(cast<ListsOp>(*first), bins, at, writer);
   } else {
     auto range = CellRangeOp::create(rewriter, loc, bins, unit, at);
     if (hasTiles && !visitsEmptyBins(locals))
       passOverEmptyBins(range, loop);
-    convertItems(cast<ItemsOp>(first), bins, range.getBegin(), range.getEnd(),
+    convertItems(cast<ItemsOp>(*first), bins, range.getBegin(), range.getEnd(),
                  writer);
   }
-  for (Operation *local : locals)
+  for (WorkOpInterface local : locals)
     convertLocal(local);
 }
 
@@ -235,15 +236,15 @@ void UnitFormer::convertList(ListsOp lists, Value from, Value call,
   rewriter.eraseOp(lists);
 }
 
-void UnitFormer::convertLocal(Operation *local) {
-  Location at = local->getLoc();
-  FlatSymbolRefAttr name = getStageName(local);
+void UnitFormer::convertLocal(WorkOpInterface local) {
+  Location at = local.getLoc();
+  FlatSymbolRefAttr name = local.getStageAttr();
   auto stage = lookupInPipeline<StageOp>(local, name);
   Value writer = writers.lookup(name);
   rewriter.setInsertionPoint(local);
-  auto around = LocalBinOp::create(
-      rewriter, at, name, writers.lookup(local->getAttr("producer")),
-      local->getAttrOfType<IntegerAttr>("port"), writer);
+  auto around = LocalBinOp::create(rewriter, at, name,
+                                   writers.lookup(local.getProducerAttr()),
+                                   local.getPortAttr(), writer);
   Block &body = around.getBody().emplaceBlock();
   Value from = body.addArgument(
       BinsType::get(rewriter.getContext(), stage.getInputAttr()), at);
@@ -251,7 +252,7 @@ void UnitFormer::convertLocal(Operation *local) {
   Value zero = arith::ConstantIndexOp::create(rewriter, at, 0);
   auto next = NextOp::create(rewriter, at, writer);
   rewriter.setInsertionPoint(next);
-  if (auto lists = dyn_cast<ListsOp>(local)) {
+  if (auto lists = dyn_cast<ListsOp>(*local)) {
     auto calls = UnitCellsOp::create(rewriter, at, from, zero);
     Value one = arith::ConstantIndexOp::create(rewriter, at, 1);
     auto loop =
@@ -262,15 +263,16 @@ void UnitFormer::convertLocal(Operation *local) {
   }
   auto range = CellRangeOp::create(rewriter, at, from, zero, zero);
   local->moveBefore(next);
-  convertItems(cast<ItemsOp>(local), from, range.getBegin(), range.getEnd(),
+  convertItems(cast<ItemsOp>(*local), from, range.getBegin(), range.getEnd(),
                writer);
 }
 
-void UnitFormer::convertEmissions(Operation *piece, Value writer) {
-  SmallVector<EmitOp> emits;
-  piece->walk([&](EmitOp emit) { emits.push_back(emit); });
-  auto stage = lookupInPipeline<StageOp>(piece, getStageName(piece));
-  for (EmitOp emit : emits) {
+void UnitFormer::convertEmissions(WorkOpInterface piece, Value writer) {
+  SmallVector<EmissionOpInterface> emits;
+  piece->walk([&](EmissionOpInterface emit) { emits.push_back(emit); });
+  auto stage = lookupInPipeline<StageOp>(piece, piece.getStageAttr());
+  for (EmissionOpInterface emission : emits) {
+    EmitOp emit = asEmit(emission);
     rewriter.setInsertionPoint(emit);
     auto record = cast<FlatSymbolRefAttr>(stage.getOutputs()[emit.getPort()]);
     Value stored = AppendOp::create(

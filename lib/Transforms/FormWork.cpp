@@ -50,7 +50,7 @@ private:
   void formBins();
   /// Makes work of a group's process phase where `builder` stands.
   void formWork(OpBuilder &builder, Group &group);
-  void convertEmit(EmitOp emit, Group &group);
+  void convertEmit(EmissionOpInterface emit, Group &group);
   void copyAssign(OpBuilder &builder, AssignOp assign, Value prim);
   void convertAssignment(AssignmentOpInterface op, StageOp consumer,
                          OwnerOp owner, Value prim);
@@ -155,28 +155,30 @@ void WorkFormer::formWork(OpBuilder &builder, Group &group) {
     work = ItemsOp::create(builder, at, stage, /*source=*/nullptr, producer,
                            port, /*lanes=*/nullptr);
 
-  SmallVector<EmitOp> emits;
-  group.process.walk([&](EmitOp emit) { emits.push_back(emit); });
+  SmallVector<EmissionOpInterface> emits;
+  group.process.walk([&](EmissionOpInterface emit) { emits.push_back(emit); });
   // Before emissions bring in the assign phases of other stages, whose queries
   // are about other bins.
   expandQueries(group.process, group.stage, bin);
   group.process.getBody().front().getTerminator()->erase();
   work->getRegion(0).takeBody(group.process.getBody());
   group.process.getBody().emplaceBlock(); // until it is erased
-  for (EmitOp emit : emits)
+  for (EmissionOpInterface emit : emits)
     convertEmit(emit, group);
 }
 
-void WorkFormer::convertEmit(EmitOp emit, Group &group) {
+void WorkFormer::convertEmit(EmissionOpInterface emit, Group &group) {
   AssignOp assign = group.assigns.lookup(emit.getPort());
-  if (!assign)
+  if (!assign) {
+    asEmit(emit);
     return;
+  }
   OpBuilder builder(emit);
   auto record =
       cast<FlatSymbolRefAttr>(group.stage.getOutputs()[emit.getPort()]);
   auto emitted = EmitOp::create(builder, emit.getLoc(),
                                 PrimType::get(builder.getContext(), record),
-                                emit.getPortAttr(), emit.getValues());
+                                emit.getPort(), emit.getNumbers());
   copyAssign(builder, assign, emitted.getPrim());
   emit.erase();
 }
@@ -225,9 +227,14 @@ void WorkFormer::convertAssignment(AssignmentOpInterface op, StageOp consumer,
   op->erase();
 }
 
-static bool changesState(Operation *op) {
-  auto access = dyn_cast<StateAccessOpInterface>(op);
-  return access && access.getAccessKinds() != StateAccess::reads;
+/// Whether a phase has an access of one of these kinds: bits.
+static bool hasAccess(Operation *phase, int kinds) {
+  return phase
+      ->walk([&](StateAccessOpInterface access) {
+        return access.getAccessKinds() & kinds ? WalkResult::interrupt()
+                                               : WalkResult::advance();
+      })
+      .wasInterrupted();
 }
 
 /// Notes at the stages what cannot be seen in kernels any more: whether the
@@ -244,14 +251,9 @@ static void noteStages(PipelineOp pipeline) {
     }
     ScheduleOp schedule = stage.getSchedule();
     bool serial = schedule && schedule.getKind() == ScheduleKind::Serialize;
-    bool ordered = op->walk([](UpdateOp) {
-                       return WalkResult::interrupt();
-                     }).wasInterrupted();
+    bool ordered = hasAccess(op, StateAccess::updates);
     stage.setOrdered(ordered);
-    stage.setWrites(op->walk([](Operation *inner) {
-                        return changesState(inner) ? WalkResult::interrupt()
-                                                   : WalkResult::advance();
-                      }).wasInterrupted());
+    stage.setWrites(hasAccess(op, ~StateAccess::reads));
     // Where a bin's end counts, one thread runs it.
     bool isLocal =
         !op->getParentOfType<KernelOp>().getOps<LocalBarrierOp>().empty();

@@ -46,13 +46,14 @@ public:
   void run();
 
 private:
-  void replaceEmit(EmitOp emit);
+  void replaceEmit(EmissionOpInterface emit);
   /// Copies what a phase does to where `builder` stands, for the primitive that
   /// `emit` emits, and shows each operation to `visit`.
-  void copyBody(OpBuilder &builder, Region &phase, EmitOp emit,
+  void copyBody(OpBuilder &builder, Region &phase, EmissionOpInterface emit,
                 llvm::function_ref<void(Operation *)> visit);
-  void replaceFields(Value prim, EmitOp emit);
-  Value createArray(OpBuilder &builder, FieldAttr field, EmitOp emit);
+  void replaceFields(Value prim, EmissionOpInterface emit);
+  Value createArray(OpBuilder &builder, FieldAttr field,
+                    EmissionOpInterface emit);
   int64_t renumber(int64_t port) { return port - (port > fusedPort()); }
   int64_t fusedPort() { return edge.getPort(); }
   void takePorts();
@@ -155,7 +156,7 @@ LogicalResult FuseStagesPass::check(EdgeOp edge, Refusal &refusal) {
       return refuse(loop, "it is assigned in a loop");
   }
 
-  SmallVector<EmitOp> emits = getEmits(producer, edge.getPort());
+  SmallVector<EmissionOpInterface> emits = getEmits(producer, edge.getPort());
   if (int64_t(emits.size()) > maxCopies)
     return refuse(emits.back(),
                   "it would be copied to " + Twine(emits.size()) + " places");
@@ -175,7 +176,7 @@ LogicalResult FuseStagesPass::check(EdgeOp edge, Refusal &refusal) {
     if (barrier.wasInterrupted())
       return failure();
   }
-  for (EmitOp emit : emits)
+  for (EmissionOpInterface emit : emits)
     for (auto loop = emit->getParentOfType<ParallelLoopOpInterface>(); loop;
          loop = loop->getParentOfType<ParallelLoopOpInterface>())
       if (loop.hasBarriers())
@@ -188,7 +189,8 @@ LogicalResult FuseStagesPass::check(EdgeOp edge, Refusal &refusal) {
 //===----------------------------------------------------------------------===//
 
 /// The numbers of an array field, in memory that an index can choose from.
-Value Fusion::createArray(OpBuilder &builder, FieldAttr field, EmitOp emit) {
+Value Fusion::createArray(OpBuilder &builder, FieldAttr field,
+                          EmissionOpInterface emit) {
   Location loc = emit.getLoc();
   int64_t first = getElementIndex(record, field.getName());
   Value array = memref::AllocaOp::create(
@@ -196,7 +198,7 @@ Value Fusion::createArray(OpBuilder &builder, FieldAttr field, EmitOp emit) {
       MemRefType::get({field.getElementCount()}, field.getType()));
   for (int64_t i = 0; i < field.getElementCount(); ++i) {
     Value at = arith::ConstantIndexOp::create(builder, loc, i);
-    memref::StoreOp::create(builder, loc, emit.getValues()[first + i], array,
+    memref::StoreOp::create(builder, loc, emit.getNumbers()[first + i], array,
                             at);
   }
   return array;
@@ -216,14 +218,14 @@ static std::optional<int64_t> getConstantElement(GetOp get, FieldAttr field) {
   return element;
 }
 
-void Fusion::replaceFields(Value prim, EmitOp emit) {
+void Fusion::replaceFields(Value prim, EmissionOpInterface emit) {
   llvm::DenseMap<StringAttr, Value> arrays;
   for (Operation *user : llvm::make_early_inc_range(prim.getUsers())) {
     auto get = cast<GetOp>(user);
     FieldAttr field = record.getField(get.getField());
     int64_t first = getElementIndex(record, get.getField());
     if (std::optional<int64_t> element = getConstantElement(get, field)) {
-      get.replaceAllUsesWith(emit.getValues()[first + *element]);
+      get.replaceAllUsesWith(emit.getNumbers()[first + *element]);
       get.erase();
       continue;
     }
@@ -251,7 +253,8 @@ void Fusion::replaceFields(Value prim, EmitOp emit) {
   }
 }
 
-void Fusion::copyBody(OpBuilder &builder, Region &phase, EmitOp emit,
+void Fusion::copyBody(OpBuilder &builder, Region &phase,
+                      EmissionOpInterface emit,
                       llvm::function_ref<void(Operation *)> visit) {
   auto prim = ub::PoisonOp::create(builder, emit.getLoc(),
                                    phase.getArgument(0).getType(),
@@ -267,7 +270,7 @@ void Fusion::copyBody(OpBuilder &builder, Region &phase, EmitOp emit,
   prim.erase();
 }
 
-void Fusion::replaceEmit(EmitOp emit) {
+void Fusion::replaceEmit(EmissionOpInterface emit) {
   OpBuilder builder(emit);
   AssignPreviousOp assignment;
   if (AssignOp assign = consumer.getAssign()) {
@@ -279,10 +282,13 @@ void Fusion::replaceEmit(EmitOp emit) {
   }
   // The consumer's ports follow the producer's.
   int64_t ports = producer.getOutputs().size() - 1;
+  SmallVector<EmissionOpInterface> emits;
   copyBody(builder, consumer.getProcess().getBody(), emit, [&](Operation *op) {
-    if (auto inner = dyn_cast<EmitOp>(op))
-      inner.setPort(ports + inner.getPort());
+    if (auto inner = dyn_cast<EmissionOpInterface>(op))
+      emits.push_back(inner);
   });
+  for (EmissionOpInterface inner : emits)
+    asEmit(inner).setPort(ports + inner.getPort());
   if (assignment)
     assignment.erase();
   emit.erase();
@@ -320,13 +326,13 @@ void Fusion::takeWaits() {
 }
 
 void Fusion::run() {
-  SmallVector<EmitOp> emits = getEmits(producer, fusedPort());
+  SmallVector<EmissionOpInterface> emits = getEmits(producer, fusedPort());
   // The producer's own emissions first, as the consumer's are put among them.
-  producer.walk([&](EmitOp emit) {
-    if (!llvm::is_contained(emits, emit))
-      emit.setPort(renumber(emit.getPort()));
+  producer.walk([&](EmissionOpInterface emit) {
+    if (emit.getPort() > fusedPort())
+      asEmit(emit).setPort(renumber(emit.getPort()));
   });
-  for (EmitOp emit : emits)
+  for (EmissionOpInterface emit : emits)
     replaceEmit(emit);
   takeWaits();
   SmallVector<Attribute> names;

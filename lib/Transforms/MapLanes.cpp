@@ -56,7 +56,7 @@ struct LaneLoop {
 
 /// What a primitive or a list asks for.
 struct LaneWork {
-  explicit LaneWork(Operation *work);
+  explicit LaneWork(WorkOpInterface work);
 
   /// Why lanes cannot be given that; empty where they can.
   std::string getObstacle(LaneMapping mapping) const;
@@ -67,7 +67,7 @@ struct LaneWork {
   int64_t getCost(LaneMapping mapping) const;
   LaneMapping getBest() const;
 
-  Operation *work;
+  WorkOpInterface work;
   SmallVector<LaneLoop> loops;
   int64_t operations = 0, updates = 0; ///< outside of the loops
   Operation *effect = nullptr;         ///< the first one outside of the loops
@@ -77,12 +77,11 @@ private:
   void count(Operation *op);
   void addLoop(Operation *loop, const Uniformity &uniformity);
   void countIterations(LaneLoop &entry, const Uniformity &uniformity);
-  bool isList() const { return isa<ListsOp>(work); }
 };
 
 struct MapLanesPass : piko::impl::MapLanesBase<MapLanesPass> {
   void runOnOperation() override;
-  LogicalResult map(Operation *work, StageOp stage);
+  LogicalResult map(WorkOpInterface work);
   void remark(const LaneWork &work, StageOp stage, LaneMapping chosen,
               bool isSpecified);
 };
@@ -97,7 +96,7 @@ struct MapLanesPass : piko::impl::MapLanesBase<MapLanesPass> {
 static bool isKnownEffect(Operation *op) {
   if (auto access = dyn_cast<StateAccessOpInterface>(op))
     return access.getAccessKinds() != StateAccess::reads;
-  return isa<EmitOp, PlaceOp>(op);
+  return isa<EmissionOpInterface, PlaceOp>(op);
 }
 
 /// Whether lanes may do an operation side by side.
@@ -133,7 +132,7 @@ static int64_t getWeight(Operation *op, Operation *root) {
   return isFree ? 0 : getTimes(op, root);
 }
 
-LaneWork::LaneWork(Operation *work) : work(work) {
+LaneWork::LaneWork(WorkOpInterface work) : work(work) {
   Uniformity uniformity(work);
   work->walk<WalkOrder::PreOrder>([&](Operation *op) {
     if (op == work)
@@ -233,7 +232,7 @@ std::string LaneWork::getObstacle(LaneMapping mapping) const {
         .str();
   if (mapping == LaneMapping::Iterations)
     return loops.empty() ? "there is no parallel loop" : "";
-  if (isList())
+  if (WorkOpInterface(work).takesList())
     return "a list is one item";
   for (const LaneLoop &entry : loops)
     if (cast<ParallelLoopOpInterface>(entry.loop).hasBarriers())
@@ -364,15 +363,15 @@ static void reportImpossible(const LaneWork &work, Operation *at, StageOp stage,
     error.attachNote(why->getLoc()) << "see here";
 }
 
-LogicalResult MapLanesPass::map(Operation *op, StageOp stage) {
+LogicalResult MapLanesPass::map(WorkOpInterface op) {
   LaneWork work(op);
-  auto items = dyn_cast<ItemsOp>(op);
+  StageOp stage = getKernelStage(op);
+  auto items = dyn_cast<ItemsOp>(*op);
   bool isSource = items && items.getSource();
   ScheduleOp schedule = stage.getSchedule();
   // What work says by itself, then what the stage says.
-  Operation *at = op;
-  std::optional<LaneMapping> said =
-      items ? items.getLanes() : cast<ListsOp>(op).getLanes();
+  Operation *at = op.getOperation();
+  std::optional<LaneMapping> said = op.getLanes();
   // What is checked is done in order, whatever the user would like to try.
   if (!said && schedule && !isSource && !work.unknown) {
     at = schedule;
@@ -383,10 +382,7 @@ LogicalResult MapLanesPass::map(Operation *op, StageOp stage) {
     return failure();
   }
   LaneMapping chosen = said.value_or(work.getBest());
-  if (items)
-    items.setLanes(chosen);
-  else
-    cast<ListsOp>(op).setLanes(chosen);
+  op.setLanes(chosen);
   Statistic *counts[] = {&this->items, &iterations, &collapsed, &one};
   ++*counts[static_cast<int>(chosen)];
   if (!isSource)
@@ -395,11 +391,8 @@ LogicalResult MapLanesPass::map(Operation *op, StageOp stage) {
 }
 
 void MapLanesPass::runOnOperation() {
-  WalkResult result = getOperation().walk([&](Operation *op) {
-    if (!isa<ItemsOp, ListsOp>(op))
-      return WalkResult::advance();
-    return failed(map(op, getKernelStage(op))) ? WalkResult::interrupt()
-                                               : WalkResult::skip();
+  WalkResult result = getOperation().walk([&](WorkOpInterface work) {
+    return failed(map(work)) ? WalkResult::interrupt() : WalkResult::advance();
   });
   if (result.wasInterrupted())
     signalPassFailure();

@@ -109,6 +109,15 @@ void OwnPixelsPass::runOnStage(StageOp stage) {
   if (stage.getTakesList())
     return refuse(process, "the phase takes a list, which may be of primitives "
                            "that update any pixel");
+  WalkResult other = process.walk([&](StateAccessOpInterface access) {
+    bool isUnknown = (access.getAccessKinds() & StateAccess::updates) &&
+                     !isa<UpdateOp>(*access);
+    if (isUnknown)
+      refuse(access, "it is not known which pixel this updates");
+    return isUnknown ? WalkResult::interrupt() : WalkResult::advance();
+  });
+  if (other.wasInterrupted())
+    return;
   for (UpdateOp update : ArrayRef(updates).drop_front())
     for (auto [a, b] :
          llvm::zip(first.getCoordinates(), update.getCoordinates()))

@@ -28,7 +28,7 @@ static bool isControlFlow(Operation *op) {
 /// not made, wherever it would have been.
 static bool hasEffect(Operation *op) {
   if (isControlFlow(op) || op->hasTrait<OpTrait::IsTerminator>() ||
-      isa<EmitOp, memref::StoreOp>(op))
+      isa<EmissionOpInterface, memref::StoreOp>(op))
     return false;
   return !wouldOpBeTriviallyDead(op);
 }
@@ -104,8 +104,9 @@ PipelineLiveness::PipelineLiveness(PipelineOp pipeline) {
     producers[consumer].push_back(producer);
   }
   for (auto stage : pipeline.getOps<StageOp>())
-    stage.walk(
-        [&](EmitOp emit) { emits[{stage, emit.getPort()}].push_back(emit); });
+    stage.walk([&](EmissionOpInterface emit) {
+      emits[{stage, emit.getPort()}].push_back(emit);
+    });
   for (auto stage : pipeline.getOps<StageOp>())
     if (canBeObserved(stage))
       markStage(stage);
@@ -129,7 +130,7 @@ void PipelineLiveness::markStage(StageOp stage) {
     return WalkResult::advance();
   });
   for (Input input : inputs.lookup(stage)) {
-    for (EmitOp emit : emits.lookup({input.producer, input.port}))
+    for (EmissionOpInterface emit : emits.lookup({input.producer, input.port}))
       markOp(emit);
     markStage(input.producer);
   }
@@ -147,8 +148,9 @@ void PipelineLiveness::markField(StageOp stage, FieldAttr field) {
     first += other.getElementCount();
   }
   for (Input input : inputs.lookup(stage))
-    for (EmitOp emit : emits.lookup({input.producer, input.port}))
-      markValues(emit.getValues().slice(first, field.getElementCount()));
+    for (EmissionOpInterface emit : emits.lookup({input.producer, input.port}))
+      markValues(
+          ValueRange(emit.getNumbers()).slice(first, field.getElementCount()));
 }
 
 //===----------------------------------------------------------------------===//
@@ -164,8 +166,14 @@ void PipelineLiveness::markOp(Operation *op) {
 void PipelineLiveness::visit(Operation *op) {
   if (Operation *parent = op->getParentOp(); !isa<AssignOp, ProcessOp>(parent))
     markOp(parent);
-  if (isa<EmitOp>(op))
-    return; // its fields are marked one by one
+  if (auto emit = dyn_cast<EmissionOpInterface>(op)) {
+    // Its fields are marked one by one.
+    SmallVector<Value> numbers = emit.getNumbers();
+    for (Value operand : op->getOperands())
+      if (!llvm::is_contained(numbers, operand))
+        markValue(operand);
+    return;
+  }
   if (auto loop = dyn_cast<scf::ForOp>(op))
     return markValues(
         {loop.getLowerBound(), loop.getUpperBound(), loop.getStep()});

@@ -52,7 +52,7 @@ private:
   llvm::DenseMap<mlir::Operation *, llvm::SmallVector<Input>> inputs;
   llvm::DenseMap<mlir::Operation *, llvm::SmallVector<StageOp>> producers;
   llvm::DenseMap<std::pair<mlir::Operation *, int64_t>,
-                 llvm::SmallVector<EmitOp>>
+                 llvm::SmallVector<EmissionOpInterface>>
       emits;
   llvm::DenseSet<mlir::Operation *> liveStages, liveOps;
   llvm::DenseSet<mlir::Value> liveValues;

@@ -340,8 +340,8 @@ Refusal PixelLoops::checkOperation(Operation *op) const {
     return checkArray(op, load.getMemRef());
   if (auto store = dyn_cast<memref::StoreOp>(op))
     return checkArray(op, store.getMemRef());
-  if (isa<EmitOp, ListAtOp, DivideOp, YieldOp, memref::AllocaOp, scf::IfOp,
-          scf::ForOp, scf::WhileOp, scf::IndexSwitchOp, scf::YieldOp,
+  if (isa<EmissionOpInterface, ListAtOp, DivideOp, YieldOp, memref::AllocaOp,
+          scf::IfOp, scf::ForOp, scf::WhileOp, scf::IndexSwitchOp, scf::YieldOp,
           scf::ConditionOp>(op) ||
       (op->getNumRegions() == 0 && isMemoryEffectFree(op)))
     return {};

@@ -9,6 +9,7 @@
 
 #include "PipelineLiveness.h"
 
+#include "Piko/Analysis/PhaseGraph.h"
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "Piko/Dialect/Piko/IR/PikoCheck.h"
 #include "Piko/Transforms/Passes.h"
@@ -369,6 +370,8 @@ void PrunePass::runOnOperation() {
     // A run that is checked reports what breaks a rule, be it observed or not.
     if (!pipeline.getOps<CheckRecordOp>().empty())
       continue;
+    // Numbers are taken away from emissions, and ports get other numbers.
+    pipeline.walk([](EmissionOpInterface emission) { asEmit(emission); });
     Pruner pruner(pipeline);
     pruner.run();
     fields += pruner.fields;

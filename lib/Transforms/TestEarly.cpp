@@ -3,6 +3,8 @@
 // piko-test-early: moves work behind the test that decides whether it is
 // needed.
 
+#include "StateAccess.h"
+
 #include "Piko/Transforms/Passes.h"
 
 namespace piko {
@@ -31,19 +33,13 @@ private:
   Region *getOnlyBranch(Operation *op);
 
   ProcessOp process;
-  llvm::DenseSet<Attribute> written; ///< State that the phase writes.
+  llvm::DenseSet<StringAttr> written; ///< State that the phase writes.
 };
 
 } // namespace
 
-Sinker::Sinker(ProcessOp process) : process(process) {
-  process.walk([&](Operation *op) {
-    if (isa<StoreOp, AtomicOp>(op))
-      written.insert(op->getAttr("state"));
-    else if (auto update = dyn_cast<UpdateOp>(op))
-      written.insert(update.getImageAttr());
-  });
-}
+Sinker::Sinker(ProcessOp process)
+    : process(process), written(getWrittenState(process)) {}
 
 /// Whether an operation, with all that is in it, only computes: from its
 /// operands, and from state that the phase leaves as it is.
@@ -53,7 +49,7 @@ bool Sinker::isMovable(Operation *op) {
     return false;
   return !op->walk([&](Operation *inner) {
               if (auto load = dyn_cast<LoadOp>(inner))
-                return written.contains(load.getStateAttr())
+                return written.contains(load.getStateAttr().getAttr())
                            ? WalkResult::interrupt()
                            : WalkResult::advance();
               bool isFree =

@@ -54,9 +54,9 @@ private:
                     mlir::Value end, mlir::Value writer);
   void convertList(ListsOp lists, mlir::Value from, mlir::Value call,
                    mlir::Value writer);
-  void convertLocal(mlir::Operation *local);
+  void convertLocal(WorkOpInterface local);
   /// What a piece of work emits goes to a writer.
-  void convertEmissions(mlir::Operation *piece, mlir::Value writer);
+  void convertEmissions(WorkOpInterface piece, mlir::Value writer);
   void convertPlaces(mlir::Value prim, mlir::Value writer,
                      mlir::IntegerAttr port);
 

@@ -248,13 +248,13 @@ unsigned piko::checkUnwritten(
   };
   SmallVector<Operation *> sinks;
   process.walk([&](Operation *op) {
-    if (isa<EmitOp, StoreOp, UpdateOp>(op))
+    if (isa<EmissionOpInterface, StoreOp, UpdateOp>(op))
       sinks.push_back(op);
   });
   for (Operation *op : sinks) {
-    if (auto emit = dyn_cast<EmitOp>(op)) {
+    if (auto emit = dyn_cast<EmissionOpInterface>(op)) {
       Attribute record = getPhaseStage(op).getOutputs()[emit.getPort()];
-      checkAll(op, emit.getValues(), cast<FlatSymbolRefAttr>(record));
+      checkAll(op, emit.getNumbers(), cast<FlatSymbolRefAttr>(record));
     } else if (auto store = dyn_cast<StoreOp>(op)) {
       check(op, store.getValue(), recordOf(op, store.getStateAttr()),
             store.getField());

@@ -56,7 +56,7 @@ public:
   /// An assign phase seen from the process phase: its primitive is the one that
   /// is processed, or one that is emitted. The number of such a phase is passed
   /// with its values.
-  unsigned addAssign(AssignOp assign, EmitOp emit = {});
+  unsigned addAssign(AssignOp assign, EmissionOpInterface emit = {});
   /// Adds what holds where `at` is reached.
   void assumeReached(mlir::Operation *at, unsigned frame = 0);
   /// Adds that a condition is true, or false.
@@ -86,9 +86,9 @@ public:
 
 private:
   struct Frame {
-    mlir::Value primitive; ///< null for the phase of the place itself
-    mlir::Value same;      ///< the primitive that it is there
-    EmitOp emit;           ///< or the emission of it
+    mlir::Value primitive;    ///< null for the phase of the place itself
+    mlir::Value same;         ///< the primitive that it is there
+    EmissionOpInterface emit; ///< or the emission of it
   };
   /// A float that is a multiple of 2^-shift.
   struct Exact {

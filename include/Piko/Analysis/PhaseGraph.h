@@ -15,7 +15,11 @@ llvm::SmallVector<EdgeOp> getEdgesFrom(StageOp stage);
 bool hasSource(StageOp stage);
 
 /// What a stage emits to a port.
-llvm::SmallVector<EmitOp> getEmits(StageOp stage, int64_t port);
+llvm::SmallVector<EmissionOpInterface> getEmits(StageOp stage, int64_t port);
+
+/// An emission as one that can be given another port and other numbers: itself,
+/// or a piko.emit that takes its place.
+EmitOp asEmit(EmissionOpInterface emission);
 
 /// The place of a field's first number among those of its record.
 int64_t getElementIndex(RecordOp record, llvm::StringRef field);

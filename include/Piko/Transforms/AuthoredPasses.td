@@ -21,7 +21,8 @@ def AddChecks : Pass<"piko-add-checks", "::mlir::ModuleOp"> {
     `scf.while` ends when a `piko.check_trip` says so.
 
     **Guarantees** that the results of a run without findings stay as they are,
-    and that no `piko.undefined` is left.
+    and that no `piko.undefined` is left. An access to state that is none of the
+    dialect's is an error, because its element is not known.
 
     Before:
     ```

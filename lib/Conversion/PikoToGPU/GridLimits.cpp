@@ -14,10 +14,12 @@ using namespace piko;
 /// Whether work in the same kernel takes what is placed.
 static bool isLocal(PlaceOp place) {
   auto bins = place->getParentOfType<BinsOp>();
-  return bins && llvm::any_of(*bins.getBodyBlock(), [&](Operation &piece) {
-           return piece.hasAttr("producer") &&
-                  piece.getAttr("stage") == place.getStageAttr();
-         });
+  return bins &&
+         llvm::any_of(bins.getOps<WorkOpInterface>(),
+                      [&](WorkOpInterface piece) {
+                        return piece.getProducerAttr() &&
+                               piece.getStageAttr() == place.getStageAttr();
+                      });
 }
 
 LogicalResult piko::checkGridLimits(KernelOp kernel) {
@@ -40,11 +42,16 @@ LogicalResult piko::checkGridLimits(KernelOp kernel) {
 
 /// What pixels cannot be shared with.
 static bool isObstacle(Operation *op) {
-  if (isa<EmitOp, PlaceOp, ListsOp, BarrierOpInterface>(op) ||
-      op->hasAttr("producer") || op->hasTrait<CheckingMode>())
+  if (isa<EmissionOpInterface, PlaceOp, BarrierOpInterface>(op) ||
+      op->hasTrait<CheckingMode>())
     return true;
-  if (auto atomic = dyn_cast<AtomicOp>(op))
-    return bool(atomic.getOld());
+  if (auto work = dyn_cast<WorkOpInterface>(op))
+    return work.takesList() || work.getProducerAttr();
+  if (auto access = dyn_cast<StateAccessOpInterface>(op)) {
+    auto atomic = dyn_cast<AtomicOp>(op);
+    bool isKnown = isa<LoadOp, StoreOp, UpdateOp>(op);
+    return atomic ? bool(atomic.getOld()) : !isKnown;
+  }
   auto array = dyn_cast<memref::AllocaOp>(op);
   return array && !array.getType().hasStaticShape();
 }
@@ -52,20 +59,18 @@ static bool isObstacle(Operation *op) {
 bool piko::canSharePixels(KernelOp kernel) {
   llvm::StringSet<> written;
   bool updates = false;
-  kernel.walk([&](Operation *op) {
-    if (auto update = dyn_cast<UpdateOp>(op))
-      written.insert(update.getImage());
-    else if (auto store = dyn_cast<StoreOp>(op))
-      written.insert(store.getState());
-    else if (auto atomic = dyn_cast<AtomicOp>(op))
-      written.insert(atomic.getState());
-    updates |= isa<UpdateOp>(op);
+  kernel.walk([&](StateAccessOpInterface access) {
+    if (access.getAccessKinds() != StateAccess::reads)
+      written.insert(access.getAccessedState().getValue());
+    updates |= isa<UpdateOp>(*access);
   });
   return updates &&
          !kernel
               .walk([&](Operation *op) {
-                auto load = dyn_cast<LoadOp>(op);
-                bool readsOwn = load && written.contains(load.getState());
+                auto access = dyn_cast<StateAccessOpInterface>(op);
+                bool readsOwn =
+                    access && access.getAccessKinds() == StateAccess::reads &&
+                    written.contains(access.getAccessedState().getValue());
                 return readsOwn || isObstacle(op) ? WalkResult::interrupt()
                                                   : WalkResult::advance();
               })

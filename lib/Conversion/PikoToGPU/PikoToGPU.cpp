@@ -121,6 +121,12 @@ static Operation *findWork(KernelOp kernel) {
   return nullptr;
 }
 
+static FlatSymbolRefAttr getStageName(Operation *work) {
+  if (auto bins = dyn_cast<BinsOp>(work))
+    return bins.getStageAttr();
+  return cast<WorkOpInterface>(work).getStageAttr();
+}
+
 LogicalResult GridBuilder::findItems() {
   launch.walk([&](scf::ForOp loop) {
     if (loop->hasAttr(marks::lanes) && loop->getParentOfType<scf::ForOp>() &&
@@ -184,12 +190,11 @@ Value GridFormer::createWriter(Location at, FlatSymbolRefAttr other) {
 
 void GridBuilder::formGrid() {
   Operation *work = findWork(kernel);
-  work->walk([&](Operation *piece) {
-    if (auto producer = piece->getAttrOfType<FlatSymbolRefAttr>("producer"))
-      memory.locals.push_back(
-          {producer, piece->getAttrOfType<IntegerAttr>("port").getInt()});
+  work->walk([&](WorkOpInterface piece) {
+    if (FlatSymbolRefAttr producer = piece.getProducerAttr())
+      memory.locals.push_back({producer, piece.getPortAttr().getInt()});
   });
-  memory.stage = work->getAttr("stage");
+  memory.stage = getStageName(work);
   GridFormer former(kernel, work, threads);
   former.run();
   memory.launch = launch = former.launch;
@@ -538,8 +543,7 @@ LogicalResult ConvertPikoToGPUPass::convert(KernelOp kernel) {
           "expected work on bins, as piko-form-work makes it");
     return success();
   }
-  auto stage = lookupInPipeline<StageOp>(
-      kernel, work->getAttrOfType<FlatSymbolRefAttr>("stage"));
+  auto stage = lookupInPipeline<StageOp>(kernel, getStageName(work));
   int64_t count = threads;
   if (!count)
     count = std::min<int64_t>(maxThreads,

@@ -278,7 +278,8 @@ LogicalResult PixelSharing::guard(UpdateOp update, Value root) {
 /// All that has an effect must be done by one thread.
 LogicalResult PixelSharing::checkEffects() {
   WalkResult result = items.walk([&](Operation *op) -> WalkResult {
-    if (!isa<UpdateOp, StoreOp, AtomicOp>(op) ||
+    auto access = dyn_cast<StateAccessOpInterface>(op);
+    if (!access || access.getAccessKinds() == StateAccess::reads ||
         llvm::any_of(owned, [&](const Owned &region) {
           return region.op->isProperAncestor(op);
         }))

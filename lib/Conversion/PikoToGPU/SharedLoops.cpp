@@ -101,19 +101,24 @@ static bool determine(ArrayRef<Value> roots, Value value, int depth = 0) {
 /// say which iteration it is.
 static bool updatesOwnPixels(Operation *loop) {
   llvm::StringMap<UpdateOp> known; // by image
-  WalkResult result = loop->walk([&](UpdateOp update) -> WalkResult {
-    auto [it, isFirst] = known.try_emplace(update.getImage(), update);
-    if (!isFirst)
-      return WalkResult(success(
-          llvm::equal(it->second.getCoordinates(), update.getCoordinates())));
-    SmallVector<Value> roots;
-    for (Value coordinate : update.getCoordinates())
-      roots.push_back(getRoot(coordinate, loop));
-    return WalkResult(success(
-        llvm::all_of(loop->getRegion(0).getArguments(), [&](Value argument) {
-          return determine(roots, argument);
-        })));
-  });
+  WalkResult result =
+      loop->walk([&](StateAccessOpInterface access) -> WalkResult {
+        if (!(access.getAccessKinds() & StateAccess::updates))
+          return WalkResult::advance();
+        auto update = dyn_cast<UpdateOp>(*access);
+        if (!update)
+          return WalkResult::interrupt(); // of a pixel that is not known
+        auto [it, isFirst] = known.try_emplace(update.getImage(), update);
+        if (!isFirst)
+          return WalkResult(success(llvm::equal(it->second.getCoordinates(),
+                                                update.getCoordinates())));
+        SmallVector<Value> roots;
+        for (Value coordinate : update.getCoordinates())
+          roots.push_back(getRoot(coordinate, loop));
+        return WalkResult(success(llvm::all_of(
+            loop->getRegion(0).getArguments(),
+            [&](Value argument) { return determine(roots, argument); })));
+      });
   return !result.wasInterrupted();
 }
 

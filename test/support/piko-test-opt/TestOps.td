@@ -28,6 +28,37 @@ def Test_StayOp : Test_Op<"stay", [
   let assemblyFormat = "attr-dict";
 }
 
+/// Emits a record of which all numbers are the same.
+def Test_EmitSameOp : Test_Op<"emit_same", [Piko_EmissionInterface]> {
+  let arguments = (ins ConfinedAttr<Piko_I64Attr, [IntNonNegative]>:$port,
+                       I32:$value,
+                       ConfinedAttr<Piko_I64Attr, [IntNonNegative]>:$times);
+  let assemblyFormat = "$port $value `times` $times attr-dict";
+  let extraClassDeclaration = [{
+    ::llvm::SmallVector<::mlir::Value> getNumbers() {
+      return ::llvm::SmallVector<::mlir::Value>(getTimes(), getValue());
+    }
+  }];
+}
+
+/// Emits, it says, but has no effect.
+def Test_EmitNothingOp : Test_Op<"emit_nothing", [
+    Pure, Piko_EmissionInterface]> {
+  let assemblyFormat = "attr-dict";
+  let extraClassDeclaration = [{
+    int64_t getPort() { return 0; }
+    ::llvm::SmallVector<::mlir::Value> getNumbers() { return {}; }
+  }];
+}
+
+/// Updates a pixel that nobody knows.
+def Test_SmearOp : Test_Op<"smear", [
+    MemoryEffects<[MemRead, MemWrite]>,
+    DeclareOpInterfaceMethods<Piko_StateAccessInterface>]> {
+  let arguments = (ins FlatSymbolRefAttr:$state);
+  let assemblyFormat = "$state attr-dict";
+}
+
 /// Writes an element of a buffer.
 def Test_ScribbleOp : Test_Op<"scribble", [
     MemoryEffects<[MemWrite]>,

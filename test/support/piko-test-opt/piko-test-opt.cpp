@@ -47,6 +47,9 @@ bool StayOp::canFail() { return false; }
 FlatSymbolRefAttr ScribbleOp::getAccessedState() { return getStateAttr(); }
 int ScribbleOp::getAccessKinds() { return StateAccess::stores; }
 
+FlatSymbolRefAttr SmearOp::getAccessedState() { return getStateAttr(); }
+int SmearOp::getAccessKinds() { return StateAccess::updates; }
+
 FlatSymbolRefAttr PeekOp::getAccessedState() { return getStateAttr(); }
 int PeekOp::getAccessKinds() { return StateAccess::reads; }
 

@@ -29,9 +29,9 @@ struct ForwardEmitted : OpRewritePattern<GetOp> {
   using OpRewritePattern::OpRewritePattern;
   LogicalResult matchAndRewrite(GetOp get,
                                 PatternRewriter &rewriter) const override {
-    ValueRange values;
-    if (auto emit = get.getPrim().getDefiningOp<EmitOp>())
-      values = emit.getValues();
+    SmallVector<Value> values;
+    if (auto emit = get.getPrim().getDefiningOp<EmissionOpInterface>())
+      values = emit.getNumbers();
     else if (auto append = get.getPrim().getDefiningOp<AppendOp>())
       values = append.getValues();
     else
@@ -115,31 +115,52 @@ LogicalResult ListAtOp::verify() {
   return success();
 }
 
-LogicalResult EmitOp::verify() {
-  bool isPhase = (*this)->getParentOfType<ProcessOp>();
-  if (!isPhase && !(*this)->getParentOfType<BinsOp>())
-    return emitOpError("expected to be inside a process phase");
-  if ((*this)->getParentOfType<UpdateOp>())
-    return emitOpError("expected to be outside an update");
-  StageOp stage = isPhase ? getPhaseStage(*this) : getKernelStage(*this);
+/// That an emission is where it may be, and does what it has to.
+static LogicalResult verifyEmissionPlace(EmissionOpInterface emission) {
+  if (!emission->getParentOfType<ProcessOp>() &&
+      !emission->getParentOfType<BinsOp>())
+    return emission->emitOpError("expected to be inside a process phase");
+  if (emission->getParentOfType<UpdateOp>())
+    return emission->emitOpError("expected to be outside an update");
+  if (wouldOpBeTriviallyDead(emission))
+    return emission->emitOpError(
+        "expected an effect, because it emits, but it says that it has none");
+  for (Value number : emission.getNumbers())
+    if (!llvm::is_contained(emission->getOperands(), number))
+      return emission->emitOpError(
+          "expected the numbers that it emits to be its operands");
+  return success();
+}
+
+LogicalResult piko::detail::verifyEmission(Operation *op) {
+  auto emission = cast<EmissionOpInterface>(op);
+  if (failed(verifyEmissionPlace(emission)))
+    return failure();
+  StageOp stage =
+      op->getParentOfType<ProcessOp>() ? getPhaseStage(op) : getKernelStage(op);
   if (!stage)
     return success(); // the phase reports it
-  if (getPort() >= int64_t(stage.getOutputs().size()))
-    return emitOpError("expected a port below ")
-           << stage.getOutputs().size() << ", which is how many stage '"
-           << getCppName(stage) << "' has, but got " << getPort();
-  auto name = cast<FlatSymbolRefAttr>(stage.getOutputs()[getPort()]);
-  RecordOp record = lookupRecord(*this, name);
+  int64_t port = emission.getPort(), ports = stage.getOutputs().size();
+  if (port < 0 || port >= ports)
+    return op->emitOpError("expected a port below ")
+           << ports << ", which is how many stage '" << getCppName(stage)
+           << "' has, but got " << port;
+  auto name = cast<FlatSymbolRefAttr>(stage.getOutputs()[port]);
+  RecordOp record = lookupRecord(op, name);
   if (!record)
     return success(); // the stage reports it
   SmallVector<Type> types = record.getElementTypes();
-  if (types != getValues().getTypes())
-    return emitOpError("expected the numbers of record ")
+  SmallVector<Value> numbers = emission.getNumbers();
+  if (TypeRange(types) != TypeRange(ValueRange(numbers)))
+    return op->emitOpError("expected the numbers of record ")
            << name << ", " << types.size() << " of types (" << types
-           << "), but got (" << getValues().getTypes() << ")";
-  if (getPrim() && getPrim().getType().getRecord() != name)
-    return emitOpError("expected a result of record ")
-           << name << ", but got " << getPrim().getType().getRecord();
+           << "), but got (" << TypeRange(ValueRange(numbers)) << ")";
+  auto prim = emission.getPrim()
+                  ? dyn_cast<PrimType>(emission.getPrim().getType())
+                  : PrimType();
+  if (prim && prim.getRecord() != name)
+    return op->emitOpError("expected a result of record ")
+           << name << ", but got " << prim.getRecord();
   return success();
 }
 

@@ -237,9 +237,8 @@ StageOp piko::getPhaseStage(Operation *op) {
 
 StageOp piko::getKernelStage(Operation *op) {
   for (Operation *at = op; at; at = at->getParentOp())
-    if (isa<ItemsOp, ListsOp>(at))
-      return lookupInPipeline<StageOp>(
-          at, at->getAttrOfType<FlatSymbolRefAttr>("stage"));
+    if (auto work = dyn_cast<WorkOpInterface>(at))
+      return lookupInPipeline<StageOp>(at, work.getStageAttr());
   if (auto local = op->getParentOfType<LocalBinOp>())
     return lookupInPipeline<StageOp>(local, local.getStageAttr());
   auto kernel = op->getParentOfType<KernelOp>();

@@ -138,9 +138,10 @@ static LogicalResult verifyCombine(Operation *op, TypeRange types) {
     return op->emitOpError("expected its body to yield results of types (")
            << types << ")";
   WalkResult effects = op->walk([&](Operation *inner) {
-    if (inner == op ||
-        !isa<EmitOp, StoreOp, AtomicOp, UpdateOp, ParallelLoopOpInterface>(
-            inner))
+    auto access = dyn_cast<StateAccessOpInterface>(inner);
+    bool isEffect = isa<EmissionOpInterface, ParallelLoopOpInterface>(inner) ||
+                    (access && access.getAccessKinds() != StateAccess::reads);
+    if (inner == op || !isEffect)
       return WalkResult::advance();
     inner->emitOpError("expected to be outside the function of a ")
         << op->getName().stripDialect();

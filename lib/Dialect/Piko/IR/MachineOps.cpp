@@ -11,14 +11,6 @@ using namespace piko;
 // Bins, and what is in them
 //===----------------------------------------------------------------------===//
 
-/// The stage and the port whose emissions work takes; null where it takes what
-/// the bin holds.
-static FlatSymbolRefAttr getProducer(Operation *work) {
-  return work->getAttrOfType<FlatSymbolRefAttr>("producer");
-}
-
-static bool isWork(Operation &op) { return isa<ItemsOp, ListsOp>(op); }
-
 static LogicalResult verifyArgument(Operation *op, Block &body, Type expected) {
   if (body.getNumArguments() == 1 && body.getArgument(0).getType() == expected)
     return success();
@@ -34,22 +26,20 @@ LogicalResult BinsOp::verifyRegions() {
           verifyArgument(*this, *getBodyBlock(), IndexType::get(getContext()))))
     return failure();
   llvm::SmallDenseSet<Attribute> before;
-  for (Operation &op : *getBodyBlock()) {
-    if (!isWork(op))
-      continue;
-    auto stage = op.getAttrOfType<FlatSymbolRefAttr>("stage");
-    FlatSymbolRefAttr producer = getProducer(&op);
+  for (auto work : getBodyBlock()->getOps<WorkOpInterface>()) {
+    FlatSymbolRefAttr stage = work.getStageAttr();
+    FlatSymbolRefAttr producer = work.getProducerAttr();
     if (before.empty() && (producer || stage != getStageAttr()))
-      return op.emitOpError("expected to take what the bins of ")
+      return work->emitOpError("expected to take what the bins of ")
              << getStageAttr() << " hold, because it is the first work on them";
     if (!before.empty() && !producer)
-      return op.emitOpError("expected to take what work in front of it emits, "
-                            "because it is not the first");
+      return work->emitOpError("expected to take what work in front of it "
+                               "emits, because it is not the first");
     if (producer && !before.contains(producer))
-      return op.emitOpError("expected work of ")
+      return work->emitOpError("expected work of ")
              << producer << " in front of it";
     if (!before.insert(stage).second)
-      return op.emitOpError("expected one piece of work of ") << stage;
+      return work->emitOpError("expected one piece of work of ") << stage;
   }
   if (before.empty())
     return emitOpError("expected work on what the bins hold");
@@ -57,20 +47,18 @@ LogicalResult BinsOp::verifyRegions() {
 }
 
 /// What work has in common.
-template <typename WorkOp> static LogicalResult verifyWork(WorkOp op) {
+static LogicalResult verifyWork(WorkOpInterface op, bool isSource) {
   if (failed(verifyStage(op, op.getStageAttr())))
     return failure();
   auto stage = lookupInPipeline<StageOp>(op, op.getStageAttr());
-  bool takesList = isa<ListsOp>(op.getOperation()), isSource = false;
-  if (auto items = dyn_cast<ItemsOp>(op.getOperation()))
-    isSource = bool(items.getSource());
+  bool takesList = op.takesList();
   if (stage.getTakesList() != takesList && !isSource)
-    return op.emitOpError("expected ")
+    return op->emitOpError("expected ")
            << (takesList ? "a stage that takes lists"
                          : "a stage that takes primitives one by one")
            << ", but got " << op.getStageAttr();
   if (bool(op.getProducerAttr()) != bool(op.getPortAttr()))
-    return op.emitOpError("expected a producer and its port, or neither");
+    return op->emitOpError("expected a producer and its port, or neither");
   Type input = takesList
                    ? Type(ListType::get(op.getContext(), stage.getInputAttr()))
                    : Type(PrimType::get(op.getContext(), stage.getInputAttr()));
@@ -80,12 +68,12 @@ template <typename WorkOp> static LogicalResult verifyWork(WorkOp op) {
     return failure();
   if (!op.getProducerAttr())
     return success();
-  return verifyLocalEdge(op, op.getProducerAttr(), *op.getPort(),
+  return verifyLocalEdge(op, op.getProducerAttr(), op.getPortAttr().getInt(),
                          op.getStageAttr());
 }
 
 LogicalResult ItemsOp::verifySymbolUses(SymbolTableCollection &) {
-  if (failed(verifyWork(*this)))
+  if (failed(verifyWork(*this, getSource().has_value())))
     return failure();
   return verifySource(*this, getSource(), getStageAttr());
 }
@@ -100,7 +88,7 @@ LogicalResult ItemsOp::verifyRegions() {
 }
 
 LogicalResult ListsOp::verifySymbolUses(SymbolTableCollection &) {
-  return verifyWork(*this);
+  return verifyWork(*this, /*isSource=*/false);
 }
 
 LogicalResult ListsOp::verifyRegions() {
@@ -126,7 +114,8 @@ LogicalResult PlaceOp::verifySymbolUses(SymbolTableCollection &) {
     return emitOpError("expected a tile only in a stage that is divided into "
                        "tiles, but ")
            << getStageAttr() << " is not";
-  if (getPrim().getDefiningOp<EmitOp>())
+  auto emission = getPrim().getDefiningOp<EmissionOpInterface>();
+  if (emission && emission.getPrim() == getPrim())
     return success();
   auto argument = dyn_cast<BlockArgument>(getPrim());
   auto items = argument ? dyn_cast<ItemsOp>(argument.getOwner()->getParentOp())

@@ -30,9 +30,8 @@ SmallVector<StageOp> piko::getStages(KernelOp kernel) {
   for (auto process : kernel.getOps<ProcessOp>())
     add(process.getStageAttr());
   for (auto bins : kernel.getOps<BinsOp>())
-    for (Operation &work : *bins.getBodyBlock())
-      if (isa<ItemsOp, ListsOp>(work))
-        add(work.getAttrOfType<FlatSymbolRefAttr>("stage"));
+    for (auto work : bins.getOps<WorkOpInterface>())
+      add(work.getStageAttr());
   for (auto bins : kernel.getOps<OpenBinsOp>()) {
     if (bins.getSource())
       continue;

@@ -117,8 +117,8 @@ static bool isPrivate(Operation *op) {
 /// Whether passes can know what an operation of a phase does.
 static bool isKnown(Operation *op) {
   return isa<PikoDialect>(op->getDialect()) ||
-         isa<AssignmentOpInterface, StateAccessOpInterface, BarrierOpInterface,
-             ParallelLoopOpInterface>(op) ||
+         isa<AssignmentOpInterface, EmissionOpInterface, StateAccessOpInterface,
+             BarrierOpInterface, ParallelLoopOpInterface>(op) ||
          op->hasTrait<OpTrait::HasRecursiveMemoryEffects>() ||
          op->hasTrait<OpTrait::IsTerminator>() || isPrivate(op);
 }
@@ -147,10 +147,24 @@ static LogicalResult verifyInPhase(Operation *op) {
   return success();
 }
 
+/// The reference gives assign and schedule phases the state as it is.
+static LogicalResult verifyMayAccess(StateAccessOpInterface access) {
+  if (access.getAccessKinds() != StateAccess::reads &&
+      (access->getParentOfType<AssignOp>() ||
+       access->getParentOfType<ScheduleOp>()))
+    return access->emitOpError("expected to be inside a process phase, because "
+                               "only process phases may change state");
+  return success();
+}
+
 LogicalResult piko::verifyPhaseBody(Operation *phase) {
-  WalkResult result = phase->walk([&](Operation *op) {
-    return op != phase && failed(verifyInPhase(op)) ? WalkResult::interrupt()
-                                                    : WalkResult::advance();
+  WalkResult result = phase->walk([&](Operation *op) -> WalkResult {
+    if (op == phase)
+      return WalkResult::advance();
+    auto access = dyn_cast<StateAccessOpInterface>(op);
+    if (access && failed(verifyMayAccess(access)))
+      return WalkResult::interrupt();
+    return verifyInPhase(op);
   });
   return failure(result.wasInterrupted());
 }
@@ -168,11 +182,11 @@ LogicalResult ScheduleOp::verifyRegions() {
   if (failed(verifyPhaseBody(*this)))
     return failure();
   // It runs before the pipeline does.
-  WalkResult result = walk([&](LoadOp load) {
-    if (lookupInPipeline<ConstantOp>(load, load.getStateAttr()))
+  WalkResult result = walk([&](StateAccessOpInterface read) {
+    if (lookupInPipeline<ConstantOp>(read, read.getAccessedState()))
       return WalkResult::advance();
-    load.emitOpError("expected a schedule to read constants only, but got ")
-        << load.getStateAttr();
+    read->emitOpError("expected a schedule to read constants only, but got ")
+        << read.getAccessedState();
     return WalkResult::interrupt();
   });
   return failure(result.wasInterrupted());

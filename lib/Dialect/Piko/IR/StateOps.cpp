@@ -52,18 +52,8 @@ static LogicalResult verifyAccess(AccessOp op, Type type) {
   return verifyElement(op, record, op.getField(), op.getElements());
 }
 
-/// The reference gives assign and schedule phases the state as it is.
-static LogicalResult verifyMayChange(Operation *op) {
-  if (op->getParentOfType<AssignOp>() || op->getParentOfType<ScheduleOp>())
-    return op->emitOpError("expected to be inside a process phase, because "
-                           "only process phases may change state");
-  return success();
-}
-
 template <typename AccessOp>
 static LogicalResult verifyWrite(AccessOp op, Type type) {
-  if (failed(verifyMayChange(op)))
-    return failure();
   if (lookupInPipeline<ConstantOp>(op, op.getStateAttr()))
     return op.emitOpError(
                "expected a buffer or an image, but got the constant ")
@@ -136,9 +126,7 @@ LogicalResult UpdateOp::verifyRegions() {
       image ? lookupRecord(image, image.getRecordAttr()) : RecordOp();
   if (!record)
     return success(); // verifySymbolUses reports it
-  if (failed(verifyMayChange(*this)))
-    return failure();
-  if (!(*this)->getParentOfType<ProcessOp>() &&
+  if (!(*this)->getParentOfType<StageOp>() &&
       !(*this)->getParentOfType<KernelOp>())
     return emitOpError("expected to be inside a process phase");
   SmallVector<Type> types = record.getElementTypes();
@@ -149,11 +137,12 @@ LogicalResult UpdateOp::verifyRegions() {
            << body.getArgumentTypes() << ")";
   // The body works on a copy of the pixel, which other access would bypass.
   WalkResult bypass = walk([&](Operation *op) {
-    auto name = op->getAttrOfType<FlatSymbolRefAttr>("state");
-    if (!isa<LoadOp, StoreOp, AtomicOp>(op) || name != getImageAttr())
+    auto access = dyn_cast<StateAccessOpInterface>(op);
+    if (op == getOperation() || !access ||
+        access.getAccessedState() != getImageAttr())
       return WalkResult::advance();
     op->emitError("expected an update to see ")
-        << name << " only through the pixel that it is given";
+        << getImageAttr() << " only through the pixel that it is given";
     return WalkResult::interrupt();
   });
   if (bypass.wasInterrupted())

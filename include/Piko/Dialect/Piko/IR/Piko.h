@@ -53,6 +53,7 @@ class Failure : public mlir::OpTrait::TraitBase<OpT, Failure> {};
 
 namespace detail {
 bool hasBarriers(mlir::Operation *loop);
+mlir::LogicalResult verifyEmission(mlir::Operation *emission);
 } // namespace detail
 } // namespace piko
 

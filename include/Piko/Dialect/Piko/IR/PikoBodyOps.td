@@ -6,6 +6,7 @@
 #define PIKO_DIALECT_PIKO_IR_PIKOBODYOPS_TD
 
 include "Piko/Dialect/Piko/IR/PikoAttributes.td"
+include "Piko/Dialect/Piko/IR/PikoInterfaces.td"
 include "Piko/Dialect/Piko/IR/PikoTypes.td"
 
 //===----------------------------------------------------------------------===//
@@ -100,7 +101,7 @@ def Piko_ListAtOp : Piko_Op<"list_at", [MemoryEffects<[MemRead]>]> {
   let hasVerifier = 1;
 }
 
-def Piko_EmitOp : Piko_Op<"emit"> {
+def Piko_EmitOp : Piko_Op<"emit", [Piko_EmissionInterface]> {
   let summary = "sends a primitive out of a port";
   let description = [{
     Takes the numbers of the port's record: its fields in order, arrays
@@ -118,7 +119,11 @@ def Piko_EmitOp : Piko_Op<"emit"> {
     $port (`(` $values^ `)` `:` type($values))?
     (`->` qualified(type($prim))^)? attr-dict
   }];
-  let hasVerifier = 1;
+  let extraClassDeclaration = [{
+    ::llvm::SmallVector<::mlir::Value> getNumbers() {
+      return ::llvm::SmallVector<::mlir::Value>(getValues());
+    }
+  }];
 }
 
 //===----------------------------------------------------------------------===//

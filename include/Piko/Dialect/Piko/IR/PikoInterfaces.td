@@ -33,6 +33,50 @@ def Piko_AssignmentInterface : OpInterface<"AssignmentOpInterface"> {
   ];
 }
 
+def Piko_EmissionInterface : OpInterface<"EmissionOpInterface"> {
+  let cppNamespace = "::piko";
+  let description = [{
+    Sends one primitive out of a port of its stage, each time that it runs, and
+    does nothing else: what it emits is all that passes need to know of it, and
+    one that changes this puts a `piko.emit` in its place. Its numbers are
+    operands of it.
+  }];
+  let methods = [
+    InterfaceMethod<"The port.", "int64_t", "getPort">,
+    InterfaceMethod<"The numbers of the port's record: its fields in order, "
+                    "arrays row-major.",
+                    "::llvm::SmallVector<::mlir::Value>", "getNumbers">,
+    InterfaceMethod<"At the machine level the primitive, for placements, or "
+                    "null.",
+                    "::mlir::Value", "getPrim", (ins), [{}], [{
+      return ::mlir::Value();
+    }]>,
+  ];
+  let verify = [{ return ::piko::detail::verifyEmission($_op); }];
+}
+
+def Piko_WorkInterface : OpInterface<"WorkOpInterface"> {
+  let cppNamespace = "::piko";
+  let description = [{
+    Work of a stage on what is in a bin, or on what a source is fed.
+  }];
+  let methods = [
+    InterfaceMethod<"The stage.", "::mlir::FlatSymbolRefAttr", "getStageAttr">,
+    InterfaceMethod<"The stage that has emitted, in this bin, what it takes; "
+                    "null where it takes what the bin holds.",
+                    "::mlir::FlatSymbolRefAttr", "getProducerAttr">,
+    InterfaceMethod<"The port of that stage, or null.", "::mlir::IntegerAttr",
+                    "getPortAttr">,
+    InterfaceMethod<"Whether it takes a list.", "bool", "takesList">,
+    InterfaceMethod<"What lanes are given, if that is said.",
+                    "::std::optional<::piko::LaneMapping>", "getLanes">,
+    InterfaceMethod<"Says what lanes are given.", "void", "setLanes",
+                    (ins "::std::optional<::piko::LaneMapping>":$lanes)>,
+    InterfaceMethod<"What runs for an item or a list.", "::mlir::Block *",
+                    "getBodyBlock">,
+  ];
+}
+
 def Piko_StateAccessInterface : OpInterface<"StateAccessOpInterface"> {
   let cppNamespace = "::piko";
   let description = [{

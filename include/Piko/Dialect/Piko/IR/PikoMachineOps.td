@@ -67,7 +67,7 @@ def Piko_BinsOp : Piko_Op<"bins", [
 /// Work on what is in a bin. With `from`, on what a port has emitted in the bin
 /// so far.
 class Piko_WorkOp<string mnemonic> : Piko_Op<mnemonic, [
-    SingleBlock, NoTerminator, AutomaticAllocationScope,
+    Piko_WorkInterface, SingleBlock, NoTerminator, AutomaticAllocationScope,
     ParentOneOf<["BinsOp", "KernelOp"]>,
     DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
   let regions = (region SizedRegion<1>:$body);
@@ -109,6 +109,7 @@ def Piko_ItemsOp : Piko_WorkOp<"items"> {
   }];
   let extraClassDeclaration = common # [{
     ::mlir::Value getPrim() { return getBody().getArgument(0); }
+    bool takesList() { return false; }
   }];
 }
 
@@ -132,6 +133,7 @@ def Piko_ListsOp : Piko_WorkOp<"lists"> {
   }];
   let extraClassDeclaration = common # [{
     ::mlir::Value getList() { return getBody().getArgument(0); }
+    bool takesList() { return true; }
   }];
 }
 
