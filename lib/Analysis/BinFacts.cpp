@@ -38,15 +38,55 @@ Linear LinearFacts::getExtent(StringRef state, int64_t dim) {
 Linear LinearFacts::getListSize(Value list) {
   Id id = number(list, 0);
   auto [found, isNew] = expressions.try_emplace(id);
-  if (isNew)
+  if (isNew) {
     found->second = addSize();
+    if (isNeverEmpty(list))
+      system.getFacts().addAtLeastZero(found->second - Linear(1));
+  }
   return found->second;
 }
 
-void LinearFacts::assumeAssigned() {
-  AssignOp assign = stage.getAssign();
+bool LinearFacts::isNeverEmpty(Value list) {
   auto process = at->getParentOfType<ProcessOp>();
-  if (!assign || !process || stage.getTakesList())
+  ScheduleOp schedule = stage.getSchedule();
+  return process && list == process.getBody().getArgument(0) &&
+         (!schedule || (!schedule.getEveryBin() && schedule.getBody().empty()));
+}
+
+bool LinearFacts::isInside(ListAtOp read) {
+  Linear index = get(read.getIndex());
+  return read.getChecked() ||
+         (isAtLeastZero(index) &&
+          isAtLeastZero(getListSize(read.getList()) - index - Linear(1)));
+}
+
+/// What stands in front of the place has run, if the place is reached.
+void LinearFacts::findItems() {
+  constexpr size_t most = 8; // each costs a search for proofs
+  for (Operation *op = at; !isa<ProcessOp>(op); op = op->getParentOp())
+    for (Operation &before : *op->getBlock()) {
+      if (&before == op || items.size() == most)
+        break;
+      auto read = dyn_cast<ListAtOp>(before);
+      auto isKnown = [&](Value item) {
+        return number(item, 0) == number(read.getPrim(), 0);
+      };
+      if (read && llvm::none_of(items, isKnown) && isInside(read))
+        items.push_back(read.getPrim());
+    }
+}
+
+bool LinearFacts::isItem(Value prim, unsigned frame) {
+  auto process = at->getParentOfType<ProcessOp>();
+  if (!process || frame != 0)
+    return false;
+  auto read = prim.getDefiningOp<ListAtOp>();
+  return prim == process.getBody().getArgument(0) || (read && isInside(read));
+}
+
+void LinearFacts::assumeAssigned(Value item) {
+  AssignOp assign = stage.getAssign();
+  if (!assign)
     return;
   Operation *only = getOnlyAssignment(assign);
   auto to = dyn_cast_or_null<AssignToOp>(only);
@@ -54,7 +94,7 @@ void LinearFacts::assumeAssigned() {
   auto box = dyn_cast_or_null<AssignBoxOp>(only);
   if (!cell && !box)
     return;
-  unsigned frame = addAssign(assign);
+  unsigned frame = addAssign(assign, item);
   assumeReached(only, frame);
   if (cell)
     facts->add(describeInBin(cell, frame));

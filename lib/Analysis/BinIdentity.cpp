@@ -43,7 +43,8 @@ LogicalResult BinIdentity::proveByRange(EdgeOp edge, AssignToOp to,
   auto cell = to.getBin().getDefiningOp<BinAtOp>();
   if (!cell) {
     refusal = {to, "the bin is not that of a cell, nor is it computed as the "
-                   "producer's was"};
+                   "producer's was; if it always is that bin, promise that by "
+                   "assignToPreviousBins"};
     return failure();
   }
   for (EmissionOpInterface emit : getEmits(producer, edge.getPort())) {
@@ -102,14 +103,16 @@ bool BinIdentity::isSameFunction(EdgeOp edge, AssignToOp to) {
   AssignOp assign = producer.getAssign();
   auto own = dyn_cast_or_null<AssignToOp>(assign ? getOnlyAssignment(assign)
                                                  : nullptr);
-  return own && !producer.getTakesList() &&
+  return own &&
          llvm::all_of(
              getEmits(producer, edge.getPort()), [&](EmissionOpInterface emit) {
                LinearFacts facts(emit, *this);
                unsigned emitted =
                    facts.addAssign(to->getParentOfType<AssignOp>(), emit);
-               return facts.isSame(to.getBin(), emitted, own.getBin(),
-                                   facts.addAssign(assign));
+               return llvm::any_of(facts.getItems(), [&](Value item) {
+                 return facts.isSame(to.getBin(), emitted, own.getBin(),
+                                     facts.addAssign(assign, item));
+               });
              });
 }
 

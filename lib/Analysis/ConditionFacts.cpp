@@ -3,6 +3,7 @@
 
 #include "Piko/Analysis/LinearFacts.h"
 
+#include "mlir/Dialect/UB/IR/UBOps.h"
 #include "mlir/IR/Matchers.h"
 
 using namespace mlir;
@@ -32,6 +33,66 @@ LinearFact LinearFacts::describeUnknown(Value condition, bool truth,
   return fact;
 }
 
+LinearFact LinearFacts::describeChoice(Value condition, Value ifTrue,
+                                       Value ifFalse, bool truth,
+                                       unsigned frame) {
+  LinearFact either;
+  std::vector<LinearFact> cases;
+  for (bool chosen : {true, false}) {
+    LinearFact fact = describe(condition, chosen, frame);
+    if (Value value = chosen ? ifTrue : ifFalse) {
+      // What holds of what an arm computes holds only if it runs.
+      LinearFact computed;
+      LinearFact *outer = std::exchange(facts, &computed);
+      LinearFact said = describe(value, truth, frame);
+      facts = outer;
+      fact.add(std::move(computed));
+      fact.add(std::move(said));
+    }
+    cases.push_back(std::move(fact));
+  }
+  either.choices.push_back(std::move(cases));
+  return either;
+}
+
+std::optional<LinearFact> LinearFacts::describeFlow(Value condition, bool truth,
+                                                    unsigned frame) {
+  if (auto argument = dyn_cast<BlockArgument>(condition)) {
+    auto loop = dyn_cast<scf::WhileOp>(argument.getOwner()->getParentOp());
+    if (!loop || argument.getOwner() != loop.getAfterBody())
+      return std::nullopt;
+    return describe(loop.getConditionOp().getArgs()[argument.getArgNumber()],
+                    truth, frame);
+  }
+  unsigned result = cast<OpResult>(condition).getResultNumber();
+  if (auto choice = condition.getDefiningOp<scf::IfOp>()) {
+    auto known = [&](scf::YieldOp yield) {
+      Value value = yield.getOperand(result);
+      return value.getDefiningOp<ub::PoisonOp>() ? Value() : value;
+    };
+    for (scf::YieldOp yield : {choice.thenYield(), choice.elseYield()})
+      expandAhead(choice, yield.getOperand(result), frame);
+    return describeChoice(choice.getCondition(), known(choice.thenYield()),
+                          known(choice.elseYield()), truth, frame);
+  }
+  if (auto loop = condition.getDefiningOp<scf::WhileOp>()) {
+    // As it was when the loop ended.
+    scf::ConditionOp end = loop.getConditionOp();
+    assume(end.getCondition(), false, frame);
+    return describe(end.getArgs()[result], truth, frame);
+  }
+  return std::nullopt;
+}
+
+LinearFact LinearFacts::describeEqual(Value a, Value b, bool isEqual,
+                                      unsigned frame) {
+  auto both = [&](bool first) {
+    return combine(true, describe(a, first, frame),
+                   describe(b, first == isEqual, frame));
+  };
+  return combine(false, both(true), both(false));
+}
+
 LinearFact LinearFacts::describe(Value condition, bool truth, unsigned frame) {
   if (APInt constant; matchPattern(condition, m_ConstantInt(&constant))) {
     LinearFact fact;
@@ -48,6 +109,17 @@ LinearFact LinearFacts::describe(Value condition, bool truth, unsigned frame) {
   if (isa_and_nonnull<arith::XOrIOp>(op) &&
       matchPattern(op->getOperand(1), m_One()))
     return of(0, !truth);
+  if (isa_and_nonnull<arith::XOrIOp>(op))
+    return describeEqual(op->getOperand(0), op->getOperand(1), !truth, frame);
+  if (auto low = dyn_cast_or_null<arith::TruncIOp>(op)) {
+    // A bool in memory is 0 or 1.
+    Linear byte = get(low.getIn(), frame);
+    if (!isSurelyAtLeastZero(byte) || !isSurelyAtLeastZero(Linear(1) - byte))
+      return describeUnknown(condition, truth, frame);
+    LinearFact fact;
+    fact.addZero(byte - Linear(truth ? 1 : 0));
+    return fact;
+  }
   if (auto select = dyn_cast_or_null<arith::SelectOp>(op);
       select && select.getType().isInteger(1))
     return combine(false, combine(true, of(0, true), of(1, truth)),
@@ -56,6 +128,8 @@ LinearFact LinearFacts::describe(Value condition, bool truth, unsigned frame) {
     return describeInteger(compare, truth, frame);
   if (auto compare = dyn_cast_or_null<arith::CmpFOp>(op))
     return describeFloat(compare, truth, frame);
+  if (std::optional<LinearFact> fact = describeFlow(condition, truth, frame))
+    return *fact;
   return describeUnknown(condition, truth, frame);
 }
 
@@ -95,9 +169,12 @@ static LinearFact describeBelow(const Linear &a, const Linear &b, bool truth) {
 LinearFact LinearFacts::describeInteger(arith::CmpIOp compare, bool truth,
                                         unsigned frame) {
   Predicate predicate = compare.getPredicate();
-  if (compare.getLhs().getType().isInteger(1))
-    return describeUnknown(compare, truth, frame);
   bool isEqual = (predicate == Predicate::eq) == truth;
+  if (compare.getLhs().getType().isInteger(1))
+    return predicate == Predicate::eq || predicate == Predicate::ne
+               ? describeEqual(compare.getLhs(), compare.getRhs(), isEqual,
+                               frame)
+               : describeUnknown(compare, truth, frame);
   if (predicate == Predicate::eq || predicate == Predicate::ne)
     if (BinAtOp cell = getComparedCell(compare, frame))
       return isEqual ? describeInBin(cell, frame)

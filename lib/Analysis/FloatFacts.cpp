@@ -156,9 +156,7 @@ LinearFacts::Opaque LinearFacts::getOpaque(Id id) {
     opaque = {system.addVariable(), system.addVariable(), false};
     facts->addBetween(Linear(0), opaque.isNaN, Linear(1));
     auto get = value.getDefiningOp<GetOp>();
-    auto process = at->getParentOfType<ProcessOp>();
-    if (get && process && frame == 0 && get.getElements().empty() &&
-        get.getPrim() == process.getBody().getArgument(0))
+    if (get && get.getElements().empty() && isItem(get.getPrim(), frame))
       for (int64_t dim = 0, e = stage.getBins().size(); dim < e; ++dim)
         if (provider.isFieldInBin(stage, get.getField(), dim)) {
           auto [low, high] = getBin(dim);

@@ -8,6 +8,7 @@
 
 #include "mlir/Dialect/UB/IR/UBOps.h"
 #include "mlir/IR/Matchers.h"
+#include "llvm/ADT/SetVector.h"
 #include "llvm/ADT/TypeSwitch.h"
 
 using namespace mlir;
@@ -25,19 +26,32 @@ static bool isConstant(Value value, APInt &constant) {
   return matchPattern(value, m_ConstantInt(&constant));
 }
 
-LinearFacts::LinearFacts(Operation *at, FactsProvider &provider)
+LinearFacts::LinearFacts(Operation *at, FactsProvider &provider,
+                         llvm::function_ref<void(LinearFacts &)> assume)
     : at(at), provider(provider), stage(getPhaseStage(at)),
       pipeline(getPipeline(at)), facts(&system.getFacts()) {
-  assumeAssigned();
+  if (assume)
+    assume(*this);
+  auto process = at->getParentOfType<ProcessOp>();
+  if (process && !stage.getTakesList()) {
+    items.push_back(process.getBody().getArgument(0));
+    assumeAssigned(items.front());
+  }
   assumeReached(at);
+  if (process && stage.getTakesList()) {
+    findItems();
+    for (Value item : items)
+      assumeAssigned(item);
+  }
 }
 
 unsigned LinearFacts::addAssign(AssignOp assign, EmissionOpInterface emit) {
-  Frame &frame = frames.emplace_back();
-  frame.primitive = assign.getBody().getArgument(0);
-  frame.emit = emit;
-  if (auto process = at->getParentOfType<ProcessOp>(); process && !emit)
-    frame.same = process.getBody().getArgument(0);
+  frames.push_back({assign.getBody().getArgument(0), /*same=*/Value(), emit});
+  return frames.size() - 1;
+}
+
+unsigned LinearFacts::addAssign(AssignOp assign, Value item) {
+  frames.push_back({assign.getBody().getArgument(0), item, /*emit=*/{}});
   return frames.size() - 1;
 }
 
@@ -74,7 +88,8 @@ LinearFacts::Id LinearFacts::create(Value value, unsigned frame) {
 /// Whether an operation gives the same wherever it runs from the same operands,
 /// if it runs at all. Each use of poison may be another number.
 static bool isComputed(Operation *op) {
-  return (isRepeatable(op) && !isa<ub::PoisonOp>(op)) || isa<BinOp, GetOp>(op);
+  return (isRepeatable(op) && !isa<ub::PoisonOp>(op)) ||
+         isa<BinOp, GetOp, ListAtOp>(op);
 }
 
 /// The value that an emission gives the element of a field; null if the element
@@ -117,7 +132,10 @@ LinearFacts::Id LinearFacts::number(Value value, unsigned frame) {
   } else if (op && isComputed(op)) {
     std::vector<uintptr_t> key{
         uintptr_t(op->getName().getAsOpaquePointer()),
-        uintptr_t(op->getAttrDictionary().getAsOpaquePointer()),
+        // Whether an index is tested changes no primitive.
+        isa<ListAtOp>(op)
+            ? 0
+            : uintptr_t(op->getAttrDictionary().getAsOpaquePointer()),
         uintptr_t(value.getType().getAsOpaquePointer()),
         cast<OpResult>(value).getResultNumber()};
     if (isa<BinOp>(op))
@@ -527,17 +545,31 @@ Linear LinearFacts::expandBranch(scf::IfOp choice, unsigned number,
                    !matchPattern(value, m_Op<arith::ConstantOp>());
     return isOther ? Value() : value;
   };
+  for (scf::YieldOp yield : {choice.thenYield(), choice.elseYield()})
+    expandAhead(choice, yield.getOperand(number), frame);
   return chooseBetween(choice.getCondition(), known(choice.thenYield()),
                        known(choice.elseYield()), frame, id);
 }
 
+void LinearFacts::expandAhead(scf::IfOp branch, Value value, unsigned frame) {
+  constexpr size_t most = 64; // values that are looked at
+  llvm::SmallSetVector<Value, 16> found;
+  found.insert(value);
+  for (size_t i = 0; i < found.size() && i < most; ++i) {
+    Value at = found[i];
+    Operation *op = at.getDefiningOp();
+    bool isAhead =
+        !branch->isProperAncestor(op ? op : at.getParentBlock()->getParentOp());
+    if (isAhead && at.getType().isIntOrIndex() && !at.getType().isInteger(1))
+      get(at, frame);
+    else if (op)
+      found.insert_range(op->getOperands());
+  }
+}
+
 Linear LinearFacts::expandField(GetOp get, unsigned frame, Id id) {
   Linear value = atom(id);
-  auto process = at->getParentOfType<ProcessOp>();
-  bool isOwn = process && frame == 0 &&
-               get.getPrim() == process.getBody().getArgument(0) &&
-               get.getElements().empty();
-  if (isOwn)
+  if (get.getElements().empty() && isItem(get.getPrim(), frame))
     for (int64_t dim = 0, e = stage.getBins().size(); dim < e; ++dim)
       if (provider.isFieldInBin(stage, get.getField(), dim)) {
         auto [low, high] = getBin(dim);

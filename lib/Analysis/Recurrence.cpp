@@ -12,37 +12,69 @@
 using namespace mlir;
 using namespace piko;
 
-/// The bound that a loop runs up or down to by `!=`, which stands still; null
-/// if its condition is another one.
-static Value findUnequalBound(BlockArgument argument, scf::WhileOp loop) {
+/// Bounds that stand still and that the condition of a loop compares with: by
+/// `!=` with the argument, or in any way with what may wrap around for all that
+/// its type says.
+static SmallVector<Value> findBounds(BlockArgument argument,
+                                     scf::WhileOp loop) {
   auto compare =
       loop.getConditionOp().getCondition().getDefiningOp<arith::CmpIOp>();
-  if (!compare || compare.getPredicate() != arith::CmpIPredicate::ne)
+  if (!compare || compare.getLhs().getType() != argument.getType())
     return {};
+  bool isUnequal = compare.getPredicate() == arith::CmpIPredicate::ne;
+  bool isWide =
+      argument.getType().isIndex() || argument.getType().isInteger(64);
+  SmallVector<Value> bounds;
   for (auto [value, bound] : {std::pair(compare.getLhs(), compare.getRhs()),
                               std::pair(compare.getRhs(), compare.getLhs())})
-    if (value == argument &&
+    if (((isUnequal && value == argument) || isWide) &&
         !loop->isAncestor(bound.getParentBlock()->getParentOp()))
-      return bound;
-  return {};
+      bounds.push_back(bound);
+  return bounds;
 }
 
-/// Whether an argument never passes a bound that its loop ends at.
-static bool keepsTo(Value bound, bool isCeiling, BlockArgument argument,
-                    scf::WhileOp loop, FactsProvider &provider) {
-  unsigned i = argument.getArgNumber();
-  auto difference = [&](LinearFacts &facts, Value value) {
-    Linear rest = facts.get(bound) - facts.get(value);
-    return isCeiling ? rest : Linear(0) - rest;
-  };
-  LinearFacts before(loop, provider);
-  if (!before.isAtLeastZero(difference(before, loop.getInits()[i])))
-    return false;
-  LinearFacts after(loop.getYieldOp(), provider);
-  after.assumeAtMost(isCeiling ? argument : bound,
-                     isCeiling ? bound : argument);
-  return after.isAtLeastZero(
-      difference(after, loop.getYieldOp().getResults()[i]));
+namespace {
+/// What an argument is never above or below, while its loop runs.
+struct Limits {
+  BlockArgument argument;
+  Value ceiling, floor;
+
+  void assume(LinearFacts &facts) const {
+    if (ceiling)
+      facts.assumeAtMost(argument, ceiling);
+    if (floor)
+      facts.assumeAtMost(floor, argument);
+  }
+  bool hold(LinearFacts &facts, Value value) const {
+    Linear number = facts.get(value);
+    return (!ceiling || facts.isAtLeastZero(facts.get(ceiling) - number)) &&
+           (!floor || facts.isAtLeastZero(number - facts.get(floor)));
+  }
+  /// Whether they hold at first, and then in each turn.
+  bool hold(scf::WhileOp loop, FactsProvider &provider) const {
+    unsigned i = argument.getArgNumber();
+    LinearFacts before(loop, provider);
+    if (!hold(before, loop.getInits()[i]))
+      return false;
+    LinearFacts after(loop.getYieldOp(), provider,
+                      [&](LinearFacts &facts) { assume(facts); });
+    return hold(after, loop.getYieldOp().getResults()[i]);
+  }
+};
+} // namespace
+
+/// Limits of which one is a bound that the loop ends at, and the other,
+/// perhaps, where the argument begins.
+static Limits findLimits(BlockArgument argument, scf::WhileOp loop,
+                         FactsProvider &provider) {
+  Value init = loop.getInits()[argument.getArgNumber()];
+  for (Value bound : findBounds(argument, loop))
+    for (Limits limits :
+         {Limits{argument, bound, init}, Limits{argument, init, bound},
+          Limits{argument, bound, {}}, Limits{argument, {}, bound}})
+      if (limits.hold(loop, provider))
+        return limits;
+  return {argument, {}, {}};
 }
 
 Recurrence piko::findRecurrence(BlockArgument argument,
@@ -51,17 +83,11 @@ Recurrence piko::findRecurrence(BlockArgument argument,
   auto loop = dyn_cast<scf::WhileOp>(argument.getOwner()->getParentOp());
   if (!loop || argument.getOwner() != loop.getBeforeBody())
     return result;
-  if (Value bound = findUnequalBound(argument, loop)) {
-    if (keepsTo(bound, /*isCeiling=*/true, argument, loop, provider))
-      result.ceiling = bound;
-    else if (keepsTo(bound, /*isCeiling=*/false, argument, loop, provider))
-      result.floor = bound;
-  }
-  LinearFacts facts(loop.getYieldOp(), provider);
-  if (result.ceiling)
-    facts.assumeAtMost(argument, result.ceiling);
-  if (result.floor)
-    facts.assumeAtMost(result.floor, argument);
+  Limits limits = findLimits(argument, loop, provider);
+  result.ceiling = limits.ceiling;
+  result.floor = limits.floor;
+  LinearFacts facts(loop.getYieldOp(), provider,
+                    [&](LinearFacts &known) { limits.assume(known); });
   Linear now = facts.get(argument);
   Linear next =
       facts.get(loop.getYieldOp().getResults()[argument.getArgNumber()]);

@@ -51,12 +51,18 @@ public:
 /// What is known at a place of a phase.
 class LinearFacts {
 public:
-  LinearFacts(mlir::Operation *at, FactsProvider &provider);
+  /// `assume` adds what is known besides, before anything is found out.
+  LinearFacts(mlir::Operation *at, FactsProvider &provider,
+              llvm::function_ref<void(LinearFacts &)> assume = nullptr);
 
-  /// An assign phase seen from the process phase: its primitive is the one that
-  /// is processed, or one that is emitted. The number of such a phase is passed
+  /// An assign phase seen from the process phase: its primitive is one that is
+  /// emitted, or one that is processed. The number of such a phase is passed
   /// with its values.
-  unsigned addAssign(AssignOp assign, EmissionOpInterface emit = {});
+  unsigned addAssign(AssignOp assign, EmissionOpInterface emit);
+  unsigned addAssign(AssignOp assign, mlir::Value item);
+  /// The primitives that the place has been given: the one that is processed,
+  /// or those of the list that have been read at indices known to be inside.
+  llvm::ArrayRef<mlir::Value> getItems() const { return items; }
   /// Adds what holds where `at` is reached.
   void assumeReached(mlir::Operation *at, unsigned frame = 0);
   /// Adds that a condition is true, or false.
@@ -127,6 +133,9 @@ private:
   /// where it is chosen.
   Linear chooseBetween(mlir::Value condition, mlir::Value ifTrue,
                        mlir::Value ifFalse, unsigned frame, Id id);
+  /// Expands what a value that an arm of a branch gives is computed from in
+  /// front of the branch: what holds of that holds whichever arm runs.
+  void expandAhead(mlir::scf::IfOp branch, mlir::Value value, unsigned frame);
   Linear expandField(GetOp get, unsigned frame, Id id);
   Linear expandFloatCast(mlir::Operation *op, unsigned frame, Id id);
   /// Whether a value is at least 0, found out on the way to something else.
@@ -162,6 +171,15 @@ private:
   /// What a comparison of exact floats surely gives, found out on the way.
   std::optional<bool> decide(mlir::Value condition, unsigned frame);
   LinearFact describeUnknown(mlir::Value condition, bool truth, unsigned frame);
+  /// What a truth value says that is one of two, of which null is unknown.
+  LinearFact describeChoice(mlir::Value condition, mlir::Value ifTrue,
+                            mlir::Value ifFalse, bool truth, unsigned frame);
+  /// What one says that control flow gives.
+  std::optional<LinearFact> describeFlow(mlir::Value condition, bool truth,
+                                         unsigned frame);
+  /// That two truth values are equal, or not.
+  LinearFact describeEqual(mlir::Value a, mlir::Value b, bool isEqual,
+                           unsigned frame);
   /// Whether a comparison for equality is that of a cell's bin with the bin
   /// that is processed; the cell's coordinates.
   BinAtOp getComparedCell(mlir::arith::CmpIOp compare, unsigned frame);
@@ -170,9 +188,16 @@ private:
   LinearFact describeTouched(AssignBoxOp box, unsigned frame);
 
   // The bin.
+  /// Whether a list is read at an index that it has.
+  bool isInside(ListAtOp read);
+  void findItems();
+  /// Whether a value is a primitive of the bin that is processed.
+  bool isItem(mlir::Value prim, unsigned frame);
   /// Adds that the bin that is processed is one that the stage's own assign
-  /// phase chose.
-  void assumeAssigned();
+  /// phase chose for a primitive.
+  void assumeAssigned(mlir::Value item);
+  /// Whether no call gets an empty list.
+  bool isNeverEmpty(mlir::Value list);
   Linear getDomain(int64_t dim);
   Linear addSize();
   bool isOwnBin(mlir::Value bin, unsigned frame);
@@ -187,6 +212,7 @@ private:
   /// Where facts go: all hold, or those of an arm that is looked at.
   LinearFact *facts;
   llvm::SmallVector<Frame> frames{1};
+  llvm::SmallVector<mlir::Value> items;
   llvm::SmallVector<std::pair<mlir::Value, unsigned>> values; // by id
   llvm::DenseMap<std::pair<mlir::Value, unsigned>, Id> ids;
   std::map<std::vector<uintptr_t>, Id> idsByKey;

@@ -201,11 +201,12 @@ def InferDirectives : Pass<"piko-infer-directives", "::piko::PipelineOp"> {
     lie between the bounds of the producer's bin. That follows from a system of
     linear inequalities: of loops and how their arguments change from turn to
     turn, of conditions on the way, minima and maxima, quotients, remainders,
-    shifts and masks, of floats that are whole numbers, and of how the producer's
-    own bin was chosen. *By function*: the bin is computed from fields as the
-    producer's was from its own, and what goes into it is handed on unchanged. A
-    condition around the
-    assignment stays, so that a primitive is in at most that bin.
+    shifts and masks, of floats that are whole numbers, of truth values, and of
+    how the producer's own bin was chosen, for the primitive or for each one of a
+    list that it reads at an index in the list. *By function*: the bin is computed
+    from fields as the producer's was from its own, and what goes into it is
+    handed on unchanged. A condition around the assignment stays, so that a
+    primitive is in at most that bin.
 
     **Guarantees** that every primitive stays in the same bins.
 
