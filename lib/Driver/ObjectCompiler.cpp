@@ -83,20 +83,25 @@ private:
 static std::string writeEntry(const Entry &entry) {
   Writer writer;
   const CompiledObject &object = entry.object;
-  writer.add(object.pipeline).add(object.symbol).add(object.code);
-  writer.add(object.header).add(entry.diagnostics);
-  for (const std::string &file : object.files)
-    writer.add(file);
+  writer.add(object.symbol).add(object.code).add(object.header);
+  writer.add(entry.diagnostics);
+  writer.add(std::to_string(object.pipelines.size()));
+  for (const auto *list : {&object.pipelines, &object.files})
+    for (const std::string &item : *list)
+      writer.add(item);
   return writer.bytes;
 }
 
 static Entry readEntry(llvm::StringRef bytes) {
   Reader reader(bytes);
   Entry entry;
-  for (std::string *part :
-       {&entry.object.pipeline, &entry.object.symbol, &entry.object.code,
-        &entry.object.header, &entry.diagnostics})
+  for (std::string *part : {&entry.object.symbol, &entry.object.code,
+                            &entry.object.header, &entry.diagnostics})
     *part = reader.next();
+  size_t pipelines = 0;
+  llvm::to_integer(reader.next(), pipelines);
+  while (!reader.atEnd() && entry.object.pipelines.size() < pipelines)
+    entry.object.pipelines.push_back(reader.next());
   while (!reader.atEnd())
     entry.object.files.push_back(reader.next());
   return entry;
@@ -119,11 +124,11 @@ static std::string makeRequest(const ObjectOptions &options,
       key.add(item);
   }
   key.add(processor.name).add(processor.features);
-  for (int number :
-       {int(source.text.has_value()), int(source.check.enabled),
-        int(options.execution), options.target.optLevel,
-        int(options.target.sanitizer), int(options.remarks),
-        int(source.gpu.emulate), int(source.gpu.seed), int(source.gpu.threads)})
+  for (int number : {int(source.text.has_value()), int(source.check.enabled),
+                     int(options.execution), options.target.optLevel,
+                     int(options.target.sanitizer), int(options.remarks),
+                     int(options.allPipelines), int(source.gpu.emulate),
+                     int(source.gpu.seed), int(source.gpu.threads)})
     key.add(std::to_string(number));
   key.add(options.nameSpace).add(getRuntimeIncludeDir());
   // What Clang looks at besides its options.
@@ -203,19 +208,41 @@ compilePipeline(const ObjectOptions &options, const Files &files,
   OwningOpRef<ModuleOp> module = readPipeline(options.source, context, files);
   if (!module)
     return nullptr;
-  object.pipeline = getPipelineName(*module, options.source);
+  std::string name = getPipelineName(*module, options.source);
+  object.pipelines = {name};
   for (auto pipeline : module->getOps<PipelineOp>())
     object.header =
         writeHostHeader(pipeline, options.source.file, options.nameSpace);
-  object.symbol = getProgramSymbol(options.nameSpace, object.pipeline);
+  object.symbol = getProgramSymbol(options.nameSpace, name);
   if (failed(lowerPipeline(*module, Level::LLVM, options.source.check,
                            options.source.synthesis, options.source.gpu)))
     return nullptr;
   std::unique_ptr<llvm::Module> translated =
       translateToLLVMIR(*module, llvmContext);
   if (translated)
-    defineProgram(*translated, object.pipeline, object.symbol);
+    defineProgram(*translated, name, object.symbol);
   return translated;
+}
+
+/// What the reference executor shall run; empty after diagnostics.
+static std::vector<PipelineDescription>
+describePipelines(const ObjectOptions &options, FrontendOptions frontend,
+                  MLIRContext &context) {
+  const std::string &name = options.source.file;
+  std::vector<PipelineDescription> pipelines;
+  auto add = [&](FailureOr<PipelineDescription> pipeline) {
+    if (succeeded(pipeline))
+      pipelines.push_back(std::move(*pipeline));
+  };
+  if (!options.allPipelines) {
+    add(describePipe(name, frontend, context));
+    return pipelines;
+  }
+  frontend.pipeName.clear();
+  if (auto file = PipelineFile::parse(name, frontend, context))
+    for (size_t i = 0; i < file->size(); ++i)
+      add(file->describe(i));
+  return pipelines;
 }
 
 /// LLVM IR of the reference executor; null after diagnostics.
@@ -238,14 +265,16 @@ compileReference(const ObjectOptions &options, const Files &files,
   context.loadAllAvailableDialects();
   FrontendOptions frontend = getFrontendOptions(options.source);
   frontend.files = files;
-  FailureOr<PipelineDescription> pipeline =
-      describePipe(file, frontend, context);
-  if (failed(pipeline))
+  std::vector<PipelineDescription> pipelines =
+      describePipelines(options, frontend, context);
+  if (pipelines.empty())
     return nullptr;
-  object.pipeline = pipeline->name;
+  for (const PipelineDescription &pipeline : pipelines)
+    object.pipelines.push_back(pipeline.name);
   object.symbol = referenceEntry;
-  return compileForHost(generateReferenceAdapter(*pipeline, file), frontend,
-                        /*optimize=*/true, llvmContext, context);
+  return compileForHost(generateReferenceAdapter(pipelines, file), frontend,
+                        /*optimize=*/options.target.optLevel > 0, llvmContext,
+                        context);
 }
 
 /// Fills an entry but for its files; false after diagnostics, which are there

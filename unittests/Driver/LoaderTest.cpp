@@ -187,13 +187,49 @@ TEST_F(Loader, CompilesTextToAnObject) {
   request.cache = options.cache;
   auto object = compileObject(request, diagnostics);
   ASSERT_TRUE(object) << diagnostics;
-  EXPECT_EQ(object->pipeline, "Table");
+  EXPECT_EQ(object->pipelines, std::vector<std::string>{"Table"});
   EXPECT_EQ(object->symbol, "pipelines_Table_program");
   EXPECT_EQ(object->code.substr(0, 4), "\x7f"
                                        "ELF");
   EXPECT_NE(object->header.find("class Table"), std::string::npos);
   EXPECT_TRUE(
       std::ranges::count(object->files, (folder / "factor.h").string()));
+}
+
+TEST_F(Loader, CompilesAllPipelinesForTheReference) {
+  ObjectOptions request;
+  request.source = {.file = "table.piko.cpp",
+                    .includeDirs = options.includeDirs,
+                    .defines = options.defines,
+                    .text = std::string(text) +
+                            "void unknown();\n"
+                            "struct Call : piko::Stage<0, 0, 64, int> {\n"
+                            "  void process(const int &) { unknown(); }\n"
+                            "};\n"
+                            "struct Lost : piko::Pipe<State> {\n"
+                            "  Call call;\n"
+                            "  Lost() { source(call); }\n"
+                            "};\n"
+                            "struct More : piko::Pipe<State> {\n"
+                            "  Set set;\n"
+                            "  More() { source(set); }\n"
+                            "};\n"};
+  request.execution = ExecutionTarget::Reference;
+  request.target = {.cpu = "native", .optLevel = 0};
+  request.cache = options.cache;
+  EXPECT_FALSE(compileObject(request, diagnostics)); // which one?
+  request.allPipelines = true;
+  std::string code;
+  for (int pass = 0; pass < 2; ++pass) { // the second from the cache
+    auto object = compileObject(request, diagnostics = "");
+    ASSERT_TRUE(object) << diagnostics;
+    EXPECT_EQ(object->pipelines, (std::vector<std::string>{"Table", "More"}));
+    EXPECT_NE(diagnostics.find("table.piko.cpp:18:"), std::string::npos)
+        << diagnostics;
+    EXPECT_EQ(countEntries(), 2u);
+    EXPECT_TRUE(pass == 0 || code == object->code);
+    code = object->code;
+  }
 }
 
 TEST_F(Loader, RefusesAnUnknownProcessor) {

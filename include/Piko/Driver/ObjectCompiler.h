@@ -19,14 +19,18 @@ struct ObjectOptions {
   CacheOptions cache = {};
   /// The C++ namespace of the generated class; a part of the object's symbol.
   std::string nameSpace = "pipelines";
+  /// For the reference executor: all pipelines of the file, whichever `source`
+  /// names, but those with errors, which go into the diagnostics.
+  bool allPipelines = false;
   bool remarks = false;
 };
 
 struct CompiledObject {
-  /// The name of the pipeline.
-  std::string pipeline;
+  /// The names of the pipelines; one if not all were asked for.
+  std::vector<std::string> pipelines;
   /// The object's one external definition, a pikort_program; for the reference
-  /// executor, a function that returns the address of one.
+  /// executor, a function from the place of a pipeline in `pipelines` to the
+  /// address of one.
   std::string symbol;
   std::string code;
   /// The C++ header for hosts; empty for the reference executor, and for

@@ -104,6 +104,8 @@ Options parseOptions(int argc, char **argv) {
       options.timeout = toNumbers<unsigned>(words.takeValues(name, false))[0];
     else if (name == "--owners")
       options.owners = true;
+    else if (name == "--no-cache")
+      options.cache.enabled = false;
     else if (!readCaseOption(name, words, options.one))
       throw std::runtime_error("unknown option " + name);
   }

@@ -7,6 +7,7 @@
 
 #include "Piko/Driver/CheckOptions.h"
 #include "Piko/Driver/GPUOptions.h"
+#include "Piko/Driver/Options.h"
 #include "Piko/Driver/SynthesisOptions.h"
 
 #include <cstdint>
@@ -51,6 +52,8 @@ struct Options {
   piko::SynthesisOptions synthesis;
   /// --target gpu-on-cpu, --gpu-threads N (0 = as the stage says), --gpu-seed N.
   piko::GPUOptions gpu;
+  /// Of the reference executor's code; --no-cache.
+  piko::CacheOptions cache;
 };
 
 /// Both throw std::runtime_error.

@@ -5,7 +5,7 @@
 #include "Piko/Dialect/Piko/IR/Piko.h"
 #include "Piko/Driver/Compiler.h"
 #include "Piko/Driver/Diagnostics.h"
-#include "Piko/Frontend/HostCompiler.h"
+#include "Piko/Driver/ObjectCompiler.h"
 #include "Piko/Target/JIT.h"
 #include "Piko/Target/Object.h"
 
@@ -32,13 +32,8 @@ private:
   DiagnosticPrinter printer;
 };
 
-std::shared_ptr<JITCode> load(llvm::Module &module, int optLevel,
-                              Sanitizer sanitizer) {
-  auto code =
-      generateCode(module, {"native", optLevel, sanitizer}, CodeFormat::Object);
-  if (!code)
-    throw std::runtime_error(llvm::toString(code.takeError()));
-  auto made = JITCode::load(*code);
+std::shared_ptr<JITCode> load(const std::string &object) {
+  auto made = JITCode::load(object);
   if (!made)
     throw std::runtime_error(llvm::toString(made.takeError()));
   return std::move(*made);
@@ -62,102 +57,98 @@ struct Programs::Implementation {
     registerPikoDialects(registry);
     return registry;
   }
-  std::unique_ptr<PipelineFile> parse(const std::string &file,
-                                      const std::string &pipe);
-  void readText(const std::string &file, const std::string &pipe);
-  void compileReference();
+  void compileReference(const std::string &file, const CacheOptions &cache);
+  void readText(const std::string &file);
+  OwningOpRef<ModuleOp> read(const std::string &pipe);
 
   MLIRContext context;
   Log log;
-  std::string referenceFile;
+  std::string sourceFile;
+  /// The only pipeline that is wanted; empty = all.
+  std::string onlyPipe;
   CheckOptions check;
   SynthesisOptions synthesis;
   GPUOptions gpu;
+  /// Where the compiled file is C++, once it is needed.
   std::unique_ptr<PipelineFile> file;
   /// Where the compiled file is `.mlir`: a module for each pipeline.
   std::vector<std::pair<std::string, OwningOpRef<ModuleOp>>> modules;
-  std::vector<std::string> referenceNames;
+  std::optional<CompiledObject> referenceObject;
+  std::string referenceDiagnostics;
   std::shared_ptr<JITCode> reference;
 };
 
-std::unique_ptr<PipelineFile>
-Programs::Implementation::parse(const std::string &file,
-                                const std::string &pipe) {
-  CompileOptions options{.file = file, .pipeName = pipe, .check = check};
-  std::unique_ptr<PipelineFile> parsed =
-      PipelineFile::parse(file, getFrontendOptions(options), context);
-  if (!parsed)
-    log.fail("cannot load " + file);
-  return parsed;
-}
-
 /// Divides the pipelines of an `.mlir` file.
-void Programs::Implementation::readText(const std::string &file,
-                                        const std::string &pipe) {
-  CompileOptions options{.file = file, .pipeName = pipe, .check = check};
+void Programs::Implementation::readText(const std::string &file) {
+  CompileOptions options{.file = file, .pipeName = onlyPipe, .check = check};
   FailureOr<std::vector<std::string>> names =
       readPipelineNames(options, context);
   if (failed(names))
     log.fail("cannot load " + file);
   for (const std::string &name : *names) {
-    if (!pipe.empty() && name != pipe)
+    if (!onlyPipe.empty() && name != onlyPipe)
       continue;
     options.pipeName = name;
     modules.emplace_back(name, readPipeline(options, context));
   }
 }
 
-void Programs::Implementation::compileReference() {
-  std::vector<PipelineDescription> described;
-  for (size_t i = 0; i < file->size(); ++i) {
-    FailureOr<PipelineDescription> description = file->describe(i);
-    if (failed(description))
-      continue;
-    referenceNames.push_back(description->name);
-    described.push_back(std::move(*description));
-  }
-  if (described.empty())
-    log.fail("cannot load " + referenceFile);
-  auto llvmContext = std::make_unique<llvm::LLVMContext>();
-  // Its code is big and runs only once.
-  std::unique_ptr<llvm::Module> module = compileForHost(
-      generateReferenceAdapter(described, referenceFile),
-      getFrontendOptions({.file = referenceFile, .check = {check.enabled, {}}}),
-      /*optimize=*/false, *llvmContext, context);
-  if (!module)
-    log.fail("cannot compile " + referenceFile + " for the reference executor");
-  reference = load(*module, /*optLevel=*/0, Sanitizer::None);
+/// All pipelines of the file, which then need to be compiled only once however
+/// often they are compared. That code is big and runs only once.
+void Programs::Implementation::compileReference(const std::string &file,
+                                                const CacheOptions &cache) {
+  ObjectOptions options{.source = {.file = file, .check = {check.enabled, {}}},
+                        .execution = ExecutionTarget::Reference,
+                        .target = {"native", /*optLevel=*/0, Sanitizer::None},
+                        .cache = cache,
+                        .allPipelines = true};
+  referenceObject = compileObject(options, referenceDiagnostics);
+  if (!referenceObject)
+    throw std::runtime_error("cannot compile " + file +
+                             " for the reference executor\n" +
+                             referenceDiagnostics);
+  reference = load(referenceObject->code);
 }
 
-Programs::Programs(const std::string &file, const std::string &reference,
-                   const std::string &pipe, const CheckOptions &check,
-                   const SynthesisOptions &synthesis, const GPUOptions &gpu)
+/// The module of a pipeline; null after diagnostics.
+OwningOpRef<ModuleOp> Programs::Implementation::read(const std::string &pipe) {
+  for (auto &[name, parsed] : modules)
+    if (name == pipe)
+      return std::move(parsed);
+  if (!modules.empty())
+    return nullptr;
+  CompileOptions options{
+      .file = sourceFile, .pipeName = onlyPipe, .check = check};
+  if (!file)
+    file =
+        PipelineFile::parse(sourceFile, getFrontendOptions(options), context);
+  for (size_t i = 0; file && i < file->size(); ++i)
+    if (file->getName(i) == pipe)
+      return file->translate(i);
+  return nullptr;
+}
+
+Programs::Programs(const Options &options)
     : self(std::make_unique<Implementation>()) {
-  self->referenceFile = reference;
-  self->check = check;
-  self->synthesis = synthesis;
-  self->gpu = gpu;
-  self->file = self->parse(reference, pipe);
-  if (file != reference)
-    self->readText(file, pipe);
-  self->compileReference();
+  self->sourceFile = options.file;
+  if (options.cases.empty())
+    self->onlyPipe = options.one.pipe;
+  self->check = options.check;
+  self->synthesis = options.synthesis;
+  self->gpu = options.gpu;
+  self->compileReference(options.reference, options.cache);
+  if (options.file != options.reference)
+    self->readText(options.file);
 }
 
 Programs::~Programs() = default;
 
 std::vector<std::string> Programs::names() const {
-  return self->referenceNames;
+  return self->referenceObject->pipelines;
 }
 
 Program Programs::compile(const std::string &pipe) {
-  OwningOpRef<ModuleOp> module;
-  for (auto &[name, parsed] : self->modules)
-    if (name == pipe)
-      module = std::move(parsed);
-  if (self->modules.empty())
-    for (size_t i = 0; i < self->file->size(); ++i)
-      if (self->file->getName(i) == pipe)
-        module = self->file->translate(i);
+  OwningOpRef<ModuleOp> module = self->read(pipe);
   if (!module || failed(lowerPipeline(*module, Level::LLVM, self->check,
                                       self->synthesis, self->gpu)))
     self->log.fail("cannot compile " + pipe);
@@ -166,8 +157,12 @@ Program Programs::compile(const std::string &pipe) {
       translateToLLVMIR(*module, *context);
   if (!llvmModule)
     self->log.fail("cannot compile " + pipe);
-  std::shared_ptr<JITCode> code =
-      load(*llvmModule, /*optLevel=*/3, JITCode::getSanitizer());
+  llvm::Expected<std::string> object = generateCode(
+      *llvmModule, {"native", /*optLevel=*/3, JITCode::getSanitizer()},
+      CodeFormat::Object);
+  if (!object)
+    throw std::runtime_error(llvm::toString(object.takeError()));
+  std::shared_ptr<JITCode> code = load(*object);
   auto name = std::make_shared<std::string>(pipe);
   Program program{{PIKORT_ABI_VERSION, name->c_str(),
                    find<void(pikort_pipeline *)>(*code, pipe + ".setup"),
@@ -180,10 +175,11 @@ Program Programs::compile(const std::string &pipe) {
 }
 
 Program Programs::reference(const std::string &pipe) {
-  const std::vector<std::string> &names = self->referenceNames;
+  const std::vector<std::string> &names = self->referenceObject->pipelines;
   auto found = std::find(names.begin(), names.end(), pipe);
   if (found == names.end())
-    self->log.fail("cannot read " + pipe);
+    throw std::runtime_error("cannot read " + pipe + "\n" +
+                             self->referenceDiagnostics);
   auto *entry = find<const pikort_program *(int)>(*self->reference,
                                                   "piko_reference_program");
   return {*entry(int(found - names.begin())), self->reference};

@@ -1,17 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // The pipelines of a file as programs: compiled one by one, as users get them,
-// and for the reference executor all at once. Each file is parsed once.
+// and for the reference executor all at once, through the disk cache.
 
 #ifndef PIKO_TEST_TOOLS_PIKO_COMPARE_PROGRAMS_H
 #define PIKO_TEST_TOOLS_PIKO_COMPARE_PROGRAMS_H
 
-#include "Piko/Driver/CheckOptions.h"
-#include "Piko/Driver/GPUOptions.h"
-#include "Piko/Driver/SynthesisOptions.h"
+#include "Options.h"
+
 #include "pikort/pikort.h"
 
-#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -24,12 +22,8 @@ struct Program {
 
 class Programs {
 public:
-  /// `pipe` is the only one that is wanted; empty = all. Throws
-  /// std::runtime_error, as do all functions.
-  Programs(const std::string &file, const std::string &reference,
-           const std::string &pipe, const piko::CheckOptions &check,
-           const piko::SynthesisOptions &synthesis,
-           const piko::GPUOptions &gpu);
+  /// Throws std::runtime_error, as do all functions.
+  explicit Programs(const Options &options);
   ~Programs();
 
   /// The pipelines that can be read.

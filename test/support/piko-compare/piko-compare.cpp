@@ -9,6 +9,7 @@
 //                [--timeout SECONDS] [--strip N] [--budget BYTES]
 //                [--check[=nan:RECORD.FIELD,..]]
 //                [--target gpu-on-cpu] [--gpu-threads N] [--gpu-seed N]
+//                [--no-cache]
 //
 // Options.h says what the options mean, Run.h what the input is. With --cases
 // each line of that file is a case, with the options --pipe to --loop-limit; a
@@ -61,9 +62,7 @@ bool compare(const Options &options, const Case &input, Programs &programs) {
 }
 
 bool compareAll(const Options &options) {
-  Programs programs(options.file, options.reference,
-                    options.cases.empty() ? options.one.pipe : "",
-                    options.check, options.synthesis, options.gpu);
+  Programs programs(options);
   if (options.cases.empty()) {
     Case one = options.one;
     std::vector<std::string> names = programs.names();
