@@ -5,8 +5,9 @@
 format    every C++ file is formatted as .clang-format says (--fix: make it so)
 licence   every source file has the licence line at its top
 paths     no file holds an absolute path of somebody's machine
+layers    the runtime's common part knows nothing of the targets' parts
 tidy      clang-tidy over the compile commands of a build (--build DIR)
-all       the first three
+all       all but the last
 """
 
 import argparse
@@ -90,6 +91,28 @@ def paths():
     return faults
 
 
+def layers():
+    """runtime/common includes none of runtime/cpu and runtime/gpu, and declares
+    none of their types itself."""
+    runtime = ROOT / "runtime"
+    foreign = set()
+    for header in [*runtime.glob("cpu/*.h"), *runtime.glob("gpu/*.h")]:
+        foreign |= set(re.findall(r"^(?:class|struct) (\w+)", header.read_text(), re.M))
+    faults = 0
+    for path in sorted(runtime.glob("common/*")):
+        for number, line in enumerate(path.read_text().splitlines(), 1):
+            part = re.search(r"\b(cpu|gpu)/", line)
+            declared = re.match(r"\s*(?:class|struct) (\w+);", line)
+            name = part and part.group() or declared and declared.group(1)
+            if part or name in foreign:
+                print(
+                    f"{path.relative_to(ROOT)}:{number}: expected nothing of a"
+                    f" target in runtime/common, but got '{name}'"
+                )
+                faults += 1
+    return faults
+
+
 def tidy(build):
     database = pathlib.Path(build) / "compile_commands.json"
     if not database.exists():
@@ -127,7 +150,8 @@ def main():
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
     parser.add_argument(
-        "check", choices=["format", "licence", "paths", "tidy", "all"]
+        "check",
+        choices=["format", "licence", "paths", "layers", "tidy", "all"],
     )
     parser.add_argument("--fix", action="store_true")
     parser.add_argument("--build", default="build")
@@ -136,9 +160,12 @@ def main():
         "format": lambda: format(args.fix),
         "licence": licence,
         "paths": paths,
+        "layers": layers,
         "tidy": lambda: tidy(args.build),
     }
-    names = ["format", "licence", "paths"] if args.check == "all" else [args.check]
+    names = [args.check]
+    if args.check == "all":
+        names = ["format", "licence", "paths", "layers"]
     faults = [name for name in names if checks[name]()]
     sys.exit(1 if faults else 0)
 

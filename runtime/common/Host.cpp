@@ -1,19 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //===- Host.cpp - The host API: life, binding, running --------------------===//
 
-#include "cpu/Check.h"
-#include "cpu/Cycle.h"
-#include "cpu/Strips.h"
+#include "common/Pipeline.h"
 
 #include <algorithm>
 #include <cstring>
 #include <functional>
-#include <omp.h>
 
 using namespace piko::rt;
 
 pikort_pipeline::pikort_pipeline()
-    : threads(std::max(1, omp_get_max_threads())) {}
+    : executor(makeExecutor(*this)), threads(executor->defaultThreads()) {}
 pikort_pipeline::~pikort_pipeline() = default;
 
 // --- Checks -----------------------------------------------------------------
@@ -111,7 +108,7 @@ int32_t pikort_create(const pikort_program *program,
     if (p->status != PIKORT_OK)
       return; // setup noted why
     p->finish();
-    makeKernels(*p);
+    p->executor->prepare();
     p->ready = true;
   });
   return p->status.load();
@@ -153,7 +150,7 @@ int32_t pikort_set_threads(pikort_pipeline *p, int32_t threads) {
     if (threads < 0 || threads > 10000)
       invalid("expected a number of threads in [0, 10000], but got " +
               std::to_string(threads));
-    p->threads = threads ? threads : std::max(1, omp_get_max_threads());
+    p->threads = threads ? threads : p->executor->defaultThreads();
   });
 }
 
@@ -368,14 +365,9 @@ int32_t pikort_run(pikort_pipeline *p) {
     checkBound(*p);
     checkApart(*p);
     p->computeGrids();
-    prepareState(*p);
-    p->profile.enter(Part::Program);
-    if (p->checker)
-      p->checker->beginRun();
+    p->executor->beginRun();
     if (p->status != PIKORT_OK)
       return;
-    startCycles(*p);
-    startStrips(*p);
     int32_t status = p->runProgram(p);
     p->settle();
     if (status != PIKORT_OK && p->status == PIKORT_OK)
@@ -385,18 +377,9 @@ int32_t pikort_run(pikort_pipeline *p) {
   });
   if (!p || !p->ready)
     return code;
-  endClears(*p);
-  endStrips(*p);
-  endCycles(*p);
-  if (p->checker)
-    p->checker->endRun();
-  for (Stage &stage : p->stages) {
-    stage.kernel->clear();
+  p->executor->endRun();
+  for (Stage &stage : p->stages)
     stage.binSchedules = {};
-  }
-  for (Source &source : p->sources)
-    if (source.kernel)
-      source.kernel->clear();
   p->memory.endFrame();
   ++p->runs;
   p->ticksPerMillisecond = p->profile.end();

@@ -2,7 +2,6 @@
 //===- Pipeline.cpp - Completes declarations, keeps the status ------------===//
 
 #include "common/Pipeline.h"
-#include "cpu/Check.h"
 
 #include <algorithm>
 #include <tuple>
@@ -298,10 +297,10 @@ int32_t pikort_pipeline::fail(int32_t code, const std::string &text) noexcept {
 
 void pikort_pipeline::report(const KernelError &found) noexcept {
   std::lock_guard<std::mutex> lock(errorMutex);
-  if (checker) { // on one thread: the first error is the earliest
+  if (executor->reportsInOrder()) { // the first error is the earliest
     if (hasError)
       return;
-    checker->noteError();
+    executor->noteError();
   }
   auto key = [](const KernelError &e) {
     return std::tie(e.unit, e.code, e.stage, e.name, e.bin, e.state, e.a, e.b,
@@ -407,7 +406,7 @@ void pikort_pipeline::settleReported() noexcept {
                                        : std::to_string(error.stage),
                    error, rank, hasState ? &states[error.state] : nullptr,
                    memoryLimitText(*this));
-      fail(error.code, checker ? checker->describe(error.code, text) : text);
+      fail(error.code, executor->describe(error.code, text));
     } catch (...) {
       fail(error.code, {});
     }

@@ -3,13 +3,14 @@
 //
 // The runtime's own form of a pipeline: the program's declarations, checked
 // and completed once by finish(), what the host bound, and the status of the
-// run. How kernels run is in cpu/.
+// run. How kernels run is the executor's matter.
 //
 //===----------------------------------------------------------------------===//
 
 #ifndef PIKO_RUNTIME_COMMON_PIPELINE_H
 #define PIKO_RUNTIME_COMMON_PIPELINE_H
 
+#include "common/Executor.h"
 #include "common/Profile.h"
 #include "pikort/abi.h"
 
@@ -23,12 +24,6 @@
 #include <vector>
 
 namespace piko::rt {
-
-class Checker; // cpu/Check.h
-struct Kernel; // cpu/Kernel.h
-struct Queue;  // cpu/Queue.h
-class Cycle;   // cpu/Cycle.h
-class Strips;  // cpu/Strips.h
 
 /// An error, thrown inside the runtime and caught at its boundary.
 struct Failure {
@@ -73,17 +68,13 @@ struct Edge {
   bool insideLoop = false;   ///< Both ends are in one loop.
   bool leavesStrips = false; ///< Only the producer is in a group of strips.
   bool local = false;        ///< The consumer runs in the producer's kernel.
-  /// If the producer is on a cycle, or the edge leaves strips: what it has
-  /// emitted so far.
-  std::shared_ptr<Queue> queue;
   bool keyed() const { return keyWidth > 0; }
 };
 
 /// Stages on a common cycle of edges.
 struct CycleShape {
   bool declared = false;
-  std::vector<int32_t> stages;  ///< Those that collect in the order of turns.
-  std::shared_ptr<Cycle> cycle; ///< Of a run.
+  std::vector<int32_t> stages; ///< Those that collect in the order of turns.
 };
 
 /// A cycle of stages that do not collect.
@@ -101,8 +92,7 @@ struct StripGroup {
   int32_t source = 0;
   int64_t chunk = 0; ///< Most primitives in a strip; 0 = as memory allows.
   std::vector<int32_t> stages;
-  bool writes = false;            ///< Some stage writes state.
-  std::shared_ptr<Strips> strips; ///< Of a run.
+  bool writes = false; ///< Some stage writes state.
 };
 
 /// How a stage, or one of its bins, runs.
@@ -128,9 +118,8 @@ struct Source {
   bool declared = false;
   int32_t stage = 0;
   const uint8_t *data = nullptr;
-  int64_t count = -1;             ///< -1 = not bound
-  int64_t begin = 0, end = 0;     ///< The strip that runs, or all.
-  std::shared_ptr<Kernel> kernel; ///< If the consumer is placed.
+  int64_t count = -1;         ///< -1 = not bound
+  int64_t begin = 0, end = 0; ///< The strip that runs, or all.
 };
 
 struct Stage {
@@ -155,11 +144,9 @@ struct Stage {
   bool hosts = false;          ///< Other stages run in its kernel, ...
   bool visitsAll = false;      ///< ... some of them for empty bins, too.
   std::vector<int32_t> clears; ///< Images that its first kernel clears.
-  bool cleared = false;        ///< It has, in this run.
   // Completed by each run:
   std::array<int64_t, 4> grid{}, cellGrid{};
   int64_t tiles = 1, cells = 1;
-  std::shared_ptr<Kernel> kernel;
   Array<BinSchedule> binSchedules; ///< If they depend on the bin.
 
   int64_t bins() const { return cells / tiles; }
@@ -235,13 +222,12 @@ struct pikort_pipeline {
   std::vector<piko::rt::CycleShape> cycles;
   std::vector<piko::rt::LoopShape> loops;
   int32_t (*runProgram)(pikort_pipeline *) = nullptr;
-  std::shared_ptr<piko::rt::Checker> checker; ///< In checking mode.
+  std::unique_ptr<piko::rt::Executor> executor;
 
   bool ready = false; ///< finish() succeeded.
   std::array<int64_t, 4> domain{0, 1, 1, 1};
   int64_t maxExtent = PIKORT_MAX_EXTENT; ///< of the domain in a dimension
   int32_t threads = 1;
-  int32_t activeThreads = 1; ///< That the open kernel has units for.
   double ticksPerMillisecond =
       piko::rt::defaultTickRate;        ///< As the latest run had it.
   int64_t loopLimit = int64_t(1) << 20; ///< Of hops and of rounds.
@@ -277,15 +263,6 @@ struct pikort_pipeline {
   /// Forgets the status and the message.
   void clearStatus() noexcept;
 
-  /// The cycle that a stage is on, or null.
-  piko::rt::Cycle *cycleOf(const piko::rt::Stage &stage) const {
-    return stage.cycle < 0 ? nullptr : cycles[stage.cycle].cycle.get();
-  }
-  /// The strips that a stage takes, or null.
-  piko::rt::Strips *stripsOf(const piko::rt::Stage &stage) const {
-    return stage.stripGroup < 0 ? nullptr
-                                : stripGroups[stage.stripGroup].strips.get();
-  }
   /// The number of a stage's record as the host knows it.
   int32_t hostRecord(int32_t stage) const {
     int32_t record = stages[stage].record, host = records[record].host;

@@ -307,8 +307,8 @@ void Checker::endless(const char *at) {
 template <class Body>
 static void checked(pikort_pipeline *p, Body &&body) noexcept {
   try {
-    if (p->checker)
-      body(*p->checker);
+    if (Checker *checker = checkerOf(*p))
+      body(*checker);
   } catch (...) {
     p->report({0, PIKORT_OUT_OF_MEMORY, 0, 0, 0});
   }
@@ -330,8 +330,8 @@ void pikoir_declare_checked_record(pikort_pipeline *p, int32_t record,
                     "lineage behind it"};
     p->records[record].host = host;
     p->records[record].lineageOffset = lineageOffset;
-    if (!p->checker)
-      p->checker = std::make_shared<Checker>(*p);
+    if (std::unique_ptr<Checker> &checker = cpuOf(*p).checker; !checker)
+      checker = std::make_unique<Checker>(*p);
   });
 }
 

@@ -12,7 +12,7 @@
 #ifndef PIKO_RUNTIME_CPU_CHECK_H
 #define PIKO_RUNTIME_CPU_CHECK_H
 
-#include "common/Pipeline.h"
+#include "cpu/CPUExecutor.h"
 
 #include <unordered_map>
 

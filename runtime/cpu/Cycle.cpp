@@ -29,7 +29,7 @@ bool Cycle::hasInput(const Stage &stage, bool fromOutside) const {
          std::any_of(stage.inputs.begin(), stage.inputs.end(), [&](int32_t e) {
            const Edge &edge = p_.edges[e];
            return p_.stages[edge.producer].cycle == number_ &&
-                  edge.queue->count > 0;
+                  queueOf(p_, edge).count > 0;
          });
 }
 
@@ -100,7 +100,7 @@ int32_t Cycle::nextTurn() {
 void Cycle::finish() {
   finished_ = true;
   for (int32_t s : stages_)
-    if (Kernel &kernel = *p_.stages[s].kernel; kernel.serial)
+    if (Kernel &kernel = kernelOf(p_, s); kernel.serial)
       kernel.clear();
 }
 
@@ -149,7 +149,8 @@ Edge *Cycle::onlyInput(const Stage &stage) const {
     return nullptr;
   for (int32_t e : stage.inputs) {
     Edge &edge = p_.edges[e];
-    if (p_.stages[edge.producer].cycle != number_ || edge.queue->count == 0)
+    if (p_.stages[edge.producer].cycle != number_ ||
+        queueOf(p_, edge).count == 0)
       continue;
     if (only)
       return nullptr;
@@ -168,7 +169,7 @@ bool Cycle::runsSerially(Kernel &kernel) const {
   const Edge *edge = onlyInput(stage);
   if (!edge)
     return false;
-  const Queue &queue = *edge->queue;
+  const Queue &queue = queueOf(p_, *edge);
   if (!Serial::takes(p_, kernel, std::max(queue.count, queue.pairs.size())))
     return false;
   if (stage.collects())
@@ -206,7 +207,7 @@ Items Cycle::serialInput(Kernel &kernel) {
   if (stage.collects())
     startLaunch(kernel);
   input_.reset();
-  std::swap(input_, *onlyInput(stage)->queue);
+  std::swap(input_, queueOf(p_, *onlyInput(stage)));
   return input_.view();
 }
 
@@ -248,19 +249,20 @@ void Cycle::absorb(const Kernel &kernel, const Serial &launch) {
 
 void piko::rt::enqueue(pikort_pipeline &p, Edge &edge, const Stream &stream) {
   const Stage &to = p.stages[edge.consumer];
-  checkCount(to, edge.queue->count + stream.count);
-  checkCount(to, edge.queue->pairs.size() + stream.pairCount);
-  edge.queue->append(p.memory, stream, p.records[to.record].size,
-                     edge.keyWidth);
+  Queue &queue = queueOf(p, edge);
+  checkCount(to, queue.count + stream.count);
+  checkCount(to, queue.pairs.size() + stream.pairCount);
+  queue.append(p.memory, stream, p.records[to.record].size, edge.keyWidth);
 }
 
 void piko::rt::startCycles(pikort_pipeline &p) {
-  p.activeThreads = p.threads;
+  CPUExecutor &cpu = cpuOf(p);
   for (size_t c = 0; c < p.cycles.size(); ++c)
-    p.cycles[c].cycle = std::make_shared<Cycle>(p, static_cast<int32_t>(c));
-  for (Edge &edge : p.edges)
-    if (p.cycleOf(p.stages[edge.producer]))
-      edge.queue = std::make_shared<Queue>();
+    cpu.cycles.push_back(std::make_unique<Cycle>(p, static_cast<int32_t>(c)));
+  cpu.queues.resize(p.edges.size());
+  for (size_t e = 0; e < p.edges.size(); ++e)
+    if (cycleOf(p, p.stages[p.edges[e].producer]))
+      cpu.queues[e] = std::make_unique<Queue>();
 }
 
 void piko::rt::restartCycles(pikort_pipeline &p, const StripGroup &group) {
@@ -270,18 +272,16 @@ void piko::rt::restartCycles(pikort_pipeline &p, const StripGroup &group) {
     if (std::find(group.stages.begin(), group.stages.end(), first) ==
         group.stages.end())
       continue;
-    p.cycles[c].cycle = std::make_shared<Cycle>(p, number);
-    for (Edge &edge : p.edges)
+    cpuOf(p).cycles[c] = std::make_unique<Cycle>(p, number);
+    for (const Edge &edge : p.edges)
       if (p.stages[edge.producer].cycle == number && !edge.leavesStrips)
-        *edge.queue = {};
+        queueOf(p, edge) = {};
   }
 }
 
 void piko::rt::endCycles(pikort_pipeline &p) {
-  for (CycleShape &shape : p.cycles)
-    shape.cycle.reset();
-  for (Edge &edge : p.edges)
-    edge.queue.reset();
+  cpuOf(p).cycles.clear();
+  cpuOf(p).queues.clear();
 }
 
 /// Asks the cycle number `number` what is next; -1 at its end, and on an error.
@@ -289,7 +289,7 @@ static int32_t ask(pikort_pipeline *p, int32_t number, auto &&question) {
   if (p->status != PIKORT_OK)
     return -1;
   int32_t next = -1;
-  Cycle *cycle = p->cycles[number].cycle.get();
+  Cycle *cycle = cpuOf(*p).cycles[static_cast<size_t>(number)].get();
   guarded(p, "cycle", [&] {
     if (p->profile.part() != Part::Cycle)
       p->profile.enter(Part::Cycle);

@@ -137,7 +137,7 @@ Array<uint32_t> piko::rt::pairStarts(Memory &memory, const Items &items) {
 bool piko::rt::byPosition(const pikort_pipeline &p, const Edge &edge) {
   const Stage &from = p.stages[edge.producer];
   return edge.keyed() || from.loop >= 0 ||
-         (edge.gather == PIKOIR_PERMUTE && from.kernel->rank);
+         (edge.gather == PIKOIR_PERMUTE && kernelOf(p, edge.producer).rank);
 }
 
 // --- By position ------------------------------------------------------------
@@ -148,7 +148,8 @@ namespace {
 class PositionGather {
 public:
   PositionGather(pikort_pipeline &p, const Edge &edge, Stream &stream)
-      : p_(p), from_(p.stages[edge.producer]), kernel_(*from_.kernel),
+      : p_(p), from_(p.stages[edge.producer]),
+        kernel_(kernelOf(p, edge.producer)),
         port_(static_cast<size_t>(edge.port)), edge_(edge), stream_(stream),
         keyed_(edge.keyed() && from_.loop < 0),
         size_(p.records[p.stages[edge.consumer].record].size),
@@ -357,13 +358,14 @@ static Stream gatherSource(pikort_pipeline &p, const Stage &stage,
   stream.keys.base = (static_cast<uint64_t>(index) << 32) +
                      static_cast<uint64_t>(source.begin);
   if (stage.placed()) {
-    if (source.kernel->open || source.kernel->pendingOutputs == 0)
+    Kernel &kernel = *cpuOf(p).sourceKernels[index];
+    if (kernel.open || kernel.pendingOutputs == 0)
       throw Failure{PIKORT_BAD_PROGRAM, "stage " + quoted(stage.name) +
                                             ": expected the bins of source " +
                                             std::to_string(index) +
                                             " to be assigned before"};
-    concatenateCells(p, *source.kernel, 0, stream);
-    releasePort(*source.kernel, 0);
+    concatenateCells(p, kernel, 0, stream);
+    releasePort(kernel, 0);
   }
   return stream;
 }
@@ -376,7 +378,7 @@ static Stream gatherSource(pikort_pipeline &p, const Stage &stage,
 
 /// Checks that a kernel has run, and counts what it emitted to an edge.
 static Stream countRecords(pikort_pipeline &p, const Edge &edge) {
-  Kernel &kernel = *p.stages[edge.producer].kernel;
+  Kernel &kernel = kernelOf(p, edge.producer);
   const Stage &to = p.stages[edge.consumer];
   auto port = static_cast<size_t>(edge.port);
   Stream stream;
@@ -392,7 +394,7 @@ static Stream countRecords(pikort_pipeline &p, const Edge &edge) {
 }
 
 Stream piko::rt::gatherEdge(pikort_pipeline &p, const Edge &edge) {
-  Kernel &kernel = *p.stages[edge.producer].kernel;
+  Kernel &kernel = kernelOf(p, edge.producer);
   const Stage &to = p.stages[edge.consumer];
   auto port = static_cast<size_t>(edge.port);
   Stream stream = countRecords(p, edge);
@@ -590,16 +592,16 @@ Stream piko::rt::gatherInputs(pikort_pipeline &p, const Stage &stage,
   for (int32_t e : stage.inputs) {
     Edge &edge = p.edges[e];
     const Stage &from = p.stages[edge.producer];
-    Cycle *cycle = p.cycleOf(from);
+    Cycle *cycle = cycleOf(p, from);
     if (edge.insideLoop)
       continue; // the loop itself keeps these
     if (cycle && from.cycle != stage.cycle && !cycle->isFinished())
       failOrder(stage, from);
-    Strips *strips = edge.leavesStrips ? p.stripsOf(from) : nullptr;
+    Strips *strips = edge.leavesStrips ? stripsOf(p, from) : nullptr;
     if (strips && !strips->isFinished())
       failOrder(stage, from);
     if (cycle || (strips && strips->isDivided()))
-      add(edge.queue->take(edge.keyWidth));
+      add(queueOf(p, edge).take(edge.keyWidth));
     else if (fromOutside)
       add(gatherEdge(p, edge));
   }

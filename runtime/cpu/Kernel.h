@@ -21,7 +21,7 @@
 #ifndef PIKO_RUNTIME_CPU_KERNEL_H
 #define PIKO_RUNTIME_CPU_KERNEL_H
 
-#include "common/Pipeline.h"
+#include "cpu/CPUExecutor.h"
 
 #include <atomic>
 
@@ -283,8 +283,6 @@ void endClears(pikort_pipeline &p);
 
 /// Makes room for what will be gathered from a kernel, once it has units.
 void prepareOutputs(pikort_pipeline &p, const Stage &stage, Kernel &kernel);
-/// Makes the kernels of a finished pipeline.
-void makeKernels(pikort_pipeline &p);
 
 } // namespace piko::rt
 

@@ -18,7 +18,7 @@ using namespace piko::rt;
 static constexpr int64_t firstBlock = int64_t(16) << 10;
 
 static void beginLocal(pikort_pipeline &p, const Kernel &host, int32_t stage) {
-  Kernel &kernel = *p.stages[stage].kernel;
+  Kernel &kernel = kernelOf(p, stage);
   kernel.clear();
   int64_t slots = 0;
   for (const pikoir_unit &unit : host.units) {
@@ -60,7 +60,7 @@ void piko::rt::endLocals(pikort_pipeline &p, Kernel &host, int32_t status) {
   for (size_t s = 0; s < p.stages.size(); ++s) {
     if (p.stages[s].host != host.stage)
       continue;
-    Kernel &kernel = *p.stages[s].kernel;
+    Kernel &kernel = kernelOf(p, static_cast<int32_t>(s));
     releaseLocals(p, kernel);
     for (auto &lane : kernel.lanes)
       p.stageStats[s].out += lane->emitted;

@@ -64,7 +64,7 @@ void Loop::failHops(const Stage &stage, int64_t cell,
                      std::to_string(cell / stage.tiles) +
                      ": a loop did not end within " +
                      std::to_string(p_.loopLimit) + " hops";
-  if (p_.checker)
-    text += p_.checker->contextOf(stage, record);
+  if (Checker *checker = checkerOf(p_))
+    text += checker->contextOf(stage, record);
   throw Failure{PIKORT_ENDLESS, text};
 }

@@ -31,28 +31,6 @@ void Kernel::clear() {
   open = false;
 }
 
-void piko::rt::makeKernels(pikort_pipeline &p) {
-  auto make = [&](int32_t stage, int32_t source) {
-    auto kernel = std::make_shared<Kernel>();
-    kernel->stage = stage;
-    kernel->source = source;
-    kernel->statsIndex = p.kernelStats.size();
-    KernelStats stats;
-    stats.name = p.stages[stage].name;
-    if (source >= 0)
-      stats.name += ".assign" + std::to_string(source);
-    p.kernelStats.push_back(std::move(stats));
-    return kernel;
-  };
-  for (size_t s = 0; s < p.stages.size(); ++s) {
-    Stage &stage = p.stages[s];
-    for (int32_t source : stage.sources)
-      if (stage.placed())
-        p.sources[source].kernel = make(static_cast<int32_t>(s), source);
-    stage.kernel = make(static_cast<int32_t>(s), -1);
-  }
-}
-
 /// What generated code sees of a kernel that is ready to run.
 static void publish(const pikort_pipeline &p, Kernel &kernel) {
   const Stage &stage = p.stages[kernel.stage];
@@ -107,7 +85,7 @@ void piko::rt::prepareOutputs(pikort_pipeline &p, const Stage &stage,
 /// Decides how a kernel is launched, and drops what no launch needs.
 static void chooseLaunch(pikort_pipeline &p, Kernel &kernel) {
   Cycle *cycle =
-      kernel.source < 0 ? p.cycleOf(p.stages[kernel.stage]) : nullptr;
+      kernel.source < 0 ? cycleOf(p, p.stages[kernel.stage]) : nullptr;
   bool serially = cycle && cycle->runsSerially(kernel);
   if (!serially || !kernel.serial)
     kernel.clear();
@@ -133,8 +111,8 @@ prepareThreads(pikort_pipeline &p, const Stage &stage, Kernel &kernel) {
 
 static void prepareStage(pikort_pipeline &p, Kernel &kernel) {
   Stage &stage = p.stages[kernel.stage];
-  Cycle *cycle = p.cycleOf(stage);
-  Strips *strips = p.stripsOf(stage);
+  Cycle *cycle = cycleOf(p, stage);
+  Strips *strips = stripsOf(p, stage);
   StageStats &stats = p.stageStats[kernel.stage];
   if (kernel.runsSerially) {
     Items input = cycle->serialInput(kernel);
@@ -177,7 +155,7 @@ static const pikoir_input *begin(pikort_pipeline &p, Kernel &kernel) {
     kernel.open = true;
     kernel.nextUnit = 0;
     int64_t useful = kernel.ownsUnits ? p.threads : kernel.input.unit_count;
-    p.activeThreads =
+    cpuOf(p).activeThreads =
         kernel.runsSerially
             ? 1
             : static_cast<int32_t>(std::clamp<int64_t>(useful, 1, p.threads));
@@ -202,10 +180,10 @@ static const pikoir_input *begin(pikort_pipeline &p, Kernel &kernel) {
     if (kernel.source < 0)
       p.stageStats[kernel.stage].out += lane->emitted;
   }
-  if (p.activeThreads > 1) {
+  if (cpuOf(p).activeThreads > 1) {
     ++stats.parallelLaunches;
     stats.waitTicks += std::max<int64_t>(0, kernel.ended - kernel.begun -
-                                                busy / p.activeThreads);
+                                                busy / cpuOf(p).activeThreads);
   }
   endLocals(p, kernel, status);
   kernel.stream = {};
@@ -216,11 +194,11 @@ static const pikoir_input *begin(pikort_pipeline &p, Kernel &kernel) {
 
 /// Takes what was emitted to where it waits; returns the status.
 static int32_t takeOutputs(pikort_pipeline &p, Kernel &kernel, bool serially) {
-  Cycle *cycle = p.cycleOf(p.stages[kernel.stage]);
+  Cycle *cycle = cycleOf(p, p.stages[kernel.stage]);
   if (cycle)
     return guarded(&p, nameOf(p, kernel),
                    [&] { cycle->absorb(kernel, serially); });
-  if (Strips *strips = p.stripsOf(p.stages[kernel.stage]))
+  if (Strips *strips = stripsOf(p, p.stages[kernel.stage]))
     strips->absorb(kernel);
   return p.status.load();
 }
@@ -253,13 +231,13 @@ static int32_t end(pikort_pipeline &p, Kernel &kernel) {
     kernel.ended = p.profile.enter(Part::Join);
     endThreads(p, kernel, status);
   }
-  p.activeThreads = p.threads;
+  cpuOf(p).activeThreads = p.threads;
   if (kernel.source < 0 && status == PIKORT_OK)
     status = takeOutputs(p, kernel, serially);
   if (serially)
     return status;
   int64_t now = p.profile.enter(
-      p.cycleOf(p.stages[kernel.stage]) ? Part::Cycle : Part::Program);
+      cycleOf(p, p.stages[kernel.stage]) ? Part::Cycle : Part::Program);
   stats.ticks += now - kernel.started;
   stats.joinTicks += kernel.begun - kernel.started + now - kernel.ended;
   return status;
@@ -278,7 +256,7 @@ failFind(pikort_pipeline *p, int32_t index, const char *what) noexcept {
 static inline Kernel *find(pikort_pipeline *p, auto &list, int32_t index,
                            const char *what) noexcept {
   if (static_cast<size_t>(index) < list.size())
-    if (Kernel *kernel = list[index].kernel.get()) [[likely]]
+    if (Kernel *kernel = list[index].get()) [[likely]]
       return kernel;
   failFind(p, index, what);
   return nullptr;
@@ -294,26 +272,26 @@ static void fail(pikort_pipeline &p, KernelError found) {
 extern "C" {
 
 const pikoir_input *pikoir_begin(pikort_pipeline *p, int32_t stage) {
-  Kernel *kernel = find(p, p->stages, stage, "stage");
-  if (kernel && p->checker)
-    p->checker->beginStage(stage);
+  Kernel *kernel = find(p, cpuOf(*p).kernels, stage, "stage");
+  if (Checker *checker = checkerOf(*p); kernel && checker)
+    checker->beginStage(stage);
   return kernel ? begin(*p, *kernel) : nullptr;
 }
 
 int32_t pikoir_end(pikort_pipeline *p, int32_t stage) {
-  Kernel *kernel = find(p, p->stages, stage, "stage");
-  if (p->checker)
-    p->checker->endStage();
+  Kernel *kernel = find(p, cpuOf(*p).kernels, stage, "stage");
+  if (Checker *checker = checkerOf(*p))
+    checker->endStage();
   return kernel ? end(*p, *kernel) : p->status.load();
 }
 
 const pikoir_input *pikoir_begin_source(pikort_pipeline *p, int32_t source) {
-  Kernel *kernel = find(p, p->sources, source, "placed source");
+  Kernel *kernel = find(p, cpuOf(*p).sourceKernels, source, "placed source");
   return kernel ? begin(*p, *kernel) : nullptr;
 }
 
 int32_t pikoir_end_source(pikort_pipeline *p, int32_t source) {
-  Kernel *kernel = find(p, p->sources, source, "placed source");
+  Kernel *kernel = find(p, cpuOf(*p).sourceKernels, source, "placed source");
   return kernel ? end(*p, *kernel) : p->status.load();
 }
 

@@ -65,9 +65,10 @@ void StackLoop::leave() {
     writeKey(edge, stream.keys.words.data(), nextEntry_ - 1, left_++);
   }
   const Stage &to = p_.stages[edge.consumer];
-  checkCount(to, edge.queue->count + 1);
-  checkCount(to, edge.queue->pairs.size() + stream.pairCount);
-  edge.queue->append(p_.memory, stream, recordSize(to), stream.keys.width);
+  Queue &queue = queueOf(p_, edge);
+  checkCount(to, queue.count + 1);
+  checkCount(to, queue.pairs.size() + stream.pairCount);
+  queue.append(p_.memory, stream, recordSize(to), stream.keys.width);
   if (edge.keyed())
     key_ = std::move(stream.keys.words);
 }

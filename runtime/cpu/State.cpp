@@ -67,8 +67,7 @@ static void prepare(pikort_pipeline &p, State &state) {
 }
 
 void piko::rt::prepareState(pikort_pipeline &p) {
-  for (Stage &stage : p.stages)
-    stage.cleared = false;
+  cpuOf(p).cleared.assign(p.stages.size(), false);
   for (State &state : p.states)
     try {
       prepare(p, state);
@@ -152,8 +151,8 @@ static void fillBins(pikort_pipeline &p, const Stage &stage, State &state,
 }
 
 void piko::rt::beginClears(pikort_pipeline &p, Kernel &kernel) {
-  Stage &stage = p.stages[kernel.stage];
-  if (stage.clears.empty() || stage.cleared)
+  const Stage &stage = p.stages[kernel.stage];
+  if (stage.clears.empty() || cpuOf(p).cleared[kernel.stage])
     return;
   Part before = p.profile.part();
   p.profile.enter(Part::State);
@@ -164,17 +163,18 @@ void piko::rt::beginClears(pikort_pipeline &p, Kernel &kernel) {
       fill(p, p.states[id]);
     else
       fillBins(p, stage, p.states[id], runs);
-  stage.cleared = true;
+  cpuOf(p).cleared[kernel.stage] = true;
   kernel.input.clears = 1;
   p.profile.enter(before);
 }
 
 void piko::rt::endClears(pikort_pipeline &p) {
-  for (Stage &stage : p.stages)
-    if (!std::exchange(stage.cleared, true))
-      for (int32_t id : stage.clears)
-        if (p.states[id].owned)
-          fill(p, p.states[id]);
+  std::vector<bool> &cleared = cpuOf(p).cleared;
+  for (size_t s = 0; s < cleared.size(); ++s)
+    for (int32_t id : p.stages[s].clears)
+      if (!cleared[s] && p.states[id].owned)
+        fill(p, p.states[id]);
+  cleared.clear();
 }
 
 extern "C" {
@@ -210,7 +210,7 @@ const int64_t *pikoir_cell_grid(pikort_pipeline *p, int32_t stage) {
 }
 
 int32_t pikoir_threads(pikort_pipeline *p) {
-  return p->checker ? 1 : p->activeThreads;
+  return checkerOf(*p) ? 1 : cpuOf(*p).activeThreads;
 }
 
 } // extern "C"

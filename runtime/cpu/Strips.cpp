@@ -14,7 +14,7 @@ Strips::Strips(pikort_pipeline &p, const StripGroup &group)
   for (int32_t s : group.stages)
     for (int32_t e : p.stages[s].outputs)
       if (e >= 0 && p.edges[e].leavesStrips) {
-        p.edges[e].queue = std::make_shared<Queue>();
+        cpuOf(p).queues[e] = std::make_unique<Queue>();
         leaving_.push_back({&p.edges[e], {}});
       }
   size_ = firstSize();
@@ -32,7 +32,7 @@ int64_t Strips::primitiveBytes() const {
 
 int64_t Strips::firstSize() const {
   int64_t all = std::max<int64_t>(1, source_.count);
-  if (p_.checker) // it knows what is concurrent in whole kernels
+  if (checkerOf(p_)) // it knows what is concurrent in whole kernels
     return all;
   if (p_.stripSize > 0)
     return std::min(p_.stripSize, all);
@@ -85,12 +85,12 @@ bool Strips::next() {
 void Strips::failCollected() const {
   const Edge *largest = leaving_.front().edge;
   for (const Waiting &waiting : leaving_)
-    if (waiting.edge->queue->bytes() > largest->queue->bytes())
+    if (queueOf(p_, *waiting.edge).bytes() > queueOf(p_, *largest).bytes())
       largest = waiting.edge;
   throw Failure{PIKORT_OUT_OF_MEMORY,
                 "stage " + quoted(p_.stages[largest->consumer].name) +
                     ": out of memory: what it collects takes " +
-                    std::to_string(largest->queue->bytes()) + " of " +
+                    std::to_string(queueOf(p_, *largest).bytes()) + " of " +
                     std::to_string(held_) + " bytes in bins, and strips need " +
                     std::to_string(p_.memory.budget() / 4) + " more" +
                     memoryLimitText(p_)};
@@ -103,7 +103,7 @@ void Strips::start() {
   divided_ |= source_.begin > 0 || source_.end < source_.count;
   restartCycles(p_, group_);
   for (Waiting &waiting : leaving_)
-    waiting.mark = waiting.edge->queue->mark();
+    waiting.mark = queueOf(p_, *waiting.edge).mark();
   stats_.clear();
   for (int32_t s : group_.stages)
     stats_.push_back(p_.stageStats[s]);
@@ -111,7 +111,7 @@ void Strips::start() {
   int64_t budget = p_.memory.budget();
   if (budget > 0 && !leaving_.empty() && held_ > budget - budget / 4)
     failCollected();
-  bool half = group_.writes && size_ > 1 && budget > held_ && !p_.checker;
+  bool half = group_.writes && size_ > 1 && budget > held_ && !checkerOf(p_);
   p_.memory.limitBins(half ? held_ + (budget - held_) / 2 : budget);
 }
 
@@ -123,7 +123,7 @@ void Strips::commit() {
 /// A strip that found no memory becomes a smaller one, if it has written
 /// nothing yet.
 bool Strips::takeBack() {
-  if (!started_ || committed_ || p_.checker ||
+  if (!started_ || committed_ || checkerOf(p_) ||
       p_.status != PIKORT_OUT_OF_MEMORY)
     return false;
   if (source_.end - source_.begin <= 1) {
@@ -135,14 +135,14 @@ bool Strips::takeBack() {
   }
   p_.clearStatus();
   size_ = std::max<int64_t>(1, (source_.end - source_.begin) / 4);
-  if (source_.kernel)
-    source_.kernel->clear();
+  if (Kernel *kernel = cpuOf(p_).sourceKernels[group_.source].get())
+    kernel->clear();
   for (size_t i = 0; i < group_.stages.size(); ++i) {
-    p_.stages[group_.stages[i]].kernel->clear();
+    kernelOf(p_, group_.stages[i]).clear();
     p_.stageStats[group_.stages[i]] = stats_[i];
   }
   for (Waiting &waiting : leaving_)
-    waiting.edge->queue->rewind(waiting.mark);
+    queueOf(p_, *waiting.edge).rewind(waiting.mark);
   return true;
 }
 
@@ -167,14 +167,13 @@ void piko::rt::startStrips(pikort_pipeline &p) {
     source.end = source.count;
   }
   p.memory.limitBins(p.memory.budget());
-  for (StripGroup &group : p.stripGroups)
-    group.strips = std::make_shared<Strips>(p, group);
+  for (const StripGroup &group : p.stripGroups)
+    cpuOf(p).strips.push_back(std::make_unique<Strips>(p, group));
 }
 
 void piko::rt::endStrips(pikort_pipeline &p) {
   p.memory.limitBins(0);
-  for (StripGroup &group : p.stripGroups)
-    group.strips.reset();
+  cpuOf(p).strips.clear();
 }
 
 extern "C" {
@@ -186,7 +185,7 @@ int32_t pikoir_strips_next(pikort_pipeline *p, int32_t id) {
       throw Failure{PIKORT_BAD_PROGRAM,
                     "expected the number of a group of stages, but got " +
                         std::to_string(id)};
-    more = p->stripGroups[id].strips->next();
+    more = cpuOf(*p).strips[id]->next();
   });
   return more;
 }

@@ -192,7 +192,7 @@ int64_t pikoir_thread(void) { return omp_get_thread_num(); }
 int64_t pikoir_team(void) { return omp_get_num_threads(); }
 
 int64_t pikoir_next_unit(pikort_pipeline *p, int32_t stage, int64_t last) {
-  Kernel &kernel = *p->stages[stage].kernel;
+  Kernel &kernel = kernelOf(*p, stage);
   const std::vector<pikoir_unit> &units = kernel.units;
   auto count = static_cast<int64_t>(units.size());
   int64_t thread = pikoir_thread(), team = pikoir_team();

@@ -274,7 +274,7 @@ void WaveLoop::sortLeft(Edge &edge, Queue &left) {
       for (uint32_t k = starts[order[i]]; k < starts[order[i] + 1]; ++k)
         sorted.pairStorage[sorted.pairCount++] = from.pairs[k];
   }
-  edge.queue->append(p_.memory, sorted, size, sorted.keys.width);
+  queueOf(p_, edge).append(p_.memory, sorted, size, sorted.keys.width);
 }
 
 /// Names the first primitive, in order, that makes one hop too many.

@@ -288,12 +288,12 @@ static pikoir_writer *openUnit(Kernel &kernel, int64_t unit) {
 }
 
 pikoir_writer *pikoir_open(pikort_pipeline *p, int32_t stage, int64_t unit) {
-  return openUnit(*p->stages[stage].kernel, unit);
+  return openUnit(kernelOf(*p, stage), unit);
 }
 
 pikoir_writer *pikoir_open_source(pikort_pipeline *p, int32_t source,
                                   int64_t unit) {
-  return openUnit(*p->sources[source].kernel, unit);
+  return openUnit(*cpuOf(*p).sourceKernels[source], unit);
 }
 
 /// Tells the host which bins a thread has run.

@@ -170,7 +170,7 @@ void GridLog::close() {
     replayUnit(unit, found[static_cast<size_t>(unit)]);
   if (cursor > limit)
     pipeline.report({0, PIKORT_OUT_OF_MEMORY,
-                     isSource ? pipeline.sources[number].kernel->stage : number,
+                     isSource ? pipeline.sources[number].stage : number,
                      cursor - limit, 0, 0});
 }
 

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//===- CPUExecutor.h - Runs a pipeline on threads of the CPU --------------===//
+//
+// Owns what runs have: for each stage, source, edge, cycle and group of strips
+// of the pipeline what the CPU keeps of it, under the same number.
+//
+//===----------------------------------------------------------------------===//
+
+#ifndef PIKO_RUNTIME_CPU_CPUEXECUTOR_H
+#define PIKO_RUNTIME_CPU_CPUEXECUTOR_H
+
+#include "common/Pipeline.h"
+
+namespace piko::rt {
+
+class Checker; // Check.h
+struct Kernel; // Kernel.h
+struct Queue;  // Queue.h
+class Cycle;   // Cycle.h
+class Strips;  // Strips.h
+
+struct CPUExecutor final : Executor {
+  explicit CPUExecutor(pikort_pipeline &p);
+  ~CPUExecutor() override;
+
+  int32_t defaultThreads() const override;
+  void prepare() override;
+  void beginRun() override;
+  void endRun() override;
+  bool reportsInOrder() const override { return checker != nullptr; }
+  void noteError() override;
+  std::string describe(int32_t code, const std::string &plain) const override;
+
+  pikort_pipeline &p;
+  // Warm from run to run:
+  std::vector<std::unique_ptr<Kernel>> kernels; ///< Of stages.
+  /// Of sources; null where the consumer is not placed.
+  std::vector<std::unique_ptr<Kernel>> sourceKernels;
+  std::unique_ptr<Checker> checker; ///< In checking mode.
+
+  // Of a run:
+  std::vector<std::unique_ptr<Cycle>> cycles;
+  std::vector<std::unique_ptr<Strips>> strips;
+  /// Of edges whose producer is on a cycle, or that leave strips: what has been
+  /// emitted so far.
+  std::vector<std::unique_ptr<Queue>> queues;
+  std::vector<bool> cleared; ///< Of stages: their images are clear.
+  int32_t activeThreads = 1; ///< That the open kernel has units for.
+};
+
+inline CPUExecutor &cpuOf(const pikort_pipeline &p) {
+  return static_cast<CPUExecutor &>(*p.executor);
+}
+
+inline Kernel &kernelOf(const pikort_pipeline &p, int32_t stage) {
+  return *cpuOf(p).kernels[static_cast<size_t>(stage)];
+}
+
+/// Of an edge that has one, of those of the pipeline.
+inline Queue &queueOf(const pikort_pipeline &p, const Edge &edge) {
+  return *cpuOf(p).queues[static_cast<size_t>(&edge - p.edges.data())];
+}
+
+/// The cycle that a stage is on, or null.
+inline Cycle *cycleOf(const pikort_pipeline &p, const Stage &stage) {
+  return stage.cycle < 0
+             ? nullptr
+             : cpuOf(p).cycles[static_cast<size_t>(stage.cycle)].get();
+}
+
+/// The strips that a stage takes, or null.
+inline Strips *stripsOf(const pikort_pipeline &p, const Stage &stage) {
+  return stage.stripGroup < 0
+             ? nullptr
+             : cpuOf(p).strips[static_cast<size_t>(stage.stripGroup)].get();
+}
+
+/// In checking mode, what checks; else null.
+inline Checker *checkerOf(const pikort_pipeline &p) {
+  return cpuOf(p).checker.get();
+}
+
+} // namespace piko::rt
+
+#endif // PIKO_RUNTIME_CPU_CPUEXECUTOR_H
