@@ -145,6 +145,14 @@ Value piko::createTripCount(OpBuilder &builder, scf::ForOp loop) {
                                       trips);
 }
 
+LogicalResult piko::checkParallelLoop(ParallelLoopOpInterface loop) {
+  if (isa<ParallelForOp, ParallelPixelsOp>(*loop))
+    return success();
+  return loop->emitError("expected piko.parallel_for or piko.parallel_pixels, "
+                         "of which other loops can be made, but got '")
+         << loop->getName() << "'";
+}
+
 void piko::convertLoop(ParallelLoopOpInterface loop) {
   if (auto pixels = dyn_cast<ParallelPixelsOp>(*loop))
     convertPixels(pixels);
@@ -159,6 +167,9 @@ void SplitLoopsPass::runOnOperation() {
     if (op->getParentOfType<KernelOp>())
       parallels.push_back(op);
   });
+  for (ParallelLoopOpInterface parallel : parallels)
+    if (failed(checkParallelLoop(parallel)))
+      return signalPassFailure();
   for (ParallelLoopOpInterface parallel : parallels) {
     ++loops;
     if (!parallel.hasBarriers()) {

@@ -4,6 +4,7 @@
 
 #include "PikoToGPU.h"
 
+#include "../../Transforms/ParallelLoops.h"
 #include "../GPUToNVVM/ExactFunctions.h"
 
 #include "llvm/ADT/StringSet.h"
@@ -32,6 +33,9 @@ LogicalResult piko::checkGridLimits(KernelOp kernel) {
     if (isa<TileOp>(op))
       return op->emitError("a kernel for a GPU has no tiles; leave out "
                            "piko-form-tiles");
+    if (auto loop = dyn_cast<ParallelLoopOpInterface>(op);
+        loop && failed(checkParallelLoop(loop)))
+      return WalkResult::interrupt();
     if (hasOtherBitsInPTX(op))
       return op->emitError("a kernel for a GPU uses '")
              << op->getName() << "', which has other bits there";

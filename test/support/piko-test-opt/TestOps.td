@@ -76,6 +76,14 @@ def Test_PeekOp : Test_Op<"peek", [
   let assemblyFormat = "$state `[` $index `]` attr-dict";
 }
 
+/// Runs its body a few times, in a way that nobody knows.
+def Test_EachOp : Test_Op<"each", [
+    SingleBlock, NoTerminator, AutomaticAllocationScope, RecursiveMemoryEffects,
+    DeclareOpInterfaceMethods<Piko_ParallelLoopInterface>]> {
+  let regions = (region SizedRegion<1>:$body);
+  let assemblyFormat = "attr-dict-with-keyword $body";
+}
+
 /// Iterations meet, in a way that nobody knows.
 def Test_MeetOp : Test_Op<"meet", [
     DeclareOpInterfaceMethods<Piko_BarrierInterface>]> {

@@ -47,6 +47,8 @@ bool StayOp::canFail() { return false; }
 FlatSymbolRefAttr ScribbleOp::getAccessedState() { return getStateAttr(); }
 int ScribbleOp::getAccessKinds() { return StateAccess::stores; }
 
+Value EachOp::buildIteration(OpBuilder &) { return getBody().getArgument(0); }
+
 FlatSymbolRefAttr SmearOp::getAccessedState() { return getStateAttr(); }
 int SmearOp::getAccessKinds() { return StateAccess::updates; }
 
