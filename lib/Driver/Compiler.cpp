@@ -62,6 +62,8 @@ FrontendOptions piko::getFrontendOptions(const CompileOptions &options) {
   if (options.check.enabled)
     result.defines.push_back("PIKO_CHECK");
   result.pipeName = options.pipeName;
+  if (options.cache.enabled)
+    result.headers = makeHeaderStore(options.cache);
   result.runtimeIncludeDir = getRuntimeIncludeDir();
   return result;
 }

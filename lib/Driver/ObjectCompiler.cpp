@@ -1,28 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // From a pipeline's text to an object file, through the cache.
-//
-// The cache has two kinds of entries. A request (options, names, compiler,
-// processor) leads to the list of what its last compilation asked the file
-// system; the request with the present answers to these questions leads to the
-// object. So nothing is parsed to find that nothing has changed, and an object
-// is found again when a header is changed back.
 
 #include "Piko/Driver/ObjectCompiler.h"
 
-#include "CompilerIdentity.h"
-#include "DiskCache.h"
 #include "HeaderWriter.h"
 #include "Piko/Driver/Compiler.h"
 #include "Piko/Driver/Diagnostics.h"
 #include "Piko/Frontend/HostCompiler.h"
 #include "Piko/Target/Object.h"
-#include "SourceRecorder.h"
+#include "SourceCache.h"
 
 #include "llvm/IR/Constants.h"
-#include "llvm/Support/Endian.h"
 #include "llvm/Support/Path.h"
-#include "llvm/Support/Process.h"
 
 #include "Piko/Analysis/LinearFacts.h"
 #include "pikort/pikort.h"
@@ -44,36 +34,6 @@ struct Entry {
   std::string diagnostics;
 };
 
-/// Strings, each behind its length.
-class Writer {
-public:
-  Writer &add(llvm::StringRef string) {
-    char length[8];
-    llvm::support::endian::write64le(length, string.size());
-    bytes.append(length, 8).append(string.data(), string.size());
-    return *this;
-  }
-  std::string bytes;
-};
-
-class Reader {
-public:
-  explicit Reader(llvm::StringRef bytes) : bytes(bytes) {}
-  bool atEnd() const { return bytes.empty(); }
-  std::string next() {
-    if (bytes.size() < 8)
-      return "";
-    uint64_t length = llvm::support::endian::read64le(bytes.data());
-    bytes = bytes.drop_front(8);
-    std::string string = bytes.take_front(length).str();
-    bytes = bytes.drop_front(string.size());
-    return string;
-  }
-
-private:
-  llvm::StringRef bytes;
-};
-
 } // namespace
 
 //===----------------------------------------------------------------------===//
@@ -81,7 +41,7 @@ private:
 //===----------------------------------------------------------------------===//
 
 static std::string writeEntry(const Entry &entry) {
-  Writer writer;
+  StringWriter writer;
   const CompiledObject &object = entry.object;
   writer.add(object.symbol).add(object.code).add(object.header);
   writer.add(entry.diagnostics);
@@ -93,7 +53,7 @@ static std::string writeEntry(const Entry &entry) {
 }
 
 static Entry readEntry(llvm::StringRef bytes) {
-  Reader reader(bytes);
+  StringReader reader(bytes);
   Entry entry;
   for (std::string *part : {&entry.object.symbol, &entry.object.code,
                             &entry.object.header, &entry.diagnostics})
@@ -112,11 +72,9 @@ static std::string makeRequest(const ObjectOptions &options,
                                const Processor &processor,
                                llvm::vfs::FileSystem &files) {
   KeyBuilder key;
-  key.add(getCompilerIdentity());
+  addSurroundings(key, files);
   const CompileOptions &source = options.source;
   key.add(source.file).add(source.pipeName).add(source.text.value_or(""));
-  if (auto folder = files.getCurrentWorkingDirectory())
-    key.add(*folder);
   for (const auto *list : {&source.includeDirs, &source.defines,
                            &source.check.numbers, &source.synthesis.without}) {
     key.add(std::to_string(list->size()));
@@ -131,47 +89,7 @@ static std::string makeRequest(const ObjectOptions &options,
                      int(source.gpu.seed), int(source.gpu.threads)})
     key.add(std::to_string(number));
   key.add(options.nameSpace).add(getRuntimeIncludeDir());
-  // What Clang looks at besides its options.
-  for (const char *name : {"CPATH", "CPLUS_INCLUDE_PATH", "SOURCE_DATE_EPOCH"})
-    key.add(llvm::sys::Process::GetEnv(name).value_or(""));
   return key.finish();
-}
-
-static std::optional<Entry> lookUp(const DiskCache &cache,
-                                   const std::string &request,
-                                   llvm::vfs::FileSystem &files) {
-  std::optional<std::string> questions = cache.read(request);
-  if (!questions)
-    return std::nullopt;
-  KeyBuilder key;
-  key.add(request);
-  for (Reader reader(*questions); !reader.atEnd();) {
-    bool isRead = reader.next() == "read";
-    SourceQuery query{reader.next(), isRead};
-    key.add(query.path).add(answer(files, query));
-  }
-  if (std::optional<std::string> bytes = cache.read(key.finish()))
-    return readEntry(*bytes);
-  return std::nullopt;
-}
-
-static void keep(const DiskCache &cache, const std::string &request,
-                 const SourceRecorder &recorder, const Entry &entry,
-                 std::string &diagnostics) {
-  Writer questions;
-  KeyBuilder key;
-  key.add(request);
-  for (const auto &[path, answer] : recorder.getAnswers()) {
-    questions.add(answer.isRead ? "read" : "find").add(path);
-    key.add(path).add(answer.text);
-  }
-  llvm::Error error = cache.write(key.finish(), writeEntry(entry));
-  if (!error)
-    error = cache.write(request, questions.bytes);
-  if (!error)
-    return cache.prune();
-  diagnostics += "warning: cannot write to the cache '" + cache.getDirectory() +
-                 "': " + llvm::toString(std::move(error)) + "\n";
 }
 
 //===----------------------------------------------------------------------===//
@@ -272,9 +190,9 @@ compileReference(const ObjectOptions &options, const Files &files,
   for (const PipelineDescription &pipeline : pipelines)
     object.pipelines.push_back(pipeline.name);
   object.symbol = referenceEntry;
-  return compileForHost(generateReferenceAdapter(pipelines, file), frontend,
-                        /*optimize=*/options.target.optLevel > 0, llvmContext,
-                        context);
+  return compileForHost(
+      generateReferenceAdapter(pipelines, file), file, frontend,
+      /*optimize=*/options.target.optLevel > 0, llvmContext, context);
 }
 
 /// Fills an entry but for its files; false after diagnostics, which are there
@@ -327,13 +245,14 @@ std::optional<CompiledObject> piko::compileObject(const ObjectOptions &options,
     return std::nullopt;
   }
   Files files = openFiles(options.source);
-  DiskCache cache(options.cache);
+  SourceCache cache(options.source.cache);
   std::string request;
   if (cache.isEnabled()) {
     request = makeRequest(options, *processor, *files);
-    if (std::optional<Entry> entry = lookUp(cache, request, *files)) {
-      diagnostics += entry->diagnostics;
-      return std::move(entry->object);
+    if (std::optional<std::string> found = cache.lookUp(request, *files)) {
+      Entry entry = readEntry(*found);
+      diagnostics += entry.diagnostics;
+      return std::move(entry.object);
     }
   }
   auto recorder = llvm::makeIntrusiveRefCnt<SourceRecorder>(files);
@@ -343,7 +262,11 @@ std::optional<CompiledObject> piko::compileObject(const ObjectOptions &options,
   if (!ok)
     return std::nullopt;
   entry.object.files = recorder->getFiles();
-  if (cache.isEnabled())
-    keep(cache, request, *recorder, entry, diagnostics);
+  if (!cache.isEnabled())
+    return std::move(entry.object);
+  if (llvm::Error error = cache.keep(request, *recorder, writeEntry(entry)))
+    diagnostics += "warning: cannot write to the cache '" +
+                   cache.getDirectory() +
+                   "': " + llvm::toString(std::move(error)) + "\n";
   return std::move(entry.object);
 }

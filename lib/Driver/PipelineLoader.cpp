@@ -48,14 +48,14 @@ static std::unique_ptr<LoadedProgram> load(CompileOptions source,
   source.check = options.check;
   source.synthesis = options.synthesis;
   source.gpu = options.gpu;
+  source.cache = options.cache;
   bool isReference = options.target == ExecutionTarget::Reference;
   ObjectOptions objectOptions{
       .source = std::move(source),
       .execution = options.target,
       .target = {.cpu = "native",
                  .sanitizer =
-                     isReference ? Sanitizer::None : JITCode::getSanitizer()},
-      .cache = options.cache};
+                     isReference ? Sanitizer::None : JITCode::getSanitizer()}};
   std::optional<CompiledObject> object =
       compileObject(objectOptions, diagnostics);
   if (!object)

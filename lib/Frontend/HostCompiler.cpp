@@ -6,28 +6,37 @@
 
 #include "Parse/ClangDiagnostics.h"
 #include "Parse/ClangInvocation.h"
+#include "Parse/PrecompiledHeader.h"
 #include "clang/CodeGen/CodeGenAction.h"
 #include "clang/Frontend/CompilerInstance.h"
+#include "clang/Lex/PreprocessorOptions.h"
 #include "llvm/Support/VirtualFileSystem.h"
 
 using namespace piko;
 
 static constexpr llvm::StringLiteral mainName = "<piko-reference>";
+static constexpr llvm::StringLiteral headerPath = "/<piko-reference>.pch";
 
 std::unique_ptr<llvm::Module>
-piko::compileForHost(llvm::StringRef text, const FrontendOptions &options,
-                     bool optimize, llvm::LLVMContext &llvmContext,
+piko::compileForHost(llvm::StringRef text, llvm::StringRef userFile,
+                     const FrontendOptions &options, bool optimize,
+                     llvm::LLVMContext &llvmContext,
                      mlir::MLIRContext &context) {
-  auto files = options.files ? options.files : llvm::vfs::getRealFileSystem();
+  auto memory = llvm::makeIntrusiveRefCnt<llvm::vfs::InMemoryFileSystem>();
+  auto files = llvm::makeIntrusiveRefCnt<llvm::vfs::OverlayFileSystem>(
+      options.files ? options.files : llvm::vfs::getRealFileSystem());
+  files->pushOverlay(memory);
+  const char *const flags[] = {optimize ? "-O2" : "-O0", "-fPIC", "-fwrapv",
+                               "-fno-strict-float-cast-overflow"};
+  auto invoke = [&](const FrontendOptions &chosen, auto diagnostics) {
+    return createClangInvocation(flags, chosen, mainName, diagnostics);
+  };
   ClangDiagnosticForwarder forwarder(context);
   clang::DiagnosticOptions diagnosticOptions;
   std::shared_ptr<clang::CompilerInvocation> invocation =
-      createClangInvocation({optimize ? "-O2" : "-O0", "-fPIC", "-fwrapv",
-                             "-fno-strict-float-cast-overflow"},
-                            options, mainName,
-                            clang::CompilerInstance::createDiagnostics(
-                                *files, diagnosticOptions, &forwarder,
-                                /*ShouldOwnClient=*/false));
+      invoke(options, clang::CompilerInstance::createDiagnostics(
+                          *files, diagnosticOptions, &forwarder,
+                          /*ShouldOwnClient=*/false));
   if (!invocation)
     return nullptr;
   // The text is in memory; nothing is read from a file of that name.
@@ -35,6 +44,15 @@ piko::compileForHost(llvm::StringRef text, const FrontendOptions &options,
       llvm::MemoryBuffer::getMemBufferCopy(text, mainName);
   invocation->getFrontendOpts().Inputs = {clang::FrontendInputFile(
       buffer->getMemBufferRef(), clang::InputKind(clang::Language::CXX))};
+  if (std::unique_ptr<llvm::MemoryBuffer> header = getPrecompiledHeader(
+          userFile, options, flags, files, invoke, headerPath)) {
+    memory->addFile(headerPath, 0, std::move(header));
+    clang::PreprocessorOptions &preprocessor =
+        invocation->getPreprocessorOpts();
+    preprocessor.ImplicitPCHInclude = headerPath;
+    preprocessor.DisablePCHOrModuleValidation =
+        clang::DisableValidationForModuleKind::All;
+  }
   clang::CompilerInstance compiler(invocation);
   compiler.setVirtualFileSystem(files);
   compiler.setVerboseOutputStream(llvm::nulls());

@@ -9,7 +9,7 @@
 
 using namespace piko;
 
-void piko::registerCppToPikoTranslation() {
+void piko::registerCppToPikoTranslation(std::shared_ptr<HeaderStore> headers) {
   static llvm::cl::list<std::string> includeDirs(
       "I", llvm::cl::Prefix,
       llvm::cl::desc("Search this directory for headers"));
@@ -19,14 +19,15 @@ void piko::registerCppToPikoTranslation() {
       "pipe", llvm::cl::desc("The pipeline to compile"));
   static mlir::TranslateToMLIRRegistration registration(
       "cpp-to-piko", "compile a pipeline in C++ to the piko dialect",
-      [](llvm::SourceMgr &sources,
-         mlir::MLIRContext *context) -> mlir::OwningOpRef<mlir::Operation *> {
+      [headers](llvm::SourceMgr &sources, mlir::MLIRContext *context)
+          -> mlir::OwningOpRef<mlir::Operation *> {
         const llvm::MemoryBuffer *buffer =
             sources.getMemoryBuffer(sources.getMainFileID());
         FrontendOptions options;
         options.includeDirs = includeDirs;
         options.defines = defines;
         options.pipeName = pipe;
+        options.headers = headers;
         llvm::StringRef name = buffer->getBufferIdentifier();
         mlir::OwningOpRef<mlir::ModuleOp> module =
             translateCppToPiko(name == "-" ? "<stdin>" : name,

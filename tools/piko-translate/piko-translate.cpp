@@ -2,6 +2,7 @@
 //
 // Takes pipelines in and out of MLIR: C++ in; LLVM IR and Graphviz out.
 
+#include "Piko/Driver/Compiler.h"
 #include "Piko/Driver/Registration.h"
 #include "Piko/Frontend/Frontend.h"
 #include "Piko/Target/Graphviz.h"
@@ -25,7 +26,7 @@ static mlir::LogicalResult exportLLVMIR(mlir::Operation *op,
 }
 
 int main(int argc, char **argv) {
-  piko::registerCppToPikoTranslation();
+  piko::registerCppToPikoTranslation(piko::makeHeaderStore({}));
   piko::registerPikoToDotTranslation();
   mlir::TranslateFromMLIRRegistration toLLVMIR(
       "mlir-to-llvmir", "translate the llvm and omp dialects to LLVM IR",

@@ -177,15 +177,18 @@ struct CommandLine {
   }
   bool isEmulated() const { return target == Machine::GPUOnCPU; }
   CompileOptions getSource() const {
-    return {.file = file,
-            .pipeName = pipe,
-            .includeDirs = {includeDirs.begin(), includeDirs.end()},
-            .defines = {defines.begin(), defines.end()},
-            .check = *getCheck(),
-            .synthesis = *getSynthesis(),
-            .gpu = {.threads = gpuThreads,
-                    .emulate = isEmulated(),
-                    .seed = gpuSeed}};
+    return {
+        .file = file,
+        .pipeName = pipe,
+        .includeDirs = {includeDirs.begin(), includeDirs.end()},
+        .defines = {defines.begin(), defines.end()},
+        .check = *getCheck(),
+        .synthesis = *getSynthesis(),
+        .gpu = {.threads = gpuThreads,
+                .emulate = isEmulated(),
+                .seed = gpuSeed},
+        // Of standard input the cache does not know what was in it.
+        .cache = {.enabled = !noCache && file != "-", .directory = cacheDir}};
   }
   TargetOptions getTarget() const {
     return {.cpu = cpu,
@@ -332,14 +335,10 @@ static std::optional<std::string> writeText(const CommandLine &line) {
 
 /// The object and what belongs to it; false after an error.
 static bool writeObject(const CommandLine &line, OutputFiles &outputs) {
-  ObjectOptions options{
-      .source = line.getSource(),
-      .target = line.getTarget(),
-      // Of standard input the cache does not know what was in it.
-      .cache = {.enabled = !line.noCache && line.file != "-",
-                .directory = line.cacheDir},
-      .nameSpace = line.nameSpace,
-      .remarks = line.remarks};
+  ObjectOptions options{.source = line.getSource(),
+                        .target = line.getTarget(),
+                        .nameSpace = line.nameSpace,
+                        .remarks = line.remarks};
   std::string diagnostics;
   std::optional<CompiledObject> object = compileObject(options, diagnostics);
   llvm::errs() << diagnostics;

@@ -19,8 +19,8 @@ namespace fs = std::filesystem;
 
 namespace {
 
-const char *const text = R"(#include <piko.h>
-#include FACTOR_HEADER
+const char *const text = R"(#include FACTOR_HEADER
+#include <piko.h>
 struct State {
   int offset;
   piko::Buffer<int> values;
@@ -161,9 +161,9 @@ TEST_F(Loader, ProgramsAreIndependent) {
 }
 
 TEST_F(Loader, SaysWhereTheTextIsWrong) {
-  EXPECT_FALSE(
-      loadText("#include <piko.h>\nstruct A : piko::Pipe<> { int }\n"));
-  EXPECT_NE(diagnostics.find("table.piko.cpp:2:"), std::string::npos)
+  EXPECT_FALSE(loadText(
+      "#define MINE\n#include <piko.h>\nstruct A : piko::Pipe<> { int }\n"));
+  EXPECT_NE(diagnostics.find("table.piko.cpp:3:"), std::string::npos)
       << diagnostics;
   EXPECT_NE(diagnostics.find("struct A : piko::Pipe<> { int }"),
             std::string::npos)
@@ -184,7 +184,7 @@ TEST_F(Loader, CompilesTextToAnObject) {
                     .includeDirs = options.includeDirs,
                     .defines = options.defines,
                     .text = text};
-  request.cache = options.cache;
+  request.source.cache = options.cache;
   auto object = compileObject(request, diagnostics);
   ASSERT_TRUE(object) << diagnostics;
   EXPECT_EQ(object->pipelines, std::vector<std::string>{"Table"});
@@ -216,7 +216,7 @@ TEST_F(Loader, CompilesAllPipelinesForTheReference) {
                             "};\n"};
   request.execution = ExecutionTarget::Reference;
   request.target = {.cpu = "native", .optLevel = 0};
-  request.cache = options.cache;
+  request.source.cache = options.cache;
   EXPECT_FALSE(compileObject(request, diagnostics)); // which one?
   request.allPipelines = true;
   std::string code;

@@ -42,6 +42,9 @@ llvm::StringRef getName(Level level);
 /// the source tree.
 std::string getRuntimeIncludeDir();
 
+/// Precompiled headers in the cache.
+std::shared_ptr<HeaderStore> makeHeaderStore(const CacheOptions &options);
+
 /// The options as the C++ front end takes them.
 FrontendOptions getFrontendOptions(const CompileOptions &options);
 

@@ -16,7 +16,6 @@ struct ObjectOptions {
   CompileOptions source;
   ExecutionTarget execution = ExecutionTarget::CPU;
   TargetOptions target = {};
-  CacheOptions cache = {};
   /// The C++ namespace of the generated class; a part of the object's symbol.
   std::string nameSpace = "pipelines";
   /// For the reference executor: all pipelines of the file, whichever `source`

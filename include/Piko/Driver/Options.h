@@ -22,6 +22,18 @@ enum class ExecutionTarget {
   Reference ///< The reference executor of piko.h: sequential, and the measure.
 };
 
+/// Where compiled code, and what Clang knows of piko.h, is kept from one
+/// process to the next.
+struct CacheOptions {
+  bool enabled = true;
+  /// Empty = $PIKO_CACHE_DIR, $XDG_CACHE_HOME/piko or $HOME/.cache/piko, the
+  /// first that there is.
+  std::string directory = {};
+  /// The oldest entries go when it is larger; 0 = $PIKO_CACHE_SIZE, in bytes,
+  /// or 512 MiB.
+  uint64_t maxBytes = 0;
+};
+
 /// A pipeline and how its text is read.
 struct CompileOptions {
   /// A pipeline's C++, or `.mlir` at the authored level.
@@ -35,6 +47,7 @@ struct CompileOptions {
   CheckOptions check = {};
   SynthesisOptions synthesis = {};
   GPUOptions gpu = {};
+  CacheOptions cache = {};
 };
 
 /// Instruments code, which then runs in programs that have the sanitizer's
@@ -49,17 +62,6 @@ struct TargetOptions {
   /// 0 to 3, as in -O3.
   int optLevel = 3;
   Sanitizer sanitizer = Sanitizer::None;
-};
-
-/// Where compiled code is kept from one process to the next.
-struct CacheOptions {
-  bool enabled = true;
-  /// Empty = $PIKO_CACHE_DIR, $XDG_CACHE_HOME/piko or $HOME/.cache/piko, the
-  /// first that there is.
-  std::string directory = {};
-  /// The oldest entries go when it is larger; 0 = $PIKO_CACHE_SIZE, in bytes,
-  /// or 512 MiB.
-  uint64_t maxBytes = 0;
 };
 
 } // namespace piko

@@ -16,6 +16,7 @@
 #include "Piko/Frontend/PipelineDescription.h"
 #include "mlir/IR/BuiltinOps.h"
 #include "mlir/IR/OwningOpRef.h"
+#include "llvm/ADT/STLFunctionalExtras.h"
 #include "llvm/Support/VirtualFileSystem.h"
 
 #include <memory>
@@ -23,6 +24,20 @@
 #include <vector>
 
 namespace piko {
+
+/// Keeps precompiled headers from one compilation to the next.
+class HeaderStore {
+public:
+  using Files = llvm::IntrusiveRefCntPtr<llvm::vfs::FileSystem>;
+  using Maker =
+      llvm::function_ref<std::optional<std::string>(const Files &files)>;
+
+  virtual ~HeaderStore() = default;
+  /// What `make` gives, or gave for the same arguments of Clang and the same
+  /// files; nothing if it fails.
+  virtual std::optional<std::string> get(llvm::ArrayRef<std::string> arguments,
+                                         const Files &files, Maker make) = 0;
+};
 
 struct FrontendOptions {
   /// `-I` and `-D`, without the letter.
@@ -36,6 +51,8 @@ struct FrontendOptions {
   std::string resourceDir;
   /// Where all files are read; null = the disk.
   llvm::IntrusiveRefCntPtr<llvm::vfs::FileSystem> files;
+  /// Where there is a precompiled piko.h; null = nowhere.
+  std::shared_ptr<HeaderStore> headers;
 };
 
 /// Compiles one pipeline of a C++ file; null after an error.
@@ -99,7 +116,7 @@ generateReferenceAdapter(llvm::ArrayRef<PipelineDescription> pipelines,
                          llvm::StringRef userFile);
 
 /// Registers `piko-translate --cpp-to-piko`.
-void registerCppToPikoTranslation();
+void registerCppToPikoTranslation(std::shared_ptr<HeaderStore> headers);
 
 } // namespace piko
 

@@ -14,14 +14,14 @@
 
 namespace piko {
 
-/// Compiles C++ text, without __PIKO__, to LLVM IR for this machine; null after
+/// Compiles C++ text that begins with what `userFile` holds, without __PIKO__,
+/// to LLVM IR for this machine; null after
 /// diagnostics in `context`'s engine. Overflow wraps and casts saturate, as the
 /// language says.
-std::unique_ptr<llvm::Module> compileForHost(llvm::StringRef text,
-                                             const FrontendOptions &options,
-                                             bool optimize,
-                                             llvm::LLVMContext &llvmContext,
-                                             mlir::MLIRContext &context);
+std::unique_ptr<llvm::Module>
+compileForHost(llvm::StringRef text, llvm::StringRef userFile,
+               const FrontendOptions &options, bool optimize,
+               llvm::LLVMContext &llvmContext, mlir::MLIRContext &context);
 
 } // namespace piko
 

@@ -8,10 +8,9 @@
 
 using namespace piko;
 
-std::shared_ptr<clang::CompilerInvocation> piko::createClangInvocation(
-    llvm::ArrayRef<const char *> flags, const FrontendOptions &options,
-    llvm::StringRef mainName,
-    llvm::IntrusiveRefCntPtr<clang::DiagnosticsEngine> diagnostics) {
+std::vector<std::string>
+piko::getClangArguments(llvm::ArrayRef<const char *> flags,
+                        const FrontendOptions &options) {
   std::vector<std::string> arguments = {
       "clang++",
       "-std=c++20",
@@ -29,6 +28,14 @@ std::shared_ptr<clang::CompilerInvocation> piko::createClangInvocation(
     arguments.push_back("-I" + directory);
   for (const std::string &macro : options.defines)
     arguments.push_back("-D" + macro);
+  return arguments;
+}
+
+std::shared_ptr<clang::CompilerInvocation> piko::createClangInvocation(
+    llvm::ArrayRef<const char *> flags, const FrontendOptions &options,
+    llvm::StringRef mainName,
+    llvm::IntrusiveRefCntPtr<clang::DiagnosticsEngine> diagnostics) {
+  std::vector<std::string> arguments = getClangArguments(flags, options);
   arguments.push_back(mainName.str());
   std::vector<const char *> argv;
   for (const std::string &argument : arguments)

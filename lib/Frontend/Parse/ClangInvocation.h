@@ -14,9 +14,13 @@
 
 namespace piko {
 
-/// The invocation for C++20 without contraction, with the user's folders and
-/// macros, piko.h's folder and Clang's own headers, and `flags`; null after an
-/// error.
+/// Clang's arguments, but for the file's name: for C++20 without contraction,
+/// with the user's folders and macros, piko.h's folder and Clang's own headers,
+/// and `flags`.
+std::vector<std::string> getClangArguments(llvm::ArrayRef<const char *> flags,
+                                           const FrontendOptions &options);
+
+/// The invocation with these arguments; null after an error.
 std::shared_ptr<clang::CompilerInvocation> createClangInvocation(
     llvm::ArrayRef<const char *> flags, const FrontendOptions &options,
     llvm::StringRef mainName,

@@ -29,6 +29,7 @@
 #include "Parse/EvaluationOrder.h"
 #include "Parse/HidingMacros.h"
 #include "Parse/PhaseNames.h"
+#include "Parse/PrecompiledHeader.h"
 #include "Parse/Wrappers.h"
 #include "clang/AST/ASTConsumer.h"
 #include "clang/AST/DeclTemplate.h"
@@ -51,21 +52,30 @@ using namespace piko;
 using llvm::failed;
 
 static constexpr llvm::StringLiteral mainName = "<piko>";
+static constexpr llvm::StringLiteral headerPath = "/<piko-header>.pch";
 
 //===----------------------------------------------------------------------===//
 // The invocation
 //===----------------------------------------------------------------------===//
 
+static constexpr const char *clangFlags[] = {"-D__PIKO__=1",
+                                             "-DNDEBUG=1",
+                                             "-fignore-exceptions",
+                                             "-O1",
+                                             "-fwrapv",
+                                             "-fno-finite-loops",
+                                             "-fno-math-errno",
+                                             "-fno-strict-aliasing",
+                                             "-gline-tables-only",
+                                             "-Wno-undefined-internal",
+                                             "-fno-strict-float-cast-overflow",
+                                             "-fno-threadsafe-statics"};
+
 static std::shared_ptr<clang::CompilerInvocation>
-makeInvocation(const ParseRequest &request,
+makeInvocation(const FrontendOptions &options,
                llvm::IntrusiveRefCntPtr<clang::DiagnosticsEngine> diagnostics) {
-  const FrontendOptions &options = request.options;
-  std::shared_ptr<clang::CompilerInvocation> invocation = createClangInvocation(
-      {"-D__PIKO__=1", "-DNDEBUG=1", "-fignore-exceptions", "-O1", "-fwrapv",
-       "-fno-finite-loops", "-fno-math-errno", "-fno-strict-aliasing",
-       "-gline-tables-only", "-Wno-undefined-internal",
-       "-fno-strict-float-cast-overflow", "-fno-threadsafe-statics"},
-      options, mainName, diagnostics);
+  std::shared_ptr<clang::CompilerInvocation> invocation =
+      createClangInvocation(clangFlags, options, mainName, diagnostics);
   if (!invocation)
     return nullptr;
 
@@ -494,10 +504,17 @@ llvm::FailureOr<ParsedFile> piko::parseFile(const ParseRequest &request,
   auto driverDiagnostics = clang::CompilerInstance::createDiagnostics(
       *files, diagnosticOptions, &forwarder, /*ShouldOwnClient=*/false);
   std::shared_ptr<clang::CompilerInvocation> invocation =
-      makeInvocation(request, driverDiagnostics);
+      makeInvocation(request.options, driverDiagnostics);
   if (!invocation)
     return llvm::failure();
   invocation->getFrontendOpts().Inputs.clear();
+
+  std::unique_ptr<llvm::MemoryBuffer> header =
+      getPrecompiledHeader(request.file, request.options, clangFlags, files,
+                           makeInvocation, headerPath);
+  bool hasHeader = header != nullptr;
+  if (hasHeader)
+    memory->addFile(headerPath, 0, std::move(header));
 
   // Before Clang, which may still hold LLVM's module when it goes.
   auto llvmContext = std::make_shared<llvm::LLVMContext>();
@@ -514,8 +531,9 @@ llvm::FailureOr<ParsedFile> piko::parseFile(const ParseRequest &request,
 
   compiler.createPreprocessor(clang::TU_Complete);
   clang::Preprocessor &preprocessor = compiler.getPreprocessor();
-  preprocessor.getBuiltinInfo().initializeBuiltins(
-      preprocessor.getIdentifierTable(), preprocessor.getLangOpts());
+  if (!hasHeader)
+    preprocessor.getBuiltinInfo().initializeBuiltins(
+        preprocessor.getIdentifierTable(), preprocessor.getLangOpts());
   FileUnitsReader reader(request, fileLocation, context, compiler, forwarder);
   preprocessor.AddPragmaHandler(&reader);
   FileReader fileReader(request.file);
@@ -532,6 +550,12 @@ llvm::FailureOr<ParsedFile> piko::parseFile(const ParseRequest &request,
   } else {
     compiler.setASTConsumer(std::make_unique<clang::ASTConsumer>());
   }
+  if (hasHeader)
+    compiler.createPCHExternalASTSource(
+        headerPath, clang::DisableValidationForModuleKind::All,
+        /*AllowPCHWithCompilerErrors=*/false,
+        compiler.getASTConsumer().GetASTDeserializationListener(),
+        /*OwnDeserializationListener=*/false);
   initializeConsumer(compiler);
   compiler.createSema(clang::TU_Complete, nullptr);
   forwarder.setSema(&compiler.getSema());

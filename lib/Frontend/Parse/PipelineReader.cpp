@@ -97,7 +97,8 @@ bool piko::isStage(const CXXRecordDecl *type) {
 static void collectPipes(const clang::DeclContext *scope, clang::Sema &sema,
                          std::vector<PipeCandidate> &pipes) {
   clang::ASTContext &ast = sema.getASTContext();
-  for (const clang::Decl *decl : scope->decls()) {
+  // What is in a precompiled header is none.
+  for (const clang::Decl *decl : scope->noload_decls()) {
     if (const auto *space = dyn_cast<clang::NamespaceDecl>(decl)) {
       if (!space->isStdNamespace() && space->getName() != "glm")
         collectPipes(space, sema, pipes);

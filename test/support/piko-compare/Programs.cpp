@@ -57,7 +57,7 @@ struct Programs::Implementation {
     registerPikoDialects(registry);
     return registry;
   }
-  void compileReference(const std::string &file, const CacheOptions &cache);
+  void compileReference(const std::string &file);
   void readText(const std::string &file);
   OwningOpRef<ModuleOp> read(const std::string &pipe);
 
@@ -67,6 +67,7 @@ struct Programs::Implementation {
   /// The only pipeline that is wanted; empty = all.
   std::string onlyPipe;
   CheckOptions check;
+  CacheOptions cache;
   SynthesisOptions synthesis;
   GPUOptions gpu;
   /// Where the compiled file is C++, once it is needed.
@@ -95,13 +96,12 @@ void Programs::Implementation::readText(const std::string &file) {
 
 /// All pipelines of the file, which then need to be compiled only once however
 /// often they are compared. That code is big and runs only once.
-void Programs::Implementation::compileReference(const std::string &file,
-                                                const CacheOptions &cache) {
-  ObjectOptions options{.source = {.file = file, .check = {check.enabled, {}}},
-                        .execution = ExecutionTarget::Reference,
-                        .target = {"native", /*optLevel=*/0, Sanitizer::None},
-                        .cache = cache,
-                        .allPipelines = true};
+void Programs::Implementation::compileReference(const std::string &file) {
+  ObjectOptions options{
+      .source = {.file = file, .check = {check.enabled, {}}, .cache = cache},
+      .execution = ExecutionTarget::Reference,
+      .target = {"native", /*optLevel=*/0, Sanitizer::None},
+      .allPipelines = true};
   referenceObject = compileObject(options, referenceDiagnostics);
   if (!referenceObject)
     throw std::runtime_error("cannot compile " + file +
@@ -118,7 +118,7 @@ OwningOpRef<ModuleOp> Programs::Implementation::read(const std::string &pipe) {
   if (!modules.empty())
     return nullptr;
   CompileOptions options{
-      .file = sourceFile, .pipeName = onlyPipe, .check = check};
+      .file = sourceFile, .pipeName = onlyPipe, .check = check, .cache = cache};
   if (!file)
     file =
         PipelineFile::parse(sourceFile, getFrontendOptions(options), context);
@@ -134,9 +134,10 @@ Programs::Programs(const Options &options)
   if (options.cases.empty())
     self->onlyPipe = options.one.pipe;
   self->check = options.check;
+  self->cache = options.cache;
   self->synthesis = options.synthesis;
   self->gpu = options.gpu;
-  self->compileReference(options.reference, options.cache);
+  self->compileReference(options.reference);
   if (options.file != options.reference)
     self->readText(options.file);
 }

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Precompiled headers on disk, as long as no file that is in them changes.
+
+#ifndef PIKO_LIB_DRIVER_HEADERCACHE_H
+#define PIKO_LIB_DRIVER_HEADERCACHE_H
+
+#include "Piko/Frontend/Frontend.h"
+#include "SourceCache.h"
+
+namespace piko {
+
+class HeaderCache : public HeaderStore {
+public:
+  explicit HeaderCache(const CacheOptions &options) : cache(options) {}
+
+  std::optional<std::string> get(llvm::ArrayRef<std::string> arguments,
+                                 const Files &files, Maker make) override;
+
+private:
+  SourceCache cache;
+};
+
+} // namespace piko
+
+#endif // PIKO_LIB_DRIVER_HEADERCACHE_H

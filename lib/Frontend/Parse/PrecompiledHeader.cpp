@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// piko.h as Clang knows it when it has read it.
+
+#include "Parse/PrecompiledHeader.h"
+
+#include "Parse/ClangInvocation.h"
+#include "clang/Basic/LangOptions.h"
+#include "clang/Frontend/CompilerInstance.h"
+#include "clang/Frontend/FrontendActions.h"
+#include "clang/Lex/Lexer.h"
+#include "clang/Serialization/ASTWriter.h"
+#include "llvm/ADT/StringExtras.h"
+#include "llvm/Support/Path.h"
+
+using namespace piko;
+
+static constexpr llvm::StringLiteral headerName = "<piko-header>";
+
+/// All names that the preprocessor met, a line each, and an empty line.
+static std::string listNames(const clang::IdentifierTable &table) {
+  std::vector<llvm::StringRef> names;
+  for (const auto &entry : table)
+    if (!entry.getKey().empty())
+      names.push_back(entry.getKey());
+  llvm::sort(names);
+  return "\n" + llvm::join(names, "\n") + "\n\n";
+}
+
+namespace {
+
+/// Parses what comes, and keeps what the parser then knows.
+class HeaderAction : public clang::ASTFrontendAction {
+public:
+  std::shared_ptr<clang::PCHBuffer> buffer =
+      std::make_shared<clang::PCHBuffer>();
+  std::string names;
+
+private:
+  clang::TranslationUnitKind getTranslationUnitKind() override {
+    return clang::TU_Prefix;
+  }
+  std::unique_ptr<clang::ASTConsumer>
+  CreateASTConsumer(clang::CompilerInstance &compiler,
+                    llvm::StringRef) override {
+    // The store knows by their text whether files have changed.
+    return std::make_unique<clang::PCHGenerator>(
+        compiler.getPreprocessor(), compiler.getModuleCache(), headerName,
+        /*isysroot=*/"", buffer, compiler.getCodeGenOpts(),
+        compiler.getFrontendOpts().ModuleFileExtensions,
+        /*AllowASTWithErrors=*/false, /*IncludeTimestamps=*/false);
+  }
+  void EndSourceFileAction() override {
+    names =
+        listNames(getCompilerInstance().getPreprocessor().getIdentifierTable());
+  }
+};
+
+} // namespace
+
+/// The line of the first directive, if nothing but comments and `#pragma once`
+/// is before it.
+static llvm::StringRef getFirstDirective(llvm::StringRef text) {
+  clang::LangOptions language;
+  language.LineComment = true;
+  std::string terminated = text.str();
+  clang::Lexer lexer(clang::SourceLocation(), language, terminated.data(),
+                     terminated.data(), terminated.data() + terminated.size());
+  clang::Token token;
+  lexer.LexFromRawLexer(token);
+  if (token.isNot(clang::tok::hash))
+    return "";
+  llvm::StringRef rest =
+      text.drop_front(lexer.getBufferLocation() - terminated.data());
+  auto [line, behind] = rest.split('\n');
+  line = line.trim();
+  return line == "pragma once" ? getFirstDirective(behind) : line;
+}
+
+/// Whether piko.h is the first that the preprocessor sees, perhaps in a header
+/// that lies beside the file.
+static bool beginsWithHeader(llvm::StringRef path, llvm::vfs::FileSystem &files,
+                             unsigned depth = 0) {
+  auto text = files.getBufferForFile(path);
+  if (!text || depth > 8)
+    return false;
+  llvm::StringRef name = getFirstDirective((*text)->getBuffer());
+  if (!name.consume_front("include"))
+    return false;
+  name = name.ltrim();
+  if (name == "<piko.h>")
+    return true;
+  if (!name.consume_front("\"") || !name.consume_back("\"") ||
+      name.contains('"'))
+    return false;
+  llvm::SmallString<128> beside(llvm::sys::path::parent_path(path));
+  llvm::sys::path::append(beside, name);
+  return beginsWithHeader(beside, files, depth + 1);
+}
+
+/// The names, and behind them the header.
+static std::optional<std::string> makeHeader(const FrontendOptions &options,
+                                             const HeaderStore::Files &files,
+                                             InvocationMaker invoke) {
+  clang::IgnoringDiagConsumer ignored; // the file's own parse shows them
+  clang::DiagnosticOptions diagnosticOptions;
+  std::shared_ptr<clang::CompilerInvocation> invocation =
+      invoke(options, clang::CompilerInstance::createDiagnostics(
+                          *files, diagnosticOptions, &ignored,
+                          /*ShouldOwnClient=*/false));
+  if (!invocation)
+    return std::nullopt;
+  std::unique_ptr<llvm::MemoryBuffer> text =
+      llvm::MemoryBuffer::getMemBuffer("#include <piko.h>\n", headerName);
+  invocation->getFrontendOpts().Inputs = {clang::FrontendInputFile(
+      text->getMemBufferRef(), clang::InputKind(clang::Language::CXX))};
+  clang::CompilerInstance compiler(invocation);
+  compiler.setVirtualFileSystem(files);
+  compiler.setVerboseOutputStream(llvm::nulls());
+  compiler.createDiagnostics(&ignored, /*ShouldOwnClient=*/false);
+  HeaderAction action;
+  if (!compiler.ExecuteAction(action) || !action.buffer->IsComplete)
+    return std::nullopt;
+  return action.names +
+         std::string(action.buffer->Data.begin(), action.buffer->Data.end());
+}
+
+/// A header does not depend on macros whose names do not occur in it.
+static bool mentions(llvm::StringRef names,
+                     llvm::ArrayRef<std::string> defines) {
+  return llvm::any_of(defines, [&](llvm::StringRef define) {
+    llvm::StringRef name = define.split('=').first.split('(').first;
+    return names.contains(("\n" + name + "\n").str());
+  });
+}
+
+std::unique_ptr<llvm::MemoryBuffer>
+piko::getPrecompiledHeader(llvm::StringRef file, const FrontendOptions &options,
+                           llvm::ArrayRef<const char *> flags,
+                           const HeaderStore::Files &files,
+                           InvocationMaker invoke, llvm::StringRef name) {
+  if (!options.headers || !beginsWithHeader(file, *files))
+    return nullptr;
+  FrontendOptions shared = options;
+  std::vector<std::string> others;
+  shared.defines.clear();
+  for (const std::string &define : options.defines)
+    (llvm::StringRef(define).starts_with("PIKO_") ? shared.defines : others)
+        .push_back(define);
+  std::optional<std::string> header =
+      options.headers->get(getClangArguments(flags, shared), files,
+                           [&](const HeaderStore::Files &recorded) {
+                             return makeHeader(shared, recorded, invoke);
+                           });
+  if (!header)
+    return nullptr;
+  size_t end = header->find("\n\n") + 1;
+  if (mentions(llvm::StringRef(*header).take_front(end), others))
+    return nullptr;
+  return llvm::MemoryBuffer::getMemBufferCopy(
+      llvm::StringRef(*header).drop_front(end + 1), name);
+}

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// piko.h as Clang knows it when it has read it, for files that begin with it:
+// most of the time that a file takes goes into that header and what it
+// includes.
+
+#ifndef PIKO_LIB_FRONTEND_PARSE_PRECOMPILEDHEADER_H
+#define PIKO_LIB_FRONTEND_PARSE_PRECOMPILEDHEADER_H
+
+#include "Piko/Frontend/Frontend.h"
+
+#include "clang/Frontend/CompilerInvocation.h"
+#include "llvm/ADT/STLFunctionalExtras.h"
+
+namespace piko {
+
+/// Makes the invocation that the header is for, with these options.
+using InvocationMaker =
+    llvm::function_ref<std::shared_ptr<clang::CompilerInvocation>(
+        const FrontendOptions &,
+        llvm::IntrusiveRefCntPtr<clang::DiagnosticsEngine>)>;
+
+/// The precompiled header for a file, made where the store has none, or null:
+/// without a store, where something comes before `#include <piko.h>` or is
+/// defined that could change what it means, or where it has errors. It holds
+/// no macros of the options but Piko's own; Clang adds them where it is used.
+std::unique_ptr<llvm::MemoryBuffer>
+getPrecompiledHeader(llvm::StringRef file, const FrontendOptions &options,
+                     llvm::ArrayRef<const char *> flags,
+                     const HeaderStore::Files &files, InvocationMaker invoke,
+                     llvm::StringRef name);
+
+} // namespace piko
+
+#endif // PIKO_LIB_FRONTEND_PARSE_PRECOMPILEDHEADER_H
