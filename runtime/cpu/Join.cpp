@@ -9,8 +9,7 @@
 //                 gives: scan the counts in rank order, then copy runs.
 //                 The same walk writes lineage keys where they are needed.
 //
-// Several edges and sources are merged by key: each record's place is its own
-// index plus, for each other stream, the number of records before it there.
+// Several edges and sources are merged by key (Merge.cpp).
 //
 //===----------------------------------------------------------------------===//
 
@@ -23,8 +22,6 @@
 #include <utility>
 
 using namespace piko::rt;
-
-static constexpr int64_t mergeChunk = 4096;
 
 namespace {
 
@@ -429,155 +426,6 @@ PortRecords piko::rt::gatherPort(pikort_pipeline &p, const Edge &edge) {
 
 // --- Several inputs ---------------------------------------------------------
 
-namespace {
-
-/// Merges streams by lineage key.
-class Merge {
-public:
-  Merge(pikort_pipeline &p, const std::vector<Stream> &from)
-      : p_(p), from_(from) {}
-
-  /// Finds the place of each record, and puts it there if there is room.
-  void findPlaces() {
-    for (const Stream &stream : from_)
-      places_.emplace_back(p_.memory, stream.count);
-    forChunks([&](const Chunk &chunk) {
-      Array<uint32_t> &places = places_[chunk.stream];
-      for (int64_t i = chunk.begin; i < chunk.end; ++i)
-        places[i] = static_cast<uint32_t>(i);
-      for (size_t other = 0; other < from_.size(); ++other)
-        if (other != chunk.stream)
-          addBefore(chunk, other, places);
-      for (int64_t i = chunk.begin; i < chunk.end && out_.items; ++i)
-        copyItem(chunk.stream, i, places[i]);
-    });
-  }
-  std::vector<Array<uint32_t>> takePlaces() { return std::move(places_); }
-
-  Stream run(const Stage &stage) {
-    size_ = p_.records[stage.record].size;
-    for (const Stream &stream : from_) {
-      out_.count += stream.count;
-      out_.pairCount += stream.pairCount;
-      out_.keys.width = std::max(out_.keys.width, stream.keys.width);
-    }
-    checkCount(stage, out_.count);
-    checkCount(stage, out_.pairCount);
-    out_.itemStorage = Array<uint8_t>(p_.memory, out_.count * size_);
-    out_.items = out_.itemStorage.data();
-    if (stage.keyWidth > 0 || stage.loop >= 0)
-      out_.keys.words =
-          Array<uint64_t>(p_.memory, out_.count * out_.keys.width);
-    else
-      out_.keys.width = 0;
-    findPlaces();
-    if (stage.placed())
-      mergePairs();
-    return std::move(out_);
-  }
-
-private:
-  struct Chunk {
-    size_t stream;
-    int64_t begin, end;
-  };
-
-  static uint64_t word(const Keys &keys, int64_t item, int32_t w) {
-    return w < keys.width ? keys.word(item, w) : 0;
-  }
-
-  /// True if record i of stream a comes before record j of stream b.
-  bool before(size_t a, int64_t i, size_t b, int64_t j) const {
-    const Keys &x = from_[a].keys, &y = from_[b].keys;
-    int32_t width = std::max(x.width, y.width);
-    for (int32_t w = 0; w < width; ++w) {
-      uint64_t u = word(x, i, w), v = word(y, j, w);
-      if (u != v)
-        return u < v;
-    }
-    return a < b;
-  }
-
-  void forChunks(auto &&body) {
-    if (chunks_.empty())
-      for (size_t s = 0; s < from_.size(); ++s)
-        for (int64_t i = 0; i < from_[s].count; i += mergeChunk)
-          chunks_.push_back({s, i, std::min(from_[s].count, i + mergeChunk)});
-    parallelFor(p_.threads, static_cast<int64_t>(chunks_.size()),
-                [&](int64_t c) { body(chunks_[static_cast<size_t>(c)]); });
-  }
-
-  /// Adds to each record's place the records of `other` that precede it.
-  void addBefore(const Chunk &chunk, size_t other, Array<uint32_t> &places) {
-    int64_t low = 0, high = from_[other].count;
-    while (low < high) {
-      int64_t middle = (low + high) / 2;
-      if (before(other, middle, chunk.stream, chunk.begin))
-        low = middle + 1;
-      else
-        high = middle;
-    }
-    for (int64_t i = chunk.begin; i < chunk.end; ++i) {
-      while (low < from_[other].count && before(other, low, chunk.stream, i))
-        ++low;
-      places[i] += static_cast<uint32_t>(low);
-    }
-  }
-
-  void copyItem(size_t s, int64_t i, int64_t to) {
-    std::memcpy(out_.itemStorage.data() + to * size_,
-                from_[s].items + i * size_, static_cast<size_t>(size_));
-    for (int32_t w = 0; w < out_.keys.width; ++w)
-      out_.keys.words[to * out_.keys.width + w] = word(from_[s].keys, i, w);
-  }
-
-  void mergePairs() {
-    out_.pairStorage = Array<uint32_t>(p_.memory, out_.pairCount);
-    out_.pairs = out_.pairStorage.data();
-    if (out_.onePairEach()) {
-      forChunks([&](const Chunk &chunk) {
-        for (int64_t i = chunk.begin; i < chunk.end; ++i)
-          out_.pairStorage[places_[chunk.stream][i]] =
-              from_[chunk.stream].pairs[i];
-      });
-      return;
-    }
-    std::vector<Array<uint32_t>> starts;
-    starts.reserve(from_.size());
-    for (const Stream &stream : from_)
-      starts.push_back(pairStarts(p_.memory, stream));
-    Array<uint32_t> to(p_.memory, out_.count);
-    forChunks([&](const Chunk &c) {
-      for (int64_t i = c.begin; i < c.end; ++i)
-        to[places_[c.stream][i]] =
-            starts[c.stream][i + 1] - starts[c.stream][i];
-    });
-    exclusiveScan(p_.threads, to.data(), to.data(), out_.count);
-    forChunks([&](const Chunk &c) {
-      for (int64_t i = c.begin; i < c.end; ++i)
-        std::copy(from_[c.stream].pairs + starts[c.stream][i],
-                  from_[c.stream].pairs + starts[c.stream][i + 1],
-                  out_.pairStorage.data() + to[places_[c.stream][i]]);
-    });
-  }
-
-  pikort_pipeline &p_;
-  const std::vector<Stream> &from_;
-  int64_t size_ = 0;
-  Stream out_;
-  std::vector<Chunk> chunks_;
-  std::vector<Array<uint32_t>> places_;
-};
-
-} // namespace
-
-std::vector<Array<uint32_t>>
-piko::rt::mergePlaces(pikort_pipeline &p, const std::vector<Stream> &streams) {
-  Merge merge(p, streams);
-  merge.findPlaces();
-  return merge.takePlaces();
-}
-
 Stream piko::rt::gatherInputs(pikort_pipeline &p, const Stage &stage,
                               bool fromOutside) {
   std::vector<Stream> streams;
@@ -609,5 +457,5 @@ Stream piko::rt::gatherInputs(pikort_pipeline &p, const Stage &stage,
     return {};
   if (streams.size() == 1)
     return std::move(streams.front());
-  return Merge(p, streams).run(stage);
+  return mergeStreams(p, streams, stage);
 }

@@ -255,6 +255,11 @@ PortRecords gatherPort(pikort_pipeline &p, const Edge &edge);
 /// What has come into a stage, in lineage order; inside a cycle only what the
 /// cycle has emitted, unless `fromOutside`.
 Stream gatherInputs(pikort_pipeline &p, const Stage &stage, bool fromOutside);
+// --- Merge.cpp --------------------------------------------------------------
+
+/// The input of a stage from several streams, in the order of their keys.
+Stream mergeStreams(pikort_pipeline &p, const std::vector<Stream> &streams,
+                    const Stage &stage);
 /// For each stream, the place of each item in the order of all their keys.
 std::vector<Array<uint32_t>> mergePlaces(pikort_pipeline &p,
                                          const std::vector<Stream> &streams);

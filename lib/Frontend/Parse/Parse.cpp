@@ -30,6 +30,7 @@
 #include "Parse/HidingMacros.h"
 #include "Parse/PhaseNames.h"
 #include "Parse/PrecompiledHeader.h"
+#include "Parse/UnitModules.h"
 #include "Parse/Wrappers.h"
 #include "clang/AST/ASTConsumer.h"
 #include "clang/AST/DeclTemplate.h"
@@ -43,10 +44,8 @@
 #include "clang/Sema/Sema.h"
 #include "llvm/ADT/SetVector.h"
 #include "llvm/ADT/StringSet.h"
-#include "llvm/IR/InstIterator.h"
 #include "llvm/Support/VirtualFileSystem.h"
 #include "llvm/TargetParser/Triple.h"
-#include "llvm/Transforms/Utils/Cloning.h"
 
 using namespace piko;
 using llvm::failed;
@@ -371,61 +370,6 @@ static bool readFunctions(clang::CodeGenerator &generator, UnitReader &reader) {
   return true;
 }
 
-/// All that the functions whose names end in `suffix` refer to.
-static llvm::DenseSet<const llvm::GlobalValue *>
-findReachable(const llvm::Module &module, llvm::StringRef suffix) {
-  llvm::DenseSet<const llvm::GlobalValue *> reached;
-  llvm::SmallVector<const llvm::User *> work;
-  llvm::DenseSet<const llvm::Constant *> seen;
-  auto visit = [&](const llvm::User &user) {
-    for (const llvm::Value *operand : user.operands())
-      if (auto *constant = llvm::dyn_cast<llvm::Constant>(operand))
-        if (seen.insert(constant).second)
-          work.push_back(constant);
-  };
-  for (const llvm::Function &function : module)
-    if (function.getName().ends_with(suffix))
-      work.push_back(&function);
-  while (!work.empty()) {
-    const llvm::User *user = work.pop_back_val();
-    if (auto *global = llvm::dyn_cast<llvm::GlobalValue>(user))
-      reached.insert(global);
-    visit(*user);
-    if (auto *function = llvm::dyn_cast<llvm::Function>(user))
-      for (const llvm::BasicBlock &block : *function)
-        for (const llvm::Instruction &instruction : block)
-          visit(instruction);
-  }
-  return reached;
-}
-
-/// A module of the one pipeline's wrappers and all that they need.
-static std::unique_ptr<llvm::Module> extractUnit(const llvm::Module &module,
-                                                 llvm::StringRef suffix) {
-  llvm::DenseSet<const llvm::GlobalValue *> reached =
-      findReachable(module, suffix);
-  llvm::ValueToValueMapTy map;
-  std::unique_ptr<llvm::Module> unit =
-      llvm::CloneModule(module, map, [&](const llvm::GlobalValue *value) {
-        return reached.contains(value);
-      });
-  for (llvm::Function &function : llvm::make_early_inc_range(*unit))
-    if (function.isDeclaration() && function.use_empty())
-      function.eraseFromParent();
-  for (llvm::GlobalVariable &global :
-       llvm::make_early_inc_range(unit->globals()))
-    if (global.isDeclaration() && global.use_empty())
-      global.eraseFromParent();
-  return unit;
-}
-
-/// Gives wrappers the names that the rest of the front end finds them by.
-static void dropSuffix(llvm::Module &module, llvm::StringRef suffix) {
-  for (llvm::Function &function : module)
-    if (function.getName().ends_with(suffix))
-      function.setName(function.getName().drop_back(suffix.size()).str());
-}
-
 /// Warns about what is C++ and is hardly meant.
 static void warnAboutText(const llvm::Module &module,
                           clang::CodeGenerator &generator,
@@ -447,22 +391,6 @@ static void warnAboutText(const llvm::Module &module,
               generator.GetDeclForMangledName(function.getName())))
         wrappers.push_back(decl);
   warnAboutEvaluationOrder(wrappers, ast, context);
-}
-
-/// Passes choose widths of numbers as for the target of the calling convention;
-/// nothing throws, since what would is refused.
-static void adaptModule(llvm::Module &module) {
-  module.setDataLayout(module.getTargetTriple().computeDataLayout());
-  for (llvm::Function &function : module) {
-    function.setDoesNotThrow();
-    for (llvm::Instruction &instruction : llvm::instructions(function))
-      if (auto *call = llvm::dyn_cast<llvm::CallBase>(&instruction))
-        call->setDoesNotThrow();
-  }
-  // That target casts null pointers between what are two address spaces there.
-  auto *pointer = llvm::PointerType::getUnqual(module.getContext());
-  auto *null = llvm::ConstantPointerNull::get(pointer);
-  llvm::ConstantExpr::getAddrSpaceCast(null, pointer)->replaceAllUsesWith(null);
 }
 
 static void collectUserFiles(const clang::SourceManager &sources,
