@@ -108,6 +108,10 @@ static void addUnitsToCPU(OpPassManager &passes,
     passes.nest<PipelineOp>().addPass(createHoistBounds());
   passes.nest<PipelineOp>().addPass(createConvertPikoToSCF());
   addCleanUp(passes);
+  if (options.has("vectorize-iterations")) {
+    passes.nest<PipelineOp>().addPass(createVectorizeIterations());
+    addCleanUp(passes);
+  }
   passes.nest<PipelineOp>().addPass(createConvertPikoToOpenMP());
   passes.addPass(createConvertPikoToLLVM());
   addCleanUp(passes);

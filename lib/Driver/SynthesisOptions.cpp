@@ -26,6 +26,7 @@ const std::vector<std::string> &SynthesisOptions::getOptional() {
                                                  "prefetch",
                                                  "compact-loops",
                                                  "vectorize",
+                                                 "vectorize-iterations",
                                                  "prove-bounds",
                                                  "hoist-bounds",
                                                  "if-convert",

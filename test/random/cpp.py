@@ -364,7 +364,7 @@ class CppPrinter:
         elif s.kind == "unordered":
             self.line("specifyOrder(piko::Unordered);")
         elif s.kind == "specifyLanes":
-            self.line("specifyLanes(piko::Lanes::One);")
+            self.line(f"specifyLanes(piko::Lanes::{s.policy});")
         else:
             self.line(f"{s.kind}();")
 

@@ -473,7 +473,7 @@ class DialectPrinter:
         if "endBin" in directives:
             text += " end_bin"
         if "specifyLanes" in directives:
-            text += " lanes one"
+            text += " lanes " + directives["specifyLanes"].policy.lower()
         return text
 
     def phase(self, name, body):

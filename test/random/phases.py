@@ -70,8 +70,19 @@ class Phases(Graphs):
             out.append(directive)
         if not out and not link and stage.threads == 8:
             self.use("one-lane")
-            out.append(Directive("specifyLanes"))
+            out.append(Directive("specifyLanes", "One"))
         stage.schedule += out
+
+    def choose_lanes(self, stage, link):
+        """Vectors even where they do not pay."""
+        is_said = any(isinstance(d, Directive) and d.kind == "specifyLanes"
+                     for d in stage.schedule)
+        if is_said or link or not any(isinstance(s, Parallel)
+                                     for s in walk(stage.process)):
+            return
+        if self.on("lanes-of-iterations") and self.random.random() < 0.6:
+            self.use("lanes-of-iterations")
+            stage.schedule.append(Directive("specifyLanes", "Iterations"))
 
     def make_assign_phase(self, pipe, index):
         """Also how many bins a primitive can be in."""

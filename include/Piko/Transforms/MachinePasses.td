@@ -444,6 +444,72 @@ def IfConvert : Pass<"piko-if-convert", "::piko::PipelineOp"> {
   let dependentDialects = ["::mlir::arith::ArithDialect"];
 }
 
+def VectorizeIterations
+    : Pass<"piko-vectorize-iterations", "::piko::PipelineOp"> {
+  let summary = "Run the iterations of parallel loops as lanes of vectors";
+  let description = [{
+    **Requires** loops over units whose access to state is checked
+    (`convert-piko-to-scf`), and lanes that `piko-map-lanes` has given the
+    iterations of.
+
+    **Does**: runs 16 consecutive iterations of a `parallelFor`, or of a row of
+    pixels, at once. What is the same for all of them stays scalar; the rest
+    becomes vectors, by predication: conditions become masks, with a branch
+    around what no lane needs; loops run as long as some lane does; access to
+    state becomes gathers and scatters, of a row of pixels masked loads and
+    stores; arrays of an iteration get a column for each lane. What has no
+    vector form runs lane by lane inside. What must keep the order of iterations
+    (emission, updates of pixels that lanes may share) runs lane by lane from the
+    first of its kind to the last.
+
+    Loops that turn out to have few iterations run as they were.
+
+    **Guarantees** the same operations on the same numbers for each iteration,
+    emissions in the same order, and the same bits for any number of lanes.
+
+    Before:
+    ```
+    scf.for %x = %lo to %hi step %c1 {
+      %z = ...
+      %old = piko.load checked @depth[%x, %y : index, index] "z" : f32
+      %nearer = arith.cmpf olt, %z, %old : f32
+      scf.if %nearer {
+        piko.store %z, checked @depth[%x, %y : index, index] "z" : f32
+      }
+    } {piko.lanes}
+    ```
+    After:
+    ```
+    scf.for %x0 = %lo to %hi step %c16 {
+      %mask = ...                              // lanes below %hi
+      %z = ... : vector<16xf32>
+      %old = piko.cpu.gather consecutive @depth[%x0, %y : index, index] "z"
+        mask %mask : vector<16xi1>, vector<16xf32>
+      %nearer = arith.cmpf olt, %z, %old : vector<16xf32>
+      %both = arith.select %mask, %nearer, %none
+      %any = vector.reduction <or>, %both
+      scf.if %any {
+        piko.cpu.scatter %z, consecutive @depth[%x0, %y : index, index] "z"
+          mask %both : vector<16xi1>, vector<16xf32>
+      }
+    }
+    ```
+
+    **Limits**: loops whose iterations use a part of memory that has no lanes
+    (views, scratch), or carry what is no number around an inner loop, stay as
+    they are, with a remark.
+  }];
+  let dependentDialects = ["::mlir::arith::ArithDialect",
+                           "::mlir::math::MathDialect",
+                           "::mlir::memref::MemRefDialect",
+                           "::mlir::scf::SCFDialect",
+                           "::mlir::vector::VectorDialect"];
+  let statistics = [
+    Statistic<"vectorized", "vectorized", "loops that compute in vectors">,
+    Statistic<"left", "left", "loops that stay as they are">,
+  ];
+}
+
 def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
   let summary = "Compute for many primitives at once";
   let description = [{

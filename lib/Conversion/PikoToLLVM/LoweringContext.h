@@ -161,6 +161,9 @@ void populateWriterToLLVMPatterns(const mlir::TypeConverter &converter,
 void populateStateToLLVMPatterns(const mlir::TypeConverter &converter,
                                  mlir::RewritePatternSet &patterns,
                                  LoweringContext &context);
+void populateLanesToLLVMPatterns(const mlir::TypeConverter &converter,
+                                 mlir::RewritePatternSet &patterns,
+                                 LoweringContext &context);
 void populateChecksToLLVMPatterns(const mlir::TypeConverter &converter,
                                   mlir::RewritePatternSet &patterns,
                                   LoweringContext &context);

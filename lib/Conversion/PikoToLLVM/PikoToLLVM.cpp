@@ -168,6 +168,7 @@ LogicalResult ConvertPikoToLLVMPass::convert(PipelineOp pipeline,
   populateKernelToLLVMPatterns(converter, patterns, context);
   populateWriterToLLVMPatterns(converter, patterns, context);
   populateStateToLLVMPatterns(converter, patterns, context);
+  populateLanesToLLVMPatterns(converter, patterns, context);
   populateChecksToLLVMPatterns(converter, patterns, context);
   populateGridToLLVMPatterns(converter, patterns, context);
   FrozenRewritePatternSet frozen(std::move(patterns));

@@ -5,6 +5,7 @@
 #include "FieldAccess.h"
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "Piko/Dialect/Piko/IR/Piko.h"
+#include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
 using namespace mlir;
 using namespace piko;
@@ -164,6 +165,42 @@ LogicalResult UpdateOp::verifyRegions() {
 //===----------------------------------------------------------------------===//
 // How state is used
 //===----------------------------------------------------------------------===//
+
+/// The field is of the lanes' type, masks and indices have as many lanes, and
+/// consecutive ones begin with scalars.
+template <typename AccessOp>
+static LogicalResult verifyLanes(AccessOp op, VectorType lanes) {
+  int64_t count = lanes.getNumElements();
+  auto mask = cast<VectorType>(op.getMask().getType());
+  if (mask.getNumElements() != count)
+    return op.emitOpError("expected a mask of ")
+           << count << " lanes, but got " << mask;
+  for (Value index : op.getIndices())
+    if (auto vector = dyn_cast<VectorType>(index.getType())) {
+      if (op.getConsecutive())
+        return op.emitOpError("expected the indices of the first of "
+                              "consecutive lanes, but got ")
+               << vector;
+      if (vector.getNumElements() != count)
+        return op.emitOpError("expected an index for each of ")
+               << count << " lanes, but got " << vector;
+    }
+  return verifyAccess(op, lanes.getElementType());
+}
+
+LogicalResult GatherOp::verifySymbolUses(SymbolTableCollection &) {
+  return verifyLanes(*this, cast<VectorType>(getResult().getType()));
+}
+
+LogicalResult ScatterOp::verifySymbolUses(SymbolTableCollection &) {
+  return verifyLanes(*this, cast<VectorType>(getValue().getType()));
+}
+
+FlatSymbolRefAttr GatherOp::getAccessedState() { return getStateAttr(); }
+int GatherOp::getAccessKinds() { return StateAccess::reads; }
+
+FlatSymbolRefAttr ScatterOp::getAccessedState() { return getStateAttr(); }
+int ScatterOp::getAccessKinds() { return StateAccess::stores; }
 
 FlatSymbolRefAttr LoadOp::getAccessedState() { return getStateAttr(); }
 int LoadOp::getAccessKinds() { return StateAccess::reads; }

@@ -7,6 +7,7 @@
 #ifndef PIKO_DIALECT_PIKO_IR_PIKOCPUOPS_TD
 #define PIKO_DIALECT_PIKO_IR_PIKOCPUOPS_TD
 
+include "Piko/Dialect/Piko/IR/PikoInterfaces.td"
 include "Piko/Dialect/Piko/IR/PikoTypes.td"
 
 /// Says that an operation is the CPU's: no kernel of the machine level has it.
@@ -499,6 +500,70 @@ def Piko_NextUnitOp : Piko_CPUOp<"next_unit", [
   let arguments = (ins Piko_BinsType:$bins, Index:$last);
   let results = (outs Index:$result);
   let assemblyFormat = "$bins `after` $last attr-dict `:` qualified(type($bins))";
+}
+
+//===----------------------------------------------------------------------===//
+// Lanes
+//===----------------------------------------------------------------------===//
+
+def Piko_Lanes : VectorOfRankAndType<[1], [F32, F64, I8, I16, I32, I64]>;
+def Piko_LaneMask : VectorOfRankAndType<[1], [I1]>;
+def Piko_LaneIndex
+    : AnyTypeOf<[Index, VectorOfRankAndType<[1], [Index]>],
+                "index, or one for each lane">;
+
+class Piko_LaneAccessOp<string mnemonic, list<Trait> traits = []>
+    : Piko_CPUOp<mnemonic, !listconcat(traits, [
+        AttrSizedOperandSegments,
+        DeclareOpInterfaceMethods<Piko_StateAccessInterface>,
+        DeclareOpInterfaceMethods<SymbolUserOpInterface>])>;
+
+def Piko_GatherOp : Piko_LaneAccessOp<"gather", [MemoryEffects<[MemRead]>]> {
+  let summary = "reads a field of a piece of state for each lane";
+  let description = [{
+    An index is that of all lanes, or a vector with one for each. With
+    `consecutive` all are scalars, those of the first lane, and each further lane
+    has the next x (the first index). Indices of lanes in the mask are inside of
+    the state; the others read nothing and get 0.
+
+    ```mlir
+    %x = piko.cpu.gather @vertices[%i : vector<16xindex>] "position.x"
+      mask %m : vector<16xi1>, vector<16xf32>
+    %z = piko.cpu.gather consecutive @depth[%x0, %y : index, index] "z"
+      mask %m : vector<16xi1>, vector<16xf32>
+    ```
+  }];
+  let arguments = (ins FlatSymbolRefAttr:$state,
+                       Variadic<Piko_LaneIndex>:$indices, StrAttr:$field,
+                       Variadic<Index>:$elements, Piko_LaneMask:$mask,
+                       UnitAttr:$consecutive);
+  let results = (outs Piko_Lanes:$result);
+  let assemblyFormat = [{
+    (`consecutive` $consecutive^)? $state
+    (`[` $indices^ `:` type($indices) `]`)? $field (`[` $elements^ `]`)?
+    `mask` $mask attr-dict `:` type($mask) `,` type($result)
+  }];
+}
+
+def Piko_ScatterOp : Piko_LaneAccessOp<"scatter", [MemoryEffects<[MemWrite]>]> {
+  let summary = "writes a field of an element for each lane";
+  let description = [{
+    As in `piko.cpu.gather`. No two lanes in the mask write the same element.
+
+    ```mlir
+    piko.cpu.scatter %v, consecutive @depth[%x0, %y : index, index] "z"
+      mask %m : vector<16xi1>, vector<16xf32>
+    ```
+  }];
+  let arguments = (ins Piko_Lanes:$value, FlatSymbolRefAttr:$state,
+                       Variadic<Piko_LaneIndex>:$indices, StrAttr:$field,
+                       Variadic<Index>:$elements, Piko_LaneMask:$mask,
+                       UnitAttr:$consecutive);
+  let assemblyFormat = [{
+    $value `,` (`consecutive` $consecutive^)? $state
+    (`[` $indices^ `:` type($indices) `]`)? $field (`[` $elements^ `]`)?
+    `mask` $mask attr-dict `:` type($mask) `,` type($value)
+  }];
 }
 
 #endif // PIKO_DIALECT_PIKO_IR_PIKOCPUOPS_TD

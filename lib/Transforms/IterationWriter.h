@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Writes a loop whose iterations run as lanes.
+
+#ifndef PIKO_LIB_TRANSFORMS_ITERATIONWRITER_H
+#define PIKO_LIB_TRANSFORMS_ITERATIONWRITER_H
+
+#include "IterationLanes.h"
+
+#include "mlir/Dialect/MemRef/IR/MemRef.h"
+#include "mlir/IR/IRMapping.h"
+#include "llvm/ADT/SetVector.h"
+
+namespace piko {
+
+class IterationWriter {
+public:
+  /// The number of lanes is the same for all types: where vectors are narrower,
+  /// LLVM takes several.
+  static constexpr int64_t laneCount = 16;
+
+  explicit IterationWriter(const IterationLanes &lanes)
+      : lanes(lanes), loop(lanes.getLoop()), loc(loop.getLoc()), builder(loop) {
+  }
+
+  /// Writes the loop in front of the builder's place.
+  void write(mlir::OpBuilder::InsertPoint place);
+
+private:
+  // Values.
+  mlir::VectorType vectorOf(mlir::Type type) const;
+  /// The lanes' values of a value of the original loop.
+  mlir::Value get(mlir::Value value);
+  /// The value of all lanes.
+  mlir::Value getUniform(mlir::Value value) const {
+    return scalars.lookupOrDefault(value);
+  }
+  /// A value as control flow carries it: a scalar where it is uniform.
+  mlir::Value getCarried(mlir::Value value) {
+    return lanes.isVarying(value) ? get(value) : getUniform(value);
+  }
+  mlir::Type getCarriedType(mlir::Value value) const;
+  /// `like` says whether lanes differ.
+  mlir::Value getCarriedAs(mlir::Value like, mlir::Value value) {
+    return lanes.isVarying(like) ? get(value) : getUniform(value);
+  }
+  void setCarried(mlir::Value value, mlir::Value carried);
+  /// A linear value of the first lane.
+  mlir::Value getFirst(mlir::Value value);
+  mlir::Value splat(mlir::Value scalar);
+  mlir::Value zeros(mlir::Type type);
+  mlir::Value invert(mlir::Value mask);
+  /// The first mask where the second one holds, which may be poison elsewhere.
+  mlir::Value both(mlir::Value mask, mlir::Value other);
+  mlir::Value any(mlir::Value mask);
+  /// Values where the mask holds, and others elsewhere.
+  mlir::Value choose(mlir::Value mask, mlir::Value yes, mlir::Value no);
+
+  // Operations.
+  void writeBlock(mlir::Block &block);
+  void writeOperation(mlir::Operation *op);
+  void writeUniform(mlir::Operation *op);
+  void writeVector(mlir::Operation *op);
+  void writeAccess(mlir::Operation *op);
+  void writeArrayAccess(mlir::Operation *op);
+  /// The place of an index in the lanes' columns of an array.
+  mlir::Value getColumns(mlir::Value index);
+  void writePrivate(mlir::memref::AllocaOp array);
+
+  // Control flow.
+  void writeStructure(mlir::Operation *op);
+  void writeIf(mlir::scf::IfOp choice);
+  void writeSwitch(mlir::scf::IndexSwitchOp choice);
+  void writeFor(mlir::scf::ForOp inner);
+  void writeVaryingFor(mlir::scf::ForOp inner);
+  void writeWhile(mlir::scf::WhileOp inner);
+  void writeVaryingWhile(mlir::scf::WhileOp inner);
+  /// What a region yields for these lanes, behind a branch around it.
+  llvm::SmallVector<mlir::Value> writeSide(mlir::Region &region,
+                                           mlir::Value mask);
+  /// Runs the body of a region whose control flow is the same for all lanes.
+  void writeShared(mlir::Region &from, mlir::Block *to, mlir::ValueRange like);
+
+  // Lane by lane.
+  /// Runs [first, last] for one active lane after the other.
+  void writeSerial(mlir::Operation *first, mlir::Operation *last);
+  void writeOrdered();
+  void useColumns(mlir::Operation *copy, mlir::Value lane);
+  /// What of [first, last] is not yet computed.
+  llvm::SmallVector<mlir::Operation *> findRest(mlir::Operation *first,
+                                                mlir::Operation *last) const;
+  /// A loop over the active lanes.
+  void writeTurns(llvm::function_ref<void(mlir::Value lane)> write);
+  /// What of `ops` needs nothing that runs lane by lane.
+  llvm::SetVector<mlir::Operation *>
+  findMovable(llvm::ArrayRef<mlir::Operation *> ops) const;
+  mlir::Value createSlot(mlir::Type type);
+  void store(mlir::Value lanes, mlir::Value slot);
+
+  const IterationLanes &lanes;
+  mlir::scf::ForOp loop;
+  mlir::Location loc;
+  mlir::OpBuilder builder;
+  mlir::Operation *outermost = nullptr; ///< Arrays stand in front of it.
+  mlir::IRMapping vectors, scalars, firsts;
+  llvm::DenseMap<mlir::Value, mlir::Value> columns; ///< of private arrays
+  mlir::Value active;
+};
+
+} // namespace piko
+
+#endif // PIKO_LIB_TRANSFORMS_ITERATIONWRITER_H

@@ -1,0 +1,52 @@
+// RUN: piko-opt --split-input-file --verify-diagnostics %s
+
+piko.record @F {"z" : f32 at 0} size 4 align 4
+piko.pipeline @P rank 1 {
+  piko.buffer @in : @F
+  piko.kernel @k {
+    %mask = arith.constant dense<true> : vector<8xi1>
+    %at = arith.constant dense<3> : vector<16xindex>
+    // expected-error@+1 {{'piko.cpu.gather' op expected a mask of 16 lanes, but got 'vector<8xi1>'}}
+    %a = piko.cpu.gather @in[%at : vector<16xindex>] "z" mask %mask : vector<8xi1>, vector<16xf32>
+  }
+}
+
+// -----
+
+piko.record @F {"z" : f32 at 0} size 4 align 4
+piko.pipeline @P rank 1 {
+  piko.buffer @in : @F
+  piko.kernel @k {
+    %mask = arith.constant dense<true> : vector<16xi1>
+    %at = arith.constant dense<3> : vector<8xindex>
+    // expected-error@+1 {{'piko.cpu.gather' op expected an index for each of 16 lanes, but got 'vector<8xindex>'}}
+    %a = piko.cpu.gather @in[%at : vector<8xindex>] "z" mask %mask : vector<16xi1>, vector<16xf32>
+  }
+}
+
+// -----
+
+piko.record @F {"z" : f32 at 0} size 4 align 4
+piko.pipeline @P rank 1 {
+  piko.buffer @in : @F
+  piko.kernel @k {
+    %mask = arith.constant dense<true> : vector<16xi1>
+    %at = arith.constant dense<3> : vector<16xindex>
+    %v = arith.constant dense<1.0> : vector<16xf32>
+    // expected-error@+1 {{'piko.cpu.scatter' op expected the indices of the first of consecutive lanes, but got 'vector<16xindex>'}}
+    piko.cpu.scatter %v, consecutive @in[%at : vector<16xindex>] "z" mask %mask : vector<16xi1>, vector<16xf32>
+  }
+}
+
+// -----
+
+piko.record @F {"z" : f32 at 0} size 4 align 4
+piko.pipeline @P rank 1 {
+  piko.buffer @in : @F
+  piko.kernel @k {
+    %mask = arith.constant dense<true> : vector<16xi1>
+    %at = arith.constant dense<3> : vector<16xindex>
+    // expected-error@+1 {{'piko.cpu.gather' op expected field 'z' to be of type 'f32', but got 'i32'}}
+    %a = piko.cpu.gather @in[%at : vector<16xindex>] "z" mask %mask : vector<16xi1>, vector<16xi32>
+  }
+}
