@@ -41,6 +41,9 @@ NAMES = {
     "i64": "batch split mark lineage",
     "i1": "always isNaN isUnwritten",
     "index": "a b bin call cell hi i j lo n tile unit",
+    "vector<16xf32>": "values",
+    "vector<16xindex>": "places",
+    "vector<16xi1>": "mask",
 }
 
 CONTEXT = """
@@ -110,7 +113,9 @@ def definitions(text):
     bins = "bins" in used or primitive
     lines = []
     for kind, names in NAMES.items():
-        value = {"f32": "1.0", "i1": "true"}.get(kind, "1")
+        value = {"f32": "1.0", "i1": "true", "vector<16xf32>": "dense<1.0>",
+                 "vector<16xindex>": "dense<1>",
+                 "vector<16xi1>": "dense<true>"}.get(kind, "1")
         lines += [
             f"%{name} = arith.constant {value}"
             + ("" if kind == "i1" else f" : {kind}")

@@ -265,6 +265,8 @@ IterationLanes::Cost IterationLanes::getCost() const {
       if (isa<scf::ForOp, scf::WhileOp>(at))
         weight *= insideLoop;
     LaneForm form = getForm(op);
+    if (form == LaneForm::Vector)
+      cost.computations += weight;
     if (form == LaneForm::Vector || form == LaneForm::Access)
       cost.vectors += weight;
     else if (form == LaneForm::Serial || form == LaneForm::Ordered)

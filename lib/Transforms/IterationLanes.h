@@ -47,6 +47,7 @@ public:
   /// inner loops count more.
   struct Cost {
     int64_t vectors = 0, serial = 0;
+    int64_t computations = 0; ///< Of the first, those that are no access.
     /// Whether vectors save more than lane by lane costs.
     bool isWorthwhile() const { return vectors >= 6 + 2 * serial; }
   };

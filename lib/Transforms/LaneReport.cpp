@@ -74,7 +74,7 @@ static std::string describe(Operation *op, const LanePlanner &planner) {
           [&](auto) { return "this use of a local array" + isNot; })
       .Case([&](scf::ForOp) {
         return "this parallelFor" + isNot +
-               ": its iterations run one after the other";
+               ": its iterations are left to piko-vectorize-iterations";
       })
       .Case<DivideOp, arith::DivSIOp, arith::DivUIOp, arith::RemSIOp,
             arith::RemUIOp>([&](auto) {

@@ -81,6 +81,8 @@ static bool isVectorized(const IterationLanes &lanes) {
     return false;
   }
   IterationLanes::Cost cost = lanes.getCost();
+  if (cost.computations == 0)
+    return false; // clears or copies, which needs no plan
   if (!isSaid(loop) && !cost.isWorthwhile()) {
     loop.emitRemark(isNot) << cost.vectors << " operations would be done by "
                            << "vectors, and " << cost.serial

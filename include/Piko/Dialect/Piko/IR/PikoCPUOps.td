@@ -527,10 +527,10 @@ def Piko_GatherOp : Piko_LaneAccessOp<"gather", [MemoryEffects<[MemRead]>]> {
     the state; the others read nothing and get 0.
 
     ```mlir
-    %x = piko.cpu.gather @vertices[%i : vector<16xindex>] "position.x"
-      mask %m : vector<16xi1>, vector<16xf32>
-    %z = piko.cpu.gather consecutive @depth[%x0, %y : index, index] "z"
-      mask %m : vector<16xi1>, vector<16xf32>
+    %xs = piko.cpu.gather @vertices[%places : vector<16xindex>] "position.x"
+      mask %mask : vector<16xi1>, vector<16xf32>
+    %zs = piko.cpu.gather consecutive @depth[%i, %j : index, index] "z"
+      mask %mask : vector<16xi1>, vector<16xf32>
     ```
   }];
   let arguments = (ins FlatSymbolRefAttr:$state,
@@ -551,8 +551,8 @@ def Piko_ScatterOp : Piko_LaneAccessOp<"scatter", [MemoryEffects<[MemWrite]>]> {
     As in `piko.cpu.gather`. No two lanes in the mask write the same element.
 
     ```mlir
-    piko.cpu.scatter %v, consecutive @depth[%x0, %y : index, index] "z"
-      mask %m : vector<16xi1>, vector<16xf32>
+    piko.cpu.scatter %values, consecutive @depth[%i, %j : index, index] "z"
+      mask %mask : vector<16xi1>, vector<16xf32>
     ```
   }];
   let arguments = (ins Piko_Lanes:$value, FlatSymbolRefAttr:$state,
