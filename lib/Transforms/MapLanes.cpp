@@ -377,6 +377,16 @@ LogicalResult MapLanesPass::map(WorkOpInterface op) {
     at = schedule;
     said = schedule.getLanes();
   }
+  // A loop that does nothing may have been removed: no fault of the user's.
+  bool needsLoop =
+      said == LaneMapping::Iterations || said == LaneMapping::Collapsed;
+  if (needsLoop && at == schedule && work.loops.empty()) {
+    emitWarning(at->getLoc())
+        << "lanes of stage '" << getCppName(stage) << "' are not given '"
+        << stringifyLaneMapping(*said)
+        << "': there is no parallel loop that does anything";
+    said = std::nullopt;
+  }
   if (said && !work.isPossible(*said)) {
     reportImpossible(work, at, stage, *said);
     return failure();

@@ -4,7 +4,7 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 piko.pipeline @P rank 1 {
   piko.source @a
   piko.stage @a bins [8] threads 1 : @F -> [] {
-    // expected-error@+1 {{expected lanes of stage 'a' to be given 'items' or 'one', but got 'iterations': there is no parallel loop}}
+    // expected-warning@+1 {{lanes of stage 'a' are not given 'iterations': there is no parallel loop that does anything}}
     piko.schedule load_balance lanes iterations
   }
   piko.kernel @k {
