@@ -48,6 +48,17 @@ static bool isSaid(scf::ForOp loop) {
   return schedule && schedule.getLanes() == LaneMapping::Iterations;
 }
 
+/// Whether a loop is over a row of what a bin has of a box. Most boxes are
+/// those of small primitives: a rasterizer's loop that was made vectors
+/// took 1.05 of its time on a mesh of 70,000 triangles, and 1.37 of the time to
+/// compile.
+static bool isOverBox(scf::ForOp loop) {
+  Value lower = loop.getLowerBound();
+  while (auto cast = lower.getDefiningOp<arith::IndexCastOp>())
+    lower = cast.getIn();
+  return lower.getDefiningOp<arith::MaxSIOp>() != nullptr;
+}
+
 /// With fewer iterations the loop runs as it was: a vector takes about as long
 /// as this many.
 static constexpr int64_t leastIterations = 4;
@@ -83,6 +94,11 @@ static bool isVectorized(const IterationLanes &lanes) {
   IterationLanes::Cost cost = lanes.getCost();
   if (cost.computations == 0)
     return false; // clears or copies, which needs no plan
+  if (!isSaid(loop) && isOverBox(loop)) {
+    loop.emitRemark(isNot) << "a box may have few pixels; "
+                              "specifyLanes(Iterations) does so all the same";
+    return false;
+  }
   if (!isSaid(loop) && !cost.isWorthwhile()) {
     loop.emitRemark(isNot) << cost.vectors << " operations would be done by "
                            << "vectors, and " << cost.serial

@@ -181,6 +181,18 @@ piko.pipeline @Stays rank 1 {
         %f = arith.sitofp %i : i32 to f32
         piko.store %f, checked @out[%x : index] "z" : f32
       } {piko.lanes}
+      // What a bin has of a box.
+      %box = arith.maxsi %n, %c0 : index
+      // expected-remark@+1 {{these iterations are not vectorized: a box may have few pixels; specifyLanes(Iterations) does so all the same}}
+      scf.for %x = %box to %n step %c1 {
+        %i = arith.index_cast %x : index to i32
+        %f = arith.sitofp %i : i32 to f32
+        %1 = arith.mulf %f, %f : f32
+        %2 = arith.addf %1, %f : f32
+        %3 = arith.mulf %2, %f : f32
+        %4 = arith.addf %3, %f : f32
+        piko.store %4, checked @out[%x : index] "z" : f32
+      } {piko.lanes}
       // expected-remark@+1 {{these iterations are not vectorized: lanes cannot share this array}}
       scf.for %x = %c1 to %n step %c1 {
         // expected-note@+1 {{here}}

@@ -462,7 +462,8 @@ def VectorizeIterations
     (emission, updates of pixels that lanes may share) runs lane by lane from the
     first of its kind to the last.
 
-    Loops that turn out to have few iterations run as they were.
+    Loops that turn out to have few iterations run as they were. Rows of boxes,
+    which mostly do, are vectorized where the schedule says `specifyLanes`.
 
     **Guarantees** the same operations on the same numbers for each iteration,
     emissions in the same order, and the same bits for any number of lanes.
