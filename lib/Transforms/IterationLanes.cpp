@@ -92,8 +92,11 @@ bool IterationLanes::isLinear(Value value) const {
   return (isLinear(a) && !isVarying(b)) || (isLinear(b) && !isVarying(a));
 }
 
-/// Updates of one pixel keep their order: lanes must not meet there.
+/// Updates of one pixel keep their order: lanes must not meet there, neither in
+/// one operation nor in two. Where they cannot, all access to the image has the
+/// same index that differs from lane to lane.
 void IterationLanes::findSharedPixels() {
+  llvm::DenseMap<Attribute, SmallVector<Value>> apart; // by dimension, or null
   loop.walk([&](Operation *op) {
     FlatSymbolRefAttr state;
     ValueRange indices;
@@ -106,10 +109,16 @@ void IterationLanes::findSharedPixels() {
     } else {
       return;
     }
-    if (written.contains(state) && lookupInPipeline<ImageOp>(op, state) &&
-        llvm::none_of(indices, [&](Value index) { return isLinear(index); }))
-      shared.insert(state);
+    if (!written.contains(state) || !lookupInPipeline<ImageOp>(op, state))
+      return;
+    auto [found, isFirst] = apart.try_emplace(state, indices);
+    for (auto [known, index] : llvm::zip(found->second, indices))
+      if (known && (known != index || !isLinear(index)))
+        known = {};
   });
+  for (auto &[state, indices] : apart)
+    if (llvm::none_of(indices, [](Value index) { return bool(index); }))
+      shared.insert(state);
 }
 
 bool IterationLanes::isAccess(Operation *op) const {

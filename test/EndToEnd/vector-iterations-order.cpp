@@ -4,11 +4,12 @@
 // emit, update pixels that they share, meet, and read the items of lists.
 // RUN: sed -n 's|^// CASE: ||p' %s > %t.cases
 // RUN: piko-compare %s --cases %t.cases --runs 1 | FileCheck %s --check-prefix=EQUAL
-// EQUAL-COUNT-7: {{^equal$}}
+// EQUAL-COUNT-8: {{^equal$}}
 // CASE: --pipe Emits --domain 67 35 --count 320
 // CASE: --pipe EmitsInLoops --domain 67 35 --count 320
 // CASE: --pipe Rows --domain 67 35 --count 320
 // CASE: --pipe Shares --domain 67 35 --count 320
+// CASE: --pipe Neighbours --domain 67 35 --count 320
 // CASE: --pipe Meets --domain 67 35 --count 320
 // CASE: --pipe Nests --domain 67 35 --count 320
 // CASE: --pipe Lists --domain 67 35 --count 320
@@ -121,6 +122,33 @@ struct Share : piko::Stage<16, 16, 64, Item>, piko::Uses<State> {
 struct Shares : piko::Pipe<State> {
   Share share;
   Shares() { source(share); }
+};
+
+// Each iteration updates its pixel and the next one's: two lanes meet there.
+struct Neighbour : piko::Stage<32, 8, 64, Item>, piko::Uses<State> {
+  void assignBin(const Item &p) {
+    assignToBin(p, binFromPosition(wrap(p.x, p.y, domain())));
+  }
+  void schedule(piko::BinId) { specifyLanes(piko::Lanes::Iterations); }
+  void process(const Item &p) {
+    int y = wrap(p.x, p.y, domain()).y;
+    parallelFor(binHi().x - binLo().x - 1, [&](int i) {
+      float value = p.value + float(i);
+      for (int k = 0; k < 3; ++k)
+        value = value * value * 0.01f + float(k);
+      int x = binLo().x + i;
+      update(state().picture, glm::ivec2(x, y),
+             [&](Pixel &pixel) { pixel.sum = pixel.sum * 0.5f + value; });
+      update(state().picture, glm::ivec2(x + 1, y), [&](Pixel &pixel) {
+        pixel.sum = pixel.sum * 0.25f - value;
+        pixel.count = pixel.count * 3 + i;
+      });
+    });
+  }
+};
+struct Neighbours : piko::Pipe<State> {
+  Neighbour stage;
+  Neighbours() { source(stage); }
 };
 
 // What is between two barriers is a loop of its own.
