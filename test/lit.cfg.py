@@ -46,6 +46,7 @@ for name in ("OMP_NUM_THREADS", "ASAN_OPTIONS", "TSAN_OPTIONS", "HOME"):
         config.environment[name] = os.environ[name]
 
 # What the tests compile is kept apart from the user's own.
+config.environment["PIKO_CACHE_SIZE"] = str(2 << 30)
 config.environment["PIKO_CACHE_DIR"] = os.path.join(
     config.test_exec_root, "cache"
 )
