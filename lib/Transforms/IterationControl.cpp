@@ -162,6 +162,7 @@ void IterationWriter::writeFor(scf::ForOp inner) {
   auto made = scf::ForOp::create(
       builder, loc, getUniform(inner.getLowerBound()),
       getUniform(inner.getUpperBound()), getUniform(inner.getStep()), inits);
+  made.setUnsignedCmp(inner.getUnsignedCmp());
   Block *body = made.getBody();
   if (!body->empty())
     body->getTerminator()->erase();

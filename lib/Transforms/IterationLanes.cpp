@@ -28,6 +28,8 @@ IterationLanes::IterationLanes(scf::ForOp loop)
       uniformity(loop, {{loop.getInductionVar(), Uniform::Iteration}}) {
   if (loop.getNumResults() > 0)
     refuse(loop, "it hands values from iteration to iteration");
+  if (loop.getUnsignedCmp())
+    refuse(loop, "it counts without a sign");
   if (!matchPattern(loop.getStep(), m_One()))
     refuse(loop, "its step is not 1");
   loop.walk([&](StateAccessOpInterface access) {
@@ -46,6 +48,7 @@ IterationLanes::IterationLanes(scf::ForOp loop)
 //===----------------------------------------------------------------------===//
 
 void IterationLanes::findArrays() {
+  int64_t bytes = 0;
   loop.walk([&](Operation *op) {
     if (auto array = dyn_cast<memref::AllocaOp>(op)) {
       MemRefType type = array.getType();
@@ -59,6 +62,16 @@ void IterationLanes::findArrays() {
       }
       if (!isSimple)
         refuse(op, "lanes cannot share this array");
+      // A turn of 16 lanes keeps as many of it.
+      constexpr int64_t most = 16 << 10;
+      Type element = type.getElementType();
+      bytes += isSimple ? type.getNumElements() *
+                              (element.isIndex()
+                                   ? 8
+                                   : (element.getIntOrFloatBitWidth() + 7) / 8)
+                        : 0;
+      if (bytes > most)
+        refuse(op, "each lane would have a copy of this array, which is large");
       privates.insert(array);
     } else if (auto store = dyn_cast<memref::StoreOp>(op)) {
       changed.insert(store.getMemRef());
@@ -78,23 +91,48 @@ bool IterationLanes::readsFixed(Operation *op) const {
          !load.getMemRef().getDefiningOp<memref::ViewOp>();
 }
 
+/// What is cast to an integer of another width.
+static Value stripCasts(Value value) {
+  while (isa_and_nonnull<arith::IndexCastOp, arith::ExtSIOp>(
+      value.getDefiningOp()))
+    value = value.getDefiningOp()->getOperand(0);
+  return value;
+}
+
 bool IterationLanes::isLinear(Value value) const {
-  if (value == loop.getInductionVar())
+  return isSum(stripCasts(value));
+}
+
+/// Sums are of one width: a narrower one may wrap, and go on from elsewhere.
+bool IterationLanes::isSum(Value value) const {
+  if (stripCasts(value) == loop.getInductionVar())
     return true;
   Operation *op = value.getDefiningOp();
-  if (isa_and_nonnull<arith::IndexCastOp, arith::ExtSIOp>(op))
-    return isLinear(op->getOperand(0));
   if (isa_and_nonnull<arith::SubIOp>(op))
-    return isLinear(op->getOperand(0)) && !isVarying(op->getOperand(1));
+    return isSum(op->getOperand(0)) && !isVarying(op->getOperand(1));
   if (!isa_and_nonnull<arith::AddIOp>(op))
     return false;
   Value a = op->getOperand(0), b = op->getOperand(1);
-  return (isLinear(a) && !isVarying(b)) || (isLinear(b) && !isVarying(a));
+  return (isSum(a) && !isVarying(b)) || (isSum(b) && !isVarying(a));
+}
+
+/// Whether a linear value is the same in all turns of inner loops.
+bool IterationLanes::isFixed(Value value) const {
+  if (value == loop.getInductionVar())
+    return true;
+  if (Operation *op = value.getDefiningOp(); op && isVarying(value))
+    return llvm::all_of(op->getOperands(),
+                        [&](Value operand) { return isFixed(operand); });
+  for (Operation *at = value.getParentBlock()->getParentOp(); at && at != loop;
+       at = at->getParentOp())
+    if (isa<scf::ForOp, scf::WhileOp>(at))
+      return false;
+  return true;
 }
 
 /// Updates of one pixel keep their order: lanes must not meet there, neither in
 /// one operation nor in two. Where they cannot, all access to the image has the
-/// same index that differs from lane to lane.
+/// same index that differs from lane to lane, in all turns of inner loops.
 void IterationLanes::findSharedPixels() {
   llvm::DenseMap<Attribute, SmallVector<Value>> apart; // by dimension, or null
   loop.walk([&](Operation *op) {
@@ -113,7 +151,7 @@ void IterationLanes::findSharedPixels() {
       return;
     auto [found, isFirst] = apart.try_emplace(state, indices);
     for (auto [known, index] : llvm::zip(found->second, indices))
-      if (known && (known != index || !isLinear(index)))
+      if (known && (known != index || !isLinear(index) || !isFixed(index)))
         known = {};
   });
   for (auto &[state, indices] : apart)

@@ -78,6 +78,8 @@ private:
   void findOrdered();
   void checkCarried();
   bool isAccess(mlir::Operation *op) const;
+  bool isSum(mlir::Value value) const;
+  bool isFixed(mlir::Value value) const;
 
   mutable mlir::scf::ForOp loop; // whose accessors are not const
   Uniformity uniformity;

@@ -4,12 +4,13 @@
 // emit, update pixels that they share, meet, and read the items of lists.
 // RUN: sed -n 's|^// CASE: ||p' %s > %t.cases
 // RUN: piko-compare %s --cases %t.cases --runs 1 | FileCheck %s --check-prefix=EQUAL
-// EQUAL-COUNT-8: {{^equal$}}
+// EQUAL-COUNT-9: {{^equal$}}
 // CASE: --pipe Emits --domain 67 35 --count 320
 // CASE: --pipe EmitsInLoops --domain 67 35 --count 320
 // CASE: --pipe Rows --domain 67 35 --count 320
 // CASE: --pipe Shares --domain 67 35 --count 320
 // CASE: --pipe Neighbours --domain 67 35 --count 320
+// CASE: --pipe Shifts --domain 67 35 --count 320
 // CASE: --pipe Meets --domain 67 35 --count 320
 // CASE: --pipe Nests --domain 67 35 --count 320
 // CASE: --pipe Lists --domain 67 35 --count 320
@@ -151,6 +152,31 @@ struct Neighbours : piko::Pipe<State> {
   Neighbours() { source(stage); }
 };
 
+// The same, in different turns of an inner loop.
+struct Shift : piko::Stage<32, 8, 64, Item>, piko::Uses<State> {
+  void assignBin(const Item &p) {
+    assignToBin(p, binFromPosition(wrap(p.x, p.y, domain())));
+  }
+  void schedule(piko::BinId) { specifyLanes(piko::Lanes::Iterations); }
+  void process(const Item &p) {
+    int y = wrap(p.x, p.y, domain()).y;
+    parallelFor(binHi().x - binLo().x - 2, [&](int i) {
+      for (int k = 0; k < 3; ++k) {
+        float value = p.value + float(i * k);
+        update(state().picture, glm::ivec2(binLo().x + i + k, y),
+               [&](Pixel &pixel) {
+                 pixel.sum = pixel.sum * 0.5f + value;
+                 pixel.count = pixel.count * 3 + i * 7 + k;
+               });
+      }
+    });
+  }
+};
+struct Shifts : piko::Pipe<State> {
+  Shift stage;
+  Shifts() { source(stage); }
+};
+
 // What is between two barriers is a loop of its own.
 struct Meet : piko::Stage<16, 16, 64, Item>, piko::Uses<State> {
   void assignBin(const Item &p) {
@@ -195,7 +221,7 @@ struct Nest : piko::Stage<16, 16, 64, Item>, piko::Uses<State> {
 };
 struct Nests : Alone<Nest> {};
 
-// The items of a list, one for each lane.
+// The items of a list.
 struct Whole : piko::Stage<16, 16, 64, Item>, piko::Uses<State> {
   void assignBin(const Item &p) {
     assignToBin(p, binFromPosition(wrap(p.x, p.y, domain())));

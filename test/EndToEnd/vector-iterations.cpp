@@ -5,13 +5,14 @@
 // iteration, integers of all sizes, divisors that are 0 elsewhere.
 // RUN: sed -n 's|^// CASE: ||p' %s > %t.cases
 // RUN: piko-compare %s --cases %t.cases --runs 1 | FileCheck %s --check-prefix=EQUAL
-// EQUAL-COUNT-7: {{^equal$}}
+// EQUAL-COUNT-8: {{^equal$}}
 // CASE: --pipe Escapes --domain 67 35 --count 320
 // CASE: --pipe Sorts --domain 67 35 --count 320
 // CASE: --pipe Searches --domain 67 35 --count 320
 // CASE: --pipe Bytes --domain 67 35 --count 320
 // CASE: --pipe Divides --domain 67 35 --count 320
 // CASE: --pipe Doubles --domain 67 35 --count 320
+// CASE: --pipe Wraps --domain 67 35 --count 320
 // CASE: --pipe Counts --domain 67 35 --count 320
 // RUN: piko-compare %s --cases %t.cases --runs 1 --without vectorize-iterations | FileCheck %s --check-prefix=EQUAL
 //
@@ -155,6 +156,21 @@ struct DoubleSum {
   }
 };
 struct Doubles : Alone<Works<DoubleSum>> {};
+
+// A sum that wraps, and goes on in more bits.
+struct Wrap {
+  static void run(State &state, const Item &p, int i, int at) {
+    int near = 2147483647 - 5;
+    int64_t place = int64_t(i + near) + 2147483648ll + p.serial;
+    float value = p.value * float(i);
+    for (int k = 0; k < 3; ++k)
+      value = value * value * 0.25f + 1;
+    if (place >= 0 && place < int64_t(state.floats.size()))
+      state.floats[place] = value;
+    state.ints[at] = int(place);
+  }
+};
+struct Wraps : Alone<Works<Wrap>> {};
 
 struct Count {
   static void run(State &state, const Item &p, int i, int at) {

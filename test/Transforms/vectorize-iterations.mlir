@@ -181,6 +181,13 @@ piko.pipeline @Stays rank 1 {
         %f = arith.sitofp %i : i32 to f32
         piko.store %f, checked @out[%x : index] "z" : f32
       } {piko.lanes}
+      // expected-remark@+1 {{these iterations are not vectorized: each lane would have a copy of this array, which is large}}
+      scf.for %x = %c1 to %n step %c1 {
+        // expected-note@+1 {{here}}
+        %large = memref.alloca() : memref<5000xf32>
+        %v = memref.load %large[%x] : memref<5000xf32>
+        piko.store %v, checked @out[%x : index] "z" : f32
+      } {piko.lanes}
       // What a bin has of a box.
       %box = arith.maxsi %n, %c0 : index
       // expected-remark@+1 {{these iterations are not vectorized: a box may have few pixels; specifyLanes(Iterations) does so all the same}}
