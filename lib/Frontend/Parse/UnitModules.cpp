@@ -4,6 +4,8 @@
 
 #include "Parse/UnitModules.h"
 
+#include "Import/MathCalls.h"
+
 #include "llvm/ADT/DenseSet.h"
 #include "llvm/ADT/STLExtras.h"
 #include "llvm/IR/Constants.h"
@@ -13,7 +15,8 @@
 
 using namespace piko;
 
-/// All that the functions whose names end in `suffix` refer to.
+/// All that the functions whose names end in `suffix` refer to, and what calls
+/// of the standard library's functions will be replaced by.
 static llvm::DenseSet<const llvm::GlobalValue *>
 findReachable(const llvm::Module &module, llvm::StringRef suffix) {
   llvm::DenseSet<const llvm::GlobalValue *> reached;
@@ -26,7 +29,8 @@ findReachable(const llvm::Module &module, llvm::StringRef suffix) {
           work.push_back(constant);
   };
   for (const llvm::Function &function : module)
-    if (function.getName().ends_with(suffix))
+    if (function.getName().ends_with(suffix) ||
+        function.getName().starts_with(mathPrefix))
       work.push_back(&function);
   while (!work.empty()) {
     const llvm::User *user = work.pop_back_val();
