@@ -63,7 +63,7 @@ SmallVector<Value> IterationWriter::writeSide(Region &region, Value mask) {
   }
   SmallVector<Type> types;
   for (Type type : end->getOperandTypes())
-    types.push_back(vectorOf(type));
+    types.push_back(getVectorType(type));
   auto some = scf::IfOp::create(builder, loc, types, any(mask),
                                 /*addThenBlock=*/true,
                                 /*addElseBlock=*/!types.empty());
@@ -271,7 +271,7 @@ void IterationWriter::writeVaryingWhile(scf::WhileOp inner) {
     inits.push_back(get(init));
   SmallVector<Type> types;
   for (Value result : inner.getResults()) {
-    types.push_back(vectorOf(result.getType()));
+    types.push_back(getVectorType(result.getType()));
     inits.push_back(zeros(types.back()));
   }
   inits.push_back(active);
@@ -333,10 +333,11 @@ void IterationWriter::write(OpBuilder::InsertPoint place) {
   // Step by what is left: a number behind the last may be too large.
   Value first = made.getInductionVar();
   firsts.map(loop.getInductionVar(), first);
-  Value steps =
-      vector::StepOp::create(builder, loc, vectorOf(builder.getIndexType()));
+  Value steps = vector::StepOp::create(builder, loc,
+                                       getVectorType(builder.getIndexType()));
   if (!type.isIndex())
-    steps = arith::IndexCastOp::create(builder, loc, vectorOf(type), steps);
+    steps =
+        arith::IndexCastOp::create(builder, loc, getVectorType(type), steps);
   vectors.map(loop.getInductionVar(),
               arith::AddIOp::create(builder, loc, splat(first), steps));
   Value left = arith::SubIOp::create(builder, loc, upper, first);

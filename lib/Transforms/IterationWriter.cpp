@@ -21,13 +21,9 @@ using namespace piko;
 // Values
 //===----------------------------------------------------------------------===//
 
-VectorType IterationWriter::vectorOf(Type type) const {
-  return VectorType::get({laneCount}, type);
-}
-
 Value IterationWriter::splat(Value scalar) {
-  return vector::BroadcastOp::create(builder, loc, vectorOf(scalar.getType()),
-                                     scalar);
+  return vector::BroadcastOp::create(builder, loc,
+                                     getVectorType(scalar.getType()), scalar);
 }
 
 Value IterationWriter::zeros(Type type) {
@@ -62,7 +58,7 @@ Value IterationWriter::get(Value value) {
 }
 
 Type IterationWriter::getCarriedType(Value value) const {
-  return lanes.isVarying(value) ? Type(vectorOf(value.getType()))
+  return lanes.isVarying(value) ? Type(getVectorType(value.getType()))
                                 : value.getType();
 }
 
@@ -147,7 +143,7 @@ void IterationWriter::writeVector(Operation *op) {
   OperationState state(loc, op->getName());
   state.addOperands(operands);
   for (Type type : op->getResultTypes())
-    state.addTypes(vectorOf(type));
+    state.addTypes(getVectorType(type));
   state.propertiesAttr = op->getPropertiesAsAttribute();
   Operation *made = builder.create(state);
   for (auto [from, to] : llvm::zip(op->getResults(), made->getResults()))
@@ -173,8 +169,8 @@ Value IterationWriter::getColumns(Value index) {
   Value count = arith::ConstantIndexOp::create(builder, loc, laneCount);
   if (!lanes.isVarying(index))
     return arith::MulIOp::create(builder, loc, getUniform(index), count);
-  Value steps =
-      vector::StepOp::create(builder, loc, vectorOf(builder.getIndexType()));
+  Value steps = vector::StepOp::create(builder, loc,
+                                       getVectorType(builder.getIndexType()));
   Value rows = arith::MulIOp::create(builder, loc, get(index), splat(count));
   return arith::AddIOp::create(builder, loc, rows, steps);
 }
@@ -201,7 +197,7 @@ void IterationWriter::writeArrayAccess(Operation *op) {
     at = isRow ? getFirst(index) : get(index);
   }
   VectorType lanesType =
-      vectorOf(cast<MemRefType>(base.getType()).getElementType());
+      getVectorType(cast<MemRefType>(base.getType()).getElementType());
   Value none = arith::ConstantIndexOp::create(builder, loc, 0);
   if (write) {
     Value value = get(write.getValue());
@@ -240,7 +236,7 @@ void IterationWriter::writeAccess(Operation *op) {
         index = arith::IndexCastOp::create(
             builder, loc,
             isa<VectorType>(index.getType())
-                ? Type(vectorOf(builder.getIndexType()))
+                ? Type(getVectorType(builder.getIndexType()))
                 : builder.getIndexType(),
             index);
     for (Value element : access.getElements())
@@ -250,7 +246,7 @@ void IterationWriter::writeAccess(Operation *op) {
   if (auto load = dyn_cast<LoadOp>(op))
     write(load, [&](ValueRange at, ValueRange elements, bool isRow) {
       vectors.map(load.getResult(),
-                  GatherOp::create(builder, loc, vectorOf(load.getType()),
+                  GatherOp::create(builder, loc, getVectorType(load.getType()),
                                    load.getStateAttr(), at, load.getFieldAttr(),
                                    elements, active,
                                    isRow ? builder.getUnitAttr() : UnitAttr())
@@ -282,7 +278,7 @@ Value IterationWriter::createSlot(Type type) {
 void IterationWriter::store(Value value, Value slot) {
   auto kept = cast<MemRefType>(slot.getType()).getElementType();
   if (getElementTypeOrSelf(value.getType()) != kept)
-    value = arith::ExtUIOp::create(builder, loc, vectorOf(kept), value);
+    value = arith::ExtUIOp::create(builder, loc, getVectorType(kept), value);
   Value none = arith::ConstantIndexOp::create(builder, loc, 0);
   vector::StoreOp::create(builder, loc, value, slot, none);
 }

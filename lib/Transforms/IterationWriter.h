@@ -6,6 +6,7 @@
 #define PIKO_LIB_TRANSFORMS_ITERATIONWRITER_H
 
 #include "IterationLanes.h"
+#include "LaneWriter.h"
 
 #include "mlir/Dialect/MemRef/IR/MemRef.h"
 #include "mlir/IR/IRMapping.h"
@@ -15,10 +16,6 @@ namespace piko {
 
 class IterationWriter {
 public:
-  /// The number of lanes is the same for all types: where vectors are narrower,
-  /// LLVM takes several.
-  static constexpr int64_t laneCount = 16;
-
   explicit IterationWriter(const IterationLanes &lanes)
       : lanes(lanes), loop(lanes.getLoop()), loc(loop.getLoc()), builder(loop) {
   }
@@ -28,7 +25,6 @@ public:
 
 private:
   // Values.
-  mlir::VectorType vectorOf(mlir::Type type) const;
   /// The lanes' values of a value of the original loop.
   mlir::Value get(mlir::Value value);
   /// The value of all lanes.

@@ -107,7 +107,7 @@ static bool isVectorized(const IterationLanes &lanes) {
     return false;
   }
   loop.emitRemark("these iterations are vectorized for ")
-      << IterationWriter::laneCount << " at once";
+      << laneCount << " at once";
   return true;
 }
 
