@@ -28,7 +28,7 @@ REFERENCES = {
     "g++ -O2": ["g++"],
     "clang++ -O2": ["clang++-22"],
 }
-COMPILED = {"scalar": ["--without=vectorize,compact-loops"], "default": []}
+COMPILED = {"scalar": ["--without=vectorize"], "default": []}
 
 
 def parse_arguments():

@@ -100,16 +100,12 @@ static void addUnitsToCPU(OpPassManager &passes,
     passes.nest<PipelineOp>().addPass(createIfConvert());
   if (options.has("prefetch"))
     passes.nest<PipelineOp>().addPass(createPrefetch());
-  if (options.has("compact-loops"))
-    passes.nest<PipelineOp>().addPass(createCompactLoops());
-  if (options.has("vectorize"))
-    passes.nest<PipelineOp>().addPass(createVectorize());
   if (options.has("hoist-bounds"))
     passes.nest<PipelineOp>().addPass(createHoistBounds());
   passes.nest<PipelineOp>().addPass(createConvertPikoToSCF());
   addCleanUp(passes);
-  if (options.has("vectorize-iterations")) {
-    passes.nest<PipelineOp>().addPass(createVectorizeIterations());
+  if (options.has("vectorize")) {
+    passes.nest<PipelineOp>().addPass(createVectorize());
     addCleanUp(passes);
   }
   passes.nest<PipelineOp>().addPass(createConvertPikoToOpenMP());

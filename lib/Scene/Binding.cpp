@@ -126,6 +126,8 @@ private:
   Supply sourceFor(const char *type) {
     if (!std::strcmp(type, "piko::scene::Pixel"))
       return supply(scene.pixels);
+    if (!std::strcmp(type, "piko::scene::Nothing"))
+      return {nullptr, 0, sizeof(scene::Nothing)};
     return meshFor(type);
   }
 
@@ -235,7 +237,8 @@ private:
     if (!supply.size)
       return fail(unsuitable("source " + std::to_string(index), record->name,
                              "'piko::scene::Vertex', '...::Triangle', "
-                             "'...::Patch' or '...::Pixel'"));
+                             "'...::Patch', '...::Pixel' or "
+                             "'...::Nothing'"));
     if (pikort_bind_source(pipeline, index, supply.data, supply.count,
                            supply.size) != PIKORT_OK)
       return lastError();

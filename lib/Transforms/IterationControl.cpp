@@ -17,16 +17,11 @@ void IterationWriter::writeStructure(Operation *op) {
     return writeIf(choice);
   if (auto choice = dyn_cast<scf::IndexSwitchOp>(op))
     return writeSwitch(choice);
-  if (auto inner = dyn_cast<scf::ForOp>(op)) {
-    bool isShared = !lanes.isVarying(inner.getLowerBound()) &&
-                    !lanes.isVarying(inner.getUpperBound()) &&
-                    !lanes.isVarying(inner.getStep());
+  bool isShared = lanes.isSharedLoop(op);
+  if (auto inner = dyn_cast<scf::ForOp>(op))
     return isShared ? writeFor(inner) : writeVaryingFor(inner);
-  }
   auto inner = cast<scf::WhileOp>(op);
-  return lanes.isVarying(inner.getConditionOp().getCondition())
-             ? writeVaryingWhile(inner)
-             : writeWhile(inner);
+  return isShared ? writeWhile(inner) : writeVaryingWhile(inner);
 }
 
 //===----------------------------------------------------------------------===//
@@ -343,5 +338,7 @@ void IterationWriter::write(OpBuilder::InsertPoint place) {
   Value left = arith::SubIOp::create(builder, loc, upper, first);
   active = arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::ult, steps,
                                  splat(left));
+  createMasks();
   writeBlock(*loop.getBody());
+  writeDeferred();
 }

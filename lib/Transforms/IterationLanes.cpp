@@ -2,21 +2,39 @@
 
 #include "IterationLanes.h"
 
+#include "Lanes.h"
+
+#include "Piko/Dialect/Piko/IR/PikoCPU.h"
+
 #include "mlir/Dialect/Arith/IR/Arith.h"
 #include "mlir/Dialect/Math/IR/Math.h"
 #include "mlir/Dialect/MemRef/IR/MemRef.h"
 #include "mlir/IR/Matchers.h"
+#include "llvm/ADT/MapVector.h"
 
 using namespace mlir;
 using namespace piko;
 
-bool piko::isNumber(Type type) { return type.isIntOrIndexOrFloat(); }
+static bool isNumber(Type type) { return type.isIntOrIndexOrFloat(); }
+
+bool piko::isLaneType(Type type) {
+  return isNumber(type) || isa<PrimType>(type);
+}
 
 bool OrderedGroup::contains(Operation *op) const {
   if (!first)
     return false;
   op = first->getBlock()->findAncestorOpInBlock(*op);
   return op && !op->isBeforeInBlock(first) && !last->isBeforeInBlock(op);
+}
+
+SmallVector<Operation *> OrderedGroup::getOperations() const {
+  SmallVector<Operation *> ops;
+  for (Operation *op = first;; op = op->getNextNode()) {
+    ops.push_back(op);
+    if (op == last)
+      return ops;
+  }
 }
 
 static bool isStructure(Operation *op) {
@@ -177,7 +195,11 @@ bool IterationLanes::isAccess(Operation *op) const {
     return isSimple(load, load.getType());
   if (auto store = dyn_cast<StoreOp>(op))
     return isSimple(store, store.getValue().getType());
-  return false;
+  if (auto get = dyn_cast<GetOp>(op))
+    return !get.getType().isInteger(1) && isVarying(get.getPrim()) &&
+           llvm::none_of(get.getElements(),
+                         [&](Value element) { return isVarying(element); });
+  return isa<ItemOp>(op);
 }
 
 //===----------------------------------------------------------------------===//
@@ -204,13 +226,20 @@ static bool isUnordered(Operation *op) {
     return access.getAccessKinds() == StateAccess::reads ||
            access.getAccessKinds() == StateAccess::changesAtomically ||
            access.getAccessKinds() == StateAccess::stores;
-  return isa<memref::LoadOp, memref::StoreOp, FailOp, FailListOp, FailDivideOp,
-             PrefetchOp>(op);
+  return isa<memref::LoadOp, memref::StoreOp, FailOp, FailListOp, FailDivideOp>(
+      op);
+}
+
+/// What only asks for memory ahead of time: a vector's loads do so themselves.
+static bool isPrefetch(Operation *op) {
+  return isa<PrefetchOp, PrefetchItemOp>(op);
 }
 
 LaneForm IterationLanes::getForm(Operation *op) const {
   if (isStructure(op))
     return LaneForm::Structure;
+  if (isPrefetch(op))
+    return LaneForm::Lazy;
   if (isa<memref::AllocaOp>(op))
     return LaneForm::Private;
   if (auto access = dyn_cast<StateAccessOpInterface>(op))
@@ -223,13 +252,20 @@ LaneForm IterationLanes::getForm(Operation *op) const {
     return LaneForm::Uniform;
   if (isAccess(op))
     return LaneForm::Access;
-  if (hasVectorForm(op) && llvm::all_of(op->getOperandTypes(), isNumber) &&
-      llvm::all_of(op->getResultTypes(), isNumber))
+  if (hasVectorForm(op) && llvm::all_of(op->getOperandTypes(), isLaneType) &&
+      llvm::all_of(op->getResultTypes(), isLaneType))
     return LaneForm::Vector;
   if (op->getNumRegions() == 0 && isPure(op) &&
-      !llvm::all_of(op->getResultTypes(), isNumber))
+      !llvm::all_of(op->getResultTypes(), isLaneType))
     return LaneForm::Lazy;
   return isUnordered(op) ? LaneForm::Serial : LaneForm::Ordered;
+}
+
+bool IterationLanes::isSharedLoop(Operation *op) const {
+  if (auto inner = dyn_cast<scf::ForOp>(op))
+    return !isVarying(inner.getLowerBound()) &&
+           !isVarying(inner.getUpperBound()) && !isVarying(inner.getStep());
+  return !isVarying(cast<scf::WhileOp>(op).getConditionOp().getCondition());
 }
 
 /// What may trap, or takes as long for one lane as for all.
@@ -246,7 +282,7 @@ bool IterationLanes::isCheap(Region &region) const {
     LaneForm form = getForm(&op);
     bool isFree =
         form == LaneForm::Vector || (form == LaneForm::Uniform && isPure(&op));
-    if (!isFree || isDivision(&op) || ordered.contains(&op) || ++count > most)
+    if (!isFree || isDivision(&op) || findGroup(&op) || ++count > most)
       return false;
   }
   return true;
@@ -261,7 +297,7 @@ void IterationLanes::checkCarried() {
     if (op == loop || !isStructure(op))
       return;
     auto isOther = [&](Value value) {
-      return isVarying(value) && !isNumber(value.getType());
+      return isVarying(value) && !isLaneType(value.getType());
     };
     bool isBad = llvm::any_of(op->getResults(), isOther);
     for (Region &region : op->getRegions())
@@ -272,52 +308,412 @@ void IterationLanes::checkCarried() {
   });
 }
 
-void IterationLanes::findOrdered() {
-  SmallVector<Operation *> all;
+const OrderedGroup *IterationLanes::findGroup(Operation *op) const {
+  for (const OrderedGroup &group : groups)
+    if (group.contains(op))
+      return &group;
+  return nullptr;
+}
+
+/// Whether all that an operation does may be done in front of others.
+bool IterationLanes::isMovable(Operation *op) const {
+  WalkResult result = op->walk([&](Operation *inner) {
+    LaneForm form = getForm(inner);
+    bool isFree = inner->hasTrait<OpTrait::IsTerminator>() ||
+                  form == LaneForm::Vector || form == LaneForm::Lazy ||
+                  form == LaneForm::Uniform || form == LaneForm::Structure ||
+                  (form == LaneForm::Access && readsFixed(inner)) ||
+                  (form == LaneForm::Serial && isMemoryEffectFree(inner));
+    return isFree ? WalkResult::advance() : WalkResult::interrupt();
+  });
+  return !result.wasInterrupted();
+}
+
+llvm::SetVector<Operation *>
+IterationLanes::findMovable(ArrayRef<Operation *> ops) const {
+  llvm::SetVector<Operation *> movable;
+  llvm::DenseSet<Operation *> inGroup(ops.begin(), ops.end());
+  Block *block = ops.front()->getBlock();
+  for (Operation *op : ops) {
+    bool isReady = isMovable(op);
+    op->walk([&](Operation *inner) {
+      for (Value operand : inner->getOperands()) {
+        Operation *from = operand.getDefiningOp();
+        from = from ? block->findAncestorOpInBlock(*from) : nullptr;
+        isReady &= !from || from == op || !inGroup.contains(from) ||
+                   movable.contains(from);
+      }
+    });
+    if (isReady)
+      movable.insert(op);
+  }
+  return movable;
+}
+
+bool IterationLanes::isVectorAhead(Operation *op,
+                                   const OrderedGroup &group) const {
+  return findMovable(group.getOperations()).contains(op);
+}
+
+void IterationLanes::findGroups(Block &block,
+                                const llvm::DenseSet<Operation *> &ops,
+                                SmallVectorImpl<OrderedGroup> &found) const {
+  OrderedGroup group;
+  SmallVector<Operation *> choices;
+  for (Operation &op : block.without_terminator()) {
+    bool holdsAny = op.walk([&](Operation *inner) {
+                        return ops.contains(inner) ? WalkResult::interrupt()
+                                                   : WalkResult::advance();
+                      }).wasInterrupted();
+    if (!holdsAny)
+      continue;
+    if (isa<scf::IfOp, scf::IndexSwitchOp>(op)) {
+      choices.push_back(&op);
+      continue;
+    }
+    if (!group)
+      group.first = &op;
+    group.last = &op;
+  }
+  // A condition between two of a group is a part of it.
+  bool isAdded = !group;
+  for (Operation *choice : choices) {
+    if (group.contains(choice))
+      continue;
+    if (!isAdded && group.last->isBeforeInBlock(choice)) {
+      found.push_back(group);
+      isAdded = true;
+    }
+    for (Region &region : choice->getRegions())
+      if (!region.empty())
+        findGroups(region.front(), ops, found);
+  }
+  if (!isAdded)
+    found.push_back(group);
+}
+
+bool IterationLanes::canDefer(const OrderedGroup &group,
+                              const llvm::SetVector<Operation *> &rest) const {
+  Block *block = group.first->getBlock();
+  auto isInRest = [&](Operation *op) {
+    op = block->findAncestorOpInBlock(*op);
+    return op && rest.contains(op);
+  };
+  bool canBe = true;
+  for (Operation *op : rest) {
+    // Nothing that vectors do needs a result.
+    for (Operation *user : op->getUsers())
+      canBe &= isInRest(user);
+    // Numbers and primitives are kept until then.
+    op->walk([&](Operation *inner) {
+      for (Value operand : inner->getOperands()) {
+        Operation *from = operand.getDefiningOp();
+        bool isOutside =
+            !loop->isAncestor(operand.getParentBlock()->getParentOp());
+        canBe &= isOutside || isLaneType(operand.getType()) ||
+                 isPrivate(operand) || (from && isInRest(from)) ||
+                 (from && getForm(from) == LaneForm::Lazy);
+      }
+    });
+  }
+  return canBe;
+}
+
+namespace {
+
+/// Whether memory is used where it stands, or later, in the order of lanes.
+struct Uses {
+  bool inPlace = false, deferred = false, changed = false, isAtomic = true;
+
+  bool isInOrder() const {
+    return !inPlace || !deferred || !changed || isAtomic;
+  }
+};
+
+} // namespace
+
+bool IterationLanes::canDefer(ArrayRef<OrderedGroup> groups) const {
+  llvm::DenseSet<Operation *> later;
+  for (const OrderedGroup &group : groups) {
+    SmallVector<Operation *> ops = group.getOperations();
+    llvm::SetVector<Operation *> rest(ops.begin(), ops.end());
+    for (Operation *op : findMovable(ops))
+      rest.remove(op);
+    if (!canDefer(group, rest))
+      return false;
+    later.insert(rest.begin(), rest.end());
+  }
+  llvm::DenseMap<Attribute, Uses> states;
+  llvm::DenseMap<Value, Uses> arrays;
+  auto note = [&](Uses &uses, Operation *op, bool changes, bool isAtomic) {
+    bool isLater = false;
+    for (Operation *at = op; at != loop && !isLater; at = at->getParentOp())
+      isLater = later.contains(at);
+    (isLater ? uses.deferred : uses.inPlace) = true;
+    uses.changed |= changes;
+    uses.isAtomic &= isAtomic;
+    return isLater;
+  };
   loop.walk([&](Operation *op) {
+    if (auto access = dyn_cast<StateAccessOpInterface>(op)) {
+      int kinds = access.getAccessKinds();
+      note(states[access.getAccessedState()], op, kinds != StateAccess::reads,
+           kinds == StateAccess::changesAtomically);
+    } else if (auto load = dyn_cast<memref::LoadOp>(op)) {
+      note(arrays[load.getMemRef()], op, /*changes=*/false, /*isAtomic=*/false);
+    } else if (auto store = dyn_cast<memref::StoreOp>(op)) {
+      // What is stored before anything is read later is there by then.
+      Uses &uses = arrays[store.getMemRef()];
+      bool isKnown = uses.deferred;
+      bool isLater = note(uses, op, /*changes=*/false, /*isAtomic=*/false);
+      uses.changed |= isLater || isKnown;
+    }
+  });
+  auto isInOrder = [](const auto &entry) { return entry.second.isInOrder(); };
+  return llvm::all_of(states, isInOrder) && llvm::all_of(arrays, isInOrder);
+}
+
+/// One group of all: in the innermost block around them that no loop repeats.
+static OrderedGroup join(ArrayRef<OrderedGroup> groups) {
+  Block *block = groups.front().first->getBlock();
+  for (const OrderedGroup &group : groups)
+    while (!block->findAncestorOpInBlock(*group.first))
+      block = block->getParentOp()->getBlock();
+  return {block->findAncestorOpInBlock(*groups.front().first),
+          block->findAncestorOpInBlock(*groups.back().last)};
+}
+
+SmallVector<OrderedGroup>
+IterationLanes::makeGroups(ArrayRef<Operation *> ops) const {
+  SmallVector<OrderedGroup> found;
+  findGroups(*loop.getBody(), {ops.begin(), ops.end()}, found);
+  if (!canDefer(found))
+    return {join(found)};
+  for (OrderedGroup &group : found)
+    group.deferred = true;
+  return found;
+}
+
+/// What keeps the order of operations: an image, or a writer; null: all of it.
+static const void *getResource(Operation *op) {
+  if (auto access = dyn_cast<StateAccessOpInterface>(op))
+    return access.getAccessedState().getAsOpaquePointer();
+  for (Value operand : op->getOperands())
+    if (isa<WriterType>(operand.getType()))
+      return operand.getAsOpaquePointer();
+  return nullptr;
+}
+
+/// Whether groups have operations in common.
+static bool overlap(const OrderedGroup &a, const OrderedGroup &b) {
+  return a.contains(b.first) || a.contains(b.last) || b.contains(a.first) ||
+         b.contains(a.last);
+}
+
+void IterationLanes::findOrdered() {
+  // What shares nothing whose order counts need not stay together.
+  struct Cluster {
+    SmallVector<Operation *> ops;
+    SmallVector<OrderedGroup> groups = {};
+  };
+  llvm::MapVector<const void *, Cluster> byResource;
+  loop.walk<WalkOrder::PreOrder>([&](Operation *op) {
     if (op != loop && !op->hasTrait<OpTrait::IsTerminator>() &&
         getForm(op) == LaneForm::Ordered)
-      all.push_back(op);
+      byResource[getResource(op)].ops.push_back(op);
   });
-  if (all.empty())
-    return;
-  // The innermost block around all of them that no loop repeats.
-  Block *block = all.front()->getBlock();
-  auto leave = [&] { block = block->getParentOp()->getBlock(); };
-  for (Operation *op : all)
-    while (!block->findAncestorOpInBlock(*op))
-      leave();
-  for (Operation *at = block->getParentOp(); at != loop; at = at->getParentOp())
-    if (isa<scf::ForOp, scf::WhileOp>(at) || !isStructure(at))
-      block = at->getBlock();
-  for (Operation *op : all) {
-    op = block->findAncestorOpInBlock(*op);
-    if (!ordered.first || op->isBeforeInBlock(ordered.first))
-      ordered.first = op;
-    if (!ordered.last || ordered.last->isBeforeInBlock(op))
-      ordered.last = op;
+  SmallVector<Cluster> clusters;
+  for (auto &[resource, cluster] : byResource) {
+    bool isApart = !byResource.contains(nullptr);
+    if (isApart || clusters.empty())
+      clusters.emplace_back();
+    llvm::append_range(clusters.back().ops, cluster.ops);
+  }
+  for (Cluster &cluster : clusters)
+    cluster.groups = makeGroups(cluster.ops);
+  auto collide = [](const Cluster &a, const Cluster &b) {
+    return llvm::any_of(a.groups, [&](const OrderedGroup &mine) {
+      return llvm::any_of(b.groups, [&](const OrderedGroup &other) {
+        return overlap(mine, other);
+      });
+    });
+  };
+  for (size_t i = 0; i < clusters.size(); ++i)
+    for (size_t j = i + 1; j < clusters.size(); ++j)
+      if (collide(clusters[i], clusters[j])) {
+        llvm::append_range(clusters[i].ops, clusters[j].ops);
+        clusters[i].groups = makeGroups(clusters[i].ops);
+        clusters.erase(clusters.begin() + j);
+        i = size_t(-1); // What is larger may collide with others.
+        break;
+      }
+  for (const Cluster &cluster : clusters)
+    llvm::append_range(groups, cluster.groups);
+}
+
+/// Whether all accesses to a row of lanes' elements are one behind the other.
+bool IterationLanes::isRow(Operation *op) const {
+  if (auto load = dyn_cast<memref::LoadOp>(op))
+    return isPrivate(load.getMemRef()) ? !isVarying(load.getIndices()[0])
+                                       : isLinear(load.getIndices()[0]);
+  if (auto store = dyn_cast<memref::StoreOp>(op))
+    return isPrivate(store.getMemRef()) ? !isVarying(store.getIndices()[0])
+                                        : isLinear(store.getIndices()[0]);
+  if (auto item = dyn_cast<ItemOp>(op))
+    return isLinear(item.getPosition());
+  auto isOfRow = [&](ValueRange indices) {
+    return !indices.empty() && isLinear(indices.front()) &&
+           llvm::none_of(indices.drop_front(),
+                         [&](Value index) { return isVarying(index); });
+  };
+  if (auto load = dyn_cast<LoadOp>(op))
+    return isOfRow(load.getIndices());
+  auto store = dyn_cast<StoreOp>(op);
+  return store && isOfRow(store.getIndices());
+}
+
+//===----------------------------------------------------------------------===//
+// Cost
+//===----------------------------------------------------------------------===//
+
+/// What the operations of as many iterations as there are lanes take, in cycles
+/// of a processor with vectors of 512 bits (Sapphire Rapids, Zen 4).
+namespace cycles {
+constexpr double scalar = 5, scalarAccess = 8, scalarDivision = 64;
+constexpr double vector = 1, row = 1.5, gather = 12, division = 16;
+/// To bring lanes apart, and a branch that is not foreseen.
+constexpr double apart = 30;
+constexpr double turnsOfLoop = 8;
+/// How many of the lanes go on, of those that came to a loop whose turns
+/// differ.
+constexpr double goOn = 0.35;
+} // namespace cycles
+
+namespace {
+
+/// How often code runs, for each time that the loop's lanes do.
+struct Frequency {
+  double serial = 1, vectors = 1;
+
+  Frequency scaled(double bySerial, double byVectors) const {
+    return {serial * bySerial, vectors * byVectors};
+  }
+};
+
+} // namespace
+
+static int64_t countOperations(Region &region) {
+  int64_t count = 0;
+  region.walk([&](Operation *) { ++count; });
+  return count;
+}
+
+/// How often a side of a condition runs, where lanes differ: mostly, if it
+/// stands alone; hardly ever, if it does much more than the other, which does
+/// something, too.
+static Frequency getFrequency(Region &side, Region &other) {
+  constexpr int64_t trivial = 16, ratio = 2;
+  int64_t count = countOperations(side),
+          countOther = other.empty() ? 0 : countOperations(other);
+  if (countOther > trivial && count > ratio * countOther)
+    return {0.001, 0.016};
+  if (countOther <= trivial || countOther > ratio * count)
+    return {0.8, 1};
+  return {0.5, 1};
+}
+
+namespace {
+
+/// Adds up what code takes.
+class CostModel {
+public:
+  explicit CostModel(const IterationLanes &lanes) : lanes(lanes) {}
+  void add(Region &region, Frequency times, bool laneByLane);
+
+  IterationLanes::Cost cost;
+
+private:
+  void addOperation(Operation *op, Frequency times, bool laneByLane);
+  void addStructure(Operation *op, Frequency times, bool laneByLane);
+
+  const IterationLanes &lanes;
+};
+
+} // namespace
+
+void CostModel::add(Region &region, Frequency times, bool laneByLane) {
+  for (Operation &op : region.front().without_terminator()) {
+    if (isa<NextOp>(op))
+      continue; // mostly has nothing to do
+    const OrderedGroup *group = laneByLane ? nullptr : lanes.findGroup(&op);
+    if (group && group->first == &op)
+      cost.vectors += cycles::apart * times.vectors;
+    bool isApart = laneByLane || (group && !lanes.isVectorAhead(&op, *group));
+    if (isStructure(&op))
+      addStructure(&op, times, isApart);
+    else
+      addOperation(&op, times, isApart);
   }
 }
 
+void CostModel::addStructure(Operation *op, Frequency times, bool laneByLane) {
+  if (auto choice = dyn_cast<scf::IfOp>(op)) {
+    Region &yes = choice.getThenRegion(), &no = choice.getElseRegion();
+    auto addSide = [&](Region &side, Region &other) {
+      if (side.empty())
+        return;
+      Frequency share = getFrequency(side, other);
+      if (!lanes.isVarying(choice.getCondition()))
+        share.vectors = share.serial;
+      add(side, times.scaled(share.serial, share.vectors), laneByLane);
+    };
+    addSide(yes, no);
+    addSide(no, yes);
+    return;
+  }
+  if (auto choice = dyn_cast<scf::IndexSwitchOp>(op)) {
+    double share = 1.0 / choice->getNumRegions();
+    double shared = lanes.isVarying(choice.getArg()) ? 1 : share;
+    for (Region &region : choice->getRegions())
+      add(region, times.scaled(share, shared), laneByLane);
+    return;
+  }
+  double going = lanes.isSharedLoop(op) ? 1 : cycles::goOn;
+  for (Region &region : op->getRegions())
+    add(region, times.scaled(cycles::turnsOfLoop * going, cycles::turnsOfLoop),
+        laneByLane);
+}
+
+void CostModel::addOperation(Operation *op, Frequency times, bool laneByLane) {
+  if (isPrefetch(op) || isa<FailOp, FailListOp, FailDivideOp>(op))
+    return; // free, or rare
+  LaneForm form = lanes.getForm(op);
+  if (form == LaneForm::Uniform || form == LaneForm::Private ||
+      form == LaneForm::Lazy)
+    return; // as much for one as for all, or nothing
+  bool isAccess = form == LaneForm::Access;
+  bool isDivided = isDivision(op);
+  double serial = times.serial * (isDivided  ? cycles::scalarDivision
+                                  : isAccess ? cycles::scalarAccess
+                                             : cycles::scalar);
+  bool isTurns = form == LaneForm::Serial || form == LaneForm::Ordered;
+  bool isGather = isAccess && !lanes.isRow(op);
+  double vectors = times.vectors * (isGather    ? cycles::gather
+                                    : isAccess  ? cycles::row
+                                    : isDivided ? cycles::division
+                                                : cycles::vector);
+  if (laneByLane || isTurns)
+    vectors = serial + (laneByLane ? 0 : times.vectors * cycles::apart);
+  else
+    cost.computes |= !isAccess;
+  cost.serial += serial;
+  cost.vectors += vectors;
+  if (isTurns || isGather)
+    cost.obstacles.emplace(vectors, op);
+}
+
 IterationLanes::Cost IterationLanes::getCost() const {
-  constexpr int64_t insideLoop = 8;
-  Cost cost;
-  loop.walk([&](Operation *op) {
-    if (op == loop || isStructure(op) || op->hasTrait<OpTrait::IsTerminator>())
-      return;
-    if (isa<FailOp, FailListOp, FailDivideOp>(op))
-      return; // rare
-    int64_t weight = 1;
-    for (Operation *at = op->getParentOp(); at != loop; at = at->getParentOp())
-      if (isa<scf::ForOp, scf::WhileOp>(at))
-        weight *= insideLoop;
-    LaneForm form = getForm(op);
-    if (form == LaneForm::Vector)
-      cost.computations += weight;
-    if (form == LaneForm::Vector || form == LaneForm::Access)
-      cost.vectors += weight;
-    else if (form == LaneForm::Serial || form == LaneForm::Ordered)
-      cost.serial += weight;
-  });
-  return cost;
+  CostModel model(*this);
+  model.add(loop.getRegion(), {}, /*laneByLane=*/false);
+  return model.cost;
 }

@@ -9,6 +9,9 @@
 
 #include "mlir/Dialect/SCF/IR/SCF.h"
 #include "llvm/ADT/DenseSet.h"
+#include "llvm/ADT/SetVector.h"
+
+#include <map>
 
 namespace piko {
 
@@ -24,12 +27,15 @@ enum class LaneForm {
   Ordered    ///< lane by lane, from the first of its kind to the last
 };
 
-/// Operations of a block that run lane by lane, in the order of iterations.
+/// Operations of a block that run lane by lane, in the order of iterations: in
+/// their place, or, `deferred`, behind all that vectors do.
 struct OrderedGroup {
   mlir::Operation *first = nullptr, *last = nullptr;
+  bool deferred = false;
 
   explicit operator bool() const { return first; }
   bool contains(mlir::Operation *op) const;
+  llvm::SmallVector<mlir::Operation *> getOperations() const;
 };
 
 class IterationLanes {
@@ -43,13 +49,13 @@ public:
     std::string why;
   };
   const Refusal &getRefusal() const { return refusal; }
-  /// How many operations vectors do, and how many lanes do one by one; those of
-  /// inner loops count more.
+  /// Estimates for as many iterations as there are lanes, in cycles.
   struct Cost {
-    int64_t vectors = 0, serial = 0;
-    int64_t computations = 0; ///< Of the first, those that are no access.
-    /// Whether vectors save more than lane by lane costs.
-    bool isWorthwhile() const { return vectors >= 6 + 2 * serial; }
+    double vectors = 0, serial = 0; ///< at once, and one after the other
+    bool computes = false;          ///< Or iterations clear or copy.
+    /// What costs most where lanes take turns, or are in other places.
+    std::multimap<double, mlir::Operation *, std::greater<>> obstacles;
+    bool isWorthwhile() const { return vectors < 0.9 * serial; }
   };
   Cost getCost() const;
 
@@ -64,9 +70,21 @@ public:
   /// Whether an operation reads an array, or state, that no iteration changes.
   bool readsFixed(mlir::Operation *op) const;
   LaneForm getForm(mlir::Operation *op) const;
+  /// Whether all lanes make the same turns of an inner loop.
+  bool isSharedLoop(mlir::Operation *op) const;
   /// Whether a side of a condition is short, and may be computed for nothing.
   bool isCheap(mlir::Region &region) const;
-  const OrderedGroup &getOrdered() const { return ordered; }
+  llvm::ArrayRef<OrderedGroup> getGroups() const { return groups; }
+  /// The group that an operation is in, or null.
+  const OrderedGroup *findGroup(mlir::Operation *op) const;
+  /// What of these operations of a block may be done in front of the others, in
+  /// vectors.
+  llvm::SetVector<mlir::Operation *>
+  findMovable(llvm::ArrayRef<mlir::Operation *> ops) const;
+  /// Whether an operation of a group is done in vectors, in front of it.
+  bool isVectorAhead(mlir::Operation *op, const OrderedGroup &group) const;
+  /// Whether lanes access one element behind the other.
+  bool isRow(mlir::Operation *op) const;
 
 private:
   void refuse(mlir::Operation *at, const llvm::Twine &why) {
@@ -76,6 +94,18 @@ private:
   void findArrays();
   void findSharedPixels();
   void findOrdered();
+  /// Groups of these operations, of a block and of the conditions in it.
+  void findGroups(mlir::Block &block,
+                  const llvm::DenseSet<mlir::Operation *> &ops,
+                  llvm::SmallVectorImpl<OrderedGroup> &found) const;
+  /// Groups of operations that keep their order among one another.
+  llvm::SmallVector<OrderedGroup>
+  makeGroups(llvm::ArrayRef<mlir::Operation *> ops) const;
+  /// Whether groups may run behind all others.
+  bool canDefer(llvm::ArrayRef<OrderedGroup> groups) const;
+  bool canDefer(const OrderedGroup &group,
+                const llvm::SetVector<mlir::Operation *> &rest) const;
+  bool isMovable(mlir::Operation *op) const;
   void checkCarried();
   bool isAccess(mlir::Operation *op) const;
   bool isSum(mlir::Value value) const;
@@ -88,11 +118,12 @@ private:
   /// Images that iterations change at pixels which may be the same.
   llvm::DenseSet<mlir::Attribute> shared;
   llvm::DenseSet<mlir::Attribute> written; // state
-  OrderedGroup ordered;
+  llvm::SmallVector<OrderedGroup> groups;
 };
 
-/// Whether vectors have elements of this type.
-bool isNumber(mlir::Type type);
+/// Whether lanes have values of this type: numbers, and primitives, of which
+/// they have the addresses.
+bool isLaneType(mlir::Type type);
 
 } // namespace piko
 

@@ -6,10 +6,11 @@
 #define PIKO_LIB_TRANSFORMS_ITERATIONWRITER_H
 
 #include "IterationLanes.h"
-#include "LaneWriter.h"
+#include "Lanes.h"
 
 #include "mlir/Dialect/MemRef/IR/MemRef.h"
 #include "mlir/IR/IRMapping.h"
+#include "llvm/ADT/MapVector.h"
 #include "llvm/ADT/SetVector.h"
 
 namespace piko {
@@ -59,6 +60,7 @@ private:
   void writeVector(mlir::Operation *op);
   void writeAccess(mlir::Operation *op);
   void writeArrayAccess(mlir::Operation *op);
+  void writeItemAccess(mlir::Operation *op);
   /// The place of an index in the lanes' columns of an array.
   mlir::Value getColumns(mlir::Value index);
   void writePrivate(mlir::memref::AllocaOp array);
@@ -78,20 +80,36 @@ private:
   void writeShared(mlir::Region &from, mlir::Block *to, mlir::ValueRange like);
 
   // Lane by lane.
+  /// What one lane does, and where it finds what that takes.
+  struct Turn {
+    llvm::SmallVector<mlir::Operation *> ops;
+    llvm::SmallVector<mlir::Operation *> made; ///< again, in front of them
+    llvm::MapVector<mlir::Value, mlir::Value> varying, uniform; ///< slots
+    mlir::Value mask; ///< of what is deferred: a slot of the lanes' bits
+  };
+  /// Keeps what [first, last] takes.
+  Turn prepareTurn(mlir::Operation *first, mlir::Operation *last,
+                   bool isDeferred);
+  mlir::IRMapping writeTurn(const Turn &turn, mlir::Value lane);
+  /// A loop over lanes, given by a bit for each.
+  void writeTurns(mlir::Value bits,
+                  llvm::function_ref<void(mlir::Value lane)> write);
+  mlir::Value getBits(mlir::Value mask);
   /// Runs [first, last] for one active lane after the other.
   void writeSerial(mlir::Operation *first, mlir::Operation *last);
-  void writeOrdered();
+  void writeOrdered(const OrderedGroup &group);
+  void createMasks();
+  void writeDeferred();
+  /// Whether the writers count primitives, of a turn that only goes to the next
+  /// one.
+  std::optional<mlir::Value> writeIsCounted(const Turn &turn);
   void useColumns(mlir::Operation *copy, mlir::Value lane);
   /// What of [first, last] is not yet computed.
   llvm::SmallVector<mlir::Operation *> findRest(mlir::Operation *first,
                                                 mlir::Operation *last) const;
-  /// A loop over the active lanes.
-  void writeTurns(llvm::function_ref<void(mlir::Value lane)> write);
-  /// What of `ops` needs nothing that runs lane by lane.
-  llvm::SetVector<mlir::Operation *>
-  findMovable(llvm::ArrayRef<mlir::Operation *> ops) const;
   mlir::Value createSlot(mlir::Type type);
-  void store(mlir::Value lanes, mlir::Value slot);
+  void storeSlot(mlir::Value value, mlir::Value slot, mlir::Value at);
+  mlir::Value loadSlot(mlir::Value slot, mlir::Value at, mlir::Type type);
 
   const IterationLanes &lanes;
   mlir::scf::ForOp loop;
@@ -101,6 +119,8 @@ private:
   mlir::IRMapping vectors, scalars, firsts;
   llvm::DenseMap<mlir::Value, mlir::Value> columns; ///< of private arrays
   mlir::Value active;
+  llvm::DenseMap<mlir::Operation *, mlir::Value> masks; ///< of groups: slots
+  llvm::SmallVector<Turn> deferred;
 };
 
 } // namespace piko

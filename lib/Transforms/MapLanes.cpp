@@ -6,8 +6,6 @@
 //   2. find what rules a mapping out;
 //   3. take what the stage's schedule says, or what costs least.
 
-#include "LanePlan.h"
-
 #include "Piko/Analysis/Uniformity.h"
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "Piko/Transforms/Passes.h"
@@ -117,6 +115,9 @@ static bool isKnown(Operation *op) {
                   isa<MemRefType>(effect.getValue().getType());
          });
 }
+
+/// As how many operations one in a loop counts whose turns are not known.
+static constexpr int64_t weightInLoop = 8;
 
 /// How often an operation is taken to run each time that `root` does.
 static int64_t getTimes(Operation *op, Operation *root) {

@@ -1,296 +1,219 @@
-// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-form-kernels,piko-form-work,piko-form-units,piko-vectorize),canonicalize,cse)' %s | FileCheck %s
+// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-vectorize),canonicalize,cse)' --split-input-file --verify-diagnostics %s | FileCheck %s
 
-piko.record @F {"v" : i32 at 0, "w" : i32 at 4} size 8 align 4
+piko.record @F {"z" : f32 at 0} size 4 align 4
 piko.record @V {"x" : f32 at 0, "y" : f32 at 4} size 8 align 4
 
-// CHECK-LABEL: piko.pipeline @P
-piko.pipeline @P rank 1 {
-  piko.buffer @vertices : @V
-  piko.buffer @lights : @V
-  piko.buffer @out : @V
-  piko.source @reads
-  piko.source @sums
-  piko.source @chooses
-  piko.source @enters
-  piko.source @little
-  piko.source @written
-
-  // Reads go one by one, with a test of the index; the rest in vectors.
-  // CHECK:       piko.kernel @kernel_reads
-  // CHECK:         %[[GAVE_UP:.*]] = memref.alloca() {alignment = 64 : i64} : memref<64xi8>
-  // CHECK:         scf.for %[[B:.*]] = %{{.*}} to %{{.*}} step %c64
-  // CHECK:           scf.for %[[I:.*]] = %[[B]] to %[[E:.*]] step %c1
-  // CHECK:             %[[AT:.*]] = arith.subi %[[I]], %[[B]]
-  // CHECK:             %[[T:.*]] = piko.storage.item %{{.*}}[%[[I]]]
-  // CHECK:             %[[V:.*]] = piko.get %[[T]] "v"
-  // CHECK:             %[[INSIDE:.*]] = arith.cmpi ult
-  // CHECK:             %[[XY:.*]]:2 = scf.if %[[INSIDE]]
-  // CHECK-DAG:           piko.load checked @vertices[%[[V]] : i32] "x"
-  // CHECK-DAG:           piko.load checked @vertices[%[[V]] : i32] "y"
-  // CHECK:             memref.store %[[XY]]#{{.}}, %[[XS:.*]][%[[AT]]]
-  // CHECK:             memref.store %[[XY]]#{{.}}, %[[YS:.*]][%[[AT]]]
-  // CHECK:             memref.store %{{.*}}, %[[GAVE_UP]][%[[AT]]]
-  // CHECK:           } {piko.reads}
-  // CHECK:           scf.for %[[G:.*]] = %c0 to %{{.*}} step %c16
-  // CHECK-DAG:         vector.load %[[XS]][%[[G]]] : memref<64xf32>, vector<16xf32>
-  // CHECK-DAG:         vector.load %[[YS]][%[[G]]] : memref<64xf32>, vector<16xf32>
-  // CHECK:             arith.addf %{{.*}} : vector<16xf32>
-  // CHECK:             arith.mulf %{{.*}} : vector<16xf32>
-  // CHECK:             vector.store %{{.*}}, %[[SUMS:.*]][%[[G]]]
-  // CHECK:           scf.for %[[I:.*]] = %[[B]] to %[[E]] step %c1
-  // CHECK:             %[[LEFT:.*]] = memref.load %[[GAVE_UP]]
-  // CHECK:             %[[AGAIN:.*]] = arith.cmpi ne, %[[LEFT]]
-  // CHECK:             scf.if %[[AGAIN]]
-  // CHECK:               piko.load @vertices
-  // CHECK:               arith.mulf %{{.*}} : f32
-  // CHECK:             } else {
-  // CHECK-NOT:           arith.mulf
-  // CHECK:               %[[SUM:.*]] = memref.load %[[SUMS]]
-  // CHECK:               piko.store %[[SUM]], @out
-  piko.stage @reads bins [0] threads 1 : @F -> [] {
-    piko.process {
-    ^bb0(%f: !piko.prim<@F>):
-      %v = piko.get %f "v" : !piko.prim<@F> -> i32
-      %x = piko.load @vertices[%v : i32] "x" : f32
-      %y = piko.load @vertices[%v : i32] "y" : f32
-      %0 = arith.addf %x, %y : f32
-      %1 = arith.mulf %0, %y : f32
-      %2 = arith.addf %1, %y : f32
-      %3 = arith.mulf %2, %y : f32
-      %4 = arith.addf %3, %y : f32
-      %5 = arith.mulf %4, %y : f32
-      %6 = arith.addf %5, %y : f32
-      %7 = arith.mulf %6, %y : f32
-      %8 = arith.addf %7, %y : f32
-      %9 = arith.mulf %8, %y : f32
-      %10 = arith.addf %9, %y : f32
-      %11 = arith.mulf %10, %y : f32
-      %12 = arith.addf %11, %y : f32
-      %13 = arith.mulf %12, %y : f32
-      %14 = arith.addf %13, %y : f32
-      %15 = arith.mulf %14, %y : f32
-      %16 = arith.addf %15, %y : f32
-      %17 = arith.mulf %16, %y : f32
-      %18 = arith.addf %17, %y : f32
-      %19 = arith.mulf %18, %y : f32
-      %20 = arith.addf %19, %y : f32
-      %21 = arith.mulf %20, %y : f32
-      %22 = arith.addf %21, %y : f32
-      %23 = arith.mulf %22, %y : f32
-      %24 = arith.addf %23, %y : f32
-      %25 = arith.mulf %24, %y : f32
-      %26 = arith.addf %25, %y : f32
-      %27 = arith.mulf %26, %y : f32
-      %28 = arith.addf %27, %y : f32
-      %29 = arith.mulf %28, %y : f32
-      %30 = arith.addf %29, %y : f32
-      %31 = arith.mulf %30, %y : f32
-      piko.store %31, @out[%v : i32] "x" : f32
-      piko.return
-    }
-  }
-
-  // A loop of as many iterations for all is a loop of vectors; what it reads is
-  // read once for all.
-  // CHECK:       piko.kernel @kernel_sums
-  // CHECK:         step %c16
-  // CHECK:           scf.while (%{{.*}} = %{{.*}}, %[[K:.*]] = %c0_i32, %{{.*}} = %{{.*}}) : (vector<16xf32>, i32, vector<16xi1>)
-  // CHECK:           do
-  // CHECK:             %[[LIGHT:.*]] = scf.if %{{.*}} -> (f32)
-  // CHECK:               piko.load checked @lights
-  // CHECK:             %[[ALL:.*]] = vector.broadcast %[[LIGHT]] : f32 to vector<16xf32>
-  // CHECK:             arith.mulf %{{.*}}, %[[ALL]] : vector<16xf32>
-  // CHECK:             math.sqrt %{{.*}} : vector<16xf32>
-  piko.stage @sums bins [0] threads 1 : @F -> [] {
-    piko.process {
-    ^bb0(%f: !piko.prim<@F>):
-      %v = piko.get %f "v" : !piko.prim<@F> -> i32
-      %w = piko.get %f "w" : !piko.prim<@F> -> i32
-      %x = arith.sitofp %w : i32 to f32
-      %c0 = arith.constant 0 : i32
-      %c1 = arith.constant 1 : i32
-      %count = piko.extent @lights[0]
-      %n = arith.index_cast %count : index to i32
-      %sum:2 = scf.while (%s = %x, %k = %c0) : (f32, i32) -> (f32, i32) {
-        %more = arith.cmpi slt, %k, %n : i32
-        scf.condition(%more) %s, %k : f32, i32
-      } do {
-      ^bb0(%s: f32, %k: i32):
-        %light = piko.load @lights[%k : i32] "x" : f32
-        %0 = arith.mulf %x, %light : f32
-        %1 = arith.mulf %0, %0 : f32
-        %2 = math.sqrt %1 : f32
-        %3 = arith.addf %s, %2 : f32
-        %4 = arith.addi %k, %c1 : i32
-        scf.yield %3, %4 : f32, i32
-      }
-      piko.store %sum#0, @out[%v : i32] "x" : f32
-      piko.return
-    }
-  }
-
-  // Both sides of a condition are computed. One that cannot be sends its lanes
-  // to the original body; behind a statement, the shorter side goes on.
-  // CHECK:       piko.kernel @kernel_chooses
-  // CHECK:         } {piko.reads}
-  // CHECK:         step %c16
-  // CHECK-NOT:       scf.if
-  // CHECK:           arith.select %{{.*}} : vector<16xi1>, vector<16xf32>
-  // CHECK:         scf.for
-  // CHECK:           scf.if
-  // CHECK:             memref.store %{{.*}} : memref<4xf32>
-  // CHECK:           } else {
-  // CHECK-NOT:         memref<4xf32>
-  // CHECK:             %[[LESS:.*]] = arith.cmpi ne
-  // CHECK-NEXT:        scf.if %[[LESS]]
-  // CHECK-NEXT:          memref.load
-  // CHECK-NEXT:          piko.store
-  piko.stage @chooses bins [0] threads 1 : @F -> [] {
-    piko.process {
-    ^bb0(%f: !piko.prim<@F>):
-      %array = memref.alloca() : memref<4xf32>
-      %v = piko.get %f "v" : !piko.prim<@F> -> i32
-      %w = piko.get %f "w" : !piko.prim<@F> -> i32
-      %c0 = arith.constant 0 : i32
-      %c3 = arith.constant 3 : i32
-      %i0 = arith.constant 0 : index
-      %x = arith.sitofp %w : i32 to f32
-      %is_positive = arith.cmpi sgt, %w, %c0 : i32
-      %is_few = arith.cmpi slt, %w, %c3 : i32
-      %a = scf.if %is_positive -> f32 {
-        %0 = arith.addf %x, %x : f32
-        %1 = arith.mulf %0, %x : f32
-        scf.yield %1 : f32
-      } else {
-        %0 = arith.subf %x, %x : f32
-        scf.yield %0 : f32
-      }
-      %b = scf.if %is_few -> f32 {
-        memref.store %a, %array[%i0] : memref<4xf32>
-        %0 = memref.load %array[%i0] : memref<4xf32>
-        scf.yield %0 : f32
-      } else {
-        %0 = arith.mulf %a, %x : f32
-        %1 = arith.addf %0, %x : f32
-        %2 = arith.mulf %1, %x : f32
-        %3 = arith.addf %2, %x : f32
-        %4 = arith.mulf %3, %x : f32
-        %5 = arith.addf %4, %x : f32
-        %6 = arith.mulf %5, %x : f32
-        %7 = arith.addf %6, %x : f32
-        %8 = arith.mulf %7, %x : f32
-        %9 = arith.addf %8, %x : f32
-        %10 = arith.mulf %9, %x : f32
-        %11 = arith.addf %10, %x : f32
-        %12 = arith.mulf %11, %x : f32
-        %13 = arith.addf %12, %x : f32
-        %14 = arith.mulf %13, %x : f32
-        %15 = arith.addf %14, %x : f32
-        %16 = arith.mulf %15, %x : f32
-        %17 = arith.addf %16, %x : f32
-        %18 = arith.mulf %17, %x : f32
-        %19 = arith.addf %18, %x : f32
-        scf.yield %19 : f32
-      }
-      %is_less = arith.cmpf olt, %b, %x : f32
-      scf.if %is_less {
-        %0 = arith.mulf %b, %x : f32
-        %1 = arith.addf %0, %x : f32
-        %2 = arith.mulf %1, %x : f32
-        %3 = arith.addf %2, %x : f32
-        %4 = arith.mulf %3, %x : f32
-        %5 = arith.addf %4, %x : f32
-        %6 = arith.mulf %5, %x : f32
-        %7 = arith.addf %6, %x : f32
-        %8 = arith.mulf %7, %x : f32
-        %9 = arith.addf %8, %x : f32
-        piko.store %9, @out[%v : i32] "x" : f32
-      }
-      piko.return
-    }
-  }
-
-  // A loop behind a condition is entered for a lane that would enter it, and has
-  // a primitive.
-  // CHECK:       piko.kernel @kernel_enters
-  // CHECK:         scf.for %[[G:.*]] = %c0 to %[[COUNT:.*]] step %c16
-  // CHECK-DAG:       %[[LANES:.*]] = vector.step
-  // CHECK-DAG:       %[[LEFT:.*]] = arith.subi %[[COUNT]], %[[G]]
-  // CHECK-DAG:       %[[ALL:.*]] = vector.broadcast %[[LEFT]]
-  // CHECK:           arith.cmpi slt, %[[LANES]], %[[ALL]]
-  // CHECK:           %[[ANY:.*]] = vector.reduction <or>
-  // CHECK:           scf.if %[[ANY]] -> (vector<16xf32>)
-  // CHECK:             scf.while
-  piko.stage @enters bins [0] threads 1 : @F -> [] {
-    piko.process {
-    ^bb0(%f: !piko.prim<@F>):
-      %v = piko.get %f "v" : !piko.prim<@F> -> i32
-      %w = piko.get %f "w" : !piko.prim<@F> -> i32
-      %c0 = arith.constant 0 : i32
-      %c1 = arith.constant 1 : i32
-      %n = arith.constant 9 : i32
-      %x = arith.sitofp %w : i32 to f32
-      %is_positive = arith.cmpi sgt, %w, %c0 : i32
-      scf.if %is_positive {
-        %sum:2 = scf.while (%s = %x, %k = %c0) : (f32, i32) -> (f32, i32) {
-          %more = arith.cmpi slt, %k, %n : i32
-          scf.condition(%more) %s, %k : f32, i32
-        } do {
-        ^bb0(%s: f32, %k: i32):
-          %0 = arith.mulf %s, %x : f32
-          %1 = arith.addf %0, %x : f32
-          %2 = arith.mulf %1, %x : f32
-          %3 = arith.addf %2, %x : f32
-          %4 = arith.mulf %3, %x : f32
-          %5 = arith.addi %k, %c1 : i32
-          scf.yield %4, %5 : f32, i32
+// A row of pixels: masked access to the pixels, a branch around what no lane
+// does, and few pixels as they were. What all share stays scalar.
+// CHECK-LABEL: piko.pipeline @Row
+// CHECK:         %[[COUNT:.*]] = arith.subi %[[HI:.*]], %[[LO:.*]] : index
+// CHECK:         %[[LONG:.*]] = arith.cmpi sge, %[[COUNT]], %c4
+// CHECK:         scf.if %[[LONG]] {
+// CHECK:           scf.for %[[X:.*]] = %[[LO]] to %[[HI]] step %c16 {
+// CHECK:             %[[AT:.*]] = arith.addi %{{.*}}, %{{.*}} : vector<16xindex>
+// CHECK:             %[[MASK:.*]] = arith.cmpi ult, %{{.*}} : vector<16xindex>
+// CHECK:             %[[SHARED:.*]] = piko.load checked @v[%c3 : index] "y" : f32
+// CHECK:             %[[Z:.*]] = arith.mulf %{{.*}} : vector<16xf32>
+// CHECK:             %[[OLD:.*]] = piko.cpu.gather consecutive @depth[%[[X]], %c3 : index, index] "z" mask %[[MASK]] : vector<16xi1>, vector<16xf32>
+// CHECK:             %[[NEARER:.*]] = arith.cmpf olt, %{{.*}}, %[[OLD]]
+// CHECK:             %[[BOTH:.*]] = arith.select %[[MASK]], %[[NEARER]], %{{.*}}
+// CHECK:             %[[ANY:.*]] = vector.reduction <or>, %[[BOTH]]
+// CHECK:             scf.if %[[ANY]] {
+// CHECK:               piko.cpu.scatter %{{.*}}, consecutive @depth[%[[X]], %c3 : index, index] "z" mask %[[BOTH]]
+// CHECK:         } else {
+// CHECK:           scf.for %{{.*}} = %[[LO]] to %[[HI]] step %c1 {
+// CHECK:             piko.store %{{.*}}, checked @depth
+piko.pipeline @Row rank 2 {
+  piko.buffer @v : @V
+  piko.image @depth : @F rank 2
+  piko.source @a
+  piko.stage @a bins [0, 0] threads 1 : @F -> [] {}
+  piko.kernel @k {
+    %c1 = arith.constant 1 : index
+    %c3 = arith.constant 3 : index
+    %half = arith.constant 0.5 : f32
+    %bins = piko.storage.open_bins @a : !piko.bins<@F>
+    %n = piko.storage.unit_count %bins : !piko.bins<@F>
+    scf.forall (%u) in (%n) {
+      // expected-remark@+1 {{these iterations are vectorized for 16 at once}}
+      scf.for %x = %c1 to %n step %c1 {
+        %i = arith.index_cast %x : index to i32
+        %f = arith.sitofp %i : i32 to f32
+        %shared = piko.load checked @v[%c3 : index] "y" : f32
+        %1 = arith.mulf %f, %shared : f32
+        %2 = arith.addf %1, %half : f32
+        %3 = arith.mulf %2, %2 : f32
+        %4 = arith.addf %3, %f : f32
+        %old = piko.load checked @depth[%x, %c3 : index, index] "z" : f32
+        %nearer = arith.cmpf olt, %4, %old : f32
+        scf.if %nearer {
+          %5 = math.sqrt %4 : f32
+          %6 = arith.divf %5, %half : f32
+          piko.store %6, checked @depth[%x, %c3 : index, index] "z" : f32
         }
-        piko.store %sum#0, @out[%v : i32] "x" : f32
-      }
-      piko.return
-    }
+      } {piko.lanes}
+    } {piko.units = #piko<units any>}
+    piko.storage.close_bins %bins : !piko.bins<@F>
   }
+}
 
-  // Too little to compute.
-  // CHECK:       piko.kernel @kernel_little
-  // CHECK-NOT:     vector
-  piko.stage @little bins [0] threads 1 : @F -> [] {
-    piko.process {
-    ^bb0(%f: !piko.prim<@F>):
-      %v = piko.get %f "v" : !piko.prim<@F> -> i32
-      %x = piko.load @vertices[%v : i32] "x" : f32
-      %0 = arith.addf %x, %x : f32
-      piko.store %0, @out[%v : i32] "x" : f32
-      piko.return
-    }
+// -----
+
+// A loop goes on as long as some lane does; those that have ended keep what they
+// have. An array has a column for each lane.
+piko.record @F {"z" : f32 at 0} size 4 align 4
+// CHECK-LABEL: piko.pipeline @Loop
+// CHECK:         %[[COLUMNS:.*]] = memref.alloca() {alignment = 64 : i64} : memref<64xf32>
+// CHECK:         scf.while (%{{.*}} = %{{.*}}, %{{.*}} = %{{.*}}, %[[M:.*]] = %{{.*}}) : (vector<16xf32>, vector<16xf32>, vector<16xi1>)
+// CHECK:           %[[GOES:.*]] = arith.cmpf olt, %{{.*}} : vector<16xf32>
+// CHECK:           %[[LEFT:.*]] = arith.select %[[M]], %{{.*}}, %{{.*}} : vector<16xi1>, vector<16xf32>
+// CHECK:           %[[GOING:.*]] = arith.select %[[M]], %[[GOES]], %{{.*}} : vector<16xi1>
+// CHECK:           %[[SOME:.*]] = vector.reduction <or>, %[[GOING]]
+// CHECK:           scf.condition(%[[SOME]]) %[[LEFT]], %[[GOING]]
+// CHECK:           vector.maskedstore %[[COLUMNS]][%c32]
+// CHECK:         vector.gather %[[COLUMNS]][%c0] [%{{.*}}]
+piko.pipeline @Loop rank 1 {
+  piko.buffer @out : @F
+  piko.source @a
+  piko.stage @a bins [0] threads 1 : @F -> [] {}
+  piko.kernel @k {
+    %c1 = arith.constant 1 : index
+    %c2 = arith.constant 2 : index
+    %c3 = arith.constant 3 : index
+    %two = arith.constant 2.0 : f32
+    %most = arith.constant 90.0 : f32
+    %bins = piko.storage.open_bins @a : !piko.bins<@F>
+    %n = piko.storage.unit_count %bins : !piko.bins<@F>
+    scf.forall (%u) in (%n) {
+      // expected-remark@+1 {{these iterations are vectorized for 16 at once}}
+      scf.for %x = %c1 to %n step %c1 {
+        %array = memref.alloca() : memref<4xf32>
+        %i = arith.index_cast %x : index to i32
+        %f = arith.sitofp %i : i32 to f32
+        %end = scf.while (%v = %f) : (f32) -> f32 {
+          %goes = arith.cmpf olt, %v, %most : f32
+          scf.condition(%goes) %v : f32
+        } do {
+        ^bb0(%v: f32):
+          memref.store %v, %array[%c2] : memref<4xf32>
+          %next = arith.mulf %v, %two : f32
+          scf.yield %next : f32
+        }
+        %place = arith.andi %x, %c3 : index
+        %kept = memref.load %array[%place] : memref<4xf32>
+        %sum = arith.addf %kept, %end : f32
+        piko.store %sum, checked @out[%x : index] "z" : f32
+      } {piko.lanes}
+    } {piko.units = #piko<units any>}
+    piko.storage.close_bins %bins : !piko.bins<@F>
   }
+}
 
-  // What is read may have been written for the primitive before.
-  // CHECK:       piko.kernel @kernel_written
-  // CHECK-NOT:     vector
-  piko.stage @written bins [0] threads 1 : @F -> [] {
-    piko.process {
-    ^bb0(%f: !piko.prim<@F>):
-      %v = piko.get %f "v" : !piko.prim<@F> -> i32
-      %c0 = arith.constant 0 : i32
-      %c1 = arith.constant 1 : i32
-      %n = arith.constant 9 : i32
-      %x = piko.load @out[%v : i32] "x" : f32
-      %sum:2 = scf.while (%s = %x, %k = %c0) : (f32, i32) -> (f32, i32) {
-        %more = arith.cmpi slt, %k, %n : i32
-        scf.condition(%more) %s, %k : f32, i32
-      } do {
-      ^bb0(%s: f32, %k: i32):
-        %0 = arith.mulf %s, %s : f32
-        %1 = arith.addf %0, %s : f32
-        %2 = arith.mulf %1, %s : f32
-        %3 = arith.addf %2, %s : f32
-        %4 = arith.mulf %3, %s : f32
-        %5 = arith.addi %k, %c1 : i32
-        scf.yield %4, %5 : f32, i32
-      }
-      piko.store %sum#0, @out[%v : i32] "x" : f32
-      piko.return
-    }
+// -----
+
+// Emissions run lane by lane, from the first to the last, in order; what they
+// need is computed ahead in vectors.
+piko.record @F {"z" : f32 at 0} size 4 align 4
+// CHECK-LABEL: piko.pipeline @Emits
+// CHECK:         scf.for %{{.*}} step %c16
+// CHECK:           arith.mulf %{{.*}} : vector<16xf32>
+// CHECK:           math.sqrt %{{.*}} : vector<16xf32>
+// CHECK:           %[[WORD:.*]] = vector.bitcast %{{.*}} : vector<16xi1> to vector<1xi16>
+// CHECK:           scf.while
+// CHECK:             %[[LANE:.*]] = math.cttz
+// CHECK:             piko.storage.append
+// CHECK-NOT:         math.sqrt
+// CHECK:             piko.storage.append
+piko.pipeline @Emits rank 1 {
+  piko.source @a
+  piko.edge @a[0] -> @b
+  piko.stage @a bins [0] threads 1 : @F -> [@F] {}
+  piko.stage @b bins [0] threads 1 : @F -> [] {}
+  piko.kernel @k {
+    %c1 = arith.constant 1 : index
+    %bins = piko.storage.open_bins @a : !piko.bins<@F>
+    %n = piko.storage.unit_count %bins : !piko.bins<@F>
+    scf.forall (%u) in (%n) {
+      %w = piko.cpu.open_writer %bins[%u] : !piko.bins<@F>
+      // expected-remark@+1 {{these iterations are vectorized for 16 at once}}
+      scf.for %x = %c1 to %n step %c1 {
+        %i = arith.index_cast %x : index to i32
+        %f = arith.sitofp %i : i32 to f32
+        %1 = arith.mulf %f, %f : f32
+        %2 = arith.addf %1, %f : f32
+        %3 = arith.mulf %2, %f : f32
+        %4 = arith.addf %3, %f : f32
+        %5 = arith.mulf %4, %f : f32
+        %6 = arith.addf %5, %f : f32
+        %7 = arith.mulf %6, %f : f32
+        %8 = arith.addf %7, %f : f32
+        %p = piko.storage.append %w[0] (%8) : f32 -> !piko.prim<@F>
+        %9 = math.sqrt %8 : f32
+        %q = piko.storage.append %w[0] (%9) : f32 -> !piko.prim<@F>
+      } {piko.lanes}
+      piko.cpu.close_writer %w
+    } {piko.units = #piko<units any>}
+    piko.storage.close_bins %bins : !piko.bins<@F>
+  }
+}
+
+// -----
+
+// What is not worth it, and what cannot be, says why.
+piko.record @F {"z" : f32 at 0} size 4 align 4
+// CHECK-LABEL: piko.pipeline @Stays
+// CHECK-NOT:     vector
+// CHECK:         piko.storage.close_bins
+piko.pipeline @Stays rank 1 {
+  piko.buffer @out : @F
+  piko.source @a
+  piko.stage @a bins [0] threads 1 : @F -> [] {}
+  piko.kernel @k {
+    %c1 = arith.constant 1 : index
+    %c0 = arith.constant 0 : index
+    %size = arith.constant 64 : index
+    %bins = piko.storage.open_bins @a : !piko.bins<@F>
+    %n = piko.storage.unit_count %bins : !piko.bins<@F>
+    scf.forall (%u) in (%n) {
+      // expected-remark-re@+1 {{these iterations are not vectorized: 16 at once are expected to take {{[0-9]+}} cycles, and one after the other {{[0-9]+}}; specifyLanes(Iterations) does so all the same}}
+      scf.for %x = %c1 to %n step %c1 {
+        %i = arith.index_cast %x : index to i32
+        %at = arith.shrui %i, %i : i32
+        // expected-note@+1 {{lanes access elements in different places}}
+        %f = piko.load checked @out[%at : i32] "z" : f32
+        %j = arith.fptosi %f : f32 to i32
+        // expected-note@+1 {{lanes access elements in different places}}
+        %g = piko.load checked @out[%j : i32] "z" : f32
+        piko.store %g, checked @out[%at : i32] "z" : f32
+      } {piko.lanes}
+      // expected-remark@+1 {{these iterations are not vectorized: each lane would have a copy of this array, which is large}}
+      scf.for %x = %c1 to %n step %c1 {
+        // expected-note@+1 {{here}}
+        %large = memref.alloca() : memref<5000xf32>
+        %v = memref.load %large[%x] : memref<5000xf32>
+        piko.store %v, checked @out[%x : index] "z" : f32
+      } {piko.lanes}
+      // What a bin has of a box.
+      %box = arith.maxsi %n, %c0 : index
+      // expected-remark@+1 {{these iterations are not vectorized: a box may have few pixels; specifyLanes(Iterations) does so all the same}}
+      scf.for %x = %box to %n step %c1 {
+        %i = arith.index_cast %x : index to i32
+        %f = arith.sitofp %i : i32 to f32
+        %1 = arith.mulf %f, %f : f32
+        %2 = arith.addf %1, %f : f32
+        %3 = arith.mulf %2, %f : f32
+        %4 = arith.addf %3, %f : f32
+        piko.store %4, checked @out[%x : index] "z" : f32
+      } {piko.lanes}
+      // expected-remark@+1 {{these iterations are not vectorized: lanes cannot share this array}}
+      scf.for %x = %c1 to %n step %c1 {
+        // expected-note@+1 {{here}}
+        %bytes = memref.alloca() : memref<64xi8>
+        %view = memref.view %bytes[%c0][] : memref<64xi8> to memref<16xf32>
+        %v = memref.load %view[%x] : memref<16xf32>
+        piko.store %v, checked @out[%x : index] "z" : f32
+      } {piko.lanes}
+    } {piko.units = #piko<units any>}
+    piko.storage.close_bins %bins : !piko.bins<@F>
   }
 }

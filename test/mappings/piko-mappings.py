@@ -34,8 +34,8 @@ THREADS = [1, 2, 7]
 STRIPS = [None, 100]
 PASSES = ["pre-schedule", "infer-directives", "fuse-stages", "test-early", "prune",
           "own-pixels", "eliminate-schedules", "fuse-kernels", "form-strips",
-          "form-tiles", "prefetch", "compact-loops", "vectorize", "prove-bounds",
-          "hoist-bounds", "if-convert"]
+          "form-tiles", "prefetch", "vectorize", "prove-bounds", "hoist-bounds",
+          "if-convert"]
 
 SIZE = ["--width", "131", "--height", "99", "--lights", "3"]
 

@@ -16,8 +16,7 @@ EQUAL, BLANK = "equal", "equal, but blank"
 #: What piko-compare may leave out of synthesis.
 PASSES = ["pre-schedule", "infer-directives", "fuse-stages", "test-early", "prune",
           "own-pixels", "eliminate-schedules", "fuse-kernels", "form-tiles",
-          "prefetch", "compact-loops", "vectorize", "vectorize-iterations",
-          "prove-bounds", "hoist-bounds", "if-convert", "uplift-pixel-loops"]
+          "prefetch", "vectorize", "prove-bounds", "hoist-bounds", "if-convert", "uplift-pixel-loops"]
 
 
 def options_of(passes):

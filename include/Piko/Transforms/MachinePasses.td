@@ -298,66 +298,6 @@ def Prefetch : Pass<"piko-prefetch", "::piko::PipelineOp"> {
   let dependentDialects = ["::mlir::arith::ArithDialect"];
 }
 
-def CompactLoops : Pass<"piko-compact-loops", "::piko::PipelineOp"> {
-  let summary = "Do what a test guards for many primitives together";
-  let description = [{
-    **Requires** loops over units (`piko-form-units`).
-
-    **Does**: cuts a loop over primitives in front of work that a test with
-    effects guards, as the shading behind a depth test that `piko-test-early` has
-    moved there. For each block of 64 primitives, a first loop does what stands
-    in front and notes which primitives pass; a second one does the work for
-    those alone. `piko-vectorize` can then compute the work in vectors that are
-    full. What the work needs is read or computed again where that has no
-    effects, and kept in arrays where it has.
-
-    **Guarantees** the same operations on the same numbers. Work is done in the
-    same order, behind tests of later primitives: it is put off only where it
-    touches no state that is written in front of it, writes none that is read
-    there, and emits nothing.
-
-    Before:
-    ```
-    scf.for %i = %begin to %end step %one {
-      %f = piko.storage.item %bins[%i] ...
-      %passed = piko.update @depth[...] ...
-      scf.if %passed {
-        ...
-        piko.update @color[...] ...
-      }
-    } {piko.lanes}
-    ```
-    After:
-    ```
-    scf.for %b = %begin to %end step %c64 {
-      memref.store %zero, %count[%zero] : memref<1xindex>
-      scf.for %i = %b to %e step %one {
-        %f = piko.storage.item %bins[%i] ...
-        %passed = piko.update @depth[...] ...
-        scf.if %passed {
-          memref.store %i, %list[%n] : memref<64xindex> ...
-        }
-      } {piko.lanes}
-      %n = memref.load %count[%zero] : memref<1xindex>
-      scf.for %j = %zero to %n step %one {
-        %i = memref.load %list[%j] : memref<64xindex>
-        %f = piko.storage.item %bins[%i] ...
-        ...
-        piko.update @color[...] ...
-      } {piko.lanes}
-    }
-    ```
-
-    **Limits**: work in which vectors would have too little to compute stays
-    where it is, as does work that is not the last of a loop.
-  }];
-  let statistics = [
-    Statistic<"compacted", "compacted", "loops that were cut">];
-  let dependentDialects = ["::mlir::arith::ArithDialect",
-                           "::mlir::memref::MemRefDialect",
-                           "::mlir::scf::SCFDialect"];
-}
-
 def HoistBounds : Pass<"piko-hoist-bounds", "::piko::PipelineOp"> {
   let summary = "Test the indices of a loop in front of it";
   let description = [{
@@ -444,29 +384,34 @@ def IfConvert : Pass<"piko-if-convert", "::piko::PipelineOp"> {
   let dependentDialects = ["::mlir::arith::ArithDialect"];
 }
 
-def VectorizeIterations
-    : Pass<"piko-vectorize-iterations", "::piko::PipelineOp"> {
-  let summary = "Run the iterations of parallel loops as lanes of vectors";
+def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
+  let summary = "Run primitives, or iterations, as lanes of vectors";
   let description = [{
     **Requires** loops over units whose access to state is checked
-    (`convert-piko-to-scf`), and lanes that `piko-map-lanes` has given the
-    iterations of.
+    (`convert-piko-to-scf`), and lanes that `piko-map-lanes` has given primitives,
+    or the iterations of a parallel loop.
 
-    **Does**: runs 16 consecutive iterations of a `parallelFor`, or of a row of
-    pixels, at once. What is the same for all of them stays scalar; the rest
-    becomes vectors, by predication: conditions become masks, with a branch
-    around what no lane needs; loops run as long as some lane does; access to
-    state becomes gathers and scatters, of a row of pixels masked loads and
-    stores; arrays of an iteration get a column for each lane. What has no
-    vector form runs lane by lane inside. What must keep the order of iterations
-    (emission, updates of pixels that lanes may share) runs lane by lane from the
-    first of its kind to the last.
+    **Does**: runs 16 consecutive turns of a loop over primitives, of a
+    `parallelFor`, or of a row of pixels, at once. What is the same for all of
+    them stays scalar; the rest becomes vectors, by predication: conditions become
+    masks, with a branch around what no lane needs; loops run as long as some lane
+    does; access to state and to primitives becomes gathers and scatters, of a row
+    of pixels masked loads and stores; local arrays get a column for each lane.
+    What has no vector form runs lane by lane inside.
 
-    Loops that turn out to have few iterations run as they were. Rows of boxes,
-    which mostly do, are vectorized where the schedule says `specifyLanes`.
+    What must keep its order (emission, updates of pixels that lanes may share)
+    runs lane by lane: all that one image or one writer is concerned with, as one
+    group in its place, or, if nothing in the loop waits for it, as several behind
+    all that vectors do. So a depth test, the shading of what has passed it, and
+    the update of a colour become turns, vectors and turns.
 
-    **Guarantees** the same operations on the same numbers for each iteration,
-    emissions in the same order, and the same bits for any number of lanes.
+    Loops that turn out to have few turns run as they were. Whether vectors pay is
+    estimated from the operations, how often they run, and for how many lanes; a
+    remark has the estimate, with what costs most. Rows of boxes, which mostly have
+    few pixels, are vectorized where the schedule says `specifyLanes`.
+
+    **Guarantees** the same operations on the same numbers for each turn, emissions
+    and updates in the same order, and the same bits for any number of lanes.
 
     Before:
     ```
@@ -496,9 +441,9 @@ def VectorizeIterations
     }
     ```
 
-    **Limits**: loops whose iterations use a part of memory that has no lanes
-    (views, scratch), or carry what is no number around an inner loop, stay as
-    they are, with a remark.
+    **Limits**: loops whose turns use a part of memory that has no lanes (views,
+    scratch), or carry what is neither a number nor a primitive around an inner
+    loop, stay as they are, with a remark.
   }];
   let dependentDialects = ["::mlir::arith::ArithDialect",
                            "::mlir::math::MathDialect",
@@ -509,81 +454,6 @@ def VectorizeIterations
     Statistic<"vectorized", "vectorized", "loops that compute in vectors">,
     Statistic<"left", "left", "loops that stay as they are">,
   ];
-}
-
-def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
-  let summary = "Compute for many primitives at once";
-  let description = [{
-    **Requires** loops over units (`piko-form-units`).
-
-    **Does**: takes the primitives of a loop over them in blocks of 64, with
-    three loops. The first reads, one primitive after the other, their fields
-    and elements of state that the kernel does not write, and leaves them in
-    arrays. The second computes from them, for 16 primitives at once, in
-    vectors: what depends on nothing else and has no effects. The third does the
-    rest, primitive by primitive in the old order. So nothing that is computed
-    ahead waits for a branch or for another primitive.
-
-    Both sides of a condition are computed. Where one side cannot be, lanes that
-    come to it give up, as do those that read outside of a buffer; their
-    primitives go through the original body, with the errors that it reports.
-    Of a conditional statement, the side that runs ahead is the shorter one if
-    both can.
-
-    **Guarantees** the same operations on the same numbers, and effects in the
-    same order. State that the kernel writes is read where it was.
-
-    Before:
-    ```
-    scf.for %i = %begin to %end step %one {
-      %t = piko.storage.item %bins[%i] ...
-      %k = piko.get %t "vertex" ...
-      %x = piko.load @vertices[%k : i32] "x" : f32
-      %y = arith.mulf %x, %x : f32 ...
-      piko.storage.append %writer, 0 (%y)
-      piko.storage.next %writer
-    } {piko.lanes}
-    ```
-    After:
-    ```
-    scf.for %b = %begin to %end step %c64 {
-      scf.for %i = %b to %e step %one {
-        %k = piko.get ...
-        %x = scf.if %inside -> (f32) {
-          piko.load checked @vertices[%k : i32] "x" : f32 ...
-        memref.store %x, %xs[%at] : memref<64xf32>
-        memref.store %outside, %gave_up[%at] : memref<64xi8>
-      }
-      scf.for %g = %zero to %count step %c16 {
-        %x = vector.load %xs[%g] : memref<64xf32>, vector<16xf32>
-        %y = arith.mulf %x, %x : vector<16xf32> ...
-        vector.store %y, %ys[%g] : memref<64xf32>, vector<16xf32>
-      }
-      scf.for %i = %b to %e step %one {
-        scf.if %gave_up {
-          ...                                // as before
-        } else {
-          %y = memref.load %ys[%at] : memref<64xf32>
-          piko.storage.append %writer, 0 (%y)
-          piko.storage.next %writer
-        }
-      }
-    }
-    ```
-
-    **Limits**: loops inside a phase, also parallel ones, end what runs ahead, as
-    do phases that take lists. Where too little can run ahead for what would
-    have to be kept, the loop stays. A remark for each phase has the verdict,
-    with what was in the way.
-  }];
-  let statistics = [
-    Statistic<"vectorized", "vectorized", "loops that compute in vectors">,
-    Statistic<"left", "left", "loops with too little to compute ahead">,
-    Statistic<"kept", "kept", "values kept for what is done one by one">];
-  let dependentDialects = ["::mlir::arith::ArithDialect",
-                           "::mlir::memref::MemRefDialect",
-                           "::mlir::scf::SCFDialect",
-                           "::mlir::vector::VectorDialect"];
 }
 
 #endif // PIKO_TRANSFORMS_MACHINEPASSES_TD

@@ -9,6 +9,12 @@
 
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
+// Members of pikoir_input.
+namespace layout {
+constexpr piko::RuntimeMember items = PIKO_RUNTIME_MEMBER(pikoir_input, items),
+                              order = PIKO_RUNTIME_MEMBER(pikoir_input, order);
+} // namespace layout
+
 namespace piko {
 
 template <typename OpT> struct Lowering : ContextPattern<OpT> {

@@ -11,11 +11,9 @@
 using namespace mlir;
 using namespace piko;
 
-// Members of pikoir_input, pikoir_unit and pikoir_call.
+// More members of pikoir_input, and those of pikoir_unit and pikoir_call.
 namespace layout {
-constexpr RuntimeMember items = PIKO_RUNTIME_MEMBER(pikoir_input, items),
-                        order = PIKO_RUNTIME_MEMBER(pikoir_input, order),
-                        offsets = PIKO_RUNTIME_MEMBER(pikoir_input, offsets),
+constexpr RuntimeMember offsets = PIKO_RUNTIME_MEMBER(pikoir_input, offsets),
                         units = PIKO_RUNTIME_MEMBER(pikoir_input, units),
                         unitCount =
                             PIKO_RUNTIME_MEMBER(pikoir_input, unit_count),

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// Access to state by the lanes of a vector.
+// Access to state and to primitives by the lanes of a vector.
 
-#include "LoweringContext.h"
+#include "KernelLowering.h"
 
+#include "Piko/Dialect/Piko/IR/CodeBuilder.h"
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
-#include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
+#include "mlir/Dialect/SCF/IR/SCF.h"
 #include "mlir/Dialect/Vector/IR/VectorOps.h"
 
 using namespace mlir;
@@ -135,11 +136,119 @@ struct ScatterLowering : LaneLowering<ScatterOp> {
   }
 };
 
+/// Positions, or those from one on, as numbers of 64 bits.
+Value countPositions(CodeBuilder at, Value position, VectorType words) {
+  Location loc = at.loc;
+  if (isa<VectorType>(position.getType()))
+    return arith::IndexCastOp::create(at.builder, loc, words, position);
+  Value first = toI64(at.builder, loc, position);
+  auto steps = llvm::to_vector(llvm::seq<int64_t>(0, words.getNumElements()));
+  return at.add(vector::BroadcastOp::create(at.builder, loc, words, first),
+                arith::ConstantOp::create(
+                    at.builder, loc, DenseIntElementsAttr::get(words, steps)));
+}
+
+struct LaneItemsLowering : Lowering<LaneItemsOp> {
+  using Lowering::Lowering;
+
+  /// The numbers of the primitives at positions of bins that have an order.
+  Value readOrder(CodeBuilder at, Value order, Value position, Value mask,
+                  VectorType words) const {
+    OpBuilder &builder = at.builder;
+    auto type = VectorType::get(words.getShape(), builder.getI32Type());
+    constexpr uint32_t size = sizeof(uint32_t);
+    Value none =
+        arith::ConstantOp::create(builder, at.loc, builder.getZeroAttr(type));
+    Value numbers;
+    if (isa<VectorType>(position.getType()))
+      numbers = LLVM::masked_gather::create(
+          builder, at.loc, type,
+          LLVM::GEPOp::create(
+              builder, at.loc,
+              LLVM::getVectorType(order.getType(), words.getNumElements()),
+              type.getElementType(), order,
+              ArrayRef<LLVM::GEPArg>{countPositions(at, position, words)}),
+          mask, none, size);
+    else
+      numbers = LLVM::MaskedLoadOp::create(
+          builder, at.loc, type, entry(builder, at.loc, order, position, size),
+          mask, none, size);
+    return arith::ExtUIOp::create(builder, at.loc, words, numbers);
+  }
+
+  LogicalResult
+  matchAndRewrite(LaneItemsOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    Location loc = op.getLoc();
+    CodeBuilder at(rewriter, loc);
+    Value bins = adaptor.getBins(), position = adaptor.getPosition();
+    auto words =
+        VectorType::get(cast<VectorType>(op.getResult().getType()).getShape(),
+                        rewriter.getI64Type());
+    Value order = context.member(rewriter, bins, layout::order);
+    Value isOrdered = LLVM::ICmpOp::create(
+        rewriter, loc, LLVM::ICmpPredicate::ne, order,
+        LLVM::ZeroOp::create(rewriter, loc, pointer(rewriter)));
+    auto numbers = scf::IfOp::create(
+        rewriter, loc, isOrdered,
+        [&](OpBuilder &builder, Location loc) {
+          scf::YieldOp::create(builder, loc,
+                               readOrder({builder, loc}, order, position,
+                                         adaptor.getMask(), words));
+        },
+        [&](OpBuilder &builder, Location loc) {
+          scf::YieldOp::create(builder, loc,
+                               countPositions({builder, loc}, position, words));
+        });
+    RecordOp record = context.record(op.getBins().getType().getRecord());
+    Value items =
+        LLVM::PtrToIntOp::create(rewriter, loc, rewriter.getI64Type(),
+                                 context.member(rewriter, bins, layout::items));
+    auto splat = [&](Value number) {
+      return vector::BroadcastOp::create(rewriter, loc, words, number);
+    };
+    Value size = createI64(rewriter, loc, record.getSize());
+    rewriter.replaceOpWithNewOp<arith::IndexCastOp>(
+        op, op.getResult().getType(),
+        at.add(at.mul(numbers.getResult(0), splat(size)), splat(items)));
+    return success();
+  }
+};
+
+struct LaneGetLowering : Lowering<LaneGetOp> {
+  using Lowering::Lowering;
+  LogicalResult
+  matchAndRewrite(LaneGetOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    Location loc = op.getLoc();
+    auto type = cast<VectorType>(op.getResult().getType());
+    auto words = VectorType::get(type.getShape(), rewriter.getI64Type());
+    Value addresses = arith::IndexCastOp::create(rewriter, loc, words,
+                                                 adaptor.getAddresses());
+    addresses = LLVM::IntToPtrOp::create(
+        rewriter, loc,
+        LLVM::getVectorType(pointer(rewriter), type.getNumElements()),
+        addresses);
+    RecordOp record = context.record(op.getRecordAttr());
+    addresses = createFieldAddress(rewriter, loc, addresses,
+                                   record.getField(op.getField()),
+                                   adaptor.getElements());
+    Value none =
+        arith::ConstantOp::create(rewriter, loc, rewriter.getZeroAttr(type));
+    rewriter.replaceOp(
+        op, LLVM::masked_gather::create(rewriter, loc, type, addresses,
+                                        adaptor.getMask(), none,
+                                        type.getElementTypeBitWidth() / 8));
+    return success();
+  }
+};
+
 } // namespace
 
 void piko::populateLanesToLLVMPatterns(const TypeConverter &converter,
                                        RewritePatternSet &patterns,
                                        LoweringContext &context) {
-  patterns.add<GatherLowering, ScatterLowering>(converter,
-                                                patterns.getContext(), context);
+  patterns
+      .add<GatherLowering, LaneGetLowering, LaneItemsLowering, ScatterLowering>(
+          converter, patterns.getContext(), context);
 }

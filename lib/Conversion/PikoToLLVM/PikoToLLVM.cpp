@@ -88,22 +88,6 @@ static void noteSubject(func::FuncOp function, const PipelineNumbers &numbers) {
   }
 }
 
-/// Keeps LLVM's vectorizer from loops that only read: to gather into vectors
-/// takes longer than to read one number after the other.
-static void annotateReads(func::FuncOp function) {
-  MLIRContext *context = function.getContext();
-  auto vectorize = LLVM::LoopVectorizeAttr::get(
-      context, /*disable=*/BoolAttr::get(context, true), {}, {}, {}, {}, {},
-      {});
-  auto annotation =
-      LLVM::LoopAnnotationAttr::get(context, {}, vectorize, {}, {}, {}, {}, {},
-                                    {}, {}, {}, {}, {}, {}, {}, {});
-  function.walk([&](scf::ForOp loop) {
-    if (loop->removeAttr(marks::reads))
-      loop->setAttr("loop_annotation", annotation);
-  });
-}
-
 LogicalResult ConvertPikoToLLVMPass::convert(PipelineOp pipeline,
                                              LoweringContext &context) {
   WalkResult phase = pipeline.walk([](Operation *op) {
@@ -175,10 +159,8 @@ LogicalResult ConvertPikoToLLVMPass::convert(PipelineOp pipeline,
   for (func::FuncOp function : functions)
     if (failed(applyPartialConversion(function, target, frozen)))
       return failure();
-  for (func::FuncOp function : functions) {
-    annotateReads(function);
+  for (func::FuncOp function : functions)
     branchInSaturatingCasts(function);
-  }
   for (func::FuncOp function : again)
     outlineUnits(function);
   for (func::FuncOp function : functions)

@@ -175,10 +175,16 @@ void piko::createPlace(OpBuilder &builder, Location loc,
   out.store(cell, layout::lastCell);
 }
 
+Value piko::createIsCounted(OpBuilder &builder, Location loc,
+                            LoweringContext &context, Value writer) {
+  MemberBuilder members(builder, loc, writer, context.tags.writer());
+  return members.any(layout::writerFlags);
+}
+
 void piko::createNext(OpBuilder &builder, Location loc,
                       LoweringContext &context, Value writer) {
-  MemberBuilder members(builder, loc, writer, context.tags.writer());
-  auto path = scf::IfOp::create(builder, loc, members.any(layout::writerFlags),
+  auto path = scf::IfOp::create(builder, loc,
+                                createIsCounted(builder, loc, context, writer),
                                 /*withElseRegion=*/false);
   OpBuilder::InsertionGuard guard(builder);
   builder.setInsertionPointToStart(path.thenBlock());

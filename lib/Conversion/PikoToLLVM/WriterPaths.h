@@ -22,6 +22,9 @@ void createPlace(mlir::OpBuilder &builder, mlir::Location loc,
 void createLocalPlace(mlir::OpBuilder &builder, mlir::Location loc,
                       LoweringContext &context, mlir::Value writer,
                       int64_t port, mlir::Value cell);
+/// Whether pikoir_next has anything to do.
+mlir::Value createIsCounted(mlir::OpBuilder &builder, mlir::Location loc,
+                            LoweringContext &context, mlir::Value writer);
 /// Ends a position (pikoir_next).
 void createNext(mlir::OpBuilder &builder, mlir::Location loc,
                 LoweringContext &context, mlir::Value writer);

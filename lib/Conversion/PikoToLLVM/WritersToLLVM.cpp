@@ -93,6 +93,17 @@ struct NextLowering : Lowering<NextOp> {
   }
 };
 
+struct IsCountedLowering : Lowering<IsCountedOp> {
+  using Lowering::Lowering;
+  LogicalResult
+  matchAndRewrite(IsCountedOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    rewriter.replaceOp(op, createIsCounted(rewriter, op.getLoc(), context,
+                                           adaptor.getWriter()));
+    return success();
+  }
+};
+
 /// An operation that is a call with the writer and a number for its arguments.
 template <typename OpT, const RuntimeFunction &function>
 struct WriterNumberLowering : Lowering<OpT> {
@@ -247,7 +258,7 @@ void piko::populateWriterToLLVMPatterns(const TypeConverter &converter,
   patterns
       .add<OpenWriterLowering, LocalBinLowering,
            WriterCallLowering<CloseWriterOp, closeWriter>, NextLowering,
-           WriterCallLowering<DeferEndOp, deferEnd>,
+           IsCountedLowering, WriterCallLowering<DeferEndOp, deferEnd>,
            WriterNumberLowering<DeferBeginOp, deferBegin>,
            WriterNumberLowering<DeferIterationOp, deferIteration>,
            WriterNumberLowering<ScratchReleaseOp, scratchRelease>,

@@ -17,6 +17,8 @@
 //   a source into a stage that takes Triangle the mesh's triangles, in order
 //   a source into a stage that takes Patch    the patches, in order
 //   a source into a stage that takes Pixel    the image's pixels, row by row
+//   a source into a stage that takes Nothing  nothing: its bins are all that a
+//                                             stage with everyBin() takes
 //   the Image<Color>                          the result: there is exactly one
 //
 // Each may occur any number of times (the Image<Color> once) or not at all.
@@ -115,6 +117,10 @@ struct Color {
 struct Pixel {
   glm::ivec2 at;
 };
+
+/// What no scene has: for a stage that runs when others are done, once for each
+/// bin.
+struct Nothing {};
 
 /// The box that holds all triangles of a tree; 0 if there are none.
 struct Bounds {

@@ -50,3 +50,43 @@ piko.pipeline @P rank 1 {
     %a = piko.cpu.gather @in[%at : vector<16xindex>] "z" mask %mask : vector<16xi1>, vector<16xi32>
   }
 }
+
+// -----
+
+piko.record @F {"z" : f32 at 0} size 4 align 4
+piko.pipeline @P rank 1 {
+  piko.source @a
+  piko.stage @a bins [0] threads 1 : @F -> [] {}
+  piko.kernel @k {
+    %mask = arith.constant dense<true> : vector<16xi1>
+    %at = arith.constant dense<3> : vector<8xindex>
+    %bins = piko.storage.open_bins @a : !piko.bins<@F>
+    // expected-error@+1 {{'piko.cpu.items' op expected a position for each of 16 lanes, but got 'vector<8xindex>'}}
+    %as = piko.cpu.items %bins[%at : vector<8xindex>] mask %mask : !piko.bins<@F>, vector<16xi1>, vector<16xindex>
+    piko.storage.close_bins %bins : !piko.bins<@F>
+  }
+}
+
+// -----
+
+piko.record @F {"z" : f32 at 0} size 4 align 4
+piko.pipeline @P rank 1 {
+  piko.kernel @k {
+    %mask = arith.constant dense<true> : vector<16xi1>
+    %as = arith.constant dense<3> : vector<16xindex>
+    // expected-error@+1 {{'piko.cpu.get' op expected a number for each of 16 lanes, but got 'vector<8xf32>'}}
+    %x = piko.cpu.get %as "z" of @F mask %mask : vector<16xindex>, vector<16xi1>, vector<8xf32>
+  }
+}
+
+// -----
+
+piko.record @F {"z" : f32 at 0} size 4 align 4
+piko.pipeline @P rank 1 {
+  piko.kernel @k {
+    %mask = arith.constant dense<true> : vector<16xi1>
+    %as = arith.constant dense<3> : vector<16xindex>
+    // expected-error@+1 {{'piko.cpu.get' op expected field 'z' to be of type 'f32', but got 'i32'}}
+    %x = piko.cpu.get %as "z" of @F mask %mask : vector<16xindex>, vector<16xi1>, vector<16xi32>
+  }
+}

@@ -19,5 +19,19 @@ piko.pipeline @P rank 2 {
     piko.cpu.scatter %a, @depth[%at, %c2 : vector<16xindex>, index] "z" mask %mask : vector<16xi1>, vector<16xf32>
     // CHECK: piko.cpu.scatter %{{.*}}, consecutive @depth[%{{.*}}, %{{.*}} : index, index] "z" mask
     piko.cpu.scatter %b, consecutive @depth[%c2, %c2 : index, index] "z" mask %mask : vector<16xi1>, vector<16xf32>
+    %bins = piko.storage.open_bins @a : !piko.bins<@F>
+    %n = piko.storage.unit_count %bins : !piko.bins<@F>
+    scf.forall (%u) in (%n) {
+      %writer = piko.cpu.open_writer %bins[%u] : !piko.bins<@F>
+      // CHECK: piko.cpu.is_counted %{{.*}}
+      %counted = piko.cpu.is_counted %writer
+      // CHECK: %[[AS:.*]] = piko.cpu.items %{{.*}}[%{{.*}} : index] mask %{{.*}} : !piko.bins<@F>, vector<16xi1>, vector<16xindex>
+      %as = piko.cpu.items %bins[%c2 : index] mask %mask : !piko.bins<@F>, vector<16xi1>, vector<16xindex>
+      // CHECK: piko.cpu.items %{{.*}}[%{{.*}} : vector<16xindex>] mask
+      %bs = piko.cpu.items %bins[%at : vector<16xindex>] mask %mask : !piko.bins<@F>, vector<16xi1>, vector<16xindex>
+      // CHECK: piko.cpu.get %[[AS]] "list"[%{{.*}}] of @F mask %{{.*}} : vector<16xindex>, vector<16xi1>, vector<16xf32>
+      %x = piko.cpu.get %as "list"[%c2] of @F mask %mask : vector<16xindex>, vector<16xi1>, vector<16xf32>
+    }
+    piko.storage.close_bins %bins : !piko.bins<@F>
   }
 }

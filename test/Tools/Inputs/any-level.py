@@ -12,11 +12,12 @@ module, scene = sys.argv[1:]
 IN_PIPELINE = """
     order-stages pre-schedule infer-directives fuse-stages test-early own-pixels
     eliminate-schedules form-kernels fuse-kernels form-program form-strips
-    form-work form-tiles form-units split-loops prefetch compact-loops vectorize""".split()
+    form-work form-tiles form-units split-loops prefetch""".split()
 STEPS = [f"piko.pipeline(piko-{name})" for name in IN_PIPELINE]
 STEPS.insert(5, "piko-prune")
 # Where tiles are does not show.
 STEPS += ["piko.pipeline(convert-piko-to-scf{private-tiles=true})"]
+STEPS += ["piko.pipeline(piko-vectorize)"]
 STEPS += ["piko.pipeline(convert-piko-to-openmp)", "convert-piko-to-llvm"]
 STEPS += ["convert-scf-to-cf,convert-vector-to-llvm,convert-math-to-llvm"]
 STEPS += ["convert-ub-to-llvm,convert-openmp-to-llvm"]

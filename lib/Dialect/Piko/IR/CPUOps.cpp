@@ -4,6 +4,7 @@
 
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
+#include "FieldAccess.h"
 #include "StageUses.h"
 
 using namespace mlir;
@@ -41,6 +42,38 @@ LogicalResult ListOp::verify() {
 LogicalResult ItemOp::verify() {
   return verifyStored(*this, getBins().getType(),
                       getPrim().getType().getRecord(), "primitive");
+}
+
+/// What belongs to lanes is a vector with an element for each.
+static LogicalResult verifyLaneCount(Operation *op, Type mask, Type lanes,
+                                     const Twine &what) {
+  int64_t count = cast<VectorType>(mask).getNumElements();
+  auto vector = dyn_cast<VectorType>(lanes);
+  if (!vector || vector.getNumElements() == count)
+    return success();
+  return op->emitOpError("expected ")
+         << what << " for each of " << count << " lanes, but got " << vector;
+}
+
+LogicalResult LaneItemsOp::verify() {
+  Type mask = getMask().getType();
+  if (failed(
+          verifyLaneCount(*this, mask, getPosition().getType(), "a position")))
+    return failure();
+  return verifyLaneCount(*this, mask, getResult().getType(), "an address");
+}
+
+LogicalResult LaneGetOp::verifySymbolUses(SymbolTableCollection &) {
+  Type mask = getMask().getType(), result = getResult().getType();
+  if (failed(verifyLaneCount(*this, mask, getAddresses().getType(),
+                             "an address")) ||
+      failed(verifyLaneCount(*this, mask, result, "a number")))
+    return failure();
+  if (failed(verifyFieldAccess(*this, getRecordAttr(), getField(),
+                               getElements().size(),
+                               cast<VectorType>(result).getElementType())))
+    return failure();
+  return verifyElement(*this, getRecordAttr(), getField(), getElements());
 }
 
 LogicalResult OpenWriterOp::verifySymbolUses(SymbolTableCollection &) {

@@ -15,10 +15,6 @@ namespace piko::marks {
 constexpr llvm::StringLiteral lanes = "piko.lanes";
 /// What lanes are given, a `LaneMappingAttr`, of a loop over primitives.
 constexpr llvm::StringLiteral mapping = "piko.mapping";
-/// A loop over what has passed a test.
-constexpr llvm::StringLiteral passed = "piko.passed";
-/// A loop that only reads ahead.
-constexpr llvm::StringLiteral reads = "piko.reads";
 /// How threads share the loop over units of work, a `UnitLoopAttr`.
 constexpr llvm::StringLiteral units = "piko.units";
 /// A loop whose iterations the threads of a block share.

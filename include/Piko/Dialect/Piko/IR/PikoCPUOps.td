@@ -319,6 +319,22 @@ def Piko_NextOp : Piko_StorageOp<"next"> {
   let assemblyFormat = "$writer attr-dict";
 }
 
+def Piko_IsCountedOp : Piko_CPUOp<"is_counted"> {
+  let summary = "whether `piko.storage.next` has anything to do";
+  let description = [{
+    It has where the order of what was emitted is to be found from the primitives
+    that it came from. That does not change within a unit of work, except between
+    `piko.cpu.defer_begin` and `piko.cpu.defer_end`.
+
+    ```mlir
+    %counted = piko.cpu.is_counted %writer
+    ```
+  }];
+  let arguments = (ins Piko_WriterType:$writer);
+  let results = (outs I1:$result);
+  let assemblyFormat = "$writer attr-dict";
+}
+
 def Piko_DeferBeginOp : Piko_CPUOp<"defer_begin"> {
   let summary = "what iterations emit is put in their order later";
   let description = [{
@@ -563,6 +579,53 @@ def Piko_ScatterOp : Piko_LaneAccessOp<"scatter", [MemoryEffects<[MemWrite]>]> {
     $value `,` (`consecutive` $consecutive^)? $state
     (`[` $indices^ `:` type($indices) `]`)? $field (`[` $elements^ `]`)?
     `mask` $mask attr-dict `:` type($mask) `,` type($value)
+  }];
+}
+
+def Piko_Addresses : VectorOfRankAndType<[1], [Index]>;
+
+def Piko_LaneItemsOp : Piko_CPUOp<"items", [MemoryEffects<[MemRead]>]> {
+  let hasVerifier = 1;
+  let summary = "the address of a primitive for each lane";
+  let description = [{
+    Of those at these positions, or, from a scalar on, at consecutive ones. The
+    positions of lanes in the mask are those of primitives; the other lanes get an
+    address of nothing.
+
+    ```mlir
+    %as = piko.cpu.items %bins[%first : index] mask %mask
+      : !piko.bins<@Fragment>, vector<16xi1>, vector<16xindex>
+    ```
+  }];
+  let arguments = (ins Piko_BinsType:$bins, Piko_LaneIndex:$position,
+                       Piko_LaneMask:$mask);
+  let results = (outs Piko_Addresses:$result);
+  let assemblyFormat = [{
+    $bins `[` $position `:` type($position) `]` `mask` $mask attr-dict
+    `:` qualified(type($bins)) `,` type($mask) `,` type($result)
+  }];
+}
+
+def Piko_LaneGetOp : Piko_CPUOp<"get", [
+    MemoryEffects<[MemRead]>,
+    DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
+  let summary = "reads a field of a primitive for each lane";
+  let description = [{
+    The primitives are given by their addresses. Lanes that are not in the mask
+    read nothing and get 0.
+
+    ```mlir
+    %zs = piko.cpu.get %as "z" of @Fragment mask %mask
+      : vector<16xindex>, vector<16xi1>, vector<16xf32>
+    ```
+  }];
+  let arguments = (ins Piko_Addresses:$addresses, StrAttr:$field,
+                       Variadic<Index>:$elements, FlatSymbolRefAttr:$record,
+                       Piko_LaneMask:$mask);
+  let results = (outs Piko_Lanes:$result);
+  let assemblyFormat = [{
+    $addresses $field (`[` $elements^ `]`)? `of` $record `mask` $mask attr-dict
+    `:` type($addresses) `,` type($mask) `,` type($result)
   }];
 }
 
