@@ -2,8 +2,8 @@
 cmake_policy(PUSH)
 cmake_policy(VERSION 3.20...3.25)
 
-# piko_add_pipeline(<target> SOURCES <file>... [PIPES <name>...] [CPU <name>]
-#                   [OPTIONS <option>...])
+# piko_add_pipeline(<target> SOURCES <file>... [PIPES <name>...]
+#                   [CPU <name>[,<name>...]] [OPTIONS <option>...])
 #
 # Compiles pipelines ahead of time and links them into a target, which may then
 # include a header for each. Of one source the PIPES are compiled, each with the
@@ -11,7 +11,7 @@ cmake_policy(VERSION 3.20...3.25)
 # the header a.h. They are compiled again when a file changes that they include.
 #
 # CPU      the processor to compile for: as clang names them, or native
-#          (x86-64-v3)
+#          (x86-64-v3); of several the last runs that fits the machine
 # OPTIONS  further options of pikoc, such as -I<folder> and -D<name>
 function(piko_add_pipeline target)
   cmake_parse_arguments(PARSE_ARGV 1 ARG "" "CPU" "SOURCES;PIPES;OPTIONS")

@@ -9,10 +9,11 @@
 #include "Piko/Driver/Diagnostics.h"
 #include "Piko/Frontend/HostCompiler.h"
 #include "Piko/Target/Object.h"
+#include "Piko/Target/Versions.h"
 #include "SourceCache.h"
 
-#include "llvm/IR/Constants.h"
 #include "llvm/Support/Path.h"
+#include "llvm/TargetParser/Host.h"
 
 #include "Piko/Analysis/LinearFacts.h"
 #include "pikort/pikort.h"
@@ -69,7 +70,7 @@ static Entry readEntry(llvm::StringRef bytes) {
 
 /// All that decides what is compiled, but for what is read from files.
 static std::string makeRequest(const ObjectOptions &options,
-                               const Processor &processor,
+                               llvm::ArrayRef<Processor> processors,
                                llvm::vfs::FileSystem &files) {
   KeyBuilder key;
   addSurroundings(key, files);
@@ -81,7 +82,9 @@ static std::string makeRequest(const ObjectOptions &options,
     for (const std::string &item : *list)
       key.add(item);
   }
-  key.add(processor.name).add(processor.features);
+  key.add(std::to_string(processors.size()));
+  for (const Processor &processor : processors)
+    key.add(processor.name).add(processor.features);
   for (int number : {int(source.text.has_value()), int(source.check.enabled),
                      int(options.execution), options.target.optLevel,
                      int(options.target.sanitizer), int(options.remarks),
@@ -96,31 +99,10 @@ static std::string makeRequest(const ObjectOptions &options,
 // Compiling
 //===----------------------------------------------------------------------===//
 
-/// Defines the object's one symbol, the pikort_program of the pipeline whose
-/// functions are in the module, and hides all others.
-static void defineProgram(llvm::Module &module, llvm::StringRef pipeline,
-                          llvm::StringRef symbol) {
-  for (llvm::GlobalValue &value : module.global_values())
-    if (!value.isDeclaration())
-      value.setLinkage(llvm::GlobalValue::InternalLinkage);
-  llvm::LLVMContext &context = module.getContext();
-  auto *name = llvm::ConstantDataArray::getString(context, pipeline);
-  auto *nameVariable =
-      new llvm::GlobalVariable(module, name->getType(), /*isConstant=*/true,
-                               llvm::GlobalValue::PrivateLinkage, name);
-  llvm::Constant *members[] = {
-      llvm::ConstantInt::get(llvm::Type::getInt32Ty(context),
-                             PIKORT_ABI_VERSION),
-      nameVariable, module.getFunction((pipeline + ".setup").str()),
-      module.getFunction((pipeline + ".run").str())};
-  llvm::Constant *program = llvm::ConstantStruct::getAnon(members);
-  new llvm::GlobalVariable(module, program->getType(), /*isConstant=*/true,
-                           llvm::GlobalValue::ExternalLinkage, program, symbol);
-}
-
 /// LLVM IR of the compiled pipeline; null after diagnostics.
 static std::unique_ptr<llvm::Module>
-compilePipeline(const ObjectOptions &options, const Files &files,
+compilePipeline(const ObjectOptions &options,
+                llvm::ArrayRef<Processor> processors, const Files &files,
                 MLIRContext &context, llvm::LLVMContext &llvmContext,
                 CompiledObject &object) {
   OwningOpRef<ModuleOp> module = readPipeline(options.source, context, files);
@@ -137,9 +119,9 @@ compilePipeline(const ObjectOptions &options, const Files &files,
     return nullptr;
   std::unique_ptr<llvm::Module> translated =
       translateToLLVMIR(*module, llvmContext);
-  if (translated)
-    defineProgram(*translated, name, object.symbol);
-  return translated;
+  if (!translated)
+    return nullptr;
+  return defineProgram(std::move(translated), name, object.symbol, processors);
 }
 
 /// What the reference executor shall run; empty after diagnostics.
@@ -197,7 +179,8 @@ compileReference(const ObjectOptions &options, const Files &files,
 
 /// Fills an entry but for its files; false after diagnostics, which are there
 /// too.
-static bool compile(const ObjectOptions &options, const Files &files,
+static bool compile(const ObjectOptions &options,
+                    llvm::ArrayRef<Processor> processors, const Files &files,
                     Entry &entry) {
   DialectRegistry registry;
   registerPikoDialects(registry);
@@ -209,12 +192,17 @@ static bool compile(const ObjectOptions &options, const Files &files,
   llvm::LLVMContext llvmContext;
   bool isReference = options.execution == ExecutionTarget::Reference;
   std::unique_ptr<llvm::Module> module =
-      (isReference ? compileReference : compilePipeline)(
-          options, files, context, llvmContext, entry.object);
+      isReference
+          ? compileReference(options, files, context, llvmContext, entry.object)
+          : compilePipeline(options, processors, files, context, llvmContext,
+                            entry.object);
   if (!module)
     return false;
+  TargetOptions target = options.target;
+  if (!isReference) // whose functions say what they are for
+    target.cpu = getBaseProcessor(module->getTargetTriple());
   llvm::Expected<std::string> code =
-      generateCode(*module, options.target, CodeFormat::Object);
+      generateCode(*module, target, CodeFormat::Object);
   if (!code) {
     stream << "error: " << llvm::toString(code.takeError()) << "\n";
     return false;
@@ -239,16 +227,17 @@ static Files openFiles(const CompileOptions &source) {
 
 std::optional<CompiledObject> piko::compileObject(const ObjectOptions &options,
                                                   std::string &diagnostics) {
-  llvm::Expected<Processor> processor = resolveProcessor(options.target.cpu);
-  if (!processor) {
-    diagnostics += "error: " + llvm::toString(processor.takeError()) + "\n";
+  llvm::Expected<std::vector<Processor>> processors = resolveProcessors(
+      options.target.cpu, llvm::Triple(llvm::sys::getProcessTriple()));
+  if (!processors) {
+    diagnostics += "error: " + llvm::toString(processors.takeError()) + "\n";
     return std::nullopt;
   }
   Files files = openFiles(options.source);
   SourceCache cache(options.source.cache);
   std::string request;
   if (cache.isEnabled()) {
-    request = makeRequest(options, *processor, *files);
+    request = makeRequest(options, *processors, *files);
     if (std::optional<std::string> found = cache.lookUp(request, *files)) {
       Entry entry = readEntry(*found);
       diagnostics += entry.diagnostics;
@@ -257,7 +246,7 @@ std::optional<CompiledObject> piko::compileObject(const ObjectOptions &options,
   }
   auto recorder = llvm::makeIntrusiveRefCnt<SourceRecorder>(files);
   Entry entry;
-  bool ok = compile(options, recorder, entry);
+  bool ok = compile(options, *processors, recorder, entry);
   diagnostics += entry.diagnostics;
   if (!ok)
     return std::nullopt;

@@ -210,6 +210,7 @@ struct pikort_pipeline {
 
   piko::rt::Memory memory; // first: the arrays below go back to it
   std::string name;
+  std::string processor; ///< That the code is for; "" = not said.
   int32_t rank = 0;
   std::vector<piko::rt::Record> records;
   std::vector<piko::rt::State> states;

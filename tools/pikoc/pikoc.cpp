@@ -84,10 +84,11 @@ struct CommandLine {
       llvm::cl::desc("write a rule for make or ninja with the files read"),
       llvm::cl::cat(category)};
   llvm::cl::opt<std::string> cpu{
-      "cpu", llvm::cl::value_desc("name"),
+      "cpu", llvm::cl::value_desc("name,..."),
       llvm::cl::desc("the processor to make code for, as clang names them, or "
                      "native (default: x86-64-v3, generic elsewhere, sm_90 for "
-                     "ptx)"),
+                     "ptx); of several in an object the last runs that fits "
+                     "the machine"),
       llvm::cl::cat(category)};
   llvm::cl::opt<Machine> target{
       "target", llvm::cl::desc("what code runs on (default: cpu)"),
@@ -218,6 +219,10 @@ static std::string checkOptions(const CommandLine &line) {
       (line.header.getNumOccurrences() || line.depfile.getNumOccurrences()))
     return "--header and --depfile belong to an object, which --emit=object or "
            "an -o that ends in .o asks for";
+  if (!isObject && llvm::StringRef(line.cpu).contains(','))
+    return "--cpu: expected one processor, because only an object has code for "
+           "several, but got '" +
+           line.cpu + "'";
   bool isGPU = line.getEmit() >= Emit::GPU;
   if (line.isEmulated() && isGPU)
     return "--target gpu-on-cpu is for code that runs on a CPU";

@@ -57,7 +57,9 @@ enum class Sanitizer { None, Address, Thread };
 /// What code is made for.
 struct TargetOptions {
   /// As LLVM names processors; "native" is this machine's, with all that it
-  /// offers, and empty is the least that objects are made for.
+  /// offers, and empty is the least that objects are made for. An object may
+  /// have code for several, between commas: the last one runs that fits the
+  /// machine.
   std::string cpu = {};
   /// 0 to 3, as in -O3.
   int optLevel = 3;

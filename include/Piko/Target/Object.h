@@ -6,6 +6,7 @@
 #define PIKO_TARGET_OBJECT_H
 
 #include "Piko/Driver/Options.h"
+#include "Piko/Target/Processor.h"
 
 #include "llvm/IR/Module.h"
 #include "llvm/Support/Error.h"
@@ -14,20 +15,11 @@
 
 namespace piko {
 
-/// A processor by LLVM's name and the features that are switched on and off
-/// beside it.
-struct Processor {
-  std::string name, features;
-};
-
-/// The processor that TargetOptions::cpu stands for, or an error if there is no
-/// such processor.
-llvm::Expected<Processor> resolveProcessor(llvm::StringRef cpu);
-
 enum class CodeFormat { Object, Assembly };
 
-/// Optimises the module and makes position-independent code of it. Static
-/// initialisers become one function, which JITCode runs.
+/// Optimises the module and makes position-independent code of it, for one
+/// processor where functions do not say which they are for. Static initialisers
+/// become one function, which JITCode runs.
 llvm::Expected<std::string> generateCode(llvm::Module &module,
                                          const TargetOptions &options,
                                          CodeFormat format);

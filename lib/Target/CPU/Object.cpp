@@ -9,8 +9,6 @@
 
 #include "llvm/ExecutionEngine/Orc/ExecutionUtils.h"
 #include "llvm/IR/IRBuilder.h"
-#include "llvm/MC/TargetRegistry.h"
-#include "llvm/Support/TargetSelect.h"
 #include "llvm/Target/TargetMachine.h"
 #include "llvm/TargetParser/Host.h"
 #include "llvm/Transforms/Instrumentation/AddressSanitizer.h"
@@ -20,42 +18,6 @@
 
 using namespace llvm;
 using namespace piko;
-
-/// The CPUs that objects run on where the user does not say more: those since
-/// about 2013 (AVX2, FMA), or what every machine of another family has.
-static StringRef getDefaultProcessor(const Triple &triple) {
-  return triple.getArch() == Triple::x86_64 ? "x86-64-v3" : "generic";
-}
-
-static Expected<const Target *> lookUpHost(const Triple &triple) {
-  InitializeNativeTarget();
-  InitializeNativeTargetAsmPrinter();
-  return lookUpTarget(triple);
-}
-
-Expected<Processor> piko::resolveProcessor(StringRef cpu) {
-  Triple triple(sys::getProcessTriple());
-  if (cpu == "native") {
-    Processor host{sys::getHostCPUName().str(), ""};
-    std::vector<std::string> features;
-    for (const auto &feature : sys::getHostCPUFeatures())
-      features.push_back((feature.second ? "+" : "-") + feature.first().str());
-    llvm::sort(features);
-    host.features = llvm::join(features, ",");
-    return host;
-  }
-  if (cpu.empty())
-    return Processor{getDefaultProcessor(triple).str(), ""};
-  Expected<const Target *> target = lookUpHost(triple);
-  if (!target)
-    return target.takeError();
-  if (!hasProcessor(**target, triple, cpu))
-    return createStringError("there is no processor '" + cpu + "' for " +
-                             triple.getArchName() +
-                             "; expected 'native' or a name that 'clang "
-                             "--print-supported-cpus' lists");
-  return Processor{cpu.str(), ""};
-}
 
 static Expected<std::unique_ptr<TargetMachine>>
 createMachine(const piko::TargetOptions &options) {

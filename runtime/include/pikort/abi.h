@@ -61,6 +61,24 @@
 extern "C" {
 #endif
 
+// --- Versions ---------------------------------------------------------------
+
+/// A program's functions, compiled for one processor.
+typedef struct pikoir_version {
+  const char *processor; ///< As pikoc was told.
+  const char *needs;     ///< Features (processor.def), separated by commas.
+  void (*setup)(pikort_pipeline *);
+  int32_t (*run)(pikort_pipeline *);
+} pikoir_version;
+
+/// All that the `setup` of a program calls which has code for several
+/// processors, or for one that not all are: runs the setup of the last version
+/// whose features this processor has, and has its run take the place of the
+/// program's. Of several versions $PIKO_CPU can name another one.
+PIKORT_API void pikoir_setup_version(pikort_pipeline *p,
+                                     const pikoir_version *versions,
+                                     int32_t count);
+
 // --- setup ------------------------------------------------------------------
 
 /// Flags of a stage.

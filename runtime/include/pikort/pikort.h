@@ -55,6 +55,7 @@ enum pikort_status {
   PIKORT_TOO_MANY = 6,         ///< More primitives or bins than 32 bits count.
   PIKORT_BAD_PROGRAM = 7,      ///< The program's declarations make no sense.
   PIKORT_VERSION = 8,          ///< Made for another version of the runtime.
+  PIKORT_WRONG_PROCESSOR = 9,  ///< No code that this processor can run.
   PIKORT_BIN_OUTSIDE = 16,     ///< AssignBin named a bin outside the grid.
   PIKORT_UPDATE_OUTSIDE = 17,  ///< An update outside of the call's own bin.
   PIKORT_INDEX_OUTSIDE = 18,   ///< An element outside a buffer or an image.
@@ -77,6 +78,9 @@ PIKORT_API void pikort_destroy(pikort_pipeline *pipeline);
 /// next call with this pipeline.
 PIKORT_API const char *pikort_message(const pikort_pipeline *pipeline);
 PIKORT_API const char *pikort_name(const pikort_pipeline *pipeline);
+/// The processor that the code is for which the pipeline runs, by the name that
+/// pikoc was given; "" where the program does not say.
+PIKORT_API const char *pikort_processor(const pikort_pipeline *pipeline);
 
 // --- Options ----------------------------------------------------------------
 

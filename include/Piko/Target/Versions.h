@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// A program whose code is there for several processors.
+
+#ifndef PIKO_TARGET_VERSIONS_H
+#define PIKO_TARGET_VERSIONS_H
+
+#include "Piko/Target/Processor.h"
+
+#include "llvm/IR/Module.h"
+
+#include <memory>
+
+namespace piko {
+
+/// Takes a module with the functions `pipeline`.setup and `pipeline`.run, and
+/// gives one that has all of its functions for each processor. It defines
+/// `symbol`, the pikort_program of the pipeline, and hides all else. What is
+/// not said to be for a processor is for the least one.
+std::unique_ptr<llvm::Module>
+defineProgram(std::unique_ptr<llvm::Module> module, llvm::StringRef pipeline,
+              llvm::StringRef symbol, llvm::ArrayRef<Processor> processors);
+
+} // namespace piko
+
+#endif // PIKO_TARGET_VERSIONS_H

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Names of processors, on other machines than this one.
+
+#include "Piko/Target/Processor.h"
+
+#include <gtest/gtest.h>
+
+using namespace piko;
+
+TEST(Processor, ListsAreForX86) {
+  llvm::Triple triple("aarch64-unknown-linux-gnu");
+  auto processors = resolveProcessors("cortex-a72,neoverse-n1", triple);
+  ASSERT_FALSE(bool(processors));
+  EXPECT_EQ(llvm::toString(processors.takeError()),
+            "expected one processor, because objects for aarch64 cannot choose "
+            "between several, but got 'cortex-a72,neoverse-n1'");
+}
+
+#if defined(__x86_64__)
+TEST(Processor, NeedsWhatCodeMayUse) {
+  auto base = resolveProcessor("x86-64");
+  ASSERT_TRUE(bool(base));
+  EXPECT_TRUE(base->needs.empty());
+  auto v3 = resolveProcessor("");
+  ASSERT_TRUE(bool(v3));
+  EXPECT_EQ(v3->name, "x86-64-v3");
+  std::vector<llvm::StringRef> expected = {
+      "sse3", "ssse3", "fma", "cx16", "sse4.1", "sse4.2", "movbe", "popcnt",
+      "avx",  "f16c",  "bmi", "avx2", "bmi2",   "sahf",   "lzcnt"};
+  EXPECT_EQ(v3->needs, expected);
+}
+#endif
