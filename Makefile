@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #
-# Two commands matter, and each works on a fresh Debian 12 machine:
+# Three commands matter, and each works on a fresh Debian 12 machine:
 #   make demo     render the bunny; says where the image is
 #   make check    build everything and run every test
+#   make bench    run the benchmarks, which takes twenty minutes; says where
+#                 the page is (BENCH=--quick: one minute; benchmarks/README.md)
 # The rest is a thin layer over the presets of CMakePresets.json.
 
 PRESET ?= release
@@ -17,7 +19,7 @@ BUNNY := /usr/share/glmark2/models/bunny.obj
 PIPE ?= Fused
 
 .DELETE_ON_ERROR:
-.PHONY: all build check clean configure demo deps docs format lint
+.PHONY: all bench build check clean configure demo deps docs format lint
 
 all: build
 
@@ -37,6 +39,12 @@ demo: configure
 	@$(BUILD)/bin/piko-render examples/raster/raster.piko.cpp --pipe $(PIPE) \
 	  $(BUNNY) --width 1024 --height 768 --out $(BUILD)/demo/bunny.png
 	@echo "rendered $(CURDIR)/$(BUILD)/demo/bunny.png"
+
+bench: configure
+	@cmake --build $(BUILD) --parallel $(JOBS) \
+	  --target piko-render pikoc piko-runtime-benchmark
+	@benchmarks/bench.py --bin $(BUILD)/bin --lib $(CURDIR)/$(BUILD)/lib \
+	  --out $(BUILD)/bench $(BENCH)
 
 check: build
 	@ctest --test-dir $(BUILD) --output-on-failure --parallel $(JOBS)

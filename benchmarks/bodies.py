@@ -52,6 +52,15 @@ def parse_arguments():
     return arguments
 
 
+def find_bodies():
+    return sorted(os.path.basename(file).removesuffix(".piko.cpp")
+                  for file in glob.glob(f"{BODIES}/*.piko.cpp"))
+
+
+def get_source(body):
+    return f"{BODIES}/{body}.piko.cpp"
+
+
 def get_program(arguments, body, build):
     march = arguments.march or ""
     name = build.replace(" ", "") + (march if build in REFERENCES else "")
@@ -77,7 +86,7 @@ def read(file):
 
 def build_compiled(arguments, body):
     """One host, with the object of each build."""
-    source = f"{BODIES}/{body}.piko.cpp"
+    source = get_source(body)
     header, host = (f"{arguments.work}/{body}.{end}" for end in ("h", "host.o"))
     before = read(header)
     for build, options in COMPILED.items():
@@ -94,33 +103,43 @@ def build_compiled(arguments, body):
 
 def build_reference(arguments, body, build):
     program = get_program(arguments, body, build)
-    source = f"{BODIES}/{body}.piko.cpp"
+    source = get_source(body)
     if is_newer(program, source):
         return  # the headers that they share change too seldom to look
     call([*REFERENCES[build], *arguments.flags, *CXX, source, "-o", program])
 
 
-def measure(arguments, body):
-    """The milliseconds of a frame, by build."""
-    best, results = {}, {}
+def measure_rounds(arguments, body, builds):
+    """The milliseconds of a frame in each round, by build."""
+    times, results = {build: [] for build in builds}, {}
     for _ in range(arguments.rounds):
-        for build in [*REFERENCES, *COMPILED]:
-            line = call([get_program(arguments, body, build),
-                         str(arguments.seconds)])
-            results[build], milliseconds = line.split()
-            best[build] = min(best.get(build, 1e9), float(milliseconds))
+        for build in builds:
+            results[build], milliseconds, *_ = call(
+                [get_program(arguments, body, build),
+                 str(arguments.seconds)]).split()
+            times[build].append(float(milliseconds))
     if len(set(results.values())) != 1:
         sys.exit(f"{body}: expected the same bits of all builds, but got "
                  f"{results}")
-    return best
+    return times
+
+
+def count(arguments, body):
+    """The operations and the bytes of a frame, if the body's host counts."""
+    _, _, *counts = call([get_program(arguments, body, "default"), "0"]).split()
+    return [float(number) for number in counts]
+
+
+def measure(arguments, body):
+    """The milliseconds of the fastest frame, by build."""
+    rounds = measure_rounds(arguments, body, [*REFERENCES, *COMPILED])
+    return {build: min(times) for build, times in rounds.items()}
 
 
 def main():
     arguments = parse_arguments()
     os.makedirs(arguments.work, exist_ok=True)
-    bodies = arguments.bodies or sorted(
-        os.path.basename(file).removesuffix(".piko.cpp")
-        for file in glob.glob(f"{BODIES}/*.piko.cpp"))
+    bodies = arguments.bodies or find_bodies()
     with ThreadPoolExecutor(arguments.jobs) as pool:
         jobs = [pool.submit(build_compiled, arguments, body)
                 for body in bodies]

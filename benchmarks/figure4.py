@@ -25,6 +25,7 @@ import shlex
 import statistics
 import sys
 
+from charts import COLORS, find_pyplot
 from commands import call
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
@@ -38,7 +39,6 @@ PANELS = [
     ("(c) BinnedFused: two stages are one", ["BinnedFused"], "Binned"),
     ("(d) Vertices shaded once", ["Indexed", "Fused", "Tiled"], "Baseline"),
 ]
-COLORS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7"]  # told apart by all eyes
 STYLES = [("-", "o"), ("--", "s"), (":", "^")]  # of the pipelines of a panel
 NUMBERS = {
     "triangles": int, "lights": int, "threads": int, "round": int, "ms": float,
@@ -243,7 +243,6 @@ def plain_line(dashes, marker):
 
 
 def draw(plot, results, out):
-    plot.rcParams.update({"svg.fonttype": "none", "svg.hashsalt": "figure4"})
     figure, axes = plot.subplots(2, 2, figsize=(9, 7.5))
     for panel, where in zip(PANELS, axes.flat):
         draw_panel(where, results, *panel)
@@ -255,14 +254,10 @@ def draw(plot, results, out):
 
 
 def load_matplotlib():
-    try:
-        import matplotlib
-    except ImportError:
+    pyplot = find_pyplot()
+    if not pyplot:
         sys.exit("figure4: charts need matplotlib (Debian's python3-matplotlib), "
                  f"which {sys.executable} does not have")
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
     return pyplot
 
 

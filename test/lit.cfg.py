@@ -6,6 +6,7 @@ split-file. Substitutions:
 
   %piko_include  folder of piko.h
   %examples      folder of the example pipelines
+  %benchmarks    folder of the benchmarks
   %bunny         a mesh of 69,666 triangles that a Debian package installs
   %python        the Python interpreter
   %utils, %docs  folders of the developer scripts and of the documents
@@ -71,6 +72,7 @@ if config.sanitize:
 config.substitutions += [
     ("%piko_include", include),
     ("%examples", os.path.join(config.piko_source_root, "examples")),
+    ("%benchmarks", os.path.join(config.piko_source_root, "benchmarks")),
     ("%bunny", bunny),
     ("%python", config.python),
     ("%qt_include", "".join(glob.glob("/usr/include/*/qt5")[:1])),

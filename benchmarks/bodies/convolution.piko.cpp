@@ -54,6 +54,10 @@ struct Host {
     bodies::bind(pipe.state().out, out);
     pipe.feed(pipe.convolve, rows);
   }
+  // 25 products and sums for a pixel.
+  double flops() const { return 50.0 * w * h; }
+  // A pixel is read, and one is written.
+  double bytes() const { return 2.0 * w * h * sizeof(float); }
   uint64_t result(auto &) { return bodies::hash(out); }
 };
 PIKO_BODY_MAIN(Convolution, Host)

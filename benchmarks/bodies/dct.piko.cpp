@@ -72,6 +72,12 @@ struct Host {
     bodies::bind(pipe.state().out, out);
     pipe.feed(pipe.transform, blocks);
   }
+  // For a pixel the offset, and 8 products and sums in each of two passes.
+  double flops() const { return 33.0 * w * h; }
+  // Pixels are read, coefficients are written.
+  double bytes() const {
+    return w * h * double(sizeof(uint8_t) + sizeof(int16_t));
+  }
   uint64_t result(auto &) { return bodies::hash(out); }
 };
 PIKO_BODY_MAIN(Dct, Host)

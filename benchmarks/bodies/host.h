@@ -77,7 +77,9 @@ template <class Pipe> void runOnce(Pipe &pipe) {
 }
 
 /// Prints the hash of the first frame and the fewest milliseconds of a warm
-/// one, of those that fit in so many seconds.
+/// one, of those that fit in so many seconds; and, where the host counts them,
+/// a frame's operations on floats, as the text has them, and the bytes that it
+/// must read or write at least once.
 template <class Pipe, class Host> int measure(int argc, char **argv) {
   double seconds = argc > 1 ? std::atof(argv[1]) : 1;
   try {
@@ -94,8 +96,11 @@ template <class Pipe, class Host> int measure(int argc, char **argv) {
       runOnce(pipe);
       best = std::min(best, now() - start);
     } while (now() - begin < seconds);
-    std::printf("%016llx %.6f\n", static_cast<unsigned long long>(result),
+    std::printf("%016llx %.6f", static_cast<unsigned long long>(result),
                 1e3 * best);
+    if constexpr (requires { host.flops(), host.bytes(); })
+      std::printf(" %.0f %.0f", host.flops(), host.bytes());
+    std::printf("\n");
   } catch (const std::exception &error) {
     std::fprintf(stderr, "%s\n", error.what());
     return 1;

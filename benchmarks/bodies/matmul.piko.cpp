@@ -49,6 +49,10 @@ struct Host {
     bodies::bind(pipe.state().c, c);
     pipe.feed(pipe.multiply, rows);
   }
+  // A product and a sum for each step.
+  double flops() const { return 2.0 * n * n * n; }
+  // a and b are read, c is written.
+  double bytes() const { return 3.0 * n * n * sizeof(float); }
   uint64_t result(auto &) { return bodies::hash(c); }
 };
 PIKO_BODY_MAIN(Matmul, Host)

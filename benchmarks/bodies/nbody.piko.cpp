@@ -53,6 +53,14 @@ struct Host {
     bodies::bind(pipe.state().forces, forces);
     pipe.feed(pipe.attract, list);
   }
+  // Of a pair: 3 differences, a dot product and its offset of 6, a root, a
+  // quotient, 3 products for the weight, 3 more and 3 sums.
+  double flops() const { return 20.0 * double(masses.size() * masses.size()); }
+  // Indices and masses are read, forces are written.
+  double bytes() const {
+    return double(list.size() * sizeof(Index) + masses.size() * sizeof(Mass) +
+                  forces.size() * sizeof(glm::vec3));
+  }
   uint64_t result(auto &) { return bodies::hash(forces); }
 };
 PIKO_BODY_MAIN(NBody, Host)

@@ -49,6 +49,10 @@ struct Host {
     bodies::bind(pipe.state().squares, squares);
     pipe.feed(pipe.scan, rows);
   }
+  // Two sums and a square.
+  double flops() const { return 3.0 * w * h; }
+  // One is read, two are written.
+  double bytes() const { return 3.0 * w * h * sizeof(float); }
   uint64_t result(auto &) { return bodies::hash(sums) ^ bodies::hash(squares); }
 };
 PIKO_BODY_MAIN(Prefix, Host)

@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// A function of the maths for each float of a buffer.
+#include <piko.h>
+
+struct State {
+  piko::Buffer<float> in, out;
+};
+struct Apply : piko::Stage<0, 0, 64, int>, piko::Uses<State> {
+  void process(const int &i) {
+    state().out[i] = piko::MATHS_FUNCTION(state().in[i]);
+  }
+};
+struct Maths : piko::Pipe<State> {
+  Apply apply;
+  Maths() { source(apply); }
+};
