@@ -4,6 +4,9 @@
 
 #include "Piko/Target/Processor.h"
 
+#include "llvm/ADT/StringMap.h"
+#include "llvm/TargetParser/Host.h"
+
 #include <gtest/gtest.h>
 
 using namespace piko;
@@ -29,5 +32,19 @@ TEST(Processor, NeedsWhatCodeMayUse) {
       "sse3", "ssse3", "fma", "cx16", "sse4.1", "sse4.2", "movbe", "popcnt",
       "avx",  "f16c",  "bmi", "avx2", "bmi2",   "sahf",   "lzcnt"};
   EXPECT_EQ(v3->needs, expected);
+}
+
+/// The runtime looks for nothing that LLVM would not see on this machine: code
+/// for `native` would need what the name of the processor promises.
+TEST(Processor, LLVMLooksForTheSameFeatures) {
+  llvm::StringMap<bool> seen = llvm::sys::getHostCPUFeatures();
+#define PIKO_FEATURE(name, leaf, subleaf, reg, shift, width, least, state)     \
+  EXPECT_TRUE(seen.contains(name)) << name;
+#include "pikort/processor.def"
+  auto native = resolveProcessor("native");
+  ASSERT_TRUE(bool(native));
+  EXPECT_FALSE(native->needs.empty());
+  for (llvm::StringRef need : native->needs)
+    EXPECT_TRUE(seen.lookup(need)) << need.str();
 }
 #endif
