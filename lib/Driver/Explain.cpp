@@ -30,6 +30,8 @@ struct Trace {
   std::vector<Remarks> remarks;  ///< of the passes that made any, in order
   std::string pass;              ///< that is running
   llvm::StringSet<> passes;      ///< that have run
+  /// Of stages that need not be strict, by name.
+  llvm::StringMap<Precision> precisions;
 
   void add(Diagnostic &remark);
 };
@@ -37,13 +39,21 @@ struct Trace {
 /// Keeps a trace of the passes of a manager, which owns it.
 struct Tracer : PassInstrumentation {
   explicit Tracer(Trace &trace) : trace(trace) {}
-  void runBeforePass(Pass *pass, Operation *) override {
+  void runBeforePass(Pass *pass, Operation *op) override {
     trace.pass = pass->getArgument().str();
+    if (trace.pass == "piko-apply-precision")
+      notePrecisions(cast<PipelineOp>(op));
     trace.passes.insert(trace.pass);
   }
   void runAfterPass(Pass *pass, Operation *op) override {
     if (pass->getArgument() == "piko-order-stages")
       trace.ordered = op->getParentOfType<ModuleOp>().clone();
+  }
+  void notePrecisions(PipelineOp pipeline) {
+    for (auto stage : pipeline.getOps<StageOp>())
+      if (ProcessOp process = stage.getProcess();
+          process && process.getPrecision())
+        trace.precisions[stage.getSymName()] = *process.getPrecision();
   }
   Trace &trace;
 };
@@ -253,6 +263,9 @@ void Report::writeStage(StageOp stage) {
   if (ScheduleOp schedule = stage.getSchedule();
       schedule && schedule.getUnordered())
     out << ", unordered";
+  if (auto said = trace.precisions.find(stage.getSymName());
+      said != trace.precisions.end())
+    out << ", " << stringifyPrecision(said->second) << " precision";
   if (isOnCycle(stage))
     out << ", on a cycle";
   if (!hosts.contains(stage.getSymName())) {

@@ -37,6 +37,9 @@ void piko::addCheckSequence(OpPassManager &passes,
 void piko::addSynthesisSequence(OpPassManager &passes,
                                 const SynthesisOptions &options) {
   addCleanUp(passes);
+  // First: proofs are about what is computed. It cannot be left out, as results
+  // depend on it.
+  passes.nest<PipelineOp>().addPass(createApplyPrecision());
   // A field that a loop reads is the same field behind it.
   passes.addPass(createLoopInvariantCodeMotionPass());
   addCleanUp(passes);

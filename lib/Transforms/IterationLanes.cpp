@@ -4,6 +4,7 @@
 
 #include "Lanes.h"
 
+#include "Piko/Dialect/Piko/IR/PikoApproximation.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
 #include "mlir/Dialect/Arith/IR/Arith.h"
@@ -215,7 +216,8 @@ static bool hasVectorForm(Operation *op) {
                math::RoundEvenOp, math::AbsFOp, math::AbsIOp, math::CopySignOp,
                math::FmaOp, math::CountLeadingZerosOp,
                math::CountTrailingZerosOp, math::CtPopOp>(op);
-  return isa<arith::ArithDialect>(op->getDialect());
+  return isa<ApproximateReciprocalOp, ApproximateRsqrtOp>(op) ||
+         isa<arith::ArithDialect>(op->getDialect());
 }
 
 /// Whether it does not matter which lane does it first.

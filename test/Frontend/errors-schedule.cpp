@@ -14,6 +14,9 @@
 // RUN: not piko-translate --cpp-to-piko -DCASE=12 %s 2>&1 | FileCheck %s --check-prefix=LANES
 // RUN: not piko-translate --cpp-to-piko -DCASE=13 %s 2>&1 | FileCheck %s --check-prefix=VARIABLE
 // RUN: not piko-translate --cpp-to-piko -DCASE=14 %s 2>&1 | FileCheck %s --check-prefix=RANGE
+// RUN: not piko-translate --cpp-to-piko -DCASE=15 %s 2>&1 | FileCheck %s --check-prefix=PRECISION
+// RUN: not piko-translate --cpp-to-piko -DCASE=16 %s 2>&1 | FileCheck %s --check-prefix=PRECISION-VARIABLE
+// RUN: not piko-translate --cpp-to-piko -DCASE=17 %s 2>&1 | FileCheck %s --check-prefix=PRECISION-RANGE
 #include <piko.h>
 
 struct State {
@@ -57,6 +60,16 @@ struct One : piko::Stage<8, 8, 64, int, int>, piko::Uses<State> {
 #elif CASE == 14
     // RANGE: errors-schedule.cpp:[[#@LINE + 1]]:5: error: expected a value of piko::Lanes, but got 4
     specifyLanes(static_cast<piko::Lanes>(4));
+#elif CASE == 15
+    // PRECISION: errors-schedule.cpp:[[#@LINE + 2]]:7: error: expected specifyPrecision for every bin, because it may not depend on the bin
+    if (bin.index)
+      specifyPrecision(piko::Precision::Relaxed);
+#elif CASE == 16
+    // PRECISION-VARIABLE: errors-schedule.cpp:[[#@LINE + 1]]:5: error: expected a precision to be a constant
+    specifyPrecision(static_cast<piko::Precision>(state().constant));
+#elif CASE == 17
+    // PRECISION-RANGE: errors-schedule.cpp:[[#@LINE + 1]]:5: error: expected a value of piko::Precision, but got 3
+    specifyPrecision(static_cast<piko::Precision>(3));
 #endif
   }
   void process(const int &i) {

@@ -14,11 +14,13 @@ struct State {
 // A tile split on another kind is accepted, and has no effect.
 // CHECK-LABEL: piko.stage @fixed
 // CHECK: piko.schedule serialize batch 16 lanes one{{$}}
+// CHECK-NEXT: piko.process precision relaxed {
 struct Fixed : piko::Stage<0, 0, 64, int, int> {
   void schedule(piko::BinId) {
     specifySchedule(piko::Serialize, 3);
     batch(16);
     specifyLanes(piko::Lanes::One);
+    specifyPrecision(piko::Precision::Relaxed);
   }
   void process(const piko::List<int> &list) { emit(list[0]); }
 };
@@ -49,10 +51,31 @@ struct Dynamic : piko::Stage<8, 8, 64, int>, piko::Uses<State> {
   }
   void process(const piko::List<int> &) {}
 };
+
+// A precision says nothing of where and when the stage runs: there is no
+// schedule. Strict is what holds without it.
+// CHECK-LABEL: piko.stage @contracted
+// CHECK-NOT: piko.schedule
+// CHECK: piko.process precision contracted {
+struct Contracted : piko::Stage<0, 0, 64, int> {
+  void schedule(piko::BinId) { specifyPrecision(piko::Precision::Contracted); }
+  void process(const int &) {}
+};
+// CHECK-LABEL: piko.stage @strict
+// CHECK-NOT: piko.schedule
+// CHECK: piko.process {
+struct Strict : piko::Stage<0, 0, 64, int> {
+  void schedule(piko::BinId) { specifyPrecision(piko::Precision::Strict); }
+  void process(const int &) {}
+};
 struct Pipeline : piko::Pipe<State> {
   Fixed fixed;
   Dynamic dynamic;
+  Contracted contracted;
+  Strict strict;
   Pipeline() {
+    source(contracted);
+    source(strict);
     source(fixed);
     connect(fixed, 0, dynamic);
   }

@@ -22,11 +22,14 @@ struct State {
 // CHECK: Pipeline All
 // CHECK: Stages, in order:
 
-// CHECK-NEXT: {{^  }}first: bins of 4 x all, 64 threads, serialize
+// CHECK-NEXT: {{^  }}first: bins of 4 x all, 64 threads, serialize, contracted precision
 // CHECK-NEXT: from source 0: 16 bytes a primitive
 struct First : piko::Stage<4, 0, 64, Item, Item, Item>, piko::Uses<State> {
   void assignBin(const Item &i) { assignToBoundingBox(i, i.at, i.at + 3); }
-  void schedule(piko::BinId) { specifySchedule(piko::Serialize); }
+  void schedule(piko::BinId) {
+    specifySchedule(piko::Serialize);
+    specifyPrecision(piko::Precision::Contracted);
+  }
   void process(const Item &i) {
     piko::atomicAdd(state().sums[0], i.value);
     emit(i, 0);
@@ -138,6 +141,8 @@ struct All : piko::Pipe<State> {
 
 // A note at another place has its own.
 // CHECK: What the passes did or refused:
+// CHECK-NEXT: piko-apply-precision
+// CHECK-NEXT: pikoc-explain.cpp:{{[0-9:]+}} stage 'first' is contracted: 0 additions
 // CHECK: {{^  }}piko-fuse-stages
 // CHECK: {{^    .*}}pikoc-explain.cpp:[[#GATHER:]]:10: stage 'gather' is not fused with stage 'repeat'
 // CHECK-NEXT: {{^      .*}}pikoc-explain.cpp:[[#GATHER-1]]:10: stage 'repeat' is on a cycle

@@ -316,7 +316,7 @@ TEST(Errors, AllocateForAMissingSource) {
 
 // What stages wait for, and whether they keep the order, is the same in all
 // bins.
-enum class Varying { EndStage, EndBin, Order, Nothing };
+enum class Varying { EndStage, EndBin, Order, Precision, Nothing };
 Varying varying;
 struct Varied : piko::Stage<1, 1, 1, int> {
   void assignBin(const int &i) { assignToAll(i); }
@@ -328,6 +328,8 @@ struct Varied : piko::Stage<1, 1, 1, int> {
       endBin();
     if (varying == Varying::Order && bin.index == 0)
       specifyOrder(piko::Unordered);
+    if (varying == Varying::Precision && bin.index != 2)
+      specifyPrecision(piko::Precision::Relaxed);
   }
   void process(const int &) {}
 };
@@ -354,6 +356,10 @@ TEST(Errors, SchedulesThatDependOnTheBin) {
   EXPECT_THAT(messageOf([&] { run(pipe, {}); }),
               HasSubstr("bin 1: expected specifyOrder to be said for all bins "
                         "or for none"));
+  varying = Varying::Precision;
+  EXPECT_THAT(messageOf([&] { run(pipe, {}); }),
+              HasSubstr("bin 2: expected specifyPrecision to be said for all "
+                        "bins or for none"));
   varying = Varying::Nothing;
   EXPECT_EQ(messageOf([&] { run(pipe, {}); }), "(no error)");
 }

@@ -102,6 +102,9 @@ struct ScheduleDescription {
   /// What lanes are given, as piko::Lanes has it, and where the text says so.
   std::optional<int64_t> lanes = std::nullopt;
   std::optional<mlir::Location> lanesLocation = std::nullopt;
+  /// As piko::Precision has it. It is the process phase's, and says nothing of
+  /// where and when that runs.
+  int64_t precision = 0;
 
   SchedulePolicy getPolicy() const {
     return policy.value_or(SchedulePolicy::LoadBalance);

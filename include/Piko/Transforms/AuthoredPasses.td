@@ -53,6 +53,59 @@ def AddChecks : Pass<"piko-add-checks", "::mlir::ModuleOp"> {
                            "::mlir::memref::MemRefDialect"];
 }
 
+def ApplyPrecision : Pass<"piko-apply-precision", "::piko::PipelineOp"> {
+  let summary = "Compute in each process phase as precisely as its stage says";
+  let description = [{
+    **Requires** the authored level, with stages as they are written: the
+    operations of one carry its precision through all fusions.
+
+    **Does**, in a process phase that says `precision contracted`: makes an
+    addition or a subtraction of a product a `math.fma`, whether the product is
+    used elsewhere, too, or not. Of two products the left one is fused. In one
+    that says `precision relaxed`, before that, in f32: makes a division a
+    product with a reciprocal, of a constant the nearest one, otherwise a
+    `piko.approximate_reciprocal` or, if the divisor is a square root, a
+    `piko.approximate_rsqrt`; and a `math.sqrt` a product with the latter. One
+    step of Newton's method makes each nearly exact. `piko::rsqrt`, which computes
+    in f64, is recognised.
+
+    **Guarantees** that no precision is left, and that what is computed is
+    written down: no later pass, no vector form and no number of threads changes
+    a bit of it. Divisions by 0 and by infinities, roots of these and of negative
+    numbers, and NaNs give what they do in `strict`. A phase that says nothing,
+    `assign` and `schedule` stay as they are.
+
+    Before:
+    ```
+    piko.process precision relaxed {
+      ...
+      %q = arith.divf %a, %x : f32
+      %s = arith.addf %q, %b : f32
+    ```
+    After:
+    ```
+    piko.process {
+      ...
+      %r = piko.approximate_reciprocal %x : f32
+      %minus = arith.negf %x : f32
+      %error = math.fma %minus, %r, %one : f32
+      %better = math.fma %r, %error, %r : f32
+      %isGood = arith.cmpf ogt, %error, %minusOne : f32
+      %1 = arith.select %isGood, %better, %r : f32
+      %s = math.fma %a, %1, %b : f32
+    ```
+
+    **Limits**: a sum in a loop keeps its order, though `relaxed` permits another.
+    Divisors beyond 2^126 may count as infinite, and below 2^-126 as 0.
+  }];
+  let statistics = [
+    Statistic<"contracted", "contracted", "additions that became math.fma">,
+    Statistic<"reciprocals", "reciprocals", "divisions that became products">,
+    Statistic<"roots", "roots", "square roots that became products">];
+  let dependentDialects = ["::mlir::arith::ArithDialect",
+                           "::mlir::math::MathDialect"];
+}
+
 def NormalizeLoops : Pass<"piko-normalize-loops"> {
   let summary = "Put the work of a loop behind its condition";
   let description = [{

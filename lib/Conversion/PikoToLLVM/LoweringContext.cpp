@@ -198,6 +198,24 @@ LLVM::CallOp LoweringContext::call(OpBuilder &builder, Location loc,
   return call;
 }
 
+LLVM::LLVMFuncOp LoweringContext::approximation(OpBuilder &builder,
+                                                StringRef name, Type type) {
+  if (auto known = module.lookupSymbol<LLVM::LLVMFuncOp>(name))
+    return known;
+  OpBuilder::InsertionGuard guard(builder);
+  builder.setInsertionPointToStart(module.getBody());
+  auto function =
+      LLVM::LLVMFuncOp::create(builder, module.getLoc(), name,
+                               LLVM::LLVMFunctionType::get(type, {type}));
+  constexpr auto none = LLVM::ModRefInfo::NoModRef;
+  function.setMemoryEffectsAttr(LLVM::MemoryEffectsAttr::get(
+      builder.getContext(), {none, none, none, none, none, none}));
+  function.setNoUnwind(true);
+  function.setWillReturn(true);
+  function.setPassthroughAttr(builder.getStrArrayAttr({"speculatable"}));
+  return function;
+}
+
 StringRef LoweringContext::zeros(int64_t bytes) {
   constexpr StringRef name = "piko.zeros";
   auto zeros = module.lookupSymbol<LLVM::GlobalOp>(name);

@@ -85,6 +85,11 @@ public:
                           const RuntimeFunction &function,
                           mlir::ValueRange arguments);
 
+  /// The function of that name from a `type` to one, which does nothing but
+  /// compute. Declared on first use.
+  mlir::LLVM::LLVMFuncOp approximation(mlir::OpBuilder &builder,
+                                       mlir::StringRef name, mlir::Type type);
+
   /// The name of a constant of at least so many zero bytes.
   mlir::StringRef zeros(int64_t bytes);
 
@@ -151,7 +156,7 @@ mlir::Value createBytes(mlir::OpBuilder &builder, mlir::Location loc,
                         mlir::MemRefType type);
 
 /// Patterns for the storage of bins, for writers, for state, for checking mode,
-/// and for the logs of grids.
+/// for approximations, and for the logs of grids.
 void populateKernelToLLVMPatterns(const mlir::TypeConverter &converter,
                                   mlir::RewritePatternSet &patterns,
                                   LoweringContext &context);
@@ -168,6 +173,9 @@ void populateChecksToLLVMPatterns(const mlir::TypeConverter &converter,
                                   mlir::RewritePatternSet &patterns,
                                   LoweringContext &context);
 
+void populateApproximationsToLLVMPatterns(const mlir::TypeConverter &converter,
+                                          mlir::RewritePatternSet &patterns,
+                                          LoweringContext &context);
 void populateGridToLLVMPatterns(const mlir::TypeConverter &converter,
                                 mlir::RewritePatternSet &patterns,
                                 LoweringContext &context);

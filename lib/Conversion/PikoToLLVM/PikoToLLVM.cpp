@@ -154,6 +154,7 @@ LogicalResult ConvertPikoToLLVMPass::convert(PipelineOp pipeline,
   populateStateToLLVMPatterns(converter, patterns, context);
   populateLanesToLLVMPatterns(converter, patterns, context);
   populateChecksToLLVMPatterns(converter, patterns, context);
+  populateApproximationsToLLVMPatterns(converter, patterns, context);
   populateGridToLLVMPatterns(converter, patterns, context);
   FrozenRewritePatternSet frozen(std::move(patterns));
   for (func::FuncOp function : functions)

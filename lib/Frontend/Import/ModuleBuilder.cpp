@@ -187,7 +187,12 @@ private:
     }
     if (!buildSchedule(number))
       return false;
-    auto process = ProcessOp::create(builder, *stage.processLocation, nullptr);
+    PrecisionAttr precision;
+    if (auto said = static_cast<Precision>(stage.schedule.precision);
+        said != Precision::Strict)
+      precision = PrecisionAttr::get(&context, said);
+    auto process =
+        ProcessOp::create(builder, *stage.processLocation, nullptr, precision);
     return buildPhase(WrapperKind::Process, number, process.getBody());
   }
 

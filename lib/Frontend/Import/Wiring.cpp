@@ -265,10 +265,11 @@ private:
            });
   }
   static llvm::StringRef getDirectiveName(const Marker &marker) {
-    return marker.kind == MarkerKind::endStage ? "endStage"
-           : marker.kind == MarkerKind::endBin ? "endBin"
-           : marker.kind == MarkerKind::lanes  ? "specifyLanes"
-                                               : "specifyOrder";
+    return marker.kind == MarkerKind::endStage    ? "endStage"
+           : marker.kind == MarkerKind::endBin    ? "endBin"
+           : marker.kind == MarkerKind::lanes     ? "specifyLanes"
+           : marker.kind == MarkerKind::precision ? "specifyPrecision"
+                                                  : "specifyOrder";
   }
   bool failPhase(const llvm::CallInst *call, const StageDescription &stage) {
     fail(call) << "expected only directives in the schedule phase of stage '"
@@ -297,6 +298,7 @@ private:
     case MarkerKind::endBin:
     case MarkerKind::order:
     case MarkerKind::lanes:
+    case MarkerKind::precision:
       directives.push_back({call, &marker});
       return true;
     case MarkerKind::assign:
@@ -356,6 +358,14 @@ private:
         return schedule.lanes.has_value();
       fail(call) << "expected a value of piko::Lanes, but got "
                  << *schedule.lanes;
+      return false;
+    case MarkerKind::precision:
+      if (!(number = getConstant(call, 0, "a precision")))
+        return false;
+      schedule.precision = *number;
+      if (*number >= 0 && *number <= 2)
+        return true;
+      fail(call) << "expected a value of piko::Precision, but got " << *number;
       return false;
     default:
       if (!(number = getConstant(call, 0, "an order")))

@@ -33,10 +33,11 @@ std::optional<MarkerKind> piko::getMarkerKind(llvm::StringRef name) {
                           MARKER(binHi) MARKER(domain) MARKER(schedule)
                               MARKER(endStage) MARKER(endBin) MARKER(batch)
                                   MARKER(everyBin) MARKER(order) MARKER(lanes)
-                                      MARKER(source) MARKER(connect)
-                                          MARKER(allocateForSource)
-                                              MARKER(phase) MARKER(clear)
-                                                  .Default(std::nullopt);
+                                      MARKER(precision) MARKER(source)
+                                          MARKER(connect)
+                                              MARKER(allocateForSource)
+                                                  MARKER(phase) MARKER(clear)
+                                                      .Default(std::nullopt);
 #undef MARKER
 }
 

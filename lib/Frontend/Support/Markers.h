@@ -58,6 +58,7 @@ enum class MarkerKind {
   everyBin,
   order,
   lanes,
+  precision,
   source,
   connect,
   allocateForSource,

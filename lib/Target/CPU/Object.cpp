@@ -4,6 +4,7 @@
 
 #include "Piko/Target/Object.h"
 
+#include "LowerArithmetic.h"
 #include "Piko/Target/CodeGeneration.h"
 #include "SelectBits.h"
 
@@ -69,12 +70,14 @@ struct LeaveOutGlobals : PassInfoMixin<LeaveOutGlobals> {
 };
 } // namespace
 
-/// What runs behind the optimizer: the instrumentation, without a constructor,
-/// as the program has initialised the runtime.
-static ModulePassManager makeLastPasses(const Triple &triple, int optLevel,
-                                        Sanitizer sanitizer) {
+/// What runs behind the optimizer: instructions of the machine that it does not
+/// know, and the instrumentation, without a constructor, as the program has
+/// initialised the runtime.
+static ModulePassManager makeLastPasses(const TargetMachine &machine,
+                                        int optLevel, Sanitizer sanitizer) {
   ModulePassManager passes;
-  if (triple.isX86() && optLevel > 0)
+  passes.addPass(LowerArithmeticPass(machine));
+  if (machine.getTargetTriple().isX86() && optLevel > 0)
     passes.addPass(createModuleToFunctionPassAdaptor(SelectBitsPass()));
   if (sanitizer == Sanitizer::Thread)
     passes.addPass(createModuleToFunctionPassAdaptor(ThreadSanitizerPass()));
@@ -117,9 +120,10 @@ Expected<std::string> piko::generateCode(Module &module,
   module.setPICLevel(PICLevel::BigPIC);
   gatherInitializers(module);
   markForSanitizer(module, options.sanitizer);
-  return emitCode(module, **machine, options.optLevel,
-                  format == CodeFormat::Object ? CodeGenFileType::ObjectFile
-                                               : CodeGenFileType::AssemblyFile,
-                  makeLastPasses((*machine)->getTargetTriple(),
-                                 options.optLevel, options.sanitizer));
+  prepareArithmetic(module, **machine);
+  return emitCode(
+      module, **machine, options.optLevel,
+      format == CodeFormat::Object ? CodeGenFileType::ObjectFile
+                                   : CodeGenFileType::AssemblyFile,
+      makeLastPasses(**machine, options.optLevel, options.sanitizer));
 }

@@ -4,8 +4,11 @@
 
 #include "Piko/Target/PTX.h"
 
+#include "Piko/Conversion/Approximations.h"
 #include "Piko/Target/CodeGeneration.h"
 
+#include "llvm/IR/IRBuilder.h"
+#include "llvm/IR/IntrinsicsNVPTX.h"
 #include "llvm/MC/TargetRegistry.h"
 #include "llvm/Support/TargetSelect.h"
 
@@ -36,11 +39,34 @@ createMachine(StringRef processor, int optLevel) {
       triple, processor, "", flags, std::nullopt, std::nullopt, level));
 }
 
+/// Approximations become instructions; kernels have no vectors of floats.
+static Error replaceApproximations(Module &module) {
+  for (Function &function : make_early_inc_range(module)) {
+    StringRef name = function.getName();
+    Intrinsic::ID intrinsic;
+    if (name == getApproximationName(approximateReciprocal, 0))
+      intrinsic = Intrinsic::nvvm_rcp_approx_ftz_f;
+    else if (name == getApproximationName(approximateRsqrt, 0))
+      intrinsic = Intrinsic::nvvm_rsqrt_approx_ftz_f;
+    else if (name.starts_with(approximateReciprocal) ||
+             name.starts_with(approximateRsqrt))
+      return createStringError("PTX has no '" + name + "'");
+    else
+      continue;
+    function.replaceAllUsesWith(
+        Intrinsic::getOrInsertDeclaration(&module, intrinsic));
+    function.eraseFromParent();
+  }
+  return Error::success();
+}
+
 Expected<std::string> piko::generatePTX(Module &module, StringRef processor,
                                         int optLevel) {
   auto machine =
       createMachine(processor.empty() ? defaultProcessor : processor, optLevel);
   if (!machine)
     return machine.takeError();
+  if (Error error = replaceApproximations(module))
+    return error;
   return emitCode(module, **machine, optLevel, CodeGenFileType::AssemblyFile);
 }

@@ -72,6 +72,13 @@ enum class Lanes : int32_t {
   One = 3,        ///< one lane does everything
 };
 
+/// How exactly the numbers of a Process are computed by a compiled pipeline.
+enum class Precision : int32_t {
+  Strict = 0,     ///< to the bit as the reference executor does
+  Contracted = 1, ///< a * b + c may be rounded once
+  Relaxed = 2,    ///< and division and square root may be approximations
+};
+
 /// The primitives of one bin, or one batch of them, in order.
 template <class T> class List;
 

@@ -98,6 +98,7 @@ void batch(int64_t size);
 void everyBin();
 void order(int32_t order);
 void lanes(int32_t lanes);
+void precision(int32_t precision);
 
 // The graph. Stages are given by their addresses in the pipeline.
 void source(const void *stage);

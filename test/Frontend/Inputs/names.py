@@ -17,7 +17,7 @@ STAGE = """
     assignBin assignToAll assignToBin assignToBoundingBox assignToLine
     assignToPreviousBins
     schedule specifySchedule endStage endBin batch everyBin specifyOrder
-    specifyLanes process emit update parallelFor parallelForPixels sync any all count reduce
+    specifyLanes specifyPrecision process emit update parallelFor parallelForPixels sync any all count reduce
     scan sort bin binLo binHi binFromPosition domain state BasicStage Stage
     Uses"""
 PIPE = """
@@ -26,7 +26,7 @@ PIPE = """
     expectNumbers nameState Pipe"""
 NAMESPACE = """
     All BasicStage BinId Bins Buffer Cells DirectMap Error Image InLineage Lanes List
-    LoadBalance NoState Order Pipe Position SchedulePolicy Serialize Stage
+    LoadBalance NoState Order Pipe Position Precision SchedulePolicy Serialize Stage
     Status Unordered Uses acos asin atan atan2 atomicAdd atomicAddFetch atomicAnd
     atomicMax atomicMin atomicOr atomicXor cbrt cos cosh exp exp2 fma hypot log
     log10 log2 max min pow rsqrt sin sinh sqrt tan tanh toInt toInt64 toUint"""

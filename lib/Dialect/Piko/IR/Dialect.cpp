@@ -6,6 +6,7 @@
 #include "IsolatedBody.h"
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "Piko/Dialect/Piko/IR/Marks.h"
+#include "Piko/Dialect/Piko/IR/PikoApproximation.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 #include "Piko/Dialect/Piko/IR/PikoCheck.h"
 #include "Piko/Dialect/Piko/IR/PikoGPU.h"
@@ -55,6 +56,10 @@ void PikoDialect::initialize() {
   addOperations<
 #define GET_OP_LIST
 #include "Piko/Dialect/Piko/IR/PikoGPUOps.cpp.inc"
+      >();
+  addOperations<
+#define GET_OP_LIST
+#include "Piko/Dialect/Piko/IR/PikoApproximationOps.cpp.inc"
       >();
 }
 

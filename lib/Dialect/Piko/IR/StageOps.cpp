@@ -252,5 +252,7 @@ LogicalResult AssignOp::verifyRegions() {
 }
 
 LogicalResult ProcessOp::verifyRegions() {
+  if (getPrecision() && !isa<StageOp>((*this)->getParentOp()))
+    return emitOpError("expected a precision only in a piko.stage");
   return verifyPhase(*this, /*isProcess=*/true);
 }

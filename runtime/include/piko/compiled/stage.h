@@ -331,6 +331,9 @@ protected:
   void everyBin() { marker::everyBin(); }
   void specifyOrder(Order order) { marker::order(order); }
   void specifyLanes(Lanes lanes) { marker::lanes(static_cast<int>(lanes)); }
+  void specifyPrecision(Precision precision) {
+    marker::precision(static_cast<int>(precision));
+  }
 };
 
 template <int X, int Y, int Threads, class In, class... Out>

@@ -57,6 +57,7 @@ public:
     node.collected.assign(node.grid.bins(), {});
     std::vector<const TypeInfo *> waitsOn;
     bool endsBin = false, unordered = false;
+    Precision precision = Precision::Strict;
     auto expectSame = [&](bool isSame, int64_t bin, const char *directive) {
       if (bin > 0 && !isSame)
         node.fail(bin, std::string("expected ") + directive +
@@ -65,6 +66,7 @@ public:
     for (int64_t bin = 0; bin < node.grid.bins(); ++bin) {
       node.waitsOn.clear();
       node.endsBin = node.unordered = false;
+      node.precision = Precision::Strict;
       Frame call{.phase = Phase::Schedule, .node = &node, .bin = bin};
       run(call, [&] { node.schedule(bin); });
       expectSame(std::is_permutation(node.waitsOn.begin(), node.waitsOn.end(),
@@ -72,9 +74,11 @@ public:
                  bin, "endStage");
       expectSame(node.endsBin == endsBin, bin, "endBin");
       expectSame(node.unordered == unordered, bin, "specifyOrder");
+      expectSame(node.precision == precision, bin, "specifyPrecision");
       waitsOn = node.waitsOn;
       endsBin = node.endsBin;
       unordered = node.unordered;
+      precision = node.precision;
     }
   }
 

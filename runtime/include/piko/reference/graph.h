@@ -71,6 +71,7 @@ public:
   std::vector<const TypeInfo *> waitsOn; ///< endStage
   bool endsBin = false;                  ///< endBin
   bool unordered = false;
+  Precision precision = Precision::Strict; ///< of compiled code only
   bool collects() const { return takesList || endsBin || !waitsOn.empty(); }
   int loop = -1; ///< which cycle of stages that do not collect, or -1
   std::vector<std::vector<std::byte>> collected; ///< primitives of each bin

@@ -277,6 +277,13 @@ public:
   void specifyLanes(Lanes, reference::Place at = reference::Place::current()) {
     reference::frameInSchedule("specifyLanes", at);
   }
+  /// How exactly a compiled pipeline computes Process. The reference executor
+  /// computes strictly.
+  void specifyPrecision(Precision precision,
+                        reference::Place at = reference::Place::current()) {
+    reference::frameInSchedule("specifyPrecision", at).node->precision =
+        precision;
+  }
 
   // Process.
 

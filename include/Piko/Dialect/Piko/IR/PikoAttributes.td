@@ -62,6 +62,15 @@ def Piko_LaneMapping : I32EnumAttr<"LaneMapping", "what lanes are given", [
 }
 def Piko_LaneMappingAttr : EnumAttr<Piko_Dialect, Piko_LaneMapping, "lanes">;
 
+def Piko_Precision : I32EnumAttr<"Precision", "how exactly numbers are computed", [
+  I32EnumAttrCase<"Strict", 0, "strict">,
+  I32EnumAttrCase<"Contracted", 1, "contracted">,
+  I32EnumAttrCase<"Relaxed", 2, "relaxed">]> {
+  let cppNamespace = "::piko";
+  let genSpecializedAttr = 0;
+}
+def Piko_PrecisionAttr : EnumAttr<Piko_Dialect, Piko_Precision, "precision">;
+
 def Piko_DivisionKind : I32EnumAttr<"DivisionKind", "integer division", [
   I32EnumAttrCase<"QuotientS", 0, "quotient_signed">,
   I32EnumAttrCase<"QuotientU", 1, "quotient_unsigned">,

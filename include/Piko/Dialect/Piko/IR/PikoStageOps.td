@@ -138,6 +138,10 @@ def Piko_ProcessOp : Piko_PhaseOp<"process"> {
     In a stage that takes a `list` the block argument is a `!piko.list`: all
     primitives of a bin in lineage order, or a batch of them.
 
+    A `precision` other than `strict` is a permission that `piko-apply-precision`
+    makes use of, and takes away: below, operations say exactly what they
+    compute. Only the authored level has it.
+
     ```mlir
     piko.record @F {"z" : f32 at 0} size 4 align 4
     piko.pipeline @P rank 2 {
@@ -162,9 +166,13 @@ def Piko_ProcessOp : Piko_PhaseOp<"process"> {
     }
     ```
   }];
-  let arguments = (ins OptionalAttr<FlatSymbolRefAttr>:$stage);
+  let arguments = (ins OptionalAttr<FlatSymbolRefAttr>:$stage,
+                       OptionalAttr<Piko_PrecisionAttr>:$precision);
   let regions = (region SizedRegion<1>:$body);
-  let assemblyFormat = "(`of` $stage^)? attr-dict-with-keyword custom<PhaseBody>($body)";
+  let assemblyFormat = [{
+    (`of` $stage^)? (`precision` $precision^)?
+    attr-dict-with-keyword custom<PhaseBody>($body)
+  }];
   let hasRegionVerifier = 1;
 }
 

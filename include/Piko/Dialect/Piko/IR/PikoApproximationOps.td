@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// The approximations that processors have instructions for.
+
+#ifndef PIKO_DIALECT_PIKO_IR_PIKOAPPROXIMATIONOPS_TD
+#define PIKO_DIALECT_PIKO_IR_PIKOAPPROXIMATIONOPS_TD
+
+include "Piko/Dialect/Piko/IR/PikoBase.td"
+
+/// As an operation of `arith`: of a float, or of each one of a vector.
+class Piko_ApproximationOp<string mnemonic> : Piko_Op<mnemonic, [
+    Pure, SameOperandsAndResultType, Elementwise, Scalarizable, Vectorizable,
+    Tensorizable]> {
+  let arguments = (ins FloatLike:$operand);
+  let results = (outs FloatLike:$result);
+  let assemblyFormat = "$operand attr-dict `:` type($result)";
+  let hasVerifier = 1;
+}
+
+def Piko_ApproximateReciprocalOp : Piko_ApproximationOp<"approximate_reciprocal"> {
+  let summary = "about 1 / x, with a relative error below 2^-11";
+  let description = [{
+    Whatever instruction the processor has for it (`vrcp14ps`, `rcpps`,
+    `rcp.approx`), or a division where there is none. It gives the same for a
+    number as for one of a vector. Of 0 it is infinite, of an infinity 0, both
+    with the sign of the operand. Denormals may count as 0, operands and results
+    alike.
+
+    ```mlir
+    %r = piko.approximate_reciprocal %x : f32
+    %s = piko.approximate_reciprocal %xs : vector<16xf32>
+    ```
+  }];
+}
+
+def Piko_ApproximateRsqrtOp : Piko_ApproximationOp<"approximate_rsqrt"> {
+  let summary = "about 1 / sqrt(x), with a relative error below 2^-11";
+  let description = [{
+    See `piko.approximate_reciprocal`. Of a number below 0 it is NaN.
+
+    ```mlir
+    %r = piko.approximate_rsqrt %x : f32
+    ```
+  }];
+}
+
+#endif // PIKO_DIALECT_PIKO_IR_PIKOAPPROXIMATIONOPS_TD

@@ -1,0 +1,273 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// piko-apply-precision: for each process phase that need not be strict,
+//   1. of divisions and square roots in f32, make products with approximations
+//      that a step of Newton's method refines;
+//   2. make additions of products math.fma.
+//
+// A refined approximation is `first + first * (share of) error`, where `error`
+// tells how far `first` is off: 1 - x * first for a reciprocal. Where `first`
+// is infinite or 0, `error` is NaN or infinite, and `first` is the result. So
+// no test of the operand is needed.
+
+#include "Piko/Dialect/Piko/IR/CppTypes.h"
+#include "Piko/Dialect/Piko/IR/PikoApproximation.h"
+#include "Piko/Transforms/Passes.h"
+
+#include "mlir/Dialect/Arith/IR/Arith.h"
+#include "mlir/Dialect/Math/IR/Math.h"
+#include "mlir/IR/ImplicitLocOpBuilder.h"
+#include "mlir/IR/Matchers.h"
+#include "mlir/IR/TypeUtilities.h"
+#include "mlir/Interfaces/SideEffectInterfaces.h"
+
+namespace piko {
+#define GEN_PASS_DEF_APPLYPRECISION
+#include "Piko/Transforms/Passes.h.inc"
+} // namespace piko
+
+using namespace mlir;
+using namespace piko;
+
+namespace {
+
+struct ApplyPrecisionPass : piko::impl::ApplyPrecisionBase<ApplyPrecisionPass> {
+  void runOnOperation() override;
+};
+
+/// Makes products of divisions and square roots, in f32.
+class Approximation {
+public:
+  explicit Approximation(Operation *op) : builder(op->getLoc(), op) {}
+
+  /// What replaces an operation, or null.
+  Value replace(Operation *op);
+
+private:
+  Value replaceDivision(Value dividend, Value divisor);
+  Value replaceRoot(Value x);
+  Value getReciprocal(Value x);
+  Value getRsqrt(Value x);
+  /// `first + share * error`, if `error` is one of a number.
+  Value refine(Value first, Value share, Value error, Value otherwise = {});
+  /// 1 - a * b.
+  Value getError(Value a, Value b) {
+    return math::FmaOp::create(builder, arith::NegFOp::create(builder, a), b,
+                               getConstant(1));
+  }
+  Value getProduct(Value a, Value b) {
+    return arith::MulFOp::create(builder, a, b);
+  }
+  Value getConstant(float value) {
+    return arith::ConstantOp::create(builder, builder.getF32FloatAttr(value));
+  }
+
+  ImplicitLocOpBuilder builder;
+};
+
+} // namespace
+
+//===----------------------------------------------------------------------===//
+// Approximations
+//===----------------------------------------------------------------------===//
+
+static bool isOne(Value value) { return matchPattern(value, m_OneFloat()); }
+
+/// The operand of a square root, or null.
+static Value getRooted(Value value) {
+  auto root = value.getDefiningOp<math::SqrtOp>();
+  return root ? root.getOperand() : Value();
+}
+
+/// x where a number is piko::rsqrt(x), which divides and extracts in f64; or
+/// null.
+static Value getWideRsqrt(Operation *op) {
+  auto narrow = dyn_cast<arith::TruncFOp>(op);
+  if (!narrow || !narrow.getType().isF32())
+    return {};
+  auto division = narrow.getIn().getDefiningOp<arith::DivFOp>();
+  Value rooted = division && isOne(division.getLhs())
+                     ? getRooted(division.getRhs())
+                     : Value();
+  auto wide = rooted ? rooted.getDefiningOp<arith::ExtFOp>() : arith::ExtFOp();
+  return wide && wide.getIn().getType().isF32() ? wide.getIn() : Value();
+}
+
+Value Approximation::replace(Operation *op) {
+  if (Value x = getWideRsqrt(op))
+    return getRsqrt(x);
+  if (op->getNumResults() != 1 || !op->getResult(0).getType().isF32())
+    return {};
+  if (auto division = dyn_cast<arith::DivFOp>(op))
+    return replaceDivision(division.getLhs(), division.getRhs());
+  if (auto root = dyn_cast<math::SqrtOp>(op))
+    return replaceRoot(root.getOperand());
+  return {};
+}
+
+Value Approximation::replaceDivision(Value dividend, Value divisor) {
+  Value inverse;
+  FloatAttr constant;
+  if (matchPattern(divisor, m_Constant(&constant))) {
+    // The nearest number, unless that has fewer bits.
+    APFloat value = constant.getValue(), one(1.0f);
+    one.divide(value, APFloat::rmNearestTiesToEven);
+    if (!one.isNormal() || !value.isNormal())
+      return {};
+    inverse = arith::ConstantOp::create(
+        builder, builder.getF32FloatAttr(one.convertToFloat()));
+  } else if (Value x = getRooted(divisor)) {
+    inverse = getRsqrt(x);
+  } else {
+    inverse = getReciprocal(divisor);
+  }
+  return isOne(dividend) ? inverse : getProduct(dividend, inverse);
+}
+
+Value Approximation::refine(Value first, Value share, Value error,
+                            Value otherwise) {
+  Value better = math::FmaOp::create(builder, share, error, first);
+  // Of 0 and infinity it is NaN; of what counted as 0, -infinity.
+  Value isGood = arith::CmpFOp::create(builder, arith::CmpFPredicate::OGT,
+                                       error, getConstant(-1));
+  return arith::SelectOp::create(builder, isGood, better,
+                                 otherwise ? otherwise : first);
+}
+
+Value Approximation::getReciprocal(Value x) {
+  Value first = ApproximateReciprocalOp::create(builder, x);
+  return refine(first, first, getError(x, first));
+}
+
+Value Approximation::getRsqrt(Value x) {
+  Value first = ApproximateRsqrtOp::create(builder, x);
+  Value error = getError(getProduct(x, first), first);
+  return refine(first, getProduct(first, getConstant(0.5f)), error);
+}
+
+Value Approximation::replaceRoot(Value x) {
+  Value inverse = ApproximateRsqrtOp::create(builder, x);
+  Value first = getProduct(x, inverse);
+  // 0 and infinity, which are their own roots, and what counts as 0; but of a
+  // negative number there is none.
+  Value isNaN = arith::CmpFOp::create(builder, arith::CmpFPredicate::UNO,
+                                      inverse, inverse);
+  Value itself = arith::SelectOp::create(builder, isNaN, inverse, x);
+  // The root of what counts as -0 is that, not +infinity.
+  Value error = getError(first, inverse);
+  return refine(first, getProduct(first, getConstant(0.5f)), error, itself);
+}
+
+//===----------------------------------------------------------------------===//
+// Contraction
+//===----------------------------------------------------------------------===//
+
+/// A product, and whether it is negated.
+struct Product {
+  arith::MulFOp op;
+  bool isNegative = false;
+};
+
+static Product getProduct(Value value) {
+  if (auto negation = value.getDefiningOp<arith::NegFOp>())
+    return {negation.getOperand().getDefiningOp<arith::MulFOp>(), true};
+  return {value.getDefiningOp<arith::MulFOp>()};
+}
+
+/// What a sum becomes: a * b + c, with the signs that `isDifference` and the
+/// product ask for; null where neither side is a product.
+static Value contract(Operation *sum, bool isDifference) {
+  Value left = sum->getOperand(0), right = sum->getOperand(1);
+  ImplicitLocOpBuilder builder(sum->getLoc(), sum);
+  auto negateIf = [&](bool isNegative, Value value) -> Value {
+    return isNegative ? arith::NegFOp::create(builder, value).getResult()
+                      : value;
+  };
+  Product product = getProduct(left);
+  bool isLeft = bool(product.op);
+  if (!isLeft)
+    product = getProduct(right);
+  if (!product.op)
+    return {};
+  bool negates = product.isNegative != (isDifference && !isLeft);
+  Value addend = isLeft ? negateIf(isDifference, right) : left;
+  return math::FmaOp::create(builder, negateIf(negates, product.op.getLhs()),
+                             product.op.getRhs(), addend);
+}
+
+//===----------------------------------------------------------------------===//
+// The pass
+//===----------------------------------------------------------------------===//
+
+/// All operations in a phase, users first.
+static SmallVector<Operation *> collectBackwards(ProcessOp process) {
+  SmallVector<Operation *> ops;
+  process.getBody().walk([&](Operation *op) { ops.push_back(op); });
+  std::reverse(ops.begin(), ops.end());
+  return ops;
+}
+
+static void removeUnused(ProcessOp process) {
+  for (Operation *op : collectBackwards(process))
+    if (isa<arith::ArithDialect, math::MathDialect>(op->getDialect()) &&
+        isOpTriviallyDead(op))
+      op->erase();
+}
+
+namespace {
+struct Counts {
+  int64_t contracted = 0, reciprocals = 0, roots = 0;
+};
+} // namespace
+
+/// 1 / sqrt(x) is seen before sqrt(x) is gone.
+static void approximate(ProcessOp process, Counts &counts) {
+  for (Operation *op : collectBackwards(process)) {
+    Value value = op->use_empty() ? Value() : Approximation(op).replace(op);
+    if (!value)
+      continue;
+    ++(isa<arith::DivFOp>(op) ? counts.reciprocals : counts.roots);
+    op->getResult(0).replaceAllUsesWith(value);
+  }
+}
+
+static void contract(ProcessOp process, Counts &counts) {
+  for (Operation *op : collectBackwards(process)) {
+    if (!isa<arith::AddFOp, arith::SubFOp>(op) || op->use_empty())
+      continue;
+    Type type = getElementTypeOrSelf(op->getResult(0).getType());
+    if (!type.isF32() && !type.isF64())
+      continue;
+    if (Value value = contract(op, isa<arith::SubFOp>(op))) {
+      ++counts.contracted;
+      op->getResult(0).replaceAllUsesWith(value);
+    }
+  }
+}
+
+void ApplyPrecisionPass::runOnOperation() {
+  for (auto stage : getOperation().getOps<StageOp>()) {
+    ProcessOp process = stage.getProcess();
+    if (!process || !process.getPrecision())
+      continue;
+    Precision precision = *process.getPrecision();
+    process.removePrecisionAttr();
+    if (precision == Precision::Strict)
+      continue;
+    Counts counts;
+    if (precision == Precision::Relaxed) {
+      approximate(process, counts);
+      removeUnused(process);
+    }
+    contract(process, counts);
+    removeUnused(process);
+    process.emitRemark() << "stage '" << getCppName(stage) << "' is "
+                         << stringifyPrecision(precision) << ": "
+                         << counts.contracted << " additions are contracted, "
+                         << counts.reciprocals << " divisions and "
+                         << counts.roots << " square roots approximated";
+    contracted += counts.contracted;
+    reciprocals += counts.reciprocals;
+    roots += counts.roots;
+  }
+}

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+// Approximations are the instructions that the processor has, also where LLVM
+// vectorizes the loop; a fused multiply-add that it has not is computed without
+// a call.
+// RUN: pikoc %s -o - --emit=assembly --no-cache --pipe Relaxed --cpu skylake-avx512 | FileCheck %s --check-prefix=AVX512
+// RUN: pikoc %s -o - --emit=assembly --no-cache --pipe Relaxed --cpu x86-64-v3 | FileCheck %s --check-prefix=AVX
+// RUN: pikoc %s -o - --emit=assembly --no-cache --pipe Relaxed --cpu x86-64 | FileCheck %s --check-prefix=SSE
+// RUN: pikoc %s -o - --emit=assembly --no-cache --pipe Contracted --cpu x86-64-v3 | FileCheck %s --check-prefix=FMA
+// RUN: pikoc %s -o - --emit=assembly --no-cache --pipe Contracted --cpu x86-64 | FileCheck %s --check-prefix=NO-FMA
+// RUN: pikoc %s -o - --emit=assembly --no-cache --pipe Strict --cpu x86-64-v3 | FileCheck %s --check-prefix=STRICT
+// REQUIRES: x86_64
+
+// AVX512-NOT: {{div[sp]s|sqrt[sp]s}}
+// AVX512:     vr{{cp|sqrt}}14ps %ymm
+// AVX512-NOT: {{div[sp]s|vsqrt[sp]s}}
+// AVX-NOT:    {{v(div|sqrt)[sp]s}}
+// AVX:        vr{{cp|sqrt}}ps %ymm
+// AVX-NOT:    {{v(div|sqrt)[sp]s}}
+// SSE:        r{{cp|sqrt}}ps %xmm
+// SSE-NOT:    {{[[:space:]](div|sqrt)[sp]s}}
+// SSE-NOT:    fmaf
+// FMA:        vfmadd{{.*}}ps
+// NO-FMA-NOT: fmaf
+// NO-FMA:     cvtpd2ps
+// NO-FMA-NOT: fmaf
+// STRICT-NOT: fmadd
+// STRICT:     vdivps
+// STRICT-NOT: fmadd
+
+#include <piko.h>
+
+struct State {
+  piko::Buffer<float> a;
+  piko::Buffer<float> b;
+};
+
+template <piko::Precision P>
+struct Divide : piko::Stage<0, 0, 1, int>, piko::Uses<State> {
+  void schedule(piko::BinId) { this->specifyPrecision(P); }
+  void process(const int &first) {
+    float x[64], y[64];
+    for (int i = 0; i < 64; ++i)
+      x[i] = state().a[first + i];
+    for (int i = 0; i < 64; ++i)
+      y[i] = x[i] * x[i] + x[i] / (1.0f + piko::rsqrt(x[i]));
+    for (int i = 0; i < 64; ++i)
+      state().b[first + i] = y[i];
+  }
+};
+template <piko::Precision P> struct Pipe : piko::Pipe<State> {
+  Divide<P> divide;
+  Pipe() { this->source(divide); }
+};
+struct Strict : Pipe<piko::Precision::Strict> {};
+struct Contracted : Pipe<piko::Precision::Contracted> {};
+struct Relaxed : Pipe<piko::Precision::Relaxed> {};

@@ -1,0 +1,232 @@
+// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-apply-precision))' --mlir-print-op-on-diagnostic=false --verify-diagnostics %s | FileCheck %s
+
+piko.record @F {"a" : f32 at 0, "b" : f32 at 4, "c" : f32 at 8, "d" : f32 at 12, "w" : f64 at 16} size 24 align 8
+
+// A phase that says nothing, or that it is strict, stays as it is.
+// CHECK-LABEL: piko.pipeline @Strict
+// CHECK-COUNT-2: piko.process {
+// CHECK:         arith.mulf
+// CHECK-NEXT:    arith.addf
+// CHECK-NOT:   math.fma
+piko.pipeline @Strict rank 1 {
+  piko.buffer @out : @F
+  piko.source @a
+  piko.edge @a[0] -> @b
+  piko.stage @a bins [0] threads 1 : @F -> [@F] {
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      %a = piko.get %f "a" : !piko.prim<@F> -> f32
+      %w = piko.get %f "w" : !piko.prim<@F> -> f64
+      piko.emit 0 (%a, %a, %a, %a, %w) : f32, f32, f32, f32, f64
+      piko.return
+    }
+  }
+  piko.stage @b bins [0] threads 1 : @F -> [] {
+    piko.process precision strict {
+    ^bb0(%f: !piko.prim<@F>):
+      %i = arith.constant 0 : index
+      %a = piko.get %f "a" : !piko.prim<@F> -> f32
+      %p = arith.mulf %a, %a : f32
+      %s = arith.addf %p, %a : f32
+      piko.store %s, @out[%i : index] "a" : f32
+      piko.return
+    }
+  }
+}
+
+// Additions of products, with all signs; of two products the left one. The
+// assign phase says where things go, and is strict.
+// CHECK-LABEL: piko.pipeline @Contracted
+piko.pipeline @Contracted rank 1 {
+  piko.buffer @out : @F
+  piko.source @s
+  // CHECK:      piko.assign {
+  // CHECK:        arith.mulf
+  // CHECK-NEXT:   arith.addf
+  // CHECK:      piko.process {
+  // CHECK-DAG:    %[[A:.*]] = piko.get %{{.*}} "a"
+  // CHECK-DAG:    %[[B:.*]] = piko.get %{{.*}} "b"
+  // CHECK-DAG:    %[[C:.*]] = piko.get %{{.*}} "c"
+  // CHECK-DAG:    %[[D:.*]] = piko.get %{{.*}} "d"
+  // CHECK-DAG:    %[[W:.*]] = piko.get %{{.*}} "w"
+  // CHECK-NOT:    arith.addf
+  // CHECK-NOT:    arith.subf
+  // CHECK:        %[[SUM:.*]] = math.fma %[[A]], %[[B]], %[[C]] : f32
+  // CHECK:        %[[OTHER:.*]] = math.fma %[[A]], %[[B]], %[[C]] : f32
+  // CHECK:        %[[MINUS_C:.*]] = arith.negf %[[C]]
+  // CHECK:        %[[DIFFERENCE:.*]] = math.fma %[[A]], %[[B]], %[[MINUS_C]]
+  // CHECK:        %[[MINUS_A:.*]] = arith.negf %[[A]]
+  // CHECK:        %[[FROM:.*]] = math.fma %[[MINUS_A]], %[[B]], %[[C]]
+  // CHECK:        %[[MINUS:.*]] = arith.negf %[[A]]
+  // CHECK:        %[[NEGATIVE:.*]] = math.fma %[[MINUS]], %[[B]], %[[C]]
+  // CHECK:        %[[BACK:.*]] = math.fma %[[A]], %[[B]], %[[C]]
+  // CHECK:        %[[CD:.*]] = arith.mulf %[[C]], %[[D]]
+  // CHECK:        %[[DOT:.*]] = math.fma %[[A]], %[[B]], %[[CD]]
+  // CHECK:        %[[WIDE:.*]] = math.fma %[[W]], %[[W]], %[[W]] : f64
+  // CHECK:        piko.store %[[SUM]], @out
+  // CHECK-NEXT:   piko.store %[[OTHER]], @out
+  // CHECK-NEXT:   piko.store %[[DIFFERENCE]], @out
+  // CHECK-NEXT:   piko.store %[[FROM]], @out
+  // CHECK-NEXT:   piko.store %[[NEGATIVE]], @out
+  // CHECK-NEXT:   piko.store %[[BACK]], @out
+  // CHECK-NEXT:   piko.store %[[DOT]], @out
+  // CHECK-NEXT:   piko.store %[[WIDE]], @out
+  // CHECK-NEXT:   piko.store %[[CD]], @out
+  piko.stage @s bins [8] threads 1 : @F -> [] {
+    piko.assign {
+    ^bb0(%f: !piko.prim<@F>):
+      %a = piko.get %f "a" : !piko.prim<@F> -> f32
+      %p = arith.mulf %a, %a : f32
+      %s = arith.addf %p, %a : f32
+      %x = arith.fptosi %s : f32 to i32
+      %b = piko.bin_at %x : i32
+      piko.assign_to %b
+      piko.return
+    }
+    // expected-remark @below {{stage 's' is contracted: 8 additions are contracted, 0 divisions and 0 square roots approximated}}
+    piko.process precision contracted {
+    ^bb0(%f: !piko.prim<@F>):
+      %i = arith.constant 0 : index
+      %a = piko.get %f "a" : !piko.prim<@F> -> f32
+      %b = piko.get %f "b" : !piko.prim<@F> -> f32
+      %c = piko.get %f "c" : !piko.prim<@F> -> f32
+      %d = piko.get %f "d" : !piko.prim<@F> -> f32
+      %w = piko.get %f "w" : !piko.prim<@F> -> f64
+      %ab = arith.mulf %a, %b : f32
+      %sum = arith.addf %ab, %c : f32
+      %other = arith.addf %c, %ab : f32
+      %difference = arith.subf %ab, %c : f32
+      %from = arith.subf %c, %ab : f32
+      %minus = arith.negf %ab : f32
+      %negative = arith.addf %minus, %c : f32
+      %back = arith.subf %c, %minus : f32
+      %cd = arith.mulf %c, %d : f32
+      %dot = arith.addf %ab, %cd : f32
+      %ww = arith.mulf %w, %w : f64
+      %wide = arith.addf %ww, %w : f64
+      piko.store %sum, @out[%i : index] "a" : f32
+      piko.store %other, @out[%i : index] "a" : f32
+      piko.store %difference, @out[%i : index] "a" : f32
+      piko.store %from, @out[%i : index] "a" : f32
+      piko.store %negative, @out[%i : index] "a" : f32
+      piko.store %back, @out[%i : index] "a" : f32
+      piko.store %dot, @out[%i : index] "a" : f32
+      piko.store %wide, @out[%i : index] "w" : f64
+      piko.store %cd, @out[%i : index] "a" : f32
+      piko.return
+    }
+  }
+}
+
+// A division contracts nothing by itself.
+// CHECK-LABEL: piko.pipeline @Divided
+// CHECK:         %[[Q:.*]] = arith.divf
+// CHECK-NEXT:    math.sqrt %[[Q]]
+// CHECK-NEXT:    arith.addf
+piko.pipeline @Divided rank 1 {
+  piko.buffer @out : @F
+  piko.source @s
+  piko.stage @s bins [0] threads 1 : @F -> [] {
+    // expected-remark @below {{stage 's' is contracted: 0 additions}}
+    piko.process precision contracted {
+    ^bb0(%f: !piko.prim<@F>):
+      %i = arith.constant 0 : index
+      %a = piko.get %f "a" : !piko.prim<@F> -> f32
+      %b = piko.get %f "b" : !piko.prim<@F> -> f32
+      %q = arith.divf %a, %b : f32
+      %r = math.sqrt %q : f32
+      %s = arith.addf %q, %r : f32
+      piko.store %s, @out[%i : index] "a" : f32
+      piko.return
+    }
+  }
+}
+
+// A quotient is a product, which is contracted with what follows. The step of
+// Newton's method counts only where the approximation is a number.
+// CHECK-LABEL: piko.pipeline @Quotient
+// CHECK-DAG:     %[[A:.*]] = piko.get %{{.*}} "a"
+// CHECK-DAG:     %[[B:.*]] = piko.get %{{.*}} "b"
+// CHECK:         %[[FIRST:.*]] = piko.approximate_reciprocal %[[B]] : f32
+// CHECK:         %[[MINUS:.*]] = arith.negf %[[B]]
+// CHECK:         %[[ONE:.*]] = arith.constant 1.0
+// CHECK:         %[[ERROR:.*]] = math.fma %[[MINUS]], %[[FIRST]], %[[ONE]]
+// CHECK:         %[[BETTER:.*]] = math.fma %[[FIRST]], %[[ERROR]], %[[FIRST]]
+// CHECK:         %[[MINUS_ONE:.*]] = arith.constant -1.0
+// CHECK:         %[[GOOD:.*]] = arith.cmpf ogt, %[[ERROR]], %[[MINUS_ONE]]
+// CHECK:         %[[INVERSE:.*]] = arith.select %[[GOOD]], %[[BETTER]], %[[FIRST]]
+// CHECK:         %[[SUM:.*]] = math.fma %[[A]], %[[INVERSE]], %[[A]]
+// CHECK:         %[[THIRD:.*]] = arith.constant 0.333333343
+// CHECK:         %[[BY_THREE:.*]] = arith.mulf %[[A]], %[[THIRD]]
+// CHECK:         %[[BY_TINY:.*]] = arith.divf %[[A]], %{{.*}} : f32
+// CHECK:         %[[WIDE:.*]] = arith.divf %{{.*}} : f64
+// CHECK:         piko.store %[[SUM]], @out
+// CHECK-NEXT:    piko.store %[[BY_THREE]], @out
+// CHECK-NEXT:    piko.store %[[BY_TINY]], @out
+// CHECK-NEXT:    piko.store %[[WIDE]], @out
+piko.pipeline @Quotient rank 1 {
+  piko.buffer @out : @F
+  piko.source @s
+  piko.stage @s bins [0] threads 1 : @F -> [] {
+    // expected-remark @below {{stage 's' is relaxed: 1 additions are contracted, 2 divisions and 0 square roots approximated}}
+    piko.process precision relaxed {
+    ^bb0(%f: !piko.prim<@F>):
+      %i = arith.constant 0 : index
+      %three = arith.constant 3.0 : f32
+      %tiny = arith.constant 1.0e-40 : f32
+      %a = piko.get %f "a" : !piko.prim<@F> -> f32
+      %b = piko.get %f "b" : !piko.prim<@F> -> f32
+      %w = piko.get %f "w" : !piko.prim<@F> -> f64
+      %q = arith.divf %a, %b : f32
+      %sum = arith.addf %q, %a : f32
+      %byThree = arith.divf %a, %three : f32
+      %byTiny = arith.divf %a, %tiny : f32
+      %wide = arith.divf %w, %w : f64
+      piko.store %sum, @out[%i : index] "a" : f32
+      piko.store %byThree, @out[%i : index] "a" : f32
+      piko.store %byTiny, @out[%i : index] "a" : f32
+      piko.store %wide, @out[%i : index] "w" : f64
+      piko.return
+    }
+  }
+}
+
+// All ways of writing an inverse square root are one approximation: 1 / sqrt(x),
+// where sqrt(x) is used, too; a / sqrt(x); and what piko::rsqrt computes.
+// CHECK-LABEL: piko.pipeline @Roots
+// CHECK-NOT:     arith.divf
+// CHECK-NOT:     math.sqrt
+// CHECK:         %[[FIRST:.*]] = piko.approximate_rsqrt %[[X:.*]] : f32
+// CHECK:         %[[ROOT:.*]] = arith.mulf %[[X]], %[[FIRST]]
+// CHECK:         %[[IS_NAN:.*]] = arith.cmpf uno, %[[FIRST]], %[[FIRST]]
+// CHECK:         %[[ITSELF:.*]] = arith.select %[[IS_NAN]], %[[FIRST]], %[[X]]
+// CHECK:         arith.select %{{.*}}, %{{.*}}, %[[ITSELF]]
+// CHECK-COUNT-3: piko.approximate_rsqrt %[[X]]
+// CHECK-NOT:     piko.approximate
+piko.pipeline @Roots rank 1 {
+  piko.buffer @out : @F
+  piko.source @s
+  piko.stage @s bins [0] threads 1 : @F -> [] {
+    // expected-remark @below {{stage 's' is relaxed: 0 additions are contracted, 2 divisions and 2 square roots approximated}}
+    piko.process precision relaxed {
+    ^bb0(%f: !piko.prim<@F>):
+      %i = arith.constant 0 : index
+      %one = arith.constant 1.0 : f32
+      %wideOne = arith.constant 1.0 : f64
+      %x = piko.get %f "a" : !piko.prim<@F> -> f32
+      %y = piko.get %f "b" : !piko.prim<@F> -> f32
+      %root = math.sqrt %x : f32
+      %inverse = arith.divf %one, %root : f32
+      %scaled = arith.divf %y, %root : f32
+      %wide = arith.extf %x : f32 to f64
+      %wideRoot = math.sqrt %wide : f64
+      %wideInverse = arith.divf %wideOne, %wideRoot : f64
+      %rsqrt = arith.truncf %wideInverse : f64 to f32
+      piko.store %root, @out[%i : index] "a" : f32
+      piko.store %inverse, @out[%i : index] "a" : f32
+      piko.store %scaled, @out[%i : index] "a" : f32
+      piko.store %rsqrt, @out[%i : index] "a" : f32
+      piko.return
+    }
+  }
+}
