@@ -102,6 +102,10 @@ Options parseOptions(int argc, char **argv) {
       options.budget = toNumbers<int64_t>(words.takeValues(name, false))[0];
     else if (name == "--timeout")
       options.timeout = toNumbers<unsigned>(words.takeValues(name, false))[0];
+    else if (name == "--cpu")
+      options.cpu = words.takeValues(name, false)[0];
+    else if (name == "--tolerance")
+      options.tolerance = std::stod(words.takeValues(name, false)[0]);
     else if (name == "--owners")
       options.owners = true;
     else if (name == "--no-cache")

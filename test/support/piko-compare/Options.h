@@ -11,6 +11,7 @@
 #include "Piko/Driver/SynthesisOptions.h"
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -45,6 +46,11 @@ struct Options {
   /// What bins may hold, in bytes; 0 = no budget.
   int64_t budget = 0;
   unsigned timeout = 0;
+  /// The largest relative difference of a number of a pipeline that has a stage
+  /// which is not strict. Without it, differences are reported, and are right.
+  std::optional<double> tolerance;
+  /// The processor that the compiled pipelines are for, as pikoc has it.
+  std::string cpu = "native";
   /// Says which threads ran which bins.
   bool owners = false;
   /// Checking mode, on both sides.

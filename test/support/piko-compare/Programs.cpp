@@ -70,6 +70,7 @@ struct Programs::Implementation {
   CacheOptions cache;
   SynthesisOptions synthesis;
   GPUOptions gpu;
+  std::string cpu;
   /// Where the compiled file is C++, once it is needed.
   std::unique_ptr<PipelineFile> file;
   /// Where the compiled file is `.mlir`: a module for each pipeline.
@@ -78,6 +79,18 @@ struct Programs::Implementation {
   std::string referenceDiagnostics;
   std::shared_ptr<JITCode> reference;
 };
+
+/// Of a module as it is written.
+static bool isStrict(ModuleOp module) {
+  return !module
+              .walk([](ProcessOp process) {
+                Precision precision =
+                    process.getPrecision().value_or(Precision::Strict);
+                return precision == Precision::Strict ? WalkResult::advance()
+                                                      : WalkResult::interrupt();
+              })
+              .wasInterrupted();
+}
 
 /// Divides the pipelines of an `.mlir` file.
 void Programs::Implementation::readText(const std::string &file) {
@@ -137,6 +150,7 @@ Programs::Programs(const Options &options)
   self->cache = options.cache;
   self->synthesis = options.synthesis;
   self->gpu = options.gpu;
+  self->cpu = options.cpu;
   self->compileReference(options.reference);
   if (options.file != options.reference)
     self->readText(options.file);
@@ -150,6 +164,7 @@ std::vector<std::string> Programs::names() const {
 
 Program Programs::compile(const std::string &pipe) {
   OwningOpRef<ModuleOp> module = self->read(pipe);
+  bool strict = module && isStrict(*module);
   if (!module || failed(lowerPipeline(*module, Level::LLVM, self->check,
                                       self->synthesis, self->gpu)))
     self->log.fail("cannot compile " + pipe);
@@ -159,7 +174,7 @@ Program Programs::compile(const std::string &pipe) {
   if (!llvmModule)
     self->log.fail("cannot compile " + pipe);
   llvm::Expected<std::string> object = generateCode(
-      *llvmModule, {"native", /*optLevel=*/3, JITCode::getSanitizer()},
+      *llvmModule, {self->cpu, /*optLevel=*/3, JITCode::getSanitizer()},
       CodeFormat::Object);
   if (!object)
     throw std::runtime_error(llvm::toString(object.takeError()));
@@ -168,7 +183,8 @@ Program Programs::compile(const std::string &pipe) {
   Program program{{PIKORT_ABI_VERSION, name->c_str(),
                    find<void(pikort_pipeline *)>(*code, pipe + ".setup"),
                    find<int32_t(pikort_pipeline *)>(*code, pipe + ".run")},
-                  nullptr};
+                  nullptr,
+                  strict};
   program.code = std::make_shared<
       std::pair<std::shared_ptr<std::string>, std::shared_ptr<JITCode>>>(name,
                                                                          code);
@@ -183,5 +199,5 @@ Program Programs::reference(const std::string &pipe) {
                              self->referenceDiagnostics);
   auto *entry = find<const pikort_program *(int)>(*self->reference,
                                                   "piko_reference_program");
-  return {*entry(int(found - names.begin())), self->reference};
+  return {*entry(int(found - names.begin())), self->reference, true};
 }

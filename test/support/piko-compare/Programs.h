@@ -18,6 +18,8 @@
 struct Program {
   pikort_program program{};
   std::shared_ptr<void> code;
+  /// Whether all stages give the bits of the reference executor.
+  bool isStrict = true;
 };
 
 class Programs {

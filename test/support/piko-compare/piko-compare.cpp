@@ -9,13 +9,19 @@
 //                [--timeout SECONDS] [--strip N] [--budget BYTES]
 //                [--check[=nan:RECORD.FIELD,..]]
 //                [--target gpu-on-cpu] [--gpu-threads N] [--gpu-seed N]
-//                [--no-cache]
+//                [--tolerance X] [--cpu NAME] [--no-cache]
 //
 // Options.h says what the options mean, Run.h what the input is. With --cases
 // each line of that file is a case, with the options --pipe to --loop-limit; a
 // line of output says which case begins, and one how it ends. Exit status 0 if
 // all is equal.
+//
+// Of a pipeline with a stage that is not strict, all runs must give the same
+// bits, and how far these are from the reference executor's is reported field by
+// field. --tolerance X says how far they may be: numbers relatively by X,
+// integers not at all.
 
+#include "Measure.h"
 #include "Options.h"
 #include "Programs.h"
 #include "Run.h"
@@ -27,17 +33,39 @@
 
 namespace {
 
+void printMeasure(const Measure &measure) {
+  for (const std::string &line : measure.lines)
+    std::printf("%s\n", line.c_str());
+}
+
+/// What a run should give that need not be strict: what it gives itself, if that
+/// is near enough to what the reference executor does. True if it is.
+bool acceptMeasured(const Options &options, Result &expected, Run &compiled) {
+  Result actual = compiled(options.threads[0]);
+  if (!expected.error.empty() || !actual.error.empty())
+    return true; // to be compared as they are
+  Measure measure = measureResults(expected, actual);
+  printMeasure(measure);
+  expected = std::move(actual);
+  return !options.tolerance || measure.isWithin(*options.tolerance);
+}
+
 /// Runs one case; true if all is equal. Throws if it cannot be run.
 bool compare(const Options &options, const Case &input, Programs &programs) {
   Run reference(programs.reference(input.pipe), input);
   Result expected = reference(1);
-  Run compiled(programs.compile(input.pipe), input);
+  Program program = programs.compile(input.pipe);
+  Run compiled(program, input);
   compiled.divide(options.strip, options.budget);
   if (options.owners)
     compiled.recordOwners();
   if (expected.isBlank() && options.cases.empty())
     throw std::runtime_error("the reference executor wrote nothing");
   bool equal = true;
+  if (!program.isStrict && !acceptMeasured(options, expected, compiled)) {
+    std::printf("expected differences of at most %g\n", *options.tolerance);
+    equal = false;
+  }
   for (int threads : options.threads)
     for (int run = 0; run < options.runs; ++run) {
       std::vector<std::string> differences =
@@ -57,7 +85,8 @@ bool compare(const Options &options, const Case &input, Programs &programs) {
   if (!expected.error.empty())
     std::printf("the reference stops: %s\n", expected.error.c_str());
   else if (equal)
-    std::printf(expected.isBlank() ? "equal, but blank\n" : "equal\n");
+    std::printf("%s%s\n", expected.isBlank() ? "equal, but blank" : "equal",
+                program.isStrict ? "" : " in all runs");
   return equal;
 }
 

@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+
+#include "Measure.h"
+
+#include "pikort/pikort.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+namespace {
+
+/// The differences in one field.
+struct FieldError {
+  int64_t numbers = 0, different = 0;
+  int64_t odd = 0; ///< finite in only one
+  double absolute = 0, relative = 0;
+  uint64_t ulps = 0;
+
+  void add(int32_t type, const char *a, const char *b);
+  std::string describe(const std::string &name, bool isFloat) const;
+
+private:
+  template <class T, class Bits> void addFloats(const char *a, const char *b);
+};
+
+/// Numbers that follow each other become integers that do.
+template <class Bits> Bits order(Bits bits) {
+  constexpr Bits sign = Bits(1) << (sizeof(Bits) * 8 - 1);
+  return bits & sign ? sign - (bits & ~sign) : sign + bits;
+}
+
+template <class T, class Bits>
+void FieldError::addFloats(const char *a, const char *b) {
+  T x, y;
+  std::memcpy(&x, a, sizeof(T));
+  std::memcpy(&y, b, sizeof(T));
+  Bits from, to;
+  std::memcpy(&from, a, sizeof(T));
+  std::memcpy(&to, b, sizeof(T));
+  if (from == to || (x != x && y != y))
+    return;
+  ++different;
+  if (!std::isfinite(x) || !std::isfinite(y)) {
+    ++odd;
+    return;
+  }
+  double difference = std::fabs(double(x) - double(y));
+  absolute = std::max(absolute, difference);
+  if (difference > 0)
+    relative = std::max(relative, difference / std::max(std::fabs(double(x)),
+                                                        std::fabs(double(y))));
+  from = order(from);
+  to = order(to);
+  ulps = std::max(ulps, uint64_t(from > to ? from - to : to - from));
+}
+
+void FieldError::add(int32_t type, const char *a, const char *b) {
+  ++numbers;
+  if (type == PIKORT_F32)
+    addFloats<float, uint32_t>(a, b);
+  else if (type == PIKORT_F64)
+    addFloats<double, uint64_t>(a, b);
+  else
+    different += std::memcmp(a, b, size_t(1) << (type - PIKORT_I8)) != 0;
+}
+
+std::string FieldError::describe(const std::string &name, bool isFloat) const {
+  std::string text = "'" + name + "': " + std::to_string(different) + " of " +
+                     std::to_string(numbers) + " numbers differ";
+  if (!isFloat)
+    return text;
+  char sizes[128];
+  std::snprintf(sizes, sizeof sizes, ", by at most %.3g, relatively %.3g, %llu",
+                absolute, relative, static_cast<unsigned long long>(ulps));
+  text += std::string(sizes) + " ULP";
+  if (odd)
+    text += "; " + std::to_string(odd) + " are finite in only one";
+  return text;
+}
+
+void measureRecords(const std::string &name, const Records &expected,
+                    const Records &actual, Measure &into) {
+  int64_t records = int64_t(expected.bytes.size()) / expected.size;
+  for (const Field &field : expected.fields) {
+    bool isFloat = field.type == PIKORT_F32 || field.type == PIKORT_F64;
+    FieldError error;
+    for (int64_t i = 0; i < records; ++i)
+      for (int64_t e = 0; e < field.elements; ++e) {
+        size_t at = size_t(i * expected.size + field.offset + e * field.stride);
+        error.add(field.type, &expected.bytes[at], &actual.bytes[at]);
+      }
+    if (!error.different)
+      continue;
+    into.lines.push_back(error.describe(name + "." + field.name, isFloat));
+    into.relative = std::max(into.relative, error.relative);
+    into.differsInKind |= !isFloat || error.odd > 0;
+  }
+}
+
+} // namespace
+
+Measure measureResults(const Result &expected, const Result &actual) {
+  Measure measure;
+  for (const auto &[name, records] : expected.state) {
+    auto found = actual.state.find(name);
+    if (found != actual.state.end() &&
+        found->second.bytes.size() == records.bytes.size()) {
+      measureRecords(name, records, found->second, measure);
+      continue;
+    }
+    measure.lines.push_back("'" + name + "' is missing or of another size");
+    measure.differsInKind = true;
+  }
+  return measure;
+}
