@@ -57,6 +57,25 @@ std::optional<LinearFacts::Exact> LinearFacts::fitExact(Exact number,
   return number;
 }
 
+template <typename Exact> static Exact add(const Exact &a, const Exact &b) {
+  int shift = std::max(a.shift, b.shift);
+  return {a.scaled * power(shift - a.shift) + b.scaled * power(shift - b.shift),
+          shift};
+}
+
+template <typename Exact> static Exact negate(const Exact &a) {
+  return {Linear(0) - a.scaled, a.shift};
+}
+
+/// None if neither is a constant.
+template <typename Exact>
+static std::optional<Exact> multiply(const Exact &a, const Exact &b) {
+  for (auto [x, y] : {std::pair(a, b), std::pair(b, a)})
+    if (std::optional<DynamicAPInt> factor = y.scaled.getConstant())
+      return Exact{x.scaled * *factor, x.shift + y.shift};
+  return std::nullopt;
+}
+
 std::optional<LinearFacts::Exact> LinearFacts::getExact(Id id) {
   if (auto found = exacts.find(id); found != exacts.end())
     return found->second;
@@ -92,26 +111,23 @@ std::optional<LinearFacts::Exact> LinearFacts::findExact(Id id) {
     std::optional<Exact> a = exactOf(0), b = exactOf(1);
     if (!a || !b)
       return std::nullopt;
-    int shift = std::max(a->shift, b->shift);
-    Linear left = a->scaled * power(shift - a->shift);
-    Linear right = b->scaled * power(shift - b->shift);
-    return fitExact(
-        {isa<arith::AddFOp>(op) ? left + right : left - right, shift}, type);
+    return fitExact(isa<arith::AddFOp>(op) ? add(*a, *b) : add(*a, negate(*b)),
+                    type);
   }
-  if (isa<arith::MulFOp>(op)) {
+  if (isa<arith::MulFOp, math::FmaOp>(op)) {
     std::optional<Exact> a = exactOf(0), b = exactOf(1);
-    if (!a || !b)
-      return std::nullopt;
-    for (auto [x, y] : {std::pair(*a, *b), std::pair(*b, *a)})
-      if (std::optional<DynamicAPInt> factor = y.scaled.getConstant())
-        return fitExact({x.scaled * *factor, x.shift + y.shift}, type);
-    return std::nullopt;
+    std::optional<Exact> product = a && b ? multiply(*a, *b) : std::nullopt;
+    std::optional<Exact> addend = Exact{Linear(0), 0};
+    if (isa<math::FmaOp>(op))
+      addend = exactOf(2);
+    // Only the sum is rounded.
+    return product && addend ? fitExact(add(*product, *addend), type)
+                             : std::nullopt;
   }
   if (isa<arith::NegFOp>(op)) {
     std::optional<Exact> a = exactOf(0);
     // The negative of 0 compares as 0 does.
-    return a ? std::optional(Exact{Linear(0) - a->scaled, a->shift})
-             : std::nullopt;
+    return a ? std::optional(negate(*a)) : std::nullopt;
   }
   if (isa<arith::ExtFOp>(op))
     return exactOf(0);

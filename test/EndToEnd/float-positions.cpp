@@ -6,11 +6,13 @@
 // RUN: pikoc %s --pipe Corners --emit=kernels --remarks -o %t.mlir 2>&1 | FileCheck %s --check-prefix=FUSED
 // RUN: pikoc %s --pipe Middles --emit=kernels --remarks -o %t.mlir 2>&1 | FileCheck %s --check-prefix=FUSED
 // RUN: FileCheck %s --check-prefix=LIMIT --input-file=%t.mlir
+// RUN: pikoc %s --pipe Fused --emit=kernels --remarks -o %t.mlir 2>&1 | FileCheck %s --check-prefix=FUSED
 // FUSED: stage 'shade' keeps each primitive in the bin that it was emitted from
 // FUSED: stage 'shade' runs inside stage 'rasterize'
 // LIMIT: piko.pipeline @Middles rank 2 max_extent 8388608 {
 // RUN: piko-compare %s --pipe Corners --domain 67 35 --count 300 | FileCheck %s
 // RUN: piko-compare %s --pipe Middles --domain 67 35 --count 300 | FileCheck %s
+// RUN: piko-compare %s --pipe Fused --domain 67 35 --count 300 --tolerance 0 | FileCheck %s
 // RUN: piko-compare %s --pipe Middles --domain 67 35 --count 100 --without fuse-stages | FileCheck %s
 // CHECK: equal
 // RUN: not piko-compare %s --pipe Middles --domain 8388609 1 --count 9 --runs 1 | FileCheck %s --check-prefix=LARGE
@@ -36,16 +38,24 @@ struct State {
   piko::Image<Pixel> image;
 };
 
-template <bool IsMiddle>
-struct Rasterize : piko::Stage<8, 8, 64, Seed, Fragment> {
+enum class Point { Corner, Middle, Fused };
+
+template <Point P> struct Rasterize : piko::Stage<8, 8, 64, Seed, Fragment> {
   static glm::ivec2 low(const Seed &s) { return {s.x % 80 - 5, s.y % 50 - 5}; }
+  void schedule(piko::BinId) {
+    this->specifyPrecision(P == Point::Fused ? piko::Precision::Contracted
+                                             : piko::Precision::Strict);
+  }
   void assignBin(const Seed &s) {
     this->assignToBoundingBox(s, low(s), low(s) + (s.size & 15));
   }
   void process(const Seed &s) {
     glm::ivec2 lo = low(s), hi = lo + (s.size & 15);
     this->parallelForPixels(lo, hi, [&](glm::ivec2 p) {
-      if constexpr (IsMiddle)
+      if constexpr (P == Point::Fused) // of multiply and add
+        this->emit({glm::vec2(p.x * 2.0f + 1.0f, p.y * 2.0f + 1.0f) * 0.5f,
+                    s.x ^ p.y});
+      else if constexpr (P == Point::Middle)
         this->emit({glm::vec2(p.x + 0.5f, p.y + 0.5f), s.x ^ p.y});
       else
         this->emit({glm::vec2(p.x, p.y), s.x ^ p.x});
@@ -65,16 +75,17 @@ struct Shade : piko::Stage<8, 8, 64, Fragment>, piko::Uses<State> {
   }
 };
 
-template <bool IsMiddle> struct Draw : piko::Pipe<State> {
-  Rasterize<IsMiddle> rasterize;
+template <Point P> struct Draw : piko::Pipe<State> {
+  Rasterize<P> rasterize;
   Shade shade;
   Draw() {
     source(rasterize);
     connect(rasterize, 0, shade);
   }
 };
-struct Corners : Draw<false> {};
-struct Middles : Draw<true> {};
+struct Corners : Draw<Point::Corner> {};
+struct Middles : Draw<Point::Middle> {};
+struct Fused : Draw<Point::Fused> {};
 
 struct Plain : piko::Stage<8, 8, 64, Seed>, piko::Uses<State> {
   void assignBin(const Seed &s) {
