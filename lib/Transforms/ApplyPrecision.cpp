@@ -1,14 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // piko-apply-precision: for each process phase that need not be strict,
-//   1. of divisions and square roots in f32, make products with approximations
-//      that a step of Newton's method refines;
+//   1. of divisions and square roots in f32, make approximations;
 //   2. make additions of products math.fma.
-//
-// A refined approximation is `first + first * (share of) error`, where `error`
-// tells how far `first` is off: 1 - x * first for a reciprocal. Where `first`
-// is infinite or 0, `error` is NaN or infinite, and `first` is the result. So
-// no test of the operand is needed.
 
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "Piko/Dialect/Piko/IR/PikoApproximation.h"
@@ -33,36 +27,6 @@ namespace {
 
 struct ApplyPrecisionPass : piko::impl::ApplyPrecisionBase<ApplyPrecisionPass> {
   void runOnOperation() override;
-};
-
-/// Makes products of divisions and square roots, in f32.
-class Approximation {
-public:
-  explicit Approximation(Operation *op) : builder(op->getLoc(), op) {}
-
-  /// What replaces an operation, or null.
-  Value replace(Operation *op);
-
-private:
-  Value replaceDivision(Value dividend, Value divisor);
-  Value replaceRoot(Value x);
-  Value getReciprocal(Value x);
-  Value getRsqrt(Value x);
-  /// `first + share * error`, if `error` is one of a number.
-  Value refine(Value first, Value share, Value error, Value otherwise = {});
-  /// 1 - a * b.
-  Value getError(Value a, Value b) {
-    return math::FmaOp::create(builder, arith::NegFOp::create(builder, a), b,
-                               getConstant(1));
-  }
-  Value getProduct(Value a, Value b) {
-    return arith::MulFOp::create(builder, a, b);
-  }
-  Value getConstant(float value) {
-    return arith::ConstantOp::create(builder, builder.getF32FloatAttr(value));
-  }
-
-  ImplicitLocOpBuilder builder;
 };
 
 } // namespace
@@ -93,19 +57,8 @@ static Value getWideRsqrt(Operation *op) {
   return wide && wide.getIn().getType().isF32() ? wide.getIn() : Value();
 }
 
-Value Approximation::replace(Operation *op) {
-  if (Value x = getWideRsqrt(op))
-    return getRsqrt(x);
-  if (op->getNumResults() != 1 || !op->getResult(0).getType().isF32())
-    return {};
-  if (auto division = dyn_cast<arith::DivFOp>(op))
-    return replaceDivision(division.getLhs(), division.getRhs());
-  if (auto root = dyn_cast<math::SqrtOp>(op))
-    return replaceRoot(root.getOperand());
-  return {};
-}
-
-Value Approximation::replaceDivision(Value dividend, Value divisor) {
+static Value replaceDivision(ImplicitLocOpBuilder &builder, Value dividend,
+                             Value divisor) {
   Value inverse;
   FloatAttr constant;
   if (matchPattern(divisor, m_Constant(&constant))) {
@@ -117,45 +70,27 @@ Value Approximation::replaceDivision(Value dividend, Value divisor) {
     inverse = arith::ConstantOp::create(
         builder, builder.getF32FloatAttr(one.convertToFloat()));
   } else if (Value x = getRooted(divisor)) {
-    inverse = getRsqrt(x);
+    inverse = ApproximateRsqrtOp::create(builder, x);
   } else {
-    inverse = getReciprocal(divisor);
+    inverse = ApproximateReciprocalOp::create(builder, divisor);
   }
-  return isOne(dividend) ? inverse : getProduct(dividend, inverse);
+  if (isOne(dividend))
+    return inverse;
+  return arith::MulFOp::create(builder, dividend, inverse);
 }
 
-Value Approximation::refine(Value first, Value share, Value error,
-                            Value otherwise) {
-  Value better = math::FmaOp::create(builder, share, error, first);
-  // Of 0 and infinity it is NaN; of what counted as 0, -infinity.
-  Value isGood = arith::CmpFOp::create(builder, arith::CmpFPredicate::OGT,
-                                       error, getConstant(-1));
-  return arith::SelectOp::create(builder, isGood, better,
-                                 otherwise ? otherwise : first);
-}
-
-Value Approximation::getReciprocal(Value x) {
-  Value first = ApproximateReciprocalOp::create(builder, x);
-  return refine(first, first, getError(x, first));
-}
-
-Value Approximation::getRsqrt(Value x) {
-  Value first = ApproximateRsqrtOp::create(builder, x);
-  Value error = getError(getProduct(x, first), first);
-  return refine(first, getProduct(first, getConstant(0.5f)), error);
-}
-
-Value Approximation::replaceRoot(Value x) {
-  Value inverse = ApproximateRsqrtOp::create(builder, x);
-  Value first = getProduct(x, inverse);
-  // 0 and infinity, which are their own roots, and what counts as 0; but of a
-  // negative number there is none.
-  Value isNaN = arith::CmpFOp::create(builder, arith::CmpFPredicate::UNO,
-                                      inverse, inverse);
-  Value itself = arith::SelectOp::create(builder, isNaN, inverse, x);
-  // The root of what counts as -0 is that, not +infinity.
-  Value error = getError(first, inverse);
-  return refine(first, getProduct(first, getConstant(0.5f)), error, itself);
+/// What replaces a division or a square root in f32, or null.
+static Value approximate(Operation *op) {
+  ImplicitLocOpBuilder builder(op->getLoc(), op);
+  if (Value x = getWideRsqrt(op))
+    return ApproximateRsqrtOp::create(builder, x);
+  if (op->getNumResults() != 1 || !op->getResult(0).getType().isF32())
+    return {};
+  if (auto division = dyn_cast<arith::DivFOp>(op))
+    return replaceDivision(builder, division.getLhs(), division.getRhs());
+  if (auto root = dyn_cast<math::SqrtOp>(op))
+    return ApproximateSqrtOp::create(builder, root.getOperand());
+  return {};
 }
 
 //===----------------------------------------------------------------------===//
@@ -223,7 +158,7 @@ struct Counts {
 /// 1 / sqrt(x) is seen before sqrt(x) is gone.
 static void approximate(ProcessOp process, Counts &counts) {
   for (Operation *op : collectBackwards(process)) {
-    Value value = op->use_empty() ? Value() : Approximation(op).replace(op);
+    Value value = op->use_empty() ? Value() : approximate(op);
     if (!value)
       continue;
     ++(isa<arith::DivFOp>(op) ? counts.reciprocals : counts.roots);

@@ -216,8 +216,7 @@ static bool hasVectorForm(Operation *op) {
                math::RoundEvenOp, math::AbsFOp, math::AbsIOp, math::CopySignOp,
                math::FmaOp, math::CountLeadingZerosOp,
                math::CountTrailingZerosOp, math::CtPopOp>(op);
-  return isa<ApproximateReciprocalOp, ApproximateRsqrtOp>(op) ||
-         isa<arith::ArithDialect>(op->getDialect());
+  return isApproximation(op) || isa<arith::ArithDialect>(op->getDialect());
 }
 
 /// Whether it does not matter which lane does it first.

@@ -142,19 +142,12 @@ piko.pipeline @Divided rank 1 {
   }
 }
 
-// A quotient is a product, which is contracted with what follows. The step of
-// Newton's method counts only where the approximation is a number.
+// A quotient is a product, which is contracted with what follows. Of a constant
+// the reciprocal is the nearest float, unless that has fewer bits.
 // CHECK-LABEL: piko.pipeline @Quotient
 // CHECK-DAG:     %[[A:.*]] = piko.get %{{.*}} "a"
 // CHECK-DAG:     %[[B:.*]] = piko.get %{{.*}} "b"
-// CHECK:         %[[FIRST:.*]] = piko.approximate_reciprocal %[[B]] : f32
-// CHECK:         %[[MINUS:.*]] = arith.negf %[[B]]
-// CHECK:         %[[ONE:.*]] = arith.constant 1.0
-// CHECK:         %[[ERROR:.*]] = math.fma %[[MINUS]], %[[FIRST]], %[[ONE]]
-// CHECK:         %[[BETTER:.*]] = math.fma %[[FIRST]], %[[ERROR]], %[[FIRST]]
-// CHECK:         %[[MINUS_ONE:.*]] = arith.constant -1.0
-// CHECK:         %[[GOOD:.*]] = arith.cmpf ogt, %[[ERROR]], %[[MINUS_ONE]]
-// CHECK:         %[[INVERSE:.*]] = arith.select %[[GOOD]], %[[BETTER]], %[[FIRST]]
+// CHECK:         %[[INVERSE:.*]] = piko.approximate_reciprocal %[[B]] : f32
 // CHECK:         %[[SUM:.*]] = math.fma %[[A]], %[[INVERSE]], %[[A]]
 // CHECK:         %[[THIRD:.*]] = arith.constant 0.333333343
 // CHECK:         %[[BY_THREE:.*]] = arith.mulf %[[A]], %[[THIRD]]
@@ -194,15 +187,19 @@ piko.pipeline @Quotient rank 1 {
 // All ways of writing an inverse square root are one approximation: 1 / sqrt(x),
 // where sqrt(x) is used, too; a / sqrt(x); and what piko::rsqrt computes.
 // CHECK-LABEL: piko.pipeline @Roots
+// CHECK-DAG:     %[[X:.*]] = piko.get %{{.*}} "a"
+// CHECK-DAG:     %[[Y:.*]] = piko.get %{{.*}} "b"
 // CHECK-NOT:     arith.divf
 // CHECK-NOT:     math.sqrt
-// CHECK:         %[[FIRST:.*]] = piko.approximate_rsqrt %[[X:.*]] : f32
-// CHECK:         %[[ROOT:.*]] = arith.mulf %[[X]], %[[FIRST]]
-// CHECK:         %[[IS_NAN:.*]] = arith.cmpf uno, %[[FIRST]], %[[FIRST]]
-// CHECK:         %[[ITSELF:.*]] = arith.select %[[IS_NAN]], %[[FIRST]], %[[X]]
-// CHECK:         arith.select %{{.*}}, %{{.*}}, %[[ITSELF]]
-// CHECK-COUNT-3: piko.approximate_rsqrt %[[X]]
-// CHECK-NOT:     piko.approximate
+// CHECK:         %[[ROOT:.*]] = piko.approximate_sqrt %[[X]] : f32
+// CHECK:         %[[INVERSE:.*]] = piko.approximate_rsqrt %[[X]] : f32
+// CHECK:         %[[FACTOR:.*]] = piko.approximate_rsqrt %[[X]] : f32
+// CHECK:         %[[SCALED:.*]] = arith.mulf %[[Y]], %[[FACTOR]]
+// CHECK:         %[[RSQRT:.*]] = piko.approximate_rsqrt %[[X]] : f32
+// CHECK:         piko.store %[[ROOT]], @out
+// CHECK-NEXT:    piko.store %[[INVERSE]], @out
+// CHECK-NEXT:    piko.store %[[SCALED]], @out
+// CHECK-NEXT:    piko.store %[[RSQRT]], @out
 piko.pipeline @Roots rank 1 {
   piko.buffer @out : @F
   piko.source @s

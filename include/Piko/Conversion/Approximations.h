@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// The functions that approximations are in LLVM IR, which only a target knows
-// the instructions for: `piko.approximate_rsqrt.f32` of a float, `.v16f32` of a
-// vector.
+// The functions that approximations are in LLVM IR, until the target, which
+// knows the instructions for them, replaces them: `piko.approximate_rsqrt.f32`
+// of a float, `.v16f32` of a vector.
 
 #ifndef PIKO_CONVERSION_APPROXIMATIONS_H
 #define PIKO_CONVERSION_APPROXIMATIONS_H
@@ -14,6 +14,7 @@ namespace piko {
 constexpr llvm::StringLiteral approximateReciprocal =
     "piko.approximate_reciprocal";
 constexpr llvm::StringLiteral approximateRsqrt = "piko.approximate_rsqrt";
+constexpr llvm::StringLiteral approximateSqrt = "piko.approximate_sqrt";
 
 /// The name of the function of so many lanes; 0 is a float.
 inline std::string getApproximationName(llvm::StringRef kind, int64_t lanes) {

@@ -65,9 +65,8 @@ def ApplyPrecision : Pass<"piko-apply-precision", "::piko::PipelineOp"> {
     that says `precision relaxed`, before that, in f32: makes a division a
     product with a reciprocal, of a constant the nearest one, otherwise a
     `piko.approximate_reciprocal` or, if the divisor is a square root, a
-    `piko.approximate_rsqrt`; and a `math.sqrt` a product with the latter. One
-    step of Newton's method makes each nearly exact. `piko::rsqrt`, which computes
-    in f64, is recognised.
+    `piko.approximate_rsqrt`; and a `math.sqrt` a `piko.approximate_sqrt`.
+    `piko::rsqrt`, which computes in f64, is recognised.
 
     **Guarantees** that no precision is left, and that what is computed is
     written down: no later pass, no vector form and no number of threads changes
@@ -87,12 +86,7 @@ def ApplyPrecision : Pass<"piko-apply-precision", "::piko::PipelineOp"> {
     piko.process {
       ...
       %r = piko.approximate_reciprocal %x : f32
-      %minus = arith.negf %x : f32
-      %error = math.fma %minus, %r, %one : f32
-      %better = math.fma %r, %error, %r : f32
-      %isGood = arith.cmpf ogt, %error, %minusOne : f32
-      %1 = arith.select %isGood, %better, %r : f32
-      %s = math.fma %a, %1, %b : f32
+      %s = math.fma %a, %r, %b : f32
     ```
 
     **Limits**: a sum in a loop keeps its order, though `relaxed` permits another.

@@ -47,4 +47,6 @@ void piko::populateApproximationsToLLVMPatterns(const TypeConverter &converter,
       converter, patterns.getContext(), context, approximateReciprocal);
   patterns.add<ApproximationLowering<ApproximateRsqrtOp>>(
       converter, patterns.getContext(), context, approximateRsqrt);
+  patterns.add<ApproximationLowering<ApproximateSqrtOp>>(
+      converter, patterns.getContext(), context, approximateSqrt);
 }

@@ -2,6 +2,7 @@
 #include "LowerArithmetic.h"
 
 #include "Piko/Conversion/Approximations.h"
+#include "Piko/Target/Approximation.h"
 
 #include "llvm/IR/IRBuilder.h"
 #include "llvm/IR/IntrinsicInst.h"
@@ -16,54 +17,47 @@ using namespace piko;
 
 namespace {
 
-/// What x86 has for an approximation, by the number of lanes.
-struct Approximation {
+/// What x86 has for approximations, by the number of lanes.
+struct VectorInstruction {
   int64_t lanes;
   Intrinsic::ID reciprocal, rsqrt;
   /// Whether it also takes a vector and a mask, for lanes that are left out.
   bool isMasked;
 };
 
-constexpr Approximation instructions14[] = {
+constexpr VectorInstruction instructions14[] = {
     {4, Intrinsic::x86_avx512_rcp14_ps_128,
      Intrinsic::x86_avx512_rsqrt14_ps_128, true},
     {8, Intrinsic::x86_avx512_rcp14_ps_256,
      Intrinsic::x86_avx512_rsqrt14_ps_256, true},
     {16, Intrinsic::x86_avx512_rcp14_ps_512,
      Intrinsic::x86_avx512_rsqrt14_ps_512, true}};
-constexpr Approximation instructions12[] = {
+constexpr VectorInstruction instructions12[] = {
     {4, Intrinsic::x86_sse_rcp_ps, Intrinsic::x86_sse_rsqrt_ps, false},
     {8, Intrinsic::x86_avx_rcp_ps_256, Intrinsic::x86_avx_rsqrt_ps_256, false}};
 
-/// Writes an approximation in front of the call that it replaces.
+/// Writes instructions for what approximates a number, or each one of a vector.
 class Writer {
 public:
-  Writer(CallInst *call, bool isRsqrt, ArrayRef<Approximation> instructions)
-      : builder(call), operand(call->getArgOperand(0)), isRsqrt(isRsqrt),
+  Writer(IRBuilderBase &builder, bool isReciprocal,
+         ArrayRef<VectorInstruction> instructions)
+      : builder(builder), isReciprocal(isReciprocal),
         instructions(instructions) {}
-  Value *write();
+  Value *write(Value *x);
 
 private:
-  Value *divide();
-  Value *apply(const Approximation &instruction, Value *vector);
+  Value *writeScalar(Value *x);
+  /// Of as many lanes as the instruction has.
+  Value *apply(const VectorInstruction &instruction, Value *vector);
 
-  IRBuilder<> builder;
-  Value *operand;
-  bool isRsqrt;
-  ArrayRef<Approximation> instructions;
+  IRBuilderBase &builder;
+  bool isReciprocal;
+  ArrayRef<VectorInstruction> instructions;
 };
 
 } // namespace
 
-/// Of no instruction there is the exact result.
-Value *Writer::divide() {
-  Value *divisor = isRsqrt
-                       ? builder.CreateUnaryIntrinsic(Intrinsic::sqrt, operand)
-                       : operand;
-  return builder.CreateFDiv(ConstantFP::get(operand->getType(), 1.0), divisor);
-}
-
-Value *Writer::apply(const Approximation &instruction, Value *vector) {
+Value *Writer::apply(const VectorInstruction &instruction, Value *vector) {
   SmallVector<Value *> arguments{vector};
   if (instruction.isMasked) {
     arguments.push_back(Constant::getNullValue(vector->getType()));
@@ -71,37 +65,40 @@ Value *Writer::apply(const Approximation &instruction, Value *vector) {
         builder.getIntNTy(std::max<int64_t>(instruction.lanes, 8))));
   }
   return builder.CreateIntrinsic(
-      isRsqrt ? instruction.rsqrt : instruction.reciprocal, arguments);
+      isReciprocal ? instruction.reciprocal : instruction.rsqrt, arguments);
+}
+
+Value *Writer::writeScalar(Value *x) {
+  const VectorInstruction &narrowest = instructions.front();
+  Value *vector =
+      PoisonValue::get(FixedVectorType::get(x->getType(), narrowest.lanes));
+  vector = builder.CreateInsertElement(vector, x, uint64_t(0));
+  return builder.CreateExtractElement(apply(narrowest, vector), uint64_t(0));
 }
 
 /// Cuts a vector into those that instructions take, and fills up the last one.
-Value *Writer::write() {
-  if (instructions.empty())
-    return divide();
-  auto *type = dyn_cast<FixedVectorType>(operand->getType());
-  int64_t lanes = type ? type->getNumElements() : 1;
-  const Approximation *widest = find_if(
-      instructions, [&](const Approximation &i) { return i.lanes >= lanes; });
-  if (widest == instructions.end())
-    --widest;
-  if (!type) {
-    Value *vector = PoisonValue::get(
-        FixedVectorType::get(operand->getType(), widest->lanes));
-    vector = builder.CreateInsertElement(vector, operand, uint64_t(0));
-    return builder.CreateExtractElement(apply(*widest, vector), uint64_t(0));
-  }
+Value *Writer::write(Value *x) {
+  auto *type = dyn_cast<FixedVectorType>(x->getType());
+  if (!type)
+    return writeScalar(x);
+  int64_t lanes = type->getNumElements();
+  const VectorInstruction *found =
+      find_if(instructions,
+              [&](const VectorInstruction &i) { return i.lanes >= lanes; });
+  const VectorInstruction &instruction =
+      found == instructions.end() ? instructions.back() : *found;
   Value *result = PoisonValue::get(type);
-  for (int64_t first = 0; first < lanes; first += widest->lanes) {
-    SmallVector<int> cut, paste(lanes);
-    for (int64_t lane = 0; lane < widest->lanes; ++lane)
-      cut.push_back(first + lane < lanes ? int(first + lane) : PoisonMaskElem);
-    Value *part = apply(*widest, builder.CreateShuffleVector(operand, cut));
+  for (int64_t first = 0; first < lanes; first += instruction.lanes) {
+    SmallVector<int> cut;
+    for (int64_t lane = first; lane < first + instruction.lanes; ++lane)
+      cut.push_back(lane < lanes ? int(lane) : PoisonMaskElem);
+    Value *part = apply(instruction, builder.CreateShuffleVector(x, cut));
     // As long as the result, to be put into it.
-    SmallVector<int> widen;
+    SmallVector<int> widen, paste;
     for (int64_t lane = 0; lane < lanes; ++lane) {
-      bool isHere = lane >= first && lane < first + widest->lanes;
+      bool isHere = lane >= first && lane < first + instruction.lanes;
       widen.push_back(isHere ? int(lane - first) : PoisonMaskElem);
-      paste[lane] = isHere ? int(lanes + lane) : int(lane);
+      paste.push_back(isHere ? int(lanes + lane) : int(lane));
     }
     result = builder.CreateShuffleVector(
         result, builder.CreateShuffleVector(part, widen), paste);
@@ -109,14 +106,20 @@ Value *Writer::write() {
   return result;
 }
 
-/// What the machine has, narrowest first.
-static ArrayRef<Approximation> getInstructions(const TargetMachine &machine) {
-  const MCSubtargetInfo &info = *machine.getMCSubtargetInfo();
-  if (!machine.getTargetTriple().isX86())
+static bool hasFma(const TargetMachine &machine) {
+  return !machine.getTargetTriple().isX86() ||
+         machine.getMCSubtargetInfo()->checkFeatures("+fma");
+}
+
+/// What the machine has, narrowest first. Without instructions for the step of
+/// Newton's method, approximations would save nothing.
+static ArrayRef<VectorInstruction>
+getInstructions(const TargetMachine &machine) {
+  if (!machine.getTargetTriple().isX86() || !hasFma(machine))
     return {};
-  if (info.checkFeatures("+avx512vl"))
-    return instructions14;
-  return ArrayRef(instructions12).drop_back(!info.checkFeatures("+avx"));
+  return machine.getMCSubtargetInfo()->checkFeatures("+avx512vl")
+             ? ArrayRef(instructions14)
+             : ArrayRef(instructions12);
 }
 
 /// a * b + c, rounded once. The product is exact in double; the sum is rounded
@@ -154,54 +157,42 @@ static Value *expandFma(CallInst *call) {
                                call->getType());
 }
 
-static void replaceCalls(Function &function,
-                         function_ref<Value *(CallInst *)> write) {
-  for (User *user : make_early_inc_range(function.users()))
-    if (auto *call = dyn_cast<CallInst>(user)) {
-      call->replaceAllUsesWith(write(call));
-      call->eraseFromParent();
-    }
-}
-
-static bool isApproximation(const Function &function) {
-  return function.isDeclaration() &&
-         (function.getName().starts_with(approximateReciprocal) ||
-          function.getName().starts_with(approximateRsqrt));
-}
-
 PreservedAnalyses LowerArithmeticPass::run(Module &module,
                                            ModuleAnalysisManager &) {
-  ArrayRef<Approximation> instructions = getInstructions(*machine);
   // It kept the vector forms from being removed.
   removeFromUsedLists(module, [](Constant *kept) {
     auto *function = dyn_cast<Function>(kept->stripPointerCasts());
-    return function && isApproximation(*function);
+    return function && getApproximation(*function);
   });
-  for (Function &function : make_early_inc_range(module)) {
-    if (!isApproximation(function))
-      continue;
-    bool isRsqrt = function.getName().starts_with(approximateRsqrt);
-    replaceCalls(function, [&](CallInst *call) {
-      return Writer(call, isRsqrt, instructions).write();
-    });
-    if (function.use_empty())
-      function.eraseFromParent();
-  }
+  ArrayRef<VectorInstruction> instructions = getInstructions(*machine);
+  replaceApproximations(
+      module, [&](IRBuilderBase &builder, Approximation kind, Value *x) {
+        if (instructions.empty())
+          return computeExactly(builder, kind, x);
+        Writer writer(builder, kind == Approximation::Reciprocal, instructions);
+        return refine(builder, kind, x, writer.write(x));
+      });
   return PreservedAnalyses::none();
 }
 
 static void expandFmas(Module &module, const TargetMachine &machine) {
-  if (!machine.getTargetTriple().isX86() ||
-      machine.getMCSubtargetInfo()->checkFeatures("+fma"))
+  if (hasFma(machine))
     return;
-  for (Function &function : module)
-    if (function.getIntrinsicID() == Intrinsic::fma &&
-        function.getReturnType()->getScalarType()->isFloatTy())
-      replaceCalls(function, expandFma);
+  for (Function &function : module) {
+    if (function.getIntrinsicID() != Intrinsic::fma ||
+        !function.getReturnType()->getScalarType()->isFloatTy())
+      continue;
+    for (User *user : make_early_inc_range(function.users())) {
+      auto *call = cast<CallInst>(user);
+      call->replaceAllUsesWith(expandFma(call));
+      call->eraseFromParent();
+    }
+  }
 }
 
 static void declareVectorForms(Module &module) {
-  for (StringRef kind : {approximateReciprocal, approximateRsqrt}) {
+  for (StringRef kind :
+       {approximateReciprocal, approximateRsqrt, approximateSqrt}) {
     std::string name = getApproximationName(kind, 0);
     Function *scalar = module.getFunction(name);
     if (!scalar)

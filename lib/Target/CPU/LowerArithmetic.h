@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// The approximations of Piko/Conversion/Approximations.h as instructions of the
-// CPU, which are the same for a number as for one of a vector; and llvm.fma of
+// The approximations of Piko/Conversion/Approximations.h by instructions of the
+// CPU, which give the same for a number as for one of a vector; and llvm.fma of
 // floats where the CPU has no instruction for it, exactly, without a call.
 
 #ifndef PIKO_TARGET_CPU_LOWERARITHMETIC_H

@@ -4,10 +4,9 @@
 
 #include "Piko/Target/PTX.h"
 
-#include "Piko/Conversion/Approximations.h"
+#include "Piko/Target/Approximation.h"
 #include "Piko/Target/CodeGeneration.h"
 
-#include "llvm/IR/IRBuilder.h"
 #include "llvm/IR/IntrinsicsNVPTX.h"
 #include "llvm/MC/TargetRegistry.h"
 #include "llvm/Support/TargetSelect.h"
@@ -39,25 +38,14 @@ createMachine(StringRef processor, int optLevel) {
       triple, processor, "", flags, std::nullopt, std::nullopt, level));
 }
 
-/// Approximations become instructions; kernels have no vectors of floats.
-static Error replaceApproximations(Module &module) {
-  for (Function &function : make_early_inc_range(module)) {
-    StringRef name = function.getName();
-    Intrinsic::ID intrinsic;
-    if (name == getApproximationName(approximateReciprocal, 0))
-      intrinsic = Intrinsic::nvvm_rcp_approx_ftz_f;
-    else if (name == getApproximationName(approximateRsqrt, 0))
-      intrinsic = Intrinsic::nvvm_rsqrt_approx_ftz_f;
-    else if (name.starts_with(approximateReciprocal) ||
-             name.starts_with(approximateRsqrt))
-      return createStringError("PTX has no '" + name + "'");
-    else
-      continue;
-    function.replaceAllUsesWith(
-        Intrinsic::getOrInsertDeclaration(&module, intrinsic));
-    function.eraseFromParent();
-  }
-  return Error::success();
+/// By instructions; kernels have no vectors of floats.
+static Value *writeApproximation(IRBuilderBase &builder, Approximation kind,
+                                 Value *x) {
+  Value *first = builder.CreateIntrinsic(
+      kind == Approximation::Reciprocal ? Intrinsic::nvvm_rcp_approx_ftz_f
+                                        : Intrinsic::nvvm_rsqrt_approx_ftz_f,
+      {x});
+  return refine(builder, kind, x, first);
 }
 
 Expected<std::string> piko::generatePTX(Module &module, StringRef processor,
@@ -66,7 +54,6 @@ Expected<std::string> piko::generatePTX(Module &module, StringRef processor,
       createMachine(processor.empty() ? defaultProcessor : processor, optLevel);
   if (!machine)
     return machine.takeError();
-  if (Error error = replaceApproximations(module))
-    return error;
+  replaceApproximations(module, writeApproximation);
   return emitCode(module, **machine, optLevel, CodeGenFileType::AssemblyFile);
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 // Approximations are the instructions that the processor has, also where LLVM
 // vectorizes the loop; a fused multiply-add that it has not is computed without
-// a call.
+// a call, and approximations are exact then.
 // RUN: pikoc %s -o - --emit=assembly --no-cache --pipe Relaxed --cpu skylake-avx512 | FileCheck %s --check-prefix=AVX512
 // RUN: pikoc %s -o - --emit=assembly --no-cache --pipe Relaxed --cpu x86-64-v3 | FileCheck %s --check-prefix=AVX
 // RUN: pikoc %s -o - --emit=assembly --no-cache --pipe Relaxed --cpu x86-64 | FileCheck %s --check-prefix=SSE
@@ -16,8 +16,9 @@
 // AVX-NOT:    {{v(div|sqrt)[sp]s}}
 // AVX:        vr{{cp|sqrt}}ps %ymm
 // AVX-NOT:    {{v(div|sqrt)[sp]s}}
-// SSE:        r{{cp|sqrt}}ps %xmm
-// SSE-NOT:    {{[[:space:]](div|sqrt)[sp]s}}
+// SSE-NOT:    {{rcp|rsqrt}}
+// SSE:        divps
+// SSE-NOT:    {{rcp|rsqrt}}
 // SSE-NOT:    fmaf
 // FMA:        vfmadd{{.*}}ps
 // NO-FMA-NOT: fmaf

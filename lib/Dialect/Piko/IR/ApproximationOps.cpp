@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// The approximations that processors have instructions for.
+// Reciprocals and square roots by approximations.
 
 #include "Piko/Dialect/Piko/IR/PikoApproximation.h"
 
@@ -27,3 +27,5 @@ LogicalResult ApproximateReciprocalOp::verify() {
 LogicalResult ApproximateRsqrtOp::verify() {
   return verifyApproximation(*this);
 }
+
+LogicalResult ApproximateSqrtOp::verify() { return verifyApproximation(*this); }

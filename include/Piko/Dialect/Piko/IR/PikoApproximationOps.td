@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// The approximations that processors have instructions for.
+// Reciprocals and square roots by the approximations that processors have
+// instructions for.
 
 #ifndef PIKO_DIALECT_PIKO_IR_PIKOAPPROXIMATIONOPS_TD
 #define PIKO_DIALECT_PIKO_IR_PIKOAPPROXIMATIONOPS_TD
@@ -18,13 +19,13 @@ class Piko_ApproximationOp<string mnemonic> : Piko_Op<mnemonic, [
 }
 
 def Piko_ApproximateReciprocalOp : Piko_ApproximationOp<"approximate_reciprocal"> {
-  let summary = "about 1 / x, with a relative error below 2^-11";
+  let summary = "1 / x, within 4 ULP";
   let description = [{
-    Whatever instruction the processor has for it (`vrcp14ps`, `rcpps`,
-    `rcp.approx`), or a division where there is none. It gives the same for a
-    number as for one of a vector. Of 0 it is infinite, of an infinity 0, both
-    with the sign of the operand. Denormals may count as 0, operands and results
-    alike.
+    The target writes it as what its instruction approximates (`vrcp14ps`,
+    `rcpps`, `rcp.approx`) and one step of Newton's method, or as a division where
+    it has none. It gives the same for a number as for one of a vector. Of 0 it is
+    infinite, of an infinity 0, both with the sign of the operand, and of a NaN
+    NaN. Denormals may count as 0, operands and results alike.
 
     ```mlir
     %r = piko.approximate_reciprocal %x : f32
@@ -34,12 +35,24 @@ def Piko_ApproximateReciprocalOp : Piko_ApproximationOp<"approximate_reciprocal"
 }
 
 def Piko_ApproximateRsqrtOp : Piko_ApproximationOp<"approximate_rsqrt"> {
-  let summary = "about 1 / sqrt(x), with a relative error below 2^-11";
+  let summary = "1 / sqrt(x), within 4 ULP";
   let description = [{
     See `piko.approximate_reciprocal`. Of a number below 0 it is NaN.
 
     ```mlir
     %r = piko.approximate_rsqrt %x : f32
+    ```
+  }];
+}
+
+def Piko_ApproximateSqrtOp : Piko_ApproximationOp<"approximate_sqrt"> {
+  let summary = "sqrt(x), within 4 ULP";
+  let description = [{
+    See `piko.approximate_reciprocal`: x times the approximation of 1 / sqrt(x).
+    0, of either sign, and infinity are their own roots.
+
+    ```mlir
+    %r = piko.approximate_sqrt %x : f32
     ```
   }];
 }
