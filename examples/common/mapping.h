@@ -1,7 +1,8 @@
 //===- mapping.h - Where the stages of a pipeline run ---------------------===//
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// What can be changed about a pipeline without changing its results.
+// What can be changed about a pipeline without changing its results, but for
+// the last bits if its precision is not strict.
 //
 //===----------------------------------------------------------------------===//
 #ifndef COMMON_MAPPING_H
@@ -20,6 +21,7 @@ struct Mapping {
   int64_t split = 0;                ///< how many primitives `All` cores share
   bool apart = true;  ///< whether stages behind the first ask for a core
   bool waits = false; ///< whether shading begins when a bin is complete
+  piko::Precision precision = piko::Precision::Strict; ///< of shading
 };
 
 } // namespace raster

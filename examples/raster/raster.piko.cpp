@@ -233,6 +233,7 @@ struct FragmentShader : piko::Stage<M.bin, M.bin, 64, Fragment, ShadedFragment>,
       this->specifySchedule(M.core, M.split);
     if constexpr (M.waits)
       this->endBin();
+    this->specifyPrecision(M.precision);
   }
 
   void process(const Fragment &f) {
