@@ -365,6 +365,8 @@ class CppPrinter:
             self.line("specifyOrder(piko::Unordered);")
         elif s.kind == "specifyLanes":
             self.line(f"specifyLanes(piko::Lanes::{s.policy});")
+        elif s.kind == "specifyPrecision":
+            self.line(f"specifyPrecision(piko::Precision::{s.policy});")
         else:
             self.line(f"{s.kind}();")
 

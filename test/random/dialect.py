@@ -476,6 +476,10 @@ class DialectPrinter:
             text += " lanes " + directives["specifyLanes"].policy.lower()
         return text
 
+    def precision(self, stage):
+        return "".join(f" precision {d.policy.lower()}" for d in stage.schedule
+                       if d.kind == "specifyPrecision")
+
     def phase(self, name, body):
         self.env, self.types = {}, {}
         if self.stage.template:
@@ -510,7 +514,7 @@ class DialectPrinter:
             if stage.assign is not None:
                 self.phase("assign", stage.assign)
             self.line(self.schedule(stage))
-            self.phase("process", stage.process)
+            self.phase("process" + self.precision(stage), stage.process)
             self.depth -= 1
             self.line("}")
         self.depth -= 1

@@ -360,7 +360,7 @@ class Directive(Stmt):
     """A schedule directive, as C++ writes it but for its operands."""
 
     kind: str  # specifySchedule, endStage, endBin, batch, everyBin, unordered,
-    # specifyLanes
+    # specifyLanes, specifyPrecision
     policy: str = "LoadBalance"
     value: Expr = None
     stage: int = 0

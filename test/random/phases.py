@@ -84,6 +84,12 @@ class Phases(Graphs):
             self.use("lanes-of-iterations")
             stage.schedule.append(Directive("specifyLanes", "Iterations"))
 
+    def choose_precision(self, stage):
+        if self.on("precision") and self.random.random() < 0.1:
+            self.use("precision")
+            stage.schedule.append(Directive(
+                "specifyPrecision", self.random.choice(["Contracted", "Relaxed"])))
+
     def make_assign_phase(self, pipe, index):
         """Also how many bins a primitive can be in."""
         r = self.random

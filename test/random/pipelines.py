@@ -24,7 +24,7 @@ from phases import *
 FEATURES = [
     "joins", "several-ports", "collecting", "endStage", "endBin", "lists", "batch",
     "everyBin", "dynamic-schedule", "parallelFor", "nested-parallel", "sync",
-    "lanes-of-iterations",
+    "lanes-of-iterations", "precision",
     "collectives", "gather", "cycles", "unordered", "fetch-atomics", "float-atomics",
     "updates", "atomics", "stores", "maths", "bit-tricks", "float-specials",
     "dynamic-elements", "loop-jumps", "early-returns", "switches", "lambdas",
@@ -171,6 +171,7 @@ class Generator(Phases):
             with self.fewer_barriers(i):
                 self.make_process(pipe, i, 1 if stage.is_list else 30)
             self.choose_lanes(stage, self.links.get(i))
+            self.choose_precision(stage)
             emits.append(self.bounds)
         if self.on("twin-stages") and r.random() < 0.3:
             self.add_twin(pipe, bounds, emits)
