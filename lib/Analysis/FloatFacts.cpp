@@ -70,7 +70,7 @@ template <typename Exact> static Exact negate(const Exact &a) {
 /// None if neither is a constant.
 template <typename Exact>
 static std::optional<Exact> multiply(const Exact &a, const Exact &b) {
-  for (auto [x, y] : {std::pair(a, b), std::pair(b, a)})
+  for (const auto &[x, y] : {std::pair(a, b), std::pair(b, a)})
     if (std::optional<DynamicAPInt> factor = y.scaled.getConstant())
       return Exact{x.scaled * *factor, x.shift + y.shift};
   return std::nullopt;
