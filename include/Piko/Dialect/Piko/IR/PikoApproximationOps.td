@@ -28,8 +28,8 @@ def Piko_ApproximateReciprocalOp : Piko_ApproximationOp<"approximate_reciprocal"
     NaN. Denormals may count as 0, operands and results alike.
 
     ```mlir
-    %r = piko.approximate_reciprocal %x : f32
-    %s = piko.approximate_reciprocal %xs : vector<16xf32>
+    %r = piko.approximate_reciprocal %z : f32
+    %s = piko.approximate_reciprocal %values : vector<16xf32>
     ```
   }];
 }
@@ -40,7 +40,7 @@ def Piko_ApproximateRsqrtOp : Piko_ApproximationOp<"approximate_rsqrt"> {
     See `piko.approximate_reciprocal`. Of a number below 0 it is NaN.
 
     ```mlir
-    %r = piko.approximate_rsqrt %x : f32
+    %r = piko.approximate_rsqrt %z : f32
     ```
   }];
 }
@@ -52,7 +52,7 @@ def Piko_ApproximateSqrtOp : Piko_ApproximationOp<"approximate_sqrt"> {
     0, of either sign, and infinity are their own roots.
 
     ```mlir
-    %r = piko.approximate_sqrt %x : f32
+    %r = piko.approximate_sqrt %z : f32
     ```
   }];
 }
