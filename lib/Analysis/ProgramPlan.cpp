@@ -6,6 +6,7 @@
 
 #include "Piko/Analysis/ProgramPlan.h"
 
+#include "Piko/Analysis/OrderFacts.h"
 #include "Piko/Dialect/Piko/IR/PikoProgram.h"
 
 using namespace mlir;
@@ -15,6 +16,8 @@ ProgramPlan::ProgramPlan(PipelineOp pipeline)
     : graph(pipeline, getDeclaredStages(pipeline)), components(graph),
       loops(graph.cutAtCollectors()), reach(graph.reach()) {
   order = components.declarationOrder();
+  for (StageOp stage : graph.stages)
+    ordered.push_back(!isOrderIrrelevant(pipeline, stage));
   findEdges(pipeline);
   findGathers(pipeline);
   findKeyed();
@@ -31,11 +34,6 @@ void ProgramPlan::findEdges(PipelineOp pipeline) {
                      graph.getNumber(edge.getConsumerAttr()), isLocal(edge)});
 }
 
-static bool isUnordered(StageOp stage) {
-  ScheduleOp schedule = stage.getSchedule();
-  return schedule && schedule.getUnordered();
-}
-
 /// A stage that runs bin by bin emits in the order of bins, which is that of
 /// lineage only if it collects, and then only without tiles.
 void ProgramPlan::findGathers(PipelineOp pipeline) {
@@ -49,8 +47,7 @@ void ProgramPlan::findGathers(PipelineOp pipeline) {
         from.getPlaced() ||
         placed.contains(FlatSymbolRefAttr::get(from.getSymNameAttr()));
     edge.permute = isPlaced && (!from.collects() || from.getTile()) &&
-                   !isUnordered(from) &&
-                   !isUnordered(graph.getStage(edge.consumer));
+                   ordered[edge.producer] && ordered[edge.consumer];
   }
 }
 
@@ -77,7 +74,9 @@ int ProgramPlan::countInputs(int stage) const {
   });
 }
 
-bool ProgramPlan::merges(int stage) const { return countInputs(stage) > 1; }
+bool ProgramPlan::merges(int stage) const {
+  return countInputs(stage) > 1 && (ordered[stage] || isLoop(getLoop(stage)));
+}
 
 int64_t &ProgramPlan::widthAt(int stage) {
   int loop = getLoop(stage);

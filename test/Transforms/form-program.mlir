@@ -104,9 +104,15 @@ piko.pipeline @Merge rank 1 {
       piko.return
     }
   }
+  piko.image @last : @F rank 1
   piko.stage @meet bins [0] threads 1 : @F -> [] {
     piko.process {
     ^bb0(%f: !piko.prim<@F>):
+      %x = piko.get %f "x" : !piko.prim<@F> -> i32
+      piko.update @last[%x : i32] {
+      ^bb0(%old: i32):
+        piko.yield [%x : i32]
+      }
       piko.return
     }
   }
@@ -114,6 +120,73 @@ piko.pipeline @Merge rank 1 {
     piko.schedule load_balance end_stage [@meet]
     piko.process {
     ^bb0(%f: !piko.prim<@F>):
+      piko.return
+    }
+  }
+}
+
+// A sum and a maximum are the same in whatever order: what comes along two edges
+// is not merged, and has no keys. Nor is it for a stage that says so.
+// CHECK-LABEL: piko.pipeline @Commutes
+// CHECK:         piko.join @sum(concatenate %{{.*}}, concatenate %{{.*}}) :
+// CHECK:         piko.join @most(concatenate %{{.*}}, concatenate %{{.*}}) :
+// CHECK:         piko.join @any(concatenate %{{.*}}, concatenate %{{.*}}) :
+// CHECK:         piko.join @both merge(concatenate %{{.*}} keys 1, concatenate %{{.*}} keys 1) :
+piko.pipeline @Commutes rank 1 {
+  piko.image @sums : @F rank 1
+  piko.source @sum
+  piko.source @sum
+  piko.source @most
+  piko.source @most
+  piko.source @any
+  piko.source @any
+  piko.source @both
+  piko.source @both
+  piko.stage @sum bins [0] threads 1 : @F -> [] {
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      %x = piko.get %f "x" : !piko.prim<@F> -> i32
+      piko.update @sums[%x : i32] {
+      ^bb0(%old: i32):
+        %twice = arith.addi %x, %x : i32
+        %new = arith.addi %twice, %old : i32
+        piko.yield [%new : i32]
+      }
+      piko.return
+    }
+  }
+  piko.stage @most bins [0] threads 1 : @F -> [] {
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      %x = piko.get %f "x" : !piko.prim<@F> -> i32
+      piko.atomic max_signed @sums[%x : i32] "x", %x : i32
+      piko.return
+    }
+  }
+  piko.stage @any bins [0] threads 1 : @F -> [] {
+    piko.schedule load_balance unordered
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      %x = piko.get %f "x" : !piko.prim<@F> -> i32
+      %old = piko.atomic add @sums[%x : i32] "x", %x : i32 -> i32
+      piko.return
+    }
+  }
+  // A sum, and then a maximum, is not what it is the other way around.
+  piko.stage @both bins [0] threads 1 : @F -> [] {
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      %x = piko.get %f "x" : !piko.prim<@F> -> i32
+      piko.update @sums[%x : i32] {
+      ^bb0(%old: i32):
+        %new = arith.addi %x, %old : i32
+        piko.yield [%new : i32]
+      }
+      piko.update @sums[%x : i32] {
+      ^bb0(%old: i32):
+        %new = arith.maxsi %old, %x : i32
+        piko.yield [%new : i32]
+      }
       piko.return
     }
   }

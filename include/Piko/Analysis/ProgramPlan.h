@@ -43,7 +43,8 @@ public:
   bool isReached(int from, int to) const { return reach[from][to]; }
   /// What leads to a stage, sources first, in order.
   llvm::SmallVector<const PlannedEdge *> getInputs(int stage) const;
-  /// Whether several edges lead into a stage, or into its loop.
+  /// Whether several edges lead into a stage, or into its loop, whose order is
+  /// not irrelevant.
   bool merges(int stage) const;
 
   const StageGraph graph;
@@ -66,6 +67,7 @@ private:
   int64_t &widthAt(int stage);
 
   const NodeGraph components, loops;
+  llvm::SmallVector<bool> ordered; ///< Stages whose order of primitives shows.
   llvm::SmallVector<llvm::SmallVector<bool>> reach;
 };
 

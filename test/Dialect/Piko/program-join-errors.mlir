@@ -224,23 +224,6 @@ piko.pipeline @P rank 1 {
   piko.program {
     %0 = piko.feed 0 : !piko.edge<@F>
     %1 = piko.feed 1 : !piko.edge<@F>
-    // expected-error @below {{expected several edges to be merged}}
-    %2 = piko.join @a(concatenate %0 keys 1, concatenate %1 keys 1) : (!piko.edge<@F>, !piko.edge<@F>) -> !piko.bins<@F>
-    piko.launch @ka(%2) : (!piko.bins<@F>) -> ()
-  }
-}
-
-// -----
-
-piko.record @F {"x" : i32 at 0} size 4 align 4
-piko.pipeline @P rank 1 {
-  piko.source @a
-  piko.source @a
-  piko.stage @a bins [0] threads 1 : @F -> [] {}
-  piko.kernel @ka { %bins = piko.storage.open_bins @a : !piko.bins<@F> }
-  piko.program {
-    %0 = piko.feed 0 : !piko.edge<@F>
-    %1 = piko.feed 1 : !piko.edge<@F>
     // expected-error @below {{expected keys to merge by}}
     %2 = piko.join @a merge(concatenate %0 keys 1, concatenate %1) : (!piko.edge<@F>, !piko.edge<@F>) -> !piko.bins<@F>
     piko.launch @ka(%2) : (!piko.bins<@F>) -> ()

@@ -313,9 +313,8 @@ LogicalResult JoinOp::verify() {
   // What goes around in waves has no keys, and is not merged by them.
   if (isa<WavesOp>((*this)->getParentOp()))
     return success();
-  if (getMerge() != (getEdges().size() > 1))
-    return emitOpError(getMerge() ? "expected several edges to merge"
-                                  : "expected several edges to be merged");
+  if (getMerge() && getEdges().size() < 2)
+    return emitOpError("expected several edges to merge");
   if (getMerge() && llvm::is_contained(getKeys(), 0))
     return emitOpError("expected keys to merge by");
   return success();

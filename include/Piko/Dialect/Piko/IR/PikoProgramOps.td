@@ -142,7 +142,8 @@ def Piko_JoinOp : Piko_ProgramStatement<"join"> {
     `permute`: they may not be, as the kernel ran bin by bin; then what each
     position emitted goes to the place that the position's rank in lineage order
     gives. `keys` is how many words the key of a primitive has, that tells its
-    lineage: what comes along several edges is merged (`merge`) by key. `keeps`
+    lineage: what comes along several edges is merged (`merge`) by key, or, if the
+    stage's results do not depend on its order, one edge follows the other. `keeps`
     is how many of these words go on with a primitive through the stage, because
     what it emits needs keys as well.
 
