@@ -27,7 +27,7 @@ struct State {
 
 // MACHINE-DAG: piko.items of @forced lanes items {
 // FINE-DAG: stage 'forced': lanes are given items, as is specified
-// FINE-DAG: stage 'forced': process is vectorized for 16 primitives at once; lanes are given items
+// FINE-DAG: stage 'forced': process is vectorized for 16 primitives at once
 struct Forced : piko::Stage<0, 0, 64, Box, Box> {
   void schedule(piko::BinId) { specifyLanes(piko::Lanes::Items); }
   void process(const Box &b) {
@@ -40,7 +40,6 @@ struct Forced : piko::Stage<0, 0, 64, Box, Box> {
 
 // It would be vectorized, and becomes no part of the stage in front of it.
 // MACHINE-DAG: piko.items of @alone lanes one {
-// FINE-DAG: stage 'alone': process is not vectorized; lanes are given one
 // FINE-DAG: the lanes of stage 'alone' are specified
 struct Alone : piko::Stage<0, 0, 64, Box, Box> {
   void assignBin(const Box &b) { assignToPreviousBins(b); }

@@ -24,6 +24,7 @@ enum Record {
   COLOR,
   OTHER,
   PIXEL,
+  NOTHING,
   BOUNDS,
   NODE,
   LEAF,
@@ -51,6 +52,7 @@ void setup(pikort_pipeline *p) {
   declareRecord(p, COLOR, "piko::scene::Color", sizeof(scene::Color));
   declareRecord(p, OTHER, "Other", 4);
   declareRecord(p, PIXEL, "piko::scene::Pixel", sizeof(scene::Pixel));
+  pikoir_declare_record(p, NOTHING, "piko::scene::Nothing", 1, 1);
   declareRecord(p, BOUNDS, "piko::scene::Bounds", sizeof(scene::Bounds));
   declareRecord(p, NODE, "piko::scene::BvhNode", sizeof(scene::BvhNode));
   declareRecord(p, LEAF, "piko::scene::BvhTriangle",
@@ -146,6 +148,20 @@ TEST_F(Binding, PixelsOfTheImage) {
   EXPECT_EQ(source.count, 15);
   EXPECT_EQ(input.pixels.at(7).at, glm::ivec2(2, 1));
   EXPECT_FALSE(input.bvh); // not asked for
+}
+
+TEST_F(Binding, NothingAtAll) {
+  auto output = bind([](pikort_pipeline *p) {
+    declareSource(p, 0, NOTHING);
+    declareState(p, 0, "picture", PIKORT_IMAGE, COLOR, 2);
+  });
+  ASSERT_TRUE(output) << output.error().message;
+  pikort_source_info source;
+  ASSERT_EQ(pikort_get_source_info(pipeline, 0, &source), PIKORT_OK);
+  EXPECT_EQ(source.count, 0);
+  int64_t extent[] = {5, 3};
+  ASSERT_EQ(pikort_set_domain(pipeline, 2, extent), PIKORT_OK);
+  EXPECT_EQ(pikort_run(pipeline), PIKORT_OK) << pikort_message(pipeline);
 }
 
 TEST_F(Binding, TreeOfTheMesh) {

@@ -1,0 +1,307 @@
+//===- visibility.piko.cpp - A rasterizer that shades what is seen --------===//
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+//   vertices --> Vertex Shader
+//                                  small
+//   triangles --> Setup ------------------> Small Coverage
+//                   |  \--------------------------------------> Coverage
+//                   |    large                                     ^
+//                   \----------> Clipper --------------------------/
+//                     crossing the near plane or the guard band
+//
+//   each bin, when all of these are done --> Shade
+//
+// A visibility buffer (Burns and Hunt 2013): for each pixel the coverage stages
+// keep the greatest key, which has the depth above and the triangle's number
+// below. So the nearest triangle wins, and the first among equals, in whatever
+// order they come, and small triangles need no bins. Then each pixel is shaded
+// once, by the ray through it and its triangle, which needs nothing of the
+// screen.
+//
+//===----------------------------------------------------------------------===//
+#include <piko.h>
+#include <piko/scene.h>
+
+#include "../common/corner.h"
+#include "../common/lighting.h"
+
+#include <bit>
+
+using namespace piko::scene;
+
+namespace visibility {
+
+using namespace raster;
+
+// A triangle on the screen, its corners clockwise, and the pixels that it may
+// cover.
+struct ScreenTriangle {
+  Point a, b, c;
+  glm::vec3 depth; // of a, b and c
+  int32_t index;
+  glm::i16vec2 lo, hi;
+};
+
+// Larger for what is nearer, then for what comes first; 0: nothing is seen.
+struct Visible {
+  uint64_t key = 0;
+};
+
+struct State {
+  Camera camera;
+  Settings settings;
+  piko::Buffer<Light> lights;
+  piko::Buffer<Vertex> mesh;
+  piko::Buffer<Triangle> triangles;
+  piko::Buffer<ScreenVertex> vertices; // one for each Vertex
+  piko::Image<Visible> visible;
+  piko::Image<Color> color;
+};
+
+inline glm::vec4 project(const Camera &camera, glm::vec3 position) {
+  return camera.viewProjection * glm::vec4(position, 1);
+}
+
+//===----------------------------------------------------------------------===//
+// Triangles on the screen
+//===----------------------------------------------------------------------===//
+
+struct VertexShader : piko::Stage<0, 0, 64, Vertex>, piko::Uses<State> {
+  void process(const Vertex &v) {
+    state().vertices[v.index] =
+        toScreen(project(state().camera, v.position), domain());
+  }
+};
+
+inline PixelBox boxOf(Point a, Point b, Point c, glm::ivec2 size) {
+  Point lo = {glm::min(glm::min(a.x, b.x), c.x),
+              glm::min(glm::min(a.y, b.y), c.y)};
+  Point hi = {glm::max(glm::max(a.x, b.x), c.x),
+              glm::max(glm::max(a.y, b.y), c.y)};
+  PixelBox box = pixelsBetween(lo, hi);
+  return {glm::max(box.lo, 0), glm::min(box.hi, size - 1)};
+}
+
+// The corners in clockwise order; `area` is that of a, b, c as they are given.
+inline ScreenTriangle clockwise(Point a, Point b, Point c, glm::vec3 depth,
+                                int64_t area, const PixelBox &box,
+                                int32_t index) {
+  if (area < 0) {
+    std::swap(b, c);
+    std::swap(depth.y, depth.z);
+  }
+  return {a, b, c, depth, index, glm::i16vec2(box.lo), glm::i16vec2(box.hi)};
+}
+
+// Small triangles have at most this many pixels in a row or a column.
+constexpr int smallSide = 8;
+
+// Finds the triangles that may cover pixels: small ones go to port 0, others to
+// port 1, and those that must be clipped to port 2.
+struct Setup
+    : piko::Stage<0, 0, 64, Triangle, ScreenTriangle, ScreenTriangle, Triangle>,
+      piko::Uses<State> {
+  void schedule(piko::BinId) { endStage<VertexShader>(); }
+
+  void process(const Triangle &t) {
+    const ScreenVertex &a = state().vertices[t.vertex.x];
+    const ScreenVertex &b = state().vertices[t.vertex.y];
+    const ScreenVertex &c = state().vertices[t.vertex.z];
+    if (isGone(a, b, c))
+      return;
+    if (needsClipping(a, b, c))
+      return emit(t, 2);
+    int64_t area = signedArea(a.at, b.at, c.at);
+    if (area == 0 || (state().settings.cullBackFaces != 0 && area > 0))
+      return;
+    PixelBox box = boxOf(a.at, b.at, c.at, domain());
+    if (box.isEmpty())
+      return;
+    ScreenTriangle s = clockwise(a.at, b.at, c.at, {a.depth, b.depth, c.depth},
+                                 area, box, t.index);
+    auto place = [&](Point p) -> Point {
+      return {p.x - box.lo.x * subpixels, p.y - box.lo.y * subpixels};
+    };
+    glm::ivec2 size = box.hi - box.lo;
+    if (size.x < smallSide && size.y < smallSide && isNear(place(a.at)) &&
+        isNear(place(b.at)) && isNear(place(c.at)))
+      emit(s, 0);
+    else
+      emit(s, 1);
+  }
+};
+
+// Cuts a triangle, and emits the parts of what is left. It is a kernel of its
+// own, because it has much to do for few triangles.
+struct Clipper : piko::Stage<0, 0, 64, Triangle, ScreenTriangle>,
+                 piko::Uses<State> {
+  void schedule(piko::BinId) { specifySchedule(piko::LoadBalance); }
+
+  void process(const Triangle &t) {
+    ClipCorner corners[maxCorners];
+    for (int i = 0; i < 3; ++i)
+      corners[i].position =
+          project(state().camera, state().mesh[t.vertex[i]].position);
+    int count = clipPolygon(corners, 3);
+    Point points[maxCorners];
+    float depths[maxCorners];
+    for (int i = 0; i < count; ++i) {
+      glm::vec4 p = corners[i].position;
+      if (!(p.w > 0))
+        return;
+      float inverse = 1 / p.w;
+      points[i] = toPoint(glm::vec2(p) * inverse, domain());
+      depths[i] = p.z * inverse;
+    }
+    int64_t area = 0;
+    for (int i = 1; i + 1 < count; ++i)
+      area += signedArea(points[0], points[i], points[i + 1]);
+    if (area == 0 || (state().settings.cullBackFaces != 0 && area > 0))
+      return;
+    for (int i = 1; i + 1 < count; ++i) {
+      Point a = points[0], b = points[i], c = points[i + 1];
+      int64_t part = signedArea(a, b, c);
+      PixelBox box = boxOf(a, b, c, domain());
+      // One of the other sign is a fold of less than 1/256 pixel.
+      if (part != 0 && (part < 0) == (area < 0) && !box.isEmpty())
+        emit(clockwise(a, b, c, {depths[0], depths[i], depths[i + 1]}, part,
+                       box, t.index),
+             0);
+    }
+  }
+};
+
+//===----------------------------------------------------------------------===//
+// What is seen
+//===----------------------------------------------------------------------===//
+
+// 0 where a pixel's centre is outside of a triangle, or behind the far plane.
+template <class Edges>
+inline uint64_t keyAt(const Edges &edges, float scale, const ScreenTriangle &t,
+                      int x, int y) {
+  if (!edges.cover(x, y))
+    return 0;
+  glm::vec3 share(edges.e0.at(x, y), edges.e1.at(x, y), edges.e2.at(x, y));
+  share *= scale;
+  float depth = glm::dot(share, t.depth);
+  if (!(depth < 1))
+    return 0;
+  // As an integer, which is larger for what is nearer.
+  auto bits = std::bit_cast<uint32_t>(depth);
+  bits = bits >> 31 ? bits : ~bits & 0x7fffffff;
+  return uint64_t(bits) << 32 | ~uint32_t(t.index);
+}
+
+struct SmallCoverage : piko::Stage<0, 0, 64, ScreenTriangle>,
+                       piko::Uses<State> {
+  void process(const ScreenTriangle &t) {
+    // Relative to the box, which makes small numbers of all.
+    auto place = [&](Point p) -> Point {
+      return {p.x - t.lo.x * subpixels, p.y - t.lo.y * subpixels};
+    };
+    Point a = place(t.a), b = place(t.b), c = place(t.c);
+    NearEdges edges(a, b, c);
+    float scale = 1.0f / float(signedArea(a, b, c));
+    for (int y = 0; y <= t.hi.y - t.lo.y; ++y)
+      for (int x = 0; x <= t.hi.x - t.lo.x; ++x)
+        if (uint64_t key = keyAt(edges, scale, t, x, y))
+          piko::atomicMax(state().visible({t.lo.x + x, t.lo.y + y}).key, key);
+  }
+};
+
+template <int Bin>
+struct Coverage : piko::Stage<Bin, Bin, 64, ScreenTriangle>, piko::Uses<State> {
+  void assignBin(const ScreenTriangle &t) {
+    this->assignToBoundingBox(t, glm::ivec2(t.lo), glm::ivec2(t.hi));
+  }
+
+  void schedule(piko::BinId) {
+    this->template endStage<SmallCoverage>();
+    this->specifyLanes(piko::Lanes::Iterations);
+  }
+
+  void process(const ScreenTriangle &t) {
+    Edges edges(t.a, t.b, t.c);
+    float scale = 1.0f / float(signedArea(t.a, t.b, t.c));
+    this->parallelForPixels(
+        glm::ivec2(t.lo), glm::ivec2(t.hi), [&](glm::ivec2 p) {
+          if (uint64_t key = keyAt(edges, scale, t, p.x, p.y))
+            this->update(this->state().visible, p,
+                         [&](Visible &v) { v.key = glm::max(v.key, key); });
+        });
+  }
+};
+
+//===----------------------------------------------------------------------===//
+// How it looks
+//===----------------------------------------------------------------------===//
+
+template <int Bin>
+struct Shade : piko::Stage<Bin, Bin, 64, Nothing>, piko::Uses<State> {
+  void assignBin(const Nothing &n) { this->assignToAll(n); }
+
+  void schedule(piko::BinId) {
+    this->everyBin();
+    this->template endStage<Coverage<Bin>>();
+  }
+
+  void process(const piko::List<Nothing> &) {
+    this->parallelForPixels([&](glm::ivec2 p) {
+      uint64_t key = this->state().visible(p).key;
+      if (key == 0)
+        return;
+      glm::vec3 color = shade(p, int32_t(~uint32_t(key)));
+      this->update(this->state().color, p,
+                   [&](Color &c) { c.rgba = glm::vec4(color, 1); });
+    });
+  }
+
+private:
+  // Of the triangle with this number, where the ray through a pixel meets it.
+  glm::vec3 shade(glm::ivec2 p, int32_t index) {
+    const State &s = this->state();
+    const Triangle &t = s.triangles[index];
+    const Vertex &a = s.mesh[t.vertex.x], &b = s.mesh[t.vertex.y],
+                 &c = s.mesh[t.vertex.z];
+    glm::vec2 at = (glm::vec2(p) + 0.5f) / glm::vec2(this->domain());
+    glm::vec3 ray = s.camera.forward + s.camera.right * (2 * at.x - 1) +
+                    s.camera.up * (1 - 2 * at.y);
+    // Moeller and Trumbore (1997), all times the determinant.
+    glm::vec3 ab = b.position - a.position, ac = c.position - a.position;
+    glm::vec3 from = s.camera.eye - a.position;
+    glm::vec3 p0 = glm::cross(ray, ac), q0 = glm::cross(from, ab);
+    float det = glm::dot(ab, p0);
+    float v = glm::dot(from, p0), w = glm::dot(ray, q0), u = det - v - w;
+    glm::vec3 position = s.camera.eye + ray * (glm::dot(ac, q0) / det);
+    glm::vec3 normal = a.normal * u + b.normal * v + c.normal * w;
+    normal = glm::normalize(det < 0 ? -normal : normal);
+    glm::vec3 sum(s.settings.ambient);
+    for (int64_t i = 0; i < s.lights.size(); ++i)
+      sum += irradiance(s.lights[i], position, normal);
+    return s.settings.albedo * sum;
+  }
+};
+
+template <int Bin> struct Pipeline : piko::Pipe<State> {
+  VertexShader vertexShader;
+  Setup setup;
+  Clipper clipper;
+  SmallCoverage smallCoverage;
+  Coverage<Bin> coverage;
+  Shade<Bin> shade;
+
+  Pipeline() {
+    this->source(vertexShader);
+    this->source(setup);
+    this->source(shade);
+    this->connect(setup, 0, smallCoverage);
+    this->connect(setup, 1, coverage);
+    this->connect(setup, 2, clipper);
+    this->connect(clipper, 0, coverage);
+    this->allocateForSource(this->state().vertices, 0);
+  }
+};
+
+} // namespace visibility
+
+struct Visibility : visibility::Pipeline<64> {};
