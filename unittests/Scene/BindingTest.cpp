@@ -274,7 +274,8 @@ TEST_F(Binding, UnknownSource) {
               declareState(p, 0, "color", PIKORT_IMAGE, COLOR, 2);
             }),
             "pipeline 'Test': source 0: expected 'piko::scene::Vertex', "
-            "'...::Triangle', '...::Patch' or '...::Pixel', but got 'Other'");
+            "'...::Triangle', '...::Patch', '...::Pixel' or '...::Nothing', "
+            "but got 'Other'");
 }
 
 TEST_F(Binding, Patches) {
