@@ -581,13 +581,16 @@ bool IterationLanes::isRow(Operation *op) const {
 /// of a processor with vectors of 512 bits (Sapphire Rapids, Zen 4).
 namespace cycles {
 constexpr double scalar = 5, scalarAccess = 8, scalarDivision = 64;
-constexpr double vector = 1, row = 1.5, gather = 12, division = 16;
-/// To bring lanes apart, and a branch that is not foreseen.
-constexpr double apart = 30;
-constexpr double turnsOfLoop = 8;
+constexpr double vector = 0.8, row = 1.5, gather = 12, division = 16;
+/// To bring lanes apart.
+constexpr double apart = 15;
+constexpr double turns = 8, turnsThatDiffer = 4;
+/// Branches that are not foreseen, of a condition that differs, and of a loop
+/// whose turns do.
+constexpr double branches = 40, exits = 100;
 /// How many of the lanes go on, of those that came to a loop whose turns
-/// differ.
-constexpr double goOn = 0.35;
+/// differ; and to one inside of such a loop.
+constexpr double goOn = 0.35, goOnInside = 0.7;
 } // namespace cycles
 
 namespace {
@@ -635,6 +638,10 @@ public:
 
 private:
   void addOperation(Operation *op, Frequency times, bool laneByLane);
+  void addBranches(double part, bool laneByLane) {
+    cost.serial += part;
+    cost.vectors += laneByLane ? part : 0;
+  }
   void addStructure(Operation *op, Frequency times, bool laneByLane);
 
   const IterationLanes &lanes;
@@ -670,6 +677,9 @@ void CostModel::addStructure(Operation *op, Frequency times, bool laneByLane) {
     };
     addSide(yes, no);
     addSide(no, yes);
+    bool isShort = lanes.isCheap(yes) && (no.empty() || lanes.isCheap(no));
+    if (lanes.isVarying(choice.getCondition()) && !isShort)
+      addBranches(cycles::branches * times.serial, laneByLane);
     return;
   }
   if (auto choice = dyn_cast<scf::IndexSwitchOp>(op)) {
@@ -679,10 +689,19 @@ void CostModel::addStructure(Operation *op, Frequency times, bool laneByLane) {
       add(region, times.scaled(share, shared), laneByLane);
     return;
   }
-  double going = lanes.isSharedLoop(op) ? 1 : cycles::goOn;
+  bool isInside = false;
+  for (Operation *at = op->getParentOp(); at != lanes.getLoop();
+       at = at->getParentOp())
+    isInside |= isa<scf::ForOp, scf::WhileOp>(at) && !lanes.isSharedLoop(at);
+  double going = lanes.isSharedLoop(op) ? 1
+                 : isInside             ? cycles::goOnInside
+                                        : cycles::goOn;
+  if (!lanes.isSharedLoop(op))
+    addBranches(cycles::exits * times.serial, laneByLane);
+  double turns =
+      lanes.isSharedLoop(op) ? cycles::turns : cycles::turnsThatDiffer;
   for (Region &region : op->getRegions())
-    add(region, times.scaled(cycles::turnsOfLoop * going, cycles::turnsOfLoop),
-        laneByLane);
+    add(region, times.scaled(turns * going, turns), laneByLane);
 }
 
 void CostModel::addOperation(Operation *op, Frequency times, bool laneByLane) {

@@ -55,7 +55,7 @@ public:
     bool computes = false;          ///< Or iterations clear or copy.
     /// What costs most where lanes take turns, or are in other places.
     std::multimap<double, mlir::Operation *, std::greater<>> obstacles;
-    bool isWorthwhile() const { return vectors < 0.9 * serial; }
+    bool isWorthwhile() const { return vectors < serial; }
   };
   Cost getCost() const;
 
