@@ -351,9 +351,13 @@ IterationLanes::findMovable(ArrayRef<Operation *> ops) const {
   return movable;
 }
 
-bool IterationLanes::isVectorAhead(Operation *op,
-                                   const OrderedGroup &group) const {
-  return findMovable(group.getOperations()).contains(op);
+llvm::SetVector<Operation *>
+IterationLanes::findTurns(const OrderedGroup &group) const {
+  SmallVector<Operation *> ops = group.getOperations();
+  llvm::SetVector<Operation *> rest(ops.begin(), ops.end());
+  for (Operation *op : findMovable(ops))
+    rest.remove(op);
+  return rest;
 }
 
 void IterationLanes::findGroups(Block &block,
@@ -436,10 +440,7 @@ struct Uses {
 bool IterationLanes::canDefer(ArrayRef<OrderedGroup> groups) const {
   llvm::DenseSet<Operation *> later;
   for (const OrderedGroup &group : groups) {
-    SmallVector<Operation *> ops = group.getOperations();
-    llvm::SetVector<Operation *> rest(ops.begin(), ops.end());
-    for (Operation *op : findMovable(ops))
-      rest.remove(op);
+    llvm::SetVector<Operation *> rest = findTurns(group);
     if (!canDefer(group, rest))
       return false;
     later.insert(rest.begin(), rest.end());
@@ -582,8 +583,9 @@ bool IterationLanes::isRow(Operation *op) const {
 namespace cycles {
 constexpr double scalar = 5, scalarAccess = 8, scalarDivision = 64;
 constexpr double vector = 0.8, row = 1.5, gather = 12, division = 16;
-/// To bring lanes apart.
-constexpr double apart = 15;
+/// To bring lanes apart, for one operation or for a group, and to hand each lane
+/// a number.
+constexpr double apart = 15, apartInOrder = 40, slot = 8;
 constexpr double turns = 8, turnsThatDiffer = 4;
 /// Branches that are not foreseen, of a condition that differs, and of a loop
 /// whose turns do.
@@ -644,7 +646,11 @@ private:
   }
   void addStructure(Operation *op, Frequency times, bool laneByLane);
 
+  /// What it takes to bring lanes apart, with what they have.
+  void addTurns(const OrderedGroup &group, Frequency times);
+
   const IterationLanes &lanes;
+  llvm::DenseSet<Operation *> turns;
 };
 
 } // namespace
@@ -655,13 +661,30 @@ void CostModel::add(Region &region, Frequency times, bool laneByLane) {
       continue; // mostly has nothing to do
     const OrderedGroup *group = laneByLane ? nullptr : lanes.findGroup(&op);
     if (group && group->first == &op)
-      cost.vectors += cycles::apart * times.vectors;
-    bool isApart = laneByLane || (group && !lanes.isVectorAhead(&op, *group));
+      addTurns(*group, times);
+    bool isApart = laneByLane || turns.contains(&op);
     if (isStructure(&op))
       addStructure(&op, times, isApart);
     else
       addOperation(&op, times, isApart);
   }
+}
+
+void CostModel::addTurns(const OrderedGroup &group, Frequency times) {
+  llvm::SetVector<Operation *> ops = lanes.findTurns(group);
+  turns.insert(ops.begin(), ops.end());
+  llvm::DenseSet<Value> inputs;
+  for (Operation *op : ops)
+    op->walk([&](Operation *inner) {
+      for (Value operand : inner->getOperands())
+        if (isLaneType(operand.getType()) && lanes.isVarying(operand) &&
+            (!operand.getDefiningOp() ||
+             !ops.contains(group.first->getBlock()->findAncestorOpInBlock(
+                 *operand.getDefiningOp()))))
+          inputs.insert(operand);
+    });
+  cost.vectors += cycles::apartInOrder * times.vectors +
+                  cycles::slot * times.serial * inputs.size();
 }
 
 void CostModel::addStructure(Operation *op, Frequency times, bool laneByLane) {

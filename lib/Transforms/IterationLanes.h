@@ -81,8 +81,8 @@ public:
   /// vectors.
   llvm::SetVector<mlir::Operation *>
   findMovable(llvm::ArrayRef<mlir::Operation *> ops) const;
-  /// Whether an operation of a group is done in vectors, in front of it.
-  bool isVectorAhead(mlir::Operation *op, const OrderedGroup &group) const;
+  /// What of a group lanes do in turns.
+  llvm::SetVector<mlir::Operation *> findTurns(const OrderedGroup &group) const;
   /// Whether lanes access one element behind the other.
   bool isRow(mlir::Operation *op) const;
 

@@ -3,6 +3,7 @@
 // A remark for each join that is more than a concatenation.
 piko.record @F {"x" : i32 at 0} size 4 align 4
 piko.pipeline @Remarks rank 1 {
+  piko.image @seen_b : @F rank 1
   piko.source @a
   piko.source @b
   // expected-remark @below {{what stage 'a' emits to stage 'b' is permuted: it runs bin by bin, which is not the order of lineage}}
@@ -15,6 +16,8 @@ piko.pipeline @Remarks rank 1 {
     }
     piko.process {
     ^bb0(%f: !piko.prim<@F>):
+      %x = piko.get %f "x" : !piko.prim<@F> -> i32
+      piko.emit 0 (%x) : i32
       piko.return
     }
   }
@@ -22,6 +25,11 @@ piko.pipeline @Remarks rank 1 {
   piko.stage @b bins [0] threads 1 : @F -> [] {
     piko.process {
     ^bb0(%f: !piko.prim<@F>):
+      %x = piko.get %f "x" : !piko.prim<@F> -> i32
+      piko.update @seen_b[%x : i32] {
+      ^bb0(%old: i32):
+        piko.yield [%x : i32]
+      }
       piko.return
     }
   }

@@ -177,6 +177,8 @@ piko.pipeline @Bins rank 1 {
 
 piko.record @F {"x" : i32 at 0} size 4 align 4
 piko.pipeline @Sources rank 1 {
+  piko.image @seen_c : @F rank 1
+  piko.image @seen_a : @F rank 1
   piko.source @a
   piko.source @a
   piko.source @b
@@ -187,6 +189,11 @@ piko.pipeline @Sources rank 1 {
   piko.stage @a bins [0] threads 1 : @F -> [] {
     piko.process {
     ^bb0(%f: !piko.prim<@F>):
+      %x = piko.get %f "x" : !piko.prim<@F> -> i32
+      piko.update @seen_a[%x : i32] {
+      ^bb0(%old: i32):
+        piko.yield [%x : i32]
+      }
       piko.return
     }
   }
@@ -204,6 +211,11 @@ piko.pipeline @Sources rank 1 {
   piko.stage @c bins [0] threads 1 : @F -> [] {
     piko.process {
     ^bb0(%f: !piko.prim<@F>):
+      %x = piko.get %f "x" : !piko.prim<@F> -> i32
+      piko.update @seen_c[%x : i32] {
+      ^bb0(%old: i32):
+        piko.yield [%x : i32]
+      }
       piko.return
     }
   }
@@ -244,6 +256,7 @@ piko.pipeline @State rank 1 {
 // What a stage that waits emits comes after all that a source leads to.
 piko.record @F {"x" : i32 at 0} size 4 align 4
 piko.pipeline @Lineages rank 1 {
+  piko.image @seen_meet : @F rank 1
   piko.source @before
   piko.source @a
   piko.edge @a[0] -> @waits
@@ -279,6 +292,11 @@ piko.pipeline @Lineages rank 1 {
   piko.stage @meet bins [0] threads 1 : @F -> [] {
     piko.process {
     ^bb0(%f: !piko.prim<@F>):
+      %x = piko.get %f "x" : !piko.prim<@F> -> i32
+      piko.update @seen_meet[%x : i32] {
+      ^bb0(%old: i32):
+        piko.yield [%x : i32]
+      }
       piko.return
     }
   }

@@ -22,6 +22,7 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 // CHECK-NEXT:        piko.leave
 // CHECK-NEXT:      } : (!piko.edge<@F>) -> ()
 piko.pipeline @Diamond rank 1 {
+  piko.image @seen_meet : @F rank 1
   piko.source @before
   piko.source @split
   piko.edge @split[0] -> @left
@@ -59,6 +60,11 @@ piko.pipeline @Diamond rank 1 {
   piko.stage @meet bins [0] threads 1 : @F -> [] {
     piko.process {
     ^bb0(%f: !piko.prim<@F>):
+      %x = piko.get %f "x" : !piko.prim<@F> -> i32
+      piko.update @seen_meet[%x : i32] {
+      ^bb0(%old: i32):
+        piko.yield [%x : i32]
+      }
       piko.return
     }
   }
