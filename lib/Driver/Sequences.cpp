@@ -107,6 +107,10 @@ static void addUnitsToCPU(OpPassManager &passes,
     passes.nest<PipelineOp>().addPass(createHoistBounds());
   passes.nest<PipelineOp>().addPass(createConvertPikoToSCF());
   addCleanUp(passes);
+  if (options.has("merge-bounds")) {
+    passes.nest<PipelineOp>().addPass(createMergeBounds());
+    addCleanUp(passes);
+  }
   if (options.has("vectorize")) {
     passes.nest<PipelineOp>().addPass(createVectorize());
     addCleanUp(passes);

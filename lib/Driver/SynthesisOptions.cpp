@@ -27,6 +27,7 @@ const std::vector<std::string> &SynthesisOptions::getOptional() {
                                                  "vectorize",
                                                  "prove-bounds",
                                                  "hoist-bounds",
+                                                 "merge-bounds",
                                                  "if-convert",
                                                  "uplift-pixel-loops"};
   return names;

@@ -18,8 +18,11 @@ void IterationWriter::writeStructure(Operation *op) {
   if (auto choice = dyn_cast<scf::IndexSwitchOp>(op))
     return writeSwitch(choice);
   bool isShared = lanes.isSharedLoop(op);
-  if (auto inner = dyn_cast<scf::ForOp>(op))
+  if (auto inner = dyn_cast<scf::ForOp>(op)) {
+    if (!lanes.getNest(inner).empty())
+      return writeNest(inner);
     return isShared ? writeFor(inner) : writeVaryingFor(inner);
+  }
   auto inner = cast<scf::WhileOp>(op);
   return isShared ? writeWhile(inner) : writeVaryingWhile(inner);
 }

@@ -38,6 +38,11 @@ SmallVector<Operation *> OrderedGroup::getOperations() const {
   }
 }
 
+/// What only asks for memory ahead of time: a vector's loads do so themselves.
+static bool isPrefetch(Operation *op) {
+  return isa<PrefetchOp, PrefetchItemOp>(op);
+}
+
 static bool isStructure(Operation *op) {
   return isa<scf::IfOp, scf::ForOp, scf::WhileOp, scf::IndexSwitchOp>(op);
 }
@@ -56,6 +61,7 @@ IterationLanes::IterationLanes(scf::ForOp loop)
       written.insert(access.getAccessedState());
   });
   findArrays();
+  findNests();
   findSharedPixels();
   checkCarried();
   if (!refusal.at)
@@ -204,6 +210,67 @@ bool IterationLanes::isAccess(Operation *op) const {
 }
 
 //===----------------------------------------------------------------------===//
+// Nests
+//===----------------------------------------------------------------------===//
+
+/// Whether the turns of a loop may change places, also with those of other
+/// lanes: they hand on nothing, and change state by atomic operations alone.
+bool IterationLanes::canCollapse(scf::ForOp inner) const {
+  if (inner.getNumResults() > 0 || inner.getUnsignedCmp() ||
+      !matchPattern(inner.getStep(), m_One()))
+    return false;
+  WalkResult result = inner.walk([&](Operation *op) {
+    bool isFree = isMemoryEffectFree(op) || op->getNumRegions() > 0 ||
+                  op->hasTrait<Failure>() || isPrefetch(op);
+    for (Value operand : op->getOperands())
+      isFree &= !isVarying(operand) || isLaneType(operand.getType());
+    if (auto access = dyn_cast<StateAccessOpInterface>(op)) {
+      bool isRead = access.getAccessKinds() == StateAccess::reads &&
+                    !written.contains(access.getAccessedState());
+      bool isAtomic =
+          access.getAccessKinds() == StateAccess::changesAtomically &&
+          op->getNumResults() == 0;
+      isFree = isRead || isAtomic;
+    } else if (isa<memref::LoadOp>(op)) {
+      isFree = readsFixed(op);
+    }
+    return isFree && !isa<memref::AllocaOp>(op) ? WalkResult::advance()
+                                                : WalkResult::interrupt();
+  });
+  return !result.wasInterrupted();
+}
+
+void IterationLanes::findNests() {
+  SmallVector<Uniformity::Root> roots{
+      {loop.getInductionVar(), Uniform::Iteration}};
+  loop.walk<WalkOrder::PreOrder>([&](scf::ForOp outer) {
+    if (outer == loop || !canCollapse(outer))
+      return WalkResult::advance();
+    SmallVector<scf::ForOp> nest{outer};
+    // A second loop, whose bounds are those of the first, with nothing around
+    // it but computation.
+    auto inner = llvm::to_vector(outer.getBody()->getOps<scf::ForOp>());
+    auto isKnown = [&](Value bound) {
+      return !outer->isAncestor(bound.getParentBlock()->getParentOp());
+    };
+    bool isOnly = inner.size() == 1 && isKnown(inner[0].getLowerBound()) &&
+                  isKnown(inner[0].getUpperBound());
+    for (Operation &op : outer.getBody()->without_terminator())
+      isOnly &= isa<scf::ForOp>(op) || isPure(&op);
+    if (isOnly)
+      nest.push_back(inner[0]);
+    if (llvm::all_of(nest, [&](scf::ForOp one) { return isSharedLoop(one); }))
+      return WalkResult::advance();
+    for (scf::ForOp one : nest)
+      roots.emplace_back(one.getInductionVar(), Uniform::Iteration);
+    nests[outer] = nest;
+    return WalkResult::skip();
+  });
+  if (!nests.empty())
+    uniformity = Uniformity(loop, roots);
+}
+
+//===----------------------------------------------------------------------===//
 // Forms
 //===----------------------------------------------------------------------===//
 
@@ -229,11 +296,6 @@ static bool isUnordered(Operation *op) {
            access.getAccessKinds() == StateAccess::stores;
   return isa<memref::LoadOp, memref::StoreOp, FailOp, FailListOp, FailDivideOp>(
       op);
-}
-
-/// What only asks for memory ahead of time: a vector's loads do so themselves.
-static bool isPrefetch(Operation *op) {
-  return isa<PrefetchOp, PrefetchItemOp>(op);
 }
 
 LaneForm IterationLanes::getForm(Operation *op) const {
@@ -583,13 +645,15 @@ bool IterationLanes::isRow(Operation *op) const {
 namespace cycles {
 constexpr double scalar = 5, scalarAccess = 8, scalarDivision = 64;
 constexpr double vector = 0.8, row = 1.5, gather = 12, division = 16;
-/// To bring lanes apart, for one operation or for a group, and to hand each lane
-/// a number.
+/// To bring lanes apart, for one operation or for a group, and to hand each
+/// lane a number.
 constexpr double apart = 15, apartInOrder = 40, slot = 8;
 constexpr double turns = 8, turnsThatDiffer = 4;
 /// Branches that are not foreseen, of a condition that differs, and of a loop
 /// whose turns do.
 constexpr double branches = 40, exits = 100;
+/// To find which lane makes which turn, and to bring there what it has.
+constexpr double pairs = 60;
 /// How many of the lanes go on, of those that came to a loop whose turns
 /// differ; and to one inside of such a loop.
 constexpr double goOn = 0.35, goOnInside = 0.7;
@@ -721,6 +785,17 @@ void CostModel::addStructure(Operation *op, Frequency times, bool laneByLane) {
                                         : cycles::goOn;
   if (!lanes.isSharedLoop(op))
     addBranches(cycles::exits * times.serial, laneByLane);
+  auto loop = dyn_cast<scf::ForOp>(op);
+  if (!laneByLane && loop && !lanes.getNest(loop).empty()) {
+    Frequency full;
+    for (size_t i = 0, e = lanes.getNest(loop).size(); i < e; ++i)
+      full.serial *= cycles::turnsThatDiffer *
+                     (i == 0 ? cycles::goOn : cycles::goOnInside);
+    cost.vectors += cycles::pairs * times.vectors * full.serial;
+    add(lanes.getNest(loop).back().getRegion(),
+        times.scaled(full.serial, full.serial), laneByLane);
+    return;
+  }
   double turns =
       lanes.isSharedLoop(op) ? cycles::turns : cycles::turnsThatDiffer;
   for (Region &region : op->getRegions())

@@ -72,6 +72,11 @@ public:
   LaneForm getForm(mlir::Operation *op) const;
   /// Whether all lanes make the same turns of an inner loop.
   bool isSharedLoop(mlir::Operation *op) const;
+  /// The loops, from the outermost, whose turns fill vectors together with the
+  /// lanes that make them; none if `loop` is not the first of such.
+  llvm::SmallVector<mlir::scf::ForOp> getNest(mlir::scf::ForOp loop) const {
+    return nests.lookup(loop);
+  }
   /// Whether a side of a condition is short, and may be computed for nothing.
   bool isCheap(mlir::Region &region) const;
   llvm::ArrayRef<OrderedGroup> getGroups() const { return groups; }
@@ -91,6 +96,8 @@ private:
     if (!refusal.at)
       refusal = {at, why.str()};
   }
+  void findNests();
+  bool canCollapse(mlir::scf::ForOp inner) const;
   void findArrays();
   void findSharedPixels();
   void findOrdered();
@@ -119,6 +126,7 @@ private:
   llvm::DenseSet<mlir::Attribute> shared;
   llvm::DenseSet<mlir::Attribute> written; // state
   llvm::SmallVector<OrderedGroup> groups;
+  llvm::DenseMap<mlir::Operation *, llvm::SmallVector<mlir::scf::ForOp>> nests;
 };
 
 /// Whether lanes have values of this type: numbers, and primitives, of which

@@ -191,7 +191,7 @@ void IterationWriter::writeArrayAccess(Operation *op) {
     at = getColumns(index);
   } else {
     base = getUniform(array);
-    isRow = lanes.isLinear(index);
+    isRow = !paired && lanes.isLinear(index);
     at = isRow ? getFirst(index) : get(index);
   }
   VectorType lanesType =
@@ -219,7 +219,8 @@ void IterationWriter::writeArrayAccess(Operation *op) {
 void IterationWriter::writeItemAccess(Operation *op) {
   if (auto item = dyn_cast<ItemOp>(op)) {
     Value position = item.getPosition();
-    position = lanes.isLinear(position) ? getFirst(position) : get(position);
+    position = !paired && lanes.isLinear(position) ? getFirst(position)
+                                                   : get(position);
     vectors.map(item.getPrim(),
                 LaneItemsOp::create(builder, loc, getVectorType(item.getType()),
                                     getUniform(item.getBins()), position,
@@ -244,10 +245,10 @@ void IterationWriter::writeAccess(Operation *op) {
     return writeItemAccess(op);
   auto write = [&](auto access, auto create) {
     ValueRange indices = access.getIndices();
-    bool isRow = !indices.empty() && lanes.isLinear(indices.front()) &&
-                 llvm::none_of(indices.drop_front(), [&](Value index) {
-                   return lanes.isVarying(index);
-                 });
+    bool isRow =
+        !paired && !indices.empty() && lanes.isLinear(indices.front()) &&
+        llvm::none_of(indices.drop_front(),
+                      [&](Value index) { return lanes.isVarying(index); });
     SmallVector<Value> at, elements;
     for (Value index : indices)
       at.push_back(isRow ? getFirst(index) : getCarried(index));

@@ -71,6 +71,17 @@ private:
   void writeSwitch(mlir::scf::IndexSwitchOp choice);
   void writeFor(mlir::scf::ForOp inner);
   void writeVaryingFor(mlir::scf::ForOp inner);
+  /// A nest whose turns lanes share: see IterationLanes::getNest.
+  void writeNest(mlir::scf::ForOp loop);
+  /// The turns of the lanes, side by side; each loop's turns are counted.
+  void writePairs(llvm::ArrayRef<mlir::scf::ForOp> nest,
+                  llvm::ArrayRef<mlir::Value> counts);
+  /// How many turns each lane makes, at most too many.
+  mlir::Value countTurns(mlir::scf::ForOp inner);
+  /// For each lane the value of another.
+  mlir::Value permute(mlir::Value value, mlir::Value from);
+  /// 32-bit integers of all lanes.
+  mlir::Value number(int64_t value);
   void writeWhile(mlir::scf::WhileOp inner);
   void writeVaryingWhile(mlir::scf::WhileOp inner);
   /// What a region yields for these lanes, behind a branch around it.
@@ -119,6 +130,7 @@ private:
   mlir::IRMapping vectors, scalars, firsts;
   llvm::DenseMap<mlir::Value, mlir::Value> columns; ///< of private arrays
   mlir::Value active;
+  bool paired = false; ///< Lanes are not the loop's turns, one after the other.
   llvm::DenseMap<mlir::Operation *, mlir::Value> masks; ///< of groups: slots
   llvm::SmallVector<Turn> deferred;
 };

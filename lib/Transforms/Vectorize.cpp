@@ -12,6 +12,9 @@
 #include "mlir/Dialect/Math/IR/Math.h"
 #include "mlir/Dialect/MemRef/IR/MemRef.h"
 #include "mlir/Dialect/Vector/IR/VectorOps.h"
+#include "mlir/IR/Matchers.h"
+#include "mlir/IR/PatternMatch.h"
+#include "mlir/Transforms/LoopInvariantCodeMotionUtils.h"
 
 #include <cmath>
 
@@ -152,6 +155,66 @@ bool Candidate::decide(const IterationLanes &lanes) {
   return true;
 }
 
+/// The bound below which a loop counts by one, if that is all that it carries;
+/// `isClosed` says whether it takes the bound as well.
+static Value findBound(scf::WhileOp loop, bool &isClosed) {
+  Block &before = *loop.getBeforeBody(), &after = *loop.getAfterBody();
+  auto compare = dyn_cast<arith::CmpIOp>(before.front());
+  if (loop->getNumOperands() != 1 || before.getNumArguments() != 1 ||
+      !loop->use_empty() || !compare ||
+      compare->getNextNode() != loop.getConditionOp() ||
+      loop.getConditionOp().getCondition() != compare.getResult() ||
+      !llvm::equal(loop.getConditionOp().getArgs(), before.getArguments()))
+    return {};
+  auto next =
+      after.getTerminator()->getOperand(0).getDefiningOp<arith::AddIOp>();
+  using P = arith::CmpIPredicate;
+  isClosed = compare.getPredicate() == P::sle;
+  bool isCounted = next && next.getLhs() == after.getArgument(0) &&
+                   matchPattern(next.getRhs(), m_One()) &&
+                   compare.getLhs() == before.getArgument(0) &&
+                   compare.getRhs().getParentBlock() != &before &&
+                   (isClosed || compare.getPredicate() == P::slt);
+  return isCounted ? compare.getRhs() : Value();
+}
+
+/// Makes loops that count loops of which one knows how often they turn, in 64
+/// bits, so that the bound may be the largest number.
+static void countLoops(scf::ForOp root) {
+  SmallVector<scf::WhileOp> loops;
+  root.walk([&](scf::WhileOp loop) { loops.push_back(loop); });
+  for (scf::WhileOp loop : loops) {
+    bool isClosed = false;
+    Value bound = findBound(loop, isClosed);
+    if (!bound || (isClosed && !bound.getType().isInteger(32)))
+      continue;
+    IRRewriter builder(loop->getContext());
+    builder.setInsertionPoint(loop);
+    Location loc = loop.getLoc();
+    Type index = builder.getIndexType();
+    auto cast = [&](Value number, Type type) -> Value {
+      return number.getType() == type
+                 ? number
+                 : arith::IndexCastOp::create(builder, loc, type, number)
+                       .getResult();
+    };
+    Value one = arith::ConstantIndexOp::create(builder, loc, 1);
+    Value lower = cast(loop.getInits().front(), index),
+          upper = cast(bound, index);
+    if (isClosed)
+      upper = arith::AddIOp::create(builder, loc, upper, one);
+    auto made = scf::ForOp::create(builder, loc, lower, upper, one);
+    builder.setInsertionPointToStart(made.getBody());
+    Value number = cast(made.getInductionVar(), bound.getType());
+    Block *body = loop.getAfterBody();
+    builder.eraseOp(body->getTerminator());
+    builder.inlineBlockBefore(body, made.getBody()->getTerminator(), number);
+    builder.eraseOp(loop);
+    // The bounds of loops inside stand outside of this one.
+    moveLoopInvariantCode(made);
+  }
+}
+
 /// With fewer turns the loop runs as it was: a vector takes about as long as
 /// this many.
 static constexpr int64_t leastTurns = 4;
@@ -182,6 +245,7 @@ void VectorizePass::runOnOperation() {
     Candidate candidate(loop);
     if (!candidate.isChosen())
       return WalkResult::advance();
+    countLoops(loop);
     IterationLanes lanes(loop);
     if (!candidate.decide(lanes)) {
       ++left;

@@ -10,8 +10,8 @@
 // RUN: FileCheck %s --check-prefix=CONTRACTED --input-file %t.contracted
 // RUN: FileCheck %s --check-prefix=RELAXED --input-file %t.relaxed
 // RUN: piko-compare %s --pipe Strict --count 1003 --domain 9 9 | FileCheck %s --check-prefix=STRICT
-// RUN: piko-compare %s --pipe Contracted --count 1003 --domain 9 9 --without vectorize,vectorize-iterations,if-convert,fuse-stages,fuse-kernels,infer-directives | diff - %t.contracted
-// RUN: piko-compare %s --pipe Relaxed --count 1003 --domain 9 9 --without vectorize,vectorize-iterations,if-convert,fuse-stages,fuse-kernels,infer-directives | diff - %t.relaxed
+// RUN: piko-compare %s --pipe Contracted --count 1003 --domain 9 9 --without vectorize,if-convert,fuse-stages,fuse-kernels,infer-directives | diff - %t.contracted
+// RUN: piko-compare %s --pipe Relaxed --count 1003 --domain 9 9 --without vectorize,if-convert,fuse-stages,fuse-kernels,infer-directives | diff - %t.relaxed
 // RUN: piko-compare %s --pipe Relaxed --count 1003 --domain 9 9 --check | diff - %t.relaxed
 // RUN: piko-compare %s --pipe Contracted --count 1003 --domain 9 9 --target gpu-on-cpu | diff - %t.contracted
 // RUN: piko-compare %s --pipe Relaxed --count 1003 --domain 9 9 --target gpu-on-cpu | diff - %t.relaxed

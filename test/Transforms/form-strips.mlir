@@ -6,7 +6,7 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 // and the first stage may wait for what runs before. Its tile is the chunk.
 // CHECK-LABEL: piko.pipeline @Diamond
 // CHECK:         piko.program roots [@split] {
-// CHECK-NEXT:      %[[BEFORE:.*]] = piko.feed 0
+// CHECK:           %[[BEFORE:.*]] = piko.feed 0
 // CHECK-NEXT:      piko.join @before
 // CHECK-NEXT:      piko.launch @kernel_before
 // CHECK-NEXT:      %[[IN:.*]] = piko.feed 1

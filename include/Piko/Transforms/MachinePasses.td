@@ -384,6 +384,49 @@ def IfConvert : Pass<"piko-if-convert", "::piko::PipelineOp"> {
   let dependentDialects = ["::mlir::arith::ArithDialect"];
 }
 
+def MergeBounds : Pass<"piko-merge-bounds", "::piko::PipelineOp"> {
+  let summary = "Test the index of an element once for all of its fields";
+  let description = [{
+    **Requires** access to state that is tested (`convert-piko-to-scf`).
+
+    **Does**: of the tests in a block that have the same outcome, each of which
+    guards a read of the same buffer or image, the first one guards all of the
+    reads. So there is one branch for an element, and its address is computed
+    once, also where lanes read elements in different places.
+
+    **Guarantees** the same reads of state that the kernel does not change, at
+    the place of the first; and the same errors, whose text names the index but no
+    field.
+
+    Before:
+    ```
+    %x = scf.if %inside -> (f32) {
+      %1 = piko.load checked @mesh[%i : i32] "x" : f32
+      scf.yield %1 : f32
+    } else { ... }
+    %square = arith.mulf %x, %x : f32
+    %y = scf.if %inside -> (f32) {
+      %2 = piko.load checked @mesh[%i : i32] "y" : f32
+      scf.yield %2 : f32
+    } else { ... }
+    ```
+    After:
+    ```
+    %xy:2 = scf.if %inside -> (f32, f32) {
+      %1 = piko.load checked @mesh[%i : i32] "x" : f32
+      %2 = piko.load checked @mesh[%i : i32] "y" : f32
+      scf.yield %1, %2 : f32, f32
+    } else { ... }
+    %square = arith.mulf %xy#0, %xy#0 : f32
+    ```
+
+    **Limits**: reads in other blocks, as inside of a condition, and of state that
+    the kernel changes, keep their tests.
+  }];
+  let statistics = [
+    Statistic<"merged", "merged", "tests that others stand for">];
+}
+
 def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
   let summary = "Run primitives, or iterations, as lanes of vectors";
   let description = [{
@@ -398,6 +441,13 @@ def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
     does; access to state and to primitives becomes gathers and scatters, of a row
     of pixels masked loads and stores; local arrays get a column for each lane.
     What has no vector form runs lane by lane inside.
+
+    Loops inside, or two of which one is all that the other does, are collapsed
+    where their turns differ between lanes but hand on nothing, and change state
+    by atomic operations alone: a scan over how many turns each lane makes fills
+    vectors with pairs of a lane and a turn, so that the pixels of small boxes
+    leave few lanes idle. (Where a lane makes more than 4,096 turns of one loop,
+    loops run in step, as others do.)
 
     What must keep its order (emission, updates of pixels that lanes may share)
     runs lane by lane: all that one image or one writer is concerned with, as one

@@ -1,0 +1,238 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Loops whose turns differ between lanes, collapsed: vectors are filled with
+// pairs of a lane and a turn, by a scan over how many turns lanes make.
+
+#include "IterationWriter.h"
+
+#include "Piko/Dialect/Piko/IR/CodeBuilder.h"
+
+#include "mlir/Dialect/Arith/IR/Arith.h"
+#include "mlir/Dialect/Vector/IR/VectorOps.h"
+
+using namespace mlir;
+using namespace piko;
+
+/// With more turns of a loop the quotient of two floats would not be exact.
+static constexpr int64_t mostTurns = 4096;
+
+Value IterationWriter::number(int64_t value) {
+  return arith::ConstantOp::create(
+      builder, loc,
+      DenseElementsAttr::get(getVectorType(builder.getI32Type()),
+                             builder.getI32IntegerAttr(value)));
+}
+
+Value IterationWriter::permute(Value value, Value from) {
+  auto type = cast<VectorType>(value.getType());
+  unsigned width = type.getElementType().isIndex()
+                       ? 64
+                       : type.getElementType().getIntOrFloatBitWidth();
+  CodeBuilder at(builder, loc);
+  auto words = getVectorType(builder.getI32Type());
+  if (width == 64) {
+    // As halves, which processors permute at once.
+    auto wide = getVectorType(builder.getI64Type());
+    Value bits = value;
+    if (type.getElementType().isIndex())
+      bits = arith::IndexCastOp::create(builder, loc, wide, value);
+    else if (type != wide)
+      bits = arith::BitcastOp::create(builder, loc, wide, value);
+    Value half = arith::ConstantOp::create(
+        builder, loc,
+        DenseElementsAttr::get(wide, builder.getI64IntegerAttr(32)));
+    Value low = arith::TruncIOp::create(builder, loc, words, bits);
+    Value high = arith::TruncIOp::create(
+        builder, loc, words, arith::ShRUIOp::create(builder, loc, bits, half));
+    low = arith::ExtUIOp::create(builder, loc, wide, permute(low, from));
+    high = arith::ExtUIOp::create(builder, loc, wide, permute(high, from));
+    bits = at.either(low, arith::ShLIOp::create(builder, loc, high, half));
+    if (type.getElementType().isIndex())
+      return arith::IndexCastOp::create(builder, loc, type, bits);
+    return type == wide
+               ? bits
+               : arith::BitcastOp::create(builder, loc, type, bits).getResult();
+  }
+  if (width < 32) {
+    Value wide = arith::ExtUIOp::create(
+        builder, loc, words,
+        isa<FloatType>(type.getElementType())
+            ? arith::BitcastOp::create(
+                  builder, loc, getVectorType(builder.getIntegerType(width)),
+                  value)
+                  .getResult()
+            : value);
+    wide = permute(wide, from);
+    Value narrow = arith::TruncIOp::create(
+        builder, loc, getVectorType(builder.getIntegerType(width)), wide);
+    return narrow.getType() == type
+               ? narrow
+               : arith::BitcastOp::create(builder, loc, type, narrow)
+                     .getResult();
+  }
+  // LLVM makes one instruction of this where there is one.
+  Value result = zeros(type);
+  for (int64_t lane = 0; lane < laneCount; ++lane) {
+    Value which = arith::IndexCastUIOp::create(
+        builder, loc, builder.getIndexType(),
+        vector::ExtractOp::create(builder, loc, from, lane));
+    Value one = vector::ExtractOp::create(builder, loc, value,
+                                          ArrayRef<OpFoldResult>{which});
+    result = vector::InsertOp::create(builder, loc, one, result, lane);
+  }
+  return result;
+}
+
+Value IterationWriter::countTurns(scf::ForOp inner) {
+  auto widen = [&](Value bound) {
+    return lanes.isVarying(bound) ? get(bound) : splat(getUniform(bound));
+  };
+  CodeBuilder at(builder, loc);
+  Value lower = widen(inner.getLowerBound()),
+        upper = widen(inner.getUpperBound());
+  Value some = at.compare(CodeBuilder::P::slt, lower, upper);
+  Value count = at.sub(upper, lower);
+  // Far too many stay far too many.
+  auto words = getVectorType(builder.getI32Type());
+  Type element = cast<VectorType>(count.getType()).getElementType();
+  if (!element.isInteger(32)) {
+    Value most = arith::ConstantOp::create(
+        builder, loc,
+        DenseElementsAttr::get(cast<ShapedType>(count.getType()),
+                               builder.getIntegerAttr(element, mostTurns + 1)));
+    count = arith::MinUIOp::create(builder, loc, count, most);
+    count =
+        element.isIndex()
+            ? arith::IndexCastOp::create(builder, loc, words, count).getResult()
+            : arith::TruncIOp::create(builder, loc, words, count).getResult();
+  }
+  return choose(both(active, some), count, number(0));
+}
+
+/// Sums of the numbers up to each lane.
+static Value scan(OpBuilder &builder, Location loc, Value numbers) {
+  Value zero = arith::ConstantOp::create(
+      builder, loc, builder.getZeroAttr(numbers.getType()));
+  for (int64_t distance = 1; distance < laneCount; distance *= 2) {
+    SmallVector<int64_t> from;
+    for (int64_t lane = 0; lane < laneCount; ++lane)
+      from.push_back(lane < distance ? laneCount : lane - distance);
+    Value moved = vector::ShuffleOp::create(builder, loc, numbers, zero, from);
+    numbers = arith::AddIOp::create(builder, loc, numbers, moved);
+  }
+  return numbers;
+}
+
+/// What a nest takes from outside that differs between lanes.
+static llvm::SetVector<Value> findInputs(scf::ForOp nest,
+                                         const IterationLanes &lanes) {
+  llvm::SetVector<Value> inputs;
+  nest.walk([&](Operation *op) {
+    for (Value operand : op->getOperands())
+      if (lanes.isVarying(operand) &&
+          !nest->isAncestor(operand.getParentBlock()->getParentOp()))
+        inputs.insert(operand);
+  });
+  return inputs;
+}
+
+void IterationWriter::writePairs(ArrayRef<scf::ForOp> nest,
+                                 ArrayRef<Value> counts) {
+  CodeBuilder at(builder, loc);
+  using P = CodeBuilder::P;
+  auto words = getVectorType(builder.getI32Type());
+  Value count = counts.front();
+  for (Value inner : counts.drop_front())
+    count = at.mul(count, inner);
+  Value ends = scan(builder, loc, count), starts = at.sub(ends, count);
+  Value total = vector::ExtractOp::create(builder, loc, ends, laneCount - 1);
+  auto made = scf::ForOp::create(
+      builder, loc, at.index(0),
+      arith::IndexCastOp::create(builder, loc, builder.getIndexType(), total),
+      at.index(laneCount));
+  OpBuilder::InsertionGuard guard(builder);
+  builder.setInsertionPointToStart(made.getBody());
+  SmallVector<int32_t> steps =
+      llvm::to_vector(llvm::seq<int32_t>(0, laneCount));
+  Value first = arith::IndexCastOp::create(builder, loc, builder.getI32Type(),
+                                           made.getInductionVar());
+  Value place =
+      at.add(vector::BroadcastOp::create(builder, loc, words, first),
+             arith::ConstantOp::create(
+                 builder, loc, DenseIntElementsAttr::get(words, steps)));
+  IRMapping savedVectors(vectors), savedScalars(scalars), savedFirsts(firsts);
+  Value outer = active;
+  active = at.compare(P::slt, place,
+                      vector::BroadcastOp::create(builder, loc, words, total));
+  // How many lanes end before: by binary search.
+  Value lane = number(0);
+  for (int64_t step = laneCount / 2; step > 0; step /= 2) {
+    Value next = at.add(lane, number(step));
+    Value end = permute(ends, at.sub(next, number(1)));
+    lane = choose(at.compare(P::sle, end, place), next, lane);
+  }
+  Value turn = at.sub(place, permute(starts, lane));
+  for (Value value : findInputs(nest.front(), lanes))
+    vectors.map(value, permute(get(value), lane));
+  auto setVariable = [&](scf::ForOp loop, Value turns) {
+    Value lower = get(loop.getLowerBound());
+    Type type = lower.getType();
+    if (type != words)
+      turns =
+          getElementTypeOrSelf(type).isIndex()
+              ? arith::IndexCastOp::create(builder, loc, type, turns)
+                    .getResult()
+              : arith::ExtUIOp::create(builder, loc, type, turns).getResult();
+    vectors.map(loop.getInductionVar(), at.add(lower, turns));
+  };
+  if (nest.size() == 2) {
+    // Exact, as both are small.
+    Value side = choose(active, permute(counts[1], lane), number(1));
+    auto floats = getVectorType(builder.getF32Type());
+    Value row = arith::FPToSIOp::create(
+        builder, loc, words,
+        arith::DivFOp::create(
+            builder, loc, arith::SIToFPOp::create(builder, loc, floats, turn),
+            arith::SIToFPOp::create(builder, loc, floats, side)));
+    row = choose(active, row, number(0));
+    setVariable(nest[0], row);
+    turn = at.sub(turn, at.mul(row, side));
+    setVariable(nest[1], turn);
+    for (Operation &op : scf::ForOp(nest[0]).getBody()->without_terminator())
+      if (&op != nest[1])
+        writeOperation(&op);
+  } else {
+    setVariable(nest[0], turn);
+  }
+  bool wasPaired = std::exchange(paired, true);
+  writeBlock(*scf::ForOp(nest.back()).getBody());
+  paired = wasPaired;
+  active = outer;
+  vectors = savedVectors;
+  scalars = savedScalars;
+  firsts = savedFirsts;
+}
+
+void IterationWriter::writeNest(scf::ForOp loop) {
+  SmallVector<scf::ForOp> nest = lanes.getNest(loop);
+  SmallVector<Value> counts;
+  CodeBuilder at(builder, loc);
+  Value tooMany;
+  for (scf::ForOp one : nest) {
+    counts.push_back(countTurns(one));
+    Value isMore =
+        at.compare(CodeBuilder::P::ugt, counts.back(), number(mostTurns));
+    tooMany = tooMany ? at.either(tooMany, isMore) : isMore;
+  }
+  auto choice = scf::IfOp::create(builder, loc, any(tooMany),
+                                  /*withElseRegion=*/true);
+  OpBuilder::InsertionGuard guard(builder);
+  builder.setInsertionPointToStart(choice.elseBlock());
+  writePairs(nest, counts);
+  builder.setInsertionPointToStart(choice.thenBlock());
+  IRMapping savedVectors(vectors), savedScalars(scalars), savedFirsts(firsts);
+  writeVaryingFor(loop);
+  vectors = savedVectors;
+  scalars = savedScalars;
+  firsts = savedFirsts;
+}
