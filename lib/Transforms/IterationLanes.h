@@ -65,6 +65,9 @@ public:
   }
   /// Whether a value is the iteration's number and what is the same for all.
   bool isLinear(mlir::Value value) const;
+  /// The same of a value that grows by one from lane to lane also where it wraps
+  /// around: it is not cast from a sum of fewer bits.
+  bool isSum(mlir::Value value) const;
   /// Whether an array belongs to an iteration.
   bool isPrivate(mlir::Value array) const { return privates.contains(array); }
   /// Whether an operation reads an array, or state, that no iteration changes.
@@ -115,7 +118,6 @@ private:
   bool isMovable(mlir::Operation *op) const;
   void checkCarried();
   bool isAccess(mlir::Operation *op) const;
-  bool isSum(mlir::Value value) const;
   bool isFixed(mlir::Value value) const;
 
   mutable mlir::scf::ForOp loop; // whose accessors are not const
@@ -128,6 +130,16 @@ private:
   llvm::SmallVector<OrderedGroup> groups;
   llvm::DenseMap<mlir::Operation *, llvm::SmallVector<mlir::scf::ForOp>> nests;
 };
+
+/// Whether an operation is control flow, which predication replaces.
+bool isStructure(mlir::Operation *op);
+
+/// Whether it only asks for memory ahead of time: a vector's loads do so
+/// themselves.
+bool isPrefetch(mlir::Operation *op);
+
+/// Whether it may trap, or takes as long for one lane as for all.
+bool isDivision(mlir::Operation *op);
 
 /// Whether lanes have values of this type: numbers, and primitives, of which
 /// they have the addresses.

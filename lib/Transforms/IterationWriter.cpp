@@ -125,7 +125,34 @@ static bool isIntegerDivision(Operation *op) {
              arith::CeilDivSIOp, arith::CeilDivUIOp, arith::FloorDivSIOp>(op);
 }
 
+/// A product of a number that grows by one from lane to lane and of one that is
+/// the same for all: what is added from lane to lane is known in front of loops
+/// over rows, and 64-bit products of vectors take long.
+bool IterationWriter::writeLinearProduct(arith::MulIOp product) {
+  Value number = product.getLhs(), factor = product.getRhs();
+  if (lanes.isVarying(factor))
+    std::swap(number, factor);
+  if (paired || lanes.isVarying(factor) || !lanes.isSum(number))
+    return false;
+  Value scalar = getUniform(factor);
+  Type type = getVectorType(scalar.getType());
+  Value first =
+      arith::MulIOp::create(builder, loc, getFirst(number), scalar);
+  Value steps = vector::StepOp::create(builder, loc,
+                                       getVectorType(builder.getIndexType()));
+  if (type != steps.getType())
+    steps = arith::IndexCastOp::create(builder, loc, type, steps);
+  vectors.map(product.getResult(),
+              arith::AddIOp::create(
+                  builder, loc, splat(first),
+                  arith::MulIOp::create(builder, loc, steps, splat(scalar))));
+  return true;
+}
+
 void IterationWriter::writeVector(Operation *op) {
+  if (auto product = dyn_cast<arith::MulIOp>(op))
+    if (writeLinearProduct(product))
+      return;
   SmallVector<Value> operands;
   for (Value operand : op->getOperands())
     operands.push_back(get(operand));

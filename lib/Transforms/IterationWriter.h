@@ -8,6 +8,7 @@
 #include "IterationLanes.h"
 #include "Lanes.h"
 
+#include "mlir/Dialect/Arith/IR/Arith.h"
 #include "mlir/Dialect/MemRef/IR/MemRef.h"
 #include "mlir/IR/IRMapping.h"
 #include "llvm/ADT/MapVector.h"
@@ -58,6 +59,8 @@ private:
   void writeOperation(mlir::Operation *op);
   void writeUniform(mlir::Operation *op);
   void writeVector(mlir::Operation *op);
+  /// Whether the product is one that it has written.
+  bool writeLinearProduct(mlir::arith::MulIOp product);
   void writeAccess(mlir::Operation *op);
   void writeArrayAccess(mlir::Operation *op);
   void writeItemAccess(mlir::Operation *op);
