@@ -65,8 +65,8 @@ public:
   }
   /// Whether a value is the iteration's number and what is the same for all.
   bool isLinear(mlir::Value value) const;
-  /// The same of a value that grows by one from lane to lane also where it wraps
-  /// around: it is not cast from a sum of fewer bits.
+  /// The same of a value that grows by one from lane to lane also where it
+  /// wraps around: it is not cast from a sum of fewer bits.
   bool isSum(mlir::Value value) const;
   /// Whether an array belongs to an iteration.
   bool isPrivate(mlir::Value array) const { return privates.contains(array); }

@@ -136,8 +136,7 @@ bool IterationWriter::writeLinearProduct(arith::MulIOp product) {
     return false;
   Value scalar = getUniform(factor);
   Type type = getVectorType(scalar.getType());
-  Value first =
-      arith::MulIOp::create(builder, loc, getFirst(number), scalar);
+  Value first = arith::MulIOp::create(builder, loc, getFirst(number), scalar);
   Value steps = vector::StepOp::create(builder, loc,
                                        getVectorType(builder.getIndexType()));
   if (type != steps.getType())

@@ -215,7 +215,7 @@ static void countLoops(scf::ForOp root) {
   }
 }
 
-/// With fewer turns the loop runs as it was: a vector takes about as long as
+/// With fewer iterations a loop runs as it was: a vector takes about as long as
 /// this many.
 static constexpr int64_t leastTurns = 4;
 
@@ -223,6 +223,12 @@ static void vectorize(const IterationLanes &lanes) {
   scf::ForOp loop = lanes.getLoop();
   Location loc = loop.getLoc();
   OpBuilder builder(loop);
+  if (isOverPrimitives(loop)) {
+    // A second body would take longer to compile than it saves.
+    IterationWriter(lanes).write(builder.saveInsertionPoint());
+    loop.erase();
+    return;
+  }
   Type type = loop.getUpperBound().getType();
   Value least = arith::ConstantOp::create(
       builder, loc, builder.getIntegerAttr(type, leastTurns));

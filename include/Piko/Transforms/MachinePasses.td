@@ -455,7 +455,7 @@ def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
     all that vectors do. So a depth test, the shading of what has passed it, and
     the update of a colour become turns, vectors and turns.
 
-    Loops that turn out to have few turns run as they were. Whether vectors pay is
+    Parallel loops that turn out to have few iterations run as they were. Whether vectors pay is
     estimated from the operations, how often they run, and for how many lanes; a
     remark has the estimate, with what costs most. Rows of boxes, which mostly have
     few pixels, are vectorized where the schedule says `specifyLanes`.
