@@ -106,15 +106,17 @@ bool piko::isOrderIrrelevant(PipelineOp pipeline, StageOp stage) {
   if (stage.getTakesList())
     return false;
   OrderFinder finder;
+  bool isKnown = false; // Or it is no phase any more.
   pipeline.walk([&](ProcessOp process) {
     FlatSymbolRefAttr name = process.getStageAttr();
     if (name ? name != FlatSymbolRefAttr::get(stage.getSymNameAttr())
              : process->getParentOp() != stage)
       return;
+    isKnown = true;
     process.walk([&](Operation *op) {
       if (op != process)
         finder.visit(op);
     });
   });
-  return !finder.isSeen();
+  return isKnown && !finder.isSeen();
 }

@@ -75,7 +75,10 @@ int ProgramPlan::countInputs(int stage) const {
 }
 
 bool ProgramPlan::merges(int stage) const {
-  return countInputs(stage) > 1 && (ordered[stage] || isLoop(getLoop(stage)));
+  // A list shows its order also where that is any.
+  return countInputs(stage) > 1 &&
+         (ordered[stage] || isLoop(getLoop(stage)) ||
+          graph.getStage(stage).getTakesList());
 }
 
 int64_t &ProgramPlan::widthAt(int stage) {

@@ -25,7 +25,7 @@ piko.pipeline @P rank 1 {
   piko.source @saturates
   piko.source @differs
   piko.stage @saturates bins [0] threads 1 : @F -> [] {
-    piko.schedule load_balance
+    piko.schedule load_balance lanes one
     piko.process {
     ^bb0(%f: !piko.prim<@F>):
       %zero = arith.constant 0 : i32
@@ -48,7 +48,7 @@ piko.pipeline @P rank 1 {
   }
   // NaN is 1.
   piko.stage @differs bins [0] threads 1 : @F -> [] {
-    piko.schedule load_balance
+    piko.schedule load_balance lanes one
     piko.process {
     ^bb0(%f: !piko.prim<@F>):
       %one = arith.constant 1 : i32
