@@ -76,9 +76,8 @@ int ProgramPlan::countInputs(int stage) const {
 
 bool ProgramPlan::merges(int stage) const {
   // A list shows its order also where that is any.
-  return countInputs(stage) > 1 &&
-         (ordered[stage] || isLoop(getLoop(stage)) ||
-          graph.getStage(stage).getTakesList());
+  return countInputs(stage) > 1 && (ordered[stage] || isLoop(getLoop(stage)) ||
+                                    graph.getStage(stage).getTakesList());
 }
 
 int64_t &ProgramPlan::widthAt(int stage) {
