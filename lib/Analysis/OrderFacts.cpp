@@ -80,7 +80,10 @@ private:
 
   void visitAccess(StateAccessOpInterface access) {
     int kinds = access.getAccessKinds();
-    seen |= kinds != StateAccess::reads && kinds != StateAccess::stores;
+    bool isImage =
+        bool(lookupInPipeline<ImageOp>(access, access.getAccessedState()));
+    seen |= kinds != StateAccess::reads &&
+            (kinds != StateAccess::stores || isImage);
     others.insert(access.getAccessedState());
   }
 

@@ -197,11 +197,13 @@ bool IterationLanes::isAccess(Operation *op) const {
 //===----------------------------------------------------------------------===//
 
 /// Whether the turns of a loop may change places, also with those of other
-/// lanes: they hand on nothing, and change state by atomic operations alone.
+/// lanes: they hand on nothing, and change each piece of state by atomic
+/// operations of one kind alone.
 bool IterationLanes::canCollapse(scf::ForOp inner) const {
   if (inner.getNumResults() > 0 || inner.getUnsignedCmp() ||
       !matchPattern(inner.getStep(), m_One()))
     return false;
+  llvm::DenseMap<Attribute, AtomicKind> kinds;
   WalkResult result = inner.walk([&](Operation *op) {
     bool isFree = isMemoryEffectFree(op) || op->getNumRegions() > 0 ||
                   op->hasTrait<Failure>() || isPrefetch(op);
@@ -210,10 +212,12 @@ bool IterationLanes::canCollapse(scf::ForOp inner) const {
     if (auto access = dyn_cast<StateAccessOpInterface>(op)) {
       bool isRead = access.getAccessKinds() == StateAccess::reads &&
                     !written.contains(access.getAccessedState());
-      bool isAtomic =
-          access.getAccessKinds() == StateAccess::changesAtomically &&
-          op->getNumResults() == 0;
-      isFree = isRead || isAtomic;
+      auto atomic = dyn_cast<AtomicOp>(op);
+      bool isOfOneKind =
+          atomic && kinds.try_emplace(atomic.getStateAttr(), atomic.getKind())
+                            .first->second == atomic.getKind();
+      isFree = isRead || (isOfOneKind && !atomic.getOld() &&
+                          atomic.getKind() != AtomicKind::AddF);
     } else if (isa<memref::LoadOp>(op)) {
       isFree = readsFixed(op);
     }

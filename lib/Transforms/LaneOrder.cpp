@@ -147,10 +147,21 @@ namespace {
 
 /// Whether memory is used where it stands, or later, in the order of lanes.
 struct Uses {
-  bool inPlace = false, deferred = false, changed = false, isAtomic = true;
+  bool inPlace = false, deferred = false, changed = false;
+  /// Whether all uses are changes that commute, all of one kind.
+  bool commute = true;
+  std::optional<AtomicKind> kind = std::nullopt;
 
   bool isInOrder() const {
-    return !inPlace || !deferred || !changed || isAtomic;
+    return !inPlace || !deferred || !changed || commute;
+  }
+  void addChange(Operation *op) {
+    auto atomic = dyn_cast<AtomicOp>(op);
+    commute &= atomic && !atomic.getOld() &&
+               atomic.getKind() != AtomicKind::AddF &&
+               kind.value_or(atomic.getKind()) == atomic.getKind();
+    if (atomic)
+      kind = atomic.getKind();
   }
 };
 
@@ -166,27 +177,26 @@ bool IterationLanes::canDefer(ArrayRef<OrderedGroup> groups) const {
   }
   llvm::DenseMap<Attribute, Uses> states;
   llvm::DenseMap<Value, Uses> arrays;
-  auto note = [&](Uses &uses, Operation *op, bool changes, bool isAtomic) {
+  auto note = [&](Uses &uses, Operation *op, bool changes) {
     bool isLater = false;
     for (Operation *at = op; at != loop && !isLater; at = at->getParentOp())
       isLater = later.contains(at);
     (isLater ? uses.deferred : uses.inPlace) = true;
     uses.changed |= changes;
-    uses.isAtomic &= isAtomic;
+    uses.addChange(op);
     return isLater;
   };
   loop.walk([&](Operation *op) {
     if (auto access = dyn_cast<StateAccessOpInterface>(op)) {
-      int kinds = access.getAccessKinds();
-      note(states[access.getAccessedState()], op, kinds != StateAccess::reads,
-           kinds == StateAccess::changesAtomically);
+      note(states[access.getAccessedState()], op,
+           access.getAccessKinds() != StateAccess::reads);
     } else if (auto load = dyn_cast<memref::LoadOp>(op)) {
-      note(arrays[load.getMemRef()], op, /*changes=*/false, /*isAtomic=*/false);
+      note(arrays[load.getMemRef()], op, /*changes=*/false);
     } else if (auto store = dyn_cast<memref::StoreOp>(op)) {
       // What is stored before anything is read later is there by then.
       Uses &uses = arrays[store.getMemRef()];
       bool isKnown = uses.deferred;
-      bool isLater = note(uses, op, /*changes=*/false, /*isAtomic=*/false);
+      bool isLater = note(uses, op, /*changes=*/false);
       uses.changed |= isLater || isKnown;
     }
   });

@@ -5,13 +5,14 @@
 // in loops of several kinds, with numbers of several widths.
 // RUN: sed -n 's|^// CASE: ||p' %s > %t.cases
 // RUN: piko-compare %s --cases %t.cases --runs 1 --threads 2 | FileCheck %s --check-prefix=EQUAL
-// EQUAL-COUNT-7: {{^equal$}}
+// EQUAL-COUNT-8: {{^equal$}}
 // CASE: --pipe Boxes --domain 67 35 --count 2000
 // CASE: --pipe Cells --domain 67 35 --count 2000
 // CASE: --pipe Rows --domain 67 35 --count 2000
 // CASE: --pipe Long --domain 67 35 --count 40
 // CASE: --pipe Widths --domain 67 35 --count 2000
 // CASE: --pipe Tests --domain 67 35 --count 2000
+// CASE: --pipe Kinds --domain 67 35 --count 2000
 // CASE: --pipe Down --domain 67 35 --count 2000
 // RUN: not piko-compare %s --pipe Outside --domain 67 35 --count 2000 --runs 1 | FileCheck %s --check-prefix=OUTSIDE
 // OUTSIDE: got: stage 'stage', bin 0: expected an index into 'sums' in [0, 64), but got 64
@@ -28,11 +29,13 @@ struct Box {
   int8_t height;
   float value;
   int64_t wide;
+  int serial;
 };
 
 struct State {
   piko::Image<int> sums;
   piko::Image<uint64_t> most;
+  piko::Buffer<int> own;
 };
 
 struct Base : piko::Stage<0, 0, 64, Box>, piko::Uses<State> {
@@ -141,6 +144,17 @@ struct DownStage : Base {
   }
 };
 
+// A sum and a maximum of an element that one primitive has, turn after turn.
+struct KindsStage : Base {
+  void process(const Box &b) {
+    glm::ivec4 box = boxOf(b, 9);
+    for (int x = 0; x < box.z; ++x) {
+      piko::atomicMax(state().own[b.serial], 3 * x);
+      piko::atomicAdd(state().own[b.serial], -x);
+    }
+  }
+};
+
 struct OutsideState {
   piko::Buffer<int> sums;
 };
@@ -155,7 +169,11 @@ struct OutsideStage : piko::Stage<0, 0, 64, Box>, piko::Uses<OutsideState> {
 
 template <class S, class T = State> struct Pipe : piko::Pipe<T> {
   S stage;
-  Pipe() { this->source(stage); }
+  Pipe() {
+    this->source(stage);
+    if constexpr (std::is_same_v<T, State>)
+      this->allocateForSource(this->state().own, 0);
+  }
 };
 struct Boxes : Pipe<BoxesStage> {};
 struct Cells : Pipe<CellsStage> {};
@@ -163,5 +181,6 @@ struct Rows : Pipe<RowsStage> {};
 struct Long : Pipe<LongStage> {};
 struct Widths : Pipe<WidthsStage> {};
 struct Tests : Pipe<TestsStage> {};
+struct Kinds : Pipe<KindsStage> {};
 struct Down : Pipe<DownStage> {};
 struct Outside : Pipe<OutsideStage, OutsideState> {};

@@ -4,12 +4,14 @@
 // numbers, and its errors.
 // RUN: sed -n 's|^// CASE: ||p' %s > %t.cases
 // RUN: piko-compare %s --cases %t.cases --runs 1 | FileCheck %s --check-prefix=EQUAL
-// EQUAL-COUNT-5: {{^equal$}}
+// EQUAL-COUNT-7: {{^equal$}}
 // CASE: --pipe Averages --domain 67 35 --count 2000
 // CASE: --pipe Addresses --domain 67 35 --count 2000
 // CASE: --pipe Repeats --domain 67 35 --count 2000
 // CASE: --pipe Guards --domain 67 35 --count 2000
 // CASE: --pipe Tests --domain 67 35 --count 2000
+// CASE: --pipe Kinds --domain 67 35 --count 2000
+// CASE: --pipe Olds --domain 67 35 --count 2000
 // RUN: piko-compare %s --pipe Tests --domain 67 35 --count 2000 --runs 1 --without vectorize | FileCheck %s
 // CHECK: equal
 // RUN: not piko-compare %s --pipe Outside --domain 67 35 --count 2000 --runs 1 --threads 2 | FileCheck %s --check-prefix=OUTSIDE
@@ -20,6 +22,8 @@
 // RUN: pikoc %s --pipe Repeats --no-cache --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=VECTORS
 // RUN: pikoc %s --pipe Guards --no-cache --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=VECTORS
 // RUN: pikoc %s --pipe Tests --no-cache --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=VECTORS
+// RUN: pikoc %s --pipe Kinds --no-cache --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=VECTORS
+// RUN: pikoc %s --pipe Olds --no-cache --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=VECTORS
 // RUN: pikoc %s --pipe Outside --no-cache --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=VECTORS
 // VECTORS: remark: stage 'stage': process is vectorized for 16 primitives at once
 #include <piko.h>
@@ -142,7 +146,7 @@ using Outside = Buffers<Reader>;
 struct Fragment {
   int x, y;
   float z, weights[4];
-  int choice;
+  int choice, serial;
 };
 struct Images {
   piko::Image<float> depth, color;
@@ -167,4 +171,69 @@ struct Test : piko::Stage<8, 8, 64, Fragment>, piko::Uses<Images> {
 struct Tests : piko::Pipe<Images> {
   Test stage;
   Tests() { source(stage); }
+};
+
+// A number that a primitive changes in two ways keeps the order of the two,
+// around what runs in the order of primitives.
+struct Numbers {
+  piko::Image<float> sums;
+  piko::Buffer<int> counts, olds, taken;
+};
+struct Kind : piko::Stage<8, 8, 64, Fragment>, piko::Uses<Numbers> {
+  static glm::ivec2 at(const Fragment &f) { return {f.x & 31, f.y & 31}; }
+  void assignBin(const Fragment &f) { assignToBin(f, binFromPosition(at(f))); }
+  void schedule(piko::BinId) { specifyLanes(piko::Lanes::Items); }
+  void process(const Fragment &f) {
+    float value = workMore(f.z, f.weights[0]);
+    for (int i = 0; i <= (f.choice & 1); ++i) {
+      update(state().sums, at(f),
+             [&](float &sum) { sum = sum * 0.5f + value; });
+      piko::atomicMax(state().counts[f.serial], 7 + i);
+    }
+    piko::atomicAdd(state().counts[f.serial], 3);
+  }
+};
+struct Kinds : piko::Pipe<Numbers> {
+  Kind stage;
+  Kinds() {
+    source(stage);
+    allocateForSource(state().counts, 0);
+  }
+};
+
+// So does one whose old values show.
+struct Taken {
+  int old;
+  float value;
+};
+struct Old : piko::Stage<8, 8, 64, Fragment, Taken>, piko::Uses<Numbers> {
+  void assignBin(const Fragment &f) {
+    assignToBin(f, binFromPosition(Kind::at(f)));
+  }
+  void schedule(piko::BinId) {
+    specifyOrder(piko::Unordered);
+    specifyLanes(piko::Lanes::Items);
+  }
+  void process(const Fragment &f) {
+    float value = workMore(f.z, 0.5f);
+    for (int i = 0; i < 1 + (f.serial & 1); ++i)
+      emit(Taken{piko::atomicAddFetch(state().counts[f.serial], i + 1), value});
+    int old = piko::atomicAddFetch(state().counts[f.serial], 10);
+    state().olds[f.serial] = old;
+  }
+};
+struct Last : piko::Stage<0, 0, 64, Taken>, piko::Uses<Numbers> {
+  void process(const Taken &t) {
+    piko::atomicAdd(state().taken[t.old & 31], 1);
+  }
+};
+struct Olds : piko::Pipe<Numbers> {
+  Old stage;
+  Last last;
+  Olds() {
+    source(stage);
+    connect(stage, 0, last);
+    allocateForSource(state().counts, 0);
+    allocateForSource(state().olds, 0);
+  }
 };
