@@ -34,12 +34,12 @@ PipelineNumbers::PipelineNumbers(PipelineOp pipeline) : pipeline(pipeline) {
   for (Operation &op : *pipeline.getBodyBlock())
     if (getStateRecord(&op))
       states[SymbolTable::getSymbolName(&op)] = states.size();
-  auto note = [&](auto access) {
-    if (isa<BufferOp>(SymbolTable::lookupSymbolIn(pipeline, access.getState())))
-      writtenBuffers.insert(access.getStateAttr().getAttr());
-  };
-  pipeline.walk([&](StoreOp store) { note(store); });
-  pipeline.walk([&](AtomicOp atomic) { note(atomic); });
+  pipeline.walk([&](StateAccessOpInterface access) {
+    FlatSymbolRefAttr state = access.getAccessedState();
+    if (access.getAccessKinds() != StateAccess::reads &&
+        isa<BufferOp>(SymbolTable::lookupSymbolIn(pipeline, state.getAttr())))
+      writtenBuffers.insert(state.getAttr());
+  });
   for (auto buffer : pipeline.getOps<BufferOp>())
     if (SymbolTable::symbolKnownUseEmpty(buffer, &pipeline.getBody()))
       unusedBuffers.insert(buffer.getSymNameAttr());
