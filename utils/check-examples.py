@@ -40,9 +40,9 @@ NAMES = {
     "i32": "x y x0 y0 x1 y1 one count zero id kind",
     "i64": "batch split mark lineage",
     "i1": "always isNaN isUnwritten",
-    "index": "a b bin call cell hi i j lo n tile unit",
+    "index": "a b bin call cell first hi i j lo n tile unit",
     "vector<16xf32>": "values",
-    "vector<16xindex>": "places",
+    "vector<16xindex>": "as places",
     "vector<16xi1>": "mask",
 }
 

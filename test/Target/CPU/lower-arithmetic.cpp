@@ -11,7 +11,7 @@
 // REQUIRES: x86_64
 
 // AVX512-NOT: {{div[sp]s|sqrt[sp]s}}
-// AVX512:     vr{{cp|sqrt}}14ps %ymm
+// AVX512:     vr{{cp|sqrt}}14ps %zmm
 // AVX512-NOT: {{div[sp]s|vsqrt[sp]s}}
 // AVX-NOT:    {{v(div|sqrt)[sp]s}}
 // AVX:        vr{{cp|sqrt}}ps %ymm

@@ -23,7 +23,7 @@ piko.record @Point {"x" : i32 at 0} size 4 align 4
 // CHECK-NEXT: "schedule plot";
 // CHECK-NEXT: }
 // CHECK-NEXT: "schedule plot" -> "process plot" [style=dashed];
-// CHECK: "process start" -> "assign plot start.0" [label="port 0: Point\npermuted"];
+// CHECK: "process start" -> "assign plot start.0" [label="port 0: Point\nconcatenated"];
 // CHECK-NEXT: "assign plot start.0" -> "process plot";
 piko.pipeline @Draw rank 1 {
   piko.buffer @sums : @Point
