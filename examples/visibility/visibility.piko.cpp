@@ -37,12 +37,11 @@ using namespace raster;
 // cover.
 struct ScreenTriangle {
   Point a, b, c;
-  glm::vec3 depth; // of a, b and c
+  glm::vec3 nearness; // of a, b and c: 0 at the far plane, 2 at the near one
   int32_t index;
   glm::i16vec2 lo, hi;
 };
 
-// Larger for what is nearer, then for what comes first; 0: nothing is seen.
 struct Visible {
   uint64_t key = 0;
 };
@@ -83,14 +82,14 @@ inline PixelBox boxOf(Point a, Point b, Point c, glm::ivec2 size) {
 }
 
 // The corners in clockwise order; `area` is that of a, b, c as they are given.
-inline ScreenTriangle clockwise(Point a, Point b, Point c, glm::vec3 depth,
+inline ScreenTriangle clockwise(Point a, Point b, Point c, glm::vec3 nearness,
                                 int64_t area, const PixelBox &box,
                                 int32_t index) {
   if (area < 0) {
     std::swap(b, c);
-    std::swap(depth.y, depth.z);
+    std::swap(nearness.y, nearness.z);
   }
-  return {a, b, c, depth, index, glm::i16vec2(box.lo), glm::i16vec2(box.hi)};
+  return {a, b, c, nearness, index, glm::i16vec2(box.lo), glm::i16vec2(box.hi)};
 }
 
 // Small triangles have at most this many pixels in a row or a column.
@@ -117,8 +116,9 @@ struct Setup
     PixelBox box = boxOf(a.at, b.at, c.at, domain());
     if (box.isEmpty())
       return;
-    ScreenTriangle s = clockwise(a.at, b.at, c.at, {a.depth, b.depth, c.depth},
-                                 area, box, t.index);
+    ScreenTriangle s =
+        clockwise(a.at, b.at, c.at, {1 - a.depth, 1 - b.depth, 1 - c.depth},
+                  area, box, t.index);
     auto place = [&](Point p) -> Point {
       return {p.x - box.lo.x * subpixels, p.y - box.lo.y * subpixels};
     };
@@ -144,14 +144,14 @@ struct Clipper : piko::Stage<0, 0, 64, Triangle, ScreenTriangle>,
           project(state().camera, state().mesh[t.vertex[i]].position);
     int count = clipPolygon(corners, 3);
     Point points[maxCorners];
-    float depths[maxCorners];
+    float nearness[maxCorners];
     for (int i = 0; i < count; ++i) {
       glm::vec4 p = corners[i].position;
       if (!(p.w > 0))
         return;
       float inverse = 1 / p.w;
       points[i] = toPoint(glm::vec2(p) * inverse, domain());
-      depths[i] = p.z * inverse;
+      nearness[i] = 1 - p.z * inverse;
     }
     int64_t area = 0;
     for (int i = 1; i + 1 < count; ++i)
@@ -164,8 +164,8 @@ struct Clipper : piko::Stage<0, 0, 64, Triangle, ScreenTriangle>,
       PixelBox box = boxOf(a, b, c, domain());
       // One of the other sign is a fold of less than 1/256 pixel.
       if (part != 0 && (part < 0) == (area < 0) && !box.isEmpty())
-        emit(clockwise(a, b, c, {depths[0], depths[i], depths[i + 1]}, part,
-                       box, t.index),
+        emit(clockwise(a, b, c, {nearness[0], nearness[i], nearness[i + 1]},
+                       part, box, t.index),
              0);
     }
   }
@@ -175,22 +175,36 @@ struct Clipper : piko::Stage<0, 0, 64, Triangle, ScreenTriangle>,
 // What is seen
 //===----------------------------------------------------------------------===//
 
-// 0 where a pixel's centre is outside of a triangle, or behind the far plane.
-template <class Edges>
-inline uint64_t keyAt(const Edges &edges, float scale, const ScreenTriangle &t,
-                      int x, int y) {
-  if (!edges.cover(x, y))
-    return 0;
-  glm::vec3 share(edges.e0.at(x, y), edges.e1.at(x, y), edges.e2.at(x, y));
-  share *= scale;
-  float depth = glm::dot(share, t.depth);
-  if (!(depth < 1))
-    return 0;
-  // As an integer, which is larger for what is nearer.
-  auto bits = std::bit_cast<uint32_t>(depth);
-  bits = bits >> 31 ? bits : ~bits & 0x7fffffff;
-  return uint64_t(bits) << 32 | ~uint32_t(t.index);
+// Larger for what is nearer, then for what comes first; 0: nothing is seen.
+inline uint64_t keyOf(float nearness, int32_t index) {
+  // The bits of positive numbers are ordered as the numbers are.
+  return nearness > 0 ? uint64_t(std::bit_cast<uint32_t>(nearness)) << 32 |
+                            ~uint32_t(index)
+                      : 0;
 }
+
+// What there is to see of a triangle: its key at a pixel that it covers, or 0.
+template <class Edges> struct Seen {
+  Edges edges;
+  float first, toB, toC;
+  int32_t index;
+
+  Seen(Point a, Point b, Point c, const ScreenTriangle &t)
+      : edges(a, b, c), first(t.nearness.x), index(t.index) {
+    float scale = 1.0f / float(signedArea(a, b, c));
+    toB = (t.nearness.y - first) * scale;
+    toC = (t.nearness.z - first) * scale;
+  }
+
+  uint64_t at(int x, int y) const {
+    if (!edges.cover(x, y))
+      return 0;
+    // By the edges' values, which are exact, so that slivers have no error.
+    return keyOf(first + float(edges.e1.at(x, y)) * toB +
+                     float(edges.e2.at(x, y)) * toC,
+                 index);
+  }
+};
 
 struct SmallCoverage : piko::Stage<0, 0, 64, ScreenTriangle>,
                        piko::Uses<State> {
@@ -199,12 +213,10 @@ struct SmallCoverage : piko::Stage<0, 0, 64, ScreenTriangle>,
     auto place = [&](Point p) -> Point {
       return {p.x - t.lo.x * subpixels, p.y - t.lo.y * subpixels};
     };
-    Point a = place(t.a), b = place(t.b), c = place(t.c);
-    NearEdges edges(a, b, c);
-    float scale = 1.0f / float(signedArea(a, b, c));
+    Seen<NearEdges> seen(place(t.a), place(t.b), place(t.c), t);
     for (int y = 0; y <= t.hi.y - t.lo.y; ++y)
       for (int x = 0; x <= t.hi.x - t.lo.x; ++x)
-        if (uint64_t key = keyAt(edges, scale, t, x, y))
+        if (uint64_t key = seen.at(x, y))
           piko::atomicMax(state().visible({t.lo.x + x, t.lo.y + y}).key, key);
   }
 };
@@ -221,11 +233,10 @@ struct Coverage : piko::Stage<Bin, Bin, 64, ScreenTriangle>, piko::Uses<State> {
   }
 
   void process(const ScreenTriangle &t) {
-    Edges edges(t.a, t.b, t.c);
-    float scale = 1.0f / float(signedArea(t.a, t.b, t.c));
+    Seen<Edges> seen(t.a, t.b, t.c, t);
     this->parallelForPixels(
         glm::ivec2(t.lo), glm::ivec2(t.hi), [&](glm::ivec2 p) {
-          if (uint64_t key = keyAt(edges, scale, t, p.x, p.y))
+          if (uint64_t key = seen.at(p.x, p.y))
             this->update(this->state().visible, p,
                          [&](Visible &v) { v.key = glm::max(v.key, key); });
         });

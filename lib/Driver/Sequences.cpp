@@ -111,6 +111,14 @@ static void addUnitsToCPU(OpPassManager &passes,
     passes.nest<PipelineOp>().addPass(createMergeBounds());
     addCleanUp(passes);
   }
+  if (options.has("thread-jumps")) {
+    passes.nest<PipelineOp>().addPass(createThreadJumps());
+    addCleanUp(passes);
+  }
+  if (options.has("narrow-integers")) {
+    passes.nest<PipelineOp>().addPass(createNarrowIntegers());
+    addCleanUp(passes);
+  }
   if (options.has("vectorize")) {
     passes.nest<PipelineOp>().addPass(createVectorize());
     addCleanUp(passes);

@@ -28,6 +28,8 @@ const std::vector<std::string> &SynthesisOptions::getOptional() {
                                                  "prove-bounds",
                                                  "hoist-bounds",
                                                  "merge-bounds",
+                                                 "thread-jumps",
+                                                 "narrow-integers",
                                                  "if-convert",
                                                  "uplift-pixel-loops"};
   return names;

@@ -324,6 +324,17 @@ bool piko::isDivision(Operation *op) {
              arith::DivFOp, math::SqrtOp>(op);
 }
 
+/// About how many instructions an operation is as vectors: those of 64 bits
+/// take two, and conversions bring two halves together.
+static int64_t countInstructions(Operation *op) {
+  auto isWide = [](Type type) { return type.isInteger(64) || type.isF64(); };
+  bool fromWide = llvm::any_of(op->getOperandTypes(), isWide),
+       toWide = llvm::any_of(op->getResultTypes(), isWide);
+  return fromWide != toWide && !isa<arith::CmpIOp, arith::CmpFOp>(op) ? 3
+         : fromWide || toWide                                         ? 2
+                                                                      : 1;
+}
+
 bool IterationLanes::isCheap(Region &region) const {
   constexpr int64_t most = 12;
   int64_t count = 0;
@@ -331,7 +342,8 @@ bool IterationLanes::isCheap(Region &region) const {
     LaneForm form = getForm(&op);
     bool isFree =
         form == LaneForm::Vector || (form == LaneForm::Uniform && isPure(&op));
-    if (!isFree || isDivision(&op) || findGroup(&op) || ++count > most)
+    if (!isFree || isDivision(&op) || findGroup(&op) ||
+        (count += countInstructions(&op)) > most)
       return false;
   }
   return true;

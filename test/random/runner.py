@@ -16,7 +16,8 @@ EQUAL, BLANK = "equal", "equal, but blank"
 #: What piko-compare may leave out of synthesis.
 PASSES = ["pre-schedule", "infer-directives", "fuse-stages", "test-early", "prune",
           "own-pixels", "eliminate-schedules", "fuse-kernels", "form-tiles",
-          "prefetch", "vectorize", "prove-bounds", "hoist-bounds", "merge-bounds", "if-convert", "uplift-pixel-loops"]
+          "prefetch", "vectorize", "prove-bounds", "hoist-bounds", "merge-bounds",
+          "thread-jumps", "narrow-integers", "if-convert", "uplift-pixel-loops"]
 
 
 def options_of(passes):

@@ -427,6 +427,113 @@ def MergeBounds : Pass<"piko-merge-bounds", "::piko::PipelineOp"> {
     Statistic<"merged", "merged", "tests that others stand for">];
 }
 
+def ThreadJumps : Pass<"piko-thread-jumps", "::piko::PipelineOp"> {
+  let summary = "Put work behind the conditions that need it";
+  let description = [{
+    **Requires** loops over units (`convert-piko-to-scf`).
+
+    **Does**: short-circuit evaluation and jump threading, which undo what earlier
+    passes put in front of conditions to see through them. Of a conjunction, the
+    right half, or else the left one, if it takes work, moves behind the other,
+    with what else serves only the sides. A condition that is known on one side of an earlier one, and does
+    nothing there, moves into the other side. So lanes of which none passes the
+    first test do nothing else.
+
+    **Guarantees** the same results: what moves has no effects, or moves past
+    nothing that has.
+
+    Before:
+    ```
+    %isSeen = arith.cmpf ogt, %depth, %zero : f32
+    %both = arith.andi %isInside, %isSeen : i1
+    %key = scf.if %both -> (i32) {
+      %1 = arith.bitcast %depth : f32 to i32
+      scf.yield %1 : i32
+    } else {
+      scf.yield %c0 : i32
+    }
+    %any = arith.cmpi ne, %key, %c0 : i32
+    scf.if %any {
+      piko.atomic max @seen[%i : index] "key", %key : i32
+    }
+    ```
+    After, where the depth takes some work:
+    ```
+    scf.if %isInside {
+      %isSeen = arith.cmpf ogt, %depth, %zero : f32
+      scf.if %isSeen {
+        %1 = arith.bitcast %depth : f32 to i32
+        %any = arith.cmpi ne, %1, %c0 : i32
+        scf.if %any {
+          piko.atomic max @seen[%i : index] "key", %1 : i32
+        }
+      }
+    }
+    ```
+
+    **Limits**: conditions with results do not move behind others.
+  }];
+  let options = [
+    Option<"minWeight", "min-weight", "int64_t", /*default=*/"4",
+           "the least work, in instructions, that is worth a branch">];
+  let statistics = [
+    Statistic<"split", "split", "conjunctions of which one half is evaluated "
+              "only if the other holds">,
+    Statistic<"threaded", "threaded", "conditions that moved into a side of "
+              "another">];
+}
+
+def NarrowIntegers : Pass<"piko-narrow-integers", "::piko::PipelineOp"> {
+  let summary = "Take the signs of edge functions in 32 bits where they fit";
+  let description = [{
+    **Requires** loops over units (`convert-piko-to-scf`).
+
+    **Does**: exact narrowing. Where a loop over pixels that may become lanes
+    compares 64-bit affine functions of the pixel (as edge functions are), or
+    takes the sign of their bits, minima and maxima combined, a test in front of
+    the loop evaluates each function at the corners of the loop's domain, divided
+    by the power of two that all of its steps are multiples of, and rounded down,
+    which changes no sign. Where all fit into 32 bits, a second version of the
+    loop computes the signs there: twice as many lanes, and no multiplication of
+    64 bits.
+
+    **Guarantees** the same outcome of each comparison, also where 64 bits
+    overflow: such functions do not pass the test.
+
+    Before:
+    ```
+    scf.for %x = %lo to %hi step %one : i32 {
+      %1 = arith.extsi %x : i32 to i64
+      %2 = arith.muli %step, %1 : i64
+      %edge = arith.addi %first, %2 : i64
+      %isInside = arith.cmpi sge, %edge, %zero : i64
+      ...
+    } {piko.lanes}
+    ```
+    After, where `%step` is a multiple of 256:
+    ```
+    scf.if %fits {
+      %step32 = ...
+      %first32 = ...
+      scf.for %x = %lo to %hi step %one : i32 {
+        %1 = arith.muli %step32, %x : i32
+        %edge = arith.addi %first32, %1 : i32
+        %isInside = arith.cmpi sge, %edge, %zero : i32
+        ...
+      } {piko.lanes}
+    } else {
+      // as before
+    }
+    ```
+
+    **Limits**: loops with a step other than one, and comparisons of what is not
+    affine, stay as they are. What else an edge function is used for, as for
+    weights, is computed in 64 bits.
+  }];
+  let statistics = [
+    Statistic<"narrowed", "narrowed", "comparisons that have a form in 32 bits">];
+}
+
 def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
   let summary = "Run primitives, or iterations, as lanes of vectors";
   let description = [{
