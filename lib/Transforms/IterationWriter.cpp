@@ -86,12 +86,18 @@ Value IterationWriter::getFirst(Value value) {
 //===----------------------------------------------------------------------===//
 
 void IterationWriter::writeBlock(Block &block) {
-  for (Operation &op : block.without_terminator()) {
-    const OrderedGroup *group = lanes.findGroup(&op);
-    if (!group || group->first->getBlock() != &block)
-      writeOperation(&op);
-    else if (&op == group->first)
-      writeOrdered(*group);
+  Operation *end = block.getTerminator();
+  for (Operation *op = &block.front(); op != end; op = op->getNextNode()) {
+    const OrderedGroup *group = lanes.findGroup(op);
+    if (group && group->first->getBlock() == &block) {
+      if (op == group->first)
+        writeOrdered(*group);
+    } else if (SmallVector<LoadOp> fields = findFields(op); !fields.empty()) {
+      writeFields(fields);
+      op = fields.back();
+    } else {
+      writeOperation(op);
+    }
   }
 }
 
@@ -264,6 +270,28 @@ void IterationWriter::writeItemAccess(Operation *op) {
                                 active));
 }
 
+bool IterationWriter::isRowOf(ValueRange indices) const {
+  return !paired && !indices.empty() && lanes.isLinear(indices.front()) &&
+         llvm::none_of(indices.drop_front(),
+                       [&](Value index) { return lanes.isVarying(index); });
+}
+
+SmallVector<Value> IterationWriter::getPlaces(ValueRange indices) {
+  bool isRow = isRowOf(indices);
+  SmallVector<Value> at;
+  for (Value index : indices)
+    at.push_back(isRow ? getFirst(index) : getCarried(index));
+  for (Value &index : at)
+    if (Type type = getElementTypeOrSelf(index.getType()); !type.isIndex())
+      index = arith::IndexCastOp::create(
+          builder, loc,
+          isa<VectorType>(index.getType())
+              ? Type(getVectorType(builder.getIndexType()))
+              : builder.getIndexType(),
+          index);
+  return at;
+}
+
 void IterationWriter::writeAccess(Operation *op) {
   if (isa<memref::LoadOp, memref::StoreOp>(op))
     return writeArrayAccess(op);
@@ -271,22 +299,8 @@ void IterationWriter::writeAccess(Operation *op) {
     return writeItemAccess(op);
   auto write = [&](auto access, auto create) {
     ValueRange indices = access.getIndices();
-    bool isRow =
-        !paired && !indices.empty() && lanes.isLinear(indices.front()) &&
-        llvm::none_of(indices.drop_front(),
-                      [&](Value index) { return lanes.isVarying(index); });
-    SmallVector<Value> at, elements;
-    for (Value index : indices)
-      at.push_back(isRow ? getFirst(index) : getCarried(index));
-    // Of other integers, as the lanes' places are of type index.
-    for (Value &index : at)
-      if (Type type = getElementTypeOrSelf(index.getType()); !type.isIndex())
-        index = arith::IndexCastOp::create(
-            builder, loc,
-            isa<VectorType>(index.getType())
-                ? Type(getVectorType(builder.getIndexType()))
-                : builder.getIndexType(),
-            index);
+    bool isRow = isRowOf(indices);
+    SmallVector<Value> at = getPlaces(indices), elements;
     for (Value element : access.getElements())
       elements.push_back(getUniform(element));
     create(at, elements, isRow);

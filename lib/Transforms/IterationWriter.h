@@ -62,6 +62,14 @@ private:
   /// Whether the product is one that it has written.
   bool writeLinearProduct(mlir::arith::MulIOp product);
   void writeAccess(mlir::Operation *op);
+  /// Whether lanes access one element after the other.
+  bool isRowOf(mlir::ValueRange indices) const;
+  /// Where lanes access state, of type index: of a row, the first place.
+  llvm::SmallVector<mlir::Value> getPlaces(mlir::ValueRange indices);
+  /// Reads of fields of one element, of which this is the first one, that are
+  /// written together; or none.
+  llvm::SmallVector<LoadOp> findFields(mlir::Operation *first) const;
+  void writeFields(llvm::ArrayRef<LoadOp> loads);
   void writeArrayAccess(mlir::Operation *op);
   void writeItemAccess(mlir::Operation *op);
   /// The place of an index in the lanes' columns of an array.
