@@ -176,6 +176,25 @@ struct LaneItemsLowering : Lowering<LaneItemsOp> {
     return arith::ExtUIOp::create(builder, at.loc, words, numbers);
   }
 
+  /// Asks for primitives that lie behind those of the lanes: gathers of one
+  /// field after the other are not foreseen as a stream.
+  void prefetch(OpBuilder &builder, Location loc, Value items, Value position,
+                int64_t lanes, int64_t size) const {
+    constexpr int64_t vectorsAhead = 4, largest = 1024;
+    if (isa<VectorType>(position.getType()) || lanes * size > largest)
+      return;
+    CodeBuilder at(builder, loc);
+    Value first =
+        at.mul(toI64(builder, loc, position), createI64(builder, loc, size));
+    constexpr int64_t line = 64;
+    for (int64_t i = 0; i < lanes * size; i += line) {
+      Value offset = at.add(
+          first, createI64(builder, loc, vectorsAhead * lanes * size + i));
+      createPrefetch(builder, loc, createOffset(builder, loc, items, offset),
+                     1);
+    }
+  }
+
   LogicalResult
   matchAndRewrite(LaneItemsOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
@@ -189,6 +208,8 @@ struct LaneItemsLowering : Lowering<LaneItemsOp> {
     Value isOrdered = LLVM::ICmpOp::create(
         rewriter, loc, LLVM::ICmpPredicate::ne, order,
         LLVM::ZeroOp::create(rewriter, loc, pointer(rewriter)));
+    RecordOp record = context.record(op.getBins().getType().getRecord());
+    Value items = context.member(rewriter, bins, layout::items);
     auto numbers = scf::IfOp::create(
         rewriter, loc, isOrdered,
         [&](OpBuilder &builder, Location loc) {
@@ -197,13 +218,13 @@ struct LaneItemsLowering : Lowering<LaneItemsOp> {
                                          adaptor.getMask(), words));
         },
         [&](OpBuilder &builder, Location loc) {
+          prefetch(builder, loc, items, position, words.getNumElements(),
+                   record.getSize());
           scf::YieldOp::create(builder, loc,
                                countPositions({builder, loc}, position, words));
         });
-    RecordOp record = context.record(op.getBins().getType().getRecord());
-    Value items =
-        LLVM::PtrToIntOp::create(rewriter, loc, rewriter.getI64Type(),
-                                 context.member(rewriter, bins, layout::items));
+    items =
+        LLVM::PtrToIntOp::create(rewriter, loc, rewriter.getI64Type(), items);
     auto splat = [&](Value number) {
       return vector::BroadcastOp::create(rewriter, loc, words, number);
     };
