@@ -33,8 +33,12 @@ inline Point snap(glm::vec2 pixels) {
 
 /// Twice the area of a triangle: positive if its corners run clockwise on the
 /// screen (y points down).
+template <class Int> inline Int areaOf(Point a, Point b, Point c) {
+  return Int(b.x - a.x) * (c.y - a.y) - Int(b.y - a.y) * (c.x - a.x);
+}
+
 inline int64_t signedArea(Point a, Point b, Point c) {
-  return int64_t(b.x - a.x) * (c.y - a.y) - int64_t(b.y - a.y) * (c.x - a.x);
+  return areaOf<int64_t>(a, b, c);
 }
 
 /// The line through a and b as a function of the pixel: positive at the

@@ -33,13 +33,28 @@ namespace visibility {
 
 using namespace raster;
 
+// A vertex on the screen.
+struct Corner {
+  Point at;
+  float nearness;   // 0 at the far plane, 2 at the near one
+  uint32_t outside; // as of a ScreenVertex
+};
+
 // A triangle on the screen, its corners clockwise, and the pixels that it may
 // cover.
 struct ScreenTriangle {
   Point a, b, c;
-  glm::vec3 nearness; // of a, b and c: 0 at the far plane, 2 at the near one
+  glm::vec3 nearness; // of a, b and c
   int32_t index;
   glm::i16vec2 lo, hi;
+};
+
+// One of few pixels, its corners relative to pixel `lo`.
+struct SmallTriangle {
+  Point a, b, c;
+  glm::vec3 nearness;
+  int32_t index;
+  glm::ivec2 lo, last; // and the last pixel, from there
 };
 
 struct Visible {
@@ -52,7 +67,7 @@ struct State {
   piko::Buffer<Light> lights;
   piko::Buffer<Vertex> mesh;
   piko::Buffer<Triangle> triangles;
-  piko::Buffer<ScreenVertex> vertices; // one for each Vertex
+  piko::Buffer<Corner> vertices; // one for each Vertex
   piko::Image<Visible> visible;
   piko::Image<Color> color;
 };
@@ -67,8 +82,8 @@ inline glm::vec4 project(const Camera &camera, glm::vec3 position) {
 
 struct VertexShader : piko::Stage<0, 0, 64, Vertex>, piko::Uses<State> {
   void process(const Vertex &v) {
-    state().vertices[v.index] =
-        toScreen(project(state().camera, v.position), domain());
+    ScreenVertex s = toScreen(project(state().camera, v.position), domain());
+    state().vertices[v.index] = {s.at, 1 - s.depth, s.outside};
   }
 };
 
@@ -81,53 +96,63 @@ inline PixelBox boxOf(Point a, Point b, Point c, glm::ivec2 size) {
   return {glm::max(box.lo, 0), glm::min(box.hi, size - 1)};
 }
 
-// The corners in clockwise order; `area` is that of a, b, c as they are given.
-inline ScreenTriangle clockwise(Point a, Point b, Point c, glm::vec3 nearness,
-                                int64_t area, const PixelBox &box,
-                                int32_t index) {
-  if (area < 0) {
-    std::swap(b, c);
-    std::swap(nearness.y, nearness.z);
-  }
-  return {a, b, c, nearness, index, glm::i16vec2(box.lo), glm::i16vec2(box.hi)};
-}
-
-// Small triangles have at most this many pixels in a row or a column.
-constexpr int smallSide = 8;
-
 // Finds the triangles that may cover pixels: small ones go to port 0, others to
 // port 1, and those that must be clipped to port 2.
 struct Setup
-    : piko::Stage<0, 0, 64, Triangle, ScreenTriangle, ScreenTriangle, Triangle>,
+    : piko::Stage<0, 0, 64, Triangle, SmallTriangle, ScreenTriangle, Triangle>,
       piko::Uses<State> {
   void schedule(piko::BinId) { endStage<VertexShader>(); }
 
   void process(const Triangle &t) {
-    const ScreenVertex &a = state().vertices[t.vertex.x];
-    const ScreenVertex &b = state().vertices[t.vertex.y];
-    const ScreenVertex &c = state().vertices[t.vertex.z];
-    if (isGone(a, b, c))
+    const Corner &a = state().vertices[t.vertex.x];
+    const Corner &b = state().vertices[t.vertex.y];
+    const Corner &c = state().vertices[t.vertex.z];
+    uint32_t outside = a.outside | b.outside | c.outside;
+    if ((a.outside & b.outside & c.outside & outsideView) ||
+        (outside & outsideRange))
       return;
-    if (needsClipping(a, b, c))
+    if (outside & outsideGuard)
       return emit(t, 2);
-    int64_t area = signedArea(a.at, b.at, c.at);
-    if (area == 0 || (state().settings.cullBackFaces != 0 && area > 0))
-      return;
     PixelBox box = boxOf(a.at, b.at, c.at, domain());
     if (box.isEmpty())
       return;
-    ScreenTriangle s =
-        clockwise(a.at, b.at, c.at, {1 - a.depth, 1 - b.depth, 1 - c.depth},
-                  area, box, t.index);
+    glm::vec3 nearness(a.nearness, b.nearness, c.nearness);
     auto place = [&](Point p) -> Point {
       return {p.x - box.lo.x * subpixels, p.y - box.lo.y * subpixels};
     };
-    glm::ivec2 size = box.hi - box.lo;
-    if (size.x < smallSide && size.y < smallSide && isNear(place(a.at)) &&
-        isNear(place(b.at)) && isNear(place(c.at)))
-      emit(s, 0);
-    else
-      emit(s, 1);
+    Point first = place(a.at), second = place(b.at), third = place(c.at);
+    glm::ivec2 last = box.hi - box.lo;
+    if (last.x < smallSide && last.y < smallSide && isNear(first) &&
+        isNear(second) && isNear(third)) {
+      if (turnClockwise<int32_t>(first, second, third, nearness))
+        emit(SmallTriangle{first, second, third, nearness, t.index, box.lo,
+                           last},
+             0);
+      return;
+    }
+    Point q = b.at, r = c.at;
+    if (turnClockwise<int64_t>(a.at, q, r, nearness))
+      emit(ScreenTriangle{a.at, q, r, nearness, t.index, glm::i16vec2(box.lo),
+                          glm::i16vec2(box.hi)},
+           1);
+  }
+
+private:
+  // Small triangles have at most this many pixels in a row or a column.
+  static constexpr int smallSide = 8;
+
+  // Exchanges b and c if a, b, c run counterclockwise; false if nothing can be
+  // seen of the triangle.
+  template <class Int>
+  bool turnClockwise(Point a, Point &b, Point &c, glm::vec3 &nearness) {
+    Int area = areaOf<Int>(a, b, c);
+    if (area == 0 || (state().settings.cullBackFaces != 0 && area > 0))
+      return false;
+    if (area < 0) {
+      std::swap(b, c);
+      std::swap(nearness.y, nearness.z);
+    }
+    return true;
   }
 };
 
@@ -161,11 +186,16 @@ struct Clipper : piko::Stage<0, 0, 64, Triangle, ScreenTriangle>,
     for (int i = 1; i + 1 < count; ++i) {
       Point a = points[0], b = points[i], c = points[i + 1];
       int64_t part = signedArea(a, b, c);
+      glm::vec3 near(nearness[0], nearness[i], nearness[i + 1]);
       PixelBox box = boxOf(a, b, c, domain());
+      if (area < 0) {
+        std::swap(b, c);
+        std::swap(near.y, near.z);
+      }
       // One of the other sign is a fold of less than 1/256 pixel.
       if (part != 0 && (part < 0) == (area < 0) && !box.isEmpty())
-        emit(clockwise(a, b, c, {nearness[0], nearness[i], nearness[i + 1]},
-                       part, box, t.index),
+        emit(ScreenTriangle{a, b, c, near, t.index, glm::i16vec2(box.lo),
+                            glm::i16vec2(box.hi)},
              0);
     }
   }
@@ -184,14 +214,14 @@ inline uint64_t keyOf(float nearness, int32_t index) {
 }
 
 // What there is to see of a triangle: its key at a pixel that it covers, or 0.
-template <class Edges> struct Seen {
-  Edges edges;
+template <class Int> struct Seen {
+  BasicEdges<Int> edges;
   float first, toB, toC;
   int32_t index;
 
-  Seen(Point a, Point b, Point c, const ScreenTriangle &t)
-      : edges(a, b, c), first(t.nearness.x), index(t.index) {
-    float scale = 1.0f / float(signedArea(a, b, c));
+  template <class T>
+  Seen(const T &t) : edges(t.a, t.b, t.c), first(t.nearness.x), index(t.index) {
+    float scale = 1.0f / float(areaOf<Int>(t.a, t.b, t.c));
     toB = (t.nearness.y - first) * scale;
     toC = (t.nearness.z - first) * scale;
   }
@@ -206,16 +236,11 @@ template <class Edges> struct Seen {
   }
 };
 
-struct SmallCoverage : piko::Stage<0, 0, 64, ScreenTriangle>,
-                       piko::Uses<State> {
-  void process(const ScreenTriangle &t) {
-    // Relative to the box, which makes small numbers of all.
-    auto place = [&](Point p) -> Point {
-      return {p.x - t.lo.x * subpixels, p.y - t.lo.y * subpixels};
-    };
-    Seen<NearEdges> seen(place(t.a), place(t.b), place(t.c), t);
-    for (int y = 0; y <= t.hi.y - t.lo.y; ++y)
-      for (int x = 0; x <= t.hi.x - t.lo.x; ++x)
+struct SmallCoverage : piko::Stage<0, 0, 64, SmallTriangle>, piko::Uses<State> {
+  void process(const SmallTriangle &t) {
+    Seen<int32_t> seen(t);
+    for (int y = 0; y <= t.last.y; ++y)
+      for (int x = 0; x <= t.last.x; ++x)
         if (uint64_t key = seen.at(x, y))
           piko::atomicMax(state().visible({t.lo.x + x, t.lo.y + y}).key, key);
   }
@@ -233,7 +258,7 @@ struct Coverage : piko::Stage<Bin, Bin, 64, ScreenTriangle>, piko::Uses<State> {
   }
 
   void process(const ScreenTriangle &t) {
-    Seen<Edges> seen(t.a, t.b, t.c, t);
+    Seen<int64_t> seen(t);
     this->parallelForPixels(
         glm::ivec2(t.lo), glm::ivec2(t.hi), [&](glm::ivec2 p) {
           if (uint64_t key = seen.at(p.x, p.y))
