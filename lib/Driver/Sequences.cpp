@@ -123,6 +123,10 @@ static void addUnitsToCPU(OpPassManager &passes,
     passes.nest<PipelineOp>().addPass(createVectorize());
     addCleanUp(passes);
   }
+  if (options.has("merge-gathers")) {
+    passes.nest<PipelineOp>().addPass(createMergeGathers());
+    addCleanUp(passes);
+  }
   passes.nest<PipelineOp>().addPass(createConvertPikoToOpenMP());
   passes.addPass(createConvertPikoToLLVM());
   addCleanUp(passes);

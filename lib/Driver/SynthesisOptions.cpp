@@ -30,6 +30,7 @@ const std::vector<std::string> &SynthesisOptions::getOptional() {
                                                  "merge-bounds",
                                                  "thread-jumps",
                                                  "narrow-integers",
+                                                 "merge-gathers",
                                                  "if-convert",
                                                  "uplift-pixel-loops"};
   return names;

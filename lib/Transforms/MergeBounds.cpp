@@ -22,7 +22,7 @@ namespace {
 
 struct MergeBoundsPass : piko::impl::MergeBoundsBase<MergeBoundsPass> {
   void runOnOperation() override;
-  void merge(Block &block, const llvm::DenseSet<StringAttr> &written);
+  void merge(KernelOp kernel);
   void merge(ArrayRef<scf::IfOp> tests);
 };
 
@@ -48,6 +48,15 @@ static LoadOp getGuarded(scf::IfOp test) {
                  (!other || !test->isProperAncestor(other))
              ? load
              : LoadOp();
+}
+
+/// Whether a field shares its cache line with the rest of its record, so that
+/// it costs little to read it along.
+static bool isShort(LoadOp load) {
+  constexpr int64_t lineSize = 64;
+  Operation *state = lookupInPipeline<Operation *>(load, load.getStateAttr());
+  RecordOp record = lookupRecord(state, getStateRecord(state));
+  return record && record.getSize() <= lineSize;
 }
 
 void MergeBoundsPass::merge(ArrayRef<scf::IfOp> tests) {
@@ -79,37 +88,41 @@ void MergeBoundsPass::merge(ArrayRef<scf::IfOp> tests) {
   merged += tests.size() - 1;
 }
 
-void MergeBoundsPass::merge(Block &block,
-                            const llvm::DenseSet<StringAttr> &written) {
+void MergeBoundsPass::merge(KernelOp kernel) {
+  llvm::DenseSet<StringAttr> written = getWrittenState(kernel);
   using Element = std::pair<Value, Attribute>;
-  llvm::MapVector<Element, SmallVector<scf::IfOp>> elements;
+  llvm::MapVector<Element, SmallVector<SmallVector<scf::IfOp>>> elements;
   DominanceInfo dominance;
-  for (auto test : block.getOps<scf::IfOp>()) {
+  kernel.walk<WalkOrder::PreOrder>([&](scf::IfOp test) {
     LoadOp load = getGuarded(test);
     if (!load || written.contains(load.getStateAttr().getAttr()))
-      continue;
-    SmallVector<scf::IfOp> &tests =
-        elements[{test.getCondition(), load.getStateAttr()}];
-    auto isKnown = [&](Value value) {
-      return dominance.properlyDominates(value, tests.front());
+      return;
+    auto &groups = elements[{test.getCondition(), load.getStateAttr()}];
+    auto isKnown = [&](Value value, scf::IfOp first) {
+      return dominance.properlyDominates(value, first);
     };
-    bool isSame =
-        tests.empty() || (llvm::all_of(load->getOperands(), isKnown) &&
-                          isKnown(test.elseYield().getOperand(0)));
-    if (isSame)
-      tests.push_back(test);
-  }
-  for (auto &[element, tests] : elements)
-    if (tests.size() > 1)
-      merge(tests);
+    for (SmallVector<scf::IfOp> &tests : groups) {
+      scf::IfOp first = tests.front();
+      bool isBehind =
+          first->getBlock() == test->getBlock() ||
+          (isShort(load) && first->getBlock()->findAncestorOpInBlock(*test));
+      if (isBehind &&
+          llvm::all_of(load->getOperands(),
+                       [&](Value value) { return isKnown(value, first); }) &&
+          isKnown(test.elseYield().getOperand(0), first)) {
+        tests.push_back(test);
+        return;
+      }
+    }
+    groups.push_back({test});
+  });
+  for (auto &[element, groups] : elements)
+    for (SmallVector<scf::IfOp> &tests : groups)
+      if (tests.size() > 1)
+        merge(tests);
 }
 
 void MergeBoundsPass::runOnOperation() {
-  for (auto kernel : getOperation().getOps<KernelOp>()) {
-    llvm::DenseSet<StringAttr> written = getWrittenState(kernel);
-    SmallVector<Block *> blocks;
-    kernel.walk([&](Block *block) { blocks.push_back(block); });
-    for (Block *block : blocks)
-      merge(*block, written);
-  }
+  for (auto kernel : getOperation().getOps<KernelOp>())
+    merge(kernel);
 }

@@ -35,7 +35,8 @@ STRIPS = [None, 100]
 PASSES = ["pre-schedule", "infer-directives", "fuse-stages", "test-early", "prune",
           "own-pixels", "eliminate-schedules", "fuse-kernels", "form-strips",
           "form-tiles", "prefetch", "vectorize", "prove-bounds", "hoist-bounds",
-          "merge-bounds", "thread-jumps", "narrow-integers", "if-convert"]
+          "merge-bounds", "thread-jumps", "narrow-integers", "merge-gathers",
+          "if-convert"]
 
 SIZE = ["--width", "131", "--height", "99", "--lights", "3"]
 

@@ -389,10 +389,11 @@ def MergeBounds : Pass<"piko-merge-bounds", "::piko::PipelineOp"> {
   let description = [{
     **Requires** access to state that is tested (`convert-piko-to-scf`).
 
-    **Does**: of the tests in a block that have the same outcome, each of which
-    guards a read of the same buffer or image, the first one guards all of the
-    reads. So there is one branch for an element, and its address is computed
-    once, also where lanes read elements in different places.
+    **Does**: of the tests that have the same outcome, each of which guards a read
+    of the same buffer or image, the first one guards all of the reads. So there is
+    one branch for an element, and its address is computed once, also where lanes
+    read elements in different places. What is read behind a condition is read
+    along, if the record is not larger than a line of the cache.
 
     **Guarantees** the same reads of state that the kernel does not change, at
     the place of the first; and the same errors, whose text names the index but no
@@ -420,8 +421,7 @@ def MergeBounds : Pass<"piko-merge-bounds", "::piko::PipelineOp"> {
     %square = arith.mulf %xy#0, %xy#0 : f32
     ```
 
-    **Limits**: reads in other blocks, as inside of a condition, and of state that
-    the kernel changes, keep their tests.
+    **Limits**: reads of state that the kernel changes keep their tests.
   }];
   let statistics = [
     Statistic<"merged", "merged", "tests that others stand for">];
@@ -613,4 +613,40 @@ def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
   ];
 }
 
+
+def MergeGathers : Pass<"piko-merge-gathers", "::piko::PipelineOp"> {
+  let summary = "Read fields of a record for all lanes at once";
+  let description = [{
+    **Requires** lanes (`piko-vectorize`).
+
+    **Does**: of gathers in a block that read words of the same elements, or of the
+    same primitives, makes one operation, if there are three or more. It loads
+    pieces of 16 bytes, one for each lane, and transposes them, which takes far
+    fewer instructions than a gather for each field. Fields of primitives that
+    are read behind conditions, for some of the lanes, are read with the first.
+
+    **Guarantees** the same reads, of state that the kernel does not change.
+
+    Before:
+    ```
+    %x = piko.cpu.gather @mesh[%is : vector<16xindex>] "x" mask %m
+      : vector<16xi1>, vector<16xf32>
+    %y = piko.cpu.gather @mesh[%is : vector<16xindex>] "y" mask %m
+      : vector<16xi1>, vector<16xf32>
+    %z = piko.cpu.gather @mesh[%is : vector<16xindex>] "z" mask %m
+      : vector<16xi1>, vector<16xf32>
+    ```
+    After:
+    ```
+    %as = piko.cpu.elements @mesh[%is : vector<16xindex>] : vector<16xindex>
+    %x, %y, %z = piko.cpu.get_fields %as ["x", "y", "z"] of @Vertex mask %m
+      : vector<16xindex>, vector<16xi1>
+        -> vector<16xf32>, vector<16xf32>, vector<16xf32>
+    ```
+
+    **Limits**: fields of 32 bits that are no arrays. Where not all lanes read,
+    gathers do.
+  }];
+  let statistics = [Statistic<"merged", "merged", "gathers">];
+}
 #endif // PIKO_TRANSFORMS_MACHINEPASSES_TD

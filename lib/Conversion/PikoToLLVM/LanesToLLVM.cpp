@@ -21,6 +21,39 @@ struct LaneAddresses {
   Value first, each;
 };
 
+/// How far elements are from the first one, in bytes: a vector if indices are,
+/// null if there are none.
+Value computeOffset(OpBuilder &builder, Location loc, StateView &view,
+                    ValueRange indices, int64_t size, int64_t lanes) {
+  auto words = VectorType::get({lanes}, builder.getI64Type());
+  auto isVector = [](Value index) { return isa<VectorType>(index.getType()); };
+  auto widen = [&](Value number) {
+    return vector::BroadcastOp::create(builder, loc, words, number).getResult();
+  };
+  // What is the same for all lanes stays scalar.
+  Value offset;
+  auto combine = [&](auto tag, Value a, Value b) -> Value {
+    using Op = decltype(tag);
+    if (isVector(a) != isVector(b))
+      (isVector(a) ? b : a) = widen(isVector(a) ? b : a);
+    return Op::create(builder, loc, a, b);
+  };
+  for (int64_t dim = indices.size() - 1; dim >= 0; --dim) {
+    Value index = indices[dim];
+    index = arith::IndexCastOp::create(
+        builder, loc,
+        isVector(index) ? Type(words) : Type(builder.getI64Type()), index);
+    offset = offset
+                 ? combine(arith::AddIOp(),
+                           combine(arith::MulIOp(), offset, view.extents[dim]),
+                           index)
+                 : index;
+  }
+  return offset
+             ? combine(arith::MulIOp(), offset, createI64(builder, loc, size))
+             : offset;
+}
+
 template <typename OpT> struct LaneLowering : ContextPattern<OpT> {
   using ContextPattern<OpT>::ContextPattern;
   using ContextPattern<OpT>::context;
@@ -33,37 +66,10 @@ protected:
     RecordOp record =
         context.record(getStateRecord(context.state(op, op.getState())));
     FieldAttr field = record.getField(op.getField());
-    auto isVector = [](Value index) {
-      return isa<VectorType>(index.getType());
-    };
-    bool isEach = llvm::any_of(adaptor.getIndices(), isVector);
+    Value offset = computeOffset(builder, loc, view, adaptor.getIndices(),
+                                 record.getSize(), lanes.getNumElements());
+    bool isEach = offset && isa<VectorType>(offset.getType());
     auto words = VectorType::get(lanes.getShape(), builder.getI64Type());
-    auto widen = [&](Value number) {
-      return vector::BroadcastOp::create(builder, loc, words, number)
-          .getResult();
-    };
-    // What is the same for all lanes stays scalar.
-    Value offset;
-    auto combine = [&](auto tag, Value a, Value b) -> Value {
-      using Op = decltype(tag);
-      if (isVector(a) != isVector(b))
-        (isVector(a) ? b : a) = widen(isVector(a) ? b : a);
-      return Op::create(builder, loc, a, b);
-    };
-    for (int64_t dim = adaptor.getIndices().size() - 1; dim >= 0; --dim) {
-      Value index = adaptor.getIndices()[dim];
-      index = arith::IndexCastOp::create(
-          builder, loc,
-          isVector(index) ? Type(words) : Type(builder.getI64Type()), index);
-      offset =
-          offset ? combine(arith::AddIOp(),
-                           combine(arith::MulIOp(), offset, view.extents[dim]),
-                           index)
-                 : index;
-    }
-    if (offset)
-      offset = combine(arith::MulIOp(), offset,
-                       createI64(builder, loc, record.getSize()));
     Value base = createFieldAddress(builder, loc, view.data, field,
                                     adaptor.getElements());
     Type pointers =
@@ -264,12 +270,39 @@ struct LaneGetLowering : Lowering<LaneGetOp> {
   }
 };
 
+struct LaneElementsLowering : Lowering<LaneElementsOp> {
+  using Lowering::Lowering;
+  LogicalResult
+  matchAndRewrite(LaneElementsOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    Location loc = op.getLoc();
+    StateView &view = context.view(rewriter, op, op.getState());
+    RecordOp record =
+        context.record(getStateRecord(context.state(op, op.getState())));
+    auto type = cast<VectorType>(op.getAddresses().getType());
+    auto words = VectorType::get(type.getShape(), rewriter.getI64Type());
+    auto widen = [&](Value number) -> Value {
+      return isa<VectorType>(number.getType())
+                 ? number
+                 : vector::BroadcastOp::create(rewriter, loc, words, number)
+                       .getResult();
+    };
+    Value offset = computeOffset(rewriter, loc, view, adaptor.getIndices(),
+                                 record.getSize(), type.getNumElements());
+    Value first = LLVM::PtrToIntOp::create(rewriter, loc, rewriter.getI64Type(),
+                                           view.data);
+    rewriter.replaceOpWithNewOp<arith::IndexCastOp>(
+        op, type, CodeBuilder(rewriter, loc).add(widen(offset), widen(first)));
+    return success();
+  }
+};
+
 } // namespace
 
 void piko::populateLanesToLLVMPatterns(const TypeConverter &converter,
                                        RewritePatternSet &patterns,
                                        LoweringContext &context) {
-  patterns
-      .add<GatherLowering, LaneGetLowering, LaneItemsLowering, ScatterLowering>(
-          converter, patterns.getContext(), context);
+  patterns.add<GatherLowering, LaneElementsLowering, LaneGetLowering,
+               LaneItemsLowering, ScatterLowering>(
+      converter, patterns.getContext(), context);
 }

@@ -166,6 +166,9 @@ void populateWriterToLLVMPatterns(const mlir::TypeConverter &converter,
 void populateStateToLLVMPatterns(const mlir::TypeConverter &converter,
                                  mlir::RewritePatternSet &patterns,
                                  LoweringContext &context);
+void populateRecordsToLLVMPatterns(const mlir::TypeConverter &converter,
+                                   mlir::RewritePatternSet &patterns,
+                                   LoweringContext &context);
 void populateLanesToLLVMPatterns(const mlir::TypeConverter &converter,
                                  mlir::RewritePatternSet &patterns,
                                  LoweringContext &context);

@@ -76,6 +76,23 @@ LogicalResult LaneGetOp::verifySymbolUses(SymbolTableCollection &) {
   return verifyElement(*this, getRecordAttr(), getField(), getElements());
 }
 
+LogicalResult LaneGetFieldsOp::verifySymbolUses(SymbolTableCollection &) {
+  Type mask = getMask().getType();
+  if (failed(
+          verifyLaneCount(*this, mask, getAddresses().getType(), "an address")))
+    return failure();
+  if (getFields().size() != getNumResults())
+    return emitOpError("expected a result for each of ")
+           << getFields().size() << " fields, but got " << getNumResults();
+  for (auto [field, result] : llvm::zip(getFields(), getResultTypes()))
+    if (failed(verifyLaneCount(*this, mask, result, "a number")) ||
+        failed(verifyFieldAccess(*this, getRecordAttr(),
+                                 cast<StringAttr>(field).getValue(), 0,
+                                 cast<VectorType>(result).getElementType())))
+      return failure();
+  return success();
+}
+
 LogicalResult OpenWriterOp::verifySymbolUses(SymbolTableCollection &) {
   return getStageAttr() ? verifyStage(*this, getStageAttr()) : success();
 }

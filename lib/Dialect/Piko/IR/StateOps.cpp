@@ -196,6 +196,20 @@ LogicalResult ScatterOp::verifySymbolUses(SymbolTableCollection &) {
   return verifyLanes(*this, cast<VectorType>(getValue().getType()));
 }
 
+LogicalResult LaneElementsOp::verifySymbolUses(SymbolTableCollection &) {
+  auto lanes = cast<VectorType>(getAddresses().getType());
+  for (Value index : getIndices())
+    if (auto vector = dyn_cast<VectorType>(index.getType());
+        vector && vector.getNumElements() != lanes.getNumElements())
+      return emitOpError("expected an index for each of ")
+             << lanes.getNumElements() << " lanes, but got " << vector;
+  return failure(
+      failed(verifyState(*this, getStateAttr(), getIndices().size())));
+}
+
+FlatSymbolRefAttr LaneElementsOp::getAccessedState() { return getStateAttr(); }
+int LaneElementsOp::getAccessKinds() { return StateAccess::reads; }
+
 FlatSymbolRefAttr GatherOp::getAccessedState() { return getStateAttr(); }
 int GatherOp::getAccessKinds() { return StateAccess::reads; }
 

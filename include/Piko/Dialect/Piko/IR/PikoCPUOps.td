@@ -629,4 +629,50 @@ def Piko_LaneGetOp : Piko_CPUOp<"get", [
   }];
 }
 
+def Piko_LaneElementsOp : Piko_CPUOp<"elements", [
+    MemoryEffects<[]>,
+    DeclareOpInterfaceMethods<Piko_StateAccessInterface>,
+    DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
+  let summary = "the addresses of elements of a piece of state";
+  let description = [{
+    An index is that of all lanes, or a vector with one for each. Those of lanes
+    whose indices are outside of the state are no addresses.
+
+    ```mlir
+    %as = piko.cpu.elements @vertices[%places : vector<16xindex>]
+      : vector<16xindex>
+    ```
+  }];
+  let arguments = (ins FlatSymbolRefAttr:$state,
+                       Variadic<Piko_LaneIndex>:$indices);
+  let results = (outs Piko_Addresses:$addresses);
+  let assemblyFormat = [{
+    $state `[` $indices `:` type($indices) `]` attr-dict `:` type($addresses)
+  }];
+}
+
+def Piko_LaneGetFieldsOp : Piko_CPUOp<"get_fields", [
+    MemoryEffects<[MemRead]>,
+    DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
+  let summary = "reads fields of a record for each lane";
+  let description = [{
+    As `piko.cpu.get` for each field, none of which is an array. What lies side by
+    side is read at once where all lanes read: by loads of 16 bytes, and a
+    transposition.
+
+    ```mlir
+    %x, %y, %z = piko.cpu.get_fields %as ["x", "y", "z"] of @Fragment mask %mask
+      : vector<16xindex>, vector<16xi1>
+        -> vector<16xi32>, vector<16xi32>, vector<16xf32>
+    ```
+  }];
+  let arguments = (ins Piko_Addresses:$addresses, StrArrayAttr:$fields,
+                       FlatSymbolRefAttr:$record, Piko_LaneMask:$mask);
+  let results = (outs Variadic<Piko_Lanes>:$values);
+  let assemblyFormat = [{
+    $addresses $fields `of` $record `mask` $mask attr-dict
+    `:` type($addresses) `,` type($mask) `->` type($values)
+  }];
+}
+
 #endif // PIKO_DIALECT_PIKO_IR_PIKOCPUOPS_TD
