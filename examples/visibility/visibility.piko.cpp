@@ -69,7 +69,7 @@ struct State {
   piko::Buffer<Triangle> triangles;
   piko::Buffer<Corner> vertices; // one for each Vertex
   piko::Image<Visible> visible;
-  piko::Image<Color> color;
+  piko::Image<Color8> color;
 };
 
 inline glm::vec4 project(const Camera &camera, glm::vec3 position) {
@@ -288,7 +288,7 @@ struct Shade : piko::Stage<Bin, Bin, 64, Nothing>, piko::Uses<State> {
         return;
       glm::vec3 color = shade(p, int32_t(~uint32_t(key)));
       this->update(this->state().color, p,
-                   [&](Color &c) { c.rgba = glm::vec4(color, 1); });
+                   [&](Color8 &c) { c = toColor8(glm::vec4(color, 1)); });
     });
   }
 

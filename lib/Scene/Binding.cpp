@@ -37,8 +37,8 @@ public:
       if (auto ok = setConstant(name, value); !ok)
         return ok.error();
     if (output.empty())
-      return fail("expected an image of 'piko::scene::Color' for the result, "
-                  "but it has none");
+      return fail("expected an image of 'piko::scene::Color' or "
+                  "'piko::scene::Color8' for the result, but it has none");
     return output;
   }
 
@@ -210,11 +210,11 @@ private:
 
   Result<Done> noteImage(const pikort_state_info &state,
                          const pikort_record_info &record) {
-    if (std::strcmp(record.name, "piko::scene::Color") != 0)
+    if (std::strcmp(record.name, "piko::scene::Color") != 0 &&
+        std::strcmp(record.name, "piko::scene::Color8") != 0)
       return Done{};
     if (!output.empty())
-      return fail("expected one image of 'piko::scene::Color' for the result, "
-                  "but got '" +
+      return fail("expected one image of colours for the result, but got '" +
                   output + "' and '" + state.name + "'");
     if (state.rank != 2)
       return fail("image '" + std::string(state.name) +

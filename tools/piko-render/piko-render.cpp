@@ -96,18 +96,30 @@ Result<FrameTimes> timeFrames(const Options &options,
                     spent / double(times.size()), int(times.size())};
 }
 
-Result<std::span<const scene::Color>> readImage(pikort_pipeline *pipeline,
-                                                const std::string &name) {
+/// The result, of whichever kind of colours it is.
+Result<std::vector<scene::Color>> readImage(pikort_pipeline *pipeline,
+                                            const std::string &name) {
   pikort_view view;
   if (pikort_get_view(pipeline, name.c_str(), &view) != PIKORT_OK)
     return errorOf(pipeline);
-  if (view.record_size != sizeof(scene::Color))
+  size_t count = size_t(view.extent[0] * view.extent[1]);
+  std::vector<scene::Color> pixels(count);
+  if (view.record_size == sizeof(scene::Color)) {
+    std::copy_n(static_cast<const scene::Color *>(view.data), count,
+                pixels.begin());
+    return pixels;
+  }
+  if (view.record_size != sizeof(scene::Color8))
     return Error{"image '" + name + "': expected pixels of " +
-                 std::to_string(sizeof(scene::Color)) + " bytes, but got " +
+                 std::to_string(sizeof(scene::Color)) + " or " +
+                 std::to_string(sizeof(scene::Color8)) + " bytes, but got " +
                  std::to_string(view.record_size)};
-  return std::span<const scene::Color>(
-      static_cast<const scene::Color *>(view.data),
-      size_t(view.extent[0] * view.extent[1]));
+  auto *bytes = static_cast<const scene::Color8 *>(view.data);
+  for (size_t i = 0; i < count; ++i)
+    for (int channel = 0; channel < 4; ++channel)
+      pixels[i].rgba[channel] =
+          float(bytes[i].rgba >> (8 * channel) & 255) / 255.0f;
+  return pixels;
 }
 
 int64_t countDrawn(std::span<const scene::Color> pixels) {
