@@ -11,6 +11,7 @@
 #include "mlir/Dialect/SCF/IR/SCF.h"
 #include "mlir/IR/IRMapping.h"
 #include "mlir/IR/Matchers.h"
+#include "mlir/Transforms/LoopInvariantCodeMotionUtils.h"
 
 namespace piko {
 #define GEN_PASS_DEF_NARROWINTEGERS
@@ -129,6 +130,14 @@ static Value getIncrement(BlockArgument argument, scf::ForOp loop) {
   return add.getLhs() == argument ? add.getRhs() : add.getLhs();
 }
 
+/// Whether an operation is -1 - x.
+static bool isComplement(Operation *op) {
+  APInt bits;
+  return isa<arith::XOrIOp>(op) &&
+         matchPattern(op->getOperand(1), m_ConstantInt(&bits)) &&
+         bits.isAllOnes();
+}
+
 bool Nest::isAffine(Value value) const {
   if (isInvariant(value))
     return value.getType().isInteger(64);
@@ -155,6 +164,8 @@ bool Nest::isAffine(Value value) const {
     return false;
   if (isa<arith::AddIOp, arith::SubIOp>(op))
     return isAffine(op->getOperand(0)) && isAffine(op->getOperand(1));
+  if (isComplement(op))
+    return isAffine(op->getOperand(0));
   if (isa<arith::MulIOp>(op))
     return (isAffine(op->getOperand(0)) && isInvariant(op->getOperand(1))) ||
            (isAffine(op->getOperand(1)) && isInvariant(op->getOperand(0)));
@@ -259,6 +270,14 @@ Affine Nest::expand(Value value) {
     a.base = getTwo(isSum, a.base, b.base);
     for (auto [x, y] : llvm::zip(a.coefficients, b.coefficients))
       x = getTwo(isSum, x, y);
+    return a;
+  }
+  if (isComplement(op)) {
+    Affine a = expand(op->getOperand(0));
+    Value ones = arith::ConstantIntOp::create(builder, loc, -1, 64);
+    a.base = getTwo(false, ones, a.base);
+    for (Value &x : a.coefficients)
+      x = getTwo(false, Value(), x);
     return a;
   }
   bool isFirst = isa<arith::ShLIOp>(op) || isInvariant(op->getOperand(1));
@@ -520,6 +539,11 @@ void NarrowIntegersPass::runOnOperation() {
     if (loop->hasAttr(marks::lanes) && !loop->hasAttr(marks::mapping))
       rows.push_back(loop);
   });
-  for (scf::ForOp row : rows)
+  for (scf::ForOp row : rows) {
+    // So that what is the same for all pixels stands in front.
+    moveLoopInvariantCode(cast<LoopLikeOpInterface>(row.getOperation()));
+    if (auto parent = dyn_cast<LoopLikeOpInterface>(row->getParentOp()))
+      moveLoopInvariantCode(parent);
     narrowed += Nest(row).narrow();
+  }
 }

@@ -62,7 +62,10 @@ static Conjunction collectWork(scf::IfOp choice, Value first, Value second) {
   llvm::DenseSet<Operation *> known{both, choice};
   auto isNeeded = [&](Operation *user) {
     Operation *here = choice->getBlock()->findAncestorOpInBlock(*user);
-    return here && known.contains(here) && (here != both || user == both);
+    // What the other side yields is needed where the first half fails.
+    return here && known.contains(here) &&
+           (here != choice ||
+            choice.getThenRegion().isAncestor(user->getParentRegion()));
   };
   for (Operation *op = choice->getPrevNode(); op; op = op->getPrevNode()) {
     bool isFirst = llvm::is_contained(op->getResults(), first);

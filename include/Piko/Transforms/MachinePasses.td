@@ -454,7 +454,7 @@ def ThreadJumps : Pass<"piko-thread-jumps", "::piko::PipelineOp"> {
     }
     %any = arith.cmpi ne, %key, %c0 : i32
     scf.if %any {
-      piko.atomic max @seen[%i : index] "key", %key : i32
+      piko.atomic max_signed @seen[%i : index] "key", %key : i32
     }
     ```
     After, where the depth takes some work:
@@ -465,7 +465,7 @@ def ThreadJumps : Pass<"piko-thread-jumps", "::piko::PipelineOp"> {
         %1 = arith.bitcast %depth : f32 to i32
         %any = arith.cmpi ne, %1, %c0 : i32
         scf.if %any {
-          piko.atomic max @seen[%i : index] "key", %1 : i32
+          piko.atomic max_signed @seen[%i : index] "key", %1 : i32
         }
       }
     }
