@@ -47,6 +47,8 @@ def parse_arguments():
                         help="of frames, for each build in each round")
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--march", help="of the references, as x86-64-v3")
+    parser.add_argument("--cpu", default="x86-64-v3",
+                        help="what pikoc compiles for (%(default)s)")
     arguments = parser.parse_args()
     arguments.flags = [f"-march={arguments.march}"] if arguments.march else []
     return arguments
@@ -92,7 +94,7 @@ def build_compiled(arguments, body):
     for build, options in COMPILED.items():
         program = get_program(arguments, body, build)
         call([f"{arguments.bin}/pikoc", source, "-o", f"{program}.o",
-              "--header", header, *options])
+              "--header", header, "--cpu", arguments.cpu, *options])
         if read(header) != before or not is_newer(host, source):
             call(["g++", *CXX, f'-DPIKO_BODY_HEADER="{header}"', "-c", source,
                   "-o", host])
