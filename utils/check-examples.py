@@ -43,6 +43,7 @@ NAMES = {
     "index": "a b bin call cell first hi i j lo n tile unit",
     "vector<16xf32>": "values",
     "vector<16xindex>": "as places",
+    "vector<16xi32>": "lanes",
     "vector<16xi1>": "mask",
 }
 
@@ -114,7 +115,7 @@ def definitions(text):
     lines = []
     for kind, names in NAMES.items():
         value = {"f32": "1.0", "i1": "true", "vector<16xf32>": "dense<1.0>",
-                 "vector<16xindex>": "dense<1>",
+                 "vector<16xindex>": "dense<1>", "vector<16xi32>": "dense<1>",
                  "vector<16xi1>": "dense<true>"}.get(kind, "1")
         lines += [
             f"%{name} = arith.constant {value}"

@@ -6,6 +6,7 @@
 #include "IterationWriter.h"
 
 #include "Piko/Dialect/Piko/IR/CodeBuilder.h"
+#include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
 #include "mlir/Dialect/Arith/IR/Arith.h"
 #include "mlir/Dialect/Vector/IR/VectorOps.h"
@@ -24,63 +25,7 @@ Value IterationWriter::number(int64_t value) {
 }
 
 Value IterationWriter::permute(Value value, Value from) {
-  auto type = cast<VectorType>(value.getType());
-  unsigned width = type.getElementType().isIndex()
-                       ? 64
-                       : type.getElementType().getIntOrFloatBitWidth();
-  CodeBuilder at(builder, loc);
-  auto words = getVectorType(builder.getI32Type());
-  if (width == 64) {
-    // As halves, which processors permute at once.
-    auto wide = getVectorType(builder.getI64Type());
-    Value bits = value;
-    if (type.getElementType().isIndex())
-      bits = arith::IndexCastOp::create(builder, loc, wide, value);
-    else if (type != wide)
-      bits = arith::BitcastOp::create(builder, loc, wide, value);
-    Value half = arith::ConstantOp::create(
-        builder, loc,
-        DenseElementsAttr::get(wide, builder.getI64IntegerAttr(32)));
-    Value low = arith::TruncIOp::create(builder, loc, words, bits);
-    Value high = arith::TruncIOp::create(
-        builder, loc, words, arith::ShRUIOp::create(builder, loc, bits, half));
-    low = arith::ExtUIOp::create(builder, loc, wide, permute(low, from));
-    high = arith::ExtUIOp::create(builder, loc, wide, permute(high, from));
-    bits = at.either(low, arith::ShLIOp::create(builder, loc, high, half));
-    if (type.getElementType().isIndex())
-      return arith::IndexCastOp::create(builder, loc, type, bits);
-    return type == wide
-               ? bits
-               : arith::BitcastOp::create(builder, loc, type, bits).getResult();
-  }
-  if (width < 32) {
-    Value wide = arith::ExtUIOp::create(
-        builder, loc, words,
-        isa<FloatType>(type.getElementType())
-            ? arith::BitcastOp::create(
-                  builder, loc, getVectorType(builder.getIntegerType(width)),
-                  value)
-                  .getResult()
-            : value);
-    wide = permute(wide, from);
-    Value narrow = arith::TruncIOp::create(
-        builder, loc, getVectorType(builder.getIntegerType(width)), wide);
-    return narrow.getType() == type
-               ? narrow
-               : arith::BitcastOp::create(builder, loc, type, narrow)
-                     .getResult();
-  }
-  // LLVM makes one instruction of this where there is one.
-  Value result = zeros(type);
-  for (int64_t lane = 0; lane < laneCount; ++lane) {
-    Value which = arith::IndexCastUIOp::create(
-        builder, loc, builder.getIndexType(),
-        vector::ExtractOp::create(builder, loc, from, lane));
-    Value one = vector::ExtractOp::create(builder, loc, value,
-                                          ArrayRef<OpFoldResult>{which});
-    result = vector::InsertOp::create(builder, loc, one, result, lane);
-  }
-  return result;
+  return PermuteOp::create(builder, loc, value, from);
 }
 
 Value IterationWriter::countTurns(scf::ForOp inner) {

@@ -21,7 +21,7 @@ piko.record @N {"n" : i32 at 0} size 4 align 4
 // CHECK:           %[[TOTAL:.*]] = vector.extract %[[ENDS:.*]][15] : i32 from vector<16xi32>
 // CHECK:           %[[STOP:.*]] = arith.index_cast %[[TOTAL]] : i32 to index
 // CHECK:           scf.for %[[K:.*]] = %c0 to %[[STOP]] step %c16 {
-// CHECK:             vector.extract %[[ENDS]][%{{.*}}] : i32 from vector<16xi32>
+// CHECK-COUNT-4:     piko.cpu.permute %[[ENDS]][%{{.*}}] : vector<16xi32>, vector<16xi32>
 // CHECK:             %[[ROW:.*]] = arith.divf
 // CHECK:             arith.fptosi %[[ROW]] : vector<16xf32> to vector<16xi32>
 // CHECK:             piko.atomic add checked @sums

@@ -30,7 +30,9 @@ template <typename OpT> struct ApproximationLowering : ContextPattern<OpT> {
     std::string name =
         getApproximationName(kind, vector ? vector.getNumElements() : 0);
     rewriter.replaceOpWithNewOp<LLVM::CallOp>(
-        op, this->context.approximation(rewriter, name, type),
+        op,
+        this->context.pureFunction(rewriter, name,
+                                   LLVM::LLVMFunctionType::get(type, {type})),
         adaptor.getOperand());
     return success();
   }

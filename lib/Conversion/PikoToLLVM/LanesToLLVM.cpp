@@ -4,6 +4,7 @@
 
 #include "KernelLowering.h"
 
+#include "Piko/Conversion/Permutations.h"
 #include "Piko/Dialect/Piko/IR/CodeBuilder.h"
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
 
@@ -297,12 +298,62 @@ struct LaneElementsLowering : Lowering<LaneElementsOp> {
   }
 };
 
+/// A permutation moves bits: what has a lane, as integers of bytes.
+struct PermuteLowering : Lowering<PermuteOp> {
+  using Lowering::Lowering;
+
+  static Value toBits(OpBuilder &builder, Location loc, Value value,
+                      VectorType bits) {
+    auto type = cast<VectorType>(value.getType());
+    if (type == bits)
+      return value;
+    if (type.getElementType().isIndex())
+      return arith::IndexCastOp::create(builder, loc, bits, value);
+    if (type.getElementType().isInteger())
+      return arith::ExtUIOp::create(builder, loc, bits, value);
+    return arith::BitcastOp::create(builder, loc, bits, value);
+  }
+  static Value fromBits(OpBuilder &builder, Location loc, Value bits,
+                        VectorType type) {
+    if (type == bits.getType())
+      return bits;
+    if (type.getElementType().isIndex())
+      return arith::IndexCastOp::create(builder, loc, type, bits);
+    if (type.getElementType().isInteger())
+      return arith::TruncIOp::create(builder, loc, type, bits);
+    return arith::BitcastOp::create(builder, loc, type, bits);
+  }
+
+  LogicalResult
+  matchAndRewrite(PermuteOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    Location loc = op.getLoc();
+    auto type = cast<VectorType>(op.getType());
+    Type element = type.getElementType();
+    unsigned width = element.isIndex() ? 64 : element.getIntOrFloatBitWidth();
+    constexpr unsigned byteSize = 8;
+    width = std::max(width, byteSize);
+    VectorType bits = type.clone(rewriter.getIntegerType(width));
+    LLVM::LLVMFuncOp function = context.pureFunction(
+        rewriter, getPermutationName(type.getNumElements(), width),
+        LLVM::LLVMFunctionType::get(bits, {bits, op.getLanes().getType()}));
+    Value moved =
+        LLVM::CallOp::create(
+            rewriter, loc, function,
+            ValueRange{toBits(rewriter, loc, adaptor.getVector(), bits),
+                       adaptor.getLanes()})
+            .getResult();
+    rewriter.replaceOp(op, fromBits(rewriter, loc, moved, type));
+    return success();
+  }
+};
+
 } // namespace
 
 void piko::populateLanesToLLVMPatterns(const TypeConverter &converter,
                                        RewritePatternSet &patterns,
                                        LoweringContext &context) {
   patterns.add<GatherLowering, LaneElementsLowering, LaneGetLowering,
-               LaneItemsLowering, ScatterLowering>(
+               LaneItemsLowering, PermuteLowering, ScatterLowering>(
       converter, patterns.getContext(), context);
 }

@@ -198,15 +198,15 @@ LLVM::CallOp LoweringContext::call(OpBuilder &builder, Location loc,
   return call;
 }
 
-LLVM::LLVMFuncOp LoweringContext::approximation(OpBuilder &builder,
-                                                StringRef name, Type type) {
+LLVM::LLVMFuncOp LoweringContext::pureFunction(OpBuilder &builder,
+                                               StringRef name,
+                                               LLVM::LLVMFunctionType type) {
   if (auto known = module.lookupSymbol<LLVM::LLVMFuncOp>(name))
     return known;
   OpBuilder::InsertionGuard guard(builder);
   builder.setInsertionPointToStart(module.getBody());
   auto function =
-      LLVM::LLVMFuncOp::create(builder, module.getLoc(), name,
-                               LLVM::LLVMFunctionType::get(type, {type}));
+      LLVM::LLVMFuncOp::create(builder, module.getLoc(), name, type);
   constexpr auto none = LLVM::ModRefInfo::NoModRef;
   function.setMemoryEffectsAttr(LLVM::MemoryEffectsAttr::get(
       builder.getContext(), {none, none, none, none, none, none}));

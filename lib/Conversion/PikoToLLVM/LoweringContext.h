@@ -85,10 +85,11 @@ public:
                           const RuntimeFunction &function,
                           mlir::ValueRange arguments);
 
-  /// The function of that name from a `type` to one, which does nothing but
-  /// compute. Declared on first use.
-  mlir::LLVM::LLVMFuncOp approximation(mlir::OpBuilder &builder,
-                                       mlir::StringRef name, mlir::Type type);
+  /// The function of that name and type, which does nothing but compute.
+  /// Declared on first use.
+  mlir::LLVM::LLVMFuncOp pureFunction(mlir::OpBuilder &builder,
+                                      mlir::StringRef name,
+                                      mlir::LLVM::LLVMFunctionType type);
 
   /// The name of a constant of at least so many zero bytes.
   mlir::StringRef zeros(int64_t bytes);

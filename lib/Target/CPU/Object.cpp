@@ -5,6 +5,7 @@
 #include "Piko/Target/Object.h"
 
 #include "LowerArithmetic.h"
+#include "LowerPermutations.h"
 #include "Piko/Target/CodeGeneration.h"
 #include "SelectBits.h"
 
@@ -121,6 +122,7 @@ Expected<std::string> piko::generateCode(Module &module,
   gatherInitializers(module);
   markForSanitizer(module, options.sanitizer);
   prepareArithmetic(module, **machine);
+  lowerPermutations(module, **machine);
   return emitCode(
       module, **machine, options.optLevel,
       format == CodeFormat::Object ? CodeGenFileType::ObjectFile

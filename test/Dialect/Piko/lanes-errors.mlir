@@ -90,3 +90,25 @@ piko.pipeline @P rank 1 {
     %x = piko.cpu.get %as "z" of @F mask %mask : vector<16xindex>, vector<16xi1>, vector<16xi32>
   }
 }
+
+// -----
+
+piko.pipeline @P rank 1 {
+  piko.kernel @k {
+    %v = arith.constant dense<1.0> : vector<16xf32>
+    %lanes = arith.constant dense<3> : vector<8xi32>
+    // expected-error@+1 {{'piko.cpu.permute' op expected a lane for each of 16 lanes, but got 'vector<8xi32>'}}
+    %r = piko.cpu.permute %v[%lanes] : vector<16xf32>, vector<8xi32>
+  }
+}
+
+// -----
+
+piko.pipeline @P rank 1 {
+  piko.kernel @k {
+    %v = arith.constant dense<1.0> : vector<6xf32>
+    %lanes = arith.constant dense<3> : vector<6xi32>
+    // expected-error@+1 {{'piko.cpu.permute' op expected a power of two of lanes, but got 6}}
+    %r = piko.cpu.permute %v[%lanes] : vector<6xf32>, vector<6xi32>
+  }
+}

@@ -32,6 +32,9 @@ piko.pipeline @P rank 2 {
       // CHECK: piko.cpu.get %[[AS]] "list"[%{{.*}}] of @F mask %{{.*}} : vector<16xindex>, vector<16xi1>, vector<16xf32>
       %x = piko.cpu.get %as "list"[%c2] of @F mask %mask : vector<16xindex>, vector<16xi1>, vector<16xf32>
     }
+    // CHECK: piko.cpu.permute %[[A]][%{{.*}}] : vector<16xf32>, vector<16xi32>
+    %lanes = arith.constant dense<3> : vector<16xi32>
+    %p = piko.cpu.permute %a[%lanes] : vector<16xf32>, vector<16xi32>
     piko.storage.close_bins %bins : !piko.bins<@F>
   }
 }

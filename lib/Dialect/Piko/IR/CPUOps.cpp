@@ -93,6 +93,16 @@ LogicalResult LaneGetFieldsOp::verifySymbolUses(SymbolTableCollection &) {
   return success();
 }
 
+LogicalResult PermuteOp::verify() {
+  Type type = getVector().getType();
+  if (failed(verifyLaneCount(*this, type, getLanes().getType(), "a lane")))
+    return failure();
+  int64_t count = cast<VectorType>(type).getNumElements();
+  if (!llvm::isPowerOf2_64(count))
+    return emitOpError("expected a power of two of lanes, but got ") << count;
+  return success();
+}
+
 LogicalResult OpenWriterOp::verifySymbolUses(SymbolTableCollection &) {
   return getStageAttr() ? verifyStage(*this, getStageAttr()) : success();
 }

@@ -675,4 +675,27 @@ def Piko_LaneGetFieldsOp : Piko_CPUOp<"get_fields", [
   }];
 }
 
+def Piko_Permutable
+    : VectorOfRankAndType<[1], [F32, F64, I1, I8, I16, I32, I64, Index]>;
+def Piko_LaneNumbers : VectorOfRankAndType<[1], [I32]>;
+
+def Piko_PermuteOp : Piko_CPUOp<"permute", [
+    Pure, AllTypesMatch<["vector", "result"]>]> {
+  let hasVerifier = 1;
+  let summary = "gives each lane what another one has";
+  let description = [{
+    Lane `i` of the result is lane `lanes[i]` of the vector, modulo their number,
+    which is a power of two. One instruction, where the processor has it.
+
+    ```mlir
+    %r = piko.cpu.permute %values[%lanes] : vector<16xf32>, vector<16xi32>
+    ```
+  }];
+  let arguments = (ins Piko_Permutable:$vector, Piko_LaneNumbers:$lanes);
+  let results = (outs Piko_Permutable:$result);
+  let assemblyFormat = [{
+    $vector `[` $lanes `]` attr-dict `:` type($vector) `,` type($lanes)
+  }];
+}
+
 #endif // PIKO_DIALECT_PIKO_IR_PIKOCPUOPS_TD
