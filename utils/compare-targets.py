@@ -4,14 +4,15 @@
 
   compare-targets.py [--render PATH] [--file PIPELINES] [--pipes A B ..]
                      [--same-picture] [--threads T ..] [--blocks T ..]
-                     [--runs N]
+                     [--cpus C ..] [--runs N]
                      SCENE [piko-render options]
 
 Each compiled run is a process of its own; its image must equal the reference
 executor's bit for bit. With --same-picture the pipelines draw the same, and the
 reference executor runs only the first of them. With --blocks, kernels for a GPU
-run on the CPU, in blocks of so many threads. Prints a line for each pipeline and
-thread count; the exit status is 1 if any image differs.
+run on the CPU, in blocks of so many threads; with --cpus, pipelines are compiled
+for these processors. Prints a line for each pipeline and thread count, or what
+stands for it; the exit status is 1 if any image differs.
 """
 
 import argparse
@@ -42,6 +43,7 @@ def main():
     parser.add_argument("--same-picture", action="store_true")
     parser.add_argument("--threads", nargs="+", default=["1", "2", "7"])
     parser.add_argument("--blocks", nargs="+", default=[])
+    parser.add_argument("--cpus", nargs="+", default=[])
     parser.add_argument("--runs", type=int, default=10)
     parser.add_argument("scene")
     arguments, arguments.options = parser.parse_known_args()
@@ -51,6 +53,8 @@ def main():
         mappings = [(f"blocks of {t}", ["--target", "gpu-on-cpu", "--gpu-threads", t,
                                          "--gpu-seed", t])
                     for t in arguments.blocks]
+    if arguments.cpus:
+        mappings = [(c, ["--cpu", c, "--threads", "1"]) for c in arguments.cpus]
     equal, expected = True, None
     for pipe in arguments.pipes:
         if not (expected and arguments.same_picture):

@@ -183,12 +183,17 @@ piko::readPipelineNames(const CompileOptions &options, MLIRContext &context) {
   return getNames(*module);
 }
 
+/// Findings are about the stages as they are written.
+static SynthesisOptions choosePasses(const CheckOptions &check,
+                                     const SynthesisOptions &synthesis) {
+  return check.enabled ? SynthesisOptions::none() : synthesis;
+}
+
 void piko::addPasses(OpPassManager &passes, Level from, Level to,
                      const CheckOptions &check,
-                     const SynthesisOptions &synthesis, const GPUOptions &gpu) {
-  // Findings are about the stages as they are written.
-  SynthesisOptions chosen =
-      check.enabled ? SynthesisOptions::none() : synthesis;
+                     const SynthesisOptions &synthesis, const GPUOptions &gpu,
+                     const CPUOptions &cpu) {
+  SynthesisOptions chosen = choosePasses(check, synthesis);
   auto goes = [&](Level level) { return from < level && level <= to; };
   if (check.enabled && from == Level::Authored)
     addCheckSequence(passes, check);
@@ -200,7 +205,7 @@ void piko::addPasses(OpPassManager &passes, Level from, Level to,
     if (gpu.emulate)
       addGPUSequence(passes, gpu);
     else
-      addCPUSequence(passes, chosen);
+      addCPUSequence(passes, chosen, cpu);
   }
   if (to >= Level::LLVM)
     addLLVMSequence(passes);
@@ -234,15 +239,49 @@ static LogicalResult checkStart(ModuleOp module, Level from, Level to,
 LogicalResult piko::lowerPipeline(ModuleOp module, Level level,
                                   const CheckOptions &check,
                                   const SynthesisOptions &synthesis,
-                                  const GPUOptions &gpu) {
+                                  const GPUOptions &gpu,
+                                  const CPUOptions &cpu) {
   Level from = getLevel(module);
   if (failed(checkStart(module, from, level, check, gpu)))
     return failure();
   PassManager passes(module.getContext());
   if (hasLaunches(module))
     addEmulationSequence(passes, gpu);
-  addPasses(passes, from, level, check, synthesis, gpu);
+  addPasses(passes, from, level, check, synthesis, gpu, cpu);
   return passes.run(module);
+}
+
+SmallVector<OwningOpRef<ModuleOp>>
+piko::lowerForEach(ArrayRef<CPUOptions> cpus, ModuleOp module,
+                   const CheckOptions &check, const SynthesisOptions &synthesis,
+                   const GPUOptions &gpu) {
+  Level from = getLevel(module);
+  bool hasVectors = from <= Level::Machine && !gpu.emulate;
+  SynthesisOptions chosen = choosePasses(check, synthesis);
+  auto lowerCommon = [&] {
+    if (!hasVectors)
+      return lowerPipeline(module, Level::LLVM, check, synthesis, gpu);
+    if (failed(checkStart(module, from, Level::LLVM, check, gpu)))
+      return failure();
+    PassManager passes(module.getContext());
+    addPasses(passes, from, Level::Machine, check, synthesis);
+    addScalarSequence(passes, chosen);
+    return passes.run(module);
+  };
+  if (failed(lowerCommon()))
+    return {};
+  SmallVector<OwningOpRef<ModuleOp>> lowered;
+  for (const CPUOptions &cpu : cpus) {
+    lowered.push_back(module.clone());
+    PassManager passes(module.getContext());
+    if (hasVectors) {
+      addVectorSequence(passes, chosen, cpu);
+      addLLVMSequence(passes);
+    }
+    if (failed(passes.run(*lowered.back())))
+      return {};
+  }
+  return lowered;
 }
 
 LogicalResult piko::lowerToGPU(ModuleOp module, const CheckOptions &check,

@@ -480,9 +480,10 @@ void Report::write() {
     out << "  " << pass.pass << "\n" << pass.text;
 }
 
-FailureOr<std::string>
-piko::explainPipeline(ModuleOp module, const CheckOptions &check,
-                      const SynthesisOptions &synthesis) {
+FailureOr<std::string> piko::explainPipeline(ModuleOp module,
+                                             const CheckOptions &check,
+                                             const SynthesisOptions &synthesis,
+                                             const CPUOptions &cpu) {
   MLIRContext *context = module.getContext();
   Trace trace;
   ScopedDiagnosticHandler handler(context, [&](Diagnostic &diagnostic) {
@@ -497,7 +498,7 @@ piko::explainPipeline(ModuleOp module, const CheckOptions &check,
   auto run = [&](Level from, Level to) {
     PassManager passes(context);
     passes.addInstrumentation(std::make_unique<Tracer>(trace));
-    addPasses(passes, from, to, check, synthesis);
+    addPasses(passes, from, to, check, synthesis, {}, cpu);
     return passes.run(module);
   };
   if (failed(run(Level::Authored, Level::Kernels)))

@@ -99,6 +99,30 @@ static std::string makeRequest(const ObjectOptions &options,
 // Compiling
 //===----------------------------------------------------------------------===//
 
+/// A module at Level::LLVM for each processor, in LLVM IR; none after
+/// diagnostics. Processors with as many lanes have the same.
+static std::vector<std::unique_ptr<llvm::Module>>
+translateForEach(ModuleOp module, llvm::ArrayRef<Processor> processors,
+                 const CompileOptions &source, llvm::LLVMContext &context) {
+  llvm::SmallVector<CPUOptions> cpus;
+  llvm::SmallDenseMap<int64_t, size_t> places; // by lanes
+  for (const Processor &processor : processors)
+    if (places.try_emplace(processor.lanes, cpus.size()).second)
+      cpus.push_back({.lanes = processor.lanes});
+  llvm::SmallVector<OwningOpRef<ModuleOp>> lowered =
+      lowerForEach(cpus, module, source.check, source.synthesis, source.gpu);
+  std::vector<std::unique_ptr<llvm::Module>> translated;
+  if (lowered.empty())
+    return translated;
+  for (const Processor &processor : processors) {
+    translated.push_back(
+        translateToLLVMIR(*lowered[places[processor.lanes]], context));
+    if (!translated.back())
+      return {};
+  }
+  return translated;
+}
+
 /// LLVM IR of the compiled pipeline; null after diagnostics.
 static std::unique_ptr<llvm::Module>
 compilePipeline(const ObjectOptions &options,
@@ -114,12 +138,9 @@ compilePipeline(const ObjectOptions &options,
     object.header =
         writeHostHeader(pipeline, options.source.file, options.nameSpace);
   object.symbol = getProgramSymbol(options.nameSpace, name);
-  if (failed(lowerPipeline(*module, Level::LLVM, options.source.check,
-                           options.source.synthesis, options.source.gpu)))
-    return nullptr;
-  std::unique_ptr<llvm::Module> translated =
-      translateToLLVMIR(*module, llvmContext);
-  if (!translated)
+  std::vector<std::unique_ptr<llvm::Module>> translated =
+      translateForEach(*module, processors, options.source, llvmContext);
+  if (translated.empty())
     return nullptr;
   return defineProgram(std::move(translated), name, object.symbol, processors);
 }

@@ -53,7 +53,7 @@ static std::unique_ptr<LoadedProgram> load(CompileOptions source,
   ObjectOptions objectOptions{
       .source = std::move(source),
       .execution = options.target,
-      .target = {.cpu = "native",
+      .target = {.cpu = isReference ? "native" : options.cpu,
                  .sanitizer =
                      isReference ? Sanitizer::None : JITCode::getSanitizer()}};
   std::optional<CompiledObject> object =

@@ -96,8 +96,8 @@ void piko::addUnitSequence(OpPassManager &passes) {
 }
 
 /// From loops over units, some of which may have become grids.
-static void addUnitsToCPU(OpPassManager &passes,
-                          const SynthesisOptions &options) {
+static void addUnitsToLoops(OpPassManager &passes,
+                            const SynthesisOptions &options) {
   passes.nest<PipelineOp>().addPass(createFormProgram());
   if (options.has("if-convert"))
     passes.nest<PipelineOp>().addPass(createIfConvert());
@@ -119,8 +119,23 @@ static void addUnitsToCPU(OpPassManager &passes,
     passes.nest<PipelineOp>().addPass(createNarrowIntegers());
     addCleanUp(passes);
   }
+}
+
+void piko::addScalarSequence(OpPassManager &passes,
+                             const SynthesisOptions &options) {
+  if (options.has("form-tiles"))
+    passes.nest<PipelineOp>().addPass(createFormTiles());
+  addUnitSequence(passes);
+  addUnitsToLoops(passes, options);
+}
+
+void piko::addVectorSequence(OpPassManager &passes,
+                             const SynthesisOptions &options,
+                             const CPUOptions &cpu) {
   if (options.has("vectorize")) {
-    passes.nest<PipelineOp>().addPass(createVectorize());
+    VectorizeOptions vectors;
+    vectors.laneCount = cpu.lanes;
+    passes.nest<PipelineOp>().addPass(createVectorize(vectors));
     addCleanUp(passes);
   }
   if (options.has("merge-gathers")) {
@@ -133,11 +148,10 @@ static void addUnitsToCPU(OpPassManager &passes,
 }
 
 void piko::addCPUSequence(OpPassManager &passes,
-                          const SynthesisOptions &options) {
-  if (options.has("form-tiles"))
-    passes.nest<PipelineOp>().addPass(createFormTiles());
-  addUnitSequence(passes);
-  addUnitsToCPU(passes, options);
+                          const SynthesisOptions &options,
+                          const CPUOptions &cpu) {
+  addScalarSequence(passes, options);
+  addVectorSequence(passes, options, cpu);
 }
 
 void piko::addLLVMSequence(OpPassManager &passes) {
@@ -154,7 +168,8 @@ void piko::addGPUSequence(OpPassManager &passes, const GPUOptions &options) {
   grids.threads = options.threads;
   passes.nest<PipelineOp>().addPass(createConvertPikoToGPU(grids));
   addCleanUp(passes);
-  addUnitsToCPU(passes, SynthesisOptions::none());
+  addUnitsToLoops(passes, SynthesisOptions::none());
+  addVectorSequence(passes, SynthesisOptions::none(), {});
   // Or constants would be arguments.
   passes.addPass(createGpuLaunchSinkIndexComputationsPass());
   passes.addPass(createGpuKernelOutliningPass());
@@ -180,6 +195,12 @@ void piko::addNVVMSequence(OpPassManager &passes) {
 }
 
 namespace {
+struct CPUSequenceOptions : PassPipelineOptions<CPUSequenceOptions> {
+  Option<int64_t> lanes{*this, "lanes",
+                        llvm::cl::desc("Lanes of a vector: 4, 8 or 16"),
+                        llvm::cl::init(CPUOptions().lanes)};
+};
+
 struct GPUSequenceOptions : PassPipelineOptions<GPUSequenceOptions> {
   Option<int64_t> threads{*this, "threads",
                           llvm::cl::desc("Threads of a block"),
@@ -205,9 +226,11 @@ void piko::registerSequences() {
   PassPipelineRegistration<>(
       "piko-to-units", "From the machine level to loops over units of work",
       addUnitSequence);
-  PassPipelineRegistration<>(
+  PassPipelineRegistration<CPUSequenceOptions>(
       "piko-to-cpu", "From the machine level to upstream dialects",
-      [](OpPassManager &passes) { addCPUSequence(passes); });
+      [](OpPassManager &passes, const CPUSequenceOptions &options) {
+        addCPUSequence(passes, {}, {.lanes = options.lanes});
+      });
   PassPipelineRegistration<>("piko-cpu-to-llvm",
                              "From upstream dialects to llvm and omp",
                              addLLVMSequence);

@@ -30,8 +30,8 @@ bool piko::isStructure(Operation *op) {
   return isa<scf::IfOp, scf::ForOp, scf::WhileOp, scf::IndexSwitchOp>(op);
 }
 
-IterationLanes::IterationLanes(scf::ForOp loop)
-    : loop(loop),
+IterationLanes::IterationLanes(scf::ForOp loop, int64_t laneCount)
+    : loop(loop), laneCount(laneCount),
       uniformity(loop, {{loop.getInductionVar(), Uniform::Iteration}}) {
   if (loop.getNumResults() > 0)
     refuse(loop, "it hands values from iteration to iteration");
@@ -70,7 +70,7 @@ void IterationLanes::findArrays() {
       }
       if (!isSimple)
         refuse(op, "lanes cannot share this array");
-      // A turn of 16 lanes keeps as many of it.
+      // A turn keeps one for each lane.
       constexpr int64_t most = 16 << 10;
       Type element = type.getElementType();
       bytes += isSimple ? type.getNumElements() *

@@ -41,7 +41,7 @@ struct OrderedGroup {
 class IterationLanes {
 public:
   /// Of a loop without barriers whose iterations are independent.
-  explicit IterationLanes(mlir::scf::ForOp loop);
+  IterationLanes(mlir::scf::ForOp loop, int64_t laneCount);
 
   /// Why the loop stays as it is, and where; `at` is null if it need not.
   struct Refusal {
@@ -60,6 +60,8 @@ public:
   Cost getCost() const;
 
   mlir::scf::ForOp getLoop() const { return loop; }
+  /// How many iterations run at once.
+  int64_t getLaneCount() const { return laneCount; }
   bool isVarying(mlir::Value value) const {
     return uniformity.isVarying(value);
   }
@@ -121,6 +123,7 @@ private:
   bool isFixed(mlir::Value value) const;
 
   mutable mlir::scf::ForOp loop; // whose accessors are not const
+  int64_t laneCount;
   Uniformity uniformity;
   Refusal refusal;
   llvm::DenseSet<mlir::Value> privates, changed; // arrays

@@ -28,6 +28,30 @@ Value IterationWriter::permute(Value value, Value from) {
   return PermuteOp::create(builder, loc, value, from);
 }
 
+/// Which lane's turns a place is among, by where the lanes' turns end: how many
+/// of them end before it. With few lanes each is asked, and with more by binary
+/// search.
+Value IterationWriter::findLane(Value ends, Value place) {
+  CodeBuilder at(builder, loc);
+  using P = CodeBuilder::P;
+  Value lane = number(0), one = number(1);
+  constexpr int64_t few = 4;
+  if (laneCount > few) {
+    for (int64_t step = laneCount / 2; step > 0; step /= 2) {
+      Value next = at.add(lane, number(step));
+      Value end = permute(ends, at.sub(next, one));
+      lane = choose(at.compare(P::sle, end, place), next, lane);
+    }
+    return lane;
+  }
+  // The last one ends behind all places that count.
+  for (int64_t i = 0; i + 1 < laneCount; ++i) {
+    Value end = splat(vector::ExtractOp::create(builder, loc, ends, i));
+    lane = choose(at.compare(P::sle, end, place), at.add(lane, one), lane);
+  }
+  return lane;
+}
+
 Value IterationWriter::countTurns(scf::ForOp inner) {
   auto widen = [&](Value bound) {
     return lanes.isVarying(bound) ? get(bound) : splat(getUniform(bound));
@@ -58,6 +82,7 @@ Value IterationWriter::countTurns(scf::ForOp inner) {
 static Value scan(OpBuilder &builder, Location loc, Value numbers) {
   Value zero = arith::ConstantOp::create(
       builder, loc, builder.getZeroAttr(numbers.getType()));
+  int64_t laneCount = cast<VectorType>(numbers.getType()).getNumElements();
   for (int64_t distance = 1; distance < laneCount; distance *= 2) {
     SmallVector<int64_t> from;
     for (int64_t lane = 0; lane < laneCount; ++lane)
@@ -109,13 +134,7 @@ void IterationWriter::writePairs(ArrayRef<scf::ForOp> nest,
   Value outer = active;
   active = at.compare(P::slt, place,
                       vector::BroadcastOp::create(builder, loc, words, total));
-  // How many lanes end before: by binary search.
-  Value lane = number(0);
-  for (int64_t step = laneCount / 2; step > 0; step /= 2) {
-    Value next = at.add(lane, number(step));
-    Value end = permute(ends, at.sub(next, number(1)));
-    lane = choose(at.compare(P::sle, end, place), next, lane);
-  }
+  Value lane = findLane(ends, place);
   Value turn = at.sub(place, permute(starts, lane));
   for (Value value : findInputs(nest.front(), lanes))
     vectors.map(value, permute(get(value), lane));

@@ -41,9 +41,9 @@ static Value toSlot(OpBuilder &builder, Location loc, Value value, Type kept) {
     return ToAddressOp::create(builder, loc, value);
   if (getElementTypeOrSelf(type) == kept)
     return value;
+  auto vector = dyn_cast<VectorType>(type);
   return arith::ExtUIOp::create(
-      builder, loc, isa<VectorType>(type) ? Type(getVectorType(kept)) : kept,
-      value);
+      builder, loc, vector ? Type(vector.clone(kept)) : kept, value);
 }
 
 static Value fromSlot(OpBuilder &builder, Location loc, Value value,
@@ -217,12 +217,19 @@ IRMapping IterationWriter::writeTurn(const Turn &turn, Value lane) {
   return mapping;
 }
 
+Type IterationWriter::getWord() {
+  constexpr int64_t byteSize = 8;
+  return builder.getIntegerType(std::max(laneCount, byteSize));
+}
+
 Value IterationWriter::getBits(Value mask) {
-  Type word = builder.getIntegerType(laneCount);
-  return vector::ExtractOp::create(
+  Type bits = builder.getIntegerType(laneCount), word = getWord();
+  Value packed = vector::ExtractOp::create(
       builder, loc,
-      vector::BitCastOp::create(builder, loc, VectorType::get({1}, word), mask),
+      vector::BitCastOp::create(builder, loc, VectorType::get({1}, bits), mask),
       ArrayRef<int64_t>{0});
+  return bits == word ? packed
+                      : arith::ExtUIOp::create(builder, loc, word, packed);
 }
 
 void IterationWriter::writeTurns(Value bits,
@@ -306,7 +313,7 @@ std::optional<Value> IterationWriter::writeIsCounted(const Turn &turn) {
 }
 
 void IterationWriter::createMasks() {
-  Type word = builder.getIntegerType(laneCount);
+  Type word = getWord();
   Value start = arith::ConstantIndexOp::create(builder, loc, 0);
   for (const OrderedGroup &group : lanes.getGroups()) {
     if (!group.deferred)
@@ -319,7 +326,7 @@ void IterationWriter::createMasks() {
 void IterationWriter::writeDeferred() {
   if (deferred.empty())
     return;
-  Type word = builder.getIntegerType(laneCount);
+  Type word = getWord();
   Value start = arith::ConstantIndexOp::create(builder, loc, 0);
   SmallVector<Value> bits;
   Value all;

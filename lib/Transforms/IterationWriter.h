@@ -19,13 +19,17 @@ namespace piko {
 class IterationWriter {
 public:
   explicit IterationWriter(const IterationLanes &lanes)
-      : lanes(lanes), loop(lanes.getLoop()), loc(loop.getLoc()), builder(loop) {
-  }
+      : lanes(lanes), laneCount(lanes.getLaneCount()), loop(lanes.getLoop()),
+        loc(loop.getLoc()), builder(loop) {}
 
   /// Writes the loop in front of the builder's place.
   void write(mlir::OpBuilder::InsertPoint place);
 
 private:
+  mlir::VectorType getVectorType(mlir::Type type) const {
+    return piko::getVectorType(type, laneCount);
+  }
+
   // Values.
   /// The lanes' values of a value of the original loop.
   mlir::Value get(mlir::Value value);
@@ -89,6 +93,8 @@ private:
                   llvm::ArrayRef<mlir::Value> counts);
   /// How many turns each lane makes, at most too many.
   mlir::Value countTurns(mlir::scf::ForOp inner);
+  /// The lane whose turn stands at a place, for each of the places.
+  mlir::Value findLane(mlir::Value ends, mlir::Value place);
   /// For each lane the value of another.
   mlir::Value permute(mlir::Value value, mlir::Value from);
   /// 32-bit integers of all lanes.
@@ -116,6 +122,8 @@ private:
   /// A loop over lanes, given by a bit for each.
   void writeTurns(mlir::Value bits,
                   llvm::function_ref<void(mlir::Value lane)> write);
+  /// What has a bit for each lane.
+  mlir::Type getWord();
   mlir::Value getBits(mlir::Value mask);
   /// Runs [first, last] for one active lane after the other.
   void writeSerial(mlir::Operation *first, mlir::Operation *last);
@@ -134,6 +142,7 @@ private:
   mlir::Value loadSlot(mlir::Value slot, mlir::Value at, mlir::Type type);
 
   const IterationLanes &lanes;
+  const int64_t laneCount;
   mlir::scf::ForOp loop;
   mlir::Location loc;
   mlir::OpBuilder builder;

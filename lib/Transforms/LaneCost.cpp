@@ -9,24 +9,81 @@
 using namespace mlir;
 using namespace piko;
 
-/// What the operations of as many iterations as there are lanes take, in cycles
-/// of a processor with vectors of 512 bits (Sapphire Rapids, Zen 4).
-namespace cycles {
-constexpr double scalar = 5, scalarAccess = 8, scalarDivision = 64;
-constexpr double vector = 0.8, row = 1.5, gather = 12, division = 16;
-/// To bring lanes apart, for one operation or for a group, and to hand each
-/// lane a number.
-constexpr double apart = 15, apartInOrder = 40, slot = 8;
-constexpr double turns = 8, turnsThatDiffer = 4;
-/// Branches that are not foreseen, of a condition that differs, and of a loop
-/// whose turns do.
-constexpr double branches = 40, exits = 100;
-/// To find which lane makes which turn, and to bring there what it has.
-constexpr double pairs = 60;
-/// How many of the lanes go on, of those that came to a loop whose turns
-/// differ; and to one inside of such a loop.
-constexpr double goOn = 0.35, goOnInside = 0.7;
-} // namespace cycles
+namespace {
+
+/// What the operations of as many iterations as there are lanes take, in
+/// cycles.
+struct Cycles {
+  double scalar, scalarAccess, scalarDivision;
+  double vector, row, gather, division;
+  /// To bring lanes apart, for one operation or for a group, and to hand each
+  /// lane a number.
+  double apart, apartInOrder, slot;
+  /// Branches that are not foreseen, of a condition that differs, and of a loop
+  /// whose turns do.
+  double branches, exits;
+  /// To find which lane makes which turn, and to bring there what it has.
+  double pairs;
+  /// How many of the lanes go on, of those that came to a loop whose turns
+  /// differ; and to one inside of such a loop.
+  double goOn, goOnInside;
+};
+
+} // namespace
+
+/// How often a loop turns.
+static constexpr double loopTurns = 8, turnsThatDiffer = 4;
+
+/// With vectors of 512 bits (Sapphire Rapids, Zen 4), of 256 bits, and of 128
+/// bits without masks: a branch for each lane stands for one.
+static const Cycles &getCycles(int64_t laneCount) {
+  static constexpr Cycles of16{.scalar = 5,
+                               .scalarAccess = 8,
+                               .scalarDivision = 64,
+                               .vector = 0.8,
+                               .row = 1.5,
+                               .gather = 12,
+                               .division = 16,
+                               .apart = 15,
+                               .apartInOrder = 40,
+                               .slot = 8,
+                               .branches = 40,
+                               .exits = 100,
+                               .pairs = 60,
+                               .goOn = 0.35,
+                               .goOnInside = 0.7};
+  static constexpr Cycles of8{.scalar = 2.5,
+                              .scalarAccess = 4,
+                              .scalarDivision = 32,
+                              .vector = 0.6,
+                              .row = 1.5,
+                              .gather = 8,
+                              .division = 8,
+                              .apart = 12,
+                              .apartInOrder = 30,
+                              .slot = 4,
+                              .branches = 20,
+                              .exits = 50,
+                              .pairs = 50,
+                              .goOn = 0.45,
+                              .goOnInside = 0.75};
+  static constexpr Cycles of4{.scalar = 1.25,
+                              .scalarAccess = 2,
+                              .scalarDivision = 16,
+                              .vector = 0.6,
+                              .row = 4,
+                              .gather = 8,
+                              .division = 5,
+                              .apart = 10,
+                              .apartInOrder = 20,
+                              .slot = 2,
+                              .branches = 10,
+                              .exits = 25,
+                              .pairs = 40,
+                              .goOn = 0.6,
+                              .goOnInside = 0.8};
+  return laneCount == 16 ? of16 : laneCount == 8 ? of8 : of4;
+}
 
 namespace {
 
@@ -50,12 +107,12 @@ static int64_t countOperations(Region &region) {
 /// How often a side of a condition runs, where lanes differ: mostly, if it
 /// stands alone; hardly ever, if it does much more than the other, which does
 /// something, too.
-static Frequency getFrequency(Region &side, Region &other) {
+static Frequency getFrequency(Region &side, Region &other, int64_t laneCount) {
   constexpr int64_t trivial = 16, ratio = 2;
   int64_t count = countOperations(side),
           countOther = other.empty() ? 0 : countOperations(other);
   if (countOther > trivial && count > ratio * countOther)
-    return {0.001, 0.016};
+    return {0.001, 0.001 * laneCount};
   if (countOther <= trivial || countOther > ratio * count)
     return {0.8, 1};
   return {0.5, 1};
@@ -66,7 +123,8 @@ namespace {
 /// Adds up what code takes.
 class CostModel {
 public:
-  explicit CostModel(const IterationLanes &lanes) : lanes(lanes) {}
+  explicit CostModel(const IterationLanes &lanes)
+      : lanes(lanes), cycles(getCycles(lanes.getLaneCount())) {}
   void add(Region &region, Frequency times, bool laneByLane);
 
   IterationLanes::Cost cost;
@@ -83,6 +141,7 @@ private:
   void addTurns(const OrderedGroup &group, Frequency times);
 
   const IterationLanes &lanes;
+  const Cycles &cycles;
   llvm::DenseSet<Operation *> turns;
 };
 
@@ -116,8 +175,8 @@ void CostModel::addTurns(const OrderedGroup &group, Frequency times) {
                  *operand.getDefiningOp()))))
           inputs.insert(operand);
     });
-  cost.vectors += cycles::apartInOrder * times.vectors +
-                  cycles::slot * times.serial * inputs.size();
+  cost.vectors += cycles.apartInOrder * times.vectors +
+                  cycles.slot * times.serial * inputs.size();
 }
 
 void CostModel::addStructure(Operation *op, Frequency times, bool laneByLane) {
@@ -126,7 +185,7 @@ void CostModel::addStructure(Operation *op, Frequency times, bool laneByLane) {
     auto addSide = [&](Region &side, Region &other) {
       if (side.empty())
         return;
-      Frequency share = getFrequency(side, other);
+      Frequency share = getFrequency(side, other, lanes.getLaneCount());
       if (!lanes.isVarying(choice.getCondition()))
         share.vectors = share.serial;
       add(side, times.scaled(share.serial, share.vectors), laneByLane);
@@ -135,7 +194,7 @@ void CostModel::addStructure(Operation *op, Frequency times, bool laneByLane) {
     addSide(no, yes);
     bool isShort = lanes.isCheap(yes) && (no.empty() || lanes.isCheap(no));
     if (lanes.isVarying(choice.getCondition()) && !isShort)
-      addBranches(cycles::branches * times.serial, laneByLane);
+      addBranches(cycles.branches * times.serial, laneByLane);
     return;
   }
   if (auto choice = dyn_cast<scf::IndexSwitchOp>(op)) {
@@ -150,23 +209,22 @@ void CostModel::addStructure(Operation *op, Frequency times, bool laneByLane) {
        at = at->getParentOp())
     isInside |= isa<scf::ForOp, scf::WhileOp>(at) && !lanes.isSharedLoop(at);
   double going = lanes.isSharedLoop(op) ? 1
-                 : isInside             ? cycles::goOnInside
-                                        : cycles::goOn;
+                 : isInside             ? cycles.goOnInside
+                                        : cycles.goOn;
   if (!lanes.isSharedLoop(op))
-    addBranches(cycles::exits * times.serial, laneByLane);
+    addBranches(cycles.exits * times.serial, laneByLane);
   auto loop = dyn_cast<scf::ForOp>(op);
   if (!laneByLane && loop && !lanes.getNest(loop).empty()) {
     Frequency full;
     for (size_t i = 0, e = lanes.getNest(loop).size(); i < e; ++i)
-      full.serial *= cycles::turnsThatDiffer *
-                     (i == 0 ? cycles::goOn : cycles::goOnInside);
-    cost.vectors += cycles::pairs * times.vectors * full.serial;
+      full.serial *=
+          turnsThatDiffer * (i == 0 ? cycles.goOn : cycles.goOnInside);
+    cost.vectors += cycles.pairs * times.vectors * full.serial;
     add(lanes.getNest(loop).back().getRegion(),
         times.scaled(full.serial, full.serial), laneByLane);
     return;
   }
-  double turns =
-      lanes.isSharedLoop(op) ? cycles::turns : cycles::turnsThatDiffer;
+  double turns = lanes.isSharedLoop(op) ? loopTurns : turnsThatDiffer;
   for (Region &region : op->getRegions())
     add(region, times.scaled(turns * going, turns), laneByLane);
 }
@@ -180,17 +238,17 @@ void CostModel::addOperation(Operation *op, Frequency times, bool laneByLane) {
     return; // as much for one as for all, or nothing
   bool isAccess = form == LaneForm::Access;
   bool isDivided = isDivision(op);
-  double serial = times.serial * (isDivided  ? cycles::scalarDivision
-                                  : isAccess ? cycles::scalarAccess
-                                             : cycles::scalar);
+  double serial = times.serial * (isDivided  ? cycles.scalarDivision
+                                  : isAccess ? cycles.scalarAccess
+                                             : cycles.scalar);
   bool isTurns = form == LaneForm::Serial || form == LaneForm::Ordered;
   bool isGather = isAccess && !lanes.isRow(op);
-  double vectors = times.vectors * (isGather    ? cycles::gather
-                                    : isAccess  ? cycles::row
-                                    : isDivided ? cycles::division
-                                                : cycles::vector);
+  double vectors = times.vectors * (isGather    ? cycles.gather
+                                    : isAccess  ? cycles.row
+                                    : isDivided ? cycles.division
+                                                : cycles.vector);
   if (laneByLane || isTurns)
-    vectors = serial + (laneByLane ? 0 : times.vectors * cycles::apart);
+    vectors = serial + (laneByLane ? 0 : times.vectors * cycles.apart);
   else
     cost.computes |= !isAccess;
   cost.serial += serial;

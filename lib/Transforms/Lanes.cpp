@@ -10,7 +10,7 @@
 using namespace mlir;
 using namespace piko;
 
-VectorType piko::getVectorType(Type type) {
+VectorType piko::getVectorType(Type type, int64_t laneCount) {
   if (isa<PrimType>(type))
     type = IndexType::get(type.getContext());
   return VectorType::get({laneCount}, type);

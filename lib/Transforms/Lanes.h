@@ -11,12 +11,9 @@
 
 namespace piko {
 
-/// Numbers of 32 bits in the widest vectors there are; where they are narrower,
-/// LLVM takes several.
-constexpr int64_t laneCount = 16;
-
-/// The type of a vector of these numbers, or of the addresses of primitives.
-mlir::VectorType getVectorType(mlir::Type type);
+/// The type of a vector of so many of these numbers, or of the addresses of
+/// primitives.
+mlir::VectorType getVectorType(mlir::Type type, int64_t laneCount);
 
 /// Whether a loop of a kernel is over the primitives of a cell.
 bool isOverPrimitives(mlir::scf::ForOp loop);

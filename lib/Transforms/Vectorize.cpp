@@ -29,6 +29,7 @@ using namespace piko;
 namespace {
 
 struct VectorizePass : piko::impl::VectorizeBase<VectorizePass> {
+  using VectorizeBase::VectorizeBase;
   void runOnOperation() override;
 };
 
@@ -138,7 +139,7 @@ bool Candidate::decide(const IterationLanes &lanes) {
   }
   if (!said && !cost.isWorthwhile()) {
     InFlightDiagnostic remark = refuse();
-    remark << laneCount << " at once are expected to take "
+    remark << lanes.getLaneCount() << " at once are expected to take "
            << std::llround(cost.vectors) << " cycles, and one after the other "
            << std::llround(cost.serial) << otherwise;
     addObstacles(remark, lanes, cost, /*isRefused=*/true);
@@ -147,10 +148,11 @@ bool Candidate::decide(const IterationLanes &lanes) {
   InFlightDiagnostic remark = loop.emitRemark();
   if (ofPrimitives)
     remark << "stage '" << getKernelStage(loop).getSymName()
-           << "': " << getLoopPhase(loop) << " is vectorized for " << laneCount
-           << " primitives at once";
+           << "': " << getLoopPhase(loop) << " is vectorized for "
+           << lanes.getLaneCount() << " primitives at once";
   else
-    remark << "these iterations are vectorized for " << laneCount << " at once";
+    remark << "these iterations are vectorized for " << lanes.getLaneCount()
+           << " at once";
   addObstacles(remark, lanes, cost, /*isRefused=*/false);
   return true;
 }
@@ -217,7 +219,9 @@ static void countLoops(scf::ForOp root) {
 
 /// With fewer iterations a loop runs as it was: a vector takes about as long as
 /// this many.
-static constexpr int64_t leastTurns = 4;
+static int64_t getLeastTurns(int64_t laneCount) {
+  return std::max<int64_t>(laneCount / 4, 2);
+}
 
 static void vectorize(const IterationLanes &lanes) {
   scf::ForOp loop = lanes.getLoop();
@@ -231,7 +235,8 @@ static void vectorize(const IterationLanes &lanes) {
   }
   Type type = loop.getUpperBound().getType();
   Value least = arith::ConstantOp::create(
-      builder, loc, builder.getIntegerAttr(type, leastTurns));
+      builder, loc,
+      builder.getIntegerAttr(type, getLeastTurns(lanes.getLaneCount())));
   Value count = arith::SubIOp::create(builder, loc, loop.getUpperBound(),
                                       loop.getLowerBound());
   Value isLong = arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::sge,
@@ -244,6 +249,11 @@ static void vectorize(const IterationLanes &lanes) {
 }
 
 void VectorizePass::runOnOperation() {
+  if (!llvm::is_contained({4, 8, 16}, laneCount)) {
+    getOperation().emitError("expected 4, 8 or 16 lanes, but got ")
+        << int64_t(laneCount);
+    return signalPassFailure();
+  }
   // Loops inside of one that is vectorized are parts of it.
   getOperation().walk<WalkOrder::PreOrder>([&](scf::ForOp loop) {
     if (!loop->hasAttr(marks::lanes))
@@ -252,7 +262,7 @@ void VectorizePass::runOnOperation() {
     if (!candidate.isChosen())
       return WalkResult::advance();
     countLoops(loop);
-    IterationLanes lanes(loop);
+    IterationLanes lanes(loop, laneCount);
     if (!candidate.decide(lanes)) {
       ++left;
       return WalkResult::advance();

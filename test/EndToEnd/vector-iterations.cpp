@@ -5,6 +5,8 @@
 // iteration, integers of all sizes, divisors that are 0 elsewhere.
 // RUN: sed -n 's|^// CASE: ||p' %s > %t.cases
 // RUN: piko-compare %s --cases %t.cases --runs 1 | FileCheck %s --check-prefix=EQUAL
+// RUN: %if x86_64 %{ piko-compare %s --cases %t.cases --runs 1 --cpu x86-64 | FileCheck %s --check-prefix=EQUAL %}
+// RUN: %if x86_64 %{ piko-compare %s --cases %t.cases --runs 1 --cpu x86-64-v3 | FileCheck %s --check-prefix=EQUAL %}
 // EQUAL-COUNT-8: {{^equal$}}
 // CASE: --pipe Escapes --domain 67 35 --count 320
 // CASE: --pipe Sorts --domain 67 35 --count 320
@@ -18,7 +20,7 @@
 //
 // RUN: pikoc %s --pipe Escapes --no-cache --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=VECTORS
 // RUN: pikoc %s --pipe Sorts --no-cache --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=VECTORS
-// VECTORS: .cpp:[[#]]:{{[0-9]+}}: remark: these iterations are vectorized for 16 at once
+// VECTORS: .cpp:[[#]]:{{[0-9]+}}: remark: these iterations are vectorized for {{4|8}} at once
 #include "Inputs/vector-iterations.h"
 
 template <class Body>

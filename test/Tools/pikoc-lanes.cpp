@@ -27,7 +27,7 @@ struct State {
 
 // MACHINE-DAG: piko.items of @forced lanes items {
 // FINE-DAG: stage 'forced': lanes are given items, as is specified
-// FINE-DAG: stage 'forced': process is vectorized for 16 primitives at once
+// FINE-DAG: stage 'forced': process is vectorized for {{4|8}} primitives at once
 struct Forced : piko::Stage<0, 0, 64, Box, Box> {
   void schedule(piko::BinId) { specifyLanes(piko::Lanes::Items); }
   void process(const Box &b) {

@@ -41,7 +41,7 @@ inline float work(float x, float y) {
 
 struct Shade : piko::Stage<8, 8, 64, Item>, piko::Uses<State> {
   void assignBin(const Item &i) { assignToBin(i, binFromPosition(i.at)); }
-  // SHADE: :[[#@LINE+1]]:8: remark: stage 'shade': process is vectorized for 16 primitives at once
+  // SHADE: :[[#@LINE+1]]:8: remark: stage 'shade': process is vectorized for {{4|8}} primitives at once
   void process(const Item &i) {
     if (update(state().depth, i.at, [&](Depth &d) {
           bool passed = i.y < d.z;
@@ -56,7 +56,7 @@ struct Shade : piko::Stage<8, 8, 64, Item>, piko::Uses<State> {
 
 struct Differ : piko::Stage<0, 0, 64, Item>, piko::Uses<State> {
   // Loops whose counts differ are no obstacle.
-  // DIFFER: :[[#@LINE+1]]:8: remark: stage 'differ': process is vectorized for 16 primitives at once
+  // DIFFER: :[[#@LINE+1]]:8: remark: stage 'differ': process is vectorized for {{4|8}} primitives at once
   void process(const Item &i) {
     float x = i.x;
     for (int k = 0; k < i.count; ++k)
@@ -67,7 +67,7 @@ struct Differ : piko::Stage<0, 0, 64, Item>, piko::Uses<State> {
 
 struct Written : piko::Stage<0, 0, 64, Item>, piko::Uses<State> {
   // Nor is a read of what the kernel writes.
-  // WRITTEN: :[[#@LINE+1]]:8: remark: stage 'written': process is vectorized for 16 primitives at once
+  // WRITTEN: :[[#@LINE+1]]:8: remark: stage 'written': process is vectorized for {{4|8}} primitives at once
   void process(const Item &i) {
     float x = state().out[i.count];
     state().out[i.count] = work(x, x);
@@ -75,7 +75,7 @@ struct Written : piko::Stage<0, 0, 64, Item>, piko::Uses<State> {
 };
 
 struct Emits : piko::Stage<0, 0, 64, Item, Item> {
-  // EMITS: :[[#@LINE+1]]:8: remark: stage 'emits': process is not vectorized: 16 at once are expected to take {{[0-9]+}} cycles, and one after the other {{[0-9]+}}; specifyLanes(Items) does so all the same
+  // EMITS: :[[#@LINE+1]]:8: remark: stage 'emits': process is not vectorized: {{4|8}} at once are expected to take {{[0-9]+}} cycles, and one after the other {{[0-9]+}}; specifyLanes(Items) does so all the same
   void process(const Item &i) {
     Item next = i;
     for (int k = 0; k < 4; ++k) {
@@ -88,7 +88,7 @@ struct Emits : piko::Stage<0, 0, 64, Item, Item> {
 
 struct Divides : piko::Stage<0, 0, 64, Item>, piko::Uses<State> {
   // Nor is a division that may be by 0.
-  // DIVIDES: :[[#@LINE+1]]:8: remark: stage 'divides': process is vectorized for 16 primitives at once
+  // DIVIDES: :[[#@LINE+1]]:8: remark: stage 'divides': process is vectorized for {{4|8}} primitives at once
   void process(const Item &i) {
     int part = 100 / i.count;
     state().numbers[i.at.x] = part * part + i.at.y;

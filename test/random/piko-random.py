@@ -53,6 +53,8 @@ def passes_of(args, seed=None):
 
 def runner_of(args, passes, first, **options):
     target = gpu_options(first) if args.gpu else ()
+    if args.cpu:
+        target = ["--cpu", args.cpu]
     return Runner(args.tool, args.mlir, passes, strip=args.strip, target=target, **options)
 
 
@@ -71,7 +73,8 @@ def command_of(args, first, seed):
     """What reduces a failure of the file that begins with `first`."""
     options = [f"--{name} {value}" for name, value in [
         ("features", args.features), ("without", args.without),
-        ("leave-out", ",".join(passes_of(args, first))), ("strip", args.strip)] if value]
+        ("leave-out", ",".join(passes_of(args, first))), ("strip", args.strip),
+        ("cpu", args.cpu)] if value]
     return " ".join([f"{sys.argv[0]} reduce --tool {args.tool} --seed {seed}", *options] +
                     ["--mlir"] * args.mlir + ["--gpu"] * args.gpu)
 
@@ -152,6 +155,8 @@ def main():
                         help="compile the text of the dialect, not C++")
     parser.add_argument("--gpu", action="store_true",
                         help="run kernels on a GPU that the CPU plays")
+    parser.add_argument("--cpu", default="",
+                        help="the processor to compile for (this machine's)")
     parser.add_argument("--strip", type=int, default=0,
                         help="primitives of a source in a strip (all)")
     parser.add_argument("--out", default="reduced.cpp")

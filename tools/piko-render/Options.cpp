@@ -20,6 +20,8 @@ it, and says how long a frame took.
   --target cpu|gpu-on-cpu|reference
                          compiled for this machine; for a GPU, which this
                          machine plays; or run by the reference executor (cpu)
+  --cpu NAME             the processor to compile for, as clang names them, of
+                         which this machine has everything (native)
   -I FOLDER, -D NAME[=VALUE]   for the pipeline's preprocessor
   --without PASS,...     passes of synthesis to leave out
   --gpu-threads N        for gpu-on-cpu: threads of a block, a power of two up to
@@ -91,6 +93,7 @@ private:
         {"--help", [&] { options.help = true; }},
         {"--pipe", [&] { options.load.pipeName = value(name); }},
         {"--target", [&] { parseTarget(value(name)); }},
+        {"--cpu", [&] { options.load.cpu = value(name); }},
         {"--no-cache", [&] { options.load.cache.enabled = false; }},
         {"--cache-dir", [&] { options.load.cache.directory = value(name); }},
         {"--without", [&] { parseWithout(value("--without")); }},

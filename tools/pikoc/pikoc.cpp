@@ -12,6 +12,7 @@
 #include "Piko/Driver/ObjectCompiler.h"
 #include "Piko/Target/Object.h"
 #include "Piko/Target/PTX.h"
+#include "Piko/Target/Processor.h"
 
 #include "llvm/IR/LLVMContext.h"
 #include "llvm/IR/Module.h"
@@ -250,13 +251,25 @@ static std::string printPipes(const std::vector<std::string> &names) {
   return text;
 }
 
+/// What levels below the machine's depend on; nothing after an error.
+static std::optional<CPUOptions> findProcessor(const CommandLine &line) {
+  llvm::Expected<Processor> processor = resolveProcessor(line.cpu);
+  if (processor)
+    return CPUOptions{.lanes = processor->lanes};
+  fail(llvm::toString(processor.takeError()));
+  return std::nullopt;
+}
+
 static std::optional<std::string> explain(const CommandLine &line,
                                           MLIRContext &context) {
   CompileOptions source = line.getSource();
   OwningOpRef<ModuleOp> module = readPipeline(source, context);
   if (!module)
     return std::nullopt;
-  auto report = explainPipeline(*module, source.check, source.synthesis);
+  std::optional<CPUOptions> cpu = findProcessor(line);
+  if (!cpu)
+    return std::nullopt;
+  auto report = explainPipeline(*module, source.check, source.synthesis, *cpu);
   return failed(report) ? std::nullopt : std::optional(*report);
 }
 
@@ -328,10 +341,13 @@ static std::optional<std::string> writeText(const CommandLine &line) {
   Level level = line.getEmit() >= Emit::LLVMIR
                     ? Level::LLVM
                     : static_cast<Level>(line.getEmit());
+  std::optional<CPUOptions> cpu = findProcessor(line);
+  if (!cpu)
+    return std::nullopt;
   OwningOpRef<ModuleOp> module = readPipeline(line.getSource(), context);
   if (!module ||
       failed(lowerPipeline(*module, level, line.getSource().check,
-                           *line.getSynthesis(), line.getSource().gpu)))
+                           *line.getSynthesis(), line.getSource().gpu, *cpu)))
     return std::nullopt;
   if (line.getEmit() >= Emit::LLVMIR)
     return translate(line, *module);

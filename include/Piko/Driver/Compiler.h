@@ -69,13 +69,22 @@ readPipelineNames(const CompileOptions &options, mlir::MLIRContext &context);
 /// Adds the passes that take a module from one level to another one.
 void addPasses(mlir::OpPassManager &passes, Level from, Level to,
                const CheckOptions &check, const SynthesisOptions &synthesis,
-               const GPUOptions &gpu = {});
+               const GPUOptions &gpu = {}, const CPUOptions &cpu = {});
 
 /// Takes a module from its level to another one; an error if it is below that.
 llvm::LogicalResult lowerPipeline(mlir::ModuleOp module, Level level,
                                   const CheckOptions &check = {},
                                   const SynthesisOptions &synthesis = {},
-                                  const GPUOptions &gpu = {});
+                                  const GPUOptions &gpu = {},
+                                  const CPUOptions &cpu = {});
+
+/// Takes a module to Level::LLVM for each of several processors. What is the
+/// same for all of them is done once, in `module` itself. None after
+/// diagnostics.
+llvm::SmallVector<mlir::OwningOpRef<mlir::ModuleOp>>
+lowerForEach(llvm::ArrayRef<CPUOptions> cpus, mlir::ModuleOp module,
+             const CheckOptions &check, const SynthesisOptions &synthesis,
+             const GPUOptions &gpu);
 
 /// LLVM IR, not optimised, of a module at Level::LLVM; null after diagnostics.
 std::unique_ptr<llvm::Module> translateToLLVMIR(mlir::ModuleOp module,

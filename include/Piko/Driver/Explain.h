@@ -18,7 +18,8 @@ namespace piko {
 /// level, and reports on it; fails after diagnostics in the context's engine.
 llvm::FailureOr<std::string>
 explainPipeline(mlir::ModuleOp module, const CheckOptions &check = {},
-                const SynthesisOptions &synthesis = {});
+                const SynthesisOptions &synthesis = {},
+                const CPUOptions &cpu = {});
 
 } // namespace piko
 

@@ -5,6 +5,7 @@
 #ifndef PIKO_DRIVER_OPTIONS_H
 #define PIKO_DRIVER_OPTIONS_H
 
+#include "Piko/Driver/CPUOptions.h"
 #include "Piko/Driver/CheckOptions.h"
 #include "Piko/Driver/GPUOptions.h"
 #include "Piko/Driver/SynthesisOptions.h"

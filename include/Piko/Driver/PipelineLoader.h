@@ -35,6 +35,9 @@ struct LoadOptions {
   CheckOptions check = {};
   SynthesisOptions synthesis = {};
   GPUOptions gpu = {};
+  /// The processor to compile for, as TargetOptions has it; one that this
+  /// machine is no less than.
+  std::string cpu = "native";
 };
 
 /// A program that is ready to run; its code goes when the object goes, so it

@@ -6,6 +6,7 @@
 #ifndef PIKO_DRIVER_SEQUENCES_H
 #define PIKO_DRIVER_SEQUENCES_H
 
+#include "Piko/Driver/CPUOptions.h"
 #include "Piko/Driver/CheckOptions.h"
 #include "Piko/Driver/GPUOptions.h"
 #include "Piko/Driver/SynthesisOptions.h"
@@ -30,7 +31,16 @@ void addUnitSequence(mlir::OpPassManager &passes);
 
 /// `piko-to-cpu`: from the machine level to scf, arith, omp and llvm.
 void addCPUSequence(mlir::OpPassManager &passes,
-                    const SynthesisOptions &options = {});
+                    const SynthesisOptions &options = {},
+                    const CPUOptions &cpu = {});
+
+/// The part of it that is the same for all processors.
+void addScalarSequence(mlir::OpPassManager &passes,
+                       const SynthesisOptions &options);
+
+/// The rest of it, from piko-vectorize on.
+void addVectorSequence(mlir::OpPassManager &passes,
+                       const SynthesisOptions &options, const CPUOptions &cpu);
 
 /// `piko-cpu-to-llvm`: from there to the llvm dialect (and omp) alone.
 void addLLVMSequence(mlir::OpPassManager &passes);

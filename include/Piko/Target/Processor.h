@@ -23,6 +23,9 @@ struct Processor {
   /// runtime can look for (pikort/processor.def), in that order; empty for what
   /// all machines have.
   std::vector<llvm::StringRef> needs = {};
+  /// Lanes of a vector: as many numbers of 32 bits as a register holds, where
+  /// all that vectors do is there for that width.
+  int64_t lanes = 4;
 };
 
 /// LLVM's target for this machine, ready to make code.

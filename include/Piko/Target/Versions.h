@@ -10,16 +10,18 @@
 #include "llvm/IR/Module.h"
 
 #include <memory>
+#include <vector>
 
 namespace piko {
 
-/// Takes a module with the functions `pipeline`.setup and `pipeline`.run, and
-/// gives one that has all of its functions for each processor. It defines
+/// Takes a module for each processor, with the functions `pipeline`.setup and
+/// `pipeline`.run, and gives one that has the functions of all. It defines
 /// `symbol`, the pikort_program of the pipeline, and hides all else. What is
 /// not said to be for a processor is for the least one.
 std::unique_ptr<llvm::Module>
-defineProgram(std::unique_ptr<llvm::Module> module, llvm::StringRef pipeline,
-              llvm::StringRef symbol, llvm::ArrayRef<Processor> processors);
+defineProgram(std::vector<std::unique_ptr<llvm::Module>> modules,
+              llvm::StringRef pipeline, llvm::StringRef symbol,
+              llvm::ArrayRef<Processor> processors);
 
 } // namespace piko
 

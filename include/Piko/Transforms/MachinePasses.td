@@ -541,8 +541,8 @@ def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
     (`convert-piko-to-scf`), and lanes that `piko-map-lanes` has given primitives,
     or the iterations of a parallel loop.
 
-    **Does**: runs 16 consecutive turns of a loop over primitives, of a
-    `parallelFor`, or of a row of pixels, at once. What is the same for all of
+    **Does**: runs as many consecutive turns of a loop over primitives, of a
+    `parallelFor`, or of a row of pixels, at once as there are `lanes`. What is the same for all of
     them stays scalar; the rest becomes vectors, by predication: conditions become
     masks, with a branch around what no lane needs; loops run as long as some lane
     does; access to state and to primitives becomes gathers and scatters, of a row
@@ -566,6 +566,11 @@ def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
     estimated from the operations, how often they run, and for how many lanes; a
     remark has the estimate, with what costs most. Rows of boxes, which mostly have
     few pixels, are vectorized where the schedule says `specifyLanes`.
+
+    The CPU target sets how many `lanes` there are, from what the processor that it
+    makes code for has: 16 with AVX-512 (F, BW, DQ and VL), 8 with AVX2, or else 4.
+    Nothing in front of this pass knows it, and an object for several processors
+    has code of each width.
 
     **Guarantees** the same operations on the same numbers for each turn, emissions
     and updates in the same order, and the same bits for any number of lanes.
@@ -607,6 +612,10 @@ def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
                            "::mlir::memref::MemRefDialect",
                            "::mlir::scf::SCFDialect",
                            "::mlir::vector::VectorDialect"];
+  let options = [
+    Option<"laneCount", "lanes", "int64_t", "16",
+           "Lanes of a vector: 4, 8 or 16 (default: 16)">,
+  ];
   let statistics = [
     Statistic<"vectorized", "vectorized", "loops that compute in vectors">,
     Statistic<"left", "left", "loops that stay as they are">,

@@ -48,8 +48,14 @@ static Processor getNativeProcessor() {
   return host;
 }
 
-static void findNeeds(const Target &target, const Triple &triple,
-                      Processor &processor) {
+static int64_t getLanes(const MCSubtargetInfo &info) {
+  if (info.checkFeatures("+avx512f,+avx512bw,+avx512dq,+avx512vl"))
+    return 16;
+  return info.checkFeatures("+avx2") ? 8 : 4;
+}
+
+static void findFeatures(const Target &target, const Triple &triple,
+                         Processor &processor) {
   if (triple.getArch() != Triple::x86_64)
     return;
   std::unique_ptr<MCSubtargetInfo> info(
@@ -60,6 +66,7 @@ static void findNeeds(const Target &target, const Triple &triple,
   for (StringRef name : checkedFeatures)
     if (enabled.contains(name))
       processor.needs.push_back(name);
+  processor.lanes = getLanes(*info);
 }
 
 Expected<Processor> piko::resolveProcessor(StringRef cpu) {
@@ -79,7 +86,7 @@ Expected<Processor> piko::resolveProcessor(StringRef cpu) {
                              triple.getArchName() +
                              "; expected 'native' or a name that 'clang "
                              "--print-supported-cpus' lists");
-  findNeeds(**target, triple, processor);
+  findFeatures(**target, triple, processor);
   return processor;
 }
 

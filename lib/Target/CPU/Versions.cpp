@@ -5,9 +5,9 @@
 //   setup:  pikoir_setup_version(p, {{processor, needs, setup, run}, ...}, n)
 //
 // The choice is the runtime's, when a pipeline is created: no variable of the
-// object changes, and nothing runs before main. All functions are LLVM's
-// copies of the same ones, with other attributes: the optimizer and the code
-// generator look at those, and not at the machine that the module is for.
+// object changes, and nothing runs before main. Functions say which processor
+// they are for: the optimizer and the code generator look at that, and not at
+// the machine that the module is for.
 
 #include "Piko/Target/Versions.h"
 
@@ -17,7 +17,6 @@
 #include "llvm/IR/IRBuilder.h"
 #include "llvm/Linker/Linker.h"
 #include "llvm/TargetParser/Host.h"
-#include "llvm/Transforms/Utils/Cloning.h"
 
 #include "pikort/pikort.h"
 
@@ -107,21 +106,18 @@ static Function *makeSetup(Module &module, StringRef pipeline,
   return setup;
 }
 
-std::unique_ptr<Module> piko::defineProgram(std::unique_ptr<Module> module,
-                                            StringRef pipeline,
-                                            StringRef symbol,
-                                            ArrayRef<Processor> processors) {
-  module->setTargetTriple(Triple(sys::getProcessTriple()));
-  SmallVector<std::unique_ptr<Module>> parts;
-  for (size_t i = 1; i < processors.size(); ++i)
-    parts.push_back(CloneModule(*module));
-  parts.push_back(std::move(module));
+std::unique_ptr<Module>
+piko::defineProgram(std::vector<std::unique_ptr<Module>> modules,
+                    StringRef pipeline, StringRef symbol,
+                    ArrayRef<Processor> processors) {
   SmallVector<Version> versions;
-  for (auto [processor, part] : llvm::zip_equal(processors, parts))
+  for (auto [processor, part] : llvm::zip_equal(processors, modules)) {
+    part->setTargetTriple(Triple(sys::getProcessTriple()));
     versions.push_back(
-        makeVersion(*part, pipeline, processor, parts.size() == 1));
-  std::unique_ptr<Module> program = std::move(parts.front());
-  for (std::unique_ptr<Module> &part : llvm::drop_begin(parts))
+        makeVersion(*part, pipeline, processor, modules.size() == 1));
+  }
+  std::unique_ptr<Module> program = std::move(modules.front());
+  for (std::unique_ptr<Module> &part : llvm::drop_begin(modules))
     Linker::linkModules(*program, std::move(part));
   Constant *run = program->getFunction(versions.front().run);
   hide(*program);

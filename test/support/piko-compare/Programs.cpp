@@ -8,6 +8,7 @@
 #include "Piko/Driver/ObjectCompiler.h"
 #include "Piko/Target/JIT.h"
 #include "Piko/Target/Object.h"
+#include "Piko/Target/Processor.h"
 
 #include <stdexcept>
 
@@ -165,8 +166,12 @@ std::vector<std::string> Programs::names() const {
 Program Programs::compile(const std::string &pipe) {
   OwningOpRef<ModuleOp> module = self->read(pipe);
   bool strict = module && isStrict(*module);
-  if (!module || failed(lowerPipeline(*module, Level::LLVM, self->check,
-                                      self->synthesis, self->gpu)))
+  llvm::Expected<Processor> processor = resolveProcessor(self->cpu);
+  if (!processor)
+    throw std::runtime_error(llvm::toString(processor.takeError()));
+  if (!module ||
+      failed(lowerPipeline(*module, Level::LLVM, self->check, self->synthesis,
+                           self->gpu, {.lanes = processor->lanes})))
     self->log.fail("cannot compile " + pipe);
   auto context = std::make_unique<llvm::LLVMContext>();
   std::unique_ptr<llvm::Module> llvmModule =
