@@ -67,6 +67,10 @@ static void findFeatures(const Target &target, const Triple &triple,
     if (enabled.contains(name))
       processor.needs.push_back(name);
   processor.lanes = getLanes(*info);
+  // LLVM takes a branch for each lane where it does not know gathers as fast.
+  if (info->checkFeatures("+avx2"))
+    processor.features += processor.features.empty() ? "+fast-gather"
+                                                     : ",+fast-gather";
 }
 
 Expected<Processor> piko::resolveProcessor(StringRef cpu) {
