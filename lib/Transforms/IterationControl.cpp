@@ -315,6 +315,24 @@ void IterationWriter::writeVaryingWhile(scf::WhileOp inner) {
 // The loop
 //===----------------------------------------------------------------------===//
 
+/// In 32 bits, which are as many as a vector has for each lane.
+Value IterationWriter::writeActive(Value left) {
+  Value most = arith::ConstantOp::create(
+      builder, loc, builder.getIntegerAttr(left.getType(), laneCount));
+  left = arith::MinUIOp::create(builder, loc, left, most);
+  Type word = builder.getI32Type();
+  if (!left.getType().isIndex())
+    left = arith::IndexCastUIOp::create(builder, loc, builder.getIndexType(),
+                                        left);
+  left = arith::IndexCastOp::create(builder, loc, word, left);
+  SmallVector<int32_t> steps =
+      llvm::to_vector(llvm::seq<int32_t>(0, laneCount));
+  Value step = arith::ConstantOp::create(
+      builder, loc, DenseIntElementsAttr::get(getVectorType(word), steps));
+  return arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::slt, step,
+                               splat(left));
+}
+
 void IterationWriter::write(OpBuilder::InsertPoint place) {
   builder.restoreInsertionPoint(place);
   Value upper = loop.getUpperBound();
@@ -338,9 +356,7 @@ void IterationWriter::write(OpBuilder::InsertPoint place) {
         arith::IndexCastOp::create(builder, loc, getVectorType(type), steps);
   vectors.map(loop.getInductionVar(),
               arith::AddIOp::create(builder, loc, splat(first), steps));
-  Value left = arith::SubIOp::create(builder, loc, upper, first);
-  active = arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::ult, steps,
-                                 splat(left));
+  active = writeActive(arith::SubIOp::create(builder, loc, upper, first));
   createMasks();
   writeBlock(*loop.getBody());
   writeDeferred();

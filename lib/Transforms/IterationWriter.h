@@ -81,6 +81,8 @@ private:
   void writePrivate(mlir::memref::AllocaOp array);
 
   // Control flow.
+  /// The lanes that have something to do, where so many iterations are left.
+  mlir::Value writeActive(mlir::Value left);
   void writeStructure(mlir::Operation *op);
   void writeIf(mlir::scf::IfOp choice);
   void writeSwitch(mlir::scf::IndexSwitchOp choice);

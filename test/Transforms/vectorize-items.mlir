@@ -8,7 +8,7 @@ piko.record @G {"y" : f32 at 0} size 4 align 4
 // counts goes through all of them.
 // CHECK-LABEL: piko.pipeline @Emits
 // CHECK:         scf.for %[[I:.*]] = %{{.*}} to %{{.*}} step %c16 {
-// CHECK:           %[[LEFT:.*]] = arith.cmpi ult
+// CHECK:           %[[LEFT:.*]] = arith.cmpi sgt, %{{.*}} : vector<16xi32>
 // CHECK:           %[[AS:.*]] = piko.cpu.items %[[BINS:.*]][%[[I]] : index] mask %[[LEFT]]
 // CHECK:           %[[Z:.*]] = piko.cpu.get %[[AS]] "z" of @F mask %[[LEFT]]
 // CHECK-NOT:       piko.storage.append

@@ -11,7 +11,7 @@ piko.record @V {"x" : f32 at 0, "y" : f32 at 4} size 8 align 4
 // CHECK:         scf.if %[[LONG]] {
 // CHECK:           scf.for %[[X:.*]] = %[[LO]] to %[[HI]] step %c16 {
 // CHECK:             %[[AT:.*]] = arith.addi %{{.*}}, %{{.*}} : vector<16xindex>
-// CHECK:             %[[MASK:.*]] = arith.cmpi ult, %{{.*}} : vector<16xindex>
+// CHECK:             %[[MASK:.*]] = arith.cmpi sgt, %{{.*}} : vector<16xi32>
 // CHECK:             %[[SHARED:.*]] = piko.load checked @v[%c3 : index] "y" : f32
 // CHECK:             %[[Z:.*]] = arith.mulf %{{.*}} : vector<16xf32>
 // CHECK:             %[[OLD:.*]] = piko.cpu.gather consecutive @depth[%[[X]], %c3 : index, index] "z" mask %[[MASK]] : vector<16xi1>, vector<16xf32>
