@@ -8,6 +8,7 @@
 #include "LowerPermutations.h"
 #include "Piko/Target/CodeGeneration.h"
 #include "SelectBits.h"
+#include "WidenMasks.h"
 
 #include "llvm/ExecutionEngine/Orc/ExecutionUtils.h"
 #include "llvm/IR/IRBuilder.h"
@@ -78,8 +79,10 @@ static ModulePassManager makeLastPasses(const TargetMachine &machine,
                                         int optLevel, Sanitizer sanitizer) {
   ModulePassManager passes;
   passes.addPass(LowerArithmeticPass(machine));
-  if (machine.getTargetTriple().isX86() && optLevel > 0)
+  if (machine.getTargetTriple().isX86() && optLevel > 0) {
     passes.addPass(createModuleToFunctionPassAdaptor(SelectBitsPass()));
+    passes.addPass(createModuleToFunctionPassAdaptor(WidenMasksPass(machine)));
+  }
   if (sanitizer == Sanitizer::Thread)
     passes.addPass(createModuleToFunctionPassAdaptor(ThreadSanitizerPass()));
   if (sanitizer == Sanitizer::Address) {

@@ -69,8 +69,8 @@ static void findFeatures(const Target &target, const Triple &triple,
   processor.lanes = getLanes(*info);
   // LLVM takes a branch for each lane where it does not know gathers as fast.
   if (info->checkFeatures("+avx2"))
-    processor.features += processor.features.empty() ? "+fast-gather"
-                                                     : ",+fast-gather";
+    processor.features +=
+        processor.features.empty() ? "+fast-gather" : ",+fast-gather";
 }
 
 Expected<Processor> piko::resolveProcessor(StringRef cpu) {

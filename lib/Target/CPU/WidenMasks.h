@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Masks of eight lanes of AVX2, which has none: comparisons give 32 bits for
+// each lane, but what leaves a block has as few as LLVM can hold, 16, and is
+// packed there and unpacked in each block that takes it.
+
+#ifndef PIKO_TARGET_CPU_WIDENMASKS_H
+#define PIKO_TARGET_CPU_WIDENMASKS_H
+
+#include "llvm/IR/PassManager.h"
+#include "llvm/Target/TargetMachine.h"
+
+namespace piko {
+
+/// Gives masks that go from block to block 32 bits for each lane, where the
+/// function's processor has AVX2 alone. To run behind the optimizer, which
+/// would undo it.
+struct WidenMasksPass : llvm::PassInfoMixin<WidenMasksPass> {
+  explicit WidenMasksPass(const llvm::TargetMachine &machine)
+      : machine(&machine) {}
+  llvm::PreservedAnalyses run(llvm::Function &function,
+                              llvm::FunctionAnalysisManager &);
+
+private:
+  const llvm::TargetMachine *machine;
+};
+
+} // namespace piko
+
+#endif // PIKO_TARGET_CPU_WIDENMASKS_H
