@@ -376,7 +376,7 @@ LogicalResult PhaseImporter::importAtomic(llvm::CallInst *call) {
   auto op =
       make<AtomicOp>(old, kind, place.state->name, place.indices, place.field,
                      place.elements, scalars.get(call->getArgOperand(4)),
-                     /*checked=*/false, /*of=*/nullptr);
+                     /*checked=*/false, /*of=*/nullptr, /*copy=*/nullptr);
   if (old)
     values[call] = op.getOld();
   return success();

@@ -36,6 +36,7 @@ piko.pipeline @Kernels rank 2 {
 
 // CHECK-LABEL: piko.pipeline @Resolved
 piko.pipeline @Resolved rank 2 {
+  piko.buffer @counts : @F
   piko.source @a
   piko.edge @a[0] -> @b
   piko.stage @a bins [8, 8] threads 64 : @F -> [@F] {}
@@ -74,6 +75,9 @@ piko.pipeline @Resolved rank 2 {
     // CHECK-NEXT: %[[TILES:.*]] = piko.grid @b[0] tiles
     // CHECK-NEXT: piko.storage.append_bin %[[W]][0] of @b in %[[BIN]]{{$}}
     // CHECK-NEXT: piko.storage.append_bin %[[W]][0] of @b in %[[BIN]] tile %[[TILES]]
+    // CHECK-NEXT: %[[COPY:.*]] = piko.cpu.private_copy add @counts "x" of %[[W]]{{$}}
+    // CHECK-NEXT: piko.cpu.private_copy and @counts "x" of %[[W]] often
+    // CHECK-NEXT: piko.atomic add checked @counts[%[[AT]] : index] "x", %[[X]] in %[[COPY]] : i32
     %bins = piko.storage.open_bins @a : !piko.bins<@F>
     %u = piko.storage.unit_count %bins : !piko.bins<@F>
     %c0, %c1 = piko.storage.unit_cells %bins[%u] : !piko.bins<@F>
@@ -89,6 +93,9 @@ piko.pipeline @Resolved rank 2 {
     %t = piko.grid @b[0] tiles
     piko.storage.append_bin %w[0] of @b in %b
     piko.storage.append_bin %w[0] of @b in %b tile %t
+    %c = piko.cpu.private_copy add @counts "x" of %w
+    %d = piko.cpu.private_copy and @counts "x" of %w often
+    piko.atomic add checked @counts[%i0 : index] "x", %x in %c : i32
   }
 }
 

@@ -161,6 +161,30 @@ LogicalResult LocalBinOp::verifySymbolUses(SymbolTableCollection &) {
   return success();
 }
 
+LogicalResult PrivateCopyOp::verifySymbolUses(SymbolTableCollection &) {
+  auto open = getWriter().getDefiningOp<OpenWriterOp>();
+  OpenBinsOp bins = getOpenBins(getWriter());
+  if ((open && open.getStageAttr()) || (bins && bins.getSource()))
+    return emitOpError("expected the writer of the stage whose kernel it is, "
+                       "but got that of ")
+           << (open.getStageAttr() ? "another stage" : "a source");
+  Operation *state = lookupInPipeline<Operation *>(*this, getStateAttr());
+  if (!state || !isa<BufferOp, ImageOp>(state))
+    return emitOpError("expected a buffer or an image, but got ")
+           << getStateAttr() << ", which is none";
+  FlatSymbolRefAttr name = getStateRecord(state);
+  RecordOp record = lookupRecord(*this, name);
+  FieldAttr field = record ? record.getField(getField()) : FieldAttr();
+  if (!field)
+    return emitOpError("expected a field of ")
+           << name << ", but got '" << getField() << "'";
+  if (getKind() == AtomicKind::AddF || !field.getType().isInteger())
+    return emitOpError("expected an operation on integers, whose order does "
+                       "not show, but got '")
+           << stringifyAtomicKind(getKind()) << "' of type " << field.getType();
+  return success();
+}
+
 LogicalResult AppendOp::verifySymbolUses(SymbolTableCollection &) {
   FlatSymbolRefAttr name = getPrim().getType().getRecord();
   RecordOp record = lookupRecord(*this, name);

@@ -74,6 +74,25 @@ LogicalResult StoreOp::verifySymbolUses(SymbolTableCollection &) {
   return verifyWrite(*this, getValue().getType());
 }
 
+/// Whether an atomic operation is what its private copy is for.
+static LogicalResult verifyCopy(AtomicOp op) {
+  if (op.getOld())
+    return op.emitOpError("expected no result, because a private copy does not "
+                          "hold what others have changed");
+  auto made = op.getCopy().getDefiningOp<PrivateCopyOp>();
+  if (made && made.getStateAttr() == op.getStateAttr() &&
+      made.getField() == op.getField() && made.getKind() == op.getKind())
+    return success();
+  InFlightDiagnostic error = op.emitOpError("expected a private copy for '")
+                             << stringifyAtomicKind(op.getKind()) << "' of "
+                             << op.getStateAttr() << " \"" << op.getField()
+                             << "\"";
+  if (made)
+    error << ", but got one for '" << stringifyAtomicKind(made.getKind())
+          << "' of " << made.getStateAttr() << " \"" << made.getField() << "\"";
+  return error;
+}
+
 LogicalResult AtomicOp::verifySymbolUses(SymbolTableCollection &) {
   bool isFloat = isa<FloatType>(getValue().getType());
   if (isFloat != (getKind() == AtomicKind::AddF))
@@ -93,7 +112,9 @@ LogicalResult AtomicOp::verifySymbolUses(SymbolTableCollection &) {
              << (getOld() ? "the result of an atomic" : "a float atomic")
              << " shows the order of its primitives";
   }
-  return verifyWrite(*this, getValue().getType());
+  if (failed(verifyWrite(*this, getValue().getType())))
+    return failure();
+  return getCopy() ? verifyCopy(*this) : success();
 }
 
 LogicalResult PrefetchOp::verifySymbolUses(SymbolTableCollection &) {

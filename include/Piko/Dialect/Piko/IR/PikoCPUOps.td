@@ -7,6 +7,7 @@
 #ifndef PIKO_DIALECT_PIKO_IR_PIKOCPUOPS_TD
 #define PIKO_DIALECT_PIKO_IR_PIKOCPUOPS_TD
 
+include "Piko/Dialect/Piko/IR/PikoAttributes.td"
 include "Piko/Dialect/Piko/IR/PikoInterfaces.td"
 include "Piko/Dialect/Piko/IR/PikoTypes.td"
 
@@ -516,6 +517,34 @@ def Piko_NextUnitOp : Piko_CPUOp<"next_unit", [
   let arguments = (ins Piko_BinsType:$bins, Index:$last);
   let results = (outs Index:$result);
   let assemblyFormat = "$bins `after` $last attr-dict `:` qualified(type($bins))";
+}
+
+def Piko_PrivateCopyOp : Piko_CPUOp<"private_copy", [
+    DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
+  let summary = "where a unit of work reduces to a piece of state";
+  let description = [{
+    A kernel that changes a field of a buffer or an image by atomic operations of
+    one kind alone, and takes no result of them, need not lock: the thread that
+    runs the unit has a copy of its own, which starts with numbers that change
+    nothing. When the kernel ends, the copies are combined with the state. One of
+    the threads uses the state itself. Where copies would cost more than they
+    save, the runtime gives none, and the operations are atomic as they were.
+
+    `often` says that a primitive changes many elements.
+
+    ```mlir
+    %writer = piko.cpu.open_writer %bins[%unit] : !piko.bins<@Fragment>
+    %c = piko.cpu.private_copy add @histogram "value" of %writer often
+    piko.atomic add checked @histogram[%i : index] "value", %one in %c : i32
+    ```
+  }];
+  let arguments = (ins Piko_AtomicKind:$kind, FlatSymbolRefAttr:$state,
+                       StrAttr:$field, Piko_WriterType:$writer,
+                       UnitAttr:$often);
+  let results = (outs Piko_PrivateCopyType:$copy);
+  let assemblyFormat = [{
+    $kind $state $field `of` $writer (`often` $often^)? attr-dict
+  }];
 }
 
 //===----------------------------------------------------------------------===//

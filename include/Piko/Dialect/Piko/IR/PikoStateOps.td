@@ -79,7 +79,8 @@ def Piko_AtomicOp : Piko_StateAccessOp<"atomic", [
   let description = [{
     A result is the value that was there. It shows the order of calls, as does
     the rounding of `add_float`: both need a stage that is `unordered`. `of` is
-    as in `piko.load`.
+    as in `piko.load`. On the CPU the change may be `in` a private copy, which
+    nobody else changes (`piko.cpu.private_copy`).
 
     ```mlir
     piko.atomic add @histogram[%i : index] "value", %one : i32
@@ -90,12 +91,13 @@ def Piko_AtomicOp : Piko_StateAccessOp<"atomic", [
                        Variadic<Piko_Coordinate>:$indices, StrAttr:$field,
                        Variadic<Index>:$elements,
                        AnyTypeOf<[I32, I64, F32, F64]>:$value, UnitAttr:$checked,
-                       OptionalAttr<StrAttr>:$of);
+                       OptionalAttr<StrAttr>:$of,
+                       Optional<Piko_PrivateCopyType>:$copy);
   let results = (outs Optional<AnyTypeOf<[I32, I64, F32, F64]>>:$old);
   let assemblyFormat = [{
     $kind (`of` $of^)? (`checked` $checked^)? $state
     (`[` $indices^ `:` type($indices) `]`)? $field
-    (`[` $elements^ `]`)? `,` $value attr-dict `:` type($value)
+    (`[` $elements^ `]`)? `,` $value (`in` $copy^)? attr-dict `:` type($value)
     (`->` type($old)^)?
   }];
 }

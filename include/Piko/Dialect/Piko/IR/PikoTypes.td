@@ -75,4 +75,12 @@ def Piko_WriterType : Piko_Type<"Writer", "writer"> {
   }];
 }
 
+def Piko_PrivateCopyType : Piko_Type<"PrivateCopy", "private_copy"> {
+  let summary = "where a worker keeps what it adds to a piece of state";
+  let description = [{
+    On the CPU, one for each thread that runs units of work, so that none waits
+    for another; what they hold is combined when the kernel ends.
+  }];
+}
+
 #endif // PIKO_DIALECT_PIKO_IR_PIKOTYPES_TD
