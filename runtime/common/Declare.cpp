@@ -256,6 +256,32 @@ void pikoir_declare_clears(pikort_pipeline *p, int32_t stage, int32_t state) {
           [&] { entry(p->stages, stage, "stage").clears.push_back(state); });
 }
 
+void pikoir_declare_private(pikort_pipeline *p, int32_t stage, int32_t copy,
+                            int32_t state, const void *identity,
+                            int32_t runShift, int32_t often,
+                            pikoir_combine combine) {
+  guarded(p, "setup", [&] {
+    Reduction &reduction = declare(entry(p->stages, stage, "stage").reductions,
+                                   copy, "private copy");
+    expect(state >= 0 && state < static_cast<int32_t>(p->states.size()) &&
+               p->states[state].declared &&
+               p->states[state].kind != PIKORT_CONSTANT,
+           "private copy " + std::to_string(copy) +
+               ": expected a declared buffer or image, but got state " +
+               std::to_string(state));
+    expect(identity && combine && runShift >= 0 && runShift < 32,
+           "private copy " + std::to_string(copy) +
+               ": expected an identity, a function, and a shift in [0, 31]");
+    const auto *bytes = static_cast<const uint8_t *>(identity);
+    reduction.state = state;
+    reduction.identity.assign(bytes,
+                              bytes + p->records[p->states[state].record].size);
+    reduction.runShift = runShift;
+    reduction.often = often != 0;
+    reduction.combine = combine;
+  });
+}
+
 void pikoir_declare_strips(pikort_pipeline *p, int32_t id, int32_t source,
                            int64_t chunk, const int32_t *stages,
                            int32_t count) {

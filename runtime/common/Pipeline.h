@@ -122,6 +122,16 @@ struct Source {
   int64_t begin = 0, end = 0; ///< The strip that runs, or all.
 };
 
+/// What a kernel does to a field of a piece of state: see PrivateCopies.h.
+struct Reduction {
+  bool declared = false;
+  int32_t state = 0;
+  std::vector<uint8_t> identity; ///< One record.
+  int32_t runShift = 0;
+  bool often = false;
+  pikoir_combine combine = nullptr;
+};
+
 struct Stage {
   bool declared = false;
   std::string name;
@@ -131,6 +141,7 @@ struct Stage {
   std::array<int64_t, 4> binSize{};
   int32_t root = 0;     ///< Of the lineage that it starts.
   int32_t keyWidth = 0; ///< 64-bit words of its items' keys, 0 = none.
+  std::vector<Reduction> reductions; ///< Of its kernel, by private copy.
   // Completed by finish():
   std::vector<int32_t> sources; ///< That feed it, ascending.
   std::vector<int32_t> inputs;  ///< Edges that end here, as declared.

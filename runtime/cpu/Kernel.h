@@ -98,6 +98,7 @@ struct Lane : pikoir_writer {
   ~Lane();
   pikort_pipeline *pipeline = nullptr;
   Kernel *kernel = nullptr;
+  size_t number = 0; ///< Among those of the kernel.
   std::vector<pikoir_port> portStorage;
   std::vector<PortLogs> logs;
   int64_t emitted = 0; ///< Over all units of this run.
@@ -107,7 +108,9 @@ struct Lane : pikoir_writer {
   /// of the next slot, and behind the unit's last.
   uint32_t *slotEnd = nullptr, *slotLimit = nullptr;
   ScratchStack scratch;
-  std::unique_ptr<Deferred> deferred; ///< If there were any.
+  std::unique_ptr<Deferred> deferred;   ///< If there were any.
+  std::vector<pikoir_private> privates; ///< For each reduction of the stage.
+  bool reduces = false;                 ///< Some unit of this launch asked.
 
   /// Frees what a run holds.
   void clear();
@@ -146,9 +149,12 @@ struct Stream : Items {
   std::vector<Array<uint8_t>> blocks;
 };
 
-class Serial; // Serial.h
+class Serial;         // Serial.h
+struct PrivateCopies; // PrivateCopies.h
 
 struct Kernel {
+  Kernel();
+  ~Kernel();
   int32_t stage = 0;
   int32_t source = -1; ///< This is the AssignBin of a source.
   size_t statsIndex = 0;
@@ -179,6 +185,8 @@ struct Kernel {
   std::mutex laneMutex;
   std::vector<std::unique_ptr<Lane>> lanes;
   std::vector<Lane *> freeLanes;
+  /// Of each reduction of the stage; they stay from run to run.
+  std::vector<std::unique_ptr<PrivateCopies>> copies;
 
   // On a cycle.
   bool firstRound = true;
@@ -277,6 +285,9 @@ void cutUnits(pikort_pipeline &p, const Stage &stage, Kernel &kernel);
 
 // --- State.cpp --------------------------------------------------------------
 
+/// Fills `bytes` with copies of a record, or with zeros.
+void fill(int32_t threads, uint8_t *to, int64_t bytes,
+          const std::vector<uint8_t> &record);
 /// Allocates images and buffers sized by sources; throws.
 void prepareState(pikort_pipeline &p);
 /// Of a stage that clears images: clears what its first kernel will not.

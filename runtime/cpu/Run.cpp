@@ -3,11 +3,15 @@
 
 #include "cpu/Check.h"
 #include "cpu/Cycle.h"
+#include "cpu/PrivateCopies.h"
 #include "cpu/Strips.h"
 
 #include <algorithm>
 
 using namespace piko::rt;
+
+Kernel::Kernel() = default;
+Kernel::~Kernel() = default;
 
 void Kernel::clear() {
   stream = {};
@@ -150,8 +154,10 @@ static const pikoir_input *begin(pikort_pipeline &p, Kernel &kernel) {
       prepareSource(p, kernel);
     else
       prepareStage(p, kernel);
-    if (kernel.source < 0)
+    if (kernel.source < 0) {
       beginClears(p, kernel);
+      beginReductions(p, kernel);
+    }
     kernel.open = true;
     kernel.nextUnit = 0;
     int64_t useful = kernel.ownsUnits ? p.threads : kernel.input.unit_count;
@@ -229,6 +235,7 @@ static int32_t end(pikort_pipeline &p, Kernel &kernel) {
       kernel.clear();
   } else {
     kernel.ended = p.profile.enter(Part::Join);
+    endReductions(p, kernel);
     endThreads(p, kernel, status);
   }
   cpuOf(p).activeThreads = p.threads;

@@ -9,9 +9,8 @@
 
 using namespace piko::rt;
 
-/// Fills `bytes` with copies of a record of `size` bytes, or with zeros.
-static void fill(int32_t threads, uint8_t *to, int64_t bytes,
-                 const std::vector<uint8_t> &record) {
+void piko::rt::fill(int32_t threads, uint8_t *to, int64_t bytes,
+                    const std::vector<uint8_t> &record) {
   bool zero = std::all_of(record.begin(), record.end(),
                           [](uint8_t byte) { return byte == 0; });
   auto size = zero ? 1 : static_cast<int64_t>(record.size());

@@ -252,12 +252,21 @@ void pikoir_next(pikoir_writer *writer) {
   }
 }
 
+/// The lane that this thread had before, if it is free: what it wrote to is in
+/// the thread's cache.
 static Lane *takeLane(Kernel &kernel) {
+  auto thread = static_cast<size_t>(pikoir_thread());
   std::lock_guard<std::mutex> lock(kernel.laneMutex);
-  if (kernel.freeLanes.empty())
+  std::vector<Lane *> &lanes = kernel.freeLanes;
+  if (lanes.empty())
     return nullptr;
-  Lane *lane = kernel.freeLanes.back();
-  kernel.freeLanes.pop_back();
+  auto own = std::find_if(lanes.begin(), lanes.end(), [&](const Lane *lane) {
+    return lane->number == thread;
+  });
+  if (own != lanes.end())
+    std::swap(*own, lanes.back());
+  Lane *lane = lanes.back();
+  lanes.pop_back();
   return lane;
 }
 
@@ -370,6 +379,7 @@ static std::unique_ptr<Lane> makeLane(pikort_pipeline &p, Kernel &kernel) {
   size_t ports = ofSource ? 1 : p.stages[kernel.stage].outputs.size();
   lane->pipeline = &p;
   lane->kernel = &kernel;
+  lane->number = kernel.lanes.size();
   lane->stage = kernel.stage;
   lane->portStorage.resize(ports);
   lane->logs.resize(ports);

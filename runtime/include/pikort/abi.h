@@ -180,6 +180,18 @@ PIKORT_API void pikoir_declare_cycle(pikort_pipeline *p, int32_t id,
 PIKORT_API void pikoir_declare_loop(pikort_pipeline *p, int32_t id,
                                     const int32_t *stages, int32_t count,
                                     int32_t keys);
+/// Combines a field of each of so many records with what a private copy of them
+/// holds, and leaves there what changes nothing.
+typedef void (*pikoir_combine)(uint8_t *to, uint8_t *copy, int64_t records);
+/// All that the kernel of a stage does to a field of a buffer or an image is
+/// one kind of operation that commutes and associates: private copy number
+/// `copy` of the stage's, from 0. `identity` is a record of a copy that changes
+/// nothing. A byte stands for 1 << `run_shift` records, to say that the kernel
+/// has changed some. `often`: a primitive changes many.
+PIKORT_API void pikoir_declare_private(pikort_pipeline *p, int32_t stage,
+                                       int32_t copy, int32_t state,
+                                       const void *identity, int32_t run_shift,
+                                       int32_t often, pikoir_combine combine);
 /// `stage` waits until `waits_for` is finished (endStage): for checking mode.
 PIKORT_API void pikoir_declare_wait(pikort_pipeline *p, int32_t stage,
                                     int32_t waits_for);
@@ -350,6 +362,16 @@ PIKORT_API void pikoir_defer_end(pikoir_writer *writer);
 PIKORT_API void *pikoir_scratch(pikoir_writer *writer, int64_t bytes);
 PIKORT_API int64_t pikoir_scratch_mark(pikoir_writer *writer);
 PIKORT_API void pikoir_scratch_release(pikoir_writer *writer, int64_t mark);
+
+/// What a unit changes in place of state, without locks, if `data` is not null;
+/// else the state itself, by atomic operations. Valid until pikoir_close.
+typedef struct pikoir_private {
+  uint8_t *data;  ///< Element 0.
+  uint8_t *dirty; ///< Of each run of records: 1 if the unit has changed one.
+} pikoir_private;
+
+PIKORT_API const pikoir_private *pikoir_get_private(pikoir_writer *writer,
+                                                    int32_t copy);
 
 /// The AssignBin kernel of a source whose consumer is PLACED. The primitives
 /// stay where the host has them. There is one pikoir_next for each.
@@ -606,6 +628,10 @@ PIKOIR_ASSERT_OFFSET(pikoir_writer, flags, 12);
 PIKOIR_ASSERT_OFFSET(pikoir_writer, port_count, 16);
 PIKOIR_ASSERT_OFFSET(pikoir_writer, stage, 20);
 PIKOIR_ASSERT_OFFSET(pikoir_writer, ports, 24);
+
+PIKOIR_ASSERT_SIZE(pikoir_private, 16);
+PIKOIR_ASSERT_OFFSET(pikoir_private, data, 0);
+PIKOIR_ASSERT_OFFSET(pikoir_private, dirty, 8);
 
 #undef PIKOIR_ASSERT_OFFSET
 #undef PIKOIR_ASSERT_SIZE
