@@ -38,6 +38,8 @@ ArrayAttr AliasTags::primitive(StringRef record, StringRef field) const {
   return tag(node("primitive " + record + "." + field, runtime()));
 }
 
+ArrayAttr AliasTags::dirty() const { return tag(node("dirty", root())); }
+
 ArrayAttr AliasTags::writer() const { return tag(node("writer", runtime())); }
 
 ArrayAttr AliasTags::input() const { return tag(node("input", runtime())); }

@@ -5,6 +5,7 @@
 //
 //   piko
 //     STATE.FIELD    each number of a piece of state by itself
+//     dirty          which parts of private copies have changed
 //     failure        what pikoir_fail keeps
 //     runtime        what calls for emissions may touch
 //       RECORD.FIELD   numbers of primitives, read or emitted
@@ -31,6 +32,7 @@ public:
                         bool isConstant) const;
   mlir::ArrayAttr primitive(mlir::StringRef record,
                             mlir::StringRef field) const;
+  mlir::ArrayAttr dirty() const;
   mlir::ArrayAttr writer() const;
   mlir::ArrayAttr input() const;
   /// Of a call of the runtime; null where nothing is known about it.

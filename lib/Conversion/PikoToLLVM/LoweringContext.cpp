@@ -5,6 +5,8 @@
 #include "LoweringContext.h"
 
 #include "Piko/Analysis/StageGraph.h"
+#include "Piko/Dialect/Piko/IR/PikoCPU.h"
+
 #include "mlir/Conversion/LLVMCommon/MemRefBuilder.h"
 #include "mlir/Conversion/LLVMCommon/TypeConverter.h"
 #include "mlir/Dialect/GPU/IR/GPUDialect.h"
@@ -43,6 +45,29 @@ PipelineNumbers::PipelineNumbers(PipelineOp pipeline) : pipeline(pipeline) {
   for (auto buffer : pipeline.getOps<BufferOp>())
     if (SymbolTable::symbolKnownUseEmpty(buffer, &pipeline.getBody()))
       unusedBuffers.insert(buffer.getSymNameAttr());
+  pipeline.walk([&](PrivateCopyOp copy) {
+    StageOp stage = getKernelStage(copy);
+    if (!stage)
+      return;
+    Reduction reduction{stage.getSymNameAttr(), copy.getStateAttr().getAttr(),
+                        copy.getFieldAttr(), copy.getKind(), copy.getOften()};
+    if (!findReduction(reduction.stage, reduction.state, reduction.field))
+      reductions.push_back(reduction);
+  });
+}
+
+std::optional<int32_t> PipelineNumbers::findReduction(StringAttr stage,
+                                                      StringAttr state,
+                                                      StringRef field) const {
+  int32_t number = 0;
+  for (const Reduction &reduction : reductions) {
+    if (reduction.stage != stage)
+      continue;
+    if (reduction.state == state && reduction.field == field)
+      return number;
+    ++number;
+  }
+  return std::nullopt;
 }
 
 std::string piko::getFunctionName(KernelOp kernel) {

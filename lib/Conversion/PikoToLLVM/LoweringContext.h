@@ -18,6 +18,13 @@
 
 namespace piko {
 
+/// What a kernel reduces to private copies of; see PrivateCopyOp.
+struct Reduction {
+  mlir::StringAttr stage, state, field;
+  AtomicKind kind;
+  bool often;
+};
+
 /// What the runtime calls a pipeline's parts.
 struct PipelineNumbers {
   PipelineOp pipeline;
@@ -26,8 +33,13 @@ struct PipelineNumbers {
   llvm::DenseSet<mlir::StringAttr> writtenBuffers;
   /// Buffers that no kernel uses.
   llvm::DenseSet<mlir::StringAttr> unusedBuffers;
+  llvm::SmallVector<Reduction> reductions;
 
   explicit PipelineNumbers(PipelineOp pipeline);
+  /// The number of a reduction among those of its stage.
+  std::optional<int32_t> findReduction(mlir::StringAttr stage,
+                                       mlir::StringAttr state,
+                                       mlir::StringRef field) const;
 };
 
 /// Data and extent of a piece of state, loaded when a kernel starts.
@@ -156,8 +168,20 @@ mlir::Value createBytes(mlir::OpBuilder &builder, mlir::Location loc,
                         mlir::Value pointer, mlir::Value size,
                         mlir::MemRefType type);
 
+/// Declares what kernels reduce to private copies of, and makes the functions
+/// that combine these.
+void declareReductions(mlir::OpBuilder &builder, mlir::Value frame,
+                       const PipelineNumbers &numbers,
+                       LoweringContext &context);
+/// What an atomic operation on an integer makes of the number that was there.
+mlir::Value createChange(mlir::OpBuilder &builder, mlir::Location loc,
+                         AtomicKind kind, mlir::Value old, mlir::Value value);
+/// A private copy keeps one note of whether it has been changed for 1 << so
+/// many records.
+int64_t getRunShift(RecordOp record);
+
 /// Patterns for the storage of bins, for writers, for state, for checking mode,
-/// for approximations, and for the logs of grids.
+/// for approximations, for private copies, and for the logs of grids.
 void populateKernelToLLVMPatterns(const mlir::TypeConverter &converter,
                                   mlir::RewritePatternSet &patterns,
                                   LoweringContext &context);
@@ -180,6 +204,9 @@ void populateChecksToLLVMPatterns(const mlir::TypeConverter &converter,
 void populateApproximationsToLLVMPatterns(const mlir::TypeConverter &converter,
                                           mlir::RewritePatternSet &patterns,
                                           LoweringContext &context);
+void populateReductionsToLLVMPatterns(const mlir::TypeConverter &converter,
+                                      mlir::RewritePatternSet &patterns,
+                                      LoweringContext &context);
 void populateGridToLLVMPatterns(const mlir::TypeConverter &converter,
                                 mlir::RewritePatternSet &patterns,
                                 LoweringContext &context);

@@ -137,6 +137,9 @@ LogicalResult ConvertPikoToLLVMPass::convert(PipelineOp pipeline,
   converter.addConversion([](WriterType type) -> Type {
     return LLVM::LLVMPointerType::get(type.getContext());
   });
+  converter.addConversion([](PrivateCopyType type) -> Type {
+    return LLVM::LLVMPointerType::get(type.getContext());
+  });
   ConversionTarget target(getContext());
   target.addIllegalDialect<PikoDialect>();
   // Of other dialects' accesses only they themselves could make code.
@@ -156,6 +159,7 @@ LogicalResult ConvertPikoToLLVMPass::convert(PipelineOp pipeline,
   populateRecordsToLLVMPatterns(converter, patterns, context);
   populateChecksToLLVMPatterns(converter, patterns, context);
   populateApproximationsToLLVMPatterns(converter, patterns, context);
+  populateReductionsToLLVMPatterns(converter, patterns, context);
   populateGridToLLVMPatterns(converter, patterns, context);
   FrozenRewritePatternSet frozen(std::move(patterns));
   for (func::FuncOp function : functions)

@@ -353,6 +353,7 @@ void SetupWriter::run(ProgramOp program) {
     declareEdge(edge);
   for (auto [name, number] : numbers.states)
     declareState(SymbolTable::lookupSymbolIn(pipeline, name), number);
+  declareReductions(builder, frame, numbers, context);
   declareRoots(program);
   program.walk<WalkOrder::PreOrder>([&](Operation *op) {
     if (auto join = dyn_cast<JoinOp>(op))

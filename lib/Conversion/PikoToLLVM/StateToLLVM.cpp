@@ -6,14 +6,15 @@
 
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
 
+#include "mlir/Dialect/SCF/IR/SCF.h"
+
 using namespace mlir;
 using namespace piko;
 
-/// How many bytes behind the first element of a buffer or image another is;
-/// null for a constant, which has no indices.
-static Value createElementOffset(OpBuilder &builder, Location loc,
-                                 ValueRange indices, const StateView &view,
-                                 int64_t size) {
+/// The number of an element of a buffer or image; null for a constant, which
+/// has no indices.
+static Value createElementNumber(OpBuilder &builder, Location loc,
+                                 ValueRange indices, const StateView &view) {
   Value index;
   for (int64_t dim = indices.size() - 1; dim >= 0; --dim) {
     Value at = toI64(builder, loc, indices[dim]);
@@ -24,9 +25,17 @@ static Value createElementOffset(OpBuilder &builder, Location loc,
                                       at)
               : at;
   }
-  return index ? arith::MulIOp::create(builder, loc, index,
-                                       createI64(builder, loc, size))
-               : Value();
+  return index;
+}
+
+/// How many bytes it is behind the first one.
+static Value createElementOffset(OpBuilder &builder, Location loc,
+                                 ValueRange indices, const StateView &view,
+                                 int64_t size) {
+  Value number = createElementNumber(builder, loc, indices, view);
+  return number ? arith::MulIOp::create(builder, loc, number,
+                                        createI64(builder, loc, size))
+                : Value();
 }
 
 namespace {
@@ -35,14 +44,18 @@ template <typename OpT> struct StateLowering : ContextPattern<OpT> {
   using ContextPattern<OpT>::ContextPattern;
   using ContextPattern<OpT>::context;
 
-  /// The address of the number that an access names.
-  Value address(OpBuilder &builder, OpT op,
-                typename OpT::Adaptor adaptor) const {
+  RecordOp record(OpT op) const {
+    return context.record(getStateRecord(context.state(op, op.getState())));
+  }
+
+  /// The address of the number that an access names, in the state or in a copy
+  /// of it.
+  Value address(OpBuilder &builder, OpT op, typename OpT::Adaptor adaptor,
+                Value copy = {}) const {
     Location loc = op.getLoc();
     StateView &view = context.view(builder, op, op.getState());
-    RecordOp record =
-        context.record(getStateRecord(context.state(op, op.getState())));
-    Value element = view.data;
+    RecordOp record = this->record(op);
+    Value element = copy ? copy : view.data;
     if (Value offset = createElementOffset(builder, loc, adaptor.getIndices(),
                                            view, record.getSize()))
       element = createOffset(builder, loc, element, offset);
@@ -110,18 +123,71 @@ struct AtomicLowering : StateLowering<AtomicOp> {
   LogicalResult
   matchAndRewrite(AtomicOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
-    // The value says nothing of what others have written: monotonic is enough,
-    // and the end of the kernel orders it before those that follow.
-    auto old = LLVM::AtomicRMWOp::create(
-        rewriter, op.getLoc(), toLLVM(op.getKind()),
-        address(rewriter, op, adaptor), adaptor.getValue(),
-        LLVM::AtomicOrdering::monotonic);
-    old.setTbaaAttr(tag(op));
+    if (op.getCopy()) {
+      createChoice(rewriter, op, adaptor);
+      rewriter.eraseOp(op);
+      return success();
+    }
+    auto old = createLocked(rewriter, op, adaptor);
     if (op.getOld())
       rewriter.replaceOp(op, old);
     else
       rewriter.eraseOp(op);
     return success();
+  }
+
+private:
+  LLVM::AtomicRMWOp createLocked(OpBuilder &builder, AtomicOp op,
+                                 OpAdaptor adaptor) const {
+    // The value says nothing of what others have written: monotonic is enough,
+    // and the end of the kernel orders it before those that follow.
+    auto old = LLVM::AtomicRMWOp::create(
+        builder, op.getLoc(), toLLVM(op.getKind()),
+        address(builder, op, adaptor), adaptor.getValue(),
+        LLVM::AtomicOrdering::monotonic);
+    old.setTbaaAttr(tag(op));
+    return old;
+  }
+
+  /// In the unit's private copy, if the runtime has given one.
+  void createChoice(OpBuilder &builder, AtomicOp op, OpAdaptor adaptor) const {
+    Location loc = op.getLoc();
+    Value data = context.member(builder, adaptor.getCopy(),
+                                PIKO_RUNTIME_MEMBER(pikoir_private, data));
+    Value dirty = context.member(builder, adaptor.getCopy(),
+                                 PIKO_RUNTIME_MEMBER(pikoir_private, dirty));
+    Value null = LLVM::ZeroOp::create(builder, loc, data.getType());
+    Value given =
+        LLVM::ICmpOp::create(builder, loc, LLVM::ICmpPredicate::ne, data, null);
+    scf::IfOp::create(
+        builder, loc, given,
+        [&](OpBuilder &then, Location loc) {
+          createPrivate(then, op, adaptor, data, dirty);
+          scf::YieldOp::create(then, loc);
+        },
+        [&](OpBuilder &otherwise, Location loc) {
+          createLocked(otherwise, op, adaptor);
+          scf::YieldOp::create(otherwise, loc);
+        });
+  }
+
+  void createPrivate(OpBuilder &builder, AtomicOp op, OpAdaptor adaptor,
+                     Value data, Value dirty) const {
+    Location loc = op.getLoc();
+    Value at = address(builder, op, adaptor, data);
+    Value old = createLoad(builder, loc, op.getValue().getType(), at, tag(op));
+    createStore(
+        builder, loc,
+        createChange(builder, loc, op.getKind(), old, adaptor.getValue()), at,
+        tag(op));
+    Value run = arith::ShRUIOp::create(
+        builder, loc,
+        createElementNumber(builder, loc, adaptor.getIndices(),
+                            context.view(builder, op, op.getState())),
+        createI64(builder, loc, getRunShift(record(op))));
+    Value changed = arith::ConstantIntOp::create(builder, loc, 1, 8);
+    createStore(builder, loc, changed, createOffset(builder, loc, dirty, run),
+                context.tags.dirty());
   }
 };
 
