@@ -126,6 +126,8 @@ void piko::addScalarSequence(OpPassManager &passes,
   if (options.has("form-tiles"))
     passes.nest<PipelineOp>().addPass(createFormTiles());
   addUnitSequence(passes);
+  if (options.has("privatize"))
+    passes.nest<PipelineOp>().addPass(createPrivatize());
   addUnitsToLoops(passes, options);
 }
 

@@ -32,7 +32,8 @@ const std::vector<std::string> &SynthesisOptions::getOptional() {
                                                  "narrow-integers",
                                                  "merge-gathers",
                                                  "if-convert",
-                                                 "uplift-pixel-loops"};
+                                                 "uplift-pixel-loops",
+                                                 "privatize"};
   return names;
 }
 

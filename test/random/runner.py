@@ -17,7 +17,8 @@ EQUAL, BLANK = "equal", "equal, but blank"
 PASSES = ["pre-schedule", "infer-directives", "fuse-stages", "test-early", "prune",
           "own-pixels", "eliminate-schedules", "fuse-kernels", "form-tiles",
           "prefetch", "vectorize", "prove-bounds", "hoist-bounds", "merge-bounds",
-          "thread-jumps", "narrow-integers", "merge-gathers", "if-convert", "uplift-pixel-loops"]
+          "thread-jumps", "narrow-integers", "merge-gathers", "if-convert", "uplift-pixel-loops",
+          "privatize"]
 
 
 def options_of(passes):

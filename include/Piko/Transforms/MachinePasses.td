@@ -658,4 +658,50 @@ def MergeGathers : Pass<"piko-merge-gathers", "::piko::PipelineOp"> {
   }];
   let statistics = [Statistic<"merged", "merged", "gathers">];
 }
+
+def Privatize : Pass<"piko-privatize", "::piko::PipelineOp"> {
+  let summary = "Reduce to private copies of state, without locks";
+  let description = [{
+    **Requires** loops over units (`piko-form-units`).
+
+    **Does**: where all that a kernel does to a field of a buffer or an image is
+    `piko.atomic` of one kind, on integers and without results, each thread gets
+    a copy of its own (`piko.cpu.private_copy`), to which it reads and writes
+    without locks. When the kernel ends, the runtime combines the copies with the
+    state, in parallel, and leaves in them what changes nothing, so that the next
+    launch finds them as they must be. It does so for runs of elements that have
+    been written to, by a function that `convert-piko-to-llvm` makes for the field
+    and the kind. The first thread has the state itself: on one thread there is no
+    copy. This is the privatization of reductions of parallelizing compilers.
+
+    **Guarantees** the same bits and the same errors: these operations commute and
+    associate, and nothing reads the field before the kernel ends.
+
+    Before:
+    ```
+    scf.forall (%unit) in (%units) {
+      %writer = piko.cpu.open_writer %bins[%unit] : !piko.bins<@Dot>
+      ...
+        piko.atomic add checked @counts[%i : i32] "value", %one : i32
+    ```
+    After:
+    ```
+    scf.forall (%unit) in (%units) {
+      %writer = piko.cpu.open_writer %bins[%unit] : !piko.bins<@Dot>
+      %copy = piko.cpu.private_copy add @counts "value" of %writer
+      ...
+        piko.atomic add checked @counts[%i : i32] "value", %one in %copy : i32
+    ```
+
+    **Limits**: whether copies are worth their memory, and the time to combine
+    them, is known when the pipeline runs: there are none for more than 8 threads,
+    for state of more than 64 MiB, under a limit of memory, and where few
+    primitives come for a large state. Remarks say what has copies and what is in
+    the way of others.
+  }];
+  let statistics = [
+    Statistic<"copies", "copies", "fields that have private copies">,
+    Statistic<"refused", "refused", "fields that atomics change in place">];
+}
+
 #endif // PIKO_TRANSFORMS_MACHINEPASSES_TD
