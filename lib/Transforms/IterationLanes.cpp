@@ -318,10 +318,13 @@ bool IterationLanes::isSharedLoop(Operation *op) const {
   return !isVarying(cast<scf::WhileOp>(op).getConditionOp().getCondition());
 }
 
-bool piko::isDivision(Operation *op) {
+bool piko::isIntegerDivision(Operation *op) {
   return isa<arith::DivSIOp, arith::DivUIOp, arith::RemSIOp, arith::RemUIOp,
-             arith::CeilDivSIOp, arith::CeilDivUIOp, arith::FloorDivSIOp,
-             arith::DivFOp, math::SqrtOp>(op);
+             arith::CeilDivSIOp, arith::CeilDivUIOp, arith::FloorDivSIOp>(op);
+}
+
+bool piko::isDivision(Operation *op) {
+  return isIntegerDivision(op) || isa<arith::DivFOp, math::SqrtOp>(op);
 }
 
 /// About how many instructions an operation is as vectors: those of 64 bits

@@ -143,6 +143,8 @@ bool isPrefetch(mlir::Operation *op);
 
 /// Whether it may trap, or takes as long for one lane as for all.
 bool isDivision(mlir::Operation *op);
+/// Whether it may trap where its last operand is 0.
+bool isIntegerDivision(mlir::Operation *op);
 
 /// Whether lanes have values of this type: numbers, and primitives, of which
 /// they have the addresses.

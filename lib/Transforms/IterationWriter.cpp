@@ -125,12 +125,6 @@ void IterationWriter::writeUniform(Operation *op) {
   builder.clone(*op, scalars);
 }
 
-/// Whether an operation may trap where its last operand is 0.
-static bool isIntegerDivision(Operation *op) {
-  return isa<arith::DivSIOp, arith::DivUIOp, arith::RemSIOp, arith::RemUIOp,
-             arith::CeilDivSIOp, arith::CeilDivUIOp, arith::FloorDivSIOp>(op);
-}
-
 /// A product of a number that grows by one from lane to lane and of one that is
 /// the same for all: what is added from lane to lane is known in front of loops
 /// over rows, and 64-bit products of vectors take long.

@@ -3,8 +3,11 @@
 // What turns of a loop cost as lanes, and one after the other.
 
 #include "IterationLanes.h"
+#include "LoopStreams.h"
 
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
+
+#include "mlir/IR/Matchers.h"
 
 using namespace mlir;
 using namespace piko;
@@ -16,6 +19,11 @@ namespace {
 struct Cycles {
   double scalar, scalarAccess, scalarDivision;
   double vector, row, gather, division;
+  /// A gather of numbers below 32 bits, for which there is no instruction; and
+  /// what it takes more if each lane goes through memory on its own.
+  double narrowGather, ownLines;
+  /// How many times as fast LLVM makes a loop that it runs as vectors.
+  double along;
   /// To bring lanes apart, for one operation or for a group, and to hand each
   /// lane a number.
   double apart, apartInOrder, slot;
@@ -44,6 +52,9 @@ static const Cycles &getCycles(int64_t laneCount) {
                                .row = 1.5,
                                .gather = 12,
                                .division = 16,
+                               .narrowGather = 70,
+                               .ownLines = 30,
+                               .along = 6,
                                .apart = 15,
                                .apartInOrder = 40,
                                .slot = 8,
@@ -59,6 +70,9 @@ static const Cycles &getCycles(int64_t laneCount) {
                               .row = 1.5,
                               .gather = 6,
                               .division = 8,
+                              .narrowGather = 35,
+                              .ownLines = 15,
+                              .along = 4,
                               .apart = 10,
                               .apartInOrder = 20,
                               .slot = 3,
@@ -74,6 +88,9 @@ static const Cycles &getCycles(int64_t laneCount) {
                               .row = 4,
                               .gather = 8,
                               .division = 5,
+                              .narrowGather = 8,
+                              .ownLines = 8,
+                              .along = 2.5,
                               .apart = 10,
                               .apartInOrder = 20,
                               .slot = 2,
@@ -140,8 +157,15 @@ private:
   /// What it takes to bring lanes apart, with what they have.
   void addTurns(const OrderedGroup &group, Frequency times);
 
+  bool isInStream(Operation *access) const {
+    return llvm::any_of(
+        inner, [&](scf::ForOp loop) { return isStream(access, loop); });
+  }
+
   const IterationLanes &lanes;
   const Cycles &cycles;
+  SmallVector<scf::ForOp> inner; ///< loops around the code, in that of lanes
+  double along = 1;              ///< How much faster LLVM makes it.
   llvm::DenseSet<Operation *> turns;
 };
 
@@ -225,8 +249,23 @@ void CostModel::addStructure(Operation *op, Frequency times, bool laneByLane) {
     return;
   }
   double turns = lanes.isSharedLoop(op) ? loopTurns : turnsThatDiffer;
+  double around = along;
+  if (loop) {
+    inner.push_back(loop);
+    along = hasVectorsAlong(loop) ? cycles.along : 1;
+  }
   for (Region &region : op->getRegions())
     add(region, times.scaled(turns * going, turns), laneByLane);
+  along = around;
+  if (loop)
+    inner.pop_back();
+}
+
+/// Whether an access is to numbers of fewer than 32 bits.
+static bool isNarrow(Operation *access) {
+  Type type = access->getNumResults() != 0 ? access->getResult(0).getType()
+                                           : access->getOperand(0).getType();
+  return type.isIntOrFloat() && type.getIntOrFloatBitWidth() < 32;
 }
 
 void CostModel::addOperation(Operation *op, Frequency times, bool laneByLane) {
@@ -238,16 +277,24 @@ void CostModel::addOperation(Operation *op, Frequency times, bool laneByLane) {
     return; // as much for one as for all, or nothing
   bool isAccess = form == LaneForm::Access;
   bool isDivided = isDivision(op);
-  double serial = times.serial * (isDivided  ? cycles.scalarDivision
-                                  : isAccess ? cycles.scalarAccess
-                                             : cycles.scalar);
+  // There are no vectors of integer division.
+  bool isRemainder =
+      isIntegerDivision(op) && !matchPattern(op->getOperand(1), m_Constant());
+  double serial = times.serial *
+                  (isDivided  ? cycles.scalarDivision
+                   : isAccess ? cycles.scalarAccess
+                              : cycles.scalar) /
+                  along;
   bool isTurns = form == LaneForm::Serial || form == LaneForm::Ordered;
   bool isGather = isAccess && !lanes.isRow(op);
-  double vectors = times.vectors * (isGather    ? cycles.gather
+  double gather = isNarrow(op) ? cycles.narrowGather : cycles.gather;
+  if (isGather && isInStream(op))
+    gather += cycles.ownLines;
+  double vectors = times.vectors * (isGather    ? gather
                                     : isAccess  ? cycles.row
                                     : isDivided ? cycles.division
                                                 : cycles.vector);
-  if (laneByLane || isTurns)
+  if (laneByLane || isTurns || isRemainder)
     vectors = serial + (laneByLane ? 0 : times.vectors * cycles.apart);
   else
     cost.computes |= !isAccess;

@@ -153,68 +153,99 @@ bool Candidate::decide(const IterationLanes &lanes) {
   else
     remark << "these iterations are vectorized for " << lanes.getLaneCount()
            << " at once";
+  if (cost.isWorthwhile())
+    remark.attachNote(loop.getLoc())
+        << "expected to take " << int64_t(cost.vectors) << " cycles, and "
+        << int64_t(cost.serial) << " one after the other";
   addObstacles(remark, lanes, cost, /*isRefused=*/false);
   return true;
 }
 
-/// The bound below which a loop counts by one, if that is all that it carries;
-/// `isClosed` says whether it takes the bound as well.
-static Value findBound(scf::WhileOp loop, bool &isClosed) {
+namespace {
+
+/// How a loop counts by one: which of its variables, below which bound, and
+/// whether it takes the bound as well.
+struct Counting {
+  unsigned variable = 0;
+  Value bound;
+  bool isClosed = false;
+};
+
+} // namespace
+
+static std::optional<Counting> findCounting(scf::WhileOp loop) {
   Block &before = *loop.getBeforeBody(), &after = *loop.getAfterBody();
+  scf::ConditionOp condition = loop.getConditionOp();
   auto compare = dyn_cast<arith::CmpIOp>(before.front());
-  if (loop->getNumOperands() != 1 || before.getNumArguments() != 1 ||
-      !loop->use_empty() || !compare ||
-      compare->getNextNode() != loop.getConditionOp() ||
-      loop.getConditionOp().getCondition() != compare.getResult() ||
-      !llvm::equal(loop.getConditionOp().getArgs(), before.getArguments()))
+  if (!compare || compare->getNextNode() != condition ||
+      condition.getCondition() != compare.getResult() ||
+      !llvm::equal(condition.getArgs(), before.getArguments()) ||
+      compare.getRhs().getParentBlock() == &before)
     return {};
-  auto next =
-      after.getTerminator()->getOperand(0).getDefiningOp<arith::AddIOp>();
+  auto variable = dyn_cast<BlockArgument>(compare.getLhs());
+  if (!variable || variable.getOwner() != &before)
+    return {};
   using P = arith::CmpIPredicate;
-  isClosed = compare.getPredicate() == P::sle;
-  bool isCounted = next && next.getLhs() == after.getArgument(0) &&
+  Counting counting{variable.getArgNumber(), compare.getRhs(),
+                    compare.getPredicate() == P::sle};
+  auto next = after.getTerminator()
+                  ->getOperand(counting.variable)
+                  .getDefiningOp<arith::AddIOp>();
+  bool isCounted = next &&
+                   next.getLhs() == after.getArgument(counting.variable) &&
                    matchPattern(next.getRhs(), m_One()) &&
-                   compare.getLhs() == before.getArgument(0) &&
-                   compare.getRhs().getParentBlock() != &before &&
-                   (isClosed || compare.getPredicate() == P::slt);
-  return isCounted ? compare.getRhs() : Value();
+                   (counting.isClosed || compare.getPredicate() == P::slt);
+  // The bound may be the largest number, where 64 bits have no next one.
+  bool fits = !counting.isClosed || counting.bound.getType().isInteger(32);
+  return isCounted && fits ? counting : std::optional<Counting>();
+}
+
+static void countLoop(scf::WhileOp loop, const Counting &counting) {
+  IRRewriter builder(loop->getContext());
+  builder.setInsertionPoint(loop);
+  Location loc = loop.getLoc();
+  Type index = builder.getIndexType(), type = counting.bound.getType();
+  auto cast = [&](Value number, Type type) -> Value {
+    return number.getType() == type
+               ? number
+               : arith::IndexCastOp::create(builder, loc, type, number)
+                     .getResult();
+  };
+  SmallVector<Value> inits(loop.getInits());
+  Value one = arith::ConstantIndexOp::create(builder, loc, 1);
+  Value lower = cast(inits[counting.variable], index),
+        upper = cast(counting.bound, index);
+  if (counting.isClosed)
+    upper = arith::AddIOp::create(builder, loc, upper, one);
+  inits.erase(inits.begin() + counting.variable);
+  auto made = scf::ForOp::create(builder, loc, lower, upper, one, inits);
+  Block *body = made.getBody(), *from = loop.getAfterBody();
+  if (!body->empty())
+    builder.eraseOp(body->getTerminator());
+  builder.setInsertionPointToStart(body);
+  SmallVector<Value> variables(made.getRegionIterArgs());
+  variables.insert(variables.begin() + counting.variable,
+                   cast(made.getInductionVar(), type));
+  Operation *yield = from->getTerminator();
+  yield->eraseOperand(counting.variable);
+  builder.inlineBlockBefore(from, body, body->end(), variables);
+  builder.setInsertionPointAfter(made);
+  SmallVector<Value> results(made.getResults());
+  Value last = cast(arith::MaxSIOp::create(builder, loc, lower, upper), type);
+  results.insert(results.begin() + counting.variable, last);
+  builder.replaceOp(loop, results);
+  // The bounds of loops inside stand outside of this one.
+  moveLoopInvariantCode(made);
 }
 
 /// Makes loops that count loops of which one knows how often they turn, in 64
-/// bits, so that the bound may be the largest number.
+/// bits.
 static void countLoops(scf::ForOp root) {
   SmallVector<scf::WhileOp> loops;
   root.walk([&](scf::WhileOp loop) { loops.push_back(loop); });
-  for (scf::WhileOp loop : loops) {
-    bool isClosed = false;
-    Value bound = findBound(loop, isClosed);
-    if (!bound || (isClosed && !bound.getType().isInteger(32)))
-      continue;
-    IRRewriter builder(loop->getContext());
-    builder.setInsertionPoint(loop);
-    Location loc = loop.getLoc();
-    Type index = builder.getIndexType();
-    auto cast = [&](Value number, Type type) -> Value {
-      return number.getType() == type
-                 ? number
-                 : arith::IndexCastOp::create(builder, loc, type, number)
-                       .getResult();
-    };
-    Value one = arith::ConstantIndexOp::create(builder, loc, 1);
-    Value lower = cast(loop.getInits().front(), index),
-          upper = cast(bound, index);
-    if (isClosed)
-      upper = arith::AddIOp::create(builder, loc, upper, one);
-    auto made = scf::ForOp::create(builder, loc, lower, upper, one);
-    builder.setInsertionPointToStart(made.getBody());
-    Value number = cast(made.getInductionVar(), bound.getType());
-    Block *body = loop.getAfterBody();
-    builder.eraseOp(body->getTerminator());
-    builder.inlineBlockBefore(body, made.getBody()->getTerminator(), number);
-    builder.eraseOp(loop);
-    // The bounds of loops inside stand outside of this one.
-    moveLoopInvariantCode(made);
-  }
+  for (scf::WhileOp loop : loops)
+    if (std::optional<Counting> counting = findCounting(loop))
+      countLoop(loop, *counting);
 }
 
 /// With fewer iterations a loop runs as it was: a vector takes about as long as
@@ -261,13 +292,17 @@ void VectorizePass::runOnOperation() {
     Candidate candidate(loop);
     if (!candidate.isChosen())
       return WalkResult::advance();
-    countLoops(loop);
-    IterationLanes lanes(loop, laneCount);
+    // Of a copy: what stays scalar stays as it is.
+    auto copy = cast<scf::ForOp>(OpBuilder(loop).clone(*loop));
+    countLoops(copy);
+    IterationLanes lanes(copy, laneCount);
     if (!candidate.decide(lanes)) {
+      copy.erase();
       ++left;
       return WalkResult::advance();
     }
     vectorize(lanes);
+    loop.erase();
     ++vectorized;
     return WalkResult::skip();
   });
