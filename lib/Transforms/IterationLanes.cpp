@@ -323,6 +323,11 @@ bool piko::isIntegerDivision(Operation *op) {
              arith::CeilDivSIOp, arith::CeilDivUIOp, arith::FloorDivSIOp>(op);
 }
 
+bool piko::isDividedAsFloats(Operation *op) {
+  return isa<arith::DivUIOp, arith::RemUIOp>(op) &&
+         op->getResult(0).getType().isInteger(32);
+}
+
 bool piko::isDivision(Operation *op) {
   return isIntegerDivision(op) || isa<arith::DivFOp, math::SqrtOp>(op);
 }

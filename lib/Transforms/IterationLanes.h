@@ -143,6 +143,8 @@ bool isPrefetch(mlir::Operation *op);
 
 /// Whether it may trap, or takes as long for one lane as for all.
 bool isDivision(mlir::Operation *op);
+/// Whether it is one of 32 bits for which floats of 64 bits are divided.
+bool isDividedAsFloats(mlir::Operation *op);
 /// Whether it may trap where its last operand is 0.
 bool isIntegerDivision(mlir::Operation *op);
 

@@ -148,6 +148,17 @@ bool IterationWriter::writeLinearProduct(arith::MulIOp product) {
   return true;
 }
 
+/// The quotient of 32-bit numbers as one of 64-bit floats: what it is above an
+/// integer, or below, is more than its rounding error. There is no instruction
+/// for vectors of integers.
+Value IterationWriter::divideAsFloats(Value dividend, Value divisor) {
+  Type wide = getVectorType(builder.getF64Type());
+  Value quotient = arith::DivFOp::create(
+      builder, loc, arith::UIToFPOp::create(builder, loc, wide, dividend),
+      arith::UIToFPOp::create(builder, loc, wide, divisor));
+  return arith::FPToUIOp::create(builder, loc, dividend.getType(), quotient);
+}
+
 void IterationWriter::writeVector(Operation *op) {
   if (auto product = dyn_cast<arith::MulIOp>(op))
     if (writeLinearProduct(product))
@@ -163,6 +174,15 @@ void IterationWriter::writeVector(Operation *op) {
         DenseElementsAttr::get(
             type, builder.getIntegerAttr(type.getElementType(), 1)));
     operands[1] = choose(active, operands[1], one);
+    if (isDividedAsFloats(op)) {
+      Value value = divideAsFloats(operands[0], operands[1]);
+      if (isa<arith::RemUIOp>(op))
+        value = arith::SubIOp::create(
+            builder, loc, operands[0],
+            arith::MulIOp::create(builder, loc, value, operands[1]));
+      vectors.map(op->getResult(0), value);
+      return;
+    }
   }
   OperationState state(loc, op->getName());
   state.addOperands(operands);

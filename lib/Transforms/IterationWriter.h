@@ -63,6 +63,7 @@ private:
   void writeOperation(mlir::Operation *op);
   void writeUniform(mlir::Operation *op);
   void writeVector(mlir::Operation *op);
+  mlir::Value divideAsFloats(mlir::Value dividend, mlir::Value divisor);
   /// Whether the product is one that it has written.
   bool writeLinearProduct(mlir::arith::MulIOp product);
   void writeAccess(mlir::Operation *op);

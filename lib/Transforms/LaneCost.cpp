@@ -277,9 +277,9 @@ void CostModel::addOperation(Operation *op, Frequency times, bool laneByLane) {
     return; // as much for one as for all, or nothing
   bool isAccess = form == LaneForm::Access;
   bool isDivided = isDivision(op);
-  // There are no vectors of integer division.
-  bool isRemainder =
-      isIntegerDivision(op) && !matchPattern(op->getOperand(1), m_Constant());
+  // There are no instructions for vectors of it.
+  bool isRemainder = isIntegerDivision(op) && !isDividedAsFloats(op) &&
+                     !matchPattern(op->getOperand(1), m_Constant());
   double serial = times.serial *
                   (isDivided  ? cycles.scalarDivision
                    : isAccess ? cycles.scalarAccess
