@@ -4,6 +4,7 @@
 #include "Piko/Conversion/Approximations.h"
 #include "Piko/Target/Approximation.h"
 
+#include "llvm/CodeGen/TargetSubtargetInfo.h"
 #include "llvm/IR/IRBuilder.h"
 #include "llvm/IR/IntrinsicInst.h"
 #include "llvm/IR/IntrinsicsX86.h"
@@ -106,18 +107,19 @@ Value *Writer::write(Value *x) {
   return result;
 }
 
-static bool hasFma(const TargetMachine &machine) {
+/// A function may be for a later processor than the object.
+static bool hasFma(const TargetMachine &machine, const Function &function) {
   return !machine.getTargetTriple().isX86() ||
-         machine.getMCSubtargetInfo()->checkFeatures("+fma");
+         machine.getSubtargetImpl(function)->checkFeatures("+fma");
 }
 
 /// What the machine has, narrowest first. Without instructions for the step of
 /// Newton's method, approximations would save nothing.
-static ArrayRef<VectorInstruction>
-getInstructions(const TargetMachine &machine) {
-  if (!machine.getTargetTriple().isX86() || !hasFma(machine))
+static ArrayRef<VectorInstruction> getInstructions(const TargetMachine &machine,
+                                                   const Function &function) {
+  if (!machine.getTargetTriple().isX86() || !hasFma(machine, function))
     return {};
-  return machine.getMCSubtargetInfo()->checkFeatures("+avx512vl")
+  return machine.getSubtargetImpl(function)->checkFeatures("+avx512vl")
              ? ArrayRef(instructions14)
              : ArrayRef(instructions12);
 }
@@ -164,9 +166,10 @@ PreservedAnalyses LowerArithmeticPass::run(Module &module,
     auto *function = dyn_cast<Function>(kept->stripPointerCasts());
     return function && getApproximation(*function);
   });
-  ArrayRef<VectorInstruction> instructions = getInstructions(*machine);
   replaceApproximations(
       module, [&](IRBuilderBase &builder, Approximation kind, Value *x) {
+        ArrayRef<VectorInstruction> instructions =
+            getInstructions(*machine, *builder.GetInsertBlock()->getParent());
         if (instructions.empty())
           return computeExactly(builder, kind, x);
         Writer writer(builder, kind == Approximation::Reciprocal, instructions);
@@ -176,14 +179,14 @@ PreservedAnalyses LowerArithmeticPass::run(Module &module,
 }
 
 static void expandFmas(Module &module, const TargetMachine &machine) {
-  if (hasFma(machine))
-    return;
   for (Function &function : module) {
     if (function.getIntrinsicID() != Intrinsic::fma ||
         !function.getReturnType()->getScalarType()->isFloatTy())
       continue;
     for (User *user : make_early_inc_range(function.users())) {
       auto *call = cast<CallInst>(user);
+      if (hasFma(machine, *call->getFunction()))
+        continue;
       call->replaceAllUsesWith(expandFma(call));
       call->eraseFromParent();
     }

@@ -8,6 +8,10 @@
 // RUN: pikoc %s -o - --emit=assembly --no-cache --pipe Contracted --cpu x86-64-v3 | FileCheck %s --check-prefix=FMA
 // RUN: pikoc %s -o - --emit=assembly --no-cache --pipe Contracted --cpu x86-64 | FileCheck %s --check-prefix=NO-FMA
 // RUN: pikoc %s -o - --emit=assembly --no-cache --pipe Strict --cpu x86-64-v3 | FileCheck %s --check-prefix=STRICT
+// The same of what is compiled for several processors.
+// RUN: pikoc %s -o %t.o --no-cache --pipe Contracted --cpu x86-64,x86-64-v3
+// RUN: objdump -d %t.o | FileCheck %s --check-prefix=OBJECT
+// OBJECT: vfmadd{{.*}}ps
 // REQUIRES: x86_64
 
 // AVX512-NOT: {{div[sp]s|sqrt[sp]s}}
