@@ -10,12 +10,12 @@
 // RUN: pikoc %s -o - --emit=assembly --no-cache --pipe Strict --cpu x86-64-v3 | FileCheck %s --check-prefix=STRICT
 // The same of what is compiled for several processors.
 // RUN: pikoc %s -o %t.o --no-cache --pipe Contracted --cpu x86-64,x86-64-v3
-// RUN: objdump -d %t.o | FileCheck %s --check-prefix=OBJECT
+// RUN: llvm-objdump -d %t.o | FileCheck %s --check-prefix=OBJECT
 // OBJECT: vfmadd{{.*}}ps
 // REQUIRES: x86_64
 
 // AVX512-NOT: {{div[sp]s|sqrt[sp]s}}
-// AVX512:     vr{{cp|sqrt}}14ps %zmm
+// AVX512:     vr{{cp|sqrt}}14ps %ymm
 // AVX512-NOT: {{div[sp]s|vsqrt[sp]s}}
 // AVX-NOT:    {{v(div|sqrt)[sp]s}}
 // AVX:        vr{{cp|sqrt}}ps %ymm
