@@ -30,11 +30,12 @@ from suite import maths, page, raster, roofline, runtime
 ROOT = bodies.ROOT
 SECTIONS = {"raster": raster, "bodies": bodies_section, "runtime": runtime,
             "maths": maths, "roofline": roofline}
+RASTERIZERS = [*PIPES, raster.VISIBILITY]
 BUNNY = "/usr/share/glmark2/models/bunny.obj"
 # What options are where the user does not say, and with --quick.
 DEFAULTS = {
     "lights": ([1, 100, 1000], [1, 100]),
-    "pipes": (PIPES, ["Indexed", "Fused", "Tiled"]),
+    "pipes": (RASTERIZERS, ["Fused", "Tiled", raster.VISIBILITY]),
     "rounds": (5, 2),
     "frames": (21, 5),
     "seconds": (0.5, 0.1),
@@ -61,6 +62,8 @@ def add_options(parser):
                         help="where to build (OUT/work)")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(),
                         help="builds at a time")
+    parser.add_argument("--cpu", default="native",
+                        help="what bodies are compiled for (%(default)s)")
     parser.add_argument("--rounds", type=int)
     parser.add_argument("--frames", type=int,
                         help="of the rasterizer in a round, at most")
@@ -71,7 +74,8 @@ def add_options(parser):
     parser.add_argument("--lights", nargs="+", type=int)
     parser.add_argument("--threads", nargs="+", type=int, default=[1, 2],
                         help="of raster and runtime (1 2)")
-    parser.add_argument("--pipes", nargs="+", choices=PIPES, metavar="PIPE",
+    parser.add_argument("--pipes", nargs="+", choices=RASTERIZERS,
+                        metavar="PIPE",
                         help="of raster, of which the fastest counts")
     parser.add_argument("--peer", action="append", default=[],
                         metavar="NAME=COMMAND",

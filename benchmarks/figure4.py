@@ -93,8 +93,8 @@ def carried_records(arguments, pipe):
     return [(stage, int(sizes[element])) for stage, element in carried]
 
 
-def measure_once(arguments, scene, pipe, lights, threads):
-    command = [f"{arguments.bin}/piko-render", RASTER, *shlex.split(scene)]
+def measure_once(arguments, scene, pipe, lights, threads, source=RASTER):
+    command = [f"{arguments.bin}/piko-render", source, *shlex.split(scene)]
     for option in ["warmup", "frames", "seconds"]:
         command += [f"--{option}", str(getattr(arguments, option))]
     command += ["--pipe", pipe, "--lights", str(lights)]
