@@ -153,10 +153,6 @@ bool Candidate::decide(const IterationLanes &lanes) {
   else
     remark << "these iterations are vectorized for " << lanes.getLaneCount()
            << " at once";
-  if (cost.isWorthwhile())
-    remark.attachNote(loop.getLoc())
-        << "expected to take " << int64_t(cost.vectors) << " cycles, and "
-        << int64_t(cost.serial) << " one after the other";
   addObstacles(remark, lanes, cost, /*isRefused=*/false);
   return true;
 }

@@ -233,18 +233,19 @@ TEST_F(Binding, WrongValues) {
 
 TEST_F(Binding, NoImage) {
   EXPECT_EQ(errorOf([](pikort_pipeline *p) { declareSource(p, 0, VERTEX); }),
-            "pipeline 'Test': expected an image of 'piko::scene::Color' for "
-            "the result, but it has none");
+            "pipeline 'Test': expected an image of 'piko::scene::Color' or "
+            "'piko::scene::Color8' for the result, but it has none");
 }
 
 TEST_F(Binding, TwoImages) {
-  EXPECT_EQ(errorOf([](pikort_pipeline *p) {
-              declareSource(p, 0, VERTEX);
-              declareState(p, 0, "a", PIKORT_IMAGE, COLOR, 2);
-              declareState(p, 1, "b", PIKORT_IMAGE, COLOR, 2);
-            }),
-            "pipeline 'Test': expected one image of 'piko::scene::Color' for "
-            "the result, but got 'a' and 'b'");
+  EXPECT_EQ(
+      errorOf([](pikort_pipeline *p) {
+        declareSource(p, 0, VERTEX);
+        declareState(p, 0, "a", PIKORT_IMAGE, COLOR, 2);
+        declareState(p, 1, "b", PIKORT_IMAGE, COLOR, 2);
+      }),
+      "pipeline 'Test': expected one image of colours for the result, but "
+      "got 'a' and 'b'");
 }
 
 TEST_F(Binding, UnknownConstant) {
