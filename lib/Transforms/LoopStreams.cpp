@@ -20,7 +20,8 @@ enum class Growth { None, One, Other };
 
 } // namespace
 
-static Growth getGrowth(Value value, scf::ForOp loop) {
+/// From what is not too far away.
+static Growth getGrowth(Value value, scf::ForOp loop, unsigned depth = 8) {
   if (loop.isDefinedOutsideOfLoop(value))
     return Growth::None;
   if (auto argument = dyn_cast<BlockArgument>(value)) {
@@ -37,12 +38,14 @@ static Growth getGrowth(Value value, scf::ForOp loop) {
     return isCount ? Growth::One : Growth::Other;
   }
   Operation *op = value.getDefiningOp();
+  if (depth == 0)
+    return Growth::Other;
   if (isa<arith::IndexCastOp, arith::IndexCastUIOp, arith::ExtSIOp,
           arith::ExtUIOp, arith::TruncIOp>(op))
-    return getGrowth(op->getOperand(0), loop);
+    return getGrowth(op->getOperand(0), loop, depth - 1);
   SmallVector<Growth> growths;
   for (Value operand : op->getOperands())
-    growths.push_back(getGrowth(operand, loop));
+    growths.push_back(getGrowth(operand, loop, depth - 1));
   if (llvm::all_of(growths, [](Growth g) { return g == Growth::None; }))
     return isMemoryEffectFree(op) ? Growth::None : Growth::Other;
   bool isSum =

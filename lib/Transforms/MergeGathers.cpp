@@ -93,16 +93,19 @@ void MergeGathersPass::mergeState(Block &block,
   }
 }
 
-/// Whether a mask holds for no lane for which another does not.
-static bool isWithin(Value mask, Value outer) {
+/// Whether a mask is known to hold for no lane for which another does not.
+static bool isWithin(Value mask, Value outer, unsigned depth = 8) {
   if (mask == outer)
     return true;
+  if (depth == 0)
+    return false;
   if (auto both = mask.getDefiningOp<arith::AndIOp>())
-    return isWithin(both.getLhs(), outer) || isWithin(both.getRhs(), outer);
+    return isWithin(both.getLhs(), outer, depth - 1) ||
+           isWithin(both.getRhs(), outer, depth - 1);
   auto choice = mask.getDefiningOp<arith::SelectOp>();
   return choice && matchPattern(choice.getFalseValue(), m_Zero()) &&
-         (isWithin(choice.getCondition(), outer) ||
-          isWithin(choice.getTrueValue(), outer));
+         (isWithin(choice.getCondition(), outer, depth - 1) ||
+          isWithin(choice.getTrueValue(), outer, depth - 1));
 }
 
 /// Primitives do not change while they are read.

@@ -3,6 +3,8 @@
 // piko-narrow-integers: signs of affine functions of a pixel in 32 bits, where
 // a test in front of the loop finds that they fit.
 
+#include "Lanes.h"
+
 #include "Piko/Transforms/Passes.h"
 
 #include "Piko/Dialect/Piko/IR/Marks.h"
@@ -62,12 +64,14 @@ private:
   bool isInvariant(Value value) const {
     return !outer->isAncestor(value.getParentRegion()->getParentOp());
   }
-  bool isAffine(Value value) const;
-  bool isTree(Value value) const;
-  std::optional<SignTest> matchTest(arith::CmpIOp compare) const;
+  bool isAffine(Value value);
+  bool computeIsAffine(Value value);
+  bool isTree(Value value);
+  std::optional<SignTest> matchTest(arith::CmpIOp compare);
   void collectLeaves(Value tree);
 
   Affine expand(Value value);
+  Affine computeExpansion(Value value);
   Affine expandArgument(BlockArgument argument);
   Affine getAffine(const Leaf &leaf);
   Value getTwo(bool isSum, Value a, Value b);
@@ -75,11 +79,17 @@ private:
   void addCheck(Affine affine);
   void prepare(const Leaf &leaf);
   Value writeLeaf(const Leaf &leaf, OpBuilder &inner);
-  Value writeTree(Value tree, OpBuilder &inner);
+  /// `written` has what this comparison has already.
+  Value writeTree(Value tree, OpBuilder &inner,
+                  llvm::DenseMap<Value, Value> &written);
 
   scf::ForOp row, outer;
   SmallVector<scf::ForOp, 2> loops; ///< from outside
   SmallVector<SignTest> tests;
+  // What is known of values, which may be used more than once.
+  llvm::DenseMap<Value, bool> affine, trees;
+  llvm::DenseMap<Value, Affine> expanded;
+  llvm::DenseSet<Value> collected;
   OpBuilder builder;
   Location loc;
   Value fits;
@@ -138,7 +148,15 @@ static bool isComplement(Operation *op) {
          bits.isAllOnes();
 }
 
-bool Nest::isAffine(Value value) const {
+bool Nest::isAffine(Value value) {
+  if (auto known = affine.find(value); known != affine.end())
+    return known->second;
+  bool result = computeIsAffine(value);
+  affine[value] = result;
+  return result;
+}
+
+bool Nest::computeIsAffine(Value value) {
   if (isInvariant(value))
     return value.getType().isInteger(64);
   if (auto argument = dyn_cast<BlockArgument>(value)) {
@@ -175,17 +193,19 @@ bool Nest::isAffine(Value value) const {
   return matchPattern(value, m_Constant());
 }
 
-bool Nest::isTree(Value value) const {
+bool Nest::isTree(Value value) {
   if (isAffine(value))
     return true;
+  if (auto known = trees.find(value); known != trees.end())
+    return known->second;
   Operation *op = value.getDefiningOp();
-  return op && outer->isProperAncestor(op) &&
-         isa<arith::OrIOp, arith::AndIOp, arith::XOrIOp, arith::MaxSIOp,
-             arith::MinSIOp>(op) &&
-         isTree(op->getOperand(0)) && isTree(op->getOperand(1));
+  return trees[value] = op && outer->isProperAncestor(op) &&
+                        isa<arith::OrIOp, arith::AndIOp, arith::XOrIOp,
+                            arith::MaxSIOp, arith::MinSIOp>(op) &&
+                        isTree(op->getOperand(0)) && isTree(op->getOperand(1));
 }
 
-std::optional<SignTest> Nest::matchTest(arith::CmpIOp compare) const {
+std::optional<SignTest> Nest::matchTest(arith::CmpIOp compare) {
   using P = arith::CmpIPredicate;
   P predicate = compare.getPredicate();
   Value lhs = compare.getLhs(), rhs = compare.getRhs();
@@ -255,6 +275,14 @@ Affine Nest::expandArgument(BlockArgument argument) {
 }
 
 Affine Nest::expand(Value value) {
+  if (auto known = expanded.find(value); known != expanded.end())
+    return known->second;
+  Affine result = computeExpansion(value);
+  expanded[value] = result;
+  return result;
+}
+
+Affine Nest::computeExpansion(Value value) {
   if (isInvariant(value))
     return {value, {}};
   if (auto argument = dyn_cast<BlockArgument>(value))
@@ -312,26 +340,27 @@ Affine Nest::getAffine(const Leaf &leaf) {
   return a;
 }
 
-/// How many of the lowest bits of a value are known to be 0.
-static unsigned countZeros(Value value) {
+/// How many of the lowest bits of a value are known to be 0, from what is not
+/// too far away.
+static unsigned countZeros(Value value, unsigned depth = 8) {
   APInt number;
   if (matchPattern(value, m_ConstantInt(&number)))
     return number.isZero() ? 32 : std::min(32u, number.countr_zero());
   Operation *op = value.getDefiningOp();
-  if (!op)
+  if (!op || depth == 0)
     return 0;
+  auto count = [&](unsigned i) {
+    return countZeros(op->getOperand(i), depth - 1);
+  };
   if (isa<arith::AddIOp, arith::SubIOp>(op))
-    return std::min(countZeros(op->getOperand(0)),
-                    countZeros(op->getOperand(1)));
+    return std::min(count(0), count(1));
   if (isa<arith::MulIOp>(op))
-    return std::min(32u, countZeros(op->getOperand(0)) +
-                             countZeros(op->getOperand(1)));
+    return std::min(32u, count(0) + count(1));
   if (isa<arith::ShLIOp>(op) &&
       matchPattern(op->getOperand(1), m_ConstantInt(&number)))
-    return std::min<uint64_t>(32, countZeros(op->getOperand(0)) +
-                                      number.getLimitedValue(32));
+    return std::min<uint64_t>(32, count(0) + number.getLimitedValue(32));
   if (isa<arith::ExtSIOp>(op))
-    return countZeros(op->getOperand(0));
+    return count(0);
   return 0;
 }
 
@@ -433,6 +462,8 @@ void Nest::prepare(const Leaf &leaf) {
 }
 
 void Nest::collectLeaves(Value tree) {
+  if (!collected.insert(tree).second)
+    return;
   if (isAffine(tree))
     return prepare({tree, {}});
   for (Value operand : tree.getDefiningOp()->getOperands())
@@ -469,15 +500,18 @@ Value Nest::writeLeaf(const Leaf &leaf, OpBuilder &inner) {
   return found->value = sum;
 }
 
-Value Nest::writeTree(Value tree, OpBuilder &inner) {
+Value Nest::writeTree(Value tree, OpBuilder &inner,
+                      llvm::DenseMap<Value, Value> &written) {
   if (isAffine(tree))
     return writeLeaf({tree, {}}, inner);
+  if (Value known = written.lookup(tree))
+    return known;
   Operation *op = tree.getDefiningOp();
   SmallVector<Value> operands;
   for (Value operand : op->getOperands())
-    operands.push_back(writeTree(operand, inner));
+    operands.push_back(writeTree(operand, inner, written));
   OperationState state(loc, op->getName(), operands, inner.getI32Type());
-  return inner.create(state)->getResult(0);
+  return written[tree] = inner.create(state)->getResult(0);
 }
 
 int64_t Nest::narrow() {
@@ -514,8 +548,9 @@ int64_t Nest::narrow() {
     Operation *compare =
         mapping.lookup(test.compare.getResult()).getDefiningOp();
     OpBuilder inner(compare);
-    Value value =
-        test.tree ? writeTree(test.tree, inner) : writeLeaf(test.leaf, inner);
+    llvm::DenseMap<Value, Value> written;
+    Value value = test.tree ? writeTree(test.tree, inner, written)
+                            : writeLeaf(test.leaf, inner);
     Value zero = arith::ConstantIntOp::create(inner, loc, 0, 32);
     using P = arith::CmpIPredicate;
     compare->getResult(0).replaceAllUsesWith(arith::CmpIOp::create(
@@ -536,7 +571,11 @@ int64_t Nest::narrow() {
 void NarrowIntegersPass::runOnOperation() {
   SmallVector<scf::ForOp> rows;
   getOperation().walk([&](scf::ForOp loop) {
-    if (loop->hasAttr(marks::lanes) && !loop->hasAttr(marks::mapping))
+    // Loops that stay scalar gain nothing.
+    bool mayBeLanes =
+        !isOverBox(loop) || hasSpecifiedLanes(loop, LaneMapping::Iterations);
+    if (loop->hasAttr(marks::lanes) && !loop->hasAttr(marks::mapping) &&
+        mayBeLanes)
       rows.push_back(loop);
   });
   for (scf::ForOp row : rows) {
