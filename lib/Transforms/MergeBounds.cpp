@@ -8,6 +8,7 @@
 
 #include "mlir/Dialect/SCF/IR/SCF.h"
 #include "mlir/IR/Dominance.h"
+#include "mlir/IR/Matchers.h"
 #include "llvm/ADT/MapVector.h"
 
 namespace piko {
@@ -59,6 +60,17 @@ static bool isShort(LoadOp load) {
   return record && record.getSize() <= lineSize;
 }
 
+/// Whether a read behind conditions is as safe in front of them as another one
+/// there. They may be what keeps an index inside; so it must be the same.
+static bool readsAlong(LoadOp load, LoadOp first) {
+  auto isConstant = [](Value element) {
+    return matchPattern(element, m_Constant());
+  };
+  return isShort(load) && load.getIndices() == first.getIndices() &&
+         (load.getElements() == first.getElements() ||
+          llvm::all_of(load.getElements(), isConstant));
+}
+
 void MergeBoundsPass::merge(ArrayRef<scf::IfOp> tests) {
   scf::IfOp first = tests.front();
   SmallVector<Type> types;
@@ -103,9 +115,9 @@ void MergeBoundsPass::merge(KernelOp kernel) {
     };
     for (SmallVector<scf::IfOp> &tests : groups) {
       scf::IfOp first = tests.front();
-      bool isBehind =
-          first->getBlock() == test->getBlock() ||
-          (isShort(load) && first->getBlock()->findAncestorOpInBlock(*test));
+      bool isBehind = first->getBlock() == test->getBlock() ||
+                      (readsAlong(load, getGuarded(first)) &&
+                       first->getBlock()->findAncestorOpInBlock(*test));
       if (isBehind &&
           llvm::all_of(load->getOperands(),
                        [&](Value value) { return isKnown(value, first); }) &&
