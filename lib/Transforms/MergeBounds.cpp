@@ -8,7 +8,6 @@
 
 #include "mlir/Dialect/SCF/IR/SCF.h"
 #include "mlir/IR/Dominance.h"
-#include "mlir/IR/Matchers.h"
 #include "llvm/ADT/MapVector.h"
 
 namespace piko {
@@ -63,12 +62,9 @@ static bool isShort(LoadOp load) {
 /// Whether a read behind conditions is as safe in front of them as another one
 /// there. They may be what keeps an index inside; so it must be the same.
 static bool readsAlong(LoadOp load, LoadOp first) {
-  auto isConstant = [](Value element) {
-    return matchPattern(element, m_Constant());
-  };
   return isShort(load) && load.getIndices() == first.getIndices() &&
-         (load.getElements() == first.getElements() ||
-          llvm::all_of(load.getElements(), isConstant));
+         (load.getElements().empty() ||
+          load.getElements() == first.getElements());
 }
 
 void MergeBoundsPass::merge(ArrayRef<scf::IfOp> tests) {

@@ -515,7 +515,9 @@ Value Nest::writeTree(Value tree, OpBuilder &inner,
 }
 
 int64_t Nest::narrow() {
-  if (!isStepOne(row))
+  bool isUnsigned = llvm::any_of(
+      loops, [](scf::ForOp loop) { return loop.getUnsignedCmp(); });
+  if (!isStepOne(row) || isUnsigned)
     return 0;
   outer.walk([&](arith::CmpIOp compare) {
     if (std::optional<SignTest> test = matchTest(compare))
