@@ -75,6 +75,8 @@ private:
   Affine expandArgument(BlockArgument argument);
   Affine getAffine(const Leaf &leaf);
   Value getTwo(bool isSum, Value a, Value b);
+  /// A bound of a loop in 64 bits.
+  Value extend(Value bound);
 
   void addCheck(Affine affine);
   void prepare(const Leaf &leaf);
@@ -247,6 +249,15 @@ Value Nest::getTwo(bool isSum, Value a, Value b) {
                : arith::SubIOp::create(builder, loc, a, b).getResult();
 }
 
+Value Nest::extend(Value bound) {
+  Type wide = builder.getI64Type();
+  if (bound.getType().isIndex())
+    return arith::IndexCastOp::create(builder, loc, wide, bound);
+  if (bound.getType() != wide)
+    return arith::ExtSIOp::create(builder, loc, wide, bound);
+  return bound;
+}
+
 /// Of a variable that grows by one: what it is at the first iteration is its
 /// value less that of the induction variable there, which counts from another
 /// number.
@@ -260,12 +271,7 @@ Affine Nest::expandArgument(BlockArgument argument) {
     return result;
   }
   Value increment = getIncrement(argument, loop);
-  Value lower = loop.getLowerBound();
-  if (lower.getType().isIndex())
-    lower =
-        arith::IndexCastOp::create(builder, loc, builder.getI64Type(), lower);
-  else if (!lower.getType().isInteger(64))
-    lower = arith::ExtSIOp::create(builder, loc, builder.getI64Type(), lower);
+  Value lower = extend(loop.getLowerBound());
   result = expand(loop.getTiedLoopInit(argument)->get());
   result.base = getTwo(false, result.base,
                        arith::MulIOp::create(builder, loc, increment, lower));
@@ -390,7 +396,6 @@ static void shiftDown(Affine &affine, OpBuilder &builder, Location loc) {
 /// A base of 62 bits, steps of 32 and variables of 28 make what is computed
 /// here, so that nothing of it overflows.
 void Nest::addCheck(Affine affine) {
-  Type wide = builder.getI64Type();
   auto constant = [&](int64_t value) -> Value {
     return arith::ConstantIntOp::create(builder, loc, value, 64);
   };
@@ -410,13 +415,6 @@ void Nest::addCheck(Affine affine) {
     if (!step)
       continue;
     require(step, 32);
-    auto extend = [&](Value bound) -> Value {
-      if (bound.getType().isIndex())
-        return arith::IndexCastOp::create(builder, loc, wide, bound);
-      if (!bound.getType().isInteger(64))
-        return arith::ExtSIOp::create(builder, loc, wide, bound);
-      return bound;
-    };
     Value first = extend(loop.getLowerBound()),
           end = extend(loop.getUpperBound());
     require(first, 28);

@@ -4,12 +4,13 @@
 // whether they fit into 32 bits or overflow 64.
 // RUN: sed -n 's|^// CASE: ||p' %s > %t.cases
 // RUN: piko-compare %s --cases %t.cases --runs 1 | FileCheck %s
-// CHECK-COUNT-5: {{^equal$}}
+// CHECK-COUNT-6: {{^equal$}}
 // CASE: --pipe Edges --domain 67 53 --count 600
 // CASE: --pipe Between --domain 67 53 --count 600
 // CASE: --pipe Carried --domain 67 53 --count 600
 // CASE: --pipe Extremes --domain 67 53 --count 600
 // CASE: --pipe Nearest --domain 67 53 --count 600
+// CASE: --pipe Shared --domain 67 53 --count 60
 //
 // RUN: pikoc %s --pipe Edges --emit=llvmir --cpu x86-64-v4 --no-cache -o - | FileCheck %s --check-prefix=NARROW
 // RUN: pikoc %s --pipe Between --emit=llvmir --cpu x86-64-v4 --no-cache -o - | FileCheck %s --check-prefix=NARROW
@@ -116,6 +117,26 @@ struct Near : Stage {
   }
 };
 
+// Sums that each use the one before twice: what takes them apart looks at each
+// once, or does not end.
+struct Twice : Stage {
+  static void add(int64_t &e, int64_t &f) {
+    e += f;
+    f += e;
+  }
+  static void addMore(int64_t &e, int64_t &f) {
+    add(e, f), add(e, f), add(e, f), add(e, f);
+  }
+  void process(const Prim &p) {
+    int64_t a = p.a, b = p.b;
+    draw(p, [&](glm::ivec2 at) {
+      int64_t e = a * at.x, f = b * at.y;
+      addMore(e, f), addMore(e, f), addMore(e, f), addMore(e, f);
+      return e < 0;
+    });
+  }
+};
+
 template <class S> struct Pipe : piko::Pipe<State> {
   S stage;
   Pipe() { source(stage); }
@@ -125,3 +146,4 @@ struct Between : Pipe<Range> {};
 struct Carried : Pipe<Carry> {};
 struct Extremes : Pipe<Extreme> {};
 struct Nearest : Pipe<Near> {};
+struct Shared : Pipe<Twice> {};

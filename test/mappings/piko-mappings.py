@@ -36,7 +36,7 @@ PASSES = ["pre-schedule", "infer-directives", "fuse-stages", "test-early", "prun
           "own-pixels", "eliminate-schedules", "fuse-kernels", "form-strips",
           "form-tiles", "prefetch", "vectorize", "prove-bounds", "hoist-bounds",
           "merge-bounds", "thread-jumps", "narrow-integers", "merge-gathers",
-          "if-convert"]
+          "privatize", "if-convert"]
 
 SIZE = ["--width", "131", "--height", "99", "--lights", "3"]
 

@@ -62,6 +62,19 @@ TEST(ToByte, RoundsAndClamps) {
   EXPECT_EQ(toByte(std::numeric_limits<float>::quiet_NaN()), 0);
 }
 
+// As an image of 8 bits would have been written from floats.
+TEST_F(ImageFile, Color8HasTheBytesOfAFile) {
+  pixels.push_back({{std::numeric_limits<float>::quiet_NaN(), -0.0f,
+                     std::numeric_limits<float>::infinity(), 0.5f}});
+  for (const Color &pixel : pixels) {
+    uint32_t rgba = piko::scene::toColor8(pixel.rgba).rgba;
+    for (int i = 0; i < 4; ++i)
+      EXPECT_EQ(rgba >> (8 * i) & 255, toByte(pixel.rgba[i])) << i;
+  }
+  EXPECT_EQ(piko::scene::Color8().rgba,
+            piko::scene::toColor8(Color().rgba).rgba);
+}
+
 TEST_F(ImageFile, EightBitFormats) {
   for (const char *name : {"a.png", "a.ppm", "A.PNG", "a.bmp", "a.tif"}) {
     auto written = writeImage(pathOf(name), width, height, pixels);

@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Operations on the lanes of a vector: access to state and to primitives, and
+// permutations. piko-vectorize makes them. A part of PikoCPUOps.td, which
+// includes it.
+
+#ifndef PIKO_DIALECT_PIKO_IR_PIKOLANEOPS_TD
+#define PIKO_DIALECT_PIKO_IR_PIKOLANEOPS_TD
+
+def Piko_Lanes : VectorOfRankAndType<[1], [F32, F64, I8, I16, I32, I64]>;
+def Piko_LaneMask : VectorOfRankAndType<[1], [I1]>;
+def Piko_LaneIndex
+    : AnyTypeOf<[Index, VectorOfRankAndType<[1], [Index]>],
+                "index, or one for each lane">;
+
+class Piko_LaneAccessOp<string mnemonic, list<Trait> traits = []>
+    : Piko_CPUOp<mnemonic, !listconcat(traits, [
+        AttrSizedOperandSegments,
+        DeclareOpInterfaceMethods<Piko_StateAccessInterface>,
+        DeclareOpInterfaceMethods<SymbolUserOpInterface>])>;
+
+def Piko_GatherOp : Piko_LaneAccessOp<"gather", [MemoryEffects<[MemRead]>]> {
+  let summary = "reads a field of a piece of state for each lane";
+  let description = [{
+    An index is that of all lanes, or a vector with one for each. With
+    `consecutive` all are scalars, those of the first lane, and each further lane
+    has the next x (the first index). Indices of lanes in the mask are inside of
+    the state; the others read nothing and get 0.
+
+    ```mlir
+    %xs = piko.cpu.gather @vertices[%places : vector<16xindex>] "position.x"
+      mask %mask : vector<16xi1>, vector<16xf32>
+    %zs = piko.cpu.gather consecutive @depth[%i, %j : index, index] "z"
+      mask %mask : vector<16xi1>, vector<16xf32>
+    ```
+  }];
+  let arguments = (ins FlatSymbolRefAttr:$state,
+                       Variadic<Piko_LaneIndex>:$indices, StrAttr:$field,
+                       Variadic<Index>:$elements, Piko_LaneMask:$mask,
+                       UnitAttr:$consecutive);
+  let results = (outs Piko_Lanes:$result);
+  let assemblyFormat = [{
+    (`consecutive` $consecutive^)? $state
+    (`[` $indices^ `:` type($indices) `]`)? $field (`[` $elements^ `]`)?
+    `mask` $mask attr-dict `:` type($mask) `,` type($result)
+  }];
+}
+
+def Piko_ScatterOp : Piko_LaneAccessOp<"scatter", [MemoryEffects<[MemWrite]>]> {
+  let summary = "writes a field of an element for each lane";
+  let description = [{
+    As in `piko.cpu.gather`. No two lanes in the mask write the same element.
+
+    ```mlir
+    piko.cpu.scatter %values, consecutive @depth[%i, %j : index, index] "z"
+      mask %mask : vector<16xi1>, vector<16xf32>
+    ```
+  }];
+  let arguments = (ins Piko_Lanes:$value, FlatSymbolRefAttr:$state,
+                       Variadic<Piko_LaneIndex>:$indices, StrAttr:$field,
+                       Variadic<Index>:$elements, Piko_LaneMask:$mask,
+                       UnitAttr:$consecutive);
+  let assemblyFormat = [{
+    $value `,` (`consecutive` $consecutive^)? $state
+    (`[` $indices^ `:` type($indices) `]`)? $field (`[` $elements^ `]`)?
+    `mask` $mask attr-dict `:` type($mask) `,` type($value)
+  }];
+}
+
+def Piko_Addresses : VectorOfRankAndType<[1], [Index]>;
+
+def Piko_LaneItemsOp : Piko_CPUOp<"items", [MemoryEffects<[MemRead]>]> {
+  let hasVerifier = 1;
+  let summary = "the address of a primitive for each lane";
+  let description = [{
+    Of those at these positions, or, from a scalar on, at consecutive ones. The
+    positions of lanes in the mask are those of primitives; the other lanes get an
+    address of nothing.
+
+    ```mlir
+    %as = piko.cpu.items %bins[%first : index] mask %mask
+      : !piko.bins<@Fragment>, vector<16xi1>, vector<16xindex>
+    ```
+  }];
+  let arguments = (ins Piko_BinsType:$bins, Piko_LaneIndex:$position,
+                       Piko_LaneMask:$mask);
+  let results = (outs Piko_Addresses:$result);
+  let assemblyFormat = [{
+    $bins `[` $position `:` type($position) `]` `mask` $mask attr-dict
+    `:` qualified(type($bins)) `,` type($mask) `,` type($result)
+  }];
+}
+
+def Piko_LaneGetOp : Piko_CPUOp<"get", [
+    MemoryEffects<[MemRead]>,
+    DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
+  let summary = "reads a field of a primitive for each lane";
+  let description = [{
+    The primitives are given by their addresses. Lanes that are not in the mask
+    read nothing and get 0.
+
+    ```mlir
+    %zs = piko.cpu.get %as "z" of @Fragment mask %mask
+      : vector<16xindex>, vector<16xi1>, vector<16xf32>
+    ```
+  }];
+  let arguments = (ins Piko_Addresses:$addresses, StrAttr:$field,
+                       Variadic<Index>:$elements, FlatSymbolRefAttr:$record,
+                       Piko_LaneMask:$mask);
+  let results = (outs Piko_Lanes:$result);
+  let assemblyFormat = [{
+    $addresses $field (`[` $elements^ `]`)? `of` $record `mask` $mask attr-dict
+    `:` type($addresses) `,` type($mask) `,` type($result)
+  }];
+}
+
+def Piko_LaneElementsOp : Piko_CPUOp<"elements", [
+    MemoryEffects<[]>,
+    DeclareOpInterfaceMethods<Piko_StateAccessInterface>,
+    DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
+  let summary = "the addresses of elements of a piece of state";
+  let description = [{
+    An index is that of all lanes, or a vector with one for each. Those of lanes
+    whose indices are outside of the state are no addresses.
+
+    ```mlir
+    %as = piko.cpu.elements @vertices[%places : vector<16xindex>]
+      : vector<16xindex>
+    ```
+  }];
+  let arguments = (ins FlatSymbolRefAttr:$state,
+                       Variadic<Piko_LaneIndex>:$indices);
+  let results = (outs Piko_Addresses:$addresses);
+  let assemblyFormat = [{
+    $state `[` $indices `:` type($indices) `]` attr-dict `:` type($addresses)
+  }];
+}
+
+def Piko_LaneGetFieldsOp : Piko_CPUOp<"get_fields", [
+    MemoryEffects<[MemRead]>,
+    DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
+  let summary = "reads fields of a record for each lane";
+  let description = [{
+    As `piko.cpu.get` for each field, none of which is an array. What lies side by
+    side is read at once where all lanes read: by loads of 16 bytes, and a
+    transposition.
+
+    ```mlir
+    %x, %y, %z = piko.cpu.get_fields %as ["x", "y", "z"] of @Fragment mask %mask
+      : vector<16xindex>, vector<16xi1>
+        -> vector<16xi32>, vector<16xi32>, vector<16xf32>
+    ```
+  }];
+  let arguments = (ins Piko_Addresses:$addresses, StrArrayAttr:$fields,
+                       FlatSymbolRefAttr:$record, Piko_LaneMask:$mask);
+  let results = (outs Variadic<Piko_Lanes>:$values);
+  let assemblyFormat = [{
+    $addresses $fields `of` $record `mask` $mask attr-dict
+    `:` type($addresses) `,` type($mask) `->` type($values)
+  }];
+}
+
+def Piko_Permutable
+    : VectorOfRankAndType<[1], [F32, F64, I1, I8, I16, I32, I64, Index]>;
+def Piko_LaneNumbers : VectorOfRankAndType<[1], [I32]>;
+
+def Piko_PermuteOp : Piko_CPUOp<"permute", [
+    Pure, AllTypesMatch<["vector", "result"]>]> {
+  let hasVerifier = 1;
+  let summary = "gives each lane what another one has";
+  let description = [{
+    Lane `i` of the result is lane `lanes[i]` of the vector, modulo their number,
+    which is a power of two. One instruction, where the processor has it.
+
+    ```mlir
+    %r = piko.cpu.permute %values[%lanes] : vector<16xf32>, vector<16xi32>
+    ```
+  }];
+  let arguments = (ins Piko_Permutable:$vector, Piko_LaneNumbers:$lanes);
+  let results = (outs Piko_Permutable:$result);
+  let assemblyFormat = [{
+    $vector `[` $lanes `]` attr-dict `:` type($vector) `,` type($lanes)
+  }];
+}
+
+#endif // PIKO_DIALECT_PIKO_IR_PIKOLANEOPS_TD

@@ -1,0 +1,461 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Passes on loops over units of work on the CPU: what they test and fetch, and
+// what of them becomes vectors.
+
+#ifndef PIKO_TRANSFORMS_CPUPASSES_TD
+#define PIKO_TRANSFORMS_CPUPASSES_TD
+
+include "mlir/Pass/PassBase.td"
+
+def Prefetch : Pass<"piko-prefetch", "::piko::PipelineOp"> {
+  let summary = "Ask for what later primitives refer to";
+  let description = [{
+    **Requires** loops over units (`piko-form-units`).
+
+    **Does**: a loop over the primitives of a bin that reads state at indices
+    which are fields of the primitive asks for the elements of a primitive
+    further on (`piko.prefetch`), and for a primitive still further on
+    (`piko.cpu.prefetch_item`): neither lies in memory in the order of the bin
+    (S. Ainsworth and T. M. Jones, "Software Prefetching for Indirect Memory
+    Accesses", 2017). A stage with one bin for all takes its primitives as they
+    were made, whose neighbours mostly refer to the same; it is left alone.
+
+    **Guarantees** that nothing changes but time: a prefetch reads nothing and
+    cannot fail.
+
+    Before:
+    ```
+    scf.for %i = %begin to %end step %one {
+      %t = piko.storage.item %bins[%i] ...
+      %k = piko.get %t "vertex" ...
+      ... piko.load @vertices[%k : i32] "x" : f32 ...
+    ```
+    After:
+    ```
+    scf.for %i = %begin to %end step %one {
+      %far = ...                        // %i + 16, or the last one
+      piko.cpu.prefetch_item %bins[%far] : !piko.bins<@Triangle>
+      %near = ...                       // %i + 8, or the last one
+      %s = piko.storage.item %bins[%near] ...
+      %j = piko.get %s "vertex" ...
+      piko.prefetch @vertices[%j : i32]
+      %t = piko.storage.item %bins[%i] ...
+    ```
+
+    **Limits**: indices that are computed, and those of reads that only the much
+    longer side of a condition does, are not followed.
+  }];
+  let statistics = [
+    Statistic<"loops", "loops", "loops that ask ahead">,
+    Statistic<"elements", "elements", "elements of state asked for">];
+  let dependentDialects = ["::mlir::arith::ArithDialect"];
+}
+
+def HoistBounds : Pass<"piko-hoist-bounds", "::piko::PipelineOp"> {
+  let summary = "Test the indices of a loop in front of it";
+  let description = [{
+    **Requires** loops over units (`piko-form-units`); last before `convert-piko-to-scf`, because
+    behind it loops stand there twice.
+
+    **Does**: takes innermost loops that count by one up to a bound that does not
+    change, and in which indices of buffers are the count, or a number that does
+    not change and the count. A test in front of the loop finds whether all these
+    indices are inside, and none wraps around; then a copy of the loop runs whose
+    accesses are `checked`, with indices that LLVM sees to be in a row, so that
+    it can form vectors. Otherwise the loop runs as it was.
+
+    **Guarantees** the same accesses in the same order, and the same errors.
+
+    Before:
+    ```
+    scf.while (%j = %zero) { %j < %n } do {
+      %i = arith.addi %base, %j : i32
+      %x = piko.load @lights[%i : i32] "x" : f32
+    ```
+    After:
+    ```
+    scf.if %all_inside {
+      scf.while (%j = %zero) { %j < %n } do {
+        %i = arith.addi %wide_base, %wide_j : index
+        %x = piko.load checked @lights[%i : index] "x" : f32
+    } else {
+      // as before
+    }
+    ```
+
+    **Limits**: a loop with another index, as one that is read from a buffer, is
+    taken for those that are as above. Long loops, and loops in which nothing is
+    tested, stay.
+  }];
+  let options = [
+    Option<"maxOperations", "max-operations", "int64_t", "64",
+           "How many operations a loop may have to stand there twice">];
+  let statistics = [
+    Statistic<"versioned", "versioned", "loops with a test in front">];
+}
+
+def IfConvert : Pass<"piko-if-convert", "::piko::PipelineOp"> {
+  let summary = "Choose values without branches";
+  let description = [{
+    **Requires** loops over units (`piko-form-units`); before `piko-vectorize`, which has no branches
+    to mask then.
+
+    **Does**: takes `scf.if` and `scf.index_switch` whose arms do nothing but
+    read fields, compare, convert and choose, moves what the arms hold in front,
+    and chooses each result by `arith.select`. `vector[axis]` and `h == 12 || h
+    == 14 ? x : z` come as such switches, and what they choose by is often not
+    predictable.
+
+    **Guarantees** the same values.
+
+    Before:
+    ```
+    %x = scf.index_switch %axis -> f32
+    case 0 {
+      scf.yield %a : f32
+    }
+    default {
+      scf.yield %b : f32
+    }
+    ```
+    After:
+    ```
+    %is_0 = arith.cmpi eq, %axis, %zero : index
+    %x = arith.select %is_0, %a, %b : f32
+    ```
+
+    **Limits**: arms that compute with floats, read state or have an effect stay,
+    as do those of a choice without results.
+  }];
+  let options = [
+    Option<"maxCases", "max-cases", "int64_t", "4",
+           "How many cases, but for the default, a switch may have">,
+    Option<"maxOperations", "max-operations", "int64_t", "8",
+           "How many operations the arms may have together">];
+  let statistics = [
+    Statistic<"converted", "converted", "choices that lost their branches">];
+  let dependentDialects = ["::mlir::arith::ArithDialect"];
+}
+
+def MergeBounds : Pass<"piko-merge-bounds", "::piko::PipelineOp"> {
+  let summary = "Test the index of an element once for all of its fields";
+  let description = [{
+    **Requires** access to state that is tested (`convert-piko-to-scf`).
+
+    **Does**: of the tests that have the same outcome, each of which guards a read
+    of the same buffer or image, the first one guards all of the reads. So there is
+    one branch for an element, and its address is computed once, also where lanes
+    read elements in different places. What is read of the same element behind a
+    condition is read along, if the record is not larger than a line of the cache.
+
+    **Guarantees** the same reads of state that the kernel does not change, at
+    the place of the first; and the same errors, whose text names the index but no
+    field.
+
+    Before:
+    ```
+    %x = scf.if %inside -> (f32) {
+      %1 = piko.load checked @mesh[%i : i32] "x" : f32
+      scf.yield %1 : f32
+    } else { ... }
+    %square = arith.mulf %x, %x : f32
+    %y = scf.if %inside -> (f32) {
+      %2 = piko.load checked @mesh[%i : i32] "y" : f32
+      scf.yield %2 : f32
+    } else { ... }
+    ```
+    After:
+    ```
+    %xy:2 = scf.if %inside -> (f32, f32) {
+      %1 = piko.load checked @mesh[%i : i32] "x" : f32
+      %2 = piko.load checked @mesh[%i : i32] "y" : f32
+      scf.yield %1, %2 : f32, f32
+    } else { ... }
+    %square = arith.mulf %xy#0, %xy#0 : f32
+    ```
+
+    **Limits**: reads of state that the kernel changes keep their tests.
+  }];
+  let statistics = [
+    Statistic<"merged", "merged", "tests that others stand for">];
+}
+
+def ThreadJumps : Pass<"piko-thread-jumps", "::piko::PipelineOp"> {
+  let summary = "Put work behind the conditions that need it";
+  let description = [{
+    **Requires** loops over units (`convert-piko-to-scf`).
+
+    **Does**: short-circuit evaluation and jump threading, which undo what earlier
+    passes put in front of conditions to see through them. Of a conjunction, the
+    right half, or else the left one, if it takes work, moves behind the other,
+    with what else serves only the sides. A condition that is known on one side of an earlier one, and does
+    nothing there, moves into the other side. So lanes of which none passes the
+    first test do nothing else.
+
+    **Guarantees** the same results: what moves has no effects, or moves past
+    nothing that has.
+
+    Before:
+    ```
+    %isSeen = arith.cmpf ogt, %depth, %zero : f32
+    %both = arith.andi %isInside, %isSeen : i1
+    %key = scf.if %both -> (i32) {
+      %1 = arith.bitcast %depth : f32 to i32
+      scf.yield %1 : i32
+    } else {
+      scf.yield %c0 : i32
+    }
+    %any = arith.cmpi ne, %key, %c0 : i32
+    scf.if %any {
+      piko.atomic max_signed @seen[%i : index] "key", %key : i32
+    }
+    ```
+    After, where the depth takes some work:
+    ```
+    scf.if %isInside {
+      %isSeen = arith.cmpf ogt, %depth, %zero : f32
+      scf.if %isSeen {
+        %1 = arith.bitcast %depth : f32 to i32
+        %any = arith.cmpi ne, %1, %c0 : i32
+        scf.if %any {
+          piko.atomic max_signed @seen[%i : index] "key", %1 : i32
+        }
+      }
+    }
+    ```
+
+    **Limits**: conditions with results do not move behind others.
+  }];
+  let options = [
+    Option<"minWeight", "min-weight", "int64_t", /*default=*/"4",
+           "the least work, in instructions, that is worth a branch">];
+  let statistics = [
+    Statistic<"split", "split", "conjunctions of which one half is evaluated "
+              "only if the other holds">,
+    Statistic<"threaded", "threaded", "conditions that moved into a side of "
+              "another">];
+}
+
+def NarrowIntegers : Pass<"piko-narrow-integers", "::piko::PipelineOp"> {
+  let summary = "Take the signs of edge functions in 32 bits where they fit";
+  let description = [{
+    **Requires** loops over units (`convert-piko-to-scf`).
+
+    **Does**: exact narrowing. Where a loop over pixels that may become lanes
+    compares 64-bit affine functions of the pixel (as edge functions are), or
+    takes the sign of their bits, minima and maxima combined, a test in front of
+    the loop evaluates each function at the corners of the loop's domain, divided
+    by the power of two that all of its steps are multiples of, and rounded down,
+    which changes no sign. Where all fit into 32 bits, a second version of the
+    loop computes the signs there: twice as many lanes, and no multiplication of
+    64 bits.
+
+    **Guarantees** the same outcome of each comparison, also where 64 bits
+    overflow: such functions do not pass the test.
+
+    Before:
+    ```
+    scf.for %x = %lo to %hi step %one : i32 {
+      %1 = arith.extsi %x : i32 to i64
+      %2 = arith.muli %step, %1 : i64
+      %edge = arith.addi %first, %2 : i64
+      %isInside = arith.cmpi sge, %edge, %zero : i64
+      ...
+    } {piko.lanes}
+    ```
+    After, where `%step` is a multiple of 256:
+    ```
+    scf.if %fits {
+      %step32 = ...
+      %first32 = ...
+      scf.for %x = %lo to %hi step %one : i32 {
+        %1 = arith.muli %step32, %x : i32
+        %edge = arith.addi %first32, %1 : i32
+        %isInside = arith.cmpi sge, %edge, %zero : i32
+        ...
+      } {piko.lanes}
+    } else {
+      // as before
+    }
+    ```
+
+    **Limits**: loops with a step other than one, and comparisons of what is not
+    affine, stay as they are. What else an edge function is used for, as for
+    weights, is computed in 64 bits.
+  }];
+  let statistics = [
+    Statistic<"narrowed", "narrowed", "comparisons that have a form in 32 bits">];
+}
+
+def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
+  let summary = "Run primitives, or iterations, as lanes of vectors";
+  let description = [{
+    **Requires** loops over units whose access to state is checked
+    (`convert-piko-to-scf`), and lanes that `piko-map-lanes` has given primitives,
+    or the iterations of a parallel loop.
+
+    **Does**: runs as many consecutive turns of a loop over primitives, of a
+    `parallelFor`, or of a row of pixels, at once as there are `lanes`. What is the same for all of
+    them stays scalar; the rest becomes vectors, by predication: conditions become
+    masks, with a branch around what no lane needs; loops run as long as some lane
+    does; access to state and to primitives becomes gathers and scatters, of a row
+    of pixels masked loads and stores; local arrays get a column for each lane.
+    What has no vector form runs lane by lane inside.
+
+    Loops inside, or two of which one is all that the other does, are collapsed
+    where their turns differ between lanes but hand on nothing, and change state
+    by atomic operations alone: a scan over how many turns each lane makes fills
+    vectors with pairs of a lane and a turn, so that the pixels of small boxes
+    leave few lanes idle. (Where a lane makes more than 4,096 turns of one loop,
+    loops run in step, as others do.)
+
+    What must keep its order (emission, updates of pixels that lanes may share)
+    runs lane by lane: all that one image or one writer is concerned with, as one
+    group in its place, or, if nothing in the loop waits for it, as several behind
+    all that vectors do. So a depth test, the shading of what has passed it, and
+    the update of a colour become turns, vectors and turns.
+
+    Parallel loops that turn out to have few iterations run as they were. Whether vectors pay is
+    estimated from the operations, how often they run, and for how many lanes; a
+    remark has the estimate, with what costs most. Rows of boxes, which mostly have
+    few pixels, are vectorized where the schedule says `specifyLanes`.
+
+    The CPU target sets how many `lanes` there are, from what the processor that it
+    makes code for has: 16 with AVX-512 (F, BW, DQ and VL), 8 with AVX2, or else 4.
+    Nothing in front of this pass knows it, and an object for several processors
+    has code of each width.
+
+    **Guarantees** the same operations on the same numbers for each turn, emissions
+    and updates in the same order, and the same bits for any number of lanes.
+
+    Before:
+    ```
+    scf.for %x = %lo to %hi step %c1 {
+      %z = ...
+      %old = piko.load checked @depth[%x, %y : index, index] "z" : f32
+      %nearer = arith.cmpf olt, %z, %old : f32
+      scf.if %nearer {
+        piko.store %z, checked @depth[%x, %y : index, index] "z" : f32
+      }
+    } {piko.lanes}
+    ```
+    After:
+    ```
+    scf.for %x0 = %lo to %hi step %c16 {
+      %mask = ...                              // lanes below %hi
+      %z = ... : vector<16xf32>
+      %old = piko.cpu.gather consecutive @depth[%x0, %y : index, index] "z"
+        mask %mask : vector<16xi1>, vector<16xf32>
+      %nearer = arith.cmpf olt, %z, %old : vector<16xf32>
+      %both = arith.select %mask, %nearer, %none
+      %any = vector.reduction <or>, %both
+      scf.if %any {
+        piko.cpu.scatter %z, consecutive @depth[%x0, %y : index, index] "z"
+          mask %both : vector<16xi1>, vector<16xf32>
+      }
+    }
+    ```
+
+    **Limits**: loops whose turns use a part of memory that has no lanes (views,
+    scratch), or carry what is neither a number nor a primitive around an inner
+    loop, stay as they are, with a remark.
+  }];
+  let dependentDialects = ["::mlir::arith::ArithDialect",
+                           "::mlir::math::MathDialect",
+                           "::mlir::memref::MemRefDialect",
+                           "::mlir::scf::SCFDialect",
+                           "::mlir::vector::VectorDialect"];
+  let options = [
+    Option<"laneCount", "lanes", "int64_t", "16",
+           "Lanes of a vector: 4, 8 or 16 (default: 16)">,
+  ];
+  let statistics = [
+    Statistic<"vectorized", "vectorized", "loops that compute in vectors">,
+    Statistic<"left", "left", "loops that stay as they are">,
+  ];
+}
+
+
+def MergeGathers : Pass<"piko-merge-gathers", "::piko::PipelineOp"> {
+  let summary = "Read fields of a record for all lanes at once";
+  let description = [{
+    **Requires** lanes (`piko-vectorize`).
+
+    **Does**: of gathers in a block that read words of the same elements, or of the
+    same primitives, makes one operation, if there are three or more. It loads
+    pieces of 16 bytes, one for each lane, and transposes them, which takes far
+    fewer instructions than a gather for each field. Fields of primitives that
+    are read behind conditions, for some of the lanes, are read with the first.
+
+    **Guarantees** the same reads, of state that the kernel does not change.
+
+    Before:
+    ```
+    %x = piko.cpu.gather @mesh[%is : vector<16xindex>] "x" mask %m
+      : vector<16xi1>, vector<16xf32>
+    %y = piko.cpu.gather @mesh[%is : vector<16xindex>] "y" mask %m
+      : vector<16xi1>, vector<16xf32>
+    %z = piko.cpu.gather @mesh[%is : vector<16xindex>] "z" mask %m
+      : vector<16xi1>, vector<16xf32>
+    ```
+    After:
+    ```
+    %as = piko.cpu.elements @mesh[%is : vector<16xindex>] : vector<16xindex>
+    %x, %y, %z = piko.cpu.get_fields %as ["x", "y", "z"] of @Vertex mask %m
+      : vector<16xindex>, vector<16xi1>
+        -> vector<16xf32>, vector<16xf32>, vector<16xf32>
+    ```
+
+    **Limits**: fields of 32 bits that are no arrays. Where not all lanes read,
+    gathers do.
+  }];
+  let statistics = [Statistic<"merged", "merged", "gathers">];
+}
+
+def Privatize : Pass<"piko-privatize", "::piko::PipelineOp"> {
+  let summary = "Reduce to private copies of state, without locks";
+  let description = [{
+    **Requires** loops over units (`piko-form-units`).
+
+    **Does**: where all that a kernel does to a field of a buffer or an image is
+    `piko.atomic` of one kind, on integers and without results, each thread gets
+    a copy of its own (`piko.cpu.private_copy`), to which it reads and writes
+    without locks. When the kernel ends, the runtime combines the copies with the
+    state, in parallel, and leaves in them what changes nothing, so that the next
+    launch finds them as they must be. It does so for runs of elements that have
+    been written to, by a function that `convert-piko-to-llvm` makes for the field
+    and the kind. The first thread has the state itself: on one thread there is no
+    copy. This is the privatization of reductions of parallelizing compilers.
+
+    **Guarantees** the same bits and the same errors: these operations commute and
+    associate, and nothing reads the field before the kernel ends.
+
+    Before:
+    ```
+    scf.forall (%unit) in (%units) {
+      %writer = piko.cpu.open_writer %bins[%unit] : !piko.bins<@Dot>
+      ...
+        piko.atomic add checked @counts[%i : i32] "value", %one : i32
+    ```
+    After:
+    ```
+    scf.forall (%unit) in (%units) {
+      %writer = piko.cpu.open_writer %bins[%unit] : !piko.bins<@Dot>
+      %copy = piko.cpu.private_copy add @counts "value" of %writer
+      ...
+        piko.atomic add checked @counts[%i : i32] "value", %one in %copy : i32
+    ```
+
+    **Limits**: whether copies are worth their memory, and the time to combine
+    them, is known when the pipeline runs: there are none for more than 8 threads,
+    for state of more than 64 MiB, under a limit of memory, and where few
+    primitives come for a large state. Remarks say what has copies and what is in
+    the way of others.
+  }];
+  let statistics = [
+    Statistic<"copies", "copies", "fields that have private copies">,
+    Statistic<"refused", "refused", "fields that atomics change in place">];
+}
+
+#endif // PIKO_TRANSFORMS_CPUPASSES_TD
