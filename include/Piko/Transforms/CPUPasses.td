@@ -296,12 +296,15 @@ def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
     or the iterations of a parallel loop.
 
     **Does**: runs as many consecutive turns of a loop over primitives, of a
-    `parallelFor`, or of a row of pixels, at once as there are `lanes`. What is the same for all of
-    them stays scalar; the rest becomes vectors, by predication: conditions become
-    masks, with a branch around what no lane needs; loops run as long as some lane
-    does; access to state and to primitives becomes gathers and scatters, of a row
-    of pixels masked loads and stores; local arrays get a column for each lane.
-    What has no vector form runs lane by lane inside.
+    `parallelFor`, or of a row of pixels, at once as there are `lanes`. What is the
+    same for all of them stays scalar; the rest becomes vectors, by predication:
+    conditions become masks, with a branch around what no lane needs; loops run as
+    long as some lane does; access to state and to primitives becomes gathers and
+    scatters, of a row of pixels masked loads and stores; local arrays get a column
+    for each lane. Where iterations read three fields or more of an element, as of
+    the triangle that a pixel shows, and all that are active turn out to read the
+    same one, scalar loads read it. Unsigned integers of 32 bits are divided as
+    floats of 64, which is exact. What has no vector form runs lane by lane inside.
 
     Loops inside, or two of which one is all that the other does, are collapsed
     where their turns differ between lanes but hand on nothing, and change state
@@ -316,10 +319,12 @@ def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
     all that vectors do. So a depth test, the shading of what has passed it, and
     the update of a colour become turns, vectors and turns.
 
-    Parallel loops that turn out to have few iterations run as they were. Whether vectors pay is
-    estimated from the operations, how often they run, and for how many lanes; a
-    remark has the estimate, with what costs most. Rows of boxes, which mostly have
-    few pixels, are vectorized where the schedule says `specifyLanes`.
+    Parallel loops that turn out to have few iterations run as they were. Whether
+    vectors pay is estimated from the operations, how often they run, and for how
+    many lanes; where they do not, a remark has the estimate, with what costs most.
+    A primitive that goes along a buffer in a loop of its own is mostly left to
+    LLVM, which makes vectors along that loop. Rows of boxes, which mostly have few
+    pixels, are vectorized where the schedule says `specifyLanes`.
 
     The CPU target sets how many `lanes` there are, from what the processor that it
     makes code for has: 16 with AVX-512 (F, BW, DQ and VL), 8 with AVX2, or else 4.
