@@ -5,6 +5,8 @@
 
 #include "Piko/Analysis/Uniformity.h"
 
+#include "mlir/Dialect/MemRef/IR/MemRef.h"
+
 using namespace mlir;
 using namespace piko;
 
@@ -23,7 +25,7 @@ Operation *piko::findBarrier(Operation *op) {
   return found;
 }
 
-Uniformity::Uniformity(Operation *root, ArrayRef<Root> roots) {
+Uniformity::Uniformity(Operation *root, ArrayRef<Root> roots) : root(root) {
   if (auto kernel = root->getParentOfType<KernelOp>())
     kernel.walk([&](StateAccessOpInterface access) {
       if (access.getAccessKinds() != StateAccess::reads)
@@ -72,15 +74,34 @@ bool Uniformity::flow(ValueRange sources, ValueRange targets, Uniform least) {
   return changed;
 }
 
-bool Uniformity::visitControlFlow(Operation *op) {
+Uniform Uniformity::getDeciding(Operation *op) const {
+  if (auto loop = dyn_cast<scf::ForOp>(op))
+    return get({loop.getLowerBound(), loop.getUpperBound(), loop.getStep()});
+  if (auto loop = dyn_cast<scf::WhileOp>(op))
+    return get(loop.getConditionOp().getCondition());
+  if (isa<scf::IfOp, scf::IndexSwitchOp>(op))
+    return get(op->getOperands());
+  return Uniform::Iteration; // It is not known.
+}
+
+Uniform Uniformity::getParting(Operation *op) const {
+  Uniform level = getDeciding(op);
   // Iterations that meet inside are compared; others may part ways.
-  auto parting = [&](ValueRange deciding) {
-    Uniform level = get(deciding);
-    return findBarrier(op) ? std::min(level, Uniform::Item) : level;
-  };
+  return findBarrier(op) ? std::min(level, Uniform::Item) : level;
+}
+
+Operation *Uniformity::findParting(Operation *op, Region &region) const {
+  for (Operation *at = op->getParentOp();
+       at && region.isAncestor(at->getParentRegion()); at = at->getParentOp())
+    if (getDeciding(at) == Uniform::Iteration)
+      return at;
+  return nullptr;
+}
+
+bool Uniformity::visitControlFlow(Operation *op) {
+  Uniform parts = getParting(op);
   if (auto loop = dyn_cast<scf::ForOp>(op)) {
     Value lower = loop.getLowerBound(), step = loop.getStep();
-    Uniform parts = parting({lower, loop.getUpperBound(), step});
     bool changed = mark(loop.getInductionVar(), get({lower, step}));
     for (ValueRange targets : {ValueRange(loop.getRegionIterArgs()),
                                ValueRange(loop.getResults())}) {
@@ -90,7 +111,6 @@ bool Uniformity::visitControlFlow(Operation *op) {
     return changed;
   }
   if (auto loop = dyn_cast<scf::WhileOp>(op)) {
-    Uniform parts = parting(loop.getConditionOp().getCondition());
     bool changed = flow(loop.getInits(), loop.getBeforeArguments(), parts);
     changed |=
         flow(loop.getYieldOp().getOperands(), loop.getBeforeArguments(), parts);
@@ -99,7 +119,6 @@ bool Uniformity::visitControlFlow(Operation *op) {
     return flow(leaving, loop.getResults(), parts) || changed;
   }
   // scf.if, scf.index_switch
-  Uniform parts = parting(op->getOperands());
   bool changed = false;
   for (Region &region : op->getRegions())
     if (!region.empty())
@@ -108,9 +127,41 @@ bool Uniformity::visitControlFlow(Operation *op) {
   return changed;
 }
 
+/// What is stored into a private array is in it from then on, wherever
+/// iterations went on together.
+bool Uniformity::visitArrayAccess(Operation *op) {
+  if (auto array = dyn_cast<memref::AllocaOp>(op)) {
+    bool isKnown = llvm::all_of(array->getUsers(), [&](Operation *user) {
+      auto store = dyn_cast<memref::StoreOp>(user);
+      return isa<memref::LoadOp>(user) ||
+             (store && store.getValue() != array.getResult());
+    });
+    return !isKnown && mark(array, Uniform::Iteration);
+  }
+  auto isInside = [&](Value array) {
+    Operation *made = array.getDefiningOp<memref::AllocaOp>();
+    return made && root->isProperAncestor(made);
+  };
+  if (auto load = dyn_cast<memref::LoadOp>(op))
+    return mark(load.getResult(), isInside(load.getMemRef())
+                                      ? get(load->getOperands())
+                                      : Uniform::Iteration);
+  auto store = cast<memref::StoreOp>(op);
+  if (!isInside(store.getMemRef()))
+    return false;
+  Uniform level = std::max(get(store.getValue()), get(store.getIndices()));
+  Block *scope = store.getMemRef().getParentBlock();
+  for (Operation *at = op->getParentOp(); at != scope->getParentOp();
+       at = at->getParentOp())
+    level = std::max(level, getParting(at));
+  return mark(store.getMemRef(), level);
+}
+
 bool Uniformity::visit(Operation *op) {
   if (isa<scf::ForOp, scf::WhileOp, scf::IfOp, scf::IndexSwitchOp>(op))
     return visitControlFlow(op);
+  if (isa<memref::AllocaOp, memref::LoadOp, memref::StoreOp>(op))
+    return visitArrayAccess(op);
   Uniform level = get(op->getOperands());
   auto load = dyn_cast<LoadOp>(op);
   if (isa<ReduceOp>(op)) // one result for all iterations

@@ -88,11 +88,19 @@ void piko::addMachineSequence(OpPassManager &passes) {
   passes.nest<PipelineOp>().addPass(createMapLanes());
 }
 
-void piko::addUnitSequence(OpPassManager &passes) {
+/// Parallel loops with barriers that have up to this many iterations are left
+/// to vectors.
+static void addUnitSequence(OpPassManager &passes, int64_t lockstep) {
   OpPassManager &pipeline = passes.nest<PipelineOp>();
   pipeline.addPass(createFormUnits());
-  pipeline.addPass(createSplitLoops());
+  SplitLoopsOptions loops;
+  loops.lockstep = lockstep;
+  pipeline.addPass(createSplitLoops(loops));
   addCleanUp(passes);
+}
+
+void piko::addUnitSequence(OpPassManager &passes) {
+  ::addUnitSequence(passes, /*lockstep=*/0);
 }
 
 /// From loops over units, some of which may have become grids.
@@ -125,7 +133,8 @@ void piko::addScalarSequence(OpPassManager &passes,
                              const SynthesisOptions &options) {
   if (options.has("form-tiles"))
     passes.nest<PipelineOp>().addPass(createFormTiles());
-  addUnitSequence(passes);
+  // The widest vectors that there are: others are made of two or four.
+  ::addUnitSequence(passes, options.has("vectorize") ? 16 : 0);
   if (options.has("privatize"))
     passes.nest<PipelineOp>().addPass(createPrivatize());
   addUnitsToLoops(passes, options);

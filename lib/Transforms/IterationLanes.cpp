@@ -30,6 +30,18 @@ bool piko::isStructure(Operation *op) {
   return isa<scf::IfOp, scf::ForOp, scf::WhileOp, scf::IndexSwitchOp>(op);
 }
 
+/// Functions that are exact, or the same for a vector as for a number.
+static bool hasVectorForm(Operation *op) {
+  if (!OpTrait::hasElementwiseMappableTraits(op))
+    return false;
+  if (op->getDialect() == op->getContext()->getLoadedDialect("math"))
+    return isa<math::SqrtOp, math::FloorOp, math::CeilOp, math::TruncOp,
+               math::RoundEvenOp, math::AbsFOp, math::AbsIOp, math::CopySignOp,
+               math::FmaOp, math::CountLeadingZerosOp,
+               math::CountTrailingZerosOp, math::CtPopOp>(op);
+  return isApproximation(op) || isa<arith::ArithDialect>(op->getDialect());
+}
+
 IterationLanes::IterationLanes(scf::ForOp loop, int64_t laneCount)
     : loop(loop), laneCount(laneCount),
       uniformity(loop, {{loop.getInductionVar(), Uniform::Iteration}}) {
@@ -49,6 +61,7 @@ IterationLanes::IterationLanes(scf::ForOp loop, int64_t laneCount)
   checkCarried();
   if (!refusal.at)
     findOrdered();
+  checkBarriers();
 }
 
 //===----------------------------------------------------------------------===//
@@ -73,7 +86,7 @@ void IterationLanes::findArrays() {
       // A turn keeps one for each lane.
       constexpr int64_t most = 16 << 10;
       Type element = type.getElementType();
-      bytes += isSimple ? type.getNumElements() *
+      bytes += isSimple && isVarying(array) ? type.getNumElements() *
                               (element.isIndex()
                                    ? 8
                                    : (element.getIntOrFloatBitWidth() + 7) / 8)
@@ -193,6 +206,47 @@ bool IterationLanes::isAccess(Operation *op) const {
 }
 
 //===----------------------------------------------------------------------===//
+// Barriers
+//===----------------------------------------------------------------------===//
+
+/// Lanes are at one place at a time, and so meet at each barrier if they go
+/// there together, and nothing that comes before it is put off.
+void IterationLanes::checkBarriers() {
+  Operation *ordered = nullptr;
+  loop.walk<WalkOrder::PreOrder>([&](Operation *op) {
+    if (op == loop || op->hasTrait<OpTrait::IsTerminator>())
+      return WalkResult::advance();
+    if (isa<ParallelLoopOpInterface>(op) ||
+        llvm::any_of(op->getResultTypes(), llvm::IsaPred<VectorType>)) {
+      refuse(op, "iterations meet inside");
+      return WalkResult::interrupt();
+    }
+    if (isa<scf::ForOp, scf::WhileOp>(op) && findBarrier(op))
+      op->walk([&](Operation *inner) {
+        if (getForm(inner) == LaneForm::Ordered)
+          ordered = inner;
+      });
+    if (getForm(op) == LaneForm::Ordered)
+      ordered = op;
+    if (!isBarrier(op))
+      return WalkResult::advance();
+    auto reduce = dyn_cast<ReduceOp>(op);
+    if (!reduce && !isa<SyncOp>(op))
+      refuse(op, "lanes have no such barrier");
+    else if (Operation *parting =
+                 uniformity.findParting(op, loop.getRegion()))
+      refuse(parting, "iterations may not go to a barrier together");
+    else if (ordered)
+      refuse(ordered, "it keeps the order of iterations, and a barrier follows");
+    else if (reduce)
+      for (Operation &inner : reduce.getBody().front().without_terminator())
+        if (!hasVectorForm(&inner))
+          refuse(&inner, "it has no vector form");
+    return WalkResult::skip();
+  });
+}
+
+//===----------------------------------------------------------------------===//
 // Nests
 //===----------------------------------------------------------------------===//
 
@@ -261,18 +315,6 @@ void IterationLanes::findNests() {
 // Forms
 //===----------------------------------------------------------------------===//
 
-/// Functions that are exact, or the same for a vector as for a number.
-static bool hasVectorForm(Operation *op) {
-  if (!OpTrait::hasElementwiseMappableTraits(op))
-    return false;
-  if (op->getDialect() == op->getContext()->getLoadedDialect("math"))
-    return isa<math::SqrtOp, math::FloorOp, math::CeilOp, math::TruncOp,
-               math::RoundEvenOp, math::AbsFOp, math::AbsIOp, math::CopySignOp,
-               math::FmaOp, math::CountLeadingZerosOp,
-               math::CountTrailingZerosOp, math::CtPopOp>(op);
-  return isApproximation(op) || isa<arith::ArithDialect>(op->getDialect());
-}
-
 /// Whether it does not matter which lane does it first.
 static bool isUnordered(Operation *op) {
   if (isMemoryEffectFree(op))
@@ -290,15 +332,21 @@ LaneForm IterationLanes::getForm(Operation *op) const {
     return LaneForm::Structure;
   if (isPrefetch(op))
     return LaneForm::Lazy;
-  if (isa<memref::AllocaOp>(op))
-    return LaneForm::Private;
+  if (isBarrier(op))
+    return LaneForm::Barrier;
+  if (auto array = dyn_cast<memref::AllocaOp>(op))
+    return isVarying(array) ? LaneForm::Private : LaneForm::Uniform;
+  if (auto store = dyn_cast<memref::StoreOp>(op);
+      store && isPrivate(store.getMemRef()) && !isVarying(store.getMemRef()))
+    return LaneForm::Uniform;
   if (auto access = dyn_cast<StateAccessOpInterface>(op))
     if (shared.contains(access.getAccessedState()))
       return LaneForm::Ordered;
   auto varies = [&](Value value) { return isVarying(value); };
   bool isUniform = op->getNumRegions() == 0 && op->getNumResults() > 0 &&
                    llvm::none_of(op->getResults(), varies);
-  if (isUniform && (isMemoryEffectFree(op) || isa<LoadOp>(op)))
+  if (isUniform &&
+      (isMemoryEffectFree(op) || isa<LoadOp, memref::LoadOp>(op)))
     return LaneForm::Uniform;
   if (isAccess(op))
     return LaneForm::Access;

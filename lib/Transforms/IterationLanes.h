@@ -21,6 +21,7 @@ enum class LaneForm {
   Vector,    ///< the same operation on vectors
   Access,    ///< a gather or a scatter, of state or of an array
   Private,   ///< an array with a column for each lane
+  Barrier,   ///< where lanes meet, which they always do
   Structure, ///< control flow, by predication
   Lazy,      ///< no number: made again where a lane needs it
   Serial,    ///< lane by lane
@@ -40,7 +41,8 @@ struct OrderedGroup {
 
 class IterationLanes {
 public:
-  /// Of a loop without barriers whose iterations are independent.
+  /// Of a loop whose iterations are independent but for barriers; with these it
+  /// has at most as many iterations as there are lanes.
   IterationLanes(mlir::scf::ForOp loop, int64_t laneCount);
 
   /// Why the loop stays as it is, and where; `at` is null if it need not.
@@ -70,7 +72,8 @@ public:
   /// The same of a value that grows by one from lane to lane also where it
   /// wraps around: it is not cast from a sum of fewer bits.
   bool isSum(mlir::Value value) const;
-  /// Whether an array belongs to an iteration.
+  /// Whether an array belongs to an iteration; it has a column for each lane if
+  /// it varies.
   bool isPrivate(mlir::Value array) const { return privates.contains(array); }
   /// Whether an operation reads an array, or state, that no iteration changes.
   bool readsFixed(mlir::Operation *op) const;
@@ -104,6 +107,7 @@ private:
   void findNests();
   bool canCollapse(mlir::scf::ForOp inner) const;
   void findArrays();
+  void checkBarriers();
   void findSharedPixels();
   void findOrdered();
   /// Groups of these operations, of a block and of the conditions in it.

@@ -111,6 +111,10 @@ void IterationWriter::writeOperation(Operation *op) {
     return writeAccess(op);
   case LaneForm::Private: // made in front of the loop
     return;
+  case LaneForm::Barrier:
+    if (auto reduce = dyn_cast<ReduceOp>(op))
+      writeReduce(reduce);
+    return;
   case LaneForm::Structure:
     return writeStructure(op);
   case LaneForm::Lazy:
@@ -122,7 +126,8 @@ void IterationWriter::writeOperation(Operation *op) {
 }
 
 void IterationWriter::writeUniform(Operation *op) {
-  builder.clone(*op, scalars);
+  if (!isa<memref::AllocaOp>(op)) // made in front of the loop
+    builder.clone(*op, scalars);
 }
 
 /// A product of a number that grows by one from lane to lane and of one that is
@@ -184,14 +189,18 @@ void IterationWriter::writeVector(Operation *op) {
       return;
     }
   }
+  for (auto [from, to] :
+       llvm::zip(op->getResults(), createVector(op, operands)->getResults()))
+    setCarried(from, to);
+}
+
+Operation *IterationWriter::createVector(Operation *op, ValueRange operands) {
   OperationState state(loc, op->getName());
   state.addOperands(operands);
   for (Type type : op->getResultTypes())
     state.addTypes(getVectorType(type));
   state.propertiesAttr = op->getPropertiesAsAttribute();
-  Operation *made = builder.create(state);
-  for (auto [from, to] : llvm::zip(op->getResults(), made->getResults()))
-    setCarried(from, to);
+  return builder.create(state);
 }
 
 //===----------------------------------------------------------------------===//
@@ -201,6 +210,10 @@ void IterationWriter::writeVector(Operation *op) {
 void IterationWriter::writePrivate(memref::AllocaOp array) {
   MemRefType type = array.getType();
   OpBuilder arrays(outermost);
+  if (!lanes.isVarying(array)) {
+    arrays.clone(*array, scalars);
+    return;
+  }
   constexpr int64_t lineSize = 64;
   columns[array] = memref::AllocaOp::create(
       arrays, loc,

@@ -63,6 +63,8 @@ private:
   void writeOperation(mlir::Operation *op);
   void writeUniform(mlir::Operation *op);
   void writeVector(mlir::Operation *op);
+  /// The same operation on vectors.
+  mlir::Operation *createVector(mlir::Operation *op, mlir::ValueRange operands);
   mlir::Value divideAsFloats(mlir::Value dividend, mlir::Value divisor);
   /// Whether the product is one that it has written.
   bool writeLinearProduct(mlir::arith::MulIOp product);
@@ -80,6 +82,14 @@ private:
   /// The place of an index in the lanes' columns of an array.
   mlir::Value getColumns(mlir::Value index);
   void writePrivate(mlir::memref::AllocaOp array);
+
+  // Where lanes meet.
+  void writeReduce(ReduceOp reduce);
+  /// In the order that piko.reduce has.
+  llvm::SmallVector<mlir::Value> combineLanes(ReduceOp reduce);
+  llvm::SmallVector<mlir::Value> combine(mlir::Block &body,
+                                         mlir::ValueRange left,
+                                         mlir::ValueRange right);
 
   // Control flow.
   /// The lanes that have something to do, where so many iterations are left.

@@ -41,7 +41,9 @@ bool IterationLanes::isMovable(Operation *op) const {
     LaneForm form = getForm(inner);
     bool isFree = inner->hasTrait<OpTrait::IsTerminator>() ||
                   form == LaneForm::Vector || form == LaneForm::Lazy ||
-                  form == LaneForm::Uniform || form == LaneForm::Structure ||
+                  (form == LaneForm::Uniform &&
+                   !isa<memref::LoadOp, memref::StoreOp>(inner)) ||
+                  form == LaneForm::Structure ||
                   (form == LaneForm::Access && readsFixed(inner)) ||
                   (form == LaneForm::Serial && isMemoryEffectFree(inner));
     return isFree ? WalkResult::advance() : WalkResult::interrupt();

@@ -14,9 +14,9 @@ namespace piko {
 /// Reports a parallel loop of which it is not known how to make other loops.
 mlir::LogicalResult checkParallelLoop(ParallelLoopOpInterface loop);
 
-/// A loop without barriers, as loops that run its iterations one after the
-/// other; the innermost is marked with `piko.lanes`.
-void convertLoop(ParallelLoopOpInterface loop);
+/// A loop as loops that run its iterations one after the other; returns the
+/// innermost, which is marked with `piko.lanes`. Barriers stay where they are.
+mlir::scf::ForOp convertLoop(ParallelLoopOpInterface loop);
 
 /// The same iterations by their numbers.
 ParallelForOp numberIterations(ParallelPixelsOp pixels);

@@ -23,6 +23,7 @@ using namespace piko;
 
 namespace {
 struct SplitLoopsPass : piko::impl::SplitLoopsBase<SplitLoopsPass> {
+  using SplitLoopsBase::SplitLoopsBase;
   void runOnOperation() override;
 };
 } // namespace
@@ -54,8 +55,8 @@ ParallelForOp piko::hoistInvariants(ParallelForOp parallel) {
   return parallel;
 }
 
-/// A loop without barriers: its iterations one after the other.
-static void convertFor(ParallelForOp parallel) {
+/// Iterations one after the other.
+static scf::ForOp convertFor(ParallelForOp parallel) {
   IRRewriter rewriter(parallel);
   Location loc = parallel.getLoc();
   Value zero = arith::ConstantIndexOp::create(rewriter, loc, 0);
@@ -67,11 +68,12 @@ static void convertFor(ParallelForOp parallel) {
   rewriter.inlineBlockBefore(body, loop.getBody()->getTerminator(),
                              loop.getInductionVar());
   rewriter.eraseOp(parallel);
+  return loop;
 }
 
-/// The pixels of a box without barriers: rows from the last dimension on, x in
-/// the innermost loop. What a row's pixels share stays out of it.
-static void convertPixels(ParallelPixelsOp pixels) {
+/// The pixels of a box: rows from the last dimension on, x in the innermost
+/// loop. What a row's pixels share stays out of it.
+static scf::ForOp convertPixels(ParallelPixelsOp pixels) {
   IRRewriter rewriter(pixels);
   Location loc = pixels.getLoc();
   Value one = arith::ConstantIntOp::create(rewriter, loc, 1, /*width=*/32);
@@ -90,6 +92,7 @@ static void convertPixels(ParallelPixelsOp pixels) {
   rewriter.eraseOp(pixels);
   if (cell.size() > 1)
     moveLoopInvariantCode(loop);
+  return loop;
 }
 
 /// The same iterations by their numbers.
@@ -153,11 +156,22 @@ LogicalResult piko::checkParallelLoop(ParallelLoopOpInterface loop) {
          << loop->getName() << "'";
 }
 
-void piko::convertLoop(ParallelLoopOpInterface loop) {
+scf::ForOp piko::convertLoop(ParallelLoopOpInterface loop) {
   if (auto pixels = dyn_cast<ParallelPixelsOp>(*loop))
-    convertPixels(pixels);
-  else
-    convertFor(cast<ParallelForOp>(*loop));
+    return convertPixels(pixels);
+  return convertFor(cast<ParallelForOp>(*loop));
+}
+
+/// Whether iterations may be the lanes of one vector, which have reductions.
+static bool fitsLanes(ParallelForOp parallel, int64_t most) {
+  std::optional<int64_t> count = getConstantIntValue(parallel.getCount());
+  if (!count || *count < 2 || *count > most)
+    return false;
+  WalkResult result = parallel.walk([](BarrierOpInterface barrier) {
+    return isa<SyncOp, ReduceOp>(*barrier) ? WalkResult::advance()
+                                           : WalkResult::interrupt();
+  });
+  return !result.wasInterrupted();
 }
 
 void SplitLoopsPass::runOnOperation() {
@@ -176,6 +190,9 @@ void SplitLoopsPass::runOnOperation() {
       convertLoop(parallel);
       continue;
     }
+    if (auto loop = dyn_cast<ParallelForOp>(*parallel);
+        loop && fitsLanes(loop, lockstep))
+      continue;
     auto pixels = dyn_cast<ParallelPixelsOp>(*parallel);
     LoopSplitter splitter(pixels ? numberIterations(pixels)
                                  : cast<ParallelForOp>(*parallel));

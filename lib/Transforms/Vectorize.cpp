@@ -3,6 +3,8 @@
 // piko-vectorize: primitives, or the iterations of a parallel loop, as lanes.
 
 #include "IterationWriter.h"
+#include "LoopSplitter.h"
+#include "ParallelLoops.h"
 
 #include "Piko/Dialect/Piko/IR/Marks.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
@@ -49,7 +51,7 @@ private:
   scf::ForOp loop;
   bool ofPrimitives;
   bool chosen = false;
-  bool said = false; ///< By the schedule, whatever it costs.
+  bool said = false; ///< By the schedule, or by barriers, whatever it costs.
 };
 
 } // namespace
@@ -67,8 +69,9 @@ Candidate::Candidate(scf::ForOp loop)
         if (std::optional<Lanes> given = getLaneMapping(outer))
           chosen &= *given == lanes || *given == Lanes::Collapsed;
   }
-  said = hasSpecifiedLanes(loop, lanes) &&
-         (!ofPrimitives || getLoopPhase(loop) == "process");
+  said = findBarrier(loop) ||
+         (hasSpecifiedLanes(loop, lanes) &&
+          (!ofPrimitives || getLoopPhase(loop) == "process"));
 }
 
 InFlightDiagnostic Candidate::refuse() {
@@ -231,6 +234,49 @@ static void countLoops(scf::ForOp root) {
       countLoop(loop, *counting);
 }
 
+/// Where lanes read different elements of a short array in a field, as the
+/// components of a corner, each is read, and a lane chooses: there is no gather
+/// within an element.
+static void readAllElements(scf::ForOp root) {
+  constexpr int64_t most = 4;
+  SmallVector<LoadOp> loads;
+  root.walk([&](LoadOp load) {
+    if (!llvm::all_of(load.getElements(), [](Value element) {
+          return matchPattern(element, m_Constant());
+        }))
+      loads.push_back(load);
+  });
+  if (loads.empty())
+    return;
+  Uniformity uniformity(root, {{root.getInductionVar(), Uniform::Iteration}});
+  for (LoadOp load : loads) {
+    Operation *state =
+        SymbolTable::lookupSymbolIn(getPipeline(load), load.getStateAttr());
+    RecordOp record = lookupRecord(load, getStateRecord(state));
+    ArrayRef<int64_t> counts = record.getField(load.getField()).getCounts();
+    SmallVector<Value> elements(load.getElements());
+    auto varies = [&](Value element) { return uniformity.isVarying(element); };
+    auto one = llvm::find_if(elements, varies);
+    if (llvm::count_if(elements, varies) != 1 ||
+        counts[one - elements.begin()] > most)
+      continue;
+    IRRewriter builder(load);
+    Value value;
+    for (int64_t i = 0; i < counts[one - elements.begin()]; ++i) {
+      Value number =
+          arith::ConstantIndexOp::create(builder, load.getLoc(), i);
+      auto read = cast<LoadOp>(builder.clone(*load));
+      read.getElementsMutable()[one - elements.begin()].assign(number);
+      Value isIt = arith::CmpIOp::create(
+          builder, load.getLoc(), arith::CmpIPredicate::eq, *one, number);
+      value = value ? arith::SelectOp::create(builder, load.getLoc(), isIt,
+                                              read.getResult(), value)
+                    : read.getResult();
+    }
+    builder.replaceOp(load, value);
+  }
+}
+
 /// With fewer iterations a loop runs as it was: a vector takes about as long as
 /// this many.
 static int64_t getLeastTurns(int64_t laneCount) {
@@ -262,11 +308,44 @@ static void vectorize(const IterationLanes &lanes) {
   loop->moveBefore(choice.elseBlock(), choice.elseBlock()->begin());
 }
 
+/// Whether the iterations of a loop, which meet, are now lanes in lockstep.
+static bool runInLockstep(ParallelForOp parallel) {
+  std::optional<int64_t> count = getConstantIntValue(parallel.getCount());
+  if (!count || *count > 16)
+    return false;
+  auto copy = cast<ParallelForOp>(OpBuilder(parallel).clone(*parallel));
+  scf::ForOp loop = convertLoop(
+      cast<ParallelLoopOpInterface>(*hoistInvariants(copy)));
+  Candidate candidate(loop);
+  countLoops(loop);
+  readAllElements(loop);
+  int64_t laneCount = std::max<int64_t>(llvm::PowerOf2Ceil(*count), 4);
+  IterationLanes lanes(loop, laneCount);
+  bool isDone = candidate.isChosen() && candidate.decide(lanes);
+  if (isDone) {
+    IterationWriter(lanes).write(OpBuilder(loop).saveInsertionPoint());
+    parallel.erase();
+  }
+  loop.erase();
+  return isDone;
+}
+
 void VectorizePass::runOnOperation() {
   if (!llvm::is_contained({4, 8, 16}, laneCount)) {
     getOperation().emitError("expected 4, 8 or 16 lanes, but got ")
         << int64_t(laneCount);
     return signalPassFailure();
+  }
+  SmallVector<ParallelForOp> meeting;
+  getOperation().walk([&](ParallelForOp parallel) {
+    if (parallel->getParentOfType<KernelOp>())
+      meeting.push_back(parallel);
+  });
+  for (ParallelForOp parallel : meeting) {
+    if (runInLockstep(parallel))
+      ++vectorized;
+    else if (failed(LoopSplitter(parallel).run()))
+      return signalPassFailure();
   }
   // Loops inside of one that is vectorized are parts of it.
   getOperation().walk<WalkOrder::PreOrder>([&](scf::ForOp loop) {
@@ -278,6 +357,7 @@ void VectorizePass::runOnOperation() {
     // Of a copy: what stays scalar stays as it is.
     auto copy = cast<scf::ForOp>(OpBuilder(loop).clone(*loop));
     countLoops(copy);
+    readAllElements(copy);
     IterationLanes lanes(copy, laneCount);
     if (!candidate.decide(lanes)) {
       copy.erase();

@@ -23,6 +23,9 @@ mlir::Operation *findBarrier(mlir::Operation *op);
 /// not know is `Uniform::Iteration`, which promises nothing. All iterations are
 /// taken to agree on the control flow around barriers: where they may not, the
 /// loop that is made of it compares them.
+///
+/// The level of a private array, `memref.alloca` inside, is that of what is in
+/// it.
 class Uniformity {
 public:
   /// Where a value begins to differ.
@@ -43,6 +46,9 @@ public:
   bool isVarying(mlir::Value value) const {
     return get(value) == Uniform::Iteration;
   }
+  /// The first operation around `op`, and inside of `region`, on which way to go
+  /// iterations may not agree; null if there is none.
+  mlir::Operation *findParting(mlir::Operation *op, mlir::Region &region) const;
   /// A value that takes the place of another.
   void replace(mlir::Value from, mlir::Value to) { mark(to, get(from)); }
 
@@ -50,12 +56,18 @@ private:
   /// Narrows what an operation defines; returns whether anything is new.
   bool visit(mlir::Operation *op);
   bool visitControlFlow(mlir::Operation *op);
+  bool visitArrayAccess(mlir::Operation *op);
+  /// The level of what decides which way control flow goes.
+  Uniform getDeciding(mlir::Operation *op) const;
+  /// The same, where barriers are: there iterations agree.
+  Uniform getParting(mlir::Operation *op) const;
   bool markArguments(mlir::Block &block, Uniform level);
   bool mark(mlir::Value value, Uniform level);
   Uniform get(mlir::ValueRange values) const;
   /// Narrows each of `targets` to its source, and to `least`.
   bool flow(mlir::ValueRange sources, mlir::ValueRange targets, Uniform least);
 
+  mlir::Operation *root;
   llvm::DenseMap<mlir::Value, Uniform> levels; ///< What is not in it: Bin.
   llvm::DenseSet<mlir::Attribute> written; ///< State that the kernel writes.
 };

@@ -319,6 +319,13 @@ def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
     all that vectors do. So a depth test, the shading of what has passed it, and
     the update of a colour become turns, vectors and turns.
 
+    A parallel loop whose iterations meet, of which `piko-split-loops` has left
+    those that a vector has lanes for, on any processor, becomes lanes in lockstep:
+    a barrier needs no code, a reduction is one of a vector's lanes, and what
+    iterations agree on stays scalar, private arrays included. Where iterations may
+    part ways around a barrier, or emit or update pixels in front of one, it is
+    cut as `piko-split-loops` cuts others, and the pieces are looked at.
+
     Parallel loops that turn out to have few iterations run as they were. Whether
     vectors pay is estimated from the operations, how often they run, and for how
     many lanes; where they do not, a remark has the estimate, with what costs most.

@@ -212,8 +212,12 @@ def SplitLoops : Pass<"piko-split-loops", "::piko::PipelineOp"> {
     emit, primitives are put
     in the order of iterations when the loop ends (`piko.cpu.defer_begin`).
 
-    **Guarantees** that nothing is left of parallel loops and barriers, and that
-    each barrier sees all that iterations did before it, in order of iteration.
+    A `piko.parallel_for` with a constant count of at most `lockstep`, whose
+    barriers are `piko.sync` and `piko.reduce`, is left to `piko-vectorize`:
+    as lanes of one vector its iterations run in lockstep, and need no cut.
+
+    **Guarantees** that nothing else is left of parallel loops and barriers, and
+    that each barrier sees all that iterations did before it, in order of iteration.
 
     Before:
     ```
@@ -245,6 +249,10 @@ def SplitLoops : Pass<"piko-split-loops", "::piko::PipelineOp"> {
     `scf.while` and `scf.index_switch` is an error, and so is a value across a
     barrier that is not a number, a primitive or a private array.
   }];
+  let options = [
+    Option<"lockstep", "lockstep", "int64_t", /*default=*/"0",
+           "Most iterations of a loop with barriers that is left to vectors">
+  ];
   let statistics = [
     Statistic<"loops", "loops", "parallel loops that became loops">,
     Statistic<"cuts", "cuts", "parallel loops that were cut at barriers">,
