@@ -35,17 +35,13 @@ public:
         glm::max(glm::abs(mesh.lo - origin), glm::abs(mesh.hi - origin));
     float margin =
         12 * epsilon * piko::max(piko::max(reach.x, reach.y), reach.z);
-    for (int i = 0; i < 3; ++i) {
-      nearScale[i] = 1 / direction[i]; // of 0 it is infinite
-      farScale[i] = nearScale[i] * longer;
-      bool isForward = nearScale[i] > 0;
-      // These sums are rounded, too.
-      float wide = margin + 4 * epsilon * glm::abs(origin[i]);
-      nearOrigin[i] = isForward ? origin[i] + wide : origin[i] - wide;
-      farOrigin[i] = isForward ? origin[i] - wide : origin[i] + wide;
-      nearSide[i] = isForward ? i : i + 3;
-      farSide[i] = isForward ? i + 3 : i;
-    }
+    nearScale = 1.0f / direction; // of 0 it is infinite
+    farScale = nearScale * longer;
+    isForward = glm::greaterThan(nearScale, glm::vec3(0));
+    // These sums are rounded, too.
+    glm::vec3 wide = margin + 4 * epsilon * glm::abs(origin);
+    originOfLo = origin + wide;
+    originOfHi = origin - wide;
     float length2 = glm::dot(direction, direction);
     usable = length2 > 1e-36f && length2 < 1e36f && margin < 1e12f;
   }
@@ -53,66 +49,73 @@ public:
   /// False if numbers are out of range or NaN.
   bool isUsable() const { return usable; }
 
-  /// Where the ray enters child i of a node, between 0 and limit; -1 if it does
-  /// not.
+  /// Where the ray enters child i of a node, between 0 and limit; INFINITY if
+  /// it does not.
   float enter(const BvhNode &node, int i, float limit) const {
+    const auto &b = node.bounds;
+    glm::vec3 toLo = glm::vec3(b[0][i], b[1][i], b[2][i]) - originOfLo;
+    glm::vec3 toHi = glm::vec3(b[3][i], b[4][i], b[5][i]) - originOfHi;
+    glm::vec3 toNear = glm::mix(toHi, toLo, isForward) * nearScale;
+    glm::vec3 toFar = glm::mix(toLo, toHi, isForward) * farScale;
     float in = 0, out = limit;
     for (int k = 0; k < 3; ++k) {
-      float n = (node.bounds[nearSide[k]][i] - nearOrigin[k]) * nearScale[k];
-      float f = (node.bounds[farSide[k]][i] - farOrigin[k]) * farScale[k];
       // NaN, which is 0 times infinity in a plane of the box, changes nothing.
-      in = in < n ? n : in;
-      out = f < out ? f : out;
+      in = in < toNear[k] ? toNear[k] : in;
+      out = toFar[k] < out ? toFar[k] : out;
     }
-    return in <= out ? in : -1.0f;
+    return in <= out ? in : INFINITY;
   }
 
 private:
-  glm::vec3 nearOrigin, farOrigin, nearScale, farScale;
-  int nearSide[3], farSide[3];
+  glm::vec3 originOfLo, originOfHi, nearScale, farScale;
+  glm::bvec3 isForward;
   bool usable;
 };
 
 /// The nearest hit with 0 < t < limit; of equally near ones that of the
-/// smallest index. If `AnyHit`, one of the hits. None if the direction is
+/// smallest index. If `anyHit`, one of the hits. None if the direction is
 /// shorter than 1e-18 or longer than 1e18, or the mesh is farther away.
-template <bool AnyHit>
-Hit findHit(glm::vec3 origin, glm::vec3 direction, float limit,
+///
+/// The rays of a packet go through the tree together: `least` gives each of
+/// them the least of all their distances, INFINITY if none enters. For a single
+/// ray it gives back what it takes.
+template <class Least>
+Hit findHit(glm::vec3 origin, glm::vec3 direction, float limit, bool anyHit,
             const piko::scene::Bounds &mesh, const piko::Buffer<BvhNode> &nodes,
-            const piko::Buffer<BvhTriangle> &triangles) {
+            const piko::Buffer<BvhTriangle> &triangles, const Least &least) {
   struct Entry {
     int32_t child, count; // as in a node
-    float t;              // where the ray enters
+    float t;              // where the first ray enters
   };
   constexpr int width = piko::scene::bvhWidth;
   Entry stack[piko::scene::bvhDepth * (width - 1) + 1];
   Hit nearest;
-  nearest.t = limit;
   SlabRay slabs(origin, direction, mesh);
-  if (nodes.size() == 0 || !slabs.isUsable())
-    return nearest;
+  constexpr float nowhere = -1; // the limit of a ray that enters no box
+  nearest.t = slabs.isUsable() ? limit : nowhere;
   ShearedRay sheared(origin, direction);
 
   int top = 0;
-  stack[top++] = {0, 0, 0};
+  if (nodes.size() > 0)
+    stack[top++] = {0, 0, 0};
   while (top > 0) {
     Entry entry = stack[--top];
-    if (entry.t > nearest.t * longer)
+    if (entry.t > -least(-nearest.t * longer))
       continue;
     for (int i = 0; i < entry.count; ++i)
-      if (sheared.intersect(triangles[entry.child + i], nearest) && AnyHit)
-        return nearest;
+      if (sheared.intersect(triangles[entry.child + i], nearest) && anyHit)
+        nearest.t = nowhere;
     if (entry.count > 0)
       continue;
 
     const BvhNode &node = nodes[entry.child];
     float enter[width];
     for (int i = 0; i < width; ++i)
-      enter[i] = slabs.enter(node, i, nearest.t * longer);
+      enter[i] = least(slabs.enter(node, i, nearest.t * longer));
     int hit[width], hits = 0;
     for (int i = 0; i < width; ++i) {
       hit[hits] = i;
-      hits += enter[i] >= 0;
+      hits += enter[i] < INFINITY;
     }
     // The nearest child comes to the top.
     int bottom = top;

@@ -1,15 +1,17 @@
 //===- raytrace.piko.cpp - A ray tracer whose stages form a cycle ---------===//
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-//                +---- shadow and mirror rays ----+
-//                v                                |
-//   pixels --> Generate --> Trace -----------> Shade
-//                             |                   |
-//                             +--> Accumulate <---+
-//                                   (image)
+//                 +---- shadow and mirror rays
+//                 v                   |
+//   Primary       Trace -----------> Shade
+//      |          |  |                ^ |
+//      +----------|--|----------------+ |
+//                 |  +--> Accumulate <--+
+//                 |        (image)
 //
-// A ray stays in the bin of its pixel, and what the rays of a pixel bring is
-// summed up in order of lineage.
+// Rays go through the tree in packets of 16, Primary's for a block of 4 x 4
+// pixels. A ray stays in the bin of its pixel, and what the rays of a pixel
+// bring is summed up in order of lineage.
 //
 //===----------------------------------------------------------------------===//
 #include <piko.h>
@@ -63,50 +65,84 @@ struct State {
   piko::Image<Color> image;
 };
 
-template <Mapping M>
-struct Generate : piko::Stage<M.bin, M.bin, 64, Pixel, Ray>, piko::Uses<State> {
-  void assignBin(const Pixel &p) {
-    this->assignToBin(p, this->binFromPosition(p.at));
-  }
-  void schedule(piko::BinId) { this->specifySchedule(M.core, M.split); }
+// A stage whose parallel loops run over the rays of a packet.
+template <Mapping M, class In, class... Out>
+struct PacketStage : piko::Stage<M.bin, M.bin, 64, In, Out...>,
+                     piko::Uses<State> {
+protected:
+  static constexpr int packet = 16;
 
-  void process(const Pixel &p) {
-    const Camera &c = this->state().camera;
-    float x = 2 * (float(p.at.x) + 0.5f) / float(this->domain().x) - 1;
-    float y = 1 - 2 * (float(p.at.y) + 0.5f) / float(this->domain().y);
-    this->emit({p.at, c.eye, c.forward + c.right * x + c.up * y, INFINITY,
-                glm::vec3(1), 0});
+  /// What a ray hits; an iteration that has none gives a limit below 0.
+  Hit find(glm::vec3 origin, glm::vec3 direction, float limit, bool anyHit) {
+    return findHit(origin, direction, limit, anyHit, this->state().bounds,
+                   this->state().nodes, this->state().leaves, [&](float t) {
+                     if (!this->any(t < INFINITY))
+                       return INFINITY;
+                     return this->reduce(
+                         t, [](float a, float b) { return piko::min(a, b); });
+                   });
   }
 };
 
-template <Mapping M>
-struct Trace : piko::Stage<M.bin, M.bin, 64, Ray, Surface, Radiance>,
-               piko::Uses<State> {
+// Follows the rays of the camera.
+template <Mapping M> struct Primary : PacketStage<M, Nothing, Surface> {
+  void assignBin(const Nothing &n) { this->assignToAll(n); }
+  void schedule(piko::BinId) {
+    this->everyBin();
+    this->specifySchedule(M.core, M.split);
+  }
+
+  void process(const piko::List<Nothing> &) {
+    constexpr int side = 4;
+    glm::ivec2 lo = this->binLo(), hi = this->binHi();
+    for (int y = lo.y; y < hi.y; y += side)
+      for (int x = lo.x; x < hi.x; x += side)
+        this->parallelFor(this->packet,
+                          [&](int i) { trace({x + i % side, y + i / side}); });
+  }
+
+private:
+  void trace(glm::ivec2 at) {
+    const Camera &c = this->state().camera;
+    glm::vec2 size = this->domain(), middle = glm::vec2(at) + 0.5f;
+    glm::vec3 direction = c.forward + c.right * (2 * middle.x / size.x - 1) +
+                          c.up * (1 - 2 * middle.y / size.y);
+    bool isPixel = glm::all(glm::lessThan(at, this->binHi()));
+    Hit hit = this->find(c.eye, direction, isPixel ? INFINITY : -1, false);
+    if (hit.triangle >= 0)
+      this->emit(
+          Surface{at, direction, glm::vec3(1), 0, hit.triangle, hit.weight});
+  }
+};
+
+// Follows the rays that come from surfaces.
+template <Mapping M> struct Trace : PacketStage<M, Ray, Surface, Radiance> {
   void assignBin(const Ray &r) { this->assignToPreviousBins(r); }
   void schedule(piko::BinId) {
+    this->batch(this->packet);
     if constexpr (M.apart)
       this->specifySchedule(M.core, M.split);
   }
 
-  void process(const Ray &r) {
-    if (r.mirrors < 0) {
-      if (find<true>(r).triangle < 0)
-        this->emit(Radiance{r.pixel, r.weight}, 1);
-      return;
-    }
-    Hit hit = find<false>(r);
-    if (hit.triangle >= 0)
-      this->emit(Surface{r.pixel, r.direction, r.weight, r.mirrors,
-                         hit.triangle, hit.weight},
-                 0);
-    else if (r.mirrors > 0)
-      this->emit(Radiance{r.pixel, r.weight * glm::vec3(Color().rgba)}, 1);
-  }
-
-private:
-  template <bool AnyHit> Hit find(const Ray &r) {
-    return findHit<AnyHit>(r.origin, r.direction, r.limit, this->state().bounds,
-                           this->state().nodes, this->state().leaves);
+  void process(const piko::List<Ray> &rays) {
+    this->parallelFor(this->packet, [&](int i) {
+      bool isRay = i < rays.size();
+      const Ray &r = rays[isRay ? i : 0];
+      bool isShadow = r.mirrors < 0;
+      Hit hit =
+          this->find(r.origin, r.direction, isRay ? r.limit : -1, isShadow);
+      if (!isRay)
+        return;
+      if (hit.triangle >= 0) {
+        if (!isShadow)
+          this->emit(Surface{r.pixel, r.direction, r.weight, r.mirrors,
+                             hit.triangle, hit.weight},
+                     0);
+      } else {
+        glm::vec3 light = isShadow ? glm::vec3(1) : glm::vec3(Color().rgba);
+        this->emit(Radiance{r.pixel, r.weight * light}, 1);
+      }
+    });
   }
 };
 
@@ -207,14 +243,14 @@ struct Accumulate : piko::Stage<M.bin, M.bin, 64, Radiance>, piko::Uses<State> {
 };
 
 template <Mapping M> struct MappedRaytracer : piko::Pipe<State> {
-  Generate<M> generate;
+  Primary<M> primary;
   Trace<M> trace;
   Shade<M> shade;
   Accumulate<M> accumulate;
 
   MappedRaytracer() {
-    source(generate);
-    connect(generate, 0, trace);
+    source(primary);
+    connect(primary, 0, shade);
     connect(trace, 0, shade);
     connect(trace, 1, accumulate);
     connect(shade, 0, trace);

@@ -75,8 +75,7 @@ SmallVector<Value> IterationWriter::combineLanes(ReduceOp reduce) {
     Value mask = arith::ConstantOp::create(
         builder, loc,
         DenseElementsAttr::get(getVectorType(builder.getI1Type()), hasOther));
-    SmallVector<Value> both =
-        combine(reduce.getBody().front(), values, others);
+    SmallVector<Value> both = combine(reduce.getBody().front(), values, others);
     // The first lane has another one, if any has.
     bool isFull = llvm::isPowerOf2_64(count);
     for (auto [value, next] : llvm::zip(values, both))

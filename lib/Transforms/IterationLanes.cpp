@@ -86,11 +86,12 @@ void IterationLanes::findArrays() {
       // A turn keeps one for each lane.
       constexpr int64_t most = 16 << 10;
       Type element = type.getElementType();
-      bytes += isSimple && isVarying(array) ? type.getNumElements() *
-                              (element.isIndex()
-                                   ? 8
-                                   : (element.getIntOrFloatBitWidth() + 7) / 8)
-                        : 0;
+      bytes += isSimple && isVarying(array)
+                   ? type.getNumElements() *
+                         (element.isIndex()
+                              ? 8
+                              : (element.getIntOrFloatBitWidth() + 7) / 8)
+                   : 0;
       if (bytes > most)
         refuse(op, "each lane would have a copy of this array, which is large");
       privates.insert(array);
@@ -233,11 +234,11 @@ void IterationLanes::checkBarriers() {
     auto reduce = dyn_cast<ReduceOp>(op);
     if (!reduce && !isa<SyncOp>(op))
       refuse(op, "lanes have no such barrier");
-    else if (Operation *parting =
-                 uniformity.findParting(op, loop.getRegion()))
+    else if (Operation *parting = uniformity.findParting(op, loop.getRegion()))
       refuse(parting, "iterations may not go to a barrier together");
     else if (ordered)
-      refuse(ordered, "it keeps the order of iterations, and a barrier follows");
+      refuse(ordered,
+             "it keeps the order of iterations, and a barrier follows");
     else if (reduce)
       for (Operation &inner : reduce.getBody().front().without_terminator())
         if (!hasVectorForm(&inner))
@@ -345,8 +346,7 @@ LaneForm IterationLanes::getForm(Operation *op) const {
   auto varies = [&](Value value) { return isVarying(value); };
   bool isUniform = op->getNumRegions() == 0 && op->getNumResults() > 0 &&
                    llvm::none_of(op->getResults(), varies);
-  if (isUniform &&
-      (isMemoryEffectFree(op) || isa<LoadOp, memref::LoadOp>(op)))
+  if (isUniform && (isMemoryEffectFree(op) || isa<LoadOp, memref::LoadOp>(op)))
     return LaneForm::Uniform;
   if (isAccess(op))
     return LaneForm::Access;

@@ -87,9 +87,8 @@ private:
   void writeReduce(ReduceOp reduce);
   /// In the order that piko.reduce has.
   llvm::SmallVector<mlir::Value> combineLanes(ReduceOp reduce);
-  llvm::SmallVector<mlir::Value> combine(mlir::Block &body,
-                                         mlir::ValueRange left,
-                                         mlir::ValueRange right);
+  llvm::SmallVector<mlir::Value>
+  combine(mlir::Block &body, mlir::ValueRange left, mlir::ValueRange right);
 
   // Control flow.
   /// The lanes that have something to do, where so many iterations are left.

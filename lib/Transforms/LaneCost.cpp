@@ -272,6 +272,10 @@ void CostModel::addOperation(Operation *op, Frequency times, bool laneByLane) {
   if (isPrefetch(op) || isa<FailOp, FailListOp, FailDivideOp>(op))
     return; // free, or rare
   LaneForm form = lanes.getForm(op);
+  if (form == LaneForm::Barrier) {
+    cost.computes |= op->getNumResults() != 0;
+    return; // What else would be done is cut there, which costs more.
+  }
   if (form == LaneForm::Uniform || form == LaneForm::Private ||
       form == LaneForm::Lazy)
     return; // as much for one as for all, or nothing

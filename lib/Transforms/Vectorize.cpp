@@ -69,9 +69,9 @@ Candidate::Candidate(scf::ForOp loop)
         if (std::optional<Lanes> given = getLaneMapping(outer))
           chosen &= *given == lanes || *given == Lanes::Collapsed;
   }
-  said = findBarrier(loop) ||
-         (hasSpecifiedLanes(loop, lanes) &&
-          (!ofPrimitives || getLoopPhase(loop) == "process"));
+  said =
+      findBarrier(loop) || (hasSpecifiedLanes(loop, lanes) &&
+                            (!ofPrimitives || getLoopPhase(loop) == "process"));
 }
 
 InFlightDiagnostic Candidate::refuse() {
@@ -263,8 +263,7 @@ static void readAllElements(scf::ForOp root) {
     IRRewriter builder(load);
     Value value;
     for (int64_t i = 0; i < counts[one - elements.begin()]; ++i) {
-      Value number =
-          arith::ConstantIndexOp::create(builder, load.getLoc(), i);
+      Value number = arith::ConstantIndexOp::create(builder, load.getLoc(), i);
       auto read = cast<LoadOp>(builder.clone(*load));
       read.getElementsMutable()[one - elements.begin()].assign(number);
       Value isIt = arith::CmpIOp::create(
@@ -314,8 +313,8 @@ static bool runInLockstep(ParallelForOp parallel) {
   if (!count || *count > 16)
     return false;
   auto copy = cast<ParallelForOp>(OpBuilder(parallel).clone(*parallel));
-  scf::ForOp loop = convertLoop(
-      cast<ParallelLoopOpInterface>(*hoistInvariants(copy)));
+  scf::ForOp loop =
+      convertLoop(cast<ParallelLoopOpInterface>(*hoistInvariants(copy)));
   Candidate candidate(loop);
   countLoops(loop);
   readAllElements(loop);

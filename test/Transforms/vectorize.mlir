@@ -186,6 +186,9 @@ piko.pipeline @Stays rank 1 {
       scf.for %x = %c1 to %n step %c1 {
         // expected-note@+1 {{here}}
         %large = memref.alloca() : memref<5000xf32>
+        %i = arith.index_cast %x : index to i32
+        %f = arith.sitofp %i : i32 to f32
+        memref.store %f, %large[%c0] : memref<5000xf32>
         %v = memref.load %large[%x] : memref<5000xf32>
         piko.store %v, checked @out[%x : index] "z" : f32
       } {piko.lanes}

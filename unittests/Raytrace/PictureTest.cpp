@@ -31,10 +31,6 @@ Camera makeCamera() {
 
 std::vector<Color> render(Input &input, int w, int h) {
   Bvh bvh = *buildBvh(input.mesh);
-  std::vector<Pixel> pixels;
-  for (int y = 0; y < h; ++y)
-    for (int x = 0; x < w; ++x)
-      pixels.push_back({{x, y}});
   raytrace::Raytracer pipe;
   pipe.setDomain({w, h});
   pipe.state().camera = makeCamera();
@@ -48,7 +44,8 @@ std::vector<Color> render(Input &input, int w, int h) {
   pipe.state().triangles.assign(input.mesh.triangles);
   pipe.state().vertices.assign(input.mesh.vertices);
   pipe.state().lights.assign(input.lights);
-  pipe.feed(pipe.generate, pixels);
+  const std::vector<piko::scene::Nothing> nothing;
+  pipe.feed(pipe.primary, nothing);
   pipe.run();
   const Color *image = pipe.state().image.data();
   return {image, image + size_t(w) * h};

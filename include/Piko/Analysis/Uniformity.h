@@ -46,8 +46,8 @@ public:
   bool isVarying(mlir::Value value) const {
     return get(value) == Uniform::Iteration;
   }
-  /// The first operation around `op`, and inside of `region`, on which way to go
-  /// iterations may not agree; null if there is none.
+  /// The first operation around `op`, and inside of `region`, on which way to
+  /// go iterations may not agree; null if there is none.
   mlir::Operation *findParting(mlir::Operation *op, mlir::Region &region) const;
   /// A value that takes the place of another.
   void replace(mlir::Value from, mlir::Value to) { mark(to, get(from)); }
