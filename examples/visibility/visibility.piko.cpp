@@ -272,13 +272,14 @@ struct Coverage : piko::Stage<Bin, Bin, 64, ScreenTriangle>, piko::Uses<State> {
 // How it looks
 //===----------------------------------------------------------------------===//
 
-template <int Bin>
+template <int Bin, piko::Precision P>
 struct Shade : piko::Stage<Bin, Bin, 64, Nothing>, piko::Uses<State> {
   void assignBin(const Nothing &n) { this->assignToAll(n); }
 
   void schedule(piko::BinId) {
     this->everyBin();
     this->template endStage<Coverage<Bin>>();
+    this->specifyPrecision(P);
   }
 
   void process(const piko::List<Nothing> &) {
@@ -318,13 +319,14 @@ private:
   }
 };
 
-template <int Bin> struct Pipeline : piko::Pipe<State> {
+template <int Bin, piko::Precision P = piko::Precision::Strict>
+struct Pipeline : piko::Pipe<State> {
   VertexShader vertexShader;
   Setup setup;
   Clipper clipper;
   SmallCoverage smallCoverage;
   Coverage<Bin> coverage;
-  Shade<Bin> shade;
+  Shade<Bin, P> shade;
 
   Pipeline() {
     this->source(vertexShader);
@@ -341,3 +343,5 @@ template <int Bin> struct Pipeline : piko::Pipe<State> {
 } // namespace visibility
 
 struct Visibility : visibility::Pipeline<64> {};
+struct RelaxedVisibility
+    : visibility::Pipeline<64, piko::Precision::Relaxed> {};

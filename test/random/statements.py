@@ -303,8 +303,8 @@ class Statements(Expressions):
             bound, times = Query("i32", "size", solid=True), 1
             over_list = True
         else:
-            times = r.choice([1, 3, 7])
-            bound = lit(times) if r.random() < 0.3 else \
+            times = r.choice([1, 3, 7, 16])  # also as many as a vector has lanes
+            bound = lit(times) if r.random() < 0.5 else \
                 op("&", self.expr("i32", scope, 1), lit(times))
             over_list = False
         inner = self.inside(scope, level=scope.level + 1, loops=None,
@@ -340,7 +340,7 @@ class Statements(Expressions):
         self.use("sync")
         self.use("shared-arrays")
         r = self.random
-        kind, length = r.choice(["i32", "f32", "i64"]), 8
+        kind, length = r.choice(["i32", "f32", "i64"]), 16
         if over_list:
             return [Sync()]
         name = self.fresh("a")
