@@ -343,5 +343,5 @@ struct Pipeline : piko::Pipe<State> {
 } // namespace visibility
 
 struct Visibility : visibility::Pipeline<64> {};
-struct RelaxedVisibility
-    : visibility::Pipeline<64, piko::Precision::Relaxed> {};
+struct RelaxedVisibility : visibility::Pipeline<64, piko::Precision::Relaxed> {
+};
