@@ -5,6 +5,7 @@
   bench.py [options] [SECTION..]
 
   raster    the fastest pipeline of examples/raster, beside peers
+  kernels   kernels of the examples: all lanes against one
   bodies    bodies of phases: all lanes against one, and C++ compilers
   runtime   what an edge between two stages costs
   maths     what a function costs, beside libm and, where it is installed, SLEEF
@@ -25,17 +26,18 @@ import bodies
 from charts import find_pyplot
 from figure4 import PIPES, print_table
 from suite import bodies as bodies_section
-from suite import maths, page, raster, roofline, runtime
+from suite import kernels, maths, page, raster, roofline, runtime
 
 ROOT = bodies.ROOT
-SECTIONS = {"raster": raster, "bodies": bodies_section, "runtime": runtime,
-            "maths": maths, "roofline": roofline}
+SECTIONS = {"raster": raster, "kernels": kernels, "bodies": bodies_section,
+            "runtime": runtime, "maths": maths, "roofline": roofline}
 RASTERIZERS = [*PIPES, raster.VISIBILITY]
 BUNNY = "/usr/share/glmark2/models/bunny.obj"
 # What options are where the user does not say, and with --quick.
 DEFAULTS = {
     "lights": ([1, 100, 1000], [1, 100]),
     "pipes": (RASTERIZERS, ["Fused", "Tiled", raster.VISIBILITY]),
+    "examples": (list(kernels.PIPELINES), ["visibility"]),
     "rounds": (5, 2),
     "frames": (21, 5),
     "seconds": (0.5, 0.1),
@@ -63,14 +65,16 @@ def add_options(parser):
     parser.add_argument("--jobs", type=int, default=os.cpu_count(),
                         help="builds at a time")
     parser.add_argument("--cpu", default="native",
-                        help="what bodies are compiled for (%(default)s)")
+                        help="what kernels and bodies are compiled for "
+                             "(%(default)s)")
     parser.add_argument("--rounds", type=int)
     parser.add_argument("--frames", type=int,
                         help="of the rasterizer in a round, at most")
     parser.add_argument("--seconds", type=float,
                         help="of frames in a round, for each contender")
     parser.add_argument("--scene", action="append", metavar="SCENE",
-                        help=f"of raster; may be repeated ({BUNNY})")
+                        help="of raster; may be repeated; kernels takes the "
+                             f"first ({BUNNY})")
     parser.add_argument("--lights", nargs="+", type=int)
     parser.add_argument("--threads", nargs="+", type=int, default=[1, 2],
                         help="of raster and runtime (1 2)")
@@ -80,6 +84,8 @@ def add_options(parser):
     parser.add_argument("--peer", action="append", default=[],
                         metavar="NAME=COMMAND",
                         help="of raster; may be repeated")
+    parser.add_argument("--examples", nargs="+", metavar="NAME",
+                        choices=kernels.PIPELINES, help="of kernels")
     parser.add_argument("--bodies", nargs="+", metavar="NAME",
                         choices=bodies.find_bodies(),
                         help="of bodies and roofline")
@@ -110,8 +116,8 @@ def check(parser, options):
     if len(set(names)) < len(names):
         parser.error("--peer: expected a name for each, which is not Piko, but "
                      f"got {', '.join(names[1:])}")
-    if "raster" in options.sections and options.scene == [BUNNY] \
-            and not os.path.exists(BUNNY):
+    if {"raster", "kernels"} & set(options.sections) \
+            and options.scene == [BUNNY] and not os.path.exists(BUNNY):
         parser.error(f"expected --scene, because there is no {BUNNY} (Debian: "
                      "glmark2-data)")
 
@@ -132,7 +138,7 @@ def parse_arguments():
     options.work = options.work or f"{options.out}/work"
     for name in ("out", "bin", "lib", "work"):
         setattr(options, name, os.path.abspath(getattr(options, name)))
-    options.warmup = 2
+    options.warmup, options.root = 2, ROOT
     options.runtime_frames = options.frames
     options.march, options.flags = None, []  # of the references
     check(parser, options)
