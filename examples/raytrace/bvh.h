@@ -76,13 +76,14 @@ private:
 /// smallest index. If `anyHit`, one of the hits. None if the direction is
 /// shorter than 1e-18 or longer than 1e18, or the mesh is farther away.
 ///
-/// The rays of a packet go through the tree together: `least` gives each of
-/// them the least of all their distances, INFINITY if none enters. For a single
-/// ray it gives back what it takes.
-template <class Least>
+/// The rays of a packet go through the tree together: `any` says whether one of
+/// them passes true, and `least` gives the least of what they pass. For a
+/// single ray both give back what they take.
+template <class Any, class Least>
 Hit findHit(glm::vec3 origin, glm::vec3 direction, float limit, bool anyHit,
             const piko::scene::Bounds &mesh, const piko::Buffer<BvhNode> &nodes,
-            const piko::Buffer<BvhTriangle> &triangles, const Least &least) {
+            const piko::Buffer<BvhTriangle> &triangles, const Any &any,
+            const Least &least) {
   struct Entry {
     int32_t child, count; // as in a node
     float t;              // where the first ray enters
@@ -100,7 +101,7 @@ Hit findHit(glm::vec3 origin, glm::vec3 direction, float limit, bool anyHit,
     stack[top++] = {0, 0, 0};
   while (top > 0) {
     Entry entry = stack[--top];
-    if (entry.t > -least(-nearest.t * longer))
+    if (!any(entry.t <= nearest.t * longer))
       continue;
     for (int i = 0; i < entry.count; ++i)
       if (sheared.intersect(triangles[entry.child + i], nearest) && anyHit)
@@ -109,21 +110,17 @@ Hit findHit(glm::vec3 origin, glm::vec3 direction, float limit, bool anyHit,
       continue;
 
     const BvhNode &node = nodes[entry.child];
-    float enter[width];
-    for (int i = 0; i < width; ++i)
-      enter[i] = least(slabs.enter(node, i, nearest.t * longer));
-    int hit[width], hits = 0;
-    for (int i = 0; i < width; ++i) {
-      hit[hits] = i;
-      hits += enter[i] < INFINITY;
-    }
     // The nearest child comes to the top.
     int bottom = top;
-    for (int k = 0; k < hits; ++k) {
-      int i = hit[k], at = top++;
-      for (; at > bottom && stack[at - 1].t < enter[i]; --at)
+    for (int i = 0; i < width; ++i) {
+      float t = slabs.enter(node, i, nearest.t * longer);
+      if (!any(t < INFINITY))
+        continue;
+      float first = least(t);
+      int at = top++;
+      for (; at > bottom && stack[at - 1].t < first; --at)
         stack[at] = stack[at - 1];
-      stack[at] = {node.child[i], node.count[i], enter[i]};
+      stack[at] = {node.child[i], node.count[i], first};
     }
   }
   return nearest;

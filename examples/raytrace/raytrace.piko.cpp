@@ -74,13 +74,14 @@ protected:
 
   /// What a ray hits; an iteration that has none gives a limit below 0.
   Hit find(glm::vec3 origin, glm::vec3 direction, float limit, bool anyHit) {
-    return findHit(origin, direction, limit, anyHit, this->state().bounds,
-                   this->state().nodes, this->state().leaves, [&](float t) {
-                     if (!this->any(t < INFINITY))
-                       return INFINITY;
-                     return this->reduce(
-                         t, [](float a, float b) { return piko::min(a, b); });
-                   });
+    return findHit(
+        origin, direction, limit, anyHit, this->state().bounds,
+        this->state().nodes, this->state().leaves,
+        [&](bool b) { return this->any(b); },
+        [&](float t) {
+          return this->reduce(t,
+                              [](float a, float b) { return piko::min(a, b); });
+        });
   }
 };
 
