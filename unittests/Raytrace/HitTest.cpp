@@ -42,7 +42,8 @@ public:
 private:
   Hit find(glm::vec3 origin, glm::vec3 direction, float limit, bool anyHit) {
     return findHit(origin, direction, limit, anyHit, tree.bounds, nodes,
-                   triangles, [](float t) { return t; });
+                   triangles, [](bool b) { return b; },
+                   [](float t) { return t; });
   }
 
   Bvh tree;
