@@ -219,7 +219,7 @@ static bool compile(const ObjectOptions &options,
                             entry.object);
   if (!module)
     return false;
-  TargetOptions target = options.target;
+  TargetOptions target = options.target.leaveOut(options.source.synthesis);
   if (!isReference) // whose functions say what they are for
     target.cpu = getBaseProcessor(module->getTargetTriple());
   llvm::Expected<std::string> code =

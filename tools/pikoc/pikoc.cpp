@@ -193,9 +193,10 @@ struct CommandLine {
         .cache = {.enabled = !noCache && file != "-", .directory = cacheDir}};
   }
   TargetOptions getTarget() const {
-    return {.cpu = cpu,
-            .optLevel = static_cast<int>(optLevel),
-            .sanitizer = sanitizer};
+    return TargetOptions{.cpu = cpu,
+                         .optLevel = static_cast<int>(optLevel),
+                         .sanitizer = sanitizer}
+        .leaveOut(*getSynthesis());
   }
 };
 

@@ -65,6 +65,16 @@ struct TargetOptions {
   /// 0 to 3, as in -O3.
   int optLevel = 3;
   Sanitizer sanitizer = Sanitizer::None;
+  /// LLVM's own vectors, of inner loops and of what stands in a row.
+  bool loopVectorize = true, slpVectorize = true;
+
+  /// The same without LLVM's passes that synthesis does without.
+  TargetOptions leaveOut(const SynthesisOptions &synthesis) const {
+    TargetOptions options = *this;
+    options.loopVectorize &= synthesis.has("loop-vectorize");
+    options.slpVectorize &= synthesis.has("slp-vectorizer");
+    return options;
+  }
 };
 
 } // namespace piko

@@ -24,12 +24,17 @@ llvm::Expected<const llvm::Target *> lookUpTarget(const llvm::Triple &triple);
 bool hasProcessor(const llvm::Target &target, const llvm::Triple &triple,
                   llvm::StringRef processor);
 
-/// Optimises the module at `optLevel` (0 to 3), runs `last` on the result, and
-/// gives the code of `machine`. No flag allows arithmetic to change: the IR
-/// says what may.
+/// LLVM's optimizer, but for the machine.
+struct OptimizerOptions {
+  int level = 3; ///< 0 to 3
+  bool loopVectorize = true, slpVectorize = true;
+};
+
+/// Optimises the module, runs `last` on the result, and gives the code of
+/// `machine`. No flag allows arithmetic to change: the IR says what may.
 llvm::Expected<std::string>
-emitCode(llvm::Module &module, llvm::TargetMachine &machine, int optLevel,
-         llvm::CodeGenFileType type,
+emitCode(llvm::Module &module, llvm::TargetMachine &machine,
+         const OptimizerOptions &options, llvm::CodeGenFileType type,
          llvm::ModulePassManager last = llvm::ModulePassManager());
 
 } // namespace piko

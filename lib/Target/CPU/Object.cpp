@@ -127,7 +127,10 @@ Expected<std::string> piko::generateCode(Module &module,
   prepareArithmetic(module, **machine);
   lowerPermutations(module, **machine);
   return emitCode(
-      module, **machine, options.optLevel,
+      module, **machine,
+      {.level = options.optLevel,
+       .loopVectorize = options.loopVectorize,
+       .slpVectorize = options.slpVectorize},
       format == CodeFormat::Object ? CodeGenFileType::ObjectFile
                                    : CodeGenFileType::AssemblyFile,
       makeLastPasses(**machine, options.optLevel, options.sanitizer));

@@ -55,5 +55,6 @@ Expected<std::string> piko::generatePTX(Module &module, StringRef processor,
   if (!machine)
     return machine.takeError();
   replaceApproximations(module, writeApproximation);
-  return emitCode(module, **machine, optLevel, CodeGenFileType::AssemblyFile);
+  return emitCode(module, **machine, {.level = optLevel},
+                  CodeGenFileType::AssemblyFile);
 }

@@ -26,7 +26,8 @@ bool piko::hasProcessor(const Target &target, const Triple &triple,
   return info->isCPUStringValid(processor);
 }
 
-static void optimize(Module &module, TargetMachine &machine, int optLevel,
+static void optimize(Module &module, TargetMachine &machine,
+                     const piko::OptimizerOptions &options,
                      ModulePassManager last) {
   static const OptimizationLevel levels[] = {
       OptimizationLevel::O0, OptimizationLevel::O1, OptimizationLevel::O2,
@@ -36,15 +37,17 @@ static void optimize(Module &module, TargetMachine &machine, int optLevel,
   CGSCCAnalysisManager components;
   ModuleAnalysisManager modules;
   PipelineTuningOptions tuning;
-  tuning.SLPVectorization = optLevel >= 2; // as Clang has it
+  // As Clang has it.
+  tuning.LoopVectorization = options.loopVectorize;
+  tuning.SLPVectorization = options.slpVectorize && options.level >= 2;
   PassBuilder builder(&machine, tuning);
   builder.registerModuleAnalyses(modules);
   builder.registerCGSCCAnalyses(components);
   builder.registerFunctionAnalyses(functions);
   builder.registerLoopAnalyses(loops);
   builder.crossRegisterProxies(loops, functions, components, modules);
-  OptimizationLevel level = levels[optLevel];
-  ModulePassManager passes = optLevel == 0
+  OptimizationLevel level = levels[options.level];
+  ModulePassManager passes = options.level == 0
                                  ? builder.buildO0DefaultPipeline(level)
                                  : builder.buildPerModuleDefaultPipeline(level);
   passes.addPass(std::move(last));
@@ -52,11 +55,12 @@ static void optimize(Module &module, TargetMachine &machine, int optLevel,
 }
 
 Expected<std::string> piko::emitCode(Module &module, TargetMachine &machine,
-                                     int optLevel, CodeGenFileType type,
+                                     const piko::OptimizerOptions &options,
+                                     CodeGenFileType type,
                                      ModulePassManager last) {
   module.setTargetTriple(machine.getTargetTriple());
   module.setDataLayout(machine.createDataLayout());
-  optimize(module, machine, optLevel, std::move(last));
+  optimize(module, machine, options, std::move(last));
   SmallString<0> code;
   raw_svector_ostream stream(code);
   legacy::PassManager passes;
