@@ -8,6 +8,7 @@
 #include "LowerPermutations.h"
 #include "Piko/Target/CodeGeneration.h"
 #include "SelectBits.h"
+#include "WidenGathers.h"
 #include "WidenMasks.h"
 
 #include "llvm/ExecutionEngine/Orc/ExecutionUtils.h"
@@ -82,6 +83,8 @@ static ModulePassManager makeLastPasses(const TargetMachine &machine,
   if (machine.getTargetTriple().isX86() && optLevel > 0) {
     passes.addPass(createModuleToFunctionPassAdaptor(SelectBitsPass()));
     passes.addPass(createModuleToFunctionPassAdaptor(WidenMasksPass(machine)));
+    passes.addPass(
+        createModuleToFunctionPassAdaptor(WidenGathersPass(machine)));
   }
   if (sanitizer == Sanitizer::Thread)
     passes.addPass(createModuleToFunctionPassAdaptor(ThreadSanitizerPass()));
