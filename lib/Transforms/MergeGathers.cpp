@@ -26,7 +26,7 @@ struct MergeGathersPass : piko::impl::MergeGathersBase<MergeGathersPass> {
   void runOnOperation() override;
 
 private:
-  void mergeState(Block &block, const llvm::DenseSet<StringAttr> &written);
+  void mergeState(KernelOp kernel);
   void mergePrimitives(KernelOp kernel);
   template <typename OpT>
   void merge(ArrayRef<OpT> reads, Value addresses, FlatSymbolRefAttr record,
@@ -64,35 +64,6 @@ void MergeGathersPass::merge(ArrayRef<OpT> reads, Value addresses,
   merged += reads.size();
 }
 
-void MergeGathersPass::mergeState(Block &block,
-                                  const llvm::DenseSet<StringAttr> &written) {
-  llvm::MapVector<std::pair<Attribute, Value>, SmallVector<GatherOp>> elements;
-  for (auto gather : block.getOps<GatherOp>()) {
-    if (gather.getConsecutive() || gather.getIndices().empty() ||
-        !gather.getElements().empty() || !isWord(gather.getType()) ||
-        written.contains(gather.getStateAttr().getAttr()))
-      continue;
-    SmallVector<GatherOp> &reads =
-        elements[{gather.getStateAttr(), gather.getMask()}];
-    if (reads.empty() || reads.front().getIndices() == gather.getIndices())
-      reads.push_back(gather);
-  }
-  for (auto &[element, reads] : elements) {
-    if (reads.size() < leastFields)
-      continue;
-    GatherOp first = reads.front();
-    OpBuilder builder(first);
-    auto words = VectorType::get(cast<VectorType>(first.getType()).getShape(),
-                                 builder.getIndexType());
-    Value addresses =
-        LaneElementsOp::create(builder, first.getLoc(), words,
-                               first.getStateAttr(), first.getIndices());
-    FlatSymbolRefAttr record = getStateRecord(
-        lookupInPipeline<Operation *>(first, first.getStateAttr()));
-    merge<GatherOp>(reads, addresses, record, builder);
-  }
-}
-
 /// Whether a mask is known to hold for no lane for which another does not.
 static bool isWithin(Value mask, Value outer, unsigned depth = 8) {
   if (mask == outer)
@@ -108,6 +79,59 @@ static bool isWithin(Value mask, Value outer, unsigned depth = 8) {
           isWithin(choice.getTrueValue(), outer, depth - 1));
 }
 
+/// Whether the first read may do what the other one does, too: it comes to all
+/// that the other one comes to, with all of its lanes.
+template <typename OpT> static bool isBehind(OpT read, OpT first) {
+  return first->getBlock()->findAncestorOpInBlock(*read) &&
+         isWithin(read.getMask(), first.getMask());
+}
+
+/// What lanes read in a condition is read in front of it as well where its
+/// record is as short as a line of the cache.
+static bool isNear(GatherOp read, GatherOp first, RecordOp record) {
+  constexpr int64_t lineSize = 64;
+  return read->getBlock() == first->getBlock() || record.getSize() <= lineSize;
+}
+
+void MergeGathersPass::mergeState(KernelOp kernel) {
+  llvm::DenseSet<StringAttr> written = getWrittenState(kernel);
+  // By state and first index; those of one place at a time.
+  llvm::MapVector<std::pair<Attribute, Value>,
+                  SmallVector<SmallVector<GatherOp>>>
+      places;
+  auto getRecord = [](GatherOp gather) {
+    return getStateRecord(
+        lookupInPipeline<Operation *>(gather, gather.getStateAttr()));
+  };
+  kernel.walk<WalkOrder::PreOrder>([&](GatherOp gather) {
+    if (gather.getConsecutive() || gather.getIndices().empty() ||
+        !gather.getElements().empty() || !isWord(gather.getType()) ||
+        written.contains(gather.getStateAttr().getAttr()))
+      return;
+    RecordOp record = lookupRecord(gather, getRecord(gather));
+    auto &groups = places[{gather.getStateAttr(), gather.getIndices()[0]}];
+    for (SmallVector<GatherOp> &reads : groups)
+      if (reads.front().getIndices() == gather.getIndices() &&
+          isBehind(gather, reads.front()) &&
+          isNear(gather, reads.front(), record))
+        return reads.push_back(gather);
+    groups.push_back({gather});
+  });
+  for (auto &[place, groups] : places)
+    for (SmallVector<GatherOp> &reads : groups) {
+      if (reads.size() < leastFields)
+        continue;
+      GatherOp first = reads.front();
+      OpBuilder builder(first);
+      auto words = VectorType::get(cast<VectorType>(first.getType()).getShape(),
+                                   builder.getIndexType());
+      Value addresses =
+          LaneElementsOp::create(builder, first.getLoc(), words,
+                                 first.getStateAttr(), first.getIndices());
+      merge<GatherOp>(reads, addresses, getRecord(first), builder);
+    }
+}
+
 /// Primitives do not change while they are read.
 void MergeGathersPass::mergePrimitives(KernelOp kernel) {
   llvm::MapVector<Value, SmallVector<LaneGetOp>> primitives;
@@ -115,11 +139,9 @@ void MergeGathersPass::mergePrimitives(KernelOp kernel) {
     if (!get.getElements().empty() || !isWord(get.getType()))
       return;
     SmallVector<LaneGetOp> &reads = primitives[get.getAddresses()];
-    bool isBehind = reads.empty() ||
-                    (reads.front().getRecordAttr() == get.getRecordAttr() &&
-                     reads.front()->getBlock()->findAncestorOpInBlock(*get) &&
-                     isWithin(get.getMask(), reads.front().getMask()));
-    if (isBehind)
+    if (reads.empty() ||
+        (reads.front().getRecordAttr() == get.getRecordAttr() &&
+         isBehind(get, reads.front())))
       reads.push_back(get);
   });
   for (auto &[primitive, reads] : primitives)
@@ -132,11 +154,7 @@ void MergeGathersPass::mergePrimitives(KernelOp kernel) {
 
 void MergeGathersPass::runOnOperation() {
   for (auto kernel : getOperation().getOps<KernelOp>()) {
-    llvm::DenseSet<StringAttr> written = getWrittenState(kernel);
-    SmallVector<Block *> blocks;
-    kernel.walk([&](Block *block) { blocks.push_back(block); });
-    for (Block *block : blocks)
-      mergeState(*block, written);
+    mergeState(kernel);
     mergePrimitives(kernel);
   }
 }

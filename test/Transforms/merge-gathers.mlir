@@ -69,4 +69,23 @@ piko.pipeline @P rank 1 {
     }
     piko.storage.close_bins %bins : !piko.bins<@V>
   }
+  // So is a field of an element, whose record is as short as a line.
+  // CHECK-LABEL: piko.kernel @conditions
+  // CHECK:         piko.cpu.get_fields %{{.*}} ["x", "y", "z"] of @V
+  // CHECK-NOT:     piko.cpu.gather
+  piko.kernel @conditions {
+    %is = vector.step : vector<16xindex>
+    %m = arith.constant dense<true> : vector<16xi1>
+    %none = arith.constant dense<false> : vector<16xi1>
+    %x = piko.cpu.gather @mesh[%is : vector<16xindex>] "x" mask %m : vector<16xi1>, vector<16xf32>
+    %some = arith.cmpf ogt, %x, %x : vector<16xf32>
+    %few = arith.select %m, %some, %none : vector<16xi1>, vector<16xi1>
+    %any = vector.reduction <or>, %few : vector<16xi1> into i1
+    scf.if %any {
+      %y = piko.cpu.gather @mesh[%is : vector<16xindex>] "y" mask %few : vector<16xi1>, vector<16xf32>
+      %z = piko.cpu.gather @mesh[%is : vector<16xindex>] "z" mask %few : vector<16xi1>, vector<16xf32>
+      %sum = arith.addf %y, %z : vector<16xf32>
+      piko.cpu.scatter %sum, @out[%is : vector<16xindex>] "z" mask %few : vector<16xi1>, vector<16xf32>
+    }
+  }
 }

@@ -171,27 +171,33 @@ struct LaneGetFieldsLowering : Lowering<LaneGetFieldsOp> {
       areWords &= cast<VectorType>(type).getElementTypeBitWidth() == 32 &&
                   fields.back().getOffset() % wordSize == 0;
     }
-    RecordReader reader(rewriter, loc, addresses, mask, fields,
-                        op.getResultTypes());
     SmallVector<int64_t> pieces;
     if (areWords && words.getNumElements() % pieceWords == 0)
       pieces = planPieces(fields, record.getSize());
     if (pieces.empty()) {
-      rewriter.replaceOp(op, reader.gather());
+      rewriter.replaceOp(op, RecordReader(rewriter, loc, addresses, mask,
+                                          fields, op.getResultTypes())
+                                 .gather());
       return success();
     }
-    Value all = vector::ReductionOp::create(rewriter, loc,
-                                            vector::CombiningKind::AND, mask);
-    auto choice =
-        scf::IfOp::create(rewriter, loc, op.getResultTypes(), all,
-                          /*addThenBlock=*/true, /*addElseBlock=*/true);
-    OpBuilder::InsertionGuard guard(rewriter);
-    rewriter.setInsertionPointToEnd(choice.thenBlock());
-    scf::YieldOp::create(rewriter, loc, reader.readPieces(pieces));
-    rewriter.setInsertionPointToEnd(choice.elseBlock());
-    scf::YieldOp::create(rewriter, loc, reader.gather());
-    rewriter.replaceOp(op, choice.getResults());
+    rewriter.replaceOp(op, RecordReader(rewriter, loc,
+                                        chooseReadable(rewriter, loc, addresses,
+                                                       mask, record.getSize()),
+                                        mask, fields, op.getResultTypes())
+                               .readPieces(pieces));
     return success();
+  }
+
+  /// The addresses, and those of zeros for lanes that have none: loads of all
+  /// lanes take no longer than branches around those of some.
+  Value chooseReadable(OpBuilder &builder, Location loc, Value addresses,
+                       Value mask, int64_t size) const {
+    Value zeros = LLVM::AddressOfOp::create(builder, loc, pointer(builder),
+                                            context.zeros(size));
+    zeros = vector::BroadcastOp::create(
+        builder, loc, addresses.getType(),
+        LLVM::PtrToIntOp::create(builder, loc, builder.getI64Type(), zeros));
+    return arith::SelectOp::create(builder, loc, mask, addresses, zeros);
   }
 };
 
