@@ -6,6 +6,7 @@
 #include "Piko/Analysis/Uniformity.h"
 
 #include "mlir/Dialect/MemRef/IR/MemRef.h"
+#include "mlir/Dialect/UB/IR/UBOps.h"
 
 using namespace mlir;
 using namespace piko;
@@ -25,7 +26,17 @@ Operation *piko::findBarrier(Operation *op) {
   return found;
 }
 
-Uniformity::Uniformity(Operation *root, ArrayRef<Root> roots) : root(root) {
+Value piko::findOnlyValue(Value yes, Value no) {
+  // Lanes have no primitives to hand on where no one comes.
+  if (!yes.getType().isIntOrIndexOrFloat())
+    return {};
+  if (no.getDefiningOp<ub::PoisonOp>())
+    return yes;
+  return yes.getDefiningOp<ub::PoisonOp>() ? no : Value();
+}
+
+Uniformity::Uniformity(Operation *root, ArrayRef<Root> roots, bool isLockstep)
+    : root(root), isLockstep(isLockstep) {
   if (auto kernel = root->getParentOfType<KernelOp>())
     kernel.walk([&](StateAccessOpInterface access) {
       if (access.getAccessKinds() != StateAccess::reads)
@@ -103,27 +114,43 @@ bool Uniformity::visitControlFlow(Operation *op) {
   if (auto loop = dyn_cast<scf::ForOp>(op)) {
     Value lower = loop.getLowerBound(), step = loop.getStep();
     bool changed = mark(loop.getInductionVar(), get({lower, step}));
-    for (ValueRange targets : {ValueRange(loop.getRegionIterArgs()),
-                               ValueRange(loop.getResults())}) {
-      changed |= flow(loop.getInitArgs(), targets, parts);
-      changed |= flow(loop.getYieldedValues(), targets, parts);
-    }
+    auto flowTo = [&](ValueRange targets, Uniform least) {
+      changed |= flow(loop.getInitArgs(), targets, least);
+      changed |= flow(loop.getYieldedValues(), targets, least);
+    };
+    flowTo(loop.getRegionIterArgs(), isLockstep ? Uniform::Bin : parts);
+    flowTo(loop.getResults(), parts);
     return changed;
   }
   if (auto loop = dyn_cast<scf::WhileOp>(op)) {
-    bool changed = flow(loop.getInits(), loop.getBeforeArguments(), parts);
-    changed |=
-        flow(loop.getYieldOp().getOperands(), loop.getBeforeArguments(), parts);
+    Uniform inside = isLockstep ? Uniform::Bin : parts;
+    bool changed = flow(loop.getInits(), loop.getBeforeArguments(), inside);
+    changed |= flow(loop.getYieldOp().getOperands(), loop.getBeforeArguments(),
+                    inside);
     ValueRange leaving = loop.getConditionOp().getArgs();
-    changed |= flow(leaving, loop.getAfterArguments(), parts);
+    changed |= flow(leaving, loop.getAfterArguments(), inside);
     return flow(leaving, loop.getResults(), parts) || changed;
   }
   // scf.if, scf.index_switch
+  if (auto choice = dyn_cast<scf::IfOp>(op); choice && isLockstep)
+    return visitIf(choice, parts);
   bool changed = false;
   for (Region &region : op->getRegions())
     if (!region.empty())
       changed |= flow(region.front().getTerminator()->getOperands(),
                       op->getResults(), parts);
+  return changed;
+}
+
+bool Uniformity::visitIf(scf::IfOp choice, Uniform parts) {
+  bool changed = false;
+  for (OpResult result : choice.getResults()) {
+    Value yes = choice.thenYield().getOperand(result.getResultNumber()),
+          no = choice.elseYield().getOperand(result.getResultNumber());
+    Value only = findOnlyValue(yes, no);
+    changed |=
+        mark(result, only ? get(only) : std::max({parts, get(yes), get(no)}));
+  }
   return changed;
 }
 

@@ -44,12 +44,13 @@ void IterationWriter::writeShared(Region &from, Block *to, ValueRange like) {
   scf::YieldOp::create(builder, loc, results);
 }
 
-SmallVector<Value> IterationWriter::writeSide(Region &region, Value mask) {
+SmallVector<Value> IterationWriter::writeSide(Region &region, Value mask,
+                                              ValueRange like) {
   Operation *end = region.front().getTerminator();
   SmallVector<Value> values;
   auto collect = [&] {
-    for (Value value : end->getOperands())
-      values.push_back(get(value));
+    for (auto [result, value] : llvm::zip_equal(like, end->getOperands()))
+      values.push_back(getCarriedAs(result, value));
   };
   Value outer = active;
   active = mask;
@@ -60,8 +61,8 @@ SmallVector<Value> IterationWriter::writeSide(Region &region, Value mask) {
     return values;
   }
   SmallVector<Type> types;
-  for (Type type : end->getOperandTypes())
-    types.push_back(getVectorType(type));
+  for (Value result : like)
+    types.push_back(getCarriedType(result));
   auto some = scf::IfOp::create(builder, loc, types, any(mask),
                                 /*addThenBlock=*/true,
                                 /*addElseBlock=*/!types.empty());
@@ -107,12 +108,23 @@ void IterationWriter::writeIf(scf::IfOp choice) {
   }
   Value condition = get(choice.getCondition());
   SmallVector<Value> yes = writeSide(choice.getThenRegion(),
-                                     both(active, condition)),
+                                     both(active, condition),
+                                     choice.getResults()),
                      no;
   if (!choice.getElseRegion().empty())
-    no = writeSide(choice.getElseRegion(), both(active, invert(condition)));
-  for (auto [i, result] : llvm::enumerate(choice.getResults()))
-    vectors.map(result, choose(condition, yes[i], no[i]));
+    no = writeSide(choice.getElseRegion(), both(active, invert(condition)),
+                   choice.getResults());
+  for (auto [i, result] : llvm::enumerate(choice.getResults())) {
+    if (lanes.isVarying(result)) {
+      vectors.map(result, choose(condition, yes[i], no[i]));
+      continue;
+    }
+    // The other side's is poison.
+    Value first = choice.thenYield().getOperand(i);
+    bool isFirst =
+        findOnlyValue(first, choice.elseYield().getOperand(i)) == first;
+    scalars.map(result, isFirst ? yes[i] : no[i]);
+  }
 }
 
 void IterationWriter::writeSwitch(scf::IndexSwitchOp choice) {
@@ -136,11 +148,12 @@ void IterationWriter::writeSwitch(scf::IndexSwitchOp choice) {
     Value one = arith::ConstantIndexOp::create(builder, loc, label);
     Value isCase = arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::eq,
                                          argument, splat(one));
-    cases.emplace_back(
-        isCase, writeSide(choice.getCaseRegions()[i], both(active, isCase)));
+    cases.emplace_back(isCase,
+                       writeSide(choice.getCaseRegions()[i],
+                                 both(active, isCase), choice.getResults()));
     left = both(left, invert(isCase));
   }
-  results = writeSide(choice.getDefaultRegion(), left);
+  results = writeSide(choice.getDefaultRegion(), left, choice.getResults());
   for (auto &[isCase, values] : cases)
     for (auto [result, value] : llvm::zip(results, values))
       result = choose(isCase, value, result);
@@ -197,8 +210,17 @@ void IterationWriter::writeVaryingFor(scf::ForOp inner) {
   using P = arith::CmpIPredicate;
   P below = inner.getUnsignedCmp() ? P::ult : P::slt;
   SmallVector<Value> inits{lower};
-  for (Value init : inner.getInitArgs())
-    inits.push_back(get(init));
+  // What is the same for the lanes that go on, and what it was for those that
+  // do not.
+  SmallVector<unsigned> shared;
+  for (auto [i, argument, init] :
+       llvm::enumerate(inner.getRegionIterArgs(), inner.getInitArgs())) {
+    inits.push_back(getCarriedAs(argument, init));
+    if (!lanes.isVarying(argument) && !inner.getResult(i).use_empty())
+      shared.push_back(i);
+  }
+  for (unsigned i : shared)
+    inits.push_back(get(inner.getInitArgs()[i]));
   inits.push_back(both(
       active, arith::CmpIOp::create(builder, loc, below, widen(lower), upper)));
   scf::WhileOp made =
@@ -213,22 +235,30 @@ void IterationWriter::writeVaryingFor(scf::ForOp inner) {
   setCarried(variable, number);
   for (auto [argument, carried] :
        llvm::zip(inner.getRegionIterArgs(), after->getArguments().drop_front()))
-    vectors.map(argument, carried);
+    setCarried(argument, carried);
   writeBlock(*inner.getBody());
   // What is left tells, since the next number may be too large.
   Value rest = arith::SubIOp::create(builder, loc, upper, widen(number));
   SmallVector<Value> next{arith::AddIOp::create(builder, loc, number, step)};
   for (auto [argument, value] :
        llvm::zip(inner.getRegionIterArgs(), inner.getYieldedValues()))
-    next.push_back(choose(active, get(value), get(argument)));
+    next.push_back(lanes.isVarying(argument)
+                       ? choose(active, get(value), get(argument))
+                       : getUniform(value));
+  size_t behind = 1 + inner.getNumRegionIterArgs();
+  for (auto [at, i] : llvm::enumerate(shared))
+    next.push_back(choose(active, get(inner.getYieldedValues()[i]),
+                          after->getArgument(behind + at)));
   next.push_back(both(
       active, arith::CmpIOp::create(builder, loc, P::ugt, rest, widen(step))));
   scf::YieldOp::create(builder, loc, next);
   active = outer;
   builder.setInsertionPointAfter(made);
-  for (auto [result, value] :
-       llvm::zip(inner.getResults(), made.getResults().drop_front()))
-    vectors.map(result, value);
+  for (auto [i, result] : llvm::enumerate(inner.getResults()))
+    if (lanes.isVarying(inner.getRegionIterArg(i)))
+      vectors.map(result, made.getResult(1 + i));
+  for (auto [at, i] : llvm::enumerate(shared))
+    vectors.map(inner.getResult(i), made.getResult(behind + at));
 }
 
 void IterationWriter::writeWhile(scf::WhileOp inner) {
@@ -263,10 +293,12 @@ void IterationWriter::writeWhile(scf::WhileOp inner) {
 
 void IterationWriter::writeVaryingWhile(scf::WhileOp inner) {
   // Its variables are those of the loop, what it left for each lane that has
-  // ended, and the mask.
+  // ended, and the mask. Behind the mask the condition hands on what is the
+  // same for the lanes that go on.
   SmallVector<Value> inits;
-  for (Value init : inner.getInits())
-    inits.push_back(get(init));
+  for (auto [variable, init] :
+       llvm::zip(inner.getBeforeArguments(), inner.getInits()))
+    inits.push_back(getCarriedAs(variable, init));
   SmallVector<Type> types;
   for (Value result : inner.getResults()) {
     types.push_back(getVectorType(result.getType()));
@@ -274,15 +306,18 @@ void IterationWriter::writeVaryingWhile(scf::WhileOp inner) {
   }
   inits.push_back(active);
   types.push_back(active.getType());
+  for (Value variable : inner.getAfterArguments())
+    if (!lanes.isVarying(variable))
+      types.push_back(variable.getType());
   Value outer = active;
   scf::WhileOp made = createWhile(builder, loc, inits, types);
 
   builder.setInsertionPointToEnd(made.getBeforeBody());
-  size_t count = inner.getInits().size();
+  size_t count = inner.getInits().size(), left = inner.getNumResults();
   ValueRange given = made.getBeforeArguments();
   for (auto [variable, value] :
        llvm::zip(inner.getBeforeArguments(), given.take_front(count)))
-    vectors.map(variable, value);
+    setCarried(variable, value);
   active = given.back();
   writeBlock(*inner.getBeforeBody());
   scf::ConditionOp condition = inner.getConditionOp();
@@ -290,19 +325,29 @@ void IterationWriter::writeVaryingWhile(scf::WhileOp inner) {
   for (auto [value, old] :
        llvm::zip(condition.getArgs(), given.drop_front(count)))
     leaving.push_back(choose(active, get(value), old));
-  leaving.push_back(both(active, get(condition.getCondition())));
-  scf::ConditionOp::create(builder, loc, any(leaving.back()), leaving);
+  Value goingOn = both(active, get(condition.getCondition()));
+  leaving.push_back(goingOn);
+  for (auto [variable, value] :
+       llvm::zip(inner.getAfterArguments(), condition.getArgs()))
+    if (!lanes.isVarying(variable))
+      leaving.push_back(getUniform(value));
+  scf::ConditionOp::create(builder, loc, any(goingOn), leaving);
 
   builder.setInsertionPointToEnd(made.getAfterBody());
   ValueRange going = made.getAfterArguments();
-  for (auto [variable, value] : llvm::zip(inner.getAfterArguments(), going))
-    vectors.map(variable, value);
-  active = going.back();
+  ValueRange shared = going.drop_front(left + 1);
+  for (auto [variable, value] : llvm::zip(inner.getAfterArguments(), going)) {
+    bool isVarying = lanes.isVarying(variable);
+    setCarried(variable, isVarying ? value : shared.front());
+    shared = isVarying ? shared : shared.drop_front();
+  }
+  active = going[left];
   writeBlock(*inner.getAfterBody());
   SmallVector<Value> next;
-  for (Value value : inner.getYieldOp().getOperands())
-    next.push_back(get(value));
-  llvm::append_range(next, going);
+  for (auto [variable, value] :
+       llvm::zip(inner.getBeforeArguments(), inner.getYieldOp().getOperands()))
+    next.push_back(getCarriedAs(variable, value));
+  llvm::append_range(next, going.take_front(left + 1));
   scf::YieldOp::create(builder, loc, next);
 
   active = outer;

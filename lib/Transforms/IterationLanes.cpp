@@ -44,7 +44,8 @@ static bool hasVectorForm(Operation *op) {
 
 IterationLanes::IterationLanes(scf::ForOp loop, int64_t laneCount)
     : loop(loop), laneCount(laneCount),
-      uniformity(loop, {{loop.getInductionVar(), Uniform::Iteration}}) {
+      uniformity(loop, {{loop.getInductionVar(), Uniform::Iteration}},
+                 /*isLockstep=*/true) {
   if (loop.getNumResults() > 0)
     refuse(loop, "it hands values from iteration to iteration");
   if (loop.getUnsignedCmp())
@@ -102,6 +103,11 @@ void IterationLanes::findArrays() {
       refuse(op, "it makes a view of memory");
     }
   });
+}
+
+bool IterationLanes::isShort(Value array) const {
+  constexpr int64_t most = 16;
+  return cast<MemRefType>(array.getType()).getNumElements() <= most;
 }
 
 bool IterationLanes::readsFixed(Operation *op) const {
@@ -309,7 +315,7 @@ void IterationLanes::findNests() {
     return WalkResult::skip();
   });
   if (!nests.empty())
-    uniformity = Uniformity(loop, roots);
+    uniformity = Uniformity(loop, roots, /*isLockstep=*/true);
 }
 
 //===----------------------------------------------------------------------===//
@@ -372,7 +378,8 @@ bool piko::isIntegerDivision(Operation *op) {
 }
 
 bool piko::isDividedAsFloats(Operation *op) {
-  return isa<arith::DivUIOp, arith::RemUIOp>(op) &&
+  return isa<arith::DivUIOp, arith::RemUIOp, arith::DivSIOp, arith::RemSIOp>(
+             op) &&
          op->getResult(0).getType().isInteger(32);
 }
 

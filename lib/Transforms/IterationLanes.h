@@ -72,6 +72,9 @@ public:
   /// The same of a value that grows by one from lane to lane also where it
   /// wraps around: it is not cast from a sum of fewer bits.
   bool isSum(mlir::Value value) const;
+  /// Whether an array is so short that lanes access all of it rather than
+  /// elements in different places.
+  bool isShort(mlir::Value array) const;
   /// Whether an array belongs to an iteration; it has a column for each lane if
   /// it varies.
   bool isPrivate(mlir::Value array) const { return privates.contains(array); }

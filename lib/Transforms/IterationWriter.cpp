@@ -155,12 +155,39 @@ bool IterationWriter::writeLinearProduct(arith::MulIOp product) {
 
 /// The quotient of 32-bit numbers as one of 64-bit floats: what it is above an
 /// integer, or below, is more than its rounding error. There is no instruction
-/// for vectors of integers.
-Value IterationWriter::divideAsFloats(Value dividend, Value divisor) {
-  Type wide = getVectorType(builder.getF64Type());
-  Value quotient = arith::DivFOp::create(
-      builder, loc, arith::UIToFPOp::create(builder, loc, wide, dividend),
-      arith::UIToFPOp::create(builder, loc, wide, divisor));
+/// for vectors of integers. By a divisor that all lanes share, the dividend
+/// and a half are multiplied: that quotient is at least half of the divisor's
+/// reciprocal away from an integer, which is more than two rounding errors.
+Value IterationWriter::divideAsFloats(Operation *division, Value dividend,
+                                      Value divisor) {
+  bool isSigned = isa<arith::DivSIOp, arith::RemSIOp>(division);
+  auto toFloat = [&](Value number) -> Value {
+    Type type = builder.getF64Type();
+    if (isa<VectorType>(number.getType()))
+      type = getVectorType(type);
+    if (isSigned)
+      return arith::SIToFPOp::create(builder, loc, type, number);
+    return arith::UIToFPOp::create(builder, loc, type, number);
+  };
+  Value quotient, number = toFloat(dividend);
+  if (Value shared = division->getOperand(1); !lanes.isVarying(shared)) {
+    auto constant = [&](double value) -> Value {
+      return arith::ConstantOp::create(builder, loc,
+                                       builder.getF64FloatAttr(value));
+    };
+    Value half = splat(constant(0.5));
+    if (isSigned)
+      half = math::CopySignOp::create(builder, loc, half, number);
+    Value reciprocal = arith::DivFOp::create(builder, loc, constant(1),
+                                             toFloat(getUniform(shared)));
+    quotient = arith::MulFOp::create(
+        builder, loc, arith::AddFOp::create(builder, loc, number, half),
+        splat(reciprocal));
+  } else {
+    quotient = arith::DivFOp::create(builder, loc, number, toFloat(divisor));
+  }
+  if (isSigned)
+    return arith::FPToSIOp::create(builder, loc, dividend.getType(), quotient);
   return arith::FPToUIOp::create(builder, loc, dividend.getType(), quotient);
 }
 
@@ -180,8 +207,8 @@ void IterationWriter::writeVector(Operation *op) {
             type, builder.getIntegerAttr(type.getElementType(), 1)));
     operands[1] = choose(active, operands[1], one);
     if (isDividedAsFloats(op)) {
-      Value value = divideAsFloats(operands[0], operands[1]);
-      if (isa<arith::RemUIOp>(op))
+      Value value = divideAsFloats(op, operands[0], operands[1]);
+      if (isa<arith::RemUIOp, arith::RemSIOp>(op))
         value = arith::SubIOp::create(
             builder, loc, operands[0],
             arith::MulIOp::create(builder, loc, value, operands[1]));
@@ -232,27 +259,94 @@ Value IterationWriter::getColumns(Value index) {
   return arith::AddIOp::create(builder, loc, rows, steps);
 }
 
+/// A row of an array with a column for each lane.
+Value IterationWriter::readRow(Value columns, Value row) {
+  return vector::LoadOp::create(
+      builder, loc,
+      getVectorType(cast<MemRefType>(columns.getType()).getElementType()),
+      columns, row);
+}
+
+/// Writes the lanes of a mask. All of the row is the lanes' own: what stands in
+/// its others is written again, so that LLVM can keep it in a register.
+void IterationWriter::writeRow(Value columns, Value row, Value mask,
+                               Value value) {
+  vector::StoreOp::create(
+      builder, loc, choose(mask, value, readRow(columns, row)), columns, row);
+}
+
+/// An access to a short array of a lane at places that differ: all rows, as a
+/// scatter takes about as long as that many stores, and what it wrote is not
+/// forwarded to reads.
+void IterationWriter::writeShortArrayAccess(Operation *op, Value index) {
+  auto load = dyn_cast<memref::LoadOp>(op);
+  Value array = load ? load.getMemRef() : cast<memref::StoreOp>(op).getMemRef();
+  Value base = columns.lookup(array), value;
+  Type word = getVectorType(builder.getI32Type());
+  Value at = arith::IndexCastOp::create(builder, loc, word, get(index));
+  int64_t count = cast<MemRefType>(array.getType()).getNumElements();
+  for (int64_t i = 0; i < count; ++i) {
+    Value row = arith::ConstantIndexOp::create(builder, loc, i * laneCount);
+    Value isHere = arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::eq,
+                                         at, number(i));
+    if (load) {
+      Value here = readRow(base, row);
+      value = value ? choose(isHere, here, value) : here;
+    } else {
+      writeRow(base, row, both(active, isHere),
+               get(cast<memref::StoreOp>(op).getValue()));
+    }
+  }
+  if (load)
+    vectors.map(load.getResult(), value);
+}
+
+void IterationWriter::writePrivateAccess(Operation *op) {
+  auto load = dyn_cast<memref::LoadOp>(op);
+  auto write = dyn_cast<memref::StoreOp>(op);
+  Value array = load ? load.getMemRef() : write.getMemRef();
+  Value index = load ? load.getIndices()[0] : write.getIndices()[0];
+  Value base = columns.lookup(array);
+  if (lanes.isVarying(index) && lanes.isShort(array))
+    return writeShortArrayAccess(op, index);
+  Value at = getColumns(index);
+  if (!lanes.isVarying(index)) {
+    if (load)
+      vectors.map(load.getResult(), readRow(base, at));
+    else
+      writeRow(base, at, active, get(write.getValue()));
+    return;
+  }
+  Value none = arith::ConstantIndexOp::create(builder, loc, 0);
+  if (write) {
+    vector::ScatterOp::create(builder, loc, /*resultType=*/Type(), base, none,
+                              at, active, get(write.getValue()));
+    return;
+  }
+  VectorType type = getVectorType(load.getType());
+  vectors.map(load.getResult(),
+              vector::GatherOp::create(builder, loc, type, base, none, at,
+                                       active, zeros(type))
+                  .getResult());
+}
+
+/// Of an array that iterations share.
 void IterationWriter::writeArrayAccess(Operation *op) {
   auto load = dyn_cast<memref::LoadOp>(op);
   auto write = dyn_cast<memref::StoreOp>(op);
   Value array = load ? load.getMemRef() : write.getMemRef();
   Value index = load ? load.getIndices()[0] : write.getIndices()[0];
+  if (columns.contains(array))
+    return writePrivateAccess(op);
   if (load && lanes.readsFixed(op) && !lanes.isVarying(index)) {
     Value one = memref::LoadOp::create(builder, loc, getUniform(array),
                                        getUniform(index));
     vectors.map(load.getResult(), splat(one));
     return;
   }
-  Value base = columns.lookup(array), at;
-  bool isRow = false; // of lanes, one behind the other
-  if (base) {
-    isRow = !lanes.isVarying(index);
-    at = getColumns(index);
-  } else {
-    base = getUniform(array);
-    isRow = !paired && lanes.isLinear(index);
-    at = isRow ? getFirst(index) : get(index);
-  }
+  Value base = getUniform(array);
+  bool isRow = !paired && lanes.isLinear(index); // one behind the other
+  Value at = isRow ? getFirst(index) : get(index);
   VectorType lanesType =
       getVectorType(cast<MemRefType>(base.getType()).getElementType());
   Value none = arith::ConstantIndexOp::create(builder, loc, 0);

@@ -65,7 +65,8 @@ private:
   void writeVector(mlir::Operation *op);
   /// The same operation on vectors.
   mlir::Operation *createVector(mlir::Operation *op, mlir::ValueRange operands);
-  mlir::Value divideAsFloats(mlir::Value dividend, mlir::Value divisor);
+  mlir::Value divideAsFloats(mlir::Operation *division, mlir::Value dividend,
+                             mlir::Value divisor);
   /// Whether the product is one that it has written.
   bool writeLinearProduct(mlir::arith::MulIOp product);
   void writeAccess(mlir::Operation *op);
@@ -78,6 +79,11 @@ private:
   llvm::SmallVector<LoadOp> findFields(mlir::Operation *first) const;
   void writeFields(llvm::ArrayRef<LoadOp> loads);
   void writeArrayAccess(mlir::Operation *op);
+  void writePrivateAccess(mlir::Operation *op);
+  void writeShortArrayAccess(mlir::Operation *op, mlir::Value index);
+  mlir::Value readRow(mlir::Value columns, mlir::Value row);
+  void writeRow(mlir::Value columns, mlir::Value row, mlir::Value mask,
+                mlir::Value value);
   void writeItemAccess(mlir::Operation *op);
   /// The place of an index in the lanes' columns of an array.
   mlir::Value getColumns(mlir::Value index);
@@ -113,9 +119,10 @@ private:
   mlir::Value number(int64_t value);
   void writeWhile(mlir::scf::WhileOp inner);
   void writeVaryingWhile(mlir::scf::WhileOp inner);
-  /// What a region yields for these lanes, behind a branch around it.
-  llvm::SmallVector<mlir::Value> writeSide(mlir::Region &region,
-                                           mlir::Value mask);
+  /// What a region yields for these lanes, behind a branch around it, as
+  /// results `like` these are carried.
+  llvm::SmallVector<mlir::Value>
+  writeSide(mlir::Region &region, mlir::Value mask, mlir::ValueRange like);
   /// Runs the body of a region whose control flow is the same for all lanes.
   void writeShared(mlir::Region &from, mlir::Block *to, mlir::ValueRange like);
 

@@ -7,6 +7,7 @@
 
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
+#include "mlir/Dialect/MemRef/IR/MemRef.h"
 #include "mlir/IR/Matchers.h"
 
 using namespace mlir;
@@ -19,17 +20,25 @@ namespace {
 struct Cycles {
   double scalar, scalarAccess, scalarDivision;
   double vector, row, gather, division;
+  /// A quotient of integers by way of floats, and one of a divisor that all
+  /// lanes share.
+  double quotient, sharedQuotient;
   /// A gather of numbers below 32 bits, for which there is no instruction; and
   /// what it takes more if each lane goes through memory on its own.
   double narrowGather, ownLines;
+  /// A scatter, and of numbers below 32 bits; and what each row takes of a
+  /// short array that is read, or written, at places that differ.
+  double scatter, narrowScatter, readRow, writeRow;
   /// How many times as fast LLVM makes a loop that it runs as vectors.
   double along;
   /// To bring lanes apart, for one operation or for a group, and to hand each
   /// lane a number.
   double apart, apartInOrder, slot;
-  /// Branches that are not foreseen, of a condition that differs, and of a loop
-  /// whose turns do.
-  double branches, exits;
+  /// Branches of a condition that differs: around what fails or takes turns,
+  /// and others, which are not foreseen; and of a loop whose turns differ.
+  double branches, unforeseen, exits;
+  /// What each turn of such a loop takes to find who goes on.
+  double turn;
   /// To find which lane makes which turn, and to bring there what it has.
   double pairs;
   /// How many of the lanes go on, of those that came to a loop whose turns
@@ -52,16 +61,24 @@ static const Cycles &getCycles(int64_t laneCount) {
                                .row = 1.5,
                                .gather = 12,
                                .division = 16,
-                               .narrowGather = 70,
+                               .quotient = 50,
+                               .sharedQuotient = 24,
+                               .narrowGather = 16,
                                .ownLines = 30,
+                               .scatter = 30,
+                               .narrowScatter = 70,
+                               .readRow = 1,
+                               .writeRow = 1.5,
                                .along = 6,
                                .apart = 15,
                                .apartInOrder = 40,
                                .slot = 8,
                                .branches = 40,
-                               .exits = 100,
+                               .unforeseen = 150,
+                               .exits = 140,
+                               .turn = 15,
                                .pairs = 60,
-                               .goOn = 0.35,
+                               .goOn = 0.4,
                                .goOnInside = 0.7};
   static constexpr Cycles of8{.scalar = 2.5,
                               .scalarAccess = 4,
@@ -70,14 +87,22 @@ static const Cycles &getCycles(int64_t laneCount) {
                               .row = 1.5,
                               .gather = 4,
                               .division = 8,
-                              .narrowGather = 35,
+                              .quotient = 60,
+                              .sharedQuotient = 60,
+                              .narrowGather = 10,
                               .ownLines = 15,
+                              .scatter = 24,
+                              .narrowScatter = 35,
+                              .readRow = 1.5,
+                              .writeRow = 2.5,
                               .along = 4,
                               .apart = 8,
                               .apartInOrder = 15,
                               .slot = 1.5,
                               .branches = 20,
+                              .unforeseen = 35,
                               .exits = 50,
+                              .turn = 10,
                               .pairs = 40,
                               .goOn = 0.45,
                               .goOnInside = 0.75};
@@ -88,14 +113,22 @@ static const Cycles &getCycles(int64_t laneCount) {
                               .row = 4,
                               .gather = 8,
                               .division = 5,
+                              .quotient = 20,
+                              .sharedQuotient = 16,
                               .narrowGather = 8,
                               .ownLines = 8,
+                              .scatter = 8,
+                              .narrowScatter = 8,
+                              .readRow = 2,
+                              .writeRow = 3,
                               .along = 2.5,
                               .apart = 10,
                               .apartInOrder = 20,
                               .slot = 2,
                               .branches = 10,
+                              .unforeseen = 10,
                               .exits = 25,
+                              .turn = 5,
                               .pairs = 40,
                               .goOn = 0.6,
                               .goOnInside = 0.8};
@@ -119,6 +152,13 @@ static int64_t countOperations(Region &region) {
   int64_t count = 0;
   region.walk([&](Operation *) { ++count; });
   return count;
+}
+
+/// Whether a program that is right does not come here.
+static bool fails(Region &region) {
+  return !region.empty() && llvm::any_of(region.front(), [](Operation &op) {
+    return op.hasTrait<Failure>();
+  });
 }
 
 /// How often a side of a condition runs, where lanes differ: mostly, if it
@@ -157,6 +197,17 @@ private:
   /// What it takes to bring lanes apart, with what they have.
   void addTurns(const OrderedGroup &group, Frequency times);
 
+  double getApart(Operation *access) const;
+  bool takesTurns(scf::IfOp choice) const {
+    return choice
+        ->walk([&](Operation *op) {
+          LaneForm form = lanes.getForm(op);
+          bool inTurns = form == LaneForm::Serial || form == LaneForm::Ordered;
+          return inTurns ? WalkResult::interrupt() : WalkResult::advance();
+        })
+        .wasInterrupted();
+  }
+  double getDivision(Operation *op) const;
   bool isInStream(Operation *access) const {
     return llvm::any_of(
         inner, [&](scf::ForOp loop) { return isStream(access, loop); });
@@ -217,8 +268,11 @@ void CostModel::addStructure(Operation *op, Frequency times, bool laneByLane) {
     addSide(yes, no);
     addSide(no, yes);
     bool isShort = lanes.isCheap(yes) && (no.empty() || lanes.isCheap(no));
+    bool isForeseen = fails(yes) || fails(no) || takesTurns(choice);
     if (lanes.isVarying(choice.getCondition()) && !isShort)
-      addBranches(cycles.branches * times.serial, laneByLane);
+      addBranches((isForeseen ? cycles.branches : cycles.unforeseen) *
+                      times.serial,
+                  laneByLane);
     return;
   }
   if (auto choice = dyn_cast<scf::IndexSwitchOp>(op)) {
@@ -249,6 +303,8 @@ void CostModel::addStructure(Operation *op, Frequency times, bool laneByLane) {
     return;
   }
   double turns = lanes.isSharedLoop(op) ? loopTurns : turnsThatDiffer;
+  if (!lanes.isSharedLoop(op) && !laneByLane)
+    cost.vectors += cycles.turn * times.vectors * turns;
   double around = along;
   if (loop) {
     inner.push_back(loop);
@@ -266,6 +322,32 @@ static bool isNarrow(Operation *access) {
   Type type = access->getNumResults() != 0 ? access->getResult(0).getType()
                                            : access->getOperand(0).getType();
   return type.isIntOrFloat() && type.getIntOrFloatBitWidth() < 32;
+}
+
+/// What an access in different places takes.
+double CostModel::getApart(Operation *access) const {
+  auto load = dyn_cast<memref::LoadOp>(access);
+  auto store = dyn_cast<memref::StoreOp>(access);
+  Value array = load ? load.getMemRef() : store ? store.getMemRef() : Value();
+  if (array && lanes.isPrivate(array) && lanes.isShort(array)) {
+    auto rows = double(cast<MemRefType>(array.getType()).getNumElements());
+    return rows * (store ? cycles.writeRow : cycles.readRow);
+  }
+  bool writes = store || isa<StoreOp>(access);
+  double apart =
+      writes ? (isNarrow(access) ? cycles.narrowScatter : cycles.scatter)
+             : (isNarrow(access) ? cycles.narrowGather : cycles.gather);
+  // What a scatter wrote is not forwarded to what reads it next.
+  if (store && lanes.isPrivate(array))
+    apart *= 2;
+  return apart + (isInStream(access) ? cycles.ownLines : 0);
+}
+
+double CostModel::getDivision(Operation *op) const {
+  if (!isDividedAsFloats(op))
+    return cycles.division;
+  return lanes.isVarying(op->getOperand(1)) ? cycles.quotient
+                                            : cycles.sharedQuotient;
 }
 
 void CostModel::addOperation(Operation *op, Frequency times, bool laneByLane) {
@@ -291,12 +373,10 @@ void CostModel::addOperation(Operation *op, Frequency times, bool laneByLane) {
                   along;
   bool isTurns = form == LaneForm::Serial || form == LaneForm::Ordered;
   bool isGather = isAccess && !lanes.isRow(op);
-  double gather = isNarrow(op) ? cycles.narrowGather : cycles.gather;
-  if (isGather && isInStream(op))
-    gather += cycles.ownLines;
+  double gather = isGather ? getApart(op) : 0;
   double vectors = times.vectors * (isGather    ? gather
                                     : isAccess  ? cycles.row
-                                    : isDivided ? cycles.division
+                                    : isDivided ? getDivision(op)
                                                 : cycles.vector);
   if (laneByLane || isTurns || isRemainder)
     vectors = serial + (laneByLane ? 0 : times.vectors * cycles.apart);

@@ -1,6 +1,7 @@
 // RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-vectorize),canonicalize,cse)' %s | FileCheck %s
 
 piko.record @Id {"n" : i32 at 0} size 4 align 4
+piko.record @Two {"m" : i32 at 0} size 4 align 4
 piko.record @T {"x" : f32 at 0, "y" : f32 at 4, "z" : f32 at 8} size 12 align 4
 
 // Three fields of an element that each lane names: gathers where lanes differ from
@@ -20,16 +21,27 @@ piko.record @T {"x" : f32 at 0, "y" : f32 at 4, "z" : f32 at 8} size 12 align 4
 // CHECK-COUNT-3:   piko.load checked @triangles[%[[PLACE]] : index]
 // CHECK-COUNT-2: piko.cpu.gather @others[%[[PLACES]] : vector<16xindex>]
 
-// An unsigned remainder: the quotient is one of doubles.
+// An unsigned remainder by what all lanes share: the dividend and a half, as
+// doubles, times a reciprocal.
 // CHECK:         %[[A:.*]] = arith.uitofp %{{.*}} : vector<16xi32> to vector<16xf64>
-// CHECK:         %[[B:.*]] = arith.uitofp %{{.*}} : vector<16xi32> to vector<16xf64>
-// CHECK:         %[[Q:.*]] = arith.divf %[[A]], %[[B]] : vector<16xf64>
+// CHECK:         %[[B:.*]] = arith.uitofp %{{.*}} : i32 to f64
+// CHECK:         %[[R:.*]] = arith.divf %{{.*}}, %[[B]] : f64
+// CHECK:         %[[HALF:.*]] = arith.addf %[[A]], %{{.*}} : vector<16xf64>
+// CHECK:         %[[RS:.*]] = vector.broadcast %[[R]] : f64 to vector<16xf64>
+// CHECK:         %[[Q:.*]] = arith.mulf %[[HALF]], %[[RS]] : vector<16xf64>
 // CHECK:         %[[WHOLE:.*]] = arith.fptoui %[[Q]] : vector<16xf64> to vector<16xi32>
 // CHECK:         %[[PRODUCT:.*]] = arith.muli %[[WHOLE]], %{{.*}} : vector<16xi32>
 // CHECK:         arith.subi %{{.*}}, %[[PRODUCT]] : vector<16xi32>
 // CHECK-NOT:     arith.remui {{.*}}vector
+
+// A signed one by what differs: the quotient is one of doubles.
+// CHECK:         %[[SA:.*]] = arith.sitofp %{{.*}} : vector<16xi32> to vector<16xf64>
+// CHECK:         %[[SB:.*]] = arith.sitofp %{{.*}} : vector<16xi32> to vector<16xf64>
+// CHECK:         %[[SQ:.*]] = arith.divf %[[SA]], %[[SB]] : vector<16xf64>
+// CHECK:         arith.fptosi %[[SQ]] : vector<16xf64> to vector<16xi32>
 piko.pipeline @P rank 1 {
   piko.buffer @ids : @Id
+  piko.buffer @two : @Two
   piko.buffer @triangles : @T
   piko.buffer @others : @T
   piko.buffer @out : @T
@@ -50,7 +62,9 @@ piko.pipeline @P rank 1 {
         %v = piko.load checked @others[%id : i32] "x" : f32
         %w = piko.load checked @others[%id : i32] "y" : f32
         %slot = arith.remui %id, %size : i32
-        %f = arith.uitofp %slot : i32 to f32
+        %other = piko.load checked @two[%i : index] "m" : i32
+        %rest = arith.remsi %slot, %other : i32
+        %f = arith.uitofp %rest : i32 to f32
         %0 = arith.mulf %x, %y : f32
         %1 = arith.addf %0, %z : f32
         %2 = arith.divf %1, %v : f32

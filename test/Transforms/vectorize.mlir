@@ -70,8 +70,10 @@ piko.record @F {"z" : f32 at 0} size 4 align 4
 // CHECK:           %[[GOING:.*]] = arith.select %[[M]], %[[GOES]], %{{.*}} : vector<16xi1>
 // CHECK:           %[[SOME:.*]] = vector.reduction <or>, %[[GOING]]
 // CHECK:           scf.condition(%[[SOME]]) %[[LEFT]], %[[GOING]]
-// CHECK:           vector.maskedstore %[[COLUMNS]][%c32]
-// CHECK:         vector.gather %[[COLUMNS]][%c0] [%{{.*}}]
+// CHECK:           %[[OLD:.*]] = vector.load %[[COLUMNS]][%c32]
+// CHECK:           %[[NEW:.*]] = arith.select %{{.*}}, %{{.*}}, %[[OLD]] : vector<16xi1>
+// CHECK:           vector.store %[[NEW]], %[[COLUMNS]][%c32]
+// CHECK-NOT:     vector.gather
 piko.pipeline @Loop rank 1 {
   piko.buffer @out : @F
   piko.source @a

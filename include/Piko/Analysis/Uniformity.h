@@ -7,6 +7,8 @@
 
 #include "Piko/Dialect/Piko/IR/Piko.h"
 
+#include "mlir/Dialect/SCF/IR/SCF.h"
+
 namespace piko {
 
 /// How far a value is the same, from the widest to the narrowest. An item is a
@@ -14,6 +16,10 @@ namespace piko {
 enum class Uniform { Bin, Item, Iteration };
 
 bool isBarrier(mlir::Operation *op);
+
+/// Which of two values that a condition hands on stands for both, since the
+/// other is poison; null if none does.
+mlir::Value findOnlyValue(mlir::Value yes, mlir::Value no);
 
 /// The first place inside an operation where the iterations of the enclosing
 /// loop meet; null if they do not.
@@ -35,7 +41,11 @@ public:
   /// `piko.lists`, or a loop over primitives or iterations with its induction
   /// variable among `roots`. Work and parallel loops inside are roots by
   /// themselves.
-  explicit Uniformity(mlir::Operation *root, llvm::ArrayRef<Root> roots = {});
+  /// In lockstep, what a loop hands on is the same for those that are still in
+  /// it, where they began with the same; and a condition hands on what one of
+  /// its sides does, if the other's is poison.
+  explicit Uniformity(mlir::Operation *root, llvm::ArrayRef<Root> roots = {},
+                      bool isLockstep = false);
 
   Uniform get(mlir::Value value) const { return levels.lookup(value); }
   /// Whether a value is the same for all items of the bin.
@@ -66,6 +76,9 @@ private:
   Uniform get(mlir::ValueRange values) const;
   /// Narrows each of `targets` to its source, and to `least`.
   bool flow(mlir::ValueRange sources, mlir::ValueRange targets, Uniform least);
+  bool visitIf(mlir::scf::IfOp choice, Uniform parts);
+
+  bool isLockstep;
 
   mlir::Operation *root;
   llvm::DenseMap<mlir::Value, Uniform> levels; ///< What is not in it: Bin.
