@@ -36,7 +36,7 @@ Value piko::findOnlyValue(Value yes, Value no) {
 }
 
 Uniformity::Uniformity(Operation *root, ArrayRef<Root> roots, bool isLockstep)
-    : root(root), isLockstep(isLockstep) {
+    : isLockstep(isLockstep), root(root) {
   if (auto kernel = root->getParentOfType<KernelOp>())
     kernel.walk([&](StateAccessOpInterface access) {
       if (access.getAccessKinds() != StateAccess::reads)
