@@ -40,8 +40,12 @@ public:
     scan();
     bool identity = sorted_ && kernel_.positions == kernel_.stream.count &&
                     kernel_.stream.onePairEach();
-    if (!identity)
+    const uint32_t *index = kernel_.stream.index;
+    bool numbers = !index || stage_.keyWidth > 0 || stage_.loop >= 0;
+    if (!identity && numbers)
       kernel_.order = Array<uint32_t>(p_.memory, kernel_.positions);
+    if (!identity && index)
+      kernel_.places = Array<uint32_t>(p_.memory, kernel_.positions);
     bool byBin = stage_.collects() && stage_.tiles > 1;
     bool ranked = rankNeeded_ && !sorted_ && (byBin || !stage_.collects());
     if (ranked) {
@@ -153,6 +157,8 @@ private:
     uint32_t *nextInBin =
         byBin && ranked ? binCounts_.data() + chunk * bins : nullptr;
     uint32_t *order = kernel_.order.data(), *rank = kernel_.rank.data();
+    uint32_t *places = kernel_.places.data();
+    const uint32_t *index = kernel_.stream.index;
     auto item =
         static_cast<uint32_t>(pieces_[static_cast<size_t>(chunk)].items - 1);
     int64_t end = firstPair(chunk + 1);
@@ -163,7 +169,10 @@ private:
         continue;
       uint32_t cell = entry & cellMask;
       uint32_t position = next[cell]++;
-      order[position] = item;
+      if (order)
+        order[position] = item;
+      if (places)
+        places[position] = index[item];
       if (nextInBin)
         rank[position] = nextInBin[cell / stage_.tiles]++;
       else if (ranked)

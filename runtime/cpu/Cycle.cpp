@@ -170,7 +170,7 @@ bool Cycle::runsSerially(Kernel &kernel) const {
   if (!edge)
     return false;
   const Queue &queue = queueOf(p_, *edge);
-  if (!Serial::takes(p_, kernel, std::max(queue.count, queue.pairs.size())))
+  if (!Serial::takes(p_, kernel, std::max(queue.count, queue.pairCount())))
     return false;
   if (stage.collects())
     return stage.tiles == 1 && round_ > 0;
@@ -234,7 +234,7 @@ void Cycle::absorb(const Kernel &kernel, const Serial &launch) {
     const Serial::Emitted &emitted = launch.ports()[port];
     if (emitted.count == 0)
       continue;
-    Stream stream{emitted, {}, {}, {}, {}};
+    Stream stream{emitted, {}, {}, {}, {}, {}};
     if (p_.edges[e].keyed()) { // a new lineage
       stream.keys.width = 2;
       stream.keys.words = Array<uint64_t>(p_.memory, 2 * stream.count);
@@ -247,12 +247,28 @@ void Cycle::absorb(const Kernel &kernel, const Serial &launch) {
   }
 }
 
-void piko::rt::enqueue(pikort_pipeline &p, Edge &edge, const Stream &stream) {
+/// The queue of an edge, if there is room in it.
+static Queue &roomFor(const pikort_pipeline &p, Edge &edge,
+                      const Stream &stream) {
   const Stage &to = p.stages[edge.consumer];
   Queue &queue = queueOf(p, edge);
   checkCount(to, queue.count + stream.count);
-  checkCount(to, queue.pairs.size() + stream.pairCount);
-  queue.append(p.memory, stream, p.records[to.record].size, edge.keyWidth);
+  checkCount(to, queue.pairCount() + stream.pairCount);
+  return queue;
+}
+
+void piko::rt::enqueue(pikort_pipeline &p, Edge &edge, const Stream &stream) {
+  roomFor(p, edge, stream)
+      .append(p.memory, stream, p.records[p.stages[edge.consumer].record].size,
+              edge.keyWidth);
+}
+
+void piko::rt::enqueue(pikort_pipeline &p, Edge &edge, Stream &&stream) {
+  if (edge.leavesStrips) // which may be taken back
+    return enqueue(p, edge, std::as_const(stream));
+  roomFor(p, edge, stream)
+      .add(p.memory, std::move(stream),
+           p.records[p.stages[edge.consumer].record].size, edge.keyWidth);
 }
 
 void piko::rt::startCycles(pikort_pipeline &p) {

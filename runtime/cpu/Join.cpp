@@ -4,10 +4,15 @@
 // For each input edge, one of two ways:
 //
 //   concatenate   The producer's units ran its items in emission order: the
-//                 units' segments follow each other. Copies at memory speed.
+//                 units' segments follow each other.
 //   by position   A slot's records go to the place that its position's rank
-//                 gives: scan the counts in rank order, then copy runs.
+//                 gives: scan the counts in rank order, then walk the slots.
 //                 The same walk writes lineage keys where they are needed.
+//
+// Records stay where they were written, and an index says where each lies: the
+// number of records from the first one in memory, for all begin at multiples of
+// their size (Writer.cpp). Only small ones are copied, and those that lie too
+// far from each other for an index.
 //
 // Several edges and sources are merged by key (Merge.cpp).
 //
@@ -31,13 +36,66 @@ struct Segments {
   int64_t bytes = 0;
 };
 
+/// Walks the segments of a log, from the first of a unit's.
+const Segment *firstOf(const Segments &all, int64_t unit) {
+  return std::lower_bound(
+      all.list.data(), all.list.data() + all.list.size(), unit,
+      [](const Segment &s, int64_t u) { return s.unit < u; });
+}
+
+/// Where records lie that stay there.
+struct Region {
+  const uint8_t *base = nullptr; ///< Null: they must be copied.
+  int64_t extent = 0;            ///< In records.
+
+  Region(const Segments &records, int64_t size) {
+    constexpr int64_t small = 16; // as good as an index
+    if (size <= small || records.list.empty())
+      return;
+    const uint8_t *first = records.list[0].data, *end = first;
+    for (const Segment &segment : records.list) {
+      first = std::min(first, segment.data);
+      end = std::max(end, segment.data + segment.bytes);
+    }
+    extent = (end - first) / size;
+    base = extent <= UINT32_MAX ? first : nullptr;
+  }
+};
+
+/// Reads where a unit's records lie, across its segments.
+class IndexReader {
+public:
+  IndexReader(const Segments &all, int64_t unit, const Region &region,
+              int64_t size)
+      : next_(firstOf(all, unit)), base_(region.base), size_(size) {}
+
+  void read(uint32_t *to, int64_t count) {
+    while (count > 0) {
+      if (left_ == 0) {
+        place_ = (next_->data - base_) / size_;
+        left_ = next_->bytes / size_;
+        ++next_;
+      }
+      int64_t now = std::min(count, left_);
+      for (int64_t i = 0; i < now; ++i)
+        to[i] = static_cast<uint32_t>(place_ + i);
+      to += now;
+      place_ += now;
+      left_ -= now;
+      count -= now;
+    }
+  }
+
+private:
+  const Segment *next_;
+  const uint8_t *base_;
+  int64_t size_, place_ = 0, left_ = 0;
+};
+
 /// Reads a unit's bytes across its segments.
 class Reader {
 public:
-  Reader(const Segments &all, int64_t unit)
-      : next_(std::lower_bound(
-            all.list.data(), all.list.data() + all.list.size(), unit,
-            [](const Segment &s, int64_t u) { return s.unit < u; })) {}
+  Reader(const Segments &all, int64_t unit) : next_(firstOf(all, unit)) {}
 
   void read(uint8_t *to, int64_t bytes) {
     while (bytes > 0) {
@@ -91,7 +149,10 @@ static Segments collect(Kernel &kernel, size_t port, Log PortLogs::*which) {
   return result;
 }
 
-static void concatenate(int32_t threads, const Segments &from, uint8_t *to) {
+/// Calls body(from, bytes, at) for pieces of segments, which lie `at` bytes
+/// behind the first in their order.
+static void forPieces(int32_t threads, const Segments &from, int64_t unit,
+                      auto &&body) {
   std::vector<int64_t> at(from.list.size());
   int64_t bytes = 0;
   for (size_t i = 0; i < at.size(); ++i) {
@@ -99,19 +160,25 @@ static void concatenate(int32_t threads, const Segments &from, uint8_t *to) {
     bytes += from.list[i].bytes;
   }
   // Small segments travel together.
-  constexpr int64_t chunk = int64_t(256) << 10;
+  int64_t chunk = (int64_t(256) << 10) / unit * unit;
   parallelChunks(threads, bytes, chunk, [&](int64_t begin, int64_t end) {
     auto i = static_cast<size_t>(std::upper_bound(at.begin(), at.end(), begin) -
                                  at.begin() - 1);
     while (begin < end) {
       int64_t skip = begin - at[i];
       int64_t now = std::min(end - begin, from.list[i].bytes - skip);
-      std::memcpy(to + begin, from.list[i].data + skip,
-                  static_cast<size_t>(now));
+      body(from.list[i].data + skip, now, begin);
       begin += now;
       ++i;
     }
   });
+}
+
+static void concatenate(int32_t threads, const Segments &from, uint8_t *to) {
+  forPieces(threads, from, 1,
+            [&](const uint8_t *data, int64_t bytes, int64_t at) {
+              std::memcpy(to + at, data, static_cast<size_t>(bytes));
+            });
 }
 
 void piko::rt::failCount(const Stage &stage, int64_t count) {
@@ -131,10 +198,24 @@ Array<uint32_t> piko::rt::pairStarts(Memory &memory, const Items &items) {
   return starts;
 }
 
-bool piko::rt::byPosition(const pikort_pipeline &p, const Edge &edge) {
-  const Stage &from = p.stages[edge.producer];
-  return edge.keyed() || from.loop >= 0 ||
-         (edge.gather == PIKOIR_PERMUTE && kernelOf(p, edge.producer).rank);
+/// True if the edge must be gathered position by position. The waves of a loop
+/// take what comes as it comes.
+static bool byPosition(const pikort_pipeline &p, const Edge &edge) {
+  return p.stages[edge.producer].loop < 0 &&
+         (edge.keyed() ||
+          (edge.gather == PIKOIR_PERMUTE && kernelOf(p, edge.producer).rank));
+}
+
+bool piko::rt::needsCounts(const pikort_pipeline &p, const Edge &edge) {
+  return p.stages[edge.producer].loop >= 0 || byPosition(p, edge);
+}
+
+/// What is used where it lies: the stream takes its blocks.
+static void keepBlocks(Kernel &kernel, size_t port, Log PortLogs::*which,
+                       Stream &stream) {
+  for (auto &lane : kernel.lanes)
+    for (auto &block : (lane->logs[port].*which).blocks)
+      stream.blocks.push_back(std::move(block));
 }
 
 // --- By position ------------------------------------------------------------
@@ -148,18 +229,15 @@ public:
       : p_(p), from_(p.stages[edge.producer]),
         kernel_(kernelOf(p, edge.producer)),
         port_(static_cast<size_t>(edge.port)), edge_(edge), stream_(stream),
-        keyed_(edge.keyed() && from_.loop < 0),
         size_(p.records[p.stages[edge.consumer].record].size),
         records_(collect(kernel_, port_, &PortLogs::records)),
+        region_(records_, size_),
         cells_(collect(kernel_, port_, &PortLogs::cells)),
         ordinals_(collect(kernel_, port_, &PortLogs::ordinals)) {}
 
   void run() {
-    stream_.itemStorage = Array<uint8_t>(p_.memory, stream_.count * size_);
-    stream_.items = stream_.itemStorage.data();
-    if (from_.loop >= 0)
-      ordinalStorage_ = Array<uint32_t>(p_.memory, stream_.count);
-    if (keyed_) {
+    makeRoom();
+    if (edge_.keyed()) {
       stream_.keys.width = from_.collects() ? 2 : kernel_.keys.width + 1;
       stream_.keys.words =
           Array<uint64_t>(p_.memory, stream_.count * stream_.keys.width);
@@ -173,11 +251,23 @@ public:
     if (placed && !stream_.onePairEach())
       pairStarts_ = startsByRank(countPairs());
     forUnits([&](int64_t begin, int64_t end) { gatherUnits(begin, end); });
+    if (region_.base)
+      keepBlocks(kernel_, port_, &PortLogs::records, stream_);
   }
-  Array<uint32_t> takeStarts() { return std::move(starts_); }
-  Array<uint32_t> takeOrdinals() { return std::move(ordinalStorage_); }
 
 private:
+  void makeRoom() {
+    if (region_.base) {
+      stream_.indexStorage = Array<uint32_t>(p_.memory, stream_.count);
+      stream_.index = stream_.indexStorage.data();
+      stream_.items = region_.base;
+      stream_.extent = region_.extent;
+    } else {
+      stream_.itemStorage = Array<uint8_t>(p_.memory, stream_.count * size_);
+      stream_.items = stream_.itemStorage.data();
+    }
+  }
+
   int64_t rankOf(int64_t slot) const {
     return kernel_.rank ? kernel_.rank[slot] : slot;
   }
@@ -237,7 +327,10 @@ private:
   }
 
   void gatherUnits(int64_t begin, int64_t end) {
-    Readers from{{records_, begin}, {cells_, begin}, {ordinals_, begin}};
+    Readers from{{records_, begin},
+                 {records_, begin, region_, size_},
+                 {cells_, begin},
+                 {ordinals_, begin}};
     for (int64_t u = begin; u < end; ++u) {
       int64_t cell = kernel_.units[u].cell_begin;
       int64_t unitEnd = kernel_.slotBegin(u + 1);
@@ -248,7 +341,9 @@ private:
   }
 
   struct Readers {
-    Reader records, cells, ordinals;
+    Reader records;
+    IndexReader places;
+    Reader cells, ordinals;
   };
 
   /// `cell` is the slot's, or one before it.
@@ -256,7 +351,10 @@ private:
     uint32_t count = kernel_.counts[port_][i];
     int64_t rank = rankOf(i);
     int64_t at = starts_[rank];
-    from.records.read(stream_.itemStorage.data() + at * size_, count * size_);
+    if (region_.base)
+      from.places.read(stream_.indexStorage.data() + at, count);
+    else
+      from.records.read(stream_.itemStorage.data() + at * size_, count * size_);
     if (pairStarts_) {
       int64_t begin = pairStarts_[rank];
       int64_t end = rank + 1 < pairStarts_.size() ? pairStarts_[rank + 1]
@@ -269,11 +367,7 @@ private:
           reinterpret_cast<uint8_t *>(stream_.pairStorage.data() + at),
           int64_t(count) * 4);
     }
-    if (ordinalStorage_)
-      from.ordinals.read(
-          reinterpret_cast<uint8_t *>(ordinalStorage_.data() + at),
-          int64_t(count) * 4);
-    if (!keyed_)
+    if (!edge_.keyed())
       return;
     while (!from_.collects() && kernel_.offsets[cell + 1] <= i)
       ++cell;
@@ -300,10 +394,11 @@ private:
   size_t port_;
   const Edge &edge_;
   Stream &stream_;
-  bool keyed_; ///< A loop makes the keys of what leaves it.
   int64_t size_;
-  Segments records_, cells_, ordinals_;
-  Array<uint32_t> starts_, pairStarts_, ordinalStorage_;
+  Segments records_;
+  Region region_;
+  Segments cells_, ordinals_;
+  Array<uint32_t> starts_, pairStarts_;
 };
 
 } // namespace
@@ -318,14 +413,6 @@ static void releasePort(Kernel &kernel, size_t port) {
     kernel.counts[port] = {};
   if (--kernel.pendingOutputs <= 0)
     kernel.clear();
-}
-
-/// One segment is used where it lies: the stream takes its blocks.
-static void keepBlocks(Kernel &kernel, size_t port, Log PortLogs::*which,
-                       Stream &stream) {
-  for (auto &lane : kernel.lanes)
-    for (auto &block : (lane->logs[port].*which).blocks)
-      stream.blocks.push_back(std::move(block));
 }
 
 /// The cells that a kernel's port logged, in unit order.
@@ -390,6 +477,34 @@ static Stream countRecords(pikort_pipeline &p, const Edge &edge) {
   return stream;
 }
 
+/// The records that a kernel's port logged, in unit order.
+static void concatenateRecords(pikort_pipeline &p, Kernel &kernel, size_t port,
+                               int64_t size, Stream &stream) {
+  Segments records = collect(kernel, port, &PortLogs::records);
+  Region region(records, size);
+  if (records.list.size() == 1) {
+    stream.items = records.list[0].data;
+  } else if (region.base) {
+    stream.items = region.base;
+    stream.extent = region.extent;
+    stream.indexStorage = Array<uint32_t>(p.memory, stream.count);
+    stream.index = stream.indexStorage.data();
+    forPieces(p.threads, records, size,
+              [&](const uint8_t *data, int64_t bytes, int64_t at) {
+                auto place = (data - region.base) / size;
+                uint32_t *to = stream.indexStorage.data() + at / size;
+                for (int64_t i = 0; i < bytes / size; ++i)
+                  to[i] = static_cast<uint32_t>(place + i);
+              });
+  } else {
+    stream.itemStorage = Array<uint8_t>(p.memory, records.bytes);
+    stream.items = stream.itemStorage.data();
+    concatenate(p.threads, records, stream.itemStorage.data());
+    return;
+  }
+  keepBlocks(kernel, port, &PortLogs::records, stream);
+}
+
 Stream piko::rt::gatherEdge(pikort_pipeline &p, const Edge &edge) {
   Kernel &kernel = kernelOf(p, edge.producer);
   const Stage &to = p.stages[edge.consumer];
@@ -398,29 +513,27 @@ Stream piko::rt::gatherEdge(pikort_pipeline &p, const Edge &edge) {
   if (byPosition(p, edge)) {
     PositionGather(p, edge, stream).run();
   } else {
-    Segments records = collect(kernel, port, &PortLogs::records);
     if (to.placed())
       concatenateCells(p, kernel, port, stream);
-    if (records.list.size() == 1) {
-      stream.items = records.list[0].data;
-      keepBlocks(kernel, port, &PortLogs::records, stream);
-    } else {
-      stream.itemStorage = Array<uint8_t>(p.memory, records.bytes);
-      stream.items = stream.itemStorage.data();
-      concatenate(p.threads, records, stream.itemStorage.data());
-    }
+    concatenateRecords(p, kernel, port, p.records[to.record].size, stream);
   }
   releasePort(kernel, port);
   return stream;
 }
 
-PortRecords piko::rt::gatherPort(pikort_pipeline &p, const Edge &edge) {
-  PortRecords result;
-  result.stream = countRecords(p, edge);
-  PositionGather gather(p, edge, result.stream);
-  gather.run();
-  result.starts = gather.takeStarts();
-  result.ordinals = gather.takeOrdinals();
+PortRecords piko::rt::takePort(pikort_pipeline &p, const Edge &edge) {
+  Kernel &kernel = kernelOf(p, edge.producer);
+  const Stage &to = p.stages[edge.consumer];
+  auto port = static_cast<size_t>(edge.port);
+  PortRecords result{countRecords(p, edge), {}, {}};
+  if (to.placed())
+    concatenateCells(p, kernel, port, result.stream);
+  concatenateRecords(p, kernel, port, p.records[to.record].size, result.stream);
+  Segments ordinals = collect(kernel, port, &PortLogs::ordinals);
+  result.ordinals = Array<uint32_t>(p.memory, ordinals.bytes / 4);
+  concatenate(p.threads, ordinals,
+              reinterpret_cast<uint8_t *>(result.ordinals.data()));
+  result.counts = std::move(kernel.counts[port]);
   return result;
 }
 

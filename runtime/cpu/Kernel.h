@@ -136,8 +136,17 @@ struct Items {
   int64_t count = 0;
   const uint32_t *pairs = nullptr; ///< If the consumer is placed.
   int64_t pairCount = 0;
+  /// Where each item lies, in records from `items`; null = they follow each
+  /// other.
+  const uint32_t *index = nullptr;
+  int64_t extent = 0; ///< If there is an index: all its entries are below.
 
   bool onePairEach() const { return pairCount == count; }
+  const uint8_t *item(int64_t i, int64_t size) const {
+    return items + (index ? index[i] : i) * size;
+  }
+  /// Records from `items` up to the last.
+  int64_t reach() const { return index ? extent : count; }
 };
 
 /// The same, with keys.
@@ -145,7 +154,7 @@ struct Stream : Items {
   Keys keys;
   // What the pointers point to, if it is ours:
   Array<uint8_t> itemStorage;
-  Array<uint32_t> pairStorage;
+  Array<uint32_t> pairStorage, indexStorage;
   std::vector<Array<uint8_t>> blocks;
 };
 
@@ -167,7 +176,10 @@ struct Kernel {
 
   // From begin until all outputs are gathered.
   Array<int64_t> offsets;
+  /// Position to item; none = identity, or that nobody asks.
   Array<uint32_t> order;
+  /// Position to where the item lies, if it is not the item's number.
+  Array<uint32_t> places;
   Array<pikoir_call> calls; ///< If Process takes a list.
   std::vector<pikoir_unit> units;
   bool ownsUnits = false; ///< Some belong to a thread that is not the first.
@@ -247,30 +259,32 @@ inline void checkCount(const Stage &stage, int64_t count) {
 }
 /// The first pair of each item of a stream that has pairs, and the end.
 Array<uint32_t> pairStarts(Memory &memory, const Items &items);
-/// True if the edge must be gathered position by position.
-bool byPosition(const pikort_pipeline &p, const Edge &edge);
+/// True if the producer must note what each of its slots emits.
+bool needsCounts(const pikort_pipeline &p, const Edge &edge);
 /// What a kernel emitted, in lineage order; frees it there.
 Stream gatherEdge(pikort_pipeline &p, const Edge &edge);
 
-/// The same for an edge from a stage of a loop, with what orders the records of
-/// different ports: where those of each rank start, and their ordinals.
+/// The same for an edge from a stage of a loop, in the order of emission, with
+/// how many records each slot emitted and, if there are several ports, their
+/// ordinals.
 struct PortRecords {
   Stream stream;
-  Array<uint32_t> starts, ordinals;
+  Array<uint32_t> counts, ordinals;
 };
-PortRecords gatherPort(pikort_pipeline &p, const Edge &edge);
+PortRecords takePort(pikort_pipeline &p, const Edge &edge);
 
 /// What has come into a stage, in lineage order; inside a cycle only what the
 /// cycle has emitted, unless `fromOutside`.
 Stream gatherInputs(pikort_pipeline &p, const Stage &stage, bool fromOutside);
 // --- Merge.cpp --------------------------------------------------------------
 
-/// The input of a stage from several streams, in the order of their keys.
-Stream mergeStreams(pikort_pipeline &p, const std::vector<Stream> &streams,
+/// The input of a stage from several streams, in the order of their keys; takes
+/// what they hold.
+Stream mergeStreams(pikort_pipeline &p, std::vector<Stream> &streams,
                     const Stage &stage);
 /// For each stream, the place of each item in the order of all their keys.
 std::vector<Array<uint32_t>> mergePlaces(pikort_pipeline &p,
-                                         const std::vector<Stream> &streams);
+                                         std::vector<Stream> &streams);
 
 // --- Cells.cpp --------------------------------------------------------------
 

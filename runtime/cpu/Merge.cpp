@@ -2,7 +2,8 @@
 //===- Merge.cpp - Merges streams by lineage key --------------------------===//
 //
 // Each record's place is its own index plus, for each other stream, the number
-// of records before it there.
+// of records before it there. Where the records of all streams lie at multiples
+// of their size, they stay there, and are indexed.
 //
 //===----------------------------------------------------------------------===//
 
@@ -21,8 +22,7 @@ namespace {
 /// Merges streams by lineage key.
 class Merge {
 public:
-  Merge(pikort_pipeline &p, const std::vector<Stream> &from)
-      : p_(p), from_(from) {}
+  Merge(pikort_pipeline &p, std::vector<Stream> &from) : p_(p), from_(from) {}
 
   /// Finds the place of each record, and puts it there if there is room.
   void findPlaces() {
@@ -36,7 +36,7 @@ public:
         if (other != chunk.stream)
           addBefore(chunk, other, places);
       for (int64_t i = chunk.begin; i < chunk.end && out_.items; ++i)
-        copyItem(chunk.stream, i, places[i]);
+        putItem(chunk.stream, i, places[i]);
     });
   }
   std::vector<Array<uint32_t>> takePlaces() { return std::move(places_); }
@@ -50,8 +50,7 @@ public:
     }
     checkCount(stage, out_.count);
     checkCount(stage, out_.pairCount);
-    out_.itemStorage = Array<uint8_t>(p_.memory, out_.count * size_);
-    out_.items = out_.itemStorage.data();
+    makeRoom();
     if (stage.keyWidth > 0 || stage.loop >= 0)
       out_.keys.words =
           Array<uint64_t>(p_.memory, out_.count * out_.keys.width);
@@ -60,6 +59,8 @@ public:
     findPlaces();
     if (stage.placed())
       mergePairs();
+    if (out_.index)
+      keepRecords();
     return std::move(out_);
   }
 
@@ -68,6 +69,34 @@ private:
     size_t stream;
     int64_t begin, end;
   };
+
+  void makeRoom() {
+    const uint8_t *first = from_[0].items, *end = first;
+    bool staggered = false;
+    for (const Stream &stream : from_) {
+      staggered |= (stream.items - from_[0].items) % size_ != 0;
+      first = std::min(first, stream.items);
+      end = std::max(end, stream.items + stream.reach() * size_);
+    }
+    out_.extent = (end - first) / size_;
+    if (staggered || out_.extent > UINT32_MAX) {
+      out_.itemStorage = Array<uint8_t>(p_.memory, out_.count * size_);
+      out_.items = out_.itemStorage.data();
+      return;
+    }
+    out_.indexStorage = Array<uint32_t>(p_.memory, out_.count);
+    out_.index = out_.indexStorage.data();
+    out_.items = first;
+  }
+
+  /// The result owns what it points into.
+  void keepRecords() {
+    for (Stream &stream : from_) {
+      std::move(stream.blocks.begin(), stream.blocks.end(),
+                std::back_inserter(out_.blocks));
+      out_.blocks.push_back(std::move(stream.itemStorage));
+    }
+  }
 
   static uint64_t word(const Keys &keys, int64_t item, int32_t w) {
     return w < keys.width ? keys.word(item, w) : 0;
@@ -111,9 +140,14 @@ private:
     }
   }
 
-  void copyItem(size_t s, int64_t i, int64_t to) {
-    std::memcpy(out_.itemStorage.data() + to * size_,
-                from_[s].items + i * size_, static_cast<size_t>(size_));
+  void putItem(size_t s, int64_t i, int64_t to) {
+    const uint8_t *item = from_[s].item(i, size_);
+    if (out_.index)
+      out_.indexStorage[to] =
+          static_cast<uint32_t>((item - out_.items) / size_);
+    else
+      std::memcpy(out_.itemStorage.data() + to * size_, item,
+                  static_cast<size_t>(size_));
     for (int32_t w = 0; w < out_.keys.width; ++w)
       out_.keys.words[to * out_.keys.width + w] = word(from_[s].keys, i, w);
   }
@@ -149,7 +183,7 @@ private:
   }
 
   pikort_pipeline &p_;
-  const std::vector<Stream> &from_;
+  std::vector<Stream> &from_;
   int64_t size_ = 0;
   Stream out_;
   std::vector<Chunk> chunks_;
@@ -159,14 +193,13 @@ private:
 } // namespace
 
 std::vector<Array<uint32_t>>
-piko::rt::mergePlaces(pikort_pipeline &p, const std::vector<Stream> &streams) {
+piko::rt::mergePlaces(pikort_pipeline &p, std::vector<Stream> &streams) {
   Merge merge(p, streams);
   merge.findPlaces();
   return merge.takePlaces();
 }
 
-Stream piko::rt::mergeStreams(pikort_pipeline &p,
-                              const std::vector<Stream> &streams,
+Stream piko::rt::mergeStreams(pikort_pipeline &p, std::vector<Stream> &streams,
                               const Stage &stage) {
   return Merge(p, streams).run(stage);
 }

@@ -71,10 +71,28 @@ struct Queue {
   Growing<uint32_t> pairs;
   Growing<uint64_t> words; ///< Of keys.
   Growing<uint32_t> nodes; ///< In the tree of a loop, if there is one.
+  /// In place of all but nodes, if it has items: what came alone.
+  Stream whole;
+
+  /// Takes what comes over if nothing is here and it is worth that; else
+  /// appends it.
+  void add(Memory &memory, Stream &&stream, int64_t size, int32_t keyWidth) {
+    constexpr int64_t worth = int64_t(16) << 10;
+    if (count > 0 || stream.count * size < worth ||
+        (keyWidth > 0 && stream.keys.width != keyWidth))
+      return append(memory, stream, size, keyWidth);
+    count = stream.count;
+    whole = std::move(stream);
+  }
 
   /// Appends items of `size` bytes with keys of `keyWidth` words (0 = none).
   void append(Memory &memory, const Stream &stream, int64_t size,
               int32_t keyWidth) {
+    if (whole.count > 0) {
+      Stream first = std::exchange(whole, {});
+      count = 0;
+      append(memory, first, size, keyWidth);
+    }
     append(memory, stream, size);
     if (keyWidth > 0) {
       uint64_t *to = words.extend(memory, stream.count * keyWidth);
@@ -83,16 +101,14 @@ struct Queue {
           *to++ = w < stream.keys.width ? stream.keys.word(i, w) : 0;
     }
   }
-  void append(Memory &memory, const Items &added, int64_t size) {
-    items.append(memory, added.items, added.count * size);
-    pairs.append(memory, added.pairs, added.pairCount);
-    count += added.count;
-  }
 
+  int64_t pairCount() const {
+    return whole.count > 0 ? whole.pairCount : pairs.size();
+  }
   int64_t bytes() const {
     return items.size() + 4 * pairs.size() + 8 * words.size();
   }
-  /// What it held at some time, without nodes.
+  /// What it held at some time, without nodes. It has taken nothing over.
   struct Mark {
     int64_t count = 0, bytes = 0, pairs = 0, words = 0;
   };
@@ -109,6 +125,7 @@ struct Queue {
 
   void reset() {
     count = 0;
+    whole = {};
     items.reset();
     pairs.reset();
     words.reset();
@@ -117,12 +134,18 @@ struct Queue {
 
   /// All items, which stay here.
   Items view() const {
+    if (whole.count > 0)
+      return whole;
     return {items.data(), count, pairs.data(), pairs.size()};
   }
 
   /// All items, without their nodes; the queue is empty then.
   Stream take(int32_t keyWidth) {
     Stream stream;
+    if (whole.count > 0) {
+      count = 0;
+      return std::exchange(whole, {});
+    }
     stream.count = std::exchange(count, 0);
     stream.pairCount = pairs.size();
     stream.itemStorage = items.take();
@@ -133,10 +156,26 @@ struct Queue {
     stream.keys.words = words.take();
     return stream;
   }
+
+private:
+  void append(Memory &memory, const Items &added, int64_t size) {
+    if (added.index) {
+      uint8_t *to = items.extend(memory, added.count * size);
+      for (int64_t i = 0; i < added.count; ++i)
+        std::memcpy(to + i * size, added.item(i, size),
+                    static_cast<size_t>(size));
+    } else {
+      items.append(memory, added.items, added.count * size);
+    }
+    pairs.append(memory, added.pairs, added.pairCount);
+    count += added.count;
+  }
 };
 
 /// Appends what came along an edge to its queue; throws.
 void enqueue(pikort_pipeline &p, Edge &edge, const Stream &stream);
+/// The same for what is its own: it may stay where it is.
+void enqueue(pikort_pipeline &p, Edge &edge, Stream &&stream);
 
 } // namespace piko::rt
 

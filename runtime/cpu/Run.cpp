@@ -18,6 +18,7 @@ void Kernel::clear() {
   input = {};
   offsets = {};
   order = {};
+  places = {};
   calls = {};
   rank = {};
   rankSize = 0;
@@ -38,9 +39,12 @@ void Kernel::clear() {
 /// What generated code sees of a kernel that is ready to run.
 static void publish(const pikort_pipeline &p, Kernel &kernel) {
   const Stage &stage = p.stages[kernel.stage];
+  const uint32_t *order = kernel.places  ? kernel.places.data()
+                          : kernel.order ? kernel.order.data()
+                                         : kernel.stream.index;
   kernel.input = {kernel.stream.items,
                   kernel.positions,
-                  kernel.order.data(),
+                  order,
                   kernel.offsets.data(),
                   kernel.units.data(),
                   static_cast<int64_t>(kernel.units.size()),
@@ -81,7 +85,7 @@ void piko::rt::prepareOutputs(pikort_pipeline &p, const Stage &stage,
     if (e < 0 || p.edges[e].local)
       continue;
     ++kernel.pendingOutputs;
-    if (byPosition(p, p.edges[e]))
+    if (needsCounts(p, p.edges[e]))
       kernel.counts[port] = Array<uint32_t>(p.memory, kernel.slots());
   }
 }
@@ -103,9 +107,9 @@ static void chooseLaunch(pikort_pipeline &p, Kernel &kernel) {
 prepareThreads(pikort_pipeline &p, const Stage &stage, Kernel &kernel) {
   if (stage.keyWidth > 0)
     kernel.keys = std::move(kernel.stream.keys);
-  bool rankNeeded = stage.loop >= 0;
+  bool rankNeeded = false;
   for (int32_t e : stage.outputs)
-    if (e >= 0 && !p.edges[e].local)
+    if (e >= 0 && !p.edges[e].local && stage.loop < 0)
       rankNeeded |= p.edges[e].keyed() || p.edges[e].gather == PIKOIR_PERMUTE;
   binItems(p, stage, kernel, rankNeeded);
   cutUnits(p, stage, kernel);

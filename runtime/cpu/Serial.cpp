@@ -116,9 +116,13 @@ void Serial::begin(const Items &input) {
     slotEnds_.resize(needed);
   lane_.slotEnd = slotEnds_.data();
   lane_.ordinal = 0;
+  places_.clear();
+  for (int64_t i = 0; i < kernel_.positions && input.index; ++i)
+    places_.push_back(input.index[itemAt(i)]);
+  const std::vector<uint32_t> &order = places_.empty() ? order_ : places_;
   kernel_.input = {input.items,
                    kernel_.positions,
-                   order_.empty() ? nullptr : order_.data(),
+                   order.empty() ? nullptr : order.data(),
                    offsets_.data(),
                    kernel_.units.data(),
                    static_cast<int64_t>(kernel_.units.size()),

@@ -114,7 +114,8 @@ private:
   const Stage &stage_;
   Lane &lane_;
   PairOrder pairs_;
-  std::vector<uint32_t> order_; ///< Position to item; none = identity.
+  std::vector<uint32_t> order_;  ///< Position to item; none = identity.
+  std::vector<uint32_t> places_; ///< The same, where the input has an index.
   std::vector<pikoir_call> calls_;
   std::vector<uint32_t> slotEnds_;
   Array<int64_t> offsets_;

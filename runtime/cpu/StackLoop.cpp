@@ -56,7 +56,7 @@ Items StackLoop::pop() {
 /// The top of the stack leaves the loop.
 void StackLoop::leave() {
   const Edge &edge = p_.edges[stack_[stack_.size() - 1].edge];
-  Stream stream{pop(), {}, {}, {}, {}};
+  Stream stream{pop(), {}, {}, {}, {}, {}};
   if (edge.keyed()) {
     stream.keys.width = edge.keyWidth;
     stream.keys.words = std::move(key_);
@@ -67,7 +67,7 @@ void StackLoop::leave() {
   const Stage &to = p_.stages[edge.consumer];
   Queue &queue = queueOf(p_, edge);
   checkCount(to, queue.count + 1);
-  checkCount(to, queue.pairs.size() + stream.pairCount);
+  checkCount(to, queue.pairCount() + stream.pairCount);
   queue.append(p_.memory, stream, recordSize(to), stream.keys.width);
   if (edge.keyed())
     key_ = std::move(stream.keys.words);
@@ -79,7 +79,7 @@ void StackLoop::pushEntry(const Entry &entry) {
   const Array<uint32_t> &starts = starts_[entry.member];
   int64_t begin = starts ? starts[entry.item] : 0;
   int64_t end = starts ? starts[entry.item + 1] : 0;
-  pushCells(stage, 0, stream.items + entry.item * recordSize(p_.stages[stage]),
+  pushCells(stage, 0, stream.item(entry.item, recordSize(p_.stages[stage])),
             stream.pairs + begin, end - begin);
 }
 

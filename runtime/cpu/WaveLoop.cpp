@@ -5,6 +5,7 @@
 #include "cpu/Parallel.h"
 
 #include <algorithm>
+#include <numeric>
 
 using namespace piko::rt;
 
@@ -22,9 +23,8 @@ void WaveLoop::begin() {
   left_ = std::vector<Queue>(p_.edges.size());
   now_.assign(entries_.begin(), entries_.end());
   for (size_t m = 0; m < members(); ++m) {
-    uint32_t *nodes = current()[m].nodes.extend(p_.memory, now_[m].count);
-    for (int64_t i = 0; i < now_[m].count; ++i)
-      nodes[i] = places_[m] ? places_[m][i] : static_cast<uint32_t>(i);
+    if (places_[m])
+      current()[m].nodes.append(p_.memory, places_[m].data(), now_[m].count);
   }
   places_.clear();
   tree_.reset(entryCount_);
@@ -81,16 +81,26 @@ Stream WaveLoop::takeInput() {
   return current()[running_].take(0);
 }
 
+Queue &WaveLoop::queueBehind(const Edge &edge) {
+  return edge.insideLoop ? later()[memberOf(edge.consumer)]
+                         : left_[static_cast<size_t>(&edge - p_.edges.data())];
+}
+
+void WaveLoop::noteCount(const Edge &edge, const Items &emitted) {
+  const Stage &to = p_.stages[edge.consumer];
+  const Queue &queue = queueBehind(edge);
+  leftCount_ += edge.insideLoop ? 0 : emitted.count;
+  checkCount(to, queue.count + emitted.count);
+  checkCount(to, queue.pairCount() + emitted.pairCount);
+}
+
 void WaveLoop::put(int32_t e, const Items &emitted, int64_t base,
                    const uint32_t *numbers) {
   const Edge &edge = p_.edges[e];
-  const Stage &to = p_.stages[edge.consumer];
-  Queue &queue = edge.insideLoop ? later()[memberOf(edge.consumer)]
-                                 : left_[static_cast<size_t>(e)];
-  leftCount_ += edge.insideLoop ? 0 : emitted.count;
-  checkCount(to, queue.count + emitted.count);
-  checkCount(to, queue.pairs.size() + emitted.pairCount);
-  queue.append(p_.memory, emitted, recordSize(to));
+  noteCount(edge, emitted);
+  Queue &queue = queueBehind(edge);
+  queue.append(p_.memory, Stream{emitted, {}, {}, {}, {}, {}},
+               recordSize(p_.stages[edge.consumer]), 0);
   uint32_t *nodes = queue.nodes.extend(p_.memory, emitted.count);
   for (int64_t i = 0; i < emitted.count; ++i)
     nodes[i] = static_cast<uint32_t>(base) + numbers[i];
@@ -106,10 +116,9 @@ void WaveLoop::absorb(const Serial &launch) {
   int64_t base = tree_.size();
   checkCount(member(running_), base + launch.emitted());
   uint32_t *parents = tree_.extend(p_.memory, launch.emitted());
-  Growing<uint32_t> &nodes = current()[running_].nodes;
   uint32_t number = 0;
   for (int64_t slot = 0; slot < launch.slots(); ++slot)
-    for (uint32_t parent = nodes[launch.itemAt(slot)];
+    for (uint32_t parent = nodeOf(launch.itemAt(slot));
          number < launch.emittedUntil(slot); ++number)
       parents[number] = parent;
   const std::vector<int32_t> &outputs = member(running_).outputs;
@@ -118,15 +127,14 @@ void WaveLoop::absorb(const Serial &launch) {
     if (emitted.count > 0)
       put(outputs[port], emitted, base, emitted.numbers);
   }
-  nodes.shrink(0);
+  current()[running_].nodes.shrink(0);
 }
 
 /// An only child takes its parent's place in the tree.
 void WaveLoop::absorbOne(const Serial &launch) {
   static constexpr uint32_t first = 0;
-  Growing<uint32_t> &nodes = current()[running_].nodes;
-  uint32_t node = nodes[launch.itemAt(0)];
-  nodes.shrink(0);
+  uint32_t node = nodeOf(launch.itemAt(0));
+  current()[running_].nodes.shrink(0);
   const std::vector<int32_t> &outputs = member(running_).outputs;
   for (size_t port = 0; port < outputs.size(); ++port)
     if (const Serial::Emitted &emitted = launch.ports()[port];
@@ -136,80 +144,102 @@ void WaveLoop::absorbOne(const Serial &launch) {
 
 // --- What other launches emitted --------------------------------------------
 
-void WaveLoop::absorb(std::vector<Port> &ports, const Array<uint32_t> &items) {
-  int64_t base = tree_.size();
-  checkCount(member(running_), base + items.size());
-  uint32_t *parents = tree_.extend(p_.memory, items.size());
-  Growing<uint32_t> &nodes = current()[running_].nodes;
-  parallelChunks(p_.threads, items.size(), 1 << 16,
-                 [&](int64_t begin, int64_t end) {
-                   for (int64_t i = begin; i < end; ++i)
-                     parents[i] = nodes[items[i]];
-                 });
-  nodes.reset();
-  for (Port &port : ports)
-    put(port.edge, port.records.stream, base, port.numbers.data());
-}
+static constexpr int64_t slotChunk = int64_t(1) << 14;
 
 void WaveLoop::absorb(Kernel &kernel) {
   std::vector<Port> ports;
-  int64_t count = 0;
   for (int32_t e : p_.stages[kernel.stage].outputs)
     if (e >= 0) {
-      ports.push_back({e, gatherPort(p_, p_.edges[e]), {}});
-      count += ports.back().count();
+      ports.push_back({e, takePort(p_, p_.edges[e])});
+      const Stream &stream = ports.back().records.stream;
+      noteCount(p_.edges[e], stream);
+      Growing<uint32_t> &nodes = queueBehind(p_.edges[e]).nodes;
+      ports.back().firstNode = nodes.size();
+      nodes.extend(p_.memory, stream.count);
     }
-  checkCount(p_.stages[kernel.stage], count);
-  Array<uint32_t> items(p_.memory, count);
-  numberRecords(kernel, ports, items.data());
+  numberRecords(kernel, ports);
   kernel.clear();
-  absorb(ports, items);
+  current()[running_].nodes.reset();
+  for (Port &port : ports) {
+    const Edge &edge = p_.edges[port.edge];
+    queueBehind(edge).add(p_.memory, std::move(port.records.stream),
+                          recordSize(p_.stages[edge.consumer]), 0);
+  }
 }
 
-/// A record's number is its place in its port, plus the records of the other
-/// ports before its position, plus those at its position with a lower ordinal.
-void WaveLoop::numberRecords(const Kernel &kernel, std::vector<Port> &ports,
-                             uint32_t *items) {
-  int64_t ranks = kernel.rank ? kernel.rankSize : kernel.positions;
-  Array<uint32_t> itemOf(p_.memory, ranks);
-  parallelChunks(
-      p_.threads, kernel.positions, 1 << 16, [&](int64_t begin, int64_t end) {
-        for (int64_t i = begin; i < end; ++i)
-          itemOf[kernel.rank ? kernel.rank[i] : i] =
-              kernel.order ? kernel.order[i] : static_cast<uint32_t>(i);
-      });
-  for (Port &port : ports)
-    port.numbers = Array<uint32_t>(p_.memory, port.count());
-  auto first = [](const Port &port, int64_t rank) -> int64_t {
-    return rank < port.records.starts.size() ? port.records.starts[rank]
-                                             : port.count();
-  };
-  auto number = [&](Port &port, int64_t rank) {
-    int64_t begin = first(port, rank), end = first(port, rank + 1);
-    if (begin == end)
-      return;
-    uint32_t *numbers = port.numbers.data();
-    for (int64_t k = begin; k < end; ++k)
-      numbers[k] = static_cast<uint32_t>(k);
-    for (const Port &other : ports) {
-      if (&other == &port)
+/// Up to each chunk of slots, and up to the last.
+std::vector<WaveLoop::Cursor>
+WaveLoop::countRecords(const std::vector<Port> &ports, int64_t slots) const {
+  int64_t chunks = (slots + slotChunk - 1) / slotChunk;
+  std::vector<Cursor> result(static_cast<size_t>(chunks + 1),
+                             Cursor{0, std::vector<int64_t>(ports.size())});
+  parallelChunks(p_.threads, slots, slotChunk, [&](int64_t begin, int64_t end) {
+    Cursor &in = result[static_cast<size_t>(begin / slotChunk)];
+    for (size_t p = 0; p < ports.size(); ++p) {
+      const uint32_t *counts = ports[p].records.counts.data();
+      in.ofPort[p] = std::accumulate(counts + begin, counts + end, int64_t(0));
+    }
+  });
+  Cursor sum = result.back();
+  for (Cursor &cursor : result) {
+    cursor.all = sum.all;
+    for (size_t p = 0; p < ports.size(); ++p) {
+      sum.all += cursor.ofPort[p];
+      sum.ofPort[p] += std::exchange(cursor.ofPort[p], sum.ofPort[p]);
+    }
+  }
+  return result;
+}
+
+/// Numbers the nodes of what was emitted as that was. Children of a node are
+/// then numbered in their order, since its cells were taken in order.
+void WaveLoop::numberRecords(const Kernel &kernel,
+                             const std::vector<Port> &ports) {
+  int64_t slots = kernel.slots(), base = tree_.size();
+  std::vector<Cursor> cursors = countRecords(ports, slots);
+  int64_t count = cursors.back().all;
+  checkCount(member(running_), base + count);
+  uint32_t *parents = tree_.extend(p_.memory, count);
+  parallelChunks(p_.threads, slots, slotChunk, [&](int64_t begin, int64_t end) {
+    Cursor &at = cursors[static_cast<size_t>(begin / slotChunk)];
+    for (int64_t slot = begin; slot < end; ++slot)
+      numberSlot(slot,
+                 nodeOf(kernel.order ? kernel.order[slot]
+                                     : static_cast<uint32_t>(slot)),
+                 ports, base, parents, at);
+  });
+}
+
+/// The records of a slot: port by port, or by ordinal if several have some.
+void WaveLoop::numberSlot(int64_t slot, uint32_t node,
+                          const std::vector<Port> &ports, int64_t base,
+                          uint32_t *parents, Cursor &at) {
+  int64_t begin = at.all;
+  for (size_t p = 0; p < ports.size(); ++p) {
+    const PortRecords &own = ports[p].records;
+    const uint32_t *ordinals = own.ordinals.data() + at.ofPort[p];
+    uint32_t *nodes = queueBehind(p_.edges[ports[p].edge]).nodes.data() +
+                      ports[p].firstNode + at.ofPort[p];
+    uint32_t count = own.counts[slot];
+    for (uint32_t k = 0; k < count; ++k)
+      nodes[k] = static_cast<uint32_t>(base + begin + k);
+    for (size_t q = 0; q < ports.size() && count > 0; ++q) {
+      const PortRecords &other = ports[q].records;
+      if (q == p)
         continue;
-      int64_t before = first(other, rank), last = first(other, rank + 1);
-      for (int64_t k = begin; k < end; ++k) {
-        while (before < last &&
-               other.records.ordinals[before] < port.records.ordinals[k])
+      const uint32_t *others = other.ordinals.data() + at.ofPort[q];
+      uint32_t before = 0, most = other.counts[slot];
+      for (uint32_t k = 0; k < count && most > 0; ++k) {
+        while (before < most && others[before] < ordinals[k])
           ++before;
-        numbers[k] += static_cast<uint32_t>(before);
+        nodes[k] += before;
       }
     }
-    for (int64_t k = begin; k < end; ++k)
-      items[numbers[k]] = itemOf[rank];
-  };
-  parallelChunks(p_.threads, ranks, 1 << 14, [&](int64_t begin, int64_t end) {
-    for (Port &port : ports)
-      for (int64_t rank = begin; rank < end; ++rank)
-        number(port, rank);
-  });
+    at.all += count;
+  }
+  for (size_t p = 0; p < ports.size(); ++p)
+    at.ofPort[p] += ports[p].records.counts[slot];
+  std::fill(parents + begin, parents + at.all, node);
 }
 
 // --- Order ------------------------------------------------------------------
@@ -248,9 +278,10 @@ void WaveLoop::sortLeft(Edge &edge, Queue &left) {
   for (int64_t place = 0; place < at.size(); ++place)
     if (at[place] != none)
       order[sorted.count++] = at[place];
-  int64_t size = recordSize(to);
-  sorted.itemStorage = Array<uint8_t>(p_.memory, from.count * size);
-  sorted.items = sorted.itemStorage.data();
+  sorted.items = from.items;
+  sorted.extent = from.reach();
+  sorted.indexStorage = Array<uint32_t>(p_.memory, from.count);
+  sorted.index = sorted.indexStorage.data();
   if (edge.keyed()) {
     sorted.keys.width = edge.keyWidth;
     sorted.keys.words = Array<uint64_t>(p_.memory, from.count * edge.keyWidth);
@@ -258,8 +289,7 @@ void WaveLoop::sortLeft(Edge &edge, Queue &left) {
   parallelChunks(
       p_.threads, from.count, 1 << 12, [&](int64_t begin, int64_t end) {
         for (int64_t i = begin; i < end; ++i) {
-          std::memcpy(sorted.itemStorage.data() + i * size,
-                      from.items + order[i] * size, static_cast<size_t>(size));
+          sorted.indexStorage[i] = from.index ? from.index[order[i]] : order[i];
           uint32_t place = places[order[i]];
           if (edge.keyed())
             writeKey(edge, &sorted.keys.words[i * edge.keyWidth],
@@ -274,7 +304,9 @@ void WaveLoop::sortLeft(Edge &edge, Queue &left) {
       for (uint32_t k = starts[order[i]]; k < starts[order[i] + 1]; ++k)
         sorted.pairStorage[sorted.pairCount++] = from.pairs[k];
   }
-  queueOf(p_, edge).append(p_.memory, sorted, size, sorted.keys.width);
+  sorted.blocks = std::move(from.blocks);
+  sorted.blocks.push_back(std::move(from.itemStorage));
+  enqueue(p_, edge, std::move(sorted));
 }
 
 /// Names the first primitive, in order, that makes one hop too many.

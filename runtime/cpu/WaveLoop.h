@@ -19,27 +19,39 @@ public:
   void absorb(const Serial &launch) override;
 
 private:
-  /// What one port emitted. All records of a kernel are numbered in the order
-  /// of emission, over all ports.
+  /// What one port emitted: of which edge, and where its nodes begin.
   struct Port {
     int32_t edge;
     PortRecords records;
-    Array<uint32_t> numbers;
+    int64_t firstNode = 0;
     int64_t count() const { return records.stream.count; }
+  };
+  /// The records of all ports up to a slot.
+  struct Cursor {
+    int64_t all = 0;
+    std::vector<int64_t> ofPort;
   };
 
   void begin() override;
   void absorbOne(const Serial &launch);
-  void numberRecords(const Kernel &kernel, std::vector<Port> &ports,
-                     uint32_t *items);
-  /// `items[n]` is the item of the kernel's input from which record n comes.
-  void absorb(std::vector<Port> &ports, const Array<uint32_t> &items);
+  std::vector<Cursor> countRecords(const std::vector<Port> &ports,
+                                   int64_t slots) const;
+  void numberRecords(const Kernel &kernel, const std::vector<Port> &ports);
+  void numberSlot(int64_t slot, uint32_t node, const std::vector<Port> &ports,
+                  int64_t base, uint32_t *parents, Cursor &at);
   /// The nodes of what is now and, but for entries, its memory.
   std::vector<Queue> &current() { return queues_[turn_]; }
   std::vector<Queue> &later() { return queues_[1 - turn_]; }
-  /// Puts what was emitted where it waits; record i is node base + numbers[i].
+  uint32_t nodeOf(uint32_t item) {
+    const Growing<uint32_t> &nodes = current()[running_].nodes;
+    return nodes.size() > 0 ? nodes[item] : item;
+  }
+  /// Where what comes along an edge waits.
+  Queue &queueBehind(const Edge &edge);
+  /// Puts what was emitted there; record i is node base + numbers[i].
   void put(int32_t edge, const Items &emitted, int64_t base,
            const uint32_t *numbers);
+  void noteCount(const Edge &edge, const Items &emitted);
   bool nextLevel();
   void flatten();
   void finish();
@@ -47,7 +59,8 @@ private:
   [[noreturn]] void fail();
 
   // For each member: what has made hops_ hops, with its nodes in the tree, and
-  // what has made one more. The order in a wave is free.
+  // what has made one more. The order in a wave is free. Without nodes: those
+  // of the entries are their numbers.
   std::vector<Items> now_;
   std::vector<Queue> queues_[2]; ///< current() and later() take turns.
   size_t turn_ = 0;

@@ -86,11 +86,16 @@ static bool grow(Lane *lane, Log &log, uint8_t *&cursor, uint8_t *&end,
   uint8_t *end = nullptr;
   bool room = logs.local
                   ? growLocal(*lane, port)
-                  : grow(lane, logs.records, out.cursor, end, 0, out.size);
+                  : grow(lane, logs.records, out.cursor, end, 0, 2 * out.size);
   if (!room)
     out.cursor = out.limit = logs.scratchRecord;
   if (!room || logs.local)
     return;
+  // A record lies at a multiple of its size, so that a number says where.
+  auto over = static_cast<int64_t>(reinterpret_cast<uintptr_t>(out.cursor) %
+                                   static_cast<uintptr_t>(out.size));
+  if (over > 0)
+    logs.records.start = out.cursor += out.size - over;
   out.limit = end - out.size;
   if (logs.padded)
     std::memset(out.cursor, 0, static_cast<size_t>(end - out.cursor));
@@ -388,9 +393,22 @@ static std::unique_ptr<Lane> makeLane(pikort_pipeline &p, Kernel &kernel) {
   return lane;
 }
 
+/// Whether what a port emits must be numbered, over all ports: for keys, and in
+/// a loop, where the records of different ports may be of one position.
+static bool needsOrdinals(const pikort_pipeline &p, const Kernel &kernel,
+                          size_t port) {
+  if (kernel.source >= 0)
+    return false;
+  const Stage &stage = p.stages[kernel.stage];
+  if (stage.loop < 0)
+    return stage.outputs[port] >= 0 && p.edges[stage.outputs[port]].keyed();
+  return std::count_if(stage.outputs.begin(), stage.outputs.end(),
+                       [](int32_t e) { return e >= 0; }) > 1;
+}
+
 /// Sets up a port for this run.
 static void preparePort(pikort_pipeline &p, const Kernel &kernel, Lane &lane,
-                        size_t port) {
+                        size_t port, bool numbered) {
   PortLogs &logs = lane.logs[port];
   pikoir_port &out = lane.portStorage[port];
   logs.clear();
@@ -401,7 +419,7 @@ static void preparePort(pikort_pipeline &p, const Kernel &kernel, Lane &lane,
   } else {
     int32_t e = p.stages[kernel.stage].outputs[port];
     logs.consumer = e < 0 ? kernel.stage : p.edges[e].consumer;
-    if (e >= 0 && (p.edges[e].keyed() || p.stages[kernel.stage].loop >= 0))
+    if (e >= 0 && numbered)
       out.flags |= PIKOIR_PORT_ORDINALS;
     if (kernel.counts[port])
       out.flags |= PIKOIR_PORT_COUNTS;
@@ -434,7 +452,9 @@ Lane &piko::rt::prepareSerialLane(pikort_pipeline &p, Kernel &kernel) {
   kernel.counts.resize(lane.logs.size()); // none are needed
   lane.flags = PIKOIR_PORT_SERIAL;
   for (size_t port = 0; port < lane.logs.size(); ++port) {
-    preparePort(p, kernel, lane, port);
+    bool inLoop = p.stages[kernel.stage].loop >= 0;
+    preparePort(p, kernel, lane, port,
+                inLoop || needsOrdinals(p, kernel, port));
     lane.flags |= lane.ports[port].flags;
   }
   return lane;
@@ -450,7 +470,7 @@ void piko::rt::prepareLanes(pikort_pipeline &p, Kernel &kernel) {
     auto &lane = kernel.lanes[i];
     lane->flags = 0;
     for (size_t port = 0; port < lane->logs.size(); ++port) {
-      preparePort(p, kernel, *lane, port);
+      preparePort(p, kernel, *lane, port, needsOrdinals(p, kernel, port));
       // pikoir_next has nothing to do for local edges.
       lane->flags |= lane->ports[port].flags & ~PIKOIR_PORT_LOCAL;
     }

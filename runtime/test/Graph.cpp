@@ -19,7 +19,7 @@ uint64_t piko::rt::test::mix(uint64_t a, uint64_t b) {
 std::vector<Item> piko::rt::test::makeItems(int64_t count, uint64_t seed) {
   std::vector<Item> result(static_cast<size_t>(count));
   for (size_t i = 0; i < result.size(); ++i)
-    result[i].id = mix(seed, i);
+    result[i] = {mix(seed, i)};
   return result;
 }
 
@@ -211,6 +211,7 @@ std::vector<int> Graph::stripStages(int source) const {
 
 void Graph::normalise(std::vector<Arrivals> &arrivals) const {
   for (size_t s = 0; s < stages.size(); ++s) {
+    std::sort(arrivals[s].items.begin(), arrivals[s].items.end());
     std::vector<int> loop = loopOf(static_cast<int>(s));
     if (loop.empty())
       continue;
@@ -222,7 +223,6 @@ void Graph::normalise(std::vector<Arrivals> &arrivals) const {
       log.items.clear();
       continue;
     }
-    std::sort(log.items.begin(), log.items.end());
     for (auto &cell : log.cells)
       std::sort(cell.begin(), cell.end());
   }
@@ -373,7 +373,7 @@ Graph Graph::random(uint64_t seed, int stageCount, int64_t items) {
     g.sources.push_back(draw(std::min(3, stageCount)));
     std::vector<Item> input(static_cast<size_t>(draw(8) ? items : 0));
     for (size_t k = 0; k < input.size(); ++k)
-      input[k].id = mix(seed + static_cast<uint64_t>(i), k);
+      input[k] = {mix(seed + static_cast<uint64_t>(i), k)};
     g.input.push_back(std::move(input));
   }
   return g;

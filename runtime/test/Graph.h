@@ -27,6 +27,7 @@ namespace piko::rt::test {
 struct Item {
   uint64_t id = 0;
   uint8_t hops = 0;
+  uint64_t check = ~id;
 };
 
 struct TestStage {
@@ -70,7 +71,7 @@ struct TestPlan {
 
 /// What reached a stage.
 struct Arrivals {
-  std::vector<uint64_t> items;              ///< In lineage order.
+  std::vector<uint64_t> items;              ///< In any order.
   std::vector<std::vector<uint64_t>> cells; ///< In each cell, in order.
   std::vector<uint64_t> calls; ///< Of lists: a hash of each, in order.
   bool operator==(const Arrivals &) const = default;

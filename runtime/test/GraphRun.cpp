@@ -77,6 +77,7 @@ static void write(pikoir_writer *w, int stage, int32_t port, const Item &item,
                                              : pikoir_append(w, port));
   room->id = item.id;
   room->hops = item.hops;
+  room->check = item.check;
   int consumer = current->stages[stage].ports[port];
   if (current->stages[consumer].flags & PIKOIR_PLACED)
     for (int64_t cell : current->places(consumer, item))
@@ -149,15 +150,14 @@ static void note(int stage, const pikoir_input *in) {
   Arrivals &log = current->arrivals[stage];
   auto *items = reinterpret_cast<const Item *>(in->items);
   EXPECT_EQ(in->tiles, current->tiles(stage));
-  int64_t itemCount = 0;
   std::set<int64_t> seen;
   auto noteCells = [&](int64_t begin, int64_t end) {
     for (int64_t c = begin; c < end; ++c)
       for (int64_t i = in->offsets[c]; i < in->offsets[c + 1]; ++i) {
         int64_t item = in->order ? in->order[i] : i;
-        itemCount = std::max(itemCount, item + 1);
         seen.insert(item);
         log.cells[static_cast<size_t>(c)].push_back(items[item].id);
+        EXPECT_EQ(items[item].check, ~items[item].id);
         static const char zeros[7] = {};
         current->paddingSeen |=
             std::memcmp(&items[item].hops + 1, zeros, sizeof(zeros)) != 0;

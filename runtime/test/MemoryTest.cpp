@@ -26,7 +26,7 @@ static Graph makeGraph(int64_t items) {
   graph.input.resize(1);
   graph.input[0].resize(static_cast<size_t>(items));
   for (size_t i = 0; i < graph.input[0].size(); ++i)
-    graph.input[0][i].id = mix(9, i);
+    graph.input[0][i] = {mix(9, i)};
   return graph;
 }
 

@@ -55,7 +55,7 @@ TEST(Order, SortedInPieces) {
   runs.runLength = 4096;
   Graph graph = chain(16384, {runs, TestStage(), TestStage()});
   for (size_t i = 0; i < graph.input[0].size(); ++i)
-    graph.input[0][i].id = i;
+    graph.input[0][i] = {i};
   checkOrder(graph);
 }
 

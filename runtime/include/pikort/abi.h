@@ -259,9 +259,9 @@ typedef struct pikoir_call {
 
 /// A stage's input: valid until pikoir_end.
 typedef struct pikoir_input {
-  const uint8_t *items;   ///< Records in lineage order.
+  const uint8_t *items;   ///< Where records lie.
   int64_t count;          ///< Positions: pairs of item and cell.
-  const uint32_t *order;  ///< Position to item; null = identity.
+  const uint32_t *order;  ///< Position to the record's place; null = identity.
   const int64_t *offsets; ///< First position of each cell, cells + 1 entries.
   const pikoir_unit *units;
   int64_t unit_count;
