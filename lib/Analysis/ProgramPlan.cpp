@@ -19,9 +19,10 @@ ProgramPlan::ProgramPlan(PipelineOp pipeline)
   for (StageOp stage : graph.stages)
     ordered.push_back(!isOrderIrrelevant(pipeline, stage));
   findEdges(pipeline);
-  findGathers(pipeline);
   findKeyed();
   findWidths();
+  findBinned(pipeline);
+  findGathers();
 }
 
 void ProgramPlan::findEdges(PipelineOp pipeline) {
@@ -32,23 +33,6 @@ void ProgramPlan::findEdges(PipelineOp pipeline) {
     edges.push_back({edge, graph.getNumber(edge.getProducerAttr()),
                      int(edge.getPort()),
                      graph.getNumber(edge.getConsumerAttr()), isLocal(edge)});
-}
-
-/// A stage that runs bin by bin emits in the order of bins, which is that of
-/// lineage only if it collects, and then only without tiles.
-void ProgramPlan::findGathers(PipelineOp pipeline) {
-  llvm::DenseSet<Attribute> placed;
-  pipeline.walk([&](AssignOp assign) { placed.insert(assign.getStageAttr()); });
-  for (PlannedEdge &edge : edges) {
-    if (edge.producer < 0 || edge.local)
-      continue;
-    StageOp from = graph.getStage(edge.producer);
-    bool isPlaced =
-        from.getPlaced() ||
-        placed.contains(FlatSymbolRefAttr::get(from.getSymNameAttr()));
-    edge.permute = isPlaced && (!from.collects() || from.getTile()) &&
-                   ordered[edge.producer] && ordered[edge.consumer];
-  }
 }
 
 SmallVector<const PlannedEdge *> ProgramPlan::getInputs(int stage) const {
@@ -69,9 +53,16 @@ bool ProgramPlan::isInsideLoop(const PlannedEdge &edge) const {
 }
 
 int ProgramPlan::countInputs(int stage) const {
-  return llvm::count_if(edges, [&](const PlannedEdge &edge) {
-    return getLoop(edge.consumer) == getLoop(stage) && !isInsideLoop(edge);
-  });
+  int count = 0;
+  llvm::DenseSet<std::pair<int, int>> loopsThere; // with the stage
+  for (const PlannedEdge &edge : edges) {
+    if (getLoop(edge.consumer) != getLoop(stage) || isInsideLoop(edge))
+      continue;
+    int from = edge.producer < 0 ? -1 : getLoop(edge.producer);
+    count += from < 0 || !isLoop(from) ||
+             loopsThere.insert({from, edge.consumer}).second;
+  }
+  return count;
 }
 
 bool ProgramPlan::merges(int stage) const {
@@ -126,5 +117,61 @@ void ProgramPlan::findWidths() {
       if (kept > 0)
         kept = std::max(kept, width);
     }
+  }
+}
+
+//===----------------------------------------------------------------------===//
+// Order
+//===----------------------------------------------------------------------===//
+
+void ProgramPlan::findBinned(PipelineOp pipeline) {
+  for (StageOp stage : graph.stages)
+    placed.push_back(stage.getPlaced());
+  keepsBins.assign(graph.stages.size(), false);
+  pipeline.walk([&](AssignOp assign) {
+    FlatSymbolRefAttr name = assign.getStageAttr();
+    if (!name) // of a stage that no kernel has
+      return;
+    int stage = graph.getNumber(name);
+    bool keeps = true;
+    assign.walk([&](AssignmentOpInterface op) { keeps &= op.keepsBin(); });
+    keepsBins[stage] = keeps && (keepsBins[stage] || !placed[stage]);
+    placed[stage] = true;
+  });
+}
+
+bool ProgramPlan::keepsBinOrder(const PlannedEdge &edge) const {
+  return edge.keys == 0 && keepsBins[edge.consumer] &&
+         !graph.getStage(edge.producer).getTile() && binOrder[edge.consumer];
+}
+
+bool ProgramPlan::needsBinOrderOnly(const PlannedEdge &edge) const {
+  return edge.local || !ordered[edge.consumer] || keepsBinOrder(edge);
+}
+
+/// A stage that runs bin by bin emits in the order of bins, which is that of
+/// lineage only if it collects, and then only without tiles. But where the bins
+/// of the next stage are the same, each gets what it needs in order; that of
+/// different bins shows if it does behind that stage, unless that one collects.
+void ProgramPlan::findGathers() {
+  binOrder.assign(graph.stages.size(), true);
+  for (bool changed = true; changed;) {
+    changed = false;
+    for (const PlannedEdge &edge : edges) {
+      if (edge.producer < 0 || !binOrder[edge.producer] ||
+          graph.getStage(edge.producer).collects() || needsBinOrderOnly(edge))
+        continue;
+      binOrder[edge.producer] = false;
+      changed = true;
+    }
+  }
+  for (PlannedEdge &edge : edges) {
+    if (edge.producer < 0 || edge.local)
+      continue;
+    StageOp from = graph.getStage(edge.producer);
+    edge.permute = placed[edge.producer] &&
+                   (!from.collects() || from.getTile()) &&
+                   ordered[edge.producer] && ordered[edge.consumer] &&
+                   !keepsBinOrder(edge);
   }
 }

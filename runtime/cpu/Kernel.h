@@ -282,9 +282,13 @@ Stream gatherInputs(pikort_pipeline &p, const Stage &stage, bool fromOutside);
 /// what they hold.
 Stream mergeStreams(pikort_pipeline &p, std::vector<Stream> &streams,
                     const Stage &stage);
-/// For each stream, the place of each item in the order of all their keys.
-std::vector<Array<uint32_t>> mergePlaces(pikort_pipeline &p,
-                                         std::vector<Stream> &streams);
+/// For each stream, the place of each item in the order of all.
+using Places = std::vector<Array<uint32_t>>;
+/// That is, of all their keys.
+Places mergePlaces(pikort_pipeline &p, std::vector<Stream> &streams);
+/// The same as mergeStreams, without keys, where each item's place is known.
+Stream placeStreams(pikort_pipeline &p, std::vector<Stream> &streams,
+                    Places places, const Stage &stage);
 
 // --- Cells.cpp --------------------------------------------------------------
 

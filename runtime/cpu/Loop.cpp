@@ -11,6 +11,20 @@
 
 using namespace piko::rt;
 
+Loop::Loop(pikort_pipeline &p, const LoopShape &shape) : p_(p), shape_(shape) {
+  for (int32_t s : shape.stages)
+    for (int32_t e : p.stages[s].outputs)
+      if (e >= 0 && !p.edges[e].insideLoop)
+        exits_.push_back(e);
+}
+
+Edge &Loop::exitTo(const Edge &edge) const {
+  size_t i = 0;
+  while (p_.edges[exits_[i]].consumer != edge.consumer)
+    ++i;
+  return p_.edges[exits_[i]];
+}
+
 std::unique_ptr<Loop> Loop::make(pikort_pipeline &p, const LoopShape &shape) {
   if (shape.ordered)
     return std::make_unique<StackLoop>(p, shape);

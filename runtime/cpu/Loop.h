@@ -9,8 +9,9 @@
 //   StackLoop   if the order of some stage's calls can be seen: one position at
 //               a time, from a stack.
 //
-// What leaves the loop goes, in order, to the queues of its edges. Its key is
-// that of the entry that it comes from, and its place among all that left.
+// What leaves the loop goes, in order, to the queues of its edges; of several
+// that lead to one stage, to that of the first. Its key is that of the entry
+// that it comes from, and its place among all that left.
 //
 //===----------------------------------------------------------------------===//
 
@@ -24,6 +25,7 @@ namespace piko::rt {
 
 class Loop {
 public:
+  Loop(pikort_pipeline &p, const LoopShape &shape);
   static std::unique_ptr<Loop> make(pikort_pipeline &p, const LoopShape &shape);
   virtual ~Loop() = default;
 
@@ -42,7 +44,6 @@ public:
   virtual void absorb(const Serial &launch) = 0;
 
 protected:
-  Loop(pikort_pipeline &p, const LoopShape &shape) : p_(p), shape_(shape) {}
   virtual void begin() = 0;
 
   size_t members() const { return shape_.stages.size(); }
@@ -59,11 +60,15 @@ protected:
   /// The words of the key of what left at `place`, if it has keys.
   void writeKey(const Edge &edge, uint64_t *key, int64_t entry,
                 uint64_t place) const;
+  /// To where what leaves by an edge goes: the first edge to the same stage,
+  /// which gets all in order.
+  Edge &exitTo(const Edge &edge) const;
   [[noreturn]] void failHops(const Stage &stage, int64_t cell,
                              const uint8_t *record) const;
 
   pikort_pipeline &p_;
   const LoopShape &shape_;
+  std::vector<int32_t> exits_;  ///< Edges.
   std::vector<Stream> entries_; ///< For each member.
   /// For each member, the places of its entries among all; none = identity.
   std::vector<Array<uint32_t>> places_;

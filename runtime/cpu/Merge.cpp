@@ -39,9 +39,27 @@ public:
         putItem(chunk.stream, i, places[i]);
     });
   }
-  std::vector<Array<uint32_t>> takePlaces() { return std::move(places_); }
+  Places takePlaces() { return std::move(places_); }
 
   Stream run(const Stage &stage) {
+    prepare(stage);
+    findPlaces();
+    return finish(stage);
+  }
+
+  /// The same where all places are known.
+  Stream run(const Stage &stage, Places places) {
+    prepare(stage);
+    places_ = std::move(places);
+    forChunks([&](const Chunk &chunk) {
+      for (int64_t i = chunk.begin; i < chunk.end; ++i)
+        putItem(chunk.stream, i, places_[chunk.stream][i]);
+    });
+    return finish(stage);
+  }
+
+private:
+  void prepare(const Stage &stage) {
     size_ = p_.records[stage.record].size;
     for (const Stream &stream : from_) {
       out_.count += stream.count;
@@ -56,7 +74,9 @@ public:
           Array<uint64_t>(p_.memory, out_.count * out_.keys.width);
     else
       out_.keys.width = 0;
-    findPlaces();
+  }
+
+  Stream finish(const Stage &stage) {
     if (stage.placed())
       mergePairs();
     if (out_.index)
@@ -64,7 +84,6 @@ public:
     return std::move(out_);
   }
 
-private:
   struct Chunk {
     size_t stream;
     int64_t begin, end;
@@ -187,13 +206,12 @@ private:
   int64_t size_ = 0;
   Stream out_;
   std::vector<Chunk> chunks_;
-  std::vector<Array<uint32_t>> places_;
+  Places places_;
 };
 
 } // namespace
 
-std::vector<Array<uint32_t>>
-piko::rt::mergePlaces(pikort_pipeline &p, std::vector<Stream> &streams) {
+Places piko::rt::mergePlaces(pikort_pipeline &p, std::vector<Stream> &streams) {
   Merge merge(p, streams);
   merge.findPlaces();
   return merge.takePlaces();
@@ -202,4 +220,9 @@ piko::rt::mergePlaces(pikort_pipeline &p, std::vector<Stream> &streams) {
 Stream piko::rt::mergeStreams(pikort_pipeline &p, std::vector<Stream> &streams,
                               const Stage &stage) {
   return Merge(p, streams).run(stage);
+}
+
+Stream piko::rt::placeStreams(pikort_pipeline &p, std::vector<Stream> &streams,
+                              Places places, const Stage &stage) {
+  return Merge(p, streams).run(stage, std::move(places));
 }

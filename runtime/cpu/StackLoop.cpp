@@ -55,7 +55,7 @@ Items StackLoop::pop() {
 
 /// The top of the stack leaves the loop.
 void StackLoop::leave() {
-  const Edge &edge = p_.edges[stack_[stack_.size() - 1].edge];
+  const Edge &edge = exitTo(p_.edges[stack_[stack_.size() - 1].edge]);
   Stream stream{pop(), {}, {}, {}, {}, {}};
   if (edge.keyed()) {
     stream.keys.width = edge.keyWidth;

@@ -9,14 +9,6 @@
 
 using namespace piko::rt;
 
-WaveLoop::WaveLoop(pikort_pipeline &p, const LoopShape &shape)
-    : Loop(p, shape) {
-  for (int32_t s : shape.stages)
-    for (int32_t e : p.stages[s].outputs)
-      if (e >= 0 && !p.edges[e].insideLoop)
-        exits_.push_back(e);
-}
-
 void WaveLoop::begin() {
   for (std::vector<Queue> &queues : queues_)
     queues = std::vector<Queue>(members());
@@ -167,79 +159,97 @@ void WaveLoop::absorb(Kernel &kernel) {
   }
 }
 
-/// Up to each chunk of slots, and up to the last.
-std::vector<WaveLoop::Cursor>
-WaveLoop::countRecords(const std::vector<Port> &ports, int64_t slots) const {
-  int64_t chunks = (slots + slotChunk - 1) / slotChunk;
-  std::vector<Cursor> result(static_cast<size_t>(chunks + 1),
-                             Cursor{0, std::vector<int64_t>(ports.size())});
+/// At the begin of each chunk of slots, and behind the last.
+std::vector<WaveLoop::Cursors>
+WaveLoop::findChunks(const std::vector<Port> &ports, int64_t slots) {
+  Cursors all;
+  for (const Port &port : ports)
+    all.push_back(
+        {port.records.counts.data(), port.records.ordinals.data(),
+         queueBehind(p_.edges[port.edge]).nodes.data() + port.firstNode});
+  auto chunks = static_cast<size_t>((slots + slotChunk - 1) / slotChunk);
+  std::vector<Cursors> result(chunks + 1, all);
   parallelChunks(p_.threads, slots, slotChunk, [&](int64_t begin, int64_t end) {
-    Cursor &in = result[static_cast<size_t>(begin / slotChunk)];
-    for (size_t p = 0; p < ports.size(); ++p) {
-      const uint32_t *counts = ports[p].records.counts.data();
-      in.ofPort[p] = std::accumulate(counts + begin, counts + end, int64_t(0));
-    }
+    for (PortCursor &port : result[static_cast<size_t>(begin / slotChunk) + 1])
+      port.next =
+          std::accumulate(port.counts + begin, port.counts + end, int64_t(0));
   });
-  Cursor sum = result.back();
-  for (Cursor &cursor : result) {
-    cursor.all = sum.all;
-    for (size_t p = 0; p < ports.size(); ++p) {
-      sum.all += cursor.ofPort[p];
-      sum.ofPort[p] += std::exchange(cursor.ofPort[p], sum.ofPort[p]);
-    }
+  for (size_t p = 0; p < all.size(); ++p) {
+    int64_t before = 0;
+    for (Cursors &cursors : result)
+      cursors[p].advance(before += std::exchange(cursors[p].next, 0));
   }
   return result;
+}
+
+/// Numbers what a slot emitted to several ports by ordinal, from `first` on.
+template <class PortCursor>
+static void numberMixed(std::vector<PortCursor> &ports, int64_t slot,
+                        uint32_t first) {
+  for (PortCursor &port : ports)
+    for (uint32_t k = 0; k < port.counts[slot]; ++k) {
+      uint32_t before = k;
+      for (const PortCursor &other : ports)
+        if (&other != &port)
+          before += static_cast<uint32_t>(
+              std::lower_bound(other.ordinals,
+                               other.ordinals + other.counts[slot],
+                               port.ordinals[k]) -
+              other.ordinals);
+      port.nodes[k] = first + before;
+    }
+}
+
+/// The same for any slot; returns how many there are.
+template <class PortCursor>
+static uint32_t numberSlot(std::vector<PortCursor> &ports, int64_t slot,
+                           uint32_t first) {
+  uint32_t sum = 0, most = 0;
+  for (const PortCursor &port : ports) {
+    sum += port.counts[slot];
+    most = std::max(most, port.counts[slot]);
+  }
+  if (sum != most)
+    numberMixed(ports, slot, first);
+  for (PortCursor &port : ports) {
+    uint32_t count = port.counts[slot];
+    for (uint32_t k = 0; k < count && sum == most; ++k)
+      port.nodes[k] = first + k;
+    port.advance(count);
+  }
+  return sum;
 }
 
 /// Numbers the nodes of what was emitted as that was. Children of a node are
 /// then numbered in their order, since its cells were taken in order.
 void WaveLoop::numberRecords(const Kernel &kernel,
                              const std::vector<Port> &ports) {
+  auto sumOf = [](const Cursors &cursors) {
+    int64_t sum = 0;
+    for (const PortCursor &port : cursors)
+      sum += port.next;
+    return sum;
+  };
   int64_t slots = kernel.slots(), base = tree_.size();
-  std::vector<Cursor> cursors = countRecords(ports, slots);
-  int64_t count = cursors.back().all;
+  std::vector<Cursors> chunks = findChunks(ports, slots);
+  int64_t count = sumOf(chunks.back());
   checkCount(member(running_), base + count);
   uint32_t *parents = tree_.extend(p_.memory, count);
   parallelChunks(p_.threads, slots, slotChunk, [&](int64_t begin, int64_t end) {
-    Cursor &at = cursors[static_cast<size_t>(begin / slotChunk)];
-    for (int64_t slot = begin; slot < end; ++slot)
-      numberSlot(slot,
-                 nodeOf(kernel.order ? kernel.order[slot]
-                                     : static_cast<uint32_t>(slot)),
-                 ports, base, parents, at);
-  });
-}
-
-/// The records of a slot: port by port, or by ordinal if several have some.
-void WaveLoop::numberSlot(int64_t slot, uint32_t node,
-                          const std::vector<Port> &ports, int64_t base,
-                          uint32_t *parents, Cursor &at) {
-  int64_t begin = at.all;
-  for (size_t p = 0; p < ports.size(); ++p) {
-    const PortRecords &own = ports[p].records;
-    const uint32_t *ordinals = own.ordinals.data() + at.ofPort[p];
-    uint32_t *nodes = queueBehind(p_.edges[ports[p].edge]).nodes.data() +
-                      ports[p].firstNode + at.ofPort[p];
-    uint32_t count = own.counts[slot];
-    for (uint32_t k = 0; k < count; ++k)
-      nodes[k] = static_cast<uint32_t>(base + begin + k);
-    for (size_t q = 0; q < ports.size() && count > 0; ++q) {
-      const PortRecords &other = ports[q].records;
-      if (q == p)
+    Cursors at = std::move(chunks[static_cast<size_t>(begin / slotChunk)]);
+    int64_t number = sumOf(at);
+    for (int64_t slot = begin; slot < end; ++slot) {
+      uint32_t emitted =
+          numberSlot(at, slot, static_cast<uint32_t>(base + number));
+      if (emitted == 0)
         continue;
-      const uint32_t *others = other.ordinals.data() + at.ofPort[q];
-      uint32_t before = 0, most = other.counts[slot];
-      for (uint32_t k = 0; k < count && most > 0; ++k) {
-        while (before < most && others[before] < ordinals[k])
-          ++before;
-        nodes[k] += before;
-      }
+      uint32_t node = nodeOf(kernel.order ? kernel.order[slot]
+                                          : static_cast<uint32_t>(slot));
+      for (uint32_t k = 0; k < emitted; ++k)
+        parents[number + k] = node;
+      number += emitted;
     }
-    at.all += count;
-  }
-  for (size_t p = 0; p < ports.size(); ++p)
-    at.ofPort[p] += ports[p].records.counts[slot];
-  std::fill(parents + begin, parents + at.all, node);
+  });
 }
 
 // --- Order ------------------------------------------------------------------
@@ -257,56 +267,65 @@ void WaveLoop::flatten() {
 void WaveLoop::finish() {
   flatten();
   for (int32_t e : exits_)
-    if (Queue &left = left_[static_cast<size_t>(e)]; left.count > 0)
-      sortLeft(p_.edges[e], left);
+    if (&exitTo(p_.edges[e]) == &p_.edges[e])
+      joinLeft(p_.edges[e]);
   left_.clear();
   entries_.clear();
   for (std::vector<Queue> &queues : queues_)
     queues.clear();
 }
 
-void WaveLoop::sortLeft(Edge &edge, Queue &left) {
-  constexpr uint32_t none = UINT32_MAX;
-  const Stage &to = p_.stages[edge.consumer];
-  Growing<uint32_t> places = std::move(left.nodes);
-  Stream from = left.take(0), sorted;
-  Array<uint32_t> at(p_.memory, tree_.size());
-  std::memset(at.data(), 0xff, static_cast<size_t>(at.size()) * 4);
-  for (int64_t i = 0; i < from.count; ++i)
-    at[places[i]] = static_cast<uint32_t>(i);
-  Array<uint32_t> order(p_.memory, from.count);
-  for (int64_t place = 0; place < at.size(); ++place)
-    if (at[place] != none)
-      order[sorted.count++] = at[place];
-  sorted.items = from.items;
-  sorted.extent = from.reach();
-  sorted.indexStorage = Array<uint32_t>(p_.memory, from.count);
-  sorted.index = sorted.indexStorage.data();
-  if (edge.keyed()) {
-    sorted.keys.width = edge.keyWidth;
-    sorted.keys.words = Array<uint64_t>(p_.memory, from.count * edge.keyWidth);
+/// Puts what left to the consumer of an edge there, by whichever edges.
+void WaveLoop::joinLeft(Edge &edge) {
+  std::vector<Stream> streams;
+  Places places;
+  int64_t count = 0;
+  for (int32_t e : exits_) {
+    Queue &left = left_[static_cast<size_t>(e)];
+    if (p_.edges[e].consumer != edge.consumer || left.count == 0)
+      continue;
+    count += left.count;
+    places.push_back(left.nodes.take());
+    streams.push_back(left.take(0));
   }
-  parallelChunks(
-      p_.threads, from.count, 1 << 12, [&](int64_t begin, int64_t end) {
-        for (int64_t i = begin; i < end; ++i) {
-          sorted.indexStorage[i] = from.index ? from.index[order[i]] : order[i];
-          uint32_t place = places[order[i]];
-          if (edge.keyed())
-            writeKey(edge, &sorted.keys.words[i * edge.keyWidth],
-                     tree_.entry(place), place);
-        }
-      });
-  if (to.placed()) {
-    Array<uint32_t> starts = pairStarts(p_.memory, from);
-    sorted.pairStorage = Array<uint32_t>(p_.memory, from.pairCount);
-    sorted.pairs = sorted.pairStorage.data();
-    for (int64_t i = 0; i < from.count; ++i)
-      for (uint32_t k = starts[order[i]]; k < starts[order[i] + 1]; ++k)
-        sorted.pairStorage[sorted.pairCount++] = from.pairs[k];
-  }
-  sorted.blocks = std::move(from.blocks);
-  sorted.blocks.push_back(std::move(from.itemStorage));
-  enqueue(p_, edge, std::move(sorted));
+  if (count == 0)
+    return;
+  Array<uint32_t> ranks;
+  if (count < tree_.size()) // some is for others
+    ranks = rankPlaces(streams, places);
+  Keys keys;
+  if (edge.keyed())
+    keys = {edge.keyWidth, 0,
+            Array<uint64_t>(p_.memory, count * edge.keyWidth)};
+  for (size_t s = 0; s < streams.size(); ++s)
+    parallelChunks(p_.threads, streams[s].count, 1 << 14,
+                   [&](int64_t begin, int64_t end) {
+                     for (int64_t i = begin; i < end; ++i) {
+                       uint32_t &place = places[s][i];
+                       uint32_t rank = ranks ? ranks[place] : place;
+                       if (keys.words)
+                         writeKey(edge, &keys.words[rank * int64_t(keys.width)],
+                                  tree_.entry(place), place);
+                       place = rank;
+                     }
+                   });
+  Stream joined =
+      placeStreams(p_, streams, std::move(places), p_.stages[edge.consumer]);
+  if (edge.keyed())
+    joined.keys = std::move(keys);
+  enqueue(p_, edge, std::move(joined));
+}
+
+/// For each place in the tree that some stream has, how many are before it.
+Array<uint32_t> WaveLoop::rankPlaces(const std::vector<Stream> &streams,
+                                     const Places &places) const {
+  Array<uint32_t> ranks(p_.memory, tree_.size());
+  std::memset(ranks.data(), 0, static_cast<size_t>(ranks.size()) * 4);
+  for (size_t s = 0; s < streams.size(); ++s)
+    for (int64_t i = 0; i < streams[s].count; ++i)
+      ranks[places[s][i]] = 1;
+  exclusiveScan(p_.threads, ranks.data(), ranks.data(), ranks.size());
+  return ranks;
 }
 
 /// Names the first primitive, in order, that makes one hop too many.

@@ -10,7 +10,7 @@ namespace piko::rt {
 
 class WaveLoop : public Loop {
 public:
-  WaveLoop(pikort_pipeline &p, const LoopShape &shape);
+  using Loop::Loop;
   int32_t next() override;
   bool runsSerially(Kernel &kernel) const override;
   Stream takeInput() override;
@@ -26,19 +26,25 @@ private:
     int64_t firstNode = 0;
     int64_t count() const { return records.stream.count; }
   };
-  /// The records of all ports up to a slot.
-  struct Cursor {
-    int64_t all = 0;
-    std::vector<int64_t> ofPort;
+  /// A port while its records are numbered: what comes from the next slot on.
+  struct PortCursor {
+    const uint32_t *counts; ///< Of all slots.
+    const uint32_t *ordinals;
+    uint32_t *nodes;
+    int64_t next = 0; ///< How many came before.
+    void advance(int64_t records) {
+      ordinals += records;
+      nodes += records;
+      next += records;
+    }
   };
+  using Cursors = std::vector<PortCursor>; ///< Of all ports.
 
   void begin() override;
   void absorbOne(const Serial &launch);
-  std::vector<Cursor> countRecords(const std::vector<Port> &ports,
-                                   int64_t slots) const;
+  std::vector<Cursors> findChunks(const std::vector<Port> &ports,
+                                  int64_t slots);
   void numberRecords(const Kernel &kernel, const std::vector<Port> &ports);
-  void numberSlot(int64_t slot, uint32_t node, const std::vector<Port> &ports,
-                  int64_t base, uint32_t *parents, Cursor &at);
   /// The nodes of what is now and, but for entries, its memory.
   std::vector<Queue> &current() { return queues_[turn_]; }
   std::vector<Queue> &later() { return queues_[1 - turn_]; }
@@ -55,7 +61,9 @@ private:
   bool nextLevel();
   void flatten();
   void finish();
-  void sortLeft(Edge &edge, Queue &left);
+  void joinLeft(Edge &edge);
+  Array<uint32_t> rankPlaces(const std::vector<Stream> &streams,
+                             const Places &places) const;
   [[noreturn]] void fail();
 
   // For each member: what has made hops_ hops, with its nodes in the tree, and
@@ -64,8 +72,7 @@ private:
   std::vector<Items> now_;
   std::vector<Queue> queues_[2]; ///< current() and later() take turns.
   size_t turn_ = 0;
-  std::vector<int32_t> exits_; ///< Edges.
-  std::vector<Queue> left_;    ///< For each edge, in the order of waves.
+  std::vector<Queue> left_; ///< For each edge, in the order of waves.
   int64_t leftCount_ = 0;
   LineageTree tree_;
   int64_t hops_ = 0;

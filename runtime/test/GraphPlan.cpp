@@ -4,6 +4,7 @@
 #include "Graph.h"
 
 #include <algorithm>
+#include <set>
 
 using namespace piko::rt::test;
 
@@ -67,7 +68,12 @@ private:
     };
     int64_t count =
         std::count_if(graph.sources.begin(), graph.sources.end(), holds);
-    forEdges([&](int, size_t, int to) { count += holds(to); });
+    std::set<std::pair<int, int>> loops; // that lead to a stage
+    forEdges([&](int from, size_t, int to) {
+      int loop = plan.partOf[from];
+      count += holds(to) &&
+               (!plan.parts[loop].isLoop || loops.insert({loop, to}).second);
+    });
     return count;
   }
 

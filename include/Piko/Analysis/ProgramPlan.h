@@ -57,17 +57,26 @@ public:
 
 private:
   void findEdges(PipelineOp pipeline);
-  void findGathers(PipelineOp pipeline);
+  void findBinned(PipelineOp pipeline);
+  void findGathers();
+  /// Whether what an edge brings reaches its bins in the order of lineage, and
+  /// no more shows, as long as it comes so into the producer's bins.
+  bool keepsBinOrder(const PlannedEdge &edge) const;
+  bool needsBinOrderOnly(const PlannedEdge &edge) const;
   void findKeyed();
   void findWidths();
   bool isInsideLoop(const PlannedEdge &edge) const;
-  /// How many edges lead into a stage, or into its loop.
+  /// How many edges lead into a stage, or into its loop; those from one loop to
+  /// one stage count once, as the loop orders what leaves it.
   int countInputs(int stage) const;
   /// The width of the keys of what comes to a stage, or into its loop.
   int64_t &widthAt(int stage);
 
   const NodeGraph components, loops;
   llvm::SmallVector<bool> ordered; ///< Stages whose order of primitives shows.
+  llvm::SmallVector<bool> placed;  ///< Those that have bins.
+  llvm::SmallVector<bool> keepsBins; ///< What comes stays in the bin before.
+  llvm::SmallVector<bool> binOrder;  ///< Order shows within a bin alone.
   llvm::SmallVector<llvm::SmallVector<bool>> reach;
 };
 

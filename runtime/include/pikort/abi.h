@@ -154,12 +154,13 @@ PIKORT_API void pikoir_declare_schedule(pikort_pipeline *p, int32_t stage,
 PIKORT_API void pikoir_declare_clears(pikort_pipeline *p, int32_t stage,
                                       int32_t state);
 /// How what a port emits is gathered: PIKOIR_CONCATENATE where its order is
-/// free, or its units are in the order of emission; and how many 64-bit words
-/// the key has that tells a primitive's lineage, 0 = none. Where several edges
-/// or sources lead into a stage, or into a loop, all that come there have keys,
-/// and so has what comes to the stages on the way. A source gives one word, a
-/// stage that collects two, and a hop adds one. Without this declaration:
-/// PIKOIR_PERMUTE, 0.
+/// free, or its units are in the order of emission, or are so in each bin of
+/// the consumer and nothing else shows; and how many 64-bit words the key has
+/// that tells a primitive's lineage, 0 = none. Where several edges or sources
+/// lead into a stage, or into a loop, all that come there have keys, and so has
+/// what comes to the stages on the way; edges from one loop to one stage are
+/// one. A source gives one word, a stage that collects two, and a hop adds one.
+/// Without this declaration: PIKOIR_PERMUTE, 0.
 enum pikoir_gather { PIKOIR_CONCATENATE = 0, PIKOIR_PERMUTE = 1 };
 PIKORT_API void pikoir_declare_join(pikort_pipeline *p, int32_t producer,
                                     int32_t port, int32_t gather, int32_t keys);
