@@ -43,7 +43,7 @@ struct Sorter : piko::Stage<0, 0, 1, A, A> {
     std::memcpy(&to, &from, (a.x & 7) * sizeof(int));
     out.x = to.first[a.x & 3] + from.first[a.y & 3];
 #elif CASE == 6
-    for (int *p : {&out.x, &out.y, &k[2]})
+    for (int *p : {&out.x, &out.y, &k[0], &k[1], &k[2]})
       // POINTERS: errors-algorithms.cpp:[[#@LINE + 1]]:10: error: not supported in Piko: access through a pointer that can point to different places; use an index, or a branch for each place{{$}}
       *p += 1;
 #elif CASE == 7

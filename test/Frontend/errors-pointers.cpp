@@ -56,7 +56,7 @@ struct Stage : piko::Stage<0, 0, 1, A, A> {
     bytes.c[i] = a.y;
     out.x = *(std::end(bytes.c) - i - 1) + bytes.d[i];
 #elif CASE == 7
-    A all[3] = {a, {a.y, a.x, 3}, a};
+    A all[5] = {a, {a.y, a.x, 3}, a, a, a};
     A *best = nullptr;
     for (A &one : all)
       if (one.x > a.x && (!best || one.y > best->y))

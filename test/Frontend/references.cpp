@@ -12,7 +12,7 @@ struct Item {
   int index;
 };
 struct State {
-  float weights[4];
+  float weights[6];
   piko::Buffer<Item> items;
 };
 static const int table[3] = {5, 7, 11};

@@ -103,10 +103,9 @@ TEST(Embree, MeetsTheSameTriangles) {
   for (int y = 0; y < side; ++y)
     for (int x = 0; x < side; ++x) {
       glm::vec3 direction(float(x) / side - 0.5f, float(y) / side - 0.5f, -1);
-      Hit ours =
-          findHit({0, 0, 0}, direction, INFINITY, /*anyHit=*/false, tree.bounds,
-                  nodes, triangles, [](bool b) { return b; },
-                  [](float t) { return t; });
+      Hit ours = findHit(
+          {0, 0, 0}, direction, INFINITY, /*anyHit=*/false, tree.bounds, nodes,
+          triangles, [](bool b) { return b; }, [](float t) { return t; });
       Hit theirs = embree.hit({0, 0, 0}, direction);
       ASSERT_EQ(ours.triangle < 0, theirs.triangle < 0);
       if (ours.triangle < 0)

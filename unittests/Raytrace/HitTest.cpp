@@ -41,9 +41,9 @@ public:
 
 private:
   Hit find(glm::vec3 origin, glm::vec3 direction, float limit, bool anyHit) {
-    return findHit(origin, direction, limit, anyHit, tree.bounds, nodes,
-                   triangles, [](bool b) { return b; },
-                   [](float t) { return t; });
+    return findHit(
+        origin, direction, limit, anyHit, tree.bounds, nodes, triangles,
+        [](bool b) { return b; }, [](float t) { return t; });
   }
 
   Bvh tree;

@@ -240,6 +240,9 @@ static bool cleanUpFunction(llvm::Function &function, ParsedUnit &unit,
     releaseMembers(function);
     unrollLoops(function, runner);
   }
+  // Of a matrix, the columns' components and then the columns.
+  for (int depth = 0; depth < 2 && unrollComponents(function); ++depth)
+    runner.run(simplify, function);
   // Each round sees through one more level of references.
   bool localized = false;
   for (int round = 0; round < roundLimit; ++round) {

@@ -9,6 +9,7 @@
 //      labelLoops      what belongs to the iterations of a parallelFor
 //      holdDivisions   what an integer division without a result is, the run
 //      says
+//      unrollComponents  loops over the components of a vector
 //   4. rounds of       splitMemory     copies and variables, number by number
 //                      expandCopies    copies that are loops
 //                      flattenPointers phis and selects of pointers (first
@@ -42,6 +43,10 @@ bool checkCalls(llvm::ArrayRef<llvm::Function *> functions, ParsedUnit &unit,
                 mlir::MLIRContext &context);
 
 void expandMarkers(llvm::Function &function, MemoryMap &memory);
+
+/// Unrolls the innermost loops over the components of a vector; whether there
+/// were any.
+bool unrollComponents(llvm::Function &function);
 
 /// Both return whether they changed anything.
 bool splitMemory(llvm::Function &function, MemoryMap &memory);
