@@ -57,12 +57,16 @@ static bool canRepeat(const llvm::Instruction &instruction) {
          (call->doesNotAccessMemory() && call->doesNotThrow());
 }
 
-/// As many turns as a vector has components, with little to do. The last time
-/// that it comes to its condition is counted, too.
+/// As many turns as a vector has components, with little to do, and no pointer
+/// that walks, which is an index as long as it does so in a loop. The last time
+/// that the loop comes to its condition is counted, too.
 unsigned Unroller::countTurns(llvm::Loop &loop) {
   constexpr unsigned mostTurns = 4 + 1, mostInstructions = 80;
   unsigned turns = counts.getSmallConstantTripCount(&loop), size = 0;
-  if (!loop.isInnermost() || turns > mostTurns)
+  bool walks = llvm::any_of(loop.getHeader()->phis(), [](llvm::PHINode &phi) {
+    return phi.getType()->isPointerTy();
+  });
+  if (!loop.isInnermost() || turns > mostTurns || walks)
     return 0;
   for (const llvm::BasicBlock *block : loop.blocks())
     for (const llvm::Instruction &instruction : *block)
