@@ -81,7 +81,8 @@ Value piko::createAppend(OpBuilder &builder, Location loc,
   Value full = out.comparePointers(LLVM::ICmpPredicate::ugt, record,
                                    out.load(layout::limit));
   Value isSlow =
-      out.either(full, out.any(layout::portFlags, ~PIKOIR_PORT_LOCAL));
+      out.either(full, out.any(layout::portFlags,
+                               ~(PIKOIR_PORT_LOCAL | PIKOIR_PORT_COUNTS)));
   auto path = scf::IfOp::create(builder, loc, out.pointer(), isSlow,
                                 /*withElseRegion=*/true);
   OpBuilder::InsertionGuard guard(builder);
@@ -152,7 +153,8 @@ void piko::createPlace(OpBuilder &builder, Location loc,
                                         out.load(layout::cells))),
                  out.either(out.comparePointers(LLVM::ICmpPredicate::eq, place,
                                                 out.load(layout::cellEnd)),
-                            out.any(layout::portFlags)));
+                            out.any(layout::portFlags, ~(PIKOIR_PORT_COUNTS |
+                                                         PIKOIR_PORT_SOURCE))));
   OpBuilder::InsertionGuard guard(builder);
   callPlaceIf(isSlow, builder, loc, context, writer, port, cell);
   Value isFirst =
@@ -179,6 +181,24 @@ Value piko::createIsCounted(OpBuilder &builder, Location loc,
                             LoweringContext &context, Value writer) {
   MemberBuilder members(builder, loc, writer, context.tags.writer());
   return members.any(layout::writerFlags);
+}
+
+void piko::createSourceNext(OpBuilder &builder, Location loc,
+                            LoweringContext &context, Value writer) {
+  MemberBuilder out = openPort(builder, loc, context, writer, /*port=*/0);
+  Value isNowhere =
+      out.compare(MemberBuilder::P::slt, out.load(layout::lastCell),
+                  createI64(builder, loc, 0));
+  scf::IfOp::create(
+      builder, loc, isNowhere,
+      [&](OpBuilder &, Location) {
+        context.call(builder, loc, PIKO_RUNTIME_FUNCTION(pikoir_next), writer);
+        scf::YieldOp::create(builder, loc);
+      },
+      [&](OpBuilder &, Location) {
+        out.store(createI64(builder, loc, -1), layout::lastCell);
+        scf::YieldOp::create(builder, loc);
+      });
 }
 
 void piko::createNext(OpBuilder &builder, Location loc,

@@ -25,6 +25,9 @@ void createLocalPlace(mlir::OpBuilder &builder, mlir::Location loc,
 /// Whether pikoir_next has anything to do.
 mlir::Value createIsCounted(mlir::OpBuilder &builder, mlir::Location loc,
                             LoweringContext &context, mlir::Value writer);
+/// Ends a primitive of a source, to whose AssignBin the writer belongs.
+void createSourceNext(mlir::OpBuilder &builder, mlir::Location loc,
+                      LoweringContext &context, mlir::Value writer);
 /// Ends a position (pikoir_next).
 void createNext(mlir::OpBuilder &builder, mlir::Location loc,
                 LoweringContext &context, mlir::Value writer);

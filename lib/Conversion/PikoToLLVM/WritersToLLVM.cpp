@@ -86,6 +86,8 @@ struct NextLowering : Lowering<NextOp> {
     if (Grid *grid = context.grid(op))
       createEntry(rewriter, op, *grid, EntryKind::Next, /*number=*/0,
                   /*bytes=*/0, getLogStage(op, op.getWriter(), context));
+    else if (op->getParentOfType<func::FuncOp>()->hasAttr(marks::source))
+      createSourceNext(rewriter, op.getLoc(), context, adaptor.getWriter());
     else
       createNext(rewriter, op.getLoc(), context, adaptor.getWriter());
     rewriter.eraseOp(op);
@@ -223,12 +225,9 @@ struct PlaceLowering : Lowering<AppendBinOp> {
     } else if (op.getPort() && isLocal(op))
       createLocalPlace(rewriter, loc, context, adaptor.getWriter(),
                        *op.getPort(), cell);
-    else if (op.getPort())
-      createPlace(rewriter, loc, context, adaptor.getWriter(), *op.getPort(),
-                  cell);
-    else
-      context.call(rewriter, loc, PIKO_RUNTIME_FUNCTION(pikoir_place_source),
-                   {adaptor.getWriter(), cell});
+    else // a source's cells are those of its only port
+      createPlace(rewriter, loc, context, adaptor.getWriter(),
+                  op.getPort().value_or(0), cell);
     rewriter.eraseOp(op);
     return success();
   }

@@ -521,7 +521,8 @@ static inline uint8_t *pikoir_append_inline(pikoir_writer *writer,
                                             int32_t port) {
   pikoir_port *out = &writer->ports[port];
   uint8_t *record = out->cursor;
-  if (record > out->limit || (out->flags & ~PIKOIR_PORT_LOCAL) != 0)
+  if (record > out->limit ||
+      (out->flags & ~(PIKOIR_PORT_LOCAL | PIKOIR_PORT_COUNTS)) != 0)
     return pikoir_append(writer, port);
   ++out->emitted;
   if (out->cells != 0) // kept by its first place
@@ -535,7 +536,8 @@ static inline void pikoir_place_inline(pikoir_writer *writer, int32_t port,
                                        int64_t cell) {
   pikoir_port *out = &writer->ports[port];
   if (cell <= out->last_cell || cell >= out->cells ||
-      out->cell_cursor == out->cell_end || out->flags != 0) {
+      out->cell_cursor == out->cell_end ||
+      (out->flags & ~(PIKOIR_PORT_COUNTS | PIKOIR_PORT_SOURCE)) != 0) {
     pikoir_place(writer, port, cell);
     return;
   }

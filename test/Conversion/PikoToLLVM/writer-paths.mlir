@@ -76,3 +76,34 @@ piko.pipeline @P rank 1 {
     }
   }
 }
+
+// A source's primitive that has a cell needs no call either.
+// CHECK-LABEL: func.func private @Q.source_0_b
+// CHECK:         %[[S:.*]] = llvm.call @pikoir_open_source
+// CHECK:           scf.if
+// CHECK:             llvm.call @pikoir_place(%[[S]], %c0_i32,
+// CHECK:           } else {
+// CHECK:             llvm.store %{{.*}}: i32
+// CHECK:           %[[LAST_AT:.*]] = llvm.getelementptr inbounds %{{.*}}[56]
+// CHECK-NEXT:      %[[LAST:.*]] = llvm.load %[[LAST_AT]]
+// CHECK-NEXT:      %[[NOWHERE:.*]] = arith.cmpi slt, %[[LAST]], %c0_i64
+// CHECK-NEXT:      scf.if %[[NOWHERE]] {
+// CHECK-NEXT:        llvm.call @pikoir_next(%[[S]])
+// CHECK-NEXT:      } else {
+// CHECK-NEXT:        llvm.store %c-1_i64, %[[LAST_AT]]
+piko.pipeline @Q rank 1 {
+  piko.source @b
+  piko.stage @b bins [8] threads 1 : @F -> [] {
+    piko.assign {
+    ^bb0(%f: !piko.prim<@F>):
+      %x = piko.get %f "x" : !piko.prim<@F> -> i32
+      %bin = piko.bin_at %x : i32
+      piko.assign_to %bin
+      piko.return
+    }
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      piko.return
+    }
+  }
+}
