@@ -81,25 +81,47 @@ private:
                                 chunks_);
   }
 
+  /// Calls body(pair, count) for pairs, one by one, or some in a row that are
+  /// the first of their items and in the same cell: neighbours often are, and
+  /// to count them one by one takes a store and a load each.
+  template <class Body>
+  void forRuns(int64_t begin, int64_t end, const Body &body) const {
+    constexpr int64_t most = 8;
+    for (int64_t k = begin; k < end; k += most) {
+      const uint32_t *pairs = pairs_ + k;
+      uint32_t first = pairs[0], others = 0;
+      if (end - k >= most)
+        for (int64_t i = 1; i < most; ++i)
+          others |= pairs[i] ^ first;
+      if (others == 0 && end - k >= most && (first & PIKOIR_FIRST_CELL) &&
+          first != noCell) {
+        body(k, most);
+        continue;
+      }
+      for (int64_t i = k; i < std::min(end, k + most); ++i)
+        body(i, 1);
+    }
+  }
+
   void count(int64_t chunk) {
     uint32_t *counts = counts_.data() + chunk * cells_;
     int64_t begin = firstPair(chunk), end = firstPair(chunk + 1);
     Piece &piece = pieces_[static_cast<size_t>(chunk)];
     uint32_t last = 0;
-    for (int64_t k = begin; k < end; ++k) {
+    forRuns(begin, end, [&](int64_t k, uint32_t run) {
       uint32_t entry = pairs_[k];
-      piece.items += entry >> 31;
+      piece.items += (entry >> 31) * run;
       if (entry == noCell) {
         ++piece.holes;
-        continue;
+        return;
       }
       uint32_t cell = entry & cellMask;
       if (piece.first == noCell)
         piece.first = cell;
       piece.sorted &= cell >= last;
       last = cell;
-      ++counts[cell];
-    }
+      counts[cell] += run;
+    });
     if (piece.first != noCell)
       piece.last = last;
   }
@@ -161,23 +183,30 @@ private:
     const uint32_t *index = kernel_.stream.index;
     auto item =
         static_cast<uint32_t>(pieces_[static_cast<size_t>(chunk)].items - 1);
-    int64_t end = firstPair(chunk + 1);
-    for (int64_t k = firstPair(chunk); k < end; ++k) {
-      uint32_t entry = pairs_[k];
-      item += entry >> 31;
-      if (entry == noCell)
-        continue;
-      uint32_t cell = entry & cellMask;
-      uint32_t position = next[cell]++;
-      if (order)
-        order[position] = item;
-      if (places)
-        places[position] = index[item];
-      if (nextInBin)
-        rank[position] = nextInBin[cell / stage_.tiles]++;
-      else if (ranked)
-        rank[position] = static_cast<uint32_t>(k);
-    }
+    forRuns(firstPair(chunk), firstPair(chunk + 1),
+            [&](int64_t k, uint32_t run) {
+              uint32_t entry = pairs_[k];
+              uint32_t first = item + (entry >> 31); // of the run
+              item = first + run - 1;
+              if (entry == noCell)
+                return;
+              uint32_t cell = entry & cellMask;
+              uint32_t position = next[cell];
+              next[cell] += run;
+              if (order)
+                for (uint32_t i = 0; i < run; ++i)
+                  order[position + i] = first + i;
+              if (places)
+                for (uint32_t i = 0; i < run; ++i)
+                  places[position + i] = index[first + i];
+              uint32_t at = static_cast<uint32_t>(k);
+              if (nextInBin)
+                at = std::exchange(nextInBin[cell / stage_.tiles],
+                                   nextInBin[cell / stage_.tiles] + run);
+              if (ranked)
+                for (uint32_t i = 0; i < run; ++i)
+                  rank[position + i] = at + i;
+            });
   }
 
   pikort_pipeline &p_;

@@ -23,8 +23,9 @@ namespace piko::rt {
 
 class LineageTree {
 public:
-  /// A tree of `roots`, each the entry of its own number.
-  void reset(int64_t roots);
+  /// A tree of `roots`, each the entry of its own number. If that is never
+  /// asked for, it is not kept.
+  void reset(int64_t roots, bool keepsEntries);
   int64_t size() const { return roots_ + parents_.size(); }
   /// Adds nodes; the caller sets the parent of each.
   uint32_t *extend(Memory &memory, int64_t count) {
@@ -39,7 +40,10 @@ public:
   int64_t entry(int64_t root) const { return entries_ ? entries_[root] : root; }
 
 private:
+  Array<uint32_t> findEntries(Memory &memory) const;
+
   int64_t roots_ = 0;
+  bool keepsEntries_ = true;
   Growing<uint32_t> parents_; ///< Of all nodes but the roots.
   Array<uint32_t> entries_;   ///< Of the roots; none = identity.
 };

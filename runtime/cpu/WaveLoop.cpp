@@ -19,7 +19,9 @@ void WaveLoop::begin() {
       current()[m].nodes.append(p_.memory, places_[m].data(), now_[m].count);
   }
   places_.clear();
-  tree_.reset(entryCount_);
+  bool keyed = std::any_of(exits_.begin(), exits_.end(),
+                           [&](int32_t e) { return p_.edges[e].keyed(); });
+  tree_.reset(entryCount_, keyed);
   leftCount_ = 0;
   hops_ = 0;
   cursor_ = 0;
@@ -200,6 +202,33 @@ static void numberMixed(std::vector<PortCursor> &ports, int64_t slot,
     }
 }
 
+/// Whether each of eight slots emitted to the same port, and one record, or
+/// nothing at all; numbers these, and returns how many there are, or -1.
+template <class PortCursor>
+static int64_t numberAlike(std::vector<PortCursor> &ports, int64_t slot,
+                           uint32_t first) {
+  constexpr int64_t alike = 8;
+  PortCursor *only = nullptr;
+  for (PortCursor &port : ports) {
+    uint32_t any = 0, other = 0;
+    for (int64_t i = 0; i < alike; ++i) {
+      any |= port.counts[slot + i];
+      other |= port.counts[slot + i] ^ 1;
+    }
+    if (any == 0)
+      continue;
+    if (other != 0 || only)
+      return -1;
+    only = &port;
+  }
+  if (!only)
+    return 0;
+  for (int64_t i = 0; i < alike; ++i)
+    only->nodes[i] = first + static_cast<uint32_t>(i);
+  only->advance(alike);
+  return alike;
+}
+
 /// The same for any slot; returns how many there are.
 template <class PortCursor>
 static uint32_t numberSlot(std::vector<PortCursor> &ports, int64_t slot,
@@ -238,16 +267,23 @@ void WaveLoop::numberRecords(const Kernel &kernel,
   parallelChunks(p_.threads, slots, slotChunk, [&](int64_t begin, int64_t end) {
     Cursors at = std::move(chunks[static_cast<size_t>(begin / slotChunk)]);
     int64_t number = sumOf(at);
-    for (int64_t slot = begin; slot < end; ++slot) {
-      uint32_t emitted =
-          numberSlot(at, slot, static_cast<uint32_t>(base + number));
-      if (emitted == 0)
-        continue;
-      uint32_t node = nodeOf(kernel.order ? kernel.order[slot]
-                                          : static_cast<uint32_t>(slot));
-      for (uint32_t k = 0; k < emitted; ++k)
-        parents[number + k] = node;
-      number += emitted;
+    auto parentAt = [&](int64_t slot) {
+      return nodeOf(kernel.order ? kernel.order[slot]
+                                 : static_cast<uint32_t>(slot));
+    };
+    for (int64_t slot = begin; slot < end; slot += 8) {
+      int64_t last = std::min(end, slot + 8);
+      auto first = static_cast<uint32_t>(base + number);
+      int64_t alike = last - slot == 8 ? numberAlike(at, slot, first) : -1;
+      for (int64_t i = 0; i < alike; ++i)
+        parents[number++] = parentAt(slot + i);
+      for (int64_t i = slot; i < last && alike < 0; ++i) {
+        first = static_cast<uint32_t>(base + number);
+        if (uint32_t emitted = numberSlot(at, i, first)) {
+          std::fill_n(parents + number, emitted, parentAt(i));
+          number += emitted;
+        }
+      }
     }
   });
 }
