@@ -38,6 +38,8 @@ private:
 /// How many fields are worth loads of whole pieces of a record.
 static constexpr size_t leastFields = 3;
 
+static constexpr int64_t wordSize = 4;
+
 /// Whether a field is as wide as the words that are transposed.
 static bool isWord(Type lanes) {
   return cast<VectorType>(lanes).getElementTypeBitWidth() == 32;
@@ -93,28 +95,83 @@ static bool isNear(GatherOp read, GatherOp first, RecordOp record) {
   return read->getBlock() == first->getBlock() || record.getSize() <= lineSize;
 }
 
+static RecordOp getRecord(GatherOp gather) {
+  return lookupRecord(gather, getStateRecord(lookupInPipeline<Operation *>(
+                                  gather, gather.getStateAttr())));
+}
+
+/// Whether what an operation does to a piece of state leaves a word of its
+/// elements as it is.
+static bool keeps(Operation *op, GatherOp read, RecordOp record) {
+  auto [state, access] = getStateAccess(op);
+  if (state != read.getStateAttr() || access == StateAccess::reads)
+    return true;
+  auto write = dyn_cast<ScatterOp>(op);
+  if (!write || !write.getElements().empty())
+    return false;
+  int64_t from = record.getField(write.getField()).getOffset(),
+          at = record.getField(read.getField()).getOffset();
+  constexpr int64_t byteBits = 8;
+  int64_t size =
+      cast<VectorType>(write.getValue().getType()).getElementTypeBitWidth() /
+      byteBits;
+  return from + size <= at || at + wordSize <= from;
+}
+
+/// Whether a word of state that the kernel changes is the same where the first
+/// read stands.
+static bool isUnchanged(GatherOp read, GatherOp first, RecordOp record) {
+  if (read->getBlock() != first->getBlock())
+    return false;
+  for (Operation *op = first; op != read; op = op->getNextNode())
+    if (op->walk([&](Operation *inner) {
+            return keeps(inner, read, record) ? WalkResult::advance()
+                                              : WalkResult::interrupt();
+          }).wasInterrupted())
+      return false;
+  return true;
+}
+
+/// The indices of each lane's element.
+static SmallVector<Value> getPlaces(GatherOp gather, OpBuilder &builder,
+                                    VectorType words) {
+  SmallVector<Value> places(gather.getIndices());
+  if (!gather.getConsecutive())
+    return places;
+  Location loc = gather.getLoc();
+  Value first = places.front();
+  if (!first.getType().isIndex())
+    first =
+        arith::IndexCastOp::create(builder, loc, builder.getIndexType(), first);
+  places.front() = arith::AddIOp::create(
+      builder, loc, vector::BroadcastOp::create(builder, loc, words, first),
+      vector::StepOp::create(builder, loc, words));
+  return places;
+}
+
 void MergeGathersPass::mergeState(KernelOp kernel) {
   llvm::DenseSet<StringAttr> written = getWrittenState(kernel);
   // By state and first index; those of one place at a time.
   llvm::MapVector<std::pair<Attribute, Value>,
                   SmallVector<SmallVector<GatherOp>>>
       places;
-  auto getRecord = [](GatherOp gather) {
-    return getStateRecord(
-        lookupInPipeline<Operation *>(gather, gather.getStateAttr()));
-  };
   kernel.walk<WalkOrder::PreOrder>([&](GatherOp gather) {
-    if (gather.getConsecutive() || gather.getIndices().empty() ||
-        !gather.getElements().empty() || !isWord(gather.getType()) ||
-        written.contains(gather.getStateAttr().getAttr()))
+    if (gather.getIndices().empty() || !gather.getElements().empty() ||
+        !isWord(gather.getType()))
       return;
-    RecordOp record = lookupRecord(gather, getRecord(gather));
+    RecordOp record = getRecord(gather);
+    if (gather.getConsecutive() && record.getSize() == wordSize)
+      return; // a row
+    bool isWritten = written.contains(gather.getStateAttr().getAttr());
     auto &groups = places[{gather.getStateAttr(), gather.getIndices()[0]}];
-    for (SmallVector<GatherOp> &reads : groups)
-      if (reads.front().getIndices() == gather.getIndices() &&
-          isBehind(gather, reads.front()) &&
-          isNear(gather, reads.front(), record))
+    for (SmallVector<GatherOp> &reads : groups) {
+      GatherOp first = reads.front();
+      if (first.getIndices() == gather.getIndices() &&
+          first.getConsecutive() == gather.getConsecutive() &&
+          isBehind(gather, first) && isNear(gather, first, record) &&
+          (!isWritten || isUnchanged(gather, first, record)))
         return reads.push_back(gather);
+    }
     groups.push_back({gather});
   });
   for (auto &[place, groups] : places)
@@ -125,10 +182,12 @@ void MergeGathersPass::mergeState(KernelOp kernel) {
       OpBuilder builder(first);
       auto words = VectorType::get(cast<VectorType>(first.getType()).getShape(),
                                    builder.getIndexType());
-      Value addresses =
-          LaneElementsOp::create(builder, first.getLoc(), words,
-                                 first.getStateAttr(), first.getIndices());
-      merge<GatherOp>(reads, addresses, getRecord(first), builder);
+      Value addresses = LaneElementsOp::create(
+          builder, first.getLoc(), words, first.getStateAttr(),
+          getPlaces(first, builder, words));
+      merge<GatherOp>(reads, addresses,
+                      FlatSymbolRefAttr::get(getRecord(first).getSymNameAttr()),
+                      builder);
     }
 }
 

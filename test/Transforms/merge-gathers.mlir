@@ -2,16 +2,22 @@
 
 piko.record @V {"x" : f32 at 0, "y" : f32 at 4, "z" : f32 at 8, "d" : f64 at 16, "n" : i32 at 24} size 32 align 8
 
-// Words of the same elements are read at once; a field of 64 bits, one for other
-// lanes, two fields alone, a row, and what the kernel changes are not.
+// Words of the same elements are read at once, also of elements one behind the
+// other; a field of 64 bits, one for other lanes, and two fields alone are not. Of
+// state that the kernel changes, so are words that nothing in between has written.
 // CHECK-LABEL: piko.kernel @state
 // CHECK:         %[[AS:.*]] = piko.cpu.elements @mesh[%[[IS:.*]] : vector<16xindex>] : vector<16xindex>
 // CHECK-NEXT:    %[[X:.*]]:3 = piko.cpu.get_fields %[[AS]] ["x", "z", "n"] of @V mask %[[M:.*]] : vector<16xindex>, vector<16xi1> -> vector<16xf32>, vector<16xf32>, vector<16xi32>
 // CHECK-NEXT:    piko.cpu.gather @mesh[%[[IS]] : vector<16xindex>] "d"
 // CHECK-NEXT:    piko.cpu.gather @mesh[%[[IS]] : vector<16xindex>] "y" mask %{{.*}}
 // CHECK-COUNT-2: piko.cpu.gather @mesh[%{{.*}} : vector<16xindex>]
-// CHECK-COUNT-3: piko.cpu.gather consecutive @mesh
-// CHECK-COUNT-3: piko.cpu.gather @out
+// CHECK:         %[[FIRST:.*]] = vector.broadcast %c0 : index to vector<16xindex>
+// CHECK:         %[[ROW:.*]] = arith.addi %[[FIRST]], %{{.*}} : vector<16xindex>
+// CHECK-NEXT:    %[[RS:.*]] = piko.cpu.elements @mesh[%[[ROW]] : vector<16xindex>]
+// CHECK-NEXT:    piko.cpu.get_fields %[[RS]] ["x", "y", "z"] of @V
+// CHECK:         piko.cpu.get_fields %{{.*}} ["x", "y", "n"] of @V
+// CHECK-NEXT:    piko.cpu.scatter %{{.*}}, @out[%[[IS]] : vector<16xindex>] "z"
+// CHECK-NEXT:    piko.cpu.gather @out[%[[IS]] : vector<16xindex>] "z"
 piko.pipeline @P rank 1 {
   piko.buffer @mesh : @V
   piko.buffer @out : @V
@@ -35,8 +41,9 @@ piko.pipeline @P rank 1 {
     %z2 = piko.cpu.gather consecutive @mesh[%c0 : index] "z" mask %m : vector<16xi1>, vector<16xf32>
     %x3 = piko.cpu.gather @out[%is : vector<16xindex>] "x" mask %m : vector<16xi1>, vector<16xf32>
     %y3 = piko.cpu.gather @out[%is : vector<16xindex>] "y" mask %m : vector<16xi1>, vector<16xf32>
+    piko.cpu.scatter %x, @out[%is : vector<16xindex>] "z" mask %m : vector<16xi1>, vector<16xf32>
     %z3 = piko.cpu.gather @out[%is : vector<16xindex>] "z" mask %m : vector<16xi1>, vector<16xf32>
-    piko.cpu.scatter %x, @out[%is : vector<16xindex>] "x" mask %m : vector<16xi1>, vector<16xf32>
+    %n3 = piko.cpu.gather @out[%is : vector<16xindex>] "n" mask %m : vector<16xi1>, vector<16xi32>
   }
 
   // A field that fewer lanes read, behind a condition, is read along; one that

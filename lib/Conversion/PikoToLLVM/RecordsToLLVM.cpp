@@ -192,12 +192,25 @@ struct LaneGetFieldsLowering : Lowering<LaneGetFieldsOp> {
   /// lanes take no longer than branches around those of some.
   Value chooseReadable(OpBuilder &builder, Location loc, Value addresses,
                        Value mask, int64_t size) const {
-    Value zeros = LLVM::AddressOfOp::create(builder, loc, pointer(builder),
-                                            context.zeros(size));
-    zeros = vector::BroadcastOp::create(
-        builder, loc, addresses.getType(),
-        LLVM::PtrToIntOp::create(builder, loc, builder.getI64Type(), zeros));
-    return arith::SelectOp::create(builder, loc, mask, addresses, zeros);
+    Value all = vector::ReductionOp::create(builder, loc,
+                                            vector::CombiningKind::AND, mask);
+    auto readable = scf::IfOp::create(
+        builder, loc, all,
+        [&](OpBuilder &builder, Location loc) {
+          scf::YieldOp::create(builder, loc, addresses);
+        },
+        [&](OpBuilder &builder, Location loc) {
+          Value zeros = LLVM::AddressOfOp::create(
+              builder, loc, pointer(builder), context.zeros(size));
+          zeros = LLVM::PtrToIntOp::create(builder, loc, builder.getI64Type(),
+                                           zeros);
+          zeros = vector::BroadcastOp::create(builder, loc, addresses.getType(),
+                                              zeros);
+          Value chosen =
+              arith::SelectOp::create(builder, loc, mask, addresses, zeros);
+          scf::YieldOp::create(builder, loc, chosen);
+        });
+    return readable.getResult(0);
   }
 };
 
