@@ -4,7 +4,9 @@
 
 #include "IterationWriter.h"
 #include "LoopSplitter.h"
+#include "LoopStreams.h"
 #include "ParallelLoops.h"
+#include "SequentialLoops.h"
 
 #include "Piko/Dialect/Piko/IR/Marks.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
@@ -33,6 +35,10 @@ namespace {
 struct VectorizePass : piko::impl::VectorizeBase<VectorizePass> {
   using VectorizeBase::VectorizeBase;
   void runOnOperation() override;
+
+private:
+  /// A loop of a phase that is written in order; whether it did.
+  bool vectorizeInOrder(Operation *op);
 };
 
 /// A loop that lanes may share.
@@ -174,19 +180,23 @@ static std::optional<Counting> findCounting(scf::WhileOp loop) {
   using P = arith::CmpIPredicate;
   Counting counting{variable.getArgNumber(), compare.getRhs(),
                     compare.getPredicate() == P::sle};
+  // Up to a number, from 0: one below it would take 2^63 turns.
+  bool isUntil = compare.getPredicate() == P::ne &&
+                 counting.bound.getType().isInteger(64) &&
+                 matchPattern(loop.getInits()[counting.variable], m_Zero());
   auto next = after.getTerminator()
                   ->getOperand(counting.variable)
                   .getDefiningOp<arith::AddIOp>();
-  bool isCounted = next &&
-                   next.getLhs() == after.getArgument(counting.variable) &&
-                   matchPattern(next.getRhs(), m_One()) &&
-                   (counting.isClosed || compare.getPredicate() == P::slt);
+  bool isCounted =
+      next && next.getLhs() == after.getArgument(counting.variable) &&
+      matchPattern(next.getRhs(), m_One()) &&
+      (counting.isClosed || isUntil || compare.getPredicate() == P::slt);
   // The bound may be the largest number, where 64 bits have no next one.
   bool fits = !counting.isClosed || counting.bound.getType().isInteger(32);
   return isCounted && fits ? counting : std::optional<Counting>();
 }
 
-static void countLoop(scf::WhileOp loop, const Counting &counting) {
+static scf::ForOp countLoop(scf::WhileOp loop, const Counting &counting) {
   IRRewriter builder(loop->getContext());
   builder.setInsertionPoint(loop);
   Location loc = loop.getLoc();
@@ -222,6 +232,7 @@ static void countLoop(scf::WhileOp loop, const Counting &counting) {
   builder.replaceOp(loop, results);
   // The bounds of loops inside stand outside of this one.
   moveLoopInvariantCode(made);
+  return made;
 }
 
 /// Makes loops that count loops of which one knows how often they turn, in 64
@@ -329,6 +340,86 @@ static bool runInLockstep(ParallelForOp parallel) {
   return isDone;
 }
 
+/// A copy of a loop that is written in order and hands on nothing, as one that
+/// counts; null if it is another.
+static scf::ForOp copyAsCount(Operation *op) {
+  OpBuilder builder(op);
+  if (auto loop = dyn_cast<scf::ForOp>(op))
+    return loop.getNumResults() == 0 && isIndependent(loop)
+               ? cast<scf::ForOp>(builder.clone(*loop))
+               : scf::ForOp();
+  auto loop = dyn_cast<scf::WhileOp>(op);
+  if (!loop || loop.getInits().size() != 1 || !loop->use_empty() ||
+      !findCounting(loop))
+    return {};
+  auto copy = cast<scf::WhileOp>(builder.clone(*loop));
+  return countLoop(copy, *findCounting(copy));
+}
+
+/// Whether it turns less often than there are lanes, as far as is known.
+static bool isShort(scf::ForOp loop, int64_t laneCount) {
+  std::optional<APInt> count = loop.getStaticTripCount();
+  return count && count->slt(laneCount);
+}
+
+static void remarkInOrder(scf::ForOp loop, int64_t laneCount, bool isCompact) {
+  InFlightDiagnostic remark = loop.emitRemark()
+                              << "iterations of this loop do not depend on one "
+                                 "another, and are vectorized for "
+                              << laneCount << " at once";
+  if (isCompact)
+    remark << ", of those that have something to do";
+}
+
+/// Vectorizes those turns of a loop that have something to do, if most work is
+/// theirs.
+static bool vectorizeCompacted(scf::ForOp loop, int64_t laneCount) {
+  std::optional<Compaction> made = compact(loop);
+  if (!made)
+    return false;
+  IterationLanes finds(made->finds, laneCount), does(made->does, laneCount);
+  if (does.getRefusal().at || !does.getCost().isWorthwhile()) {
+    made->strips.erase();
+    return false;
+  }
+  remarkInOrder(loop, laneCount, /*isCompact=*/true);
+  vectorize(does);
+  if (!finds.getRefusal().at && finds.getCost().isWorthwhile())
+    vectorize(finds);
+  loop.erase();
+  return true;
+}
+
+bool VectorizePass::vectorizeInOrder(Operation *op) {
+  StageOp stage = getKernelStage(op);
+  if (!stage || !op->getParentOfType<scf::ForallOp>() ||
+      (stage.getSchedule() &&
+       stage.getSchedule().getLanes() == LaneMapping::One))
+    return false;
+  scf::ForOp copy = copyAsCount(op);
+  if (!copy)
+    return false;
+  countLoops(copy);
+  if (!isIndependent(copy) || isShort(copy, laneCount) ||
+      hasVectorsAlong(copy) || isOverBox(copy)) {
+    copy.erase();
+    return false;
+  }
+  if (!vectorizeCompacted(copy, laneCount)) {
+    IterationLanes lanes(copy, laneCount);
+    if (lanes.getRefusal().at || !lanes.getCost().computes ||
+        !lanes.getCost().isWorthwhile()) {
+      copy.erase();
+      return false;
+    }
+    remarkInOrder(copy, laneCount, /*isCompact=*/false);
+    vectorize(lanes);
+  }
+  op->erase();
+  ++vectorized;
+  return true;
+}
+
 void VectorizePass::runOnOperation() {
   if (!llvm::is_contained({4, 8, 16}, laneCount)) {
     getOperation().emitError("expected 4, 8 or 16 lanes, but got ")
@@ -347,9 +438,10 @@ void VectorizePass::runOnOperation() {
       return signalPassFailure();
   }
   // Loops inside of one that is vectorized are parts of it.
-  getOperation().walk<WalkOrder::PreOrder>([&](scf::ForOp loop) {
-    if (!loop->hasAttr(marks::lanes))
-      return WalkResult::advance();
+  getOperation().walk<WalkOrder::PreOrder>([&](Operation *op) {
+    auto loop = dyn_cast<scf::ForOp>(op);
+    if (!loop || !loop->hasAttr(marks::lanes))
+      return vectorizeInOrder(op) ? WalkResult::skip() : WalkResult::advance();
     Candidate candidate(loop);
     if (!candidate.isChosen())
       return WalkResult::advance();

@@ -301,10 +301,12 @@ def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
     conditions become masks, with a branch around what no lane needs; loops run as
     long as some lane does; access to state and to primitives becomes gathers and
     scatters, of a row of pixels masked loads and stores; local arrays get a column
-    for each lane. Where iterations read three fields or more of an element, as of
+    for each lane, and short ones are accessed row by row, also where lanes are in
+    different places. What a loop hands on stays scalar where all lanes that are
+    still in it began with the same, as the place of an insertion. Where iterations read three fields or more of an element, as of
     the triangle that a pixel shows, and all that are active turn out to read the
-    same one, scalar loads read it. Unsigned integers of 32 bits are divided as
-    floats of 64, which is exact. What has no vector form runs lane by lane inside.
+    same one, scalar loads read it. Integers of 32 bits are divided as floats of 64,
+    which is exact; by what all lanes share, they are multiplied. What has no vector form runs lane by lane inside.
 
     Loops inside, or two of which one is all that the other does, are collapsed
     where their turns differ between lanes but hand on nothing, and change state
@@ -329,6 +331,12 @@ def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
     Parallel loops that turn out to have few iterations run as they were. Whether
     vectors pay is estimated from the operations, how often they run, and for how
     many lanes; where they do not, a remark has the estimate, with what costs most.
+    A loop of a phase that is written in order is vectorized as well where it stands
+    in no other vector, its turns hand on nothing, read no state that they change,
+    and store each field once. If all that a turn does stands behind a condition,
+    with a loop of its own, the turns that have something to do are found first,
+    1,024 at a time (stream compaction), so that vectors are full.
+
     A primitive that goes along a buffer in a loop of its own is mostly left to
     LLVM, which makes vectors along that loop. Rows of boxes, which mostly have few
     pixels, are vectorized where the schedule says `specifyLanes`.
@@ -394,13 +402,16 @@ def MergeGathers : Pass<"piko-merge-gathers", "::piko::PipelineOp"> {
   let description = [{
     **Requires** lanes (`piko-vectorize`).
 
-    **Does**: of gathers in a block that read words of the same elements, or of the
-    same primitives, makes one operation, if there are three or more. It loads
-    pieces of 16 bytes, one for each lane, and transposes them, which takes far
-    fewer instructions than a gather for each field. Fields of primitives that
-    are read behind conditions, for some of the lanes, are read with the first.
+    **Does**: of gathers that read words of the same elements, or of the same
+    primitives, makes one operation, if there are three or more. It loads pieces of
+    16 bytes, one for each lane, and transposes them, which takes far fewer
+    instructions than a gather for each field; lanes that read nothing load zeros.
+    Fields of primitives that are read behind conditions, for some of the lanes,
+    are read with the first, and so are those of elements whose records are as
+    short as a line of the cache.
 
-    **Guarantees** the same reads, of state that the kernel does not change.
+    **Guarantees** the same reads: of state that the kernel changes, only words that
+    nothing in between writes.
 
     Before:
     ```
@@ -419,8 +430,7 @@ def MergeGathers : Pass<"piko-merge-gathers", "::piko::PipelineOp"> {
         -> vector<16xf32>, vector<16xf32>, vector<16xf32>
     ```
 
-    **Limits**: fields of 32 bits that are no arrays. Where not all lanes read,
-    gathers do.
+    **Limits**: fields of 32 bits that are no arrays.
   }];
   let statistics = [Statistic<"merged", "merged", "gathers">];
 }

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Loops of phases whose turns are written in order, though none needs what
+// another one did.
+
+#ifndef PIKO_LIB_TRANSFORMS_SEQUENTIALLOOPS_H
+#define PIKO_LIB_TRANSFORMS_SEQUENTIALLOOPS_H
+
+#include "mlir/Dialect/SCF/IR/SCF.h"
+
+namespace piko {
+
+/// Whether lanes may share the turns of a loop: they hand on nothing, read
+/// nothing that they change, and change each field of state in one place, once
+/// in a turn, where lanes keep their order.
+bool isIndependent(mlir::scf::ForOp loop);
+
+/// Stream compaction: a loop that finds which turns of another one have
+/// something to do, and one over these turns.
+struct Compaction {
+  mlir::scf::ForOp strips; ///< around both, instead of the loop
+  mlir::scf::ForOp finds, does;
+};
+
+/// Of a loop whose turns do nothing but what stands behind one condition, which
+/// has a loop of its own; none of others.
+std::optional<Compaction> compact(mlir::scf::ForOp loop);
+
+} // namespace piko
+
+#endif // PIKO_LIB_TRANSFORMS_SEQUENTIALLOOPS_H
