@@ -26,6 +26,8 @@ struct Cycles {
   /// A gather of numbers below 32 bits, for which there is no instruction; and
   /// what it takes more if each lane goes through memory on its own.
   double narrowGather, ownLines;
+  /// One of several words of an element that are read at once.
+  double transposed;
   /// A scatter, and of numbers below 32 bits; and what each row takes of a
   /// short array that is read, or written, at places that differ.
   double scatter, narrowScatter, readRow, writeRow;
@@ -34,9 +36,10 @@ struct Cycles {
   /// To bring lanes apart, for one operation or for a group, and to hand each
   /// lane a number.
   double apart, apartInOrder, slot;
-  /// Branches of a condition that differs: around what fails or takes turns,
-  /// and others, which are not foreseen; and of a loop whose turns differ.
-  double branches, unforeseen, exits;
+  /// Branches of a condition that differs: to what fails, around what takes
+  /// turns, and others, which are not foreseen; and of a loop whose turns
+  /// differ.
+  double checks, branches, unforeseen, exits;
   /// What each turn of such a loop takes to find who goes on.
   double turn;
   /// To find which lane makes which turn, and to bring there what it has.
@@ -65,20 +68,22 @@ static const Cycles &getCycles(int64_t laneCount) {
                                .sharedQuotient = 24,
                                .narrowGather = 16,
                                .ownLines = 30,
-                               .scatter = 30,
+                               .transposed = 7,
+                               .scatter = 40,
                                .narrowScatter = 70,
-                               .readRow = 1,
-                               .writeRow = 1.5,
+                               .readRow = 0.8,
+                               .writeRow = 1.2,
                                .along = 6,
                                .apart = 15,
                                .apartInOrder = 40,
                                .slot = 8,
+                               .checks = 15,
                                .branches = 40,
-                               .unforeseen = 150,
-                               .exits = 140,
+                               .unforeseen = 250,
+                               .exits = 300,
                                .turn = 15,
                                .pairs = 60,
-                               .goOn = 0.4,
+                               .goOn = 0.55,
                                .goOnInside = 0.7};
   static constexpr Cycles of8{.scalar = 2.5,
                               .scalarAccess = 4,
@@ -91,16 +96,18 @@ static const Cycles &getCycles(int64_t laneCount) {
                               .sharedQuotient = 60,
                               .narrowGather = 10,
                               .ownLines = 15,
-                              .scatter = 24,
+                              .transposed = 4,
+                              .scatter = 20,
                               .narrowScatter = 35,
-                              .readRow = 1.5,
-                              .writeRow = 2.5,
+                              .readRow = 0.5,
+                              .writeRow = 0.8,
                               .along = 4,
                               .apart = 8,
                               .apartInOrder = 15,
                               .slot = 1.5,
+                              .checks = 8,
                               .branches = 20,
-                              .unforeseen = 35,
+                              .unforeseen = 60,
                               .exits = 50,
                               .turn = 10,
                               .pairs = 40,
@@ -117,6 +124,7 @@ static const Cycles &getCycles(int64_t laneCount) {
                               .sharedQuotient = 16,
                               .narrowGather = 8,
                               .ownLines = 8,
+                              .transposed = 6,
                               .scatter = 8,
                               .narrowScatter = 8,
                               .readRow = 2,
@@ -125,6 +133,7 @@ static const Cycles &getCycles(int64_t laneCount) {
                               .apart = 10,
                               .apartInOrder = 20,
                               .slot = 2,
+                              .checks = 4,
                               .branches = 10,
                               .unforeseen = 10,
                               .exits = 25,
@@ -208,6 +217,7 @@ private:
         .wasInterrupted();
   }
   double getDivision(Operation *op) const;
+  bool isTransposed(LoadOp load) const;
   bool isInStream(Operation *access) const {
     return llvm::any_of(
         inner, [&](scf::ForOp loop) { return isStream(access, loop); });
@@ -268,10 +278,10 @@ void CostModel::addStructure(Operation *op, Frequency times, bool laneByLane) {
     addSide(yes, no);
     addSide(no, yes);
     bool isShort = lanes.isCheap(yes) && (no.empty() || lanes.isCheap(no));
-    bool isForeseen = fails(yes) || fails(no) || takesTurns(choice);
     if (lanes.isVarying(choice.getCondition()) && !isShort)
-      addBranches((isForeseen ? cycles.branches : cycles.unforeseen) *
-                      times.serial,
+      addBranches(times.serial * (fails(yes) || fails(no) ? cycles.checks
+                                  : takesTurns(choice)    ? cycles.branches
+                                                          : cycles.unforeseen),
                   laneByLane);
     return;
   }
@@ -286,8 +296,11 @@ void CostModel::addStructure(Operation *op, Frequency times, bool laneByLane) {
   for (Operation *at = op->getParentOp(); at != lanes.getLoop();
        at = at->getParentOp())
     isInside |= isa<scf::ForOp, scf::WhileOp>(at) && !lanes.isSharedLoop(at);
+  // Ranges differ less than what else ends loops.
+  constexpr double goOnInRange = 0.75;
   double going = lanes.isSharedLoop(op) ? 1
                  : isInside             ? cycles.goOnInside
+                 : isa<scf::ForOp>(op)  ? goOnInRange
                                         : cycles.goOn;
   if (!lanes.isSharedLoop(op))
     addBranches(cycles.exits * times.serial, laneByLane);
@@ -324,6 +337,34 @@ static bool isNarrow(Operation *access) {
   return type.isIntOrFloat() && type.getIntOrFloatBitWidth() < 32;
 }
 
+/// Whether elements one behind the other are more than the number of each that
+/// is accessed.
+static bool isStrided(Operation *access) {
+  auto load = dyn_cast<LoadOp>(access);
+  auto store = dyn_cast<StoreOp>(access);
+  if (!load && !store)
+    return false;
+  Operation *state = lookupInPipeline<Operation *>(
+      access, load ? load.getStateAttr() : store.getStateAttr());
+  Type type = load ? load.getType() : store.getValue().getType();
+  constexpr int64_t byteBits = 8;
+  return lookupRecord(access, getStateRecord(state)).getSize() !=
+         int64_t(type.getIntOrFloatBitWidth()) / byteBits;
+}
+
+/// Whether lanes read three words or more of an element, which are loaded and
+/// transposed.
+bool CostModel::isTransposed(LoadOp load) const {
+  auto isAlike = [&](Operation *user) {
+    auto other = dyn_cast<LoadOp>(user);
+    return other && other.getStateAttr() == load.getStateAttr() &&
+           other.getType().getIntOrFloatBitWidth() == 32;
+  };
+  constexpr int64_t least = 3;
+  return !load.getIndices().empty() && load.getElements().empty() &&
+         llvm::count_if(load.getIndices().front().getUsers(), isAlike) >= least;
+}
+
 /// What an access in different places takes.
 double CostModel::getApart(Operation *access) const {
   auto load = dyn_cast<memref::LoadOp>(access);
@@ -333,6 +374,9 @@ double CostModel::getApart(Operation *access) const {
     auto rows = double(cast<MemRefType>(array.getType()).getNumElements());
     return rows * (store ? cycles.writeRow : cycles.readRow);
   }
+  if (auto read = dyn_cast<LoadOp>(access);
+      read && isStrided(access) && isTransposed(read))
+    return cycles.transposed + (isInStream(access) ? cycles.ownLines : 0);
   bool writes = store || isa<StoreOp>(access);
   double apart =
       writes ? (isNarrow(access) ? cycles.narrowScatter : cycles.scatter)
@@ -341,6 +385,22 @@ double CostModel::getApart(Operation *access) const {
   if (store && lanes.isPrivate(array))
     apart *= 2;
   return apart + (isInStream(access) ? cycles.ownLines : 0);
+}
+
+/// How many numbers of an array in a record one lane loads at once, where their
+/// places are constant: LLVM makes vectors of them.
+static double getInRow(Operation *access) {
+  ValueRange elements;
+  if (auto load = dyn_cast<LoadOp>(access))
+    elements = load.getElements();
+  else if (auto get = dyn_cast<GetOp>(access))
+    elements = get.getElements();
+  constexpr double width = 4;
+  bool areConstant =
+      !elements.empty() && llvm::all_of(elements, [](Value element) {
+        return matchPattern(element, m_Constant());
+      });
+  return areConstant ? width : 1;
 }
 
 double CostModel::getDivision(Operation *op) const {
@@ -368,11 +428,11 @@ void CostModel::addOperation(Operation *op, Frequency times, bool laneByLane) {
                      !matchPattern(op->getOperand(1), m_Constant());
   double serial = times.serial *
                   (isDivided  ? cycles.scalarDivision
-                   : isAccess ? cycles.scalarAccess
+                   : isAccess ? cycles.scalarAccess / getInRow(op)
                               : cycles.scalar) /
                   along;
   bool isTurns = form == LaneForm::Serial || form == LaneForm::Ordered;
-  bool isGather = isAccess && !lanes.isRow(op);
+  bool isGather = isAccess && (!lanes.isRow(op) || isStrided(op));
   double gather = isGather ? getApart(op) : 0;
   double vectors = times.vectors * (isGather    ? gather
                                     : isAccess  ? cycles.row

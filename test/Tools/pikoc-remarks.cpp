@@ -91,7 +91,7 @@ struct Divides : piko::Stage<0, 0, 64, Item>, piko::Uses<State> {
   // DIVIDES: :[[#@LINE+1]]:8: remark: stage 'divides': process is vectorized for {{4|8}} primitives at once
   void process(const Item &i) {
     int part = 100 / i.count;
-    state().numbers[i.at.x] = part * part + i.at.y;
+    state().out[i.at.x] = work(float(part), i.y);
   }
 };
 
