@@ -5,15 +5,18 @@
   bodies.py [options] [NAME..]
 
 Builds each pipeline of benchmarks/bodies by pikoc and, as the reference
-executor, by g++ and clang++, and prints a table in Markdown: the processor time
-of the fastest warm frame on one thread, and how many times as fast pikoc's code
-is. The first frames of all builds must give the same bits, or this ends with an
-error. Builds take turns in each round.
+executor, by g++ and clang++, and prints a table in Markdown: the milliseconds of
+the fastest warm frame of one lane, without any vectors (*scalar*) and with LLVM's
+(*one lane*), and of all lanes; how many times as fast lanes are as each, and as the
+references; and the medians of that. Time is the processor's on one thread, or the wall's on several.
+The first frames of all builds must give the same bits, or this ends with an error.
+Builds take turns in each round.
 """
 
 import argparse
 import glob
 import os
+import statistics
 import sys
 from concurrent.futures import ThreadPoolExecutor
 
@@ -28,7 +31,12 @@ REFERENCES = {
     "g++ -O2": ["g++"],
     "clang++ -O2": ["clang++-22"],
 }
-COMPILED = {"scalar": ["--without=vectorize"], "default": []}
+# One lane, without any vectors and with LLVM's, and all lanes.
+ONE_LANE = {
+    "scalar": ["--without=vectorize,loop-vectorize,slp-vectorizer"],
+    "one lane": ["--without=vectorize"],
+}
+COMPILED = ONE_LANE | {"default": []}
 
 
 def parse_arguments():
@@ -47,8 +55,10 @@ def parse_arguments():
                         help="of frames, for each build in each round")
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--march", help="of the references, as x86-64-v3")
-    parser.add_argument("--cpu", default="x86-64-v3",
+    parser.add_argument("--cpu", default="x86-64-v4",
                         help="what pikoc compiles for (%(default)s)")
+    parser.add_argument("--threads", type=int, default=1,
+                        help="of pikoc's code; references have one")
     arguments = parser.parse_args()
     arguments.flags = [f"-march={arguments.march}"] if arguments.march else []
     return arguments
@@ -111,14 +121,14 @@ def build_reference(arguments, body, build):
     call([*REFERENCES[build], *arguments.flags, *CXX, source, "-o", program])
 
 
-def measure_rounds(arguments, body, builds):
+def measure_rounds(arguments, body, builds, threads=1):
     """The milliseconds of a frame in each round, by build."""
     times, results = {build: [] for build in builds}, {}
     for _ in range(arguments.rounds):
         for build in builds:
             results[build], milliseconds, *_ = call(
-                [get_program(arguments, body, build),
-                 str(arguments.seconds)]).split()
+                [get_program(arguments, body, build), str(arguments.seconds),
+                 str(threads)]).split()
             times[build].append(float(milliseconds))
     if len(set(results.values())) != 1:
         sys.exit(f"{body}: expected the same bits of all builds, but got "
@@ -134,8 +144,27 @@ def count(arguments, body):
 
 def measure(arguments, body):
     """The milliseconds of the fastest frame, by build."""
-    rounds = measure_rounds(arguments, body, [*REFERENCES, *COMPILED])
+    rounds = measure_rounds(arguments, body, [*COMPILED, *REFERENCES],
+                            arguments.threads)
     return {build: min(times) for build, times in rounds.items()}
+
+
+def print_table(arguments, bodies):
+    others = [*ONE_LANE, *REFERENCES]
+    print("| body | scalar, ms | one lane, ms | all lanes, ms | "
+          + " | ".join(f"over {name}" for name in others) + " |")
+    print("|---" * (4 + len(others)) + "|")
+    found = []
+    for body in bodies:
+        best = measure(arguments, body)
+        found.append([best[name] / best["default"] for name in others])
+        print(f"| {body} | "
+              + " | ".join(f"{best[build]:.3f}" for build in COMPILED) + " | "
+              + " | ".join(f"{ratio:.2f}" for ratio in found[-1]) + " |",
+              flush=True)
+    medians = [statistics.median(column) for column in zip(*found)]
+    print("| median | | | | "
+          + " | ".join(f"{median:.2f}" for median in medians) + " |")
 
 
 def main():
@@ -149,14 +178,7 @@ def main():
                  for body in bodies for build in REFERENCES]
         for job in jobs:
             job.result()
-    names = list(REFERENCES)
-    print("| body | scalar, ms | default, ms | " + " | ".join(names) + " |")
-    print("|---" * (3 + len(names)) + "|")
-    for body in bodies:
-        best = measure(arguments, body)
-        ratios = [f"{best[name] / best['scalar']:.2f}" for name in names]
-        print(f"| {body} | {best['scalar']:.3f} | {best['default']:.3f} | "
-              + " | ".join(ratios) + " |", flush=True)
+    print_table(arguments, bodies)
 
 
 if __name__ == "__main__":

@@ -63,9 +63,10 @@ template <class Elements> uint64_t hashState(Elements &&state) {
   }
 }
 
-inline double now() {
+/// Of this thread's processor time, or of the wall, for several threads.
+inline double now(int threads) {
   timespec time;
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+  clock_gettime(threads > 1 ? CLOCK_MONOTONIC : CLOCK_THREAD_CPUTIME_ID, &time);
   return double(time.tv_sec) + 1e-9 * double(time.tv_nsec);
 }
 
@@ -77,25 +78,26 @@ template <class Pipe> void runOnce(Pipe &pipe) {
 }
 
 /// Prints the hash of the first frame and the fewest milliseconds of a warm
-/// one, of those that fit in so many seconds; and, where the host counts them,
-/// a frame's operations on floats, as the text has them, and the bytes that it
-/// must read or write at least once.
+/// one, of those that fit in so many seconds, on so many threads; and, where
+/// the host counts them, a frame's operations on floats, as the text has them,
+/// and the bytes that it must read or write at least once.
 template <class Pipe, class Host> int measure(int argc, char **argv) {
   double seconds = argc > 1 ? std::atof(argv[1]) : 1;
+  int threads = argc > 2 ? std::atoi(argv[2]) : 1;
   try {
     Pipe pipe;
     Host host;
     if constexpr (requires { pipe.setThreads(1); })
-      pipe.setThreads(1);
+      pipe.setThreads(threads);
     host.bind(pipe);
     runOnce(pipe);
     uint64_t result = host.result(pipe);
-    double best = 1e9, begin = now();
+    double best = 1e9, begin = now(threads);
     do {
-      double start = now();
+      double start = now(threads);
       runOnce(pipe);
-      best = std::min(best, now() - start);
-    } while (now() - begin < seconds);
+      best = std::min(best, now(threads) - start);
+    } while (now(threads) - begin < seconds);
     std::printf("%016llx %.6f", static_cast<unsigned long long>(result),
                 1e3 * best);
     if constexpr (requires { host.flops(), host.bytes(); })
