@@ -5,6 +5,7 @@
 
 #include "Piko/Analysis/Uniformity.h"
 
+#include "mlir/Dialect/Arith/IR/Arith.h"
 #include "mlir/Dialect/MemRef/IR/MemRef.h"
 #include "mlir/Dialect/UB/IR/UBOps.h"
 
@@ -33,6 +34,19 @@ Value piko::findOnlyValue(Value yes, Value no) {
   if (no.getDefiningOp<ub::PoisonOp>())
     return yes;
   return yes.getDefiningOp<ub::PoisonOp>() ? no : Value();
+}
+
+/// Whether memory is accessed at a place that follows from a number.
+static bool isForPlaces(Value number, unsigned depth = 6) {
+  return depth > 0 && llvm::any_of(number.getUsers(), [&](Operation *user) {
+           if (auto store = dyn_cast<memref::StoreOp>(user))
+             return llvm::is_contained(store.getIndices(), number);
+           if (isa<memref::LoadOp, LoadOp>(user))
+             return true;
+           return isa<arith::ArithDialect>(user->getDialect()) &&
+                  user->getResult(0).getType().isIntOrIndex() &&
+                  isForPlaces(user->getResult(0), depth - 1);
+         });
 }
 
 Uniformity::Uniformity(Operation *root, ArrayRef<Root> roots, bool isLockstep)
@@ -85,6 +99,17 @@ bool Uniformity::flow(ValueRange sources, ValueRange targets, Uniform least) {
   return changed;
 }
 
+bool Uniformity::flowInside(ValueRange sources, ValueRange targets,
+                            Uniform parts) {
+  bool changed = false;
+  for (auto [source, target] : llvm::zip(sources, targets)) {
+    bool isShared = isLockstep && isForPlaces(target);
+    changed |=
+        mark(target, std::max(isShared ? Uniform::Bin : parts, get(source)));
+  }
+  return changed;
+}
+
 Uniform Uniformity::getDeciding(Operation *op) const {
   if (auto loop = dyn_cast<scf::ForOp>(op))
     return get({loop.getLowerBound(), loop.getUpperBound(), loop.getStep()});
@@ -114,21 +139,21 @@ bool Uniformity::visitControlFlow(Operation *op) {
   if (auto loop = dyn_cast<scf::ForOp>(op)) {
     Value lower = loop.getLowerBound(), step = loop.getStep();
     bool changed = mark(loop.getInductionVar(), get({lower, step}));
-    auto flowTo = [&](ValueRange targets, Uniform least) {
-      changed |= flow(loop.getInitArgs(), targets, least);
-      changed |= flow(loop.getYieldedValues(), targets, least);
-    };
-    flowTo(loop.getRegionIterArgs(), isLockstep ? Uniform::Bin : parts);
-    flowTo(loop.getResults(), parts);
+    for (ValueRange sources :
+         {ValueRange(loop.getInitArgs()), loop.getYieldedValues()}) {
+      changed |= flowInside(sources, loop.getRegionIterArgs(), parts);
+      changed |= flow(sources, loop.getResults(), parts);
+    }
     return changed;
   }
   if (auto loop = dyn_cast<scf::WhileOp>(op)) {
-    Uniform inside = isLockstep ? Uniform::Bin : parts;
-    bool changed = flow(loop.getInits(), loop.getBeforeArguments(), inside);
-    changed |= flow(loop.getYieldOp().getOperands(), loop.getBeforeArguments(),
-                    inside);
+    bool changed =
+        flowInside(loop.getInits(), loop.getBeforeArguments(), parts);
+    changed |= flowInside(loop.getYieldOp().getOperands(),
+                          loop.getBeforeArguments(), parts);
     ValueRange leaving = loop.getConditionOp().getArgs();
-    changed |= flow(leaving, loop.getAfterArguments(), inside);
+    changed |= flow(leaving, loop.getAfterArguments(),
+                    isLockstep ? Uniform::Bin : parts);
     return flow(leaving, loop.getResults(), parts) || changed;
   }
   // scf.if, scf.index_switch

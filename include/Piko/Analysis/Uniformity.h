@@ -41,9 +41,9 @@ public:
   /// `piko.lists`, or a loop over primitives or iterations with its induction
   /// variable among `roots`. Work and parallel loops inside are roots by
   /// themselves.
-  /// In lockstep, what a loop hands on is the same for those that are still in
-  /// it, where they began with the same; and a condition hands on what one of
-  /// its sides does, if the other's is poison.
+  /// In lockstep, a place that a loop hands on is the same for those that are
+  /// still in it, where they began with the same; and a condition hands on what
+  /// one of its sides does, if the other's is poison.
   explicit Uniformity(mlir::Operation *root, llvm::ArrayRef<Root> roots = {},
                       bool isLockstep = false);
 
@@ -76,6 +76,10 @@ private:
   Uniform get(mlir::ValueRange values) const;
   /// Narrows each of `targets` to its source, and to `least`.
   bool flow(mlir::ValueRange sources, mlir::ValueRange targets, Uniform least);
+  /// The same of what a loop hands on, which in lockstep stays as wide as its
+  /// sources if memory is accessed there: elsewhere lanes have it at hand.
+  bool flowInside(mlir::ValueRange sources, mlir::ValueRange targets,
+                  Uniform parts);
   bool visitIf(mlir::scf::IfOp choice, Uniform parts);
 
   bool isLockstep;
