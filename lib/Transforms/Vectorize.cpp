@@ -362,6 +362,20 @@ static bool isShort(scf::ForOp loop, int64_t laneCount) {
   return count && count->slt(laneCount);
 }
 
+/// Whether turns only clear or copy, which LLVM does well.
+static bool onlyMoves(scf::ForOp loop) {
+  return !loop.getBody()
+              ->walk([](Operation *op) {
+                bool computes =
+                    isa<scf::ForOp, scf::WhileOp>(op) ||
+                    (op->getNumOperands() > 0 && op->getNumResults() == 1 &&
+                     isPure(op) && op->getResult(0).getType().isFloat());
+                return computes ? WalkResult::interrupt()
+                                : WalkResult::advance();
+              })
+              .wasInterrupted();
+}
+
 static void remarkInOrder(scf::ForOp loop, int64_t laneCount, bool isCompact) {
   InFlightDiagnostic remark = loop.emitRemark()
                               << "iterations of this loop do not depend on one "
@@ -400,7 +414,7 @@ bool VectorizePass::vectorizeInOrder(Operation *op) {
   if (!copy)
     return false;
   countLoops(copy);
-  if (!isIndependent(copy) || isShort(copy, laneCount) ||
+  if (!isIndependent(copy) || isShort(copy, laneCount) || onlyMoves(copy) ||
       hasVectorsAlong(copy) || isOverBox(copy)) {
     copy.erase();
     return false;
