@@ -45,13 +45,18 @@ bool isAvailable(size_t bytes) {
          fits("/sys/fs/cgroup/memory.max", "", 1);
 }
 
-/// Maps memory, with large blocks on huge page boundaries; null if refused.
-uint8_t *mapSystem(size_t bytes) {
+/// What is mapped for a block, of which large ones begin at a huge page.
+size_t mappedBytes(size_t bytes) {
+  return bytes >= hugePage ? bytes + hugePage : bytes;
+}
+
+/// Maps memory, at `hint` if that is free; null if refused.
+uint8_t *mapSystem(size_t bytes, uint8_t *hint) {
   if (!isAvailable(bytes))
     return nullptr;
   bool huge = bytes >= hugePage;
-  size_t mapped = huge ? bytes + hugePage : bytes;
-  void *raw = mmap(nullptr, mapped, PROT_READ | PROT_WRITE,
+  size_t mapped = mappedBytes(bytes);
+  void *raw = mmap(hint, mapped, PROT_READ | PROT_WRITE,
                    MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
   if (raw == MAP_FAILED)
     return nullptr;
@@ -97,9 +102,24 @@ int64_t Memory::countMapping() {
   return mappingTicks_;
 }
 
+uint8_t *Memory::findRoom(size_t bytes) {
+  constexpr size_t least = size_t(1) << 30;
+  if (room_ + bytes > roomEnd_) {
+    size_t all = std::max(least, 4 * bytes);
+    void *found = mmap(nullptr, all, PROT_NONE,
+                       MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+    if (found == MAP_FAILED)
+      return nullptr;
+    munmap(found, all);
+    room_ = reinterpret_cast<uintptr_t>(found);
+    roomEnd_ = room_ + all;
+  }
+  return reinterpret_cast<uint8_t *>(std::exchange(room_, room_ + bytes));
+}
+
 uint8_t *Memory::map(size_t bytes) {
   MappingTimer timer(*this);
-  return mapSystem(bytes);
+  return mapSystem(bytes, findRoom(mappedBytes(bytes)));
 }
 
 void Memory::unmap(uint8_t *data, size_t bytes) {

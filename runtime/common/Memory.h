@@ -73,12 +73,16 @@ private:
     int64_t frame; ///< When it was last in use.
   };
   class MappingTimer;
+  /// Where to map next: behind the block before, so that an index can reach
+  /// from one to the other. Small blocks would go into any gap.
+  uint8_t *findRoom(size_t bytes);
   uint8_t *map(size_t bytes);
   void unmap(uint8_t *data, size_t bytes);
   void unmapAllFree();
 
   mutable std::mutex mutex_;
   std::multimap<size_t, Free> free_;
+  uintptr_t room_ = 0, roomEnd_ = 0; ///< Address space that was free.
   int64_t limit_ = 0;
   int64_t reserved_ = 0;
   int64_t binBytes_ = 0;
