@@ -199,11 +199,11 @@ piko.pipeline @Parts rank 1 {
     %n = piko.storage.unit_count %bins : !piko.bins<@F>
     scf.forall (%u) in (%n) {
       %w = piko.cpu.open_writer %bins[%u] : !piko.bins<@F>
-      // expected-remark@+3 {{these iterations are not vectorized: iterations may not go to a barrier together}}
-      // expected-remark-re@+2 {{these iterations are not vectorized: 8 at once are expected to take {{.*}}}}
-      // expected-remark@+1 {{these iterations are vectorized for 8 at once}}
+      // expected-remark@+2 {{these iterations are not vectorized: iterations may not go to a barrier together}}
+      // expected-remark-re@+1 2 {{these iterations are not vectorized: 8 at once are expected to take {{.*}}}}
       piko.parallel_for %c16 {
       ^bb0(%i: index):
+        // expected-note@+1 {{lanes access elements in different places}}
         %n0 = piko.load checked @in[%i : index] "n" : i32
         // expected-note@+1 {{lanes take turns, because this has no vector form}}
         %some = arith.cmpi sgt, %n0, %zero : i32
@@ -213,6 +213,7 @@ piko.pipeline @Parts rank 1 {
         }
         %f = arith.sitofp %n0 : i32 to f32
         %g = arith.mulf %f, %f : f32
+        // expected-note@+1 {{lanes access elements in different places}}
         piko.store %g, checked @out[%i : index] "z" : f32
         piko.yield
       }
