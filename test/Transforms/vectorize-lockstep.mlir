@@ -199,8 +199,9 @@ piko.pipeline @Parts rank 1 {
     %n = piko.storage.unit_count %bins : !piko.bins<@F>
     scf.forall (%u) in (%n) {
       %w = piko.cpu.open_writer %bins[%u] : !piko.bins<@F>
-      // expected-remark@+2 {{these iterations are not vectorized: iterations may not go to a barrier together}}
-      // expected-remark-re@+1 2 {{these iterations are not vectorized: 8 at once are expected to take {{.*}}}}
+      // expected-remark@+3 {{these iterations are not vectorized: iterations may not go to a barrier together}}
+      // expected-remark-re@+2 {{8 at once are expected to take {{[0-9]+}} cycles, and one after the other}}
+      // expected-remark-re@+1 {{8 at once are expected to take {{[0-9]+}} cycles, and one after the other}}
       piko.parallel_for %c16 {
       ^bb0(%i: index):
         // expected-note@+1 {{lanes access elements in different places}}
