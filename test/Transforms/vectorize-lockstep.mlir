@@ -200,8 +200,8 @@ piko.pipeline @Parts rank 1 {
     scf.forall (%u) in (%n) {
       %w = piko.cpu.open_writer %bins[%u] : !piko.bins<@F>
       // expected-remark@+3 {{these iterations are not vectorized: iterations may not go to a barrier together}}
-      // expected-remark-re@+2 {{8 at once are expected to take {{[0-9]+}} cycles, and one after the other}}
-      // expected-remark-re@+1 {{8 at once are expected to take {{[0-9]+}} cycles, and one after the other}}
+      // expected-remark-re@+2 {{8 at once are expected to take {{1[0-9]}} cycles, and one after the other}}
+      // expected-remark-re@+1 {{8 at once are expected to take {{2[0-9]}} cycles, and one after the other}}
       piko.parallel_for %c16 {
       ^bb0(%i: index):
         // expected-note@+1 {{lanes access elements in different places}}
