@@ -44,25 +44,55 @@ static bool hasVectorForm(Operation *op) {
 
 IterationLanes::IterationLanes(scf::ForOp loop, int64_t laneCount)
     : loop(loop), laneCount(laneCount),
-      uniformity(loop, {{loop.getInductionVar(), Uniform::Iteration}},
-                 /*isLockstep=*/true) {
+      roots{{loop.getInductionVar(), Uniform::Iteration}},
+      uniformity(loop, roots, /*isLockstep=*/true) {
+  loop.walk([&](StateAccessOpInterface access) {
+    if (access.getAccessKinds() != StateAccess::reads)
+      written.insert(access.getAccessedState());
+  });
+  analyze();
+  // What is computed of an array is another way then, and may have other turns.
+  while (splitArraysOfTurns()) {
+    uniformity = Uniformity(loop, roots, /*isLockstep=*/true);
+    analyze();
+  }
+  checkBarriers();
+}
+
+void IterationLanes::analyze() {
+  refusal = {};
   if (loop.getNumResults() > 0)
     refuse(loop, "it hands values from iteration to iteration");
   if (loop.getUnsignedCmp())
     refuse(loop, "it counts without a sign");
   if (!matchPattern(loop.getStep(), m_One()))
     refuse(loop, "its step is not 1");
-  loop.walk([&](StateAccessOpInterface access) {
-    if (access.getAccessKinds() != StateAccess::reads)
-      written.insert(access.getAccessedState());
-  });
+  privates.clear();
+  changed.clear();
   findArrays();
+  nests.clear();
   findNests();
+  shared.clear();
   findSharedPixels();
   checkCarried();
+  groups.clear();
   if (!refusal.at)
     findOrdered();
-  checkBarriers();
+}
+
+/// Where lanes take turns to change an array, each has a column, though it does
+/// the same as the others.
+bool IterationLanes::splitArraysOfTurns() {
+  size_t known = roots.size();
+  llvm::DenseSet<Value> found;
+  for (const OrderedGroup &group : groups)
+    for (Operation *op : findTurns(group))
+      op->walk([&](memref::StoreOp store) {
+        Value array = store.getMemRef();
+        if (isPrivate(array) && !isVarying(array) && found.insert(array).second)
+          roots.emplace_back(array, Uniform::Iteration);
+      });
+  return roots.size() > known;
 }
 
 //===----------------------------------------------------------------------===//
@@ -289,8 +319,7 @@ bool IterationLanes::canCollapse(scf::ForOp inner) const {
 }
 
 void IterationLanes::findNests() {
-  SmallVector<Uniformity::Root> roots{
-      {loop.getInductionVar(), Uniform::Iteration}};
+  SmallVector<Uniformity::Root> roots(this->roots);
   loop.walk<WalkOrder::PreOrder>([&](scf::ForOp outer) {
     if (outer == loop || !canCollapse(outer))
       return WalkResult::advance();

@@ -107,6 +107,9 @@ private:
     if (!refusal.at)
       refusal = {at, why.str()};
   }
+  void analyze();
+  /// Whether there were any.
+  bool splitArraysOfTurns();
   void findNests();
   bool canCollapse(mlir::scf::ForOp inner) const;
   void findArrays();
@@ -131,6 +134,7 @@ private:
 
   mutable mlir::scf::ForOp loop; // whose accessors are not const
   int64_t laneCount;
+  llvm::SmallVector<Uniformity::Root> roots;
   Uniformity uniformity;
   Refusal refusal;
   llvm::DenseSet<mlir::Value> privates, changed; // arrays

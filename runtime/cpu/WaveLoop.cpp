@@ -375,7 +375,7 @@ void WaveLoop::fail() {
         if (member(m).placed())
           first = now_[m].pairs[pairStarts(p_.memory, now_[m])[i]];
         failHops(member(m), first & ~PIKOIR_FIRST_CELL,
-                 now_[m].items + i * recordSize(member(m)));
+                 now_[m].item(i, recordSize(member(m))));
       }
   throw Failure{PIKORT_BAD_PROGRAM, "expected a loop to hold a primitive"};
 }

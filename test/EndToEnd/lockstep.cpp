@@ -6,7 +6,7 @@
 // RUN: piko-compare %s --cases %t.cases --runs 1 | FileCheck %s --check-prefix=EQUAL
 // RUN: %if x86_64 %{ piko-compare %s --cases %t.cases --runs 1 --cpu x86-64 | FileCheck %s --check-prefix=EQUAL %}
 // RUN: %if x86_64 %{ piko-compare %s --cases %t.cases --runs 1 --cpu x86-64-v3 | FileCheck %s --check-prefix=EQUAL %}
-// EQUAL-COUNT-12: {{^equal$}}
+// EQUAL-COUNT-15: {{^equal$}}
 // CASE: --pipe Nearest --count 400
 // CASE: --pipe Sums --count 400
 // CASE: --pipe Network --count 400
@@ -19,6 +19,9 @@
 // CASE: --pipe Cells --domain 37 21 --count 400
 // CASE: --pipe Orders --domain 37 21 --count 400
 // CASE: --pipe Corners --count 400
+// CASE: --pipe Changes --count 400
+// CASE: --pipe ChangesOfAll --count 400
+// CASE: --pipe ChangesOfItems --count 400
 // RUN: piko-compare %s --pipe Nearest --count 400 --runs 1 --without vectorize | FileCheck %s
 // CHECK: equal
 // RUN: not piko-compare %s --pipe Outside --count 400 --runs 1 --threads 2 | FileCheck %s --check-prefix=OUTSIDE
@@ -291,6 +294,48 @@ struct EmitterBefore : Alone<Particle, Particle> {
   }
 };
 struct EmitsBefore : Emitting<EmitterBefore> {};
+
+// An array that is the same for all, and changes between what keeps its order.
+struct Changer : Alone<Particle, Particle> {
+  void process(const Particle &p) {
+    parallelFor(16, [&](int i) {
+      int same[2] = {1, 2};
+      sync();
+      for (int k = 0; k < 9; ++k) {
+        emit(Particle{i + same[k % 2], p.y, p.value, p.serial}, 0);
+        same[k % 2] += 3;
+      }
+    });
+  }
+};
+struct Changes : Emitting<Changer> {};
+
+struct ChangerOfAll : Alone<Particle, Particle> {
+  void schedule(piko::BinId) { specifyLanes(piko::Lanes::Iterations); }
+  void process(const Particle &p) {
+    parallelFor(50, [&](int i) {
+      int same[2] = {1, 2};
+      for (int k = 0; k < 9; ++k) {
+        emit(Particle{i + same[k % 2], p.y, numberOf(p, i), p.serial}, 0);
+        same[k % 2] += 3;
+      }
+    });
+  }
+};
+struct ChangesOfAll : Emitting<ChangerOfAll> {};
+
+struct ChangerOfItems : Alone<Particle, Particle> {
+  void schedule(piko::BinId) { specifyLanes(piko::Lanes::Items); }
+  void process(const Particle &p) {
+    int same[4] = {1, 2, 3, 4};
+    float v = piko::sqrt(numberOf(p, 3) + 4);
+    for (int k = 0; k < 9; ++k) {
+      emit(Particle{p.x + same[k % 4], p.y, v, p.serial}, 0);
+      same[(k + 1) % 4] += same[k % 4];
+    }
+  }
+};
+struct ChangesOfItems : Emitting<ChangerOfItems> {};
 
 // Barriers that lanes do not have.
 struct Scanner : Alone<> {

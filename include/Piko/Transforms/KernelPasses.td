@@ -111,7 +111,7 @@ def FormProgram : Pass<"piko-form-program", "::piko::PipelineOp"> {
     how wide the keys are by which they are merged. A remark says of each edge
     that is permuted, and of each merge, why.
 
-    **Guarantees** that what comes to a stage is in lineage order, and that only
+    **Guarantees** that what comes to a bin is in lineage order, and that only
     primitives have keys that will be merged.
 
     Before:
