@@ -4,24 +4,25 @@ piko.record @V {"x" : f32 at 0, "y" : f32 at 4, "z" : f32 at 8, "n" : i32 at 24}
 piko.record @W {"x" : f32 at 0, "y" : f32 at 4, "z" : f32 at 8} size 12 align 4
 piko.record @G {"y" : f32 at 0} size 4 align 4
 
-// Where all lanes read: for each a load of the 16 bytes that have x, y and z, and
-// a transposition of 4x4 words; n, which is beyond, alone is a gather. Elsewhere,
-// gathers.
+// For each lane a load of the 16 bytes that have x, y and z, of zeros where it
+// does not read, and a transposition of 4x4 words; n, which is beyond, alone is a
+// gather.
 // CHECK-LABEL: func.func private @P.kernel_a
 // CHECK:         %[[ALL:.*]] = vector.reduction <and>
-// CHECK-NEXT:    %{{.*}}:4 = scf.if %[[ALL]]
-// CHECK-COUNT-4:   llvm.load %{{.*}} {alignment = 4 : i64} : !llvm.ptr -> vector<4xi32>
-// CHECK:           vector.shuffle %{{.*}}, %{{.*}} [0, 4, 1, 5]
-// CHECK-NEXT:      vector.shuffle %{{.*}}, %{{.*}} [2, 6, 3, 7]
-// CHECK-NEXT:      vector.shuffle %{{.*}}, %{{.*}} [0, 4, 1, 5]
-// CHECK-NEXT:      vector.shuffle %{{.*}}, %{{.*}} [2, 6, 3, 7]
-// CHECK-NEXT:      vector.shuffle %{{.*}}, %{{.*}} [0, 1, 4, 5]
-// CHECK-NEXT:      vector.shuffle %{{.*}}, %{{.*}} [2, 3, 6, 7]
-// CHECK:           vector.bitcast %{{.*}} : vector<4xi32> to vector<4xf32>
-// CHECK:           llvm.intr.masked.gather
-// CHECK-NEXT:      scf.yield
-// CHECK-NEXT:    } else {
-// CHECK-COUNT-4:   llvm.intr.masked.gather
+// CHECK-NEXT:    scf.if %[[ALL]] -> (vector<4xi64>) {
+// CHECK:           llvm.ptrtoint
+// CHECK:           arith.select %{{.*}} : vector<4xi1>, vector<4xi64>
+// CHECK:         }
+// CHECK-COUNT-4: llvm.load %{{.*}} {alignment = 4 : i64} : !llvm.ptr -> vector<4xi32>
+// CHECK:         vector.shuffle %{{.*}}, %{{.*}} [0, 4, 1, 5]
+// CHECK-NEXT:    vector.shuffle %{{.*}}, %{{.*}} [2, 6, 3, 7]
+// CHECK-NEXT:    vector.shuffle %{{.*}}, %{{.*}} [0, 4, 1, 5]
+// CHECK-NEXT:    vector.shuffle %{{.*}}, %{{.*}} [2, 6, 3, 7]
+// CHECK-NEXT:    vector.shuffle %{{.*}}, %{{.*}} [0, 1, 4, 5]
+// CHECK-NEXT:    vector.shuffle %{{.*}}, %{{.*}} [2, 3, 6, 7]
+// CHECK:         vector.bitcast %{{.*}} : vector<4xi32> to vector<4xf32>
+// CHECK:         llvm.intr.masked.gather
+// CHECK-NOT:     llvm.intr.masked.gather
 //
 // A record of 12 bytes has no 16 to load.
 // CHECK-LABEL: func.func private @P.kernel_b
