@@ -279,6 +279,10 @@ void IterationLanes::checkBarriers() {
       for (Operation &inner : reduce.getBody().front().without_terminator())
         if (!hasVectorForm(&inner))
           refuse(&inner, "it has no vector form");
+        else if (llvm::any_of(inner.getOperands(), [&](Value operand) {
+                   return isVarying(operand);
+                 }))
+          refuse(&inner, "it combines by what differs between lanes");
     return WalkResult::skip();
   });
 }
