@@ -215,7 +215,7 @@ Compaction Compactor::write() {
 std::optional<Compaction> piko::compact(scf::ForOp loop) {
   scf::IfOp condition = findOnlyCondition(loop);
   if (!condition || !loop.getUpperBound().getType().isIndex() ||
-      !matchPattern(loop.getStep(), m_One()))
+      !matchPattern(loop.getStep(), m_One()) || loop.getUnsignedCmp())
     return std::nullopt;
   return Compactor(loop, condition).write();
 }

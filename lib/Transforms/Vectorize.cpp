@@ -404,6 +404,19 @@ static bool vectorizeCompacted(scf::ForOp loop, int64_t laneCount) {
   return true;
 }
 
+/// Whether a loop begins at a place in memory or a number of 32 bits, so that
+/// steps of several turns do not leave 64. A user's own 64 may be the last
+/// ones.
+static bool beginsEarly(scf::ForOp loop) {
+  Value lower = loop.getLowerBound();
+  while (isa_and_nonnull<arith::IndexCastOp, arith::IndexCastUIOp,
+                         arith::ExtSIOp, arith::ExtUIOp>(lower.getDefiningOp()))
+    lower = lower.getDefiningOp()->getOperand(0);
+  if (std::optional<int64_t> known = getConstantIntValue(lower))
+    return llvm::isInt<32>(*known);
+  return !lower.getType().isInteger(64);
+}
+
 bool VectorizePass::vectorizeInOrder(Operation *op) {
   StageOp stage = getKernelStage(op);
   if (!stage || !op->getParentOfType<scf::ForallOp>() ||
@@ -414,8 +427,8 @@ bool VectorizePass::vectorizeInOrder(Operation *op) {
   if (!copy)
     return false;
   countLoops(copy);
-  if (!isIndependent(copy) || isShort(copy, laneCount) || onlyMoves(copy) ||
-      hasVectorsAlong(copy) || isOverBox(copy)) {
+  if (!beginsEarly(copy) || !isIndependent(copy) || isShort(copy, laneCount) ||
+      onlyMoves(copy) || hasVectorsAlong(copy) || isOverBox(copy)) {
     copy.erase();
     return false;
   }

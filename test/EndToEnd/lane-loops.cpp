@@ -4,7 +4,7 @@
 // lane, remainders by what lanes share, and reads of records behind conditions.
 // RUN: sed -n 's|^// CASE: ||p' %s > %t.cases
 // RUN: piko-compare %s --cases %t.cases --runs 1 | FileCheck %s
-// CHECK-COUNT-7: {{^equal$}}
+// CHECK-COUNT-8: {{^equal$}}
 // CASE: --pipe Neighbours --domain 40 40 --count 700
 // CASE: --pipe Neighbours --domain 33 33 --count 5000
 // CASE: --pipe Insertion --domain 8 8 --count 1003
@@ -12,10 +12,13 @@
 // CASE: --pipe Remainders --domain 8 8 --count 1003 --wide
 // CASE: --pipe Bytes --domain 8 8 --count 1003
 // CASE: --pipe Copies --domain 8 8 --count 300
+// CASE: --pipe Late --domain 8 8 --count 300
 //
 // RUN: pikoc %s --pipe Neighbours --remarks --no-cache -o %t.ll 2>&1 | FileCheck %s --check-prefix=REMARK
-// REMARK: lane-loops.cpp:[[# @LINE + 22]]:{{.*}} iterations of this loop do not depend on one another, and are vectorized for {{.*}} at once, of those that have something to do
+// REMARK: lane-loops.cpp:[[# @LINE + 24]]:{{.*}} iterations of this loop do not depend on one another, and are vectorized for {{.*}} at once, of those that have something to do
 #include <piko.h>
+
+#include <cstdint>
 
 struct Prim {
   int x, y, z, w, serial;
@@ -182,6 +185,25 @@ struct Copies : piko::Pipe<State> {
   Copy copy;
   Copies() {
     source(copy);
+    allocateForSource(state().results, 0);
+  }
+};
+
+// Steps of several turns would leave 64 bits.
+struct Ending : piko::Stage<0, 0, 64, Prim>, piko::Uses<State> {
+  void process(const piko::List<Prim> &list) {
+    for (int64_t i = INT64_MAX - 20; i < INT64_MAX - (list[0].x & 1); ++i) {
+      float sum = float(i & 31);
+      for (int k = 0; k < 9; ++k)
+        sum = piko::sqrt(sum * sum + 1) * 0.7f + float(k) / (sum + 3);
+      state().results[int(i & 63)].sum = sum;
+    }
+  }
+};
+struct Late : piko::Pipe<State> {
+  Ending ending;
+  Late() {
+    source(ending);
     allocateForSource(state().results, 0);
   }
 };
