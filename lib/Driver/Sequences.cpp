@@ -131,6 +131,10 @@ static void addUnitsToLoops(OpPassManager &passes,
 
 void piko::addScalarSequence(OpPassManager &passes,
                              const SynthesisOptions &options) {
+  if (options.has("defer-shading")) {
+    passes.nest<PipelineOp>().addPass(createDeferShading());
+    addCleanUp(passes);
+  }
   if (options.has("form-tiles"))
     passes.nest<PipelineOp>().addPass(createFormTiles());
   // The widest vectors that there are: others are made of two or four.

@@ -16,9 +16,9 @@ const std::vector<std::string> &SynthesisOptions::getOptional() {
   static const std::vector<std::string> names = {
       "pre-schedule", "infer-directives", "fuse-stages", "test-early", "prune",
       "own-pixels", "eliminate-schedules", "fuse-kernels", "form-strips",
-      "form-tiles", "prefetch", "vectorize", "prove-bounds", "hoist-bounds",
-      "merge-bounds", "thread-jumps", "narrow-integers", "merge-gathers",
-      "if-convert", "uplift-pixel-loops", "privatize",
+      "defer-shading", "form-tiles", "prefetch", "vectorize", "prove-bounds",
+      "hoist-bounds", "merge-bounds", "thread-jumps", "narrow-integers",
+      "merge-gathers", "if-convert", "uplift-pixel-loops", "privatize",
       // of LLVM
       "loop-vectorize", "slp-vectorizer"};
   return names;

@@ -49,7 +49,7 @@ struct Shade : piko::Stage<8, 8, 64, Item>, piko::Uses<State> {
           return passed;
         })) {
       float color = work(i.x, i.y);
-      update(state().color, i.at, [&](float &c) { c = color; });
+      update(state().color, i.at, [&](float &c) { c = c * 0.5f + color; });
     }
   }
 };

@@ -48,6 +48,80 @@ def FormWork : Pass<"piko-form-work", "::piko::PipelineOp"> {
                            "::mlir::scf::SCFDialect"];
 }
 
+def DeferShading : Pass<"piko-defer-shading", "::piko::PipelineOp"> {
+  let summary = "Shade each pixel once, when a bin's primitives are done";
+  let description = [{
+    **Requires** the machine level (`piko-form-work`).
+
+    **Does**: takes images whose pixels a kernel overwrites and never reads: of
+    all that the primitives of a bin write to a pixel, only the last is seen. In
+    place of such an update, what it is computed from is kept for the pixel, in
+    arrays of the bin (deferred shading: T. Saito and T. Takahashi,
+    "Comprehensible Rendering of 3-D Shapes", 1990); the rest is done in a loop
+    over the bin's pixels behind the work, once for each pixel that a primitive
+    has overwritten, in full vectors. Where to cut is found by the minimum cut
+    of what all updates of the image compute alike: the fewest bytes, and all
+    loops behind it.
+
+    The test that decides whether a primitive is seen stays where it is, and may
+    be any. An update that tests a pixel and paints it, on one condition, is split
+    in two for that: one that changes what the test reads, and one that
+    overwrites the rest.
+
+    **Guarantees** the same images. A read outside of a buffer is no error where
+    what was read is overwritten.
+
+    Before:
+    ```
+    piko.items of @a {
+    ^bb0(%f: !piko.prim<@F>):
+      ...
+      %passed = piko.update @depth[%x, %y : i32, i32] in %bin { ... } -> i1
+      scf.if %passed {
+        %sum = scf.for ... { ... %normal ... }
+        piko.update @color[%x, %y : i32, i32] in %bin { ... piko.yield[%sum] }
+      }
+    }
+    ```
+    After:
+    ```
+    %painted = memref.alloca() : memref<1024xi32>   // all 0
+    %normals = memref.alloca() : memref<1024xf32>
+    piko.items of @a {
+    ^bb0(%f: !piko.prim<@F>):
+      ...
+      %passed = piko.update @depth[%x, %y : i32, i32] in %bin { ... } -> i1
+      scf.if %passed {
+        memref.store %normal, %normals[%place]
+        memref.store %one, %painted[%place]
+      }
+    }
+    piko.parallel_pixels(%lo, ...) to (%hi, ...) {
+    ^bb0(%x: i32, %y: i32):
+      scf.if /* painted at %place */ {
+        %normal = memref.load %normals[%place]
+        %sum = scf.for ... { ... %normal ... }
+        piko.update @color[%x, %y : i32, i32] in %bin { ... piko.yield[%sum] }
+      }
+    }
+    ```
+
+    **Limits**: all updates of the image do the same from the cut on, at pixels
+    that are proved to be in the bin (`piko-prove-bounds`); one thread runs a
+    bin. What is cheaper to compute than to keep stays: a few operations without
+    a loop. A remark says what is kept, or what is in the way.
+  }];
+  let options = [
+    Option<"budget", "budget", "int64_t", "262144",
+           "Most bytes that are kept of a bin">];
+  let statistics = [
+    Statistic<"deferred", "deferred", "images that are written once a pixel">,
+    Statistic<"refused", "refused", "images that are written more often">];
+  let dependentDialects = ["::mlir::arith::ArithDialect",
+                           "::mlir::memref::MemRefDialect",
+                           "::mlir::scf::SCFDialect"];
+}
+
 def FormTiles : Pass<"piko-form-tiles", "::piko::PipelineOp"> {
   let summary = "Keep the pixels of a bin near who runs it";
   let description = [{

@@ -12,7 +12,7 @@ module, scene = sys.argv[1:]
 IN_PIPELINE = """
     order-stages pre-schedule infer-directives fuse-stages test-early own-pixels
     eliminate-schedules form-kernels fuse-kernels form-program form-strips
-    form-work form-tiles form-units split-loops prefetch""".split()
+    form-work defer-shading form-tiles form-units split-loops prefetch""".split()
 STEPS = [f"piko.pipeline(piko-{name})" for name in IN_PIPELINE]
 STEPS.insert(5, "piko-prune")
 # Where tiles are does not show.
