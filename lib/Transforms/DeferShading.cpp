@@ -9,6 +9,7 @@
 //      bin's pixels behind the work.
 
 #include "CommonSlice.h"
+#include "PaintedPixels.h"
 #include "SplitUpdate.h"
 #include "StateAccess.h"
 
@@ -22,8 +23,6 @@
 #include "mlir/Dialect/MemRef/IR/MemRef.h"
 #include "mlir/Dialect/SCF/IR/SCF.h"
 #include "mlir/Interfaces/LoopLikeInterface.h"
-#include "llvm/ADT/MapVector.h"
-#include "llvm/ADT/SmallBitVector.h"
 
 namespace piko {
 #define GEN_PASS_DEF_DEFERSHADING
@@ -39,14 +38,6 @@ struct DeferShadingPass : piko::impl::DeferShadingBase<DeferShadingPass> {
   using DeferShadingBase::DeferShadingBase;
   void runOnOperation() override;
   void runOnBins(KernelOp kernel, BinsOp bins);
-};
-
-/// A place at which a primitive overwrites a pixel, of one image or of several.
-struct Site {
-  SmallVector<UpdateOp> updates; // in the order of the images
-  ValueRange getCoordinates() const {
-    return UpdateOp(updates.front()).getCoordinates();
-  }
 };
 
 /// Why something cannot be done, and where.
@@ -96,84 +87,6 @@ private:
 };
 
 } // namespace
-
-//===----------------------------------------------------------------------===//
-// What overwrites a pixel
-//===----------------------------------------------------------------------===//
-
-/// Whether an update makes of a pixel what it was, or what has nothing to do
-/// with that.
-static bool overwrites(UpdateOp update) {
-  Block &body = update.getBody().front();
-  auto yield = cast<YieldOp>(body.getTerminator());
-  if (!update.getResults().empty())
-    return false;
-  for (auto [old, value] : llvm::zip(body.getArguments(), yield.getPixel()))
-    for (OpOperand &use : old.getUses())
-      if (use.getOwner() != yield || use.get() != value)
-        return false;
-  return true;
-}
-
-/// The numbers of a pixel that an update reads or changes.
-static llvm::SmallBitVector getTouched(UpdateOp update) {
-  Block &body = update.getBody().front();
-  auto yield = cast<YieldOp>(body.getTerminator());
-  llvm::SmallBitVector touched(body.getNumArguments());
-  for (auto [number, old] : llvm::enumerate(body.getArguments()))
-    touched[number] = !old.hasOneUse() || *old.user_begin() != yield ||
-                      yield.getPixel()[number] != old;
-  return touched;
-}
-
-/// The images that a kernel overwrites numbers of, of which it sees nothing,
-/// with what overwrites them.
-static llvm::MapVector<StringAttr, SmallVector<UpdateOp>>
-findPainted(Operation *kernel) {
-  llvm::MapVector<StringAttr, SmallVector<UpdateOp>> painted;
-  SmallVector<UpdateOp> changes;
-  llvm::DenseSet<StringAttr> others;
-  kernel->walk([&](Operation *op) {
-    auto [state, kind] = getStateAccess(op);
-    auto update = dyn_cast<UpdateOp>(op);
-    if (update && overwrites(update))
-      painted[state.getAttr()].push_back(update);
-    else if (update)
-      changes.push_back(update);
-    else if (state)
-      others.insert(state.getAttr());
-  });
-  painted.remove_if([&](auto &image) {
-    return others.contains(image.first) ||
-           llvm::any_of(changes, [&](UpdateOp change) {
-             return change.getImageAttr().getAttr() == image.first &&
-                    llvm::any_of(image.second, [&](UpdateOp update) {
-                      return getTouched(change).anyCommon(getTouched(update));
-                    });
-           });
-  });
-  return painted;
-}
-
-/// Sites of images that are painted together.
-static SmallVector<SmallVector<Site>> findSites(Operation *kernel) {
-  SmallVector<SmallVector<Site>> groups;
-  auto isPaintedWith = [](ArrayRef<Site> sites, ArrayRef<UpdateOp> updates) {
-    return llvm::equal(sites, updates, [](const Site &site, UpdateOp update) {
-      return site.updates.front()->getBlock() == update->getBlock() &&
-             llvm::equal(site.getCoordinates(), update.getCoordinates());
-    });
-  };
-  for (auto &[image, updates] : findPainted(kernel)) {
-    SmallVector<Site> *group = llvm::find_if(
-        groups, [&](auto &sites) { return isPaintedWith(sites, updates); });
-    if (group == groups.end())
-      group = &groups.emplace_back(updates.size());
-    for (auto [site, update] : llvm::zip(*group, updates))
-      site.updates.push_back(update);
-  }
-  return groups;
-}
 
 //===----------------------------------------------------------------------===//
 // What can be done later
@@ -527,33 +440,6 @@ void Deferral::apply() {
 // The pass
 //===----------------------------------------------------------------------===//
 
-/// Whether a site paints a pixel once for each bin: it stands in one loop, over
-/// pixels, of a phase that takes the bin's list.
-static bool paintsOnce(Operation *work, const Site &site) {
-  Operation *loop = nullptr;
-  for (Operation *at = site.updates.front()->getParentOp(); at != work;
-       at = at->getParentOp())
-    if (isa<LoopLikeOpInterface, ParallelLoopOpInterface>(at)) {
-      if (loop || !isa<ParallelPixelsOp>(at))
-        return false;
-      loop = at;
-    }
-  return isa<ListsOp>(work);
-}
-
-/// The work of a bin in which all sites are, or null.
-static Operation *findWork(BinsOp bins, ArrayRef<Site> sites) {
-  Operation *only = nullptr;
-  for (const Site &site : sites) {
-    Operation *work =
-        bins.getBodyBlock()->findAncestorOpInBlock(*site.updates.front());
-    if (!work || (only && only != work))
-      return nullptr;
-    only = work;
-  }
-  return isa<WorkOpInterface>(only) ? only : nullptr;
-}
-
 void DeferShadingPass::runOnBins(KernelOp kernel, BinsOp bins) {
   if (!whyNotOf(lookupInPipeline<StageOp>(bins, bins.getStageAttr()))) {
     SmallVector<UpdateOp> updates;
@@ -564,7 +450,7 @@ void DeferShadingPass::runOnBins(KernelOp kernel, BinsOp bins) {
       });
   }
   for (const SmallVector<Site> &sites : findSites(kernel)) {
-    Operation *work = findWork(bins, sites);
+    Operation *work = findPaintingWork(bins, sites);
     if (!work || (sites.size() == 1 && paintsOnce(work, sites.front())))
       continue;
     Deferral deferral(bins, work, sites);
