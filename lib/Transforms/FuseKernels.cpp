@@ -71,7 +71,8 @@ static KernelOp findKernel(StageOp stage) {
 
 static bool waitsForBin(StageOp stage) {
   ScheduleOp schedule = stage.getSchedule();
-  return stage.getTakesList() || (schedule && schedule.getEndBin());
+  return stage.getTakesList() ||
+         (schedule && (schedule.getEndBin() || schedule.getBehind()));
 }
 
 static ScheduleKind getKind(StageOp stage) {

@@ -7,6 +7,8 @@
 //   3. give the consumer's ports and edges to the producer, and drop the
 //      consumer.
 
+#include "StateAccess.h"
+
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "Piko/Transforms/Passes.h"
 
@@ -18,6 +20,7 @@
 #include "mlir/Dialect/UB/IR/UBOps.h"
 #include "mlir/IR/IRMapping.h"
 #include "mlir/IR/Matchers.h"
+#include "mlir/Interfaces/LoopLikeInterface.h"
 
 namespace piko {
 #define GEN_PASS_DEF_FUSESTAGES
@@ -32,7 +35,13 @@ namespace {
 struct FuseStagesPass : piko::impl::FuseStagesBase<FuseStagesPass> {
   using FuseStagesBase::FuseStagesBase;
   void runOnOperation() override;
-  LogicalResult check(EdgeOp edge, Refusal &refusal);
+  LogicalResult check(EdgeOp edge, Refusal &refusal) {
+    return check(edge, lookupInPipeline<StageOp>(edge, edge.getProducerAttr()),
+                 refusal);
+  }
+  LogicalResult check(EdgeOp edge, StageOp host, Refusal &refusal);
+  bool emitsFurther(StageOp stage, StageOp host);
+  bool runsBetterBehind(EdgeOp edge);
 };
 
 /// Makes a stage part of the one that feeds it.
@@ -123,7 +132,9 @@ static Operation *getLoopAround(Operation *op) {
   return nullptr;
 }
 
-LogicalResult FuseStagesPass::check(EdgeOp edge, Refusal &refusal) {
+/// Checks an edge whose producer is, or will be, part of `host`.
+LogicalResult FuseStagesPass::check(EdgeOp edge, StageOp host,
+                                    Refusal &refusal) {
   auto producer = lookupInPipeline<StageOp>(edge, edge.getProducerAttr());
   auto consumer = lookupInPipeline<StageOp>(edge, edge.getConsumerAttr());
   auto refuse = [&](Operation *at, const Twine &why) {
@@ -141,7 +152,11 @@ LogicalResult FuseStagesPass::check(EdgeOp edge, Refusal &refusal) {
     return refuse(consumer, "bins are divided into tiles");
   if (consumer.collects())
     return refuse(consumer, "it waits until no primitive can reach it");
-  if (failed(checkSchedules(producer, consumer, refusal)))
+  if (ScheduleOp schedule = consumer.getSchedule();
+      schedule && schedule.getBehind())
+    return refuse(consumer, "its loops fill vectors behind the other");
+  if (failed(checkSchedules(producer.getSchedule() ? producer : host, consumer,
+                            refusal)))
     return failure();
 
   AssignOp assign = consumer.getAssign();
@@ -182,6 +197,96 @@ LogicalResult FuseStagesPass::check(EdgeOp edge, Refusal &refusal) {
       if (loop.hasBarriers())
         return refuse(emit, "it is emitted between iterations that meet");
   return success();
+}
+
+//===----------------------------------------------------------------------===//
+// Loop fission
+//===----------------------------------------------------------------------===//
+
+static bool isLoop(Operation *op) {
+  return isa<LoopLikeOpInterface, ParallelLoopOpInterface>(op);
+}
+
+/// Whether a phase has a loop that is not over pixels or iterations.
+static bool hasLoop(ProcessOp process) {
+  return process
+      ->walk([](LoopLikeOpInterface) { return WalkResult::interrupt(); })
+      .wasInterrupted();
+}
+
+/// Whether a stage, with all that become part of it, emits to another.
+bool FuseStagesPass::emitsFurther(StageOp stage, StageOp host) {
+  return llvm::any_of(getEdgesFrom(stage), [&](EdgeOp edge) {
+    Refusal refusal;
+    auto consumer = lookupInPipeline<StageOp>(edge, edge.getConsumerAttr());
+    return failed(check(edge, host, refusal)) || emitsFurther(consumer, host);
+  });
+}
+
+/// Whether all that a stage emits stays in its bin, and meets nothing else:
+/// lineage is not needed, as it is in order there.
+static bool staysInBin(StageOp stage) {
+  return llvm::all_of(getEdgesFrom(stage), [&](EdgeOp edge) {
+    auto consumer = lookupInPipeline<StageOp>(edge, edge.getConsumerAttr());
+    AssignOp assign = consumer.getAssign();
+    return assign && consumer.getBins() == stage.getBins() &&
+           !isOnCycle(consumer) && !hasSource(consumer) &&
+           getEdgesInto(consumer).size() == 1 &&
+           isa_and_nonnull<AssignPreviousOp>(getOnlyAssignment(assign)) &&
+           !consumer.getTile() && staysInBin(consumer);
+  });
+}
+
+/// Whether a consumer that can be fused is better run behind its producer, bin
+/// by bin: loops of what is emitted in a loop are run for the few iterations
+/// that emit at a time, and lanes of a vector have nothing to do; from a list
+/// they are full. What only ends in pixels has piko-defer-shading for that.
+bool FuseStagesPass::runsBetterBehind(EdgeOp edge) {
+  auto producer = lookupInPipeline<StageOp>(edge, edge.getProducerAttr());
+  auto consumer = lookupInPipeline<StageOp>(edge, edge.getConsumerAttr());
+  if (producer.isWholeDomain() || !hasLoop(consumer.getProcess()) ||
+      !getWrittenState(consumer.getProcess()).empty())
+    return false;
+  if (ScheduleOp schedule = producer.getSchedule();
+      schedule && (schedule.getTileSplit() || schedule.getUnordered()))
+    return false;
+  bool isInLoop = llvm::any_of(
+      getEmits(producer, edge.getPort()), [&](EmissionOpInterface emit) {
+        Operation *at = emit->getParentOp();
+        while (at != producer.getProcess() && !isLoop(at))
+          at = at->getParentOp();
+        return at != producer.getProcess();
+      });
+  llvm::DenseSet<StringAttr> written = getWrittenState(producer.getProcess());
+  bool readsChanges =
+      consumer.getProcess()
+          ->walk([&](StateAccessOpInterface access) {
+            return written.contains(access.getAccessedState().getAttr())
+                       ? WalkResult::interrupt()
+                       : WalkResult::advance();
+          })
+          .wasInterrupted();
+  return isInLoop && !readsChanges && staysInBin(consumer) &&
+         emitsFurther(consumer, producer);
+}
+
+/// Lets a stage run behind its producer, on the same core.
+static void runBehind(StageOp stage, StageOp producer) {
+  ScheduleOp schedule = stage.getSchedule();
+  OpBuilder builder(stage.getProcess());
+  auto unit = builder.getUnitAttr();
+  if (!schedule) {
+    ScheduleOp before = producer.getSchedule();
+    auto kind = ScheduleKindAttr::get(
+        builder.getContext(),
+        getKind(producer).value_or(ScheduleKind::LoadBalance));
+    schedule = ScheduleOp::create(
+        builder, stage.getLoc(), kind, /*tileSplit=*/nullptr,
+        /*endStage=*/nullptr, /*endBin=*/nullptr, /*behind=*/nullptr,
+        /*batch=*/nullptr, /*everyBin=*/nullptr, /*unordered=*/nullptr,
+        before ? before.getResolvedAttr() : nullptr, /*lanes=*/nullptr);
+  }
+  schedule.setBehindAttr(unit);
 }
 
 //===----------------------------------------------------------------------===//
@@ -361,6 +466,16 @@ void FuseStagesPass::runOnOperation() {
         Refusal refusal;
         if (failed(check(edge, refusal)))
           continue;
+        if (fission && runsBetterBehind(edge)) {
+          runBehind(consumer, producer);
+          consumer.emitRemark()
+              << "stage '" << getCppName(consumer) << "' takes what stage '"
+              << getCppName(producer)
+              << "' emits in a loop from a list, as its own loops fill vectors "
+                 "there";
+          ++behind;
+          continue;
+        }
         consumer.emitRemark()
             << "stage '" << getCppName(consumer) << "' runs inside stage '"
             << getCppName(producer) << "'";

@@ -213,10 +213,11 @@ void pikort_pipeline::findLocals() {
       continue;
     const Stage &from = stages[edge.producer], &to = stages[edge.consumer];
     auto isAlone = [](const Stage &stage) {
-      return stage.cycle < 0 && stage.stripGroup < 0 && stage.cellSize == 0 &&
+      return stage.cycle < 0 && stage.cellSize == 0 &&
              !(stage.flags & PIKOIR_SPLIT);
     };
-    if (!to.collects() || to.inputs.size() != 1 || !to.sources.empty() ||
+    if (from.stripGroup != to.stripGroup || !to.collects() ||
+        to.inputs.size() != 1 || !to.sources.empty() ||
         from.binSize != to.binSize || !isAlone(from) || !isAlone(to))
       bad("stage " + quoted(to.name) +
           ": expected a local edge between stages with the same bins, which "

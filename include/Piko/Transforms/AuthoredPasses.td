@@ -347,6 +347,11 @@ def FuseStages : Pass<"piko-fuse-stages", "::piko::PipelineOp"> {
     order. The stage notes in `fused` whose phases it holds, and each access to
     state whose phase it is from.
 
+    A consumer with loops, which what a producer emits in a loop would be put
+    into, is left apart if it emits in turn: it runs `behind`, so that
+    `piko-fuse-kernels` makes one kernel of both, with a list of the bin between
+    them (loop fission). From the list, lanes of vectors are full.
+
     Before:
     ```
     piko.edge @a[0] -> @b
@@ -372,9 +377,12 @@ def FuseStages : Pass<"piko-fuse-stages", "::piko::PipelineOp"> {
   }];
   let options = [
     Option<"maxCopies", "max-copies", "int64_t", "4",
-           "To how many places a stage may be copied">];
+           "To how many places a stage may be copied">,
+    Option<"fission", "fission", "bool", "true",
+           "Leave apart what is better run behind its producer">];
   let statistics = [
     Statistic<"fused", "fused", "stages that became part of another">,
+    Statistic<"behind", "behind", "stages that run behind another">,
     Statistic<"refused", "refused", "edges that stay">];
   let dependentDialects = ["::mlir::arith::ArithDialect",
                            "::mlir::memref::MemRefDialect",

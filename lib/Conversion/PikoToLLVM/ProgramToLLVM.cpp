@@ -184,7 +184,9 @@ static_assert(int(ScheduleKind::LoadBalance) == PIKOIR_LOAD_BALANCE &&
 /// pikoir_stage_flags
 static int64_t stageFlags(StageOp stage) {
   ScheduleOp schedule = stage.getSchedule();
-  return (stage.collects() ? PIKOIR_COLLECTS : 0) |
+  // Of a stage that runs behind another nothing shows where its lineage starts.
+  bool isBehind = schedule && schedule.getBehind();
+  return (stage.collects() || isBehind ? PIKOIR_COLLECTS : 0) |
          (stage.getSplit() ? PIKOIR_SPLIT : 0) |
          (stage.getPlaced() ? PIKOIR_PLACED : 0) |
          (schedule && schedule.getUnordered() ? PIKOIR_UNORDERED : 0) |

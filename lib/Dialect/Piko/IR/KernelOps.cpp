@@ -108,7 +108,8 @@ LogicalResult piko::verifyLocalEdge(Operation *op, FlatSymbolRefAttr from,
       return op->emitOpError("expected stages with bins of one size, but got ")
              << "[" << producer.getBins() << "] and [" << consumer.getBins()
              << "]";
-    if (!consumer.collects())
+    ScheduleOp schedule = consumer.getSchedule();
+    if (!consumer.collects() && !(schedule && schedule.getBehind()))
       return op->emitOpError("expected a stage that waits for its bin, but ")
              << to << " does not";
     return success();
