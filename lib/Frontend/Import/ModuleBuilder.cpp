@@ -218,8 +218,8 @@ private:
         static_cast<ScheduleKind>(schedule.getPolicy()),
         number(schedule.tileSplit),
         waits.empty() ? mlir::ArrayAttr() : builder.getArrayAttr(waits),
-        schedule.endBin, /*behind=*/false, number(schedule.batch), schedule.everyBin,
-        schedule.unordered, /*resolved=*/false, lanes);
+        schedule.endBin, /*behind=*/false, number(schedule.batch),
+        schedule.everyBin, schedule.unordered, /*resolved=*/false, lanes);
     return !schedule.isDynamic ||
            buildPhase(WrapperKind::Schedule, stageNumber, op.getBody());
   }
