@@ -43,11 +43,8 @@ SmallVector<LoadOp> IterationWriter::findFields(Operation *first) const {
   return fields.size() < least ? SmallVector<LoadOp>() : fields;
 }
 
-/// Where all active lanes read one element, scalar loads read it; elsewhere,
-/// gathers do.
-void IterationWriter::writeFields(ArrayRef<LoadOp> loads) {
-  LoadOp first = loads.front();
-  SmallVector<Value> places = getPlaces(first.getIndices());
+std::pair<SmallVector<Value>, Value>
+IterationWriter::compareWithFirst(ValueRange places) {
   // No lane is active here only where nothing that is read matters.
   Value bits = getBits(active);
   Value last = arith::ConstantOp::create(
@@ -56,7 +53,7 @@ void IterationWriter::writeFields(ArrayRef<LoadOp> loads) {
   lane = arith::AndIOp::create(builder, loc, lane, last);
   lane =
       arith::IndexCastUIOp::create(builder, loc, builder.getIndexType(), lane);
-  Value differ;
+  Value differ = zeros(active.getType());
   SmallVector<Value> firsts;
   for (Value place : places) {
     if (!isa<VectorType>(place.getType())) {
@@ -67,14 +64,22 @@ void IterationWriter::writeFields(ArrayRef<LoadOp> loads) {
         vector::ExtractOp::create(builder, loc, place, OpFoldResult(lane)));
     Value other = arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::ne,
                                         place, splat(firsts.back()));
-    differ = differ ? arith::OrIOp::create(builder, loc, differ, other) : other;
+    differ = arith::OrIOp::create(builder, loc, differ, other);
   }
+  return {firsts, any(both(active, differ))};
+}
+
+/// Where all active lanes read one element, scalar loads read it; elsewhere,
+/// gathers do.
+void IterationWriter::writeFields(ArrayRef<LoadOp> loads) {
+  auto [first, differ] =
+      compareWithFirst(getPlaces(LoadOp(loads.front()).getIndices()));
+  ArrayRef<Value> firsts = first; // which lambdas can capture
   SmallVector<Type> types;
   for (LoadOp load : loads)
     types.push_back(getVectorType(load.getType()));
-  auto choice =
-      scf::IfOp::create(builder, loc, types, any(both(active, differ)),
-                        /*addThenBlock=*/true, /*addElseBlock=*/true);
+  auto choice = scf::IfOp::create(builder, loc, types, differ,
+                                  /*addThenBlock=*/true, /*addElseBlock=*/true);
   OpBuilder::InsertionGuard guard(builder);
   auto fill = [&](Block *block, auto read) {
     builder.setInsertionPointToEnd(block);
@@ -97,4 +102,36 @@ void IterationWriter::writeFields(ArrayRef<LoadOp> loads) {
   });
   for (size_t i = 0; i < loads.size(); ++i)
     vectors.map(LoadOp(loads[i]).getResult(), choice.getResult(i));
+}
+
+/// An element for each lane, and of a row each line of the cache.
+void IterationWriter::writePrefetch(PrefetchOp prefetch) {
+  constexpr int64_t lineSize = 64;
+  SmallVector<Value> places = getPlaces(prefetch.getIndices());
+  bool isRow = isRowOf(prefetch.getIndices());
+  int64_t step = laneCount;
+  for (Value &place : places)
+    if (isa<VectorType>(place.getType())) {
+      place = choose(active, place, zeros(place.getType()));
+      step = 1;
+    }
+  if (isRow) {
+    RecordOp record =
+        lookupRecord(prefetch, getStateRecord(lookupInPipeline<Operation *>(
+                                   prefetch, prefetch.getStateAttr())));
+    step = std::max<int64_t>(lineSize / record.getSize(), 1);
+  }
+  for (int64_t lane = 0; lane < laneCount; lane += step) {
+    SmallVector<Value> own;
+    for (Value place : places)
+      own.push_back(
+          isa<VectorType>(place.getType())
+              ? vector::ExtractOp::create(builder, loc, place, lane).getResult()
+              : place);
+    if (isRow)
+      own[0] = arith::AddIOp::create(
+          builder, loc, own[0],
+          arith::ConstantIndexOp::create(builder, loc, lane));
+    PrefetchOp::create(builder, loc, prefetch.getState(), own);
+  }
 }

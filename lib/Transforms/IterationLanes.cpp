@@ -26,6 +26,12 @@ bool piko::isPrefetch(Operation *op) {
   return isa<PrefetchOp, PrefetchItemOp>(op);
 }
 
+bool piko::asksAhead(scf::ForOp loop) {
+  return !isOverPrimitives(loop) &&
+         loop->walk([](PrefetchOp) { return WalkResult::interrupt(); })
+             .wasInterrupted();
+}
+
 bool piko::isStructure(Operation *op) {
   return isa<scf::IfOp, scf::ForOp, scf::WhileOp, scf::IndexSwitchOp>(op);
 }
@@ -371,7 +377,7 @@ LaneForm IterationLanes::getForm(Operation *op) const {
   if (isStructure(op))
     return LaneForm::Structure;
   if (isPrefetch(op))
-    return LaneForm::Lazy;
+    return asksAhead(loop) ? LaneForm::Access : LaneForm::Lazy;
   if (isBarrier(op))
     return LaneForm::Barrier;
   if (auto array = dyn_cast<memref::AllocaOp>(op))

@@ -152,6 +152,10 @@ bool isStructure(mlir::Operation *op);
 /// themselves.
 bool isPrefetch(mlir::Operation *op);
 
+/// Whether a loop is there to ask for memory: not one over primitives, whose
+/// lanes read it right away.
+bool asksAhead(mlir::scf::ForOp loop);
+
 /// Whether it may trap, or takes as long for one lane as for all.
 bool isDivision(mlir::Operation *op);
 /// Whether it is one of 32 bits for which floats of 64 bits are divided.

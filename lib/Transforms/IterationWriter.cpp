@@ -418,6 +418,8 @@ void IterationWriter::writeAccess(Operation *op) {
     return writeArrayAccess(op);
   if (isa<ItemOp, GetOp>(op))
     return writeItemAccess(op);
+  if (auto prefetch = dyn_cast<PrefetchOp>(op))
+    return writePrefetch(prefetch);
   auto write = [&](auto access, auto create) {
     ValueRange indices = access.getIndices();
     bool isRow = isRowOf(indices);

@@ -78,6 +78,10 @@ private:
   /// written together; or none.
   llvm::SmallVector<LoadOp> findFields(mlir::Operation *first) const;
   void writeFields(llvm::ArrayRef<LoadOp> loads);
+  /// Places as those of the first active lane, and whether others differ.
+  std::pair<llvm::SmallVector<mlir::Value>, mlir::Value>
+  compareWithFirst(mlir::ValueRange places);
+  void writePrefetch(PrefetchOp prefetch);
   void writeArrayAccess(mlir::Operation *op);
   void writePrivateAccess(mlir::Operation *op);
   void writeShortArrayAccess(mlir::Operation *op, mlir::Value index);

@@ -2,7 +2,11 @@
 //
 // piko-prefetch: what a later primitive refers to is asked for ahead of time.
 
+#include "Lanes.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
+#include "PrefetchRows.h"
+
+#include "Piko/Dialect/Piko/IR/Marks.h"
 #include "Piko/Transforms/Passes.h"
 
 #include "mlir/Dialect/Arith/IR/Arith.h"
@@ -163,6 +167,19 @@ static bool areSorted(ItemOp item) {
                       [](int64_t extent) { return extent != 0; });
 }
 
+/// Whether a loop is the innermost one over the pixels of a bin, which it takes
+/// once and not for each primitive.
+static bool isOverRows(scf::ForOp loop) {
+  if (!loop->hasAttr(marks::lanes) || !isa<scf::ForOp>(loop->getParentOp()) ||
+      isOverBox(loop))
+    return false;
+  for (Operation *at = loop; at; at = at->getParentOp())
+    if (auto outer = dyn_cast<scf::ForOp>(at);
+        outer && !outer.getBody()->getOps<ItemOp>().empty())
+      return false;
+  return true;
+}
+
 void PrefetchPass::runOnOperation() {
   SmallVector<std::pair<scf::ForOp, ItemOp>> found;
   getOperation().walk([&](scf::ForOp loop) {
@@ -171,4 +188,15 @@ void PrefetchPass::runOnOperation() {
   });
   for (auto [loop, item] : found)
     convert(loop, item);
+  SmallVector<scf::ForOp> pixels;
+  getOperation().walk([&](scf::ForOp loop) {
+    if (isOverRows(loop))
+      pixels.push_back(loop);
+  });
+  for (scf::ForOp loop : pixels)
+    if (int64_t count =
+            prefetchRows(cast<scf::ForOp>(loop->getParentOp()), loop)) {
+      elements += count;
+      ++loops;
+    }
 }

@@ -123,6 +123,8 @@ bool Candidate::decide(const IterationLanes &lanes) {
       remark.attachNote(refusal.at->getLoc()) << "here";
     return false;
   }
+  if (asksAhead(loop))
+    return true;
   IterationLanes::Cost cost = lanes.getCost();
   if (!ofPrimitives && !cost.computes)
     return false; // clears or copies, which needs no plan

@@ -21,6 +21,13 @@ def Prefetch : Pass<"piko-prefetch", "::piko::PipelineOp"> {
     Accesses", 2017). A stage with one bin for all takes its primitives as they
     were made, whose neighbours mostly refer to the same; it is left alone.
 
+    A loop over rows of pixels that reads a place from memory, as the number of
+    the triangle that is seen, asks in stages, a row further on for each read on
+    the way: for the corners of triangles of the next row, for the triangles of
+    the row behind it, and for the numbers of the third one. Of pixels that refer
+    to the same as those of the row before, nothing is asked. There are no stages
+    if a buffer is small.
+
     **Guarantees** that nothing changes but time: a prefetch reads nothing and
     cannot fail.
 
@@ -43,8 +50,10 @@ def Prefetch : Pass<"piko-prefetch", "::piko::PipelineOp"> {
       %t = piko.storage.item %bins[%i] ...
     ```
 
-    **Limits**: indices that are computed, and those of reads that only the much
-    longer side of a condition does, are not followed.
+    **Limits**: of primitives, indices that are computed, and those of reads that
+    only the much longer side of a condition does, are not followed. Of pixels,
+    only reads of buffers are, and of state that the loop does not change, not in
+    boxes nor for each primitive.
   }];
   let statistics = [
     Statistic<"loops", "loops", "loops that ask ahead">,

@@ -206,7 +206,10 @@ struct PrefetchLowering : ContextPattern<PrefetchOp> {
     Value element = LLVM::GEPOp::create(rewriter, loc, view.data.getType(),
                                         rewriter.getI8Type(), view.data,
                                         ArrayRef<LLVM::GEPArg>{offset});
-    createPrefetch(rewriter, loc, element, record.getSize());
+    // Records that divide a line are mostly in one.
+    constexpr int64_t lineSize = 64;
+    createPrefetch(rewriter, loc, element,
+                   lineSize % record.getSize() == 0 ? 1 : record.getSize());
     rewriter.eraseOp(op);
     return success();
   }
