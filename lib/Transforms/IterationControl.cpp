@@ -405,4 +405,5 @@ void IterationWriter::write(OpBuilder::InsertPoint place) {
   createMasks();
   writeBlock(*loop.getBody());
   writeDeferred();
+  writeLastFlushes();
 }

@@ -121,6 +121,8 @@ void IterationWriter::writeOperation(Operation *op) {
     return;
   case LaneForm::Serial:
   case LaneForm::Ordered:
+    if (canStage(op))
+      return writeStaged(cast<AtomicOp>(op));
     writeSerial(op, op);
   }
 }

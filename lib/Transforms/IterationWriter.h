@@ -130,6 +130,18 @@ private:
   /// Runs the body of a region whose control flow is the same for all lanes.
   void writeShared(mlir::Region &from, mlir::Block *to, mlir::ValueRange like);
 
+  // Changes that wait in a list.
+  struct Staged {
+    mlir::Value count;                                ///< an array of one
+    llvm::MapVector<mlir::Value, mlir::Value> values; ///< arrays
+  };
+  bool canStage(mlir::Operation *op);
+  Staged &getStaged(AtomicOp atomic);
+  void writeStaged(AtomicOp atomic);
+  void writeFlush(AtomicOp atomic, const Staged &list, mlir::Value count);
+  /// Behind the loop.
+  void writeLastFlushes();
+
   // Lane by lane.
   /// What one lane does, and where it finds what that takes.
   struct Turn {
@@ -176,6 +188,7 @@ private:
   bool paired = false; ///< Lanes are not the loop's turns, one after the other.
   llvm::DenseMap<mlir::Operation *, mlir::Value> masks; ///< of groups: slots
   llvm::SmallVector<Turn> deferred;
+  llvm::MapVector<mlir::Operation *, Staged> staged;
 };
 
 } // namespace piko

@@ -322,7 +322,9 @@ def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
     by atomic operations alone: a scan over how many turns each lane makes fills
     vectors with pairs of a lane and a turn, so that the pixels of small boxes
     leave few lanes idle. (Where a lane makes more than 4,096 turns of one loop,
-    loops run in step, as others do.)
+    loops run in step, as others do.) What pairs change in private copies
+    (`piko-privatize`) is staged: 16 lanes compress it into a list, through which a
+    scalar loop goes when it is full, so that misses of the cache overlap.
 
     What must keep its order (emission, updates of pixels that lanes may share)
     runs lane by lane: all that one image or one writer is concerned with, as one

@@ -4,6 +4,7 @@
 
 #include "Piko/Target/Object.h"
 
+#include "CompressStores.h"
 #include "LowerArithmetic.h"
 #include "LowerPermutations.h"
 #include "Piko/Target/CodeGeneration.h"
@@ -82,6 +83,8 @@ static ModulePassManager makeLastPasses(const TargetMachine &machine,
   passes.addPass(LowerArithmeticPass(machine));
   if (machine.getTargetTriple().isX86() && optLevel > 0) {
     passes.addPass(createModuleToFunctionPassAdaptor(SelectBitsPass()));
+    passes.addPass(
+        createModuleToFunctionPassAdaptor(CompressStoresPass(machine)));
     passes.addPass(createModuleToFunctionPassAdaptor(WidenMasksPass(machine)));
     passes.addPass(
         createModuleToFunctionPassAdaptor(WidenGathersPass(machine)));
