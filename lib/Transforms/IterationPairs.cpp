@@ -14,8 +14,10 @@
 using namespace mlir;
 using namespace piko;
 
-/// With more turns of a loop the quotient of two floats would not be exact.
-static constexpr int64_t mostTurns = 4096;
+/// With more turns of a loop the quotient of two floats would not be exact: it
+/// is less than 2^10, of numbers below 2^20, so that two rounding errors are
+/// less than 2^-13, and it is at least 2^-11 away from an integer.
+static constexpr int64_t mostTurns = 1024;
 
 Value IterationWriter::number(int64_t value) {
   return arith::ConstantOp::create(
@@ -116,6 +118,17 @@ void IterationWriter::writePairs(ArrayRef<scf::ForOp> nest,
     count = at.mul(count, inner);
   Value ends = scan(builder, loc, count), starts = at.sub(ends, count);
   Value total = vector::ExtractOp::create(builder, loc, ends, laneCount - 1);
+  // There is one division for all pairs.
+  auto floats = getVectorType(builder.getF32Type());
+  auto constant = [&](float value) {
+    return splat(arith::ConstantOp::create(builder, loc,
+                                           builder.getF32FloatAttr(value)));
+  };
+  Value part;
+  if (nest.size() == 2)
+    part = arith::DivFOp::create(
+        builder, loc, constant(1),
+        arith::SIToFPOp::create(builder, loc, floats, counts[1]));
   auto made = scf::ForOp::create(
       builder, loc, at.index(0),
       arith::IndexCastOp::create(builder, loc, builder.getIndexType(), total),
@@ -150,17 +163,15 @@ void IterationWriter::writePairs(ArrayRef<scf::ForOp> nest,
     vectors.map(loop.getInductionVar(), at.add(lower, turns));
   };
   if (nest.size() == 2) {
-    // Exact, as both are small.
-    Value side = choose(active, permute(counts[1], lane), number(1));
-    auto floats = getVectorType(builder.getF32Type());
+    Value middle = arith::AddFOp::create(
+        builder, loc, arith::SIToFPOp::create(builder, loc, floats, turn),
+        constant(0.5));
     Value row = arith::FPToSIOp::create(
         builder, loc, words,
-        arith::DivFOp::create(
-            builder, loc, arith::SIToFPOp::create(builder, loc, floats, turn),
-            arith::SIToFPOp::create(builder, loc, floats, side)));
+        arith::MulFOp::create(builder, loc, middle, permute(part, lane)));
     row = choose(active, row, number(0));
     setVariable(nest[0], row);
-    turn = at.sub(turn, at.mul(row, side));
+    turn = at.sub(turn, at.mul(row, permute(counts[1], lane)));
     setVariable(nest[1], turn);
     for (Operation &op : scf::ForOp(nest[0]).getBody()->without_terminator())
       if (&op != nest[1])

@@ -19,10 +19,12 @@ piko.record @N {"n" : i32 at 0} size 4 align 4
 // CHECK:           vector.shuffle %{{.*}} [16, 16, 16, 16, 0,
 // CHECK:           vector.shuffle %{{.*}} [16, 16, 16, 16, 16, 16, 16, 16, 0,
 // CHECK:           %[[TOTAL:.*]] = vector.extract %[[ENDS:.*]][15] : i32 from vector<16xi32>
+// CHECK:           %[[PART:.*]] = arith.divf
 // CHECK:           %[[STOP:.*]] = arith.index_cast %[[TOTAL]] : i32 to index
 // CHECK:           scf.for %[[K:.*]] = %c0 to %[[STOP]] step %c16 {
 // CHECK-COUNT-4:     piko.cpu.permute %[[ENDS]][%{{.*}}] : vector<16xi32>, vector<16xi32>
-// CHECK:             %[[ROW:.*]] = arith.divf
+// CHECK:             %[[HERE:.*]] = piko.cpu.permute %[[PART]]
+// CHECK:             %[[ROW:.*]] = arith.mulf %{{.*}}, %[[HERE]]
 // CHECK:             arith.fptosi %[[ROW]] : vector<16xf32> to vector<16xi32>
 // CHECK:             piko.atomic add checked @sums
 // CHECK-NOT:         scf.while {{.*}} : (vector<16xindex>
