@@ -203,6 +203,65 @@ static bool thread(scf::IfOp later) {
   return true;
 }
 
+//===----------------------------------------------------------------------===//
+// Conditions that are known
+//===----------------------------------------------------------------------===//
+
+/// Whether a float is known not to be 0 where an operation stands: a condition
+/// around it compares it with 0.
+static bool isNonZeroAt(Value number, Operation *at) {
+  using P = arith::CmpFPredicate;
+  for (; !isa<KernelOp>(at); at = at->getParentOp()) {
+    auto choice = dyn_cast<scf::IfOp>(at->getParentOp());
+    auto compare = choice ? choice.getCondition().getDefiningOp<arith::CmpFOp>()
+                          : arith::CmpFOp();
+    if (compare && choice.getThenRegion().isAncestor(at->getParentRegion()) &&
+        compare.getLhs() == number &&
+        matchPattern(compare.getRhs(), m_AnyZeroFloat()) &&
+        llvm::is_contained({P::OGT, P::OLT, P::ONE}, compare.getPredicate()))
+      return true;
+  }
+  return false;
+}
+
+/// Whether some bit of an integer is known to be set where an operation stands.
+static bool hasBitsAt(Value number, Operation *at, unsigned depth = 8) {
+  APInt constant;
+  if (matchPattern(number, m_ConstantInt(&constant)))
+    return !constant.isZero();
+  Operation *op = number.getDefiningOp();
+  if (!op || depth == 0)
+    return false;
+  auto has = [&](Value value) { return hasBitsAt(value, at, depth - 1); };
+  if (isa<arith::OrIOp>(op))
+    return has(op->getOperand(0)) || has(op->getOperand(1));
+  if (isa<arith::ExtUIOp, arith::ExtSIOp>(op))
+    return has(op->getOperand(0));
+  if (auto bits = dyn_cast<arith::BitcastOp>(op))
+    return bits.getIn().getType().isFloat() && isNonZeroAt(bits.getIn(), at);
+  // What a shift does not lose.
+  auto shift = dyn_cast<arith::ShLIOp>(op);
+  auto wide =
+      shift ? shift.getLhs().getDefiningOp<arith::ExtUIOp>() : arith::ExtUIOp();
+  return wide && matchPattern(shift.getRhs(), m_ConstantInt(&constant)) &&
+         constant.ule(wide.getType().getIntOrFloatBitWidth() -
+                      wide.getIn().getType().getIntOrFloatBitWidth()) &&
+         has(wide.getIn());
+}
+
+/// scf.if %x > 0.0 { scf.if bits(%x) != 0 { .. } }  =>  scf.if %x > 0.0 { .. }
+static bool foldKnown(scf::IfOp choice) {
+  auto compare = choice.getCondition().getDefiningOp<arith::CmpIOp>();
+  if (!compare || compare.getPredicate() != arith::CmpIPredicate::ne ||
+      !matchPattern(compare.getRhs(), m_Zero()) ||
+      !hasBitsAt(compare.getLhs(), choice))
+    return false;
+  OpBuilder builder(choice);
+  choice.getConditionMutable().assign(arith::ConstantOp::create(
+      builder, choice.getLoc(), builder.getBoolAttr(true)));
+  return true;
+}
+
 void ThreadJumpsPass::runOnOperation() {
   bool changed = true;
   while (changed) {
@@ -223,4 +282,7 @@ void ThreadJumpsPass::runOnOperation() {
       }
     }
   }
+  getOperation().walk([&](KernelOp kernel) {
+    kernel.walk([&](scf::IfOp choice) { known += foldKnown(choice); });
+  });
 }

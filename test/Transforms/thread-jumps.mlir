@@ -90,4 +90,69 @@ piko.pipeline @P rank 1 {
       piko.atomic max_signed @out[%at : index] "k", %r : i32
     }
   }
+
+  // The bits of a float that is not 0 are not all 0, shifted or with others. Those
+  // of another float may be, of one on the other side of its condition, of one
+  // that may be no number, and those that a shift may have lost.
+  // CHECK-LABEL: piko.kernel @known
+  // CHECK:         scf.if
+  // CHECK-NOT:       scf.if
+  // CHECK:           piko.atomic max_unsigned @out[%{{.*}}] "k"
+  // CHECK:           arith.cmpi ne
+  // CHECK-NEXT:      scf.if
+  // CHECK:           arith.cmpi ne
+  // CHECK-NEXT:      scf.if
+  // CHECK:         } else {
+  // CHECK:           arith.cmpi ne
+  // CHECK-NEXT:      scf.if
+  // CHECK:         arith.cmpf une
+  // CHECK-NEXT:    scf.if
+  // CHECK:           arith.cmpi ne
+  // CHECK-NEXT:      scf.if
+  piko.kernel @known {
+    %at = arith.constant 0 : index
+    %zero = arith.constant 0.0 : f32
+    %none = arith.constant 0 : i32
+    %wide_none = arith.constant 0 : i64
+    %c32 = arith.constant 32 : i64
+    %c33 = arith.constant 33 : i64
+    %k = piko.load @in[%at : index] "k" : i32
+    %x = piko.load @in[%at : index] "x" : f32
+    %y = arith.addf %x, %x : f32
+    %isSeen = arith.cmpf ogt, %x, %zero : f32
+    %bits = arith.bitcast %x : f32 to i32
+    %wide = arith.extui %bits : i32 to i64
+    scf.if %isSeen {
+      %high = arith.shli %wide, %c32 : i64
+      %low = arith.extui %k : i32 to i64
+      %key = arith.ori %high, %low : i64
+      %any = arith.cmpi ne, %key, %wide_none : i64
+      scf.if %any {
+        piko.atomic max_unsigned @out[%at : index] "k", %k : i32
+      }
+      %lost = arith.shli %wide, %c33 : i64
+      %any_lost = arith.cmpi ne, %lost, %wide_none : i64
+      scf.if %any_lost {
+        piko.atomic max_unsigned @out[%at : index] "k", %k : i32
+      }
+      %other = arith.bitcast %y : f32 to i32
+      %any_other = arith.cmpi ne, %other, %none : i32
+      scf.if %any_other {
+        piko.atomic max_unsigned @out[%at : index] "k", %k : i32
+      }
+    } else {
+      %any = arith.cmpi ne, %bits, %none : i32
+      scf.if %any {
+        piko.atomic max_unsigned @out[%at : index] "k", %k : i32
+      }
+    }
+    %isOther = arith.cmpf une, %y, %zero : f32
+    scf.if %isOther {
+      %other = arith.bitcast %y : f32 to i32
+      %any = arith.cmpi ne, %other, %none : i32
+      scf.if %any {
+        piko.atomic max_unsigned @out[%at : index] "k", %k : i32
+      }
+    }
+  }
 }

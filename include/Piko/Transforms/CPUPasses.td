@@ -200,7 +200,8 @@ def ThreadJumps : Pass<"piko-thread-jumps", "::piko::PipelineOp"> {
     right half, or else the left one, if it takes work, moves behind the other,
     with what else serves only the sides. A condition that is known on one side of an earlier one, and does
     nothing there, moves into the other side. So lanes of which none passes the
-    first test do nothing else.
+    first test do nothing else. A condition that asks whether any bit of a number
+    is set, which bits of a float are that one around it compares with 0, goes.
 
     **Guarantees** the same results: what moves has no effects, or moves past
     nothing that has.
@@ -226,10 +227,7 @@ def ThreadJumps : Pass<"piko-thread-jumps", "::piko::PipelineOp"> {
       %isSeen = arith.cmpf ogt, %depth, %zero : f32
       scf.if %isSeen {
         %1 = arith.bitcast %depth : f32 to i32
-        %any = arith.cmpi ne, %1, %c0 : i32
-        scf.if %any {
-          piko.atomic max_signed @seen[%i : index] "key", %1 : i32
-        }
+        piko.atomic max_signed @seen[%i : index] "key", %1 : i32
       }
     }
     ```
@@ -243,7 +241,8 @@ def ThreadJumps : Pass<"piko-thread-jumps", "::piko::PipelineOp"> {
     Statistic<"split", "split", "conjunctions of which one half is evaluated "
               "only if the other holds">,
     Statistic<"threaded", "threaded", "conditions that moved into a side of "
-              "another">];
+              "another">,
+    Statistic<"known", "known", "conditions that others decide">];
 }
 
 def NarrowIntegers : Pass<"piko-narrow-integers", "::piko::PipelineOp"> {
@@ -321,7 +320,7 @@ def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
     where their turns differ between lanes but hand on nothing, and change state
     by atomic operations alone: a scan over how many turns each lane makes fills
     vectors with pairs of a lane and a turn, so that the pixels of small boxes
-    leave few lanes idle. (Where a lane makes more than 4,096 turns of one loop,
+    leave few lanes idle. (Where a lane makes more than 1,024 turns of one loop,
     loops run in step, as others do.) What pairs change in private copies
     (`piko-privatize`) is staged: 16 lanes compress it into a list, through which a
     scalar loop goes when it is full, so that misses of the cache overlap.
