@@ -157,6 +157,10 @@ void piko::addVectorSequence(OpPassManager &passes,
     passes.nest<PipelineOp>().addPass(createMergeGathers());
     addCleanUp(passes);
   }
+  if (options.has("tabulate-invariants")) {
+    passes.nest<PipelineOp>().addPass(createTabulateInvariants());
+    addCleanUp(passes);
+  }
   passes.nest<PipelineOp>().addPass(createConvertPikoToOpenMP());
   passes.addPass(createConvertPikoToLLVM());
   addCleanUp(passes);

@@ -18,7 +18,8 @@ const std::vector<std::string> &SynthesisOptions::getOptional() {
       "own-pixels", "eliminate-schedules", "fuse-kernels", "form-strips",
       "defer-shading", "form-tiles", "prefetch", "vectorize", "prove-bounds",
       "hoist-bounds", "merge-bounds", "thread-jumps", "narrow-integers",
-      "merge-gathers", "if-convert", "uplift-pixel-loops", "privatize",
+      "merge-gathers", "tabulate-invariants", "if-convert",
+      "uplift-pixel-loops", "privatize",
       // of LLVM
       "loop-vectorize", "slp-vectorizer"};
   return names;

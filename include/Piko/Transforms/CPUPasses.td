@@ -407,6 +407,52 @@ def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
 }
 
 
+def TabulateInvariants : Pass<"piko-tabulate-invariants", "::piko::PipelineOp"> {
+  let summary = "Compute once what each turn of an inner loop computes alike";
+  let description = [{
+    **Requires** loops over units (`convert-piko-to-scf`); best behind
+    `piko-vectorize`, where what lanes share is scalar.
+
+    **Does**: where an inner loop, as one over lights, is in others, as those over
+    pixels, and a number that takes a root or a division follows from the turn's
+    own number and from state that the kernel does not change, such as the length
+    of a light's direction, a loop in front of all others computes it for each turn
+    into an array (scalar expansion), from which the inner loop reads it. With more
+    than 1,024 turns the loop runs as it was.
+
+    **Guarantees** the same bits: what is read is what was computed, and the places
+    read are those of the loop's own turns.
+
+    Before:
+    ```
+    scf.for %y = %lo to %hi step %one {
+      scf.for %i = %zero to %n step %one {
+        %x = piko.load checked @lights[%i : index] "x" : f32
+        %length = math.sqrt %x : f32
+    ```
+    After:
+    ```
+    scf.for %i = %zero to %count step %one {
+      %x = piko.load checked @lights[%i : index] "x" : f32
+      %root = math.sqrt %x : f32
+      memref.store %root, %lengths[%i] : memref<1024xf32>
+    }
+    scf.for %y = %lo to %hi step %one {
+      scf.for %i = %zero to %n step %one {
+        %length = scf.if %fits -> (f32) {
+          %root = memref.load %lengths[%i] : memref<1024xf32>
+    ```
+
+    **Limits**: loops that count from 0 by one, up to a number that does not
+    change, and of state the elements of the turns' own numbers.
+  }];
+  let statistics = [
+    Statistic<"numbers", "numbers", "numbers that are read from arrays">];
+  let dependentDialects = ["::mlir::arith::ArithDialect",
+                           "::mlir::memref::MemRefDialect",
+                           "::mlir::scf::SCFDialect"];
+}
+
 def MergeGathers : Pass<"piko-merge-gathers", "::piko::PipelineOp"> {
   let summary = "Read fields of a record for all lanes at once";
   let description = [{
