@@ -10,6 +10,7 @@
 
 #include "mlir/Dialect/Arith/IR/Arith.h"
 #include "mlir/Dialect/Math/IR/Math.h"
+#include "mlir/Dialect/SCF/IR/SCF.h"
 #include "mlir/IR/ImplicitLocOpBuilder.h"
 #include "mlir/IR/Matchers.h"
 #include "mlir/IR/TypeUtilities.h"
@@ -130,6 +131,57 @@ static Value contract(Operation *sum, bool isDifference) {
                              product.op.getRhs(), addend);
 }
 
+/// A product that both sides of a condition yield, of numbers that they yield
+/// then; null if one yields something else, or nothing adds to it.
+static Value splitProduct(OpResult result, scf::IfOp choice) {
+  unsigned number = result.getResultNumber();
+  auto getYielded = [&](Region &side) {
+    Value value = side.front().getTerminator()->getOperand(number);
+    return value.getDefiningOp<arith::MulFOp>();
+  };
+  arith::MulFOp yes = getYielded(choice.getThenRegion()),
+                no = getYielded(choice.getElseRegion());
+  if (!yes || !no || llvm::none_of(result.getUsers(), [](Operation *user) {
+        return isa<arith::AddFOp, arith::SubFOp>(user);
+      }))
+    return {};
+  // The sides stay where they are, in a condition with two more results.
+  OpBuilder builder(choice);
+  SmallVector<Type> types(choice.getResultTypes());
+  types.append(2, result.getType());
+  auto made =
+      scf::IfOp::create(builder, choice.getLoc(), types, choice.getCondition());
+  made.getThenRegion().takeBody(choice.getThenRegion());
+  made.getElseRegion().takeBody(choice.getElseRegion());
+  made.thenYield()->insertOperands(types.size() - 2,
+                                   {yes.getLhs(), yes.getRhs()});
+  made.elseYield()->insertOperands(types.size() - 2,
+                                   {no.getLhs(), no.getRhs()});
+  builder.setInsertionPointAfter(made);
+  auto factors = made.getResults().take_back(2);
+  Value product =
+      arith::MulFOp::create(builder, yes.getLoc(), factors[0], factors[1]);
+  choice.replaceAllUsesWith(made.getResults().drop_back(2));
+  made.getResult(number).replaceAllUsesWith(product);
+  choice.erase();
+  return product;
+}
+
+/// Products that leave a condition as such can be contracted with what is added
+/// behind it.
+static void splitProducts(ProcessOp process) {
+  SmallVector<scf::IfOp> choices;
+  process.getBody().walk([&](scf::IfOp choice) {
+    if (choice.getNumResults() > 0)
+      choices.push_back(choice);
+  });
+  for (scf::IfOp choice : choices)
+    for (unsigned i = 0, count = choice.getNumResults(); i < count; ++i)
+      if (Value product = splitProduct(choice->getResult(i), choice))
+        choice =
+            product.getDefiningOp()->getOperand(0).getDefiningOp<scf::IfOp>();
+}
+
 //===----------------------------------------------------------------------===//
 // The pass
 //===----------------------------------------------------------------------===//
@@ -194,6 +246,7 @@ void ApplyPrecisionPass::runOnOperation() {
       approximate(process, counts);
       removeUnused(process);
     }
+    splitProducts(process);
     contract(process, counts);
     removeUnused(process);
     process.emitRemark() << "stage '" << getCppName(stage) << "' is "

@@ -227,3 +227,39 @@ piko.pipeline @Roots rank 1 {
     }
   }
 }
+
+// A product that both sides of a condition yield is contracted with what is added
+// behind it; one that only one side yields is none.
+// CHECK-LABEL: piko.pipeline @Sides
+// CHECK:         %[[SIDES:.*]]:4 = scf.if
+// CHECK:           scf.yield %{{.*}}, %{{.*}}, %[[A:.*]], %[[B:.*]] : f32, f32, f32, f32
+// CHECK:         } else {
+// CHECK:           scf.yield %{{.*}}, %{{.*}}, %[[B]], %[[A]] : f32, f32, f32, f32
+// CHECK:         math.fma %[[SIDES]]#2, %[[SIDES]]#3, %[[A]]
+// CHECK:         arith.addf %[[SIDES]]#1, %[[B]]
+piko.pipeline @Sides rank 1 {
+  piko.buffer @out : @F
+  piko.source @s
+  piko.stage @s bins [0] threads 1 : @F -> [] {
+    // expected-remark @below {{stage 's' is contracted: 1 additions are contracted, 0 divisions and 0 square roots approximated}}
+    piko.process precision contracted {
+    ^bb0(%f: !piko.prim<@F>):
+      %i = arith.constant 0 : index
+      %a = piko.get %f "a" : !piko.prim<@F> -> f32
+      %b = piko.get %f "b" : !piko.prim<@F> -> f32
+      %less = arith.cmpf olt, %a, %b : f32
+      %sides:2 = scf.if %less -> (f32, f32) {
+        %product = arith.mulf %a, %b : f32
+        scf.yield %product, %product : f32, f32
+      } else {
+        %product = arith.mulf %b, %a : f32
+        scf.yield %product, %a : f32, f32
+      }
+      %sum = arith.addf %sides#0, %a : f32
+      %other = arith.addf %sides#1, %b : f32
+      piko.store %sum, @out[%i : index] "a" : f32
+      piko.store %other, @out[%i : index] "a" : f32
+      piko.return
+    }
+  }
+}

@@ -61,8 +61,8 @@ def ApplyPrecision : Pass<"piko-apply-precision", "::piko::PipelineOp"> {
 
     **Does**, in a process phase that says `precision contracted`: makes an
     addition or a subtraction of a product a `math.fma`, whether the product is
-    used elsewhere, too, or not. Of two products the left one is fused. In one
-    that says `precision relaxed`, before that, in f32: makes a division a
+    used elsewhere, too, or not, and also if both sides of a condition yield one. Of
+    two products the left one is fused. In one that says `precision relaxed`, before that, in f32: makes a division a
     product with a reciprocal, of a constant the nearest one, otherwise a
     `piko.approximate_reciprocal` or, if the divisor is a square root, a
     `piko.approximate_rsqrt`; and a `math.sqrt` a `piko.approximate_sqrt`.
