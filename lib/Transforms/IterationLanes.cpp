@@ -82,8 +82,12 @@ void IterationLanes::analyze() {
   findSharedPixels();
   checkCarried();
   groups.clear();
-  if (!refusal.at)
+  emissions.clear();
+  emitted.clear();
+  if (!refusal.at) {
     findOrdered();
+    findEmissions();
+  }
 }
 
 /// Where lanes take turns to change an array, each has a column, though it does

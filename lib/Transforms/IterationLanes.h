@@ -6,6 +6,7 @@
 #define PIKO_LIB_TRANSFORMS_ITERATIONLANES_H
 
 #include "Piko/Analysis/Uniformity.h"
+#include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
 #include "mlir/Dialect/SCF/IR/SCF.h"
 #include "llvm/ADT/DenseSet.h"
@@ -37,6 +38,20 @@ struct OrderedGroup {
   explicit operator bool() const { return first; }
   bool contains(mlir::Operation *op) const;
   llvm::SmallVector<mlir::Operation *> getOperations() const;
+};
+
+/// A record that lanes emit, and where it is put.
+struct LaneRecord {
+  AppendOp append;
+  AppendBinOp place; ///< or null
+  const OrderedGroup *group = nullptr;
+};
+
+/// What vectors emit to a port for all lanes: each lane its records, in order.
+struct PortEmissions {
+  mlir::Value writer;
+  int64_t port = 0;
+  llvm::SmallVector<LaneRecord> records = {};
 };
 
 class IterationLanes {
@@ -99,6 +114,13 @@ public:
   findMovable(llvm::ArrayRef<mlir::Operation *> ops) const;
   /// What of a group lanes do in turns.
   llvm::SetVector<mlir::Operation *> findTurns(const OrderedGroup &group) const;
+  llvm::ArrayRef<PortEmissions> getEmissions() const { return emissions; }
+  /// Whether an operation is one of the emissions that vectors make.
+  bool isEmission(mlir::Operation *op) const { return emitted.contains(op); }
+  /// Why lanes take turns to emit, for a remark; or nothing.
+  llvm::StringRef explainTurns(mlir::Operation *emission) const;
+  /// Whether vectors store the records that lanes emit in their turns.
+  bool isStoredByVectors(AppendOp append) const;
   /// Whether lanes access one element behind the other.
   bool isRow(mlir::Operation *op) const;
 
@@ -120,6 +142,11 @@ private:
   void findGroups(mlir::Block &block,
                   const llvm::DenseSet<mlir::Operation *> &ops,
                   llvm::SmallVectorImpl<OrderedGroup> &found) const;
+  /// The same of emissions, whose groups end where a condition begins.
+  void findEmissionGroups(mlir::Block &block,
+                          const llvm::DenseSet<mlir::Operation *> &ops,
+                          llvm::SmallVectorImpl<OrderedGroup> &found) const;
+  bool areEmissions(llvm::ArrayRef<mlir::Operation *> ops) const;
   /// Groups of operations that keep their order among one another.
   llvm::SmallVector<OrderedGroup>
   makeGroups(llvm::ArrayRef<mlir::Operation *> ops) const;
@@ -128,6 +155,8 @@ private:
   bool canDefer(const OrderedGroup &group,
                 const llvm::SetVector<mlir::Operation *> &rest) const;
   bool isMovable(mlir::Operation *op) const;
+  bool addEmission(mlir::Operation *op, PortEmissions &port) const;
+  void findEmissions();
   void checkCarried();
   bool isAccess(mlir::Operation *op) const;
   bool isFixed(mlir::Value value) const;
@@ -142,6 +171,8 @@ private:
   llvm::DenseSet<mlir::Attribute> shared;
   llvm::DenseSet<mlir::Attribute> written; // state
   llvm::SmallVector<OrderedGroup> groups;
+  llvm::SmallVector<PortEmissions> emissions;
+  llvm::DenseSet<mlir::Operation *> emitted;
   llvm::DenseMap<mlir::Operation *, llvm::SmallVector<mlir::scf::ForOp>> nests;
 };
 

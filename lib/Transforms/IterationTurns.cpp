@@ -89,13 +89,16 @@ namespace {
 /// What operations that run lane by lane take from outside of them.
 class SerialInputs {
 public:
-  SerialInputs(const IterationLanes &lanes, ArrayRef<Operation *> ops)
+  /// Those of `records` are stored by vectors.
+  SerialInputs(const IterationLanes &lanes, ArrayRef<Operation *> ops,
+               const llvm::MapVector<Operation *, Value> &records)
       : lanes(lanes), ops(ops.begin(), ops.end()) {
     for (Operation *op : ops)
-      op->walk([&](Operation *inner) {
-        for (Value operand : inner->getOperands())
-          add(operand);
-      });
+      if (!records.contains(op))
+        op->walk([&](Operation *inner) {
+          for (Value operand : inner->getOperands())
+            add(operand);
+        });
   }
   /// What differs between lanes.
   llvm::SetVector<Value> varying;
@@ -118,11 +121,12 @@ private:
     if (lanes.isPrivate(value) || isInside(value) ||
         !lanes.getLoop()->isAncestor(value.getParentBlock()->getParentOp()))
       return;
-    if (isLaneType(value.getType())) {
+    Operation *op = value.getDefiningOp();
+    bool isConstant = op && op->hasTrait<OpTrait::ConstantLike>();
+    if (isLaneType(value.getType()) && !isConstant) {
       (lanes.isVarying(value) ? varying : uniform).insert(value);
       return;
     }
-    Operation *op = value.getDefiningOp();
     for (Value operand : op->getOperands())
       add(operand);
     made.insert(op);
@@ -186,7 +190,11 @@ IterationWriter::Turn IterationWriter::prepareTurn(Operation *first,
                                                    bool isDeferred) {
   Turn turn;
   turn.ops = findRest(first, last);
-  SerialInputs inputs(lanes, turn.ops);
+  for (Operation *op : turn.ops)
+    if (auto append = dyn_cast<AppendOp>(op);
+        append && lanes.isStoredByVectors(append))
+      turn.records[append] = writeRecords(append);
+  SerialInputs inputs(lanes, turn.ops, turn.records);
   Value start = arith::ConstantIndexOp::create(builder, loc, 0);
   for (Value value : inputs.varying) {
     Value slot = turn.varying[value] = createSlot(value.getType());
@@ -213,7 +221,18 @@ IRMapping IterationWriter::writeTurn(const Turn &turn, Value lane) {
   for (ArrayRef<Operation *> ops :
        {ArrayRef<Operation *>(turn.made), ArrayRef<Operation *>(turn.ops)})
     for (Operation *op : ops)
-      useColumns(builder.clone(*op, mapping), lane);
+      if (Value records = turn.records.lookup(op)) {
+        auto append = cast<AppendOp>(op);
+        mapping.map(
+            append.getPrim(),
+            AppendRecordOp::create(builder, loc, append.getPrim().getType(),
+                                   mapping.lookupOrDefault(append.getWriter()),
+                                   append.getPortAttr(), records, lane,
+                                   builder.getI64IntegerAttr(laneCount))
+                .getPrim());
+      } else {
+        useColumns(builder.clone(*op, mapping), lane);
+      }
   return mapping;
 }
 
@@ -240,6 +259,7 @@ void IterationWriter::writeTurns(Value bits,
                                 builder, loc, builder.getIntegerAttr(word, 1));
   auto turns =
       scf::WhileOp::create(builder, loc, TypeRange{word}, ValueRange{bits});
+  turnLoops.push_back(turns);
   Block *before = builder.createBlock(&turns.getBefore(), {}, word, loc);
   Value isLeft = arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::ne,
                                        before->getArgument(0), none);
@@ -323,7 +343,7 @@ void IterationWriter::createMasks() {
   }
 }
 
-void IterationWriter::writeDeferred() {
+void IterationWriter::writeDeferredTurns(ArrayRef<Turn> deferred) {
   if (deferred.empty())
     return;
   Type word = getWord();

@@ -24,6 +24,8 @@ public:
 
   /// Writes the loop in front of the builder's place.
   void write(mlir::OpBuilder::InsertPoint place);
+  /// The loops over lanes, each of which has what one lane does alone.
+  llvm::ArrayRef<mlir::scf::WhileOp> getTurnLoops() const { return turnLoops; }
 
 private:
   mlir::VectorType getVectorType(mlir::Type type) const {
@@ -148,6 +150,7 @@ private:
     llvm::SmallVector<mlir::Operation *> ops;
     llvm::SmallVector<mlir::Operation *> made; ///< again, in front of them
     llvm::MapVector<mlir::Value, mlir::Value> varying, uniform; ///< slots
+    llvm::MapVector<mlir::Operation *, mlir::Value> records;    ///< memory
     mlir::Value mask; ///< of what is deferred: a slot of the lanes' bits
   };
   /// Keeps what [first, last] takes.
@@ -165,10 +168,25 @@ private:
   void writeOrdered(const OrderedGroup &group);
   void createMasks();
   void writeDeferred();
+  void writeDeferredTurns(llvm::ArrayRef<Turn> deferred);
   /// Whether the writers count primitives, of a turn that only goes to the next
   /// one.
   std::optional<mlir::Value> writeIsCounted(const Turn &turn);
   void useColumns(mlir::Operation *copy, mlir::Value lane);
+
+  // Emissions of all lanes, behind all.
+  void writeEmissions(const PortEmissions &port);
+  mlir::Value writeAreFew();
+  /// The turn that emits a record.
+  const Turn &findTurn(LaneRecord record) const;
+  llvm::SmallVector<Turn> findOtherTurns() const;
+  /// What lanes have of a value that a turn takes.
+  mlir::Value getTurnValue(const Turn &turn, mlir::Value value);
+  /// The lanes that take a turn.
+  mlir::Value loadMask(const Turn &turn);
+  /// The records that lanes will emit, in memory.
+  mlir::Value writeRecords(AppendOp append);
+
   /// What of [first, last] is not yet computed.
   llvm::SmallVector<mlir::Operation *> findRest(mlir::Operation *first,
                                                 mlir::Operation *last) const;
@@ -189,6 +207,7 @@ private:
   llvm::DenseMap<mlir::Operation *, mlir::Value> masks; ///< of groups: slots
   llvm::SmallVector<Turn> deferred;
   llvm::MapVector<mlir::Operation *, Staged> staged;
+  llvm::SmallVector<mlir::scf::WhileOp> turnLoops;
 };
 
 } // namespace piko

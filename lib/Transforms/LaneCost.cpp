@@ -202,6 +202,7 @@ private:
     cost.vectors += laneByLane ? part : 0;
   }
   void addStructure(Operation *op, Frequency times, bool laneByLane);
+  void addEmission(Operation *op, Frequency times);
 
   /// What it takes to bring lanes apart, with what they have.
   void addTurns(const OrderedGroup &group, Frequency times);
@@ -217,6 +218,7 @@ private:
         .wasInterrupted();
   }
   double getDivision(Operation *op) const;
+  double getScalar(Operation *op) const;
   bool isTransposed(LoadOp load) const;
   bool isInStream(Operation *access) const {
     return llvm::any_of(
@@ -249,6 +251,9 @@ void CostModel::add(Region &region, Frequency times, bool laneByLane) {
 
 void CostModel::addTurns(const OrderedGroup &group, Frequency times) {
   llvm::SetVector<Operation *> ops = lanes.findTurns(group);
+  ops.remove_if([&](Operation *op) { return lanes.isEmission(op); });
+  if (llvm::all_of(ops, llvm::IsaPred<NextOp>))
+    return; // mostly has nothing to do
   turns.insert(ops.begin(), ops.end());
   llvm::DenseSet<Value> inputs;
   for (Operation *op : ops)
@@ -410,9 +415,37 @@ double CostModel::getDivision(Operation *op) const {
                                             : cycles.sharedQuotient;
 }
 
+/// What an operation of one iteration takes, for as many as there are lanes;
+/// what emits stores its numbers, and keeps count.
+double CostModel::getScalar(Operation *op) const {
+  constexpr double bookkeeping = 12; // operations
+  if (auto append = dyn_cast<AppendOp>(op))
+    return cycles.scalar * (double(append.getValues().size()) + bookkeeping);
+  return isDivision(op) ? cycles.scalarDivision
+         : lanes.getForm(op) == LaneForm::Access
+             ? cycles.scalarAccess / getInRow(op)
+             : cycles.scalar;
+}
+
+/// What vectors emit: a transposition, and the stores of all lanes' records.
+void CostModel::addEmission(Operation *op, Frequency times) {
+  auto append = dyn_cast<AppendOp>(op);
+  if (!append)
+    return;
+  constexpr double wordSize = 4;
+  RecordOp record =
+      lookupRecord(append, append.getPrim().getType().getRecord());
+  cost.serial += times.serial * getScalar(append);
+  cost.vectors +=
+      times.vectors * (cycles.apartInOrder +
+                       cycles.transposed * double(record.getSize()) / wordSize);
+}
+
 void CostModel::addOperation(Operation *op, Frequency times, bool laneByLane) {
   if (isPrefetch(op) || isa<FailOp, FailListOp, FailDivideOp>(op))
     return; // free, or rare
+  if (!laneByLane && lanes.isEmission(op))
+    return addEmission(op, times);
   LaneForm form = lanes.getForm(op);
   if (form == LaneForm::Barrier) {
     cost.computes |= op->getNumResults() != 0;
@@ -426,11 +459,7 @@ void CostModel::addOperation(Operation *op, Frequency times, bool laneByLane) {
   // There are no instructions for vectors of it.
   bool isRemainder = isIntegerDivision(op) && !isDividedAsFloats(op) &&
                      !matchPattern(op->getOperand(1), m_Constant());
-  double serial = times.serial *
-                  (isDivided  ? cycles.scalarDivision
-                   : isAccess ? cycles.scalarAccess / getInRow(op)
-                              : cycles.scalar) /
-                  along;
+  double serial = times.serial * getScalar(op) / along;
   bool isTurns = form == LaneForm::Serial || form == LaneForm::Ordered;
   bool isGather = isAccess && (!lanes.isRow(op) || isStrided(op));
   double gather = isGather ? getApart(op) : 0;

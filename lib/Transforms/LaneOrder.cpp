@@ -118,6 +118,42 @@ void IterationLanes::findGroups(Block &block,
     found.push_back(group);
 }
 
+void IterationLanes::findEmissionGroups(
+    Block &block, const llvm::DenseSet<Operation *> &ops,
+    SmallVectorImpl<OrderedGroup> &found) const {
+  OrderedGroup group;
+  auto end = [&] {
+    if (group)
+      found.push_back(group);
+    group = {};
+  };
+  for (Operation &op : block.without_terminator()) {
+    if (ops.contains(&op)) {
+      if (!group)
+        group.first = &op;
+      group.last = &op;
+      continue;
+    }
+    if (llvm::none_of(ops, [&](Operation *one) { return op.isAncestor(one); }))
+      continue;
+    end();
+    for (Region &region : op.getRegions())
+      if (!region.empty())
+        findEmissionGroups(region.front(), ops, found);
+  }
+  end();
+}
+
+/// Whether operations emit, and no loop of an iteration repeats them.
+bool IterationLanes::areEmissions(ArrayRef<Operation *> ops) const {
+  return llvm::all_of(ops, [&](Operation *op) {
+    bool isOnce = isa<AppendOp, AppendBinOp, NextOp>(op);
+    for (Operation *at = op->getParentOp(); at != loop; at = at->getParentOp())
+      isOnce &= isa<scf::IfOp, scf::IndexSwitchOp>(at);
+    return isOnce;
+  });
+}
+
 bool IterationLanes::canDefer(const OrderedGroup &group,
                               const llvm::SetVector<Operation *> &rest) const {
   Block *block = group.first->getBlock();
@@ -219,9 +255,15 @@ static OrderedGroup join(ArrayRef<OrderedGroup> groups) {
 SmallVector<OrderedGroup>
 IterationLanes::makeGroups(ArrayRef<Operation *> ops) const {
   SmallVector<OrderedGroup> found;
-  findGroups(*loop.getBody(), {ops.begin(), ops.end()}, found);
-  if (!canDefer(found))
-    return {join(found)};
+  llvm::DenseSet<Operation *> wanted(ops.begin(), ops.end());
+  if (areEmissions(ops))
+    findEmissionGroups(*loop.getBody(), wanted, found);
+  if (found.empty() || !canDefer(found)) {
+    found.clear();
+    findGroups(*loop.getBody(), wanted, found);
+    if (!canDefer(found))
+      return {join(found)};
+  }
   for (OrderedGroup &group : found)
     group.deferred = true;
   return found;

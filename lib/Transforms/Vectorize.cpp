@@ -107,7 +107,7 @@ static void addObstacles(InFlightDiagnostic &remark,
     if (isGather)
       note << "lanes access elements in different places";
     else if (isa<AppendOp, AppendBinOp>(op))
-      note << "lanes take turns to emit, in order";
+      note << "lanes take turns to emit, in order" << lanes.explainTurns(op);
     else if (auto access = dyn_cast<StateAccessOpInterface>(op))
       note << "lanes take turns to access '"
            << access.getAccessedState().getValue() << "'";

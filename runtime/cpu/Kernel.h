@@ -65,7 +65,7 @@ struct LocalBin {
 struct PortLogs {
   Log records, cells, ordinals;
   std::vector<uint8_t> scratch;
-  uint8_t *scratchRecord = nullptr; ///< In it, aligned: room for one record.
+  uint8_t *scratchRecord = nullptr; ///< In it, aligned: room for records.
   uint32_t *countsEnd = nullptr;
   bool padded = false; ///< Records have padding, which must be zero.
   int32_t consumer = 0;
@@ -246,8 +246,9 @@ void deferPlace(Lane &lane, int32_t port, int64_t cell);
 /// Opens, and ends, the kernels of the stages that run in this one.
 void beginLocals(pikort_pipeline &p, Kernel &host);
 void endLocals(pikort_pipeline &p, Kernel &host, int32_t status);
-/// Makes room for one more record of a local edge. False if memory is refused.
-bool growLocal(Lane &lane, int32_t port);
+/// Makes room for so many more records of a local edge. False if memory is
+/// refused.
+bool growLocal(Lane &lane, int32_t port, int64_t count);
 
 // --- Join.cpp ---------------------------------------------------------------
 

@@ -70,14 +70,14 @@ void piko::rt::endLocals(pikort_pipeline &p, Kernel &host, int32_t status) {
   }
 }
 
-bool piko::rt::growLocal(Lane &lane, int32_t port) {
+bool piko::rt::growLocal(Lane &lane, int32_t port, int64_t count) {
   pikoir_port &out = lane.ports[port];
   PortLogs &logs = lane.logs[port];
   Log &log = logs.records;
   if (log.failed)
     return false;
   int64_t used = log.blocks.empty() ? 0 : out.cursor - log.blocks[0].data();
-  int64_t bytes = std::max({2 * used, used + out.size, firstBlock});
+  int64_t bytes = std::max({2 * used, used + count * out.size, firstBlock});
   try {
     log.blocks.reserve(1);
     Array<uint8_t> block(lane.pipeline->memory, bytes);

@@ -79,14 +79,15 @@ static bool grow(Lane *lane, Log &log, uint8_t *&cursor, uint8_t *&end,
 
 // --- Records ----------------------------------------------------------------
 
-/// Makes room for one more record.
-[[gnu::noinline]] static void growRecords(Lane *lane, int32_t port) {
+/// Makes room for so many more records.
+[[gnu::noinline]] static void growRecords(Lane *lane, int32_t port,
+                                          int64_t count) {
   pikoir_port &out = lane->ports[port];
   PortLogs &logs = lane->logs[port];
   uint8_t *end = nullptr;
-  bool room = logs.local
-                  ? growLocal(*lane, port)
-                  : grow(lane, logs.records, out.cursor, end, 0, 2 * out.size);
+  bool room = logs.local ? growLocal(*lane, port, count)
+                         : grow(lane, logs.records, out.cursor, end, 0,
+                                (count + 1) * out.size);
   if (!room)
     out.cursor = out.limit = logs.scratchRecord;
   if (!room || logs.local)
@@ -121,7 +122,7 @@ uint8_t *pikoir_append(pikoir_writer *writer, int32_t port) {
   if (out.flags & PIKOIR_PORT_DEFERRED) [[unlikely]]
     return deferAppend(*laneOf(writer), port);
   if (out.cursor > out.limit) [[unlikely]]
-    growRecords(laneOf(writer), port);
+    growRecords(laneOf(writer), port, 1);
   uint8_t *record = out.cursor;
   ++out.emitted;
   if (out.flags & PIKOIR_PORT_ORDINALS)
@@ -134,6 +135,12 @@ uint8_t *pikoir_append(pikoir_writer *writer, int32_t port) {
   if (out.flags & PIKOIR_PORT_ORDINALS)
     noteOrdinal(laneOf(writer), port);
   return record;
+}
+
+void pikoir_reserve(pikoir_writer *writer, int32_t port, int64_t count) {
+  const pikoir_port &out = writer->ports[port];
+  if (out.cursor > out.limit || out.limit - out.cursor < (count - 1) * out.size)
+    growRecords(laneOf(writer), port, count);
 }
 
 // --- Cells ------------------------------------------------------------------
@@ -435,7 +442,8 @@ static void preparePort(pikort_pipeline &p, const Kernel &kernel, Lane &lane,
     out.size = record.size;
   out.cells = to.placed() ? to.cells : 0;
   logs.padded = record.padded;
-  logs.scratch.resize(static_cast<size_t>(record.size + record.align));
+  logs.scratch.resize(
+      static_cast<size_t>(PIKOIR_MOST_RESERVED * record.size + record.align));
   auto address = reinterpret_cast<uintptr_t>(logs.scratch.data());
   auto align = static_cast<uintptr_t>(record.align);
   logs.scratchRecord = logs.scratch.data() + (align - address % align) % align;

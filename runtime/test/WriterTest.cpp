@@ -4,6 +4,7 @@
 #include "pikort/abi.h"
 #include "pikort/pikort.hpp"
 
+#include <cstring>
 #include <functional>
 #include <gtest/gtest.h>
 #include <string>
@@ -195,6 +196,53 @@ TEST_F(Writer, DefersBadPlaces) {
 }
 
 // --- Scratch ----------------------------------------------------------------
+
+// --- Reserved room ----------------------------------------------------------
+
+// As many as there is room for lie one behind the other, across blocks.
+TEST_F(Writer, ReservesRoom) {
+  constexpr int64_t rounds = 3000;
+  runWith([](pikoir_writer *w) {
+    int64_t id = 0;
+    for (int64_t round = 0; round < rounds; ++round) {
+      int64_t count = round % PIKOIR_MOST_RESERVED + 1;
+      pikoir_reserve(w, 0, count);
+      pikoir_port &port = w->ports[0];
+      ASSERT_LE(port.cursor + (count - 1) * port.size, port.limit);
+      auto *room = reinterpret_cast<Item *>(port.cursor);
+      for (int64_t i = 0; i < count; ++i) {
+        room[i].id = id + i;
+        room[i].kind = 1;
+      }
+      for (int64_t i = 0; i < count; ++i) {
+        ++port.emitted;
+        port.last_cell = -1;
+        pikoir_place(w, 0, 0);
+      }
+      id += count;
+      emit(w, id++, 0, true);
+    }
+  });
+  ASSERT_GT(drained.size(), size_t(rounds));
+  for (size_t i = 0; i < drained.size(); ++i)
+    ASSERT_EQ(drained[i], int64_t(i));
+}
+
+// Where memory is refused, records go to the scratch.
+TEST_F(Writer, ReservesRoomThatIsRefused) {
+  pikort_set_memory_limit(pipe.get(), 40000);
+  runWith(
+      [](pikoir_writer *w) {
+        for (int round = 0; round < 3; ++round) {
+          pikoir_reserve(w, 0, PIKOIR_MOST_RESERVED);
+          std::memset(w->ports[0].cursor, 1,
+                      PIKOIR_MOST_RESERVED * sizeof(Item));
+          w->ports[0].cursor += PIKOIR_MOST_RESERVED * sizeof(Item);
+          emit(w, 1, 0);
+        }
+      },
+      PIKORT_OUT_OF_MEMORY);
+}
 
 TEST_F(Writer, ScratchIsAStack) {
   runWith([](pikoir_writer *w) {

@@ -331,6 +331,18 @@ def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
     all that vectors do. So a depth test, the shading of what has passed it, and
     the update of a colour become turns, vectors and turns.
 
+    What lanes emit behind all that vectors do, up to three records of each lane to
+    a port, vectors emit for all lanes (`piko.cpu.append`): room is made once, the
+    fields are transposed into records, and each lane stores its own where the
+    number of those before it says. Where few lanes do (up to three eighths; of
+    records up to 16 bytes, one eighth), or positions are counted
+    (`piko.cpu.is_counted`), lanes take turns. They do so, too, where a loop of
+    each lane emits, where a record may go to several bins, and where it is no
+    whole number of words of 4 bytes, or more than 256 bytes; records whose fields
+    vectors have are then transposed in front of the turns, and copied
+    (`piko.cpu.store_records`). Loops that lanes run in their turns are looked at as
+    others are.
+
     A parallel loop whose iterations meet, of which `piko-split-loops` has left
     those that a vector has lanes for, on any processor, becomes lanes in lockstep:
     a barrier needs no code, a reduction is one of a vector's lanes, and what
@@ -343,7 +355,7 @@ def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
     many lanes; where they do not, a remark has the estimate, with what costs most.
     A loop of a phase that is written in order is vectorized as well where it stands
     in no other vector, its turns hand on nothing, read no state that they change,
-    and store each field once. If all that a turn does stands behind a condition,
+    and store each field once; they may emit. If all that a turn does stands behind a condition,
     with a loop of its own, the turns that have something to do are found first,
     1,024 at a time (stream compaction), so that vectors are full.
 

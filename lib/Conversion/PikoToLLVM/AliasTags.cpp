@@ -38,6 +38,8 @@ ArrayAttr AliasTags::primitive(StringRef record, StringRef field) const {
   return tag(node("primitive " + record + "." + field, runtime()));
 }
 
+ArrayAttr AliasTags::record() const { return tag(runtime()); }
+
 ArrayAttr AliasTags::dirty() const { return tag(node("dirty", root())); }
 
 ArrayAttr AliasTags::writer() const { return tag(node("writer", runtime())); }
@@ -49,6 +51,7 @@ ArrayAttr AliasTags::call(StringRef function) const {
     return tag(node("failure", root()));
   static constexpr StringRef emissions[] = {
       PIKO_RUNTIME_FUNCTION(pikoir_append).name,
+      PIKO_RUNTIME_FUNCTION(pikoir_reserve).name,
       PIKO_RUNTIME_FUNCTION(pikoir_place).name,
       PIKO_RUNTIME_FUNCTION(pikoir_next).name,
       PIKO_RUNTIME_FUNCTION(pikoir_place_source).name,

@@ -32,6 +32,8 @@ public:
                         bool isConstant) const;
   mlir::ArrayAttr primitive(mlir::StringRef record,
                             mlir::StringRef field) const;
+  /// Of what holds several fields of a record.
+  mlir::ArrayAttr record() const;
   mlir::ArrayAttr dirty() const;
   mlir::ArrayAttr writer() const;
   mlir::ArrayAttr input() const;

@@ -180,14 +180,18 @@ mlir::Value createChange(mlir::OpBuilder &builder, mlir::Location loc,
 /// many records.
 int64_t getRunShift(RecordOp record);
 
-/// Patterns for the storage of bins, for writers, for state, for checking mode,
-/// for approximations, for private copies, and for the logs of grids.
+/// Patterns for the storage of bins, for writers, for emissions of lanes, for
+/// state, for checking mode, for approximations, for private copies, and for
+/// the logs of grids.
 void populateKernelToLLVMPatterns(const mlir::TypeConverter &converter,
                                   mlir::RewritePatternSet &patterns,
                                   LoweringContext &context);
 void populateWriterToLLVMPatterns(const mlir::TypeConverter &converter,
                                   mlir::RewritePatternSet &patterns,
                                   LoweringContext &context);
+void populateEmissionsToLLVMPatterns(const mlir::TypeConverter &converter,
+                                     mlir::RewritePatternSet &patterns,
+                                     LoweringContext &context);
 void populateStateToLLVMPatterns(const mlir::TypeConverter &converter,
                                  mlir::RewritePatternSet &patterns,
                                  LoweringContext &context);

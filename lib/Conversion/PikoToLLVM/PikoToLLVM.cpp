@@ -154,6 +154,7 @@ LogicalResult ConvertPikoToLLVMPass::convert(PipelineOp pipeline,
   patterns.add<SelectLowering, PoisonLowering>(converter, &getContext());
   populateKernelToLLVMPatterns(converter, patterns, context);
   populateWriterToLLVMPatterns(converter, patterns, context);
+  populateEmissionsToLLVMPatterns(converter, patterns, context);
   populateStateToLLVMPatterns(converter, patterns, context);
   populateLanesToLLVMPatterns(converter, patterns, context);
   populateRecordsToLLVMPatterns(converter, patterns, context);

@@ -4,6 +4,7 @@
 // lane each, whose words are then transposed. A gather loads each word alone.
 
 #include "KernelLowering.h"
+#include "RecordPieces.h"
 
 #include "mlir/Dialect/SCF/IR/SCF.h"
 #include "mlir/Dialect/Vector/IR/VectorOps.h"
@@ -11,10 +12,28 @@
 using namespace mlir;
 using namespace piko;
 
-namespace {
+std::array<Value, pieceWords>
+piko::transposeBlocks(OpBuilder &builder, Location loc,
+                      const std::array<Value, pieceWords> &rows) {
+  int64_t lanes = cast<VectorType>(rows[0].getType()).getNumElements();
+  // Of words p of the first vector and q of the second, in turn or in pairs.
+  auto mix = [&](Value a, Value b, std::array<int64_t, 4> block) -> Value {
+    SmallVector<int64_t> order;
+    for (int64_t group = 0; group < lanes; group += pieceWords)
+      for (int64_t word : block)
+        order.push_back(word < pieceWords ? group + word
+                                          : lanes + group + word - pieceWords);
+    return vector::ShuffleOp::create(builder, loc, a, b, order);
+  };
+  Value low01 = mix(rows[0], rows[1], {0, 4, 1, 5}),
+        high01 = mix(rows[0], rows[1], {2, 6, 3, 7}),
+        low23 = mix(rows[2], rows[3], {0, 4, 1, 5}),
+        high23 = mix(rows[2], rows[3], {2, 6, 3, 7});
+  return {mix(low01, low23, {0, 1, 4, 5}), mix(low01, low23, {2, 3, 6, 7}),
+          mix(high01, high23, {0, 1, 4, 5}), mix(high01, high23, {2, 3, 6, 7})};
+}
 
-constexpr int64_t wordSize = 4, pieceWords = 4;
-constexpr int64_t pieceSize = wordSize * pieceWords;
+namespace {
 
 /// Where pieces of a record begin, in bytes, that have at least two of the
 /// fields each. A piece does not go beyond the record.
@@ -106,21 +125,7 @@ std::array<Value, pieceWords> RecordReader::transpose(ArrayRef<Value> parts) {
       row.push_back(parts[lane]);
     rows[i] = join(row);
   }
-  // Of words p of the first vector and q of the second, in turn or in pairs.
-  auto mix = [&](Value a, Value b, std::array<int64_t, 4> block) {
-    SmallVector<int64_t> order;
-    for (int64_t group = 0; group < lanes; group += pieceWords)
-      for (int64_t word : block)
-        order.push_back(word < pieceWords ? group + word
-                                          : lanes + group + word - pieceWords);
-    return shuffle(a, b, order);
-  };
-  Value low01 = mix(rows[0], rows[1], {0, 4, 1, 5}),
-        high01 = mix(rows[0], rows[1], {2, 6, 3, 7}),
-        low23 = mix(rows[2], rows[3], {0, 4, 1, 5}),
-        high23 = mix(rows[2], rows[3], {2, 6, 3, 7});
-  return {mix(low01, low23, {0, 1, 4, 5}), mix(low01, low23, {2, 3, 6, 7}),
-          mix(high01, high23, {0, 1, 4, 5}), mix(high01, high23, {2, 3, 6, 7})};
+  return transposeBlocks(builder, loc, rows);
 }
 
 SmallVector<Value> RecordReader::readPieces(ArrayRef<int64_t> pieces) {

@@ -2,7 +2,12 @@
 
 #include "WriterPaths.h"
 
+#include "LaneBits.h"
+
 #include "Piko/Dialect/Piko/IR/CodeBuilder.h"
+
+#include "mlir/Dialect/Math/IR/Math.h"
+#include "mlir/Dialect/Vector/IR/VectorOps.h"
 
 using namespace mlir;
 using namespace piko;
@@ -175,6 +180,150 @@ void piko::createPlace(OpBuilder &builder, Location loc,
   createStore(builder, loc, out.either(entry, mark), place, out.tag);
   out.store(createOffset(builder, loc, place, 4), layout::cellCursor);
   out.store(cell, layout::lastCell);
+}
+
+Value piko::createReserve(OpBuilder &builder, Location loc,
+                          LoweringContext &context, Value writer, int64_t port,
+                          int64_t count) {
+  MemberBuilder out = openPort(builder, loc, context, writer, port);
+  Value size = out.load(layout::size);
+  Value last = createOffset(builder, loc, out.load(layout::cursor),
+                            out.mul(size, createI64(builder, loc, count - 1)));
+  Value isSlow = out.comparePointers(LLVM::ICmpPredicate::ugt, last,
+                                     out.load(layout::limit));
+  out.when(isSlow, [&] {
+    context.call(builder, loc, PIKO_RUNTIME_FUNCTION(pikoir_reserve),
+                 {writer, createI32(builder, loc, port),
+                  createI64(builder, loc, count)});
+  });
+  return out.load(layout::cursor);
+}
+
+/// How many records lanes emit.
+static Value countRecords(MemberBuilder &out, const LaneEmissions &emissions) {
+  Value count;
+  for (Value bits : emissions.bits) {
+    Value ones = math::CtPopOp::create(out.builder, out.loc, bits);
+    count = count ? out.add(count, ones) : ones;
+  }
+  return count;
+}
+
+void piko::createAppendLanes(OpBuilder &builder, Location loc,
+                             LoweringContext &context, Value writer,
+                             const LaneEmissions &emissions) {
+  MemberBuilder out = openPort(builder, loc, context, writer, emissions.port);
+  Value count = countRecords(out, emissions);
+  out.store(out.add(out.load(layout::emitted), count), layout::emitted);
+  // Records that are put nowhere are not kept.
+  Value zero = createI64(builder, loc, 0);
+  Value isKept =
+      out.compare(MemberBuilder::P::eq, out.load(layout::cells), zero);
+  Value bytes =
+      out.mul(out.select(isKept, count, zero), out.load(layout::size));
+  out.store(createOffset(builder, loc, out.load(layout::cursor), bytes),
+            layout::cursor);
+}
+
+/// The runtime's way for each record.
+static void createPlaceEach(OpBuilder &builder, Location loc,
+                            LoweringContext &context, Value writer,
+                            const LaneEmissions &emissions) {
+  MemberBuilder out = openPort(builder, loc, context, writer, emissions.port);
+  Value zero = createI64(builder, loc, 0);
+  out.forEach(
+      out.index(0), out.index(emissions.lanes), out.index(1), [&](Value lane) {
+        Value shift = toI64(builder, loc, lane);
+        for (auto [bits, cells] : llvm::zip(emissions.bits, emissions.cells)) {
+          Value rest = arith::ShRUIOp::create(builder, loc, bits, shift);
+          Value bit = out.both(rest, createI64(builder, loc, 1));
+          out.when(out.compare(MemberBuilder::P::ne, bit, zero), [&] {
+            out.increment(layout::emitted);
+            out.store(createI64(builder, loc, -1), layout::lastCell);
+            context.call(
+                builder, loc, PIKO_RUNTIME_FUNCTION(pikoir_place),
+                {writer, createI32(builder, loc, emissions.port),
+                 vector::ExtractOp::create(builder, loc, cells, lane)});
+          });
+        }
+      });
+}
+
+/// Whether there is a cell that a lane in the mask names and that is none.
+static Value createIsOutside(MemberBuilder &out, const LaneEmissions &emissions,
+                             Value cellCount) {
+  auto words = cast<VectorType>(emissions.cells.front().getType());
+  Value most =
+      vector::BroadcastOp::create(out.builder, out.loc, words, cellCount);
+  Value outside;
+  for (auto [bits, cells] : llvm::zip(emissions.bits, emissions.cells)) {
+    Value bad = createBits(out.builder, out.loc,
+                           out.compare(MemberBuilder::P::uge, cells, most));
+    bad = out.both(bad, bits);
+    outside = outside ? out.either(outside, bad) : bad;
+  }
+  return out.compare(MemberBuilder::P::ne, outside,
+                     createI64(out.builder, out.loc, 0));
+}
+
+/// Notes the cells of the lanes one behind the other, each as the first of its
+/// record. A lane that is not in the mask leaves its own to be written over.
+static void noteCells(MemberBuilder &out, const LaneEmissions &emissions) {
+  OpBuilder &builder = out.builder;
+  Location loc = out.loc;
+  Type entries = VectorType::get({emissions.lanes}, out.i32());
+  Value first = vector::BroadcastOp::create(
+      builder, loc, entries,
+      createI32(builder, loc, int64_t(PIKOIR_FIRST_CELL)));
+  SmallVector<Value> noted;
+  for (Value cells : emissions.cells)
+    noted.push_back(out.either(
+        arith::TruncIOp::create(builder, loc, entries, cells), first));
+  Value place = out.load(layout::cellCursor);
+  for (int64_t lane = 0; lane < emissions.lanes; ++lane)
+    for (auto [bits, cells] : llvm::zip(emissions.bits, noted)) {
+      createStore(builder, loc,
+                  vector::ExtractOp::create(builder, loc, cells, lane), place,
+                  out.tag);
+      place = createOffset(
+          builder, loc, place,
+          createLaneOffset(builder, loc, bits, lane, sizeof(uint32_t)));
+    }
+  out.store(place, layout::cellCursor);
+}
+
+void piko::createPlaceLanes(OpBuilder &builder, Location loc,
+                            LoweringContext &context, Value writer,
+                            const LaneEmissions &emissions, bool isLocal) {
+  MemberBuilder out = openPort(builder, loc, context, writer, emissions.port);
+  Value isSlow = createIsOutside(out, emissions,
+                                 isLocal ? createI64(builder, loc, 1)
+                                         : out.load(layout::cells));
+  if (!isLocal) {
+    auto bytes = int64_t(sizeof(uint32_t)) * emissions.lanes *
+                 int64_t(emissions.bits.size());
+    Value room = out.comparePointers(
+        LLVM::ICmpPredicate::ugt,
+        createOffset(builder, loc, out.load(layout::cellCursor), bytes),
+        out.load(layout::cellEnd));
+    isSlow = out.either(isSlow, room);
+  }
+  isSlow = out.either(
+      isSlow, out.any(layout::portFlags, isLocal ? ~PIKOIR_PORT_LOCAL : -1));
+  auto path = scf::IfOp::create(builder, loc, isSlow, /*withElseRegion=*/true);
+  OpBuilder::InsertionGuard guard(builder);
+  builder.setInsertionPointToStart(path.thenBlock());
+  createPlaceEach(builder, loc, context, writer, emissions);
+  builder.setInsertionPointToStart(path.elseBlock());
+  Value count = countRecords(out, emissions);
+  out.store(out.add(out.load(layout::emitted), count), layout::emitted);
+  Value bytes = out.mul(count, out.load(layout::size));
+  out.store(createOffset(builder, loc, out.load(layout::cursor), bytes),
+            layout::cursor);
+  if (isLocal)
+    return;
+  out.store(out.add(out.load(layout::kept), count), layout::kept);
+  noteCells(out, emissions);
 }
 
 Value piko::createIsCounted(OpBuilder &builder, Location loc,

@@ -22,6 +22,31 @@ void createPlace(mlir::OpBuilder &builder, mlir::Location loc,
 void createLocalPlace(mlir::OpBuilder &builder, mlir::Location loc,
                       LoweringContext &context, mlir::Value writer,
                       int64_t port, mlir::Value cell);
+/// Where so many records of a port may be written (pikoir_reserve).
+mlir::Value createReserve(mlir::OpBuilder &builder, mlir::Location loc,
+                          LoweringContext &context, mlir::Value writer,
+                          int64_t port, int64_t count);
+/// What lanes emit to a port: a bit for each in an i64, and the cells.
+struct LaneEmissions {
+  int64_t port, lanes;
+  llvm::SmallVector<mlir::Value> bits, cells;
+};
+/// pikoir_append for each of the records that are written behind one another.
+void createAppendLanes(mlir::OpBuilder &builder, mlir::Location loc,
+                       LoweringContext &context, mlir::Value writer,
+                       const LaneEmissions &emissions);
+/// The same where each is put into a cell.
+void createPlaceLanes(mlir::OpBuilder &builder, mlir::Location loc,
+                      LoweringContext &context, mlir::Value writer,
+                      const LaneEmissions &emissions, bool isLocal);
+/// Whether the edge from a port to a stage is local, or each of them if several
+/// may be meant.
+bool isLocalEdge(mlir::Operation *op, int64_t port,
+                 mlir::FlatSymbolRefAttr stage, LoweringContext &context);
+/// How many tiles a bin of a stage has.
+mlir::Value createTileCount(mlir::OpBuilder &builder, mlir::Operation *op,
+                            mlir::FlatSymbolRefAttr stage,
+                            LoweringContext &context);
 /// Whether pikoir_next has anything to do.
 mlir::Value createIsCounted(mlir::OpBuilder &builder, mlir::Location loc,
                             LoweringContext &context, mlir::Value writer);

@@ -12,6 +12,35 @@
 using namespace mlir;
 using namespace piko;
 
+bool piko::isLocalEdge(Operation *op, int64_t port, FlatSymbolRefAttr stage,
+                       LoweringContext &context) {
+  bool isLocal = false;
+  PipelineOp pipeline = context.numbers(op).pipeline;
+  for (auto edge : pipeline.getOps<EdgeOp>()) {
+    if (edge.getPort() != port || edge.getConsumerAttr() != stage)
+      continue;
+    if (!edge.getLocal())
+      return false;
+    isLocal = true;
+  }
+  return isLocal;
+}
+
+Value piko::createTileCount(OpBuilder &builder, Operation *op,
+                            FlatSymbolRefAttr stage, LoweringContext &context) {
+  int32_t number = context.stageNumber(op, stage.getValue());
+  Value count;
+  for (int64_t dim = 0, e = context.stage(op, stage).getBins().size(); dim < e;
+       ++dim) {
+    Value size = context.query(
+        builder, op, PIKO_RUNTIME_FUNCTION(pikoir_cell_grid), number, dim);
+    count = count ? arith::MulIOp::create(builder, op->getLoc(), count, size)
+                        .getResult()
+                  : size;
+  }
+  return count;
+}
+
 namespace {
 
 struct OpenWriterLowering : Lowering<OpenWriterOp> {
@@ -201,16 +230,11 @@ struct PlaceLowering : Lowering<AppendBinOp> {
                   ConversionPatternRewriter &rewriter) const override {
     Location loc = op.getLoc();
     Value cell = toI64(rewriter, loc, adaptor.getBin());
-    StageOp stage = context.stage(op, op.getStageAttr());
     if (adaptor.getTile()) {
-      int32_t number = context.stageNumber(op, op.getStage());
-      for (int64_t dim = 0, e = stage.getBins().size(); dim < e; ++dim)
-        cell = arith::MulIOp::create(
-            rewriter, loc, cell,
-            context.query(rewriter, op, PIKO_RUNTIME_FUNCTION(pikoir_cell_grid),
-                          number, dim));
-      cell = arith::AddIOp::create(rewriter, loc, cell,
-                                   toI64(rewriter, loc, adaptor.getTile()));
+      Value tiles = createTileCount(rewriter, op, op.getStageAttr(), context);
+      cell = arith::AddIOp::create(
+          rewriter, loc, arith::MulIOp::create(rewriter, loc, cell, tiles),
+          toI64(rewriter, loc, adaptor.getTile()));
     }
     if (Grid *grid = context.grid(op)) {
       int64_t port = op.getPort().value_or(0);
@@ -222,7 +246,8 @@ struct PlaceLowering : Lowering<AppendBinOp> {
                                   /*bytes=*/8, from);
         LLVM::StoreOp::create(rewriter, loc, cell, entry);
       }
-    } else if (op.getPort() && isLocal(op))
+    } else if (op.getPort() &&
+               isLocalEdge(op, *op.getPort(), op.getStageAttr(), context))
       createLocalPlace(rewriter, loc, context, adaptor.getWriter(),
                        *op.getPort(), cell);
     else // a source's cells are those of its only port
@@ -230,22 +255,6 @@ struct PlaceLowering : Lowering<AppendBinOp> {
                   op.getPort().value_or(0), cell);
     rewriter.eraseOp(op);
     return success();
-  }
-
-private:
-  /// Whether the edge is local, or each of them if several may be meant.
-  bool isLocal(AppendBinOp op) const {
-    bool isLocal = false;
-    PipelineOp pipeline = context.numbers(op).pipeline;
-    for (auto edge : pipeline.getOps<EdgeOp>()) {
-      if (edge.getPort() != *op.getPort() ||
-          edge.getConsumerAttr() != op.getStageAttr())
-        continue;
-      if (!edge.getLocal())
-        return false;
-      isLocal = true;
-    }
-    return isLocal;
   }
 };
 

@@ -316,6 +316,9 @@ typedef struct pikoir_writer {
 /// The first entry that a record notes in its list of cells has this bit.
 #define PIKOIR_FIRST_CELL 0x80000000u
 
+/// How many records are written at once, at most.
+#define PIKOIR_MOST_RESERVED 64
+
 /// Orders and bins what the stage's producers emitted. Null on an error.
 PIKORT_API const pikoir_input *pikoir_begin(pikort_pipeline *p, int32_t stage);
 PIKORT_API pikoir_writer *pikoir_open(pikort_pipeline *p, int32_t stage,
@@ -332,6 +335,11 @@ PIKORT_API uint8_t *pikoir_append(pikoir_writer *writer, int32_t port);
 /// Puts the port's latest record in a cell of the consumer. A cell named twice
 /// counts once. A cell outside the grid is a PIKORT_BIN_OUTSIDE error.
 PIKORT_API void pikoir_place(pikoir_writer *writer, int32_t port, int64_t cell);
+/// Sees to it that so many more records of a port, at most
+/// PIKOIR_MOST_RESERVED, have room one behind the other from its cursor on. The
+/// writer has no flags.
+PIKORT_API void pikoir_reserve(pikoir_writer *writer, int32_t port,
+                               int64_t count);
 /// Ends a position; in a LIST stage, a call.
 PIKORT_API void pikoir_next(pikoir_writer *writer);
 PIKORT_API void pikoir_close(pikoir_writer *writer);

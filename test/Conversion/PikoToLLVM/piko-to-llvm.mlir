@@ -42,6 +42,7 @@ piko.pipeline @P rank 2 max_extent 4096 {
   piko.source @a
   piko.edge @a[0] -> @b
   piko.stage @a bins [0, 0] threads 1 : @F -> [@F] {
+    piko.schedule load_balance lanes one
     piko.process {
     ^bb0(%f: !piko.prim<@F>):
       %x = piko.get %f "x" : !piko.prim<@F> -> i32

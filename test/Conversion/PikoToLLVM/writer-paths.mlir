@@ -1,4 +1,4 @@
-// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-form-kernels,piko-form-work,piko-form-units),piko-to-cpu)' %s | FileCheck %s
+// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-form-kernels,piko-form-work,piko-map-lanes,piko-form-units),piko-to-cpu)' %s | FileCheck %s
 // What emissions nearly always do needs no call: members of pikoir_writer and
 // pikoir_port are read and written in place (pikort/abi.h).
 
@@ -55,6 +55,7 @@ piko.pipeline @P rank 1 {
   piko.source @a
   piko.edge @a[0] -> @b
   piko.stage @a bins [0] threads 1 : @F -> [@F] {
+    piko.schedule load_balance lanes one
     piko.process {
     ^bb0(%f: !piko.prim<@F>):
       %x = piko.get %f "x" : !piko.prim<@F> -> i32

@@ -1,11 +1,14 @@
 // RUN: piko-opt %s | piko-opt | FileCheck %s
 
 piko.record @F {"z" : f32 at 0, "list" : f32[4 : 4] at 4} size 20 align 4
+piko.record @G {"x" : f32 at 0, "y" : i32 at 4} size 8 align 4
 piko.pipeline @P rank 2 {
   piko.buffer @in : @F
   piko.image @depth : @F rank 2
   piko.source @a
-  piko.stage @a bins [0, 0] threads 1 : @F -> [] {}
+  piko.stage @a bins [0, 0] threads 1 : @F -> [@G] {}
+  piko.stage @b bins [8, 8] threads 1 : @G -> [] {}
+  piko.edge @a[0] -> @b
   // CHECK-LABEL: piko.kernel @k
   piko.kernel @k {
     %c2 = arith.constant 2 : index
@@ -29,6 +32,16 @@ piko.pipeline @P rank 2 {
       %as = piko.cpu.items %bins[%c2 : index] mask %mask : !piko.bins<@F>, vector<16xi1>, vector<16xindex>
       // CHECK: piko.cpu.items %{{.*}}[%{{.*}} : vector<16xindex>] mask
       %bs = piko.cpu.items %bins[%at : vector<16xindex>] mask %mask : !piko.bins<@F>, vector<16xi1>, vector<16xindex>
+      // CHECK: piko.cpu.append %{{.*}}[0] (%[[A]], %{{.*}} : vector<16xf32>, vector<16xi32>) of @G mask %{{.*}} : vector<16xi1>
+      %ys = arith.constant dense<2> : vector<16xi32>
+      piko.cpu.append %writer[0] (%a, %ys : vector<16xf32>, vector<16xi32>) of @G mask %mask : vector<16xi1>
+      // CHECK: piko.cpu.append %{{.*}}[0] (%[[A]], %{{.*}}, %{{.*}}, %{{.*}} : {{.*}}) of @G mask %{{.*}}, %{{.*}} : vector<16xi1>, vector<16xi1> in @b[%{{.*}}, %{{.*}} : vector<16xindex>, vector<16xindex>]
+      piko.cpu.append %writer[0] (%a, %ys, %b, %ys : vector<16xf32>, vector<16xi32>, vector<16xf32>, vector<16xi32>) of @G mask %mask, %mask : vector<16xi1>, vector<16xi1> in @b[%at, %at : vector<16xindex>, vector<16xindex>]
+      %memory = memref.alloca() : memref<256xi8>
+      // CHECK: piko.cpu.store_records %[[MEMORY:.*]](%[[A]], %{{.*}} : vector<16xf32>, vector<16xi32>) of @G : memref<256xi8>
+      piko.cpu.store_records %memory (%a, %ys : vector<16xf32>, vector<16xi32>) of @G : memref<256xi8>
+      // CHECK: piko.cpu.append_record %{{.*}}[0] from %[[MEMORY]][%{{.*}} of 16] : memref<256xi8> -> !piko.prim<@G>
+      %stored = piko.cpu.append_record %writer[0] from %memory[%c2 of 16] : memref<256xi8> -> !piko.prim<@G>
       // CHECK: piko.cpu.get %[[AS]] "list"[%{{.*}}] of @F mask %{{.*}} : vector<16xindex>, vector<16xi1>, vector<16xf32>
       %x = piko.cpu.get %as "list"[%c2] of @F mask %mask : vector<16xindex>, vector<16xi1>, vector<16xf32>
     }

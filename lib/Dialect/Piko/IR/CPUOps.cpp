@@ -207,6 +207,76 @@ LogicalResult AppendOp::verifySymbolUses(SymbolTableCollection &) {
   return success();
 }
 
+/// The numbers of records are those of its fields, for each of so many lanes.
+static LogicalResult verifyLaneRecords(Operation *op, FlatSymbolRefAttr name,
+                                       TypeRange values, int64_t lanes,
+                                       size_t records) {
+  RecordOp record = lookupRecord(op, name);
+  if (!record)
+    return op->emitOpError("expected a record, but got ")
+           << name << ", which is none";
+  SmallVector<Type> types;
+  for (size_t i = 0; i < records; ++i)
+    for (Type type : record.getElementTypes())
+      types.push_back(VectorType::get({lanes}, type));
+  if (TypeRange(types) != values)
+    return op->emitOpError("expected the numbers of ")
+           << records << " of record " << name << ", (" << types
+           << "), but got (" << values << ")";
+  return success();
+}
+
+LogicalResult LaneAppendOp::verifySymbolUses(SymbolTableCollection &) {
+  size_t records = getMasks().size();
+  if (records == 0)
+    return emitOpError("expected a mask for each record, but got none");
+  Type mask = getMasks().front().getType();
+  for (ValueRange operands :
+       {ValueRange(getMasks()), ValueRange(getBins()), ValueRange(getTiles())})
+    for (Value operand : operands)
+      if (failed(verifyLaneCount(*this, mask, operand.getType(), "an element")))
+        return failure();
+  if (failed(verifyLaneRecords(*this, getRecordAttr(), getValues().getTypes(),
+                               cast<VectorType>(mask).getNumElements(),
+                               records)))
+    return failure();
+  size_t bins = getStage() ? records : 0;
+  if (getBins().size() != bins)
+    return emitOpError("expected a bin for each of ")
+           << bins << " records, but got " << getBins().size();
+  if (!getTiles().empty() && getTiles().size() != bins)
+    return emitOpError("expected a tile for each of ")
+           << bins << " records, but got " << getTiles().size();
+  if (getStageAttr() && failed(verifyStage(*this, getStageAttr())))
+    return failure();
+  FailureOr<FlatSymbolRefAttr> emitted =
+      verifyPort(*this, getWriter(), getPort());
+  if (succeeded(emitted) && *emitted && *emitted != getRecordAttr())
+    return emitOpError("expected primitives of record ")
+           << *emitted << ", which port " << getPort() << " emits, but got "
+           << getRecordAttr();
+  return success(succeeded(emitted));
+}
+
+LogicalResult StoreRecordsOp::verifySymbolUses(SymbolTableCollection &) {
+  if (getValues().empty())
+    return emitOpError("expected the numbers of a record, but got none");
+  auto lanes = cast<VectorType>(getValues().front().getType());
+  return verifyLaneRecords(*this, getRecordAttr(), getValues().getTypes(),
+                           lanes.getNumElements(), 1);
+}
+
+LogicalResult AppendRecordOp::verifySymbolUses(SymbolTableCollection &) {
+  FlatSymbolRefAttr name = getPrim().getType().getRecord();
+  FailureOr<FlatSymbolRefAttr> emitted =
+      verifyPort(*this, getWriter(), getPort());
+  if (succeeded(emitted) && *emitted && *emitted != name)
+    return emitOpError("expected a primitive of record ")
+           << *emitted << ", which port " << getPort() << " emits, but got "
+           << name;
+  return success(succeeded(emitted));
+}
+
 LogicalResult AppendBinOp::verifySymbolUses(SymbolTableCollection &) {
   if (failed(verifyStage(*this, getStageAttr())))
     return failure();

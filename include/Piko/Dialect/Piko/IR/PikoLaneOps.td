@@ -183,4 +183,83 @@ def Piko_PermuteOp : Piko_CPUOp<"permute", [
   }];
 }
 
+def Piko_LaneBins : VectorOfRankAndType<[1], [Index]>;
+
+def Piko_LaneAppendOp : Piko_CPUOp<"append", [
+    AttrSizedOperandSegments,
+    DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
+  let summary = "emits primitives of the lanes in a mask";
+  let description = [{
+    What `piko.storage.append` does for one lane in the mask after the other: the
+    numbers of the records are those of its fields, and may be followed by those of
+    further records, each of which has a mask of its own; a lane emits the first
+    record before the second. With bins, each record is put into one of the
+    stage's, and into a tile of it where there are tiles. Positions are not counted: see `piko.cpu.is_counted`.
+
+    The lanes' records are transposed, and stored one behind the other.
+
+    ```mlir
+    piko.cpu.append %writer[0] (%us, %vs : vector<16xf32>, vector<16xf32>)
+      of @Point mask %mask : vector<16xi1>
+    piko.cpu.append %writer[0] (%us, %vs : vector<16xf32>, vector<16xf32>)
+      of @Point mask %mask : vector<16xi1> in @plot[%bins : vector<16xindex>]
+    ```
+  }];
+  let arguments = (ins Piko_WriterType:$writer, Piko_I64Attr:$port,
+                       Variadic<Piko_Lanes>:$values,
+                       FlatSymbolRefAttr:$record,
+                       Variadic<Piko_LaneMask>:$masks,
+                       OptionalAttr<FlatSymbolRefAttr>:$stage,
+                       Variadic<Piko_LaneBins>:$bins,
+                       Variadic<Piko_LaneBins>:$tiles);
+  let assemblyFormat = [{
+    $writer `[` $port `]` `(` $values `:` type($values) `)` `of` $record
+    `mask` $masks `:` type($masks) (`in` $stage^ `[` $bins `:` type($bins) `]`)?
+    (`tile` $tiles^ `:` type($tiles))? attr-dict
+  }];
+}
+
+def Piko_StoreRecordsOp : Piko_CPUOp<"store_records", [
+    MemoryEffects<[MemWrite]>,
+    DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
+  let summary = "stores a record of each lane";
+  let description = [{
+    The numbers are those of its fields. Each record is cut into pieces of 16
+    bytes, the last of which may be padded: the memory has room for those of all
+    lanes.
+
+    ```mlir
+    piko.cpu.store_records %memory (%us, %vs : vector<16xf32>, vector<16xf32>)
+      of @Point : memref<?xi8>
+    ```
+  }];
+  let arguments = (ins Piko_Bytes:$memory, Variadic<Piko_Lanes>:$values,
+                       FlatSymbolRefAttr:$record);
+  let assemblyFormat = [{
+    $memory `(` $values `:` type($values) `)` `of` $record attr-dict
+    `:` qualified(type($memory))
+  }];
+}
+
+def Piko_AppendRecordOp : Piko_CPUOp<"append_record", [
+    DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
+  let summary = "emits a record that a lane has stored";
+  let description = [{
+    As `piko.storage.append`, with the numbers of one of the records that
+    `piko.cpu.store_records` stored.
+
+    ```mlir
+    %p = piko.cpu.append_record %writer[0] from %memory[%lane of 16]
+      : memref<?xi8> -> !piko.prim<@Point>
+    ```
+  }];
+  let arguments = (ins Piko_WriterType:$writer, Piko_I64Attr:$port,
+                       Piko_Bytes:$memory, Index:$lane, Piko_I64Attr:$lanes);
+  let results = (outs Piko_PrimType:$prim);
+  let assemblyFormat = [{
+    $writer `[` $port `]` `from` $memory `[` $lane `of` $lanes `]` attr-dict
+    `:` qualified(type($memory)) `->` qualified(type($prim))
+  }];
+}
+
 #endif // PIKO_DIALECT_PIKO_IR_PIKOLANEOPS_TD
