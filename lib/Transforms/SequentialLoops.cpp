@@ -35,6 +35,7 @@ private:
     return loop->isAncestor(array.getParentBlock()->getParentOp());
   }
   bool isOnce(StoreOp store);
+  bool isOfTurn(AppendBinOp place);
   bool isKnown(Operation *op);
 
   scf::ForOp loop;
@@ -54,7 +55,22 @@ bool Effects::isOnce(StoreOp store) {
          fields.insert({store.getStateAttr(), store.getFieldAttr()}).second;
 }
 
+/// Whether what is put into a bin was emitted in the same turn.
+bool Effects::isOfTurn(AppendBinOp place) {
+  bool isEmitted = false;
+  loop.walk([&](AppendOp append) {
+    isEmitted |= append.getWriter() == place.getWriter() &&
+                 append.getPort() == place.getPort();
+  });
+  return isEmitted;
+}
+
+/// What is emitted keeps its order in lanes, too.
 bool Effects::isKnown(Operation *op) {
+  if (auto place = dyn_cast<AppendBinOp>(op))
+    return isOfTurn(place);
+  if (isa<AppendOp>(op))
+    return true;
   if (auto store = dyn_cast<StoreOp>(op))
     return isOnce(store);
   if (auto load = dyn_cast<LoadOp>(op))

@@ -37,8 +37,13 @@ struct VectorizePass : piko::impl::VectorizeBase<VectorizePass> {
   void runOnOperation() override;
 
 private:
+  void vectorizeLoops(Operation *root);
+  /// What lanes are given of a loop; whether loops inside of it are left.
+  WalkResult visit(Operation *op);
   /// A loop of a phase that is written in order; whether it did.
   bool vectorizeInOrder(Operation *op);
+  bool vectorizeCompacted(scf::ForOp loop);
+  void vectorize(const IterationLanes &lanes);
 };
 
 /// A loop that lanes may share.
@@ -206,8 +211,7 @@ static scf::ForOp countLoop(scf::WhileOp loop, const Counting &counting) {
   auto cast = [&](Value number, Type type) -> Value {
     return number.getType() == type
                ? number
-               : arith::IndexCastOp::create(builder, loc, type, number)
-                     .getResult();
+               : builder.createOrFold<arith::IndexCastOp>(loc, type, number);
   };
   SmallVector<Value> inits(loop.getInits());
   Value one = arith::ConstantIndexOp::create(builder, loc, 1);
@@ -295,13 +299,20 @@ static int64_t getLeastTurns(int64_t laneCount) {
   return std::max<int64_t>(laneCount / 4, 2);
 }
 
-static void vectorize(const IterationLanes &lanes) {
+/// Makes vectors of a loop, and of loops that one lane after the other runs.
+void VectorizePass::vectorize(const IterationLanes &lanes) {
   scf::ForOp loop = lanes.getLoop();
   Location loc = loop.getLoc();
   OpBuilder builder(loop);
+  IterationWriter writer(lanes);
+  auto write = [&] {
+    writer.write(builder.saveInsertionPoint());
+    for (scf::WhileOp turns : writer.getTurnLoops())
+      vectorizeLoops(turns);
+  };
   if (isOverPrimitives(loop)) {
     // A second body would take longer to compile than it saves.
-    IterationWriter(lanes).write(builder.saveInsertionPoint());
+    write();
     loop.erase();
     return;
   }
@@ -316,7 +327,7 @@ static void vectorize(const IterationLanes &lanes) {
   auto choice = scf::IfOp::create(builder, loc, isLong, /*withElse=*/true);
   loop->removeAttr(marks::lanes);
   builder.setInsertionPointToStart(choice.thenBlock());
-  IterationWriter(lanes).write(builder.saveInsertionPoint());
+  write();
   loop->moveBefore(choice.elseBlock(), choice.elseBlock()->begin());
 }
 
@@ -389,7 +400,7 @@ static void remarkInOrder(scf::ForOp loop, int64_t laneCount, bool isCompact) {
 
 /// Vectorizes those turns of a loop that have something to do, if most work is
 /// theirs.
-static bool vectorizeCompacted(scf::ForOp loop, int64_t laneCount) {
+bool VectorizePass::vectorizeCompacted(scf::ForOp loop) {
   std::optional<Compaction> made = compact(loop);
   if (!made)
     return false;
@@ -434,7 +445,7 @@ bool VectorizePass::vectorizeInOrder(Operation *op) {
     copy.erase();
     return false;
   }
-  if (!vectorizeCompacted(copy, laneCount)) {
+  if (!vectorizeCompacted(copy)) {
     IterationLanes lanes(copy, laneCount);
     if (lanes.getRefusal().at || !lanes.getCost().computes ||
         !lanes.getCost().isWorthwhile()) {
@@ -447,6 +458,36 @@ bool VectorizePass::vectorizeInOrder(Operation *op) {
   op->erase();
   ++vectorized;
   return true;
+}
+
+WalkResult VectorizePass::visit(Operation *op) {
+  auto loop = dyn_cast<scf::ForOp>(op);
+  if (!loop || !loop->hasAttr(marks::lanes))
+    return vectorizeInOrder(op) ? WalkResult::skip() : WalkResult::advance();
+  Candidate candidate(loop);
+  if (!candidate.isChosen())
+    return WalkResult::advance();
+  // Of a copy: what stays scalar stays as it is.
+  auto copy = cast<scf::ForOp>(OpBuilder(loop).clone(*loop));
+  countLoops(copy);
+  readAllElements(copy);
+  IterationLanes lanes(copy, laneCount);
+  if (!candidate.decide(lanes)) {
+    copy.erase();
+    ++left;
+    return WalkResult::advance();
+  }
+  vectorize(lanes);
+  loop.erase();
+  ++vectorized;
+  return WalkResult::skip();
+}
+
+/// Loops inside of one that is vectorized are parts of it.
+void VectorizePass::vectorizeLoops(Operation *root) {
+  root->walk<WalkOrder::PreOrder>([&](Operation *op) {
+    return op == root ? WalkResult::advance() : visit(op);
+  });
 }
 
 void VectorizePass::runOnOperation() {
@@ -466,27 +507,5 @@ void VectorizePass::runOnOperation() {
     else if (failed(LoopSplitter(parallel).run()))
       return signalPassFailure();
   }
-  // Loops inside of one that is vectorized are parts of it.
-  getOperation().walk<WalkOrder::PreOrder>([&](Operation *op) {
-    auto loop = dyn_cast<scf::ForOp>(op);
-    if (!loop || !loop->hasAttr(marks::lanes))
-      return vectorizeInOrder(op) ? WalkResult::skip() : WalkResult::advance();
-    Candidate candidate(loop);
-    if (!candidate.isChosen())
-      return WalkResult::advance();
-    // Of a copy: what stays scalar stays as it is.
-    auto copy = cast<scf::ForOp>(OpBuilder(loop).clone(*loop));
-    countLoops(copy);
-    readAllElements(copy);
-    IterationLanes lanes(copy, laneCount);
-    if (!candidate.decide(lanes)) {
-      copy.erase();
-      ++left;
-      return WalkResult::advance();
-    }
-    vectorize(lanes);
-    loop.erase();
-    ++vectorized;
-    return WalkResult::skip();
-  });
+  vectorizeLoops(getOperation());
 }
