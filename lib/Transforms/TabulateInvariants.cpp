@@ -61,8 +61,8 @@ private:
 
 } // namespace
 
-/// With more turns the loop runs as it was.
-static constexpr int64_t mostTurns = 1024;
+/// With fewer or more turns the loop runs as it was.
+static constexpr int64_t leastTurns = 32, mostTurns = 1024;
 
 bool Tabulator::findOutermost() {
   for (Operation *at = loop->getParentOp(); at && !isa<scf::ForallOp>(at);
@@ -208,7 +208,9 @@ int64_t Tabulator::run() {
   for (Value number : numbers)
     if (auto load = number.getDefiningOp<LoadOp>())
       states.insert(load.getStateAttr());
-  Value fits = at.compare(CodeBuilder::P::sle, upper, at.index(mostTurns));
+  Value fits =
+      at.both(at.compare(CodeBuilder::P::sge, upper, at.index(leastTurns)),
+              at.compare(CodeBuilder::P::sle, upper, at.index(mostTurns)));
   for (Attribute state : states) {
     Value extent =
         ExtentOp::create(builder, at.loc, cast<FlatSymbolRefAttr>(state),

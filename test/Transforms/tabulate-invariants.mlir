@@ -15,8 +15,10 @@ piko.pipeline @Lights rank 2 {
   // CHECK-LABEL: piko.kernel @k
   // CHECK:         scf.forall
   // CHECK:           %[[N:.*]] = piko.extent @lights[0]
+  // CHECK:           %[[MANY:.*]] = arith.cmpi sge, %[[N]], %c32
   // CHECK:           %[[SHORT:.*]] = arith.cmpi sle, %[[N]], %c1024
-  // CHECK:           %[[FITS:.*]] = arith.andi %[[SHORT]], %
+  // CHECK:           %[[BOTH:.*]] = arith.andi %[[MANY]], %[[SHORT]]
+  // CHECK:           %[[FITS:.*]] = arith.andi %[[BOTH]], %
   // CHECK:           %[[COUNT:.*]] = arith.select %[[FITS]], %[[N]], %c0
   // CHECK:           %[[TABLE:.*]] = memref.alloca() : memref<1024xf32>
   // CHECK-NEXT:      scf.for %[[J:.*]] = %c0 to %[[COUNT]] step %c1 {

@@ -429,8 +429,8 @@ def TabulateInvariants : Pass<"piko-tabulate-invariants", "::piko::PipelineOp"> 
     pixels, and a number that takes a root or a division follows from the turn's
     own number and from state that the kernel does not change, such as the length
     of a light's direction, a loop in front of all others computes it for each turn
-    into an array (scalar expansion), from which the inner loop reads it. With more
-    than 1,024 turns the loop runs as it was.
+    into an array (scalar expansion), from which the inner loop reads it. With fewer
+    than 32 turns, or more than 1,024, the loop runs as it was.
 
     **Guarantees** the same bits: what is read is what was computed, and the places
     read are those of the loop's own turns.
