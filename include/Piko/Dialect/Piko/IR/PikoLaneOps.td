@@ -194,15 +194,17 @@ def Piko_LaneAppendOp : Piko_CPUOp<"append", [
     numbers of the records are those of its fields, and may be followed by those of
     further records, each of which has a mask of its own; a lane emits the first
     record before the second. With bins, each record is put into one of the
-    stage's, and into a tile of it where there are tiles. Positions are not counted: see `piko.cpu.is_counted`.
+    stage's, and into a tile of it where there are tiles. Positions are not
+    counted: see `piko.cpu.is_counted`.
 
     The lanes' records are transposed, and stored one behind the other.
 
     ```mlir
-    piko.cpu.append %writer[0] (%us, %vs : vector<16xf32>, vector<16xf32>)
+    piko.cpu.append %writer[0] (%values, %values : vector<16xf32>, vector<16xf32>)
       of @Point mask %mask : vector<16xi1>
-    piko.cpu.append %writer[0] (%us, %vs : vector<16xf32>, vector<16xf32>)
-      of @Point mask %mask : vector<16xi1> in @plot[%bins : vector<16xindex>]
+    piko.cpu.append %writer[0] (%values, %values : vector<16xf32>, vector<16xf32>)
+      of @Point mask %mask : vector<16xi1>
+      in @plot[%places : vector<16xindex>]
     ```
   }];
   let arguments = (ins Piko_WriterType:$writer, Piko_I64Attr:$port,
@@ -229,8 +231,9 @@ def Piko_StoreRecordsOp : Piko_CPUOp<"store_records", [
     lanes.
 
     ```mlir
-    piko.cpu.store_records %memory (%us, %vs : vector<16xf32>, vector<16xf32>)
-      of @Point : memref<?xi8>
+    %memory = memref.alloca() : memref<256xi8>
+    piko.cpu.store_records %memory (%values, %values
+      : vector<16xf32>, vector<16xf32>) of @Point : memref<256xi8>
     ```
   }];
   let arguments = (ins Piko_Bytes:$memory, Variadic<Piko_Lanes>:$values,
@@ -249,8 +252,9 @@ def Piko_AppendRecordOp : Piko_CPUOp<"append_record", [
     `piko.cpu.store_records` stored.
 
     ```mlir
-    %p = piko.cpu.append_record %writer[0] from %memory[%lane of 16]
-      : memref<?xi8> -> !piko.prim<@Point>
+    %memory = memref.alloca() : memref<256xi8>
+    %p = piko.cpu.append_record %writer[0] from %memory[%i of 16]
+      : memref<256xi8> -> !piko.prim<@Point>
     ```
   }];
   let arguments = (ins Piko_WriterType:$writer, Piko_I64Attr:$port,
