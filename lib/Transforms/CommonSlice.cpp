@@ -344,16 +344,14 @@ bool CommonSlice::cut() {
   moves.clear();
   for (size_t i = 0; i < instances.size(); ++i)
     moves.push_back(!stays[i]);
+  SmallVector<bool> isUsed(nodes.size());
+  for (auto [number, instance] : llvm::enumerate(instances))
+    for (auto [value, used] : instance.uses)
+      isUsed[used] = isUsed[used] || moves[number];
   for (auto [number, node] : llvm::enumerate(nodes)) {
     bool isComputed =
         node.isKnown || (node.instance >= 0 && moves[node.instance]);
-    bool isUsed = llvm::any_of(llvm::enumerate(instances), [&](auto user) {
-      return moves[user.index()] &&
-             llvm::any_of(user.value().uses, [&, n = (int)number](auto use) {
-               return use.second == n;
-             });
-    });
-    if (!isComputed && isUsed) {
+    if (!isComputed && isUsed[number]) {
       kept.push_back(node.values);
       keptNodes.push_back(number);
     }
@@ -363,16 +361,15 @@ bool CommonSlice::cut() {
 
 SmallVector<Operation *> CommonSlice::getOperations() const {
   SmallVector<Operation *> all;
-  for (auto [number, instance] : llvm::enumerate(instances))
-    if (!isRoot(number))
-      all.push_back(instance.op);
+  for (const Instance &instance : instances)
+    all.push_back(instance.op);
   return all;
 }
 
 SmallVector<Operation *> CommonSlice::getMoved() const {
   SmallVector<Operation *> moved;
   for (auto [number, instance] : llvm::enumerate(instances))
-    if (moves[number] && !isRoot(number))
+    if (moves[number])
       moved.push_back(instance.op);
   return moved;
 }

@@ -35,7 +35,7 @@ public:
   /// what they are computed from; false if they do not do the same.
   bool addRoot(llvm::ArrayRef<mlir::Operation *> ops);
 
-  /// All operations of the first place, but for the roots.
+  /// All operations of the first place.
   llvm::SmallVector<mlir::Operation *> getOperations() const;
 
   /// Finds the cut that keeps the fewest bytes, and of these the earliest;
@@ -44,7 +44,7 @@ public:
 
   /// What has to be kept.
   llvm::ArrayRef<Counterparts> getKept() const { return kept; }
-  /// The operations of the first place that move, but for the roots.
+  /// The operations of the first place that move.
   llvm::SmallVector<mlir::Operation *> getMoved() const;
 
   /// Makes what has moved: `known` gives the values of counterparts that are

@@ -99,9 +99,10 @@ bool Deferral::isInWork(Value value) const {
 /// A number before it was converted from one kind of integer to a wider one.
 static Value stripCast(Value value) {
   Operation *op = value.getDefiningOp();
-  return isa_and_nonnull<arith::IndexCastOp, arith::ExtSIOp>(op)
-             ? op->getOperand(0)
-             : Value();
+  bool isWider =
+      isa_and_nonnull<arith::ExtSIOp>(op) ||
+      (isa_and_nonnull<arith::IndexCastOp>(op) && value.getType().isIndex());
+  return isWider ? op->getOperand(0) : Value();
 }
 
 bool Deferral::isCoordinate(const Counterparts &values, int64_t dim) const {
@@ -198,6 +199,22 @@ CommonSlice::Rules Deferral::makeRules() {
               }};
 }
 
+/// Why nothing of a stage can be deferred.
+static std::optional<Reason> whyNotOf(StageOp stage) {
+  const char *why = nullptr;
+  if (llvm::is_contained(stage.getBins(), 0))
+    why = "a bin is the whole domain; give the stage bins of a size";
+  else if (stage.getTile())
+    why = "threads share a bin by the pixels that primitives update; give the "
+          "stage smaller bins";
+  else if (stage.getSplit())
+    why = "threads share the primitives of a bin; give the stage bins that are "
+          "run by one";
+  if (!why)
+    return std::nullopt;
+  return Reason{stage.getLoc(), why};
+}
+
 /// Moves reads of a primitive's fields out of what may move: behind the work
 /// there are no primitives.
 static void hoistFields(const Site &site) {
@@ -206,7 +223,8 @@ static void hoistFields(const Site &site) {
       continue;
     SmallVector<GetOp> reads;
     op.walk([&](GetOp read) {
-      if (llvm::all_of(read->getOperands(), [&](Value operand) {
+      if (isSpeculatable(read) &&
+          llvm::all_of(read->getOperands(), [&](Value operand) {
             return !op.isAncestor(operand.getParentRegion()->getParentOp());
           }))
         reads.push_back(read);
@@ -219,8 +237,9 @@ static void hoistFields(const Site &site) {
 /// Finds what is to be done later; false if it is too little, or if that cannot
 /// be told apart.
 bool Deferral::findWork() {
-  for (const Site &site : sites)
-    hoistFields(site);
+  if (!whyNotOf(stage))
+    for (const Site &site : sites)
+      hoistFields(site);
   for (size_t image = 0; image < sites.front().updates.size(); ++image) {
     SmallVector<Operation *> updates;
     for (const Site &site : sites) {
@@ -243,7 +262,11 @@ bool Deferral::findWork() {
 //===----------------------------------------------------------------------===//
 
 int64_t Deferral::getPixels() const {
-  return ShapedType::getNumElements(stage.getBins());
+  constexpr int64_t most = int64_t(1) << 40;
+  int64_t pixels = 1;
+  for (int64_t extent : stage.getBins())
+    pixels = std::min(most, pixels * std::min(extent, most / pixels + 1));
+  return pixels;
 }
 
 /// What is stored for a value: truth values take a byte at least.
@@ -258,22 +281,6 @@ int64_t Deferral::getBytes() const {
     bytes += type.isIndex() ? 8 : type.getIntOrFloatBitWidth() / 8;
   }
   return bytes;
-}
-
-/// Why nothing of a stage can be deferred.
-static std::optional<Reason> whyNotOf(StageOp stage) {
-  const char *why = nullptr;
-  if (llvm::is_contained(stage.getBins(), 0))
-    why = "a bin is the whole domain; give the stage bins of a size";
-  else if (stage.getTile())
-    why = "threads share a bin by the pixels that primitives update; give the "
-          "stage smaller bins";
-  else if (stage.getSplit())
-    why = "threads share the primitives of a bin; give the stage bins that are "
-          "run by one";
-  if (!why)
-    return std::nullopt;
-  return Reason{stage.getLoc(), why};
 }
 
 std::optional<Reason> Deferral::whyNot(int64_t budget) {
@@ -326,9 +333,13 @@ void Deferral::createArrays() {
     first.push_back(cells.lo(bins.getBin(), dim));
   auto createArray = [&](Type type) -> Value {
     constexpr int64_t lineSize = 64;
-    return memref::AllocaOp::create(builder, loc,
-                                    MemRefType::get({getPixels()}, type),
-                                    builder.getI64IntegerAttr(lineSize));
+    auto array = memref::AllocaOp::create(builder, loc,
+                                          MemRefType::get({getPixels()}, type),
+                                          builder.getI64IntegerAttr(lineSize));
+    array->setAttr(
+        marks::pixels,
+        UpdateOp(sites.front().updates.front()).getImageAttr().getAttr());
+    return array;
   };
   isPainted = createArray(builder.getI32Type());
   for (const Counterparts &values : slice.getKept())
@@ -343,6 +354,23 @@ void Deferral::createArrays() {
   memref::StoreOp::create(builder, loc, no, isPainted, loop.getInductionVar());
 }
 
+/// The value behind which all values are known.
+static Value getInnermost(ValueRange values) {
+  Value inner = values.front();
+  for (Value value : values.drop_front()) {
+    Block *block = value.getParentBlock();
+    bool isBehind =
+        block == inner.getParentBlock()
+            ? value.getDefiningOp() && (!inner.getDefiningOp() ||
+                                        inner.getDefiningOp()->isBeforeInBlock(
+                                            value.getDefiningOp()))
+            : inner.getParentRegion()->isAncestor(value.getParentRegion());
+    if (isBehind)
+      inner = value;
+  }
+  return inner;
+}
+
 /// Keeps, in place of the updates of a site, what they are computed from.
 void Deferral::keepAt(size_t number) {
   const Site &site = sites[number];
@@ -352,7 +380,10 @@ void Deferral::keepAt(size_t number) {
       last = update;
   OpBuilder builder(last);
   Location loc = last.getLoc();
+  // Sites that paint one pixel of a loop have one place, too.
+  builder.setInsertionPointAfterValue(getInnermost(site.getCoordinates()));
   Value place = getPlace(builder, loc, site.getCoordinates());
+  builder.setInsertionPoint(last);
   for (auto [values, array] : llvm::zip(slice.getKept(), arrays)) {
     Value value = values[number];
     if (Type type = getStoredType(value.getType()); type != value.getType())
@@ -366,19 +397,20 @@ void Deferral::keepAt(size_t number) {
 /// A coordinate at which the pixel of a site is known behind the work.
 Value Deferral::getKnown(OpBuilder &builder, const Counterparts &values,
                          ValueRange cell) const {
-  Value first = values.front();
+  Value known = values.front();
+  Type type = known.getType();
   for (auto [dim, at] : llvm::enumerate(cell)) {
-    if (!isCoordinate(values, dim) || first.getType() == at.getType())
+    if (!isCoordinate(values, dim))
       continue;
-    if (first.getType().isIndex())
-      return arith::IndexCastOp::create(builder, at.getLoc(), first.getType(),
-                                        at);
-    return arith::ExtSIOp::create(builder, at.getLoc(), first.getType(), at);
-  }
-  for (auto [dim, at] : llvm::enumerate(cell))
-    if (isCoordinate(values, dim))
+    if (type == at.getType())
       return at;
-  return first;
+    if (type.isIndex())
+      return arith::IndexCastOp::create(builder, at.getLoc(), type, at);
+    if (type.getIntOrFloatBitWidth() < 32)
+      return arith::TruncIOp::create(builder, at.getLoc(), type, at);
+    return arith::ExtSIOp::create(builder, at.getLoc(), type, at);
+  }
+  return known;
 }
 
 /// The loop over the pixels of the bin that does the rest.

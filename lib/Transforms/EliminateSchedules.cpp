@@ -23,8 +23,9 @@ struct EliminateSchedulesPass
 /// Whether the schedule says more than which core takes a bin.
 static bool saysMore(ScheduleOp schedule) {
   return schedule.getEndStageAttr() || schedule.getEndBin() ||
-         schedule.getBatch() || schedule.getEveryBin() ||
-         schedule.getUnordered() || schedule.getLanes();
+         schedule.getBehind() || schedule.getBatch() ||
+         schedule.getEveryBin() || schedule.getUnordered() ||
+         schedule.getLanes();
 }
 
 void EliminateSchedulesPass::runOnOperation() {

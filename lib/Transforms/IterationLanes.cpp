@@ -4,6 +4,7 @@
 
 #include "Lanes.h"
 
+#include "Piko/Dialect/Piko/IR/Marks.h"
 #include "Piko/Dialect/Piko/IR/PikoApproximation.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
@@ -225,6 +226,20 @@ void IterationLanes::findSharedPixels() {
   for (auto &[state, indices] : apart)
     if (llvm::none_of(indices, [](Value index) { return bool(index); }))
       shared.insert(state);
+  llvm::DenseMap<Attribute, Value> places; // in arrays of a bin's pixels
+  loop.walk([&](memref::StoreOp store) {
+    if (Attribute pixels = getPixels(store)) {
+      Value place = store.getIndices().front();
+      Value known = places.try_emplace(pixels, place).first->second;
+      if (known != place || !isLinear(place) || !isFixed(place))
+        shared.insert(pixels);
+    }
+  });
+}
+
+Attribute piko::getPixels(memref::StoreOp store) {
+  Operation *array = store.getMemRef().getDefiningOp();
+  return array ? array->getAttr(marks::pixels) : Attribute();
 }
 
 bool IterationLanes::isAccess(Operation *op) const {
@@ -286,13 +301,14 @@ void IterationLanes::checkBarriers() {
       refuse(ordered,
              "it keeps the order of iterations, and a barrier follows");
     else if (reduce)
-      for (Operation &inner : reduce.getBody().front().without_terminator())
+      for (Operation &inner : reduce.getBody().front().without_terminator()) {
         if (!hasVectorForm(&inner))
           refuse(&inner, "it has no vector form");
         else if (llvm::any_of(inner.getOperands(), [&](Value operand) {
                    return isVarying(operand);
                  }))
           refuse(&inner, "it combines by what differs between lanes");
+      }
     return WalkResult::skip();
   });
 }
@@ -391,6 +407,9 @@ LaneForm IterationLanes::getForm(Operation *op) const {
     return LaneForm::Uniform;
   if (auto access = dyn_cast<StateAccessOpInterface>(op))
     if (shared.contains(access.getAccessedState()))
+      return LaneForm::Ordered;
+  if (auto store = dyn_cast<memref::StoreOp>(op))
+    if (Attribute pixels = getPixels(store); pixels && shared.contains(pixels))
       return LaneForm::Ordered;
   auto varies = [&](Value value) { return isVarying(value); };
   bool isUniform = op->getNumRegions() == 0 && op->getNumResults() > 0 &&

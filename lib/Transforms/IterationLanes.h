@@ -8,6 +8,7 @@
 #include "Piko/Analysis/Uniformity.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
+#include "mlir/Dialect/MemRef/IR/MemRef.h"
 #include "mlir/Dialect/SCF/IR/SCF.h"
 #include "llvm/ADT/DenseSet.h"
 #include "llvm/ADT/SetVector.h"
@@ -188,6 +189,10 @@ bool isPrefetch(mlir::Operation *op);
 bool asksAhead(mlir::scf::ForOp loop);
 
 /// Whether it may trap, or takes as long for one lane as for all.
+/// The name of the array of pixels (`marks::pixels`) that a store changes, or
+/// null.
+mlir::Attribute getPixels(mlir::memref::StoreOp store);
+
 bool isDivision(mlir::Operation *op);
 /// Whether it is one of 32 bits for which floats of 64 bits are divided.
 bool isDividedAsFloats(mlir::Operation *op);

@@ -273,6 +273,9 @@ IterationLanes::makeGroups(ArrayRef<Operation *> ops) const {
 static const void *getResource(Operation *op) {
   if (auto access = dyn_cast<StateAccessOpInterface>(op))
     return access.getAccessedState().getAsOpaquePointer();
+  if (auto store = dyn_cast<memref::StoreOp>(op))
+    if (Attribute pixels = getPixels(store))
+      return pixels.getAsOpaquePointer();
   for (Value operand : op->getOperands())
     if (isa<WriterType>(operand.getType()))
       return operand.getAsOpaquePointer();

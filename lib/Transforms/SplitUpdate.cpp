@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #include "SplitUpdate.h"
+#include "StateAccess.h"
 
 #include "mlir/Dialect/Arith/IR/Arith.h"
 #include "mlir/Dialect/SCF/IR/SCF.h"
@@ -23,7 +24,8 @@ class UpdateSplitter {
 public:
   explicit UpdateSplitter(UpdateOp update)
       : update(update), body(update.getBody().front()),
-        yield(cast<YieldOp>(body.getTerminator())) {}
+        yield(cast<YieldOp>(body.getTerminator())),
+        written(getWrittenState(update)) {}
 
   /// Finds the numbers that can be painted later; false if there are none.
   bool findPainted();
@@ -40,7 +42,8 @@ private:
   UpdateOp update;
   Block &body;
   YieldOp yield;
-  std::optional<Choice> common; ///< Its condition and outcome.
+  llvm::DenseSet<StringAttr> written; ///< State that the update changes.
+  std::optional<Choice> common;       ///< Its condition and outcome.
   SmallVector<std::pair<unsigned, Value>> painted;
   llvm::SetVector<Operation *> work; ///< Operands before their users.
 };
@@ -88,7 +91,7 @@ bool UpdateSplitter::collect(Value value) {
   bool isComputed =
       !op->walk([&](Operation *inner) {
            auto load = dyn_cast<LoadOp>(inner);
-           bool isFree = load ? load.getStateAttr() != update.getImageAttr()
+           bool isFree = load ? !written.contains(load.getStateAttr().getAttr())
                          : inner->getNumRegions() > 0
                              ? inner->getDialect() != update->getDialect()
                              : isMemoryEffectFree(inner);

@@ -117,6 +117,14 @@ prepareThreads(pikort_pipeline &p, const Stage &stage, Kernel &kernel) {
   openLanes(p, kernel);
 }
 
+/// Whether a kernel changes state: its stage, or one behind it.
+static bool writesState(const pikort_pipeline &p, const Kernel &kernel) {
+  return p.stages[kernel.stage].writes() ||
+         std::any_of(p.stages.begin(), p.stages.end(), [&](const Stage &stage) {
+           return stage.host == kernel.stage && stage.writes();
+         });
+}
+
 static void prepareStage(pikort_pipeline &p, Kernel &kernel) {
   Stage &stage = p.stages[kernel.stage];
   Cycle *cycle = cycleOf(p, stage);
@@ -135,7 +143,7 @@ static void prepareStage(pikort_pipeline &p, Kernel &kernel) {
     kernel.launch = strips->number();
   if (!kernel.runsSerially)
     prepareThreads(p, stage, kernel);
-  if (strips && stage.writes())
+  if (strips && writesState(p, kernel))
     strips->commit();
   stats.placed += kernel.positions;
 }

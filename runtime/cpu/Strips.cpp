@@ -149,13 +149,16 @@ bool Strips::takeBack() {
 void Strips::absorb(Kernel &kernel) {
   if (!divided_)
     return;
-  for (int32_t e : p_.stages[kernel.stage].outputs) {
-    if (e < 0 || !p_.edges[e].leavesStrips)
+  for (Edge &edge : p_.edges) {
+    bool isOfKernel =
+        edge.producer == kernel.stage ||
+        (edge.producer >= 0 && p_.stages[edge.producer].host == kernel.stage);
+    if (!isOfKernel || !edge.leavesStrips)
       continue;
     // Too much of it is the fault of the stage that it waits for.
-    const std::string &name = p_.stages[p_.edges[e].consumer].name;
+    const std::string &name = p_.stages[edge.consumer].name;
     guarded(&p_, "stage " + quoted(name),
-            [&] { enqueue(p_, p_.edges[e], gatherEdge(p_, p_.edges[e])); });
+            [&] { enqueue(p_, edge, gatherEdge(p_, edge)); });
   }
 }
 

@@ -10,6 +10,7 @@
 // BEHIND: piko.strips
 // RUN: pikoc %s --pipe Pixels --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=BEHIND-PIXELS
 // BEHIND-PIXELS: remark: stage 'shade' takes what stage 'cover' emits in a loop from a list
+// BEHIND-PIXELS: remark: stage 'shade' runs bin by bin behind stage 'cover'
 // RUN: pikoc %s --pipe Further --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=INSIDE
 // RUN: pikoc %s --pipe Merged --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=INSIDE
 // RUN: pikoc %s --pipe Whole --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=INSIDE
@@ -23,6 +24,8 @@
 // RUN: piko-compare %s --pipe Further --domain 67 35 --count 900 --runs 2 | FileCheck %s
 // RUN: piko-compare %s --pipe Merged --domain 67 35 --count 900 --runs 2 | FileCheck %s
 // RUN: piko-compare %s --pipe Whole --domain 67 35 --count 300 --runs 2 | FileCheck %s
+// RUN: piko-compare %s --pipe Waits --domain 67 35 --count 300 --strip 13 --runs 1 | FileCheck %s
+// RUN: piko-compare %s --pipe Twice --domain 67 35 --count 3300 --budget 3000000 --runs 1 --threads 2 | FileCheck %s
 // CHECK: equal
 #include <piko.h>
 
@@ -153,6 +156,70 @@ struct Pixels : piko::Pipe<State> {
     source(cover);
     connect(cover, 0, shade);
     connect(shade, 0, blend);
+    allocateForSource(state().lights, 0);
+  }
+};
+
+// What waits is fed by the stage behind, from strip to strip.
+struct Last : Blend<8> {
+  void schedule(piko::BinId) {
+    endBin();
+    endStage<Shade<8>>();
+  }
+};
+struct Waits : piko::Pipe<State> {
+  Spread<8> spread;
+  Shade<8> shade;
+  Last last;
+  Waits() {
+    source(spread);
+    connect(spread, 0, shade);
+    connect(shade, 0, last);
+    allocateForSource(state().lights, 0);
+  }
+};
+
+// Only the stage behind changes pixels, in a strip for which memory may run out.
+struct Many : piko::Stage<8, 8, 64, Particle, Splat> {
+  void assignBin(const Particle &p) {
+    assignToBoundingBox(p, {p.x - 2, p.y - 2}, {p.x + 2, p.y + 2});
+  }
+  void schedule(piko::BinId) { specifySchedule(piko::DirectMap); }
+  void process(const Particle &p) {
+    int count = p.serial < 3000 ? 1 : 1000;
+    for (int k = 0; k < count; ++k)
+      emit(Splat{binLo(), p.value + float(k)});
+  }
+};
+struct Fork : piko::Stage<8, 8, 64, Splat, Shaded, Shaded> {
+  void assignBin(const Splat &s) { assignToPreviousBins(s); }
+  void process(const Splat &s) {
+    float sum = 0;
+    for (int i = 0; i < int(s.value) % 8; ++i)
+      sum = sum * 0.5f + s.value;
+    emit(Shaded{s.at, s.value, sum}, 1);
+    emit(Shaded{s.at, s.value, sum}, 0);
+  }
+};
+struct Count : piko::Stage<8, 8, 64, Shaded>, piko::Uses<State> {
+  void assignBin(const Shaded &s) { assignToPreviousBins(s); }
+  void process(const Shaded &s) {
+    update(state().other, s.at, [&](Pixel &p) {
+      p.value = p.value * 0.75f + s.sum;
+      ++p.count;
+    });
+  }
+};
+struct Twice : piko::Pipe<State> {
+  Many many;
+  Fork fork;
+  Count count;
+  Blend<8> blend;
+  Twice() {
+    source(many);
+    connect(many, 0, fork);
+    connect(fork, 0, blend);
+    connect(fork, 1, count);
     allocateForSource(state().lights, 0);
   }
 };

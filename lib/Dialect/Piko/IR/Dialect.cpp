@@ -76,7 +76,7 @@ static StringRef getExpectedKind(StringRef name) {
       .Case(marks::mapping, "what lanes are given, as #piko<lanes items>")
       .Case(marks::units, "how threads share units, as #piko<units any>")
       .Case(marks::number, "a 64-bit integer")
-      .Case(cppNameAttr, "a string")
+      .Cases({marks::pixels, cppNameAttr}, "a string")
       .Case(cppTypesAttr, "a dictionary")
       .Default({});
 }
@@ -88,7 +88,7 @@ static bool hasExpectedKind(NamedAttribute attribute) {
     return isa<LaneMappingAttr>(value);
   if (name == marks::units)
     return isa<UnitLoopAttr>(value);
-  if (name == cppNameAttr)
+  if (name == cppNameAttr || name == marks::pixels)
     return isa<StringAttr>(value);
   if (name == cppTypesAttr)
     return isa<DictionaryAttr>(value);

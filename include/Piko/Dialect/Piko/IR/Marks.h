@@ -29,6 +29,9 @@ constexpr llvm::StringLiteral shortCircuit = "piko.short_circuit";
 /// An access to an image whose pixel piko-prove-bounds has found to be in the
 /// bin.
 constexpr llvm::StringLiteral inside = "piko.inside";
+/// An array with a number for each pixel of a bin, which primitives change in
+/// order of lineage; arrays of one name change together.
+constexpr llvm::StringLiteral pixels = "piko.pixels";
 /// Of a kernel's function, until it is converted: the number of the stage whose
 /// bins it is for, or of the source that it places.
 constexpr llvm::StringLiteral number = "piko.number";
