@@ -21,8 +21,8 @@ piko.pipeline @P rank 1 {
     // CHECK: ^bb0(%[[BIN:.*]]: index):
     ^bb0(%bin: index):
       // CHECK: %[[LO:.*]] = arith.muli %[[BIN]], %{{.*}} : index
-      // CHECK: %[[PAINTED:.*]] = memref.alloca() {alignment = 64 : i64} : memref<64xi32>
-      // CHECK: %[[SUMS:.*]] = memref.alloca() {alignment = 64 : i64} : memref<64xf32>
+      // CHECK: %[[PAINTED:.*]] = memref.alloca() {alignment = 64 : i64, piko.pixels = "color"} : memref<64xi32>
+      // CHECK: %[[SUMS:.*]] = memref.alloca() {alignment = 64 : i64, piko.pixels = "color"} : memref<64xf32>
       // CHECK-NOT: memref.alloca
       // CHECK: scf.for
       // CHECK: memref.store %{{.*}}, %[[PAINTED]]
