@@ -48,3 +48,11 @@ func.func @number() {
 func.func @name() attributes {piko.cpp_name = 1} {
   return
 }
+
+// -----
+
+func.func @pixels() {
+  // expected-error@+1 {{expected 'piko.pixels' to be a string, but got unit}}
+  %array = memref.alloca() {piko.pixels} : memref<4xf32>
+  return
+}
