@@ -269,7 +269,8 @@ int64_t Deferral::getPixels() const {
   return pixels;
 }
 
-/// What is stored for a value: truth values take a byte at least.
+/// What is stored for a value: truth values take a word, as vectors of bits
+/// have no masked stores.
 static Type getStoredType(Type type) {
   return type.isInteger(1) ? IntegerType::get(type.getContext(), 32) : type;
 }
@@ -472,6 +473,16 @@ void Deferral::apply() {
 // The pass
 //===----------------------------------------------------------------------===//
 
+/// Why what could be deferred of one site alone cannot be of all.
+static std::optional<Reason> whyNotAlike(BinsOp bins, Operation *work,
+                                         ArrayRef<Site> sites) {
+  if (sites.size() == 1 || !Deferral(bins, work, sites.take_front()).findWork())
+    return std::nullopt;
+  return Reason{UpdateOp(sites[1].updates.front()).getLoc(),
+                "this does not do the same as the update before; let both end "
+                "in one computation, as in a function that both call"};
+}
+
 void DeferShadingPass::runOnBins(KernelOp kernel, BinsOp bins) {
   if (!whyNotOf(lookupInPipeline<StageOp>(bins, bins.getStageAttr()))) {
     SmallVector<UpdateOp> updates;
@@ -486,11 +497,14 @@ void DeferShadingPass::runOnBins(KernelOp kernel, BinsOp bins) {
     if (!work || (sites.size() == 1 && paintsOnce(work, sites.front())))
       continue;
     Deferral deferral(bins, work, sites);
-    if (!deferral.findWork())
+    std::optional<Reason> reason;
+    if (deferral.findWork())
+      reason = deferral.whyNot(budget);
+    else if (!(reason = whyNotAlike(bins, work, sites)))
       continue;
     UpdateOp update = sites.front().updates.front();
     std::string what = ("what is written to '" + update.getImage() + "'").str();
-    if (std::optional<Reason> reason = deferral.whyNot(budget)) {
+    if (reason) {
       InFlightDiagnostic remark =
           update.emitRemark()
           << what << " is computed also where it is overwritten";
