@@ -8,6 +8,7 @@
 //   3. keep that in place of the updates, and do the rest in a loop over the
 //      bin's pixels behind the work.
 
+#include "BinOwner.h"
 #include "CommonSlice.h"
 #include "PaintedPixels.h"
 #include "SplitUpdate.h"
@@ -38,12 +39,6 @@ struct DeferShadingPass : piko::impl::DeferShadingBase<DeferShadingPass> {
   using DeferShadingBase::DeferShadingBase;
   void runOnOperation() override;
   void runOnBins(KernelOp kernel, BinsOp bins);
-};
-
-/// Why something cannot be done, and where.
-struct Reason {
-  Location at;
-  std::string why;
 };
 
 /// Moves what some images are painted with behind the work that paints them.
@@ -199,22 +194,6 @@ CommonSlice::Rules Deferral::makeRules() {
               }};
 }
 
-/// Why nothing of a stage can be deferred.
-static std::optional<Reason> whyNotOf(StageOp stage) {
-  const char *why = nullptr;
-  if (llvm::is_contained(stage.getBins(), 0))
-    why = "a bin is the whole domain; give the stage bins of a size";
-  else if (stage.getTile())
-    why = "threads share a bin by the pixels that primitives update; give the "
-          "stage smaller bins";
-  else if (stage.getSplit())
-    why = "threads share the primitives of a bin; give the stage bins that are "
-          "run by one";
-  if (!why)
-    return std::nullopt;
-  return Reason{stage.getLoc(), why};
-}
-
 /// Moves reads of a primitive's fields out of what may move: behind the work
 /// there are no primitives.
 static void hoistFields(const Site &site) {
@@ -237,7 +216,7 @@ static void hoistFields(const Site &site) {
 /// Finds what is to be done later; false if it is too little, or if that cannot
 /// be told apart.
 bool Deferral::findWork() {
-  if (!whyNotOf(stage))
+  if (!whyNotOneThread(stage))
     for (const Site &site : sites)
       hoistFields(site);
   for (size_t image = 0; image < sites.front().updates.size(); ++image) {
@@ -285,7 +264,7 @@ int64_t Deferral::getBytes() const {
 }
 
 std::optional<Reason> Deferral::whyNot(int64_t budget) {
-  if (std::optional<Reason> reason = whyNotOf(stage))
+  if (std::optional<Reason> reason = whyNotOneThread(stage))
     return reason;
   for (const Site &site : sites)
     for (UpdateOp update : site.updates)
@@ -484,7 +463,7 @@ static std::optional<Reason> whyNotAlike(BinsOp bins, Operation *work,
 }
 
 void DeferShadingPass::runOnBins(KernelOp kernel, BinsOp bins) {
-  if (!whyNotOf(lookupInPipeline<StageOp>(bins, bins.getStageAttr()))) {
+  if (!whyNotOneThread(lookupInPipeline<StageOp>(bins, bins.getStageAttr()))) {
     SmallVector<UpdateOp> updates;
     bins.walk([&](UpdateOp update) { updates.push_back(update); });
     for (UpdateOp update : updates)

@@ -10,6 +10,7 @@
 //   write
 //      it at the end.
 
+#include "BinOwner.h"
 #include "StateAccess.h"
 
 #include "Piko/Dialect/Piko/IR/BinArithmetic.h"
@@ -33,12 +34,6 @@ namespace {
 struct FormTilesPass : piko::impl::FormTilesBase<FormTilesPass> {
   using FormTilesBase::FormTilesBase;
   void runOnOperation() override;
-};
-
-/// Why something cannot be done, and where.
-struct Reason {
-  Location at;
-  std::string why;
 };
 
 /// The accesses to the images of a pipeline.
@@ -154,19 +149,11 @@ bool TileFormer::mayHaveBatches() {
 }
 
 std::optional<Reason> TileFormer::whyNot() {
-  auto reason = [&](const Twine &why) {
-    return Reason{stage.getLoc(), why.str()};
-  };
-  if (llvm::is_contained(stage.getBins(), 0))
-    return reason("a bin is the whole domain; give the stage bins of a size");
-  if (stage.getTile())
-    return reason("threads share a bin by the pixels that primitives update; "
-                  "give the stage smaller bins");
-  if (stage.getSplit())
-    return reason("threads share the primitives of a bin; let the stage change "
-                  "pixels by update");
+  if (std::optional<Reason> reason = whyNotOneThread(stage))
+    return reason;
   if (stage.getTakesList() && mayHaveBatches())
-    return reason("its list may be cut into batches; leave out batch");
+    return Reason{stage.getLoc(),
+                  "its list may be cut into batches; leave out batch"};
   return std::nullopt;
 }
 
