@@ -6,21 +6,16 @@
 #ifndef PIKO_TARGET_CPU_COMPRESSSTORES_H
 #define PIKO_TARGET_CPU_COMPRESSSTORES_H
 
-#include "llvm/IR/PassManager.h"
-#include "llvm/Target/TargetMachine.h"
+#include "ProcessorPass.h"
 
 namespace piko {
 
 /// Compresses in registers, a vector of 512 bits at a time, and stores as many
 /// lanes as there are, where the function's processor has AVX-512.
-struct CompressStoresPass : llvm::PassInfoMixin<CompressStoresPass> {
-  explicit CompressStoresPass(const llvm::TargetMachine &machine)
-      : machine(&machine) {}
+struct CompressStoresPass : ProcessorPass<CompressStoresPass> {
+  using ProcessorPass::ProcessorPass;
   llvm::PreservedAnalyses run(llvm::Function &function,
                               llvm::FunctionAnalysisManager &);
-
-private:
-  const llvm::TargetMachine *machine;
 };
 
 } // namespace piko

@@ -6,8 +6,7 @@
 #ifndef PIKO_TARGET_CPU_WIDENGATHERS_H
 #define PIKO_TARGET_CPU_WIDENGATHERS_H
 
-#include "llvm/IR/PassManager.h"
-#include "llvm/Target/TargetMachine.h"
+#include "ProcessorPass.h"
 
 namespace piko {
 
@@ -16,14 +15,10 @@ namespace piko {
 /// AVX2. To run behind the optimizer, which must not know: a word may go
 /// beyond an object. AddressSanitizer would tell of that, so functions for it
 /// stay as they are.
-struct WidenGathersPass : llvm::PassInfoMixin<WidenGathersPass> {
-  explicit WidenGathersPass(const llvm::TargetMachine &machine)
-      : machine(&machine) {}
+struct WidenGathersPass : ProcessorPass<WidenGathersPass> {
+  using ProcessorPass::ProcessorPass;
   llvm::PreservedAnalyses run(llvm::Function &function,
                               llvm::FunctionAnalysisManager &);
-
-private:
-  const llvm::TargetMachine *machine;
 };
 
 } // namespace piko

@@ -7,22 +7,17 @@
 #ifndef PIKO_TARGET_CPU_WIDENMASKS_H
 #define PIKO_TARGET_CPU_WIDENMASKS_H
 
-#include "llvm/IR/PassManager.h"
-#include "llvm/Target/TargetMachine.h"
+#include "ProcessorPass.h"
 
 namespace piko {
 
 /// Gives masks that go from block to block 32 bits for each lane, where the
 /// function's processor has AVX2 alone. To run behind the optimizer, which
 /// would undo it.
-struct WidenMasksPass : llvm::PassInfoMixin<WidenMasksPass> {
-  explicit WidenMasksPass(const llvm::TargetMachine &machine)
-      : machine(&machine) {}
+struct WidenMasksPass : ProcessorPass<WidenMasksPass> {
+  using ProcessorPass::ProcessorPass;
   llvm::PreservedAnalyses run(llvm::Function &function,
                               llvm::FunctionAnalysisManager &);
-
-private:
-  const llvm::TargetMachine *machine;
 };
 
 } // namespace piko
