@@ -1,12 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// piko-hoist-bounds: for each innermost loop,
-//   1. find the tested accesses, each at a sum of what does not change and, at
-//      most once, of the loop's count;
-//   2. if these are all, write a test in front that all are inside;
-//   3. copy the loop, for where they are, with accesses that are not tested.
+// piko-hoist-bounds: for each nest of loops, outermost first,
+//   1. find the tested accesses;
+//   2. if the range of each index is known in front of the nest, write a test
+//      there that all are inside;
+//   3. copy the nest, for where they are, with accesses that are not tested.
+// Where a loop is innermost, and each index a sum of what does not change and,
+// at most once, of the loop's count, the copy has indices of 64 bits in a row.
+
+#include "IndexRanges.h"
 
 #include "Piko/Dialect/Piko/IR/BinArithmetic.h"
+#include "Piko/Dialect/Piko/IR/Marks.h"
+#include "Piko/Dialect/Piko/IR/PikoCPU.h"
 #include "Piko/Transforms/Passes.h"
 
 #include "mlir/Dialect/Arith/IR/Arith.h"
@@ -24,12 +30,6 @@ using namespace piko;
 
 namespace {
 
-/// What a loop counts with: from `first`, by one, while it is less than `end`.
-struct Count {
-  SmallVector<Value> values; // the count, as an argument of each region
-  Value first, end;
-};
-
 /// An index: numbers that do not change, perhaps less than others, and the
 /// count. All are i32, but for the count.
 struct Sum {
@@ -45,15 +45,14 @@ struct Access {
   Sum sum;
 };
 
+/// Of one innermost loop.
 class LoopVersioner {
 public:
-  LoopVersioner(LoopLikeOpInterface loop, int64_t maxOperations)
-      : loop(loop), maxOperations(maxOperations) {}
+  explicit LoopVersioner(LoopLikeOpInterface loop)
+      : loop(loop), count(findLoopCount(loop)) {}
   bool run();
 
 private:
-  bool isLarge();
-  void findCount();
   bool collect();
   bool add(Value index, Sum &sum, bool isOff);
   Value createTest(OpBuilder &builder);
@@ -61,90 +60,87 @@ private:
   Value createSum(OpBuilder &builder, const Sum &sum);
 
   LoopLikeOpInterface loop;
-  int64_t maxOperations;
-  std::optional<Count> count;
+  std::optional<LoopCount> count;
   SmallVector<Access> accesses;
 };
 
 struct HoistBoundsPass : piko::impl::HoistBoundsBase<HoistBoundsPass> {
   using HoistBoundsBase::HoistBoundsBase;
   void runOnOperation() override;
+
+private:
+  bool runOnNest(LoopLikeOpInterface nest);
 };
 
 } // namespace
 
-/// The one index of an access to a buffer that is tested; null for others.
-static Value getTestedIndex(Operation *op) {
-  auto get = [](auto access) {
-    return access.getChecked() || access.getIndices().size() != 1
-               ? Value()
-               : access.getIndices()[0];
-  };
+/// Calls a function with an access; false for what is none.
+template <class Function>
+static bool visitAccess(Operation *op, Function &&visit) {
   if (auto load = dyn_cast<LoadOp>(op))
-    return get(load);
-  if (auto store = dyn_cast<StoreOp>(op))
-    return get(store);
-  if (auto atomic = dyn_cast<AtomicOp>(op))
-    return get(atomic);
-  return Value();
+    visit(load);
+  else if (auto store = dyn_cast<StoreOp>(op))
+    visit(store);
+  else if (auto atomic = dyn_cast<AtomicOp>(op))
+    visit(atomic);
+  else
+    return false;
+  return true;
 }
 
-/// Whether an access is tested, whatever its indices.
-static bool isTested(Operation *op) {
-  auto get = [](auto access) {
-    return !access.getChecked() && !access.getIndices().empty();
-  };
-  if (auto load = dyn_cast<LoadOp>(op))
-    return get(load);
-  if (auto store = dyn_cast<StoreOp>(op))
-    return get(store);
-  auto atomic = dyn_cast<AtomicOp>(op);
-  return atomic && get(atomic);
-}
-
-static StringAttr getState(Operation *op) {
-  return op->getAttrOfType<FlatSymbolRefAttr>("state").getAttr();
-}
-
-bool LoopVersioner::isLarge() {
-  int64_t operations = 0;
-  bool isInnermost = true;
-  loop->walk([&](Operation *op) {
-    ++operations;
-    isInnermost &= op == loop.getOperation() || !isa<LoopLikeOpInterface>(op);
+/// The indices of an access that is tested; none of others.
+static ValueRange getTestedIndices(Operation *op) {
+  ValueRange indices;
+  visitAccess(op, [&](auto access) {
+    if (!access.getChecked())
+      indices = access.getIndices();
   });
-  return !isInnermost || operations > maxOperations;
+  return indices;
 }
 
-void LoopVersioner::findCount() {
-  if (auto range = dyn_cast<scf::ForOp>(loop.getOperation())) {
-    if (matchPattern(range.getStep(), m_One()))
-      count = Count{{range.getInductionVar()},
-                    range.getLowerBound(),
-                    range.getUpperBound()};
-    return;
-  }
-  auto repeat = dyn_cast<scf::WhileOp>(loop.getOperation());
-  if (!repeat)
-    return;
-  auto compare =
-      repeat.getConditionOp().getCondition().getDefiningOp<arith::CmpIOp>();
-  if (!compare || compare.getPredicate() != arith::CmpIPredicate::slt ||
-      !loop.isDefinedOutsideOfLoop(compare.getRhs()))
-    return;
-  auto before = dyn_cast<BlockArgument>(compare.getLhs());
-  if (!before || before.getOwner() != repeat.getBeforeBody())
-    return;
-  unsigned i = before.getArgNumber();
-  auto step =
-      repeat.getYieldOp().getResults()[i].getDefiningOp<arith::AddIOp>();
-  if (!step || !matchPattern(step.getRhs(), m_One()))
-    return;
-  auto after = dyn_cast<BlockArgument>(step.getLhs());
-  if (!after || after.getOwner() != repeat.getAfterBody() ||
-      repeat.getConditionOp().getArgs()[after.getArgNumber()] != before)
-    return;
-  count = Count{{after}, repeat.getInits()[i], compare.getRhs()};
+static FlatSymbolRefAttr getState(Operation *op) {
+  return op->getAttrOfType<FlatSymbolRefAttr>("state");
+}
+
+/// Whether nothing but loops that count stands in a nest that is not too large
+/// to stand there twice.
+static bool mayCopy(LoopLikeOpInterface nest, int64_t maxOperations) {
+  int64_t operations = 0;
+  WalkResult result = nest->walk([&](Operation *op) {
+    bool isOfWork = isa<ItemOp>(op) || op->hasAttr(marks::lanes);
+    return ++operations > maxOperations || isOfWork ? WalkResult::interrupt()
+                                                    : WalkResult::advance();
+  });
+  return !result.wasInterrupted();
+}
+
+static bool isInnermost(LoopLikeOpInterface loop) {
+  return !loop->walk([&](LoopLikeOpInterface inner) {
+                return inner == loop ? WalkResult::advance()
+                                     : WalkResult::interrupt();
+              })
+              .wasInterrupted();
+}
+
+/// Puts a nest and a copy of it behind a test; what the copy has of the nest.
+static IRMapping version(LoopLikeOpInterface nest, Value test) {
+  OpBuilder builder(nest);
+  IRMapping mapping;
+  Operation *copy = builder.clone(*nest, mapping);
+  auto choice =
+      scf::IfOp::create(builder, nest.getLoc(), nest->getResultTypes(), test,
+                        /*withElseRegion=*/true);
+  nest->replaceAllUsesWith(choice);
+  auto fill = [&](Block *block, Operation *loop) {
+    if (block->empty() || !block->back().hasTrait<OpTrait::IsTerminator>()) {
+      builder.setInsertionPointToEnd(block);
+      scf::YieldOp::create(builder, nest.getLoc(), loop->getResults());
+    }
+    loop->moveBefore(block, block->begin());
+  };
+  fill(choice.thenBlock(), copy);
+  fill(choice.elseBlock(), nest);
+  return mapping;
 }
 
 /// Adds an index to a sum, or takes it off; false if it is none.
@@ -156,7 +152,7 @@ bool LoopVersioner::add(Value value, Sum &sum, bool isOff) {
     sum.constant += isOff ? -constant.getSExtValue() : constant.getSExtValue();
     return true;
   }
-  if (count && llvm::is_contained(count->values, value)) {
+  if (count && count->value == value) {
     bool isFirst = !sum.counts && !isOff;
     sum.counts = true;
     return isFirst;
@@ -182,11 +178,12 @@ bool LoopVersioner::add(Value value, Sum &sum, bool isOff) {
 /// Finds the accesses; whether they are all that are tested.
 bool LoopVersioner::collect() {
   WalkResult result = loop->walk([&](Operation *op) {
-    if (!isTested(op))
+    ValueRange indices = getTestedIndices(op);
+    if (indices.empty())
       return WalkResult::advance();
-    Value index = getTestedIndex(op);
     Access access{op, {}};
-    if (!index || !add(index, access.sum, /*isOff=*/false))
+    if (indices.size() > 1 ||
+        !add(indices.front(), access.sum, /*isOff=*/false))
       return WalkResult::interrupt();
     accesses.push_back(std::move(access));
     return WalkResult::advance();
@@ -235,9 +232,9 @@ Value LoopVersioner::createTest(OpBuilder &builder) {
       expect(Predicate::sle, end, constant(int64_t(1) << 40));
     }
   }
-  SmallVector<std::pair<StringAttr, Sum>> known;
+  SmallVector<std::pair<FlatSymbolRefAttr, Sum>> known;
   for (const Access &access : accesses) {
-    std::pair<StringAttr, Sum> place(getState(access.op), access.sum);
+    std::pair<FlatSymbolRefAttr, Sum> place(getState(access.op), access.sum);
     if (llvm::is_contained(known, place))
       continue;
     known.push_back(place);
@@ -250,7 +247,7 @@ Value LoopVersioner::createTest(OpBuilder &builder) {
     }
     expect(Predicate::sge, lowest, constant(0));
     expect(Predicate::sle, behind,
-           ExtentOp::create(builder, loc, place.first, 0));
+           ExtentOp::create(builder, loc, place.first.getAttr(), 0));
     // What is computed in 32 bits must be the same number.
     expect(Predicate::sle, behind, constant(int64_t(1) << 31));
   }
@@ -266,7 +263,7 @@ void LoopVersioner::replaceIndices(OpBuilder &builder, IRMapping &mapping) {
     Location loc = copy->getLoc();
     builder.setInsertionPoint(copy);
     if (access.sum.counts) {
-      Value counted = mapping.lookup(count->values.front());
+      Value counted = mapping.lookup(count->value);
       if (!counted.getType().isIndex())
         counted = arith::IndexCastOp::create(builder, loc,
                                              builder.getIndexType(), counted);
@@ -276,48 +273,90 @@ void LoopVersioner::replaceIndices(OpBuilder &builder, IRMapping &mapping) {
       found.getIndicesMutable().assign(index);
       found.setChecked(true);
     };
-    if (auto load = dyn_cast<LoadOp>(copy))
-      change(load);
-    else if (auto store = dyn_cast<StoreOp>(copy))
-      change(store);
-    else
-      change(cast<AtomicOp>(copy));
+    visitAccess(copy, change);
   }
 }
 
 bool LoopVersioner::run() {
-  if (isLarge())
-    return false;
-  findCount();
   if (!collect())
     return false;
   OpBuilder builder(loop);
-  auto choice = scf::IfOp::create(builder, loop.getLoc(),
-                                  loop->getResultTypes(), createTest(builder),
-                                  /*withElseRegion=*/true);
-  loop->replaceAllUsesWith(choice);
-  auto fill = [&](Block *block, Operation *copy) {
-    if (block->empty() || !block->back().hasTrait<OpTrait::IsTerminator>()) {
-      builder.setInsertionPointToEnd(block);
-      scf::YieldOp::create(builder, loop.getLoc(), copy->getResults());
-    }
-    copy->moveBefore(block, block->begin());
-  };
-  IRMapping mapping;
-  Operation *copy = builder.clone(*loop, mapping);
-  fill(choice.thenBlock(), copy);
-  fill(choice.elseBlock(), loop);
-  builder.setInsertionPoint(copy);
+  IRMapping mapping = version(loop, createTest(builder));
+  builder.setInsertionPoint(mapping.lookup(loop.getOperation()));
   replaceIndices(builder, mapping);
   return true;
 }
 
-void HoistBoundsPass::runOnOperation() {
-  SmallVector<LoopLikeOpInterface> loops;
-  getOperation().walk([&](LoopLikeOpInterface loop) {
-    if (isa<scf::ForOp, scf::WhileOp>(loop.getOperation()))
-      loops.push_back(loop);
+/// Sums of which it is known that they do not wrap around.
+static void setNoWrap(Operation *op) {
+  auto set = [](auto sum) {
+    sum.setOverflowFlags(sum.getOverflowFlags() |
+                         arith::IntegerOverflowFlags::nsw);
+  };
+  if (auto sum = dyn_cast<arith::AddIOp>(op))
+    set(sum);
+  else if (auto difference = dyn_cast<arith::SubIOp>(op))
+    set(difference);
+  else if (auto product = dyn_cast<arith::MulIOp>(op))
+    set(product);
+}
+
+/// Versions a nest by the ranges of its indices.
+static bool versionByRanges(LoopLikeOpInterface nest) {
+  auto front = std::make_unique<Block>();
+  OpBuilder builder(nest->getContext());
+  builder.setInsertionPointToEnd(front.get());
+  IndexRanges ranges(nest, builder);
+  SmallVector<Operation *> accesses;
+  WalkResult result = nest->walk([&](Operation *op) {
+    ValueRange indices = getTestedIndices(op);
+    if (!indices.empty())
+      accesses.push_back(op);
+    for (auto [dim, index] : llvm::enumerate(indices)) {
+      std::optional<IndexRanges::Range> range = ranges.get(index);
+      if (!range)
+        return WalkResult::interrupt();
+      ranges.expectInside(*range, getState(op), int64_t(dim));
+    }
+    return WalkResult::advance();
   });
-  for (LoopLikeOpInterface loop : loops)
-    versioned += LoopVersioner(loop, maxOperations).run();
+  if (result.wasInterrupted() || accesses.empty())
+    return false;
+  nest->getBlock()->getOperations().splice(nest->getIterator(),
+                                           front->getOperations());
+  SmallVector<Operation *> sums, divisions;
+  nest->walk([&](Operation *op) {
+    if (op->getNumResults() == 1 && ranges.isKnown(op->getResult(0)))
+      (isa<DivideOp>(op) ? divisions : sums).push_back(op);
+  });
+  IRMapping mapping = version(nest, ranges.getTest());
+  for (Operation *access : accesses)
+    visitAccess(mapping.lookup(access),
+                [](auto copy) { copy.setChecked(true); });
+  for (Operation *sum : sums)
+    setNoWrap(mapping.lookup(sum));
+  for (Operation *op : divisions) {
+    auto division = cast<DivideOp>(mapping.lookup(op));
+    IRRewriter rewriter(division);
+    rewriter.replaceOp(division, division.createUnchecked(rewriter));
+  }
+  return true;
+}
+
+/// Whether a nest stands there twice, of loops that count.
+bool HoistBoundsPass::runOnNest(LoopLikeOpInterface nest) {
+  if (isInnermost(nest) && mayCopy(nest, maxOperations) &&
+      LoopVersioner(nest).run())
+    return true;
+  return mayCopy(nest, maxNestOperations) && versionByRanges(nest);
+}
+
+void HoistBoundsPass::runOnOperation() {
+  getOperation().walk<WalkOrder::PreOrder>([&](Operation *op) {
+    auto nest = dyn_cast<LoopLikeOpInterface>(op);
+    if (!isa<scf::ForOp, scf::WhileOp>(op) || !runOnNest(nest))
+      return WalkResult::advance();
+    ++versioned;
+    return WalkResult::skip();
+  });
 }

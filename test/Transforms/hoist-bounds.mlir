@@ -1,5 +1,5 @@
 // RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-form-kernels,piko-form-work,piko-form-units,piko-hoist-bounds))' %s | FileCheck %s
-// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-form-kernels,piko-form-work,piko-form-units,piko-hoist-bounds{max-operations=4}))' %s | FileCheck %s --check-prefix=SHORT
+// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-form-kernels,piko-form-work,piko-form-units,piko-hoist-bounds{max-operations=4 max-nest-operations=4}))' %s | FileCheck %s --check-prefix=SHORT
 
 // SHORT-NOT: checked
 
@@ -14,6 +14,8 @@ piko.pipeline @P rank 1 {
   piko.source @rows
   piko.source @once
   piko.source @gathers
+  piko.source @ranges
+  piko.source @wraps
 
   // for (j = 0; j < n; ++j) b[x + j] = a[j - 1]; both ends of each row of
   // indices are tested, in 64 bits.
@@ -116,13 +118,87 @@ piko.pipeline @P rank 1 {
         %next = arith.addi %j, %two : i32
         scf.yield %next : i32
       }
-      // Nor twice the count.
-      %double = scf.while (%j = %zero) : (i32) -> i32 {
+      piko.return
+    }
+  }
+
+  // Of a nest the range of each index is computed in front of it: here of
+  // b[n * min(j + k, x)], where products have four corners; sums that it has
+  // found to fit do not wrap around.
+  // CHECK:      piko.kernel @kernel_ranges
+  // CHECK:        %[[X:.*]] = piko.get %{{.*}} "x"
+  // CHECK:        %[[N:.*]] = piko.get %{{.*}} "n"
+  // CHECK-NOT:    scf.while
+  // CHECK:        arith.minsi
+  // CHECK:        arith.muli
+  // CHECK:        %[[EXTENT:.*]] = piko.extent @b[0]
+  // CHECK:        arith.cmpi slt, %{{.*}}, %[[EXTENT]] : index
+  // CHECK:        scf.if
+  // CHECK:          scf.while
+  // CHECK:            scf.while
+  // CHECK:              arith.addi %{{.*}}, %{{.*}} overflow<nsw> : i32
+  // CHECK:              piko.load checked @b[%{{.*}} : i32]
+  // CHECK:        } else {
+  // CHECK:          scf.while
+  // CHECK:            scf.while
+  // CHECK:              arith.addi %{{.*}}, %{{.*}} : i32
+  // CHECK:              piko.load @b[%{{.*}} : i32]
+  piko.stage @ranges bins [0] threads 1 : @F -> [] {
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      %zero = arith.constant 0 : i32
+      %one = arith.constant 1 : i32
+      %x = piko.get %f "x" : !piko.prim<@F> -> i32
+      %n = piko.get %f "n" : !piko.prim<@F> -> i32
+      %rows = scf.while (%j = %zero) : (i32) -> i32 {
         %more = arith.cmpi slt, %j, %n : i32
         scf.condition(%more) %j : i32
       } do {
       ^bb0(%j: i32):
-        %at = arith.addi %j, %j : i32
+        %columns = scf.while (%k = %j) : (i32) -> i32 {
+          %more = arith.cmpi slt, %k, %n : i32
+          scf.condition(%more) %k : i32
+        } do {
+        ^bb0(%k: i32):
+          %sum = arith.addi %j, %k : i32
+          %limited = arith.minsi %sum, %x : i32
+          %at = arith.muli %n, %limited : i32
+          %v = piko.load @b[%at : i32] "v" : f32
+          %next = arith.addi %k, %one : i32
+          scf.yield %next : i32
+        }
+        %next = arith.addi %j, %one : i32
+        scf.yield %next : i32
+      }
+      piko.return
+    }
+  }
+
+  // A remainder is below its divisor, if that is positive and the dividend is
+  // not negative; then it needs no test either.
+  // CHECK:      piko.kernel @kernel_wraps
+  // CHECK:        scf.if
+  // CHECK:          scf.while
+  // CHECK-NOT:        piko.divide
+  // CHECK:            %[[R:.*]] = arith.remsi
+  // CHECK:            piko.load checked @a[%[[R]] : i32]
+  // CHECK:        } else {
+  // CHECK:          scf.while
+  // CHECK:            piko.divide remainder_signed
+  piko.stage @wraps bins [0] threads 1 : @F -> [] {
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      %zero = arith.constant 0 : i32
+      %one = arith.constant 1 : i32
+      %x = piko.get %f "x" : !piko.prim<@F> -> i32
+      %n = piko.get %f "n" : !piko.prim<@F> -> i32
+      %last = scf.while (%j = %zero) : (i32) -> i32 {
+        %more = arith.cmpi slt, %j, %n : i32
+        scf.condition(%more) %j : i32
+      } do {
+      ^bb0(%j: i32):
+        %sum = arith.addi %j, %x : i32
+        %at = piko.divide remainder_signed %sum, %n : i32
         %v = piko.load @a[%at : i32] "v" : f32
         %next = arith.addi %j, %one : i32
         scf.yield %next : i32

@@ -67,12 +67,16 @@ def HoistBounds : Pass<"piko-hoist-bounds", "::piko::PipelineOp"> {
     **Requires** loops over units (`piko-form-units`); last before `convert-piko-to-scf`, because
     behind it loops stand there twice.
 
-    **Does**: takes innermost loops that count by one up to a bound that does not
-    change, and in which indices of buffers are the count, or a number that does
-    not change and the count. A test in front of the loop finds whether all these
-    indices are inside, and none wraps around; then a copy of the loop runs whose
-    accesses are `checked`, with indices that LLVM sees to be in a row, so that
-    it can form vectors. Otherwise the loop runs as it was.
+    **Does**: takes nests of loops, outermost first, in which the range of each
+    index that is tested is known in front: sums, products, minima, maxima,
+    choices and remainders of numbers that do not change and of counts by one.
+    Interval arithmetic in front of the nest finds the least and the greatest
+    index, and a test whether all are inside, and nothing wraps around; then a
+    copy of the nest runs whose accesses are `checked`, and whose divisions that
+    are known to have a result are not tested either. An innermost loop in which
+    each index is a sum with the count at most once gets indices that LLVM sees
+    to be in a row, so that it can form vectors. Otherwise the nest runs as it
+    was.
 
     **Guarantees** the same accesses in the same order, and the same errors.
 
@@ -93,13 +97,16 @@ def HoistBounds : Pass<"piko-hoist-bounds", "::piko::PipelineOp"> {
     }
     ```
 
-    **Limits**: a loop with another index, as one that is read from a buffer, is
-    taken for those that are as above. Long loops, and loops in which nothing is
-    tested, stay.
+    **Limits**: a nest with another index, as one of 32 bits that is read from a
+    buffer, stays, and the loops inside it are looked at; long nests, and those in
+    which nothing is tested, stay, too. A loop that counts down, or by another
+    number than one, has no range.
   }];
   let options = [
     Option<"maxOperations", "max-operations", "int64_t", "64",
-           "How many operations a loop may have to stand there twice">];
+           "How many operations an innermost loop may have to stand there twice">,
+    Option<"maxNestOperations", "max-nest-operations", "int64_t", "128",
+           "The same of a nest of loops">];
   let statistics = [
     Statistic<"versioned", "versioned", "loops with a test in front">];
 }
@@ -311,10 +318,15 @@ def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
     scatters, of a row of pixels masked loads and stores; local arrays get a column
     for each lane, and short ones are accessed row by row, also where lanes are in
     different places. What a loop hands on stays scalar where all lanes that are
-    still in it began with the same, as the place of an insertion. Where iterations read three fields or more of an element, as of
-    the triangle that a pixel shows, and all that are active turn out to read the
-    same one, scalar loads read it. Integers of 32 bits are divided as floats of 64,
-    which is exact; by what all lanes share, they are multiplied. What has no vector form runs lane by lane inside.
+    still in it began with the same, as the place of an insertion. Where
+    iterations read three fields or more of an element, as of the triangle that a
+    pixel shows, and all that are active turn out to read the same one, scalar
+    loads read it. Integers of 32 bits are divided as floats of 64,
+    which is exact; by what all lanes share, they are multiplied. Where an index
+    grows by one from lane to lane but for limits, as one that is clamped to an
+    image, or wraps around in it, a test finds whether it does so here, and a load
+    of a row is the other side of the gather. What has no vector form runs lane by
+    lane inside.
 
     Loops inside, or two of which one is all that the other does, are collapsed
     where their turns differ between lanes but hand on nothing, and change state
@@ -355,9 +367,13 @@ def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
     many lanes; where they do not, a remark has the estimate, with what costs most.
     A loop of a phase that is written in order is vectorized as well where it stands
     in no other vector, its turns hand on nothing, read no state that they change,
-    and store each field once; they may emit. If all that a turn does stands behind a condition,
-    with a loop of its own, the turns that have something to do are found first,
-    1,024 at a time (stream compaction), so that vectors are full.
+    and store each field once; they may emit. If all that a turn does stands behind
+    a condition, with a loop of its own, the turns that have something to do are
+    found first, 1,024 at a time (stream compaction), so that vectors are full.
+    Where such loops turn equally often for all primitives, as those along the rows
+    of an image, primitives become lanes only if they are expected to be faster. A
+    loop that stands there again with tests of its indices (`piko-hoist-bounds`)
+    is left as it is.
 
     A primitive that goes along a buffer in a loop of its own is mostly left to
     LLVM, which makes vectors along that loop. Rows of boxes, which mostly have few
