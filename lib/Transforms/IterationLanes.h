@@ -73,6 +73,8 @@ public:
     bool computes = false;          ///< Or iterations clear or copy.
     /// What costs most where lanes take turns, or are in other places.
     std::multimap<double, mlir::Operation *, std::greater<>> obstacles;
+    /// Of `serial`, what inner loops take.
+    llvm::DenseMap<mlir::Operation *, double> loops;
     bool isWorthwhile() const { return vectors < serial; }
   };
   Cost getCost() const;
@@ -124,6 +126,9 @@ public:
   bool isStoredByVectors(AppendOp append) const;
   /// Whether lanes access one element behind the other.
   bool isRow(mlir::Operation *op) const;
+  /// Of a read that is mostly of a row, as its index is linear but for limits,
+  /// what must be linear when it runs; else null.
+  mlir::Value findLimited(mlir::Operation *op) const;
 
 private:
   void refuse(mlir::Operation *at, const llvm::Twine &why) {
@@ -161,6 +166,7 @@ private:
   void checkCarried();
   bool isAccess(mlir::Operation *op) const;
   bool isFixed(mlir::Value value) const;
+  bool isLimited(mlir::Value value) const;
 
   mutable mlir::scf::ForOp loop; // whose accessors are not const
   int64_t laneCount;
@@ -176,6 +182,10 @@ private:
   llvm::DenseSet<mlir::Operation *> emitted;
   llvm::DenseMap<mlir::Operation *, llvm::SmallVector<mlir::scf::ForOp>> nests;
 };
+
+/// Whether a side of a condition has the loops of the other one with tests that
+/// may fail, for indices that are not all inside.
+bool isFallback(mlir::Region &region);
 
 /// Whether an operation is control flow, which predication replaces.
 bool isStructure(mlir::Operation *op);

@@ -430,6 +430,8 @@ void IterationWriter::writeAccess(Operation *op) {
       elements.push_back(getUniform(element));
     create(at, elements, isRow);
   };
+  if (Value limited = paired ? Value() : lanes.findLimited(op))
+    return writeLimited(cast<LoadOp>(op), limited);
   if (auto load = dyn_cast<LoadOp>(op))
     write(load, [&](ValueRange at, ValueRange elements, bool isRow) {
       vectors.map(load.getResult(),

@@ -72,6 +72,7 @@ private:
   /// Whether the product is one that it has written.
   bool writeLinearProduct(mlir::arith::MulIOp product);
   void writeAccess(mlir::Operation *op);
+  void writeLimited(LoadOp load, mlir::Value limited);
   /// Whether lanes access one element after the other.
   bool isRowOf(mlir::ValueRange indices) const;
   /// Where lanes access state, of type index: of a row, the first place.

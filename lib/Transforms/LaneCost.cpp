@@ -51,6 +51,9 @@ struct Cycles {
 
 } // namespace
 
+/// How many operations test whether an index is linear.
+static constexpr double rowTest = 5;
+
 /// How often a loop turns.
 static constexpr double loopTurns = 8, turnsThatDiffer = 4;
 
@@ -170,15 +173,46 @@ static bool fails(Region &region) {
   });
 }
 
+static bool mayFail(Region &region) {
+  return region
+      .walk([](Operation *op) {
+        return op->hasTrait<Failure>() ? WalkResult::interrupt()
+                                       : WalkResult::advance();
+      })
+      .wasInterrupted();
+}
+
+static bool isFallbackOf(Region &side, Region &other) {
+  auto hasLoop = [](Region &region) {
+    return region
+        .walk([](LoopLikeOpInterface) { return WalkResult::interrupt(); })
+        .wasInterrupted();
+  };
+  return !other.empty() && hasLoop(side) && hasLoop(other) && mayFail(side) &&
+         !mayFail(other);
+}
+
+bool piko::isFallback(Region &region) {
+  auto choice = dyn_cast<scf::IfOp>(region.getParentOp());
+  return choice && isFallbackOf(region, &region == &choice.getThenRegion()
+                                            ? choice.getElseRegion()
+                                            : choice.getThenRegion());
+}
+
 /// How often a side of a condition runs, where lanes differ: mostly, if it
 /// stands alone; hardly ever, if it does much more than the other, which does
 /// something, too.
 static Frequency getFrequency(Region &side, Region &other, int64_t laneCount) {
+  constexpr double rare = 0.001;
+  if (isFallbackOf(side, other))
+    return {rare, rare * double(laneCount)};
+  if (!other.empty() && isFallbackOf(other, side))
+    return {1, 1};
   constexpr int64_t trivial = 16, ratio = 2;
   int64_t count = countOperations(side),
           countOther = other.empty() ? 0 : countOperations(other);
   if (countOther > trivial && count > ratio * countOther)
-    return {0.001, 0.001 * laneCount};
+    return {rare, rare * double(laneCount)};
   if (countOther <= trivial || countOther > ratio * count)
     return {0.8, 1};
   return {0.5, 1};
@@ -202,6 +236,7 @@ private:
     cost.vectors += laneByLane ? part : 0;
   }
   void addStructure(Operation *op, Frequency times, bool laneByLane);
+  double getTurns(Operation *loop) const;
   void addEmission(Operation *op, Frequency times);
 
   /// What it takes to bring lanes apart, with what they have.
@@ -269,6 +304,14 @@ void CostModel::addTurns(const OrderedGroup &group, Frequency times) {
                   cycles.slot * times.serial * inputs.size();
 }
 
+/// How often a loop turns, as far as is known.
+double CostModel::getTurns(Operation *loop) const {
+  if (auto counted = dyn_cast<scf::ForOp>(loop))
+    if (std::optional<APInt> count = counted.getStaticTripCount())
+      return double(count->getLimitedValue());
+  return lanes.isSharedLoop(loop) ? loopTurns : turnsThatDiffer;
+}
+
 void CostModel::addStructure(Operation *op, Frequency times, bool laneByLane) {
   if (auto choice = dyn_cast<scf::IfOp>(op)) {
     Region &yes = choice.getThenRegion(), &no = choice.getElseRegion();
@@ -320,7 +363,7 @@ void CostModel::addStructure(Operation *op, Frequency times, bool laneByLane) {
         times.scaled(full.serial, full.serial), laneByLane);
     return;
   }
-  double turns = lanes.isSharedLoop(op) ? loopTurns : turnsThatDiffer;
+  double turns = getTurns(op);
   if (!lanes.isSharedLoop(op) && !laneByLane)
     cost.vectors += cycles.turn * times.vectors * turns;
   double around = along;
@@ -328,8 +371,10 @@ void CostModel::addStructure(Operation *op, Frequency times, bool laneByLane) {
     inner.push_back(loop);
     along = hasVectorsAlong(loop) ? cycles.along : 1;
   }
+  double before = cost.serial;
   for (Region &region : op->getRegions())
     add(region, times.scaled(turns * going, turns), laneByLane);
+  cost.loops[op] += cost.serial - before;
   along = around;
   if (loop)
     inner.pop_back();
@@ -461,12 +506,15 @@ void CostModel::addOperation(Operation *op, Frequency times, bool laneByLane) {
                      !matchPattern(op->getOperand(1), m_Constant());
   double serial = times.serial * getScalar(op) / along;
   bool isTurns = form == LaneForm::Serial || form == LaneForm::Ordered;
-  bool isGather = isAccess && (!lanes.isRow(op) || isStrided(op));
+  Value limited = lanes.findLimited(op);
+  bool isGather = isAccess && ((!lanes.isRow(op) && !limited) || isStrided(op));
   double gather = isGather ? getApart(op) : 0;
-  double vectors = times.vectors * (isGather    ? gather
-                                    : isAccess  ? cycles.row
-                                    : isDivided ? getDivision(op)
-                                                : cycles.vector);
+  double vectors =
+      times.vectors * (isGather    ? gather
+                       : limited   ? cycles.row + cycles.vector * rowTest
+                       : isAccess  ? cycles.row
+                       : isDivided ? getDivision(op)
+                                   : cycles.vector);
   if (laneByLane || isTurns || isRemainder)
     vectors = serial + (laneByLane ? 0 : times.vectors * cycles.apart);
   else

@@ -3,6 +3,8 @@
 #include "SequentialLoops.h"
 
 #include "IterationLanes.h"
+#include "Lanes.h"
+#include "LoopStreams.h"
 
 #include "Piko/Dialect/Piko/IR/Marks.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
@@ -93,8 +95,68 @@ bool Effects::areIndependent() {
               .wasInterrupted();
 }
 
-bool piko::isIndependent(scf::ForOp loop) {
+static bool isIndependent(scf::ForOp loop) {
   return loop.getNumResults() == 0 && Effects(loop).areIndependent();
+}
+
+/// Whether it turns less often than there are lanes, as far as is known.
+static bool isShort(scf::ForOp loop, int64_t laneCount) {
+  std::optional<APInt> count = loop.getStaticTripCount();
+  return count && count->slt(laneCount);
+}
+
+/// What is cast to another width or kind.
+static Value stripCasts(Value value) {
+  while (Operation *op = value.getDefiningOp()) {
+    if (!isa<CastOpInterface>(op))
+      break;
+    value = op->getOperand(0);
+  }
+  return value;
+}
+
+/// Whether an operation computes a number, and not a place in memory alone.
+static bool computes(Operation *op) {
+  if (isa<scf::ForOp, scf::WhileOp>(op))
+    return true;
+  if (op->getNumOperands() == 0 || op->getNumResults() != 1 || !isPure(op) ||
+      isa<CastOpInterface>(op))
+    return false;
+  auto isRead = [](Value operand) {
+    return isa_and_nonnull<LoadOp, memref::LoadOp>(
+        stripCasts(operand).getDefiningOp());
+  };
+  return op->getResult(0).getType().isFloat() ||
+         llvm::any_of(op->getOperands(), isRead);
+}
+
+/// Whether turns only clear or copy, which LLVM does well.
+static bool onlyMoves(scf::ForOp loop) {
+  return !loop.getBody()
+              ->walk([](Operation *op) {
+                return computes(op) ? WalkResult::interrupt()
+                                    : WalkResult::advance();
+              })
+              .wasInterrupted();
+}
+
+/// Whether a loop begins at a place in memory or a number of 32 bits, so that
+/// steps of several turns do not leave 64. A user's own 64 may be the last
+/// ones.
+static bool beginsEarly(scf::ForOp loop) {
+  Value lower = loop.getLowerBound();
+  while (isa_and_nonnull<arith::IndexCastOp, arith::IndexCastUIOp,
+                         arith::ExtSIOp, arith::ExtUIOp>(lower.getDefiningOp()))
+    lower = lower.getDefiningOp()->getOperand(0);
+  if (std::optional<int64_t> known = getConstantIntValue(lower))
+    return llvm::isInt<32>(*known);
+  return !lower.getType().isInteger(64);
+}
+
+bool piko::mayRunInOrder(scf::ForOp loop, int64_t laneCount) {
+  return beginsEarly(loop) && isIndependent(loop) &&
+         !isShort(loop, laneCount) && !onlyMoves(loop) &&
+         !hasVectorsAlong(loop) && !isOverBox(loop);
 }
 
 //===----------------------------------------------------------------------===//

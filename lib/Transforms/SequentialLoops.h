@@ -10,10 +10,11 @@
 
 namespace piko {
 
-/// Whether lanes may share the turns of a loop: they hand on nothing, read
-/// nothing that they change, and change each field of state in one place, once
-/// in a turn, where lanes keep their order.
-bool isIndependent(mlir::scf::ForOp loop);
+/// Whether lanes should share the turns of a loop, if their cost allows. They
+/// may: turns hand on nothing, read nothing that they change, and change each
+/// field of state in one place, once in a turn, where lanes keep their order.
+/// And it is not known that the loop is short, or that LLVM does it well.
+bool mayRunInOrder(mlir::scf::ForOp loop, int64_t laneCount);
 
 /// Stream compaction: a loop that finds which turns of another one have
 /// something to do, and one over these turns.

@@ -58,6 +58,10 @@ public:
 
 private:
   InFlightDiagnostic refuse();
+  /// Whether it takes less to run primitives one after the other, and to give
+  /// lanes the iterations of loops in them.
+  bool isFasterInside(const IterationLanes &lanes,
+                      const IterationLanes::Cost &cost);
 
   scf::ForOp loop;
   bool ofPrimitives;
@@ -121,6 +125,28 @@ static void addObstacles(InFlightDiagnostic &remark,
   }
 }
 
+/// Only loops that turn as often for all primitives count, as those over the
+/// rows of an image: others may be short.
+bool Candidate::isFasterInside(const IterationLanes &lanes,
+                               const IterationLanes::Cost &cost) {
+  double inside = cost.serial;
+  scf::ForOp root = lanes.getLoop();
+  root->walk<WalkOrder::PreOrder>([&](scf::ForOp inner) {
+    if (inner == root || !lanes.isSharedLoop(inner) ||
+        isFallback(*inner->getParentRegion()) ||
+        !mayRunInOrder(inner, lanes.getLaneCount()))
+      return WalkResult::advance();
+    IterationLanes turns(inner, lanes.getLaneCount());
+    IterationLanes::Cost part = turns.getCost();
+    if (turns.getRefusal().at || !part.computes || !part.isWorthwhile())
+      return WalkResult::advance();
+    inside -= cost.loops.lookup(inner) * (1 - part.vectors / part.serial);
+    return WalkResult::skip();
+  });
+  constexpr double gain = 0.98; // Or primitives are simpler.
+  return inside < gain * cost.vectors;
+}
+
 bool Candidate::decide(const IterationLanes &lanes) {
   if (const IterationLanes::Refusal &refusal = lanes.getRefusal(); refusal.at) {
     InFlightDiagnostic remark = refuse() << refusal.why;
@@ -146,6 +172,14 @@ bool Candidate::decide(const IterationLanes &lanes) {
            << std::llround(cost.vectors) << " cycles, and one after the other "
            << std::llround(cost.serial) << otherwise;
     addObstacles(remark, lanes, cost, /*isRefused=*/true);
+    return false;
+  }
+  if (!said && ofPrimitives && isFasterInside(lanes, cost)) {
+    refuse() << "iterations of a loop in it are" << otherwise;
+    return false;
+  }
+  if (!said && ofPrimitives && isFasterInside(lanes, cost)) {
+    refuse() << "iterations of a loop in it are" << otherwise;
     return false;
   }
   InFlightDiagnostic remark = loop.emitRemark();
@@ -358,35 +392,14 @@ static bool runInLockstep(ParallelForOp parallel) {
 static scf::ForOp copyAsCount(Operation *op) {
   OpBuilder builder(op);
   if (auto loop = dyn_cast<scf::ForOp>(op))
-    return loop.getNumResults() == 0 && isIndependent(loop)
-               ? cast<scf::ForOp>(builder.clone(*loop))
-               : scf::ForOp();
+    return loop.getNumResults() == 0 ? cast<scf::ForOp>(builder.clone(*loop))
+                                     : scf::ForOp();
   auto loop = dyn_cast<scf::WhileOp>(op);
   if (!loop || loop.getInits().size() != 1 || !loop->use_empty() ||
       !findCounting(loop))
     return {};
   auto copy = cast<scf::WhileOp>(builder.clone(*loop));
   return countLoop(copy, *findCounting(copy));
-}
-
-/// Whether it turns less often than there are lanes, as far as is known.
-static bool isShort(scf::ForOp loop, int64_t laneCount) {
-  std::optional<APInt> count = loop.getStaticTripCount();
-  return count && count->slt(laneCount);
-}
-
-/// Whether turns only clear or copy, which LLVM does well.
-static bool onlyMoves(scf::ForOp loop) {
-  return !loop.getBody()
-              ->walk([](Operation *op) {
-                bool computes =
-                    isa<scf::ForOp, scf::WhileOp>(op) ||
-                    (op->getNumOperands() > 0 && op->getNumResults() == 1 &&
-                     isPure(op) && op->getResult(0).getType().isFloat());
-                return computes ? WalkResult::interrupt()
-                                : WalkResult::advance();
-              })
-              .wasInterrupted();
 }
 
 static void remarkInOrder(scf::ForOp loop, int64_t laneCount, bool isCompact) {
@@ -417,31 +430,18 @@ bool VectorizePass::vectorizeCompacted(scf::ForOp loop) {
   return true;
 }
 
-/// Whether a loop begins at a place in memory or a number of 32 bits, so that
-/// steps of several turns do not leave 64. A user's own 64 may be the last
-/// ones.
-static bool beginsEarly(scf::ForOp loop) {
-  Value lower = loop.getLowerBound();
-  while (isa_and_nonnull<arith::IndexCastOp, arith::IndexCastUIOp,
-                         arith::ExtSIOp, arith::ExtUIOp>(lower.getDefiningOp()))
-    lower = lower.getDefiningOp()->getOperand(0);
-  if (std::optional<int64_t> known = getConstantIntValue(lower))
-    return llvm::isInt<32>(*known);
-  return !lower.getType().isInteger(64);
-}
-
 bool VectorizePass::vectorizeInOrder(Operation *op) {
   StageOp stage = getKernelStage(op);
   if (!stage || !op->getParentOfType<scf::ForallOp>() ||
       (stage.getSchedule() &&
-       stage.getSchedule().getLanes() == LaneMapping::One))
+       stage.getSchedule().getLanes() == LaneMapping::One) ||
+      isFallback(*op->getParentRegion()))
     return false;
   scf::ForOp copy = copyAsCount(op);
   if (!copy)
     return false;
   countLoops(copy);
-  if (!beginsEarly(copy) || !isIndependent(copy) || isShort(copy, laneCount) ||
-      onlyMoves(copy) || hasVectorsAlong(copy) || isOverBox(copy)) {
+  if (!mayRunInOrder(copy, laneCount)) {
     copy.erase();
     return false;
   }
