@@ -9,10 +9,9 @@
 // at most once, of the loop's count, the copy has indices of 64 bits in a row.
 
 #include "IndexRanges.h"
+#include "Lanes.h"
 
 #include "Piko/Dialect/Piko/IR/BinArithmetic.h"
-#include "Piko/Dialect/Piko/IR/Marks.h"
-#include "Piko/Dialect/Piko/IR/PikoCPU.h"
 #include "Piko/Transforms/Passes.h"
 
 #include "mlir/Dialect/Arith/IR/Arith.h"
@@ -69,7 +68,7 @@ struct HoistBoundsPass : piko::impl::HoistBoundsBase<HoistBoundsPass> {
   void runOnOperation() override;
 
 private:
-  bool runOnNest(LoopLikeOpInterface nest);
+  WalkResult visit(LoopLikeOpInterface nest);
 };
 
 } // namespace
@@ -102,14 +101,12 @@ static FlatSymbolRefAttr getState(Operation *op) {
   return op->getAttrOfType<FlatSymbolRefAttr>("state");
 }
 
-/// Whether nothing but loops that count stands in a nest that is not too large
-/// to stand there twice.
-static bool mayCopy(LoopLikeOpInterface nest, int64_t maxOperations) {
+/// Whether a nest is not too large to stand there twice.
+static bool isSmall(LoopLikeOpInterface nest, int64_t maxOperations) {
   int64_t operations = 0;
   WalkResult result = nest->walk([&](Operation *op) {
-    bool isOfWork = isa<ItemOp>(op) || op->hasAttr(marks::lanes);
-    return ++operations > maxOperations || isOfWork ? WalkResult::interrupt()
-                                                    : WalkResult::advance();
+    return ++operations > maxOperations ? WalkResult::interrupt()
+                                        : WalkResult::advance();
   });
   return !result.wasInterrupted();
 }
@@ -343,20 +340,25 @@ static bool versionByRanges(LoopLikeOpInterface nest) {
   return true;
 }
 
-/// Whether a nest stands there twice, of loops that count.
-bool HoistBoundsPass::runOnNest(LoopLikeOpInterface nest) {
-  if (isInnermost(nest) && mayCopy(nest, maxOperations) &&
-      LoopVersioner(nest).run())
-    return true;
-  return mayCopy(nest, maxNestOperations) && versionByRanges(nest);
+WalkResult HoistBoundsPass::visit(LoopLikeOpInterface nest) {
+  if (isInnermost(nest) && isSmall(nest, maxOperations) &&
+      LoopVersioner(nest).run()) {
+    ++versioned;
+    return WalkResult::skip();
+  }
+  // Where not all indices are inside, as with a guard around what reads them,
+  // those of loops inside may be.
+  auto loop = dyn_cast<scf::ForOp>(nest.getOperation());
+  if (!(loop && isOverPrimitives(loop)) && isSmall(nest, maxNestOperations) &&
+      versionByRanges(nest))
+    ++versioned;
+  return WalkResult::advance();
 }
 
 void HoistBoundsPass::runOnOperation() {
   getOperation().walk<WalkOrder::PreOrder>([&](Operation *op) {
-    auto nest = dyn_cast<LoopLikeOpInterface>(op);
-    if (!isa<scf::ForOp, scf::WhileOp>(op) || !runOnNest(nest))
-      return WalkResult::advance();
-    ++versioned;
-    return WalkResult::skip();
+    return isa<scf::ForOp, scf::WhileOp>(op)
+               ? visit(cast<LoopLikeOpInterface>(op))
+               : WalkResult::advance();
   });
 }

@@ -434,8 +434,7 @@ bool VectorizePass::vectorizeInOrder(Operation *op) {
   StageOp stage = getKernelStage(op);
   if (!stage || !op->getParentOfType<scf::ForallOp>() ||
       (stage.getSchedule() &&
-       stage.getSchedule().getLanes() == LaneMapping::One) ||
-      isFallback(*op->getParentRegion()))
+       stage.getSchedule().getLanes() == LaneMapping::One))
     return false;
   scf::ForOp copy = copyAsCount(op);
   if (!copy)

@@ -371,9 +371,7 @@ def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
     a condition, with a loop of its own, the turns that have something to do are
     found first, 1,024 at a time (stream compaction), so that vectors are full.
     Where such loops turn equally often for all primitives, as those along the rows
-    of an image, primitives become lanes only if they are expected to be faster. A
-    loop that stands there again with tests of its indices (`piko-hoist-bounds`)
-    is left as it is.
+    of an image, primitives become lanes only if they are expected to be faster.
 
     A primitive that goes along a buffer in a loop of its own is mostly left to
     LLVM, which makes vectors along that loop. Rows of boxes, which mostly have few
