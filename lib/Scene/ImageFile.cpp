@@ -1,4 +1,4 @@
-//===- ImageFile.cpp - Images to files ------------------------------------===//
+//===- ImageFile.cpp - Images in files ------------------------------------===//
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #include "ImageModule.h"
 
@@ -13,7 +13,7 @@ static Result<const ImageFunctions *> getFunctions() {
   void *symbol = module ? dlsym(module, imageModuleSymbol) : nullptr;
   if (!symbol)
     return Error{std::string("cannot load ") + imageModuleFile +
-                 ", which writes images"};
+                 ", which reads and writes images"};
   return static_cast<const ImageFunctions *>(symbol);
 }
 
@@ -30,4 +30,11 @@ Result<Done> render::writeImage(const std::string &path, int width, int height,
   if (!functions)
     return functions.error();
   return (*functions)->writeImage(path, width, height, pixels);
+}
+
+Result<Image> render::readImage(const std::string &path) {
+  auto functions = getFunctions();
+  if (!functions)
+    return functions.error();
+  return (*functions)->readImage(path);
 }

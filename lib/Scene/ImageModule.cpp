@@ -1,4 +1,4 @@
-//===- ImageModule.cpp - Images to files with OpenImageIO -----------------===//
+//===- ImageModule.cpp - Images in files with OpenImageIO -----------------===//
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #include "ImageModule.h"
 
@@ -17,10 +17,14 @@ namespace fs = std::filesystem;
 
 namespace {
 
-Error failWith(const std::string &path, std::string why) {
+Error failTo(const char *what, const std::string &path, std::string why) {
   if (size_t end = why.find('\n'); end != std::string::npos)
     why.resize(end);
-  return {"cannot write image '" + path + "': " + why};
+  return {std::string("cannot ") + what + " image '" + path + "': " + why};
+}
+
+Error failWith(const std::string &path, std::string why) {
+  return failTo("write", path, std::move(why));
 }
 
 /// The extension, in lowercase and without the dot.
@@ -134,7 +138,39 @@ Result<Done> write(const std::string &path, int width, int height,
   return Done{};
 }
 
+Result<Image> read(const std::string &path) {
+  auto fail = [&](std::string why) {
+    return failTo("read", path, std::move(why));
+  };
+  std::error_code problem;
+  if (!fs::exists(path, problem))
+    return fail("there is no such file");
+  auto input = OIIO::ImageInput::open(path);
+  if (!input)
+    return fail(OIIO::geterror());
+  const OIIO::ImageSpec &spec = input->spec();
+  constexpr int64_t mostPixels = int64_t(1) << 30;
+  int channels = spec.nchannels;
+  if (spec.width < 1 || spec.height < 1 || spec.depth > 1 || channels < 1 ||
+      int64_t(spec.width) * spec.height > mostPixels)
+    return fail("expected a picture of up to 2^30 pixels");
+  std::vector<float> values(size_t(spec.width) * spec.height * channels);
+  if (!input->read_image(0, 0, 0, channels, OIIO::TypeDesc::FLOAT,
+                         values.data()))
+    return fail(input->geterror());
+  Image image{spec.width, spec.height, {}};
+  image.pixels.resize(size_t(spec.width) * spec.height);
+  int colors = channels < 3 ? 1 : 3;
+  for (size_t i = 0; i < image.pixels.size(); ++i) {
+    const float *pixel = &values[i * size_t(channels)];
+    for (int c = 0; c < 3; ++c)
+      image.pixels[i].rgba[c] = pixel[colors == 1 ? 0 : c];
+    image.pixels[i].rgba.a = channels > colors ? pixel[colors] : 1;
+  }
+  return image;
+}
+
 } // namespace
 
 extern "C" __attribute__((visibility("default")))
-const ImageFunctions piko_image_functions = {write, checkFormat};
+const ImageFunctions piko_image_functions = {write, checkFormat, read};

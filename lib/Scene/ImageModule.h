@@ -1,5 +1,4 @@
-//===- ImageModule.h - What writes images, loaded when one is -----*- C++
-//-*-===//
+//===- ImageModule.h - OpenImageIO, loaded when needed ----------*- C++ -*-===//
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // OpenImageIO comes with 250 libraries, which take longer to load than a cached
@@ -17,6 +16,7 @@ namespace piko::render {
 struct ImageFunctions {
   decltype(&render::writeImage) writeImage;
   decltype(&render::checkImageFormat) checkImageFormat;
+  decltype(&render::readImage) readImage;
 };
 
 /// The module's one symbol, and the file it is in.

@@ -28,12 +28,18 @@ JsonObject &JsonObject::add(std::string_view key, std::string_view value) {
   return addRaw(key, quote(value));
 }
 
-JsonObject &JsonObject::add(std::string_view key, double value) {
-  if (!std::isfinite(value))
-    return addRaw(key, "null");
+static std::string write(double value, const char *format) {
   char text[32];
-  std::snprintf(text, sizeof text, "%.15g", std::round(value * 1000) / 1000);
-  return addRaw(key, text);
+  std::snprintf(text, sizeof text, format, value);
+  return std::isfinite(value) ? text : "null";
+}
+
+JsonObject &JsonObject::add(std::string_view key, double value) {
+  return addRaw(key, write(std::round(value * 1000) / 1000, "%.15g"));
+}
+
+JsonObject &JsonObject::addExact(std::string_view key, double value) {
+  return addRaw(key, write(value, "%.9g"));
 }
 
 JsonObject &JsonObject::add(std::string_view key,

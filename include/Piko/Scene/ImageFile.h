@@ -1,9 +1,9 @@
-//===- ImageFile.h - Images to files ----------------------------*- C++ -*-===//
+//===- ImageFile.h - Images in files ----------------------------*- C++ -*-===//
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #ifndef PIKO_SCENE_IMAGEFILE_H
 #define PIKO_SCENE_IMAGEFILE_H
 
-#include "Piko/Scene/Result.h"
+#include "Piko/Scene/Image.h"
 
 #include <piko/scene.h>
 
@@ -25,6 +25,10 @@ inline uint8_t toByte(float value) {
 /// 8 bits for each of r, g and b. The file appears whole or not at all.
 Result<Done> writeImage(const std::string &path, int width, int height,
                         std::span<const scene::Color> pixels);
+
+/// Reads an image in any format that OpenImageIO knows, 8 bits as k / 255; one
+/// channel becomes grey, and a missing alpha 1.
+Result<Image> readImage(const std::string &path);
 
 /// Whether writeImage knows the format of a file of this name: for a message
 /// before the work starts rather than after it.

@@ -21,6 +21,8 @@ public:
   }
   /// Rounded to thousandths.
   JsonObject &add(std::string_view key, double value);
+  /// To nine digits.
+  JsonObject &addExact(std::string_view key, double value);
   JsonObject &add(std::string_view key, std::integral auto value) {
     return addRaw(key, std::to_string(value));
   }

@@ -1,0 +1,168 @@
+//===- piko-diff.cpp - Measure how far images are from another one --------===//
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+#include "Piko/Scene/ImageError.h"
+#include "Piko/Scene/ImageFile.h"
+#include "Piko/Scene/Json.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+
+using namespace piko;
+using namespace piko::render;
+
+static const char *const usage =
+    R"(usage: piko-diff [options] REFERENCE IMAGE
+
+Measures how far an image is from another one, in r, g and b as a display shows
+them: the largest, the mean and the root mean square absolute difference, the
+99th percentile of pixels, PSNR in dB, and the mean of FLIP, which predicts what
+an observer notices. Black to white is 1.
+
+  --map FILE             write FLIP of each pixel, from black (equal) by red and
+                         yellow to white
+  --pixels-per-degree P  how finely an observer sees the images (67.02: a display
+                         of 3840 pixels, 0.7 m wide, from 0.7 m)
+  --json                 print one line of JSON
+  --fail-above E         exit with 1 if the largest difference is above E
+  --help                 print this
+)";
+
+namespace {
+
+struct Options {
+  bool help = false, json = false;
+  std::vector<std::string> files;
+  std::string map;
+  double pixelsPerDegree = usualPixelsPerDegree;
+  double failAbove = INFINITY;
+};
+
+Result<double> parseNumber(const std::string &name, const std::string &text) {
+  double number = 0;
+  auto [end, problem] =
+      std::from_chars(text.data(), text.data() + text.size(), number);
+  if (problem != std::errc() || end != text.data() + text.size() ||
+      !(number >= 0))
+    return Error{name + ": expected a number of at least 0, but got '" + text +
+                 "'"};
+  return number;
+}
+
+Result<Options> parseOptions(const std::vector<std::string> &words) {
+  Options options;
+  for (size_t i = 0; i < words.size(); ++i) {
+    const std::string &word = words[i];
+    bool takesValue = word == "--map" || word == "--pixels-per-degree" ||
+                      word == "--fail-above";
+    if (takesValue && i + 1 == words.size())
+      return Error{"option '" + word + "' lacks its value"};
+    if (word == "--help") {
+      options.help = true;
+    } else if (word == "--json") {
+      options.json = true;
+    } else if (word == "--map") {
+      options.map = words[++i];
+    } else if (takesValue) {
+      auto number = parseNumber(word, words[++i]);
+      if (!number)
+        return number.error();
+      (word == "--fail-above" ? options.failAbove : options.pixelsPerDegree) =
+          *number;
+    } else if (word.size() > 1 && word[0] == '-') {
+      return Error{"unknown option '" + word + "'"};
+    } else {
+      options.files.push_back(word);
+    }
+  }
+  if (!options.help && options.files.size() != 2)
+    return Error{"expected two images, but got " +
+                 std::to_string(options.files.size())};
+  return options;
+}
+
+/// Black by red and yellow to white.
+scene::Color heat(float value) {
+  auto part = [&](float from) {
+    return std::clamp(3 * value - from, 0.0f, 1.0f);
+  };
+  return {{part(0), part(1), part(2), 1}};
+}
+
+Result<Done> writeMap(const Options &options, const Image &image,
+                      const std::vector<float> &flip) {
+  std::vector<scene::Color> pixels(flip.size());
+  std::transform(flip.begin(), flip.end(), pixels.begin(), heat);
+  return writeImage(options.map, image.width, image.height, pixels);
+}
+
+std::string describe(const Options &options, const ImageError &error) {
+  if (options.json)
+    // Differences are below JsonObject's thousandths.
+    return JsonObject()
+        .addExact("largest", error.largest)
+        .addExact("mean", error.mean)
+        .addExact("rms", error.rms)
+        .addExact("p99", error.p99)
+        .addExact("psnr", error.psnr)
+        .addExact("flip", error.flip)
+        .add("differing", error.differing)
+        .add("not_finite", error.notFinite)
+        .text();
+  char text[256];
+  std::snprintf(text, sizeof text,
+                "largest %.6g, mean %.6g, rms %.6g, 99%% of pixels %.6g, "
+                "PSNR %.2f dB, FLIP %.6g, %lld pixels differ",
+                error.largest, error.mean, error.rms, error.p99, error.psnr,
+                error.flip, static_cast<long long>(error.differing));
+  std::string line = text;
+  if (error.notFinite > 0)
+    line += ", " + std::to_string(error.notFinite) + " are not finite";
+  return line;
+}
+
+/// Whether the images are near enough.
+Result<bool> compareFiles(const Options &options) {
+  if (!options.map.empty())
+    if (auto ok = checkImageFormat(options.map); !ok)
+      return ok.error();
+  auto reference = readImage(options.files[0]);
+  if (!reference)
+    return reference.error();
+  auto image = readImage(options.files[1]);
+  if (!image)
+    return image.error();
+  std::vector<float> flip;
+  auto error =
+      compareImages(*reference, *image, options.pixelsPerDegree, &flip);
+  if (!error)
+    return Error{"'" + options.files[0] + "' and '" + options.files[1] +
+                 "': " + error.error().message};
+  if (!options.map.empty())
+    if (auto ok = writeMap(options, *image, flip); !ok)
+      return ok.error();
+  std::printf("%s\n", describe(options, *error).c_str());
+  return error->largest <= options.failAbove;
+}
+
+int fail(const Error &error) {
+  std::fprintf(stderr, "piko-diff: error: %s\n", error.message.c_str());
+  return 2;
+}
+
+} // namespace
+
+int main(int argc, char **argv) {
+  auto options = parseOptions({argv + 1, argv + argc});
+  if (!options)
+    return fail(options.error());
+  if (options->help) {
+    std::fputs(usage, stdout);
+    return 0;
+  }
+  auto isNear = compareFiles(*options);
+  if (!isNear)
+    return fail(isNear.error());
+  return *isNear ? 0 : 1;
+}
