@@ -4,21 +4,28 @@
 // whether they fit into 32 bits or overflow 64.
 // RUN: sed -n 's|^// CASE: ||p' %s > %t.cases
 // RUN: piko-compare %s --cases %t.cases --runs 1 | FileCheck %s
-// CHECK-COUNT-6: {{^equal$}}
+// CHECK-COUNT-8: {{^equal$}}
 // CASE: --pipe Edges --domain 67 53 --count 600
 // CASE: --pipe Between --domain 67 53 --count 600
 // CASE: --pipe Carried --domain 67 53 --count 600
 // CASE: --pipe Extremes --domain 67 53 --count 600
 // CASE: --pipe Nearest --domain 67 53 --count 600
 // CASE: --pipe Shared --domain 67 53 --count 60
+// CASE: --pipe Weighted --domain 67 53 --count 600
+// CASE: --pipe Limits --domain 67 53 --count 600
 //
 // RUN: pikoc %s --pipe Edges --emit=llvmir --cpu x86-64-v4 --no-cache -o - | FileCheck %s --check-prefix=NARROW
 // RUN: pikoc %s --pipe Between --emit=llvmir --cpu x86-64-v4 --no-cache -o - | FileCheck %s --check-prefix=NARROW
 // RUN: pikoc %s --pipe Extremes --emit=llvmir --cpu x86-64-v4 --no-cache -o - | FileCheck %s --check-prefix=NARROW
 // RUN: pikoc %s --pipe Nearest --emit=llvmir --cpu x86-64-v4 --no-cache -o - | FileCheck %s --check-prefix=NARROW
+// RUN: pikoc %s --pipe Weighted --emit=llvmir --cpu x86-64-v4 --no-cache -o - | FileCheck %s --check-prefix=VALUE
+// RUN: pikoc %s --pipe Limits --emit=llvmir --cpu x86-64-v4 --no-cache -o - | FileCheck %s --check-prefix=VALUE
+// VALUE: sitofp <16 x i32> %{{.*}} to <16 x float>
 // NARROW: icmp s{{lt|ge}} <16 x i32> %{{.*}}, zeroinitializer
 // REQUIRES: x86_64
 #include <piko.h>
+
+#include <bit>
 
 struct Prim {
   int a, b, c;
@@ -137,6 +144,42 @@ struct Twice : Stage {
   }
 };
 
+// An edge function, with a bias for its sign, and its value.
+struct Weight : Stage {
+  void process(const Prim &p) {
+    int64_t dx = spread(p.a, p.kind), dy = spread(p.b, p.kind >> 6);
+    int64_t first = spread(p.c, p.kind >> 12), bias = p.kind & 1;
+    glm::ivec2 lo(p.a & 15, p.b & 15), hi(p.b & 63, p.c & 63);
+    parallelForPixels(lo, hi, [&](glm::ivec2 at) {
+      int64_t e = first + dx * 256 * at.x - dy * 256 * at.y;
+      if (e - bias < 0)
+        return;
+      float weight = float(e);
+      update(state().seen, at, [&](Cell &cell) {
+        cell.last = glm::max(cell.last, int64_t(std::bit_cast<int>(weight)));
+      });
+    });
+  }
+};
+
+// What is 2^31 or -2^31, or next to it, at some pixel of the box.
+struct Limit : Stage {
+  void process(const Prim &p) {
+    glm::ivec2 lo(p.a & 15, p.b & 15), hi(32 + (p.b & 31), 32 + (p.c & 15));
+    glm::ivec2 where = p.kind & 1 ? hi : lo;
+    int64_t dx = (p.a >> 8) % 70000, dy = (p.b >> 8) % 70000;
+    int64_t limit = p.kind & 2 ? -(int64_t(1) << 31) : int64_t(1) << 31;
+    int64_t first =
+        limit + int(p.kind >> 2 & 3) - 2 - dx * where.x - dy * where.y;
+    parallelForPixels(lo, hi, [&](glm::ivec2 at) {
+      float value = float(first + dx * at.x + dy * at.y);
+      update(state().seen, at, [&](Cell &cell) {
+        cell.last = cell.last * 31 + std::bit_cast<int>(value);
+      });
+    });
+  }
+};
+
 template <class S> struct Pipe : piko::Pipe<State> {
   S stage;
   Pipe() { source(stage); }
@@ -147,3 +190,5 @@ struct Carried : Pipe<Carry> {};
 struct Extremes : Pipe<Extreme> {};
 struct Nearest : Pipe<Near> {};
 struct Shared : Pipe<Twice> {};
+struct Weighted : Pipe<Weight> {};
+struct Limits : Pipe<Limit> {};

@@ -2,18 +2,21 @@
 
 piko.record @V {"n" : i64 at 0} size 8 align 8
 
-// The steps are multiples of 256, so the functions are divided by that.
+// The steps are multiples of 256, so the functions are divided by that. What a
+// row begins with is carried from the one before.
 // CHECK-LABEL: piko.kernel @rectangle
 // CHECK:         %[[BASE:.*]] = arith.shrsi %{{.*}}, %c8_i64
 // CHECK:         arith.andi
 // CHECK:         scf.if %{{.*}} {
-// CHECK-NEXT:      scf.for %[[Y:.*]] = %{{.*}} to %{{.*}} step %{{.*}} : i32 {
-// CHECK-NEXT:        %[[PY:.*]] = arith.muli %[[Y]], %{{.*}} : i32
-// CHECK-NEXT:        %[[ROW:.*]] = arith.addi %{{.*}}, %[[PY]] : i32
-// CHECK:             scf.for %[[X:.*]] = %{{.*}} to
+// CHECK-NEXT:      scf.for {{.*}} iter_args(%[[ROW:.*]] = %{{.*}}, %[[ROW1:.*]] = %{{.*}}) -> (i32, i32)
+// CHECK-NEXT:        scf.for %[[X:.*]] = %{{.*}} to
+// CHECK:               arith.addi %[[ROW1]], %{{.*}} : i32
 // CHECK:               arith.muli %[[X]], %{{.*}} : i32
+// CHECK:               arith.addi %[[ROW]], %{{.*}} : i32
 // CHECK:               %[[BITS:.*]] = arith.ori %{{.*}}, %{{.*}} : i32
 // CHECK:               arith.cmpi sge, %[[BITS]], %c0_i32 : i32
+// CHECK:             arith.addi %[[ROW]], %[[STEP:.*]] : i32
+// CHECK:             arith.addi %[[ROW1]], %[[STEP]] : i32
 // CHECK:         } else {
 // CHECK:           scf.for
 // CHECK:             scf.for

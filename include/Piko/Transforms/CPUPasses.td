@@ -253,7 +253,7 @@ def ThreadJumps : Pass<"piko-thread-jumps", "::piko::PipelineOp"> {
 }
 
 def NarrowIntegers : Pass<"piko-narrow-integers", "::piko::PipelineOp"> {
-  let summary = "Take the signs of edge functions in 32 bits where they fit";
+  let summary = "Take edge functions in 32 bits where they fit";
   let description = [{
     **Requires** loops over units (`convert-piko-to-scf`).
 
@@ -264,10 +264,18 @@ def NarrowIntegers : Pass<"piko-narrow-integers", "::piko::PipelineOp"> {
     by the power of two that all of its steps are multiples of, and rounded down,
     which changes no sign. Where all fit into 32 bits, a second version of the
     loop computes the signs there: twice as many lanes, and no multiplication of
-    64 bits.
+    64 bits. What a row begins with is carried from the row before: how many
+    vectors a row has is seldom predicted, and a product is then waited for.
 
-    **Guarantees** the same outcome of each comparison, also where 64 bits
-    overflow: such functions do not pass the test.
+    Where such a function becomes a floating-point number as well, as a weight
+    does, all of its bits are needed. A second test finds whether these fit, too,
+    and leads to a third version, which converts from 32 bits. There the function
+    is the one whose sign is taken, shifted back, plus what the bits below were,
+    if both have the same steps: a bias for points on an edge does not matter. A
+    remark says how many comparisons and conversions there are.
+
+    **Guarantees** the same outcome of each comparison, and the same number, also
+    where 64 bits overflow: such functions do not pass the test.
 
     Before:
     ```
@@ -296,11 +304,15 @@ def NarrowIntegers : Pass<"piko-narrow-integers", "::piko::PipelineOp"> {
     ```
 
     **Limits**: loops with a step other than one, and comparisons of what is not
-    affine, stay as they are. What else an edge function is used for, as for
-    weights, is computed in 64 bits.
+    affine, stay as they are. Loops of more than 200 operations have no third
+    version, and a remark says so. What else an edge function is used for is
+    computed in 64 bits.
   }];
   let statistics = [
-    Statistic<"narrowed", "narrowed", "comparisons that have a form in 32 bits">];
+    Statistic<"comparisons", "comparisons", "comparisons that have a form in 32 "
+              "bits">,
+    Statistic<"values", "values", "conversions to floating point that have a "
+              "form in 32 bits">];
 }
 
 def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
