@@ -111,6 +111,7 @@ private:
   SmallVector<SignTest> tests;
   SmallVector<Conversion> conversions;
   SmallVector<Narrow> leaves;
+  size_t signLeaves = 0; ///< The first ones, which comparisons need.
   llvm::DenseMap<Value, bool> trees;
   llvm::DenseSet<Value> collected;
   Value signsFit, valuesFit;
@@ -324,6 +325,9 @@ Value Narrower::writeTree(Value tree, OpBuilder &inner, Version &version,
 }
 
 void Narrower::narrowTests(Version &version) {
+  // First all leaves: where one is carried, the loop is made anew.
+  for (size_t leaf = 0; leaf < signLeaves; ++leaf)
+    writeLeaf(leaf, version);
   for (SignTest &test : tests) {
     Operation *compare =
         version.mapping.lookup(test.compare.getResult()).getDefiningOp();
@@ -343,8 +347,8 @@ void Narrower::narrowConversions(Version &version) {
   for (Conversion &conversion : conversions) {
     auto op = version.mapping.lookup(conversion.op.getResult())
                   .getDefiningOp<arith::SIToFPOp>();
-    OpBuilder inner(op);
     Value value = writeLeaf(conversion.leaf, version);
+    OpBuilder inner(op);
     if (unsigned zeros = leaves[conversion.leaf].zeros) {
       Value by = arith::ConstantIntOp::create(inner, nest.loc, zeros, 32);
       value = arith::ShLIOp::create(inner, nest.loc, value, by);
@@ -448,6 +452,7 @@ void Narrower::narrow() {
     else
       prepare(test.leaf, signsFit);
   }
+  signLeaves = leaves.size();
   findConversions();
   if (tests.empty() && conversions.empty())
     return;

@@ -4,7 +4,7 @@
 // whether they fit into 32 bits or overflow 64.
 // RUN: sed -n 's|^// CASE: ||p' %s > %t.cases
 // RUN: piko-compare %s --cases %t.cases --runs 1 | FileCheck %s
-// CHECK-COUNT-8: {{^equal$}}
+// CHECK-COUNT-9: {{^equal$}}
 // CASE: --pipe Edges --domain 67 53 --count 600
 // CASE: --pipe Between --domain 67 53 --count 600
 // CASE: --pipe Carried --domain 67 53 --count 600
@@ -12,6 +12,7 @@
 // CASE: --pipe Nearest --domain 67 53 --count 600
 // CASE: --pipe Shared --domain 67 53 --count 60
 // CASE: --pipe Weighted --domain 67 53 --count 600
+// CASE: --pipe Rows --domain 67 53 --count 600
 // CASE: --pipe Limits --domain 67 53 --count 600
 //
 // RUN: pikoc %s --pipe Edges --emit=llvmir --cpu x86-64-v4 --no-cache -o - | FileCheck %s --check-prefix=NARROW
@@ -162,6 +163,14 @@ struct Weight : Stage {
   }
 };
 
+// A sign that all pixels of a row have.
+struct Row : Stage {
+  void process(const Prim &p) {
+    int64_t step = spread(p.b, p.kind >> 6), first = spread(p.c, p.kind >> 12);
+    draw(p, [&](glm::ivec2 at) { return first + step * at.y >= 0; });
+  }
+};
+
 // What is 2^31 or -2^31, or next to it, at some pixel of the box.
 struct Limit : Stage {
   void process(const Prim &p) {
@@ -191,4 +200,5 @@ struct Extremes : Pipe<Extreme> {};
 struct Nearest : Pipe<Near> {};
 struct Shared : Pipe<Twice> {};
 struct Weighted : Pipe<Weight> {};
+struct Rows : Pipe<Row> {};
 struct Limits : Pipe<Limit> {};
