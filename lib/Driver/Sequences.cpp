@@ -84,6 +84,7 @@ void piko::addMachineSequence(OpPassManager &passes) {
   pipeline.addPass(createFormProgram()); // of what was written by hand
   pipeline.addPass(createFormWork());
   addCleanUp(passes);
+  passes.nest<PipelineOp>().addPass(createForwardStores());
   // Last: it counts what is left to do.
   passes.nest<PipelineOp>().addPass(createMapLanes());
 }

@@ -185,6 +185,43 @@ def FormTiles : Pass<"piko-form-tiles", "::piko::PipelineOp"> {
     Statistic<"refused", "refused", "images that one kernel updates, but without tiles">];
 }
 
+def ForwardStores : Pass<"piko-forward-stores", "::piko::PipelineOp"> {
+  let summary = "Forward what is stored to state to what reads it";
+  let description = [{
+    **Requires** structured work (`piko-form-work`).
+
+    **Does**: store-to-load forwarding, and elimination of redundant loads. What a
+    call reads of state, and has stored or read there before, is the same number:
+    no other call changes it. LLVM knows the same of one lane, but not of gathers
+    and scatters, so that lanes would go through memory. A read that is left stands
+    for others behind it, also in conditions and loops, and what it tests is
+    known there.
+
+    **Guarantees** the same numbers, and the same stores.
+
+    Before:
+    ```
+    piko.store %x, @motions[%i : i32] "position.x" : f32
+    piko.store %v, @motions[%i : i32] "velocity.x" : f32
+    %1 = piko.load @motions[%i : i32] "position.x" : f32
+    %2 = arith.cmpf olt, %1, %limit : f32
+    ```
+    After:
+    ```
+    piko.store %x, @motions[%i : i32] "position.x" : f32
+    piko.store %v, @motions[%i : i32] "velocity.x" : f32
+    %2 = arith.cmpf olt, %x, %limit : f32
+    ```
+
+    **Limits**: a store to the same field of an element of which one does not know
+    that it is the same one, or another one of the same array, ends what is known of
+    it, as do barriers, parallel loops and updates; a read behind a condition that
+    stores is left.
+  }];
+  let statistics = [
+    Statistic<"forwarded", "forwarded", "reads that others stand for">];
+}
+
 def MapLanes : Pass<"piko-map-lanes", "::piko::PipelineOp"> {
   let summary = "Choose what lanes are given";
   let description = [{
