@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// piko-merge-bounds: fields of one element are read behind one test of its
-// index.
+// piko-merge-bounds: fields of one element are read, or written, behind one
+// test of its index.
 
 #include "Piko/Transforms/Passes.h"
 #include "StateAccess.h"
@@ -24,6 +24,7 @@ struct MergeBoundsPass : piko::impl::MergeBoundsBase<MergeBoundsPass> {
   void runOnOperation() override;
   void merge(KernelOp kernel);
   void merge(ArrayRef<scf::IfOp> tests);
+  void mergeWrites(Block &block);
 };
 
 } // namespace
@@ -96,6 +97,44 @@ void MergeBoundsPass::merge(ArrayRef<scf::IfOp> tests) {
   merged += tests.size() - 1;
 }
 
+/// Whether an operation writes a field of any element of a piece of state, or
+/// may; `isRead` whether it reads it, too.
+static bool touches(Operation *op, FlatSymbolRefAttr state, StringAttr field,
+                    bool isRead) {
+  return op
+      ->walk([&](Operation *inner) {
+        auto [other, access] = getStateAccess(inner);
+        if (other != state || (access == StateAccess::reads && !isRead))
+          return WalkResult::advance();
+        auto load = dyn_cast<LoadOp>(inner);
+        auto store = dyn_cast<StoreOp>(inner);
+        bool isOther = (load && load.getFieldAttr() != field) ||
+                       (store && store.getFieldAttr() != field);
+        return isOther ? WalkResult::advance() : WalkResult::interrupt();
+      })
+      .wasInterrupted();
+}
+
+/// Whether what a test guards is the same where another one stands in front of
+/// it.
+static bool isUnchanged(scf::IfOp test, scf::IfOp first) {
+  LoadOp load = getGuarded(test);
+  auto meets = [](Operation *op) {
+    return op
+        ->walk([](Operation *inner) {
+          return isa<BarrierOpInterface, ParallelLoopOpInterface>(inner)
+                     ? WalkResult::interrupt()
+                     : WalkResult::advance();
+        })
+        .wasInterrupted();
+  };
+  for (Operation *op = first; op != test; op = op->getNextNode())
+    if (meets(op) || touches(op, load.getStateAttr(), load.getFieldAttr(),
+                             /*isRead=*/false))
+      return false;
+  return true;
+}
+
 void MergeBoundsPass::merge(KernelOp kernel) {
   llvm::DenseSet<StringAttr> written = getWrittenState(kernel);
   using Element = std::pair<Value, Attribute>;
@@ -103,8 +142,9 @@ void MergeBoundsPass::merge(KernelOp kernel) {
   DominanceInfo dominance;
   kernel.walk<WalkOrder::PreOrder>([&](scf::IfOp test) {
     LoadOp load = getGuarded(test);
-    if (!load || written.contains(load.getStateAttr().getAttr()))
+    if (!load)
       return;
+    bool isWritten = written.contains(load.getStateAttr().getAttr());
     auto &groups = elements[{test.getCondition(), load.getStateAttr()}];
     auto isKnown = [&](Value value, scf::IfOp first) {
       return dominance.properlyDominates(value, first);
@@ -112,9 +152,9 @@ void MergeBoundsPass::merge(KernelOp kernel) {
     for (SmallVector<scf::IfOp> &tests : groups) {
       scf::IfOp first = tests.front();
       bool isBehind = first->getBlock() == test->getBlock() ||
-                      (readsAlong(load, getGuarded(first)) &&
+                      (!isWritten && readsAlong(load, getGuarded(first)) &&
                        first->getBlock()->findAncestorOpInBlock(*test));
-      if (isBehind &&
+      if (isBehind && !(isWritten && !isUnchanged(test, first)) &&
           llvm::all_of(load->getOperands(),
                        [&](Value value) { return isKnown(value, first); }) &&
           isKnown(test.elseYield().getOperand(0), first)) {
@@ -130,7 +170,67 @@ void MergeBoundsPass::merge(KernelOp kernel) {
         merge(tests);
 }
 
+/// The writes that a test guards, if it has nothing else to do; or none.
+static SmallVector<StoreOp> getWrites(scf::IfOp test) {
+  SmallVector<StoreOp> writes;
+  if (test.getNumResults() != 0 || test.getElseRegion().empty() ||
+      !onlyFails(test.getElseRegion()))
+    return {};
+  for (Operation &op : test.thenBlock()->without_terminator()) {
+    auto store = dyn_cast<StoreOp>(op);
+    if (!store || !store.getChecked() || store.getTile() ||
+        (!writes.empty() &&
+         store.getStateAttr() != writes.front().getStateAttr()))
+      return {};
+    writes.push_back(store);
+  }
+  return writes;
+}
+
+/// Whether what a test guards may be done behind an operation, too, and the
+/// error that it may find be told.
+static bool mayPass(Operation *op, scf::IfOp test, ArrayRef<StoreOp> writes) {
+  if (isMemoryEffectFree(op))
+    return true;
+  for (StoreOp write : writes)
+    if (touches(op, write.getStateAttr(), write.getFieldAttr(),
+                /*isRead=*/true))
+      return false;
+  if (isa<LoadOp, StoreOp>(op))
+    return true;
+  auto other = dyn_cast<scf::IfOp>(op);
+  return other && other.getCondition() == test.getCondition() &&
+         getGuarded(other);
+}
+
+/// A test that is made again for other fields guards them all: the writes of
+/// the first one are done where the last one stands.
+void MergeBoundsPass::mergeWrites(Block &block) {
+  scf::IfOp test;
+  SmallVector<StoreOp> writes;
+  for (Operation &op : block) {
+    auto next = dyn_cast<scf::IfOp>(op);
+    SmallVector<StoreOp> more = next ? getWrites(next) : SmallVector<StoreOp>();
+    bool joins = test && next && !more.empty() &&
+                 next.getCondition() == test.getCondition() &&
+                 more.front().getStateAttr() == writes.front().getStateAttr();
+    if (joins) {
+      Operation *front = &next.thenBlock()->front();
+      for (StoreOp write : writes)
+        write->moveBefore(front);
+      test.erase();
+      ++merged;
+    } else if (test && mayPass(&op, test, writes)) {
+      continue;
+    }
+    test = next && !more.empty() ? next : scf::IfOp();
+    writes = test ? getWrites(test) : SmallVector<StoreOp>();
+  }
+}
+
 void MergeBoundsPass::runOnOperation() {
-  for (auto kernel : getOperation().getOps<KernelOp>())
+  for (auto kernel : getOperation().getOps<KernelOp>()) {
     merge(kernel);
+    kernel.walk([&](Block *block) { mergeWrites(*block); });
+  }
 }

@@ -164,10 +164,13 @@ def MergeBounds : Pass<"piko-merge-bounds", "::piko::PipelineOp"> {
     one branch for an element, and its address is computed once, also where lanes
     read elements in different places. What is read of the same element behind a
     condition is read along, if the record is not larger than a line of the cache.
+    Tests that guard writes to fields of the same element become the last of them,
+    so that lanes can write these at once.
 
-    **Guarantees** the same reads of state that the kernel does not change, at
-    the place of the first; and the same errors, whose text names the index but no
-    field.
+    **Guarantees** the same numbers: what the kernel changes is read at the place of
+    the first only where nothing in between writes the field, and written at that of
+    the last only where nothing in between uses it; and the same errors, whose text
+    names the index but no field, in the same order.
 
     Before:
     ```
@@ -191,7 +194,8 @@ def MergeBounds : Pass<"piko-merge-bounds", "::piko::PipelineOp"> {
     %square = arith.mulf %xy#0, %xy#0 : f32
     ```
 
-    **Limits**: reads of state that the kernel changes keep their tests.
+    **Limits**: reads in conditions of state that the kernel changes keep their
+    tests; so do writes with another test between them.
   }];
   let statistics = [
     Statistic<"merged", "merged", "tests that others stand for">];
