@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// piko-merge-gathers: lanes read fields of one record at once.
+// piko-merge-gathers: lanes read, and write, fields of one record at once.
 
 #include "Piko/Transforms/Passes.h"
 #include "StateAccess.h"
@@ -28,6 +28,8 @@ struct MergeGathersPass : piko::impl::MergeGathersBase<MergeGathersPass> {
 private:
   void mergeState(KernelOp kernel);
   void mergePrimitives(KernelOp kernel);
+  void mergeWrites(Block &block);
+  void mergeWrites(ArrayRef<ScatterOp> writes);
   template <typename OpT>
   void merge(ArrayRef<OpT> reads, Value addresses, FlatSymbolRefAttr record,
              OpBuilder &builder);
@@ -95,9 +97,9 @@ static bool isNear(GatherOp read, GatherOp first, RecordOp record) {
   return read->getBlock() == first->getBlock() || record.getSize() <= lineSize;
 }
 
-static RecordOp getRecord(GatherOp gather) {
-  return lookupRecord(gather, getStateRecord(lookupInPipeline<Operation *>(
-                                  gather, gather.getStateAttr())));
+template <typename OpT> static RecordOp getRecord(OpT access) {
+  return lookupRecord(access, getStateRecord(lookupInPipeline<Operation *>(
+                                  access, access.getStateAttr())));
 }
 
 /// Whether what an operation does to a piece of state leaves a word of its
@@ -133,12 +135,13 @@ static bool isUnchanged(GatherOp read, GatherOp first, RecordOp record) {
 }
 
 /// The indices of each lane's element.
-static SmallVector<Value> getPlaces(GatherOp gather, OpBuilder &builder,
+template <typename OpT>
+static SmallVector<Value> getPlaces(OpT access, OpBuilder &builder,
                                     VectorType words) {
-  SmallVector<Value> places(gather.getIndices());
-  if (!gather.getConsecutive())
+  SmallVector<Value> places(access.getIndices());
+  if (!access.getConsecutive())
     return places;
-  Location loc = gather.getLoc();
+  Location loc = access.getLoc();
   Value first = places.front();
   if (!first.getType().isIndex())
     first =
@@ -211,9 +214,83 @@ void MergeGathersPass::mergePrimitives(KernelOp kernel) {
     }
 }
 
+/// Whether a write is of another word of the same elements, by the same lanes.
+static bool isBeside(ScatterOp write, ArrayRef<ScatterOp> others) {
+  ScatterOp first = others.front();
+  return write.getStateAttr() == first.getStateAttr() &&
+         write.getIndices() == first.getIndices() &&
+         write.getMask() == first.getMask() &&
+         write.getConsecutive() == first.getConsecutive() &&
+         llvm::none_of(others, [&](ScatterOp other) {
+           return other.getFieldAttr() == write.getFieldAttr();
+         });
+}
+
+/// Whether writes to a piece of state may be put off behind an operation.
+static bool mayPass(Operation *op, FlatSymbolRefAttr state) {
+  if (isMemoryEffectFree(op))
+    return true;
+  auto [other, access] = getStateAccess(op);
+  return op->getNumRegions() == 0 && other && other != state;
+}
+
+void MergeGathersPass::mergeWrites(ArrayRef<ScatterOp> writes) {
+  if (writes.size() < leastFields)
+    return;
+  ScatterOp last = writes.back();
+  OpBuilder builder(last);
+  auto words =
+      VectorType::get(cast<VectorType>(last.getMask().getType()).getShape(),
+                      builder.getIndexType());
+  SmallVector<Value> values;
+  SmallVector<Attribute> fields;
+  for (ScatterOp write : writes) {
+    values.push_back(write.getValue());
+    fields.push_back(write.getFieldAttr());
+  }
+  Value addresses =
+      LaneElementsOp::create(builder, last.getLoc(), words, last.getStateAttr(),
+                             getPlaces(last, builder, words));
+  LaneSetFieldsOp::create(builder, last.getLoc(), values, addresses,
+                          builder.getArrayAttr(fields), last.getStateAttr(),
+                          last.getMask());
+  for (ScatterOp write : writes)
+    write.erase();
+  merged += writes.size();
+}
+
+/// Writes to elements of one piece of state each, and all of them done where
+/// the last one is.
+void MergeGathersPass::mergeWrites(Block &block) {
+  SmallVector<SmallVector<ScatterOp>> groups;
+  for (Operation &op : llvm::make_early_inc_range(block)) {
+    auto write = dyn_cast<ScatterOp>(op);
+    bool isPart = write && !write.getIndices().empty() &&
+                  write.getElements().empty() &&
+                  isWord(write.getValue().getType()) &&
+                  getRecord(write).getSize() != wordSize;
+    bool isMore = false;
+    for (SmallVector<ScatterOp> &writes : groups) {
+      if (isPart && isBeside(write, writes)) {
+        writes.push_back(write);
+        isMore = true;
+      } else if (!mayPass(&op, writes.front().getStateAttr())) {
+        mergeWrites(writes);
+        writes.clear();
+      }
+    }
+    llvm::erase_if(groups, [](const auto &writes) { return writes.empty(); });
+    if (isPart && !isMore)
+      groups.push_back({write});
+  }
+  for (ArrayRef<ScatterOp> writes : groups)
+    mergeWrites(writes);
+}
+
 void MergeGathersPass::runOnOperation() {
   for (auto kernel : getOperation().getOps<KernelOp>()) {
     mergeState(kernel);
     mergePrimitives(kernel);
+    kernel.walk([&](Block *block) { mergeWrites(*block); });
   }
 }

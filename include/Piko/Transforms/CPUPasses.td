@@ -506,10 +506,13 @@ def MergeGathers : Pass<"piko-merge-gathers", "::piko::PipelineOp"> {
     instructions than a gather for each field; lanes that read nothing load zeros.
     Fields of primitives that are read behind conditions, for some of the lanes,
     are read with the first, and so are those of elements whose records are as
-    short as a line of the cache.
+    short as a line of the cache. Of scatters of words of the same elements, three
+    or more without other access to that state between them, it makes one operation
+    as well, where the last one is: words are transposed, and each lane stores
+    pieces of up to 16 bytes, if all lanes write.
 
     **Guarantees** the same reads: of state that the kernel changes, only words that
-    nothing in between writes.
+    nothing in between writes; and the same writes.
 
     Before:
     ```

@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// Lanes that read several fields of a record each: loads of 16 bytes, of one
-// lane each, whose words are then transposed. A gather loads each word alone.
+// Lanes that read, or write, several fields of a record each: loads and stores
+// of 16 bytes, of one lane each, whose words are transposed. A gather loads
+// each word alone.
 
 #include "KernelLowering.h"
 #include "RecordPieces.h"
 
 #include "mlir/Dialect/SCF/IR/SCF.h"
 #include "mlir/Dialect/Vector/IR/VectorOps.h"
+
+#include <map>
 
 using namespace mlir;
 using namespace piko;
@@ -219,11 +222,159 @@ struct LaneGetFieldsLowering : Lowering<LaneGetFieldsOp> {
   }
 };
 
+/// Words that lie side by side, at most four.
+struct Run {
+  int64_t begin; ///< in bytes
+  SmallVector<Value> words;
+};
+
+/// Code for one access of all lanes.
+class RecordWriter {
+public:
+  RecordWriter(OpBuilder &builder, Location loc, Value addresses, Value mask)
+      : builder(builder), loc(loc), addresses(addresses), mask(mask),
+        lanes(cast<VectorType>(mask.getType()).getNumElements()) {}
+
+  void scatter(Value value, FieldAttr field);
+  void write(ArrayRef<Run> runs);
+
+private:
+  void store(Value value, Value place, int64_t offset) {
+    LLVM::StoreOp::create(builder, loc, value,
+                          createOffset(builder, loc, place, offset), wordSize);
+  }
+
+  OpBuilder &builder;
+  Location loc;
+  Value addresses, mask;
+  int64_t lanes;
+};
+
+void RecordWriter::scatter(Value value, FieldAttr field) {
+  Type pointers = LLVM::getVectorType(
+      LLVM::LLVMPointerType::get(builder.getContext()), lanes);
+  Value at = createOffset(
+      builder, loc, LLVM::IntToPtrOp::create(builder, loc, pointers, addresses),
+      field.getOffset());
+  int64_t bits = cast<VectorType>(value.getType()).getElementTypeBitWidth();
+  LLVM::masked_scatter::create(builder, loc, value, at, mask, bits / 8);
+}
+
+/// One lane after the other.
+void RecordWriter::write(ArrayRef<Run> runs) {
+  auto words = VectorType::get({lanes}, builder.getI32Type());
+  Value none =
+      arith::ConstantOp::create(builder, loc, builder.getZeroAttr(words));
+  SmallVector<std::array<Value, pieceWords>> pieces;
+  for (const Run &run : runs) {
+    std::array<Value, pieceWords> rows;
+    rows.fill(none);
+    for (auto [row, word] : llvm::zip(rows, run.words))
+      row = vector::BitCastOp::create(builder, loc, words, word);
+    pieces.push_back(transposeBlocks(builder, loc, rows));
+  }
+  for (int64_t lane = 0; lane < lanes; ++lane) {
+    Value address = vector::ExtractOp::create(builder, loc, addresses, lane);
+    Value place = LLVM::IntToPtrOp::create(
+        builder, loc, LLVM::LLVMPointerType::get(builder.getContext()),
+        address);
+    for (auto [run, piece] : llvm::zip(runs, pieces)) {
+      Value vector = piece[lane % pieceWords];
+      auto part = [&](int64_t from, int64_t count) -> Value {
+        int64_t first = lane / pieceWords * pieceWords + from;
+        return vector::ShuffleOp::create(
+            builder, loc, vector, vector,
+            llvm::to_vector(llvm::seq<int64_t>(first, first + count)));
+      };
+      // Of three words two, and the third.
+      int64_t count = run.words.size(), whole = count == 3 ? 2 : count;
+      store(part(0, whole), place, run.begin);
+      if (whole < count)
+        store(part(whole, count - whole), place, run.begin + whole * wordSize);
+    }
+  }
+}
+
+struct LaneSetFieldsLowering : Lowering<LaneSetFieldsOp> {
+  using Lowering::Lowering;
+  LogicalResult
+  matchAndRewrite(LaneSetFieldsOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    Location loc = op.getLoc();
+    Value mask = adaptor.getMask();
+    auto words = VectorType::get(cast<VectorType>(mask.getType()).getShape(),
+                                 rewriter.getI64Type());
+    Value addresses = arith::IndexCastOp::create(rewriter, loc, words,
+                                                 adaptor.getAddresses());
+    SmallVector<FieldAttr> fields = getFields(op);
+    auto scatterAll = [&](OpBuilder &builder) {
+      RecordWriter writer(builder, loc, addresses, mask);
+      for (auto [value, field] : llvm::zip(adaptor.getValues(), fields))
+        writer.scatter(value, field);
+    };
+    SmallVector<Run> runs;
+    if (words.getNumElements() % pieceWords == 0)
+      runs = planRuns(fields, adaptor.getValues());
+    if (runs.size() < fields.size()) {
+      Value all = vector::ReductionOp::create(rewriter, loc,
+                                              vector::CombiningKind::AND, mask);
+      scf::IfOp::create(
+          rewriter, loc, all,
+          [&](OpBuilder &builder, Location loc) {
+            RecordWriter(builder, loc, addresses, mask).write(runs);
+            scf::YieldOp::create(builder, loc);
+          },
+          [&](OpBuilder &builder, Location loc) {
+            scatterAll(builder);
+            scf::YieldOp::create(builder, loc);
+          });
+    } else {
+      scatterAll(rewriter);
+    }
+    rewriter.eraseOp(op);
+    return success();
+  }
+
+private:
+  SmallVector<FieldAttr> getFields(LaneSetFieldsOp op) const {
+    RecordOp record =
+        context.record(getStateRecord(context.state(op, op.getState())));
+    SmallVector<FieldAttr> fields;
+    for (Attribute name : op.getFields())
+      fields.push_back(record.getField(cast<StringAttr>(name).getValue()));
+    return fields;
+  }
+
+  /// As many as there are fields if these are no words.
+  static SmallVector<Run> planRuns(ArrayRef<FieldAttr> fields,
+                                   ValueRange values) {
+    std::map<int64_t, Value> words;
+    SmallVector<Run> runs(fields.size());
+    for (auto [field, value] : llvm::zip(fields, values)) {
+      if (cast<VectorType>(value.getType()).getElementTypeBitWidth() != 32 ||
+          field.getOffset() % wordSize != 0)
+        return runs;
+      words[field.getOffset()] = value;
+    }
+    runs.clear();
+    for (auto [offset, word] : words) {
+      bool follows =
+          !runs.empty() && runs.back().words.size() < pieceWords &&
+          runs.back().begin + int64_t(runs.back().words.size()) * wordSize ==
+              offset;
+      if (!follows)
+        runs.push_back({offset, {}});
+      runs.back().words.push_back(word);
+    }
+    return runs;
+  }
+};
+
 } // namespace
 
 void piko::populateRecordsToLLVMPatterns(const TypeConverter &converter,
                                          RewritePatternSet &patterns,
                                          LoweringContext &context) {
-  patterns.add<LaneGetFieldsLowering>(converter, patterns.getContext(),
-                                      context);
+  patterns.add<LaneGetFieldsLowering, LaneSetFieldsLowering>(
+      converter, patterns.getContext(), context);
 }

@@ -112,3 +112,67 @@ piko.pipeline @P rank 1 {
     %r = piko.cpu.permute %v[%lanes] : vector<6xf32>, vector<6xi32>
   }
 }
+
+// -----
+
+piko.record @V {"x" : f32 at 0, "y" : i32 at 4} size 8 align 4
+piko.pipeline @P rank 1 {
+  piko.buffer @out : @V
+  piko.stage @a bins [0] threads 1 : @V -> [] {}
+  piko.kernel @k {
+    %v = arith.constant dense<1.0> : vector<16xf32>
+    %at = arith.constant dense<3> : vector<16xindex>
+    %mask = arith.constant dense<true> : vector<16xi1>
+    %few = arith.constant dense<true> : vector<8xi1>
+    // expected-error@+1 {{'piko.cpu.set_fields' op expected a number for each of 2 fields, but got 1}}
+    piko.cpu.set_fields(%v) to %at ["x", "y"] of @out mask %mask : vector<16xindex>, vector<16xi1>, vector<16xf32>
+  }
+}
+
+// -----
+
+piko.record @V {"x" : f32 at 0, "y" : i32 at 4} size 8 align 4
+piko.pipeline @P rank 1 {
+  piko.buffer @out : @V
+  piko.stage @a bins [0] threads 1 : @V -> [] {}
+  piko.kernel @k {
+    %v = arith.constant dense<1.0> : vector<16xf32>
+    %at = arith.constant dense<3> : vector<16xindex>
+    %mask = arith.constant dense<true> : vector<16xi1>
+    %few = arith.constant dense<true> : vector<8xi1>
+    // expected-error@+1 {{'piko.cpu.set_fields' op expected field 'y' to be of type 'i32', but got 'f32'}}
+    piko.cpu.set_fields(%v) to %at ["y"] of @out mask %mask : vector<16xindex>, vector<16xi1>, vector<16xf32>
+  }
+}
+
+// -----
+
+piko.record @V {"x" : f32 at 0, "y" : i32 at 4} size 8 align 4
+piko.pipeline @P rank 1 {
+  piko.buffer @out : @V
+  piko.stage @a bins [0] threads 1 : @V -> [] {}
+  piko.kernel @k {
+    %v = arith.constant dense<1.0> : vector<16xf32>
+    %at = arith.constant dense<3> : vector<16xindex>
+    %mask = arith.constant dense<true> : vector<16xi1>
+    %few = arith.constant dense<true> : vector<8xi1>
+    // expected-error@+1 {{'piko.cpu.set_fields' op expected an address for each of 8 lanes, but got 'vector<16xindex>'}}
+    piko.cpu.set_fields(%v) to %at ["x"] of @out mask %few : vector<16xindex>, vector<8xi1>, vector<16xf32>
+  }
+}
+
+// -----
+
+piko.record @V {"x" : f32 at 0, "y" : i32 at 4} size 8 align 4
+piko.pipeline @P rank 1 {
+  piko.buffer @out : @V
+  piko.stage @a bins [0] threads 1 : @V -> [] {}
+  piko.kernel @k {
+    %v = arith.constant dense<1.0> : vector<16xf32>
+    %at = arith.constant dense<3> : vector<16xindex>
+    %mask = arith.constant dense<true> : vector<16xi1>
+    %few = arith.constant dense<true> : vector<8xi1>
+    // expected-error@+1 {{'piko.cpu.set_fields' op expected a piece of state, but got @a}}
+    piko.cpu.set_fields(%v) to %at ["x"] of @a mask %mask : vector<16xindex>, vector<16xi1>, vector<16xf32>
+  }
+}

@@ -93,6 +93,30 @@ LogicalResult LaneGetFieldsOp::verifySymbolUses(SymbolTableCollection &) {
   return success();
 }
 
+LogicalResult LaneSetFieldsOp::verifySymbolUses(SymbolTableCollection &) {
+  Type mask = getMask().getType();
+  if (failed(
+          verifyLaneCount(*this, mask, getAddresses().getType(), "an address")))
+    return failure();
+  if (getFields().size() != getValues().size())
+    return emitOpError("expected a number for each of ")
+           << getFields().size() << " fields, but got " << getValues().size();
+  auto state = lookupInPipeline<Operation *>(*this, getStateAttr());
+  FlatSymbolRefAttr record = state ? getStateRecord(state) : nullptr;
+  if (!record)
+    return emitOpError("expected a piece of state, but got ") << getStateAttr();
+  for (auto [field, value] : llvm::zip(getFields(), getValues().getTypes()))
+    if (failed(verifyLaneCount(*this, mask, value, "a number")) ||
+        failed(verifyFieldAccess(*this, record,
+                                 cast<StringAttr>(field).getValue(), 0,
+                                 cast<VectorType>(value).getElementType())))
+      return failure();
+  return success();
+}
+
+FlatSymbolRefAttr LaneSetFieldsOp::getAccessedState() { return getStateAttr(); }
+int LaneSetFieldsOp::getAccessKinds() { return StateAccess::stores; }
+
 LogicalResult PermuteOp::verify() {
   Type type = getVector().getType();
   if (failed(verifyLaneCount(*this, type, getLanes().getType(), "a lane")))

@@ -160,6 +160,32 @@ def Piko_LaneGetFieldsOp : Piko_CPUOp<"get_fields", [
   }];
 }
 
+def Piko_LaneSetFieldsOp : Piko_CPUOp<"set_fields", [
+    MemoryEffects<[MemWrite]>,
+    DeclareOpInterfaceMethods<Piko_StateAccessInterface>,
+    DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
+  let summary = "writes fields of an element for each lane";
+  let description = [{
+    As `piko.cpu.scatter` for each field, none of which is an array, where the
+    elements are those at addresses (`piko.cpu.elements`). What lies side by side is
+    written at once where all lanes write: by a transposition, and stores of 16
+    bytes.
+
+    ```mlir
+    piko.cpu.set_fields(%x, %y, %z) to %as ["x", "y", "z"] of @vertices mask %mask
+      : vector<16xindex>, vector<16xi1>,
+        vector<16xf32>, vector<16xf32>, vector<16xf32>
+    ```
+  }];
+  let arguments = (ins Variadic<Piko_Lanes>:$values, Piko_Addresses:$addresses,
+                       StrArrayAttr:$fields, FlatSymbolRefAttr:$state,
+                       Piko_LaneMask:$mask);
+  let assemblyFormat = [{
+    `(` $values `)` `to` $addresses $fields `of` $state `mask` $mask attr-dict
+    `:` type($addresses) `,` type($mask) `,` type($values)
+  }];
+}
+
 def Piko_Permutable
     : VectorOfRankAndType<[1], [F32, F64, I1, I8, I16, I32, I64, Index]>;
 def Piko_LaneNumbers : VectorOfRankAndType<[1], [I32]>;
