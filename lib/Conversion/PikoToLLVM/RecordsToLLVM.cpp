@@ -243,12 +243,24 @@ private:
     LLVM::StoreOp::create(builder, loc, value,
                           createOffset(builder, loc, place, offset), wordSize);
   }
+  /// The first three words of a piece; what follows them stays as it is.
+  void storeThree(Value piece, Value place, int64_t offset);
 
   OpBuilder &builder;
   Location loc;
   Value addresses, mask;
   int64_t lanes;
 };
+
+void RecordWriter::storeThree(Value piece, Value place, int64_t offset) {
+  auto type = VectorType::get({pieceWords}, builder.getI1Type());
+  Value three = arith::ConstantOp::create(
+      builder, loc,
+      DenseElementsAttr::get(type, ArrayRef<bool>{true, true, true, false}));
+  LLVM::MaskedStoreOp::create(builder, loc, piece,
+                              createOffset(builder, loc, place, offset), three,
+                              wordSize);
+}
 
 void RecordWriter::scatter(Value value, FieldAttr field) {
   Type pointers = LLVM::getVectorType(
@@ -286,11 +298,11 @@ void RecordWriter::write(ArrayRef<Run> runs) {
             builder, loc, vector, vector,
             llvm::to_vector(llvm::seq<int64_t>(first, first + count)));
       };
-      // Of three words two, and the third.
-      int64_t count = run.words.size(), whole = count == 3 ? 2 : count;
-      store(part(0, whole), place, run.begin);
-      if (whole < count)
-        store(part(whole, count - whole), place, run.begin + whole * wordSize);
+      int64_t count = run.words.size();
+      if (count == 3)
+        storeThree(part(0, pieceWords), place, run.begin);
+      else
+        store(part(0, count), place, run.begin);
     }
   }
 }
