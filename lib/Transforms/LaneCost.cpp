@@ -255,10 +255,8 @@ private:
   double getDivision(Operation *op) const;
   double getScalar(Operation *op) const;
   bool isTransposed(LoadOp load) const;
-  bool isInStream(Operation *access) const {
-    return llvm::any_of(
-        inner, [&](scf::ForOp loop) { return isStream(access, loop); });
-  }
+  double getOwnLines(Operation *access) const;
+  double getTurns(Operation *loop) const;
 
   const IterationLanes &lanes;
   const Cycles &cycles;
@@ -415,6 +413,20 @@ bool CostModel::isTransposed(LoadOp load) const {
          llvm::count_if(load.getIndices().front().getUsers(), isAlike) >= least;
 }
 
+/// What lanes take that stream through memory, each on its own, where loops
+/// around the stream do not read the same again.
+double CostModel::getOwnLines(Operation *access) const {
+  auto stream = llvm::find_if(
+      inner, [&](scf::ForOp loop) { return isStream(access, loop); });
+  if (stream == inner.end())
+    return 0;
+  double own = cycles.ownLines;
+  for (scf::ForOp loop : llvm::make_range(inner.begin(), stream))
+    if (isRepeated(access, loop))
+      own /= std::max(1.0, getTurns(loop));
+  return own;
+}
+
 /// What an access in different places takes.
 double CostModel::getApart(Operation *access) const {
   auto load = dyn_cast<memref::LoadOp>(access);
@@ -426,7 +438,7 @@ double CostModel::getApart(Operation *access) const {
   }
   if (auto read = dyn_cast<LoadOp>(access);
       read && isStrided(access) && isTransposed(read))
-    return cycles.transposed + (isInStream(access) ? cycles.ownLines : 0);
+    return cycles.transposed + getOwnLines(access);
   bool writes = store || isa<StoreOp>(access);
   double apart =
       writes ? (isNarrow(access) ? cycles.narrowScatter : cycles.scatter)
@@ -434,7 +446,7 @@ double CostModel::getApart(Operation *access) const {
   // What a scatter wrote is not forwarded to what reads it next.
   if (store && lanes.isPrivate(array))
     apart *= 2;
-  return apart + (isInStream(access) ? cycles.ownLines : 0);
+  return apart + getOwnLines(access);
 }
 
 /// How many numbers of an array in a record one lane loads at once, where their

@@ -116,6 +116,33 @@ bool piko::isStream(Operation *access, scf::ForOp loop) {
   return place && getGrowth(*place, loop) == Growth::One;
 }
 
+/// Whether a value is the same in each turn of `loop`, or runs through the same
+/// ones in loops inside of it.
+static bool isRepeated(Value value, scf::ForOp loop,
+                       llvm::SmallDenseSet<Value> &seen) {
+  if (loop.isDefinedOutsideOfLoop(value) || !seen.insert(value).second)
+    return true;
+  if (auto argument = dyn_cast<BlockArgument>(value)) {
+    auto inner = dyn_cast<scf::ForOp>(argument.getOwner()->getParentOp());
+    return inner && inner != loop && argument == inner.getInductionVar() &&
+           isRepeated(inner.getLowerBound(), loop, seen) &&
+           isRepeated(inner.getStep(), loop, seen);
+  }
+  Operation *op = value.getDefiningOp();
+  return op->getNumRegions() == 0 && isMemoryEffectFree(op) &&
+         llvm::all_of(op->getOperands(), [&](Value operand) {
+           return isRepeated(operand, loop, seen);
+         });
+}
+
+bool piko::isRepeated(Operation *access, scf::ForOp loop) {
+  std::optional<Place> place = getPlace(access);
+  llvm::SmallDenseSet<Value> seen;
+  return place && llvm::all_of(place->indices, [&](Value index) {
+           return ::isRepeated(index, loop, seen);
+         });
+}
+
 /// Whether a loop is so short that LLVM unrolls it.
 static bool isShort(scf::ForOp loop) {
   constexpr int64_t most = 16;

@@ -15,6 +15,10 @@ namespace piko {
 /// element from one iteration to the next.
 bool isStream(mlir::Operation *access, mlir::scf::ForOp loop);
 
+/// Whether an access is to the same elements in each turn of a loop around it,
+/// as far as is known: their lines of the cache are there from the first one.
+bool isRepeated(mlir::Operation *access, mlir::scf::ForOp loop);
+
 /// Whether LLVM is expected to run iterations of an inner loop as vectors: they
 /// have no control flow, access streams or what is the same for all, and carry
 /// nothing but sums that may be reordered. A short loop in another is unrolled,

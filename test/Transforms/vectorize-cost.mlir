@@ -1,0 +1,80 @@
+// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-vectorize))' --split-input-file --verify-diagnostics %s
+
+piko.record @Row {"z" : f32[32 : 4] at 0, "k" : i32 at 128} size 132 align 4
+piko.record @D {"z" : f32 at 0} size 4 align 4
+
+// Each turn of the outer loop reads the same numbers again, which are in the
+// cache: lanes share their lines' cost over all turns.
+piko.pipeline @ReadsAgain rank 1 {
+  piko.buffer @out : @D
+  piko.source @a
+  piko.stage @a bins [0] threads 1 : @Row -> [] {}
+  piko.kernel @k {
+    %c0 = arith.constant 0 : index
+    %c1 = arith.constant 1 : index
+    %c32 = arith.constant 32 : index
+    %none = arith.constant 0.0 : f32
+    %bins = piko.storage.open_bins @a : !piko.bins<@Row>
+    %n = piko.storage.unit_count %bins : !piko.bins<@Row>
+    scf.forall (%u) in (%n) {
+      %lo, %hi = piko.storage.cell_range %bins[%u, %u] : !piko.bins<@Row>
+      // expected-remark@+1 {{stage 'a': process is vectorized for 16 primitives at once}}
+      scf.for %i = %lo to %hi step %c1 {
+        %f = piko.storage.item %bins[%i] : !piko.bins<@Row> -> !piko.prim<@Row>
+        %k = piko.get %f "k" : !piko.prim<@Row> -> i32
+        %all = scf.for %y = %c0 to %c32 step %c1 iter_args(%a = %none) -> f32 {
+          %sum = scf.for %x = %c0 to %c32 step %c1 iter_args(%s = %a) -> f32 {
+            %z = piko.get %f "z"[%x] : !piko.prim<@Row> -> f32
+            %0 = arith.mulf %z, %s : f32
+            %1 = arith.addf %0, %z : f32
+            %2 = arith.mulf %1, %1 : f32
+            %3 = arith.addf %2, %z : f32
+            scf.yield %3 : f32
+          }
+          scf.yield %sum : f32
+        }
+        piko.store %all, checked @out[%k : i32] "z" : f32
+      } {piko.lanes, piko.mapping = #piko<lanes items>}
+    }
+    piko.storage.close_bins %bins : !piko.bins<@Row>
+  }
+}
+
+// -----
+
+piko.record @Row {"z" : f32[32 : 4] at 0, "k" : i32 at 128} size 132 align 4
+piko.record @D {"z" : f32 at 0} size 4 align 4
+
+// The same sums of what is read once: as many lines as there are lanes.
+piko.pipeline @ReadsOnce rank 1 {
+  piko.buffer @out : @D
+  piko.source @a
+  piko.stage @a bins [0] threads 1 : @Row -> [] {}
+  piko.kernel @k {
+    %c0 = arith.constant 0 : index
+    %c1 = arith.constant 1 : index
+    %c32 = arith.constant 32 : index
+    %none = arith.constant 0.0 : f32
+    %bins = piko.storage.open_bins @a : !piko.bins<@Row>
+    %n = piko.storage.unit_count %bins : !piko.bins<@Row>
+    scf.forall (%u) in (%n) {
+      %lo, %hi = piko.storage.cell_range %bins[%u, %u] : !piko.bins<@Row>
+      // expected-remark@+1 {{stage 'a': process is not vectorized: 16 at once are expected to take}}
+      scf.for %i = %lo to %hi step %c1 {
+        %f = piko.storage.item %bins[%i] : !piko.bins<@Row> -> !piko.prim<@Row>
+        %k = piko.get %f "k" : !piko.prim<@Row> -> i32
+        %sum = scf.for %x = %c0 to %c32 step %c1 iter_args(%s = %none) -> f32 {
+          // expected-note@+1 {{lanes access elements in different places}}
+          %z = piko.get %f "z"[%x] : !piko.prim<@Row> -> f32
+          %0 = arith.mulf %z, %s : f32
+          %1 = arith.addf %0, %z : f32
+          %2 = arith.mulf %1, %1 : f32
+          %3 = arith.addf %2, %z : f32
+          scf.yield %3 : f32
+        }
+        piko.store %sum, checked @out[%k : i32] "z" : f32
+      } {piko.lanes, piko.mapping = #piko<lanes items>}
+    }
+    piko.storage.close_bins %bins : !piko.bins<@Row>
+  }
+}
