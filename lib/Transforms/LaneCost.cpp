@@ -256,7 +256,6 @@ private:
   double getScalar(Operation *op) const;
   bool isTransposed(LoadOp load) const;
   double getOwnLines(Operation *access) const;
-  double getTurns(Operation *loop) const;
 
   const IterationLanes &lanes;
   const Cycles &cycles;
