@@ -5,6 +5,7 @@
 #include "Piko/Driver/Sequences.h"
 
 #include "Piko/Conversion/Passes.h"
+#include "Piko/Dialect/Piko/IR/Canonicalization.h"
 #include "Piko/Transforms/Passes.h"
 
 #include "mlir/Conversion/MathToLLVM/MathToLLVM.h"
@@ -23,7 +24,8 @@ using namespace mlir;
 using namespace piko;
 
 static void addCleanUp(OpPassManager &passes) {
-  passes.addPass(createCanonicalizerPass());
+  passes.addPass(
+      createCanonicalizerPass(GreedyRewriteConfig(), getInexactPatterns()));
   passes.addPass(createCSEPass());
 }
 

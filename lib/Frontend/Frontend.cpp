@@ -6,6 +6,7 @@
 #include "Cleanup/Cleanup.h"
 #include "Import/ModuleBuilder.h"
 #include "Import/Wiring.h"
+#include "Piko/Dialect/Piko/IR/Canonicalization.h"
 #include "Piko/Dialect/Piko/IR/Piko.h"
 #include "mlir/Dialect/Arith/IR/Arith.h"
 #include "mlir/Dialect/ControlFlow/IR/ControlFlow.h"
@@ -38,7 +39,9 @@ static void canonicalize(mlir::ModuleOp module) {
     dialect->getCanonicalizationPatterns(patterns);
   for (mlir::RegisteredOperationName op : context->getRegisteredOperations())
     op.getCanonicalizationPatterns(patterns, context);
-  (void)mlir::applyPatternsGreedily(module, std::move(patterns));
+  (void)mlir::applyPatternsGreedily(
+      module,
+      mlir::FrozenRewritePatternSet(std::move(patterns), getInexactPatterns()));
   mlir::IRRewriter rewriter(context);
   mlir::DominanceInfo dominance(module);
   mlir::eliminateCommonSubExpressions(rewriter, dominance, module);

@@ -113,10 +113,10 @@ static double colorDistance(Triple a, Triple b) {
 static void addFiltered(const Plane &from, const Kernel &alongX,
                         const Kernel &alongY, double weight, Plane &to) {
   auto filter = [&](auto read, const Kernel &kernel, int at, int end) {
-    int radius = int(kernel.size() / 2);
+    int first = at - int(kernel.size() / 2);
     double sum = 0;
-    for (int i = -radius; i <= radius; ++i)
-      sum += kernel[size_t(i + radius)] * read(std::clamp(at + i, 0, end - 1));
+    for (size_t i = 0; i < kernel.size(); ++i)
+      sum += kernel[i] * read(std::clamp(first + int(i), 0, end - 1));
     return sum;
   };
   Plane rows(from.width, from.height);

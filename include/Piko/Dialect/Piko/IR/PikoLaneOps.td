@@ -172,9 +172,8 @@ def Piko_LaneSetFieldsOp : Piko_CPUOp<"set_fields", [
     bytes.
 
     ```mlir
-    piko.cpu.set_fields(%x, %y, %z) to %as ["x", "y", "z"] of @vertices mask %mask
-      : vector<16xindex>, vector<16xi1>,
-        vector<16xf32>, vector<16xf32>, vector<16xf32>
+    piko.cpu.set_fields(%values) to %as ["position.x"] of @vertices mask %mask
+      : vector<16xindex>, vector<16xi1>, vector<16xf32>
     ```
   }];
   let arguments = (ins Variadic<Piko_Lanes>:$values, Piko_Addresses:$addresses,
