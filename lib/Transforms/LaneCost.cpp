@@ -20,6 +20,8 @@ namespace {
 struct Cycles {
   double scalar, scalarAccess, scalarDivision;
   double vector, row, gather, division;
+  /// A row of numbers below 32 bits, whose lanes may have no masks.
+  double narrowRow;
   /// A quotient of integers by way of floats, and one of a divisor that all
   /// lanes share.
   double quotient, sharedQuotient;
@@ -67,6 +69,7 @@ static const Cycles &getCycles(int64_t laneCount) {
                                .row = 1.5,
                                .gather = 12,
                                .division = 16,
+                               .narrowRow = 1.5,
                                .quotient = 50,
                                .sharedQuotient = 24,
                                .narrowGather = 16,
@@ -95,6 +98,7 @@ static const Cycles &getCycles(int64_t laneCount) {
                               .row = 1.5,
                               .gather = 4,
                               .division = 8,
+                              .narrowRow = 24,
                               .quotient = 60,
                               .sharedQuotient = 60,
                               .narrowGather = 10,
@@ -123,6 +127,7 @@ static const Cycles &getCycles(int64_t laneCount) {
                               .row = 4,
                               .gather = 8,
                               .division = 5,
+                              .narrowRow = 16,
                               .quotient = 20,
                               .sharedQuotient = 16,
                               .narrowGather = 8,
@@ -520,12 +525,12 @@ void CostModel::addOperation(Operation *op, Frequency times, bool laneByLane) {
   Value limited = lanes.findLimited(op);
   bool isGather = isAccess && ((!lanes.isRow(op) && !limited) || isStrided(op));
   double gather = isGather ? getApart(op) : 0;
-  double vectors =
-      times.vectors * (isGather    ? gather
-                       : limited   ? cycles.row + cycles.vector * rowTest
-                       : isAccess  ? cycles.row
-                       : isDivided ? getDivision(op)
-                                   : cycles.vector);
+  double row = isAccess && isNarrow(op) ? cycles.narrowRow : cycles.row;
+  double vectors = times.vectors * (isGather    ? gather
+                                    : limited   ? row + cycles.vector * rowTest
+                                    : isAccess  ? row
+                                    : isDivided ? getDivision(op)
+                                                : cycles.vector);
   if (laneByLane || isTurns || isRemainder)
     vectors = serial + (laneByLane ? 0 : times.vectors * cycles.apart);
   else
