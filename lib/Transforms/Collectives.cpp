@@ -7,6 +7,7 @@
 #include "Piko/Dialect/Piko/IR/CodeBuilder.h"
 
 #include "mlir/IR/IRMapping.h"
+#include "mlir/IR/TypeUtilities.h"
 
 using namespace mlir;
 using namespace piko;
@@ -52,9 +53,9 @@ struct Writer : CodeBuilder {
 
   /// Whether a < b; NaNs are equal to each other and greater than all else.
   Value isLess(Value a, Value b, bool isUnsigned) {
-    if (!isa<FloatType>(a.getType()))
-      return compare(isUnsigned || a.getType().isInteger(1) ? P::ult : P::slt,
-                     a, b);
+    Type type = getElementTypeOrSelf(a.getType());
+    if (!isa<FloatType>(type))
+      return compare(isUnsigned || type.isInteger(1) ? P::ult : P::slt, a, b);
     Value isNumber = compare(arith::CmpFPredicate::ORD, a, a);
     Value isNaN = compare(arith::CmpFPredicate::UNO, b, b);
     return either(compare(arith::CmpFPredicate::OLT, a, b),

@@ -271,6 +271,19 @@ bool IterationLanes::isAccess(Operation *op) const {
 // Barriers
 //===----------------------------------------------------------------------===//
 
+/// What a barrier combines the values of lanes by.
+void IterationLanes::checkCombination(Operation *barrier) {
+  if (barrier->getNumRegions() == 0)
+    return;
+  for (Operation &op : barrier->getRegion(0).front().without_terminator()) {
+    if (!hasVectorForm(&op))
+      refuse(&op, "it has no vector form");
+    else if (llvm::any_of(op.getOperands(),
+                          [&](Value operand) { return isVarying(operand); }))
+      refuse(&op, "it combines by what differs between lanes");
+  }
+}
+
 /// Lanes are at one place at a time, and so meet at each barrier if they go
 /// there together, and nothing that comes before it is put off.
 void IterationLanes::checkBarriers() {
@@ -292,23 +305,15 @@ void IterationLanes::checkBarriers() {
       ordered = op;
     if (!isBarrier(op))
       return WalkResult::advance();
-    auto reduce = dyn_cast<ReduceOp>(op);
-    if (!reduce && !isa<SyncOp>(op))
+    if (!isa<SyncOp, ReduceOp, ScanOp, SortOp>(op))
       refuse(op, "lanes have no such barrier");
     else if (Operation *parting = uniformity.findParting(op, loop.getRegion()))
       refuse(parting, "iterations may not go to a barrier together");
     else if (ordered)
       refuse(ordered,
              "it keeps the order of iterations, and a barrier follows");
-    else if (reduce)
-      for (Operation &inner : reduce.getBody().front().without_terminator()) {
-        if (!hasVectorForm(&inner))
-          refuse(&inner, "it has no vector form");
-        else if (llvm::any_of(inner.getOperands(), [&](Value operand) {
-                   return isVarying(operand);
-                 }))
-          refuse(&inner, "it combines by what differs between lanes");
-      }
+    else
+      checkCombination(op);
     return WalkResult::skip();
   });
 }

@@ -141,6 +141,7 @@ private:
   void findNests();
   bool canCollapse(mlir::scf::ForOp inner) const;
   void findArrays();
+  void checkCombination(mlir::Operation *barrier);
   void checkBarriers();
   void findSharedPixels();
   void findOrdered();

@@ -112,9 +112,7 @@ void IterationWriter::writeOperation(Operation *op) {
   case LaneForm::Private: // made in front of the loop
     return;
   case LaneForm::Barrier:
-    if (auto reduce = dyn_cast<ReduceOp>(op))
-      writeReduce(reduce);
-    return;
+    return writeBarrier(op);
   case LaneForm::Structure:
     return writeStructure(op);
   case LaneForm::Lazy:

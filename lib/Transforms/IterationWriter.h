@@ -97,11 +97,19 @@ private:
   void writePrivate(mlir::memref::AllocaOp array);
 
   // Where lanes meet.
+  void writeBarrier(mlir::Operation *op);
   void writeReduce(ReduceOp reduce);
   /// In the order that piko.reduce has.
   llvm::SmallVector<mlir::Value> combineLanes(ReduceOp reduce);
   llvm::SmallVector<mlir::Value>
   combine(mlir::Block &body, mlir::ValueRange left, mlir::ValueRange right);
+  void writeScan(ScanOp scan);
+  void writeSort(SortOp sort);
+  /// Vectors with the lanes of others, and a constant mask.
+  llvm::SmallVector<mlir::Value> shuffle(mlir::ValueRange values,
+                                         llvm::ArrayRef<int64_t> from);
+  mlir::Value createMask(llvm::function_ref<bool(int64_t)> holds);
+  llvm::SmallVector<mlir::Value> getAll(mlir::ValueRange values);
 
   // Control flow.
   /// The lanes that have something to do, where so many iterations are left.

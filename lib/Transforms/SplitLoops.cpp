@@ -162,14 +162,16 @@ scf::ForOp piko::convertLoop(ParallelLoopOpInterface loop) {
   return convertFor(cast<ParallelForOp>(*loop));
 }
 
-/// Whether iterations may be the lanes of one vector, which have reductions.
+/// Whether iterations may be the lanes of one vector, which have reductions,
+/// scans and sorts.
 static bool fitsLanes(ParallelForOp parallel, int64_t most) {
   std::optional<int64_t> count = getConstantIntValue(parallel.getCount());
   if (!count || *count < 2 || *count > most)
     return false;
   WalkResult result = parallel.walk([](BarrierOpInterface barrier) {
-    return isa<SyncOp, ReduceOp>(*barrier) ? WalkResult::advance()
-                                           : WalkResult::interrupt();
+    return isa<SyncOp, ReduceOp, ScanOp, SortOp>(*barrier)
+               ? WalkResult::advance()
+               : WalkResult::interrupt();
   });
   return !result.wasInterrupted();
 }

@@ -37,6 +37,7 @@
 // RUN: pikoc %s --pipe Emits --no-cache --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=LANES
 // RUN: pikoc %s --pipe Cells --no-cache --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=LANES
 // RUN: pikoc %s --pipe Corners --no-cache --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=LANES
+// RUN: pikoc %s --pipe Scans --no-cache --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=LANES
 // LANES: remark: these iterations are vectorized for 16 at once
 // RUN: pikoc %s --pipe Sums --no-cache --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=FEW
 // FEW: remark: these iterations are vectorized for 16 at once
@@ -337,7 +338,7 @@ struct ChangerOfItems : Alone<Particle, Particle> {
 };
 struct ChangesOfItems : Emitting<ChangerOfItems> {};
 
-// Barriers that lanes do not have.
+// Scans and sorts.
 struct Scanner : Alone<> {
   void process(const Particle &p) {
     parallelFor(16, [&](int i) {

@@ -373,8 +373,9 @@ def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
 
     A parallel loop whose iterations meet, of which `piko-split-loops` has left
     those that a vector has lanes for, on any processor, becomes lanes in lockstep:
-    a barrier needs no code, a reduction is one of a vector's lanes, and what
-    iterations agree on stays scalar, private arrays included. Where iterations may
+    a barrier needs no code, a reduction is one of a vector's lanes, a scan joins
+    shuffled blocks of them, a sort counts how many keys come before each, and
+    what iterations agree on stays scalar, private arrays included. Where iterations may
     part ways around a barrier, or emit or update pixels in front of one, it is
     cut as `piko-split-loops` cuts others, and the pieces are looked at.
 
