@@ -42,5 +42,10 @@ std::shared_ptr<clang::CompilerInvocation> piko::createClangInvocation(
     argv.push_back(argument.c_str());
   clang::CreateInvocationOptions createOptions;
   createOptions.Diags = diagnostics;
-  return clang::createInvocation(argv, createOptions);
+  std::shared_ptr<clang::CompilerInvocation> invocation =
+      clang::createInvocation(argv, createOptions);
+  // It points to the first argument, which ends here.
+  if (invocation)
+    invocation->getCodeGenOpts().Argv0 = "clang";
+  return invocation;
 }
