@@ -156,6 +156,7 @@ struct Images {
 struct Test : piko::Stage<8, 8, 64, Fragment>, piko::Uses<Images> {
   static glm::ivec2 at(const Fragment &f) { return {f.x & 31, f.y & 31}; }
   void assignBin(const Fragment &f) { assignToBin(f, binFromPosition(at(f))); }
+  void schedule(piko::BinId) { specifyLanes(piko::Lanes::Items); }
   void process(const Fragment &f) {
     bool passed = false;
     float old = 0;
