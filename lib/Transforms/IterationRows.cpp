@@ -57,8 +57,8 @@ Value IterationLanes::findLimited(Operation *op) const {
 void IterationWriter::writeLimited(LoadOp load, Value limited) {
   Value number = get(limited);
   auto type = cast<VectorType>(number.getType());
-  Value steps = vector::StepOp::create(
-      builder, loc, VectorType::get(laneCount, builder.getIndexType()));
+  Value steps = vector::StepOp::create(builder, loc,
+                                       getVectorType(builder.getIndexType()));
   if (!type.getElementType().isIndex())
     steps = arith::IndexCastOp::create(builder, loc, type, steps);
   Value first = vector::ExtractOp::create(builder, loc, number, 0);

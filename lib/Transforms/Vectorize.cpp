@@ -183,10 +183,6 @@ bool Candidate::decide(const IterationLanes &lanes) {
     refuse() << "iterations of a loop in it are" << otherwise;
     return false;
   }
-  if (!said && ofPrimitives && isFasterInside(lanes, cost)) {
-    refuse() << "iterations of a loop in it are" << otherwise;
-    return false;
-  }
   InFlightDiagnostic remark = loop.emitRemark();
   if (ofPrimitives)
     remark << "stage '" << getKernelStage(loop).getSymName()
