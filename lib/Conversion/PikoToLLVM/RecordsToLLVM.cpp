@@ -160,6 +160,14 @@ SmallVector<Value> RecordReader::readPieces(ArrayRef<int64_t> pieces) {
   return values;
 }
 
+/// The addresses of lanes as integers of 64 bits.
+static Value toIntegers(OpBuilder &builder, Location loc, Value addresses) {
+  auto type = cast<VectorType>(addresses.getType());
+  return arith::IndexCastOp::create(
+      builder, loc, VectorType::get(type.getShape(), builder.getI64Type()),
+      addresses);
+}
+
 struct LaneGetFieldsLowering : Lowering<LaneGetFieldsOp> {
   using Lowering::Lowering;
   LogicalResult
@@ -167,10 +175,8 @@ struct LaneGetFieldsLowering : Lowering<LaneGetFieldsOp> {
                   ConversionPatternRewriter &rewriter) const override {
     Location loc = op.getLoc();
     Value mask = adaptor.getMask();
-    auto words = VectorType::get(cast<VectorType>(mask.getType()).getShape(),
-                                 rewriter.getI64Type());
-    Value addresses = arith::IndexCastOp::create(rewriter, loc, words,
-                                                 adaptor.getAddresses());
+    Value addresses = toIntegers(rewriter, loc, adaptor.getAddresses());
+    int64_t laneCount = cast<VectorType>(addresses.getType()).getNumElements();
     RecordOp record = context.record(op.getRecordAttr());
     SmallVector<FieldAttr> fields;
     bool areWords = true;
@@ -180,7 +186,7 @@ struct LaneGetFieldsLowering : Lowering<LaneGetFieldsOp> {
                   fields.back().getOffset() % wordSize == 0;
     }
     SmallVector<int64_t> pieces;
-    if (areWords && words.getNumElements() % pieceWords == 0)
+    if (areWords && laneCount % pieceWords == 0)
       pieces = planPieces(fields, record.getSize());
     if (pieces.empty()) {
       rewriter.replaceOp(op, RecordReader(rewriter, loc, addresses, mask,
@@ -314,10 +320,8 @@ struct LaneSetFieldsLowering : Lowering<LaneSetFieldsOp> {
                   ConversionPatternRewriter &rewriter) const override {
     Location loc = op.getLoc();
     Value mask = adaptor.getMask();
-    auto words = VectorType::get(cast<VectorType>(mask.getType()).getShape(),
-                                 rewriter.getI64Type());
-    Value addresses = arith::IndexCastOp::create(rewriter, loc, words,
-                                                 adaptor.getAddresses());
+    Value addresses = toIntegers(rewriter, loc, adaptor.getAddresses());
+    int64_t laneCount = cast<VectorType>(addresses.getType()).getNumElements();
     SmallVector<FieldAttr> fields = getFields(op);
     auto scatterAll = [&](OpBuilder &builder) {
       RecordWriter writer(builder, loc, addresses, mask);
@@ -325,7 +329,7 @@ struct LaneSetFieldsLowering : Lowering<LaneSetFieldsOp> {
         writer.scatter(value, field);
     };
     SmallVector<Run> runs;
-    if (words.getNumElements() % pieceWords == 0)
+    if (laneCount % pieceWords == 0)
       runs = planRuns(fields, adaptor.getValues());
     if (runs.size() < fields.size()) {
       Value all = vector::ReductionOp::create(rewriter, loc,
