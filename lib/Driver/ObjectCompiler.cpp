@@ -246,8 +246,11 @@ static Files openFiles(const CompileOptions &source) {
   return files;
 }
 
-std::optional<CompiledObject> piko::compileObject(const ObjectOptions &options,
+std::optional<CompiledObject> piko::compileObject(const ObjectOptions &given,
                                                   std::string &diagnostics) {
+  ObjectOptions options = given;
+  options.source.synthesis =
+      options.target.leaveOutUnseen(options.source.synthesis);
   llvm::Expected<std::vector<Processor>> processors = resolveProcessors(
       options.target.cpu, llvm::Triple(llvm::sys::getProcessTriple()));
   if (!processors) {

@@ -75,6 +75,15 @@ struct TargetOptions {
     options.slpVectorize &= synthesis.has("slp-vectorizer");
     return options;
   }
+
+  /// Without vectors, if the code is for the thread sanitizer, which does not
+  /// see what they access by gathers, scatters and masks.
+  SynthesisOptions leaveOutUnseen(SynthesisOptions synthesis) const {
+    if (sanitizer == Sanitizer::Thread)
+      for (const char *pass : {"vectorize", "loop-vectorize", "slp-vectorizer"})
+        synthesis.without.push_back(pass);
+    return synthesis;
+  }
 };
 
 } // namespace piko

@@ -169,18 +169,18 @@ Program Programs::compile(const std::string &pipe) {
   llvm::Expected<Processor> processor = resolveProcessor(self->cpu);
   if (!processor)
     throw std::runtime_error(llvm::toString(processor.takeError()));
-  if (!module ||
-      failed(lowerPipeline(*module, Level::LLVM, self->check, self->synthesis,
-                           self->gpu, {.lanes = processor->lanes})))
+  TargetOptions target{self->cpu, /*optLevel=*/3, JITCode::getSanitizer()};
+  if (!module || failed(lowerPipeline(*module, Level::LLVM, self->check,
+                                      target.leaveOutUnseen(self->synthesis),
+                                      self->gpu, {.lanes = processor->lanes})))
     self->log.fail("cannot compile " + pipe);
   auto context = std::make_unique<llvm::LLVMContext>();
   std::unique_ptr<llvm::Module> llvmModule =
       translateToLLVMIR(*module, *context);
   if (!llvmModule)
     self->log.fail("cannot compile " + pipe);
-  llvm::Expected<std::string> object = generateCode(
-      *llvmModule, {self->cpu, /*optLevel=*/3, JITCode::getSanitizer()},
-      CodeFormat::Object);
+  llvm::Expected<std::string> object =
+      generateCode(*llvmModule, target, CodeFormat::Object);
   if (!object)
     throw std::runtime_error(llvm::toString(object.takeError()));
   std::shared_ptr<JITCode> code = load(*object);

@@ -66,8 +66,14 @@ private:
 
   static void handle(int, siginfo_t *info, void *) {
     DivisionTrap *trap = current();
-    if (trap && info->si_code == FPE_INTDIV)
+    if (trap && info->si_code == FPE_INTDIV) {
+      // A sanitizer calls this from a handler of its own, which blocks it.
+      sigset_t signal;
+      sigemptyset(&signal);
+      sigaddset(&signal, SIGFPE);
+      pthread_sigmask(SIG_UNBLOCK, &signal, nullptr);
       siglongjmp(trap->back, 1);
+    }
     // Not ours: the instruction runs again, and traps again.
     sigaction(SIGFPE, &previous(), nullptr);
   }
