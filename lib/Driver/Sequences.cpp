@@ -126,10 +126,6 @@ static void addUnitsToLoops(OpPassManager &passes,
     passes.nest<PipelineOp>().addPass(createThreadJumps());
     addCleanUp(passes);
   }
-  if (options.has("narrow-integers")) {
-    passes.nest<PipelineOp>().addPass(createNarrowIntegers());
-    addCleanUp(passes);
-  }
 }
 
 void piko::addScalarSequence(OpPassManager &passes,
@@ -150,6 +146,12 @@ void piko::addScalarSequence(OpPassManager &passes,
 void piko::addVectorSequence(OpPassManager &passes,
                              const SynthesisOptions &options,
                              const CPUOptions &cpu) {
+  if (options.has("narrow-integers")) {
+    NarrowIntegersOptions narrow;
+    narrow.laneCount = options.has("vectorize") ? cpu.lanes : 0;
+    passes.nest<PipelineOp>().addPass(createNarrowIntegers(narrow));
+    addCleanUp(passes);
+  }
   if (options.has("vectorize")) {
     VectorizeOptions vectors;
     vectors.laneCount = cpu.lanes;

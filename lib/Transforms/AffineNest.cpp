@@ -57,30 +57,29 @@ bool AffineNest::isAffine(Value value) {
   return result;
 }
 
+bool AffineNest::isVariable(Value value) {
+  return llvm::any_of(
+      loops, [&](scf::ForOp loop) { return loop.getInductionVar() == value; });
+}
+
 bool AffineNest::computeIsAffine(Value value) {
-  if (isInvariant(value))
-    return value.getType().isInteger(64);
+  if (!value.getType().isInteger(64) && !value.getType().isInteger(32))
+    return false;
+  if (isInvariant(value) || isVariable(value))
+    return true;
   if (auto argument = dyn_cast<BlockArgument>(value)) {
     auto loop = dyn_cast<scf::ForOp>(argument.getOwner()->getParentOp());
-    if (!loop || !llvm::is_contained(loops, loop) ||
-        !value.getType().isInteger(64))
+    if (!loop || !llvm::is_contained(loops, loop))
       return false;
-    if (argument == loop.getInductionVar())
-      return true;
     Value increment = getIncrement(argument, loop);
     return increment && isInvariant(increment) &&
            isAffine(loop.getTiedLoopInit(argument)->get());
   }
   Operation *op = value.getDefiningOp();
-  if (isa<arith::ExtSIOp, arith::IndexCastOp>(op)) {
-    Value variable = op->getOperand(0);
-    return value.getType().isInteger(64) &&
-           llvm::any_of(loops, [&](scf::ForOp loop) {
-             return loop.getInductionVar() == variable;
-           });
-  }
-  if (!value.getType().isInteger(64))
-    return false;
+  if (isa<arith::ExtSIOp>(op))
+    return isAffine(op->getOperand(0));
+  if (isa<arith::IndexCastOp>(op))
+    return value.getType().isInteger(64) && isVariable(op->getOperand(0));
   if (isa<arith::AddIOp, arith::SubIOp>(op))
     return isAffine(op->getOperand(0)) && isAffine(op->getOperand(1));
   if (isComplement(op))
@@ -116,13 +115,13 @@ Affine AffineNest::subtract(Affine a, const Affine &b) {
   return a;
 }
 
-Value AffineNest::extend(Value bound) {
+Value AffineNest::extend(Value number) {
   Type wide = builder.getI64Type();
-  if (bound.getType().isIndex())
-    return arith::IndexCastOp::create(builder, loc, wide, bound);
-  if (bound.getType() != wide)
-    return arith::ExtSIOp::create(builder, loc, wide, bound);
-  return bound;
+  if (number.getType().isIndex())
+    return arith::IndexCastOp::create(builder, loc, wide, number);
+  if (number.getType() != wide)
+    return arith::ExtSIOp::create(builder, loc, wide, number);
+  return number;
 }
 
 /// Of a variable that grows by one: what it is at the first iteration is its
@@ -136,7 +135,7 @@ Affine AffineNest::expandArgument(BlockArgument argument) {
     result.coefficients[number] = makeConstant(1);
     return result;
   }
-  Value increment = getIncrement(argument, loop);
+  Value increment = extend(getIncrement(argument, loop));
   Value lower = extend(loop.getLowerBound());
   result = expand(loop.getTiedLoopInit(argument)->get());
   result.base = getTwo(false, result.base,
@@ -156,14 +155,20 @@ Affine AffineNest::expand(Value value) {
 
 Affine AffineNest::computeExpansion(Value value) {
   if (isInvariant(value))
-    return {value, {}};
+    return {extend(value), {}};
   if (auto argument = dyn_cast<BlockArgument>(value))
     return expandArgument(argument);
   Operation *op = value.getDefiningOp();
-  if (isa<arith::ExtSIOp, arith::IndexCastOp>(op))
-    return expandArgument(cast<BlockArgument>(op->getOperand(0)));
+  if (isa<arith::ExtSIOp, arith::IndexCastOp>(op)) {
+    Value number = op->getOperand(0);
+    if (isVariable(number))
+      return expandArgument(cast<BlockArgument>(number));
+    Affine narrow = expand(number);
+    assumed.push_back(narrow);
+    return narrow;
+  }
   if (matchPattern(value, m_Constant()))
-    return {builder.clone(*op)->getResult(0), {}};
+    return {extend(builder.clone(*op)->getResult(0)), {}};
   if (isa<arith::AddIOp, arith::SubIOp>(op)) {
     bool isSum = isa<arith::AddIOp>(op);
     Affine a = expand(op->getOperand(0)), b = expand(op->getOperand(1));
@@ -185,6 +190,7 @@ Affine AffineNest::computeExpansion(Value value) {
   Value factor = op->getOperand(isFirst ? 1 : 0);
   if (!isInvariant(factor))
     factor = builder.clone(*factor.getDefiningOp())->getResult(0);
+  factor = extend(factor);
   auto scale = [&](Value &x) {
     if (!x)
       return;
@@ -256,6 +262,8 @@ void AffineNest::require(Value value, int bits, Value &fits) {
 // A base of 62 bits, steps of 32 and variables of 28 make what is computed
 // here, so that nothing of it overflows.
 AffineNest::Range AffineNest::addCheck(const Affine &affine, Value &fits) {
+  for (const Affine &narrow : std::exchange(assumed, {}))
+    addCheck(narrow, fits);
   Value least = affine.base ? affine.base : makeConstant(0);
   require(least, 62, fits);
   Value most = least;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// 64-bit affine functions of the pixel, in a loop over the pixels of a row and
-// the loop over rows around it; and tests in front of the loops of what values
-// such functions have in them.
+// Affine functions of the pixel, in a loop over the pixels of a row and the
+// loop over rows around it; and tests in front of the loops of what values such
+// functions have in them.
 
 #ifndef PIKO_LIB_TRANSFORMS_AFFINENEST_H
 #define PIKO_LIB_TRANSFORMS_AFFINENEST_H
@@ -13,7 +13,8 @@
 
 namespace piko {
 
-/// base + coefficients[i] * variable i, modulo 2^64; null for 0.
+/// base + coefficients[i] * variable i, modulo 2^64; null for 0. All of these
+/// numbers have 64 bits.
 struct Affine {
   mlir::Value base;
   std::array<mlir::Value, 2> coefficients;
@@ -33,8 +34,10 @@ public:
   bool isInvariant(mlir::Value value) const {
     return !outer->isAncestor(value.getParentRegion()->getParentOp());
   }
+  /// Whether a number of 32 or 64 bits is a function that `expand` knows.
   bool isAffine(mlir::Value value);
 
+  /// Of 32 bits, the number itself if that has as many: see `addCheck`.
   Affine expand(mlir::Value value);
   Affine subtract(Affine a, const Affine &b);
   /// Without the bits that all coefficients have as 0, and without those of the
@@ -47,7 +50,8 @@ public:
     mlir::Value least, most;
   };
   /// Extends a test, null at first, by whether a function fits into 32 bits at
-  /// the corners of the loops' domain, hence at all pixels.
+  /// the corners of the loops' domain, hence at all pixels; and those of 32
+  /// bits that others were expanded from, which do not overflow then.
   Range addCheck(const Affine &affine, mlir::Value &fits);
   /// Extends a test by whether a number has so many bits, with its sign.
   void require(mlir::Value value, int bits, mlir::Value &fits);
@@ -60,17 +64,20 @@ public:
   mlir::Location loc;
 
 private:
+  bool isVariable(mlir::Value value);
   bool computeIsAffine(mlir::Value value);
   Affine computeExpansion(mlir::Value value);
   Affine expandArgument(mlir::BlockArgument argument);
-  /// A bound of a loop in 64 bits.
-  mlir::Value extend(mlir::Value bound);
+  /// A signed number in 64 bits.
+  mlir::Value extend(mlir::Value number);
 
   mlir::scf::ForOp row, outer;
   llvm::SmallVector<mlir::scf::ForOp, 2> loops;
   // What is known of values, which may be used more than once.
   llvm::DenseMap<mlir::Value, bool> affine;
   llvm::DenseMap<mlir::Value, Affine> expanded;
+  /// Functions of 32 bits that are extended, and not yet tested.
+  llvm::SmallVector<Affine> assumed;
 };
 
 } // namespace piko

@@ -382,17 +382,25 @@ void IterationWriter::write(OpBuilder::InsertPoint place) {
   builder.restoreInsertionPoint(place);
   Value upper = loop.getUpperBound();
   Type type = upper.getType();
-  auto constant = [&](int64_t value) -> Value {
-    return arith::ConstantOp::create(builder, loc,
-                                     builder.getIntegerAttr(type, value));
-  };
-  auto made = scf::ForOp::create(builder, loc, loop.getLowerBound(), upper,
-                                 constant(laneCount));
-  outermost = made;
+  Value first = loop.getLowerBound();
+  Block *body;
+  if (isOneVector(loop, laneCount)) {
+    Value isAny = arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::slt,
+                                        first, upper);
+    auto made = scf::IfOp::create(builder, loc, isAny, /*withElse=*/false);
+    outermost = made;
+    body = made.thenBlock();
+  } else {
+    Value step = arith::ConstantOp::create(
+        builder, loc, builder.getIntegerAttr(type, laneCount));
+    auto made = scf::ForOp::create(builder, loc, first, upper, step);
+    outermost = made;
+    body = made.getBody();
+    first = made.getInductionVar();
+  }
   loop.walk([&](memref::AllocaOp array) { writePrivate(array); });
-  builder.setInsertionPointToStart(made.getBody());
+  builder.setInsertionPointToStart(body);
   // Step by what is left: a number behind the last may be too large.
-  Value first = made.getInductionVar();
   firsts.map(loop.getInductionVar(), first);
   Value steps = vector::StepOp::create(builder, loc,
                                        getVectorType(builder.getIndexType()));

@@ -23,6 +23,21 @@ bool piko::isLaneType(Type type) {
   return isNumber(type) || isa<PrimType>(type);
 }
 
+bool piko::isOneVector(scf::ForOp loop, int64_t laneCount) {
+  auto least = loop.getUpperBound().getDefiningOp<arith::MinSIOp>();
+  if (!least)
+    return false;
+  return llvm::any_of(least->getOperands(), [&](Value bound) {
+    auto behind = bound.getDefiningOp<arith::AddIOp>();
+    std::optional<int64_t> width =
+        behind ? getConstantIntValue(behind.getRhs()) : std::nullopt;
+    return width && *width <= laneCount &&
+           behind.getLhs() == loop.getLowerBound() &&
+           bitEnumContainsAll(behind.getOverflowFlags(),
+                              arith::IntegerOverflowFlags::nsw);
+  });
+}
+
 bool piko::isPrefetch(Operation *op) {
   return isa<PrefetchOp, PrefetchItemOp>(op);
 }

@@ -199,11 +199,15 @@ bool isPrefetch(mlir::Operation *op);
 /// lanes read it right away.
 bool asksAhead(mlir::scf::ForOp loop);
 
-/// Whether it may trap, or takes as long for one lane as for all.
+/// Whether a loop turns no more often than there are lanes, as one over a
+/// strip.
+bool isOneVector(mlir::scf::ForOp loop, int64_t laneCount);
+
 /// The name of the array of pixels (`marks::pixels`) that a store changes, or
 /// null.
 mlir::Attribute getPixels(mlir::memref::StoreOp store);
 
+/// Whether it may trap, or takes as long for one lane as for all.
 bool isDivision(mlir::Operation *op);
 /// Whether it is one of 32 bits for which floats of 64 bits are divided.
 bool isDividedAsFloats(mlir::Operation *op);

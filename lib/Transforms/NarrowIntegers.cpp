@@ -5,12 +5,14 @@
 
 #include "AffineNest.h"
 #include "Lanes.h"
+#include "RowStrips.h"
 
 #include "Piko/Transforms/Passes.h"
 
 #include "Piko/Dialect/Piko/IR/Marks.h"
 
 #include "mlir/Dialect/Arith/IR/Arith.h"
+#include "mlir/Dialect/MemRef/IR/MemRef.h"
 #include "mlir/Dialect/SCF/IR/SCF.h"
 #include "mlir/IR/IRMapping.h"
 #include "mlir/IR/Matchers.h"
@@ -28,6 +30,7 @@ using namespace piko;
 namespace {
 
 struct NarrowIntegersPass : piko::impl::NarrowIntegersBase<NarrowIntegersPass> {
+  using NarrowIntegersBase::NarrowIntegersBase;
   void runOnOperation() override;
 };
 
@@ -74,16 +77,30 @@ struct Version {
   llvm::DenseMap<size_t, Value> leaves;
 };
 
+/// A leaf without whose sign a pixel has nothing to do.
+struct RequiredSign {
+  size_t leaf;
+  bool isNegative;
+};
+
 /// The comparisons and conversions of a loop over pixels.
 class Narrower {
 public:
-  explicit Narrower(scf::ForOp row) : nest(row) {}
+  /// With strips of so many columns, or none if 0.
+  Narrower(scf::ForOp row, int64_t stripWidth)
+      : nest(row), stripWidth(stripWidth) {}
 
   /// Makes further versions of the loops, as far as there is a use.
   void narrow();
 
-  int64_t comparisons() const { return tests.size(); }
+  /// Of 64 bits.
+  int64_t comparisons() const {
+    return llvm::count_if(tests, [](SignTest test) {
+      return test.compare.getLhs().getType().isInteger(64);
+    });
+  }
   int64_t values() const { return conversions.size(); }
+  bool areInterchanged() const { return !required.empty(); }
 
 private:
   bool isTree(Value value);
@@ -96,6 +113,11 @@ private:
   void prepareConversion(arith::SIToFPOp op);
 
   void findConversions();
+
+  void findRequired(Block &block);
+  void requireCondition(Value condition);
+  void requireTree(Value tree, bool isNegative);
+  void makeStrips(Version &version);
 
   scf::IfOp choose(Value fits);
   void makeVersions();
@@ -111,6 +133,9 @@ private:
   SmallVector<SignTest> tests;
   SmallVector<Conversion> conversions;
   SmallVector<Narrow> leaves;
+  SmallVector<RequiredSign> required; ///< none where there are no strips
+  int64_t stripWidth;
+  bool mayHaveStrips = false;
   size_t signLeaves = 0; ///< The first ones, which comparisons need.
   llvm::DenseMap<Value, bool> trees;
   llvm::DenseSet<Value> collected;
@@ -141,7 +166,8 @@ std::optional<SignTest> Narrower::matchTest(arith::CmpIOp compare) {
   Value lhs = compare.getLhs(), rhs = compare.getRhs();
   bool isSigned = predicate == P::slt || predicate == P::sle ||
                   predicate == P::sgt || predicate == P::sge;
-  if (!isSigned || !lhs.getType().isInteger(64) ||
+  bool isNarrow = lhs.getType().isInteger(32);
+  if (!isSigned || (isNarrow ? !mayHaveStrips : !lhs.getType().isInteger(64)) ||
       (nest.isInvariant(lhs) && nest.isInvariant(rhs)))
     return {};
   APInt bound;
@@ -201,15 +227,17 @@ size_t Narrower::prepare(const Leaf &leaf, Value &fits) {
   if (known != leaves.end())
     return known - leaves.begin();
   // What a difference is made of must not overflow, either.
+  bool isNarrow = leaf.plus.getType().isInteger(32);
   if (leaf.minus)
     for (Value part : {leaf.plus, leaf.minus}) {
       Affine affine = nest.expand(part);
-      nest.shiftDown(affine);
+      if (!isNarrow)
+        nest.shiftDown(affine);
       nest.addCheck(affine, fits);
     }
   Narrow narrow{leaf, getAffine(leaf), {}, 0, {}, {}, {}};
   narrow.shifted = narrow.whole;
-  narrow.zeros = nest.shiftDown(narrow.shifted);
+  narrow.zeros = isNarrow ? 0 : nest.shiftDown(narrow.shifted);
   narrow.range = nest.addCheck(narrow.shifted, fits);
   auto cutOne = [&](Value value) {
     return value ? cut(nest.builder, nest.loc, value) : value;
@@ -296,7 +324,14 @@ Value Narrower::writeLeaf(size_t number, Version &version) {
     if (!step)
       continue;
     if (loop != version.loops.back()) {
+      // What others carry are arguments of the loop that is made anew.
+      SmallVector<std::pair<size_t, unsigned>> carried;
+      for (auto [other, value] : version.leaves)
+        if (auto argument = dyn_cast_or_null<BlockArgument>(value))
+          carried.push_back({other, argument.getArgNumber()});
       sum = carryOverRows(loop, sum, step);
+      for (auto [other, argument] : carried)
+        version.leaves[other] = loop.getBody()->getArgument(argument);
       continue;
     }
     OpBuilder body = OpBuilder::atBlockBegin(loop.getBody());
@@ -360,6 +395,73 @@ void Narrower::narrowConversions(Version &version) {
 }
 
 //===----------------------------------------------------------------------===//
+// Strips
+//===----------------------------------------------------------------------===//
+
+void Narrower::requireTree(Value tree, bool isNegative) {
+  if (nest.isAffine(tree)) {
+    required.push_back({prepare({tree, {}}, signsFit), isNegative});
+    return;
+  }
+  Operation *op = tree.getDefiningOp();
+  bool areBoth = isNegative ? isa<arith::AndIOp, arith::MaxSIOp>(op)
+                            : isa<arith::OrIOp, arith::MinSIOp>(op);
+  if (areBoth)
+    for (Value operand : op->getOperands())
+      requireTree(operand, isNegative);
+}
+
+/// What has to be where a condition holds.
+void Narrower::requireCondition(Value condition) {
+  Operation *op = condition.getDefiningOp();
+  auto choice = dyn_cast_or_null<arith::SelectOp>(op);
+  bool isBoth = choice && matchPattern(choice.getFalseValue(), m_Zero());
+  if (isBoth || isa_and_nonnull<arith::AndIOp>(op)) {
+    requireCondition(op->getOperand(0));
+    requireCondition(op->getOperand(1));
+    return;
+  }
+  auto *test = llvm::find_if(
+      tests, [&](const SignTest &test) { return test.compare == op; });
+  if (test == tests.end())
+    return;
+  if (test->tree)
+    requireTree(test->tree, test->isNegative);
+  else
+    required.push_back({prepare(test->leaf, signsFit), test->isNegative});
+}
+
+/// Of a block that does nothing but what stands behind one condition, what that
+/// takes.
+void Narrower::findRequired(Block &block) {
+  scf::IfOp only;
+  for (Operation &op : block.without_terminator()) {
+    if (isPure(&op))
+      continue;
+    auto choice = dyn_cast<scf::IfOp>(op);
+    if (only || !choice || choice.getNumResults() > 0 || choice.elseBlock())
+      return;
+    only = choice;
+  }
+  if (!only)
+    return;
+  requireCondition(only.getCondition());
+  findRequired(*only.thenBlock());
+}
+
+void Narrower::makeStrips(Version &version) {
+  if (required.empty())
+    return;
+  SmallVector<HalfPlane> planes;
+  for (RequiredSign sign : required) {
+    const Narrow &leaf = leaves[sign.leaf];
+    planes.push_back(
+        {leaf.base, leaf.steps[0], leaf.steps[1], sign.isNegative});
+  }
+  interchange(version.loops.front(), version.loops.back(), planes, stripWidth);
+}
+
+//===----------------------------------------------------------------------===//
 // Versions
 //===----------------------------------------------------------------------===//
 
@@ -404,11 +506,13 @@ void Narrower::makeVersions() {
     finish(choice.thenBlock(), inner);
     Version signs = copy(inner.elseBlock());
     narrowTests(signs);
+    makeStrips(signs);
     narrowest = inner.thenBlock();
   }
   Version version = copy(narrowest);
   narrowTests(version);
   narrowConversions(version);
+  makeStrips(version);
   // The wide version is the old one.
   outer->replaceAllUsesWith(choice.getResults());
   finish(choice.elseBlock(), outer);
@@ -442,6 +546,8 @@ void Narrower::narrow() {
       nest.getLoops(), [](scf::ForOp loop) { return loop.getUnsignedCmp(); });
   if (!matchPattern(nest.getRow().getStep(), m_One()) || isUnsigned)
     return;
+  mayHaveStrips = stripWidth != 0 && nest.getLoops().size() == 2 &&
+                  canInterchange(outer, nest.getRow());
   outer.walk([&](arith::CmpIOp compare) {
     if (std::optional<SignTest> test = matchTest(compare))
       tests.push_back(*test);
@@ -454,12 +560,57 @@ void Narrower::narrow() {
   }
   signLeaves = leaves.size();
   findConversions();
-  if (tests.empty() && conversions.empty())
+  if (mayHaveStrips) {
+    findRequired(*nest.getRow().getBody());
+    // Of what bounds are upright, rows are as full as strips, and lie in order.
+    if (llvm::none_of(required, [&](RequiredSign sign) {
+          return leaves[sign.leaf].steps[0] && leaves[sign.leaf].steps[1];
+        }))
+      required.clear();
+  }
+  if (comparisons() == 0 && conversions.empty() && required.empty()) {
+    tests.clear();
     return;
-  outer.emitRemark("where they fit, ")
-      << tests.size() << " comparisons and " << conversions.size()
-      << " conversions of these iterations take 32 bits instead of 64";
+  }
+  if (comparisons() != 0 || !conversions.empty())
+    outer.emitRemark("where they fit, ")
+        << comparisons() << " comparisons and " << conversions.size()
+        << " conversions of these iterations take 32 bits instead of 64";
+  if (!required.empty())
+    outer.emitRemark("where they fit into 32 bits, ")
+        << required.size() << " comparisons bound the rows of each strip of "
+        << stripWidth << " columns";
   makeVersions();
+}
+
+/// Moves out of a loop what it reads of local arrays that it does not change,
+/// at places that are known.
+static void hoistLoads(scf::ForOp loop) {
+  SmallVector<memref::LoadOp> loads;
+  loop.walk([&](memref::LoadOp load) {
+    auto array = load.getMemRef().getDefiningOp<memref::AllocaOp>();
+    if (!array || loop->isAncestor(array))
+      return;
+    bool isInside =
+        llvm::all_of(llvm::zip(load.getIndices(), array.getType().getShape()),
+                     [](auto pair) {
+                       std::optional<int64_t> at =
+                           getConstantIntValue(std::get<0>(pair));
+                       return at && *at >= 0 && *at < std::get<1>(pair);
+                     });
+    bool isRead = llvm::all_of(array->getUsers(), [&](Operation *user) {
+      return isa<memref::LoadOp>(user) ||
+             (isa<memref::StoreOp>(user) && !loop->isAncestor(user));
+    });
+    if (isInside && isRead)
+      loads.push_back(load);
+  });
+  for (memref::LoadOp load : loads) {
+    for (Value index : load.getIndices())
+      if (!loop.isDefinedOutsideOfLoop(index))
+        index.getDefiningOp()->moveBefore(loop);
+    load->moveBefore(loop);
+  }
 }
 
 void NarrowIntegersPass::runOnOperation() {
@@ -474,12 +625,17 @@ void NarrowIntegersPass::runOnOperation() {
   });
   for (scf::ForOp row : rows) {
     // So that what is the same for all pixels stands in front.
+    hoistLoads(row);
     moveLoopInvariantCode(cast<LoopLikeOpInterface>(row.getOperation()));
-    if (auto parent = dyn_cast<LoopLikeOpInterface>(row->getParentOp()))
+    if (auto parent = dyn_cast<LoopLikeOpInterface>(row->getParentOp())) {
+      if (auto rows = dyn_cast<scf::ForOp>(row->getParentOp()))
+        hoistLoads(rows);
       moveLoopInvariantCode(parent);
-    Narrower narrower(row);
+    }
+    Narrower narrower(row, laneCount);
     narrower.narrow();
     comparisons += narrower.comparisons();
     values += narrower.values();
+    interchanged += narrower.areInterchanged();
   }
 }

@@ -84,6 +84,8 @@ static scf::ForOp convertPixels(ParallelPixelsOp pixels) {
                               pixels.getHi()[dim], one);
     cell[dim] = loop.getInductionVar();
     rewriter.setInsertionPoint(loop.getBody()->getTerminator());
+    if (dim > 0)
+      loop->setAttr(marks::rows, rewriter.getUnitAttr());
   }
   loop->setAttr(marks::lanes, rewriter.getUnitAttr());
   Block *body = pixels.getBodyBlock();

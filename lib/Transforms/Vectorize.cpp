@@ -345,7 +345,7 @@ void VectorizePass::vectorize(const IterationLanes &lanes) {
     for (scf::WhileOp turns : writer.getTurnLoops())
       vectorizeLoops(turns);
   };
-  if (isOverPrimitives(loop)) {
+  if (isOverPrimitives(loop) || isOneVector(loop, laneCount)) {
     // A second body would take longer to compile than it saves.
     write();
     loop.erase();

@@ -278,6 +278,12 @@ def NarrowIntegers : Pass<"piko-narrow-integers", "::piko::PipelineOp"> {
     if both have the same steps: a bias for points on an edge does not matter. A
     remark says how many comparisons and conversions there are.
 
+    With `lanes`, loops over rows of which a pixel has something to do only where
+    such functions have one sign are strip-mined and interchanged: a strip has as
+    many columns as there are lanes, and around the loop over its rows stands what
+    finds which of them the half-planes of all edges reach. So hardly any vector
+    is empty, and what a branch decides changes once a strip, not once a row.
+
     **Guarantees** the same outcome of each comparison, and the same number, also
     where 64 bits overflow: such functions do not pass the test.
 
@@ -310,13 +316,20 @@ def NarrowIntegers : Pass<"piko-narrow-integers", "::piko::PipelineOp"> {
     **Limits**: loops with a step other than one, and comparisons of what is not
     affine, stay as they are. Loops of more than 200 operations have no third
     version, and a remark says so. What else an edge function is used for is
-    computed in 64 bits.
+    computed in 64 bits. Loops are interchanged if their pixels may be visited in
+    any order (`piko.rows`), and access no element but their own of what they
+    change.
   }];
+  let options = [
+    Option<"laneCount", "lanes", "int64_t", /*default=*/"0",
+           "lanes of a vector, which a strip has as columns; 0: no strips">];
   let statistics = [
     Statistic<"comparisons", "comparisons", "comparisons that have a form in 32 "
               "bits">,
     Statistic<"values", "values", "conversions to floating point that have a "
-              "form in 32 bits">];
+              "form in 32 bits">,
+    Statistic<"interchanged", "interchanged", "loops over rows that are inside "
+              "of loops over strips">];
 }
 
 def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {

@@ -13,6 +13,9 @@ namespace piko::marks {
 
 /// A loop whose turns lanes may share: over primitives or iterations.
 constexpr llvm::StringLiteral lanes = "piko.lanes";
+/// A loop over rows of pixels, around one whose turns lanes may share: all of
+/// these pixels may be visited in any order.
+constexpr llvm::StringLiteral rows = "piko.rows";
 /// What lanes are given, a `LaneMappingAttr`, of a loop over primitives.
 constexpr llvm::StringLiteral mapping = "piko.mapping";
 /// How threads share the loop over units of work, a `UnitLoopAttr`.
