@@ -61,6 +61,7 @@ private:
   bool isCoordinate(const Counterparts &values, int64_t dim) const;
   bool isMovable(Operation *op) const;
   bool isOfItem(LoadOp load) const;
+  bool isShared(Operation *op) const;
   int64_t getPixels() const;
   Value getPlace(OpBuilder &builder, Location loc, ValueRange coordinates);
   Value getKnown(OpBuilder &builder, const Counterparts &values,
@@ -111,10 +112,35 @@ bool Deferral::isCoordinate(const Counterparts &values, int64_t dim) const {
   return true;
 }
 
+static bool holdsLoop(Operation *op) {
+  return op
+      ->walk([](Operation *inner) {
+        return isa<LoopLikeOpInterface>(inner) ? WalkResult::interrupt()
+                                               : WalkResult::advance();
+      })
+      .wasInterrupted();
+}
+
+/// Whether a loop over pixels stands behind an operation, outside of which that
+/// computes once what all of them take: behind the work each would do so for
+/// itself.
+bool Deferral::isShared(Operation *op) const {
+  for (const Site &site : sites)
+    for (Operation *at = site.updates.front()->getParentOp(); at != work;
+         at = at->getParentOp())
+      if (isa<LoopLikeOpInterface, ParallelLoopOpInterface>(at))
+        if (Operation *loop = op->getBlock()->findAncestorOpInBlock(*at))
+          if (loop != op && op->isBeforeInBlock(loop))
+            return true;
+  return false;
+}
+
 /// Whether an operation, with all that it holds, computes the same behind the
 /// work: from numbers, and from state that the kernel leaves as it is.
 bool Deferral::isMovable(Operation *op) const {
   if (auto load = dyn_cast<LoadOp>(op); load && isOfItem(load))
+    return false;
+  if (holdsLoop(op) && isShared(op))
     return false;
   return !op->walk([&](Operation *inner) {
               auto load = dyn_cast<LoadOp>(inner);
@@ -142,15 +168,6 @@ bool Deferral::isOfItem(LoadOp load) const {
          llvm::all_of(load.getIndices(), isSame) &&
          llvm::any_of(load.getIndices(),
                       [&](Value index) { return isInWork(index); });
-}
-
-static bool holdsLoop(Operation *op) {
-  return op
-      ->walk([](Operation *inner) {
-        return isa<LoopLikeOpInterface>(inner) ? WalkResult::interrupt()
-                                               : WalkResult::advance();
-      })
-      .wasInterrupted();
 }
 
 /// About how many instructions an operation is, by its kind.

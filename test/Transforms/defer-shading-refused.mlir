@@ -369,3 +369,45 @@ piko.pipeline @P rank 1 {
     }
   }
 }
+
+// -----
+
+// One sum for several pixels: each would compute it for itself.
+
+piko.record @F {"x" : i32 at 0, "a" : f32 at 4} size 8 align 4
+piko.record @D {"z" : f32 at 0} size 4 align 4
+piko.pipeline @P rank 1 {
+  piko.buffer @lights : @D
+  piko.image @color : @D rank 1
+  piko.source @last
+  piko.stage @last bins [64] threads 1 ordered : @F -> [] {}
+  piko.kernel @kernel_last {
+    %zero = arith.constant 0 : index
+    %one = arith.constant 1 : index
+    %four = arith.constant 4 : index
+    piko.bins of @last {
+    ^bb0(%bin: index):
+      piko.items of @last {
+      ^bb0(%f: !piko.prim<@F>):
+        %x = piko.get %f "x" : !piko.prim<@F> -> i32
+        %a = piko.get %f "a" : !piko.prim<@F> -> f32
+        %count = piko.extent @lights[0]
+        %sum = scf.for %i = %zero to %count step %one iter_args(%before = %a) -> f32 {
+          %l = piko.load checked @lights[%i : index] "z" : f32
+          %m = arith.mulf %l, %a : f32
+          %n = arith.divf %m, %l : f32
+          %after = arith.addf %before, %n : f32
+          scf.yield %after : f32
+        }
+        scf.for %k = %zero to %four step %one {
+          %step = arith.index_cast %k : index to i32
+          %at = arith.addi %x, %step : i32
+          piko.update @color[%at : i32] in %bin {
+          ^bb0(%old: f32):
+            piko.yield [%sum : f32]
+          } {piko.inside}
+        }
+      }
+    }
+  }
+}

@@ -109,7 +109,8 @@ def DeferShading : Pass<"piko-defer-shading", "::piko::PipelineOp"> {
     **Limits**: all updates of the image do the same from the cut on, at pixels
     that are proved to be in the bin (`piko-prove-bounds`); one thread runs a
     bin. What is cheaper to compute than to keep stays: a few operations without
-    a loop. A remark says what is kept, or what is in the way.
+    a loop; and so does a loop whose result several pixels share, as of a block
+    that is shaded once. A remark says what is kept, or what is in the way.
   }];
   let options = [
     Option<"budget", "budget", "int64_t", "262144",
