@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #
-# Three commands matter, and each works on a fresh Debian 12 machine:
+# Four commands matter, and each works on a fresh Debian 12 machine:
 #   make demo     render the bunny; says where the image is
 #   make check    build everything and run every test
 #   make bench    run the benchmarks, which takes twenty minutes; says where
 #                 the page is (BENCH=--quick: one minute; benchmarks/README.md)
+#   make charts   chart speed against error, which takes twenty minutes; says
+#                 where the page is (CHARTS=--quick: two minutes)
 # The rest is a thin layer over the presets of CMakePresets.json.
 
 PRESET ?= release
@@ -19,7 +21,7 @@ BUNNY := /usr/share/glmark2/models/bunny.obj
 PIPE ?= Fused
 
 .DELETE_ON_ERROR:
-.PHONY: all bench build check clean configure demo deps docs format lint
+.PHONY: all bench build charts check clean configure demo deps docs format lint
 
 all: build
 
@@ -45,6 +47,14 @@ bench: configure
 	  --target piko-render pikoc piko-runtime-benchmark
 	@benchmarks/bench.py --bin $(BUILD)/bin --lib $(CURDIR)/$(BUILD)/lib \
 	  --out $(BUILD)/bench $(BENCH)
+
+# Debian's python3-matplotlib is for its own python3.
+charts: configure
+	@utils/install-deps.sh utils/packages-charts.txt
+	@cmake --build $(BUILD) --parallel $(JOBS) \
+	  --target piko-render piko-diff FailureTests
+	@/usr/bin/python3 benchmarks/speed-error.py --bin $(BUILD)/bin \
+	  --out $(BUILD)/charts $(CHARTS)
 
 check: build
 	@ctest --test-dir $(BUILD) --output-on-failure --parallel $(JOBS)

@@ -5,8 +5,8 @@ import subprocess
 import sys
 
 
-def call(command):
-    done = subprocess.run(command, capture_output=True, text=True)
+def call(command, cwd=None):
+    done = subprocess.run(command, capture_output=True, text=True, cwd=cwd)
     if done.returncode:
         sys.exit(f"{' '.join(command)}\n{done.stderr}")
     return done.stdout

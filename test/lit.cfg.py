@@ -22,7 +22,7 @@ split-file. Substitutions:
                  reference executor
 
 Features: `bunny` where that mesh is installed, `gpu` where an NVIDIA driver
-is, `ptxas` where NVIDIA's assembler is, `asan` and `tsan` in builds with that
+is, `ptxas` where NVIDIA's assembler is, `chromium` where that browser is, `asan` and `tsan` in builds with that
 sanitizer.
 """
 
@@ -96,6 +96,8 @@ if platform.machine() in ("x86_64", "AMD64"):
     config.available_features.add("x86_64")
 if shutil.which("ptxas"):
     config.available_features.add("ptxas")
+if shutil.which("chromium"):
+    config.available_features.add("chromium")
 if "address" in config.sanitize:
     config.available_features.add("asan")
 if "thread" in config.sanitize:

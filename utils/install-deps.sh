@@ -1,11 +1,13 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #
-# Installs the packages of utils/packages.txt on Debian 12, as root or through
-# sudo. Does nothing when all are there.
+# install-deps.sh [LIST]
+#
+# Installs the packages of a list (utils/packages.txt) on Debian 12, as root or
+# through sudo. Does nothing when all are there.
 set -euo pipefail
 
-list="$(dirname "$0")/packages.txt"
+list="${1:-$(dirname "$0")/packages.txt}"
 
 if ! command -v dpkg-query >/dev/null; then
   echo "install-deps: not a Debian system: install these by other means," \

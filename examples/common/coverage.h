@@ -17,7 +17,10 @@
 
 namespace raster {
 
-constexpr int subpixelBits = 8;
+#ifndef SUBPIXEL_BITS
+#define SUBPIXEL_BITS 8
+#endif
+constexpr int subpixelBits = SUBPIXEL_BITS; ///< at most 10
 constexpr int32_t subpixels = 1 << subpixelBits;
 
 /// A point on the screen in 1/256 pixel, x to the right and y down.
@@ -90,7 +93,7 @@ using NearEdges = BasicEdges<int32_t>;
 /// Whether a point is near enough to pixel (0, 0) for NearEdges: products of
 /// two differences stay below 2^29.
 inline bool isNear(Point p) {
-  constexpr uint32_t reach = 32 * subpixels;
+  constexpr uint32_t reach = 1 << 13;
   return (uint32_t(p.x) + reach <= 2 * reach) &
          (uint32_t(p.y) + reach <= 2 * reach);
 }

@@ -289,8 +289,9 @@ struct Composite : piko::Stage<M.bin, M.bin, 64, PixelColor>,
 };
 
 // What follows the Rasterizer.
-template <Mapping M, class UsedState> struct Pixels : piko::Pipe<UsedState> {
-  FragmentShader<M> fragmentShader;
+template <Mapping M, class UsedState, class Shader = FragmentShader<M>>
+struct Pixels : piko::Pipe<UsedState> {
+  Shader fragmentShader;
   DepthTest<M> depthTest;
   Composite<M> composite;
 
@@ -312,7 +313,8 @@ template <Mapping M> struct LinearRaster : Pixels<M, MeshState> {
   }
 };
 
-template <Mapping M> struct IndexedRaster : Pixels<M, IndexedState> {
+template <Mapping M, class Shader = FragmentShader<M>>
+struct IndexedRaster : Pixels<M, IndexedState, Shader> {
   VertexShader vertexShader;
   Setup setup;
   Rasterizer<M, BoxedTriangle, IndexedState> rasterizer;

@@ -76,10 +76,12 @@ private:
 /// smallest index. If `anyHit`, one of the hits. None if the direction is
 /// shorter than 1e-18 or longer than 1e18, or the mesh is farther away.
 ///
+/// `Test` says how a ray meets a triangle, as ShearedRay does.
+///
 /// The rays of a packet go through the tree together: `any` says whether one of
 /// them passes true, and `least` gives the least of what they pass. For a
 /// single ray both give back what they take.
-template <class Any, class Least>
+template <class Test = ShearedRay, class Any, class Least>
 Hit findHit(glm::vec3 origin, glm::vec3 direction, float limit, bool anyHit,
             const piko::scene::Bounds &mesh, const piko::Buffer<BvhNode> &nodes,
             const piko::Buffer<BvhTriangle> &triangles, const Any &any,
@@ -94,7 +96,7 @@ Hit findHit(glm::vec3 origin, glm::vec3 direction, float limit, bool anyHit,
   SlabRay slabs(origin, direction, mesh);
   constexpr float nowhere = -1; // the limit of a ray that enters no box
   nearest.t = slabs.isUsable() ? limit : nowhere;
-  ShearedRay sheared(origin, direction);
+  Test test(origin, direction);
 
   int top = 0;
   if (nodes.size() > 0)
@@ -104,7 +106,7 @@ Hit findHit(glm::vec3 origin, glm::vec3 direction, float limit, bool anyHit,
     if (!any(entry.t <= nearest.t * longer))
       continue;
     for (int i = 0; i < entry.count; ++i)
-      if (sheared.intersect(triangles[entry.child + i], nearest) && anyHit)
+      if (test.intersect(triangles[entry.child + i], nearest) && anyHit)
         nearest.t = nowhere;
     if (entry.count > 0)
       continue;

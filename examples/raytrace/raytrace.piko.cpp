@@ -66,7 +66,7 @@ struct State {
 };
 
 // A stage whose parallel loops run over the rays of a packet.
-template <Mapping M, class In, class... Out>
+template <Mapping M, class Test, class In, class... Out>
 struct PacketStage : piko::Stage<M.bin, M.bin, 64, In, Out...>,
                      piko::Uses<State> {
 protected:
@@ -74,7 +74,7 @@ protected:
 
   /// What a ray hits; an iteration that has none gives a limit below 0.
   Hit find(glm::vec3 origin, glm::vec3 direction, float limit, bool anyHit) {
-    return findHit(
+    return findHit<Test>(
         origin, direction, limit, anyHit, this->state().bounds,
         this->state().nodes, this->state().leaves,
         [&](bool b) { return this->any(b); },
@@ -86,7 +86,8 @@ protected:
 };
 
 // Follows the rays of the camera.
-template <Mapping M> struct Primary : PacketStage<M, Nothing, Surface> {
+template <Mapping M, class Test>
+struct Primary : PacketStage<M, Test, Nothing, Surface> {
   void assignBin(const Nothing &n) { this->assignToAll(n); }
   void schedule(piko::BinId) {
     this->everyBin();
@@ -117,7 +118,8 @@ private:
 };
 
 // Follows the rays that come from surfaces.
-template <Mapping M> struct Trace : PacketStage<M, Ray, Surface, Radiance> {
+template <Mapping M, class Test>
+struct Trace : PacketStage<M, Test, Ray, Surface, Radiance> {
   void assignBin(const Ray &r) { this->assignToPreviousBins(r); }
   void schedule(piko::BinId) {
     this->batch(this->packet);
@@ -243,9 +245,10 @@ struct Accumulate : piko::Stage<M.bin, M.bin, 64, Radiance>, piko::Uses<State> {
   }
 };
 
-template <Mapping M> struct MappedRaytracer : piko::Pipe<State> {
-  Primary<M> primary;
-  Trace<M> trace;
+template <Mapping M, class Test = ShearedRay>
+struct MappedRaytracer : piko::Pipe<State> {
+  Primary<M, Test> primary;
+  Trace<M, Test> trace;
   Shade<M> shade;
   Accumulate<M> accumulate;
 

@@ -57,6 +57,7 @@ struct Depth {
 struct State {
   Camera camera;
   Settings settings;
+  int32_t texels = 1; ///< by which a shadow's edge is blurred, on either side
   piko::Buffer<Light> lights;
   piko::Buffer<Box> reach;             // of all vertices, in the first element
   piko::Buffer<ShadedVertex> vertices; // one for each Vertex
@@ -198,7 +199,8 @@ struct FragmentShader : piko::Stage<M.bin, M.bin, 64, Fragment, ShadedFragment>,
   }
 
 private:
-  // How much of a square, two texels wide, about the point on the map is lit.
+  // Percentage-closer filtering: how much of a square about the point on the
+  // map is lit.
   float visibility(glm::vec3 position, glm::vec3 normal, glm::vec3 toLight) {
     if (!(glm::dot(normal, toLight) > 0))
       return 0; // turned away
@@ -207,12 +209,14 @@ private:
     glm::ivec2 center(piko::toInt(piko::floor(at.x)),
                       piko::toInt(piko::floor(at.y)));
     glm::vec2 part = glm::vec2(at) - glm::vec2(center);
+    int reach = state().texels;
     float lit = 0;
-    for (int y = -1; y <= 1; ++y)
-      for (int x = -1; x <= 1; ++x)
+    for (int y = -reach; y <= reach; ++y)
+      for (int x = -reach; x <= reach; ++x)
         if (isLit(center + glm::ivec2(x, y), at.z))
           lit += overlap(x, part.x) * overlap(y, part.y);
-    return lit * 0.25f;
+    float side = float(2 * reach);
+    return lit / (side * side);
   }
 
   bool isLit(glm::ivec2 texel, float depth) {
@@ -223,8 +227,9 @@ private:
 
   // How much of the square lies in the column or row of texels `step` beside
   // its centre's, in which the centre has passed `part` of a texel.
-  static float overlap(int step, float part) {
-    return step < 0 ? 1 - part : step > 0 ? part : 1;
+  float overlap(int step, float part) {
+    int reach = state().texels;
+    return step == -reach ? 1 - part : step == reach ? part : 1;
   }
 };
 

@@ -293,7 +293,7 @@ struct Shade : piko::Stage<Bin, Bin, 64, Nothing>, piko::Uses<State> {
     });
   }
 
-private:
+protected:
   // Of the triangle with this number, where the ray through a pixel meets it.
   glm::vec3 shade(glm::ivec2 p, int32_t index) {
     const State &s = this->state();
@@ -319,14 +319,15 @@ private:
   }
 };
 
-template <int Bin, piko::Precision P = piko::Precision::Strict>
+template <int Bin, piko::Precision P = piko::Precision::Strict,
+          class Shader = Shade<Bin, P>>
 struct Pipeline : piko::Pipe<State> {
   VertexShader vertexShader;
   Setup setup;
   Clipper clipper;
   SmallCoverage smallCoverage;
   Coverage<Bin> coverage;
-  Shade<Bin, P> shade;
+  Shader shade;
 
   Pipeline() {
     this->source(vertexShader);

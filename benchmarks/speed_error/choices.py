@@ -1,0 +1,173 @@
+# SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+"""Where a user trades speed for error, and what each choice is measured by."""
+
+from dataclasses import dataclass, field
+
+CHOICES_FOLDER = "benchmarks/choices"
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One of a choice: a pipeline and options of piko-render."""
+
+    name: str
+    source: str
+    pipe: str
+    options: tuple[str, ...] = ()
+
+    def command(self, tool):
+        return [tool, self.source, "--pipe", self.pipe, "-I", "examples",
+                *self.options]
+
+
+@dataclass(frozen=True)
+class Choice:
+    name: str
+    title: str
+    settings: list[Setting]
+    reference: Setting
+    against: str  # what the reference is, for a reader
+    text: str  # what the choice is
+    default: str  # the setting of the examples
+    patches: bool = False  # of scenes that are patches, not meshes
+    options: tuple[str, ...] = field(default=())  # of all settings
+
+
+def sets(**constants):
+    return tuple(word for name, value in constants.items()
+                 for word in ("--set", f"{name}={value}"))
+
+
+EXACT = Setting("exact", f"{CHOICES_FOLDER}/exact.piko.cpp", "Exact")
+
+
+def exact(**constants):
+    return Setting("exact", EXACT.source, EXACT.pipe, sets(**constants))
+
+
+def numbers():
+    source = f"{CHOICES_FOLDER}/numbers.piko.cpp"
+    return Choice(
+        "numbers", "Numbers of a stage",
+        [Setting(name, source, f"{name}Numbers")
+         for name in ("Strict", "Contracted", "Relaxed", "Double")],
+        Setting("Double", source, "DoubleNumbers"), "the same in double",
+        "specifyPrecision of the stage that shades, in examples/raster's Tiled.",
+        "Strict", options=("--lights", "100"))
+
+
+def subpixels():
+    source = "examples/visibility/visibility.piko.cpp"
+    return Choice(
+        "subpixels", "Bits below a pixel",
+        [Setting(f"{bits} bits", source, "Visibility",
+                 ("-D", f"SUBPIXEL_BITS={bits}")) for bits in (2, 4, 6, 8, 10)],
+        exact(), "rays in double",
+        "The grid on which examples/visibility places corners; its coverage is "
+        "exact on each.", "8 bits")
+
+
+def rays():
+    source = f"{CHOICES_FOLDER}/rays.piko.cpp"
+    return Choice(
+        "rays", "Rays and triangles",
+        [Setting(name, source, pipe, sets(depth=0, shadows=0))
+         for name, pipe in (("watertight", "Watertight"),
+                            ("direct, float", "DirectFloat"),
+                            ("direct, double", "DirectDouble"))],
+        exact(), "rays in double",
+        "The test of examples/raytrace, which is watertight, and Moeller's and "
+        "Trumbore's, whose triangles round each for itself. Camera rays.",
+        "watertight")
+
+
+def shading_rate():
+    source = f"{CHOICES_FOLDER}/shading_rate.piko.cpp"
+    return Choice(
+        "shading-rate", "Pixels that share a colour",
+        [*(Setting(f"{side}x{side}", source, f"Rate{side}")
+           for side in (1, 2, 4)),
+         *(Setting(f"{side}x{side} by contrast", source, f"Contrast{side}")
+           for side in (2, 4))],
+        Setting("1x1", source, "Rate1"), "each pixel shaded",
+        "examples/visibility, shaded once for each block of pixels; by contrast "
+        "once more where their depths differ.", "1x1", options=("--lights", "1000"))
+
+
+def transparency():
+    source = f"{CHOICES_FOLDER}/transparency.piko.cpp"
+    return Choice(
+        "transparency", "Layers of transparency",
+        [Setting("sorted", source, "Sorted"),
+         *(Setting(f"{k} nearest", source, f"Nearest{k}")
+           for k in (2, 4, 8, 16, 32)),
+         Setting("weighted", source, "Weighted")],
+        Setting("sorted", source, "Sorted"), "all layers sorted",
+        "examples/oit, and pixels that keep their k nearest layers, or a weighted "
+        "mean of all.", "sorted")
+
+
+def shadows():
+    source = "examples/shadow/shadow.piko.cpp"
+    return Choice(
+        "shadows", "Width of percentage-closer filtering",
+        [Setting(f"{2 * reach} texels", source, "Bins32", sets(texels=reach))
+         for reach in (1, 2, 3, 4)],
+        exact(shadows=1), "shadow rays in double",
+        "The square of the shadow map over which examples/shadow asks what is "
+        "lit; its map has as many texels as the image has pixels.",
+        "2 texels", options=("--ground",))
+
+
+def micropolygons():
+    source = "examples/reyes/reyes.piko.cpp"
+    return Choice(
+        "micropolygons", "Size of micropolygons",
+        [Setting(f"{rate} pixels", source, "Reyes", sets(rate=rate))
+         for rate in (4, 2, 1, 0.5, 0.25)],
+        Setting("1/16", source, "Reyes", sets(rate=1 / 16)),
+        "micropolygons of 1/16 pixel",
+        "How long an edge of a micropolygon of examples/reyes may be.",
+        "1 pixels", patches=True)
+
+
+def samples():
+    source = f"{CHOICES_FOLDER}/samples.piko.cpp"
+    return Choice(
+        "samples", "Samples a pixel",
+        [Setting("1", source, "Samples1"),
+         *(Setting(f"{n} {kind.lower()}", source, f"{kind}{n}")
+           for n in (2, 4, 8, 16) for kind in ("Rotated", "Sobol"))],
+        exact(samples=32), "1024 rays a pixel in double",
+        "Where camera rays pass through a pixel: a rotated grid (the standard "
+        "patterns of Direct3D) or the first points of Sobol's sequence.", "1")
+
+
+def depth():
+    source = f"{CHOICES_FOLDER}/depth.piko.cpp"
+    return Choice(
+        "depth", "Format of depths",
+        [Setting(name, source, pipe) for name, pipe in
+         (("16 bits", "Depth16"), ("24 bits", "Depth24"),
+          ("float", "DepthFloat"), ("reversed float", "DepthReversed"))],
+        exact(), "rays in double",
+        "What examples/raster's Tiled compares: z / w as an integer or a float, "
+        "or near / distance.", "float")
+
+
+def output():
+    source = f"{CHOICES_FOLDER}/output.piko.cpp"
+    return Choice(
+        "output", "Format of the result",
+        [Setting(name, source, pipe) for name, pipe in
+         (("float", "OutputFloat"), ("half", "OutputHalf"),
+          ("dithered 8 bits", "OutputDithered"), ("8 bits", "OutputBytes"))],
+        Setting("float", source, "OutputFloat"), "floats",
+        "What the last stage rounds colours to. Dithering adds to the error of "
+        "each pixel, and takes away that of their means, which FLIP sees.",
+        "float")
+
+
+CHOICES = {choice.name: choice for choice in
+           (numbers(), samples(), subpixels(), depth(), rays(), shading_rate(),
+            transparency(), shadows(), micropolygons(), output())}

@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+"""Charts for print, by matplotlib."""
+
+from charts import COLORS
+
+
+def place_zeros(values):
+    """Where a logarithmic axis has what is 0: below the least other one."""
+    positive = [v for v in values if v > 0]
+    return min(positive, default=1) / 10
+
+
+def draw_choice(pyplot, choice, points, metric="rms"):
+    """Milliseconds against error; a colour for each scene."""
+    figure, axes = pyplot.subplots(figsize=(7, 4.8))
+    zero = place_zeros([p.errors[metric] for p in points])
+
+    def place(point):
+        return point.errors[metric] or zero
+
+    for i, scene in enumerate(dict.fromkeys(p.scene for p in points)):
+        color = COLORS[i % len(COLORS)]
+        own = [p for p in points if p.scene == scene]
+        front = sorted((p for p in own if p.front), key=lambda p: p.ms)
+        axes.plot([place(p) for p in front], [p.ms for p in front], "-",
+                  color=color, alpha=0.5)
+        for p in own:
+            axes.errorbar(place(p), p.ms,
+                          [[p.ms - min(p.times)], [max(p.times) - p.ms]],
+                          fmt="o", color=color,
+                          markerfacecolor=color if p.front else "white",
+                          label=scene if p is own[0] else None)
+            axes.annotate(p.setting, (place(p), p.ms), xytext=(6, 5),
+                          textcoords="offset points", fontsize=8)
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    exact = any(p.errors[metric] == 0 for p in points)
+    note = f"; at {zero:.1e}: none" if exact else ""
+    axes.set_xlabel(f"{metric} error against {choice.against}{note}")
+    axes.set_ylabel("ms a frame")
+    axes.grid(which="both", color="#eeeeee")
+    axes.set_axisbelow(True)
+    axes.set_title(choice.title)
+    axes.legend(frameon=False)
+    figure.tight_layout()
+    return figure
+
+
+def write(pyplot, figure, stem):
+    figure.savefig(f"{stem}.svg", metadata={"Date": None})
+    figure.savefig(f"{stem}.png", dpi=110)
+    pyplot.close(figure)
