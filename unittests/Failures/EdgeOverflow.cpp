@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #include "Failure.h"
 
+#include "CheckedEdgeOverflow.h"
 #include "NaiveEdgeOverflow.h"
 #include "WideEdgeOverflow.h"
 
@@ -130,6 +131,14 @@ TEST(Failure, EdgeOverflow) {
     EXPECT_GT(errors.naive, 10) << side;
     EXPECT_EQ(errors.ours, 0) << side;
   }
+}
+
+TEST(Failure, CheckedEdgeOverflow) {
+  for (int side : {4, 8, 13, 14, 15, 16, 32, 1024})
+    EXPECT_EQ(percentWrong(drawFan<pipelines::CheckedEdgeOverflow>(side),
+                           findExact(side)),
+              0)
+        << side;
 }
 
 } // namespace

@@ -2,7 +2,8 @@
 //
 // Edge functions of corners in 1/256 pixel, on a strip of a large image: which
 // triangle is drawn, and how often. `Naive` has them in 32 bits, which an edge
-// across an image of 182 pixels a side may overflow; ours in 64.
+// across an image of 182 pixels a side may overflow; `Wide` in 64; and
+// `Checked` in 32 where all is near and in 64 elsewhere.
 #include <piko.h>
 
 #include "common/coverage.h"
@@ -19,7 +20,24 @@ struct State {
   piko::Image<Cell> image;
 };
 
-template <class Int>
+using Wide = raster::Edges;
+using Narrow = raster::NearEdges;
+
+// Edges relative to a pixel, from which isNear() measures.
+struct Checked {
+  raster::Point first, second, third;
+  bool isNear;
+
+  Checked(raster::Point a, raster::Point b, raster::Point c)
+      : first(a), second(b), third(c),
+        isNear(raster::isNear(a) && raster::isNear(b) && raster::isNear(c)) {}
+  bool cover(int x, int y) const {
+    return isNear ? Narrow(first, second, third).cover(x, y)
+                  : Wide(first, second, third).cover(x, y);
+  }
+};
+
+template <class Edges>
 struct Draw : piko::Stage<64, 64, 64, SnappedTriangle>, piko::Uses<State> {
   void assignBin(const SnappedTriangle &t) {
     raster::PixelBox box = boxOf(t);
@@ -27,8 +45,7 @@ struct Draw : piko::Stage<64, 64, 64, SnappedTriangle>, piko::Uses<State> {
   }
   void process(const SnappedTriangle &t) {
     raster::PixelBox box = boxOf(t);
-    raster::BasicEdges<Int> edges({t.a.x, t.a.y}, {t.b.x, t.b.y},
-                                  {t.c.x, t.c.y});
+    Edges edges({t.a.x, t.a.y}, {t.b.x, t.b.y}, {t.c.x, t.c.y});
     parallelForPixels(box.lo, box.hi, [&](glm::ivec2 p) {
       if (edges.cover(p.x, p.y + state().top))
         update(state().image, p, [&](Cell &cell) {
@@ -49,9 +66,10 @@ private:
   }
 };
 
-template <class Int> struct Pipeline : piko::Pipe<State> {
-  Draw<Int> draw;
+template <class Edges> struct Pipeline : piko::Pipe<State> {
+  Draw<Edges> draw;
   Pipeline() { source(draw); }
 };
-struct NaiveEdgeOverflow : Pipeline<int32_t> {};
-struct WideEdgeOverflow : Pipeline<int64_t> {};
+struct NaiveEdgeOverflow : Pipeline<Narrow> {};
+struct WideEdgeOverflow : Pipeline<Wide> {};
+struct CheckedEdgeOverflow : Pipeline<Checked> {};
