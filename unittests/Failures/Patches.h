@@ -3,6 +3,7 @@
 #ifndef UNITTESTS_FAILURES_PATCHES_H
 #define UNITTESTS_FAILURES_PATCHES_H
 
+#include "Camera.h"
 #include "Cast.h"
 #include "Failure.h"
 
@@ -10,8 +11,7 @@
 
 namespace failures {
 
-/// Patches before a camera at the origin that looks along -z and is 90 degrees
-/// wide and high.
+/// Patches before the camera of Camera.h.
 struct PatchScene {
   std::vector<piko::scene::Patch> patches;
   int size = 128; ///< of the picture
@@ -27,23 +27,6 @@ struct PatchScene {
     patches.push_back(patch);
   }
 };
-
-inline piko::scene::Camera makeCamera(float nearZ) {
-  const float farZ = 1000;
-  piko::scene::Camera camera{};
-  camera.forward = {0, 0, -1};
-  camera.right = {1, 0, 0};
-  camera.up = {0, 1, 0};
-  camera.nearZ = nearZ;
-  camera.farZ = farZ;
-  camera.viewProjection = glm::mat4(0);
-  camera.viewProjection[0][0] = 1;
-  camera.viewProjection[1][1] = 1;
-  camera.viewProjection[2][2] = -(farZ + nearZ) / (farZ - nearZ);
-  camera.viewProjection[2][3] = -1;
-  camera.viewProjection[3][2] = -2 * farZ * nearZ / (farZ - nearZ);
-  return camera;
-}
 
 /// A picture, with alpha 0 where nothing was drawn.
 template <class Pipe> Image drawPatches(const PatchScene &scene) {
