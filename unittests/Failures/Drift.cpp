@@ -10,8 +10,10 @@
 #include "EulerParticles.h"
 #include "LeapfrogParticles.h"
 #include "PairwiseLights.h"
+#include "PhaseSpinners.h"
 #include "PlainLights.h"
 #include "PlainSteps.h"
+#include "RotateSpinners.h"
 
 #include <algorithm>
 #include <cmath>
@@ -266,6 +268,78 @@ TEST(Failure, LongOrbits) {
   Errors errors = LongOrbits().measure(1e5);
   EXPECT_GT(errors.naive, 0.5);
   EXPECT_LT(errors.ours, 1e-3);
+}
+
+//===----------------------------------------------------------------------===//
+// Rotations
+//===----------------------------------------------------------------------===//
+
+constexpr uint32_t turn = 12345679; // about 1 degree
+
+template <class Pipe>
+std::vector<glm::vec2> spin(const std::vector<glm::vec2> &points, int frames) {
+  std::vector<typename Pipe::Spinner> spinners;
+  for (glm::vec2 p : points)
+    spinners.push_back({p, turn, frames, int32_t(spinners.size())});
+  Pipe pipe;
+  pipe.setDomain({1, 1});
+  pipe.feed(pipe.spin, spinners);
+  pipe.run().orThrow();
+  std::vector<glm::vec2> spun;
+  for (size_t i = 0; i < points.size(); ++i)
+    spun.push_back(pipe.state().positions[int64_t(i)]);
+  return spun;
+}
+
+/// How far a point at a distance of 1 is from where it should be.
+template <class Pipe> double errorOfSpin(double frames) {
+  double angle = std::ldexp(2 * M_PI * uint32_t(turn * uint32_t(frames)), -32);
+  glm::dvec2 exact(std::cos(angle), std::sin(angle));
+  return glm::distance(exact, glm::dvec2(spin<Pipe>({{1, 0}}, int(frames))[0]));
+}
+
+/// A square of dots.
+template <class Pipe> Image drawSpin(int frames) {
+  constexpr int size = 128, dots = 12;
+  std::vector<glm::vec2> points;
+  for (int i = 0; i < dots * dots; ++i)
+    points.emplace_back(i % dots - dots / 2, i / dots - dots / 2);
+  Image image =
+      paint(size, size, [](int, int) { return rgb(0.1f, 0.1f, 0.1f); });
+  for (glm::vec2 p : spin<Pipe>(points, frames)) {
+    glm::vec2 at = size / 2.0f + 7.0f * p;
+    if (at.x >= 0 && at.y >= 0 && at.x < size && at.y < size)
+      image.pixels[int(at.y) * size + int(at.x)] = rgb(1, 0.9f, 0.3f);
+  }
+  return image;
+}
+
+struct LongSpins : Mode {
+  Description describe() const override {
+    return {"LongSpins",
+            "A rotation by about a degree at each frame",
+            "frames",
+            "distance from where a point should be, at a radius of 1",
+            "turns the last frame's point",
+            "phase accumulator in integers",
+            {1e2, 1e3, 1e4, 1e5, 1e6, 1e7}};
+  }
+  Errors measure(double frames) const override {
+    return {errorOfSpin<pipelines::RotateSpinners>(frames),
+            errorOfSpin<pipelines::PhaseSpinners>(frames)};
+  }
+  Pictures draw() const override {
+    constexpr int frames = 10000000;
+    return {drawSpin<pipelines::RotateSpinners>(frames),
+            drawSpin<pipelines::PhaseSpinners>(frames)};
+  }
+};
+const Registration<LongSpins> longSpins;
+
+TEST(Failure, LongSpins) {
+  Errors errors = LongSpins().measure(1e7);
+  EXPECT_GT(errors.naive, 0.1);
+  EXPECT_LT(errors.ours, 1e-6);
 }
 
 } // namespace

@@ -183,3 +183,57 @@ template <class Method> struct ParticlePipe : piko::Pipe<ParticleState> {
 };
 struct EulerParticles : ParticlePipe<ExplicitEuler> {};
 struct LeapfrogParticles : ParticlePipe<Leapfrog> {};
+
+//===----------------------------------------------------------------------===//
+// Rotations
+//===----------------------------------------------------------------------===//
+
+/// A point that turns about the origin by turn / 2^32 at each frame.
+struct Spinner {
+  glm::vec2 position;
+  uint32_t turn;
+  int32_t frames, index;
+};
+struct SpinState {
+  piko::Buffer<glm::vec2> positions; // one for each Spinner
+};
+
+constexpr float turnToRadians = 6.28318531f / 4294967296.0f;
+
+inline glm::vec2 rotate(glm::vec2 p, float angle) {
+  float c = piko::cos(angle), s = piko::sin(angle);
+  return {c * p.x - s * p.y, s * p.x + c * p.y};
+}
+
+// Turns what the last frame had.
+struct Rotate : piko::Stage<0, 0, 64, Spinner>, piko::Uses<SpinState> {
+  void process(const Spinner &spinner) {
+    float angle = float(spinner.turn) * turnToRadians;
+    float c = piko::cos(angle), s = piko::sin(angle);
+    glm::vec2 p = spinner.position;
+    for (int i = 0; i < spinner.frames; ++i)
+      p = {c * p.x - s * p.y, s * p.x + c * p.y};
+    state().positions[spinner.index] = p;
+  }
+};
+
+// Has a phase accumulator, which wraps around without an error.
+struct Accumulate : piko::Stage<0, 0, 64, Spinner>, piko::Uses<SpinState> {
+  void process(const Spinner &spinner) {
+    uint32_t phase = 0;
+    for (int i = 0; i < spinner.frames; ++i)
+      phase += spinner.turn;
+    state().positions[spinner.index] =
+        rotate(spinner.position, float(int32_t(phase)) * turnToRadians);
+  }
+};
+
+template <class Method> struct SpinPipe : piko::Pipe<SpinState> {
+  Method spin;
+  SpinPipe() {
+    source(spin);
+    allocateForSource(state().positions, 0);
+  }
+};
+struct RotateSpinners : SpinPipe<Rotate> {};
+struct PhaseSpinners : SpinPipe<Accumulate> {};
