@@ -228,6 +228,11 @@ template <class Pipe> double errorOfEnergy(double steps) {
   return std::abs(energy / Orbit::energy - 1);
 }
 
+void setPixel(Image &image, glm::vec2 at) {
+  if (at.x >= 0 && at.y >= 0 && at.x < image.width && at.y < image.height)
+    image.pixels[int(at.y) * image.width + int(at.x)] = rgb(1, 0.9f, 0.3f);
+}
+
 template <class Pipe> Image drawOrbit() {
   constexpr int size = 192, dots = 4000;
   std::vector<int> steps(dots);
@@ -237,8 +242,7 @@ template <class Pipe> Image drawOrbit() {
       paint(size, size, [](int, int) { return rgb(0.1f, 0.1f, 0.1f); });
   for (const auto &p : move<Pipe>(steps)) {
     glm::vec2 at = size / 2.0f + p.position * (size / 16.0f);
-    if (at.x >= 0 && at.y >= 0 && at.x < size && at.y < size)
-      image.pixels[int(at.y) * size + int(at.x)] = rgb(1, 0.9f, 0.3f);
+    setPixel(image, at);
   }
   return image;
 }
@@ -308,8 +312,8 @@ template <class Pipe> Image drawSpin(int frames) {
       paint(size, size, [](int, int) { return rgb(0.1f, 0.1f, 0.1f); });
   for (glm::vec2 p : spin<Pipe>(points, frames)) {
     glm::vec2 at = size / 2.0f + 7.0f * p;
-    if (at.x >= 0 && at.y >= 0 && at.x < size && at.y < size)
-      image.pixels[int(at.y) * size + int(at.x)] = rgb(1, 0.9f, 0.3f);
+    for (int i = 0; i < 4; ++i)
+      setPixel(image, at + glm::vec2(i % 2, i / 2));
   }
   return image;
 }

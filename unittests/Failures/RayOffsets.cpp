@@ -149,7 +149,7 @@ struct RaySelfIntersection : Mode {
             "wrong pixels",
             naive,
             ours,
-            {1e-6, 1e-5, 1e-4, 1e-2, 1, 1e2, 1e4, 1e6}};
+            {1e-12, 1e-6, 1e-4, 1e-2, 1, 1e4, 1e6, 1e10}};
   }
   Errors measure(double scale) const override { return compare({scale, 0}); }
   Pictures draw() const override { return show({1e4, 0}); }

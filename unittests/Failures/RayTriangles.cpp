@@ -152,17 +152,17 @@ TEST(Failure, RayLeaks) {
 /// A square at distance 1, of needles from bottom to top, `width` wide each,
 /// and rays at the inside of each.
 struct RayNeedles : Mode {
-  static constexpr int needles = 128, raysEach = 16;
+  static constexpr int needles = 128, middle = needles / 2, raysEach = 16;
   static Scene makeScene(double width) {
     Scene scene;
-    auto at = [&](int i) { return float(width * (i - needles / 2)); };
+    auto at = [&](int i) { return float(width * (i - middle)); };
     for (int i = 0; i < needles; ++i) {
       scene.add({at(i), -1, -1}, {at(i + 1), -1, -1}, {at(i), 1, -1});
       scene.add({at(i + 1), -1, -1}, {at(i + 1), 1, -1}, {at(i), 1, -1});
       for (int j = 0; j < raysEach; ++j) {
         float y = 1.8f * (float(j) + 0.5f) / raysEach - 0.9f;
         scene.rays.push_back(
-            {{0, 0, 0}, {float(width * (i - needles / 2 + 0.37)), y, -1}});
+            {{0, 0, 0}, {float(width * (i - middle + 0.37)), y, -1}});
       }
     }
     return scene;

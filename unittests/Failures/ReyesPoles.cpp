@@ -21,8 +21,9 @@ PatchScene makeCaps(int n) {
   double radius = 3.6 / n;
   for (int k = 0; k < 4 * n * n; ++k) {
     double angle = M_PI / 2 * (k % 4), c = std::cos(angle), s = std::sin(angle);
-    double x = radius * (2 * (k / 4 % n) + 1) - 3.6;
-    double y = radius * (2 * (k / 4 / n) + 1) - 3.6;
+    int column = k / 4 % n, row = k / 4 / n;
+    double x = radius * (2 * column + 1) - 3.6;
+    double y = radius * (2 * row + 1) - 3.6;
     scene.add([&](int i, int j) {
       const double weights[4][2] = {{1, 0}, {1, 0.55}, {0.55, 1}, {0, 1}};
       double a = weights[j][0] * i / 3, b = weights[j][1] * i / 3;
@@ -41,10 +42,10 @@ int countBlots(const PatchScene &scene, const Image &image) {
   int blots = 0;
   for (size_t k = 0; k < scene.patches.size(); k += 4) {
     glm::vec3 pole = scene.patches[k].points[0];
-    double x = scene.size / 2 * (1 - pole.x / pole.z);
-    double y = scene.size / 2 * (1 + pole.y / pole.z);
+    auto x = int(scene.size * 0.5 * (1 - pole.x / pole.z) - 0.5);
+    auto y = int(scene.size * 0.5 * (1 + pole.y / pole.z) - 0.5);
     for (int i = 0; i < 4; ++i) {
-      int pixel = int(y - 0.5 + i / 2) * scene.size + int(x - 0.5 + i % 2);
+      int pixel = (y + i / 2) * scene.size + x + i % 2;
       float color = image.pixels[pixel].rgba.x;
       blots += !(std::abs(color - exact) < 0.25);
     }
