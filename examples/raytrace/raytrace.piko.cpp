@@ -86,7 +86,7 @@ protected:
 };
 
 // Follows the rays of the camera.
-template <Mapping M, class Test>
+template <Mapping M, class Test = ShearedRay>
 struct Primary : PacketStage<M, Test, Nothing, Surface> {
   void assignBin(const Nothing &n) { this->assignToAll(n); }
   void schedule(piko::BinId) {
@@ -118,7 +118,7 @@ private:
 };
 
 // Follows the rays that come from surfaces.
-template <Mapping M, class Test>
+template <Mapping M, class Test = ShearedRay>
 struct Trace : PacketStage<M, Test, Ray, Surface, Radiance> {
   void assignBin(const Ray &r) { this->assignToPreviousBins(r); }
   void schedule(piko::BinId) {
