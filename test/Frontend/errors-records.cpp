@@ -10,6 +10,7 @@
 // RUN: not piko-translate --cpp-to-piko --pipe=Pipe7 %s 2>&1 | FileCheck %s --check-prefix=VECTOR
 // RUN: not piko-translate --cpp-to-piko --pipe=Pipe8 %s 2>&1 | FileCheck %s --check-prefix=PACKED
 // RUN: not piko-translate --cpp-to-piko --pipe=Pipe9 %s 2>&1 | FileCheck %s --check-prefix=PRAGMA
+// RUN: not piko-translate --cpp-to-piko --pipe=Pipe10 %s 2>&1 | FileCheck %s --check-prefix=LATER
 #include <piko.h>
 #include <string>
 #include <vector>
@@ -87,3 +88,12 @@ using Pipe6 = WithState<ArrayState>;
 using Pipe7 = Pipeline<Mesh>;
 using Pipe8 = Pipeline<Packed>;
 using Pipe9 = Pipeline<Four>;
+struct Later;
+// LATER: error: expected a type that is defined, but got 'Later'
+struct LaterDrain : piko::Stage<0, 0, 64, Later> {
+  void process(const Later &) {}
+};
+struct Pipe10 : piko::Pipe<> {
+  LaterDrain drain;
+  Pipe10() { source(drain); }
+};

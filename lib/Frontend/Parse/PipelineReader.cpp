@@ -132,9 +132,44 @@ static void collectPipes(const clang::DeclContext *scope, clang::Sema &sema,
   }
 }
 
+/// Instantiates a class and what it, its bases and its members name as template
+/// arguments: primitives and records of state, which nothing else may need.
+static void instantiate(QualType type, clang::SourceLocation location,
+                        clang::Sema &sema,
+                        llvm::SmallPtrSetImpl<const clang::Type *> &visited) {
+  type = sema.getASTContext().getBaseElementType(type.getCanonicalType());
+  if (type->isDependentType() || !type->isRecordType() ||
+      !visited.insert(type.getTypePtr()).second ||
+      !sema.isCompleteType(location, type))
+    return;
+  auto visit = [&](QualType part) {
+    instantiate(part, location, sema, visited);
+  };
+  auto visitArguments = [&](llvm::ArrayRef<clang::TemplateArgument> arguments,
+                            const auto &self) -> void {
+    for (const clang::TemplateArgument &argument : arguments)
+      if (argument.getKind() == clang::TemplateArgument::Type)
+        visit(argument.getAsType());
+      else if (argument.getKind() == clang::TemplateArgument::Pack)
+        self(argument.pack_elements(), self);
+  };
+  const CXXRecordDecl *record = type->getAsCXXRecordDecl()->getDefinition();
+  if (const auto *made = dyn_cast<Specialization>(record))
+    visitArguments(made->getTemplateArgs().asArray(), visitArguments);
+  for (const clang::CXXBaseSpecifier &base : record->bases())
+    visit(base.getType());
+  for (const clang::FieldDecl *field : record->fields())
+    visit(field->getType());
+}
+
 std::vector<PipeCandidate> piko::findPipes(clang::Sema &sema) {
   std::vector<PipeCandidate> pipes;
-  collectPipes(sema.getASTContext().getTranslationUnitDecl(), sema, pipes);
+  clang::ASTContext &ast = sema.getASTContext();
+  collectPipes(ast.getTranslationUnitDecl(), sema, pipes);
+  llvm::SmallPtrSet<const clang::Type *, 32> visited;
+  for (const PipeCandidate &pipe : pipes)
+    instantiate(ast.getCanonicalTagType(pipe.type), pipe.location, sema,
+                visited);
   return pipes;
 }
 

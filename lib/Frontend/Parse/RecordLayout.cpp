@@ -75,6 +75,9 @@ llvm::FailureOr<unsigned> RecordTable::get(QualType type, mlir::Location user,
 
   RecordDescription record;
   record.name = getName(type);
+  if (type->isIncompleteType())
+    return mlir::emitError(user) << "expected a type that is defined, but got '"
+                                 << record.name << "'";
   if (!type.isTriviallyCopyableType(ast)) {
     mlir::InFlightDiagnostic diagnostic = mlir::emitError(user);
     diagnostic << "expected a trivially copyable type, but got '" << record.name
