@@ -7,8 +7,9 @@
 A SCENE is a file and, in the same word, what options of piko-render it needs.
 Measures each setting of each choice (--list) on each scene that has what it
 draws, meshes or patches; settings take turns in each round. Writes OUT/points.csv,
-OUT/CHOICE.svg and .png where Debian's python3-matplotlib is installed, and
-OUT/index.html, a page that needs no network.
+OUT/CHOICE.svg and .png where Debian's python3-matplotlib is installed,
+OUT/summary.md, which settings are on the Pareto front, and OUT/index.html, a page
+that needs no network.
 """
 
 import argparse
@@ -20,7 +21,7 @@ import statistics
 import sys
 
 from charts import find_pyplot
-from speed_error import draw, failures, page
+from speed_error import draw, failures, page, summary
 from speed_error.choices import CHOICES
 from speed_error.measure import Measurer, Scene
 from suite.page import find_processor
@@ -140,6 +141,7 @@ def main():
     write_csv([p for _, points, _ in measured for p in points],
               f"{options.out}/points.csv")
     modes = failures.collect(options)
+    summary.write_summary(measured, modes, f"{options.out}/summary.md")
     page.write_page(f"{options.out}/index.html", measured, modes, notes)
     print(f"wrote {options.out}/index.html")
 

@@ -22,9 +22,9 @@ struct CoarseShade : Shade<Bin, piko::Precision::Strict> {
     this->parallelFor(blocks.x * blocks.y, [&](int i) {
       glm::ivec2 first = lo + Rate * glm::ivec2(i % blocks.x, i / blocks.x);
       glm::ivec2 size = glm::min(hi - first, Rate);
-      uint64_t left = paint(first, size, 0);
-      if (ByContrast && left != 0)
-        paint(first, size, left);
+      float nearness = paint(first, size, 0);
+      if (ByContrast)
+        paint(first, size, nearness);
     });
   }
 
@@ -32,16 +32,20 @@ private:
   static float nearnessOf(uint64_t key) {
     return std::bit_cast<float>(uint32_t(key >> 32));
   }
+  static bool areAlike(float a, float b) {
+    return glm::abs(a - b) <= 0.02f * glm::max(a, b);
+  }
 
-  // Paints the pixels of a block that are as far away as one of them, the first
-  // or the one with this key; returns the key of one that is not, or 0.
-  uint64_t paint(glm::ivec2 first, glm::ivec2 size, uint64_t wanted) {
+  // Paints the pixels of a block as the first of them looks: all, or those
+  // about as far away; with a nearness that of others, those that are not.
+  // Returns how near that pixel is, 0 if there is none.
+  float paint(glm::ivec2 first, glm::ivec2 size, float others) {
     uint64_t shaded = 0;
     glm::ivec2 at(0);
     for (int k = size.x * size.y - 1; k >= 0; --k) {
       glm::ivec2 p = first + glm::ivec2(k % size.x, k / size.x);
       uint64_t key = this->state().visible(p).key;
-      if (key != 0 && (wanted == 0 || key == wanted)) {
+      if (key != 0 && (others == 0 || !areAlike(nearnessOf(key), others))) {
         shaded = key;
         at = p;
       }
@@ -51,18 +55,16 @@ private:
     Color8 color =
         toColor8(glm::vec4(this->shade(at, int32_t(~uint32_t(shaded))), 1));
     float nearness = nearnessOf(shaded);
-    uint64_t left = 0;
     for (int k = 0; k < size.x * size.y; ++k) {
       glm::ivec2 p = first + glm::ivec2(k % size.x, k / size.x);
       uint64_t key = this->state().visible(p).key;
-      bool isAlike = !ByContrast ||
-                     glm::abs(nearnessOf(key) - nearness) <= 0.02f * nearness;
-      if (key != 0 && isAlike)
+      float here = nearnessOf(key);
+      bool isOurs = others != 0 ? !areAlike(here, others)
+                                : !ByContrast || areAlike(here, nearness);
+      if (key != 0 && isOurs)
         this->update(this->state().color, p, [&](Color8 &c) { c = color; });
-      else if (key != 0)
-        left = key;
     }
-    return left;
+    return nearness;
   }
 };
 

@@ -83,9 +83,11 @@ class Measurer:
         return [*setting.command(tool), *scene.words, *self.size(),
                 *choice.options, "--threads", str(self.options.threads)]
 
-    def draw(self, choice, setting, scene, file):
+    def draw(self, choice, setting, scene, *files):
         call([*self.command(choice, setting, scene, self.render), "--frames",
-              "1", "--warmup", "0", "--out", file], cwd=self.root)
+              "1", "--warmup", "0",
+              *(word for file in files for word in ("--out", file))],
+             cwd=self.root)
 
     def time(self, choice, setting, scene):
         line = call([*self.command(choice, setting, scene, self.render),
@@ -106,16 +108,15 @@ class Measurer:
         """Settings take turns, so that what slows the machine down hits all."""
         stem = f"{self.folder}/images/{choice.name}-{scene.name}"
         reference = f"{stem}-reference"
-        self.draw(choice, choice.reference, scene, f"{reference}.exr")
-        self.draw(choice, choice.reference, scene, f"{reference}.jpg")
+        self.draw(choice, choice.reference, scene, f"{reference}.exr",
+                  f"{reference}.jpg")
         points = []
         for i, setting in enumerate(choice.settings):
             point = Point(choice.name, scene.name, setting.name,
                           shlex.join(self.command(choice, setting, scene,
                                                   "piko-render")))
             point.image, point.map = f"{stem}-{i}.jpg", f"{stem}-{i}-flip.jpg"
-            self.draw(choice, setting, scene, f"{stem}-{i}.exr")
-            self.draw(choice, setting, scene, point.image)
+            self.draw(choice, setting, scene, f"{stem}-{i}.exr", point.image)
             point.errors = self.compare(f"{reference}.exr", f"{stem}-{i}.exr",
                                         point.map)
             os.remove(f"{stem}-{i}.exr")

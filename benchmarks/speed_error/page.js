@@ -105,6 +105,19 @@ function show(view, choice, point) {
   make(view, "code", {}, point.command);
 }
 
+// Labels that would lie on others are left to the pointer.
+function makeLabeller(svg) {
+  const taken = [];
+  return (x, y, text) => {
+    const width = 6.6 * text.length, isLeft = x + 9 + width > WIDTH;
+    const box = {x: isLeft ? x - 9 - width : x + 9, y: y - 8, width};
+    if (taken.some(o => Math.abs(o.y - box.y) < 12 && box.x < o.x + o.width && o.x < box.x + width))
+      return;
+    taken.push(box);
+    make(svg, "text", {class: "label", x: box.x, y: box.y}, text);
+  };
+}
+
 function drawChoice(section, choice) {
   const old = section.querySelector("svg");
   const svg = make(section.querySelector(".chart"), "svg", {viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: "img", "aria-label": choice.title});
@@ -114,6 +127,7 @@ function drawChoice(section, choice) {
   const x = makeAxis(choice.points.map(errorOf), LEFT + 8, WIDTH - RIGHT);
   const y = makeAxis(choice.points.flatMap(p => [p.ms, p.least, p.most]), HEIGHT - BOTTOM, TOP);
   drawAxes(svg, x, y, metric === "psnr" ? "10^(-PSNR / 20)" : METRICS[metric], "ms a frame");
+  const label = makeLabeller(svg);
   DATA.scenes.forEach((scene, i) => {
     const color = COLORS[i % COLORS.length];
     const points = choice.points.filter(p => p.scene === scene);
@@ -130,7 +144,7 @@ function drawChoice(section, choice) {
       };
       for (const event of ["mouseenter", "focus", "click"])
         dot.addEventListener(event, choose);
-      make(svg, "text", {class: "label", x: at[0] + 9, y: at[1] - 8}, p.setting);
+      label(...at, p.setting);
       if (!view.hasChildNodes() && front.includes(p))
         choose();
     }

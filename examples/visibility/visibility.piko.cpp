@@ -36,7 +36,7 @@ using namespace raster;
 // A vertex on the screen.
 struct Corner {
   Point at;
-  float nearness;   // 0 at the far plane, 2 at the near one
+  float nearness;   // 1 / w, which floats resolve as finely far away as near by
   uint32_t outside; // as of a ScreenVertex
 };
 
@@ -83,7 +83,7 @@ inline glm::vec4 project(const Camera &camera, glm::vec3 position) {
 struct VertexShader : piko::Stage<0, 0, 64, Vertex>, piko::Uses<State> {
   void process(const Vertex &v) {
     ScreenVertex s = toScreen(project(state().camera, v.position), domain());
-    state().vertices[v.index] = {s.at, 1 - s.depth, s.outside};
+    state().vertices[v.index] = {s.at, s.inverse, s.outside};
   }
 };
 
@@ -174,9 +174,8 @@ struct Clipper : piko::Stage<0, 0, 64, Triangle, ScreenTriangle>,
       glm::vec4 p = corners[i].position;
       if (!(p.w > 0))
         return;
-      float inverse = 1 / p.w;
-      points[i] = toPoint(glm::vec2(p) * inverse, domain());
-      nearness[i] = 1 - p.z * inverse;
+      nearness[i] = 1 / p.w;
+      points[i] = toPoint(glm::vec2(p) * nearness[i], domain());
     }
     int64_t area = 0;
     for (int i = 1; i + 1 < count; ++i)

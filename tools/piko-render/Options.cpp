@@ -49,7 +49,8 @@ it, and says how long a frame took.
   --warmup N --frames N  untimed and timed frames (5 30)
   --seconds S            stop early after so long, but with 3 timed frames at
                          least (1000)
-  --out IMAGE            write the last frame: .png, .exr, .ppm, ...
+  --out IMAGE            write the last frame: .png, .exr, .ppm, ...; may be
+                         repeated
   --trace FILE           run one more frame, and write which thread ran which
                          bins when, for Perfetto or chrome://tracing
   --json                 print one line of JSON
@@ -116,7 +117,7 @@ private:
         {"--warmup", [&] { options.warmup = integer(name, 0, maxInt); }},
         {"--frames", [&] { options.frames = integer(name, 1, maxInt); }},
         {"--seconds", [&] { options.seconds = number(name); }},
-        {"--out", [&] { options.out = value(name); }},
+        {"--out", [&] { options.images.push_back(value(name)); }},
         {"--trace", [&] { options.trace = value(name); }},
         {"--json", [&] { options.json = true; }},
     };

@@ -23,7 +23,7 @@ struct Options {
   int64_t memoryBudget = 0, stripSize = 0;
   int warmup = 5, frames = 30;
   double seconds = 1000;
-  std::string out;
+  std::vector<std::string> images; ///< to write
   std::string trace; ///< where to write which thread ran which bins
   bool json = false;
 };

@@ -153,8 +153,8 @@ Result<std::unique_ptr<LoadedProgram>> loadProgram(const Options &options) {
 
 /// Everything after the command line.
 Result<Done> renderScene(const Options &options) {
-  if (!options.out.empty())
-    if (auto ok = checkImageFormat(options.out); !ok)
+  for (const std::string &image : options.images)
+    if (auto ok = checkImageFormat(image); !ok)
       return ok.error();
   auto program = loadProgram(options);
   if (!program)
@@ -185,9 +185,9 @@ Result<Done> renderScene(const Options &options) {
   auto pixels = readImage(pipeline, *output);
   if (!pixels)
     return pixels.error();
-  if (!options.out.empty())
-    if (auto ok = writeImage(options.out, options.view.width,
-                             options.view.height, *pixels);
+  for (const std::string &image : options.images)
+    if (auto ok = writeImage(image, options.view.width, options.view.height,
+                             *pixels);
         !ok)
       return ok.error();
 

@@ -43,7 +43,7 @@ TEST(RenderOptions, AllOfThem) {
   EXPECT_EQ(o->warmup, 0);
   EXPECT_EQ(o->frames, 4);
   EXPECT_EQ(o->seconds, 2.5);
-  EXPECT_EQ(o->out, "o.exr");
+  EXPECT_EQ(o->images, std::vector<std::string>{"o.exr"});
   ASSERT_EQ(o->values.size(), 2u);
   EXPECT_EQ(o->values[0], (std::pair<std::string, std::string>("depth", "3")));
   EXPECT_EQ(o->values[1], (std::pair<std::string, std::string>("text", "a=b")));
