@@ -65,7 +65,8 @@ def parse_options():
             setattr(options, name, least if quick else usual)
     scenes = SCENES[::2] if quick else SCENES
     try:
-        options.scenes = [Scene.parse(s) for s in options.scenes or scenes]
+        options.scenes = [Scene.parse(s, ROOT)
+                          for s in options.scenes or scenes]
     except ValueError as error:
         parser.error(str(error))
     for name in ("rounds", "frames", "width", "height"):

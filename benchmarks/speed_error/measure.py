@@ -43,12 +43,13 @@ class Scene:
     words: list[str]  # the file and what options it needs
 
     @classmethod
-    def parse(cls, text):
+    def parse(cls, text, root):
         words = shlex.split(text)
         if not words:
             raise ValueError("expected a scene to have a file")
         if os.path.exists(words[0]):  # Tools run in the tree's folder.
-            words[0] = os.path.abspath(words[0])
+            file = os.path.abspath(words[0])
+            words[0] = file.removeprefix(f"{root}/")
         return cls(os.path.splitext(os.path.basename(words[0]))[0], words)
 
     def is_patches(self):

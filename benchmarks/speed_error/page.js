@@ -49,7 +49,7 @@ function makeAxis(values, from, to) {
   const first = hasZero ? from + 0.1 * (to - from) : from;
   const place = v => v > 0 ? first + (Math.log10(v) - low) / (high - low) * (to - first) : from;
   const ticks = [];
-  const steps = high - low < 1.2 ? [1, 2, 5] : [1];
+  const steps = high - low < 2.2 ? [1, 2, 5] : [1];
   const every = Math.max(1, Math.ceil((high - low) / 6));
   for (let e = Math.floor(low); e <= high; e += every)
     for (const step of steps) {
@@ -153,10 +153,11 @@ function drawChoice(section, choice) {
 
 // Error against how hard the scene is: the naive method, and ours.
 function drawMode(figure, mode) {
+  make(figure, "p", {class: "quiet"}, `${mode.error}, by ${mode.hardness}`);
   const svg = make(figure, "svg", {viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: "img", "aria-label": mode.title});
   const x = makeAxis(mode.points.map(p => p.scene), LEFT + 8, WIDTH - RIGHT);
   const y = makeAxis(mode.points.flatMap(p => [p.naive, p.ours]), HEIGHT - BOTTOM, TOP);
-  drawAxes(svg, x, y, mode.hardness, mode.error);
+  drawAxes(svg, x, y, "", "");
   [["naive", COLORS[1]], ["ours", COLORS[0]]].forEach(([who, color]) => {
     make(svg, "path", {class: "front", stroke: color, d: mode.points.map((p, n) => `${n ? "L" : "M"}${x.place(p.scene)} ${y.place(p[who])}`).join("")});
     for (const p of mode.points)

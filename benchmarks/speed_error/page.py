@@ -30,14 +30,18 @@ def encode(file):
     return f"data:image/{kind};base64,{data}"
 
 
+def name(image):
+    return os.path.basename(image)
+
+
 def describe_point(point, reference):
     errors = {m: point.errors[m] for m in METRICS}
     # JSON has no infinity; 400 dB is more than floats can tell apart.
     errors["psnr"] = min(errors["psnr"], 400)
     return {"scene": point.scene, "setting": point.setting, "ms": point.ms,
             "least": min(point.times), "most": max(point.times),
-            "command": point.command, "image": point.image, "map": point.map,
-            "reference": reference, **errors}
+            "command": point.command, "image": name(point.image),
+            "map": name(point.map), "reference": name(reference), **errors}
 
 
 def get_reference(point):
@@ -85,13 +89,14 @@ def write_mode(mode):
 def write_page(file, measured, modes, notes):
     """`measured`: choices, each with its points and what its default costs."""
     points = [p for _, ps, _ in measured for p in ps]
-    names = {name for p in points for name in (p.image, p.map, get_reference(p))}
+    images = {image for p in points
+              for image in (p.image, p.map, get_reference(p))}
     scenes = list(dict.fromkeys(p.scene for p in points))
     data = {"choices": [describe_choice(c, ps) for c, ps, _ in measured],
             "modes": [{k: v for k, v in m.items() if k != "pictures"}
                       for m in modes],
             "scenes": scenes,
-            "images": {name: encode(name) for name in sorted(names)}}
+            "images": {name(image): encode(image) for image in sorted(images)}}
     legend = "".join(
         f'<span><i style="background:{COLORS[i % len(COLORS)]}"></i>{escape(s)}'
         "</span>" for i, s in enumerate(scenes))
