@@ -33,34 +33,34 @@ public:
   bool areOwn();
 
 private:
-  bool isOfPixel(ValueRange indices) const;
+  bool isOfPixel(Attribute state, ValueRange indices);
   bool isOwnArray(Value array) const {
     return columns->isAncestor(array.getParentBlock()->getParentOp());
   }
-  bool isOwn(Operation *op) const;
+  bool isOwn(Operation *op);
 
   scf::ForOp rows, columns;
   llvm::DenseSet<Attribute> written;
+  llvm::DenseMap<Attribute, SmallVector<Value>> pixels; ///< by state
 };
 
 } // namespace
 
-/// Whether indices are the pixel's row and column, in either order.
-bool PixelAccesses::isOfPixel(ValueRange indices) const {
-  auto contains = [&](scf::ForOp loop) {
-    return llvm::any_of(indices, [&](Value index) {
-      return stripCast(index) == loop.getInductionVar();
-    });
-  };
-  return contains(rows) && contains(columns);
+/// Whether indices are the pixel's row and column, in the order in which all
+/// accesses have them.
+bool PixelAccesses::isOfPixel(Attribute state, ValueRange indices) {
+  auto at = llvm::map_to_vector(indices, stripCast);
+  return llvm::is_contained(at, rows.getInductionVar()) &&
+         llvm::is_contained(at, columns.getInductionVar()) &&
+         pixels.try_emplace(state, at).first->second == at;
 }
 
-bool PixelAccesses::isOwn(Operation *op) const {
+bool PixelAccesses::isOwn(Operation *op) {
   if (auto load = dyn_cast<LoadOp>(op))
     return !written.contains(load.getStateAttr()) ||
-           isOfPixel(load.getIndices());
+           isOfPixel(load.getStateAttr(), load.getIndices());
   if (auto store = dyn_cast<StoreOp>(op))
-    return isOfPixel(store.getIndices());
+    return isOfPixel(store.getStateAttr(), store.getIndices());
   if (auto load = dyn_cast<memref::LoadOp>(op))
     return isOwnArray(load.getMemRef());
   if (auto store = dyn_cast<memref::StoreOp>(op))

@@ -94,8 +94,9 @@ piko.pipeline @P rank 2 {
     } {piko.rows}
   }
 
-  // What is left in rows: a pixel that another one reads, what is not behind a
-  // condition alone, upright bounds, and loops that keep their order.
+  // What is left in rows: a pixel that another one reads, one whose row and column
+  // change places, what is not behind a condition alone, upright bounds, and loops
+  // that keep their order.
   // CHECK-LABEL: piko.kernel @left
   // CHECK-NOT:     step %c8_i32
   // CHECK-LABEL: piko.kernel @end
@@ -114,6 +115,19 @@ piko.pipeline @P rank 2 {
           %at = arith.index_cast %x : i32 to index
           %row = arith.index_cast %y : i32 to index
           %other = piko.load checked @out[%at, %zero : index, index] "n" : i64
+          piko.store %other, checked @out[%at, %row : index, index] "n" : i64
+        }
+      } {piko.lanes}
+    } {piko.rows}
+    scf.for %y = %lo to %hi step %one : i32 {
+      %py = arith.muli %k, %y : i32
+      scf.for %x = %lo to %hi step %one : i32 {
+        %e = arith.subi %py, %x : i32
+        %isIn = arith.cmpi sge, %e, %lo : i32
+        scf.if %isIn {
+          %at = arith.index_cast %x : i32 to index
+          %row = arith.index_cast %y : i32 to index
+          %other = piko.load checked @out[%row, %at : index, index] "n" : i64
           piko.store %other, checked @out[%at, %row : index, index] "n" : i64
         }
       } {piko.lanes}

@@ -186,8 +186,8 @@ Result<Done> renderScene(const Options &options) {
   if (!pixels)
     return pixels.error();
   for (const std::string &image : options.images)
-    if (auto ok = writeImage(image, options.view.width, options.view.height,
-                             *pixels);
+    if (auto ok =
+            writeImage(image, options.view.width, options.view.height, *pixels);
         !ok)
       return ok.error();
 

@@ -129,6 +129,8 @@ LogicalResult PhaseImporter::importInstruction(llvm::Instruction *instruction) {
     if (name.starts_with("piko."))
       return importAccessor(call, name);
   }
+  if (llvm::isa<llvm::WithOverflowInst>(instruction))
+    return success(); // Its parts are values.
   if (instruction->getType()->isPointerTy())
     return reject(instruction, manyPlaces);
   if (mlir::Value value = scalars.import(instruction)) {

@@ -278,25 +278,61 @@ Value ScalarImporter::importCompare(llvm::CmpInst *compare) {
   }
 }
 
-/// A part of what an addition or subtraction with overflow gives.
+/// Whether a sum, a difference or a product leaves its type.
+Value ScalarImporter::makeOverflow(llvm::Intrinsic::ID id, Value a, Value b) {
+  using P = arith::CmpIPredicate;
+  Type type = a.getType();
+  unsigned bits = type.getIntOrFloatBitWidth();
+  Value zero = makeInteger(type, llvm::APInt(bits, 0));
+  switch (id) {
+  case llvm::Intrinsic::uadd_with_overflow:
+    return make<arith::CmpIOp>(P::ult, make<arith::AddIOp>(a, b), a);
+  case llvm::Intrinsic::usub_with_overflow:
+    return make<arith::CmpIOp>(P::ult, a, b);
+  case llvm::Intrinsic::umul_with_overflow: {
+    auto product = arith::MulUIExtendedOp::create(builder, *location, a, b);
+    return make<arith::CmpIOp>(P::ne, product.getHigh(), zero);
+  }
+  case llvm::Intrinsic::sadd_with_overflow: {
+    // Its sign is neither that of the one nor that of the other.
+    Value sum = make<arith::AddIOp>(a, b);
+    Value both = make<arith::AndIOp>(make<arith::XOrIOp>(sum, a),
+                                     make<arith::XOrIOp>(sum, b));
+    return make<arith::CmpIOp>(P::slt, both, zero);
+  }
+  case llvm::Intrinsic::ssub_with_overflow: {
+    Value both =
+        make<arith::AndIOp>(make<arith::XOrIOp>(a, b),
+                            make<arith::XOrIOp>(make<arith::SubIOp>(a, b), a));
+    return make<arith::CmpIOp>(P::slt, both, zero);
+  }
+  case llvm::Intrinsic::smul_with_overflow: {
+    auto product = arith::MulSIExtendedOp::create(builder, *location, a, b);
+    Value sign = make<arith::ShRSIOp>(
+        product.getLow(), makeInteger(type, llvm::APInt(bits, bits - 1)));
+    return make<arith::CmpIOp>(P::ne, product.getHigh(), sign);
+  }
+  default:
+    return Value();
+  }
+}
+
+/// A part of what an operation with overflow gives.
 Value ScalarImporter::importOverflow(llvm::Instruction *instruction) {
   auto *extract = cast<llvm::ExtractValueInst>(instruction);
   auto *call = dyn_cast<llvm::WithOverflowInst>(extract->getAggregateOperand());
   if (!call)
     return Value();
   Value a = get(call->getLHS()), b = get(call->getRHS());
-  bool wantsResult = extract->getIndices()[0] == 0;
-  switch (call->getIntrinsicID()) {
-  case llvm::Intrinsic::uadd_with_overflow: {
-    Value sum = make<arith::AddIOp>(a, b);
-    return wantsResult ? sum
-                       : make<arith::CmpIOp>(arith::CmpIPredicate::ult, sum, a);
-  }
-  case llvm::Intrinsic::usub_with_overflow:
-    return wantsResult ? make<arith::SubIOp>(a, b)
-                       : make<arith::CmpIOp>(arith::CmpIPredicate::ult, a, b);
+  if (extract->getIndices()[0] == 1)
+    return makeOverflow(call->getIntrinsicID(), a, b);
+  switch (call->getBinaryOp()) {
+  case llvm::Instruction::Add:
+    return make<arith::AddIOp>(a, b);
+  case llvm::Instruction::Sub:
+    return make<arith::SubIOp>(a, b);
   default:
-    return Value();
+    return make<arith::MulIOp>(a, b);
   }
 }
 

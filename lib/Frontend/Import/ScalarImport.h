@@ -48,6 +48,8 @@ private:
   mlir::Value importCompare(llvm::CmpInst *compare);
   mlir::Value importIntrinsic(llvm::IntrinsicInst *call);
   mlir::Value importOverflow(llvm::Instruction *extract);
+  mlir::Value makeOverflow(llvm::Intrinsic::ID id, mlir::Value a,
+                           mlir::Value b);
   mlir::Value makeFunnelShift(llvm::IntrinsicInst *call, bool left);
   mlir::Value makeClassTest(llvm::IntrinsicInst *call);
   mlir::Value makeClassTestByBits(mlir::Value value, llvm::FPClassTest classes);
