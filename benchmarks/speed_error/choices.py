@@ -119,6 +119,18 @@ def shadows():
         "2 texels", options=("--ground",))
 
 
+def shadow_bias():
+    source = "examples/shadow/shadow.piko.cpp"
+    return Choice(
+        "shadow-bias", "Bias of a shadow map",
+        [Setting(f"{bias} texels", source, "Bins32", sets(bias=bias))
+         for bias in (0, 0.5, 1, 1.5, 3, 6)],
+        exact(shadows=1), "shadow rays in double",
+        "By how many texels' slope examples/shadow lifts a surface above its map: "
+        "with less it shadows itself, with more shadows come off what casts them.",
+        "1.5 texels", options=("--ground",))
+
+
 def micropolygons():
     source = "examples/reyes/reyes.piko.cpp"
     return Choice(
@@ -170,4 +182,5 @@ def output():
 
 CHOICES = {choice.name: choice for choice in
            (numbers(), samples(), subpixels(), depth(), rays(), shading_rate(),
-            transparency(), shadows(), micropolygons(), output())}
+            transparency(), shadows(), shadow_bias(), micropolygons(),
+            output())}

@@ -90,11 +90,12 @@ public:
   }
 
   /// The place on the map, in texels, and the depth of a point on a surface
-  /// with this normal, which faces the light.
-  glm::vec3 lookup(glm::vec3 position, glm::vec3 normal) const {
+  /// with this normal, which faces the light: of one so many texels' slope
+  /// above it.
+  glm::vec3 lookup(glm::vec3 position, glm::vec3 normal, float bias) const {
     glm::vec3 n = glm::abs(axes.along(normal));
     glm::vec2 texel = 2.0f * glm::vec2(half) / glm::vec2(size);
-    float lift = reach * (n.x * texel.x + n.y * texel.y) +
+    float lift = bias * (n.x * texel.x + n.y * texel.y) +
                  roughness * piko::max(texel.x, texel.y);
     glm::vec4 p = clip(position + lift * normal);
     glm::vec2 center = glm::vec2(size) * 0.5f;
@@ -102,7 +103,6 @@ public:
   }
 
 private:
-  static constexpr float reach = 1.5f;
   static constexpr float roughness = 1.0f / 8;
 
   LightAxes axes;

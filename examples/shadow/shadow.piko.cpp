@@ -58,6 +58,7 @@ struct State {
   Camera camera;
   Settings settings;
   int32_t texels = 1; ///< by which a shadow's edge is blurred, on either side
+  float bias = 1.5f;  ///< texels by whose slope surfaces are above the map
   piko::Buffer<Light> lights;
   piko::Buffer<Box> reach;             // of all vertices, in the first element
   piko::Buffer<ShadedVertex> vertices; // one for each Vertex
@@ -205,7 +206,7 @@ private:
     if (!(glm::dot(normal, toLight) > 0))
       return 0; // turned away
     LightView view(toLight, state().reach[0], this->domain());
-    glm::vec3 at = view.lookup(position, normal);
+    glm::vec3 at = view.lookup(position, normal, state().bias);
     glm::ivec2 center(piko::toInt(piko::floor(at.x)),
                       piko::toInt(piko::floor(at.y)));
     glm::vec2 part = glm::vec2(at) - glm::vec2(center);
