@@ -20,7 +20,9 @@ namespace raster {
 #ifndef SUBPIXEL_BITS
 #define SUBPIXEL_BITS 8
 #endif
-constexpr int subpixelBits = SUBPIXEL_BITS; ///< at most 10
+constexpr int subpixelBits = SUBPIXEL_BITS;
+static_assert(subpixelBits >= 1 && subpixelBits <= 10,
+              "guard band and edge functions hold at most 10 bits");
 constexpr int32_t subpixels = 1 << subpixelBits;
 
 /// A point on the screen in 1/256 pixel, x to the right and y down.

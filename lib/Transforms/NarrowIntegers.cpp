@@ -61,6 +61,11 @@ static void hoistLoads(scf::ForOp loop) {
 }
 
 void NarrowIntegersPass::runOnOperation() {
+  if (laneCount < 0) {
+    getOperation().emitError("expected at least 0 lanes, but got ")
+        << int64_t(laneCount);
+    return signalPassFailure();
+  }
   SmallVector<scf::ForOp> rows;
   getOperation().walk([&](scf::ForOp loop) {
     // Loops that stay scalar gain nothing.

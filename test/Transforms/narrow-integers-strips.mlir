@@ -1,4 +1,6 @@
 // RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-narrow-integers{lanes=8}),canonicalize,cse)' --verify-diagnostics %s | FileCheck %s
+// RUN: not piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-narrow-integers{lanes=-8}))' %s 2>&1 | FileCheck %s --check-prefix=LANES
+// LANES: error: expected at least 0 lanes, but got -8
 
 piko.record @V {"n" : i64 at 0, "k" : i32 at 8} size 16 align 8
 
