@@ -3,6 +3,8 @@
 #ifndef PIKO_UNITTESTS_EXAMPLES_TESTSCENE_H
 #define PIKO_UNITTESTS_EXAMPLES_TESTSCENE_H
 
+#include "../Support/Camera.h"
+
 #include <piko.h>
 #include <piko/scene.h>
 
@@ -28,25 +30,6 @@ struct Input {
     triangles.push_back({{a, b, c}, int32_t(triangles.size())});
   }
 };
-
-/// At the origin, looking along -z, 90 degrees wide and high.
-inline Camera makeCamera() {
-  Camera camera{};
-  const float nearZ = 0.25f, farZ = 100;
-  camera.eye = {0, 0, 0};
-  camera.forward = {0, 0, -1};
-  camera.right = {1, 0, 0};
-  camera.up = {0, 1, 0};
-  camera.nearZ = nearZ;
-  camera.farZ = farZ;
-  camera.viewProjection = glm::mat4(0);
-  camera.viewProjection[0][0] = 1;
-  camera.viewProjection[1][1] = 1;
-  camera.viewProjection[2][2] = -(farZ + nearZ) / (farZ - nearZ);
-  camera.viewProjection[2][3] = -1;
-  camera.viewProjection[3][2] = -2 * farZ * nearZ / (farZ - nearZ);
-  return camera;
-}
 
 /// A square of two triangles that faces the camera at a distance.
 inline void addSquare(Input &input, glm::vec2 center, float half,

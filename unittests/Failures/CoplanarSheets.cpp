@@ -4,9 +4,10 @@
 // Depths of two triangles in the same plane are rounded differently if their
 // corners are others, so that now the one is in front and now the other
 // (z-fighting).
-#include "Camera.h"
 #include "Cast.h"
 #include "Failure.h"
+
+#include "../Support/Camera.h"
 
 #include "ExampleOit.h"
 #include "TolerantOit.h"
@@ -53,7 +54,8 @@ template <class Pipe> Image drawSheets(int cells) {
   auto triangles = castAll<typename Pipe::Triangle>(mesh.triangles);
   Pipe pipe;
   pipe.setDomain({size, size});
-  pipe.state().camera = std::bit_cast<typename Pipe::Camera>(makeCamera(0.25f));
+  pipe.state().camera =
+      std::bit_cast<typename Pipe::Camera>(test::makeCamera(0.25f, 1000));
   pipe.state().material = {0.5f};
   pipe.state().lights.assign(
       std::vector<typename Pipe::Light>{{{0, 0, 1, 0}, {1, 1, 1, 0}}});

@@ -1,8 +1,9 @@
 //===- MeshNoise.cpp - Vertices that are nowhere --------------------------===//
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
-#include "Camera.h"
 #include "Cast.h"
 #include "Failure.h"
+
+#include "../Support/Camera.h"
 
 #include "ExampleOit.h"
 #include "TrustingMesh.h"
@@ -99,7 +100,8 @@ template <class Pipe> Image drawBall(const NoisyBall &ball) {
   auto triangles = castAll<typename Pipe::Triangle>(ball.mesh.triangles);
   Pipe pipe;
   pipe.setDomain({size, size});
-  pipe.state().camera = std::bit_cast<typename Pipe::Camera>(makeCamera(0.25f));
+  pipe.state().camera =
+      std::bit_cast<typename Pipe::Camera>(test::makeCamera(0.25f, 1000));
   if constexpr (requires { typename Pipe::Light; })
     pipe.state().lights.assign(
         std::vector<typename Pipe::Light>{{{0, 0.6f, 0.8f, 0}, {1, 1, 1, 0}}});

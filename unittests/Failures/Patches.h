@@ -3,7 +3,7 @@
 #ifndef UNITTESTS_FAILURES_PATCHES_H
 #define UNITTESTS_FAILURES_PATCHES_H
 
-#include "Camera.h"
+#include "../Support/Camera.h"
 #include "Cast.h"
 #include "Failure.h"
 
@@ -37,7 +37,7 @@ template <class Pipe> Image drawPatches(const PatchScene &scene) {
   Pipe pipe;
   pipe.setDomain({scene.size, scene.size});
   pipe.state().camera =
-      std::bit_cast<typename Pipe::Camera>(makeCamera(scene.nearZ));
+      std::bit_cast<typename Pipe::Camera>(test::makeCamera(scene.nearZ, 1000));
   pipe.state().rate = scene.rate;
   pipe.state().lights.assign(lights);
   pipe.state().patches.assign(patches);

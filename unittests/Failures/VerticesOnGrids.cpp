@@ -38,7 +38,7 @@ std::vector<glm::vec2> placeVertices(int cells, Grid grid) {
 /// How often a mesh draws each pixel.
 template <class Pipe> std::vector<int> drawMesh(int cells, Grid grid) {
   std::vector<glm::vec2> v = placeVertices(cells, grid);
-  std::vector<typename Pipe::MeshTriangle> triangles;
+  std::vector<typename Pipe::FlatTriangle> triangles;
   for (int j = 0; j < cells; ++j)
     for (int i = 0; i < cells; ++i) {
       int at = j * (cells + 1) + i, below = at + cells + 1;
