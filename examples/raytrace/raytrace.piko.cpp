@@ -161,7 +161,8 @@ struct Shade : piko::Stage<M.bin, M.bin, 64, Surface, Ray, Radiance>,
   void process(const Surface &s) {
     Point p = pointOf(s);
     glm::vec3 weight = s.weight;
-    if (s.mirrors < this->state().depth) {
+    // The first condition is for a pipeline whose depth is fixed to 0.
+    if (this->state().depth > 0 && s.mirrors < this->state().depth) {
       float mirror = this->state().mirror;
       emitRay(s, p, mirrored(s.direction, p), INFINITY, weight * mirror,
               s.mirrors + 1);

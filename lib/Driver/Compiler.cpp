@@ -183,10 +183,15 @@ piko::readPipelineNames(const CompileOptions &options, MLIRContext &context) {
   return getNames(*module);
 }
 
-/// Findings are about the stages as they are written.
+/// Findings and counts of work are about the stages as they are written.
 static SynthesisOptions choosePasses(const CheckOptions &check,
                                      const SynthesisOptions &synthesis) {
-  return check.enabled ? SynthesisOptions::none() : synthesis;
+  if (!check.enabled && synthesis.count != Counting::Work)
+    return synthesis;
+  SynthesisOptions none = SynthesisOptions::none();
+  none.count = synthesis.count;
+  none.fix = synthesis.fix;
+  return none;
 }
 
 void piko::addPasses(OpPassManager &passes, Level from, Level to,

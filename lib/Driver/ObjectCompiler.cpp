@@ -76,8 +76,9 @@ static std::string makeRequest(const ObjectOptions &options,
   addSurroundings(key, files);
   const CompileOptions &source = options.source;
   key.add(source.file).add(source.pipeName).add(source.text.value_or(""));
-  for (const auto *list : {&source.includeDirs, &source.defines,
-                           &source.check.numbers, &source.synthesis.without}) {
+  for (const auto *list :
+       {&source.includeDirs, &source.defines, &source.check.numbers,
+        &source.synthesis.without, &source.synthesis.fix}) {
     key.add(std::to_string(list->size()));
     for (const std::string &item : *list)
       key.add(item);
@@ -89,7 +90,8 @@ static std::string makeRequest(const ObjectOptions &options,
                      int(options.execution), options.target.optLevel,
                      int(options.target.sanitizer), int(options.remarks),
                      int(options.allPipelines), int(source.gpu.emulate),
-                     int(source.gpu.seed), int(source.gpu.threads)})
+                     int(source.synthesis.count), int(source.gpu.seed),
+                     int(source.gpu.threads)})
     key.add(std::to_string(number));
   key.add(options.nameSpace).add(getRuntimeIncludeDir());
   return key.finish();

@@ -38,6 +38,14 @@ void piko::addCheckSequence(OpPassManager &passes,
 
 void piko::addSynthesisSequence(OpPassManager &passes,
                                 const SynthesisOptions &options) {
+  if (!options.fix.empty()) {
+    FixConstantsOptions constants;
+    constants.values.assign(options.fix.begin(), options.fix.end());
+    passes.nest<PipelineOp>().addPass(createFixConstants(constants));
+    addCleanUp(passes);
+  }
+  if (options.count == Counting::Work)
+    passes.nest<PipelineOp>().addPass(createCountWork());
   addCleanUp(passes);
   // First: proofs are about what is computed. It cannot be left out, as results
   // depend on it.
@@ -53,6 +61,8 @@ void piko::addSynthesisSequence(OpPassManager &passes,
   }
   {
     OpPassManager &pipeline = passes.nest<PipelineOp>();
+    if (options.has("prune"))
+      pipeline.addPass(createPruneUnreached());
     pipeline.addPass(createOrderStages());
     if (options.has("pre-schedule"))
       pipeline.addPass(createPreSchedule());
@@ -166,6 +176,8 @@ void piko::addVectorSequence(OpPassManager &passes,
     passes.nest<PipelineOp>().addPass(createTabulateInvariants());
     addCleanUp(passes);
   }
+  if (options.count == Counting::Lanes)
+    passes.nest<PipelineOp>().addPass(createCountLanes());
   passes.nest<PipelineOp>().addPass(createConvertPikoToOpenMP());
   passes.addPass(createConvertPikoToLLVM());
   addCleanUp(passes);

@@ -137,6 +137,21 @@ void pikoir_declare_state(pikort_pipeline *p, int32_t id, const char *name,
   });
 }
 
+void pikoir_declare_fixed(pikort_pipeline *p, int32_t id, const char *field,
+                          int64_t offset, int64_t size, int64_t bits) {
+  guarded(p, "setup", [&] {
+    expect(id >= 0 && id < static_cast<int32_t>(p->states.size()),
+           "expected declared state that is fixed, but got " +
+               std::to_string(id));
+    int32_t kind = size ? PIKORT_CONSTANT : PIKORT_BUFFER;
+    const State &state = p->states[id];
+    expect(state.kind == kind && size >= 0 && size <= 8 && offset >= 0 &&
+               offset + size <= p->records[state.record].size,
+           "state " + quoted(state.name) + ": expected what can be fixed");
+    p->fixed.push_back({id, orEmpty(field), offset, size, bits});
+  });
+}
+
 void pikoir_declare_written(pikort_pipeline *p, int32_t id) {
   guarded(p, "setup", [&] { findBuffer(p, id).written = true; });
 }

@@ -313,6 +313,36 @@ static void checkBound(const pikort_pipeline &p) {
                                         std::to_string(s) + " is not bound"};
 }
 
+/// Whether what the code was specialized for is what the host has bound.
+static bool holds(const State &state, const Fixed &fixed, int64_t elements) {
+  if (fixed.size == 0)
+    return elements == fixed.bits;
+  return std::memcmp(state.bytes.data() + fixed.offset, &fixed.bits,
+                     static_cast<size_t>(fixed.size)) == 0;
+}
+
+static void checkFixed(const pikort_pipeline &p) {
+  for (const Fixed &fixed : p.fixed) {
+    const State &state = p.states[fixed.state];
+    int64_t elements = state.perSource < 0 ? state.view.extent[0]
+                                           : p.sources[state.perSource].count;
+    if (holds(state, fixed, elements))
+      continue;
+    std::string who = "pipeline " + quoted(p.name) + ": ";
+    if (fixed.size == 0)
+      throw Failure{PIKORT_INVALID_ARGUMENT,
+                    who + "it was compiled for a buffer " + quoted(state.name) +
+                        " of " + std::to_string(fixed.bits) +
+                        " elements, but got " + std::to_string(elements)};
+    throw Failure{PIKORT_INVALID_ARGUMENT,
+                  who + "it was compiled for another value of constant " +
+                      quoted(state.name) +
+                      (fixed.field == "value"
+                           ? std::string()
+                           : ", field " + quoted(fixed.field))};
+  }
+}
+
 /// Bytes of the host's, from `data` on.
 struct HostMemory {
   const uint8_t *data;
@@ -363,6 +393,7 @@ int32_t pikort_run(pikort_pipeline *p) {
     p->profile.begin();
   int32_t code = call(p, [&] {
     checkBound(*p);
+    checkFixed(*p);
     checkApart(*p);
     p->computeGrids();
     p->executor->beginRun();

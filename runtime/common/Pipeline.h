@@ -10,6 +10,7 @@
 #ifndef PIKO_RUNTIME_COMMON_PIPELINE_H
 #define PIKO_RUNTIME_COMMON_PIPELINE_H
 
+#include "common/Counters.h"
 #include "common/Executor.h"
 #include "common/Profile.h"
 #include "pikort/abi.h"
@@ -93,6 +94,14 @@ struct StripGroup {
   int64_t chunk = 0; ///< Most primitives in a strip; 0 = as memory allows.
   std::vector<int32_t> stages;
   bool writes = false; ///< Some stage writes state.
+};
+
+/// What the code takes for granted of a constant, or of a buffer's size.
+struct Fixed {
+  int32_t state;
+  std::string field;
+  int64_t offset, size; ///< In bytes; size 0 = the number of elements.
+  int64_t bits;
 };
 
 /// How a stage, or one of its bins, runs.
@@ -248,6 +257,8 @@ struct pikort_pipeline {
   void (*unitReport)(void *, const pikort_unit_run *) = nullptr;
   void *unitReportData = nullptr;
 
+  std::vector<piko::rt::Fixed> fixed;
+  std::vector<std::unique_ptr<piko::rt::Counter>> counters;
   piko::rt::Profile profile{memory};
   std::vector<piko::rt::KernelStats> kernelStats;
   std::vector<piko::rt::StageStats> stageStats;
@@ -341,6 +352,9 @@ int32_t guarded(pikort_pipeline *p, const Who &who, Body &&body) noexcept {
     return p->fail(PIKORT_OUT_OF_MEMORY, {});
   }
 }
+
+/// Before a run, when all state has its size; throws.
+void startCounters(pikort_pipeline &p);
 
 /// 'name', for messages.
 inline std::string quoted(const std::string &name) { return "'" + name + "'"; }

@@ -185,6 +185,8 @@ void pikort_reset_stats(pikort_pipeline *p) {
   p->profile.reset();
   for (StageStats &stats : p->stageStats)
     stats = {};
+  for (std::unique_ptr<Counter> &counter : p->counters)
+    counter->reset();
   p->runs = 0;
   p->memory.resetPeak();
 }

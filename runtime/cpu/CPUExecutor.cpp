@@ -47,6 +47,7 @@ void CPUExecutor::prepare() {
 
 void CPUExecutor::beginRun() {
   prepareState(p);
+  startCounters(p);
   p.profile.enter(Part::Program);
   if (checker)
     checker->beginRun();

@@ -24,6 +24,10 @@ it, and says how long a frame took.
                          which this machine has everything (native)
   -I FOLDER, -D NAME[=VALUE]   for the pipeline's preprocessor
   --without PASS,...     passes of synthesis to leave out
+  --fix NAME,...         specialize the pipeline for values that the scene has:
+                         CONSTANT, BUFFER.size, all (all constants but cameras,
+                         and sizes of small buffers), or NAME=VALUE; may be
+                         repeated
   --gpu-threads N        for gpu-on-cpu: threads of a block, a power of two up to
                          1024 (as many as the stage has)
   --gpu-seed N           for gpu-on-cpu: permutes the blocks (in order)
@@ -53,6 +57,10 @@ it, and says how long a frame took.
                          repeated
   --trace FILE           run one more frame, and write which thread ran which
                          bins when, for Perfetto or chrome://tracing
+  --counters             count the work of one more frame beside the least that
+                         it needs: calls, loops, bytes, arithmetic, lanes
+  --explain              name the frame's three largest wastes, and what would
+                         remove them
   --json                 print one line of JSON
   --help                 print this
 )";
@@ -98,6 +106,7 @@ private:
         {"--no-cache", [&] { options.load.cache.enabled = false; }},
         {"--cache-dir", [&] { options.load.cache.directory = value(name); }},
         {"--without", [&] { parseWithout(value("--without")); }},
+        {"--fix", [&] { parseFix(value(name)); }},
         {"--gpu-threads",
          [&] { options.load.gpu.threads = integer(name, 1, 1024); }},
         {"--gpu-seed",
@@ -119,6 +128,8 @@ private:
         {"--seconds", [&] { options.seconds = number(name); }},
         {"--out", [&] { options.images.push_back(value(name)); }},
         {"--trace", [&] { options.trace = value(name); }},
+        {"--counters", [&] { options.counters = true; }},
+        {"--explain", [&] { options.explain = true; }},
         {"--json", [&] { options.json = true; }},
     };
     auto action = actions.find(name);
@@ -130,9 +141,21 @@ private:
 
   void parseWithout(const std::string &text) {
     if (auto synthesis = parseSynthesisOptions(text))
-      options.load.synthesis = *synthesis;
+      options.load.synthesis.without = synthesis->without;
     else
       fail(describeWrongSynthesisOptions(text));
+  }
+
+  void parseFix(const std::string &text) {
+    for (size_t begin = 0; begin <= text.size();) {
+      size_t end = std::min(text.find(',', begin), text.size());
+      if (end == begin)
+        return fail("--fix: expected names with commas between them, but got "
+                    "'" +
+                    text + "'");
+      options.fix.push_back(text.substr(begin, end - begin));
+      begin = end + 1;
+    }
   }
 
   void parseCheck(const std::string &text) {
@@ -165,6 +188,10 @@ private:
       fail("expected a pipeline file and a scene file");
     else if (!(options.view.fovy > 0 && options.view.fovy < 180))
       fail("--fovy: expected an angle between 0 and 180 degrees");
+    else if (!options.fix.empty() &&
+             options.load.target == ExecutionTarget::Reference)
+      fail("--fix is for pipelines that are compiled, and does nothing with "
+           "--target reference");
     else if (!(options.seconds >= 0))
       fail("--seconds: expected a number of at least 0");
   }

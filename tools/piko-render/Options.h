@@ -19,12 +19,15 @@ struct Options {
   bool cull = false;
   bool ground = false;
   std::vector<std::pair<std::string, std::string>> values; ///< of constants
+  std::vector<std::string> fix; ///< what to specialize the pipeline for
   int threads = 0;
   int64_t memoryBudget = 0, stripSize = 0;
   int warmup = 5, frames = 30;
   double seconds = 1000;
   std::vector<std::string> images; ///< to write
-  std::string trace; ///< where to write which thread ran which bins
+  std::string trace;     ///< where to write which thread ran which bins
+  bool counters = false; ///< count the work of one more frame
+  bool explain = false;
   bool json = false;
 };
 

@@ -5,9 +5,12 @@
 // piko/scene.h says.
 //
 //===----------------------------------------------------------------------===//
+#include "Frame.h"
 #include "Options.h"
 #include "Report.h"
+#include "Specialize.h"
 #include "Trace.h"
+#include "Wastes.h"
 
 #include "Piko/Scene/Binding.h"
 #include "Piko/Scene/ImageFile.h"
@@ -35,12 +38,6 @@ public:
 private:
   using Clock = std::chrono::steady_clock;
   Clock::time_point start = Clock::now();
-};
-
-/// A pipeline of the runtime, destroyed at the end.
-struct PipelineOwner {
-  pikort_pipeline *pipeline = nullptr;
-  ~PipelineOwner() { pikort_destroy(pipeline); }
 };
 
 Error errorOf(pikort_pipeline *pipeline) { return {pikort_message(pipeline)}; }
@@ -138,51 +135,65 @@ std::string hashOf(std::span<const scene::Color> pixels) {
   return text;
 }
 
-Result<std::unique_ptr<LoadedProgram>> loadProgram(const Options &options) {
-  std::string diagnostics;
-  auto program = loadPipeline(options.pipeline, options.load, diagnostics);
-  if (!program && diagnostics.empty())
-    return Error{"cannot load pipeline '" + options.pipeline + "'"};
-  std::fputs(diagnostics.c_str(), stderr);
-  if (!diagnostics.empty() && diagnostics.back() != '\n')
-    std::fputc('\n', stderr);
-  if (!program)
-    return Error{}; // already said
-  return program;
+/// Puts a frame for the values that the options name in the place of a general
+/// one.
+Result<Done> specializeFrame(Options &options, SceneInput &scene,
+                             Frame &frame) {
+  auto specialized = specialize(options, frame.pipeline());
+  if (!specialized)
+    return specialized.error();
+  options = *specialized;
+  auto loaded = Frame::load(options);
+  if (!loaded)
+    return loaded.error();
+  frame = std::move(*loaded);
+  return frame.bind(options, scene);
+}
+
+/// Prints what is asked for.
+Result<Done> report(const Options &options, const RunResult &result,
+                    SceneInput &scene, pikort_pipeline *pipeline) {
+  JsonObject line = makeReport(options, result, pipeline);
+  std::string text = summarize(result, pipeline) + "\n";
+  if (options.counters || options.explain) {
+    auto work = measureWork(options, scene, pipeline);
+    if (!work)
+      return work.error();
+    std::vector<Waste> wastes = findWastes(*work, pipeline);
+    line.add("work", reportWork(*work)).add("wastes", reportWastes(wastes));
+    if (options.counters)
+      text += printWork(*work, result.pixels);
+    if (options.explain)
+      text += printWastes(wastes);
+  }
+  std::printf("%s", options.json ? (line.text() + "\n").c_str() : text.c_str());
+  return Done{};
 }
 
 /// Everything after the command line.
-Result<Done> renderScene(const Options &options) {
+Result<Done> renderScene(Options options) {
   for (const std::string &image : options.images)
     if (auto ok = checkImageFormat(image); !ok)
       return ok.error();
-  auto program = loadProgram(options);
-  if (!program)
-    return program.error();
+  auto frame = Frame::load(options);
+  if (!frame)
+    return frame.error();
   Stopwatch loading;
   auto scene = loadScene(options);
   if (!scene)
     return scene.error();
   double loadMilliseconds = loading.milliseconds();
-
-  PipelineOwner owner;
-  int32_t code = pikort_create(&(*program)->get(), &owner.pipeline);
-  pikort_pipeline *pipeline = owner.pipeline;
-  int64_t extent[] = {options.view.width, options.view.height};
-  if (code != PIKORT_OK ||
-      pikort_set_domain(pipeline, 2, extent) != PIKORT_OK ||
-      pikort_set_threads(pipeline, options.threads) != PIKORT_OK ||
-      pikort_set_memory_budget(pipeline, options.memoryBudget) != PIKORT_OK ||
-      pikort_set_strip_size(pipeline, options.stripSize) != PIKORT_OK)
-    return errorOf(pipeline);
-  auto output = bindScene(pipeline, *scene);
-  if (!output)
-    return output.error();
+  if (auto ok = frame->bind(options, *scene); !ok)
+    return ok.error();
+  if (!options.fix.empty())
+    if (auto ok = specializeFrame(options, *scene, *frame); !ok)
+      return ok.error();
+  pikort_pipeline *pipeline = frame->pipeline();
 
   auto times = timeFrames(options, pipeline);
   if (!times)
     return times.error();
-  auto pixels = readImage(pipeline, *output);
+  auto pixels = readImage(pipeline, frame->image());
   if (!pixels)
     return pixels.error();
   for (const std::string &image : options.images)
@@ -203,7 +214,7 @@ Result<Done> renderScene(const Options &options) {
   int cores = int(std::max(1u, std::thread::hardware_concurrency()));
   int threads = isReference ? 1 : options.threads ? options.threads : cores;
   RunResult result{*times,
-                   (*program)->compileMilliseconds(),
+                   frame->compileMilliseconds(),
                    loadMilliseconds,
                    int64_t(scene->mesh.triangles.size()),
                    int64_t(scene->mesh.vertices.size()),
@@ -212,9 +223,8 @@ Result<Done> renderScene(const Options &options) {
                    countDrawn(*pixels),
                    hashOf(*pixels),
                    std::move(*counts)};
-  std::string text = options.json ? makeReport(options, result, pipeline).text()
-                                  : summarize(result, pipeline);
-  std::printf("%s\n", text.c_str());
+  if (auto ok = report(options, result, *scene, pipeline); !ok)
+    return ok.error();
   return options.trace.empty() ? Done{} : traceFrame(pipeline, options.trace);
 }
 

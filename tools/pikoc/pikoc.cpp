@@ -152,6 +152,12 @@ struct CommandLine {
       "without", llvm::cl::value_desc("pass,..."),
       llvm::cl::desc("passes of synthesis to leave out"),
       llvm::cl::cat(category)};
+  llvm::cl::list<std::string> fix{
+      "fix", llvm::cl::CommaSeparated, llvm::cl::value_desc("name=value,..."),
+      llvm::cl::desc("specialize the pipeline for values of constants, "
+                     "name[.field][[element]], and for sizes of buffers, "
+                     "name.size; a run with others is an error"),
+      llvm::cl::cat(category)};
   llvm::cl::opt<bool> explain{
       "explain", llvm::cl::desc("write what synthesis makes of the pipeline"),
       llvm::cl::cat(category)};
@@ -174,8 +180,11 @@ struct CommandLine {
     return parseCheckOptions(check.empty() ? "" : "=" + check);
   }
   std::optional<SynthesisOptions> getSynthesis() const {
-    return without.empty() ? SynthesisOptions()
-                           : parseSynthesisOptions(without);
+    auto options =
+        without.empty() ? SynthesisOptions() : parseSynthesisOptions(without);
+    if (options)
+      options->fix.assign(fix.begin(), fix.end());
+    return options;
   }
   bool isEmulated() const { return target == Machine::GPUOnCPU; }
   CompileOptions getSource() const {

@@ -24,7 +24,8 @@ TEST(RenderOptions, AllOfThem) {
        "--warmup",  "0",        "--frames",   "4",         "--seconds",
        "2.5",       "--out",    "o.exr",      "--json",    "-I",
        "inc",       "-Iother",  "-DX=1",      "-D",        "Y",
-       "scene.obj", "--set",    "depth=3",    "--set",     "text=a=b"});
+       "scene.obj", "--set",    "depth=3",    "--set",     "text=a=b",
+       "--without", "prune",    "--counters", "--explain"});
   ASSERT_TRUE(o) << o.error().message;
   EXPECT_EQ(o->pipeline, "a.piko.cpp");
   EXPECT_EQ(o->scene, "scene.obj");
@@ -39,6 +40,7 @@ TEST(RenderOptions, AllOfThem) {
   EXPECT_EQ(*o->view.at, glm::vec3(0, 0.5f, 0));
   EXPECT_EQ(o->lights, 7);
   EXPECT_TRUE(o->cull && o->ground && o->json && !o->help);
+  EXPECT_TRUE(o->counters && o->explain);
   EXPECT_EQ(o->threads, 2);
   EXPECT_EQ(o->warmup, 0);
   EXPECT_EQ(o->frames, 4);
@@ -53,6 +55,24 @@ TEST(RenderOptions, HelpNeedsNothingElse) {
   auto o = parseOptions({"--help"});
   ASSERT_TRUE(o);
   EXPECT_TRUE(o->help);
+}
+
+// Neither --fix nor --without takes back what the other one says.
+TEST(RenderOptions, Fix) {
+  auto o = parseOptions({"a", "b", "--fix", "all,depth=3", "--without", "prune",
+                         "--fix", "lights.size"});
+  ASSERT_TRUE(o) << o.error().message;
+  EXPECT_EQ(o->fix,
+            (std::vector<std::string>{"all", "depth=3", "lights.size"}));
+  EXPECT_EQ(o->load.synthesis.without, std::vector<std::string>{"prune"});
+  for (const char *wrong : {"", ",", "a,", "a,,b"})
+    EXPECT_EQ(errorOf({"a", "b", "--fix", wrong}),
+              std::string("--fix: expected names with commas between them, but "
+                          "got '") +
+                  wrong + "'");
+  EXPECT_EQ(errorOf({"a", "b", "--fix", "all", "--target", "reference"}),
+            "--fix is for pipelines that are compiled, and does nothing with "
+            "--target reference");
 }
 
 TEST(RenderOptions, Check) {

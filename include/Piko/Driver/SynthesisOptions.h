@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// Which passes of synthesis to leave out: `--without=PASS,...`.
+// Which passes of synthesis to leave out, `--without=PASS,...`, and what to
+// count.
 
 #ifndef PIKO_DRIVER_SYNTHESISOPTIONS_H
 #define PIKO_DRIVER_SYNTHESISOPTIONS_H
@@ -11,15 +12,26 @@
 
 namespace piko {
 
+/// What a program counts as it runs.
+enum class Counting {
+  None,
+  Work, ///< What the text of each stage does, from the authored level on.
+  Lanes ///< The operations and lanes of the code, on a CPU.
+};
+
 struct SynthesisOptions {
   /// Names of passes as piko-opt has them, but for `piko-`.
   std::vector<std::string> without;
+  /// Values that constants and sizes of buffers have in all runs, as
+  /// piko-fix-constants takes them.
+  std::vector<std::string> fix = {};
+  Counting count = Counting::None;
 
   bool has(const std::string &pass) const;
   /// All passes that can be left out; results are the same without them.
   static const std::vector<std::string> &getOptional();
   /// None of them.
-  static SynthesisOptions none() { return {getOptional()}; }
+  static SynthesisOptions none() { return {.without = getOptional()}; }
 };
 
 /// Reads names with commas between them, with or without `piko-`; none if one

@@ -53,6 +53,96 @@ def AddChecks : Pass<"piko-add-checks", "::mlir::ModuleOp"> {
                            "::mlir::memref::MemRefDialect"];
 }
 
+def CountWork : Pass<"piko-count-work", "::piko::PipelineOp"> {
+  let summary = "Count what the text of each stage does";
+  let description = [{
+    **Requires** the authored level, with stages as they are written.
+
+    **Does**, in each process phase: counts its calls, the turns of each loop and
+    the iterations of each parallel one, what goes out of each port, the fields
+    of each piece of state that are read and written, the pixels that are
+    updated, and the arithmetic operations on floats and on integers. Each number
+    is a `piko.counter`, whose location is the loop, or the first emission or
+    access.
+
+    **Guarantees** that the pipeline computes what it did. Without the passes
+    that fuse and leave out work, the counts are those of the reference: the same
+    on any number of threads.
+
+    Before:
+    ```
+    piko.stage @shade ... {
+      piko.process {
+        %x = piko.load @lights[%i : index] "x" : f32
+        %y = arith.mulf %x, %x : f32
+        piko.emit 0 (%y) : f32
+    ```
+    After:
+    ```
+    piko.counter 0 calls of "shade"
+    piko.counter 1 floats of "shade"
+    piko.counter 2 integers of "shade"
+    piko.counter 3 reads of "shade" to @lights
+    piko.counter 4 emissions of "shade" port 0
+    piko.stage @shade ... {
+      piko.process {
+        %one = arith.constant 1 : index
+        piko.count 0 by %one
+        piko.count 1 by %one
+        piko.count_element 3 @lights[%i : index] 4 bytes at 0
+        %x = piko.load @lights[%i : index] "x" : f32
+        %y = arith.mulf %x, %x : f32
+        piko.count 4 by %one
+        piko.emit 0 (%y) : f32
+    ```
+
+    **Limits**: what moves, chooses or converts between integers is no
+    arithmetic, nor is the logic of conditions; a function such as an exponential
+    is one operation. The assign and schedule phases are not counted.
+  }];
+  let statistics = [Statistic<"counters", "counters", "counters">];
+  let dependentDialects = ["::mlir::arith::ArithDialect"];
+}
+
+def FixConstants : Pass<"piko-fix-constants", "::piko::PipelineOp"> {
+  let summary = "Specialize a pipeline for values of its constants";
+  let description = [{
+    **Requires** the authored level.
+
+    **Does**: `values` has the form `settings.shadows=0`, `weights.value[2]=0.5`
+    (of an array), `albedo=0.5` (a constant that is a number) or `lights.size=1`
+    (how many elements a buffer has). The value takes the place of each load of
+    the field and of each `piko.extent` of the buffer, and a `piko.fixed` has the
+    runtime test, before each run, that the host's value is the same.
+
+    **Guarantees** that results are those of the general pipeline, or a run is an
+    error that names the constant. What the value makes unnecessary goes by
+    canonicalization and `piko-prune`.
+
+    Before:
+    ```
+    piko.constant @settings : @Settings
+    ...
+      %shadows = piko.load @settings "shadows" : i32
+    ```
+    After:
+    ```
+    piko.constant @settings : @Settings
+    piko.fixed @settings "shadows" = 0 : i32
+    ...
+      %shadows = arith.constant 0 : i32
+    ```
+
+    **Limits**: an element that is indexed by what is not constant is loaded all
+    the same. Elements of buffers are not fixed.
+  }];
+  let options = [
+    ListOption<"values", "values", "std::string",
+               "CONSTANT[.FIELD][[ELEMENT]]=VALUE or BUFFER.size=COUNT">];
+  let statistics = [Statistic<"replaced", "replaced", "loads and sizes">];
+  let dependentDialects = ["::mlir::arith::ArithDialect"];
+}
+
 def ApplyPrecision : Pass<"piko-apply-precision", "::piko::PipelineOp"> {
   let summary = "Compute in each process phase as precisely as its stage says";
   let description = [{
@@ -459,6 +549,41 @@ def ProveBounds : Pass<"piko-prove-bounds", "::piko::PipelineOp"> {
   let statistics = [
     Statistic<"proved", "proved", "accesses that need no test">,
     Statistic<"left", "left", "accesses that are tested">];
+}
+
+def PruneUnreached : Pass<"piko-prune-unreached", "::piko::PipelineOp"> {
+  let summary = "Drop edges on which nothing goes, and what they alone feed";
+  let description = [{
+    **Requires** the authored level, cleaned up, with stages as they are written.
+
+    **Does**: a port on which no operation of the process phase emits, because a
+    constant or a template argument says so, goes with its edge; so does each
+    stage that no primitive can reach from a source.
+
+    **Guarantees** the same results, and the same order of what is left.
+
+    Before:
+    ```
+    piko.edge @shade[0] -> @trace
+    piko.edge @shade[1] -> @accumulate
+    piko.edge @trace[0] -> @accumulate
+    piko.stage @shade ... -> [@Ray, @Radiance] {
+      ... piko.emit 1 (%color) : f32 // and no other
+    ```
+    After:
+    ```
+    piko.edge @shade[0] -> @accumulate
+    piko.stage @shade ... -> [@Radiance] {
+      ... piko.emit 0 (%color) : f32
+    ```
+
+    **Limits**: a stage that runs for empty bins, or that one which is reached
+    waits for, stays, with an edge that leads there. So does all that is fed only
+    behind a condition which never holds, but is not constant.
+  }];
+  let statistics = [
+    Statistic<"edges", "edges", "edges that were dropped">,
+    Statistic<"stages", "stages", "stages that were dropped">];
 }
 
 def Prune : Pass<"piko-prune", "::mlir::ModuleOp"> {

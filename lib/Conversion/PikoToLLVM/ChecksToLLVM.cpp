@@ -29,14 +29,8 @@ template <typename OpT> struct CheckLowering : ContextPattern<OpT> {
     return v ? toI64(builder, op.getLoc(), v)
              : createI64(builder, op.getLoc(), otherwise);
   }
-  /// "file:line", or null where the place is not known.
   Value place(OpBuilder &builder, OpT op) const {
-    if (auto at = op.getLoc()->template findInstanceOf<FileLineColLoc>())
-      return context.text(
-          builder, op.getLoc(),
-          (at.getFilename().getValue() + ":" + Twine(at.getLine())).str());
-    return LLVM::ZeroOp::create(
-        builder, op.getLoc(), LLVM::LLVMPointerType::get(builder.getContext()));
+    return context.place(builder, op);
   }
 };
 

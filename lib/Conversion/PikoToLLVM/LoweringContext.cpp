@@ -261,6 +261,16 @@ StringRef LoweringContext::zeros(int64_t bytes) {
   return name;
 }
 
+Value LoweringContext::place(OpBuilder &builder, Operation *op) {
+  Location loc = op->getLoc();
+  if (auto at = loc->findInstanceOf<FileLineColLoc>())
+    return text(
+        builder, loc,
+        (at.getFilename().getValue() + ":" + Twine(at.getLine())).str());
+  return LLVM::ZeroOp::create(builder, loc,
+                              LLVM::LLVMPointerType::get(builder.getContext()));
+}
+
 Value LoweringContext::text(OpBuilder &builder, Location loc, StringRef text) {
   LLVM::GlobalOp &global = texts[text];
   if (!global) {

@@ -110,6 +110,9 @@ public:
   mlir::Value text(mlir::OpBuilder &builder, mlir::Location loc,
                    mlir::StringRef text);
 
+  /// "file:line" of an operation, or null where that is not known.
+  mlir::Value place(mlir::OpBuilder &builder, mlir::Operation *op);
+
   /// The grid that an operation is in, or null on a CPU.
   Grid *grid(mlir::Operation *op);
   void noteGrid(mlir::Operation *inside, Grid grid);
@@ -201,6 +204,9 @@ void populateRecordsToLLVMPatterns(const mlir::TypeConverter &converter,
 void populateLanesToLLVMPatterns(const mlir::TypeConverter &converter,
                                  mlir::RewritePatternSet &patterns,
                                  LoweringContext &context);
+void populateCountsToLLVMPatterns(const mlir::TypeConverter &converter,
+                                  mlir::RewritePatternSet &patterns,
+                                  LoweringContext &context);
 void populateChecksToLLVMPatterns(const mlir::TypeConverter &converter,
                                   mlir::RewritePatternSet &patterns,
                                   LoweringContext &context);

@@ -159,6 +159,7 @@ LogicalResult ConvertPikoToLLVMPass::convert(PipelineOp pipeline,
   populateLanesToLLVMPatterns(converter, patterns, context);
   populateRecordsToLLVMPatterns(converter, patterns, context);
   populateChecksToLLVMPatterns(converter, patterns, context);
+  populateCountsToLLVMPatterns(converter, patterns, context);
   populateApproximationsToLLVMPatterns(converter, patterns, context);
   populateReductionsToLLVMPatterns(converter, patterns, context);
   populateGridToLLVMPatterns(converter, patterns, context);

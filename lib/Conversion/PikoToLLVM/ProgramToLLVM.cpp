@@ -7,6 +7,8 @@
 
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "Piko/Dialect/Piko/IR/PikoCheck.h"
+#include "Piko/Dialect/Piko/IR/PikoCount.h"
+#include "Piko/Dialect/Piko/IR/PikoFixed.h"
 #include "Piko/Dialect/Piko/IR/PikoProgram.h"
 
 #include "mlir/Dialect/ControlFlow/IR/ControlFlowOps.h"
@@ -45,6 +47,8 @@ private:
   void declareRecord(StringAttr name, int32_t number);
   void declareField(FieldAttr field, int32_t record);
   void declareCheckedRecord(CheckRecordOp record);
+  void declareCounter(CounterOp counter);
+  void declareFixed(FixedOp fixed);
   void declareState(Operation *state, int32_t number);
   void declareStage(StageOp stage, int32_t number);
   void declareEdge(EdgeOp edge);
@@ -122,6 +126,32 @@ void SetupWriter::declareField(FieldAttr field, int32_t record) {
           i64(field.getElementOffset(row * rowLength)), i64(rowLength),
           i64(strides.empty() ? 0 : strides.back())});
   }
+}
+
+void SetupWriter::declareCounter(CounterOp counter) {
+  int64_t part = counter.getPort().value_or(-1);
+  if (FlatSymbolRefAttr state = counter.getStateAttr())
+    part = numbers.states.lookup(state.getAttr());
+  call(PIKO_RUNTIME_FUNCTION(pikoir_declare_counter),
+       {i32(counter.getNumber()), i32(int64_t(counter.getKind())),
+        text(counter.getStage()), i32(part),
+        i32(counter.getInside() ? int64_t(*counter.getInside()) : -1),
+        context.place(builder, counter)});
+}
+
+void SetupWriter::declareFixed(FixedOp fixed) {
+  int64_t offset = 0, size = 0;
+  StringRef name = fixed.getField().value_or("");
+  if (!name.empty()) {
+    Operation *state =
+        SymbolTable::lookupSymbolIn(pipeline, fixed.getStateAttr());
+    FieldAttr field = context.record(getStateRecord(state)).getField(name);
+    offset = field.getElementOffset(fixed.getElement().value_or(0));
+    size = field.getType().getIntOrFloatBitWidth() / 8;
+  }
+  call(PIKO_RUNTIME_FUNCTION(pikoir_declare_fixed),
+       {i32(numbers.states.lookup(fixed.getStateAttr().getAttr())), text(name),
+        i64(offset), i64(size), i64(static_cast<int64_t>(fixed.getBits()))});
 }
 
 void SetupWriter::declareCheckedRecord(CheckRecordOp check) {
@@ -355,6 +385,10 @@ void SetupWriter::run(ProgramOp program) {
     declareEdge(edge);
   for (auto [name, number] : numbers.states)
     declareState(SymbolTable::lookupSymbolIn(pipeline, name), number);
+  for (auto fixed : pipeline.getOps<FixedOp>())
+    declareFixed(fixed);
+  for (auto counter : pipeline.getOps<CounterOp>())
+    declareCounter(counter);
   declareReductions(builder, frame, numbers, context);
   declareRoots(program);
   program.walk<WalkOrder::PreOrder>([&](Operation *op) {

@@ -511,6 +511,34 @@ PIKORT_API int64_t pikoir_check_index(pikort_pipeline *p, int64_t index,
 #define PIKOIR_MOST_TRIPS (INT64_C(1) << 28)
 PIKORT_API int32_t pikoir_check_trip(pikort_pipeline *p, const char *place);
 
+// --- specialization ----------------------------------------------------------
+
+/// The code takes `size` bytes of a constant, from an offset on, to be the
+/// least of `bits`, or with size 0 a buffer to have `bits` elements. A run with
+/// others is an error.
+PIKORT_API void pikoir_declare_fixed(pikort_pipeline *p, int32_t state,
+                                     const char *field, int64_t offset,
+                                     int64_t size, int64_t bits);
+
+// --- counting ---------------------------------------------------------------
+//
+// Any thread adds to any counter.
+
+/// `stage` may be no stage of its own any more. `part` is the port of
+/// emissions, the number of a piece of state that is accessed, otherwise -1;
+/// `around` the counter of what it lies in, or -1. A place is a constant
+/// "file:line", or null.
+PIKORT_API void pikoir_declare_counter(pikort_pipeline *p, int32_t counter,
+                                       int32_t kind, const char *stage,
+                                       int32_t part, int32_t around,
+                                       const char *place);
+PIKORT_API void pikoir_count(pikort_pipeline *p, int32_t counter,
+                             int64_t amount);
+/// An access to bytes of an element; unused indices are 0.
+PIKORT_API void pikoir_count_element(pikort_pipeline *p, int32_t counter,
+                                     int64_t x, int64_t y, int64_t z, int64_t w,
+                                     int64_t bytes, int64_t offset);
+
 // --- programs that run a pipeline by themselves, as the reference does ------
 
 /// What the host bound to a source; `count` gets the number of primitives.

@@ -278,6 +278,46 @@ typedef struct pikort_stage_stats {
   int64_t out;    ///< Primitives emitted, over all ports.
 } pikort_stage_stats;
 
+// The first ten are of the text, counted without any fusion, the others of the
+// code that runs.
+enum pikort_counter_kind {
+  PIKORT_CALLS = 0,      ///< Of Process.
+  PIKORT_ITERATIONS = 1, ///< Of a parallel loop.
+  PIKORT_TURNS = 2,      ///< Of any other loop.
+  PIKORT_EMISSIONS = 3,  ///< Out of a port.
+  PIKORT_READS = 4,      ///< Of fields of a piece of state.
+  PIKORT_STORES = 5,     ///< The same, written.
+  PIKORT_UPDATES = 6,    ///< Of pixels.
+  PIKORT_ATOMICS = 7,
+  PIKORT_FLOATS = 8,       ///< Operations of f32 and f64.
+  PIKORT_INTEGERS = 9,     ///< Operations of integers.
+  PIKORT_SCALARS = 10,     ///< Operations that are no vectors'.
+  PIKORT_VECTORS = 11,     ///< Operations on vectors.
+  PIKORT_LANES = 12,       ///< Of these, lanes, ...
+  PIKORT_ACTIVE_LANES = 13 ///< ... and those of them that do something.
+};
+
+/// What a program that was compiled for counting has counted since the latest
+/// reset.
+typedef struct pikort_counter {
+  const char *stage;
+  const char *state;    ///< That is accessed, or null.
+  const char *consumer; ///< The stage that emissions go to, or null.
+  const char *place;    ///< "file:line", or null.
+  int32_t kind;         ///< pikort_counter_kind
+  int32_t port;         ///< Of emissions, otherwise -1.
+  int32_t around;       ///< The counter of the loop or calls around, or -1.
+  int64_t count;
+  int64_t bytes;          ///< Emitted or accessed.
+  int64_t distinct;       ///< Elements accessed, each once.
+  int64_t distinct_bytes; ///< Of these, bytes accessed, each once.
+} pikort_counter;
+
+/// 0 where the program was not compiled for counting.
+PIKORT_API int32_t pikort_counter_count(const pikort_pipeline *pipeline);
+PIKORT_API int32_t pikort_get_counter(pikort_pipeline *pipeline, int32_t index,
+                                      pikort_counter *counter);
+
 PIKORT_API int64_t pikort_stats_runs(const pikort_pipeline *pipeline);
 PIKORT_API int32_t pikort_kernel_count(const pikort_pipeline *pipeline);
 PIKORT_API int32_t pikort_get_kernel_stats(pikort_pipeline *pipeline,

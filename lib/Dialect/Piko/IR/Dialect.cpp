@@ -9,6 +9,8 @@
 #include "Piko/Dialect/Piko/IR/PikoApproximation.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 #include "Piko/Dialect/Piko/IR/PikoCheck.h"
+#include "Piko/Dialect/Piko/IR/PikoCount.h"
+#include "Piko/Dialect/Piko/IR/PikoFixed.h"
 #include "Piko/Dialect/Piko/IR/PikoGPU.h"
 #include "Piko/Dialect/Piko/IR/PikoProgram.h"
 
@@ -44,6 +46,14 @@ void PikoDialect::initialize() {
   addOperations<
 #define GET_OP_LIST
 #include "Piko/Dialect/Piko/IR/PikoCheckOps.cpp.inc"
+      >();
+  addOperations<
+#define GET_OP_LIST
+#include "Piko/Dialect/Piko/IR/PikoCountOps.cpp.inc"
+      >();
+  addOperations<
+#define GET_OP_LIST
+#include "Piko/Dialect/Piko/IR/PikoFixedOps.cpp.inc"
       >();
   addOperations<
 #define GET_OP_LIST

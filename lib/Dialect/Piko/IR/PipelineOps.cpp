@@ -4,6 +4,8 @@
 
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "Piko/Dialect/Piko/IR/PikoCheck.h"
+#include "Piko/Dialect/Piko/IR/PikoCount.h"
+#include "Piko/Dialect/Piko/IR/PikoFixed.h"
 #include "Piko/Dialect/Piko/IR/PikoProgram.h"
 #include "llvm/ADT/StringSet.h"
 
@@ -209,7 +211,7 @@ static LogicalResult verifyReached(PipelineOp pipeline) {
 LogicalResult PipelineOp::verifyRegions() {
   for (Operation &op : *getBodyBlock())
     if (!isa<ConstantOp, BufferOp, ImageOp, SourceOp, EdgeOp, StageOp, KernelOp,
-             ProgramOp, CheckRecordOp>(op))
+             ProgramOp, CheckRecordOp, CounterOp, FixedOp>(op))
       return op.emitOpError(
           "expected only state, sources, edges, stages, kernels and a program "
           "in a pipeline");

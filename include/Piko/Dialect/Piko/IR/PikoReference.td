@@ -4,6 +4,8 @@
 
 include "Piko/Dialect/Piko/IR/PikoOps.td"
 include "Piko/Dialect/Piko/IR/PikoCheckOps.td"
+include "Piko/Dialect/Piko/IR/PikoCountOps.td"
+include "Piko/Dialect/Piko/IR/PikoFixedOps.td"
 include "Piko/Dialect/Piko/IR/PikoCPUOps.td"
 include "Piko/Dialect/Piko/IR/PikoProgramOps.td"
 include "Piko/Dialect/Piko/IR/PikoGPUOps.td"

@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// piko-prune-unreached:
+//   1. find the stages that a primitive may reach: from sources, along the
+//      ports on which something is emitted;
+//   2. take away the others, unless somebody waits for them or they run for
+//      empty bins, and the edges on which nothing goes.
+
+#include "Piko/Analysis/PhaseGraph.h"
+#include "Piko/Dialect/Piko/IR/CppTypes.h"
+#include "Piko/Dialect/Piko/IR/PikoCheck.h"
+#include "Piko/Transforms/Passes.h"
+
+#include "llvm/ADT/SetVector.h"
+
+namespace piko {
+#define GEN_PASS_DEF_PRUNEUNREACHED
+#include "Piko/Transforms/Passes.h.inc"
+} // namespace piko
+
+using namespace mlir;
+using namespace piko;
+
+namespace {
+
+struct PruneUnreachedPass : piko::impl::PruneUnreachedBase<PruneUnreachedPass> {
+  void runOnOperation() override;
+};
+
+class ReachPruner {
+public:
+  explicit ReachPruner(PipelineOp pipeline) : pipeline(pipeline) {}
+  void run();
+  int64_t stages = 0, edges = 0; ///< That were dropped.
+
+private:
+  StageOp getStage(FlatSymbolRefAttr name) {
+    return lookupInPipeline<StageOp>(pipeline, name);
+  }
+  void keep(StageOp stage);
+  void findKept();
+  void removeEdges();
+  void removeStages();
+  bool isUsed(EdgeOp edge);
+  bool isFormal(EdgeOp edge);
+
+  PipelineOp pipeline;
+  llvm::SetVector<Operation *> kept;
+  llvm::DenseSet<Operation *> fed; ///< By a source or an edge that is used.
+  /// Stages and their ports on which something is emitted.
+  llvm::DenseSet<std::pair<Operation *, int64_t>> emitting;
+};
+
+} // namespace
+
+/// Whether a stage may run though no primitive reaches it.
+static bool runsForEmptyBins(StageOp stage) {
+  ScheduleOp schedule = stage.getSchedule();
+  return schedule && (schedule.getEveryBin() || !schedule.getBody().empty());
+}
+
+/// A stage is reached, and with it those that it waits for: without them it
+/// might not collect.
+void ReachPruner::keep(StageOp stage) {
+  if (!kept.insert(stage))
+    return;
+  ScheduleOp schedule = stage.getSchedule();
+  if (!schedule || !schedule.getEndStageAttr())
+    return;
+  for (auto name : schedule.getEndStageAttr().getAsRange<FlatSymbolRefAttr>())
+    keep(getStage(name));
+}
+
+bool ReachPruner::isUsed(EdgeOp edge) {
+  StageOp producer = getStage(edge.getProducerAttr());
+  return kept.contains(producer) &&
+         emitting.contains({producer, int64_t(edge.getPort())});
+}
+
+/// Nothing goes along the edge, but its consumer is kept, and needs an edge.
+bool ReachPruner::isFormal(EdgeOp edge) {
+  StageOp consumer = getStage(edge.getConsumerAttr());
+  return kept.contains(consumer) && !fed.contains(consumer);
+}
+
+void ReachPruner::findKept() {
+  for (auto stage : pipeline.getOps<StageOp>())
+    stage.walk([&](EmissionOpInterface emission) {
+      emitting.insert({stage, emission.getPort()});
+    });
+  for (auto source : pipeline.getOps<SourceOp>())
+    keep(getStage(source.getStageAttr()));
+  for (auto stage : pipeline.getOps<StageOp>())
+    if (runsForEmptyBins(stage))
+      keep(stage);
+  for (size_t before = 0; before != kept.size();) {
+    before = kept.size();
+    fed.clear();
+    for (auto source : pipeline.getOps<SourceOp>())
+      fed.insert(getStage(source.getStageAttr()));
+    for (auto edge : pipeline.getOps<EdgeOp>())
+      if (isUsed(edge)) {
+        keep(getStage(edge.getConsumerAttr()));
+        fed.insert(getStage(edge.getConsumerAttr()));
+      }
+    for (auto edge : pipeline.getOps<EdgeOp>())
+      if (isFormal(edge))
+        keep(getStage(edge.getProducerAttr()));
+  }
+}
+
+/// Takes away those on which nothing goes; the ports of others move up.
+void ReachPruner::removeEdges() {
+  llvm::DenseMap<std::pair<Operation *, int64_t>, EdgeOp> leaving;
+  for (auto edge : pipeline.getOps<EdgeOp>())
+    leaving[{getStage(edge.getProducerAttr()), int64_t(edge.getPort())}] = edge;
+  Builder builder(pipeline.getContext());
+  for (auto stage : pipeline.getOps<StageOp>()) {
+    SmallVector<Attribute> outputs;
+    llvm::DenseMap<int64_t, int64_t> ports;
+    for (auto [port, record] : llvm::enumerate(stage.getOutputs())) {
+      EdgeOp edge = leaving.at({stage, int64_t(port)});
+      if (!isUsed(edge) && !isFormal(edge)) {
+        edge.erase();
+        ++edges;
+        continue;
+      }
+      edge.setPort(outputs.size());
+      ports[port] = outputs.size();
+      outputs.push_back(record);
+    }
+    if (outputs.size() == stage.getOutputs().size())
+      continue;
+    stage.setOutputsAttr(builder.getArrayAttr(outputs));
+    stage.walk(
+        [&](EmitOp emit) { emit.setPort(ports.lookup(emit.getPort())); });
+  }
+}
+
+void ReachPruner::removeStages() {
+  for (auto stage : llvm::to_vector(pipeline.getOps<StageOp>())) {
+    if (kept.contains(stage))
+      continue;
+    stage.emitRemark("stage '")
+        << getCppName(stage)
+        << "' is removed, because no primitive can reach it";
+    stage.erase();
+    ++stages;
+  }
+}
+
+void ReachPruner::run() {
+  findKept();
+  // Ports of emissions get other numbers.
+  pipeline.walk([](EmissionOpInterface emission) { asEmit(emission); });
+  removeEdges();
+  removeStages();
+}
+
+void PruneUnreachedPass::runOnOperation() {
+  // A run that is checked has all stages that the text has.
+  if (!getOperation().getOps<CheckRecordOp>().empty())
+    return;
+  ReachPruner pruner(getOperation());
+  pruner.run();
+  stages += pruner.stages;
+  edges += pruner.edges;
+}

@@ -1,0 +1,210 @@
+//===- WorkReport.cpp - What was counted, as JSON and as tables -----------===//
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+#include "Work.h"
+
+#include <algorithm>
+#include <cstdarg>
+#include <cstdio>
+
+using namespace piko;
+using namespace piko::render;
+
+/// How many times as much as is needed; 1 where nothing is done.
+static double ratio(int64_t done, int64_t needed) {
+  return done ? double(done) / double(std::max<int64_t>(1, needed)) : 1;
+}
+
+static const char *describeAccess(int32_t kind) {
+  switch (kind) {
+  case PIKORT_READS:
+    return "reads";
+  case PIKORT_STORES:
+    return "stores";
+  case PIKORT_UPDATES:
+    return "updates";
+  default:
+    return "atomics";
+  }
+}
+
+//===----------------------------------------------------------------------===//
+// JSON
+//===----------------------------------------------------------------------===//
+
+static JsonObject reportStage(const StageWork &stage) {
+  return JsonObject()
+      .add("name", stage.name)
+      .add("primitives", stage.primitives)
+      .add("calls", stage.calls)
+      .add("least", stage.least)
+      .add("ratio", ratio(stage.calls, stage.least))
+      .add("updates", stage.updates)
+      .add("emissions", stage.emissions)
+      .add("floats", stage.floats)
+      .add("integers", stage.integers);
+}
+
+static JsonObject reportEdge(const EdgeWork &edge) {
+  return JsonObject()
+      .add("from", edge.from)
+      .add("port", edge.port)
+      .add("to", edge.to)
+      .add("primitives", edge.primitives)
+      .add("bytes", edge.bytes)
+      .add("stored", edge.stored);
+}
+
+static JsonObject reportAccess(const AccessWork &access) {
+  return JsonObject()
+      .add("stage", access.stage)
+      .add("state", access.state)
+      .add("kind", describeAccess(access.kind))
+      .add("count", access.count)
+      .add("bytes", access.bytes)
+      .add("elements", access.distinct)
+      .add("least", access.distinctBytes)
+      .add("ratio", ratio(access.bytes, access.distinctBytes));
+}
+
+static JsonObject reportLoop(const LoopWork &loop) {
+  return JsonObject()
+      .add("stage", loop.stage)
+      .add("place", loop.place)
+      .add("parallel", int(loop.isParallel))
+      .add("turns", loop.turns)
+      .add("around", loop.around)
+      .add("effects", loop.effects);
+}
+
+static JsonObject reportKernel(const KernelWork &kernel) {
+  return JsonObject()
+      .add("name", kernel.name)
+      .add("scalars", kernel.scalars)
+      .add("vectors", kernel.vectors)
+      .add("lanes", kernel.lanes)
+      .add("active_lanes", kernel.active)
+      .add("ratio", ratio(kernel.lanes, kernel.active));
+}
+
+template <class T>
+static std::vector<JsonObject> reportAll(const std::vector<T> &all,
+                                         JsonObject (*report)(const T &)) {
+  std::vector<JsonObject> reports;
+  for (const T &one : all)
+    reports.push_back(report(one));
+  return reports;
+}
+
+JsonObject render::reportWork(const Work &work) {
+  return JsonObject()
+      .add("stages", reportAll(work.stages, reportStage))
+      .add("edges", reportAll(work.edges, reportEdge))
+      .add("accesses", reportAll(work.accesses, reportAccess))
+      .add("loops", reportAll(work.loops, reportLoop))
+      .add("kernels", reportAll(work.kernels, reportKernel));
+}
+
+//===----------------------------------------------------------------------===//
+// Tables
+//===----------------------------------------------------------------------===//
+
+/// A line, as printf has it.
+__attribute__((format(printf, 2, 3))) static void
+print(std::string &to, const char *format, ...) {
+  va_list arguments;
+  va_start(arguments, format);
+  char line[512];
+  std::vsnprintf(line, sizeof line, format, arguments);
+  va_end(arguments);
+  to += line;
+  to += '\n';
+}
+
+/// With a unit of 1000s behind it where it is large.
+static std::string shorten(int64_t number) {
+  char text[32];
+  double value = double(number);
+  const char *units[] = {"", " k", " M", " G", " T"};
+  size_t unit = 0;
+  for (; value >= 10'000 && unit + 1 < std::size(units); ++unit)
+    value /= 1000;
+  std::snprintf(text, sizeof text, unit ? "%.4g%s" : "%.0f%s", value,
+                units[unit]);
+  return text;
+}
+
+static void printStages(std::string &text, const Work &work, int64_t pixels) {
+  print(text, "\nwhat the text does: %lld pixels are drawn",
+        static_cast<long long>(pixels));
+  print(text, "  %-22s %10s %10s %7s %10s %10s %10s", "stage", "calls",
+        "needed", "ratio", "a pixel", "floats", "integers");
+  for (const StageWork &stage : work.stages)
+    print(text, "  %-22s %10s %10s %7.2f %10.3g %10s %10s", stage.name.c_str(),
+          shorten(stage.calls).c_str(), shorten(stage.least).c_str(),
+          ratio(stage.calls, stage.least),
+          double(stage.calls) / double(std::max<int64_t>(1, pixels)),
+          shorten(stage.floats).c_str(), shorten(stage.integers).c_str());
+}
+
+static void printLoops(std::string &text, const Work &work) {
+  if (work.loops.empty())
+    return;
+  print(text, "  %-22s %10s %10s %10s  %s", "loops of", "turns", "each time",
+        "effects", "at");
+  for (const LoopWork &loop : work.loops)
+    if (loop.turns)
+      print(text, "  %-22s %10s %10.4g %10s  %s%s", loop.stage.c_str(),
+            shorten(loop.turns).c_str(), ratio(loop.turns, loop.around),
+            shorten(loop.effects).c_str(), loop.place.c_str(),
+            loop.isParallel ? ", parallel" : "");
+}
+
+static void printEdges(std::string &text, const Work &work) {
+  if (work.edges.empty())
+    return;
+  print(text, "  %-45s %10s %10s %10s", "edges", "primitives", "bytes",
+        "stored");
+  for (const EdgeWork &edge : work.edges) {
+    std::string name =
+        edge.from + " port " + std::to_string(edge.port) + " to " + edge.to;
+    print(text, "  %-45s %10s %10s %10s", name.c_str(),
+          shorten(edge.primitives).c_str(), shorten(edge.bytes).c_str(),
+          shorten(edge.stored).c_str());
+  }
+}
+
+static void printAccesses(std::string &text, const Work &work) {
+  if (work.accesses.empty())
+    return;
+  print(text, "  %-22s %-22s %-8s %10s %10s %10s %7s", "state of", "name", "",
+        "times", "bytes", "once each", "ratio");
+  for (const AccessWork &access : work.accesses)
+    if (access.count)
+      print(text, "  %-22s %-22s %-8s %10s %10s %10s %7.2f",
+            access.stage.c_str(), access.state.c_str(),
+            describeAccess(access.kind), shorten(access.count).c_str(),
+            shorten(access.bytes).c_str(),
+            shorten(access.distinctBytes).c_str(),
+            ratio(access.bytes, access.distinctBytes));
+}
+
+static void printKernels(std::string &text, const Work &work) {
+  print(text, "what the code does");
+  print(text, "  %-22s %10s %10s %10s %10s %7s", "kernel", "scalars", "vectors",
+        "lanes", "used", "ratio");
+  for (const KernelWork &kernel : work.kernels)
+    print(text, "  %-22s %10s %10s %10s %10s %7.2f", kernel.name.c_str(),
+          shorten(kernel.scalars).c_str(), shorten(kernel.vectors).c_str(),
+          shorten(kernel.lanes).c_str(), shorten(kernel.active).c_str(),
+          ratio(kernel.lanes, kernel.active));
+}
+
+std::string render::printWork(const Work &work, int64_t pixels) {
+  std::string text;
+  printStages(text, work, pixels);
+  printLoops(text, work);
+  printEdges(text, work);
+  printAccesses(text, work);
+  printKernels(text, work);
+  return text;
+}
