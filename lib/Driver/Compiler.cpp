@@ -219,6 +219,7 @@ void piko::addPasses(OpPassManager &passes, Level from, Level to,
 /// Whether the passes that are asked for can start from where a module is.
 static LogicalResult checkStart(ModuleOp module, Level from, Level to,
                                 const CheckOptions &check,
+                                const SynthesisOptions &synthesis,
                                 const GPUOptions &gpu) {
   if (from > to)
     return emitError(module.getLoc())
@@ -228,6 +229,10 @@ static LogicalResult checkStart(ModuleOp module, Level from, Level to,
   if (check.enabled && from != Level::Authored)
     return emitError(module.getLoc())
            << "--check: expected the authored level, but the file is at the "
+           << getName(from) << " level";
+  if (!synthesis.fix.empty() && from != Level::Authored)
+    return emitError(module.getLoc())
+           << "--fix: expected the authored level, but the file is at the "
            << getName(from) << " level";
   if (hasGPUKernels(module) && !gpu.emulate)
     return emitError(module.getLoc())
@@ -247,7 +252,7 @@ LogicalResult piko::lowerPipeline(ModuleOp module, Level level,
                                   const GPUOptions &gpu,
                                   const CPUOptions &cpu) {
   Level from = getLevel(module);
-  if (failed(checkStart(module, from, level, check, gpu)))
+  if (failed(checkStart(module, from, level, check, synthesis, gpu)))
     return failure();
   PassManager passes(module.getContext());
   if (hasLaunches(module))
@@ -266,7 +271,7 @@ piko::lowerForEach(ArrayRef<CPUOptions> cpus, ModuleOp module,
   auto lowerCommon = [&] {
     if (!hasVectors)
       return lowerPipeline(module, Level::LLVM, check, synthesis, gpu);
-    if (failed(checkStart(module, from, Level::LLVM, check, gpu)))
+    if (failed(checkStart(module, from, Level::LLVM, check, synthesis, gpu)))
       return failure();
     PassManager passes(module.getContext());
     addPasses(passes, from, Level::Machine, check, synthesis);
@@ -295,7 +300,7 @@ LogicalResult piko::lowerToGPU(ModuleOp module, const CheckOptions &check,
   if (hasGPUKernels(module))
     return success();
   Level from = getLevel(module);
-  if (failed(checkStart(module, from, Level::Machine, check, {})))
+  if (failed(checkStart(module, from, Level::Machine, check, synthesis, {})))
     return failure();
   Location loc = module.getLoc();
   for (auto pipeline : module.getOps<PipelineOp>())

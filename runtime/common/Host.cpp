@@ -4,6 +4,7 @@
 #include "common/Pipeline.h"
 
 #include <algorithm>
+#include <cstdio>
 #include <cstring>
 #include <functional>
 
@@ -313,12 +314,51 @@ static void checkBound(const pikort_pipeline &p) {
                                         std::to_string(s) + " is not bound"};
 }
 
-/// Whether what the code was specialized for is what the host has bound.
-static bool holds(const State &state, const Fixed &fixed, int64_t elements) {
-  if (fixed.size == 0)
-    return elements == fixed.bits;
-  return std::memcmp(state.bytes.data() + fixed.offset, &fixed.bits,
-                     static_cast<size_t>(fixed.size)) == 0;
+/// A number of a field's type, of which bytes are given.
+static std::string numberText(int32_t type, const void *bytes) {
+  auto read = [&](auto number) {
+    std::memcpy(&number, bytes, sizeof(number));
+    return number;
+  };
+  char text[32];
+  if (type == PIKORT_F32)
+    std::snprintf(text, sizeof(text), "%.9g", double(read(0.0f)));
+  else if (type == PIKORT_F64)
+    std::snprintf(text, sizeof(text), "%.17g", read(0.0));
+  else
+    std::snprintf(text, sizeof(text), "%lld",
+                  type == PIKORT_I8    ? static_cast<long long>(read(int8_t()))
+                  : type == PIKORT_I16 ? static_cast<long long>(read(int16_t()))
+                  : type == PIKORT_I32
+                      ? static_cast<long long>(read(int32_t()))
+                      : static_cast<long long>(read(int64_t())));
+  return text;
+}
+
+/// The error where the code was specialized for something else than the host
+/// has bound.
+static Failure otherThanFixed(const pikort_pipeline &p, const Fixed &fixed,
+                              int64_t elements) {
+  const State &state = p.states[fixed.state];
+  std::string who = "pipeline " + quoted(p.name) + ": ";
+  std::string expected = std::to_string(fixed.bits),
+              got = std::to_string(elements);
+  if (fixed.size == 0) {
+    who += "buffer " + quoted(state.name) + ", size";
+  } else {
+    who += "constant " + quoted(state.name);
+    if (fixed.field != "value")
+      who += ", field " + quoted(fixed.field);
+    for (const Field &field : p.records[state.record].fields)
+      if (field.name == fixed.field) {
+        expected = numberText(field.type, &fixed.bits);
+        got = numberText(field.type, state.bytes.data() + fixed.offset);
+      }
+  }
+  return {PIKORT_INVALID_ARGUMENT, who + ": expected " + expected +
+                                       ", which the pipeline was compiled for, "
+                                       "but got " +
+                                       got};
 }
 
 static void checkFixed(const pikort_pipeline &p) {
@@ -326,20 +366,13 @@ static void checkFixed(const pikort_pipeline &p) {
     const State &state = p.states[fixed.state];
     int64_t elements = state.perSource < 0 ? state.view.extent[0]
                                            : p.sources[state.perSource].count;
-    if (holds(state, fixed, elements))
-      continue;
-    std::string who = "pipeline " + quoted(p.name) + ": ";
-    if (fixed.size == 0)
-      throw Failure{PIKORT_INVALID_ARGUMENT,
-                    who + "it was compiled for a buffer " + quoted(state.name) +
-                        " of " + std::to_string(fixed.bits) +
-                        " elements, but got " + std::to_string(elements)};
-    throw Failure{PIKORT_INVALID_ARGUMENT,
-                  who + "it was compiled for another value of constant " +
-                      quoted(state.name) +
-                      (fixed.field == "value"
-                           ? std::string()
-                           : ", field " + quoted(fixed.field))};
+    bool holds =
+        fixed.size == 0
+            ? elements == fixed.bits
+            : std::memcmp(state.bytes.data() + fixed.offset, &fixed.bits,
+                          static_cast<size_t>(fixed.size)) == 0;
+    if (!holds)
+      throw otherThanFixed(p, fixed, elements);
   }
 }
 

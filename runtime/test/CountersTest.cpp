@@ -23,6 +23,7 @@ void setup(pikort_pipeline *p) {
   pikoir_declare_pipeline(p, "Counting", 1);
   pikoir_declare_record(p, 0, "Light", sizeof(Light), 4);
   pikoir_declare_field(p, 0, "x", PIKORT_F32, 0, 1, 0);
+  pikoir_declare_field(p, 0, "kind", PIKORT_I32, 12, 1, 0);
   pikoir_declare_state(p, 0, "settings", PIKORT_CONSTANT, 0, 0, -1, nullptr);
   pikoir_declare_state(p, 1, "lights", PIKORT_BUFFER, 0, 1, -1, nullptr);
   int64_t bins[] = {0};
@@ -120,12 +121,13 @@ TEST_F(Counting, SaysWhatIsWrong) {
 // A program that was compiled for other values does not run.
 TEST_F(Counting, IsFixed) {
   EXPECT_EQ(start(8), PIKORT_INVALID_ARGUMENT);
-  EXPECT_STREQ(pikort_message(pipeline),
-               "pipeline 'Counting': it was compiled for another value of "
-               "constant 'settings', field 'kind'");
+  EXPECT_STREQ(
+      pikort_message(pipeline),
+      "pipeline 'Counting': constant 'settings', field 'kind': expected "
+      "7, which the pipeline was compiled for, but got 8");
   fixedSize = 5;
   EXPECT_EQ(start(7), PIKORT_INVALID_ARGUMENT);
   EXPECT_STREQ(pikort_message(pipeline),
-               "pipeline 'Counting': it was compiled for a buffer 'lights' of "
-               "5 elements, but got 4");
+               "pipeline 'Counting': buffer 'lights', size: expected 5, which "
+               "the pipeline was compiled for, but got 4");
 }
