@@ -230,9 +230,12 @@ static LogicalResult checkStart(ModuleOp module, Level from, Level to,
     return emitError(module.getLoc())
            << "--check: expected the authored level, but the file is at the "
            << getName(from) << " level";
-  if (!synthesis.fix.empty() && from != Level::Authored)
+  const char *option = !synthesis.fix.empty()              ? "--fix"
+                       : synthesis.count == Counting::Work ? "--counters"
+                                                           : nullptr;
+  if (option && from != Level::Authored)
     return emitError(module.getLoc())
-           << "--fix: expected the authored level, but the file is at the "
+           << option << ": expected the authored level, but the file is at the "
            << getName(from) << " level";
   if (hasGPUKernels(module) && !gpu.emulate)
     return emitError(module.getLoc())

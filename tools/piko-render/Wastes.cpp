@@ -108,7 +108,7 @@ void WasteFinder::addTurns(const LoopWork &loop) {
     if (stage.name == loop.stage)
       add(timeOf(stage) * (1 - used / looked),
           stage.name + " looks at " + text(looked / used) +
-              " places for each that it emits or updates, at " + loop.place,
+              " places for each that it changes, at " + loop.place,
           "a tighter range of the loop, or smaller bins, which end it");
 }
 

@@ -24,11 +24,6 @@ private:
   void addEffects(const pikort_counter &counter);
   int64_t countOf(int32_t index);
   void addCode(const pikort_counter &counter);
-  StageWork &stage(const std::string &name) {
-    return *std::find_if(work.stages.begin(), work.stages.end(),
-                         [&](const StageWork &s) { return s.name == name; });
-  }
-  KernelWork &kernel(const std::string &name);
 
   Work &work;
   pikort_pipeline *pipeline;
@@ -48,16 +43,17 @@ void Collector::addStages() {
   }
 }
 
-KernelWork &Collector::kernel(const std::string &name) {
-  for (KernelWork &known : work.kernels)
+/// The one of that name, which is added where there is none.
+template <class T> static T &find(std::vector<T> &all, const char *name) {
+  for (T &known : all)
     if (known.name == name)
       return known;
-  work.kernels.push_back({.name = name});
-  return work.kernels.back();
+  all.emplace_back().name = name;
+  return all.back();
 }
 
 void Collector::addCode(const pikort_counter &counter) {
-  KernelWork &to = kernel(counter.stage);
+  KernelWork &to = find(work.kernels, counter.stage);
   switch (counter.kind) {
   case PIKORT_SCALARS:
     to.scalars += counter.count;
@@ -85,7 +81,7 @@ void Collector::addEffects(const pikort_counter &counter) {
 }
 
 void Collector::add(int32_t index, const pikort_counter &counter) {
-  StageWork &of = stage(counter.stage);
+  StageWork &of = find(work.stages, counter.stage);
   switch (counter.kind) {
   case PIKORT_CALLS:
     of.calls += counter.count;
@@ -112,9 +108,10 @@ void Collector::add(int32_t index, const pikort_counter &counter) {
     return;
   case PIKORT_UPDATES:
     of.updates += counter.count;
-    addEffects(counter);
     [[fallthrough]];
   default:
+    if (counter.kind == PIKORT_UPDATES || counter.kind == PIKORT_ATOMICS)
+      addEffects(counter);
     work.accesses.push_back({counter.stage, counter.state, counter.kind,
                              counter.count, counter.bytes, counter.distinct,
                              counter.distinct_bytes});
@@ -142,6 +139,7 @@ static Result<Done> countFrame(Options options, SceneInput &scene,
   options.load.check = {};
   options.load.gpu = {};
   options.load.synthesis.count = count;
+  options.memoryBudget = options.stripSize = 0; // without strips all is stored
   auto frame = Frame::load(options);
   if (!frame)
     return frame.error();

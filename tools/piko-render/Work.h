@@ -49,7 +49,8 @@ struct LoopWork {
   bool isParallel = false;
   int64_t turns = 0;
   int64_t around = 0;  ///< Turns of the loop around, or calls of the stage.
-  int64_t effects = 0; ///< Emissions and updates whose innermost loop it is.
+  /// Emissions, updates and atomics whose innermost loop it is.
+  int64_t effects = 0;
 };
 
 /// What the code of a kernel does.
