@@ -38,7 +38,8 @@ def parse_options():
     parser.add_argument("scenes", nargs="*", metavar="SCENE",
                         help=f"({', '.join(SCENES)})")
     parser.add_argument("--choices", nargs="+", choices=CHOICES,
-                        metavar="CHOICE", default=list(CHOICES))
+                        metavar="CHOICE",
+                        help="(all; with --quick those that have quick settings)")
     parser.add_argument("--list", action="store_true",
                         help="print the choices and their settings")
     parser.add_argument("--out", default=f"{ROOT}/build/charts",
@@ -47,7 +48,7 @@ def parse_options():
                         help="where the tools are")
     parser.add_argument("--quick", action="store_true",
                         help="one scene of each kind, a quarter of the pixels, "
-                             "fewer rounds")
+                             "fewer rounds and settings")
     parser.add_argument("--rounds", type=int)
     parser.add_argument("--frames", type=int, help="of a round, at most")
     parser.add_argument("--seconds", type=float, help="of a round, about")
@@ -63,6 +64,10 @@ def parse_options():
                                ("height", 240, 480)):
         if getattr(options, name) is None:
             setattr(options, name, least if quick else usual)
+    names = options.choices or [name for name, choice in CHOICES.items()
+                                if not quick or choice.is_quick()]
+    options.choices = [CHOICES[name].quickly() if quick else CHOICES[name]
+                       for name in names]
     scenes = SCENES[::2] if quick else SCENES
     try:
         options.scenes = [Scene.parse(s, ROOT)
@@ -118,25 +123,24 @@ def main():
     measurer = Measurer(options, ROOT)
     pyplot = find_pyplot()
     measured = []
-    for name in options.choices:
-        choice = CHOICES[name]
+    for choice in options.choices:
         points = []
         for scene in options.scenes:
             if scene.is_patches() == choice.patches:
                 points += measurer.measure(choice, scene)
         if not points:
-            print(f"{name}: no scene of this kind", file=sys.stderr)
+            print(f"{choice.name}: no scene of this kind", file=sys.stderr)
             continue
         for p in points:
             spread = (max(p.times) - min(p.times)) / statistics.median(p.times)
-            print(f"{name:15} {p.scene:12} {p.setting:15} {p.ms:8.3f} ms "
+            print(f"{choice.name:15} {p.scene:12} {p.setting:15} {p.ms:8.3f} ms "
                   f"(spread {spread:.0%})  rms {p.errors['rms']:.3g}  FLIP "
                   f"{p.errors['flip']:.3g}{'  front' if p.front else ''}",
                   flush=True)
         measured.append((choice, points, describe_price(choice, points)))
         if pyplot:
             draw.write(pyplot, draw.draw_choice(pyplot, choice, points),
-                       f"{options.out}/{name}")
+                       f"{options.out}/{choice.name}")
     if not measured:
         sys.exit("nothing to measure")
     write_csv([p for _, points, _ in measured for p in points],

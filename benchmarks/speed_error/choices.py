@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 """Where a user trades speed for error, and what each choice is measured by."""
 
+import dataclasses
 from dataclasses import dataclass, field
 
 CHOICES_FOLDER = "benchmarks/choices"
@@ -14,6 +15,7 @@ class Setting:
     source: str
     pipe: str
     options: tuple[str, ...] = ()
+    quick: bool = True  # whether it is of what --quick measures
 
     def command(self, tool):
         return [tool, self.source, "--pipe", self.pipe, "-I", "examples",
@@ -31,6 +33,15 @@ class Choice:
     default: str  # the setting of the examples
     patches: bool = False  # of scenes that are patches, not meshes
     options: tuple[str, ...] = field(default=())  # of all settings
+
+    def is_quick(self):
+        """Whether --quick measures it if nobody asks for it."""
+        return any(s.quick for s in self.settings)
+
+    def quickly(self):
+        """What --quick measures of it: all, if none of its settings is quick."""
+        settings = [s for s in self.settings if s.quick or not self.is_quick()]
+        return dataclasses.replace(self, settings=settings)
 
 
 def sets(**constants):
@@ -155,13 +166,15 @@ def samples():
         "patterns of Direct3D) or the first points of Sobol's sequence.", "1")
 
 
-def depth():
+def depth(scale, name="depth"):
     source = f"{CHOICES_FOLDER}/depth.piko.cpp"
     return Choice(
-        "depth", "Format of depths",
-        [Setting(name, source, pipe) for name, pipe in
+        name, f"Format of depths, far plane {scale} times as far as the near one",
+        [Setting(setting, source, pipe, sets(range=scale), quick=scale == 10)
+         for setting, pipe in
          (("16 bits", "Depth16"), ("24 bits", "Depth24"),
-          ("float", "DepthFloat"), ("reversed float", "DepthReversed"))],
+          ("32 bits", "Depth32"), ("float", "DepthFloat"),
+          ("reversed float", "DepthReversed"))],
         exact(), "rays in double",
         "What examples/raster's Tiled compares: z / w as an integer or a float, "
         "or near / distance.", "float")
@@ -181,6 +194,7 @@ def output():
 
 
 CHOICES = {choice.name: choice for choice in
-           (numbers(), samples(), subpixels(), depth(), rays(), shading_rate(),
-            transparency(), shadows(), shadow_bias(), micropolygons(),
-            output())}
+           (numbers(), samples(), subpixels(), depth(10),
+            depth(10**4, "depth-10k"), depth(10**6, "depth-1m"), rays(),
+            shading_rate(), transparency(), shadows(), shadow_bias(),
+            micropolygons(), output())}
