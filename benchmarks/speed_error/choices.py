@@ -60,10 +60,17 @@ def numbers():
     source = f"{CHOICES_FOLDER}/numbers.piko.cpp"
     return Choice(
         "numbers", "Numbers of a stage",
-        [Setting(name, source, f"{name}Numbers")
-         for name in ("Strict", "Contracted", "Relaxed", "Double")],
+        [*(Setting(name, source, f"{name}Numbers")
+           for name in ("Strict", "Contracted", "Relaxed", "Double")),
+         *(Setting(name, f"{CHOICES_FOLDER}/halves.piko.cpp", pipe, quick=False)
+           for name, pipe in (("half normals", "HalfNormals"),
+                              ("half colours", "HalfColors"),
+                              ("both in halves", "Halves")))],
         Setting("Double", source, "DoubleNumbers"), "the same in double",
-        "specifyPrecision of the stage that shades, in examples/raster's Tiled.",
+        "specifyPrecision of the stage that shades, in examples/raster's Tiled, "
+        "and halves in place of floats on the edges to it and from it. In one "
+        "kernel with what they connect, these edges are registers or arrays of a "
+        "bin: halves save little memory traffic and cost conversions.",
         "Strict", options=("--lights", "100"))
 
 

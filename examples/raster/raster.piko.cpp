@@ -152,8 +152,8 @@ struct Setup : piko::Stage<0, 0, 64, Triangle, BoxedTriangle>,
 //===----------------------------------------------------------------------===//
 
 // Finds the pixels of a triangle that lie in the bin.
-template <Mapping M, class Triangle, class UsedState>
-struct Rasterizer : piko::Stage<M.bin, M.bin, 64, Triangle, Fragment>,
+template <Mapping M, class Triangle, class UsedState, class Out = Fragment>
+struct Rasterizer : piko::Stage<M.bin, M.bin, 64, Triangle, Out>,
                     piko::Uses<UsedState> {
   void assignBin(const Triangle &t) {
     if constexpr (M.bin == 0) {
@@ -178,11 +178,10 @@ struct Rasterizer : piko::Stage<M.bin, M.bin, 64, Triangle, Fragment>,
         },
         [&](const Sample &s) {
           glm::vec3 w = s.weight;
-          this->emit(
-              Fragment{s.pixel, s.depth,
-                       a.position * w.x + b.position * w.y + c.position * w.z,
-                       a.normal * w.x + b.normal * w.y + c.normal * w.z},
-              0);
+          this->emit(Out{s.pixel, s.depth,
+                         a.position * w.x + b.position * w.y + c.position * w.z,
+                         a.normal * w.x + b.normal * w.y + c.normal * w.z},
+                     0);
         });
   }
 
