@@ -119,10 +119,13 @@ def transparency():
         [Setting("sorted", source, "Sorted"),
          *(Setting(f"{k} nearest", source, f"Nearest{k}")
            for k in (2, 4, 8, 16, 32)),
-         Setting("weighted", source, "Weighted")],
+         Setting("weighted", source, "Weighted"),
+         Setting("moments", f"{CHOICES_FOLDER}/moments.piko.cpp", "MomentOit",
+                 quick=False)],
         Setting("sorted", source, "Sorted"), "all layers sorted",
-        "examples/oit, and pixels that keep their k nearest layers, or a weighted "
-        "mean of all.", "sorted")
+        "examples/oit; pixels that keep their k nearest layers (a k-buffer); a "
+        "weighted mean of all; and moment-based transparency, which estimates "
+        "from four power moments how far each layer is seen.", "sorted")
 
 
 def shadows():
