@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// examples/raytrace with other tests of a ray and a triangle.
+// examples/raytrace with other tests of a ray and a triangle, and distances in
+// double.
 #include "raytrace/raytrace.piko.cpp"
 
 namespace raytrace {
 
 /// Moeller and Trumbore, "Fast, Minimum Storage Ray/Triangle Intersection",
 /// 1997. Each triangle rounds for itself, so that a ray may pass between two.
-template <class Float> class DirectRay {
+template <class Float, class Distance = float> class DirectRay {
 public:
+  using Hit = HitAt<Distance>;
+
   DirectRay(glm::vec3 origin, glm::vec3 direction)
       : origin(origin), direction(direction) {}
 
@@ -23,7 +26,7 @@ public:
     Vector p = glm::cross(along, ac), q = glm::cross(from, ab);
     Float inverse = 1 / glm::dot(ab, p);
     Float v = glm::dot(from, p) * inverse, w = glm::dot(along, q) * inverse;
-    float t = float(glm::dot(ac, q) * inverse);
+    Distance t = Distance(glm::dot(ac, q) * inverse);
     if (!(v >= 0 && w >= 0 && v + w <= 1 && t > 0 && t <= nearest.t))
       return false;
     if (t == nearest.t && nearest.triangle < triangle.index)
@@ -45,3 +48,5 @@ struct Rays : raytrace::MappedRaytracer<{.bin = 16, .apart = false}, Test> {};
 struct Watertight : Rays<raytrace::ShearedRay> {};
 struct DirectFloat : Rays<raytrace::DirectRay<float>> {};
 struct DirectDouble : Rays<raytrace::DirectRay<double>> {};
+struct FarWatertight : Rays<raytrace::ShearedRayTo<double>> {};
+struct FarDirectDouble : Rays<raytrace::DirectRay<double, double>> {};

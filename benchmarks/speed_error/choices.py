@@ -89,13 +89,19 @@ def rays():
     source = f"{CHOICES_FOLDER}/rays.piko.cpp"
     return Choice(
         "rays", "Rays and triangles",
-        [Setting(name, source, pipe, sets(depth=0, shadows=0))
-         for name, pipe in (("watertight", "Watertight"),
-                            ("direct, float", "DirectFloat"),
-                            ("direct, double", "DirectDouble"))],
+        [Setting(name, source, pipe, sets(depth=0, shadows=0), quick)
+         for name, pipe, quick in
+         (("watertight", "Watertight", True),
+          ("direct, float", "DirectFloat", True),
+          ("direct, double", "DirectDouble", True),
+          ("watertight, double t", "FarWatertight", False),
+          ("direct, double, double t", "FarDirectDouble", False))],
         exact(), "rays in double",
         "The test of examples/raytrace, which is watertight, and Moeller's and "
-        "Trumbore's, whose triangles round each for itself. Camera rays.",
+        "Trumbore's, whose triangles round each for itself; the distance t of a "
+        "hit in float, or in double. Camera rays. Points are computed from the "
+        "weights of a triangle's corners, so that t only decides which hit is the "
+        "nearest: its precision shows where two are closer than floats tell apart.",
         "watertight")
 
 

@@ -82,17 +82,18 @@ private:
 /// them passes true, and `least` gives the least of what they pass. For a
 /// single ray both give back what they take.
 template <class Test = ShearedRay, class Any, class Least>
-Hit findHit(glm::vec3 origin, glm::vec3 direction, float limit, bool anyHit,
-            const piko::scene::Bounds &mesh, const piko::Buffer<BvhNode> &nodes,
-            const piko::Buffer<BvhTriangle> &triangles, const Any &any,
-            const Least &least) {
+typename Test::Hit findHit(glm::vec3 origin, glm::vec3 direction, float limit,
+                           bool anyHit, const piko::scene::Bounds &mesh,
+                           const piko::Buffer<BvhNode> &nodes,
+                           const piko::Buffer<BvhTriangle> &triangles,
+                           const Any &any, const Least &least) {
   struct Entry {
     int32_t child, count; // as in a node
     float t;              // where the first ray enters
   };
   constexpr int width = piko::scene::bvhWidth;
   Entry stack[piko::scene::bvhDepth * (width - 1) + 1];
-  Hit nearest;
+  typename Test::Hit nearest;
   SlabRay slabs(origin, direction, mesh);
   constexpr float nowhere = -1; // the limit of a ray that enters no box
   nearest.t = slabs.isUsable() ? limit : nowhere;
@@ -115,7 +116,7 @@ Hit findHit(glm::vec3 origin, glm::vec3 direction, float limit, bool anyHit,
     // The nearest child comes to the top.
     int bottom = top;
     for (int i = 0; i < width; ++i) {
-      float t = slabs.enter(node, i, nearest.t * longer);
+      float t = slabs.enter(node, i, float(nearest.t) * longer);
       if (!any(t < INFINITY))
         continue;
       float first = least(t);

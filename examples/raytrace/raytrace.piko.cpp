@@ -73,7 +73,8 @@ protected:
   static constexpr int packet = 16;
 
   /// What a ray hits; an iteration that has none gives a limit below 0.
-  Hit find(glm::vec3 origin, glm::vec3 direction, float limit, bool anyHit) {
+  typename Test::Hit find(glm::vec3 origin, glm::vec3 direction, float limit,
+                          bool anyHit) {
     return findHit<Test>(
         origin, direction, limit, anyHit, this->state().bounds,
         this->state().nodes, this->state().leaves,
@@ -110,7 +111,7 @@ private:
     glm::vec3 direction = c.forward + c.right * (2 * middle.x / size.x - 1) +
                           c.up * (1 - 2 * middle.y / size.y);
     bool isPixel = glm::all(glm::lessThan(at, this->binHi()));
-    Hit hit = this->find(c.eye, direction, isPixel ? INFINITY : -1, false);
+    auto hit = this->find(c.eye, direction, isPixel ? INFINITY : -1, false);
     if (hit.triangle >= 0)
       this->emit(
           Surface{at, direction, glm::vec3(1), 0, hit.triangle, hit.weight});
@@ -132,7 +133,7 @@ struct Trace : PacketStage<M, Test, Ray, Surface, Radiance> {
       bool isRay = i < rays.size();
       const Ray &r = rays[isRay ? i : 0];
       bool isShadow = r.mirrors < 0;
-      Hit hit =
+      auto hit =
           this->find(r.origin, r.direction, isRay ? r.limit : -1, isShadow);
       if (!isRay)
         return;

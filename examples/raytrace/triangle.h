@@ -18,17 +18,20 @@
 namespace raytrace {
 
 /// Where a ray first meets the mesh: at origin + t * direction.
-struct Hit {
-  float t;
+template <class Distance> struct HitAt {
+  Distance t;
   int32_t triangle = -1; ///< its index; -1 if there is none
   glm::vec3 weight;      ///< of the triangle's corners; the sum is 1
 };
+using Hit = HitAt<float>;
 
 /// A ray as the test wants it. The largest component of the direction, in
 /// magnitude, must be finite and normal.
-class ShearedRay {
+template <class Distance> class ShearedRayTo {
 public:
-  ShearedRay(glm::vec3 origin, glm::vec3 direction) : origin(origin) {
+  using Hit = HitAt<Distance>;
+
+  ShearedRayTo(glm::vec3 origin, glm::vec3 direction) : origin(origin) {
     glm::vec3 size = glm::abs(direction);
     z = size.x > size.y ? (size.x > size.z ? 0 : 2) : (size.y > size.z ? 1 : 2);
     x = z == 2 ? 0 : z + 1;
@@ -63,7 +66,7 @@ public:
     if (sum == 0) // it is seen from the side, or has no area
       return false;
     double distance = du * double(a.z) + dv * double(b.z) + dw * double(c.z);
-    float t = float(distance / (sum * double(length)));
+    Distance t = Distance(distance / (sum * double(length)));
     if (!(t > 0 && t <= nearest.t))
       return false;
     if (t == nearest.t && nearest.triangle < triangle.index)
@@ -89,6 +92,7 @@ private:
   int x, y, z; ///< z is where the direction is longest
   float length, shearX, shearY;
 };
+using ShearedRay = ShearedRayTo<float>;
 
 } // namespace raytrace
 
