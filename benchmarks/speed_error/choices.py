@@ -111,11 +111,17 @@ def shading_rate():
         "shading-rate", "Pixels that share a colour",
         [*(Setting(f"{side}x{side}", source, f"Rate{side}")
            for side in (1, 2, 4)),
-         *(Setting(f"{side}x{side} by contrast", source, f"Contrast{side}")
-           for side in (2, 4))],
+         *(Setting(f"{side}x{side} by depths", source, f"Contrast{side}")
+           for side in (2, 4)),
+         *(Setting(f"{side}x{side} by colours, {percent} %", source,
+                   f"Colors{side}", ("-D", f"CONTRAST={percent / 100}"),
+                   quick=False)
+           for side in (2, 4) for percent in (1, 5))],
         Setting("1x1", source, "Rate1"), "each pixel shaded",
-        "examples/visibility, shaded once for each block of pixels; by contrast "
-        "once more where their depths differ.", "1x1", options=("--lights", "1000"))
+        "examples/visibility, shaded once for each block of pixels; once more "
+        "where their depths differ; or at two pixels of 2x2 and the corners of 4x4, "
+        "and at the others only if the contrast of these colours is above so many "
+        "percent.", "1x1", options=("--lights", "1000"))
 
 
 def transparency():
