@@ -140,28 +140,52 @@ def transparency():
         "from four power moments how far each layer is seen.", "sorted")
 
 
+SHADOW = "examples/shadow/shadow.piko.cpp"
+SHADOW_MAP = f"{CHOICES_FOLDER}/shadow_map.piko.cpp"
+
+
 def shadows():
-    source = "examples/shadow/shadow.piko.cpp"
+    # On a slope, texels of the filter are nearer to the light by up to half a
+    # texel more than its reach.
     return Choice(
-        "shadows", "Width of percentage-closer filtering",
-        [Setting(f"{2 * reach} texels", source, "Bins32", sets(texels=reach))
-         for reach in (1, 2, 3, 4)],
+        "shadows", "Percentage-closer filtering",
+        [Setting(f"{2 * reach + 1}x{2 * reach + 1}", SHADOW, "Bins32",
+                 sets(texels=reach, bias=reach + 0.5)) for reach in range(4)],
         exact(shadows=1), "shadow rays in double",
-        "The square of the shadow map over which examples/shadow asks what is "
-        "lit; its map has as many texels as the image has pixels.",
-        "2 texels", options=("--ground",))
+        "How many texels of the shadow map examples/shadow compares, with as much "
+        "bias as that needs; its map has as many texels as the image has pixels.",
+        "3x3", options=("--ground",))
+
+
+def shadow_map():
+    return Choice(
+        "shadow-map", "Size of a shadow map",
+        [Setting("as the image", SHADOW, "Bins32", quick=False),
+         *(Setting(f"{side} x {side}", SHADOW_MAP, f"Map{side}", sets(side=side),
+                   quick=False)
+           for side in (256, 512, 1024, 2048, 4096, 8192))],
+        exact(shadows=1), "shadow rays in double",
+        "The texels of the map that examples/shadow draws: as many as the image has "
+        "pixels, or so many in a square. The ground, two triangles, covers half of "
+        "them.", "as the image", options=("--ground",))
 
 
 def shadow_bias():
-    source = "examples/shadow/shadow.piko.cpp"
+    def settings(name, pipe, biases, quick):
+        return [Setting(f"{name} {bias}", SHADOW_MAP, pipe,
+                        sets(side=1024, bias=bias), quick) for bias in biases]
+
     return Choice(
         "shadow-bias", "Bias of a shadow map",
-        [Setting(f"{bias} texels", source, "Bins32", sets(bias=bias))
-         for bias in (0, 0.5, 1, 1.5, 3, 6)],
+        [*settings("offset", "Map1024", (0, 0.5, 1, 1.5, 3, 6), True),
+         *settings("slope", "SlopeScaled1024", (0.5, 1, 1.5, 3, 6), False),
+         *settings("constant", "Constant1024", (0.5, 1, 1.5, 3, 6), False)],
         exact(shadows=1), "shadow rays in double",
-        "By how many texels' slope examples/shadow lifts a surface above its map: "
-        "with less it shadows itself, with more shadows come off what casts them.",
-        "1.5 texels", options=("--ground",))
+        "How far, in texels of a map of 1024 x 1024, a surface is lifted above it: "
+        "by their slope along the normal, as examples/shadow does; by their slope "
+        "towards the light (slope-scaled bias); or towards the light by as much "
+        "everywhere. With less it shadows itself (acne), with more shadows come off "
+        "what casts them.", "offset 1.5", options=("--ground",))
 
 
 def micropolygons():
@@ -218,5 +242,5 @@ def output():
 CHOICES = {choice.name: choice for choice in
            (numbers(), samples(), subpixels(), depth(10),
             depth(10**4, "depth-10k"), depth(10**6, "depth-1m"), rays(),
-            shading_rate(), transparency(), shadows(), shadow_bias(),
-            micropolygons(), output())}
+            shading_rate(), transparency(), shadows(), shadow_map(),
+            shadow_bias(), micropolygons(), output())}

@@ -94,12 +94,17 @@ public:
   /// above it.
   glm::vec3 lookup(glm::vec3 position, glm::vec3 normal, float bias) const {
     glm::vec3 n = glm::abs(axes.along(normal));
-    glm::vec2 texel = 2.0f * glm::vec2(half) / glm::vec2(size);
+    glm::vec2 texel = texelSize();
     float lift = bias * (n.x * texel.x + n.y * texel.y) +
                  roughness * piko::max(texel.x, texel.y);
     glm::vec4 p = clip(position + lift * normal);
     glm::vec2 center = glm::vec2(size) * 0.5f;
     return {center.x + p.x * center.x, center.y - p.y * center.y, p.z};
+  }
+
+  /// How wide and how high a texel is in the world.
+  glm::vec2 texelSize() const {
+    return 2.0f * glm::vec2(half) / glm::vec2(size);
   }
 
 private:
@@ -109,6 +114,29 @@ private:
   glm::vec3 middle, half;
   glm::ivec2 size;
 };
+
+/// Percentage-closer filtering (Reeves, Salesin and Cook 1987): how much of a
+/// square of 2 * reach texels a side about a place on the map is lit; at a
+/// reach of 0, whether the texel there is.
+template <class IsLit>
+float filterShadow(glm::vec2 place, int reach, IsLit isLit) {
+  glm::vec2 corner = glm::floor(place), part = place - corner;
+  glm::ivec2 center(piko::toInt(corner.x), piko::toInt(corner.y));
+  if (reach == 0)
+    return isLit(center) ? 1.0f : 0.0f;
+  // How much of the square lies in a column or row of texels so many steps
+  // beside its centre's, in which the centre has passed `part` of a texel.
+  auto overlap = [&](int step, float part) {
+    return step == -reach ? 1 - part : step == reach ? part : 1;
+  };
+  float lit = 0;
+  for (int y = -reach; y <= reach; ++y)
+    for (int x = -reach; x <= reach; ++x)
+      if (isLit(center + glm::ivec2(x, y)))
+        lit += overlap(x, part.x) * overlap(y, part.y);
+  float side = float(2 * reach);
+  return lit / (side * side);
+}
 
 } // namespace shadow
 

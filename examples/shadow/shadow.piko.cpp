@@ -58,7 +58,8 @@ struct State {
   Camera camera;
   Settings settings;
   int32_t texels = 1; ///< by which a shadow's edge is blurred, on either side
-  float bias = 1.5f;  ///< texels by whose slope surfaces are above the map
+  float bias = 1.5f; ///< texels by whose slope surfaces are above the map: half
+                     ///< a texel more than the blur
   piko::Buffer<Light> lights;
   piko::Buffer<Box> reach;             // of all vertices, in the first element
   piko::Buffer<ShadedVertex> vertices; // one for each Vertex
@@ -200,37 +201,20 @@ struct FragmentShader : piko::Stage<M.bin, M.bin, 64, Fragment, ShadedFragment>,
   }
 
 private:
-  // Percentage-closer filtering: how much of a square about the point on the
-  // map is lit.
+  // How much of the sun is seen.
   float visibility(glm::vec3 position, glm::vec3 normal, glm::vec3 toLight) {
     if (!(glm::dot(normal, toLight) > 0))
       return 0; // turned away
     LightView view(toLight, state().reach[0], this->domain());
     glm::vec3 at = view.lookup(position, normal, state().bias);
-    glm::ivec2 center(piko::toInt(piko::floor(at.x)),
-                      piko::toInt(piko::floor(at.y)));
-    glm::vec2 part = glm::vec2(at) - glm::vec2(center);
-    int reach = state().texels;
-    float lit = 0;
-    for (int y = -reach; y <= reach; ++y)
-      for (int x = -reach; x <= reach; ++x)
-        if (isLit(center + glm::ivec2(x, y), at.z))
-          lit += overlap(x, part.x) * overlap(y, part.y);
-    float side = float(2 * reach);
-    return lit / (side * side);
+    return filterShadow(glm::vec2(at), state().texels,
+                        [&](glm::ivec2 t) { return isLit(t, at.z); });
   }
 
   bool isLit(glm::ivec2 texel, float depth) {
     return glm::any(glm::lessThan(texel, glm::ivec2(0))) ||
            glm::any(glm::greaterThanEqual(texel, this->domain())) ||
            depth <= state().map(texel).z;
-  }
-
-  // How much of the square lies in the column or row of texels `step` beside
-  // its centre's, in which the centre has passed `part` of a texel.
-  float overlap(int step, float part) {
-    int reach = state().texels;
-    return step == -reach ? 1 - part : step == reach ? part : 1;
   }
 };
 
