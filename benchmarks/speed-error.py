@@ -123,7 +123,7 @@ def main():
     measurer = Measurer(options, ROOT)
     pyplot = find_pyplot()
     measured = []
-    for choice in options.choices:
+    for choice in filter(measurer.can_measure, options.choices):
         points = []
         for scene in options.scenes:
             if scene.is_patches() == choice.patches:

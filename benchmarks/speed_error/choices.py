@@ -4,6 +4,8 @@
 import dataclasses
 from dataclasses import dataclass, field
 
+from speed_error.lod import Level
+
 CHOICES_FOLDER = "benchmarks/choices"
 
 
@@ -16,6 +18,7 @@ class Setting:
     pipe: str
     options: tuple[str, ...] = ()
     quick: bool = True  # whether it is of what --quick measures
+    level: Level | None = None  # of the mesh; None: all of it
 
     def command(self, tool):
         return [tool, self.source, "--pipe", self.pipe, "-I", "examples",
@@ -200,6 +203,28 @@ def micropolygons():
         "1 pixels", patches=True)
 
 
+def levels_of_detail():
+    source = "examples/visibility/visibility.piko.cpp"
+    full = Setting("full mesh", source, "Visibility", quick=False)
+
+    def level(pixels, cluster=0):
+        name = f"{pixels} pixels" + (", clusters" if cluster else "")
+        return Setting(name, source, "Visibility", quick=False,
+                       level=Level(pixels, cluster))
+
+    return Choice(
+        "detail", "Levels of detail",
+        [full, *(level(pixels) for pixels in (0.25, 0.5, 1, 2, 4, 8)),
+         *(level(pixels, 2048) for pixels in (0.5, 2, 8))],
+        full, "the full mesh",
+        "examples/visibility of meshes that meshoptimizer has simplified, by edge "
+        "collapse and quadric error metrics: so far off, in pixels, at the vertex "
+        "that is nearest to the eye, or for each cluster of 2048 triangles at its "
+        "nearest one, with fixed borders between clusters. That is of positions: "
+        "the normals, which make most of the error here, are off by more.",
+        "full mesh")
+
+
 def samples():
     source = f"{CHOICES_FOLDER}/samples.piko.cpp"
     return Choice(
@@ -240,7 +265,7 @@ def output():
 
 
 CHOICES = {choice.name: choice for choice in
-           (numbers(), samples(), subpixels(), depth(10),
+           (numbers(), samples(), levels_of_detail(), subpixels(), depth(10),
             depth(10**4, "depth-10k"), depth(10**6, "depth-1m"), rays(),
             shading_rate(), transparency(), shadows(), shadow_map(),
             shadow_bias(), micropolygons(), output())}

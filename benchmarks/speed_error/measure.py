@@ -5,9 +5,11 @@ import json
 import os
 import shlex
 import statistics
+import sys
 from dataclasses import dataclass, field
 
 from commands import call
+from speed_error.lod import Simplifier
 
 METRICS = ["largest", "mean", "rms", "p99", "psnr", "flip"]
 
@@ -74,14 +76,26 @@ class Measurer:
         self.diff = f"{options.bin}/piko-diff"
         self.root = root
         self.folder = options.out
+        self.simplifier = Simplifier(options, root)
         os.makedirs(f"{self.folder}/images", exist_ok=True)
 
     def size(self):
         return ["--width", str(self.options.width),
                 "--height", str(self.options.height)]
 
+    def can_measure(self, choice):
+        """Says so, if something is not installed."""
+        if not any(s.level for s in choice.settings) or self.simplifier.build():
+            return True
+        print(f"{choice.name}: expected libmeshoptimizer-dev to be installed",
+              file=sys.stderr)
+        return False
+
     def command(self, choice, setting, scene, tool):
-        return [*setting.command(tool), *scene.words, *self.size(),
+        words = scene.words
+        if setting.level:
+            words = self.simplifier.words(scene, setting.level)
+        return [*setting.command(tool), *words, *self.size(),
                 *choice.options, "--threads", str(self.options.threads)]
 
     def draw(self, choice, setting, scene, *files):
