@@ -61,7 +61,8 @@ struct View {
   /// The rate is kept in a range in which grids do not outgrow integers.
   View(const piko::scene::Camera &camera, glm::ivec2 size, float rate)
       : toClip(camera.viewProjection), half(glm::vec2(size) * 0.5f),
-        rate(piko::clamp(rate, 0.125f, 64.0f)), least(nearest * camera.nearZ) {}
+        rate(piko::clamp(rate, 0.0625f, 64.0f)), least(nearest * camera.nearZ) {
+  }
 
   glm::vec4 project(glm::vec3 p) const { return toClip * glm::vec4(p, 1); }
 };
