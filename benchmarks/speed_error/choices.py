@@ -191,16 +191,32 @@ def shadow_bias():
         "what casts them.", "offset 1.5", options=("--ground",))
 
 
+REYES = "examples/reyes/reyes.piko.cpp"
+FINEST = Setting("1/16", REYES, "Reyes", sets(rate=1 / 16))
+
+
 def micropolygons():
-    source = "examples/reyes/reyes.piko.cpp"
     return Choice(
         "micropolygons", "Size of micropolygons",
-        [Setting(f"{rate} pixels", source, "Reyes", sets(rate=rate))
+        [Setting(f"{rate} pixels", REYES, "Reyes", sets(rate=rate))
          for rate in (4, 2, 1, 0.5, 0.25)],
-        Setting("1/16", source, "Reyes", sets(rate=1 / 16)),
-        "micropolygons of 1/16 pixel",
+        FINEST, "micropolygons of 1/16 pixel",
         "How long an edge of a micropolygon of examples/reyes may be.",
         "1 pixels", patches=True)
+
+
+def bound_slack():
+    # Segments are as many as the bound over the rate, so that a bound which is
+    # twice as long is a rate which is half as long.
+    return Choice(
+        "bound-slack", "Slack of the bound of edges",
+        [Setting(f"{slack} times", REYES, "Reyes", sets(rate=1 / slack),
+                 quick=False) for slack in (0.7, 1, 1.2, 1.4, 1.7, 2)],
+        FINEST, "micropolygons of 1/16 pixel",
+        "examples/reyes dices to edges of 1 pixel at most, by bounds of curves: how "
+        "many times longer these are than its own. Below 1 an edge may be longer "
+        "than asked for, at 0.7 by what rounding segments to the nearest power of "
+        "two, not up, would allow.", "1 times", patches=True)
 
 
 def levels_of_detail():
@@ -268,4 +284,4 @@ CHOICES = {choice.name: choice for choice in
            (numbers(), samples(), levels_of_detail(), subpixels(), depth(10),
             depth(10**4, "depth-10k"), depth(10**6, "depth-1m"), rays(),
             shading_rate(), transparency(), shadows(), shadow_map(),
-            shadow_bias(), micropolygons(), output())}
+            shadow_bias(), micropolygons(), bound_slack(), output())}
