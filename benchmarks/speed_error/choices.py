@@ -181,8 +181,8 @@ def shadow_bias():
     return Choice(
         "shadow-bias", "Bias of a shadow map",
         [*settings("offset", "Map1024", (0, 0.5, 1, 1.5, 3, 6), True),
-         *settings("slope", "SlopeScaled1024", (0.5, 1, 1.5, 3, 6), False),
-         *settings("constant", "Constant1024", (0.5, 1, 1.5, 3, 6), False)],
+         *settings("slope", "SlopeScaled1024", (1, 1.5, 3, 6), False),
+         *settings("constant", "Constant1024", (1, 1.5, 3, 6), False)],
         exact(shadows=1), "shadow rays in double",
         "How far, in texels of a map of 1024 x 1024, a surface is lifted above it: "
         "by their slope along the normal, as examples/shadow does; by their slope "
@@ -256,7 +256,7 @@ def samples():
 def depth(scale, name="depth"):
     source = f"{CHOICES_FOLDER}/depth.piko.cpp"
     return Choice(
-        name, f"Format of depths, far plane {scale} times as far as the near one",
+        name, f"Format of depths, far plane {scale:,} times as far as the near one",
         [Setting(setting, source, pipe, sets(range=scale), quick=scale == 10)
          for setting, pipe in
          (("16 bits", "Depth16"), ("24 bits", "Depth24"),

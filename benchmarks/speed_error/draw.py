@@ -10,10 +10,24 @@ def place_zeros(values):
     return min(positive, default=1) / 10
 
 
+def remove_overlapping(figure, labels):
+    """Those that would cover one before them."""
+    renderer = figure.canvas.get_renderer()
+    boxes = []
+    for label in labels:
+        box = label.get_window_extent(renderer)
+        if any(box.overlaps(other) for other in boxes):
+            label.remove()
+        else:
+            boxes.append(box)
+
+
 def draw_choice(pyplot, choice, points, metric="rms"):
-    """Milliseconds against error; a colour for each scene."""
+    """Milliseconds against error; a colour for each scene. Where names would
+    cover one another, those on the front and the default's go first."""
     figure, axes = pyplot.subplots(figsize=(7, 4.8))
     zero = place_zeros([p.errors[metric] for p in points])
+    labels = []
 
     def place(point):
         return point.errors[metric] or zero
@@ -30,8 +44,9 @@ def draw_choice(pyplot, choice, points, metric="rms"):
                           fmt="o", color=color,
                           markerfacecolor=color if p.front else "white",
                           label=scene if p is own[0] else None)
-            axes.annotate(p.setting, (place(p), p.ms), xytext=(6, 5),
-                          textcoords="offset points", fontsize=8)
+            label = axes.annotate(p.setting, (place(p), p.ms), xytext=(6, 5),
+                                  textcoords="offset points", fontsize=8)
+            labels.append((p.setting != choice.default, not p.front, label))
     axes.set_xscale("log")
     axes.set_yscale("log")
     exact = any(p.errors[metric] == 0 for p in points)
@@ -43,6 +58,8 @@ def draw_choice(pyplot, choice, points, metric="rms"):
     axes.set_title(choice.title)
     axes.legend(frameon=False)
     figure.tight_layout()
+    remove_overlapping(figure, [label for *_, label in
+                                sorted(labels, key=lambda l: l[:2])])
     return figure
 
 
