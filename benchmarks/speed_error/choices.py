@@ -98,7 +98,7 @@ def rays():
           ("direct, float", "DirectFloat", True),
           ("direct, double", "DirectDouble", True),
           ("watertight, double t", "FarWatertight", False),
-          ("direct, double, double t", "FarDirectDouble", False))],
+          ("direct, double t", "FarDirectDouble", False))],
         exact(), "rays in double",
         "The test of examples/raytrace, which is watertight, and Moeller's and "
         "Trumbore's, whose triangles round each for itself; the distance t of a "
@@ -116,7 +116,7 @@ def shading_rate():
            for side in (1, 2, 4)),
          *(Setting(f"{side}x{side} by depths", source, f"Contrast{side}")
            for side in (2, 4)),
-         *(Setting(f"{side}x{side} by colours, {percent} %", source,
+         *(Setting(f"{side}x{side} by {percent} % contrast", source,
                    f"Colors{side}", ("-D", f"CONTRAST={percent / 100}"),
                    quick=False)
            for side in (2, 4) for percent in (1, 5))],
@@ -224,7 +224,7 @@ def levels_of_detail():
     full = Setting("full mesh", source, "Visibility", quick=False)
 
     def level(pixels, cluster=0):
-        name = f"{pixels} pixels" + (", clusters" if cluster else "")
+        name = f"{pixels} pixels" + (" by cluster" if cluster else "")
         return Setting(name, source, "Visibility", quick=False,
                        level=Level(pixels, cluster))
 
