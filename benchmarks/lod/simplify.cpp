@@ -38,14 +38,17 @@ struct Mesh {
 /// As piko-render: vertices without a normal have the area-weighted mean of the
 /// triangles around them.
 void addNormals(Mesh &mesh) {
+  std::vector<char> isMissing;
+  for (const Vertex &v : mesh.vertices)
+    isMissing.push_back(v.normal == aiVector3D());
   for (size_t i = 0; i < mesh.indices.size(); i += 3) {
-    Vertex *corners[3];
+    const unsigned *corners = &mesh.indices[i];
+    aiVector3D a = mesh.vertices[corners[0]].position;
+    aiVector3D normal = (mesh.vertices[corners[1]].position - a) ^
+                        (mesh.vertices[corners[2]].position - a);
     for (int k = 0; k < 3; ++k)
-      corners[k] = &mesh.vertices[mesh.indices[i + k]];
-    aiVector3D a = corners[0]->position;
-    aiVector3D normal = (corners[1]->position - a) ^ (corners[2]->position - a);
-    for (Vertex *corner : corners)
-      corner->normal += normal;
+      if (isMissing[corners[k]])
+        mesh.vertices[corners[k]].normal += normal;
   }
   for (Vertex &v : mesh.vertices)
     v.normal.NormalizeSafe();
@@ -57,11 +60,9 @@ Mesh load(const char *path) {
       path, aiProcess_Triangulate | aiProcess_PreTransformVertices |
                 aiProcess_JoinIdenticalVertices);
   Mesh mesh;
-  bool hasNormals = true;
   for (unsigned m = 0; scene && m < scene->mNumMeshes; ++m) {
     const aiMesh &part = *scene->mMeshes[m];
     auto first = unsigned(mesh.vertices.size());
-    hasNormals &= part.HasNormals();
     for (unsigned i = 0; i < part.mNumVertices; ++i)
       mesh.vertices.push_back({part.mVertices[i], part.HasNormals()
                                                       ? part.mNormals[i]
@@ -75,8 +76,7 @@ Mesh load(const char *path) {
     std::fprintf(stderr, "%s: %s\n", path, importer.GetErrorString());
     std::exit(1);
   }
-  if (!hasNormals)
-    addNormals(mesh);
+  addNormals(mesh);
   return mesh;
 }
 
