@@ -71,7 +71,7 @@ public:
     float at2 = (m[1] - z * atZ - x1 * rest) / (x2 - x1);
     float at1 = rest - at2;
     float share = part * atZ + (x1 < z ? at1 : 0) + (x2 < z ? at2 : 0);
-    return glm::clamp(share, 0.0f, 1.0f); // 0 for NaN
+    return share > 0 ? glm::min(share, 1.0f) : 0; // of NaN 0
   }
 
 private:
