@@ -188,10 +188,9 @@ static SynthesisOptions choosePasses(const CheckOptions &check,
                                      const SynthesisOptions &synthesis) {
   if (!check.enabled && synthesis.count != Counting::Work)
     return synthesis;
-  SynthesisOptions none = SynthesisOptions::none();
-  none.count = synthesis.count;
-  none.fix = synthesis.fix;
-  return none;
+  SynthesisOptions chosen = synthesis;
+  chosen.without = SynthesisOptions::getOptional();
+  return chosen;
 }
 
 void piko::addPasses(OpPassManager &passes, Level from, Level to,

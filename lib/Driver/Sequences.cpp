@@ -47,6 +47,12 @@ void piko::addSynthesisSequence(OpPassManager &passes,
   if (options.count == Counting::Work)
     passes.nest<PipelineOp>().addPass(createCountWork());
   addCleanUp(passes);
+  if (!options.directives.empty()) {
+    SetDirectivesOptions directives;
+    directives.directives.assign(options.directives.begin(),
+                                 options.directives.end());
+    passes.nest<PipelineOp>().addPass(createSetDirectives(directives));
+  }
   // First: proofs are about what is computed. It cannot be left out, as results
   // depend on it.
   passes.nest<PipelineOp>().addPass(createApplyPrecision());

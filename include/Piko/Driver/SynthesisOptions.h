@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// Which passes of synthesis to leave out, `--without=PASS,...`, and what to
-// count.
+// Which passes of synthesis to leave out, `--without=PASS,...`; what is fixed and
+// which directives are set before it; and what to count.
 
 #ifndef PIKO_DRIVER_SYNTHESISOPTIONS_H
 #define PIKO_DRIVER_SYNTHESISOPTIONS_H
@@ -26,6 +26,8 @@ struct SynthesisOptions {
   /// piko-fix-constants takes them.
   std::vector<std::string> fix = {};
   Counting count = Counting::None;
+  /// `stage:key=value`, as piko-set-directives takes them.
+  std::vector<std::string> directives = {};
 
   bool has(const std::string &pass) const;
   /// All passes that can be left out; results are the same without them.

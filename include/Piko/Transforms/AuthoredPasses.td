@@ -143,6 +143,48 @@ def FixConstants : Pass<"piko-fix-constants", "::piko::PipelineOp"> {
   let dependentDialects = ["::mlir::arith::ArithDialect"];
 }
 
+def SetDirectives : Pass<"piko-set-directives", "::piko::PipelineOp"> {
+  let summary = "Set directives that change no result, or only last bits";
+  let description = [{
+    **Requires** the authored level, with stages as they are written.
+
+    **Does**: sets, for each `stage:key=value` of `set`, a directive of the stage of
+    that name, in C++ or in the dialect, in the place of what it says itself:
+
+    * `schedule`: `load_balance`, `direct_map`, `serialize`, `all`, or `none`, as if
+      the stage said nothing;
+    * `split`: how many primitives `all` gives a core at a time;
+    * `lanes`: `items`, `iterations`, `collapsed`, `one`, or `none`;
+    * `precision`: `strict`, `contracted` or `relaxed`.
+
+    **Guarantees** the results of the pipeline as it was, but for the last bits of
+    what stages compute whose `precision` is set: `end_stage`, `end_bin`, `batch`,
+    `every_bin` and `unordered` stay as they are.
+
+    Before, with `set=shade:schedule=direct_map,shade:precision=contracted`:
+    ```
+    piko.stage @shade ... {
+      piko.schedule load_balance end_bin
+      piko.process {
+    ```
+    After:
+    ```
+    piko.stage @shade ... {
+      piko.schedule direct_map end_bin
+      piko.process precision contracted {
+    ```
+
+    **Limits**: a schedule with a dynamic body says where bins run when the pipeline
+    does, and is refused; so is `none` where a schedule says what a stage waits for.
+    Lanes that a stage cannot have are refused by `piko-map-lanes`.
+  }];
+  let options = [
+    ListOption<"directives", "set", "std::string",
+               "Directives to set, as stage:key=value">];
+  let statistics = [
+    Statistic<"numSet", "set", "directives that were set">];
+}
+
 def ApplyPrecision : Pass<"piko-apply-precision", "::piko::PipelineOp"> {
   let summary = "Compute in each process phase as precisely as its stage says";
   let description = [{
