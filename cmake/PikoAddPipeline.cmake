@@ -3,7 +3,8 @@ cmake_policy(PUSH)
 cmake_policy(VERSION 3.20...3.25)
 
 # piko_add_pipeline(<target> SOURCES <file>... [PIPES <name>...]
-#                   [CPU <name>[,<name>...]] [OPTIONS <option>...])
+#                   [CPU <name>[,<name>...]] [TUNED <file>]
+#                   [OPTIONS <option>...])
 #
 # Compiles pipelines ahead of time and links them into a target, which may then
 # include a header for each. Of one source the PIPES are compiled, each with the
@@ -12,9 +13,10 @@ cmake_policy(VERSION 3.20...3.25)
 #
 # CPU      the processor to compile for: as clang names them, or native
 #          (x86-64-v3); of several the last runs that fits the machine
+# TUNED    what piko-tune chose for the pipeline, of which there is one then
 # OPTIONS  further options of pikoc, such as -I<folder> and -D<name>
 function(piko_add_pipeline target)
-  cmake_parse_arguments(PARSE_ARGV 1 ARG "" "CPU" "SOURCES;PIPES;OPTIONS")
+  cmake_parse_arguments(PARSE_ARGV 1 ARG "" "CPU;TUNED" "SOURCES;PIPES;OPTIONS")
   if(ARG_UNPARSED_ARGUMENTS)
     message(FATAL_ERROR "piko_add_pipeline: unexpected '${ARG_UNPARSED_ARGUMENTS}'")
   endif()
@@ -28,6 +30,15 @@ function(piko_add_pipeline target)
   endif()
   if(ARG_CPU)
     list(APPEND ARG_OPTIONS --cpu=${ARG_CPU})
+  endif()
+  if(ARG_TUNED)
+    list(LENGTH ARG_PIPES pipes)
+    if(count GREATER 1 OR pipes GREATER 1)
+      message(FATAL_ERROR
+        "piko_add_pipeline: expected one pipeline with TUNED")
+    endif()
+    get_filename_component(tuned ${ARG_TUNED} ABSOLUTE)
+    list(APPEND ARG_OPTIONS --tuned=${tuned})
   endif()
 
   set(folder ${CMAKE_CURRENT_BINARY_DIR}/${target}.pipelines)

@@ -156,17 +156,36 @@ static LogicalResult selectPipeline(ModuleOp module, StringRef file,
   return success();
 }
 
+/// Whether what a tuner may set is still open.
+static LogicalResult checkTuning(ModuleOp module,
+                                 const CompileOptions &options) {
+  if (!options.tunables.empty())
+    return emitError(
+               FileLineColLoc::get(module.getContext(), options.file, 1, 1))
+           << "expected C++, because only its text has tunables";
+  if (!options.synthesis.directives.empty() &&
+      getLevel(module) != Level::Authored)
+    return emitError(module.getLoc())
+           << "directives: expected the authored level, but the file is at the "
+           << getName(getLevel(module)) << " level";
+  return success();
+}
+
 OwningOpRef<ModuleOp>
 piko::readPipeline(const CompileOptions &options, MLIRContext &context,
                    llvm::IntrusiveRefCntPtr<llvm::vfs::FileSystem> files) {
   context.loadAllAvailableDialects();
   FrontendOptions frontend = getFrontendOptions(options);
   frontend.files = files;
-  if (!isMLIR(options.file))
+  if (!isMLIR(options.file)) {
+    if (failed(setTunables(options.file, options.tunables, frontend, context)))
+      return {};
     return translateCppToPiko(options.file, frontend, context);
+  }
   OwningOpRef<ModuleOp> module = parseMLIR(options.file, context, *files);
   if (!module ||
-      failed(selectPipeline(*module, options.file, options.pipeName)))
+      failed(selectPipeline(*module, options.file, options.pipeName)) ||
+      failed(checkTuning(*module, options)))
     return {};
   return module;
 }
@@ -181,6 +200,14 @@ piko::readPipelineNames(const CompileOptions &options, MLIRContext &context) {
   if (!module)
     return failure();
   return getNames(*module);
+}
+
+FailureOr<std::vector<TunableDescription>>
+piko::readTunables(const CompileOptions &options, MLIRContext &context) {
+  context.loadAllAvailableDialects();
+  if (!isMLIR(options.file))
+    return listTunables(options.file, getFrontendOptions(options), context);
+  return std::vector<TunableDescription>();
 }
 
 /// Findings and counts of work are about the stages as they are written.

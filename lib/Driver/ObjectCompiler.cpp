@@ -78,11 +78,14 @@ static std::string makeRequest(const ObjectOptions &options,
   key.add(source.file).add(source.pipeName).add(source.text.value_or(""));
   for (const auto *list :
        {&source.includeDirs, &source.defines, &source.check.numbers,
-        &source.synthesis.without, &source.synthesis.fix}) {
+        &source.synthesis.without, &source.synthesis.fix,
+        &source.synthesis.directives}) {
     key.add(std::to_string(list->size()));
     for (const std::string &item : *list)
       key.add(item);
   }
+  for (const auto &[name, value] : source.tunables)
+    key.add(name).add(value);
   key.add(std::to_string(processors.size()));
   for (const Processor &processor : processors)
     key.add(processor.name).add(processor.features);
@@ -188,6 +191,8 @@ compileReference(const ObjectOptions &options, const Files &files,
   context.loadAllAvailableDialects();
   FrontendOptions frontend = getFrontendOptions(options.source);
   frontend.files = files;
+  if (failed(setTunables(file, options.source.tunables, frontend, context)))
+    return nullptr;
   std::vector<PipelineDescription> pipelines =
       describePipelines(options, frontend, context);
   if (pipelines.empty())

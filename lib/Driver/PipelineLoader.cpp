@@ -7,6 +7,8 @@
 #include "Piko/Driver/ObjectCompiler.h"
 #include "Piko/Target/JIT.h"
 
+#include "llvm/Support/xxhash.h"
+
 #include <chrono>
 
 using namespace piko;
@@ -16,10 +18,11 @@ namespace {
 class JITProgram : public LoadedProgram {
 public:
   JITProgram(std::unique_ptr<JITCode> code, const pikort_program *found,
-             double taken)
+             double taken, uint64_t codeHash)
       : code(std::move(code)) {
     program = found;
     milliseconds = taken;
+    hash = codeHash;
   }
 
 private:
@@ -45,6 +48,7 @@ static std::unique_ptr<LoadedProgram> load(CompileOptions source,
   source.pipeName = options.pipeName;
   source.includeDirs = options.includeDirs;
   source.defines = options.defines;
+  source.tunables = options.tunables;
   source.check = options.check;
   source.synthesis = options.synthesis;
   source.gpu = options.gpu;
@@ -72,8 +76,8 @@ static std::unique_ptr<LoadedProgram> load(CompileOptions source,
     return fail(program.takeError());
   std::chrono::duration<double, std::milli> taken =
       std::chrono::steady_clock::now() - start;
-  return std::make_unique<JITProgram>(std::move(*code), *program,
-                                      taken.count());
+  return std::make_unique<JITProgram>(std::move(*code), *program, taken.count(),
+                                      llvm::xxh3_64bits(object->code));
 }
 
 std::unique_ptr<LoadedProgram> piko::loadPipeline(const std::string &file,

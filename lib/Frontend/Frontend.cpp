@@ -6,6 +6,7 @@
 #include "Cleanup/Cleanup.h"
 #include "Import/ModuleBuilder.h"
 #include "Import/Wiring.h"
+#include "Parse/ClangInvocation.h"
 #include "Piko/Dialect/Piko/IR/Canonicalization.h"
 #include "Piko/Dialect/Piko/IR/Piko.h"
 #include "mlir/Dialect/Arith/IR/Arith.h"
@@ -19,6 +20,9 @@
 #include "mlir/IR/Verifier.h"
 #include "mlir/Transforms/CSE.h"
 #include "mlir/Transforms/GreedyPatternRewriteDriver.h"
+#include "llvm/ADT/StringExtras.h"
+
+#include <cmath>
 
 using namespace piko;
 using llvm::failed;
@@ -144,6 +148,84 @@ piko::listPipes(llvm::StringRef file, const FrontendOptions &options,
   if (failed(parsed))
     return failure();
   return std::move(parsed->pipes);
+}
+
+llvm::FailureOr<std::vector<TunableDescription>>
+piko::listTunables(llvm::StringRef file, const FrontendOptions &options,
+                   mlir::MLIRContext &context) {
+  llvm::FailureOr<ParsedFile> parsed = parseFile(
+      {file.str(), std::nullopt, options, ParseGoal::ListTunables}, context);
+  if (failed(parsed))
+    return failure();
+  return std::move(parsed->tunables);
+}
+
+/// "a, b or c".
+static std::string listAlternatives(llvm::ArrayRef<std::string> words) {
+  std::string text = words.front();
+  for (size_t i = 1; i < words.size(); ++i)
+    text += (i + 1 < words.size() ? ", " : " or ") + words[i];
+  return text;
+}
+
+/// Whether a value stands for one that is written down: reals are the same to
+/// six digits.
+static bool isSameValue(llvm::StringRef written, llvm::StringRef value) {
+  double a = 0, b = 0;
+  if (!written.contains_insensitive("e") && !written.contains("."))
+    return written == value;
+  if (!llvm::to_float(written, a) || !llvm::to_float(value, b))
+    return written == value;
+  return std::abs(a - b) <= 1e-6 * std::abs(a);
+}
+
+/// How PIKO_TUNED says that a tunable has a value; an error if there is no such
+/// tunable or value.
+static llvm::FailureOr<std::string>
+writeTunable(llvm::ArrayRef<TunableDescription> tunables, llvm::StringRef name,
+             llvm::StringRef value, mlir::Location file) {
+  std::vector<std::string> names;
+  for (const TunableDescription &tunable : tunables) {
+    names.push_back("'" + tunable.name + "'");
+    if (tunable.name != name)
+      continue;
+    for (auto [written, text] : llvm::zip(tunable.values, tunable.texts))
+      if (isSameValue(written, value))
+        return tunable.name + "=" + text;
+    return mlir::emitError(tunable.location)
+           << "expected " << listAlternatives(tunable.values)
+           << " for tunable '" << name << "', but got " << value;
+  }
+  if (names.empty())
+    return mlir::emitError(file)
+           << "expected a tunable '" << name << "', but the text has none";
+  return mlir::emitError(file)
+         << "expected a tunable '" << name << "', but the text has "
+         << llvm::join(names, ", ");
+}
+
+llvm::LogicalResult
+piko::setTunables(llvm::StringRef file,
+                  llvm::ArrayRef<std::pair<std::string, std::string>> values,
+                  FrontendOptions &options, mlir::MLIRContext &context) {
+  if (values.empty())
+    return llvm::success();
+  mlir::Location location = mlir::FileLineColLoc::get(&context, file, 1, 1);
+  if (isTuned(options))
+    return mlir::emitError(location) << "expected tunables in a tuned file or "
+                                        "in PIKO_TUNED, but got both";
+  auto tunables = listTunables(file, options, context);
+  if (failed(tunables))
+    return failure();
+  std::vector<std::string> settings;
+  for (const auto &[name, value] : values) {
+    auto setting = writeTunable(*tunables, name, value, location);
+    if (failed(setting))
+      return failure();
+    settings.push_back(std::move(*setting));
+  }
+  options.defines.push_back("PIKO_TUNED=\"" + llvm::join(settings, ";") + "\"");
+  return llvm::success();
 }
 
 llvm::FailureOr<PipelineDescription>

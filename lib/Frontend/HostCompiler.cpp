@@ -39,20 +39,23 @@ piko::compileForHost(llvm::StringRef text, llvm::StringRef userFile,
                           /*ShouldOwnClient=*/false));
   if (!invocation)
     return nullptr;
-  // The text is in memory; nothing is read from a file of that name.
-  std::unique_ptr<llvm::MemoryBuffer> buffer =
-      llvm::MemoryBuffer::getMemBufferCopy(text, mainName);
-  invocation->getFrontendOpts().Inputs = {clang::FrontendInputFile(
-      buffer->getMemBufferRef(), clang::InputKind(clang::Language::CXX))};
+  std::string mainText;
   if (std::unique_ptr<llvm::MemoryBuffer> header = getPrecompiledHeader(
           userFile, options, flags, files, invoke, headerPath)) {
     memory->addFile(headerPath, 0, std::move(header));
+    mainText = getTextBehindHeader(options);
     clang::PreprocessorOptions &preprocessor =
         invocation->getPreprocessorOpts();
     preprocessor.ImplicitPCHInclude = headerPath;
     preprocessor.DisablePCHOrModuleValidation =
         clang::DisableValidationForModuleKind::All;
   }
+  mainText += text;
+  // The text is in memory; nothing is read from a file of that name.
+  std::unique_ptr<llvm::MemoryBuffer> buffer =
+      llvm::MemoryBuffer::getMemBuffer(mainText, mainName);
+  invocation->getFrontendOpts().Inputs = {clang::FrontendInputFile(
+      buffer->getMemBufferRef(), clang::InputKind(clang::Language::CXX))};
   clang::CompilerInstance compiler(invocation);
   compiler.setVirtualFileSystem(files);
   compiler.setVerboseOutputStream(llvm::nulls());

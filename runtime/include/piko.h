@@ -22,6 +22,7 @@ QT_NO_KEYWORDS; else write '#undef emit' in front of this header"
 
 #include <piko/bins.h>
 #include <piko/math.h>
+#include <piko/tunable.h>
 
 #ifdef __PIKO__
 #include <piko/compiled/piko.h>

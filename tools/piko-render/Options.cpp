@@ -28,6 +28,7 @@ it, and says how long a frame took.
                          CONSTANT, BUFFER.size, all (all constants but cameras,
                          and sizes of small buffers), or NAME=VALUE; may be
                          repeated
+  --tuned FILE           the setting that piko-tune wrote there
   --gpu-threads N        for gpu-on-cpu: threads of a block, a power of two up to
                          1024 (as many as the stage has)
   --gpu-seed N           for gpu-on-cpu: permutes the blocks (in order)
@@ -107,6 +108,7 @@ private:
         {"--cache-dir", [&] { options.load.cache.directory = value(name); }},
         {"--without", [&] { parseWithout(value("--without")); }},
         {"--fix", [&] { parseFix(value(name)); }},
+        {"--tuned", [&] { options.tuned = value(name); }},
         {"--gpu-threads",
          [&] { options.load.gpu.threads = integer(name, 1, 1024); }},
         {"--gpu-seed",

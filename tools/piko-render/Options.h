@@ -14,6 +14,7 @@ struct Options {
   bool help = false;
   std::string pipeline, scene;
   LoadOptions load;
+  std::string tuned; ///< the file of a setting that piko-tune wrote
   ViewOptions view;
   int lights = 1;
   bool cull = false;

@@ -12,6 +12,7 @@
 #include "Trace.h"
 #include "Wastes.h"
 
+#include "Piko/Driver/TunedSetting.h"
 #include "Piko/Scene/Binding.h"
 #include "Piko/Scene/ImageFile.h"
 #include "Piko/Scene/ProgressBar.h"
@@ -170,6 +171,22 @@ Result<Done> report(const Options &options, const RunResult &result,
   return Done{};
 }
 
+/// Sets what piko-tune chose, where the command line does not say otherwise.
+Result<Done> applyTuned(Options &options) {
+  if (options.tuned.empty())
+    return Done{};
+  std::string wrong;
+  auto setting = readTunedSetting(options.tuned, wrong);
+  if (setting)
+    wrong = setting->apply(options.load.pipeName, options.load.tunables,
+                           options.load.synthesis);
+  if (!wrong.empty())
+    return Error{"--tuned: " + wrong};
+  if (options.stripSize == 0)
+    options.stripSize = setting->stripSize;
+  return Done{};
+}
+
 /// Everything after the command line.
 Result<Done> renderScene(Options options) {
   for (const std::string &image : options.images)
@@ -244,6 +261,8 @@ int main(int argc, char **argv) {
     std::fputs(usage, stdout);
     return 0;
   }
+  if (auto ok = applyTuned(*options); !ok)
+    return fail(ok.error());
   if (auto ok = renderScene(*options); !ok)
     return fail(ok.error());
   return 0;

@@ -10,10 +10,12 @@
 #include "Piko/Driver/Diagnostics.h"
 #include "Piko/Driver/Explain.h"
 #include "Piko/Driver/ObjectCompiler.h"
+#include "Piko/Driver/TunedSetting.h"
 #include "Piko/Target/Object.h"
 #include "Piko/Target/PTX.h"
 #include "Piko/Target/Processor.h"
 
+#include "llvm/ADT/StringExtras.h"
 #include "llvm/IR/LLVMContext.h"
 #include "llvm/IR/Module.h"
 #include "llvm/Support/CommandLine.h"
@@ -128,6 +130,15 @@ struct CommandLine {
   llvm::cl::opt<bool> listPipes{
       "list-pipes", llvm::cl::desc("print the names of the file's pipelines"),
       llvm::cl::cat(category)};
+  llvm::cl::opt<bool> listTunables{
+      "list-tunables",
+      llvm::cl::desc("print where the file declares tunables, and the values "
+                     "that each may have, first the one that it has"),
+      llvm::cl::cat(category)};
+  llvm::cl::opt<std::string> tuned{
+      "tuned", llvm::cl::value_desc("file"),
+      llvm::cl::desc("compile with the setting that piko-tune wrote there"),
+      llvm::cl::cat(category)};
   llvm::cl::list<std::string> includeDirs{
       "I", llvm::cl::Prefix, llvm::cl::value_desc("folder"),
       llvm::cl::desc("where C++ looks for headers"), llvm::cl::cat(category)};
@@ -165,6 +176,10 @@ struct CommandLine {
       "remarks", llvm::cl::desc("print what the passes have to say"),
       llvm::cl::cat(category)};
 
+  /// What the file of --tuned holds.
+  TunedSetting setting;
+
+  bool isListing() const { return listPipes || listTunables; }
   Emit getEmit() const {
     if (emit.getNumOccurrences())
       return emit;
@@ -187,7 +202,27 @@ struct CommandLine {
     return options;
   }
   bool isEmulated() const { return target == Machine::GPUOnCPU; }
+  /// Returns what is wrong, or nothing.
+  std::string readTuned() {
+    if (!tuned.getNumOccurrences())
+      return "";
+    std::string error;
+    if (auto found = readTunedSetting(tuned, error))
+      setting = std::move(*found);
+    return error;
+  }
+  /// Sets what was tuned; returns what is wrong, or nothing.
+  std::string tune(CompileOptions &options) const {
+    if (!tuned.getNumOccurrences())
+      return "";
+    return setting.apply(options.pipeName, options.tunables, options.synthesis);
+  }
   CompileOptions getSource() const {
+    CompileOptions options = getUntuned();
+    (void)tune(options);
+    return options;
+  }
+  CompileOptions getUntuned() const {
     return {
         .file = file,
         .pipeName = pipe,
@@ -205,7 +240,7 @@ struct CommandLine {
     return TargetOptions{.cpu = cpu,
                          .optLevel = static_cast<int>(optLevel),
                          .sanitizer = sanitizer}
-        .leaveOut(*getSynthesis());
+        .leaveOut(getSource().synthesis);
   }
 };
 
@@ -218,12 +253,15 @@ static int fail(const llvm::Twine &message) {
 
 /// What is wrong with options that are fine one by one; empty if nothing.
 static std::string checkOptions(const CommandLine &line) {
-  bool isObject = line.getEmit() == Emit::Object && !line.listPipes;
+  bool isObject = line.getEmit() == Emit::Object && !line.isListing();
   if (!line.getCheck())
     return "--check: expected nan:RECORD.FIELD,..., but got '" + line.check +
            "'";
   if (!line.getSynthesis())
     return describeWrongSynthesisOptions(line.without);
+  CompileOptions source = line.getUntuned();
+  if (std::string wrong = line.tune(source); !wrong.empty())
+    return "--tuned: " + wrong;
   if (line.optLevel > 3)
     return "expected -O0 to -O3, but got -O" + std::to_string(line.optLevel);
   if (!isObject &&
@@ -245,10 +283,10 @@ static std::string checkOptions(const CommandLine &line) {
   if (line.sanitizer.getNumOccurrences() &&
       (line.getEmit() < Emit::Assembly || isGPU))
     return "--sanitize belongs to an object or assembly";
-  if (line.explain && (line.emit.getNumOccurrences() || line.listPipes ||
+  if (line.explain && (line.emit.getNumOccurrences() || line.isListing() ||
                        line.getEmit() != Emit::LLVMIR))
-    return "--explain writes a report, and goes without --emit, --list-pipes "
-           "and an -o that ends in .o or .s";
+    return "--explain writes a report, and goes without --emit, --list-pipes, "
+           "--list-tunables and an -o that ends in .o or .s";
   if (isObject && line.output == "-" && llvm::outs().is_displayed())
     return "expected -o, because an object is not for a terminal";
   return "";
@@ -258,6 +296,19 @@ static std::string printPipes(const std::vector<std::string> &names) {
   std::string text;
   for (const std::string &name : names)
     text += name + "\n";
+  return text;
+}
+
+static std::string printTunables(const std::vector<TunableDescription> &list) {
+  std::string text;
+  llvm::raw_string_ostream stream(text);
+  for (const TunableDescription &tunable : list) {
+    if (auto place = dyn_cast<FileLineColLoc>(tunable.location))
+      stream << place.getFilename().getValue() << ":" << place.getLine() << ":"
+             << place.getColumn() << ": ";
+    stream << tunable.name << " = " << llvm::join(tunable.values, " | ")
+           << "\n";
+  }
   return text;
 }
 
@@ -344,6 +395,11 @@ static std::optional<std::string> writeText(const CommandLine &line) {
     auto names = readPipelineNames(line.getSource(), context);
     return failed(names) ? std::nullopt : std::optional(printPipes(*names));
   }
+  if (line.listTunables) {
+    auto tunables = readTunables(line.getUntuned(), context);
+    return failed(tunables) ? std::nullopt
+                            : std::optional(printTunables(*tunables));
+  }
   if (line.explain)
     return explain(line, context);
   if (line.getEmit() >= Emit::GPU)
@@ -355,9 +411,9 @@ static std::optional<std::string> writeText(const CommandLine &line) {
   if (!cpu)
     return std::nullopt;
   OwningOpRef<ModuleOp> module = readPipeline(line.getSource(), context);
-  if (!module ||
-      failed(lowerPipeline(*module, level, line.getSource().check,
-                           *line.getSynthesis(), line.getSource().gpu, *cpu)))
+  if (!module || failed(lowerPipeline(*module, level, line.getSource().check,
+                                      line.getSource().synthesis,
+                                      line.getSource().gpu, *cpu)))
     return std::nullopt;
   if (line.getEmit() >= Emit::LLVMIR)
     return translate(line, *module);
@@ -370,6 +426,9 @@ static bool writeObject(const CommandLine &line, OutputFiles &outputs) {
                         .target = line.getTarget(),
                         .nameSpace = line.nameSpace,
                         .remarks = line.remarks};
+  if (line.setting.stripSize > 0)
+    llvm::errs() << "warning: --tuned: the host sets strips of "
+                 << line.setting.stripSize << " primitives\n";
   std::string diagnostics;
   std::optional<CompiledObject> object = compileObject(options, diagnostics);
   llvm::errs() << diagnostics;
@@ -380,6 +439,8 @@ static bool writeObject(const CommandLine &line, OutputFiles &outputs) {
          "it nothing says what the pipeline takes");
     return false;
   }
+  if (!line.tuned.empty())
+    object->files.push_back(line.tuned);
   std::vector<std::string> targets = {line.output};
   llvm::Error error = outputs.add(line.output, object->code);
   if (!error && line.header.getNumOccurrences()) {
@@ -401,10 +462,12 @@ int main(int argc, char **argv) {
   llvm::cl::HideUnrelatedOptions(line.category);
   llvm::cl::ParseCommandLineOptions(argc, argv,
                                     "Piko's compiler for pipelines\n");
+  if (std::string wrong = line.readTuned(); !wrong.empty())
+    return fail("--tuned: " + wrong);
   if (std::string wrong = checkOptions(line); !wrong.empty())
     return fail(wrong);
   OutputFiles outputs;
-  if (line.getEmit() == Emit::Object && !line.listPipes) {
+  if (line.getEmit() == Emit::Object && !line.isListing()) {
     if (!writeObject(line, outputs))
       return 1;
   } else {

@@ -66,6 +66,10 @@ std::string getPipelineName(mlir::ModuleOp module,
 llvm::FailureOr<std::vector<std::string>>
 readPipelineNames(const CompileOptions &options, mlir::MLIRContext &context);
 
+/// The tunables of a file; `.mlir` has none.
+llvm::FailureOr<std::vector<TunableDescription>>
+readTunables(const CompileOptions &options, mlir::MLIRContext &context);
+
 /// Adds the passes that take a module from one level to another one.
 void addPasses(mlir::OpPassManager &passes, Level from, Level to,
                const CheckOptions &check, const SynthesisOptions &synthesis,

@@ -13,6 +13,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace piko {
@@ -35,6 +36,9 @@ struct CacheOptions {
   uint64_t maxBytes = 0;
 };
 
+/// The names of tunables of a text, each with one of the values that it lists.
+using TunableSettings = std::vector<std::pair<std::string, std::string>>;
+
 /// A pipeline and how its text is read.
 struct CompileOptions {
   /// A pipeline's C++, or `.mlir` at the authored level.
@@ -43,6 +47,7 @@ struct CompileOptions {
   std::string pipeName = {};
   /// `-I` and `-D`, without the letter.
   std::vector<std::string> includeDirs = {}, defines = {};
+  TunableSettings tunables = {};
   /// The file's text, where it is not on disk; `file` is then only its name.
   std::optional<std::string> text = {};
   CheckOptions check = {};

@@ -29,6 +29,7 @@ struct LoadOptions {
   ExecutionTarget target = ExecutionTarget::CPU;
   /// `-I` and `-D`, without the letter.
   std::vector<std::string> includeDirs = {}, defines = {};
+  TunableSettings tunables = {};
   CacheOptions cache = {};
   /// What is checked while the pipeline runs. The reference executor is told in
   /// the pipeline's text of fields that must not be NaN.
@@ -48,10 +49,13 @@ public:
   const pikort_program &get() const { return *program; }
   /// From the text to here, in milliseconds.
   double compileMilliseconds() const { return milliseconds; }
+  /// A hash of the code: what has the same runs the same.
+  uint64_t codeHash() const { return hash; }
 
 protected:
   const pikort_program *program = nullptr;
   double milliseconds = 0;
+  uint64_t hash = 0;
 };
 
 /// Compiles a pipeline's file, C++ or `.mlir` (which the reference executor

@@ -70,6 +70,32 @@ llvm::FailureOr<std::vector<std::string>>
 listPipes(llvm::StringRef file, const FrontendOptions &options,
           mlir::MLIRContext &context);
 
+/// A constant that a tuner may choose: a call of piko::tunable.
+struct TunableDescription {
+  std::string name = {};
+  /// The standard value, then the others, as a user writes them: an enumerator
+  /// by its name.
+  std::vector<std::string> values = {};
+  /// The same as PIKO_TUNED takes them.
+  std::vector<std::string> texts = {};
+  /// The first call.
+  mlir::Location location;
+};
+
+/// The tunables of a C++ file and of the headers that are the user's, in the
+/// order in which they stand there.
+llvm::FailureOr<std::vector<TunableDescription>>
+listTunables(llvm::StringRef file, const FrontendOptions &options,
+             mlir::MLIRContext &context);
+
+/// Defines PIKO_TUNED so that the file's tunables have these values, by their
+/// names, as listTunables() writes them. An error if the file has no such
+/// tunable, or it no such value.
+llvm::LogicalResult
+setTunables(llvm::StringRef file,
+            llvm::ArrayRef<std::pair<std::string, std::string>> values,
+            FrontendOptions &options, mlir::MLIRContext &context);
+
 /// Reads a pipeline's stages, edges, state and records without compiling its
 /// phases.
 llvm::FailureOr<PipelineDescription>

@@ -92,6 +92,41 @@ static std::string explainAssertion(const clang::Diagnostic &info,
   return isInLanguage(info) ? text.split(": ").second.str() : "";
 }
 
+/// What the call of piko::tunable that a note names expected of PIKO_TUNED;
+/// empty for another note.
+static std::string explainTunable(llvm::StringRef note) {
+  if (!note.consume_front("in call to 'tunable<"))
+    return "";
+  auto [name, values] = note.split("(&\"").second.split("\"[0], ");
+  if (!values.consume_back(")'"))
+    return "";
+  if (name.empty() || name.find_first_of("=; \"\\") != name.npos)
+    return ("expected a tunable's name to have no '=', ';', quote or space, "
+            "but "
+            "got '" +
+            name + "'")
+        .str();
+  return ("PIKO_TUNED: expected one of " + values + " for tunable '" + name +
+          "'")
+      .str();
+}
+
+bool ClangDiagnosticForwarder::rewriteTunable(const clang::Diagnostic &info,
+                                              llvm::StringRef note) {
+  std::string better = pending ? explainTunable(note) : "";
+  if (better.empty())
+    return false;
+  mlir::Location location =
+      convertLocation(info.getLocation(), info.getSourceManager(), context);
+  pending.reset();
+  isExplained = true;
+  if (std::exchange(tunable, better) == better)
+    return true;
+  pending.emplace(location, mlir::DiagnosticSeverity::Error);
+  *pending << better;
+  return true;
+}
+
 void ClangDiagnosticForwarder::HandleDiagnostic(
     clang::DiagnosticsEngine::Level level, const clang::Diagnostic &info) {
   DiagnosticConsumer::HandleDiagnostic(level, info);
@@ -100,6 +135,8 @@ void ClangDiagnosticForwarder::HandleDiagnostic(
     return;
   llvm::SmallString<128> text;
   info.FormatDiagnostic(text);
+  if (level == clang::DiagnosticsEngine::Note && rewriteTunable(info, text))
+    return;
   if (level != clang::DiagnosticsEngine::Note) {
     isExplained = isMisplaced = false;
   } else if (isMisplaced && pending && !isInLanguage(info)) {

@@ -36,6 +36,10 @@ public:
   void flush();
 
 private:
+  /// Where a note is about a tunable that has no such value, puts our text in
+  /// the place of the error, once.
+  bool rewriteTunable(const clang::Diagnostic &info, llvm::StringRef note);
+
   mlir::MLIRContext &context;
   const clang::Sema *sema = nullptr;
   std::optional<mlir::Diagnostic> pending;
@@ -43,6 +47,9 @@ private:
   bool isExplained = false;
   /// Whether that is about a call in the user's text, which a note will name.
   bool isMisplaced = false;
+  /// The last text of ours about a tunable, which Clang may have two errors
+  /// for.
+  std::string tunable;
   /// If it is about a wrapper's call of a phase: how the phase is declared.
   std::string phase;
 };

@@ -31,6 +31,16 @@ piko::getClangArguments(llvm::ArrayRef<const char *> flags,
   return arguments;
 }
 
+llvm::StringRef piko::getMacroName(llvm::StringRef define) {
+  return define.split('=').first.split('(').first;
+}
+
+bool piko::isTuned(const FrontendOptions &options) {
+  return llvm::any_of(options.defines, [](llvm::StringRef define) {
+    return getMacroName(define) == "PIKO_TUNED";
+  });
+}
+
 std::shared_ptr<clang::CompilerInvocation> piko::createClangInvocation(
     llvm::ArrayRef<const char *> flags, const FrontendOptions &options,
     llvm::StringRef mainName,

@@ -20,6 +20,12 @@ namespace piko {
 std::vector<std::string> getClangArguments(llvm::ArrayRef<const char *> flags,
                                            const FrontendOptions &options);
 
+/// Whether the macros define PIKO_TUNED.
+bool isTuned(const FrontendOptions &options);
+
+/// The name of a macro that `-D` defines.
+llvm::StringRef getMacroName(llvm::StringRef define);
+
 /// The invocation with these arguments; null after an error.
 std::shared_ptr<clang::CompilerInvocation> createClangInvocation(
     llvm::ArrayRef<const char *> flags, const FrontendOptions &options,

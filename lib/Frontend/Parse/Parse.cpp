@@ -6,6 +6,7 @@
 //   #pragma piko_file
 //   #pragma piko_wrappers
 //
+// (with a line before them, if a precompiled piko.h must hear of PIKO_TUNED).
 // At the first the user's file is entered, under the name that the user gave.
 // At the second the user's declarations are complete: pipelines are found, one
 // or each is read, and text with a wrapper for each of its phases is entered as
@@ -30,6 +31,7 @@
 #include "Parse/HidingMacros.h"
 #include "Parse/PhaseNames.h"
 #include "Parse/PrecompiledHeader.h"
+#include "Parse/Tunables.h"
 #include "Parse/UnitModules.h"
 #include "Parse/Wrappers.h"
 #include "clang/AST/ASTConsumer.h"
@@ -216,6 +218,7 @@ private:
       pipes.push_back(pipe.name);
     switch (request.goal) {
     case ParseGoal::ListPipes:
+    case ParseGoal::ListTunables:
       return true;
     case ParseGoal::CompilePipe: {
       llvm::FailureOr<PipeCandidate> pipe =
@@ -454,8 +457,10 @@ llvm::FailureOr<ParsedFile> piko::parseFile(const ParseRequest &request,
   compiler.createFileManager();
   compiler.createSourceManager();
   clang::SourceManager &sources = compiler.getSourceManager();
-  sources.setMainFileID(sources.createFileID(llvm::MemoryBuffer::getMemBuffer(
-      "#pragma piko_file\n;\n#pragma piko_wrappers\n", mainName)));
+  std::string mainText = hasHeader ? getTextBehindHeader(request.options) : "";
+  mainText += "#pragma piko_file\n;\n#pragma piko_wrappers\n";
+  sources.setMainFileID(sources.createFileID(
+      llvm::MemoryBuffer::getMemBuffer(mainText, mainName)));
 
   compiler.createPreprocessor(clang::TU_Complete);
   clang::Preprocessor &preprocessor = compiler.getPreprocessor();
@@ -468,7 +473,8 @@ llvm::FailureOr<ParsedFile> piko::parseFile(const ParseRequest &request,
   preprocessor.AddPragmaHandler(&fileReader);
   compiler.createASTContext();
 
-  bool compiles = request.goal != ParseGoal::ListPipes;
+  bool compiles = request.goal == ParseGoal::CompilePipe ||
+                  request.goal == ParseGoal::CompileAll;
   clang::CodeGenerator *generator = nullptr;
   if (compiles) {
     auto consumer =
@@ -499,6 +505,12 @@ llvm::FailureOr<ParsedFile> piko::parseFile(const ParseRequest &request,
     return llvm::failure();
   ParsedFile result;
   result.pipes = std::move(reader.pipes);
+  if (request.goal == ParseGoal::ListTunables) {
+    auto tunables = findTunables(compiler.getASTContext(), context);
+    if (failed(tunables))
+      return llvm::failure();
+    result.tunables = std::move(*tunables);
+  }
   if (!compiles)
     return result;
   std::unique_ptr<llvm::Module> module(generator->ReleaseModule());

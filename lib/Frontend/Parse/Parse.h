@@ -14,7 +14,7 @@
 namespace piko {
 
 /// What is asked of a file.
-enum class ParseGoal { ListPipes, CompilePipe, CompileAll };
+enum class ParseGoal { ListPipes, ListTunables, CompilePipe, CompileAll };
 
 struct ParseRequest {
   std::string file;
@@ -48,6 +48,8 @@ struct ParsedUnit {
 struct ParsedFile {
   /// The names of all pipelines, in the order of their definition.
   std::vector<std::string> pipes;
+  /// What ListTunables asks for.
+  std::vector<TunableDescription> tunables;
   /// The pipelines that were asked for.
   std::vector<std::unique_ptr<ParsedUnit>> units;
 };

@@ -129,9 +129,15 @@ static std::optional<std::string> makeHeader(const FrontendOptions &options,
 static bool mentions(llvm::StringRef names,
                      llvm::ArrayRef<std::string> defines) {
   return llvm::any_of(defines, [&](llvm::StringRef define) {
-    llvm::StringRef name = define.split('=').first.split('(').first;
-    return names.contains(("\n" + name + "\n").str());
+    return names.contains(("\n" + getMacroName(define) + "\n").str());
   });
+}
+
+std::string piko::getTextBehindHeader(const FrontendOptions &options) {
+  if (!isTuned(options))
+    return "";
+  return "template <> inline constexpr const char "
+         "*piko::detail::tunedText<void> = PIKO_TUNED;\n";
 }
 
 std::unique_ptr<llvm::MemoryBuffer>
@@ -145,8 +151,9 @@ piko::getPrecompiledHeader(llvm::StringRef file, const FrontendOptions &options,
   std::vector<std::string> others;
   shared.defines.clear();
   for (const std::string &define : options.defines)
-    (llvm::StringRef(define).starts_with("PIKO_") ? shared.defines : others)
-        .push_back(define);
+    if (getMacroName(define) != "PIKO_TUNED") // told behind the header
+      (llvm::StringRef(define).starts_with("PIKO_") ? shared.defines : others)
+          .push_back(define);
   std::optional<std::string> header =
       options.headers->get(getClangArguments(flags, shared), files,
                            [&](const HeaderStore::Files &recorded) {

@@ -23,12 +23,17 @@ using InvocationMaker =
 /// The precompiled header for a file, made where the store has none, or null:
 /// without a store, where something comes before `#include <piko.h>` or is
 /// defined that could change what it means, or where it has errors. It holds
-/// no macros of the options but Piko's own; Clang adds them where it is used.
+/// no macros of the options but Piko's own, without PIKO_TUNED; Clang adds them
+/// where it is used.
 std::unique_ptr<llvm::MemoryBuffer>
 getPrecompiledHeader(llvm::StringRef file, const FrontendOptions &options,
                      llvm::ArrayRef<const char *> flags,
                      const HeaderStore::Files &files, InvocationMaker invoke,
                      llvm::StringRef name);
+
+/// What to put in front of a text for which there is such a header, and which
+/// may have PIKO_TUNED.
+std::string getTextBehindHeader(const FrontendOptions &options);
 
 } // namespace piko
 

@@ -29,7 +29,7 @@ NAMESPACE = """
     LoadBalance NoState Order Pipe Position Precision SchedulePolicy Serialize Stage
     Status Unordered Uses acos asin atan atan2 atomicAdd atomicAddFetch atomicAnd
     atomicMax atomicMin atomicOr atomicXor cbrt cos cosh exp exp2 fma hypot log
-    log10 log2 max min pow rsqrt sin sinh sqrt tan tanh toInt toInt64 toUint"""
+    log10 log2 max min pow rsqrt sin sinh sqrt tan tanh toInt toInt64 toUint tunable"""
 # Of namespaces, which are no names for functions; piko.h needs the others.
 SPACES = "piko std glm user detail marker reference"
 # What other headers declare globally as no function.
