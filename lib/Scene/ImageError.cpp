@@ -315,13 +315,10 @@ Result<std::vector<float>> render::computeFlip(const Image &reference,
 // All measures
 //===----------------------------------------------------------------------===//
 
-Result<ImageError> render::compareImages(const Image &reference,
-                                         const Image &image,
-                                         double pixelsPerDegree,
-                                         std::vector<float> *flip) {
-  auto map = computeFlip(reference, image, pixelsPerDegree);
-  if (!map)
-    return map.error();
+Result<ImageError> render::compareColors(const Image &reference,
+                                         const Image &image) {
+  if (auto ok = checkSizes(reference, image); !ok)
+    return ok.error();
   ImageError error;
   double sum = 0, squares = 0;
   std::vector<float> worst(image.pixels.size());
@@ -338,7 +335,6 @@ Result<ImageError> render::compareImages(const Image &reference,
     }
     error.notFinite += !isFinite;
     error.differing += worst[i] > 0;
-    error.flip += (*map)[i];
   }
   double count = double(worst.size());
   auto rank = worst.begin() + std::ptrdiff_t(std::ceil(0.99 * count)) - 1;
@@ -349,7 +345,23 @@ Result<ImageError> render::compareImages(const Image &reference,
   error.rms = std::sqrt(squares / (3 * count));
   error.psnr = squares > 0 ? -20 * std::log10(error.rms)
                            : std::numeric_limits<double>::infinity();
-  error.flip /= count;
+  return error;
+}
+
+Result<ImageError> render::compareImages(const Image &reference,
+                                         const Image &image,
+                                         double pixelsPerDegree,
+                                         std::vector<float> *flip) {
+  auto map = computeFlip(reference, image, pixelsPerDegree);
+  if (!map)
+    return map.error();
+  auto error = compareColors(reference, image);
+  if (!error)
+    return error;
+  double sum = 0;
+  for (float value : *map)
+    sum += value;
+  error->flip = sum / double(map->size());
   if (flip)
     *flip = std::move(*map);
   return error;

@@ -98,6 +98,23 @@ TEST(Flip, FallsWithDistance) {
             compareImages(flat, noisy, 20)->flip);
 }
 
+TEST(ImageError, IsTheSameWithoutFlip) {
+  Image flat = fill(60, 40, {{0.5f, 0.5f, 0.5f, 1}}), other = flat;
+  other.pixels[7].rgba = {0.75f, 0.5f, NAN, 1};
+  auto all = compareImages(flat, other), colors = compareColors(flat, other);
+  ASSERT_TRUE(all && colors);
+  EXPECT_EQ(all->largest, colors->largest);
+  EXPECT_EQ(all->mean, colors->mean);
+  EXPECT_EQ(all->rms, colors->rms);
+  EXPECT_EQ(all->p99, colors->p99);
+  EXPECT_EQ(all->differing, colors->differing);
+  EXPECT_EQ(all->notFinite, 1);
+  EXPECT_EQ(colors->notFinite, 1);
+  EXPECT_GT(all->flip, 0);
+  EXPECT_EQ(colors->flip, 0);
+  EXPECT_FALSE(compareColors(fill(3, 4, black), fill(4, 3, black)));
+}
+
 TEST(ImageError, Refuses) {
   EXPECT_FALSE(compareImages(fill(3, 4, black), fill(4, 3, black)));
   EXPECT_FALSE(compareImages(Image(), Image()));
