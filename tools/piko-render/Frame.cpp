@@ -1,11 +1,80 @@
-//===- Frame.cpp - A pipeline that is bound to a scene --------------------===//
+//===- Frame.cpp - A scene bound to a pipeline ----------------------------===//
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #include "Frame.h"
 
+#include "Piko/Scene/ProgressBar.h"
+
+#include <algorithm>
 #include <cstdio>
 
 using namespace piko;
 using namespace piko::render;
+
+Error render::errorOf(pikort_pipeline *pipeline) {
+  return {pikort_message(pipeline)};
+}
+
+Result<SceneInput> render::loadScene(const Options &options) {
+  ProgressBar bar("loading");
+  auto mesh = loadMesh(options.scene, [&](double part) { bar.update(part); });
+  if (!mesh)
+    return mesh.error();
+  if (options.ground)
+    addGround(*mesh);
+  Sphere bounds = boundingSphere(*mesh);
+  auto camera = makeCamera(options.view, bounds);
+  if (!camera)
+    return Error{"scene '" + options.scene + "': " + camera.error().message};
+  SceneInput scene{};
+  scene.size = {options.view.width, options.view.height};
+  scene.camera = *camera;
+  scene.settings.cullBackFaces = options.cull;
+  scene.lights = makeLights(options.lights, bounds);
+  scene.mesh = std::move(*mesh);
+  scene.values = options.values;
+  return scene;
+}
+
+Result<std::string> render::createPipeline(const Options &options,
+                                           const pikort_program &program,
+                                           SceneInput &scene,
+                                           PipelineOwner &owner) {
+  int32_t code = pikort_create(&program, &owner.pipeline);
+  pikort_pipeline *pipeline = owner.pipeline;
+  int64_t extent[] = {scene.size.x, scene.size.y};
+  if (code != PIKORT_OK ||
+      pikort_set_domain(pipeline, 2, extent) != PIKORT_OK ||
+      pikort_set_threads(pipeline, options.threads) != PIKORT_OK ||
+      pikort_set_memory_budget(pipeline, options.memoryBudget) != PIKORT_OK ||
+      pikort_set_strip_size(pipeline, options.stripSize) != PIKORT_OK)
+    return errorOf(pipeline);
+  return bindScene(pipeline, scene);
+}
+
+Result<std::vector<scene::Color>> render::readImage(pikort_pipeline *pipeline,
+                                                    const std::string &name) {
+  pikort_view view;
+  if (pikort_get_view(pipeline, name.c_str(), &view) != PIKORT_OK)
+    return errorOf(pipeline);
+  size_t count = size_t(view.extent[0] * view.extent[1]);
+  std::vector<scene::Color> pixels(count);
+  if (view.record_size == sizeof(scene::Color)) {
+    std::copy_n(static_cast<const scene::Color *>(view.data), count,
+                pixels.begin());
+    return pixels;
+  }
+  if (view.record_size != sizeof(scene::Color8))
+    return Error{"image '" + name + "': expected pixels of " +
+                 std::to_string(sizeof(scene::Color)) + " or " +
+                 std::to_string(sizeof(scene::Color8)) + " bytes, but got " +
+                 std::to_string(view.record_size)};
+  auto *bytes = static_cast<const scene::Color8 *>(view.data);
+  for (size_t i = 0; i < count; ++i)
+    for (int channel = 0; channel < 4; ++channel)
+      pixels[i].rgba[channel] =
+          float(bytes[i].rgba >> (8 * channel) & 255) / 255.0f;
+  return pixels;
+}
 
 Result<Frame> Frame::load(const Options &options) {
   std::string diagnostics;
@@ -22,14 +91,7 @@ Result<Frame> Frame::load(const Options &options) {
 }
 
 Result<Done> Frame::bind(const Options &options, SceneInput &scene) {
-  int32_t code = pikort_create(&program->get(), &owned);
-  int64_t extent[] = {options.view.width, options.view.height};
-  if (code != PIKORT_OK || pikort_set_domain(owned, 2, extent) != PIKORT_OK ||
-      pikort_set_threads(owned, options.threads) != PIKORT_OK ||
-      pikort_set_memory_budget(owned, options.memoryBudget) != PIKORT_OK ||
-      pikort_set_strip_size(owned, options.stripSize) != PIKORT_OK)
-    return Error{pikort_message(owned)};
-  auto bound = bindScene(owned, scene);
+  auto bound = createPipeline(options, program->get(), scene, owner);
   if (!bound)
     return bound.error();
   output = *bound;
@@ -37,7 +99,7 @@ Result<Done> Frame::bind(const Options &options, SceneInput &scene) {
 }
 
 Result<Done> Frame::run() {
-  if (pikort_run(owned) != PIKORT_OK)
-    return Error{pikort_message(owned)};
+  if (pikort_run(owner.pipeline) != PIKORT_OK)
+    return errorOf(owner.pipeline);
   return Done{};
 }

@@ -1,5 +1,9 @@
-//===- Frame.h - A pipeline that is bound to a scene ------------*- C++ -*-===//
+//===- Frame.h - A scene bound to a pipeline --------------------*- C++ -*-===//
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// What piko-render and piko-tune do before and after a run.
+//
+//===----------------------------------------------------------------------===//
 #ifndef PIKO_TOOLS_PIKORENDER_FRAME_H
 #define PIKO_TOOLS_PIKORENDER_FRAME_H
 
@@ -7,26 +11,46 @@
 
 #include "Piko/Scene/Binding.h"
 
+#include <pikort/pikort.h>
+
 #include <memory>
+#include <utility>
 
 namespace piko::render {
 
-/// A compiled program, and a pipeline of it that is ready to run.
-class Frame {
-public:
-  Frame() = default;
-  Frame(Frame &&other) noexcept
-      : program(std::move(other.program)),
-        owned(std::exchange(other.owned, nullptr)),
-        output(std::move(other.output)) {}
-  Frame &operator=(Frame &&other) noexcept {
-    std::swap(program, other.program);
-    std::swap(owned, other.owned);
-    std::swap(output, other.output);
+/// A pipeline of the runtime, destroyed at the end.
+struct PipelineOwner {
+  PipelineOwner() = default;
+  PipelineOwner(PipelineOwner &&other) noexcept
+      : pipeline(std::exchange(other.pipeline, nullptr)) {}
+  PipelineOwner &operator=(PipelineOwner &&other) noexcept {
+    std::swap(pipeline, other.pipeline);
     return *this;
   }
-  ~Frame() { pikort_destroy(owned); }
+  ~PipelineOwner() { pikort_destroy(pipeline); }
 
+  pikort_pipeline *pipeline = nullptr;
+};
+
+/// What went wrong with a pipeline last.
+Error errorOf(pikort_pipeline *pipeline);
+
+/// Reads the scene and sets camera, lights and values as options say.
+Result<SceneInput> loadScene(const Options &options);
+
+/// Makes a pipeline of a program and binds a scene, which must outlive it: the
+/// name of its image.
+Result<std::string> createPipeline(const Options &options,
+                                   const pikort_program &program,
+                                   SceneInput &scene, PipelineOwner &owner);
+
+/// The image of that name, of whichever kind of colours it is.
+Result<std::vector<scene::Color>> readImage(pikort_pipeline *pipeline,
+                                            const std::string &name);
+
+/// A compiled program, and a pipeline of it that is bound to a scene.
+class Frame {
+public:
   /// Compiles what the options name, and says on stderr what the compiler has
   /// to say; an error without a message if that is all.
   static Result<Frame> load(const Options &options);
@@ -35,14 +59,14 @@ public:
   /// Runs once.
   Result<Done> run();
 
-  pikort_pipeline *pipeline() const { return owned; }
+  pikort_pipeline *pipeline() const { return owner.pipeline; }
   /// The name of the image that the pipeline makes.
   const std::string &image() const { return output; }
   double compileMilliseconds() const { return program->compileMilliseconds(); }
 
 private:
-  std::unique_ptr<LoadedProgram> program;
-  pikort_pipeline *owned = nullptr;
+  std::unique_ptr<LoadedProgram> program; // goes last
+  PipelineOwner owner;
   std::string output;
 };
 

@@ -13,7 +13,6 @@
 #include "Wastes.h"
 
 #include "Piko/Driver/TunedSetting.h"
-#include "Piko/Scene/Binding.h"
 #include "Piko/Scene/ImageFile.h"
 #include "Piko/Scene/ProgressBar.h"
 
@@ -40,29 +39,6 @@ private:
   using Clock = std::chrono::steady_clock;
   Clock::time_point start = Clock::now();
 };
-
-Error errorOf(pikort_pipeline *pipeline) { return {pikort_message(pipeline)}; }
-
-Result<SceneInput> loadScene(const Options &options) {
-  ProgressBar bar("loading");
-  auto mesh = loadMesh(options.scene, [&](double part) { bar.update(part); });
-  if (!mesh)
-    return mesh.error();
-  if (options.ground)
-    addGround(*mesh);
-  Sphere bounds = boundingSphere(*mesh);
-  auto camera = makeCamera(options.view, bounds);
-  if (!camera)
-    return Error{"scene '" + options.scene + "': " + camera.error().message};
-  SceneInput scene{};
-  scene.size = {options.view.width, options.view.height};
-  scene.camera = *camera;
-  scene.settings.cullBackFaces = options.cull;
-  scene.lights = makeLights(options.lights, bounds);
-  scene.mesh = std::move(*mesh);
-  scene.values = options.values;
-  return scene;
-}
 
 /// Runs the warm-up frames, then the timed ones.
 Result<FrameTimes> timeFrames(const Options &options,
@@ -92,32 +68,6 @@ Result<FrameTimes> timeFrames(const Options &options,
   std::sort(times.begin(), times.end());
   return FrameTimes{times[times.size() / 2], times.front(), times.back(),
                     spent / double(times.size()), int(times.size())};
-}
-
-/// The result, of whichever kind of colours it is.
-Result<std::vector<scene::Color>> readImage(pikort_pipeline *pipeline,
-                                            const std::string &name) {
-  pikort_view view;
-  if (pikort_get_view(pipeline, name.c_str(), &view) != PIKORT_OK)
-    return errorOf(pipeline);
-  size_t count = size_t(view.extent[0] * view.extent[1]);
-  std::vector<scene::Color> pixels(count);
-  if (view.record_size == sizeof(scene::Color)) {
-    std::copy_n(static_cast<const scene::Color *>(view.data), count,
-                pixels.begin());
-    return pixels;
-  }
-  if (view.record_size != sizeof(scene::Color8))
-    return Error{"image '" + name + "': expected pixels of " +
-                 std::to_string(sizeof(scene::Color)) + " or " +
-                 std::to_string(sizeof(scene::Color8)) + " bytes, but got " +
-                 std::to_string(view.record_size)};
-  auto *bytes = static_cast<const scene::Color8 *>(view.data);
-  for (size_t i = 0; i < count; ++i)
-    for (int channel = 0; channel < 4; ++channel)
-      pixels[i].rgba[channel] =
-          float(bytes[i].rgba >> (8 * channel) & 255) / 255.0f;
-  return pixels;
 }
 
 int64_t countDrawn(std::span<const scene::Color> pixels) {
