@@ -13,11 +13,11 @@ install(DIRECTORY runtime/include/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
 install(DIRECTORY docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR})
 install(FILES LICENSE README.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
 if(PIKO_ENABLE_COMPILER)
-  set(tools pikoc piko-diff piko-opt piko-render piko-translate)
+  set(tools pikoc piko-diff piko-opt piko-render piko-translate piko-tune)
   set_target_properties(${tools} PROPERTIES
     INSTALL_RPATH "$ORIGIN/../${CMAKE_INSTALL_LIBDIR};${PIKO_LLVM_PREFIX}/lib")
   install(TARGETS pikoc EXPORT PikoTargets)
-  install(TARGETS piko-diff piko-opt piko-render piko-translate)
+  install(TARGETS piko-diff piko-opt piko-render piko-translate piko-tune)
   install(TARGETS PikoImage LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
 endif()
 

@@ -1,0 +1,150 @@
+//===- Report.cpp - What piko-tune says and writes ------------------------===//
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+#include "Report.h"
+
+#include <cmath>
+#include <filesystem>
+
+using namespace piko;
+using namespace piko::tune;
+using render::JsonObject;
+
+static std::string print(const char *format, double number) {
+  char text[64];
+  std::snprintf(text, sizeof text, format, number);
+  return text;
+}
+
+/// How a duel ended, for the first.
+static std::string describe(const Duel &duel) {
+  std::string text = "won " + std::to_string(duel.wins) + " of " +
+                     std::to_string(duel.rounds) +
+                     " rounds, p = " + print("%.2g", duel.chance());
+  if (duel.rounds > 0 && duel.isLevel())
+    text +=
+        std::abs(duel.ratio - 1) < 0.01 ? ", level within 1 %" : ", not sure";
+  return text;
+}
+
+static size_t countLeftOut(const TuneResult &result) {
+  size_t count = 0;
+  for (const Trial &trial : result.trials)
+    count += !trial.problem.empty();
+  return count;
+}
+
+std::string tune::summarize(const TuneResult &result) {
+  const Outcome &outcome = result.outcome;
+  const Space &space = result.space;
+  const Trial &chosen = *outcome.chosen, &text = *outcome.text;
+  std::string lines =
+      space.name(chosen.setting) + ": " + print("%.3g ms", chosen.median());
+  if (&chosen == &text)
+    lines += ", as the text says\n";
+  else
+    lines += ", " + print("%.2f", outcome.againstText.ratio) +
+             " times as fast as " + space.name(text.setting) + " (" +
+             describe(outcome.againstText) + ")\n";
+  lines += "error (" + result.options.metricName +
+           "): " + print("%.3g", *chosen.error) + ", of " +
+           result.options.errorText + "\n";
+  if (outcome.runnerUp)
+    lines += "runner-up: " + space.name(outcome.runnerUp->setting) + ", " +
+             print("%.2f", outcome.againstRunnerUp.ratio) +
+             " times the time (the chosen one " +
+             describe(outcome.againstRunnerUp) + ")\n";
+  lines += std::to_string(outcome.runs) + " runs of " +
+           std::to_string(result.trials.size()) + " settings, " +
+           std::to_string(outcome.compilations) + " compiled, " +
+           std::to_string(countLeftOut(result)) + " left out" +
+           (outcome.isBudgetSpent ? "; the budget is spent\n" : "\n");
+  for (const Trial &trial : result.trials)
+    if (!trial.problem.empty())
+      lines += "  left out: " + space.name(trial.setting) + ": " +
+               trial.problem + "\n";
+  if (const auto &survey = result.survey)
+    lines += "all " + std::to_string(survey->settings) + " settings, " +
+             std::to_string(survey->programs) + " programs, " +
+             std::to_string(survey->runs) + " runs: the best is " +
+             space.name(survey->best) + "; the chosen one is slower by " +
+             print("%.1f %%\n", 100 * survey->regret);
+  return lines;
+}
+
+static JsonObject describeJson(const Duel &duel) {
+  return JsonObject()
+      .add("wins", duel.wins)
+      .add("rounds", duel.rounds)
+      .addExact("p", duel.chance())
+      .add("ratio", duel.ratio);
+}
+
+/// Where and how was measured, and what.
+static JsonObject describeMeasurement(const TuneResult &result) {
+  const render::Options &render = result.options.render;
+  const Outcome &outcome = result.outcome;
+  JsonObject object;
+  object.add("scene", std::filesystem::path(render.scene).filename().string())
+      .add("width", render.view.width)
+      .add("height", render.view.height)
+      .add("lights", render.lights)
+      .add("threads", render.threads)
+      .add("processor", getProcessorName())
+      .add("metric", result.options.metricName)
+      .addExact("error_limit", result.options.error)
+      .addExact("error", *outcome.chosen->error)
+      .add("ms", outcome.chosen->median())
+      .add("text_ms", outcome.text->median())
+      .add("text", result.space.name(outcome.text->setting))
+      .add("against_text", describeJson(outcome.againstText));
+  return object;
+}
+
+std::string tune::writeJson(const TuneResult &result) {
+  const Outcome &outcome = result.outcome;
+  JsonObject object;
+  object.add("chosen", result.space.name(outcome.chosen->setting))
+      .add("changes", countChanges(outcome.chosen->setting))
+      .add("measured", describeMeasurement(result));
+  if (outcome.runnerUp)
+    object.add("runner_up", result.space.name(outcome.runnerUp->setting))
+        .add("against_runner_up", describeJson(outcome.againstRunnerUp));
+  object.add("runs", outcome.runs)
+      .add("settings", result.trials.size())
+      .add("compilations", outcome.compilations)
+      .add("left_out", countLeftOut(result))
+      .add("budget_spent", int(outcome.isBudgetSpent));
+  if (const auto &survey = result.survey)
+    object.add("all_settings", survey->settings)
+        .add("all_programs", survey->programs)
+        .add("all_runs", survey->runs)
+        .add("best", result.space.name(survey->best))
+        .addExact("regret", survey->regret);
+  return object.text() + "\n";
+}
+
+/// A field of CSV.
+static std::string quote(const std::string &text) {
+  std::string quoted = "\"";
+  for (char c : text)
+    quoted += c == '"' ? "\"\"" : std::string(1, c);
+  return quoted + "\"";
+}
+
+std::string tune::writeCSV(const TuneResult &result) {
+  std::string text = "setting,ms,frames,error,problem\n";
+  for (const Trial &trial : result.trials)
+    text += quote(result.space.name(trial.setting)) + "," +
+            (trial.full.empty() ? "" : print("%.6g", trial.median())) + "," +
+            std::to_string(trial.full.size()) + "," +
+            (trial.error ? print("%.9g", *trial.error) : "") + "," +
+            quote(trial.problem) + "\n";
+  return text;
+}
+
+std::string tune::writeSetting(const TuneResult &result) {
+  TunedSetting setting = result.space.describe(result.outcome.chosen->setting);
+  const auto &without = result.options.render.load.synthesis.without;
+  setting.without.insert(setting.without.end(), without.begin(), without.end());
+  return writeTunedSetting(setting, describeMeasurement(result).text());
+}

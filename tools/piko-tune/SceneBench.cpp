@@ -1,0 +1,152 @@
+//===- SceneBench.cpp - A scene that settings render ----------------------===//
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+#include "SceneBench.h"
+
+#include "Piko/Scene/ImageError.h"
+#include "Piko/Scene/ImageFile.h"
+
+#include <chrono>
+
+using namespace piko;
+using namespace piko::tune;
+using render::Error;
+using render::Result;
+
+/// An image of less than this many pixels across has no smaller one.
+static constexpr int leastWidth = 256;
+
+Result<std::unique_ptr<SceneBench>>
+SceneBench::create(const TuneOptions &options, const Space &space) {
+  std::unique_ptr<SceneBench> bench(new SceneBench(options, space));
+  render::Options render = options.render;
+  auto full = render::loadScene(render);
+  if (!full)
+    return full.error();
+  bench->fullScene = std::move(*full);
+  int width = render.view.width, height = render.view.height;
+  bench->hasSmall = std::min(width, height) >= leastWidth;
+  if (bench->hasSmall) {
+    render.view.width = width / 2;
+    render.view.height = height / 2;
+    auto small = render::loadScene(render);
+    if (!small)
+      return small.error();
+    bench->smallScene = std::move(*small);
+  }
+  if (options.reference.empty())
+    return bench;
+  auto image = render::readImage(options.reference);
+  if (!image)
+    return image.error();
+  if (image->width != width || image->height != height)
+    return Error{"expected a reference image of " + std::to_string(width) +
+                 " x " + std::to_string(height) + " pixels, but '" +
+                 options.reference + "' has " + std::to_string(image->width) +
+                 " x " + std::to_string(image->height)};
+  bench->reference = std::move(*image);
+  return bench;
+}
+
+/// The first error of diagnostics.
+static std::string findError(const std::string &diagnostics) {
+  constexpr std::string_view word = "error: ";
+  size_t at = diagnostics.find(word);
+  size_t begin = at == std::string::npos ? 0 : at + word.size();
+  return diagnostics.substr(begin, diagnostics.find('\n', begin) - begin);
+}
+
+Result<uint64_t> SceneBench::prepare(const Setting &setting) {
+  LoadOptions load = options.render.load;
+  TunedSetting tuned = space.describe(setting);
+  std::string wrong = tuned.apply(load.pipeName, load.tunables, load.synthesis);
+  if (!wrong.empty())
+    return Error{wrong};
+  Entry &entry = entries[setting];
+  std::string diagnostics;
+  if (!entry.program)
+    entry.program = loadPipeline(options.render.pipeline, load, diagnostics);
+  if (!entry.program)
+    return Error{findError(diagnostics)};
+  return entry.program->codeHash() +
+         0x9e3779b97f4a7c15 * uint64_t(tuned.stripSize);
+}
+
+Result<SceneBench::Instance *> SceneBench::getInstance(const Setting &setting,
+                                                       Scale scale) {
+  bool isSmall = hasSmall && scale == Scale::Small;
+  Entry &entry = entries.at(setting);
+  std::unique_ptr<Instance> &instance = isSmall ? entry.small : entry.full;
+  if (instance)
+    return instance.get();
+  instance = std::make_unique<Instance>();
+  render::Options render = options.render;
+  if (int64_t strip = space.describe(setting).stripSize)
+    render.stripSize = strip;
+  auto image =
+      render::createPipeline(render, entry.program->get(),
+                             isSmall ? smallScene : fullScene, instance->owner);
+  if (!image) {
+    Error error = image.error();
+    instance.reset();
+    return error;
+  }
+  instance->image = *image;
+  return instance.get();
+}
+
+Result<double> SceneBench::visit(const Setting &setting, Scale scale) {
+  auto instance = getInstance(setting, scale);
+  if (!instance)
+    return instance.error();
+  pikort_pipeline *pipeline = (*instance)->owner.pipeline;
+  std::chrono::duration<double, std::milli> time{};
+  for (int i = 0; i < runsOfVisit; ++i) {
+    auto start = std::chrono::steady_clock::now();
+    if (pikort_run(pipeline) != PIKORT_OK)
+      return render::errorOf(pipeline);
+    time = std::chrono::steady_clock::now() - start;
+  }
+  return time.count();
+}
+
+static double get(Metric metric, const render::ImageError &error) {
+  switch (metric) {
+  case Metric::Max:
+    return error.largest;
+  case Metric::Mean:
+    return error.mean;
+  case Metric::RMS:
+    return error.rms;
+  case Metric::P99:
+    return error.p99;
+  case Metric::FLIP:
+    break;
+  }
+  return error.flip;
+}
+
+Result<double> SceneBench::measureError(const Setting &setting) {
+  auto instance = getInstance(setting, Scale::Full);
+  if (!instance)
+    return instance.error();
+  auto pixels =
+      render::readImage((*instance)->owner.pipeline, (*instance)->image);
+  if (!pixels)
+    return pixels.error();
+  render::Image image{fullScene.size.x, fullScene.size.y, std::move(*pixels)};
+  if (!reference)
+    reference = image;
+  auto error = options.metric == Metric::FLIP
+                   ? render::compareImages(*reference, image)
+                   : render::compareColors(*reference, image);
+  if (!error)
+    return error.error();
+  return get(options.metric, *error);
+}
+
+void SceneBench::release(const Setting &setting) {
+  if (auto entry = entries.find(setting); entry != entries.end()) {
+    entry->second.small.reset();
+    entry->second.full.reset();
+  }
+}

@@ -1,0 +1,463 @@
+//===- Search.cpp - The fastest of many settings --------------------------===//
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+#include "Search.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+using namespace piko;
+using namespace piko::tune;
+using piko::render::Error;
+using piko::render::Result;
+
+/// Runs that are kept for the last comparisons.
+static constexpr int reserve = 48;
+/// A pipeline that is slower than the best by this is not looked at further,
+/// and a change that made a setting so is not tried again with others.
+static const double hopeless = std::log(1.25);
+/// What is faster by less is not worth a change.
+static const double level = std::log(1.01);
+/// In which a duel is decided, or is not.
+static constexpr int mostRounds = 12;
+
+static double medianOf(std::vector<double> values) {
+  if (values.empty())
+    return 0;
+  auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  if (values.size() % 2)
+    return *middle;
+  return (*middle + *std::max_element(values.begin(), middle)) / 2;
+}
+
+/// Of an even number the lower one: what disturbs a frame makes it slower.
+static double lowerMedianOf(std::vector<double> values) {
+  auto middle = values.begin() + std::ptrdiff_t((values.size() - 1) / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+double Trial::median() const { return medianOf(full); }
+
+double Duel::chance() const {
+  int most = std::max(wins, rounds - wins);
+  double sum = 0, term = std::pow(0.5, rounds); // of k wins, from all down
+  for (int k = rounds; k >= most; --k) {
+    sum += term;
+    term *= double(k) / (rounds - k + 1);
+  }
+  return std::min(1.0, 2 * sum);
+}
+
+Duel Duel::turned() const { return {rounds - wins, rounds, 1 / ratio}; }
+
+int tune::countChanges(const Setting &setting) {
+  return int(std::count_if(setting.begin(), setting.end(),
+                           [](int value) { return value != 0; }));
+}
+
+/// Whether a dimension belongs to a setting's pipeline.
+static bool applies(const Dimension &dimension, const Setting &setting) {
+  return !dimension.pipeline || *dimension.pipeline == setting[0];
+}
+
+std::optional<std::vector<Setting>>
+tune::enumerateSettings(const std::vector<Dimension> &dimensions, size_t most) {
+  std::vector<Setting> settings{Setting(dimensions.size(), 0)};
+  for (size_t d = 0; d < dimensions.size(); ++d) {
+    std::vector<Setting> more;
+    for (const Setting &setting : settings) {
+      size_t count =
+          applies(dimensions[d], setting) ? dimensions[d].values.size() : 1;
+      for (size_t value = 0; value < count; ++value) {
+        more.push_back(setting);
+        more.back()[d] = int(value);
+      }
+      if (more.size() > most)
+        return std::nullopt;
+    }
+    settings = std::move(more);
+  }
+  return settings;
+}
+
+Search::Search(std::vector<Dimension> dimensions, Bench &bench, double limit,
+               int budget)
+    : log([](const std::string &) {}), dimensions(std::move(dimensions)),
+      bench(bench), limit(limit), budget(budget) {}
+
+//===----------------------------------------------------------------------===//
+// Trials
+//===----------------------------------------------------------------------===//
+
+Trial *Search::getTrial(const Setting &setting, bool isNew) {
+  if (auto known = bySetting.find(setting); known != bySetting.end())
+    return isNew || !known->second->problem.empty() ? nullptr : known->second;
+  trials.push_back({.setting = setting, .number = trials.size()});
+  Trial *trial = bySetting[setting] = &trials.back();
+  ++compilations;
+  auto program = bench.prepare(setting);
+  if (!program) {
+    trial->problem = program.error().message;
+    return nullptr;
+  }
+  trial->program = *program;
+  auto [same, isFirst] = byProgram.try_emplace(*program, trial);
+  if (isFirst)
+    return trial;
+  // One of them is enough.
+  trials.pop_back();
+  bySetting[setting] = same->second;
+  return isNew || !same->second->problem.empty() ? nullptr : same->second;
+}
+
+void Search::leaveOut(Trial *trial, const std::string &why) {
+  trial->problem = why;
+  bench.release(trial->setting);
+}
+
+bool Search::visit(Trial *trial, Scale scale, double *time) {
+  runs += runsOfVisit;
+  auto result = bench.visit(trial->setting, scale);
+  if (!result) {
+    leaveOut(trial, result.error().message);
+    return false;
+  }
+  *time = std::max(*result, 1e-6);
+  (scale == Scale::Full ? trial->full : trial->small).push_back(*time);
+  if (scale == Scale::Small || trial->error)
+    return true;
+  auto error = bench.measureError(trial->setting);
+  if (!error) {
+    leaveOut(trial, error.error().message);
+    return false;
+  }
+  trial->error = *error;
+  // What the text says is where changes start, whatever its error.
+  if (*error <= limit || countChanges(trial->setting) == 0)
+    return true;
+  leaveOut(trial, "its error is too large");
+  return false;
+}
+
+//===----------------------------------------------------------------------===//
+// Races
+//===----------------------------------------------------------------------===//
+
+/// Rounds of a race: for each, the logarithms of times in the order of
+/// settings.
+using Rounds = std::vector<std::vector<double>>;
+
+/// How slow each setting is, where rounds are slow or fast as a whole and a few
+/// times are disturbed: Tukey's median polish, with lower medians.
+static std::vector<double> polish(const Rounds &rounds) {
+  size_t count = rounds[0].size();
+  std::vector<double> scores(count), offsets(rounds.size(), 0);
+  for (int iteration = 0; iteration < 4; ++iteration) {
+    for (size_t i = 0; i < count; ++i) {
+      std::vector<double> values;
+      for (size_t r = 0; r < rounds.size(); ++r)
+        values.push_back(rounds[r][i] - offsets[r]);
+      scores[i] = iteration ? lowerMedianOf(values)
+                            : *std::min_element(values.begin(), values.end());
+    }
+    for (size_t r = 0; r < rounds.size(); ++r) {
+      std::vector<double> values;
+      for (size_t i = 0; i < count; ++i)
+        values.push_back(rounds[r][i] - scores[i]);
+      offsets[r] = lowerMedianOf(values);
+    }
+  }
+  return scores;
+}
+
+void Search::race(std::vector<Trial *> &pool, Scale scale, int rounds) {
+  std::map<size_t, std::vector<double>> logs; // by the number of a trial
+  for (int round = 0; round < rounds && !pool.empty(); ++round) {
+    if (runs + int(pool.size()) * runsOfVisit > budget) {
+      isBudgetSpent = true;
+      break;
+    }
+    double time = 0;
+    for (size_t i = 0; i < pool.size(); ++i) {
+      // To and fro, so that nobody is always the one behind the slowest.
+      Trial *trial = pool[round % 2 ? pool.size() - 1 - i : i];
+      if (visit(trial, scale, &time))
+        logs[trial->number].push_back(std::log(time));
+    }
+    std::erase_if(pool, [](Trial *trial) { return !trial->problem.empty(); });
+  }
+  if (pool.empty() || logs.empty())
+    return;
+  Rounds table(logs[pool[0]->number].size());
+  for (size_t round = 0; round < table.size(); ++round)
+    for (Trial *trial : pool)
+      table[round].push_back(logs[trial->number][round]);
+  std::vector<double> scores = polish(table);
+  for (size_t i = 0; i < pool.size(); ++i)
+    pool[i]->score = scores[i];
+  rank(pool);
+}
+
+/// Sorts settings by their scores, and notes what changes gained.
+void Search::rank(std::vector<Trial *> &pool) {
+  for (Trial *a : pool)
+    for (Trial *b : pool)
+      gains[{a->number, b->number}] = b->score - a->score;
+  std::sort(pool.begin(), pool.end(), [&](Trial *a, Trial *b) {
+    return std::pair(a->score, a->number) < std::pair(b->score, b->number);
+  });
+}
+
+/// Runs those from `next` on once more, as one frame may have been disturbed.
+void Search::giveSecondChance(std::vector<Trial *> &pool, size_t next,
+                              Scale scale) {
+  if (runs + int(pool.size() - next + 2) * runsOfVisit > budget)
+    return;
+  // By two that were not, to know how fast the machine is now.
+  double time = 0, offset = -INFINITY;
+  for (Trial *anchor : {pool[0], pool[next - 1]})
+    if (visit(anchor, scale, &time))
+      offset = std::max(offset, anchor->score - std::log(time));
+  if (offset == -INFINITY)
+    return;
+  for (size_t i = next; i < pool.size(); ++i)
+    if (visit(pool[i], scale, &time))
+      pool[i]->score = std::min(pool[i]->score, offset + std::log(time));
+  std::erase_if(pool, [](Trial *trial) { return !trial->problem.empty(); });
+  rank(pool);
+}
+
+void Search::halve(std::vector<Trial *> &pool, size_t keep) {
+  // Where what the text says is not allowed, errors come before times.
+  auto isGood = [this](Trial *trial) { return isAllowed(trial); };
+  Scale scale = std::any_of(pool.begin(), pool.end(), isGood) ? Scale::Small
+                                                              : Scale::Full;
+  for (int rounds = 1; pool.size() > keep;) {
+    race(pool, scale, rounds);
+    size_t next = std::max(keep, (pool.size() + 1) / 2);
+    if (rounds == 1 && !isBudgetSpent && next < pool.size())
+      giveSecondChance(pool, next, scale);
+    if (isBudgetSpent || pool.size() <= keep)
+      break;
+    for (size_t i = next; i < pool.size(); ++i)
+      bench.release(pool[i]->setting);
+    pool.resize(std::min(pool.size(), next));
+    rounds = scale == Scale::Small ? 1 : std::min(4, rounds * 2);
+    scale = Scale::Full;
+  }
+}
+
+Duel Search::fight(Trial *first, Trial *second, int most) {
+  Duel duel;
+  std::vector<double> ratios;
+  for (int round = 0; round < most; ++round) {
+    if (runs + 2 * runsOfVisit > budget)
+      break;
+    double times[2];
+    for (int turn : {round % 2, 1 - round % 2})
+      if (!visit(turn ? second : first, Scale::Full, &times[turn]))
+        return duel;
+    ++duel.rounds;
+    duel.wins += times[0] < times[1];
+    ratios.push_back(times[1] / std::max(times[0], 1e-6));
+    duel.ratio = medianOf(ratios);
+    if (duel.rounds >= 6 && !duel.isLevel())
+      break;
+  }
+  return duel;
+}
+
+//===----------------------------------------------------------------------===//
+// Steps
+//===----------------------------------------------------------------------===//
+
+/// The pipelines to start from, the best first.
+std::vector<Trial *> Search::findBases(Trial *text) {
+  std::vector<Trial *> pool{text};
+  for (size_t value = 1; value < dimensions[0].values.size(); ++value) {
+    Setting setting = text->setting;
+    setting[0] = int(value);
+    if (Trial *trial = getTrial(setting, /*isNew=*/true))
+      pool.push_back(trial);
+  }
+  halve(pool, 2);
+  if (pool.size() < 2)
+    return pool;
+  race(pool, Scale::Full, 2);
+  if (pool.size() == 2 && pool[1]->score - pool[0]->score > hopeless) {
+    bench.release(pool[1]->setting);
+    pool.pop_back();
+  }
+  return pool;
+}
+
+/// The dimension in which two settings differ, if it is one and no pipeline.
+static std::optional<size_t> findChange(const Setting &a, const Setting &b) {
+  std::optional<size_t> found;
+  for (size_t d = 0; d < a.size(); ++d)
+    if (a[d] != b[d]) {
+      if (found || d == 0)
+        return std::nullopt;
+      found = d;
+    }
+  return found;
+}
+
+/// Whether the change of one value to a base, or the same change to another
+/// setting of that pipeline, was bad.
+bool Search::isHopeless(const Setting &setting, const Setting &base) const {
+  size_t d = *findChange(setting, base);
+  auto isSameChange = [&](const Setting &from, const Setting &to) {
+    return to[0] == base[0] && to[d] == setting[d] && from[d] == base[d] &&
+           findChange(from, to) == d;
+  };
+  for (const auto &[pair, gain] : gains)
+    if (gain < -hopeless / 2 &&
+        isSameChange(trials[pair.second].setting, trials[pair.first].setting))
+      return true;
+  for (const Trial &trial : trials)
+    if (!trial.problem.empty())
+      for (const auto &[other, known] : bySetting)
+        if (known->problem.empty() && isSameChange(other, trial.setting))
+          return true;
+  return false;
+}
+
+void Search::addChanges(Trial *base, std::vector<Trial *> &pool) {
+  for (size_t d = 1; d < dimensions.size(); ++d) {
+    if (!applies(dimensions[d], base->setting))
+      continue;
+    for (size_t value = 0; value < dimensions[d].values.size(); ++value) {
+      Setting setting = base->setting;
+      setting[d] = int(value);
+      if (setting == base->setting || isHopeless(setting, base->setting))
+        continue;
+      if (Trial *trial = getTrial(setting, /*isNew=*/true))
+        pool.push_back(trial);
+    }
+  }
+}
+
+/// Adds, for each base, changes that were good alone, together: the best two,
+/// three and four.
+void Search::addCombinations(const std::vector<Trial *> &bases,
+                             std::vector<Trial *> &pool) {
+  for (Trial *base : bases) {
+    std::map<size_t, std::pair<double, int>> best; // gain, value
+    for (const auto &[pair, gain] : gains) {
+      const Trial &trial = trials[pair.first];
+      auto d = findChange(trial.setting, base->setting);
+      if (pair.second != base->number || gain < level || !d ||
+          !isAllowed(&trial))
+        continue;
+      auto candidate = std::pair(gain, trial.setting[*d]);
+      best[*d] = std::max(best[*d], candidate);
+    }
+    std::vector<std::pair<double, size_t>> order;
+    for (const auto &[dimension, gain] : best)
+      order.emplace_back(-gain.first, dimension);
+    std::sort(order.begin(), order.end());
+    Setting setting = base->setting;
+    for (size_t i = 0; i < std::min<size_t>(order.size(), 4); ++i) {
+      setting[order[i].second] = best[order[i].second].second;
+      if (Trial *trial = i > 0 ? getTrial(setting, /*isNew=*/true) : nullptr)
+        pool.push_back(trial);
+    }
+  }
+}
+
+/// About how many runs it takes to find the best of so many settings.
+static int costOf(size_t settings) {
+  return 5 * int(settings) + 15 * runsOfVisit;
+}
+
+/// Steps 1 to 3: the settings that raced last, the fastest first.
+std::vector<Trial *> Search::improve(Trial *text) {
+  std::vector<Trial *> bases = findBases(text), ranking = bases;
+  constexpr int mostGenerations = 4;
+  for (int i = 0; i < mostGenerations && !isBudgetSpent; ++i) {
+    std::vector<Trial *> pool = bases;
+    for (Trial *base : bases)
+      // All changes of one pipeline are worth more than some of two.
+      if (base == bases[0] || runs + costOf(2 * pool.size()) <= budget)
+        addChanges(base, pool);
+    if (pool.size() == bases.size())
+      break;
+    log(std::to_string(pool.size() - bases.size()) + " changes of " +
+        std::to_string(bases.size()) +
+        (bases.size() == 1 ? " setting" : " settings"));
+    halve(pool, 3);
+    addCombinations(bases, pool);
+    race(pool, Scale::Full, 3);
+    std::erase_if(pool, [](Trial *trial) { return trial->full.empty(); });
+    if (pool.empty())
+      break;
+    ranking = pool;
+    if (pool[0] == bases[0])
+      break;
+    bases = {pool[0]};
+  }
+  return ranking;
+}
+
+/// The best that raced last, if it is sure to be faster than the text; of who
+/// is as fast as another one, the one with fewer changes.
+void Search::choose(std::vector<Trial *> ranking, Outcome &outcome) {
+  Trial *text = bySetting[Setting(dimensions.size(), 0)];
+  Trial *first = ranking[0],
+        *second = ranking.size() > 1 ? ranking[1] : nullptr;
+  outcome.chosen = first;
+  if (first != text) {
+    Duel duel = outcome.againstText = fight(first, text, mostRounds);
+    bool isFaster = !duel.isLevel() && std::log(duel.ratio) >= level;
+    if (isAllowed(text) && !isFaster) {
+      outcome.chosen = text;
+      outcome.runnerUp = first;
+      outcome.againstText = {};
+      outcome.againstRunnerUp = duel.turned();
+      return;
+    }
+  }
+  outcome.runnerUp = second;
+  if (!second)
+    return;
+  Duel duel = first != text && second == text
+                  ? outcome.againstText
+                  : fight(first, second, mostRounds);
+  bool isSlower = duel.ratio < 1 && !duel.isLevel();
+  bool isSimpler = std::abs(std::log(duel.ratio)) < level &&
+                   countChanges(second->setting) < countChanges(first->setting);
+  if (isSlower || isSimpler) {
+    std::swap(outcome.chosen, outcome.runnerUp);
+    duel = duel.turned();
+  }
+  outcome.againstRunnerUp = duel;
+}
+
+Result<Outcome> Search::run() {
+  Trial *text = getTrial(Setting(dimensions.size(), 0));
+  double time = 0;
+  if (!text || !visit(text, Scale::Full, &time))
+    return Error{trials.front().problem};
+  int all = budget;
+  budget = std::max(all - reserve, 0);
+  std::vector<Trial *> ranking = improve(text);
+  if (std::find(ranking.begin(), ranking.end(), text) == ranking.end())
+    ranking.push_back(text);
+  std::erase_if(ranking, [&](Trial *trial) { return !isAllowed(trial); });
+  budget = all;
+  if (ranking.empty())
+    return Error{
+        "no setting that was tried has so small an error; that of what "
+        "the text says is " +
+        std::to_string(*text->error)};
+  Outcome outcome;
+  outcome.text = text;
+  choose(std::move(ranking), outcome);
+  outcome.runs = runs;
+  outcome.compilations = compilations;
+  outcome.isBudgetSpent = isBudgetSpent;
+  return outcome;
+}

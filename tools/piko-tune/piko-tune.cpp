@@ -1,0 +1,102 @@
+//===- piko-tune.cpp - The fastest setting within an error ----------------===//
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Reads what a text leaves open (Space.h), looks for the fastest setting
+// (Search.h) by rendering a scene (SceneBench.h), and writes it down (Report.h,
+// Chart.h).
+//
+//===----------------------------------------------------------------------===//
+#include "Chart.h"
+#include "Exhaustive.h"
+#include "Report.h"
+#include "SceneBench.h"
+
+#include <cstdio>
+#include <fstream>
+
+using namespace piko;
+using namespace piko::tune;
+using render::Done;
+using render::Error;
+using render::Result;
+
+namespace {
+
+Result<Done> writeFile(const std::string &path, const std::string &text) {
+  if (path.empty())
+    return Done{};
+  std::ofstream file(path, std::ios::binary);
+  file << text;
+  file.close();
+  if (!file)
+    return Error{"cannot write '" + path + "'"};
+  return Done{};
+}
+
+Result<Done> writeFiles(const TuneResult &result) {
+  const TuneOptions &options = result.options;
+  for (const auto &[path, text] : {std::pair(options.out, writeSetting(result)),
+                                   std::pair(options.chart, drawChart(result)),
+                                   std::pair(options.csv, writeCSV(result))})
+    if (auto ok = writeFile(path, text); !ok)
+      return ok;
+  return Done{};
+}
+
+Result<Space> loadSpace(const TuneOptions &options) {
+  std::string diagnostics;
+  auto space = readSpace(options, diagnostics);
+  std::fputs(diagnostics.c_str(), stderr);
+  if (!space)
+    return Error{}; // already said
+  return std::move(*space);
+}
+
+/// Everything after the command line.
+Result<Done> tuneScene(const TuneOptions &options) {
+  auto space = loadSpace(options);
+  if (!space)
+    return space.error();
+  auto bench = SceneBench::create(options, *space);
+  if (!bench)
+    return bench.error();
+  Search search(space->dimensions, **bench, options.error, options.budget);
+  search.log = [](const std::string &line) {
+    std::fprintf(stderr, "piko-tune: %s\n", line.c_str());
+  };
+  auto outcome = search.run();
+  if (!outcome)
+    return outcome.error();
+  TuneResult result{options, *space, search.getTrials(), *outcome};
+  if (options.exhaustive) {
+    auto survey = surveyAll(space->dimensions, **bench, options.error,
+                            outcome->chosen->setting);
+    if (!survey)
+      return survey.error();
+    result.survey = *survey;
+  }
+  std::string text = options.json ? writeJson(result) : summarize(result);
+  std::fputs(text.c_str(), stdout);
+  return writeFiles(result);
+}
+
+int fail(const Error &error) {
+  if (!error.message.empty())
+    std::fprintf(stderr, "piko-tune: error: %s\n", error.message.c_str());
+  return 1;
+}
+
+} // namespace
+
+int main(int argc, char **argv) {
+  auto options = parseTuneOptions({argv + 1, argv + argc});
+  if (!options)
+    return fail(options.error());
+  if (options->help) {
+    std::fputs(usage, stdout);
+    return 0;
+  }
+  if (auto ok = tuneScene(*options); !ok)
+    return fail(ok.error());
+  return 0;
+}
