@@ -343,6 +343,20 @@ struct BinnedFused
 struct Bucketed
     : raster::LinearRaster<{.bin = 0, .core = raster::All, .split = 4096}> {};
 struct Indexed : raster::IndexedRaster<{.bin = 0}> {};
-struct Fused : raster::IndexedRaster<{.bin = 32, .apart = false}> {};
-struct Tiled
-    : raster::IndexedRaster<{.bin = 32, .apart = false, .waits = true}> {};
+
+// What piko-tune may choose for the last two.
+namespace raster {
+constexpr int tile = piko::tunable("tile", 32, 8, 16, 64);
+constexpr auto shading =
+    piko::tunable("shading", piko::Precision::Strict,
+                  piko::Precision::Contracted, piko::Precision::Relaxed);
+} // namespace raster
+
+struct Fused
+    : raster::IndexedRaster<{
+          .bin = raster::tile, .apart = false, .precision = raster::shading}> {
+};
+struct Tiled : raster::IndexedRaster<{.bin = raster::tile,
+                                      .apart = false,
+                                      .waits = true,
+                                      .precision = raster::shading}> {};

@@ -264,6 +264,7 @@ struct MappedRaytracer : piko::Pipe<State> {
   }
 };
 
-struct Raytracer : MappedRaytracer<{.bin = 16, .apart = false}> {};
+struct Raytracer : MappedRaytracer<{.bin = piko::tunable("tile", 16, 8, 32, 64),
+                                    .apart = false}> {};
 
 } // namespace raytrace

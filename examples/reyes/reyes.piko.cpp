@@ -398,6 +398,7 @@ template <Mapping M> struct MappedReyes : piko::Pipe<State> {
   }
 };
 
-struct Reyes : MappedReyes<{.bin = 32, .rest = piko::DirectMap}> {};
+struct Reyes : MappedReyes<{.bin = piko::tunable("tile", 32, 16, 64),
+                            .rest = piko::DirectMap}> {};
 
 } // namespace reyes

@@ -139,7 +139,7 @@ struct Setup
 
 private:
   // Small triangles have at most this many pixels in a row or a column.
-  static constexpr int smallSide = 8;
+  static constexpr int smallSide = piko::tunable("small", 8, 4, 6);
 
   // Exchanges b and c if a, b, c run counterclockwise; false if nothing can be
   // seen of the triangle.
@@ -340,8 +340,11 @@ struct Pipeline : piko::Pipe<State> {
   }
 };
 
+// The side of a bin, in pixels.
+constexpr int tile = piko::tunable("tile", 64, 32, 128);
+
 } // namespace visibility
 
-struct Visibility : visibility::Pipeline<64> {};
-struct RelaxedVisibility : visibility::Pipeline<64, piko::Precision::Relaxed> {
-};
+struct Visibility : visibility::Pipeline<visibility::tile> {};
+struct RelaxedVisibility
+    : visibility::Pipeline<visibility::tile, piko::Precision::Relaxed> {};
