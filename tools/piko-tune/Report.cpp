@@ -90,6 +90,7 @@ static JsonObject describeMeasurement(const TuneResult &result) {
       .add("lights", render.lights)
       .add("threads", render.threads)
       .add("processor", getProcessorName())
+      .add("clock", result.options.countsCPU ? "cpu" : "wall")
       .add("metric", result.options.metricName)
       .addExact("error_limit", result.options.error)
       .addExact("error", *outcome.chosen->error)

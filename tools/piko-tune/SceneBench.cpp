@@ -5,7 +5,7 @@
 #include "Piko/Scene/ImageError.h"
 #include "Piko/Scene/ImageFile.h"
 
-#include <chrono>
+#include <ctime>
 
 using namespace piko;
 using namespace piko::tune;
@@ -94,19 +94,26 @@ Result<SceneBench::Instance *> SceneBench::getInstance(const Setting &setting,
   return instance.get();
 }
 
+/// Milliseconds from some time on, or that all threads have taken.
+static double readClock(bool countsCPU) {
+  timespec time{};
+  clock_gettime(countsCPU ? CLOCK_PROCESS_CPUTIME_ID : CLOCK_MONOTONIC, &time);
+  return 1e3 * double(time.tv_sec) + 1e-6 * double(time.tv_nsec);
+}
+
 Result<double> SceneBench::visit(const Setting &setting, Scale scale) {
   auto instance = getInstance(setting, scale);
   if (!instance)
     return instance.error();
   pikort_pipeline *pipeline = (*instance)->owner.pipeline;
-  std::chrono::duration<double, std::milli> time{};
+  double time = 0;
   for (int i = 0; i < runsOfVisit; ++i) {
-    auto start = std::chrono::steady_clock::now();
+    double start = readClock(options.countsCPU);
     if (pikort_run(pipeline) != PIKORT_OK)
       return render::errorOf(pipeline);
-    time = std::chrono::steady_clock::now() - start;
+    time = readClock(options.countsCPU) - start;
   }
-  return time.count();
+  return time;
 }
 
 static double get(Metric metric, const render::ImageError &error) {

@@ -5,6 +5,7 @@
 #include "Piko/Driver/Compiler.h"
 #include "Piko/Driver/Diagnostics.h"
 
+#include "llvm/ADT/STLExtras.h"
 #include "llvm/Support/raw_ostream.h"
 #include "llvm/TargetParser/Host.h"
 
@@ -132,10 +133,12 @@ std::optional<Space> tune::readSpace(const TuneOptions &options,
     for (const StageDescription &stage : pipeline->stages)
       reader.addStage(stage, int(i));
   }
-  if (reader.has("passes"))
-    for (const char *pass : passes)
-      if (options.render.load.synthesis.has(pass))
-        reader.add(Axis::Pass, pass, {"yes", "no"});
+  for (const std::string &pass : SynthesisOptions::getOptional()) {
+    bool isAsked = reader.has(pass.c_str()) ||
+                   (reader.has("passes") && llvm::is_contained(passes, pass));
+    if (isAsked && options.render.load.synthesis.has(pass))
+      reader.add(Axis::Pass, pass, {"yes", "no"});
+  }
   if (reader.has("strips") && options.render.stripSize == 0)
     reader.add(Axis::Strip, "strip", {"0", "4096", "32768"});
   return std::move(reader.space);

@@ -28,8 +28,12 @@ and passes that the text leaves open. Nothing is changed in the text.
                          the error, as piko-diff measures it (max)
   --reference IMAGE      what images are compared with (what the text gives)
   --space GROUP,...      what may be changed, of tunables, schedules, lanes,
-                         numbers, passes and strips (all but strips)
+                         numbers, passes, strips, and single passes of
+                         synthesis by name (all groups but strips)
   --budget RUNS          frames to run at most (500)
+  --clock wall|cpu       what counts: the time that a frame takes, or that of
+                         processors, for machines that do something else, too,
+                         with --threads 1 (wall)
 
   --out FILE             write the setting for pikoc --tuned and piko-render
                          --tuned
@@ -72,6 +76,7 @@ private:
   void parseMetric();
   void parseSpace();
   void parseBudget();
+  void parseClock();
 
   std::string value(const std::string &name) {
     if (next < words.size())
@@ -138,6 +143,7 @@ void Parser::parseWord(const std::string &word) {
       {"--reference", [&] { options.reference = value(word); }},
       {"--space", [&] { parseSpace(); }},
       {"--budget", [&] { parseBudget(); }},
+      {"--clock", [&] { parseClock(); }},
       {"--out", [&] { options.out = value(word); }},
       {"--chart", [&] { options.chart = value(word); }},
       {"--csv", [&] { options.csv = value(word); }},
@@ -196,12 +202,19 @@ void Parser::parseSpace() {
       "tunables", "schedules", "lanes", "numbers", "passes", "strips"};
   options.space.clear();
   for (const std::string &group : split(value("--space"))) {
-    if (!groups.contains(group))
-      return fail("--space: expected groups of tunables, schedules, lanes, "
-                  "numbers, passes and strips, but got '" +
+    if (!groups.contains(group) && !parseSynthesisOptions(group))
+      return fail("--space: expected tunables, schedules, lanes, numbers, "
+                  "passes, strips or the name of a pass, but got '" +
                   group + "'");
     options.space.insert(group);
   }
+}
+
+void Parser::parseClock() {
+  std::string clock = value("--clock");
+  options.countsCPU = clock == "cpu";
+  if (clock != "cpu" && clock != "wall")
+    fail("--clock: expected wall or cpu, but got '" + clock + "'");
 }
 
 void Parser::parseBudget() {

@@ -23,9 +23,11 @@ struct TuneOptions {
   Metric metric = Metric::Max;
   std::string metricName = "max";
   std::string reference; ///< an image; empty = what the text gives
+  /// Groups, and names of passes.
   std::set<std::string> space = {"tunables", "schedules", "lanes", "numbers",
                                  "passes"};
   int budget = 500;
+  bool countsCPU = false; ///< the time of processors instead of the time
   bool exhaustive = false, json = false;
   std::string out, chart, csv; ///< files to write
 };
