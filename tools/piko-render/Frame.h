@@ -51,6 +51,16 @@ Result<std::vector<scene::Color>> readImage(pikort_pipeline *pipeline,
 /// A compiled program, and a pipeline of it that is bound to a scene.
 class Frame {
 public:
+  Frame() = default;
+  Frame(Frame &&) = default;
+  /// Pipelines go before their programs, so neither is destroyed here.
+  Frame &operator=(Frame &&other) noexcept {
+    std::swap(program, other.program);
+    std::swap(owner, other.owner);
+    std::swap(output, other.output);
+    return *this;
+  }
+
   /// Compiles what the options name, and says on stderr what the compiler has
   /// to say; an error without a message if that is all.
   static Result<Frame> load(const Options &options);

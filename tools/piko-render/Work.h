@@ -48,7 +48,7 @@ struct LoopWork {
   std::string stage, place;
   bool isParallel = false;
   int64_t turns = 0;
-  int64_t around = 0;  ///< Turns of the loop around, or calls of the stage.
+  int64_t around = 0; ///< Turns of the loop around, or calls of the stage.
   /// Emissions, updates and atomics whose innermost loop it is.
   int64_t effects = 0;
 };
