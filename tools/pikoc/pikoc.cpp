@@ -133,7 +133,7 @@ struct CommandLine {
   llvm::cl::opt<bool> listTunables{
       "list-tunables",
       llvm::cl::desc("print where the file declares tunables, and the values "
-                     "that each may have, first the one that it has"),
+                     "that each may have, first the standard one"),
       llvm::cl::cat(category)};
   llvm::cl::opt<std::string> tuned{
       "tuned", llvm::cl::value_desc("file"),

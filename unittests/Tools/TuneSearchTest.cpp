@@ -1,6 +1,6 @@
 //===- TuneSearchTest.cpp - The search of piko-tune, with made-up costs ---===//
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
-#include "Search.h"
+#include "Exhaustive.h"
 
 #include <gtest/gtest.h>
 
@@ -199,6 +199,20 @@ TEST(TuneSearch, MakesDoWithAnyBudget) {
     EXPECT_LE(outcome->runs, std::max(budget, runsOfVisit));
     EXPECT_TRUE(outcome->isBudgetSpent);
   }
+}
+
+TEST(TuneSearch, SurveyFindsTheBestAndTheRegret) {
+  MadeUpBench bench(costOf, 0.02, 1);
+  bench.errorOf = [](const Setting &s) { return s[2] == 2 ? 0.5 : 0.001; };
+  Setting chosen{1, 2, 0, 0, 0};
+  auto survey = surveyAll(makeSpace(), bench, 0.004, chosen);
+  ASSERT_TRUE(survey) << survey.error().message;
+  EXPECT_EQ(survey->settings, 120u);
+  EXPECT_EQ(survey->programs, 80u);
+  EXPECT_EQ(survey->best, (Setting{2, 3, 1, 0, 1}));
+  EXPECT_NEAR(survey->regret, costOf(chosen) / costOf(survey->best) - 1, 0.02);
+  EXPECT_GT(survey->runs, 80 * exhaustiveRounds * runsOfVisit);
+  EXPECT_FALSE(surveyAll(makeSpace(), bench, 0, chosen));
 }
 
 TEST(TuneSearch, SignTest) {
