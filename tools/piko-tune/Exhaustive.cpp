@@ -19,7 +19,8 @@ static constexpr size_t mostSettings = 2000;
 
 /// Ranks settings by their time relative to the text's in the same block.
 static std::vector<Trial *> rankAll(Search &search, Bench &bench,
-                                    const std::vector<Trial *> &all) {
+                                    const std::vector<Trial *> &all,
+                                    Survey &survey) {
   render::ProgressBar bar("running all settings");
   std::vector<std::pair<double, Trial *>> order;
   Trial *text = all[0];
@@ -42,8 +43,10 @@ static std::vector<Trial *> rankAll(Search &search, Bench &bench,
            std::pair(b.first, b.second->number);
   });
   std::vector<Trial *> ranking;
-  for (auto [score, trial] : order)
+  for (auto [score, trial] : order) {
     ranking.push_back(trial);
+    survey.times.emplace_back(trial->setting, std::exp(score));
+  }
   return ranking;
 }
 
@@ -67,7 +70,7 @@ Result<Survey> tune::surveyAll(const std::vector<Dimension> &dimensions,
     }
   }
   Survey survey{.settings = settings->size()};
-  std::vector<Trial *> ranking = rankAll(search, bench, all);
+  std::vector<Trial *> ranking = rankAll(search, bench, all, survey);
   std::erase_if(ranking, [&](Trial *trial) {
     return !trial->problem.empty() || !trial->error || *trial->error > limit;
   });

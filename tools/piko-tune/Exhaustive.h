@@ -14,6 +14,8 @@ struct Survey {
   size_t settings = 0, programs = 0; ///< programs that ran, and are allowed
   int runs = 0;                      ///< to rank all of them
   Setting best = {};
+  /// Of what ran, the best first: its time by that of what the text says.
+  std::vector<std::pair<Setting, double>> times = {};
   double regret = 0; ///< how much slower the chosen one is: 0.05 = 5 %
 };
 

@@ -137,6 +137,9 @@ void Search::rank(std::vector<Trial *> &pool) {
   });
 }
 
+/// A disturbed frame takes rarely more than twice the time.
+static const double mostDisturbance = std::log(2);
+
 /// Runs those from `next` on once more, as one frame may have been disturbed.
 void Search::giveSecondChance(std::vector<Trial *> &pool, size_t next,
                               Scale scale) {
@@ -149,8 +152,9 @@ void Search::giveSecondChance(std::vector<Trial *> &pool, size_t next,
       offset = std::max(offset, anchor->score - std::log(time));
   if (offset == -INFINITY)
     return;
+  double most = pool[next - 1]->score + mostDisturbance;
   for (size_t i = next; i < pool.size(); ++i)
-    if (visit(pool[i], scale, &time))
+    if (pool[i]->score <= most && visit(pool[i], scale, &time))
       pool[i]->score = std::min(pool[i]->score, offset + std::log(time));
   std::erase_if(pool, [](Trial *trial) { return !trial->problem.empty(); });
   rank(pool);
@@ -163,7 +167,10 @@ void Search::halve(std::vector<Trial *> &pool, size_t keep) {
                                                               : Scale::Full;
   for (int rounds = 1; pool.size() > keep;) {
     race(pool, scale, rounds);
+    // Of few all can go at once that are not wanted.
     size_t next = std::max(keep, (pool.size() + 1) / 2);
+    if (pool.size() <= 4 * keep)
+      next = keep;
     if (rounds == 1 && !isBudgetSpent && next < pool.size())
       giveSecondChance(pool, next, scale);
     if (isBudgetSpent || pool.size() <= keep)

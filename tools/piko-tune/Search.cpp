@@ -11,7 +11,7 @@ using piko::render::Error;
 using piko::render::Result;
 
 /// Runs that are kept for the last comparisons.
-static constexpr int reserve = 48;
+static constexpr int reserve = 28;
 /// A pipeline that is slower than the best by this is not looked at further,
 /// and a change that made a setting so is not tried again with others.
 static const double hopeless = std::log(1.25);
@@ -181,7 +181,7 @@ void Search::addCombinations(const std::vector<Trial *> &bases,
 
 /// About how many runs it takes to find the best of so many settings.
 static int costOf(size_t settings) {
-  return 5 * int(settings) + 15 * runsOfVisit;
+  return 4 * int(settings) + 12 * runsOfVisit;
 }
 
 /// Steps 1 to 3: the settings that raced last, the fastest first.
@@ -201,7 +201,7 @@ std::vector<Trial *> Search::improve(Trial *text) {
         (bases.size() == 1 ? " setting" : " settings"));
     halve(pool, 3);
     addCombinations(bases, pool);
-    race(pool, Scale::Full, 3);
+    race(pool, Scale::Full, 2);
     std::erase_if(pool, [](Trial *trial) { return trial->full.empty(); });
     if (pool.empty())
       break;

@@ -209,6 +209,8 @@ TEST(TuneSearch, SurveyFindsTheBestAndTheRegret) {
   ASSERT_TRUE(survey) << survey.error().message;
   EXPECT_EQ(survey->settings, 120u);
   EXPECT_EQ(survey->programs, 80u);
+  ASSERT_EQ(survey->times.size(), 80u);
+  EXPECT_NEAR(survey->times[0].second, costOf(survey->best) / 10, 0.02);
   EXPECT_EQ(survey->best, (Setting{2, 3, 1, 0, 1}));
   EXPECT_NEAR(survey->regret, costOf(chosen) / costOf(survey->best) - 1, 0.02);
   EXPECT_GT(survey->runs, 80 * exhaustiveRounds * runsOfVisit);
