@@ -6,9 +6,9 @@
 //
 //   1. The pipelines race as the text has them; the best two stay.
 //   2. Each change of one value of these joins them. Successive halving: all
-//      run once, with a small image, and the slower half once more; the faster
-//      half goes on with a full one, and runs twice as often each time that
-//      half of it has gone.
+//      run once, with a small image, and those that would go once more; of
+//      many, half go, and the others go on with a full image, and run twice as
+//      often each time that half of them has gone. Of few all but three go.
 //   3. Changes that were good alone are tried together, against the best so
 //      far. From the winner on, 2 again, until nothing better is found.
 //   4. The winner meets the runner-up and what the text says, in turn, until a
