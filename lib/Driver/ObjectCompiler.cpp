@@ -84,6 +84,7 @@ static std::string makeRequest(const ObjectOptions &options,
     for (const std::string &item : *list)
       key.add(item);
   }
+  key.add(std::to_string(source.tunables.size()));
   for (const auto &[name, value] : source.tunables)
     key.add(name).add(value);
   key.add(std::to_string(processors.size()));

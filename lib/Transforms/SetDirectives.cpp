@@ -146,6 +146,20 @@ static LogicalResult setPrecision(StageOp stage, const Directive &directive) {
   return success();
 }
 
+static LogicalResult set(StageOp stage, const Directive &directive) {
+  if (directive.key == "schedule")
+    return setSchedule(stage, directive);
+  if (directive.key == "split")
+    return setSplit(stage, directive);
+  if (directive.key == "lanes")
+    return setLanes(stage, directive);
+  if (directive.key == "precision")
+    return setPrecision(stage, directive);
+  return refuse(stage, directive)
+         << "expected schedule, split, lanes or precision, because others may "
+            "change results";
+}
+
 LogicalResult SetDirectivesPass::apply(StringRef text,
                                        llvm::StringSet<> &known) {
   PipelineOp pipeline = getOperation();
@@ -161,17 +175,11 @@ LogicalResult SetDirectivesPass::apply(StringRef text,
     return refuse(stage, *directive) << "it has no process phase";
   if (!known.insert(text.split('=').first).second)
     return refuse(stage, *directive) << "it is set twice";
-  if (directive->key == "schedule")
-    return setSchedule(stage, *directive);
-  if (directive->key == "split")
-    return setSplit(stage, *directive);
-  if (directive->key == "lanes")
-    return setLanes(stage, *directive);
-  if (directive->key == "precision")
-    return setPrecision(stage, *directive);
-  return refuse(stage, *directive)
-         << "expected schedule, split, lanes or precision, because others may "
-            "change results";
+  if (failed(set(stage, *directive)))
+    return failure();
+  stage.emitRemark() << directive->key << " of stage '" << getCppName(stage)
+                     << "' is set to '" << directive->value << "'";
+  return success();
 }
 
 void SetDirectivesPass::runOnOperation() {

@@ -16,14 +16,26 @@ struct Point {
   const Trial *trial;
 };
 
-/// Where numbers are on the page, in pixels.
+/// Where numbers are on the page, in pixels. Errors are by decades, 0 below the
+/// last of them.
 struct Scales {
-  double mostMs, mostError;
+  double mostMs = 1e-3;
+  int leastDecade = -3, mostDecade = -3;
 
   static constexpr double left = 80, top = 40, width = 560, height = 360;
   double x(double ms) const { return left + width * ms / mostMs; }
   double y(double error) const {
-    return top + height * (1 - error / mostError);
+    double decade = error > 0 ? std::log10(error) : leastDecade - 1;
+    double part = (decade - leastDecade + 1) / (mostDecade - leastDecade + 1);
+    return top + height * (1 - std::clamp(part, 0.0, 1.0));
+  }
+  void add(double ms, double error) {
+    mostMs = std::max(mostMs, 1.05 * ms);
+    if (error <= 0)
+      return;
+    leastDecade =
+        std::clamp(int(std::floor(std::log10(error))), -12, leastDecade);
+    mostDecade = std::max(mostDecade, int(std::ceil(std::log10(error))));
   }
 };
 
@@ -69,10 +81,10 @@ static std::string drawAxes(const Scales &scales) {
   for (double ms = 0, step = findStep(scales.mostMs); ms <= scales.mostMs;
        ms += step)
     svg += write(scales.x(ms), bottom + 18, "middle", print("%.3g", ms));
-  for (double error = 0, step = findStep(scales.mostError);
-       error <= scales.mostError; error += step)
-    svg += write(scales.left - 8, scales.y(error) + 4, "end",
-                 print("%.2g", error));
+  svg += write(scales.left - 8, bottom + 4, "end", "0");
+  for (int decade = scales.leastDecade; decade <= scales.mostDecade; ++decade)
+    svg += write(scales.left - 8, scales.y(std::pow(10, decade)) + 4, "end",
+                 print("1e%d", decade));
   return svg + write(right, bottom + 36, "end", "milliseconds a frame");
 }
 
@@ -116,15 +128,18 @@ static std::string drawPoint(const Point &point, const TuneResult &result,
 
 std::string tune::drawChart(const TuneResult &result) {
   std::vector<Point> points;
-  Scales scales{1e-3, result.options.error * 1.25};
+  Scales scales;
+  scales.add(0, result.options.error);
+  auto add = [&](const Trial &trial) {
+    if (trial.full.empty() || !trial.error)
+      return;
+    points.push_back({trial.median(), *trial.error, &trial});
+    scales.add(trial.median(), *trial.error);
+  };
   for (const Trial &trial : result.trials)
-    if (!trial.full.empty() && trial.error) {
-      points.push_back({trial.median(), *trial.error, &trial});
-      scales.mostMs = std::max(scales.mostMs, 1.05 * trial.median());
-      scales.mostError = std::max(scales.mostError, 1.05 * *trial.error);
-    }
-  if (scales.mostError == 0)
-    scales.mostError = 1;
+    if (&trial != result.outcome.chosen)
+      add(trial);
+  add(*result.outcome.chosen); // above all others
   std::string svg = "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"680\" "
                     "height=\"460\" font-family=\"sans-serif\" "
                     "font-size=\"12\">\n<rect width=\"680\" height=\"460\" "
