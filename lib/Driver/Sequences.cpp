@@ -36,16 +36,25 @@ void piko::addCheckSequence(OpPassManager &passes,
   passes.addPass(createAddChecks(checks));
 }
 
+static void addFixedConstants(OpPassManager &passes,
+                              const SynthesisOptions &options) {
+  if (options.fix.empty())
+    return;
+  FixConstantsOptions constants;
+  constants.values.assign(options.fix.begin(), options.fix.end());
+  passes.nest<PipelineOp>().addPass(createFixConstants(constants));
+  addCleanUp(passes);
+}
+
 void piko::addSynthesisSequence(OpPassManager &passes,
                                 const SynthesisOptions &options) {
-  if (!options.fix.empty()) {
-    FixConstantsOptions constants;
-    constants.values.assign(options.fix.begin(), options.fix.end());
-    passes.nest<PipelineOp>().addPass(createFixConstants(constants));
-    addCleanUp(passes);
-  }
-  if (options.count == Counting::Work)
+  // What is counted is the work that is left of the text; else precision comes
+  // first, because what is folded is rounded.
+  bool counts = options.count == Counting::Work;
+  if (counts) {
+    addFixedConstants(passes, options);
     passes.nest<PipelineOp>().addPass(createCountWork());
+  }
   addCleanUp(passes);
   if (!options.directives.empty()) {
     SetDirectivesOptions directives;
@@ -53,9 +62,11 @@ void piko::addSynthesisSequence(OpPassManager &passes,
                                  options.directives.end());
     passes.nest<PipelineOp>().addPass(createSetDirectives(directives));
   }
-  // First: proofs are about what is computed. It cannot be left out, as results
-  // depend on it.
+  // Before all else: proofs are about what is computed. It cannot be left out,
+  // as results depend on it.
   passes.nest<PipelineOp>().addPass(createApplyPrecision());
+  if (!counts)
+    addFixedConstants(passes, options);
   // A field that a loop reads is the same field behind it.
   passes.addPass(createLoopInvariantCodeMotionPass());
   addCleanUp(passes);
@@ -67,9 +78,9 @@ void piko::addSynthesisSequence(OpPassManager &passes,
   }
   {
     OpPassManager &pipeline = passes.nest<PipelineOp>();
+    pipeline.addPass(createOrderStages());
     if (options.has("prune"))
       pipeline.addPass(createPruneUnreached());
-    pipeline.addPass(createOrderStages());
     if (options.has("pre-schedule"))
       pipeline.addPass(createPreSchedule());
     if (options.has("infer-directives"))

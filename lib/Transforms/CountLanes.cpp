@@ -203,9 +203,13 @@ void LaneCounter::countRegions(Operation &op, Value sums, Value mask) {
 void LaneCounter::countBlock(Block &block, Value sums, Value mask) {
   BlockWork work = measure(block);
   Value own = getAccessMask(block);
-  for (Operation &op : llvm::make_early_inc_range(block))
+  for (Operation &op : llvm::make_early_inc_range(block)) {
+    // Of what stands behind the access, its mask is the guard as well.
+    bool isBehind = own && (!own.getDefiningOp() ||
+                            own.getDefiningOp()->isBeforeInBlock(&op));
     if (op.getNumRegions())
-      countRegions(op, sums, mask);
+      countRegions(op, sums, !mask && isBehind ? own : mask);
+  }
   addWork(block, work, sums, mask ? mask : own);
 }
 

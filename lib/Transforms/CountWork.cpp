@@ -2,7 +2,8 @@
 //
 // piko-count-work counts, in the process phase of each stage,
 //   1. calls, and of each loop its turns, where they begin;
-//   2. emissions and accesses to state, in front of each;
+//   2. emissions and accesses to state, in front of each, and those that are
+//      effects for the innermost loop, too;
 //   3. arithmetic, once for each block, at its begin.
 
 #include "Piko/Transforms/Passes.h"
@@ -12,6 +13,7 @@
 
 #include "mlir/Dialect/Arith/IR/Arith.h"
 #include "mlir/Dialect/SCF/IR/SCF.h"
+#include "mlir/IR/Matchers.h"
 
 namespace piko {
 #define GEN_PASS_DEF_COUNTWORK
@@ -49,6 +51,7 @@ private:
   StringAttr stage;                 ///< Its name.
   int32_t floats = 0, integers = 0; ///< The stage's counters.
   int32_t around = 0; ///< The counter of the innermost loop, or of calls.
+  bool isInLoop = false;
 };
 
 } // namespace
@@ -72,6 +75,24 @@ void WorkCounter::countArithmetic(Block &block) {
     count(builder, loc, integers, integerCount);
 }
 
+/// Of a loop whose body stands in front of its condition: the branch of the
+/// body where another one does nothing but end the loop, as where the text's
+/// own condition does not hold; else all of it.
+static Block *getBodyBranch(scf::WhileOp loop) {
+  auto goesOn = dyn_cast<OpResult>(loop.getConditionOp().getCondition());
+  auto test = goesOn ? dyn_cast<scf::IfOp>(goesOn.getOwner()) : scf::IfOp();
+  if (!test || test->getParentOp() != loop || !test.elseBlock())
+    return loop.getBeforeBody();
+  Block *branches[] = {test.thenBlock(), test.elseBlock()};
+  for (unsigned i : {0, 1}) {
+    Value flag =
+        branches[i]->getTerminator()->getOperand(goesOn.getResultNumber());
+    if (llvm::hasSingleElement(*branches[i]) && matchPattern(flag, m_Zero()))
+      return branches[1 - i];
+  }
+  return loop.getBeforeBody();
+}
+
 /// The block of a loop that runs once for each turn; null for what is none.
 static Block *getTurn(Operation *op) {
   if (auto loop = dyn_cast<ParallelLoopOpInterface>(op))
@@ -81,8 +102,7 @@ static Block *getTurn(Operation *op) {
   auto loop = dyn_cast<scf::WhileOp>(op);
   if (!loop)
     return nullptr;
-  // What stands in front of the condition may be all there is.
-  return llvm::hasSingleElement(*loop.getAfterBody()) ? loop.getBeforeBody()
+  return llvm::hasSingleElement(*loop.getAfterBody()) ? getBodyBranch(loop)
                                                       : loop.getAfterBody();
 }
 
@@ -99,8 +119,10 @@ bool WorkCounter::countLoop(Operation *op) {
   auto kind = isa<ParallelLoopOpInterface>(op) ? CounterKind::Iterations
                                                : CounterKind::Turns;
   int32_t outer = around;
+  bool wasInLoop = std::exchange(isInLoop, true);
   around = counters.add(op->getLoc(), kind, stage, outer);
   countInside(op);
+  isInLoop = wasInLoop;
   auto builder = OpBuilder::atBlockBegin(turn);
   count(builder, op->getLoc(), around, 1);
   around = outer;
@@ -114,7 +136,7 @@ void WorkCounter::countElement(Operation *op, CounterKind kind,
     return; // a constant
   OpBuilder builder(op);
   Location loc = op->getLoc();
-  int32_t counter = counters.getAccesses(loc, kind, stage, state, around);
+  int32_t counter = counters.getAccesses(loc, kind, stage, state);
   RecordOp record = lookupRecord(
       op, getStateRecord(lookupInPipeline<Operation *>(op, state)));
   int64_t offset = 0, bytes = record.getSize();
@@ -148,12 +170,15 @@ void WorkCounter::countBlock(Block &block) {
     if (!countLoop(&op))
       countInside(&op);
     countAccess(&op);
+    if (isInLoop && isa<EmissionOpInterface, UpdateOp, AtomicOp>(op)) {
+      OpBuilder builder(&op);
+      count(builder, op.getLoc(),
+            counters.getEffects(op.getLoc(), stage, around), 1);
+    }
     if (auto emission = dyn_cast<EmissionOpInterface>(op)) {
       OpBuilder builder(&op);
-      count(
-          builder, op.getLoc(),
-          counters.getEmissions(op.getLoc(), stage, emission.getPort(), around),
-          1);
+      count(builder, op.getLoc(),
+            counters.getEmissions(op.getLoc(), stage, emission.getPort()), 1);
     }
   }
   countArithmetic(block);

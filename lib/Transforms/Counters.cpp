@@ -29,21 +29,27 @@ int32_t Counters::add(Location loc, CounterKind kind, StringAttr stage,
   return create(loc, kind, stage, {}, {}, inside);
 }
 
-int32_t Counters::getEmissions(Location loc, StringAttr stage, int64_t port,
-                               int32_t inside) {
+int32_t Counters::getEmissions(Location loc, StringAttr stage, int64_t port) {
   auto [known, isNew] = ports.try_emplace({stage, port}, number);
   if (isNew)
     create(loc, CounterKind::Emissions, stage,
-           Builder(pipeline.getContext()).getI64IntegerAttr(port), {}, inside);
+           Builder(pipeline.getContext()).getI64IntegerAttr(port), {}, {});
   return known->second;
 }
 
 int32_t Counters::getAccesses(Location loc, CounterKind kind, StringAttr stage,
-                              FlatSymbolRefAttr state, int32_t inside) {
+                              FlatSymbolRefAttr state) {
   auto [known, isNew] =
       accesses.try_emplace({stage, state, static_cast<int32_t>(kind)}, number);
   if (isNew)
-    create(loc, kind, stage, {}, state, inside);
+    create(loc, kind, stage, {}, state, {});
+  return known->second;
+}
+
+int32_t Counters::getEffects(Location loc, StringAttr stage, int32_t loop) {
+  auto [known, isNew] = effects.try_emplace(loop, number);
+  if (isNew)
+    add(loc, CounterKind::Effects, stage, loop);
   return known->second;
 }
 

@@ -21,14 +21,14 @@ public:
   /// The number of a new counter of what lies inside of what another counts.
   int32_t add(mlir::Location loc, CounterKind kind, mlir::StringAttr stage,
               std::optional<int32_t> inside = std::nullopt);
-  /// The number of a stage's one counter for a port. It is as far inside as
-  /// the first of the emissions.
-  int32_t getEmissions(mlir::Location loc, mlir::StringAttr stage, int64_t port,
-                       int32_t inside);
-  /// The same for accesses of a kind to a piece of state.
+  /// The number of a stage's one counter for a port.
+  int32_t getEmissions(mlir::Location loc, mlir::StringAttr stage,
+                       int64_t port);
+  /// The number of a stage's one counter for such accesses.
   int32_t getAccesses(mlir::Location loc, CounterKind kind,
-                      mlir::StringAttr stage, mlir::FlatSymbolRefAttr state,
-                      int32_t inside);
+                      mlir::StringAttr stage, mlir::FlatSymbolRefAttr state);
+  /// The number of the one counter for effects in a loop that another counts.
+  int32_t getEffects(mlir::Location loc, mlir::StringAttr stage, int32_t loop);
   int32_t size() const { return number; }
 
 private:
@@ -39,6 +39,7 @@ private:
   PipelineOp pipeline;
   int32_t number = 0;
   llvm::DenseMap<std::pair<mlir::Attribute, int64_t>, int32_t> ports;
+  llvm::DenseMap<int32_t, int32_t> effects; // by loop
   llvm::DenseMap<std::tuple<mlir::Attribute, mlir::Attribute, int32_t>, int32_t>
       accesses;
 };

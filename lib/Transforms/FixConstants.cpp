@@ -11,6 +11,8 @@
 #include "Piko/Dialect/Piko/IR/PikoFixed.h"
 
 #include "mlir/IR/Matchers.h"
+#include "llvm/ADT/SetVector.h"
+#include "llvm/ADT/StringSet.h"
 #include "llvm/Support/Error.h"
 
 namespace piko {
@@ -33,6 +35,7 @@ private:
   LogicalResult fixField(ConstantOp constant, StringRef path, StringRef value);
   void declare(Operation *state, StringAttr field, IntegerAttr element,
                TypedAttr value);
+  llvm::StringSet<> paths; ///< That are fixed.
   InFlightDiagnostic fail() {
     return getOperation().emitError("piko-fix-constants: ");
   }
@@ -65,6 +68,8 @@ static TypedAttr parseNumber(Type type, StringRef text) {
       llvm::consumeError(status.takeError());
       return {};
     }
+    if (*status & APFloat::opOverflow)
+      return {};
     return builder.getFloatAttr(type, value);
   }
   unsigned bits = type.getIntOrFloatBitWidth();
@@ -122,6 +127,28 @@ static bool isOf(LoadOp load, FieldAttr field, int64_t element) {
   return number == element;
 }
 
+/// Whether an index follows from a number: where it is outside, an error of the
+/// run says so, and not one of the compiler's verifiers.
+static bool isInIndex(Value number) {
+  llvm::SetVector<Value> reached;
+  reached.insert(number);
+  for (size_t i = 0; i < reached.size(); ++i)
+    for (OpOperand &use : reached[i].getUses()) {
+      Operation *user = use.getOwner();
+      auto store = dyn_cast<StoreOp>(user);
+      if (store && use.get() == store.getValue())
+        continue;
+      if (isa<arith::ArithDialect>(user->getDialect()))
+        for (Value result : user->getResults())
+          if (result.getType().isIntOrIndex())
+            reached.insert(result);
+      if (isa<StateAccessOpInterface, GetOp>(user) ||
+          isa<memref::MemRefDialect>(user->getDialect()))
+        return true;
+    }
+  return false;
+}
+
 LogicalResult FixConstantsPass::fixField(ConstantOp constant, StringRef path,
                                          StringRef value) {
   auto [name, element] = parsePath(path.empty() ? "value" : path);
@@ -139,14 +166,15 @@ LogicalResult FixConstantsPass::fixField(ConstantOp constant, StringRef path,
   TypedAttr number = parseNumber(field.getType(), value);
   if (!number)
     return fail() << "expected a value of " << field.getType() << " for '"
-                  << constant.getSymName() << "', but got '" << value << "'";
+                  << constant.getSymName() << (path.empty() ? "" : ".") << path
+                  << "', but got '" << value << "'";
   Builder builder(&getContext());
   declare(constant, builder.getStringAttr(name),
           element ? builder.getI64IntegerAttr(*element) : IntegerAttr(),
           number);
   getOperation().walk([&](LoadOp load) {
     if (load.getState() != constant.getSymName() || load.getField() != name ||
-        !isOf(load, field, element.value_or(0)))
+        !isOf(load, field, element.value_or(0)) || isInIndex(load.getResult()))
       return;
     OpBuilder at(load);
     load.replaceAllUsesWith(
@@ -159,6 +187,8 @@ LogicalResult FixConstantsPass::fixField(ConstantOp constant, StringRef path,
 
 LogicalResult FixConstantsPass::fix(StringRef text) {
   auto [path, value] = text.split('=');
+  if (!paths.insert(path).second)
+    return fail() << "expected one value of '" << path << "', but got two";
   auto [name, field] = path.split('.');
   if (name.empty() || value.empty())
     return fail() << "expected CONSTANT[.FIELD]=VALUE or BUFFER.size=COUNT, "
@@ -175,6 +205,7 @@ LogicalResult FixConstantsPass::fix(StringRef text) {
 }
 
 void FixConstantsPass::runOnOperation() {
+  paths.clear();
   for (const std::string &value : values)
     if (failed(fix(value)))
       return signalPassFailure();

@@ -3,8 +3,10 @@
 // piko-prune-unreached:
 //   1. find the stages that a primitive may reach: from sources, along the
 //      ports on which something is emitted;
-//   2. take away the others, unless somebody waits for them or they run for
-//      empty bins, and the edges on which nothing goes.
+//   2. keep what others depend on: stages that somebody waits for, that run for
+//      empty bins, or that with a stage which collects are on one cycle, whose
+//      rounds they make;
+//   3. take away the others, and the edges on which nothing goes.
 
 #include "Piko/Analysis/PhaseGraph.h"
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
@@ -42,6 +44,7 @@ private:
   void removeEdges();
   void removeStages();
   bool isUsed(EdgeOp edge);
+  bool makesRounds(EdgeOp edge);
   bool isFormal(EdgeOp edge);
 
   PipelineOp pipeline;
@@ -53,8 +56,8 @@ private:
 
 } // namespace
 
-/// Whether a stage may run though no primitive reaches it.
-static bool runsForEmptyBins(StageOp stage) {
+/// Whether a stage, or its schedule, may run though no primitive reaches it.
+static bool runsUnreached(StageOp stage) {
   ScheduleOp schedule = stage.getSchedule();
   return schedule && (schedule.getEveryBin() || !schedule.getBody().empty());
 }
@@ -77,6 +80,31 @@ bool ReachPruner::isUsed(EdgeOp edge) {
          emitting.contains({producer, int64_t(edge.getPort())});
 }
 
+/// Whether a stage that is kept collects in the rounds of a cycle that the edge
+/// is on.
+bool ReachPruner::makesRounds(EdgeOp edge) {
+  llvm::SetVector<Operation *> ahead, behind;
+  ahead.insert(getStage(edge.getConsumerAttr()));
+  behind.insert(getStage(edge.getProducerAttr()));
+  for (size_t before = 0; before != ahead.size() + behind.size();) {
+    before = ahead.size() + behind.size();
+    for (auto other : pipeline.getOps<EdgeOp>()) {
+      StageOp from = getStage(other.getProducerAttr()),
+              to = getStage(other.getConsumerAttr());
+      if (ahead.contains(from))
+        ahead.insert(to);
+      if (behind.contains(to))
+        behind.insert(from);
+    }
+  }
+  if (!ahead.contains(getStage(edge.getProducerAttr())))
+    return false;
+  return llvm::any_of(ahead, [&](Operation *op) {
+    auto stage = cast<StageOp>(op);
+    return behind.contains(op) && kept.contains(op) && stage.collects();
+  });
+}
+
 /// Nothing goes along the edge, but its consumer is kept, and needs an edge.
 bool ReachPruner::isFormal(EdgeOp edge) {
   StageOp consumer = getStage(edge.getConsumerAttr());
@@ -91,7 +119,7 @@ void ReachPruner::findKept() {
   for (auto source : pipeline.getOps<SourceOp>())
     keep(getStage(source.getStageAttr()));
   for (auto stage : pipeline.getOps<StageOp>())
-    if (runsForEmptyBins(stage))
+    if (runsUnreached(stage))
       keep(stage);
   for (size_t before = 0; before != kept.size();) {
     before = kept.size();
@@ -104,8 +132,10 @@ void ReachPruner::findKept() {
         fed.insert(getStage(edge.getConsumerAttr()));
       }
     for (auto edge : pipeline.getOps<EdgeOp>())
-      if (isFormal(edge))
+      if (isFormal(edge) || makesRounds(edge)) {
         keep(getStage(edge.getProducerAttr()));
+        keep(getStage(edge.getConsumerAttr()));
+      }
   }
 }
 
@@ -120,7 +150,7 @@ void ReachPruner::removeEdges() {
     llvm::DenseMap<int64_t, int64_t> ports;
     for (auto [port, record] : llvm::enumerate(stage.getOutputs())) {
       EdgeOp edge = leaving.at({stage, int64_t(port)});
-      if (!isUsed(edge) && !isFormal(edge)) {
+      if (!isUsed(edge) && !isFormal(edge) && !makesRounds(edge)) {
         edge.erase();
         ++edges;
         continue;

@@ -41,42 +41,48 @@ int64_t Counter::bytes() const {
 void Counter::reset() {
   for (Shard &shard : shards)
     shard.count = shard.bytes = 0;
-  for (int64_t i = 0; i < elements; ++i)
-    touched[i] = 0;
+  if (touched)
+    std::fill_n(touched.data(), elements * words(), 0);
 }
 
-void Counter::expect(int64_t count, int64_t size) {
+void Counter::expect(Memory &memory, int64_t count, int64_t size) {
   if (count == elements && size == recordSize)
     return;
   elements = 0;
-  touched =
-      std::make_unique<std::atomic<uint64_t>[]>(static_cast<size_t>(count));
+  recordSize = std::max<int64_t>(1, size);
+  touched = {};
+  touched = Array<uint64_t>(memory, count * words(), Use::State);
+  std::fill_n(touched.data(), count * words(), 0);
   elements = count;
-  recordSize = size;
 }
 
 void Counter::touch(int64_t element, int64_t first, int64_t size) noexcept {
-  if (element < 0 || element >= elements || size <= 0)
+  if (element < 0 || element >= elements || first < 0 || size <= 0 ||
+      first + size > recordSize)
     return; // an error that generated code reports
-  int64_t begin = std::min<int64_t>(first / share(), 63),
-          end = std::min<int64_t>((first + size - 1) / share(), 63) + 1;
-  uint64_t bits = (~uint64_t(0) >> (64 - (end - begin))) << begin;
-  if (~touched[element].load(std::memory_order_relaxed) & bits)
-    touched[element].fetch_or(bits, std::memory_order_relaxed);
+  for (int64_t bit = first / share(); bit <= (first + size - 1) / share();
+       ++bit) {
+    std::atomic_ref word(touched[element * words() + bit / 64]);
+    uint64_t mask = uint64_t(1) << (bit % 64);
+    if (~word.load(std::memory_order_relaxed) & mask)
+      word.fetch_or(mask, std::memory_order_relaxed);
+  }
 }
 
 int64_t Counter::distinct() const {
   int64_t sum = 0;
   for (int64_t i = 0; i < elements; ++i)
-    sum += touched[i] != 0;
+    sum += std::any_of(&touched[i * words()], &touched[i * words()] + words(),
+                       [](uint64_t word) { return word != 0; });
   return sum;
 }
 
 int64_t Counter::distinctBytes() const {
   int64_t bits = 0;
-  for (int64_t i = 0; i < elements; ++i)
-    bits += std::popcount(touched[i].load());
-  return bits * share();
+  for (int64_t i = 0; i < elements * words(); ++i)
+    bits += std::popcount(touched[i]);
+  // Four bytes may be one that was accessed and three that were not.
+  return std::min(bits * share(), bytes());
 }
 
 static Counter *find(pikort_pipeline *p, int32_t index) {
@@ -107,7 +113,7 @@ void piko::rt::startCounters(pikort_pipeline &p) {
     int64_t elements = 1;
     for (int64_t extent : state.view.extent)
       elements *= extent;
-    counter->expect(elements, p.records[state.record].size);
+    counter->expect(p.memory, elements, p.records[state.record].size);
   }
 }
 

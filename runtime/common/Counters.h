@@ -4,18 +4,19 @@
 // A program that was compiled for counting says how much it does of what.
 // Threads add to shards of a counter, which are summed when somebody asks. Of
 // the elements of a piece of state a counter also keeps which of their bytes
-// were accessed: a word of 64 bits for each element, in which a bit stands for
-// an equal share of the record, of one byte at least.
+// were accessed: a bit for each byte of a small record, for each four of a
+// larger one.
 //
 //===----------------------------------------------------------------------===//
 
 #ifndef PIKO_RUNTIME_COMMON_COUNTERS_H
 #define PIKO_RUNTIME_COMMON_COUNTERS_H
 
+#include "common/Memory.h"
+
 #include <array>
 #include <atomic>
 #include <cstdint>
-#include <memory>
 #include <string>
 
 namespace piko::rt {
@@ -33,8 +34,8 @@ struct Counter {
   void reset();
 
   /// Forgets which bytes were accessed, unless as many elements are expected
-  /// as before; throws bad_alloc.
-  void expect(int64_t elements, int64_t recordSize);
+  /// as before; throws OutOfMemory.
+  void expect(Memory &memory, int64_t elements, int64_t recordSize);
   void touch(int64_t element, int64_t first, int64_t size) noexcept;
   int64_t distinct() const;
   int64_t distinctBytes() const;
@@ -45,10 +46,11 @@ private:
     std::atomic<int64_t> count{0}, bytes{0};
   };
   std::array<Shard, shardCount> shards;
-  std::unique_ptr<std::atomic<uint64_t>[]> touched;
+  Array<uint64_t> touched; ///< The words of each element.
   int64_t elements = 0, recordSize = 1;
   /// Bytes that a bit stands for.
-  int64_t share() const { return (recordSize + 63) / 64; }
+  int64_t share() const { return recordSize <= 64 ? 1 : 4; }
+  int64_t words() const { return (recordSize / share() + 63) / 64; }
 };
 
 } // namespace piko::rt

@@ -4,6 +4,7 @@
 #include "common/Pipeline.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <functional>
@@ -361,6 +362,26 @@ static Failure otherThanFixed(const pikort_pipeline &p, const Fixed &fixed,
                                        got};
 }
 
+/// Whether both are of a float's type and not numbers: which ones they are is
+/// nothing that a pipeline can tell.
+static bool areNaN(const pikort_pipeline &p, const Fixed &fixed) {
+  const State &state = p.states[fixed.state];
+  for (const Field &field : p.records[state.record].fields)
+    if (field.name == fixed.field &&
+        (field.type == PIKORT_F32 || field.type == PIKORT_F64)) {
+      auto isNaN = [&](const void *bytes) {
+        float single = 0;
+        double wide = 0;
+        std::memcpy(&single, bytes, sizeof(single));
+        if (field.type == PIKORT_F64)
+          std::memcpy(&wide, bytes, sizeof(wide));
+        return field.type == PIKORT_F64 ? std::isnan(wide) : std::isnan(single);
+      };
+      return isNaN(&fixed.bits) && isNaN(state.bytes.data() + fixed.offset);
+    }
+  return false;
+}
+
 static void checkFixed(const pikort_pipeline &p) {
   for (const Fixed &fixed : p.fixed) {
     const State &state = p.states[fixed.state];
@@ -370,7 +391,8 @@ static void checkFixed(const pikort_pipeline &p) {
         fixed.size == 0
             ? elements == fixed.bits
             : std::memcmp(state.bytes.data() + fixed.offset, &fixed.bits,
-                          static_cast<size_t>(fixed.size)) == 0;
+                          static_cast<size_t>(fixed.size)) == 0 ||
+                  areNaN(p, fixed);
     if (!holds)
       throw otherThanFixed(p, fixed, elements);
   }

@@ -76,12 +76,14 @@ Result<std::vector<scene::Color>> render::readImage(pikort_pipeline *pipeline,
   return pixels;
 }
 
-Result<Frame> Frame::load(const Options &options) {
+Result<Frame> Frame::load(const Options &options, bool wasCompiled) {
   std::string diagnostics;
   Frame frame;
   frame.program = loadPipeline(options.pipeline, options.load, diagnostics);
   if (!frame.program && diagnostics.empty())
     return Error{"cannot load pipeline '" + options.pipeline + "'"};
+  if (frame.program && wasCompiled)
+    return frame;
   std::fputs(diagnostics.c_str(), stderr);
   if (!diagnostics.empty() && diagnostics.back() != '\n')
     std::fputc('\n', stderr);

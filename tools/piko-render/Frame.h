@@ -62,8 +62,9 @@ public:
   }
 
   /// Compiles what the options name, and says on stderr what the compiler has
-  /// to say; an error without a message if that is all.
-  static Result<Frame> load(const Options &options);
+  /// to say, of what was compiled before its errors alone; an error without a
+  /// message if that is all.
+  static Result<Frame> load(const Options &options, bool wasCompiled = false);
   /// Binds a scene, which must outlive the frame.
   Result<Done> bind(const Options &options, SceneInput &scene);
   /// Runs once.

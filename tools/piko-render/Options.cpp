@@ -194,6 +194,10 @@ private:
              options.load.target == ExecutionTarget::Reference)
       fail("--fix is for pipelines that are compiled, and does nothing with "
            "--target reference");
+    else if (options.explain &&
+             options.load.target == ExecutionTarget::Reference)
+      fail("--explain is for pipelines that are compiled: nothing is measured "
+           "of --target reference");
     else if (!(options.seconds >= 0))
       fail("--seconds: expected a number of at least 0");
   }

@@ -91,10 +91,14 @@ Result<Done> ValueFinder::addConstant(const pikort_state_info &state) {
 
 Result<Done> ValueFinder::addSize(const pikort_state_info &state) {
   pikort_view view;
-  if (pikort_get_view(pipeline, state.name, &view) != PIKORT_OK)
+  pikort_source_info source{};
+  if (state.per_source < 0
+          ? pikort_get_view(pipeline, state.name, &view) != PIKORT_OK
+          : pikort_get_source_info(pipeline, state.per_source, &source) !=
+                PIKORT_OK)
     return lastError();
-  values.push_back(std::string(state.name) +
-                   ".size=" + std::to_string(view.extent[0]));
+  int64_t size = state.per_source < 0 ? view.extent[0] : source.count;
+  values.push_back(std::string(state.name) + ".size=" + std::to_string(size));
   return Done{};
 }
 

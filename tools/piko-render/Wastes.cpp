@@ -22,7 +22,7 @@ public:
     for (const StageWork &stage : work.stages)
       operations += double(stage.operations());
   }
-  std::vector<Waste> find();
+  std::vector<Waste> find(bool isCPU);
 
 private:
   void addCalls(const StageWork &stage);
@@ -156,13 +156,14 @@ void WasteFinder::addStored() {
             ": pikoc --explain says what keeps them apart");
 }
 
-std::vector<Waste> WasteFinder::find() {
+std::vector<Waste> WasteFinder::find(bool isCPU) {
   for (const StageWork &stage : work.stages)
     addCalls(stage);
   for (const LoopWork &loop : work.loops)
     addTurns(loop);
-  for (const KernelWork &kernel : work.kernels)
-    addKernel(kernel);
+  if (isCPU)
+    for (const KernelWork &kernel : work.kernels)
+      addKernel(kernel);
   addTimes();
   addStored();
   std::stable_sort(wastes.begin(), wastes.end(),
@@ -172,9 +173,9 @@ std::vector<Waste> WasteFinder::find() {
   return wastes;
 }
 
-std::vector<Waste> render::findWastes(const Work &work,
-                                      pikort_pipeline *timed) {
-  return WasteFinder(work, timed).find();
+std::vector<Waste> render::findWastes(const Work &work, pikort_pipeline *timed,
+                                      bool isCPU) {
+  return WasteFinder(work, timed).find(isCPU);
 }
 
 std::string render::printWastes(const std::vector<Waste> &wastes) {

@@ -15,8 +15,9 @@ struct Waste {
 
 /// The wastes of a frame, the largest first. Time is measured where the runtime
 /// knows it; what stages waste is their share of the kernels' time, by the
-/// operations that are counted.
-std::vector<Waste> findWastes(const Work &work, pikort_pipeline *timed);
+/// operations that are counted. Lanes are those of a CPU.
+std::vector<Waste> findWastes(const Work &work, pikort_pipeline *timed,
+                              bool isCPU);
 
 /// The three largest of them, for people.
 std::string printWastes(const std::vector<Waste> &wastes);

@@ -21,7 +21,6 @@ public:
 private:
   void addStages();
   void add(int32_t index, const pikort_counter &counter);
-  void addEffects(const pikort_counter &counter);
   int64_t countOf(int32_t index);
   void addCode(const pikort_counter &counter);
 
@@ -75,11 +74,6 @@ int64_t Collector::countOf(int32_t index) {
   return counter.count;
 }
 
-void Collector::addEffects(const pikort_counter &counter) {
-  if (auto loop = loops.find(counter.around); loop != loops.end())
-    work.loops[loop->second].effects += counter.count;
-}
-
 void Collector::add(int32_t index, const pikort_counter &counter) {
   StageWork &of = find(work.stages, counter.stage);
   switch (counter.kind) {
@@ -99,9 +93,11 @@ void Collector::add(int32_t index, const pikort_counter &counter) {
                           countOf(counter.around), 0});
     loops[index] = work.loops.size() - 1;
     return;
+  case PIKORT_EFFECTS:
+    work.loops[loops.at(counter.around)].effects += counter.count;
+    return;
   case PIKORT_EMISSIONS:
     of.emissions += counter.count;
-    addEffects(counter);
     if (counter.consumer)
       work.edges.push_back({counter.stage, counter.consumer, counter.port,
                             counter.count, counter.bytes, 0});
@@ -110,8 +106,6 @@ void Collector::add(int32_t index, const pikort_counter &counter) {
     of.updates += counter.count;
     [[fallthrough]];
   default:
-    if (counter.kind == PIKORT_UPDATES || counter.kind == PIKORT_ATOMICS)
-      addEffects(counter);
     work.accesses.push_back({counter.stage, counter.state, counter.kind,
                              counter.count, counter.bytes, counter.distinct,
                              counter.distinct_bytes});
@@ -140,7 +134,7 @@ static Result<Done> countFrame(Options options, SceneInput &scene,
   options.load.gpu = {};
   options.load.synthesis.count = count;
   options.memoryBudget = options.stripSize = 0; // without strips all is stored
-  auto frame = Frame::load(options);
+  auto frame = Frame::load(options, /*wasCompiled=*/true);
   if (!frame)
     return frame.error();
   if (auto ok = frame->bind(options, scene); !ok)
@@ -187,6 +181,15 @@ static int64_t countStored(pikort_pipeline *timed, const std::string &stage) {
   return 0; // nothing: it runs where the primitive is made
 }
 
+/// Of what a stage stores, the part of an edge by its primitives.
+static int64_t shareOf(const Work &work, const EdgeWork &edge, int64_t stored) {
+  double all = 0;
+  for (const EdgeWork &other : work.edges)
+    if (other.to == edge.to)
+      all += double(other.primitives);
+  return all > 0 ? int64_t(double(stored) * double(edge.primitives) / all) : 0;
+}
+
 Result<Work> render::measureWork(const Options &options, SceneInput &scene,
                                  pikort_pipeline *timed) {
   Work work;
@@ -199,6 +202,6 @@ Result<Work> render::measureWork(const Options &options, SceneInput &scene,
   }
   if (options.load.target == ExecutionTarget::CPU)
     for (EdgeWork &edge : work.edges)
-      edge.stored = countStored(timed, edge.to);
+      edge.stored = shareOf(work, edge, countStored(timed, edge.to));
   return work;
 }

@@ -34,7 +34,7 @@ struct EdgeWork {
   int32_t port = 0;
   int64_t primitives = 0;
   int64_t bytes = 0;  ///< If each were stored as the text has it.
-  int64_t stored = 0; ///< That the code stores, for all edges to the consumer.
+  int64_t stored = 0; ///< That the code stores, by the edge's primitives.
 };
 
 struct AccessWork {

@@ -94,7 +94,7 @@ Result<Done> specializeFrame(Options &options, SceneInput &scene,
   if (!specialized)
     return specialized.error();
   options = *specialized;
-  auto loaded = Frame::load(options);
+  auto loaded = Frame::load(options, /*wasCompiled=*/true);
   if (!loaded)
     return loaded.error();
   frame = std::move(*loaded);
@@ -110,7 +110,8 @@ Result<Done> report(const Options &options, const RunResult &result,
     auto work = measureWork(options, scene, pipeline);
     if (!work)
       return work.error();
-    std::vector<Waste> wastes = findWastes(*work, pipeline);
+    std::vector<Waste> wastes =
+        findWastes(*work, pipeline, !options.load.gpu.emulate);
     line.add("work", reportWork(*work)).add("wastes", reportWastes(wastes));
     if (options.counters)
       text += printWork(*work, result.pixels);
@@ -135,6 +136,21 @@ Result<Done> applyTuned(Options &options) {
   if (options.stripSize == 0)
     options.stripSize = setting->stripSize;
   return Done{};
+}
+
+/// What a pipeline counts is what it left out.
+void warnOf(const std::vector<Count> &counts) {
+  for (const Count &count : counts)
+    if (count.sum != 0)
+      std::fprintf(stderr, "piko-render: warning: '%s' counts %lld\n",
+                   count.name.c_str(), static_cast<long long>(count.sum));
+}
+
+int countThreads(const Options &options) {
+  if (options.load.target == ExecutionTarget::Reference)
+    return 1;
+  int cores = int(std::max(1u, std::thread::hardware_concurrency()));
+  return options.threads ? options.threads : cores;
 }
 
 /// Everything after the command line.
@@ -168,25 +184,18 @@ Result<Done> renderScene(Options options) {
             writeImage(image, options.view.width, options.view.height, *pixels);
         !ok)
       return ok.error();
-
   auto counts = readCounters(pipeline);
   if (!counts)
     return counts.error();
-  for (const Count &count : *counts)
-    if (count.sum != 0)
-      std::fprintf(stderr, "piko-render: warning: '%s' counts %lld\n",
-                   count.name.c_str(), static_cast<long long>(count.sum));
+  warnOf(*counts);
 
-  bool isReference = options.load.target == ExecutionTarget::Reference;
-  int cores = int(std::max(1u, std::thread::hardware_concurrency()));
-  int threads = isReference ? 1 : options.threads ? options.threads : cores;
   RunResult result{*times,
                    frame->compileMilliseconds(),
                    loadMilliseconds,
                    int64_t(scene->mesh.triangles.size()),
                    int64_t(scene->mesh.vertices.size()),
                    int64_t(scene->mesh.patches.size()),
-                   threads,
+                   countThreads(options),
                    countDrawn(*pixels),
                    hashOf(*pixels),
                    std::move(*counts)};

@@ -25,7 +25,7 @@ TEST(RenderOptions, AllOfThem) {
        "2.5",       "--out",    "o.exr",      "--json",    "-I",
        "inc",       "-Iother",  "-DX=1",      "-D",        "Y",
        "scene.obj", "--set",    "depth=3",    "--set",     "text=a=b",
-       "--without", "prune",    "--counters", "--explain"});
+       "--without", "prune",    "--counters"});
   ASSERT_TRUE(o) << o.error().message;
   EXPECT_EQ(o->pipeline, "a.piko.cpp");
   EXPECT_EQ(o->scene, "scene.obj");
@@ -40,7 +40,7 @@ TEST(RenderOptions, AllOfThem) {
   EXPECT_EQ(*o->view.at, glm::vec3(0, 0.5f, 0));
   EXPECT_EQ(o->lights, 7);
   EXPECT_TRUE(o->cull && o->ground && o->json && !o->help);
-  EXPECT_TRUE(o->counters && o->explain);
+  EXPECT_TRUE(o->counters && !o->explain);
   EXPECT_EQ(o->threads, 2);
   EXPECT_EQ(o->warmup, 0);
   EXPECT_EQ(o->frames, 4);
@@ -55,6 +55,15 @@ TEST(RenderOptions, HelpNeedsNothingElse) {
   auto o = parseOptions({"--help"});
   ASSERT_TRUE(o);
   EXPECT_TRUE(o->help);
+}
+
+TEST(RenderOptions, Explain) {
+  auto o = parseOptions({"a", "b", "--explain"});
+  ASSERT_TRUE(o);
+  EXPECT_TRUE(o->explain);
+  EXPECT_EQ(errorOf({"a", "b", "--explain", "--target", "reference"}),
+            "--explain is for pipelines that are compiled: nothing is measured "
+            "of --target reference");
 }
 
 // Neither --fix nor --without takes back what the other one says.

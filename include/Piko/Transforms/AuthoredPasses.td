@@ -107,7 +107,8 @@ def CountWork : Pass<"piko-count-work", "::piko::PipelineOp"> {
 def FixConstants : Pass<"piko-fix-constants", "::piko::PipelineOp"> {
   let summary = "Specialize a pipeline for values of its constants";
   let description = [{
-    **Requires** the authored level.
+    **Requires** the authored level, behind `piko-apply-precision`: what is folded
+    is rounded.
 
     **Does**: `values` has the form `settings.shadows=0`, `weights.value[2]=0.5`
     (of an array), `albedo=0.5` (a constant that is a number) or `lights.size=1`
@@ -134,7 +135,8 @@ def FixConstants : Pass<"piko-fix-constants", "::piko::PipelineOp"> {
     ```
 
     **Limits**: an element that is indexed by what is not constant is loaded all
-    the same. Elements of buffers are not fixed.
+    the same, and so is a number that an index is computed from, which is tested
+    when the pipeline runs. Elements of buffers are not fixed.
   }];
   let options = [
     ListOption<"values", "values", "std::string",
@@ -596,7 +598,8 @@ def ProveBounds : Pass<"piko-prove-bounds", "::piko::PipelineOp"> {
 def PruneUnreached : Pass<"piko-prune-unreached", "::piko::PipelineOp"> {
   let summary = "Drop edges on which nothing goes, and what they alone feed";
   let description = [{
-    **Requires** the authored level, cleaned up, with stages as they are written.
+    **Requires** the authored level with stages in order (`piko-order-stages`):
+    their order, and what may not wait, follow from all edges of the text.
 
     **Does**: a port on which no operation of the process phase emits, because a
     constant or a template argument says so, goes with its edge; so does each
@@ -620,8 +623,9 @@ def PruneUnreached : Pass<"piko-prune-unreached", "::piko::PipelineOp"> {
     ```
 
     **Limits**: a stage that runs for empty bins, or that one which is reached
-    waits for, stays, with an edge that leads there. So does all that is fed only
-    behind a condition which never holds, but is not constant.
+    waits for, stays, with an edge that leads there. So does a cycle on which a
+    stage that is reached collects, because its rounds can be seen; and all that
+    is fed only behind a condition which never holds, but is not constant.
   }];
   let statistics = [
     Statistic<"edges", "edges", "edges that were dropped">,

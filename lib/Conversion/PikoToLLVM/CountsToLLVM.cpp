@@ -20,6 +20,7 @@ static_assert(int(CounterKind::Calls) == PIKORT_CALLS &&
               int(CounterKind::Atomics) == PIKORT_ATOMICS &&
               int(CounterKind::Floats) == PIKORT_FLOATS &&
               int(CounterKind::Integers) == PIKORT_INTEGERS &&
+              int(CounterKind::Effects) == PIKORT_EFFECTS &&
               int(CounterKind::Scalars) == PIKORT_SCALARS &&
               int(CounterKind::Vectors) == PIKORT_VECTORS &&
               int(CounterKind::Lanes) == PIKORT_LANES &&

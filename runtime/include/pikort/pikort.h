@@ -278,8 +278,8 @@ typedef struct pikort_stage_stats {
   int64_t out;    ///< Primitives emitted, over all ports.
 } pikort_stage_stats;
 
-// The first ten are of the text, counted without any fusion, the others of the
-// code that runs.
+// The first eleven are of the text, counted without any fusion, the others of
+// the code that runs.
 enum pikort_counter_kind {
   PIKORT_CALLS = 0,      ///< Of Process.
   PIKORT_ITERATIONS = 1, ///< Of a parallel loop.
@@ -291,10 +291,11 @@ enum pikort_counter_kind {
   PIKORT_ATOMICS = 7,
   PIKORT_FLOATS = 8,       ///< Operations of f32 and f64.
   PIKORT_INTEGERS = 9,     ///< Operations of integers.
-  PIKORT_SCALARS = 10,     ///< Operations that are no vectors'.
-  PIKORT_VECTORS = 11,     ///< Operations on vectors.
-  PIKORT_LANES = 12,       ///< Of these, lanes, ...
-  PIKORT_ACTIVE_LANES = 13 ///< ... and those of them that do something.
+  PIKORT_EFFECTS = 10,     ///< Emissions, updates and atomics right in a loop.
+  PIKORT_SCALARS = 11,     ///< Operations that are no vectors'.
+  PIKORT_VECTORS = 12,     ///< Operations on vectors.
+  PIKORT_LANES = 13,       ///< Of these, lanes, ...
+  PIKORT_ACTIVE_LANES = 14 ///< ... and those of them that do something.
 };
 
 /// What a program that was compiled for counting has counted since the latest

@@ -62,3 +62,30 @@ piko.pipeline @P rank 1 {
   // expected-error@+1 {{expected a value of 'f32', but got 'i32'}}
   piko.fixed @c "z" = 1 : i32
 }
+
+// -----
+
+piko.record @F {"z" : f32 at 0, "w" : i32[2 : 4] at 4} size 12 align 4
+piko.pipeline @P rank 1 {
+  piko.constant @c : @F
+  // expected-error@+1 {{expected no element of a field that is no array}}
+  piko.fixed @c "z"[0] = 1.0 : f32
+}
+
+// -----
+
+piko.record @F {"z" : f32 at 0, "w" : i32[2 : 4] at 4} size 12 align 4
+piko.pipeline @P rank 1 {
+  piko.constant @c : @F
+  // expected-error@+1 {{expected an element of an array}}
+  piko.fixed @c "w" = 1 : i32
+}
+
+// -----
+
+piko.record @F {"z" : f32 at 0, "w" : i32[2 : 4] at 4} size 12 align 4
+piko.pipeline @P rank 1 {
+  piko.buffer @b : @F
+  // expected-error@+1 {{expected how many elements a buffer has}}
+  piko.fixed @b = -5 : index
+}

@@ -23,6 +23,8 @@ LogicalResult FixedOp::verifySymbolUses(SymbolTableCollection &) {
   if (isSize && !isa<IndexType>(getValue().getType()))
     return emitOpError("expected an index for the size of a buffer, but got ")
            << getValue().getType();
+  if (isSize && (getElement() || cast<IntegerAttr>(getValue()).getInt() < 0))
+    return emitOpError("expected how many elements a buffer has");
   if (isSize)
     return success();
   FieldAttr field =
@@ -31,6 +33,11 @@ LogicalResult FixedOp::verifySymbolUses(SymbolTableCollection &) {
     return emitOpError("expected a field of ")
            << getStateAttr() << ", but got '" << *getField()
            << "', which is none";
+  if (getElement().has_value() == field.getCounts().empty())
+    return emitOpError("expected ")
+           << (field.getCounts().empty() ? "no element of a field that is no "
+                                           "array"
+                                         : "an element of an array");
   int64_t element = getElement().value_or(0);
   if (element < 0 || element >= field.getElementCount())
     return emitOpError("expected an element from 0 to ")

@@ -19,10 +19,11 @@ def Piko_CounterKind : I32EnumAttr<"CounterKind", "what a counter counts", [
   I32EnumAttrCase<"Atomics", 7, "atomics">,
   I32EnumAttrCase<"Floats", 8, "floats">,
   I32EnumAttrCase<"Integers", 9, "integers">,
-  I32EnumAttrCase<"Scalars", 10, "scalars">,
-  I32EnumAttrCase<"Vectors", 11, "vectors">,
-  I32EnumAttrCase<"Lanes", 12, "lanes">,
-  I32EnumAttrCase<"ActiveLanes", 13, "active_lanes">]> {
+  I32EnumAttrCase<"Effects", 10, "effects">,
+  I32EnumAttrCase<"Scalars", 11, "scalars">,
+  I32EnumAttrCase<"Vectors", 12, "vectors">,
+  I32EnumAttrCase<"Lanes", 13, "lanes">,
+  I32EnumAttrCase<"ActiveLanes", 14, "active_lanes">]> {
   let cppNamespace = "::piko";
 }
 
@@ -31,15 +32,17 @@ def Piko_CounterOp : Piko_Op<"counter", [
   let summary = "a number that the runtime adds up";
   let description = [{
     Of a stage, which may have become a part of another one; emissions are those
-    of a port, and accesses those to a piece of state. What is counted may lie `inside` of what an earlier counter counts, the
-    innermost loop or the calls. The location is the place in the text that a
+    of a port, and accesses those to a piece of state. What is counted may lie `inside` of what an earlier counter counts, a loop
+    or the calls; effects are the emissions, updates and atomics whose innermost
+    loop that is. The location is the place in the text that a
     report names.
 
     ```mlir
     piko.counter 0 calls of "shade"
     piko.counter 1 turns of "shade" inside 0
-    piko.counter 2 emissions of "shade" port 0 inside 1
-    piko.counter 3 reads of "shade" to @lights
+    piko.counter 2 effects of "shade" inside 1
+    piko.counter 3 emissions of "shade" port 0
+    piko.counter 4 reads of "shade" to @lights
     ```
   }];
   let arguments = (ins I32Attr:$number, Piko_CounterKind:$kind,
