@@ -213,8 +213,17 @@ std::vector<Trial *> Search::improve(Trial *text) {
   return ranking;
 }
 
-/// The best that raced last, if it is sure to be faster than the text; of who
-/// is as fast as another one, the one with fewer changes.
+/// Whether the first of a duel is the faster one: it is sure, or clear enough
+/// where the budget does not let it become so.
+static bool isFaster(const Duel &duel) {
+  double gain = std::log(duel.ratio);
+  return gain >= level &&
+         (!duel.isLevel() ||
+          (gain >= 3 * level && 3 * duel.wins >= 2 * duel.rounds));
+}
+
+/// The best that raced last, if it is faster than the text; of who is as fast
+/// as another one, the one with fewer changes.
 void Search::choose(std::vector<Trial *> ranking, Outcome &outcome) {
   Trial *text = bySetting[Setting(dimensions.size(), 0)];
   Trial *first = ranking[0],
@@ -222,8 +231,7 @@ void Search::choose(std::vector<Trial *> ranking, Outcome &outcome) {
   outcome.chosen = first;
   if (first != text) {
     Duel duel = outcome.againstText = fight(first, text, mostRounds);
-    bool isFaster = !duel.isLevel() && std::log(duel.ratio) >= level;
-    if (isAllowed(text) && !isFaster) {
+    if (isAllowed(text) && !isFaster(duel)) {
       outcome.chosen = text;
       outcome.runnerUp = first;
       outcome.againstText = {};

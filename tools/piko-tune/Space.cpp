@@ -73,13 +73,27 @@ struct SpaceReader {
 
 } // namespace
 
+/// Whether a schedule says where bins run, and nothing else.
+static bool saysOnlyWhere(const ScheduleDescription &schedule) {
+  return schedule.policy && !schedule.batch && schedule.endStage.empty() &&
+         !schedule.endBin && !schedule.everyBin && !schedule.unordered &&
+         !schedule.lanes;
+}
+
+/// What cannot be set is not tried, as far as the text shows it.
 void SpaceReader::addStage(const StageDescription &stage, int pipeline) {
-  if (has("schedules") && !stage.schedule.isDynamic)
-    add(Axis::Directive, stage.name + ":schedule",
-        {"text", "none", "load_balance", "direct_map"}, pipeline);
-  if (has("lanes"))
-    add(Axis::Directive, stage.name + ":lanes",
-        {"text", "items", "iterations", "collapsed", "one"}, pipeline);
+  if (has("schedules") && !stage.schedule.isDynamic) {
+    std::vector<std::string> values = {"text", "load_balance", "direct_map"};
+    if (saysOnlyWhere(stage.schedule))
+      values.push_back("none");
+    add(Axis::Directive, stage.name + ":schedule", values, pipeline);
+  }
+  if (has("lanes")) {
+    std::vector<std::string> values = {"text", "iterations", "one"};
+    if (!stage.takesList)
+      values.insert(values.end(), {"items", "collapsed"});
+    add(Axis::Directive, stage.name + ":lanes", values, pipeline);
+  }
   if (has("numbers") && options.error > 0)
     add(Axis::Directive, stage.name + ":precision",
         {"text", "contracted", "relaxed"}, pipeline);

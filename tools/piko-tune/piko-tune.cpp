@@ -52,6 +52,9 @@ Result<Space> loadSpace(const TuneOptions &options) {
   return std::move(*space);
 }
 
+/// Colours are floats: one step of 255 may be a little more than 1/255.
+double getLimit(const TuneOptions &options) { return options.error * 1.0001; }
+
 /// Everything after the command line.
 Result<Done> tuneScene(const TuneOptions &options) {
   auto space = loadSpace(options);
@@ -60,7 +63,7 @@ Result<Done> tuneScene(const TuneOptions &options) {
   auto bench = SceneBench::create(options, *space);
   if (!bench)
     return bench.error();
-  Search search(space->dimensions, **bench, options.error, options.budget);
+  Search search(space->dimensions, **bench, getLimit(options), options.budget);
   search.log = [](const std::string &line) {
     std::fprintf(stderr, "piko-tune: %s\n", line.c_str());
   };
@@ -69,7 +72,7 @@ Result<Done> tuneScene(const TuneOptions &options) {
     return outcome.error();
   TuneResult result{options, *space, search.getTrials(), *outcome};
   if (options.exhaustive) {
-    auto survey = surveyAll(space->dimensions, **bench, options.error,
+    auto survey = surveyAll(space->dimensions, **bench, getLimit(options),
                             outcome->chosen->setting);
     if (!survey)
       return survey.error();
