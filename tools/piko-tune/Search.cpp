@@ -151,8 +151,7 @@ void Search::addChanges(Trial *base, std::vector<Trial *> &pool) {
   }
 }
 
-/// Adds, for each base, changes that were good alone, together: the best two,
-/// three and four.
+/// Adds, for each base, changes that were good alone, together.
 void Search::addCombinations(const std::vector<Trial *> &bases,
                              std::vector<Trial *> &pool) {
   for (Trial *base : bases) {
@@ -160,7 +159,7 @@ void Search::addCombinations(const std::vector<Trial *> &bases,
     for (const auto &[pair, gain] : gains) {
       const Trial &trial = trials[pair.first];
       auto d = findChange(trial.setting, base->setting);
-      if (pair.second != base->number || gain < level || !d ||
+      if (pair.second != base->number || gain < 2 * level || !d ||
           !isAllowed(&trial))
         continue;
       auto candidate = std::pair(gain, trial.setting[*d]);
@@ -170,10 +169,16 @@ void Search::addCombinations(const std::vector<Trial *> &bases,
     for (const auto &[dimension, gain] : best)
       order.emplace_back(-gain.first, dimension);
     std::sort(order.begin(), order.end());
-    Setting setting = base->setting;
-    for (size_t i = 0; i < std::min<size_t>(order.size(), 4); ++i) {
-      setting[order[i].second] = best[order[i].second].second;
-      if (Trial *trial = i > 0 ? getTrial(setting, /*isNew=*/true) : nullptr)
+    // Two of the best three, and all of them.
+    order.resize(std::min<size_t>(order.size(), 3));
+    for (unsigned chosen : {3u, 5u, 6u, 7u}) {
+      if (chosen >> order.size() != 0)
+        continue;
+      Setting setting = base->setting;
+      for (size_t i = 0; i < order.size(); ++i)
+        if (chosen >> i & 1)
+          setting[order[i].second] = best[order[i].second].second;
+      if (Trial *trial = getTrial(setting, /*isNew=*/true))
         pool.push_back(trial);
     }
   }
