@@ -12,9 +12,11 @@ using piko::render::Result;
 
 /// Runs that are kept for the last comparisons.
 static constexpr int reserve = 28;
-/// A pipeline that is slower than the best by this is not looked at further,
-/// and a change that made a setting so is not tried again with others.
-static const double hopeless = std::log(1.25);
+/// A pipeline that is slower than the best by this is not looked at further: no
+/// change is expected to make up for it.
+static const double slowPipeline = std::log(1.75);
+/// A change that made a setting slower by this is not tried again with others.
+static const double hopeless = std::log(1.12);
 /// What is faster by less is not worth a change.
 static const double level = std::log(1.01);
 /// In which a duel is decided, or is not.
@@ -97,7 +99,7 @@ std::vector<Trial *> Search::findBases(Trial *text) {
   if (pool.size() < 2)
     return pool;
   race(pool, Scale::Full, 2);
-  if (pool.size() == 2 && pool[1]->score - pool[0]->score > hopeless) {
+  if (pool.size() == 2 && pool[1]->score - pool[0]->score > slowPipeline) {
     bench.release(pool[1]->setting);
     pool.pop_back();
   }
@@ -125,7 +127,7 @@ bool Search::isHopeless(const Setting &setting, const Setting &base) const {
            findChange(from, to) == d;
   };
   for (const auto &[pair, gain] : gains)
-    if (gain < -hopeless / 2 &&
+    if (gain < -hopeless &&
         isSameChange(trials[pair.second].setting, trials[pair.first].setting))
       return true;
   for (const Trial &trial : trials)
