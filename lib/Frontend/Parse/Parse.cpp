@@ -413,10 +413,25 @@ static void collectUserFiles(const clang::SourceManager &sources,
 // All of it
 //===----------------------------------------------------------------------===//
 
+/// Refuses what a shell has left of a string without its quotes.
+static llvm::LogicalResult checkTuned(const FrontendOptions &options,
+                                      mlir::Location file) {
+  for (llvm::StringRef define : options.defines) {
+    auto [name, value] = define.split('=');
+    if (name == "PIKO_TUNED" && !value.starts_with("\""))
+      return mlir::emitError(file) << "PIKO_TUNED: expected a string, such as "
+                                      "-DPIKO_TUNED='\"name=value\"', but got '"
+                                   << value << "'";
+  }
+  return llvm::success();
+}
+
 llvm::FailureOr<ParsedFile> piko::parseFile(const ParseRequest &request,
                                             mlir::MLIRContext &context) {
   mlir::Location fileLocation =
       mlir::FileLineColLoc::get(&context, request.file, 1, 1);
+  if (failed(checkTuned(request.options, fileLocation)))
+    return llvm::failure();
   auto memory = llvm::makeIntrusiveRefCnt<llvm::vfs::InMemoryFileSystem>();
   auto files = llvm::makeIntrusiveRefCnt<llvm::vfs::OverlayFileSystem>(
       request.options.files ? request.options.files
