@@ -5,6 +5,7 @@
 #include "Piko/Scene/ImageError.h"
 #include "Piko/Scene/ImageFile.h"
 
+#include <algorithm>
 #include <ctime>
 
 using namespace piko;
@@ -26,8 +27,8 @@ SceneBench::create(const TuneOptions &options, const Space &space) {
   int width = render.view.width, height = render.view.height;
   bench->hasSmall = std::min(width, height) >= leastWidth;
   if (bench->hasSmall) {
-    render.view.width = width / 2;
-    render.view.height = height / 2;
+    render.view.width = width * 3 / 4;
+    render.view.height = height * 3 / 4;
     auto small = render::loadScene(render);
     if (!small)
       return small.error();
@@ -111,7 +112,9 @@ Result<double> SceneBench::visit(const Setting &setting, Scale scale) {
     double start = readClock(options.countsCPU);
     if (pikort_run(pipeline) != PIKORT_OK)
       return render::errorOf(pipeline);
-    time = readClock(options.countsCPU) - start;
+    // The second one, unless it was disturbed.
+    double taken = readClock(options.countsCPU) - start;
+    time = i == 0 ? taken : std::min(time, taken);
   }
   return time;
 }

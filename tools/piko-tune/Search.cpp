@@ -162,7 +162,7 @@ void Search::addCombinations(const std::vector<Trial *> &bases,
       const Trial &trial = trials[pair.first];
       auto d = findChange(trial.setting, base->setting);
       if (pair.second != base->number || gain < 2 * level || !d ||
-          !isAllowed(&trial))
+          !mayBeAllowed(trial))
         continue;
       auto candidate = std::pair(gain, trial.setting[*d]);
       best[*d] = std::max(best[*d], candidate);

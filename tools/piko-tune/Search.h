@@ -57,7 +57,7 @@ public:
   virtual ~Bench() = default;
   /// Compiles a setting. Those with the same number run the same program.
   virtual render::Result<uint64_t> prepare(const Setting &setting) = 0;
-  /// Runs a frame, and then one that is timed: milliseconds.
+  /// Runs two frames: the milliseconds of the faster one.
   virtual render::Result<double> visit(const Setting &setting, Scale scale) = 0;
   /// How far the last full image is from what it should be.
   virtual render::Result<double> measureError(const Setting &setting) = 0;
@@ -144,6 +144,10 @@ private:
   std::vector<Trial *> improve(Trial *text);
   bool isAllowed(const Trial *trial) const {
     return trial->problem.empty() && trial->error && *trial->error <= limit;
+  }
+  /// Whether no full image has shown that it is not.
+  bool mayBeAllowed(const Trial &trial) const {
+    return trial.problem.empty() && (!trial.error || *trial.error <= limit);
   }
   void choose(std::vector<Trial *> ranking, Outcome &outcome);
 
