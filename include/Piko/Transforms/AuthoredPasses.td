@@ -98,7 +98,8 @@ def CountWork : Pass<"piko-count-work", "::piko::PipelineOp"> {
 
     **Limits**: what moves, chooses or converts between integers is no
     arithmetic, nor is the logic of conditions; a function such as an exponential
-    is one operation. The assign and schedule phases are not counted.
+    is one operation. Of a loop with a `break` the last turn counts, be it only
+    its test. The assign and schedule phases are not counted.
   }];
   let statistics = [Statistic<"counters", "counters", "counters">];
   let dependentDialects = ["::mlir::arith::ArithDialect"];
