@@ -5,7 +5,7 @@
 #   make check    build everything and run every test
 #   make bench    run the benchmarks, which takes twenty minutes; says where
 #                 the page is (BENCH=--quick: one minute; benchmarks/README.md)
-#   make charts   chart speed against error, which takes a quarter of an hour; says
+#   make charts   chart speed against error, which takes ten minutes; says
 #                 where the page is (CHARTS=--quick: two minutes)
 # The rest is a thin layer over the presets of CMakePresets.json.
 

@@ -20,10 +20,9 @@ MESHES = ["/usr/share/glmark2/models/bunny.obj",
           "/usr/share/glmark2/models/horse.3ds",
           "/usr/share/glmark2/models/cat.3ds"]
 PATCHES = ["examples/reyes/knot.bpt"]
-# The pipeline of each example that its text commends.
+# Of each example that draws a scene the pipeline that its text commends.
 PIPES = {"raster": "Fused", "visibility": "Visibility", "raytrace": "Raytracer",
-         "shadow": "Bins32", "oit": None, "voxelize": None, "histogram": None,
-         "bilateral": None, "reyes": "Reyes"}
+         "shadow": "Bins32", "oit": "Bins32", "reyes": "Reyes"}
 FIELDS = ["example", "scene", "kind", "name", "done", "needed", "ratio"]
 
 
@@ -48,11 +47,9 @@ def parse_options():
 def count(options, example, scene):
     """What piko-render reports of an example and a scene."""
     source = f"{ROOT}/examples/{example}/{example}.piko.cpp"
-    pipe = PIPES[example] or call([f"{options.bin}/pikoc", source,
-                                   "--list-pipes"]).split()[-1]
     text = call([f"{options.bin}/piko-render", source,
                  scene if os.path.isabs(scene) else f"{ROOT}/{scene}", "--pipe",
-                 pipe, "--frames", str(options.frames), "--counters", "--json",
+                 PIPES[example], "--frames", str(options.frames), "--counters", "--json",
                  *options.others])
     return json.loads(text)
 
@@ -102,7 +99,8 @@ def main():
                 f"| {example} | {name} | {report['ms_median']:.2f} | "
                 + " | ".join(worst(found, kind)
                              for kind in ("calls", "turns", "lanes"))
-                + " | " + (f"{waste['ms']:.2f} ms: {waste['what']}"
+                + " | " + (f"{waste['ms']:.2f} ms: {waste['what']}".replace(
+                    f"{ROOT}/", "")
                            if waste else "-") + " |", flush=True)
     if options.csv:
         with open(options.csv, "w", newline="", encoding="utf-8") as file:
