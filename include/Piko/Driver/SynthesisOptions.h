@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// Which passes of synthesis to leave out, `--without=PASS,...`; what is fixed and
-// which directives are set before it; and what to count.
+// Which passes of synthesis to leave out, `--without=PASS,...`; what is fixed
+// and which directives are set before it; and what to count.
 
 #ifndef PIKO_DRIVER_SYNTHESISOPTIONS_H
 #define PIKO_DRIVER_SYNTHESISOPTIONS_H
