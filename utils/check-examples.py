@@ -170,7 +170,7 @@ def complete(text):
     if BARRIERS.search(text):
         text = ITERATIONS.replace("BODY", text)
     body = definitions(text) + "\n" + text
-    if "piko.check_record" in text:
+    if re.search(r"piko\.(check_record|counter|fixed) ", text):
         return module(kernel=text)
     if "piko.schedule " in text:
         return blend(text, "")

@@ -12,12 +12,12 @@ def Piko_FixedOp : Piko_Op<"fixed", [
     HasParent<"PipelineOp">, DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
   let summary = "a number of the host's that the pipeline was compiled for";
   let description = [{
-    A field of a constant, or an element of one that is an array, or without a
-    field how many elements a buffer has. A run with another value is an error.
+    A field of a constant, or an element of one that is an array (`"weights"[3]`),
+    or without a field how many elements a buffer has. A run with another value is
+    an error.
 
     ```mlir
-    piko.fixed @settings "shadows" = 0 : i32
-    piko.fixed @kernel "weights"[3] = 0.25 : f32
+    piko.fixed @camera "width" = 640 : i32
     piko.fixed @lights = 1 : index
     ```
   }];
