@@ -595,46 +595,4 @@ def Privatize : Pass<"piko-privatize", "::piko::PipelineOp"> {
     Statistic<"refused", "refused", "fields that atomics change in place">];
 }
 
-def CountLanes : Pass<"piko-count-lanes", "::piko::PipelineOp"> {
-  let summary = "Count the operations that kernels do, and their lanes";
-  let description = [{
-    **Requires** loops over units, as the last pass on them leaves them.
-
-    **Does**: sums up, in each kernel, the arithmetic operations on scalars, those
-    on vectors, the lanes of these, and how many of the lanes do something: those
-    of the mask whose lanes an `scf.if` or an `scf.while` around them asks for, or
-    of the mask with which their block reads and writes. A unit of work adds up in
-    memory of its own and tells the runtime (`piko.count`) at its end.
-
-    **Guarantees** that the pipeline computes what it did, by the same vectors.
-
-    Before:
-    ```
-    scf.forall (%unit) in (%units) {
-      ...
-        %any = vector.reduction <or>, %mask : vector<16xi1> into i1
-        scf.if %any {
-          %y = arith.mulf %x, %x : vector<16xf32>
-    ```
-    After:
-    ```
-    scf.forall (%unit) in (%units) {
-      %sums = memref.alloca() : memref<4xindex>
-      ...
-        scf.if %any {
-          %y = arith.mulf %x, %x : vector<16xf32>
-          %bits = vector.bitcast %mask : vector<16xi1> to vector<1xi16>
-          ... // adds 1 vector, 16 lanes, and the bits that are set
-      piko.count 1 by %vectors
-    ```
-
-    **Limits**: a lane whose result a select drops counts as one that does
-    something. What the runtime does between kernels is not counted.
-  }];
-  let statistics = [Statistic<"counted", "counted", "kernels that count">];
-  let dependentDialects = ["::mlir::math::MathDialect",
-                           "::mlir::memref::MemRefDialect",
-                           "::mlir::vector::VectorDialect"];
-}
-
 #endif // PIKO_TRANSFORMS_CPUPASSES_TD

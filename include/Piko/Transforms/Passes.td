@@ -6,6 +6,8 @@
 #ifndef PIKO_TRANSFORMS_PASSES_TD
 #define PIKO_TRANSFORMS_PASSES_TD
 
+include "Piko/Transforms/InstrumentationPasses.td"
+include "Piko/Transforms/SpecializationPasses.td"
 include "Piko/Transforms/AuthoredPasses.td"
 include "Piko/Transforms/KernelPasses.td"
 include "Piko/Transforms/MachinePasses.td"

@@ -2,6 +2,7 @@
 //
 // What checking mode adds to a pipeline.
 
+#include "ElementAccess.h"
 #include "Piko/Dialect/Piko/IR/PikoCheck.h"
 
 using namespace mlir;
@@ -24,15 +25,7 @@ LogicalResult CheckRecordOp::verifySymbolUses(SymbolTableCollection &) {
 }
 
 LogicalResult CheckAccessOp::verifySymbolUses(SymbolTableCollection &) {
-  auto *state = lookupInPipeline<Operation *>(*this, getStateAttr());
-  if (!isa_and_nonnull<BufferOp, ImageOp>(state))
-    return emitOpError("expected a buffer or an image, but got ")
-           << getStateAttr() << ", which is none";
-  if (int64_t(getIndices().size()) != getStateRank(state))
-    return emitOpError("expected ")
-           << getStateRank(state) << " indices into " << getStateAttr()
-           << ", but got " << getIndices().size();
-  return success();
+  return verifyElement(*this, getStateAttr(), getIndices().size());
 }
 
 LogicalResult CheckLoopOp::verify() {
