@@ -42,7 +42,6 @@ constexpr int64_t kindCount = 4;
 /// What a block does each time that it runs.
 struct BlockWork {
   int64_t scalars = 0, vectors = 0, lanes = 0;
-  int64_t width = 0; ///< Of its widest vectors.
 };
 
 /// Counts in one kernel.
@@ -82,7 +81,6 @@ static BlockWork measure(Block &block) {
     }
     ++work.vectors;
     work.lanes += vector.getNumElements();
-    work.width = std::max(work.width, vector.getNumElements());
   }
   return work;
 }

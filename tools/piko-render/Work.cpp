@@ -113,12 +113,11 @@ void Collector::add(int32_t index, const pikort_counter &counter) {
 }
 
 Result<Done> Collector::collect() {
-  bool isCode = false;
   for (int32_t i = 0; i < pikort_counter_count(pipeline); ++i) {
     pikort_counter counter;
     if (pikort_get_counter(pipeline, i, &counter) != PIKORT_OK)
       return Error{pikort_message(pipeline)};
-    isCode = counter.kind >= PIKORT_SCALARS;
+    bool isCode = counter.kind >= PIKORT_SCALARS;
     if (!isCode && i == 0)
       addStages();
     isCode ? addCode(counter) : add(i, counter);

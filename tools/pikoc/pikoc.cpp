@@ -287,6 +287,9 @@ static std::string checkOptions(const CommandLine &line) {
                        line.getEmit() != Emit::LLVMIR))
     return "--explain writes a report, and goes without --emit, --list-pipes, "
            "--list-tunables and an -o that ends in .o or .s";
+  if (!line.fix.empty() && line.getEmit() == Emit::Authored)
+    return "--fix takes effect below the authored level, which --emit=authored "
+           "prints as it is";
   if (isObject && line.output == "-" && llvm::outs().is_displayed())
     return "expected -o, because an object is not for a terminal";
   return "";
