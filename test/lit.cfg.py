@@ -94,7 +94,12 @@ if os.path.exists("/dev/nvidiactl"):
     config.available_features.add("gpu")
 if platform.machine() in ("x86_64", "AMD64"):
     config.available_features.add("x86_64")
-if shutil.which("ptxas"):
+# NVIDIA's installers leave PATH as it is.
+cuda = os.environ.get("CUDA_HOME", "/usr/local/cuda")
+if not shutil.which("ptxas"):
+    path.append(os.path.join(cuda, "bin"))
+    config.environment["PATH"] = os.path.pathsep.join(path)
+if shutil.which("ptxas", path=config.environment["PATH"]):
     config.available_features.add("ptxas")
 if shutil.which("chromium"):
     config.available_features.add("chromium")

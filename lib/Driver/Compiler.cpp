@@ -4,9 +4,11 @@
 
 #include "Piko/Driver/Compiler.h"
 
+#include "Piko/Conversion/KernelImage.h"
 #include "Piko/Dialect/Piko/IR/Piko.h"
 #include "Piko/Driver/Sequences.h"
 #include "Piko/Target/Emulate.h"
+#include "Piko/Target/PTX.h"
 
 #include "mlir/Dialect/GPU/IR/GPUDialect.h"
 #include "mlir/Dialect/LLVMIR/LLVMDialect.h"
@@ -233,7 +235,7 @@ void piko::addPasses(OpPassManager &passes, Level from, Level to,
   if (goes(Level::Machine))
     addMachineSequence(passes);
   if (goes(Level::Target)) {
-    if (gpu.emulate)
+    if (gpu.target != GPUTarget::None)
       addGPUSequence(passes, gpu);
     else
       addCPUSequence(passes, chosen, cpu);
@@ -256,6 +258,10 @@ static LogicalResult checkStart(ModuleOp module, Level from, Level to,
     return emitError(module.getLoc())
            << "--check: expected the authored level, but the file is at the "
            << getName(from) << " level";
+  if (check.enabled && gpu.target == GPUTarget::CUDA)
+    return emitError(module.getLoc())
+           << "--check: expected --target cpu or gpu-on-cpu, because what is "
+              "checked is written down on the host";
   const char *option = !synthesis.fix.empty()              ? "--fix"
                        : synthesis.count == Counting::Work ? "--counters"
                                                            : nullptr;
@@ -263,14 +269,18 @@ static LogicalResult checkStart(ModuleOp module, Level from, Level to,
     return emitError(module.getLoc())
            << option << ": expected the authored level, but the file is at the "
            << getName(from) << " level";
-  if (hasGPUKernels(module) && !gpu.emulate)
+  bool isGPU = gpu.target != GPUTarget::None;
+  if (hasGPUKernels(module) && !isGPU)
     return emitError(module.getLoc())
            << "expected kernels for a CPU, but the file has some for a GPU, "
-              "which --target gpu-on-cpu runs and --emit=ptx writes";
-  if (!hasGPUKernels(module) && gpu.emulate && from > Level::Machine)
+              "which --target cuda and --target gpu-on-cpu run and --emit=ptx "
+              "writes";
+  if (!hasGPUKernels(module) && isGPU && from > Level::Machine)
     return emitError(module.getLoc())
-           << "--target gpu-on-cpu: expected kernels for a GPU, or the machine "
-              "level or one above it, but the file is at the "
+           << (gpu.target == GPUTarget::CUDA ? "--target cuda"
+                                             : "--target gpu-on-cpu")
+           << ": expected kernels for a GPU, or the machine level or one above "
+              "it, but the file is at the "
            << getName(from) << " level";
   return success();
 }
@@ -285,7 +295,7 @@ LogicalResult piko::lowerPipeline(ModuleOp module, Level level,
     return failure();
   PassManager passes(module.getContext());
   if (hasLaunches(module))
-    addEmulationSequence(passes, gpu);
+    addLaunchSequence(passes, gpu);
   addPasses(passes, from, level, check, synthesis, gpu, cpu);
   return passes.run(module);
 }
@@ -295,7 +305,7 @@ piko::lowerForEach(ArrayRef<CPUOptions> cpus, ModuleOp module,
                    const CheckOptions &check, const SynthesisOptions &synthesis,
                    const GPUOptions &gpu) {
   Level from = getLevel(module);
-  bool hasVectors = from <= Level::Machine && !gpu.emulate;
+  bool hasVectors = from <= Level::Machine && gpu.target == GPUTarget::None;
   SynthesisOptions chosen = choosePasses(check, synthesis);
   auto lowerCommon = [&] {
     if (!hasVectors)
@@ -356,7 +366,8 @@ piko::translateKernels(ModuleOp module, llvm::LLVMContext &context) {
 }
 
 std::unique_ptr<llvm::Module>
-piko::translateToLLVMIR(ModuleOp module, llvm::LLVMContext &context) {
+piko::translateToLLVMIR(ModuleOp module, llvm::LLVMContext &context,
+                        const GPUOptions &gpu, int optLevel) {
   std::unique_ptr<llvm::Module> host =
       translateModuleToLLVMIR(module, context, "pipeline");
   for (auto kernels : module.getOps<gpu::GPUModuleOp>()) {
@@ -364,8 +375,13 @@ piko::translateToLLVMIR(ModuleOp module, llvm::LLVMContext &context) {
         translateModuleToLLVMIR(kernels, context, kernels.getName());
     if (!host || !translated)
       return nullptr;
-    if (llvm::Error error = linkEmulatedKernels(*host, std::move(translated),
-                                                kernels.getName())) {
+    StringRef name = kernels.getName();
+    llvm::Error error =
+        gpu.target == GPUTarget::CUDA
+            ? embedPTX(*host, *translated, getImageName(name), gpu.chip,
+                       optLevel)
+            : linkEmulatedKernels(*host, std::move(translated), name);
+    if (error) {
       emitError(module.getLoc()) << llvm::toString(std::move(error));
       return nullptr;
     }

@@ -93,11 +93,11 @@ static std::string makeRequest(const ObjectOptions &options,
   for (int number : {int(source.text.has_value()), int(source.check.enabled),
                      int(options.execution), options.target.optLevel,
                      int(options.target.sanitizer), int(options.remarks),
-                     int(options.allPipelines), int(source.gpu.emulate),
+                     int(options.allPipelines), int(source.gpu.target),
                      int(source.synthesis.count), int(source.gpu.seed),
                      int(source.gpu.threads)})
     key.add(std::to_string(number));
-  key.add(options.nameSpace).add(getRuntimeIncludeDir());
+  key.add(source.gpu.chip).add(options.nameSpace).add(getRuntimeIncludeDir());
   return key.finish();
 }
 
@@ -109,7 +109,8 @@ static std::string makeRequest(const ObjectOptions &options,
 /// diagnostics. Processors with as many lanes have the same.
 static std::vector<std::unique_ptr<llvm::Module>>
 translateForEach(ModuleOp module, llvm::ArrayRef<Processor> processors,
-                 const CompileOptions &source, llvm::LLVMContext &context) {
+                 const CompileOptions &source, int optLevel,
+                 llvm::LLVMContext &context) {
   llvm::SmallVector<CPUOptions> cpus;
   llvm::SmallDenseMap<int64_t, size_t> places; // by lanes
   for (const Processor &processor : processors)
@@ -121,8 +122,8 @@ translateForEach(ModuleOp module, llvm::ArrayRef<Processor> processors,
   if (lowered.empty())
     return translated;
   for (const Processor &processor : processors) {
-    translated.push_back(
-        translateToLLVMIR(*lowered[places[processor.lanes]], context));
+    translated.push_back(translateToLLVMIR(*lowered[places[processor.lanes]],
+                                           context, source.gpu, optLevel));
     if (!translated.back())
       return {};
   }
@@ -145,7 +146,8 @@ compilePipeline(const ObjectOptions &options,
         writeHostHeader(pipeline, options.source.file, options.nameSpace);
   object.symbol = getProgramSymbol(options.nameSpace, name);
   std::vector<std::unique_ptr<llvm::Module>> translated =
-      translateForEach(*module, processors, options.source, llvmContext);
+      translateForEach(*module, processors, options.source,
+                       options.target.optLevel, llvmContext);
   if (translated.empty())
     return nullptr;
   return defineProgram(std::move(translated), name, object.symbol, processors);

@@ -227,16 +227,19 @@ void piko::addGPUSequence(OpPassManager &passes, const GPUOptions &options) {
   passes.addPass(createGpuLaunchSinkIndexComputationsPass());
   passes.addPass(createGpuKernelOutliningPass());
   addCleanUp(passes);
-  if (options.emulate)
-    addEmulationSequence(passes, options);
+  if (options.target != GPUTarget::None)
+    addLaunchSequence(passes, options);
 }
 
-void piko::addEmulationSequence(OpPassManager &passes,
-                                const GPUOptions &options) {
+void piko::addLaunchSequence(OpPassManager &passes, const GPUOptions &options) {
   addNVVMSequence(passes);
-  ConvertGPUToEmulatorOptions emulation;
-  emulation.seed = options.seed;
-  passes.addPass(createConvertGPUToEmulator(emulation));
+  if (options.target == GPUTarget::CUDA) {
+    passes.addPass(createConvertGPUToCUDA());
+  } else {
+    ConvertGPUToEmulatorOptions emulation;
+    emulation.seed = options.seed;
+    passes.addPass(createConvertGPUToEmulator(emulation));
+  }
   addCleanUp(passes);
 }
 

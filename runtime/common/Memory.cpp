@@ -2,6 +2,7 @@
 //===- Memory.cpp - Memory that is kept from frame to frame ---------------===//
 
 #include "common/Memory.h"
+#include "common/Accelerator.h"
 #include "common/Clock.h"
 
 #include <algorithm>
@@ -119,12 +120,17 @@ uint8_t *Memory::findRoom(size_t bytes) {
 
 uint8_t *Memory::map(size_t bytes) {
   MappingTimer timer(*this);
+  if (accelerator_)
+    return isAvailable(bytes) ? accelerator_->map(bytes) : nullptr;
   return mapSystem(bytes, findRoom(mappedBytes(bytes)));
 }
 
 void Memory::unmap(uint8_t *data, size_t bytes) {
   MappingTimer timer(*this);
-  munmap(data, bytes);
+  if (accelerator_)
+    accelerator_->unmap(data);
+  else
+    munmap(data, bytes);
 }
 
 // --- Blocks -----------------------------------------------------------------

@@ -20,6 +20,8 @@
 
 namespace piko::rt {
 
+class Accelerator;
+
 /// Thrown inside the runtime, and caught at its boundary.
 struct OutOfMemory {
   int64_t bytes; ///< What was asked for.
@@ -47,6 +49,10 @@ public:
   void release(Block block, Use use);
   /// Unmaps blocks that no recent frame used.
   void endFrame();
+
+  /// Before the first block: where all memory comes from in place of the
+  /// system. It outlives the memory.
+  void setAccelerator(Accelerator *from) { accelerator_ = from; }
 
   /// From here on what this thread takes to map and unmap is counted.
   int64_t countMapping();
@@ -80,6 +86,7 @@ private:
   void unmap(uint8_t *data, size_t bytes);
   void unmapAllFree();
 
+  Accelerator *accelerator_ = nullptr;
   mutable std::mutex mutex_;
   std::multimap<size_t, Free> free_;
   uintptr_t room_ = 0, roomEnd_ = 0; ///< Address space that was free.

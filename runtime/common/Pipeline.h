@@ -10,6 +10,7 @@
 #ifndef PIKO_RUNTIME_COMMON_PIPELINE_H
 #define PIKO_RUNTIME_COMMON_PIPELINE_H
 
+#include "common/Accelerator.h"
 #include "common/Counters.h"
 #include "common/Executor.h"
 #include "common/Profile.h"
@@ -59,6 +60,8 @@ struct State {
   std::vector<uint8_t> clear; ///< One record, or empty.
   std::vector<uint8_t> bytes; ///< A constant's.
   Array<uint8_t> owned;       ///< An image's, or of a buffer that we allocate.
+  Array<uint8_t> mirror;      ///< What a device sees of the host's own memory.
+  uint8_t *hosts = nullptr; ///< That memory, while the mirror takes its place.
   pikoir_state view{};
 };
 
@@ -127,8 +130,10 @@ struct Source {
   bool declared = false;
   int32_t stage = 0;
   const uint8_t *data = nullptr;
-  int64_t count = -1;         ///< -1 = not bound
-  int64_t begin = 0, end = 0; ///< The strip that runs, or all.
+  int64_t count = -1;    ///< -1 = not bound
+  Array<uint8_t> mirror; ///< What a device sees of the host's own memory.
+  const uint8_t *hosts = nullptr; ///< That memory meanwhile.
+  int64_t begin = 0, end = 0;     ///< The strip that runs, or all.
 };
 
 /// What a kernel does to a field of a piece of state: see PrivateCopies.h.
@@ -228,7 +233,8 @@ struct pikort_pipeline {
   pikort_pipeline();
   ~pikort_pipeline();
 
-  piko::rt::Memory memory; // first: the arrays below go back to it
+  std::unique_ptr<piko::rt::Accelerator> accelerator; ///< None = the CPU.
+  piko::rt::Memory memory; // next: the arrays below go back to it
   std::string name;
   std::string processor; ///< That the code is for; "" = not said.
   int32_t rank = 0;
@@ -267,6 +273,12 @@ struct pikort_pipeline {
   std::string message;
   std::atomic<int32_t> status{0};
   std::atomic<int32_t> reported{0}; ///< Some error that report() noted.
+
+  /// In the setup: what runs the grids.
+  void useAccelerator(std::unique_ptr<piko::rt::Accelerator> device) {
+    accelerator = std::move(device);
+    memory.setAccelerator(accelerator.get());
+  }
 
   /// Checks and completes the declarations; throws Failure.
   void finish();

@@ -4,6 +4,7 @@
 #include "cpu/CPUExecutor.h"
 #include "cpu/Check.h"
 #include "cpu/Cycle.h"
+#include "cpu/Mirrors.h"
 #include "cpu/Strips.h"
 
 #include <algorithm>
@@ -47,6 +48,7 @@ void CPUExecutor::prepare() {
 
 void CPUExecutor::beginRun() {
   prepareState(p);
+  beginMirrors(p);
   startCounters(p);
   p.profile.enter(Part::Program);
   if (checker)
@@ -60,6 +62,7 @@ void CPUExecutor::beginRun() {
 
 void CPUExecutor::endRun() {
   endClears(p);
+  endMirrors(p);
   endStrips(p);
   endCycles(p);
   if (checker)

@@ -182,6 +182,7 @@ struct Kernel {
   Array<uint32_t> places;
   Array<pikoir_call> calls; ///< If Process takes a list.
   std::vector<pikoir_unit> units;
+  Array<pikoir_unit> sharedUnits; ///< The same for an accelerator.
   bool ownsUnits = false; ///< Some belong to a thread that is not the first.
   std::atomic<int64_t> nextUnit = 0; ///< For any thread.
   int64_t positions = 0;

@@ -26,6 +26,7 @@ void Kernel::clear() {
   keys = {};
   counts.clear();
   units.clear();
+  sharedUnits = {};
   for (auto &lane : lanes)
     lane->clear();
   firstRound = true;
@@ -37,16 +38,24 @@ void Kernel::clear() {
 }
 
 /// What generated code sees of a kernel that is ready to run.
-static void publish(const pikort_pipeline &p, Kernel &kernel) {
+static void publish(pikort_pipeline &p, Kernel &kernel) {
   const Stage &stage = p.stages[kernel.stage];
   const uint32_t *order = kernel.places  ? kernel.places.data()
                           : kernel.order ? kernel.order.data()
                                          : kernel.stream.index;
+  const pikoir_unit *units = kernel.units.data();
+  if (p.accelerator) {
+    kernel.sharedUnits =
+        Array<pikoir_unit>(p.memory, static_cast<int64_t>(kernel.units.size()));
+    std::copy(kernel.units.begin(), kernel.units.end(),
+              kernel.sharedUnits.data());
+    units = kernel.sharedUnits.data();
+  }
   kernel.input = {kernel.stream.items,
                   kernel.positions,
                   order,
                   kernel.offsets.data(),
-                  kernel.units.data(),
+                  units,
                   static_cast<int64_t>(kernel.units.size()),
                   kernel.source >= 0 ? 1 : stage.tiles,
                   kernel.calls.data(),

@@ -26,6 +26,10 @@ int64_t unitSize(const pikort_pipeline &p, const Stage &stage,
                  const BinSchedule &schedule, int64_t positions) {
   if (schedule.tileSplit > 0 && !stage.sharesTile)
     return schedule.tileSplit;
+  if (p.accelerator) { // a unit is a block's
+    int64_t share = positions / (p.accelerator->residentThreads() / 64);
+    return std::clamp<int64_t>((share + 63) / 64 * 64, 64, 1024);
+  }
   int64_t share = positions / (int64_t(p.threads) * 8);
   return std::clamp<int64_t>((share + 15) / 16 * 16, 16, 1024);
 }

@@ -101,7 +101,8 @@ enum : unsigned {
 inline constexpr CUdevice CU_DEVICE_CPU = -1;
 
 /// The functions, by name. `load` fills it; the names with a suffix, such as
-/// cuMemAlloc_v2, are symbols of the driver, and what cuda.h's plain names mean.
+/// cuMemAlloc_v2, are symbols of the driver, and what cuda.h's plain names
+/// mean.
 struct Driver {
 #define PIKO_CUDA_FUNCTION(NAME, SYMBOL, PARAMETERS)                           \
   CUresult(*NAME) PARAMETERS = nullptr;

@@ -264,6 +264,8 @@ extern "C" {
 void pikoir_grid_launch(pikort_pipeline *p, void (*thread)(const void *),
                         int64_t blocks, int64_t threads, const void *arguments,
                         int64_t seed) {
+  if (p->status != PIKORT_OK)
+    return;
   static std::mutex mutex; // the memory of blocks is the code's
   std::lock_guard<std::mutex> lock(mutex);
   Device grid(thread, arguments, blocks, threads);

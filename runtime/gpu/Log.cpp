@@ -5,7 +5,8 @@
 // is opened, told its entries one after the other, and closed, as the CPU's
 // kernel would do it.
 //
-// Room is address space: the system gives pages where they are written.
+// Room is address space: the system gives pages where they are written. It is
+// the accelerator's, or else mapped for each grid.
 //
 //===----------------------------------------------------------------------===//
 
@@ -19,6 +20,8 @@
 using namespace piko::rt;
 
 static constexpr size_t mostRoom = size_t(1) << 36, leastRoom = size_t(1) << 28;
+/// Of the head; a multiple of what pieces are aligned to.
+static constexpr int64_t headRoom = 64;
 /// For what has no room: more than any entry takes.
 static constexpr int64_t spareRoom = int64_t(1) << 26;
 static_assert(sizeof(pikoir_entry) == 16 && sizeof(pikoir_piece) == 64,
@@ -32,13 +35,20 @@ struct Place {
   int32_t code;
 };
 
-struct GridLog : pikoir_log {
+struct GridLog;
+
+/// Begins the room, where threads find it.
+struct Head : pikoir_log {
+  GridLog *log;
+};
+
+struct GridLog {
   GridLog(pikort_pipeline &p, int32_t number, bool isSource, int64_t units);
   GridLog(const GridLog &) = delete;
   GridLog &operator=(const GridLog &) = delete;
   ~GridLog() {
-    if (memory)
-      munmap(memory, room);
+    if (!pipeline.accelerator && !room.empty())
+      munmap(room.data(), room.size());
   }
 
   void close();
@@ -47,12 +57,14 @@ struct GridLog : pikoir_log {
   int32_t number;
   bool isSource;
   int64_t units;
-  void *memory = nullptr;
-  size_t room = mostRoom;
+  std::span<uint8_t> room;
+  Head *head = nullptr;
   std::vector<Place> places;
 
 private:
   using Spans = std::vector<pikoir_span>;
+
+  static std::span<uint8_t> mapRoom();
 
   /// What each unit has.
   std::vector<Spans> collect() const;
@@ -65,30 +77,32 @@ private:
 
 GridLog::GridLog(pikort_pipeline &p, int32_t number, bool isSource,
                  int64_t units)
-    : pikoir_log{}, pipeline(p), number(number), isSource(isSource),
-      units(units) {
-  do {
-    memory = mmap(nullptr, room, PROT_READ | PROT_WRITE,
-                  MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
-    if (memory != MAP_FAILED)
-      break;
-    memory = nullptr;
-    room /= 2;
-  } while (room >= leastRoom);
-  if (!memory)
+    : pipeline(p), number(number), isSource(isSource), units(units),
+      room(p.accelerator ? p.accelerator->logSpace() : mapRoom()) {
+  if (room.empty())
     throw OutOfMemory{static_cast<int64_t>(leastRoom)};
-  spare = reinterpret_cast<int64_t>(memory);
-  cursor = spare + spareRoom;
-  limit = spare + static_cast<int64_t>(room);
+  head = new (room.data()) Head;
+  auto begin = reinterpret_cast<int64_t>(room.data());
+  head->spare = begin + headRoom;
+  head->cursor = begin + headRoom + spareRoom;
+  head->limit = begin + static_cast<int64_t>(room.size());
+  head->log = this;
+}
+
+std::span<uint8_t> GridLog::mapRoom() {
+  for (size_t bytes = mostRoom; bytes >= leastRoom; bytes /= 2) {
+    void *memory = mmap(nullptr, bytes, PROT_READ | PROT_WRITE,
+                        MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+    if (memory != MAP_FAILED)
+      return {static_cast<uint8_t *>(memory), bytes};
+  }
+  return {};
 }
 
 std::vector<GridLog::Spans> GridLog::collect() const {
   std::vector<Spans> found(static_cast<size_t>(units));
-  int64_t end = std::min(cursor, limit);
-  for (int64_t at = spare + spareRoom; at < end;) {
+  for (int64_t at = head->spare + spareRoom; at < head->cursor;) {
     const auto *piece = reinterpret_cast<const pikoir_piece *>(at);
-    if (piece->bytes == 0)
-      break; // this one had no room
     const auto *first = reinterpret_cast<const pikoir_span *>(piece + 1);
     if (piece->kind == PIKOIR_PIECE_DIRECTORY) {
       Spans &spans = found[static_cast<size_t>(piece->unit)];
@@ -165,33 +179,43 @@ void GridLog::replayUnit(int64_t unit, const Spans &spans) {
 }
 
 void GridLog::close() {
+  if (pipeline.status != PIKORT_OK)
+    return; // the grid did not end
+  if (head->cursor > head->limit)
+    return pipeline.report({0, PIKORT_OUT_OF_MEMORY,
+                            isSource ? pipeline.sources[number].stage : number,
+                            head->cursor - head->limit, 0, 0});
   std::vector<Spans> found = collect();
   for (int64_t unit = 0; unit < units; ++unit)
     replayUnit(unit, found[static_cast<size_t>(unit)]);
-  if (cursor > limit)
-    pipeline.report({0, PIKORT_OUT_OF_MEMORY,
-                     isSource ? pipeline.sources[number].stage : number,
-                     cursor - limit, 0, 0});
 }
 
 extern "C" {
 
 pikoir_log *pikoir_log_open(pikort_pipeline *p, int32_t number, int32_t flags,
                             int64_t units) {
-  return new GridLog(*p, number, (flags & PIKOIR_LOG_SOURCE) != 0, units);
+  GridLog *log = nullptr;
+  guarded(p, "run", [&] {
+    log = new GridLog(*p, number, (flags & PIKOIR_LOG_SOURCE) != 0, units);
+  });
+  return log ? log->head : nullptr;
 }
 
 void pikoir_log_place(pikoir_log *log, int32_t place, int32_t function,
                       int32_t stage, const char *name, int32_t code) {
-  auto &places = static_cast<GridLog *>(log)->places;
+  if (!log)
+    return;
+  auto &places = static_cast<Head *>(log)->log->places;
   if (places.size() <= static_cast<size_t>(place))
     places.resize(static_cast<size_t>(place) + 1);
   places[static_cast<size_t>(place)] = {function, stage, name, code};
 }
 
 void pikoir_log_close(pikoir_log *log) {
-  auto *grid = static_cast<GridLog *>(log);
-  grid->close();
+  if (!log)
+    return;
+  GridLog *grid = static_cast<Head *>(log)->log;
+  guarded(&grid->pipeline, "run", [&] { grid->close(); });
   delete grid;
 }
 

@@ -17,9 +17,10 @@ Compiles a pipeline that uses the types of piko/scene.h, renders a scene with
 it, and says how long a frame took.
 
   --pipe NAME            which pipeline of the file (the only one)
-  --target cpu|gpu-on-cpu|reference
-                         compiled for this machine; for a GPU, which this
-                         machine plays; or run by the reference executor (cpu)
+  --target cpu|cuda|gpu-on-cpu|reference
+                         compiled for this machine; for an NVIDIA GPU; for a GPU
+                         that this machine plays; or run by the reference
+                         executor (cpu)
   --cpu NAME             the processor to compile for, as clang names them, of
                          which this machine has everything (native)
   -I FOLDER, -D NAME[=VALUE]   for the pipeline's preprocessor
@@ -29,8 +30,9 @@ it, and says how long a frame took.
                          and sizes of small buffers), or NAME=VALUE; may be
                          repeated
   --tuned FILE           the setting that piko-tune wrote there
-  --gpu-threads N        for gpu-on-cpu: threads of a block, a power of two up to
-                         1024 (as many as the stage has)
+  --gpu-threads N        for cuda and gpu-on-cpu: threads of a block, a power of
+                         two up to 1024 (as many as the stage has)
+  --gpu-chip NAME        for cuda: the oldest chip that the code runs on (sm_70)
   --gpu-seed N           for gpu-on-cpu: permutes the blocks (in order)
   --no-cache             compile even if nothing changed since the last time
   --cache-dir FOLDER     where compiled code is kept ($PIKO_CACHE_DIR,
@@ -111,6 +113,7 @@ private:
         {"--tuned", [&] { options.tuned = value(name); }},
         {"--gpu-threads",
          [&] { options.load.gpu.threads = integer(name, 1, 1024); }},
+        {"--gpu-chip", [&] { options.load.gpu.chip = value(name); }},
         {"--gpu-seed",
          [&] { options.load.gpu.seed = integer(name, 0, maxInt); }},
         {"--width", [&] { options.view.width = integer(name, 1, 65536); }},
@@ -251,10 +254,12 @@ private:
   void parseTarget(const std::string &name) {
     options.load.target =
         name == "reference" ? ExecutionTarget::Reference : ExecutionTarget::CPU;
-    options.load.gpu.emulate = name == "gpu-on-cpu";
-    if (name != "cpu" && name != "gpu-on-cpu" && name != "reference")
-      fail("--target: expected cpu, gpu-on-cpu or reference, but got '" + name +
-           "'");
+    auto target = name == "reference" ? GPUTarget::None : parseGPUTarget(name);
+    if (target)
+      options.load.gpu.target = *target;
+    else
+      fail("--target: expected cpu, gpu-on-cpu, cuda or reference, but got '" +
+           name + "'");
   }
 
   void fail(const std::string &message) {

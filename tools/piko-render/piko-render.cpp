@@ -111,7 +111,7 @@ Result<Done> report(const Options &options, const RunResult &result,
     if (!work)
       return work.error();
     std::vector<Waste> wastes =
-        findWastes(*work, pipeline, !options.load.gpu.emulate);
+        findWastes(*work, pipeline, options.load.gpu.target == GPUTarget::None);
     line.add("work", reportWork(*work)).add("wastes", reportWastes(wastes));
     if (options.counters)
       text += printWork(*work, result.pixels);

@@ -40,8 +40,6 @@ enum class Emit {
   PTX
 };
 
-enum class Machine { CPU, GPUOnCPU };
-
 struct CommandLine {
   llvm::cl::OptionCategory category{"pikoc options"};
   llvm::cl::opt<std::string> file{llvm::cl::Positional, llvm::cl::Required,
@@ -93,15 +91,22 @@ struct CommandLine {
                      "ptx); of several in an object the last runs that fits "
                      "the machine"),
       llvm::cl::cat(category)};
-  llvm::cl::opt<Machine> target{
+  llvm::cl::opt<GPUTarget> target{
       "target", llvm::cl::desc("what code runs on (default: cpu)"),
       llvm::cl::values(
-          clEnumValN(Machine::CPU, "cpu", "the processor"),
+          clEnumValN(GPUTarget::None, "cpu", "the processor"),
+          clEnumValN(GPUTarget::CUDA, "cuda",
+                     "kernels on an NVIDIA GPU, all else on the processor"),
           clEnumValN(
-              Machine::GPUOnCPU, "gpu-on-cpu",
+              GPUTarget::Emulator, "gpu-on-cpu",
               "kernels for a GPU, on the processor: blocks one after the "
               "other, their threads by turns")),
-      llvm::cl::init(Machine::CPU), llvm::cl::cat(category)};
+      llvm::cl::init(GPUTarget::None), llvm::cl::cat(category)};
+  llvm::cl::opt<std::string> gpuChip{
+      "gpu-chip", llvm::cl::value_desc("name"), llvm::cl::init("sm_70"),
+      llvm::cl::desc("the oldest chip that code of --target cuda runs on "
+                     "(default: sm_70)"),
+      llvm::cl::cat(category)};
   llvm::cl::opt<int64_t> gpuSeed{
       "gpu-seed", llvm::cl::value_desc("number"), llvm::cl::init(0),
       llvm::cl::desc("permutes the blocks of --target gpu-on-cpu (default: in "
@@ -201,7 +206,7 @@ struct CommandLine {
       options->fix.assign(fix.begin(), fix.end());
     return options;
   }
-  bool isEmulated() const { return target == Machine::GPUOnCPU; }
+  bool isEmulated() const { return target == GPUTarget::Emulator; }
   /// Returns what is wrong, or nothing.
   std::string readTuned() {
     if (!tuned.getNumOccurrences())
@@ -231,8 +236,9 @@ struct CommandLine {
         .check = *getCheck(),
         .synthesis = *getSynthesis(),
         .gpu = {.threads = gpuThreads,
-                .emulate = isEmulated(),
-                .seed = gpuSeed},
+                .target = target,
+                .seed = gpuSeed,
+                .chip = gpuChip},
         // Of standard input the cache does not know what was in it.
         .cache = {.enabled = !noCache && file != "-", .directory = cacheDir}};
   }
@@ -273,11 +279,15 @@ static std::string checkOptions(const CommandLine &line) {
            "several, but got '" +
            line.cpu + "'";
   bool isGPU = line.getEmit() >= Emit::GPU;
-  if (line.isEmulated() && isGPU)
-    return "--target gpu-on-cpu is for code that runs on a CPU";
-  if (line.gpuThreads.getNumOccurrences() && !line.isEmulated() && !isGPU)
-    return "--gpu-threads belongs to --emit=gpu, --emit=ptx or --target "
-           "gpu-on-cpu";
+  bool isForGPU = line.target != GPUTarget::None;
+  if (isForGPU && isGPU)
+    return "--target is for the host's code, and goes without --emit=gpu and "
+           "--emit=ptx";
+  if (line.gpuThreads.getNumOccurrences() && !isForGPU && !isGPU)
+    return "--gpu-threads belongs to --emit=gpu, --emit=ptx, --target cuda or "
+           "--target gpu-on-cpu";
+  if (line.gpuChip.getNumOccurrences() && line.target != GPUTarget::CUDA)
+    return "--gpu-chip belongs to --target cuda";
   if (line.gpuSeed.getNumOccurrences() && !line.isEmulated())
     return "--gpu-seed belongs to --target gpu-on-cpu";
   if (line.sanitizer.getNumOccurrences() &&
@@ -349,7 +359,8 @@ static std::string print(ModuleOp module) {
 static std::optional<std::string> translate(const CommandLine &line,
                                             ModuleOp module) {
   llvm::LLVMContext context;
-  std::unique_ptr<llvm::Module> translated = translateToLLVMIR(module, context);
+  std::unique_ptr<llvm::Module> translated = translateToLLVMIR(
+      module, context, line.getSource().gpu, static_cast<int>(line.optLevel));
   if (!translated)
     return std::nullopt;
   std::string text;

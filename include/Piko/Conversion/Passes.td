@@ -202,6 +202,38 @@ def ConvertGPUToEmulator : Pass<"convert-gpu-to-emulator", "::mlir::ModuleOp"> {
                            "::mlir::LLVM::LLVMDialect"];
 }
 
+def ConvertGPUToCUDA : Pass<"convert-gpu-to-cuda", "::mlir::ModuleOp"> {
+  let summary = "Launch kernels on a CUDA device";
+  let description = [{
+    **Requires** kernels in `gpu.module`s named after their pipelines (`P_gpu`),
+    launched by `gpu.launch_func`, whose arguments are numbers and pointers that
+    the device can read; and beside them the pipeline's `P.setup`.
+
+    **Does**: makes of each launch a call of the runtime (`pikort/grid.h`), with
+    the kernel's name and the arguments in memory. The setup names a constant,
+    the image, which is made of the kernels' LLVM IR as PTX when the module is
+    translated.
+
+    **Guarantees** that the host's code is for a CPU alone.
+
+    Before:
+    ```
+    gpu.launch_func @P_gpu::@k blocks in (%n, %one, %one) threads in (%t, %one, %one)
+        args(%p : !llvm.ptr)
+    ```
+    After:
+    ```
+    %k = llvm.mlir.addressof @k.name : !llvm.ptr
+    llvm.store %p, %arguments : !llvm.ptr, !llvm.ptr
+    llvm.call @pikoir_cuda_launch(%frame, %k, %n, %t, %arguments, %count)
+    ```
+
+    **Limits**: grids and blocks have one dimension.
+  }];
+  let dependentDialects = ["::mlir::arith::ArithDialect",
+                           "::mlir::LLVM::LLVMDialect"];
+}
+
 def ConvertGPUToExactNVVM
     : Pass<"convert-gpu-to-exact-nvvm", "::mlir::gpu::GPUModuleOp"> {
   let summary = "Turn kernels into the nvvm and llvm dialects, without libdevice";

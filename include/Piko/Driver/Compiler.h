@@ -90,9 +90,13 @@ lowerForEach(llvm::ArrayRef<CPUOptions> cpus, mlir::ModuleOp module,
              const CheckOptions &check, const SynthesisOptions &synthesis,
              const GPUOptions &gpu);
 
-/// LLVM IR, not optimised, of a module at Level::LLVM; null after diagnostics.
+/// LLVM IR, not optimised, of a module at Level::LLVM, with its kernels for a
+/// GPU as `gpu` says: PTX made with `optLevel`, or functions for the emulator.
+/// Null after diagnostics.
 std::unique_ptr<llvm::Module> translateToLLVMIR(mlir::ModuleOp module,
-                                                llvm::LLVMContext &context);
+                                                llvm::LLVMContext &context,
+                                                const GPUOptions &gpu = {},
+                                                int optLevel = 3);
 
 /// Takes a module from the machine level or above to one with a `gpu.module`,
 /// unless it has one; an error if the pipeline has no kernel for a GPU.

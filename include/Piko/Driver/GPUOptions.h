@@ -6,17 +6,42 @@
 #define PIKO_DRIVER_GPUOPTIONS_H
 
 #include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
 
 namespace piko {
+
+/// What runs the kernels for a GPU.
+enum class GPUTarget {
+  None,     ///< Nothing: they are for a CPU.
+  Emulator, ///< --target gpu-on-cpu: blocks one after the other, their threads
+            ///< by turns.
+  CUDA ///< --target cuda: a device, from PTX that the program brings along.
+};
+
+/// What --target takes.
+inline constexpr const char *gpuTargetNames = "cpu, gpu-on-cpu or cuda";
+
+/// The target of that name, or nothing.
+inline std::optional<GPUTarget> parseGPUTarget(std::string_view name) {
+  if (name == "cpu")
+    return GPUTarget::None;
+  if (name == "gpu-on-cpu")
+    return GPUTarget::Emulator;
+  if (name == "cuda")
+    return GPUTarget::CUDA;
+  return std::nullopt;
+}
 
 struct GPUOptions {
   /// Threads of a block, a power of two; 0 = as many as the stage has.
   int64_t threads = 0;
-  /// Runs kernels for a GPU on the CPU (--target gpu-on-cpu): blocks one after
-  /// the other, their threads by turns.
-  bool emulate = false;
-  /// Permutes the blocks then; 0 = in order.
+  GPUTarget target = GPUTarget::None;
+  /// Permutes the blocks of the emulator; 0 = in order.
   int64_t seed = 0;
+  /// Of CUDA: the oldest chip that the PTX is for.
+  std::string chip = "sm_70";
 };
 
 } // namespace piko

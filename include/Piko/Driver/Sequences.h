@@ -50,9 +50,9 @@ void addLLVMSequence(mlir::OpPassManager &passes);
 /// the emulator, and kernels are in the llvm and nvvm dialects.
 void addGPUSequence(mlir::OpPassManager &passes, const GPUOptions &options);
 
-/// From kernels in a `gpu.module` to such for the emulator.
-void addEmulationSequence(mlir::OpPassManager &passes,
-                          const GPUOptions &options);
+/// From kernels in a `gpu.module` to such that the emulator or a device runs,
+/// as the options say.
+void addLaunchSequence(mlir::OpPassManager &passes, const GPUOptions &options);
 
 /// `piko-gpu-to-nvvm`: the kernels from there to the llvm and nvvm dialects.
 void addNVVMSequence(mlir::OpPassManager &passes);

@@ -18,6 +18,12 @@ namespace piko {
 llvm::Expected<std::string>
 generatePTX(llvm::Module &module, llvm::StringRef processor, int optLevel);
 
+/// Gives the constant `name`, which the host's code declares, the PTX of
+/// `kernels`, which ends with a zero byte.
+llvm::Error embedPTX(llvm::Module &host, llvm::Module &kernels,
+                     llvm::StringRef name, llvm::StringRef processor,
+                     int optLevel);
+
 } // namespace piko
 
 #endif // PIKO_TARGET_PTX_H

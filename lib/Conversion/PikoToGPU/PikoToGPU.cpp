@@ -16,6 +16,7 @@
 #include "../../Transforms/ParallelLoops.h"
 #include "../../Transforms/UnitFormer.h"
 
+#include "Piko/Conversion/KernelImage.h"
 #include "Piko/Dialect/Piko/IR/Marks.h"
 #include "Piko/Dialect/Piko/IR/PikoGPU.h"
 
@@ -162,7 +163,7 @@ void GridFormer::createUnits(StageOp stage, IntegerAttr source) {
       /*dynamicSharedMemorySize=*/Value(), /*asyncTokenType=*/Type(),
       /*asyncDependencies=*/ValueRange(), /*workgroupAttributions=*/TypeRange(),
       /*privateAttributions=*/TypeRange(), Value(), Value(), Value(),
-      symbol("_gpu"), symbol("_" + kernel.getSymName()));
+      symbol(kernelsSuffix), symbol("_" + kernel.getSymName()));
   CloseLogOp::create(rewriter, loc, log);
   rewriter.setInsertionPointToEnd(&launch.getBody().front());
   unitEnd = gpu::TerminatorOp::create(rewriter, loc);

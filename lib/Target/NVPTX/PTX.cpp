@@ -58,3 +58,20 @@ Expected<std::string> piko::generatePTX(Module &module, StringRef processor,
   return emitCode(module, **machine, {.level = optLevel},
                   CodeGenFileType::AssemblyFile);
 }
+
+Error piko::embedPTX(Module &host, Module &kernels, StringRef name,
+                     StringRef processor, int optLevel) {
+  Expected<std::string> text = generatePTX(kernels, processor, optLevel);
+  if (!text)
+    return text.takeError();
+  GlobalVariable *declared = host.getGlobalVariable(name);
+  if (!declared)
+    return createStringError("expected '" + name + "' in the host's code");
+  Constant *bytes = ConstantDataArray::getString(host.getContext(), *text);
+  auto *image = new GlobalVariable(host, bytes->getType(), /*isConstant=*/true,
+                                   GlobalValue::InternalLinkage, bytes);
+  declared->replaceAllUsesWith(image);
+  image->takeName(declared);
+  declared->eraseFromParent();
+  return Error::success();
+}

@@ -84,7 +84,8 @@ typedef struct pikoir_log {
   int64_t spare;
 } pikoir_log;
 
-/// The log of a stage's kernel, or, with PIKOIR_LOG_SOURCE, of a source's.
+/// The log of a stage's kernel, or, with PIKOIR_LOG_SOURCE, of a source's; null
+/// if the run has failed, and then so does its launch.
 PIKORT_API pikoir_log *pikoir_log_open(pikort_pipeline *p, int32_t number,
                                        int32_t flags, int64_t units);
 #define PIKOIR_LOG_SOURCE 1
@@ -108,7 +109,16 @@ PIKORT_API void pikoir_grid_launch(pikort_pipeline *p,
                                    int64_t threads, const void *arguments,
                                    int64_t seed);
 
-/// Intrinsics of threads, only inside of a launch.
+/// In a program's setup: its grids run on a CUDA device, which has the kernels
+/// of `ptx`, text that ends with a zero byte and lives as long as the program.
+PIKORT_API void pikoir_cuda_module(pikort_pipeline *p, const char *ptx);
+/// Runs a grid there and waits for it; `arguments` are `count` words of eight
+/// bytes.
+PIKORT_API void pikoir_cuda_launch(pikort_pipeline *p, const char *kernel,
+                                   int64_t blocks, int64_t threads,
+                                   const void *arguments, int64_t count);
+
+/// Intrinsics of threads, only inside of an emulator's launch.
 PIKORT_API int32_t pikoir_gpu_thread(void);
 PIKORT_API int32_t pikoir_gpu_block(void);
 PIKORT_API int32_t pikoir_gpu_threads(void);

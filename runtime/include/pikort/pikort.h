@@ -56,6 +56,8 @@ enum pikort_status {
   PIKORT_BAD_PROGRAM = 7,      ///< The program's declarations make no sense.
   PIKORT_VERSION = 8,          ///< Made for another version of the runtime.
   PIKORT_WRONG_PROCESSOR = 9,  ///< No code that this processor can run.
+  PIKORT_NO_DEVICE = 10,       ///< No device of the kind that it is for.
+  PIKORT_DEVICE_FAILED = 11,   ///< The device, or its driver, failed.
   PIKORT_BIN_OUTSIDE = 16,     ///< AssignBin named a bin outside the grid.
   PIKORT_UPDATE_OUTSIDE = 17,  ///< An update outside of the call's own bin.
   PIKORT_INDEX_OUTSIDE = 18,   ///< An element outside a buffer or an image.

@@ -83,10 +83,11 @@ Options parseOptions(int argc, char **argv) {
         throw std::runtime_error(piko::describeWrongSynthesisOptions(text));
       options.synthesis = *synthesis;
     } else if (name == "--target") {
-      std::string target = words.takeValues(name, false)[0];
-      if (target != "cpu" && target != "gpu-on-cpu")
-        throw std::runtime_error("expected --target cpu or gpu-on-cpu");
-      options.gpu.emulate = target != "cpu";
+      auto target = piko::parseGPUTarget(words.takeValues(name, false)[0]);
+      if (!target)
+        throw std::runtime_error(std::string("expected --target ") +
+                                 piko::gpuTargetNames);
+      options.gpu.target = *target;
     } else if (name == "--gpu-threads")
       options.gpu.threads =
           toNumbers<int64_t>(words.takeValues(name, false))[0];

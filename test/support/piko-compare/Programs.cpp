@@ -176,7 +176,7 @@ Program Programs::compile(const std::string &pipe) {
     self->log.fail("cannot compile " + pipe);
   auto context = std::make_unique<llvm::LLVMContext>();
   std::unique_ptr<llvm::Module> llvmModule =
-      translateToLLVMIR(*module, *context);
+      translateToLLVMIR(*module, *context, self->gpu);
   if (!llvmModule)
     self->log.fail("cannot compile " + pipe);
   llvm::Expected<std::string> object =

@@ -9,7 +9,7 @@
 // CHECK:         llvm.store %[[P]], %{{.*}} : !llvm.ptr, !llvm.ptr
 // CHECK:         %[[SECOND:.*]] = llvm.getelementptr %[[ARGUMENTS]][1]
 // CHECK:         llvm.store %[[X]], %[[SECOND]] : f32, !llvm.ptr
-// CHECK:         %[[THREAD:.*]] = llvm.mlir.addressof @m.k.emulated
+// CHECK-DAG:     %[[THREAD:.*]] = llvm.mlir.addressof @m.k.emulated
 // CHECK-DAG:     %[[BLOCKS:.*]] = arith.index_cast %[[N]]
 // CHECK-DAG:     %[[SEED:.*]] = llvm.mlir.constant(9 : i64)
 // CHECK:         llvm.call @pikoir_grid_launch(%[[FRAME]], %[[THREAD]], %[[BLOCKS]], %{{.*}}, %[[ARGUMENTS]], %[[SEED]])

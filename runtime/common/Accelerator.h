@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//===- Accelerator.h - A device that kernels run on -----------------------===//
+//
+// What a pipeline needs of a device that runs its grids. Host and device share
+// addresses: what map() gives is read and written by both, never at the same
+// time, because launch() returns when the grid has ended.
+//
+//===----------------------------------------------------------------------===//
+
+#ifndef PIKO_RUNTIME_COMMON_ACCELERATOR_H
+#define PIKO_RUNTIME_COMMON_ACCELERATOR_H
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+namespace piko::rt {
+
+class Accelerator {
+public:
+  virtual ~Accelerator() = default;
+
+  /// Shared memory, aligned to a page; null if refused.
+  virtual uint8_t *map(size_t bytes) noexcept = 0;
+  virtual void unmap(uint8_t *data) noexcept = 0;
+
+  /// Address space for what one grid emits, the same for all: memory is taken
+  /// where it is written. Empty if refused.
+  virtual std::span<uint8_t> logSpace() noexcept = 0;
+
+  /// How many threads it takes to fill the device.
+  virtual int64_t residentThreads() const = 0;
+
+  /// Runs a kernel of the program's and waits for it; throws Failure.
+  /// `arguments` are `count` words of eight bytes.
+  virtual void launch(const char *kernel, int64_t blocks, int64_t threads,
+                      const void *arguments, int64_t count) = 0;
+};
+
+} // namespace piko::rt
+
+#endif // PIKO_RUNTIME_COMMON_ACCELERATOR_H

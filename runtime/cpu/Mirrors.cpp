@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//===- Mirrors.cpp - What a device sees of the host's memory --------------===//
+
+#include "cpu/Mirrors.h"
+#include "cpu/Parallel.h"
+
+using namespace piko::rt;
+
+static void copy(const pikort_pipeline &p, uint8_t *to, const uint8_t *from,
+                 int64_t bytes) {
+  parallelChunks(
+      p.threads, bytes, int64_t(1) << 20, [&](int64_t begin, int64_t end) {
+        std::memcpy(to + begin, from + begin, static_cast<size_t>(end - begin));
+      });
+}
+
+/// Makes `mirror` the same as the host's memory; kept from run to run.
+static void fillMirror(pikort_pipeline &p, Array<uint8_t> &mirror,
+                       const uint8_t *data, int64_t bytes) {
+  if (!mirror || mirror.size() != bytes) {
+    mirror = {};
+    mirror = Array<uint8_t>(p.memory, bytes, Use::State);
+  }
+  copy(p, mirror.data(), data, bytes);
+}
+
+static int64_t bytesOf(const pikort_pipeline &p, const State &state) {
+  return p.records[state.record].size * state.view.extent[0];
+}
+
+void piko::rt::beginMirrors(pikort_pipeline &p) {
+  if (!p.accelerator)
+    return;
+  for (State &state : p.states)
+    if (!state.owned && state.view.data) {
+      fillMirror(p, state.mirror, state.view.data, bytesOf(p, state));
+      state.hosts = std::exchange(state.view.data, state.mirror.data());
+    }
+  for (Source &source : p.sources)
+    if (source.data) {
+      fillMirror(p, source.mirror, source.data,
+                 source.count * p.records[p.stages[source.stage].record].size);
+      source.hosts = std::exchange(source.data, source.mirror.data());
+    }
+}
+
+void piko::rt::endMirrors(pikort_pipeline &p) {
+  for (State &state : p.states)
+    if (state.hosts) {
+      state.view.data = std::exchange(state.hosts, nullptr);
+      if (state.written)
+        copy(p, state.view.data, state.mirror.data(), bytesOf(p, state));
+    }
+  for (Source &source : p.sources)
+    if (source.hosts)
+      source.data = std::exchange(source.hosts, nullptr);
+}

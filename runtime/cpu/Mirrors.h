@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//===- Mirrors.h - What a device sees of the host's memory ----------------===//
+
+#ifndef PIKO_RUNTIME_CPU_MIRRORS_H
+#define PIKO_RUNTIME_CPU_MIRRORS_H
+
+#include "common/Pipeline.h"
+
+namespace piko::rt {
+
+/// Where kernels run on an accelerator: copies constants, bound buffers and
+/// sources to memory that it shares, which takes their place; throws.
+void beginMirrors(pikort_pipeline &p);
+/// Puts the host's memory back, with what kernels have written.
+void endMirrors(pikort_pipeline &p);
+
+} // namespace piko::rt
+
+#endif // PIKO_RUNTIME_CPU_MIRRORS_H
