@@ -8,6 +8,9 @@
 #include "Piko/Analysis/StageGraph.h"
 #include "Piko/Dialect/Piko/IR/PikoProgram.h"
 #include "Piko/Driver/Compiler.h"
+#include "Piko/Driver/Sequences.h"
+#include "Piko/Target/KernelResources.h"
+#include "Piko/Target/PTX.h"
 
 #include "mlir/Pass/Pass.h"
 #include "mlir/Pass/PassInstrumentation.h"
@@ -15,6 +18,7 @@
 #include "llvm/ADT/StringExtras.h"
 #include "llvm/ADT/StringMap.h"
 #include "llvm/ADT/StringSet.h"
+#include "llvm/Support/Format.h"
 
 using namespace mlir;
 using namespace piko;
@@ -480,10 +484,64 @@ void Report::write() {
     out << "  " << pass.pass << "\n" << pass.text;
 }
 
-FailureOr<std::string> piko::explainPipeline(ModuleOp module,
-                                             const CheckOptions &check,
-                                             const SynthesisOptions &synthesis,
-                                             const CPUOptions &cpu) {
+//===----------------------------------------------------------------------===//
+// Kernels on a GPU
+//===----------------------------------------------------------------------===//
+
+static void writeResources(const KernelReport &report, StringRef chip,
+                           StringRef prefix, raw_ostream &out) {
+  ArrayRef<KernelResources> kernels = report.kernels;
+  bool isAssembled = llvm::any_of(kernels, [](const KernelResources &k) {
+    return k.assembled.has_value();
+  });
+  out << "\nOn " << chip
+      << (isAssembled ? ", as ptxas says" : " (" + report.source + ")")
+      << ":\n  threads  block memory";
+  if (isAssembled)
+    out << "  registers  stack  spilled  occupancy";
+  out << "  kernel\n";
+  for (const KernelResources &kernel : kernels) {
+    StringRef name = kernel.kernel;
+    name.consume_front(prefix);
+    out << llvm::format("  %7lld  %12lld", (long long)kernel.threads,
+                        (long long)kernel.blockMemory);
+    if (const auto &found = kernel.assembled)
+      out << llvm::format("  %9lld  %5lld  %7lld", (long long)found->registers,
+                          (long long)found->stack,
+                          (long long)(found->spillStores + found->spillLoads));
+    if (auto occupancy = kernel.getOccupancy(chip))
+      out << llvm::format("  %7.0f %%", 100 * *occupancy);
+    else if (isAssembled)
+      out << "          -";
+    out << "  " << name << "\n";
+  }
+}
+
+/// Makes PTX of a module's kernels and writes what they take.
+static LogicalResult explainKernels(ModuleOp module, StringRef pipeline,
+                                    const GPUOptions &gpu, int optLevel,
+                                    raw_ostream &out) {
+  llvm::LLVMContext context;
+  std::unique_ptr<llvm::Module> kernels = translateKernels(module, context);
+  if (!kernels)
+    return failure();
+  auto fail = [&](llvm::Error error) {
+    return emitError(module.getLoc()) << llvm::toString(std::move(error));
+  };
+  llvm::Expected<std::string> ptx = generatePTX(*kernels, gpu.chip, optLevel);
+  if (!ptx)
+    return fail(ptx.takeError());
+  auto resources = measureKernels(*kernels, *ptx, gpu.chip);
+  if (!resources)
+    return fail(resources.takeError());
+  writeResources(*resources, gpu.chip, (pipeline + "_").str(), out);
+  return success();
+}
+
+FailureOr<std::string>
+piko::explainPipeline(ModuleOp module, const CheckOptions &check,
+                      const SynthesisOptions &synthesis, const CPUOptions &cpu,
+                      const GPUOptions &gpu, int optLevel) {
   MLIRContext *context = module.getContext();
   Trace trace;
   ScopedDiagnosticHandler handler(context, [&](Diagnostic &diagnostic) {
@@ -495,10 +553,14 @@ FailureOr<std::string> piko::explainPipeline(ModuleOp module,
     return emitError(module.getLoc())
            << "--explain: expected the authored level, but the file is at the "
            << getName(level) << " level";
+  bool isCUDA = gpu.target == GPUTarget::CUDA;
   auto run = [&](Level from, Level to) {
     PassManager passes(context);
     passes.addInstrumentation(std::make_unique<Tracer>(trace));
-    addPasses(passes, from, to, check, synthesis, {}, cpu);
+    addPasses(passes, from, isCUDA ? std::min(to, Level::Machine) : to, check,
+              synthesis, {}, cpu);
+    if (isCUDA && to == Level::Target)
+      addGPUSequence(passes, {.threads = gpu.threads});
     return passes.run(module);
   };
   if (failed(run(Level::Authored, Level::Kernels)))
@@ -509,6 +571,10 @@ FailureOr<std::string> piko::explainPipeline(ModuleOp module,
     return failure();
   std::string text;
   llvm::raw_string_ostream out(text);
-  Report(trace, getOnlyPipeline(*kernels), out).write();
+  PipelineOp pipeline = getOnlyPipeline(*kernels);
+  Report(trace, pipeline, out).write();
+  if (isCUDA &&
+      failed(explainKernels(module, pipeline.getSymName(), gpu, optLevel, out)))
+    return failure();
   return text;
 }

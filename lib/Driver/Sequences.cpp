@@ -222,6 +222,9 @@ void piko::addGPUSequence(OpPassManager &passes, const GPUOptions &options) {
   passes.nest<PipelineOp>().addPass(createConvertPikoToGPU(grids));
   addCleanUp(passes);
   addUnitsToLoops(passes, SynthesisOptions::none());
+  // Each test that is left writes an entry of its own.
+  passes.nest<PipelineOp>().addPass(createMergeBounds());
+  addCleanUp(passes);
   addVectorSequence(passes, SynthesisOptions::none(), {});
   // Or constants would be arguments.
   passes.addPass(createGpuLaunchSinkIndexComputationsPass());

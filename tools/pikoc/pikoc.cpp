@@ -343,7 +343,8 @@ static std::optional<std::string> explain(const CommandLine &line,
   std::optional<CPUOptions> cpu = findProcessor(line);
   if (!cpu)
     return std::nullopt;
-  auto report = explainPipeline(*module, source.check, source.synthesis, *cpu);
+  auto report = explainPipeline(*module, source.check, source.synthesis, *cpu,
+                                source.gpu, static_cast<int>(line.optLevel));
   return failed(report) ? std::nullopt : std::optional(*report);
 }
 

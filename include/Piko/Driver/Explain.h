@@ -16,10 +16,12 @@ namespace piko {
 
 /// Takes a module that holds one pipeline from the authored to the target
 /// level, and reports on it; fails after diagnostics in the context's engine.
+/// For CUDA, with what the kernels take of the chip.
 llvm::FailureOr<std::string>
 explainPipeline(mlir::ModuleOp module, const CheckOptions &check = {},
                 const SynthesisOptions &synthesis = {},
-                const CPUOptions &cpu = {});
+                const CPUOptions &cpu = {}, const GPUOptions &gpu = {},
+                int optLevel = 3);
 
 } // namespace piko
 

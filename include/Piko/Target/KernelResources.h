@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// What the kernels of a module take of a GPU.
+
+#ifndef PIKO_TARGET_KERNELRESOURCES_H
+#define PIKO_TARGET_KERNELRESOURCES_H
+
+#include "llvm/IR/Module.h"
+#include "llvm/Support/Error.h"
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace piko {
+
+struct KernelResources {
+  std::string kernel;
+  int64_t threads = 0;     ///< Of a block.
+  int64_t blockMemory = 0; ///< Shared memory of a block, bytes.
+  /// What NVIDIA's assembler says, where there is one; a thread's, in bytes but
+  /// for registers.
+  struct Assembled {
+    int64_t registers = 0, stack = 0, spillStores = 0, spillLoads = 0;
+  };
+  std::optional<Assembled> assembled;
+
+  /// The part of the threads which a multiprocessor of `chip` can have at the
+  /// same time that it has of this kernel: by its registers, block memory and
+  /// threads. None where the registers, or the chip's limits, are not known.
+  std::optional<double> getOccupancy(llvm::StringRef chip) const;
+};
+
+/// The path of ptxas: on PATH, in $CUDA_HOME/bin, or in the toolkit's customary
+/// folder; empty if there is none.
+std::string findAssembler();
+
+struct KernelReport {
+  std::vector<KernelResources> kernels; ///< In the order of the module.
+  std::string source; ///< "ptxas", or why nothing was assembled.
+};
+
+/// The resources of each kernel. `ptx` was made of the module for `chip`. An
+/// error if the assembler refuses it, though it knows the chip.
+llvm::Expected<KernelReport> measureKernels(const llvm::Module &kernels,
+                                            llvm::StringRef ptx,
+                                            llvm::StringRef chip);
+
+} // namespace piko
+
+#endif // PIKO_TARGET_KERNELRESOURCES_H

@@ -1,0 +1,219 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// The limits of chips are those of the table "Technical Specifications per
+// Compute Capability" in NVIDIA's CUDA C++ Programming Guide.
+
+#include "Piko/Target/KernelResources.h"
+
+#include "llvm/ADT/SetVector.h"
+#include "llvm/ADT/StringExtras.h"
+#include "llvm/IR/Constants.h"
+#include "llvm/IR/Instructions.h"
+#include "llvm/Support/FileSystem.h"
+#include "llvm/Support/FileUtilities.h"
+#include "llvm/Support/MathExtras.h"
+#include "llvm/Support/MemoryBuffer.h"
+#include "llvm/Support/Path.h"
+#include "llvm/Support/Program.h"
+#include "llvm/Support/raw_ostream.h"
+
+using namespace llvm;
+using namespace piko;
+
+//===----------------------------------------------------------------------===//
+// Occupancy
+//===----------------------------------------------------------------------===//
+
+namespace {
+/// Of a multiprocessor.
+struct ChipLimits {
+  const char *chip;
+  int64_t threads, blocks, blockMemory;
+  int64_t reserved; ///< Of the memory of each block, for the system.
+};
+} // namespace
+
+static constexpr ChipLimits chips[] = {{"sm_70", 2048, 32, 96 << 10, 0},
+                                       {"sm_72", 2048, 32, 96 << 10, 0},
+                                       {"sm_75", 1024, 16, 64 << 10, 0},
+                                       {"sm_80", 2048, 32, 164 << 10, 1024},
+                                       {"sm_86", 1536, 16, 100 << 10, 1024},
+                                       {"sm_87", 1536, 16, 164 << 10, 1024},
+                                       {"sm_89", 1536, 24, 100 << 10, 1024},
+                                       {"sm_90", 2048, 32, 228 << 10, 1024},
+                                       {"sm_100", 2048, 32, 228 << 10, 1024},
+                                       {"sm_120", 1536, 32, 100 << 10, 1024}};
+static constexpr int64_t registersOfMultiprocessor = 64 << 10;
+
+std::optional<double> KernelResources::getOccupancy(StringRef chip) const {
+  const auto *limits =
+      find_if(chips, [&](const ChipLimits &each) { return chip == each.chip; });
+  if (limits == std::end(chips) || !assembled || threads == 0)
+    return std::nullopt;
+  // Registers are given to warps, in pieces of 256.
+  int64_t warps = divideCeil(threads, 32);
+  int64_t ofWarp =
+      alignTo(std::max<int64_t>(assembled->registers, 1) * 32, 256);
+  int64_t memory = alignTo(blockMemory + limits->reserved, 128);
+  int64_t blocks =
+      std::min({limits->blocks, limits->threads / (warps * 32),
+                registersOfMultiprocessor / (ofWarp * warps),
+                limits->blockMemory / std::max<int64_t>(memory, 1)});
+  return double(blocks * warps * 32) / double(limits->threads);
+}
+
+//===----------------------------------------------------------------------===//
+// From the module
+//===----------------------------------------------------------------------===//
+
+/// The functions that use a variable.
+static void collectUsers(const User *user,
+                         SmallSetVector<const Function *, 4> &functions) {
+  if (auto *instruction = dyn_cast<Instruction>(user))
+    functions.insert(instruction->getFunction());
+  else
+    for (const User *next : user->users())
+      collectUsers(next, functions);
+}
+
+static std::vector<KernelResources> findKernels(const Module &module) {
+  std::vector<KernelResources> kernels;
+  constexpr unsigned sharedSpace = 3;
+  for (const Function &function : module) {
+    if (function.getCallingConv() != CallingConv::PTX_Kernel)
+      continue;
+    KernelResources &kernel = kernels.emplace_back();
+    kernel.kernel = function.getName().str();
+    StringRef extents =
+        function.getFnAttribute("nvvm.maxntid").getValueAsString();
+    to_integer(extents.split(',').first, kernel.threads);
+    for (const GlobalVariable &variable : module.globals()) {
+      SmallSetVector<const Function *, 4> users;
+      for (const User *user : variable.users())
+        collectUsers(user, users);
+      if (variable.getAddressSpace() == sharedSpace &&
+          users.contains(&function))
+        kernel.blockMemory += static_cast<int64_t>(
+            module.getDataLayout().getTypeAllocSize(variable.getValueType()));
+    }
+  }
+  return kernels;
+}
+
+//===----------------------------------------------------------------------===//
+// From the assembler
+//===----------------------------------------------------------------------===//
+
+std::string piko::findAssembler() {
+  constexpr StringLiteral name = "ptxas";
+  if (auto found = sys::findProgramByName(name))
+    return *found;
+  const char *home = getenv("CUDA_HOME");
+  for (StringRef folder :
+       {StringRef(home ? home : ""), StringRef("/usr/local/cuda")}) {
+    SmallString<128> bin(folder);
+    sys::path::append(bin, "bin");
+    if (auto found = sys::findProgramByName(name, {bin.str()});
+        !folder.empty() && found)
+      return *found;
+  }
+  return "";
+}
+
+/// The number in front of `what` in a line.
+static int64_t getNumberBefore(StringRef line, StringRef what) {
+  int64_t number = 0;
+  StringRef before = line.take_front(line.find(what)).rtrim();
+  to_integer(before.substr(before.find_last_of(" ,") + 1), number);
+  return number;
+}
+
+/// Reads what `ptxas -v` prints: a line with the kernel's name, one with its
+/// stack and spills, one with its registers.
+static void readReport(StringRef report,
+                       std::vector<KernelResources> &kernels) {
+  KernelResources *kernel = nullptr;
+  for (StringRef line : split(report, '\n')) {
+    if (line.contains("Compiling entry function")) {
+      StringRef name = line.split('\'').second.split('\'').first;
+      auto found = find_if(kernels, [&](const KernelResources &each) {
+        return name == each.kernel;
+      });
+      kernel = found == kernels.end() ? nullptr : &*found;
+      if (kernel)
+        kernel->assembled.emplace();
+    } else if (kernel && line.contains("bytes stack frame")) {
+      kernel->assembled->stack = getNumberBefore(line, "bytes stack frame");
+      kernel->assembled->spillStores =
+          getNumberBefore(line, "bytes spill stores");
+      kernel->assembled->spillLoads =
+          getNumberBefore(line, "bytes spill loads");
+    } else if (kernel && line.contains("Used ")) {
+      kernel->assembled->registers = getNumberBefore(line, "registers");
+    }
+  }
+}
+
+/// What the assembler prints about `ptx`.
+static Expected<std::string> assemble(StringRef assembler, StringRef ptx,
+                                      StringRef chip) {
+  SmallString<128> input, output;
+  if (auto error = sys::fs::createTemporaryFile("piko", "ptx", input))
+    return createStringError(error, "cannot make a temporary file");
+  FileRemover removeInput(input);
+  if (auto error = sys::fs::createTemporaryFile("piko", "txt", output))
+    return createStringError(error, "cannot make a temporary file");
+  FileRemover removeOutput(output);
+  std::error_code failed;
+  raw_fd_ostream stream(input, failed);
+  stream << ptx;
+  stream.close();
+  if (failed || stream.has_error())
+    return createStringError("cannot write '" + input + "'");
+  std::string architecture = ("-arch=" + chip).str();
+  std::string wrong;
+  StringRef arguments[] = {assembler, "-v",        architecture,
+                           "-o",      "/dev/null", input};
+  int result =
+      sys::ExecuteAndWait(assembler, arguments, std::nullopt,
+                          {StringRef(), StringRef(output), StringRef(output)},
+                          /*SecondsToWait=*/0, /*MemoryLimit=*/0, &wrong);
+  auto text = MemoryBuffer::getFile(output);
+  std::string report = text ? (*text)->getBuffer().str() : "";
+  if (result != 0)
+    return createStringError(
+        assembler + " refuses the kernels: " +
+        (wrong.empty() ? StringRef(report).trim() : StringRef(wrong)));
+  return report;
+}
+
+/// Each toolkit leaves out chips that the one before it knew.
+static bool knowsChip(StringRef assembler, StringRef chip) {
+  std::string empty =
+      (".version 6.0\n.target " + chip + "\n.address_size 64\n").str();
+  Expected<std::string> report = assemble(assembler, empty, chip);
+  if (report)
+    return true;
+  consumeError(report.takeError());
+  return false;
+}
+
+Expected<KernelReport> piko::measureKernels(const Module &module, StringRef ptx,
+                                            StringRef chip) {
+  KernelReport result{findKernels(module), "ptxas"};
+  std::string assembler = findAssembler();
+  if (assembler.empty()) {
+    result.source = "no ptxas was found to say the rest";
+    return result;
+  }
+  Expected<std::string> report = assemble(assembler, ptx, chip);
+  if (report) {
+    readReport(*report, result.kernels);
+    return result;
+  }
+  if (knowsChip(assembler, chip))
+    return report.takeError();
+  consumeError(report.takeError());
+  result.source = ("the ptxas that was found does not know " + chip).str();
+  return result;
+}
