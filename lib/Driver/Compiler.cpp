@@ -258,6 +258,7 @@ static LogicalResult checkStart(ModuleOp module, Level from, Level to,
     return emitError(module.getLoc())
            << "--check: expected the authored level, but the file is at the "
            << getName(from) << " level";
+  assert(gpu.target != GPUTarget::Auto && "compileObject makes both");
   if (check.enabled && gpu.target == GPUTarget::CUDA)
     return emitError(module.getLoc())
            << "--check: expected --target cpu or gpu-on-cpu, because what is "

@@ -130,12 +130,47 @@ translateForEach(ModuleOp module, llvm::ArrayRef<Processor> processors,
   return translated;
 }
 
+/// Of --target auto: adds code for a device. A pipeline that none can run goes
+/// without it, and a warning says why.
+static void addDeviceVersion(ModuleOp module, const ObjectOptions &options,
+                             std::vector<Processor> &processors,
+                             std::vector<std::unique_ptr<llvm::Module>> &parts,
+                             llvm::LLVMContext &context) {
+  CompileOptions source = options.source;
+  source.gpu.target = GPUTarget::CUDA;
+  std::string reason;
+  Location place = module.getLoc();
+  std::vector<std::unique_ptr<llvm::Module>> translated;
+  {
+    ScopedDiagnosticHandler handler(
+        module.getContext(), [&](Diagnostic &diagnostic) {
+          if (diagnostic.getSeverity() != DiagnosticSeverity::Error)
+            return failure();
+          if (reason.empty()) {
+            reason = diagnostic.str();
+            place = diagnostic.getLocation();
+          }
+          return success();
+        });
+    translated = translateForEach(module, processors.front(), source,
+                                  options.target.optLevel, context);
+  }
+  if (translated.empty()) {
+    emitWarning(place) << "no code for a GPU: " << reason;
+    return;
+  }
+  Processor host = processors.front();
+  host.device = "cuda";
+  host.needs.push_back("cuda");
+  processors.push_back(std::move(host));
+  parts.push_back(std::move(translated.front()));
+}
+
 /// LLVM IR of the compiled pipeline; null after diagnostics.
 static std::unique_ptr<llvm::Module>
-compilePipeline(const ObjectOptions &options,
-                llvm::ArrayRef<Processor> processors, const Files &files,
-                MLIRContext &context, llvm::LLVMContext &llvmContext,
-                CompiledObject &object) {
+compilePipeline(const ObjectOptions &options, std::vector<Processor> processors,
+                const Files &files, MLIRContext &context,
+                llvm::LLVMContext &llvmContext, CompiledObject &object) {
   OwningOpRef<ModuleOp> module = readPipeline(options.source, context, files);
   if (!module)
     return nullptr;
@@ -145,11 +180,18 @@ compilePipeline(const ObjectOptions &options,
     object.header =
         writeHostHeader(pipeline, options.source.file, options.nameSpace);
   object.symbol = getProgramSymbol(options.nameSpace, name);
-  std::vector<std::unique_ptr<llvm::Module>> translated =
-      translateForEach(*module, processors, options.source,
-                       options.target.optLevel, llvmContext);
+  CompileOptions source = options.source;
+  OwningOpRef<ModuleOp> copy;
+  if (source.gpu.target == GPUTarget::Auto) {
+    source.gpu.target = GPUTarget::None;
+    copy = module->clone();
+  }
+  std::vector<std::unique_ptr<llvm::Module>> translated = translateForEach(
+      *module, processors, source, options.target.optLevel, llvmContext);
   if (translated.empty())
     return nullptr;
+  if (copy)
+    addDeviceVersion(*copy, options, processors, translated, llvmContext);
   return defineProgram(std::move(translated), name, object.symbol, processors);
 }
 

@@ -2,6 +2,7 @@
 //===- Versions.cpp - Which of a program's codes this processor runs ------===//
 
 #include "common/Pipeline.h"
+#include "cuda/Device.h"
 
 #include <algorithm>
 #include <cstdlib>
@@ -77,7 +78,7 @@ static std::vector<std::string_view> detectFeatures() { return {}; }
 
 // --- The choice -------------------------------------------------------------
 
-/// The features of a version that this processor lacks, with commas.
+/// The features of a version that this machine lacks, with commas.
 static std::string findMissing(const pikoir_version &version) {
   static const std::vector<std::string_view> features = detectFeatures();
   std::string missing;
@@ -85,7 +86,10 @@ static std::string findMissing(const pikoir_version &version) {
   while (!rest.empty()) {
     std::string_view name = rest.substr(0, rest.find(','));
     rest.remove_prefix(std::min(rest.size(), name.size() + 1));
-    if (std::find(features.begin(), features.end(), name) == features.end())
+    bool has = name == "cuda" ? piko::cuda::hasDevice()
+                              : std::find(features.begin(), features.end(),
+                                          name) != features.end();
+    if (!has)
       missing.append(missing.empty() ? "" : ", ").append(name);
   }
   return missing;

@@ -85,6 +85,14 @@ std::shared_ptr<Device> Device::open() {
   return device;
 }
 
+bool piko::cuda::hasDevice() noexcept {
+  try {
+    return Device::open() != nullptr;
+  } catch (...) {
+    return false;
+  }
+}
+
 Device::Device(const Driver &driver, int ordinal)
     : driver(driver), ordinal(ordinal) {
   char name[256] = "";

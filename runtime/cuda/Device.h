@@ -20,6 +20,9 @@ namespace piko::cuda {
 /// The driver's functions; throws Failure with PIKORT_NO_DEVICE.
 const Driver &loadDriver();
 
+/// Whether there is a device that pipelines can use.
+bool hasDevice() noexcept;
+
 /// A device and its primary context, shared by all pipelines of the process.
 class Device {
 public:

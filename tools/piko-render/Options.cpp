@@ -17,10 +17,10 @@ Compiles a pipeline that uses the types of piko/scene.h, renders a scene with
 it, and says how long a frame took.
 
   --pipe NAME            which pipeline of the file (the only one)
-  --target cpu|cuda|gpu-on-cpu|reference
-                         compiled for this machine; for an NVIDIA GPU; for a GPU
-                         that this machine plays; or run by the reference
-                         executor (cpu)
+  --target cpu|cuda|auto|gpu-on-cpu|reference
+                         compiled for this machine; for an NVIDIA GPU; for that
+                         where there is one; for a GPU that this machine plays;
+                         or run by the reference executor (cpu)
   --cpu NAME             the processor to compile for, as clang names them, of
                          which this machine has everything (native)
   -I FOLDER, -D NAME[=VALUE]   for the pipeline's preprocessor
@@ -32,7 +32,7 @@ it, and says how long a frame took.
   --tuned FILE           the setting that piko-tune wrote there
   --gpu-threads N        for cuda and gpu-on-cpu: threads of a block, a power of
                          two up to 1024 (as many as the stage has)
-  --gpu-chip NAME        for cuda: the oldest chip that the code runs on (sm_70)
+  --gpu-chip NAME        for cuda and auto: the oldest chip that the code runs on (sm_70)
   --gpu-seed N           for gpu-on-cpu: permutes the blocks (in order)
   --no-cache             compile even if nothing changed since the last time
   --cache-dir FOLDER     where compiled code is kept ($PIKO_CACHE_DIR,
@@ -258,7 +258,7 @@ private:
     if (target)
       options.load.gpu.target = *target;
     else
-      fail("--target: expected cpu, gpu-on-cpu, cuda or reference, but got '" +
+      fail("--target: expected cpu, cuda, auto, gpu-on-cpu or reference, but got '" +
            name + "'");
   }
 

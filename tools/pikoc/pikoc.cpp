@@ -97,6 +97,9 @@ struct CommandLine {
           clEnumValN(GPUTarget::None, "cpu", "the processor"),
           clEnumValN(GPUTarget::CUDA, "cuda",
                      "kernels on an NVIDIA GPU, all else on the processor"),
+          clEnumValN(GPUTarget::Auto, "auto",
+                     "cuda where a program finds a device, else cpu: for an "
+                     "object"),
           clEnumValN(
               GPUTarget::Emulator, "gpu-on-cpu",
               "kernels for a GPU, on the processor: blocks one after the "
@@ -286,8 +289,12 @@ static std::string checkOptions(const CommandLine &line) {
   if (line.gpuThreads.getNumOccurrences() && !isForGPU && !isGPU)
     return "--gpu-threads belongs to --emit=gpu, --emit=ptx, --target cuda or "
            "--target gpu-on-cpu";
-  if (line.gpuChip.getNumOccurrences() && line.target != GPUTarget::CUDA)
-    return "--gpu-chip belongs to --target cuda";
+  bool isForCUDA =
+      line.target == GPUTarget::CUDA || line.target == GPUTarget::Auto;
+  if (line.gpuChip.getNumOccurrences() && !isForCUDA)
+    return "--gpu-chip belongs to --target cuda or auto";
+  if (line.target == GPUTarget::Auto && !isObject)
+    return "--target auto belongs to an object, which has code for both";
   if (line.gpuSeed.getNumOccurrences() && !line.isEmulated())
     return "--gpu-seed belongs to --target gpu-on-cpu";
   if (line.sanitizer.getNumOccurrences() &&

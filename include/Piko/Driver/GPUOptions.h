@@ -17,11 +17,10 @@ enum class GPUTarget {
   None,     ///< Nothing: they are for a CPU.
   Emulator, ///< --target gpu-on-cpu: blocks one after the other, their threads
             ///< by turns.
-  CUDA ///< --target cuda: a device, from PTX that the program brings along.
+  CUDA, ///< --target cuda: a device, from PTX that the program brings along.
+  Auto  ///< --target auto: CUDA where there is a device, else the CPU. Only
+        ///< compileObject() takes it.
 };
-
-/// What --target takes.
-inline constexpr const char *gpuTargetNames = "cpu, gpu-on-cpu or cuda";
 
 /// The target of that name, or nothing.
 inline std::optional<GPUTarget> parseGPUTarget(std::string_view name) {
@@ -31,6 +30,8 @@ inline std::optional<GPUTarget> parseGPUTarget(std::string_view name) {
     return GPUTarget::Emulator;
   if (name == "cuda")
     return GPUTarget::CUDA;
+  if (name == "auto")
+    return GPUTarget::Auto;
   return std::nullopt;
 }
 

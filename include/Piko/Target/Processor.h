@@ -26,6 +26,11 @@ struct Processor {
   /// Lanes of a vector: as many numbers of 32 bits as a register holds, where
   /// all that vectors do is there for that width.
   int64_t lanes = 4;
+  /// What the runtime calls code for it and `device`, if that is not empty: a
+  /// GPU that it needs beside it.
+  std::string device = "";
+
+  const std::string &getLabel() const { return device.empty() ? name : device; }
 };
 
 /// LLVM's target for this machine, ready to make code.

@@ -53,7 +53,7 @@ struct Version {
 /// of other versions where there are any.
 static Version makeVersion(Module &module, StringRef pipeline,
                            const Processor &processor, bool isOnly) {
-  std::string suffix = isOnly ? "" : "." + processor.name;
+  std::string suffix = isOnly ? "" : "." + processor.getLabel();
   for (Function &function : module) {
     if (function.isDeclaration())
       continue;
@@ -74,7 +74,7 @@ static GlobalVariable *makeTable(Module &module, ArrayRef<Version> versions) {
   SmallVector<Constant *> entries;
   for (const Version &version : versions) {
     Constant *members[] = {
-        getString(module, version.processor.name),
+        getString(module, version.processor.getLabel()),
         getString(module, llvm::join(version.processor.needs, ",")),
         module.getFunction(version.setup), module.getFunction(version.run)};
     entries.push_back(ConstantStruct::getAnon(members));

@@ -84,9 +84,8 @@ Options parseOptions(int argc, char **argv) {
       options.synthesis = *synthesis;
     } else if (name == "--target") {
       auto target = piko::parseGPUTarget(words.takeValues(name, false)[0]);
-      if (!target)
-        throw std::runtime_error(std::string("expected --target ") +
-                                 piko::gpuTargetNames);
+      if (!target || *target == piko::GPUTarget::Auto)
+        throw std::runtime_error("expected --target cpu, cuda or gpu-on-cpu");
       options.gpu.target = *target;
     } else if (name == "--gpu-threads")
       options.gpu.threads =
