@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//===- LaunchCalls.cpp - Launches of the driver for tests -----------------===//
+
+#include "State.h"
+
+#include <cstring>
+
+using namespace piko::testdriver;
+using namespace piko::cuda;
+namespace ptx = piko::ptx;
+using piko::ptx::Class;
+using piko::ptx::FaultKind;
+
+namespace {
+
+constexpr uint32_t mostThreads = 1024, mostShared = 48 << 10,
+                   mostBlocksX = 0x7fffffff, mostBlocksYZ = 65535;
+
+CUresult errorOf(FaultKind kind) {
+  switch (kind) {
+  case FaultKind::IllegalAddress:
+    return CUDA_ERROR_ILLEGAL_ADDRESS;
+  case FaultKind::MisalignedAddress:
+    return CUDA_ERROR_MISALIGNED_ADDRESS;
+  case FaultKind::IllegalInstruction:
+    return CUDA_ERROR_ILLEGAL_INSTRUCTION;
+  case FaultKind::Deadlock:
+    return CUDA_ERROR_LAUNCH_TIMEOUT;
+  case FaultKind::Trap:
+    break;
+  }
+  return CUDA_ERROR_LAUNCH_FAILED;
+}
+
+uint64_t &counterOf(PikoTestDriverCounts &counts, Class of) {
+  switch (of) {
+  case Class::Integer:
+    return counts.integer;
+  case Class::Single:
+    return counts.single;
+  case Class::Double:
+    return counts.twice;
+  case Class::Move:
+    return counts.move;
+  case Class::Control:
+    return counts.control;
+  case Class::LoadGlobal:
+    return counts.loadGlobal;
+  case Class::StoreGlobal:
+    return counts.storeGlobal;
+  case Class::LoadShared:
+    return counts.loadShared;
+  case Class::StoreShared:
+    return counts.storeShared;
+  case Class::LoadLocal:
+    return counts.loadLocal;
+  case Class::StoreLocal:
+    return counts.storeLocal;
+  case Class::LoadGeneric:
+    return counts.loadGeneric;
+  case Class::StoreGeneric:
+    return counts.storeGeneric;
+  case Class::Parameter:
+    return counts.parameter;
+  case Class::Atomic:
+    return counts.atomic;
+  case Class::Barrier:
+    return counts.barrier;
+  case Class::WarpOperation:
+    break;
+  }
+  return counts.warpOperation;
+}
+
+void addCounts(const ptx::Launch &launch) {
+  PikoTestDriverCounts &counts = state().counts[launch.program.name];
+  const auto &blocks = launch.blocks, &threads = launch.threads;
+  uint64_t blockCount = uint64_t(blocks[0]) * blocks[1] * blocks[2];
+  ++counts.launches;
+  counts.blocks += blockCount;
+  counts.threads += blockCount * threads[0] * threads[1] * threads[2];
+  for (size_t pc = 0; pc < launch.sites.size(); ++pc) {
+    const ptx::Site &site = launch.sites[pc];
+    counts.warpInstructions += site.warps;
+    counts.laneInstructions += site.lanes;
+    counts.globalBytes += site.bytes;
+    counts.globalSectors += site.sectors;
+    counterOf(counts, launch.program.code[pc].counted) += site.warps;
+  }
+}
+
+/// What is wrong with the sizes of a launch; empty if nothing.
+std::string check(const ptx::Program &program,
+                  const std::array<uint32_t, 3> &blocks,
+                  const std::array<uint32_t, 3> &threads, uint32_t shared) {
+  uint64_t count = uint64_t(threads[0]) * threads[1] * threads[2];
+  if (!count || count > mostThreads || threads[2] > 64)
+    return std::to_string(count) + " threads in a block";
+  if (!blocks[0] || !blocks[1] || !blocks[2] || blocks[0] > mostBlocksX ||
+      blocks[1] > mostBlocksYZ || blocks[2] > mostBlocksYZ)
+    return "a number of blocks";
+  const auto &most = program.maxThreads, &required = program.requiredThreads;
+  if (most[0] && count > uint64_t(most[0]) * most[1] * most[2])
+    return std::to_string(count) + " threads, more than .maxntid of '" +
+           program.name + "'";
+  if (required[0] && threads != required)
+    return "other threads than .reqntid of '" + program.name + "'";
+  if (uint64_t(program.sharedBytes) + shared > mostShared)
+    return "more than " + std::to_string(mostShared) +
+           " bytes of shared memory";
+  return {};
+}
+
+} // namespace
+
+CUresult piko::cuda::cuLaunchKernel(CUfunction handle, unsigned gridX,
+                                    unsigned gridY, unsigned gridZ,
+                                    unsigned blockX, unsigned blockY,
+                                    unsigned blockZ, unsigned sharedBytes,
+                                    CUstream stream, void **parameters,
+                                    void **extra) {
+  Call call(__func__, Needs::Context);
+  if (CUresult error = call.refused())
+    return error;
+  Context &context = call.context();
+  auto found = context.functions.find(handle);
+  if (found == context.functions.end())
+    return call.fail(CUDA_ERROR_INVALID_HANDLE, "no function of a module");
+  if (!call.hasStream(stream))
+    return call.fail(CUDA_ERROR_INVALID_HANDLE, "no live stream");
+  if (extra)
+    return call.fail(CUDA_ERROR_NOT_SUPPORTED, "parameters in a buffer");
+  const ptx::Program &program = found->second.program;
+  ptx::Launch launch{program,
+                     context.memory,
+                     found->second.module->source,
+                     {gridX, gridY, gridZ},
+                     {blockX, blockY, blockZ},
+                     sharedBytes,
+                     std::vector<uint8_t>(program.parameterBytes),
+                     state().seed,
+                     {}};
+  if (std::string wrong =
+          check(program, launch.blocks, launch.threads, sharedBytes);
+      !wrong.empty())
+    return call.fail(CUDA_ERROR_INVALID_VALUE, wrong);
+  for (size_t i = 0; i < program.parameters.size(); ++i) {
+    if (!parameters || !parameters[i])
+      return call.fail(CUDA_ERROR_INVALID_VALUE,
+                       "no parameter " + std::to_string(i));
+    std::memcpy(&launch.parameters[program.parameters[i].offset], parameters[i],
+                program.parameters[i].size);
+  }
+  try {
+    ptx::run(launch);
+  } catch (const ptx::Fault &fault) {
+    // As a launch that runs while the host goes on.
+    context.failed = call.fail(errorOf(fault.kind), fault.text);
+  }
+  addCounts(launch);
+  return CUDA_SUCCESS;
+}

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//===- MemoryTable.cpp - Allocations by their addresses -------------------===//
+
+#include "State.h"
+
+#include <cstring>
+#include <sys/mman.h>
+
+using namespace piko::testdriver;
+
+static constexpr uint64_t page = 4096;
+/// More than this is left as the system gives it: only what is touched takes
+/// memory.
+static constexpr uint64_t filledBytes = uint64_t(4) << 20;
+static constexpr size_t remembered = 64;
+
+static uint8_t *map(uint64_t bytes, int protection) {
+  void *memory = mmap(nullptr, bytes, protection,
+                      MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+  return memory == MAP_FAILED ? nullptr : static_cast<uint8_t *>(memory);
+}
+
+const Allocation *MemoryTable::allocate(AllocationKind kind, uint64_t bytes) {
+  Allocation made;
+  made.kind = kind;
+  made.bytes = bytes;
+  if (bytes > UINT64_MAX - 2 * page)
+    return nullptr;
+  made.mapped = (bytes + page - 1) / page * page;
+  made.memory = map(made.mapped, PROT_READ | PROT_WRITE);
+  if (!made.memory)
+    return nullptr;
+  made.begin = reinterpret_cast<uint64_t>(made.memory);
+  if (kind == AllocationKind::Device) {
+    // Addresses of which the host can use none.
+    uint8_t *reserved = map(made.mapped, PROT_NONE);
+    if (!reserved) {
+      munmap(made.memory, made.mapped);
+      return nullptr;
+    }
+    made.begin = reinterpret_cast<uint64_t>(reserved);
+    used += bytes;
+  }
+  if (bytes <= filledBytes)
+    std::memset(made.memory, ptx::unwritten, made.mapped);
+  return &(allocations[made.begin] = made);
+}
+
+void MemoryTable::release(uint64_t address) {
+  auto found = allocations.find(address);
+  const Allocation &it = found->second;
+  munmap(it.memory, it.mapped);
+  if (it.kind == AllocationKind::Device) {
+    munmap(reinterpret_cast<void *>(it.begin), it.mapped);
+    used -= it.bytes;
+  }
+  if (released.size() == remembered)
+    released.erase(released.begin());
+  released.push_back(it);
+  allocations.erase(found);
+}
+
+void MemoryTable::clear() {
+  while (!allocations.empty())
+    release(allocations.begin()->first);
+  released.clear();
+}
+
+const Allocation *MemoryTable::at(uint64_t address) const {
+  auto after = allocations.upper_bound(address);
+  if (after == allocations.begin())
+    return nullptr;
+  const Allocation &it = std::prev(after)->second;
+  return address - it.begin < it.bytes ? &it : nullptr;
+}
+
+piko::ptx::Memory::Range MemoryTable::find(uint64_t address) const {
+  const Allocation *it = at(address);
+  if (!it)
+    return {};
+  return {it->begin, it->begin + it->bytes,
+          reinterpret_cast<uint64_t>(it->memory) - it->begin};
+}
+
+std::string MemoryTable::describe(uint64_t address) const {
+  auto after = allocations.upper_bound(address);
+  if (after != allocations.begin()) {
+    const Allocation &it = std::prev(after)->second;
+    uint64_t distance = address - it.begin;
+    if (distance < it.mapped + page)
+      return "byte " + std::to_string(distance) + " of an allocation of " +
+             std::to_string(it.bytes);
+  }
+  for (const Allocation &it : released)
+    if (address - it.begin < it.bytes)
+      return "byte " + std::to_string(address - it.begin) + " of " +
+             std::to_string(it.bytes) + " that were freed";
+  return {};
+}

@@ -1,0 +1,300 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//===- ModuleCalls.cpp - Modules of the driver for tests ------------------===//
+
+#include "State.h"
+
+#include <algorithm>
+#include <cstring>
+
+using namespace piko::testdriver;
+using namespace piko::cuda;
+namespace ptx = piko::ptx;
+using piko::ptx::ParseError;
+using piko::ptx::Space;
+
+namespace {
+
+/// The newest PTX that is taken: that of CUDA 12.8.
+constexpr uint32_t newestMajor = 8, newestMinor = 7;
+constexpr uint32_t mostShared = 48 << 10;
+constexpr int mostThreads = 1024, mostThreadsOfProcessor = 2048,
+              mostBlocksOfProcessor = 32, mostRegisters = 255,
+              registersOfProcessor = 65536, sharedOfProcessor = 100 << 10;
+
+/// Puts texts into the buffers of cuModuleLoadDataEx's options.
+class Log {
+public:
+  Log(unsigned count, const CUjit_option *options, void **values) {
+    for (unsigned i = 0; i < count; ++i) {
+      if (options[i] == CU_JIT_ERROR_LOG_BUFFER)
+        errors = static_cast<char *>(values[i]);
+      if (options[i] == CU_JIT_ERROR_LOG_BUFFER_SIZE_BYTES)
+        errorsSize = &values[i];
+      if (options[i] == CU_JIT_INFO_LOG_BUFFER && values[i])
+        *static_cast<char *>(values[i]) = 0;
+      if (options[i] == CU_JIT_INFO_LOG_BUFFER_SIZE_BYTES)
+        values[i] = nullptr;
+    }
+    // The size is given, and then that of the text.
+    room = errorsSize ? reinterpret_cast<uintptr_t>(*errorsSize) : 0;
+    write("");
+  }
+
+  void write(const std::string &text) const {
+    if (!errors || !room)
+      return;
+    size_t size = std::min<size_t>(text.size(), room - 1);
+    std::memcpy(errors, text.data(), size);
+    errors[size] = 0;
+    *errorsSize = reinterpret_cast<void *>(size);
+  }
+
+private:
+  char *errors = nullptr;
+  void **errorsSize = nullptr;
+  uintptr_t room = 0;
+};
+
+class Loader {
+public:
+  Loader(Context &context, const char *source)
+      : context(context), module(std::make_unique<Module>()) {
+    module->source = source;
+  }
+  Loader(const Loader &) = delete;
+  Loader &operator=(const Loader &) = delete;
+  ~Loader() {
+    if (!module)
+      return;
+    for (const auto &[name, address] : module->variables)
+      context.memory.release(address);
+    for (const auto &[name, function] : module->functions)
+      context.functions.erase(function);
+  }
+
+  /// Throws ParseError. Returns an error for what is valid but cannot run.
+  CUresult load();
+  CUmodule keep() {
+    auto handle = state().newHandle<CUmodule>();
+    context.modules[handle] = std::move(module);
+    return handle;
+  }
+
+private:
+  void placeVariables();
+  void fillPointers() const;
+  void decodeFunctions();
+
+  Context &context;
+  std::unique_ptr<Module> module;
+};
+
+CUresult Loader::load() {
+  module->syntax = ptx::parseModule(module->source);
+  const ptx::ModuleSyntax &syntax = module->syntax;
+  if (std::pair(syntax.versionMajor, syntax.versionMinor) >
+      std::pair(newestMajor, newestMinor))
+    return CUDA_ERROR_UNSUPPORTED_PTX_VERSION;
+  if (syntax.target > static_cast<uint32_t>(state().capability))
+    return CUDA_ERROR_NO_BINARY_FOR_GPU;
+  placeVariables();
+  fillPointers();
+  decodeFunctions();
+  return CUDA_SUCCESS;
+}
+
+void Loader::placeVariables() {
+  for (const ptx::Variable &variable : module->syntax.variables) {
+    if (variable.space == Space::Shared)
+      continue;
+    if (variable.external)
+      throw ParseError(variable.line,
+                       "expected a definition of '" + variable.name + "'");
+    const Allocation *made = context.memory.allocate(
+        AllocationKind::Module, std::max<uint64_t>(variable.size, 1));
+    if (!made)
+      throw ParseError(variable.line, "no memory for '" + variable.name + "'");
+    std::memset(made->memory, 0, made->bytes);
+    std::copy(variable.data.begin(), variable.data.end(), made->memory);
+    module->variables[variable.name] = made->begin;
+    if (variable.space == Space::Const)
+      module->constantBytes += variable.size;
+  }
+}
+
+void Loader::fillPointers() const {
+  for (const ptx::Variable &variable : module->syntax.variables)
+    for (const ptx::Variable::Pointer &pointer : variable.pointers) {
+      uint64_t address = module->addressOf(pointer.symbol);
+      if (!address)
+        throw ParseError(variable.line,
+                         "expected a variable '" + pointer.symbol + "'");
+      address += static_cast<uint64_t>(pointer.addend);
+      std::memcpy(reinterpret_cast<uint8_t *>(module->addressOf(variable.name) +
+                                              pointer.offset),
+                  &address, sizeof(address));
+    }
+}
+
+void Loader::decodeFunctions() {
+  for (const ptx::FunctionSyntax &syntax : module->syntax.functions) {
+    if (!syntax.entry)
+      continue;
+    Function function;
+    function.module = module.get();
+    function.program = ptx::decode(module->syntax, syntax.name, *module);
+    if (function.program.sharedBytes > mostShared)
+      throw ParseError(syntax.line,
+                       "expected at most " + std::to_string(mostShared) +
+                           " bytes of shared memory, but '" + syntax.name +
+                           "' has " +
+                           std::to_string(function.program.sharedBytes));
+    auto handle = state().newHandle<CUfunction>();
+    context.functions[handle] = std::move(function);
+    module->functions[syntax.name] = handle;
+  }
+}
+
+bool isBinary(const char *image) {
+  return std::memcmp(image,
+                     "\x7f"
+                     "ELF",
+                     4) == 0 ||
+         std::memcmp(image, "\x50\xed\x55\xba", 4) == 0;
+}
+
+} // namespace
+
+CUresult piko::cuda::cuModuleLoadDataEx(CUmodule *result, const void *image,
+                                        unsigned count, CUjit_option *options,
+                                        void **values) {
+  Call call(__func__, Needs::Context);
+  if (CUresult error = call.refused())
+    return error;
+  if (!result || !image || (count && (!options || !values)))
+    return call.fail(CUDA_ERROR_INVALID_VALUE, "null");
+  const Log log(count, options, values);
+  const char *source = static_cast<const char *>(image);
+  if (!*source || isBinary(source))
+    return call.fail(CUDA_ERROR_INVALID_IMAGE, "expected the text of PTX");
+  try {
+    Loader loader(call.context(), source);
+    if (CUresult error = loader.load())
+      return call.fail(error, "");
+    *result = loader.keep();
+    return CUDA_SUCCESS;
+  } catch (const ParseError &error) {
+    log.write(error.what());
+    return call.fail(CUDA_ERROR_INVALID_PTX, error.what());
+  }
+}
+
+CUresult piko::cuda::cuModuleUnload(CUmodule handle) {
+  Call call(__func__, Needs::Context);
+  if (CUresult error = call.refused())
+    return error;
+  Context &context = call.context();
+  auto found = context.modules.find(handle);
+  if (found == context.modules.end())
+    return call.fail(CUDA_ERROR_INVALID_HANDLE, "no loaded module");
+  for (const auto &[name, address] : found->second->variables)
+    context.memory.release(address);
+  for (const auto &[name, function] : found->second->functions)
+    context.functions.erase(function);
+  context.modules.erase(found);
+  return CUDA_SUCCESS;
+}
+
+CUresult piko::cuda::cuModuleGetFunction(CUfunction *function, CUmodule module,
+                                         const char *name) {
+  Call call(__func__, Needs::Context);
+  if (CUresult error = call.refused())
+    return error;
+  if (!function || !name)
+    return call.fail(CUDA_ERROR_INVALID_VALUE, "null");
+  auto found = call.context().modules.find(module);
+  if (found == call.context().modules.end())
+    return call.fail(CUDA_ERROR_INVALID_HANDLE, "no loaded module");
+  const auto &functions = found->second->functions;
+  auto named = functions.find(std::string_view(name));
+  if (named == functions.end())
+    return call.fail(CUDA_ERROR_NOT_FOUND,
+                     "expected a kernel '" + std::string(name) + "'");
+  *function = named->second;
+  return CUDA_SUCCESS;
+}
+
+static int registersOf(const piko::ptx::Program &program) {
+  // What a compiler would need is less than what is declared.
+  return std::clamp(static_cast<int>(program.registers), 16, mostRegisters);
+}
+
+static int threadsOf(const piko::ptx::Program &program) {
+  const auto &limit =
+      program.requiredThreads[0] ? program.requiredThreads : program.maxThreads;
+  return limit[0] ? static_cast<int>(limit[0] * limit[1] * limit[2])
+                  : mostThreads;
+}
+
+CUresult piko::cuda::cuFuncGetAttribute(int *value,
+                                        CUfunction_attribute attribute,
+                                        CUfunction handle) {
+  Call call(__func__, Needs::Context);
+  if (CUresult error = call.refused())
+    return error;
+  auto found = call.context().functions.find(handle);
+  if (found == call.context().functions.end())
+    return call.fail(CUDA_ERROR_INVALID_HANDLE, "no function of a module");
+  if (!value)
+    return call.fail(CUDA_ERROR_INVALID_VALUE, "null");
+  const ptx::Program &program = found->second.program;
+  const Module &module = *found->second.module;
+  switch (attribute) {
+  case CU_FUNC_ATTRIBUTE_MAX_THREADS_PER_BLOCK:
+    *value = threadsOf(program);
+    return CUDA_SUCCESS;
+  case CU_FUNC_ATTRIBUTE_SHARED_SIZE_BYTES:
+    *value = static_cast<int>(program.sharedBytes);
+    return CUDA_SUCCESS;
+  case CU_FUNC_ATTRIBUTE_CONST_SIZE_BYTES:
+    *value = static_cast<int>(module.constantBytes);
+    return CUDA_SUCCESS;
+  case CU_FUNC_ATTRIBUTE_LOCAL_SIZE_BYTES:
+    *value = static_cast<int>(program.localBytes);
+    return CUDA_SUCCESS;
+  case CU_FUNC_ATTRIBUTE_NUM_REGS:
+    *value = registersOf(program);
+    return CUDA_SUCCESS;
+  case CU_FUNC_ATTRIBUTE_PTX_VERSION:
+    *value = static_cast<int>(10 * module.syntax.versionMajor +
+                              module.syntax.versionMinor);
+    return CUDA_SUCCESS;
+  case CU_FUNC_ATTRIBUTE_BINARY_VERSION:
+    *value = state().capability;
+    return CUDA_SUCCESS;
+  }
+  return call.fail(CUDA_ERROR_INVALID_VALUE,
+                   "attribute " + std::to_string(attribute));
+}
+
+CUresult piko::cuda::cuOccupancyMaxActiveBlocksPerMultiprocessor(
+    int *blocks, CUfunction handle, int threads, size_t sharedBytes) {
+  Call call(__func__, Needs::Context);
+  if (CUresult error = call.refused())
+    return error;
+  auto found = call.context().functions.find(handle);
+  if (found == call.context().functions.end())
+    return call.fail(CUDA_ERROR_INVALID_HANDLE, "no function of a module");
+  const ptx::Program &program = found->second.program;
+  if (!blocks || threads <= 0 || threads > threadsOf(program))
+    return call.fail(CUDA_ERROR_INVALID_VALUE,
+                     std::to_string(threads) + " threads");
+  const int warps = (threads + 31) / 32;
+  const size_t shared = program.sharedBytes + sharedBytes;
+  *blocks =
+      std::min({mostBlocksOfProcessor, mostThreadsOfProcessor / (32 * warps),
+                registersOfProcessor / (32 * warps * registersOf(program))});
+  if (shared)
+    *blocks = std::min(*blocks, static_cast<int>(sharedOfProcessor / shared));
+  return CUDA_SUCCESS;
+}

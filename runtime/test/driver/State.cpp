@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//===- State.cpp - What the driver for tests holds ------------------------===//
+
+#include "State.h"
+
+#include <cstdio>
+#include <cstdlib>
+#include <utility>
+
+using namespace piko::testdriver;
+
+static uint64_t numberFrom(const char *variable, uint64_t otherwise) {
+  const char *text = std::getenv(variable);
+  return text && *text ? std::strtoull(text, nullptr, 0) : otherwise;
+}
+
+/// function:n:error, and more behind commas.
+static std::vector<Failure> parseFailures(const char *text) {
+  std::vector<Failure> failures;
+  std::string_view rest = text ? text : "";
+  while (!rest.empty()) {
+    std::string one(rest.substr(0, rest.find(',')));
+    rest.remove_prefix(std::min(rest.size(), one.size() + 1));
+    size_t first = one.find(':'), second = one.find(':', first + 1);
+    if (first == one.npos || second == one.npos) {
+      std::fprintf(stderr,
+                   "PIKO_TEST_DRIVER_FAIL: expected function:n:error, but got "
+                   "'%s'\n",
+                   one.c_str());
+      continue;
+    }
+    Failure failure;
+    failure.function = one.substr(0, first);
+    failure.calls = std::strtoull(one.c_str() + first + 1, nullptr, 0);
+    failure.error = static_cast<CUresult>(std::atoi(one.c_str() + second + 1));
+    failures.push_back(failure);
+  }
+  return failures;
+}
+
+State::State() {
+  uint64_t count = numberFrom("PIKO_TEST_DRIVER_DEVICES", 1);
+  for (uint64_t device = 0; device < count; ++device)
+    devices.push_back(std::make_unique<Context>());
+  capability = static_cast<int>(numberFrom("PIKO_TEST_DRIVER_SM", 90));
+  memoryLimit = numberFrom("PIKO_TEST_DRIVER_MEMORY", memoryLimit);
+  seed = numberFrom("PIKO_TEST_DRIVER_SEED", 0);
+  printsCounts = numberFrom("PIKO_TEST_DRIVER_COUNTS", 0) != 0;
+  failures = parseFailures(std::getenv("PIKO_TEST_DRIVER_FAIL"));
+}
+
+State::~State() {
+  if (!leaks.empty())
+    std::fprintf(stderr, "driver for tests: alive at the end of a context:\n%s",
+                 leaks.c_str());
+  if (!printsCounts)
+    return;
+  for (const auto &[kernel, it] : counts)
+    std::fprintf(
+        stderr,
+        "%s: %llu launches, %llu warp instructions, %.1f %% of lanes, %llu "
+        "bytes of global memory in %llu sectors\n",
+        kernel.c_str(), static_cast<unsigned long long>(it.launches),
+        static_cast<unsigned long long>(it.warpInstructions),
+        it.warpInstructions
+            ? 100.0 * static_cast<double>(it.laneInstructions) /
+                  (32.0 * static_cast<double>(it.warpInstructions))
+            : 0.0,
+        static_cast<unsigned long long>(it.globalBytes),
+        static_cast<unsigned long long>(it.globalSectors));
+}
+
+State &piko::testdriver::state() {
+  static State instance;
+  return instance;
+}
+
+CUcontext &piko::testdriver::currentContext() {
+  thread_local CUcontext current = nullptr;
+  return current;
+}
+
+Context *piko::testdriver::contextOf(CUcontext handle) {
+  for (auto &device : state().devices)
+    if (handle && device->handle == handle)
+      return device.get();
+  return nullptr;
+}
+
+static const char *kindOf(AllocationKind kind) {
+  switch (kind) {
+  case AllocationKind::Device:
+    return "device memory";
+  case AllocationKind::Managed:
+    return "managed memory";
+  case AllocationKind::Host:
+    return "pinned memory of the host";
+  case AllocationKind::Module:
+    break;
+  }
+  return "memory of a module";
+}
+
+std::string Context::describe() const {
+  std::string text;
+  for (const auto &[address, it] : memory.all())
+    if (it.kind != AllocationKind::Module)
+      text += std::to_string(it.bytes) + " bytes of " + kindOf(it.kind) + "\n";
+  for (const auto &[handle, module] : modules) {
+    text += "module";
+    for (const auto &function : module->syntax.functions)
+      text += " " + function.name;
+    text += "\n";
+  }
+  if (!streams.empty())
+    text += std::to_string(streams.size()) + " streams\n";
+  if (!events.empty())
+    text += std::to_string(events.size()) + " events\n";
+  return text;
+}
+
+Call::Call(const char *function, Needs needs)
+    : guard(state().lock), function(function) {
+  ++state().calls[function];
+  error = begin(needs);
+}
+
+CUresult Call::injected() {
+  auto &failures = state().failures;
+  CUresult found = CUDA_SUCCESS;
+  for (size_t i = 0; i < failures.size();) {
+    Failure &failure = failures[i];
+    if (!failure.function.empty() && failure.function != function) {
+      ++i;
+    } else if (--failure.calls) {
+      ++i;
+    } else {
+      found = failure.error;
+      failures.erase(failures.begin() + static_cast<ptrdiff_t>(i));
+    }
+  }
+  return found;
+}
+
+CUresult Call::begin(Needs needs) {
+  if (CUresult failure = injected())
+    return fail(failure, "made to fail");
+  if (needs == Needs::Nothing)
+    return CUDA_SUCCESS;
+  if (!state().initialized)
+    return fail(CUDA_ERROR_NOT_INITIALIZED, "cuInit was not called");
+  if (needs == Needs::Initialization)
+    return CUDA_SUCCESS;
+  current = contextOf(currentContext());
+  if (!current)
+    return fail(CUDA_ERROR_INVALID_CONTEXT,
+                currentContext() ? "the current context was released"
+                                 : "no context is current");
+  // Its text is that of the kernel.
+  return current->failed;
+}
+
+CUresult Call::fail(CUresult result, const std::string &text) const {
+  const char *name = nameOf(result);
+  state().error = std::string(function) + ": " + (name ? name : "error") +
+                  (text.empty() ? "" : ": " + text);
+  return result;
+}

@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//===- State.h - What the driver for tests holds --------------------------===//
+//
+// One state for the process, behind one lock, which a call holds from its begin
+// to its end. Handles are numbers that are never given twice, so that those of
+// what has been destroyed are found out.
+//
+//===----------------------------------------------------------------------===//
+
+#ifndef PIKO_TEST_DRIVER_STATE_H
+#define PIKO_TEST_DRIVER_STATE_H
+
+#include "Symbols.h"
+#include "TestDriver.h"
+#include "ptx/Machine.h"
+
+#include <chrono>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+namespace piko::testdriver {
+
+using namespace piko::cuda;
+
+enum class AllocationKind : uint8_t { Device, Managed, Host, Module };
+
+/// Memory that kernels may access.
+struct Allocation {
+  AllocationKind kind = AllocationKind::Device;
+  uint64_t begin = 0, bytes = 0; ///< As the program knows them.
+  uint64_t mapped = 0;           ///< Bytes, in whole pages.
+  /// Where the memory is in the host: at `begin` if not of the device alone,
+  /// whose addresses the host cannot use.
+  uint8_t *memory = nullptr;
+};
+
+/// Allocations by their addresses.
+class MemoryTable : public ptx::Memory {
+public:
+  MemoryTable() = default;
+  MemoryTable(const MemoryTable &) = delete;
+  MemoryTable &operator=(const MemoryTable &) = delete;
+  ~MemoryTable() override { clear(); }
+
+  /// Null if the system has no more.
+  const Allocation *allocate(AllocationKind kind, uint64_t bytes);
+  /// \p address must be the begin of one.
+  void release(uint64_t address);
+  void clear();
+
+  /// The allocation that an address lies in; null if there is none.
+  const Allocation *at(uint64_t address) const;
+  Range find(uint64_t address) const override;
+  std::string describe(uint64_t address) const override;
+
+  const std::map<uint64_t, Allocation> &all() const { return allocations; }
+  uint64_t deviceBytes() const { return used; }
+
+private:
+  std::map<uint64_t, Allocation> allocations;
+  std::vector<Allocation> released; ///< The last ones, for messages.
+  uint64_t used = 0;                ///< Of the device.
+};
+
+struct Module;
+
+struct Function {
+  Module *module = nullptr;
+  ptx::Program program;
+};
+
+struct Module : ptx::Symbols {
+  std::string source; ///< That `syntax` points into.
+  ptx::ModuleSyntax syntax;
+  std::map<std::string, uint64_t, std::less<>> variables; ///< Addresses.
+  std::map<std::string, CUfunction, std::less<>> functions;
+  uint64_t constantBytes = 0;
+
+  uint64_t addressOf(std::string_view name) const override {
+    auto found = variables.find(name);
+    return found == variables.end() ? 0 : found->second;
+  }
+};
+
+struct Event {
+  bool recorded = false;
+  std::chrono::steady_clock::time_point time;
+};
+
+/// A device's primary context, and what was made in it.
+struct Context {
+  int references = 0;
+  CUcontext handle = nullptr;
+  CUresult failed = CUDA_SUCCESS; ///< Of a kernel; all calls return it.
+  MemoryTable memory;
+  std::map<CUmodule, std::unique_ptr<Module>> modules;
+  std::map<CUfunction, Function> functions;
+  std::map<CUstream, unsigned> streams;
+  std::map<CUevent, Event> events;
+
+  /// What is alive, a line each.
+  std::string describe() const;
+};
+
+struct Failure {
+  std::string function; ///< Any if empty.
+  uint64_t calls;       ///< Until it happens.
+  CUresult error;
+};
+
+struct State {
+  State();
+  ~State();
+
+  std::recursive_mutex lock;
+  bool initialized = false;
+  std::vector<std::unique_ptr<Context>> devices;
+  int capability = 90; ///< 10 * major + minor.
+  uint64_t memoryLimit = uint64_t(16) << 30;
+  uint64_t seed = 0;
+  bool printsCounts = false;
+
+  std::vector<Failure> failures;
+  std::map<std::string, uint64_t, std::less<>> calls;
+  std::string error, leaks;
+  std::map<std::string, PikoTestDriverCounts, std::less<>> counts;
+
+  template <typename Handle> Handle newHandle() {
+    return reinterpret_cast<Handle>(nextHandle += 16);
+  }
+
+private:
+  uintptr_t nextHandle = 0x1000;
+};
+
+State &state();
+
+/// What a call needs.
+enum class Needs : uint8_t { Nothing, Initialization, Context };
+
+/// A call of the driver: counted, made to fail, and locked.
+class Call {
+public:
+  Call(const char *function, Needs needs);
+  Call(const Call &) = delete;
+  Call &operator=(const Call &) = delete;
+
+  /// What to return at once; CUDA_SUCCESS if the call may go on.
+  CUresult refused() const { return error; }
+  /// The calling thread's.
+  Context &context() const { return *current; }
+  /// Keeps the text; returns \p result.
+  CUresult fail(CUresult result, const std::string &text) const;
+  /// Null, or a live stream of the context.
+  bool hasStream(CUstream stream) const {
+    return !stream || current->streams.contains(stream);
+  }
+
+private:
+  CUresult begin(Needs needs);
+  CUresult injected();
+
+  std::unique_lock<std::recursive_mutex> guard;
+  const char *function;
+  Context *current = nullptr;
+  CUresult error = CUDA_SUCCESS;
+};
+
+/// The calling thread's current context.
+CUcontext &currentContext();
+/// Null if it is no live context.
+Context *contextOf(CUcontext handle);
+
+/// Names and texts of errors; null for none of them.
+const char *nameOf(CUresult error);
+const char *textOf(CUresult error);
+
+} // namespace piko::testdriver
+
+#endif // PIKO_TEST_DRIVER_STATE_H

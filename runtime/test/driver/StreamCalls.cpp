@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//===- StreamCalls.cpp - Streams and events of the driver for tests -------===//
+
+#include "State.h"
+
+using namespace piko::testdriver;
+using namespace piko::cuda;
+
+CUresult piko::cuda::cuStreamCreate(CUstream *stream, unsigned flags) {
+  Call call(__func__, Needs::Context);
+  if (CUresult error = call.refused())
+    return error;
+  if (!stream || flags > CU_STREAM_NON_BLOCKING)
+    return call.fail(CUDA_ERROR_INVALID_VALUE,
+                     "flags " + std::to_string(flags));
+  *stream = state().newHandle<CUstream>();
+  call.context().streams[*stream] = flags;
+  return CUDA_SUCCESS;
+}
+
+CUresult piko::cuda::cuStreamDestroy(CUstream stream) {
+  Call call(__func__, Needs::Context);
+  if (CUresult error = call.refused())
+    return error;
+  if (!call.context().streams.erase(stream))
+    return call.fail(CUDA_ERROR_INVALID_HANDLE, "no live stream");
+  return CUDA_SUCCESS;
+}
+
+CUresult piko::cuda::cuStreamSynchronize(CUstream stream) {
+  Call call(__func__, Needs::Context);
+  if (CUresult error = call.refused())
+    return error;
+  if (!call.hasStream(stream))
+    return call.fail(CUDA_ERROR_INVALID_HANDLE, "no live stream");
+  return CUDA_SUCCESS;
+}
+
+CUresult piko::cuda::cuEventCreate(CUevent *event, unsigned flags) {
+  Call call(__func__, Needs::Context);
+  if (CUresult error = call.refused())
+    return error;
+  if (!event || flags != CU_EVENT_DEFAULT)
+    return call.fail(CUDA_ERROR_INVALID_VALUE,
+                     "flags " + std::to_string(flags));
+  *event = state().newHandle<CUevent>();
+  call.context().events[*event] = Event();
+  return CUDA_SUCCESS;
+}
+
+CUresult piko::cuda::cuEventDestroy(CUevent event) {
+  Call call(__func__, Needs::Context);
+  if (CUresult error = call.refused())
+    return error;
+  if (!call.context().events.erase(event))
+    return call.fail(CUDA_ERROR_INVALID_HANDLE, "no live event");
+  return CUDA_SUCCESS;
+}
+
+CUresult piko::cuda::cuEventRecord(CUevent event, CUstream stream) {
+  Call call(__func__, Needs::Context);
+  if (CUresult error = call.refused())
+    return error;
+  auto found = call.context().events.find(event);
+  if (found == call.context().events.end() || !call.hasStream(stream))
+    return call.fail(CUDA_ERROR_INVALID_HANDLE, "no live event or stream");
+  found->second.recorded = true;
+  found->second.time = std::chrono::steady_clock::now();
+  return CUDA_SUCCESS;
+}
+
+CUresult piko::cuda::cuEventSynchronize(CUevent event) {
+  Call call(__func__, Needs::Context);
+  if (CUresult error = call.refused())
+    return error;
+  if (!call.context().events.contains(event))
+    return call.fail(CUDA_ERROR_INVALID_HANDLE, "no live event");
+  return CUDA_SUCCESS;
+}
+
+CUresult piko::cuda::cuEventElapsedTime(float *milliseconds, CUevent start,
+                                        CUevent end) {
+  Call call(__func__, Needs::Context);
+  if (CUresult error = call.refused())
+    return error;
+  const auto &events = call.context().events;
+  auto first = events.find(start), last = events.find(end);
+  if (first == events.end() || last == events.end() ||
+      !first->second.recorded || !last->second.recorded)
+    return call.fail(CUDA_ERROR_INVALID_HANDLE, "no event that was recorded");
+  if (!milliseconds)
+    return call.fail(CUDA_ERROR_INVALID_VALUE, "null");
+  *milliseconds = std::chrono::duration<float, std::milli>(last->second.time -
+                                                           first->second.time)
+                      .count();
+  return CUDA_SUCCESS;
+}

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//===- TestDriver.h - Control of the driver for tests ---------------------===//
+//
+// libpiko-test-driver.so has the symbols of NVIDIA's driver that
+// cuda/DriverAPI.def names. It runs PTX on the CPU, and reports what a GPU may
+// let pass: accesses outside of allocations, calls with handles that are not
+// valid, leaks. Tests load it in place of libcuda.so.1.
+//
+// Streams run at once, in order. A kernel that fails does so as on a GPU: the
+// launch succeeds, all later calls return the error until the context's last
+// reference is released.
+//
+// Environment, read when the library is loaded:
+//
+//   PIKO_TEST_DRIVER_DEVICES   devices; 1
+//   PIKO_TEST_DRIVER_SM        compute capability, 10 * major + minor; 90
+//   PIKO_TEST_DRIVER_MEMORY    bytes that cuMemAlloc has; 16 GiB
+//   PIKO_TEST_DRIVER_SEED      order of blocks; 0: as numbered
+//   PIKO_TEST_DRIVER_FAIL      function:n:error, as pikoTestDriverFail; more
+//                              than one with commas
+//   PIKO_TEST_DRIVER_COUNTS    1: counts of all kernels to stderr at the end
+//
+// The functions here may be called at any time, from any thread. Texts that
+// they return live until the calling thread's next call of the same function.
+//
+//===----------------------------------------------------------------------===//
+
+#ifndef PIKO_TEST_DRIVER_H
+#define PIKO_TEST_DRIVER_H
+
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/// The \p n-th call from now, counted from 1, of a function such as cuMemAlloc
+/// (without the symbol's suffix), or of any if it is null, does nothing and
+/// returns \p error, a CUresult.
+void pikoTestDriverFail(const char *function, uint64_t n, int error);
+
+/// Calls of a function so far, or of all if it is null.
+uint64_t pikoTestDriverCalls(const char *function);
+
+/// What the last call that failed had to say; empty if none did.
+const char *pikoTestDriverError(void);
+
+/// What lived when contexts were released, a line each; empty if nothing. It is
+/// written to stderr, too, when the process ends.
+const char *pikoTestDriverLeaks(void);
+
+/// What is alive now, in the same form.
+const char *pikoTestDriverAlive(void);
+
+/// What the launches of a kernel did. A warp instruction is one that a warp
+/// runs for its active lanes, of which each is a lane instruction; lane
+/// utilization is laneInstructions / (32 * warpInstructions).
+struct PikoTestDriverCounts {
+  uint64_t launches, blocks, threads;
+  uint64_t warpInstructions, laneInstructions;
+  // Warp instructions by class.
+  uint64_t integer, single, twice, move, control;
+  uint64_t loadGlobal, storeGlobal, loadShared, storeShared;
+  uint64_t loadLocal, storeLocal, loadGeneric, storeGeneric;
+  uint64_t parameter, atomic, barrier, warpOperation;
+  /// Of global memory, atomic operations too: bytes that lanes ask for, and
+  /// sectors of 32 bytes that warps touch.
+  uint64_t globalBytes, globalSectors;
+};
+
+/// Counts of a kernel, or of all if its name is null. Returns 0, or 1 if it was
+/// never launched; \p counts are zeros then.
+int pikoTestDriverCounts(const char *kernel,
+                         struct PikoTestDriverCounts *counts);
+
+/// The names of kernels that were launched, a line each, sorted.
+const char *pikoTestDriverKernels(void);
+
+/// Forgets failures that are still to come, numbers of calls, texts of errors
+/// and of leaks, and counts. What is alive stays.
+void pikoTestDriverReset(void);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif // PIKO_TEST_DRIVER_H

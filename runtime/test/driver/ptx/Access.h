@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//===- Access.h - Checked accesses to memory ------------------------------===//
+
+#ifndef PIKO_TEST_DRIVER_PTX_ACCESS_H
+#define PIKO_TEST_DRIVER_PTX_ACCESS_H
+
+#include "ptx/Lanes.h"
+
+namespace piko::ptx {
+
+/// Looks a global address up that is not in the range that the instruction used
+/// last. Faults if it is in no memory.
+void findRange(const Warp &warp, const Instruction &it, uint32_t lane,
+               uint64_t address, uint32_t bytes);
+
+/// Faults: an address beyond its memory, or not a multiple of its size.
+[[noreturn]] void faultAt(const Warp &warp, FaultKind kind, Space space,
+                          uint32_t lane, uint64_t address, uint32_t bytes);
+
+/// The sectors of 32 bytes that a warp touches with one instruction.
+class Sectors {
+public:
+  void add(uint64_t address) {
+    uint64_t sector = address >> 5;
+    if (count && sector <= greatest) {
+      for (uint32_t i = count; i-- > 0;)
+        if (seen[i] == sector)
+          return;
+    } else {
+      greatest = sector;
+    }
+    seen[count++] = sector;
+  }
+  uint32_t size() const { return count; }
+
+private:
+  std::array<uint64_t, warpSize> seen;
+  uint64_t greatest = 0;
+  uint32_t count = 0;
+};
+
+inline uint8_t *inRegion(const Warp &warp, Space space, uint32_t lane,
+                         uint64_t address, uint32_t bytes, uint8_t *region,
+                         uint64_t start, uint64_t size) {
+  uint64_t offset = address - start;
+  if (size < bytes || offset > size - bytes)
+    faultAt(warp, FaultKind::IllegalAddress, space, lane, address, bytes);
+  return region + offset;
+}
+
+/// Where an address lies in the host's memory. \p sectors counts global ones.
+template <Space space>
+inline uint8_t *locate(const Warp &warp, const Instruction &it, uint32_t lane,
+                       uint64_t address, uint32_t bytes, Sectors &sectors) {
+  if (address & (bytes - 1))
+    faultAt(warp, FaultKind::MisalignedAddress, space, lane, address, bytes);
+  if constexpr (space == Space::Global || space == Space::Const) {
+    const Site &site = *warp.site;
+    if (address < site.begin || address > site.end - bytes)
+      findRange(warp, it, lane, address, bytes);
+    sectors.add(address);
+    return reinterpret_cast<uint8_t *>(address + site.distance);
+  } else if constexpr (space == Space::Shared) {
+    return inRegion(warp, space, lane, address, bytes, warp.shared, sharedStart,
+                    warp.sharedBytes);
+  } else if constexpr (space == Space::Local) {
+    return inRegion(warp, space, lane, address, bytes,
+                    warp.local + uint64_t(lane) * warp.program->localBytes,
+                    localStart, warp.program->localBytes);
+  } else if constexpr (space == Space::Param) {
+    if (address < callStart)
+      return inRegion(warp, space, lane, address, bytes,
+                      const_cast<uint8_t *>(warp.parameters), 0,
+                      warp.program->parameterBytes);
+    return inRegion(warp, space, lane, address, bytes,
+                    warp.calls + uint64_t(lane) * warp.program->callBytes,
+                    callStart, warp.program->callBytes);
+  } else {
+    switch (address & windowMask) {
+    case sharedWindow:
+      return locate<Space::Shared>(warp, it, lane, address & ~windowMask, bytes,
+                                   sectors);
+    case localWindow:
+      return locate<Space::Local>(warp, it, lane, address & ~windowMask, bytes,
+                                  sectors);
+    case parameterWindow:
+      return locate<Space::Param>(warp, it, lane, address & ~windowMask, bytes,
+                                  sectors);
+    default:
+      return locate<Space::Global>(warp, it, lane, address, bytes, sectors);
+    }
+  }
+}
+
+inline uint64_t addressOf(const Warp &warp, const Instruction &it,
+                          uint32_t lane) {
+  uint64_t base = it.a.bytes == 8 ? warp.lanes<uint64_t>(it.a)[lane]
+                                  : warp.lanes<uint32_t>(it.a)[lane];
+  return base + static_cast<uint64_t>(it.offset);
+}
+
+} // namespace piko::ptx
+
+#endif // PIKO_TEST_DRIVER_PTX_ACCESS_H

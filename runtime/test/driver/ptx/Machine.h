@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//===- Machine.h - Launches of kernels ------------------------------------===//
+
+#ifndef PIKO_TEST_DRIVER_PTX_MACHINE_H
+#define PIKO_TEST_DRIVER_PTX_MACHINE_H
+
+#include "ptx/Warp.h"
+
+#include <memory>
+
+namespace piko::ptx {
+
+/// Global memory: what kernels may access.
+class Memory {
+public:
+  /// Addresses, and how far behind each of them its memory lies in the host.
+  struct Range {
+    uint64_t begin = 0, end = 0, distance = 0;
+  };
+  virtual ~Memory() = default;
+  /// The allocation or variable that an address lies in; empty if there is
+  /// none.
+  virtual Range find(uint64_t address) const = 0;
+  /// What is known of an address that lies in none; empty if nothing.
+  virtual std::string describe(uint64_t address) const { return {}; }
+};
+
+struct Launch {
+  const Program &program;
+  const Memory &memory;
+  std::string_view source; ///< The module's text, for messages.
+  std::array<uint32_t, 3> blocks, threads;
+  uint32_t dynamicSharedBytes = 0;
+  std::vector<uint8_t> parameters;
+  uint64_t seed = 0; ///< Of the order of blocks; 0: as they are numbered.
+  std::vector<Site> sites;
+};
+
+/// The block that runs, and its warps.
+class Block {
+public:
+  explicit Block(Launch &launch);
+  void run(uint64_t number);
+  /// A group of a warp has come to a barrier.
+  void arrive() { arrived = true; }
+
+  Launch &launch;
+  std::array<uint32_t, 3> index{};
+  uint32_t threadCount;
+  uint64_t sharedSize;
+
+private:
+  bool releaseBarriers();
+  uint32_t liveThreads() const;
+  [[noreturn]] void reportDeadlock() const;
+
+  bool arrived = false;
+  std::vector<uint64_t> sharedMemory;
+  std::vector<std::unique_ptr<Warp>> warps;
+};
+
+/// Runs all blocks. Throws Fault.
+void run(Launch &launch);
+
+} // namespace piko::ptx
+
+#endif // PIKO_TEST_DRIVER_PTX_MACHINE_H
