@@ -158,6 +158,14 @@ struct Stream : Items {
   std::vector<Array<uint8_t>> blocks;
 };
 
+/// What an accelerator sees of an input that lies elsewhere.
+struct InputMirrors {
+  Array<uint8_t> items;
+  Array<uint32_t> order;
+  Array<pikoir_unit> units;
+  Array<pikoir_call> calls;
+};
+
 class Serial;         // Serial.h
 struct PrivateCopies; // PrivateCopies.h
 
@@ -173,6 +181,7 @@ struct Kernel {
   // From begin to end.
   Stream stream;
   pikoir_input input{};
+  InputMirrors mirrors;
 
   // From begin until all outputs are gathered.
   Array<int64_t> offsets;
@@ -182,7 +191,6 @@ struct Kernel {
   Array<uint32_t> places;
   Array<pikoir_call> calls; ///< If Process takes a list.
   std::vector<pikoir_unit> units;
-  Array<pikoir_unit> sharedUnits; ///< The same for an accelerator.
   bool ownsUnits = false; ///< Some belong to a thread that is not the first.
   std::atomic<int64_t> nextUnit = 0; ///< For any thread.
   int64_t positions = 0;

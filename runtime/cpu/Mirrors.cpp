@@ -55,3 +55,33 @@ void piko::rt::endMirrors(pikort_pipeline &p) {
     if (source.hosts)
       source.data = std::exchange(source.hosts, nullptr);
 }
+
+/// Lets `data` point to a copy of its elements.
+template <class T>
+static void share(pikort_pipeline &p, Array<T> &mirror, const T *&data,
+                  int64_t count) {
+  mirror = {};
+  if (!data || count == 0)
+    return;
+  mirror = Array<T>(p.memory, count);
+  std::copy_n(data, count, mirror.data());
+  data = mirror.data();
+}
+
+void piko::rt::shareUnits(pikort_pipeline &p, Kernel &kernel) {
+  pikoir_input &input = kernel.input;
+  if (p.accelerator)
+    share(p, kernel.mirrors.units, input.units, input.unit_count);
+}
+
+void piko::rt::shareInput(pikort_pipeline &p, Kernel &kernel, int64_t records) {
+  if (!p.accelerator)
+    return;
+  pikoir_input &input = kernel.input;
+  InputMirrors &mirrors = kernel.mirrors;
+  shareUnits(p, kernel);
+  share(p, mirrors.items, input.items,
+        records * p.records[p.stages[kernel.stage].record].size);
+  share(p, mirrors.order, input.order, input.count);
+  share(p, mirrors.calls, input.calls, input.call_count);
+}

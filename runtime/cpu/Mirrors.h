@@ -4,7 +4,7 @@
 #ifndef PIKO_RUNTIME_CPU_MIRRORS_H
 #define PIKO_RUNTIME_CPU_MIRRORS_H
 
-#include "common/Pipeline.h"
+#include "cpu/Kernel.h"
 
 namespace piko::rt {
 
@@ -13,6 +13,11 @@ namespace piko::rt {
 void beginMirrors(pikort_pipeline &p);
 /// Puts the host's memory back, with what kernels have written.
 void endMirrors(pikort_pipeline &p);
+
+/// Lets an accelerator read a kernel's units, or all of its input, in which
+/// `records` primitives lie; throws.
+void shareUnits(pikort_pipeline &p, Kernel &kernel);
+void shareInput(pikort_pipeline &p, Kernel &kernel, int64_t records);
 
 } // namespace piko::rt
 

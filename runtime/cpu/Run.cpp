@@ -3,6 +3,7 @@
 
 #include "cpu/Check.h"
 #include "cpu/Cycle.h"
+#include "cpu/Mirrors.h"
 #include "cpu/PrivateCopies.h"
 #include "cpu/Strips.h"
 
@@ -26,7 +27,7 @@ void Kernel::clear() {
   keys = {};
   counts.clear();
   units.clear();
-  sharedUnits = {};
+  mirrors = {};
   for (auto &lane : lanes)
     lane->clear();
   firstRound = true;
@@ -43,24 +44,17 @@ static void publish(pikort_pipeline &p, Kernel &kernel) {
   const uint32_t *order = kernel.places  ? kernel.places.data()
                           : kernel.order ? kernel.order.data()
                                          : kernel.stream.index;
-  const pikoir_unit *units = kernel.units.data();
-  if (p.accelerator) {
-    kernel.sharedUnits =
-        Array<pikoir_unit>(p.memory, static_cast<int64_t>(kernel.units.size()));
-    std::copy(kernel.units.begin(), kernel.units.end(),
-              kernel.sharedUnits.data());
-    units = kernel.sharedUnits.data();
-  }
   kernel.input = {kernel.stream.items,
                   kernel.positions,
                   order,
                   kernel.offsets.data(),
-                  units,
+                  kernel.units.data(),
                   static_cast<int64_t>(kernel.units.size()),
                   kernel.source >= 0 ? 1 : stage.tiles,
                   kernel.calls.data(),
                   kernel.calls.size(),
                   /*clears=*/0};
+  shareUnits(p, kernel);
 }
 
 static void openLanes(pikort_pipeline &p, Kernel &kernel) {

@@ -2,6 +2,7 @@
 //===- Serial.cpp - Launches that are too small for threads ---------------===//
 
 #include "cpu/Serial.h"
+#include "cpu/Mirrors.h"
 
 #include <algorithm>
 
@@ -129,6 +130,7 @@ void Serial::begin(const Items &input) {
                    stage_.tiles,
                    stage_.takesList() ? calls_.data() : nullptr,
                    static_cast<int64_t>(calls_.size())};
+  shareInput(p_, kernel_, input.reach());
 }
 
 void Serial::binPairs(const Items &input) {

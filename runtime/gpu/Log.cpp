@@ -71,6 +71,7 @@ private:
   void replayUnit(int64_t unit, const Spans &spans);
   void replay(pikoir_writer *writer, const pikoir_entry &entry);
   void fail(const pikoir_entry &entry);
+  void failAll(std::vector<const pikoir_entry *> &errors);
 };
 
 } // namespace
@@ -130,6 +131,18 @@ void GridLog::fail(const pikoir_entry &entry) {
   }
 }
 
+/// In the order of primitives, each in that of its threads.
+void GridLog::failAll(std::vector<const pikoir_entry *> &errors) {
+  auto positionOf = [](const pikoir_entry *entry) {
+    return reinterpret_cast<const int64_t *>(entry + 1)[3];
+  };
+  std::stable_sort(errors.begin(), errors.end(), [&](auto *a, auto *b) {
+    return positionOf(a) < positionOf(b);
+  });
+  for (const pikoir_entry *error : errors)
+    fail(*error);
+}
+
 void GridLog::replay(pikoir_writer *writer, const pikoir_entry &entry) {
   int32_t port = entry.number;
   switch (entry.kind) {
@@ -145,10 +158,8 @@ void GridLog::replay(pikoir_writer *writer, const pikoir_entry &entry) {
     return isSource ? pikoir_place_source(writer, cell)
                     : pikoir_place(writer, port, cell);
   }
-  case PIKOIR_ENTRY_NEXT:
-    return pikoir_next(writer);
   default:
-    return fail(entry);
+    return pikoir_next(writer);
   }
 }
 
@@ -162,6 +173,7 @@ void GridLog::replayUnit(int64_t unit, const Spans &spans) {
       writers.emplace_back(
           static_cast<int32_t>(s),
           pikoir_open(&pipeline, static_cast<int32_t>(s), unit));
+  std::vector<const pikoir_entry *> errors;
   for (const pikoir_span &span : spans)
     for (int64_t at = span.begin; at != span.end;) {
       const auto *entry = reinterpret_cast<const pikoir_entry *>(at);
@@ -169,11 +181,14 @@ void GridLog::replayUnit(int64_t unit, const Spans &spans) {
         std::memcpy(&at, &entry->number, sizeof(at));
         continue;
       }
+      if (entry->kind == PIKOIR_ENTRY_ERROR)
+        errors.push_back(entry);
       for (auto [stage, writer] : writers)
-        if (stage == entry->stage)
+        if (entry->kind != PIKOIR_ENTRY_ERROR && stage == entry->stage)
           replay(writer, *entry);
       at += entry->bytes;
     }
+  failAll(errors);
   for (auto it = writers.rbegin(); it != writers.rend(); ++it)
     pikoir_close(it->second);
 }

@@ -1,11 +1,13 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
-"""Runs every pipeline of every example on a GPU that the CPU plays.
+"""Runs every pipeline of every example on a GPU.
 
-  piko-gpu-examples.py --bin build/bin
+  piko-gpu-examples.py --bin build/bin --driver build/lib/libpiko-test-driver.so
   piko-gpu-examples.py --bin build/bin --only raster --jobs 1
 
-Each runs in blocks of 32 and of 64 threads, in two orders of blocks. Pictures must
+Each runs on one that the CPU plays, in blocks of 32 threads, and as PTX on a CUDA
+device, in blocks of 64: behind NVIDIA's driver, or the one that is given, such as
+the driver for tests, with two orders of blocks. Pictures must
 equal, bit for bit, those of the CPU, which other tests hold to the reference
 executor; what draws no picture is compared with the reference executor on random
 primitives. Prints each difference with the command that shows it again; the exit
@@ -25,8 +27,8 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 sys.path.insert(0, str(ROOT / "test" / "mappings"))
 write_torus = __import__("piko-mappings").write_torus
 
-BLOCKS = [["--gpu-threads", "32", "--gpu-seed", "1"],
-          ["--gpu-threads", "64", "--gpu-seed", "2"]]
+TARGETS = [["--target", "gpu-on-cpu", "--gpu-threads", "32", "--gpu-seed", "1"],
+           ["--target", "cuda", "--gpu-threads", "64"]]
 SIZE = ["--width", "41", "--height", "29", "--lights", "2", "--frames", "1",
         "--warmup", "0", "--json"]
 SCENES = {"reyes": [str(ROOT / "examples/reyes/knot.bpt"), "--set", "rate=6"]}
@@ -47,11 +49,11 @@ def run(command, folder):
     return done.stdout
 
 
-def compare(tools, folder, file, pipe, block):
+def compare(tools, folder, file, pipe, target):
     name = file.parent.name
     run([tools / "piko-compare", file, "--pipe", pipe, "--domain",
          *COMPARED[name], "--count", "300", "--runs", "1", "--threads", "2",
-         "--target", "gpu-on-cpu", *block], folder)
+         *target], folder)
 
 
 def draw(tools, folder, file, pipe, rest):
@@ -62,15 +64,14 @@ def draw(tools, folder, file, pipe, rest):
 
 def check(tools, folder, file, pipe, expected):
     if file.parent.name in COMPARED:
-        for block in BLOCKS:
-            compare(tools, folder, file, pipe, block)
+        for target in TARGETS:
+            compare(tools, folder, file, pipe, target)
         return
     expected = expected.result()
     if not expected["pixels"]:
         raise Failed(f"{file.name} {pipe} draws nothing")
-    for block in BLOCKS:
-        command, actual = draw(tools, folder, file, pipe,
-                               ["--target", "gpu-on-cpu", *block])
+    for target in TARGETS:
+        command, actual = draw(tools, folder, file, pipe, target)
         if actual["image_hash"] != expected["image_hash"]:
             raise Failed(f"another picture than the CPU's: "
                          f"{' '.join(map(str, command))}")
@@ -80,10 +81,14 @@ def main():
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--bin", default=str(ROOT / "build/bin"))
+    parser.add_argument("--driver", help="in place of libcuda.so.1")
     parser.add_argument("--only", help="an example")
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     arguments = parser.parse_args()
     tools = pathlib.Path(arguments.bin).resolve()
+    if arguments.driver:
+        os.environ["PIKO_CUDA_DRIVER"] = str(pathlib.Path(arguments.driver).resolve())
+    os.environ.setdefault("PIKO_TEST_DRIVER_SEED", "2")
 
     tasks = []
     for file in sorted(ROOT.glob("examples/*/*.piko.cpp")):

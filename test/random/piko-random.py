@@ -52,7 +52,7 @@ def passes_of(args, seed=None):
 
 
 def runner_of(args, passes, first, **options):
-    target = gpu_options(first) if args.gpu else ()
+    target = gpu_options(first, args.gpu) if args.gpu else ()
     if args.cpu:
         target = ["--cpu", args.cpu]
     return Runner(args.tool, args.mlir, passes, strip=args.strip, target=target, **options)
@@ -74,9 +74,9 @@ def command_of(args, first, seed):
     options = [f"--{name} {value}" for name, value in [
         ("features", args.features), ("without", args.without),
         ("leave-out", ",".join(passes_of(args, first))), ("strip", args.strip),
-        ("cpu", args.cpu)] if value]
+        ("cpu", args.cpu), ("gpu", args.gpu)] if value]
     return " ".join([f"{sys.argv[0]} reduce --tool {args.tool} --seed {seed}", *options] +
-                    ["--mlir"] * args.mlir + ["--gpu"] * args.gpu)
+                    ["--mlir"] * args.mlir)
 
 
 def command_run(args):
@@ -153,8 +153,10 @@ def main():
     parser.add_argument("--table", action="store_true", help="count the features")
     parser.add_argument("--mlir", action="store_true",
                         help="compile the text of the dialect, not C++")
-    parser.add_argument("--gpu", action="store_true",
-                        help="run kernels on a GPU that the CPU plays")
+    parser.add_argument("--gpu", nargs="?", const="gpu-on-cpu",
+                        choices=["gpu-on-cpu", "cuda", "any"],
+                        help="run kernels on a GPU that the CPU plays, or on one "
+                             "behind $PIKO_CUDA_DRIVER")
     parser.add_argument("--cpu", default="",
                         help="the processor to compile for (this machine's)")
     parser.add_argument("--strip", type=int, default=0,

@@ -33,11 +33,15 @@ def choose_passes(seed):
     return [p for p in PASSES if r.random() < 0.4] if r.random() < 0.4 else []
 
 
-def gpu_options(seed):
-    """How the file that begins with this pipeline runs on a GPU."""
+def gpu_options(seed, target):
+    """How the file that begins with this pipeline runs on a GPU, or on either
+    kind."""
     r = random.Random(seed)
-    return ["--target", "gpu-on-cpu", "--gpu-threads", str(r.choice([1, 32, 64, 128])),
-            "--gpu-seed", str(r.randrange(1000))]
+    threads = ["--gpu-threads", str(r.choice([1, 32, 64, 128]))]
+    order = ["--gpu-seed", str(r.randrange(1000))]
+    if target == "any":
+        target = r.choice(["cuda", "gpu-on-cpu"])
+    return ["--target", target, *threads, *(order if target != "cuda" else [])]
 
 
 def case_of(pipe):

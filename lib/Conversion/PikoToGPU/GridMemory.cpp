@@ -7,8 +7,6 @@
 
 #include "Piko/Dialect/Piko/IR/PikoGPU.h"
 
-#include "pikort/grid.h"
-
 using namespace mlir;
 using namespace piko;
 
@@ -37,6 +35,16 @@ void GridMemory::clearOutboxes(OpBuilder &builder) {
     memref::StoreOp::create(
         builder, loc, zero, outboxes,
         arith::ConstantIndexOp::create(builder, loc, i).getResult());
+}
+
+void GridMemory::setPosition(OpBuilder &builder, Value position) {
+  Location loc = launch.getLoc();
+  Value word =
+      arith::IndexCastOp::create(builder, loc, builder.getI64Type(), position);
+  memref::StoreOp::create(
+      builder, loc, word, outboxes,
+      arith::ConstantIndexOp::create(builder, loc, PIKOIR_OUTBOX_POSITION)
+          .getResult());
 }
 
 static Value createPlace(OpBuilder &builder, Location loc, int64_t base) {

@@ -4,8 +4,8 @@
 //   1. make a launch with a block for each unit of the stored bins, and in it
 //      loops over its cells and their primitives (GridFormer);
 //   2. if all that others see of it are pixels, share these among the block's
-//      threads, and take primitives in groups, whose fields the block copies to
-//      its memory;
+//      threads, and take primitives in groups, whose setup the threads share
+//      (PixelSharing.cpp, ItemSetup.cpp);
 //   3. otherwise choose who takes which loop (SharedLoops.cpp) and map the
 //      block's work to its threads (BlockMapping.cpp);
 //   4. convert access to state, and open a log for what the grid leaves.
@@ -87,13 +87,10 @@ private:
   void hoistPrivateArrays();
   void upliftLoops();
   ThreadTile createTile();
-  void groupItems();
   LogicalResult mapLoop(ParallelLoopOpInterface loop, MappingCounts &counts);
   void obeyLanes();
   LogicalResult mapPieces(ParallelForOp loop, bool isOne);
   LogicalResult convertAccess();
-  /// The fields that are read by name alone, or none if they are too large.
-  llvm::MapVector<StringAttr, SmallVector<GetOp>> collectFields(ItemOp item);
 
   KernelOp kernel;
   StageOp stage;
@@ -319,73 +316,6 @@ ThreadTile GridBuilder::createTile() {
   return tile;
 }
 
-llvm::MapVector<StringAttr, SmallVector<GetOp>>
-GridBuilder::collectFields(ItemOp item) {
-  llvm::MapVector<StringAttr, SmallVector<GetOp>> fields;
-  for (Operation *user : item->getUsers())
-    if (auto get = dyn_cast<GetOp>(user); get && get.getElements().empty())
-      fields[get.getFieldAttr()].push_back(get);
-  int64_t bytes = 0;
-  for (auto &[name, gets] : fields)
-    bytes += threads * llvm::divideCeil(
-                           gets.front().getType().getIntOrFloatBitWidth(), 8);
-  // Errors need eight bytes for each thread.
-  if (bytes > maxBlockBytes - 8 * threads)
-    fields.clear();
-  return fields;
-}
-
-void GridBuilder::groupItems() {
-  OpBuilder builder(items);
-  Value begin = items.getLowerBound(), end = items.getUpperBound();
-  Value thread = launch.getThreadIds().x;
-  auto item = *items.getBody()->getOps<ItemOp>().begin();
-  auto fields = collectFields(item);
-  auto groups =
-      scf::ForOp::create(builder, loc, begin, end, launch.getBlockSizeX());
-  builder.setInsertionPointToStart(groups.getBody());
-  Value base = groups.getInductionVar();
-
-  if (!fields.empty()) {
-    Value at = arith::AddIOp::create(builder, loc, base, thread);
-    Value inside =
-        arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::slt, at, end);
-    auto copy = scf::IfOp::create(builder, loc, inside);
-    OpBuilder body = copy.getThenBodyBuilder();
-    Value prim =
-        ItemOp::create(body, item.getLoc(), item.getType(), item.getBins(), at);
-    for (auto &[name, gets] : fields) {
-      Type type = gets.front().getType();
-      Value memory = addBlockMemory(launch, threads, type);
-      Value value = GetOp::create(body, gets.front().getLoc(), type, prim, name,
-                                  ValueRange());
-      memref::StoreOp::create(body, loc, value, memory, thread);
-      for (GetOp get : gets) {
-        OpBuilder here(get);
-        Value copied = memref::LoadOp::create(here, get.getLoc(), memory,
-                                              items.getInductionVar());
-        get.replaceAllUsesWith(copied);
-        get.erase();
-      }
-    }
-    gpu::BarrierOp::create(builder, loc);
-  }
-
-  Value left = arith::SubIOp::create(builder, loc, end, base);
-  Value count =
-      arith::MinSIOp::create(builder, loc, left, launch.getBlockSizeX());
-  items->moveBefore(groups.getBody()->getTerminator());
-  items.setLowerBound(arith::ConstantIndexOp::create(builder, loc, 0));
-  items.setUpperBound(count);
-  if (!fields.empty()) {
-    builder.setInsertionPoint(groups.getBody()->getTerminator());
-    gpu::BarrierOp::create(builder, loc);
-  }
-  builder.setInsertionPoint(item);
-  item.getPositionMutable().assign(
-      arith::AddIOp::create(builder, loc, base, items.getInductionVar()));
-}
-
 LogicalResult GridBuilder::convertAccess() {
   RewritePatternSet patterns(kernel.getContext());
   populatePikoToSCFPatterns(patterns);
@@ -404,10 +334,11 @@ LogicalResult GridBuilder::sharePixelsOfBins(SharingCounts &counts) {
   if (failed(findItems()))
     return failure();
   upliftLoops();
-  if (failed(sharePixels(items, createTile(), counts)))
+  ThreadTile tile = createTile();
+  if (failed(sharePixels(items, tile, counts)))
     return failure();
   hoistPrivateArrays();
-  groupItems();
+  shareSetup(items, tile, memory);
   if (failed(convertAccess()))
     return failure();
   finishGrid();

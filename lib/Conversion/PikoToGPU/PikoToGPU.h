@@ -8,6 +8,8 @@
 #include "Piko/Conversion/Passes.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
+#include "pikort/grid.h"
+
 #include "mlir/Dialect/GPU/IR/GPUDialect.h"
 #include "mlir/Dialect/MemRef/IR/MemRef.h"
 #include "mlir/Dialect/SCF/IR/SCF.h"
@@ -56,6 +58,13 @@ struct SharingCounts {
 llvm::LogicalResult sharePixels(mlir::scf::ForOp items, const ThreadTile &tile,
                                 SharingCounts &counts);
 
+struct GridMemory;
+/// Lets each thread of a block compute what depends on a primitive alone for
+/// another one, in groups of as many as there are threads, in a loop whose
+/// pixels they share.
+void shareSetup(mlir::scf::ForOp items, const ThreadTile &tile,
+                GridMemory &memory);
+
 /// How the threads of a block take a loop over primitives or iterations.
 enum class ThreadMapping {
   One,     ///< One after the other; loops inside may be shared.
@@ -88,6 +97,8 @@ struct GridMemory {
   int64_t getLocalBase(LocalBinOp local);
   void flush(mlir::OpBuilder &builder);
   void clearOutboxes(mlir::OpBuilder &builder);
+  /// Which primitive errors are about from here on.
+  void setPosition(mlir::OpBuilder &builder, mlir::Value position);
   void setLocalCount(mlir::OpBuilder &builder, LocalBinOp local,
                      mlir::Value count);
   mlir::Value getLocalCount(mlir::OpBuilder &builder, LocalBinOp local);

@@ -162,11 +162,13 @@ bool piko::createErrorEntry(OpBuilder &builder, Operation *op,
                   text, createI32(host, loc, code)});
   }
   Value payload =
-      createEntry(builder, op, *grid, EntryKind::Error, place, 3 * 8);
+      createEntry(builder, op, *grid, EntryKind::Error, place, 4 * 8);
   SmallVector<Value> words{bin ? toI64(builder, loc, bin)
                                : createI64(builder, loc, -1)};
   llvm::append_range(words, numbers);
   words.resize(3, createI64(builder, loc, 0));
+  words.push_back(
+      GridCode(builder, loc).get(grid->outboxes, PIKOIR_OUTBOX_POSITION));
   for (auto [i, word] : llvm::enumerate(words))
     LLVM::StoreOp::create(builder, loc, word,
                           createOffset(builder, loc, payload, 8 * i));

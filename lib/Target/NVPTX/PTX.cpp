@@ -48,6 +48,20 @@ static Value *writeApproximation(IRBuilderBase &builder, Approximation kind,
   return refine(builder, kind, x, first);
 }
 
+/// The optimizer may join accesses to 16 bytes, and takes it that the variable
+/// is aligned for them: so it shall be from the start.
+static void alignBlockMemory(Module &module) {
+  constexpr unsigned sharedSpace = 3;
+  for (GlobalVariable &variable : module.globals())
+    if (variable.getAddressSpace() == sharedSpace) {
+      uint64_t bytes =
+          module.getDataLayout().getTypeAllocSize(variable.getValueType());
+      Align wanted(std::min<uint64_t>(
+          16, llvm::bit_floor(std::max<uint64_t>(bytes, 1))));
+      variable.setAlignment(std::max(wanted, variable.getAlign().valueOrOne()));
+    }
+}
+
 Expected<std::string> piko::generatePTX(Module &module, StringRef processor,
                                         int optLevel) {
   auto machine =
@@ -55,6 +69,7 @@ Expected<std::string> piko::generatePTX(Module &module, StringRef processor,
   if (!machine)
     return machine.takeError();
   replaceApproximations(module, writeApproximation);
+  alignBlockMemory(module);
   return emitCode(module, **machine, {.level = optLevel},
                   CodeGenFileType::AssemblyFile);
 }

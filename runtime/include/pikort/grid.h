@@ -28,7 +28,7 @@ enum {
   PIKOIR_ENTRY_RECORD = 0, ///< Of port `number`: the record.
   PIKOIR_ENTRY_CELL = 1,   ///< Of port `number`: int64_t cell.
   PIKOIR_ENTRY_NEXT = 2,
-  PIKOIR_ENTRY_ERROR = 3, ///< At place `number`: int64_t bin, a, b.
+  PIKOIR_ENTRY_ERROR = 3, ///< At place `number`: int64_t bin, a, b, position.
   PIKOIR_ENTRY_LINK = 4, ///< It goes on at the address in `number` and `stage`.
   PIKOIR_ENTRY_KEPT = 5  ///< A record of a local edge that was placed.
 };
@@ -64,7 +64,10 @@ enum {
   PIKOIR_OUTBOX_BYTES = 3, ///< Of the piece that it is in.
   PIKOIR_OUTBOX_LAST = 4,  ///< The last record.
   PIKOIR_OUTBOX_KEPT = 5,  ///< How many were placed.
-  PIKOIR_OUTBOX_WORDS = 6
+  /// Of the primitive that errors are about, where a thread does not take them
+  /// in order; in the first outbox.
+  PIKOIR_OUTBOX_POSITION = 6,
+  PIKOIR_OUTBOX_WORDS = 7
 };
 /// Words of a block that a flush needs: one for each warp, and one.
 #define PIKOIR_FLUSH_CELLS 33

@@ -8,9 +8,9 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 // CHECK:         %[[LOG:.*]] = piko.gpu.open_log
 // CHECK:         gpu.launch {{.*}}threads(%[[T:[a-z0-9]+]],
 // CHECK-SAME:        workgroup(%[[CELLS:.*]] : memref<33xi64, {{.*}}>, %[[KEPT:.*]] : memref<4xi64, #gpu.address_space<workgroup>>
-// CHECK:           %[[BOXES:.*]] = memref.alloca() : memref<12xi64>
+// CHECK:           %[[BOXES:.*]] = memref.alloca() : memref<14xi64>
 // CHECK-COUNT-4:   memref.store %c0_i64, %[[KEPT]]
-// CHECK:           piko.gpu.outboxes %[[LOG]] in %[[BOXES]] : memref<12xi64> local [@start] [0] in %[[KEPT]]
+// CHECK:           piko.gpu.outboxes %[[LOG]] in %[[BOXES]] : memref<14xi64> local [@start] [0] in %[[KEPT]]
 // CHECK:           %[[OTHER:.*]] = piko.gpu.log_of %[[LOG]] of @last
 // CHECK:             piko.storage.append %[[LOG]][0]
 // CHECK:             piko.storage.append_bin %[[LOG]][0] of @last

@@ -9,7 +9,7 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 // CHECK:         %[[LOG:.*]] = piko.gpu.open_log
 // CHECK:         gpu.launch blocks(%[[UNIT:[a-z0-9]+]], {{.*}}threads(%[[T:[a-z0-9]+]],
 // CHECK-SAME:        workgroup(%[[CELLS:.*]] : memref<33xi64, #gpu.address_space<workgroup>>)
-// CHECK:           %[[BOX:.*]] = memref.alloca() : memref<6xi64>
+// CHECK:           %[[BOX:.*]] = memref.alloca() : memref<7xi64>
 // CHECK-COUNT-6:   memref.store %c0_i64, %[[BOX]]
 // CHECK:           piko.gpu.outboxes %[[LOG]] in %[[BOX]]
 // CHECK:           %[[BEGIN:.*]], %[[END:.*]] = piko.storage.cell_range

@@ -13,19 +13,33 @@ piko.record @Pixel {"n" : i32 at 0} size 4 align 4
 // CHECK:         scf.if
 // CHECK:           %[[LOG:.*]] = piko.gpu.open_log %[[BINS]]
 // CHECK:           gpu.launch blocks(%[[UNIT:[a-z0-9]+]], {{.*}}) in (%{{.*}} = %[[UNITS]], {{.*}}) threads(%[[T:[a-z0-9]+]], {{.*}}) in (%{{.*}} = %c8, %{{[^)]*}})
-// CHECK-SAME:        workgroup(%{{.*}} : memref<33xi64, #gpu.address_space<workgroup>>, %[[X:.*]] : memref<8xi32, #gpu.address_space<workgroup>>, %[[Y:.*]] : memref<8xi32, #gpu.address_space<workgroup>>, %[[TO:.*]] : memref<8xi32, #gpu.address_space<workgroup>>)
+// CHECK-SAME:        workgroup(%{{[a-z0-9]*}} : memref<33xi64, #gpu.address_space<workgroup>>, %[[X:[a-z0-9]*]] : memref<8xi32, #gpu.address_space<workgroup>>, %[[Y:[a-z0-9]*]] : memref<8xi32, #gpu.address_space<workgroup>>, %[[SPAN:[a-z0-9]*]] : memref<8xi32, #gpu.address_space<workgroup>>, %[[ANY:[a-z0-9]*]] : memref<8xi8, #gpu.address_space<workgroup>>)
 // Threads are 4 wide and 2 high.
 // CHECK:             %[[TX:.*]] = arith.remui %[[T]], %c4
 // CHECK:             %[[ROW:.*]] = arith.divui %[[T]], %c4
 // CHECK:             piko.storage.unit_cells %[[BINS]][%[[UNIT]]]
 // CHECK:             piko.storage.cell_range %[[BINS]][%[[UNIT]],
-// The block copies the fields of 8 primitives.
+// Each thread does the setup of one of 8 primitives, and notes which one errors
+// are about: fields, and what the pixels need of "to" and "x".
 // CHECK:             scf.for %[[BASE:.*]] = %{{.*}} to %{{.*}} step %c8
-// CHECK:               piko.storage.item
-// CHECK:               memref.store %{{.*}}, %[[X]][%[[T]]]
+// CHECK:               %[[MINE:.*]] = arith.addi %[[BASE]], %[[T]]
+// CHECK:               scf.if
+// CHECK:                 %[[POSITION:.*]] = arith.index_cast %[[MINE]]
+// CHECK:                 memref.store %[[POSITION]], %{{.*}}[%c6]
+// CHECK:                 %[[ITEM:.*]] = piko.storage.item %{{.*}}[%[[MINE]]]
+// CHECK:                 %[[FROM:.*]] = piko.get %[[ITEM]] "x"
+// CHECK:                 memref.store %[[FROM]], %[[X]][%[[T]]]
+// CHECK:                 memref.store %{{.*}}, %[[Y]][%[[T]]]
+// CHECK:                 %[[TO:.*]] = piko.get %[[ITEM]] "to"
+// CHECK:                 %[[D:.*]] = arith.subi %[[TO]], %[[FROM]]
+// CHECK:                 memref.store %[[D]], %[[SPAN]][%[[T]]]
+// CHECK:                 arith.extui
+// CHECK:                 memref.store %{{.*}}, %[[ANY]][%[[T]]]
 // CHECK:               gpu.barrier
+// CHECK-NOT:           piko.get
 // CHECK:               scf.for %[[K:.*]] = %c0
 // CHECK:                 memref.load %[[X]][%[[K]]]
+// CHECK:                 memref.load %[[SPAN]][%[[K]]]
 // The row is behind a test of whose it is; the loop along it has a step of 4.
 // CHECK:                 arith.shrui %{{.*}}, %c2_i32
 // CHECK:                 %[[REST:.*]] = arith.andi %{{.*}}, %c1_i32

@@ -8,7 +8,7 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 // CHECK:         %[[LOG:.*]] = llvm.call @pikoir_log_open
 // CHECK:         gpu.launch blocks(%[[BLOCK:[a-z0-9]+]], {{.*}} threads(%[[T:[a-z0-9]+]],
 // CHECK-SAME:        workgroup(%[[CELLS:[a-z0-9]+]] :
-// CHECK:           %[[BOX:.*]] = memref.alloca() : memref<6xi64>
+// CHECK:           %[[BOX:.*]] = memref.alloca() : memref<7xi64>
 // An entry of 32 bytes: its header and the record.
 // CHECK:           %[[CURSOR:.*]] = memref.load %[[BOX]][%c1]
 // CHECK:           %[[END:.*]] = arith.addi %[[CURSOR]], %c32_i64

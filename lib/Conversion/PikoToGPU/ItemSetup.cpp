@@ -1,0 +1,325 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Loop fission of a loop over primitives whose pixels the threads of a block
+// share. What depends on the primitive alone, its setup, would be computed by
+// every thread alike; instead each thread computes that of another primitive:
+//
+//   for each group of as many primitives as threads
+//     setup of mine; what the pixels need of it goes to the block's memory
+//     barrier
+//     for each primitive of the group
+//       my pixels, from the block's memory
+//     barrier
+//
+// An operation is left to the pixels if it has an effect, knows the thread or
+// an array, is in a loop with such an operation, or needs the result of one.
+// Where one is in an scf.if that is the same for all threads, both loops have
+// that scf.if. Errors keep the order of primitives, because each notes which
+// one it is about.
+
+#include "PikoToGPU.h"
+
+#include "Piko/Dialect/Piko/IR/PikoCPU.h"
+
+#include "mlir/IR/IRMapping.h"
+#include "mlir/Interfaces/LoopLikeInterface.h"
+#include "mlir/Interfaces/SideEffectInterfaces.h"
+#include "llvm/ADT/MapVector.h"
+
+using namespace mlir;
+using namespace piko;
+
+namespace {
+
+/// How much of the setup is taken out of the loop over pixels.
+enum class Extent { All, Fields };
+
+class ItemSetup {
+public:
+  ItemSetup(scf::ForOp items, const ThreadTile &tile, GridMemory &memory,
+            Extent extent);
+
+  bool isEmpty() const { return shared.empty(); }
+  int64_t countBytes() const;
+  /// In front of the loop over the primitives of a group: the setup of the
+  /// thread's own, which is the one at `position`.
+  void createSetup(OpBuilder &builder, Value position);
+  /// Lets the loop, which counts through a group now, take what it needs from
+  /// memory.
+  void replaceInPixels();
+
+private:
+  void findPixelWork();
+  bool mustKeep(Operation *op) const;
+  bool isCommonIf(Operation *op) const;
+  bool isInSetup(Value value) const;
+  void findShared();
+  void computeAgain();
+  void cloneSetup(Block &from, OpBuilder &to, IRMapping &mapping);
+  void eraseSetup(Block &block);
+
+  /// As it is in memory: an i1 has no size of its own there.
+  static Type getStorage(Type type) {
+    return type.isInteger(1) ? IntegerType::get(type.getContext(), 8) : type;
+  }
+
+  scf::ForOp items;
+  GridMemory &memory;
+  Extent extent;
+  int64_t threads;
+  llvm::DenseSet<Value> own;            ///< What differs between threads.
+  llvm::DenseSet<Operation *> pixels;   ///< Left to the loop over pixels.
+  llvm::DenseSet<Operation *> both;     ///< As cheap as a load.
+  llvm::MapVector<Value, Value> shared; ///< And where it is in memory.
+};
+
+} // namespace
+
+ItemSetup::ItemSetup(scf::ForOp items, const ThreadTile &tile,
+                     GridMemory &memory, Extent extent)
+    : items(items), memory(memory), extent(extent), threads(1),
+      own(tile.place.begin(), tile.place.end()) {
+  for (int64_t side : tile.extents)
+    threads *= side;
+  findPixelWork();
+  findShared();
+}
+
+//===----------------------------------------------------------------------===//
+// What is left to the pixels
+//===----------------------------------------------------------------------===//
+
+/// Whether an operation cannot be done for another primitive at the same time.
+bool ItemSetup::mustKeep(Operation *op) const {
+  if (extent == Extent::Fields && !isa<GetOp, ItemOp>(op))
+    return true;
+  if (auto access = dyn_cast<StateAccessOpInterface>(op))
+    if (access.getAccessKinds() != StateAccess::reads)
+      return true;
+  if (!op->hasTrait<OpTrait::HasRecursiveMemoryEffects>() &&
+      !isMemoryEffectFree(op) && !hasSingleEffect<MemoryEffects::Read>(op))
+    return true;
+  return llvm::any_of(op->getOperands(), [&](Value operand) {
+    Operation *from = operand.getDefiningOp();
+    return isa<MemRefType>(operand.getType()) || own.contains(operand) ||
+           (from && pixels.contains(from));
+  });
+}
+
+/// Whether all threads take the same way through an scf.if that has work for
+/// pixels in it.
+bool ItemSetup::isCommonIf(Operation *op) const {
+  return op == items ||
+         (isa<scf::IfOp>(op) && !mustKeep(op) && isCommonIf(op->getParentOp()));
+}
+
+void ItemSetup::findPixelWork() {
+  // Again and again, because in a loop a use comes first.
+  for (bool changed = true; changed;) {
+    changed = false;
+    items.getBody()->walk([&](Operation *op) {
+      if (op->hasTrait<OpTrait::IsTerminator>() || pixels.contains(op))
+        return;
+      Operation *parent = op->getParentOp();
+      bool keep = mustKeep(op) || (parent != items && pixels.contains(parent) &&
+                                   !isCommonIf(parent));
+      for (Region &region : op->getRegions())
+        for (Operation &inner : region.getOps())
+          keep |= pixels.contains(&inner);
+      if (!keep)
+        return;
+      changed = true;
+      pixels.insert(op);
+      for (Region &region : op->getRegions())
+        for (Block &block : region)
+          own.insert(block.args_begin(), block.args_end());
+    });
+  }
+}
+
+//===----------------------------------------------------------------------===//
+// What they need of the setup
+//===----------------------------------------------------------------------===//
+
+bool ItemSetup::isInSetup(Value value) const {
+  Operation *op = value.getDefiningOp();
+  return op && items->isProperAncestor(op) && !pixels.contains(op);
+}
+
+void ItemSetup::findShared() {
+  SmallVector<Value> todo;
+  items.getBody()->walk([&](Operation *op) {
+    bool ends = op->hasTrait<OpTrait::IsTerminator>();
+    if (pixels.contains(ends ? op->getParentOp() : op))
+      llvm::append_range(todo, op->getOperands());
+  });
+  while (!todo.empty()) {
+    Value value = todo.pop_back_val();
+    if (!isInSetup(value))
+      continue;
+    Operation *op = value.getDefiningOp();
+    bool isNumber = value.getType().isIntOrIndexOrFloat();
+    if (!isNumber || op->hasTrait<OpTrait::ConstantLike>() ||
+        isa<arith::IndexCastOp, arith::IndexCastUIOp, arith::ExtSIOp,
+            arith::ExtUIOp, arith::TruncIOp>(op)) {
+      if (both.insert(op).second)
+        llvm::append_range(todo, op->getOperands());
+    } else {
+      shared.try_emplace(value);
+    }
+  }
+  computeAgain();
+}
+
+/// One operation on what is there anyway is no more than a load.
+void ItemSetup::computeAgain() {
+  auto isConstant = [](Value value) {
+    return value.getDefiningOp() &&
+           value.getDefiningOp()->hasTrait<OpTrait::ConstantLike>();
+  };
+  auto isThere = [&](Value value) {
+    return !isInSetup(value) || isConstant(value) || shared.contains(value) ||
+           both.contains(value.getDefiningOp());
+  };
+  for (Value value : llvm::to_vector(llvm::make_first_range(shared))) {
+    Operation *op = value.getDefiningOp();
+    if (op->getNumRegions() || !isMemoryEffectFree(op) || isa<GetOp>(op) ||
+        op->getNumResults() != 1 || !llvm::all_of(op->getOperands(), isThere))
+      continue;
+    both.insert(op);
+    shared.erase(value);
+    for (Value operand : op->getOperands())
+      if (isInSetup(operand) && isConstant(operand))
+        both.insert(operand.getDefiningOp());
+  }
+}
+
+int64_t ItemSetup::countBytes() const {
+  int64_t bytes = 0;
+  for (auto &[value, place] : shared) {
+    Type type = getStorage(value.getType());
+    bytes +=
+        threads * (type.isIndex()
+                       ? 8
+                       : llvm::divideCeil(type.getIntOrFloatBitWidth(), 8));
+  }
+  return bytes;
+}
+
+//===----------------------------------------------------------------------===//
+// Fission
+//===----------------------------------------------------------------------===//
+
+void ItemSetup::cloneSetup(Block &from, OpBuilder &to, IRMapping &mapping) {
+  for (Operation &op : from.without_terminator()) {
+    if (pixels.contains(&op)) {
+      auto ifOp = dyn_cast<scf::IfOp>(&op);
+      if (!ifOp || mustKeep(ifOp))
+        continue;
+      auto copy = scf::IfOp::create(
+          to, op.getLoc(), mapping.lookupOrDefault(ifOp.getCondition()),
+          /*withElseRegion=*/ifOp.elseBlock() != nullptr);
+      OpBuilder inside = copy.getThenBodyBuilder();
+      cloneSetup(*ifOp.thenBlock(), inside, mapping);
+      if (ifOp.elseBlock()) {
+        inside = copy.getElseBodyBuilder();
+        cloneSetup(*ifOp.elseBlock(), inside, mapping);
+      }
+      continue;
+    }
+    Operation *copy = to.clone(op, mapping);
+    for (auto [result, value] :
+         llvm::zip_equal(op.getResults(), copy->getResults())) {
+      auto found = shared.find(result);
+      if (found == shared.end())
+        continue;
+      Location loc = op.getLoc();
+      Type type = getStorage(result.getType());
+      Value stored = value;
+      if (type != result.getType())
+        stored = arith::ExtUIOp::create(to, loc, type, stored);
+      found->second = addBlockMemory(memory.launch, threads, type);
+      memref::StoreOp::create(to, loc, stored, found->second,
+                              Value(memory.launch.getThreadIds().x));
+    }
+  }
+}
+
+void ItemSetup::createSetup(OpBuilder &builder, Value position) {
+  memory.setPosition(builder, position);
+  IRMapping mapping;
+  mapping.map(items.getInductionVar(), position);
+  cloneSetup(*items.getBody(), builder, mapping);
+}
+
+void ItemSetup::replaceInPixels() {
+  for (auto &[value, place] : shared) {
+    OpBuilder builder(value.getDefiningOp());
+    Location loc = value.getLoc();
+    Value loaded =
+        memref::LoadOp::create(builder, loc, place, items.getInductionVar());
+    if (loaded.getType() != value.getType())
+      loaded = arith::TruncIOp::create(builder, loc, value.getType(), loaded);
+    Value(value).replaceAllUsesWith(loaded);
+  }
+  eraseSetup(*items.getBody());
+}
+
+/// What has no use any more; the loads have some.
+void ItemSetup::eraseSetup(Block &block) {
+  for (Operation &op : llvm::make_early_inc_range(llvm::reverse(block))) {
+    if (pixels.contains(&op)) {
+      for (Region &region : op.getRegions())
+        for (Block &inner : region)
+          eraseSetup(inner);
+    } else if (!op.hasTrait<OpTrait::IsTerminator>() && op.use_empty()) {
+      op.erase();
+    }
+  }
+}
+
+void piko::shareSetup(scf::ForOp items, const ThreadTile &tile,
+                      GridMemory &memory) {
+  gpu::LaunchOp launch = memory.launch;
+  Location loc = items.getLoc();
+  OpBuilder builder(items);
+  Value begin = items.getLowerBound(), end = items.getUpperBound();
+  int64_t room = maxBlockBytes - 8 * PIKOIR_FLUSH_CELLS;
+  std::optional<ItemSetup> setup;
+  for (Extent extent : {Extent::All, Extent::Fields})
+    if (setup.emplace(items, tile, memory, extent); setup->countBytes() <= room)
+      break;
+  if (setup->isEmpty() || setup->countBytes() > room) {
+    builder.setInsertionPointToStart(items.getBody());
+    memory.setPosition(builder, items.getInductionVar());
+    return;
+  }
+
+  Value size = launch.getBlockSizeX();
+  auto groups = scf::ForOp::create(builder, loc, begin, end, size);
+  builder.setInsertionPointToStart(groups.getBody());
+  Value base = groups.getInductionVar();
+  Value mine =
+      arith::AddIOp::create(builder, loc, base, launch.getThreadIds().x);
+  Value any =
+      arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::slt, mine, end);
+  auto ifAny = scf::IfOp::create(builder, loc, any);
+  OpBuilder inside = ifAny.getThenBodyBuilder();
+  setup->createSetup(inside, mine);
+  gpu::BarrierOp::create(builder, loc);
+
+  Value left = arith::SubIOp::create(builder, loc, end, base);
+  Value count = arith::MinSIOp::create(builder, loc, left, size);
+  items->moveBefore(groups.getBody()->getTerminator());
+  items.setLowerBound(arith::ConstantIndexOp::create(builder, loc, 0));
+  items.setUpperBound(count);
+  builder.setInsertionPointToStart(items.getBody());
+  Value position =
+      arith::AddIOp::create(builder, loc, base, items.getInductionVar());
+  items.getInductionVar().replaceAllUsesExcept(position,
+                                               position.getDefiningOp());
+  memory.setPosition(builder, position);
+  setup->replaceInPixels();
+  builder.setInsertionPoint(groups.getBody()->getTerminator());
+  gpu::BarrierOp::create(builder, loc);
+}
