@@ -3,6 +3,8 @@
 
 #include "DriverFixture.h"
 
+#include <algorithm>
+
 using namespace piko::testdriver;
 
 void DriverTest::SetUp() {
@@ -114,8 +116,8 @@ std::vector<uint64_t> DriverTest::run(const std::string &body,
   CUfunction function = load(kernel(body, before));
   if (!function)
     return {};
-  in.resize(size_t(threads) * blocks);
-  std::vector<uint64_t> out(in.size());
+  std::vector<uint64_t> out(size_t(threads) * blocks);
+  in.resize(std::max(in.size(), out.size()));
   const size_t bytes = in.size() * sizeof(uint64_t);
   CUdeviceptr from = 0, to = 0;
   EXPECT_EQ(cuMemAlloc(&from, bytes), CUDA_SUCCESS);
@@ -124,7 +126,9 @@ std::vector<uint64_t> DriverTest::run(const std::string &body,
   EXPECT_EQ(cuMemsetD8Async(to, 0, bytes, nullptr), CUDA_SUCCESS);
   EXPECT_EQ(launch(function, blocks, threads, {from, to}), CUDA_SUCCESS)
       << pikoTestDriverError();
-  EXPECT_EQ(cuMemcpyDtoHAsync(out.data(), to, bytes, nullptr), CUDA_SUCCESS);
+  EXPECT_EQ(
+      cuMemcpyDtoHAsync(out.data(), to, out.size() * sizeof(uint64_t), nullptr),
+      CUDA_SUCCESS);
   EXPECT_EQ(cuMemFree(from), CUDA_SUCCESS);
   EXPECT_EQ(cuMemFree(to), CUDA_SUCCESS);
   unload();

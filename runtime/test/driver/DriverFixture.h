@@ -33,8 +33,8 @@ protected:
   std::string loadError(const std::string &source);
   /// Unloads what `load` has loaded.
   void unload();
-  /// Runs a kernel of `kernel` on one number for each thread; the first is 0 in
-  /// \p out where there is none in \p in.
+  /// Runs a kernel of `kernel`; [out] has a number of each thread, [in] has
+  /// \p in, and zeros behind it up to as many.
   std::vector<uint64_t> run(const std::string &body,
                             std::vector<uint64_t> in = {},
                             unsigned threads = 32, unsigned blocks = 1,
