@@ -459,6 +459,10 @@ TEST_F(ArithmeticTest, Packing) {
            [](U, U b) { return b; });
   checkUnary("mov.b32 {%rs1, %rs2}, %r5; mov.b32 %r7, {%rs2, %rs1};", "%r7",
              integers, [](U a) { return std::rotl(a, 16); });
+  checkUnary("{ .reg .b16 part; mov.b32 {part, %rs1}, %r5; }"
+             "{ .reg .b32 part; mov.b32 part, 3; cvt.u32.u16 %r7, %rs1;"
+             "  add.s32 %r7, %r7, part; }",
+             "%r7", integers, [](U a) { return (a >> 16) + 3; });
 }
 
 TEST_F(ArithmeticTest, Approximations) {

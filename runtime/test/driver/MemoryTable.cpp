@@ -83,17 +83,17 @@ piko::ptx::Memory::Range MemoryTable::find(uint64_t address) const {
 }
 
 std::string MemoryTable::describe(uint64_t address) const {
-  auto after = allocations.upper_bound(address);
-  if (after != allocations.begin()) {
-    const Allocation &it = std::prev(after)->second;
-    uint64_t distance = address - it.begin;
-    if (distance < it.mapped + page)
-      return "byte " + std::to_string(distance) + " of an allocation of " +
-             std::to_string(it.bytes);
-  }
+  auto byteOf = [&](const Allocation &it) {
+    return "byte " + std::to_string(address - it.begin) + " of ";
+  };
   for (const Allocation &it : released)
-    if (address - it.begin < it.bytes)
-      return "byte " + std::to_string(address - it.begin) + " of " +
-             std::to_string(it.bytes) + " that were freed";
-  return {};
+    if (address - it.begin < it.bytes && !at(address))
+      return byteOf(it) + std::to_string(it.bytes) + " that were freed";
+  auto after = allocations.upper_bound(address);
+  if (after == allocations.begin())
+    return {};
+  const Allocation &it = std::prev(after)->second;
+  return address - it.begin < it.mapped + page
+             ? byteOf(it) + "an allocation of " + std::to_string(it.bytes)
+             : std::string();
 }

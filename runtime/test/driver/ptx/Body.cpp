@@ -4,6 +4,7 @@
 #include "ptx/Parser.h"
 
 #include <bit>
+#include <set>
 #include <utility>
 
 using namespace piko::ptx;
@@ -31,12 +32,14 @@ private:
   std::vector<Argument> parseList(char end);
   int64_t parseOffset();
   std::string resolve(std::string_view name) const;
+  std::string declare(std::string_view name, size_t number);
 
   Lexer &lexer;
   FunctionSyntax &function;
   /// From the names that a scope declares to unique ones: sequences of calls
   /// declare the same parameters again and again.
   std::vector<std::map<std::string, std::string, std::less<>>> scopes;
+  std::set<std::string> registers; ///< Whose names have no %, in effect.
 };
 
 } // namespace
@@ -70,7 +73,7 @@ void BodyParser::parseItem() {
   statement.line = lexer.peek().line;
   if (lexer.accept('@')) {
     statement.guardNegated = lexer.accept('!');
-    statement.guard = lexer.expectWord("a predicate");
+    statement.guard = resolve(lexer.expectWord("a predicate"));
   }
   Token word = lexer.peek();
   lexer.expectWord("an instruction");
@@ -123,12 +126,15 @@ void BodyParser::parseRegisters() {
   do {
     RegisterFamily family;
     family.type = *type;
-    family.prefix = lexer.expectWord("the name of a register");
+    family.prefix = declare(lexer.expectWord("the name of a register"),
+                            function.registers.size());
     if (lexer.accept('<')) {
       family.count =
           static_cast<uint32_t>(lexer.expectCount("a number of registers"));
       lexer.expect('>');
     }
+    if (!family.count)
+      registers.insert(family.prefix);
     function.registers.push_back(std::move(family));
   } while (lexer.accept(','));
   lexer.expect(';');
@@ -137,12 +143,17 @@ void BodyParser::parseRegisters() {
 void BodyParser::parseVariables(Space space) {
   Variable variable = parseVariable(lexer, space);
   lexer.expect(';');
-  std::string unique = variable.name;
-  if (scopes.size() > 1)
-    unique += "#" + std::to_string(function.variables.size());
-  scopes.back()[variable.name] = unique;
-  variable.name = unique;
+  variable.name = declare(variable.name, function.variables.size());
   function.variables.push_back(std::move(variable));
+}
+
+/// Makes a name of the innermost scope; returns its unique one.
+std::string BodyParser::declare(std::string_view name, size_t number) {
+  std::string unique(name);
+  if (scopes.size() > 1)
+    unique += "#" + std::to_string(number);
+  scopes.back()[std::string(name)] = unique;
+  return unique;
 }
 
 std::string BodyParser::resolve(std::string_view name) const {
@@ -234,9 +245,10 @@ Argument BodyParser::parseName() {
     argument.kind = Argument::Sink;
     return argument;
   }
-  argument.kind = name[0] == '%' ? Argument::Register : Argument::Symbol;
-  argument.name =
-      argument.kind == Argument::Symbol ? resolve(name) : std::string(name);
+  argument.name = resolve(name);
+  argument.kind = name[0] == '%' || registers.contains(argument.name)
+                      ? Argument::Register
+                      : Argument::Symbol;
   if (argument.kind == Argument::Symbol)
     argument.value = parseOffset();
   return argument;
