@@ -21,8 +21,12 @@ inline float flush(float value) {
   uint32_t bits = std::bit_cast<uint32_t>(value);
   return bits & 0x7f800000 ? value : std::bit_cast<float>(bits & 0x80000000);
 }
+// By its bits: clang 22 at -O1 with sanitizers takes a root for equal to
+// itself.
 inline float canonical(float value) {
-  return value == value ? value : std::bit_cast<float>(0x7fffffffu);
+  uint32_t bits = std::bit_cast<uint32_t>(value);
+  return (bits & 0x7fffffff) > 0x7f800000 ? std::bit_cast<float>(0x7fffffffu)
+                                          : value;
 }
 inline double canonical(double value) { return value; }
 
