@@ -56,6 +56,7 @@ Uniformity::Uniformity(Operation *root, ArrayRef<Root> roots, bool isLockstep)
       if (access.getAccessKinds() != StateAccess::reads)
         written.insert(access.getAccessedState());
     });
+  findMeetings();
   for (auto [value, level] : roots)
     mark(value, level);
   for (bool changed = true; changed;) {
@@ -69,6 +70,17 @@ Uniformity::Uniformity(Operation *root, ArrayRef<Root> roots, bool isLockstep)
         changed |= visit(op);
     });
   }
+}
+
+/// All at once: each round asks for every store how its surroundings part.
+void Uniformity::findMeetings() {
+  root->walk([&](Operation *barrier) {
+    if (!isBarrier(barrier))
+      return;
+    for (Operation *at = barrier; !isa<ParallelLoopOpInterface>(at) &&
+                                  meetings.insert(at).second && at != root;)
+      at = at->getParentOp();
+  });
 }
 
 bool Uniformity::mark(Value value, Uniform level) {
@@ -123,7 +135,7 @@ Uniform Uniformity::getDeciding(Operation *op) const {
 Uniform Uniformity::getParting(Operation *op) const {
   Uniform level = getDeciding(op);
   // Iterations that meet inside are compared; others may part ways.
-  return findBarrier(op) ? std::min(level, Uniform::Item) : level;
+  return meetings.contains(op) ? std::min(level, Uniform::Item) : level;
 }
 
 Operation *Uniformity::findParting(Operation *op, Region &region) const {

@@ -81,12 +81,15 @@ private:
   bool flowInside(mlir::ValueRange sources, mlir::ValueRange targets,
                   Uniform parts);
   bool visitIf(mlir::scf::IfOp choice, Uniform parts);
+  void findMeetings();
 
   bool isLockstep;
 
   mlir::Operation *root;
   llvm::DenseMap<mlir::Value, Uniform> levels; ///< What is not in it: Bin.
   llvm::DenseSet<mlir::Attribute> written; ///< State that the kernel writes.
+  /// Operations that findBarrier finds a barrier in.
+  llvm::DenseSet<mlir::Operation *> meetings;
 };
 
 } // namespace piko
