@@ -73,7 +73,8 @@ static std::string makeRequest(const ObjectOptions &options,
                                llvm::ArrayRef<Processor> processors,
                                llvm::vfs::FileSystem &files) {
   KeyBuilder key;
-  addSurroundings(key, files);
+  addSurroundings(key);
+  addFolder(key, files);
   const CompileOptions &source = options.source;
   key.add(source.file).add(source.pipeName).add(source.text.value_or(""));
   for (const auto *list :

@@ -29,13 +29,16 @@ std::string StringReader::next() {
   return string;
 }
 
-void piko::addSurroundings(KeyBuilder &key, vfs::FileSystem &files) {
+void piko::addSurroundings(KeyBuilder &key) {
   key.add(getCompilerIdentity());
-  if (auto folder = files.getCurrentWorkingDirectory())
-    key.add(*folder);
   // What Clang looks at besides its options.
   for (const char *name : {"CPATH", "CPLUS_INCLUDE_PATH", "SOURCE_DATE_EPOCH"})
     key.add(sys::Process::GetEnv(name).value_or(""));
+}
+
+void piko::addFolder(KeyBuilder &key, vfs::FileSystem &files) {
+  if (auto folder = files.getCurrentWorkingDirectory())
+    key.add(*folder);
 }
 
 std::optional<std::string> SourceCache::lookUp(StringRef request,

@@ -32,9 +32,12 @@ private:
   llvm::StringRef bytes;
 };
 
-/// Adds what decides, besides its options and the files that it reads, what the
-/// compiler makes: which compiler it is, and its surroundings.
-void addSurroundings(KeyBuilder &key, llvm::vfs::FileSystem &files);
+/// Adds what decides, besides its options, the files that it reads and the
+/// folder that it runs in, what the compiler makes: which compiler it is, and
+/// its environment.
+void addSurroundings(KeyBuilder &key);
+/// Adds the folder from which relative paths begin.
+void addFolder(KeyBuilder &key, llvm::vfs::FileSystem &files);
 
 class SourceCache {
 public:

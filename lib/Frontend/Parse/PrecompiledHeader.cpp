@@ -78,7 +78,7 @@ static llvm::StringRef getFirstDirective(llvm::StringRef text) {
 }
 
 /// Whether piko.h is the first that the preprocessor sees, perhaps in a header
-/// that lies beside the file.
+/// that lies beside the file, or whose whole path the file says.
 static bool beginsWithHeader(llvm::StringRef path, llvm::vfs::FileSystem &files,
                              unsigned depth = 0) {
   auto text = files.getBufferForFile(path);
@@ -93,7 +93,9 @@ static bool beginsWithHeader(llvm::StringRef path, llvm::vfs::FileSystem &files,
   if (!name.consume_front("\"") || !name.consume_back("\"") ||
       name.contains('"'))
     return false;
-  llvm::SmallString<128> beside(llvm::sys::path::parent_path(path));
+  llvm::SmallString<128> beside;
+  if (llvm::sys::path::is_relative(name))
+    beside = llvm::sys::path::parent_path(path);
   llvm::sys::path::append(beside, name);
   return beginsWithHeader(beside, files, depth + 1);
 }
