@@ -273,7 +273,9 @@ static bool compile(const ObjectOptions &options,
   if (!module)
     return false;
   TargetOptions target = options.target.leaveOut(options.source.synthesis);
-  if (!isReference) // whose functions say what they are for
+  if (isReference) // whose code is big, and runs a few times
+    target.optLevel = std::min(target.optLevel, 1);
+  else // whose functions say what they are for
     target.cpu = getBaseProcessor(module->getTargetTriple());
   llvm::Expected<std::string> code =
       generateCode(*module, target, CodeFormat::Object);

@@ -26,7 +26,7 @@ piko::compileForHost(llvm::StringRef text, llvm::StringRef userFile,
   auto files = llvm::makeIntrusiveRefCnt<llvm::vfs::OverlayFileSystem>(
       options.files ? options.files : llvm::vfs::getRealFileSystem());
   files->pushOverlay(memory);
-  const char *const flags[] = {optimize ? "-O2" : "-O0", "-fPIC", "-fwrapv",
+  const char *const flags[] = {optimize ? "-O1" : "-O0", "-fPIC", "-fwrapv",
                                "-fno-strict-float-cast-overflow"};
   auto invoke = [&](const FrontendOptions &chosen, auto diagnostics) {
     return createClangInvocation(flags, chosen, mainName, diagnostics);
@@ -39,6 +39,8 @@ piko::compileForHost(llvm::StringRef text, llvm::StringRef userFile,
                           /*ShouldOwnClient=*/false));
   if (!invocation)
     return nullptr;
+  // Whoever makes code of it runs the optimizer, and once is enough.
+  invocation->getCodeGenOpts().DisableLLVMPasses = true;
   std::string mainText;
   if (std::unique_ptr<llvm::MemoryBuffer> header = getPrecompiledHeader(
           userFile, options, flags, files, invoke, headerPath)) {

@@ -15,9 +15,9 @@
 namespace piko {
 
 /// Compiles C++ text that begins with what `userFile` holds, without __PIKO__,
-/// to LLVM IR for this machine; null after
-/// diagnostics in `context`'s engine. Overflow wraps and casts saturate, as the
-/// language says.
+/// to LLVM IR for this machine; null after diagnostics in `context`'s engine.
+/// With `optimize` the optimizer, which did not run yet, may work on it.
+/// Overflow wraps and casts saturate, as the language says.
 std::unique_ptr<llvm::Module>
 compileForHost(llvm::StringRef text, llvm::StringRef userFile,
                const FrontendOptions &options, bool optimize,
