@@ -14,6 +14,7 @@
 
 #include "llvm/Support/Path.h"
 #include "llvm/TargetParser/Host.h"
+#include "llvm/Transforms/IPO/Internalize.h"
 
 #include "Piko/Analysis/LinearFacts.h"
 #include "pikort/pikort.h"
@@ -246,9 +247,16 @@ compileReference(const ObjectOptions &options, const Files &files,
   for (const PipelineDescription &pipeline : pipelines)
     object.pipelines.push_back(pipeline.name);
   object.symbol = referenceEntry;
-  return compileForHost(
+  std::unique_ptr<llvm::Module> module = compileForHost(
       generateReferenceAdapter(pipelines, file), file, frontend,
       /*optimize=*/options.target.optLevel > 0, llvmContext, context);
+  // It is all of the program's text: to look up thousands of templates by name
+  // would take most of the time that loading it takes.
+  if (module)
+    llvm::internalizeModule(*module, [](const llvm::GlobalValue &value) {
+      return value.getName() == referenceEntry;
+    });
+  return module;
 }
 
 /// Fills an entry but for its files; false after diagnostics, which are there
