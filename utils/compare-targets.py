@@ -8,7 +8,8 @@
                      SCENE [piko-render options]
 
 Each compiled run is a process of its own; its image must equal the reference
-executor's bit for bit. With --same-picture the pipelines draw the same, and the
+executor's bit for bit, whose code is not optimized: it is big and draws one
+frame. With --same-picture the pipelines draw the same, and the
 reference executor runs only the first of them. With --blocks, kernels for a GPU
 run on the CPU, in blocks of so many threads; with --cpus, pipelines are compiled
 for these processors. Prints a line for each pipeline and thread count, or what
@@ -58,7 +59,7 @@ def main():
     equal, expected = True, None
     for pipe in arguments.pipes:
         if not (expected and arguments.same_picture):
-            expected = render(arguments, pipe, ["--target", "reference"])
+            expected = render(arguments, pipe, ["--target", "reference", "-O0"])
         for name, options in mappings:
             wrong = 0
             for _ in range(arguments.runs):

@@ -58,6 +58,7 @@ static std::unique_ptr<LoadedProgram> load(CompileOptions source,
       .source = std::move(source),
       .execution = options.target,
       .target = {.cpu = isReference ? "native" : options.cpu,
+                 .optLevel = options.optLevel,
                  .sanitizer =
                      isReference ? Sanitizer::None : JITCode::getSanitizer()}};
   std::optional<CompiledObject> object =

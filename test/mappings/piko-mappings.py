@@ -140,7 +140,7 @@ def check(render, folder, example, number, picked):
     *mapped, left_out, threads, strip = picked
     texts = [mapping_text(*m) for m in mapped]
     file = write_source(folder, example, number, texts)
-    rest = ["--threads", str(threads), "--no-cache"]
+    rest = ["--threads", str(threads)]
     names = [name for name, out in zip(PASSES, left_out) if out]
     if names:
         rest += ["--without", ",".join(names)]
@@ -181,6 +181,8 @@ def main():
             concurrent.futures.ThreadPoolExecutor(arguments.jobs) as pool:
         folder = pathlib.Path(arguments.keep or temporary).resolve()
         folder.mkdir(parents=True, exist_ok=True)
+        # Nothing is left in the user's cache.
+        os.environ.setdefault("PIKO_CACHE_DIR", str(folder / "cache"))
         write_torus(folder / "torus.ply")
         render = str(pathlib.Path(arguments.render).resolve())
         whole = mapping_text(0, "LoadBalance", "LoadBalance", 0, True, False)
@@ -189,7 +191,7 @@ def main():
                 draw, render, folder,
                 write_source(folder, example, "reference",
                              [whole] * example.mappings),
-                example, ["--target", "reference"])
+                example, ["--target", "reference", "-O0"])
             for example in {task[0].name: task[0] for task in tasks}.values()}
         done = [pool.submit(check, render, folder, *task) for task in tasks]
         for name, future in references.items():

@@ -23,6 +23,8 @@ it, and says how long a frame took.
                          or run by the reference executor (cpu)
   --cpu NAME             the processor to compile for, as clang names them, of
                          which this machine has everything (native)
+  -O0, -O1, -O2, -O3     how much to optimise; the reference executor at most as
+                         -O1 has it (-O3)
   -I FOLDER, -D NAME[=VALUE]   for the pipeline's preprocessor
   --without PASS,...     passes of synthesis to leave out
   --fix NAME,...         specialize the pipeline for values that the scene has:
@@ -91,6 +93,8 @@ private:
       options.load.includeDirs.push_back(attached(word));
     else if (word == "-D" || word.starts_with("-D"))
       options.load.defines.push_back(attached(word));
+    else if (word.starts_with("-O"))
+      parseLevel(word);
     else if (word == "--check" || word.starts_with("--check="))
       parseCheck(word.substr(7));
     else if (word.size() > 1 && word[0] == '-')
@@ -142,6 +146,13 @@ private:
       fail("unknown option '" + name + "'");
     else
       action->second();
+  }
+
+  void parseLevel(const std::string &word) {
+    if (word.size() == 3 && word[2] >= '0' && word[2] <= '3')
+      options.load.optLevel = word[2] - '0';
+    else
+      fail("expected -O0 to -O3, but got " + word);
   }
 
   void parseWithout(const std::string &text) {

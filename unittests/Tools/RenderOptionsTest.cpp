@@ -25,12 +25,13 @@ TEST(RenderOptions, AllOfThem) {
        "2.5",       "--out",    "o.exr",      "--json",    "-I",
        "inc",       "-Iother",  "-DX=1",      "-D",        "Y",
        "scene.obj", "--set",    "depth=3",    "--set",     "text=a=b",
-       "--without", "prune",    "--counters"});
+       "--without", "prune",    "--counters", "-O1"});
   ASSERT_TRUE(o) << o.error().message;
   EXPECT_EQ(o->pipeline, "a.piko.cpp");
   EXPECT_EQ(o->scene, "scene.obj");
   EXPECT_EQ(o->load.pipeName, "Binned");
   EXPECT_EQ(o->load.target, ExecutionTarget::Reference);
+  EXPECT_EQ(o->load.optLevel, 1);
   EXPECT_EQ(o->load.includeDirs, (std::vector<std::string>{"inc", "other"}));
   EXPECT_EQ(o->load.defines, (std::vector<std::string>{"X=1", "Y"}));
   EXPECT_EQ(o->view.width, 320);
@@ -64,6 +65,14 @@ TEST(RenderOptions, Explain) {
   EXPECT_EQ(errorOf({"a", "b", "--explain", "--target", "reference"}),
             "--explain is for pipelines that are compiled: nothing is measured "
             "of --target reference");
+}
+
+TEST(RenderOptions, Level) {
+  EXPECT_EQ(parseOptions({"a", "b"})->load.optLevel, 3);
+  EXPECT_EQ(parseOptions({"a", "b", "-O0"})->load.optLevel, 0);
+  for (const char *bad : {"-O", "-O4", "-Os", "-O12"})
+    EXPECT_EQ(errorOf({"a", "b", bad}),
+              std::string("expected -O0 to -O3, but got ") + bad);
 }
 
 // Neither --fix nor --without takes back what the other one says.

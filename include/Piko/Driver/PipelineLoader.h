@@ -39,6 +39,9 @@ struct LoadOptions {
   /// The processor to compile for, as TargetOptions has it; one that this
   /// machine is no less than.
   std::string cpu = "native";
+  /// 0 to 3, as in -O3. The reference executor is never optimised beyond 1: its
+  /// code is big, and runs a few times.
+  int optLevel = 3;
 };
 
 /// A program that is ready to run; its code goes when the object goes, so it
