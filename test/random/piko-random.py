@@ -18,7 +18,9 @@ and the order of blocks follow from the seed.
 
 import argparse
 import concurrent.futures
+import os
 import sys
+import tempfile
 import time
 from collections import Counter
 
@@ -163,8 +165,11 @@ def main():
                         help="primitives of a source in a strip (all)")
     parser.add_argument("--out", default="reduced.cpp")
     args = parser.parse_args()
-    return {"run": command_run, "show": command_show, "reduce": command_reduce}[
-        args.command](args)
+    command = {"run": command_run, "show": command_show, "reduce": command_reduce}
+    # Files share a precompiled piko.h, and leave nothing in the user's cache.
+    with tempfile.TemporaryDirectory() as cache:
+        os.environ.setdefault("PIKO_CACHE_DIR", cache)
+        return command[args.command](args)
 
 
 if __name__ == "__main__":

@@ -100,7 +100,7 @@ class Runner:
         try:
             done = subprocess.run(
                 [self.tool, file.with_suffix(".mlir") if self.text else file,
-                 "--reference", file, "--no-cache", "--cases", cases, "--runs", "1", "--timeout",
+                 "--reference", file, "--cases", cases, "--runs", "1", "--timeout",
                  str(self.timeout), "--strip", str(self.strip), "--threads", *map(str, self.threads),
                  *options_of(self.passes), *self.target],
                 stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
