@@ -17,10 +17,10 @@
 // CASE: --pipe Bytes --domain 40 40 --count 300
 // CASE: --pipe Large --domain 40 40 --count 300
 //
-// RUN: pikoc %s --pipe Boxes --no-cache --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=ONCE
-// RUN: pikoc %s --pipe Neighbours --no-cache --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=ONCE
-// RUN: pikoc %s --pipe Loops --no-cache --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=ONCE
-// RUN: pikoc %s --pipe Bytes --no-cache --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=ONCE
+// RUN: pikoc %s --pipe Boxes --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=ONCE
+// RUN: pikoc %s --pipe Neighbours --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=ONCE
+// RUN: pikoc %s --pipe Loops --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=ONCE
+// RUN: pikoc %s --pipe Bytes --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=ONCE
 // ONCE: remark: what is written to 'color' is computed once for each pixel
 #include <piko.h>
 

@@ -30,11 +30,11 @@
 // OUTSIDE: got: stage 'last': expected a bin id in [0, 4096), but got 4096
 //
 // Why lanes take turns.
-// RUN: pikoc %s --pipe Short --remarks --no-cache -o %t.ll 2>&1 | FileCheck %s --check-prefix=SHORT
+// RUN: pikoc %s --pipe Short --remarks -o %t.ll 2>&1 | FileCheck %s --check-prefix=SHORT
 // SHORT: note: lanes take turns to emit, in order: the record is no whole number of words of 4 bytes, up to 256 bytes
-// RUN: pikoc %s --pipe Looped --remarks --no-cache -o %t.ll 2>&1 | FileCheck %s --check-prefix=LOOPED
+// RUN: pikoc %s --pipe Looped --remarks -o %t.ll 2>&1 | FileCheck %s --check-prefix=LOOPED
 // LOOPED: note: lanes take turns to emit, in order: a loop of each lane emits
-// RUN: pikoc %s --pipe Four --remarks --no-cache -o %t.ll 2>&1 | FileCheck %s --check-prefix=FOUR
+// RUN: pikoc %s --pipe Four --remarks -o %t.ll 2>&1 | FileCheck %s --check-prefix=FOUR
 // FOUR: note: lanes take turns to emit, in order: more than 3 of each lane go to the port
 #include <piko.h>
 

@@ -14,7 +14,7 @@
 // CASE: --pipe Copies --domain 8 8 --count 300
 // CASE: --pipe Late --domain 8 8 --count 300
 //
-// RUN: pikoc %s --pipe Neighbours --remarks --no-cache -o %t.ll 2>&1 | FileCheck %s --check-prefix=REMARK
+// RUN: pikoc %s --pipe Neighbours --remarks -o %t.ll 2>&1 | FileCheck %s --check-prefix=REMARK
 // REMARK: lane-loops.cpp:[[# @LINE + 24]]:{{.*}} iterations of this loop do not depend on one another, and are vectorized for {{.*}} at once, of those that have something to do
 #include <piko.h>
 

@@ -15,12 +15,12 @@
 // CASE: --pipe Rows --domain 67 53 --count 600
 // CASE: --pipe Limits --domain 67 53 --count 600
 //
-// RUN: pikoc %s --pipe Edges --emit=llvmir --cpu x86-64-v4 --no-cache -o - | FileCheck %s --check-prefix=NARROW
-// RUN: pikoc %s --pipe Between --emit=llvmir --cpu x86-64-v4 --no-cache -o - | FileCheck %s --check-prefix=NARROW
-// RUN: pikoc %s --pipe Extremes --emit=llvmir --cpu x86-64-v4 --no-cache -o - | FileCheck %s --check-prefix=NARROW
-// RUN: pikoc %s --pipe Nearest --emit=llvmir --cpu x86-64-v4 --no-cache -o - | FileCheck %s --check-prefix=NARROW
-// RUN: pikoc %s --pipe Weighted --emit=llvmir --cpu x86-64-v4 --no-cache -o - | FileCheck %s --check-prefix=VALUE
-// RUN: pikoc %s --pipe Limits --emit=llvmir --cpu x86-64-v4 --no-cache -o - | FileCheck %s --check-prefix=VALUE
+// RUN: pikoc %s --pipe Edges --emit=llvmir --cpu x86-64-v4 -o - | FileCheck %s --check-prefix=NARROW
+// RUN: pikoc %s --pipe Between --emit=llvmir --cpu x86-64-v4 -o - | FileCheck %s --check-prefix=NARROW
+// RUN: pikoc %s --pipe Extremes --emit=llvmir --cpu x86-64-v4 -o - | FileCheck %s --check-prefix=NARROW
+// RUN: pikoc %s --pipe Nearest --emit=llvmir --cpu x86-64-v4 -o - | FileCheck %s --check-prefix=NARROW
+// RUN: pikoc %s --pipe Weighted --emit=llvmir --cpu x86-64-v4 -o - | FileCheck %s --check-prefix=VALUE
+// RUN: pikoc %s --pipe Limits --emit=llvmir --cpu x86-64-v4 -o - | FileCheck %s --check-prefix=VALUE
 // VALUE: sitofp <16 x i32> %{{.*}} to <16 x float>
 // NARROW: icmp s{{lt|ge}} <16 x i32> %{{.*}}, zeroinitializer
 // REQUIRES: x86_64

@@ -19,7 +19,7 @@
 // CASE: --pipe Counted --domain 167 93 --count 400
 // CASE: --pipe Either --domain 167 93 --count 400
 //
-// DEFINE: %{target} = pikoc %s --emit=target --cpu x86-64-v4 --no-cache -o -
+// DEFINE: %{target} = pikoc %s --emit=target --cpu x86-64-v4 -o -
 // RUN: %{target} --pipe Bits | FileCheck %s --check-prefix=STRIPS
 // RUN: %{target} --pipe Returns | FileCheck %s --check-prefix=STRIPS
 // RUN: %{target} --pipe All | FileCheck %s --check-prefix=STRIPS

@@ -20,9 +20,9 @@
 // RUN: not piko-compare %s --pipe Outside --domain 67 35 --count 2000 --runs 1 | FileCheck %s --check-prefix=OUTSIDE
 // OUTSIDE: got: stage 'stage', bin 0: expected an index into 'sums' in [0, 64), but got 64
 //
-// RUN: pikoc %s --pipe Boxes --no-cache --emit=target -o - | FileCheck %s --check-prefix=PAIRS
-// RUN: pikoc %s --pipe Cells --no-cache --emit=target -o - | FileCheck %s --check-prefix=PAIRS
-// RUN: pikoc %s --pipe Rows --no-cache --emit=target -o - | FileCheck %s --check-prefix=PAIRS
+// RUN: pikoc %s --pipe Boxes --emit=target -o - | FileCheck %s --check-prefix=PAIRS
+// RUN: pikoc %s --pipe Cells --emit=target -o - | FileCheck %s --check-prefix=PAIRS
+// RUN: pikoc %s --pipe Rows --emit=target -o - | FileCheck %s --check-prefix=PAIRS
 // PAIRS: vector.shuffle %{{.*}}, %{{.*}} [{{4, 4, 0, 1|8, 8, 8, 8, 0, 1, 2, 3}}]
 #include <piko.h>
 

@@ -39,7 +39,7 @@ def main():
     for source in sorted(glob.glob(f"{folder}/*.piko.cpp")):
         body = os.path.basename(source).removesuffix(".piko.cpp")
         remarks = subprocess.run(
-            [pikoc, source, "--no-cache", "--cpu", "x86-64-v4", "--remarks",
+            [pikoc, source, "--cpu", "x86-64-v4", "--remarks",
              "--emit", "target", "-o", f"{work}.mlir"],
             check=True, capture_output=True, text=True).stderr
         lines = filter(None, map(describe, remarks.splitlines()))

@@ -2,12 +2,12 @@
 // Approximations are the instructions that the processor has, also where LLVM
 // vectorizes the loop; a fused multiply-add that it has not is computed without
 // a call, and approximations are exact then.
-// RUN: pikoc %s -o - --emit=assembly --no-cache --pipe Relaxed --cpu skylake-avx512 | FileCheck %s --check-prefix=AVX512
-// RUN: pikoc %s -o - --emit=assembly --no-cache --pipe Relaxed --cpu x86-64-v3 | FileCheck %s --check-prefix=AVX
-// RUN: pikoc %s -o - --emit=assembly --no-cache --pipe Relaxed --cpu x86-64 | FileCheck %s --check-prefix=SSE
-// RUN: pikoc %s -o - --emit=assembly --no-cache --pipe Contracted --cpu x86-64-v3 | FileCheck %s --check-prefix=FMA
-// RUN: pikoc %s -o - --emit=assembly --no-cache --pipe Contracted --cpu x86-64 | FileCheck %s --check-prefix=NO-FMA
-// RUN: pikoc %s -o - --emit=assembly --no-cache --pipe Strict --cpu x86-64-v3 | FileCheck %s --check-prefix=STRICT
+// RUN: pikoc %s -o - --emit=assembly --pipe Relaxed --cpu skylake-avx512 | FileCheck %s --check-prefix=AVX512
+// RUN: pikoc %s -o - --emit=assembly --pipe Relaxed --cpu x86-64-v3 | FileCheck %s --check-prefix=AVX
+// RUN: pikoc %s -o - --emit=assembly --pipe Relaxed --cpu x86-64 | FileCheck %s --check-prefix=SSE
+// RUN: pikoc %s -o - --emit=assembly --pipe Contracted --cpu x86-64-v3 | FileCheck %s --check-prefix=FMA
+// RUN: pikoc %s -o - --emit=assembly --pipe Contracted --cpu x86-64 | FileCheck %s --check-prefix=NO-FMA
+// RUN: pikoc %s -o - --emit=assembly --pipe Strict --cpu x86-64-v3 | FileCheck %s --check-prefix=STRICT
 // The same of what is compiled for several processors.
 // RUN: pikoc %s -o %t.o --no-cache --pipe Contracted --cpu x86-64,x86-64-v3
 // RUN: llvm-objdump -d %t.o | FileCheck %s --check-prefix=OBJECT

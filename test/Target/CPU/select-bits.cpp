@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 // A float that is chosen by an integer is moved by cmov, or its sign is flipped,
 // and no branch depends on the data.
-// RUN: pikoc %s -o - --emit=assembly --no-cache --without=vectorize | FileCheck %s
+// RUN: pikoc %s -o - --emit=assembly --without=vectorize | FileCheck %s
 // REQUIRES: x86_64
 
 #include <piko.h>
