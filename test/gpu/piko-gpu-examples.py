@@ -27,7 +27,7 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 sys.path.insert(0, str(ROOT / "test" / "mappings"))
 write_torus = __import__("piko-mappings").write_torus
 
-TARGETS = [["--target", "gpu-on-cpu", "-O1", "--gpu-threads", "32", "--gpu-seed", "1"],
+TARGETS = [["--target", "gpu-on-cpu", "--gpu-threads", "32", "--gpu-seed", "1"],
            ["--target", "cuda", "--gpu-threads", "64"]]
 SIZE = ["--width", "41", "--height", "29", "--lights", "2", "--frames", "1",
         "--warmup", "0", "--json"]
@@ -53,12 +53,13 @@ def compare(tools, folder, file, pipe, target):
     name = file.parent.name
     run([tools / "piko-compare", file, "--pipe", pipe, "--domain",
          *COMPARED[name], "--count", "300", "--runs", "1", "--threads", "2",
-         *[option for option in target if option != "-O1"]], folder)
+         *target], folder)
 
 
 def draw(tools, folder, file, pipe, rest):
     scene = SCENES.get(file.parent.name, ["torus.ply"])
-    command = [tools / "piko-render", file, "--pipe", pipe, *scene, *SIZE, *rest]
+    quick = ["-O1"] if "gpu-on-cpu" in rest else []
+    command = [tools / "piko-render", file, "--pipe", pipe, *scene, *SIZE, *quick, *rest]
     return command, json.loads(run(command, folder))
 
 
