@@ -46,16 +46,24 @@ State::State() {
   memoryLimit = numberFrom("PIKO_TEST_DRIVER_MEMORY", memoryLimit);
   seed = numberFrom("PIKO_TEST_DRIVER_SEED", 0);
   printsCounts = numberFrom("PIKO_TEST_DRIVER_COUNTS", 0) != 0;
+  printsErrors = numberFrom("PIKO_TEST_DRIVER_ERRORS", 0) != 0;
   failures = parseFailures(std::getenv("PIKO_TEST_DRIVER_FAIL"));
 }
 
-State::~State() {
-  if (!leaks.empty())
+State &piko::testdriver::state() {
+  static State *const instance = new State;
+  return *instance;
+}
+
+/// When the library is unloaded, after the program's own objects are destroyed.
+[[gnu::destructor]] static void report() {
+  const State &at = state();
+  if (!at.leaks.empty())
     std::fprintf(stderr, "driver for tests: alive at the end of a context:\n%s",
-                 leaks.c_str());
-  if (!printsCounts)
+                 at.leaks.c_str());
+  if (!at.printsCounts)
     return;
-  for (const auto &[kernel, it] : counts)
+  for (const auto &[kernel, it] : at.counts)
     std::fprintf(
         stderr,
         "%s: %llu launches, %llu warp instructions, %.1f %% of lanes, %llu "
@@ -68,11 +76,6 @@ State::~State() {
             : 0.0,
         static_cast<unsigned long long>(it.globalBytes),
         static_cast<unsigned long long>(it.globalSectors));
-}
-
-State &piko::testdriver::state() {
-  static State instance;
-  return instance;
 }
 
 CUcontext &piko::testdriver::currentContext() {
@@ -164,5 +167,7 @@ CUresult Call::fail(CUresult result, const std::string &text) const {
   const char *name = nameOf(result);
   state().error = std::string(function) + ": " + (name ? name : "error") +
                   (text.empty() ? "" : ": " + text);
+  if (state().printsErrors)
+    std::fprintf(stderr, "%s\n", state().error.c_str());
   return result;
 }

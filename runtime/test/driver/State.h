@@ -113,7 +113,8 @@ struct Failure {
 
 struct State {
   State();
-  ~State();
+  State(const State &) = delete;
+  State &operator=(const State &) = delete;
 
   std::recursive_mutex lock;
   bool initialized = false;
@@ -121,7 +122,7 @@ struct State {
   int capability = 90; ///< 10 * major + minor.
   uint64_t memoryLimit = uint64_t(16) << 30;
   uint64_t seed = 0;
-  bool printsCounts = false;
+  bool printsCounts = false, printsErrors = false;
 
   std::vector<Failure> failures;
   std::map<std::string, uint64_t, std::less<>> calls;
@@ -136,6 +137,8 @@ private:
   uintptr_t nextHandle = 0x1000;
 };
 
+/// Made by the first call, and never destroyed: objects of the program may call
+/// the driver until it ends.
 State &state();
 
 /// What a call needs.

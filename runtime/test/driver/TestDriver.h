@@ -15,9 +15,12 @@
 //   PIKO_TEST_DRIVER_DEVICES   devices; 1
 //   PIKO_TEST_DRIVER_SM        compute capability, 10 * major + minor; 90
 //   PIKO_TEST_DRIVER_MEMORY    bytes that cuMemAlloc has; 16 GiB
-//   PIKO_TEST_DRIVER_SEED      order of blocks; 0: as numbered
+//   PIKO_TEST_DRIVER_SEED      order of blocks, of warps and their turns, and
+//   of
+//                              lanes in atomic operations; 0: as numbered
 //   PIKO_TEST_DRIVER_FAIL      function:n:error, as pikoTestDriverFail; more
 //                              than one with commas
+//   PIKO_TEST_DRIVER_ERRORS    1: texts of errors to stderr as they come
 //   PIKO_TEST_DRIVER_COUNTS    1: counts of all kernels to stderr at the end
 //
 // The functions here may be called at any time, from any thread. Texts that

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //===- Atomic.cpp - Atomic operations and fences of PTX -------------------===//
 //
-// Lanes make theirs in order of their numbers; only one runs at a time.
+// Lanes make theirs one after the other, from the warp's firstLane on.
 //
 //===----------------------------------------------------------------------===//
 
@@ -66,7 +66,7 @@ void change(Warp &warp, const Instruction &it) {
   Sectors sectors;
   const auto operation = static_cast<Operation>(it.variant);
   const T *b = warp.lanes<T>(it.b), *c = warp.lanes<T>(it.c);
-  forEachLane(warp.active, [&](uint32_t lane) {
+  auto one = [&](uint32_t lane) {
     uint8_t *place = locate<space>(warp, it, lane, addressOf(warp, it, lane),
                                    sizeof(T), sectors);
     T old;
@@ -78,7 +78,10 @@ void change(Warp &warp, const Instruction &it) {
     std::memcpy(place, &value, sizeof(T));
     if (!it.negated)
       warp.lanes<T>(it.result)[lane] = old;
-  });
+  };
+  const uint32_t from = allLanes << warp.firstLane;
+  forEachLane(warp.active & from, one);
+  forEachLane(warp.active & ~from, one);
   warp.site->sectors += sectors.size();
   if (sectors.size())
     warp.site->bytes +=

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cstring>
 #include <numeric>
-#include <random>
 
 using namespace piko::ptx;
 
@@ -58,6 +57,23 @@ Block::Block(Launch &launch) : launch(launch) {
   }
 }
 
+/// Each has its turn. With a seed the order and the length of turns vary, so
+/// that what lacks a barrier shows.
+bool Block::runWarps() {
+  bool ran = false;
+  uint32_t steps = turn;
+  if (launch.seed) {
+    std::shuffle(warps.begin(), warps.end(), random);
+    steps = 1 + static_cast<uint32_t>(random() % turn);
+  }
+  for (auto &warp : warps) {
+    warp->firstLane =
+        launch.seed ? static_cast<uint32_t>(random() % warpSize) : 0;
+    ran |= warp->run(steps);
+  }
+  return ran;
+}
+
 void Block::run(uint64_t number) {
   index = {static_cast<uint32_t>(number % launch.blocks[0]),
            static_cast<uint32_t>(number / launch.blocks[0] % launch.blocks[1]),
@@ -66,11 +82,10 @@ void Block::run(uint64_t number) {
               sharedMemory.size() * sizeof(uint64_t));
   for (auto &warp : warps)
     warp->reset();
+  random.seed(launch.seed + number);
   arrived = false;
   while (true) {
-    bool ran = false;
-    for (auto &warp : warps)
-      ran |= warp->run(turn);
+    bool ran = runWarps();
     if (arrived)
       ran |= releaseBarriers();
     if (!liveThreads())

@@ -7,6 +7,7 @@
 #include "ptx/Warp.h"
 
 #include <memory>
+#include <random>
 
 namespace piko::ptx {
 
@@ -32,7 +33,9 @@ struct Launch {
   std::array<uint32_t, 3> blocks, threads;
   uint32_t dynamicSharedBytes = 0;
   std::vector<uint8_t> parameters;
-  uint64_t seed = 0; ///< Of the order of blocks; 0: as they are numbered.
+  /// Of the order of blocks, of warps, and of lanes in atomic operations; 0: as
+  /// they are numbered.
+  uint64_t seed = 0;
   std::vector<Site> sites;
 };
 
@@ -50,11 +53,13 @@ public:
   uint64_t sharedSize;
 
 private:
+  bool runWarps();
   bool releaseBarriers();
   uint32_t liveThreads() const;
   [[noreturn]] void reportDeadlock() const;
 
   bool arrived = false;
+  std::mt19937_64 random;
   std::vector<uint64_t> sharedMemory;
   std::vector<std::unique_ptr<Warp>> warps;
 };

@@ -123,7 +123,8 @@ public:
   uint32_t active = 0; ///< Lanes of the current instruction.
   uint32_t pc = 0, next = 0;
   uint32_t live = 0;
-  Site *site = nullptr; ///< Of the current instruction.
+  Site *site = nullptr;   ///< Of the current instruction.
+  uint32_t firstLane = 0; ///< Of atomic operations; others follow in a circle.
   uint64_t sharedBytes = 0;
   uint8_t *shared = nullptr, *local = nullptr, *calls = nullptr;
   const uint8_t *parameters = nullptr;
