@@ -37,9 +37,9 @@ uint64_t &counterOf(PikoTestDriverCounts &counts, Class of) {
   case Class::Integer:
     return counts.integer;
   case Class::Single:
-    return counts.single;
+    return counts.float32;
   case Class::Double:
-    return counts.twice;
+    return counts.float64;
   case Class::Move:
     return counts.move;
   case Class::Control:

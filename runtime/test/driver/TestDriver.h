@@ -62,7 +62,7 @@ struct PikoTestDriverCounts {
   uint64_t launches, blocks, threads;
   uint64_t warpInstructions, laneInstructions;
   // Warp instructions by class.
-  uint64_t integer, single, twice, move, control;
+  uint64_t integer, float32, float64, move, control;
   uint64_t loadGlobal, storeGlobal, loadShared, storeShared;
   uint64_t loadLocal, storeLocal, loadGeneric, storeGeneric;
   uint64_t parameter, atomic, barrier, warpOperation;
