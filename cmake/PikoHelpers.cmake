@@ -97,7 +97,9 @@ function(piko_add_unittest name)
   add_executable(${name} ${ARG_UNPARSED_ARGUMENTS})
   target_link_libraries(${name} PRIVATE piko_options ${ARG_LINK} GTest::gtest GTest::gtest_main)
   piko_add_sanitizer_options(${name})
-  gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60)
+  # Tests have more threads than cores: to wait must not cost time.
+  gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60
+    PROPERTIES ENVIRONMENT OMP_WAIT_POLICY=passive)
 endfunction()
 if(BUILD_TESTING OR NOT DEFINED BUILD_TESTING)
   find_package(GTest REQUIRED)

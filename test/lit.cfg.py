@@ -46,6 +46,9 @@ for name in ("OMP_NUM_THREADS", "ASAN_OPTIONS", "TSAN_OPTIONS", "HOME"):
     if name in os.environ:
         config.environment[name] = os.environ[name]
 
+# More threads than cores: to wait must not cost time.
+config.environment["OMP_WAIT_POLICY"] = "passive"
+
 # What the tests compile is kept apart from the user's own.
 config.environment["PIKO_CACHE_SIZE"] = str(2 << 30)
 config.environment["PIKO_CACHE_DIR"] = os.path.join(
