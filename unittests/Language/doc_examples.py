@@ -10,6 +10,8 @@ added, so that the examples are compiled and linked.
 
 A comment `// error: TEXT` on a line of a fence says that the example must be
 refused by the compiler with a message that holds TEXT.
+
+All begin with piko.h, which Clang reads once for them.
 """
 import argparse
 import pathlib
@@ -50,6 +52,12 @@ def main():
     args = parser.parse_args()
     args.work.mkdir(parents=True, exist_ok=True)
 
+    flags = [args.compiler, "-std=c++20", "-Wall", f"-I{args.include}"]
+    header = args.work / "piko.pch"
+    subprocess.run([*flags, "-fpch-instantiate-templates", "-x", "c++-header",
+                    f"{args.include}/piko.h", "-o", str(header)], check=True)
+    flags += ["-include-pch", str(header)]
+
     failures = count = 0
     for line, code in examples(args.document.read_text()):
         count += 1
@@ -60,8 +68,8 @@ def main():
         source.write_text(code)
         program = source.with_suffix("")
         build = subprocess.run(
-            [args.compiler, "-std=c++20", "-Wall", f"-I{args.include}",
-             str(source), "-o", str(program)], text=True, capture_output=True)
+            [*flags, str(source), "-o", str(program)],
+            text=True, capture_output=True)
         if expected:
             if build.returncode == 0 or expected[1] not in build.stderr:
                 print(f"line {line}: expected the error '{expected[1]}', "
