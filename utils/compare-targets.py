@@ -9,10 +9,10 @@
 
 Each compiled run is a process of its own; its image must equal the reference
 executor's bit for bit, whose code is not optimized: it is big and draws one
-frame. With --same-picture the pipelines draw the same, and the
-reference executor runs only the first of them. With --blocks, kernels for a GPU
-run on the CPU, in blocks of so many threads; with --cpus, pipelines are compiled
-for these processors. Prints a line for each pipeline and thread count, or what
+frame. With --same-picture the pipelines draw the same, and the reference executor
+runs only the first of them. With --blocks, kernels for a GPU run on the CPU, in
+blocks of so many threads; with --cpus, pipelines are compiled for these
+processors. Prints a line for each pipeline and thread count, or what
 stands for it; the exit status is 1 if any image differs.
 """
 

@@ -58,7 +58,7 @@ def compare(tools, folder, file, pipe, target):
 
 def draw(tools, folder, file, pipe, rest):
     scene = SCENES.get(file.parent.name, ["torus.ply"])
-    quick = ["-O1"] if "gpu-on-cpu" in rest else []
+    quick = ["-O0"] if "gpu-on-cpu" in rest else []
     command = [tools / "piko-render", file, "--pipe", pipe, *scene, *SIZE, *quick, *rest]
     return command, json.loads(run(command, folder))
 

@@ -36,5 +36,5 @@ for step in STEPS:
     result = subprocess.run(["piko-opt", module, passes], capture_output=True)
     assert result.returncode == 0, result.stderr.decode()
     pathlib.Path(module).write_bytes(result.stdout)
-    picture = draw("-O1")  # what LLVM makes of it is not what this is about
+    picture = draw("-O0")  # what LLVM makes of it is not what this is about
     assert picture == expected, f"{step}: {picture} instead of {expected}"
