@@ -112,6 +112,8 @@ static std::optional<std::string> makeHeader(const FrontendOptions &options,
                           /*ShouldOwnClient=*/false));
   if (!invocation)
     return std::nullopt;
+  // Or each file instantiates anew what the header itself uses.
+  invocation->getLangOpts().PCHInstantiateTemplates = true;
   std::unique_ptr<llvm::MemoryBuffer> text =
       llvm::MemoryBuffer::getMemBuffer("#include <piko.h>\n", headerName);
   invocation->getFrontendOpts().Inputs = {clang::FrontendInputFile(
