@@ -131,7 +131,7 @@ std::string tune::drawChart(const TuneResult &result) {
   Scales scales;
   scales.add(0, result.options.error);
   auto add = [&](const Trial &trial) {
-    if (trial.full.empty() || !trial.error)
+    if (trial.times.empty() || !trial.error)
       return;
     points.push_back({trial.median(), *trial.error, &trial});
     scales.add(trial.median(), *trial.error);

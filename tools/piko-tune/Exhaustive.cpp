@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <climits>
 #include <cmath>
+#include <map>
 
 using namespace piko;
 using namespace piko::tune;
@@ -16,6 +17,10 @@ using render::Result;
 /// Pipelines that are in memory at a time.
 static constexpr size_t blockSize = 6;
 static constexpr size_t mostSettings = 2000;
+/// Those that run once more with the chosen one: so many rounds each time that
+/// their pipelines are made anew.
+static constexpr size_t finalists = 6;
+static constexpr int finalRounds = 6, finalInstances = 4;
 
 /// Ranks settings by their time relative to the text's in the same block.
 static std::vector<Trial *> rankAll(Search &search, Bench &bench,
@@ -29,7 +34,7 @@ static std::vector<Trial *> rankAll(Search &search, Bench &bench,
     std::vector<Trial *> block(all.begin() + std::ptrdiff_t(begin),
                                all.begin() + std::ptrdiff_t(end));
     block.push_back(text);
-    search.race(block, Scale::Full, exhaustiveRounds);
+    search.race(block, exhaustiveRounds);
     for (Trial *trial : block) {
       if (trial != text)
         order.emplace_back(trial->score - text->score, trial);
@@ -45,9 +50,26 @@ static std::vector<Trial *> rankAll(Search &search, Bench &bench,
   std::vector<Trial *> ranking;
   for (auto [score, trial] : order) {
     ranking.push_back(trial);
-    survey.times.emplace_back(trial->setting, std::exp(score));
+    survey.all.push_back({trial->setting, std::exp(score),
+                          trial->error.value_or(0), trial->times});
   }
   return ranking;
+}
+
+/// The one whose scores are least together.
+static Trial *findBest(Search &search, Bench &bench,
+                       std::vector<Trial *> pool) {
+  std::map<size_t, double> sums; // by the number of a trial
+  for (int i = 0; i < finalInstances; ++i) {
+    search.race(pool, finalRounds);
+    for (Trial *trial : pool) {
+      sums[trial->number] += trial->score;
+      bench.release(trial->setting);
+    }
+  }
+  return *std::min_element(pool.begin(), pool.end(), [&](Trial *a, Trial *b) {
+    return sums[a->number] < sums[b->number];
+  });
 }
 
 Result<Survey> tune::surveyAll(const std::vector<Dimension> &dimensions,
@@ -79,12 +101,17 @@ Result<Survey> tune::surveyAll(const std::vector<Dimension> &dimensions,
   Trial *mine = search.getTrial(chosen);
   if (ranking.empty() || !mine)
     return Error{"no setting has so small an error"};
-  constexpr size_t finalists = 4;
   ranking.resize(std::min(ranking.size(), finalists));
   if (std::find(ranking.begin(), ranking.end(), mine) == ranking.end())
     ranking.push_back(mine);
-  search.race(ranking, Scale::Full, 2 * exhaustiveRounds);
-  survey.best = ranking[0]->setting;
-  survey.regret = std::exp(mine->score - ranking[0]->score) - 1;
+  Trial *best = findBest(search, bench, ranking);
+  survey.best = best->setting;
+  if (best == mine)
+    return survey;
+  Duel duel = search.compare(
+      best, mine, search.getRound() + 1 - finalRounds * finalInstances);
+  survey.regret = duel.ratio - 1;
+  survey.leastRegret = duel.leastRatio - 1;
+  survey.mostRegret = duel.mostRatio - 1;
   return survey;
 }

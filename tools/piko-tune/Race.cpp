@@ -29,7 +29,7 @@ static double lowerMedianOf(std::vector<double> values) {
   return *middle;
 }
 
-double Trial::median() const { return medianOf(full); }
+double Trial::median() const { return medianOf(times); }
 
 double Duel::chance() const {
   int most = std::max(wins, rounds - wins);
@@ -41,23 +41,26 @@ double Duel::chance() const {
   return std::min(1.0, 2 * sum);
 }
 
-Duel Duel::turned() const { return {rounds - wins, rounds, 1 / ratio}; }
+Duel Duel::turned() const {
+  return {rounds - wins, rounds, 1 / ratio, 1 / mostRatio, 1 / leastRatio};
+}
 
 void Search::leaveOut(Trial *trial, const std::string &why) {
   trial->problem = why;
   bench.release(trial->setting);
 }
 
-bool Search::visit(Trial *trial, Scale scale, double *time) {
+bool Search::visit(Trial *trial, double *time) {
   runs += runsOfVisit;
-  auto result = bench.visit(trial->setting, scale);
+  auto result = bench.visit(trial->setting);
   if (!result) {
     leaveOut(trial, result.error().message);
     return false;
   }
   *time = std::max(*result, 1e-6);
-  (scale == Scale::Full ? trial->full : trial->small).push_back(*time);
-  if (scale == Scale::Small || trial->error)
+  trial->times.push_back(*time);
+  observations.push_back({trial->setting, round, std::log(*time)});
+  if (trial->error)
     return true;
   auto error = bench.measureError(trial->setting);
   if (!error) {
@@ -99,18 +102,19 @@ static std::vector<double> polish(const Rounds &rounds) {
   return scores;
 }
 
-void Search::race(std::vector<Trial *> &pool, Scale scale, int rounds) {
+void Search::race(std::vector<Trial *> &pool, int rounds) {
   std::map<size_t, std::vector<double>> logs; // by the number of a trial
-  for (int round = 0; round < rounds && !pool.empty(); ++round) {
-    if (runs + int(pool.size()) * runsOfVisit > budget) {
+  for (int i = 0; i < rounds && !pool.empty(); ++i) {
+    if (!canRun(pool.size())) {
       isBudgetSpent = true;
       break;
     }
+    ++round;
     double time = 0;
-    for (size_t i = 0; i < pool.size(); ++i) {
+    for (size_t j = 0; j < pool.size(); ++j) {
       // To and fro, so that nobody is always the one behind the slowest.
-      Trial *trial = pool[round % 2 ? pool.size() - 1 - i : i];
-      if (visit(trial, scale, &time))
+      Trial *trial = pool[i % 2 ? pool.size() - 1 - j : j];
+      if (visit(trial, &time))
         logs[trial->number].push_back(std::log(time));
     }
     std::erase_if(pool, [](Trial *trial) { return !trial->problem.empty(); });
@@ -124,81 +128,65 @@ void Search::race(std::vector<Trial *> &pool, Scale scale, int rounds) {
   std::vector<double> scores = polish(table);
   for (size_t i = 0; i < pool.size(); ++i)
     pool[i]->score = scores[i];
-  rank(pool);
-}
-
-/// Sorts settings by their scores, and notes what changes gained.
-void Search::rank(std::vector<Trial *> &pool) {
-  for (Trial *a : pool)
-    for (Trial *b : pool)
-      gains[{a->number, b->number}] = b->score - a->score;
   std::sort(pool.begin(), pool.end(), [&](Trial *a, Trial *b) {
     return std::pair(a->score, a->number) < std::pair(b->score, b->number);
   });
 }
 
-/// A disturbed frame takes rarely more than twice the time.
-static const double mostDisturbance = std::log(2);
-
-/// Runs those from `next` on once more, as one frame may have been disturbed.
-void Search::giveSecondChance(std::vector<Trial *> &pool, size_t next,
-                              Scale scale) {
-  if (runs + int(pool.size() - next + 2) * runsOfVisit > budget)
-    return;
-  // By two that were not, to know how fast the machine is now.
-  double time = 0, offset = -INFINITY;
-  for (Trial *anchor : {pool[0], pool[next - 1]})
-    if (visit(anchor, scale, &time))
-      offset = std::max(offset, anchor->score - std::log(time));
-  if (offset == -INFINITY)
-    return;
-  double most = pool[next - 1]->score + mostDisturbance;
-  for (size_t i = next; i < pool.size(); ++i)
-    if (pool[i]->score <= most && visit(pool[i], scale, &time))
-      pool[i]->score = std::min(pool[i]->score, offset + std::log(time));
-  std::erase_if(pool, [](Trial *trial) { return !trial->problem.empty(); });
-  rank(pool);
+/// The time that a setting took in each round from some on.
+static std::map<size_t, double>
+listTimes(const std::vector<CostModel::Observation> &observations,
+          const Trial *trial, size_t since) {
+  std::map<size_t, double> times;
+  for (const CostModel::Observation &observation : observations)
+    if (observation.round >= since && observation.setting == trial->setting)
+      times[observation.round] = observation.logTime;
+  return times;
 }
 
-void Search::halve(std::vector<Trial *> &pool, size_t keep) {
-  // Where what the text says is not allowed, errors come before times.
-  auto isGood = [this](Trial *trial) { return isAllowed(trial); };
-  Scale scale = std::any_of(pool.begin(), pool.end(), isGood) ? Scale::Small
-                                                              : Scale::Full;
-  for (int rounds = 1; pool.size() > keep;) {
-    race(pool, scale, rounds);
-    // Of few all can go at once that are not wanted.
-    size_t next = std::max(keep, (pool.size() + 1) / 2);
-    if (pool.size() <= 4 * keep)
-      next = keep;
-    if (rounds == 1 && !isBudgetSpent && next < pool.size())
-      giveSecondChance(pool, next, scale);
-    if (isBudgetSpent || pool.size() <= keep)
-      break;
-    for (size_t i = next; i < pool.size(); ++i)
-      bench.release(pool[i]->setting);
-    pool.resize(std::min(pool.size(), next));
-    rounds = scale == Scale::Small ? 1 : std::min(4, rounds * 2);
-    scale = Scale::Full;
-  }
+/// How many of the least values are below the median of so many with less than
+/// 2.5 %, which bounds it: as a sign test.
+static size_t countOutside(size_t rounds) {
+  size_t outside = 0;
+  while (2 * (outside + 1) <= rounds &&
+         Duel{int(outside), int(rounds)}.chance() <= 0.05)
+    ++outside;
+  return outside > 0 ? outside - 1 : 0;
 }
 
-Duel Search::fight(Trial *first, Trial *second, int most) {
+Duel Search::compare(const Trial *first, const Trial *second,
+                     size_t since) const {
   Duel duel;
   std::vector<double> ratios;
-  for (int round = 0; round < most; ++round) {
-    if (runs + 2 * runsOfVisit > budget)
-      break;
-    double times[2];
-    for (int turn : {round % 2, 1 - round % 2})
-      if (!visit(turn ? second : first, Scale::Full, &times[turn]))
-        return duel;
+  auto others = listTimes(observations, second, since);
+  for (auto [at, time] : listTimes(observations, first, since)) {
+    auto other = others.find(at);
+    if (other == others.end())
+      continue;
     ++duel.rounds;
-    duel.wins += times[0] < times[1];
-    ratios.push_back(times[1] / std::max(times[0], 1e-6));
-    duel.ratio = medianOf(ratios);
-    if (duel.rounds >= 6 && !duel.isLevel())
-      break;
+    duel.wins += time < other->second;
+    ratios.push_back(std::exp(other->second - time));
   }
+  if (ratios.empty())
+    return duel;
+  duel.ratio = medianOf(ratios);
+  std::sort(ratios.begin(), ratios.end());
+  size_t outside = countOutside(ratios.size());
+  duel.leastRatio = ratios[outside];
+  duel.mostRatio = ratios[ratios.size() - 1 - outside];
   return duel;
+}
+
+Duel Search::fight(Trial *first, Trial *second, size_t since, int most) {
+  while (true) {
+    Duel duel = compare(first, second, since);
+    bool isSure = duel.rounds >= 6 && !duel.isLevel();
+    if (isSure || duel.rounds >= most || !canRun(2))
+      return duel;
+    ++round;
+    double time = 0;
+    for (int turn : {duel.rounds % 2, 1 - duel.rounds % 2})
+      if (!visit(turn ? second : first, &time))
+        return duel;
+  }
 }

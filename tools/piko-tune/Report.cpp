@@ -58,6 +58,11 @@ std::string tune::summarize(const TuneResult &result) {
            std::to_string(outcome.compilations) + " compiled, " +
            std::to_string(countLeftOut(result)) + " left out" +
            (outcome.isBudgetSpent ? "; the budget is spent\n" : "\n");
+  if (outcome.missedChanges > 0)
+    lines += "the budget is too small for " +
+             std::to_string(outcome.missedChanges) +
+             " changes of one value; --budget " +
+             std::to_string(outcome.neededBudget) + " is not\n";
   for (const Trial &trial : result.trials)
     if (!trial.problem.empty())
       lines += "  left out: " + space.name(trial.setting) + ": " +
@@ -67,7 +72,9 @@ std::string tune::summarize(const TuneResult &result) {
              std::to_string(survey->programs) + " programs, " +
              std::to_string(survey->runs) + " runs: the best is " +
              space.name(survey->best) + "; the chosen one is slower by " +
-             print("%.1f %%\n", 100 * survey->regret);
+             print("%.1f %%", 100 * survey->regret) +
+             print(" (%.1f", 100 * survey->leastRegret) +
+             print(" to %.1f %%)\n", 100 * survey->mostRegret);
   return lines;
 }
 
@@ -114,13 +121,16 @@ std::string tune::writeJson(const TuneResult &result) {
       .add("settings", result.trials.size())
       .add("compilations", outcome.compilations)
       .add("left_out", countLeftOut(result))
-      .add("budget_spent", int(outcome.isBudgetSpent));
+      .add("budget_spent", int(outcome.isBudgetSpent))
+      .add("missed_changes", outcome.missedChanges);
   if (const auto &survey = result.survey)
     object.add("all_settings", survey->settings)
         .add("all_programs", survey->programs)
         .add("all_runs", survey->runs)
         .add("best", result.space.name(survey->best))
-        .addExact("regret", survey->regret);
+        .addExact("regret", survey->regret)
+        .addExact("regret_least", survey->leastRegret)
+        .addExact("regret_most", survey->mostRegret);
   return object.text() + "\n";
 }
 
@@ -136,15 +146,20 @@ std::string tune::writeCSV(const TuneResult &result) {
   std::string text = "setting,ms,frames,error,problem\n";
   for (const Trial &trial : result.trials)
     text += quote(result.space.name(trial.setting)) + "," +
-            (trial.full.empty() ? "" : print("%.6g", trial.median())) + "," +
-            std::to_string(trial.full.size()) + "," +
+            (trial.times.empty() ? "" : print("%.6g", trial.median())) + "," +
+            std::to_string(trial.times.size()) + "," +
             (trial.error ? print("%.9g", *trial.error) : "") + "," +
             quote(trial.problem) + "\n";
   if (!result.survey)
     return text;
-  text += "\nof all settings,time by the text's\n";
-  for (const auto &[setting, time] : result.survey->times)
-    text += quote(result.space.name(setting)) + print(",%.4f\n", time);
+  text += "\nof all settings,time by the text's,error,ms of rounds\n";
+  for (const SurveyedSetting &one : result.survey->all) {
+    text += quote(result.space.name(one.setting)) + print(",%.4f", one.ratio) +
+            print(",%.9g", one.error);
+    for (double time : one.times)
+      text += print(",%.6g", time);
+    text += "\n";
+  }
   return text;
 }
 

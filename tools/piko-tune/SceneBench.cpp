@@ -13,32 +13,20 @@ using namespace piko::tune;
 using render::Error;
 using render::Result;
 
-/// An image of less than this many pixels across has no smaller one.
-static constexpr int leastWidth = 256;
-
 Result<std::unique_ptr<SceneBench>>
 SceneBench::create(const TuneOptions &options, const Space &space) {
   std::unique_ptr<SceneBench> bench(new SceneBench(options, space));
-  render::Options render = options.render;
-  auto full = render::loadScene(render);
-  if (!full)
-    return full.error();
-  bench->fullScene = std::move(*full);
-  int width = render.view.width, height = render.view.height;
-  bench->hasSmall = std::min(width, height) >= leastWidth;
-  if (bench->hasSmall) {
-    render.view.width = width * 3 / 4;
-    render.view.height = height * 3 / 4;
-    auto small = render::loadScene(render);
-    if (!small)
-      return small.error();
-    bench->smallScene = std::move(*small);
-  }
+  auto scene = render::loadScene(options.render);
+  if (!scene)
+    return scene.error();
+  bench->scene = std::move(*scene);
   if (options.reference.empty())
     return bench;
   auto image = render::readImage(options.reference);
   if (!image)
     return image.error();
+  auto [width, height] =
+      std::pair(options.render.view.width, options.render.view.height);
   if (image->width != width || image->height != height)
     return Error{"expected a reference image of " + std::to_string(width) +
                  " x " + std::to_string(height) + " pixels, but '" +
@@ -72,20 +60,17 @@ Result<uint64_t> SceneBench::prepare(const Setting &setting) {
          0x9e3779b97f4a7c15 * uint64_t(tuned.stripSize);
 }
 
-Result<SceneBench::Instance *> SceneBench::getInstance(const Setting &setting,
-                                                       Scale scale) {
-  bool isSmall = hasSmall && scale == Scale::Small;
+Result<SceneBench::Instance *> SceneBench::getInstance(const Setting &setting) {
   Entry &entry = entries.at(setting);
-  std::unique_ptr<Instance> &instance = isSmall ? entry.small : entry.full;
+  std::unique_ptr<Instance> &instance = entry.instance;
   if (instance)
     return instance.get();
   instance = std::make_unique<Instance>();
   render::Options render = options.render;
   if (int64_t strip = space.describe(setting).stripSize)
     render.stripSize = strip;
-  auto image =
-      render::createPipeline(render, entry.program->get(),
-                             isSmall ? smallScene : fullScene, instance->owner);
+  auto image = render::createPipeline(render, entry.program->get(), scene,
+                                      instance->owner);
   if (!image) {
     Error error = image.error();
     instance.reset();
@@ -102,8 +87,8 @@ static double readClock(bool countsCPU) {
   return 1e3 * double(time.tv_sec) + 1e-6 * double(time.tv_nsec);
 }
 
-Result<double> SceneBench::visit(const Setting &setting, Scale scale) {
-  auto instance = getInstance(setting, scale);
+Result<double> SceneBench::visit(const Setting &setting) {
+  auto instance = getInstance(setting);
   if (!instance)
     return instance.error();
   pikort_pipeline *pipeline = (*instance)->owner.pipeline;
@@ -136,14 +121,14 @@ static double get(Metric metric, const render::ImageError &error) {
 }
 
 Result<double> SceneBench::measureError(const Setting &setting) {
-  auto instance = getInstance(setting, Scale::Full);
+  auto instance = getInstance(setting);
   if (!instance)
     return instance.error();
   auto pixels =
       render::readImage((*instance)->owner.pipeline, (*instance)->image);
   if (!pixels)
     return pixels.error();
-  render::Image image{fullScene.size.x, fullScene.size.y, std::move(*pixels)};
+  render::Image image{scene.size.x, scene.size.y, std::move(*pixels)};
   if (!reference)
     reference = image;
   auto error = options.metric == Metric::FLIP
@@ -155,8 +140,6 @@ Result<double> SceneBench::measureError(const Setting &setting) {
 }
 
 void SceneBench::release(const Setting &setting) {
-  if (auto entry = entries.find(setting); entry != entries.end()) {
-    entry->second.small.reset();
-    entry->second.full.reset();
-  }
+  if (auto entry = entries.find(setting); entry != entries.end())
+    entry->second.instance.reset();
 }

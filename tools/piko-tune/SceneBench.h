@@ -20,7 +20,7 @@ public:
   create(const TuneOptions &options, const Space &space);
 
   render::Result<uint64_t> prepare(const Setting &setting) override;
-  render::Result<double> visit(const Setting &setting, Scale scale) override;
+  render::Result<double> visit(const Setting &setting) override;
   /// Where there is no reference image yet, the setting's image becomes it.
   render::Result<double> measureError(const Setting &setting) override;
   void release(const Setting &setting) override;
@@ -33,17 +33,16 @@ private:
   };
   struct Entry {
     std::unique_ptr<LoadedProgram> program;
-    std::unique_ptr<Instance> small, full;
+    std::unique_ptr<Instance> instance;
   };
 
   SceneBench(const TuneOptions &options, const Space &space)
       : options(options), space(space) {}
-  render::Result<Instance *> getInstance(const Setting &setting, Scale scale);
+  render::Result<Instance *> getInstance(const Setting &setting);
 
   const TuneOptions &options;
   const Space &space;
-  render::SceneInput smallScene, fullScene;
-  bool hasSmall = false;
+  render::SceneInput scene;
   std::optional<render::Image> reference;
   std::map<Setting, Entry> entries;
 };
