@@ -24,9 +24,9 @@ static constexpr size_t leastCandidates = 500;
 /// Observations that a model learns from at most: it takes the cube of time.
 static constexpr size_t mostObservations = 300;
 /// An improvement that is expected to be less is not worth a run.
-static const double leastImprovement = 1e-4;
+static const double leastImprovement = 1e-5;
 /// Rounds in which nothing better was found before the search ends.
-static constexpr int mostIdleRounds = 12;
+static constexpr int mostIdleRounds = 16;
 /// Who runs in turn at last, for how many rounds.
 static constexpr size_t finalists = 3;
 static constexpr int finalRounds = 6;

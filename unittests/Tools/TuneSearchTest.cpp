@@ -1,60 +1,14 @@
 //===- TuneSearchTest.cpp - The search of piko-tune, with made-up costs ---===//
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #include "Exhaustive.h"
+#include "MadeUpBench.h"
 
 #include <gtest/gtest.h>
 
-#include <cmath>
-#include <random>
-#include <set>
-
 using namespace piko;
 using namespace piko::tune;
-using render::Error;
-using render::Result;
 
 namespace {
-
-/// Times that a function says, with noise: each is up to some percent more, one
-/// in twenty twice as much, and the machine gets slower and faster.
-class MadeUpBench : public Bench {
-public:
-  MadeUpBench(std::function<double(const Setting &)> cost, double noise,
-              unsigned seed)
-      : cost(std::move(cost)), noise(noise), random(seed) {}
-
-  Result<uint64_t> prepare(const Setting &setting) override {
-    if (broken.contains(setting))
-      return Error{"does not compile"};
-    uint64_t program = 0;
-    for (int value : setting)
-      program = program * 16 + uint64_t(value);
-    return program;
-  }
-  Result<double> visit(const Setting &setting) override {
-    ++visits;
-    std::uniform_real_distribution<double> uniform(0, 1);
-    double drift = 1 + 0.3 * std::sin(0.02 * visits);
-    double spike = uniform(random) < 0.05 ? 1 : 0;
-    return cost(setting) * drift *
-           (1 + noise * uniform(random) + (noise > 0 ? spike : 0));
-  }
-  Result<double> measureError(const Setting &setting) override {
-    return errorOf(setting);
-  }
-  void release(const Setting &) override {}
-
-  std::set<Setting> broken;
-  std::function<double(const Setting &)> errorOf = [](const Setting &) {
-    return 0.0;
-  };
-  int visits = 0;
-
-private:
-  std::function<double(const Setting &)> cost;
-  double noise;
-  std::mt19937 random;
-};
 
 /// Three pipelines, the last with dimensions of its own: 144 settings.
 std::vector<Dimension> makeSpace() {
