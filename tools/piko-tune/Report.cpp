@@ -62,7 +62,7 @@ std::string tune::summarize(const TuneResult &result) {
     lines += "the budget is too small for " +
              std::to_string(outcome.missedChanges) +
              " changes of one value; --budget " +
-             std::to_string(outcome.neededBudget) + " is not\n";
+             std::to_string(outcome.neededBudget) + " is enough\n";
   for (const Trial &trial : result.trials)
     if (!trial.problem.empty())
       lines += "  left out: " + space.name(trial.setting) + ": " +
