@@ -16,6 +16,8 @@ static constexpr double disbelief = 1;
 /// By how many standard deviations an observation must be slower than what the
 /// others let expect, not to be believed.
 static constexpr double outlier = 3.5;
+/// Rounds of what is believed, after all that ran.
+static constexpr size_t firstOwnRound = size_t(1) << 40;
 
 double CostModel::Prediction::expectImprovement(double below) const {
   if (deviation < 1e-9)
@@ -197,7 +199,8 @@ void CostModel::fit(std::vector<Observation> all) {
 void CostModel::believe(const Setting &setting) {
   // In a round of its own, and with no noise but what is in the prediction.
   double logTime = predict(setting).mean;
-  observations.push_back({setting, observations.size() + (1 << 20), logTime});
+  observations.push_back(
+      {setting, firstOwnRound + observations.size(), logTime});
   doubts.push_back(0);
   append(observations.size() - 1);
   solve();
