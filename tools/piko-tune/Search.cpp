@@ -157,7 +157,8 @@ void Search::screen(Trial *text) {
     }
     if (pool.size() == 1)
       continue;
-    log(std::to_string(pool.size() - 1) + " changes of one value");
+    log(std::to_string(pool.size() - 1) +
+        (pool.size() == 2 ? " change" : " changes") + " of one value");
     race(pool, 1);
     for (Trial *trial : pool)
       bench.release(trial->setting);
