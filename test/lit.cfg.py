@@ -18,6 +18,7 @@ split-file. Substitutions:
   %cxx_host      compiler and flags that build a host of compiled pipelines
   %link_host     what such a host links
   %qt_include    folder of Qt's headers
+  %test_driver   the driver for tests, in place of NVIDIA's
   %cxx_reference compiler and flags that build a pipeline file with the
                  reference executor
 
@@ -80,6 +81,10 @@ config.substitutions += [
     ("%python", config.python),
     ("%qt_include", "".join(glob.glob("/usr/include/*/qt5")[:1])),
     ("%utils", os.path.join(config.piko_source_root, "utils")),
+    (
+        "%test_driver",
+        os.path.join(config.piko_binary_root, "lib", "libpiko-test-driver.so"),
+    ),
     ("%readme", os.path.join(config.piko_source_root, "README.md")),
     ("%docs", os.path.join(config.piko_source_root, "docs")),
     ("%cmake", config.cmake),

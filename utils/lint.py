@@ -93,8 +93,8 @@ def paths():
 
 
 def layers():
-    """runtime/common includes none of runtime/cpu and runtime/gpu, and declares
-    none of their types itself."""
+    """runtime/common includes none of runtime/cpu, runtime/gpu and runtime/cuda,
+    and declares none of the first two's types itself."""
     runtime = ROOT / "runtime"
     foreign = set()
     for header in [*runtime.glob("cpu/*.h"), *runtime.glob("gpu/*.h")]:
@@ -102,7 +102,7 @@ def layers():
     faults = 0
     for path in sorted(runtime.glob("common/*")):
         for number, line in enumerate(path.read_text().splitlines(), 1):
-            part = re.search(r"\b(cpu|gpu)/", line)
+            part = re.search(r"\b(cpu|gpu|cuda)/", line)
             declared = re.match(r"\s*(?:class|struct) (\w+);", line)
             name = part and part.group() or declared and declared.group(1)
             if part or name in foreign:
@@ -115,7 +115,7 @@ def layers():
 
 
 # No headers of LLVM, which take most of clang-tidy's time.
-QUICK = ("runtime/common", "runtime/cpu", "runtime/gpu", "lib/Scene")
+QUICK = ("runtime/common", "runtime/cpu", "runtime/gpu", "runtime/cuda", "lib/Scene")
 
 
 def tidy(build, quick):

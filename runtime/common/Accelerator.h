@@ -13,6 +13,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string_view>
 
 namespace piko::rt {
 
@@ -36,6 +37,9 @@ public:
   virtual void launch(const char *kernel, int64_t blocks, int64_t threads,
                       const void *arguments, int64_t count) = 0;
 };
+
+/// Whether this machine has a device of a kind: "cuda".
+bool hasDevice(std::string_view kind) noexcept;
 
 } // namespace piko::rt
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //===- Versions.cpp - Which of a program's codes this processor runs ------===//
 
+#include "common/Accelerator.h"
 #include "common/Pipeline.h"
-#include "cuda/Device.h"
 
 #include <algorithm>
 #include <cstdlib>
@@ -86,9 +86,8 @@ static std::string findMissing(const pikoir_version &version) {
   while (!rest.empty()) {
     std::string_view name = rest.substr(0, rest.find(','));
     rest.remove_prefix(std::min(rest.size(), name.size() + 1));
-    bool has = name == "cuda" ? piko::cuda::hasDevice()
-                              : std::find(features.begin(), features.end(),
-                                          name) != features.end();
+    bool has = hasDevice(name) || std::find(features.begin(), features.end(),
+                                            name) != features.end();
     if (!has)
       missing.append(missing.empty() ? "" : ", ").append(name);
   }

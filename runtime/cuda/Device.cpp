@@ -70,14 +70,51 @@ static int chooseOrdinal(int count) {
   return ordinal;
 }
 
+static int countDevices(const Driver &driver) {
+  int count = 0;
+  if (driver.cuDeviceGetCount(&count) != CUDA_SUCCESS || count == 0)
+    failNoDevice("the driver has none");
+  return count;
+}
+
+static std::string nameOf(const Driver &driver, CUdevice device) {
+  char name[256] = "";
+  bool found =
+      driver.cuDeviceGetName(name, sizeof(name), device) == CUDA_SUCCESS;
+  return found ? name : "";
+}
+
+/// A device that pipelines can use.
+static CUdevice findDevice(const Driver &driver, int ordinal) {
+  CUdevice device = 0;
+  std::string who = "device " + std::to_string(ordinal);
+  if (driver.cuDeviceGet(&device, ordinal) != CUDA_SUCCESS)
+    failNoDevice("the driver does not give " + who);
+  who += " (" + nameOf(driver, device) + ")";
+  auto get = [&](CUdevice_attribute which) {
+    int value = 0;
+    if (driver.cuDeviceGetAttribute(&value, which, device) != CUDA_SUCCESS)
+      failNoDevice("the driver does not describe " + who);
+    return value;
+  };
+  int major = get(CU_DEVICE_ATTRIBUTE_COMPUTE_CAPABILITY_MAJOR);
+  int minor = get(CU_DEVICE_ATTRIBUTE_COMPUTE_CAPABILITY_MINOR);
+  if (major < 7)
+    failNoDevice(who +
+                 ": expected compute capability 7.0 or later, but it "
+                 "has " +
+                 std::to_string(major) + "." + std::to_string(minor));
+  if (!get(CU_DEVICE_ATTRIBUTE_CONCURRENT_MANAGED_ACCESS))
+    failNoDevice(who + ": expected managed memory that takes pages on demand, "
+                       "which it, or this operating system, does not have");
+  return device;
+}
+
 std::shared_ptr<Device> Device::open() {
   static std::mutex mutex;
   static std::map<int, std::weak_ptr<Device>> devices;
   const Driver &driver = loadDriver();
-  int count = 0;
-  if (driver.cuDeviceGetCount(&count) != CUDA_SUCCESS || count == 0)
-    failNoDevice("the driver has none");
-  int ordinal = chooseOrdinal(count);
+  int ordinal = chooseOrdinal(countDevices(driver));
   std::lock_guard<std::mutex> lock(mutex);
   std::shared_ptr<Device> device = devices[ordinal].lock();
   if (!device)
@@ -85,30 +122,21 @@ std::shared_ptr<Device> Device::open() {
   return device;
 }
 
-bool piko::cuda::hasDevice() noexcept {
+bool piko::rt::hasDevice(std::string_view kind) noexcept {
   try {
-    return Device::open() != nullptr;
+    if (kind != "cuda")
+      return false;
+    const Driver &driver = loadDriver();
+    findDevice(driver, chooseOrdinal(countDevices(driver)));
+    return true;
   } catch (...) {
     return false;
   }
 }
 
 Device::Device(const Driver &driver, int ordinal)
-    : driver(driver), ordinal(ordinal) {
-  char name[256] = "";
-  check(driver.cuDeviceGet(&device_, ordinal), "finding it");
-  if (driver.cuDeviceGetName(name, sizeof(name), device_) == CUDA_SUCCESS)
-    name_ = name;
-  int major = attribute(CU_DEVICE_ATTRIBUTE_COMPUTE_CAPABILITY_MAJOR);
-  int minor = attribute(CU_DEVICE_ATTRIBUTE_COMPUTE_CAPABILITY_MINOR);
-  if (major < 7)
-    failNoDevice("device " + std::to_string(ordinal) + " (" + name_ +
-                 "): expected compute capability 7.0 or later, but it has " +
-                 std::to_string(major) + "." + std::to_string(minor));
-  if (!attribute(CU_DEVICE_ATTRIBUTE_CONCURRENT_MANAGED_ACCESS))
-    failNoDevice("device " + std::to_string(ordinal) + " (" + name_ +
-                 "): expected managed memory that takes pages on demand, which "
-                 "it, or this operating system, does not have");
+    : driver(driver), ordinal(ordinal), device_(findDevice(driver, ordinal)),
+      name_(nameOf(driver, device_)) {
   check(driver.cuDevicePrimaryCtxRetain(&context_, device_),
         "making its context");
 }
@@ -123,12 +151,6 @@ int Device::attribute(CUdevice_attribute which) const {
   check(driver.cuDeviceGetAttribute(&value, which, device_),
         "reading an attribute");
   return value;
-}
-
-size_t Device::totalMemory() const {
-  size_t bytes = 0;
-  check(driver.cuDeviceTotalMem(&bytes, device_), "reading its memory's size");
-  return bytes;
 }
 
 std::string Device::describe(CUresult result, const std::string &doing) const {

@@ -20,9 +20,6 @@ namespace piko::cuda {
 /// The driver's functions; throws Failure with PIKORT_NO_DEVICE.
 const Driver &loadDriver();
 
-/// Whether there is a device that pipelines can use.
-bool hasDevice() noexcept;
-
 /// A device and its primary context, shared by all pipelines of the process.
 class Device {
 public:
@@ -38,7 +35,6 @@ public:
   const int ordinal;
 
   int attribute(CUdevice_attribute which) const;
-  size_t totalMemory() const;
   /// Makes its context the calling thread's; the result of the call.
   CUresult enter() const { return driver.cuCtxSetCurrent(context_); }
   /// Throws Failure unless `result` is success; `doing` is what was tried.

@@ -100,9 +100,8 @@ enum : unsigned {
 /// cuMemPrefetchAsync: to the host.
 inline constexpr CUdevice CU_DEVICE_CPU = -1;
 
-/// The functions, by name. `load` fills it; the names with a suffix, such as
-/// cuMemAlloc_v2, are symbols of the driver, and what cuda.h's plain names
-/// mean.
+/// The functions, by name; null until the driver is loaded. Symbols may have a
+/// suffix, such as cuMemAlloc_v2, which is what cuda.h's plain names mean.
 struct Driver {
 #define PIKO_CUDA_FUNCTION(NAME, SYMBOL, PARAMETERS)                           \
   CUresult(*NAME) PARAMETERS = nullptr;

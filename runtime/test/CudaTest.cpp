@@ -249,6 +249,8 @@ bool wasRelease(const std::string &error) {
 }
 
 TEST_F(Cuda, EachCallFails) {
+  ASSERT_TRUE(scale()); // starts the driver
+  pikoTestDriverReset();
   ASSERT_TRUE(scale(2));
   uint64_t calls = pikoTestDriverCalls(nullptr);
   ASSERT_GT(calls, 20u);

@@ -269,7 +269,8 @@ private:
     if (target)
       options.load.gpu.target = *target;
     else
-      fail("--target: expected cpu, cuda, auto, gpu-on-cpu or reference, but got '" +
+      fail("--target: expected cpu, cuda, auto, gpu-on-cpu or reference, but "
+           "got '" +
            name + "'");
   }
 

@@ -130,7 +130,8 @@ TEST(RenderOptions, Errors) {
     EXPECT_EQ(errorOf({"a", "b", "--set", bad}),
               "--set: expected NAME=VALUE, but got '" + std::string(bad) + "'");
   EXPECT_EQ(errorOf({"a", "b", "--target", "gpu"}),
-            "--target: expected cpu, gpu-on-cpu or reference, but got 'gpu'");
+            "--target: expected cpu, cuda, auto, gpu-on-cpu or reference, but "
+            "got 'gpu'");
 }
 
 } // namespace
