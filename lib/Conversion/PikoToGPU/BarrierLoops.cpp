@@ -81,10 +81,11 @@ private:
 // What threads do alone
 //===----------------------------------------------------------------------===//
 
-/// What may be done without an iteration: it has no effect on anything.
+/// What may be done without an iteration: it has no effect on anything, and
+/// reads no primitive, of which there may be none so far behind.
 static bool isFree(Operation *op) {
   return op->getNumRegions() == 0 && isMemoryEffectFree(op) &&
-         isSpeculatable(op);
+         isSpeculatable(op) && !isa<GetOp, ItemOp>(op);
 }
 
 /// What a thread without an iteration has for a value, or null.
