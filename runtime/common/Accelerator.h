@@ -25,9 +25,11 @@ public:
   virtual uint8_t *map(size_t bytes) noexcept = 0;
   virtual void unmap(uint8_t *data) noexcept = 0;
 
-  /// Address space for what one grid emits, the same for all: memory is taken
-  /// where it is written. Empty if refused.
+  /// Address space for what one grid emits, the same for all, and zero: memory
+  /// is taken where it is written. Empty if refused.
   virtual std::span<uint8_t> logSpace() noexcept = 0;
+  /// A part of it becomes zero again; an error is the run's.
+  virtual void clearLog(std::span<uint8_t> part) noexcept = 0;
 
   /// How many threads it takes to fill the device.
   virtual int64_t residentThreads() const = 0;

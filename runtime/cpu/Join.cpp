@@ -194,7 +194,9 @@ Array<uint32_t> piko::rt::pairStarts(Memory &memory, const Items &items) {
   for (int64_t k = 0; k < items.pairCount; ++k)
     if (items.pairs[k] & PIKOIR_FIRST_CELL)
       starts[item++] = static_cast<uint32_t>(k);
-  starts[item] = static_cast<uint32_t>(items.pairCount);
+  // Of a stream without any pair, all begin and end at 0.
+  std::fill(starts.data() + item, starts.data() + items.count + 1,
+            static_cast<uint32_t>(items.pairCount));
   return starts;
 }
 

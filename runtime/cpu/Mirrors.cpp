@@ -74,14 +74,18 @@ void piko::rt::shareUnits(pikort_pipeline &p, Kernel &kernel) {
     share(p, kernel.mirrors.units, input.units, input.unit_count);
 }
 
-void piko::rt::shareInput(pikort_pipeline &p, Kernel &kernel, int64_t records) {
+void piko::rt::shareInput(pikort_pipeline &p, Kernel &kernel,
+                          const Items &from) {
   if (!p.accelerator)
     return;
   pikoir_input &input = kernel.input;
   InputMirrors &mirrors = kernel.mirrors;
   shareUnits(p, kernel);
-  share(p, mirrors.items, input.items,
-        records * p.records[p.stages[kernel.stage].record].size);
+  // What has an index lies in blocks of the pipeline's memory, which may be far
+  // from each other.
+  if (!from.index)
+    share(p, mirrors.items, input.items,
+          from.count * p.records[p.stages[kernel.stage].record].size);
   share(p, mirrors.order, input.order, input.count);
   share(p, mirrors.calls, input.calls, input.call_count);
 }

@@ -14,10 +14,10 @@ void beginMirrors(pikort_pipeline &p);
 /// Puts the host's memory back, with what kernels have written.
 void endMirrors(pikort_pipeline &p);
 
-/// Lets an accelerator read a kernel's units, or all of its input, in which
-/// `records` primitives lie; throws.
+/// Lets an accelerator read a kernel's units, or all of its input, whose
+/// primitives are those of `from`; throws.
 void shareUnits(pikort_pipeline &p, Kernel &kernel);
-void shareInput(pikort_pipeline &p, Kernel &kernel, int64_t records);
+void shareInput(pikort_pipeline &p, Kernel &kernel, const Items &from);
 
 } // namespace piko::rt
 

@@ -130,7 +130,7 @@ void Serial::begin(const Items &input) {
                    stage_.tiles,
                    stage_.takesList() ? calls_.data() : nullptr,
                    static_cast<int64_t>(calls_.size())};
-  shareInput(p_, kernel_, input.reach());
+  shareInput(p_, kernel_, input);
 }
 
 void Serial::binPairs(const Items &input) {

@@ -66,6 +66,20 @@ std::span<uint8_t> Accelerator::logSpace() noexcept {
   return log_;
 }
 
+void Accelerator::clearLog(std::span<uint8_t> part) noexcept {
+  if (part.empty())
+    return;
+  piko::rt::guarded(&p_, "run", [&] {
+    device_->check(device_->enter(), "entering its context");
+    device_->check(device_->driver.cuMemsetD8Async(
+                       reinterpret_cast<CUdeviceptr>(part.data()), 0,
+                       part.size(), stream_),
+                   "clearing the log");
+    device_->check(device_->driver.cuStreamSynchronize(stream_),
+                   "clearing the log");
+  });
+}
+
 // --- Kernels -----------------------------------------------------------------
 
 void Accelerator::loadModule() {

@@ -29,6 +29,7 @@ public:
   uint8_t *map(size_t bytes) noexcept override;
   void unmap(uint8_t *data) noexcept override;
   std::span<uint8_t> logSpace() noexcept override;
+  void clearLog(std::span<uint8_t> part) noexcept override;
   int64_t residentThreads() const override { return residentThreads_; }
   void launch(const char *kernel, int64_t blocks, int64_t threads,
               const void *arguments, int64_t count) override;

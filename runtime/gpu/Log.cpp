@@ -47,11 +47,18 @@ struct GridLog {
   GridLog(const GridLog &) = delete;
   GridLog &operator=(const GridLog &) = delete;
   ~GridLog() {
-    if (!pipeline.accelerator && !room.empty())
+    if (pipeline.accelerator && head)
+      pipeline.accelerator->clearLog(usedPieces());
+    else if (!room.empty())
       munmap(room.data(), room.size());
   }
 
   void close();
+  std::span<uint8_t> usedPieces() const {
+    int64_t begin = head->spare + spareRoom;
+    return {reinterpret_cast<uint8_t *>(begin),
+            static_cast<size_t>(std::min(head->cursor, head->limit) - begin)};
+  }
 
   pikort_pipeline &pipeline;
   int32_t number;
