@@ -99,8 +99,13 @@ def ConvertPikoToGPU : Pass<"convert-piko-to-gpu", "::piko::PipelineOp"> {
       pixels it has. All threads take all the primitives of the bin in order, so
       that the updates of a pixel keep their lineage order; what belongs to other
       threads' pixels is behind a test of the pixel, or, where a loop counts
-      through pixels, stepped over. The block copies fields of as many primitives
-      as it has threads into its own memory, between two `gpu.barrier`s.
+      through pixels, stepped over. What depends on a primitive alone, its setup,
+      is split off (loop fission): each thread does it for one of as many
+      primitives as the block has threads, and leaves what the pixels need of it
+      in the block's memory, between two `gpu.barrier`s. What is in a loop with
+      work on pixels, or uses an array, all threads still do alike; and where the
+      block's memory has no room for all of it, only fields are shared. An error
+      notes which primitive it is about, by which the runtime puts them in order.
     - Of any other kernel, threads share the primitives of a bin, or the iterations
       of parallel loops, where no two of these update a pixel. Where iterations
       meet at barriers and are at most as many as the block has threads, each is a
