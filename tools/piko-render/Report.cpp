@@ -69,13 +69,30 @@ double runsOf(pikort_pipeline *pipeline) {
   return double(std::max<int64_t>(1, pikort_stats_runs(pipeline)));
 }
 
+/// What the frames ran on.
+const char *nameTarget(const Options &options, pikort_pipeline *pipeline) {
+  if (options.load.target == ExecutionTarget::Reference)
+    return "reference";
+  switch (options.load.gpu.target) {
+  case GPUTarget::Emulator:
+    return "gpu-on-cpu";
+  case GPUTarget::CUDA:
+    return "cuda";
+  case GPUTarget::Auto:
+    return pikort_processor(pipeline) == std::string_view("cuda") ? "cuda"
+                                                                  : "cpu";
+  default:
+    return "cpu";
+  }
+}
+
 } // namespace
 
 JsonObject render::makeReport(const Options &options, const RunResult &result,
                               pikort_pipeline *pipeline) {
   double runs = runsOf(pipeline);
   bool isReference = options.load.target == ExecutionTarget::Reference;
-  const char *target = isReference ? "reference" : "cpu";
+  const char *target = nameTarget(options, pipeline);
   std::string name = pikort_name(pipeline);
   JsonObject report;
   report.add("peer", "piko")
