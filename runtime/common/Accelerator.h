@@ -28,7 +28,8 @@ public:
   /// Address space for what one grid emits, the same for all, and zero: memory
   /// is taken where it is written. Empty if refused.
   virtual std::span<uint8_t> logSpace() noexcept = 0;
-  /// A part of it becomes zero again; an error is the run's.
+  /// A part of it becomes zero again before the next grid; an error is the
+  /// run's.
   virtual void clearLog(std::span<uint8_t> part) noexcept = 0;
 
   /// How many threads it takes to fill the device.

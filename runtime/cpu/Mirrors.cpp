@@ -48,7 +48,8 @@ void piko::rt::endMirrors(pikort_pipeline &p) {
   for (State &state : p.states)
     if (state.hosts) {
       state.view.data = std::exchange(state.hosts, nullptr);
-      if (state.written)
+      // A device that failed may have taken its memory along.
+      if (state.written && p.status != PIKORT_DEVICE_FAILED)
         copy(p, state.view.data, state.mirror.data(), bytesOf(p, state));
     }
   for (Source &source : p.sources)

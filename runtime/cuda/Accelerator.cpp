@@ -13,9 +13,9 @@ using piko::rt::Failure;
 Accelerator::Accelerator(pikort_pipeline &p, const char *ptx)
     : p_(p), ptx_(ptx), device_(Device::open()) {
   device_->check(device_->enter(), "entering its context");
-  constexpr int64_t threadsOfMultiprocessor = 2048;
   residentThreads_ =
-      threadsOfMultiprocessor *
+      int64_t(device_->attribute(
+          CU_DEVICE_ATTRIBUTE_MAX_THREADS_PER_MULTIPROCESSOR)) *
       device_->attribute(CU_DEVICE_ATTRIBUTE_MULTIPROCESSOR_COUNT);
   device_->check(
       device_->driver.cuStreamCreate(&stream_, CU_STREAM_NON_BLOCKING),
@@ -74,8 +74,6 @@ void Accelerator::clearLog(std::span<uint8_t> part) noexcept {
     device_->check(device_->driver.cuMemsetD8Async(
                        reinterpret_cast<CUdeviceptr>(part.data()), 0,
                        part.size(), stream_),
-                   "clearing the log");
-    device_->check(device_->driver.cuStreamSynchronize(stream_),
                    "clearing the log");
   });
 }

@@ -47,10 +47,10 @@ struct GridLog {
   GridLog(const GridLog &) = delete;
   GridLog &operator=(const GridLog &) = delete;
   ~GridLog() {
-    if (pipeline.accelerator && head)
-      pipeline.accelerator->clearLog(usedPieces());
-    else if (!room.empty())
+    if (!pipeline.accelerator && !room.empty())
       munmap(room.data(), room.size());
+    else if (head && pipeline.status != PIKORT_DEVICE_FAILED)
+      pipeline.accelerator->clearLog(usedPieces());
   }
 
   void close();

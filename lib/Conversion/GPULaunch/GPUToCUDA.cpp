@@ -89,7 +89,6 @@ LogicalResult ConvertGPUToCUDAPass::convert(gpu::LaunchFuncOp launch) {
                  call->arguments,
                  LLVM::ConstantOp::create(
                      builder, loc, builder.getI64IntegerAttr(call->count))});
-  launch.erase();
   return success();
 }
 
@@ -98,11 +97,8 @@ void ConvertGPUToCUDAPass::runOnOperation() {
        llvm::to_vector(getOperation().getOps<gpu::GPUModuleOp>()))
     if (failed(declareImage(kernels)))
       return signalPassFailure();
-  SmallVector<gpu::LaunchFuncOp> launches;
-  getOperation().walk(
-      [&](gpu::LaunchFuncOp launch) { launches.push_back(launch); });
-  for (gpu::LaunchFuncOp launch : launches)
-    if (failed(convert(launch)))
-      return signalPassFailure();
-  getOperation()->removeAttr(gpu::GPUDialect::getContainerModuleAttrName());
+  if (failed(convertLaunches(getOperation(), [&](gpu::LaunchFuncOp launch) {
+        return convert(launch);
+      })))
+    signalPassFailure();
 }

@@ -44,16 +44,12 @@ LogicalResult ConvertGPUToEmulatorPass::convert(gpu::LaunchFuncOp launch) {
                  call->blocks, call->threads, call->arguments,
                  LLVM::ConstantOp::create(builder, loc,
                                           builder.getI64IntegerAttr(seed))});
-  launch.erase();
   return success();
 }
 
 void ConvertGPUToEmulatorPass::runOnOperation() {
-  SmallVector<gpu::LaunchFuncOp> launches;
-  getOperation().walk(
-      [&](gpu::LaunchFuncOp launch) { launches.push_back(launch); });
-  for (gpu::LaunchFuncOp launch : launches)
-    if (failed(convert(launch)))
-      return signalPassFailure();
-  getOperation()->removeAttr(gpu::GPUDialect::getContainerModuleAttrName());
+  if (failed(convertLaunches(getOperation(), [&](gpu::LaunchFuncOp launch) {
+        return convert(launch);
+      })))
+    signalPassFailure();
 }

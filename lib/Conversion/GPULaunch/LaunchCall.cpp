@@ -55,3 +55,17 @@ FailureOr<LaunchCall> piko::createLaunchCall(gpu::LaunchFuncOp launch) {
   call.threads = toI64(launch.getBlockSizeX());
   return call;
 }
+
+LogicalResult piko::convertLaunches(
+    ModuleOp module,
+    llvm::function_ref<LogicalResult(gpu::LaunchFuncOp)> convert) {
+  SmallVector<gpu::LaunchFuncOp> launches;
+  module.walk([&](gpu::LaunchFuncOp launch) { launches.push_back(launch); });
+  for (gpu::LaunchFuncOp launch : launches) {
+    if (failed(convert(launch)))
+      return failure();
+    launch.erase();
+  }
+  module->removeAttr(gpu::GPUDialect::getContainerModuleAttrName());
+  return success();
+}

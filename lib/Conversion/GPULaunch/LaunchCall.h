@@ -24,6 +24,12 @@ struct LaunchCall {
 /// for a grid of several dimensions or an argument that is not a number.
 llvm::FailureOr<LaunchCall> createLaunchCall(mlir::gpu::LaunchFuncOp launch);
 
+/// Converts all launches of a module, which is for a CPU alone then. Fails
+/// where `convert` does, which leaves the launch to be erased.
+llvm::LogicalResult convertLaunches(
+    mlir::ModuleOp module,
+    llvm::function_ref<llvm::LogicalResult(mlir::gpu::LaunchFuncOp)> convert);
+
 /// A function without result, declared on first use.
 mlir::LLVM::LLVMFuncOp declareFunction(mlir::ModuleOp module,
                                        llvm::StringRef name,
