@@ -54,6 +54,9 @@ constexpr ErrorName errorNames[] = {
     {CUDA_ERROR_MISALIGNED_ADDRESS, "CUDA_ERROR_MISALIGNED_ADDRESS",
      "a kernel accessed memory at a misaligned address"},
     {CUDA_ERROR_LAUNCH_FAILED, "CUDA_ERROR_LAUNCH_FAILED", "a kernel failed"},
+    {CUDA_ERROR_COOPERATIVE_LAUNCH_TOO_LARGE,
+     "CUDA_ERROR_COOPERATIVE_LAUNCH_TOO_LARGE",
+     "too many blocks in cooperative launch"},
     {CUDA_ERROR_NOT_SUPPORTED, "CUDA_ERROR_NOT_SUPPORTED",
      "operation not supported"},
     {CUDA_ERROR_UNKNOWN, "CUDA_ERROR_UNKNOWN", "unknown error"}};
@@ -88,12 +91,13 @@ int attributeOf(CUdevice_attribute attribute) {
   case CU_DEVICE_ATTRIBUTE_CLOCK_RATE:
     return 1000000;
   case CU_DEVICE_ATTRIBUTE_MULTIPROCESSOR_COUNT:
-    return 4;
+    return multiprocessors;
   case CU_DEVICE_ATTRIBUTE_MAX_THREADS_PER_MULTIPROCESSOR:
     return 2048;
   case CU_DEVICE_ATTRIBUTE_UNIFIED_ADDRESSING:
   case CU_DEVICE_ATTRIBUTE_MANAGED_MEMORY:
   case CU_DEVICE_ATTRIBUTE_CONCURRENT_MANAGED_ACCESS:
+  case CU_DEVICE_ATTRIBUTE_COOPERATIVE_LAUNCH:
     return 1;
   case CU_DEVICE_ATTRIBUTE_COMPUTE_CAPABILITY_MAJOR:
     return state().capability / 10;
@@ -137,7 +141,7 @@ CUresult piko::cuda::cuDriverGetVersion(int *version) {
     return error;
   if (!version)
     return call.fail(CUDA_ERROR_INVALID_VALUE, "null");
-  *version = 12080;
+  *version = 12090;
   return CUDA_SUCCESS;
 }
 

@@ -98,14 +98,28 @@ void DriverTest::unload() {
   module = nullptr;
 }
 
+static std::vector<void *> placesOf(std::vector<uint64_t> &parameters) {
+  std::vector<void *> places;
+  for (uint64_t &parameter : parameters)
+    places.push_back(&parameter);
+  return places;
+}
+
+CUresult DriverTest::launchTogether(CUfunction function, unsigned blocks,
+                                    unsigned threads,
+                                    std::vector<uint64_t> parameters) {
+  CUresult result =
+      cuLaunchCooperativeKernel(function, blocks, 1, 1, threads, 1, 1, 0,
+                                nullptr, placesOf(parameters).data());
+  return result ? result : cuCtxSynchronize();
+}
+
 CUresult DriverTest::launch(CUfunction function, unsigned blocks,
                             unsigned threads,
                             std::vector<uint64_t> parameters) {
-  std::vector<void *> pointers;
-  for (uint64_t &parameter : parameters)
-    pointers.push_back(&parameter);
-  CUresult result = cuLaunchKernel(function, blocks, 1, 1, threads, 1, 1, 0,
-                                   nullptr, pointers.data(), nullptr);
+  CUresult result =
+      cuLaunchKernel(function, blocks, 1, 1, threads, 1, 1, 0, nullptr,
+                     placesOf(parameters).data(), nullptr);
   return result ? result : cuCtxSynchronize();
 }
 

@@ -42,6 +42,9 @@ protected:
   /// Launches; the error that synchronization then gives.
   CUresult launch(CUfunction function, unsigned blocks, unsigned threads,
                   std::vector<uint64_t> parameters);
+  /// The same, of a cooperative launch.
+  CUresult launchTogether(CUfunction function, unsigned blocks,
+                          unsigned threads, std::vector<uint64_t> parameters);
   /// Releases the context, which a failed kernel has made useless, and makes a
   /// new one.
   void renewContext();

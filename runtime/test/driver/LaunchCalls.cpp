@@ -16,6 +16,15 @@ namespace {
 constexpr uint32_t mostThreads = 1024, mostShared = 48 << 10,
                    mostBlocksX = 0x7fffffff, mostBlocksYZ = 65535;
 
+/// A launch, with its parameters as they were at the call.
+struct Kernel {
+  CUfunction function = nullptr;
+  std::array<uint32_t, 3> blocks{}, threads{};
+  uint32_t sharedBytes = 0;
+  bool cooperative = false;
+  std::vector<uint8_t> parameters{};
+};
+
 CUresult errorOf(FaultKind kind) {
   switch (kind) {
   case FaultKind::IllegalAddress:
@@ -111,46 +120,64 @@ std::string check(const ptx::Program &program,
   return {};
 }
 
-} // namespace
+/// The program's parameters, out of what they are at now; empty text if all
+/// are there.
+std::string take(void **from, const ptx::Program &program,
+                 std::vector<uint8_t> &parameters) {
+  parameters.resize(program.parameterBytes);
+  for (size_t i = 0; i < program.parameters.size(); ++i) {
+    if (!from || !from[i])
+      return "no parameter " + std::to_string(i);
+    std::memcpy(&parameters[program.parameters[i].offset], from[i],
+                program.parameters[i].size);
+  }
+  return {};
+}
 
-CUresult piko::cuda::cuLaunchKernel(CUfunction handle, unsigned gridX,
-                                    unsigned gridY, unsigned gridZ,
-                                    unsigned blockX, unsigned blockY,
-                                    unsigned blockZ, unsigned sharedBytes,
-                                    CUstream stream, void **parameters,
-                                    void **extra) {
-  Call call(__func__, Needs::Context);
-  if (CUresult error = call.refused())
-    return error;
-  Context &context = call.context();
-  auto found = context.functions.find(handle);
-  if (found == context.functions.end())
+/// Checks a launch and takes its parameters.
+CUresult prepare(const Call &call, Kernel &kernel, CUstream stream,
+                 void **parameters) {
+  auto found = call.context().functions.find(kernel.function);
+  if (found == call.context().functions.end())
     return call.fail(CUDA_ERROR_INVALID_HANDLE, "no function of a module");
   if (!call.hasStream(stream))
     return call.fail(CUDA_ERROR_INVALID_HANDLE, "no live stream");
-  if (extra)
-    return call.fail(CUDA_ERROR_NOT_SUPPORTED, "parameters in a buffer");
   const ptx::Program &program = found->second.program;
-  ptx::Launch launch{program,
+  std::string wrong =
+      check(program, kernel.blocks, kernel.threads, kernel.sharedBytes);
+  if (wrong.empty())
+    wrong = take(parameters, program, kernel.parameters);
+  if (!wrong.empty())
+    return call.fail(CUDA_ERROR_INVALID_VALUE, wrong);
+  if (!kernel.cooperative)
+    return CUDA_SUCCESS;
+  const auto &blocks = kernel.blocks, &threads = kernel.threads;
+  const uint64_t count = uint64_t(blocks[0]) * blocks[1] * blocks[2];
+  const int most =
+      multiprocessors *
+      residentBlocks(program,
+                     static_cast<int>(threads[0] * threads[1] * threads[2]),
+                     kernel.sharedBytes);
+  if (count > static_cast<uint64_t>(most))
+    return call.fail(CUDA_ERROR_COOPERATIVE_LAUNCH_TOO_LARGE,
+                     std::to_string(count) + " blocks, and " +
+                         std::to_string(most) + " run at the same time");
+  return CUDA_SUCCESS;
+}
+
+CUresult run(const Call &call, const Kernel &kernel) {
+  Context &context = call.context();
+  const Function &function = context.functions.find(kernel.function)->second;
+  ptx::Launch launch{function.program,
                      context.memory,
-                     found->second.module->source,
-                     {gridX, gridY, gridZ},
-                     {blockX, blockY, blockZ},
-                     sharedBytes,
-                     std::vector<uint8_t>(program.parameterBytes),
+                     function.module->source,
+                     kernel.blocks,
+                     kernel.threads,
+                     kernel.sharedBytes,
+                     kernel.parameters,
+                     kernel.cooperative,
                      state().seed,
                      {}};
-  if (std::string wrong =
-          check(program, launch.blocks, launch.threads, sharedBytes);
-      !wrong.empty())
-    return call.fail(CUDA_ERROR_INVALID_VALUE, wrong);
-  for (size_t i = 0; i < program.parameters.size(); ++i) {
-    if (!parameters || !parameters[i])
-      return call.fail(CUDA_ERROR_INVALID_VALUE,
-                       "no parameter " + std::to_string(i));
-    std::memcpy(&launch.parameters[program.parameters[i].offset], parameters[i],
-                program.parameters[i].size);
-  }
   try {
     ptx::run(launch);
   } catch (const ptx::Fault &fault) {
@@ -159,4 +186,45 @@ CUresult piko::cuda::cuLaunchKernel(CUfunction handle, unsigned gridX,
   }
   addCounts(launch);
   return CUDA_SUCCESS;
+}
+
+CUresult launchKernel(const Call &call, Kernel kernel, CUstream stream,
+                      void **parameters) {
+  CUresult error = prepare(call, kernel, stream, parameters);
+  return error ? error : run(call, kernel);
+}
+
+} // namespace
+
+CUresult piko::cuda::cuLaunchKernel(CUfunction function, unsigned gridX,
+                                    unsigned gridY, unsigned gridZ,
+                                    unsigned blockX, unsigned blockY,
+                                    unsigned blockZ, unsigned sharedBytes,
+                                    CUstream stream, void **parameters,
+                                    void **extra) {
+  Call call(__func__, Needs::Context);
+  if (CUresult error = call.refused())
+    return error;
+  if (extra)
+    return call.fail(CUDA_ERROR_NOT_SUPPORTED, "parameters in a buffer");
+  return launchKernel(
+      call,
+      {function, {gridX, gridY, gridZ}, {blockX, blockY, blockZ}, sharedBytes},
+      stream, parameters);
+}
+
+CUresult piko::cuda::cuLaunchCooperativeKernel(
+    CUfunction function, unsigned gridX, unsigned gridY, unsigned gridZ,
+    unsigned blockX, unsigned blockY, unsigned blockZ, unsigned sharedBytes,
+    CUstream stream, void **parameters) {
+  Call call(__func__, Needs::Context);
+  if (CUresult error = call.refused())
+    return error;
+  return launchKernel(call,
+                      {function,
+                       {gridX, gridY, gridZ},
+                       {blockX, blockY, blockZ},
+                       sharedBytes,
+                       /*cooperative=*/true},
+                      stream, parameters);
 }

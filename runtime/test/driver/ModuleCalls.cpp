@@ -14,8 +14,8 @@ using piko::ptx::Space;
 
 namespace {
 
-/// The newest PTX that is taken: that of CUDA 12.8.
-constexpr uint32_t newestMajor = 8, newestMinor = 7;
+/// The newest PTX that is taken: that of CUDA 12.9.
+constexpr uint32_t newestMajor = 8, newestMinor = 8;
 constexpr uint32_t mostShared = 48 << 10;
 constexpr int mostThreads = 1024, mostThreadsOfProcessor = 2048,
               mostBlocksOfProcessor = 32, mostRegisters = 255,
@@ -277,6 +277,18 @@ CUresult piko::cuda::cuFuncGetAttribute(int *value,
                    "attribute " + std::to_string(attribute));
 }
 
+int piko::testdriver::residentBlocks(const ptx::Program &program, int threads,
+                                     size_t dynamicSharedBytes) {
+  const int warps = (threads + 31) / 32;
+  const size_t shared = program.sharedBytes + dynamicSharedBytes;
+  int blocks =
+      std::min({mostBlocksOfProcessor, mostThreadsOfProcessor / (32 * warps),
+                registersOfProcessor / (32 * warps * registersOf(program))});
+  if (shared)
+    blocks = std::min(blocks, static_cast<int>(sharedOfProcessor / shared));
+  return blocks;
+}
+
 CUresult piko::cuda::cuOccupancyMaxActiveBlocksPerMultiprocessor(
     int *blocks, CUfunction handle, int threads, size_t sharedBytes) {
   Call call(__func__, Needs::Context);
@@ -289,12 +301,6 @@ CUresult piko::cuda::cuOccupancyMaxActiveBlocksPerMultiprocessor(
   if (!blocks || threads <= 0 || threads > threadsOf(program))
     return call.fail(CUDA_ERROR_INVALID_VALUE,
                      std::to_string(threads) + " threads");
-  const int warps = (threads + 31) / 32;
-  const size_t shared = program.sharedBytes + sharedBytes;
-  *blocks =
-      std::min({mostBlocksOfProcessor, mostThreadsOfProcessor / (32 * warps),
-                registersOfProcessor / (32 * warps * registersOf(program))});
-  if (shared)
-    *blocks = std::min(*blocks, static_cast<int>(sharedOfProcessor / shared));
+  *blocks = residentBlocks(program, threads, sharedBytes);
   return CUDA_SUCCESS;
 }

@@ -85,6 +85,13 @@ struct Module : ptx::Symbols {
   }
 };
 
+/// Of a device.
+inline constexpr int multiprocessors = 4;
+
+/// Blocks that run at the same time on a multiprocessor.
+int residentBlocks(const ptx::Program &program, int threads,
+                   size_t dynamicSharedBytes);
+
 struct Event {
   bool recorded = false;
   std::chrono::steady_clock::time_point time;

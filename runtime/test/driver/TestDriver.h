@@ -10,14 +10,18 @@
 // launch succeeds, all later calls return the error until the context's last
 // reference is released.
 //
+// The blocks of a cooperative launch run in turns, which end at nanosleep or
+// after some thousand instructions; those of others run one after the other.
+// Where all blocks that run sleep again and again and no memory changes, the
+// launch has timed out. A loop that does not sleep is not found out.
+//
 // Environment, read when the library is loaded:
 //
 //   PIKO_TEST_DRIVER_DEVICES   devices; 1
 //   PIKO_TEST_DRIVER_SM        compute capability, 10 * major + minor; 90
 //   PIKO_TEST_DRIVER_MEMORY    bytes that cuMemAlloc has; 16 GiB
 //   PIKO_TEST_DRIVER_SEED      order of blocks, of warps and their turns, and
-//   of
-//                              lanes in atomic operations; 0: as numbered
+//                              of lanes in atomic operations; 0: as numbered
 //   PIKO_TEST_DRIVER_FAIL      function:n:error, as pikoTestDriverFail; more
 //                              than one with commas
 //   PIKO_TEST_DRIVER_ERRORS    1: texts of errors to stderr as they come

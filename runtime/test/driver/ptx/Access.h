@@ -6,6 +6,8 @@
 
 #include "ptx/Lanes.h"
 
+#include <cstring>
+
 namespace piko::ptx {
 
 /// Looks a global address up that is not in the range that the instruction used
@@ -90,6 +92,18 @@ inline uint8_t *locate(const Warp &warp, const Instruction &it, uint32_t lane,
       return locate<Space::Global>(warp, it, lane, address, bytes, sectors);
     }
   }
+}
+
+/// Writes to where `locate` says, and notes whether others may see a change.
+template <Space space>
+inline void write(Warp &warp, uint8_t *place, uint64_t address,
+                  const void *value, uint32_t bytes) {
+  const bool isOwn =
+      space == Space::Local || space == Space::Param ||
+      (space == Space::Generic && (address & windowMask) == localWindow);
+  if (!isOwn)
+    warp.changed |= std::memcmp(place, value, bytes) != 0;
+  std::memcpy(place, value, bytes);
 }
 
 inline uint64_t addressOf(const Warp &warp, const Instruction &it,

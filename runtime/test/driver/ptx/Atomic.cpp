@@ -67,15 +67,15 @@ void change(Warp &warp, const Instruction &it) {
   const auto operation = static_cast<Operation>(it.variant);
   const T *b = warp.lanes<T>(it.b), *c = warp.lanes<T>(it.c);
   auto one = [&](uint32_t lane) {
-    uint8_t *place = locate<space>(warp, it, lane, addressOf(warp, it, lane),
-                                   sizeof(T), sectors);
+    const uint64_t address = addressOf(warp, it, lane);
+    uint8_t *place = locate<space>(warp, it, lane, address, sizeof(T), sectors);
     T old;
     std::memcpy(&old, place, sizeof(T));
     T value = changed(operation, old, b[lane], c[lane]);
     if constexpr (std::is_same_v<T, float>)
       if (value != value)
         value = std::bit_cast<float>(0x7fffffffu);
-    std::memcpy(place, &value, sizeof(T));
+    write<space>(warp, place, address, &value, sizeof(T));
     if (!it.negated)
       warp.lanes<T>(it.result)[lane] = old;
   };

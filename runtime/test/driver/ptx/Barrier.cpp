@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
-//===- Barrier.cpp - Barriers of blocks of PTX ----------------------------===//
+//===- Barrier.cpp - Barriers and sleeps of PTX ---------------------------===//
 
 #include "ptx/Decoder.h"
 #include "ptx/Lanes.h"
@@ -38,9 +38,40 @@ void synchronize(Warp &warp, const Instruction &it) {
   warp.waitAtBarrier(barrier, threads, it.variant);
 }
 
+/// However long: what is waited for may be another block's.
+void sleep(Warp &warp, const Instruction &) { warp.sleep(); }
+
+bool decodeSleep(Decoding &d) {
+  constexpr Type nanoseconds{Kind::Unsigned, 32};
+  if (d.takeType() != nanoseconds)
+    d.fail("expected .u32");
+  d.finish(1);
+  d.it.run = sleep;
+  d.it.counted = Class::Control;
+  d.it.a = d.value(0, nanoseconds);
+  return true;
+}
+
+/// The reduction that bar.red names, and its predicate.
+Reduction takeReduction(Decoding &d) {
+  const Type type = d.takeType();
+  const Reduction reduction = d.take("popc")  ? Reduction::Count
+                              : d.take("and") ? Reduction::All
+                              : d.take("or")  ? Reduction::Any
+                                              : Reduction::None;
+  if (reduction == Reduction::None ||
+      type.isPredicate() == (reduction == Reduction::Count))
+    d.fail("expected a reduction that is known");
+  d.it.result = d.result(0, type);
+  d.it.c = d.predicate(d.size() - 1, &d.it.negated);
+  return reduction;
+}
+
 } // namespace
 
 bool piko::ptx::decodeBarrier(Decoding &d) {
+  if (d.base() == "nanosleep")
+    return decodeSleep(d);
   const bool isShort = d.base() == "bar";
   if (!isShort && d.base() != "barrier")
     return false;
@@ -48,14 +79,20 @@ bool piko::ptx::decodeBarrier(Decoding &d) {
   if (isShort && d.statement.opcode.starts_with("bar.warp"))
     return false;
   d.take("cta");
-  if (!d.take("sync"))
-    d.fail("expected .sync");
+  const bool reduces = d.take("red");
+  if (!reduces && !d.take("sync"))
+    d.fail("expected .sync or .red");
   d.it.variant = d.take("aligned") || isShort;
-  d.finish(d.size() == 2 ? 2 : 1);
+  if (reduces)
+    d.it.extra = static_cast<uint32_t>(takeReduction(d));
+  // Between a result and a predicate, if it reduces.
+  const size_t first = reduces ? 1 : 0, around = reduces ? 2 : 0;
+  const bool hasThreads = d.size() == around + 2;
+  d.finish(around + (hasThreads ? 2 : 1));
   constexpr Type number{Kind::Unsigned, 32};
   d.it.run = synchronize;
   d.it.counted = Class::Barrier;
-  d.it.a = d.value(0, number);
-  d.it.b = d.size() == 2 ? d.value(1, number) : d.scope.constant(0, 4);
+  d.it.a = d.value(first, number);
+  d.it.b = hasThreads ? d.value(first + 1, number) : d.scope.constant(0, 4);
   return true;
 }

@@ -6,11 +6,16 @@
 #include <algorithm>
 #include <cstring>
 #include <numeric>
+#include <utility>
 
 using namespace piko::ptx;
 
-/// Instructions that a warp runs before the next one's turn.
-static constexpr uint32_t turn = 4096;
+/// Instructions that a warp runs before the next one's turn, and such rounds of
+/// its warps that a block runs before the next block's.
+static constexpr uint32_t turn = 4096, roundsOfBlock = 16;
+/// Rounds of the blocks in which all are asleep and find that nothing has
+/// changed, until a launch is given up.
+static constexpr uint32_t patience = 10000;
 
 static std::string text(const std::array<uint32_t, 3> &index) {
   return "(" + std::to_string(index[0]) + ", " + std::to_string(index[1]) +
@@ -74,7 +79,7 @@ bool Block::runWarps() {
   return ran;
 }
 
-void Block::run(uint64_t number) {
+void Block::begin(uint64_t number) {
   index = {static_cast<uint32_t>(number % launch.blocks[0]),
            static_cast<uint32_t>(number / launch.blocks[0] % launch.blocks[1]),
            static_cast<uint32_t>(number / launch.blocks[0] / launch.blocks[1])};
@@ -84,16 +89,42 @@ void Block::run(uint64_t number) {
     warp->reset();
   random.seed(launch.seed + number);
   arrived = false;
-  while (true) {
+}
+
+Block::Turn Block::run() {
+  for (auto &warp : warps)
+    warp->wake();
+  for (uint32_t round = 0; round < roundsOfBlock; ++round) {
     bool ran = runWarps();
     if (arrived)
       ran |= releaseBarriers();
     if (!liveThreads())
-      return;
-    if (!ran && std::none_of(warps.begin(), warps.end(),
-                             [](auto &warp) { return warp->separate(); }))
+      return Turn::Ended;
+    if (ran)
+      continue;
+    if (hasSleepers())
+      return Turn::Asleep;
+    if (!separate())
       reportDeadlock();
   }
+  return Turn::Over;
+}
+
+bool Block::separate() {
+  return std::any_of(warps.begin(), warps.end(),
+                     [](auto &warp) { return warp->separate(); });
+}
+
+bool Block::hasSleepers() const {
+  return std::any_of(warps.begin(), warps.end(),
+                     [](auto &warp) { return warp->sleeper(); });
+}
+
+bool Block::takeChange() {
+  bool changed = false;
+  for (auto &warp : warps)
+    changed |= std::exchange(warp->changed, false);
+  return changed;
 }
 
 uint32_t Block::liveThreads() const {
@@ -119,8 +150,12 @@ bool Block::releaseBarriers() {
   for (uint32_t barrier = 0; barrier < barriers; ++barrier)
     if (waiting[barrier] && waiting[barrier] >= wanted[barrier]) {
       released = true;
+      int holding = 0;
+      for (const auto &warp : warps)
+        holding += std::popcount(warp->lanesThatHold(barrier));
       for (auto &warp : warps)
-        warp->release(barrier);
+        warp->release(barrier, waiting[barrier],
+                      static_cast<uint32_t>(holding));
     }
   return released;
 }
@@ -150,19 +185,67 @@ void Block::reportDeadlock() const {
   throw Fault{FaultKind::Deadlock, what};
 }
 
+void Block::reportEndlessSleep(const std::string &others) const {
+  for (const auto &warp : warps)
+    if (const Group *group = warp->sleeper()) {
+      uint32_t line = launch.program.code[group->pc - 1].line;
+      throw Fault{FaultKind::Deadlock,
+                  "threads wait for memory that nothing changes; kernel '" +
+                      launch.program.name + "', line " + std::to_string(line) +
+                      ": " + std::string(lineOf(launch.source, line)) +
+                      " block " + text(index) + "; " + others};
+    }
+  reportDeadlock();
+}
+
+/// Runs blocks in turns until they have ended; \p waiting have not begun.
+static void runTogether(std::vector<Block *> blocks, std::mt19937_64 &random,
+                        bool shuffled, uint64_t waiting) {
+  for (uint32_t idle = 0; !blocks.empty();) {
+    if (shuffled)
+      std::shuffle(blocks.begin(), blocks.end(), random);
+    bool changed = false, asleep = true;
+    std::erase_if(blocks, [&](Block *block) {
+      Block::Turn turn = block->run();
+      changed |= block->takeChange();
+      asleep &= turn == Block::Turn::Asleep;
+      return turn == Block::Turn::Ended;
+    });
+    idle = asleep && !changed ? idle + 1 : 0;
+    if (idle < patience)
+      continue;
+    idle = 0;
+    // Lanes may wait for those that sleep, which wait for them.
+    bool separated = false;
+    for (Block *block : blocks)
+      separated |= block->separate();
+    if (!separated)
+      blocks[0]->reportEndlessSleep(
+          waiting ? std::to_string(waiting) +
+                        " blocks have not begun: the launch is not cooperative"
+                  : std::to_string(blocks.size()) + " blocks sleep");
+  }
+}
+
 void piko::ptx::run(Launch &launch) {
   launch.sites.assign(launch.program.code.size(), Site());
-  uint64_t count =
+  const uint64_t count =
       uint64_t(launch.blocks[0]) * launch.blocks[1] * launch.blocks[2];
-  Block block(launch);
-  if (!launch.seed) {
-    for (uint64_t number = 0; number < count; ++number)
-      block.run(number);
-    return;
+  std::mt19937_64 random(launch.seed);
+  std::vector<uint64_t> order;
+  if (launch.seed) {
+    order.resize(count);
+    std::iota(order.begin(), order.end(), uint64_t(0));
+    std::shuffle(order.begin(), order.end(), random);
   }
-  std::vector<uint64_t> order(count);
-  std::iota(order.begin(), order.end(), uint64_t(0));
-  std::shuffle(order.begin(), order.end(), std::mt19937_64(launch.seed));
-  for (uint64_t number : order)
-    block.run(number);
+  std::vector<std::unique_ptr<Block>> blocks;
+  std::vector<Block *> running;
+  for (uint64_t i = 0; i < (launch.cooperative ? count : 1); ++i)
+    running.push_back(
+        blocks.emplace_back(std::make_unique<Block>(launch)).get());
+  for (uint64_t i = 0; i < count; i += running.size()) {
+    for (size_t j = 0; j < running.size(); ++j)
+      running[j]->begin(launch.seed ? order[i + j] : i + j);
+    runTogether(running, random, launch.seed != 0, count - i - running.size());
+  }
 }

@@ -33,17 +33,29 @@ struct Launch {
   std::array<uint32_t, 3> blocks, threads;
   uint32_t dynamicSharedBytes = 0;
   std::vector<uint8_t> parameters;
+  /// All blocks make progress: each runs until it sleeps or has had its turn.
+  /// Without it one runs after the other.
+  bool cooperative = false;
   /// Of the order of blocks, of warps, and of lanes in atomic operations; 0: as
   /// they are numbered.
   uint64_t seed = 0;
   std::vector<Site> sites;
 };
 
-/// The block that runs, and its warps.
+/// A block and its warps.
 class Block {
 public:
   explicit Block(Launch &launch);
-  void run(uint64_t number);
+  void begin(uint64_t number);
+  enum class Turn : uint8_t { Ended, Over, Asleep };
+  /// Wakes what sleeps, and runs until nothing is awake or the turn is over.
+  Turn run();
+  /// Whether memory has changed since the last question.
+  bool takeChange();
+  /// As `Warp::separate`.
+  bool separate();
+  /// Something sleeps, and nothing that runs changes what it reads.
+  [[noreturn]] void reportEndlessSleep(const std::string &others) const;
   /// A group of a warp has come to a barrier.
   void arrive() { arrived = true; }
 
@@ -54,6 +66,7 @@ public:
 
 private:
   bool runWarps();
+  bool hasSleepers() const;
   bool releaseBarriers();
   uint32_t liveThreads() const;
   [[noreturn]] void reportDeadlock() const;

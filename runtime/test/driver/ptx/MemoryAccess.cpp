@@ -73,10 +73,10 @@ void store(Warp &warp, const Instruction &it) {
   Sectors sectors;
   const R *from = warp.lanes<R>(it.b);
   forEachLane(warp.active, [&](uint32_t lane) {
-    auto value = static_cast<M>(from[lane]);
-    std::memcpy(locate<space>(warp, it, lane, addressOf(warp, it, lane),
-                              sizeof(M), sectors),
-                &value, sizeof(M));
+    const auto value = static_cast<M>(from[lane]);
+    const uint64_t address = addressOf(warp, it, lane);
+    uint8_t *to = locate<space>(warp, it, lane, address, sizeof(M), sectors);
+    write<space>(warp, to, address, &value, sizeof(M));
   });
   count(warp, it, sectors);
 }
@@ -108,11 +108,12 @@ template <Space space> void storeVector(Warp &warp, const Instruction &it) {
   Sectors sectors;
   const std::vector<Operand> &list = warp.program->lists[it.extra];
   forEachLane(warp.active, [&](uint32_t lane) {
-    uint8_t *to = locate<space>(warp, it, lane, addressOf(warp, it, lane),
+    const uint64_t address = addressOf(warp, it, lane);
+    uint8_t *to = locate<space>(warp, it, lane, address,
                                 uint32_t(it.element) * it.count, sectors);
     for (uint32_t i = 0; i < it.count; ++i) {
       uint64_t value = readLane(warp, list[i], lane);
-      std::memcpy(to + i * it.element, &value, it.element);
+      write<space>(warp, to + i * it.element, address, &value, it.element);
     }
   });
   count(warp, it, sectors);
@@ -198,7 +199,7 @@ Class classOf(Space space, bool isStore) {
   }
 }
 
-/// Blocks and threads run one after the other: all accesses are ordered.
+/// One thread runs at a time: all accesses are ordered.
 void takeOrder(Decoding &d) {
   d.takeOneOf({"weak", "volatile", "relaxed", "acquire", "release"});
   d.takeOneOf({"cta", "cluster", "gpu", "sys"});

@@ -58,6 +58,9 @@ enum class Flow : uint8_t { On, Branch, Table, End, Trap };
 /// Runs an instruction for the active lanes of a warp.
 using Handler = void (*)(Warp &, const Instruction &);
 
+/// What threads get of a barrier: Instruction::extra.
+enum class Reduction : uint8_t { None, Count, All, Any };
+
 struct Instruction {
   Handler run = nullptr;
   Operand result, second; ///< second: the other of a pair of results.

@@ -89,6 +89,7 @@ void Warp::reset() {
   groups[0].state = Group::Ready;
   groups[0].mask = live;
   current = 0;
+  changed = false;
 }
 
 bool Warp::run(uint32_t steps) {
@@ -312,7 +313,38 @@ void Warp::waitAtBarrier(uint32_t barrier, uint32_t arrivals, bool aligned) {
   block.arrive();
 }
 
-void Warp::release(uint32_t barrier) {
+uint32_t Warp::lanesThatHold(uint32_t barrier) const {
+  uint32_t lanes = 0;
+  for (const Group &group : groups) {
+    if (group.state != Group::AtBarrier || group.barrier != barrier)
+      continue;
+    const Instruction &it = program->code[group.pc - 1];
+    if (it.extra)
+      lanes |= group.mask & (it.negated ? ~predicate(it.c) : predicate(it.c));
+  }
+  return lanes;
+}
+
+/// Gives a group that has waited at a barrier what came of it.
+void Warp::reduce(const Group &group, uint32_t arrived, uint32_t holding) {
+  const Instruction &it = program->code[group.pc - 1];
+  active = group.mask;
+  switch (static_cast<Reduction>(it.extra)) {
+  case Reduction::None:
+    return;
+  case Reduction::Count:
+    for (uint32_t lane = 0; lane < warpSize; ++lane)
+      if (active >> lane & 1)
+        lanes<uint32_t>(it.result)[lane] = holding;
+    return;
+  case Reduction::All:
+    return setPredicate(it.result, holding == arrived ? allLanes : 0);
+  case Reduction::Any:
+    return setPredicate(it.result, holding ? allLanes : 0);
+  }
+}
+
+void Warp::release(uint32_t barrier, uint32_t arrived, uint32_t holding) {
   uint32_t place = nowhere;
   for (Group &group : groups) {
     if (group.state != Group::AtBarrier || group.barrier != barrier)
@@ -324,7 +356,27 @@ void Warp::release(uint32_t barrier) {
             static_cast<uint32_t>(std::countr_zero(group.mask)));
     place = pc;
     group.state = Group::Ready;
+    reduce(group, arrived, holding);
   }
+}
+
+void Warp::sleep() {
+  groups[current].state = Group::Sleeping;
+  groups[current].pc = next;
+  reselect = true;
+}
+
+void Warp::wake() {
+  for (Group &group : groups)
+    if (group.state == Group::Sleeping)
+      group.state = Group::Ready;
+}
+
+const Group *Warp::sleeper() const {
+  for (const Group &group : groups)
+    if (group.state == Group::Sleeping)
+      return &group;
+  return nullptr;
 }
 
 bool Warp::gather(uint32_t members) {

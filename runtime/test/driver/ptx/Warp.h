@@ -6,7 +6,7 @@
 // the branch reconverges until they have come there. So groups are a tree, of
 // which only leaves run. A group that waits, at a barrier or for other lanes of
 // a warp operation, lets other leaves run, as hardware with independent thread
-// scheduling does.
+// scheduling does. One that sleeps runs again in the block's next turn.
 //
 //===----------------------------------------------------------------------===//
 
@@ -51,7 +51,7 @@ inline constexpr uint8_t unwritten = 0xcd;
 
 /// Threads of a warp that run together.
 struct Group {
-  enum State : uint8_t { Free, Ready, Parted, AtBarrier, Gathering };
+  enum State : uint8_t { Free, Ready, Parted, AtBarrier, Gathering, Sleeping };
   State state = Free;
   bool callee = false; ///< Begins with a call, ends with its return.
   uint16_t children = 0;
@@ -102,6 +102,8 @@ public:
   void exitLanes();
   /// Until so many threads have come to it, or all that live if it is 0.
   void waitAtBarrier(uint32_t barrier, uint32_t arrivals, bool aligned);
+  /// Until the block's next turn.
+  void sleep();
   /// Whether all lanes of \p members that live are here; `active` is them,
   /// then.
   bool gather(uint32_t members);
@@ -109,8 +111,15 @@ public:
   /// Where nothing else can run, lanes that wait for others to reconverge go on
   /// without them; returns whether there are any.
   bool separate();
-  /// Lets groups go on that wait at a barrier.
-  void release(uint32_t barrier);
+  /// Lanes that wait at a barrier and bring it a predicate that holds.
+  uint32_t lanesThatHold(uint32_t barrier) const;
+  /// Lets groups go on that wait at a barrier of \p arrived threads, for
+  /// \p holding of which the predicate that they brought holds.
+  void release(uint32_t barrier, uint32_t arrived, uint32_t holding);
+  /// Lets groups go on that sleep.
+  void wake();
+  /// A group that sleeps; null if none does.
+  const Group *sleeper() const;
 
   [[noreturn]] void fault(FaultKind kind, const std::string &what,
                           uint32_t lane) const;
@@ -123,6 +132,7 @@ public:
   uint32_t active = 0; ///< Lanes of the current instruction.
   uint32_t pc = 0, next = 0;
   uint32_t live = 0;
+  bool changed = false;   ///< Wrote what others may read, and it was new.
   Site *site = nullptr;   ///< Of the current instruction.
   uint32_t firstLane = 0; ///< Of atomic operations; others follow in a circle.
   uint64_t sharedBytes = 0;
@@ -134,6 +144,7 @@ public:
   std::vector<Group> groups;
 
 private:
+  void reduce(const Group &group, uint32_t arrived, uint32_t holding);
   uint32_t runGroup(uint32_t steps);
   bool select();
   int32_t add(const Group &group);
