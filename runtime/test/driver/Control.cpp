@@ -78,6 +78,12 @@ pikoTestDriverCounts(const char *kernel, struct PikoTestDriverCounts *counts) {
   return counts->launches == 0;
 }
 
+[[gnu::visibility("default")]] void
+pikoTestDriverHostCounts(struct PikoTestDriverHostCounts *counts) {
+  Lock lock(state().lock);
+  *counts = state().hostCounts;
+}
+
 [[gnu::visibility("default")]] const char *pikoTestDriverKernels(void) {
   thread_local std::string text;
   Lock lock(state().lock);
@@ -94,6 +100,7 @@ pikoTestDriverCounts(const char *kernel, struct PikoTestDriverCounts *counts) {
   state().error.clear();
   state().leaks.clear();
   state().counts.clear();
+  state().hostCounts = {};
 }
 
 } // extern "C"

@@ -18,6 +18,7 @@ protected:
 TEST_F(DriverCallsTest, HasEveryFunction) {
 #define PIKO_CUDA_FUNCTION(NAME, SYMBOL, PARAMETERS)                           \
   EXPECT_NE(dlsym(RTLD_DEFAULT, SYMBOL), nullptr) << SYMBOL;
+#define PIKO_CUDA_OPTIONAL PIKO_CUDA_FUNCTION
 #include "cuda/DriverAPI.def"
 }
 

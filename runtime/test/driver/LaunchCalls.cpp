@@ -4,99 +4,16 @@
 #include "State.h"
 
 #include <cstring>
+#include <utility>
 
 using namespace piko::testdriver;
 using namespace piko::cuda;
 namespace ptx = piko::ptx;
-using piko::ptx::Class;
-using piko::ptx::FaultKind;
 
 namespace {
 
 constexpr uint32_t mostThreads = 1024, mostShared = 48 << 10,
                    mostBlocksX = 0x7fffffff, mostBlocksYZ = 65535;
-
-/// A launch, with its parameters as they were at the call.
-struct Kernel {
-  CUfunction function = nullptr;
-  std::array<uint32_t, 3> blocks{}, threads{};
-  uint32_t sharedBytes = 0;
-  bool cooperative = false;
-  std::vector<uint8_t> parameters{};
-};
-
-CUresult errorOf(FaultKind kind) {
-  switch (kind) {
-  case FaultKind::IllegalAddress:
-    return CUDA_ERROR_ILLEGAL_ADDRESS;
-  case FaultKind::MisalignedAddress:
-    return CUDA_ERROR_MISALIGNED_ADDRESS;
-  case FaultKind::IllegalInstruction:
-    return CUDA_ERROR_ILLEGAL_INSTRUCTION;
-  case FaultKind::Deadlock:
-    return CUDA_ERROR_LAUNCH_TIMEOUT;
-  case FaultKind::Trap:
-    break;
-  }
-  return CUDA_ERROR_LAUNCH_FAILED;
-}
-
-uint64_t &counterOf(PikoTestDriverCounts &counts, Class of) {
-  switch (of) {
-  case Class::Integer:
-    return counts.integer;
-  case Class::Single:
-    return counts.float32;
-  case Class::Double:
-    return counts.float64;
-  case Class::Move:
-    return counts.move;
-  case Class::Control:
-    return counts.control;
-  case Class::LoadGlobal:
-    return counts.loadGlobal;
-  case Class::StoreGlobal:
-    return counts.storeGlobal;
-  case Class::LoadShared:
-    return counts.loadShared;
-  case Class::StoreShared:
-    return counts.storeShared;
-  case Class::LoadLocal:
-    return counts.loadLocal;
-  case Class::StoreLocal:
-    return counts.storeLocal;
-  case Class::LoadGeneric:
-    return counts.loadGeneric;
-  case Class::StoreGeneric:
-    return counts.storeGeneric;
-  case Class::Parameter:
-    return counts.parameter;
-  case Class::Atomic:
-    return counts.atomic;
-  case Class::Barrier:
-    return counts.barrier;
-  case Class::WarpOperation:
-    break;
-  }
-  return counts.warpOperation;
-}
-
-void addCounts(const ptx::Launch &launch) {
-  PikoTestDriverCounts &counts = state().counts[launch.program.name];
-  const auto &blocks = launch.blocks, &threads = launch.threads;
-  uint64_t blockCount = uint64_t(blocks[0]) * blocks[1] * blocks[2];
-  ++counts.launches;
-  counts.blocks += blockCount;
-  counts.threads += blockCount * threads[0] * threads[1] * threads[2];
-  for (size_t pc = 0; pc < launch.sites.size(); ++pc) {
-    const ptx::Site &site = launch.sites[pc];
-    counts.warpInstructions += site.warps;
-    counts.laneInstructions += site.lanes;
-    counts.globalBytes += site.bytes;
-    counts.globalSectors += site.sectors;
-    counterOf(counts, launch.program.code[pc].counted) += site.warps;
-  }
-}
 
 /// What is wrong with the sizes of a launch; empty if nothing.
 std::string check(const ptx::Program &program,
@@ -135,13 +52,10 @@ std::string take(void **from, const ptx::Program &program,
 }
 
 /// Checks a launch and takes its parameters.
-CUresult prepare(const Call &call, Kernel &kernel, CUstream stream,
-                 void **parameters) {
+CUresult prepare(const Call &call, Kernel &kernel, void **parameters) {
   auto found = call.context().functions.find(kernel.function);
   if (found == call.context().functions.end())
     return call.fail(CUDA_ERROR_INVALID_HANDLE, "no function of a module");
-  if (!call.hasStream(stream))
-    return call.fail(CUDA_ERROR_INVALID_HANDLE, "no live stream");
   const ptx::Program &program = found->second.program;
   std::string wrong =
       check(program, kernel.blocks, kernel.threads, kernel.sharedBytes);
@@ -165,33 +79,10 @@ CUresult prepare(const Call &call, Kernel &kernel, CUstream stream,
   return CUDA_SUCCESS;
 }
 
-CUresult run(const Call &call, const Kernel &kernel) {
-  Context &context = call.context();
-  const Function &function = context.functions.find(kernel.function)->second;
-  ptx::Launch launch{function.program,
-                     context.memory,
-                     function.module->source,
-                     kernel.blocks,
-                     kernel.threads,
-                     kernel.sharedBytes,
-                     kernel.parameters,
-                     kernel.cooperative,
-                     state().seed,
-                     {}};
-  try {
-    ptx::run(launch);
-  } catch (const ptx::Fault &fault) {
-    // As a launch that runs while the host goes on.
-    context.failed = call.fail(errorOf(fault.kind), fault.text);
-  }
-  addCounts(launch);
-  return CUDA_SUCCESS;
-}
-
 CUresult launchKernel(const Call &call, Kernel kernel, CUstream stream,
                       void **parameters) {
-  CUresult error = prepare(call, kernel, stream, parameters);
-  return error ? error : run(call, kernel);
+  CUresult error = prepare(call, kernel, parameters);
+  return error ? error : submit(call, stream, std::move(kernel));
 }
 
 } // namespace

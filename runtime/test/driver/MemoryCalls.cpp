@@ -3,8 +3,6 @@
 
 #include "State.h"
 
-#include <cstring>
-
 using namespace piko::testdriver;
 using namespace piko::cuda;
 
@@ -43,31 +41,6 @@ CUresult release(Call &call, uint64_t address, bool isHost) {
   return CUDA_SUCCESS;
 }
 
-/// Where a part of the device's memory is in the host; null, with the call's
-/// text, if it is not all in one allocation.
-uint8_t *resolve(const Call &call, CUdeviceptr address, uint64_t bytes,
-                 CUstream stream) {
-  if (!call.hasStream(stream)) {
-    call.fail(CUDA_ERROR_INVALID_HANDLE, "no live stream");
-    return nullptr;
-  }
-  const MemoryTable &memory = call.context().memory;
-  const Allocation *it = memory.at(address);
-  if (!it || bytes > it->begin + it->bytes - address) {
-    std::string known = memory.describe(address);
-    call.fail(CUDA_ERROR_INVALID_VALUE,
-              std::to_string(bytes) + " bytes are not all in an allocation" +
-                  (known.empty() ? "" : ", " + known));
-    return nullptr;
-  }
-  return it->memory + (address - it->begin);
-}
-
-CUresult errorOf(const Call &call, CUstream stream) {
-  return call.hasStream(stream) ? CUDA_ERROR_INVALID_VALUE
-                                : CUDA_ERROR_INVALID_HANDLE;
-}
-
 } // namespace
 
 CUresult piko::cuda::cuMemGetInfo(size_t *free, size_t *total) {
@@ -82,7 +55,7 @@ CUresult piko::cuda::cuMemGetInfo(size_t *free, size_t *total) {
 }
 
 CUresult piko::cuda::cuMemAlloc(CUdeviceptr *address, size_t bytes) {
-  Call call(__func__, Needs::Context);
+  Call call(__func__, Needs::NoCapture);
   if (CUresult error = call.refused())
     return error;
   return allocate(call, AllocationKind::Device, address, bytes);
@@ -90,7 +63,7 @@ CUresult piko::cuda::cuMemAlloc(CUdeviceptr *address, size_t bytes) {
 
 CUresult piko::cuda::cuMemAllocManaged(CUdeviceptr *address, size_t bytes,
                                        unsigned flags) {
-  Call call(__func__, Needs::Context);
+  Call call(__func__, Needs::NoCapture);
   if (CUresult error = call.refused())
     return error;
   if (flags != CU_MEM_ATTACH_GLOBAL)
@@ -100,14 +73,14 @@ CUresult piko::cuda::cuMemAllocManaged(CUdeviceptr *address, size_t bytes,
 }
 
 CUresult piko::cuda::cuMemFree(CUdeviceptr address) {
-  Call call(__func__, Needs::Context);
+  Call call(__func__, Needs::NoCapture);
   if (CUresult error = call.refused())
     return error;
   return address ? release(call, address, false) : CUDA_SUCCESS;
 }
 
 CUresult piko::cuda::cuMemAllocHost(void **address, size_t bytes) {
-  Call call(__func__, Needs::Context);
+  Call call(__func__, Needs::NoCapture);
   if (CUresult error = call.refused())
     return error;
   uint64_t made = 0;
@@ -119,7 +92,7 @@ CUresult piko::cuda::cuMemAllocHost(void **address, size_t bytes) {
 }
 
 CUresult piko::cuda::cuMemFreeHost(void *address) {
-  Call call(__func__, Needs::Context);
+  Call call(__func__, Needs::NoCapture);
   if (CUresult error = call.refused())
     return error;
   return release(call, reinterpret_cast<uint64_t>(address), true);
@@ -130,8 +103,16 @@ CUresult piko::cuda::cuMemPrefetchAsync(CUdeviceptr address, size_t bytes,
   Call call(__func__, Needs::Context);
   if (CUresult error = call.refused())
     return error;
-  if (!bytes || !resolve(call, address, bytes, stream))
-    return errorOf(call, stream);
+  if (CUresult error = call.checkStream(stream))
+    return error;
+  if (Capture *capture = call.context().captureOf(stream)) {
+    capture->valid = false;
+    return call.fail(CUDA_ERROR_STREAM_CAPTURE_UNSUPPORTED, "");
+  }
+  std::string wrong =
+      bytes ? checkMemory(call.context(), address, bytes) : "no bytes";
+  if (!wrong.empty())
+    return call.fail(CUDA_ERROR_INVALID_VALUE, wrong);
   if (call.context().memory.at(address)->kind != AllocationKind::Managed)
     return call.fail(CUDA_ERROR_INVALID_VALUE, "memory is not managed");
   if (device != CU_DEVICE_CPU &&
@@ -145,14 +126,9 @@ CUresult piko::cuda::cuMemcpyAsync(CUdeviceptr to, CUdeviceptr from,
   Call call(__func__, Needs::Context);
   if (CUresult error = call.refused())
     return error;
-  if (!bytes)
-    return CUDA_SUCCESS;
-  uint8_t *target = resolve(call, to, bytes, stream);
-  const uint8_t *source = target ? resolve(call, from, bytes, stream) : nullptr;
-  if (!source)
-    return errorOf(call, stream);
-  std::memmove(target, source, bytes);
-  return CUDA_SUCCESS;
+  return bytes
+             ? submit(call, stream, Copy{Direction::OnDevice, to, from, bytes})
+             : call.checkStream(stream);
 }
 
 CUresult piko::cuda::cuMemcpyHtoDAsync(CUdeviceptr to, const void *from,
@@ -160,13 +136,10 @@ CUresult piko::cuda::cuMemcpyHtoDAsync(CUdeviceptr to, const void *from,
   Call call(__func__, Needs::Context);
   if (CUresult error = call.refused())
     return error;
-  if (!bytes)
-    return CUDA_SUCCESS;
-  uint8_t *target = resolve(call, to, bytes, stream);
-  if (!target || !from)
-    return errorOf(call, stream);
-  std::memmove(target, from, bytes);
-  return CUDA_SUCCESS;
+  return bytes ? submit(call, stream,
+                        Copy{Direction::ToDevice, to,
+                             reinterpret_cast<uint64_t>(from), bytes})
+               : call.checkStream(stream);
 }
 
 CUresult piko::cuda::cuMemcpyDtoHAsync(void *to, CUdeviceptr from, size_t bytes,
@@ -174,13 +147,10 @@ CUresult piko::cuda::cuMemcpyDtoHAsync(void *to, CUdeviceptr from, size_t bytes,
   Call call(__func__, Needs::Context);
   if (CUresult error = call.refused())
     return error;
-  if (!bytes)
-    return CUDA_SUCCESS;
-  const uint8_t *source = resolve(call, from, bytes, stream);
-  if (!source || !to)
-    return errorOf(call, stream);
-  std::memmove(to, source, bytes);
-  return CUDA_SUCCESS;
+  return bytes ? submit(call, stream,
+                        Copy{Direction::FromDevice,
+                             reinterpret_cast<uint64_t>(to), from, bytes})
+               : call.checkStream(stream);
 }
 
 CUresult piko::cuda::cuMemsetD8Async(CUdeviceptr address, unsigned char value,
@@ -188,11 +158,6 @@ CUresult piko::cuda::cuMemsetD8Async(CUdeviceptr address, unsigned char value,
   Call call(__func__, Needs::Context);
   if (CUresult error = call.refused())
     return error;
-  if (!bytes)
-    return CUDA_SUCCESS;
-  uint8_t *target = resolve(call, address, bytes, stream);
-  if (!target)
-    return errorOf(call, stream);
-  std::memset(target, value, bytes);
-  return CUDA_SUCCESS;
+  return bytes ? submit(call, stream, Fill{address, bytes, value})
+               : call.checkStream(stream);
 }

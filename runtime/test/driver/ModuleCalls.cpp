@@ -168,7 +168,7 @@ bool isBinary(const char *image) {
 CUresult piko::cuda::cuModuleLoadDataEx(CUmodule *result, const void *image,
                                         unsigned count, CUjit_option *options,
                                         void **values) {
-  Call call(__func__, Needs::Context);
+  Call call(__func__, Needs::NoCapture);
   if (CUresult error = call.refused())
     return error;
   if (!result || !image || (count && (!options || !values)))
@@ -190,7 +190,7 @@ CUresult piko::cuda::cuModuleLoadDataEx(CUmodule *result, const void *image,
 }
 
 CUresult piko::cuda::cuModuleUnload(CUmodule handle) {
-  Call call(__func__, Needs::Context);
+  Call call(__func__, Needs::NoCapture);
   if (CUresult error = call.refused())
     return error;
   Context &context = call.context();

@@ -55,6 +55,18 @@ State &piko::testdriver::state() {
   return *instance;
 }
 
+static void printHostCounts(const PikoTestDriverHostCounts &it) {
+  auto number = [](uint64_t value) {
+    return static_cast<unsigned long long>(value);
+  };
+  std::fprintf(stderr,
+               "host: %llu launches of kernels, %llu of graphs with %llu "
+               "kernels, %llu copies, %llu fills, %llu waits\n",
+               number(it.launches), number(it.graphLaunches),
+               number(it.graphKernels), number(it.copies), number(it.fills),
+               number(it.waits));
+}
+
 /// When the library is unloaded, after the program's own objects are destroyed.
 [[gnu::destructor]] static void report() {
   const State &at = state();
@@ -63,6 +75,7 @@ State &piko::testdriver::state() {
                  at.leaks.c_str());
   if (!at.printsCounts)
     return;
+  printHostCounts(at.hostCounts);
   for (const auto &[kernel, it] : at.counts)
     std::fprintf(
         stderr,
@@ -117,6 +130,10 @@ std::string Context::describe() const {
   }
   if (!streams.empty())
     text += std::to_string(streams.size()) + " streams\n";
+  if (!graphs.empty())
+    text += std::to_string(graphs.size()) + " graphs\n";
+  if (!executables.empty())
+    text += std::to_string(executables.size()) + " executable graphs\n";
   if (!events.empty())
     text += std::to_string(events.size()) + " events\n";
   return text;
@@ -160,7 +177,14 @@ CUresult Call::begin(Needs needs) {
                 currentContext() ? "the current context was released"
                                  : "no context is current");
   // Its text is that of the kernel.
-  return current->failed;
+  if (current->failed || needs == Needs::Context)
+    return current->failed;
+  return refuseCaptures(
+      CUDA_ERROR_STREAM_CAPTURE_UNSUPPORTED, [](const Stream &stream) {
+        return stream.capture->mode == CU_STREAM_CAPTURE_MODE_GLOBAL ||
+               (stream.capture->mode == CU_STREAM_CAPTURE_MODE_THREAD_LOCAL &&
+                stream.capture->thread == std::this_thread::get_id());
+      });
 }
 
 CUresult Call::fail(CUresult result, const std::string &text) const {

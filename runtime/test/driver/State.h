@@ -12,13 +12,16 @@
 
 #include "Symbols.h"
 #include "TestDriver.h"
+#include "Work.h"
 #include "ptx/Machine.h"
 
 #include <chrono>
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
+#include <thread>
 #include <vector>
 
 namespace piko::testdriver {
@@ -92,8 +95,22 @@ inline constexpr int multiprocessors = 4;
 int residentBlocks(const ptx::Program &program, int threads,
                    size_t dynamicSharedBytes);
 
+/// Of a stream whose work becomes nodes.
+struct Capture {
+  CUstreamCaptureMode mode = CU_STREAM_CAPTURE_MODE_GLOBAL;
+  std::thread::id thread; ///< That began it.
+  bool valid = true;
+  Nodes nodes;
+};
+
+struct Stream {
+  unsigned flags = 0;
+  std::optional<Capture> capture;
+};
+
 struct Event {
   bool recorded = false;
+  CUstream captured = nullptr; ///< In a capture of it, if it was the last.
   std::chrono::steady_clock::time_point time;
 };
 
@@ -105,9 +122,13 @@ struct Context {
   MemoryTable memory;
   std::map<CUmodule, std::unique_ptr<Module>> modules;
   std::map<CUfunction, Function> functions;
-  std::map<CUstream, unsigned> streams;
+  std::map<CUstream, Stream> streams;
   std::map<CUevent, Event> events;
+  std::map<CUgraph, Nodes> graphs;
+  std::map<CUgraphExec, Nodes> executables;
 
+  /// Null if the stream is not captured.
+  Capture *captureOf(CUstream stream);
   /// What is alive, a line each.
   std::string describe() const;
 };
@@ -135,6 +156,7 @@ struct State {
   std::map<std::string, uint64_t, std::less<>> calls;
   std::string error, leaks;
   std::map<std::string, PikoTestDriverCounts, std::less<>> counts;
+  PikoTestDriverHostCounts hostCounts{};
 
   template <typename Handle> Handle newHandle() {
     return reinterpret_cast<Handle>(nextHandle += 16);
@@ -149,7 +171,13 @@ private:
 State &state();
 
 /// What a call needs.
-enum class Needs : uint8_t { Nothing, Initialization, Context };
+enum class Needs : uint8_t {
+  Nothing,
+  Initialization,
+  Context,
+  /// A context, and no capture that forbids what may wait for the device.
+  NoCapture
+};
 
 /// A call of the driver: counted, made to fail, and locked.
 class Call {
@@ -164,9 +192,20 @@ public:
   Context &context() const { return *current; }
   /// Keeps the text; returns \p result.
   CUresult fail(CUresult result, const std::string &text) const;
-  /// Null, or a live stream of the context.
-  bool hasStream(CUstream stream) const {
-    return !stream || current->streams.contains(stream);
+  /// Whether a stream may be used: null, or a live one of the context, whose
+  /// capture is valid if there is one.
+  CUresult checkStream(CUstream stream) const;
+  /// Whether the host may wait for a stream; counts that it does.
+  CUresult waitFor(CUstream stream) const;
+  /// Makes captures invalid that hold for \p which; says so if there are any.
+  template <typename F> CUresult refuseCaptures(CUresult error, F which) const {
+    bool found = false;
+    for (auto &[handle, stream] : current->streams)
+      if (stream.capture && which(stream)) {
+        stream.capture->valid = false;
+        found = true;
+      }
+    return found ? fail(error, "a stream is captured") : CUDA_SUCCESS;
   }
 
 private:

@@ -14,7 +14,7 @@ CUresult piko::cuda::cuStreamCreate(CUstream *stream, unsigned flags) {
     return call.fail(CUDA_ERROR_INVALID_VALUE,
                      "flags " + std::to_string(flags));
   *stream = state().newHandle<CUstream>();
-  call.context().streams[*stream] = flags;
+  call.context().streams[*stream].flags = flags;
   return CUDA_SUCCESS;
 }
 
@@ -31,9 +31,7 @@ CUresult piko::cuda::cuStreamSynchronize(CUstream stream) {
   Call call(__func__, Needs::Context);
   if (CUresult error = call.refused())
     return error;
-  if (!call.hasStream(stream))
-    return call.fail(CUDA_ERROR_INVALID_HANDLE, "no live stream");
-  return CUDA_SUCCESS;
+  return call.waitFor(stream);
 }
 
 CUresult piko::cuda::cuEventCreate(CUevent *event, unsigned flags) {
@@ -62,9 +60,13 @@ CUresult piko::cuda::cuEventRecord(CUevent event, CUstream stream) {
   if (CUresult error = call.refused())
     return error;
   auto found = call.context().events.find(event);
-  if (found == call.context().events.end() || !call.hasStream(stream))
-    return call.fail(CUDA_ERROR_INVALID_HANDLE, "no live event or stream");
+  if (found == call.context().events.end())
+    return call.fail(CUDA_ERROR_INVALID_HANDLE, "no live event");
+  if (CUresult error = call.checkStream(stream))
+    return error;
   found->second.recorded = true;
+  found->second.captured =
+      call.context().captureOf(stream) ? stream : CUstream();
   found->second.time = std::chrono::steady_clock::now();
   return CUDA_SUCCESS;
 }
@@ -73,8 +75,15 @@ CUresult piko::cuda::cuEventSynchronize(CUevent event) {
   Call call(__func__, Needs::Context);
   if (CUresult error = call.refused())
     return error;
-  if (!call.context().events.contains(event))
+  auto found = call.context().events.find(event);
+  if (found == call.context().events.end())
     return call.fail(CUDA_ERROR_INVALID_HANDLE, "no live event");
+  if (found->second.captured) {
+    if (Capture *capture = call.context().captureOf(found->second.captured))
+      capture->valid = false;
+    return call.fail(CUDA_ERROR_CAPTURED_EVENT, "");
+  }
+  ++state().hostCounts.waits;
   return CUDA_SUCCESS;
 }
 
@@ -88,6 +97,8 @@ CUresult piko::cuda::cuEventElapsedTime(float *milliseconds, CUevent start,
   if (first == events.end() || last == events.end() ||
       !first->second.recorded || !last->second.recorded)
     return call.fail(CUDA_ERROR_INVALID_HANDLE, "no event that was recorded");
+  if (first->second.captured || last->second.captured)
+    return call.fail(CUDA_ERROR_CAPTURED_EVENT, "");
   if (!milliseconds)
     return call.fail(CUDA_ERROR_INVALID_VALUE, "null");
   *milliseconds = std::chrono::duration<float, std::milli>(last->second.time -

@@ -10,6 +10,7 @@ namespace piko::cuda {
 #define PIKO_CUDA_FUNCTION(NAME, SYMBOL, PARAMETERS)                           \
   extern "C"                                                                   \
       [[gnu::visibility("default")]] CUresult NAME PARAMETERS __asm__(SYMBOL);
+#define PIKO_CUDA_OPTIONAL PIKO_CUDA_FUNCTION
 #include "cuda/DriverAPI.def"
 } // namespace piko::cuda
 

@@ -10,6 +10,11 @@
 // launch succeeds, all later calls return the error until the context's last
 // reference is released.
 //
+// What a stream that is captured is given becomes nodes of a graph, with its
+// parameters as they were then. A call that a capture forbids makes it invalid.
+// An executable graph is not updated to another function of a kernel, which
+// drivers before 11.2 refuse and later ones take: callers need a way out.
+//
 // The blocks of a cooperative launch run in turns, which end at nanosleep or
 // after some thousand instructions; those of others run one after the other.
 // Where all blocks that run sleep again and again and no memory changes, the
@@ -25,7 +30,8 @@
 //   PIKO_TEST_DRIVER_FAIL      function:n:error, as pikoTestDriverFail; more
 //                              than one with commas
 //   PIKO_TEST_DRIVER_ERRORS    1: texts of errors to stderr as they come
-//   PIKO_TEST_DRIVER_COUNTS    1: counts of all kernels to stderr at the end
+//   PIKO_TEST_DRIVER_COUNTS    1: counts of all kernels, and what the host has
+//                              asked for, to stderr at the end
 //
 // The functions here may be called at any time, from any thread. Texts that
 // they return live until the calling thread's next call of the same function.
@@ -79,6 +85,17 @@ struct PikoTestDriverCounts {
 /// never launched; \p counts are zeros then.
 int pikoTestDriverCounts(const char *kernel,
                          struct PikoTestDriverCounts *counts);
+
+/// What the host has asked of the device.
+struct PikoTestDriverHostCounts {
+  /// On streams that were not captured.
+  uint64_t launches, copies, fills;
+  uint64_t graphLaunches;
+  uint64_t graphKernels; ///< That graphs have launched.
+  uint64_t waits;        ///< For the context, a stream or an event.
+};
+
+void pikoTestDriverHostCounts(struct PikoTestDriverHostCounts *counts);
 
 /// The names of kernels that were launched, a line each, sorted.
 const char *pikoTestDriverKernels(void);

@@ -1,0 +1,188 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//===- Work.cpp - What streams do -----------------------------------------===//
+
+#include "State.h"
+
+#include <cstring>
+#include <utility>
+
+using namespace piko::testdriver;
+using namespace piko::cuda;
+namespace ptx = piko::ptx;
+using piko::ptx::Class;
+using piko::ptx::FaultKind;
+
+namespace {
+
+CUresult errorOf(FaultKind kind) {
+  switch (kind) {
+  case FaultKind::IllegalAddress:
+    return CUDA_ERROR_ILLEGAL_ADDRESS;
+  case FaultKind::MisalignedAddress:
+    return CUDA_ERROR_MISALIGNED_ADDRESS;
+  case FaultKind::IllegalInstruction:
+    return CUDA_ERROR_ILLEGAL_INSTRUCTION;
+  case FaultKind::Deadlock:
+    return CUDA_ERROR_LAUNCH_TIMEOUT;
+  case FaultKind::Trap:
+    break;
+  }
+  return CUDA_ERROR_LAUNCH_FAILED;
+}
+
+uint64_t &counterOf(PikoTestDriverCounts &counts, Class of) {
+  switch (of) {
+  case Class::Integer:
+    return counts.integer;
+  case Class::Single:
+    return counts.float32;
+  case Class::Double:
+    return counts.float64;
+  case Class::Move:
+    return counts.move;
+  case Class::Control:
+    return counts.control;
+  case Class::LoadGlobal:
+    return counts.loadGlobal;
+  case Class::StoreGlobal:
+    return counts.storeGlobal;
+  case Class::LoadShared:
+    return counts.loadShared;
+  case Class::StoreShared:
+    return counts.storeShared;
+  case Class::LoadLocal:
+    return counts.loadLocal;
+  case Class::StoreLocal:
+    return counts.storeLocal;
+  case Class::LoadGeneric:
+    return counts.loadGeneric;
+  case Class::StoreGeneric:
+    return counts.storeGeneric;
+  case Class::Parameter:
+    return counts.parameter;
+  case Class::Atomic:
+    return counts.atomic;
+  case Class::Barrier:
+    return counts.barrier;
+  case Class::WarpOperation:
+    break;
+  }
+  return counts.warpOperation;
+}
+
+void addCounts(const ptx::Launch &launch) {
+  PikoTestDriverCounts &counts = state().counts[launch.program.name];
+  const auto &blocks = launch.blocks, &threads = launch.threads;
+  uint64_t blockCount = uint64_t(blocks[0]) * blocks[1] * blocks[2];
+  ++counts.launches;
+  counts.blocks += blockCount;
+  counts.threads += blockCount * threads[0] * threads[1] * threads[2];
+  for (size_t pc = 0; pc < launch.sites.size(); ++pc) {
+    const ptx::Site &site = launch.sites[pc];
+    counts.warpInstructions += site.warps;
+    counts.laneInstructions += site.lanes;
+    counts.globalBytes += site.bytes;
+    counts.globalSectors += site.sectors;
+    counterOf(counts, launch.program.code[pc].counted) += site.warps;
+  }
+}
+
+void runKernel(const Call &call, const Kernel &kernel) {
+  Context &context = call.context();
+  const Function &function = context.functions.find(kernel.function)->second;
+  ptx::Launch launch{function.program,
+                     context.memory,
+                     function.module->source,
+                     kernel.blocks,
+                     kernel.threads,
+                     kernel.sharedBytes,
+                     kernel.parameters,
+                     kernel.cooperative,
+                     state().seed,
+                     {}};
+  try {
+    ptx::run(launch);
+  } catch (const ptx::Fault &fault) {
+    // As a launch that runs while the host goes on.
+    context.failed = call.fail(errorOf(fault.kind), fault.text);
+  }
+  addCounts(launch);
+}
+
+/// Where a part of the device's memory is in the host.
+uint8_t *placeOf(const Context &context, uint64_t address) {
+  const Allocation *it = context.memory.at(address);
+  return it->memory + (address - it->begin);
+}
+
+void runCopy(const Context &context, const Copy &copy) {
+  auto *to = copy.direction == Direction::FromDevice
+                 ? reinterpret_cast<uint8_t *>(copy.to)
+                 : placeOf(context, copy.to);
+  const auto *from = copy.direction == Direction::ToDevice
+                         ? reinterpret_cast<const uint8_t *>(copy.from)
+                         : placeOf(context, copy.from);
+  std::memmove(to, from, copy.bytes);
+}
+
+void count(const Work &work, PikoTestDriverHostCounts &counts) {
+  ++(std::holds_alternative<Kernel>(work) ? counts.launches
+     : std::holds_alternative<Copy>(work) ? counts.copies
+                                          : counts.fills);
+}
+
+} // namespace
+
+std::string piko::testdriver::checkMemory(const Context &context,
+                                          uint64_t address, uint64_t bytes) {
+  const Allocation *it = context.memory.at(address);
+  if (it && bytes <= it->begin + it->bytes - address)
+    return {};
+  std::string known = context.memory.describe(address);
+  return std::to_string(bytes) + " bytes are not all in an allocation" +
+         (known.empty() ? "" : ", " + known);
+}
+
+std::string piko::testdriver::checkMemory(const Context &context,
+                                          const Work &work) {
+  if (const auto *fill = std::get_if<Fill>(&work))
+    return checkMemory(context, fill->address, fill->bytes);
+  const auto *copy = std::get_if<Copy>(&work);
+  if (!copy)
+    return {};
+  if ((copy->direction == Direction::FromDevice && !copy->to) ||
+      (copy->direction == Direction::ToDevice && !copy->from))
+    return "null";
+  std::string wrong;
+  if (copy->direction != Direction::FromDevice)
+    wrong = checkMemory(context, copy->to, copy->bytes);
+  if (wrong.empty() && copy->direction != Direction::ToDevice)
+    wrong = checkMemory(context, copy->from, copy->bytes);
+  return wrong;
+}
+
+void piko::testdriver::run(const Call &call, const Work &work) {
+  if (const auto *kernel = std::get_if<Kernel>(&work))
+    runKernel(call, *kernel);
+  else if (const auto *copy = std::get_if<Copy>(&work))
+    runCopy(call.context(), *copy);
+  else if (const auto *fill = std::get_if<Fill>(&work))
+    std::memset(placeOf(call.context(), fill->address), fill->value,
+                fill->bytes);
+}
+
+CUresult piko::testdriver::submit(const Call &call, CUstream stream,
+                                  Work work) {
+  if (CUresult error = call.checkStream(stream))
+    return error;
+  if (std::string wrong = checkMemory(call.context(), work); !wrong.empty())
+    return call.fail(CUDA_ERROR_INVALID_VALUE, wrong);
+  if (Capture *capture = call.context().captureOf(stream)) {
+    capture->nodes.push_back(
+        {state().newHandle<CUgraphNode>(), std::move(work)});
+    return CUDA_SUCCESS;
+  }
+  count(work, state().hostCounts);
+  run(call, work);
+  return CUDA_SUCCESS;
+}
