@@ -27,6 +27,7 @@ using CUevent = struct CUevent_st *;
 using CUgraph = struct CUgraph_st *;
 using CUgraphNode = struct CUgraphNode_st *;
 using CUgraphExec = struct CUgraphExec_st *;
+using CUgraphConditionalHandle = uint64_t;
 
 } // extern "C"
 
@@ -130,6 +131,36 @@ enum CUgraphExecUpdateResult : int {
   CU_GRAPH_EXEC_UPDATE_ERROR_ATTRIBUTES_CHANGED = 8
 };
 
+enum CUgraphNodeType : int { CU_GRAPH_NODE_TYPE_CONDITIONAL = 13 };
+
+enum CUgraphConditionalNodeType : int {
+  CU_GRAPH_COND_TYPE_IF = 0,
+  CU_GRAPH_COND_TYPE_WHILE = 1,
+  CU_GRAPH_COND_TYPE_SWITCH = 2
+};
+
+struct CUDA_CONDITIONAL_NODE_PARAMS {
+  CUgraphConditionalHandle handle;
+  CUgraphConditionalNodeType type;
+  unsigned size;        ///< Number of bodies.
+  CUgraph *phGraph_out; ///< The bodies, which the node has.
+  CUcontext ctx;
+};
+
+struct CUgraphNodeParams {
+  CUgraphNodeType type;
+  int reserved0[3];
+  union {
+    long long reserved1[29];
+    CUDA_CONDITIONAL_NODE_PARAMS conditional;
+  };
+  long long reserved2;
+};
+
+struct CUgraphEdgeData {
+  unsigned char from_port, to_port, type, reserved[5];
+};
+
 struct CUgraphExecUpdateResultInfo {
   CUgraphExecUpdateResult result;
   CUgraphNode errorNode; ///< Of the graph; null where its topology changed.
@@ -139,7 +170,11 @@ struct CUgraphExecUpdateResultInfo {
 enum : unsigned {
   CU_MEM_ATTACH_GLOBAL = 1,   ///< Of cuMemAllocManaged.
   CU_STREAM_NON_BLOCKING = 1, ///< Of cuStreamCreate.
-  CU_EVENT_DEFAULT = 0        ///< Of cuEventCreate.
+  CU_EVENT_DEFAULT = 0,       ///< Of cuEventCreate.
+  /// Of cuGraphConditionalHandleCreate.
+  CU_GRAPH_COND_ASSIGN_DEFAULT = 1,
+  /// Of cuStreamUpdateCaptureDependencies.
+  CU_STREAM_SET_CAPTURE_DEPENDENCIES = 1
 };
 
 /// cuMemPrefetchAsync: to the host.

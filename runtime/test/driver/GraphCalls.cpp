@@ -1,112 +1,31 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
-//===- GraphCalls.cpp - Captures and graphs of the driver for tests -------===//
+//===- GraphCalls.cpp - Graphs of the driver for tests --------------------===//
 
 #include "State.h"
 
 #include <algorithm>
+#include <cstring>
 #include <utility>
 
 using namespace piko::testdriver;
 using namespace piko::cuda;
+namespace ptx = piko::ptx;
+namespace testdriver = piko::testdriver;
 
-Capture *Context::captureOf(CUstream stream) {
-  auto found = streams.find(stream);
-  return found != streams.end() && found->second.capture
-             ? &*found->second.capture
-             : nullptr;
+CUgraphNode Graph::add(Work work) {
+  auto handle = state().newHandle<CUgraphNode>();
+  nodes.push_back({handle, std::move(work)});
+  return handle;
 }
 
-CUresult Call::checkStream(CUstream stream) const {
-  if (!stream)
-    return refuseCaptures(
-        CUDA_ERROR_STREAM_CAPTURE_IMPLICIT,
-        [](const Stream &it) { return !(it.flags & CU_STREAM_NON_BLOCKING); });
-  if (!current->streams.contains(stream))
-    return fail(CUDA_ERROR_INVALID_HANDLE, "no live stream");
-  const Capture *capture = current->captureOf(stream);
-  return capture && !capture->valid
-             ? fail(CUDA_ERROR_STREAM_CAPTURE_INVALIDATED, "")
-             : CUDA_SUCCESS;
+void Context::destroyGraph(CUgraph graph) {
+  auto found = graphs.find(graph);
+  for (const Node &node : found->second.nodes)
+    if (const auto *conditional = std::get_if<Conditional>(&node.work))
+      for (CUgraph body : conditional->graphs)
+        destroyGraph(body);
+  graphs.erase(found);
 }
-
-CUresult Call::waitFor(CUstream stream) const {
-  if (CUresult error = checkStream(stream))
-    return error;
-  if (Capture *capture = current->captureOf(stream)) {
-    capture->valid = false;
-    return fail(CUDA_ERROR_STREAM_CAPTURE_UNSUPPORTED,
-                "the stream is captured");
-  }
-  ++state().hostCounts.waits;
-  return CUDA_SUCCESS;
-}
-
-// --- Captures ----------------------------------------------------------------
-
-CUresult piko::cuda::cuStreamBeginCapture(CUstream stream,
-                                          CUstreamCaptureMode mode) {
-  Call call(__func__, Needs::Context);
-  if (CUresult error = call.refused())
-    return error;
-  if (!stream)
-    return call.fail(CUDA_ERROR_STREAM_CAPTURE_UNSUPPORTED,
-                     "the legacy stream");
-  if (mode < CU_STREAM_CAPTURE_MODE_GLOBAL ||
-      mode > CU_STREAM_CAPTURE_MODE_RELAXED)
-    return call.fail(CUDA_ERROR_INVALID_VALUE, "mode " + std::to_string(mode));
-  if (CUresult error = call.checkStream(stream))
-    return error;
-  std::optional<Capture> &capture = call.context().streams[stream].capture;
-  if (capture)
-    return call.fail(CUDA_ERROR_ILLEGAL_STATE, "it is captured already");
-  capture.emplace();
-  capture->mode = mode;
-  capture->thread = std::this_thread::get_id();
-  return CUDA_SUCCESS;
-}
-
-CUresult piko::cuda::cuStreamEndCapture(CUstream stream, CUgraph *graph) {
-  Call call(__func__, Needs::Context);
-  if (CUresult error = call.refused())
-    return error;
-  if (!graph)
-    return call.fail(CUDA_ERROR_INVALID_VALUE, "null");
-  *graph = nullptr;
-  auto &streams = call.context().streams;
-  auto found = streams.find(stream);
-  if (stream && found == streams.end())
-    return call.fail(CUDA_ERROR_INVALID_HANDLE, "no live stream");
-  if (!stream || !found->second.capture)
-    return call.fail(CUDA_ERROR_ILLEGAL_STATE, "it is not captured");
-  if (found->second.capture->mode != CU_STREAM_CAPTURE_MODE_RELAXED &&
-      found->second.capture->thread != std::this_thread::get_id())
-    return call.fail(CUDA_ERROR_STREAM_CAPTURE_WRONG_THREAD, "");
-  const Capture capture =
-      *std::exchange(found->second.capture, std::optional<Capture>());
-  if (!capture.valid)
-    return call.fail(CUDA_ERROR_STREAM_CAPTURE_INVALIDATED, "");
-  *graph = state().newHandle<CUgraph>();
-  call.context().graphs[*graph] = capture.nodes;
-  return CUDA_SUCCESS;
-}
-
-CUresult piko::cuda::cuStreamIsCapturing(CUstream stream,
-                                         CUstreamCaptureStatus *status) {
-  Call call(__func__, Needs::Context);
-  if (CUresult error = call.refused())
-    return error;
-  if (!status)
-    return call.fail(CUDA_ERROR_INVALID_VALUE, "null");
-  if (stream && !call.context().streams.contains(stream))
-    return call.fail(CUDA_ERROR_INVALID_HANDLE, "no live stream");
-  const Capture *capture = call.context().captureOf(stream);
-  *status = !capture         ? CU_STREAM_CAPTURE_STATUS_NONE
-            : capture->valid ? CU_STREAM_CAPTURE_STATUS_ACTIVE
-                             : CU_STREAM_CAPTURE_STATUS_INVALIDATED;
-  return CUDA_SUCCESS;
-}
-
-// --- Graphs ------------------------------------------------------------------
 
 namespace {
 
@@ -121,6 +40,8 @@ CUgraphExecUpdateResult difference(const Work &from, const Work &to) {
     if (kernel->cooperative != other.cooperative)
       return CU_GRAPH_EXEC_UPDATE_ERROR_ATTRIBUTES_CHANGED;
   }
+  if (std::holds_alternative<Conditional>(from))
+    return CU_GRAPH_EXEC_UPDATE_ERROR_NOT_SUPPORTED;
   if (const auto *copy = std::get_if<Copy>(&from))
     if (copy->direction != std::get<Copy>(to).direction)
       return CU_GRAPH_EXEC_UPDATE_ERROR_PARAMETERS_CHANGED;
@@ -146,28 +67,93 @@ const char *textOf(CUgraphExecUpdateResult result) {
     return "another function of a kernel";
   case CU_GRAPH_EXEC_UPDATE_ERROR_ATTRIBUTES_CHANGED:
     return "a kernel that is cooperative, and one that is not";
+  case CU_GRAPH_EXEC_UPDATE_ERROR_NOT_SUPPORTED:
+    return "a conditional node";
   default:
     return "another direction of a copy";
   }
 }
 
-/// Runs a node; false ends the graph.
-bool runNode(const Call &call, const Work &work) {
-  Context &context = call.context();
-  if (const auto *kernel = std::get_if<Kernel>(&work)) {
-    if (!context.functions.contains(kernel->function)) {
-      context.failed =
-          call.fail(CUDA_ERROR_LAUNCH_FAILED, "a kernel that was unloaded");
-      return false;
-    }
-    ++state().hostCounts.graphKernels;
+/// Rounds of a conditional node's body until a launch is given up.
+constexpr uint32_t patience = 1000000;
+
+class GraphRun : ptx::Conditions {
+public:
+  explicit GraphRun(const Call &call) : call(call), context(call.context()) {}
+
+  /// False where one has failed, which later calls return.
+  bool run(const Nodes &nodes) {
+    return std::all_of(nodes.begin(), nodes.end(),
+                       [&](const Node &node) { return run(node.work); });
   }
-  if (std::string wrong = checkMemory(context, work); !wrong.empty()) {
-    context.failed = call.fail(CUDA_ERROR_ILLEGAL_ADDRESS, wrong);
+
+private:
+  bool run(const Work &work);
+  bool run(const Conditional &node);
+  bool fail(CUresult error, const std::string &text) {
+    context.failed = call.fail(error, text);
     return false;
   }
-  run(call, work);
+  bool set(uint64_t handle, uint32_t value) override {
+    auto found = context.conditions.find(handle);
+    if (found == context.conditions.end())
+      return false;
+    found->second.value = value;
+    return true;
+  }
+
+  const Call &call;
+  Context &context;
+};
+
+bool GraphRun::run(const Work &work) {
+  if (const auto *conditional = std::get_if<Conditional>(&work))
+    return run(*conditional);
+  if (const auto *kernel = std::get_if<Kernel>(&work)) {
+    if (!context.functions.contains(kernel->function))
+      return fail(CUDA_ERROR_LAUNCH_FAILED, "a kernel that was unloaded");
+    ++state().hostCounts.graphKernels;
+  }
+  if (std::string wrong = checkMemory(context, work); !wrong.empty())
+    return fail(CUDA_ERROR_ILLEGAL_ADDRESS, wrong);
+  testdriver::run(call, work, this);
   return context.failed == CUDA_SUCCESS;
+}
+
+bool GraphRun::run(const Conditional &node) {
+  const uint32_t &value = context.conditions[node.handle].value;
+  if (node.type == CU_GRAPH_COND_TYPE_WHILE) {
+    for (uint32_t round = 0; value; ++round) {
+      if (round == patience)
+        return fail(CUDA_ERROR_LAUNCH_TIMEOUT,
+                    "a conditional node that does not end");
+      if (!run(node.bodies[0]))
+        return false;
+    }
+    return true;
+  }
+  const size_t body =
+      node.type == CU_GRAPH_COND_TYPE_SWITCH ? value : (value ? 0 : 1);
+  return body >= node.bodies.size() || run(node.bodies[body]);
+}
+
+/// Gives conditional nodes what is in their bodies, in which nothing may be of
+/// the host; false if something is.
+bool takeBodies(const Context &context, Nodes &nodes, bool isBody) {
+  for (Node &node : nodes) {
+    if (const auto *copy = std::get_if<Copy>(&node.work))
+      if (isBody && copy->direction != Direction::OnDevice)
+        return false;
+    auto *conditional = std::get_if<Conditional>(&node.work);
+    if (!conditional)
+      continue;
+    for (CUgraph graph : conditional->graphs) {
+      conditional->bodies.push_back(context.graphs.find(graph)->second.nodes);
+      if (!takeBodies(context, conditional->bodies.back(), true))
+        return false;
+    }
+  }
+  return true;
 }
 
 } // namespace
@@ -184,8 +170,12 @@ CUresult piko::cuda::cuGraphInstantiateWithFlags(CUgraphExec *executable,
                      "flags " + std::to_string(flags));
   if (found == call.context().graphs.end())
     return call.fail(CUDA_ERROR_INVALID_VALUE, "no live graph");
+  Executable made{graph, found->second.nodes};
+  if (!takeBodies(call.context(), made.nodes, false))
+    return call.fail(CUDA_ERROR_NOT_SUPPORTED,
+                     "a copy of the host's memory in a conditional node");
   *executable = state().newHandle<CUgraphExec>();
-  call.context().executables[*executable] = found->second;
+  call.context().executables[*executable] = std::move(made);
   return CUDA_SUCCESS;
 }
 
@@ -199,11 +189,11 @@ CUresult piko::cuda::cuGraphExecUpdate(CUgraphExec executable, CUgraph graph,
   if (!info || from == call.context().executables.end() ||
       to == call.context().graphs.end())
     return call.fail(CUDA_ERROR_INVALID_VALUE, "no live graph");
-  *info = compare(from->second, to->second);
+  *info = compare(from->second.nodes, to->second.nodes);
   if (info->result)
     return call.fail(CUDA_ERROR_GRAPH_EXEC_UPDATE_FAILURE,
                      textOf(info->result));
-  from->second = to->second;
+  from->second = {graph, to->second.nodes};
   return CUDA_SUCCESS;
 }
 
@@ -219,9 +209,10 @@ CUresult piko::cuda::cuGraphLaunch(CUgraphExec executable, CUstream stream) {
   if (call.context().captureOf(stream))
     return call.fail(CUDA_ERROR_NOT_SUPPORTED, "a graph within a graph");
   ++state().hostCounts.graphLaunches;
-  for (const Node &node : found->second)
-    if (!runNode(call, node.work))
-      break;
+  for (auto &[handle, condition] : call.context().conditions)
+    if (condition.isAssigned && condition.graph == found->second.graph)
+      condition.value = condition.initial;
+  GraphRun(call).run(found->second.nodes);
   return CUDA_SUCCESS;
 }
 
@@ -238,7 +229,87 @@ CUresult piko::cuda::cuGraphDestroy(CUgraph graph) {
   Call call(__func__, Needs::Context);
   if (CUresult error = call.refused())
     return error;
-  if (!call.context().graphs.erase(graph))
+  auto found = call.context().graphs.find(graph);
+  if (found == call.context().graphs.end() || found->second.isBody)
     return call.fail(CUDA_ERROR_INVALID_VALUE, "no live graph");
+  call.context().destroyGraph(graph);
+  return CUDA_SUCCESS;
+}
+
+// --- Conditional nodes -------------------------------------------------------
+
+CUresult
+piko::cuda::cuGraphConditionalHandleCreate(CUgraphConditionalHandle *handle,
+                                           CUgraph graph, CUcontext context,
+                                           unsigned value, unsigned flags) {
+  Call call(__func__, Needs::Context);
+  if (CUresult error = call.refused())
+    return error;
+  if (!handle || flags > CU_GRAPH_COND_ASSIGN_DEFAULT ||
+      (context && context != call.context().handle))
+    return call.fail(CUDA_ERROR_INVALID_VALUE,
+                     "flags " + std::to_string(flags));
+  if (!call.context().graphs.contains(graph))
+    return call.fail(CUDA_ERROR_INVALID_VALUE, "no live graph");
+  *handle = reinterpret_cast<uint64_t>(state().newHandle<void *>());
+  Condition &made = call.context().conditions[*handle];
+  made.graph = graph;
+  made.isAssigned = flags & CU_GRAPH_COND_ASSIGN_DEFAULT;
+  made.initial = value;
+  std::memset(&made.value, ptx::unwritten, sizeof(made.value));
+  return CUDA_SUCCESS;
+}
+
+/// What is wrong with a conditional node; empty if nothing.
+static std::string check(const Context &context, CUgraph graph,
+                         const CUDA_CONDITIONAL_NODE_PARAMS &given) {
+  auto found = context.conditions.find(given.handle);
+  if (found == context.conditions.end())
+    return "no handle of a condition";
+  if (found->second.isUsed)
+    return "a handle that another node has";
+  if (found->second.graph != graph && !context.graphs.at(graph).isBody)
+    return "a handle of another graph";
+  if (given.ctx && given.ctx != context.handle)
+    return "another context";
+  const unsigned most = given.type == CU_GRAPH_COND_TYPE_WHILE ? 1
+                        : given.type == CU_GRAPH_COND_TYPE_IF  ? 2
+                                                               : ~0u;
+  return given.size && given.size <= most
+             ? std::string()
+             : std::to_string(given.size) + " bodies";
+}
+
+CUresult piko::cuda::cuGraphAddNode(CUgraphNode *node, CUgraph graph,
+                                    const CUgraphNode *dependencies,
+                                    const CUgraphEdgeData *edges, size_t count,
+                                    CUgraphNodeParams *parameters) {
+  Call call(__func__, Needs::Context);
+  if (CUresult error = call.refused())
+    return error;
+  Context &context = call.context();
+  auto found = context.graphs.find(graph);
+  if (!node || !parameters || (count && !dependencies) ||
+      found == context.graphs.end())
+    return call.fail(CUDA_ERROR_INVALID_VALUE, "no live graph");
+  if (parameters->type != CU_GRAPH_NODE_TYPE_CONDITIONAL)
+    return call.fail(CUDA_ERROR_NOT_SUPPORTED,
+                     "a node that is not conditional");
+  if (edges || count > 1 ||
+      (count ? *dependencies : nullptr) != found->second.last())
+    return call.fail(CUDA_ERROR_NOT_SUPPORTED,
+                     "nodes that do not follow each other");
+  CUDA_CONDITIONAL_NODE_PARAMS &given = parameters->conditional;
+  if (std::string wrong = check(context, graph, given); !wrong.empty())
+    return call.fail(CUDA_ERROR_INVALID_VALUE, wrong);
+  context.conditions[given.handle].isUsed = true;
+  Conditional made{given.handle, given.type, {}};
+  for (unsigned body = 0; body < given.size; ++body) {
+    made.graphs.push_back(state().newHandle<CUgraph>());
+    context.graphs[made.graphs.back()].isBody = true;
+  }
+  *node = found->second.add(std::move(made));
+  given.phGraph_out =
+      std::get<Conditional>(found->second.nodes.back().work).graphs.data();
   return CUDA_SUCCESS;
 }

@@ -3,6 +3,7 @@
 
 #include "State.h"
 
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <utility>
@@ -130,8 +131,11 @@ std::string Context::describe() const {
   }
   if (!streams.empty())
     text += std::to_string(streams.size()) + " streams\n";
-  if (!graphs.empty())
-    text += std::to_string(graphs.size()) + " graphs\n";
+  const auto whole =
+      std::count_if(graphs.begin(), graphs.end(),
+                    [](const auto &graph) { return !graph.second.isBody; });
+  if (whole)
+    text += std::to_string(whole) + " graphs\n";
   if (!executables.empty())
     text += std::to_string(executables.size()) + " executable graphs\n";
   if (!events.empty())

@@ -100,7 +100,32 @@ struct Capture {
   CUstreamCaptureMode mode = CU_STREAM_CAPTURE_MODE_GLOBAL;
   std::thread::id thread; ///< That began it.
   bool valid = true;
+  CUgraph graph = nullptr;
+  bool isOwner = true;        ///< Of the graph: it made it.
+  CUgraphNode last = nullptr; ///< That the next node follows.
+};
+
+struct Graph {
   Nodes nodes;
+  bool isBody = false; ///< Of a node, which destroys it.
+
+  CUgraphNode last() const {
+    return nodes.empty() ? CUgraphNode() : nodes.back().handle;
+  }
+  CUgraphNode add(Work work);
+};
+
+struct Executable {
+  CUgraph graph = nullptr; ///< That it was made of.
+  Nodes nodes;
+};
+
+/// What conditional nodes ask, by its handle.
+struct Condition {
+  CUgraph graph = nullptr;
+  uint32_t initial = 0, value = 0;
+  bool isAssigned = false; ///< Its initial value, at each launch.
+  bool isUsed = false;     ///< By a node.
 };
 
 struct Stream {
@@ -124,11 +149,14 @@ struct Context {
   std::map<CUfunction, Function> functions;
   std::map<CUstream, Stream> streams;
   std::map<CUevent, Event> events;
-  std::map<CUgraph, Nodes> graphs;
-  std::map<CUgraphExec, Nodes> executables;
+  std::map<CUgraph, Graph> graphs;
+  std::map<CUgraphExec, Executable> executables;
+  std::map<CUgraphConditionalHandle, Condition> conditions;
 
   /// Null if the stream is not captured.
   Capture *captureOf(CUstream stream);
+  /// With the bodies of its nodes.
+  void destroyGraph(CUgraph graph);
   /// What is alive, a line each.
   std::string describe() const;
 };

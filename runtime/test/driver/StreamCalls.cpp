@@ -22,6 +22,9 @@ CUresult piko::cuda::cuStreamDestroy(CUstream stream) {
   Call call(__func__, Needs::Context);
   if (CUresult error = call.refused())
     return error;
+  const Capture *capture = call.context().captureOf(stream);
+  if (capture && capture->isOwner)
+    call.context().destroyGraph(capture->graph);
   if (!call.context().streams.erase(stream))
     return call.fail(CUDA_ERROR_INVALID_HANDLE, "no live stream");
   return CUDA_SUCCESS;

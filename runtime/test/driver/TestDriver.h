@@ -13,7 +13,8 @@
 // What a stream that is captured is given becomes nodes of a graph, with its
 // parameters as they were then. A call that a capture forbids makes it invalid.
 // An executable graph is not updated to another function of a kernel, which
-// drivers before 11.2 refuse and later ones take: callers need a way out.
+// drivers before 11.2 refuse and later ones take: callers need a way out. Nodes
+// of a graph follow each other; one beside another is not supported.
 //
 // The blocks of a cooperative launch run in turns, which end at nanosleep or
 // after some thousand instructions; those of others run one after the other.

@@ -87,19 +87,15 @@ void addCounts(const ptx::Launch &launch) {
   }
 }
 
-void runKernel(const Call &call, const Kernel &kernel) {
+void runKernel(const Call &call, const Kernel &kernel,
+               ptx::Conditions *conditions) {
   Context &context = call.context();
   const Function &function = context.functions.find(kernel.function)->second;
-  ptx::Launch launch{function.program,
-                     context.memory,
-                     function.module->source,
-                     kernel.blocks,
-                     kernel.threads,
-                     kernel.sharedBytes,
-                     kernel.parameters,
-                     kernel.cooperative,
-                     state().seed,
-                     {}};
+  ptx::Launch launch{
+      function.program,  context.memory,     function.module->source,
+      kernel.blocks,     kernel.threads,     kernel.sharedBytes,
+      kernel.parameters, kernel.cooperative, state().seed,
+      conditions};
   try {
     ptx::run(launch);
   } catch (const ptx::Fault &fault) {
@@ -161,9 +157,10 @@ std::string piko::testdriver::checkMemory(const Context &context,
   return wrong;
 }
 
-void piko::testdriver::run(const Call &call, const Work &work) {
+void piko::testdriver::run(const Call &call, const Work &work,
+                           ptx::Conditions *conditions) {
   if (const auto *kernel = std::get_if<Kernel>(&work))
-    runKernel(call, *kernel);
+    runKernel(call, *kernel, conditions);
   else if (const auto *copy = std::get_if<Copy>(&work))
     runCopy(call.context(), *copy);
   else if (const auto *fill = std::get_if<Fill>(&work))
@@ -178,8 +175,11 @@ CUresult piko::testdriver::submit(const Call &call, CUstream stream,
   if (std::string wrong = checkMemory(call.context(), work); !wrong.empty())
     return call.fail(CUDA_ERROR_INVALID_VALUE, wrong);
   if (Capture *capture = call.context().captureOf(stream)) {
-    capture->nodes.push_back(
-        {state().newHandle<CUgraphNode>(), std::move(work)});
+    Graph &graph = call.context().graphs[capture->graph];
+    if (capture->last != graph.last())
+      return call.fail(CUDA_ERROR_NOT_SUPPORTED,
+                       "nodes that do not follow each other");
+    capture->last = graph.add(std::move(work));
     return CUDA_SUCCESS;
   }
   count(work, state().hostCounts);

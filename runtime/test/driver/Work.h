@@ -16,6 +16,10 @@
 #include <variant>
 #include <vector>
 
+namespace piko::ptx {
+class Conditions;
+}
+
 namespace piko::testdriver {
 
 using namespace piko::cuda;
@@ -44,15 +48,24 @@ struct Fill {
   uint8_t value = 0;
 };
 
-using Work = std::variant<Kernel, Copy, Fill>;
+struct Node;
+
+/// In the order of their capture, in which they run.
+using Nodes = std::vector<Node>;
+
+struct Conditional {
+  CUgraphConditionalHandle handle = 0;
+  CUgraphConditionalNodeType type = CU_GRAPH_COND_TYPE_IF;
+  std::vector<CUgraph> graphs; ///< Its bodies.
+  std::vector<Nodes> bodies{}; ///< What is in them, of an executable graph.
+};
+
+using Work = std::variant<Kernel, Copy, Fill, Conditional>;
 
 struct Node {
   CUgraphNode handle = nullptr;
   Work work;
 };
-
-/// In the order of their capture, in which they run.
-using Nodes = std::vector<Node>;
 
 /// What is wrong with memory that work uses; empty if nothing.
 std::string checkMemory(const Context &context, const Work &work);
@@ -61,7 +74,8 @@ std::string checkMemory(const Context &context, uint64_t address,
 
 /// Runs work whose memory is there. A kernel that fails is the error of later
 /// calls.
-void run(const Call &call, const Work &work);
+void run(const Call &call, const Work &work,
+         ptx::Conditions *conditions = nullptr);
 
 /// Runs it or, on a stream that is captured, keeps it.
 CUresult submit(const Call &call, CUstream stream, Work work);

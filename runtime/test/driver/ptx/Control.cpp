@@ -3,6 +3,7 @@
 
 #include "ptx/Decoder.h"
 #include "ptx/Lanes.h"
+#include "ptx/Machine.h"
 
 #include <cstring>
 
@@ -54,6 +55,23 @@ void call(Warp &warp, const Instruction &it) {
   warp.call(it.target);
 }
 
+/// it.extra: copies from where the handle and the value are.
+void setCondition(Warp &warp, const Instruction &it) {
+  const auto &from = warp.program->calls[it.extra].list;
+  forEachLane(warp.active, [&](uint32_t lane) {
+    const uint8_t *memory =
+        warp.calls + uint64_t(lane) * warp.program->callBytes;
+    uint64_t handle = 0;
+    uint32_t value = 0;
+    std::memcpy(&handle, memory + from[0].from, sizeof(handle));
+    std::memcpy(&value, memory + from[1].from, sizeof(value));
+    Conditions *conditions = warp.block.launch.conditions;
+    if (!conditions || !conditions->set(handle, value))
+      warp.fault(FaultKind::IllegalAddress,
+                 "no condition of the graph that runs", lane);
+  });
+}
+
 void returnLanes(Warp &warp, const Instruction &) { warp.returnLanes(); }
 void exitLanes(Warp &warp, const Instruction &) { warp.exitLanes(); }
 
@@ -83,6 +101,28 @@ bool decodeBranch(Decoding &d) {
   return true;
 }
 
+/// Where an argument of a call is.
+uint32_t placeOf(Decoding &d, const Argument &argument) {
+  Space space = Space::Generic;
+  uint64_t address = argument.kind == Argument::Symbol
+                         ? d.scope.addressOf(argument.name, space)
+                         : 0;
+  if (space != Space::Param || address < callStart)
+    d.fail("expected a variable in parameter memory");
+  return static_cast<uint32_t>(address - callStart);
+}
+
+/// A function of the driver, which no module defines.
+bool decodeSetConditional(Decoding &d, const Argument *given) {
+  if (!given || given->parts.size() != 2)
+    d.fail("expected 2 parameters of 'cudaGraphSetConditional'");
+  d.it.run = setCondition;
+  d.it.extra =
+      d.scope.addCopies({{{placeOf(d, given->parts[0]), 0, sizeof(uint64_t)},
+                          {placeOf(d, given->parts[1]), 0, sizeof(uint32_t)}}});
+  return true;
+}
+
 /// Between variables of the caller and the callee's parameters or results.
 Copies copiesOf(Decoding &d, const Argument *given,
                 const FunctionSyntax &callee,
@@ -92,14 +132,7 @@ Copies copiesOf(Decoding &d, const Argument *given,
     d.fail("expected " + std::to_string(declared.size()) +
            " parameters or results of '" + callee.name + "'");
   for (size_t i = 0; i < declared.size(); ++i) {
-    const Argument &argument = given->parts[i];
-    Space space = Space::Generic;
-    uint64_t address = argument.kind == Argument::Symbol
-                           ? d.scope.addressOf(argument.name, space)
-                           : 0;
-    if (space != Space::Param || address < callStart)
-      d.fail("expected a variable in parameter memory");
-    auto own = static_cast<uint32_t>(address - callStart);
+    const uint32_t own = placeOf(d, given->parts[i]);
     Parameter other = d.scope.parameterOf(callee, declared[i]);
     copies.list.push_back(fromCallee
                               ? Copies::Copy{other.offset, own, other.size}
@@ -118,19 +151,22 @@ bool decodeCall(Decoding &d) {
     results = &arguments[next++];
   if (d.argument(next).kind != Argument::Symbol)
     d.fail("expected the name of a function");
-  d.callee = d.argument(next++).name;
+  const std::string &callee = d.argument(next++).name;
   if (next < arguments.size() && arguments[next].kind == Argument::List)
     parameters = &arguments[next++];
   if (next != arguments.size())
     d.fail("expected a call of a function by its name");
-  const FunctionSyntax &callee = d.scope.functionOf(d.callee);
+  if (callee == "cudaGraphSetConditional")
+    return decodeSetConditional(d, parameters);
+  d.callee = callee;
+  const FunctionSyntax &function = d.scope.functionOf(callee);
   d.it.run = call;
   d.it.extra = d.scope.addCopies(
-      copiesOf(d, parameters, callee, callee.parameters, false));
+      copiesOf(d, parameters, function, function.parameters, false));
   d.behind = d.it;
   d.behind.run = copy;
   d.behind.extra =
-      d.scope.addCopies(copiesOf(d, results, callee, callee.results, true));
+      d.scope.addCopies(copiesOf(d, results, function, function.results, true));
   return true;
 }
 

@@ -26,6 +26,14 @@ public:
   virtual std::string describe(uint64_t address) const { return {}; }
 };
 
+/// What the conditional nodes of a graph ask.
+class Conditions {
+public:
+  virtual ~Conditions() = default;
+  /// Whether there is a condition of this handle.
+  virtual bool set(uint64_t handle, uint32_t value) = 0;
+};
+
 struct Launch {
   const Program &program;
   const Memory &memory;
@@ -39,7 +47,8 @@ struct Launch {
   /// Of the order of blocks, of warps, and of lanes in atomic operations; 0: as
   /// they are numbered.
   uint64_t seed = 0;
-  std::vector<Site> sites;
+  Conditions *conditions = nullptr; ///< Of the graph that launches it.
+  std::vector<Site> sites{};
 };
 
 /// A block and its warps.
