@@ -76,6 +76,21 @@ TEST_P(CompiledKernelsTest, ScanInOneCooperativeLaunch) {
   EXPECT_EQ(*counter, 2 * static_cast<uint32_t>(blocks));
 }
 
+TEST_P(CompiledKernelsTest, GridBarriers) {
+  constexpr uint32_t blocks = 5, threads = 64;
+  for (const char *name : {"topBit", "senseReversing", "flags", "allThreads",
+                           "lock", "together"}) {
+    uint32_t *slots = put(std::vector<uint32_t>(blocks)), *missing = put({0}),
+             *state = put(std::vector<uint32_t>(blocks));
+    EXPECT_EQ(launchTogether(kernelOf("GridBarriers", name), blocks, threads,
+                             {of(slots), of(missing), of(state)}),
+              CUDA_SUCCESS)
+        << name << ": " << pikoTestDriverError();
+    EXPECT_EQ(*missing, 0u) << name;
+    EXPECT_EQ(std::count(slots, slots + blocks, 4u), blocks) << name;
+  }
+}
+
 TEST_P(CompiledKernelsTest, Atomics) {
   constexpr uint32_t all = 4 * 64;
   uint32_t *out = put({0, 0, ~0u, 0, ~0u, 0, 0, 0});

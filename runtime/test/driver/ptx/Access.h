@@ -66,6 +66,11 @@ inline uint8_t *locate(const Warp &warp, const Instruction &it, uint32_t lane,
     return inRegion(warp, space, lane, address, bytes, warp.shared, sharedStart,
                     warp.sharedBytes);
   } else if constexpr (space == Space::Local) {
+    // A function's parameters are on its stack where their address is taken.
+    if (address >= callStart)
+      return inRegion(warp, space, lane, address, bytes,
+                      warp.calls + uint64_t(lane) * warp.program->callBytes,
+                      callStart, warp.program->callBytes);
     return inRegion(warp, space, lane, address, bytes,
                     warp.local + uint64_t(lane) * warp.program->localBytes,
                     localStart, warp.program->localBytes);
