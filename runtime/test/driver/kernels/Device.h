@@ -2,6 +2,9 @@
 //===- Device.h - Device code in plain C++ --------------------------------===//
 //
 // Clang's builtins for a GPU need neither the CUDA language nor its headers.
+// Atomic operations that read and write have no order in the PTX of LLVM 22,
+// whatever they say (loads, stores, fences and compare and swap have theirs):
+// what needs one has a fence beside it.
 //
 //===----------------------------------------------------------------------===//
 

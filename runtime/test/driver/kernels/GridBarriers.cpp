@@ -46,6 +46,7 @@ extern "C" kernel void senseReversing(u32 *slots, u32 *missing, u32 *state) {
     __syncthreads();
     sense = !sense;
     if (threadX() == 0) {
+      __nvvm_membar_gl();
       if (__atomic_fetch_add(state, 1, __ATOMIC_ACQ_REL) == blocksX() - 1) {
         __atomic_store_n(state, 0, __ATOMIC_RELAXED);
         __atomic_store_n(state + 1, sense, __ATOMIC_RELEASE);
@@ -129,8 +130,10 @@ extern "C" kernel void together(u32 *slots, u32 *missing, u32 *state) {
   runRounds(slots, missing, [=](u32) mutable {
     target += blocksX();
     __syncthreads();
-    if (threadX() == 0)
+    if (threadX() == 0) {
+      __nvvm_membar_gl();
       __atomic_fetch_add(state, 1, __ATOMIC_RELAXED);
+    }
     while (__nvvm_bar0_or(threadX() == 0 &&
                           __atomic_load_n(state, __ATOMIC_ACQUIRE) < target))
       __nvvm_nanosleep(40);
