@@ -25,7 +25,7 @@ int64_t GridMemory::getLocalBase(LocalBinOp local) {
 }
 
 void GridMemory::flush(OpBuilder &builder) {
-  FlushOp::create(builder, launch.getLoc(), log, cells);
+  FlushOp::create(builder, launch.getLoc(), log, launch.getBlockIds().x, cells);
 }
 
 void GridMemory::clearOutboxes(OpBuilder &builder) {

@@ -56,6 +56,7 @@ public:
 
   gpu::LaunchOp launch;
   Value log;
+  using UnitFormer::bins;
 
 protected:
   void createUnits(StageOp stage, IntegerAttr source) override;
@@ -82,6 +83,7 @@ private:
   void createMemory();
   void convertLocal(LocalBinOp local);
   void finishGrid();
+  void repeatForUnits(Operation *opened);
   LogicalResult findItems();
   void dropEnds();
   void hoistPrivateArrays();
@@ -97,6 +99,7 @@ private:
   int64_t threads;
   Location loc;
   scf::ForOp items;
+  Value bins;
   gpu::LaunchOp launch;
   GridMemory memory;
 };
@@ -141,9 +144,9 @@ void GridFormer::createUnits(StageOp stage, IntegerAttr source) {
                             FlatSymbolRefAttr::get(stage.getSymNameAttr()),
                             source);
   Value zero = constant(0), one = constant(1), size = constant(threads);
-  Value count = UnitCountOp::create(rewriter, loc, bins);
+  Value blocks = BlockCountOp::create(rewriter, loc, bins, size);
   Value any = arith::CmpIOp::create(rewriter, loc, arith::CmpIPredicate::ugt,
-                                    count, zero);
+                                    blocks, zero);
   // A GPU refuses a grid without blocks.
   auto ifAny = scf::IfOp::create(rewriter, loc, any);
   CloseBinsOp::create(rewriter, loc, bins);
@@ -156,7 +159,7 @@ void GridFormer::createUnits(StageOp stage, IntegerAttr source) {
   log = OpenLogOp::create(rewriter, loc, WriterType::get(rewriter.getContext()),
                           bins);
   launch = gpu::LaunchOp::create(
-      rewriter, loc, count, one, one, size, one, one,
+      rewriter, loc, blocks, one, one, size, one, one,
       /*dynamicSharedMemorySize=*/Value(), /*asyncTokenType=*/Type(),
       /*asyncDependencies=*/ValueRange(), /*workgroupAttributions=*/TypeRange(),
       /*privateAttributions=*/TypeRange(), Value(), Value(), Value(),
@@ -197,6 +200,7 @@ void GridBuilder::formGrid() {
   former.run();
   memory.launch = launch = former.launch;
   memory.log = former.log;
+  bins = former.bins;
   dropEnds();
   createMemory();
   launch.walk([&](LocalBinOp local) { convertLocal(local); });
@@ -257,7 +261,8 @@ void GridBuilder::convertLocal(LocalBinOp local) {
   }
 }
 
-/// Threads begin with empty outboxes, and leave the last ones at the end.
+/// Threads begin with empty outboxes, and leave what is in them at the end of
+/// each unit.
 void GridBuilder::finishGrid() {
   auto opened = *memory.outboxes.getUsers().begin();
   for (Operation *user : memory.outboxes.getUsers())
@@ -276,6 +281,26 @@ void GridBuilder::finishGrid() {
   }
   builder.setInsertionPoint(opened->getBlock()->getTerminator());
   memory.flush(builder);
+  repeatForUnits(opened);
+}
+
+/// What follows `opened` is done for one unit after the other: the runtime may
+/// launch fewer blocks than there are units.
+void GridBuilder::repeatForUnits(Operation *opened) {
+  Block &body = launch.getBody().front();
+  OpBuilder builder = OpBuilder::atBlockBegin(&body);
+  Value count = UnitCountOp::create(builder, loc, bins);
+  builder.setInsertionPoint(body.getTerminator());
+  Value first = launch.getBlockIds().x;
+  auto units =
+      scf::ForOp::create(builder, loc, first, count, launch.getGridSize().x);
+  Value unit = units.getInductionVar();
+  first.replaceAllUsesExcept(unit, units);
+  units.getBody()->getOperations().splice(
+      units.getBody()->begin(), body.getOperations(),
+      std::next(opened->getIterator()), units->getIterator());
+  builder.setInsertionPoint(units.getBody()->getTerminator());
+  gpu::BarrierOp::create(builder, loc); // the block's memory is used again
 }
 
 /// An alloca in a loop would take more memory each time around.

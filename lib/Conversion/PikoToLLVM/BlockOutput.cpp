@@ -25,8 +25,8 @@ namespace {
 class BlockOutput {
 public:
   BlockOutput(OpBuilder &builder, FlushOp op, Value cells, Grid &grid)
-      : code{builder, op.getLoc()}, cells(cells), grid(grid),
-        launch(op->getParentOfType<gpu::LaunchOp>()),
+      : code{builder, op.getLoc()}, unit(op.getUnit()), cells(cells),
+        grid(grid), launch(op->getParentOfType<gpu::LaunchOp>()),
         threads(*getConstantIntValue(launch.getBlockSizeX())) {}
   void publish();
   void keep(int64_t outbox, int64_t recordBytes);
@@ -51,12 +51,13 @@ private:
     return arith::IndexCastOp::create(code.builder, code.loc, code.i64(),
                                       launch.getThreadIds().x);
   }
+  void link(Value directory);
   void reserveRecords(Value kept, Value most, int64_t base, int64_t size);
   void copyRecords(Value from, Value end, Value to, int64_t size);
   void copyBytes(Value from, Value to, int64_t size);
 
   GridCode code;
-  Value cells;
+  Value unit, cells;
   Grid &grid;
   gpu::LaunchOp launch;
   int64_t threads;
@@ -134,6 +135,25 @@ Value BlockOutput::sumBelow(Value number, Value &total) {
 // The directory
 //===----------------------------------------------------------------------===//
 
+/// Appends a directory to the unit's.
+void BlockOutput::link(Value directory) {
+  constexpr int64_t next = offsetof(pikoir_piece, next),
+                    first = offsetof(pikoir_unit_log, first),
+                    last = offsetof(pikoir_unit_log, last);
+  Value number = toI64(code.builder, code.loc, unit);
+  code.store(number, directory, offsetof(pikoir_piece, unit));
+  code.store(code.constant(0), directory, next);
+  Value units = code.load(code.i64(), grid.log, offsetof(pikoir_log, units));
+  Value mine =
+      code.add(units, code.mul(number, code.constant(sizeof(pikoir_unit_log))));
+  Value before = code.load(code.i64(), code.at(mine), last);
+  Value isFirst = code.compare(P::eq, before, code.constant(0));
+  code.store(directory,
+             code.select(isFirst, code.add(mine, code.constant(first)),
+                         code.add(before, code.constant(next))));
+  code.store(directory, mine, last);
+}
+
 void BlockOutput::publish() {
   constexpr int64_t header = sizeof(pikoir_piece), span = sizeof(pikoir_span);
   Value begin = code.get(grid.outboxes, PIKOIR_OUTBOX_BEGIN);
@@ -147,9 +167,8 @@ void BlockOutput::publish() {
                       code.constant(-header));
     Value piece = code.take(grid.log, bytes, PIKOIR_PIECE_DIRECTORY);
     when(code.compare(P::ne, piece, code.constant(0)), [&] {
-      code.store(toI64(code.builder, code.loc, launch.getBlockIds().x), piece,
-                 offsetof(pikoir_piece, unit));
       code.store(total, piece, offsetof(pikoir_piece, spans));
+      link(piece);
     });
     code.set(piece, cells, told);
   });

@@ -30,6 +30,11 @@ struct GridCode : CodeBuilder {
   mlir::Value load(mlir::Type type, mlir::Value address) {
     return mlir::LLVM::LoadOp::create(builder, loc, type, at(address));
   }
+  /// Of what a pointer points to.
+  mlir::Value load(mlir::Type type, mlir::Value pointer, int64_t offset) {
+    return mlir::LLVM::LoadOp::create(
+        builder, loc, type, createOffset(builder, loc, pointer, offset));
+  }
   void store(mlir::Value value, mlir::Value address, int64_t offset = 0) {
     mlir::LLVM::StoreOp::create(
         builder, loc, value, createOffset(builder, loc, at(address), offset));

@@ -157,7 +157,7 @@ bool piko::createErrorEntry(OpBuilder &builder, Operation *op,
              : LLVM::ZeroOp::create(
                    host, loc, LLVM::LLVMPointerType::get(host.getContext()));
     context.call(host, loc, PIKO_RUNTIME_FUNCTION(pikoir_log_place),
-                 {grid->log, createI32(host, loc, place),
+                 {context.frame(launch), grid->log, createI32(host, loc, place),
                   createI32(host, loc, which), createI32(host, loc, stage),
                   text, createI32(host, loc, code)});
   }
@@ -172,7 +172,14 @@ bool piko::createErrorEntry(OpBuilder &builder, Operation *op,
   for (auto [i, word] : llvm::enumerate(words))
     LLVM::StoreOp::create(builder, loc, word,
                           createOffset(builder, loc, payload, 8 * i));
+  LLVM::StoreOp::create(
+      builder, loc, createI64(builder, loc, 1),
+      createOffset(builder, loc, grid->log, offsetof(pikoir_log, errors)));
   return true;
+}
+
+static int32_t getLogFlags(func::FuncOp function) {
+  return function->hasAttr(marks::source) ? PIKOIR_LOG_SOURCE : 0;
 }
 
 namespace {
@@ -186,15 +193,30 @@ struct OpenLogLowering : ContextPattern<OpenLogOp> {
     auto number = function->getAttrOfType<IntegerAttr>(marks::number);
     Location loc = op.getLoc();
     rewriter.replaceOp(
-        op,
-        context.call(
-            rewriter, loc, PIKO_RUNTIME_FUNCTION(pikoir_log_open),
-            {context.frame(op), createI32(rewriter, loc, number.getInt()),
-             createI32(rewriter, loc,
-                       function->hasAttr(marks::source) ? PIKOIR_LOG_SOURCE
-                                                        : 0),
-             context.member(rewriter, adaptor.getBins(),
-                            PIKO_RUNTIME_MEMBER(pikoir_input, unit_count))}));
+        op, context.call(rewriter, loc, PIKO_RUNTIME_FUNCTION(pikoir_log_open),
+                         {context.frame(op),
+                          createI32(rewriter, loc, number.getInt()),
+                          createI32(rewriter, loc, getLogFlags(function))}));
+    return success();
+  }
+};
+
+struct BlockCountLowering : ContextPattern<BlockCountOp> {
+  using ContextPattern::ContextPattern;
+  LogicalResult
+  matchAndRewrite(BlockCountOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    auto function = op->getParentOfType<func::FuncOp>();
+    auto number = function->getAttrOfType<IntegerAttr>(marks::number);
+    Location loc = op.getLoc();
+    Value blocks =
+        context
+            .call(rewriter, loc, PIKO_RUNTIME_FUNCTION(pikoir_blocks),
+                  {context.frame(op), createI32(rewriter, loc, number.getInt()),
+                   createI32(rewriter, loc, getLogFlags(function)),
+                   toI64(rewriter, loc, adaptor.getThreads())})
+            .getResult();
+    rewriter.replaceOp(op, toIndex(rewriter, loc, blocks));
     return success();
   }
 };
@@ -205,7 +227,7 @@ struct CloseLogLowering : ContextPattern<CloseLogOp> {
   matchAndRewrite(CloseLogOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
     context.call(rewriter, op.getLoc(), PIKO_RUNTIME_FUNCTION(pikoir_log_close),
-                 adaptor.getLog());
+                 {context.frame(op), adaptor.getLog()});
     rewriter.eraseOp(op);
     return success();
   }
@@ -296,8 +318,9 @@ struct BytesAtLowering : ContextPattern<BytesAtOp> {
 void piko::populateGridToLLVMPatterns(const TypeConverter &converter,
                                       RewritePatternSet &patterns,
                                       LoweringContext &context) {
-  patterns.add<OpenLogLowering, CloseLogLowering, LogOfLowering,
-               OutboxesLowering, AllocateLowering, BytesAtLowering>(
-      converter, patterns.getContext(), context);
+  patterns
+      .add<OpenLogLowering, BlockCountLowering, CloseLogLowering, LogOfLowering,
+           OutboxesLowering, AllocateLowering, BytesAtLowering>(
+          converter, patterns.getContext(), context);
   populateBlockOutputPatterns(converter, patterns, context);
 }

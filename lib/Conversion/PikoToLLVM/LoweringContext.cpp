@@ -175,13 +175,28 @@ Value LoweringContext::query(OpBuilder &builder, Operation *op,
                                   createOffset(builder, loc, entries, 8 * dim));
 }
 
+/// The launch that is to load members of bins that are opened outside: where a
+/// device makes them, the host does not know them when it launches.
+static gpu::LaunchOp findLaunch(OpBuilder &builder, Value bins) {
+  Operation *parent = builder.getInsertionBlock()->getParentOp();
+  auto launch = dyn_cast<gpu::LaunchOp>(parent);
+  if (!launch)
+    launch = parent->getParentOfType<gpu::LaunchOp>();
+  bool isInside = launch && launch.getBody().isAncestor(bins.getParentRegion());
+  return isInside ? gpu::LaunchOp() : launch;
+}
+
 Value LoweringContext::member(OpBuilder &builder, Value bins,
                               const RuntimeMember &which) {
-  Value &known = members[{bins, which.offset}];
+  gpu::LaunchOp launch = findLaunch(builder, bins);
+  Value &known = members[{bins, launch, which.offset}];
   if (known)
     return known;
   OpBuilder::InsertionGuard guard(builder);
-  builder.setInsertionPointAfterValue(bins);
+  if (launch)
+    builder.setInsertionPointToStart(&launch.getBody().front());
+  else
+    builder.setInsertionPointAfterValue(bins);
   Location loc = bins.getLoc();
   return known = createLoad(
              builder, loc, convertType(bins.getContext(), which.type),

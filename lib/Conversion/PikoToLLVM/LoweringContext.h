@@ -127,7 +127,9 @@ private:
   /// By function and name.
   llvm::DenseMap<mlir::Operation *, llvm::StringMap<StateView>> views;
   llvm::DenseMap<mlir::Operation *, llvm::StringMap<mlir::Value>> queries;
-  llvm::DenseMap<std::pair<mlir::Value, int64_t>, mlir::Value> members;
+  llvm::DenseMap<std::tuple<mlir::Value, mlir::Operation *, int64_t>,
+                 mlir::Value>
+      members;
 };
 
 /// A pattern that uses it.

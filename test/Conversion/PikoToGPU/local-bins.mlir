@@ -14,7 +14,7 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 // CHECK:           %[[OTHER:.*]] = piko.gpu.log_of %[[LOG]] of @last
 // CHECK:             piko.storage.append %[[LOG]][0]
 // CHECK:             piko.storage.append_bin %[[LOG]][0] of @last
-// CHECK:           piko.gpu.flush %[[LOG]] using %[[CELLS]]
+// CHECK:           piko.gpu.flush %[[LOG]][%{{.*}}] using %[[CELLS]]
 // CHECK:           piko.storage.local_bin @last from %[[LOG]][0] writer %[[OTHER]] {
 // CHECK-NEXT:      ^bb0(%[[BINS:.*]]: !piko.bins<@F>):
 // CHECK-NEXT:        %[[WORD:.*]] = memref.load %[[KEPT]][%c1]

@@ -21,9 +21,9 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 // CHECK:               piko.storage.append %[[LOG]][0]
 // CHECK:               piko.storage.next %[[LOG]]
 // CHECK:             }
-// CHECK-NEXT:        piko.gpu.flush %[[LOG]] using %[[CELLS]]
+// CHECK-NEXT:        piko.gpu.flush %[[LOG]][%{{.*}}] using %[[CELLS]]
 // CHECK:           gpu.barrier
-// CHECK:           piko.gpu.flush %[[LOG]] using %[[CELLS]]
+// CHECK:           piko.gpu.flush %[[LOG]][%{{.*}}] using %[[CELLS]]
 // CHECK:         piko.gpu.close_log %[[LOG]]
 piko.pipeline @Emits rank 1 {
   piko.source @copy

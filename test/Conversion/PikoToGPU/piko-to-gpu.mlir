@@ -5,18 +5,20 @@
 piko.record @Row {"x" : i32 at 0, "y" : i32 at 4, "to" : i32 at 8} size 12 align 4
 piko.record @Pixel {"n" : i32 at 0} size 4 align 4
 
-// A block runs a unit; errors go to the log of the grid. The stage's 20 threads
-// become 16.
+// A block runs one unit after the other; errors go to the log of the grid. The
+// stage's 20 threads become 16.
 // CHECK-LABEL: piko.kernel @kernel_draw
 // CHECK:         %[[BINS:.*]] = piko.storage.open_bins @draw
-// CHECK:         %[[UNITS:.*]] = piko.storage.unit_count %[[BINS]]
+// CHECK:         %[[BLOCKS:.*]] = piko.gpu.block_count %[[BINS]] of %c8
 // CHECK:         scf.if
 // CHECK:           %[[LOG:.*]] = piko.gpu.open_log %[[BINS]]
-// CHECK:           gpu.launch blocks(%[[UNIT:[a-z0-9]+]], {{.*}}) in (%{{.*}} = %[[UNITS]], {{.*}}) threads(%[[T:[a-z0-9]+]], {{.*}}) in (%{{.*}} = %c8, %{{[^)]*}})
+// CHECK:           gpu.launch blocks(%[[FIRST:[a-z0-9]+]], {{.*}}) in (%[[STEP:[a-z0-9_]+]] = %[[BLOCKS]], {{.*}}) threads(%[[T:[a-z0-9]+]], {{.*}}) in (%{{.*}} = %c8, %{{[^)]*}})
 // CHECK-SAME:        workgroup(%{{[a-z0-9]*}} : memref<33xi64, #gpu.address_space<workgroup>>, %[[X:[a-z0-9]*]] : memref<8xi32, #gpu.address_space<workgroup>>, %[[Y:[a-z0-9]*]] : memref<8xi32, #gpu.address_space<workgroup>>, %[[SPAN:[a-z0-9]*]] : memref<8xi32, #gpu.address_space<workgroup>>, %[[ANY:[a-z0-9]*]] : memref<8xi8, #gpu.address_space<workgroup>>)
+// CHECK-NEXT:        %[[UNITS:.*]] = piko.storage.unit_count %[[BINS]]
 // Threads are 4 wide and 2 high.
 // CHECK:             %[[TX:.*]] = arith.remui %[[T]], %c4
 // CHECK:             %[[ROW:.*]] = arith.divui %[[T]], %c4
+// CHECK:             scf.for %[[UNIT:.*]] = %[[FIRST]] to %[[UNITS]] step %[[STEP]]
 // CHECK:             piko.storage.unit_cells %[[BINS]][%[[UNIT]]]
 // CHECK:             piko.storage.cell_range %[[BINS]][%[[UNIT]],
 // Each thread does the setup of one of 8 primitives, and notes which one errors
@@ -45,14 +47,16 @@ piko.record @Pixel {"n" : i32 at 0} size 4 align 4
 // CHECK:                 %[[REST:.*]] = arith.andi %{{.*}}, %c1_i32
 // CHECK:                 %[[MINE:.*]] = arith.cmpi eq, %[[REST]], %{{.*}} : i32
 // CHECK:                 scf.if %[[MINE]] {
-// CHECK:                   scf.for %[[STEP:.*]] = %c0
+// CHECK:                   scf.for %{{.*}} = %c0
 // CHECK:                     arith.muli %{{.*}}, %c4_i32
 // CHECK:                     piko.load checked @image[
 // CHECK:                     piko.store %{{.*}}, checked @image[
 // CHECK:                     piko.fail @draw in %{{.*}} outside bin of @image(
 // CHECK:               gpu.barrier
-// CHECK:             piko.gpu.flush %[[LOG]]
-// CHECK:             gpu.terminator
+// CHECK:             piko.gpu.flush %[[LOG]][%[[UNIT]]]
+// CHECK-NEXT:        gpu.barrier
+// CHECK-NEXT:      }
+// CHECK-NEXT:      gpu.terminator
 // CHECK:           piko.gpu.close_log %[[LOG]]
 // CHECK:         piko.storage.close_bins %[[BINS]]
 

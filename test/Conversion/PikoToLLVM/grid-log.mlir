@@ -5,9 +5,15 @@
 piko.record @F {"x" : i32 at 0} size 4 align 4
 
 // CHECK-LABEL: func.func private @P.kernel_start
-// CHECK:         %[[LOG:.*]] = llvm.call @pikoir_log_open
+// CHECK-SAME:        (%[[FRAME:.*]]: !llvm.ptr)
+// CHECK:         %[[BINS:.*]] = llvm.select
+// CHECK:         %[[BLOCKS:.*]] = llvm.call @pikoir_blocks(%[[FRAME]], %c0_i32, %c0_i32, %c64_i64)
+// CHECK:         %[[LOG:.*]] = llvm.call @pikoir_log_open(%[[FRAME]], %c0_i32, %c0_i32)
 // CHECK:         gpu.launch blocks(%[[BLOCK:[a-z0-9]+]], {{.*}} threads(%[[T:[a-z0-9]+]],
 // CHECK-SAME:        workgroup(%[[CELLS:[a-z0-9]+]] :
+// The host does not know how many units there are.
+// CHECK:           %[[COUNT:.*]] = llvm.getelementptr inbounds %[[BINS]][40]
+// CHECK:           llvm.load %[[COUNT]]
 // CHECK:           %[[BOX:.*]] = memref.alloca() : memref<7xi64>
 // An entry of 32 bytes: its header and the record.
 // CHECK:           %[[CURSOR:.*]] = memref.load %[[BOX]][%c1]
@@ -46,13 +52,18 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 // One reservation for the block: a header, and 16 bytes for each of these threads.
 // CHECK:             %[[SPANS:.*]] = arith.muli %[[SUMS]]#1, %c16_i64
 // CHECK:             llvm.atomicrmw add
+// Behind the unit's last directory, or as its first.
+// CHECK:               %[[UNITS:.*]] = llvm.getelementptr inbounds %[[LOG]][24]
+// CHECK:               llvm.load %[[UNITS]]
+// CHECK:               arith.muli %{{.*}}, %c16_i64
+// CHECK:               arith.select
 // CHECK:             memref.store %{{.*}}, %[[CELLS]][%c32]
 // CHECK:           gpu.barrier
 // CHECK:           scf.if %[[HAS]] {
 // CHECK:             llvm.store %[[BEGIN]]
 // CHECK:             llvm.store %[[NOW]]
 // CHECK:             memref.store %[[NOW]], %[[BOX]][%c0]
-// CHECK:         llvm.call @pikoir_log_close(%[[LOG]])
+// CHECK:         llvm.call @pikoir_log_close(%[[FRAME]], %[[LOG]])
 piko.pipeline @P rank 1 {
   piko.source @start
   piko.edge @start[0] -> @last

@@ -30,6 +30,23 @@ def Piko_OpenLogOp : Piko_GPUOp<"open_log"> {
   let assemblyFormat = "$bins attr-dict `:` qualified(type($bins))";
 }
 
+def Piko_BlockCountOp : Piko_GPUOp<"block_count"> {
+  let summary = "how many blocks run the units of work";
+  let description = [{
+    In front of the launch. None if there is nothing to do. Where the runtime does
+    not know how many units there are, as many as fill the device: a block takes
+    one unit after the other.
+
+    ```mlir
+    %blocks = piko.gpu.block_count %bins of %threads : !piko.bins<@Fragment>
+    ```
+  }];
+  let arguments = (ins Piko_BinsType:$bins, Index:$threads);
+  let results = (outs Index:$blocks);
+  let assemblyFormat =
+      "$bins `of` $threads attr-dict `:` qualified(type($bins))";
+}
+
 def Piko_CloseLogOp : Piko_GPUOp<"close_log"> {
   let summary = "gives what a grid has emitted to the runtime, unit by unit";
   let description = [{
@@ -86,14 +103,17 @@ def Piko_FlushOp : Piko_GPUOp<"flush"> {
     All threads of the block come here; it is a barrier. By one reservation in the
     log the block takes what is in the outboxes, in the order of threads: a thread's
     place follows from votes in its warp and a sum over warps, whose numbers are in
-    memory of the block, one for each warp and one more.
+    memory of the block, one for each warp and one more. It belongs to a unit of
+    work, which all of them run.
 
     ```mlir
-    piko.gpu.flush %log using %cells : memref<33xi64, 3>
+    piko.gpu.flush %log[%unit] using %cells : memref<33xi64, 3>
     ```
   }];
-  let arguments = (ins Piko_WriterType:$log, MemRefOf<[I64]>:$cells);
-  let assemblyFormat = "$log `using` $cells attr-dict `:` type($cells)";
+  let arguments = (ins Piko_WriterType:$log, Index:$unit,
+      MemRefOf<[I64]>:$cells);
+  let assemblyFormat =
+      "$log `[` $unit `]` `using` $cells attr-dict `:` type($cells)";
 }
 
 def Piko_AllocateOp : Piko_GPUOp<"allocate"> {
