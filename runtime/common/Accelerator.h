@@ -12,10 +12,13 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <string_view>
 
 namespace piko::rt {
+
+class DeviceFrame;
 
 class Accelerator {
 public:
@@ -39,6 +42,9 @@ public:
   /// `arguments` are `count` words of eight bytes.
   virtual void launch(const char *kernel, int64_t blocks, int64_t threads,
                       const void *arguments, int64_t count) = 0;
+
+  /// What records the runs of the pipeline; launches go to it meanwhile. Once.
+  virtual std::unique_ptr<DeviceFrame> makeFrame() = 0;
 };
 
 /// Whether this machine has a device of a kind: "cuda".

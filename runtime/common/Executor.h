@@ -30,6 +30,8 @@ public:
   /// Before the program runs, with grids computed: makes the state that the run
   /// needs. Throws, or sets the status.
   virtual void beginRun() = 0;
+  /// Runs the program; returns its status.
+  virtual int32_t runProgram() = 0;
   /// After it, and after any error of beginRun: frees what the run held.
   virtual void endRun() = 0;
 

@@ -454,7 +454,7 @@ int32_t pikort_run(pikort_pipeline *p) {
     p->executor->beginRun();
     if (p->status != PIKORT_OK)
       return;
-    int32_t status = p->runProgram(p);
+    int32_t status = p->executor->runProgram();
     p->settle();
     if (status != PIKORT_OK && p->status == PIKORT_OK)
       throw Failure{PIKORT_BAD_PROGRAM, "pipeline " + quoted(p->name) +

@@ -24,6 +24,8 @@ int32_t CPUExecutor::defaultThreads() const {
 }
 
 void CPUExecutor::prepare() {
+  if (p.accelerator)
+    frame = p.accelerator->makeFrame();
   auto make = [&](int32_t stage, int32_t source) {
     auto kernel = std::make_unique<Kernel>();
     kernel->stage = stage;
@@ -56,6 +58,43 @@ void CPUExecutor::beginRun() {
   if (p.status != PIKORT_OK)
     return;
   activeThreads = p.threads;
+  startCycles(p);
+  startStrips(p);
+}
+
+int32_t CPUExecutor::runProgram() {
+  if (!frame || !frame->begin())
+    return p.runProgram(&p);
+  using Outcome = DeviceFrame::Outcome;
+  Outcome outcome = Outcome::Done;
+  guarded(&p, "run", [&] {
+    int32_t status = p.runProgram(&p);
+    if (status == PIKORT_OK && p.settle() == PIKORT_OK)
+      outcome = frame->finish();
+  });
+  frame->end();
+  if (outcome == Outcome::Done || p.status != PIKORT_OK)
+    return p.status;
+  restartRun();
+  int32_t status = p.runProgram(&p);
+  if (status == PIKORT_OK && p.settle() == PIKORT_OK &&
+      outcome == Outcome::Spoilt)
+    throw Failure{PIKORT_OUT_OF_MEMORY,
+                  "pipeline " + quoted(p.name) +
+                      ": out of memory on the device, and what it kept from "
+                      "the run before is lost"};
+  return status;
+}
+
+void CPUExecutor::restartRun() {
+  for (auto *list : {&kernels, &sourceKernels})
+    for (std::unique_ptr<Kernel> &kernel : *list)
+      if (kernel)
+        kernel->clear();
+  endStrips(p);
+  endCycles(p);
+  cleared.assign(p.stages.size(), false);
+  refillMirrors(p);
   startCycles(p);
   startStrips(p);
 }

@@ -9,6 +9,7 @@
 #ifndef PIKO_RUNTIME_CPU_CPUEXECUTOR_H
 #define PIKO_RUNTIME_CPU_CPUEXECUTOR_H
 
+#include "common/DeviceFrame.h"
 #include "common/Pipeline.h"
 
 namespace piko::rt {
@@ -26,7 +27,10 @@ struct CPUExecutor final : Executor {
   int32_t defaultThreads() const override;
   void prepare() override;
   void beginRun() override;
+  int32_t runProgram() override;
   void endRun() override;
+  /// Begins the run anew, on what it began with.
+  void restartRun();
   bool reportsInOrder() const override { return checker != nullptr; }
   void noteError() override;
   std::string describe(int32_t code, const std::string &plain) const override;
@@ -36,7 +40,8 @@ struct CPUExecutor final : Executor {
   std::vector<std::unique_ptr<Kernel>> kernels; ///< Of stages.
   /// Of sources; null where the consumer is not placed.
   std::vector<std::unique_ptr<Kernel>> sourceKernels;
-  std::unique_ptr<Checker> checker; ///< In checking mode.
+  std::unique_ptr<Checker> checker;   ///< In checking mode.
+  std::unique_ptr<DeviceFrame> frame; ///< With an accelerator.
 
   // Of a run:
   std::vector<std::unique_ptr<Cycle>> cycles;
@@ -76,6 +81,12 @@ inline Strips *stripsOf(const pikort_pipeline &p, const Stage &stage) {
 }
 
 /// In checking mode, what checks; else null.
+/// What records the run, if the device takes it as a whole.
+inline DeviceFrame *recordingOf(const pikort_pipeline &p) {
+  DeviceFrame *frame = cpuOf(p).frame.get();
+  return frame && frame->isRecording() ? frame : nullptr;
+}
+
 inline Checker *checkerOf(const pikort_pipeline &p) {
   return cpuOf(p).checker.get();
 }

@@ -164,6 +164,14 @@ struct InputMirrors {
   Array<uint32_t> order;
   Array<pikoir_unit> units;
   Array<pikoir_call> calls;
+  Array<pikoir_input> input; ///< What generated code sees, from run to run.
+
+  void clear() {
+    items = {};
+    order = {};
+    units = {};
+    calls = {};
+  }
 };
 
 class Serial;         // Serial.h

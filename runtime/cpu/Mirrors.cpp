@@ -44,6 +44,12 @@ void piko::rt::beginMirrors(pikort_pipeline &p) {
     }
 }
 
+void piko::rt::refillMirrors(pikort_pipeline &p) {
+  for (State &state : p.states)
+    if (state.hosts)
+      copy(p, state.mirror.data(), state.hosts, bytesOf(p, state));
+}
+
 void piko::rt::endMirrors(pikort_pipeline &p) {
   for (State &state : p.states)
     if (state.hosts) {
@@ -73,6 +79,15 @@ void piko::rt::shareUnits(pikort_pipeline &p, Kernel &kernel) {
   pikoir_input &input = kernel.input;
   if (p.accelerator)
     share(p, kernel.mirrors.units, input.units, input.unit_count);
+}
+
+void piko::rt::shareHeader(pikort_pipeline &p, Kernel &kernel) {
+  if (!p.accelerator)
+    return;
+  Array<pikoir_input> &shared = kernel.mirrors.input;
+  if (!shared)
+    shared = Array<pikoir_input>(p.memory, 1, Use::State);
+  shared[0] = kernel.input;
 }
 
 void piko::rt::shareInput(pikort_pipeline &p, Kernel &kernel,

@@ -11,11 +11,14 @@ namespace piko::rt {
 /// Where kernels run on an accelerator: copies constants, bound buffers and
 /// sources to memory that it shares, which takes their place; throws.
 void beginMirrors(pikort_pipeline &p);
+/// Copies bound buffers again, which kernels may have changed.
+void refillMirrors(pikort_pipeline &p);
 /// Puts the host's memory back, with what kernels have written.
 void endMirrors(pikort_pipeline &p);
 
 /// Lets an accelerator read a kernel's units, or all of its input, whose
 /// primitives are those of `from`; throws.
+void shareHeader(pikort_pipeline &p, Kernel &kernel);
 void shareUnits(pikort_pipeline &p, Kernel &kernel);
 void shareInput(pikort_pipeline &p, Kernel &kernel, const Items &from);
 

@@ -27,7 +27,7 @@ void Kernel::clear() {
   keys = {};
   counts.clear();
   units.clear();
-  mirrors = {};
+  mirrors.clear();
   for (auto &lane : lanes)
     lane->clear();
   firstRound = true;
@@ -187,7 +187,11 @@ static const pikoir_input *begin(pikort_pipeline &p, Kernel &kernel) {
   else
     kernel.begun =
         p.profile.enter(code == PIKORT_OK ? Part::Kernel : Part::Program);
-  return code == PIKORT_OK ? &kernel.input : nullptr;
+  if (code == PIKORT_OK)
+    code = guarded(&p, nameOf(p, kernel), [&] { shareHeader(p, kernel); });
+  return code != PIKORT_OK ? nullptr
+         : p.accelerator   ? kernel.mirrors.input.data()
+                           : &kernel.input;
 }
 
 /// Counts what a launch over threads emitted and how long they waited, and
@@ -291,9 +295,24 @@ static void fail(pikort_pipeline &p, KernelError found) {
   p.report(found);
 }
 
+/// The input of a kernel that the device begins itself.
+static const pikoir_input *record(pikort_pipeline &p, int32_t number,
+                                  bool isSource) {
+  const pikoir_input *input = nullptr;
+  if (p.status == PIKORT_OK)
+    guarded(&p, "run", [&] {
+      input = cpuOf(p).frame->join(number, isSource);
+      if (!isSource)
+        cpuOf(p).cleared[static_cast<size_t>(number)] = true;
+    });
+  return input;
+}
+
 extern "C" {
 
 const pikoir_input *pikoir_begin(pikort_pipeline *p, int32_t stage) {
+  if (recordingOf(*p))
+    return record(*p, stage, /*isSource=*/false);
   Kernel *kernel = find(p, cpuOf(*p).kernels, stage, "stage");
   if (Checker *checker = checkerOf(*p); kernel && checker)
     checker->beginStage(stage);
@@ -301,6 +320,8 @@ const pikoir_input *pikoir_begin(pikort_pipeline *p, int32_t stage) {
 }
 
 int32_t pikoir_end(pikort_pipeline *p, int32_t stage) {
+  if (recordingOf(*p))
+    return p->status.load();
   Kernel *kernel = find(p, cpuOf(*p).kernels, stage, "stage");
   if (Checker *checker = checkerOf(*p))
     checker->endStage();
@@ -308,11 +329,15 @@ int32_t pikoir_end(pikort_pipeline *p, int32_t stage) {
 }
 
 const pikoir_input *pikoir_begin_source(pikort_pipeline *p, int32_t source) {
+  if (recordingOf(*p))
+    return record(*p, source, /*isSource=*/true);
   Kernel *kernel = find(p, cpuOf(*p).sourceKernels, source, "placed source");
   return kernel ? begin(*p, *kernel) : nullptr;
 }
 
 int32_t pikoir_end_source(pikort_pipeline *p, int32_t source) {
+  if (recordingOf(*p))
+    return p->status.load();
   Kernel *kernel = find(p, cpuOf(*p).sourceKernels, source, "placed source");
   return kernel ? end(*p, *kernel) : p->status.load();
 }

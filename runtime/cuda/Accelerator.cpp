@@ -3,6 +3,7 @@
 
 #include "cuda/Accelerator.h"
 #include "common/Pipeline.h"
+#include "cuda/JoinKernels.h"
 #include "pikort/grid.h"
 
 #include <algorithm>
@@ -13,10 +14,11 @@ using piko::rt::Failure;
 Accelerator::Accelerator(pikort_pipeline &p, const char *ptx)
     : p_(p), ptx_(ptx), device_(Device::open()) {
   device_->check(device_->enter(), "entering its context");
-  residentThreads_ =
-      int64_t(device_->attribute(
-          CU_DEVICE_ATTRIBUTE_MAX_THREADS_PER_MULTIPROCESSOR)) *
-      device_->attribute(CU_DEVICE_ATTRIBUTE_MULTIPROCESSOR_COUNT);
+  int processors = device_->attribute(CU_DEVICE_ATTRIBUTE_MULTIPROCESSOR_COUNT);
+  residentThreads_ = int64_t(device_->attribute(
+                         CU_DEVICE_ATTRIBUTE_MAX_THREADS_PER_MULTIPROCESSOR)) *
+                     processors;
+  joinBlocks_ = std::min<int64_t>(processors, mostJoinBlocks);
   device_->check(
       device_->driver.cuStreamCreate(&stream_, CU_STREAM_NON_BLOCKING),
       "creating a stream");
@@ -27,10 +29,13 @@ Accelerator::~Accelerator() {
   device_->enter();
   if (!log_.empty())
     unmap(log_.data());
-  if (module_)
-    driver.cuModuleUnload(module_);
+  for (CUmodule module : {module_, joins_})
+    if (module)
+      driver.cuModuleUnload(module);
   if (stream_)
     driver.cuStreamDestroy(stream_);
+  if (progress_)
+    driver.cuMemFreeHost(progress_);
 }
 
 // --- Memory ------------------------------------------------------------------
@@ -80,54 +85,113 @@ void Accelerator::clearLog(std::span<uint8_t> part) noexcept {
 
 // --- Kernels -----------------------------------------------------------------
 
-void Accelerator::loadModule() {
+bool Accelerator::canWaitInGrids() const {
+  return device_->attribute(CU_DEVICE_ATTRIBUTE_COOPERATIVE_LAUNCH) != 0;
+}
+
+std::unique_ptr<piko::rt::DeviceFrame> Accelerator::makeFrame() {
+  auto frame = std::make_unique<Frame>(p_, *this);
+  frame_ = frame.get();
+  return frame;
+}
+
+void Accelerator::loadModules() {
+  if (!joins_)
+    joins_ = load(joinKernels);
+  if (!module_)
+    module_ = load(ptx_);
+}
+
+CUmodule Accelerator::load(const char *ptx) {
   char log[8192] = "";
   CUjit_option options[] = {CU_JIT_ERROR_LOG_BUFFER,
                             CU_JIT_ERROR_LOG_BUFFER_SIZE_BYTES};
   void *values[] = {log, reinterpret_cast<void *>(sizeof(log))};
+  CUmodule module = nullptr;
   CUresult result =
-      device_->driver.cuModuleLoadDataEx(&module_, ptx_, 2, options, values);
+      device_->driver.cuModuleLoadDataEx(&module, ptx, 2, options, values);
   std::string text = log;
   while (!text.empty() && (text.back() == '\n' || text.back() == ' '))
     text.pop_back();
   device_->check(result, "loading the kernels" +
                              (text.empty() ? "" : " (" + text + ")"));
+  return module;
 }
 
-CUfunction Accelerator::find(const char *kernel) {
+CUfunction Accelerator::find(const std::string &kernel) {
   auto [found, isNew] = functions_.try_emplace(kernel, nullptr);
   if (isNew) {
-    CUresult result =
-        device_->driver.cuModuleGetFunction(&found->second, module_, kernel);
+    CUmodule module = kernel.starts_with("piko_") ? joins_ : module_;
+    CUresult result = device_->driver.cuModuleGetFunction(
+        &found->second, module, kernel.c_str());
     if (result != CUDA_SUCCESS)
       functions_.erase(kernel);
-    device_->check(result, std::string("finding kernel '") + kernel + "'");
+    device_->check(result, "finding kernel '" + kernel + "'");
   }
   return found->second;
 }
 
 void Accelerator::launch(const char *kernel, int64_t blocks, int64_t threads,
                          const void *arguments, int64_t count) {
-  device_->check(device_->enter(), "entering its context");
-  if (!module_)
-    loadModule();
-  CUfunction function = find(kernel);
-  if (blocks > INT32_MAX)
-    throw Failure{PIKORT_TOO_MANY, std::string("kernel '") + kernel +
+  const auto *words = static_cast<const int64_t *>(arguments);
+  GridLaunch grid{kernel, blocks, threads, {words, words + count}, false};
+  if (frame_ && frame_->isRecording())
+    return frame_->launch(std::move(grid));
+  submit({&grid, 1}, {});
+}
+
+void Accelerator::launch(const GridLaunch &grid) {
+  if (grid.blocks > INT32_MAX)
+    throw Failure{PIKORT_TOO_MANY, "kernel '" + grid.kernel +
                                        "': expected at most 2147483647 blocks, "
                                        "but got " +
-                                       std::to_string(blocks)};
-  std::vector<void *> places(static_cast<size_t>(count));
-  for (size_t i = 0; i < places.size(); ++i)
-    places[i] =
-        const_cast<int64_t *>(static_cast<const int64_t *>(arguments) + i);
-  std::string doing = std::string("running kernel '") + kernel + "'";
-  device_->check(device_->driver.cuLaunchKernel(
-                     function, static_cast<unsigned>(blocks), 1, 1,
-                     static_cast<unsigned>(threads), 1, 1, /*sharedBytes=*/0,
-                     stream_, places.data(), nullptr),
-                 doing);
-  device_->check(device_->driver.cuStreamSynchronize(stream_), doing);
+                                       std::to_string(grid.blocks)};
+  CUfunction function = find(grid.kernel);
+  std::vector<void *> places;
+  for (const int64_t &word : grid.arguments)
+    places.push_back(const_cast<int64_t *>(&word));
+  auto blocks = static_cast<unsigned>(grid.blocks),
+       threads = static_cast<unsigned>(grid.threads);
+  const Driver &driver = device_->driver;
+  CUresult result =
+      grid.isJoin
+          ? driver.cuLaunchCooperativeKernel(function, blocks, 1, 1, threads, 1,
+                                             1, /*sharedBytes=*/0, stream_,
+                                             places.data())
+          : driver.cuLaunchKernel(function, blocks, 1, 1, threads, 1, 1,
+                                  /*sharedBytes=*/0, stream_, places.data(),
+                                  nullptr);
+  device_->check(result, "running kernel '" + grid.kernel + "'");
+}
+
+void Accelerator::submit(std::span<const GridLaunch> grids,
+                         std::span<uint8_t> clear) {
+  device_->check(device_->enter(), "entering its context");
+  loadModules();
+  clearLog(clear);
+  for (const GridLaunch &grid : grids)
+    launch(grid);
+  CUresult result = device_->driver.cuStreamSynchronize(stream_);
+  if (result != CUDA_SUCCESS)
+    device_->check(result, "running kernel '" + findFailed(grids) + "'");
+}
+
+std::string Accelerator::findFailed(std::span<const GridLaunch> grids) const {
+  auto at = static_cast<size_t>(
+      progress_ ? *static_cast<volatile int64_t *>(progress_) : 0);
+  return grids[std::min(at, grids.size() - 1)].kernel;
+}
+
+int64_t *Accelerator::progress() {
+  if (!progress_) {
+    void *memory = nullptr;
+    device_->check(device_->enter(), "entering its context");
+    device_->check(device_->driver.cuMemAllocHost(&memory, sizeof(int64_t)),
+                   "allocating memory of the host");
+    progress_ = static_cast<int64_t *>(memory);
+  }
+  *progress_ = 0;
+  return progress_;
 }
 
 // --- What generated code calls ----------------------------------------------

@@ -11,6 +11,7 @@
 
 #include "common/Accelerator.h"
 #include "cuda/Device.h"
+#include "cuda/Frame.h"
 
 #include <string>
 #include <unordered_map>
@@ -33,19 +34,36 @@ public:
   int64_t residentThreads() const override { return residentThreads_; }
   void launch(const char *kernel, int64_t blocks, int64_t threads,
               const void *arguments, int64_t count) override;
+  std::unique_ptr<rt::DeviceFrame> makeFrame() override;
+
+  /// Whether blocks of a grid can wait for each other, as joins do.
+  bool canWaitInGrids() const;
+  /// Blocks of a join, all of which are resident.
+  int64_t joinBlocks() const { return joinBlocks_; }
+  /// Runs grids one after the other, behind making a part of the log zero
+  /// again, and waits for them; throws.
+  void submit(std::span<const GridLaunch> grids, std::span<uint8_t> clear);
+  /// Memory of the host in which joins say how far a submission is; throws.
+  int64_t *progress();
 
 private:
-  void loadModule();
-  CUfunction find(const char *kernel);
+  void loadModules();
+  CUmodule load(const char *ptx);
+  CUfunction find(const std::string &kernel);
+  void launch(const GridLaunch &grid);
+  /// The kernel of a submission that failed, as far as it is known.
+  std::string findFailed(std::span<const GridLaunch> grids) const;
 
   pikort_pipeline &p_;
   const char *ptx_;
   std::shared_ptr<Device> device_;
   CUstream stream_ = nullptr;
-  CUmodule module_ = nullptr;
+  CUmodule module_ = nullptr, joins_ = nullptr;
   std::unordered_map<std::string, CUfunction> functions_;
   std::span<uint8_t> log_;
-  int64_t residentThreads_ = 0;
+  int64_t *progress_ = nullptr;
+  int64_t residentThreads_ = 0, joinBlocks_ = 0;
+  Frame *frame_ = nullptr; ///< The executor's, which ends first.
 };
 
 } // namespace piko::cuda

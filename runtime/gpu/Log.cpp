@@ -27,6 +27,13 @@ static constexpr int64_t spareRoom = int64_t(1) << 26;
 static_assert(sizeof(pikoir_entry) == 16 && sizeof(pikoir_piece) == 64,
               "as generated code has it");
 
+/// Of what units have, in a multiple of what pieces are aligned to.
+static int64_t tableBytes(int64_t units) {
+  constexpr int64_t align = sizeof(pikoir_piece);
+  int64_t bytes = units * static_cast<int64_t>(sizeof(pikoir_unit_log));
+  return (bytes + align - 1) / align * align;
+}
+
 namespace {
 
 struct Place {
@@ -43,21 +50,21 @@ struct Head : pikoir_log {
 };
 
 struct GridLog {
-  GridLog(pikort_pipeline &p, int32_t number, bool isSource, int64_t units);
+  GridLog(pikort_pipeline &p, Kernel &kernel, int32_t number, bool isSource);
   GridLog(const GridLog &) = delete;
   GridLog &operator=(const GridLog &) = delete;
   ~GridLog() {
     if (!pipeline.accelerator && !room.empty())
       munmap(room.data(), room.size());
     else if (head && pipeline.status != PIKORT_DEVICE_FAILED)
-      pipeline.accelerator->clearLog(usedPieces());
+      pipeline.accelerator->clearLog(used());
   }
 
   void close();
-  std::span<uint8_t> usedPieces() const {
-    int64_t begin = head->spare + spareRoom;
-    return {reinterpret_cast<uint8_t *>(begin),
-            static_cast<size_t>(std::min(head->cursor, head->limit) - begin)};
+  std::span<uint8_t> used() const {
+    return {
+        reinterpret_cast<uint8_t *>(head->units),
+        static_cast<size_t>(std::min(head->cursor, head->limit) - head->units)};
   }
 
   pikort_pipeline &pipeline;
@@ -73,8 +80,8 @@ private:
 
   static std::span<uint8_t> mapRoom();
 
-  /// What each unit has.
-  std::vector<Spans> collect() const;
+  /// What a unit has.
+  Spans collect(int64_t unit) const;
   void replayUnit(int64_t unit, const Spans &spans);
   void replay(pikoir_writer *writer, const pikoir_entry &entry);
   void fail(const pikoir_entry &entry);
@@ -83,16 +90,18 @@ private:
 
 } // namespace
 
-GridLog::GridLog(pikort_pipeline &p, int32_t number, bool isSource,
-                 int64_t units)
-    : pipeline(p), number(number), isSource(isSource), units(units),
+GridLog::GridLog(pikort_pipeline &p, Kernel &kernel, int32_t number,
+                 bool isSource)
+    : pipeline(p), number(number), isSource(isSource),
+      units(kernel.input.unit_count),
       room(p.accelerator ? p.accelerator->logSpace() : mapRoom()) {
   if (room.empty())
     throw OutOfMemory{static_cast<int64_t>(leastRoom)};
   head = new (room.data()) Head;
   auto begin = reinterpret_cast<int64_t>(room.data());
   head->spare = begin + headRoom;
-  head->cursor = begin + headRoom + spareRoom;
+  head->units = head->spare + spareRoom; // zero, as all behind the spare room
+  head->cursor = head->units + tableBytes(units);
   head->limit = begin + static_cast<int64_t>(room.size());
   head->log = this;
 }
@@ -107,16 +116,15 @@ std::span<uint8_t> GridLog::mapRoom() {
   return {};
 }
 
-std::vector<GridLog::Spans> GridLog::collect() const {
-  std::vector<Spans> found(static_cast<size_t>(units));
-  for (int64_t at = head->spare + spareRoom; at < head->cursor;) {
+GridLog::Spans GridLog::collect(int64_t unit) const {
+  Spans found;
+  int64_t at =
+      reinterpret_cast<const pikoir_unit_log *>(head->units)[unit].first;
+  while (at != 0) {
     const auto *piece = reinterpret_cast<const pikoir_piece *>(at);
     const auto *first = reinterpret_cast<const pikoir_span *>(piece + 1);
-    if (piece->kind == PIKOIR_PIECE_DIRECTORY) {
-      Spans &spans = found[static_cast<size_t>(piece->unit)];
-      spans.insert(spans.end(), first, first + piece->spans);
-    }
-    at += piece->bytes;
+    found.insert(found.end(), first, first + piece->spans);
+    at = piece->next;
   }
   return found;
 }
@@ -207,25 +215,43 @@ void GridLog::close() {
     return pipeline.report({0, PIKORT_OUT_OF_MEMORY,
                             isSource ? pipeline.sources[number].stage : number,
                             head->cursor - head->limit, 0, 0});
-  std::vector<Spans> found = collect();
   for (int64_t unit = 0; unit < units; ++unit)
-    replayUnit(unit, found[static_cast<size_t>(unit)]);
+    replayUnit(unit, collect(unit));
+}
+
+/// Of a stage, or of a source.
+static Kernel &findKernel(pikort_pipeline &p, int32_t number, int32_t flags) {
+  return flags & PIKOIR_LOG_SOURCE
+             ? *cpuOf(p).sourceKernels[static_cast<size_t>(number)]
+             : kernelOf(p, number);
 }
 
 extern "C" {
 
-pikoir_log *pikoir_log_open(pikort_pipeline *p, int32_t number, int32_t flags,
-                            int64_t units) {
+int64_t pikoir_blocks(pikort_pipeline *p, int32_t number, int32_t flags,
+                      int64_t threads) {
+  if (p->status != PIKORT_OK)
+    return 0;
+  if (DeviceFrame *frame = recordingOf(*p))
+    return frame->blocks(number, flags & PIKOIR_LOG_SOURCE, threads);
+  return findKernel(*p, number, flags).input.unit_count;
+}
+
+pikoir_log *pikoir_log_open(pikort_pipeline *p, int32_t number, int32_t flags) {
   GridLog *log = nullptr;
+  if (DeviceFrame *frame = recordingOf(*p))
+    return frame->log(number, flags & PIKOIR_LOG_SOURCE);
   guarded(p, "run", [&] {
-    log = new GridLog(*p, number, (flags & PIKOIR_LOG_SOURCE) != 0, units);
+    log = new GridLog(*p, findKernel(*p, number, flags), number,
+                      (flags & PIKOIR_LOG_SOURCE) != 0);
   });
   return log ? log->head : nullptr;
 }
 
-void pikoir_log_place(pikoir_log *log, int32_t place, int32_t function,
-                      int32_t stage, const char *name, int32_t code) {
-  if (!log)
+void pikoir_log_place(pikort_pipeline *p, pikoir_log *log, int32_t place,
+                      int32_t function, int32_t stage, const char *name,
+                      int32_t code) {
+  if (!log || recordingOf(*p))
     return;
   auto &places = static_cast<Head *>(log)->log->places;
   if (places.size() <= static_cast<size_t>(place))
@@ -233,8 +259,8 @@ void pikoir_log_place(pikoir_log *log, int32_t place, int32_t function,
   places[static_cast<size_t>(place)] = {function, stage, name, code};
 }
 
-void pikoir_log_close(pikoir_log *log) {
-  if (!log)
+void pikoir_log_close(pikort_pipeline *p, pikoir_log *log) {
+  if (!log || recordingOf(*p))
     return;
   GridLog *grid = static_cast<Head *>(log)->log;
   guarded(&grid->pipeline, "run", [&] { grid->close(); });

@@ -16,30 +16,38 @@ using namespace piko::cuda;
 
 namespace {
 
-// out[i] = items[i] * factor, for the positions of a unit a block.
+// out[i] = items[i] * factor, for the positions of a block's units.
 const char *const goodPTX = R"(
 .version 6.0
 .target sm_70
 .address_size 64
 
 .visible .entry scale(
-  .param .u64 units,
-  .param .u64 items,
+  .param .u64 input,
   .param .u64 out,
   .param .u64 factor
 )
 .maxntid 32, 1, 1
 {
-  .reg .pred %p<2>;
-  .reg .b32 %r<6>;
-  .reg .b64 %rd<14>;
+  .reg .pred %p<3>;
+  .reg .b32 %r<7>;
+  .reg .b64 %rd<18>;
 
-  ld.param.u64 %rd1, [units];
-  ld.param.u64 %rd2, [items];
+  ld.param.u64 %rd14, [input];
   ld.param.u64 %rd3, [out];
   ld.param.u64 %rd4, [factor];
+  ld.global.u64 %rd2, [%rd14];
+  ld.global.u64 %rd1, [%rd14+32];
+  ld.global.u64 %rd15, [%rd14+40];
   mov.u32 %r1, %ctaid.x;
-  mul.wide.u32 %rd5, %r1, 40;
+  cvt.u64.u32 %rd16, %r1;
+  mov.u32 %r6, %nctaid.x;
+  cvt.u64.u32 %rd17, %r6;
+unit:
+  setp.ge.s64 %p2, %rd16, %rd15;
+  @%p2 bra done;
+  mul.lo.s64 %rd5, %rd16, 40;
+  add.s64 %rd16, %rd16, %rd17;
   add.s64 %rd6, %rd1, %rd5;
   ld.global.u64 %rd7, [%rd6+16];
   ld.global.u64 %rd8, [%rd6+24];
@@ -49,7 +57,7 @@ const char *const goodPTX = R"(
   add.s64 %rd10, %rd7, %rd9;
 next:
   setp.ge.s64 %p1, %rd10, %rd8;
-  @%p1 bra done;
+  @%p1 bra unit;
   shl.b64 %rd11, %rd10, 2;
   add.s64 %rd12, %rd2, %rd11;
   ld.global.u32 %r4, [%rd12];
@@ -87,13 +95,15 @@ int32_t run(pikort_pipeline *p) {
   const pikoir_input *in = pikoir_begin(p, 0);
   if (!in)
     return pikoir_status(p);
-  pikoir_log *log = pikoir_log_open(p, 0, 0, in->unit_count);
+  int64_t blocks = pikoir_blocks(p, 0, 0, 32);
+  pikoir_log *log = pikoir_log_open(p, 0, 0);
   int32_t local[64] = {};
-  const void *arguments[] = {
-      in->units, strayPointer ? reinterpret_cast<uint8_t *>(local) : in->items,
-      pikoir_get_state(p, 1)->data, pikoir_get_state(p, 0)->data};
-  pikoir_cuda_launch(p, kernel, in->unit_count, 32, arguments, 4);
-  pikoir_log_close(log);
+  const void *arguments[] = {in,
+                             strayPointer ? reinterpret_cast<uint8_t *>(local)
+                                          : pikoir_get_state(p, 1)->data,
+                             pikoir_get_state(p, 0)->data};
+  pikoir_cuda_launch(p, kernel, blocks, 32, arguments, 3);
+  pikoir_log_close(p, log);
   return pikoir_end(p, 0);
 }
 

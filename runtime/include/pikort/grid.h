@@ -2,11 +2,12 @@
  *
  * What the host's code of a kernel for a GPU calls, and what a grid leaves.
  *
- *   pikoir_log *log = pikoir_log_open(p, stage);
- *   pikoir_log_place(log, i, ...);               // for each place that can
- * fail
- *   ... launch a block for each unit; blocks take memory of the log ...
- *   pikoir_log_close(log);
+ *   blocks = pikoir_blocks(p, stage, 0, threads); // none: nothing to do
+ *   pikoir_log *log = pikoir_log_open(p, stage, 0);
+ *   pikoir_log_place(p, log, i, ...); // for each place that can fail
+ *   ... launch: block b of n runs the units b, b + n, ..; blocks take memory of
+ *   the log ...
+ *   pikoir_log_close(p, log);
  *
  * Memory is taken by adding to `cursor`, in pieces that begin with their
  * length. Threads put entries into pieces of their own, their outboxes; now and
@@ -48,13 +49,19 @@ typedef struct pikoir_piece {
   int64_t bytes; ///< With the header.
   int64_t kind;
   int64_t unit, spans;
-  int64_t reserved[4];
+  int64_t next; ///< The unit's directory behind this one: its address, or 0.
+  int64_t reserved[3];
 } pikoir_piece;
 
 /// Entries of a thread, from an address to another.
 typedef struct pikoir_span {
   int64_t begin, end;
 } pikoir_span;
+
+/// The directories of a unit: addresses, or 0.
+typedef struct pikoir_unit_log {
+  int64_t first, last;
+} pikoir_unit_log;
 
 /// What a thread has of an outbox, in words of eight bytes.
 enum {
@@ -85,12 +92,19 @@ typedef struct pikoir_log {
   int64_t cursor; ///< An address.
   int64_t limit;
   int64_t spare;
+  int64_t units;  ///< The address of a pikoir_unit_log for each unit.
+  int64_t errors; ///< Not 0: there are entries that are errors.
 } pikoir_log;
+
+/// How many blocks of so many threads run the units of a stage's kernel, or,
+/// with PIKOIR_LOG_SOURCE, of a source's: between its begin and its end.
+PIKORT_API int64_t pikoir_blocks(pikort_pipeline *p, int32_t number,
+                                 int32_t flags, int64_t threads);
 
 /// The log of a stage's kernel, or, with PIKOIR_LOG_SOURCE, of a source's; null
 /// if the run has failed, and then so does its launch.
 PIKORT_API pikoir_log *pikoir_log_open(pikort_pipeline *p, int32_t number,
-                                       int32_t flags, int64_t units);
+                                       int32_t flags);
 #define PIKOIR_LOG_SOURCE 1
 
 /// What an error at a place is: a call of `function` with these arguments.
@@ -99,11 +113,11 @@ enum {
   PIKOIR_PLACE_INDEX = 1,
   PIKOIR_PLACE_BARRIER = 2
 };
-PIKORT_API void pikoir_log_place(pikoir_log *log, int32_t place,
-                                 int32_t function, int32_t stage,
+PIKORT_API void pikoir_log_place(pikort_pipeline *p, pikoir_log *log,
+                                 int32_t place, int32_t function, int32_t stage,
                                  const char *name, int32_t code);
 /// Gives all entries to the runtime in order, as units would; frees the log.
-PIKORT_API void pikoir_log_close(pikoir_log *log);
+PIKORT_API void pikoir_log_close(pikort_pipeline *p, pikoir_log *log);
 
 /// Runs `thread(arguments)` for all threads of all blocks, on a device that the
 /// calling thread plays. Not 0: `seed` permutes the blocks.

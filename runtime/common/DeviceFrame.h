@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//===- DeviceFrame.h - A run without the host between kernels -------------===//
+//
+// While a frame records, the program's launches are noted, and between them
+// joins on the device; nothing runs. Then all of it is submitted at once. What
+// comes out of a kernel is known to the device alone.
+//
+//===----------------------------------------------------------------------===//
+
+#ifndef PIKO_RUNTIME_COMMON_DEVICEFRAME_H
+#define PIKO_RUNTIME_COMMON_DEVICEFRAME_H
+
+#include "pikort/abi.h"
+#include "pikort/grid.h"
+
+namespace piko::rt {
+
+class DeviceFrame {
+public:
+  virtual ~DeviceFrame() = default;
+
+  /// Begins to record a run; false if the pipeline, or this run of it, needs
+  /// the host between its kernels. Throws.
+  virtual bool begin() = 0;
+  virtual bool isRecording() const = 0;
+  /// The input of a stage's kernel, or of a source's, for the device to read;
+  /// throws.
+  virtual const pikoir_input *join(int32_t number, bool isSource) = 0;
+  virtual int64_t blocks(int32_t number, bool isSource,
+                         int64_t threads) const = 0;
+  virtual pikoir_log *log(int32_t number, bool isSource) = 0;
+  /// Sets an image, or a buffer that is sized by a source, to its clear value.
+  virtual void clear(int32_t state) = 0;
+  enum class Outcome {
+    Done,
+    Repeat, ///< Memory or a rule: the host is to take the run step by step.
+    Spoilt  ///< The same, but state that was to stay has changed.
+  };
+  /// Submits what was recorded and waits for it; throws.
+  virtual Outcome finish() = 0;
+  /// Ends what begin() began, whatever has happened.
+  virtual void end() noexcept = 0;
+};
+
+} // namespace piko::rt
+
+#endif // PIKO_RUNTIME_COMMON_DEVICEFRAME_H

@@ -1,0 +1,285 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//===- Frame.cpp - A pipeline's frame as one submission -------------------===//
+
+#include "cuda/Frame.h"
+#include "cuda/Accelerator.h"
+
+#include <algorithm>
+#include <cstring>
+
+using namespace piko::cuda;
+using namespace piko::rt;
+
+/// In front of what grids take of the log: see gpu/Log.cpp.
+static constexpr int64_t headRoom = 64, spareRoom = int64_t(1) << 26;
+
+// --- What runs without the host ---------------------------------------------
+
+bool Frame::isPossible() const {
+  if (needsHost_ || !device_.canWaitInGrids() ||
+      p_.executor->reportsInOrder() || p_.unitReport || p_.memory.limit() > 0 ||
+      p_.memory.budget() > 0)
+    return false;
+  for (const Stage &stage : p_.stages)
+    if (stage.cycle >= 0 || stage.loop >= 0 ||
+        stage.clears.size() > mostJoinClears ||
+        stage.inputs.size() + stage.sources.size() > mostJoinInputs)
+      return false;
+  for (const Edge &edge : p_.edges)
+    if (edge.keyed() && p_.stages[edge.producer].host >= 0)
+      return false;
+  return std::none_of(p_.stripGroups.begin(), p_.stripGroups.end(),
+                      [](const StripGroup &group) { return group.chunk > 0; });
+}
+
+bool Frame::begin() {
+  if (!isPossible())
+    return false;
+  if (!places_)
+    takeMemory();
+  std::memset(places_.data(), 0,
+              static_cast<size_t>(places_.size()) * sizeof(Place));
+  launches_.clear();
+  last_ = nullptr;
+  isCleared_.assign(p_.states.size(), false);
+  for (size_t s = 0; s < p_.sources.size(); ++s)
+    if (p_.stages[p_.sources[s].stage].placed())
+      describeSource(find(static_cast<int32_t>(s), true).args,
+                     static_cast<int32_t>(s));
+  for (size_t s = 0; s < p_.stages.size(); ++s)
+    describeStage(find(static_cast<int32_t>(s), false).args, p_.stages[s]);
+  isRecording_ = true;
+  return true;
+}
+
+void Frame::takeMemory() {
+  int64_t clearBytes = 0;
+  for (const State &state : p_.states) {
+    clearOffsets_[&state] = clearBytes;
+    clearBytes += (p_.records[state.record].size + 15) / 16 * 16;
+  }
+  frame_ = Array<FrameState>(p_.memory, 1, Use::State);
+  clearRecords_ = Array<uint8_t>(p_.memory, clearBytes + 1, Use::State);
+  std::memset(clearRecords_.data(), 0, static_cast<size_t>(clearBytes));
+  for (const State &state : p_.states)
+    if (state.kind == PIKORT_IMAGE)
+      std::copy(state.clear.begin(), state.clear.end(),
+                clearRecords_.data() + clearOffsets_[&state]);
+  places_ = Array<Place>(
+      p_.memory, static_cast<int64_t>(p_.stages.size() + p_.sources.size()),
+      Use::State);
+}
+
+size_t Frame::placeOf(int32_t number, bool isSource) const {
+  auto at = static_cast<size_t>(number);
+  return isSource ? p_.stages.size() + at : at;
+}
+
+// --- What joins are told ----------------------------------------------------
+
+void Frame::describeSource(JoinArgs &args, int32_t source) const {
+  args.inputCount = 1;
+  args.inputs[0] =
+      describeSourceInput(p_.stages[p_.sources[source].stage], source);
+  args.inputs[0].producer = nullptr;
+  args.recordSize = p_.records[p_.stages[p_.sources[source].stage].record].size;
+  args.cells = args.tiles = 1;
+  args.splits = true;
+  args.unitsAtOnce = device_.residentThreads() / 64;
+}
+
+JoinInput Frame::describeSourceInput(const Stage &stage, int32_t source) const {
+  const Source &from = p_.sources[source];
+  JoinInput input{};
+  input.items = from.data + from.begin * p_.records[stage.record].size;
+  input.count = from.end - from.begin;
+  input.keyBase =
+      (static_cast<uint64_t>(source) << 32) + static_cast<uint64_t>(from.begin);
+  input.isSource = true;
+  input.stage = -1;
+  if (stage.placed())
+    input.producer = &find(source, true).state;
+  return input;
+}
+
+JoinInput Frame::describeEdge(const Edge &edge) const {
+  const Stage &from = p_.stages[edge.producer];
+  bool isHosted = from.host >= 0;
+  JoinInput input{};
+  input.producer = &find(isHosted ? from.host : edge.producer, false).state;
+  input.stage = isHosted ? edge.producer : -1;
+  input.port = edge.port;
+  input.keyed = edge.keyed();
+  input.permute = edge.gather == PIKOIR_PERMUTE && !isHosted;
+  input.collects = from.collects();
+  input.root = static_cast<uint32_t>(from.root);
+  return input;
+}
+
+void Frame::describeInputs(JoinArgs &args, const Stage &stage) const {
+  for (int32_t source : stage.sources)
+    args.inputs[args.inputCount++] = describeSourceInput(stage, source);
+  for (int32_t e : stage.inputs)
+    if (!p_.edges[e].local)
+      args.inputs[args.inputCount++] = describeEdge(p_.edges[e]);
+}
+
+void Frame::describeClears(JoinArgs &args, const Stage &stage) {
+  for (int32_t id : stage.clears) {
+    const State &state = p_.states[id];
+    args.clears[args.clearCount++] = {state.owned.data(), clearRecord(state),
+                                      p_.records[state.record].size};
+  }
+}
+
+const uint8_t *Frame::clearRecord(const State &state) {
+  return clearRecords_.data() + clearOffsets_[&state];
+}
+
+void Frame::describeStage(JoinArgs &args, const Stage &stage) {
+  const BinSchedule &schedule = stage.schedule;
+  bool isSerial = schedule.kind == PIKOIR_SERIALIZE;
+  bool sharesBins = schedule.kind != PIKOIR_DIRECT_MAP || stage.bins() == 1;
+  describeInputs(args, stage);
+  describeClears(args, stage);
+  args.recordSize = p_.records[stage.record].size;
+  args.cells = stage.cells;
+  args.tiles = stage.tiles;
+  args.placed = stage.placed();
+  args.takesList = stage.takesList();
+  args.collects = stage.collects();
+  args.splits = stage.splits() && (stage.takesList() || sharesBins);
+  args.visitsAll = stage.visitsAll;
+  args.everyBin = schedule.everyBin;
+  args.serialize = isSerial;
+  args.keyWidth = stage.keyWidth;
+  args.tileSplit = stage.sharesTile ? 0 : schedule.tileSplit;
+  args.batch = schedule.batch;
+  args.unitsAtOnce = device_.residentThreads() / 64;
+  args.rank = p_.rank;
+  for (int32_t e : stage.outputs)
+    args.ranked |=
+        e >= 0 && !p_.edges[e].local &&
+        (p_.edges[e].keyed() || p_.edges[e].gather == PIKOIR_PERMUTE);
+  for (size_t d = 0; d < 4; ++d) {
+    args.domain[d] = p_.domain[d];
+    args.binSize[d] = stage.binSize[d];
+    args.grid[d] = stage.grid[d];
+  }
+}
+
+// --- What the program asks for ----------------------------------------------
+
+const pikoir_input *Frame::join(int32_t number, bool isSource) {
+  Place &place = find(number, isSource);
+  // Schedules that depend on the bin; a kernel that runs strip by strip.
+  if ((!isSource && p_.stages[number].binSchedules) || place.args.frame)
+    needsHost_ = true;
+  place.args.frame = frame_.data();
+  place.args.kernel = &place.state;
+  place.args.previous = last_;
+  place.args.number = static_cast<int64_t>(launches_.size());
+  last_ = &place.state;
+  launches_.push_back({"piko_join",
+                       device_.joinBlocks(),
+                       joinThreads,
+                       {reinterpret_cast<int64_t>(&place.args)},
+                       /*isJoin=*/true});
+  if (!isSource)
+    for (int32_t id : p_.stages[number].clears)
+      isCleared_[static_cast<size_t>(id)] = true;
+  return &place.state.input;
+}
+
+pikoir_log *Frame::log(int32_t number, bool isSource) {
+  return &find(number, isSource).state.log;
+}
+
+int64_t Frame::mostItems(const JoinArgs &args) const {
+  int64_t most = 0;
+  for (const JoinInput &input :
+       std::span(args.inputs, static_cast<size_t>(args.inputCount))) {
+    if (input.producer)
+      return -1;
+    most += input.count;
+  }
+  return most;
+}
+
+int64_t Frame::blocks(int32_t number, bool isSource, int64_t threads) const {
+  const JoinArgs &args = find(number, isSource).args;
+  int64_t blocks = device_.residentThreads() / threads;
+  int64_t most = mostItems(args);
+  if (args.splits && args.tileSplit == 0 && !args.placed && most >= 0)
+    blocks = std::min(blocks, (most + 63) / 64);
+  return std::max<int64_t>(blocks, 1);
+}
+
+void Frame::clear(int32_t id) {
+  const State &state = p_.states[id];
+  int64_t size = p_.records[state.record].size;
+  isCleared_[static_cast<size_t>(id)] = true;
+  launches_.push_back({"piko_fill",
+                       device_.joinBlocks(),
+                       joinThreads,
+                       {reinterpret_cast<int64_t>(state.owned.data()),
+                        state.owned.size() / size,
+                        reinterpret_cast<int64_t>(clearRecord(state)), size},
+                       /*isJoin=*/false});
+}
+
+// --- The submission ---------------------------------------------------------
+
+Frame::Outcome Frame::finish() {
+  isRecording_ = false;
+  std::span<uint8_t> room;
+  if (!needsHost_)
+    room = device_.logSpace();
+  if (room.empty())
+    return Outcome::Repeat;
+  auto begin = reinterpret_cast<int64_t>(room.data());
+  FrameState &frame = frame_[0];
+  frame = {};
+  frame.progress = device_.progress();
+  frame.log.spare = begin + headRoom;
+  frame.log.cursor = begin + headRoom + spareRoom;
+  frame.log.limit = begin + static_cast<int64_t>(room.size());
+  device_.submit(launches_, used_);
+  int64_t end = last_ ? last_->log.cursor : frame.log.cursor;
+  used_ = {
+      reinterpret_cast<uint8_t *>(frame.log.cursor),
+      static_cast<size_t>(std::min(end, frame.log.limit) - frame.log.cursor)};
+  bool failed = frame.failed != 0 || end > frame.log.limit ||
+                (last_ && last_->log.errors != 0);
+  if (!failed) {
+    noteStatistics();
+    return Outcome::Done;
+  }
+  device_.clearLog(std::exchange(used_, {}));
+  return keepsState() ? Outcome::Spoilt : Outcome::Repeat;
+}
+
+bool Frame::keepsState() const {
+  for (size_t i = 0; i < p_.states.size(); ++i) {
+    const State &state = p_.states[i];
+    bool changes = state.kind == PIKORT_IMAGE || state.written;
+    if (state.owned && changes && !isCleared_[i])
+      return true;
+  }
+  return false;
+}
+
+void Frame::end() noexcept { isRecording_ = false; }
+
+void Frame::noteStatistics() {
+  for (size_t s = 0; s < p_.stages.size(); ++s) {
+    const Place &place = find(static_cast<int32_t>(s), false);
+    p_.stageStats[s].in += place.state.in;
+    p_.stageStats[s].placed += place.state.placed;
+    size_t i = p_.stages[s].sources.size();
+    for (int32_t e : p_.stages[s].inputs)
+      if (!p_.edges[e].local)
+        p_.stageStats[p_.edges[e].producer].out +=
+            static_cast<int64_t>(place.state.received[i++]);
+  }
+}

@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//===- Entries.h - Reads what threads have left in a log ------------------===//
+
+#ifndef PIKO_RUNTIME_CUDA_DEVICE_ENTRIES_H
+#define PIKO_RUNTIME_CUDA_DEVICE_ENTRIES_H
+
+#include "cuda/device/Grid.h"
+
+namespace piko::cuda {
+
+/// As in rt::noCell: a source's primitive that has none.
+constexpr uint32_t noCell = 0xffffffffu;
+
+inline const uint8_t *payload(const pikoir_entry *entry) {
+  return reinterpret_cast<const uint8_t *>(entry + 1);
+}
+
+inline const pikoir_entry *entryAt(int64_t address) {
+  return reinterpret_cast<const pikoir_entry *>(address);
+}
+
+/// Where the entry behind `entry` is, past links.
+inline int64_t skipLinks(int64_t at, int64_t end) {
+  while (at != end && entryAt(at)->kind == PIKOIR_ENTRY_LINK)
+    at = *reinterpret_cast<const int64_t *>(&entryAt(at)->number);
+  return at;
+}
+
+/// Walks a span for what is of an input, and tells `sink`:
+///   emit(mine)        a record of the port, or of another one of the stage
+///   keep(record)      a record of the port that counts; of a source's
+///                     AssignBin, that a primitive begins: null
+///   place(cell)       its next cell, above those before
+///   insert(cell)      a cell that is not, and none of those before
+///   next()            the position has ended
+///   fail()            what no join can do
+/// The rules are those of pikoir_append, pikoir_place and pikoir_next.
+template <class Sink> class SpanReader {
+public:
+  SpanReader(const JoinInput &input, const JoinArgs &args, Sink &sink)
+      : input_(input), placed_(args.placed), cells_(args.cells), sink_(sink) {}
+
+  void read(const pikoir_span &span) {
+    for (int64_t at = skipLinks(span.begin, span.end); at != span.end;
+         at = skipLinks(at + entryAt(at)->bytes, span.end)) {
+      const pikoir_entry *entry = entryAt(at);
+      if (entry->stage != input_.stage)
+        continue;
+      switch (entry->kind) {
+      case PIKOIR_ENTRY_RECORD:
+        readRecord(entry);
+        break;
+      case PIKOIR_ENTRY_CELL:
+        if (entry->number == input_.port)
+          readCell(entry, span);
+        break;
+      case PIKOIR_ENTRY_NEXT:
+        readNext();
+        break;
+      default:
+        break;
+      }
+    }
+  }
+
+private:
+  void readRecord(const pikoir_entry *entry) {
+    bool isMine = entry->number == input_.port;
+    sink_.emit(isMine);
+    if (!isMine)
+      return;
+    record_ = entry;
+    last_ = -1;
+    if (!placed_)
+      sink_.keep(entry);
+  }
+
+  void readCell(const pikoir_entry *entry, const pikoir_span &span) {
+    auto cell = *reinterpret_cast<const int64_t *>(payload(entry));
+    if (static_cast<uint64_t>(cell) >= static_cast<uint64_t>(cells_) ||
+        (!record_ && !input_.isSource))
+      return sink_.fail();
+    if (cell == last_)
+      return;
+    if (last_ < 0) {
+      firstCell_ = entry;
+      sink_.keep(record_);
+    }
+    if (cell > last_) {
+      last_ = cell;
+      sink_.place(static_cast<uint32_t>(cell));
+    } else if (!isKnown(entry, cell, span)) {
+      sink_.insert(static_cast<uint32_t>(cell));
+    }
+  }
+
+  /// Whether a cell is among those of the record before `entry`.
+  bool isKnown(const pikoir_entry *entry, int64_t cell,
+               const pikoir_span &span) const {
+    auto end = reinterpret_cast<int64_t>(entry);
+    for (auto at = reinterpret_cast<int64_t>(firstCell_); at != end;
+         at = skipLinks(at + entryAt(at)->bytes, span.end)) {
+      const pikoir_entry *before = entryAt(at);
+      if (before->kind == PIKOIR_ENTRY_CELL && before->stage == input_.stage &&
+          before->number == input_.port &&
+          *reinterpret_cast<const int64_t *>(payload(before)) == cell)
+        return true;
+    }
+    return false;
+  }
+
+  void readNext() {
+    if (input_.isSource) {
+      if (last_ < 0) {
+        sink_.keep(nullptr);
+        sink_.place(noCell);
+      }
+      last_ = -1;
+    }
+    sink_.next();
+  }
+
+  const JoinInput &input_;
+  bool placed_;
+  int64_t cells_;
+  Sink &sink_;
+  const pikoir_entry *record_ = nullptr, *firstCell_ = nullptr;
+  int64_t last_ = -1;
+};
+
+/// What has come into a stage, in lineage order.
+struct Stream {
+  const uint8_t *items;
+  int64_t count, pairCount;
+  const uint32_t *pairs;      ///< Cells, the first of each item marked.
+  const uint32_t *pairStarts; ///< The first pair of each item, and the end.
+  KeyWords keys;
+
+  uint64_t key(int64_t item, int32_t w) const {
+    if (w >= keys.width)
+      return 0;
+    return keys.words ? keys.words[item * keys.width + w]
+                      : keys.base + static_cast<uint64_t>(item);
+  }
+};
+
+/// Copies a record.
+inline void copyRecord(uint8_t *to, const uint8_t *from, int64_t size) {
+  if (((reinterpret_cast<uint64_t>(to) | reinterpret_cast<uint64_t>(from) |
+        static_cast<uint64_t>(size)) &
+       3) == 0) {
+    for (int64_t i = 0; i < size / 4; ++i)
+      reinterpret_cast<uint32_t *>(to)[i] =
+          reinterpret_cast<const uint32_t *>(from)[i];
+    return;
+  }
+  for (int64_t i = 0; i < size; ++i)
+    to[i] = from[i];
+}
+
+} // namespace piko::cuda
+
+#endif // PIKO_RUNTIME_CUDA_DEVICE_ENTRIES_H

@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//===- Merge.h - Merges streams by lineage key ----------------------------===//
+//
+// An item's place is its own number plus, for each other stream, how many of
+// its items come before: a binary search each.
+//
+//===----------------------------------------------------------------------===//
+
+#ifndef PIKO_RUNTIME_CUDA_DEVICE_MERGE_H
+#define PIKO_RUNTIME_CUDA_DEVICE_MERGE_H
+
+#include "cuda/device/Entries.h"
+
+namespace piko::cuda {
+
+class Merge {
+public:
+  Merge(Grid &grid, const JoinArgs &args, const Stream *streams, int32_t count)
+      : grid_(grid), args_(args), streams_(streams), count_(count) {}
+
+  /// Between two barriers; `out` is uniform.
+  void run(Stream &out) {
+    for (int32_t s = 0; s < count_; ++s) {
+      out.count += streams_[s].count;
+      out.pairCount += streams_[s].pairCount;
+      width_ = larger(width_, streams_[s].keys.width);
+    }
+    if (out.count > UINT32_MAX || out.pairCount > UINT32_MAX)
+      return grid_.fail();
+    takeRoom(out);
+    if (grid_.hasFailed())
+      return;
+    for (int32_t s = 0; s < count_; ++s)
+      grid_.forEach(streams_[s].count, [&](int64_t i) { move(s, i); });
+    if (!args_.placed)
+      return grid_.sync();
+    grid_.exclusiveScan(pairStarts_, out.count + 1);
+    for (int32_t s = 0; s < count_; ++s)
+      grid_.forEach(streams_[s].count, [&](int64_t i) { movePairs(s, i); });
+    grid_.sync();
+  }
+
+private:
+  void takeRoom(Stream &out) {
+    out.items = items_ = grid_.take<uint8_t>(out.count * args_.recordSize);
+    if (args_.keyWidth > 0) {
+      keys_ = grid_.take<uint64_t>(out.count * width_);
+      out.keys = {keys_, 0, width_};
+    }
+    if (!args_.placed)
+      return;
+    out.pairs = pairs_ = grid_.take<uint32_t>(out.pairCount);
+    out.pairStarts = pairStarts_ = grid_.take<uint32_t>(out.count + 1);
+    for (int32_t s = 0; s < count_; ++s)
+      places_[s] = grid_.take<uint32_t>(streams_[s].count);
+    if (!grid_.hasFailed() && Grid::isFirst())
+      pairStarts_[out.count] = 0;
+  }
+
+  /// True if item i of stream a comes before item j of stream b.
+  bool before(int32_t a, int64_t i, int32_t b, int64_t j) const {
+    for (int32_t w = 0; w < width_; ++w) {
+      uint64_t u = streams_[a].key(i, w), v = streams_[b].key(j, w);
+      if (u != v)
+        return u < v;
+    }
+    return a < b;
+  }
+
+  int64_t placeOf(int32_t s, int64_t i) const {
+    int64_t place = i;
+    for (int32_t other = 0; other < count_; ++other) {
+      if (other == s)
+        continue;
+      int64_t low = 0, high = streams_[other].count;
+      while (low < high) {
+        int64_t middle = (low + high) / 2;
+        if (before(other, middle, s, i))
+          low = middle + 1;
+        else
+          high = middle;
+      }
+      place += low;
+    }
+    return place;
+  }
+
+  void move(int32_t s, int64_t i) {
+    const Stream &from = streams_[s];
+    int64_t to = placeOf(s, i);
+    copyRecord(items_ + to * args_.recordSize,
+               from.items + i * args_.recordSize, args_.recordSize);
+    if (keys_)
+      for (int32_t w = 0; w < width_; ++w)
+        keys_[to * width_ + w] = from.key(i, w);
+    if (!pairs_)
+      return;
+    places_[s][i] = static_cast<uint32_t>(to);
+    pairStarts_[to] = from.pairStarts[i + 1] - from.pairStarts[i];
+  }
+
+  void movePairs(int32_t s, int64_t i) {
+    const Stream &from = streams_[s];
+    uint32_t *to = pairs_ + pairStarts_[places_[s][i]];
+    for (uint32_t k = from.pairStarts[i]; k < from.pairStarts[i + 1]; ++k)
+      *to++ = from.pairs[k];
+  }
+
+  Grid &grid_;
+  const JoinArgs &args_;
+  const Stream *streams_;
+  int32_t count_, width_ = 0;
+  uint8_t *items_ = nullptr;
+  uint64_t *keys_ = nullptr;
+  uint32_t *pairs_ = nullptr, *pairStarts_ = nullptr;
+  uint32_t *places_[mostJoinInputs] = {};
+};
+
+} // namespace piko::cuda
+
+#endif // PIKO_RUNTIME_CUDA_DEVICE_MERGE_H
