@@ -8,7 +8,7 @@
 #include "Piko/Dialect/Piko/IR/Piko.h"
 #include "Piko/Driver/Sequences.h"
 #include "Piko/Target/Emulate.h"
-#include "Piko/Target/PTX.h"
+#include "Piko/Target/KernelImages.h"
 
 #include "mlir/Dialect/GPU/IR/GPUDialect.h"
 #include "mlir/Dialect/LLVMIR/LLVMDialect.h"
@@ -377,10 +377,15 @@ piko::translateToLLVMIR(ModuleOp module, llvm::LLVMContext &context,
     if (!host || !translated)
       return nullptr;
     StringRef name = kernels.getName();
+    auto report = [&](const MissingCubin &cubin) {
+      (cubin.isRefused ? emitWarning(module.getLoc())
+                       : emitRemark(module.getLoc()))
+          << "no cubin for " << cubin.chip << ": " << cubin.reason;
+    };
     llvm::Error error =
         gpu.target == GPUTarget::CUDA
-            ? embedPTX(*host, *translated, getImageName(name), gpu.chip,
-                       optLevel)
+            ? embedKernels(*host, *translated, getImagesName(name), gpu,
+                           optLevel, report)
             : linkEmulatedKernels(*host, std::move(translated), name);
     if (error) {
       emitError(module.getLoc()) << llvm::toString(std::move(error));

@@ -531,10 +531,15 @@ static LogicalResult explainKernels(ModuleOp module, StringRef pipeline,
   llvm::Expected<std::string> ptx = generatePTX(*kernels, gpu.chip, optLevel);
   if (!ptx)
     return fail(ptx.takeError());
-  auto resources = measureKernels(*kernels, *ptx, gpu.chip);
-  if (!resources)
-    return fail(resources.takeError());
-  writeResources(*resources, gpu.chip, (pipeline + "_").str(), out);
+  std::vector<std::string> chips = gpu.cubins;
+  if (chips.empty())
+    chips.push_back(gpu.chip);
+  for (const std::string &chip : chips) {
+    auto resources = measureKernels(*kernels, *ptx, chip);
+    if (!resources)
+      return fail(resources.takeError());
+    writeResources(*resources, chip, (pipeline + "_").str(), out);
+  }
   return success();
 }
 

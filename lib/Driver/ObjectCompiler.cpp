@@ -8,6 +8,7 @@
 #include "Piko/Driver/Compiler.h"
 #include "Piko/Driver/Diagnostics.h"
 #include "Piko/Frontend/HostCompiler.h"
+#include "Piko/Target/Assembler.h"
 #include "Piko/Target/Object.h"
 #include "Piko/Target/Versions.h"
 #include "SourceCache.h"
@@ -100,6 +101,10 @@ static std::string makeRequest(const ObjectOptions &options,
                      int(source.gpu.threads)})
     key.add(std::to_string(number));
   key.add(source.gpu.chip).add(options.nameSpace).add(getRuntimeIncludeDir());
+  for (const std::string &chip : source.gpu.cubins)
+    key.add(chip);
+  if (!source.gpu.cubins.empty())
+    key.add(getAssemblerIdentity(findAssembler()));
   return key.finish();
 }
 

@@ -24,6 +24,11 @@ class Accelerator {
 public:
   virtual ~Accelerator() = default;
 
+  /// Which one it is of its kind.
+  virtual int32_t number() const = 0;
+  /// Throws Failure if the device is lost: then what map() gave may be gone.
+  virtual void checkAlive() const = 0;
+
   /// Shared memory, aligned to a page; null if refused.
   virtual uint8_t *map(size_t bytes) noexcept = 0;
   virtual void unmap(uint8_t *data) noexcept = 0;
@@ -47,8 +52,11 @@ public:
   virtual std::unique_ptr<DeviceFrame> makeFrame() = 0;
 };
 
-/// Whether this machine has a device of a kind: "cuda".
-bool hasDevice(std::string_view kind) noexcept;
+/// Whether that is what a program calls a kind of device.
+bool isDeviceKind(std::string_view name) noexcept;
+/// Throws Failure unless this machine has a device of a kind with this number,
+/// or the one that is taken for PIKORT_ANY_DEVICE.
+void checkDevice(std::string_view kind, int32_t number);
 
 } // namespace piko::rt
 

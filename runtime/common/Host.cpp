@@ -78,12 +78,23 @@ static void checkArray(const pikort_pipeline &p, const std::string &who,
             " bytes");
 }
 
+/// What lies on a device that is lost may be gone.
+static void checkAlive(const pikort_pipeline &p) {
+  if (p.accelerator)
+    p.accelerator->checkAlive();
+}
+
 extern "C" {
 
 // --- Life -------------------------------------------------------------------
 
 int32_t pikort_create(const pikort_program *program,
                       pikort_pipeline **pipeline) {
+  return pikort_create_on(program, PIKORT_ANY_DEVICE, pipeline);
+}
+
+int32_t pikort_create_on(const pikort_program *program, int32_t device,
+                         pikort_pipeline **pipeline) {
   if (!program || !pipeline)
     return PIKORT_INVALID_ARGUMENT;
   *pipeline = nullptr;
@@ -95,6 +106,11 @@ int32_t pikort_create(const pikort_program *program,
   }
   guarded(p, "pipeline", [&] {
     p->name = program->name ? program->name : "";
+    if (device < PIKORT_PROCESSOR)
+      invalid("pipeline " + quoted(p->name) +
+              ": expected a device's number, but got " +
+              std::to_string(device));
+    p->device = device;
     if (program->abi_version != PIKORT_ABI_VERSION)
       throw Failure{PIKORT_VERSION,
                     "pipeline " + quoted(p->name) +
@@ -125,6 +141,11 @@ const char *pikort_message(const pikort_pipeline *pipeline) {
 
 const char *pikort_name(const pikort_pipeline *pipeline) {
   return pipeline ? pipeline->name.c_str() : "";
+}
+
+int32_t pikort_device(const pikort_pipeline *pipeline) {
+  return pipeline && pipeline->accelerator ? pipeline->accelerator->number()
+                                           : PIKORT_PROCESSOR;
 }
 
 // --- Options ----------------------------------------------------------------
@@ -245,6 +266,7 @@ int32_t pikort_allocate_buffer(pikort_pipeline *p, const char *name,
     int64_t bytes;
     if (__builtin_mul_overflow(count, p->records[state.record].size, &bytes))
       throw OutOfMemory{INT64_MAX};
+    checkAlive(*p);
     state.bound = false;
     state.owned = {};
     state.owned = Array<uint8_t>(p->memory, bytes, Use::State);
@@ -279,6 +301,8 @@ int32_t pikort_get_view(pikort_pipeline *p, const char *name,
     State &state = findState(*p, name);
     if (!view)
       invalid("expected room for a view, but got null");
+    if (state.owned)
+      checkAlive(*p);
     bool atRun = state.kind == PIKORT_IMAGE || state.perSource >= 0;
     if (atRun && !state.view.data)
       throw Failure{PIKORT_UNBOUND,
@@ -447,6 +471,7 @@ int32_t pikort_run(pikort_pipeline *p) {
   if (p)
     p->profile.begin();
   int32_t code = call(p, [&] {
+    checkAlive(*p);
     checkBound(*p);
     checkFixed(*p);
     checkApart(*p);

@@ -233,6 +233,7 @@ struct pikort_pipeline {
   pikort_pipeline();
   ~pikort_pipeline();
 
+  int32_t device = PIKORT_ANY_DEVICE;                 ///< As the host chose.
   std::unique_ptr<piko::rt::Accelerator> accelerator; ///< None = the CPU.
   piko::rt::Memory memory; // next: the arrays below go back to it
   std::string name;

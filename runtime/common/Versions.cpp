@@ -78,20 +78,51 @@ static std::vector<std::string_view> detectFeatures() { return {}; }
 
 // --- The choice -------------------------------------------------------------
 
-/// The features of a version that this machine lacks, with commas.
-static std::string findMissing(const pikoir_version &version) {
-  static const std::vector<std::string_view> features = detectFeatures();
-  std::string missing;
+/// The features that a version needs, one by one.
+template <class Visit>
+static void visitNeeds(const pikoir_version &version, Visit visit) {
   std::string_view rest = version.needs;
   while (!rest.empty()) {
     std::string_view name = rest.substr(0, rest.find(','));
     rest.remove_prefix(std::min(rest.size(), name.size() + 1));
-    bool has = hasDevice(name) || std::find(features.begin(), features.end(),
-                                            name) != features.end();
+    visit(name);
+  }
+}
+
+/// Whether there is a device of a kind, and the host wants it.
+static bool hasDevice(const pikort_pipeline &p, std::string_view kind) {
+  try {
+    checkDevice(kind, p.device);
+    return true;
+  } catch (...) {
+    return false;
+  }
+}
+
+/// The features of a version that this machine lacks, with commas.
+static std::string findMissing(const pikort_pipeline &p,
+                               const pikoir_version &version) {
+  static const std::vector<std::string_view> features = detectFeatures();
+  std::string missing;
+  visitNeeds(version, [&](std::string_view name) {
+    bool has = isDeviceKind(name) ? hasDevice(p, name)
+                                  : std::find(features.begin(), features.end(),
+                                              name) != features.end();
     if (!has)
       missing.append(missing.empty() ? "" : ", ").append(name);
-  }
+  });
   return missing;
+}
+
+/// A device that the host has chosen by its number must be there, if there is
+/// code for one.
+static void checkChosenDevice(const pikort_pipeline &p,
+                              std::span<const pikoir_version> versions) {
+  for (const pikoir_version &version : versions)
+    visitNeeds(version, [&](std::string_view name) {
+      if (p.device >= 0 && isDeviceKind(name))
+        checkDevice(name, p.device);
+    });
 }
 
 using Versions = std::span<const pikoir_version>;
@@ -107,7 +138,8 @@ static std::string listProcessors(Versions versions) {
                                      Versions versions) {
   std::string missing;
   for (const pikoir_version &version : versions) {
-    missing.append(missing.empty() ? "" : " and ").append(findMissing(version));
+    missing.append(missing.empty() ? "" : " and ")
+        .append(findMissing(p, version));
     if (versions.size() > 1)
       missing.append(" (").append(version.processor).append(")");
   }
@@ -142,9 +174,11 @@ void pikoir_setup_version(pikort_pipeline *p, const pikoir_version *versions,
                         ": expected code for some processor"};
     Versions candidates =
         selectNamed(*p, {versions, static_cast<size_t>(count)});
-    auto chosen = std::find_if(
-        candidates.rbegin(), candidates.rend(),
-        [](const pikoir_version &one) { return findMissing(one).empty(); });
+    checkChosenDevice(*p, candidates);
+    auto chosen = std::find_if(candidates.rbegin(), candidates.rend(),
+                               [&](const pikoir_version &one) {
+                                 return findMissing(*p, one).empty();
+                               });
     if (chosen == candidates.rend())
       failMissing(*p, candidates);
     p->processor = chosen->processor;

@@ -11,8 +11,12 @@
 using namespace piko::cuda;
 using piko::rt::Failure;
 
-Accelerator::Accelerator(pikort_pipeline &p, const char *ptx)
-    : p_(p), ptx_(ptx), device_(Device::open()) {
+static const pikoir_cuda_image joinImages[] = {
+    {0, 0, piko::cuda::joinKernels}, {0, 0, nullptr}};
+
+Accelerator::Accelerator(pikort_pipeline &p, const pikoir_cuda_image *images)
+    : p_(p), device_(Device::open(p.device)), module_(*device_, images),
+      joins_(*device_, joinImages) {
   device_->check(device_->enter(), "entering its context");
   int processors = device_->attribute(CU_DEVICE_ATTRIBUTE_MULTIPROCESSOR_COUNT);
   residentThreads_ = int64_t(device_->attribute(
@@ -25,17 +29,17 @@ Accelerator::Accelerator(pikort_pipeline &p, const char *ptx)
 }
 
 Accelerator::~Accelerator() {
-  const Driver &driver = device_->driver;
+  if (device_->isLost()) // with all that was on it
+    return;
   device_->enter();
   if (!log_.empty())
     unmap(log_.data());
-  for (CUmodule module : {module_, joins_})
-    if (module)
-      driver.cuModuleUnload(module);
+  module_.unload();
+  joins_.unload();
   if (stream_)
-    driver.cuStreamDestroy(stream_);
+    device_->driver.cuStreamDestroy(stream_);
   if (progress_)
-    driver.cuMemFreeHost(progress_);
+    device_->driver.cuMemFreeHost(progress_);
 }
 
 // --- Memory ------------------------------------------------------------------
@@ -95,40 +99,8 @@ std::unique_ptr<piko::rt::DeviceFrame> Accelerator::makeFrame() {
   return frame;
 }
 
-void Accelerator::loadModules() {
-  if (!joins_)
-    joins_ = load(joinKernels);
-  if (!module_)
-    module_ = load(ptx_);
-}
-
-CUmodule Accelerator::load(const char *ptx) {
-  char log[8192] = "";
-  CUjit_option options[] = {CU_JIT_ERROR_LOG_BUFFER,
-                            CU_JIT_ERROR_LOG_BUFFER_SIZE_BYTES};
-  void *values[] = {log, reinterpret_cast<void *>(sizeof(log))};
-  CUmodule module = nullptr;
-  CUresult result =
-      device_->driver.cuModuleLoadDataEx(&module, ptx, 2, options, values);
-  std::string text = log;
-  while (!text.empty() && (text.back() == '\n' || text.back() == ' '))
-    text.pop_back();
-  device_->check(result, "loading the kernels" +
-                             (text.empty() ? "" : " (" + text + ")"));
-  return module;
-}
-
-CUfunction Accelerator::find(const std::string &kernel) {
-  auto [found, isNew] = functions_.try_emplace(kernel, nullptr);
-  if (isNew) {
-    CUmodule module = kernel.starts_with("piko_") ? joins_ : module_;
-    CUresult result = device_->driver.cuModuleGetFunction(
-        &found->second, module, kernel.c_str());
-    if (result != CUDA_SUCCESS)
-      functions_.erase(kernel);
-    device_->check(result, "finding kernel '" + kernel + "'");
-  }
-  return found->second;
+Module &Accelerator::moduleOf(const std::string &kernel) {
+  return kernel.starts_with("piko_") ? joins_ : module_;
 }
 
 void Accelerator::launch(const char *kernel, int64_t blocks, int64_t threads,
@@ -142,11 +114,11 @@ void Accelerator::launch(const char *kernel, int64_t blocks, int64_t threads,
 
 void Accelerator::launch(const GridLaunch &grid) {
   if (grid.blocks > INT32_MAX)
-    throw Failure{PIKORT_TOO_MANY, "kernel '" + grid.kernel +
-                                       "': expected at most 2147483647 blocks, "
+    throw Failure{PIKORT_TOO_MANY, moduleOf(grid.kernel).describe(grid.kernel) +
+                                       ": expected at most 2147483647 blocks, "
                                        "but got " +
                                        std::to_string(grid.blocks)};
-  CUfunction function = find(grid.kernel);
+  CUfunction function = moduleOf(grid.kernel).find(grid.kernel);
   std::vector<void *> places;
   for (const int64_t &word : grid.arguments)
     places.push_back(const_cast<int64_t *>(&word));
@@ -161,25 +133,29 @@ void Accelerator::launch(const GridLaunch &grid) {
           : driver.cuLaunchKernel(function, blocks, 1, 1, threads, 1, 1,
                                   /*sharedBytes=*/0, stream_, places.data(),
                                   nullptr);
-  device_->check(result, "running kernel '" + grid.kernel + "'");
+  if (result != CUDA_SUCCESS)
+    device_->check(result,
+                   "running " + moduleOf(grid.kernel).describe(grid.kernel));
 }
 
 void Accelerator::submit(std::span<const GridLaunch> grids,
                          std::span<uint8_t> clear) {
   device_->check(device_->enter(), "entering its context");
-  loadModules();
+  for (const GridLaunch &grid : grids) // before any of them runs
+    moduleOf(grid.kernel).find(grid.kernel);
   clearLog(clear);
   for (const GridLaunch &grid : grids)
     launch(grid);
   CUresult result = device_->driver.cuStreamSynchronize(stream_);
   if (result != CUDA_SUCCESS)
-    device_->check(result, "running kernel '" + findFailed(grids) + "'");
+    device_->check(result, "running " + describeFailed(grids));
 }
 
-std::string Accelerator::findFailed(std::span<const GridLaunch> grids) const {
+std::string Accelerator::describeFailed(std::span<const GridLaunch> grids) {
   auto at = static_cast<size_t>(
       progress_ ? *static_cast<volatile int64_t *>(progress_) : 0);
-  return grids[std::min(at, grids.size() - 1)].kernel;
+  const std::string &kernel = grids[std::min(at, grids.size() - 1)].kernel;
+  return moduleOf(kernel).describe(kernel);
 }
 
 int64_t *Accelerator::progress() {
@@ -198,9 +174,17 @@ int64_t *Accelerator::progress() {
 
 extern "C" {
 
-void pikoir_cuda_module(pikort_pipeline *p, const char *ptx) {
+void pikoir_cuda_module(pikort_pipeline *p, const pikoir_cuda_image *images) {
   piko::rt::guarded(p, "pipeline", [&] {
-    p->useAccelerator(std::make_unique<Accelerator>(*p, ptx));
+    p->useAccelerator(std::make_unique<Accelerator>(*p, images));
+  });
+}
+
+void pikoir_cuda_kernel(pikort_pipeline *p, const char *kernel,
+                        const char *stage, const char *place) {
+  piko::rt::guarded(p, "pipeline", [&] {
+    if (auto *device = static_cast<Accelerator *>(p->accelerator.get()))
+      device->name(kernel, stage, place);
   });
 }
 

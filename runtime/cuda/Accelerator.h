@@ -10,11 +10,10 @@
 #define PIKO_RUNTIME_CUDA_ACCELERATOR_H
 
 #include "common/Accelerator.h"
-#include "cuda/Device.h"
 #include "cuda/Frame.h"
+#include "cuda/Module.h"
 
 #include <string>
-#include <unordered_map>
 
 struct pikort_pipeline;
 
@@ -22,11 +21,12 @@ namespace piko::cuda {
 
 class Accelerator final : public rt::Accelerator {
 public:
-  /// `ptx` ends with a zero byte, and lives as long as the program; throws
-  /// Failure.
-  Accelerator(pikort_pipeline &p, const char *ptx);
+  /// The images live as long as the program; throws Failure.
+  Accelerator(pikort_pipeline &p, const pikoir_cuda_image *images);
   ~Accelerator() override;
 
+  int32_t number() const override { return device_->ordinal; }
+  void checkAlive() const override { device_->checkAlive(); }
   uint8_t *map(size_t bytes) noexcept override;
   void unmap(uint8_t *data) noexcept override;
   std::span<uint8_t> logSpace() noexcept override;
@@ -46,20 +46,21 @@ public:
   /// Memory of the host in which joins say how far a submission is; throws.
   int64_t *progress();
 
+  /// Of a kernel, for messages.
+  void name(const char *kernel, const char *stage, const char *place) {
+    module_.name(kernel, stage, place);
+  }
+
 private:
-  void loadModules();
-  CUmodule load(const char *ptx);
-  CUfunction find(const std::string &kernel);
+  Module &moduleOf(const std::string &kernel);
   void launch(const GridLaunch &grid);
   /// The kernel of a submission that failed, as far as it is known.
-  std::string findFailed(std::span<const GridLaunch> grids) const;
+  std::string describeFailed(std::span<const GridLaunch> grids);
 
   pikort_pipeline &p_;
-  const char *ptx_;
   std::shared_ptr<Device> device_;
+  Module module_, joins_; ///< The program's kernels, and the runtime's.
   CUstream stream_ = nullptr;
-  CUmodule module_ = nullptr, joins_ = nullptr;
-  std::unordered_map<std::string, CUfunction> functions_;
   std::span<uint8_t> log_;
   int64_t *progress_ = nullptr;
   int64_t residentThreads_ = 0, joinBlocks_ = 0;

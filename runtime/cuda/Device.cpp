@@ -56,8 +56,13 @@ const Driver &piko::cuda::loadDriver() {
 
 // --- Devices -----------------------------------------------------------------
 
-/// The number that the environment gives.
-static int chooseOrdinal(int count) {
+/// The number that the host asks for, or else the environment.
+static int chooseOrdinal(int32_t asked, int count) {
+  if (asked >= count)
+    failNoDevice("expected one from 0 to " + std::to_string(count - 1) +
+                 ", but got " + std::to_string(asked));
+  if (asked >= 0)
+    return asked;
   const char *text = std::getenv("PIKO_CUDA_DEVICE");
   if (!text || !*text)
     return 0;
@@ -110,33 +115,47 @@ static CUdevice findDevice(const Driver &driver, int ordinal) {
   return device;
 }
 
-std::shared_ptr<Device> Device::open() {
+std::shared_ptr<Device> Device::open(int32_t number) {
   static std::mutex mutex;
-  static std::map<int, std::weak_ptr<Device>> devices;
+  struct Slot {
+    std::weak_ptr<Device> device;
+    std::shared_ptr<Loss> loss; ///< Of that device, beyond its end.
+  };
+  static std::map<int, Slot> slots;
+  if (number == PIKORT_PROCESSOR)
+    failNoDevice("expected one, because the program has no code for a "
+                 "processor alone, but got PIKORT_PROCESSOR");
   const Driver &driver = loadDriver();
-  int ordinal = chooseOrdinal(countDevices(driver));
+  int ordinal = chooseOrdinal(number, countDevices(driver));
   std::lock_guard<std::mutex> lock(mutex);
-  std::shared_ptr<Device> device = devices[ordinal].lock();
-  if (!device)
-    devices[ordinal] = device = std::make_shared<Device>(driver, ordinal);
+  Slot &slot = slots[ordinal];
+  std::shared_ptr<Device> device = slot.device.lock();
+  bool isLost = slot.loss && slot.loss->result != CUDA_SUCCESS;
+  if (!device || isLost) {
+    auto loss = std::make_shared<Loss>();
+    device = std::make_shared<Device>(driver, ordinal, loss, isLost);
+    slot = {device, loss};
+  }
   return device;
 }
 
-bool piko::rt::hasDevice(std::string_view kind) noexcept {
-  try {
-    if (kind != "cuda")
-      return false;
-    const Driver &driver = loadDriver();
-    findDevice(driver, chooseOrdinal(countDevices(driver)));
-    return true;
-  } catch (...) {
-    return false;
-  }
+bool piko::rt::isDeviceKind(std::string_view name) noexcept {
+  return name == "cuda";
 }
 
-Device::Device(const Driver &driver, int ordinal)
-    : driver(driver), ordinal(ordinal), device_(findDevice(driver, ordinal)),
-      name_(nameOf(driver, device_)) {
+void piko::rt::checkDevice(std::string_view, int32_t number) {
+  if (number == PIKORT_PROCESSOR)
+    failNoDevice("the host has chosen the processor");
+  const Driver &driver = loadDriver();
+  findDevice(driver, chooseOrdinal(number, countDevices(driver)));
+}
+
+Device::Device(const Driver &driver, int ordinal, std::shared_ptr<Loss> loss,
+               bool reset)
+    : driver(driver), ordinal(ordinal), loss_(std::move(loss)),
+      device_(findDevice(driver, ordinal)), name_(nameOf(driver, device_)) {
+  if (reset)
+    check(driver.cuDevicePrimaryCtxReset(device_), "resetting its context");
   check(driver.cuDevicePrimaryCtxRetain(&context_, device_),
         "making its context");
 }
@@ -153,19 +172,122 @@ int Device::attribute(CUdevice_attribute which) const {
   return value;
 }
 
-std::string Device::describe(CUresult result, const std::string &doing) const {
+std::string Device::describe() const {
+  return "CUDA device " + std::to_string(ordinal) +
+         (name_.empty() ? "" : " (" + name_ + ")");
+}
+
+/// "doing: CUDA_ERROR_...: what that means"
+static std::string describe(const Driver &driver, CUresult result,
+                            const std::string &doing) {
   const char *name = nullptr, *text = nullptr;
   driver.cuGetErrorName(result, &name);
   driver.cuGetErrorString(result, &text);
-  return "CUDA device " + std::to_string(ordinal) +
-         (name_.empty() ? "" : " (" + name_ + ")") + ": " + doing + ": " +
-         (name ? name : "error " + std::to_string(result)) +
+  return doing + ": " + (name ? name : "error " + std::to_string(result)) +
          (text ? std::string(": ") + text : "");
 }
 
-void Device::check(CUresult result, const std::string &doing) const {
-  if (result != CUDA_SUCCESS)
-    throw Failure{result == CUDA_ERROR_OUT_OF_MEMORY ? PIKORT_OUT_OF_MEMORY
-                                                     : PIKORT_DEVICE_FAILED,
-                  describe(result, doing)};
+CUresult Device::enter() const {
+  CUresult lost = loss_->result;
+  return lost ? lost : driver.cuCtxSetCurrent(context_);
 }
+
+void Device::check(CUresult result, const std::string &doing) const {
+  if (result == CUDA_SUCCESS)
+    return;
+  checkAlive();
+  std::string text = ::describe(driver, result, doing);
+  noteLoss(result, text);
+  throw Failure{result == CUDA_ERROR_OUT_OF_MEMORY ? PIKORT_OUT_OF_MEMORY
+                                                   : PIKORT_DEVICE_FAILED,
+                describe() + ": " + text};
+}
+
+// --- Devices that are lost ---------------------------------------------------
+
+/// Whether no later call can do anything.
+static bool isLoss(CUresult result) {
+  switch (result) {
+  case CUDA_ERROR_DEINITIALIZED:
+  case CUDA_ERROR_DEVICE_UNAVAILABLE:
+  case CUDA_ERROR_ECC_UNCORRECTABLE:
+  case CUDA_ERROR_NVLINK_UNCORRECTABLE:
+  case CUDA_ERROR_ILLEGAL_ADDRESS:
+  case CUDA_ERROR_LAUNCH_TIMEOUT:
+  case CUDA_ERROR_CONTEXT_IS_DESTROYED:
+  case CUDA_ERROR_ASSERT:
+  case CUDA_ERROR_HARDWARE_STACK_ERROR:
+  case CUDA_ERROR_ILLEGAL_INSTRUCTION:
+  case CUDA_ERROR_MISALIGNED_ADDRESS:
+  case CUDA_ERROR_INVALID_ADDRESS_SPACE:
+  case CUDA_ERROR_INVALID_PC:
+  case CUDA_ERROR_LAUNCH_FAILED:
+    return true;
+  default:
+    return false;
+  }
+}
+
+void Device::noteLoss(CUresult result, const std::string &what) const {
+  std::lock_guard<std::mutex> lock(loss_->mutex);
+  if (!isLoss(result) || isLost())
+    return;
+  loss_->text = what;
+  loss_->result = result;
+}
+
+void Device::checkAlive() const {
+  if (!isLost())
+    return;
+  std::lock_guard<std::mutex> lock(loss_->mutex);
+  throw Failure{PIKORT_DEVICE_FAILED,
+                describe() +
+                    " is lost, for this pipeline and others that are on it, "
+                    "since " +
+                    loss_->text};
+}
+
+// --- What hosts ask ----------------------------------------------------------
+
+extern "C" {
+
+int32_t pikort_device_count() {
+  try {
+    return countDevices(loadDriver());
+  } catch (...) {
+    return 0;
+  }
+}
+
+int32_t pikort_get_device(int32_t device, pikort_device_info *info) {
+  if (!info)
+    return PIKORT_INVALID_ARGUMENT;
+  *info = {};
+  if (device < 0 || device >= pikort_device_count())
+    return PIKORT_NOT_FOUND;
+  try {
+    const Driver &driver = loadDriver();
+    CUdevice found = 0;
+    size_t bytes = 0;
+    int major = 0, minor = 0;
+    if (driver.cuDeviceGet(&found, device) ||
+        driver.cuDeviceGetName(info->name, sizeof(info->name), found) ||
+        driver.cuDeviceTotalMem(&bytes, found) ||
+        driver.cuDeviceGetAttribute(
+            &major, CU_DEVICE_ATTRIBUTE_COMPUTE_CAPABILITY_MAJOR, found) ||
+        driver.cuDeviceGetAttribute(
+            &minor, CU_DEVICE_ATTRIBUTE_COMPUTE_CAPABILITY_MINOR, found))
+      return PIKORT_DEVICE_FAILED;
+    info->capability = 10 * major + minor;
+    info->memory = static_cast<int64_t>(bytes);
+    findDevice(driver, device);
+    info->usable = 1;
+    return PIKORT_OK;
+  } catch (const Failure &failure) {
+    return failure.code == PIKORT_NO_DEVICE ? PIKORT_OK : failure.code;
+  } catch (...) {
+    return PIKORT_OUT_OF_MEMORY;
+  }
+}
+
+} // extern "C"

@@ -3,7 +3,12 @@
 //
 // The driver is loaded when it is first asked for, from libcuda.so.1 or from
 // where the environment variable PIKO_CUDA_DRIVER says. PIKO_CUDA_DEVICE is the
-// number of the device that pipelines use, 0 if it is not set.
+// number of the device for pipelines whose host chooses none, 0 if it is not
+// set.
+//
+// An error of a kernel, or of the hardware, is that of all later calls of its
+// context: the device is lost for the pipelines that are on it, which touch
+// neither it nor its memory again. The next pipeline resets it.
 //
 //===----------------------------------------------------------------------===//
 
@@ -12,7 +17,9 @@
 
 #include "cuda/DriverAPI.h"
 
+#include <atomic>
 #include <memory>
+#include <mutex>
 #include <string>
 
 namespace piko::cuda {
@@ -20,13 +27,25 @@ namespace piko::cuda {
 /// The driver's functions; throws Failure with PIKORT_NO_DEVICE.
 const Driver &loadDriver();
 
-/// A device and its primary context, shared by all pipelines of the process.
+/// How a device was lost, if it was.
+struct Loss {
+  std::atomic<CUresult> result = CUDA_SUCCESS;
+  std::mutex mutex;
+  std::string text; ///< What happened first.
+};
+
+/// A device and its primary context, shared by all pipelines of the process
+/// that are on it.
 class Device {
 public:
-  /// The device that the environment chooses; throws Failure.
-  static std::shared_ptr<Device> open();
+  /// The device of a number, or the one that the environment chooses
+  /// (PIKORT_ANY_DEVICE); throws Failure.
+  static std::shared_ptr<Device> open(int32_t number);
 
-  Device(const Driver &driver, int ordinal);
+  /// `loss` is kept up to date, for who opens it next; with `reset` what was
+  /// in its context goes.
+  Device(const Driver &driver, int ordinal, std::shared_ptr<Loss> loss,
+         bool reset);
   Device(const Device &) = delete;
   Device &operator=(const Device &) = delete;
   ~Device();
@@ -35,14 +54,26 @@ public:
   const int ordinal;
 
   int attribute(CUdevice_attribute which) const;
-  /// Makes its context the calling thread's; the result of the call.
-  CUresult enter() const { return driver.cuCtxSetCurrent(context_); }
+  /// Of compute, 10 * major + minor.
+  int capability() const {
+    return 10 * attribute(CU_DEVICE_ATTRIBUTE_COMPUTE_CAPABILITY_MAJOR) +
+           attribute(CU_DEVICE_ATTRIBUTE_COMPUTE_CAPABILITY_MINOR);
+  }
+  /// Makes its context the calling thread's; the result of the call, or what
+  /// the device was lost by.
+  CUresult enter() const;
   /// Throws Failure unless `result` is success; `doing` is what was tried.
   void check(CUresult result, const std::string &doing) const;
-  /// "CUDA device 0 (name): doing: CUDA_ERROR_...: what that means".
-  std::string describe(CUresult result, const std::string &doing) const;
+  bool isLost() const { return loss_->result != CUDA_SUCCESS; }
+  /// Throws Failure if it is lost, with what happened.
+  void checkAlive() const;
+  /// "CUDA device 0 (name)"
+  std::string describe() const;
 
 private:
+  void noteLoss(CUresult result, const std::string &what) const;
+
+  std::shared_ptr<Loss> loss_;
   CUdevice device_ = 0;
   CUcontext context_ = nullptr;
   std::string name_;

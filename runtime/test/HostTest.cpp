@@ -428,8 +428,11 @@ TEST(Create, RejectsBadPrograms) {
     EXPECT_EQ(pikort_run(p), PIKORT_BAD_PROGRAM);
     pikort_destroy(p);
   };
-  expect({7, "Old", setup, run}, PIKORT_VERSION,
-         "pipeline 'Old': expected a program for runtime version 6, but got 7");
+  constexpr uint32_t version = PIKORT_ABI_VERSION;
+  expect({version + 1, "Newer", setup, run}, PIKORT_VERSION,
+         ("pipeline 'Newer': expected a program for runtime version " +
+          std::to_string(version) + ", but got " + std::to_string(version + 1))
+             .c_str());
   expect({PIKORT_ABI_VERSION, "Empty", nullptr, run}, PIKORT_BAD_PROGRAM,
          "pipeline 'Empty': expected a program with setup and run");
   auto twice = [](pikort_pipeline *p) {

@@ -34,7 +34,9 @@ it, and says how long a frame took.
   --tuned FILE           the setting that piko-tune wrote there
   --gpu-threads N        for cuda and gpu-on-cpu: threads of a block, a power of
                          two up to 1024 (as many as the stage has)
-  --gpu-chip NAME        for cuda and auto: the oldest chip that the code runs on (sm_70)
+  --gpu-chip NAME,...    for cuda and auto: PTX for the oldest of these chips and
+                         later ones, and a cubin for each where ptxas is found
+                         (PTX for sm_70)
   --gpu-seed N           for gpu-on-cpu: permutes the blocks (in order)
   --no-cache             compile even if nothing changed since the last time
   --cache-dir FOLDER     where compiled code is kept ($PIKO_CACHE_DIR,
@@ -117,7 +119,7 @@ private:
         {"--tuned", [&] { options.tuned = value(name); }},
         {"--gpu-threads",
          [&] { options.load.gpu.threads = integer(name, 1, 1024); }},
-        {"--gpu-chip", [&] { options.load.gpu.chip = value(name); }},
+        {"--gpu-chip", [&] { parseChips(value(name)); }},
         {"--gpu-seed",
          [&] { options.load.gpu.seed = integer(name, 0, maxInt); }},
         {"--width", [&] { options.view.width = integer(name, 1, 65536); }},
@@ -153,6 +155,13 @@ private:
       options.load.optLevel = word[2] - '0';
     else
       fail("expected -O0 to -O3, but got " + word);
+  }
+
+  void parseChips(const std::string &names) {
+    if (!options.load.gpu.setChips(names))
+      fail(
+          "--gpu-chip: expected names such as sm_90 between commas, but got '" +
+          names + "'");
   }
 
   void parseWithout(const std::string &text) {

@@ -106,9 +106,10 @@ struct CommandLine {
               "other, their threads by turns")),
       llvm::cl::init(GPUTarget::None), llvm::cl::cat(category)};
   llvm::cl::opt<std::string> gpuChip{
-      "gpu-chip", llvm::cl::value_desc("name"), llvm::cl::init("sm_70"),
-      llvm::cl::desc("the oldest chip that code of --target cuda runs on "
-                     "(default: sm_70)"),
+      "gpu-chip", llvm::cl::value_desc("name,..."),
+      llvm::cl::desc("chips of --target cuda: PTX for the oldest of them and "
+                     "later ones (default: sm_70), and, where ptxas is found, "
+                     "a cubin for each that is named"),
       llvm::cl::cat(category)};
   llvm::cl::opt<int64_t> gpuSeed{
       "gpu-seed", llvm::cl::value_desc("number"), llvm::cl::init(0),
@@ -231,6 +232,9 @@ struct CommandLine {
     return options;
   }
   CompileOptions getUntuned() const {
+    GPUOptions gpu{.threads = gpuThreads, .target = target, .seed = gpuSeed};
+    if (gpuChip.getNumOccurrences())
+      (void)gpu.setChips(gpuChip.getValue());
     return {
         .file = file,
         .pipeName = pipe,
@@ -238,10 +242,7 @@ struct CommandLine {
         .defines = {defines.begin(), defines.end()},
         .check = *getCheck(),
         .synthesis = *getSynthesis(),
-        .gpu = {.threads = gpuThreads,
-                .target = target,
-                .seed = gpuSeed,
-                .chip = gpuChip},
+        .gpu = std::move(gpu),
         // Of standard input the cache does not know what was in it.
         .cache = {.enabled = !noCache && file != "-", .directory = cacheDir}};
   }
@@ -293,6 +294,11 @@ static std::string checkOptions(const CommandLine &line) {
       line.target == GPUTarget::CUDA || line.target == GPUTarget::Auto;
   if (line.gpuChip.getNumOccurrences() && !isForCUDA)
     return "--gpu-chip belongs to --target cuda or auto";
+  if (line.gpuChip.getNumOccurrences() &&
+      !GPUOptions().setChips(line.gpuChip.getValue()))
+    return "--gpu-chip: expected names such as sm_90 between commas, but got "
+           "'" +
+           line.gpuChip + "'";
   if (line.target == GPUTarget::Auto && !isObject)
     return "--target auto belongs to an object, which has code for both";
   if (line.gpuSeed.getNumOccurrences() && !line.isEmulated())

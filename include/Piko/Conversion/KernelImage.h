@@ -14,10 +14,10 @@ namespace piko {
 /// The gpu.module of pipeline P is P_gpu.
 inline constexpr llvm::StringLiteral kernelsSuffix = "_gpu";
 
-/// The constant that holds what a device loads: the PTX of a gpu.module, which
-/// ends with a zero byte.
-inline std::string getImageName(llvm::StringRef kernels) {
-  return (kernels + ".ptx").str();
+/// The constant that lists what a device may load of a gpu.module, as the
+/// runtime's pikoir_cuda_module takes it.
+inline std::string getImagesName(llvm::StringRef kernels) {
+  return (kernels + ".images").str();
 }
 
 } // namespace piko

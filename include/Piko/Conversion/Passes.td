@@ -216,8 +216,10 @@ def ConvertGPUToCUDA : Pass<"convert-gpu-to-cuda", "::mlir::ModuleOp"> {
 
     **Does**: makes of each launch a call of the runtime (`pikort/grid.h`), with
     the kernel's name and the arguments in memory. The setup names a constant,
-    the image, which is made of the kernels' LLVM IR as PTX when the module is
-    translated.
+    the list of images, which are made of the kernels' LLVM IR, as PTX and
+    cubins, when the module is translated. It tells the runtime the stage and
+    the line of each kernel, where its location has them: `loc("stage"("file"
+    :line:column))`.
 
     **Guarantees** that the host's code is for a CPU alone.
 

@@ -91,8 +91,8 @@ lowerForEach(llvm::ArrayRef<CPUOptions> cpus, mlir::ModuleOp module,
              const GPUOptions &gpu);
 
 /// LLVM IR, not optimised, of a module at Level::LLVM, with its kernels for a
-/// GPU as `gpu` says: PTX made with `optLevel`, or functions for the emulator.
-/// Null after diagnostics.
+/// GPU as `gpu` says: PTX made with `optLevel`, and cubins, or functions for
+/// the emulator. Null after diagnostics.
 std::unique_ptr<llvm::Module> translateToLLVMIR(mlir::ModuleOp module,
                                                 llvm::LLVMContext &context,
                                                 const GPUOptions &gpu = {},

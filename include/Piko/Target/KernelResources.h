@@ -31,10 +31,6 @@ struct KernelResources {
   std::optional<double> getOccupancy(llvm::StringRef chip) const;
 };
 
-/// The path of ptxas: on PATH, in $CUDA_HOME/bin, or in the toolkit's customary
-/// folder; empty if there is none.
-std::string findAssembler();
-
 struct KernelReport {
   std::vector<KernelResources> kernels; ///< In the order of the module.
   std::string source; ///< "ptxas", or why nothing was assembled.

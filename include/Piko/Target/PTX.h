@@ -18,11 +18,8 @@ namespace piko {
 llvm::Expected<std::string>
 generatePTX(llvm::Module &module, llvm::StringRef processor, int optLevel);
 
-/// Gives the constant `name`, which the host's code declares, the PTX of
-/// `kernels`, which ends with a zero byte.
-llvm::Error embedPTX(llvm::Module &host, llvm::Module &kernels,
-                     llvm::StringRef name, llvm::StringRef processor,
-                     int optLevel);
+/// An error if there is no chip of that name.
+llvm::Error checkChip(llvm::StringRef chip);
 
 } // namespace piko
 

@@ -23,15 +23,18 @@ struct ConvertGPUToCUDAPass
   void runOnOperation() override;
 
 private:
-  LogicalResult declareImage(gpu::GPUModuleOp kernels);
+  LogicalResult declareImages(gpu::GPUModuleOp kernels);
+  void nameKernels(OpBuilder &setup, Value pipeline, gpu::GPUModuleOp kernels);
   LogicalResult convert(gpu::LaunchFuncOp launch);
-  Value createText(OpBuilder &builder, Location loc, StringRef text);
+  /// The address of a constant, which ends with a zero byte.
+  Value createText(OpBuilder &builder, Location loc, std::string symbol,
+                   StringRef text);
 };
 } // namespace
 
-/// Lets the setup of the pipeline name the image, which the translation to LLVM
-/// IR makes of the kernels.
-LogicalResult ConvertGPUToCUDAPass::declareImage(gpu::GPUModuleOp kernels) {
+/// Lets the setup of the pipeline name the images, which the translation to
+/// LLVM IR makes of the kernels.
+LogicalResult ConvertGPUToCUDAPass::declareImages(gpu::GPUModuleOp kernels) {
   ModuleOp module = getOperation();
   StringRef pipeline = kernels.getName();
   pipeline.consume_back(kernelsSuffix);
@@ -42,24 +45,70 @@ LogicalResult ConvertGPUToCUDAPass::declareImage(gpu::GPUModuleOp kernels) {
            << name << "' beside the kernels";
   Location loc = kernels.getLoc();
   Type pointer = LLVM::LLVMPointerType::get(&getContext());
-  std::string image = getImageName(kernels.getName());
+  std::string images = getImagesName(kernels.getName());
   OpBuilder builder(module.getBodyRegion());
   LLVM::GlobalOp::create(
       builder, loc, LLVM::LLVMArrayType::get(builder.getI8Type(), 0),
-      /*isConstant=*/true, LLVM::Linkage::External, image, Attribute());
+      /*isConstant=*/true, LLVM::Linkage::External, images, Attribute());
   auto callee =
       declareFunction(module, "pikoir_cuda_module", {pointer, pointer});
   builder.setInsertionPointToStart(&setup.getFunctionBody().front());
   LLVM::CallOp::create(
       builder, loc, callee,
       ValueRange{setup.getArgument(0),
-                 LLVM::AddressOfOp::create(builder, loc, pointer, image)});
+                 LLVM::AddressOfOp::create(builder, loc, pointer, images)});
+  nameKernels(builder, setup.getArgument(0), kernels);
   return success();
 }
 
+/// The stage of a kernel, as convert-piko-to-gpu has left it; null if nothing
+/// is known.
+static NameLoc findStage(Location location) {
+  NameLoc found;
+  location->walk([&](Location inner) {
+    found = dyn_cast<NameLoc>(inner);
+    return found ? WalkResult::interrupt() : WalkResult::advance();
+  });
+  return found;
+}
+
+/// "file:line", or nothing.
+static std::string describePlace(Location location) {
+  std::string text;
+  location->walk([&](Location inner) {
+    auto file = dyn_cast<FileLineColLoc>(inner);
+    if (!file)
+      return WalkResult::advance();
+    text = (file.getFilename().getValue() + ":" + Twine(file.getLine())).str();
+    return WalkResult::interrupt();
+  });
+  return text;
+}
+
+/// Tells the runtime where kernels come from, for its messages.
+void ConvertGPUToCUDAPass::nameKernels(OpBuilder &setup, Value pipeline,
+                                       gpu::GPUModuleOp kernels) {
+  Location loc = kernels.getLoc();
+  Type pointer = LLVM::LLVMPointerType::get(&getContext());
+  for (auto kernel : kernels.getOps<FunctionOpInterface>()) {
+    NameLoc stage = findStage(kernel.getLoc());
+    if (!stage)
+      continue;
+    auto callee = declareFunction(getOperation(), "pikoir_cuda_kernel",
+                                  {pointer, pointer, pointer, pointer});
+    auto text = [&](StringRef suffix, StringRef value) {
+      return createText(setup, loc, (kernel.getName() + suffix).str(), value);
+    };
+    Value name = text(".name", kernel.getName());
+    Value stageName = text(".stage", stage.getName().getValue());
+    Value place = text(".place", describePlace(stage.getChildLoc()));
+    LLVM::CallOp::create(setup, loc, callee,
+                         ValueRange{pipeline, name, stageName, place});
+  }
+}
+
 Value ConvertGPUToCUDAPass::createText(OpBuilder &builder, Location loc,
-                                       StringRef text) {
-  std::string name = (text + ".name").str();
+                                       std::string name, StringRef text) {
   Type pointer = LLVM::LLVMPointerType::get(&getContext());
   if (!getOperation().lookupSymbol(name)) {
     std::string bytes = text.str() + '\0';
@@ -82,7 +131,8 @@ LogicalResult ConvertGPUToCUDAPass::convert(gpu::LaunchFuncOp launch) {
   Type i64 = builder.getI64Type();
   auto callee = declareFunction(getOperation(), "pikoir_cuda_launch",
                                 {pointer, pointer, i64, i64, pointer, i64});
-  Value kernel = createText(builder, loc, launch.getKernelName().getValue());
+  StringRef name = launch.getKernelName().getValue();
+  Value kernel = createText(builder, loc, (name + ".name").str(), name);
   LLVM::CallOp::create(
       builder, loc, callee,
       ValueRange{call->pipeline, kernel, call->blocks, call->threads,
@@ -95,7 +145,7 @@ LogicalResult ConvertGPUToCUDAPass::convert(gpu::LaunchFuncOp launch) {
 void ConvertGPUToCUDAPass::runOnOperation() {
   for (auto kernels :
        llvm::to_vector(getOperation().getOps<gpu::GPUModuleOp>()))
-    if (failed(declareImage(kernels)))
+    if (failed(declareImages(kernels)))
       return signalPassFailure();
   if (failed(convertLaunches(getOperation(), [&](gpu::LaunchFuncOp launch) {
         return convert(launch);

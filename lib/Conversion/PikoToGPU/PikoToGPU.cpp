@@ -158,8 +158,10 @@ void GridFormer::createUnits(StageOp stage, IntegerAttr source) {
   };
   log = OpenLogOp::create(rewriter, loc, WriterType::get(rewriter.getContext()),
                           bins);
+  // The kernel's name for who runs it: its stage, and where that stands.
+  auto origin = NameLoc::get(stage.getSymNameAttr(), work->getLoc());
   launch = gpu::LaunchOp::create(
-      rewriter, loc, blocks, one, one, size, one, one,
+      rewriter, origin, blocks, one, one, size, one, one,
       /*dynamicSharedMemorySize=*/Value(), /*asyncTokenType=*/Type(),
       /*asyncDependencies=*/ValueRange(), /*workgroupAttributions=*/TypeRange(),
       /*privateAttributions=*/TypeRange(), Value(), Value(), Value(),

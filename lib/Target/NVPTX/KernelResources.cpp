@@ -5,17 +5,13 @@
 
 #include "Piko/Target/KernelResources.h"
 
+#include "Piko/Target/Assembler.h"
+
 #include "llvm/ADT/SetVector.h"
 #include "llvm/ADT/StringExtras.h"
 #include "llvm/IR/Constants.h"
 #include "llvm/IR/Instructions.h"
-#include "llvm/Support/FileSystem.h"
-#include "llvm/Support/FileUtilities.h"
 #include "llvm/Support/MathExtras.h"
-#include "llvm/Support/MemoryBuffer.h"
-#include "llvm/Support/Path.h"
-#include "llvm/Support/Program.h"
-#include "llvm/Support/raw_ostream.h"
 
 using namespace llvm;
 using namespace piko;
@@ -104,22 +100,6 @@ static std::vector<KernelResources> findKernels(const Module &module) {
 // From the assembler
 //===----------------------------------------------------------------------===//
 
-std::string piko::findAssembler() {
-  constexpr StringLiteral name = "ptxas";
-  if (auto found = sys::findProgramByName(name))
-    return *found;
-  const char *home = getenv("CUDA_HOME");
-  for (StringRef folder :
-       {StringRef(home ? home : ""), StringRef("/usr/local/cuda")}) {
-    SmallString<128> bin(folder);
-    sys::path::append(bin, "bin");
-    if (auto found = sys::findProgramByName(name, {bin.str()});
-        !folder.empty() && found)
-      return *found;
-  }
-  return "";
-}
-
 /// The number in front of `what` in a line.
 static int64_t getNumberBefore(StringRef line, StringRef what) {
   int64_t number = 0;
@@ -154,50 +134,6 @@ static void readReport(StringRef report,
   }
 }
 
-/// What the assembler prints about `ptx`.
-static Expected<std::string> assemble(StringRef assembler, StringRef ptx,
-                                      StringRef chip) {
-  SmallString<128> input, output;
-  if (auto error = sys::fs::createTemporaryFile("piko", "ptx", input))
-    return createStringError(error, "cannot make a temporary file");
-  FileRemover removeInput(input);
-  if (auto error = sys::fs::createTemporaryFile("piko", "txt", output))
-    return createStringError(error, "cannot make a temporary file");
-  FileRemover removeOutput(output);
-  std::error_code failed;
-  raw_fd_ostream stream(input, failed);
-  stream << ptx;
-  stream.close();
-  if (failed || stream.has_error())
-    return createStringError("cannot write '" + input + "'");
-  std::string architecture = ("-arch=" + chip).str();
-  std::string wrong;
-  StringRef arguments[] = {assembler, "-v",        architecture,
-                           "-o",      "/dev/null", input};
-  int result =
-      sys::ExecuteAndWait(assembler, arguments, std::nullopt,
-                          {StringRef(), StringRef(output), StringRef(output)},
-                          /*SecondsToWait=*/0, /*MemoryLimit=*/0, &wrong);
-  auto text = MemoryBuffer::getFile(output);
-  std::string report = text ? (*text)->getBuffer().str() : "";
-  if (result != 0)
-    return createStringError(
-        assembler + " refuses the kernels: " +
-        (wrong.empty() ? StringRef(report).trim() : StringRef(wrong)));
-  return report;
-}
-
-/// Each toolkit leaves out chips that the one before it knew.
-static bool knowsChip(StringRef assembler, StringRef chip) {
-  std::string empty =
-      (".version 6.0\n.target " + chip + "\n.address_size 64\n").str();
-  Expected<std::string> report = assemble(assembler, empty, chip);
-  if (report)
-    return true;
-  consumeError(report.takeError());
-  return false;
-}
-
 Expected<KernelReport> piko::measureKernels(const Module &module, StringRef ptx,
                                             StringRef chip) {
   KernelReport result{findKernels(module), "ptxas"};
@@ -206,14 +142,14 @@ Expected<KernelReport> piko::measureKernels(const Module &module, StringRef ptx,
     result.source = "no ptxas was found to say the rest";
     return result;
   }
-  Expected<std::string> report = assemble(assembler, ptx, chip);
-  if (report) {
-    readReport(*report, result.kernels);
+  Expected<Assembly> assembly = assemble(assembler, ptx, chip);
+  if (assembly) {
+    readReport(assembly->report, result.kernels);
     return result;
   }
   if (knowsChip(assembler, chip))
-    return report.takeError();
-  consumeError(report.takeError());
+    return assembly.takeError();
+  consumeError(assembly.takeError());
   result.source = ("the ptxas that was found does not know " + chip).str();
   return result;
 }

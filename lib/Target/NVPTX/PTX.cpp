@@ -14,22 +14,33 @@
 using namespace llvm;
 using namespace piko;
 
-static constexpr const char *defaultProcessor = "sm_90";
+static constexpr const char *defaultProcessor = "sm_90",
+                            *nvptx = "nvptx64-nvidia-cuda";
 
-static Expected<std::unique_ptr<TargetMachine>>
-createMachine(StringRef processor, int optLevel) {
+static Expected<const Target *> findTarget(const Triple &triple,
+                                           StringRef processor) {
   LLVMInitializeNVPTXTargetInfo();
   LLVMInitializeNVPTXTarget();
   LLVMInitializeNVPTXTargetMC();
   LLVMInitializeNVPTXAsmPrinter();
-  Triple triple("nvptx64-nvidia-cuda");
   Expected<const Target *> target = lookUpTarget(triple);
-  if (!target)
-    return target.takeError();
-  if (!hasProcessor(**target, triple, processor))
+  if (target && !hasProcessor(**target, triple, processor))
     return createStringError("there is no processor '" + processor +
                              "' for PTX; expected a name such as '" +
                              defaultProcessor + "'");
+  return target;
+}
+
+Error piko::checkChip(StringRef chip) {
+  return findTarget(Triple(nvptx), chip).takeError();
+}
+
+static Expected<std::unique_ptr<TargetMachine>>
+createMachine(StringRef processor, int optLevel) {
+  Triple triple(nvptx);
+  Expected<const Target *> target = findTarget(triple, processor);
+  if (!target)
+    return target.takeError();
   llvm::TargetOptions flags;
   // Contraction would give bits that a CPU does not.
   flags.AllowFPOpFusion = FPOpFusion::Strict;
@@ -72,21 +83,4 @@ Expected<std::string> piko::generatePTX(Module &module, StringRef processor,
   alignBlockMemory(module);
   return emitCode(module, **machine, {.level = optLevel},
                   CodeGenFileType::AssemblyFile);
-}
-
-Error piko::embedPTX(Module &host, Module &kernels, StringRef name,
-                     StringRef processor, int optLevel) {
-  Expected<std::string> text = generatePTX(kernels, processor, optLevel);
-  if (!text)
-    return text.takeError();
-  GlobalVariable *declared = host.getGlobalVariable(name);
-  if (!declared)
-    return createStringError("expected '" + name + "' in the host's code");
-  Constant *bytes = ConstantDataArray::getString(host.getContext(), *text);
-  auto *image = new GlobalVariable(host, bytes->getType(), /*isConstant=*/true,
-                                   GlobalValue::InternalLinkage, bytes);
-  declared->replaceAllUsesWith(image);
-  image->takeName(declared);
-  declared->eraseFromParent();
-  return Error::success();
 }

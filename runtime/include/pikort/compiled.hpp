@@ -17,6 +17,9 @@
 // copyable, such as the one that the pipeline's C++ names; numbers must be of
 // the same kind.
 //
+// pipelines::DrawPipe pipe{piko::rt::Device{1}} is on the second device, where
+// the program has code for one.
+//
 // A call that can fail returns a status. If nobody looks at it, it is thrown,
 // as a piko::Error. Without exceptions, run() fails while something is not
 // bound.
@@ -44,6 +47,8 @@ class CompiledPipeline {
 public:
   /// How the creation went; where it failed, all else fails.
   const Status &created() const { return pipe.created(); }
+  /// The device that it is on; PIKORT_PROCESSOR if on none.
+  Device device() const { return pipe.device(); }
   /// For the C functions; still owned by this object.
   pikort_pipeline *get() const { return pipe.get(); }
 
@@ -115,8 +120,9 @@ protected:
   /// Hands the state's constants over before each run.
   using Bind = Status (*)(CompiledPipeline &);
 
-  CompiledPipeline(const pikort_program &program, Bind constants)
-      : pipe(program), bind(constants) {}
+  CompiledPipeline(const pikort_program &program, Bind constants,
+                   Device device = {})
+      : pipe(program, device), bind(constants) {}
   CompiledPipeline(CompiledPipeline &&) = default;
   ~CompiledPipeline() = default;
 

@@ -126,9 +126,23 @@ PIKORT_API void pikoir_grid_launch(pikort_pipeline *p,
                                    int64_t threads, const void *arguments,
                                    int64_t seed);
 
-/// In a program's setup: its grids run on a CUDA device, which has the kernels
-/// of `ptx`, text that ends with a zero byte and lives as long as the program.
-PIKORT_API void pikoir_cuda_module(pikort_pipeline *p, const char *ptx);
+/// What a CUDA device may load: PTX, text that ends with a zero byte, or a
+/// cubin.
+typedef struct pikoir_cuda_image {
+  int32_t chip;     ///< Of a cubin, 10 * major + minor; of PTX, 0.
+  int32_t is_exact; ///< A cubin for devices of just this number.
+  const void *data; ///< Null behind the last one.
+} pikoir_cuda_image;
+
+/// In a program's setup: its grids run on a CUDA device, which loads one of
+/// `images`: the latest cubin that fits it, or else the PTX. They live as long
+/// as the program.
+PIKORT_API void pikoir_cuda_module(pikort_pipeline *p,
+                                   const pikoir_cuda_image *images);
+/// Behind it, for messages: the stage of a kernel, and where that stands, as
+/// "file:line" or "".
+PIKORT_API void pikoir_cuda_kernel(pikort_pipeline *p, const char *kernel,
+                                   const char *stage, const char *place);
 /// Runs a grid there and waits for it; `arguments` are `count` words of eight
 /// bytes.
 PIKORT_API void pikoir_cuda_launch(pikort_pipeline *p, const char *kernel,

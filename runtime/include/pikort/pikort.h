@@ -24,7 +24,7 @@ extern "C" {
 #endif
 
 /// Changes whenever generated code and runtime would no longer fit together.
-#define PIKORT_ABI_VERSION 6u
+#define PIKORT_ABI_VERSION 7u
 /// The most cells that a domain may have in a dimension, so that sums of
 /// coordinates and small numbers do not wrap around.
 #define PIKORT_MAX_EXTENT 1073741824
@@ -74,6 +74,17 @@ enum pikort_status {
 /// only pikort_message and pikort_destroy.
 PIKORT_API int32_t pikort_create(const pikort_program *program,
                                  pikort_pipeline **pipeline);
+/// Which device runs the grids of a program that has code for one: its number,
+/// from 0, or one of these.
+enum {
+  PIKORT_ANY_DEVICE = -1, ///< $PIKO_CUDA_DEVICE or 0; the processor, if the
+                          ///< program has code for it and there is no device.
+  PIKORT_PROCESSOR = -2   ///< None: the program's code for the processor.
+};
+/// The same on a device. It is no error if the program has code for the
+/// processor alone, and one if there is no such device.
+PIKORT_API int32_t pikort_create_on(const pikort_program *program,
+                                    int32_t device, pikort_pipeline **pipeline);
 /// Frees a pipeline and all its memory; null is allowed.
 PIKORT_API void pikort_destroy(pikort_pipeline *pipeline);
 /// What the latest failed call had to say; "" if none failed. Valid until the
@@ -83,6 +94,23 @@ PIKORT_API const char *pikort_name(const pikort_pipeline *pipeline);
 /// The processor that the code is for which the pipeline runs, by the name that
 /// pikoc was given; "" where the program does not say.
 PIKORT_API const char *pikort_processor(const pikort_pipeline *pipeline);
+/// The number of the device that runs the pipeline's grids, or
+/// PIKORT_PROCESSOR.
+PIKORT_API int32_t pikort_device(const pikort_pipeline *pipeline);
+
+// --- Devices ----------------------------------------------------------------
+
+typedef struct pikort_device_info {
+  char name[64];
+  int32_t capability; ///< Of compute, 10 * major + minor.
+  int32_t usable;     ///< 1 if pipelines can be on it.
+  int64_t memory;     ///< In bytes.
+} pikort_device_info;
+
+/// The CUDA devices of this machine; 0 if it has no driver for them.
+PIKORT_API int32_t pikort_device_count(void);
+/// PIKORT_NOT_FOUND if there is none of this number.
+PIKORT_API int32_t pikort_get_device(int32_t device, pikort_device_info *info);
 
 // --- Options ----------------------------------------------------------------
 

@@ -40,11 +40,16 @@ template <class T> struct View {
   }
 };
 
+/// Which device a pipeline is on, as pikort_create_on takes it.
+struct Device {
+  int32_t number = PIKORT_ANY_DEVICE;
+};
+
 class Pipeline {
 public:
   /// Makes a pipeline; see created() for how that went.
-  explicit Pipeline(const pikort_program &program) {
-    int32_t code = pikort_create(&program, &handle_);
+  explicit Pipeline(const pikort_program &program, Device device = {}) {
+    int32_t code = pikort_create_on(&program, device.number, &handle_);
     created_ = status(code);
   }
   Pipeline(Pipeline &&other) noexcept
@@ -61,6 +66,8 @@ public:
 
   /// How the creation went.
   const Status &created() const { return created_; }
+  /// The device that it is on; PIKORT_PROCESSOR if on none.
+  Device device() const { return {pikort_device(handle_)}; }
   /// For the C functions; still owned by this object.
   pikort_pipeline *get() const { return handle_; }
 

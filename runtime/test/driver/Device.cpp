@@ -26,6 +26,8 @@ constexpr ErrorName errorNames[] = {
      "driver shutting down"},
     {CUDA_ERROR_STUB_LIBRARY, "CUDA_ERROR_STUB_LIBRARY",
      "the driver is a stub library"},
+    {CUDA_ERROR_DEVICE_UNAVAILABLE, "CUDA_ERROR_DEVICE_UNAVAILABLE",
+     "the device cannot run anything now"},
     {CUDA_ERROR_NO_DEVICE, "CUDA_ERROR_NO_DEVICE", "no device is there"},
     {CUDA_ERROR_INVALID_DEVICE, "CUDA_ERROR_INVALID_DEVICE",
      "invalid number of a device"},
@@ -267,6 +269,23 @@ CUresult piko::cuda::cuDevicePrimaryCtxRelease(CUdevice device) {
   if (!found->failed)
     state().leaks += found->describe();
   state().devices[static_cast<size_t>(device)] = std::make_unique<Context>();
+  return CUDA_SUCCESS;
+}
+
+CUresult piko::cuda::cuDevicePrimaryCtxReset(CUdevice device) {
+  Call call(__func__, Needs::Initialization);
+  if (CUresult error = call.refused())
+    return error;
+  Context *found = primary(device);
+  if (!found)
+    return call.fail(CUDA_ERROR_INVALID_DEVICE, std::to_string(device));
+  // The same handle, so that who goes on with what was there is found out.
+  auto fresh = std::make_unique<Context>();
+  fresh->references = found->references;
+  fresh->handle = found->handle;
+  if (!found->failed)
+    state().leaks += found->describe();
+  state().devices[static_cast<size_t>(device)] = std::move(fresh);
   return CUDA_SUCCESS;
 }
 

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <dlfcn.h>
+#include <elf.h>
 
 using namespace piko::testdriver;
 
@@ -152,11 +153,21 @@ TEST_F(DriverCallsTest, LaunchesThatCannotBe) {
 
 TEST_F(DriverCallsTest, ModulesThatAreNotValid) {
   CUmodule loaded = nullptr;
-  EXPECT_EQ(cuModuleLoadDataEx(&loaded,
-                               "\x7f"
-                               "ELF",
-                               0, nullptr, nullptr),
+  Elf64_Ehdr elf{};
+  std::memcpy(elf.e_ident, ELFMAG, SELFMAG);
+  EXPECT_EQ(cuModuleLoadDataEx(&loaded, &elf, 0, nullptr, nullptr),
             CUDA_ERROR_INVALID_IMAGE);
+  elf.e_ident[EI_CLASS] = ELFCLASS64;
+  elf.e_machine = 190;
+  elf.e_flags = 0x56;
+  EXPECT_EQ(cuModuleLoadDataEx(&loaded, &elf, 0, nullptr, nullptr),
+            CUDA_ERROR_NO_BINARY_FOR_GPU);
+  EXPECT_NE(error().find("a cubin for sm_86"), error().npos) << error();
+  elf.e_ident[EI_ABIVERSION] = 8;
+  elf.e_flags = 0x6005a04;
+  EXPECT_EQ(cuModuleLoadDataEx(&loaded, &elf, 0, nullptr, nullptr),
+            CUDA_ERROR_NO_BINARY_FOR_GPU);
+  EXPECT_NE(error().find("a cubin for sm_90"), error().npos) << error();
   EXPECT_EQ(cuModuleLoadDataEx(&loaded,
                                ".version 7.8 .target sm_100 .address_size 64",
                                0, nullptr, nullptr),

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <elf.h>
 
 using namespace piko::testdriver;
 using namespace piko::cuda;
@@ -155,12 +156,26 @@ void Loader::decodeFunctions() {
   }
 }
 
-bool isBinary(const char *image) {
-  return std::memcmp(image,
-                     "\x7f"
-                     "ELF",
-                     4) == 0 ||
-         std::memcmp(image, "\x50\xed\x55\xba", 4) == 0;
+/// What is wrong with an image that is not the text of PTX; a cubin is for no
+/// device here, whichever chip it is for.
+std::pair<CUresult, std::string> refuse(const char *image) {
+  Elf64_Ehdr header;
+  constexpr uint16_t cuda = 190;
+  if (std::memcmp(image, ELFMAG, SELFMAG) != 0)
+    return {CUDA_ERROR_INVALID_IMAGE, "expected the text of PTX"};
+  std::memcpy(&header, image, sizeof(header));
+  if (header.e_ident[EI_CLASS] != ELFCLASS64 || header.e_machine != cuda)
+    return {CUDA_ERROR_INVALID_IMAGE, "expected a cubin, but got another ELF"};
+  // Toolkits from 13 on have the chip in another byte.
+  uint32_t chip = header.e_flags >> (header.e_ident[EI_ABIVERSION] < 8 ? 0 : 8);
+  return {CUDA_ERROR_NO_BINARY_FOR_GPU, "a cubin for sm_" +
+                                            std::to_string(chip & 0xff) +
+                                            ", and this device runs PTX"};
+}
+
+bool isText(const char *image) {
+  return *image && std::memcmp(image, ELFMAG, SELFMAG) != 0 &&
+         std::memcmp(image, "\x50\xed\x55\xba", 4) != 0;
 }
 
 } // namespace
@@ -175,8 +190,10 @@ CUresult piko::cuda::cuModuleLoadDataEx(CUmodule *result, const void *image,
     return call.fail(CUDA_ERROR_INVALID_VALUE, "null");
   const Log log(count, options, values);
   const char *source = static_cast<const char *>(image);
-  if (!*source || isBinary(source))
-    return call.fail(CUDA_ERROR_INVALID_IMAGE, "expected the text of PTX");
+  if (!isText(source)) {
+    auto [error, text] = refuse(source);
+    return call.fail(error, text);
+  }
   try {
     Loader loader(call.context(), source);
     if (CUresult error = loader.load())

@@ -1,13 +1,21 @@
 // RUN: piko-opt %s --piko-gpu-to-nvvm --convert-gpu-to-cuda | FileCheck %s
 
-// The setup names the image, which is made when the module is translated; a
-// launch names the kernel and has its arguments in memory, eight bytes each.
+// The setup names the images, which are made when the module is translated; a
+// launch names the kernel and has its arguments in memory, eight bytes each. Of
+// kernels whose stage is known the setup says it.
 // CHECK-DAG:   llvm.mlir.global internal constant @k.name("k\00")
-// CHECK-DAG:   llvm.mlir.global external constant @Dots_gpu.ptx()
+// CHECK-DAG:   llvm.mlir.global internal constant @k.stage("draw\00")
+// CHECK-DAG:   llvm.mlir.global internal constant @k.place("dots.cpp:17\00")
+// CHECK-DAG:   llvm.mlir.global external constant @Dots_gpu.images()
 // CHECK-LABEL: func.func @Dots.setup(
 // CHECK-SAME:      %[[P:.*]]: !llvm.ptr)
-// CHECK:         %[[IMAGE:.*]] = llvm.mlir.addressof @Dots_gpu.ptx
-// CHECK:         llvm.call @pikoir_cuda_module(%[[P]], %[[IMAGE]])
+// CHECK:         %[[IMAGES:.*]] = llvm.mlir.addressof @Dots_gpu.images
+// CHECK:         llvm.call @pikoir_cuda_module(%[[P]], %[[IMAGES]])
+// CHECK:         %[[KERNEL:.*]] = llvm.mlir.addressof @k.name
+// CHECK:         %[[STAGE:.*]] = llvm.mlir.addressof @k.stage
+// CHECK:         %[[PLACE:.*]] = llvm.mlir.addressof @k.place
+// CHECK:         llvm.call @pikoir_cuda_kernel(%[[P]], %[[KERNEL]], %[[STAGE]], %[[PLACE]])
+// CHECK-NOT:     pikoir_cuda_kernel
 // CHECK-LABEL: func.func @launch(
 // CHECK-SAME:      %[[FRAME:.*]]: !llvm.ptr, %[[N:.*]]: index, %[[Q:.*]]: !llvm.ptr, %[[X:.*]]: f32)
 // CHECK:         %[[ARGUMENTS:.*]] = llvm.alloca
@@ -35,6 +43,9 @@ module attributes {gpu.container_module} {
   gpu.module @Dots_gpu {
     gpu.func @k(%p: !llvm.ptr, %x: f32) kernel {
       llvm.store %x, %p : f32, !llvm.ptr
+      gpu.return
+    } loc("draw"("dots.cpp":17:8))
+    gpu.func @unknown() kernel {
       gpu.return
     }
   }

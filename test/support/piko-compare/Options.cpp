@@ -90,7 +90,10 @@ Options parseOptions(int argc, char **argv) {
     } else if (name == "--gpu-threads")
       options.gpu.threads =
           toNumbers<int64_t>(words.takeValues(name, false))[0];
-    else if (name == "--gpu-seed")
+    else if (name == "--gpu-chip") {
+      if (!options.gpu.setChips(words.takeValues(name, false)[0]))
+        throw std::runtime_error("expected --gpu-chip sm_90,..");
+    } else if (name == "--gpu-seed")
       options.gpu.seed = toNumbers<int64_t>(words.takeValues(name, false))[0];
     else if (name == "--threads")
       options.threads = toNumbers<int>(words.takeValues(name, true));

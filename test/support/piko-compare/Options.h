@@ -56,7 +56,8 @@ struct Options {
   /// Checking mode, on both sides.
   piko::CheckOptions check;
   piko::SynthesisOptions synthesis;
-  /// --target gpu-on-cpu, --gpu-threads N (0 = as the stage says), --gpu-seed N.
+  /// --target gpu-on-cpu, --gpu-threads N (0 = as the stage says), --gpu-seed N,
+  /// --gpu-chip NAME,..
   piko::GPUOptions gpu;
   /// Of the reference executor's code; --no-cache.
   piko::CacheOptions cache;

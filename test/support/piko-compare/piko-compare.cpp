@@ -9,7 +9,8 @@
 //                [--timeout SECONDS] [--strip N] [--budget BYTES]
 //                [--check[=nan:RECORD.FIELD,..]]
 //                [--target gpu-on-cpu] [--gpu-threads N] [--gpu-seed N]
-//                [--tolerance X] [--cpu NAME] [--no-cache]
+//                [--gpu-chip NAME,..] [--tolerance X] [--cpu NAME]
+//                [--no-cache]
 //
 // Options.h says what the options mean, Run.h what the input is. With --cases
 // each line of that file is a case, with the options --pipe to --loop-limit; a
