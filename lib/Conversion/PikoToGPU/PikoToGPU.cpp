@@ -138,6 +138,17 @@ LogicalResult GridBuilder::findItems() {
                  !items.getBody()->getOps<ItemOp>().empty());
 }
 
+/// Where the first phase of the work stands.
+static Location findPhase(Operation *work) {
+  Location place = work->getLoc();
+  work->walk<WalkOrder::PreOrder>([&](WorkOpInterface phase) {
+    place = phase.getLoc();
+    return WalkResult::interrupt();
+  });
+  return place;
+}
+
+/// The launch has a name for who runs it: its stage, and where that stands.
 void GridFormer::createUnits(StageOp stage, IntegerAttr source) {
   auto type = BinsType::get(rewriter.getContext(), stage.getInputAttr());
   bins = OpenBinsOp::create(rewriter, loc, type,
@@ -158,8 +169,7 @@ void GridFormer::createUnits(StageOp stage, IntegerAttr source) {
   };
   log = OpenLogOp::create(rewriter, loc, WriterType::get(rewriter.getContext()),
                           bins);
-  // The kernel's name for who runs it: its stage, and where that stands.
-  auto origin = NameLoc::get(stage.getSymNameAttr(), work->getLoc());
+  auto origin = NameLoc::get(stage.getSymNameAttr(), findPhase(work));
   launch = gpu::LaunchOp::create(
       rewriter, origin, blocks, one, one, size, one, one,
       /*dynamicSharedMemorySize=*/Value(), /*asyncTokenType=*/Type(),
