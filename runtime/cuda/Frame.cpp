@@ -33,8 +33,10 @@ bool Frame::isPossible() const {
 }
 
 bool Frame::begin() {
-  if (!isPossible())
+  if (!isPossible()) {
+    clearLog();
     return false;
+  }
   if (!places_)
     takeMemory();
   std::memset(places_.data(), 0,
@@ -235,8 +237,10 @@ Frame::Outcome Frame::finish() {
   std::span<uint8_t> room;
   if (!needsHost_)
     room = device_.logSpace();
-  if (room.empty())
+  if (room.empty()) {
+    clearLog();
     return Outcome::Repeat;
+  }
   auto begin = reinterpret_cast<int64_t>(room.data());
   FrameState &frame = frame_[0];
   frame = {};
@@ -255,8 +259,13 @@ Frame::Outcome Frame::finish() {
     noteStatistics();
     return Outcome::Done;
   }
-  device_.clearLog(std::exchange(used_, {}));
+  clearLog();
   return keepsState() ? Outcome::Spoilt : Outcome::Repeat;
+}
+
+void Frame::clearLog() {
+  if (!used_.empty())
+    device_.clearLog(std::exchange(used_, {}));
 }
 
 bool Frame::keepsState() const {

@@ -69,6 +69,8 @@ private:
   int64_t mostItems(const JoinArgs &args) const;
   const uint8_t *clearRecord(const rt::State &state);
   void noteStatistics();
+  /// Makes the log zero again, as the host's way needs it.
+  void clearLog();
   /// Whether the run has changed state that it did not clear.
   bool keepsState() const;
 
