@@ -139,6 +139,7 @@ TEST_F(LostDevice, NewPipelineResetsIt) {
 // Also if the host keeps its context alive.
 TEST_F(LostDevice, IsResetWhenItsPipelinesAreGone) {
   CUcontext context = nullptr;
+  ASSERT_EQ(cuInit(0), CUDA_SUCCESS);
   ASSERT_EQ(cuDevicePrimaryCtxRetain(&context, 0), CUDA_SUCCESS);
   {
     piko::rt::Pipeline pipe(program, Device{0});
