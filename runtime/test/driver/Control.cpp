@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //===- Control.cpp - Control of the driver for tests ----------------------===//
 
+#include "Counts.h"
 #include "State.h"
-
-#include <array>
 
 using namespace piko::testdriver;
 using piko::cuda::CUresult;
@@ -11,18 +10,6 @@ using piko::cuda::CUresult;
 namespace {
 
 using Lock = std::lock_guard<std::recursive_mutex>;
-
-/// Every member of the counts, one after the other.
-using Numbers =
-    std::array<uint64_t, sizeof(PikoTestDriverCounts) / sizeof(uint64_t)>;
-
-void add(PikoTestDriverCounts &sum, const PikoTestDriverCounts &counts) {
-  auto total = std::bit_cast<Numbers>(sum);
-  const auto more = std::bit_cast<Numbers>(counts);
-  for (size_t i = 0; i < total.size(); ++i)
-    total[i] += more[i];
-  sum = std::bit_cast<PikoTestDriverCounts>(total);
-}
 
 } // namespace
 
@@ -74,7 +61,7 @@ pikoTestDriverCounts(const char *kernel, struct PikoTestDriverCounts *counts) {
   *counts = {};
   for (const auto &[name, of] : state().counts)
     if (!kernel || name == kernel)
-      add(*counts, of);
+      addCounts(of, *counts);
   return counts->launches == 0;
 }
 

@@ -114,7 +114,7 @@ int attributeOf(CUdevice_attribute attribute) {
   case CU_DEVICE_ATTRIBUTE_CLOCK_RATE:
     return 1000000;
   case CU_DEVICE_ATTRIBUTE_MULTIPROCESSOR_COUNT:
-    return multiprocessors;
+    return state().multiprocessors;
   case CU_DEVICE_ATTRIBUTE_MAX_THREADS_PER_MULTIPROCESSOR:
     return 2048;
   case CU_DEVICE_ATTRIBUTE_UNIFIED_ADDRESSING:

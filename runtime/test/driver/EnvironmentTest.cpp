@@ -25,6 +25,10 @@ TEST(EnvironmentTest, IsRead) {
                 &value, CU_DEVICE_ATTRIBUTE_COMPUTE_CAPABILITY_MINOR, 1),
             CUDA_SUCCESS);
   EXPECT_EQ(value, 5);
+  EXPECT_EQ(
+      cuDeviceGetAttribute(&value, CU_DEVICE_ATTRIBUTE_MULTIPROCESSOR_COUNT, 0),
+      CUDA_SUCCESS);
+  EXPECT_EQ(value, 132);
   ASSERT_EQ(cuDevicePrimaryCtxRetain(&context, 1), CUDA_SUCCESS);
   ASSERT_EQ(cuCtxSetCurrent(context), CUDA_SUCCESS);
   EXPECT_EQ(cuModuleLoadDataEx(&module,

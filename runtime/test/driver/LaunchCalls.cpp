@@ -68,7 +68,7 @@ CUresult prepare(const Call &call, Kernel &kernel, void **parameters) {
   const auto &blocks = kernel.blocks, &threads = kernel.threads;
   const uint64_t count = uint64_t(blocks[0]) * blocks[1] * blocks[2];
   const int most =
-      multiprocessors *
+      state().multiprocessors *
       residentBlocks(program,
                      static_cast<int>(threads[0] * threads[1] * threads[2]),
                      kernel.sharedBytes);

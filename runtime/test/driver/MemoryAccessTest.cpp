@@ -114,26 +114,6 @@ TEST_F(MemoryAccessTest, Atomics) {
   EXPECT_EQ(out[5], 32u % 10);
 }
 
-TEST_F(MemoryAccessTest, Counts) {
-  pikoTestDriverReset();
-  run("ld.global.b64 %rd6, [%rd3]; setp.lt.u32 %p1, %r1, 8;"
-      "@%p1 st.global.b64 [%rd4], %rd6;");
-  PikoTestDriverCounts counts;
-  ASSERT_EQ(pikoTestDriverCounts("k", &counts), 0);
-  EXPECT_EQ(counts.launches, 1u);
-  EXPECT_EQ(counts.threads, 32u);
-  EXPECT_EQ(counts.warpInstructions, 13u);
-  EXPECT_EQ(counts.laneInstructions, 12u * 32 + 8);
-  EXPECT_EQ(counts.loadGlobal, 1u);
-  EXPECT_EQ(counts.storeGlobal, 1u);
-  EXPECT_EQ(counts.parameter, 2u);
-  EXPECT_EQ(counts.globalBytes, 32u * 8 + 8 * 8);
-  EXPECT_EQ(counts.globalSectors, 8u + 2);
-  EXPECT_STREQ(pikoTestDriverKernels(), "k\n");
-  EXPECT_EQ(pikoTestDriverCounts("other", &counts), 1);
-  EXPECT_EQ(counts.launches, 0u);
-}
-
 TEST_F(MemoryAccessTest, BeyondAnAllocation) {
   std::string text =
       runFaulty("st.global.b32 [%rd3+880], %r1;", CUDA_ERROR_ILLEGAL_ADDRESS);

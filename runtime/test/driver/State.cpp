@@ -3,6 +3,8 @@
 
 #include "State.h"
 
+#include "Counts.h"
+
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -44,9 +46,12 @@ State::State() {
   for (uint64_t device = 0; device < count; ++device)
     devices.push_back(std::make_unique<Context>());
   capability = static_cast<int>(numberFrom("PIKO_TEST_DRIVER_SM", 90));
+  multiprocessors =
+      static_cast<int>(numberFrom("PIKO_TEST_DRIVER_MULTIPROCESSORS", 4));
   memoryLimit = numberFrom("PIKO_TEST_DRIVER_MEMORY", memoryLimit);
   seed = numberFrom("PIKO_TEST_DRIVER_SEED", 0);
-  printsCounts = numberFrom("PIKO_TEST_DRIVER_COUNTS", 0) != 0;
+  if (const char *counts = std::getenv("PIKO_TEST_DRIVER_COUNTS"))
+    countsGoTo = counts == std::string_view("0") ? "" : counts;
   printsErrors = numberFrom("PIKO_TEST_DRIVER_ERRORS", 0) != 0;
   failures = parseFailures(std::getenv("PIKO_TEST_DRIVER_FAIL"));
 }
@@ -68,28 +73,48 @@ static void printHostCounts(const PikoTestDriverHostCounts &it) {
                number(it.waits));
 }
 
+/// {"kernels": {NAME: {COUNT: n, ..}, ..}, "host": {COUNT: n, ..},
+/// "calls": {FUNCTION: n, ..}}
+static void writeCounts(const State &at) {
+  std::FILE *file = std::fopen(at.countsGoTo.c_str(), "w");
+  if (!file) {
+    std::fprintf(stderr, "PIKO_TEST_DRIVER_COUNTS: cannot write '%s'\n",
+                 at.countsGoTo.c_str());
+    return;
+  }
+  const char *separator = "\n";
+  std::fputs("{\"kernels\": {", file);
+  for (const auto &[kernel, counts] : at.counts) {
+    std::fprintf(file, "%s\"%s\": %s", separator, kernel.c_str(),
+                 toJSON(counts).c_str());
+    separator = ",\n";
+  }
+  std::fprintf(file, "},\n\"host\": %s", toJSON(at.hostCounts).c_str());
+  std::fputs(",\n\"calls\": {", file);
+  separator = "";
+  for (const auto &[function, count] : at.calls) {
+    std::fprintf(file, "%s\"%s\": %llu", separator, function.c_str(),
+                 static_cast<unsigned long long>(count));
+    separator = ", ";
+  }
+  std::fputs("}}\n", file);
+  std::fclose(file);
+}
+
 /// When the library is unloaded, after the program's own objects are destroyed.
 [[gnu::destructor]] static void report() {
   const State &at = state();
   if (!at.leaks.empty())
     std::fprintf(stderr, "driver for tests: alive at the end of a context:\n%s",
                  at.leaks.c_str());
-  if (!at.printsCounts)
-    return;
-  printHostCounts(at.hostCounts);
-  for (const auto &[kernel, it] : at.counts)
-    std::fprintf(
-        stderr,
-        "%s: %llu launches, %llu warp instructions, %.1f %% of lanes, %llu "
-        "bytes of global memory in %llu sectors\n",
-        kernel.c_str(), static_cast<unsigned long long>(it.launches),
-        static_cast<unsigned long long>(it.warpInstructions),
-        it.warpInstructions
-            ? 100.0 * static_cast<double>(it.laneInstructions) /
-                  (32.0 * static_cast<double>(it.warpInstructions))
-            : 0.0,
-        static_cast<unsigned long long>(it.globalBytes),
-        static_cast<unsigned long long>(it.globalSectors));
+  if (at.countsGoTo == "1") {
+    printHostCounts(at.hostCounts);
+    for (const auto &[kernel, counts] : at.counts)
+      std::fprintf(stderr, "%s: %s\n", kernel.c_str(),
+                   describeCounts(counts).c_str());
+  } else if (!at.countsGoTo.empty()) {
+    writeCounts(at);
+  }
 }
 
 CUcontext &piko::testdriver::currentContext() {

@@ -88,9 +88,6 @@ struct Module : ptx::Symbols {
   }
 };
 
-/// Of a device.
-inline constexpr int multiprocessors = 4;
-
 /// Blocks that run at the same time on a multiprocessor.
 int residentBlocks(const ptx::Program &program, int threads,
                    size_t dynamicSharedBytes);
@@ -175,10 +172,12 @@ struct State {
   std::recursive_mutex lock;
   bool initialized = false;
   std::vector<std::unique_ptr<Context>> devices;
-  int capability = 90; ///< 10 * major + minor.
+  int capability = 90;     ///< 10 * major + minor.
+  int multiprocessors = 4; ///< That a device says to have.
   uint64_t memoryLimit = uint64_t(16) << 30;
   uint64_t seed = 0;
-  bool printsCounts = false, printsErrors = false;
+  std::string countsGoTo; ///< As the environment says; empty: nowhere.
+  bool printsErrors = false;
 
   std::vector<Failure> failures;
   std::map<std::string, uint64_t, std::less<>> calls;

@@ -25,6 +25,8 @@
 //
 //   PIKO_TEST_DRIVER_DEVICES   devices; 1
 //   PIKO_TEST_DRIVER_SM        compute capability, 10 * major + minor; 90
+//   PIKO_TEST_DRIVER_MULTIPROCESSORS
+//                              that a device says to have; 4
 //   PIKO_TEST_DRIVER_MEMORY    bytes that cuMemAlloc has; 16 GiB
 //   PIKO_TEST_DRIVER_SEED      order of blocks, of warps and their turns, and
 //                              of lanes in atomic operations; 0: as numbered
@@ -32,7 +34,9 @@
 //                              than one with commas
 //   PIKO_TEST_DRIVER_ERRORS    1: texts of errors to stderr as they come
 //   PIKO_TEST_DRIVER_COUNTS    1: counts of all kernels, and what the host has
-//                              asked for, to stderr at the end
+//                              asked for, to stderr at the end; else the name
+//                              of a file to write them to, and the numbers of
+//                              calls, as JSON
 //
 // The functions here may be called at any time, from any thread. Texts that
 // they return live until the calling thread's next call of the same function.
@@ -70,16 +74,23 @@ const char *pikoTestDriverAlive(void);
 /// runs for its active lanes, of which each is a lane instruction; lane
 /// utilization is laneInstructions / (32 * warpInstructions).
 struct PikoTestDriverCounts {
-  uint64_t launches, blocks, threads;
+  uint64_t launches, blocks, threads, warps;
   uint64_t warpInstructions, laneInstructions;
-  // Warp instructions by class.
-  uint64_t integer, float32, float64, move, control;
+  /// Of each launch, the most that one of its warps ran; summed.
+  uint64_t longestWarps;
+  // Warp instructions by class. Divisions are those that GPUs do by a sequence
+  // of instructions, as are remainders and correctly rounded roots.
+  uint64_t integer, integer64, float32, float64, special;
+  uint64_t integerDivision, float32Division, float64Division;
+  uint64_t convert, move, control;
   uint64_t loadGlobal, storeGlobal, loadShared, storeShared;
   uint64_t loadLocal, storeLocal, loadGeneric, storeGeneric;
   uint64_t parameter, atomic, barrier, warpOperation;
   /// Of global memory, atomic operations too: bytes that lanes ask for, and
   /// sectors of 32 bytes that warps touch.
   uint64_t globalBytes, globalSectors;
+  /// Sectors that a launch touches at least once; summed.
+  uint64_t distinctSectors;
 };
 
 /// Counts of a kernel, or of all if its name is null. Returns 0, or 1 if it was

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //===- Work.cpp - What streams do -----------------------------------------===//
 
+#include "Counts.h"
 #include "State.h"
 
 #include <cstring>
@@ -9,7 +10,6 @@
 using namespace piko::testdriver;
 using namespace piko::cuda;
 namespace ptx = piko::ptx;
-using piko::ptx::Class;
 using piko::ptx::FaultKind;
 
 namespace {
@@ -30,63 +30,6 @@ CUresult errorOf(FaultKind kind) {
   return CUDA_ERROR_LAUNCH_FAILED;
 }
 
-uint64_t &counterOf(PikoTestDriverCounts &counts, Class of) {
-  switch (of) {
-  case Class::Integer:
-    return counts.integer;
-  case Class::Single:
-    return counts.float32;
-  case Class::Double:
-    return counts.float64;
-  case Class::Move:
-    return counts.move;
-  case Class::Control:
-    return counts.control;
-  case Class::LoadGlobal:
-    return counts.loadGlobal;
-  case Class::StoreGlobal:
-    return counts.storeGlobal;
-  case Class::LoadShared:
-    return counts.loadShared;
-  case Class::StoreShared:
-    return counts.storeShared;
-  case Class::LoadLocal:
-    return counts.loadLocal;
-  case Class::StoreLocal:
-    return counts.storeLocal;
-  case Class::LoadGeneric:
-    return counts.loadGeneric;
-  case Class::StoreGeneric:
-    return counts.storeGeneric;
-  case Class::Parameter:
-    return counts.parameter;
-  case Class::Atomic:
-    return counts.atomic;
-  case Class::Barrier:
-    return counts.barrier;
-  case Class::WarpOperation:
-    break;
-  }
-  return counts.warpOperation;
-}
-
-void addCounts(const ptx::Launch &launch) {
-  PikoTestDriverCounts &counts = state().counts[launch.program.name];
-  const auto &blocks = launch.blocks, &threads = launch.threads;
-  uint64_t blockCount = uint64_t(blocks[0]) * blocks[1] * blocks[2];
-  ++counts.launches;
-  counts.blocks += blockCount;
-  counts.threads += blockCount * threads[0] * threads[1] * threads[2];
-  for (size_t pc = 0; pc < launch.sites.size(); ++pc) {
-    const ptx::Site &site = launch.sites[pc];
-    counts.warpInstructions += site.warps;
-    counts.laneInstructions += site.lanes;
-    counts.globalBytes += site.bytes;
-    counts.globalSectors += site.sectors;
-    counterOf(counts, launch.program.code[pc].counted) += site.warps;
-  }
-}
-
 void runKernel(const Call &call, const Kernel &kernel,
                ptx::Conditions *conditions) {
   Context &context = call.context();
@@ -102,7 +45,7 @@ void runKernel(const Call &call, const Kernel &kernel,
     // As a launch that runs while the host goes on.
     context.failed = call.fail(errorOf(fault.kind), fault.text);
   }
-  addCounts(launch);
+  addCounts(launch, state().counts[function.program.name]);
 }
 
 /// Where a part of the device's memory is in the host.

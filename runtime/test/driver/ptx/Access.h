@@ -34,12 +34,18 @@ public:
     seen[count++] = sector;
   }
   uint32_t size() const { return count; }
+  const uint64_t *begin() const { return seen.data(); }
+  const uint64_t *end() const { return seen.data() + count; }
 
 private:
   std::array<uint64_t, warpSize> seen;
   uint64_t greatest = 0;
   uint32_t count = 0;
 };
+
+/// Counts an access of the active lanes, each of so many bytes, to global
+/// memory.
+void countAccess(const Warp &warp, uint64_t bytes, const Sectors &sectors);
 
 inline uint8_t *inRegion(const Warp &warp, Space space, uint32_t lane,
                          uint64_t address, uint32_t bytes, uint8_t *region,

@@ -82,10 +82,7 @@ void change(Warp &warp, const Instruction &it) {
   const uint32_t from = allLanes << warp.firstLane;
   forEachLane(warp.active & from, one);
   forEachLane(warp.active & ~from, one);
-  warp.site->sectors += sectors.size();
-  if (sectors.size())
-    warp.site->bytes +=
-        sizeof(T) * static_cast<uint32_t>(std::popcount(warp.active));
+  countAccess(warp, sizeof(T), sectors);
 }
 
 template <Space space> Handler handlerFor(Type type) {

@@ -189,9 +189,10 @@ bool decodeSet(Decoding &d) {
   d.it.run = find(*comparison, type, flushes, std::make_index_sequence<14>());
   if (!d.it.run)
     d.fail("expected a comparison of this type");
-  d.it.counted = !type.isFloat()   ? Class::Integer
-                 : type.bits == 64 ? Class::Double
-                                   : Class::Single;
+  d.it.counted = type.isFloat()
+                     ? (type.bits == 64 ? Class::Double : Class::Single)
+                 : type.bits == 64 ? Class::Integer64
+                                   : Class::Integer;
   takePredicates(d);
   d.it.a = d.value(1, type);
   d.it.b = d.value(2, type);

@@ -222,7 +222,8 @@ bool piko::ptx::decodeConvert(Decoding &d) {
   if (d.take("sat"))
     d.it.variant |= saturates;
   d.finish(2);
-  d.it.counted = Class::Move;
+  // Between integers it is at most a move.
+  d.it.counted = from.isFloat() || to.isFloat() ? Class::Convert : Class::Move;
   d.it.result = d.wideResult(d.argument(0), to);
   d.it.a = d.wideValue(d.argument(1), from);
   const bool exact =

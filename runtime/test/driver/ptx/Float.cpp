@@ -205,6 +205,9 @@ bool decodeFunction(Decoding &d) {
   if (!approximate && !d.take("rn"))
     d.fail("expected .rn or .approx");
   Modifiers m = takeModifiers(d);
+  d.it.counted = approximate         ? Class::Special
+                 : m.type.bits == 64 ? Class::DoubleDivision
+                                     : Class::SingleDivision;
   if (approximate)
     d.it.run =
         m.type.bits == 32 ? approximationNamed(base, m.flushes) : nullptr;
@@ -239,6 +242,9 @@ bool decodeBinary(Decoding &d) {
              : base == "mul" ? binaryFor<Mul>(m)
              : base == "div" ? binaryFor<Div>(m)
                              : binaryFor<CopySign>(m);
+  if (base == "div")
+    d.it.counted =
+        m.type.bits == 64 ? Class::DoubleDivision : Class::SingleDivision;
   finishOperands(d, m.type, 2);
   return true;
 }

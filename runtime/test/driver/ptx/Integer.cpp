@@ -282,14 +282,17 @@ bool piko::ptx::decodeInteger(Decoding &d) {
   std::optional<Type> named = d.peekType();
   if (!named || named->isFloat() || named->isPredicate())
     return false;
-  d.it.counted = Class::Integer;
+  const bool isDivision = base == "div" || base == "rem";
+  d.it.counted = isDivision          ? Class::IntegerDivision
+                 : named->bits == 64 ? Class::Integer64
+                                     : Class::Integer;
   if (base == "mul" || base == "mad")
     return decodeMultiply(d, base == "mad");
   if (base == "addc" || base == "subc")
     return decodeCarry(d, base == "subc", true);
   const bool isUnary = base == "neg" || base == "abs";
-  const bool isBinary = base == "add" || base == "sub" || base == "div" ||
-                        base == "rem" || base == "min" || base == "max";
+  const bool isBinary = base == "add" || base == "sub" || base == "min" ||
+                        base == "max" || isDivision;
   if (!isUnary && !isBinary && base != "sad")
     return false;
 

@@ -346,7 +346,7 @@ bool decodeByName(Decoding &d) {
 bool piko::ptx::decodeLogic(Decoding &d) {
   if (!d.peekType())
     return false;
-  d.it.counted = Class::Integer;
+  d.it.counted = d.peekType()->bits == 64 ? Class::Integer64 : Class::Integer;
   if (!decodeByName(d))
     return false;
   if (!d.it.run)

@@ -98,8 +98,11 @@ Block::Turn Block::run() {
     bool ran = runWarps();
     if (arrived)
       ran |= releaseBarriers();
-    if (!liveThreads())
+    if (!liveThreads()) {
+      for (const auto &warp : warps)
+        launch.longestWarp = std::max(launch.longestWarp, warp->ran);
       return Turn::Ended;
+    }
     if (ran)
       continue;
     if (hasSleepers())

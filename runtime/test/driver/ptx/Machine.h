@@ -4,6 +4,7 @@
 #ifndef PIKO_TEST_DRIVER_PTX_MACHINE_H
 #define PIKO_TEST_DRIVER_PTX_MACHINE_H
 
+#include "ptx/Footprint.h"
 #include "ptx/Warp.h"
 
 #include <memory>
@@ -49,6 +50,9 @@ struct Launch {
   uint64_t seed = 0;
   Conditions *conditions = nullptr; ///< Of the graph that launches it.
   std::vector<Site> sites{};
+  Footprint footprint{};
+  /// The most that one warp ran.
+  uint64_t longestWarp = 0;
 };
 
 /// A block and its warps.

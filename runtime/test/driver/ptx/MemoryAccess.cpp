@@ -41,15 +41,20 @@ void piko::ptx::findRange(const Warp &warp, const Instruction &it,
   warp.site->distance = range.distance;
 }
 
-namespace {
-
-/// Counts an access to global memory.
-void count(const Warp &warp, const Instruction &it, const Sectors &sectors) {
+void piko::ptx::countAccess(const Warp &warp, uint64_t bytes,
+                            const Sectors &sectors) {
   if (!sectors.size())
     return;
   warp.site->sectors += sectors.size();
-  warp.site->bytes += uint64_t(it.element) * it.count *
-                      static_cast<uint32_t>(std::popcount(warp.active));
+  warp.site->bytes += bytes * static_cast<uint32_t>(std::popcount(warp.active));
+  for (uint64_t sector : sectors)
+    warp.block.launch.footprint.add(sector);
+}
+
+namespace {
+
+void count(const Warp &warp, const Instruction &it, const Sectors &sectors) {
+  countAccess(warp, uint64_t(it.element) * it.count, sectors);
 }
 
 /// One element of type M into a register of type R.

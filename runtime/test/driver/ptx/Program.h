@@ -33,10 +33,16 @@ struct Operand {
 
 /// What instructions are counted as.
 enum class Class : uint8_t {
-  Integer,
+  Integer,   ///< Of at most 32 bits.
+  Integer64, ///< Which GPUs do in pieces of 32 bits.
   Single,
   Double,
-  Move, ///< And conversions, selections, addresses of spaces.
+  Special,         ///< Approximations of a multiprocessor's special functions.
+  IntegerDivision, ///< And what other divisions and roots are sequences, too.
+  SingleDivision,
+  DoubleDivision,
+  Convert, ///< From or to floats.
+  Move,    ///< And selections, addresses of spaces.
   Control,
   LoadGlobal,
   StoreGlobal,

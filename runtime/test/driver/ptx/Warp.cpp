@@ -84,6 +84,7 @@ void Warp::reset() {
       else
         lanes<uint32_t>(it.place)[lane] = value;
     }
+  ran = 0;
   live = threads == warpSize ? allLanes : (1u << threads) - 1;
   groups.assign(1, Group());
   groups[0].state = Group::Ready;
@@ -93,13 +94,13 @@ void Warp::reset() {
 }
 
 bool Warp::run(uint32_t steps) {
-  bool ran = false;
+  bool any = false;
   while (steps && select()) {
     uint32_t taken = runGroup(steps);
     steps -= std::min(steps, taken);
-    ran = true;
+    any = true;
   }
-  return ran;
+  return any;
 }
 
 /// The group that was made last goes first: what has parted meets soon. One
@@ -128,6 +129,7 @@ uint32_t Warp::runGroup(uint32_t steps) {
   for (uint32_t step = 0; step < steps;) {
     if (next == end) {
       group.pc = next;
+      ran += step;
       finish(current);
       return step + 1;
     }
@@ -147,9 +149,12 @@ uint32_t Warp::runGroup(uint32_t steps) {
       site->lanes += static_cast<uint32_t>(std::popcount(active));
     }
     instruction.run(*this, instruction);
-    if (reselect)
+    if (reselect) {
+      ran += step;
       return step;
+    }
   }
+  ran += steps;
   group.pc = next;
   exhausted = true;
   return steps;

@@ -133,6 +133,7 @@ public:
   uint32_t pc = 0, next = 0;
   uint32_t live = 0;
   bool changed = false;   ///< Wrote what others may read, and it was new.
+  uint64_t ran = 0;       ///< Instructions of this block.
   Site *site = nullptr;   ///< Of the current instruction.
   uint32_t firstLane = 0; ///< Of atomic operations; others follow in a circle.
   uint64_t sharedBytes = 0;

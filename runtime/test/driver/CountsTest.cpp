@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//===- CountsTest.cpp - What is counted of kernels ------------------------===//
+
+#include "Counts.h"
+#include "DriverFixture.h"
+
+using namespace piko::testdriver;
+
+namespace {
+
+class CountsTest : public DriverTest {
+protected:
+  void SetUp() override {
+    DriverTest::SetUp();
+    pikoTestDriverReset();
+  }
+  static PikoTestDriverCounts counts() {
+    PikoTestDriverCounts counts;
+    pikoTestDriverCounts("k", &counts);
+    return counts;
+  }
+};
+
+TEST_F(CountsTest, OfMemory) {
+  run("ld.global.b64 %rd6, [%rd3]; setp.lt.u32 %p1, %r1, 8;"
+      "@%p1 st.global.b64 [%rd4], %rd6;");
+  PikoTestDriverCounts counts;
+  ASSERT_EQ(pikoTestDriverCounts("k", &counts), 0);
+  EXPECT_EQ(counts.launches, 1u);
+  EXPECT_EQ(counts.threads, 32u);
+  EXPECT_EQ(counts.warps, 1u);
+  EXPECT_EQ(counts.warpInstructions, 13u);
+  EXPECT_EQ(counts.laneInstructions, 12u * 32 + 8);
+  EXPECT_EQ(counts.loadGlobal, 1u);
+  EXPECT_EQ(counts.storeGlobal, 1u);
+  EXPECT_EQ(counts.parameter, 2u);
+  EXPECT_EQ(counts.globalBytes, 32u * 8 + 8 * 8);
+  EXPECT_EQ(counts.globalSectors, 8u + 2);
+  EXPECT_EQ(counts.distinctSectors, 8u + 2);
+  EXPECT_STREQ(pikoTestDriverKernels(), "k\n");
+  EXPECT_EQ(pikoTestDriverCounts("other", &counts), 1);
+  EXPECT_EQ(counts.launches, 0u);
+}
+
+// Both blocks read the same sectors, and write others.
+TEST_F(CountsTest, DistinctSectors) {
+  run("ld.global.b64 %rd6, [%rd1]; st.global.b64 [%rd4], %rd6;"
+      "ld.global.b64 %rd6, [%rd1+8];",
+      {}, 32, 2);
+  EXPECT_EQ(counts().globalSectors, 2u * (1 + 8 + 1));
+  EXPECT_EQ(counts().distinctSectors, 1u + 2 * 8);
+}
+
+TEST_F(CountsTest, Kinds) {
+  run("");
+  const PikoTestDriverCounts none = counts();
+  run(R"(
+    add.s32 %r5, %r1, 1;
+    and.b32 %r5, %r5, 3;
+    add.s64 %rd6, %rd3, %rd4;
+    setp.lt.s64 %p1, %rd6, 5;
+    div.u32 %r6, %r5, 7;
+    rem.u64 %rd7, %rd6, 7;
+    cvt.u64.u32 %rd8, %r5;
+    cvt.rn.f32.u32 %f1, %r5;
+    add.rn.f32 %f2, %f1, %f1;
+    div.rn.f32 %f2, %f1, %f1;
+    sqrt.rn.f32 %f2, %f1;
+    rcp.approx.f32 %f2, %f1;
+    cvt.f64.f32 %fd1, %f1;
+    add.rn.f64 %fd2, %fd1, %fd1;
+    div.rn.f64 %fd2, %fd1, %fd1;)");
+  const PikoTestDriverCounts it = counts();
+  // Twice what the kernel around them has.
+  auto of = [&](uint64_t PikoTestDriverCounts::*member) {
+    return it.*member - 2 * (none.*member);
+  };
+  EXPECT_EQ(of(&PikoTestDriverCounts::integer), 2u);
+  EXPECT_EQ(of(&PikoTestDriverCounts::integer64), 2u);
+  EXPECT_EQ(of(&PikoTestDriverCounts::integerDivision), 2u);
+  EXPECT_EQ(of(&PikoTestDriverCounts::move), 1u);
+  EXPECT_EQ(of(&PikoTestDriverCounts::convert), 2u);
+  EXPECT_EQ(of(&PikoTestDriverCounts::float32), 1u);
+  EXPECT_EQ(of(&PikoTestDriverCounts::float32Division), 2u);
+  EXPECT_EQ(of(&PikoTestDriverCounts::special), 1u);
+  EXPECT_EQ(of(&PikoTestDriverCounts::float64), 1u);
+  EXPECT_EQ(of(&PikoTestDriverCounts::float64Division), 1u);
+  EXPECT_EQ(of(&PikoTestDriverCounts::warpInstructions), 15u);
+}
+
+// Of 2 warps, the second runs a loop of its own.
+TEST_F(CountsTest, LongestWarp) {
+  run(R"(
+    setp.lt.u32 %p1, %r1, 32;
+    @%p1 bra DONE;
+    mov.b32 %r5, 0;
+  LOOP:
+    add.s32 %r5, %r5, 1;
+    setp.lt.u32 %p2, %r5, 10;
+    @%p2 bra LOOP;
+  DONE:)",
+      {}, 64);
+  EXPECT_EQ(counts().warps, 2u);
+  // Both have what is in front of the loop and behind it.
+  EXPECT_EQ(2 * counts().longestWarps, counts().warpInstructions + 1 + 3 * 10);
+}
+
+TEST_F(CountsTest, AsJSON) {
+  PikoTestDriverCounts counts{};
+  counts.launches = 3;
+  counts.distinctSectors = 12;
+  std::string text = toJSON(counts);
+  EXPECT_EQ(text.find("{\"launches\": 3, \"blocks\": 0, "), 0u) << text;
+  EXPECT_NE(text.find("\"distinctSectors\": 12}"), text.npos) << text;
+}
+
+} // namespace

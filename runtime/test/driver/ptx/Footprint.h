@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//===- Footprint.h - Distinct sectors of memory ---------------------------===//
+
+#ifndef PIKO_TEST_DRIVER_PTX_FOOTPRINT_H
+#define PIKO_TEST_DRIVER_PTX_FOOTPRINT_H
+
+#include <bit>
+#include <cstdint>
+#include <unordered_map>
+
+namespace piko::ptx {
+
+/// The sectors of 32 bytes that a launch touches at least once: what it must
+/// move, however large its caches are. A bit for each, by groups of 64.
+class Footprint {
+public:
+  void add(uint64_t sector) {
+    uint64_t group = sector / 64;
+    if (!last || group != lastGroup) {
+      last = &groups[group];
+      lastGroup = group;
+    }
+    *last |= uint64_t(1) << sector % 64;
+  }
+  uint64_t sectors() const {
+    uint64_t sum = 0;
+    for (const auto &[group, bits] : groups)
+      sum += static_cast<uint64_t>(std::popcount(bits));
+    return sum;
+  }
+
+private:
+  std::unordered_map<uint64_t, uint64_t> groups; // Nodes keep their places.
+  uint64_t lastGroup = 0;
+  uint64_t *last = nullptr;
+};
+
+} // namespace piko::ptx
+
+#endif // PIKO_TEST_DRIVER_PTX_FOOTPRINT_H
