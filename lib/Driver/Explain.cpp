@@ -5,12 +5,12 @@
 
 #include "Piko/Driver/Explain.h"
 
+#include "ExplainKernels.h"
+
 #include "Piko/Analysis/StageGraph.h"
 #include "Piko/Dialect/Piko/IR/PikoProgram.h"
 #include "Piko/Driver/Compiler.h"
 #include "Piko/Driver/Sequences.h"
-#include "Piko/Target/KernelResources.h"
-#include "Piko/Target/PTX.h"
 
 #include "mlir/Pass/Pass.h"
 #include "mlir/Pass/PassInstrumentation.h"
@@ -18,7 +18,6 @@
 #include "llvm/ADT/StringExtras.h"
 #include "llvm/ADT/StringMap.h"
 #include "llvm/ADT/StringSet.h"
-#include "llvm/Support/Format.h"
 
 using namespace mlir;
 using namespace piko;
@@ -484,65 +483,6 @@ void Report::write() {
     out << "  " << pass.pass << "\n" << pass.text;
 }
 
-//===----------------------------------------------------------------------===//
-// Kernels on a GPU
-//===----------------------------------------------------------------------===//
-
-static void writeResources(const KernelReport &report, StringRef chip,
-                           StringRef prefix, raw_ostream &out) {
-  ArrayRef<KernelResources> kernels = report.kernels;
-  bool isAssembled = llvm::any_of(kernels, [](const KernelResources &k) {
-    return k.assembled.has_value();
-  });
-  out << "\nOn " << chip
-      << (isAssembled ? ", as ptxas says" : " (" + report.source + ")")
-      << ":\n  threads  block memory";
-  if (isAssembled)
-    out << "  registers  stack  spilled  occupancy";
-  out << "  kernel\n";
-  for (const KernelResources &kernel : kernels) {
-    StringRef name = kernel.kernel;
-    name.consume_front(prefix);
-    out << llvm::format("  %7lld  %12lld", (long long)kernel.threads,
-                        (long long)kernel.blockMemory);
-    if (const auto &found = kernel.assembled)
-      out << llvm::format("  %9lld  %5lld  %7lld", (long long)found->registers,
-                          (long long)found->stack,
-                          (long long)(found->spillStores + found->spillLoads));
-    if (auto occupancy = kernel.getOccupancy(chip))
-      out << llvm::format("  %7.0f %%", 100 * *occupancy);
-    else if (isAssembled)
-      out << "          -";
-    out << "  " << name << "\n";
-  }
-}
-
-/// Makes PTX of a module's kernels and writes what they take.
-static LogicalResult explainKernels(ModuleOp module, StringRef pipeline,
-                                    const GPUOptions &gpu, int optLevel,
-                                    raw_ostream &out) {
-  llvm::LLVMContext context;
-  std::unique_ptr<llvm::Module> kernels = translateKernels(module, context);
-  if (!kernels)
-    return failure();
-  auto fail = [&](llvm::Error error) {
-    return emitError(module.getLoc()) << llvm::toString(std::move(error));
-  };
-  llvm::Expected<std::string> ptx = generatePTX(*kernels, gpu.chip, optLevel);
-  if (!ptx)
-    return fail(ptx.takeError());
-  std::vector<std::string> chips = gpu.cubins;
-  if (chips.empty())
-    chips.push_back(gpu.chip);
-  for (const std::string &chip : chips) {
-    auto resources = measureKernels(*kernels, *ptx, chip);
-    if (!resources)
-      return fail(resources.takeError());
-    writeResources(*resources, chip, (pipeline + "_").str(), out);
-  }
-  return success();
-}
-
 FailureOr<std::string>
 piko::explainPipeline(ModuleOp module, const CheckOptions &check,
                       const SynthesisOptions &synthesis, const CPUOptions &cpu,
@@ -572,14 +512,24 @@ piko::explainPipeline(ModuleOp module, const CheckOptions &check,
     return failure();
   OwningOpRef<ModuleOp> kernels = module.clone();
   // What is below has remarks alone.
-  if (failed(run(Level::Kernels, Level::Target)))
+  std::vector<KernelTraffic> traffic;
+  if (isCUDA) {
+    if (failed(run(Level::Kernels, Level::Machine)))
+      return failure();
+    for (auto kernel : getOnlyPipeline(module).getOps<KernelOp>())
+      traffic.push_back(findKernelTraffic(kernel));
+  }
+  if (failed(run(isCUDA ? Level::Machine : Level::Kernels, Level::Target)))
     return failure();
   std::string text;
   llvm::raw_string_ostream out(text);
   PipelineOp pipeline = getOnlyPipeline(*kernels);
   Report(trace, pipeline, out).write();
-  if (isCUDA &&
-      failed(explainKernels(module, pipeline.getSymName(), gpu, optLevel, out)))
-    return failure();
+  if (isCUDA) {
+    if (failed(explainResources(module, pipeline.getSymName(), gpu, optLevel,
+                                out)))
+      return failure();
+    explainTraffic(traffic, out);
+  }
   return text;
 }
