@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+"""Published limits of chips, of `chips.json`, which names their sources."""
+
+import json
+import pathlib
+from dataclasses import dataclass
+
+DATA = pathlib.Path(__file__).with_name("chips.json")
+
+
+@dataclass(frozen=True)
+class Chip:
+    """Counts are of a multiprocessor, unless their name says otherwise."""
+    name: str
+    compute_capability: str
+    assembled_for: str  # the chip that ptxas assembles for in its place
+    multiprocessors: int
+    gigahertz: float
+    issue: int  # warp instructions a cycle
+    lanes: dict  # a cycle, by the kind of instruction
+    threads: int
+    blocks: int
+    registers: int
+    block_memory: int  # bytes
+    block_reserved: int  # of the memory of each block, by the system
+    l1_bytes_per_clock: int
+    l2_bytes_per_clock: int | None  # of the chip; None if not published
+    l2_megabytes: float
+    dram_gb_per_s: float
+    arithmetic_cycles: int
+    l2_cycles: int
+    dram_cycles: int
+    launch_us: float  # of a kernel behind another in a stream
+    wait_us: float  # of the host for the device, and the launch behind it
+    sources: tuple
+
+    def milliseconds(self, cycles):
+        return cycles / (self.gigahertz * 1e6)
+
+
+def read_chips(file=DATA):
+    """Chips by their names, and the texts of sources by theirs."""
+    with open(file) as stream:
+        data = json.load(stream)
+    chips = {}
+    for name, values in data["chips"].items():
+        for source in values["sources"]:
+            if source not in data["sources"]:
+                raise ValueError(f"{name}: expected a source of the file, but got "
+                                 f"'{source}'")
+        chips[name] = Chip(name=name, **values)
+    return chips, data["sources"]

@@ -1,0 +1,174 @@
+# SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+"""A roofline of kernels: from counted instructions and bytes to milliseconds.
+
+Two figures for each kernel:
+
+* `least`: what one of the chip's limits takes, if it is all that costs time and
+  caches hold what they can. No kernel can be faster.
+* `most`: the same with caches that hold nothing for long, and with warps each of
+  whose instructions waits for the one before it, a load for the L2 cache: what
+  hides that are only other warps of the same multiprocessor. Kernels may be still
+  slower: banks of shared memory, atomics on one address, and blocks that end
+  late are not in it.
+
+What the host does is in neither.
+"""
+
+import math
+from dataclasses import dataclass
+
+WARP = 32
+SECTOR = 32  # bytes
+
+# Instructions of the machine for one of PTX. Measured with ptxas 13.0: of two
+# kernels with 16 and with 48 of them, one behind the other, the sizes differ by so
+# much; sm_80 and sm_90 agree. Calls of the ways for rare operands are in it, these
+# ways are not.
+SLOTS = {
+    "integer": 1, "integer64": 2, "float32": 1, "float64": 1, "special": 1,
+    "integerDivision": 16, "float32Division": 13, "float64Division": 24,
+    "convert": 1, "move": 0.5, "control": 1,
+    "loadGlobal": 1, "storeGlobal": 1, "loadShared": 1, "storeShared": 1,
+    "loadLocal": 1, "storeLocal": 1, "loadGeneric": 1, "storeGeneric": 1,
+    "parameter": 0,  # an operand of what uses it
+    "atomic": 1, "barrier": 1, "warpOperation": 1,
+}
+# Which unit of a multiprocessor takes them, and how many of its instructions.
+UNITS = {
+    "integer": {"integer": 1, "integer64": 2, "integerDivision": 12},
+    "float32": {"float32": 1, "float32Division": 9},
+    "float64": {"float64": 1, "float64Division": 9},
+    "special": {"special": 1, "float32Division": 1, "float64Division": 1,
+                "integerDivision": 1},
+    "convert": {"convert": 1, "integerDivision": 2},
+    "memory": {"loadGlobal": 1, "storeGlobal": 1, "loadShared": 1,
+               "storeShared": 1, "loadLocal": 1, "storeLocal": 1,
+               "loadGeneric": 1, "storeGeneric": 1, "atomic": 1,
+               "warpOperation": 1},
+}
+LOADS = ("loadGlobal", "loadGeneric", "atomic")
+LOCAL = ("loadLocal", "storeLocal")
+LOCAL_SECTORS = 4  # of a warp that reads or writes 4 bytes a lane
+
+
+@dataclass
+class Resources:
+    """What ptxas says of a kernel, and its block."""
+    threads: int
+    block_memory: int
+    registers: int | None
+
+
+def count_warps(resources, chip):
+    """Warps of a kernel that a multiprocessor has at the same time; as many as it
+    can have where registers are not known."""
+    if not resources or resources.registers is None or resources.threads < 1:
+        return chip.threads // WARP
+    warps = math.ceil(resources.threads / WARP)
+    # Registers are given to warps, in pieces of 256.
+    of_warp = math.ceil(max(resources.registers, 1) * WARP / 256) * 256
+    memory = resources.block_memory + chip.block_reserved
+    blocks = min(chip.blocks, chip.threads // (warps * WARP),
+                 chip.registers // (of_warp * warps))
+    if memory:
+        blocks = min(blocks, chip.block_memory // memory)
+    return max(blocks, 1) * warps
+
+
+def count_slots(counts):
+    return sum(counts[kind] * slots for kind, slots in SLOTS.items())
+
+
+def find_memory(counts, chip, units):
+    """Milliseconds of caches and of memory: (at least, at most)."""
+    sectors, distinct = counts["globalSectors"], counts["distinctSectors"]
+    local = LOCAL_SECTORS * sum(counts[kind] for kind in LOCAL)
+    l1 = chip.milliseconds((sectors + local) * SECTOR /
+                           (chip.l1_bytes_per_clock * units))
+    footprint = distinct * SECTOR
+    dram = footprint / (chip.dram_gb_per_s * 1e6)
+    of_launch = footprint / max(counts["launches"], 1)
+    fits = of_launch <= chip.l2_megabytes * 2**20
+    least, most = {"L1": l1, "DRAM": 0 if fits else dram}, {"L1": l1, "DRAM": dram}
+    if chip.l2_bytes_per_clock:
+        for times, count in ((least, distinct), (most, sectors)):
+            times["L2"] = chip.milliseconds(
+                count * SECTOR / chip.l2_bytes_per_clock)
+    return least, most
+
+
+def find_latency(counts, chip, resources):
+    """Milliseconds, if nothing but other warps hides what an instruction waits
+    for: all of them, or the longest warp alone."""
+    slots = count_slots(counts)
+    loads = sum(counts[kind] for kind in LOADS)
+    cycles = ((slots - loads) * chip.arithmetic_cycles + loads * chip.l2_cycles)
+    resident = chip.multiprocessors * count_warps(resources, chip)
+    of_launch = counts["warps"] / max(counts["launches"], 1)
+    longest = counts["longestWarps"] / max(counts["warpInstructions"], 1)
+    return {
+        "latency": chip.milliseconds(cycles / max(min(resident, of_launch), 1)),
+        "longest warp": chip.milliseconds(cycles * longest),
+    }
+
+
+@dataclass
+class Estimate:
+    least: dict  # milliseconds by limit
+    most: dict
+
+    @property
+    def least_ms(self):
+        return max(self.least.values())
+
+    @property
+    def most_ms(self):
+        return max(self.most.values())
+
+    @property
+    def limit(self):
+        return max(self.least, key=self.least.get)
+
+    @property
+    def most_limit(self):
+        return max(self.most, key=self.most.get)
+
+
+def estimate_kernel(counts, chip, resources=None):
+    """Of all launches of a kernel together, which are counted so."""
+    slots = count_slots(counts)
+    # No more than there are blocks have work.
+    units = min(chip.multiprocessors,
+                math.ceil(counts["blocks"] / max(counts["launches"], 1)) or 1)
+    busy = {"issue": chip.milliseconds(slots / (chip.issue * units))}
+    for unit, kinds in UNITS.items():
+        lanes = WARP * sum(counts[kind] * n for kind, n in kinds.items())
+        busy[unit] = chip.milliseconds(lanes / (chip.lanes[unit] * units))
+    longest = counts["longestWarps"] / max(counts["warpInstructions"], 1)
+    busy["longest warp"] = chip.milliseconds(slots * longest)
+    busy["launch"] = counts["launches"] * chip.launch_us * 1e-3
+    least, most = find_memory(counts, chip, units)
+    return Estimate({**busy, **least},
+                    {**busy, **most, **find_latency(counts, chip, resources)})
+
+
+@dataclass
+class Frame:
+    kernels: dict  # estimates by name
+    least_ms: float
+    most_ms: float
+    waits: int
+
+
+WAITS = ("cuStreamSynchronize", "cuCtxSynchronize", "cuEventSynchronize",
+         "cuMemcpyDtoH", "cuMemcpyHtoD")
+
+
+def estimate_frame(report, chip, resources):
+    """`report` is what the driver for tests wrote; `resources` by kernel."""
+    kernels = {name: estimate_kernel(counts, chip, resources.get(name))
+               for name, counts in report["kernels"].items()}
+    waits = sum(report.get("calls", {}).get(call, 0) for call in WAITS)
+    return Frame(kernels, sum(k.least_ms for k in kernels.values()),
+                 sum(k.most_ms for k in kernels.values())
+                 + waits * chip.wait_us * 1e-3, waits)
