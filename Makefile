@@ -7,6 +7,9 @@
 #                 the page is (BENCH=--quick: one minute; benchmarks/README.md)
 #   make charts   chart speed against error, which takes ten minutes; says
 #                 where the page is (CHARTS=--quick: two minutes)
+# On a machine with a card of NVIDIA's, one more:
+#   make gpu-bench   compare with cudaraster's and the paper's figures; without a
+#                    card, by estimates (GPU_BENCH=--quick; docs/GPU.md)
 # The rest is a thin layer over the presets of CMakePresets.json.
 
 PRESET ?= release
@@ -21,7 +24,8 @@ BUNNY := /usr/share/glmark2/models/bunny.obj
 PIPE ?= Fused
 
 .DELETE_ON_ERROR:
-.PHONY: all bench build charts check clean configure demo deps docs format lint
+.PHONY: all bench build charts check clean configure demo deps docs format \
+  gpu-bench lint
 
 all: build
 
@@ -47,6 +51,13 @@ bench: configure
 	  --target piko-render pikoc piko-runtime-benchmark
 	@benchmarks/bench.py --bin $(BUILD)/bin --lib $(CURDIR)/$(BUILD)/lib \
 	  --out $(BUILD)/bench $(BENCH)
+
+gpu-bench: configure
+	@cmake --build $(BUILD) --parallel $(JOBS) \
+	  --target piko-render pikoc piko-test-driver
+	@benchmarks/gpu-bench.py --bin $(BUILD)/bin \
+	  --driver $(BUILD)/lib/libpiko-test-driver.so --out $(BUILD)/gpu-bench \
+	  $(GPU_BENCH)
 
 # Debian's python3-matplotlib is for its own python3.
 charts: configure

@@ -30,6 +30,10 @@ def find_processor():
         return platform.machine()
 
 
+def name_command():
+    return f"benchmarks/{os.path.basename(sys.argv[0])}"
+
+
 def describe_machine():
     versions = [call([tool, "--version"]).splitlines()[0]
                 for tool in ("g++", "clang++-22")]
@@ -37,7 +41,7 @@ def describe_machine():
         f"{find_processor()}, {os.cpu_count()} threads; {platform.platform()}.",
         "; ".join(versions) + ".",
         f"Made on {datetime.date.today()} by "
-        f"`{shlex.join(['benchmarks/bench.py', *sys.argv[1:]])}`. "
+        f"`{shlex.join([name_command(), *sys.argv[1:]])}`. "
         f"Load before: {os.getloadavg()[0]:.2f}; numbers count only from a "
         "machine that does nothing else.",
     ]

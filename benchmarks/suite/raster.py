@@ -43,7 +43,7 @@ def parse_peer(text):
     return name, shlex.split(command)
 
 
-def measure_peer(peer, scene, lights, threads):
+def measure_peer(peer, scene, lights, threads, size=SIZE):
     """The median milliseconds that a program prints: the last line of its
     output is JSON with `ms_median`."""
     name, words = peer
@@ -53,7 +53,7 @@ def measure_peer(peer, scene, lights, threads):
             command += shlex.split(scene)
         else:
             command.append(word.format(scene=scene, lights=lights,
-                                       threads=threads, **SIZE))
+                                       threads=threads, **size))
     try:
         done = subprocess.run(command, capture_output=True, text=True)
     except OSError as error:
