@@ -34,6 +34,15 @@ int64_t unitSize(const pikort_pipeline &p, const Stage &stage,
   return std::clamp<int64_t>((share + 15) / 16 * 16, 16, 1024);
 }
 
+/// Cells or calls in a unit, at most `most`. A block takes one after the other,
+/// so that few in each keep all multiprocessors busy.
+int64_t mostTogether(const pikort_pipeline &p, int64_t count, int64_t most) {
+  if (!p.accelerator)
+    return most;
+  int64_t blocks = 4 * p.accelerator->residentThreads() / 64;
+  return std::clamp<int64_t>(count / blocks, 1, most);
+}
+
 /// Of a unit that any thread may run.
 constexpr int64_t nobody = -1;
 
@@ -49,7 +58,7 @@ public:
       return add(0, stage_.cells, 0, kernel_.positions, 0);
     int64_t chunk = sizeOf(schedule);
     // What waits for a bin may do much, whatever there is in it.
-    int64_t most = stage_.hosts ? 16 : 1024;
+    int64_t most = mostTogether(p_, stage_.cells, stage_.hosts ? 16 : 1024);
     int64_t first = 0; // of the group that is not yet added
     int64_t owner = nobody;
     auto flush = [&](int64_t cell) {
@@ -92,6 +101,7 @@ public:
       first = call;
     };
     int64_t calls = kernel_.calls.size();
+    const int64_t most = mostTogether(p_, calls, 16);
     for (int64_t call = 0; call < calls; ++call) {
       const pikoir_call &now = kernel_.calls[call];
       const BinSchedule &schedule = stage_.scheduleOf(now.bin);
@@ -104,7 +114,7 @@ public:
         continue;
       // A call may do much, whatever its list.
       bool enough = now.end - kernel_.calls[first].begin >= sizeOf(schedule) ||
-                    call + 1 - first >= 16;
+                    call + 1 - first >= most;
       bool sameBin = call + 1 < calls && kernel_.calls[call + 1].bin == now.bin;
       if (enough && (!sameBin || stage_.splits()))
         flush(call + 1);
