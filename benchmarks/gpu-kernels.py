@@ -15,13 +15,13 @@ import fnmatch
 import os
 import pathlib
 import re
-import shutil
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 
 from commands import call
 from gpu_model.counting import COLUMNS, read_explained
+from gpu_model.slots import find_assembler
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 # What most of a frame's time goes to, as EXAMPLE/PIPELINE/KERNEL.
@@ -45,13 +45,6 @@ def parse_options():
                         help="kernels that must not spill, as "
                              "EXAMPLE/PIPELINE/KERNEL (" + ", ".join(HOT) + ")")
     return parser.parse_args()
-
-
-def find_assembler():
-    folders = [os.environ.get("PATH", ""),
-               os.path.join(os.environ.get("CUDA_HOME", ""), "bin"),
-               "/usr/local/cuda/bin"]
-    return shutil.which("ptxas", path=os.pathsep.join(folders))
 
 
 def list_chips():

@@ -11,7 +11,7 @@ import unittest
 
 sys.path.insert(0, sys.argv.pop(1))
 
-from gpu_model import counting, model  # noqa: E402
+from gpu_model import counting, model, slots  # noqa: E402
 from gpu_model.chips import DATA, read_chips  # noqa: E402
 
 CHIPS, SOURCES = read_chips()
@@ -52,7 +52,7 @@ class Limits(unittest.TestCase):
     def test_divisions_are_sequences(self):
         one = model.estimate_kernel(count(float32=1e6), CHIP)
         division = model.estimate_kernel(count(float32Division=1e6), CHIP)
-        self.assertAlmostEqual(division.least["issue"] / one.least["issue"], 13)
+        self.assertAlmostEqual(division.least["issue"] / one.least["issue"], 11)
         self.assertGreater(division.least["special"], 0)
 
     def test_few_blocks_use_few_multiprocessors(self):
@@ -144,6 +144,13 @@ class Data(unittest.TestCase):
             file.flush()
             with self.assertRaisesRegex(ValueError, "K40c.*'hearsay'"):
                 read_chips(file.name)
+
+    def test_slots(self):
+        assembler = slots.find_assembler()
+        if not assembler:
+            self.skipTest("no ptxas")
+        for kind, count in slots.measure(assembler, "sm_80").items():
+            self.assertAlmostEqual(model.SLOTS[kind] / count, 1, delta=0.2, msg=kind)
 
     def test_explained(self):
         text = ("Pipeline P\n\nOn sm_80, as ptxas says:\n  threads  block memory  "
