@@ -54,6 +54,8 @@ def add_options(parser):
     parser.add_argument("sections", nargs="*", metavar="SECTION", help="(all)")
     parser.add_argument("--estimate", metavar="CHIP", choices=list(chips),
                         help=f"one of {', '.join(chips)} (H100, without a card)")
+    parser.add_argument("--measure", action="store_true",
+                        help="what the driver runs, though no card is found")
     parser.add_argument("--quick", action="store_true", help="as little as can be")
     parser.add_argument("--out", default=f"{ROOT}/build/gpu-bench", metavar="FOLDER",
                         help="(build/gpu-bench)")
@@ -82,6 +84,8 @@ def check(parser, options):
         if section not in SECTIONS:
             parser.error(f"expected sections of {', '.join(SECTIONS)}, but got "
                          f"'{section}'")
+    if options.estimate and options.measure:
+        parser.error("expected --estimate or --measure, and not both")
     for name in ("width", "height", "rounds", "frames", "reruns"):
         if getattr(options, name) < 1:
             parser.error(f"--{name}: expected at least 1, but got "
@@ -101,7 +105,7 @@ def parse_options():
         formatter_class=argparse.RawDescriptionHelpFormatter)
     add_options(parser)
     options = parser.parse_args()
-    if not options.estimate and not timing.find_card():
+    if not (options.estimate or options.measure or timing.find_card()):
         options.estimate = "H100"
         print("gpu-bench: no card was found; times are estimates", file=sys.stderr)
     which = 2 if options.quick else 1 if options.estimate else 0

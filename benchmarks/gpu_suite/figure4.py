@@ -18,8 +18,9 @@ def measure(options, timer):
     for scene in options.scene:
         word = timing.name_scene(scene)
         for lights in options.lights:
-            times = {pipe: timer.time(timing.RASTER, pipe, scene, lights)
-                     for pipe in pipes}
+            timings, _ = timer.time_all(
+                [(timing.RASTER, pipe) for pipe in pipes], scene, lights)
+            times = {pipe: it for (_, pipe), it in timings.items()}
             if len({it.image_hash for it in times.values()}) > 1:
                 raise ValueError(f"{word}: expected one image of {', '.join(pipes)}")
             for title, (pipe,), base in PAPER:

@@ -15,8 +15,8 @@ def measure(options, timer):
     rows, records, bars = [], [], {}
     for scene in options.scene:
         word = timing.name_scene(scene)
-        for example, pipe in list_pipes(PIPES):
-            it = timer.time(example, pipe, scene, 1)
+        timings, _ = timer.time_all(list_pipes(PIPES), scene, 1)
+        for (_, pipe), it in timings.items():
             # What costs nothing, such as joins that have no kernel, is not shown.
             total = sum(it.kernels.values())
             parts = {name: ms / total for name, ms in it.kernels.items()

@@ -2,7 +2,7 @@
 """Whole frames of the rasterizers, beside peers such as cudaraster."""
 
 from suite.raster import measure_peer
-from suite.section import Rounds, Section, draw_groups
+from suite.section import Section, draw_groups
 
 from . import timing
 
@@ -23,12 +23,11 @@ def check_images(timings):
                              f"{pipe}")
 
 
-def measure_peers(options, scene, lights):
-    """Rounds of each."""
+def list_peers(options, scene, lights):
+    """What measures each of them once."""
     size = {"width": options.width, "height": options.height}
-    return {name: Rounds([measure_peer((name, words), scene, lights, 1, size)
-                          for _ in range(options.rounds)])
-            for name, words in options.peer}
+    return {peer[0]: lambda peer=peer: measure_peer(peer, scene, lights, 1, size)
+            for peer in options.peer}
 
 
 def measure(options, timer):
@@ -36,10 +35,10 @@ def measure(options, timer):
     for scene in options.scene:
         word = timing.name_scene(scene)
         for lights in options.lights:
-            timings = {(example, pipe): timer.time(example, pipe, scene, lights)
-                       for example, pipe in list_pipes(options.pipes)}
+            timings, peers = timer.time_all(
+                list_pipes(options.pipes), scene, lights,
+                list_peers(options, scene, lights))
             check_images(timings)
-            peers = measure_peers(options, scene, lights)
             fastest = min(it.ms for it in timings.values())
             bars[f"{word}, {lights}"] = {
                 **{pipe: it.ms for (_, pipe), it in timings.items()},

@@ -64,23 +64,38 @@ class Card:
             command += [f"--{name}", str(getattr(options, name))]
         return json.loads(call(command).strip().split("\n")[-1])
 
-    def time(self, example, pipe, scene, lights):
-        runs = [self.run(example, pipe, scene, lights)
-                for _ in range(self.options.rounds)]
-        hashes = {run["image_hash"] for run in runs}
-        if len(hashes) > 1:
-            raise ValueError(f"{pipe}: expected one image of all rounds, but got "
-                             f"{len(hashes)}")
-        kernels = {k["name"]: statistics.median(
-            next(o["ms"] - o["join_ms"] for o in run["kernels"]
-                 if o["name"] == k["name"]) for run in runs)
-            for k in runs[0]["kernels"]}
-        rounds = [run["ms_median"] for run in runs]
-        return Timing(statistics.median(rounds), kernels, hashes.pop(),
-                      runs[0]["tris"], rounds)
+    def time_all(self, cases, scene, lights, others=None):
+        """Timings of cases, (example, pipeline), and rounds of other things that are
+        timed, by name; all take turns."""
+        runs = {case: [] for case in cases}
+        times = {name: [] for name in others or {}}
+        for _ in range(self.options.rounds):
+            for case, own in runs.items():
+                own.append(self.run(*case, scene, lights))
+            for name, measure in (others or {}).items():
+                times[name].append(measure())
+        return ({case: make_timing(case, own) for case, own in runs.items()},
+                {name: Rounds(rounds) for name, rounds in times.items()})
 
     def rerun(self, example, pipe, scene, turn):
         return self.run(example, pipe, scene, 1)["image_hash"]
+
+
+def make_timing(case, runs):
+    """Of rounds of a case. What a kernel takes is without the joins before it."""
+    hashes = {run["image_hash"] for run in runs}
+    if len(hashes) > 1:
+        raise ValueError(f"{case[1]}: expected one image of all rounds, but got "
+                         f"{len(hashes)}")
+    kernels = {}
+    for run in runs:
+        for kernel in run["kernels"]:
+            kernels.setdefault(kernel["name"], []).append(
+                kernel["ms"] - kernel["join_ms"])
+    rounds = [run["ms_median"] for run in runs]
+    return Timing(statistics.median(rounds),
+                  {name: statistics.median(ms) for name, ms in kernels.items()},
+                  hashes.pop(), runs[0]["tris"], rounds)
 
 
 class Estimate:
@@ -97,6 +112,12 @@ class Estimate:
             self.resources[example, pipe] = counting.read_resources(
                 self.options, source_of(example), pipe, self.chip)
         return self.resources[example, pipe]
+
+    def time_all(self, cases, scene, lights, others=None):
+        """As of a card; others are measured all the same."""
+        return ({case: self.time(*case, scene, lights) for case in cases},
+                {name: Rounds([measure() for _ in range(self.options.rounds)])
+                 for name, measure in (others or {}).items()})
 
     def time(self, example, pipe, scene, lights):
         run, report = counting.count_frame(
