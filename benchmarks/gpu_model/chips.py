@@ -31,6 +31,7 @@ class Chip:
     l2_cycles: int
     dram_cycles: int
     launch_us: float  # of a kernel behind another in a stream
+    graph_us: float  # in a graph
     wait_us: float  # of the host for the device, and the launch behind it
     sources: tuple
 

@@ -135,7 +135,7 @@ class Estimate:
         return max(self.most, key=self.most.get)
 
 
-def estimate_kernel(counts, chip, resources=None):
+def estimate_kernel(counts, chip, resources=None, launch_us=None):
     """Of all launches of a kernel together, which are counted so."""
     slots = count_slots(counts)
     # No more than there are blocks have work.
@@ -147,7 +147,8 @@ def estimate_kernel(counts, chip, resources=None):
         busy[unit] = chip.milliseconds(lanes / (chip.lanes[unit] * units))
     longest = counts["longestWarps"] / max(counts["warpInstructions"], 1)
     busy["longest warp"] = chip.milliseconds(slots * longest)
-    busy["launch"] = counts["launches"] * chip.launch_us * 1e-3
+    busy["launch"] = 1e-3 * counts["launches"] * (
+        chip.launch_us if launch_us is None else launch_us)
     least, most = find_memory(counts, chip, units)
     return Estimate({**busy, **least},
                     {**busy, **most, **find_latency(counts, chip, resources)})
@@ -161,15 +162,20 @@ class Frame:
     waits: int
 
 
-WAITS = ("cuStreamSynchronize", "cuCtxSynchronize", "cuEventSynchronize",
-         "cuMemcpyDtoH", "cuMemcpyHtoD")
+def find_launch(report, chip):
+    """Microseconds of a launch: kernels of graphs take less."""
+    host = report.get("host", {})
+    kernels = host.get("launches", 0) + host.get("graphKernels", 0)
+    part = host.get("graphKernels", 0) / kernels if kernels else 0
+    return part * chip.graph_us + (1 - part) * chip.launch_us
 
 
 def estimate_frame(report, chip, resources):
     """`report` is what the driver for tests wrote; `resources` by kernel."""
-    kernels = {name: estimate_kernel(counts, chip, resources.get(name))
+    launch_us = find_launch(report, chip)
+    kernels = {name: estimate_kernel(counts, chip, resources.get(name), launch_us)
                for name, counts in report["kernels"].items()}
-    waits = sum(report.get("calls", {}).get(call, 0) for call in WAITS)
+    waits = report.get("host", {}).get("waits", 0)
     return Frame(kernels, sum(k.least_ms for k in kernels.values()),
                  sum(k.most_ms for k in kernels.values())
                  + waits * chip.wait_us * 1e-3, waits)

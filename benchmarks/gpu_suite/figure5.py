@@ -7,6 +7,7 @@ from suite.section import Section
 from . import timing
 from .frames import list_pipes
 
+UNKNOWN = "the frame is one submission, whose kernels nobody times"
 # One of three kernels, as the paper's, and the one of visibility.
 PIPES = ["Fused", "Visibility"]
 
@@ -19,6 +20,11 @@ def measure(options, timer):
         for (_, pipe), it in timings.items():
             # What costs nothing, such as joins that have no kernel, is not shown.
             total = sum(it.kernels.values())
+            if total <= 0:
+                rows.append([word, pipe, "all", "not known", ""])
+                records.append({"scene": word, "pipe": pipe, "kernel": "all",
+                                "ms": "", "part": "", "how": UNKNOWN})
+                continue
             parts = {name: ms / total for name, ms in it.kernels.items()
                      if ms > total / 1000}
             bars[f"{word}, {pipe}"] = parts
@@ -32,12 +38,14 @@ def measure(options, timer):
         "figure5", f"Figure 5 of the Piko paper, {timer.described}",
         ["The part of the time of all kernels that each takes, with one light. In the "
          "paper scenes of small triangles spend more in triangle setup, those of "
-         "large ones in the rasterizer."],
+         "large ones in the rasterizer. Not known: " + UNKNOWN + "; a profiler does, or "
+         "--estimate."],
         ["scene", "pipeline", "kernel", "time", "part"], rows, records,
         lambda pyplot: draw(pyplot, bars))
 
 
 def draw(pyplot, bars):
+    """Nothing, where nothing is known."""
     figure, axes = pyplot.subplots(figsize=(9, 1.5 + 0.5 * len(bars)))
     names = list(dict.fromkeys(name for parts in bars.values() for name in parts))
     left = [0.0] * len(bars)
@@ -50,6 +58,7 @@ def draw(pyplot, bars):
     axes.invert_yaxis()
     axes.set_xlim(0, 100)
     axes.set_xlabel("% of the time of kernels")
-    figure.legend(loc="upper center", ncols=4, frameon=False)
+    if names:
+        figure.legend(loc="upper center", ncols=4, frameon=False)
     figure.tight_layout(rect=(0, 0, 1, 0.88))
     return figure

@@ -88,13 +88,17 @@ class Limits(unittest.TestCase):
             self.assertLessEqual(it.least_ms, it.most_ms)
 
     def test_launches(self):
-        chip = dataclasses.replace(CHIP, launch_us=1.0, wait_us=5.0)
+        chip = dataclasses.replace(CHIP, launch_us=1.0, graph_us=0.5, wait_us=5.0)
         report = {"kernels": {"k": count(launches=3)},
-                  "calls": {"cuStreamSynchronize": 2, "cuMemFree": 7}}
+                  "host": {"launches": 3, "graphKernels": 0, "waits": 2}}
         frame = model.estimate_frame(report, chip, {})
         self.assertEqual(frame.kernels["k"].limit, "launch")
         self.assertAlmostEqual(frame.least_ms, 0.003)
         self.assertAlmostEqual(frame.most_ms, 0.013)
+        report["host"] = {"launches": 0, "graphKernels": 3, "waits": 1}
+        frame = model.estimate_frame(report, chip, {})
+        self.assertAlmostEqual(frame.least_ms, 0.0015)
+        self.assertAlmostEqual(frame.most_ms, 0.0065)
 
     def test_a_kernel_that_ran_nothing(self):
         it = model.estimate_kernel(count(blocks=0, warps=0, launches=0), CHIP)
