@@ -322,9 +322,10 @@ void IterationWriter::writeVaryingWhile(scf::WhileOp inner) {
   writeBlock(*inner.getBeforeBody());
   scf::ConditionOp condition = inner.getConditionOp();
   SmallVector<Value> leaving;
-  for (auto [value, old] :
-       llvm::zip(condition.getArgs(), given.drop_front(count)))
-    leaving.push_back(choose(active, get(value), old));
+  for (auto [result, value, old] : llvm::zip(
+           inner.getResults(), condition.getArgs(), given.drop_front(count)))
+    leaving.push_back(result.use_empty() ? get(value)
+                                         : choose(active, get(value), old));
   Value goingOn = both(active, get(condition.getCondition()));
   leaving.push_back(goingOn);
   for (auto [variable, value] :

@@ -70,7 +70,8 @@ public:
   /// Estimates for as many iterations as there are lanes, in cycles.
   struct Cost {
     double vectors = 0, serial = 0; ///< at once, and one after the other
-    bool computes = false;          ///< Or iterations clear or copy.
+    double lines = 0;      ///< Of `vectors`, what lanes take of the cache.
+    bool computes = false; ///< Or iterations clear or copy.
     /// What costs most where lanes take turns, or are in other places.
     std::multimap<double, mlir::Operation *, std::greater<>> obstacles;
     /// Of `serial`, what inner loops take.
@@ -78,6 +79,9 @@ public:
     bool isWorthwhile() const { return vectors < serial; }
   };
   Cost getCost() const;
+  /// How many turns all lanes together make of a loop that is made of these
+  /// two, as far as is known.
+  double getFlatTurns(mlir::Operation *outer, mlir::Operation *inner) const;
 
   mlir::scf::ForOp getLoop() const { return loop; }
   /// How many iterations run at once.
@@ -183,6 +187,9 @@ private:
   llvm::DenseSet<mlir::Operation *> emitted;
   llvm::DenseMap<mlir::Operation *, llvm::SmallVector<mlir::scf::ForOp>> nests;
 };
+
+/// How often a loop turns each time, if that is known, but for sums that wrap.
+std::optional<int64_t> getConstantTurns(mlir::scf::ForOp loop);
 
 /// Whether a side of a condition has the loops of the other one with tests that
 /// may fail, for indices that are not all inside.

@@ -5,6 +5,7 @@
 #include "IterationLanes.h"
 #include "LoopStreams.h"
 
+#include "Piko/Dialect/Piko/IR/Marks.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
 #include "mlir/Dialect/MemRef/IR/MemRef.h"
@@ -59,6 +60,9 @@ static constexpr double rowTest = 5;
 /// How often a loop turns.
 static constexpr double loopTurns = 8, turnsThatDiffer = 4;
 
+/// How many lanes are at work in a loop that each goes through by itself.
+static constexpr double fullness = 0.85;
+
 /// With vectors of 512 bits (Sapphire Rapids, Zen 4), of 256 bits, and of 128
 /// bits without masks: a branch for each lane stands for one.
 static const Cycles &getCycles(int64_t laneCount) {
@@ -74,9 +78,9 @@ static const Cycles &getCycles(int64_t laneCount) {
                                .sharedQuotient = 24,
                                .narrowGather = 16,
                                .ownLines = 30,
-                               .transposed = 7,
-                               .scatter = 40,
-                               .narrowScatter = 70,
+                               .transposed = 12,
+                               .scatter = 16,
+                               .narrowScatter = 60,
                                .readRow = 0.8,
                                .writeRow = 1.2,
                                .along = 6,
@@ -234,6 +238,8 @@ public:
 
   IterationLanes::Cost cost;
 
+  double getFlatTurns(Operation *outer, Operation *inner) const;
+
 private:
   void addOperation(Operation *op, Frequency times, bool laneByLane);
   void addBranches(double part, bool laneByLane) {
@@ -242,6 +248,8 @@ private:
   }
   void addStructure(Operation *op, Frequency times, bool laneByLane);
   double getTurns(Operation *loop) const;
+  /// How many of the lanes make a turn of a loop.
+  double getGoing(Operation *loop) const;
   void addEmission(Operation *op, Frequency times);
 
   /// What it takes to bring lanes apart, with what they have.
@@ -306,12 +314,54 @@ void CostModel::addTurns(const OrderedGroup &group, Frequency times) {
                   cycles.slot * times.serial * inputs.size();
 }
 
+std::optional<int64_t> piko::getConstantTurns(scf::ForOp loop) {
+  if (std::optional<APInt> count = loop.getStaticTripCount())
+    return count->getLimitedValue();
+  auto strip = [](Value value) {
+    while (auto cast = value.getDefiningOp<arith::IndexCastOp>())
+      value = cast.getIn();
+    return value;
+  };
+  auto sum = strip(loop.getUpperBound()).getDefiningOp<arith::AddIOp>();
+  if (!sum || !matchPattern(loop.getStep(), m_One()) ||
+      strip(sum.getLhs()) != strip(loop.getLowerBound()))
+    return std::nullopt;
+  return getConstantIntValue(sum.getRhs());
+}
+
 /// How often a loop turns, as far as is known.
 double CostModel::getTurns(Operation *loop) const {
+  if (auto turns = loop->getAttrOfType<FloatAttr>(marks::turns))
+    return turns.getValueAsDouble();
   if (auto counted = dyn_cast<scf::ForOp>(loop))
-    if (std::optional<APInt> count = counted.getStaticTripCount())
-      return double(count->getLimitedValue());
+    if (std::optional<int64_t> count = getConstantTurns(counted))
+      return double(*count);
   return lanes.isSharedLoop(loop) ? loopTurns : turnsThatDiffer;
+}
+
+double CostModel::getGoing(Operation *loop) const {
+  if (lanes.isSharedLoop(loop))
+    return 1;
+  if (loop->hasAttr(marks::turns))
+    return fullness;
+  if (auto counted = dyn_cast<scf::ForOp>(loop);
+      counted && getConstantTurns(counted))
+    return 1;
+  for (Operation *at = loop->getParentOp(); at != lanes.getLoop();
+       at = at->getParentOp())
+    if (isa<scf::ForOp, scf::WhileOp>(at) && !lanes.isSharedLoop(at))
+      return cycles.goOnInside;
+  // Ranges differ less than what else ends loops.
+  constexpr double goOnInRange = 0.75;
+  return isa<scf::ForOp>(loop) ? goOnInRange : cycles.goOn;
+}
+
+/// Each lane makes the turns of its own inner loops, and waits in the end.
+double CostModel::getFlatTurns(Operation *outer, Operation *inner) const {
+  // Measured, of lists and of searches.
+  constexpr double goOnInNest = 0.35;
+  return getTurns(outer) * getGoing(outer) *
+         std::max(1.0, getTurns(inner) * goOnInNest) / fullness;
 }
 
 void CostModel::addStructure(Operation *op, Frequency times, bool laneByLane) {
@@ -320,13 +370,17 @@ void CostModel::addStructure(Operation *op, Frequency times, bool laneByLane) {
     auto addSide = [&](Region &side, Region &other) {
       if (side.empty())
         return;
-      Frequency share = getFrequency(side, other, lanes.getLaneCount());
+      Frequency share = op->getParentOp()->hasAttr(marks::turns)
+                            ? Frequency{0.5, 1}
+                            : getFrequency(side, other, lanes.getLaneCount());
       if (!lanes.isVarying(choice.getCondition()))
         share.vectors = share.serial;
       add(side, times.scaled(share.serial, share.vectors), laneByLane);
     };
     addSide(yes, no);
     addSide(no, yes);
+    if (op->getParentOp()->hasAttr(marks::turns)) // The state is chosen.
+      cost.vectors += times.vectors * cycles.vector * choice.getNumResults();
     bool isShort = lanes.isCheap(yes) && (no.empty() || lanes.isCheap(no));
     if (lanes.isVarying(choice.getCondition()) && !isShort)
       addBranches(times.serial * (fails(yes) || fails(no) ? cycles.checks
@@ -342,16 +396,7 @@ void CostModel::addStructure(Operation *op, Frequency times, bool laneByLane) {
       add(region, times.scaled(share, shared), laneByLane);
     return;
   }
-  bool isInside = false;
-  for (Operation *at = op->getParentOp(); at != lanes.getLoop();
-       at = at->getParentOp())
-    isInside |= isa<scf::ForOp, scf::WhileOp>(at) && !lanes.isSharedLoop(at);
-  // Ranges differ less than what else ends loops.
-  constexpr double goOnInRange = 0.75;
-  double going = lanes.isSharedLoop(op) ? 1
-                 : isInside             ? cycles.goOnInside
-                 : isa<scf::ForOp>(op)  ? goOnInRange
-                                        : cycles.goOn;
+  double going = getGoing(op);
   if (!lanes.isSharedLoop(op))
     addBranches(cycles.exits * times.serial, laneByLane);
   auto loop = dyn_cast<scf::ForOp>(op);
@@ -431,6 +476,14 @@ double CostModel::getOwnLines(Operation *access) const {
   return own;
 }
 
+/// Whether an element is read that is then stored.
+static bool isReadBefore(memref::StoreOp store) {
+  return llvm::any_of(store.getMemRef().getUsers(), [&](Operation *user) {
+    auto load = dyn_cast<memref::LoadOp>(user);
+    return load && load.getIndices() == store.getIndices();
+  });
+}
+
 /// What an access in different places takes.
 double CostModel::getApart(Operation *access) const {
   auto load = dyn_cast<memref::LoadOp>(access);
@@ -442,15 +495,17 @@ double CostModel::getApart(Operation *access) const {
   }
   if (auto read = dyn_cast<LoadOp>(access);
       read && isStrided(access) && isTransposed(read))
-    return cycles.transposed + getOwnLines(access);
+    return cycles.transposed;
   bool writes = store || isa<StoreOp>(access);
   double apart =
       writes ? (isNarrow(access) ? cycles.narrowScatter : cycles.scatter)
              : (isNarrow(access) ? cycles.narrowGather : cycles.gather);
-  // What a scatter wrote is not forwarded to what reads it next.
+  // What a scatter wrote is not forwarded to what reads it next, which a turn
+  // that changes what is there soon does.
+  constexpr double waits = 2, waitsAtOnce = 8;
   if (store && lanes.isPrivate(array))
-    apart *= 2;
-  return apart + getOwnLines(access);
+    apart *= isReadBefore(store) ? waitsAtOnce : waits;
+  return apart;
 }
 
 /// How many numbers of an array in a record one lane loads at once, where their
@@ -524,21 +579,28 @@ void CostModel::addOperation(Operation *op, Frequency times, bool laneByLane) {
   bool isTurns = form == LaneForm::Serial || form == LaneForm::Ordered;
   Value limited = lanes.findLimited(op);
   bool isGather = isAccess && ((!lanes.isRow(op) && !limited) || isStrided(op));
-  double gather = isGather ? getApart(op) : 0;
+  double lines = isGather ? getOwnLines(op) : 0;
+  double gather = isGather ? getApart(op) + lines : 0;
   double row = isAccess && isNarrow(op) ? cycles.narrowRow : cycles.row;
   double vectors = times.vectors * (isGather    ? gather
                                     : limited   ? row + cycles.vector * rowTest
                                     : isAccess  ? row
                                     : isDivided ? getDivision(op)
                                                 : cycles.vector);
-  if (laneByLane || isTurns || isRemainder)
+  if (laneByLane || isTurns || isRemainder) {
     vectors = serial + (laneByLane ? 0 : times.vectors * cycles.apart);
-  else
+  } else {
     cost.computes |= !isAccess;
+    cost.lines += times.vectors * lines;
+  }
   cost.serial += serial;
   cost.vectors += vectors;
   if (isTurns || isGather)
     cost.obstacles.emplace(vectors, op);
+}
+
+double IterationLanes::getFlatTurns(Operation *outer, Operation *inner) const {
+  return CostModel(*this).getFlatTurns(outer, inner);
 }
 
 IterationLanes::Cost IterationLanes::getCost() const {

@@ -3,6 +3,7 @@
 // piko-vectorize: primitives, or the iterations of a parallel loop, as lanes.
 
 #include "IterationWriter.h"
+#include "LaneNests.h"
 #include "LoopSplitter.h"
 #include "LoopStreams.h"
 #include "ParallelLoops.h"
@@ -43,7 +44,12 @@ private:
   /// A loop of a phase that is written in order; whether it did.
   bool vectorizeInOrder(Operation *op);
   bool vectorizeCompacted(scf::ForOp loop);
-  void vectorize(const IterationLanes &lanes);
+  /// Makes vectors of a loop, with what is left of `scalar`, which does the
+  /// same, for a few turns.
+  void vectorize(const IterationLanes &lanes, scf::ForOp scalar);
+  void vectorize(const IterationLanes &lanes) {
+    vectorize(lanes, lanes.getLoop());
+  }
 };
 
 /// A loop that lanes may share.
@@ -53,11 +59,15 @@ public:
 
   /// Whether lanes are given its turns.
   bool isChosen() const { return chosen; }
-  /// Whether it becomes vectors, which a remark tells.
-  bool decide(const IterationLanes &lanes);
+  /// Whether it becomes vectors, which a remark tells; `flat` is what lanes may
+  /// do instead.
+  bool decide(const IterationLanes &lanes, const FlatLoop &flat = {});
 
 private:
   InFlightDiagnostic refuse();
+  /// Whether it is expected to take less otherwise, which a remark tells.
+  bool isRefused(const IterationLanes &lanes, const IterationLanes::Cost &cost);
+  void remarkVectors(const IterationLanes &lanes, const FlatLoop &flat);
   /// Whether it takes less to run primitives one after the other, and to give
   /// lanes the iterations of loops in them.
   bool isFasterInside(const IterationLanes &lanes,
@@ -147,7 +157,54 @@ bool Candidate::isFasterInside(const IterationLanes &lanes,
   return inside < gain * cost.vectors;
 }
 
-bool Candidate::decide(const IterationLanes &lanes) {
+bool Candidate::isRefused(const IterationLanes &lanes,
+                          const IterationLanes::Cost &cost) {
+  std::string otherwise = "; specifyLanes(";
+  otherwise += ofPrimitives ? "Items" : "Iterations";
+  otherwise += ") does so all the same";
+  if (!ofPrimitives && isOverBox(loop)) {
+    refuse() << "a box may have few pixels" << otherwise;
+    return true;
+  }
+  // With half the lanes estimates matter more: measured, bodies that are
+  // expected to gain less than a fifth lose.
+  constexpr double sure = 0.8;
+  bool isSure = !ofPrimitives || lanes.getLaneCount() != 8 ||
+                cost.vectors < sure * cost.serial;
+  if (!cost.isWorthwhile() || !isSure) {
+    InFlightDiagnostic remark = refuse();
+    remark << lanes.getLaneCount() << " at once are expected to take "
+           << std::llround(cost.vectors) << " cycles, and one after the other "
+           << std::llround(cost.serial) << otherwise;
+    addObstacles(remark, lanes, cost, /*isRefused=*/true);
+    return true;
+  }
+  if (!ofPrimitives || !isFasterInside(lanes, cost))
+    return false;
+  refuse() << "iterations of a loop in it are" << otherwise;
+  return true;
+}
+
+void Candidate::remarkVectors(const IterationLanes &lanes,
+                              const FlatLoop &flat) {
+  InFlightDiagnostic remark = loop.emitRemark();
+  if (ofPrimitives)
+    remark << "stage '" << getKernelStage(loop).getSymName()
+           << "': " << getLoopPhase(loop) << " is vectorized for "
+           << lanes.getLaneCount() << " primitives at once";
+  else
+    remark << "these iterations are vectorized for " << lanes.getLaneCount()
+           << " at once";
+  for (Location nest : flat.nests)
+    remark.attachNote(nest) << "lanes go on in this loop each by itself, "
+                               "however often the loop inside turns";
+  for (Location nest : flat.ordered)
+    remark.attachNote(nest) << "lanes take turns to go through this loop, "
+                               "because an order shows of what it does";
+  addObstacles(remark, lanes, lanes.getCost(), /*isRefused=*/false);
+}
+
+bool Candidate::decide(const IterationLanes &lanes, const FlatLoop &flat) {
   if (const IterationLanes::Refusal &refusal = lanes.getRefusal(); refusal.at) {
     InFlightDiagnostic remark = refuse() << refusal.why;
     if (refusal.at != loop)
@@ -159,39 +216,9 @@ bool Candidate::decide(const IterationLanes &lanes) {
   IterationLanes::Cost cost = lanes.getCost();
   if (!ofPrimitives && !cost.computes)
     return false; // clears or copies, which needs no plan
-  std::string otherwise = "; specifyLanes(";
-  otherwise += ofPrimitives ? "Items" : "Iterations";
-  otherwise += ") does so all the same";
-  if (!said && !ofPrimitives && isOverBox(loop)) {
-    refuse() << "a box may have few pixels" << otherwise;
+  if (!said && isRefused(lanes, cost))
     return false;
-  }
-  // With half the lanes estimates matter more: measured, bodies that are
-  // expected to gain less than a fifth lose.
-  constexpr double sure = 0.8;
-  bool isSure = !ofPrimitives || lanes.getLaneCount() != 8 ||
-                cost.vectors < sure * cost.serial;
-  if (!said && !(cost.isWorthwhile() && isSure)) {
-    InFlightDiagnostic remark = refuse();
-    remark << lanes.getLaneCount() << " at once are expected to take "
-           << std::llround(cost.vectors) << " cycles, and one after the other "
-           << std::llround(cost.serial) << otherwise;
-    addObstacles(remark, lanes, cost, /*isRefused=*/true);
-    return false;
-  }
-  if (!said && ofPrimitives && isFasterInside(lanes, cost)) {
-    refuse() << "iterations of a loop in it are" << otherwise;
-    return false;
-  }
-  InFlightDiagnostic remark = loop.emitRemark();
-  if (ofPrimitives)
-    remark << "stage '" << getKernelStage(loop).getSymName()
-           << "': " << getLoopPhase(loop) << " is vectorized for "
-           << lanes.getLaneCount() << " primitives at once";
-  else
-    remark << "these iterations are vectorized for " << lanes.getLaneCount()
-           << " at once";
-  addObstacles(remark, lanes, cost, /*isRefused=*/false);
+  remarkVectors(lanes, flat);
   return true;
 }
 
@@ -334,8 +361,8 @@ static int64_t getLeastTurns(int64_t laneCount) {
   return std::max<int64_t>(laneCount / 4, 2);
 }
 
-/// Makes vectors of a loop, and of loops that one lane after the other runs.
-void VectorizePass::vectorize(const IterationLanes &lanes) {
+/// Loops that one lane after the other runs are made vectors, too.
+void VectorizePass::vectorize(const IterationLanes &lanes, scf::ForOp scalar) {
   scf::ForOp loop = lanes.getLoop();
   Location loc = loop.getLoc();
   OpBuilder builder(loop);
@@ -348,7 +375,7 @@ void VectorizePass::vectorize(const IterationLanes &lanes) {
   if (isOverPrimitives(loop) || isOneVector(loop, laneCount)) {
     // A second body would take longer to compile than it saves.
     write();
-    loop.erase();
+    scalar.erase();
     return;
   }
   Type type = loop.getUpperBound().getType();
@@ -360,10 +387,10 @@ void VectorizePass::vectorize(const IterationLanes &lanes) {
   Value isLong = arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::sge,
                                        count, least);
   auto choice = scf::IfOp::create(builder, loc, isLong, /*withElse=*/true);
-  loop->removeAttr(marks::lanes);
+  scalar->removeAttr(marks::lanes);
   builder.setInsertionPointToStart(choice.thenBlock());
   write();
-  loop->moveBefore(choice.elseBlock(), choice.elseBlock()->begin());
+  scalar->moveBefore(choice.elseBlock(), choice.elseBlock()->begin());
 }
 
 /// Whether the iterations of a loop, which meet, are now lanes in lockstep.
@@ -472,12 +499,22 @@ WalkResult VectorizePass::visit(Operation *op) {
   countLoops(copy);
   readAllElements(copy);
   IterationLanes lanes(copy, laneCount);
-  if (!candidate.decide(lanes)) {
+  FlatLoop flat;
+  if (!lanes.getRefusal().at)
+    flat = flattenNests(lanes);
+  bool isDone = candidate.decide(lanes, flat);
+  if (isDone && flat.loop) {
+    vectorize(IterationLanes(flat.loop, laneCount), copy);
+  } else if (isDone) {
+    vectorize(lanes, copy);
+  } else {
     copy.erase();
     ++left;
-    return WalkResult::advance();
   }
-  vectorize(lanes);
+  if (flat.loop)
+    flat.loop.erase();
+  if (!isDone)
+    return WalkResult::advance();
   loop.erase();
   ++vectorized;
   return WalkResult::skip();

@@ -7,7 +7,7 @@
 piko.record @V {"z" : f32 at 0} size 4 align 4
 // CHECK-LABEL: piko.pipeline @Insert
 // CHECK:         %[[ROWS:.*]] = memref.alloca() {alignment = 64 : i64} : memref<64xf32>
-// CHECK:         %[[LEFT:.*]]:4 = scf.while (%[[AT:.*]] = %c3, %{{.*}} = %{{.*}}, %{{.*}} = %{{.*}}, %[[M:.*]] = %{{.*}}) : (index, vector<16xindex>, vector<16xindex>, vector<16xi1>)
+// CHECK:         %[[LEFT:.*]]:3 = scf.while (%[[AT:.*]] = %c3, %{{.*}} = %{{.*}}, %[[M:.*]] = %{{.*}}) : (index, vector<16xindex>, vector<16xi1>)
 // CHECK:           %[[GOES:.*]] = arith.cmpi sgt, %[[AT]], %c0 : index
 // CHECK:           scf.if %[[GOES]] -> (index, vector<16xi1>)
 // CHECK:             %[[BEFORE:.*]] = arith.subi %[[AT]], %c1 : index
@@ -17,8 +17,8 @@ piko.record @V {"z" : f32 at 0} size 4 align 4
 // CHECK-NOT:         vector.{{gather|scatter|masked}}
 // CHECK:             vector.store %{{.*}}, %[[ROWS]][%{{.*}}]
 // CHECK:             scf.yield %{{.*}}, %{{.*}} : index, vector<16xi1>
-// CHECK:           scf.condition(%{{.*}}) %{{.*}} : vector<16xindex>, vector<16xindex>, vector<16xi1>, index
-// CHECK:         %[[WORDS:.*]] = arith.index_cast %[[LEFT]]#1 : vector<16xindex> to vector<16xi32>
+// CHECK:           scf.condition(%{{.*}}) %{{.*}} : vector<16xindex>, vector<16xi1>, index
+// CHECK:         %[[WORDS:.*]] = arith.index_cast %[[LEFT]]#0 : vector<16xindex> to vector<16xi32>
 // CHECK:         %[[IS0:.*]] = arith.cmpi eq, %[[WORDS]], %{{.*}} : vector<16xi32>
 // CHECK:         %[[HERE:.*]] = arith.select %{{.*}}, %[[IS0]], %{{.*}} : vector<16xi1>
 // CHECK:         %[[OLD:.*]] = vector.load %[[ROWS]][%c0]

@@ -366,6 +366,16 @@ def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
     (`piko-privatize`) is staged: 16 lanes compress it into a list, through which a
     scalar loop goes when it is full, so that misses of the cache overlap.
 
+    Where an iteration has a loop inside of another one, whose turns differ
+    between lanes, as the probes of a hash table in each of eight corners, lanes
+    would wait for the one that makes the most. Such nests are flattened where
+    that is expected to take a fifth less: one loop, each of whose turns makes one
+    of the inner loop or, where that has ended, goes on to the next turn of the
+    outer one, so that each lane goes through the nest by itself. A lane does what
+    it did, in the order that it did; nests of which an order shows between lanes,
+    as they emit or update pixels that lanes may share, stay as they are, and a
+    remark says so.
+
     What must keep its order (emission, updates of pixels that lanes may share)
     runs lane by lane: all that one image or one writer is concerned with, as one
     group in its place, or, if nothing in the loop waits for it, as several behind

@@ -18,6 +18,9 @@ constexpr llvm::StringLiteral lanes = "piko.lanes";
 constexpr llvm::StringLiteral rows = "piko.rows";
 /// What lanes are given, a `LaneMappingAttr`, of a loop over primitives.
 constexpr llvm::StringLiteral mapping = "piko.mapping";
+/// How many turns lanes together are expected to make of a loop that was made
+/// of two, one inside of the other: a 64-bit float.
+constexpr llvm::StringLiteral turns = "piko.turns";
 /// How threads share the loop over units of work, a `UnitLoopAttr`.
 constexpr llvm::StringLiteral units = "piko.units";
 /// A loop whose iterations the threads of a block share.

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Loop flattening: two loops, one inside of the other, as one whose turns are
+// those of the inner loop, so that lanes which have ended it need not wait for
+// those which have not.
+
+#ifndef PIKO_LIB_TRANSFORMS_FLATTENLOOPS_H
+#define PIKO_LIB_TRANSFORMS_FLATTENLOOPS_H
+
+#include "mlir/Dialect/SCF/IR/SCF.h"
+
+namespace piko {
+
+/// A loop, and the only one that stands in it by itself.
+struct FlatNest {
+  mlir::Operation *outer = nullptr, *inner = nullptr;
+
+  explicit operator bool() const { return outer; }
+};
+
+/// What `outer`, an scf.for or an scf.while, is a nest of. None where another
+/// loop stands beside the inner one, or where what it keeps from turn to turn
+/// is no number.
+FlatNest findFlatNest(mlir::Operation *outer);
+
+/// Replaces a nest by one loop that does the same in the same order. Each of
+/// its turns makes one of the inner loop, and, where that has ended, goes on to
+/// the next turn of the outer loop, up to the inner one.
+mlir::scf::WhileOp flatten(FlatNest nest);
+
+} // namespace piko
+
+#endif // PIKO_LIB_TRANSFORMS_FLATTENLOOPS_H
