@@ -37,11 +37,11 @@ static SmallVector<Block *> getBlocks(Operation *loop) {
   return {other.getBeforeBody(), other.getAfterBody()};
 }
 
-/// Whether a loop counts so that the next number is never too large.
+/// Whether a loop counts with a sign, by a step that is known.
 static bool isSimple(Operation *loop) {
   auto counted = dyn_cast<scf::ForOp>(loop);
-  return !counted || (!counted.getUnsignedCmp() &&
-                      matchPattern(counted.getStep(), m_One()));
+  return !counted ||
+         (!counted.getUnsignedCmp() && getConstantIntValue(counted.getStep()));
 }
 
 /// The type that a loop counts in: 32 bits, where its bounds have no more.
@@ -73,8 +73,9 @@ static bool isCheapTest(Operation *loop) {
     return true;
   Block &test = *other.getBeforeBody();
   return test.getOperations().size() <= most + 1 &&
-         llvm::all_of(test.without_terminator(),
-                      [](Operation &op) { return isPure(&op); });
+         llvm::all_of(test.without_terminator(), [](Operation &op) {
+           return op.getNumRegions() == 0 && isPure(&op);
+         });
 }
 
 /// What is computed in the outer loop in front of the inner one, and used in it
@@ -111,7 +112,8 @@ FlatNest piko::findFlatNest(Operation *outer) {
       if (isLoop(&op)) {
         if (nest || !isSimple(&op))
           return {};
-        nest = {outer, &op};
+        nest.outer = outer;
+        nest.inner = &op;
       }
   if (!nest)
     return {};
@@ -148,10 +150,7 @@ private:
     return llvm::map_to_vector(values, [&](Value value) { return get(value); });
   }
   /// Clones the operations from `first` up to `end`.
-  void clone(Operation *first, Operation *end) {
-    for (Operation *op = first; op != end; op = op->getNextNode())
-      builder.clone(*op, mapping);
-  }
+  void clone(Operation *first, Operation *end);
   Value getBound(scf::ForOp loop, Value bound);
   /// A counting loop carries its number first.
   Values getInits(Operation *loop);
@@ -173,6 +172,9 @@ private:
   Values writeStart(ValueRange carried);
   Values writeAdvance(ValueRange handed);
   Values writeTurn(ValueRange state);
+  /// Chooses what state is next: a lane that does not go on may wait.
+  Values writeWait(Value goesOn, llvm::function_ref<Values()> stay,
+                   llvm::function_ref<Values()> advance);
 
   /// Whether the inner loop stands where the outer one tests.
   bool isInTest() const {
@@ -191,6 +193,17 @@ private:
 };
 
 } // namespace
+
+/// Each time with arguments of its own for the blocks inside.
+void Flattener::clone(Operation *first, Operation *end) {
+  for (Operation *op = first; op != end; op = op->getNextNode()) {
+    op->walk([&](Block *block) {
+      for (Value argument : block->getArguments())
+        mapping.erase(argument);
+    });
+    builder.clone(*op, mapping);
+  }
+}
 
 Value Flattener::getBound(scf::ForOp loop, Value bound) {
   Type type = getCounterType(loop);
@@ -246,9 +259,12 @@ Flattener::Values Flattener::getNext(Operation *loop) {
   if (!isa<scf::ForOp>(loop))
     return next;
   Value counter = counters.lookup(loop);
-  Value one = arith::ConstantOp::create(
-      builder, loc, builder.getIntegerAttr(counter.getType(), 1));
-  next.insert(next.begin(), CodeBuilder(builder, loc).add(counter, one));
+  Value step = arith::ConstantOp::create(
+      builder, loc,
+      builder.getIntegerAttr(
+          counter.getType(),
+          *getConstantIntValue(cast<scf::ForOp>(loop).getStep())));
+  next.insert(next.begin(), CodeBuilder(builder, loc).add(counter, step));
   return next;
 }
 
@@ -267,6 +283,8 @@ Flattener::Values Flattener::writeChoice(Value condition, TypeRange types,
   OpBuilder::InsertionGuard guard(builder);
   for (auto [block, write] : {std::pair(choice.thenBlock(), yes),
                               std::pair(choice.elseBlock(), no)}) {
+    if (!block->empty())
+      block->getTerminator()->erase();
     builder.setInsertionPointToEnd(block);
     scf::YieldOp::create(builder, loc, write());
   }
@@ -361,6 +379,7 @@ Flattener::Values Flattener::writeAdvance(ValueRange handed) {
       [&] { return leave(test.handed); });
 }
 
+/// A lane that waits finds its test to fail again in the next turn.
 Flattener::Values Flattener::writeTurn(ValueRange state) {
   size_t count = getInits(nest.inner).size();
   ValueRange carried = state.drop_front().take_front(count);
@@ -370,16 +389,32 @@ Flattener::Values Flattener::writeTurn(ValueRange state) {
     setCounter(counted, state[1 + count + kept.size()]);
   Test test = writeTest(nest.inner, carried);
   auto advance = [&] { return writeAdvance(test.handed); };
-  if (!isCheapTest(nest.inner))
+  auto turn = [&] {
     return writeChoice(
-        test.goesOn, types,
-        [&] { return stay(writeBody(nest.inner, test.handed)); }, advance);
-  Values next = writeChoice(
-      test.goesOn, carried.getTypes(),
-      [&] { return writeBody(nest.inner, test.handed); },
-      [&] { return llvm::to_vector(carried); });
-  test = writeTest(nest.inner, next);
-  return writeChoice(test.goesOn, types, [&] { return stay(next); }, advance);
+        test.goesOn, carried.getTypes(),
+        [&] { return writeBody(nest.inner, test.handed); },
+        [&] { return llvm::to_vector(carried); });
+  };
+  if (isCheapTest(nest.inner)) {
+    Values next = turn();
+    test = writeTest(nest.inner, next);
+    return writeWait(test.goesOn, [&] { return stay(next); }, advance);
+  }
+  if (nest.advances)
+    return writeWait(test.goesOn, [&] { return stay(turn()); }, advance);
+  return writeChoice(
+      test.goesOn, types,
+      [&] { return stay(writeBody(nest.inner, test.handed)); }, advance);
+}
+
+Flattener::Values Flattener::writeWait(Value goesOn,
+                                       llvm::function_ref<Values()> stay,
+                                       llvm::function_ref<Values()> advance) {
+  Values state = writeChoice(goesOn, types, stay, advance);
+  if (nest.advances)
+    state.front().getDefiningOp()->setAttr(
+        marks::advances, builder.getF64FloatAttr(*nest.advances));
+  return state;
 }
 
 scf::WhileOp Flattener::write() {

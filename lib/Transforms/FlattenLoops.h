@@ -14,6 +14,10 @@ namespace piko {
 /// A loop, and the only one that stands in it by itself.
 struct FlatNest {
   mlir::Operation *outer = nullptr, *inner = nullptr;
+  /// In how many of its turns a lane is expected to go on to the next one of
+  /// the outer loop, where lanes wait for others before they do; else all of
+  /// them.
+  std::optional<double> advances = std::nullopt;
 
   explicit operator bool() const { return outer; }
 };

@@ -5,7 +5,10 @@
 
 #include "IterationWriter.h"
 
+#include "Piko/Dialect/Piko/IR/Marks.h"
+
 #include "mlir/Dialect/Arith/IR/Arith.h"
+#include "mlir/Dialect/Math/IR/Math.h"
 #include "mlir/Dialect/MemRef/IR/MemRef.h"
 #include "mlir/Dialect/Vector/IR/VectorOps.h"
 
@@ -87,6 +90,25 @@ SmallVector<Value> IterationWriter::writeSide(Region &region, Value mask,
   return SmallVector<Value>(some.getResults());
 }
 
+/// Lanes wait until three eighths of all do, or no other lane is left.
+Value IterationWriter::writeWaiting(Value goesOn) {
+  constexpr int64_t eighths = 3;
+  Value waiting = getBits(both(active, invert(goesOn))),
+        others = getBits(both(active, goesOn));
+  Type word = waiting.getType();
+  auto compare = [&](arith::CmpIPredicate predicate, Value bits, int64_t to) {
+    Value number = arith::ConstantOp::create(builder, loc,
+                                             builder.getIntegerAttr(word, to));
+    return arith::CmpIOp::create(builder, loc, predicate, bits, number);
+  };
+  Value count = math::CtPopOp::create(builder, loc, waiting);
+  Value areFew = compare(arith::CmpIPredicate::ult, count,
+                         std::max<int64_t>(1, laneCount * eighths / 8));
+  Value areOthers = compare(arith::CmpIPredicate::ne, others, 0);
+  Value wait = arith::AndIOp::create(builder, loc, areFew, areOthers);
+  return arith::OrIOp::create(builder, loc, goesOn, splat(wait));
+}
+
 void IterationWriter::writeIf(scf::IfOp choice) {
   if (!lanes.isVarying(choice.getCondition())) {
     SmallVector<Type> types;
@@ -107,6 +129,8 @@ void IterationWriter::writeIf(scf::IfOp choice) {
     return;
   }
   Value condition = get(choice.getCondition());
+  if (choice->hasAttr(marks::advances))
+    condition = writeWaiting(condition);
   SmallVector<Value> yes = writeSide(choice.getThenRegion(),
                                      both(active, condition),
                                      choice.getResults()),

@@ -79,6 +79,9 @@ public:
     bool isWorthwhile() const { return vectors < serial; }
   };
   Cost getCost() const;
+  /// How many turns each lane makes of a loop that lanes leave at different
+  /// times, as far as is known.
+  double getOwnTurns(mlir::Operation *inner) const;
   /// How many turns all lanes together make of a loop that is made of these
   /// two, as far as is known.
   double getFlatTurns(mlir::Operation *outer, mlir::Operation *inner) const;

@@ -116,6 +116,8 @@ private:
   mlir::Value writeActive(mlir::Value left);
   void writeStructure(mlir::Operation *op);
   void writeIf(mlir::scf::IfOp choice);
+  /// Which lanes do not yet leave a turn that only some go on with.
+  mlir::Value writeWaiting(mlir::Value goesOn);
   void writeSwitch(mlir::scf::IndexSwitchOp choice);
   void writeFor(mlir::scf::ForOp inner);
   void writeVaryingFor(mlir::scf::ForOp inner);

@@ -31,6 +31,8 @@ struct Cycles {
   double narrowGather, ownLines;
   /// One of several words of an element that are read at once.
   double transposed;
+  /// A word of a record that is emitted.
+  double emitted;
   /// A scatter, and of numbers below 32 bits; and what each row takes of a
   /// short array that is read, or written, at places that differ.
   double scatter, narrowScatter, readRow, writeRow;
@@ -78,7 +80,8 @@ static const Cycles &getCycles(int64_t laneCount) {
                                .sharedQuotient = 24,
                                .narrowGather = 16,
                                .ownLines = 30,
-                               .transposed = 12,
+                               .transposed = 7,
+                               .emitted = 12,
                                .scatter = 16,
                                .narrowScatter = 60,
                                .readRow = 0.8,
@@ -108,6 +111,7 @@ static const Cycles &getCycles(int64_t laneCount) {
                               .narrowGather = 10,
                               .ownLines = 15,
                               .transposed = 4,
+                              .emitted = 4,
                               .scatter = 20,
                               .narrowScatter = 35,
                               .readRow = 0.5,
@@ -137,6 +141,7 @@ static const Cycles &getCycles(int64_t laneCount) {
                               .narrowGather = 8,
                               .ownLines = 8,
                               .transposed = 6,
+                              .emitted = 6,
                               .scatter = 8,
                               .narrowScatter = 8,
                               .readRow = 2,
@@ -239,6 +244,8 @@ public:
   IterationLanes::Cost cost;
 
   double getFlatTurns(Operation *outer, Operation *inner) const;
+  /// How many turns a lane makes of a loop.
+  double getOwnTurns(Operation *loop) const;
 
 private:
   void addOperation(Operation *op, Frequency times, bool laneByLane);
@@ -360,8 +367,12 @@ double CostModel::getGoing(Operation *loop) const {
 double CostModel::getFlatTurns(Operation *outer, Operation *inner) const {
   // Measured, of lists and of searches.
   constexpr double goOnInNest = 0.35;
-  return getTurns(outer) * getGoing(outer) *
-         std::max(1.0, getTurns(inner) * goOnInNest) / fullness;
+  return getTurns(outer) * std::max(1.0, getTurns(inner) * goOnInNest) /
+         fullness;
+}
+
+double CostModel::getOwnTurns(Operation *loop) const {
+  return std::max(1.0, getTurns(loop) * cycles.goOn);
 }
 
 void CostModel::addStructure(Operation *op, Frequency times, bool laneByLane) {
@@ -375,6 +386,9 @@ void CostModel::addStructure(Operation *op, Frequency times, bool laneByLane) {
                             : getFrequency(side, other, lanes.getLaneCount());
       if (!lanes.isVarying(choice.getCondition()))
         share.vectors = share.serial;
+      auto advances = choice->getAttrOfType<FloatAttr>(marks::advances);
+      if (advances && &side == &no)
+        share.vectors = advances.getValueAsDouble();
       add(side, times.scaled(share.serial, share.vectors), laneByLane);
     };
     addSide(yes, no);
@@ -554,7 +568,7 @@ void CostModel::addEmission(Operation *op, Frequency times) {
   cost.serial += times.serial * getScalar(append);
   cost.vectors +=
       times.vectors * (cycles.apartInOrder +
-                       cycles.transposed * double(record.getSize()) / wordSize);
+                       cycles.emitted * double(record.getSize()) / wordSize);
 }
 
 void CostModel::addOperation(Operation *op, Frequency times, bool laneByLane) {
@@ -597,6 +611,10 @@ void CostModel::addOperation(Operation *op, Frequency times, bool laneByLane) {
   cost.vectors += vectors;
   if (isTurns || isGather)
     cost.obstacles.emplace(vectors, op);
+}
+
+double IterationLanes::getOwnTurns(Operation *inner) const {
+  return CostModel(*this).getOwnTurns(inner);
 }
 
 double IterationLanes::getFlatTurns(Operation *outer, Operation *inner) const {

@@ -5,7 +5,9 @@
 #include "FlattenLoops.h"
 
 #include "Piko/Dialect/Piko/IR/Marks.h"
+#include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
+#include "mlir/Dialect/Arith/IR/Arith.h"
 #include "mlir/Dialect/MemRef/IR/MemRef.h"
 #include "mlir/Interfaces/SideEffectInterfaces.h"
 #include "mlir/Transforms/LoopInvariantCodeMotionUtils.h"
@@ -82,13 +84,158 @@ static SmallVector<Location> findOrdered(const IterationLanes &lanes) {
   return found;
 }
 
+/// Takes a loop instead of the best one, if it is expected to take less;
+/// otherwise erases it.
+static bool tryLoop(FlatLoop &best, scf::ForOp loop, int64_t laneCount,
+                    Location nest) {
+  constexpr double gain = 0.8; // Turns are estimated.
+  IterationLanes lanes(loop, laneCount);
+  IterationLanes::Cost cost = lanes.getCost();
+  // A loop that is made of two is not known to stream.
+  double lines = std::max(cost.lines, best.cost.lines);
+  cost.vectors += lines - cost.lines;
+  cost.lines = lines;
+  if (lanes.getRefusal().at || cost.vectors > gain * best.cost.vectors) {
+    loop.erase();
+    return false;
+  }
+  if (best.loop)
+    best.loop.erase();
+  cost.serial = best.cost.serial;
+  best.loop = loop;
+  best.cost = std::move(cost);
+  best.nests.push_back(nest);
+  return true;
+}
+
+static void setTurns(scf::WhileOp loop, double turns) {
+  loop->setAttr(marks::turns, Builder(loop).getF64FloatAttr(turns));
+}
+
+static scf::ForOp clone(scf::ForOp loop) {
+  return cast<scf::ForOp>(OpBuilder(loop).clone(*loop));
+}
+
+//===----------------------------------------------------------------------===//
+// Iterations
+//===----------------------------------------------------------------------===//
+
+/// The only loop that stands in an iteration by itself, if lanes leave it at
+/// different times, and no order shows of what they do: primitives may be
+/// counted by themselves.
+static Operation *findOwnLoop(const IterationLanes &lanes) {
+  scf::ForOp root = lanes.getLoop();
+  Operation *own = nullptr;
+  for (Operation &op : root.getBody()->without_terminator())
+    if (isa<scf::ForOp, scf::WhileOp>(op)) {
+      if (own)
+        return nullptr;
+      own = &op;
+    }
+  bool isBound = holds(root, [&](Operation *op) {
+    auto counted = dyn_cast<scf::ForOp>(op);
+    return (op != root && !isa<NextOp>(op) && lanes.findGroup(op)) ||
+           isBarrier(op) || isPrefetch(op) ||
+           (isa<NextOp>(op) && op->getParentOp() != root) ||
+           (counted && op != root && !lanes.getNest(counted).empty());
+  });
+  return own && !isBound && isDivergent(own, lanes) ? own : nullptr;
+}
+
+/// Makes a loop over the lanes, around one over the iterations of each, as many
+/// apart as there are lanes.
+static scf::ForOp stripMine(scf::ForOp loop, int64_t laneCount) {
+  OpBuilder builder(loop);
+  Location loc = loop.getLoc();
+  Value lower = loop.getLowerBound(), upper = loop.getUpperBound();
+  Value width = arith::ConstantOp::create(
+      builder, loc, builder.getIntegerAttr(lower.getType(), laneCount));
+  Value behind = arith::AddIOp::create(builder, loc, lower, width,
+                                       arith::IntegerOverflowFlags::nsw);
+  Value end = arith::MinSIOp::create(builder, loc, behind, upper);
+  auto ofLanes = scf::ForOp::create(builder, loc, lower, end, loop.getStep());
+  ofLanes->setAttrs(loop->getAttrs());
+  builder.setInsertionPointToStart(ofLanes.getBody());
+  Value first = ofLanes.getInductionVar();
+  auto own = scf::ForOp::create(builder, loc, first, upper, width);
+  loop.getInductionVar().replaceAllUsesWith(own.getInductionVar());
+  auto &body = own.getBody()->getOperations();
+  body.splice(body.begin(), loop.getBody()->getOperations(),
+              loop.getBody()->begin(), std::prev(loop.getBody()->end()));
+  // Arrays of one iteration after the other take the same place.
+  for (auto array : llvm::to_vector(own.getBody()->getOps<memref::AllocaOp>()))
+    array->moveBefore(own);
+  loop.erase();
+  return ofLanes;
+}
+
+/// Reads what is used behind a loop in front of it.
+static void readAhead(Operation *loop) {
+  for (Operation *op = loop->getNextNode(), *next; op; op = next) {
+    next = op->getNextNode();
+    auto get = dyn_cast<GetOp>(op);
+    if (get && get.getElements().empty() &&
+        get.getPrim().getParentBlock() == loop->getBlock() &&
+        get.getPrim().getDefiningOp()->isBeforeInBlock(loop))
+      get->moveBefore(loop);
+  }
+}
+
+/// Lanes take iterations that are as many apart as there are lanes, and each
+/// goes on to its next one by itself.
+static void flattenIterations(FlatLoop &best, const IterationLanes &lanes) {
+  int64_t laneCount = lanes.getLaneCount();
+  scf::ForOp loop = clone(best.loop ? best.loop : lanes.getLoop());
+  IterationLanes before(loop, laneCount);
+  Operation *inner = findOwnLoop(before);
+  if (!inner || !loop.getLowerBound().getType().isIndex()) {
+    loop.erase();
+    return;
+  }
+  constexpr double fullness = 0.85, atOnce = 3.0 / 8;
+  double turns = before.getOwnTurns(inner);
+  Location loc = loop.getLoc();
+  SmallVector<Value> writers;
+  for (NextOp next :
+       llvm::make_early_inc_range(loop.getBody()->getOps<NextOp>())) {
+    writers.push_back(next.getWriter());
+    next.erase();
+  }
+  loop = stripMine(loop, laneCount);
+  readAhead(inner);
+  hoistInvariants(inner->getParentOp(), before);
+  FlatNest nest = findFlatNest(inner->getParentOp());
+  if (!nest) {
+    loop.erase();
+    return;
+  }
+  nest.advances = std::min(1.0, 1 / (turns * atOnce));
+  setTurns(flatten(nest), turns / fullness);
+  if (tryLoop(best, loop, laneCount, loc))
+    best.writers = writers;
+}
+
+void piko::countPrimitives(scf::ForOp loop, ValueRange writers) {
+  OpBuilder builder(loop);
+  Location loc = loop.getLoc();
+  for (Value writer : writers) {
+    Value isCounted = IsCountedOp::create(builder, loc, writer);
+    auto choice =
+        scf::IfOp::create(builder, loc, isCounted, /*withElseRegion=*/false);
+    OpBuilder::InsertionGuard guard(builder);
+    builder.setInsertionPointToStart(choice.thenBlock());
+    auto made = scf::ForOp::create(builder, loc, loop.getLowerBound(),
+                                   loop.getUpperBound(), loop.getStep());
+    builder.setInsertionPointToStart(made.getBody());
+    NextOp::create(builder, loc, writer);
+  }
+}
+
 FlatLoop piko::flattenNests(const IterationLanes &lanes) {
   constexpr size_t most = 3;
-  constexpr double gain = 0.8; // Turns are estimated.
   FlatLoop best{{}, lanes.getCost(), {}, findOrdered(lanes)};
   for (size_t skipped = 0; skipped < most;) {
-    scf::ForOp from = best.loop ? best.loop : lanes.getLoop();
-    auto loop = cast<scf::ForOp>(OpBuilder(from).clone(*from));
+    scf::ForOp loop = clone(best.loop ? best.loop : lanes.getLoop());
     IterationLanes before(loop, lanes.getLaneCount());
     FlatNest nest = findNest(before, skipped);
     if (!nest) {
@@ -98,26 +245,9 @@ FlatLoop piko::flattenNests(const IterationLanes &lanes) {
     Location loc = nest.outer->getLoc();
     double turns = before.getFlatTurns(nest.outer, nest.inner);
     hoistInvariants(nest.outer, before);
-    scf::WhileOp made = flatten(findFlatNest(nest.outer));
-    made->setAttr(marks::turns,
-                  FloatAttr::get(Float64Type::get(loop.getContext()), turns));
-    IterationLanes after(loop, lanes.getLaneCount());
-    IterationLanes::Cost cost = after.getCost();
-    // A loop that is made of two is not known to stream.
-    double lines = std::max(cost.lines, best.cost.lines);
-    cost.vectors += lines - cost.lines;
-    cost.lines = lines;
-    if (after.getRefusal().at || cost.vectors > gain * best.cost.vectors) {
-      loop.erase();
-      ++skipped;
-      continue;
-    }
-    if (best.loop)
-      best.loop.erase();
-    cost.serial = best.cost.serial;
-    best.loop = loop;
-    best.cost = std::move(cost);
-    best.nests.push_back(loc);
+    setTurns(flatten(findFlatNest(nest.outer)), turns);
+    skipped += !tryLoop(best, loop, lanes.getLaneCount(), loc);
   }
+  flattenIterations(best, lanes);
   return best;
 }

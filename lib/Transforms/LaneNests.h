@@ -17,11 +17,16 @@ struct FlatLoop {
   llvm::SmallVector<mlir::Location> nests = {};
   /// Others, which lanes go through one after the other, since an order shows.
   llvm::SmallVector<mlir::Location> ordered = {};
+  /// By which its primitives are to be counted by themselves.
+  llvm::SmallVector<mlir::Value> writers = {};
 };
+
+/// Counts all primitives of a loop in front of where it stands.
+void countPrimitives(mlir::scf::ForOp loop, mlir::ValueRange writers);
 
 /// Flattens each nest whose inner loop lanes leave at different times, where
 /// that is expected to take less, and nothing of it is done in an order that
-/// shows.
+/// shows; then iterations, each with its only loop.
 FlatLoop flattenNests(const IterationLanes &lanes);
 
 } // namespace piko

@@ -135,6 +135,14 @@ static void addObstacles(InFlightDiagnostic &remark,
   }
 }
 
+/// With half the lanes estimates matter more: measured, bodies that are
+/// expected to gain less than a fifth lose.
+static bool isSurelyFaster(const IterationLanes::Cost &cost,
+                           int64_t laneCount) {
+  constexpr double sure = 0.8;
+  return cost.vectors < (laneCount == 8 ? sure : 1) * cost.serial;
+}
+
 /// Only loops that turn as often for all primitives count, as those over the
 /// rows of an image: others may be short.
 bool Candidate::isFasterInside(const IterationLanes &lanes,
@@ -148,7 +156,8 @@ bool Candidate::isFasterInside(const IterationLanes &lanes,
       return WalkResult::advance();
     IterationLanes turns(inner, lanes.getLaneCount());
     IterationLanes::Cost part = turns.getCost();
-    if (turns.getRefusal().at || !part.computes || !part.isWorthwhile())
+    if (turns.getRefusal().at || !part.computes ||
+        !isSurelyFaster(part, lanes.getLaneCount()))
       return WalkResult::advance();
     inside -= cost.loops.lookup(inner) * (1 - part.vectors / part.serial);
     return WalkResult::skip();
@@ -166,12 +175,9 @@ bool Candidate::isRefused(const IterationLanes &lanes,
     refuse() << "a box may have few pixels" << otherwise;
     return true;
   }
-  // With half the lanes estimates matter more: measured, bodies that are
-  // expected to gain less than a fifth lose.
-  constexpr double sure = 0.8;
-  bool isSure = !ofPrimitives || lanes.getLaneCount() != 8 ||
-                cost.vectors < sure * cost.serial;
-  if (!cost.isWorthwhile() || !isSure) {
+  bool isFaster = ofPrimitives ? isSurelyFaster(cost, lanes.getLaneCount())
+                               : cost.isWorthwhile();
+  if (!isFaster) {
     InFlightDiagnostic remark = refuse();
     remark << lanes.getLaneCount() << " at once are expected to take "
            << std::llround(cost.vectors) << " cycles, and one after the other "
@@ -474,8 +480,9 @@ bool VectorizePass::vectorizeInOrder(Operation *op) {
   }
   if (!vectorizeCompacted(copy)) {
     IterationLanes lanes(copy, laneCount);
-    if (lanes.getRefusal().at || !lanes.getCost().computes ||
-        !lanes.getCost().isWorthwhile()) {
+    IterationLanes::Cost cost = lanes.getCost();
+    if (lanes.getRefusal().at || !cost.computes ||
+        !isSurelyFaster(cost, laneCount)) {
       copy.erase();
       return false;
     }
@@ -504,6 +511,7 @@ WalkResult VectorizePass::visit(Operation *op) {
     flat = flattenNests(lanes);
   bool isDone = candidate.decide(lanes, flat);
   if (isDone && flat.loop) {
+    countPrimitives(loop, flat.writers);
     vectorize(IterationLanes(flat.loop, laneCount), copy);
   } else if (isDone) {
     vectorize(lanes, copy);

@@ -6,7 +6,7 @@
 // as it is, because its order shows.
 // RUN: sed -n 's|^// CASE: ||p' %s > %t.cases
 // RUN: piko-compare %s --cases %t.cases --runs 1 | FileCheck %s
-// CHECK-COUNT-10: {{^equal$}}
+// CHECK-COUNT-15: {{^equal$}}
 // CASE: --pipe Probes --domain 8 8 --count 1003
 // CASE: --pipe Cells --domain 8 8 --count 700
 // CASE: --pipe Collatz --domain 8 8 --count 333
@@ -17,8 +17,16 @@
 // CASE: --pipe Counts --domain 8 8 --count 700
 // CASE: --pipe Paints --domain 8 8 --count 300
 // CASE: --pipe Emits --domain 8 8 --count 300
+// CASE: --pipe Orbits --domain 8 8 --count 1003
+// CASE: --pipe Orbits --domain 8 8 --count 17
+// CASE: --pipe Orbits --domain 8 8 --count 5
+// CASE: --pipe Trees --domain 8 8 --count 1003
+// CASE: --pipe Chains --domain 8 8 --count 777
 //
 // RUN: pikoc %s --pipe Probes --cpu x86-64-v4 --remarks -o %t.ll 2>&1 | FileCheck %s --check-prefix=REMARK
+// RUN: pikoc %s --pipe Trees --cpu x86-64-v4 --remarks -o %t.ll 2>&1 | FileCheck %s --check-prefix=TREES
+// TREES: process is vectorized for 16 primitives at once
+// TREES: flat-loops.cpp:[[# @LINE + 23]]:{{.*}} lanes go on in this loop each by itself
 // REMARK: process is vectorized for 16 primitives at once
 // REMARK: flat-loops.cpp:[[# @LINE + 50]]:{{.*}} lanes go on in this loop each by itself
 #include <piko.h>
@@ -197,6 +205,76 @@ struct Enter {
   }
 };
 struct Empty : Pipe<Enter> {};
+
+/// Primitives whose loops end at different times: what is read of them, and
+/// stored, is that of the next one.
+struct Orbit {
+  Result run(const State &, const Prim &p) {
+    float x = float(p.x & 255) * 0.01f - 2, y = float(p.y & 255) * 0.01f - 1;
+    float a = 0, b = 0, c = 1;
+    int turns = 0;
+    while (a * a + b * b < 8 && turns < 90) {
+      float next = a * a - b * b + x;
+      b = 2 * a * b + y;
+      a = next;
+      for (int i = 0; i < 6; ++i)
+        c = piko::sqrt((c * c + b) / (a * a + 1) + 9) / (c * b + 2.5f) - 1;
+      c = c > 4 || c < -4 ? 1 : c;
+      ++turns;
+    }
+    return {turns + (p.z & 1), int(c * 64)};
+  }
+};
+struct Orbits : Pipe<Orbit> {};
+
+/// A traversal with a stack.
+struct Traverse {
+  Result run(const State &, const Prim &p) {
+    int stack[24];
+    int top = 0;
+    Result r{0, 0};
+    stack[top++] = 1;
+    while (top > 0) {
+      int node = stack[--top];
+      float d = float((node * 37 ^ p.x) & 255) - float(p.y & 127);
+      float e = piko::sqrt(d * d + float(p.w & 15)) * 0.5f + d * 0.25f;
+      for (int i = 0; i < 5; ++i)
+        e = piko::sqrt(e * e + d) / (e + 7) * (d / (e * e + 3) + 1);
+      ++r.a;
+      if (node >= 512) {
+        r.b = r.b * 31 + node;
+        continue;
+      }
+      if (e < 9)
+        stack[top++] = node * 2;
+      if (e > 2)
+        stack[top++] = node * 2 + 1;
+    }
+    return r;
+  }
+};
+struct Trees : Pipe<Traverse> {};
+
+/// Links of other primitives, of which a loop reads lists.
+struct Follow {
+  Result run(const State &state, const Prim &p) {
+    int n = int(state.prims.size());
+    uint32_t at = uint32_t(p.x);
+    Result r{0, 0};
+    for (int hops = 0; hops < 30; ++hops) {
+      int sum = 0;
+      for (uint32_t i = 0; i < (at >> 9 & 7); ++i)
+        sum += state.prims[int((at + i) % uint32_t(n))].y ^ int(i * at);
+      r.a = r.a * 31 + sum;
+      at = at * 1664525u + 1013904223u + uint32_t(sum);
+      if ((at >> 27) == 3)
+        break;
+      ++r.b;
+    }
+    return r;
+  }
+};
+struct Chains : Pipe<Follow> {};
 
 /// Atomic operations in the inner loop, whose order does not show.
 struct Count : piko::Stage<0, 0, 1, Prim>, piko::Uses<State> {

@@ -67,7 +67,7 @@ piko.record @P {"k" : i32 at 0, "n" : i32 at 4} size 8 align 4
 piko.record @N {"n" : i32 at 0} size 4 align 4
 
 // Loops whose ends are a fixed number of turns from where they begin do not
-// differ.
+// differ: only the loop around them does.
 // CHECK-LABEL: piko.pipeline @Alike
 // CHECK:         scf.while
 // CHECK:           scf.while
@@ -87,7 +87,8 @@ piko.pipeline @Alike rank 1 {
     %u = piko.storage.unit_count %bins : !piko.bins<@P>
     scf.forall (%unit) in (%u) {
       %lo, %hi = piko.storage.cell_range %bins[%unit, %unit] : !piko.bins<@P>
-      // expected-remark@+1 {{stage 'a': process is vectorized for 16 primitives at once}}
+      // expected-remark@+2 {{stage 'a': process is vectorized for 16 primitives at once}}
+      // expected-note@+1 {{lanes go on in this loop each by itself}}
       scf.for %i = %lo to %hi step %step {
         %p = piko.storage.item %bins[%i] : !piko.bins<@P> -> !piko.prim<@P>
         %k = piko.get %p "k" : !piko.prim<@P> -> i32
@@ -148,6 +149,74 @@ piko.pipeline @Ordered rank 1 {
           }
         }
       } {piko.lanes, piko.mapping = #piko<lanes items>}
+    }
+    piko.storage.close_bins %bins : !piko.bins<@P>
+  }
+}
+
+// -----
+
+piko.record @P {"x" : f32 at 0, "k" : i32 at 4} size 8 align 4
+piko.record @N {"x" : f32 at 0} size 4 align 4
+
+// A loop by itself, long for some primitives: each lane takes every sixteenth
+// primitive, and waits with the next one until three eighths of the lanes need
+// one, or none has anything else to do. All primitives are
+// counted behind it.
+// CHECK-LABEL: piko.pipeline @Iterates
+// CHECK:         piko.cpu.items
+// CHECK:         scf.while
+// CHECK:         } do {
+// CHECK:           scf.for
+// CHECK:             arith.divf
+// CHECK:           %[[WAITING:.*]] = math.ctpop %{{.*}} : i16
+// CHECK:           arith.cmpi ult, %[[WAITING]], %c6_i16 : i16
+// CHECK:           piko.cpu.scatter %{{.*}}, @out
+// CHECK:           piko.cpu.items %{{.*}}[%{{.*}} : vector<16xindex>]
+// CHECK-NOT:     scf.while
+// CHECK:         %[[COUNTED:.*]] = piko.cpu.is_counted
+// CHECK:         scf.if %[[COUNTED]] {
+// CHECK-NEXT:      scf.for
+// CHECK-NEXT:        piko.storage.next
+piko.pipeline @Iterates rank 1 {
+  piko.buffer @out : @N
+  piko.source @a
+  piko.stage @a bins [0] threads 1 : @P -> [] {}
+  piko.kernel @k {
+    %c0 = arith.constant 0 : index
+    %c1 = arith.constant 1 : index
+    %c4 = arith.constant 4 : index
+    %one = arith.constant 1.0 : f32
+    %bins = piko.storage.open_bins @a : !piko.bins<@P>
+    %u = piko.storage.unit_count %bins : !piko.bins<@P>
+    scf.forall (%unit) in (%u) {
+      %writer = piko.cpu.open_writer %bins[%unit] : !piko.bins<@P>
+      %lo, %hi = piko.storage.cell_range %bins[%unit, %unit] : !piko.bins<@P>
+      // expected-remark@+2 {{stage 'a': process is vectorized for 16 primitives at once}}
+      // expected-note@+1 {{lanes go on in this loop each by itself}}
+      scf.for %i = %lo to %hi step %c1 {
+        %p = piko.storage.item %bins[%i] : !piko.bins<@P> -> !piko.prim<@P>
+        %x = piko.get %p "x" : !piko.prim<@P> -> f32
+        %last = scf.while (%at = %x) : (f32) -> f32 {
+          %next = scf.for %j = %c0 to %c4 step %c1 iter_args(%y = %at) -> f32 {
+            %0 = arith.divf %y, %x : f32
+            %1 = math.sqrt %0 : f32
+            %2 = arith.divf %1, %y : f32
+            %3 = arith.divf %2, %0 : f32
+            %4 = math.sqrt %3 : f32
+            scf.yield %4 : f32
+          }
+          %goes = arith.cmpf olt, %next, %one : f32
+          scf.condition(%goes) %next : f32
+        } do {
+        ^bb0(%at: f32):
+          scf.yield %at : f32
+        }
+        %k = piko.get %p "k" : !piko.prim<@P> -> i32
+        piko.store %last, checked @out[%k : i32] "x" : f32
+        piko.storage.next %writer
+      } {piko.lanes, piko.mapping = #piko<lanes items>}
+      piko.cpu.close_writer %writer
     }
     piko.storage.close_bins %bins : !piko.bins<@P>
   }

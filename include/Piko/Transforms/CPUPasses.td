@@ -376,6 +376,11 @@ def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
     as they emit or update pixels that lanes may share, stay as they are, and a
     remark says so.
 
+    Where all that iterations do by themselves is one such loop, as rays that end
+    at different times have, lanes take iterations that are as many apart as there
+    are lanes, and each goes on to its next one by itself. It waits with that until
+    three eighths of the lanes do, or no other one has anything to do.
+
     What must keep its order (emission, updates of pixels that lanes may share)
     runs lane by lane: all that one image or one writer is concerned with, as one
     group in its place, or, if nothing in the loop waits for it, as several behind

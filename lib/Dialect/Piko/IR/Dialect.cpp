@@ -87,7 +87,7 @@ static StringRef getExpectedKind(StringRef name) {
       .Case(marks::mapping, "what lanes are given, as #piko<lanes items>")
       .Case(marks::units, "how threads share units, as #piko<units any>")
       .Case(marks::number, "a 64-bit integer")
-      .Case(marks::turns, "a 64-bit float")
+      .Cases({marks::turns, marks::advances}, "a 64-bit float")
       .Cases({marks::pixels, cppNameAttr}, "a string")
       .Case(cppTypesAttr, "a dictionary")
       .Default({});
@@ -104,7 +104,7 @@ static bool hasExpectedKind(NamedAttribute attribute) {
     return isa<StringAttr>(value);
   if (name == cppTypesAttr)
     return isa<DictionaryAttr>(value);
-  if (name == marks::turns)
+  if (name == marks::turns || name == marks::advances)
     return isa<FloatAttr>(value) && cast<FloatAttr>(value).getType().isF64();
   if (auto number = dyn_cast<IntegerAttr>(value))
     return name == marks::number && number.getType().isInteger(64);

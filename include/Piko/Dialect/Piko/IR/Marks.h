@@ -21,6 +21,10 @@ constexpr llvm::StringLiteral mapping = "piko.mapping";
 /// How many turns lanes together are expected to make of a loop that was made
 /// of two, one inside of the other: a 64-bit float.
 constexpr llvm::StringLiteral turns = "piko.turns";
+/// An scf.if whose second side a lane may put off for as long as others take
+/// the first one, which does nothing for it: in how many turns it runs, a
+/// 64-bit float.
+constexpr llvm::StringLiteral advances = "piko.advances";
 /// How threads share the loop over units of work, a `UnitLoopAttr`.
 constexpr llvm::StringLiteral units = "piko.units";
 /// A loop whose iterations the threads of a block share.
