@@ -66,7 +66,7 @@ public:
 private:
   InFlightDiagnostic refuse();
   /// Whether it is expected to take less otherwise, which a remark tells.
-  bool isRefused(const IterationLanes &lanes, const IterationLanes::Cost &cost);
+  bool isRefused(const IterationLanes &lanes, const FlatLoop &flat);
   void remarkVectors(const IterationLanes &lanes, const FlatLoop &flat);
   /// Whether it takes less to run primitives one after the other, and to give
   /// lanes the iterations of loops in them.
@@ -166,8 +166,8 @@ bool Candidate::isFasterInside(const IterationLanes &lanes,
   return inside < gain * cost.vectors;
 }
 
-bool Candidate::isRefused(const IterationLanes &lanes,
-                          const IterationLanes::Cost &cost) {
+bool Candidate::isRefused(const IterationLanes &lanes, const FlatLoop &flat) {
+  IterationLanes::Cost cost = lanes.getCost();
   std::string otherwise = "; specifyLanes(";
   otherwise += ofPrimitives ? "Items" : "Iterations";
   otherwise += ") does so all the same";
@@ -177,7 +177,11 @@ bool Candidate::isRefused(const IterationLanes &lanes,
   }
   bool isFaster = ofPrimitives ? isSurelyFaster(cost, lanes.getLaneCount())
                                : cost.isWorthwhile();
-  if (!isFaster) {
+  // Flattened nests make up for little else that was not foreseen.
+  constexpr double half = 0.5;
+  bool isFasterFlat = flat.loop && cost.isWorthwhile() &&
+                      flat.cost.vectors < half * cost.serial;
+  if (!isFaster && !isFasterFlat) {
     InFlightDiagnostic remark = refuse();
     remark << lanes.getLaneCount() << " at once are expected to take "
            << std::llround(cost.vectors) << " cycles, and one after the other "
@@ -222,7 +226,7 @@ bool Candidate::decide(const IterationLanes &lanes, const FlatLoop &flat) {
   IterationLanes::Cost cost = lanes.getCost();
   if (!ofPrimitives && !cost.computes)
     return false; // clears or copies, which needs no plan
-  if (!said && isRefused(lanes, cost))
+  if (!said && isRefused(lanes, flat))
     return false;
   remarkVectors(lanes, flat);
   return true;

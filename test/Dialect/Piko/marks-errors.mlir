@@ -56,3 +56,13 @@ func.func @pixels() {
   %array = memref.alloca() {piko.pixels} : memref<4xf32>
   return
 }
+
+// -----
+
+func.func @turns(%end: index) {
+  %c1 = arith.constant 1 : index
+  // expected-error@+1 {{expected 'piko.turns' to be a 64-bit float, but got 8 : i64}}
+  scf.for %i = %c1 to %end step %c1 {
+  } {piko.turns = 8}
+  return
+}
