@@ -255,6 +255,11 @@ int64_t Memory::peak() const {
   return peak_;
 }
 
+void Memory::noteOthers(int64_t bytes) {
+  std::lock_guard<std::mutex> lock(mutex_);
+  peak_ = std::max(peak_, binBytes_ + bytes);
+}
+
 void Memory::resetPeak() {
   std::lock_guard<std::mutex> lock(mutex_);
   peak_ = binBytes_;

@@ -71,6 +71,8 @@ public:
   int64_t peakSinceMark() const;
   int64_t reserved() const;
   int64_t peak() const;
+  /// Counts bins that lie elsewhere, at the same time as those here.
+  void noteOthers(int64_t bytes);
   void resetPeak();
 
 private:

@@ -34,6 +34,8 @@ Accelerator::~Accelerator() {
   device_->enter();
   if (!log_.empty())
     unmap(log_.data());
+  if (graph_)
+    device_->driver.cuGraphExecDestroy(graph_);
   module_.unload();
   joins_.unload();
   if (stream_)
@@ -138,14 +140,56 @@ void Accelerator::launch(const GridLaunch &grid) {
                    "running " + moduleOf(grid.kernel).describe(grid.kernel));
 }
 
+bool Accelerator::hasGraphs() const {
+  const Driver &driver = device_->driver;
+  return driver.cuGraphInstantiateWithFlags && driver.cuGraphExecUpdate;
+}
+
+template <class Body> void Accelerator::capture(const Body &body) {
+  const Driver &driver = device_->driver;
+  // Other threads may do with the device what they like meanwhile.
+  device_->check(driver.cuStreamBeginCapture(
+                     stream_, CU_STREAM_CAPTURE_MODE_THREAD_LOCAL),
+                 "capturing a frame");
+  CUgraph graph = nullptr;
+  try {
+    body();
+  } catch (...) {
+    driver.cuStreamEndCapture(stream_, &graph);
+    if (graph)
+      driver.cuGraphDestroy(graph);
+    throw;
+  }
+  device_->check(driver.cuStreamEndCapture(stream_, &graph),
+                 "capturing a frame");
+  CUgraphExecUpdateResultInfo info{};
+  CUresult result =
+      graph_ ? driver.cuGraphExecUpdate(graph_, graph, &info) : CUDA_SUCCESS;
+  if (graph_ && result != CUDA_SUCCESS)
+    driver.cuGraphExecDestroy(std::exchange(graph_, nullptr));
+  if (!graph_)
+    result = driver.cuGraphInstantiateWithFlags(&graph_, graph, /*flags=*/0);
+  driver.cuGraphDestroy(graph);
+  device_->check(result, "making a graph of a frame");
+}
+
 void Accelerator::submit(std::span<const GridLaunch> grids,
                          std::span<uint8_t> clear) {
   device_->check(device_->enter(), "entering its context");
   for (const GridLaunch &grid : grids) // before any of them runs
     moduleOf(grid.kernel).find(grid.kernel);
-  clearLog(clear);
-  for (const GridLaunch &grid : grids)
-    launch(grid);
+  auto submitAll = [&] {
+    clearLog(clear);
+    for (const GridLaunch &grid : grids)
+      launch(grid);
+  };
+  if (grids.size() > 1 && hasGraphs()) {
+    capture(submitAll);
+    device_->check(device_->driver.cuGraphLaunch(graph_, stream_),
+                   "running a frame");
+  } else {
+    submitAll();
+  }
   CUresult result = device_->driver.cuStreamSynchronize(stream_);
   if (result != CUDA_SUCCESS)
     device_->check(result, "running " + describeFailed(grids));

@@ -41,7 +41,8 @@ public:
   /// Blocks of a join, all of which are resident.
   int64_t joinBlocks() const { return joinBlocks_; }
   /// Runs grids one after the other, behind making a part of the log zero
-  /// again, and waits for them; throws.
+  /// again, and waits for them: several as one graph, where the driver has
+  /// what that takes. Throws.
   void submit(std::span<const GridLaunch> grids, std::span<uint8_t> clear);
   /// Memory of the host in which joins say how far a submission is; throws.
   int64_t *progress();
@@ -54,6 +55,9 @@ public:
 private:
   Module &moduleOf(const std::string &kernel);
   void launch(const GridLaunch &grid);
+  bool hasGraphs() const;
+  /// Makes `graph_` of what follows in the stream, or changes it to that.
+  template <class Body> void capture(const Body &body);
   /// The kernel of a submission that failed, as far as it is known.
   std::string describeFailed(std::span<const GridLaunch> grids);
 
@@ -61,6 +65,7 @@ private:
   std::shared_ptr<Device> device_;
   Module module_, joins_; ///< The program's kernels, and the runtime's.
   CUstream stream_ = nullptr;
+  CUgraphExec graph_ = nullptr; ///< Of the latest submission.
   std::span<uint8_t> log_;
   int64_t *progress_ = nullptr;
   int64_t residentThreads_ = 0, joinBlocks_ = 0;

@@ -39,6 +39,9 @@ static Driver openDriver() {
   };
 #define PIKO_CUDA_FUNCTION(NAME, SYMBOL, PARAMETERS)                           \
   driver.NAME = reinterpret_cast<CUresult(*) PARAMETERS>(find(SYMBOL));
+#define PIKO_CUDA_OPTIONAL(NAME, SYMBOL, PARAMETERS)                           \
+  driver.NAME =                                                                \
+      reinterpret_cast<CUresult(*) PARAMETERS>(dlsym(library, SYMBOL));
 #include "cuda/DriverAPI.def"
   if (CUresult result = driver.cuInit(0); result != CUDA_SUCCESS) {
     const char *text = nullptr;

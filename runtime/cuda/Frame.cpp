@@ -253,6 +253,7 @@ Frame::Outcome Frame::finish() {
   used_ = {
       reinterpret_cast<uint8_t *>(frame.log.cursor),
       static_cast<size_t>(std::min(end, frame.log.limit) - frame.log.cursor)};
+  p_.memory.noteOthers(static_cast<int64_t>(used_.size()));
   bool failed = frame.failed != 0 || end > frame.log.limit ||
                 (last_ && last_->log.errors != 0);
   if (!failed) {
