@@ -3,6 +3,7 @@
 // piko-vectorize: primitives, or the iterations of a parallel loop, as lanes.
 
 #include "IterationWriter.h"
+#include "LaneCandidate.h"
 #include "LaneNests.h"
 #include "LoopSplitter.h"
 #include "LoopStreams.h"
@@ -20,8 +21,6 @@
 #include "mlir/IR/Matchers.h"
 #include "mlir/IR/PatternMatch.h"
 #include "mlir/Transforms/LoopInvariantCodeMotionUtils.h"
-
-#include <cmath>
 
 namespace piko {
 #define GEN_PASS_DEF_VECTORIZE
@@ -52,185 +51,7 @@ private:
   }
 };
 
-/// A loop that lanes may share.
-class Candidate {
-public:
-  explicit Candidate(scf::ForOp loop);
-
-  /// Whether lanes are given its turns.
-  bool isChosen() const { return chosen; }
-  /// Whether it becomes vectors, which a remark tells; `flat` is what lanes may
-  /// do instead.
-  bool decide(const IterationLanes &lanes, const FlatLoop &flat = {});
-
-private:
-  InFlightDiagnostic refuse();
-  /// Whether it is expected to take less otherwise, which a remark tells.
-  bool isRefused(const IterationLanes &lanes, const FlatLoop &flat);
-  void remarkVectors(const IterationLanes &lanes, const FlatLoop &flat);
-  /// Whether it takes less to run primitives one after the other, and to give
-  /// lanes the iterations of loops in them.
-  bool isFasterInside(const IterationLanes &lanes,
-                      const IterationLanes::Cost &cost);
-
-  scf::ForOp loop;
-  bool ofPrimitives;
-  bool chosen = false;
-  bool said = false; ///< By the schedule, or by barriers, whatever it costs.
-};
-
 } // namespace
-
-Candidate::Candidate(scf::ForOp loop)
-    : loop(loop), ofPrimitives(isOverPrimitives(loop)) {
-  using Lanes = LaneMapping;
-  Lanes lanes = ofPrimitives ? Lanes::Items : Lanes::Iterations;
-  if (ofPrimitives) {
-    chosen = getLaneMapping(loop).value_or(lanes) == lanes;
-  } else {
-    chosen = true;
-    for (Operation *at = loop->getParentOp(); at; at = at->getParentOp())
-      if (auto outer = dyn_cast<scf::ForOp>(at))
-        if (std::optional<Lanes> given = getLaneMapping(outer))
-          chosen &= *given == lanes || *given == Lanes::Collapsed;
-  }
-  said =
-      findBarrier(loop) || (hasSpecifiedLanes(loop, lanes) &&
-                            (!ofPrimitives || getLoopPhase(loop) == "process"));
-}
-
-InFlightDiagnostic Candidate::refuse() {
-  InFlightDiagnostic remark = loop.emitRemark();
-  if (ofPrimitives)
-    remark << "stage '" << getKernelStage(loop).getSymName()
-           << "': " << getLoopPhase(loop) << " is not vectorized: ";
-  else
-    remark << "these iterations are not vectorized: ";
-  return remark;
-}
-
-/// What costs most where lanes take turns, at the user's lines; of a loop that
-/// is refused also where they are in different places.
-static void addObstacles(InFlightDiagnostic &remark,
-                         const IterationLanes &lanes,
-                         const IterationLanes::Cost &cost, bool isRefused) {
-  constexpr size_t most = 2;
-  llvm::DenseSet<Location> lines;
-  for (auto [part, op] : cost.obstacles) {
-    if (lines.size() == most || part < cost.vectors / 8)
-      return;
-    bool isGather = lanes.getForm(op) == LaneForm::Access;
-    if ((isGather && !isRefused) || !lines.insert(op->getLoc()).second)
-      continue;
-    Diagnostic &note = remark.attachNote(op->getLoc());
-    if (isGather)
-      note << "lanes access elements in different places";
-    else if (isa<AppendOp, AppendBinOp>(op))
-      note << "lanes take turns to emit, in order" << lanes.explainTurns(op);
-    else if (auto access = dyn_cast<StateAccessOpInterface>(op))
-      note << "lanes take turns to access '"
-           << access.getAccessedState().getValue() << "'";
-    else
-      note << "lanes take turns, because this has no vector form";
-  }
-}
-
-/// With half the lanes estimates matter more: measured, bodies that are
-/// expected to gain less than a fifth lose.
-static bool isSurelyFaster(const IterationLanes::Cost &cost,
-                           int64_t laneCount) {
-  constexpr double sure = 0.8;
-  return cost.vectors < (laneCount == 8 ? sure : 1) * cost.serial;
-}
-
-/// Only loops that turn as often for all primitives count, as those over the
-/// rows of an image: others may be short.
-bool Candidate::isFasterInside(const IterationLanes &lanes,
-                               const IterationLanes::Cost &cost) {
-  double inside = cost.serial;
-  scf::ForOp root = lanes.getLoop();
-  root->walk<WalkOrder::PreOrder>([&](scf::ForOp inner) {
-    if (inner == root || !lanes.isSharedLoop(inner) ||
-        isFallback(*inner->getParentRegion()) ||
-        !mayRunInOrder(inner, lanes.getLaneCount()))
-      return WalkResult::advance();
-    IterationLanes turns(inner, lanes.getLaneCount());
-    IterationLanes::Cost part = turns.getCost();
-    if (turns.getRefusal().at || !part.computes ||
-        !isSurelyFaster(part, lanes.getLaneCount()))
-      return WalkResult::advance();
-    inside -= cost.loops.lookup(inner) * (1 - part.vectors / part.serial);
-    return WalkResult::skip();
-  });
-  constexpr double gain = 0.98; // Or primitives are simpler.
-  return inside < gain * cost.vectors;
-}
-
-bool Candidate::isRefused(const IterationLanes &lanes, const FlatLoop &flat) {
-  IterationLanes::Cost cost = lanes.getCost();
-  std::string otherwise = "; specifyLanes(";
-  otherwise += ofPrimitives ? "Items" : "Iterations";
-  otherwise += ") does so all the same";
-  if (!ofPrimitives && isOverBox(loop)) {
-    refuse() << "a box may have few pixels" << otherwise;
-    return true;
-  }
-  bool isFaster = ofPrimitives ? isSurelyFaster(cost, lanes.getLaneCount())
-                               : cost.isWorthwhile();
-  // Flattened nests make up for little else that was not foreseen.
-  constexpr double half = 0.5;
-  bool isFasterFlat = flat.loop && cost.isWorthwhile() &&
-                      flat.cost.vectors < half * cost.serial;
-  if (!isFaster && !isFasterFlat) {
-    InFlightDiagnostic remark = refuse();
-    remark << lanes.getLaneCount() << " at once are expected to take "
-           << std::llround(cost.vectors) << " cycles, and one after the other "
-           << std::llround(cost.serial) << otherwise;
-    addObstacles(remark, lanes, cost, /*isRefused=*/true);
-    return true;
-  }
-  if (!ofPrimitives || !isFasterInside(lanes, cost))
-    return false;
-  refuse() << "iterations of a loop in it are" << otherwise;
-  return true;
-}
-
-void Candidate::remarkVectors(const IterationLanes &lanes,
-                              const FlatLoop &flat) {
-  InFlightDiagnostic remark = loop.emitRemark();
-  if (ofPrimitives)
-    remark << "stage '" << getKernelStage(loop).getSymName()
-           << "': " << getLoopPhase(loop) << " is vectorized for "
-           << lanes.getLaneCount() << " primitives at once";
-  else
-    remark << "these iterations are vectorized for " << lanes.getLaneCount()
-           << " at once";
-  for (Location nest : flat.nests)
-    remark.attachNote(nest) << "lanes go on in this loop each by itself, "
-                               "however often the loop inside turns";
-  for (Location nest : flat.ordered)
-    remark.attachNote(nest) << "lanes take turns to go through this loop, "
-                               "because an order shows of what it does";
-  addObstacles(remark, lanes, lanes.getCost(), /*isRefused=*/false);
-}
-
-bool Candidate::decide(const IterationLanes &lanes, const FlatLoop &flat) {
-  if (const IterationLanes::Refusal &refusal = lanes.getRefusal(); refusal.at) {
-    InFlightDiagnostic remark = refuse() << refusal.why;
-    if (refusal.at != loop)
-      remark.attachNote(refusal.at->getLoc()) << "here";
-    return false;
-  }
-  if (asksAhead(loop))
-    return true;
-  IterationLanes::Cost cost = lanes.getCost();
-  if (!ofPrimitives && !cost.computes)
-    return false; // clears or copies, which needs no plan
-  if (!said && isRefused(lanes, flat))
-    return false;
-  remarkVectors(lanes, flat);
-  return true;
-}
 
 namespace {
 
@@ -411,7 +232,7 @@ static bool runInLockstep(ParallelForOp parallel) {
   auto copy = cast<ParallelForOp>(OpBuilder(parallel).clone(*parallel));
   scf::ForOp loop =
       convertLoop(cast<ParallelLoopOpInterface>(*hoistInvariants(copy)));
-  Candidate candidate(loop);
+  LaneCandidate candidate(loop);
   countLoops(loop);
   readAllElements(loop);
   int64_t laneCount = std::max<int64_t>(llvm::PowerOf2Ceil(*count), 4);
@@ -502,7 +323,7 @@ WalkResult VectorizePass::visit(Operation *op) {
   auto loop = dyn_cast<scf::ForOp>(op);
   if (!loop || !loop->hasAttr(marks::lanes))
     return vectorizeInOrder(op) ? WalkResult::skip() : WalkResult::advance();
-  Candidate candidate(loop);
+  LaneCandidate candidate(loop);
   if (!candidate.isChosen())
     return WalkResult::advance();
   // Of a copy: what stays scalar stays as it is.
