@@ -11,8 +11,8 @@
 using namespace piko::cuda;
 using piko::rt::Failure;
 
-static const pikoir_cuda_image joinImages[] = {
-    {0, 0, piko::cuda::joinKernels}, {0, 0, nullptr}};
+static const pikoir_cuda_image joinImages[] = {{0, 0, piko::cuda::joinKernels},
+                                               {0, 0, nullptr}};
 
 Accelerator::Accelerator(pikort_pipeline &p, const pikoir_cuda_image *images)
     : p_(p), device_(Device::open(p.device)), module_(*device_, images),
@@ -148,9 +148,9 @@ bool Accelerator::hasGraphs() const {
 template <class Body> void Accelerator::capture(const Body &body) {
   const Driver &driver = device_->driver;
   // Other threads may do with the device what they like meanwhile.
-  device_->check(driver.cuStreamBeginCapture(
-                     stream_, CU_STREAM_CAPTURE_MODE_THREAD_LOCAL),
-                 "capturing a frame");
+  device_->check(
+      driver.cuStreamBeginCapture(stream_, CU_STREAM_CAPTURE_MODE_THREAD_LOCAL),
+      "capturing a frame");
   CUgraph graph = nullptr;
   try {
     body();

@@ -89,9 +89,9 @@ CUfunction Module::find(const std::string &kernel) {
   if (found != functions_.end())
     return found->second;
   CUfunction function = nullptr;
-  device_.check(device_.driver.cuModuleGetFunction(&function, handle_,
-                                                    kernel.c_str()),
-                "finding " + describe(kernel));
+  device_.check(
+      device_.driver.cuModuleGetFunction(&function, handle_, kernel.c_str()),
+      "finding " + describe(kernel));
   functions_.emplace(kernel, function);
   return function;
 }

@@ -110,11 +110,11 @@ static int32_t run(pikort_pipeline *p) {
   int64_t blocks = pikoir_blocks(p, 0, 0, 32);
   pikoir_log *log = pikoir_log_open(p, 0, 0);
   int32_t local[64] = {};
-  const void *arguments[] = {
-      in,
-      ScaleProgram::strayPointer ? reinterpret_cast<uint8_t *>(local)
+  const void *arguments[] = {in,
+                             ScaleProgram::strayPointer
+                                 ? reinterpret_cast<uint8_t *>(local)
                                  : pikoir_get_state(p, 1)->data,
-      pikoir_get_state(p, 0)->data};
+                             pikoir_get_state(p, 0)->data};
   pikoir_cuda_launch(p, ScaleProgram::kernel, blocks, 32, arguments, 3);
   pikoir_log_close(p, log);
   return pikoir_end(p, 0);

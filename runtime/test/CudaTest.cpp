@@ -34,6 +34,20 @@ TEST_F(Cuda, RunsAgainAndAgain) {
   EXPECT_EQ(counts.launches, 5u);
 }
 
+TEST_F(Cuda, AFrameIsOneSubmission) {
+  ASSERT_TRUE(scale(3));
+  expectScaled();
+  PikoTestDriverHostCounts counts;
+  pikoTestDriverHostCounts(&counts);
+  EXPECT_EQ(counts.graphLaunches, 3u);
+  EXPECT_EQ(counts.graphKernels, 6u); // a join and the kernel
+  EXPECT_EQ(counts.launches, 0u);
+  EXPECT_EQ(counts.copies, 0u);
+  EXPECT_EQ(counts.waits, 3u);
+  // The first one has no log to clear; the third is the second, changed.
+  EXPECT_EQ(pikoTestDriverCalls("cuGraphInstantiateWithFlags"), 2u);
+}
+
 TEST_F(Cuda, AllocatesNothingInLaterRuns) {
   piko::rt::Pipeline pipe{program};
   ASSERT_TRUE(bind(pipe));
