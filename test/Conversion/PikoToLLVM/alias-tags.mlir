@@ -1,5 +1,5 @@
-// RUN: piko-opt --piko-synthesize --piko-to-machine --piko-to-cpu %s | FileCheck %s
-// RUN: piko-opt --piko-synthesize --piko-to-machine --piko-to-cpu --piko-cpu-to-llvm %s | mlir-translate --mlir-to-llvmir | FileCheck %s --check-prefix=IR
+// RUN: piko-opt --piko-synthesize --piko-to-machine --piko-to-cpu=lanes=4 %s | FileCheck %s
+// RUN: piko-opt --piko-synthesize --piko-to-machine --piko-to-cpu=lanes=4 --piko-cpu-to-llvm %s | mlir-translate --mlir-to-llvmir | FileCheck %s --check-prefix=IR
 // LLVM is told what accesses touch, so that a store to a buffer is none to
 // another field, to another buffer, to primitives or to what the runtime holds.
 
