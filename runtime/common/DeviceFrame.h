@@ -31,6 +31,11 @@ public:
   virtual pikoir_log *log(int32_t number, bool isSource) = 0;
   /// Sets an image, or a buffer that is sized by a source, to its clear value.
   virtual void clear(int32_t state) = 0;
+  /// What pikoir_loop_step, pikoir_cycle_takes and pikoir_cycle_turn answer:
+  /// they lead the program once through what the device repeats.
+  virtual int32_t stepLoop(int32_t loop) = 0;
+  virtual bool takes(int32_t stage) = 0;
+  virtual int32_t nextTurn(int32_t cycle) = 0;
   enum class Outcome {
     Done,
     Repeat, ///< Memory or a rule: the host is to take the run step by step.

@@ -3,7 +3,7 @@
 
 #include "cuda/Accelerator.h"
 #include "common/Pipeline.h"
-#include "cuda/JoinKernels.h"
+#include "cuda/Kernels.h"
 #include "pikort/grid.h"
 
 #include <algorithm>
@@ -13,10 +13,12 @@ using piko::rt::Failure;
 
 static const pikoir_cuda_image joinImages[] = {{0, 0, piko::cuda::joinKernels},
                                                {0, 0, nullptr}};
+static const pikoir_cuda_image conditionImages[] = {
+    {0, 0, piko::cuda::conditionKernels}, {0, 0, nullptr}};
 
 Accelerator::Accelerator(pikort_pipeline &p, const pikoir_cuda_image *images)
     : p_(p), device_(Device::open(p.device)), module_(*device_, images),
-      joins_(*device_, joinImages) {
+      joins_(*device_, joinImages), conditions_(*device_, conditionImages) {
   device_->check(device_->enter(), "entering its context");
   int processors = device_->attribute(CU_DEVICE_ATTRIBUTE_MULTIPROCESSOR_COUNT);
   residentThreads_ = int64_t(device_->attribute(
@@ -34,10 +36,9 @@ Accelerator::~Accelerator() {
   device_->enter();
   if (!log_.empty())
     unmap(log_.data());
-  if (graph_)
-    device_->driver.cuGraphExecDestroy(graph_);
-  module_.unload();
-  joins_.unload();
+  submission_.end();
+  for (Module *module : {&module_, &joins_, &conditions_})
+    module->unload();
   if (stream_)
     device_->driver.cuStreamDestroy(stream_);
   if (progress_)
@@ -102,7 +103,9 @@ std::unique_ptr<piko::rt::DeviceFrame> Accelerator::makeFrame() {
 }
 
 Module &Accelerator::moduleOf(const std::string &kernel) {
-  return kernel.starts_with("piko_") ? joins_ : module_;
+  return kernel == conditionKernel     ? conditions_
+         : kernel.starts_with("piko_") ? joins_
+                                       : module_;
 }
 
 void Accelerator::launch(const char *kernel, int64_t blocks, int64_t threads,
@@ -111,10 +114,11 @@ void Accelerator::launch(const char *kernel, int64_t blocks, int64_t threads,
   GridLaunch grid{kernel, blocks, threads, {words, words + count}, false};
   if (frame_ && frame_->isRecording())
     return frame_->launch(std::move(grid));
-  submit({&grid, 1}, {});
+  Step step{Step::Kind::Grid, std::move(grid)};
+  submit({&step, 1}, {});
 }
 
-void Accelerator::launch(const GridLaunch &grid) {
+void Accelerator::launch(const GridLaunch &grid, CUstream stream) {
   if (grid.blocks > INT32_MAX)
     throw Failure{PIKORT_TOO_MANY, moduleOf(grid.kernel).describe(grid.kernel) +
                                        ": expected at most 2147483647 blocks, "
@@ -130,76 +134,40 @@ void Accelerator::launch(const GridLaunch &grid) {
   CUresult result =
       grid.isJoin
           ? driver.cuLaunchCooperativeKernel(function, blocks, 1, 1, threads, 1,
-                                             1, /*sharedBytes=*/0, stream_,
+                                             1, /*sharedBytes=*/0, stream,
                                              places.data())
           : driver.cuLaunchKernel(function, blocks, 1, 1, threads, 1, 1,
-                                  /*sharedBytes=*/0, stream_, places.data(),
+                                  /*sharedBytes=*/0, stream, places.data(),
                                   nullptr);
   if (result != CUDA_SUCCESS)
     device_->check(result,
                    "running " + moduleOf(grid.kernel).describe(grid.kernel));
 }
 
-bool Accelerator::hasGraphs() const {
-  const Driver &driver = device_->driver;
-  return driver.cuGraphInstantiateWithFlags && driver.cuGraphExecUpdate;
-}
-
-template <class Body> void Accelerator::capture(const Body &body) {
-  const Driver &driver = device_->driver;
-  // Other threads may do with the device what they like meanwhile.
-  device_->check(
-      driver.cuStreamBeginCapture(stream_, CU_STREAM_CAPTURE_MODE_THREAD_LOCAL),
-      "capturing a frame");
-  CUgraph graph = nullptr;
-  try {
-    body();
-  } catch (...) {
-    driver.cuStreamEndCapture(stream_, &graph);
-    if (graph)
-      driver.cuGraphDestroy(graph);
-    throw;
-  }
-  device_->check(driver.cuStreamEndCapture(stream_, &graph),
-                 "capturing a frame");
-  CUgraphExecUpdateResultInfo info{};
-  CUresult result =
-      graph_ ? driver.cuGraphExecUpdate(graph_, graph, &info) : CUDA_SUCCESS;
-  if (graph_ && result != CUDA_SUCCESS)
-    driver.cuGraphExecDestroy(std::exchange(graph_, nullptr));
-  if (!graph_)
-    result = driver.cuGraphInstantiateWithFlags(&graph_, graph, /*flags=*/0);
-  driver.cuGraphDestroy(graph);
-  device_->check(result, "making a graph of a frame");
-}
-
-void Accelerator::submit(std::span<const GridLaunch> grids,
+void Accelerator::submit(std::span<const Step> steps,
                          std::span<uint8_t> clear) {
   device_->check(device_->enter(), "entering its context");
-  for (const GridLaunch &grid : grids) // before any of them runs
-    moduleOf(grid.kernel).find(grid.kernel);
-  auto submitAll = [&] {
-    clearLog(clear);
-    for (const GridLaunch &grid : grids)
-      launch(grid);
-  };
-  if (grids.size() > 1 && hasGraphs()) {
-    capture(submitAll);
-    device_->check(device_->driver.cuGraphLaunch(graph_, stream_),
-                   "running a frame");
-  } else {
-    submitAll();
-  }
-  CUresult result = device_->driver.cuStreamSynchronize(stream_);
-  if (result != CUDA_SUCCESS)
-    device_->check(result, "running " + describeFailed(grids));
+  for (const Step &step : steps) // before any of them runs
+    if (step.kind == Step::Kind::Grid)
+      moduleOf(step.grid.kernel).find(step.grid.kernel);
+  submission_.run(steps, clear);
 }
 
-std::string Accelerator::describeFailed(std::span<const GridLaunch> grids) {
+void Accelerator::wait(std::span<const Step> steps) {
+  CUresult result = device_->driver.cuStreamSynchronize(stream_);
+  if (result != CUDA_SUCCESS)
+    device_->check(result, "running " + describeFailed(steps));
+}
+
+std::string Accelerator::describeFailed(std::span<const Step> steps) {
   auto at = static_cast<size_t>(
       progress_ ? *static_cast<volatile int64_t *>(progress_) : 0);
-  const std::string &kernel = grids[std::min(at, grids.size() - 1)].kernel;
-  return moduleOf(kernel).describe(kernel);
+  for (; at < steps.size(); ++at)
+    if (steps[at].kind == Step::Kind::Grid) {
+      const std::string &kernel = steps[at].grid.kernel;
+      return moduleOf(kernel).describe(kernel);
+    }
+  return "a frame";
 }
 
 int64_t *Accelerator::progress() {

@@ -12,6 +12,7 @@
 #include "common/Accelerator.h"
 #include "cuda/Frame.h"
 #include "cuda/Module.h"
+#include "cuda/Submission.h"
 
 #include <string>
 
@@ -40,10 +41,9 @@ public:
   bool canWaitInGrids() const;
   /// Blocks of a join, all of which are resident.
   int64_t joinBlocks() const { return joinBlocks_; }
-  /// Runs grids one after the other, behind making a part of the log zero
-  /// again, and waits for them: several as one graph, where the driver has
-  /// what that takes. Throws.
-  void submit(std::span<const GridLaunch> grids, std::span<uint8_t> clear);
+  /// Does what the steps say, behind making a part of the log zero again, and
+  /// waits for it; throws.
+  void submit(std::span<const Step> steps, std::span<uint8_t> clear);
   /// Memory of the host in which joins say how far a submission is; throws.
   int64_t *progress();
 
@@ -53,19 +53,20 @@ public:
   }
 
 private:
+  friend class Submission;
   Module &moduleOf(const std::string &kernel);
-  void launch(const GridLaunch &grid);
-  bool hasGraphs() const;
-  /// Makes `graph_` of what follows in the stream, or changes it to that.
-  template <class Body> void capture(const Body &body);
+  void launch(const GridLaunch &grid, CUstream stream);
+  /// For all that was submitted; throws.
+  void wait(std::span<const Step> steps);
   /// The kernel of a submission that failed, as far as it is known.
-  std::string describeFailed(std::span<const GridLaunch> grids);
+  std::string describeFailed(std::span<const Step> steps);
 
   pikort_pipeline &p_;
   std::shared_ptr<Device> device_;
-  Module module_, joins_; ///< The program's kernels, and the runtime's.
+  /// The program's kernels, and the runtime's.
+  Module module_, joins_, conditions_;
   CUstream stream_ = nullptr;
-  CUgraphExec graph_ = nullptr; ///< Of the latest submission.
+  Submission submission_{*this};
   std::span<uint8_t> log_;
   int64_t *progress_ = nullptr;
   int64_t residentThreads_ = 0, joinBlocks_ = 0;

@@ -21,15 +21,23 @@ bool Frame::isPossible() const {
       p_.memory.budget() > 0)
     return false;
   for (const Stage &stage : p_.stages)
-    if (stage.cycle >= 0 || stage.loop >= 0 ||
-        stage.clears.size() > mostJoinClears ||
-        stage.inputs.size() + stage.sources.size() > mostJoinInputs)
+    if (stage.clears.size() > mostJoinClears ||
+        stage.inputs.size() + stage.sources.size() > mostJoinInputs ||
+        (stage.cycle >= 0 && stage.outputs.size() > mostQueuePorts))
       return false;
   for (const Edge &edge : p_.edges)
     if (edge.keyed() && p_.stages[edge.producer].host >= 0)
       return false;
-  return std::none_of(p_.stripGroups.begin(), p_.stripGroups.end(),
+  auto isOne = [&](const auto &shape) { return isPossible(shape); };
+  return std::all_of(p_.loops.begin(), p_.loops.end(), isOne) &&
+         std::all_of(p_.cycles.begin(), p_.cycles.end(), isOne) &&
+         std::none_of(p_.stripGroups.begin(), p_.stripGroups.end(),
                       [](const StripGroup &group) { return group.chunk > 0; });
+}
+
+template <class T> static void makeZero(const Array<T> &array) {
+  std::memset(static_cast<void *>(array.data()), 0,
+              static_cast<size_t>(array.size()) * sizeof(T));
 }
 
 bool Frame::begin() {
@@ -39,17 +47,23 @@ bool Frame::begin() {
   }
   if (!places_)
     takeMemory();
-  std::memset(places_.data(), 0,
-              static_cast<size_t>(places_.size()) * sizeof(Place));
-  launches_.clear();
-  last_ = nullptr;
+  makeZero(places_);
+  makeZero(queues_);
+  makeZero(loops_);
+  makeZero(cycles_);
+  for (LoopState &loop : std::span(loops_.data(), p_.loops.size()))
+    loop.again = 1;
+  for (CycleState &cycle : std::span(cycles_.data(), p_.cycles.size()))
+    cycle.again = 1;
+  joins_.reset();
+  queuings_.reset();
+  ends_.reset();
+  leaves_.reset();
+  steps_.clear();
+  joined_ = nullptr;
+  members_.assign(p_.loops.size(), 0);
+  turns_.assign(p_.cycles.size(), 0);
   isCleared_.assign(p_.states.size(), false);
-  for (size_t s = 0; s < p_.sources.size(); ++s)
-    if (p_.stages[p_.sources[s].stage].placed())
-      describeSource(find(static_cast<int32_t>(s), true).args,
-                     static_cast<int32_t>(s));
-  for (size_t s = 0; s < p_.stages.size(); ++s)
-    describeStage(find(static_cast<int32_t>(s), false).args, p_.stages[s]);
   isRecording_ = true;
   return true;
 }
@@ -67,9 +81,27 @@ void Frame::takeMemory() {
     if (state.kind == PIKORT_IMAGE)
       std::copy(state.clear.begin(), state.clear.end(),
                 clearRecords_.data() + clearOffsets_[&state]);
-  places_ = Array<Place>(
-      p_.memory, static_cast<int64_t>(p_.stages.size() + p_.sources.size()),
-      Use::State);
+  auto countOf = [](const auto &list) {
+    return static_cast<int64_t>(list.size());
+  };
+  places_ = Array<Place>(p_.memory, countOf(p_.stages) + countOf(p_.sources),
+                         Use::State);
+  queues_ = Array<QueueState>(p_.memory, countOf(p_.edges) + 1, Use::State);
+  loops_ = Array<LoopState>(p_.memory, countOf(p_.loops) + 1, Use::State);
+  cycles_ = Array<CycleState>(p_.memory, countOf(p_.cycles) + 1, Use::State);
+  // A program repeats what does not collect behind each stage that does.
+  auto timesOf = [&](int32_t cycle) {
+    return cycle < 0 ? 1 : 1 + countOf(collectorsOf(cycle));
+  };
+  int64_t kernels = countOf(p_.sources), waves = 0;
+  for (const Stage &stage : p_.stages)
+    kernels += timesOf(stage.cycle);
+  for (const LoopShape &loop : p_.loops)
+    waves += timesOf(loop.cycle);
+  joins_ = {p_.memory, kernels};
+  queuings_ = {p_.memory, kernels};
+  leaves_ = {p_.memory, waves};
+  ends_ = {p_.memory, waves + countOf(p_.cycles)};
 }
 
 size_t Frame::placeOf(int32_t number, bool isSource) const {
@@ -80,12 +112,12 @@ size_t Frame::placeOf(int32_t number, bool isSource) const {
 // --- What joins are told ----------------------------------------------------
 
 void Frame::describeSource(JoinArgs &args, int32_t source) const {
+  const Stage &stage = p_.stages[p_.sources[source].stage];
   args.inputCount = 1;
-  args.inputs[0] =
-      describeSourceInput(p_.stages[p_.sources[source].stage], source);
+  args.inputs[0] = describeSourceInput(stage, source);
   args.inputs[0].producer = nullptr;
-  args.recordSize = p_.records[p_.stages[p_.sources[source].stage].record].size;
-  args.cells = args.tiles = 1;
+  args.shape = {p_.records[stage.record].size, 1, 0, 0};
+  args.tiles = 1;
   args.splits = true;
   args.unitsAtOnce = device_.residentThreads() / 64;
 }
@@ -111,7 +143,7 @@ JoinInput Frame::describeEdge(const Edge &edge) const {
   input.producer = &find(isHosted ? from.host : edge.producer, false).state;
   input.stage = isHosted ? edge.producer : -1;
   input.port = edge.port;
-  input.keyed = edge.keyed();
+  input.keyWidth = edge.keyWidth;
   input.permute = edge.gather == PIKOIR_PERMUTE && !isHosted;
   input.collects = from.collects();
   input.root = static_cast<uint32_t>(from.root);
@@ -119,11 +151,31 @@ JoinInput Frame::describeEdge(const Edge &edge) const {
 }
 
 void Frame::describeInputs(JoinArgs &args, const Stage &stage) const {
+  auto add = [&](JoinInput input) {
+    input.number = args.inputCount;
+    args.inputs[args.inputCount++] = input;
+  };
   for (int32_t source : stage.sources)
-    args.inputs[args.inputCount++] = describeSourceInput(stage, source);
-  for (int32_t e : stage.inputs)
-    if (!p_.edges[e].local)
-      args.inputs[args.inputCount++] = describeEdge(p_.edges[e]);
+    add(describeSourceInput(stage, source));
+  for (int32_t e : stage.inputs) {
+    const Edge &edge = p_.edges[e];
+    if (edge.local)
+      continue;
+    JoinInput input = describeEdge(edge);
+    if (hasQueue(edge)) {
+      input.producer = nullptr;
+      input.queue = &queues_[e];
+      input.isInLoop = edge.insideLoop;
+    }
+    add(input);
+  }
+}
+
+Shape Frame::describeShape(const Stage &stage) const {
+  int32_t keyWidth = stage.keyWidth;
+  if (stage.loop >= 0)
+    keyWidth = std::max(keyWidth, p_.loops[stage.loop].keyWidth);
+  return {p_.records[stage.record].size, stage.cells, stage.placed(), keyWidth};
 }
 
 void Frame::describeClears(JoinArgs &args, const Stage &stage) {
@@ -138,27 +190,16 @@ const uint8_t *Frame::clearRecord(const State &state) {
   return clearRecords_.data() + clearOffsets_[&state];
 }
 
-void Frame::describeStage(JoinArgs &args, const Stage &stage) {
-  const BinSchedule &schedule = stage.schedule;
-  bool isSerial = schedule.kind == PIKOIR_SERIALIZE;
-  bool sharesBins = schedule.kind != PIKOIR_DIRECT_MAP || stage.bins() == 1;
-  describeInputs(args, stage);
-  describeClears(args, stage);
-  args.recordSize = p_.records[stage.record].size;
-  args.cells = stage.cells;
+void Frame::describeStage(JoinArgs &args, int32_t number) {
+  const Stage &stage = p_.stages[number];
+  if (stage.loop >= 0)
+    args.loop = &loops_[stage.loop];
+  if (stage.cycle >= 0)
+    args.cycle = &cycles_[stage.cycle];
+  args.shape = describeShape(stage);
   args.tiles = stage.tiles;
-  args.placed = stage.placed();
-  args.takesList = stage.takesList();
-  args.collects = stage.collects();
-  args.splits = stage.splits() && (stage.takesList() || sharesBins);
-  args.visitsAll = stage.visitsAll;
-  args.everyBin = schedule.everyBin;
-  args.serialize = isSerial;
-  args.keyWidth = stage.keyWidth;
-  args.tileSplit = stage.sharesTile ? 0 : schedule.tileSplit;
-  args.batch = schedule.batch;
-  args.unitsAtOnce = device_.residentThreads() / 64;
   args.rank = p_.rank;
+  args.ranked = stage.loop >= 0;
   for (int32_t e : stage.outputs)
     args.ranked |=
         e >= 0 && !p_.edges[e].local &&
@@ -168,29 +209,64 @@ void Frame::describeStage(JoinArgs &args, const Stage &stage) {
     args.binSize[d] = stage.binSize[d];
     args.grid[d] = stage.grid[d];
   }
+  describeInputs(args, stage);
+  describeClears(args, stage);
+  describeSchedule(args, stage);
+}
+
+void Frame::describeSchedule(JoinArgs &args, const Stage &stage) const {
+  const BinSchedule &schedule = stage.schedule;
+  bool sharesBins = schedule.kind != PIKOIR_DIRECT_MAP || stage.bins() == 1;
+  args.takesList = stage.takesList();
+  args.collects = stage.collects();
+  args.splits = stage.splits() && (stage.takesList() || sharesBins);
+  args.visitsAll = stage.visitsAll;
+  args.everyBin = schedule.everyBin;
+  args.serialize = schedule.kind == PIKOIR_SERIALIZE;
+  args.tileSplit = stage.sharesTile ? 0 : schedule.tileSplit;
+  args.batch = schedule.batch;
+  args.unitsAtOnce = device_.residentThreads() / 64;
 }
 
 // --- What the program asks for ----------------------------------------------
 
+void Frame::launchOwn(const char *kernel, const void *args) {
+  steps_.push_back({Step::Kind::Grid,
+                    {kernel,
+                     device_.joinBlocks(),
+                     joinThreads,
+                     {reinterpret_cast<int64_t>(args)},
+                     /*isJoin=*/true}});
+}
+
 const pikoir_input *Frame::join(int32_t number, bool isSource) {
   Place &place = find(number, isSource);
+  JoinArgs &args = joins_.take();
   // Schedules that depend on the bin; a kernel that runs strip by strip.
-  if ((!isSource && p_.stages[number].binSchedules) || place.args.frame)
+  if ((!isSource && p_.stages[number].binSchedules) || joins_.isExhausted() ||
+      (place.args && (isSource || p_.stages[number].cycle < 0)))
     needsHost_ = true;
-  place.args.frame = frame_.data();
-  place.args.kernel = &place.state;
-  place.args.previous = last_;
-  place.args.number = static_cast<int64_t>(launches_.size());
-  last_ = &place.state;
-  launches_.push_back({"piko_join",
-                       device_.joinBlocks(),
-                       joinThreads,
-                       {reinterpret_cast<int64_t>(&place.args)},
-                       /*isJoin=*/true});
+  if (isSource)
+    describeSource(args, number);
+  else
+    describeStage(args, number);
+  args.frame = frame_.data();
+  args.kernel = &place.state;
+  args.number = nextNumber();
+  place.args = &args;
+  place.stage = isSource ? -1 : number;
+  joined_ = &place;
+  launchOwn("piko_join", &args);
   if (!isSource)
     for (int32_t id : p_.stages[number].clears)
       isCleared_[static_cast<size_t>(id)] = true;
   return &place.state.input;
+}
+
+void Frame::launch(GridLaunch grid) {
+  steps_.push_back({Step::Kind::Grid, std::move(grid)});
+  if (joined_ && joined_->stage >= 0 && p_.stages[joined_->stage].cycle >= 0)
+    queue(*joined_);
 }
 
 pikoir_log *Frame::log(int32_t number, bool isSource) {
@@ -201,7 +277,7 @@ int64_t Frame::mostItems(const JoinArgs &args) const {
   int64_t most = 0;
   for (const JoinInput &input :
        std::span(args.inputs, static_cast<size_t>(args.inputCount))) {
-    if (input.producer)
+    if (input.producer || input.queue)
       return -1;
     most += input.count;
   }
@@ -209,10 +285,10 @@ int64_t Frame::mostItems(const JoinArgs &args) const {
 }
 
 int64_t Frame::blocks(int32_t number, bool isSource, int64_t threads) const {
-  const JoinArgs &args = find(number, isSource).args;
+  const JoinArgs &args = *find(number, isSource).args;
   int64_t blocks = device_.residentThreads() / threads;
   int64_t most = mostItems(args);
-  if (args.splits && args.tileSplit == 0 && !args.placed && most >= 0)
+  if (args.splits && args.tileSplit == 0 && !args.shape.placed && most >= 0)
     blocks = std::min(blocks, (most + 63) / 64);
   return std::max<int64_t>(blocks, 1);
 }
@@ -221,13 +297,14 @@ void Frame::clear(int32_t id) {
   const State &state = p_.states[id];
   int64_t size = p_.records[state.record].size;
   isCleared_[static_cast<size_t>(id)] = true;
-  launches_.push_back({"piko_fill",
-                       device_.joinBlocks(),
-                       joinThreads,
-                       {reinterpret_cast<int64_t>(state.owned.data()),
-                        state.owned.size() / size,
-                        reinterpret_cast<int64_t>(clearRecord(state)), size},
-                       /*isJoin=*/false});
+  steps_.push_back({Step::Kind::Grid,
+                    {"piko_fill",
+                     device_.joinBlocks(),
+                     joinThreads,
+                     {reinterpret_cast<int64_t>(state.owned.data()),
+                      state.owned.size() / size,
+                      reinterpret_cast<int64_t>(clearRecord(state)), size},
+                     /*isJoin=*/false}});
 }
 
 // --- The submission ---------------------------------------------------------
@@ -248,14 +325,15 @@ Frame::Outcome Frame::finish() {
   frame.log.spare = begin + headRoom;
   frame.log.cursor = begin + headRoom + spareRoom;
   frame.log.limit = begin + static_cast<int64_t>(room.size());
-  device_.submit(launches_, used_);
-  int64_t end = last_ ? last_->log.cursor : frame.log.cursor;
+  device_.submit(steps_, used_);
+  const KernelState *last = frame.latest;
+  int64_t end = last ? last->log.cursor : frame.log.cursor;
   used_ = {
       reinterpret_cast<uint8_t *>(frame.log.cursor),
       static_cast<size_t>(std::min(end, frame.log.limit) - frame.log.cursor)};
   p_.memory.noteOthers(static_cast<int64_t>(used_.size()));
   bool failed = frame.failed != 0 || end > frame.log.limit ||
-                (last_ && last_->log.errors != 0);
+                (last && last->log.errors != 0);
   if (!failed) {
     noteStatistics();
     return Outcome::Done;
@@ -287,9 +365,11 @@ void Frame::noteStatistics() {
     p_.stageStats[s].in += place.state.in;
     p_.stageStats[s].placed += place.state.placed;
     size_t i = p_.stages[s].sources.size();
-    for (int32_t e : p_.stages[s].inputs)
-      if (!p_.edges[e].local)
-        p_.stageStats[p_.edges[e].producer].out +=
-            static_cast<int64_t>(place.state.received[i++]);
+    for (int32_t e : p_.stages[s].inputs) {
+      if (p_.edges[e].local)
+        continue;
+      p_.stageStats[p_.edges[e].producer].out +=
+          static_cast<int64_t>(place.state.received[i++] + queues_[e].emitted);
+    }
   }
 }

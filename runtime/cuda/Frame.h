@@ -15,6 +15,7 @@
 #include "common/Pipeline.h"
 #include "cuda/device/Joins.h"
 
+#include <algorithm>
 #include <map>
 #include <string>
 #include <vector>
@@ -29,6 +30,20 @@ struct GridLaunch {
   int64_t blocks, threads;
   std::vector<int64_t> arguments;
   bool isJoin; ///< Of the runtime's own kernels; its blocks meet at barriers.
+  bool operator==(const GridLaunch &) const = default;
+};
+
+/// What a submission does: launches grids, some of them repeatedly.
+struct Step {
+  enum class Kind {
+    Grid,
+    Repeat, ///< What follows, until its end, at least once, ...
+    End     ///< ... and as long as `again` is not zero then.
+  };
+  Kind kind;
+  GridLaunch grid;
+  const int32_t *again = nullptr; ///< Where the device sees it.
+  bool operator==(const Step &) const = default;
 };
 
 class Frame final : public rt::DeviceFrame {
@@ -41,33 +56,79 @@ public:
   int64_t blocks(int32_t number, bool isSource, int64_t threads) const override;
   pikoir_log *log(int32_t number, bool isSource) override;
   void clear(int32_t state) override;
+  int32_t stepLoop(int32_t loop) override;
+  bool takes(int32_t) override { return true; }
+  int32_t nextTurn(int32_t cycle) override;
   Outcome finish() override;
   void end() noexcept override;
 
-  void launch(GridLaunch grid) { launches_.push_back(std::move(grid)); }
+  void launch(GridLaunch grid);
 
 private:
   /// A kernel of the program: a stage's, or the AssignBin of a source.
   struct Place {
-    JoinArgs args;
     KernelState state;
+    JoinArgs *args; ///< Of its latest join.
+    int32_t stage;  ///< -1: of a source.
+  };
+  /// Elements that the device reads, which a frame takes one by one.
+  template <class T> class Pool {
+  public:
+    Pool() = default;
+    Pool(rt::Memory &memory, int64_t most)
+        : elements_(memory, most + 1, rt::Use::State), most_(most) {}
+    void reset() { used_ = 0; }
+    /// The next one, zero; those behind the last are one and the same.
+    T &take() {
+      T &element = elements_[std::min(used_++, most_)];
+      element = {};
+      return element;
+    }
+    bool isExhausted() const { return used_ > most_; }
+
+  private:
+    rt::Array<T> elements_;
+    int64_t most_ = 0, used_ = 0;
   };
 
   bool isPossible() const;
+  bool isPossible(const rt::LoopShape &loop) const;
+  bool isPossible(const rt::CycleShape &cycle) const;
+  bool hasQueue(const rt::Edge &edge) const {
+    return p_.stages[edge.producer].cycle >= 0;
+  }
   void takeMemory();
   size_t placeOf(int32_t number, bool isSource) const;
   Place &find(int32_t number, bool isSource) const {
     return places_[static_cast<int64_t>(placeOf(number, isSource))];
   }
+  /// Notes a grid of the runtime's own kernels.
+  void launchOwn(const char *kernel, const void *args);
+  int64_t nextNumber() const { return static_cast<int64_t>(steps_.size()); }
   void describeSource(JoinArgs &args, int32_t source) const;
-  void describeStage(JoinArgs &args, const rt::Stage &stage);
+  void describeStage(JoinArgs &args, int32_t number);
   void describeInputs(JoinArgs &args, const rt::Stage &stage) const;
+  void describeSchedule(JoinArgs &args, const rt::Stage &stage) const;
   JoinInput describeSourceInput(const rt::Stage &stage, int32_t source) const;
   JoinInput describeEdge(const rt::Edge &edge) const;
+  Shape describeShape(const rt::Stage &stage) const;
   void describeClears(JoinArgs &args, const rt::Stage &stage);
   /// How many primitives come in, or -1 where only the device knows.
   int64_t mostItems(const JoinArgs &args) const;
   const uint8_t *clearRecord(const rt::State &state);
+  // What kernels of a cycle emit waits in queues (FrameCycles.cpp).
+  void queue(const Place &place);
+  std::vector<int32_t> exitsOf(const rt::LoopShape &loop) const;
+  int32_t groupOf(const rt::Edge &edge) const;
+  std::vector<int32_t> collectorsOf(int32_t cycle) const;
+  void repeat(const int32_t &again);
+  void endRepeat(const int32_t &again);
+  void endWave(int32_t loop);
+  void endLoop(int32_t loop);
+  void endRound(int32_t cycle);
+  template <class Wanted>
+  void describeWaiting(StepArgs &args, const Wanted &wanted) const;
+
   void noteStatistics();
   /// Makes the log zero again, as the host's way needs it.
   void clearLog();
@@ -78,12 +139,21 @@ private:
   Accelerator &device_;
   bool isRecording_ = false;
   bool needsHost_ = false; ///< Known from a run before.
-  std::vector<GridLaunch> launches_;
-  std::vector<bool> isCleared_; ///< States of this run.
-  const KernelState *last_ = nullptr;
+  std::vector<Step> steps_;
+  std::vector<bool> isCleared_;   ///< States of this run.
+  const Place *joined_ = nullptr; ///< The latest.
+  std::vector<size_t> members_;   ///< Of each loop, those led through.
+  std::vector<size_t> turns_;     ///< Of each cycle, those taken.
   // From run to run, where the device sees it:
   rt::Array<FrameState> frame_;
   rt::Array<Place> places_;
+  rt::Array<QueueState> queues_; ///< Of each edge.
+  rt::Array<LoopState> loops_;
+  rt::Array<CycleState> cycles_;
+  Pool<JoinArgs> joins_;
+  Pool<QueueArgs> queuings_;
+  Pool<StepArgs> ends_;
+  Pool<LeaveArgs> leaves_;
   rt::Array<uint8_t> clearRecords_;
   std::map<const rt::State *, int64_t> clearOffsets_;
   std::span<uint8_t> used_; ///< Of the log, by the run before.

@@ -180,10 +180,10 @@ TEST_F(LostDevice, ByACallOfTheHost) {
 
 // What may pass is tried again.
 TEST_F(LostDevice, NotByWhatMayPass) {
-  piko::rt::Pipeline pipe(program, Device{0});
-  ASSERT_TRUE(bind(pipe));
   for (CUresult error : {CUDA_ERROR_LAUNCH_OUT_OF_RESOURCES, CUDA_ERROR_UNKNOWN,
                          CUDA_ERROR_NOT_SUPPORTED}) {
+    piko::rt::Pipeline pipe(program, Device{0}); // a graph is launched once
+    ASSERT_TRUE(bind(pipe));
     pikoTestDriverFail("cuLaunchKernel", 1, error);
     auto status = pipe.run();
     EXPECT_EQ(status.code(), PIKORT_DEVICE_FAILED);

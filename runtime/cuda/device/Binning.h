@@ -27,13 +27,13 @@ public:
 
   /// Between two barriers; all results are uniform.
   void run() {
-    offsets = grid_.take<int64_t>(args_.cells + 1);
+    offsets = grid_.take<int64_t>(args_.shape.cells + 1);
     if (grid_.hasFailed())
       return;
-    if (args_.placed)
+    if (args_.shape.placed)
       return binPairs();
     positions = stream_.count;
-    grid_.forEach(args_.cells + 1,
+    grid_.forEach(args_.shape.cells + 1,
                   [&](int64_t c) { offsets[c] = c == 0 ? 0 : positions; });
     grid_.sync();
   }
@@ -55,7 +55,7 @@ private:
     KeyedNumbers from = takeNumbers(), to = takeNumbers();
     if (grid_.hasFailed())
       return from;
-    int64_t groups = ceilDivide(args_.cells, cellsInOne);
+    int64_t groups = ceilDivide(args_.shape.cells, cellsInOne);
     grid_.forEach(stream_.pairCount, [&](int64_t k) {
       uint32_t pair = stream_.pairs[k];
       from.keys[k] =
@@ -80,11 +80,11 @@ private:
            ++k)
         itemOf[k] = static_cast<uint32_t>(i);
     });
-    grid_.forEach(args_.cells + 1, [&](int64_t cell) {
+    grid_.forEach(args_.shape.cells + 1, [&](int64_t cell) {
       offsets[cell] = firstOf(sorted.keys, cell);
     });
     grid_.sync();
-    positions = offsets[args_.cells];
+    positions = offsets[args_.shape.cells];
     grid_.forEach(positions,
                   [&](int64_t p) { order[p] = itemOf[sorted.numbers[p]]; });
     bool byBin = args_.collects && args_.tiles > 1;

@@ -37,8 +37,9 @@ inline int64_t skipLinks(int64_t at, int64_t end) {
 /// The rules are those of pikoir_append, pikoir_place and pikoir_next.
 template <class Sink> class SpanReader {
 public:
-  SpanReader(const JoinInput &input, const JoinArgs &args, Sink &sink)
-      : input_(input), placed_(args.placed), cells_(args.cells), sink_(sink) {}
+  SpanReader(const JoinInput &input, const Shape &shape, Sink &sink)
+      : input_(input), placed_(shape.placed), cells_(shape.cells), sink_(sink) {
+  }
 
   void read(const pikoir_span &span) {
     for (int64_t at = skipLinks(span.begin, span.end); at != span.end;
@@ -126,22 +127,6 @@ private:
   Sink &sink_;
   const pikoir_entry *record_ = nullptr, *firstCell_ = nullptr;
   int64_t last_ = -1;
-};
-
-/// What has come into a stage, in lineage order.
-struct Stream {
-  const uint8_t *items;
-  int64_t count, pairCount;
-  const uint32_t *pairs;      ///< Cells, the first of each item marked.
-  const uint32_t *pairStarts; ///< The first pair of each item, and the end.
-  KeyWords keys;
-
-  uint64_t key(int64_t item, int32_t w) const {
-    if (w >= keys.width)
-      return 0;
-    return keys.words ? keys.words[item * keys.width + w]
-                      : keys.base + static_cast<uint64_t>(item);
-  }
 };
 
 /// Copies a record.

@@ -13,70 +13,60 @@
 #ifndef PIKO_RUNTIME_CUDA_DEVICE_GATHER_H
 #define PIKO_RUNTIME_CUDA_DEVICE_GATHER_H
 
-#include "cuda/device/Entries.h"
+#include "cuda/device/Siblings.h"
 
 namespace piko::cuda {
 
 class Gather {
 public:
-  Gather(Grid &grid, const JoinArgs &args, int32_t input)
-      : Gather(grid, args, args.inputs[input], args.kernel->received[input]) {}
-  Gather(Grid &grid, const JoinArgs &args, const JoinInput &input,
-         uint64_t &received)
-      : grid_(grid), args_(args), input_(input), from_(*input.producer),
-        received_(received), keyWidth_(!input.keyed     ? 0
-                                       : input.collects ? 2
-                                                        : from_.keys.width + 1),
-        byPosition_(!input.isSource &&
+  /// What `input` has among `spans`; `received` counts it. Within a loop,
+  /// `siblings` knows what else its parents have emitted.
+  Gather(Grid &grid, const Shape &shape, const JoinInput &input,
+         const Spans &spans, uint64_t &received,
+         const Siblings *siblings = nullptr)
+      : grid_(grid), shape_(shape), input_(input), spans_(spans),
+        from_(spans.kernel()), received_(received), siblings_(siblings),
+        keyWidth_(input.keyWidth == 0 || siblings ? 0
+                  : input.collects                ? 2
+                                                  : from_.keys.width + 1),
+        byPosition_(!input.isSource && !siblings &&
                     (keyWidth_ > 0 || (input.permute && from_.rank))) {}
 
   /// Between two barriers; `stream` is uniform.
   void run(Stream &stream);
+  /// Of what was gathered in a loop.
+  const Lineage &lineage() const { return lineage_; }
 
 private:
-  /// Where a slot's records and cells begin: in the order of emission, and in
-  /// that of positions.
-  struct Places {
-    uint32_t *counts, *emitted, *starts;
-  };
   struct Counter;
   struct SlotCounter;
   struct Placer;
 
-  void listSpans();
   void countSpans();
   void findSlots();
-  Places placeSlots(uint32_t *counts);
   void place(Stream &stream);
   void placeNone(Stream &stream);
-
-  int64_t slots() const {
-    return from_.input.calls ? from_.input.call_count : from_.input.count;
-  }
-  int64_t slotOf(int64_t unit) const {
-    const pikoir_unit &u = from_.input.units[unit];
-    return from_.input.calls ? u.cell_begin : u.begin;
-  }
-  int64_t rankOf(int64_t slot) const {
-    return from_.rank ? from_.rank[slot] : slot;
+  template <class Sink> void read(Sink &sink, int64_t span) const {
+    SpanReader<Sink>(input_, shape_, sink).read(spans_.list[span]);
   }
   /// The cell of a position.
   int64_t cellOf(int64_t position) const;
 
   Grid &grid_;
-  const JoinArgs &args_;
+  const Shape &shape_;
   const JoinInput &input_;
+  const Spans &spans_;
   const KernelState &from_;
   uint64_t &received_;
+  const Siblings *siblings_;
   int32_t keyWidth_;
   bool byPosition_;
-  int64_t spanCount_ = 0, recordCount_ = 0, pairCount_ = 0;
-  uint32_t *firstSpans_ = nullptr; ///< Of each unit, and the end.
-  pikoir_span *spans_ = nullptr;
+  int64_t recordCount_ = 0, pairCount_ = 0;
   uint32_t *records_ = nullptr, *pairs_ = nullptr; ///< In front of each span.
-  uint32_t *all_ = nullptr; ///< With those of other ports.
-  uint32_t *slotOfSpan_ = nullptr;
-  Places recordPlaces_{}, pairPlaces_{};
+  uint32_t *all_ = nullptr;   ///< With those of other ports.
+  uint32_t *slots_ = nullptr; ///< Of each span, where it is asked for.
+  Spans::Places recordPlaces_{}, pairPlaces_{};
+  Lineage lineage_{};
 };
 
 struct Gather::Counter {
@@ -126,22 +116,24 @@ struct Gather::Placer {
   void keep(const pikoir_entry *entry) {
     int64_t to = record++, toPair = pair;
     if (gather.byPosition_) {
-      int64_t rank = gather.rankOf(slot);
-      const Places &places = gather.recordPlaces_;
+      int64_t rank = gather.spans_.rankOf(slot);
+      const Spans::Places &places = gather.recordPlaces_;
       to = places.starts[rank] + (to - places.emitted[slot]);
       if (pairs)
         toPair = gather.pairPlaces_.starts[rank] +
                  (toPair - gather.pairPlaces_.emitted[slot]);
     }
     if (entry)
-      copyRecord(items + to * gather.args_.recordSize, payload(entry),
-                 gather.args_.recordSize);
+      copyRecord(items + to * gather.shape_.recordSize, payload(entry),
+                 gather.shape_.recordSize);
     if (pairs) {
       pairStarts[to] = static_cast<uint32_t>(toPair);
       first = end = pairs + toPair;
     }
     if (keys)
       putKey(keys + to * gather.keyWidth_);
+    if (gather.siblings_)
+      gather.siblings_->describe(gather.lineage_, to, slot, ordinal - 1);
   }
   void place(uint32_t cell) {
     if (!pairs)
@@ -163,15 +155,13 @@ struct Gather::Placer {
   void putKey(uint64_t *to) const {
     const KernelState &from = gather.from_;
     if (gather.input_.collects) { // a new lineage
-      to[0] = static_cast<uint64_t>(gather.input_.root) << 32;
-      to[1] = static_cast<uint64_t>(gather.rankOf(slot)) << 32 | ordinal;
+      to[0] = static_cast<uint64_t>(gather.input_.root) << 32 | from.launch;
+      to[1] = static_cast<uint64_t>(gather.spans_.rankOf(slot)) << 32 | ordinal;
       return;
     }
-    int64_t item = from.input.order ? from.input.order[slot] : slot;
-    Stream parents{};
-    parents.keys = from.keys;
+    int64_t item = gather.spans_.itemOf(slot);
     for (int32_t w = 0; w < from.keys.width; ++w)
-      to[w] = parents.key(item, w);
+      to[w] = from.keys.word(item, w);
     to[from.keys.width] =
         static_cast<uint64_t>(gather.cellOf(slot)) << 32 | ordinal;
   }
@@ -187,57 +177,18 @@ inline int64_t Gather::cellOf(int64_t position) const {
   return low;
 }
 
-/// Puts the units' directories one behind the other.
-inline void Gather::listSpans() {
-  int64_t units = from_.input.unit_count;
-  const auto *logs = reinterpret_cast<const pikoir_unit_log *>(from_.log.units);
-  auto forDirectories = [&](int64_t unit, auto &&body) {
-    for (int64_t at = logs[unit].first; at != 0;) {
-      const auto *piece = reinterpret_cast<const pikoir_piece *>(at);
-      body(reinterpret_cast<const pikoir_span *>(piece + 1), piece->spans);
-      at = piece->next;
-    }
-  };
-  firstSpans_ = grid_.take<uint32_t>(units + 1);
-  if (grid_.hasFailed())
-    return;
-  grid_.forEach(units + 1, [&](int64_t unit) {
-    int64_t count = 0;
-    if (unit < units)
-      forDirectories(unit, [&](auto *, int64_t spans) { count += spans; });
-    firstSpans_[unit] = static_cast<uint32_t>(count);
-  });
-  spanCount_ = grid_.exclusiveScan(firstSpans_, units + 1);
-  spans_ = grid_.take<pikoir_span>(spanCount_);
-  slotOfSpan_ = grid_.take<uint32_t>(spanCount_); // the unit, for now
-  if (grid_.hasFailed())
-    return;
-  int64_t warp = Grid::index() / warpSize, warps = Grid::size() / warpSize;
-  for (int64_t unit = warp; unit < units; unit += warps) {
-    int64_t to = firstSpans_[unit];
-    forDirectories(unit, [&](const pikoir_span *from, int64_t count) {
-      for (int64_t i = Grid::lane(); i < count; i += warpSize) {
-        spans_[to + i] = from[i];
-        slotOfSpan_[to + i] = static_cast<uint32_t>(unit);
-      }
-      to += count;
-    });
-  }
-  grid_.sync();
-}
-
 inline void Gather::countSpans() {
-  records_ = grid_.take<uint32_t>(spanCount_);
-  pairs_ = args_.placed ? grid_.take<uint32_t>(spanCount_) : nullptr;
-  all_ = keyWidth_ > 0 ? grid_.take<uint32_t>(spanCount_) : nullptr;
-  uint32_t *ends = byPosition_ ? grid_.take<uint32_t>(spanCount_) : nullptr;
+  records_ = grid_.take<uint32_t>(spans_.count);
+  pairs_ = shape_.placed ? grid_.take<uint32_t>(spans_.count) : nullptr;
+  all_ = keyWidth_ > 0 ? grid_.take<uint32_t>(spans_.count) : nullptr;
+  uint32_t *ends = byPosition_ ? grid_.take<uint32_t>(spans_.count) : nullptr;
   if (grid_.hasFailed())
     return;
   uint64_t received = 0;
   bool failed = false;
-  grid_.forEach(spanCount_, [&](int64_t s) {
+  grid_.forEach(spans_.count, [&](int64_t s) {
     Counter counter;
-    SpanReader<Counter>(input_, args_, counter).read(spans_[s]);
+    read(counter, s);
     records_[s] = counter.records;
     if (pairs_)
       pairs_[s] = counter.pairs;
@@ -251,56 +202,29 @@ inline void Gather::countSpans() {
   if (received > 0)
     __atomic_fetch_add(&received_, received, __ATOMIC_RELAXED);
   if (failed)
-    args_.frame->failed = 1;
-  recordCount_ = grid_.exclusiveScan(records_, spanCount_);
+    grid_.failFrame();
+  recordCount_ = grid_.exclusiveScan(records_, spans_.count);
   if (pairs_)
-    pairCount_ = grid_.exclusiveScan(pairs_, spanCount_);
+    pairCount_ = grid_.exclusiveScan(pairs_, spans_.count);
   if (all_)
-    grid_.exclusiveScan(all_, spanCount_);
-  if (!ends)
-    return;
-  grid_.exclusiveScan(ends, spanCount_);
-  grid_.forEach(spanCount_, [&](int64_t s) {
-    uint32_t unit = slotOfSpan_[s];
-    slotOfSpan_[s] =
-        static_cast<uint32_t>(slotOf(unit) + ends[s] - ends[firstSpans_[unit]]);
-  });
-  grid_.sync();
-}
-
-/// `counts` are those of slots.
-inline Gather::Places Gather::placeSlots(uint32_t *counts) {
-  int64_t n = slots();
-  Places places{counts, grid_.take<uint32_t>(n), nullptr};
-  if (grid_.hasFailed())
-    return places;
-  grid_.forEach(n, [&](int64_t i) { places.emitted[i] = counts[i]; });
-  grid_.exclusiveScan(places.emitted, n);
-  places.starts = places.emitted;
-  if (!from_.rank)
-    return places;
-  places.starts = grid_.takeZeros(from_.rankSize);
-  if (grid_.hasFailed())
-    return places;
-  grid_.forEach(n,
-                [&](int64_t i) { places.starts[from_.rank[i]] = counts[i]; });
-  grid_.exclusiveScan(places.starts, from_.rankSize);
-  return places;
+    grid_.exclusiveScan(all_, spans_.count);
+  if (ends)
+    slots_ = spans_.findSlots(grid_, ends);
 }
 
 inline void Gather::findSlots() {
-  uint32_t *records = grid_.takeZeros(slots());
-  uint32_t *pairs = args_.placed ? grid_.takeZeros(slots()) : nullptr;
+  uint32_t *records = grid_.takeZeros(spans_.slots());
+  uint32_t *pairs = shape_.placed ? grid_.takeZeros(spans_.slots()) : nullptr;
   if (grid_.hasFailed())
     return;
-  grid_.forEach(spanCount_, [&](int64_t s) {
-    SlotCounter counter{records, pairs, slotOfSpan_[s]};
-    SpanReader<SlotCounter>(input_, args_, counter).read(spans_[s]);
+  grid_.forEach(spans_.count, [&](int64_t s) {
+    SlotCounter counter{records, pairs, slots_[s]};
+    read(counter, s);
   });
   grid_.sync();
-  recordPlaces_ = placeSlots(records);
+  recordPlaces_ = spans_.placeSlots(grid_, records);
   if (pairs && !grid_.hasFailed())
-    pairPlaces_ = placeSlots(pairs);
+    pairPlaces_ = spans_.placeSlots(grid_, pairs);
 }
 
 inline void Gather::place(Stream &stream) {
@@ -308,8 +232,9 @@ inline void Gather::place(Stream &stream) {
   uint32_t *pairs = nullptr, *pairStarts = nullptr;
   uint64_t *keys = nullptr;
   if (!input_.isSource)
-    stream.items = items = grid_.take<uint8_t>(recordCount_ * args_.recordSize);
-  if (args_.placed) {
+    stream.items = items =
+        grid_.take<uint8_t>(recordCount_ * shape_.recordSize);
+  if (shape_.placed) {
     stream.pairs = pairs = grid_.take<uint32_t>(pairCount_);
     stream.pairStarts = pairStarts = grid_.take<uint32_t>(recordCount_ + 1);
   }
@@ -317,11 +242,17 @@ inline void Gather::place(Stream &stream) {
     keys = grid_.take<uint64_t>(recordCount_ * keyWidth_);
     stream.keys = {keys, 0, keyWidth_};
   }
+  if (siblings_)
+    lineage_ = {grid_.take<uint32_t>(recordCount_),
+                grid_.take<uint32_t>(recordCount_),
+                grid_.take<uint32_t>(recordCount_)};
   if (grid_.hasFailed())
     return;
   if (pairStarts && Grid::isFirst())
     pairStarts[recordCount_] = static_cast<uint32_t>(pairCount_);
-  grid_.forEach(spanCount_, [&](int64_t s) {
+  const uint32_t *all = siblings_ ? siblings_->before() : all_;
+  const uint32_t *slots = siblings_ ? siblings_->slots() : slots_;
+  grid_.forEach(spans_.count, [&](int64_t s) {
     Placer placer{*this,
                   items,
                   pairs,
@@ -329,9 +260,9 @@ inline void Gather::place(Stream &stream) {
                   keys,
                   records_[s],
                   pairs_ ? pairs_[s] : 0,
-                  all_ ? all_[s] : 0,
-                  slotOfSpan_[s]};
-    SpanReader<Placer>(input_, args_, placer).read(spans_[s]);
+                  all ? all[s] : 0,
+                  slots ? slots[s] : 0};
+    read(placer, s);
   });
   grid_.sync();
 }
@@ -342,7 +273,6 @@ inline void Gather::placeNone(Stream &stream) {
 }
 
 inline void Gather::run(Stream &stream) {
-  listSpans();
   if (!grid_.hasFailed())
     countSpans();
   if (byPosition_ && !grid_.hasFailed())

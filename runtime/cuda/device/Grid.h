@@ -83,7 +83,8 @@ public:
     sync();
     return words;
   }
-  void fail() { failed_ = true; } ///< Uniform.
+  void fail() { failed_ = true; }         ///< Uniform.
+  void failFrame() { frame_.failed = 1; } ///< By any thread.
   bool hasFailed() const { return failed_; }
   int64_t top() const { return top_; }
 

@@ -6,7 +6,7 @@
 //
 //===----------------------------------------------------------------------===//
 
-#include "cuda/device/Gather.h"
+#include "cuda/device/Loops.h"
 #include "cuda/device/Merge.h"
 #include "cuda/device/Units.h"
 
@@ -17,68 +17,134 @@ namespace {
 class Join {
 public:
   explicit Join(const JoinArgs &args)
-      : args_(args),
-        grid_(*args.frame, args.previous ? args.previous->log.cursor
-                                         : args.frame->log.cursor) {}
+      : args_(args), grid_(*args.frame, cursorOf(*args.frame)),
+        isFirstRun_(args.kernel->runs == 0) {}
 
   void run() {
     if (Grid::isFirst())
       *args_.frame->progress = args_.number;
-    if (isStopped())
+    if (isStopped(*args_.frame))
       return publishNothing();
     Stream stream{};
     gather(stream);
+    bool everyBin = args_.everyBin && isFirstRun_;
+    bool isIdle = (args_.loop || args_.cycle) && stream.count == 0 &&
+                  !(args_.collects && everyBin);
     Binning bins(grid_, args_, stream);
-    if (!grid_.hasFailed())
+    if (!isIdle && !grid_.hasFailed())
       bins.run();
-    Cutter cutter(grid_, args_, bins);
-    if (!grid_.hasFailed())
+    Cutter cutter(grid_, args_, bins, everyBin);
+    if (!isIdle && !grid_.hasFailed())
       cutter.run();
     int64_t units = takeLogs(cutter.unitCount);
+    uint32_t *childCounts = takeChildCounts(stream);
     // What a thread alone has found is known to all here.
     grid_.sync();
     if (grid_.hasFailed() || args_.frame->failed)
       return publishNothing();
     clear(cutter, bins);
-    if (Grid::isFirst())
+    if (Grid::isFirst()) {
       publish(stream, bins, cutter, units);
+      endInputs(stream, childCounts);
+    }
     grid_.sync();
     if (Grid::isFirst())
       *args_.frame->progress = args_.number + 1;
   }
 
 private:
-  /// Whether something failed before.
-  bool isStopped() {
-    const KernelState *before = args_.previous;
-    return args_.frame->failed ||
-           (before && (before->log.cursor > before->log.limit ||
-                       before->log.errors != 0));
-  }
+  bool isInLaterWave() const { return args_.loop && args_.loop->hops > 0; }
 
   void gather(Stream &stream) {
-    if (Grid::isFirst())
-      for (uint64_t &received : args_.kernel->received)
-        received = 0;
+    if (isInLaterWave())
+      return gatherWave(stream);
     Stream streams[mostJoinInputs];
     int32_t filled = 0;
     for (int32_t i = 0; i < args_.inputCount && !grid_.hasFailed(); ++i) {
-      const JoinInput &input = args_.inputs[i];
       Stream &next = streams[filled];
       next = {};
-      if (input.isSource) {
-        next.items = input.items;
-        next.count = input.count;
-        next.keys = {nullptr, input.keyBase, 1};
-      }
-      if (input.producer)
-        Gather(grid_, args_, i).run(next);
+      gatherInput(args_.inputs[i], next);
       filled += next.count > 0;
     }
     if (filled == 1)
       stream = streams[0];
     if (filled > 1 && !grid_.hasFailed())
-      Merge(grid_, args_, streams, filled).run(stream);
+      Merge(grid_, args_.shape, streams, filled).run(stream);
+  }
+
+  void gatherInput(const JoinInput &input, Stream &stream) {
+    if (input.isInLoop) // of this wave, for the next one
+      return;
+    if (input.queue) {
+      Concatenation all(grid_, args_.shape, input.keyWidth, /*isInLoop=*/false);
+      all.run([&](auto &&body) {
+        forChunks(*input.queue, input.queue->count, body);
+      });
+      stream = all.stream;
+      return;
+    }
+    if (!isFirstRun_) // the first one has taken it
+      return;
+    if (input.isSource) {
+      stream.items = input.items;
+      stream.count = input.count;
+      stream.keys = {nullptr, input.keyBase, 1};
+    }
+    if (!input.producer)
+      return;
+    Spans spans(grid_, *input.producer);
+    spans.find();
+    Gather(grid_, args_.shape, input, spans,
+           args_.kernel->received[input.number])
+        .run(stream);
+  }
+
+  /// The order of a wave's primitives is free: their places tell it.
+  void gatherWave(Stream &stream) {
+    Concatenation all(grid_, args_.shape, /*keyWidth=*/0, /*isInLoop=*/true);
+    all.run([&](auto &&body) {
+      for (int32_t i = 0; i < args_.inputCount; ++i)
+        if (args_.inputs[i].isInLoop)
+          forChunks(*args_.inputs[i].queue, args_.inputs[i].queue->ready, body);
+    });
+    stream = all.stream;
+    lineage_ = all.lineage;
+  }
+
+  template <class Body>
+  static void forChunks(const QueueState &queue, int64_t count,
+                        const Body &body) {
+    for (int64_t c = 0; c < count; ++c)
+      body(queue.chunks[c]);
+  }
+
+  /// Drops what has been taken of a queue.
+  static void drop(QueueState &queue, bool isInLoop) {
+    int64_t taken = isInLoop ? queue.ready : queue.count;
+    for (int64_t c = 0; c < taken; ++c)
+      queue.items -= queue.chunks[c].stream.count;
+    for (int64_t c = taken; c < queue.count; ++c)
+      queue.chunks[c - taken] = queue.chunks[c];
+    queue.count -= taken;
+    queue.ready = 0;
+  }
+
+  /// Of what comes into a loop.
+  uint32_t *takeChildCounts(const Stream &stream) {
+    bool isEntry = args_.loop && !isInLaterWave() && stream.count > 0;
+    return isEntry ? grid_.takeZeros(stream.count) : nullptr;
+  }
+
+  /// What has been taken no longer waits; by the first thread.
+  void endInputs(const Stream &stream, uint32_t *childCounts) {
+    for (int32_t i = 0; i < args_.inputCount; ++i)
+      if (args_.inputs[i].queue)
+        drop(*args_.inputs[i].queue, args_.inputs[i].isInLoop);
+    if (!childCounts)
+      return;
+    args_.loop->places = stream.count;
+    args_.loop->childCounts = childCounts;
+    args_.loop->entryKeys = stream.keys;
   }
 
   /// For each unit, that it has emitted nothing yet; returns the address.
@@ -89,7 +155,8 @@ private:
 
   /// Sets images to their clear values where no unit will.
   void clear(const Cutter &cutter, const Binning &bins) {
-    if (args_.clearCount == 0 || (args_.visitsAll && !args_.takesList))
+    if (args_.clearCount == 0 || !isFirstRun_ ||
+        (args_.visitsAll && !args_.takesList))
       return;
     bool whole = cutter.unitCount == 0;
     int64_t pixels = 1;
@@ -130,28 +197,39 @@ private:
     kernel = {};
     kernel.log = args_.frame->log;
     kernel.log.cursor = grid_.top();
+    args_.frame->latest = &kernel;
   }
 
   void publish(const Stream &stream, const Binning &bins, const Cutter &cutter,
                int64_t units) {
     KernelState &kernel = *args_.kernel;
-    kernel.input = {stream.items,        bins.positions, bins.order,
-                    bins.offsets,        cutter.units,   cutter.unitCount,
-                    args_.tiles,         cutter.calls,   cutter.callCount,
-                    args_.clearCount > 0};
+    kernel.input = {stream.items,     bins.positions,
+                    bins.order,       bins.offsets,
+                    cutter.units,     cutter.unitCount,
+                    args_.tiles,      cutter.calls,
+                    cutter.callCount, args_.clearCount > 0 && isFirstRun_};
     kernel.log = args_.frame->log;
     kernel.log.cursor = grid_.top();
     kernel.log.units = units;
-    kernel.cells = args_.cells;
+    kernel.cells = args_.shape.cells;
     kernel.rank = bins.rank;
     kernel.rankSize = bins.rankSize;
-    kernel.keys = args_.keyWidth > 0 ? stream.keys : KeyWords{};
-    kernel.in = stream.count;
-    kernel.placed = bins.positions;
+    kernel.keys = args_.shape.keyWidth > 0 ? stream.keys : KeyWords{};
+    kernel.pairStarts = stream.pairStarts;
+    kernel.items = stream.count;
+    kernel.lineage = lineage_;
+    if (args_.cycle && args_.collects)
+      kernel.launch = static_cast<uint64_t>(args_.cycle->launches++);
+    ++kernel.runs;
+    kernel.in += stream.count;
+    kernel.placed += bins.positions;
+    args_.frame->latest = &kernel;
   }
 
   const JoinArgs &args_;
   Grid grid_;
+  bool isFirstRun_;
+  Lineage lineage_{};
 };
 
 } // namespace
@@ -167,4 +245,22 @@ piko_fill(uint8_t *to, int64_t count, const uint8_t *record, int64_t size) {
 /// left. A cooperative launch of joinThreads threads a block.
 extern "C" [[clang::nvptx_kernel]] void piko_join(const JoinArgs *args) {
   Join(*args).run();
+}
+
+/// Behind a kernel that may run again: keeps what it has left for others. This,
+/// and what follows, is launched as a join is.
+extern "C" [[clang::nvptx_kernel]] void piko_queue(const QueueArgs *args) {
+  Queuer(*args).run();
+}
+
+extern "C" [[clang::nvptx_kernel]] void piko_wave(const StepArgs *args) {
+  Wave(*args).run();
+}
+
+extern "C" [[clang::nvptx_kernel]] void piko_round(const StepArgs *args) {
+  Round(*args).run();
+}
+
+extern "C" [[clang::nvptx_kernel]] void piko_leave(const LeaveArgs *args) {
+  Leave(*args).run();
 }

@@ -21,10 +21,15 @@ constexpr int32_t joinThreads = 256;
 constexpr int32_t mostJoinBlocks = 1024;
 constexpr int32_t mostJoinInputs = 8;
 constexpr int32_t mostJoinClears = 8;
+constexpr int32_t mostQueuePorts = 8;
+constexpr int32_t mostStepQueues = 16;
+
+struct KernelState;
 
 /// What all grids of a frame share.
 struct FrameState {
   pikoir_log log; ///< Memory is taken in address order, and never given back.
+  KernelState *latest; ///< The kernel that ran last; null before the first.
   /// The host's: the grid that runs, as a number in the order of launches.
   volatile int64_t *progress;
   int32_t failed;   ///< Memory or a count did not suffice, or a kernel failed.
@@ -37,9 +42,77 @@ struct KeyWords {
   const uint64_t *words; ///< Null: base + item.
   uint64_t base;
   int32_t width; ///< 0: there are none.
+
+  uint64_t word(int64_t item, int32_t w) const {
+    if (w >= width)
+      return 0;
+    return words ? words[item * width + w] : base + static_cast<uint64_t>(item);
+  }
 };
 
-/// What the device knows of a kernel, from its begin until the frame ends.
+/// Primitives in an order.
+struct Stream {
+  const uint8_t *items;
+  int64_t count, pairCount;
+  const uint32_t *pairs;      ///< Cells, the first of each item marked.
+  const uint32_t *pairStarts; ///< The first pair of each item, and the end.
+  KeyWords keys;
+};
+
+/// Where the primitives of a wave stand in the lineage order of all that a loop
+/// holds. What a wave has emitted: the parent's place, and which child it is.
+struct Lineage {
+  uint32_t *places; ///< Null of what came in first: the items' numbers.
+  uint32_t *children;
+  uint32_t *entries; ///< Which of the primitives that came in it comes from.
+};
+
+/// What a launch has put into a queue.
+struct Chunk {
+  Stream stream;
+  Lineage lineage; ///< Within a loop.
+};
+
+/// Primitives that wait for a stage, where their producer runs several times.
+struct QueueState {
+  Chunk *chunks; ///< In the order in which they came, which is lineage's.
+  int64_t count, capacity;
+  int64_t items;    ///< In all chunks.
+  int64_t ready;    ///< Within a loop: chunks of the wave before.
+  uint64_t emitted; ///< For the host's statistics.
+};
+
+/// A primitive that has left a loop.
+struct Exit {
+  const uint8_t *item;
+  const uint32_t *pairs;
+  uint32_t pairCount;
+  uint32_t group; ///< To which stage.
+  uint32_t place, child, entry;
+};
+
+/// A loop that runs in waves. Its places are numbers, below `places`, of what
+/// has left it and of the primitives of this wave, in lineage order.
+struct LoopState {
+  int32_t again; ///< Whether another wave follows.
+  int64_t hops;  ///< Waves before this one.
+  int64_t places;
+  uint32_t *childCounts; ///< Of each place, in this wave.
+  KeyWords entryKeys;
+  Exit *exits;
+  int64_t exitCount, exitCapacity;
+  int64_t exitsBefore; ///< This wave.
+};
+
+/// Rounds of a cycle whose stages collect.
+struct CycleState {
+  int32_t again; ///< Whether another round follows.
+  int64_t rounds;
+  int64_t launches; ///< Of stages that collect.
+};
+
+/// What the device knows of a kernel, from its begin until the frame ends, or
+/// until it begins again.
 struct KernelState {
   pikoir_input input;
   pikoir_log log;
@@ -47,9 +120,21 @@ struct KernelState {
   const uint32_t *rank; ///< Position to place in emission order; null = same.
   int64_t rankSize;
   KeyWords keys; ///< Of items.
+  const uint32_t *pairStarts;
+  int64_t items;
+  Lineage lineage; ///< Of items, within a loop.
+  uint64_t launch; ///< Of a stage that collects, in its cycle.
+  int64_t runs;    ///< Before this one.
   // Counted for the host's statistics.
   int64_t in, placed;
   uint64_t received[mostJoinInputs]; ///< With what was placed nowhere.
+};
+
+/// What streams of a stage's primitives have in common.
+struct Shape {
+  int64_t recordSize, cells;
+  int32_t placed;
+  int32_t keyWidth; ///< Of the stage's items; 0: none are needed.
 };
 
 /// What comes into a stage: a source, or what a kernel left for a port.
@@ -58,9 +143,12 @@ struct JoinInput {
   const uint8_t *items;  ///< Of a source: primitives and their number.
   int64_t count;
   uint64_t keyBase;
+  QueueState *queue; ///< What comes through one has nothing else said here.
   int32_t isSource;
+  int32_t isInLoop;    ///< Of a queue: both ends are in one loop.
+  int32_t number;      ///< Among the stage's inputs.
   int32_t stage, port; ///< Those of the log's entries.
-  int32_t keyed;       ///< Its primitives have lineage keys.
+  int32_t keyWidth;    ///< 64-bit words of its primitives' keys; 0: none.
   int32_t permute;     ///< Emission order may differ from that of positions.
   int32_t collects;    ///< The producer takes lists or all of a bin.
   uint32_t root;       ///< Of the lineage that the producer starts then.
@@ -75,20 +163,68 @@ struct JoinClear {
 struct JoinArgs {
   FrameState *frame;
   KernelState *kernel;
-  const KernelState *previous; ///< The kernel that ran before, or null.
-  int64_t number;              ///< Of the join, in the order of launches.
+  LoopState *loop;   ///< The stage's, or null.
+  CycleState *cycle; ///< The stage's, or null.
+  int64_t number;    ///< Of the join, in the order of launches.
   int32_t inputCount, clearCount;
   JoinInput inputs[mostJoinInputs];
   JoinClear clears[mostJoinClears];
-  int64_t recordSize, cells, tiles;
-  int32_t placed, takesList, collects, splits, visitsAll, everyBin, serialize;
+  Shape shape;
+  int64_t tiles;
+  int32_t takesList, collects, splits, visitsAll, everyBin, serialize;
   int32_t ranked;      ///< Some edge needs the order of emission.
-  int32_t keyWidth;    ///< Of the stage's items; 0: none are needed.
   int64_t tileSplit;   ///< Positions of a unit; 0: as the device likes.
   int64_t batch;       ///< Positions of a call; 0: all of the bin.
   int64_t unitsAtOnce; ///< Blocks that fill the device.
   int32_t rank;        ///< Of the domain; four entries each, unused = 1 or 0.
   int64_t domain[4], binSize[4], grid[4];
+};
+
+/// A port of a kernel whose primitives go through a queue.
+struct QueuePort {
+  JoinInput input; ///< Whose producer is the kernel.
+  Shape shape;     ///< Of the consumer's primitives.
+  QueueState *queue;
+  int32_t isInLoop;
+  int32_t group; ///< Of what leaves a loop; -1: nothing does.
+};
+
+/// Behind a kernel that may run several times: what it has emitted is to wait.
+struct QueueArgs {
+  FrameState *frame;
+  KernelState *kernel;
+  LoopState *loop; ///< The kernel's, or null.
+  int64_t number;
+  int32_t portCount;
+  QueuePort ports[mostQueuePorts];
+};
+
+/// Behind each wave of a loop, or each round of a cycle.
+struct StepArgs {
+  FrameState *frame;
+  LoopState *loop;   ///< Of a wave.
+  CycleState *cycle; ///< Of a round.
+  int64_t number;
+  int64_t limit; ///< Of waves or rounds behind the first.
+  int32_t queueCount;
+  QueueState *queues[mostStepQueues]; ///< What waits for the next one.
+};
+
+/// All that has left a loop to one stage.
+struct ExitGroup {
+  QueueState *queue;
+  Shape shape;
+  int32_t keyWidth; ///< Of the edge; 0: it needs none.
+};
+
+/// Behind a loop.
+struct LeaveArgs {
+  FrameState *frame;
+  LoopState *loop;
+  int64_t number;
+  int32_t keyWidth; ///< Of what comes in.
+  int32_t groupCount;
+  ExitGroup groups[mostQueuePorts];
 };
 
 } // namespace piko::cuda

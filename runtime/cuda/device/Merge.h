@@ -15,8 +15,8 @@ namespace piko::cuda {
 
 class Merge {
 public:
-  Merge(Grid &grid, const JoinArgs &args, const Stream *streams, int32_t count)
-      : grid_(grid), args_(args), streams_(streams), count_(count) {}
+  Merge(Grid &grid, const Shape &shape, const Stream *streams, int32_t count)
+      : grid_(grid), shape_(shape), streams_(streams), count_(count) {}
 
   /// Between two barriers; `out` is uniform.
   void run(Stream &out) {
@@ -32,7 +32,7 @@ public:
       return;
     for (int32_t s = 0; s < count_; ++s)
       grid_.forEach(streams_[s].count, [&](int64_t i) { move(s, i); });
-    if (!args_.placed)
+    if (!shape_.placed)
       return grid_.sync();
     grid_.exclusiveScan(pairStarts_, out.count + 1);
     for (int32_t s = 0; s < count_; ++s)
@@ -42,12 +42,12 @@ public:
 
 private:
   void takeRoom(Stream &out) {
-    out.items = items_ = grid_.take<uint8_t>(out.count * args_.recordSize);
-    if (args_.keyWidth > 0) {
+    out.items = items_ = grid_.take<uint8_t>(out.count * shape_.recordSize);
+    if (shape_.keyWidth > 0) {
       keys_ = grid_.take<uint64_t>(out.count * width_);
       out.keys = {keys_, 0, width_};
     }
-    if (!args_.placed)
+    if (!shape_.placed)
       return;
     out.pairs = pairs_ = grid_.take<uint32_t>(out.pairCount);
     out.pairStarts = pairStarts_ = grid_.take<uint32_t>(out.count + 1);
@@ -60,7 +60,7 @@ private:
   /// True if item i of stream a comes before item j of stream b.
   bool before(int32_t a, int64_t i, int32_t b, int64_t j) const {
     for (int32_t w = 0; w < width_; ++w) {
-      uint64_t u = streams_[a].key(i, w), v = streams_[b].key(j, w);
+      uint64_t u = streams_[a].keys.word(i, w), v = streams_[b].keys.word(j, w);
       if (u != v)
         return u < v;
     }
@@ -88,11 +88,11 @@ private:
   void move(int32_t s, int64_t i) {
     const Stream &from = streams_[s];
     int64_t to = placeOf(s, i);
-    copyRecord(items_ + to * args_.recordSize,
-               from.items + i * args_.recordSize, args_.recordSize);
+    copyRecord(items_ + to * shape_.recordSize,
+               from.items + i * shape_.recordSize, shape_.recordSize);
     if (keys_)
       for (int32_t w = 0; w < width_; ++w)
-        keys_[to * width_ + w] = from.key(i, w);
+        keys_[to * width_ + w] = from.keys.word(i, w);
     if (!pairs_)
       return;
     places_[s][i] = static_cast<uint32_t>(to);
@@ -107,7 +107,7 @@ private:
   }
 
   Grid &grid_;
-  const JoinArgs &args_;
+  const Shape &shape_;
   const Stream *streams_;
   int32_t count_, width_ = 0;
   uint8_t *items_ = nullptr;

@@ -16,9 +16,9 @@ namespace piko::cuda {
 
 class Cutter {
 public:
-  Cutter(Grid &grid, const JoinArgs &args, const Binning &bins)
-      : grid_(grid), args_(args), positions_(bins.positions),
-        offsets_(bins.offsets) {}
+  Cutter(Grid &grid, const JoinArgs &args, const Binning &bins, bool everyBin)
+      : grid_(grid), args_(args), everyBin_(everyBin),
+        positions_(bins.positions), offsets_(bins.offsets) {}
 
   pikoir_unit *units = nullptr;
   pikoir_call *calls = nullptr;
@@ -29,11 +29,11 @@ public:
     if (args_.takesList)
       return cutCalls();
     if (args_.serialize)
-      return addWhole(args_.cells, 0, positions_,
+      return addWhole(args_.shape.cells, 0, positions_,
                       positions_ > 0 || args_.visitsAll);
     int64_t chunk = unitSize();
     cut(
-        args_.cells,
+        args_.shape.cells,
         [&](int64_t cell) {
           int64_t count = countOf(cell), least = args_.visitsAll ? 1 : 0;
           return larger(least, args_.splits ? ceilDivide(count, chunk)
@@ -43,7 +43,7 @@ public:
     units = grid_.take<pikoir_unit>(unitCount);
     if (!grid_.hasFailed())
       grid_.forEach(unitCount, [&](int64_t u) {
-        int64_t cell = groupOf(u, args_.cells), begin = offsets_[cell],
+        int64_t cell = groupOf(u, args_.shape.cells), begin = offsets_[cell],
                 end = offsets_[cell + 1];
         if (args_.splits) {
           begin += (u - starts_[cell]) * chunk;
@@ -104,9 +104,9 @@ private:
 
   void cutCalls() {
     cut(
-        args_.cells,
+        args_.shape.cells,
         [&](int64_t bin) {
-          int64_t count = countOf(bin), least = args_.everyBin ? 1 : 0;
+          int64_t count = countOf(bin), least = everyBin_ ? 1 : 0;
           return larger(least, ceilDivide(count, batchOf(count)));
         },
         callCount);
@@ -114,7 +114,8 @@ private:
     if (grid_.hasFailed())
       return;
     grid_.forEach(callCount, [&](int64_t c) {
-      int64_t bin = groupOf(c, args_.cells), batch = batchOf(countOf(bin));
+      int64_t bin = groupOf(c, args_.shape.cells),
+              batch = batchOf(countOf(bin));
       int64_t begin = offsets_[bin] + (c - starts_[bin]) * batch;
       calls[c] = {bin, begin, smaller(offsets_[bin + 1], begin + batch)};
     });
@@ -124,7 +125,7 @@ private:
     const uint32_t *firstCalls = starts_;
     if (!args_.splits)
       cut(
-          args_.cells,
+          args_.shape.cells,
           [&](int64_t bin) -> int64_t {
             return firstCalls[bin + 1] > firstCalls[bin];
           },
@@ -137,7 +138,7 @@ private:
     grid_.forEach(unitCount, [&](int64_t u) {
       int64_t first = u, end = u + 1;
       if (!args_.splits) {
-        int64_t bin = groupOf(u, args_.cells);
+        int64_t bin = groupOf(u, args_.shape.cells);
         first = firstCalls[bin];
         end = firstCalls[bin + 1];
       }
@@ -148,6 +149,7 @@ private:
 
   Grid &grid_;
   const JoinArgs &args_;
+  bool everyBin_;
   int64_t positions_;
   const int64_t *offsets_;
   uint32_t *starts_ = nullptr;

@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//===- FrameCycles.cpp - What a frame repeats on the device ---------------===//
+//
+// The program is led once through each loop and each round. A loop becomes
+//
+//   repeat { for each stage: join, kernel, piko_queue; piko_wave } piko_leave
+//
+// and a cycle whose stages a, b collect, with what does not behind each:
+//
+//   loops and stages  repeat { a  loops and stages  b  loops and stages
+//                              piko_round }
+//
+// Nothing has come for a stage: then its kernel has no units.
+//
+//===----------------------------------------------------------------------===//
+
+#include "cuda/Frame.h"
+
+using namespace piko::cuda;
+using namespace piko::rt;
+
+bool Frame::isPossible(const LoopShape &loop) const {
+  size_t entries = 0, inside = 0;
+  for (int32_t s : loop.stages) {
+    bool isEntry = !p_.stages[s].sources.empty();
+    for (int32_t e : p_.stages[s].inputs) {
+      inside += p_.edges[e].insideLoop;
+      isEntry |= !p_.edges[e].insideLoop;
+    }
+    entries += isEntry;
+  }
+  return !loop.ordered && entries == 1 && inside <= mostStepQueues &&
+         exitsOf(loop).size() <= mostQueuePorts;
+}
+
+bool Frame::isPossible(const CycleShape &cycle) const {
+  size_t waiting = 0;
+  for (int32_t s : cycle.stages)
+    if (p_.stages[s].collects())
+      waiting += p_.stages[s].inputs.size();
+  return waiting <= mostStepQueues;
+}
+
+/// For each stage that gets what leaves a loop, the first edge to it.
+std::vector<int32_t> Frame::exitsOf(const LoopShape &loop) const {
+  std::vector<int32_t> exits;
+  for (int32_t s : loop.stages)
+    for (int32_t e : p_.stages[s].outputs)
+      if (e >= 0 && !p_.edges[e].insideLoop &&
+          std::none_of(exits.begin(), exits.end(), [&](int32_t other) {
+            return p_.edges[other].consumer == p_.edges[e].consumer;
+          }))
+        exits.push_back(e);
+  return exits;
+}
+
+/// Among these, or -1 if the edge does not leave a loop.
+int32_t Frame::groupOf(const Edge &edge) const {
+  int32_t loop = p_.stages[edge.producer].loop;
+  if (loop < 0 || edge.insideLoop)
+    return -1;
+  int32_t group = 0;
+  for (int32_t e : exitsOf(p_.loops[loop])) {
+    if (p_.edges[e].consumer == edge.consumer)
+      break;
+    ++group;
+  }
+  return group;
+}
+
+std::vector<int32_t> Frame::collectorsOf(int32_t cycle) const {
+  std::vector<int32_t> collectors;
+  for (int32_t s : p_.cycles[cycle].stages)
+    if (p_.stages[s].collects())
+      collectors.push_back(s);
+  return collectors;
+}
+
+void Frame::queue(const Place &place) {
+  const Stage &stage = p_.stages[place.stage];
+  QueueArgs &args = queuings_.take();
+  args.frame = frame_.data();
+  args.kernel = place.args->kernel;
+  args.loop = place.args->loop;
+  args.number = nextNumber();
+  for (int32_t e : stage.outputs) {
+    if (e < 0)
+      continue;
+    const Edge &edge = p_.edges[e];
+    QueuePort &port = args.ports[args.portCount++];
+    port = {describeEdge(edge), describeShape(p_.stages[edge.consumer]),
+            &queues_[e], edge.insideLoop, groupOf(edge)};
+  }
+  if (args.portCount > 0)
+    launchOwn("piko_queue", &args);
+}
+
+// --- Loops ------------------------------------------------------------------
+
+void Frame::repeat(const int32_t &again) {
+  steps_.push_back({Step::Kind::Repeat, {}, &again});
+}
+
+void Frame::endRepeat(const int32_t &again) {
+  steps_.push_back({Step::Kind::End, {}, &again});
+}
+
+int32_t Frame::stepLoop(int32_t loop) {
+  const std::vector<int32_t> &stages = p_.loops[loop].stages;
+  size_t &member = members_[static_cast<size_t>(loop)];
+  const int32_t &again = loops_[loop].again;
+  if (member == 0)
+    repeat(again);
+  if (member < stages.size())
+    return stages[member++];
+  endWave(loop);
+  endRepeat(again);
+  endLoop(loop);
+  member = 0;
+  return -1;
+}
+
+/// The queues of edges that are wanted.
+template <class Wanted>
+void Frame::describeWaiting(StepArgs &args, const Wanted &wanted) const {
+  for (size_t e = 0; e < p_.edges.size(); ++e)
+    if (args.queueCount < mostStepQueues && wanted(p_.edges[e]))
+      args.queues[args.queueCount++] = &queues_[static_cast<int64_t>(e)];
+}
+
+void Frame::endWave(int32_t loop) {
+  StepArgs &args = ends_.take();
+  args.frame = frame_.data();
+  args.loop = &loops_[loop];
+  args.number = nextNumber();
+  args.limit = p_.loopLimit;
+  describeWaiting(args, [&](const Edge &edge) {
+    return edge.insideLoop && p_.stages[edge.producer].loop == loop;
+  });
+  launchOwn("piko_wave", &args);
+}
+
+void Frame::endLoop(int32_t loop) {
+  LeaveArgs &args = leaves_.take();
+  args.frame = frame_.data();
+  args.loop = &loops_[loop];
+  args.number = nextNumber();
+  args.keyWidth = p_.loops[loop].keyWidth;
+  for (int32_t e : exitsOf(p_.loops[loop]))
+    args.groups[args.groupCount++] = {
+        &queues_[e], describeShape(p_.stages[p_.edges[e].consumer]),
+        p_.edges[e].keyWidth};
+  launchOwn("piko_leave", &args);
+}
+
+// --- Rounds -----------------------------------------------------------------
+
+int32_t Frame::nextTurn(int32_t cycle) {
+  std::vector<int32_t> collectors = collectorsOf(cycle);
+  size_t &turn = turns_[static_cast<size_t>(cycle)];
+  if (collectors.empty())
+    return -1;
+  if (turn == 0)
+    repeat(cycles_[cycle].again);
+  if (turn < collectors.size())
+    return collectors[turn++];
+  endRound(cycle);
+  endRepeat(cycles_[cycle].again);
+  return -1;
+}
+
+void Frame::endRound(int32_t cycle) {
+  StepArgs &args = ends_.take();
+  args.frame = frame_.data();
+  args.cycle = &cycles_[cycle];
+  args.number = nextNumber();
+  args.limit = p_.loopLimit;
+  describeWaiting(args, [&](const Edge &edge) {
+    const Stage &to = p_.stages[edge.consumer];
+    return hasQueue(edge) && to.cycle == cycle && to.collects();
+  });
+  launchOwn("piko_round", &args);
+}

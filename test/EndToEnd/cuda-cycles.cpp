@@ -1,0 +1,209 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Loops and rounds that a device repeats by itself, with the lineage order that
+// the reference executor has: behind each, updates show it.
+#include "Inputs/ports.h"
+
+struct Pixel {
+  float sum = 0;
+  int count = 0;
+};
+struct State {
+  piko::Image<Pixel> image;
+};
+
+struct Blend : piko::Stage<8, 8, 64, Point>, piko::Uses<State> {
+  void assignBin(const Point &p) {
+    assignToBoundingBox(p, glm::ivec2(p.x, p.y), glm::ivec2(p.x, p.y));
+  }
+  void process(const Point &p) {
+    update(state().image, glm::ivec2(p.x, p.y), [&](Pixel &pixel) {
+      pixel.sum = pixel.sum * 0.75f + p.value;
+      ++pixel.count;
+    });
+  }
+};
+
+inline Point moved(const Point &p, int dx, int dy, float value, int tag) {
+  return {(p.x + dx) % 64, (p.y + dy) % 48, value, tag};
+}
+
+// Many hops, one child each, no bins.
+struct Collatz : piko::Stage<0, 0, 64, Point, Point, Point> {
+  void process(const Point &p) {
+    if (p.tag <= 1)
+      emit(p, 1);
+    else
+      emit(moved(p, 1, 0, p.value + 1,
+                 p.tag % 2 == 0 ? p.tag / 2 : p.tag % 50 * 3 + 1),
+           0);
+  }
+};
+struct Numbers : piko::Pipe<State> {
+  Collatz collatz;
+  Blend blend;
+  Numbers() {
+    source(collatz);
+    source(blend);
+    connect(collatz, 0, collatz);
+    connect(collatz, 1, blend);
+  }
+};
+
+// A tree whose nodes lie in several bins, each of which emits for it.
+struct Split : piko::Stage<16, 16, 64, Point, Point, Point> {
+  void assignBin(const Point &p) {
+    assignToBoundingBox(p, glm::ivec2(p.x - p.tag / 2, p.y),
+                        glm::ivec2(p.x + p.tag / 3, p.y + p.tag / 4));
+  }
+  void process(const Point &p) {
+    if (p.tag % 3 == 0)
+      emit(moved(p, 3, 1, -p.value, p.tag), 1);
+    for (int i = 0; i < p.tag % 4; ++i)
+      if (p.tag > 4)
+        emit(moved(p, 5 * i, i, p.value + i, p.tag / 3), 0);
+      else
+        emit(moved(p, i, i, p.value - i, p.tag), 1);
+    if (p.tag % 5 == 1)
+      emit(p, 1);
+  }
+};
+struct Tree : piko::Pipe<State> {
+  Split split;
+  Blend blend;
+  Tree() {
+    source(split);
+    connect(split, 0, split);
+    connect(split, 1, blend);
+  }
+};
+
+// Two stages play ping-pong; both let some out, to two stages.
+struct Ping : piko::Stage<8, 8, 64, Point, Point, Point, Point> {
+  void assignBin(const Point &p) {
+    assignToBoundingBox(p, glm::ivec2(p.x, p.y), glm::ivec2(p.x + 3, p.y));
+  }
+  void process(const Point &p) {
+    if (p.tag > 2)
+      emit(moved(p, 2, 2, p.value * 0.5f, p.tag - 3), 0);
+    if (p.tag % 2 == 0)
+      emit(p, 1);
+    else
+      emit(p, 2);
+  }
+};
+struct Pong : piko::Stage<0, 0, 64, Point, Point, Point, Point> {
+  void process(const Point &p) {
+    Point next = moved(p, 7, 0, p.value + 2, p.tag);
+    if (p.tag % 3 == 0)
+      emit(next, 0);
+    else if (p.tag % 3 == 1)
+      emit(next, 1);
+    else
+      emit(next, 2);
+    if (p.tag % 4 == 0)
+      emit(moved(p, 0, 7, p.value - 2, p.tag / 2), 0);
+  }
+};
+struct Shift : piko::Stage<0, 0, 64, Point, Point> {
+  void process(const Point &p) { emit(moved(p, 1, 1, p.value, p.tag)); }
+};
+struct PingPong : piko::Pipe<State> {
+  Ping ping;
+  Pong pong;
+  Shift shift;
+  Blend blend;
+  PingPong() {
+    source(ping);
+    source(shift);
+    connect(ping, 0, pong);
+    connect(pong, 0, ping);
+    connect(ping, 1, blend);
+    connect(pong, 1, blend);
+    connect(ping, 2, shift);
+    connect(pong, 2, shift);
+    connect(shift, 0, blend);
+  }
+};
+
+// What leaves one loop comes into another.
+struct Chain : piko::Pipe<State> {
+  Collatz collatz;
+  Split split;
+  Shift shift;
+  Blend blend;
+  Chain() {
+    source(collatz);
+    source(split);
+    connect(collatz, 0, collatz);
+    connect(collatz, 1, split);
+    connect(split, 0, split);
+    connect(split, 1, shift);
+    connect(shift, 0, blend);
+  }
+};
+
+// Lists in rounds; empty bins are called in the first one alone.
+struct Gather : piko::Stage<16, 16, 64, Point, Point, Point> {
+  void assignBin(const Point &p) {
+    assignToBoundingBox(p, glm::ivec2(p.x - 2, p.y), glm::ivec2(p.x, p.y));
+  }
+  void schedule(piko::BinId) {
+    everyBin();
+    batch(7);
+  }
+  void process(const piko::List<Point> &list) {
+    if (list.size() == 0)
+      emit(Point{int(bin().index) * 5 % 64, int(bin().index) % 48, 3, 9}, 0);
+    parallelFor(int(list.size()), [&](int i) {
+      const Point &p = list[i];
+      if (p.tag > 3)
+        emit(moved(p, i % 3, 1, p.value, p.tag / 3), 0);
+      emit(moved(p, 0, i % 5, p.value * 0.5f, p.tag), 1);
+    });
+  }
+};
+struct Lists : piko::Pipe<State> {
+  Gather gather;
+  Blend blend;
+  Lists() {
+    source(gather);
+    connect(gather, 0, gather);
+    connect(gather, 1, blend);
+  }
+};
+
+// Two stages collect in turn; between them, a loop and a stage that is none.
+struct Merge : piko::Stage<32, 32, 64, Point, Point, Point> {
+  void assignBin(const Point &p) {
+    assignToBoundingBox(p, glm::ivec2(p.x, p.y), glm::ivec2(p.x, p.y));
+  }
+  void process(const piko::List<Point> &list) {
+    for (int i = 0; i < int(list.size()); ++i) {
+      const Point &p = list[i];
+      if (p.tag > 6)
+        emit(moved(p, 1, i % 4, p.value + i, p.tag / 2), 0);
+      else
+        emit(p, 1);
+    }
+  }
+};
+struct Turns : piko::Pipe<State> {
+  Gather gather;
+  Merge merge;
+  Collatz collatz;
+  Shift shift;
+  Blend blend;
+  Turns() {
+    source(gather);
+    source(shift);
+    source(blend);
+    connect(gather, 0, collatz);
+    connect(collatz, 0, collatz);
+    connect(collatz, 1, shift);
+    connect(gather, 1, merge);
+    connect(shift, 0, merge);
+    connect(merge, 0, gather);
+    connect(merge, 1, blend);
+  }
+};
