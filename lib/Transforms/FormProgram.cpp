@@ -48,11 +48,12 @@ private:
   LogicalResult findKernels();
   void setRoots(ProgramOp program);
   void clearState();
-  LogicalResult createKernel(KernelOp kernel);
-  LogicalResult checkInputs(ArrayRef<int> stages);
+  void createKernel(KernelOp kernel);
+  void createInputs(ArrayRef<int> stages);
   void assignSource(KernelOp kernel);
   void createLaunch(int stage, std::optional<int64_t> turn = std::nullopt);
   JoinOp createJoin(int stage);
+  SmallVector<StageOp> getAwaited(StageOp stage);
   void createWaits(StageOp stage);
   void createCycle(int component);
   void createRounds(ArrayRef<int> stages);
@@ -77,6 +78,7 @@ private:
   llvm::DenseMap<Operation *, Value> aroundValues;
   llvm::DenseMap<int, KernelOp> kernels; ///< Of process phases.
   SmallVector<KernelOp> assigns;         ///< Of sources.
+  llvm::DenseSet<Operation *> created;   ///< Kernels.
   llvm::DenseSet<int> componentsDone;
 };
 
@@ -182,14 +184,23 @@ JoinOp ProgramWriter::createJoin(int stage) {
 }
 
 /// Waits that no edge implies.
-void ProgramWriter::createWaits(StageOp stage) {
+/// The stages whose end a stage waits for though no edges lead there.
+SmallVector<StageOp> ProgramWriter::getAwaited(StageOp stage) {
+  SmallVector<StageOp> awaited;
   ScheduleOp schedule = stage.getSchedule();
   if (!schedule || !schedule.getEndStageAttr())
-    return;
+    return awaited;
   int number = plan.graph.getNumber(stage);
   for (auto name : schedule.getEndStageAttr().getAsRange<FlatSymbolRefAttr>())
     if (!plan.isReached(plan.graph.getNumber(name), number))
-      WaitOp::create(builder, schedule.getLoc(), name);
+      awaited.push_back(plan.graph.getStage(plan.graph.getNumber(name)));
+  return awaited;
+}
+
+void ProgramWriter::createWaits(StageOp stage) {
+  for (StageOp awaited : getAwaited(stage))
+    WaitOp::create(builder, stage.getSchedule().getLoc(),
+                   FlatSymbolRefAttr::get(awaited.getSymNameAttr()));
 }
 
 void ProgramWriter::createLaunch(int stage, std::optional<int64_t> turn) {
@@ -365,7 +376,8 @@ LogicalResult ProgramWriter::findKernels() {
     if (getAssignedSource(kernel))
       assigns.push_back(kernel);
     else if (!stages.empty())
-      kernels[plan.graph.getNumber(stages.front())] = kernel;
+      for (StageOp stage : stages)
+        kernels[plan.graph.getNumber(stage)] = kernel;
   }
   for (StageOp stage : plan.graph.stages)
     if (!found.contains(stage))
@@ -396,47 +408,56 @@ void ProgramWriter::clearState() {
     ClearOp::create(builder, pipeline.getLoc(), builder.getArrayAttr(states));
 }
 
-/// What feeds the stages from outside must have run.
-LogicalResult ProgramWriter::checkInputs(ArrayRef<int> stages) {
+/// What feeds stages from outside, and what they wait for, runs before them.
+void ProgramWriter::createInputs(ArrayRef<int> stages) {
+  auto createOther = [&](int stage) {
+    if (!llvm::is_contained(stages, stage))
+      createKernel(kernels.at(stage));
+  };
   for (const PlannedEdge &edge : plan.edges)
     if (edge.producer >= 0 && !edge.local &&
-        llvm::is_contained(stages, edge.consumer) &&
-        !llvm::is_contained(stages, edge.producer) && !values.contains(edge.op))
-      return kernels.at(edge.consumer)
-                 .emitError("expected the kernel of stage ")
-             << quote(plan.graph.getStage(edge.producer))
-             << ", which feeds stage "
-             << quote(plan.graph.getStage(edge.consumer))
-             << ", in front of this one";
-  return success();
+        llvm::is_contained(stages, edge.consumer))
+      createOther(edge.producer);
+  for (int stage : stages)
+    for (StageOp awaited : getAwaited(plan.graph.getStage(stage)))
+      createOther(plan.graph.getNumber(awaited));
+  for (KernelOp kernel : assigns)
+    if (llvm::is_contained(stages,
+                           plan.edges[*getAssignedSource(kernel)].consumer))
+      createKernel(kernel);
 }
 
-LogicalResult ProgramWriter::createKernel(KernelOp kernel) {
+/// Kernels run as they stand, but behind what feeds them: a pass may have
+/// opened a cycle, in which they could stand in any order.
+void ProgramWriter::createKernel(KernelOp kernel) {
+  if (!created.insert(kernel).second)
+    return;
   SmallVector<StageOp> stages = getStages(kernel);
   std::optional<int64_t> source = getAssignedSource(kernel);
   if (stages.empty() && !source) { // of a schedule
     LaunchOp::create(builder, kernel.getLoc(), TypeRange(), kernel.getSymName(),
                      Value(), IntegerAttr(), /*clears=*/nullptr);
-    return success();
+    return;
   }
   int stage = source ? plan.edges[*source].consumer
                      : plan.graph.getNumber(stages.front());
   int component = plan.getComponent(stage);
-  if (!plan.isCyclic(component)) {
-    if (source)
-      assignSource(kernel);
-    else if (failed(checkInputs(stage)))
-      return failure();
-    else
-      createLaunch(stage);
-    return success();
-  }
-  if (!componentsDone.insert(component).second)
-    return success();
-  if (failed(checkInputs(plan.getComponentStages(component))))
-    return failure();
-  createCycle(component);
-  return success();
+  bool isCyclic = plan.isCyclic(component);
+  if (source && !isCyclic)
+    return assignSource(kernel);
+  if (isCyclic && !componentsDone.insert(component).second)
+    return;
+  SmallVector<int> together;
+  if (isCyclic)
+    llvm::append_range(together, plan.getComponentStages(component));
+  else
+    for (StageOp member : stages)
+      together.push_back(plan.graph.getNumber(member));
+  createInputs(together);
+  if (isCyclic)
+    createCycle(component);
+  else
+    createLaunch(stage);
 }
 
 LogicalResult ProgramWriter::run() {
@@ -452,8 +473,7 @@ LogicalResult ProgramWriter::run() {
         schedule && !schedule.getBody().empty())
       ScheduleBinsOp::create(builder, schedule.getLoc(), stage.getSymName());
   for (auto kernel : pipeline.getOps<KernelOp>())
-    if (failed(createKernel(kernel)))
-      return failure();
+    createKernel(kernel);
   return success();
 }
 

@@ -38,27 +38,6 @@ piko.pipeline @Remarks rank 1 {
 // -----
 
 piko.record @F {"x" : i32 at 0} size 4 align 4
-piko.pipeline @Order rank 1 {
-  piko.source @a
-  piko.edge @a[0] -> @b
-  // expected-error @below {{expected the kernel of stage 'a', which feeds stage 'b', in front of this one}}
-  piko.stage @b bins [0] threads 1 : @F -> [] {
-    piko.process {
-    ^bb0(%f: !piko.prim<@F>):
-      piko.return
-    }
-  }
-  piko.stage @a bins [0] threads 1 : @F -> [@F] {
-    piko.process {
-    ^bb0(%f: !piko.prim<@F>):
-      piko.return
-    }
-  }
-}
-
-// -----
-
-piko.record @F {"x" : i32 at 0} size 4 align 4
 piko.pipeline @NoKernel rank 1 {
   piko.source @a
   piko.edge @a[0] -> @b

@@ -294,7 +294,9 @@ def apply(pipe, edit):
     elif kind == "cut":
         name, part, at, size = argument
         expect(name in stages)
-        del getattr(pipe.stages[stages[name]], part)[at:at + size]
+        statements = getattr(pipe.stages[stages[name]], part)
+        expect(statements is not None)
+        del statements[at:at + size]
     elif kind == "source":
         expect(argument < len(pipe.sources) and len(pipe.sources) > 1)
         expect(all(s.source < argument for s in pipe.state))
