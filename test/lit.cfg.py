@@ -19,6 +19,7 @@ split-file. Substitutions:
   %link_host     what such a host links
   %qt_include    folder of Qt's headers
   %test_driver   the driver for tests, in place of NVIDIA's
+  %test_driver_11  the same without what came with CUDA 12
   %cxx_reference compiler and flags that build a pipeline file with the
                  reference executor
 
@@ -81,6 +82,10 @@ config.substitutions += [
     ("%python", config.python),
     ("%qt_include", "".join(glob.glob("/usr/include/*/qt5")[:1])),
     ("%utils", os.path.join(config.piko_source_root, "utils")),
+    (
+        "%test_driver_11",
+        os.path.join(config.piko_binary_root, "lib", "libpiko-test-driver-11.so"),
+    ),
     (
         "%test_driver",
         os.path.join(config.piko_binary_root, "lib", "libpiko-test-driver.so"),

@@ -205,6 +205,6 @@ void Submission::addRepeat(std::span<const Step> body, const int32_t *again,
   ++captured_;
   addSteps(body, depth + 1);
   setCondition(handle, again, depth + 1);
-  --captured_;
   check(driver().cuStreamEndCapture(inner, &graph));
+  --captured_;
 }

@@ -1,7 +1,47 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// Loops and rounds that a device repeats by itself, with the lineage order that
-// the reference executor has: behind each, updates show it.
+// Loops and rounds that a device repeats by itself, in the lineage order that
+// the reference executor has: updates that do not commute show it.
+// DEFINE: %{compare} = piko-compare %s --count 100 --domain 64 48 --runs 1 --threads 2 --target cuda --gpu-threads 64
+// RUN: export PIKO_TEST_DRIVER_COUNTS=1
+// RUN: env PIKO_CUDA_DRIVER=%test_driver %{compare} --pipe Numbers 2>&1 | FileCheck %s
+// RUN: env PIKO_CUDA_DRIVER=%test_driver %{compare} --pipe Tree 2>&1 | FileCheck %s
+// RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_SEED=3 %{compare} --pipe PingPong 2>&1 | FileCheck %s
+// RUN: env PIKO_CUDA_DRIVER=%test_driver %{compare} --pipe Chain 2>&1 | FileCheck %s
+// RUN: env PIKO_CUDA_DRIVER=%test_driver %{compare} --pipe Lists 2>&1 | FileCheck %s
+// RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_SEED=4 %{compare} --pipe Turns 2>&1 | FileCheck %s
+// CHECK-DAG: {{^equal$}}
+// CHECK-DAG: host: 0 launches of kernels, 1 of graphs with {{[0-9]+}} kernels, 0 copies, 0 fills, 1 waits
+//
+// A driver without graphs gets the grids one by one, and waits for each wave.
+// RUN: env PIKO_CUDA_DRIVER=%test_driver_11 %{compare} --pipe PingPong 2>&1 | FileCheck %s --check-prefix=OLD
+// RUN: env PIKO_CUDA_DRIVER=%test_driver_11 %{compare} --pipe Turns 2>&1 | FileCheck %s --check-prefix=OLD
+// OLD-DAG: {{^equal$}}
+// OLD-DAG: host: {{[0-9]+}} launches of kernels, 0 of graphs with 0 kernels, 0 copies, 0 fills, {{[1-9][0-9]}} waits
+//
+// What needs the host between its kernels: entries at two stages of a loop, and
+// an order across hops that shows.
+// RUN: env PIKO_CUDA_DRIVER=%test_driver %{compare} --pipe TwoEntries 2>&1 | FileCheck %s --check-prefix=HOST
+// RUN: env PIKO_CUDA_DRIVER=%test_driver %{compare} --pipe Ordered 2>&1 | FileCheck %s --check-prefix=HOST
+// HOST-DAG: {{^equal$}}
+// HOST-DAG: host: {{[0-9]+}} launches of kernels, 0 of graphs with 0 kernels
+//
+// A loop without an end is the error that a CPU reports.
+// RUN: env PIKO_CUDA_DRIVER=%test_driver not %{compare} --pipe Numbers --loop-limit 5 2>&1 | FileCheck %s --check-prefix=HOPS
+// RUN: env PIKO_CUDA_DRIVER=%test_driver not %{compare} --pipe Lists --loop-limit 1 2>&1 | FileCheck %s --check-prefix=ROUNDS
+// HOPS: got: stage 'collatz', bin 0: a loop did not end within 5 hops
+// ROUNDS: got: stage 'gather': a loop did not end within 1 rounds
+//
+// Calls that fail while a graph with conditions is made.
+// RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_FAIL=cuGraphConditionalHandleCreate:1:999 not %{compare} --pipe Chain 2>&1 | FileCheck %s --check-prefix=FAILS
+// RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_FAIL=cuStreamGetCaptureInfo:2:999 not %{compare} --pipe Chain 2>&1 | FileCheck %s --check-prefix=FAILS
+// RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_FAIL=cuGraphAddNode:2:999 not %{compare} --pipe Chain 2>&1 | FileCheck %s --check-prefix=FAILS
+// RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_FAIL=cuStreamUpdateCaptureDependencies:1:999 not %{compare} --pipe Turns 2>&1 | FileCheck %s --check-prefix=FAILS
+// RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_FAIL=cuStreamBeginCaptureToGraph:2:999 not %{compare} --pipe Turns 2>&1 | FileCheck %s --check-prefix=FAILS
+// RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_FAIL=cuStreamEndCapture:2:999 not %{compare} --pipe Turns 2>&1 | FileCheck %s --check-prefix=FAILS
+// FAILS-NOT: alive at the end
+// FAILS: got: CUDA device 0 (Piko test device): {{.*}}a frame: CUDA_ERROR_UNKNOWN
+// FAILS-NOT: alive at the end
 #include "Inputs/ports.h"
 
 struct Pixel {
@@ -205,5 +245,41 @@ struct Turns : piko::Pipe<State> {
     connect(shift, 0, merge);
     connect(merge, 0, gather);
     connect(merge, 1, blend);
+  }
+};
+
+struct TwoEntries : piko::Pipe<State> {
+  Ping ping;
+  Pong pong;
+  Blend blend;
+  TwoEntries() {
+    source(ping);
+    source(pong);
+    connect(ping, 0, pong);
+    connect(pong, 0, ping);
+    connect(ping, 1, blend);
+    connect(pong, 1, blend);
+    connect(ping, 2, blend);
+    connect(pong, 2, blend);
+  }
+};
+
+// Each hop changes a pixel in its order.
+struct Draw : piko::Stage<8, 8, 64, Point, Point>, piko::Uses<State> {
+  void assignBin(const Point &p) {
+    assignToBoundingBox(p, glm::ivec2(p.x, p.y), glm::ivec2(p.x, p.y));
+  }
+  void process(const Point &p) {
+    update(state().image, glm::ivec2(p.x, p.y),
+           [&](Pixel &pixel) { pixel.sum = pixel.sum * 0.5f + p.value; });
+    if (p.tag > 1)
+      emit(moved(p, p.tag % 2, 0, p.value, p.tag / 2));
+  }
+};
+struct Ordered : piko::Pipe<State> {
+  Draw draw;
+  Ordered() {
+    source(draw);
+    connect(draw, 0, draw);
   }
 };
