@@ -19,6 +19,7 @@
 #include "Piko/Conversion/KernelImage.h"
 #include "Piko/Dialect/Piko/IR/Marks.h"
 #include "Piko/Dialect/Piko/IR/PikoGPU.h"
+#include "Piko/Dialect/Piko/IR/PikoProgram.h"
 
 #include "pikort/grid.h"
 
@@ -182,16 +183,38 @@ void GridFormer::createUnits(StageOp stage, IntegerAttr source) {
   unit = launch.getBlockIds().x;
 }
 
-/// What emits nothing needs no positions.
+/// Whether a join asks at which positions of a kernel primitives were emitted:
+/// for keys, or to permute them. The places of a loop and the cells of a source
+/// take positions, too.
+static bool needsPositions(KernelOp kernel) {
+  ProgramOp program = getProgram(kernel->getParentOfType<PipelineOp>());
+  if (getAssignedSource(kernel) || !program)
+    return true;
+  SmallVector<EdgeOp> emitted = getEmittedEdges(kernel);
+  bool needs = false;
+  program->walk([&](Operation *op) {
+    if (auto launch = dyn_cast<LaunchOp>(op))
+      needs |= launch.getKernel() == kernel.getSymName() &&
+               op->getParentOfType<WavesOp>();
+    if (auto join = dyn_cast<JoinOp>(op))
+      for (auto [edge, permute, keys] :
+           llvm::zip(join.getEdges(), join.getPermutes(), join.getKeys()))
+        needs |= (permute || keys > 0) &&
+                 llvm::is_contained(emitted, getOrigin(edge));
+  });
+  return needs;
+}
+
+/// Positions end for those who ask where something was emitted.
 void GridBuilder::dropEnds() {
   SmallVector<NextOp> ends;
-  WalkResult result = launch.walk([&](Operation *op) {
+  bool emits = false;
+  launch.walk([&](Operation *op) {
     if (auto next = dyn_cast<NextOp>(op))
       ends.push_back(next);
-    return isa<AppendOp, AppendBinOp>(op) ? WalkResult::interrupt()
-                                          : WalkResult::advance();
+    emits |= isa<AppendOp, AppendBinOp>(op);
   });
-  if (!result.wasInterrupted())
+  if (!emits || !needsPositions(kernel))
     for (NextOp end : ends)
       end.erase();
 }

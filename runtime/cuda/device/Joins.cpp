@@ -237,8 +237,20 @@ private:
 /// Fills an image, or zeros a buffer, with copies of a record.
 extern "C" [[clang::nvptx_kernel]] void
 piko_fill(uint8_t *to, int64_t count, const uint8_t *record, int64_t size) {
-  Grid::forEach(count,
-                [&](int64_t i) { copyRecord(to + i * size, record, size); });
+  using Words = uint32_t __attribute__((vector_size(16)));
+  constexpr int64_t together = sizeof(Words);
+  if (together % size != 0 || reinterpret_cast<uint64_t>(to) % together != 0)
+    return Grid::forEach(
+        count, [&](int64_t i) { copyRecord(to + i * size, record, size); });
+  Words words;
+  for (int64_t i = 0; i < together; ++i)
+    reinterpret_cast<uint8_t *>(&words)[i] = record[i % size];
+  int64_t whole = count * size / together;
+  Grid::forEach(whole,
+                [&](int64_t i) { reinterpret_cast<Words *>(to)[i] = words; });
+  Grid::forEach(count * size - whole * together, [&](int64_t i) {
+    to[whole * together + i] = record[i % size];
+  });
 }
 
 /// Begins a kernel: makes its input and an empty log of what its producers have

@@ -4,6 +4,7 @@
 #include "Counts.h"
 #include "State.h"
 
+#include <cstdio>
 #include <cstring>
 #include <utility>
 
@@ -45,7 +46,14 @@ void runKernel(const Call &call, const Kernel &kernel,
     // As a launch that runs while the host goes on.
     context.failed = call.fail(errorOf(fault.kind), fault.text);
   }
-  addCounts(launch, state().counts[function.program.name]);
+  const std::string &name = function.program.name;
+  addCounts(launch, state().counts[name]);
+  if (state().countsGoTo == "launches") {
+    PikoTestDriverCounts counts{};
+    addCounts(launch, counts);
+    std::fprintf(stderr, "%s: %s\n", name.c_str(),
+                 describeCounts(counts).c_str());
+  }
 }
 
 /// Where a part of the device's memory is in the host.
