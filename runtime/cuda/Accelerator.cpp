@@ -7,6 +7,9 @@
 #include "pikort/grid.h"
 
 #include <algorithm>
+#include <charconv>
+#include <cstdlib>
+#include <cstring>
 
 using namespace piko::cuda;
 using piko::rt::Failure;
@@ -15,6 +18,23 @@ static const pikoir_cuda_image joinImages[] = {{0, 0, piko::cuda::joinKernels},
                                                {0, 0, nullptr}};
 static const pikoir_cuda_image conditionImages[] = {
     {0, 0, piko::cuda::conditionKernels}, {0, 0, nullptr}};
+
+/// A barrier of blocks takes as long as some 20 loads, one behind the other,
+/// and a join that has to do with a few thousand things has a dozen of them.
+static int64_t findMostAlone() {
+  const char *text = std::getenv("PIKO_CUDA_ALONE");
+  int64_t most = 6144;
+  if (!text || !*text)
+    return most;
+  const char *end = text + std::strlen(text);
+  auto [stop, error] = std::from_chars(text, end, most);
+  if (error != std::errc() || stop != end || most < 0)
+    throw Failure{PIKORT_INVALID_ARGUMENT,
+                  std::string("PIKO_CUDA_ALONE: expected a number of at least "
+                              "0, but got '") +
+                      text + "'"};
+  return most;
+}
 
 Accelerator::Accelerator(pikort_pipeline &p, const pikoir_cuda_image *images)
     : p_(p), device_(Device::open(p.device)), module_(*device_, images),
@@ -25,6 +45,7 @@ Accelerator::Accelerator(pikort_pipeline &p, const pikoir_cuda_image *images)
                          CU_DEVICE_ATTRIBUTE_MAX_THREADS_PER_MULTIPROCESSOR)) *
                      processors;
   joinBlocks_ = std::min<int64_t>(processors, mostJoinBlocks);
+  mostAlone_ = findMostAlone();
   device_->check(
       device_->driver.cuStreamCreate(&stream_, CU_STREAM_NON_BLOCKING),
       "creating a stream");

@@ -41,6 +41,8 @@ public:
   bool canWaitInGrids() const;
   /// Blocks of a join, all of which are resident.
   int64_t joinBlocks() const { return joinBlocks_; }
+  /// Up to how much work its first block does by itself (device/Grid.h).
+  int64_t mostAlone() const { return mostAlone_; }
   /// Does what the steps say, behind making a part of the log zero again, and
   /// waits for it; throws.
   void submit(std::span<const Step> steps, std::span<uint8_t> clear);
@@ -69,7 +71,7 @@ private:
   Submission submission_{*this};
   std::span<uint8_t> log_;
   int64_t *progress_ = nullptr;
-  int64_t residentThreads_ = 0, joinBlocks_ = 0;
+  int64_t residentThreads_ = 0, joinBlocks_ = 0, mostAlone_ = 0;
   Frame *frame_ = nullptr; ///< The executor's, which ends first.
 };
 

@@ -322,6 +322,7 @@ Frame::Outcome Frame::finish() {
   FrameState &frame = frame_[0];
   frame = {};
   frame.progress = device_.progress();
+  frame.mostAlone = device_.mostAlone();
   frame.log.spare = begin + headRoom;
   frame.log.cursor = begin + headRoom + spareRoom;
   frame.log.limit = begin + static_cast<int64_t>(room.size());

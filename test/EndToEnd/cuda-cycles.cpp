@@ -7,9 +7,11 @@
 // RUN: env PIKO_CUDA_DRIVER=%test_driver %{compare} --pipe Numbers 2>&1 | FileCheck %s
 // RUN: env PIKO_CUDA_DRIVER=%test_driver %{compare} --pipe Tree 2>&1 | FileCheck %s
 // RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_SEED=3 %{compare} --pipe PingPong 2>&1 | FileCheck %s
+// RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_SEED=3 PIKO_CUDA_ALONE=0 %{compare} --pipe PingPong 2>&1 | FileCheck %s
 // RUN: env PIKO_CUDA_DRIVER=%test_driver %{compare} --pipe Chain 2>&1 | FileCheck %s
 // RUN: env PIKO_CUDA_DRIVER=%test_driver %{compare} --pipe Lists 2>&1 | FileCheck %s
 // RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_SEED=4 %{compare} --pipe Turns 2>&1 | FileCheck %s
+// RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_CUDA_ALONE=300 %{compare} --pipe Turns 2>&1 | FileCheck %s
 // CHECK-DAG: {{^equal$}}
 // CHECK-DAG: host: 0 launches of kernels, 1 of graphs with {{[0-9]+}} kernels, 0 copies, 0 fills, 1 waits
 //
@@ -31,6 +33,9 @@
 // RUN: env PIKO_CUDA_DRIVER=%test_driver not %{compare} --pipe Lists --loop-limit 1 2>&1 | FileCheck %s --check-prefix=ROUNDS
 // HOPS: got: stage 'collatz', bin 0: a loop did not end within 5 hops
 // ROUNDS: got: stage 'gather': a loop did not end within 1 rounds
+//
+// RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_CUDA_ALONE=much not %{compare} --pipe Lists 2>&1 | FileCheck %s --check-prefix=ALONE
+// ALONE: PIKO_CUDA_ALONE: expected a number of at least 0, but got 'much'
 //
 // Calls that fail while a graph with conditions is made.
 // RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_FAIL=cuGraphConditionalHandleCreate:1:999 not %{compare} --pipe Chain 2>&1 | FileCheck %s --check-prefix=FAILS

@@ -90,6 +90,8 @@ def main():
     if arguments.driver:
         os.environ["PIKO_CUDA_DRIVER"] = str(pathlib.Path(arguments.driver).resolve())
     os.environ.setdefault("PIKO_TEST_DRIVER_SEED", "2")
+    # Joins of few primitives are not left to one block.
+    os.environ.setdefault("PIKO_CUDA_ALONE", "0")
 
     tasks = []
     for file in sorted(ROOT.glob("examples/*/*.piko.cpp")):

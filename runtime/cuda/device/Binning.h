@@ -25,7 +25,8 @@ public:
   uint32_t *rank = nullptr;
   int64_t rankSize = 0;
 
-  /// Between two barriers; all results are uniform.
+  /// Behind a barrier; all results are uniform. In front of one, unless all is
+  /// in one cell.
   void run() {
     offsets = grid_.take<int64_t>(args_.shape.cells + 1);
     if (grid_.hasFailed())
@@ -34,8 +35,13 @@ public:
       return binPairs();
     positions = stream_.count;
     grid_.forEach(args_.shape.cells + 1,
-                  [&](int64_t c) { offsets[c] = c == 0 ? 0 : positions; });
-    grid_.sync();
+                  [&](int64_t cell) { offsets[cell] = beginOf(cell); });
+  }
+
+  /// Whether everything is in the first cell, which is known without a barrier.
+  bool isInOne() const { return !args_.shape.placed; }
+  int64_t beginOf(int64_t cell) const {
+    return !isInOne() ? offsets[cell] : cell == 0 ? 0 : positions;
   }
 
 private:

@@ -178,43 +178,41 @@ inline int64_t Gather::cellOf(int64_t position) const {
 }
 
 inline void Gather::countSpans() {
-  records_ = grid_.take<uint32_t>(spans_.count);
-  pairs_ = shape_.placed ? grid_.take<uint32_t>(spans_.count) : nullptr;
-  all_ = keyWidth_ > 0 ? grid_.take<uint32_t>(spans_.count) : nullptr;
-  uint32_t *ends = byPosition_ ? grid_.take<uint32_t>(spans_.count) : nullptr;
-  if (grid_.hasFailed())
-    return;
+  auto takeWords = [&](bool wanted) {
+    return wanted ? grid_.take<uint32_t>(spans_.count) : nullptr;
+  };
+  records_ = takeWords(true);
+  pairs_ = takeWords(shape_.placed);
+  all_ = takeWords(keyWidth_ > 0);
+  uint32_t *ends = takeWords(byPosition_);
   uint64_t received = 0;
   bool failed = false;
-  grid_.forEach(spans_.count, [&](int64_t s) {
-    Counter counter;
-    read(counter, s);
-    records_[s] = counter.records;
-    if (pairs_)
-      pairs_[s] = counter.pairs;
-    if (all_)
-      all_[s] = counter.all;
-    if (ends)
-      ends[s] = counter.ends;
-    received += counter.mine;
-    failed |= counter.failed;
-  });
+  int64_t totals[4];
+  grid_.scan<4>(spans_.count, {records_, pairs_, all_, ends}, totals,
+                [&](int64_t s, uint32_t (&numbers)[4]) {
+                  Counter counter;
+                  read(counter, s);
+                  numbers[0] = counter.records;
+                  numbers[1] = counter.pairs;
+                  numbers[2] = counter.all;
+                  numbers[3] = counter.ends;
+                  received += counter.mine;
+                  failed |= counter.failed;
+                });
   if (received > 0)
     __atomic_fetch_add(&received_, received, __ATOMIC_RELAXED);
   if (failed)
     grid_.failFrame();
-  recordCount_ = grid_.exclusiveScan(records_, spans_.count);
-  if (pairs_)
-    pairCount_ = grid_.exclusiveScan(pairs_, spans_.count);
-  if (all_)
-    grid_.exclusiveScan(all_, spans_.count);
-  if (ends)
+  recordCount_ = totals[0];
+  pairCount_ = shape_.placed ? totals[1] : 0;
+  if (ends && !grid_.hasFailed())
     slots_ = spans_.findSlots(grid_, ends);
 }
 
 inline void Gather::findSlots() {
   uint32_t *records = grid_.takeZeros(spans_.slots());
   uint32_t *pairs = shape_.placed ? grid_.takeZeros(spans_.slots()) : nullptr;
+  grid_.sync();
   if (grid_.hasFailed())
     return;
   grid_.forEach(spans_.count, [&](int64_t s) {
@@ -270,6 +268,7 @@ inline void Gather::place(Stream &stream) {
 /// All items begin and end at no pair.
 inline void Gather::placeNone(Stream &stream) {
   stream.pairs = stream.pairStarts = grid_.takeZeros(stream.count + 1);
+  grid_.sync();
 }
 
 inline void Gather::run(Stream &stream) {

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //===- Grid.h - Threads of a device that work together --------------------===//
 //
-// A grid of blocks that are all resident: they meet at barriers. What is said
-// to be uniform has the same value in all threads.
+// A grid of blocks that are all resident: they meet at barriers. Where there is
+// little to do, the first block works alone, whose barriers are a hundred times
+// as fast. What is said to be uniform has the same value in all threads.
 //
 //===----------------------------------------------------------------------===//
 
@@ -26,43 +27,50 @@ inline PIKO_BLOCK_MEMORY uint32_t warpWords[warpsOfBlock];
 
 class Grid {
 public:
-  /// Memory is taken from `cursor` on.
-  Grid(FrameState &frame, int64_t cursor)
-      : frame_(frame), top_(cursor), limit_(frame.log.limit) {}
+  /// Memory is taken from `cursor` on. `work` is about how often a loop's body
+  /// runs; uniform.
+  Grid(FrameState &frame, int64_t cursor, int64_t work)
+      : frame_(frame), top_(cursor), limit_(frame.log.limit),
+        isAlone_(work <= frame.mostAlone) {}
 
-  static int64_t block() { return __nvvm_read_ptx_sreg_ctaid_x(); }
-  static int64_t blocks() { return __nvvm_read_ptx_sreg_nctaid_x(); }
+  /// True in blocks that are to end at once, as the first one works alone.
+  bool isIdle() {
+    if (!isAlone_ || firstBlock() == 0)
+      return false;
+    __syncthreads();
+    if (thread() == 0)
+      arrive();
+    return true;
+  }
+  int64_t block() const { return isAlone_ ? 0 : firstBlock(); }
+  int64_t blocks() const {
+    return isAlone_ ? 1 : __nvvm_read_ptx_sreg_nctaid_x();
+  }
   static int32_t thread() {
     return static_cast<int32_t>(__nvvm_read_ptx_sreg_tid_x());
   }
   static int32_t lane() { return thread() % warpSize; }
-  static bool isFirst() { return block() == 0 && thread() == 0; }
-  static int64_t index() { return block() * joinThreads + thread(); }
-  static int64_t size() { return blocks() * joinThreads; }
+  static bool isFirst() { return firstBlock() == 0 && thread() == 0; }
+  int64_t index() const { return block() * joinThreads + thread(); }
+  int64_t size() const { return blocks() * joinThreads; }
 
   /// Calls body(i) for numbers below n, which is uniform.
-  template <class Body> static void forEach(int64_t n, const Body &body) {
+  template <class Body> void forEach(int64_t n, const Body &body) const {
     for (int64_t i = index(); i < n; i += size())
       body(i);
   }
 
-  /// A barrier of all threads: what was written in front of it is seen behind.
-  [[gnu::noinline]] void sync() {
-    __syncthreads();
-    if (thread() == 0) {
-      __nvvm_membar_gl();
-      auto all = static_cast<uint32_t>(blocks());
-      uint32_t before =
-          __atomic_fetch_add(&frame_.arrived, 1u, __ATOMIC_RELAXED);
-      uint32_t target = (before / all + 1) * all;
-      while (static_cast<int32_t>(
-                 __atomic_load_n(&frame_.arrived, __ATOMIC_RELAXED) - target) <
-             0)
-        __nvvm_nanosleep(32);
-      __nvvm_membar_gl();
-    }
-    __syncthreads();
+  /// A barrier of all that work: what was written in front of it is seen
+  /// behind.
+  void sync() {
+    if (isAlone_)
+      __syncthreads();
+    else
+      meet();
   }
+  /// Once, before the first thread changes what says how much work there is:
+  /// idle blocks have seen it.
+  void settle() { meet(); }
 
   /// Memory that all threads see, not initialised; uniform. Null, and
   /// hasFailed, where there is none.
@@ -75,12 +83,11 @@ public:
     top_ += bytes;
     return reinterpret_cast<T *>(top_ - bytes);
   }
-  /// The same, zero; behind a barrier.
+  /// The same, zero behind a barrier.
   uint32_t *takeZeros(int64_t count) {
     uint32_t *words = take<uint32_t>(count);
     if (words)
       forEach(count, [&](int64_t i) { words[i] = 0; });
-    sync();
     return words;
   }
   void fail() { failed_ = true; }         ///< Uniform.
@@ -88,11 +95,49 @@ public:
   bool hasFailed() const { return failed_; }
   int64_t top() const { return top_; }
 
-  /// Each number becomes the sum of those before it; returns the sum of all,
-  /// uniform. Fails where that has more than 32 bits. Between two barriers.
-  int64_t exclusiveScan(uint32_t *numbers, int64_t count);
+  /// Exclusive prefix sums of several arrays at a time: numbersOf(i, numbers)
+  /// gives element i of each, from what all threads see. `sums` has the arrays,
+  /// or null, and `totals` their sums, uniform. Fails where one has more than
+  /// 32 bits. In front of a barrier.
+  template <int32_t Count, class NumbersOf>
+  void scan(int64_t n, uint32_t *const (&sums)[Count], int64_t (&totals)[Count],
+            const NumbersOf &numbersOf);
+  /// The same of one; returns the sum of all.
+  template <class NumberOf>
+  int64_t scan(int64_t n, uint32_t *sums, const NumberOf &numberOf) {
+    int64_t total[1];
+    scan<1>(n, {sums}, total,
+            [&](int64_t i, uint32_t (&number)[1]) { number[0] = numberOf(i); });
+    return total[0];
+  }
+  /// In place. Between two barriers.
+  int64_t exclusiveScan(uint32_t *numbers, int64_t n) {
+    sync();
+    return scan(n, numbers, [&](int64_t i) { return numbers[i]; });
+  }
 
 private:
+  /// Returns how many have to arrive until all are there.
+  uint32_t arrive() {
+    auto all = static_cast<uint32_t>(__nvvm_read_ptx_sreg_nctaid_x());
+    __nvvm_membar_gl();
+    uint32_t before = __atomic_fetch_add(&frame_.arrived, 1u, __ATOMIC_RELAXED);
+    return (before / all + 1) * all;
+  }
+  [[gnu::noinline]] void meet() {
+    __syncthreads();
+    if (thread() == 0) {
+      uint32_t target = arrive();
+      while (static_cast<int32_t>(
+                 __atomic_load_n(&frame_.arrived, __ATOMIC_RELAXED) - target) <
+             0)
+        __nvvm_nanosleep(32);
+      __nvvm_membar_gl();
+    }
+    __syncthreads();
+  }
+
+  static int64_t firstBlock() { return __nvvm_read_ptx_sreg_ctaid_x(); }
   /// The sum over the block's threads, in all of them.
   static uint64_t sumOfBlock(uint64_t mine);
   /// The sum over the block's threads before this one, and of all.
@@ -100,7 +145,7 @@ private:
 
   FrameState &frame_;
   int64_t top_, limit_;
-  bool failed_ = false;
+  bool isAlone_, failed_ = false;
 };
 
 inline uint64_t Grid::sumOfBlock(uint64_t mine) {
@@ -137,43 +182,55 @@ inline uint32_t Grid::scanBlock(uint32_t mine, uint32_t &total) {
   return before + sum - mine;
 }
 
-[[gnu::noinline]] inline int64_t Grid::exclusiveScan(uint32_t *numbers,
-                                                     int64_t count) {
+template <int32_t Count, class NumbersOf>
+void Grid::scan(int64_t n, uint32_t *const (&sums)[Count],
+                int64_t (&totals)[Count], const NumbersOf &numbersOf) {
+  static_assert(Count <= mostScans);
+  for (int64_t &total : totals)
+    total = 0;
   if (failed_)
-    return 0;
-  sync();
+    return;
   int64_t chunk =
-      ceilDivide(ceilDivide(count, blocks()), joinThreads) * joinThreads;
-  int64_t begin = smaller(block() * chunk, count),
-          end = smaller(begin + chunk, count);
-  uint64_t mine = 0;
-  for (int64_t i = begin + thread(); i < end; i += joinThreads)
-    mine += numbers[i];
-  uint64_t ofBlock = sumOfBlock(mine);
-  if (thread() == 0)
-    frame_.blockSums[block()] = ofBlock;
-  sync();
-  uint64_t before = 0, all = 0;
-  for (int64_t b = thread(); b < blocks(); b += joinThreads) {
-    uint64_t sum = frame_.blockSums[b];
-    before += b < block() ? sum : 0;
-    all += sum;
+      ceilDivide(ceilDivide(n, blocks()), joinThreads) * joinThreads;
+  int64_t begin = smaller(block() * chunk, n), end = smaller(begin + chunk, n);
+  uint64_t mine[Count] = {};
+  for (int64_t i = begin + thread(); i < end; i += joinThreads) {
+    uint32_t numbers[Count];
+    numbersOf(i, numbers);
+    for (int32_t c = 0; c < Count; ++c) {
+      mine[c] += numbers[c];
+      if (sums[c])
+        sums[c][i] = numbers[c];
+    }
   }
-  before = sumOfBlock(before);
-  all = sumOfBlock(all);
-  auto base = static_cast<uint32_t>(before);
-  for (int64_t i = begin; i < end; i += joinThreads) {
-    int64_t at = i + thread();
-    uint32_t total;
-    uint32_t sum = scanBlock(at < end ? numbers[at] : 0, total);
-    if (at < end)
-      numbers[at] = base + sum;
-    base += total;
+  for (int32_t c = 0; c < Count; ++c) {
+    uint64_t ofBlock = sumOfBlock(mine[c]);
+    if (thread() == 0)
+      frame_.blockSums[c][block()] = ofBlock;
   }
-  if (all > UINT32_MAX)
-    fail();
   sync();
-  return static_cast<int64_t>(all);
+  for (int32_t c = 0; c < Count; ++c) {
+    uint64_t before = 0, all = 0;
+    for (int64_t b = thread(); b < blocks(); b += joinThreads) {
+      uint64_t sum = frame_.blockSums[c][b];
+      before += b < block() ? sum : 0;
+      all += sum;
+    }
+    auto base = static_cast<uint32_t>(sumOfBlock(before));
+    all = sumOfBlock(all);
+    for (int64_t i = begin; i < end && sums[c]; i += joinThreads) {
+      int64_t at = i + thread();
+      uint32_t total;
+      uint32_t sum = scanBlock(at < end ? sums[c][at] : 0, total);
+      if (at < end)
+        sums[c][at] = base + sum;
+      base += total;
+    }
+    totals[c] = static_cast<int64_t>(all);
+    if (all > UINT32_MAX)
+      fail();
+  }
+  sync();
 }
 
 } // namespace piko::cuda

@@ -17,14 +17,18 @@ namespace {
 class Join {
 public:
   explicit Join(const JoinArgs &args)
-      : args_(args), grid_(*args.frame, cursorOf(*args.frame)),
+      : args_(args), grid_(*args.frame, cursorOf(*args.frame), workOf(args)),
         isFirstRun_(args.kernel->runs == 0) {}
 
   void run() {
+    if (grid_.isIdle())
+      return;
     if (Grid::isFirst())
       *args_.frame->progress = args_.number;
-    if (isStopped(*args_.frame))
+    if (isStopped(*args_.frame)) {
+      grid_.settle();
       return publishNothing();
+    }
     Stream stream{};
     gather(stream);
     bool everyBin = args_.everyBin && isFirstRun_;
@@ -38,21 +42,37 @@ public:
       cutter.run();
     int64_t units = takeLogs(cutter.unitCount);
     uint32_t *childCounts = takeChildCounts(stream);
-    // What a thread alone has found is known to all here.
-    grid_.sync();
+    grid_.settle(); // what a thread alone has found is known to all
     if (grid_.hasFailed() || args_.frame->failed)
       return publishNothing();
     clear(cutter, bins);
     if (Grid::isFirst()) {
       publish(stream, bins, cutter, units);
       endInputs(stream, childCounts);
-    }
-    grid_.sync();
-    if (Grid::isFirst())
       *args_.frame->progress = args_.number + 1;
+    }
   }
 
 private:
+  /// About how much there is to do; of what comes in without bins, a unit each.
+  static int64_t workOf(const JoinArgs &args) {
+    int64_t work = args.shape.placed || args.everyBin ? args.shape.cells : 0;
+    int64_t pixels = args.clearCount > 0 && args.kernel->runs == 0 ? 1 : 0;
+    for (int32_t d = 0; d < args.rank; ++d)
+      pixels *= args.domain[d];
+    work += pixels;
+    for (int32_t i = 0; i < args.inputCount; ++i) {
+      const JoinInput &input = args.inputs[i];
+      if (input.queue)
+        work += input.queue->items;
+      if (input.producer)
+        work += piko::cuda::workOf(*input.producer);
+      work += args.shape.placed || args.inputCount > 1 ? input.count
+                                                       : input.count / 256;
+    }
+    return work;
+  }
+
   bool isInLaterWave() const { return args_.loop && args_.loop->hops > 0; }
 
   void gather(Stream &stream) {
@@ -209,7 +229,7 @@ private:
                     args_.tiles,      cutter.calls,
                     cutter.callCount, args_.clearCount > 0 && isFirstRun_};
     kernel.log = args_.frame->log;
-    kernel.log.cursor = grid_.top();
+    kernel.log.cursor = kernel.logBegin = grid_.top();
     kernel.log.units = units;
     kernel.cells = args_.shape.cells;
     kernel.rank = bins.rank;
@@ -239,18 +259,22 @@ extern "C" [[clang::nvptx_kernel]] void
 piko_fill(uint8_t *to, int64_t count, const uint8_t *record, int64_t size) {
   using Words = uint32_t __attribute__((vector_size(16)));
   constexpr int64_t together = sizeof(Words);
+  int64_t first = __nvvm_read_ptx_sreg_ctaid_x() * joinThreads + Grid::thread(),
+          threads = __nvvm_read_ptx_sreg_nctaid_x() * joinThreads;
+  auto forEach = [&](int64_t n, const auto &body) {
+    for (int64_t i = first; i < n; i += threads)
+      body(i);
+  };
   if (together % size != 0 || reinterpret_cast<uint64_t>(to) % together != 0)
-    return Grid::forEach(
-        count, [&](int64_t i) { copyRecord(to + i * size, record, size); });
+    return forEach(count,
+                   [&](int64_t i) { copyRecord(to + i * size, record, size); });
   Words words;
   for (int64_t i = 0; i < together; ++i)
     reinterpret_cast<uint8_t *>(&words)[i] = record[i % size];
   int64_t whole = count * size / together;
-  Grid::forEach(whole,
-                [&](int64_t i) { reinterpret_cast<Words *>(to)[i] = words; });
-  Grid::forEach(count * size - whole * together, [&](int64_t i) {
-    to[whole * together + i] = record[i % size];
-  });
+  forEach(whole, [&](int64_t i) { reinterpret_cast<Words *>(to)[i] = words; });
+  forEach(count * size - whole * together,
+          [&](int64_t i) { to[whole * together + i] = record[i % size]; });
 }
 
 /// Begins a kernel: makes its input and an empty log of what its producers have

@@ -23,18 +23,20 @@ constexpr int32_t mostJoinInputs = 8;
 constexpr int32_t mostJoinClears = 8;
 constexpr int32_t mostQueuePorts = 8;
 constexpr int32_t mostStepQueues = 16;
+constexpr int32_t mostScans = 4; ///< At a time.
 
 struct KernelState;
 
 /// What all grids of a frame share.
 struct FrameState {
   pikoir_log log; ///< Memory is taken in address order, and never given back.
+  int64_t mostAlone;   ///< Up to how much work one block does by itself.
   KernelState *latest; ///< The kernel that ran last; null before the first.
   /// The host's: the grid that runs, as a number in the order of launches.
   volatile int64_t *progress;
   int32_t failed;   ///< Memory or a count did not suffice, or a kernel failed.
   uint32_t arrived; ///< Blocks at barriers, over all of them.
-  uint64_t blockSums[mostJoinBlocks];
+  uint64_t blockSums[mostScans][mostJoinBlocks];
 };
 
 /// Lineage keys: see rt::Keys.
@@ -116,6 +118,7 @@ struct CycleState {
 struct KernelState {
   pikoir_input input;
   pikoir_log log;
+  int64_t logBegin; ///< Where its log's cursor began.
   int64_t cells;
   const uint32_t *rank; ///< Position to place in emission order; null = same.
   int64_t rankSize;

@@ -19,7 +19,8 @@ namespace piko::cuda {
 class Wave : FrameTask {
 public:
   explicit Wave(const StepArgs &args)
-      : FrameTask(*args.frame, args.number), args_(args), loop_(*args.loop) {}
+      : FrameTask(*args.frame, args.number, workOf(args)), args_(args),
+        loop_(*args.loop) {}
 
   void run() {
     int64_t waiting = 0;
@@ -47,6 +48,13 @@ public:
   }
 
 private:
+  static int64_t workOf(const StepArgs &args) {
+    int64_t work = args.loop->places + args.loop->exitCount;
+    for (int32_t i = 0; i < args.queueCount; ++i)
+      work += args.queues[i]->items;
+    return work;
+  }
+
   int64_t placeAll() {
     uint32_t *starts = loop_.childCounts;
     grid_.forEach(loop_.exitsBefore,
@@ -76,7 +84,7 @@ private:
 class Round : FrameTask {
 public:
   explicit Round(const StepArgs &args)
-      : FrameTask(*args.frame, args.number), args_(args) {}
+      : FrameTask(*args.frame, args.number, /*work=*/0), args_(args) {}
 
   void run() {
     CycleState &cycle = *args_.cycle;
@@ -101,7 +109,9 @@ private:
 class Leave : FrameTask {
 public:
   explicit Leave(const LeaveArgs &args)
-      : FrameTask(*args.frame, args.number), args_(args), loop_(*args.loop) {}
+      : FrameTask(*args.frame, args.number,
+                  args.loop->places + args.loop->exitCount),
+        args_(args), loop_(*args.loop) {}
 
   void run() {
     FrameTask::run([&] {
@@ -127,6 +137,7 @@ private:
     uint32_t *ranks = grid_.takeZeros(loop_.places);
     uint32_t *pairStarts =
         group.shape.placed ? grid_.takeZeros(loop_.places) : nullptr;
+    grid_.sync();
     if (grid_.hasFailed())
       return;
     forExits(number, [&](const Exit &exit) {

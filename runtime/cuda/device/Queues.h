@@ -139,21 +139,29 @@ inline int64_t cursorOf(const FrameState &frame) {
   return frame.latest ? frame.latest->log.cursor : frame.log.cursor;
 }
 
+/// About how much it is to go through what a kernel has emitted.
+inline int64_t workOf(const KernelState &kernel) {
+  constexpr int64_t perEntry = 64; // bytes
+  return kernel.input.unit_count +
+         (kernel.log.cursor - kernel.logBegin) / perEntry;
+}
+
 /// What runs between kernels and takes memory behind the latest one's.
 class FrameTask {
 public:
-  FrameTask(FrameState &frame, int64_t number)
-      : grid_(frame, cursorOf(frame)), frame_(frame), number_(number) {}
+  FrameTask(FrameState &frame, int64_t number, int64_t work)
+      : grid_(frame, cursorOf(frame), work), frame_(frame), number_(number) {}
 
   /// Calls body() if nothing has failed; returns whether nothing has then.
   template <class Body> bool run(const Body &body) {
+    if (grid_.isIdle())
+      return false;
     if (Grid::isFirst())
       *frame_.progress = number_;
     bool goesOn = !isStopped(frame_);
-    grid_.sync();
     if (goesOn)
       body();
-    grid_.sync();
+    grid_.settle();
     goesOn = goesOn && !grid_.hasFailed() && !frame_.failed;
     if (!Grid::isFirst())
       return goesOn;
@@ -177,7 +185,8 @@ private:
 class Queuer : FrameTask {
 public:
   explicit Queuer(const QueueArgs &args)
-      : FrameTask(*args.frame, args.number), args_(args) {}
+      : FrameTask(*args.frame, args.number, workOf(*args.kernel)), args_(args) {
+  }
 
   void run() {
     FrameTask::run([&] {

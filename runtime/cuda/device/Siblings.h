@@ -86,15 +86,17 @@ inline void Siblings::run(LoopState &loop) {
   uint32_t *ends = grid_.take<uint32_t>(spans_.count);
   if (grid_.hasFailed())
     return;
-  grid_.forEach(spans_.count, [&](int64_t s) {
-    Counter counter;
-    read(counter, s);
-    before_[s] = counter.records;
-    ends[s] = counter.ends;
-  });
-  grid_.exclusiveScan(before_, spans_.count);
+  int64_t totals[2];
+  grid_.scan<2>(spans_.count, {before_, ends}, totals,
+                [&](int64_t s, uint32_t (&numbers)[2]) {
+                  Counter counter;
+                  read(counter, s);
+                  numbers[0] = counter.records;
+                  numbers[1] = counter.ends;
+                });
   slots_ = spans_.findSlots(grid_, ends);
   uint32_t *counts = grid_.takeZeros(spans_.slots());
+  grid_.sync();
   if (grid_.hasFailed())
     return;
   grid_.forEach(spans_.count, [&](int64_t s) {

@@ -35,7 +35,7 @@ public:
   /// Sorts by keys below 2 ^ `bits`; the result is in `from` or in `to`, and is
   /// returned. Between two barriers.
   KeyedNumbers run(KeyedNumbers from, KeyedNumbers to, int32_t bits) {
-    counts_ = grid_.take<uint32_t>(digits * Grid::blocks());
+    counts_ = grid_.take<uint32_t>(digits * grid_.blocks());
     for (int32_t shift = 0; shift < bits && !grid_.hasFailed();
          shift += digitBits) {
       sortDigit(from, to, shift);
@@ -53,9 +53,9 @@ private:
 
   void sortDigit(KeyedNumbers from, KeyedNumbers to, int32_t shift) {
     int64_t chunk =
-        ceilDivide(ceilDivide(count_, Grid::blocks()), joinThreads) *
+        ceilDivide(ceilDivide(count_, grid_.blocks()), joinThreads) *
         joinThreads;
-    int64_t begin = smaller(Grid::block() * chunk, count_),
+    int64_t begin = smaller(grid_.block() * chunk, count_),
             end = smaller(begin + chunk, count_);
     digitPlaces[Grid::thread()] = 0;
     __syncthreads();
@@ -63,9 +63,9 @@ private:
       __atomic_fetch_add(&digitPlaces[digitOf(from.keys[i], shift)], 1u,
                          __ATOMIC_RELAXED);
     __syncthreads();
-    uint32_t *mine = &counts_[Grid::thread() * Grid::blocks() + Grid::block()];
+    uint32_t *mine = &counts_[Grid::thread() * grid_.blocks() + grid_.block()];
     *mine = digitPlaces[Grid::thread()];
-    grid_.exclusiveScan(counts_, digits * Grid::blocks());
+    grid_.exclusiveScan(counts_, digits * grid_.blocks());
     digitPlaces[Grid::thread()] = *mine;
     for (int64_t i = begin; i < end; i += joinThreads)
       scatterTile(from, to, shift, i + Grid::thread(), end);

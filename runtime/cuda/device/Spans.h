@@ -21,8 +21,8 @@ public:
 
   /// Between two barriers.
   void find();
-  /// The slot in which each span begins; `ends` of each are those of positions.
-  uint32_t *findSlots(Grid &grid, uint32_t *ends) const;
+  /// The slot in which each span begins; in front of it, so many positions end.
+  uint32_t *findSlots(Grid &grid, const uint32_t *ends) const;
 
   int64_t slots() const {
     return from_.input.calls ? from_.input.call_count : from_.input.count;
@@ -66,18 +66,17 @@ inline void Spans::find() {
   firstSpans_ = grid_.take<uint32_t>(units + 1);
   if (grid_.hasFailed())
     return;
-  grid_.forEach(units + 1, [&](int64_t unit) {
+  count = grid_.scan(units + 1, firstSpans_, [&](int64_t unit) {
     int64_t sum = 0;
     if (unit < units)
       forDirectories(unit, [&](auto *, int64_t spans) { sum += spans; });
-    firstSpans_[unit] = static_cast<uint32_t>(sum);
+    return static_cast<uint32_t>(sum);
   });
-  count = grid_.exclusiveScan(firstSpans_, units + 1);
   list = grid_.take<pikoir_span>(count);
   unitOf = grid_.take<uint32_t>(count);
   if (grid_.hasFailed())
     return;
-  int64_t warp = Grid::index() / warpSize, warps = Grid::size() / warpSize;
+  int64_t warp = grid_.index() / warpSize, warps = grid_.size() / warpSize;
   for (int64_t unit = warp; unit < units; unit += warps) {
     int64_t to = firstSpans_[unit];
     forDirectories(unit, [&](const pikoir_span *from, int64_t spans) {
@@ -91,10 +90,9 @@ inline void Spans::find() {
   grid_.sync();
 }
 
-inline uint32_t *Spans::findSlots(Grid &grid, uint32_t *ends) const {
+inline uint32_t *Spans::findSlots(Grid &grid, const uint32_t *ends) const {
   uint32_t *slots = grid.take<uint32_t>(count);
-  grid.exclusiveScan(ends, count);
-  if (!grid.hasFailed())
+  if (slots)
     grid.forEach(count, [&](int64_t s) {
       uint32_t unit = unitOf[s];
       slots[s] = static_cast<uint32_t>(firstSlotOf(unit) + ends[s] -
@@ -110,13 +108,13 @@ inline Spans::Places Spans::placeSlots(Grid &grid,
   Places places{grid.take<uint32_t>(n + 1), nullptr};
   if (grid.hasFailed())
     return places;
-  grid.forEach(n + 1,
-               [&](int64_t i) { places.emitted[i] = i < n ? counts[i] : 0; });
-  grid.exclusiveScan(places.emitted, n + 1);
+  grid.scan(n + 1, places.emitted,
+            [&](int64_t i) { return i < n ? counts[i] : 0; });
   places.starts = places.emitted;
   if (!from_.rank)
     return places;
   places.starts = grid.takeZeros(from_.rankSize + 1);
+  grid.sync();
   if (grid.hasFailed())
     return places;
   grid.forEach(n, [&](int64_t i) { places.starts[from_.rank[i]] = counts[i]; });

@@ -17,84 +17,94 @@ namespace piko::cuda {
 class Cutter {
 public:
   Cutter(Grid &grid, const JoinArgs &args, const Binning &bins, bool everyBin)
-      : grid_(grid), args_(args), everyBin_(everyBin),
-        positions_(bins.positions), offsets_(bins.offsets) {}
+      : grid_(grid), args_(args), bins_(bins), everyBin_(everyBin),
+        cells_(args.shape.cells) {}
 
   pikoir_unit *units = nullptr;
   pikoir_call *calls = nullptr;
   int64_t unitCount = 0, callCount = 0;
 
-  /// Between two barriers; all results are uniform.
+  /// Behind the binning; what the kernel takes is there in front of a barrier.
+  /// All results are uniform.
   void run() {
     if (args_.takesList)
       return cutCalls();
     if (args_.serialize)
-      return addWhole(args_.shape.cells, 0, positions_,
-                      positions_ > 0 || args_.visitsAll);
+      return addWhole(cells_, bins_.positions > 0 || args_.visitsAll);
     int64_t chunk = unitSize();
-    cut(
-        args_.shape.cells,
+    Pieces all = cut(
         [&](int64_t cell) {
           int64_t count = countOf(cell), least = args_.visitsAll ? 1 : 0;
           return larger(least, args_.splits ? ceilDivide(count, chunk)
                                             : smaller<int64_t>(count, 1));
         },
-        unitCount);
-    units = grid_.take<pikoir_unit>(unitCount);
-    if (!grid_.hasFailed())
-      grid_.forEach(unitCount, [&](int64_t u) {
-        int64_t cell = groupOf(u, args_.shape.cells), begin = offsets_[cell],
-                end = offsets_[cell + 1];
-        if (args_.splits) {
-          begin += (u - starts_[cell]) * chunk;
-          end = smaller(end, begin + chunk);
-        }
-        units[u] = {cell, cell + 1, begin, end, -1};
-      });
-    grid_.sync();
+        args_.visitsAll);
+    addUnits(all.count, [&](int64_t u) -> pikoir_unit {
+      int64_t cell = all.cellOf(u), begin = bins_.beginOf(cell),
+              end = bins_.beginOf(cell + 1);
+      if (args_.splits) {
+        begin += (u - all.startOf(cell)) * chunk;
+        end = smaller(end, begin + chunk);
+      }
+      return {cell, cell + 1, begin, end, -1};
+    });
   }
 
 private:
+  /// What each cell is cut into.
+  struct Pieces {
+    int64_t count, cells;
+    const uint32_t *starts; ///< Null: the first cell has all.
+
+    int64_t startOf(int64_t cell) const {
+      return starts ? starts[cell] : cell == 0 ? 0 : count;
+    }
+    /// The last one that begins at or before a piece.
+    int64_t cellOf(int64_t piece) const {
+      int64_t low = 0, high = starts ? cells : 1;
+      while (high - low > 1) {
+        int64_t middle = (low + high) / 2;
+        (starts[middle] <= piece ? low : high) = middle;
+      }
+      return low;
+    }
+  };
+
+  /// Each cell has piecesOf(cell), which is 0 for empty ones but where
+  /// `everyCell` is true.
+  template <class Count> Pieces cut(const Count &piecesOf, bool everyCell) {
+    if (bins_.isInOne() && !everyCell)
+      return {piecesOf(0), cells_, nullptr};
+    auto *starts = grid_.take<uint32_t>(cells_ + 1);
+    int64_t count = grid_.scan(cells_ + 1, starts, [&](int64_t cell) {
+      return cell < cells_ ? static_cast<uint32_t>(piecesOf(cell)) : 0;
+    });
+    return {count, cells_, starts};
+  }
+
   int64_t countOf(int64_t cell) const {
-    return offsets_[cell + 1] - offsets_[cell];
+    return bins_.beginOf(cell + 1) - bins_.beginOf(cell);
   }
 
   int64_t unitSize() const {
     if (args_.tileSplit > 0)
       return args_.tileSplit;
-    int64_t share = ceilDivide(positions_ / args_.unitsAtOnce, 64) * 64;
+    int64_t share = ceilDivide(bins_.positions / args_.unitsAtOnce, 64) * 64;
     return smaller<int64_t>(larger<int64_t>(share, 64), 1024);
   }
 
-  /// `starts_` becomes the first piece of each group, of piecesOf(group) each.
-  template <class Count>
-  void cut(int64_t groups, const Count &piecesOf, int64_t &pieces) {
-    starts_ = grid_.take<uint32_t>(groups + 1);
-    if (grid_.hasFailed())
-      return;
-    grid_.forEach(groups + 1, [&](int64_t g) {
-      starts_[g] = g < groups ? static_cast<uint32_t>(piecesOf(g)) : 0;
-    });
-    pieces = grid_.exclusiveScan(starts_, groups + 1);
-  }
-
-  /// The group of a piece: the last one that begins at or before it.
-  int64_t groupOf(int64_t piece, int64_t groups) const {
-    int64_t low = 0, high = groups;
-    while (high - low > 1) {
-      int64_t middle = (low + high) / 2;
-      (starts_[middle] <= piece ? low : high) = middle;
-    }
-    return low;
+  template <class UnitAt> void addUnits(int64_t count, const UnitAt &unitAt) {
+    unitCount = count;
+    units = grid_.take<pikoir_unit>(count);
+    if (!grid_.hasFailed())
+      grid_.forEach(count, [&](int64_t u) { units[u] = unitAt(u); });
   }
 
   /// Everything is one unit, if there is any.
-  void addWhole(int64_t end, int64_t begin, int64_t positions, bool any) {
-    unitCount = any;
-    units = grid_.take<pikoir_unit>(unitCount);
-    if (any && !grid_.hasFailed() && Grid::isFirst())
-      units[0] = {0, end, begin, positions, -1};
-    grid_.sync();
+  void addWhole(int64_t end, bool any) {
+    addUnits(any, [&](int64_t) -> pikoir_unit {
+      return {0, end, 0, bins_.positions, -1};
+    });
   }
 
   int64_t batchOf(int64_t count) const {
@@ -103,56 +113,45 @@ private:
   }
 
   void cutCalls() {
-    cut(
-        args_.shape.cells,
+    Pieces all = cut(
         [&](int64_t bin) {
           int64_t count = countOf(bin), least = everyBin_ ? 1 : 0;
           return larger(least, ceilDivide(count, batchOf(count)));
         },
-        callCount);
+        everyBin_);
+    auto callAt = [&](int64_t c) -> pikoir_call {
+      int64_t bin = all.cellOf(c), batch = batchOf(countOf(bin)),
+              begin = bins_.beginOf(bin) + (c - all.startOf(bin)) * batch;
+      return {bin, begin, smaller(bins_.beginOf(bin + 1), begin + batch)};
+    };
+    callCount = all.count;
     calls = grid_.take<pikoir_call>(callCount);
     if (grid_.hasFailed())
       return;
-    grid_.forEach(callCount, [&](int64_t c) {
-      int64_t bin = groupOf(c, args_.shape.cells),
-              batch = batchOf(countOf(bin));
-      int64_t begin = offsets_[bin] + (c - starts_[bin]) * batch;
-      calls[c] = {bin, begin, smaller(offsets_[bin + 1], begin + batch)};
-    });
-    grid_.sync();
+    grid_.forEach(callCount, [&](int64_t c) { calls[c] = callAt(c); });
+    auto unitOf = [&](int64_t first, int64_t end) -> pikoir_unit {
+      return {first, end, callAt(first).begin, callAt(end - 1).end, -1};
+    };
     if (args_.serialize)
-      return addWhole(callCount, 0, positions_, callCount > 0);
-    const uint32_t *firstCalls = starts_;
-    if (!args_.splits)
-      cut(
-          args_.shape.cells,
-          [&](int64_t bin) -> int64_t {
-            return firstCalls[bin + 1] > firstCalls[bin];
-          },
-          unitCount);
-    else
-      unitCount = callCount;
-    units = grid_.take<pikoir_unit>(unitCount);
-    if (grid_.hasFailed())
-      return;
-    grid_.forEach(unitCount, [&](int64_t u) {
-      int64_t first = u, end = u + 1;
-      if (!args_.splits) {
-        int64_t bin = groupOf(u, args_.shape.cells);
-        first = firstCalls[bin];
-        end = firstCalls[bin + 1];
-      }
-      units[u] = {first, end, calls[first].begin, calls[end - 1].end, -1};
+      return addWhole(callCount, callCount > 0);
+    if (args_.splits)
+      return addUnits(callCount, [&](int64_t u) { return unitOf(u, u + 1); });
+    Pieces bins = cut(
+        [&](int64_t bin) -> int64_t {
+          return all.startOf(bin + 1) > all.startOf(bin);
+        },
+        everyBin_);
+    addUnits(bins.count, [&](int64_t u) {
+      int64_t bin = bins.cellOf(u);
+      return unitOf(all.startOf(bin), all.startOf(bin + 1));
     });
-    grid_.sync();
   }
 
   Grid &grid_;
   const JoinArgs &args_;
+  const Binning &bins_;
   bool everyBin_;
-  int64_t positions_;
-  const int64_t *offsets_;
-  uint32_t *starts_ = nullptr;
+  int64_t cells_;
 };
 
 } // namespace piko::cuda
