@@ -112,6 +112,20 @@ enum CUjit_option : int {
 
 enum CUlimit : int { CU_LIMIT_STACK_SIZE = 0 };
 
+enum CUpointer_attribute : int {
+  CU_POINTER_ATTRIBUTE_CONTEXT = 1,
+  CU_POINTER_ATTRIBUTE_MEMORY_TYPE = 2,
+  CU_POINTER_ATTRIBUTE_IS_MANAGED = 8,
+  CU_POINTER_ATTRIBUTE_DEVICE_ORDINAL = 9,
+  CU_POINTER_ATTRIBUTE_RANGE_START_ADDR = 11,
+  CU_POINTER_ATTRIBUTE_RANGE_SIZE = 12
+};
+
+enum CUmemorytype : unsigned {
+  CU_MEMORYTYPE_HOST = 1,
+  CU_MEMORYTYPE_DEVICE = 2
+};
+
 /// Which threads may not make calls that may wait for the device, such as
 /// cuMemAlloc, while a stream is captured: all, the one that began, none.
 enum CUstreamCaptureMode : int {
@@ -178,14 +192,21 @@ enum : unsigned {
   CU_MEM_ATTACH_GLOBAL = 1,   ///< Of cuMemAllocManaged.
   CU_STREAM_NON_BLOCKING = 1, ///< Of cuStreamCreate.
   CU_EVENT_DEFAULT = 0,       ///< Of cuEventCreate.
+  CU_EVENT_DISABLE_TIMING = 2,
   /// Of cuGraphConditionalHandleCreate.
   CU_GRAPH_COND_ASSIGN_DEFAULT = 1,
   /// Of cuStreamUpdateCaptureDependencies.
   CU_STREAM_SET_CAPTURE_DEPENDENCIES = 1
 };
 
+/// Streams that are not created: the context's, with which others that do not
+/// say otherwise synchronize, and the calling thread's.
+inline const CUstream CU_STREAM_LEGACY = reinterpret_cast<CUstream>(1),
+                      CU_STREAM_PER_THREAD = reinterpret_cast<CUstream>(2);
+
 /// cuMemPrefetchAsync: to the host.
 inline constexpr CUdevice CU_DEVICE_CPU = -1;
+inline constexpr CUdevice CU_DEVICE_INVALID = -2;
 
 /// The functions, by name; null until the driver is loaded, and where an
 /// optional one is not in it. Symbols may have a suffix, such as cuMemAlloc_v2,

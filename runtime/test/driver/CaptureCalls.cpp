@@ -16,7 +16,7 @@ Capture *Context::captureOf(CUstream stream) {
 }
 
 CUresult Call::checkStream(CUstream stream) const {
-  if (!stream)
+  if (isDefault(stream))
     return refuseCaptures(
         CUDA_ERROR_STREAM_CAPTURE_IMPLICIT,
         [](const Stream &it) { return !(it.flags & CU_STREAM_NON_BLOCKING); });
@@ -37,7 +37,30 @@ CUresult Call::waitFor(CUstream stream) const {
                 "the stream is captured");
   }
   ++state().hostCounts.waits;
-  return CUDA_SUCCESS;
+  return finish(current->laterOf(stream));
+}
+
+Later &Context::laterOf(CUstream stream) {
+  auto found = streams.find(stream);
+  return found != streams.end() && found->second.flags & CU_STREAM_NON_BLOCKING
+             ? found->second.later
+             : later;
+}
+
+CUresult Call::finish(Later &later, const Event *upTo) const {
+  while (!later.empty() && (!upTo || upTo->waiting)) {
+    auto next = std::move(later.front());
+    later.pop_front();
+    if (!current->failed)
+      next(*this);
+  }
+  return current->failed;
+}
+
+CUresult Call::finishAll() const {
+  for (auto &[handle, stream] : current->streams)
+    finish(stream.later);
+  return finish(current->later);
 }
 
 /// Begins to capture into a graph, or into a new one if it is null.
@@ -127,7 +150,7 @@ CUresult piko::cuda::cuStreamIsCapturing(CUstream stream,
     return error;
   if (!status)
     return call.fail(CUDA_ERROR_INVALID_VALUE, "null");
-  if (stream && !call.context().streams.contains(stream))
+  if (!isDefault(stream) && !call.context().streams.contains(stream))
     return call.fail(CUDA_ERROR_INVALID_HANDLE, "no live stream");
   *status = statusOf(call.context().captureOf(stream));
   return CUDA_SUCCESS;

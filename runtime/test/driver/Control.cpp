@@ -71,6 +71,11 @@ pikoTestDriverHostCounts(struct PikoTestDriverHostCounts *counts) {
   *counts = state().hostCounts;
 }
 
+[[gnu::visibility("default")]] void pikoTestDriverDefer(int on) {
+  Lock lock(state().lock);
+  state().defers = on != 0;
+}
+
 [[gnu::visibility("default")]] const char *pikoTestDriverKernels(void) {
   thread_local std::string text;
   Lock lock(state().lock);

@@ -168,5 +168,8 @@ std::string piko::testdriver::toJSON(const PikoTestDriverHostCounts &counts) {
   add("graphLaunches", counts.graphLaunches);
   add("graphKernels", counts.graphKernels);
   add("waits", counts.waits);
+  add("bytesToDevice", counts.bytesToDevice);
+  add("bytesFromDevice", counts.bytesFromDevice);
+  add("bytesOnDevice", counts.bytesOnDevice);
   return text + "}";
 }

@@ -316,5 +316,5 @@ CUresult piko::cuda::cuCtxSynchronize() {
                               [](const Stream &) { return true; }))
     return error;
   ++state().hostCounts.waits;
-  return CUDA_SUCCESS;
+  return call.finishAll();
 }

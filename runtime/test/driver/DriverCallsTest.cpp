@@ -112,6 +112,118 @@ TEST_F(DriverCallsTest, StreamsAndEvents) {
   EXPECT_EQ(cuEventDestroy(end), CUDA_SUCCESS);
 }
 
+TEST_F(DriverCallsTest, WhereMemoryLies) {
+  CUdeviceptr device = 0, managed = 0;
+  void *hosts = nullptr;
+  ASSERT_EQ(cuMemAlloc(&device, 100), CUDA_SUCCESS);
+  ASSERT_EQ(cuMemAllocManaged(&managed, 8, CU_MEM_ATTACH_GLOBAL), CUDA_SUCCESS);
+  ASSERT_EQ(cuMemAllocHost(&hosts, 8), CUDA_SUCCESS);
+  auto look = [](CUdeviceptr at, uint32_t type, bool isManaged, uint64_t begin,
+                 uint64_t bytes) {
+    CUpointer_attribute which[] = {
+        CU_POINTER_ATTRIBUTE_MEMORY_TYPE, CU_POINTER_ATTRIBUTE_IS_MANAGED,
+        CU_POINTER_ATTRIBUTE_RANGE_START_ADDR, CU_POINTER_ATTRIBUTE_RANGE_SIZE};
+    uint64_t found[4] = {};
+    void *values[] = {&found[0], &found[1], &found[2], &found[3]};
+    EXPECT_EQ(cuPointerGetAttributes(4, which, values, at), CUDA_SUCCESS);
+    EXPECT_EQ(found[0], type);
+    EXPECT_EQ(found[1], uint64_t(isManaged));
+    EXPECT_EQ(found[2], begin);
+    EXPECT_EQ(found[3], bytes);
+  };
+  look(device + 99, CU_MEMORYTYPE_DEVICE, false, device, 100);
+  look(device + 100, 0, false, 0, 0);
+  look(managed, CU_MEMORYTYPE_DEVICE, true, managed, 8);
+  look(reinterpret_cast<uint64_t>(hosts), CU_MEMORYTYPE_HOST, false,
+       reinterpret_cast<uint64_t>(hosts), 8);
+  look(reinterpret_cast<uint64_t>(&device), 0, false, 0, 0);
+  EXPECT_EQ(cuPointerGetAttributes(1, nullptr, nullptr, device),
+            CUDA_ERROR_INVALID_VALUE);
+  EXPECT_EQ(cuMemFree(device), CUDA_SUCCESS);
+  EXPECT_EQ(cuMemFree(managed), CUDA_SUCCESS);
+  EXPECT_EQ(cuMemFreeHost(hosts), CUDA_SUCCESS);
+}
+
+TEST_F(DriverCallsTest, ContextsOfStreams) {
+  CUstream stream = nullptr;
+  CUcontext context = nullptr, own = nullptr;
+  ASSERT_EQ(cuCtxGetCurrent(&own), CUDA_SUCCESS);
+  ASSERT_EQ(cuStreamCreate(&stream, CU_STREAM_NON_BLOCKING), CUDA_SUCCESS);
+  for (CUstream each : {stream, CUstream(), CU_STREAM_PER_THREAD}) {
+    EXPECT_EQ(cuStreamGetCtx(each, &context), CUDA_SUCCESS);
+    EXPECT_EQ(context, own);
+  }
+  EXPECT_EQ(cuStreamDestroy(stream), CUDA_SUCCESS);
+  EXPECT_EQ(cuStreamGetCtx(stream, &context), CUDA_ERROR_INVALID_HANDLE);
+}
+
+/// Two streams that do what they have to when they are waited for.
+class Deferred : public DriverCallsTest {
+protected:
+  void SetUp() override {
+    DriverCallsTest::SetUp();
+    pikoTestDriverDefer(1);
+    ASSERT_EQ(cuMemAllocManaged(&address, 8, CU_MEM_ATTACH_GLOBAL),
+              CUDA_SUCCESS);
+    bytes = reinterpret_cast<volatile uint8_t *>(address);
+    for (int i = 0; i < 8; ++i)
+      bytes[i] = 0;
+    for (CUstream &stream : streams)
+      ASSERT_EQ(cuStreamCreate(&stream, CU_STREAM_NON_BLOCKING), CUDA_SUCCESS);
+  }
+  void TearDown() override {
+    for (CUstream stream : streams)
+      EXPECT_EQ(cuStreamDestroy(stream), CUDA_SUCCESS);
+    EXPECT_EQ(cuMemFree(address), CUDA_SUCCESS);
+    pikoTestDriverDefer(0);
+    DriverCallsTest::TearDown();
+  }
+  void fill(int at, int stream) {
+    ASSERT_EQ(cuMemsetD8Async(address + at, 1, 1, streams[stream]),
+              CUDA_SUCCESS);
+  }
+
+  CUdeviceptr address = 0;
+  volatile uint8_t *bytes = nullptr;
+  CUstream streams[2] = {};
+};
+
+TEST_F(Deferred, UntilTheHostWaits) {
+  CUevent event = nullptr;
+  ASSERT_EQ(cuEventCreate(&event, CU_EVENT_DISABLE_TIMING), CUDA_SUCCESS);
+  EXPECT_EQ(cuEventQuery(event), CUDA_SUCCESS);
+  fill(0, 0);
+  ASSERT_EQ(cuEventRecord(event, streams[0]), CUDA_SUCCESS);
+  fill(1, 0);
+  fill(2, 1);
+  EXPECT_EQ(cuEventQuery(event), CUDA_ERROR_NOT_READY);
+  EXPECT_EQ(bytes[0], 0);
+  EXPECT_EQ(cuEventSynchronize(event), CUDA_SUCCESS);
+  EXPECT_EQ(cuEventQuery(event), CUDA_SUCCESS);
+  EXPECT_EQ(bytes[0], 1);
+  EXPECT_EQ(bytes[1], 0);
+  EXPECT_EQ(cuStreamSynchronize(streams[0]), CUDA_SUCCESS);
+  EXPECT_EQ(bytes[1], 1);
+  EXPECT_EQ(bytes[2], 0);
+  EXPECT_EQ(cuCtxSynchronize(), CUDA_SUCCESS);
+  EXPECT_EQ(bytes[2], 1);
+  EXPECT_EQ(cuEventDestroy(event), CUDA_SUCCESS);
+}
+
+// What is not pinned is copied in the call.
+TEST_F(Deferred, CopiesOfTheHostsMemory) {
+  uint8_t from = 5, to = 0;
+  ASSERT_EQ(cuMemcpyHtoDAsync(address, &from, 1, streams[0]), CUDA_SUCCESS);
+  from = 6;
+  EXPECT_EQ(bytes[0], 0);
+  ASSERT_EQ(cuMemcpyDtoHAsync(&to, address, 1, streams[0]), CUDA_SUCCESS);
+  EXPECT_EQ(to, 5);
+  PikoTestDriverHostCounts counts;
+  pikoTestDriverHostCounts(&counts);
+  EXPECT_EQ(counts.bytesToDevice, 1u);
+  EXPECT_EQ(counts.bytesFromDevice, 1u);
+}
+
 TEST_F(DriverCallsTest, LaunchesThatCannotBe) {
   CUfunction function = load(R"(
 .version 7.8

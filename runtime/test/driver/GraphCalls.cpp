@@ -209,10 +209,16 @@ CUresult piko::cuda::cuGraphLaunch(CUgraphExec executable, CUstream stream) {
   if (call.context().captureOf(stream))
     return call.fail(CUDA_ERROR_NOT_SUPPORTED, "a graph within a graph");
   ++state().hostCounts.graphLaunches;
-  for (auto &[handle, condition] : call.context().conditions)
-    if (condition.isAssigned && condition.graph == found->second.graph)
-      condition.value = condition.initial;
-  GraphRun(call).run(found->second.nodes);
+  auto launch = [made = found->second](const Call &at) {
+    for (auto &[handle, condition] : at.context().conditions)
+      if (condition.isAssigned && condition.graph == made.graph)
+        condition.value = condition.initial;
+    GraphRun(at).run(made.nodes);
+  };
+  if (state().defers)
+    call.context().laterOf(stream).push_back(std::move(launch));
+  else
+    launch(call);
   return CUDA_SUCCESS;
 }
 

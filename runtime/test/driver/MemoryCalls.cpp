@@ -3,6 +3,8 @@
 
 #include "State.h"
 
+#include <cstring>
+
 using namespace piko::testdriver;
 using namespace piko::cuda;
 
@@ -28,6 +30,8 @@ CUresult allocate(Call &call, AllocationKind kind, uint64_t *address,
 }
 
 CUresult release(Call &call, uint64_t address, bool isHost) {
+  if (CUresult error = call.finishAll())
+    return error;
   MemoryTable &memory = call.context().memory;
   const Allocation *it = memory.at(address);
   if (!it || it->begin != address || it->kind == AllocationKind::Module ||
@@ -96,6 +100,65 @@ CUresult piko::cuda::cuMemFreeHost(void *address) {
   if (CUresult error = call.refused())
     return error;
   return release(call, reinterpret_cast<uint64_t>(address), true);
+}
+
+/// Of an allocation of any device, or of none.
+static uint64_t attributeOf(CUpointer_attribute which, const Context *context,
+                            size_t device, const Allocation *it) {
+  switch (which) {
+  case CU_POINTER_ATTRIBUTE_CONTEXT:
+    return it ? reinterpret_cast<uint64_t>(context->handle) : 0;
+  case CU_POINTER_ATTRIBUTE_MEMORY_TYPE:
+    return !it                                ? 0
+           : it->kind == AllocationKind::Host ? CU_MEMORYTYPE_HOST
+                                              : CU_MEMORYTYPE_DEVICE;
+  case CU_POINTER_ATTRIBUTE_IS_MANAGED:
+    return it && it->kind == AllocationKind::Managed;
+  case CU_POINTER_ATTRIBUTE_DEVICE_ORDINAL:
+    return it ? device : uint32_t(CU_DEVICE_INVALID);
+  case CU_POINTER_ATTRIBUTE_RANGE_START_ADDR:
+    return it ? it->begin : 0;
+  case CU_POINTER_ATTRIBUTE_RANGE_SIZE:
+    return it ? it->bytes : 0;
+  }
+  return 0;
+}
+
+/// Of what the driver writes.
+static size_t sizeOf(CUpointer_attribute which) {
+  switch (which) {
+  case CU_POINTER_ATTRIBUTE_MEMORY_TYPE:
+  case CU_POINTER_ATTRIBUTE_DEVICE_ORDINAL:
+    return 4;
+  case CU_POINTER_ATTRIBUTE_IS_MANAGED:
+    return 1;
+  default:
+    return 8;
+  }
+}
+
+CUresult piko::cuda::cuPointerGetAttributes(unsigned count,
+                                            CUpointer_attribute *attributes,
+                                            void **values,
+                                            CUdeviceptr address) {
+  Call call(__func__, Needs::Context);
+  if (CUresult error = call.refused())
+    return error;
+  if (!attributes || !values)
+    return call.fail(CUDA_ERROR_INVALID_VALUE, "null");
+  const Context *context = nullptr;
+  const Allocation *found = nullptr;
+  size_t device = 0;
+  for (size_t d = 0; d < state().devices.size() && !found; ++d) {
+    context = state().devices[d].get();
+    found = context->memory.at(address);
+    device = d;
+  }
+  for (unsigned i = 0; i < count; ++i) {
+    uint64_t value = attributeOf(attributes[i], context, device, found);
+    std::memcpy(values[i], &value, sizeOf(attributes[i]));
+  }
+  return CUDA_SUCCESS;
 }
 
 CUresult piko::cuda::cuMemPrefetchAsync(CUdeviceptr address, size_t bytes,

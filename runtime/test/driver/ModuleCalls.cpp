@@ -210,6 +210,8 @@ CUresult piko::cuda::cuModuleUnload(CUmodule handle) {
   Call call(__func__, Needs::NoCapture);
   if (CUresult error = call.refused())
     return error;
+  if (CUresult error = call.finishAll())
+    return error;
   Context &context = call.context();
   auto found = context.modules.find(handle);
   if (found == context.modules.end())

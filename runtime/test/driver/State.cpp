@@ -53,6 +53,7 @@ State::State() {
   if (const char *counts = std::getenv("PIKO_TEST_DRIVER_COUNTS"))
     countsGoTo = counts == std::string_view("0") ? "" : counts;
   printsErrors = numberFrom("PIKO_TEST_DRIVER_ERRORS", 0) != 0;
+  defers = numberFrom("PIKO_TEST_DRIVER_DEFER", 0) != 0;
   failures = parseFailures(std::getenv("PIKO_TEST_DRIVER_FAIL"));
 }
 
@@ -65,12 +66,15 @@ static void printHostCounts(const PikoTestDriverHostCounts &it) {
   auto number = [](uint64_t value) {
     return static_cast<unsigned long long>(value);
   };
-  std::fprintf(stderr,
-               "host: %llu launches of kernels, %llu of graphs with %llu "
-               "kernels, %llu copies, %llu fills, %llu waits\n",
-               number(it.launches), number(it.graphLaunches),
-               number(it.graphKernels), number(it.copies), number(it.fills),
-               number(it.waits));
+  std::fprintf(
+      stderr,
+      "host: %llu launches of kernels, %llu of graphs with %llu "
+      "kernels, %llu copies, %llu fills, %llu waits; %llu bytes to the "
+      "device, %llu from it, %llu on it\n",
+      number(it.launches), number(it.graphLaunches), number(it.graphKernels),
+      number(it.copies), number(it.fills), number(it.waits),
+      number(it.bytesToDevice), number(it.bytesFromDevice),
+      number(it.bytesOnDevice));
 }
 
 /// {"kernels": {NAME: {COUNT: n, ..}, ..}, "host": {COUNT: n, ..},

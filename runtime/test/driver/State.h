@@ -16,6 +16,8 @@
 #include "ptx/Machine.h"
 
 #include <chrono>
+#include <deque>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -125,13 +127,21 @@ struct Condition {
   bool isUsed = false;     ///< By a node.
 };
 
+class Call;
+
+/// What a stream has still to do.
+using Later = std::deque<std::function<void(const Call &)>>;
+
 struct Stream {
   unsigned flags = 0;
   std::optional<Capture> capture;
+  Later later;
 };
 
 struct Event {
-  bool recorded = false;
+  bool recorded = false, isTimed = true;
+  Later *waiting = nullptr;    ///< In that it is still to happen.
+  uint64_t records = 0;        ///< How often it was recorded.
   CUstream captured = nullptr; ///< In a capture of it, if it was the last.
   std::chrono::steady_clock::time_point time;
 };
@@ -149,7 +159,10 @@ struct Context {
   std::map<CUgraph, Graph> graphs;
   std::map<CUgraphExec, Executable> executables;
   std::map<CUgraphConditionalHandle, Condition> conditions;
+  Later later; ///< Of streams that wait for each other.
 
+  /// What a live stream, or one that is not created, has still to do.
+  Later &laterOf(CUstream stream);
   /// Null if the stream is not captured.
   Capture *captureOf(CUstream stream);
   /// With the bodies of its nodes.
@@ -178,6 +191,8 @@ struct State {
   uint64_t seed = 0;
   std::string countsGoTo; ///< As the environment says; empty: nowhere.
   bool printsErrors = false;
+  bool defers =
+      false; ///< Streams do what they have to when they are waited for.
 
   std::vector<Failure> failures;
   std::map<std::string, uint64_t, std::less<>> calls;
@@ -222,8 +237,12 @@ public:
   /// Whether a stream may be used: null, or a live one of the context, whose
   /// capture is valid if there is one.
   CUresult checkStream(CUstream stream) const;
-  /// Whether the host may wait for a stream; counts that it does.
+  /// Waits for a stream, if the host may; counts that it does.
   CUresult waitFor(CUstream stream) const;
+  /// Lets streams do all that they have to, or what leads to an event; the
+  /// error of a kernel.
+  CUresult finish(Later &later, const Event *upTo = nullptr) const;
+  CUresult finishAll() const;
   /// Makes captures invalid that hold for \p which; says so if there are any.
   template <typename F> CUresult refuseCaptures(CUresult error, F which) const {
     bool found = false;
@@ -244,6 +263,12 @@ private:
   Context *current = nullptr;
   CUresult error = CUDA_SUCCESS;
 };
+
+/// Whether it is none that the host creates.
+inline bool isDefault(CUstream stream) {
+  return !stream || stream == CU_STREAM_LEGACY ||
+         stream == CU_STREAM_PER_THREAD;
+}
 
 /// The calling thread's current context.
 CUcontext &currentContext();

@@ -6,9 +6,9 @@
 // let pass: accesses outside of allocations, calls with handles that are not
 // valid, leaks. Tests load it in place of libcuda.so.1.
 //
-// Streams run at once, in order. A kernel that fails does so as on a GPU: the
-// launch succeeds, all later calls return the error until the context's last
-// reference is released.
+// Streams run at once, in order, or else when the host waits for them. A kernel
+// that fails does so as on a GPU: the launch succeeds, all later calls return
+// the error until the context's last reference is released.
 //
 // What a stream that is captured is given becomes nodes of a graph, with its
 // parameters as they were then. A call that a capture forbids makes it invalid.
@@ -32,6 +32,7 @@
 //                              of lanes in atomic operations; 0: as numbered
 //   PIKO_TEST_DRIVER_FAIL      function:n:error, as pikoTestDriverFail; more
 //                              than one with commas
+//   PIKO_TEST_DRIVER_DEFER     1: as pikoTestDriverDefer
 //   PIKO_TEST_DRIVER_ERRORS    1: texts of errors to stderr as they come
 //   PIKO_TEST_DRIVER_COUNTS    1: counts of all kernels, and what the host has
 //                              asked for, to stderr at the end; launches: each
@@ -106,9 +107,17 @@ struct PikoTestDriverHostCounts {
   uint64_t graphLaunches;
   uint64_t graphKernels; ///< That graphs have launched.
   uint64_t waits;        ///< For the context, a stream or an event.
+  /// That copies had, on streams that were not captured.
+  uint64_t bytesToDevice, bytesFromDevice, bytesOnDevice;
 };
 
 void pikoTestDriverHostCounts(struct PikoTestDriverHostCounts *counts);
+
+/// From here on a stream does what it is given when the host waits for it, for
+/// an event in it, or for all; or, if \p on is 0, at once. What is not waited
+/// for is so late as it may be on a GPU. Streams that were not made as
+/// CU_STREAM_NON_BLOCKING count as one.
+void pikoTestDriverDefer(int on);
 
 /// The names of kernels that were launched, a line each, sorted.
 const char *pikoTestDriverKernels(void);

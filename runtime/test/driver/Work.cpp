@@ -73,6 +73,11 @@ void runCopy(const Context &context, const Copy &copy) {
 }
 
 void count(const Work &work, PikoTestDriverHostCounts &counts) {
+  if (const auto *copy = std::get_if<Copy>(&work))
+    (copy->direction == Direction::ToDevice     ? counts.bytesToDevice
+     : copy->direction == Direction::FromDevice ? counts.bytesFromDevice
+                                                : counts.bytesOnDevice) +=
+        copy->bytes;
   ++(std::holds_alternative<Kernel>(work) ? counts.launches
      : std::holds_alternative<Copy>(work) ? counts.copies
                                           : counts.fills);
@@ -119,6 +124,40 @@ void piko::testdriver::run(const Call &call, const Work &work,
                 fill->bytes);
 }
 
+/// Whether memory of the host is none that the driver has made, which it copies
+/// to or from before the call returns.
+static bool isPageable(const Context &context, uint64_t address) {
+  return !context.memory.at(address);
+}
+
+/// A stream that is not waited for does it later; a copy's error is the
+/// context's then.
+static CUresult runOrDefer(const Call &call, CUstream stream, Work work) {
+  if (!state().defers) {
+    run(call, work);
+    return CUDA_SUCCESS;
+  }
+  Later &later = call.context().laterOf(stream);
+  auto *copy = std::get_if<Copy>(&work);
+  if (copy && copy->direction == Direction::FromDevice &&
+      isPageable(call.context(), copy->to)) {
+    if (CUresult error = call.finish(later))
+      return error;
+    run(call, work);
+    return CUDA_SUCCESS;
+  }
+  std::shared_ptr<std::vector<uint8_t>> staged;
+  if (copy && copy->direction == Direction::ToDevice &&
+      isPageable(call.context(), copy->from)) {
+    const auto *from = reinterpret_cast<const uint8_t *>(copy->from);
+    staged = std::make_shared<std::vector<uint8_t>>(from, from + copy->bytes);
+    copy->from = reinterpret_cast<uint64_t>(staged->data());
+  }
+  later.push_back(
+      [work = std::move(work), staged](const Call &at) { run(at, work); });
+  return CUDA_SUCCESS;
+}
+
 CUresult piko::testdriver::submit(const Call &call, CUstream stream,
                                   Work work) {
   if (CUresult error = call.checkStream(stream))
@@ -134,6 +173,5 @@ CUresult piko::testdriver::submit(const Call &call, CUstream stream,
     return CUDA_SUCCESS;
   }
   count(work, state().hostCounts);
-  run(call, work);
-  return CUDA_SUCCESS;
+  return runOrDefer(call, stream, std::move(work));
 }
