@@ -3,7 +3,8 @@
 //
 // What a pipeline needs of a device that runs its grids. Host and device share
 // addresses: what map() gives is read and written by both, never at the same
-// time, because launch() returns when the grid has ended.
+// time, because launch() returns when the grid has ended, and nobody touches
+// what a frame uses before DeviceFrame::await.
 //
 //===----------------------------------------------------------------------===//
 
@@ -14,11 +15,22 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <string>
 #include <string_view>
 
 namespace piko::rt {
 
 class DeviceFrame;
+
+/// While a host's call lasts: at the end of the outermost one the thread has
+/// the device (the context, in CUDA) that it had before.
+class DeviceScope {
+public:
+  DeviceScope() noexcept;
+  DeviceScope(const DeviceScope &) = delete;
+  DeviceScope &operator=(const DeviceScope &) = delete;
+  ~DeviceScope();
+};
 
 class Accelerator {
 public:
@@ -39,6 +51,27 @@ public:
   /// A part of it becomes zero again before the next grid; an error is the
   /// run's.
   virtual void clearLog(std::span<uint8_t> part) noexcept = 0;
+
+  // --- what the host says is where. Errors begin with `who`.
+  /// Throws Failure unless kernels may use so many bytes there.
+  virtual void checkMemory(const std::string &who, const void *address,
+                           int64_t bytes) const = 0;
+  /// Throws Failure if that is memory of a device alone.
+  virtual void checkHosts(const std::string &who, const void *data) const = 0;
+
+  // --- runs. What these begin is in the order of the stream; they may return
+  // before it is done, and throw Failure.
+  /// The stream of the run that begins: the host's, or PIKORT_OWN_STREAM.
+  /// Whether the host waits for its end at once.
+  virtual void useStream(void *stream, bool waits) = 0;
+  /// Waits for what the stream has been given; what follows is in one of ours.
+  virtual void finishStream() = 0;
+  /// The same, where it has anything to do for the run, and after an error.
+  virtual void endStream() noexcept = 0;
+  /// Copies to the device, on it, and to the host.
+  virtual void upload(uint8_t *to, const uint8_t *from, int64_t bytes) = 0;
+  virtual void copy(uint8_t *to, const uint8_t *from, int64_t bytes) = 0;
+  virtual void download(uint8_t *to, const uint8_t *from, int64_t bytes) = 0;
 
   /// How many threads it takes to fill the device.
   virtual int64_t residentThreads() const = 0;

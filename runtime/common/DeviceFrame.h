@@ -19,8 +19,10 @@ class DeviceFrame {
 public:
   virtual ~DeviceFrame() = default;
 
-  /// Begins to record a run; false if the pipeline, or this run of it, needs
-  /// the host between its kernels. Throws.
+  /// Whether a run would be recorded, as far as is known: the pipeline, or this
+  /// run of it, may need the host between its kernels.
+  virtual bool isPossible() const = 0;
+  /// Begins to record a run; false if that is not possible. Throws.
   virtual bool begin() = 0;
   virtual bool isRecording() const = 0;
   /// The input of a stage's kernel, or of a source's, for the device to read;
@@ -41,8 +43,13 @@ public:
     Repeat, ///< Memory or a rule: the host is to take the run step by step.
     Spoilt  ///< The same, but state that was to stay has changed.
   };
-  /// Submits what was recorded and waits for it; throws.
-  virtual Outcome finish() = 0;
+  /// Submits what was recorded; false, and nothing runs, if the host is to take
+  /// the run step by step. Throws.
+  virtual bool submit() = 0;
+  /// Whether it has ended; throws.
+  virtual bool isDone() const = 0;
+  /// Waits for it; throws.
+  virtual Outcome await() = 0;
   /// Ends what begin() began, whatever has happened.
   virtual void end() noexcept = 0;
 };

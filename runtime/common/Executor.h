@@ -30,8 +30,16 @@ public:
   /// Before the program runs, with grids computed: makes the state that the run
   /// needs. Throws, or sets the status.
   virtual void beginRun() = 0;
-  /// Runs the program; returns its status.
+  /// Runs the program; returns its status. Where a device has all of it the
+  /// run may go on, and the host goes on with awaitProgram.
   virtual int32_t runProgram() = 0;
+  virtual bool isPending() const { return false; }
+  /// Whether awaitProgram would not wait; throws.
+  virtual bool isDone() const { return true; }
+  /// Waits for the end of the run; returns its status. Throws.
+  virtual int32_t awaitProgram() { return 0; }
+  /// Whether the run was repeated, behind what the device's stream had by then.
+  virtual bool wasRepeated() const { return false; }
   /// After it, and after any error of beginRun: frees what the run held.
   virtual void endRun() = 0;
 

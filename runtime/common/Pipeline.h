@@ -18,6 +18,7 @@
 
 #include <array>
 #include <atomic>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -57,6 +58,7 @@ struct State {
   bool bound = false;
   bool written = false;       ///< A buffer that kernels change.
   bool unused = false;        ///< A buffer that no kernel uses.
+  bool onDevice = false;      ///< What is bound is a device's memory.
   std::vector<uint8_t> clear; ///< One record, or empty.
   std::vector<uint8_t> bytes; ///< A constant's.
   Array<uint8_t> owned;       ///< An image's, or of a buffer that we allocate.
@@ -131,6 +133,7 @@ struct Source {
   int32_t stage = 0;
   const uint8_t *data = nullptr;
   int64_t count = -1;    ///< -1 = not bound
+  bool onDevice = false; ///< What is bound is a device's memory.
   Array<uint8_t> mirror; ///< What a device sees of the host's own memory.
   const uint8_t *hosts = nullptr; ///< That memory meanwhile.
   int64_t begin = 0, end = 0;     ///< The strip that runs, or all.
@@ -274,6 +277,13 @@ struct pikort_pipeline {
   std::string message;
   std::atomic<int32_t> status{0};
   std::atomic<int32_t> reported{0}; ///< Some error that report() noted.
+
+  // Of a run that the host has not waited for:
+  bool pending = false;
+  /// What it changes for later runs meanwhile.
+  std::vector<std::function<void()>> deferred;
+  /// How it has ended, where no call has said so yet.
+  piko::rt::Failure unsaid{};
 
   /// In the setup: what runs the grids.
   void useAccelerator(std::unique_ptr<piko::rt::Accelerator> device) {

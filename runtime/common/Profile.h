@@ -53,6 +53,11 @@ public:
   }
   Part part() const { return part_; }
   int64_t runStart() const { return first_; }
+  /// The thread goes on with a run that it has left.
+  void resume() {
+    last_ = ticks();
+    mapped_ = memory_.countMapping();
+  }
 
   /// A kernel that takes next to nothing begins in a cycle. To look at the
   /// clock would take longer, so only some are measured, and stand for those

@@ -50,7 +50,8 @@ void CPUExecutor::prepare() {
 
 void CPUExecutor::beginRun() {
   prepareState(p);
-  beginMirrors(p);
+  repeated = false;
+  beginMirrors(p, frame && frame->isPossible());
   startCounters(p);
   p.profile.enter(Part::Program);
   if (checker)
@@ -65,20 +66,31 @@ void CPUExecutor::beginRun() {
 int32_t CPUExecutor::runProgram() {
   if (!frame || !frame->begin())
     return p.runProgram(&p);
-  using Outcome = DeviceFrame::Outcome;
-  Outcome outcome = Outcome::Done;
   guarded(&p, "run", [&] {
     int32_t status = p.runProgram(&p);
     if (status == PIKORT_OK && p.settle() == PIKORT_OK)
-      outcome = frame->finish();
+      pending = frame->submit();
   });
   frame->end();
-  if (outcome == Outcome::Done || p.status != PIKORT_OK)
+  return pending || p.status != PIKORT_OK
+             ? p.status.load()
+             : repeatProgram(DeviceFrame::Outcome::Repeat);
+}
+
+int32_t CPUExecutor::awaitProgram() {
+  pending = false;
+  DeviceFrame::Outcome outcome = frame->await();
+  if (outcome == DeviceFrame::Outcome::Done)
     return p.status;
+  repeated = true;
+  return repeatProgram(outcome);
+}
+
+int32_t CPUExecutor::repeatProgram(DeviceFrame::Outcome outcome) {
   restartRun();
   int32_t status = p.runProgram(&p);
   if (status == PIKORT_OK && p.settle() == PIKORT_OK &&
-      outcome == Outcome::Spoilt)
+      outcome == DeviceFrame::Outcome::Spoilt)
     throw Failure{PIKORT_OUT_OF_MEMORY,
                   "pipeline " + quoted(p.name) +
                       ": out of memory on the device, and what it kept from "
@@ -94,12 +106,16 @@ void CPUExecutor::restartRun() {
   endStrips(p);
   endCycles(p);
   cleared.assign(p.stages.size(), false);
+  p.accelerator->finishStream();
   refillMirrors(p);
   startCycles(p);
   startStrips(p);
 }
 
 void CPUExecutor::endRun() {
+  pending = false;
+  if (p.accelerator)
+    p.accelerator->endStream();
   endClears(p);
   endMirrors(p);
   endStrips(p);

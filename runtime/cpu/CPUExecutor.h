@@ -28,7 +28,13 @@ struct CPUExecutor final : Executor {
   void prepare() override;
   void beginRun() override;
   int32_t runProgram() override;
+  bool isPending() const override { return pending; }
+  bool isDone() const override { return frame->isDone(); }
+  int32_t awaitProgram() override;
+  bool wasRepeated() const override { return repeated; }
   void endRun() override;
+  /// Runs the program step by step, for a frame that could not.
+  int32_t repeatProgram(DeviceFrame::Outcome outcome);
   /// Begins the run anew, on what it began with.
   void restartRun();
   bool reportsInOrder() const override { return checker != nullptr; }
@@ -42,6 +48,8 @@ struct CPUExecutor final : Executor {
   std::vector<std::unique_ptr<Kernel>> sourceKernels;
   std::unique_ptr<Checker> checker;   ///< In checking mode.
   std::unique_ptr<DeviceFrame> frame; ///< With an accelerator.
+  bool pending = false;               ///< It has been submitted.
+  bool repeated = false;              ///< The run had to be, behind it.
 
   // Of a run:
   std::vector<std::unique_ptr<Cycle>> cycles;

@@ -14,50 +14,100 @@ static void copy(const pikort_pipeline &p, uint8_t *to, const uint8_t *from,
       });
 }
 
-/// Makes `mirror` the same as the host's memory; kept from run to run.
+namespace {
+
+/// What has a mirror, kept from run to run.
+struct Original {
+  const uint8_t *data;
+  int64_t bytes;
+  bool onDevice;
+};
+
+} // namespace
+
+/// Makes `mirror` the same.
 static void fillMirror(pikort_pipeline &p, Array<uint8_t> &mirror,
-                       const uint8_t *data, int64_t bytes) {
-  if (!mirror || mirror.size() != bytes) {
+                       const Original &from, bool isFrame) {
+  if (!mirror || mirror.size() != from.bytes) {
     mirror = {};
-    mirror = Array<uint8_t>(p.memory, bytes, Use::State);
+    mirror = Array<uint8_t>(p.memory, from.bytes, Use::State);
   }
-  copy(p, mirror.data(), data, bytes);
+  if (from.bytes == 0)
+    return;
+  if (from.onDevice)
+    p.accelerator->copy(mirror.data(), from.data, from.bytes);
+  else if (isFrame)
+    p.accelerator->upload(mirror.data(), from.data, from.bytes);
+  else
+    copy(p, mirror.data(), from.data, from.bytes);
 }
 
 static int64_t bytesOf(const pikort_pipeline &p, const State &state) {
   return p.records[state.record].size * state.view.extent[0];
 }
 
-void piko::rt::beginMirrors(pikort_pipeline &p) {
+static void beginMirror(pikort_pipeline &p, State &state, bool isFrame) {
+  fillMirror(p, state.mirror,
+             {state.view.data, bytesOf(p, state), state.onDevice}, isFrame);
+  state.hosts = std::exchange(state.view.data, state.mirror.data());
+}
+
+static void beginMirror(pikort_pipeline &p, Source &source, bool isFrame) {
+  int64_t size = p.records[p.stages[source.stage].record].size;
+  fillMirror(p, source.mirror,
+             {source.data, source.count * size, source.onDevice}, isFrame);
+  source.hosts = std::exchange(source.data, source.mirror.data());
+}
+
+void piko::rt::beginMirrors(pikort_pipeline &p, bool isFrame) {
   if (!p.accelerator)
     return;
+  if (!isFrame) // what the host copies is what the stream has left there
+    p.accelerator->finishStream();
   for (State &state : p.states)
-    if (!state.owned && state.view.data) {
-      fillMirror(p, state.mirror, state.view.data, bytesOf(p, state));
-      state.hosts = std::exchange(state.view.data, state.mirror.data());
-    }
+    if (!state.owned && state.view.data && !(isFrame && state.onDevice))
+      beginMirror(p, state, isFrame);
   for (Source &source : p.sources)
-    if (source.data) {
-      fillMirror(p, source.mirror, source.data,
-                 source.count * p.records[p.stages[source.stage].record].size);
-      source.hosts = std::exchange(source.data, source.mirror.data());
-    }
+    if (source.data && !(isFrame && source.onDevice))
+      beginMirror(p, source, isFrame);
+  if (!isFrame)
+    p.accelerator->finishStream();
 }
 
 void piko::rt::refillMirrors(pikort_pipeline &p) {
   for (State &state : p.states)
-    if (state.hosts)
+    if (state.hosts && state.written)
       copy(p, state.mirror.data(), state.hosts, bytesOf(p, state));
+    else if (!state.hosts && state.onDevice && state.view.data)
+      beginMirror(p, state, false);
+  for (Source &source : p.sources)
+    if (!source.hosts && source.onDevice && source.data)
+      beginMirror(p, source, false);
+  p.accelerator->finishStream();
+}
+
+/// What kernels have written goes to where it was bound. A device that failed
+/// may have taken its memory along.
+static void takeBack(pikort_pipeline &p, State &state) {
+  int64_t bytes = bytesOf(p, state);
+  if (!state.written || bytes == 0 || p.status == PIKORT_DEVICE_FAILED)
+    return;
+  guarded(&p, "run", [&] {
+    if (!state.onDevice)
+      return p.accelerator->download(state.view.data, state.mirror.data(),
+                                     bytes);
+    p.accelerator->copy(state.view.data, state.mirror.data(), bytes);
+  });
 }
 
 void piko::rt::endMirrors(pikort_pipeline &p) {
   for (State &state : p.states)
     if (state.hosts) {
       state.view.data = std::exchange(state.hosts, nullptr);
-      // A device that failed may have taken its memory along.
-      if (state.written && p.status != PIKORT_DEVICE_FAILED)
-        copy(p, state.view.data, state.mirror.data(), bytesOf(p, state));
+      takeBack(p, state);
     }
+  if (p.accelerator && p.status != PIKORT_DEVICE_FAILED)
+    guarded(&p, "run", [&] { p.accelerator->finishStream(); });
   for (Source &source : p.sources)
     if (source.hosts)
       source.data = std::exchange(source.hosts, nullptr);

@@ -9,9 +9,12 @@
 namespace piko::rt {
 
 /// Where kernels run on an accelerator: copies constants, bound buffers and
-/// sources to memory that it shares, which takes their place; throws.
-void beginMirrors(pikort_pipeline &p);
-/// Copies bound buffers again, which kernels may have changed.
+/// sources to memory that it shares, which takes their place; throws. Where the
+/// host touches nothing until the run has ended, copies are in the order of its
+/// stream, and what is in the device's memory stays where it is.
+void beginMirrors(pikort_pipeline &p, bool isFrame);
+/// For a frame that the host repeats: copies again what kernels may have
+/// changed, and what was not copied; throws.
 void refillMirrors(pikort_pipeline &p);
 /// Puts the host's memory back, with what kernels have written.
 void endMirrors(pikort_pipeline &p);

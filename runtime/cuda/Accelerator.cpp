@@ -46,9 +46,9 @@ Accelerator::Accelerator(pikort_pipeline &p, const pikoir_cuda_image *images)
                      processors;
   joinBlocks_ = std::min<int64_t>(processors, mostJoinBlocks);
   mostAlone_ = findMostAlone();
-  device_->check(
-      device_->driver.cuStreamCreate(&stream_, CU_STREAM_NON_BLOCKING),
-      "creating a stream");
+  device_->check(device_->driver.cuStreamCreate(&own_, CU_STREAM_NON_BLOCKING),
+                 "creating a stream");
+  stream_ = own_;
 }
 
 Accelerator::~Accelerator() {
@@ -60,8 +60,10 @@ Accelerator::~Accelerator() {
   submission_.end();
   for (Module *module : {&module_, &joins_, &conditions_})
     module->unload();
-  if (stream_)
-    device_->driver.cuStreamDestroy(stream_);
+  if (done_)
+    device_->driver.cuEventDestroy(done_);
+  if (own_)
+    device_->driver.cuStreamDestroy(own_);
   if (progress_)
     device_->driver.cuMemFreeHost(progress_);
 }
@@ -100,15 +102,82 @@ std::span<uint8_t> Accelerator::logSpace() noexcept {
 }
 
 void Accelerator::clearLog(std::span<uint8_t> part) noexcept {
+  clearLog(part, stream_);
+}
+
+void Accelerator::clearLog(std::span<uint8_t> part, CUstream stream) noexcept {
   if (part.empty())
     return;
   piko::rt::guarded(&p_, "run", [&] {
     device_->check(device_->enter(), "entering its context");
-    device_->check(device_->driver.cuMemsetD8Async(
-                       reinterpret_cast<CUdeviceptr>(part.data()), 0,
-                       part.size(), stream_),
-                   "clearing the log");
+    device_->check(
+        device_->driver.cuMemsetD8Async(
+            reinterpret_cast<CUdeviceptr>(part.data()), 0, part.size(), stream),
+        "clearing the log");
   });
+}
+
+// --- Streams -----------------------------------------------------------------
+
+void Accelerator::useStream(void *stream, bool waits) {
+  bool isOwn = stream == PIKORT_OWN_STREAM;
+  device_->check(device_->enter(), "entering its context");
+  if (!isOwn)
+    device_->checkStream(static_cast<CUstream>(stream));
+  if ((!isOwn || !waits) && !done_)
+    device_->check(
+        device_->driver.cuEventCreate(&done_, CU_EVENT_DISABLE_TIMING),
+        "creating an event");
+  stream_ = isOwn ? own_ : static_cast<CUstream>(stream);
+  usesEvent_ = !isOwn || !waits;
+}
+
+void Accelerator::finishStream() {
+  CUresult result = CUDA_SUCCESS;
+  device_->check(device_->enter(), "entering its context");
+  if (isBusy_ || stream_ != own_)
+    result = device_->driver.cuStreamSynchronize(stream_);
+  leaveStream();
+  device_->check(result, "waiting for a stream");
+}
+
+void Accelerator::endStream() noexcept {
+  if (isBusy_ && device_->enter() == CUDA_SUCCESS)
+    device_->driver.cuStreamSynchronize(stream_);
+  leaveStream();
+}
+
+void Accelerator::leaveStream() {
+  stream_ = own_;
+  usesEvent_ = isBusy_ = false;
+}
+
+void Accelerator::upload(uint8_t *to, const uint8_t *from, int64_t bytes) {
+  isBusy_ = true;
+  device_->check(device_->enter(), "entering its context");
+  device_->check(
+      device_->driver.cuMemcpyHtoDAsync(reinterpret_cast<CUdeviceptr>(to), from,
+                                        static_cast<size_t>(bytes), stream_),
+      "copying to its memory");
+}
+
+void Accelerator::copy(uint8_t *to, const uint8_t *from, int64_t bytes) {
+  isBusy_ = true;
+  device_->check(device_->enter(), "entering its context");
+  device_->check(
+      device_->driver.cuMemcpyAsync(reinterpret_cast<CUdeviceptr>(to),
+                                    reinterpret_cast<CUdeviceptr>(from),
+                                    static_cast<size_t>(bytes), stream_),
+      "copying in its memory");
+}
+
+void Accelerator::download(uint8_t *to, const uint8_t *from, int64_t bytes) {
+  isBusy_ = true;
+  device_->check(device_->enter(), "entering its context");
+  device_->check(
+      device_->driver.cuMemcpyDtoHAsync(to, reinterpret_cast<CUdeviceptr>(from),
+                                        static_cast<size_t>(bytes), stream_),
+      "copying from its memory");
 }
 
 // --- Kernels -----------------------------------------------------------------
@@ -136,7 +205,8 @@ void Accelerator::launch(const char *kernel, int64_t blocks, int64_t threads,
   if (frame_ && frame_->isRecording())
     return frame_->launch(std::move(grid));
   Step step{Step::Kind::Grid, std::move(grid)};
-  submit({&step, 1}, {});
+  enqueue({&step, 1}, {});
+  await({&step, 1});
 }
 
 void Accelerator::launch(const GridLaunch &grid, CUstream stream) {
@@ -165,13 +235,34 @@ void Accelerator::launch(const GridLaunch &grid, CUstream stream) {
                    "running " + moduleOf(grid.kernel).describe(grid.kernel));
 }
 
-void Accelerator::submit(std::span<const Step> steps,
-                         std::span<uint8_t> clear) {
+void Accelerator::enqueue(std::span<const Step> steps,
+                          std::span<uint8_t> clear) {
   device_->check(device_->enter(), "entering its context");
   for (const Step &step : steps) // before any of them runs
     if (step.kind == Step::Kind::Grid)
       moduleOf(step.grid.kernel).find(step.grid.kernel);
+  isBusy_ = true;
   submission_.run(steps, clear);
+  if (usesEvent_)
+    device_->check(device_->driver.cuEventRecord(done_, stream_),
+                   "running a frame");
+}
+
+bool Accelerator::isDone() const {
+  device_->check(device_->enter(), "entering its context");
+  CUresult result = device_->driver.cuEventQuery(done_);
+  if (result != CUDA_ERROR_NOT_READY)
+    device_->check(result, "looking at a frame");
+  return result == CUDA_SUCCESS;
+}
+
+void Accelerator::await(std::span<const Step> steps) {
+  device_->check(device_->enter(), "entering its context");
+  if (!usesEvent_)
+    wait(steps);
+  else if (CUresult result = device_->driver.cuEventSynchronize(done_))
+    device_->check(result, "running " + describeFailed(steps));
+  leaveStream();
 }
 
 void Accelerator::wait(std::span<const Step> steps) {

@@ -32,6 +32,19 @@ public:
   void unmap(uint8_t *data) noexcept override;
   std::span<uint8_t> logSpace() noexcept override;
   void clearLog(std::span<uint8_t> part) noexcept override;
+  void checkMemory(const std::string &who, const void *address,
+                   int64_t bytes) const override {
+    device_->checkMemory(who, reinterpret_cast<CUdeviceptr>(address), bytes);
+  }
+  void checkHosts(const std::string &who, const void *data) const override {
+    device_->checkHosts(who, data);
+  }
+  void useStream(void *stream, bool waits) override;
+  void finishStream() override;
+  void endStream() noexcept override;
+  void upload(uint8_t *to, const uint8_t *from, int64_t bytes) override;
+  void copy(uint8_t *to, const uint8_t *from, int64_t bytes) override;
+  void download(uint8_t *to, const uint8_t *from, int64_t bytes) override;
   int64_t residentThreads() const override { return residentThreads_; }
   void launch(const char *kernel, int64_t blocks, int64_t threads,
               const void *arguments, int64_t count) override;
@@ -43,9 +56,13 @@ public:
   int64_t joinBlocks() const { return joinBlocks_; }
   /// Up to how much work its first block does by itself (device/Grid.h).
   int64_t mostAlone() const { return mostAlone_; }
-  /// Does what the steps say, behind making a part of the log zero again, and
-  /// waits for it; throws.
-  void submit(std::span<const Step> steps, std::span<uint8_t> clear);
+  /// Gives the stream what the steps say, behind making a part of the log zero
+  /// again; throws.
+  void enqueue(std::span<const Step> steps, std::span<uint8_t> clear);
+  /// Whether that has ended.
+  bool isDone() const;
+  /// Waits for it; throws.
+  void await(std::span<const Step> steps);
   /// Memory of the host in which joins say how far a submission is; throws.
   int64_t *progress();
 
@@ -57,9 +74,11 @@ public:
 private:
   friend class Submission;
   Module &moduleOf(const std::string &kernel);
+  void clearLog(std::span<uint8_t> part, CUstream stream) noexcept;
   void launch(const GridLaunch &grid, CUstream stream);
-  /// For all that was submitted; throws.
+  /// For all that is in the stream; throws.
   void wait(std::span<const Step> steps);
+  void leaveStream();
   /// The kernel of a submission that failed, as far as it is known.
   std::string describeFailed(std::span<const Step> steps);
 
@@ -67,7 +86,11 @@ private:
   std::shared_ptr<Device> device_;
   /// The program's kernels, and the runtime's.
   Module module_, joins_, conditions_;
-  CUstream stream_ = nullptr;
+  CUstream own_ = nullptr;
+  CUstream stream_ = nullptr; ///< Of the run; the host's, or our own.
+  CUevent done_ = nullptr;    ///< Behind a frame that is not waited for.
+  bool usesEvent_ = false;    ///< To wait for the run.
+  bool isBusy_ = false;       ///< The stream may have something to do for it.
   Submission submission_{*this};
   std::span<uint8_t> log_;
   int64_t *progress_ = nullptr;

@@ -118,6 +118,29 @@ static CUdevice findDevice(const Driver &driver, int ordinal) {
   return device;
 }
 
+namespace {
+
+/// Of the host's call that the thread is in.
+struct Entered {
+  int depth = 0;
+  CUcontext now = nullptr;    ///< Null: not looked at.
+  CUcontext before = nullptr; ///< That was current, where it is another one.
+  const Driver *driver = nullptr; ///< Null: it is not.
+};
+thread_local Entered entered;
+
+} // namespace
+
+piko::rt::DeviceScope::DeviceScope() noexcept { ++entered.depth; }
+
+piko::rt::DeviceScope::~DeviceScope() {
+  if (--entered.depth > 0)
+    return;
+  if (entered.driver)
+    entered.driver->cuCtxSetCurrent(entered.before);
+  entered = {};
+}
+
 std::shared_ptr<Device> Device::open(int32_t number) {
   static std::mutex mutex;
   struct Slot {
@@ -191,8 +214,23 @@ static std::string describe(const Driver &driver, CUresult result,
 }
 
 CUresult Device::enter() const {
-  CUresult lost = loss_->result;
-  return lost ? lost : driver.cuCtxSetCurrent(context_);
+  if (CUresult lost = loss_->result)
+    return lost;
+  if (entered.depth == 0) // a thread of the runtime's
+    return driver.cuCtxSetCurrent(context_);
+  CUcontext current = entered.now;
+  if (!current)
+    if (CUresult error = driver.cuCtxGetCurrent(&current))
+      return error;
+  if (current != context_) {
+    if (CUresult error = driver.cuCtxSetCurrent(context_))
+      return error;
+    if (!entered.driver)
+      entered.before = current;
+    entered.driver = &driver;
+  }
+  entered.now = context_;
+  return CUDA_SUCCESS;
 }
 
 void Device::check(CUresult result, const std::string &doing) const {

@@ -59,14 +59,23 @@ public:
     return 10 * attribute(CU_DEVICE_ATTRIBUTE_COMPUTE_CAPABILITY_MAJOR) +
            attribute(CU_DEVICE_ATTRIBUTE_COMPUTE_CAPABILITY_MINOR);
   }
-  /// Makes its context the calling thread's; the result of the call, or what
-  /// the device was lost by.
+  /// Makes its context the calling thread's, until the end of the host's call
+  /// (rt::DeviceScope); the result of the driver's, or what the device was lost
+  /// by.
   CUresult enter() const;
   /// Throws Failure unless `result` is success; `doing` is what was tried.
   void check(CUresult result, const std::string &doing) const;
   bool isLost() const { return loss_->result != CUDA_SUCCESS; }
   /// Throws Failure if it is lost, with what happened.
   void checkAlive() const;
+  /// Throws Failure unless its kernels may use so many bytes there; `who`
+  /// begins the message.
+  void checkMemory(const std::string &who, CUdeviceptr address,
+                   int64_t bytes) const;
+  /// Throws Failure if the host has no access to what it says is its own.
+  void checkHosts(const std::string &who, const void *data) const;
+  /// Throws Failure unless work may be given to a stream of the host's.
+  void checkStream(CUstream stream) const;
   /// "CUDA device 0 (name)"
   std::string describe() const;
 

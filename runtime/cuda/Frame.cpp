@@ -309,14 +309,14 @@ void Frame::clear(int32_t id) {
 
 // --- The submission ---------------------------------------------------------
 
-Frame::Outcome Frame::finish() {
+bool Frame::submit() {
   isRecording_ = false;
   std::span<uint8_t> room;
   if (!needsHost_)
     room = device_.logSpace();
   if (room.empty()) {
     clearLog();
-    return Outcome::Repeat;
+    return false;
   }
   auto begin = reinterpret_cast<int64_t>(room.data());
   FrameState &frame = frame_[0];
@@ -326,7 +326,15 @@ Frame::Outcome Frame::finish() {
   frame.log.spare = begin + headRoom;
   frame.log.cursor = begin + headRoom + spareRoom;
   frame.log.limit = begin + static_cast<int64_t>(room.size());
-  device_.submit(steps_, used_);
+  device_.enqueue(steps_, used_);
+  return true;
+}
+
+bool Frame::isDone() const { return device_.isDone(); }
+
+Frame::Outcome Frame::await() {
+  device_.await(steps_);
+  const FrameState &frame = frame_[0];
   const KernelState *last = frame.latest;
   int64_t end = last ? last->log.cursor : frame.log.cursor;
   used_ = {
@@ -352,7 +360,8 @@ bool Frame::keepsState() const {
   for (size_t i = 0; i < p_.states.size(); ++i) {
     const State &state = p_.states[i];
     bool changes = state.kind == PIKORT_IMAGE || state.written;
-    if (state.owned && changes && !isCleared_[i])
+    bool stays = state.owned || state.onDevice;
+    if (stays && changes && !isCleared_[i])
       return true;
   }
   return false;

@@ -50,6 +50,7 @@ class Frame final : public rt::DeviceFrame {
 public:
   Frame(pikort_pipeline &p, Accelerator &device) : p_(p), device_(device) {}
 
+  bool isPossible() const override;
   bool begin() override;
   bool isRecording() const override { return isRecording_; }
   const pikoir_input *join(int32_t number, bool isSource) override;
@@ -59,7 +60,9 @@ public:
   int32_t stepLoop(int32_t loop) override;
   bool takes(int32_t) override { return true; }
   int32_t nextTurn(int32_t cycle) override;
-  Outcome finish() override;
+  bool submit() override;
+  bool isDone() const override;
+  Outcome await() override;
   void end() noexcept override;
 
   void launch(GridLaunch grid);
@@ -91,7 +94,6 @@ private:
     int64_t most_ = 0, used_ = 0;
   };
 
-  bool isPossible() const;
   bool isPossible(const rt::LoopShape &loop) const;
   bool isPossible(const rt::CycleShape &cycle) const;
   bool hasQueue(const rt::Edge &edge) const {

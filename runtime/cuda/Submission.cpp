@@ -42,7 +42,6 @@ void Submission::run(std::span<const Step> steps, std::span<uint8_t> clear) {
     accelerator_.clearLog(clear);
     runOneByOne(steps);
   }
-  accelerator_.wait(steps);
 }
 
 void Submission::end() noexcept {
@@ -111,7 +110,7 @@ void Submission::makeGraph(std::span<const Step> steps,
 
 CUgraph Submission::capture(std::span<const Step> steps,
                             std::span<uint8_t> clear) {
-  CUstream stream = accelerator_.stream_;
+  CUstream stream = accelerator_.own_;
   for (size_t depth = 1; depth <= 2 && repeats(steps); ++depth)
     streamOf(depth); // a capture refuses to make them
   // Other threads may do with the device what they like meanwhile.
@@ -120,25 +119,31 @@ CUgraph Submission::capture(std::span<const Step> steps,
                               "capturing a frame");
   CUgraph graph = nullptr;
   try {
-    accelerator_.clearLog(clear);
+    accelerator_.clearLog(clear, stream);
     addSteps(steps, 0);
   } catch (...) {
     for (; captured_ > 0; --captured_) // their graphs are the whole one's
       driver().cuStreamEndCapture(bodyStreams_[captured_ - 1], &graph);
-    graph = nullptr;
-    driver().cuStreamEndCapture(stream, &graph);
-    if (graph)
+    if (endCapture(stream, graph) == CUDA_SUCCESS)
       driver().cuGraphDestroy(graph);
     throw;
   }
-  accelerator_.device_->check(driver().cuStreamEndCapture(stream, &graph),
-                              "capturing a frame");
+  accelerator_.device_->check(endCapture(stream, graph), "capturing a frame");
   return graph;
+}
+
+CUresult Submission::endCapture(CUstream stream, CUgraph &graph) const {
+  CUresult result = driver().cuStreamEndCapture(stream, &graph);
+  CUgraph other = nullptr;
+  if (result != CUDA_SUCCESS && // it may not have ended
+      driver().cuStreamEndCapture(stream, &other) == CUDA_SUCCESS)
+    driver().cuGraphDestroy(other);
+  return result;
 }
 
 CUstream Submission::streamOf(size_t depth) {
   if (depth == 0)
-    return accelerator_.stream_;
+    return accelerator_.own_;
   while (bodyStreams_.size() < depth) {
     CUstream stream = nullptr;
     accelerator_.device_->check(

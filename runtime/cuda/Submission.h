@@ -24,8 +24,8 @@ public:
   Submission(const Submission &) = delete;
   Submission &operator=(const Submission &) = delete;
 
-  /// Does what the steps say, behind making a part of the log zero, and waits
-  /// for it. The device must be entered; throws.
+  /// Gives the stream of the run what the steps say, behind making a part of
+  /// the log zero. The device must be entered; throws.
   void run(std::span<const Step> steps, std::span<uint8_t> clear);
   /// Frees what it has of the device, which must be entered.
   void end() noexcept;
@@ -41,13 +41,14 @@ private:
   /// Makes `graph_` of the steps, or changes it to them.
   void makeGraph(std::span<const Step> steps, std::span<uint8_t> clear);
   CUgraph capture(std::span<const Step> steps, std::span<uint8_t> clear);
+  CUresult endCapture(CUstream stream, CUgraph &graph) const;
   /// On a stream that is captured; bodies are captured on others.
   void addSteps(std::span<const Step> steps, size_t depth);
   void addRepeat(std::span<const Step> body, const int32_t *again,
                  size_t depth);
   void setCondition(CUgraphConditionalHandle handle, const int32_t *again,
                     size_t depth);
-  /// The pipeline's, or one for bodies in bodies.
+  /// The pipeline's own, or one for bodies in bodies.
   CUstream streamOf(size_t depth);
   void dropGraph() noexcept;
 

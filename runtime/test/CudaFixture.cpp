@@ -2,6 +2,7 @@
 //===- CudaFixture.cpp - A program for the driver for tests ---------------===//
 
 #include "CudaFixture.h"
+#include "Symbols.h"
 
 #include <cstdlib>
 #include <cstring>
@@ -19,7 +20,8 @@ const char *const ScaleProgram::goodPTX = R"(
 .visible .entry scale(
   .param .u64 input,
   .param .u64 out,
-  .param .u64 factor
+  .param .u64 factor,
+  .param .u64 log
 )
 .maxntid 32, 1, 1
 {
@@ -37,6 +39,7 @@ const char *const ScaleProgram::goodPTX = R"(
   cvt.u64.u32 %rd16, %r1;
   mov.u32 %r6, %nctaid.x;
   cvt.u64.u32 %rd17, %r6;
+  // log
 unit:
   setp.ge.s64 %p2, %rd16, %rd15;
   @%p2 bra done;
@@ -67,6 +70,14 @@ done:
 const char *const ScaleProgram::wrongPTX =
     ".version 6.0\n.target sm_70\n"
     ".address_size 64\nmultiply everything;\n";
+
+std::string ScaleProgram::failingPTX() {
+  std::string ptx = goodPTX;
+  return ptx.replace(ptx.find("  // log"), 8,
+                     "  ld.param.u64 %rd13, [log];\n"
+                     "  mov.u64 %rd12, 1;\n"
+                     "  st.global.u64 [%rd13+32], %rd12;");
+}
 
 std::vector<pikoir_cuda_image> ScaleProgram::images;
 const char *ScaleProgram::kernel = "scale";
@@ -114,14 +125,48 @@ static int32_t run(pikort_pipeline *p) {
                              ScaleProgram::strayPointer
                                  ? reinterpret_cast<uint8_t *>(local)
                                  : pikoir_get_state(p, 1)->data,
-                             pikoir_get_state(p, 0)->data};
-  pikoir_cuda_launch(p, ScaleProgram::kernel, blocks, 32, arguments, 3);
+                             pikoir_get_state(p, 0)->data, log};
+  pikoir_cuda_launch(p, ScaleProgram::kernel, blocks, 32, arguments, 4);
   pikoir_log_close(p, log);
   return pikoir_end(p, 0);
 }
 
 const pikort_program ScaleProgram::program{PIKORT_ABI_VERSION, "Scale", setup,
                                            run};
+
+// --- The host ----------------------------------------------------------------
+
+static void succeed(CUresult result) { EXPECT_EQ(result, CUDA_SUCCESS); }
+
+HostContext::HostContext(int32_t device) : device(device) {
+  succeed(cuInit(0));
+  succeed(cuDevicePrimaryCtxRetain(&handle, device));
+  succeed(cuCtxSetCurrent(handle));
+}
+
+HostContext::~HostContext() {
+  succeed(cuCtxSetCurrent(nullptr));
+  succeed(cuDevicePrimaryCtxRelease(device));
+}
+
+DeviceNumbers::DeviceNumbers(const std::vector<int32_t> &values)
+    : count(values.size()) {
+  succeed(cuMemAlloc(&address, count * sizeof(int32_t)));
+  succeed(cuMemcpyHtoDAsync(address, values.data(), count * sizeof(int32_t),
+                            nullptr));
+  succeed(cuStreamSynchronize(nullptr));
+}
+
+DeviceNumbers::~DeviceNumbers() { cuMemFree(address); }
+
+std::vector<int32_t> DeviceNumbers::get() const {
+  std::vector<int32_t> values(count);
+  succeed(cuMemcpyDtoHAsync(values.data(), address, count * sizeof(int32_t),
+                            nullptr));
+  return values;
+}
+
+// --- The tests ---------------------------------------------------------------
 
 void Cuda::SetUpTestSuite() {
   setenv("PIKO_CUDA_DRIVER", PIKO_TEST_DRIVER, 1);
@@ -133,6 +178,7 @@ void Cuda::SetUp() {
   kernel = "scale";
   strayPointer = false;
   std::iota(numbers.begin(), numbers.end(), 0);
+  pikoTestDriverDefer(0);
   pikoTestDriverReset();
 }
 
@@ -163,9 +209,15 @@ piko::rt::Status Cuda::scale(int runs, piko::rt::Device device) {
   return status;
 }
 
-void Cuda::expectScaled() const {
-  for (size_t i = 0; i < out.size(); ++i)
-    ASSERT_EQ(out[i], 3 * static_cast<int32_t>(i));
+void Cuda::expectScaled(const std::vector<int32_t> &values, int32_t factor) {
+  for (size_t i = 0; i < values.size(); ++i)
+    ASSERT_EQ(values[i], factor * static_cast<int32_t>(i));
+}
+
+PikoTestDriverHostCounts Cuda::hostCounts() {
+  PikoTestDriverHostCounts counts;
+  pikoTestDriverHostCounts(&counts);
+  return counts;
 }
 
 void Cuda::expectIn(const piko::rt::Status &status,

@@ -19,6 +19,9 @@ namespace piko::cuda {
 struct ScaleProgram {
   static const char *const goodPTX, *const wrongPTX;
 
+  /// The same, but the device says that there are errors, which the host does
+  /// not find.
+  static std::string failingPTX();
   static std::vector<pikoir_cuda_image> images;
   static const char *kernel;
   static bool strayPointer; ///< Items lie where no device sees them.
@@ -28,6 +31,34 @@ struct ScaleProgram {
   static void bring(const char *ptx,
                     std::vector<pikoir_cuda_image> cubins = {});
   static const pikort_program program;
+};
+
+/// What a host has of CUDA: the primary context of a device, current until the
+/// end of the object.
+class HostContext {
+public:
+  explicit HostContext(int32_t device = 0);
+  HostContext(const HostContext &) = delete;
+  HostContext &operator=(const HostContext &) = delete;
+  ~HostContext();
+
+  const int32_t device;
+  CUcontext handle = nullptr;
+};
+
+/// Numbers in memory of the current context.
+class DeviceNumbers {
+public:
+  explicit DeviceNumbers(const std::vector<int32_t> &values);
+  DeviceNumbers(const DeviceNumbers &) = delete;
+  DeviceNumbers &operator=(const DeviceNumbers &) = delete;
+  ~DeviceNumbers();
+
+  std::vector<int32_t> get() const;
+  rt::DeviceSpan<int32_t> span() const { return {address, count}; }
+
+  CUdeviceptr address = 0;
+  const size_t count;
 };
 
 /// On a machine with two devices of compute capability 9.0.
@@ -43,7 +74,10 @@ protected:
   /// Creates, binds and runs; the first error, or how it ended. `out` is what
   /// was written.
   piko::rt::Status scale(int runs = 1, piko::rt::Device device = {});
-  void expectScaled() const;
+  void expectScaled() const { expectScaled(out); }
+  static void expectScaled(const std::vector<int32_t> &values,
+                           int32_t factor = 3);
+  static PikoTestDriverHostCounts hostCounts();
   static void expectIn(const piko::rt::Status &status,
                        std::initializer_list<const char *> parts);
 

@@ -141,6 +141,43 @@ TEST_F(Host, RunsAndReadsBack) {
   ASSERT_TRUE(pipe.view<Pixel>("bias").elements.data());
 }
 
+// There is nothing to wait for.
+TEST_F(Host, RunsOnTheProcessorAtOnce) {
+  bindAll();
+  ASSERT_TRUE(pipe.runAsync());
+  EXPECT_TRUE(pipe.isDone());
+  EXPECT_EQ(pipe.view<Pixel>("depth")(0).z, 3.0f);
+  ASSERT_TRUE(pipe.wait());
+  act = Act::BadBin;
+  EXPECT_EQ(pipe.runAsync().code(), PIKORT_BIN_OUTSIDE);
+  EXPECT_TRUE(pipe.wait());
+  act = Act::Nothing;
+  expectError(pipe.runAsync(piko::rt::Stream(nullptr)), PIKORT_INVALID_ARGUMENT,
+              "pipeline 'Small': expected a run without a stream, because the "
+              "pipeline is on the processor");
+  ASSERT_TRUE(pipe.run());
+}
+
+TEST_F(Host, MemoryOfADeviceOnTheProcessor) {
+  bindAll();
+  piko::rt::DeviceSpan<Pixel> far(uint64_t(0x7000'0000'0000), 4);
+  expectError(pipe.source(0, far), PIKORT_INVALID_ARGUMENT,
+              "source 0: expected memory of the host, because the pipeline is "
+              "on the processor, but got memory of a device");
+  expectError(pipe.buffer("lights", far), PIKORT_INVALID_ARGUMENT,
+              "buffer 'lights': expected memory of the host, because the "
+              "pipeline is on the processor, but got memory of a device");
+  ASSERT_TRUE(pipe.run());
+  EXPECT_TRUE(pipe.deviceView<Pixel>("depth").empty());
+  EXPECT_STREQ(
+      pikort_message(pipe.get()),
+      "state 'depth': expected a pipeline on a device, but this one is "
+      "on the processor");
+  std::vector<Pixel> copy(64);
+  ASSERT_TRUE(pipe.read("depth", std::span(copy)));
+  EXPECT_EQ(copy[0].z, 3.0f);
+}
+
 TEST_F(Host, FollowsTheDomain) {
   bindAll();
   points.resize(10);

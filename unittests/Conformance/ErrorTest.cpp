@@ -65,6 +65,13 @@ TEST_F(Error, IndexOutsideIsThatOfTheFirstPrimitive) {
     ASSERT_TRUE(pipe.source(0, good));
     EXPECT_RUNS(pipe);
   }
+  // While the host goes on.
+  ASSERT_TRUE(pipe.source(0, bad));
+  Status status = pipe.runAsync();
+  expectError(
+      status ? pipe.wait() : status, PIKORT_INDEX_OUTSIDE,
+      {"'count'", "expected an index into 'table' in [0, 16), but got 1120"});
+  EXPECT_TRUE(pipe.wait());
   // A position that is no number.
   bad = good;
   bad[77].y = std::numeric_limits<float>::quiet_NaN();

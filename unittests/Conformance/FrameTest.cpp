@@ -57,6 +57,24 @@ TEST(Frame, ImagesAreClearedAndBuffersStay) {
     host.expectFrame();
 }
 
+TEST(Frame, RunsWhileTheHostGoesOn) {
+  Host host(900);
+  for (int frame = 0; frame < 3; ++frame) {
+    FrameResult expected =
+        conformance::expectFrame(width, height, host.scale, host.table,
+                                 host.sums, host.items, host.finds);
+    ASSERT_TRUE(host.pipe.runAsync());
+    // For the next one.
+    ASSERT_TRUE(host.pipe.constant("scale", ++host.scale));
+    Status status = host.pipe.wait();
+    ASSERT_TRUE(status) << status.message();
+    EXPECT_TRUE(host.pipe.isDone());
+    EXPECT_EQ(host.sums, expected.sums);
+    EXPECT_EQ(host.found, expected.found);
+    EXPECT_TRUE(isSame(read<Nearest>(host.pipe, "nearest"), expected.nearest));
+  }
+}
+
 TEST(Frame, HostChangesItsMemoryBetweenRuns) {
   Host host(300);
   host.expectFrame();

@@ -18,7 +18,9 @@
 // the same kind.
 //
 // pipelines::DrawPipe pipe{piko::rt::Device{1}} is on the second device, where
-// the program has code for one.
+// the program has code for one. feed() and bind() take piko::rt::DeviceSpan for
+// what lies there; runAsync() runs in a stream, and deviceView() says where
+// results are (device.hpp).
 //
 // A call that can fail returns a status. If nobody looks at it, it is thrown,
 // as a piko::Error. Without exceptions, run() fails while something is not
@@ -66,7 +68,9 @@ public:
     return status(pikort_set_domain(get(), rank, extent));
   }
   CheckedStatus setThreads(int32_t count) { return pipe.threads(count); }
-  CheckedStatus setMemoryLimit(int64_t bytes) { return pipe.memoryLimit(bytes); }
+  CheckedStatus setMemoryLimit(int64_t bytes) {
+    return pipe.memoryLimit(bytes);
+  }
   CheckedStatus setMemoryBudget(int64_t bytes) {
     return pipe.memoryBudget(bytes);
   }
@@ -84,8 +88,7 @@ public:
       size = recordSize(source);
     else
       size = sizeof(T);
-    return status(
-        pikort_bind_source(get(), source, primitives, count, size));
+    return status(pikort_bind_source(get(), source, primitives, count, size));
   }
   /// The same for a vector, an array or a span.
   template <std::ranges::contiguous_range Range>
@@ -101,10 +104,25 @@ public:
     static_assert(outlives<Range>,
                   "feed does not copy; the primitives must outlive the run");
     if (source.number < 0)
-      return Status(PIKORT_INVALID_ARGUMENT,
-                    "a stage has several sources; feed them by number");
+      return feedByNumber();
     return feed(source.number, std::ranges::data(primitives),
                 static_cast<int64_t>(std::ranges::size(primitives)));
+  }
+
+  /// Primitives in memory of the device that the pipeline is on; see
+  /// pikort_bind_device_source.
+  template <class T>
+  CheckedStatus feed(int32_t source, DeviceSpan<T> primitives) {
+    return status(pikort_bind_device_source(
+        get(), source, primitives.address(),
+        static_cast<int64_t>(primitives.size()), sizeof(T)));
+  }
+  template <class R, class T>
+    requires LaidOutAs<std::remove_const_t<T>, R>
+  CheckedStatus feed(const Source<R> &source, DeviceSpan<T> primitives) {
+    if (source.number < 0)
+      return feedByNumber();
+    return feed(source.number, primitives);
   }
 
   /// Clears the images and runs the pipeline on what was fed.
@@ -115,6 +133,19 @@ public:
       return status;
     return pipe.run();
   }
+
+  /// Gives a run to a stream: the host goes on, and wait() says how the run
+  /// went. Until then it owns what was bound and fed; constants may be changed.
+  /// See pikort_run_async.
+  CheckedStatus runAsync(Stream stream = {}) { return tryRunAsync(stream); }
+  Status tryRunAsync(Stream stream = {}) {
+    if (Status status = bind(*this); !status)
+      return status;
+    return pipe.runAsync(stream);
+  }
+  CheckedStatus wait() { return pipe.wait(); }
+  /// Whether wait() would not wait.
+  bool isDone() const { return pipe.isDone(); }
 
 protected:
   /// Hands the state's constants over before each run.
@@ -130,13 +161,16 @@ private:
   CheckedStatus status(int32_t code) const {
     return Status(code, pikort_message(get()));
   }
+  static Status feedByNumber() {
+    return Status(PIKORT_INVALID_ARGUMENT,
+                  "a stage has several sources; feed them by number");
+  }
   /// 0 if there is no such source.
   int64_t recordSize(int32_t source) const {
     pikort_source_info info;
     pikort_record_info record;
-    bool isFound =
-        pikort_get_source_info(get(), source, &info) == PIKORT_OK &&
-        pikort_get_record(get(), info.record, &record) == PIKORT_OK;
+    bool isFound = pikort_get_source_info(get(), source, &info) == PIKORT_OK &&
+                   pikort_get_record(get(), info.record, &record) == PIKORT_OK;
     return isFound ? record.size : 0;
   }
 

@@ -11,6 +11,11 @@
 // independent. Pointers that the host binds must stay valid while they are
 // bound; they are not copied, except for constants.
 //
+// Where kernels run on a CUDA device, the host may bind memory of the device,
+// run in a stream of its own, and use results where they are. Pipelines are in
+// the device's primary context, as is what the CUDA runtime API makes; each
+// call leaves the calling thread with the context that it had before.
+//
 //===----------------------------------------------------------------------===//
 
 #ifndef PIKORT_PIKORT_H
@@ -58,6 +63,8 @@ enum pikort_status {
   PIKORT_WRONG_PROCESSOR = 9,  ///< No code that this processor can run.
   PIKORT_NO_DEVICE = 10,       ///< No device of the kind that it is for.
   PIKORT_DEVICE_FAILED = 11,   ///< The device, or its driver, failed.
+  PIKORT_REPEATED = 12,        ///< A run was, behind what followed it in its
+                               ///< stream: see pikort_run_async.
   PIKORT_BIN_OUTSIDE = 16,     ///< AssignBin named a bin outside the grid.
   PIKORT_UPDATE_OUTSIDE = 17,  ///< An update outside of the call's own bin.
   PIKORT_INDEX_OUTSIDE = 18,   ///< An element outside a buffer or an image.
@@ -162,6 +169,24 @@ PIKORT_API int32_t pikort_bind_source(pikort_pipeline *pipeline, int32_t source,
                                       int64_t record_size);
 
 /// The memory of a piece of state.
+/// The same in memory of the device that the pipeline is on: an address as
+/// cuMemAlloc or cudaMalloc gives it. Kernels read and write it in place;
+/// nothing is copied where no run has to be taken step by step by the host. The
+/// records must all lie in memory of this device (managed memory does), of its
+/// primary context, at a multiple of the record's alignment:
+/// PIKORT_INVALID_ARGUMENT otherwise, and where the pipeline is on the
+/// processor. What the device is to read must be there, in the order of the
+/// run's stream, when the run begins.
+PIKORT_API int32_t pikort_bind_device_source(pikort_pipeline *pipeline,
+                                             int32_t source, uint64_t address,
+                                             int64_t count,
+                                             int64_t record_size);
+PIKORT_API int32_t pikort_bind_device_buffer(pikort_pipeline *pipeline,
+                                             const char *name, uint64_t address,
+                                             int64_t count,
+                                             int64_t record_size);
+
+/// The memory of a piece of state.
 typedef struct pikort_view {
   void *data;
   int64_t extent[4];   ///< Elements in each dimension, x first; unused = 1.
@@ -171,14 +196,77 @@ typedef struct pikort_view {
 } pikort_view;
 
 /// Where a constant, buffer or image lies. Images and buffers sized by a
-/// source exist after the first run and until the next.
+/// source exist after the first run and until the next. Waits for a run that is
+/// on its way. On a device reading it moves pages of managed memory to the
+/// host. A buffer that is memory of the device has no view.
 PIKORT_API int32_t pikort_get_view(pikort_pipeline *pipeline, const char *name,
                                    pikort_view *view);
+
+/// The memory of a piece of state on a device.
+typedef struct pikort_device_view {
+  uint64_t address;    ///< A CUdeviceptr.
+  int64_t extent[4];   ///< Elements in each dimension, x first; unused = 1.
+  int64_t stride[4];   ///< Bytes from one to the next: [1] is a row's pitch.
+  int64_t record_size; ///< Bytes of an element.
+  int32_t rank;        ///< 1 buffer, 1 to 4 image.
+  int32_t record;      ///< Index for pikort_get_record.
+  int32_t channels; ///< Scalars of an element, if all have one type and there
+                    ///< is nothing between them; 0 otherwise.
+  int32_t type;     ///< pikort_field_type of these; -1.
+  int32_t device;   ///< As pikort_device says.
+} pikort_device_view;
+
+/// Where an image or a buffer lies on the device that the pipeline is on, for
+/// kernels and copies of the host's. Nothing is copied, and nothing waited for:
+/// what is there is what the run has left for those behind it in its stream.
+/// The address stays until a run with another domain, or with another number of
+/// primitives where a source sizes the buffer, until it is bound or allocated
+/// anew, and until the pipeline goes; the contents until the next run. Images
+/// and buffers sized by a source exist from the first run on (PIKORT_UNBOUND).
+/// An error for constants, memory of the host, and on the processor.
+PIKORT_API int32_t pikort_get_device_view(pikort_pipeline *pipeline,
+                                          const char *name,
+                                          pikort_device_view *view);
+/// Copies all elements to the host, wherever they are; `count` is their number.
+/// Waits for a run that is on its way.
+PIKORT_API int32_t pikort_read(pikort_pipeline *pipeline, const char *name,
+                               void *to, int64_t count, int64_t record_size);
 
 // --- Running ----------------------------------------------------------------
 
 /// Clears images, zeroes buffers sized by a source, and runs all kernels.
 PIKORT_API int32_t pikort_run(pikort_pipeline *pipeline);
+
+/// The pipeline's own stream.
+#define PIKORT_OWN_STREAM ((void *)-1)
+
+/// The same in the order of a stream, a CUstream or cudaStream_t of the
+/// device's primary context, also 0, or PIKORT_OWN_STREAM: the run begins when
+/// what the stream has been given before has ended, and what it is given later
+/// begins when the run has ended. Returns when the stream has been given the
+/// run. A run that needs the host between its kernels (docs/GPU.md lists them)
+/// waits for the stream, and has ended when this returns; so has one on the
+/// processor, which takes PIKORT_OWN_STREAM only. A stream that is captured is
+/// refused.
+///
+/// Until pikort_wait the run owns what is bound: memory of the host may be
+/// neither changed nor freed, and what the run writes to it is there behind
+/// pikort_wait. Meanwhile the host may set constants and options and bind for
+/// the next run. Calls that need the end of the run wait for it: those that
+/// run, pikort_get_view, pikort_read, pikort_allocate_buffer. How it has ended
+/// is said by pikort_wait, or else by the next call that is to run, which does
+/// nothing else then.
+///
+/// If the device finds an error, or its memory does not suffice, the rest of
+/// the run does nothing, and the wait repeats it step by step: the status is
+/// that of the repetition, or PIKORT_REPEATED if that went well. What followed
+/// in the stream has seen incomplete results by then.
+PIKORT_API int32_t pikort_run_async(pikort_pipeline *pipeline, void *stream);
+/// Waits for the end of the run, not for what followed in its stream; its
+/// status. PIKORT_OK where there is nothing to wait for, or to say.
+PIKORT_API int32_t pikort_wait(pikort_pipeline *pipeline);
+/// 1 if pikort_wait would not wait, or has an error of the device to report.
+PIKORT_API int32_t pikort_is_done(const pikort_pipeline *pipeline);
 
 // --- Reflection -------------------------------------------------------------
 

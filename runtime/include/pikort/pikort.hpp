@@ -17,6 +17,7 @@
 #define PIKORT_PIKORT_HPP
 
 #include "piko/status.h"
+#include "pikort/device.hpp"
 #include "pikort/pikort.h"
 
 #include <initializer_list>
@@ -39,6 +40,23 @@ template <class T> struct View {
     return elements[static_cast<size_t>(row * extent[0] + x)];
   }
 };
+
+/// Empty if T has another size.
+template <class T> DeviceView<T> deviceViewOf(const pikort_device_view &raw) {
+  DeviceView<T> view;
+  if (raw.record_size != static_cast<int64_t>(sizeof(T)))
+    return view;
+  size_t count = 1;
+  for (int d = 0; d < 4; ++d) {
+    view.extent[d] = raw.extent[d];
+    count *= static_cast<size_t>(raw.extent[d]);
+  }
+  view.elements = {raw.address, count};
+  view.channels = raw.channels;
+  view.type = raw.type;
+  view.device = raw.device;
+  return view;
+}
 
 /// Which device a pipeline is on, as pikort_create_on takes it.
 struct Device {
@@ -104,6 +122,14 @@ public:
   template <class T> Status buffer(const char *name, std::vector<T> &data) {
     return buffer(name, std::span<T>(data));
   }
+  /// Binds memory of the device that the pipeline is on; see
+  /// pikort_bind_device_buffer.
+  template <class T> Status buffer(const char *name, DeviceSpan<T> data) {
+    static_assert(std::is_trivially_copyable_v<T>);
+    return status(pikort_bind_device_buffer(handle_, name, data.address(),
+                                            static_cast<int64_t>(data.size()),
+                                            sizeof(T)));
+  }
   Status allocate(const char *name, int64_t count) {
     return status(pikort_allocate_buffer(handle_, name, count));
   }
@@ -117,7 +143,20 @@ public:
   template <class T> Status source(int32_t index, const std::vector<T> &data) {
     return source(index, std::span<const T>(data));
   }
+  template <class T> Status source(int32_t index, DeviceSpan<T> data) {
+    static_assert(std::is_trivially_copyable_v<T>);
+    return status(pikort_bind_device_source(handle_, index, data.address(),
+                                            static_cast<int64_t>(data.size()),
+                                            sizeof(T)));
+  }
   Status run() { return status(pikort_run(handle_)); }
+  /// Gives a run to a stream; see pikort_run_async.
+  Status runAsync(Stream stream = {}) {
+    return status(pikort_run_async(handle_, stream.get()));
+  }
+  /// Waits for it; how it went.
+  Status wait() { return status(pikort_wait(handle_)); }
+  bool isDone() const { return pikort_is_done(handle_) != 0; }
 
   /// A buffer's or image's elements; empty if T has another size.
   template <class T> View<T> view(const char *name) {
@@ -131,6 +170,21 @@ public:
       count *= result.extent[d] = raw.extent[d];
     result.elements = {static_cast<T *>(raw.data), static_cast<size_t>(count)};
     return result;
+  }
+
+  /// The same on the device, where runs have left them; see
+  /// pikort_get_device_view.
+  template <class T> DeviceView<T> deviceView(const char *name) {
+    pikort_device_view raw;
+    if (pikort_get_device_view(handle_, name, &raw) != PIKORT_OK)
+      return {};
+    return deviceViewOf<T>(raw);
+  }
+  /// Copies all elements of a buffer or an image to the host.
+  template <class T> Status read(const char *name, std::span<T> to) {
+    static_assert(std::is_trivially_copyable_v<T>);
+    return status(pikort_read(handle_, name, to.data(),
+                              static_cast<int64_t>(to.size()), sizeof(T)));
   }
 
 private:

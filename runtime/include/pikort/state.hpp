@@ -183,10 +183,24 @@ public:
     result.elements = {static_cast<T *>(raw.data), static_cast<size_t>(count)};
     return result;
   }
-  R *data() const { return view().elements.data(); }
-  int64_t size() const {
-    return static_cast<int64_t>(view().elements.size());
+  /// Where runs leave them on the device that the pipeline is on, without a
+  /// copy and without waiting; empty before the first run, where the host's
+  /// memory is bound, and on the processor. See pikort_get_device_view.
+  template <LaidOutAs<R> T = R> DeviceView<T> deviceView() const {
+    pikort_device_view raw;
+    if (pikort_get_device_view(where.pipeline, where.name, &raw) != PIKORT_OK)
+      return {};
+    return deviceViewOf<T>(raw);
   }
+  /// Copies all of them to the host, wherever they are; a vector has as many as
+  /// there are, in x, then y, and so on.
+  template <RangeOf<R> Range> CheckedStatus read(Range &&to) const {
+    return where.status(
+        pikort_read(where.pipeline, where.name, std::ranges::data(to),
+                    static_cast<int64_t>(std::ranges::size(to)), sizeof(R)));
+  }
+  R *data() const { return view().elements.data(); }
+  int64_t size() const { return static_cast<int64_t>(view().elements.size()); }
 
 protected:
   bool find(pikort_view &raw) const {
@@ -235,6 +249,14 @@ public:
     return bind(std::ranges::data(range),
                 static_cast<int64_t>(std::ranges::size(range)));
   }
+  /// Uses memory of the device that the pipeline is on, which the host cannot
+  /// touch: read() copies it. See pikort_bind_device_buffer.
+  template <LaidOutAs<R> T> CheckedStatus bind(DeviceSpan<T> elements) {
+    static_assert(!std::is_const_v<T>, "a pipeline may write to a buffer");
+    return this->where.status(pikort_bind_device_buffer(
+        this->where.pipeline, this->where.name, elements.address(),
+        static_cast<int64_t>(elements.size()), sizeof(R)));
+  }
   /// Copies the elements.
   template <LaidOutAs<R> T>
   CheckedStatus assign(const T *elements, int64_t count) {
@@ -253,8 +275,8 @@ public:
   }
   /// Makes elements whose bytes are zero.
   CheckedStatus allocate(int64_t count) {
-    return this->where.status(pikort_allocate_buffer(
-        this->where.pipeline, this->where.name, count));
+    return this->where.status(
+        pikort_allocate_buffer(this->where.pipeline, this->where.name, count));
   }
 };
 
