@@ -20,6 +20,7 @@ split-file. Substitutions:
   %qt_include    folder of Qt's headers
   %test_driver   the driver for tests, in place of NVIDIA's
   %test_driver_11  the same without what came with CUDA 12
+  %cxx_ptx       compiler and flags that make PTX of a file of CUDA's
   %cxx_reference compiler and flags that build a pipeline file with the
                  reference executor
 
@@ -60,6 +61,12 @@ config.environment["PIKO_CACHE_DIR"] = os.path.join(
 bunny = "/usr/share/glmark2/models/bunny.obj"
 include = os.path.join(config.piko_source_root, "runtime", "include")
 reference = [config.cxx, "-std=c++20", "-O1", "-ffp-contract=off", "-I", include]
+# Kernels of an application's own, in CUDA C++, without a toolkit.
+ptx = [os.path.join(config.llvm_tools, "clang++"), "-x cuda -std=c++20 -O2 -S"]
+ptx += ["--cuda-device-only --cuda-gpu-arch=sm_70 -nocudainc -nocudalib"]
+ptx += ["-ffp-contract=off -Wno-unknown-cuda-version"]
+ptx += ["-include __clang_cuda_builtin_vars.h"]
+ptx += [f"'-D__{it}__=__attribute__(({it}))'" for it in ("global", "device", "host")]
 library_dir = os.path.join(config.piko_binary_root, "lib")
 link_host = [f"-L{library_dir}", f"-Wl,-rpath,{library_dir}", "-lpikort"]
 link_host.append(config.openmp_runtime)
@@ -97,6 +104,7 @@ config.substitutions += [
     ("%cxx_host", f"{config.cxx} -std=c++20 -Wall -Wextra -Werror -I {include}"),
     ("%link_host", " ".join(link_host)),
     ("%cxx_reference", " ".join(reference)),
+    ("%cxx_ptx", " ".join(ptx)),
     ("%cxx", config.cxx),
     ("%other_cxx", other_cxx),
 ]

@@ -34,7 +34,7 @@ SIZE = ["--width", "41", "--height", "29", "--lights", "2", "--frames", "1",
 SCENES = {"reyes": [str(ROOT / "examples/reyes/knot.bpt"), "--set", "rate=6"]}
 # What piko-render has no scene for, and the size of its domain.
 COMPARED = {"voxelize": ["33", "18", "7"], "bilateral": ["41", "29"],
-            "histogram": ["41", "29"]}
+            "histogram": ["41", "29"], "particles": ["41", "29"]}
 
 
 class Failed(Exception):
