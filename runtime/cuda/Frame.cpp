@@ -45,7 +45,7 @@ bool Frame::begin() {
     clearLog();
     return false;
   }
-  if (!places_)
+  if (!hasMemory_)
     takeMemory();
   makeZero(places_);
   makeZero(queues_);
@@ -102,6 +102,7 @@ void Frame::takeMemory() {
   queuings_ = {p_.memory, kernels};
   leaves_ = {p_.memory, waves};
   ends_ = {p_.memory, waves + countOf(p_.cycles)};
+  hasMemory_ = true;
 }
 
 size_t Frame::placeOf(int32_t number, bool isSource) const {
