@@ -241,6 +241,36 @@ def ConvertGPUToCUDA : Pass<"convert-gpu-to-cuda", "::mlir::ModuleOp"> {
                            "::mlir::LLVM::LLVMDialect"];
 }
 
+def OutlineRareWork : Pass<"piko-outline-rare-work", "::mlir::gpu::GPUModuleOp"> {
+  let summary = "Make functions of what few primitives of a kernel need";
+  let description = [{
+    **Requires** kernels as functions (`gpu-kernel-outlining`).
+
+    **Does**: makes a function of each loop that is marked with `piko.rare`, which
+    is not inlined, so that what it needs in registers and stack is not the
+    kernel's where it is not called. It gets by value what the loop uses; private
+    arrays that only the loop uses move into it, and of small ones that the kernel
+    uses, too, it has a copy, which it gives back.
+
+    Before:
+    ```
+    scf.for %i = %begin to %end step %one {
+      ...
+    } {piko.rare}
+    ```
+    After:
+    ```
+    func.call @kernel_rare(%begin, %end) : (index, index) -> ()
+    ```
+
+    **Limits**: an array of more than 16 numbers that both sides use is passed by
+    its address.
+  }];
+  let statistics = [Statistic<"outlined", "outlined", "loops that became functions">];
+  let dependentDialects = ["::mlir::func::FuncDialect",
+                           "::mlir::memref::MemRefDialect"];
+}
+
 def ConvertGPUToExactNVVM
     : Pass<"convert-gpu-to-exact-nvvm", "::mlir::gpu::GPUModuleOp"> {
   let summary = "Turn kernels into the nvvm and llvm dialects, without libdevice";

@@ -8,6 +8,7 @@
 
 #include "mlir/Conversion/ArithToLLVM/ArithToLLVM.h"
 #include "mlir/Conversion/ControlFlowToLLVM/ControlFlowToLLVM.h"
+#include "mlir/Conversion/FuncToLLVM/ConvertFuncToLLVM.h"
 #include "mlir/Conversion/GPUToNVVM/GPUToNVVMPass.h"
 #include "mlir/Conversion/LLVMCommon/ConversionTarget.h"
 #include "mlir/Conversion/LLVMCommon/TypeConverter.h"
@@ -53,11 +54,20 @@ void ConvertGPUToExactNVVMPass::runOnOperation() {
   arith::populateArithToLLVMConversionPatterns(converter, patterns);
   cf::populateControlFlowToLLVMConversionPatterns(converter, patterns);
   populateFinalizeMemRefToLLVMConversionPatterns(converter, patterns);
+  populateFuncToLLVMConversionPatterns(converter, patterns);
   populateMathToLLVMConversionPatterns(converter, patterns);
   ub::populateUBToLLVMConversionPatterns(converter, patterns);
   LLVMConversionTarget target(getContext());
   target.addLegalDialect<NVVM::NVVMDialect>();
   target.addLegalOp<gpu::GPUModuleOp>();
   if (failed(applyFullConversion(module, target, std::move(patterns))))
-    signalPassFailure();
+    return signalPassFailure();
+  // Barriers order what a block's threads see; an atomic has no need to.
+  module.walk([](LLVM::AtomicRMWOp atomic) {
+    auto type = cast<LLVM::LLVMPointerType>(atomic.getPtr().getType());
+    if (type.getAddressSpace() == unsigned(NVVM::NVVMMemorySpace::Shared)) {
+      atomic.setOrdering(LLVM::AtomicOrdering::monotonic);
+      atomic.setSyncscope("block");
+    }
+  });
 }

@@ -109,10 +109,12 @@ static int64_t getNumberBefore(StringRef line, StringRef what) {
 }
 
 /// Reads what `ptxas -v` prints: a line with the kernel's name, one with its
-/// stack and spills, one with its registers.
+/// stack and spills, one with its registers; then the same of functions that it
+/// calls, whose spills are theirs.
 static void readReport(StringRef report,
                        std::vector<KernelResources> &kernels) {
   KernelResources *kernel = nullptr;
+  bool isOwn = false;
   for (StringRef line : split(report, '\n')) {
     if (line.contains("Compiling entry function")) {
       StringRef name = line.split('\'').second.split('\'').first;
@@ -122,7 +124,9 @@ static void readReport(StringRef report,
       kernel = found == kernels.end() ? nullptr : &*found;
       if (kernel)
         kernel->assembled.emplace();
-    } else if (kernel && line.contains("bytes stack frame")) {
+    } else if (line.contains("Function properties for ")) {
+      isOwn = kernel && line.rtrim().ends_with(" " + kernel->kernel);
+    } else if (kernel && isOwn && line.contains("bytes stack frame")) {
       kernel->assembled->stack = getNumberBefore(line, "bytes stack frame");
       kernel->assembled->spillStores =
           getNumberBefore(line, "bytes spill stores");

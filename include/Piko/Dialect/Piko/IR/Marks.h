@@ -33,6 +33,9 @@ constexpr llvm::StringLiteral shared = "piko.shared";
 constexpr llvm::StringLiteral one = "piko.one";
 /// A loop whose iterations have outboxes of their own.
 constexpr llvm::StringLiteral deferred = "piko.deferred";
+/// A loop of a kernel that is to be a function of its own: few primitives need
+/// it.
+constexpr llvm::StringLiteral rare = "piko.rare";
 /// An arith.andi or arith.ori of truth values whose second operand counts only
 /// where the first does not decide: a processor may branch.
 constexpr llvm::StringLiteral shortCircuit = "piko.short_circuit";

@@ -1,0 +1,72 @@
+// RUN: piko-opt %s --pass-pipeline='builtin.module(gpu.module(piko-outline-rare-work))' --split-input-file | FileCheck %s
+// RUN: piko-opt %s --pass-pipeline='builtin.module(gpu.module(piko-outline-rare-work,convert-scf-to-cf,convert-gpu-to-exact-nvvm))' --split-input-file | FileCheck %s --check-prefix=LLVM
+
+// What the thread's number gives is computed again; parameters go by the block's
+// memory; an array of the loop's own moves; of another one a copy comes back.
+// CHECK-LABEL: gpu.module @kernels
+// CHECK:         func.func @k_rare(%[[BEGIN:.*]]: index, %[[END:.*]]: index, %[[SUM:.*]]: f32, %[[WORDS:.*]]: memref<2xi64, #gpu.address_space<workgroup>>, %[[A:.*]]: f32, %[[B:.*]]: f32) -> (f32, f32)
+// CHECK-SAME:        noinline
+// CHECK-DAG:       gpu.thread_id x
+// CHECK-DAG:       memref.load %[[WORDS]][%c0
+// CHECK-DAG:       llvm.inttoptr
+// CHECK-DAG:       memref.alloca() : memref<32xf32>
+// CHECK-DAG:       memref.alloca() : memref<2xf32>
+// CHECK:           scf.for %{{.*}} = %[[BEGIN]] to %[[END]]
+// CHECK-NOT:       piko.rare
+// CHECK:           return %{{.*}}, %{{.*}} : f32, f32
+// CHECK:         gpu.func @k
+// CHECK-SAME:      workgroup(%[[MEMORY:.*]] : memref<2xi64, #gpu.address_space<workgroup>>)
+// CHECK-NOT:       memref<32xf32>
+// CHECK:           %[[KEPT:.*]] = memref.alloca() : memref<2xf32>
+// CHECK:           llvm.ptrtoint
+// CHECK:           memref.store %{{.*}}, %[[MEMORY]]
+// CHECK:           %[[R:.*]]:2 = {{.*}}call @k_rare(
+// CHECK:           memref.store %[[R]]#0, %[[KEPT]]
+// CHECK:           memref.store %[[R]]#1, %[[KEPT]]
+// CHECK-NOT:       scf.for
+// CHECK:           gpu.return
+
+// LLVM:         llvm.func internal @k_rare(
+// LLVM-SAME:      noinline
+// LLVM:         llvm.func @k(
+// LLVM-SAME:      nvvm.kernel, nvvm.maxnreg = 64
+// LLVM:           llvm.call @k_rare(
+gpu.module @kernels {
+  gpu.func @k(%out: !llvm.ptr, %count: i64, %begin: index, %end: index, %v: f32) kernel {
+    %c0 = arith.constant 0 : index
+    %c1 = arith.constant 1 : index
+    %t = gpu.thread_id x
+    %own = memref.alloca() : memref<32xf32>
+    %kept = memref.alloca() : memref<2xf32>
+    memref.store %v, %kept[%c0] : memref<2xf32>
+    %sum = arith.addf %v, %v : f32
+    scf.for %i = %begin to %end step %c1 {
+      memref.store %sum, %own[%t] : memref<32xf32>
+      %x = memref.load %own[%i] : memref<32xf32>
+      memref.store %x, %kept[%c1] : memref<2xf32>
+      llvm.store %count, %out : i64, !llvm.ptr
+    } {piko.rare}
+    %a = memref.load %kept[%c1] : memref<2xf32>
+    llvm.store %a, %out : f32, !llvm.ptr
+    gpu.return
+  }
+}
+
+// -----
+
+// A loop that is not marked stays, and so does the kernel's bound.
+// CHECK-LABEL: gpu.module @kernels
+// CHECK-NOT:     func.func
+// CHECK:         gpu.func @k
+// CHECK-NOT:       maxnreg
+// CHECK:           scf.for
+// LLVM-NOT:      noinline
+gpu.module @kernels {
+  gpu.func @k(%out: !llvm.ptr, %begin: index, %end: index, %v: f32) kernel {
+    %c1 = arith.constant 1 : index
+    scf.for %i = %begin to %end step %c1 {
+      llvm.store %v, %out : f32, !llvm.ptr
+    }
+    gpu.return
+  }
+}
