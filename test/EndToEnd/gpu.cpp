@@ -17,7 +17,7 @@
 // A pixel is behind a test, or loops step from one of a thread's own to the next.
 // RUN: pikoc %s --pipe Boxes --emit=gpu --gpu-threads 8 | FileCheck %s --check-prefix=GPU
 // GPU-LABEL: gpu.func @Boxes_kernel_draw
-// GPU-SAME:    workgroup({{.*}}memref<8x{{.*}}, #gpu.address_space<workgroup>>
+// GPU-SAME:    workgroup({{.*}}memref<{{[0-9]+x[if][0-9]+}}, #gpu.address_space<workgroup>>
 // GPU-COUNT-2: gpu.barrier
 //
 // Each kind of kernel: emissions, lists, batches, barriers and collectives with

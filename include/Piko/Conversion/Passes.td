@@ -92,7 +92,7 @@ def ConvertPikoToGPU : Pass<"convert-piko-to-gpu", "::piko::PipelineOp"> {
 
     **Does**: turns the work of each kernel into a `gpu.launch`: a block runs a unit
     of the stored bins, which is a bin, several, or a share of the primitives of
-    one. What its threads do is one of two:
+    one. What its threads do is one of three:
 
     - Of a kernel whose effects are updates of pixels, its threads share out the
       pixels of a bin: a pixel is that thread's whose place in a tile of `threads`
@@ -106,6 +106,17 @@ def ConvertPikoToGPU : Pass<"convert-piko-to-gpu", "::piko::PipelineOp"> {
       work on pixels, or uses an array, all threads still do alike; and where the
       block's memory has no room for all of it, only fields are shared. An error
       notes which primitive it is about, by which the runtime puts them in order.
+    - Where, moreover, a primitive has one nest of loops over the pixels of a box, or
+      one pixel, and differs from others in them, and the block needs at most 384
+      bytes a thread, threads take the pixels of a whole
+      group of at most 64 primitives as one space (collapsed loops). A thread tests
+      the pixels of a part of that space, and sets the primitive's bit in a mask that
+      each pixel of the bin has in the block's memory; behind a barrier, threads take
+      pixels with bits, and update each for bit after bit, so in lineage order. A
+      primitive that leaves the bin, or takes the way of a condition that uses arrays
+      of the phase, ends its group in front of it and is done alone, in a loop that is
+      marked with `piko.rare`. A remark says why threads take one primitive after the
+      other.
     - Of any other kernel, threads share the primitives of a bin, or the iterations
       of parallel loops, where no two of these update a pixel. Where iterations
       meet at barriers and are at most as many as the block has threads, each is a
@@ -166,9 +177,12 @@ def ConvertPikoToGPU : Pass<"convert-piko-to-gpu", "::piko::PipelineOp"> {
     Statistic<"barriers", "barriers", "loops whose iterations are threads">,
     Statistic<"cut", "cut", "loops that are cut at barriers">,
     Statistic<"strided", "strided", "loops that step over others' pixels">,
-    Statistic<"guarded", "guarded", "tests of whose a pixel is">];
+    Statistic<"guarded", "guarded", "tests of whose a pixel is">,
+    Statistic<"collapsed", "collapsed",
+              "loops over primitives whose pixels are one space">];
   let dependentDialects = ["::mlir::arith::ArithDialect",
                            "::mlir::gpu::GPUDialect",
+                           "::mlir::math::MathDialect",
                            "::mlir::memref::MemRefDialect",
                            "::mlir::scf::SCFDialect"];
 }

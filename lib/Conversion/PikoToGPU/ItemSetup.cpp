@@ -17,63 +17,15 @@
 // that scf.if. Errors keep the order of primitives, because each notes which
 // one it is about.
 
-#include "PikoToGPU.h"
+#include "ItemSetup.h"
 
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
-#include "mlir/IR/IRMapping.h"
 #include "mlir/Interfaces/LoopLikeInterface.h"
 #include "mlir/Interfaces/SideEffectInterfaces.h"
-#include "llvm/ADT/MapVector.h"
 
 using namespace mlir;
 using namespace piko;
-
-namespace {
-
-/// How much of the setup is taken out of the loop over pixels.
-enum class Extent { All, Fields };
-
-class ItemSetup {
-public:
-  ItemSetup(scf::ForOp items, const ThreadTile &tile, GridMemory &memory,
-            Extent extent);
-
-  bool isEmpty() const { return shared.empty(); }
-  int64_t countBytes() const;
-  /// In front of the loop over the primitives of a group: the setup of the
-  /// thread's own, which is the one at `position`.
-  void createSetup(OpBuilder &builder, Value position);
-  /// Lets the loop, which counts through a group now, take what it needs from
-  /// memory.
-  void replaceInPixels();
-
-private:
-  void findPixelWork();
-  bool mustKeep(Operation *op) const;
-  bool isCommonIf(Operation *op) const;
-  bool isInSetup(Value value) const;
-  void findShared();
-  void computeAgain();
-  void cloneSetup(Block &from, OpBuilder &to, IRMapping &mapping);
-  void eraseSetup(Block &block);
-
-  /// As it is in memory: an i1 has no size of its own there.
-  static Type getStorage(Type type) {
-    return type.isInteger(1) ? IntegerType::get(type.getContext(), 8) : type;
-  }
-
-  scf::ForOp items;
-  GridMemory &memory;
-  Extent extent;
-  int64_t threads;
-  llvm::DenseSet<Value> own;            ///< What differs between threads.
-  llvm::DenseSet<Operation *> pixels;   ///< Left to the loop over pixels.
-  llvm::DenseSet<Operation *> both;     ///< As cheap as a load.
-  llvm::MapVector<Value, Value> shared; ///< And where it is in memory.
-};
-
-} // namespace
 
 ItemSetup::ItemSetup(scf::ForOp items, const ThreadTile &tile,
                      GridMemory &memory, Extent extent)
@@ -210,20 +162,46 @@ int64_t ItemSetup::countBytes() const {
 // Fission
 //===----------------------------------------------------------------------===//
 
-void ItemSetup::cloneSetup(Block &from, OpBuilder &to, IRMapping &mapping) {
+/// Values of one type are in one array, so that an address is found once.
+void ItemSetup::placeShared() {
+  llvm::MapVector<Type, int64_t> sizes;
+  for (auto &[value, place] : shared) {
+    int64_t &size = sizes[getStorage(value.getType())];
+    place.first = size;
+    size += threads;
+  }
+  llvm::DenseMap<Type, Value> arrays;
+  for (auto [type, size] : sizes)
+    arrays[type] = addBlockMemory(memory.launch, size, type);
+  for (auto &[value, place] : shared)
+    place.memory = arrays.lookup(getStorage(value.getType()));
+}
+
+static Value createPlace(OpBuilder &builder, Location loc, Value number,
+                         int64_t first) {
+  if (first == 0)
+    return number;
+  Value constant = arith::ConstantIndexOp::create(builder, loc, first);
+  return arith::AddIOp::create(builder, loc, number, constant);
+}
+
+void ItemSetup::cloneSetup(Block &from, OpBuilder &to, IRMapping &mapping,
+                           PixelHook atPixels) {
   for (Operation &op : from.without_terminator()) {
     if (pixels.contains(&op)) {
       auto ifOp = dyn_cast<scf::IfOp>(&op);
+      if (atPixels)
+        atPixels(&op, to, mapping);
       if (!ifOp || mustKeep(ifOp))
         continue;
       auto copy = scf::IfOp::create(
           to, op.getLoc(), mapping.lookupOrDefault(ifOp.getCondition()),
           /*withElseRegion=*/ifOp.elseBlock() != nullptr);
       OpBuilder inside = copy.getThenBodyBuilder();
-      cloneSetup(*ifOp.thenBlock(), inside, mapping);
+      cloneSetup(*ifOp.thenBlock(), inside, mapping, atPixels);
       if (ifOp.elseBlock()) {
         inside = copy.getElseBodyBuilder();
-        cloneSetup(*ifOp.elseBlock(), inside, mapping);
+        cloneSetup(*ifOp.elseBlock(), inside, mapping, atPixels);
       }
       continue;
     }
@@ -238,26 +216,29 @@ void ItemSetup::cloneSetup(Block &from, OpBuilder &to, IRMapping &mapping) {
       Value stored = value;
       if (type != result.getType())
         stored = arith::ExtUIOp::create(to, loc, type, stored);
-      found->second = addBlockMemory(memory.launch, threads, type);
-      memref::StoreOp::create(to, loc, stored, found->second,
-                              Value(memory.launch.getThreadIds().x));
+      memref::StoreOp::create(to, loc, stored, found->second.memory,
+                              createPlace(to, loc,
+                                          memory.launch.getThreadIds().x,
+                                          found->second.first));
     }
   }
 }
 
-void ItemSetup::createSetup(OpBuilder &builder, Value position) {
+void ItemSetup::createSetup(OpBuilder &builder, Value position,
+                            PixelHook atPixels) {
+  placeShared();
   memory.setPosition(builder, position);
   IRMapping mapping;
   mapping.map(items.getInductionVar(), position);
-  cloneSetup(*items.getBody(), builder, mapping);
+  cloneSetup(*items.getBody(), builder, mapping, atPixels);
 }
 
 void ItemSetup::replaceInPixels() {
   for (auto &[value, place] : shared) {
     OpBuilder builder(value.getDefiningOp());
     Location loc = value.getLoc();
-    Value loaded =
-        memref::LoadOp::create(builder, loc, place, items.getInductionVar());
+    Value at = createPlace(builder, loc, items.getInductionVar(), place.first);
+    Value loaded = memref::LoadOp::create(builder, loc, place.memory, at);
     if (loaded.getType() != value.getType())
       loaded = arith::TruncIOp::create(builder, loc, value.getType(), loaded);
     Value(value).replaceAllUsesWith(loaded);

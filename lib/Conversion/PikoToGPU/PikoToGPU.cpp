@@ -5,12 +5,13 @@
 //      loops over its cells and their primitives (GridFormer);
 //   2. if all that others see of it are pixels, share these among the block's
 //      threads, and take primitives in groups, whose setup the threads share
-//      (PixelSharing.cpp, ItemSetup.cpp);
+//      (CollapsedPixels.cpp, or PixelSharing.cpp and ItemSetup.cpp);
 //   3. otherwise choose who takes which loop (SharedLoops.cpp) and map the
 //      block's work to its threads (BlockMapping.cpp);
 //   4. convert access to state, and open a log for what the grid leaves.
 
 #include "PikoToGPU.h"
+#include "CollapsedPixels.h"
 
 #include "../../Transforms/LoopSplitter.h"
 #include "../../Transforms/ParallelLoops.h"
@@ -23,6 +24,7 @@
 
 #include "pikort/grid.h"
 
+#include "mlir/Dialect/Math/IR/Math.h"
 #include "mlir/Dialect/SCF/Transforms/Transforms.h"
 #include "mlir/Dialect/UB/IR/UBOps.h"
 #include "mlir/IR/PatternMatch.h"
@@ -73,8 +75,9 @@ public:
   GridBuilder(KernelOp kernel, StageOp stage, int64_t threads)
       : kernel(kernel), stage(stage), threads(threads), loc(kernel.getLoc()) {}
 
-  /// Threads share the pixels of a bin; fails where they cannot.
-  LogicalResult sharePixelsOfBins(SharingCounts &counts);
+  /// Threads share the pixels of a bin, of one primitive after the other or of
+  /// many; fails where they cannot.
+  LogicalResult sharePixelsOfBins(bool collapses, SharingCounts &counts);
   /// Threads do what SharedLoops.cpp and BlockMapping.cpp say.
   LogicalResult mapWork(MappingCounts &counts);
 
@@ -105,12 +108,20 @@ private:
   GridMemory memory;
 };
 
+/// Why threads cannot do something, if it is known.
+struct Obstacle {
+  Location at;
+  std::string text;
+};
+
 struct ConvertPikoToGPUPass
     : piko::impl::ConvertPikoToGPUBase<ConvertPikoToGPUPass> {
   using ConvertPikoToGPUBase::ConvertPikoToGPUBase;
   void runOnOperation() override;
   LogicalResult convert(KernelOp kernel);
-  bool tryToSharePixels(KernelOp kernel, StageOp stage, int64_t count);
+  bool sharePixels(KernelOp kernel, StageOp stage, int64_t count);
+  std::optional<Obstacle> tryToSharePixels(KernelOp kernel, StageOp stage,
+                                           int64_t count, bool collapses);
 };
 
 } // namespace
@@ -385,7 +396,8 @@ LogicalResult GridBuilder::convertAccess() {
           GreedySimplifyRegionLevel::Disabled));
 }
 
-LogicalResult GridBuilder::sharePixelsOfBins(SharingCounts &counts) {
+LogicalResult GridBuilder::sharePixelsOfBins(bool collapses,
+                                             SharingCounts &counts) {
   formGrid();
   SmallVector<ParallelLoopOpInterface> loops;
   launch.walk([&](ParallelLoopOpInterface loop) { loops.push_back(loop); });
@@ -394,11 +406,21 @@ LogicalResult GridBuilder::sharePixelsOfBins(SharingCounts &counts) {
   if (failed(findItems()))
     return failure();
   upliftLoops();
+  useClosedFormsInPixelLoops(items);
   ThreadTile tile = createTile();
-  if (failed(sharePixels(items, tile, counts)))
-    return failure();
-  hoistPrivateArrays();
-  shareSetup(items, tile, memory);
+  if (collapses) {
+    PixelNestResult found = findPixelNest(items, stage);
+    if (!found.nest)
+      return emitError(found.at) << found.obstacle;
+    if (failed(collapsePixels(items, *found.nest, stage, tile, memory, counts)))
+      return failure();
+    hoistPrivateArrays();
+  } else {
+    if (failed(sharePixels(items, tile, counts)))
+      return failure();
+    hoistPrivateArrays();
+    shareSetup(items, tile, memory);
+  }
   if (failed(convertAccess()))
     return failure();
   finishGrid();
@@ -492,39 +514,57 @@ LogicalResult GridBuilder::mapWork(MappingCounts &counts) {
   return success();
 }
 
-/// On a copy, which takes the kernel's place where it comes out.
-bool ConvertPikoToGPUPass::tryToSharePixels(KernelOp kernel, StageOp stage,
-                                            int64_t count) {
+/// On a copy, which takes the kernel's place where it comes out; otherwise says
+/// why not.
+std::optional<Obstacle> ConvertPikoToGPUPass::tryToSharePixels(KernelOp kernel,
+                                                               StageOp stage,
+                                                               int64_t count,
+                                                               bool collapses) {
+  OpBuilder builder(kernel);
+  auto copy = cast<KernelOp>(builder.clone(*kernel));
+  SharingCounts counts;
+  Obstacle obstacle{kernel.getLoc(), ""};
+  LogicalResult result = [&] {
+    ScopedDiagnosticHandler handler(&getContext(), [&](Diagnostic &error) {
+      obstacle = {error.getLocation(), error.str()};
+      return success();
+    });
+    return GridBuilder(copy, stage, count).sharePixelsOfBins(collapses, counts);
+  }();
+  if (failed(result)) {
+    copy.erase();
+    return obstacle;
+  }
+  kernel.erase();
+  strided += counts.strided;
+  guarded += counts.guarded;
+  collapsed += counts.collapsed;
+  return std::nullopt;
+}
+
+/// Threads share the pixels of many primitives, or else of one after the other.
+bool ConvertPikoToGPUPass::sharePixels(KernelOp kernel, StageOp stage,
+                                       int64_t count) {
   bool isOne = contains(kernel, [](Operation *op) {
     auto items = dyn_cast<ItemsOp>(op);
     return items && items.getLanes() == LaneMapping::One;
   });
   if (isOne || !canSharePixels(kernel))
     return false;
-  OpBuilder builder(kernel);
-  auto copy = cast<KernelOp>(builder.clone(*kernel));
-  SharingCounts counts;
-  std::string obstacle;
-  Location at = kernel.getLoc();
-  LogicalResult result = [&] {
-    ScopedDiagnosticHandler handler(&getContext(), [&](Diagnostic &error) {
-      obstacle = error.str();
-      at = error.getLocation();
-      return success();
-    });
-    return GridBuilder(copy, stage, count).sharePixelsOfBins(counts);
-  }();
-  if (failed(result)) {
-    copy.erase();
-    if (!obstacle.empty())
-      emitRemark(at, "the threads of a block do not share pixels: ")
-          << obstacle;
-    return false;
-  }
-  kernel.erase();
-  strided += counts.strided;
-  guarded += counts.guarded;
-  return true;
+  std::optional<Obstacle> few = Obstacle{kernel.getLoc(), ""};
+  if (count > 1)
+    few = tryToSharePixels(kernel, stage, count, /*collapses=*/true);
+  if (!few)
+    return true;
+  auto none = tryToSharePixels(kernel, stage, count, /*collapses=*/false);
+  if (none && !none->text.empty())
+    emitRemark(none->at, "the threads of a block do not share pixels: ")
+        << none->text;
+  else if (!none && !few->text.empty())
+    emitRemark(few->at, "the threads of a block take one primitive after the "
+                        "other: ")
+        << few->text;
+  return !none;
 }
 
 LogicalResult ConvertPikoToGPUPass::convert(KernelOp kernel) {
@@ -543,7 +583,7 @@ LogicalResult ConvertPikoToGPUPass::convert(KernelOp kernel) {
   if (failed(checkGridLimits(kernel)))
     return failure();
   ++grids;
-  if (tryToSharePixels(kernel, stage, count))
+  if (sharePixels(kernel, stage, count))
     return success();
   MappingCounts counts;
   if (failed(GridBuilder(kernel, stage, count).mapWork(counts)))

@@ -50,8 +50,15 @@ struct ThreadTile {
 };
 
 struct SharingCounts {
-  int64_t strided = 0, guarded = 0;
+  int64_t strided = 0, guarded = 0, collapsed = 0;
 };
+
+/// The number that a coordinate is, under casts that keep its low bits.
+mlir::Value getCoordinateRoot(mlir::Value coordinate);
+
+/// Lets no integer go from pixel to pixel that is another function of the
+/// pixel.
+void useClosedFormsInPixelLoops(mlir::scf::ForOp items);
 
 /// Leaves to each thread the updates of its own pixels, and what follows from
 /// them, in a loop over primitives that all threads run.
@@ -124,7 +131,7 @@ llvm::LogicalResult mapIterations(ParallelForOp loop,
                                   ThreadOperations &made);
 
 /// What every GPU's blocks have.
-constexpr int64_t maxThreads = 1024, maxBlockBytes = 48 << 10;
+constexpr int64_t maxThreads = 1024, maxBlockBytes = 48 << 10, warpSize = 32;
 
 } // namespace piko
 

@@ -26,8 +26,7 @@ ThreadTile::ThreadTile(int64_t threads, int64_t rank) : extents(rank, 1) {
     extents[dim] *= 2;
 }
 
-/// The number that a coordinate is, under casts that keep its low bits.
-static Value getRoot(Value coordinate) {
+Value piko::getCoordinateRoot(Value coordinate) {
   while (Operation *op = coordinate.getDefiningOp()) {
     if (!isa<arith::IndexCastOp, arith::ExtSIOp, arith::TruncIOp>(op))
       break;
@@ -55,7 +54,7 @@ private:
   };
 
   Value rootOf(UpdateOp update) {
-    return getRoot(update.getCoordinates()[dim]);
+    return getCoordinateRoot(update.getCoordinates()[dim]);
   }
   LogicalResult share(UpdateOp update);
   bool canStride(scf::ForOp loop);

@@ -5,6 +5,9 @@
 piko.record @Row {"x" : i32 at 0, "y" : i32 at 4, "to" : i32 at 8} size 12 align 4
 piko.record @Pixel {"n" : i32 at 0} size 4 align 4
 
+// What pixels need is in an array, so threads take one primitive after the other
+// (collapsed-pixels.mlir has many at a time).
+//
 // A block runs one unit after the other; errors go to the log of the grid. The
 // stage's 20 threads become 16.
 // CHECK-LABEL: piko.kernel @kernel_draw
@@ -13,7 +16,7 @@ piko.record @Pixel {"n" : i32 at 0} size 4 align 4
 // CHECK:         scf.if
 // CHECK:           %[[LOG:.*]] = piko.gpu.open_log %[[BINS]]
 // CHECK:           gpu.launch blocks(%[[FIRST:[a-z0-9]+]], {{.*}}) in (%[[STEP:[a-z0-9_]+]] = %[[BLOCKS]], {{.*}}) threads(%[[T:[a-z0-9]+]], {{.*}}) in (%{{.*}} = %c8, %{{[^)]*}})
-// CHECK-SAME:        workgroup(%{{[a-z0-9]*}} : memref<33xi64, #gpu.address_space<workgroup>>, %[[X:[a-z0-9]*]] : memref<8xi32, #gpu.address_space<workgroup>>, %[[Y:[a-z0-9]*]] : memref<8xi32, #gpu.address_space<workgroup>>, %[[SPAN:[a-z0-9]*]] : memref<8xi32, #gpu.address_space<workgroup>>, %[[ANY:[a-z0-9]*]] : memref<8xi8, #gpu.address_space<workgroup>>)
+// CHECK-SAME:        workgroup(%{{[a-z0-9]*}} : memref<33xi64, #gpu.address_space<workgroup>>, %[[SETUP:[a-z0-9]*]] : memref<24xi32, #gpu.address_space<workgroup>>, %[[ANY:[a-z0-9]*]] : memref<8xi8, #gpu.address_space<workgroup>>)
 // CHECK-NEXT:        %[[UNITS:.*]] = piko.storage.unit_count %[[BINS]]
 // Threads are 4 wide and 2 high.
 // CHECK:             %[[TX:.*]] = arith.remui %[[T]], %c4
@@ -30,18 +33,21 @@ piko.record @Pixel {"n" : i32 at 0} size 4 align 4
 // CHECK:                 memref.store %[[POSITION]], %{{.*}}[%c6]
 // CHECK:                 %[[ITEM:.*]] = piko.storage.item %{{.*}}[%[[MINE]]]
 // CHECK:                 %[[FROM:.*]] = piko.get %[[ITEM]] "x"
-// CHECK:                 memref.store %[[FROM]], %[[X]][%[[T]]]
-// CHECK:                 memref.store %{{.*}}, %[[Y]][%[[T]]]
+// CHECK:                 %[[T8:.*]] = arith.addi %[[T]], %c8
+// CHECK:                 memref.store %[[FROM]], %[[SETUP]][%[[T8]]]
+// CHECK:                 memref.store %{{.*}}, %[[SETUP]][%[[T]]]
 // CHECK:                 %[[TO:.*]] = piko.get %[[ITEM]] "to"
 // CHECK:                 %[[D:.*]] = arith.subi %[[TO]], %[[FROM]]
-// CHECK:                 memref.store %[[D]], %[[SPAN]][%[[T]]]
+// CHECK:                 %[[T16:.*]] = arith.addi %[[T]], %c16
+// CHECK:                 memref.store %[[D]], %[[SETUP]][%[[T16]]]
 // CHECK:                 arith.extui
 // CHECK:                 memref.store %{{.*}}, %[[ANY]][%[[T]]]
 // CHECK:               gpu.barrier
 // CHECK-NOT:           piko.get
 // CHECK:               scf.for %[[K:.*]] = %c0
-// CHECK:                 memref.load %[[X]][%[[K]]]
-// CHECK:                 memref.load %[[SPAN]][%[[K]]]
+// CHECK:                 %[[K8:.*]] = arith.addi %[[K]], %c8
+// CHECK:                 memref.load %[[SETUP]][%[[K8]]]
+// CHECK:                 memref.load %[[SETUP]][%[[K]]]
 // The row is behind a test of whose it is; the loop along it has a step of 4.
 // CHECK:                 arith.shrui %{{.*}}, %c2_i32
 // CHECK:                 %[[REST:.*]] = arith.andi %{{.*}}, %c1_i32
@@ -67,7 +73,7 @@ piko.record @Pixel {"n" : i32 at 0} size 4 align 4
 // ONE:         gpu.terminator
 
 // STAGE-LABEL: piko.kernel @kernel_draw
-// STAGE:         workgroup({{.*}} : memref<16xi32, #gpu.address_space<workgroup>>
+// STAGE:         workgroup({{.*}} : memref<48xi32, #gpu.address_space<workgroup>>
 piko.pipeline @P rank 2 {
   piko.image @image : @Pixel rank 2
   piko.source @draw
@@ -86,14 +92,18 @@ piko.pipeline @P rank 2 {
       %y = piko.get %f "y" : !piko.prim<@Row> -> i32
       %to = piko.get %f "to" : !piko.prim<@Row> -> i32
       %one = arith.constant 1 : i32
+      %at = arith.constant 0 : index
+      %added = memref.alloca() : memref<1xi32>
+      memref.store %one, %added[%at] : memref<1xi32>
       scf.while (%i = %x) : (i32) -> (i32) {
         %more = arith.cmpi slt, %i, %to : i32
         scf.condition(%more) %i : i32
       } do {
       ^bb0(%i: i32):
+        %n = memref.load %added[%at] : memref<1xi32>
         piko.update @image[%i, %y : i32, i32] {
         ^bb0(%old: i32):
-          %new = arith.addi %old, %one : i32
+          %new = arith.addi %old, %n : i32
           piko.yield [%new : i32]
         }
         %next = arith.addi %i, %one : i32

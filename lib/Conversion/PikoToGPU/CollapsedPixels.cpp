@@ -1,0 +1,589 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Collapses the pixels of a group of primitives into one space that the threads
+// of a block share, where each primitive has a box of pixels and a test:
+//
+//   for each group of as many primitives as threads
+//     setup of mine: its box, and what pixels need, to the block's memory
+//     barrier
+//     for my part of all (primitive, pixel of its box)
+//       if the test holds: set the primitive's bit in the pixel's mask, and
+//         put the pixel on a list with the first bit
+//     barrier
+//     for my pixels of the list
+//       for each bit of the mask, the lowest first: update the pixel
+//     barrier
+//
+// So small primitives leave few threads idle, and the updates of a pixel are in
+// lineage order, because one thread makes them in the order of bits. Bits are
+// set by atomics whose order nobody can see.
+//
+// A primitive that takes a rare branch, or whose box is not in the bin, ends
+// its group in front of it. Then it is done alone, by all threads
+// (PixelSharing.cpp), out of line, so that it decides about no register of the
+// others.
+
+#include "CollapsedPixels.h"
+
+#include "Emitter.h"
+#include "ItemSetup.h"
+
+#include "Piko/Dialect/Piko/IR/BinArithmetic.h"
+#include "Piko/Dialect/Piko/IR/Marks.h"
+
+#include "mlir/Dialect/Math/IR/Math.h"
+#include "mlir/Interfaces/SideEffectInterfaces.h"
+#include "llvm/Support/MathExtras.h"
+
+using namespace mlir;
+using namespace piko;
+
+using Predicate = arith::CmpIPredicate;
+
+namespace {
+
+class CollapsedPixels {
+public:
+  CollapsedPixels(scf::ForOp items, PixelNest &nest, StageOp stage,
+                  const ThreadTile &tile, GridMemory &memory)
+      : items(items), nest(nest), stage(stage), tile(tile), memory(memory),
+        launch(memory.launch), threads(1) {
+    for (int64_t side : tile.extents)
+      threads *= side;
+    group = std::min<int64_t>(threads, 64);
+    words = llvm::divideCeil(group, 32);
+    for (int64_t extent : stage.getBins())
+      pixels *= extent;
+  }
+  LogicalResult run(SharingCounts &counts);
+
+private:
+  /// Of a primitive, for each dimension: where its loop begins, and how many
+  /// pixels it counts.
+  struct Side {
+    Value lo, extent;
+  };
+  using Box = SmallVector<Side, 3>;
+
+  void split(SharingCounts &counts);
+  LogicalResult checkMemory(int64_t setupBytes);
+  void clear();
+  void createGroups(ItemSetup &setup);
+  void note(Operation *op, OpBuilder &at, const IRMapping &mapping);
+  void addBox(Emitter &b, Value size);
+  void findCovered(Emitter &b);
+  Value findSlot(Emitter &b, Value count, Value first);
+  SmallVector<Value> findFirst(Emitter &b, Value count, Value first);
+  SmallVector<Value> testPixel(Emitter &b, ValueRange now);
+  void addPixel(Emitter &b, Value item, ArrayRef<Value> cell);
+  std::pair<Value, Value> takePixel(Emitter &b, Value at);
+  void updatePixels(Emitter &b);
+  void updatePixel(Emitter &b, Value pixel, Value bit);
+  Value runRare(Emitter &b);
+  Box cloneBox(Emitter &b, IRMapping &mapping);
+  void mapCounters(IRMapping &mapping, ArrayRef<Value> cell);
+
+  scf::ForOp items, rare;
+  PixelNest &nest;
+  StageOp stage;
+  const ThreadTile &tile;
+  GridMemory &memory;
+  gpu::LaunchOp launch;
+  int64_t threads, group, words, pixels = 1;
+  bool hasNest = false;
+  bool isRareForOne = false;       ///< Its pixels cannot be shared.
+  SmallVector<Value> binLo, binHi; ///< By dimension, as its loop counts.
+  Value thread, base;              ///< base: the group's first primitive.
+  /// Of the block. The ticket has the boxes in its upper bits, and the pixels
+  /// of all of them below.
+  Value ticket, limit, listed, slots, starts, masks, touched, list;
+  Value until; ///< The first rare primitive of the group.
+};
+
+constexpr int64_t pixelBits = 24;
+
+/// Of a block's memory: with more, a multiprocessor has few of its threads at
+/// work. A bin that has so many pixels for a thread has primitives for which
+/// masks cost more than threads that idle: a large triangle has many, and its
+/// test is cheap beside an atomic.
+constexpr int64_t maxBytesOfThread = 384;
+
+} // namespace
+
+//===----------------------------------------------------------------------===//
+// The two loops
+//===----------------------------------------------------------------------===//
+
+/// Takes what is rare out of the loop, into one of its own.
+void CollapsedPixels::split(SharingCounts &counts) {
+  OpBuilder builder(items);
+  rare = cast<scf::ForOp>(builder.clone(*items));
+  if (failed(sharePixels(rare, tile, counts))) {
+    rare.erase();
+    rare = cast<scf::ForOp>(builder.clone(*items));
+    isRareForOne = true;
+  }
+  for (Block *block : nest.rare) {
+    while (Operation *op = block->getTerminator()->getPrevNode())
+      op->erase();
+    Emitter inside(items.getLoc(), block->getTerminator());
+    inside.change(arith::AtomicRMWKind::minu, thread, limit, inside.index(0));
+  }
+  nest.work->walk([&](UpdateOp update) {
+    update->setAttr(marks::inside, builder.getUnitAttr());
+  });
+}
+
+/// Whether the block has room for it, and the multiprocessor for such blocks.
+LogicalResult CollapsedPixels::checkMemory(int64_t setupBytes) {
+  int64_t bytes = setupBytes + 8 * PIKOIR_FLUSH_CELLS + 12 + 8 * group +
+                  4 * words * pixels + llvm::divideCeil(pixels, 32) * 4 +
+                  2 * pixels;
+  int64_t most = std::min(
+      maxBlockBytes, maxBytesOfThread * std::max<int64_t>(threads, warpSize));
+  if (pixels < (1 << 16) && group * pixels < (1 << pixelBits) && bytes <= most)
+    return success();
+  return emitError(items.getLoc(),
+                   "masks for the pixels of a bin take too much memory "
+                   "for a block of ")
+         << threads << " threads";
+}
+
+/// What is to be zero when a group begins is so from the start; each group
+/// leaves it as it was.
+void CollapsedPixels::clear() {
+  Emitter b(items.getLoc(), memory.cells.getParentBlock()->getTerminator());
+  Operation *first = tile.place.back().getDefiningOp();
+  b.setInsertionPointAfter(first);
+  thread = b.cast(launch.getThreadIds().x, b.getI32Type());
+  Type i32 = b.getI32Type();
+  auto add = [&](int64_t size, Type type) {
+    return addBlockMemory(launch, size, type);
+  };
+  ticket = add(1, i32), limit = add(1, i32), listed = add(1, i32);
+  slots = add(group, i32), starts = add(group, i32);
+  masks = add(words * pixels, i32);
+  touched = add(llvm::divideCeil(pixels, 32), i32);
+  list = add(pixels, b.getI16Type());
+  Value zero = b.number(0);
+  Emitter one = b.when(b.is(thread, Predicate::eq, zero));
+  one.store(zero, ticket, zero);
+  one.store(zero, listed, zero);
+  one.store(one.number(group), limit, zero);
+  auto clearAll = [&](Value array) {
+    int64_t size = cast<MemRefType>(array.getType()).getNumElements();
+    auto loop = scf::ForOp::create(b, launch.getThreadIds().x, b.index(size),
+                                   b.index(threads));
+    Emitter inside(b.getLoc(), loop.getBody()->getTerminator());
+    inside.store(zero, array, loop.getInductionVar());
+  };
+  clearAll(masks);
+  clearAll(touched);
+  b.barrier();
+}
+
+LogicalResult CollapsedPixels::run(SharingCounts &counts) {
+  clear();
+  split(counts);
+  ItemSetup setup(items, tile, memory, Extent::All);
+  if (failed(checkMemory(setup.countBytes())))
+    return failure();
+  createGroups(setup);
+  if (!hasNest)
+    return emitError(items.getLoc(),
+                     "where its pixels are depends on an array");
+  items.erase();
+  ++counts.collapsed;
+  return success();
+}
+
+void CollapsedPixels::createGroups(ItemSetup &setup) {
+  Emitter b(items.getLoc(), items);
+  BinArithmetic bins(b, b.getLoc(), stage);
+  for (int64_t dim = 0, e = nest.getRank(); dim < e; ++dim) {
+    scf::ForOp loop = nest.getLoop(dim);
+    Value number = loop ? loop.getInductionVar() : nest.getCoordinate(dim);
+    binLo.push_back(
+        b.cast(bins.lo(nest.update.getBin(), dim), number.getType()));
+    binHi.push_back(
+        b.cast(bins.hi(nest.update.getBin(), dim), number.getType()));
+  }
+  Value begin = items.getLowerBound(), end = items.getUpperBound();
+  auto groups = scf::WhileOp::create(
+      b, TypeRange{b.getIndexType()}, ValueRange{begin},
+      [&](OpBuilder &at, Location loc, ValueRange next) {
+        Value more =
+            arith::CmpIOp::create(at, loc, Predicate::slt, next[0], end);
+        scf::ConditionOp::create(at, loc, more, next);
+      },
+      [&](OpBuilder &at, Location loc, ValueRange now) {
+        scf::YieldOp::create(at, loc, now);
+      });
+  Operation *yield = groups.getAfterBody()->getTerminator();
+  base = groups.getAfterArguments()[0];
+  b.setInsertionPoint(yield);
+  Value mine = b.add(base, launch.getThreadIds().x);
+  Value has = b.is(mine, Predicate::slt, end);
+  if (group < threads)
+    has = b.both(has, b.is(thread, Predicate::slt, b.number(group)));
+  Emitter own = b.when(has);
+  setup.createSetup(own, mine,
+                    [&](Operation *op, OpBuilder &at, const IRMapping &values) {
+                      note(op, at, values);
+                    });
+  b.barrier();
+
+  // From here on the loop's body is a pattern for what is done with pixels.
+  items->moveBefore(yield);
+  Emitter inside(items.getLoc(), &items.getBody()->front());
+  Value position = inside.add(base, items.getInductionVar());
+  items.getInductionVar().replaceAllUsesExcept(position,
+                                               position.getDefiningOp());
+  setup.replaceInPixels();
+  findCovered(b);
+  b.barrier();
+  updatePixels(b);
+  b.barrier();
+  yield->setOperand(0, runRare(b));
+}
+
+//===----------------------------------------------------------------------===//
+// Boxes
+//===----------------------------------------------------------------------===//
+
+/// In the setup of a primitive: that it is rare, or what its box is.
+void CollapsedPixels::note(Operation *op, OpBuilder &at,
+                           const IRMapping &mapping) {
+  Emitter b(op->getLoc(), at.getInsertionBlock(), at.getInsertionPoint());
+  if (isa<memref::AtomicRMWOp>(op)) {
+    b.change(arith::AtomicRMWKind::minu, thread, limit, b.index(0));
+    return;
+  }
+  if (op != nest.anchor)
+    return;
+  hasNest = true;
+  Value some = b.truth(true), inBin = b.truth(true), size = b.number(1);
+  for (int64_t dim = 0, e = nest.getRank(); dim < e; ++dim) {
+    scf::ForOp loop = nest.getLoop(dim);
+    Value lo = mapping.lookupOrDefault(loop ? loop.getLowerBound()
+                                            : nest.getCoordinate(dim));
+    inBin = b.both(inBin, b.is(lo, Predicate::sge, binLo[dim]));
+    if (!loop) {
+      inBin = b.both(inBin, b.is(lo, Predicate::slt, binHi[dim]));
+      continue;
+    }
+    Value hi = mapping.lookupOrDefault(loop.getUpperBound());
+    some = b.both(some, b.is(lo, Predicate::slt, hi));
+    inBin = b.both(inBin, b.is(hi, Predicate::sle, binHi[dim]));
+    size = b.mul(size, b.toNumber(b.sub(hi, lo)));
+  }
+  Emitter full = b.when(some);
+  auto branch = scf::IfOp::create(full, inBin, /*withElseRegion=*/true);
+  Emitter boxed(b.getLoc(), branch.thenBlock()->getTerminator());
+  addBox(boxed, size);
+  Emitter outside(b.getLoc(), branch.elseBlock()->getTerminator());
+  outside.change(arith::AtomicRMWKind::minu, thread, limit, outside.index(0));
+}
+
+/// Gives the box the next slot, and its pixels the next numbers.
+void CollapsedPixels::addBox(Emitter &b, Value size) {
+  Value increment = b.add(size, b.number(1 << pixelBits));
+  Value old =
+      b.change(arith::AtomicRMWKind::addi, increment, ticket, b.index(0));
+  Value slot = b.shr(old, b.number(pixelBits));
+  b.store(thread, slots, slot);
+  b.store(b.both(old, b.number((1 << pixelBits) - 1)), starts, slot);
+}
+
+//===----------------------------------------------------------------------===//
+// Coverage
+//===----------------------------------------------------------------------===//
+
+/// The slot of the box with the pixel of this number, by bisection.
+Value CollapsedPixels::findSlot(Emitter &b, Value count, Value first) {
+  Value slot = b.number(0);
+  for (int64_t step = group / 2; step > 0; step /= 2) {
+    Value next = b.add(slot, b.number(step));
+    Value isIn = b.both(b.is(next, Predicate::slt, count),
+                        b.is(b.load(starts, next), Predicate::sle, first));
+    slot = b.select(isIn, next, slot);
+  }
+  return slot;
+}
+
+/// What a block on the way to the work has in front of an operation.
+static void cloneUntil(Emitter &b, Block *block, Operation *end,
+                       IRMapping &mapping) {
+  for (Operation &op : *block) {
+    if (&op == end)
+      break;
+    b.clone(op, mapping);
+  }
+}
+
+/// The box of a primitive, of what its setup has left.
+CollapsedPixels::Box CollapsedPixels::cloneBox(Emitter &b, IRMapping &mapping) {
+  for (auto [block, next] : nest.levels) {
+    cloneUntil(b, block, next, mapping);
+    if (next == nest.anchor)
+      break;
+  }
+  if (nest.loops.empty())
+    cloneUntil(b, nest.work, nest.anchor, mapping);
+  Box box;
+  for (int64_t dim = 0, e = nest.getRank(); dim < e; ++dim) {
+    scf::ForOp loop = nest.getLoop(dim);
+    Value lo = mapping.lookupOrDefault(loop ? loop.getLowerBound()
+                                            : nest.getCoordinate(dim));
+    Value extent = b.number(1);
+    if (loop)
+      extent =
+          b.toNumber(b.sub(mapping.lookupOrDefault(loop.getUpperBound()), lo));
+    box.push_back({lo, extent});
+  }
+  return box;
+}
+
+/// Lets counters be the pixel.
+void CollapsedPixels::mapCounters(IRMapping &mapping, ArrayRef<Value> cell) {
+  for (int64_t dim = 0, e = nest.getRank(); dim < e; ++dim)
+    if (scf::ForOp loop = nest.getLoop(dim))
+      mapping.map(loop.getInductionVar(), cell[dim]);
+}
+
+/// Each thread has a part of the pixels of all boxes that is in one piece.
+void CollapsedPixels::findCovered(Emitter &b) {
+  Value zero = b.number(0);
+  Value all = b.load(ticket, zero);
+  until = b.load(limit, zero);
+  Value count = b.shr(all, b.number(pixelBits));
+  Value total = b.both(all, b.number((1 << pixelBits) - 1));
+  Value share = b.shr(b.add(total, b.number(threads - 1)),
+                      b.number(llvm::Log2_64(threads)));
+  Value first = b.mul(thread, share);
+  Value last = arith::MinSIOp::create(b, b.add(first, share), total);
+  Emitter some = b.when(b.is(first, Predicate::slt, last));
+  SmallVector<Value> state = findFirst(some, count, first);
+  auto loop = scf::ForOp::create(some, first, last, some.number(1), state);
+  Emitter in(b.getLoc(), loop.getBody(), loop.getBody()->end());
+  scf::YieldOp::create(in, testPixel(in, loop.getRegionIterArgs()));
+}
+
+/// Slot and place in its box of the pixel with a number.
+SmallVector<Value> CollapsedPixels::findFirst(Emitter &b, Value count,
+                                              Value first) {
+  Value slot = findSlot(b, count, first);
+  IRMapping mapping;
+  mapping.map(items.getInductionVar(), b.toIndex(b.load(slots, slot)));
+  Box box = cloneBox(b, mapping);
+  Value rest = b.sub(first, b.load(starts, slot));
+  SmallVector<Value> state{slot};
+  for (auto [lo, extent] : ArrayRef(box).drop_back()) {
+    state.push_back(arith::RemUIOp::create(b, rest, extent));
+    rest = arith::DivUIOp::create(b, rest, extent);
+  }
+  state.push_back(rest);
+  return state;
+}
+
+/// Marks the pixel if it passes the tests; returns slot and place of the next.
+SmallVector<Value> CollapsedPixels::testPixel(Emitter &b, ValueRange now) {
+  Value item = b.load(slots, now[0]);
+  Value position = b.add(base, b.toIndex(item));
+  memory.setPosition(b, position);
+  IRMapping mapping;
+  mapping.map(items.getInductionVar(), b.toIndex(item));
+  Box box = cloneBox(b, mapping);
+  SmallVector<Value> cell;
+  for (auto [place, side] : llvm::zip(now.drop_front(), box))
+    cell.push_back(b.add(side.lo, b.fromNumber(place, side.lo.getType())));
+  mapCounters(mapping, cell);
+  Emitter at = b;
+  for (auto [block, next] : nest.levels) {
+    if (!nest.isInside(next))
+      continue;
+    cloneUntil(at, block, next, mapping);
+    if (auto test = dyn_cast<scf::IfOp>(next))
+      at = at.when(mapping.lookupOrDefault(test.getCondition()));
+  }
+  addPixel(at, item, cell);
+
+  b.setInsertionPointToEnd(b.getInsertionBlock());
+  SmallVector<Value> next{now[0]};
+  Value carry = b.number(1);
+  for (auto [place, side] : llvm::zip(now.drop_front(), box)) {
+    Value more = b.add(place, carry);
+    Value ends = b.is(more, Predicate::sge, side.extent);
+    next.push_back(b.select(ends, b.number(0), more));
+    carry = arith::ExtUIOp::create(b, b.getI32Type(), ends);
+  }
+  next.front() = b.add(now[0], carry);
+  return next;
+}
+
+/// Sets the primitive's bit in the pixel's mask.
+void CollapsedPixels::addPixel(Emitter &b, Value item, ArrayRef<Value> cell) {
+  Value pixel;
+  for (int64_t dim = cell.size(); dim-- > 0;) {
+    Value at = b.toNumber(b.sub(cell[dim], binLo[dim]));
+    pixel =
+        pixel ? b.add(b.mul(pixel, b.number(stage.getBins()[dim])), at) : at;
+  }
+  auto bitOf = [&](Emitter &at, Value number) {
+    return at.shl(at.number(1), at.both(number, at.number(31)));
+  };
+  constexpr auto setBits = arith::AtomicRMWKind::ori;
+  Value place = pixel;
+  if (words > 1)
+    place = b.add(b.shl(pixel, b.number(1)), b.shr(item, b.number(5)));
+  Value old = b.change(setBits, bitOf(b, item), masks, place);
+  Emitter first = b.when(b.is(old, Predicate::eq, b.number(0)));
+  if (words > 1) {
+    Value bit = bitOf(first, pixel);
+    Value others =
+        first.change(setBits, bit, touched, first.shr(pixel, first.number(5)));
+    first = first.when(
+        first.is(first.both(others, bit), Predicate::eq, first.number(0)));
+  }
+  Value last = first.change(arith::AtomicRMWKind::addi, first.number(1), listed,
+                            first.index(0));
+  first.store(arith::TruncIOp::create(first, first.getI16Type(), pixel), list,
+              last);
+}
+
+//===----------------------------------------------------------------------===//
+// Updates
+//===----------------------------------------------------------------------===//
+
+/// Takes a pixel off the list: its number, and which primitives of the group,
+/// up to a rare one, have it.
+std::pair<Value, Value> CollapsedPixels::takePixel(Emitter &b, Value at) {
+  Type i64 = b.getI64Type();
+  Value pixel = arith::ExtUIOp::create(b, b.getI32Type(), b.load(list, at));
+  Value mask, zero = b.number(0);
+  for (int64_t word = 0; word < words; ++word) {
+    Value place = pixel;
+    if (words > 1)
+      place = b.add(b.shl(pixel, b.number(1)), b.number(word));
+    Value bits = arith::ExtUIOp::create(b, i64, b.load(masks, place));
+    mask = mask ? b.either(mask, b.shl(bits, b.number(i64, 32))) : bits;
+    b.store(zero, masks, place);
+  }
+  if (words > 1)
+    b.store(zero, touched, b.shr(pixel, b.number(5)));
+  Value one = b.number(i64, 1);
+  Value shift = arith::ExtUIOp::create(b, i64, until);
+  Value below = b.sub(b.shl(one, shift), one);
+  Value isAll = b.is(until, Predicate::sge, b.number(64));
+  return {pixel, b.both(mask, b.select(isAll, b.number(i64, -1), below))};
+}
+
+/// Each thread has some pixels of the list, and takes bit after bit of them, so
+/// that a warp waits for the longest sum of bits, and not for that of each
+/// pixel.
+void CollapsedPixels::updatePixels(Emitter &b) {
+  Value size = b.load(listed, b.number(0));
+  Type i32 = b.getI32Type(), i64 = b.getI64Type();
+  Emitter one = b.when(b.is(thread, Predicate::eq, b.number(0)));
+  one.store(one.number(0), ticket, one.number(0));
+  one.store(one.number(group), limit, one.number(0));
+
+  Value none = b.number(i64, 0);
+  auto loop = scf::WhileOp::create(
+      b, TypeRange{i32, i32, i64}, ValueRange{thread, b.number(0), none},
+      [&](OpBuilder &at, Location loc, ValueRange now) {
+        Value rest =
+            arith::CmpIOp::create(at, loc, Predicate::ne, now[2], none);
+        Value more =
+            arith::CmpIOp::create(at, loc, Predicate::slt, now[0], size);
+        more = arith::OrIOp::create(at, loc, rest, more);
+        scf::ConditionOp::create(at, loc, more, now);
+      },
+      [&](OpBuilder &at, Location loc, ValueRange now) {
+        Emitter in(loc, at.getInsertionBlock(), at.getInsertionPoint());
+        auto fetch = scf::IfOp::create(in, TypeRange{i32, i32, i64},
+                                       in.is(now[2], Predicate::eq, none),
+                                       /*withElseRegion=*/true);
+        Emitter taken(loc, fetch.thenBlock(), fetch.thenBlock()->end());
+        auto [pixel, mask] = takePixel(taken, now[0]);
+        Value next = taken.add(now[0], taken.number(threads));
+        scf::YieldOp::create(taken, ValueRange{next, pixel, mask});
+        Emitter kept(loc, fetch.elseBlock(), fetch.elseBlock()->end());
+        scf::YieldOp::create(kept, now);
+        mask = fetch.getResult(2);
+        // Only a rare primitive leaves none.
+        Emitter work = in.when(in.is(mask, Predicate::ne, none));
+        updatePixel(work, fetch.getResult(1),
+                    math::CountTrailingZerosOp::create(work, mask));
+        Value less = in.both(mask, in.sub(mask, in.number(i64, 1)));
+        scf::YieldOp::create(
+            in, ValueRange{fetch.getResult(0), fetch.getResult(1), less});
+      });
+  (void)loop;
+}
+
+void CollapsedPixels::updatePixel(Emitter &b, Value pixel, Value bit) {
+  Value item = b.toIndex(bit);
+  memory.setPosition(b, b.add(base, item));
+  IRMapping mapping;
+  mapping.map(items.getInductionVar(), item);
+  SmallVector<Value> cell;
+  for (int64_t extent : stage.getBins()) {
+    Value size = b.number(extent);
+    Type type = binLo[cell.size()].getType();
+    Value at = arith::RemUIOp::create(b, pixel, size);
+    cell.push_back(b.add(binLo[cell.size()], b.fromNumber(at, type)));
+    pixel = arith::DivUIOp::create(b, pixel, size);
+  }
+  mapCounters(mapping, cell);
+  for (auto [block, next] : nest.levels)
+    cloneUntil(b, block, next, mapping);
+  cloneUntil(b, nest.work, nest.work->getTerminator(), mapping);
+}
+
+/// The group's rare primitive, if it has one; returns where the next group
+/// begins.
+Value CollapsedPixels::runRare(Emitter &b) {
+  Value zero = b.number(0);
+  Emitter one = b.when(b.is(thread, Predicate::eq, zero));
+  one.store(zero, listed, zero);
+  Value isRare = b.is(until, Predicate::slt, b.number(group));
+  Value position = b.add(base, b.toIndex(until));
+  Value next = b.select(isRare, b.add(position, b.index(1)),
+                        b.add(base, b.index(group)));
+  Emitter in = b.when(isRare);
+  Emitter body = in;
+  if (isRareForOne)
+    body = in.when(in.is(thread, Predicate::eq, zero));
+  rare->moveBefore(&*body.getInsertionPoint());
+  rare.setLowerBound(position);
+  body.setInsertionPoint(rare);
+  // Not known to be one, so that it stays a loop until it is outlined.
+  rare.setUpperBound(arith::MinSIOp::create(body, next, items.getUpperBound()));
+  rare->setAttr(marks::rare, b.getUnitAttr());
+  OpBuilder inside = OpBuilder::atBlockBegin(rare.getBody());
+  memory.setPosition(inside, rare.getInductionVar());
+  in.setInsertionPoint(in.getInsertionBlock()->getTerminator());
+  in.barrier();
+  return next;
+}
+
+/// Erases copies of what is not needed.
+static void eraseDead(Block &block) {
+  for (Operation &op : llvm::make_early_inc_range(llvm::reverse(block))) {
+    for (Region &region : op.getRegions())
+      for (Block &inner : region)
+        eraseDead(inner);
+    if (isOpTriviallyDead(&op))
+      op.erase();
+  }
+}
+
+LogicalResult piko::collapsePixels(scf::ForOp items, PixelNest &nest,
+                                   StageOp stage, const ThreadTile &tile,
+                                   GridMemory &memory, SharingCounts &counts) {
+  if (failed(CollapsedPixels(items, nest, stage, tile, memory).run(counts)))
+    return failure();
+  eraseDead(memory.launch.getBody().front());
+  return success();
+}

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// The setup of primitives, split off from the work on their pixels.
+
+#ifndef PIKO_LIB_CONVERSION_PIKOTOGPU_ITEMSETUP_H
+#define PIKO_LIB_CONVERSION_PIKOTOGPU_ITEMSETUP_H
+
+#include "PikoToGPU.h"
+
+#include "mlir/IR/IRMapping.h"
+#include "llvm/ADT/MapVector.h"
+
+namespace piko {
+
+/// How much of the setup is taken out of the loop over pixels.
+enum class Extent { All, Fields };
+
+class ItemSetup {
+public:
+  ItemSetup(mlir::scf::ForOp items, const ThreadTile &tile, GridMemory &memory,
+            Extent extent);
+
+  bool isEmpty() const { return shared.empty(); }
+  int64_t countBytes() const;
+  /// In front of the loop over the primitives of a group: the setup of the
+  /// thread's own, which is the one at `position`. `atPixels` gets, in the
+  /// setup, what is left to the pixels where it stood, with the setup's values.
+  using PixelHook = llvm::function_ref<void(
+      mlir::Operation *, mlir::OpBuilder &, const mlir::IRMapping &)>;
+  void createSetup(mlir::OpBuilder &builder, mlir::Value position,
+                   PixelHook atPixels = nullptr);
+  /// Lets the loop, which counts through a group now, take what it needs from
+  /// memory.
+  void replaceInPixels();
+
+private:
+  void findPixelWork();
+  bool mustKeep(mlir::Operation *op) const;
+  bool isCommonIf(mlir::Operation *op) const;
+  bool isInSetup(mlir::Value value) const;
+  void findShared();
+  void computeAgain();
+  void cloneSetup(mlir::Block &from, mlir::OpBuilder &to,
+                  mlir::IRMapping &mapping, PixelHook atPixels);
+  void eraseSetup(mlir::Block &block);
+  void placeShared();
+
+  /// As it is in memory: an i1 has no size of its own there.
+  static mlir::Type getStorage(mlir::Type type) {
+    return type.isInteger(1) ? mlir::IntegerType::get(type.getContext(), 8)
+                             : type;
+  }
+
+  mlir::scf::ForOp items;
+  GridMemory &memory;
+  Extent extent;
+  int64_t threads;
+  llvm::DenseSet<mlir::Value> own;          ///< What differs between threads.
+  llvm::DenseSet<mlir::Operation *> pixels; ///< Left to the loop over pixels.
+  llvm::DenseSet<mlir::Operation *> both;   ///< As cheap as a load.
+  /// Where a value is in memory: the thread's number behind `first`.
+  struct Place {
+    mlir::Value memory;
+    int64_t first = 0;
+  };
+  llvm::MapVector<mlir::Value, Place> shared;
+};
+
+} // namespace piko
+
+#endif // PIKO_LIB_CONVERSION_PIKOTOGPU_ITEMSETUP_H
