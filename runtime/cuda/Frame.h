@@ -146,7 +146,7 @@ private:
   const Place *joined_ = nullptr; ///< The latest.
   std::vector<size_t> members_;   ///< Of each loop, those led through.
   std::vector<size_t> turns_;     ///< Of each cycle, those taken.
-  bool hasMemory_ = false; ///< All of what follows.
+  bool hasMemory_ = false;        ///< All of what follows.
   // From run to run, where the device sees it:
   rt::Array<FrameState> frame_;
   rt::Array<Place> places_;
