@@ -33,7 +33,8 @@ it, and says how long a frame took.
                          repeated
   --tuned FILE           the setting that piko-tune wrote there
   --gpu-threads N        for cuda and gpu-on-cpu: threads of a block, a power of
-                         two up to 1024 (as many as the stage has)
+                         two up to 1024 (as many as the stage has; up to 256
+                         where a bin has more than 16 pixels for each)
   --gpu-chip NAME,...    for cuda and auto: PTX for the oldest of these chips and
                          later ones, and a cubin for each where ptxas is found
                          (PTX for sm_70)

@@ -118,8 +118,10 @@ struct CommandLine {
       llvm::cl::cat(category)};
   llvm::cl::opt<int64_t> gpuThreads{
       "gpu-threads", llvm::cl::value_desc("count"), llvm::cl::init(0),
-      llvm::cl::desc("threads of a block, a power of two up to 1024 (default: "
-                     "as many as the stage has)"),
+      llvm::cl::desc(
+          "threads of a block, a power of two up to 1024 (default: "
+          "as many as the stage has; up to 256 where a bin has more than "
+          "16 pixels for each)"),
       llvm::cl::cat(category)};
   llvm::cl::opt<unsigned> optLevel{
       "O",

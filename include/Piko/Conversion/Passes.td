@@ -170,7 +170,8 @@ def ConvertPikoToGPU : Pass<"convert-piko-to-gpu", "::piko::PipelineOp"> {
   let options = [
     Option<"threads", "threads", "int64_t", "0",
            "Threads of a block, a power of two up to 1024 (default: what the "
-           "stage has, rounded down to one)">];
+           "stage has, rounded down to one; more where a bin has more than 16 "
+           "pixels for each, up to 256)">];
   let statistics = [
     Statistic<"grids", "grids", "kernels that became grids">,
     Statistic<"shared", "shared", "loops that threads share">,

@@ -567,6 +567,17 @@ bool ConvertPikoToGPUPass::sharePixels(KernelOp kernel, StageOp stage,
   return !none;
 }
 
+/// As many as the stage has, but not much fewer than a bin has pixels: a device
+/// has few blocks then, and each of them takes long.
+static int64_t chooseThreads(StageOp stage) {
+  constexpr uint64_t pixelsOfThread = 16, most = 256;
+  uint64_t pixels = 1, threads = stage.getThreads();
+  for (int64_t size : stage.getBins())
+    pixels = llvm::SaturatingMultiply<uint64_t>(pixels, size);
+  threads = std::max(threads, std::min(pixels / pixelsOfThread, most));
+  return std::min<int64_t>(maxThreads, llvm::bit_floor(threads));
+}
+
 LogicalResult ConvertPikoToGPUPass::convert(KernelOp kernel) {
   Operation *work = findWork(kernel);
   if (!work) {
@@ -576,10 +587,7 @@ LogicalResult ConvertPikoToGPUPass::convert(KernelOp kernel) {
     return success();
   }
   auto stage = lookupInPipeline<StageOp>(kernel, getStageName(work));
-  int64_t count = threads;
-  if (!count)
-    count = std::min<int64_t>(maxThreads,
-                              llvm::bit_floor(uint64_t(stage.getThreads())));
+  int64_t count = threads ? threads : chooseThreads(stage);
   if (failed(checkGridLimits(kernel)))
     return failure();
   ++grids;
