@@ -10,6 +10,8 @@
 using namespace piko::cuda;
 using namespace piko::rt;
 
+/// More than these, of many strips, are the host's.
+static constexpr int64_t mostSteps = 4096;
 /// In front of what grids take of the log: see gpu/Log.cpp.
 static constexpr int64_t headRoom = 64, spareRoom = int64_t(1) << 26;
 
@@ -22,17 +24,18 @@ bool Frame::isPossible() const {
     return false;
   for (const Stage &stage : p_.stages)
     if (stage.clears.size() > mostJoinClears ||
-        stage.inputs.size() + stage.sources.size() > mostJoinInputs ||
-        (stage.cycle >= 0 && stage.outputs.size() > mostQueuePorts))
+        stage.inputs.size() + stage.sources.size() > mostJoinInputs)
+      return false;
+  for (size_t s = 0; s < p_.stages.size(); ++s)
+    if ((p_.stages[s].cycle >= 0 || p_.stages[s].stripGroup >= 0) &&
+        edgesOf(static_cast<int32_t>(s)).size() > mostQueuePorts)
       return false;
   for (const Edge &edge : p_.edges)
     if (edge.keyed() && p_.stages[edge.producer].host >= 0)
       return false;
   auto isOne = [&](const auto &shape) { return isPossible(shape); };
   return std::all_of(p_.loops.begin(), p_.loops.end(), isOne) &&
-         std::all_of(p_.cycles.begin(), p_.cycles.end(), isOne) &&
-         std::none_of(p_.stripGroups.begin(), p_.stripGroups.end(),
-                      [](const StripGroup &group) { return group.chunk > 0; });
+         std::all_of(p_.cycles.begin(), p_.cycles.end(), isOne);
 }
 
 template <class T> static void makeZero(const Array<T> &array) {
@@ -50,11 +53,14 @@ bool Frame::begin() {
   makeZero(places_);
   makeZero(queues_);
   makeZero(loops_);
-  makeZero(cycles_);
+
   for (LoopState &loop : std::span(loops_.data(), p_.loops.size()))
     loop.again = 1;
-  for (CycleState &cycle : std::span(cycles_.data(), p_.cycles.size()))
-    cycle.again = 1;
+  cycleStates_.reset();
+  cycles_.clear();
+  for (size_t c = 0; c < p_.cycles.size(); ++c)
+    cycles_.push_back(&takeCycle());
+  strips_.assign(p_.stripGroups.size(), {});
   joins_.reset();
   queuings_.reset();
   ends_.reset();
@@ -88,20 +94,7 @@ void Frame::takeMemory() {
                          Use::State);
   queues_ = Array<QueueState>(p_.memory, countOf(p_.edges) + 1, Use::State);
   loops_ = Array<LoopState>(p_.memory, countOf(p_.loops) + 1, Use::State);
-  cycles_ = Array<CycleState>(p_.memory, countOf(p_.cycles) + 1, Use::State);
-  // A program repeats what does not collect behind each stage that does.
-  auto timesOf = [&](int32_t cycle) {
-    return cycle < 0 ? 1 : 1 + countOf(collectorsOf(cycle));
-  };
-  int64_t kernels = countOf(p_.sources), waves = 0;
-  for (const Stage &stage : p_.stages)
-    kernels += timesOf(stage.cycle);
-  for (const LoopShape &loop : p_.loops)
-    waves += timesOf(loop.cycle);
-  joins_ = {p_.memory, kernels};
-  queuings_ = {p_.memory, kernels};
-  leaves_ = {p_.memory, waves};
-  ends_ = {p_.memory, waves + countOf(p_.cycles)};
+
   hasMemory_ = true;
 }
 
@@ -196,7 +189,7 @@ void Frame::describeStage(JoinArgs &args, int32_t number) {
   if (stage.loop >= 0)
     args.loop = &loops_[stage.loop];
   if (stage.cycle >= 0)
-    args.cycle = &cycles_[stage.cycle];
+    args.cycle = cycles_[static_cast<size_t>(stage.cycle)];
   args.shape = describeShape(stage);
   args.tiles = stage.tiles;
   args.rank = p_.rank;
@@ -229,6 +222,29 @@ void Frame::describeSchedule(JoinArgs &args, const Stage &stage) const {
   args.unitsAtOnce = device_.residentThreads() / 64;
 }
 
+std::vector<int32_t> Frame::edgesOf(int32_t kernel) const {
+  std::vector<int32_t> edges;
+  for (size_t e = 0; e < p_.edges.size(); ++e) {
+    const Edge &edge = p_.edges[e];
+    if (!edge.local &&
+        (edge.producer == kernel || p_.stages[edge.producer].host == kernel))
+      edges.push_back(static_cast<int32_t>(e));
+  }
+  return edges;
+}
+
+int64_t Frame::findStrip(const Stage &stage) {
+  if (stage.stripGroup < 0)
+    return -1;
+  StripRecord &record = strips_[static_cast<size_t>(stage.stripGroup)];
+  const Source &source = p_.sources[p_.stripGroups[stage.stripGroup].source];
+  if (record.begin != source.begin)
+    ++record.number;
+  record.begin = source.begin;
+  record.isDivided |= source.begin > 0 || source.end < source.count;
+  return record.number;
+}
+
 // --- What the program asks for ----------------------------------------------
 
 void Frame::launchOwn(const char *kernel, const void *args) {
@@ -242,11 +258,13 @@ void Frame::launchOwn(const char *kernel, const void *args) {
 
 const pikoir_input *Frame::join(int32_t number, bool isSource) {
   Place &place = find(number, isSource);
-  JoinArgs &args = joins_.take();
-  // Schedules that depend on the bin; a kernel that runs strip by strip.
-  if ((!isSource && p_.stages[number].binSchedules) || joins_.isExhausted() ||
-      (place.args && (isSource || p_.stages[number].cycle < 0)))
+  JoinArgs &args = joins_.take(p_.memory);
+  const Stage &stage = p_.stages[isSource ? p_.sources[number].stage : number];
+  bool repeats = stage.stripGroup >= 0 || (!isSource && stage.cycle >= 0);
+  if (stage.binSchedules || (place.args && !repeats) ||
+      nextNumber() > mostSteps)
     needsHost_ = true;
+  args.strip = findStrip(stage);
   if (isSource)
     describeSource(args, number);
   else
@@ -266,7 +284,7 @@ const pikoir_input *Frame::join(int32_t number, bool isSource) {
 
 void Frame::launch(GridLaunch grid) {
   steps_.push_back({Step::Kind::Grid, std::move(grid)});
-  if (joined_ && joined_->stage >= 0 && p_.stages[joined_->stage].cycle >= 0)
+  if (joined_ && joined_->stage >= 0)
     queue(*joined_);
 }
 

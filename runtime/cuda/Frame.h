@@ -77,28 +77,41 @@ private:
   /// Elements that the device reads, which a frame takes one by one.
   template <class T> class Pool {
   public:
-    Pool() = default;
-    Pool(rt::Memory &memory, int64_t most)
-        : elements_(memory, most + 1, rt::Use::State), most_(most) {}
     void reset() { used_ = 0; }
-    /// The next one, zero; those behind the last are one and the same.
-    T &take() {
-      T &element = elements_[std::min(used_++, most_)];
+    /// The next one, zero; it stays where it is. Throws OutOfMemory.
+    T &take(rt::Memory &memory) {
+      auto piece = static_cast<size_t>(used_ / together);
+      if (piece == pieces_.size())
+        pieces_.emplace_back(memory, together, rt::Use::State);
+      T &element = pieces_[piece][used_++ % together];
       element = {};
       return element;
     }
-    bool isExhausted() const { return used_ > most_; }
 
   private:
-    rt::Array<T> elements_;
-    int64_t most_ = 0, used_ = 0;
+    static constexpr int64_t together = 32;
+    std::vector<rt::Array<T>> pieces_;
+    int64_t used_ = 0;
+  };
+  /// What is known of the strips of a source while a frame is recorded.
+  struct StripRecord {
+    int64_t begin = -1, number = -1;
+    bool isDivided = false;
   };
 
   bool isPossible(const rt::LoopShape &loop) const;
   bool isPossible(const rt::CycleShape &cycle) const;
+  /// Whether the producer's kernel may run several times before the consumer's.
   bool hasQueue(const rt::Edge &edge) const {
-    return p_.stages[edge.producer].cycle >= 0;
+    const rt::Stage &from = p_.stages[edge.producer];
+    return from.cycle >= 0 ||
+           (edge.leavesStrips &&
+            strips_[static_cast<size_t>(from.stripGroup)].isDivided);
   }
+  /// Edges of a kernel's stages that are not local.
+  std::vector<int32_t> edgesOf(int32_t kernel) const;
+  /// Notes the strip of a source that a stage's kernel takes, or a source's.
+  int64_t findStrip(const rt::Stage &stage);
   void takeMemory();
   size_t placeOf(int32_t number, bool isSource) const;
   Place &find(int32_t number, bool isSource) const {
@@ -128,6 +141,7 @@ private:
   void endWave(int32_t loop);
   void endLoop(int32_t loop);
   void endRound(int32_t cycle);
+  CycleState &takeCycle();
   template <class Wanted>
   void describeWaiting(StepArgs &args, const Wanted &wanted) const;
 
@@ -142,17 +156,19 @@ private:
   bool isRecording_ = false;
   bool needsHost_ = false; ///< Known from a run before.
   std::vector<Step> steps_;
-  std::vector<bool> isCleared_;   ///< States of this run.
-  const Place *joined_ = nullptr; ///< The latest.
-  std::vector<size_t> members_;   ///< Of each loop, those led through.
-  std::vector<size_t> turns_;     ///< Of each cycle, those taken.
-  bool hasMemory_ = false;        ///< All of what follows.
+  std::vector<bool> isCleared_;      ///< States of this run.
+  const Place *joined_ = nullptr;    ///< The latest.
+  std::vector<size_t> members_;      ///< Of each loop, those led through.
+  std::vector<size_t> turns_;        ///< Of each cycle, those taken.
+  std::vector<CycleState *> cycles_; ///< Of each, the state of its next run.
+  std::vector<StripRecord> strips_;  ///< Of each group.
+  bool hasMemory_ = false;           ///< All of what follows.
   // From run to run, where the device sees it:
   rt::Array<FrameState> frame_;
   rt::Array<Place> places_;
   rt::Array<QueueState> queues_; ///< Of each edge.
   rt::Array<LoopState> loops_;
-  rt::Array<CycleState> cycles_;
+  Pool<CycleState> cycleStates_;
   Pool<JoinArgs> joins_;
   Pool<QueueArgs> queuings_;
   Pool<StepArgs> ends_;

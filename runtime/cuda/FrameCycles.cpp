@@ -10,6 +10,9 @@
 //   loops and stages  repeat { a  loops and stages  b  loops and stages
 //                              piko_round }
 //
+// A source whose strips have a given size is taken strip by strip, each of
+// which is recorded; what leaves them waits in queues, too.
+//
 // Nothing has come for a stage: then its kernel has no units.
 //
 //===----------------------------------------------------------------------===//
@@ -77,22 +80,24 @@ std::vector<int32_t> Frame::collectorsOf(int32_t cycle) const {
 }
 
 void Frame::queue(const Place &place) {
-  const Stage &stage = p_.stages[place.stage];
-  QueueArgs &args = queuings_.take();
-  args.frame = frame_.data();
-  args.kernel = place.args->kernel;
-  args.loop = place.args->loop;
-  args.number = nextNumber();
-  for (int32_t e : stage.outputs) {
-    if (e < 0)
-      continue;
+  QueueArgs *args = nullptr;
+  for (int32_t e : edgesOf(place.stage)) {
     const Edge &edge = p_.edges[e];
-    QueuePort &port = args.ports[args.portCount++];
-    port = {describeEdge(edge), describeShape(p_.stages[edge.consumer]),
-            &queues_[e], edge.insideLoop, groupOf(edge)};
+    if (!hasQueue(edge))
+      continue;
+    if (!args)
+      args = &queuings_.take(p_.memory);
+    args->ports[args->portCount++] = {
+        describeEdge(edge), describeShape(p_.stages[edge.consumer]),
+        &queues_[e], edge.insideLoop, groupOf(edge)};
   }
-  if (args.portCount > 0)
-    launchOwn("piko_queue", &args);
+  if (!args)
+    return;
+  args->frame = frame_.data();
+  args->kernel = place.args->kernel;
+  args->loop = place.args->loop;
+  args->number = nextNumber();
+  launchOwn("piko_queue", args);
 }
 
 // --- Loops ------------------------------------------------------------------
@@ -129,7 +134,7 @@ void Frame::describeWaiting(StepArgs &args, const Wanted &wanted) const {
 }
 
 void Frame::endWave(int32_t loop) {
-  StepArgs &args = ends_.take();
+  StepArgs &args = ends_.take(p_.memory);
   args.frame = frame_.data();
   args.loop = &loops_[loop];
   args.number = nextNumber();
@@ -141,7 +146,7 @@ void Frame::endWave(int32_t loop) {
 }
 
 void Frame::endLoop(int32_t loop) {
-  LeaveArgs &args = leaves_.take();
+  LeaveArgs &args = leaves_.take(p_.memory);
   args.frame = frame_.data();
   args.loop = &loops_[loop];
   args.number = nextNumber();
@@ -160,19 +165,28 @@ int32_t Frame::nextTurn(int32_t cycle) {
   size_t &turn = turns_[static_cast<size_t>(cycle)];
   if (collectors.empty())
     return -1;
+  CycleState *&state = cycles_[static_cast<size_t>(cycle)];
   if (turn == 0)
-    repeat(cycles_[cycle].again);
+    repeat(state->again);
   if (turn < collectors.size())
     return collectors[turn++];
   endRound(cycle);
-  endRepeat(cycles_[cycle].again);
+  endRepeat(state->again);
+  turn = 0;
+  state = &takeCycle(); // of the next strip
   return -1;
 }
 
+CycleState &Frame::takeCycle() {
+  CycleState &state = cycleStates_.take(p_.memory);
+  state.again = 1;
+  return state;
+}
+
 void Frame::endRound(int32_t cycle) {
-  StepArgs &args = ends_.take();
+  StepArgs &args = ends_.take(p_.memory);
   args.frame = frame_.data();
-  args.cycle = &cycles_[cycle];
+  args.cycle = cycles_[static_cast<size_t>(cycle)];
   args.number = nextNumber();
   args.limit = p_.loopLimit;
   describeWaiting(args, [&](const Edge &edge) {

@@ -12,6 +12,9 @@
 // RUN: env PIKO_CUDA_DRIVER=%test_driver %{compare} --pipe Lists 2>&1 | FileCheck %s
 // RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_SEED=4 %{compare} --pipe Turns 2>&1 | FileCheck %s
 // RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_CUDA_ALONE=300 %{compare} --pipe Turns 2>&1 | FileCheck %s
+// RUN: env PIKO_CUDA_DRIVER=%test_driver %{compare} --pipe Chain --strip 40 2>&1 | FileCheck %s
+// RUN: env PIKO_CUDA_DRIVER=%test_driver %{compare} --pipe Strips --strip 13 2>&1 | FileCheck %s
+// RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_CUDA_ALONE=0 %{compare} --pipe Strips --strip 13 2>&1 | FileCheck %s
 // CHECK-DAG: {{^equal$}}
 // CHECK-DAG: host: 0 launches of kernels, 1 of graphs with {{[0-9]+}} kernels, {{[0-9]+}} copies, 0 fills, 1 waits
 //
@@ -286,5 +289,23 @@ struct Ordered : piko::Pipe<State> {
   Ordered() {
     source(draw);
     connect(draw, 0, draw);
+  }
+};
+
+// A source in strips, through rounds; what leaves them waits for a stage that
+// collects.
+struct Strips : piko::Pipe<State> {
+  Shift shift;
+  Split split;
+  Merge merge;
+  Blend blend;
+  Strips() {
+    source(shift);
+    source(blend);
+    connect(shift, 0, split);
+    connect(split, 0, split);
+    connect(split, 1, merge);
+    connect(merge, 0, merge);
+    connect(merge, 1, blend);
   }
 };

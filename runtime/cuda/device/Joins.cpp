@@ -18,7 +18,8 @@ class Join {
 public:
   explicit Join(const JoinArgs &args)
       : args_(args), grid_(*args.frame, cursorOf(*args.frame), workOf(args)),
-        isFirstRun_(args.kernel->runs == 0) {}
+        isFirstRun_(args.kernel->runs == 0 ||
+                    args.kernel->strip != args.strip) {}
 
   void run() {
     if (grid_.isIdle())
@@ -175,7 +176,7 @@ private:
 
   /// Sets images to their clear values where no unit will.
   void clear(const Cutter &cutter, const Binning &bins) {
-    if (args_.clearCount == 0 || !isFirstRun_ ||
+    if (args_.clearCount == 0 || args_.kernel->runs > 0 ||
         (args_.visitsAll && !args_.takesList))
       return;
     bool whole = cutter.unitCount == 0;
@@ -227,7 +228,7 @@ private:
                     bins.order,       bins.offsets,
                     cutter.units,     cutter.unitCount,
                     args_.tiles,      cutter.calls,
-                    cutter.callCount, args_.clearCount > 0 && isFirstRun_};
+                    cutter.callCount, args_.clearCount > 0 && kernel.runs == 0};
     kernel.log = args_.frame->log;
     kernel.log.cursor = kernel.logBegin = grid_.top();
     kernel.log.units = units;
@@ -240,6 +241,9 @@ private:
     kernel.lineage = lineage_;
     if (args_.cycle && args_.collects)
       kernel.launch = static_cast<uint64_t>(args_.cycle->launches++);
+    if (args_.strip >= 0 && args_.collects)
+      kernel.launch = static_cast<uint64_t>(args_.strip);
+    kernel.strip = args_.strip;
     ++kernel.runs;
     kernel.in += stream.count;
     kernel.placed += bins.positions;
@@ -248,7 +252,7 @@ private:
 
   const JoinArgs &args_;
   Grid grid_;
-  bool isFirstRun_;
+  bool isFirstRun_; ///< Of a strip.
   Lineage lineage_{};
 };
 

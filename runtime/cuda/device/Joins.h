@@ -126,7 +126,8 @@ struct KernelState {
   const uint32_t *pairStarts;
   int64_t items;
   Lineage lineage; ///< Of items, within a loop.
-  uint64_t launch; ///< Of a stage that collects, in its cycle.
+  uint64_t launch; ///< Of a stage that collects, in its cycle or by strips.
+  int64_t strip;   ///< The latest.
   int64_t runs;    ///< Before this one.
   // Counted for the host's statistics.
   int64_t in, placed;
@@ -169,6 +170,7 @@ struct JoinArgs {
   LoopState *loop;   ///< The stage's, or null.
   CycleState *cycle; ///< The stage's, or null.
   int64_t number;    ///< Of the join, in the order of launches.
+  int64_t strip;     ///< Of the stage's source; -1: all at a time.
   int32_t inputCount, clearCount;
   JoinInput inputs[mostJoinInputs];
   JoinClear clears[mostJoinClears];
