@@ -9,6 +9,7 @@
 #include "Piko/Driver/Sequences.h"
 #include "Piko/Target/Emulate.h"
 #include "Piko/Target/KernelImages.h"
+#include "Piko/Target/PTX.h"
 
 #include "mlir/Dialect/GPU/IR/GPUDialect.h"
 #include "mlir/Dialect/LLVMIR/LLVMDialect.h"
@@ -355,6 +356,15 @@ LogicalResult piko::lowerToGPU(ModuleOp module, const CheckOptions &check,
   return emitError(loc) << "expected a kernel, but the pipeline has none";
 }
 
+/// Loads and stores are aligned as the layout says that is known by then, and
+/// by LLVM's own one numbers of 64 bits are not.
+static std::unique_ptr<llvm::Module>
+translateForPTX(gpu::GPUModuleOp kernels, llvm::LLVMContext &context) {
+  kernels->setAttr(LLVM::LLVMDialect::getDataLayoutAttrName(),
+                   StringAttr::get(kernels.getContext(), getPTXLayout()));
+  return translateModuleToLLVMIR(kernels, context, kernels.getName());
+}
+
 std::unique_ptr<llvm::Module>
 piko::translateKernels(ModuleOp module, llvm::LLVMContext &context) {
   PassManager passes(module.getContext());
@@ -362,7 +372,7 @@ piko::translateKernels(ModuleOp module, llvm::LLVMContext &context) {
   if (failed(passes.run(module)))
     return nullptr;
   for (auto kernels : module.getOps<gpu::GPUModuleOp>())
-    return translateModuleToLLVMIR(kernels, context, kernels.getName());
+    return translateForPTX(kernels, context);
   return nullptr;
 }
 
@@ -372,8 +382,10 @@ piko::translateToLLVMIR(ModuleOp module, llvm::LLVMContext &context,
   std::unique_ptr<llvm::Module> host =
       translateModuleToLLVMIR(module, context, "pipeline");
   for (auto kernels : module.getOps<gpu::GPUModuleOp>()) {
+    bool isPTX = gpu.target == GPUTarget::CUDA;
     std::unique_ptr<llvm::Module> translated =
-        translateModuleToLLVMIR(kernels, context, kernels.getName());
+        isPTX ? translateForPTX(kernels, context)
+              : translateModuleToLLVMIR(kernels, context, kernels.getName());
     if (!host || !translated)
       return nullptr;
     StringRef name = kernels.getName();
@@ -383,10 +395,9 @@ piko::translateToLLVMIR(ModuleOp module, llvm::LLVMContext &context,
           << "no cubin for " << cubin.chip << ": " << cubin.reason;
     };
     llvm::Error error =
-        gpu.target == GPUTarget::CUDA
-            ? embedKernels(*host, *translated, getImagesName(name), gpu,
-                           optLevel, report)
-            : linkEmulatedKernels(*host, std::move(translated), name);
+        isPTX ? embedKernels(*host, *translated, getImagesName(name), gpu,
+                             optLevel, report)
+              : linkEmulatedKernels(*host, std::move(translated), name);
     if (error) {
       emitError(module.getLoc()) << llvm::toString(std::move(error));
       return nullptr;

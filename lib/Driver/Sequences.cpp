@@ -248,6 +248,7 @@ void piko::addLaunchSequence(OpPassManager &passes, const GPUOptions &options) {
 
 void piko::addNVVMSequence(OpPassManager &passes) {
   OpPassManager &kernels = passes.nest<gpu::GPUModuleOp>();
+  kernels.addPass(createReloadInputs());
   kernels.addPass(createOutlineRareWork());
   kernels.addPass(createSCFToControlFlowPass());
   kernels.addPass(createConvertGPUToExactNVVM());

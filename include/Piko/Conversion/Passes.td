@@ -286,6 +286,40 @@ def OutlineRareWork : Pass<"piko-outline-rare-work", "::mlir::gpu::GPUModuleOp">
                            "::mlir::memref::MemRefDialect"];
 }
 
+def ReloadInputs : Pass<"piko-reload-inputs", "::mlir::gpu::GPUModuleOp"> {
+  let summary = "Load members of the input where kernels need them";
+  let description = [{
+    **Requires** kernels as functions (`gpu-kernel-outlining`).
+
+    **Does**: loads that are marked with `piko.input` stand where a kernel begins,
+    and their registers would be taken until it ends. For each use there is another
+    load, in front of the outermost loop around the use whose body has no loop but
+    those around the use.
+
+    Before:
+    ```
+    %units = llvm.load %input {piko.input} : !llvm.ptr -> !llvm.ptr
+    scf.for %unit = %first to %count step %blocks {
+      "use"(%units) : (!llvm.ptr) -> ()
+      scf.for ...
+    }
+    ```
+    After:
+    ```
+    scf.for %unit = %first to %count step %blocks {
+      %same = llvm.intr.launder.invariant.group %input : !llvm.ptr
+      %units = llvm.load %same : !llvm.ptr -> !llvm.ptr
+      "use"(%units) : (!llvm.ptr) -> ()
+      scf.for ...
+    }
+    ```
+
+    **Limits**: only of addresses at a constant distance from what a kernel is given.
+  }];
+  let statistics = [Statistic<"reloaded", "reloaded", "loads that were made">];
+  let dependentDialects = ["::mlir::LLVM::LLVMDialect"];
+}
+
 def ConvertGPUToExactNVVM
     : Pass<"convert-gpu-to-exact-nvvm", "::mlir::gpu::GPUModuleOp"> {
   let summary = "Turn kernels into the nvvm and llvm dialects, without libdevice";

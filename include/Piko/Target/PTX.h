@@ -18,6 +18,9 @@ namespace piko {
 llvm::Expected<std::string>
 generatePTX(llvm::Module &module, llvm::StringRef processor, int optLevel);
 
+/// How data are laid out in memory, in LLVM's syntax.
+std::string getPTXLayout();
+
 /// An error if there is no chip of that name.
 llvm::Error checkChip(llvm::StringRef chip);
 

@@ -36,6 +36,34 @@ struct ConvertGPUToExactNVVMPass
 };
 } // namespace
 
+static bool isShared(Value pointer) {
+  return cast<LLVM::LLVMPointerType>(pointer.getType()).getAddressSpace() ==
+         unsigned(NVVM::NVVMMemorySpace::Shared);
+}
+
+/// With this, half of the threads that a multiprocessor can have find room.
+static constexpr int32_t maxRegisters = 64;
+
+/// Says of access to a block's memory what memref cannot. Of a load that is not
+/// to be kept, LLVM has to know that it cannot go in front of its loop; and
+/// ptxas, how many registers that is for.
+static void finishBlockMemory(Operation *op) {
+  if (auto atomic = dyn_cast<LLVM::AtomicRMWOp>(op);
+      atomic && isShared(atomic.getPtr())) {
+    // Barriers order what a block's threads see; an atomic has no need to.
+    atomic.setOrdering(LLVM::AtomicOrdering::monotonic);
+    atomic.setSyncscope("block");
+  }
+  auto load = dyn_cast<LLVM::LoadOp>(op);
+  if (!load || !load.getNontemporal() || !isShared(load.getAddr()))
+    return;
+  load.setNontemporal(false);
+  load.setVolatile_(true);
+  op->getParentOfType<LLVM::LLVMFuncOp>()->setAttr(
+      NVVM::NVVMDialect::getMaxnregAttrName(),
+      OpBuilder(op).getI32IntegerAttr(maxRegisters));
+}
+
 void ConvertGPUToExactNVVMPass::runOnOperation() {
   gpu::GPUModuleOp module = getOperation();
   WalkResult result = module.walk([](Operation *op) -> WalkResult {
@@ -62,12 +90,5 @@ void ConvertGPUToExactNVVMPass::runOnOperation() {
   target.addLegalOp<gpu::GPUModuleOp>();
   if (failed(applyFullConversion(module, target, std::move(patterns))))
     return signalPassFailure();
-  // Barriers order what a block's threads see; an atomic has no need to.
-  module.walk([](LLVM::AtomicRMWOp atomic) {
-    auto type = cast<LLVM::LLVMPointerType>(atomic.getPtr().getType());
-    if (type.getAddressSpace() == unsigned(NVVM::NVVMMemorySpace::Shared)) {
-      atomic.setOrdering(LLVM::AtomicOrdering::monotonic);
-      atomic.setSyncscope("block");
-    }
-  });
+  module.walk([](Operation *op) { finishBlockMemory(op); });
 }

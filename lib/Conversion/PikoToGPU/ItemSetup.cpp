@@ -19,6 +19,8 @@
 
 #include "ItemSetup.h"
 
+#include "../LoadPlace.h"
+
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
 #include "mlir/Interfaces/LoopLikeInterface.h"
@@ -238,12 +240,35 @@ void ItemSetup::replaceInPixels() {
     OpBuilder builder(value.getDefiningOp());
     Location loc = value.getLoc();
     Value at = createPlace(builder, loc, items.getInductionVar(), place.first);
-    Value loaded = memref::LoadOp::create(builder, loc, place.memory, at);
+    loads.push_back(memref::LoadOp::create(builder, loc, place.memory, at));
+    Value loaded = loads.back();
     if (loaded.getType() != value.getType())
       loaded = arith::TruncIOp::create(builder, loc, value.getType(), loaded);
     Value(value).replaceAllUsesWith(loaded);
   }
   eraseSetup(*items.getBody());
+}
+
+void ItemSetup::sinkLoads() {
+  for (memref::LoadOp load : loads) {
+    Type type = load.getType();
+    if (!type.isIndex() && type.getIntOrFloatBitWidth() < 64)
+      continue;
+    llvm::MapVector<Operation *, SmallVector<OpOperand *>> places;
+    for (OpOperand &use : load->getUses())
+      places[findLoadPlace(use.getOwner(), items)].push_back(&use);
+    for (auto &[place, uses] : places) {
+      if (place->getParentOfType<LoopLikeOpInterface>() == items)
+        continue;
+      OpBuilder builder(place);
+      auto again = cast<memref::LoadOp>(builder.clone(*load));
+      again.setNontemporal(true); // Not to be kept: GPUToNVVM.cpp.
+      for (OpOperand *use : uses)
+        use->set(again);
+    }
+    if (load->use_empty())
+      load->erase();
+  }
 }
 
 /// What has no use any more; the loads have some.
@@ -257,6 +282,29 @@ void ItemSetup::eraseSetup(Block &block) {
       op.erase();
     }
   }
+}
+
+/// A group has few primitives: its counter takes a register, where an index
+/// takes two.
+static void countInFewBits(scf::ForOp items) {
+  OpBuilder builder(items);
+  Location loc = items.getLoc();
+  Type type = builder.getI32Type();
+  auto cast = [&](Value value) {
+    return arith::IndexCastOp::create(builder, loc, type, value);
+  };
+  auto made =
+      scf::ForOp::create(builder, loc, cast(items.getLowerBound()),
+                         cast(items.getUpperBound()), cast(items.getStep()));
+  made->setDiscardableAttrs(items->getDiscardableAttrDictionary());
+  builder.setInsertionPointToStart(made.getBody());
+  Value number = arith::IndexCastUIOp::create(
+      builder, loc, builder.getIndexType(), made.getInductionVar());
+  items.getInductionVar().replaceAllUsesWith(number);
+  items.getBody()->getTerminator()->erase();
+  made.getBody()->getOperations().splice(std::prev(made.getBody()->end()),
+                                         items.getBody()->getOperations());
+  items.erase();
 }
 
 void piko::shareSetup(scf::ForOp items, const ThreadTile &tile,
@@ -301,6 +349,8 @@ void piko::shareSetup(scf::ForOp items, const ThreadTile &tile,
                                                position.getDefiningOp());
   memory.setPosition(builder, position);
   setup->replaceInPixels();
+  setup->sinkLoads();
+  countInFewBits(items);
   builder.setInsertionPoint(groups.getBody()->getTerminator());
   gpu::BarrierOp::create(builder, loc);
 }

@@ -32,6 +32,9 @@ public:
   /// Lets the loop, which counts through a group now, take what it needs from
   /// memory.
   void replaceInPixels();
+  /// Moves these loads into loops over pixels that need them outside of the
+  /// innermost ones: there they take registers that are short.
+  void sinkLoads();
 
 private:
   void findPixelWork();
@@ -64,6 +67,7 @@ private:
     int64_t first = 0;
   };
   llvm::MapVector<mlir::Value, Place> shared;
+  llvm::SmallVector<mlir::memref::LoadOp> loads; ///< What pixels take of it.
 };
 
 } // namespace piko

@@ -143,12 +143,13 @@ bool PixelSharing::canStride(scf::ForOp loop) {
 
 /// Counts how often the loop comes to a pixel of the thread, and makes it a
 /// loop over that count: the bounds may be any numbers, and a step of more than
-/// one could miss the end and wrap.
+/// one could miss the end and wrap. The count has the type of the bounds, which
+/// may take half the registers of an index.
 void PixelSharing::stride(scf::ForOp loop) {
   OpBuilder builder(loop);
   Location loc = loop.getLoc();
   Value lo = loop.getLowerBound(), hi = loop.getUpperBound();
-  Type type = lo.getType(), index = builder.getIndexType();
+  Type type = lo.getType();
   auto number = [&](int64_t value) {
     return constant(builder, loc, type, value);
   };
@@ -169,18 +170,13 @@ void PixelSharing::stride(scf::ForOp loop) {
                                        number(llvm::Log2_64(mask + 1)));
   count = arith::AddIOp::create(builder, loc, count, number(1));
   count = arith::SelectOp::create(builder, loc, any, count, number(0));
-  if (!type.isIndex())
-    count = arith::IndexCastUIOp::create(builder, loc, index, count);
   first = arith::AddIOp::create(builder, loc, lo, first);
 
-  auto steps =
-      scf::ForOp::create(builder, loc, constant(builder, loc, index, 0), count,
-                         constant(builder, loc, index, 1));
+  auto steps = scf::ForOp::create(builder, loc, number(0), count, number(1));
+  steps.setUnsignedCmp(true);
   builder.setInsertionPointToStart(steps.getBody());
-  Value step = steps.getInductionVar();
-  if (!type.isIndex())
-    step = arith::IndexCastOp::create(builder, loc, type, step);
-  Value offset = arith::MulIOp::create(builder, loc, step, number(mask + 1));
+  Value offset = arith::MulIOp::create(builder, loc, steps.getInductionVar(),
+                                       number(mask + 1));
   Value at = arith::AddIOp::create(builder, loc, first, offset);
   loop.getInductionVar().replaceAllUsesWith(at);
   loop.getBody()->getTerminator()->erase();

@@ -5,6 +5,7 @@
 #include "LoweringContext.h"
 
 #include "Piko/Analysis/StageGraph.h"
+#include "Piko/Dialect/Piko/IR/Marks.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
 #include "mlir/Conversion/LLVMCommon/MemRefBuilder.h"
@@ -198,9 +199,12 @@ Value LoweringContext::member(OpBuilder &builder, Value bins,
   else
     builder.setInsertionPointAfterValue(bins);
   Location loc = bins.getLoc();
-  return known = createLoad(
-             builder, loc, convertType(bins.getContext(), which.type),
-             createOffset(builder, loc, bins, which.offset), tags.input());
+  known =
+      createLoad(builder, loc, convertType(bins.getContext(), which.type),
+                 createOffset(builder, loc, bins, which.offset), tags.input());
+  if (launch)
+    known.getDefiningOp()->setAttr(marks::input, builder.getUnitAttr());
+  return known;
 }
 
 /// Whether a function of the runtime is hardly ever called, though there is a

@@ -31,6 +31,8 @@ static Expected<const Target *> findTarget(const Triple &triple,
   return target;
 }
 
+std::string piko::getPTXLayout() { return Triple(nvptx).computeDataLayout(); }
+
 Error piko::checkChip(StringRef chip) {
   return findTarget(Triple(nvptx), chip).takeError();
 }

@@ -36,3 +36,22 @@ gpu.module @kernels {
     gpu.return
   }
 }
+
+// -----
+
+// What is not to be kept over a loop is loaded where it stands, and bounds the
+// kernel's registers.
+// CHECK-LABEL: gpu.module @short
+// CHECK:         llvm.func @k(
+// CHECK-SAME:      nvvm.maxnreg = 64
+// CHECK:           llvm.load volatile %{{.*}} : !llvm.ptr<3> -> i64
+// CHECK:           llvm.load %{{.*}} : !llvm.ptr<3> -> i64
+gpu.module @short {
+  gpu.func @k(%out: !llvm.ptr, %i: index) workgroup(%memory: memref<64xi64, #gpu.address_space<workgroup>>) kernel {
+    %a = memref.load %memory[%i] {nontemporal = true} : memref<64xi64, #gpu.address_space<workgroup>>
+    %b = memref.load %memory[%i] : memref<64xi64, #gpu.address_space<workgroup>>
+    %c = arith.addi %a, %b : i64
+    llvm.store %c, %out : i64, !llvm.ptr
+    gpu.return
+  }
+}

@@ -44,7 +44,8 @@ piko.record @Pixel {"n" : i32 at 0} size 4 align 4
 // CHECK:                 memref.store %{{.*}}, %[[ANY]][%[[T]]]
 // CHECK:               gpu.barrier
 // CHECK-NOT:           piko.get
-// CHECK:               scf.for %[[K:.*]] = %c0
+// CHECK:               scf.for %[[NUMBER:.*]] = %c0_i32 to %{{.*}} : i32
+// CHECK-NEXT:            %[[K:.*]] = arith.index_castui %[[NUMBER]]
 // CHECK:                 %[[K8:.*]] = arith.addi %[[K]], %c8
 // CHECK:                 memref.load %[[SETUP]][%[[K8]]]
 // CHECK:                 memref.load %[[SETUP]][%[[K]]]
@@ -53,7 +54,7 @@ piko.record @Pixel {"n" : i32 at 0} size 4 align 4
 // CHECK:                 %[[REST:.*]] = arith.andi %{{.*}}, %c1_i32
 // CHECK:                 %[[MINE:.*]] = arith.cmpi eq, %[[REST]], %{{.*}} : i32
 // CHECK:                 scf.if %[[MINE]] {
-// CHECK:                   scf.for %{{.*}} = %c0
+// CHECK:                   scf.for unsigned %{{.*}} = %c0
 // CHECK:                     arith.muli %{{.*}}, %c4_i32
 // CHECK:                     piko.load checked @image[
 // CHECK:                     piko.store %{{.*}}, checked @image[

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// piko-reload-inputs: members of the input are loaded where a kernel begins.
+// Each would be in registers until it ends, where most are needed for a moment:
+// for a unit, a cell or a primitive. So for each use,
+//   1. go from it to the outermost loop in whose body no other loop waits: what
+//   is
+//      loaded in front of that is kept over none that does not need it;
+//   2. load the member again there, from an address that LLVM does not know to
+//   be
+//      the same, or it would put the load back.
+
+#include "../LoadPlace.h"
+
+#include "Piko/Conversion/Passes.h"
+
+#include "Piko/Dialect/Piko/IR/Marks.h"
+
+#include "mlir/Dialect/GPU/IR/GPUDialect.h"
+#include "mlir/Dialect/LLVMIR/LLVMDialect.h"
+#include "mlir/IR/IRMapping.h"
+#include "llvm/ADT/MapVector.h"
+
+namespace piko {
+#define GEN_PASS_DEF_RELOADINPUTS
+#include "Piko/Conversion/Passes.h.inc"
+} // namespace piko
+
+using namespace mlir;
+using namespace piko;
+
+namespace {
+
+struct ReloadInputsPass : piko::impl::ReloadInputsBase<ReloadInputsPass> {
+  void runOnOperation() override;
+  void reload(LLVM::LoadOp load);
+};
+
+} // namespace
+
+/// The load at another place, with the address's offset.
+static Value createReload(LLVM::LoadOp load, Operation *place) {
+  OpBuilder builder(place);
+  IRMapping mapping;
+  auto step = load.getAddr().getDefiningOp<LLVM::GEPOp>();
+  Value base = step ? step.getBase() : load.getAddr();
+  mapping.map(base, LLVM::LaunderInvariantGroupOp::create(
+                        builder, load.getLoc(), base.getType(), base));
+  if (step)
+    builder.clone(*step, mapping);
+  return builder.clone(*load, mapping)->getResult(0);
+}
+
+void ReloadInputsPass::reload(LLVM::LoadOp load) {
+  load->removeAttr(marks::input);
+  auto step = load.getAddr().getDefiningOp<LLVM::GEPOp>();
+  if (step && !step.getDynamicIndices().empty())
+    return;
+  llvm::MapVector<Operation *, SmallVector<OpOperand *>> places;
+  for (OpOperand &use : load.getResult().getUses())
+    if (Operation *place = findLoadPlace(use.getOwner(), load->getParentOp());
+        place->getParentOp() != load->getParentOp())
+      places[place].push_back(&use);
+  for (auto &[place, uses] : places) {
+    Value loaded = createReload(load, place);
+    for (OpOperand *use : uses)
+      use->set(loaded);
+    ++reloaded;
+  }
+  if (load.use_empty())
+    load.erase();
+}
+
+void ReloadInputsPass::runOnOperation() {
+  SmallVector<LLVM::LoadOp> loads;
+  getOperation().walk([&](LLVM::LoadOp load) {
+    if (load->hasAttr(marks::input))
+      loads.push_back(load);
+  });
+  for (LLVM::LoadOp load : loads)
+    reload(load);
+}
