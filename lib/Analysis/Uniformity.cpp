@@ -38,11 +38,18 @@ Value piko::findOnlyValue(Value yes, Value no) {
 
 /// Whether memory is accessed at a place that follows from a number.
 static bool isForPlaces(Value number, unsigned depth = 6) {
-  return depth > 0 && llvm::any_of(number.getUsers(), [&](Operation *user) {
+  return depth > 0 && llvm::any_of(number.getUses(), [&](OpOperand &use) {
+           Operation *user = use.getOwner();
            if (auto store = dyn_cast<memref::StoreOp>(user))
              return llvm::is_contained(store.getIndices(), number);
            if (isa<memref::LoadOp, LoadOp>(user))
              return true;
+           if (auto condition = dyn_cast<scf::ConditionOp>(user))
+             return use.getOperandNumber() > 0 &&
+                    isForPlaces(
+                        cast<scf::WhileOp>(condition->getParentOp())
+                            .getAfterArguments()[use.getOperandNumber() - 1],
+                        depth - 1);
            return isa<arith::ArithDialect>(user->getDialect()) &&
                   user->getResult(0).getType().isIntOrIndex() &&
                   isForPlaces(user->getResult(0), depth - 1);
@@ -191,6 +198,22 @@ bool Uniformity::visitIf(scf::IfOp choice, Uniform parts) {
   return changed;
 }
 
+bool Uniformity::isInside(Value array) const {
+  Operation *made = array.getDefiningOp<memref::AllocaOp>();
+  return made && root->isProperAncestor(made);
+}
+
+/// Whether an array is filled in front of the root, which only reads it.
+bool Uniformity::isFinished(Value array) const {
+  auto made = array.getDefiningOp<memref::AllocaOp>();
+  return made && llvm::all_of(made->getUsers(), [&](Operation *user) {
+           auto store = dyn_cast<memref::StoreOp>(user);
+           return isa<memref::LoadOp>(user) ||
+                  (store && store.getValue() != array &&
+                   !root->isAncestor(store));
+         });
+}
+
 /// What is stored into a private array is in it from then on, wherever
 /// iterations went on together.
 bool Uniformity::visitArrayAccess(Operation *op) {
@@ -202,14 +225,11 @@ bool Uniformity::visitArrayAccess(Operation *op) {
     });
     return !isKnown && mark(array, Uniform::Iteration);
   }
-  auto isInside = [&](Value array) {
-    Operation *made = array.getDefiningOp<memref::AllocaOp>();
-    return made && root->isProperAncestor(made);
-  };
   if (auto load = dyn_cast<memref::LoadOp>(op))
-    return mark(load.getResult(), isInside(load.getMemRef())
-                                      ? get(load->getOperands())
-                                      : Uniform::Iteration);
+    return mark(load.getResult(),
+                isInside(load.getMemRef()) || isFinished(load.getMemRef())
+                    ? get(load->getOperands())
+                    : Uniform::Iteration);
   auto store = cast<memref::StoreOp>(op);
   if (!isInside(store.getMemRef()))
     return false;

@@ -31,7 +31,7 @@ mlir::Operation *findBarrier(mlir::Operation *op);
 /// loop that is made of it compares them.
 ///
 /// The level of a private array, `memref.alloca` inside, is that of what is in
-/// it.
+/// it. One that is filled outside is the same for all.
 class Uniformity {
 public:
   /// Where a value begins to differ.
@@ -67,6 +67,8 @@ private:
   bool visit(mlir::Operation *op);
   bool visitControlFlow(mlir::Operation *op);
   bool visitArrayAccess(mlir::Operation *op);
+  bool isInside(mlir::Value array) const;
+  bool isFinished(mlir::Value array) const;
   /// The level of what decides which way control flow goes.
   Uniform getDeciding(mlir::Operation *op) const;
   /// The same, where barriers are: there iterations agree.
