@@ -91,8 +91,9 @@ class SerialInputs {
 public:
   /// Those of `records` are stored by vectors.
   SerialInputs(const IterationLanes &lanes, ArrayRef<Operation *> ops,
-               const llvm::MapVector<Operation *, Value> &records)
-      : lanes(lanes), ops(ops.begin(), ops.end()) {
+               const llvm::MapVector<Operation *, Value> &records,
+               bool isDeferred)
+      : lanes(lanes), ops(ops.begin(), ops.end()), isDeferred(isDeferred) {
     for (Operation *op : ops)
       if (!records.contains(op))
         op->walk([&](Operation *inner) {
@@ -123,7 +124,10 @@ private:
       return;
     Operation *op = value.getDefiningOp();
     bool isConstant = op && op->hasTrait<OpTrait::ConstantLike>();
-    if (isLaneType(value.getType()) && !isConstant) {
+    // Each lane widens its own index: vectors of 64 bits are two.
+    bool isWidened = !isDeferred && isa_and_nonnull<arith::IndexCastOp>(op) &&
+                     value.getType().isIndex();
+    if (isLaneType(value.getType()) && !isConstant && !isWidened) {
       (lanes.isVarying(value) ? varying : uniform).insert(value);
       return;
     }
@@ -134,6 +138,7 @@ private:
 
   const IterationLanes &lanes;
   llvm::DenseSet<Operation *> ops;
+  bool isDeferred;
 };
 
 } // namespace
@@ -194,7 +199,7 @@ IterationWriter::Turn IterationWriter::prepareTurn(Operation *first,
     if (auto append = dyn_cast<AppendOp>(op);
         append && lanes.isStoredByVectors(append))
       turn.records[append] = writeRecords(append);
-  SerialInputs inputs(lanes, turn.ops, turn.records);
+  SerialInputs inputs(lanes, turn.ops, turn.records, isDeferred);
   Value start = arith::ConstantIndexOp::create(builder, loc, 0);
   for (Value value : inputs.varying) {
     Value slot = turn.varying[value] = createSlot(value.getType());

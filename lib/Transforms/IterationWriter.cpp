@@ -191,7 +191,31 @@ Value IterationWriter::divideAsFloats(Operation *division, Value dividend,
   return arith::FPToUIOp::create(builder, loc, dividend.getType(), quotient);
 }
 
+/// Whether an index is inside of an extent, by its 32 bits: vectors of 64 bits
+/// are two, and take as long again to bring together.
+bool IterationWriter::writeInside(arith::CmpIOp compare) {
+  auto index = compare.getLhs().getDefiningOp<arith::IndexCastOp>();
+  Value extent = compare.getRhs();
+  if (compare.getPredicate() != arith::CmpIPredicate::ult || !index ||
+      !index.getIn().getType().isInteger(32) || lanes.isVarying(extent) ||
+      !lanes.isVarying(index.getIn()) || !extent.getDefiningOp<ExtentOp>())
+    return false;
+  // A negative index is, without its sign, this much or more.
+  constexpr int64_t most = int64_t(1) << 31;
+  Value limit = arith::MinUIOp::create(
+      builder, loc, getUniform(extent),
+      arith::ConstantIndexOp::create(builder, loc, most));
+  limit = arith::IndexCastOp::create(builder, loc, builder.getI32Type(), limit);
+  vectors.map(compare.getResult(),
+              arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::ult,
+                                    get(index.getIn()), splat(limit)));
+  return true;
+}
+
 void IterationWriter::writeVector(Operation *op) {
+  if (auto compare = dyn_cast<arith::CmpIOp>(op))
+    if (writeInside(compare))
+      return;
   if (auto product = dyn_cast<arith::MulIOp>(op))
     if (writeLinearProduct(product))
       return;

@@ -71,6 +71,8 @@ private:
                              mlir::Value divisor);
   /// Whether the product is one that it has written.
   bool writeLinearProduct(mlir::arith::MulIOp product);
+  /// Whether it compares an index with an extent, which it has written.
+  bool writeInside(mlir::arith::CmpIOp compare);
   void writeAccess(mlir::Operation *op);
   void writeLimited(LoadOp load, mlir::Value limited);
   /// Whether lanes access one element after the other.
