@@ -8,7 +8,6 @@
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
 #include "mlir/Dialect/Arith/IR/Arith.h"
-#include "mlir/Dialect/Vector/IR/VectorOps.h"
 #include "mlir/IR/Matchers.h"
 #include "llvm/ADT/MapVector.h"
 
@@ -134,22 +133,15 @@ static bool isUnchanged(GatherOp read, GatherOp first, RecordOp record) {
   return true;
 }
 
-/// The indices of each lane's element.
+/// The address of each lane's element.
 template <typename OpT>
-static SmallVector<Value> getPlaces(OpT access, OpBuilder &builder,
-                                    VectorType words) {
-  SmallVector<Value> places(access.getIndices());
-  if (!access.getConsecutive())
-    return places;
-  Location loc = access.getLoc();
-  Value first = places.front();
-  if (!first.getType().isIndex())
-    first =
-        arith::IndexCastOp::create(builder, loc, builder.getIndexType(), first);
-  places.front() = arith::AddIOp::create(
-      builder, loc, vector::BroadcastOp::create(builder, loc, words, first),
-      vector::StepOp::create(builder, loc, words));
-  return places;
+static Value createElements(OpT access, OpBuilder &builder) {
+  auto words =
+      VectorType::get(cast<VectorType>(access.getMask().getType()).getShape(),
+                      builder.getIndexType());
+  return LaneElementsOp::create(builder, access.getLoc(), words,
+                                access.getStateAttr(), access.getIndices(),
+                                access.getConsecutiveAttr());
 }
 
 void MergeGathersPass::mergeState(KernelOp kernel) {
@@ -183,12 +175,7 @@ void MergeGathersPass::mergeState(KernelOp kernel) {
         continue;
       GatherOp first = reads.front();
       OpBuilder builder(first);
-      auto words = VectorType::get(cast<VectorType>(first.getType()).getShape(),
-                                   builder.getIndexType());
-      Value addresses = LaneElementsOp::create(
-          builder, first.getLoc(), words, first.getStateAttr(),
-          getPlaces(first, builder, words));
-      merge<GatherOp>(reads, addresses,
+      merge<GatherOp>(reads, createElements(first, builder),
                       FlatSymbolRefAttr::get(getRecord(first).getSymNameAttr()),
                       builder);
     }
@@ -239,21 +226,15 @@ void MergeGathersPass::mergeWrites(ArrayRef<ScatterOp> writes) {
     return;
   ScatterOp last = writes.back();
   OpBuilder builder(last);
-  auto words =
-      VectorType::get(cast<VectorType>(last.getMask().getType()).getShape(),
-                      builder.getIndexType());
   SmallVector<Value> values;
   SmallVector<Attribute> fields;
   for (ScatterOp write : writes) {
     values.push_back(write.getValue());
     fields.push_back(write.getFieldAttr());
   }
-  Value addresses =
-      LaneElementsOp::create(builder, last.getLoc(), words, last.getStateAttr(),
-                             getPlaces(last, builder, words));
-  LaneSetFieldsOp::create(builder, last.getLoc(), values, addresses,
-                          builder.getArrayAttr(fields), last.getStateAttr(),
-                          last.getMask());
+  LaneSetFieldsOp::create(
+      builder, last.getLoc(), values, createElements(last, builder),
+      builder.getArrayAttr(fields), last.getStateAttr(), last.getMask());
   for (ScatterOp write : writes)
     write.erase();
   merged += writes.size();

@@ -8,10 +8,7 @@ piko.record @V {"x" : f32 at 0, "y" : f32 at 4, "z" : f32 at 8, "d" : f64 at 16,
 // CHECK:         %[[SUM:.*]] = arith.addf
 // CHECK-NEXT:    %[[AS:.*]] = piko.cpu.elements @out[%[[IS:.*]] : vector<16xindex>] : vector<16xindex>
 // CHECK-NEXT:    piko.cpu.set_fields(%[[X:.*]], %[[SUM]], %[[X]]) to %[[AS]] ["x", "z", "y"] of @out mask %[[M:.*]] : vector<16xindex>, vector<16xi1>, vector<16xf32>, vector<16xf32>, vector<16xf32>
-// CHECK-NEXT:    %[[FIRST:.*]] = vector.broadcast %c0 : index to vector<16xindex>
-// CHECK-NEXT:    %[[STEPS:.*]] = vector.step : vector<16xindex>
-// CHECK-NEXT:    %[[ROW:.*]] = arith.addi %[[FIRST]], %[[STEPS]] : vector<16xindex>
-// CHECK-NEXT:    %[[RS:.*]] = piko.cpu.elements @out[%[[ROW]] : vector<16xindex>]
+// CHECK-NEXT:    %[[RS:.*]] = piko.cpu.elements consecutive @out[%c0 : index] : vector<16xindex>
 // CHECK-NEXT:    piko.cpu.set_fields(%[[X]], %[[X]], %[[X]]) to %[[RS]] ["x", "y", "z"] of @out
 piko.pipeline @P rank 1 {
   piko.buffer @mesh : @V

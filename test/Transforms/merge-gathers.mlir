@@ -11,9 +11,7 @@ piko.record @V {"x" : f32 at 0, "y" : f32 at 4, "z" : f32 at 8, "d" : f64 at 16,
 // CHECK-NEXT:    piko.cpu.gather @mesh[%[[IS]] : vector<16xindex>] "d"
 // CHECK-NEXT:    piko.cpu.gather @mesh[%[[IS]] : vector<16xindex>] "y" mask %{{.*}}
 // CHECK-COUNT-2: piko.cpu.gather @mesh[%{{.*}} : vector<16xindex>]
-// CHECK:         %[[FIRST:.*]] = vector.broadcast %c0 : index to vector<16xindex>
-// CHECK:         %[[ROW:.*]] = arith.addi %[[FIRST]], %{{.*}} : vector<16xindex>
-// CHECK-NEXT:    %[[RS:.*]] = piko.cpu.elements @mesh[%[[ROW]] : vector<16xindex>]
+// CHECK:         %[[RS:.*]] = piko.cpu.elements consecutive @mesh[%c0 : index] : vector<16xindex>
 // CHECK-NEXT:    piko.cpu.get_fields %[[RS]] ["x", "y", "z"] of @V
 // CHECK:         piko.cpu.get_fields %{{.*}} ["x", "y", "n"] of @V
 // CHECK-NEXT:    piko.cpu.scatter %{{.*}}, @out[%[[IS]] : vector<16xindex>] "z"

@@ -3,6 +3,8 @@
 // Access to state and to primitives by the lanes of a vector.
 
 #include "KernelLowering.h"
+#include "RecordPieces.h"
+#include "RecordRows.h"
 
 #include "Piko/Conversion/Permutations.h"
 #include "Piko/Dialect/Piko/IR/CodeBuilder.h"
@@ -20,6 +22,12 @@ namespace {
 /// the other, or one for each.
 struct LaneAddresses {
   Value first, each;
+};
+
+/// The word of its records that an access to a row of them is to.
+struct RowWord {
+  Value first; ///< the address of the first record
+  int64_t size, number;
 };
 
 /// How far elements are from the first one, in bytes: a vector if indices are,
@@ -60,6 +68,24 @@ template <typename OpT> struct LaneLowering : ContextPattern<OpT> {
   using ContextPattern<OpT>::context;
 
 protected:
+  std::optional<RowWord> findRowWord(OpBuilder &builder, OpT op,
+                                     typename OpT::Adaptor adaptor,
+                                     VectorType lanes) const {
+    RecordOp record =
+        context.record(getStateRecord(context.state(op, op.getState())));
+    int64_t offset = record.getField(op.getField()).getOffset();
+    if (!op.getConsecutive() || !op.getElements().empty() ||
+        lanes.getElementTypeBitWidth() != 32 || offset % wordSize != 0 ||
+        !isRecordRow(lanes.getNumElements(), record.getSize(), /*fields=*/1))
+      return std::nullopt;
+    StateView &view = context.view(builder, op, op.getState());
+    Value start =
+        computeOffset(builder, op.getLoc(), view, adaptor.getIndices(),
+                      record.getSize(), lanes.getNumElements());
+    return RowWord{createOffset(builder, op.getLoc(), view.data, start),
+                   record.getSize(), offset / wordSize};
+  }
+
   LaneAddresses address(OpBuilder &builder, OpT op,
                         typename OpT::Adaptor adaptor, VectorType lanes) const {
     Location loc = op.getLoc();
@@ -107,6 +133,13 @@ struct GatherLowering : LaneLowering<GatherOp> {
                   ConversionPatternRewriter &rewriter) const override {
     Location loc = op.getLoc();
     auto type = cast<VectorType>(op.getResult().getType());
+    if (std::optional<RowWord> word =
+            findRowWord(rewriter, op, adaptor, type)) {
+      RecordRow row(rewriter, loc, word->first, word->size, adaptor.getMask());
+      rewriter.replaceOpWithNewOp<vector::BitCastOp>(
+          op, type, row.read({word->number}).front());
+      return success();
+    }
     LaneAddresses from = address(rewriter, op, adaptor, type);
     uint32_t alignment = type.getElementTypeBitWidth() / 8;
     Value none =
@@ -130,6 +163,16 @@ struct ScatterLowering : LaneLowering<ScatterOp> {
                   ConversionPatternRewriter &rewriter) const override {
     Location loc = op.getLoc();
     auto type = cast<VectorType>(op.getValue().getType());
+    if (std::optional<RowWord> word =
+            findRowWord(rewriter, op, adaptor, type)) {
+      SmallVector<Value> words(word->size / wordSize);
+      words[word->number] = vector::BitCastOp::create(
+          rewriter, loc, type.clone(rewriter.getI32Type()), adaptor.getValue());
+      RecordRow(rewriter, loc, word->first, word->size, adaptor.getMask())
+          .write(words);
+      rewriter.eraseOp(op);
+      return success();
+    }
     LaneAddresses to = address(rewriter, op, adaptor, type);
     uint32_t alignment = type.getElementTypeBitWidth() / 8;
     if (to.first)
@@ -290,6 +333,16 @@ struct LaneElementsLowering : Lowering<LaneElementsOp> {
     };
     Value offset = computeOffset(rewriter, loc, view, adaptor.getIndices(),
                                  record.getSize(), type.getNumElements());
+    if (op.getConsecutive()) {
+      SmallVector<int64_t> steps;
+      for (int64_t lane = 0; lane < type.getNumElements(); ++lane)
+        steps.push_back(lane * record.getSize());
+      offset =
+          CodeBuilder(rewriter, loc)
+              .add(widen(offset),
+                   arith::ConstantOp::create(
+                       rewriter, loc, DenseIntElementsAttr::get(words, steps)));
+    }
     Value first = LLVM::PtrToIntOp::create(rewriter, loc, rewriter.getI64Type(),
                                            view.data);
     rewriter.replaceOpWithNewOp<arith::IndexCastOp>(

@@ -6,6 +6,7 @@
 
 #include "KernelLowering.h"
 #include "RecordPieces.h"
+#include "RecordRows.h"
 
 #include "mlir/Dialect/SCF/IR/SCF.h"
 #include "mlir/Dialect/Vector/IR/VectorOps.h"
@@ -168,6 +169,23 @@ static Value toIntegers(OpBuilder &builder, Location loc, Value addresses) {
       addresses);
 }
 
+/// The records at consecutive addresses, if they are few words each.
+static std::optional<RecordRow> findRow(OpBuilder &builder, Location loc,
+                                        LaneElementsOp elements,
+                                        Value addresses, Value mask,
+                                        int64_t size, int64_t fields) {
+  int64_t lanes = cast<VectorType>(mask.getType()).getNumElements();
+  if (!elements || !elements.getConsecutive() ||
+      !isRecordRow(lanes, size, fields))
+    return std::nullopt;
+  Value first = vector::ExtractOp::create(builder, loc, addresses, 0);
+  return RecordRow(builder, loc,
+                   LLVM::IntToPtrOp::create(
+                       builder, loc,
+                       LLVM::LLVMPointerType::get(builder.getContext()), first),
+                   size, mask);
+}
+
 struct LaneGetFieldsLowering : Lowering<LaneGetFieldsOp> {
   using Lowering::Lowering;
   LogicalResult
@@ -185,6 +203,15 @@ struct LaneGetFieldsLowering : Lowering<LaneGetFieldsOp> {
       areWords &= cast<VectorType>(type).getElementTypeBitWidth() == 32 &&
                   fields.back().getOffset() % wordSize == 0;
     }
+    LaneElementsOp elements;
+    if (areWords)
+      elements = op.getAddresses().getDefiningOp<LaneElementsOp>();
+    if (std::optional<RecordRow> row =
+            findRow(rewriter, loc, elements, addresses, mask, record.getSize(),
+                    fields.size())) {
+      rewriter.replaceOp(op, readRow(rewriter, op, *row, fields));
+      return success();
+    }
     SmallVector<int64_t> pieces;
     if (areWords && laneCount % pieceWords == 0)
       pieces = planPieces(fields, record.getSize());
@@ -200,6 +227,19 @@ struct LaneGetFieldsLowering : Lowering<LaneGetFieldsOp> {
                                         mask, fields, op.getResultTypes())
                                .readPieces(pieces));
     return success();
+  }
+
+  static SmallVector<Value> readRow(OpBuilder &builder, LaneGetFieldsOp op,
+                                    RecordRow &row,
+                                    ArrayRef<FieldAttr> fields) {
+    SmallVector<int64_t> words;
+    for (FieldAttr field : fields)
+      words.push_back(field.getOffset() / wordSize);
+    SmallVector<Value> values = row.read(words);
+    for (auto [value, type] : llvm::zip(values, op.getResultTypes()))
+      value = vector::BitCastOp::create(builder, op.getLoc(),
+                                        cast<VectorType>(type), value);
+    return values;
   }
 
   /// The addresses, and those of zeros for lanes that have none: loads of all
@@ -328,6 +368,10 @@ struct LaneSetFieldsLowering : Lowering<LaneSetFieldsOp> {
       for (auto [value, field] : llvm::zip(adaptor.getValues(), fields))
         writer.scatter(value, field);
     };
+    if (writeRow(rewriter, op, adaptor, addresses, fields)) {
+      rewriter.eraseOp(op);
+      return success();
+    }
     SmallVector<Run> runs;
     if (laneCount % pieceWords == 0)
       runs = planRuns(fields, adaptor.getValues());
@@ -352,6 +396,28 @@ struct LaneSetFieldsLowering : Lowering<LaneSetFieldsOp> {
   }
 
 private:
+  /// Whether the records are a row, whose fields it has written.
+  bool writeRow(OpBuilder &builder, LaneSetFieldsOp op, OpAdaptor adaptor,
+                Value addresses, ArrayRef<FieldAttr> fields) const {
+    RecordOp record =
+        context.record(getStateRecord(context.state(op, op.getState())));
+    SmallVector<Value> words(record.getSize() / wordSize);
+    Type type = VectorType::get(
+        cast<VectorType>(addresses.getType()).getShape(), builder.getI32Type());
+    for (auto [value, field] : llvm::zip(adaptor.getValues(), fields)) {
+      if (cast<VectorType>(value.getType()).getElementTypeBitWidth() != 32 ||
+          field.getOffset() % wordSize != 0)
+        return false;
+      words[field.getOffset() / wordSize] =
+          vector::BitCastOp::create(builder, op.getLoc(), type, value);
+    }
+    std::optional<RecordRow> row = findRow(
+        builder, op.getLoc(), op.getAddresses().getDefiningOp<LaneElementsOp>(),
+        addresses, adaptor.getMask(), record.getSize(), fields.size());
+    if (row)
+      row->write(words);
+    return row.has_value();
+  }
   SmallVector<FieldAttr> getFields(LaneSetFieldsOp op) const {
     RecordOp record =
         context.record(getStateRecord(context.state(op, op.getState())));

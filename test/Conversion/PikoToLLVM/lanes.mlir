@@ -2,13 +2,13 @@
 
 piko.record @F {"lo" : i32 at 0, "hi" : i32 at 4, "w" : f32 at 8} size 12 align 4
 piko.record @D {"z" : f32 at 0} size 4 align 4
-piko.record @C {"r" : f32 at 0, "g" : f32 at 4} size 8 align 4
+piko.record @C {"r" : f32 at 0, "g" : f32 at 4} size 40 align 4
 
 // Pixels that lie one behind the other are loaded and stored as a vector; with
-// other fields between them, they are gathered. An element of a buffer is found
+// many words between them, they are scattered. An element of a buffer is found
 // for each lane.
 // CHECK-LABEL: func.func private @P.kernel_a
-// CHECK:         %[[STEPS:.*]] = arith.constant dense<[0, 8, 16, 24, 32, 40, 48, 56, 64, 72, 80, 88, 96, 104, 112, 120]> : vector<16xi64>
+// CHECK:         %[[STEPS:.*]] = arith.constant dense<[0, 40, 80, 120, 160, 200, 240, 280, 320, 360, 400, 440, 480, 520, 560, 600]> : vector<16xi64>
 // CHECK:         llvm.intr.masked.gather %{{.*}} : (vector<16x!llvm.ptr>, vector<16xi1>, vector<16xf32>) -> vector<16xf32>
 // CHECK:         llvm.intr.masked.load %{{.*}} : (!llvm.ptr, vector<16xi1>, vector<16xf32>) -> vector<16xf32>
 // CHECK:         llvm.intr.masked.store %{{.*}} : vector<16xf32>, vector<16xi1> into !llvm.ptr

@@ -44,6 +44,18 @@ piko.record @F {"z" : f32 at 0} size 4 align 4
 piko.pipeline @P rank 1 {
   piko.buffer @in : @F
   piko.kernel @k {
+    %at = arith.constant dense<3> : vector<16xindex>
+    // expected-error@+1 {{'piko.cpu.elements' op expected the indices of the first of consecutive lanes, but got 'vector<16xindex>'}}
+    %as = piko.cpu.elements consecutive @in[%at : vector<16xindex>] : vector<16xindex>
+  }
+}
+
+// -----
+
+piko.record @F {"z" : f32 at 0} size 4 align 4
+piko.pipeline @P rank 1 {
+  piko.buffer @in : @F
+  piko.kernel @k {
     %mask = arith.constant dense<true> : vector<16xi1>
     %at = arith.constant dense<3> : vector<16xindex>
     // expected-error@+1 {{'piko.cpu.gather' op expected field 'z' to be of type 'f32', but got 'i32'}}

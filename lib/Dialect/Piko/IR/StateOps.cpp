@@ -187,15 +187,9 @@ LogicalResult UpdateOp::verifyRegions() {
 // How state is used
 //===----------------------------------------------------------------------===//
 
-/// The field is of the lanes' type, masks and indices have as many lanes, and
-/// consecutive ones begin with scalars.
+/// Indices have as many lanes, and consecutive ones begin with scalars.
 template <typename AccessOp>
-static LogicalResult verifyLanes(AccessOp op, VectorType lanes) {
-  int64_t count = lanes.getNumElements();
-  auto mask = cast<VectorType>(op.getMask().getType());
-  if (mask.getNumElements() != count)
-    return op.emitOpError("expected a mask of ")
-           << count << " lanes, but got " << mask;
+static LogicalResult verifyLaneIndices(AccessOp op, int64_t count) {
   for (Value index : op.getIndices())
     if (auto vector = dyn_cast<VectorType>(index.getType())) {
       if (op.getConsecutive())
@@ -206,6 +200,19 @@ static LogicalResult verifyLanes(AccessOp op, VectorType lanes) {
         return op.emitOpError("expected an index for each of ")
                << count << " lanes, but got " << vector;
     }
+  return success();
+}
+
+/// The field is of the lanes' type, and masks and indices have as many lanes.
+template <typename AccessOp>
+static LogicalResult verifyLanes(AccessOp op, VectorType lanes) {
+  int64_t count = lanes.getNumElements();
+  auto mask = cast<VectorType>(op.getMask().getType());
+  if (mask.getNumElements() != count)
+    return op.emitOpError("expected a mask of ")
+           << count << " lanes, but got " << mask;
+  if (failed(verifyLaneIndices(op, count)))
+    return failure();
   return verifyAccess(op, lanes.getElementType());
 }
 
@@ -219,11 +226,8 @@ LogicalResult ScatterOp::verifySymbolUses(SymbolTableCollection &) {
 
 LogicalResult LaneElementsOp::verifySymbolUses(SymbolTableCollection &) {
   auto lanes = cast<VectorType>(getAddresses().getType());
-  for (Value index : getIndices())
-    if (auto vector = dyn_cast<VectorType>(index.getType());
-        vector && vector.getNumElements() != lanes.getNumElements())
-      return emitOpError("expected an index for each of ")
-             << lanes.getNumElements() << " lanes, but got " << vector;
+  if (failed(verifyLaneIndices(*this, lanes.getNumElements())))
+    return failure();
   return failure(
       failed(verifyState(*this, getStateAttr(), getIndices().size())));
 }

@@ -120,19 +120,23 @@ def Piko_LaneElementsOp : Piko_CPUOp<"elements", [
     DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
   let summary = "the addresses of elements of a piece of state";
   let description = [{
-    An index is that of all lanes, or a vector with one for each. Those of lanes
-    whose indices are outside of the state are no addresses.
+    An index is that of all lanes, or a vector with one for each; with
+    `consecutive` as in `piko.cpu.gather`. Those of lanes whose indices are outside
+    of the state are no addresses.
 
     ```mlir
     %as = piko.cpu.elements @vertices[%places : vector<16xindex>]
       : vector<16xindex>
+    %bs = piko.cpu.elements consecutive @vertices[%first : index]
+      : vector<16xindex>
     ```
   }];
   let arguments = (ins FlatSymbolRefAttr:$state,
-                       Variadic<Piko_LaneIndex>:$indices);
+                       Variadic<Piko_LaneIndex>:$indices,
+                       UnitAttr:$consecutive);
   let results = (outs Piko_Addresses:$addresses);
   let assemblyFormat = [{
-    $state `[` $indices `:` type($indices) `]` attr-dict `:` type($addresses)
+    (`consecutive` $consecutive^)? $state `[` $indices `:` type($indices) `]` attr-dict `:` type($addresses)
   }];
 }
 
@@ -143,7 +147,8 @@ def Piko_LaneGetFieldsOp : Piko_CPUOp<"get_fields", [
   let description = [{
     As `piko.cpu.get` for each field, none of which is an array. What lies side by
     side is read at once where all lanes read: by loads of 16 bytes, and a
-    transposition.
+    transposition. Consecutive elements are loaded as wide vectors, whose words are
+    de-interleaved.
 
     ```mlir
     %x, %y, %z = piko.cpu.get_fields %as ["x", "y", "z"] of @Fragment mask %mask
@@ -169,7 +174,7 @@ def Piko_LaneSetFieldsOp : Piko_CPUOp<"set_fields", [
     As `piko.cpu.scatter` for each field, none of which is an array, where the
     elements are those at addresses (`piko.cpu.elements`). What lies side by side is
     written at once where all lanes write: by a transposition, and stores of 16
-    bytes.
+    bytes. Those of consecutive elements are interleaved.
 
     ```mlir
     piko.cpu.set_fields(%values) to %as ["position.x"] of @vertices mask %mask
