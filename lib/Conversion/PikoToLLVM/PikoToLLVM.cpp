@@ -17,6 +17,8 @@
 #include "mlir/Dialect/SCF/IR/SCF.h"
 #include "mlir/Dialect/SCF/Transforms/Patterns.h"
 #include "mlir/Dialect/UB/IR/UBOps.h"
+#include "mlir/Dialect/Vector/IR/VectorOps.h"
+#include "llvm/ADT/SetVector.h"
 
 namespace piko {
 #define GEN_PASS_DEF_CONVERTPIKOTOLLVM
@@ -85,6 +87,28 @@ static void noteSubject(func::FuncOp function, const PipelineNumbers &numbers) {
                                          bins.getSource().value_or(stage)));
     if (bins.getSource())
       function->setAttr(marks::source, builder.getUnitAttr());
+  }
+}
+
+/// Says where hardly any lane fails: calls there, one lane after the other, are
+/// in a loop, so that LLVM does not see it, and spills registers in front.
+static void expectSuccess(func::FuncOp function) {
+  llvm::SetVector<Operation *> choices;
+  function.walk([&](Operation *op) {
+    Operation *turns = op->getParentOp();
+    if (op->hasTrait<Failure>() && isa<scf::WhileOp>(turns) &&
+        isa<scf::IfOp>(turns->getParentOp()))
+      choices.insert(turns->getParentOp());
+  });
+  for (Operation *op : choices) {
+    auto choice = cast<scf::IfOp>(op);
+    if (!choice.getCondition().getDefiningOp<vector::ReductionOp>() ||
+        choice.getNumResults() > 0 || choice.elseBlock())
+      continue;
+    OpBuilder builder(choice);
+    Value never = arith::ConstantIntOp::create(builder, choice.getLoc(), 0, 1);
+    choice.getConditionMutable().assign(LLVM::ExpectOp::create(
+        builder, choice.getLoc(), choice.getCondition(), never));
   }
 }
 
@@ -164,6 +188,8 @@ LogicalResult ConvertPikoToLLVMPass::convert(PipelineOp pipeline,
   populateReductionsToLLVMPatterns(converter, patterns, context);
   populateGridToLLVMPatterns(converter, patterns, context);
   FrozenRewritePatternSet frozen(std::move(patterns));
+  for (func::FuncOp function : functions)
+    expectSuccess(function);
   for (func::FuncOp function : functions)
     if (failed(applyPartialConversion(function, target, frozen)))
       return failure();
