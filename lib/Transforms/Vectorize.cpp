@@ -3,6 +3,7 @@
 // piko-vectorize: primitives, or the iterations of a parallel loop, as lanes.
 
 #include "IterationWriter.h"
+#include "LaneArrays.h"
 #include "LaneCandidate.h"
 #include "LaneNests.h"
 #include "LoopSplitter.h"
@@ -144,48 +145,6 @@ static void countLoops(scf::ForOp root) {
       countLoop(loop, *counting);
 }
 
-/// Where lanes read different elements of a short array in a field, as the
-/// components of a corner, each is read, and a lane chooses: there is no gather
-/// within an element.
-static void readAllElements(scf::ForOp root) {
-  constexpr int64_t most = 4;
-  SmallVector<LoadOp> loads;
-  root.walk([&](LoadOp load) {
-    if (!llvm::all_of(load.getElements(), [](Value element) {
-          return matchPattern(element, m_Constant());
-        }))
-      loads.push_back(load);
-  });
-  if (loads.empty())
-    return;
-  Uniformity uniformity(root, {{root.getInductionVar(), Uniform::Iteration}});
-  for (LoadOp load : loads) {
-    Operation *state =
-        SymbolTable::lookupSymbolIn(getPipeline(load), load.getStateAttr());
-    RecordOp record = lookupRecord(load, getStateRecord(state));
-    ArrayRef<int64_t> counts = record.getField(load.getField()).getCounts();
-    SmallVector<Value> elements(load.getElements());
-    auto varies = [&](Value element) { return uniformity.isVarying(element); };
-    auto one = llvm::find_if(elements, varies);
-    if (llvm::count_if(elements, varies) != 1 ||
-        counts[one - elements.begin()] > most)
-      continue;
-    IRRewriter builder(load);
-    Value value;
-    for (int64_t i = 0; i < counts[one - elements.begin()]; ++i) {
-      Value number = arith::ConstantIndexOp::create(builder, load.getLoc(), i);
-      auto read = cast<LoadOp>(builder.clone(*load));
-      read.getElementsMutable()[one - elements.begin()].assign(number);
-      Value isIt = arith::CmpIOp::create(
-          builder, load.getLoc(), arith::CmpIPredicate::eq, *one, number);
-      value = value ? arith::SelectOp::create(builder, load.getLoc(), isIt,
-                                              read.getResult(), value)
-                    : read.getResult();
-    }
-    builder.replaceOp(load, value);
-  }
-}
-
 /// With fewer iterations a loop runs as it was: a vector takes about as long as
 /// this many.
 static int64_t getLeastTurns(int64_t laneCount) {
@@ -235,6 +194,7 @@ static bool runInLockstep(ParallelForOp parallel) {
   LaneCandidate candidate(loop);
   countLoops(loop);
   readAllElements(loop);
+  copyItemArrays(loop);
   int64_t laneCount = std::max<int64_t>(llvm::PowerOf2Ceil(*count), 4);
   IterationLanes lanes(loop, laneCount);
   bool isDone = candidate.isChosen() && candidate.decide(lanes);
@@ -330,6 +290,7 @@ WalkResult VectorizePass::visit(Operation *op) {
   auto copy = cast<scf::ForOp>(OpBuilder(loop).clone(*loop));
   countLoops(copy);
   readAllElements(copy);
+  copyItemArrays(copy);
   IterationLanes lanes(copy, laneCount);
   FlatLoop flat;
   if (!lanes.getRefusal().at)
