@@ -6,6 +6,7 @@
 #include "LaneArrays.h"
 #include "LaneCandidate.h"
 #include "LaneNests.h"
+#include "LaneQuotients.h"
 #include "LoopSplitter.h"
 #include "LoopStreams.h"
 #include "ParallelLoops.h"
@@ -300,7 +301,8 @@ WalkResult VectorizePass::visit(Operation *op) {
     countPrimitives(loop, flat.writers);
     vectorize(IterationLanes(flat.loop, laneCount), copy);
   } else if (isDone) {
-    vectorize(lanes, copy);
+    testDividends(copy);
+    vectorize(IterationLanes(copy, laneCount), copy);
   } else {
     copy.erase();
     ++left;
