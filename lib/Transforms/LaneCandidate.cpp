@@ -2,6 +2,7 @@
 
 #include "LaneCandidate.h"
 
+#include "LaneLatency.h"
 #include "Lanes.h"
 #include "SequentialLoops.h"
 
@@ -126,13 +127,24 @@ bool LaneCandidate::isRefused(const IterationLanes &lanes,
   return true;
 }
 
+/// A row of pixels, or a bin's, may fill no more than one vector.
+bool LaneCandidate::paysInPairs(const IterationLanes &lanes,
+                                const FlatLoop &flat) const {
+  if (!ofPrimitives || lanes.getLaneCount() != widestLanes || asksAhead(loop))
+    return false;
+  if (!flat.loop)
+    return isBoundByLatency(lanes);
+  return !isOneVector(flat.loop, widestLanes) &&
+         isBoundByLatency(IterationLanes(flat.loop, widestLanes));
+}
+
 void LaneCandidate::remarkVectors(const IterationLanes &lanes,
                                   const FlatLoop &flat) {
   InFlightDiagnostic remark = loop.emitRemark();
   if (ofPrimitives)
     remark << "stage '" << getKernelStage(loop).getSymName()
            << "': " << getLoopPhase(loop) << " is vectorized for "
-           << lanes.getLaneCount() << " primitives at once";
+           << (paired ? 2 : 1) * lanes.getLaneCount() << " primitives at once";
   else
     remark << "these iterations are vectorized for " << lanes.getLaneCount()
            << " at once";
@@ -159,6 +171,7 @@ bool LaneCandidate::decide(const IterationLanes &lanes, const FlatLoop &flat) {
     return false; // clears or copies, which needs no plan
   if (!said && isRefused(lanes, flat))
     return false;
+  paired = paysInPairs(lanes, flat);
   remarkVectors(lanes, flat);
   return true;
 }

@@ -13,6 +13,9 @@ namespace piko {
 /// estimates may be wrong.
 bool isSurelyFaster(const IterationLanes::Cost &cost, int64_t laneCount);
 
+/// The number of lanes of vectors that have enough registers for two of each.
+constexpr int64_t widestLanes = 16;
+
 /// A loop that lanes may share.
 class LaneCandidate {
 public:
@@ -23,11 +26,15 @@ public:
   /// Whether it becomes vectors, which a remark tells; `flat` is what lanes may
   /// do instead.
   bool decide(const IterationLanes &lanes, const FlatLoop &flat = {});
+  /// Whether it becomes vectors of twice as many lanes.
+  bool isPaired() const { return paired; }
 
 private:
   mlir::InFlightDiagnostic refuse();
   /// Whether it is expected to take less otherwise, which a remark tells.
   bool isRefused(const IterationLanes &lanes, const FlatLoop &flat);
+  /// Whether two vectors at once are expected to take much less.
+  bool paysInPairs(const IterationLanes &lanes, const FlatLoop &flat) const;
   void remarkVectors(const IterationLanes &lanes, const FlatLoop &flat);
   /// Whether it takes less to run primitives one after the other, and to give
   /// lanes the iterations of loops in them.
@@ -37,6 +44,7 @@ private:
   mlir::scf::ForOp loop;
   bool ofPrimitives;
   bool chosen = false;
+  bool paired = false;
   bool said = false; ///< By the schedule, or by barriers, whatever it costs.
 };
 

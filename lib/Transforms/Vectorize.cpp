@@ -5,6 +5,7 @@
 #include "IterationWriter.h"
 #include "LaneArrays.h"
 #include "LaneCandidate.h"
+#include "LaneLatency.h"
 #include "LaneNests.h"
 #include "LaneQuotients.h"
 #include "LoopSplitter.h"
@@ -50,6 +51,9 @@ private:
   void vectorize(const IterationLanes &lanes, scf::ForOp scalar);
   void vectorize(const IterationLanes &lanes) {
     vectorize(lanes, lanes.getLoop());
+  }
+  int64_t countLanes(const LaneCandidate &candidate) const {
+    return candidate.isPaired() ? 2 * laneCount : int64_t(laneCount);
   }
 };
 
@@ -272,8 +276,9 @@ bool VectorizePass::vectorizeInOrder(Operation *op) {
       copy.erase();
       return false;
     }
-    remarkInOrder(copy, laneCount, /*isCompact=*/false);
-    vectorize(lanes);
+    bool isPaired = laneCount == widestLanes && isBoundByLatency(lanes);
+    remarkInOrder(copy, (isPaired ? 2 : 1) * laneCount, /*isCompact=*/false);
+    vectorize(IterationLanes(copy, (isPaired ? 2 : 1) * laneCount));
   }
   op->erase();
   ++vectorized;
@@ -299,10 +304,10 @@ WalkResult VectorizePass::visit(Operation *op) {
   bool isDone = candidate.decide(lanes, flat);
   if (isDone && flat.loop) {
     countPrimitives(loop, flat.writers);
-    vectorize(IterationLanes(flat.loop, laneCount), copy);
+    vectorize(IterationLanes(flat.loop, countLanes(candidate)), copy);
   } else if (isDone) {
     testDividends(copy);
-    vectorize(IterationLanes(copy, laneCount), copy);
+    vectorize(IterationLanes(copy, countLanes(candidate)), copy);
   } else {
     copy.erase();
     ++left;

@@ -5,10 +5,11 @@ piko.record @N {"n" : i32 at 0} size 4 align 4
 
 // Eight searches, each of which ends when it has found something: one loop, in
 // whose turns lanes are in different searches. A search goes on, or it adds what
-// it has found, and the next one begins.
+// it has found, and the next one begins. A turn waits for a gather, so that two
+// vectors take turns.
 // CHECK-LABEL: piko.pipeline @Searches
 // CHECK:         scf.while
-// CHECK-SAME:      vector<16xi1>
+// CHECK-SAME:      vector<32xi1>
 // CHECK:         } do {
 // CHECK:           piko.cpu.gather @table
 // CHECK-NOT:     scf.while
@@ -27,7 +28,7 @@ piko.pipeline @Searches rank 1 {
     %u = piko.storage.unit_count %bins : !piko.bins<@P>
     scf.forall (%unit) in (%u) {
       %lo, %hi = piko.storage.cell_range %bins[%unit, %unit] : !piko.bins<@P>
-      // expected-remark@+1 {{stage 'a': process is vectorized for 16 primitives at once}}
+      // expected-remark@+1 {{stage 'a': process is vectorized for 32 primitives at once}}
       scf.for %i = %lo to %hi step %step {
         %p = piko.storage.item %bins[%i] : !piko.bins<@P> -> !piko.prim<@P>
         %k = piko.get %p "k" : !piko.prim<@P> -> i32

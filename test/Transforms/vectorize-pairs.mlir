@@ -97,7 +97,7 @@ piko.pipeline @Carried rank 1 {
     %n = piko.storage.unit_count %bins : !piko.bins<@B>
     scf.forall (%u) in (%n) {
       %lo, %hi = piko.storage.cell_range %bins[%u, %u] : !piko.bins<@B>
-      // expected-remark@+1 {{stage 'a': process is vectorized for 16 primitives at once}}
+      // expected-remark@+1 {{stage 'a': process is vectorized for 32 primitives at once}}
       scf.for %i = %lo to %hi step %step {
         %b = piko.storage.item %bins[%i] : !piko.bins<@B> -> !piko.prim<@B>
         %w = piko.get %b "w" : !piko.prim<@B> -> i32
