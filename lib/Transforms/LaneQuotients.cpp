@@ -10,62 +10,132 @@
 using namespace mlir;
 using namespace piko;
 
-/// The quotient by what is the same in all turns that, where it is negative,
-/// decides a test; or null.
-static arith::DivFOp findQuotient(arith::CmpFOp test, bool skips,
-                                  scf::ForOp root) {
+/// Whether a comparison with 0 decides for numbers that are negative.
+static bool isDecided(arith::CmpFOp test, bool skips) {
   using P = arith::CmpFPredicate;
-  P predicate = test.getPredicate();
-  bool isDecided =
-      skips ? llvm::is_contained({P::OLT, P::OLE, P::ULT, P::ULE}, predicate)
-            : llvm::is_contained({P::OGT, P::OGE, P::UGT, P::UGE}, predicate);
-  auto quotient = test.getLhs().getDefiningOp<arith::DivFOp>();
+  return matchPattern(test.getRhs(), m_AnyZeroFloat()) &&
+         llvm::is_contained(skips ? ArrayRef<P>{P::OLT, P::OLE, P::ULT, P::ULE}
+                                  : ArrayRef<P>{P::OGT, P::OGE, P::UGT, P::UGE},
+                            test.getPredicate());
+}
+
+/// The quotient by what is the same in all turns; or null.
+static arith::DivFOp findQuotient(Value value, scf::ForOp root) {
+  auto quotient = value.getDefiningOp<arith::DivFOp>();
   bool isShared =
       quotient && quotient.getType().isF32() &&
       !root->isAncestor(quotient.getRhs().getParentBlock()->getParentOp());
-  return isDecided && isShared && matchPattern(test.getRhs(), m_AnyZeroFloat())
-             ? quotient
-             : arith::DivFOp();
+  return isShared ? quotient : arith::DivFOp();
 }
 
-/// The quotients each of which decides alone, where it is negative, that a turn
-/// does not go on.
-static void findQuotients(Value condition, bool skips, scf::ForOp root,
-                          llvm::SetVector<arith::DivFOp> &quotients) {
+/// What tests compare that decide, where they are negative, that a turn does
+/// not go on.
+struct Tested {
+  llvm::SetVector<arith::DivFOp> quotients;
+  /// Pairs of quotients by one divisor whose sum is taken off 1, as for the
+  /// last barycentric coordinate.
+  SmallVector<std::pair<arith::DivFOp, arith::DivFOp>> rests;
+};
+
+/// The quotients whose sum is taken off 1, in either order.
+static std::pair<arith::DivFOp, arith::DivFOp> findRest(Value value) {
+  auto quotient = [](Value part) {
+    return part.getDefiningOp<arith::DivFOp>();
+  };
+  auto rest = value.getDefiningOp<arith::SubFOp>();
+  if (!rest)
+    return {};
+  auto isOne = [](Value part) { return matchPattern(part, m_OneFloat()); };
+  if (auto sum = rest.getRhs().getDefiningOp<arith::AddFOp>();
+      sum && isOne(rest.getLhs()))
+    return {quotient(sum.getLhs()), quotient(sum.getRhs())};
+  auto before = rest.getLhs().getDefiningOp<arith::SubFOp>();
+  if (before && isOne(before.getLhs()))
+    return {quotient(before.getRhs()), quotient(rest.getRhs())};
+  return {};
+}
+
+static void findTested(Value condition, bool skips, scf::ForOp root,
+                       Tested &tested) {
   Operation *op = condition.getDefiningOp();
   if (skips ? isa_and_nonnull<arith::OrIOp>(op)
             : isa_and_nonnull<arith::AndIOp>(op)) {
-    findQuotients(op->getOperand(0), skips, root, quotients);
-    findQuotients(op->getOperand(1), skips, root, quotients);
-  } else if (auto test = dyn_cast_or_null<arith::CmpFOp>(op)) {
-    if (arith::DivFOp quotient = findQuotient(test, skips, root))
-      quotients.insert(quotient);
+    findTested(op->getOperand(0), skips, root, tested);
+    findTested(op->getOperand(1), skips, root, tested);
+  } else if (auto test = dyn_cast_or_null<arith::CmpFOp>(op);
+             test && isDecided(test, skips)) {
+    if (arith::DivFOp quotient = findQuotient(test.getLhs(), root))
+      tested.quotients.insert(quotient);
+    else if (auto rest = findRest(test.getLhs()); rest.first && rest.second)
+      tested.rests.push_back(rest);
   }
 }
 
-/// Whether a quotient is surely negative: its dividend has the other sign than
-/// the divisor, and is so much larger than nothing that it does not become 0.
-static Value isSurelyNegative(OpBuilder &builder, arith::DivFOp quotient,
-                              scf::ForOp root) {
-  Location loc = quotient.getLoc();
-  Value sign, least;
-  {
-    OpBuilder::InsertionGuard guard(builder);
-    builder.setInsertionPoint(root);
-    auto constant = [&](float value) -> Value {
-      return arith::ConstantOp::create(builder, loc,
-                                       builder.getF32FloatAttr(value));
-    };
-    constexpr float tiny = 0x1p-100F;
-    Value divisor = quotient.getRhs();
-    sign = math::CopySignOp::create(builder, loc, constant(1), divisor);
-    least = arith::MulFOp::create(builder, loc,
-                                  math::AbsFOp::create(builder, loc, divisor),
-                                  constant(-tiny));
+namespace {
+
+/// Tests of dividends by what is the same in all turns.
+class DividendTests {
+public:
+  explicit DividendTests(OpBuilder &builder, scf::ForOp root)
+      : builder(builder), front(root) {}
+  Value isSurelyNegative(arith::DivFOp quotient);
+  Value isSurelyNegative(arith::DivFOp a, arith::DivFOp b);
+
+private:
+  /// The dividend of the quotient of numbers one of which is the divisor
+  /// without its sign.
+  Value getDividend(arith::DivFOp quotient);
+  Value scale(arith::DivFOp quotient, float factor);
+  Value constant(Location loc, float value) {
+    return arith::ConstantOp::create(front, loc, front.getF32FloatAttr(value));
   }
-  Value dividend = arith::MulFOp::create(builder, loc, quotient.getLhs(), sign);
-  return arith::CmpFOp::create(builder, loc, arith::CmpFPredicate::OLT,
-                               dividend, least);
+
+  OpBuilder &builder;
+  OpBuilder front; ///< in front of all turns
+};
+
+} // namespace
+
+Value DividendTests::getDividend(arith::DivFOp quotient) {
+  Location loc = quotient.getLoc();
+  Value sign =
+      math::CopySignOp::create(front, loc, constant(loc, 1), quotient.getRhs());
+  return arith::MulFOp::create(builder, loc, quotient.getLhs(), sign);
+}
+
+Value DividendTests::scale(arith::DivFOp quotient, float factor) {
+  Location loc = quotient.getLoc();
+  return arith::MulFOp::create(
+      front, loc, math::AbsFOp::create(front, loc, quotient.getRhs()),
+      constant(loc, factor));
+}
+
+/// The dividend has the other sign than the divisor, and is so much larger than
+/// nothing that the quotient does not become 0.
+Value DividendTests::isSurelyNegative(arith::DivFOp quotient) {
+  constexpr float tiny = 0x1p-100F;
+  return arith::CmpFOp::create(builder, quotient.getLoc(),
+                               arith::CmpFPredicate::OLT, getDividend(quotient),
+                               scale(quotient, -tiny));
+}
+
+/// Of what is left of 1 after two quotients that are not negative: their sum is
+/// more than 1 by more than what all is rounded by, which is less than 2^-21 of
+/// it. A divisor that is so small that it loses bits, or is 0, is left to the
+/// quotients.
+Value DividendTests::isSurelyNegative(arith::DivFOp a, arith::DivFOp b) {
+  constexpr float more = 1 + 0x1p-16F, tiny = 0x1p-100F;
+  Location loc = b.getLoc();
+  Value least = scale(a, more);
+  Value isTiny = arith::CmpFOp::create(front, loc, arith::CmpFPredicate::OLT,
+                                       least, constant(loc, tiny));
+  least = arith::SelectOp::create(
+      front, loc, isTiny, constant(loc, std::numeric_limits<float>::infinity()),
+      least);
+  Value sum =
+      arith::AddFOp::create(builder, loc, getDividend(a), getDividend(b));
+  return arith::CmpFOp::create(builder, loc, arith::CmpFPredicate::OGT, sum,
+                               least);
 }
 
 /// Moves what only a block needs into it.
@@ -85,19 +155,26 @@ static void testDividends(scf::IfOp choice, scf::ForOp root) {
   bool skips = choice.getThenRegion().front().without_terminator().empty();
   bool hasElse = !choice.getElseRegion().empty() &&
                  !choice.getElseRegion().front().without_terminator().empty();
-  llvm::SetVector<arith::DivFOp> quotients;
+  Tested tested;
   if (choice.getNumResults() == 0 && skips == hasElse)
-    findQuotients(choice.getCondition(), skips, root, quotients);
-  if (quotients.empty())
+    findTested(choice.getCondition(), skips, root, tested);
+  if (tested.quotients.empty())
     return;
   OpBuilder builder(choice);
   Location loc = choice.getLoc();
+  DividendTests tests(builder, root);
   Value isOut;
-  for (arith::DivFOp quotient : quotients) {
-    Value negative = isSurelyNegative(builder, quotient, root);
+  auto add = [&](Value negative) {
     isOut =
         isOut ? arith::OrIOp::create(builder, loc, isOut, negative) : negative;
-  }
+  };
+  for (arith::DivFOp quotient : tested.quotients)
+    add(tests.isSurelyNegative(quotient));
+  // Where one of the two is negative, it decides itself.
+  for (auto [a, b] : tested.rests)
+    if (tested.quotients.contains(a) && tested.quotients.contains(b) &&
+        a.getRhs() == b.getRhs())
+      add(tests.isSurelyNegative(a, b));
   Value yes = arith::ConstantIntOp::create(builder, loc, 1, 1);
   Value mayGoOn = arith::XOrIOp::create(builder, loc, isOut, yes);
   auto around = scf::IfOp::create(builder, loc, mayGoOn, /*withElse=*/false);

@@ -92,3 +92,60 @@ piko.pipeline @Other rank 1 {
     piko.storage.close_bins %bins : !piko.bins<@V>
   }
 }
+
+// -----
+
+piko.record @V {"z" : f32 at 0} size 4 align 4
+piko.record @W {"u" : f32 at 0, "v" : f32 at 4} size 8 align 4
+
+// What is left of 1 after two such quotients is negative where the dividends' sum
+// is more than the divisor, by more than what is rounded; a divisor that is tiny is
+// not known to be exceeded.
+// CHECK-LABEL: piko.pipeline @Barycentric
+// CHECK-DAG:     %[[INFINITY:.*]] = arith.constant 0x7F800000 : f32
+// CHECK:         %[[ABS:.*]] = math.absf %{{.*}} : f32
+// CHECK:         arith.mulf %[[ABS]], %{{.*}} : f32
+// CHECK-NEXT:    %[[MORE:.*]] = arith.mulf %[[ABS]], %{{.*}} : f32
+// CHECK:         %[[IS_TINY:.*]] = arith.cmpf olt, %[[MORE]], %{{.*}} : f32
+// CHECK:         %[[LEAST:.*]] = arith.select %[[IS_TINY]], %[[INFINITY]], %[[MORE]] : f32
+// CHECK:         %[[SUM:.*]] = arith.addf %{{.*}}, %{{.*}} : vector<16xf32>
+// CHECK-NEXT:    %[[LEASTS:.*]] = vector.broadcast %[[LEAST]]
+// CHECK-NEXT:    arith.cmpf ogt, %[[SUM]], %[[LEASTS]] : vector<16xf32>
+// CHECK:         scf.if
+// CHECK-COUNT-2:   arith.divf
+piko.pipeline @Barycentric rank 1 {
+  piko.constant @area : @V
+  piko.buffer @in : @W
+  piko.buffer @out : @V
+  piko.source @a
+  piko.stage @a bins [0] threads 1 : @V -> [] {}
+  piko.kernel @k {
+    %c0 = arith.constant 0 : index
+    %c1 = arith.constant 1 : index
+    %zero = arith.constant 0.0 : f32
+    %one = arith.constant 1.0 : f32
+    %bins = piko.storage.open_bins @a : !piko.bins<@V>
+    %n = piko.storage.unit_count %bins : !piko.bins<@V>
+    scf.forall (%unit) in (%n) {
+      %area = piko.load @area "z" : f32
+      scf.for %x = %c0 to %n step %c1 {
+        %a = piko.load checked @in[%x : index] "u" : f32
+        %b = piko.load checked @in[%x : index] "v" : f32
+        %c = arith.subf %a, %b : f32
+        %u = arith.divf %a, %area : f32
+        %v = arith.divf %c, %area : f32
+        %rest = arith.subf %one, %u : f32
+        %w = arith.subf %rest, %v : f32
+        %uIsIn = arith.cmpf oge, %u, %zero : f32
+        %vIsIn = arith.cmpf oge, %v, %zero : f32
+        %wIsIn = arith.cmpf oge, %w, %zero : f32
+        %areIn = arith.andi %uIsIn, %vIsIn : i1
+        %isInside = arith.andi %areIn, %wIsIn : i1
+        scf.if %isInside {
+          piko.store %w, checked @out[%x : index] "z" : f32
+        }
+      } {piko.lanes}
+    }
+    piko.storage.close_bins %bins : !piko.bins<@V>
+  }
+}
