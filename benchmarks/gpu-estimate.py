@@ -12,7 +12,7 @@ which interprets PTX, once for each number of multiprocessors: seconds to minute
 For each kernel and chip: the least milliseconds that the chip's published limits
 (gpu_model/chips.json) allow for what was counted, what limits it, and how many they
 may be where nothing but other warps hides latency. gpu_model/model.py says what is
-in it. What the host does, such as joins of edges of cycles, is not. Loops in which
+in it. What the host does is not, nor how long blocks take to meet. Loops in which
 blocks wait for each other run longer there than on a card, and are counted. Nothing
 here is measured.
 """
