@@ -192,6 +192,8 @@ int32_t pikort_bind_constant(pikort_pipeline *p, const char *name,
     if (!data)
       invalid("constant " + quoted(state.name) +
               ": expected its bytes, but got null");
+    state.changed |=
+        std::memcmp(state.bytes.data(), data, static_cast<size_t>(size)) != 0;
     std::memcpy(state.bytes.data(), data, static_cast<size_t>(size));
     state.bound = true;
   });

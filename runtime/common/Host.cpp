@@ -141,6 +141,10 @@ int32_t pikort_set_strip_size(pikort_pipeline *p, int64_t primitives) {
   });
 }
 
+int32_t pikort_set_kernel_times(pikort_pipeline *p, int32_t on) {
+  return call(p, [&] { change(p, [=] { p->timesKernels = on != 0; }); });
+}
+
 int32_t pikort_set_unit_report(pikort_pipeline *p,
                                void (*report)(void *, const pikort_unit_run *),
                                void *data) {

@@ -60,7 +60,8 @@ struct State {
   bool unused = false;        ///< A buffer that no kernel uses.
   bool onDevice = false;      ///< What is bound is a device's memory.
   std::vector<uint8_t> clear; ///< One record, or empty.
-  std::vector<uint8_t> bytes; ///< A constant's.
+  std::vector<uint8_t> bytes; ///< A constant's, ...
+  bool changed = true;        ///< ... since a frame of a device took them.
   Array<uint8_t> owned;       ///< An image's, or of a buffer that we allocate.
   Array<uint8_t> mirror;      ///< What a device sees of the host's own memory.
   uint8_t *hosts = nullptr; ///< That memory, while the mirror takes its place.
@@ -264,6 +265,7 @@ struct pikort_pipeline {
   int64_t loopLimit = int64_t(1) << 20; ///< Of hops and of rounds.
   int64_t stripSize = 0;                ///< Of all strips; 0 = not said.
 
+  bool timesKernels = false; ///< Of frames of a device.
   void (*unitReport)(void *, const pikort_unit_run *) = nullptr;
   void *unitReportData = nullptr;
 

@@ -26,8 +26,9 @@ enum class Part {
   Kernel,     ///< Units of work, and waiting for those of other threads.
   Cycle,      ///< Decides what runs next in a cycle, and keeps its order.
   Allocation, ///< Gets memory from the system, and gives it back.
+  Device,     ///< Waits for all of a run on a device.
 };
-constexpr size_t partCount = 6;
+constexpr size_t partCount = 7;
 
 class Profile {
 public:

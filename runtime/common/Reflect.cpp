@@ -154,7 +154,8 @@ int32_t pikort_get_time_stats(pikort_pipeline *p, pikort_time_stats *stats) {
             part(Part::Cycle),
             part(Part::State),
             part(Part::Allocation),
-            part(Part::Program)};
+            part(Part::Program),
+            part(Part::Device)};
   return PIKORT_OK;
 }
 

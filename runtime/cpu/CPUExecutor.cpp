@@ -79,7 +79,9 @@ int32_t CPUExecutor::runProgram() {
 
 int32_t CPUExecutor::awaitProgram() {
   pending = false;
+  p.profile.enter(Part::Device);
   DeviceFrame::Outcome outcome = frame->await();
+  p.profile.enter(Part::Program);
   if (outcome == DeviceFrame::Outcome::Done)
     return p.status;
   repeated = true;
@@ -93,8 +95,8 @@ int32_t CPUExecutor::repeatProgram(DeviceFrame::Outcome outcome) {
       outcome == DeviceFrame::Outcome::Spoilt)
     throw Failure{PIKORT_OUT_OF_MEMORY,
                   "pipeline " + quoted(p.name) +
-                      ": out of memory on the device, and what it kept from "
-                      "the run before is lost"};
+                      ": out of memory on the device, and what the run changes "
+                      "in place is lost"};
   return status;
 }
 

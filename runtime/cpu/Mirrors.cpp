@@ -47,8 +47,12 @@ static int64_t bytesOf(const pikort_pipeline &p, const State &state) {
 }
 
 static void beginMirror(pikort_pipeline &p, State &state, bool isFrame) {
-  fillMirror(p, state.mirror,
-             {state.view.data, bytesOf(p, state), state.onDevice}, isFrame);
+  bool isThere = isFrame && state.kind == PIKORT_CONSTANT && state.mirror &&
+                 !state.changed;
+  if (!isThere)
+    fillMirror(p, state.mirror,
+               {state.view.data, bytesOf(p, state), state.onDevice}, isFrame);
+  state.changed = false;
   state.hosts = std::exchange(state.view.data, state.mirror.data());
 }
 

@@ -262,6 +262,7 @@ void Accelerator::await(std::span<const Step> steps) {
     wait(steps);
   else if (CUresult result = device_->driver.cuEventSynchronize(done_))
     device_->check(result, "running " + describeFailed(steps));
+  submission_.addTimes();
   leaveStream();
 }
 

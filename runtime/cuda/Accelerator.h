@@ -91,7 +91,7 @@ private:
   CUevent done_ = nullptr;    ///< Behind a frame that is not waited for.
   bool usesEvent_ = false;    ///< To wait for the run.
   bool isBusy_ = false;       ///< The stream may have something to do for it.
-  Submission submission_{*this};
+  Submission submission_{*this, *device_};
   std::span<uint8_t> log_;
   int64_t *progress_ = nullptr;
   int64_t residentThreads_ = 0, joinBlocks_ = 0, mostAlone_ = 0;

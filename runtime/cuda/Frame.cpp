@@ -247,13 +247,31 @@ int64_t Frame::findStrip(const Stage &stage) {
 
 // --- What the program asks for ----------------------------------------------
 
-void Frame::launchOwn(const char *kernel, const void *args) {
+void Frame::launchOwn(const char *kernel, const void *args, int32_t timed) {
   steps_.push_back({Step::Kind::Grid,
                     {kernel,
                      device_.joinBlocks(),
                      joinThreads,
                      {reinterpret_cast<int64_t>(args)},
-                     /*isJoin=*/true}});
+                     /*isJoin=*/true},
+                    /*again=*/nullptr,
+                    timed});
+}
+
+int32_t Frame::kernelOf(int32_t number, bool isSource) const {
+  int32_t kernel = 0;
+  for (size_t s = 0; s < p_.stages.size(); ++s) {
+    for (int32_t source : p_.stages[s].sources)
+      if (p_.stages[s].placed()) {
+        if (isSource && source == number)
+          return kernel;
+        ++kernel;
+      }
+    if (!isSource && static_cast<int32_t>(s) == number)
+      return kernel;
+    ++kernel;
+  }
+  return -1;
 }
 
 const pikoir_input *Frame::join(int32_t number, bool isSource) {
@@ -275,7 +293,8 @@ const pikoir_input *Frame::join(int32_t number, bool isSource) {
   place.args = &args;
   place.stage = isSource ? -1 : number;
   joined_ = &place;
-  launchOwn("piko_join", &args);
+  timed_ = kernelOf(number, isSource);
+  launchOwn("piko_join", &args, timed_);
   if (!isSource)
     for (int32_t id : p_.stages[number].clears)
       isCleared_[static_cast<size_t>(id)] = true;
@@ -283,7 +302,7 @@ const pikoir_input *Frame::join(int32_t number, bool isSource) {
 }
 
 void Frame::launch(GridLaunch grid) {
-  steps_.push_back({Step::Kind::Grid, std::move(grid)});
+  steps_.push_back({Step::Kind::Grid, std::move(grid), nullptr, timed_});
   if (joined_ && joined_->stage >= 0)
     queue(*joined_);
 }

@@ -43,6 +43,7 @@ struct Step {
   Kind kind;
   GridLaunch grid;
   const int32_t *again = nullptr; ///< Where the device sees it.
+  int32_t timed = -1; ///< The kernel of the pipeline's whose time a grid is.
   bool operator==(const Step &) const = default;
 };
 
@@ -117,8 +118,10 @@ private:
   Place &find(int32_t number, bool isSource) const {
     return places_[static_cast<int64_t>(placeOf(number, isSource))];
   }
-  /// Notes a grid of the runtime's own kernels.
-  void launchOwn(const char *kernel, const void *args);
+  /// Notes a grid of the runtime's own kernels, for one of the pipeline's.
+  void launchOwn(const char *kernel, const void *args, int32_t timed = -1);
+  /// As pikort_get_kernel_stats counts them.
+  int32_t kernelOf(int32_t number, bool isSource) const;
   int64_t nextNumber() const { return static_cast<int64_t>(steps_.size()); }
   void describeSource(JoinArgs &args, int32_t source) const;
   void describeStage(JoinArgs &args, int32_t number);
@@ -158,12 +161,13 @@ private:
   std::vector<Step> steps_;
   std::vector<bool> isCleared_;      ///< States of this run.
   const Place *joined_ = nullptr;    ///< The latest.
+  int32_t timed_ = -1;               ///< Its kernel.
   std::vector<size_t> members_;      ///< Of each loop, those led through.
   std::vector<size_t> turns_;        ///< Of each cycle, those taken.
   std::vector<CycleState *> cycles_; ///< Of each, the state of its next run.
   std::vector<StripRecord> strips_;  ///< Of each group.
-  bool hasMemory_ = false;           ///< All of what follows.
   // From run to run, where the device sees it:
+  bool hasMemory_ = false; ///< All of what follows.
   rt::Array<FrameState> frame_;
   rt::Array<Place> places_;
   rt::Array<QueueState> queues_; ///< Of each edge.

@@ -97,7 +97,7 @@ void Frame::queue(const Place &place) {
   args->kernel = place.args->kernel;
   args->loop = place.args->loop;
   args->number = nextNumber();
-  launchOwn("piko_queue", args);
+  launchOwn("piko_queue", args, timed_);
 }
 
 // --- Loops ------------------------------------------------------------------

@@ -33,18 +33,31 @@ bool Submission::canBeGraph(std::span<const Step> steps) const {
 }
 
 void Submission::run(std::span<const Step> steps, std::span<uint8_t> clear) {
-  if (canBeGraph(steps)) {
+  timesKernels_ = accelerator_.p_.timesKernels;
+  if (canBeGraph(steps) && !timesKernels_) {
     makeGraph(steps, clear);
     accelerator_.device_->check(
         driver().cuGraphLaunch(graph_, accelerator_.stream_),
         "running a frame");
   } else {
     accelerator_.clearLog(clear);
+    beginTimes();
     runOneByOne(steps);
   }
 }
 
+void Submission::beginTimes() {
+  if (timesKernels_)
+    times_.begin(accelerator_.stream_);
+}
+
+void Submission::addTimes() {
+  if (timesKernels_)
+    times_.add(accelerator_.p_.kernelStats);
+}
+
 void Submission::end() noexcept {
+  times_.end();
   dropGraph();
   for (CUstream stream : bodyStreams_)
     driver().cuStreamDestroy(stream);
@@ -64,6 +77,8 @@ void Submission::runOneByOne(std::span<const Step> steps) {
   for (size_t i = 0; i < steps.size(); ++i) {
     if (steps[i].kind == Step::Kind::Grid) {
       accelerator_.launch(steps[i].grid, accelerator_.stream_);
+      if (timesKernels_)
+        times_.note(accelerator_.stream_, steps[i].timed, steps[i].grid.isJoin);
       continue;
     }
     std::span<const Step> body = bodyOf(steps.subspan(i));
@@ -71,6 +86,8 @@ void Submission::runOneByOne(std::span<const Step> steps) {
     do {
       runOneByOne(body);
       accelerator_.wait(steps);
+      addTimes();
+      beginTimes();
     } while (*again != 0);
     i += body.size() + 1;
   }

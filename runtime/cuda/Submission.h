@@ -12,6 +12,7 @@
 
 #include "cuda/Device.h"
 #include "cuda/Frame.h"
+#include "cuda/KernelTimes.h"
 
 namespace piko::cuda {
 
@@ -20,13 +21,16 @@ inline constexpr const char *conditionKernel = "piko_condition";
 
 class Submission {
 public:
-  explicit Submission(Accelerator &device) : accelerator_(device) {}
+  Submission(Accelerator &accelerator, const Device &device)
+      : accelerator_(accelerator), times_(device) {}
   Submission(const Submission &) = delete;
   Submission &operator=(const Submission &) = delete;
 
   /// Gives the stream of the run what the steps say, behind making a part of
   /// the log zero. The device must be entered; throws.
   void run(std::span<const Step> steps, std::span<uint8_t> clear);
+  /// When that has ended: adds what kernels took, if that is measured; throws.
+  void addTimes();
   /// Frees what it has of the device, which must be entered.
   void end() noexcept;
 
@@ -51,8 +55,11 @@ private:
   /// The pipeline's own, or one for bodies in bodies.
   CUstream streamOf(size_t depth);
   void dropGraph() noexcept;
+  void beginTimes();
 
   Accelerator &accelerator_;
+  KernelTimes times_;
+  bool timesKernels_ = false; ///< Of the run.
   std::vector<CUstream> bodyStreams_;
   size_t captured_ = 0; ///< Streams of bodies that are captured.
   CUgraphExec graph_ = nullptr;

@@ -19,7 +19,7 @@ class CudaMemory : public Cuda {};
 
 TEST_F(CudaMemory, HostMemoryIsCopiedForEachRun) {
   ASSERT_TRUE(scale(3));
-  EXPECT_EQ(hostCounts().bytesToDevice, 3 * (2 * arrayBytes + 4));
+  EXPECT_EQ(hostCounts().bytesToDevice, 3 * 2 * arrayBytes + 4);
   EXPECT_EQ(hostCounts().bytesFromDevice, 3 * arrayBytes);
   EXPECT_EQ(hostCounts().bytesOnDevice, 0u);
 }
@@ -34,7 +34,7 @@ TEST_F(CudaMemory, DeviceMemoryIsUsedInPlace) {
   uint64_t before = hostCounts().bytesToDevice;
   for (int run = 0; run < 3; ++run)
     ASSERT_TRUE(pipe.run());
-  EXPECT_EQ(hostCounts().bytesToDevice - before, 3u * 4); // the constant
+  EXPECT_EQ(hostCounts().bytesToDevice - before, 4u); // the constant
   EXPECT_EQ(hostCounts().bytesFromDevice, 0u);
   EXPECT_EQ(hostCounts().bytesOnDevice, 0u);
   expectScaled(to.get());

@@ -302,6 +302,8 @@ Status runTwice(Scene &scene, std::vector<int32_t> &hosts) {
 
 TEST_F(CudaStream, EachCallFails) {
   uint64_t calls = 0;
+  numbers.resize(300);
+  out.resize(300);
   int failed = 0;
   for (uint64_t n = 0; n <= calls; ++n) {
     Scene scene(program, numbers);

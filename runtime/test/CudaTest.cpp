@@ -42,10 +42,44 @@ TEST_F(Cuda, AFrameIsOneSubmission) {
   EXPECT_EQ(counts.graphLaunches, 3u);
   EXPECT_EQ(counts.graphKernels, 6u); // a join and the kernel
   EXPECT_EQ(counts.launches, 0u);
-  EXPECT_EQ(counts.copies, 12u); // three to it, one back
+  EXPECT_EQ(counts.copies, 10u); // two to it and one back, and the constant
   EXPECT_EQ(counts.waits, 6u);   // for its end, and for what comes back
   // The first one has no log to clear; the third is the second, changed.
   EXPECT_EQ(pikoTestDriverCalls("cuGraphInstantiateWithFlags"), 2u);
+}
+
+// Of a frame that is one submission nothing is known, unless it is asked for.
+TEST_F(Cuda, TimesOfKernels) {
+  piko::rt::Pipeline pipe{program};
+  ASSERT_TRUE(bind(pipe));
+  auto stats = [&] {
+    pikort_kernel_stats stats{};
+    EXPECT_EQ(pikort_get_kernel_stats(pipe.get(), 0, &stats), PIKORT_OK);
+    return stats;
+  };
+  ASSERT_TRUE(pipe.run());
+  EXPECT_EQ(stats().launches, 0);
+  EXPECT_EQ(stats().milliseconds, 0);
+  pikort_time_stats time;
+  ASSERT_EQ(pikort_get_time_stats(pipe.get(), &time), PIKORT_OK);
+  EXPECT_GT(time.device, 0);
+  ASSERT_EQ(pikort_set_kernel_times(pipe.get(), 1), PIKORT_OK);
+  for (bool late : {false, true}) {
+    pikoTestDriverDefer(late);
+    double before = stats().milliseconds;
+    ASSERT_TRUE(pipe.run());
+    EXPECT_GT(stats().milliseconds, before);
+  }
+  EXPECT_STREQ(stats().name, "scaler");
+  EXPECT_EQ(stats().launches, 2);
+  EXPECT_GT(stats().join_milliseconds, 0);
+  EXPECT_LT(stats().join_milliseconds, stats().milliseconds);
+  expectScaled();
+  ASSERT_EQ(pikort_set_kernel_times(pipe.get(), 0), PIKORT_OK);
+  ASSERT_TRUE(pipe.run());
+  EXPECT_EQ(stats().launches, 2);
+  pikort_reset_stats(pipe.get());
+  EXPECT_EQ(stats().milliseconds, 0);
 }
 
 TEST_F(Cuda, AllocatesNothingInLaterRuns) {

@@ -416,8 +416,9 @@ TEST_F(Host, TimeStatistics) {
   pikort_time_stats time;
   ASSERT_EQ(pikort_get_time_stats(p, &time), PIKORT_OK);
   double sum = 0;
-  for (double part : {time.kernels, time.waiting, time.joins, time.cycles,
-                      time.clears, time.allocation, time.program}) {
+  for (double part :
+       {time.device, time.kernels, time.waiting, time.joins, time.cycles,
+        time.clears, time.allocation, time.program}) {
     EXPECT_GE(part, 0);
     sum += part;
   }

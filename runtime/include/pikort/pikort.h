@@ -349,7 +349,9 @@ PIKORT_API int32_t pikort_get_source_info(pikort_pipeline *pipeline,
 // --- Statistics -------------------------------------------------------------
 
 /// A kernel: a stage's Process, or "<stage>.assign<n>" for the AssignBin of
-/// source n. Sums since the latest reset; divide by pikort_stats_runs.
+/// source n. Sums since the latest reset; divide by pikort_stats_runs. Of runs
+/// that a device has all of they are zeros, unless pikort_set_kernel_times asks
+/// for them.
 typedef struct pikort_kernel_stats {
   const char *name;
   double milliseconds;      ///< From begin to end.
@@ -369,7 +371,15 @@ typedef struct pikort_time_stats {
   double clears;     ///< Allocating and clearing images and buffers.
   double allocation; ///< Mapping memory, in whatever part.
   double program;    ///< All else: the program between kernels, strips.
+  double device;     ///< Waiting for runs that a device had all of: for their
+                     ///< kernels, and what orders and bins between them.
 } pikort_time_stats;
+
+/// On a device: measures kernels of runs that it has all of, or, with 0, no
+/// more. Such runs are slower, because kernels are launched one by one, with
+/// events between them; the times are the device's.
+PIKORT_API int32_t pikort_set_kernel_times(pikort_pipeline *pipeline,
+                                           int32_t on);
 
 /// A unit of work: what one thread ran at a time.
 typedef struct pikort_unit_run {
