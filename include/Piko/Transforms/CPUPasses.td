@@ -381,6 +381,17 @@ def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
     are lanes, and each goes on to its next one by itself. It waits with that until
     three eighths of the lanes do, or no other one has anything to do.
 
+    Where turns of loops inside wait for what the turn before hands on, as those of
+    a march through a volume do, loops over primitives, and loops in order, have
+    twice as many lanes, if `lanes` are 16: two vectors, of which one is under way
+    while the other one waits. The longest cycle of dependences is compared with
+    what all operations take, and what turns hand on has to fit into registers.
+
+    Where iterations go on only if quotients by what all share are not negative, as
+    barycentric coordinates, dividends are tested first, and vectors without an
+    iteration that may go on divide nothing. Elements of a primitive's array that
+    loops read four times or more are gathered in front of the loops.
+
     What must keep its order (emission, updates of pixels that lanes may share)
     runs lane by lane: all that one image or one writer is concerned with, as one
     group in its place, or, if nothing in the loop waits for it, as several behind
@@ -538,7 +549,9 @@ def MergeGathers : Pass<"piko-merge-gathers", "::piko::PipelineOp"> {
     short as a line of the cache. Of scatters of words of the same elements, three
     or more without other access to that state between them, it makes one operation
     as well, where the last one is: words are transposed, and each lane stores
-    pieces of up to 16 bytes, if all lanes write.
+    pieces of up to 16 bytes, if all lanes write. Of 16 lanes, consecutive elements
+    of up to eight words are loaded and stored as vectors of their words, which are
+    de-interleaved and interleaved.
 
     **Guarantees** the same reads: of state that the kernel changes, only words that
     nothing in between writes; and the same writes.
