@@ -59,7 +59,7 @@ class Card:
         command = [f"{options.bin}/piko-render", source_of(example),
                    *shlex.split(scene), "--pipe", pipe, "--target", "cuda",
                    "--lights", str(lights), "--width", str(options.width),
-                   "--height", str(options.height), "--json"]
+                   "--height", str(options.height), "--json", "--kernel-times"]
         for name in ("warmup", "frames", "seconds"):
             command += [f"--{name}", str(getattr(options, name))]
         return json.loads(call(command).strip().split("\n")[-1])

@@ -70,6 +70,8 @@ it, and says how long a frame took.
   --explain              name the frame's three largest wastes, and what would
                          remove them
   --json                 print one line of JSON
+  --kernel-times         for cuda, with --json: what kernels take, in frames of
+                         their own, whose grids are launched one by one
   --help                 print this
 )";
 
@@ -143,6 +145,7 @@ private:
         {"--counters", [&] { options.counters = true; }},
         {"--explain", [&] { options.explain = true; }},
         {"--json", [&] { options.json = true; }},
+        {"--kernel-times", [&] { options.kernelTimes = true; }},
     };
     auto action = actions.find(name);
     if (action == actions.end())

@@ -29,7 +29,7 @@ struct Options {
   std::string trace;     ///< where to write which thread ran which bins
   bool counters = false; ///< count the work of one more frame
   bool explain = false;
-  bool json = false;
+  bool json = false, kernelTimes = false;
 };
 
 extern const char *const usage;

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #include "Report.h"
 
+#include "Frame.h"
+
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
@@ -11,20 +13,36 @@ using namespace piko::render;
 
 namespace {
 
+bool isOnDevice(pikort_pipeline *pipeline) {
+  return pikort_device(pipeline) != PIKORT_PROCESSOR;
+}
+
+/// "CUDA device 0 (NAME)", or nothing.
+std::string nameDevice(pikort_pipeline *pipeline) {
+  pikort_device_info info;
+  int32_t number = pikort_device(pipeline);
+  if (!isOnDevice(pipeline) || pikort_get_device(number, &info) != PIKORT_OK)
+    return {};
+  return "CUDA device " + std::to_string(number) + " (" + info.name + ")";
+}
+
+/// Where a device has all of a run it is not known what its kernels took,
+/// unless somebody has asked for it.
 std::vector<JsonObject> reportKernels(pikort_pipeline *pipeline, double runs) {
   std::vector<JsonObject> kernels;
   for (int32_t i = 0; i < pikort_kernel_count(pipeline); ++i) {
     pikort_kernel_stats stats;
     if (pikort_get_kernel_stats(pipeline, i, &stats) != PIKORT_OK)
       continue;
-    kernels.push_back(
-        JsonObject()
-            .add("name", stats.name)
-            .add("ms", stats.milliseconds / runs)
-            .add("join_ms", stats.join_milliseconds / runs)
-            .add("wait_ms", stats.wait_milliseconds / runs)
-            .add("launches", double(stats.launches) / runs)
-            .add("parallel_launches", double(stats.parallel_launches) / runs));
+    JsonObject &kernel = kernels.emplace_back();
+    kernel.add("name", stats.name);
+    bool isKnown = stats.launches > 0 || !isOnDevice(pipeline);
+    if (isKnown)
+      kernel.add("ms", stats.milliseconds / runs)
+          .add("join_ms", stats.join_milliseconds / runs)
+          .add("wait_ms", stats.wait_milliseconds / runs)
+          .add("launches", double(stats.launches) / runs)
+          .add("parallel_launches", double(stats.parallel_launches) / runs);
   }
   return kernels;
 }
@@ -48,14 +66,17 @@ std::vector<JsonObject> reportStages(pikort_pipeline *pipeline, double runs) {
 JsonObject reportTime(pikort_pipeline *pipeline, double runs) {
   pikort_time_stats stats{};
   pikort_get_time_stats(pipeline, &stats);
-  return JsonObject()
-      .add("kernels_ms", stats.kernels / runs)
+  JsonObject report;
+  report.add("kernels_ms", stats.kernels / runs)
       .add("waiting_ms", stats.waiting / runs)
       .add("joins_ms", stats.joins / runs)
       .add("cycles_ms", stats.cycles / runs)
       .add("clears_ms", stats.clears / runs)
       .add("allocation_ms", stats.allocation / runs)
       .add("program_ms", stats.program / runs);
+  if (isOnDevice(pipeline))
+    report.add("device_ms", stats.device / runs);
+  return report;
 }
 
 JsonObject reportCounts(const std::vector<Count> &counts) {
@@ -88,6 +109,23 @@ const char *nameTarget(const Options &options, pikort_pipeline *pipeline) {
 
 } // namespace
 
+bool render::isTimed(const Options &options, pikort_pipeline *pipeline) {
+  return options.kernelTimes && isOnDevice(pipeline);
+}
+
+Result<std::vector<JsonObject>> render::timeKernels(const Options &options,
+                                                    pikort_pipeline *pipeline) {
+  constexpr int most = 3;
+  int frames = std::min(most, options.frames);
+  pikort_reset_stats(pipeline);
+  bool isRun = pikort_set_kernel_times(pipeline, 1) == PIKORT_OK;
+  for (int i = 0; i < frames && isRun; ++i)
+    isRun = pikort_run(pipeline) == PIKORT_OK;
+  if (!isRun)
+    return errorOf(pipeline);
+  return reportKernels(pipeline, frames);
+}
+
 JsonObject render::makeReport(const Options &options, const RunResult &result,
                               pikort_pipeline *pipeline) {
   double runs = runsOf(pipeline);
@@ -118,26 +156,33 @@ JsonObject render::makeReport(const Options &options, const RunResult &result,
       .add("load_ms", result.loadMilliseconds)
       .add("patches", result.patches)
       .add("counters", reportCounts(result.counts));
-  if (!isReference) // the runtime does not see inside of it
-    report.add("peak_bin_bytes", pikort_peak_bytes(pipeline))
-        .add("time", reportTime(pipeline, runs))
-        .add("kernels", reportKernels(pipeline, runs))
-        .add("stages", reportStages(pipeline, runs));
+  if (isOnDevice(pipeline))
+    report.add("device", nameDevice(pipeline));
+  if (isReference) // the runtime does not see inside of it
+    return report;
+  report.add("peak_bin_bytes", pikort_peak_bytes(pipeline))
+      .add("time", reportTime(pipeline, runs));
+  if (!isTimed(options, pipeline))
+    report.add("kernels", reportKernels(pipeline, runs));
+  report.add("stages", reportStages(pipeline, runs));
   return report;
 }
 
 std::string render::summarize(const RunResult &result,
                               pikort_pipeline *pipeline) {
-  char text[256];
+  std::string where = nameDevice(pipeline);
+  if (where.empty())
+    where = std::to_string(result.threads) + " threads";
+  char text[512];
   std::snprintf(text, sizeof text,
                 "%s: %.2f ms a frame (median of %d, %.2f to %.2f), "
-                "%lld %s, %lld pixels, %d threads, compiled in %.0f ms",
+                "%lld %s, %lld pixels, %s, compiled in %.0f ms",
                 pikort_name(pipeline), result.times.median, result.times.count,
                 result.times.min, result.times.max,
                 static_cast<long long>(result.patches > 0 ? result.patches
                                                           : result.triangles),
                 result.patches > 0 ? "patches" : "triangles",
-                static_cast<long long>(result.pixels), result.threads,
+                static_cast<long long>(result.pixels), where.c_str(),
                 result.compileMilliseconds);
   return text;
 }

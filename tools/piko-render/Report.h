@@ -28,8 +28,17 @@ struct RunResult {
   std::vector<Count> counts;
 };
 
-/// The JSON line: first what all renderers of the comparison report, then what
-/// the runtime counted, for each frame.
+/// Whether what kernels take is asked for, and measured by itself.
+bool isTimed(const Options &options, pikort_pipeline *pipeline);
+
+/// What kernels take on a device, for each frame, of frames of their own. They
+/// change state and statistics of the pipeline.
+Result<std::vector<JsonObject>> timeKernels(const Options &options,
+                                            pikort_pipeline *pipeline);
+
+/// The JSON line, without kernels that are timed by themselves: first what all
+/// renderers of the comparison report, then what the runtime counted, for each
+/// frame.
 JsonObject makeReport(const Options &options, const RunResult &result,
                       pikort_pipeline *pipeline);
 

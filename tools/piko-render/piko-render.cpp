@@ -106,6 +106,12 @@ Result<Done> report(const Options &options, const RunResult &result,
                     SceneInput &scene, pikort_pipeline *pipeline) {
   JsonObject line = makeReport(options, result, pipeline);
   std::string text = summarize(result, pipeline) + "\n";
+  if (options.json && isTimed(options, pipeline)) {
+    auto kernels = timeKernels(options, pipeline);
+    if (!kernels)
+      return kernels.error();
+    line.add("kernels", *kernels);
+  }
   if (options.counters || options.explain) {
     auto work = measureWork(options, scene, pipeline);
     if (!work)
