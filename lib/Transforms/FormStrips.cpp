@@ -178,6 +178,8 @@ std::optional<Reason> Group::whyNotFirst(const Node &node) {
               ", which feeds it, does not run in strips with it",
           edge};
   }
+  if (sources.empty())
+    return Reason{"nothing feeds it"};
   if (sources.size() > 1)
     return Reason{"several sources feed it"};
   if (auto reason = whyNotAtAll(node))
@@ -201,6 +203,8 @@ std::optional<Reason> Group::whyNotNext(const Node &node) {
       lineages.push_back(roots.lookup(producer));
     }
   }
+  if (lineages.empty())
+    return Reason{"nothing feeds it"};
   if (!llvm::all_equal(lineages))
     return Reason{"what reaches it is of several lineages, one of which comes "
                   "after the other"};

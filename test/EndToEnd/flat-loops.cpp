@@ -27,7 +27,7 @@
 // RUN: pikoc %s --pipe Trees --cpu x86-64-v4 --remarks -o %t.ll 2>&1 | FileCheck %s --check-prefix=TREES
 // TREES: process is vectorized for 16 primitives at once
 // TREES: flat-loops.cpp:[[# @LINE + 23]]:{{.*}} lanes go on in this loop each by itself
-// REMARK: process is vectorized for 16 primitives at once
+// REMARK: process is vectorized for 32 primitives at once
 // REMARK: flat-loops.cpp:[[# @LINE + 50]]:{{.*}} lanes go on in this loop each by itself
 #include <piko.h>
 

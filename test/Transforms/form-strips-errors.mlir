@@ -301,3 +301,43 @@ piko.pipeline @Lineages rank 1 {
     }
   }
 }
+
+// -----
+
+// A pass may have found that nothing reaches a stage.
+piko.record @F {"x" : i32 at 0} size 4 align 4
+piko.pipeline @Unfed rank 1 {
+  piko.image @seen : @F rank 1
+  piko.source @a
+  piko.edge @b[0] -> @b
+  piko.edge @b[1] -> @c
+  // expected-remark @below {{stage 'a' does not run in strips: no stage that}}
+  piko.stage @a bins [0] threads 1 : @F -> [] {
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      piko.return
+    }
+  }
+  // expected-remark @below {{stage 'b' does not run in strips: nothing feeds it}}
+  piko.stage @b bins [0] threads 1 : @F -> [@F, @F] {
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      %x = piko.get %f "x" : !piko.prim<@F> -> i32
+      piko.emit 0 (%x) : i32
+      piko.emit 1 (%x) : i32
+      piko.return
+    }
+  }
+  // expected-remark @below {{stage 'c' does not run in strips: stage 'b', which feeds it, does not run in strips with it}}
+  piko.stage @c bins [0] threads 1 : @F -> [] {
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      %x = piko.get %f "x" : !piko.prim<@F> -> i32
+      piko.update @seen[%x : i32] {
+      ^bb0(%old: i32):
+        piko.yield [%x : i32]
+      }
+      piko.return
+    }
+  }
+}
