@@ -310,6 +310,7 @@ piko.pipeline @Unfed rank 1 {
   piko.image @seen : @F rank 1
   piko.source @a
   piko.edge @b[0] -> @b
+  // expected-note @below {{because of this}}
   piko.edge @b[1] -> @c
   // expected-remark @below {{stage 'a' does not run in strips: no stage that}}
   piko.stage @a bins [0] threads 1 : @F -> [] {
