@@ -12,7 +12,8 @@ const Driver &Submission::driver() const {
   return accelerator_.device_->driver;
 }
 
-void Submission::check(CUresult result) const {
+void Submission::check(CUresult result) {
+  refusesConditions_ |= result == CUDA_ERROR_NOT_SUPPORTED;
   accelerator_.device_->check(result, "making a graph of a frame");
 }
 
@@ -29,13 +30,27 @@ bool Submission::canBeGraph(std::span<const Step> steps) const {
                        d.cuStreamGetCaptureInfo &&
                        d.cuStreamUpdateCaptureDependencies &&
                        d.cuStreamBeginCaptureToGraph;
-  return steps.size() > 1 && hasGraphs && (hasConditions || !repeats(steps));
+  return steps.size() > 1 && hasGraphs &&
+         ((hasConditions && !refusesConditions_) || !repeats(steps));
+}
+
+bool Submission::tryGraph(std::span<const Step> steps,
+                          std::span<uint8_t> clear) {
+  if (timesKernels_ || !canBeGraph(steps))
+    return false;
+  try {
+    makeGraph(steps, clear);
+  } catch (const piko::rt::Failure &) {
+    if (canBeGraph(steps))
+      throw;
+    return false;
+  }
+  return true;
 }
 
 void Submission::run(std::span<const Step> steps, std::span<uint8_t> clear) {
   timesKernels_ = accelerator_.p_.timesKernels;
-  if (canBeGraph(steps) && !timesKernels_) {
-    makeGraph(steps, clear);
+  if (tryGraph(steps, clear)) {
     accelerator_.device_->check(
         driver().cuGraphLaunch(graph_, accelerator_.stream_),
         "running a frame");

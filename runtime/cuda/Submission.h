@@ -36,8 +36,11 @@ public:
 
 private:
   const Driver &driver() const;
-  void check(CUresult result) const;
+  void check(CUresult result);
   bool canBeGraph(std::span<const Step> steps) const;
+  /// Makes `graph_` of the steps; false if they are to run one by one, also
+  /// because the driver refuses conditions, as where MPS shares the device.
+  bool tryGraph(std::span<const Step> steps, std::span<uint8_t> clear);
   void runOneByOne(std::span<const Step> steps);
   /// What stands between a Repeat, the first step, and its end.
   static std::span<const Step> bodyOf(std::span<const Step> steps);
@@ -63,6 +66,7 @@ private:
   std::vector<CUstream> bodyStreams_;
   size_t captured_ = 0; ///< Streams of bodies that are captured.
   CUgraphExec graph_ = nullptr;
+  bool refusesConditions_ = false;
   std::vector<Step> steps_; ///< Of the graph.
   std::span<uint8_t> clear_;
 };

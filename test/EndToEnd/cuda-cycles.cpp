@@ -21,6 +21,9 @@
 // A driver without graphs gets the grids one by one, and waits for each wave.
 // RUN: env PIKO_CUDA_DRIVER=%test_driver_11 %{compare} --pipe PingPong 2>&1 | FileCheck %s --check-prefix=OLD
 // RUN: env PIKO_CUDA_DRIVER=%test_driver_11 %{compare} --pipe Turns 2>&1 | FileCheck %s --check-prefix=OLD
+// So does one that refuses conditions.
+// RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_FAIL=cuGraphAddNode:1:801 %{compare} --pipe Turns 2>&1 | FileCheck %s --check-prefix=OLD
+// RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_FAIL=cuGraphInstantiateWithFlags:1:801 %{compare} --pipe Chain 2>&1 | FileCheck %s --check-prefix=OLD
 // OLD-DAG: {{^equal$}}
 // OLD-DAG: host: {{[0-9]+}} launches of kernels, 0 of graphs with 0 kernels, {{[0-9]+}} copies, 0 fills, {{[1-9][0-9]}} waits
 //
