@@ -24,7 +24,7 @@ import sys
 
 import bodies
 from charts import find_pyplot
-from figure4 import PIPES, print_table
+from figure4 import PIPES
 from suite import bodies as bodies_section
 from suite import kernels, maths, page, raster, roofline, runtime
 
@@ -149,23 +149,12 @@ def main():
     options = parse_arguments()
     os.makedirs(options.work, exist_ok=True)
     machine = page.describe_machine()  # and its load, before there is more
-    pyplot = find_pyplot()
-    if not pyplot:
+    if not find_pyplot():
         print("bench: no charts without matplotlib (Debian's "
               "python3-matplotlib)", file=sys.stderr)
-    sections = []
-    for name in options.sections:
-        print(f"bench: {name}", file=sys.stderr, flush=True)
-        section = SECTIONS[name].measure(options)
-        section.write_csv(f"{options.out}/{name}.csv")
-        if pyplot:
-            section.draw(pyplot).savefig(f"{options.out}/{name}.svg",
-                                         metadata={"Date": None})
-        print(f"\n{section.title}")
-        print_table(section.head, section.rows)
-        sections.append(section)
-        page.write_page(sections, machine, options.out)
-    print(f"\n{options.out}/index.html")
+    page.measure_all(options.sections,
+                     lambda name: SECTIONS[name].measure(options), machine,
+                     options.out)
 
 
 if __name__ == "__main__":

@@ -27,8 +27,7 @@ import argparse
 import os
 import sys
 
-from charts import find_pyplot
-from figure4 import PIPES, ROOT, print_table
+from figure4 import PIPES, ROOT
 from gpu_model.chips import read_chips
 from gpu_suite import figure4, figure5, frames, published, reruns, timing
 from suite import page, raster
@@ -132,23 +131,12 @@ def main():
     timer = timing.Estimate(options, read_chips()[0][options.estimate]) \
         if options.estimate else timing.Card(options)
     notes = describe_times(timer) + page.describe_machine()
-    pyplot = find_pyplot()
-    sections = []
-    for name in options.sections:
-        print(f"gpu-bench: {name}", file=sys.stderr, flush=True)
-        try:
-            section = SECTIONS[name].measure(options, timer)
-        except ValueError as error:
-            sys.exit(f"gpu-bench: {error}")
-        section.write_csv(f"{options.out}/{name}.csv")
-        if pyplot:
-            section.draw(pyplot).savefig(f"{options.out}/{name}.svg",
-                                         metadata={"Date": None})
-        print(f"\n{section.title}")
-        print_table(section.head, section.rows)
-        sections.append(section)
-        page.write_page(sections, notes, options.out)
-    print(f"\n{options.out}/index.html")
+    try:
+        page.measure_all(options.sections,
+                         lambda name: SECTIONS[name].measure(options, timer), notes,
+                         options.out)
+    except ValueError as error:
+        sys.exit(f"gpu-bench: {error}")
 
 
 if __name__ == "__main__":

@@ -9,7 +9,9 @@ import shlex
 import sys
 from html import escape
 
+from charts import find_pyplot
 from commands import call
+from figure4 import print_table
 
 STYLE = """
 body { font: 15px/1.45 sans-serif; max-width: 60em; margin: 2em auto; }
@@ -76,3 +78,24 @@ def write_page(sections, machine, folder):
         file.write(f"<!DOCTYPE html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">"
                    f"\n<title>Piko: benchmarks</title>\n<style>{STYLE}</style>\n"
                    f"<h1>Benchmarks</h1>\n{notes}\n{body}\n</html>\n")
+
+
+def measure_all(names, measure, notes, folder):
+    """Measures a section for each name, prints its table, and writes its CSV file and
+    chart into the folder, and a page with all that there are so far. `measure` takes a
+    name; charts are left out where matplotlib is not installed."""
+    program = os.path.splitext(os.path.basename(sys.argv[0]))[0]
+    pyplot = find_pyplot()
+    sections = []
+    for name in names:
+        print(f"{program}: {name}", file=sys.stderr, flush=True)
+        section = measure(name)
+        section.write_csv(f"{folder}/{name}.csv")
+        if pyplot:
+            section.draw(pyplot).savefig(f"{folder}/{name}.svg",
+                                         metadata={"Date": None})
+        print(f"\n{section.title}")
+        print_table(section.head, section.rows)
+        sections.append(section)
+        write_page(sections, notes, folder)
+    print(f"\n{folder}/index.html")
