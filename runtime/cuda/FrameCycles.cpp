@@ -87,9 +87,9 @@ void Frame::queue(const Place &place) {
       continue;
     if (!args)
       args = &queuings_.take(p_.memory);
-    args->ports[args->portCount++] = {
-        describeEdge(edge), describeShape(p_.stages[edge.consumer]),
-        &queues_[e], edge.insideLoop, groupOf(edge)};
+    args->ports[args->portCount++] = {describeEdge(edge),
+                                      describeShape(p_.stages[edge.consumer]),
+                                      &queues_[e], groupOf(edge)};
   }
   if (!args)
     return;

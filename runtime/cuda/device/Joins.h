@@ -190,7 +190,6 @@ struct QueuePort {
   JoinInput input; ///< Whose producer is the kernel.
   Shape shape;     ///< Of the consumer's primitives.
   QueueState *queue;
-  int32_t isInLoop;
   int32_t group; ///< Of what leaves a loop; -1: nothing does.
 };
 

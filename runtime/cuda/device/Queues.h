@@ -15,10 +15,10 @@ T *makeRoom(Grid &grid, T *elements, int64_t count, int64_t &capacity) {
   if (count < capacity)
     return elements;
   capacity = larger<int64_t>(8, 2 * count);
-  T *larger = grid.take<T>(capacity);
-  for (int64_t i = 0; i < count && larger && Grid::isFirst(); ++i)
-    larger[i] = elements[i];
-  return larger;
+  T *room = grid.take<T>(capacity);
+  for (int64_t i = 0; i < count && room && Grid::isFirst(); ++i)
+    room[i] = elements[i];
+  return room;
 }
 
 /// Puts a chunk at the end of a queue. Between two barriers.
@@ -204,9 +204,8 @@ private:
       siblings.run(*args_.loop);
     for (int32_t i = 0; i < args_.portCount && !grid_.hasFailed(); ++i) {
       const QueuePort &port = args_.ports[i];
-      bool isOfLoop = args_.loop && (port.isInLoop || port.group >= 0);
       Gather gather(grid_, port.shape, port.input, spans, port.queue->emitted,
-                    isOfLoop ? &siblings : nullptr);
+                    args_.loop ? &siblings : nullptr);
       Chunk chunk{};
       gather.run(chunk.stream);
       chunk.lineage = gather.lineage();
