@@ -204,26 +204,32 @@ Value RowPrefetcher::clone(Value value, OpBuilder &builder,
   return mapping.lookup(value);
 }
 
-/// Whether a buffer is too large for the nearest caches, and none is empty that
-/// leads there.
+/// Whether what a stage asks for is too large for the nearest caches: what pixels
+/// read at their own place for the second level, and of what that refers to all
+/// that leads there for the third. None of it may be empty.
 Value RowPrefetcher::isWorthwhile(const Stage &stage, OpBuilder &builder) {
-  constexpr int64_t nearBytes = 4 << 20;
+  constexpr int64_t nearBytes = 4 << 20, ownBytes = 1 << 20;
   CodeBuilder at(builder, pixels.getLoc());
   Value worthwhile;
   auto require = [&](Attribute state, int64_t least) {
-    Value extent =
-        ExtentOp::create(builder, at.loc, cast<FlatSymbolRefAttr>(state),
-                         builder.getI64IntegerAttr(0));
-    Value isLarge = at.compare(CodeBuilder::P::uge, extent, at.index(least));
+    auto symbol = cast<FlatSymbolRefAttr>(state);
+    auto image = lookupInPipeline<ImageOp>(pixels, symbol);
+    Value count;
+    for (int64_t d = 0, rank = image ? image.getRank() : 1; d < rank; ++d) {
+      Value extent = ExtentOp::create(builder, at.loc, symbol,
+                                      builder.getI64IntegerAttr(d));
+      count = count ? at.mul(count, extent) : extent;
+    }
+    Value isLarge = at.compare(CodeBuilder::P::uge, count, at.index(least));
     worthwhile = worthwhile ? at.both(worthwhile, isLarge) : isLarge;
   };
+  int64_t bytes = stage.first == 0 ? ownBytes : nearBytes;
   for (const auto &[other, references] : stages)
-    if (other == stage || (stage.first == 0 && other.first != 0)) {
+    if (other == stage) {
       RecordOp record = lookupRecord(
           pixels, getStateRecord(lookupInPipeline<Operation *>(
                       pixels, cast<FlatSymbolRefAttr>(other.second))));
-      if (other.first != 0)
-        require(other.second, nearBytes / record.getSize());
+      require(other.second, bytes / record.getSize());
     }
   for (Attribute state : tested)
     require(state, 1);

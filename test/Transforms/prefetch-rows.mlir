@@ -12,7 +12,12 @@ piko.record @Color {"v" : f32 at 0} size 4 align 4
 // triangles of the second one, and for the corners of the next, each if there is
 // such a row, and of keys that differ from those of the row before.
 // CHECK-LABEL: piko.kernel @kernel_shade
+// Keys are asked for where their image is large, whatever the buffers are.
 // CHECK:         %[[HI:.*]] = piko.domain[1]
+// CHECK:         %[[KEYS0:.*]] = piko.extent @keys[0]
+// CHECK:         %[[KEYS1:.*]] = piko.extent @keys[1]
+// CHECK:         %[[KEYS:.*]] = arith.muli %[[KEYS0]], %[[KEYS1]]
+// CHECK:         arith.cmpi uge, %[[KEYS]], %c262144
 // CHECK:         scf.for %[[Y:.*]] = %{{.*}} to %[[HI]] step %c1
 // CHECK-NEXT:      %[[LEFT:.*]] = arith.subi %[[HI]], %[[Y]]
 // CHECK:           %[[HAS3:.*]] = arith.cmpi sgt, %[[LEFT]], %c3

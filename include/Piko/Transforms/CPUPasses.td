@@ -25,8 +25,10 @@ def Prefetch : Pass<"piko-prefetch", "::piko::PipelineOp"> {
     the triangle that is seen, asks in stages, a row further on for each read on
     the way: for the corners of triangles of the next row, for the triangles of
     the row behind it, and for the numbers of the third one. Of pixels that refer
-    to the same as those of the row before, nothing is asked. There are no stages
-    if a buffer is small.
+    to the same as those of the row before, nothing is asked. There is no stage
+    for buffers that the nearest caches hold (4 MiB), nor for what pixels read at
+    their own place if it is less than 1 MiB: in larger images each row of a bin
+    is on a page of its own, where no hardware prefetcher follows.
 
     **Guarantees** that nothing changes but time: a prefetch reads nothing and
     cannot fail.
