@@ -4,6 +4,7 @@
 
 #include "Piko/Target/Object.h"
 
+#include "BroadcastLoads.h"
 #include "CompressStores.h"
 #include "LowerArithmetic.h"
 #include "LowerPermutations.h"
@@ -88,6 +89,8 @@ static ModulePassManager makeLastPasses(const TargetMachine &machine,
     passes.addPass(createModuleToFunctionPassAdaptor(WidenMasksPass(machine)));
     passes.addPass(
         createModuleToFunctionPassAdaptor(WidenGathersPass(machine)));
+    passes.addPass(
+        createModuleToFunctionPassAdaptor(BroadcastLoadsPass(machine)));
   }
   if (sanitizer == Sanitizer::Thread)
     passes.addPass(createModuleToFunctionPassAdaptor(ThreadSanitizerPass()));
