@@ -204,9 +204,9 @@ Value RowPrefetcher::clone(Value value, OpBuilder &builder,
   return mapping.lookup(value);
 }
 
-/// Whether what a stage asks for is too large for the nearest caches: what pixels
-/// read at their own place for the second level, and of what that refers to all
-/// that leads there for the third. None of it may be empty.
+/// Whether what a stage asks for is too large for the nearest caches: what
+/// pixels read at their own place for the second level, and of what that refers
+/// to all that leads there for the third. None of it may be empty.
 Value RowPrefetcher::isWorthwhile(const Stage &stage, OpBuilder &builder) {
   constexpr int64_t nearBytes = 4 << 20, ownBytes = 1 << 20;
   CodeBuilder at(builder, pixels.getLoc());

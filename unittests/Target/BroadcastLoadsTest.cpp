@@ -4,85 +4,35 @@
 
 #include "../../lib/Target/CPU/BroadcastLoads.h"
 
-#include "llvm/AsmParser/Parser.h"
-#include "llvm/IR/InstIterator.h"
-#include "llvm/IR/LLVMContext.h"
-#include "llvm/IR/Module.h"
-#include "llvm/IR/Verifier.h"
-#include "llvm/MC/TargetRegistry.h"
-#include "llvm/Passes/PassBuilder.h"
-#include "llvm/Support/SourceMgr.h"
-#include "llvm/Support/TargetSelect.h"
-#include "llvm/Support/raw_ostream.h"
-#include "llvm/Target/TargetMachine.h"
-#include "llvm/TargetParser/Host.h"
-#include "llvm/TargetParser/Triple.h"
+#include "PassTest.h"
 
-#include <gtest/gtest.h>
+#include "llvm/IR/InstIterator.h"
 
 using namespace llvm;
 
 namespace {
 
-class BroadcastLoads : public testing::Test {
+class BroadcastLoads : public PassTest {
 protected:
-  void SetUp() override {
-    InitializeNativeTarget();
-    Triple triple(sys::getProcessTriple());
-    if (!triple.isX86())
-      GTEST_SKIP() << "for x86 alone";
-    std::string error;
-    const Target *target = TargetRegistry::lookupTarget(triple, error);
-    ASSERT_TRUE(target) << error;
-    machine.reset(target->createTargetMachine(triple, "x86-64-v4", "", {}, {}));
-  }
-
   /// Runs the pass on the body of a function of a pointer, a flag, a vector and
   /// another pointer, and says whether a load is right in front of the splat's
   /// insertion, as selection needs it.
   bool isRepeated(StringRef body) {
     std::string text =
-        "declare <4 x float> @llvm.fma.v4f32(<4 x float>, <4 x float>, "
-        "<4 x float>)\n"
         "define <4 x float> @f(ptr %p, i1 %c, <4 x float> %v, ptr %q) {\n";
     text += body;
-    text += "}\n";
-    SMDiagnostic error;
-    module = parseAssemblyString(text, error, context);
-    if (!module) {
-      ADD_FAILURE() << error.getMessage().str();
+    text += "}\ndeclare <4 x float> @llvm.fma.v4f32(<4 x float>, "
+            "<4 x float>, <4 x float>)\n";
+    Function *function = run<piko::BroadcastLoadsPass>(text);
+    if (!function)
       return false;
-    }
-    module->setDataLayout(machine->createDataLayout());
-    Function &function = *module->getFunction("f");
-    run(function);
-    EXPECT_FALSE(verifyModule(*module, &errs()));
-    for (Instruction &instruction : instructions(function))
+    for (Instruction &instruction : instructions(*function))
       if (auto *insert = dyn_cast<InsertElementInst>(&instruction))
         if (auto *load = dyn_cast<LoadInst>(insert->getOperand(1)))
           if (load->getParent() == insert->getParent() && load->hasOneUse())
             return true;
     return false;
   }
-
-private:
-  void run(Function &function) {
-    LoopAnalysisManager loops;
-    FunctionAnalysisManager functions;
-    CGSCCAnalysisManager components;
-    ModuleAnalysisManager modules;
-    PassBuilder builder(machine.get());
-    builder.registerModuleAnalyses(modules);
-    builder.registerCGSCCAnalyses(components);
-    builder.registerFunctionAnalyses(functions);
-    builder.registerLoopAnalyses(loops);
-    builder.crossRegisterProxies(loops, functions, components, modules);
-    piko::BroadcastLoadsPass(*machine).run(function, functions);
-  }
-
-  LLVMContext context;
-  std::unique_ptr<Module> module;
-  std::unique_ptr<TargetMachine> machine;
 };
 
 const char *splatOf =

@@ -10,6 +10,7 @@
 #include "LowerPermutations.h"
 #include "Piko/Target/CodeGeneration.h"
 #include "SelectBits.h"
+#include "UniformGathers.h"
 #include "WidenGathers.h"
 #include "WidenMasks.h"
 
@@ -87,6 +88,8 @@ static ModulePassManager makeLastPasses(const TargetMachine &machine,
     passes.addPass(
         createModuleToFunctionPassAdaptor(CompressStoresPass(machine)));
     passes.addPass(createModuleToFunctionPassAdaptor(WidenMasksPass(machine)));
+    passes.addPass(
+        createModuleToFunctionPassAdaptor(UniformGathersPass(machine)));
     passes.addPass(
         createModuleToFunctionPassAdaptor(WidenGathersPass(machine)));
     passes.addPass(

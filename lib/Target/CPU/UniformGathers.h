@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// LLVM's loop vectorizer makes a gather of what a turn of a loop loads behind a
+// condition, also where all turns load from one place: nothing says that memory
+// is there if no turn's condition holds. A gather takes an access for each
+// lane, though all are the same. Here one masked load does it, for all lanes.
+
+#ifndef PIKO_TARGET_CPU_UNIFORMGATHERS_H
+#define PIKO_TARGET_CPU_UNIFORMGATHERS_H
+
+#include "ProcessorPass.h"
+
+namespace piko {
+
+/// For processors with AVX. To run behind the optimizer.
+struct UniformGathersPass : ProcessorPass<UniformGathersPass> {
+  using ProcessorPass::ProcessorPass;
+  llvm::PreservedAnalyses run(llvm::Function &function,
+                              llvm::FunctionAnalysisManager &analyses);
+};
+
+} // namespace piko
+
+#endif // PIKO_TARGET_CPU_UNIFORMGATHERS_H
