@@ -11,6 +11,7 @@
 #include "Piko/Dialect/Piko/IR/Marks.h"
 
 #include "mlir/Dialect/MemRef/IR/MemRef.h"
+#include "mlir/Dialect/Vector/IR/VectorOps.h"
 #include "mlir/Transforms/LoopInvariantCodeMotionUtils.h"
 
 namespace piko {

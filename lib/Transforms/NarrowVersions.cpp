@@ -4,7 +4,10 @@
 
 #include "Narrower.h"
 
+#include "Lanes.h"
 #include "RowStrips.h"
+
+#include "Piko/Dialect/Piko/IR/Marks.h"
 
 #include "mlir/IR/PatternMatch.h"
 
@@ -132,7 +135,11 @@ static void finish(Block *block, Operation *loop) {
   loop->remove();
   block->push_back(loop);
   OpBuilder end = OpBuilder::atBlockEnd(block);
-  scf::YieldOp::create(end, loop->getLoc(), loop->getResults());
+  // Nobody uses what rows hand on that may be visited in any order.
+  ValueRange results;
+  if (block->getParentOp()->getNumResults() != 0)
+    results = loop->getResults();
+  scf::YieldOp::create(end, loop->getLoc(), results);
 }
 
 Narrower::Version Narrower::copy(Block *into) {
@@ -151,19 +158,51 @@ Narrower::Version Narrower::copy(Block *into) {
 }
 
 scf::IfOp Narrower::choose(Value fits) {
-  return scf::IfOp::create(nest.builder, nest.loc,
-                           nest.getOuter().getResultTypes(), fits,
+  TypeRange results;
+  if (required.empty())
+    results = nest.getOuter().getResultTypes();
+  return scf::IfOp::create(nest.builder, nest.loc, results, fits,
                            /*addThenBlock=*/true, /*addElseBlock=*/true);
+}
+
+/// Whether the box reaches into all half-planes: two of five boxes of triangles
+/// that are larger than bins do not. Null where there are none.
+Value Narrower::testReach() {
+  OpBuilder &builder = nest.builder;
+  Value isReached, zero = nest.makeConstant(0);
+  for (RequiredSign sign : required) {
+    const AffineNest::Range &range = leaves[sign.leaf].range;
+    using P = arith::CmpIPredicate;
+    Value reaches = arith::CmpIOp::create(
+        builder, nest.loc, sign.isNegative ? P::slt : P::sge,
+        sign.isNegative ? range.least : range.most, zero);
+    isReached =
+        isReached ? arith::AndIOp::create(builder, nest.loc, isReached, reaches)
+                        .getResult()
+                  : reaches;
+  }
+  return isReached;
+}
+
+/// Enters a condition.
+Block *Narrower::enter(Block *block, Value condition) {
+  auto made = scf::IfOp::create(nest.builder, nest.loc, condition,
+                                /*withElseRegion=*/false);
+  finish(block, made);
+  return made.thenBlock();
 }
 
 // Values fit less often than signs, which are divided.
 void Narrower::makeVersions() {
   scf::ForOp outer = nest.getOuter();
+  Value isReached = testReach();
   scf::IfOp choice = choose(tests.empty() ? valuesFit : signsFit);
   Block *narrowest = choice.thenBlock();
+  if (isReached)
+    narrowest = enter(narrowest, isReached);
   if (!tests.empty() && !conversions.empty()) {
     scf::IfOp inner = choose(valuesFit);
-    finish(choice.thenBlock(), inner);
+    finish(narrowest, inner);
     Version signs = copy(inner.elseBlock());
     narrowTests(signs);
     makeStrips(signs);
@@ -174,8 +213,19 @@ void Narrower::makeVersions() {
   narrowConversions(version);
   makeStrips(version);
   // The wide version is the old one.
-  outer->replaceAllUsesWith(choice.getResults());
+  if (choice.getNumResults() != 0)
+    outer->replaceAllUsesWith(choice.getResults());
   finish(choice.elseBlock(), outer);
+}
+
+/// Whether lanes may be primitives, to each of which all of this is done.
+static bool mayBeInLanes(Operation *loop) {
+  for (auto parent = loop->getParentOfType<scf::ForOp>(); parent;
+       parent = parent->getParentOfType<scf::ForOp>())
+    if (parent->hasAttr(marks::lanes) &&
+        getLaneMapping(parent) != LaneMapping::Iterations)
+      return true;
+  return false;
 }
 
 void Narrower::makeStrips(Version &version) {
@@ -187,5 +237,8 @@ void Narrower::makeStrips(Version &version) {
     planes.push_back(
         {leaf.base, leaf.steps[0], leaf.steps[1], sign.isNegative});
   }
-  interchange(version.loops.front(), version.loops.back(), planes, stripWidth);
+  // As many as a vector has rows, which are f64.
+  int64_t group = mayBeInLanes(nest.getOuter()) ? 1 : (stripWidth + 1) / 2;
+  interchange(version.loops.front(), version.loops.back(), planes, stripWidth,
+              group);
 }

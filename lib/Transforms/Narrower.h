@@ -103,6 +103,8 @@ private:
   void makeStrips(Version &version);
 
   mlir::scf::IfOp choose(mlir::Value fits);
+  mlir::Value testReach();
+  mlir::Block *enter(mlir::Block *block, mlir::Value condition);
   void makeVersions();
   Version copy(mlir::Block *into);
   void narrowTests(Version &version);

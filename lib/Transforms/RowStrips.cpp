@@ -8,6 +8,9 @@
 
 #include "mlir/Dialect/Arith/IR/Arith.h"
 #include "mlir/Dialect/MemRef/IR/MemRef.h"
+#include "mlir/Dialect/Vector/IR/VectorOps.h"
+
+#include <limits>
 
 using namespace mlir;
 using namespace piko;
@@ -110,25 +113,37 @@ bool piko::canInterchange(scf::ForOp rows, scf::ForOp columns) {
 
 namespace {
 
-/// Writes a loop over strips around the loop over rows.
+/// Writes a loop over strips around the loop over rows. What rows strips have
+/// is found for `group` of them at once, in vectors if it is more than one.
 class StripWriter {
 public:
-  StripWriter(scf::ForOp rows, scf::ForOp columns)
-      : rows(rows), columns(columns), builder(rows), loc(rows.getLoc()) {}
-  void write(ArrayRef<HalfPlane> planes, int64_t width);
+  StripWriter(scf::ForOp rows, scf::ForOp columns, int64_t width, int64_t group)
+      : rows(rows), columns(columns), width(width), group(group), builder(rows),
+        loc(rows.getLoc()) {}
+  void write(ArrayRef<HalfPlane> planes);
 
 private:
   /// What is the same for all strips: a plane as one that is not negative
   /// inside, on the first row.
   struct Edge {
     Value first, columnStep;
-    Value inverse;   ///< of what it falls by from row to row, f64
-    Value bias;      ///< what is added to where it is 0, f64
-    Value isFalling; ///< Whether rows from there on are outside.
+    Value inverse; ///< of what it falls by from row to row, f64
+    Value bias;    ///< what is added to where it is 0, f64
+    /// Bits that leave a row as it is, or make it the least or the greatest
+    /// number, where rows from there on are outside, or up to there.
+    Value firstBits, endBits;
+  };
+  /// Of the strips of a group, numbers of rows: the first one, and how many
+  /// there are up to the last one.
+  struct Bounds {
+    Value first, end;
   };
   Edge prepare(const HalfPlane &plane);
-  /// Of a strip, how many rows lie in front of where an edge is 0.
+  Bounds findBounds(ArrayRef<Edge> edges, Value left);
+  /// Of strips, how many rows lie in front of where an edge is 0.
   Value findRow(const Edge &edge, Value firstColumn, Value lastColumn);
+  Value enterLoop(Value left, Value end, int64_t step);
+  void moveRows(Value column, Bounds bounds);
   void carryFrom(Value row);
 
   Value integer(int64_t value) {
@@ -138,11 +153,23 @@ private:
     return arith::ConstantOp::create(builder, loc,
                                      builder.getF64FloatAttr(value));
   }
+  /// A number for each strip of a group.
+  Value spread(Value number) {
+    if (group == 1)
+      return number;
+    auto type = VectorType::get({group}, number.getType());
+    return vector::BroadcastOp::create(builder, loc, type, number);
+  }
   template <class Op> Value make(Value a, Value b) {
     return Op::create(builder, loc, a, b);
   }
+  template <class Op> Value convert(Value number, Type to) {
+    if (auto type = dyn_cast<VectorType>(number.getType()))
+      to = type.clone(to);
+    return Op::create(builder, loc, to, number);
+  }
   Value toReal(Value number) {
-    return arith::SIToFPOp::create(builder, loc, builder.getF64Type(), number);
+    return convert<arith::SIToFPOp>(number, builder.getF64Type());
   }
   Value choose(Value condition, Value yes, Value no) {
     return arith::SelectOp::create(builder, loc, condition, yes, no);
@@ -156,9 +183,10 @@ private:
   }
 
   scf::ForOp rows, columns;
+  int64_t width, group;
   OpBuilder builder;
   Location loc;
-  Value height; ///< f64
+  Value count, height; ///< Of rows, also as f64 of each strip.
 };
 
 } // namespace
@@ -168,25 +196,28 @@ private:
 // count as inside.
 StripWriter::Edge StripWriter::prepare(const HalfPlane &plane) {
   constexpr double slack = 1.0 / 1024, far = 1e18;
+  constexpr int32_t most = std::numeric_limits<int32_t>::max();
   Value zero = integer(0), base = plane.base ? plane.base : zero;
   Value rowStep = plane.rowStep ? plane.rowStep : zero;
-  Edge edge{make<arith::AddIOp>(
-                base, make<arith::MulIOp>(rowStep, rows.getLowerBound())),
-            plane.columnStep ? plane.columnStep : zero,
-            {},
-            {},
-            {}};
+  Value columnStep = plane.columnStep ? plane.columnStep : zero;
+  Value first = make<arith::AddIOp>(
+      base, make<arith::MulIOp>(rowStep, rows.getLowerBound()));
   using P = arith::CmpIPredicate;
-  edge.isFalling = compare(plane.isNegative ? P::sgt : P::slt, rowStep, zero);
-  edge.inverse = choose(
+  Value isFalling = compare(plane.isNegative ? P::sgt : P::slt, rowStep, zero);
+  Value inverse = choose(
       compare(P::eq, rowStep, zero), real(-far),
       make<arith::DivFOp>(real(plane.isNegative ? 1 : -1), toReal(rowStep)));
   if (plane.isNegative) { // -1 - value is not
-    edge.first = make<arith::XOrIOp>(edge.first, integer(-1));
-    edge.columnStep = make<arith::SubIOp>(zero, edge.columnStep);
+    first = make<arith::XOrIOp>(first, integer(-1));
+    columnStep = make<arith::SubIOp>(zero, columnStep);
   }
-  edge.bias = choose(edge.isFalling, real(1 + slack), real(1 - slack));
-  return edge;
+  Value bias = choose(isFalling, real(1 + slack), real(1 - slack));
+  return {spread(first),
+          spread(columnStep),
+          spread(inverse),
+          spread(bias),
+          spread(choose(isFalling, zero, integer(-1))),
+          spread(choose(isFalling, zero, integer(most)))};
 }
 
 // A half-plane reaches as far in a strip as at one of its outer columns.
@@ -200,8 +231,33 @@ Value StripWriter::findRow(const Edge &edge, Value firstColumn,
   Value row = make<arith::AddFOp>(
       make<arith::MulFOp>(toReal(most), edge.inverse), edge.bias);
   using P = arith::CmpFPredicate;
-  row = choose(P::OLT, choose(P::OGT, row, real(0)), height);
-  return arith::FPToSIOp::create(builder, loc, builder.getI32Type(), row);
+  row = choose(P::OLT, choose(P::OGT, row, spread(real(0))), height);
+  return convert<arith::FPToSIOp>(row, builder.getI32Type());
+}
+
+// Strips behind the last column have bounds, too, but nobody reads them.
+StripWriter::Bounds StripWriter::findBounds(ArrayRef<Edge> edges, Value left) {
+  Value lefts = spread(left);
+  if (group > 1) {
+    SmallVector<int32_t> places;
+    for (int64_t strip = 0; strip < group; ++strip)
+      places.push_back(strip * width);
+    lefts = make<arith::AddIOp>(
+        lefts, arith::ConstantOp::create(builder, loc,
+                                         builder.getI32VectorAttr(places)));
+  }
+  Value last = make<arith::MinSIOp>(
+      make<arith::AddIOp>(lefts, spread(integer(width - 1))),
+      spread(make<arith::SubIOp>(columns.getUpperBound(), integer(1))));
+  Bounds bounds{spread(integer(0)), spread(count)};
+  for (const Edge &edge : edges) {
+    Value row = findRow(edge, lefts, last);
+    bounds.first = make<arith::MaxSIOp>(
+        bounds.first, make<arith::AndIOp>(row, edge.firstBits));
+    bounds.end =
+        make<arith::MinSIOp>(bounds.end, make<arith::OrIOp>(row, edge.endBits));
+  }
+  return bounds;
 }
 
 /// Lets the loop over rows begin with what it had so many rows behind its first
@@ -218,40 +274,58 @@ void StripWriter::carryFrom(Value row) {
   }
 }
 
-void StripWriter::write(ArrayRef<HalfPlane> planes, int64_t width) {
-  Value top = rows.getLowerBound(), end = columns.getUpperBound();
-  // A box without rows has no strips.
-  Value count = make<arith::MaxSIOp>(
-      make<arith::SubIOp>(rows.getUpperBound(), top), integer(0));
-  height = toReal(count);
-  SmallVector<Edge> edges;
-  for (const HalfPlane &plane : planes)
-    edges.push_back(prepare(plane));
-  auto strips = scf::ForOp::create(builder, loc, columns.getLowerBound(), end,
-                                   integer(width));
-  builder.setInsertionPointToStart(strips.getBody());
-  Value left = strips.getInductionVar();
+/// Moves the loop over rows, of a strip that begins with a column, in here.
+void StripWriter::moveRows(Value column, Bounds bounds) {
   Value right = make<arith::MinSIOp>(
-      arith::AddIOp::create(builder, loc, left, integer(width),
+      arith::AddIOp::create(builder, loc, column, integer(width),
                             arith::IntegerOverflowFlags::nsw),
-      end);
-  Value last = make<arith::SubIOp>(right, integer(1));
-  Value first = integer(0), behind = count;
-  for (const Edge &edge : edges) {
-    Value row = findRow(edge, left, last);
-    first =
-        make<arith::MaxSIOp>(first, choose(edge.isFalling, integer(0), row));
-    behind = make<arith::MinSIOp>(behind, choose(edge.isFalling, row, count));
-  }
-  carryFrom(first);
-  rows.setLowerBound(make<arith::AddIOp>(top, first));
-  rows.setUpperBound(make<arith::AddIOp>(top, behind));
-  rows->moveBefore(strips.getBody()->getTerminator());
-  columns.setLowerBound(left);
+      columns.getUpperBound());
+  carryFrom(bounds.first);
+  Value top = rows.getLowerBound();
+  rows.setLowerBound(make<arith::AddIOp>(top, bounds.first));
+  rows.setUpperBound(make<arith::AddIOp>(top, bounds.end));
+  rows->moveBefore(builder.getInsertionBlock()->getTerminator());
+  columns.setLowerBound(column);
   columns.setUpperBound(right);
 }
 
+/// Enters a loop over what is between two columns, in steps; its variable.
+Value StripWriter::enterLoop(Value left, Value end, int64_t step) {
+  auto made = scf::ForOp::create(builder, loc, left, end, integer(step));
+  builder.setInsertionPointToStart(made.getBody());
+  return made.getInductionVar();
+}
+
+void StripWriter::write(ArrayRef<HalfPlane> planes) {
+  Value left = columns.getLowerBound(), end = columns.getUpperBound();
+  // A box without rows has no strips.
+  count = make<arith::MaxSIOp>(
+      make<arith::SubIOp>(rows.getUpperBound(), rows.getLowerBound()),
+      integer(0));
+  height = spread(toReal(count));
+  SmallVector<Edge> edges;
+  for (const HalfPlane &plane : planes)
+    edges.push_back(prepare(plane));
+  if (group == 1) {
+    left = enterLoop(left, end, width);
+    moveRows(left, findBounds(edges, left));
+    return;
+  }
+  left = enterLoop(left, end, group * width);
+  Bounds bounds = findBounds(edges, left);
+  end = make<arith::MinSIOp>(make<arith::AddIOp>(left, integer(group * width)),
+                             end);
+  Value column = enterLoop(left, end, width);
+  Value strip = convert<arith::IndexCastUIOp>(
+      make<arith::DivUIOp>(make<arith::SubIOp>(column, left), integer(width)),
+      builder.getIndexType());
+  for (Value *bound : {&bounds.first, &bounds.end})
+    *bound = vector::ExtractOp::create(builder, loc, *bound, strip);
+  moveRows(column, bounds);
+}
+
 void piko::interchange(scf::ForOp rows, scf::ForOp columns,
-                       ArrayRef<HalfPlane> planes, int64_t width) {
-  StripWriter(rows, columns).write(planes, width);
+                       ArrayRef<HalfPlane> planes, int64_t width,
+                       int64_t group) {
+  StripWriter(rows, columns, width, group).write(planes);
 }

@@ -26,8 +26,10 @@ bool canInterchange(mlir::scf::ForOp rows, mlir::scf::ForOp columns);
 
 /// Makes a loop over strips of so many columns around both, in which those rows
 /// are left that have a pixel in all half-planes; others have nothing to do.
+/// The rows of `group` strips are found at once.
 void interchange(mlir::scf::ForOp rows, mlir::scf::ForOp columns,
-                 llvm::ArrayRef<HalfPlane> planes, int64_t width);
+                 llvm::ArrayRef<HalfPlane> planes, int64_t width,
+                 int64_t group);
 
 } // namespace piko
 

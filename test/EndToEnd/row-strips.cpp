@@ -29,7 +29,7 @@
 // RUN: %{target} --pipe Slab | FileCheck %s --check-prefix=STRIPS
 // RUN: %{target} --pipe Octagon | FileCheck %s --check-prefix=STRIPS
 // RUN: %{target} --pipe Lit | FileCheck %s --check-prefix=STRIPS
-// STRIPS: arith.fptosi %{{.*}} : f64 to i32
+// STRIPS: arith.fptosi %{{.*}} : vector<8xf64> to vector<8xi32>
 //
 // Upright bounds leave rows full. What others read or count keeps its order, and
 // a union is not convex.
@@ -37,7 +37,7 @@
 // RUN: %{target} --pipe Neighbours | FileCheck %s --check-prefix=ROWS
 // RUN: %{target} --pipe Counted | FileCheck %s --check-prefix=ROWS
 // RUN: %{target} --pipe Either | FileCheck %s --check-prefix=ROWS
-// ROWS-NOT: arith.fptosi %{{.*}} : f64 to i32
+// ROWS-NOT: arith.fptosi %{{.*}} : {{.*}}f64{{.*}}i32
 // REQUIRES: x86_64
 #include <piko.h>
 

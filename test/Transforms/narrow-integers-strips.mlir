@@ -11,23 +11,30 @@ piko.pipeline @P rank 2 {
   piko.stage @a bins [0, 0] threads 1 : @V -> [] {}
 
   // Loop interchange: strips of 8 columns, and of each the rows that both
-  // half-planes reach at one of its outer columns.
+  // half-planes reach at one of its outer columns, which is found for four strips
+  // at once. A box that lies outside of one has none.
   // CHECK-LABEL: piko.kernel @triangle
+  // CHECK:         %[[ABOVE:.*]] = arith.cmpi sge, %{{.*}}, %c0_i64 : i64
+  // CHECK:         %[[BELOW:.*]] = arith.cmpi sge, %{{.*}}, %c0_i64 : i64
+  // CHECK:         %[[REACHES:.*]] = arith.andi %[[ABOVE]], %[[BELOW]] : i1
   // CHECK:         scf.if %{{.*}} {
-  // CHECK:           %[[STEP:.*]] = arith.sitofp %{{.*}} : i32 to f64
-  // CHECK:           arith.divf %{{.*}}, %[[STEP]] : f64
-  // CHECK:           scf.for %[[LEFT:.*]] = %c3_i32 to %c61_i32 step %c8_i32
-  // CHECK:             %[[NEXT:.*]] = arith.addi %[[LEFT]], %c8_i32 overflow<nsw>
-  // CHECK:             %[[RIGHT:.*]] = arith.minsi %[[NEXT]], %c61_i32
-  // CHECK:             arith.maxsi
-  // CHECK:             %[[ROW:.*]] = arith.fptosi %{{.*}} : f64 to i32
-  // CHECK:             arith.fptosi
-  // CHECK:             scf.for %[[Y:.*]] = %{{.*}} to %{{.*}} step %c1_i32 iter_args
-  // CHECK:               scf.for %[[X:.*]] = %[[LEFT]] to %[[RIGHT]] step %c1_i32
-  // CHECK:                 arith.cmpi sge, %{{.*}}, %c0_i32 : i32
-  // CHECK:                 piko.store %{{.*}}, checked @out[%{{.*}}, %{{.*}}
-  // CHECK:               } {piko.lanes}
-  // CHECK:             } {piko.rows}
+  // CHECK-NEXT:      scf.if %[[REACHES]] {
+  // CHECK:             %[[STEP:.*]] = arith.sitofp %{{.*}} : i32 to f64
+  // CHECK:             arith.divf %{{.*}}, %[[STEP]] : f64
+  // CHECK:             scf.for %[[GROUP:.*]] = %c3_i32 to %c61_i32 step %c32_i32
+  // CHECK:               arith.maxsi %{{.*}} : vector<4xi32>
+  // CHECK-COUNT-2:       arith.fptosi %{{.*}} : vector<4xf64> to vector<4xi32>
+  // CHECK:               %[[LAST:.*]] = arith.minsi %{{.*}}, %c61_i32
+  // CHECK:               scf.for %[[LEFT:.*]] = %[[GROUP]] to %[[LAST]] step %c8_i32
+  // CHECK-COUNT-2:         vector.extract %{{.*}} : i32 from vector<4xi32>
+  // CHECK:                 %[[NEXT:.*]] = arith.addi %[[LEFT]], %c8_i32 overflow<nsw>
+  // CHECK:                 %[[RIGHT:.*]] = arith.minsi %[[NEXT]], %c61_i32
+  // CHECK:                 scf.for %[[Y:.*]] = %{{.*}} to %{{.*}} step %c1_i32 iter_args
+  // CHECK:                   scf.for %[[X:.*]] = %[[LEFT]] to %[[RIGHT]] step %c1_i32
+  // CHECK:                     arith.cmpi sge, %{{.*}}, %c0_i32 : i32
+  // CHECK:                     piko.store %{{.*}}, checked @out[%{{.*}}, %{{.*}}
+  // CHECK:                   } {piko.lanes}
+  // CHECK:                 } {piko.rows}
   // CHECK:         } else {
   // CHECK:           scf.for %{{.*}} = %c1_i32 to %c50_i32 step %c1_i32
   // CHECK:             scf.for %{{.*}} = %c3_i32 to %c61_i32 step %c1_i32
@@ -66,8 +73,9 @@ piko.pipeline @P rank 2 {
   // negative. Where they overflow, the loops are as they were.
   // CHECK-LABEL: piko.kernel @narrow
   // CHECK:         scf.if
-  // CHECK:           scf.for {{.*}} step %c8_i32
+  // CHECK:           scf.for {{.*}} step %c32_i32
   // CHECK-COUNT-2:     arith.fptosi
+  // CHECK:             scf.for {{.*}} step %c8_i32
   // CHECK:         } else {
   // CHECK:           arith.cmpi sge, %{{.*}}, %c0_i32 : i32
   piko.kernel @narrow {
@@ -96,10 +104,76 @@ piko.pipeline @P rank 2 {
     } {piko.rows}
   }
 
+  // What rows hand on, and nobody uses behind them, begins with what it has in the
+  // strip's first row.
+  // CHECK-LABEL: piko.kernel @carried
+  // CHECK:         scf.if %{{.*}} {
+  // CHECK:           scf.for {{.*}} step %c8_i32
+  // CHECK:             %[[BEHIND:.*]] = arith.addi %{{.*}}, %{{.*}} : i64
+  // CHECK:             scf.for {{.*}} iter_args(%{{.*}} = %[[BEHIND]], %{{.*}} = %{{.*}}) -> (i64, i32)
+  // CHECK:         } else {
+  // CHECK:           scf.for {{.*}} iter_args(%{{.*}} = %{{.*}}) -> (i64)
+  piko.kernel @carried {
+    %zero = arith.constant 0 : index
+    %lo = arith.constant 0 : i32
+    %hi = arith.constant 64 : i32
+    %one = arith.constant 1 : i32
+    %none = arith.constant 0 : i64
+    %n = piko.load @in[%zero : index] "n" : i64
+    // expected-remark@below {{1 comparisons and 0 conversions}}
+    // expected-remark@below {{1 comparisons bound the rows}}
+    %end = scf.for %y = %lo to %hi step %one iter_args(%py = %n) -> i64 : i32 {
+      scf.for %x = %lo to %hi step %one : i32 {
+        %x64 = arith.extsi %x : i32 to i64
+        %px = arith.muli %n, %x64 : i64
+        %e = arith.addi %px, %py : i64
+        %isIn = arith.cmpi sge, %e, %none : i64
+        scf.if %isIn {
+          %at = arith.index_cast %x : i32 to index
+          %row = arith.index_cast %y : i32 to index
+          piko.store %n, checked @out[%at, %row : index, index] "n" : i64
+        }
+      } {piko.lanes}
+      %next = arith.addi %py, %n : i64
+      scf.yield %next : i64
+    } {piko.rows}
+  }
+
+  // Where lanes may be primitives, each finds the rows of its strips one after the
+  // other.
+  // CHECK-LABEL: piko.kernel @items
+  // CHECK-NOT:     vector
+  // CHECK:         scf.for {{.*}} step %c8_i32
+  // CHECK:           arith.fptosi %{{.*}} : f64 to i32
+  // CHECK-NOT:     vector
+  // CHECK-LABEL: piko.kernel @left
+  piko.kernel @items {
+    %zero = arith.constant 0 : index
+    %first = arith.constant 1 : index
+    %lo = arith.constant 0 : i32
+    %hi = arith.constant 64 : i32
+    %one = arith.constant 1 : i32
+    %k = piko.load @in[%zero : index] "k" : i32
+    scf.for %i = %zero to %first step %first {
+      // expected-remark@below {{1 comparisons bound the rows}}
+      scf.for %y = %lo to %hi step %one : i32 {
+        %py = arith.muli %k, %y : i32
+        scf.for %x = %lo to %hi step %one : i32 {
+          %e = arith.subi %py, %x : i32
+          %isIn = arith.cmpi sge, %e, %lo : i32
+          scf.if %isIn {
+            %at = arith.index_cast %x : i32 to index
+            %row = arith.index_cast %y : i32 to index
+            piko.store %k, checked @out[%at, %row : index, index] "k" : i32
+          }
+        } {piko.lanes}
+      } {piko.rows}
+    } {piko.lanes, piko.mapping = #piko<lanes items>}
+  }
+
   // What is left in rows: a pixel that another one reads, one whose row and column
   // change places, what is not behind a condition alone, upright bounds, and loops
   // that keep their order.
-  // CHECK-LABEL: piko.kernel @left
   // CHECK-NOT:     step %c8_i32
   // CHECK-LABEL: piko.kernel @end
   piko.kernel @left {

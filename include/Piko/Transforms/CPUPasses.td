@@ -284,7 +284,10 @@ def NarrowIntegers : Pass<"piko-narrow-integers", "::piko::PipelineOp"> {
     such functions have one sign are strip-mined and interchanged: a strip has as
     many columns as there are lanes, and around the loop over its rows stands what
     finds which of them the half-planes of all edges reach. So hardly any vector
-    is empty, and what a branch decides changes once a strip, not once a row.
+    is empty, and what a branch decides changes once a strip, not once a row. For
+    half as many strips as there are lanes this is found at once, in vectors,
+    unless lanes may be primitives. A box that lies outside of a half-plane, by
+    what was evaluated at its corners, has no strips.
 
     **Guarantees** the same outcome of each comparison, and the same number, also
     where 64 bits overflow: such functions do not pass the test.
@@ -322,6 +325,7 @@ def NarrowIntegers : Pass<"piko-narrow-integers", "::piko::PipelineOp"> {
     any order (`piko.rows`), and access no element but their own of what they
     change.
   }];
+  let dependentDialects = ["::mlir::vector::VectorDialect"];
   let options = [
     Option<"laneCount", "lanes", "int64_t", /*default=*/"0",
            "lanes of a vector, which a strip has as columns; 0: no strips">];
