@@ -480,18 +480,37 @@ static int64_t countInstructions(Operation *op) {
                                                                       : 1;
 }
 
-bool IterationLanes::isCheap(Region &region) const {
-  constexpr int64_t most = 12;
-  int64_t count = 0;
+/// Adds up the instructions of a side that has no effect where no lane is
+/// active; false if it may have one, or takes long.
+bool IterationLanes::addInstructions(Region &region, bool isOfStrip,
+                                     int64_t &count) const {
   for (Operation &op : region.front().without_terminator()) {
     LaneForm form = getForm(&op);
+    if (isa<scf::IfOp>(op) && isOfStrip && isVarying(op.getOperand(0))) {
+      for (Region &side : op.getRegions())
+        if (!side.empty() && !addInstructions(side, isOfStrip, count))
+          return false;
+      continue;
+    }
     bool isFree =
         form == LaneForm::Vector || (form == LaneForm::Uniform && isPure(&op));
-    if (!isFree || isDivision(&op) || findGroup(&op) ||
-        (count += countInstructions(&op)) > most)
+    bool isMasked = isOfStrip && isa<LoadOp, StoreOp>(op) &&
+                    form == LaneForm::Access && isRow(&op) && !findLimited(&op);
+    if ((!isFree && !isMasked) || isDivision(&op) || findGroup(&op))
       return false;
+    count += countInstructions(&op);
   }
   return true;
+}
+
+// Hardly any vector of a strip is empty, and where one is, a branch is seldom
+// foreseen: without it, the next row's pixels are asked for in the meantime.
+bool IterationLanes::isCheap(Region &region) const {
+  constexpr int64_t most = 12, mostOfStrip = 64;
+  bool isOfStrip = isOneVector(loop, laneCount);
+  int64_t count = 0;
+  return addInstructions(region, isOfStrip, count) &&
+         count <= (isOfStrip ? mostOfStrip : most);
 }
 
 void IterationLanes::checkCarried() {

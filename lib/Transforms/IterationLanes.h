@@ -172,6 +172,8 @@ private:
   bool addEmission(mlir::Operation *op, PortEmissions &port) const;
   void findEmissions();
   void checkCarried();
+  bool addInstructions(mlir::Region &region, bool isOfStrip,
+                       int64_t &count) const;
   bool isAccess(mlir::Operation *op) const;
   bool isFixed(mlir::Value value) const;
   bool isLimited(mlir::Value value) const;

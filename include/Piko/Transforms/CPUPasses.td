@@ -348,8 +348,11 @@ def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
     **Does**: runs as many consecutive turns of a loop over primitives, of a
     `parallelFor`, or of a row of pixels, at once as there are `lanes`. What is the
     same for all of them stays scalar; the rest becomes vectors, by predication:
-    conditions become masks, with a branch around what no lane needs; loops run as
-    long as some lane does; access to state and to primitives becomes gathers and
+    conditions become masks, with a branch around what no lane needs; in a strip of
+    a convex shape (`piko-narrow-integers`), of which hardly any vector is empty,
+    there is none around up to 64 instructions, so that the pixels of the next row
+    are asked for before it is known what these become. Loops run as long as some
+    lane does; access to state and to primitives becomes gathers and
     scatters, of a row of pixels masked loads and stores; local arrays get a column
     for each lane, and short ones are accessed row by row, also where lanes are in
     different places. What a loop hands on stays scalar where all lanes that are
