@@ -3,6 +3,7 @@
 // What turns of a loop cost as lanes, and one after the other.
 
 #include "IterationLanes.h"
+#include "LaneCycles.h"
 #include "LoopStreams.h"
 
 #include "Piko/Dialect/Piko/IR/Marks.h"
@@ -14,48 +15,6 @@
 using namespace mlir;
 using namespace piko;
 
-namespace {
-
-/// What the operations of as many iterations as there are lanes take, in
-/// cycles.
-struct Cycles {
-  double scalar, scalarAccess, scalarDivision;
-  double vector, row, gather, division;
-  /// A row of numbers below 32 bits, whose lanes may have no masks.
-  double narrowRow;
-  /// A quotient of integers by way of floats, and one of a divisor that all
-  /// lanes share.
-  double quotient, sharedQuotient;
-  /// A gather of numbers below 32 bits, for which there is no instruction; and
-  /// what it takes more if each lane goes through memory on its own.
-  double narrowGather, ownLines;
-  /// One of several words of an element that are read at once.
-  double transposed;
-  /// A word of a record that is emitted.
-  double emitted;
-  /// A scatter, and of numbers below 32 bits; and what each row takes of a
-  /// short array that is read, or written, at places that differ.
-  double scatter, narrowScatter, readRow, writeRow;
-  /// How many times as fast LLVM makes a loop that it runs as vectors.
-  double along;
-  /// To bring lanes apart, for one operation or for a group, and to hand each
-  /// lane a number.
-  double apart, apartInOrder, slot;
-  /// Branches of a condition that differs: to what fails, around what takes
-  /// turns, and others, which are not foreseen; and of a loop whose turns
-  /// differ.
-  double checks, branches, unforeseen, exits;
-  /// What each turn of such a loop takes to find who goes on.
-  double turn;
-  /// To find which lane makes which turn, and to bring there what it has.
-  double pairs;
-  /// How many of the lanes go on, of those that came to a loop whose turns
-  /// differ; and to one inside of such a loop.
-  double goOn, goOnInside;
-};
-
-} // namespace
-
 /// How many operations test whether an index is linear.
 static constexpr double rowTest = 5;
 
@@ -64,102 +23,6 @@ static constexpr double loopTurns = 8, turnsThatDiffer = 4;
 
 /// How many lanes are at work in a loop that each goes through by itself.
 static constexpr double fullness = 0.85;
-
-/// With vectors of 512 bits (Sapphire Rapids, Zen 4), of 256 bits, and of 128
-/// bits without masks: a branch for each lane stands for one.
-static const Cycles &getCycles(int64_t laneCount) {
-  static constexpr Cycles of16{.scalar = 5,
-                               .scalarAccess = 8,
-                               .scalarDivision = 64,
-                               .vector = 0.8,
-                               .row = 1.5,
-                               .gather = 12,
-                               .division = 16,
-                               .narrowRow = 1.5,
-                               .quotient = 50,
-                               .sharedQuotient = 24,
-                               .narrowGather = 16,
-                               .ownLines = 30,
-                               .transposed = 7,
-                               .emitted = 12,
-                               .scatter = 16,
-                               .narrowScatter = 60,
-                               .readRow = 0.8,
-                               .writeRow = 1.2,
-                               .along = 6,
-                               .apart = 15,
-                               .apartInOrder = 40,
-                               .slot = 8,
-                               .checks = 15,
-                               .branches = 40,
-                               .unforeseen = 250,
-                               .exits = 300,
-                               .turn = 15,
-                               .pairs = 60,
-                               .goOn = 0.55,
-                               .goOnInside = 0.7};
-  static constexpr Cycles of8{.scalar = 2.5,
-                              .scalarAccess = 4,
-                              .scalarDivision = 32,
-                              .vector = 0.4,
-                              .row = 1.5,
-                              .gather = 4,
-                              .division = 8,
-                              .narrowRow = 24,
-                              .quotient = 60,
-                              .sharedQuotient = 60,
-                              .narrowGather = 10,
-                              .ownLines = 15,
-                              .transposed = 4,
-                              .emitted = 4,
-                              .scatter = 20,
-                              .narrowScatter = 35,
-                              .readRow = 0.5,
-                              .writeRow = 0.8,
-                              .along = 4,
-                              .apart = 8,
-                              .apartInOrder = 15,
-                              .slot = 1.5,
-                              .checks = 8,
-                              .branches = 20,
-                              .unforeseen = 60,
-                              .exits = 50,
-                              .turn = 10,
-                              .pairs = 40,
-                              .goOn = 0.45,
-                              .goOnInside = 0.75};
-  static constexpr Cycles of4{.scalar = 1.25,
-                              .scalarAccess = 2,
-                              .scalarDivision = 16,
-                              .vector = 0.6,
-                              .row = 4,
-                              .gather = 8,
-                              .division = 5,
-                              .narrowRow = 16,
-                              .quotient = 20,
-                              .sharedQuotient = 16,
-                              .narrowGather = 8,
-                              .ownLines = 8,
-                              .transposed = 6,
-                              .emitted = 6,
-                              .scatter = 8,
-                              .narrowScatter = 8,
-                              .readRow = 2,
-                              .writeRow = 3,
-                              .along = 2.5,
-                              .apart = 10,
-                              .apartInOrder = 20,
-                              .slot = 2,
-                              .checks = 4,
-                              .branches = 10,
-                              .unforeseen = 10,
-                              .exits = 25,
-                              .turn = 5,
-                              .pairs = 40,
-                              .goOn = 0.6,
-                              .goOnInside = 0.8};
-  return laneCount == 16 ? of16 : laneCount == 8 ? of8 : of4;
-}
 
 namespace {
 

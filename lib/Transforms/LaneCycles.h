@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// What operations take on a processor, as lanes and one after the other:
+// measured, and the only numbers of the cost model that depend on it.
+
+#ifndef PIKO_LIB_TRANSFORMS_LANECYCLES_H
+#define PIKO_LIB_TRANSFORMS_LANECYCLES_H
+
+#include <cstdint>
+
+namespace piko {
+
+/// What the operations of as many iterations as there are lanes take, in
+/// cycles.
+struct Cycles {
+  double scalar, scalarAccess, scalarDivision;
+  double vector, row, gather, division;
+  /// A row of numbers below 32 bits, whose lanes may have no masks.
+  double narrowRow;
+  /// A quotient of integers by way of floats, and one of a divisor that all
+  /// lanes share.
+  double quotient, sharedQuotient;
+  /// A gather of numbers below 32 bits, for which there is no instruction; and
+  /// what it takes more if each lane goes through memory on its own.
+  double narrowGather, ownLines;
+  /// One of several words of an element that are read at once.
+  double transposed;
+  /// A word of a record that is emitted.
+  double emitted;
+  /// A scatter, and of numbers below 32 bits; and what each row takes of a
+  /// short array that is read, or written, at places that differ.
+  double scatter, narrowScatter, readRow, writeRow;
+  /// How many times as fast LLVM makes a loop that it runs as vectors.
+  double along;
+  /// To bring lanes apart, for one operation or for a group, and to hand each
+  /// lane a number.
+  double apart, apartInOrder, slot;
+  /// Branches of a condition that differs: to what fails, around what takes
+  /// turns, and others, which are not foreseen; and of a loop whose turns
+  /// differ.
+  double checks, branches, unforeseen, exits;
+  /// What each turn of such a loop takes to find who goes on.
+  double turn;
+  /// To find which lane makes which turn, and to bring there what it has.
+  double pairs;
+  /// How many of the lanes go on, of those that came to a loop whose turns
+  /// differ; and to one inside of such a loop.
+  double goOn, goOnInside;
+};
+
+/// With vectors of 512 bits (Sapphire Rapids, Zen 4), of 256 bits, and of 128
+/// bits without masks: a branch for each lane stands for one.
+const Cycles &getCycles(int64_t laneCount);
+
+} // namespace piko
+
+#endif // PIKO_LIB_TRANSFORMS_LANECYCLES_H
