@@ -4,6 +4,7 @@
 
 #include "IterationLanes.h"
 #include "LaneCycles.h"
+#include "LoadChains.h"
 #include "LoopStreams.h"
 
 #include "Piko/Dialect/Piko/IR/Marks.h"
@@ -121,6 +122,8 @@ private:
   /// How many of the lanes make a turn of a loop.
   double getGoing(Operation *loop) const;
   void addEmission(Operation *op, Frequency times);
+  /// What iterations wait for where turns say where the next ones load.
+  void addChase(LoadOp load, Frequency times, bool laneByLane);
 
   /// What it takes to bring lanes apart, with what they have.
   void addTurns(const OrderedGroup &group, Frequency times);
@@ -145,6 +148,7 @@ private:
   SmallVector<scf::ForOp> inner; ///< loops around the code, in that of lanes
   double along = 1;              ///< How much faster LLVM makes it.
   llvm::DenseSet<Operation *> turns;
+  llvm::DenseSet<Value> chased; ///< indices, each of one wait
 };
 
 } // namespace
@@ -434,6 +438,24 @@ void CostModel::addEmission(Operation *op, Frequency times) {
                        cycles.emitted * double(record.getSize()) / wordSize);
 }
 
+void CostModel::addChase(LoadOp load, Frequency times, bool laneByLane) {
+  // A nest that is flattened chooses where its turns read; it was looked at
+  // before.
+  Operation *chase = findChase(load);
+  if (!chase || !lanes.getLoop()->isProperAncestor(chase) ||
+      chase->hasAttr(marks::turns) ||
+      !chased.insert(load.getIndices().front()).second)
+    return;
+  // Loops inside begin with a wait.
+  for (Operation *at = load->getParentOp(); at != chase; at = at->getParentOp())
+    if (isa<scf::ForOp, scf::WhileOp>(at))
+      times = times.scaled(1 / (getTurns(at) * getGoing(at)), 1 / getTurns(at));
+  double one = cycles.chase / double(lanes.getLaneCount());
+  cost.serial += times.serial * cycles.chase;
+  cost.vectors +=
+      laneByLane ? times.serial * cycles.chase : times.vectors * one;
+}
+
 void CostModel::addOperation(Operation *op, Frequency times, bool laneByLane) {
   if (isPrefetch(op) || isa<FailOp, FailListOp, FailDivideOp>(op))
     return; // free, or rare
@@ -447,6 +469,8 @@ void CostModel::addOperation(Operation *op, Frequency times, bool laneByLane) {
   if (form == LaneForm::Uniform || form == LaneForm::Private ||
       form == LaneForm::Lazy)
     return; // as much for one as for all, or nothing
+  if (auto load = dyn_cast<LoadOp>(op); load && !load.getIndices().empty())
+    addChase(load, times, laneByLane);
   bool isAccess = form == LaneForm::Access;
   bool isDivided = isDivision(op);
   // There are no instructions for vectors of it.

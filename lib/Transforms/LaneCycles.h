@@ -39,6 +39,10 @@ struct Cycles {
   /// turns, and others, which are not foreseen; and of a loop whose turns
   /// differ.
   double checks, branches, unforeseen, exits;
+  /// What iterations wait, one after the other, for a load whose place another
+  /// load has said: for the second level of the cache, and to have the place
+  /// back from where it was kept.
+  double chase;
   /// What each turn of such a loop takes to find who goes on.
   double turn;
   /// To find which lane makes which turn, and to bring there what it has.

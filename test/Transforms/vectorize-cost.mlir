@@ -78,3 +78,45 @@ piko.pipeline @ReadsOnce rank 1 {
     piko.storage.close_bins %bins : !piko.bins<@Row>
   }
 }
+
+// -----
+
+piko.record @Item {"k" : i32 at 0} size 4 align 4
+piko.record @Node {"next" : i32 at 0, "x" : f32 at 4} size 8 align 4
+piko.record @D {"z" : f32 at 0} size 4 align 4
+
+// A list: each node says where the next one is, and one iteration waits for each
+// of them. Lanes wait together, for which a gather is little.
+piko.pipeline @Chases rank 1 {
+  piko.buffer @nodes : @Node
+  piko.buffer @out : @D
+  piko.source @a
+  piko.stage @a bins [0] threads 1 : @Item -> [] {}
+  piko.kernel @k {
+    %c0 = arith.constant 0 : i32
+    %c1 = arith.constant 1 : index
+    %none = arith.constant 0.0 : f32
+    %bins = piko.storage.open_bins @a : !piko.bins<@Item>
+    %n = piko.storage.unit_count %bins : !piko.bins<@Item>
+    scf.forall (%u) in (%n) {
+      %lo, %hi = piko.storage.cell_range %bins[%u, %u] : !piko.bins<@Item>
+      // expected-remark@+1 {{stage 'a': process is vectorized for 32 primitives at once}}
+      scf.for %i = %lo to %hi step %c1 {
+        %f = piko.storage.item %bins[%i] : !piko.bins<@Item> -> !piko.prim<@Item>
+        %k = piko.get %f "k" : !piko.prim<@Item> -> i32
+        %all:2 = scf.while (%at = %k, %sum = %none) : (i32, f32) -> (i32, f32) {
+          %more = arith.cmpi sge, %at, %c0 : i32
+          scf.condition(%more) %at, %sum : i32, f32
+        } do {
+        ^bb0(%at: i32, %sum: f32):
+          %next = piko.load checked @nodes[%at : i32] "next" : i32
+          %x = piko.load checked @nodes[%at : i32] "x" : f32
+          %more = arith.addf %sum, %x : f32
+          scf.yield %next, %more : i32, f32
+        }
+        piko.store %all#1, checked @out[%k : i32] "z" : f32
+      } {piko.lanes, piko.mapping = #piko<lanes items>}
+    }
+    piko.storage.close_bins %bins : !piko.bins<@Item>
+  }
+}

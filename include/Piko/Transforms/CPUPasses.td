@@ -431,6 +431,8 @@ def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
     vectors pay is estimated from the operations, how often they run, and for how
     many lanes; where they do not, a remark has the estimate, with what costs most.
     A loop of a phase that is written in order is vectorized as well where it stands
+    One iteration alone waits for each load whose place a load of the turn before
+    has said, as of the nodes of a tree (pointer chasing); lanes wait together.
     in no other vector, its turns hand on nothing, read no state that they change,
     and store each field once; they may emit. If all that a turn does stands behind
     a condition, with a loop of its own, the turns that have something to do are
