@@ -125,7 +125,39 @@ IndexRanges::findOfDivision(DivideOp division) {
   return {};
 }
 
+/// Of what grows with the number, by a positive constant: shifts and quotients;
+/// and of a number whose upper bits are left out.
+std::optional<IndexRanges::Range> IndexRanges::findByConstant(Operation *op,
+                                                              int64_t number) {
+  bool isShift = isa<arith::ShLIOp, arith::ShRSIOp, arith::ShRUIOp>(op);
+  constexpr int64_t mostBits = 31;
+  if (number < 0 || (isShift && number > mostBits) || (!isShift && number == 0))
+    return {};
+  if (isa<arith::AndIOp>(op))
+    return Range{constant(0), constant(number)};
+  std::optional<Range> range = get(op->getOperand(0));
+  if (!range)
+    return {};
+  if (isa<arith::DivUIOp, arith::ShRUIOp>(op))
+    expect(Predicate::sge, range->least, constant(0));
+  Value by = constant(isShift ? int64_t(1) << number : number);
+  if (isa<arith::ShLIOp>(op))
+    return multiply(*range, {by, by});
+  // A shift rounds down.
+  auto divide = [&](Value value) -> Value {
+    return isa<arith::ShRSIOp>(op)
+               ? create<arith::ShRSIOp>(value, constant(number))
+               : create<arith::DivSIOp>(value, by);
+  };
+  return Range{divide(range->least), divide(range->greatest)};
+}
+
 std::optional<IndexRanges::Range> IndexRanges::findOfOperation(Operation *op) {
+  if (APInt number; isa<arith::AndIOp, arith::DivSIOp, arith::DivUIOp,
+                        arith::ShLIOp, arith::ShRSIOp, arith::ShRUIOp>(op) &&
+                    matchPattern(op->getOperand(1), m_ConstantInt(&number)) &&
+                    number.isSignedIntN(32))
+    return findByConstant(op, number.getSExtValue());
   if (auto division = dyn_cast<DivideOp>(op))
     return findOfDivision(division);
   if (isa<arith::RemSIOp, arith::RemUIOp>(op))

@@ -46,6 +46,7 @@ public:
 private:
   std::optional<Range> find(mlir::Value value);
   std::optional<Range> findOfOperation(mlir::Operation *op);
+  std::optional<Range> findByConstant(mlir::Operation *op, int64_t number);
   std::optional<Range> findOfDivision(DivideOp division);
   std::optional<Range> findOfRemainder(mlir::Value lhs, mlir::Value rhs,
                                        bool isSigned);

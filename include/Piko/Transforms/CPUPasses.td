@@ -71,7 +71,8 @@ def HoistBounds : Pass<"piko-hoist-bounds", "::piko::PipelineOp"> {
 
     **Does**: takes nests of loops, outermost first, in which the range of each
     index that is tested is known in front: sums, products, minima, maxima,
-    choices and remainders of numbers that do not change and of counts by one.
+    choices and remainders of numbers that do not change and of counts by one, and
+    their quotients, shifts and masks by constants.
     Interval arithmetic in front of the nest finds the least and the greatest
     index, and a test whether all are inside, and nothing wraps around; then a
     copy of the nest runs whose accesses are `checked`, and whose divisions that
