@@ -36,10 +36,19 @@ private:
 
 } // namespace
 
-/// How many fields are worth loads of whole pieces of a record.
-static constexpr size_t leastFields = 3;
-
 static constexpr int64_t wordSize = 4;
+
+/// Whether fields are worth loads of whole pieces of a record: three, or two
+/// side by side.
+template <typename OpT>
+static bool areWorthPieces(ArrayRef<OpT> reads, RecordOp record) {
+  if (reads.size() != 2)
+    return reads.size() > 2;
+  auto getOffset = [&](OpT read) {
+    return int64_t(record.getField(read.getField()).getOffset());
+  };
+  return std::abs(getOffset(reads[0]) - getOffset(reads[1])) == wordSize;
+}
 
 /// Whether a field is as wide as the words that are transposed.
 static bool isWord(Type lanes) {
@@ -171,9 +180,9 @@ void MergeGathersPass::mergeState(KernelOp kernel) {
   });
   for (auto &[place, groups] : places)
     for (SmallVector<GatherOp> &reads : groups) {
-      if (reads.size() < leastFields)
-        continue;
       GatherOp first = reads.front();
+      if (!areWorthPieces<GatherOp>(reads, getRecord(first)))
+        continue;
       OpBuilder builder(first);
       merge<GatherOp>(reads, createElements(first, builder),
                       FlatSymbolRefAttr::get(getRecord(first).getSymNameAttr()),
@@ -193,12 +202,13 @@ void MergeGathersPass::mergePrimitives(KernelOp kernel) {
          isBehind(get, reads.front())))
       reads.push_back(get);
   });
-  for (auto &[primitive, reads] : primitives)
-    if (reads.size() >= leastFields) {
+  for (auto &[primitive, reads] : primitives) {
+    FlatSymbolRefAttr record = reads.front().getRecordAttr();
+    if (areWorthPieces<LaneGetOp>(reads, lookupRecord(reads.front(), record))) {
       OpBuilder builder(reads.front());
-      merge<LaneGetOp>(reads, primitive, reads.front().getRecordAttr(),
-                       builder);
+      merge<LaneGetOp>(reads, primitive, record, builder);
     }
+  }
 }
 
 /// Whether a write is of another word of the same elements, by the same lanes.
@@ -222,6 +232,7 @@ static bool mayPass(Operation *op, FlatSymbolRefAttr state) {
 }
 
 void MergeGathersPass::mergeWrites(ArrayRef<ScatterOp> writes) {
+  constexpr size_t leastFields = 3;
   if (writes.size() < leastFields)
     return;
   ScatterOp last = writes.back();

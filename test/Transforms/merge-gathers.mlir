@@ -3,13 +3,15 @@
 piko.record @V {"x" : f32 at 0, "y" : f32 at 4, "z" : f32 at 8, "d" : f64 at 16, "n" : i32 at 24} size 32 align 8
 
 // Words of the same elements are read at once, also of elements one behind the
-// other; a field of 64 bits, one for other lanes, and two fields alone are not. Of
-// state that the kernel changes, so are words that nothing in between has written.
+// other, and two alone if they are side by side; a field of 64 bits, and one for
+// other lanes, are not. Of state that the kernel changes, so are words that nothing
+// in between has written.
 // CHECK-LABEL: piko.kernel @state
 // CHECK:         %[[AS:.*]] = piko.cpu.elements @mesh[%[[IS:.*]] : vector<16xindex>] : vector<16xindex>
 // CHECK-NEXT:    %[[X:.*]]:3 = piko.cpu.get_fields %[[AS]] ["x", "z", "n"] of @V mask %[[M:.*]] : vector<16xindex>, vector<16xi1> -> vector<16xf32>, vector<16xf32>, vector<16xi32>
 // CHECK-NEXT:    piko.cpu.gather @mesh[%[[IS]] : vector<16xindex>] "d"
 // CHECK-NEXT:    piko.cpu.gather @mesh[%[[IS]] : vector<16xindex>] "y" mask %{{.*}}
+// CHECK:         piko.cpu.get_fields %{{.*}} ["x", "y"] of @V
 // CHECK-COUNT-2: piko.cpu.gather @mesh[%{{.*}} : vector<16xindex>]
 // CHECK:         %[[RS:.*]] = piko.cpu.elements consecutive @mesh[%c0 : index] : vector<16xindex>
 // CHECK-NEXT:    piko.cpu.get_fields %[[RS]] ["x", "y", "z"] of @V
@@ -25,6 +27,7 @@ piko.pipeline @P rank 1 {
     %c0 = arith.constant 0 : index
     %is = vector.step : vector<16xindex>
     %js = arith.addi %is, %is : vector<16xindex>
+    %ks = arith.addi %js, %is : vector<16xindex>
     %m = arith.constant dense<true> : vector<16xi1>
     %few = arith.cmpi ult, %is, %js : vector<16xindex>
     %x = piko.cpu.gather @mesh[%is : vector<16xindex>] "x" mask %m : vector<16xi1>, vector<16xf32>
@@ -34,6 +37,8 @@ piko.pipeline @P rank 1 {
     %n = piko.cpu.gather @mesh[%is : vector<16xindex>] "n" mask %m : vector<16xi1>, vector<16xi32>
     %x1 = piko.cpu.gather @mesh[%js : vector<16xindex>] "x" mask %few : vector<16xi1>, vector<16xf32>
     %y1 = piko.cpu.gather @mesh[%js : vector<16xindex>] "y" mask %few : vector<16xi1>, vector<16xf32>
+    %x4 = piko.cpu.gather @mesh[%ks : vector<16xindex>] "x" mask %few : vector<16xi1>, vector<16xf32>
+    %z4 = piko.cpu.gather @mesh[%ks : vector<16xindex>] "z" mask %few : vector<16xi1>, vector<16xf32>
     %x2 = piko.cpu.gather consecutive @mesh[%c0 : index] "x" mask %m : vector<16xi1>, vector<16xf32>
     %y2 = piko.cpu.gather consecutive @mesh[%c0 : index] "y" mask %m : vector<16xi1>, vector<16xf32>
     %z2 = piko.cpu.gather consecutive @mesh[%c0 : index] "z" mask %m : vector<16xi1>, vector<16xf32>

@@ -553,9 +553,10 @@ def MergeGathers : Pass<"piko-merge-gathers", "::piko::PipelineOp"> {
     **Requires** lanes (`piko-vectorize`).
 
     **Does**: of gathers that read words of the same elements, or of the same
-    primitives, makes one operation, if there are three or more. It loads pieces of
-    16 bytes, one for each lane, and transposes them, which takes far fewer
-    instructions than a gather for each field; lanes that read nothing load zeros.
+    primitives, makes one operation, if there are three or more, or two side by
+    side. It loads pieces of 16 bytes, or of 8, one for each lane, and transposes
+    them, which takes far fewer instructions than a gather for each field; lanes
+    that read nothing load zeros.
     Fields of primitives that are read behind conditions, for some of the lanes,
     are read with the first, and so are those of elements whose records are as
     short as a line of the cache. Of scatters of words of the same elements, three

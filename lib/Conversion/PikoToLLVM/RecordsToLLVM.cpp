@@ -61,6 +61,15 @@ SmallVector<int64_t> planPieces(ArrayRef<FieldAttr> fields, int64_t size) {
   return pieces;
 }
 
+/// Where two words side by side begin, if the fields are that.
+std::optional<int64_t> findPair(ArrayRef<FieldAttr> fields) {
+  if (fields.size() != 2)
+    return std::nullopt;
+  int64_t a = fields[0].getOffset(), b = fields[1].getOffset();
+  return std::abs(a - b) == wordSize ? std::optional(std::min(a, b))
+                                     : std::nullopt;
+}
+
 /// Code for one access.
 class RecordReader {
 public:
@@ -72,8 +81,11 @@ public:
 
   SmallVector<Value> gather();
   SmallVector<Value> readPieces(ArrayRef<int64_t> pieces);
+  SmallVector<Value> readPair(int64_t begin);
 
 private:
+  /// The address of each lane's record.
+  SmallVector<Value> getPlaces();
   Value gather(size_t i);
   Value shuffle(Value a, Value b, ArrayRef<int64_t> mask) {
     return vector::ShuffleOp::create(builder, loc, a, b, mask);
@@ -132,14 +144,44 @@ std::array<Value, pieceWords> RecordReader::transpose(ArrayRef<Value> parts) {
   return transposeBlocks(builder, loc, rows);
 }
 
-SmallVector<Value> RecordReader::readPieces(ArrayRef<int64_t> pieces) {
-  auto pieceType = VectorType::get({pieceWords}, builder.getI32Type());
+SmallVector<Value> RecordReader::getPlaces() {
   Type pointer = LLVM::LLVMPointerType::get(builder.getContext());
   SmallVector<Value> places;
   for (int64_t lane = 0; lane < lanes; ++lane) {
     Value place = vector::ExtractOp::create(builder, loc, addresses, lane);
     places.push_back(LLVM::IntToPtrOp::create(builder, loc, pointer, place));
   }
+  return places;
+}
+
+/// A load of both words for each lane.
+SmallVector<Value> RecordReader::readPair(int64_t begin) {
+  Type pair = builder.getI64Type();
+  Value pairs =
+      LLVM::PoisonOp::create(builder, loc, VectorType::get({lanes}, pair));
+  for (auto [lane, place] : llvm::enumerate(getPlaces()))
+    pairs = vector::InsertOp::create(
+        builder, loc,
+        LLVM::LoadOp::create(builder, loc, pair,
+                             createOffset(builder, loc, place, begin),
+                             wordSize),
+        pairs, lane);
+  Value words = vector::BitCastOp::create(
+      builder, loc, VectorType::get({2 * lanes}, builder.getI32Type()), pairs);
+  SmallVector<Value> values;
+  for (auto [field, type] : llvm::zip(fields, types)) {
+    SmallVector<int64_t> order;
+    for (int64_t lane = 0; lane < lanes; ++lane)
+      order.push_back(2 * lane + (field.getOffset() != begin));
+    values.push_back(vector::BitCastOp::create(
+        builder, loc, cast<VectorType>(type), shuffle(words, words, order)));
+  }
+  return values;
+}
+
+SmallVector<Value> RecordReader::readPieces(ArrayRef<int64_t> pieces) {
+  auto pieceType = VectorType::get({pieceWords}, builder.getI32Type());
+  SmallVector<Value> places = getPlaces();
   SmallVector<Value> values(fields.size());
   for (int64_t begin : pieces) {
     SmallVector<Value> parts;
@@ -212,20 +254,22 @@ struct LaneGetFieldsLowering : Lowering<LaneGetFieldsOp> {
       rewriter.replaceOp(op, readRow(rewriter, op, *row, fields));
       return success();
     }
+    std::optional<int64_t> pair = areWords ? findPair(fields) : std::nullopt;
     SmallVector<int64_t> pieces;
-    if (areWords && laneCount % pieceWords == 0)
+    if (areWords && !pair && laneCount % pieceWords == 0)
       pieces = planPieces(fields, record.getSize());
-    if (pieces.empty()) {
+    if (pieces.empty() && !pair) {
       rewriter.replaceOp(op, RecordReader(rewriter, loc, addresses, mask,
                                           fields, op.getResultTypes())
                                  .gather());
       return success();
     }
-    rewriter.replaceOp(op, RecordReader(rewriter, loc,
-                                        chooseReadable(rewriter, loc, addresses,
-                                                       mask, record.getSize()),
-                                        mask, fields, op.getResultTypes())
-                               .readPieces(pieces));
+    RecordReader reader(
+        rewriter, loc,
+        chooseReadable(rewriter, loc, addresses, mask, record.getSize()), mask,
+        fields, op.getResultTypes());
+    rewriter.replaceOp(op, pair ? reader.readPair(*pair)
+                                : reader.readPieces(pieces));
     return success();
   }
 

@@ -1,6 +1,6 @@
 // RUN: piko-opt --piko-synthesize --piko-to-machine --piko-to-cpu=lanes=4 %s | FileCheck %s
 
-piko.record @I {"i" : i32 at 0, "x" : f32 at 4} size 8 align 4
+piko.record @I {"i" : i32 at 0, "x" : f32 at 8} size 12 align 4
 piko.record @V {"a" : f32 at 0, "b" : f32 at 4, "c" : f32 at 8, "d" : f32 at 12, "e" : f32 at 16, "f" : f32 at 20, "g" : f32 at 24, "n" : i32 at 32} size 36 align 4
 
 // Where all lanes write, a transposition of 4x4 words, of which each lane stores 16
