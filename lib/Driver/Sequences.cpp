@@ -189,6 +189,10 @@ void piko::addVectorSequence(OpPassManager &passes,
     passes.nest<PipelineOp>().addPass(createMergeGathers());
     addCleanUp(passes);
   }
+  if (options.has("pair-gathers")) {
+    passes.nest<PipelineOp>().addPass(createPairGathers());
+    addCleanUp(passes);
+  }
   if (options.has("tabulate-invariants")) {
     passes.nest<PipelineOp>().addPass(createTabulateInvariants());
     addCleanUp(passes);

@@ -18,7 +18,7 @@ const std::vector<std::string> &SynthesisOptions::getOptional() {
       "own-pixels", "eliminate-schedules", "fuse-kernels", "form-strips",
       "defer-shading", "form-tiles", "prefetch", "vectorize", "prove-bounds",
       "hoist-bounds", "merge-bounds", "thread-jumps", "narrow-integers",
-      "merge-gathers", "tabulate-invariants", "if-convert",
+      "merge-gathers", "pair-gathers", "tabulate-invariants", "if-convert",
       "uplift-pixel-loops", "privatize",
       // of LLVM
       "loop-vectorize", "slp-vectorizer"};

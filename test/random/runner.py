@@ -18,7 +18,7 @@ PASSES = ["pre-schedule", "infer-directives", "fuse-stages", "test-early", "prun
           "own-pixels", "eliminate-schedules", "fuse-kernels", "defer-shading",
           "form-tiles",
           "prefetch", "vectorize", "prove-bounds", "hoist-bounds", "merge-bounds",
-          "thread-jumps", "narrow-integers", "merge-gathers", "if-convert", "uplift-pixel-loops",
+          "thread-jumps", "narrow-integers", "merge-gathers", "pair-gathers", "if-convert", "uplift-pixel-loops",
           "privatize"]
 
 

@@ -431,9 +431,9 @@ def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
     Parallel loops that turn out to have few iterations run as they were. Whether
     vectors pay is estimated from the operations, how often they run, and for how
     many lanes; where they do not, a remark has the estimate, with what costs most.
-    A loop of a phase that is written in order is vectorized as well where it stands
     One iteration alone waits for each load whose place a load of the turn before
     has said, as of the nodes of a tree (pointer chasing); lanes wait together.
+    A loop of a phase that is written in order is vectorized as well where it stands
     in no other vector, its turns hand on nothing, read no state that they change,
     and store each field once; they may emit. If all that a turn does stands behind
     a condition, with a loop of its own, the turns that have something to do are
@@ -589,6 +589,50 @@ def MergeGathers : Pass<"piko-merge-gathers", "::piko::PipelineOp"> {
     **Limits**: fields of 32 bits that are no arrays.
   }];
   let statistics = [Statistic<"merged", "merged", "gathers">];
+}
+
+def PairGathers : Pass<"piko-pair-gathers", "::piko::PipelineOp"> {
+  let summary = "Read elements side by side for all lanes at once";
+  let description = [{
+    **Requires** lanes (`piko-vectorize`); behind `piko-merge-gathers`.
+
+    **Does**: of gathers from a buffer of numbers whose indices are one apart, as
+    those of a table's entry and the next one, of voxels along x or of a row of
+    bytes, makes one operation, which loads up to 8 bytes of a lane at once. A test
+    finds whether the elements of all lanes are followed by as many in the buffer,
+    and, where two indices are one apart but for limits, as clamped ones, whether
+    they are here; elsewhere gathers read them. Loops of up to 64 turns in which
+    lanes read one element behind the other are unrolled for it. There are no
+    gathers of fewer than 32 bits: each lane loads its number.
+
+    **Guarantees** the same numbers in the lanes that read them.
+
+    Before:
+    ```
+    %a = piko.cpu.gather @table[%is : vector<16xindex>] "value" mask %m
+      : vector<16xi1>, vector<16xi32>
+    %js = arith.addi %is, %ones : vector<16xi32>
+    %b = piko.cpu.gather @table[%js : vector<16xindex>] "value" mask %n
+      : vector<16xi1>, vector<16xi32>
+    ```
+    After:
+    ```
+    %a, %b = scf.if %are_apart -> (vector<16xi32>, vector<16xi32>) {
+      ... // as before
+    } else {
+      %0, %1 = piko.cpu.gather_run @table[%is] "value" mask %some
+        : vector<16xi32>, vector<16xi1> -> vector<16xi32>, vector<16xi32>
+      scf.yield %0, %1 : vector<16xi32>, vector<16xi32>
+    }
+    ```
+
+    **Limits**: indices of 32 bits into buffers that the kernel does not change,
+    of numbers of at most 32 bits; gathers in one block, or each alone in a
+    condition of it.
+  }];
+  let statistics = [
+    Statistic<"paired", "paired", "gathers of elements side by side">,
+    Statistic<"loaded", "loaded", "gathers that each lane does by itself">];
 }
 
 def Privatize : Pass<"piko-privatize", "::piko::PipelineOp"> {

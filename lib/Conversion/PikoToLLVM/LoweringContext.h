@@ -203,6 +203,9 @@ void populateStateToLLVMPatterns(const mlir::TypeConverter &converter,
 void populateRecordsToLLVMPatterns(const mlir::TypeConverter &converter,
                                    mlir::RewritePatternSet &patterns,
                                    LoweringContext &context);
+void populateRunsToLLVMPatterns(const mlir::TypeConverter &converter,
+                                mlir::RewritePatternSet &patterns,
+                                LoweringContext &context);
 void populateLanesToLLVMPatterns(const mlir::TypeConverter &converter,
                                  mlir::RewritePatternSet &patterns,
                                  LoweringContext &context);

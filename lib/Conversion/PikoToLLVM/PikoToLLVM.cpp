@@ -181,6 +181,7 @@ LogicalResult ConvertPikoToLLVMPass::convert(PipelineOp pipeline,
   populateEmissionsToLLVMPatterns(converter, patterns, context);
   populateStateToLLVMPatterns(converter, patterns, context);
   populateLanesToLLVMPatterns(converter, patterns, context);
+  populateRunsToLLVMPatterns(converter, patterns, context);
   populateRecordsToLLVMPatterns(converter, patterns, context);
   populateChecksToLLVMPatterns(converter, patterns, context);
   populateCountsToLLVMPatterns(converter, patterns, context);

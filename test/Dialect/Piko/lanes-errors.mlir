@@ -188,3 +188,42 @@ piko.pipeline @P rank 1 {
     piko.cpu.set_fields(%v) to %at ["x"] of @a mask %mask : vector<16xindex>, vector<16xi1>, vector<16xf32>
   }
 }
+
+// -----
+
+piko.record @N {"n" : f32 at 0} size 4 align 4
+piko.pipeline @P rank 1 {
+  piko.buffer @in : @N
+  piko.kernel @k {
+    %mask = arith.constant dense<true> : vector<16xi1>
+    %at = arith.constant dense<3> : vector<16xi32>
+    // expected-error@+1 {{'piko.cpu.gather_run' op expected 1, 2, 4 or 8 bytes together, but got 3 elements of 4}}
+    %a:3 = piko.cpu.gather_run @in[%at] "n" mask %mask : vector<16xi32>, vector<16xi1> -> vector<16xf32>, vector<16xf32>, vector<16xf32>
+  }
+}
+
+// -----
+
+piko.record @N {"n" : f32 at 0} size 4 align 4
+piko.pipeline @P rank 1 {
+  piko.buffer @in : @N
+  piko.kernel @k {
+    %mask = arith.constant dense<true> : vector<8xi1>
+    %at = arith.constant dense<3> : vector<16xi32>
+    // expected-error@+1 {{'piko.cpu.gather_run' op expected an index and a mask of 16 lanes, but got 'vector<16xi32>' and 'vector<8xi1>'}}
+    %a = piko.cpu.gather_run @in[%at] "n" mask %mask : vector<16xi32>, vector<8xi1> -> vector<16xf32>
+  }
+}
+
+// -----
+
+piko.record @G {"x" : f32 at 0, "y" : i32 at 4} size 8 align 4
+piko.pipeline @P rank 1 {
+  piko.buffer @in : @G
+  piko.kernel @k {
+    %mask = arith.constant dense<true> : vector<16xi1>
+    %at = arith.constant dense<3> : vector<16xi32>
+    // expected-error@+1 {{'piko.cpu.gather_run' op expected elements of no more than the field, but got records of 8 bytes}}
+    %a = piko.cpu.gather_run @in[%at] "x" mask %mask : vector<16xi32>, vector<16xi1> -> vector<16xf32>
+  }
+}

@@ -2,8 +2,12 @@
 
 piko.record @F {"z" : f32 at 0, "list" : f32[4 : 4] at 4} size 20 align 4
 piko.record @G {"x" : f32 at 0, "y" : i32 at 4} size 8 align 4
+piko.record @N {"n" : f32 at 0} size 4 align 4
+piko.record @B {"b" : i8 at 0} size 1 align 1
 piko.pipeline @P rank 2 {
   piko.buffer @in : @F
+  piko.buffer @numbers : @N
+  piko.buffer @bytes : @B
   piko.image @depth : @F rank 2
   piko.source @a
   piko.stage @a bins [0, 0] threads 1 : @F -> [@G] {}
@@ -22,6 +26,11 @@ piko.pipeline @P rank 2 {
     piko.cpu.scatter %a, @depth[%at, %c2 : vector<16xindex>, index] "z" mask %mask : vector<16xi1>, vector<16xf32>
     // CHECK: piko.cpu.scatter %{{.*}}, consecutive @depth[%{{.*}}, %{{.*}} : index, index] "z" mask
     piko.cpu.scatter %b, consecutive @depth[%c2, %c2 : index, index] "z" mask %mask : vector<16xi1>, vector<16xf32>
+    %words = arith.constant dense<3> : vector<16xi32>
+    // CHECK: piko.cpu.gather_run @numbers[%{{.*}}] "n" mask %{{.*}} : vector<16xi32>, vector<16xi1> -> vector<16xf32>, vector<16xf32>
+    %run:2 = piko.cpu.gather_run @numbers[%words] "n" mask %mask : vector<16xi32>, vector<16xi1> -> vector<16xf32>, vector<16xf32>
+    // CHECK: piko.cpu.gather_run @bytes[%{{.*}}] "b" mask %{{.*}} : vector<16xindex>, vector<16xi1> -> vector<16xi8>
+    %byte = piko.cpu.gather_run @bytes[%at] "b" mask %mask : vector<16xindex>, vector<16xi1> -> vector<16xi8>
     // CHECK: %[[OF:.*]] = piko.cpu.elements @depth[%{{.*}}, %{{.*}} : vector<16xindex>, index] : vector<16xindex>
     %of = piko.cpu.elements @depth[%at, %c2 : vector<16xindex>, index] : vector<16xindex>
     // CHECK: piko.cpu.elements consecutive @depth[%{{.*}}, %{{.*}} : index, index] : vector<16xindex>

@@ -220,6 +220,36 @@ LogicalResult GatherOp::verifySymbolUses(SymbolTableCollection &) {
   return verifyLanes(*this, cast<VectorType>(getResult().getType()));
 }
 
+LogicalResult GatherRunOp::verifySymbolUses(SymbolTableCollection &) {
+  auto state = verifyState(*this, getStateAttr(), /*indices=*/1);
+  if (failed(state))
+    return failure();
+  FlatSymbolRefAttr record = getStateRecord(*state);
+  int64_t size = lookupRecord(*this, record).getSize(),
+          together = size * getNumResults();
+  if (!llvm::is_contained({1, 2, 4, 8}, together))
+    return emitOpError("expected 1, 2, 4 or 8 bytes together, but got ")
+           << getNumResults() << " elements of " << size;
+  auto index = getIndex().getType(), mask = getMask().getType();
+  for (Type type : getResultTypes()) {
+    auto lanes = cast<VectorType>(type);
+    if (index.getShape() != lanes.getShape() ||
+        mask.getShape() != lanes.getShape())
+      return emitOpError("expected an index and a mask of ")
+             << lanes.getNumElements() << " lanes, but got " << index << " and "
+             << mask;
+    if (failed(verifyFieldAccess(*this, record, getField(), /*elements=*/0,
+                                 lanes.getElementType())))
+      return failure();
+    constexpr int64_t byteBits = 8;
+    if (size * byteBits != lanes.getElementTypeBitWidth())
+      return emitOpError("expected elements of no more than the field, but got "
+                         "records of ")
+             << size << " bytes";
+  }
+  return success();
+}
+
 LogicalResult ScatterOp::verifySymbolUses(SymbolTableCollection &) {
   return verifyLanes(*this, cast<VectorType>(getValue().getType()));
 }
@@ -237,6 +267,9 @@ int LaneElementsOp::getAccessKinds() { return StateAccess::reads; }
 
 FlatSymbolRefAttr GatherOp::getAccessedState() { return getStateAttr(); }
 int GatherOp::getAccessKinds() { return StateAccess::reads; }
+
+FlatSymbolRefAttr GatherRunOp::getAccessedState() { return getStateAttr(); }
+int GatherRunOp::getAccessKinds() { return StateAccess::reads; }
 
 FlatSymbolRefAttr ScatterOp::getAccessedState() { return getStateAttr(); }
 int ScatterOp::getAccessKinds() { return StateAccess::stores; }

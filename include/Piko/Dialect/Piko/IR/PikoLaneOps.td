@@ -46,6 +46,34 @@ def Piko_GatherOp : Piko_LaneAccessOp<"gather", [MemoryEffects<[MemRead]>]> {
   }];
 }
 
+def Piko_LanePlaces : VectorOfRankAndType<[1], [I32, Index]>;
+
+def Piko_GatherRunOp : Piko_CPUOp<"gather_run", [
+    MemoryEffects<[MemRead]>,
+    DeclareOpInterfaceMethods<Piko_StateAccessInterface>,
+    DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
+  let summary = "reads elements that stand side by side for each lane";
+  let description = [{
+    A result for each of them, from the index on, of a buffer whose elements are
+    no more than this field. They take 1, 2, 4 or 8 bytes together. Those of lanes
+    in the mask, of which there is one, are inside of the buffer; the others get
+    numbers that do not matter. Each lane loads its own: elements of fewer than 32
+    bits have no gathers.
+
+    ```mlir
+    %v0, %v1 = piko.cpu.gather_run @vertices[%lanes] "position.x" mask %mask
+      : vector<16xi32>, vector<16xi1> -> vector<16xf32>, vector<16xf32>
+    ```
+  }];
+  let arguments = (ins FlatSymbolRefAttr:$state, Piko_LanePlaces:$index,
+                       StrAttr:$field, Piko_LaneMask:$mask);
+  let results = (outs Variadic<Piko_Lanes>:$values);
+  let assemblyFormat = [{
+    $state `[` $index `]` $field `mask` $mask attr-dict
+    `:` type($index) `,` type($mask) `->` type($values)
+  }];
+}
+
 def Piko_ScatterOp : Piko_LaneAccessOp<"scatter", [MemoryEffects<[MemWrite]>]> {
   let summary = "writes a field of an element for each lane";
   let description = [{
