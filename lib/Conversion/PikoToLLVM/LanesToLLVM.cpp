@@ -3,6 +3,7 @@
 // Access to state and to primitives by the lanes of a vector.
 
 #include "KernelLowering.h"
+#include "LaneIndices.h"
 #include "RecordPieces.h"
 #include "RecordRows.h"
 
@@ -175,14 +176,73 @@ struct ScatterLowering : LaneLowering<ScatterOp> {
     }
     LaneAddresses to = address(rewriter, op, adaptor, type);
     uint32_t alignment = type.getElementTypeBitWidth() / 8;
+    constexpr uint32_t leastScattered = 4;
     if (to.first)
       LLVM::MaskedStoreOp::create(rewriter, loc, adaptor.getValue(), to.first,
                                   adaptor.getMask(), alignment);
-    else
+    else if (alignment >= leastScattered)
       LLVM::masked_scatter::create(rewriter, loc, adaptor.getValue(), to.each,
                                    adaptor.getMask(), alignment);
+    else
+      storeNarrow(rewriter, op, adaptor, to.each, alignment);
     rewriter.eraseOp(op);
     return success();
+  }
+
+private:
+  /// There is no scatter of fewer than 32 bits: LLVM has a branch for each
+  /// lane, which all of them do not need.
+  void storeNarrow(ConversionPatternRewriter &rewriter, ScatterOp op,
+                   OpAdaptor adaptor, Value addresses,
+                   uint32_t alignment) const {
+    Location loc = op.getLoc();
+    Value value = adaptor.getValue(), mask = adaptor.getMask();
+    Value all = vector::ReductionOp::create(rewriter, loc,
+                                            vector::CombiningKind::AND, mask);
+    Value index = findWords(rewriter, op);
+    Value data = context.view(rewriter, op, op.getState()).data;
+    Type element = cast<VectorType>(value.getType()).getElementType();
+    auto storeAll = [&](OpBuilder &builder, Location loc) {
+      SmallVector<Value> indices;
+      if (index)
+        indices = extractIndices({builder, loc}, index);
+      int64_t lanes = cast<VectorType>(mask.getType()).getNumElements();
+      for (int64_t lane = 0; lane < lanes; ++lane) {
+        Value to =
+            index ? LLVM::GEPOp::create(builder, loc, data.getType(), element,
+                                        data,
+                                        ArrayRef<LLVM::GEPArg>{indices[lane]})
+                        .getResult()
+                  : LLVM::ExtractElementOp::create(
+                        builder, loc, addresses, createI64(builder, loc, lane));
+        LLVM::StoreOp::create(
+            builder, loc, vector::ExtractOp::create(builder, loc, value, lane),
+            to, alignment);
+      }
+      scf::YieldOp::create(builder, loc);
+    };
+    auto storeSome = [&](OpBuilder &builder, Location loc) {
+      LLVM::masked_scatter::create(builder, loc, value, addresses, mask,
+                                   alignment);
+      scf::YieldOp::create(builder, loc);
+    };
+    scf::IfOp::create(rewriter, loc, all, storeAll, storeSome);
+  }
+
+  /// The index of 32 bits that elements of one number have; or null.
+  Value findWords(ConversionPatternRewriter &rewriter, ScatterOp op) const {
+    RecordOp record =
+        context.record(getStateRecord(context.state(op, op.getState())));
+    auto type = cast<VectorType>(op.getValue().getType());
+    constexpr int64_t byteBits = 8;
+    if (op.getIndices().size() != 1 || op.getConsecutive() ||
+        record.getSize() * byteBits != type.getElementTypeBitWidth())
+      return {};
+    auto cast = op.getIndices().front().getDefiningOp<arith::IndexCastOp>();
+    auto words = cast ? dyn_cast<VectorType>(cast.getIn().getType()) : nullptr;
+    return words && words.getElementType().isInteger(32)
+               ? rewriter.getRemappedValue(cast.getIn())
+               : Value();
   }
 };
 

@@ -18,10 +18,17 @@ piko.record @B {"b" : i8 at 0} size 1 align 1
 // CHECK-COUNT-4: llvm.load %{{.*}} {alignment = 1 : i64} : !llvm.ptr -> i8
 // CHECK-COUNT-3: arith.shli %{{.*}} : i32
 // CHECK:         vector.bitcast %{{.*}} : vector<1xi32> to vector<4xi8>
+// They are stored one after the other, without tests if all are.
+// CHECK:         %[[ALL:.*]] = vector.reduction <and>
+// CHECK-NEXT:    scf.if %[[ALL]] {
+// CHECK-COUNT-4:   llvm.store %{{.*}}, %{{.*}} {alignment = 1 : i64} : i8, !llvm.ptr
+// CHECK-NEXT:    } else {
+// CHECK-NEXT:      llvm.intr.masked.scatter
 piko.pipeline @P rank 1 {
   piko.buffer @in : @N
   piko.buffer @raw : @B
   piko.buffer @out : @N
+  piko.buffer @copy : @B
   piko.source @a
   piko.source @b
   piko.stage @a bins [0] threads 1 : @N -> [] {}
@@ -41,6 +48,7 @@ piko.pipeline @P rank 1 {
     %mask = arith.constant dense<true> : vector<4xi1>
     %steps = vector.step : vector<4xindex>
     %a = piko.cpu.gather_run @raw[%steps] "b" mask %mask : vector<4xindex>, vector<4xi1> -> vector<4xi8>
+    piko.cpu.scatter %a, @copy[%steps : vector<4xindex>] "b" mask %mask : vector<4xi1>, vector<4xi8>
     %f = arith.uitofp %a : vector<4xi8> to vector<4xf32>
     piko.cpu.scatter %f, @out[%steps : vector<4xindex>] "n" mask %mask : vector<4xi1>, vector<4xf32>
     piko.storage.close_bins %bins : !piko.bins<@N>
