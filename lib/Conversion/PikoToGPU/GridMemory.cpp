@@ -10,6 +10,15 @@
 using namespace mlir;
 using namespace piko;
 
+Value piko::addBlockMemory(gpu::LaunchOp launch, ArrayRef<int64_t> shape,
+                           Type type) {
+  auto space = gpu::AddressSpaceAttr::get(
+      launch.getContext(), gpu::GPUDialect::getWorkgroupAddressSpace());
+  return launch.addWorkgroupAttribution(
+      MemRefType::get(shape, type, MemRefLayoutAttrInterface(), space),
+      launch.getLoc());
+}
+
 int64_t GridMemory::getWords() {
   return (int64_t(locals.size()) + 1) * PIKOIR_OUTBOX_WORDS;
 }

@@ -12,15 +12,13 @@
 
 #include "PikoToGPU.h"
 #include "CollapsedPixels.h"
+#include "GridFormer.h"
 
 #include "../../Transforms/LoopSplitter.h"
 #include "../../Transforms/ParallelLoops.h"
-#include "../../Transforms/UnitFormer.h"
 
-#include "Piko/Conversion/KernelImage.h"
 #include "Piko/Dialect/Piko/IR/Marks.h"
 #include "Piko/Dialect/Piko/IR/PikoGPU.h"
-#include "Piko/Dialect/Piko/IR/PikoProgram.h"
 
 #include "pikort/grid.h"
 
@@ -40,35 +38,7 @@ namespace piko {
 using namespace mlir;
 using namespace piko;
 
-Value piko::addBlockMemory(gpu::LaunchOp launch, ArrayRef<int64_t> shape,
-                           Type type) {
-  auto space = gpu::AddressSpaceAttr::get(
-      launch.getContext(), gpu::GPUDialect::getWorkgroupAddressSpace());
-  return launch.addWorkgroupAttribution(
-      MemRefType::get(shape, type, MemRefLayoutAttrInterface(), space),
-      launch.getLoc());
-}
-
 namespace {
-
-/// Makes a launch of a kernel's work; a block runs a unit.
-class GridFormer : public UnitFormer {
-public:
-  GridFormer(KernelOp kernel, Operation *work, int64_t threads)
-      : UnitFormer(kernel, work), kernel(kernel), threads(threads) {}
-
-  gpu::LaunchOp launch;
-  Value log;
-  using UnitFormer::bins;
-
-protected:
-  void createUnits(StageOp stage, IntegerAttr source) override;
-  Value createWriter(Location at, FlatSymbolRefAttr other) override;
-
-private:
-  KernelOp kernel;
-  int64_t threads;
-};
 
 class GridBuilder {
 public:
@@ -87,9 +57,7 @@ private:
   void createMemory();
   void convertLocal(LocalBinOp local);
   void finishGrid();
-  void repeatForUnits(Operation *opened);
   LogicalResult findItems();
-  void dropEnds();
   void hoistPrivateArrays();
   void upliftLoops();
   ThreadTile createTile();
@@ -126,20 +94,6 @@ struct ConvertPikoToGPUPass
 
 } // namespace
 
-/// The piko.bins of a kernel, or the piko.items of a source.
-static Operation *findWork(KernelOp kernel) {
-  for (Operation &op : *kernel.getBodyBlock())
-    if (isa<BinsOp, ItemsOp>(op))
-      return &op;
-  return nullptr;
-}
-
-static FlatSymbolRefAttr getStageName(Operation *work) {
-  if (auto bins = dyn_cast<BinsOp>(work))
-    return bins.getStageAttr();
-  return cast<WorkOpInterface>(work).getStageAttr();
-}
-
 LogicalResult GridBuilder::findItems() {
   launch.walk([&](scf::ForOp loop) {
     if (loop->hasAttr(marks::lanes) && loop->getParentOfType<scf::ForOp>() &&
@@ -148,91 +102,6 @@ LogicalResult GridBuilder::findItems() {
   });
   return success(items && !items.getNumResults() &&
                  !items.getBody()->getOps<ItemOp>().empty());
-}
-
-/// Where the first phase of the work stands.
-static Location findPhase(Operation *work) {
-  Location place = work->getLoc();
-  work->walk<WalkOrder::PreOrder>([&](WorkOpInterface phase) {
-    place = phase.getLoc();
-    return WalkResult::interrupt();
-  });
-  return place;
-}
-
-/// The launch has a name for who runs it: its stage, and where that stands.
-void GridFormer::createUnits(StageOp stage, IntegerAttr source) {
-  auto type = BinsType::get(rewriter.getContext(), stage.getInputAttr());
-  bins = OpenBinsOp::create(rewriter, loc, type,
-                            FlatSymbolRefAttr::get(stage.getSymNameAttr()),
-                            source);
-  Value zero = constant(0), one = constant(1), size = constant(threads);
-  Value blocks = BlockCountOp::create(rewriter, loc, bins, size);
-  Value any = arith::CmpIOp::create(rewriter, loc, arith::CmpIPredicate::ugt,
-                                    blocks, zero);
-  // A GPU refuses a grid without blocks.
-  auto ifAny = scf::IfOp::create(rewriter, loc, any);
-  CloseBinsOp::create(rewriter, loc, bins);
-  rewriter.setInsertionPointToStart(ifAny.thenBlock());
-  auto pipeline = kernel->getParentOfType<PipelineOp>();
-  auto symbol = [&](const Twine &suffix) {
-    return FlatSymbolRefAttr::get(rewriter.getContext(),
-                                  (pipeline.getSymName() + suffix).str());
-  };
-  log = OpenLogOp::create(rewriter, loc, WriterType::get(rewriter.getContext()),
-                          bins);
-  auto origin = NameLoc::get(stage.getSymNameAttr(), findPhase(work));
-  launch = gpu::LaunchOp::create(
-      rewriter, origin, blocks, one, one, size, one, one,
-      /*dynamicSharedMemorySize=*/Value(), /*asyncTokenType=*/Type(),
-      /*asyncDependencies=*/ValueRange(), /*workgroupAttributions=*/TypeRange(),
-      /*privateAttributions=*/TypeRange(), Value(), Value(), Value(),
-      symbol(kernelsSuffix), symbol("_" + kernel.getSymName()));
-  CloseLogOp::create(rewriter, loc, log);
-  rewriter.setInsertionPointToEnd(&launch.getBody().front());
-  unitEnd = gpu::TerminatorOp::create(rewriter, loc);
-  unit = launch.getBlockIds().x;
-}
-
-/// Whether a join asks at which positions of a kernel primitives were emitted:
-/// for keys, or to permute them. The places of a loop and the cells of a source
-/// take positions, too.
-static bool needsPositions(KernelOp kernel) {
-  ProgramOp program = getProgram(kernel->getParentOfType<PipelineOp>());
-  if (getAssignedSource(kernel) || !program)
-    return true;
-  SmallVector<EdgeOp> emitted = getEmittedEdges(kernel);
-  bool needs = false;
-  program->walk([&](Operation *op) {
-    if (auto launch = dyn_cast<LaunchOp>(op))
-      needs |= launch.getKernel() == kernel.getSymName() &&
-               op->getParentOfType<WavesOp>();
-    if (auto join = dyn_cast<JoinOp>(op))
-      for (auto [edge, permute, keys] :
-           llvm::zip(join.getEdges(), join.getPermutes(), join.getKeys()))
-        needs |= (permute || keys > 0) &&
-                 llvm::is_contained(emitted, getOrigin(edge));
-  });
-  return needs;
-}
-
-/// Positions end for those who ask where something was emitted.
-void GridBuilder::dropEnds() {
-  SmallVector<NextOp> ends;
-  bool emits = false;
-  launch.walk([&](Operation *op) {
-    if (auto next = dyn_cast<NextOp>(op))
-      ends.push_back(next);
-    emits |= isa<AppendOp, AppendBinOp>(op);
-  });
-  if (!emits || !needsPositions(kernel))
-    for (NextOp end : ends)
-      end.erase();
-}
-
-Value GridFormer::createWriter(Location at, FlatSymbolRefAttr other) {
-  rewriter.setInsertionPoint(unitEnd);
-  return other ? LogOfOp::create(rewriter, at, log, other).getResult() : log;
 }
 
 void GridBuilder::formGrid() {
@@ -247,7 +116,7 @@ void GridBuilder::formGrid() {
   memory.launch = launch = former.launch;
   memory.log = former.log;
   bins = former.bins;
-  dropEnds();
+  dropEnds(kernel, launch);
   createMemory();
   launch.walk([&](LocalBinOp local) { convertLocal(local); });
 }
@@ -327,26 +196,7 @@ void GridBuilder::finishGrid() {
   }
   builder.setInsertionPoint(opened->getBlock()->getTerminator());
   memory.flush(builder);
-  repeatForUnits(opened);
-}
-
-/// What follows `opened` is done for one unit after the other: the runtime may
-/// launch fewer blocks than there are units.
-void GridBuilder::repeatForUnits(Operation *opened) {
-  Block &body = launch.getBody().front();
-  OpBuilder builder = OpBuilder::atBlockBegin(&body);
-  Value count = UnitCountOp::create(builder, loc, bins);
-  builder.setInsertionPoint(body.getTerminator());
-  Value first = launch.getBlockIds().x;
-  auto units =
-      scf::ForOp::create(builder, loc, first, count, launch.getGridSize().x);
-  Value unit = units.getInductionVar();
-  first.replaceAllUsesExcept(unit, units);
-  units.getBody()->getOperations().splice(
-      units.getBody()->begin(), body.getOperations(),
-      std::next(opened->getIterator()), units->getIterator());
-  builder.setInsertionPoint(units.getBody()->getTerminator());
-  gpu::BarrierOp::create(builder, loc); // the block's memory is used again
+  repeatForUnits(launch, bins, opened);
 }
 
 /// An alloca in a loop would take more memory each time around.
