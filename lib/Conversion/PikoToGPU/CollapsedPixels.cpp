@@ -20,8 +20,9 @@
 //
 // A primitive that takes a rare branch, or whose box is not in the bin, ends
 // its group in front of it. Then it is done alone, by all threads
-// (PixelSharing.cpp), out of line, so that it decides about no register of the
-// others.
+// (PixelSharing.cpp), out of line; and the first of them leaves what is left of
+// its unit to a launch of its own (RareLaunch.cpp), so that it decides about no
+// register of the others.
 
 #include "CollapsedPixels.h"
 
@@ -55,7 +56,7 @@ public:
     for (int64_t extent : stage.getBins())
       pixels *= extent;
   }
-  LogicalResult run(SharingCounts &counts);
+  FailureOr<RareSite> run(SharingCounts &counts);
 
 private:
   /// Of a primitive, for each dimension: where its loop begins, and how many
@@ -79,6 +80,7 @@ private:
   std::pair<Value, Value> takePixel(Emitter &b, Value at);
   void updatePixels(Emitter &b);
   void updatePixel(Emitter &b, Value pixel, Value bit);
+  Value resume(Emitter &b);
   Value runRare(Emitter &b);
   Box cloneBox(Emitter &b, IRMapping &mapping);
   void mapCounters(IRMapping &mapping, ArrayRef<Value> cell);
@@ -98,6 +100,7 @@ private:
   /// of all of them below.
   Value ticket, limit, listed, slots, starts, masks, touched, list;
   Value until; ///< The first rare primitive of the group.
+  RareSite site;
 };
 
 constexpr int64_t pixelBits = 24;
@@ -182,7 +185,7 @@ void CollapsedPixels::clear() {
   b.barrier();
 }
 
-LogicalResult CollapsedPixels::run(SharingCounts &counts) {
+FailureOr<RareSite> CollapsedPixels::run(SharingCounts &counts) {
   clear();
   split(counts);
   ItemSetup setup(items, tile, memory, Extent::All);
@@ -194,7 +197,20 @@ LogicalResult CollapsedPixels::run(SharingCounts &counts) {
                      "where its pixels are depends on an array");
   items.erase();
   ++counts.collapsed;
-  return success();
+  return site;
+}
+
+/// Where the first group begins: this is the launch that goes on where another
+/// one has left a unit.
+Value CollapsedPixels::resume(Emitter &b) {
+  site.begin = items.getLowerBound();
+  site.end = items.getUpperBound();
+  site.rest =
+      RestOp::create(b, b.getIndexType(), memory.log, launch.getBlockIds().x);
+  site.isLeft = b.is(site.rest, Predicate::ne, b.index(0));
+  Value from =
+      arith::MaxSIOp::create(b, site.begin, b.sub(site.rest, b.index(1)));
+  return b.select(site.isLeft, from, site.end);
 }
 
 void CollapsedPixels::createGroups(ItemSetup &setup) {
@@ -208,8 +224,8 @@ void CollapsedPixels::createGroups(ItemSetup &setup) {
     binHi.push_back(
         b.cast(bins.hi(nest.update.getBin(), dim), number.getType()));
   }
-  Value begin = items.getLowerBound(), end = items.getUpperBound();
-  auto groups = scf::WhileOp::create(
+  Value begin = resume(b), end = items.getUpperBound();
+  auto groups = site.groups = scf::WhileOp::create(
       b, TypeRange{b.getIndexType()}, ValueRange{begin},
       [&](OpBuilder &at, Location loc, ValueRange next) {
         Value more =
@@ -552,6 +568,9 @@ Value CollapsedPixels::runRare(Emitter &b) {
   Value next = b.select(isRare, b.add(position, b.index(1)),
                         b.add(base, b.index(group)));
   Emitter in = b.when(isRare);
+  site.branch = cast<scf::IfOp>(in.getInsertionBlock()->getParentOp());
+  site.position = position;
+  site.next = next.getDefiningOp();
   Emitter body = in;
   if (isRareForOne)
     body = in.when(in.is(thread, Predicate::eq, zero));
@@ -579,11 +598,13 @@ static void eraseDead(Block &block) {
   }
 }
 
-LogicalResult piko::collapsePixels(scf::ForOp items, PixelNest &nest,
-                                   StageOp stage, const ThreadTile &tile,
-                                   GridMemory &memory, SharingCounts &counts) {
-  if (failed(CollapsedPixels(items, nest, stage, tile, memory).run(counts)))
-    return failure();
-  eraseDead(memory.launch.getBody().front());
-  return success();
+FailureOr<RareSite> piko::collapsePixels(scf::ForOp items, PixelNest &nest,
+                                         StageOp stage, const ThreadTile &tile,
+                                         GridMemory &memory,
+                                         SharingCounts &counts) {
+  FailureOr<RareSite> site =
+      CollapsedPixels(items, nest, stage, tile, memory).run(counts);
+  if (succeeded(site))
+    eraseDead(memory.launch.getBody().front());
+  return site;
 }

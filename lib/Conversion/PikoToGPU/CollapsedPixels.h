@@ -7,14 +7,35 @@
 
 #include "PixelNest.h"
 
+#include "Piko/Dialect/Piko/IR/PikoGPU.h"
+
 namespace piko {
+
+/// Where a kernel takes the primitives of a cell in groups, and comes to a rare
+/// one.
+struct RareSite {
+  RestOp rest;            ///< What a launch before has left of the unit.
+  mlir::Value isLeft;     ///< Whether that is something.
+  mlir::Value begin, end; ///< The cell's positions.
+  mlir::scf::WhileOp groups;
+  mlir::scf::IfOp branch; ///< What is done with a rare primitive ...
+  mlir::Value position;   ///< ... which is here,
+  mlir::Operation *next;  ///< and where the next group begins: a select.
+};
 
 /// Spreads the pixels of the boxes of a group of primitives over the threads of
 /// a block, and gives the rare ones to all of them. Fails with an error where
 /// it cannot; the kernel is then of no use.
-llvm::LogicalResult collapsePixels(mlir::scf::ForOp items, PixelNest &nest,
-                                   StageOp stage, const ThreadTile &tile,
-                                   GridMemory &memory, SharingCounts &counts);
+llvm::FailureOr<RareSite> collapsePixels(mlir::scf::ForOp items,
+                                         PixelNest &nest, StageOp stage,
+                                         const ThreadTile &tile,
+                                         GridMemory &memory,
+                                         SharingCounts &counts);
+
+/// Puts a launch in front of the kernel's that leaves each unit to that where
+/// its first rare primitive stands. So what these need, which is called, takes
+/// no registers of the first one.
+void leaveRareToSecondLaunch(RareSite site, mlir::gpu::LaunchOp second);
 
 } // namespace piko
 

@@ -258,11 +258,13 @@ LogicalResult GridBuilder::sharePixelsOfBins(bool collapses,
   upliftLoops();
   useClosedFormsInPixelLoops(items);
   ThreadTile tile = createTile();
+  FailureOr<RareSite> rare = failure();
   if (collapses) {
     PixelNestResult found = findPixelNest(items, stage);
     if (!found.nest)
       return emitError(found.at) << found.obstacle;
-    if (failed(collapsePixels(items, *found.nest, stage, tile, memory, counts)))
+    rare = collapsePixels(items, *found.nest, stage, tile, memory, counts);
+    if (failed(rare))
       return failure();
     hoistPrivateArrays();
   } else {
@@ -274,6 +276,8 @@ LogicalResult GridBuilder::sharePixelsOfBins(bool collapses,
   if (failed(convertAccess()))
     return failure();
   finishGrid();
+  if (succeeded(rare))
+    leaveRareToSecondLaunch(*rare, launch);
   return success();
 }
 

@@ -144,7 +144,7 @@ bool piko::createErrorEntry(OpBuilder &builder, Operation *op,
   if (!grid || !pipeline.getOps<CheckRecordOp>().empty())
     return false;
   Location loc = op->getLoc();
-  int32_t place = grid->places++;
+  int32_t place = context.nextPlace(launch);
   {
     OpBuilder host(launch);
     int32_t which = function == PIKO_RUNTIME_FUNCTION(pikoir_fail).name
@@ -275,6 +275,42 @@ struct OutboxesLowering : ContextPattern<OutboxesOp> {
   }
 };
 
+/// The address of what a unit's launches say to each other.
+Value getRestAddress(GridCode &code, Value log, Value unit) {
+  Value units = code.load(code.i64(), log, offsetof(pikoir_log, units));
+  Value mine = code.mul(toI64(code.builder, code.loc, unit),
+                        code.constant(sizeof(pikoir_unit_log)));
+  return code.add(code.add(units, mine),
+                  code.constant(offsetof(pikoir_unit_log, rest)));
+}
+
+struct RestLowering : ContextPattern<RestOp> {
+  using ContextPattern::ContextPattern;
+  LogicalResult
+  matchAndRewrite(RestOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    GridCode code(rewriter, op.getLoc());
+    Value at = getRestAddress(code, adaptor.getLog(), adaptor.getUnit());
+    rewriter.replaceOp(
+        op, toIndex(rewriter, op.getLoc(), code.load(code.i64(), at)));
+    return success();
+  }
+};
+
+struct LeaveRestLowering : ContextPattern<LeaveRestOp> {
+  using ContextPattern::ContextPattern;
+  LogicalResult
+  matchAndRewrite(LeaveRestOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    GridCode code(rewriter, op.getLoc());
+    Value at = getRestAddress(code, adaptor.getLog(), adaptor.getUnit());
+    Value position = toI64(rewriter, op.getLoc(), adaptor.getPosition());
+    code.store(code.add(position, code.constant(1)), at);
+    rewriter.eraseOp(op);
+    return success();
+  }
+};
+
 struct AllocateLowering : ContextPattern<AllocateOp> {
   using ContextPattern::ContextPattern;
   LogicalResult
@@ -318,9 +354,9 @@ struct BytesAtLowering : ContextPattern<BytesAtOp> {
 void piko::populateGridToLLVMPatterns(const TypeConverter &converter,
                                       RewritePatternSet &patterns,
                                       LoweringContext &context) {
-  patterns
-      .add<OpenLogLowering, BlockCountLowering, CloseLogLowering, LogOfLowering,
-           OutboxesLowering, AllocateLowering, BytesAtLowering>(
-          converter, patterns.getContext(), context);
+  patterns.add<OpenLogLowering, BlockCountLowering, CloseLogLowering,
+               LogOfLowering, OutboxesLowering, RestLowering, LeaveRestLowering,
+               AllocateLowering, BytesAtLowering>(
+      converter, patterns.getContext(), context);
   populateBlockOutputPatterns(converter, patterns, context);
 }

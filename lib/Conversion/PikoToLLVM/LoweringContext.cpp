@@ -128,6 +128,10 @@ void LoweringContext::noteGrid(Operation *inside, Grid grid) {
   grids[inside->getParentOfType<gpu::LaunchOp>()] = grid;
 }
 
+int32_t LoweringContext::nextPlace(Operation *launch) {
+  return places[launch->getParentOfType<func::FuncOp>()]++;
+}
+
 StateView &LoweringContext::view(OpBuilder &builder, Operation *op,
                                  StringRef state) {
   auto function = op->getParentOfType<func::FuncOp>();

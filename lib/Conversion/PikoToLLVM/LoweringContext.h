@@ -58,7 +58,6 @@ struct Grid {
   llvm::SmallVector<std::pair<int64_t, int64_t>> locals;
   llvm::SmallVector<int64_t> recordBytes;
   llvm::SmallVector<bool> placed; ///< Whether records are kept by placing them.
-  int32_t places = 0;
 };
 
 class LoweringContext {
@@ -116,6 +115,8 @@ public:
   /// The grid that an operation is in, or null on a CPU.
   Grid *grid(mlir::Operation *op);
   void noteGrid(mlir::Operation *inside, Grid grid);
+  /// The number of another place that can fail, of all launches of a kernel.
+  int32_t nextPlace(mlir::Operation *launch);
 
   const AliasTags tags;
 
@@ -123,7 +124,8 @@ private:
   mlir::ModuleOp module;
   llvm::StringMap<mlir::LLVM::GlobalOp> texts;
   llvm::DenseMap<mlir::Operation *, const PipelineNumbers *> functions;
-  llvm::DenseMap<mlir::Operation *, Grid> grids; // by launch
+  llvm::DenseMap<mlir::Operation *, Grid> grids;     // by launch
+  llvm::DenseMap<mlir::Operation *, int32_t> places; // by function
   /// By function and name.
   llvm::DenseMap<mlir::Operation *, llvm::StringMap<StateView>> views;
   llvm::DenseMap<mlir::Operation *, llvm::StringMap<mlir::Value>> queries;

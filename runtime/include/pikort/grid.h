@@ -58,9 +58,11 @@ typedef struct pikoir_span {
   int64_t begin, end;
 } pikoir_span;
 
-/// The directories of a unit: addresses, or 0.
+/// Of a unit: its directories, addresses or 0; and the position from which on a
+/// second launch is to go on, and one, or 0.
 typedef struct pikoir_unit_log {
   int64_t first, last;
+  int64_t rest;
 } pikoir_unit_log;
 
 /// What a thread has of an outbox, in words of eight bytes.

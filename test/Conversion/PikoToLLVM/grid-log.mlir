@@ -55,7 +55,7 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 // Behind the unit's last directory, or as its first.
 // CHECK:               %[[UNITS:.*]] = llvm.getelementptr inbounds %[[LOG]][24]
 // CHECK:               llvm.load %[[UNITS]]
-// CHECK:               arith.muli %{{.*}}, %c16_i64
+// CHECK:               arith.muli %{{.*}}, %c24_i64
 // CHECK:               arith.select
 // CHECK:             memref.store %{{.*}}, %[[CELLS]][%c32]
 // CHECK:           gpu.barrier

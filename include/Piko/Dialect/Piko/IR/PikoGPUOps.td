@@ -131,6 +131,35 @@ def Piko_AllocateOp : Piko_GPUOp<"allocate"> {
   let assemblyFormat = "$log `[` $size `]` attr-dict";
 }
 
+def Piko_RestOp : Piko_GPUOp<"rest"> {
+  let summary = "where a unit of work goes on";
+  let description = [{
+    One more than the position from which on the unit's primitives have been left
+    to another launch (`piko.gpu.leave_rest`); 0 where none have been.
+
+    ```mlir
+    %rest = piko.gpu.rest %log[%unit]
+    ```
+  }];
+  let arguments = (ins Piko_WriterType:$log, Index:$unit);
+  let results = (outs Index:$rest);
+  let assemblyFormat = "$log `[` $unit `]` attr-dict";
+}
+
+def Piko_LeaveRestOp : Piko_GPUOp<"leave_rest"> {
+  let summary = "leaves primitives of a unit to the next launch";
+  let description = [{
+    Those from a position on: the next launch of the same kernel takes them. By one
+    thread of a block.
+
+    ```mlir
+    piko.gpu.leave_rest %log[%unit] from %position
+    ```
+  }];
+  let arguments = (ins Piko_WriterType:$log, Index:$unit, Index:$position);
+  let assemblyFormat = "$log `[` $unit `]` `from` $position attr-dict";
+}
+
 def Piko_BytesAtOp : Piko_GPUOp<"bytes_at", [Pure]> {
   let summary = "so many bytes from an address on";
   let description = [{
