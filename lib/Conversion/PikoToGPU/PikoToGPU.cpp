@@ -137,8 +137,11 @@ void GridBuilder::createMemory() {
     ports = builder.getDenseI64ArrayAttr(llvm::map_to_vector(
         memory.locals, [](auto edge) { return edge.second; }));
   }
+  bool emits = contains(launch, [](Operation *op) {
+    return isa<AppendOp, AppendBinOp, NextOp>(op);
+  });
   OutboxesOp::create(builder, loc, memory.log, memory.outboxes, producers,
-                     ports, memory.kept);
+                     ports, memory.kept, /*forErrors=*/!emits);
 }
 
 /// What the block has of a local edge is one cell, or as many calls as there

@@ -52,6 +52,7 @@ private:
                                       launch.getThreadIds().x);
   }
   void link(Value directory);
+  Value getWord(int64_t which);
   void reserveRecords(Value kept, Value most, int64_t base, int64_t size);
   void copyRecords(Value from, Value end, Value to, int64_t size);
   void copyBytes(Value from, Value to, int64_t size);
@@ -154,10 +155,24 @@ void BlockOutput::link(Value directory) {
   code.store(directory, mine, last);
 }
 
+/// Of the log's outbox.
+Value BlockOutput::getWord(int64_t which) {
+  if (!grid.forErrors)
+    return code.get(grid.outboxes, which);
+  Value words = code.get(grid.outboxes, PIKOIR_OUTBOX_BEGIN);
+  Value none = code.constant(0);
+  return code.choose(
+      code.compare(P::ne, words, none),
+      [&] {
+        return code.load(code.i64(), code.add(words, code.constant(8 * which)));
+      },
+      [&] { return none; });
+}
+
 void BlockOutput::publish() {
   constexpr int64_t header = sizeof(pikoir_piece), span = sizeof(pikoir_span);
-  Value begin = code.get(grid.outboxes, PIKOIR_OUTBOX_BEGIN);
-  Value cursor = code.get(grid.outboxes, PIKOIR_OUTBOX_CURSOR);
+  Value begin = getWord(PIKOIR_OUTBOX_BEGIN);
+  Value cursor = getWord(PIKOIR_OUTBOX_CURSOR);
   Value has = code.compare(P::ne, begin, cursor), total;
   Value place = countBelow(has, total);
   Value any = code.compare(P::ne, total, code.constant(0));
@@ -181,7 +196,11 @@ void BlockOutput::publish() {
       code.store(begin, at, offsetof(pikoir_span, begin));
       code.store(cursor, at, offsetof(pikoir_span, end));
     });
-    code.set(cursor, grid.outboxes, PIKOIR_OUTBOX_BEGIN);
+    if (grid.forErrors)
+      code.store(cursor, code.get(grid.outboxes, PIKOIR_OUTBOX_BEGIN),
+                 8 * PIKOIR_OUTBOX_BEGIN);
+    else
+      code.set(cursor, grid.outboxes, PIKOIR_OUTBOX_BEGIN);
   });
 }
 

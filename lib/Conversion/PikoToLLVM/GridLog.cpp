@@ -132,10 +132,67 @@ int64_t piko::findOutbox(const Grid &grid, int64_t stage, int64_t port) {
   return 0;
 }
 
+/// The words of an outbox for errors, of which there may have been none: their
+/// address, or 0 where there is no memory.
+static Value openErrorOutbox(GridCode &code, const Grid &grid) {
+  using P = GridCode::P;
+  constexpr int64_t bytes =
+      llvm::alignTo(layout::pieceHeader + 8 * PIKOIR_OUTBOX_WORDS, 64);
+  Value known = code.get(grid.outboxes, PIKOIR_OUTBOX_BEGIN);
+  return code.choose(
+      code.compare(P::ne, known, code.constant(0)), [&] { return known; },
+      [&] {
+        Value zero = code.constant(0);
+        Value piece =
+            code.take(grid.log, code.constant(bytes), PIKOIR_PIECE_MEMORY);
+        Value isThere = code.compare(P::ne, piece, zero);
+        Value words = code.add(piece, code.constant(layout::pieceHeader));
+        code.when(isThere, [&] {
+          for (int64_t word = 0; word < PIKOIR_OUTBOX_WORDS; ++word)
+            code.store(zero, words, 8 * word);
+          code.set(words, grid.outboxes, PIKOIR_OUTBOX_BEGIN);
+        });
+        return code.select(isThere, words, zero);
+      });
+}
+
+/// Words at an address.
+static Value viewWords(GridCode &code, Value address) {
+  OpBuilder &builder = code.builder;
+  auto bytesType = MemRefType::get({ShapedType::kDynamic}, builder.getI8Type());
+  Value bytes = createBytes(builder, code.loc, code.at(address),
+                            code.constant(8 * PIKOIR_OUTBOX_WORDS), bytesType);
+  return memref::ViewOp::create(
+      builder, code.loc, MemRefType::get({PIKOIR_OUTBOX_WORDS}, code.i64()),
+      bytes, code.index(0), ValueRange());
+}
+
+/// An entry for an error; its payload.
+static Value createErrorRoom(GridCode &code, Operation *op, const Grid &grid,
+                             int32_t place) {
+  constexpr int64_t bytes = 4 * 8;
+  if (!grid.forErrors)
+    return createEntry(code.builder, op, grid, EntryKind::Error, place, bytes);
+  Value words = openErrorOutbox(code, grid);
+  Value isThere = code.compare(GridCode::P::ne, words, code.constant(0));
+  return code.at(code.choose(
+      isThere,
+      [&]() -> Value {
+        Grid inLog = grid;
+        inLog.outboxes = viewWords(code, words);
+        Value payload = createEntry(code.builder, op, inLog, EntryKind::Error,
+                                    place, bytes);
+        return LLVM::PtrToIntOp::create(code.builder, code.loc, code.i64(),
+                                        payload);
+      },
+      [&] { return getSpare(code, grid.log); }));
+}
+
 bool piko::createErrorEntry(OpBuilder &builder, Operation *op,
                             LoweringContext &context, StringRef function,
                             int32_t stage, std::optional<StringRef> name,
-                            Value bin, int32_t code, ArrayRef<Value> numbers) {
+                            Value bin, int32_t number,
+                            ArrayRef<Value> numbers) {
   auto launch = op->getParentOfType<gpu::LaunchOp>();
   Grid *grid = context.grid(op);
   // What is checked is told to the runtime while the grid runs, and so are its
@@ -159,16 +216,15 @@ bool piko::createErrorEntry(OpBuilder &builder, Operation *op,
     context.call(host, loc, PIKO_RUNTIME_FUNCTION(pikoir_log_place),
                  {context.frame(launch), grid->log, createI32(host, loc, place),
                   createI32(host, loc, which), createI32(host, loc, stage),
-                  text, createI32(host, loc, code)});
+                  text, createI32(host, loc, number)});
   }
-  Value payload =
-      createEntry(builder, op, *grid, EntryKind::Error, place, 4 * 8);
+  GridCode code(builder, loc);
+  Value payload = createErrorRoom(code, op, *grid, place);
   SmallVector<Value> words{bin ? toI64(builder, loc, bin)
                                : createI64(builder, loc, -1)};
   llvm::append_range(words, numbers);
   words.resize(3, createI64(builder, loc, 0));
-  words.push_back(
-      GridCode(builder, loc).get(grid->outboxes, PIKOIR_OUTBOX_POSITION));
+  words.push_back(code.get(grid->outboxes, PIKOIR_OUTBOX_POSITION));
   for (auto [i, word] : llvm::enumerate(words))
     LLVM::StoreOp::create(builder, loc, word,
                           createOffset(builder, loc, payload, 8 * i));
@@ -254,6 +310,7 @@ struct OutboxesLowering : ContextPattern<OutboxesOp> {
     grid.log = adaptor.getLog();
     grid.outboxes = adaptor.getState();
     grid.kept = adaptor.getKept();
+    grid.forErrors = op.getForErrors();
     for (auto [i, port] :
          llvm::enumerate(op.getPorts().value_or(ArrayRef<int64_t>()))) {
       auto producer = cast<FlatSymbolRefAttr>((*op.getProducers())[i]);

@@ -58,6 +58,8 @@ struct Grid {
   llvm::SmallVector<std::pair<int64_t, int64_t>> locals;
   llvm::SmallVector<int64_t> recordBytes;
   llvm::SmallVector<bool> placed; ///< Whether records are kept by placing them.
+  bool forErrors =
+      false; ///< An outbox's words are in the log, from an error on.
 };
 
 class LoweringContext {

@@ -79,10 +79,13 @@ def Piko_OutboxesOp : Piko_GPUOp<"outboxes"> {
   let description = [{
     Says for the `gpu.launch` around where each thread has its outboxes: one for
     the log and one for each port of a local edge, of six numbers each. What the
-    block has of a local edge is in its memory, four numbers each.
+    block has of a local edge is in its memory, four numbers each. `for errors`: that
+    of the log is in the log itself, from the first error on, and the first number is
+    its address; so a grid that emits nothing keeps one number.
 
     ```mlir
     piko.gpu.outboxes %log in %numbers : memref<6xi64>
+    piko.gpu.outboxes %log for errors in %numbers : memref<6xi64>
     piko.gpu.outboxes %log in %more : memref<12xi64> local [@test] [0] in %kept
       : memref<4xi64, 3>
     ```
@@ -90,9 +93,10 @@ def Piko_OutboxesOp : Piko_GPUOp<"outboxes"> {
   let arguments = (ins Piko_WriterType:$log, MemRefOf<[I64]>:$state,
                        OptionalAttr<FlatSymbolRefArrayAttr>:$producers,
                        OptionalAttr<DenseI64ArrayAttr>:$ports,
-                       Optional<MemRefOf<[I64]>>:$kept);
+                       Optional<MemRefOf<[I64]>>:$kept,
+                       UnitAttr:$forErrors);
   let assemblyFormat = [{
-    $log `in` $state `:` type($state)
+    $log (`for` `errors` $forErrors^)? `in` $state `:` type($state)
     (`local` $producers^ $ports `in` $kept `:` type($kept))? attr-dict
   }];
 }
