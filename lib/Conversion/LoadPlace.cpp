@@ -4,6 +4,9 @@
 
 #include "LoadPlace.h"
 
+#include "Piko/Dialect/Piko/IR/Marks.h"
+#include "Piko/Dialect/Piko/IR/Piko.h"
+
 #include "mlir/Interfaces/LoopLikeInterface.h"
 
 using namespace mlir;
@@ -18,7 +21,18 @@ static bool holdsOtherLoop(LoopLikeOpInterface loop, Operation *op) {
       .wasInterrupted();
 }
 
+/// Whether a run that comes here fails.
+static bool fails(Block *block) {
+  return llvm::any_of(*block, [](Operation &op) {
+    return op.hasTrait<Failure>() || op.hasAttr(marks::fails);
+  });
+}
+
 Operation *piko::findLoadPlace(Operation *user, Operation *around) {
+  for (Operation *op = user; around->isProperAncestor(op);
+       op = op->getParentOp())
+    if (fails(op->getBlock()))
+      return op;
   Operation *place = user;
   while (auto loop = place->getParentOfType<LoopLikeOpInterface>()) {
     if (!around->isProperAncestor(loop) || holdsOtherLoop(loop, place))

@@ -8,6 +8,7 @@
 
 #include "mlir/Dialect/SCF/IR/SCF.h"
 #include "mlir/IR/Dominance.h"
+#include "mlir/Interfaces/SideEffectInterfaces.h"
 #include "llvm/ADT/MapVector.h"
 
 namespace piko {
@@ -32,7 +33,8 @@ struct MergeBoundsPass : piko::impl::MergeBoundsBase<MergeBoundsPass> {
 /// Whether all that a side of a condition does besides yielding is to fail.
 static bool onlyFails(Region &side) {
   return llvm::all_of(side.front().without_terminator(), [](Operation &op) {
-    return op.hasTrait<Failure>() || isMemoryEffectFree(&op);
+    return op.hasTrait<Failure>() || isMemoryEffectFree(&op) ||
+           hasSingleEffect<MemoryEffects::Read>(&op);
   });
 }
 

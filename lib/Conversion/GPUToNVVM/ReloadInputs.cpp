@@ -16,6 +16,7 @@
 
 #include "Piko/Dialect/Piko/IR/Marks.h"
 
+#include "mlir/Dialect/Arith/IR/Arith.h"
 #include "mlir/Dialect/GPU/IR/GPUDialect.h"
 #include "mlir/Dialect/LLVMIR/LLVMDialect.h"
 #include "mlir/IR/IRMapping.h"
@@ -51,11 +52,27 @@ static Value createReload(LLVM::LoadOp load, Operation *place) {
   return builder.clone(*load, mapping)->getResult(0);
 }
 
+/// Gives each use of a number as another type a cast of its own, so that the
+/// load is for that.
+static void repeatCasts(LLVM::LoadOp load) {
+  for (Operation *user : llvm::make_early_inc_range(load->getUsers())) {
+    auto cast = dyn_cast<arith::IndexCastOp>(user);
+    if (!cast)
+      continue;
+    for (OpOperand &use : llvm::make_early_inc_range(cast->getUses())) {
+      OpBuilder builder(use.getOwner());
+      use.set(builder.clone(*cast)->getResult(0));
+    }
+    cast.erase();
+  }
+}
+
 void ReloadInputsPass::reload(LLVM::LoadOp load) {
   load->removeAttr(marks::input);
   auto step = load.getAddr().getDefiningOp<LLVM::GEPOp>();
   if (step && !step.getDynamicIndices().empty())
     return;
+  repeatCasts(load);
   llvm::MapVector<Operation *, SmallVector<OpOperand *>> places;
   for (OpOperand &use : load.getResult().getUses())
     if (Operation *place = findLoadPlace(use.getOwner(), load->getParentOp());

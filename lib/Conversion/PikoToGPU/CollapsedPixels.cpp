@@ -99,7 +99,9 @@ private:
   /// Of the block. The ticket has the boxes in its upper bits, and the pixels
   /// of all of them below.
   Value ticket, limit, listed, slots, starts, masks, touched, list;
-  Value until; ///< The first rare primitive of the group.
+  /// The first rare primitive of the group, when its setup has ended: in the
+  /// block's memory, where each thread finds what all of them have written.
+  Value until;
   RareSite site;
 };
 
@@ -168,6 +170,7 @@ void CollapsedPixels::clear() {
   masks = add(words * pixels, i32);
   touched = add(llvm::divideCeil(pixels, 32), i32);
   list = add(pixels, b.getI16Type());
+  until = add(1, i32);
   Value zero = b.number(0);
   Emitter one = b.when(b.is(thread, Predicate::eq, zero));
   one.store(zero, ticket, zero);
@@ -371,7 +374,7 @@ void CollapsedPixels::mapCounters(IRMapping &mapping, ArrayRef<Value> cell) {
 void CollapsedPixels::findCovered(Emitter &b) {
   Value zero = b.number(0);
   Value all = b.load(ticket, zero);
-  until = b.load(limit, zero);
+  b.store(b.load(limit, zero), until, zero);
   Value count = b.shr(all, b.number(pixelBits));
   Value total = b.both(all, b.number((1 << pixelBits) - 1));
   Value share = b.shr(b.add(total, b.number(threads - 1)),
@@ -487,10 +490,10 @@ std::pair<Value, Value> CollapsedPixels::takePixel(Emitter &b, Value at) {
   }
   if (words > 1)
     b.store(zero, touched, b.shr(pixel, b.number(5)));
-  Value one = b.number(i64, 1);
-  Value shift = arith::ExtUIOp::create(b, i64, until);
+  Value one = b.number(i64, 1), end = b.loadAgain(until);
+  Value shift = arith::ExtUIOp::create(b, i64, end);
   Value below = b.sub(b.shl(one, shift), one);
-  Value isAll = b.is(until, Predicate::sge, b.number(64));
+  Value isAll = b.is(end, Predicate::sge, b.number(64));
   return {pixel, b.both(mask, b.select(isAll, b.number(i64, -1), below))};
 }
 
@@ -563,8 +566,9 @@ Value CollapsedPixels::runRare(Emitter &b) {
   Value zero = b.number(0);
   Emitter one = b.when(b.is(thread, Predicate::eq, zero));
   one.store(zero, listed, zero);
-  Value isRare = b.is(until, Predicate::slt, b.number(group));
-  Value position = b.add(base, b.toIndex(until));
+  Value end = b.loadAgain(until);
+  Value isRare = b.is(end, Predicate::slt, b.number(group));
+  Value position = b.add(base, b.toIndex(end));
   Value next = b.select(isRare, b.add(position, b.index(1)),
                         b.add(base, b.index(group)));
   Emitter in = b.when(isRare);

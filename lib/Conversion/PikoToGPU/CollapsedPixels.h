@@ -37,6 +37,10 @@ llvm::FailureOr<RareSite> collapsePixels(mlir::scf::ForOp items,
 /// no registers of the first one.
 void leaveRareToSecondLaunch(RareSite site, mlir::gpu::LaunchOp second);
 
+/// Puts what a loop that all threads run needs of what is around it, and is the
+/// same for all of them, into the block's memory, where each use finds it.
+void keepInBlock(mlir::scf::WhileOp loop, mlir::gpu::LaunchOp launch);
+
 } // namespace piko
 
 #endif // PIKO_LIB_CONVERSION_PIKOTOGPU_COLLAPSEDPIXELS_H

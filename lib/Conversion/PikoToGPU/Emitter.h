@@ -81,6 +81,14 @@ struct Emitter : mlir::ImplicitLocOpBuilder {
     return mlir::memref::LoadOp::create(*this, memory,
                                         mlir::ValueRange{toIndex(at)});
   }
+  /// The first element of a block's memory, which is not to be kept in
+  /// registers in front of a loop (GPUToNVVM.cpp).
+  mlir::Value loadAgain(mlir::Value memory) {
+    auto load =
+        mlir::memref::LoadOp::create(*this, memory, mlir::ValueRange{index(0)});
+    load.setNontemporal(true);
+    return load;
+  }
   void store(mlir::Value value, mlir::Value memory, mlir::Value at) {
     mlir::memref::StoreOp::create(*this, value, memory,
                                   mlir::ValueRange{toIndex(at)});

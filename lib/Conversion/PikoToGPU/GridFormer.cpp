@@ -109,7 +109,8 @@ void piko::dropEnds(KernelOp kernel, gpu::LaunchOp launch) {
       end.erase();
 }
 
-void piko::repeatForUnits(gpu::LaunchOp launch, Value bins, Operation *opened) {
+scf::ForOp piko::repeatForUnits(gpu::LaunchOp launch, Value bins,
+                                Operation *opened) {
   Location loc = launch.getLoc();
   Block &body = launch.getBody().front();
   OpBuilder builder = OpBuilder::atBlockBegin(&body);
@@ -125,4 +126,5 @@ void piko::repeatForUnits(gpu::LaunchOp launch, Value bins, Operation *opened) {
       std::next(opened->getIterator()), units->getIterator());
   builder.setInsertionPoint(units.getBody()->getTerminator());
   gpu::BarrierOp::create(builder, loc); // the block's memory is used again
+  return units;
 }

@@ -41,8 +41,16 @@ void dropEnds(KernelOp kernel, mlir::gpu::LaunchOp launch);
 
 /// What follows `opened` in a block's work is done for one unit of `bins` after
 /// the other: the runtime may launch fewer blocks than there are units.
-void repeatForUnits(mlir::gpu::LaunchOp launch, mlir::Value bins,
-                    mlir::Operation *opened);
+mlir::scf::ForOp repeatForUnits(mlir::gpu::LaunchOp launch, mlir::Value bins,
+                                mlir::Operation *opened);
+
+/// Keeps the counter of a loop that all threads run alike in the block's
+/// memory. `createEnd` finds the loop's end again.
+void countInBlock(mlir::scf::ForOp loop, mlir::gpu::LaunchOp launch,
+                  llvm::function_ref<mlir::Value(mlir::OpBuilder &)> createEnd);
+
+/// Does so for the loops over units and cells.
+void countWorkInBlock(mlir::scf::ForOp units, mlir::gpu::LaunchOp launch);
 
 } // namespace piko
 

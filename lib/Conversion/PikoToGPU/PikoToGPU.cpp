@@ -56,7 +56,7 @@ private:
   /// Opens outboxes; `work` is what the grid was made of.
   void createMemory();
   void convertLocal(LocalBinOp local);
-  void finishGrid();
+  scf::ForOp finishGrid();
   LogicalResult findItems();
   void hoistPrivateArrays();
   void upliftLoops();
@@ -181,7 +181,7 @@ void GridBuilder::convertLocal(LocalBinOp local) {
 
 /// Threads begin with empty outboxes, and leave what is in them at the end of
 /// each unit.
-void GridBuilder::finishGrid() {
+scf::ForOp GridBuilder::finishGrid() {
   auto opened = *memory.outboxes.getUsers().begin();
   for (Operation *user : memory.outboxes.getUsers())
     if (isa<OutboxesOp>(user))
@@ -199,7 +199,7 @@ void GridBuilder::finishGrid() {
   }
   builder.setInsertionPoint(opened->getBlock()->getTerminator());
   memory.flush(builder);
-  repeatForUnits(launch, bins, opened);
+  return repeatForUnits(launch, bins, opened);
 }
 
 /// An alloca in a loop would take more memory each time around.
@@ -278,9 +278,11 @@ LogicalResult GridBuilder::sharePixelsOfBins(bool collapses,
   }
   if (failed(convertAccess()))
     return failure();
-  finishGrid();
-  if (succeeded(rare))
+  scf::ForOp units = finishGrid();
+  if (succeeded(rare)) {
+    countWorkInBlock(units, launch);
     leaveRareToSecondLaunch(*rare, launch);
+  }
   return success();
 }
 

@@ -36,10 +36,11 @@ static void leaveUnits(RareSite &site, gpu::LaunchOp launch,
   Emitter in(branch.getLoc(), branch.thenBlock()->getTerminator());
   Value thread = launch.getThreadIds().x;
   Emitter one = in.when(in.is(thread, Predicate::eq, in.index(0)));
-  LeaveRestOp::create(one, rest.getLog(), rest.getUnit(),
-                      copyOf(site.position));
+  Value unit = one.clone(*rest.getUnit().getDefiningOp())->getResult(0);
+  LeaveRestOp::create(one, rest.getLog(), unit, copyOf(site.position));
   in.barrier();
   copies.lookup(site.next)->setOperand(1, end);
+  keepInBlock(groups, launch);
 }
 
 void piko::leaveRareToSecondLaunch(RareSite site, gpu::LaunchOp second) {
@@ -47,6 +48,7 @@ void piko::leaveRareToSecondLaunch(RareSite site, gpu::LaunchOp second) {
   IRMapping copies;
   auto first = cast<gpu::LaunchOp>(builder.clone(*second, copies));
   leaveUnits(site, first, copies);
+  keepInBlock(site.groups, second);
   StringRef name = second.getFunctionAttr().getLeafReference();
   second.setFunctionAttr(
       FlatSymbolRefAttr::get(builder.getContext(), (name + "_rest").str()));

@@ -51,6 +51,15 @@ private:
     return arith::IndexCastOp::create(code.builder, code.loc, code.i64(),
                                       launch.getThreadIds().x);
   }
+  // What lives as long as the kernel has 32 bits.
+  Value narrowThread() {
+    return arith::IndexCastOp::create(code.builder, code.loc, code.i32(),
+                                      launch.getThreadIds().x);
+  }
+  Value number(int64_t value) {
+    return createI32(code.builder, code.loc, value);
+  }
+  Value lane() { return code.both(narrowThread(), number(warpSize - 1)); }
   void link(Value directory);
   Value getWord(int64_t which);
   void reserveRecords(Value kept, Value most, int64_t base, int64_t size);
@@ -69,12 +78,12 @@ private:
 Value BlockOutput::sumOfWarps(Value ofWarp, Value isWriter, Value &total) {
   OpBuilder &builder = code.builder;
   Location loc = code.loc;
-  Value index = launch.getThreadIds().x;
-  Value warp =
-      arith::DivUIOp::create(builder, loc, index, code.index(warpSize));
+  Value warp = arith::DivUIOp::create(builder, loc, narrowThread(),
+                                      createI32(builder, loc, warpSize));
+  Value place = toIndex(builder, loc, warp);
   code.barrier(); // what was said in the last round is read
   when(isWriter,
-       [&] { memref::StoreOp::create(builder, loc, ofWarp, cells, warp); });
+       [&] { memref::StoreOp::create(builder, loc, ofWarp, cells, place); });
   code.barrier();
   int64_t warps = std::max<int64_t>(1, threads / warpSize);
   auto loop = scf::ForOp::create(
@@ -85,7 +94,9 @@ Value BlockOutput::sumOfWarps(Value ofWarp, Value isWriter, Value &total) {
     builder.setInsertionPointToStart(loop.getBody());
     Value number =
         memref::LoadOp::create(builder, loc, cells, loop.getInductionVar());
-    Value isBelow = code.compare(P::ult, loop.getInductionVar(), warp);
+    Value other = arith::IndexCastOp::create(builder, loc, code.i32(),
+                                             loop.getInductionVar());
+    Value isBelow = code.compare(P::ult, other, warp);
     Value below = code.select(isBelow, number, code.constant(0));
     scf::YieldOp::create(
         builder, loc,
@@ -103,16 +114,13 @@ Value BlockOutput::countBelow(Value has, Value &total) {
   Value rank =
       math::CtPopOp::create(code.builder, code.loc, code.both(votes, below));
   Value all = math::CtPopOp::create(code.builder, code.loc, votes);
-  Value lane = code.both(thread(), code.constant(warpSize - 1));
-  Value before = sumOfWarps(code.extend(all),
-                            code.compare(P::eq, lane, code.constant(0)), total);
+  Value isFirst = code.compare(P::eq, lane(), number(0));
+  Value before = sumOfWarps(code.extend(all), isFirst, total);
   return code.add(before, code.extend(rank));
 }
 
 Value BlockOutput::sumBelow(Value number, Value &total) {
-  Value lane = code.both(thread(), code.constant(warpSize - 1));
-  Value narrow =
-      arith::TruncIOp::create(code.builder, code.loc, code.i32(), lane);
+  Value narrow = lane();
   Value sum =
       arith::TruncIOp::create(code.builder, code.loc, code.i32(), number);
   int64_t lanes = std::min(threads, warpSize);
@@ -127,7 +135,8 @@ Value BlockOutput::sumBelow(Value number, Value &total) {
     sum = code.add(sum, code.select(has, other, zero));
   }
   Value wide = code.extend(sum);
-  Value isLast = code.compare(P::eq, lane, code.constant(lanes - 1));
+  Value isLast =
+      code.compare(P::eq, narrow, createI32(code.builder, code.loc, lanes - 1));
   Value before = sumOfWarps(wide, isLast, total);
   return code.add(before, code.sub(wide, number));
 }

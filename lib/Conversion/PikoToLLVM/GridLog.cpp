@@ -228,9 +228,10 @@ bool piko::createErrorEntry(OpBuilder &builder, Operation *op,
   for (auto [i, word] : llvm::enumerate(words))
     LLVM::StoreOp::create(builder, loc, word,
                           createOffset(builder, loc, payload, 8 * i));
-  LLVM::StoreOp::create(
+  auto tells = LLVM::StoreOp::create(
       builder, loc, createI64(builder, loc, 1),
       createOffset(builder, loc, grid->log, offsetof(pikoir_log, errors)));
+  tells->setAttr(marks::fails, builder.getUnitAttr());
   return true;
 }
 

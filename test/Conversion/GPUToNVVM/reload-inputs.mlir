@@ -9,8 +9,8 @@
 // CHECK-NEXT:    %[[LOG:.*]] = llvm.load %[[OUT]]
 // CHECK-NEXT:    %[[AT:.*]] = llvm.getelementptr inbounds %[[INPUT]][40]
 // CHECK-NEXT:    %[[COUNT:.*]] = llvm.load %[[AT]] : !llvm.ptr -> i64
-// CHECK-NEXT:    %[[UNITS:.*]] = arith.index_cast %[[COUNT]]
 // CHECK-NEXT:    llvm.getelementptr
+// CHECK-NEXT:    %[[UNITS:.*]] = arith.index_cast %[[COUNT]]
 // CHECK-NEXT:    scf.for %[[UNIT:.*]] = %{{.*}} to %[[UNITS]]
 // CHECK-NEXT:      %[[SAME:.*]] = llvm.intr.launder.invariant.group %[[INPUT]]
 // CHECK-NEXT:      %[[FIRST:.*]] = llvm.load %[[SAME]] : !llvm.ptr -> i64
@@ -61,6 +61,40 @@ gpu.module @others {
       llvm.store %loaded, %input : i64, !llvm.ptr
       scf.for %j = %begin to %end step %step {
         llvm.store %i, %input : i64, !llvm.ptr
+      }
+    }
+    gpu.return
+  }
+}
+
+// Only a run that fails needs it: there it is loaded, and cast. What fails is told
+// by a store that is marked.
+// CHECK-LABEL: gpu.func @fails
+// CHECK:         scf.for
+// CHECK-NEXT:      scf.for
+// CHECK-NEXT:        scf.if
+// CHECK-NEXT:          %[[INDEX:.*]] = llvm.intr.launder.invariant.group
+// CHECK-NEXT:          %[[TILES:.*]] = llvm.load %[[INDEX]]
+// CHECK-NEXT:          %[[CAST:.*]] = arith.index_cast %[[TILES]]
+// CHECK-NEXT:          arith.divui %{{.*}}, %[[CAST]]
+gpu.module @failing {
+  gpu.func @fails(%input: !llvm.ptr, %begin: index, %end: index, %bad: i1) kernel {
+    %c1 = arith.constant 1 : index
+    %tiles = llvm.load %input {piko.input} : !llvm.ptr -> i64
+    %index = arith.index_cast %tiles : i64 to index
+    scf.for %cell = %begin to %end step %c1 {
+      scf.for %i = %begin to %end step %c1 {
+        scf.if %bad {
+          %bin = arith.divui %cell, %index : index
+          %number = arith.index_cast %bin : index to i64
+          llvm.store %number, %input {piko.fails} : i64, !llvm.ptr
+        }
+      }
+      scf.for %i = %begin to %end step %c1 {
+        scf.if %bad {
+          %number = arith.index_cast %i : index to i64
+          llvm.store %number, %input : i64, !llvm.ptr
+        }
       }
     }
     gpu.return

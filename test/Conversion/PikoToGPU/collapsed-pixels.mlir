@@ -9,7 +9,7 @@ piko.record @Pixel {"n" : i32 at 0} size 4 align 4
 // Threads share the pixels of the boxes of 64 primitives: a mask of 64 bits for
 // each of the bin's 64 pixels, and a list of those that have one.
 // CHECK-LABEL: piko.kernel @kernel_draw
-// CHECK:         gpu.launch {{.*}} threads(%[[T:[a-z0-9]+]],
+// CHECK:         gpu.launch {{.*}} threads(%[[T:[a-z0-9]+]],{{.*}} function(@P_kernel_draw)
 // CHECK-SAME:      %[[TICKET:[a-z0-9]+]] : memref<1xi32, #gpu.address_space<workgroup>>, %[[LIMIT:[a-z0-9]+]] : memref<1xi32, {{[^,]*}}>, %[[LISTED:[a-z0-9]+]] : memref<1xi32, {{[^,]*}}>, %[[SLOTS:[a-z0-9]+]] : memref<64xi32, {{[^,]*}}>, %[[STARTS:[a-z0-9]+]] : memref<64xi32, {{[^,]*}}>, %[[MASKS:[a-z0-9]+]] : memref<128xi32, {{[^,]*}}>, %[[TOUCHED:[a-z0-9]+]] : memref<2xi32, {{[^,]*}}>, %[[LIST:[a-z0-9]+]] : memref<64xi16,
 // The setup of a thread's own primitive: one that uses an array is rare, and so
 // is one whose box is not in the bin; the others take a slot.
@@ -38,12 +38,33 @@ piko.record @Pixel {"n" : i32 at 0} size 4 align 4
 // CHECK-NOT:         piko.fail @draw in %{{.*}} outside bin
 // CHECK:             piko.store %{{.*}}, checked @image
 // CHECK:           gpu.barrier
+// Groups up to the first rare primitive are a launch of their own, which leaves the
+// rest of the unit to another one.
+// CHECK:           scf.if
+// CHECK:             piko.gpu.leave_rest %[[LOG:.*]][%{{.*}}] from %{{.*}}
+// CHECK-NOT:     piko.rare
+// CHECK:         gpu.launch {{.*}} function(@P_kernel_draw_rest)
+// The counters of loops over units and cells are in the block's memory, and what
+// groups need of the cell, which each use loads.
+// CHECK:           scf.while
+// CHECK-NEXT:        %[[UNIT:.*]] = memref.load %[[COUNTER:.*]][%c0] {nontemporal = true}
+// CHECK:             arith.cmpi slt, %[[UNIT]]
+// CHECK:             scf.while
+// CHECK:               %[[REST:.*]] = piko.gpu.rest %[[LOG]][%{{.*}}]
+// CHECK:               %[[LEFT:.*]] = arith.cmpi ne, %[[REST]], %c0
+// CHECK:               arith.select %[[LEFT]]
+// CHECK:               memref.store %{{.*}}, %[[END:.*]][%c0] : memref<1xindex
+// CHECK:               scf.while
+// CHECK-NEXT:            %[[LAST:.*]] = memref.load %[[END]][%c0] {nontemporal = true}
+// CHECK-NEXT:            arith.cmpi slt, %{{.*}}, %[[LAST]]
 // Threads do a rare one together, in a loop that becomes a function.
 // CHECK:           scf.if
 // CHECK:             scf.for
 // CHECK:               memref.store %{{.*}} : memref<2xi32>
 // CHECK:             } {{{.*}}piko.rare}
 // CHECK:             gpu.barrier
+// CHECK:           gpu.barrier
+// CHECK:           memref.store %{{.*}}, %[[COUNTER]][%c0]
 
 // A mask of 16 bits needs no other word to say that it is not empty.
 // FEW-LABEL: piko.kernel @kernel_draw

@@ -36,6 +36,8 @@ constexpr llvm::StringLiteral deferred = "piko.deferred";
 /// A loop of a kernel that is to be a function of its own: few primitives need
 /// it.
 constexpr llvm::StringLiteral rare = "piko.rare";
+/// A store by which a grid says that the run fails.
+constexpr llvm::StringLiteral fails = "piko.fails";
 /// A load of a member of the input, where a grid's kernel begins.
 constexpr llvm::StringLiteral input = "piko.input";
 /// An arith.andi or arith.ori of truth values whose second operand counts only
