@@ -115,7 +115,10 @@ def ConvertPikoToGPU : Pass<"convert-piko-to-gpu", "::piko::PipelineOp"> {
       pixels with bits, and update each for bit after bit, so in lineage order. A
       primitive that leaves the bin, or takes the way of a condition that uses arrays
       of the phase, ends its group in front of it and is done alone, in a loop that is
-      marked with `piko.rare`. A remark says why threads take one primitive after the
+      marked with `piko.rare`, of a launch of its own (`kernel_draw_rest`): the one in
+      front of it has no such loop, and leaves a unit where its first rare primitive
+      stands (`piko.gpu.leave_rest`). What these launches count, and need of a cell,
+      is in the block's memory. A remark says why threads take one primitive after the
       other.
     - Of any other kernel, threads share the primitives of a bin, or the iterations
       of parallel loops, where no two of these update a pixel. Where iterations
@@ -127,6 +130,13 @@ def ConvertPikoToGPU : Pass<"convert-piko-to-gpu", "::piko::PipelineOp"> {
       share the pieces. What lies between such loops and has effects is done by
       the first thread, between two barriers; all else by all threads alike.
       Arrays that several threads see are in the block's memory.
+
+      Where a primitive has a loop that changes state by atomics alone, whose order
+      nobody sees, and nobody reads what they change, threads put it off, with the
+      branch that it is in: what that needs waits in the block's memory until no
+      room may be left for another round, and is taken in order of the length of its
+      loop, which threads of a warp then have about the same of; two nested loops
+      that count become one.
 
     What a thread emits goes to its outbox (`piko.gpu.outboxes`); behind each round of
     a loop that threads share the block takes it, in their order (`piko.gpu.flush`),
@@ -179,6 +189,7 @@ def ConvertPikoToGPU : Pass<"convert-piko-to-gpu", "::piko::PipelineOp"> {
     Statistic<"cut", "cut", "loops that are cut at barriers">,
     Statistic<"strided", "strided", "loops that step over others' pixels">,
     Statistic<"guarded", "guarded", "tests of whose a pixel is">,
+    Statistic<"deferred", "deferred", "loops of atomics that threads put off">,
     Statistic<"collapsed", "collapsed",
               "loops over primitives whose pixels are one space">];
   let dependentDialects = ["::mlir::arith::ArithDialect",

@@ -41,6 +41,7 @@ private:
   LogicalResult mapOperation(Operation *op);
   LogicalResult mapRun(ArrayRef<Operation *> run);
   void share(scf::ForOp loop);
+  bool isPutOff(scf::ForOp loop) const;
   LogicalResult mapIterations(ParallelForOp loop);
   void shareInRounds(scf::ForOp loop);
   LogicalResult mapLocalBin(LocalBinOp local);
@@ -285,17 +286,37 @@ void BlockMapper::shareInRounds(scf::ForOp loop) {
       ifOp.thenBlock()->getTerminator()->getIterator(),
       loop.getBody()->getOperations());
   memory.flush(builder);
+  if (auto found = memory.queues.find(loop); found != memory.queues.end()) {
+    Value next = arith::AddIOp::create(builder, loc, rounds.getInductionVar(),
+                                       rounds.getStep());
+    Value isLast = arith::CmpIOp::create(builder, loc,
+                                         arith::CmpIPredicate::sge, next, end);
+    WorkQueue queue = found->second;
+    queue.work->removeAttr(marks::shared);
+    queue.drain(builder, isLast);
+    threads.ofOne.insert(queue.work);
+  }
   loop.erase();
 }
 
+/// Whether it is what iterations of another loop have put off.
+bool BlockMapper::isPutOff(scf::ForOp loop) const {
+  return llvm::any_of(memory.queues, [&](const auto &entry) {
+    return entry.second.work == loop;
+  });
+}
+
 void BlockMapper::share(scf::ForOp loop) {
+  if (isPutOff(loop))
+    return; // that loop's share() moves it
   loop->removeAttr(marks::shared);
   ++counts.shared;
   OpBuilder builder(loop);
   gpu::BarrierOp::create(builder, loc);
   builder.setInsertionPointAfter(loop);
   gpu::BarrierOp::create(builder, loc);
-  if (!loop->removeAttr(marks::deferred) && contains(loop, isEmission))
+  if (memory.queues.contains(loop) ||
+      (!loop->removeAttr(marks::deferred) && contains(loop, isEmission)))
     return shareInRounds(loop);
   threads.ofOne.insert(loop);
   builder.setInsertionPoint(loop);

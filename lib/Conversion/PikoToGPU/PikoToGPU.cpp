@@ -5,9 +5,11 @@
 //      loops over its cells and their primitives (GridFormer);
 //   2. if all that others see of it are pixels, share these among the block's
 //      threads, and take primitives in groups, whose setup the threads share
-//      (CollapsedPixels.cpp, or PixelSharing.cpp and ItemSetup.cpp);
-//   3. otherwise choose who takes which loop (SharedLoops.cpp) and map the
-//      block's work to its threads (BlockMapping.cpp);
+//      (CollapsedPixels.cpp and RareLaunch.cpp, or PixelSharing.cpp and
+//      ItemSetup.cpp);
+//   3. otherwise choose who takes which loop (SharedLoops.cpp), put off those
+//      of atomics (DeferredWork.cpp), and map the block's work to its threads
+//      (BlockMapping.cpp);
 //   4. convert access to state, and open a log for what the grid leaves.
 
 #include "PikoToGPU.h"
@@ -367,8 +369,16 @@ LogicalResult GridBuilder::mapWork(MappingCounts &counts) {
   for (ParallelLoopOpInterface loop : loops)
     if (failed(mapLoop(loop, counts)))
       return failure();
+  SmallVector<scf::ForOp> shared;
+  launch.walk([&](scf::ForOp loop) {
+    if (loop->hasAttr(marks::shared))
+      shared.push_back(loop);
+  });
+  for (scf::ForOp loop : shared)
+    counts.deferred += deferWork(loop, memory, threads);
   if (failed(convertAccess()) || failed(mapBlock(memory, counts)))
     return failure();
+  beginQueues(memory);
   finishGrid();
   return success();
 }
@@ -458,6 +468,7 @@ LogicalResult ConvertPikoToGPUPass::convert(KernelOp kernel) {
   shared += counts.shared;
   barriers += counts.threads;
   cut += counts.cut;
+  deferred += counts.deferred;
   return success();
 }
 

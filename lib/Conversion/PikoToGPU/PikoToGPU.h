@@ -14,6 +14,7 @@
 #include "mlir/Dialect/MemRef/IR/MemRef.h"
 #include "mlir/Dialect/SCF/IR/SCF.h"
 #include "llvm/ADT/DenseSet.h"
+#include "llvm/ADT/MapVector.h"
 
 namespace piko {
 
@@ -48,6 +49,8 @@ struct ThreadTile {
   /// The thread's place in the tile.
   llvm::SmallVector<mlir::Value> place;
 };
+
+struct Emitter;
 
 struct SharingCounts {
   int64_t strided = 0, guarded = 0, collapsed = 0;
@@ -86,7 +89,26 @@ ThreadMapping chooseMapping(mlir::Operation *loop, int64_t threads);
 bool hasSharedParent(mlir::Operation *op);
 
 struct MappingCounts {
-  int64_t shared = 0, threads = 0, cut = 0;
+  int64_t shared = 0, threads = 0, cut = 0, deferred = 0;
+};
+
+/// What threads that share the iterations of a loop put off, in the block's
+/// memory (DeferredWork.cpp).
+struct WorkQueue {
+  int64_t capacity, threads;
+  mlir::Value count; ///< How many wait.
+  /// Of each class of length: how many wait, and the place of the first.
+  mlir::Value lengths, starts;
+  mlir::Value classes; ///< Of those that wait: class, and place in that above.
+  mlir::Value order;   ///< The longest first.
+  /// A loop over those that wait, of which each thread takes some.
+  mlir::scf::ForOp work;
+
+  /// Behind a round of iterations, in which as many as there are threads may
+  /// have come: does the work if there may be no room for another round, or
+  /// `isLast`.
+  void drain(mlir::OpBuilder &builder, mlir::Value isLast);
+  void clear(Emitter &b, mlir::Value thread);
 };
 
 /// What a grid has for what its threads emit (piko.gpu.outboxes).
@@ -98,6 +120,8 @@ struct GridMemory {
   mlir::Attribute stage;   ///< The kernel's.
   /// Producer and port of each local edge.
   llvm::SmallVector<std::pair<mlir::FlatSymbolRefAttr, int64_t>> locals;
+  /// What iterations of loops that threads share put off.
+  llvm::MapVector<mlir::Operation *, WorkQueue> queues;
 
   int64_t getWords();
   /// Where the words of a local edge begin.
@@ -110,6 +134,13 @@ struct GridMemory {
                      mlir::Value count);
   mlir::Value getLocalCount(mlir::OpBuilder &builder, LocalBinOp local);
 };
+
+/// Puts off what a loop whose iterations threads share does in an inner loop by
+/// atomics alone, whose order nobody sees. False where there is nothing of
+/// that kind.
+bool deferWork(mlir::scf::ForOp loop, GridMemory &memory, int64_t threads);
+/// Where a block begins; behind mapBlock.
+void beginQueues(GridMemory &memory);
 
 /// Maps a block's work to its threads: the first thread does what has effects,
 /// loops that are marked are shared, iterations of parallel loops are threads,
