@@ -305,7 +305,8 @@ def ReloadInputs : Pass<"piko-reload-inputs", "::mlir::gpu::GPUModuleOp"> {
     **Does**: loads that are marked with `piko.input` stand where a kernel begins,
     and their registers would be taken until it ends. For each use there is another
     load, in front of the outermost loop around the use whose body has no loop but
-    those around the use.
+    those around the use. What only a run that fails needs (`piko.fails`) is loaded
+    where that is told.
 
     Before:
     ```
