@@ -81,8 +81,8 @@ void PikoDialect::initialize() {
 static StringRef getExpectedKind(StringRef name) {
   return llvm::StringSwitch<StringRef>(name)
       .Cases({marks::lanes, marks::rows, marks::shared, marks::one,
-              marks::deferred, marks::rare, marks::fails, marks::input, marks::shortCircuit,
-              marks::inside, marks::source},
+              marks::deferred, marks::rare, marks::fails, marks::input,
+              marks::shortCircuit, marks::inside, marks::source},
              "a unit")
       .Case(marks::mapping, "what lanes are given, as #piko<lanes items>")
       .Case(marks::units, "how threads share units, as #piko<units any>")
