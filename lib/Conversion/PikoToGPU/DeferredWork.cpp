@@ -65,7 +65,8 @@ private:
   scf::ForOp loop;
   GridMemory &memory;
   int64_t threads;
-  llvm::StringSet<> written; ///< State.
+  /// State that the kernel changes, and of which it needs what is there.
+  llvm::StringSet<> written, seen;
   Operation *anchor = nullptr;
   SmallVector<Operation *> ops; ///< What is put off, with the anchor.
   llvm::SetVector<Value> needs; ///< What that needs of the primitive.
@@ -100,7 +101,8 @@ bool WorkDeferral::canDefer(Operation *op) const {
   return !contains(op, [&](Operation *inner) {
     if (auto atomic = dyn_cast<AtomicOp>(inner))
       return atomic.getOld() || atomic.getCopy() ||
-             atomic.getKind() == AtomicKind::AddF;
+             atomic.getKind() == AtomicKind::AddF ||
+             seen.contains(atomic.getState());
     if (auto load = dyn_cast<LoadOp>(inner))
       return written.contains(load.getState());
     return !inner->hasTrait<OpTrait::HasRecursiveMemoryEffects>() &&
@@ -116,6 +118,9 @@ bool WorkDeferral::find() {
   memory.launch.walk([&](StateAccessOpInterface access) {
     if (access.getAccessKinds() != StateAccess::reads)
       written.insert(access.getAccessedState().getValue());
+    auto atomic = dyn_cast<AtomicOp>(*access);
+    if (!atomic || atomic.getOld())
+      seen.insert(access.getAccessedState().getValue());
   });
   loop.getBody()->walk<WalkOrder::PreOrder>([&](Operation *op) {
     if (!isa<LoopLikeOpInterface>(op))
