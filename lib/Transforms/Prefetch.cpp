@@ -128,10 +128,41 @@ static Value cloneIndex(Value index, OpBuilder &builder, IRMapping &mapping) {
   return builder.clone(*op, mapping)->getResult(0);
 }
 
+/// The stage whose bins a primitive is in, if one is.
+static StageOp getStage(ItemOp item) {
+  auto bins = item.getBins().getDefiningOp<OpenBinsOp>();
+  if (!bins || bins.getSource())
+    return {};
+  return lookupInPipeline<StageOp>(item, bins.getStageAttr());
+}
+
+/// Whether a bin's primitives come from many places. Where a producer puts them
+/// into the bin that it is in itself, they follow each other as they were made.
+static bool areScattered(ItemOp item) {
+  StageOp stage = getStage(item);
+  WalkResult result = getPipeline(item)->walk([&](AppendBinOp place) {
+    bool isSame =
+        isa_and_present<CellBinOp, CallBinOp>(place.getBin().getDefiningOp());
+    return place.getStage() == stage.getSymName() && !isSame
+               ? WalkResult::interrupt()
+               : WalkResult::advance();
+  });
+  return result.wasInterrupted();
+}
+
+/// Whether to ask for primitives that refer to nothing: small ones are copied
+/// into the order of their bins.
+static bool areFarApart(ItemOp item) {
+  constexpr int64_t copied = 16;
+  RecordOp record = lookupRecord(item, item.getPrim().getType().getRecord());
+  return record.getSize() > copied && areScattered(item);
+}
+
 void PrefetchPass::convert(scf::ForOp loop, ItemOp item) {
   SmallVector<Reference> references = findReferences(loop, item);
-  if (references.empty())
+  if (references.empty() && !areFarApart(item))
     return;
+  ++loops;
   Location loc = item.getLoc();
   OpBuilder builder(loop);
   Value one = arith::ConstantIndexOp::create(builder, loc, 1);
@@ -139,12 +170,15 @@ void PrefetchPass::convert(scf::ForOp loop, ItemOp item) {
   builder.setInsertionPointToStart(loop.getBody());
   auto ahead = [&](int64_t distance) -> Value {
     Value by = arith::ConstantIndexOp::create(builder, loc, distance);
-    Value at = arith::AddIOp::create(builder, loc, loop.getInductionVar(), by);
-    return arith::MinSIOp::create(builder, loc, at, last);
+    return arith::AddIOp::create(builder, loc, loop.getInductionVar(), by);
   };
+  // It may be in the next bin, or behind the last one.
   PrefetchItemOp::create(builder, loc, item.getBins(), ahead(farDistance));
+  if (references.empty())
+    return;
+  Value near = arith::MinSIOp::create(builder, loc, ahead(nearDistance), last);
   IRMapping mapping;
-  mapping.map(loop.getInductionVar(), ahead(nearDistance));
+  mapping.map(loop.getInductionVar(), near);
   builder.clone(*item, mapping);
   for (Reference &reference : references) {
     SmallVector<Value> indices;
@@ -153,18 +187,14 @@ void PrefetchPass::convert(scf::ForOp loop, ItemOp item) {
     PrefetchOp::create(builder, loc, reference.state, indices);
     ++elements;
   }
-  ++loops;
 }
 
 /// Whether primitives are sorted into bins. Others come as they were made, and
 /// what neighbours refer to is mostly at hand.
 static bool areSorted(ItemOp item) {
-  auto bins = item.getBins().getDefiningOp<OpenBinsOp>();
-  if (!bins || bins.getSource())
-    return false;
-  auto stage = lookupInPipeline<StageOp>(item, bins.getStageAttr());
-  return llvm::any_of(stage.getBins(),
-                      [](int64_t extent) { return extent != 0; });
+  StageOp stage = getStage(item);
+  return stage && llvm::any_of(stage.getBins(),
+                               [](int64_t extent) { return extent != 0; });
 }
 
 /// Whether a loop is the innermost one over the pixels of a bin, which it takes

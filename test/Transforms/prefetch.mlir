@@ -33,8 +33,7 @@ piko.pipeline @P rank 1 {
   // CHECK:         %[[LO:.*]], %[[HI:.*]] = piko.storage.cell_range
   // CHECK:         %[[LAST:.*]] = arith.subi %[[HI]], %c1
   // CHECK:         scf.for %[[I:.*]] = %[[LO]] to %[[HI]]
-  // CHECK:           %[[I16:.*]] = arith.addi %[[I]], %c16
-  // CHECK:           %[[FAR:.*]] = arith.minsi %[[I16]], %[[LAST]]
+  // CHECK:           %[[FAR:.*]] = arith.addi %[[I]], %c16
   // CHECK:           piko.cpu.prefetch_item %[[BINS:.*]][%[[FAR]]]
   // CHECK:           %[[I8:.*]] = arith.addi %[[I]], %c8
   // CHECK:           %[[NEAR:.*]] = arith.minsi %[[I8]], %[[LAST]]
@@ -174,6 +173,73 @@ piko.pipeline @Widths rank 1 {
       %0 = arith.addf %x, %y : f32
       %1 = arith.addf %0, %z : f32
       piko.store %1, @out[%c : i64] "x" : f32
+      piko.return
+    }
+  }
+}
+
+piko.record @Small {"x" : i32 at 0, "y" : f64 at 8} size 16 align 8
+piko.record @Large {"x" : i32 at 0, "y" : f64 at 8, "z" : f64 at 16} size 24 align 8
+
+// Large primitives that refer to nothing are asked for as well, where they come
+// from other bins.
+// CHECK-LABEL: piko.pipeline @Scattered
+// CHECK:       piko.kernel @kernel_large
+// CHECK:         piko.storage.cell_range
+// CHECK-NEXT:    scf.for %[[I:.*]] =
+// CHECK:           %[[FAR:.*]] = arith.addi %[[I]], %c16
+// CHECK:           piko.cpu.prefetch_item %{{.*}}[%[[FAR]]] : !piko.bins<@Large>
+// CHECK-NEXT:      piko.storage.item %{{.*}}[%[[I]]]
+// Not those that stay in the bin that they were made in, nor small ones.
+// CHECK:       piko.kernel @kernel_kept
+// CHECK-NOT:     piko.cpu.prefetch_item
+// CHECK:       piko.kernel @kernel_small
+// CHECK-NOT:     piko.cpu.prefetch_item
+piko.pipeline @Scattered rank 1 {
+  piko.source @large
+  piko.edge @large[0] -> @kept
+  piko.edge @kept[0] -> @small
+  piko.stage @large bins [8] threads 1 : @Large -> [@Large] {
+    piko.assign {
+    ^bb0(%f: !piko.prim<@Large>):
+      %x = piko.get %f "x" : !piko.prim<@Large> -> i32
+      %bin = piko.bin_at %x : i32
+      piko.assign_to %bin
+      piko.return
+    }
+    piko.process {
+    ^bb0(%f: !piko.prim<@Large>):
+      %x = piko.get %f "x" : !piko.prim<@Large> -> i32
+      %y = piko.get %f "y" : !piko.prim<@Large> -> f64
+      %z = piko.get %f "z" : !piko.prim<@Large> -> f64
+      piko.emit 0 (%x, %y, %z) : i32, f64, f64
+      piko.return
+    }
+  }
+  piko.stage @kept bins [8] threads 1 : @Large -> [@Small] {
+    piko.assign {
+    ^bb0(%f: !piko.prim<@Large>):
+      piko.assign_previous
+      piko.return
+    }
+    piko.process {
+    ^bb0(%f: !piko.prim<@Large>):
+      %x = piko.get %f "x" : !piko.prim<@Large> -> i32
+      %y = piko.get %f "y" : !piko.prim<@Large> -> f64
+      piko.emit 0 (%x, %y) : i32, f64
+      piko.return
+    }
+  }
+  piko.stage @small bins [8] threads 1 : @Small -> [] {
+    piko.assign {
+    ^bb0(%f: !piko.prim<@Small>):
+      %x = piko.get %f "x" : !piko.prim<@Small> -> i32
+      %bin = piko.bin_at %x : i32
+      piko.assign_to %bin
+      piko.return
+    }
+    piko.process {
+    ^bb0(%f: !piko.prim<@Small>):
       piko.return
     }
   }

@@ -18,8 +18,11 @@ def Prefetch : Pass<"piko-prefetch", "::piko::PipelineOp"> {
     further on (`piko.prefetch`), and for a primitive still further on
     (`piko.cpu.prefetch_item`): neither lies in memory in the order of the bin
     (S. Ainsworth and T. M. Jones, "Software Prefetching for Indirect Memory
-    Accesses", 2017). A stage with one bin for all takes its primitives as they
-    were made, whose neighbours mostly refer to the same; it is left alone.
+    Accesses", 2017). Where primitives refer to nothing, they are asked for
+    themselves, if they were put into the bin from others, and have more than 16
+    bytes: smaller ones are copied into order. A stage with one bin for all takes
+    its primitives as they were made, whose neighbours mostly refer to the same;
+    it is left alone.
 
     A loop over rows of pixels that reads a place from memory, as the number of
     the triangle that is seen, asks in stages, a row further on for each read on
@@ -43,7 +46,7 @@ def Prefetch : Pass<"piko-prefetch", "::piko::PipelineOp"> {
     After:
     ```
     scf.for %i = %begin to %end step %one {
-      %far = ...                        // %i + 16, or the last one
+      %far = ...                        // %i + 16
       piko.cpu.prefetch_item %bins[%far] : !piko.bins<@Triangle>
       %near = ...                       // %i + 8, or the last one
       %s = piko.storage.item %bins[%near] ...

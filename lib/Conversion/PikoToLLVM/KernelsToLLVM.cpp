@@ -13,7 +13,8 @@ using namespace piko;
 
 // More members of pikoir_input, and those of pikoir_unit and pikoir_call.
 namespace layout {
-constexpr RuntimeMember offsets = PIKO_RUNTIME_MEMBER(pikoir_input, offsets),
+constexpr RuntimeMember count = PIKO_RUNTIME_MEMBER(pikoir_input, count),
+                        offsets = PIKO_RUNTIME_MEMBER(pikoir_input, offsets),
                         units = PIKO_RUNTIME_MEMBER(pikoir_input, units),
                         unitCount =
                             PIKO_RUNTIME_MEMBER(pikoir_input, unit_count),
@@ -241,58 +242,73 @@ struct CallBinLowering : Lowering<CallBinOp> {
   }
 };
 
-/// What takes the address of a primitive.
-template <typename OpT> struct PositionLowering : Lowering<OpT> {
-  using Lowering<OpT>::Lowering, Lowering<OpT>::context, Lowering<OpT>::pointer,
-      Lowering<OpT>::entry;
+/// Whether positions lead to records by numbers.
+static Value isOrdered(OpBuilder &builder, Location loc, Value order) {
+  return LLVM::ICmpOp::create(
+      builder, loc, LLVM::ICmpPredicate::ne, order,
+      LLVM::ZeroOp::create(builder, loc, order.getType()));
+}
 
-  Value address(OpT op, typename OpT::Adaptor adaptor,
-                ConversionPatternRewriter &rewriter) const {
+/// The number of the record at a position.
+static Value readOrder(OpBuilder &builder, Location loc,
+                       LoweringContext &context, Value order, Value position) {
+  Value bytes = arith::MulIOp::create(
+      builder, loc, position, createI64(builder, loc, sizeof(uint32_t)));
+  Value number = createLoad(builder, loc, builder.getI32Type(),
+                            createOffset(builder, loc, order, bytes),
+                            context.tags.input());
+  return arith::ExtUIOp::create(builder, loc, builder.getI64Type(), number);
+}
+
+struct ItemLowering : Lowering<ItemOp> {
+  using Lowering::Lowering;
+  LogicalResult
+  matchAndRewrite(ItemOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
     Location loc = op.getLoc();
     Value bins = adaptor.getBins();
     Value position = toI64(rewriter, loc, adaptor.getPosition());
     Value order = context.member(rewriter, bins, layout::order);
-    Value null = LLVM::ZeroOp::create(rewriter, loc, pointer(rewriter));
-    Value ordered = LLVM::ICmpOp::create(rewriter, loc, LLVM::ICmpPredicate::ne,
-                                         order, null);
     auto choice = scf::IfOp::create(
-        rewriter, loc, ordered,
+        rewriter, loc, isOrdered(rewriter, loc, order),
         [&](OpBuilder &builder, Location loc) {
-          Value item =
-              createLoad(builder, loc, builder.getI32Type(),
-                         entry(builder, loc, order, position, sizeof(uint32_t)),
-                         this->context.tags.input());
-          Value wide =
-              arith::ExtUIOp::create(builder, loc, builder.getI64Type(), item);
-          scf::YieldOp::create(builder, loc, wide);
+          scf::YieldOp::create(
+              builder, loc, readOrder(builder, loc, context, order, position));
         },
         [&](OpBuilder &builder, Location loc) {
           scf::YieldOp::create(builder, loc, position);
         });
     Value items = context.member(rewriter, bins, layout::items);
-    RecordOp record = this->context.record(op.getBins().getType().getRecord());
-    return entry(rewriter, loc, items, choice.getResult(0), record.getSize());
-  }
-};
-
-struct ItemLowering : PositionLowering<ItemOp> {
-  using PositionLowering::PositionLowering;
-  LogicalResult
-  matchAndRewrite(ItemOp op, OpAdaptor adaptor,
-                  ConversionPatternRewriter &rewriter) const override {
-    rewriter.replaceOp(op, address(op, adaptor, rewriter));
+    RecordOp record = context.record(op.getBins().getType().getRecord());
+    rewriter.replaceOp(
+        op, entry(rewriter, loc, items, choice.getResult(0), record.getSize()));
     return success();
   }
 };
 
-struct PrefetchItemLowering : PositionLowering<PrefetchItemOp> {
-  using PositionLowering::PositionLowering;
+struct PrefetchItemLowering : Lowering<PrefetchItemOp> {
+  using Lowering::Lowering;
   LogicalResult
   matchAndRewrite(PrefetchItemOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
-    createPrefetch(
-        rewriter, op.getLoc(), address(op, adaptor, rewriter),
-        context.record(op.getBins().getType().getRecord()).getSize());
+    Location loc = op.getLoc();
+    Value bins = adaptor.getBins();
+    Value order = context.member(rewriter, bins, layout::order);
+    // What lies in order the processor foresees.
+    auto choice =
+        scf::IfOp::create(rewriter, loc, isOrdered(rewriter, loc, order),
+                          /*withElseRegion=*/false);
+    rewriter.setInsertionPoint(choice.thenBlock()->getTerminator());
+    Value last = arith::SubIOp::create(
+        rewriter, loc, context.member(rewriter, bins, layout::count),
+        createI64(rewriter, loc, 1));
+    Value position = arith::MinSIOp::create(
+        rewriter, loc, toI64(rewriter, loc, adaptor.getPosition()), last);
+    int64_t size = context.record(op.getBins().getType().getRecord()).getSize();
+    Value item = readOrder(rewriter, loc, context, order, position);
+    Value items = context.member(rewriter, bins, layout::items);
+    createPrefetch(rewriter, loc, entry(rewriter, loc, items, item, size),
+                   size);
     rewriter.eraseOp(op);
     return success();
   }

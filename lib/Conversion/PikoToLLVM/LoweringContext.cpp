@@ -378,13 +378,19 @@ Value piko::createOffset(OpBuilder &builder, Location loc, Value pointer,
 void piko::createPrefetch(OpBuilder &builder, Location loc, Value pointer,
                           int64_t bytes) {
   constexpr int32_t read = 0, keep = 3, data = 1;
+  constexpr int64_t line = 64, mostLines = 4;
+  auto ask = [&](int64_t offset) {
+    Value at = LLVM::GEPOp::create(builder, loc, pointer.getType(),
+                                   builder.getI8Type(), pointer,
+                                   ArrayRef<LLVM::GEPArg>{int32_t(offset)});
+    LLVM::Prefetch::create(builder, loc, at, read, keep, data);
+  };
   LLVM::Prefetch::create(builder, loc, pointer, read, keep, data);
-  if (bytes == 1)
-    return;
-  Value last =
-      LLVM::GEPOp::create(builder, loc, pointer.getType(), builder.getI8Type(),
-                          pointer, ArrayRef<LLVM::GEPArg>{int32_t(bytes - 1)});
-  LLVM::Prefetch::create(builder, loc, last, read, keep, data);
+  for (int64_t offset = line; offset < std::min(bytes - 1, mostLines * line);
+       offset += line)
+    ask(offset);
+  if (bytes > 1)
+    ask(bytes - 1);
 }
 
 Value piko::createFieldAddress(OpBuilder &builder, Location loc, Value record,

@@ -163,8 +163,8 @@ mlir::Value createOffset(mlir::OpBuilder &builder, mlir::Location loc,
                          mlir::Value pointer, int64_t bytes);
 mlir::Value createOffset(mlir::OpBuilder &builder, mlir::Location loc,
                          mlir::Value pointer, mlir::Value bytes);
-/// Asks for so many bytes, in one line of the cache or two; the pointer may
-/// lead anywhere.
+/// Asks for so many bytes, of many the first lines of the cache and the last;
+/// the pointer may lead anywhere.
 void createPrefetch(mlir::OpBuilder &builder, mlir::Location loc,
                     mlir::Value pointer, int64_t bytes);
 /// The address of an element of a field of a record.

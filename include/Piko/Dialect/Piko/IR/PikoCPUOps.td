@@ -188,7 +188,8 @@ def Piko_ItemOp : Piko_StorageOp<"item", [Pure]> {
 def Piko_PrefetchItemOp : Piko_CPUOp<"prefetch_item"> {
   let summary = "says that the primitive at a position will be read";
   let description = [{
-    A hint that changes nothing; the position is that of a primitive.
+    A hint that changes nothing. Behind the last position it is for the last one.
+    Nothing is asked for where primitives lie in the order of positions.
 
     ```mlir
     piko.cpu.prefetch_item %bins[%i] : !piko.bins<@Fragment>
