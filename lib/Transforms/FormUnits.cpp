@@ -46,7 +46,7 @@ static UnitLoop chooseLoop(ScheduleOp schedule) {
     return UnitLoop::Queue;
   switch (schedule.getKind()) {
   case ScheduleKind::DirectMap:
-    return UnitLoop::Owned;
+    return UnitLoop::Queue; // units have homes
   case ScheduleKind::Serialize:
     return UnitLoop::Serial;
   case ScheduleKind::LoadBalance:

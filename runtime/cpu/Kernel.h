@@ -174,6 +174,26 @@ struct InputMirrors {
   }
 };
 
+/// How far the units of each owner have been given to threads.
+class UnitCursors {
+public:
+  /// For units that belong to so many homes, or to nobody (Units.cpp).
+  void reset(const std::vector<pikoir_unit> &units, int64_t homes);
+  int64_t homes() const { return homes_; }
+  /// The next unit of an owner, or -1 at the end.
+  int64_t take(const std::vector<pikoir_unit> &units, int64_t owner);
+
+private:
+  struct alignas(64) Cursor { // on a line of its own
+    std::atomic<int64_t> next = 0;
+    int64_t end = 0; ///< Behind the last unit.
+  };
+  Cursor &of(int64_t owner) { return cursors_[owner + 2]; }
+
+  std::unique_ptr<Cursor[]> cursors_;
+  int64_t homes_ = 0, room_ = 0;
+};
+
 class Serial;         // Serial.h
 struct PrivateCopies; // PrivateCopies.h
 
@@ -199,8 +219,7 @@ struct Kernel {
   Array<uint32_t> places;
   Array<pikoir_call> calls; ///< If Process takes a list.
   std::vector<pikoir_unit> units;
-  bool ownsUnits = false; ///< Some belong to a thread that is not the first.
-  std::atomic<int64_t> nextUnit = 0; ///< For any thread.
+  UnitCursors cursors;
   int64_t positions = 0;
   /// Position to its place in emission order; none = identity.
   Array<uint32_t> rank;

@@ -174,12 +174,11 @@ static const pikoir_input *begin(pikort_pipeline &p, Kernel &kernel) {
       beginReductions(p, kernel);
     }
     kernel.open = true;
-    kernel.nextUnit = 0;
-    int64_t useful = kernel.ownsUnits ? p.threads : kernel.input.unit_count;
-    cpuOf(p).activeThreads =
-        kernel.runsSerially
-            ? 1
-            : static_cast<int32_t>(std::clamp<int64_t>(useful, 1, p.threads));
+    kernel.cursors.reset(kernel.units, kernel.runsSerially ? 1 : p.threads);
+    cpuOf(p).activeThreads = kernel.runsSerially
+                                 ? 1
+                                 : static_cast<int32_t>(std::clamp<int64_t>(
+                                       kernel.input.unit_count, 1, p.threads));
   });
   if (code == PIKORT_OK && kernel.runsSerially &&
       kernel.positions <= Serial::fewest)

@@ -4,9 +4,11 @@
 // A unit is what one thread takes at a time: neighbouring cells until there is
 // enough work in them, or a part of a cell that may be split. Where Process
 // takes a list, calls take the place of cells' positions. Schedules say who
-// runs a unit: bins of DirectMap belong to the cores in turn, those of
-// Serialize to the first. How units are cut, and who runs them, is never seen
-// in a result.
+// runs a unit: those of DirectMap have a home, a core that gets neighbours, as
+// many primitives as the others; those of Serialize are the first core's. A
+// core without work takes what others have not begun, so that nobody waits for
+// a core whose primitives take longer. How units are cut, and who runs them, is
+// never seen in a result.
 //
 //===----------------------------------------------------------------------===//
 
@@ -19,6 +21,11 @@
 using namespace piko::rt;
 
 namespace {
+
+// Owners of units that have no home.
+constexpr int64_t nobody = -1;    ///< Any thread takes the next one.
+constexpr int64_t firstCore = -2; ///< The first thread runs it, and no other.
+constexpr int64_t unmapped = 0;   ///< Gets a home when all are cut.
 
 /// Positions in a unit: enough units to balance the threads, enough work in
 /// each to be worth it, a multiple of any lanes.
@@ -43,9 +50,6 @@ int64_t mostTogether(const pikort_pipeline &p, int64_t count, int64_t most) {
   return std::clamp<int64_t>(count / blocks, 1, most);
 }
 
-/// Of a unit that any thread may run.
-constexpr int64_t nobody = -1;
-
 class Cutter {
 public:
   Cutter(pikort_pipeline &p, const Stage &stage, Kernel &kernel)
@@ -55,7 +59,7 @@ public:
   void cutCells() {
     const BinSchedule &schedule = stage_.scheduleOf(0);
     if (!stage_.binSchedules && schedule.kind == PIKOIR_SERIALIZE)
-      return add(0, stage_.cells, 0, kernel_.positions, 0);
+      return add(0, stage_.cells, 0, kernel_.positions, firstCore);
     int64_t chunk = sizeOf(schedule);
     // What waits for a bin may do much, whatever there is in it.
     int64_t most = mostTogether(p_, stage_.cells, stage_.hosts ? 16 : 1024);
@@ -68,9 +72,8 @@ public:
     };
     for (int64_t cell = 0; cell < stage_.cells; ++cell) {
       int64_t begin = offsets_[cell], end = offsets_[cell + 1];
-      int64_t bin = cell / stage_.tiles;
-      const BinSchedule &now = stage_.scheduleOf(bin);
-      int64_t nowOwner = ownerOf(now, bin, cell);
+      const BinSchedule &now = stage_.scheduleOf(cell / stage_.tiles);
+      int64_t nowOwner = ownerOf(now);
       if (owner != nowOwner)
         flush(cell);
       owner = nowOwner;
@@ -79,8 +82,7 @@ public:
       if (end - begin > chunk && splits(now)) {
         flush(cell);
         for (int64_t i = begin; i < end; i += chunk)
-          add(cell, cell + 1, i, std::min(end, i + chunk),
-              owner == nobody ? nobody : owner++);
+          add(cell, cell + 1, i, std::min(end, i + chunk), owner);
         first = cell + 1;
       } else if (now.kind != PIKOIR_SERIALIZE &&
                  (end - offsets_[first] >= chunk || cell + 1 - first >= most)) {
@@ -105,8 +107,7 @@ public:
     for (int64_t call = 0; call < calls; ++call) {
       const pikoir_call &now = kernel_.calls[call];
       const BinSchedule &schedule = stage_.scheduleOf(now.bin);
-      int64_t nowOwner =
-          ownerOf(schedule, now.bin, stage_.splits() ? call : now.bin);
+      int64_t nowOwner = ownerOf(schedule);
       if (owner != nowOwner)
         flush(call);
       owner = nowOwner;
@@ -122,18 +123,31 @@ public:
     flush(calls);
   }
 
-private:
-  /// Who runs a bin, or a part of the only bin.
-  int64_t ownerOf(const BinSchedule &schedule, int64_t bin,
-                  int64_t part) const {
-    switch (schedule.kind) {
-    case PIKOIR_SERIALIZE:
-      return 0;
-    case PIKOIR_DIRECT_MAP:
-      return p_.threads == 1 ? 0 : stage_.bins() == 1 ? part : bin;
-    default:
-      return nobody;
+  /// Gives each core neighbouring units of those that are mapped, as many
+  /// positions as the others. A cell counts as well: there may be much to do
+  /// where there is nothing in it.
+  void mapUnits() {
+    auto weigh = [](const pikoir_unit &unit) {
+      return unit.end - unit.begin + unit.cell_end - unit.cell_begin;
+    };
+    int64_t all = 0, before = 0;
+    for (const pikoir_unit &unit : units_)
+      all += unit.owner == unmapped ? weigh(unit) : 0;
+    for (pikoir_unit &unit : units_) {
+      if (unit.owner != unmapped)
+        continue;
+      int64_t weight = weigh(unit);
+      unit.owner =
+          (before + weight / 2) * p_.threads / std::max<int64_t>(all, 1);
+      before += weight;
     }
+  }
+
+private:
+  static int64_t ownerOf(const BinSchedule &schedule) {
+    return schedule.kind == PIKOIR_SERIALIZE    ? firstCore
+           : schedule.kind == PIKOIR_DIRECT_MAP ? unmapped
+                                                : nobody;
   }
   /// Whether threads may share one of its bins.
   bool splits(const BinSchedule &schedule) const {
@@ -148,7 +162,6 @@ private:
     if (begin == end && !stage_.visitsAll && !calls)
       return;
     units_.push_back({cellBegin, cellEnd, begin, end, owner});
-    kernel_.ownsUnits |= owner > 0;
   }
 
   void makeCalls() {
@@ -192,12 +205,12 @@ private:
 void piko::rt::cutUnits(pikort_pipeline &p, const Stage &stage,
                         Kernel &kernel) {
   kernel.units.clear();
-  kernel.ownsUnits = false;
   Cutter cutter(p, stage, kernel);
   if (stage.takesList())
     cutter.cutCalls();
   else
     cutter.cutCells();
+  cutter.mapUnits();
 }
 
 // --- Who runs a unit ---------------------------------------------------------
@@ -205,22 +218,54 @@ void piko::rt::cutUnits(pikort_pipeline &p, const Stage &stage,
 int64_t pikoir_thread(void) { return omp_get_thread_num(); }
 int64_t pikoir_team(void) { return omp_get_num_threads(); }
 
-int64_t pikoir_next_unit(pikort_pipeline *p, int32_t stage, int64_t last) {
-  Kernel &kernel = kernelOf(*p, stage);
-  const std::vector<pikoir_unit> &units = kernel.units;
-  auto count = static_cast<int64_t>(units.size());
-  int64_t thread = pikoir_thread(), team = pikoir_team();
-  if (last < 0 || units[last].owner != nobody)
-    for (int64_t unit = last + 1; unit < count; ++unit)
-      if (units[unit].owner != nobody && units[unit].owner % team == thread)
-        return unit;
-  for (;;) {
-    int64_t unit = kernel.nextUnit.fetch_add(1, std::memory_order_relaxed);
-    if (unit >= count)
-      return -1;
-    if (units[unit].owner == nobody)
+void UnitCursors::reset(const std::vector<pikoir_unit> &units, int64_t homes) {
+  if (room_ < homes) {
+    cursors_ = std::make_unique<Cursor[]>(homes - firstCore);
+    room_ = homes;
+  }
+  homes_ = homes;
+  for (int64_t owner = firstCore; owner < homes; ++owner) {
+    of(owner).next.store(0, std::memory_order_relaxed);
+    of(owner).end = 0;
+  }
+  for (size_t unit = units.size(); unit-- > 0;) {
+    Cursor &cursor = of(units[unit].owner);
+    cursor.next.store(unit, std::memory_order_relaxed);
+    cursor.end = std::max(cursor.end, static_cast<int64_t>(unit + 1));
+  }
+}
+
+int64_t UnitCursors::take(const std::vector<pikoir_unit> &units,
+                          int64_t owner) {
+  Cursor &cursor = of(owner);
+  while (cursor.next.load(std::memory_order_relaxed) < cursor.end) {
+    int64_t unit = cursor.next.fetch_add(1, std::memory_order_relaxed);
+    if (unit < cursor.end && units[unit].owner == owner)
       return unit;
   }
+  return -1;
+}
+
+int64_t pikoir_next_unit(pikort_pipeline *p, int32_t stage, int64_t) {
+  Kernel &kernel = kernelOf(*p, stage);
+  UnitCursors &cursors = kernel.cursors;
+  int64_t thread = pikoir_thread(), team = pikoir_team(), unit = -1;
+  auto take = [&](int64_t owner) {
+    unit = cursors.take(kernel.units, owner);
+    return unit >= 0;
+  };
+  if (thread == 0 && take(firstCore))
+    return unit;
+  // There may be fewer threads than homes.
+  for (int64_t home = thread; home < cursors.homes(); home += team)
+    if (take(home))
+      return unit;
+  if (take(nobody))
+    return unit;
+  for (int64_t home = 0; home < cursors.homes(); ++home)
+    if (take(home))
+      return unit;
+  return -1;
 }
 
 // --- Schedules that depend on the bin ---------------------------------------

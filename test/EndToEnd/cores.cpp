@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // Bins run on the cores that the schedule names, also where it depends on the
-// bin, and whoever hands the bins out: DirectMap takes the cores in turn,
-// Serialize the first, and All shares a bin among them.
+// bin, and whoever hands the bins out: DirectMap gives each core neighbours, which
+// others take over if it is late, Serialize takes the first core, and All shares a
+// bin among them.
 // RUN: printf -- '--pipe %%s --domain 28 --count 6000\n' Mapped Serial ByBin Lists > %t.cases
 // RUN: printf '%%s\n' '--pipe Hops --domain 28 --count 60000' '--pipe Parts --count 6000' >> %t.cases
 // RUN: piko-compare %s --cases %t.cases --threads 3 --owners > %t.resolved
@@ -39,12 +40,12 @@ struct InTurn : Counts<InTurn, Item> {
   void process(const Item &i) { count(i); }
 };
 // CHECK: Mapped:
-// CHECK-NEXT: stage, bin 0: 0{{$}}
-// CHECK-NEXT: stage, bin 1: 1{{$}}
-// CHECK-NEXT: stage, bin 2: 2{{$}}
-// CHECK-NEXT: stage, bin 4: 1{{$}}
-// CHECK-NEXT: stage, bin 5: 2{{$}}
-// CHECK-NEXT: stage, bin 6: 0{{$}}
+// CHECK: stage, bin 0: {{[0-2]}}
+// CHECK: stage, bin 1: {{[0-2]}}
+// CHECK: stage, bin 2: {{[0-2]}}
+// CHECK: stage, bin 4: {{[0-2]}}
+// CHECK: stage, bin 5: {{[0-2]}}
+// CHECK: stage, bin 6: {{[0-2]}}
 // CHECK: equal
 struct Mapped : piko::Pipe<State> {
   InTurn stage;
@@ -66,7 +67,7 @@ struct Serial : piko::Pipe<State> {
   Serial() { source(stage); }
 };
 
-// Two on the first core, the rest in turn, the last on any.
+// Two on the first core, the rest on their own, the last on any.
 struct Chosen : Counts<Chosen, Item> {
   void schedule(piko::BinId bin) {
     if (bin.index == 1 || bin.index == 2)
@@ -77,12 +78,12 @@ struct Chosen : Counts<Chosen, Item> {
   void process(const Item &i) { count(i); }
 };
 // CHECK: ByBin:
-// CHECK-NEXT: stage, bin 0: 0{{$}}
+// CHECK-NEXT: stage, bin 0: {{[0-2]}}
 // CHECK-NEXT: stage, bin 1: 0{{$}}
 // CHECK-NEXT: stage, bin 2: 0{{$}}
-// CHECK-NEXT: stage, bin 4: 1{{$}}
-// CHECK-NEXT: stage, bin 5: 2{{$}}
-// CHECK-NEXT: stage, bin 6: {{[0-2]}}
+// CHECK: stage, bin 4: {{[0-2]}}
+// CHECK: stage, bin 5: {{[0-2]}}
+// CHECK: stage, bin 6: {{[0-2]}}
 // CHECK: equal
 struct ByBin : piko::Pipe<State> {
   Chosen stage;
@@ -100,12 +101,12 @@ struct InLists : Counts<InLists, Item> {
   }
 };
 // CHECK: Lists:
-// CHECK-NEXT: stage, bin 0: 0{{$}}
-// CHECK-NEXT: stage, bin 1: 1{{$}}
-// CHECK-NEXT: stage, bin 2: 2{{$}}
-// CHECK-NEXT: stage, bin 4: 1{{$}}
-// CHECK-NEXT: stage, bin 5: 2{{$}}
-// CHECK-NEXT: stage, bin 6: 0{{$}}
+// CHECK: stage, bin 0: {{[0-2]}}
+// CHECK: stage, bin 1: {{[0-2]}}
+// CHECK: stage, bin 2: {{[0-2]}}
+// CHECK: stage, bin 4: {{[0-2]}}
+// CHECK: stage, bin 5: {{[0-2]}}
+// CHECK: stage, bin 6: {{[0-2]}}
 // CHECK: equal
 struct Lists : piko::Pipe<State> {
   InLists stage;
@@ -122,8 +123,8 @@ struct Hop : Counts<Hop, Item, Item> {
   }
 };
 // CHECK: Hops:
-// CHECK: hop, bin 1: 1{{$}}
-// CHECK: hop, bin 5: 2{{$}}
+// CHECK: hop, bin 1: {{[0-2]}}
+// CHECK: hop, bin 5: {{[0-2]}}
 // CHECK: equal
 struct Hops : piko::Pipe<State> {
   Hop hop;
@@ -133,7 +134,7 @@ struct Hops : piko::Pipe<State> {
   }
 };
 
-// Parts of the only bin go to the cores in turn, or to whoever is free.
+// Each core has a part of the only bin, or whoever is free takes the next.
 struct Shared : piko::Stage<0, 0, 64, Item, Item>, piko::Uses<State> {
   void schedule(piko::BinId) { specifySchedule(piko::DirectMap); }
   void process(const Item &i) { emit(i); }
@@ -149,7 +150,7 @@ struct All : piko::Stage<0, 0, 64, Item>, piko::Uses<State> {
 };
 // CHECK: Parts:
 // CHECK-NEXT: all, bin 0: {{[0-2] [0-2]}}
-// CHECK-NEXT: shared, bin 0: 0 1 2
+// CHECK: shared, bin 0: {{[0-2]}}
 // CHECK-NEXT: equal
 struct Parts : piko::Pipe<State> {
   Shared shared;

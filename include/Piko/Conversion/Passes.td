@@ -58,9 +58,8 @@ def ConvertPikoToOpenMP : Pass<"convert-piko-to-openmp", "::piko::PipelineOp"> {
 
     **Does**: turns the `scf.forall` of each kernel into an `omp.parallel` with
     the host's thread count. In it is, by the `piko.units` of the loop, an
-    `omp.wsloop` with a dynamic schedule (`any`), a loop over all units in which
-    a thread runs its own (`owned`), or one that asks the runtime for the next
-    unit (`queue`). `serial` becomes a plain loop. Private arrays move to the
+    `omp.wsloop` with a dynamic schedule (`any`), or a loop that asks the runtime
+    for the next unit (`queue`). `serial` becomes a plain loop. Private arrays move to the
     front of the thread's region, so that they take stack space once and not for
     each primitive.
 

@@ -25,8 +25,7 @@ constexpr RuntimeMember cellBegin =
                             PIKO_RUNTIME_MEMBER(pikoir_unit, cell_begin),
                         cellEnd = PIKO_RUNTIME_MEMBER(pikoir_unit, cell_end),
                         begin = PIKO_RUNTIME_MEMBER(pikoir_unit, begin),
-                        end = PIKO_RUNTIME_MEMBER(pikoir_unit, end),
-                        owner = PIKO_RUNTIME_MEMBER(pikoir_unit, owner);
+                        end = PIKO_RUNTIME_MEMBER(pikoir_unit, end);
 constexpr RuntimeMember callBin = PIKO_RUNTIME_MEMBER(pikoir_call, bin),
                         callBegin = PIKO_RUNTIME_MEMBER(pikoir_call, begin),
                         callEnd = PIKO_RUNTIME_MEMBER(pikoir_call, end);
@@ -124,20 +123,6 @@ struct UnitCellsLowering : Lowering<UnitCellsOp> {
     Value last = load(rewriter, loc, unit, layout::cellEnd);
     rewriter.replaceOp(
         op, {toIndex(rewriter, loc, first), toIndex(rewriter, loc, last)});
-    return success();
-  }
-};
-
-struct UnitOwnerLowering : Lowering<UnitOwnerOp> {
-  using Lowering::Lowering;
-  LogicalResult
-  matchAndRewrite(UnitOwnerOp op, OpAdaptor adaptor,
-                  ConversionPatternRewriter &rewriter) const override {
-    Location loc = op.getLoc();
-    Value units = context.member(rewriter, adaptor.getBins(), layout::units);
-    Value unit =
-        entry(rewriter, loc, units, adaptor.getUnit(), sizeof(pikoir_unit));
-    rewriter.replaceOp(op, load(rewriter, loc, unit, layout::owner));
     return success();
   }
 };
@@ -461,30 +446,6 @@ struct ThreadsLowering : Lowering<ThreadsOp> {
   }
 };
 
-struct ThreadLowering : Lowering<ThreadOp> {
-  using Lowering::Lowering;
-  LogicalResult
-  matchAndRewrite(ThreadOp op, OpAdaptor,
-                  ConversionPatternRewriter &rewriter) const override {
-    rewriter.replaceOp(op, context.call(rewriter, op.getLoc(),
-                                        PIKO_RUNTIME_FUNCTION(pikoir_thread),
-                                        ValueRange()));
-    return success();
-  }
-};
-
-struct TeamLowering : Lowering<TeamOp> {
-  using Lowering::Lowering;
-  LogicalResult
-  matchAndRewrite(TeamOp op, OpAdaptor,
-                  ConversionPatternRewriter &rewriter) const override {
-    rewriter.replaceOp(op, context.call(rewriter, op.getLoc(),
-                                        PIKO_RUNTIME_FUNCTION(pikoir_team),
-                                        ValueRange()));
-    return success();
-  }
-};
-
 } // namespace
 
 void piko::populateKernelToLLVMPatterns(const TypeConverter &converter,
@@ -497,7 +458,6 @@ void piko::populateKernelToLLVMPatterns(const TypeConverter &converter,
                ToAddressLowering, FromAddressLowering,
 
                BeginScheduleLowering, ScheduleBinLowering, GetLowering,
-               GridLowering, DomainLowering, ThreadsLowering, ThreadLowering,
-               TeamLowering, UnitOwnerLowering, NextUnitLowering>(
+               GridLowering, DomainLowering, ThreadsLowering, NextUnitLowering>(
       converter, patterns.getContext(), context);
 }

@@ -37,11 +37,6 @@ static UnitBody findUnitBody(omp::ParallelOp parallel) {
           queue.getConditionOp().getCondition().getDefiningOp<arith::CmpIOp>();
       return {&op, body, body->getArgument(0), goesOn.getRhs()};
     }
-    if (auto owned = dyn_cast<scf::ForOp>(op)) {
-      auto own = *owned.getBody()->getOps<scf::IfOp>().begin();
-      return {&op, own.thenBlock(), owned.getInductionVar(),
-              owned.getUpperBound()};
-    }
   }
   llvm_unreachable("a parallel region has a loop over units");
 }
@@ -87,13 +82,11 @@ static func::FuncOp createUnit(func::FuncOp kernel, const UnitBody &body,
     builder.clone(*constant, copies);
   for (auto [from, to] : llvm::zip(arguments, entry->getArguments()))
     copies.map(from, to);
-  // Private arrays, which lie before the loop; who the thread is, the loop
-  // asks.
+  // Private arrays, which lie before the loop.
   for (Operation &op : llvm::make_early_inc_range(*body.loop->getBlock())) {
     if (&op == body.loop)
       break;
-    if (!isa<CallOpInterface>(op))
-      op.moveBefore(entry, entry->end());
+    op.moveBefore(entry, entry->end());
   }
   entry->getOperations().splice(entry->end(), body.block->getOperations(),
                                 body.block->begin(),

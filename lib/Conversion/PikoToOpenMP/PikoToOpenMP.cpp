@@ -64,14 +64,10 @@ public:
     rewriter.createBlock(&parallel.getRegion());
     rewriter.setInsertionPoint(omp::TerminatorOp::create(rewriter, loc));
     hoistPrivateArrays(forall, rewriter);
-    switch (kind) {
-    case UnitLoop::Any:
-      return shareAny();
-    case UnitLoop::Owned:
-      return shareOwned();
-    default:
-      return shareQueue();
-    }
+    if (kind == UnitLoop::Any)
+      shareAny();
+    else
+      shareQueue();
   }
 
 private:
@@ -103,21 +99,6 @@ private:
                                        rewriter.getIndexType(), loc);
     omp::YieldOp::create(rewriter, loc, ValueRange());
     moveBody(body);
-  }
-
-  /// A thread passes by what is not its own.
-  void shareOwned() {
-    Value thread = ThreadOp::create(rewriter, loc);
-    Value team = TeamOp::create(rewriter, loc);
-    scf::ForOp loop = createLoop();
-    rewriter.setInsertionPointToStart(loop.getBody());
-    Value unit = loop.getInductionVar();
-    Value owner = UnitOwnerOp::create(rewriter, loc, bins, unit);
-    Value turn = arith::RemUIOp::create(rewriter, loc, owner, team);
-    Value mine = arith::CmpIOp::create(rewriter, loc, arith::CmpIPredicate::eq,
-                                       turn, thread);
-    auto own = scf::IfOp::create(rewriter, loc, mine);
-    moveBody(own.thenBlock(), unit);
   }
 
   void shareQueue() {

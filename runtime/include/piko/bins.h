@@ -52,7 +52,7 @@ template <int... Size> struct Bins {
 /// Which cores run the bins of a stage.
 enum SchedulePolicy : int32_t {
   LoadBalance = 0, ///< any core takes the next bin
-  DirectMap = 1,   ///< bins go to cores in turn
+  DirectMap = 1,   ///< each core has bins of its own
   Serialize = 2,   ///< one core runs all bins
   All = 3,         ///< all cores run one bin after the other
 };

@@ -239,9 +239,10 @@ PIKORT_API int32_t pikoir_status(pikort_pipeline *p);
 /// has several cells only if it has them whole; units partition the positions
 /// in order. In a LIST stage cell_begin and cell_end are indices of calls, and
 /// units partition the calls; those of one bin are in one unit unless it is
-/// SPLIT. Thread `owner` modulo the size of the team should run it, any if that
-/// is -1: bins of DIRECT_MAP belong to the cores in turn, and so do parts of
-/// the only bin; those of SERIALIZE belong to the first.
+/// SPLIT. `owner` is the thread that has its home, modulo the size of the team,
+/// for bins of DIRECT_MAP and parts of the only one: ascending, and as many
+/// positions for each; -1 if any thread may run it, -2 if the first one must,
+/// as for bins of SERIALIZE.
 typedef struct pikoir_unit {
   int64_t cell_begin;
   int64_t cell_end;
@@ -324,8 +325,8 @@ PIKORT_API const pikoir_input *pikoir_begin(pikort_pipeline *p, int32_t stage);
 PIKORT_API pikoir_writer *pikoir_open(pikort_pipeline *p, int32_t stage,
                                       int64_t unit);
 /// The unit that the calling thread should run after `last`, which is -1 at the
-/// start: first its own, in order, then the next of those that are nobody's; -1
-/// if there is none.
+/// start: first its own, in order, then the next of those that are nobody's,
+/// then those of others that they have not begun; -1 if there is none.
 PIKORT_API int64_t pikoir_next_unit(pikort_pipeline *p, int32_t stage,
                                     int64_t last);
 /// Room for the next record of a port, never null. The caller writes all

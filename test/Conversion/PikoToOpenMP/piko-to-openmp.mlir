@@ -15,18 +15,12 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 // CHECK:               omp.yield
 // CHECK:         piko.storage.close_bins
 
+// The runtime knows which units have their home with a thread.
 // CHECK-LABEL: piko.kernel @kernel_mapped
 // CHECK:         %[[BINS:.*]] = piko.storage.open_bins
-// CHECK:         %[[COUNT:.*]] = piko.storage.unit_count
 // CHECK:         omp.parallel
-// CHECK:           %[[THREAD:.*]] = piko.cpu.thread
-// CHECK-NEXT:      %[[TEAM:.*]] = piko.cpu.team
-// CHECK-NEXT:      scf.for %[[UNIT:.*]] = %{{.*}} to %[[COUNT]]
-// CHECK-NEXT:        %[[OWNER:.*]] = piko.cpu.unit_owner %[[BINS]][%[[UNIT]]]
-// CHECK-NEXT:        %[[TURN:.*]] = arith.remui %[[OWNER]], %[[TEAM]]
-// CHECK-NEXT:        %[[MINE:.*]] = arith.cmpi eq, %[[TURN]], %[[THREAD]]
-// CHECK-NEXT:        scf.if %[[MINE]] {
-// CHECK-NEXT:          piko.cpu.open_writer %{{.*}}[%[[UNIT]]]
+// CHECK:           scf.while
+// CHECK-NEXT:        piko.cpu.next_unit %[[BINS]] after
 
 // CHECK-LABEL: piko.kernel @kernel_serial
 // CHECK-NOT:     omp.

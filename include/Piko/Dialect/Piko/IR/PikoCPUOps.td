@@ -462,54 +462,13 @@ def Piko_ThreadsOp : Piko_CPUOp<"threads", [Pure]> {
   let assemblyFormat = "attr-dict";
 }
 
-def Piko_ThreadOp : Piko_CPUOp<"thread", [MemoryEffects<[MemRead]>]> {
-  let summary = "which of its team a thread is";
-  let description = [{
-    Counted from 0, below `piko.cpu.team`.
-
-    ```mlir
-    %t = piko.cpu.thread
-    ```
-  }];
-  let results = (outs I64:$result);
-  let assemblyFormat = "attr-dict";
-}
-
-def Piko_TeamOp : Piko_CPUOp<"team", [MemoryEffects<[MemRead]>]> {
-  let summary = "how many threads run a parallel region";
-  let description = [{
-    They may be fewer than `piko.cpu.threads`, which asks for them.
-
-    ```mlir
-    %n = piko.cpu.team
-    ```
-  }];
-  let results = (outs I64:$result);
-  let assemblyFormat = "attr-dict";
-}
-
-def Piko_UnitOwnerOp : Piko_CPUOp<"unit_owner", [Pure]> {
-  let summary = "the core that a unit of work belongs to";
-  let description = [{
-    Modulo the size of the team it is the thread that runs the unit; -1 if any
-    may.
-
-    ```mlir
-    %o = piko.cpu.unit_owner %bins[%unit] : !piko.bins<@Fragment>
-    ```
-  }];
-  let arguments = (ins Piko_BinsType:$bins, Index:$unit);
-  let results = (outs I64:$result);
-  let assemblyFormat = "$bins `[` $unit `]` attr-dict `:` qualified(type($bins))";
-}
-
 def Piko_NextUnitOp : Piko_CPUOp<"next_unit", [
     MemoryEffects<[MemRead, MemWrite]>]> {
   let summary = "the unit of work that a thread runs next";
   let description = [{
-    First those that belong to the thread, in order, then the next one of those
-    that any thread may run. The operand is what it ran before, -1 at the start; the
-    result is -1 at the end.
+    First those that have their home with the thread, in order, then the next one of
+    those that any thread may run, then those that others have not begun. The operand
+    is what it ran before, -1 at the start; the result is -1 at the end.
 
     ```mlir
     %u = piko.cpu.next_unit %bins after %unit : !piko.bins<@Fragment>
