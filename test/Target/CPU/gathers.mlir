@@ -3,9 +3,10 @@
 // REQUIRES: x86_64
 // RUN: pikoc %s --emit=assembly --cpu x86-64-v3 | FileCheck %s
 // RUN: pikoc %s --emit=assembly --cpu haswell | FileCheck %s
-// CHECK: vgather{{.*}}, %ymm
+// CHECK: vgather{{.*}}, %{{[xy]}}mm
 
-piko.record @V {"at" : i32 at 0, "z" : f32 at 4} size 8 align 4
+// Two words that are not side by side, of which one load would take both.
+piko.record @V {"at" : i32 at 0, "y" : f32 at 4, "z" : f32 at 8} size 12 align 4
 piko.pipeline @P rank 1 {
   piko.buffer @in : @V
   piko.source @a

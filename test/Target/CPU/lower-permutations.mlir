@@ -11,11 +11,11 @@
 // Of 64 bits an instruction takes two registers, or they move as halves.
 // AVX512:         vpermd %zmm
 // AVX512-COUNT-2: vpermi2q %zmm
-// AVX2:          vpermd %ymm
-// AVX2-NOT:      vpermd
+// AVX2:          vperm{{d|ps}} %ymm
+// AVX2-NOT:      vperm{{d|ps}}
 // AVX2:          vpermpd $216
-// AVX2:          vpermd %ymm
-// AVX2:          vpermd %ymm
+// AVX2:          vperm{{d|ps}} %ymm
+// AVX2:          vperm{{d|ps}} %ymm
 // AVX-COUNT-3:   vpermilps %xmm{{.*}}, %xmm{{.*}}, %xmm
 // SSSE3-COUNT-4: pshufb %xmm
 // SSE2-COUNT-8:  (%rsp,%r{{[a-z0-9]+}},{{[48]}}), %xmm

@@ -1,10 +1,11 @@
-// Bytes that lanes read in different places: the words that they lie in, shifted,
+// Bytes that lanes read in different places, and that piko-pair-gathers has not
+// loaded one by one: the words that they lie in, shifted,
 // where there are gathers; loads of one byte each where there are none, or where
 // a sanitizer would tell of what lies behind a buffer.
 // REQUIRES: x86_64
-// RUN: pikoc %s --emit=assembly --cpu x86-64-v4 | FileCheck %s --check-prefix=WIDE
-// RUN: pikoc %s --emit=assembly --cpu x86-64-v3 | FileCheck %s --check-prefix=HALF
-// RUN: pikoc %s --emit=assembly --cpu x86-64-v4 --sanitize=address | FileCheck %s --check-prefix=ALONE
+// RUN: pikoc %s --emit=assembly --without=pair-gathers --cpu x86-64-v4 | FileCheck %s --check-prefix=WIDE
+// RUN: pikoc %s --emit=assembly --without=pair-gathers --cpu x86-64-v3 | FileCheck %s --check-prefix=HALF
+// RUN: pikoc %s --emit=assembly --without=pair-gathers --cpu x86-64-v4 --sanitize=address | FileCheck %s --check-prefix=ALONE
 // WIDE-COUNT-2: vpgather{{[dq]}}d {{.*}}, %{{[yz]}}mm
 // WIDE:         vpsrlvd %zmm
 // WIDE-NOT:     vpinsrb
