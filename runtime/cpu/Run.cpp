@@ -174,7 +174,7 @@ static const pikoir_input *begin(pikort_pipeline &p, Kernel &kernel) {
       beginReductions(p, kernel);
     }
     kernel.open = true;
-    kernel.cursors.reset(kernel.units, kernel.runsSerially ? 1 : p.threads);
+    kernel.cursors.reset(kernel.units, p.threads);
     cpuOf(p).activeThreads = kernel.runsSerially
                                  ? 1
                                  : static_cast<int32_t>(std::clamp<int64_t>(

@@ -137,8 +137,9 @@ public:
       if (unit.owner != unmapped)
         continue;
       int64_t weight = weigh(unit);
-      unit.owner =
-          (before + weight / 2) * p_.threads / std::max<int64_t>(all, 1);
+      unit.owner = std::min<int64_t>(
+          (before + weight / 2) * p_.threads / std::max<int64_t>(all, 1),
+          p_.threads - 1); // one without weight may be the last
       before += weight;
     }
   }
