@@ -58,6 +58,18 @@ void takeAll(pikort_pipeline *p) {
     list.push_back(last);
 }
 
+/// Of two threads, the first one begins when the other one has found no more.
+void takeLate(pikort_pipeline *p) {
+#pragma omp parallel num_threads(2)
+  {
+    if (omp_get_thread_num() == 1)
+      takeAll(p);
+#pragma omp barrier
+    if (omp_get_thread_num() == 0)
+      takeAll(p);
+  }
+}
+
 void runUnits(int32_t kind, void (*how)(pikort_pipeline *p)) {
   schedule = kind;
   share = how;
@@ -101,16 +113,7 @@ TEST(Units, HomesAreBalanced) {
 
 // Who is late finds that others have done its units.
 TEST(Units, OthersTakeOver) {
-  runUnits(PIKOIR_DIRECT_MAP, [](pikort_pipeline *p) {
-#pragma omp parallel num_threads(2)
-    {
-      if (omp_get_thread_num() == 1)
-        takeAll(p);
-#pragma omp barrier
-      if (omp_get_thread_num() == 0)
-        takeAll(p);
-    }
-  });
+  runUnits(PIKOIR_DIRECT_MAP, takeLate);
   checkOnce();
   EXPECT_TRUE(taken[0].empty());
   // Its own come first: with two threads, those of every other home.
@@ -120,16 +123,7 @@ TEST(Units, OthersTakeOver) {
 }
 
 TEST(Units, OnlyTheFirstRunsSerializedBins) {
-  runUnits(PIKOIR_SERIALIZE, [](pikort_pipeline *p) {
-#pragma omp parallel num_threads(2)
-    {
-      if (omp_get_thread_num() == 1)
-        takeAll(p);
-#pragma omp barrier
-      if (omp_get_thread_num() == 0)
-        takeAll(p);
-    }
-  });
+  runUnits(PIKOIR_SERIALIZE, takeLate);
   checkOnce();
   EXPECT_TRUE(taken[1].empty());
 }
