@@ -332,7 +332,7 @@ void Report::writeProcess(ProcessOp process) {
         << (trace.passes.contains("piko-eliminate-schedules")
                 ? ": eliminated, because "
                 : ": ")
-        << "the OpenMP loop hands bins to any core\n";
+        << "any core takes the next bins\n";
   out << "    Process " << stage.getSymName();
   if (auto tile = stage.getTile())
     out << ", by tiles with a side of " << *tile << " cells";

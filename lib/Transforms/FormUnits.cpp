@@ -40,20 +40,9 @@ static FlatSymbolRefAttr getStageName(Operation *op) {
 
 /// What a stage's schedule makes of the loop over its units.
 static UnitLoop chooseLoop(ScheduleOp schedule) {
-  if (!schedule)
-    return UnitLoop::Any;
-  if (!schedule.getResolved())
-    return UnitLoop::Queue;
-  switch (schedule.getKind()) {
-  case ScheduleKind::DirectMap:
-    return UnitLoop::Queue; // units have homes
-  case ScheduleKind::Serialize:
-    return UnitLoop::Serial;
-  case ScheduleKind::LoadBalance:
-  case ScheduleKind::All:
-    return UnitLoop::Any;
-  }
-  llvm_unreachable("a schedule has a kind");
+  bool serial = schedule && schedule.getResolved() &&
+                schedule.getKind() == ScheduleKind::Serialize;
+  return serial ? UnitLoop::Serial : UnitLoop::Shared;
 }
 
 void UnitFormer::createUnits(StageOp stage, IntegerAttr source) {
@@ -62,7 +51,7 @@ void UnitFormer::createUnits(StageOp stage, IntegerAttr source) {
   Value count = UnitCountOp::create(rewriter, loc, bins);
   auto forall = scf::ForallOp::create(
       rewriter, loc, ArrayRef<OpFoldResult>{count}, ValueRange(), std::nullopt);
-  UnitLoop kind = source ? UnitLoop::Any : chooseLoop(stage.getSchedule());
+  UnitLoop kind = source ? UnitLoop::Shared : chooseLoop(stage.getSchedule());
   forall->setAttr(marks::units, UnitLoopAttr::get(rewriter.getContext(), kind));
   CloseBinsOp::create(rewriter, loc, bins);
   unit = forall.getInductionVar(0);

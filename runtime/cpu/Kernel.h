@@ -92,13 +92,14 @@ struct ScratchStack {
   int64_t used = 0;  ///< In it.
 };
 
-/// A writer and its logs: used by one thread at a time, for many units.
-struct Lane : pikoir_writer {
+/// A writer and its logs: used by one thread at a time, for many units. No two
+/// share a line of the cache.
+struct alignas(64) Lane : pikoir_writer {
   Lane();
   ~Lane();
   pikort_pipeline *pipeline = nullptr;
   Kernel *kernel = nullptr;
-  size_t number = 0; ///< Among those of the kernel.
+  std::atomic_flag taken; ///< By a thread that has opened a unit.
   std::vector<pikoir_port> portStorage;
   std::vector<PortLogs> logs;
   int64_t emitted = 0; ///< Over all units of this run.
@@ -180,8 +181,10 @@ public:
   /// For units that belong to so many homes, or to nobody (Units.cpp).
   void reset(const std::vector<pikoir_unit> &units, int64_t homes);
   int64_t homes() const { return homes_; }
+  /// Whether no unit has an owner.
+  bool areNobodys() const { return nobodys_; }
   /// The next unit of an owner, or -1 at the end.
-  int64_t take(const std::vector<pikoir_unit> &units, int64_t owner);
+  int64_t take(const pikoir_unit *units, int64_t owner);
 
 private:
   struct alignas(64) Cursor { // on a line of its own
@@ -192,6 +195,7 @@ private:
 
   std::unique_ptr<Cursor[]> cursors_;
   int64_t homes_ = 0, room_ = 0;
+  bool nobodys_ = true;
 };
 
 class Serial;         // Serial.h
@@ -230,9 +234,8 @@ struct Kernel {
   int32_t pendingOutputs = 0;
   bool open = false;
 
-  std::mutex laneMutex;
   std::vector<std::unique_ptr<Lane>> lanes;
-  std::vector<Lane *> freeLanes;
+  size_t activeLanes = 0; ///< The first ones, which threads of this run take.
   /// Of each reduction of the stage; they stay from run to run.
   std::vector<std::unique_ptr<PrivateCopies>> copies;
 

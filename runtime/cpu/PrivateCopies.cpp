@@ -76,7 +76,7 @@ void piko::rt::beginReductions(pikort_pipeline &p, Kernel &kernel) {
   const std::vector<Reduction> &reductions = p.stages[kernel.stage].reductions;
   if (reductions.empty())
     return;
-  size_t lanes = kernel.runsSerially ? 1 : kernel.freeLanes.size();
+  size_t lanes = kernel.runsSerially ? 1 : kernel.activeLanes;
   while (kernel.copies.size() < reductions.size())
     kernel.copies.push_back(std::make_unique<PrivateCopies>());
   for (size_t i = 0; i < lanes; ++i) {
@@ -136,7 +136,7 @@ void piko::rt::endReductions(pikort_pipeline &p, Kernel &kernel) {
   if (kernel.source >= 0 || reductions.empty())
     return;
   std::vector<const Lane *> lanes;
-  for (size_t i = 1; i < kernel.freeLanes.size(); ++i)
+  for (size_t i = 1; i < kernel.activeLanes; ++i)
     if (kernel.lanes[i]->reduces)
       lanes.push_back(kernel.lanes[i].get());
   for (size_t r = 0; r < reductions.size() && !lanes.empty(); ++r) {

@@ -53,7 +53,8 @@ static void publish(pikort_pipeline &p, Kernel &kernel) {
                   kernel.source >= 0 ? 1 : stage.tiles,
                   kernel.calls.data(),
                   kernel.calls.size(),
-                  /*clears=*/0};
+                  /*clears=*/0,
+                  /*cursors=*/nullptr};
   shareUnits(p, kernel);
 }
 
@@ -175,6 +176,7 @@ static const pikoir_input *begin(pikort_pipeline &p, Kernel &kernel) {
     }
     kernel.open = true;
     kernel.cursors.reset(kernel.units, p.threads);
+    kernel.input.cursors = &kernel.cursors;
     cpuOf(p).activeThreads = kernel.runsSerially
                                  ? 1
                                  : static_cast<int32_t>(std::clamp<int64_t>(

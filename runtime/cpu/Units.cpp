@@ -225,6 +225,7 @@ void UnitCursors::reset(const std::vector<pikoir_unit> &units, int64_t homes) {
     room_ = homes;
   }
   homes_ = homes;
+  nobodys_ = true;
   for (int64_t owner = firstCore; owner < homes; ++owner) {
     of(owner).next.store(0, std::memory_order_relaxed);
     of(owner).end = 0;
@@ -233,11 +234,11 @@ void UnitCursors::reset(const std::vector<pikoir_unit> &units, int64_t homes) {
     Cursor &cursor = of(units[unit].owner);
     cursor.next.store(unit, std::memory_order_relaxed);
     cursor.end = std::max(cursor.end, static_cast<int64_t>(unit + 1));
+    nobodys_ = nobodys_ && units[unit].owner == nobody;
   }
 }
 
-int64_t UnitCursors::take(const std::vector<pikoir_unit> &units,
-                          int64_t owner) {
+int64_t UnitCursors::take(const pikoir_unit *units, int64_t owner) {
   Cursor &cursor = of(owner);
   while (cursor.next.load(std::memory_order_relaxed) < cursor.end) {
     int64_t unit = cursor.next.fetch_add(1, std::memory_order_relaxed);
@@ -247,12 +248,15 @@ int64_t UnitCursors::take(const std::vector<pikoir_unit> &units,
   return -1;
 }
 
-int64_t pikoir_next_unit(pikort_pipeline *p, int32_t stage, int64_t) {
-  Kernel &kernel = kernelOf(*p, stage);
-  UnitCursors &cursors = kernel.cursors;
+int64_t pikoir_next_unit(const pikoir_input *input) {
+  if (!input->cursors)
+    return -1; // there is nothing to do after an error
+  UnitCursors &cursors = *static_cast<UnitCursors *>(input->cursors);
+  if (cursors.areNobodys())
+    return cursors.take(input->units, nobody);
   int64_t thread = pikoir_thread(), team = pikoir_team(), unit = -1;
   auto take = [&](int64_t owner) {
-    unit = cursors.take(kernel.units, owner);
+    unit = cursors.take(input->units, owner);
     return unit >= 0;
   };
   if (thread == 0 && take(firstCore))

@@ -268,18 +268,12 @@ void pikoir_next(pikoir_writer *writer) {
 /// the thread's cache.
 static Lane *takeLane(Kernel &kernel) {
   auto thread = static_cast<size_t>(pikoir_thread());
-  std::lock_guard<std::mutex> lock(kernel.laneMutex);
-  std::vector<Lane *> &lanes = kernel.freeLanes;
-  if (lanes.empty())
-    return nullptr;
-  auto own = std::find_if(lanes.begin(), lanes.end(), [&](const Lane *lane) {
-    return lane->number == thread;
-  });
-  if (own != lanes.end())
-    std::swap(*own, lanes.back());
-  Lane *lane = lanes.back();
-  lanes.pop_back();
-  return lane;
+  for (size_t i = 0; i < kernel.activeLanes; ++i) {
+    Lane &lane = *kernel.lanes[(thread + i) % kernel.activeLanes];
+    if (!lane.taken.test_and_set(std::memory_order_acquire))
+      return &lane;
+  }
+  return nullptr;
 }
 
 static pikoir_writer *openUnit(Kernel &kernel, int64_t unit) {
@@ -379,8 +373,7 @@ void pikoir_close(pikoir_writer *writer) {
   lane->busy += closed - lane->opened;
   if (lane->pipeline->unitReport) [[unlikely]]
     reportUnit(*lane, closed);
-  std::lock_guard<std::mutex> lock(lane->kernel->laneMutex);
-  lane->kernel->freeLanes.push_back(lane); // has room for all lanes
+  lane->taken.clear(std::memory_order_release);
 }
 
 // --- Lanes ------------------------------------------------------------------
@@ -391,7 +384,6 @@ static std::unique_ptr<Lane> makeLane(pikort_pipeline &p, Kernel &kernel) {
   size_t ports = ofSource ? 1 : p.stages[kernel.stage].outputs.size();
   lane->pipeline = &p;
   lane->kernel = &kernel;
-  lane->number = kernel.lanes.size();
   lane->stage = kernel.stage;
   lane->portStorage.resize(ports);
   lane->logs.resize(ports);
@@ -469,19 +461,18 @@ Lane &piko::rt::prepareSerialLane(pikort_pipeline &p, Kernel &kernel) {
 }
 
 void piko::rt::prepareLanes(pikort_pipeline &p, Kernel &kernel) {
-  size_t needed = std::min(static_cast<size_t>(p.threads), kernel.units.size());
-  while (kernel.lanes.size() < needed)
+  kernel.activeLanes =
+      std::min(static_cast<size_t>(p.threads), kernel.units.size());
+  while (kernel.lanes.size() < kernel.activeLanes)
     kernel.lanes.push_back(makeLane(p, kernel));
-  kernel.freeLanes.clear();
-  kernel.freeLanes.reserve(needed);
-  for (size_t i = 0; i < needed; ++i) {
+  for (size_t i = 0; i < kernel.activeLanes; ++i) {
     auto &lane = kernel.lanes[i];
+    lane->taken.clear();
     lane->flags = 0;
     for (size_t port = 0; port < lane->logs.size(); ++port) {
       preparePort(p, kernel, *lane, port, needsOrdinals(p, kernel, port));
       // pikoir_next has nothing to do for local edges.
       lane->flags |= lane->ports[port].flags & ~PIKOIR_PORT_LOCAL;
     }
-    kernel.freeLanes.push_back(lane.get());
   }
 }

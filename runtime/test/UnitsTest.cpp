@@ -15,7 +15,7 @@ constexpr int64_t bins = 64, threads = 4;
 int32_t schedule;                    // of all bins
 std::vector<pikoir_unit> units;      // of the latest run
 std::vector<int64_t> taken[threads]; // units, by thread
-void (*share)(pikort_pipeline *p) = nullptr;
+void (*share)(const pikoir_input *input) = nullptr;
 
 /// More in the first bins than in all others.
 int64_t binOf(int64_t item) {
@@ -47,30 +47,29 @@ int32_t run(pikort_pipeline *p) {
   units.assign(in->units, in->units + in->unit_count);
   for (std::vector<int64_t> &list : taken)
     list.clear();
-  share(p);
+  share(in);
   return pikoir_end(p, 0);
 }
 
-void takeAll(pikort_pipeline *p) {
+void takeAll(const pikoir_input *input) {
   std::vector<int64_t> &list = taken[omp_get_thread_num()];
-  int64_t last = -1;
-  while ((last = pikoir_next_unit(p, 0, last)) >= 0)
-    list.push_back(last);
+  for (int64_t u; (u = pikoir_next_unit(input)) >= 0;)
+    list.push_back(u);
 }
 
 /// Of two threads, the first one begins when the other one has found no more.
-void takeLate(pikort_pipeline *p) {
+void takeLate(const pikoir_input *input) {
 #pragma omp parallel num_threads(2)
   {
     if (omp_get_thread_num() == 1)
-      takeAll(p);
+      takeAll(input);
 #pragma omp barrier
     if (omp_get_thread_num() == 0)
-      takeAll(p);
+      takeAll(input);
   }
 }
 
-void runUnits(int32_t kind, void (*how)(pikort_pipeline *p)) {
+void runUnits(int32_t kind, void (*how)(const pikoir_input *input)) {
   schedule = kind;
   share = how;
   static const pikort_program program{PIKORT_ABI_VERSION, "Units", setup, run};
@@ -130,9 +129,9 @@ TEST(Units, OnlyTheFirstRunsSerializedBins) {
 
 TEST(Units, AllThreadsAtOnce) {
   for (int32_t kind : {PIKOIR_LOAD_BALANCE, PIKOIR_DIRECT_MAP, PIKOIR_ALL}) {
-    runUnits(kind, [](pikort_pipeline *p) {
+    runUnits(kind, [](const pikoir_input *input) {
 #pragma omp parallel num_threads(threads)
-      takeAll(p);
+      takeAll(input);
     });
     checkOnce();
   }

@@ -5,7 +5,7 @@
 // RUN: pikoc %s --explain --without eliminate-schedules,fuse-kernels | FileCheck %s --check-prefix=WITHOUT
 
 // WITHOUT: waits until nothing can reach the bin: a kernel break, because piko-fuse-kernels did not run
-// WITHOUT: Schedule repeat: the OpenMP loop hands bins to any core
+// WITHOUT: Schedule repeat: any core takes the next bins
 
 #include <piko.h>
 
@@ -124,7 +124,7 @@ struct All : piko::Pipe<State> {
 // CHECK-NEXT: Process first
 // CHECK-NEXT: AssignBin repeat: there is one bin
 // CHECK-NEXT: {{^  }}kernel_repeat, again until its cycle is empty
-// CHECK-NEXT: Schedule repeat: eliminated, because the OpenMP loop hands bins to any core
+// CHECK-NEXT: Schedule repeat: eliminated, because any core takes the next bins
 // CHECK-NEXT: Process repeat
 // CHECK-NEXT: AssignBin gather{{$}}
 // CHECK-NEXT: AssignBin repeat: there is one bin

@@ -28,7 +28,7 @@ piko.record @F {"x" : i32 at 0, "y" : i32 at 4} size 8 align 4
 // CHECK:                 piko.storage.next %[[W]]
 // CHECK:               } {piko.lanes}
 // CHECK:             piko.cpu.close_writer %[[W]]
-// CHECK:           {piko.units = #piko<units any>}
+// CHECK:           {piko.units = #piko<units shared>}
 // CHECK:           piko.storage.close_bins %[[BINS]]
 // CHECK:         piko.kernel @kernel_b
 // CHECK:           %[[BIN:.*]] = piko.storage.cell_bin

@@ -62,7 +62,7 @@ piko.pipeline @Varying rank 1 {
         piko.yield
       }
       piko.cpu.close_writer %w
-    } {piko.units = #piko<units any>}
+    } {piko.units = #piko<units shared>}
     piko.storage.close_bins %bins : !piko.bins<@F>
   }
 }
@@ -103,7 +103,7 @@ piko.pipeline @Cheap rank 1 {
         piko.yield
       }
       piko.cpu.close_writer %w
-    } {piko.units = #piko<units any>}
+    } {piko.units = #piko<units shared>}
     piko.storage.close_bins %bins : !piko.bins<@F>
   }
 }
@@ -161,7 +161,7 @@ piko.pipeline @Scan rank 1 {
         piko.yield
       }
       piko.cpu.close_writer %w
-    } {piko.units = #piko<units any>}
+    } {piko.units = #piko<units shared>}
     piko.storage.close_bins %bins : !piko.bins<@F>
   }
 }

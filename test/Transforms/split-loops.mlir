@@ -31,7 +31,7 @@ piko.pipeline @Plain rank 1 {
         piko.yield
       }
       piko.cpu.close_writer %w
-    } {piko.units = #piko<units any>}
+    } {piko.units = #piko<units shared>}
     piko.storage.close_bins %bins : !piko.bins<@F>
   }
 }
@@ -95,7 +95,7 @@ piko.pipeline @Across rank 1 {
         piko.yield
       }
       piko.cpu.close_writer %w
-    } {piko.units = #piko<units any>}
+    } {piko.units = #piko<units shared>}
     piko.storage.close_bins %bins : !piko.bins<@F>
   }
 }
@@ -147,7 +147,7 @@ piko.pipeline @Uniform rank 1 {
         piko.yield
       }
       piko.cpu.close_writer %w
-    } {piko.units = #piko<units any>}
+    } {piko.units = #piko<units shared>}
     piko.storage.close_bins %bins : !piko.bins<@F>
   }
 }

@@ -31,7 +31,7 @@ piko.pipeline @Rows rank 2 {
         piko.yield
       }
       piko.cpu.close_writer %w
-    } {piko.units = #piko<units any>}
+    } {piko.units = #piko<units shared>}
     piko.storage.close_bins %bins : !piko.bins<@F>
   }
 }
@@ -69,7 +69,7 @@ piko.pipeline @Meeting rank 2 {
         piko.yield
       }
       piko.cpu.close_writer %w
-    } {piko.units = #piko<units any>}
+    } {piko.units = #piko<units shared>}
     piko.storage.close_bins %bins : !piko.bins<@F>
   }
 }

@@ -74,7 +74,7 @@ piko.pipeline @Insert rank 1 {
         %middle = memref.load %array[%c2] : memref<4xf32>
         piko.store %middle, checked @out[%x : index] "z" : f32
       } {piko.lanes}
-    } {piko.units = #piko<units any>}
+    } {piko.units = #piko<units shared>}
     piko.storage.close_bins %bins : !piko.bins<@V>
   }
 }

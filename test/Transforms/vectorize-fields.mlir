@@ -73,7 +73,7 @@ piko.pipeline @P rank 1 {
         %5 = arith.mulf %4, %f : f32
         piko.store %5, checked @out[%i : index] "x" : f32
       } {piko.lanes}
-    } {piko.units = #piko<units any>}
+    } {piko.units = #piko<units shared>}
     piko.storage.close_bins %bins : !piko.bins<@Id>
   }
 }

@@ -41,7 +41,7 @@ piko.pipeline @InOrder rank 1 {
         %next = arith.addi %i, %one : i64
         scf.yield %next : i64
       }
-    } {piko.units = #piko<units any>}
+    } {piko.units = #piko<units shared>}
     piko.storage.close_bins %bins : !piko.bins<@V>
   }
 }
@@ -80,7 +80,7 @@ piko.pipeline @Refused rank 1 {
         piko.store %w, checked @out[%x : index] "z" : f32
         piko.store %r, checked @out[%next : index] "z" : f32
       }
-    } {piko.units = #piko<units any>}
+    } {piko.units = #piko<units shared>}
     piko.storage.close_bins %bins : !piko.bins<@V>
   }
 }
@@ -132,7 +132,7 @@ piko.pipeline @Compacted rank 1 {
           piko.store %sum, checked @out[%x : index] "z" : f32
         }
       }
-    } {piko.units = #piko<units any>}
+    } {piko.units = #piko<units shared>}
     piko.storage.close_bins %bins : !piko.bins<@V>
   }
 }

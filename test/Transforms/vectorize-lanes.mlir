@@ -34,7 +34,7 @@ piko.pipeline @Row rank 2 {
         %4 = arith.divf %3, %1 : f32
         piko.store %4, checked @depth[%x, %c1 : index, index] "z" : f32
       } {piko.lanes}
-    } {piko.units = #piko<units any>}
+    } {piko.units = #piko<units shared>}
     piko.storage.close_bins %bins : !piko.bins<@F>
   }
 }

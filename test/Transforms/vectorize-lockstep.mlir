@@ -73,7 +73,7 @@ piko.pipeline @Votes rank 1 {
         piko.yield
       }
       piko.cpu.close_writer %w
-    } {piko.units = #piko<units any>}
+    } {piko.units = #piko<units shared>}
     piko.storage.close_bins %bins : !piko.bins<@F>
   }
 }
@@ -124,7 +124,7 @@ piko.pipeline @Tree rank 1 {
         piko.yield
       }
       piko.cpu.close_writer %w
-    } {piko.units = #piko<units any>}
+    } {piko.units = #piko<units shared>}
     piko.storage.close_bins %bins : !piko.bins<@F>
   }
 }
@@ -171,7 +171,7 @@ piko.pipeline @Emits rank 1 {
         piko.yield
       }
       piko.cpu.close_writer %w
-    } {piko.units = #piko<units any>}
+    } {piko.units = #piko<units shared>}
     piko.storage.close_bins %bins : !piko.bins<@F>
   }
 }
@@ -219,7 +219,7 @@ piko.pipeline @Parts rank 1 {
         piko.yield
       }
       piko.cpu.close_writer %w
-    } {piko.units = #piko<units any>}
+    } {piko.units = #piko<units shared>}
     piko.storage.close_bins %bins : !piko.bins<@F>
   }
 }

@@ -52,7 +52,7 @@ piko.pipeline @Limited rank 1 {
         %next = arith.addi %i, %one : i32
         scf.yield %next : i32
       }
-    } {piko.units = #piko<units any>}
+    } {piko.units = #piko<units shared>}
     piko.storage.close_bins %bins : !piko.bins<@V>
   }
 }

@@ -49,7 +49,7 @@ piko.pipeline @P rank 2 {
           }
         }
       } {piko.lanes}
-    } {piko.units = #piko<units any>}
+    } {piko.units = #piko<units shared>}
     piko.storage.close_bins %bins : !piko.bins<@V>
   }
 
@@ -93,7 +93,7 @@ piko.pipeline @P rank 2 {
           }
         }
       } {piko.lanes}
-    } {piko.units = #piko<units any>}
+    } {piko.units = #piko<units shared>}
     piko.storage.close_bins %bins : !piko.bins<@V>
   }
 }

@@ -52,7 +52,7 @@ piko.pipeline @Row rank 2 {
           piko.store %6, checked @depth[%x, %c3 : index, index] "z" : f32
         }
       } {piko.lanes}
-    } {piko.units = #piko<units any>}
+    } {piko.units = #piko<units shared>}
     piko.storage.close_bins %bins : !piko.bins<@F>
   }
 }
@@ -106,7 +106,7 @@ piko.pipeline @Loop rank 1 {
         %sum = arith.addf %kept, %end : f32
         piko.store %sum, checked @out[%x : index] "z" : f32
       } {piko.lanes}
-    } {piko.units = #piko<units any>}
+    } {piko.units = #piko<units shared>}
     piko.storage.close_bins %bins : !piko.bins<@F>
   }
 }
@@ -154,7 +154,7 @@ piko.pipeline @Emits rank 1 {
         %q = piko.storage.append %w[0] (%9) : f32 -> !piko.prim<@F>
       } {piko.lanes}
       piko.cpu.close_writer %w
-    } {piko.units = #piko<units any>}
+    } {piko.units = #piko<units shared>}
     piko.storage.close_bins %bins : !piko.bins<@F>
   }
 }
@@ -214,7 +214,7 @@ piko.pipeline @Stays rank 1 {
         %v = memref.load %view[%x] : memref<16xf32>
         piko.store %v, checked @out[%x : index] "z" : f32
       } {piko.lanes}
-    } {piko.units = #piko<units any>}
+    } {piko.units = #piko<units shared>}
     piko.storage.close_bins %bins : !piko.bins<@F>
   }
 }

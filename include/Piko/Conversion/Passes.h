@@ -19,7 +19,7 @@ namespace piko {
 /// Updates and other access to state, behind tests, as `scf.if`s.
 void populatePikoToSCFPatterns(mlir::RewritePatternSet &patterns);
 
-/// The `scf.forall` of a kernel, as an OpenMP loop.
+/// The `scf.forall` of a kernel, over OpenMP threads.
 void populatePikoToOpenMPPatterns(mlir::RewritePatternSet &patterns);
 
 #define GEN_PASS_DECL

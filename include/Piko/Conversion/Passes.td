@@ -57,22 +57,27 @@ def ConvertPikoToOpenMP : Pass<"convert-piko-to-openmp", "::piko::PipelineOp"> {
     **Requires** loops over units (`piko-form-units`).
 
     **Does**: turns the `scf.forall` of each kernel into an `omp.parallel` with
-    the host's thread count. In it is, by the `piko.units` of the loop, an
-    `omp.wsloop` with a dynamic schedule (`any`), or a loop that asks the runtime
-    for the next unit (`queue`). `serial` becomes a plain loop. Private arrays move to the
-    front of the thread's region, so that they take stack space once and not for
-    each primitive.
+    the host's thread count, in which each thread asks the runtime for one unit after
+    the other; or, where its `piko.units` is `serial`, into a plain loop. Private
+    arrays move to the front of the thread's region, so that they take stack space
+    once and not for each primitive.
 
     Before:
     ```
-    scf.forall (%u) in (%units) { ... } {piko.units = #piko<units any>}
+    scf.forall (%u) in (%units) { ... } {piko.units = #piko<units shared>}
     ```
     After:
     ```
     %threads = piko.cpu.threads
     omp.parallel num_threads(%threads : i32) {
-      omp.wsloop schedule(dynamic) {
-        omp.loop_nest (%u) : index = (%zero) to (%units) step (%one) { ... }
+      scf.while : () -> index {
+        %next = piko.cpu.next_unit %bins : !piko.bins<@Fragment>
+        %any = arith.cmpi ult, %next, %units : index
+        scf.condition(%any) %next : index
+      } do {
+      ^bb0(%u: index):
+        ...
+        scf.yield
       }
     }
     ```

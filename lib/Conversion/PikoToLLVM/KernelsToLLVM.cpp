@@ -133,14 +133,10 @@ struct NextUnitLowering : Lowering<NextUnitOp> {
   matchAndRewrite(NextUnitOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
     Location loc = op.getLoc();
-    auto number =
-        op->getParentOfType<func::FuncOp>()->getAttrOfType<IntegerAttr>(
-            marks::number);
     Value next =
         context
             .call(rewriter, loc, PIKO_RUNTIME_FUNCTION(pikoir_next_unit),
-                  {context.frame(op), createI32(rewriter, loc, number.getInt()),
-                   toI64(rewriter, loc, adaptor.getLast())})
+                  {adaptor.getBins()})
             .getResult();
     rewriter.replaceOp(op, toIndex(rewriter, loc, next));
     return success();

@@ -24,21 +24,12 @@ struct UnitBody {
 } // namespace
 
 static UnitBody findUnitBody(omp::ParallelOp parallel) {
-  for (Operation &op : parallel.getRegion().front()) {
-    if (auto any = dyn_cast<omp::WsloopOp>(op)) {
-      auto nest = cast<omp::LoopNestOp>(any.getWrappedLoop());
-      Block &body = nest.getRegion().front();
-      return {&op, &body, body.getArgument(0),
-              nest.getLoopUpperBounds().front()};
-    }
-    if (auto queue = dyn_cast<scf::WhileOp>(op)) {
-      Block *body = queue.getAfterBody();
-      auto goesOn =
-          queue.getConditionOp().getCondition().getDefiningOp<arith::CmpIOp>();
-      return {&op, body, body->getArgument(0), goesOn.getRhs()};
-    }
-  }
-  llvm_unreachable("a parallel region has a loop over units");
+  scf::WhileOp loop =
+      *parallel.getRegion().front().getOps<scf::WhileOp>().begin();
+  Block *body = loop.getAfterBody();
+  auto goesOn =
+      loop.getConditionOp().getCondition().getDefiningOp<arith::CmpIOp>();
+  return {loop, body, body->getArgument(0), goesOn.getRhs()};
 }
 
 /// Splits what a loop's body takes from around the threads into what can be

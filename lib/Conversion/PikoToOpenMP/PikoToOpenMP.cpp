@@ -64,10 +64,7 @@ public:
     rewriter.createBlock(&parallel.getRegion());
     rewriter.setInsertionPoint(omp::TerminatorOp::create(rewriter, loc));
     hoistPrivateArrays(forall, rewriter);
-    if (kind == UnitLoop::Any)
-      shareAny();
-    else
-      shareQueue();
+    share();
   }
 
 private:
@@ -77,43 +74,26 @@ private:
 
   /// Moves the body in front of the terminator of `to`, whose argument is the
   /// unit.
-  void moveBody(Block *to) { moveBody(to, to->getArgument(0)); }
-  void moveBody(Block *to, Value unit) {
+  void moveBody(Block *to) {
     rewriter.eraseOp(forall.getTerminator());
     rewriter.inlineBlockBefore(forall.getBody(), to,
-                               to->getTerminator()->getIterator(), unit);
+                               to->getTerminator()->getIterator(),
+                               to->getArgument(0));
   }
 
-  void shareAny() {
-    omp::WsloopOperands clauses;
-    clauses.scheduleKind = omp::ClauseScheduleKindAttr::get(
-        rewriter.getContext(), omp::ClauseScheduleKind::Dynamic);
-    auto wsloop = omp::WsloopOp::create(rewriter, loc, clauses);
-    rewriter.createBlock(&wsloop.getRegion());
-    omp::LoopNestOperands bounds;
-    bounds.loopLowerBounds.push_back(zero);
-    bounds.loopUpperBounds.push_back(count);
-    bounds.loopSteps.push_back(one);
-    auto nest = omp::LoopNestOp::create(rewriter, loc, bounds);
-    Block *body = rewriter.createBlock(&nest.getRegion(), {},
-                                       rewriter.getIndexType(), loc);
-    omp::YieldOp::create(rewriter, loc, ValueRange());
-    moveBody(body);
-  }
-
-  void shareQueue() {
-    Value before = arith::ConstantIndexOp::create(rewriter, loc, -1);
-    Type index = rewriter.getIndexType();
-    auto loop = scf::WhileOp::create(rewriter, loc, TypeRange(index),
-                                     ValueRange(before));
-    Block *ask = rewriter.createBlock(&loop.getBefore(), {}, index, loc);
-    Value next = NextUnitOp::create(rewriter, loc, bins, ask->getArgument(0));
+  /// Each thread asks the runtime for one unit after the other.
+  void share() {
+    auto loop = scf::WhileOp::create(rewriter, loc,
+                                     TypeRange(rewriter.getIndexType()), {});
+    rewriter.createBlock(&loop.getBefore());
+    Value next = NextUnitOp::create(rewriter, loc, bins);
     // It is -1 at the end.
     Value any = arith::CmpIOp::create(rewriter, loc, arith::CmpIPredicate::ult,
                                       next, count);
     scf::ConditionOp::create(rewriter, loc, any, next);
-    Block *run = rewriter.createBlock(&loop.getAfter(), {}, index, loc);
-    scf::YieldOp::create(rewriter, loc, run->getArgument(0));
+    Block *run = rewriter.createBlock(&loop.getAfter(), {},
+                                      rewriter.getIndexType(), loc);
+    scf::YieldOp::create(rewriter, loc);
     moveBody(run);
   }
 

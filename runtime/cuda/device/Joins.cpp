@@ -228,7 +228,8 @@ private:
                     bins.order,       bins.offsets,
                     cutter.units,     cutter.unitCount,
                     args_.tiles,      cutter.calls,
-                    cutter.callCount, args_.clearCount > 0 && kernel.runs == 0};
+                    cutter.callCount, args_.clearCount > 0 && kernel.runs == 0,
+                    nullptr};
     kernel.log = args_.frame->log;
     kernel.log.cursor = kernel.logBegin = grid_.top();
     kernel.log.units = units;

@@ -272,6 +272,7 @@ typedef struct pikoir_input {
   const pikoir_call *calls;
   int64_t call_count;
   int64_t clears; ///< Tiles begin with their clear value: 0 or 1.
+  void *cursors;  ///< The runtime's: which units threads have taken.
 } pikoir_input;
 
 /// One port of a writer. The fields up to `cells` are the fast path's: see the
@@ -324,11 +325,10 @@ typedef struct pikoir_writer {
 PIKORT_API const pikoir_input *pikoir_begin(pikort_pipeline *p, int32_t stage);
 PIKORT_API pikoir_writer *pikoir_open(pikort_pipeline *p, int32_t stage,
                                       int64_t unit);
-/// The unit that the calling thread should run after `last`, which is -1 at the
-/// start: first its own, in order, then the next of those that are nobody's,
-/// then those of others that they have not begun; -1 if there is none.
-PIKORT_API int64_t pikoir_next_unit(pikort_pipeline *p, int32_t stage,
-                                    int64_t last);
+/// The unit that the calling thread should run next: first its own, in order,
+/// then the next of those that are nobody's, then those of others that they
+/// have not begun; -1 if there is none.
+PIKORT_API int64_t pikoir_next_unit(const pikoir_input *input);
 /// Room for the next record of a port, never null. The caller writes all
 /// leaves; padding is zero. A record that is placed in no cell is dropped: its
 /// room is the next record's.
@@ -638,7 +638,7 @@ PIKOIR_ASSERT_SIZE(pikoir_call, 24);
 PIKOIR_ASSERT_OFFSET(pikoir_call, bin, 0);
 PIKOIR_ASSERT_OFFSET(pikoir_call, begin, 8);
 PIKOIR_ASSERT_OFFSET(pikoir_call, end, 16);
-PIKOIR_ASSERT_SIZE(pikoir_input, 80);
+PIKOIR_ASSERT_SIZE(pikoir_input, 88);
 PIKOIR_ASSERT_OFFSET(pikoir_input, items, 0);
 PIKOIR_ASSERT_OFFSET(pikoir_input, count, 8);
 PIKOIR_ASSERT_OFFSET(pikoir_input, order, 16);
@@ -649,6 +649,7 @@ PIKOIR_ASSERT_OFFSET(pikoir_input, tiles, 48);
 PIKOIR_ASSERT_OFFSET(pikoir_input, calls, 56);
 PIKOIR_ASSERT_OFFSET(pikoir_input, call_count, 64);
 PIKOIR_ASSERT_OFFSET(pikoir_input, clears, 72);
+PIKOIR_ASSERT_OFFSET(pikoir_input, cursors, 80);
 PIKOIR_ASSERT_SIZE(pikoir_port, 120);
 PIKOIR_ASSERT_OFFSET(pikoir_port, cursor, 0);
 PIKOIR_ASSERT_OFFSET(pikoir_port, limit, 8);

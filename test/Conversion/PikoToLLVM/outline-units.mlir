@@ -20,17 +20,18 @@ piko.record @F {"v" : f32 at 0} size 4 align 4
 // CHECK:         %[[SEVERAL:.*]] = arith.cmpi sgt, %[[THREADS]], %c1_i32
 // CHECK:         scf.if %[[SEVERAL]] {
 // CHECK-NEXT:      omp.parallel num_threads(%[[THREADS]] : i32) {
-// CHECK-NEXT:        omp.wsloop schedule(dynamic) {
-// CHECK-NEXT:          omp.loop_nest (%[[I:.*]]) : index
-// CHECK-NEXT:            func.call @P.kernel_a.unit({{.*}}, %[[I]])
+// CHECK-NEXT:        scf.while
+// CHECK-NEXT:          llvm.call @pikoir_next_unit
+// CHECK:             ^bb0(%[[I:.*]]: index):
+// CHECK-NEXT:          func.call @P.kernel_a.unit({{.*}}, %[[I]])
 // CHECK:         } else {
 // CHECK-NEXT:      scf.for %[[I:.*]] = %c0 to %{{.*}} step %c1 {
 // CHECK-NEXT:        func.call @P.kernel_a.unit({{.*}}, %[[I]])
 
 // Outside of cycles a kernel is as it was.
 // CHECK-LABEL: func.func private @P.kernel_b(
-// CHECK:         omp.loop_nest
-// CHECK-NEXT:      arith.index_cast
+// CHECK:         omp.parallel
+// CHECK:           llvm.call @pikoir_next_unit
 // CHECK:           llvm.call @pikoir_open
 // CHECK-NOT:   @P.kernel_b.unit
 piko.pipeline @P rank 1 {
@@ -51,7 +52,7 @@ piko.pipeline @P rank 1 {
       %v = memref.load %array[%units] : memref<4xf32>
       piko.atomic add_float checked @sums[%u : index] "v", %v : f32
       piko.cpu.close_writer %w
-    } {piko.units = #piko<units any>}
+    } {piko.units = #piko<units shared>}
     piko.storage.close_bins %bins : !piko.bins<@F>
   }
   piko.kernel @kernel_b {
@@ -60,7 +61,7 @@ piko.pipeline @P rank 1 {
     scf.forall (%u) in (%units) {
       %w = piko.cpu.open_writer %bins[%u] : !piko.bins<@F>
       piko.cpu.close_writer %w
-    } {piko.units = #piko<units any>}
+    } {piko.units = #piko<units shared>}
     piko.storage.close_bins %bins : !piko.bins<@F>
   }
 }

@@ -49,7 +49,7 @@ piko.pipeline @P rank 1 {
       piko.cpu.scatter %2, @out[%5 : vector<16xindex>] "b" mask %6 : vector<16xi1>, vector<16xf64>
       piko.cpu.scatter %3, @out[%5 : vector<16xindex>] "c" mask %6 : vector<16xi1>, vector<16xi8>
       piko.cpu.scatter %4, @out[%5 : vector<16xindex>] "d" mask %6 : vector<16xi1>, vector<16xi16>
-    } {piko.units = #piko<units any>}
+    } {piko.units = #piko<units shared>}
     piko.storage.close_bins %bins : !piko.bins<@V>
   }
 }

@@ -73,7 +73,7 @@ piko.pipeline @P rank 1 {
       piko.atomic min_signed checked @n[%u : index] "least", %v in %least : i64
       piko.atomic and checked @n[%u : index] "bits"[%one], %x in %bits : i32
       piko.cpu.close_writer %w
-    } {piko.units = #piko<units any>}
+    } {piko.units = #piko<units shared>}
     piko.storage.close_bins %bins : !piko.bins<@F>
   }
 }

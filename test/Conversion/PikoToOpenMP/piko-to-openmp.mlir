@@ -5,39 +5,35 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 // Without a schedule any thread takes the next unit; private arrays take stack
 // space once a thread.
 // CHECK-LABEL: piko.kernel @kernel_balanced
+// CHECK:         %[[COUNT:.*]] = piko.storage.unit_count %[[BINS:.*]] :
 // CHECK:         %[[THREADS:.*]] = piko.cpu.threads
 // CHECK:         omp.parallel num_threads(%[[THREADS]] : i32) {
 // CHECK-NEXT:      %[[ARRAY:.*]] = memref.alloca() : memref<4xi32>
-// CHECK-NEXT:      omp.wsloop schedule(dynamic) {
-// CHECK-NEXT:        omp.loop_nest (%[[UNIT:.*]]) : index =
-// CHECK:               piko.cpu.open_writer %{{.*}}[%[[UNIT]]]
-// CHECK:               memref.store %{{.*}}, %[[ARRAY]]
-// CHECK:               omp.yield
+// CHECK-NEXT:      scf.while
+// CHECK-NEXT:        %[[NEXT:.*]] = piko.cpu.next_unit %[[BINS]] :
+// CHECK-NEXT:        %[[ANY:.*]] = arith.cmpi ult, %[[NEXT]], %[[COUNT]]
+// CHECK-NEXT:        scf.condition(%[[ANY]]) %[[NEXT]]
+// CHECK:           ^bb0(%[[UNIT:.*]]: index):
+// CHECK-NEXT:        piko.cpu.open_writer %{{.*}}[%[[UNIT]]]
+// CHECK:             memref.store %{{.*}}, %[[ARRAY]]
+// CHECK:             scf.yield
 // CHECK:         piko.storage.close_bins
 
 // The runtime knows which units have their home with a thread.
 // CHECK-LABEL: piko.kernel @kernel_mapped
-// CHECK:         %[[BINS:.*]] = piko.storage.open_bins
 // CHECK:         omp.parallel
 // CHECK:           scf.while
-// CHECK-NEXT:        piko.cpu.next_unit %[[BINS]] after
+// CHECK-NEXT:        piko.cpu.next_unit
 
 // CHECK-LABEL: piko.kernel @kernel_serial
 // CHECK-NOT:     omp.
 // CHECK:         scf.for
 
-// What no pass has resolved the runtime hands out.
+// What no pass has resolved it hands out as well.
 // CHECK-LABEL: piko.kernel @kernel_queued
-// CHECK-DAG:     %[[COUNT:.*]] = piko.storage.unit_count %[[BINS:.*]] :
-// CHECK-DAG:     %[[START:.*]] = arith.constant -1 : index
 // CHECK:         omp.parallel
-// CHECK:           scf.while (%[[LAST:.*]] = %[[START]])
-// CHECK-NEXT:        %[[NEXT:.*]] = piko.cpu.next_unit %[[BINS]] after %[[LAST]]
-// CHECK-NEXT:        %[[ANY:.*]] = arith.cmpi ult, %[[NEXT]], %[[COUNT]]
-// CHECK-NEXT:        scf.condition(%[[ANY]]) %[[NEXT]]
-// CHECK:           ^bb0(%[[UNIT:.*]]: index):
-// CHECK-NEXT:        piko.cpu.open_writer %{{.*}}[%[[UNIT]]]
-// CHECK:             scf.yield %[[UNIT]]
+// CHECK:           scf.while
+// CHECK-NEXT:        piko.cpu.next_unit
 piko.pipeline @P rank 2 {
   piko.source @balanced
   piko.source @mapped

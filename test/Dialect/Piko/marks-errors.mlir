@@ -28,7 +28,7 @@ func.func @mapping(%n: index) {
 // -----
 
 func.func @units(%n: index) {
-  // expected-error@+1 {{expected 'piko.units' to be how threads share units, as #piko<units any>, but got #piko<lanes items>}}
+  // expected-error@+1 {{expected 'piko.units' to be how threads share units, as #piko<units shared>, but got #piko<lanes items>}}
   scf.forall (%u) in (%n) {
   } {piko.units = #piko<lanes items>}
   return

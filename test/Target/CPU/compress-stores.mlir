@@ -53,7 +53,7 @@ piko.pipeline @P rank 1 {
         } {piko.lanes, piko.mapping = #piko<lanes items>}
       }
       piko.cpu.close_writer %writer
-    } {piko.units = #piko<units any>}
+    } {piko.units = #piko<units shared>}
     piko.storage.close_bins %bins : !piko.bins<@B>
   }
   piko.program {

@@ -17,7 +17,7 @@
 // AVX2:          vperm{{d|ps}} %ymm
 // AVX2:          vperm{{d|ps}} %ymm
 // AVX-COUNT-3:   vpermilps %xmm{{.*}}, %xmm{{.*}}, %xmm
-// SSSE3-COUNT-4: pshufb %xmm
+// SSSE3-COUNT-4: pshufb
 // SSE2-COUNT-8:  (%rsp,%r{{[a-z0-9]+}},{{[48]}}), %xmm
 // WIDE-COUNT-8:  (%rsp,%r{{[a-z0-9]+}},{{[48]}})
 
@@ -41,7 +41,7 @@ piko.pipeline @P16 rank 1 {
       %2 = piko.cpu.permute %b[%lanes] : vector<16xf64>, vector<16xi32>
       piko.cpu.scatter %1, @out[%order : vector<16xindex>] "a" mask %all : vector<16xi1>, vector<16xf32>
       piko.cpu.scatter %2, @out[%order : vector<16xindex>] "b" mask %all : vector<16xi1>, vector<16xf64>
-    } {piko.units = #piko<units any>}
+    } {piko.units = #piko<units shared>}
     piko.storage.close_bins %bins : !piko.bins<@V>
   }
 }
@@ -64,7 +64,7 @@ piko.pipeline @P8 rank 1 {
       %2 = piko.cpu.permute %b[%lanes] : vector<8xf64>, vector<8xi32>
       piko.cpu.scatter %1, @out[%order : vector<8xindex>] "a" mask %all : vector<8xi1>, vector<8xf32>
       piko.cpu.scatter %2, @out[%order : vector<8xindex>] "b" mask %all : vector<8xi1>, vector<8xf64>
-    } {piko.units = #piko<units any>}
+    } {piko.units = #piko<units shared>}
     piko.storage.close_bins %bins : !piko.bins<@V>
   }
 }
@@ -87,7 +87,7 @@ piko.pipeline @P4 rank 1 {
       %2 = piko.cpu.permute %b[%lanes] : vector<4xf64>, vector<4xi32>
       piko.cpu.scatter %1, @out[%order : vector<4xindex>] "a" mask %all : vector<4xi1>, vector<4xf32>
       piko.cpu.scatter %2, @out[%order : vector<4xindex>] "b" mask %all : vector<4xi1>, vector<4xf64>
-    } {piko.units = #piko<units any>}
+    } {piko.units = #piko<units shared>}
     piko.storage.close_bins %bins : !piko.bins<@V>
   }
 }

@@ -39,7 +39,7 @@ piko.pipeline @P rank 1 {
         %4 = arith.muli %3, %2 : i32
         piko.store %4, checked @out[%x : index] "at" : i32
       } {piko.lanes}
-    } {piko.units = #piko<units any>}
+    } {piko.units = #piko<units shared>}
     piko.storage.close_bins %bins : !piko.bins<@V>
   }
   piko.program {

@@ -85,7 +85,7 @@ static StringRef getExpectedKind(StringRef name) {
               marks::shortCircuit, marks::inside, marks::source},
              "a unit")
       .Case(marks::mapping, "what lanes are given, as #piko<lanes items>")
-      .Case(marks::units, "how threads share units, as #piko<units any>")
+      .Case(marks::units, "how threads share units, as #piko<units shared>")
       .Case(marks::number, "a 64-bit integer")
       .Cases({marks::turns, marks::advances}, "a 64-bit float")
       .Cases({marks::pixels, cppNameAttr}, "a string")

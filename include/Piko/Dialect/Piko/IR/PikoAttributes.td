@@ -43,9 +43,8 @@ def Piko_ScheduleKind : I32EnumAttr<"ScheduleKind", "where bins run", [
 
 /// The `piko.units` of a loop over units of work.
 def Piko_UnitLoop : I32EnumAttr<"UnitLoop", "how threads share units of work", [
-  I32EnumAttrCase<"Any", 0, "any">,       // any thread takes the next one
-  I32EnumAttrCase<"Serial", 1, "serial">, // one thread runs them all
-  I32EnumAttrCase<"Queue", 2, "queue">]> { // the runtime says for each
+  I32EnumAttrCase<"Shared", 0, "shared">,   // each takes the next one
+  I32EnumAttrCase<"Serial", 1, "serial">]> { // one thread runs them all
   let cppNamespace = "::piko";
   let genSpecializedAttr = 0;
 }

@@ -467,16 +467,16 @@ def Piko_NextUnitOp : Piko_CPUOp<"next_unit", [
   let summary = "the unit of work that a thread runs next";
   let description = [{
     First those that have their home with the thread, in order, then the next one of
-    those that any thread may run, then those that others have not begun. The operand
-    is what it ran before, -1 at the start; the result is -1 at the end.
+    those that any thread may run, then those that others have not begun; -1 at the
+    end.
 
     ```mlir
-    %u = piko.cpu.next_unit %bins after %unit : !piko.bins<@Fragment>
+    %u = piko.cpu.next_unit %bins : !piko.bins<@Fragment>
     ```
   }];
-  let arguments = (ins Piko_BinsType:$bins, Index:$last);
+  let arguments = (ins Piko_BinsType:$bins);
   let results = (outs Index:$result);
-  let assemblyFormat = "$bins `after` $last attr-dict `:` qualified(type($bins))";
+  let assemblyFormat = "$bins attr-dict `:` qualified(type($bins))";
 }
 
 def Piko_PrivateCopyOp : Piko_CPUOp<"private_copy", [
