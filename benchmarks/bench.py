@@ -5,6 +5,7 @@
   bench.py [options] [SECTION..]
 
   raster    the fastest pipeline of examples/raster, beside peers
+  fusion    the pipelines of examples/raster against each other
   kernels   kernels of the examples: all lanes against one
   bodies    bodies of phases: all lanes against one, and C++ compilers
   runtime   what an edge between two stages costs
@@ -16,6 +17,8 @@ with all measurements and, where Debian's python3-matplotlib is installed, a
 chart. A SCENE is a file and, in the same word, what options of piko-render it
 needs. In the COMMAND of a peer, {scene}, {lights}, {threads}, {width} and
 {height} stand for what is measured; it prints a line of JSON with `ms_median`.
+With --against, ends with an error where something takes longer than in an
+earlier run on the same machine.
 """
 
 import argparse
@@ -24,12 +27,13 @@ import sys
 
 import bodies
 from charts import find_pyplot
-from figure4 import PIPES
+from figure4 import PIPES, print_table
 from suite import bodies as bodies_section
-from suite import kernels, maths, page, raster, roofline, runtime
+from suite import (against, fusion, kernels, maths, page, raster, roofline,
+                   runtime)
 
 ROOT = bodies.ROOT
-SECTIONS = {"raster": raster, "kernels": kernels, "bodies": bodies_section,
+SECTIONS = {"raster": raster, "fusion": fusion, "kernels": kernels, "bodies": bodies_section,
             "runtime": runtime, "maths": maths, "roofline": roofline}
 RASTERIZERS = [*PIPES, raster.VISIBILITY]
 BUNNY = "/usr/share/glmark2/models/bunny.obj"
@@ -56,6 +60,11 @@ def add_options(parser):
                         help="less of everything: under two minutes")
     parser.add_argument("--out", default=f"{ROOT}/build/bench", metavar="FOLDER",
                         help="(build/bench)")
+    parser.add_argument("--against", metavar="FOLDER",
+                        help="the OUT of an earlier run")
+    parser.add_argument("--tolerance", type=float, default=0.15,
+                        help="what may take longer, as a part of what it took "
+                             "in that run (%(default)s)")
     parser.add_argument("--bin", default=f"{ROOT}/build/bin",
                         help="where the tools are")
     parser.add_argument("--lib", default=f"{ROOT}/build/lib",
@@ -108,6 +117,14 @@ def check(parser, options):
         if getattr(options, name) < 1:
             parser.error(f"--{name}: expected at least 1, but got "
                          f"{getattr(options, name)}")
+    if options.against is not None and not os.path.isdir(options.against):
+        parser.error(f"--against: no folder '{options.against}'")
+    if options.against is not None \
+            and os.path.abspath(options.against) == options.out:
+        parser.error("--against: expected another folder than --out")
+    if not options.tolerance >= 0:
+        parser.error("--tolerance: expected at least 0, but got "
+                     f"{options.tolerance}")
     try:
         options.peer = [raster.parse_peer(text) for text in options.peer]
     except ValueError as error:
@@ -116,7 +133,7 @@ def check(parser, options):
     if len(set(names)) < len(names):
         parser.error("--peer: expected a name for each, which is not Piko, but "
                      f"got {', '.join(names[1:])}")
-    if {"raster", "kernels"} & set(options.sections) \
+    if {"raster", "fusion", "kernels"} & set(options.sections) \
             and options.scene == [BUNNY] and not os.path.exists(BUNNY):
         parser.error(f"expected --scene, because there is no {BUNNY} (Debian: "
                      "glmark2-data)")
@@ -152,9 +169,15 @@ def main():
     if not find_pyplot():
         print("bench: no charts without matplotlib (Debian's "
               "python3-matplotlib)", file=sys.stderr)
-    page.measure_all(options.sections,
-                     lambda name: SECTIONS[name].measure(options), machine,
-                     options.out)
+    sections = page.measure_all(options.sections,
+                                lambda name: SECTIONS[name].measure(options),
+                                machine, options.out)
+    if options.against is not None:
+        slower = against.report(sections, options.against, options.tolerance,
+                                print_table)
+        if slower:
+            sys.exit(f"bench: {slower} times are above {1 + options.tolerance:.2f} "
+                     "of before")
 
 
 if __name__ == "__main__":

@@ -55,4 +55,5 @@ def measure(options):
         lambda pyplot: draw_groups(
             pyplot, list(gains),
             {f"over {name}": [gain[name] for gain in gains.values()]
-             for name in titles}, "times as fast", log=True))
+             for name in titles}, "times as fast", log=True),
+        keys=["body", "build"], times=["ms"])

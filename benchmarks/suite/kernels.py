@@ -75,4 +75,5 @@ def measure(options):
         rows, records,
         lambda pyplot: draw_groups(pyplot, list(gains),
                                    {"over one lane": list(gains.values())},
-                                   "times as fast", log=True))
+                                   "times as fast", log=True),
+        keys=["example", "kernel", "lanes"], times=["ms"])

@@ -92,4 +92,5 @@ def measure(options):
             {title: [t.get(name) for t in times.values()]
              for name, title in CONTENDERS.items()
              if any(name in t for t in times.values())},
-            "ns a float", log=True))
+            "ns a float", log=True),
+        keys=["function", "who"], times=["ns"])

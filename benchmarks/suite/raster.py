@@ -134,4 +134,5 @@ def measure(options):
         lambda pyplot: draw_groups(
             pyplot, list(cases),
             {who: [times[who].median for times in cases.values()]
-             for who in ["Piko", *names]}, "milliseconds", log=True))
+             for who in ["Piko", *names]}, "milliseconds", log=True),
+        keys=["scene", "lights", "threads", "who"], times=["ms"])

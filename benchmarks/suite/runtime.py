@@ -39,4 +39,5 @@ def measure(options):
         ["edge", "threads", "emit", "a record", "join", "a record", "peak"],
         rows, records,
         lambda pyplot: draw_groups(pyplot, list(joins), groups,
-                                 "join, ns a record and thread"))
+                                 "join, ns a record and thread"),
+        keys=["edge", "threads"], times=["emit_ns", "join_ns"])

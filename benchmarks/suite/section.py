@@ -3,7 +3,7 @@
 
 import csv
 import statistics
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Callable
 
 from charts import COLORS
@@ -18,6 +18,9 @@ class Section:
     rows: list[list[str]]
     records: list[dict]  # of the CSV file
     draw: Callable  # from pyplot to a figure
+    # Columns of the CSV file that say what was measured, and those with times.
+    keys: list[str] = field(default_factory=list)
+    times: list[str] = field(default_factory=list)
 
     def write_csv(self, file):
         with open(file, "w", newline="") as stream:
