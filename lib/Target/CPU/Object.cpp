@@ -10,6 +10,7 @@
 #include "LowerPermutations.h"
 #include "Piko/Target/CodeGeneration.h"
 #include "SelectBits.h"
+#include "TransposeGathers.h"
 #include "UniformGathers.h"
 #include "WidenGathers.h"
 #include "WidenMasks.h"
@@ -90,6 +91,8 @@ static ModulePassManager makeLastPasses(const TargetMachine &machine,
     passes.addPass(createModuleToFunctionPassAdaptor(WidenMasksPass(machine)));
     passes.addPass(
         createModuleToFunctionPassAdaptor(UniformGathersPass(machine)));
+    passes.addPass(
+        createModuleToFunctionPassAdaptor(TransposeGathersPass(machine)));
     passes.addPass(
         createModuleToFunctionPassAdaptor(WidenGathersPass(machine)));
     passes.addPass(

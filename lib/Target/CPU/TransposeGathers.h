@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// LLVM's loop vectorizer makes a gather of each word that a turn of a loop
+// loads from a record, or from a short array in it. Here each lane loads words
+// side by side at once, four of them, and blocks of 4 x 4 words are transposed:
+// a gather takes an access for each lane and word.
+
+#ifndef PIKO_TARGET_CPU_TRANSPOSEGATHERS_H
+#define PIKO_TARGET_CPU_TRANSPOSEGATHERS_H
+
+#include "ProcessorPass.h"
+
+namespace piko {
+
+/// Of gathers in a block by all lanes, for processors with AVX2. To run behind
+/// the optimizer.
+struct TransposeGathersPass : ProcessorPass<TransposeGathersPass> {
+  using ProcessorPass::ProcessorPass;
+  llvm::PreservedAnalyses run(llvm::Function &function,
+                              llvm::FunctionAnalysisManager &analyses);
+};
+
+} // namespace piko
+
+#endif // PIKO_TARGET_CPU_TRANSPOSEGATHERS_H
