@@ -10,6 +10,7 @@
 #include "LowerPermutations.h"
 #include "Piko/Target/CodeGeneration.h"
 #include "SelectBits.h"
+#include "StoreLanes.h"
 #include "TransposeGathers.h"
 #include "UniformGathers.h"
 #include "WidenGathers.h"
@@ -95,6 +96,7 @@ static ModulePassManager makeLastPasses(const TargetMachine &machine,
         createModuleToFunctionPassAdaptor(TransposeGathersPass(machine)));
     passes.addPass(
         createModuleToFunctionPassAdaptor(WidenGathersPass(machine)));
+    passes.addPass(createModuleToFunctionPassAdaptor(StoreLanesPass(machine)));
     passes.addPass(
         createModuleToFunctionPassAdaptor(BroadcastLoadsPass(machine)));
   }
