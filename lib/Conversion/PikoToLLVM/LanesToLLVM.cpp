@@ -199,20 +199,22 @@ private:
     Value value = adaptor.getValue(), mask = adaptor.getMask();
     Value all = vector::ReductionOp::create(rewriter, loc,
                                             vector::CombiningKind::AND, mask);
-    Value index = findWords(rewriter, op);
+    Value words = findWords(op);
+    std::optional<SharedIndex> split;
+    auto lower = [&](Value value) { return rewriter.getRemappedValue(value); };
+    if (words)
+      split = splitIndex({rewriter, loc}, words, op, lower);
+    Value index = words ? lower(words) : words;
     Value data = context.view(rewriter, op, op.getState()).data;
     Type element = cast<VectorType>(value.getType()).getElementType();
     auto storeAll = [&](OpBuilder &builder, Location loc) {
-      SmallVector<Value> indices;
-      if (index)
-        indices = extractIndices({builder, loc}, index);
+      SmallVector<Value> places =
+          index ? addressLanes({builder, loc}, data, element, index, split)
+                : SmallVector<Value>();
       int64_t lanes = cast<VectorType>(mask.getType()).getNumElements();
       for (int64_t lane = 0; lane < lanes; ++lane) {
         Value to =
-            index ? LLVM::GEPOp::create(builder, loc, data.getType(), element,
-                                        data,
-                                        ArrayRef<LLVM::GEPArg>{indices[lane]})
-                        .getResult()
+            index ? places[lane]
                   : LLVM::ExtractElementOp::create(
                         builder, loc, addresses, createI64(builder, loc, lane));
         LLVM::StoreOp::create(
@@ -229,8 +231,24 @@ private:
     scf::IfOp::create(rewriter, loc, all, storeAll, storeSome);
   }
 
+  /// The address of each lane's element.
+  static SmallVector<Value>
+  addressLanes(CodeBuilder at, Value data, Type element, Value index,
+               const std::optional<SharedIndex> &split) {
+    auto address = [&](Value from, Value index) -> Value {
+      return LLVM::GEPOp::create(at.builder, at.loc, data.getType(), element,
+                                 from, ArrayRef<LLVM::GEPArg>{index});
+    };
+    SmallVector<Value> places;
+    for (Value own : extractIndices(at, split ? split->lanes : index)) {
+      Value place = address(data, own);
+      places.push_back(split ? address(place, split->shared) : place);
+    }
+    return places;
+  }
+
   /// The index of 32 bits that elements of one number have; or null.
-  Value findWords(ConversionPatternRewriter &rewriter, ScatterOp op) const {
+  Value findWords(ScatterOp op) const {
     RecordOp record =
         context.record(getStateRecord(context.state(op, op.getState())));
     auto type = cast<VectorType>(op.getValue().getType());
@@ -240,9 +258,8 @@ private:
       return {};
     auto cast = op.getIndices().front().getDefiningOp<arith::IndexCastOp>();
     auto words = cast ? dyn_cast<VectorType>(cast.getIn().getType()) : nullptr;
-    return words && words.getElementType().isInteger(32)
-               ? rewriter.getRemappedValue(cast.getIn())
-               : Value();
+    return words && words.getElementType().isInteger(32) ? cast.getIn()
+                                                         : Value();
   }
 };
 
