@@ -136,7 +136,8 @@ struct GatherLowering : LaneLowering<GatherOp> {
     auto type = cast<VectorType>(op.getResult().getType());
     if (std::optional<RowWord> word =
             findRowWord(rewriter, op, adaptor, type)) {
-      RecordRow row(rewriter, loc, word->first, word->size, adaptor.getMask());
+      RecordRow row(rewriter, loc, word->first, word->size, adaptor.getMask(),
+                    isa<BufferOp>(context.state(op, op.getState())));
       rewriter.replaceOpWithNewOp<vector::BitCastOp>(
           op, type, row.read({word->number}).front());
       return success();
@@ -169,7 +170,8 @@ struct ScatterLowering : LaneLowering<ScatterOp> {
       SmallVector<Value> words(word->size / wordSize);
       words[word->number] = vector::BitCastOp::create(
           rewriter, loc, type.clone(rewriter.getI32Type()), adaptor.getValue());
-      RecordRow(rewriter, loc, word->first, word->size, adaptor.getMask())
+      RecordRow(rewriter, loc, word->first, word->size, adaptor.getMask(),
+                isa<BufferOp>(context.state(op, op.getState())))
           .write(words);
       rewriter.eraseOp(op);
       return success();

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // Where records have an even number of words, pairs of words come first: half
-// as many units take half as many permutations.
+// as many units take half as many permutations. Where all lanes are in the
+// mask, as they mostly are, nothing has to find which words are those of which
+// lane.
 
 #include "RecordRows.h"
 
 #include "RecordPieces.h"
 
+#include "mlir/Dialect/SCF/IR/SCF.h"
 #include "mlir/Dialect/Vector/IR/VectorOps.h"
 
 using namespace mlir;
@@ -21,8 +24,9 @@ bool piko::isRecordRow(int64_t laneCount, int64_t size, int64_t fields) {
 }
 
 RecordRow::RecordRow(OpBuilder &builder, Location loc, Value first,
-                     int64_t size, Value mask)
+                     int64_t size, Value mask, bool areMostlyAll)
     : builder(builder), loc(loc), first(first), mask(mask),
+      areMostlyAll(areMostlyAll),
       lanes(llvm::cast<VectorType>(mask.getType()).getNumElements()),
       count(size / wordSize),
       type(VectorType::get({lanes}, builder.getI32Type())),
@@ -71,13 +75,40 @@ Value RecordRow::deinterleave(ArrayRef<Value> vectors, int64_t unit) {
   return found;
 }
 
-SmallVector<Value> RecordRow::read(ArrayRef<int64_t> words) {
+Value RecordRow::createAreAll() {
+  return vector::ReductionOp::create(builder, loc, vector::CombiningKind::AND,
+                                     mask);
+}
+
+SmallVector<Value> RecordRow::load(bool areAll) {
   Value none =
       arith::ConstantOp::create(builder, loc, builder.getZeroAttr(type));
   SmallVector<Value> loaded;
   for (int64_t i = 0; i < count; ++i)
-    loaded.push_back(LLVM::MaskedLoadOp::create(
-        builder, loc, type, getAddress(i), createMask(i), none, wordSize));
+    if (areAll)
+      loaded.push_back(
+          LLVM::LoadOp::create(builder, loc, type, getAddress(i), wordSize));
+    else
+      loaded.push_back(LLVM::MaskedLoadOp::create(
+          builder, loc, type, getAddress(i), createMask(i), none, wordSize));
+  return loaded;
+}
+
+SmallVector<Value> RecordRow::load() {
+  if (!areMostlyAll)
+    return load(/*areAll=*/false);
+  auto choice = scf::IfOp::create(builder, loc, SmallVector<Type>(count, type),
+                                  createAreAll(), /*withElseRegion=*/true);
+  OpBuilder::InsertionGuard guard(builder);
+  for (Block *block : {choice.thenBlock(), choice.elseBlock()}) {
+    builder.setInsertionPointToStart(block);
+    scf::YieldOp::create(builder, loc, load(block == choice.thenBlock()));
+  }
+  return SmallVector<Value>(choice.getResults());
+}
+
+SmallVector<Value> RecordRow::read(ArrayRef<int64_t> words) {
+  SmallVector<Value> loaded = load();
   SmallVector<Value> values;
   if (count % 2 != 0) {
     for (int64_t word : words)
@@ -148,20 +179,39 @@ SmallVector<Value> RecordRow::interleaveAll(ArrayRef<Value> words) {
   return vectors;
 }
 
+void RecordRow::store(ArrayRef<Value> words, int64_t number, Value vector,
+                      Value these) {
+  SmallVector<bool> isWritten;
+  for (int64_t word = 0; word < lanes; ++word)
+    isWritten.push_back(bool(words[(number * lanes + word) % count]));
+  if (llvm::is_contained(isWritten, false)) {
+    Value written = arith::ConstantOp::create(
+        builder, loc,
+        DenseElementsAttr::get(llvm::cast<VectorType>(mask.getType()),
+                               isWritten));
+    these =
+        these ? arith::AndIOp::create(builder, loc, these, written) : written;
+  }
+  if (these)
+    LLVM::MaskedStoreOp::create(builder, loc, vector, getAddress(number), these,
+                                wordSize);
+  else
+    LLVM::StoreOp::create(builder, loc, vector, getAddress(number), wordSize);
+}
+
 void RecordRow::write(ArrayRef<Value> words) {
   SmallVector<Value> vectors = interleaveAll(words);
-  auto masks = llvm::cast<VectorType>(mask.getType());
-  for (int64_t i = 0; i < count; ++i) {
-    SmallVector<bool> isWritten;
-    for (int64_t word = 0; word < lanes; ++word)
-      isWritten.push_back(bool(words[(i * lanes + word) % count]));
-    Value these = createMask(i);
-    if (llvm::is_contained(isWritten, false))
-      these = arith::AndIOp::create(
-          builder, loc, these,
-          arith::ConstantOp::create(builder, loc,
-                                    DenseElementsAttr::get(masks, isWritten)));
-    LLVM::MaskedStoreOp::create(builder, loc, vectors[i], getAddress(i), these,
-                                wordSize);
+  auto storeAll = [&](bool areAll) {
+    for (int64_t i = 0; i < count; ++i)
+      store(words, i, vectors[i], areAll ? Value() : createMask(i));
+  };
+  if (!areMostlyAll)
+    return storeAll(/*areAll=*/false);
+  auto choice = scf::IfOp::create(builder, loc, createAreAll(),
+                                  /*withElseRegion=*/true);
+  OpBuilder::InsertionGuard guard(builder);
+  for (Block *block : {choice.thenBlock(), choice.elseBlock()}) {
+    builder.setInsertionPointToStart(block);
+    storeAll(block == choice.thenBlock());
   }
 }

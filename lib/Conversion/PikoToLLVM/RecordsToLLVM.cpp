@@ -213,6 +213,7 @@ static Value toIntegers(OpBuilder &builder, Location loc, Value addresses) {
 
 /// The records at consecutive addresses, if they are few words each.
 static std::optional<RecordRow> findRow(OpBuilder &builder, Location loc,
+                                        const LoweringContext &context,
                                         LaneElementsOp elements,
                                         Value addresses, Value mask,
                                         int64_t size, int64_t fields) {
@@ -221,11 +222,12 @@ static std::optional<RecordRow> findRow(OpBuilder &builder, Location loc,
       !isRecordRow(lanes, size, fields))
     return std::nullopt;
   Value first = vector::ExtractOp::create(builder, loc, addresses, 0);
+  bool isBuffer = isa<BufferOp>(context.state(elements, elements.getState()));
   return RecordRow(builder, loc,
                    LLVM::IntToPtrOp::create(
                        builder, loc,
                        LLVM::LLVMPointerType::get(builder.getContext()), first),
-                   size, mask);
+                   size, mask, isBuffer);
 }
 
 struct LaneGetFieldsLowering : Lowering<LaneGetFieldsOp> {
@@ -249,8 +251,8 @@ struct LaneGetFieldsLowering : Lowering<LaneGetFieldsOp> {
     if (areWords)
       elements = op.getAddresses().getDefiningOp<LaneElementsOp>();
     if (std::optional<RecordRow> row =
-            findRow(rewriter, loc, elements, addresses, mask, record.getSize(),
-                    fields.size())) {
+            findRow(rewriter, loc, context, elements, addresses, mask,
+                    record.getSize(), fields.size())) {
       rewriter.replaceOp(op, readRow(rewriter, op, *row, fields));
       return success();
     }
@@ -455,9 +457,10 @@ private:
       words[field.getOffset() / wordSize] =
           vector::BitCastOp::create(builder, op.getLoc(), type, value);
     }
-    std::optional<RecordRow> row = findRow(
-        builder, op.getLoc(), op.getAddresses().getDefiningOp<LaneElementsOp>(),
-        addresses, adaptor.getMask(), record.getSize(), fields.size());
+    std::optional<RecordRow> row =
+        findRow(builder, op.getLoc(), context,
+                op.getAddresses().getDefiningOp<LaneElementsOp>(), addresses,
+                adaptor.getMask(), record.getSize(), fields.size());
     if (row)
       row->write(words);
     return row.has_value();
