@@ -137,6 +137,8 @@ void piko::addUnitSequence(OpPassManager &passes) {
 static void addUnitsToLoops(OpPassManager &passes,
                             const SynthesisOptions &options) {
   passes.nest<PipelineOp>().addPass(createFormProgram());
+  if (options.has("hoist-loads"))
+    passes.nest<PipelineOp>().addPass(createHoistLoads());
   if (options.has("if-convert"))
     passes.nest<PipelineOp>().addPass(createIfConvert());
   if (options.has("prefetch"))

@@ -117,6 +117,43 @@ def HoistBounds : Pass<"piko-hoist-bounds", "::piko::PipelineOp"> {
     Statistic<"versioned", "versioned", "loops with a test in front">];
 }
 
+def HoistLoads : Pass<"piko-hoist-loads", "::piko::PipelineOp"> {
+  let summary = "Read in front of a loop what its condition reads";
+  let description = [{
+    **Requires** loops over units (`piko-form-units`); before `piko-hoist-bounds`
+    and `piko-vectorize`, which look for loops that count to a number that they
+    know in front.
+
+    **Does**: a number that a loop's condition reads from state without an index,
+    and that the kernel does not change, as an extent that the user keeps with a
+    buffer, is read in front of the loop, with what is computed from it alone.
+
+    **Guarantees** the same numbers: such a read cannot fail, and a condition is
+    found at least once.
+
+    Before:
+    ```
+    scf.while (%x = %zero) : (i32) -> i32 {
+      %width = piko.load @width "value" : i32
+      %more = arith.cmpi slt, %x, %width : i32
+      scf.condition(%more) %x : i32
+    } do { ... }
+    ```
+    After:
+    ```
+    %width = piko.load @width "value" : i32
+    scf.while (%x = %zero) : (i32) -> i32 {
+      %more = arith.cmpi slt, %x, %width : i32
+      scf.condition(%more) %x : i32
+    } do { ... }
+    ```
+
+    **Limits**: elements of arrays and buffers stay, as their indices are tested;
+    so does what is read behind a loop's condition, which LLVM moves.
+  }];
+  let statistics = [Statistic<"hoisted", "hoisted", "reads in front of loops">];
+}
+
 def IfConvert : Pass<"piko-if-convert", "::piko::PipelineOp"> {
   let summary = "Choose values without branches";
   let description = [{
