@@ -188,3 +188,64 @@ void piko::testDividends(scf::ForOp root) {
   for (scf::IfOp choice : choices)
     ::testDividends(choice, root);
 }
+
+namespace {
+
+/// What decides whether a division of integers has a result: what all lanes
+/// share, and what else is enough for that where a lane's dividend is not.
+struct DivisionTest {
+  Value needed, enough;
+};
+
+} // namespace
+
+/// The divisor is not 0, and either the dividend is not the lowest number or
+/// the divisor not -1.
+static std::optional<DivisionTest>
+findDivisionTest(scf::IfOp choice, const IterationLanes &lanes) {
+  auto both = choice.getCondition().getDefiningOp<arith::AndIOp>();
+  if (!both || choice.getNumResults() != 1 || choice.getElseRegion().empty())
+    return std::nullopt;
+  Operation *division = &choice.thenBlock()->front();
+  if (!isIntegerDivision(division) ||
+      division->getNextNode() != choice.thenYield() ||
+      choice.thenYield().getOperand(0) != division->getResult(0))
+    return std::nullopt;
+  for (unsigned i : {0, 1}) {
+    Value needed = both->getOperand(i);
+    auto either = both->getOperand(1 - i).getDefiningOp<arith::OrIOp>();
+    if (!either || lanes.isVarying(needed))
+      continue;
+    for (unsigned j : {0, 1})
+      if (!lanes.isVarying(either->getOperand(j)) &&
+          lanes.isVarying(either->getOperand(1 - j)))
+        return DivisionTest{needed, either->getOperand(j)};
+  }
+  return std::nullopt;
+}
+
+static void testDivisor(scf::IfOp choice, const DivisionTest &test) {
+  OpBuilder builder(choice);
+  Location loc = choice.getLoc();
+  Value sure = arith::AndIOp::create(builder, loc, test.needed, test.enough);
+  auto around = scf::IfOp::create(builder, loc, choice.getResultTypes(), sure,
+                                  /*withElseRegion=*/true);
+  choice->replaceAllUsesWith(around);
+  choice->moveBefore(around.elseBlock(), around.elseBlock()->end());
+  builder.setInsertionPointToEnd(around.elseBlock());
+  scf::YieldOp::create(builder, loc, choice.getResults());
+  builder.setInsertionPointToStart(around.thenBlock());
+  Operation *division = builder.clone(choice.thenBlock()->front());
+  scf::YieldOp::create(builder, loc, division->getResults());
+}
+
+void piko::testDivisors(const IterationLanes &lanes) {
+  SmallVector<std::pair<scf::IfOp, DivisionTest>> found;
+  scf::ForOp root = lanes.getLoop();
+  root.walk([&](scf::IfOp choice) {
+    if (std::optional<DivisionTest> test = findDivisionTest(choice, lanes))
+      found.emplace_back(choice, *test);
+  });
+  for (auto &[choice, test] : found)
+    testDivisor(choice, test);
+}

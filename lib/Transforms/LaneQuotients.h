@@ -5,7 +5,7 @@
 #ifndef PIKO_LIB_TRANSFORMS_LANEQUOTIENTS_H
 #define PIKO_LIB_TRANSFORMS_LANEQUOTIENTS_H
 
-#include "mlir/Dialect/SCF/IR/SCF.h"
+#include "IterationLanes.h"
 
 namespace piko {
 
@@ -13,6 +13,10 @@ namespace piko {
 /// negative, as barycentric coordinates are, tests their dividends in front:
 /// vectors of which no lane goes on divide nothing.
 void testDividends(mlir::scf::ForOp root);
+
+/// Where lanes divide integers by what all share, and that is neither 0 nor -1,
+/// no lane's dividend needs to be looked at.
+void testDivisors(const IterationLanes &lanes);
 
 } // namespace piko
 

@@ -278,6 +278,7 @@ bool VectorizePass::vectorizeInOrder(Operation *op) {
     }
     bool isPaired = laneCount == widestLanes && isBoundByLatency(lanes);
     remarkInOrder(copy, (isPaired ? 2 : 1) * laneCount, /*isCompact=*/false);
+    testDivisors(lanes);
     vectorize(IterationLanes(copy, (isPaired ? 2 : 1) * laneCount));
   }
   op->erase();
@@ -306,6 +307,7 @@ WalkResult VectorizePass::visit(Operation *op) {
     countPrimitives(loop, flat.writers);
     vectorize(IterationLanes(flat.loop, countLanes(candidate)), copy);
   } else if (isDone) {
+    testDivisors(lanes);
     testDividends(copy);
     vectorize(IterationLanes(copy, countLanes(candidate)), copy);
   } else {

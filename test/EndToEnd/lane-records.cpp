@@ -8,7 +8,7 @@
 // RUN: piko-compare %s --cases %t.cases --runs 1 --without hoist-loads | FileCheck %s --check-prefix=EQUAL
 // RUN: %if x86_64 %{ piko-compare %s --cases %t.cases --runs 1 --cpu x86-64 | FileCheck %s --check-prefix=EQUAL %}
 // RUN: %if x86_64 %{ piko-compare %s --cases %t.cases --runs 1 --cpu x86-64-v3 | FileCheck %s --check-prefix=EQUAL %}
-// EQUAL-COUNT-8: {{^equal$}}
+// EQUAL-COUNT-9: {{^equal$}}
 // CASE: --pipe Traces --count 70
 // CASE: --pipe Norms --count 1
 // CASE: --pipe Gaps --count 1
@@ -17,6 +17,7 @@
 // CASE: --pipe Haar --count 16
 // CASE: --pipe Planes --count 16
 // CASE: --pipe Dither --count 16
+// CASE: --pipe Quotients --count 16
 //
 // RUN: %if x86_64 %{ pikoc %s --pipe Rows --cpu x86-64-v4 --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=LOOP %}
 // RUN: %if x86_64 %{ pikoc %s --pipe Inner --cpu x86-64-v4 --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=LOOP %}
@@ -183,3 +184,18 @@ struct Dithers {
   }
 };
 struct Dither : Alone<Dithers> {};
+
+//===-- Divisors that lanes share -----------------------------------------===//
+
+struct Quotient {
+  static void run(State &state, int serial) {
+    for (int i = 0; i < 4; ++i) {
+      int divisor = int(state.shorts[i] & 3) - 1;
+      divisor = divisor == 0 ? 7 : divisor;
+      int value = serial * serial * 1000 - 77777;
+      state.bytes[serial * 4 + i] =
+          uint8_t((value / divisor + value % divisor) & 255);
+    }
+  }
+};
+struct Quotients : Alone<Quotient> {};

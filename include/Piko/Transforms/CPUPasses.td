@@ -401,7 +401,8 @@ def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
     iterations read three fields or more of an element, as of the triangle that a
     pixel shows, and all that are active turn out to read the same one, scalar
     loads read it. Integers of 32 bits are divided as floats of 64,
-    which is exact; by what all lanes share, they are multiplied. Where an index
+    which is exact; by what all lanes share, they are multiplied, and where that
+    is neither 0 nor -1, no dividend is tested. Where an index
     grows by one from lane to lane but for limits, as one that is clamped to an
     image, or wraps around in it, a test finds whether it does so here, and a load
     of a row is the other side of the gather. What has no vector form runs lane by
