@@ -142,6 +142,16 @@ def ConvertPikoToGPU : Pass<"convert-piko-to-gpu", "::piko::PipelineOp"> {
       loop, which threads of a warp then have about the same of; two nested loops
       that count become one.
 
+      Where a primitive has two ways with effects, and one of them keeps arrays that
+      nothing else uses, that way is rare: it becomes a region that is marked with
+      `piko.rare`, for `piko-outline-rare-work`, and parallel loops in it alone do not
+      keep threads from sharing primitives. What threads have of outboxes, and the
+      counters of units and cells, are in the block's memory then. If all that the
+      usual way does is to emit, there are two launches: the first one has no such
+      region; it drops what a round with a rare primitive has emitted, and leaves the
+      unit there (`piko.gpu.leave_rest`). The second one (`kernel_start_rest`) goes on
+      from there, and from where the bin begins if work in that takes what is emitted.
+
     What a thread emits goes to its outbox (`piko.gpu.outboxes`); behind each round of
     a loop that threads share the block takes it, in their order (`piko.gpu.flush`),
     so that what a block emits is in lineage order. Of a local edge the block has the
@@ -194,6 +204,7 @@ def ConvertPikoToGPU : Pass<"convert-piko-to-gpu", "::piko::PipelineOp"> {
     Statistic<"strided", "strided", "loops that step over others' pixels">,
     Statistic<"guarded", "guarded", "tests of whose a pixel is">,
     Statistic<"deferred", "deferred", "loops of atomics that threads put off">,
+    Statistic<"rare", "rare", "branches that few threads take, set apart">,
     Statistic<"collapsed", "collapsed",
               "loops over primitives whose pixels are one space">];
   let dependentDialects = ["::mlir::arith::ArithDialect",
@@ -276,8 +287,8 @@ def OutlineRareWork : Pass<"piko-outline-rare-work", "::mlir::gpu::GPUModuleOp">
   let description = [{
     **Requires** kernels as functions (`gpu-kernel-outlining`).
 
-    **Does**: makes a function of each loop that is marked with `piko.rare`, which
-    is not inlined, so that what it needs in registers and stack is not the
+    **Does**: makes a function of each loop, or `scf.execute_region`, that is marked
+    with `piko.rare`, which is not inlined, so that what it needs in registers and stack is not the
     kernel's where it is not called. It gets by value what the loop uses; private
     arrays that only the loop uses move into it, and of small ones that the kernel
     uses, too, it has a copy, which it gives back.

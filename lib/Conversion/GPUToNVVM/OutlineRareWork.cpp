@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// piko-outline-rare-work: for each loop of a kernel that is marked as rare,
+// piko-outline-rare-work: for each loop, or region, of a kernel that is marked
+// as rare,
 //   1. make a function of it, which gets by value what the loop uses, but for
 //      what it can compute as well from constants and the thread's number;
 //   2. pass the kernel's own parameters in the block's memory: as arguments
@@ -38,12 +39,12 @@ struct OutlineRareWorkPass
   void runOnOperation() override;
 };
 
-/// Makes a function of a loop.
+/// Makes a function of a loop or region.
 class Outlining {
 public:
-  Outlining(scf::ForOp loop, SymbolTable &symbols)
+  Outlining(Operation *loop, SymbolTable &symbols)
       : loop(loop), kernel(loop->getParentOfType<gpu::GPUFuncOp>()),
-        symbols(symbols), loc(loop.getLoc()) {}
+        symbols(symbols), loc(loop->getLoc()) {}
   void run();
 
 private:
@@ -60,7 +61,7 @@ private:
   void storeAll(OpBuilder &builder, ArrayRef<memref::AllocaOp> arrays,
                 ValueRange values);
 
-  scf::ForOp loop;
+  Operation *loop;
   gpu::GPUFuncOp kernel;
   SymbolTable &symbols;
   Location loc;
@@ -126,7 +127,7 @@ void Outlining::sortCapture(Value capture) {
 
 void Outlining::sortCaptures() {
   llvm::SetVector<Value> captures(loop->operand_begin(), loop->operand_end());
-  getUsedValuesDefinedAbove(loop.getRegion(), captures);
+  getUsedValuesDefinedAbove(loop->getRegion(0), captures);
   for (Value capture : captures)
     sortCapture(capture);
 }
@@ -187,6 +188,7 @@ func::FuncOp Outlining::createFunction() {
     results.append(array.getType().getNumElements(),
                    array.getType().getElementType());
   llvm::append_range(inputs, results);
+  llvm::append_range(results, loop->getResultTypes());
   OpBuilder builder(kernel);
   auto function =
       func::FuncOp::create(builder, loc, (kernel.getName() + "_rare").str(),
@@ -208,6 +210,7 @@ void Outlining::run() {
   func::FuncOp function = createFunction();
   auto call = func::CallOp::create(caller, loc, function, values);
   storeAll(caller, copied, call.getResults());
+  loop->replaceAllUsesWith(call.getResults().take_back(loop->getNumResults()));
   kernel->setAttr(NVVM::NVVMDialect::getMaxnregAttrName(),
                   caller.getI32IntegerAttr(maxRegisters));
 
@@ -225,23 +228,26 @@ void Outlining::run() {
   for (memref::AllocaOp array : copied)
     copies.push_back(cast<memref::AllocaOp>(builder.clone(*array, mapping)));
   storeAll(builder, copies, body->getArguments().drop_front(arguments.size()));
-  builder.clone(*loop, mapping)->removeAttr(marks::rare);
+  Operation *work = builder.clone(*loop, mapping);
+  work->removeAttr(marks::rare);
   SmallVector<Value> results;
   loadAll(builder, copies, results);
+  llvm::append_range(results, work->getResults());
   func::ReturnOp::create(builder, loc, results);
-  loop.erase();
+  loop->erase();
   for (memref::AllocaOp array : own)
     array.erase();
 }
 
 void OutlineRareWorkPass::runOnOperation() {
   SymbolTable symbols(getOperation());
-  SmallVector<scf::ForOp> loops;
-  getOperation().walk([&](scf::ForOp loop) {
-    if (loop->hasAttr(marks::rare) && !loop.getNumResults())
-      loops.push_back(loop);
+  SmallVector<Operation *> loops;
+  getOperation().walk([&](Operation *op) {
+    bool isLoop = isa<scf::ForOp>(op) && !op->getNumResults();
+    if (op->hasAttr(marks::rare) && (isLoop || isa<scf::ExecuteRegionOp>(op)))
+      loops.push_back(op);
   });
-  for (scf::ForOp loop : loops)
+  for (Operation *loop : loops)
     Outlining(loop, symbols).run();
   outlined += loops.size();
 }

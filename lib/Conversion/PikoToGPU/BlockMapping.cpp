@@ -286,6 +286,10 @@ void BlockMapper::shareInRounds(scf::ForOp loop) {
       ifOp.thenBlock()->getTerminator()->getIterator(),
       loop.getBody()->getOperations());
   memory.flush(builder);
+  if (memory.rare && memory.rare->loop == loop) {
+    memory.rare->rounds = rounds;
+    memory.rare->turn = ifOp;
+  }
   if (auto found = memory.queues.find(loop); found != memory.queues.end()) {
     Value next = arith::AddIOp::create(builder, loc, rounds.getInductionVar(),
                                        rounds.getStep());
@@ -404,7 +408,7 @@ void BlockMapper::deferIterations(DeferBeginOp begin) {
   Value words = arith::MulIOp::create(builder, loc, iterations,
                                       constant(builder, memory.getWords()));
   states = memref::ViewOp::create(builder, loc, type, all, zero, words);
-  own = createOwn(cast<MemRefType>(memory.outboxes.getType()));
+  own = createOwn(MemRefType::get({memory.getWords()}, builder.getI64Type()));
   SmallVector<DeferIterationOp> deferred;
   for (Operation *op = begin; op && !isa<DeferEndOp>(op);
        op = op->getNextNode())

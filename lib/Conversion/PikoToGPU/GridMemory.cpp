@@ -46,6 +46,27 @@ void GridMemory::clearOutboxes(OpBuilder &builder) {
         arith::ConstantIndexOp::create(builder, loc, i).getResult());
 }
 
+void GridMemory::keepOutboxesInBlock(int64_t threads) {
+  Location loc = launch.getLoc();
+  int64_t words = getWords();
+  auto array = outboxes.getDefiningOp<memref::AllocaOp>();
+  OpBuilder builder(array);
+  Type i64 = builder.getI64Type();
+  // A word of all threads is in one piece: a warp finds it at once.
+  Value all = addBlockMemory(launch, words * threads, i64);
+  auto type =
+      MemRefType::get(words, i64,
+                      StridedLayoutAttr::get(builder.getContext(),
+                                             ShapedType::kDynamic, threads),
+                      cast<MemRefType>(all.getType()).getMemorySpace());
+  outboxes = memref::ReinterpretCastOp::create(
+      builder, loc, type, all, OpFoldResult(launch.getThreadIds().x),
+      ArrayRef<OpFoldResult>{builder.getIndexAttr(words)},
+      ArrayRef<OpFoldResult>{builder.getIndexAttr(threads)});
+  array.replaceAllUsesWith(outboxes);
+  array.erase();
+}
+
 void GridMemory::setPosition(OpBuilder &builder, Value position) {
   Location loc = launch.getLoc();
   Value word =

@@ -8,7 +8,8 @@
 //      (CollapsedPixels.cpp and RareLaunch.cpp, or PixelSharing.cpp and
 //      ItemSetup.cpp);
 //   3. otherwise choose who takes which loop (SharedLoops.cpp), put off those
-//      of atomics (DeferredWork.cpp), and map the block's work to its threads
+//      of atomics (DeferredWork.cpp), set rare branches apart (RareBranches.cpp
+//      and RareRounds.cpp), and map the block's work to its threads
 //      (BlockMapping.cpp);
 //   4. convert access to state, and open a log for what the grid leaves.
 
@@ -58,7 +59,8 @@ private:
   /// Opens outboxes; `work` is what the grid was made of.
   void createMemory();
   void convertLocal(LocalBinOp local);
-  scf::ForOp finishGrid();
+  LogicalResult finish(GridMemory &memory, MappingCounts &counts);
+  scf::ForOp finishGrid(GridMemory &memory);
   LogicalResult findItems();
   void hoistPrivateArrays();
   void upliftLoops();
@@ -183,7 +185,7 @@ void GridBuilder::convertLocal(LocalBinOp local) {
 
 /// Threads begin with empty outboxes, and leave what is in them at the end of
 /// each unit.
-scf::ForOp GridBuilder::finishGrid() {
+scf::ForOp GridBuilder::finishGrid(GridMemory &memory) {
   auto opened = *memory.outboxes.getUsers().begin();
   for (Operation *user : memory.outboxes.getUsers())
     if (isa<OutboxesOp>(user))
@@ -201,7 +203,7 @@ scf::ForOp GridBuilder::finishGrid() {
   }
   builder.setInsertionPoint(opened->getBlock()->getTerminator());
   memory.flush(builder);
-  return repeatForUnits(launch, bins, opened);
+  return repeatForUnits(memory.launch, bins, opened);
 }
 
 /// An alloca in a loop would take more memory each time around.
@@ -280,7 +282,7 @@ LogicalResult GridBuilder::sharePixelsOfBins(bool collapses,
   }
   if (failed(convertAccess()))
     return failure();
-  scf::ForOp units = finishGrid();
+  scf::ForOp units = finishGrid(memory);
   if (succeeded(rare)) {
     countWorkInBlock(units, launch);
     leaveRareToSecondLaunch(*rare, launch);
@@ -338,8 +340,9 @@ LogicalResult GridBuilder::mapLoop(ParallelLoopOpInterface loop,
 }
 
 /// Does what piko-map-lanes says. Where lanes would have items whose updates
-/// have to be put in order, they share the iterations of one; where they would
-/// have pairs, they have items if these need no order.
+/// have to be put in order, they share the iterations of one, if others than
+/// rare primitives have any; where they would have pairs, they have items if
+/// these need no order.
 void GridBuilder::obeyLanes() {
   auto yes = UnitAttr::get(kernel.getContext());
   auto keepToOne = [&](Operation *work) {
@@ -350,7 +353,8 @@ void GridBuilder::obeyLanes() {
     LaneMapping lanes = work.getLanes().value_or(LaneMapping::Items);
     if (lanes == LaneMapping::One)
       keepToOne(work);
-    else if (lanes != LaneMapping::Iterations &&
+    else if ((lanes != LaneMapping::Iterations ||
+              hasRareIterationsOnly(work)) &&
              chooseMapping(work, threads) == ThreadMapping::Shared)
       work->setAttr(marks::shared, yes);
   });
@@ -376,10 +380,30 @@ LogicalResult GridBuilder::mapWork(MappingCounts &counts) {
   });
   for (scf::ForOp loop : shared)
     counts.deferred += deferWork(loop, memory, threads);
-  if (failed(convertAccess()) || failed(mapBlock(memory, counts)))
+  std::optional<GridMemory> rest;
+  for (scf::ForOp loop : shared) {
+    int64_t rare = setRareBranchesApart(loop);
+    if (rare && !rest)
+      rest = leaveRareRounds(loop, memory);
+    counts.rare += rare;
+  }
+  if (failed(convertAccess()) || failed(finish(memory, counts)))
+    return failure();
+  return rest ? finish(*rest, counts) : success();
+}
+
+/// Maps a launch's work; what it leaves, or has to be left, is known.
+LogicalResult GridBuilder::finish(GridMemory &memory, MappingCounts &counts) {
+  if (failed(mapBlock(memory, counts)))
     return failure();
   beginQueues(memory);
-  finishGrid();
+  if (memory.rare)
+    finishRareRounds(memory);
+  scf::ForOp units = finishGrid(memory);
+  if (counts.rare) {
+    memory.keepOutboxesInBlock(threads);
+    countWorkInBlock(units, memory.launch);
+  }
   return success();
 }
 
@@ -469,6 +493,7 @@ LogicalResult ConvertPikoToGPUPass::convert(KernelOp kernel) {
   barriers += counts.threads;
   cut += counts.cut;
   deferred += counts.deferred;
+  rare += counts.rare;
   return success();
 }
 

@@ -88,8 +88,22 @@ ThreadMapping chooseMapping(mlir::Operation *loop, int64_t threads);
 /// Whether an operation is in a loop that is shared.
 bool hasSharedParent(mlir::Operation *op);
 
+/// Whether the parallel loops of a loop over primitives are all in branches
+/// that are rare (RareBranches.cpp), and there are such branches.
+bool hasRareIterationsOnly(mlir::Operation *loop);
+/// Makes regions of their own of the rare branches of a loop that threads
+/// share, which become functions; how many.
+int64_t setRareBranchesApart(mlir::scf::ForOp loop);
+
+/// Puts a second launch behind that of `memory`, for units in which primitives
+/// of a shared loop are rare; what that has. Nothing where it would show.
+std::optional<GridMemory> leaveRareRounds(mlir::scf::ForOp loop,
+                                          GridMemory &memory);
+/// Lets a launch leave units, or go on with them; behind mapBlock.
+void finishRareRounds(GridMemory &memory);
+
 struct MappingCounts {
-  int64_t shared = 0, threads = 0, cut = 0, deferred = 0;
+  int64_t shared = 0, threads = 0, cut = 0, deferred = 0, rare = 0;
 };
 
 /// What threads that share the iterations of a loop put off, in the block's
@@ -111,6 +125,18 @@ struct WorkQueue {
   void clear(Emitter &b, mlir::Value thread);
 };
 
+/// Where threads share primitives in rounds, and leave a unit to a second
+/// launch in front of a round with a rare one (RareRounds.cpp).
+struct RareRounds {
+  mlir::scf::ForOp cells, loop; ///< Over the unit's cells, and primitives.
+  /// What becomes of the loop: rounds, and in one a thread's turn.
+  mlir::scf::ForOp rounds;
+  mlir::scf::IfOp turn;
+  /// Of the first launch, in the block's memory: whether a thread has come to a
+  /// rare primitive, and whether the unit has been left.
+  mlir::Value found, left;
+};
+
 /// What a grid has for what its threads emit (piko.gpu.outboxes).
 struct GridMemory {
   mlir::gpu::LaunchOp launch;
@@ -122,12 +148,16 @@ struct GridMemory {
   llvm::SmallVector<std::pair<mlir::FlatSymbolRefAttr, int64_t>> locals;
   /// What iterations of loops that threads share put off.
   llvm::MapVector<mlir::Operation *, WorkQueue> queues;
+  std::optional<RareRounds> rare;
 
   int64_t getWords();
   /// Where the words of a local edge begin.
   int64_t getLocalBase(LocalBinOp local);
   void flush(mlir::OpBuilder &builder);
   void clearOutboxes(mlir::OpBuilder &builder);
+  /// Puts the outboxes of threads, which are many numbers, into the block's
+  /// memory.
+  void keepOutboxesInBlock(int64_t threads);
   /// Which primitive errors are about from here on.
   void setPosition(mlir::OpBuilder &builder, mlir::Value position);
   void setLocalCount(mlir::OpBuilder &builder, LocalBinOp local,

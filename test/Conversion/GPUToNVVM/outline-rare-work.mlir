@@ -70,3 +70,36 @@ gpu.module @kernels {
     gpu.return
   }
 }
+
+// -----
+
+// A region gives what it yields.
+// CHECK-LABEL: gpu.module @kernels
+// CHECK:         func.func @k_rare(%[[V:.*]]: f32{{.*}}) -> f32
+// CHECK:           memref.alloca() : memref<4xf32>
+// CHECK:           %[[X:.*]] = scf.execute_region
+// CHECK:           return %[[X]] : f32
+// CHECK:         gpu.func @k
+// CHECK-NOT:       memref.alloca
+// CHECK:           scf.if
+// CHECK-NEXT:        %[[R:.*]] = {{.*}}call @k_rare(
+// CHECK-NEXT:        scf.yield %[[R]] : f32
+
+// LLVM:         llvm.func internal @k_rare({{.*}}) -> f32
+gpu.module @kernels {
+  gpu.func @k(%out: !llvm.ptr, %is: i1, %v: f32, %at: index) kernel {
+    %own = memref.alloca() : memref<4xf32>
+    %r = scf.if %is -> f32 {
+      %x = scf.execute_region -> f32 no_inline {
+        memref.store %v, %own[%at] : memref<4xf32>
+        %y = memref.load %own[%at] : memref<4xf32>
+        scf.yield %y : f32
+      } {piko.rare}
+      scf.yield %x : f32
+    } else {
+      scf.yield %v : f32
+    }
+    llvm.store %r, %out : f32, !llvm.ptr
+    gpu.return
+  }
+}

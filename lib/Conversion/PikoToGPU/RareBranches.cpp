@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// A thread that has a primitive of its own may come to a branch that keeps
+// arrays, which the other way does not: clipping. Such a branch is *rare* if it
+// is there for its effects; one that finds a number may be as usual as the
+// other. In line it would cost all primitives its registers, and memory of the
+// thread's own; so
+//   1. it becomes a region of its own, which piko-outline-rare-work makes a
+//      function of;
+//   2. loops over iterations that only it has do not count where it is decided
+//      who takes what: they are the thread's.
+
+#include "PikoToGPU.h"
+
+#include "Piko/Dialect/Piko/IR/Marks.h"
+
+using namespace mlir;
+using namespace piko;
+
+/// The arrays that a region uses and `op`, which it is of, does not hold.
+static SmallVector<memref::AllocaOp> findArraysOutside(Operation *op,
+                                                       Region &region) {
+  SmallVector<memref::AllocaOp> arrays;
+  region.walk([&](Operation *inner) {
+    for (Value operand : inner->getOperands()) {
+      auto array = operand.getDefiningOp<memref::AllocaOp>();
+      if (array && !op->isAncestor(array) && !llvm::is_contained(arrays, array))
+        arrays.push_back(array);
+    }
+  });
+  return arrays;
+}
+
+/// The way of a condition in a loop that has arrays of its turn for itself,
+/// where the other one uses none; null if there is no such way.
+static Region *findRareWay(scf::IfOp branch, Operation *loop) {
+  SmallVector<Region *> ways;
+  for (Region &region : branch->getRegions()) {
+    if (region.empty())
+      return nullptr;
+    SmallVector<memref::AllocaOp> arrays = findArraysOutside(branch, region);
+    if (arrays.empty())
+      continue;
+    bool isOwn = llvm::all_of(arrays, [&](memref::AllocaOp array) {
+      return loop->isAncestor(array) &&
+             llvm::all_of(array->getUsers(), [&](Operation *user) {
+               return region.isAncestor(user->getParentRegion());
+             });
+    });
+    if (!isOwn)
+      return nullptr;
+    ways.push_back(&region);
+  }
+  return ways.size() == 1 ? ways.front() : nullptr;
+}
+
+static SmallVector<Region *> findRareWays(Operation *loop) {
+  SmallVector<Region *> rare;
+  loop->walk<WalkOrder::PreOrder>([&](Operation *op) {
+    if (llvm::is_contained(rare, op->getParentRegion()))
+      return WalkResult::skip();
+    if (auto branch = dyn_cast<scf::IfOp>(op); branch && !op->getNumResults())
+      if (Region *way = findRareWay(branch, loop))
+        rare.push_back(way);
+    return WalkResult::advance();
+  });
+  return rare;
+}
+
+bool piko::hasRareIterationsOnly(Operation *loop) {
+  SmallVector<Region *> rare = findRareWays(loop);
+  bool all = true;
+  loop->walk([&](ParallelLoopOpInterface parallel) {
+    all &= llvm::any_of(rare, [&](Region *way) {
+      return way->isAncestor(parallel->getParentRegion());
+    });
+  });
+  return all && !rare.empty();
+}
+
+int64_t piko::setRareBranchesApart(scf::ForOp loop) {
+  SmallVector<Region *> rare = findRareWays(loop);
+  for (Region *way : rare) {
+    Block &block = way->front();
+    OpBuilder builder(block.getTerminator());
+    Location loc = way->getParentOp()->getLoc();
+    auto apart = scf::ExecuteRegionOp::create(builder, loc, TypeRange(),
+                                              /*no_inline=*/true);
+    apart->setAttr(marks::rare, builder.getUnitAttr());
+    Block *inside = builder.createBlock(&apart.getRegion());
+    inside->getOperations().splice(inside->end(), block.getOperations(),
+                                   block.begin(), apart->getIterator());
+    scf::YieldOp::create(builder, loc);
+  }
+  return rare.size();
+}
