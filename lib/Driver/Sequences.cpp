@@ -256,6 +256,7 @@ void piko::addNVVMSequence(OpPassManager &passes) {
   OpPassManager &kernels = passes.nest<gpu::GPUModuleOp>();
   kernels.addPass(createReloadInputs());
   kernels.addPass(createOutlineRareWork());
+  kernels.addPass(createSpillToBlock());
   kernels.addPass(createSCFToControlFlowPass());
   kernels.addPass(createConvertGPUToExactNVVM());
   addCleanUp(kernels);

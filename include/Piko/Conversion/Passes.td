@@ -312,6 +312,54 @@ def OutlineRareWork : Pass<"piko-outline-rare-work", "::mlir::gpu::GPUModuleOp">
                            "::mlir::memref::MemRefDialect"];
 }
 
+def SpillToBlock : Pass<"piko-spill-to-block", "::mlir::gpu::GPUModuleOp"> {
+  let summary = "Keep what an innermost loop seldom needs in the block's memory";
+  let description = [{
+    **Requires** kernels as functions (`gpu-kernel-outlining`), with as many threads
+    as they say.
+
+    **Does**: in a kernel whose registers are bounded, numbers that are alive over an
+    innermost loop are spilled to the block's memory if they would take more than
+    `max-registers`, all but those that each turn of the loop uses. Such a number is
+    stored where it is known, at a place of the thread's own, and loaded again where
+    it is used under a condition in the loop, in turns of the loop around it, or
+    behind it; casts are made again there. The loads are not to be moved
+    (`nontemporal`).
+
+    Before:
+    ```
+    %depth = "setup"() : () -> f32
+    scf.for %x = %lo to %hi step %one {
+      %covered = "test"(%x) : (index) -> i1
+      scf.if %covered {
+        "shade"(%depth) : (f32) -> ()
+      }
+    }
+    ```
+    After:
+    ```
+    %depth = "setup"() : () -> f32
+    memref.store %depth, %places[%thread] : memref<64xf32, 3>
+    scf.for %x = %lo to %hi step %one {
+      %covered = "test"(%x) : (index) -> i1
+      scf.if %covered {
+        %again = memref.load %places[%thread] {nontemporal = true} : memref<64xf32, 3>
+        "shade"(%again) : (f32) -> ()
+      }
+    }
+    ```
+
+    **Limits**: no pointers, which are found again from numbers, and no truth values;
+    at most `max-bytes` a thread, and 24 KB of a block.
+  }];
+  let options = [Option<"maxRegisters", "max-registers", "int64_t", "52",
+                        "registers of 32 bits of what may be alive over a loop">,
+                 Option<"maxBytes", "max-bytes", "int64_t", "192",
+                        "of the block's memory for each thread">];
+  let statistics = [Statistic<"spilled", "spilled", "numbers that were spilled">];
+  let dependentDialects = ["::mlir::memref::MemRefDialect"];
+}
+
 def ReloadInputs : Pass<"piko-reload-inputs", "::mlir::gpu::GPUModuleOp"> {
   let summary = "Load members of the input where kernels need them";
   let description = [{
