@@ -14,7 +14,7 @@
 #include "common/Counters.h"
 #include "common/Executor.h"
 #include "common/Profile.h"
-#include "pikort/abi.h"
+#include "pikort/abi_layout.h"
 
 #include <array>
 #include <atomic>

@@ -6,7 +6,7 @@
 #ifndef PIKO_LIB_CONVERSION_PIKOTOLLVM_RUNTIMEABI_H
 #define PIKO_LIB_CONVERSION_PIKOTOLLVM_RUNTIMEABI_H
 
-#include "pikort/abi.h"
+#include "pikort/abi_layout.h"
 
 #include "mlir/IR/Builders.h"
 #include "llvm/ADT/StringRef.h"

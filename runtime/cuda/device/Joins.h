@@ -12,7 +12,7 @@
 #ifndef PIKO_RUNTIME_CUDA_DEVICE_JOINS_H
 #define PIKO_RUNTIME_CUDA_DEVICE_JOINS_H
 
-#include "pikort/abi.h"
+#include "pikort/abi_layout.h"
 #include "pikort/grid.h"
 
 namespace piko::cuda {
