@@ -13,8 +13,9 @@ static constexpr size_t alignment = 64;
 Warp::Warp(Block &block, uint32_t number, uint32_t threads)
     : program(&block.launch.program), block(block), number(number),
       first(number * warpSize), threads(threads) {
-  registers.resize((program->registerBytes + alignment) / sizeof(uint64_t) + 1);
-  auto start = reinterpret_cast<uintptr_t>(registers.data());
+  registers = std::make_unique_for_overwrite<uint64_t[]>( // reset() fills it
+      (program->registerBytes + alignment) / sizeof(uint64_t) + 1);
+  auto start = reinterpret_cast<uintptr_t>(registers.get());
   bank[0] =
       reinterpret_cast<uint8_t *>((start + alignment - 1) & ~(alignment - 1));
   // Written by no instruction.

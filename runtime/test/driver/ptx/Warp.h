@@ -16,6 +16,7 @@
 #include "ptx/Program.h"
 
 #include <bit>
+#include <memory>
 #include <span>
 
 namespace piko::ptx {
@@ -156,7 +157,7 @@ private:
   bool reselect = false;  ///< The current group is not what runs next.
   bool exhausted = false; ///< It has had its turn.
   uint32_t threads;
-  std::vector<uint64_t> registers; ///< Room for alignment in front.
+  std::unique_ptr<uint64_t[]> registers; ///< Room for alignment in front.
   std::vector<uint8_t> localMemory, callMemory;
 };
 
