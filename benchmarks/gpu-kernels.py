@@ -26,7 +26,7 @@ from gpu_model.slots import find_assembler
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 # What most of a frame's time goes to, as EXAMPLE/PIPELINE/KERNEL.
 HOT = ["raster/Fused/kernel_rasterizer", "raster/Tiled/kernel_rasterizer",
-       "visibility/*/kernel_coverage"]
+       "visibility/*/kernel_coverage", "visibility/*/kernel_shade"]
 OF_BLOCK = ["threads", "block memory", "stack"]
 
 

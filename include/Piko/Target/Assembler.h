@@ -6,6 +6,7 @@
 #ifndef PIKO_TARGET_ASSEMBLER_H
 #define PIKO_TARGET_ASSEMBLER_H
 
+#include "llvm/ADT/ArrayRef.h"
 #include "llvm/ADT/StringRef.h"
 #include "llvm/Support/Error.h"
 
@@ -26,10 +27,11 @@ struct Assembly {
   std::string report; ///< What `ptxas -v` prints.
 };
 
-/// Assembles PTX for a chip such as sm_90; an error with the assembler's own
-/// text if it refuses.
+/// Assembles PTX for a chip such as sm_90, or only those of its kernels that
+/// are named; an error with the assembler's own text if it refuses.
 llvm::Expected<Assembly> assemble(llvm::StringRef assembler,
-                                  llvm::StringRef ptx, llvm::StringRef chip);
+                                  llvm::StringRef ptx, llvm::StringRef chip,
+                                  llvm::ArrayRef<std::string> kernels = {});
 
 /// Each toolkit leaves out chips that the one before it knew.
 bool knowsChip(llvm::StringRef assembler, llvm::StringRef chip);

@@ -31,6 +31,20 @@ struct KernelResources {
   std::optional<double> getOccupancy(llvm::StringRef chip) const;
 };
 
+struct AssembledKernels {
+  std::vector<KernelResources> kernels; ///< In the order of the module.
+  std::string cubin;
+};
+
+/// Assembles `ptx`, which was made of the module. A kernel that spills
+/// registers may have more of them, if it spills none then, a multiprocessor
+/// has room for at least three quarters of the threads, and it calls no
+/// function.
+llvm::Expected<AssembledKernels> assembleKernels(llvm::StringRef assembler,
+                                                 const llvm::Module &kernels,
+                                                 llvm::StringRef ptx,
+                                                 llvm::StringRef chip);
+
 struct KernelReport {
   std::vector<KernelResources> kernels; ///< In the order of the module.
   std::string source; ///< "ptxas", or why nothing was assembled.

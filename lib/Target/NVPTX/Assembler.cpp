@@ -77,7 +77,8 @@ private:
 } // namespace
 
 Expected<Assembly> piko::assemble(StringRef assembler, StringRef ptx,
-                                  StringRef chip) {
+                                  StringRef chip,
+                                  ArrayRef<std::string> kernels) {
   TemporaryFile input("ptx"), output("cubin"), printed("txt");
   if (!input.exists() || !output.exists() || !printed.exists())
     return createStringError("cannot make a temporary file");
@@ -85,8 +86,10 @@ Expected<Assembly> piko::assemble(StringRef assembler, StringRef ptx,
     return createStringError("cannot write '" + input.getPath() + "'");
   std::string architecture = ("-arch=" + chip).str(), failed;
   StringRef report = printed.getPath();
-  StringRef arguments[] = {assembler,        "-v",           architecture, "-o",
-                           output.getPath(), input.getPath()};
+  SmallVector<StringRef> arguments = {
+      assembler, "-v", architecture, "-o", output.getPath(), input.getPath()};
+  for (const std::string &kernel : kernels)
+    arguments.append({"-e", kernel});
   int result = sys::ExecuteAndWait(
       assembler, arguments, std::nullopt, {StringRef(), report, report},
       /*SecondsToWait=*/0, /*MemoryLimit=*/0, &failed);

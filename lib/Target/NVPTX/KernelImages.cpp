@@ -5,6 +5,7 @@
 #include "Piko/Target/KernelImages.h"
 
 #include "Piko/Target/Assembler.h"
+#include "Piko/Target/KernelResources.h"
 #include "Piko/Target/PTX.h"
 
 #include "llvm/IR/Constants.h"
@@ -14,16 +15,16 @@ using namespace piko;
 
 /// A cubin of `ptx` for a chip; nothing where there can be none.
 static std::optional<std::string>
-makeCubin(StringRef assembler, StringRef ptx, StringRef chip,
-          function_ref<void(const MissingCubin &)> report) {
+makeCubin(StringRef assembler, const Module &kernels, StringRef ptx,
+          StringRef chip, function_ref<void(const MissingCubin &)> report) {
   if (assembler.empty()) {
     report({chip.str(), "no ptxas was found", false});
     return std::nullopt;
   }
-  Expected<Assembly> assembly = assemble(assembler, ptx, chip);
-  if (assembly)
-    return std::move(assembly->cubin);
-  std::string reason = toString(assembly.takeError());
+  auto assembled = assembleKernels(assembler, kernels, ptx, chip);
+  if (assembled)
+    return std::move(assembled->cubin);
+  std::string reason = toString(assembled.takeError());
   if (knowsChip(assembler, chip))
     report({chip.str(), reason, true});
   else
@@ -73,7 +74,7 @@ Error piko::embedKernels(Module &host, Module &kernels, StringRef name,
   std::string assembler = gpu.cubins.empty() ? "" : findAssembler();
   SmallVector<Constant *> images;
   for (const std::string &chip : gpu.cubins)
-    if (auto cubin = makeCubin(assembler, *ptx, chip, report))
+    if (auto cubin = makeCubin(assembler, kernels, *ptx, chip, report))
       images.push_back(makeImage(host, (name + "." + chip).str(), *cubin,
                                  getChipNumber(chip),
                                  StringRef(chip).ends_with("a")));

@@ -5,6 +5,8 @@
 
 #include "Piko/Target/KernelResources.h"
 
+#include "KernelReports.h"
+
 #include "Piko/Target/Assembler.h"
 
 #include "llvm/ADT/SetVector.h"
@@ -72,7 +74,7 @@ static void collectUsers(const User *user,
       collectUsers(next, functions);
 }
 
-static std::vector<KernelResources> findKernels(const Module &module) {
+std::vector<KernelResources> piko::findKernels(const Module &module) {
   std::vector<KernelResources> kernels;
   constexpr unsigned sharedSpace = 3;
   for (const Function &function : module) {
@@ -111,8 +113,7 @@ static int64_t getNumberBefore(StringRef line, StringRef what) {
 /// Reads what `ptxas -v` prints: a line with the kernel's name, one with its
 /// stack and spills, one with its registers; then the same of functions that it
 /// calls, whose spills are theirs.
-static void readReport(StringRef report,
-                       std::vector<KernelResources> &kernels) {
+void piko::readReport(StringRef report, std::vector<KernelResources> &kernels) {
   KernelResources *kernel = nullptr;
   bool isOwn = false;
   for (StringRef line : split(report, '\n')) {
@@ -140,20 +141,16 @@ static void readReport(StringRef report,
 
 Expected<KernelReport> piko::measureKernels(const Module &module, StringRef ptx,
                                             StringRef chip) {
-  KernelReport result{findKernels(module), "ptxas"};
   std::string assembler = findAssembler();
-  if (assembler.empty()) {
-    result.source = "no ptxas was found to say the rest";
-    return result;
-  }
-  Expected<Assembly> assembly = assemble(assembler, ptx, chip);
-  if (assembly) {
-    readReport(assembly->report, result.kernels);
-    return result;
-  }
+  if (assembler.empty())
+    return KernelReport{findKernels(module),
+                        "no ptxas was found to say the rest"};
+  auto assembled = assembleKernels(assembler, module, ptx, chip);
+  if (assembled)
+    return KernelReport{std::move(assembled->kernels), "ptxas"};
   if (knowsChip(assembler, chip))
-    return assembly.takeError();
-  consumeError(assembly.takeError());
-  result.source = ("the ptxas that was found does not know " + chip).str();
-  return result;
+    return assembled.takeError();
+  consumeError(assembled.takeError());
+  return KernelReport{findKernels(module),
+                      ("the ptxas that was found does not know " + chip).str()};
 }
