@@ -17,9 +17,9 @@ const std::vector<std::string> &SynthesisOptions::getOptional() {
       "pre-schedule", "infer-directives", "fuse-stages", "test-early", "prune",
       "own-pixels", "eliminate-schedules", "fuse-kernels", "form-strips",
       "defer-shading", "form-tiles", "prefetch", "vectorize", "prove-bounds",
-      "hoist-loads", "hoist-bounds", "merge-bounds", "thread-jumps", "narrow-integers",
-      "merge-gathers", "pair-gathers", "tabulate-invariants", "if-convert",
-      "uplift-pixel-loops", "privatize",
+      "hoist-loads", "hoist-bounds", "merge-bounds", "thread-jumps",
+      "narrow-integers", "merge-gathers", "pair-gathers", "tabulate-invariants",
+      "if-convert", "uplift-pixel-loops", "privatize",
       // of LLVM
       "loop-vectorize", "slp-vectorizer"};
   return names;
