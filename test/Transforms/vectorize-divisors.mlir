@@ -49,7 +49,7 @@ piko.pipeline @P rank 1 {
         }
         piko.store %q, checked @out[%x : index] "n" : i32
       } {piko.lanes}
-    } {piko.units = #piko<units any>}
+    } {piko.units = #piko<units shared>}
     piko.storage.close_bins %bins : !piko.bins<@N>
   }
   piko.program {

@@ -34,9 +34,10 @@ THREADS = [1, 2, 7]
 STRIPS = [None, 100]
 PASSES = ["pre-schedule", "infer-directives", "fuse-stages", "test-early", "prune",
           "own-pixels", "eliminate-schedules", "fuse-kernels", "form-strips",
-          "defer-shading", "form-tiles", "prefetch", "vectorize", "prove-bounds", "hoist-loads", "hoist-bounds",
-          "merge-bounds", "thread-jumps", "narrow-integers", "merge-gathers", "pair-gathers",
-          "privatize", "if-convert"]
+          "defer-shading", "form-tiles", "prefetch", "vectorize", "prove-bounds",
+          "hoist-loads", "hoist-bounds", "merge-bounds", "thread-jumps",
+          "narrow-integers", "merge-gathers", "pair-gathers", "privatize",
+          "if-convert"]
 
 SIZE = ["--width", "131", "--height", "99", "--lights", "3"]
 
@@ -100,18 +101,38 @@ def mappings():
         yield bin_size, core, rest, split, apart, waits
 
 
+class Subsets:
+    """All subsets of some things, in an order that mixes them: a permutation of
+    their numbers, as a list of all of them would take too much memory."""
+
+    def __init__(self, size, shuffled):
+        self.size = size
+        self.factors = [shuffled.randrange(1, 1 << size, 2) for _ in range(2)]
+
+    def __len__(self):
+        return 1 << self.size
+
+    def __getitem__(self, number):
+        for factor in self.factors:
+            number = number * factor % len(self)
+            number ^= number >> (self.size // 2)
+        return [bool(number >> i & 1) for i in range(self.size)]
+
+
 def combinations(example):
     """All combinations, in an order that mixes them."""
     shuffled = random.Random(example.name)
     choices = [list(mappings()) for _ in range(example.mappings)]
-    choices += [list(itertools.product([False, True], repeat=len(PASSES))),
-                THREADS, STRIPS]
-    total = 1
+    choices += [THREADS[:], STRIPS[:]]
     for options in choices:
         shuffled.shuffle(options)
-        total *= len(options)
-    # A step that has no divisor in common with any of the sizes.
-    step = 1000003
+    choices.insert(example.mappings, Subsets(len(PASSES), shuffled))
+    total = math.prod(map(len, choices))
+    # The golden section of all, without a divisor in common with it: what varies
+    # slowest changes in a few steps, too.
+    step = int(total * (math.sqrt(5) - 1) / 2)
+    while math.gcd(step, total) != 1:
+        step += 1
     for number in range(total):
         rest, picked = number * step % total, []
         for options in choices:

@@ -16,9 +16,9 @@ EQUAL, BLANK = "equal", "equal, but blank"
 #: What piko-compare may leave out of synthesis.
 PASSES = ["pre-schedule", "infer-directives", "fuse-stages", "test-early", "prune",
           "own-pixels", "eliminate-schedules", "fuse-kernels", "defer-shading",
-          "form-tiles",
-          "prefetch", "vectorize", "prove-bounds", "hoist-loads", "hoist-bounds", "merge-bounds",
-          "thread-jumps", "narrow-integers", "merge-gathers", "pair-gathers", "if-convert", "uplift-pixel-loops",
+          "form-tiles", "prefetch", "vectorize", "prove-bounds", "hoist-loads",
+          "hoist-bounds", "merge-bounds", "thread-jumps", "narrow-integers",
+          "merge-gathers", "pair-gathers", "if-convert", "uplift-pixel-loops",
           "privatize"]
 
 
