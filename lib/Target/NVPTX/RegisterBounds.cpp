@@ -3,8 +3,9 @@
 // ptxas spills where it takes more threads at a time to be worth it, or where a
 // bound says so (.maxnreg). A few registers more may spare all of that at
 // little cost, and how many only ptxas can say:
-//   1. assemble; kernels that spill get a higher bound, as long as at least
-//      three quarters of the threads still have room;
+//   1. assemble; kernels that spill no more than such registers could hold get
+//      a higher bound, as long as at least three quarters of the threads still
+//      have room;
 //   2. again, those alone, at most three times, by 8 registers each;
 //   3. those that spill all the same have what they had.
 
@@ -27,6 +28,13 @@ static constexpr double leastOccupancy = 0.75;
 static bool spills(const KernelResources &kernel) {
   return kernel.assembled &&
          kernel.assembled->spillStores + kernel.assembled->spillLoads > 0;
+}
+
+/// Whether what it spills may find room in the registers of all tries.
+static bool spillsLittle(const KernelResources &kernel) {
+  constexpr int64_t registerBytes = 4;
+  return spills(kernel) &&
+         kernel.assembled->spillStores <= tries * piece * registerBytes;
 }
 
 /// PTX in which a kernel's directives say the bound.
@@ -101,7 +109,7 @@ RegisterBounds::assembleBounded(ArrayRef<std::string> kernels) {
 std::vector<std::string> RegisterBounds::raise() {
   std::vector<std::string> raised;
   for (auto [before, kernel, bound] : zip(first, now, bounds)) {
-    if (!spills(kernel) || callsFunction(kernel.kernel))
+    if (!spillsLittle(kernel) || callsFunction(kernel.kernel))
       continue;
     int64_t known = std::max(bound, kernel.assembled->registers);
     int64_t next = alignDown(known, piece) + piece;
