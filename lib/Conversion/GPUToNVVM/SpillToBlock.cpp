@@ -3,9 +3,8 @@
 // piko-spill-to-block: numbers that are alive over an innermost loop, and that
 // it needs under a condition or not at all, are in the block's memory. For each
 // such loop of a kernel
-//   1. count the registers of what is alive over it: if there are few, leave
-//   all
-//      as it is;
+//   1. count the registers of what is alive over it: if there are few, all
+//      stays as it is;
 //   2. a number that each of its turns needs stays in a register;
 //   3. any other is stored where it is known, at a place of the thread's, and
 //      loaded where it is used inside of the loop, or behind it. The load is
