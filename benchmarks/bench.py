@@ -33,7 +33,8 @@ from suite import (against, fusion, kernels, maths, page, raster, roofline,
                    runtime)
 
 ROOT = bodies.ROOT
-SECTIONS = {"raster": raster, "fusion": fusion, "kernels": kernels, "bodies": bodies_section,
+SECTIONS = {"raster": raster, "fusion": fusion, "kernels": kernels,
+            "bodies": bodies_section,
             "runtime": runtime, "maths": maths, "roofline": roofline}
 RASTERIZERS = [*PIPES, raster.VISIBILITY]
 BUNNY = "/usr/share/glmark2/models/bunny.obj"
@@ -133,6 +134,8 @@ def check(parser, options):
     if len(set(names)) < len(names):
         parser.error("--peer: expected a name for each, which is not Piko, but "
                      f"got {', '.join(names[1:])}")
+    if "fusion" in options.sections and not fusion.find_pipes(options):
+        parser.error("--pipes: fusion expected pipelines of examples/raster")
     if {"raster", "fusion", "kernels"} & set(options.sections) \
             and options.scene == [BUNNY] and not os.path.exists(BUNNY):
         parser.error(f"expected --scene, because there is no {BUNNY} (Debian: "

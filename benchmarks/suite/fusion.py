@@ -12,18 +12,21 @@ from suite.section import Rounds, Section, draw_groups
 FUSED, APART = "BinnedFused", "Binned"
 
 
+def find_pipes(options):
+    return [pipe for pipe in options.pipes if pipe != VISIBILITY]
+
+
 def measure_case(options, scene, lights):
-    pipes = [pipe for pipe in options.pipes if pipe != VISIBILITY]
-    times = {pipe: [] for pipe in pipes}
+    times = {pipe: [] for pipe in find_pipes(options)}
     for _ in range(options.rounds):
-        for pipe in pipes:
+        for pipe in times:
             run = measure_pipe(options, scene, pipe, lights, options.threads[-1])
             times[pipe].append(run["ms_median"])
     return {pipe: Rounds(rounds) for pipe, rounds in times.items()}
 
 
 def measure(options):
-    pipes = [pipe for pipe in options.pipes if pipe != VISIBILITY]
+    pipes = find_pipes(options)
     rows, records, cases = [], [], {}
     for scene in options.scene:
         word = os.path.basename(shlex.split(scene)[0])

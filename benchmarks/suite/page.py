@@ -83,7 +83,8 @@ def write_page(sections, machine, folder):
 def measure_all(names, measure, notes, folder):
     """Measures a section for each name, prints its table, and writes its CSV file and
     chart into the folder, and a page with all that there are so far. `measure` takes a
-    name; charts are left out where matplotlib is not installed. Returns the sections."""
+    name; charts are left out where matplotlib is not installed. Returns the
+    sections."""
     program = os.path.splitext(os.path.basename(sys.argv[0]))[0]
     pyplot = find_pyplot()
     sections = []
