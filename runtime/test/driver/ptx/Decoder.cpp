@@ -2,19 +2,21 @@
 //===- Decoder.cpp - Programs of kernels ----------------------------------===//
 //
 // 1. The entry function and those that it calls, one after the other, get
-// places
-//    for their variables and parameters.
+//    places for their variables and parameters.
 // 2. Statements become instructions; registers and constants get their places
-//    where they are first used.
+//    where they are first used, and give them back where a basic block knows of
+//    their last use.
 // 3. Labels and functions become numbers of instructions.
 // 4. Branches learn where their lanes meet again.
 //
 //===----------------------------------------------------------------------===//
 
 #include "ptx/Decoder.h"
+#include "ptx/Locals.h"
 
 #include <algorithm>
 #include <cstring>
+#include <optional>
 #include <utility>
 
 using namespace piko::ptx;
@@ -93,6 +95,8 @@ private:
   void checkRecursion(const std::string &function, int depth) const;
   const Type *typeOf(std::string_view name) const;
   Operand place(uint8_t bytes);
+  Operand placeOf(const std::string &name, uint8_t bytes);
+  void freeLocals(size_t statement);
   uint64_t allocate(uint64_t &end, const Variable &variable);
 
   const ModuleSyntax &module;
@@ -108,6 +112,10 @@ private:
   // Of the function that is decoded.
   const FunctionSyntax *current = nullptr;
   std::map<std::string, Register, std::less<>> registers;
+  std::optional<BlockLocals> locals;
+  /// Places of block locals that are over. By width: lanes that wait in a block
+  /// while others run elsewhere keep theirs.
+  std::map<uint8_t, std::vector<Operand>> free;
   std::map<uint32_t, std::string> labels, tables; ///< Of instructions.
   std::map<uint32_t, std::string> callees;        ///< Of all functions.
 };
@@ -175,6 +183,21 @@ Operand ProgramDecoder::place(uint8_t bytes) {
   return operand;
 }
 
+Operand ProgramDecoder::placeOf(const std::string &name, uint8_t bytes) {
+  std::vector<Operand> &unused = free[bytes];
+  if (unused.empty() || !locals->contains(name))
+    return place(bytes);
+  Operand operand = unused.back();
+  unused.pop_back();
+  return operand;
+}
+
+void ProgramDecoder::freeLocals(size_t statement) {
+  for (std::string_view name : locals->endingAt(statement))
+    if (auto found = registers.find(name); found != registers.end())
+      free[found->second.place.bytes].push_back(found->second.place);
+}
+
 const Type *ProgramDecoder::typeOf(std::string_view name) const {
   for (const RegisterFamily &family : current->registers) {
     if (!family.count) {
@@ -205,8 +228,8 @@ Operand ProgramDecoder::registerOf(const std::string &name, Type *type) {
   Register made;
   if (const Type *declared = typeOf(name)) {
     made.type = *declared;
-    made.place =
-        place(declared->isPredicate()
+    made.place = placeOf(
+        name, declared->isPredicate()
                   ? 0
                   : static_cast<uint8_t>(std::max(declared->bytes(), 2u)));
   } else if (name == "%carry") { // Of add.cc, in no program's text.
@@ -346,14 +369,17 @@ void ProgramDecoder::linkLabels(const FunctionSyntax &function,
 void ProgramDecoder::decodeFunction(const FunctionSyntax &function) {
   current = &function;
   registers.clear();
+  locals.emplace(function);
+  free.clear();
   labels.clear();
   tables.clear();
   auto first = static_cast<uint32_t>(program.code.size());
   places.find(function.name)->second.first = first;
   std::vector<uint32_t> starts;
-  for (const Statement &statement : function.statements) {
+  for (size_t i = 0; i < function.statements.size(); ++i) {
     starts.push_back(static_cast<uint32_t>(program.code.size()));
-    decodeStatement(statement);
+    decodeStatement(function.statements[i]);
+    freeLocals(i);
   }
   starts.push_back(static_cast<uint32_t>(program.code.size()));
   program.code.push_back(implicitReturn(function.statements.empty()

@@ -47,19 +47,59 @@ void Warp::fault(FaultKind kind, const std::string &what, uint32_t lane) const {
                         thread / threads[0] / threads[1]})};
 }
 
-Block::Block(Launch &launch) : launch(launch) {
-  threadCount = launch.threads[0] * launch.threads[1] * launch.threads[2];
-  sharedSize = uint64_t(launch.program.sharedBytes) + launch.dynamicSharedBytes;
-  // In units that keep the strictest alignment of an access.
-  sharedMemory.resize((sharedSize + 15) / 16 * 2 + 2);
-  auto start = reinterpret_cast<uintptr_t>(sharedMemory.data());
-  auto *shared = reinterpret_cast<uint8_t *>((start + 15) & ~uintptr_t(15));
+/// Of a part of a workspace: a cache line and a vector of registers.
+static constexpr size_t alignment = 64;
+
+size_t Workspace::sizeOf(std::initializer_list<size_t> parts) {
+  size_t sum = 0;
+  for (size_t bytes : parts)
+    sum += (bytes + alignment - 1) / alignment * alignment;
+  return sum;
+}
+
+void Workspace::reset(size_t bytes) {
+  if (!memory || bytes > capacity) {
+    memory.reset(); // Not both at a time.
+    memory = std::make_unique_for_overwrite<uint8_t[]>(bytes + alignment);
+    capacity = bytes;
+  }
+  auto start = reinterpret_cast<uintptr_t>(memory.get());
+  next = reinterpret_cast<uint8_t *>((start + alignment - 1) / alignment *
+                                     alignment);
+}
+
+uint8_t *Workspace::take(size_t bytes) {
+  return std::exchange(next, next + sizeOf({bytes}));
+}
+
+static uint32_t threadsOf(const Launch &launch) {
+  return launch.threads[0] * launch.threads[1] * launch.threads[2];
+}
+
+static uint64_t sharedBytesOf(const Launch &launch) {
+  return uint64_t(launch.program.sharedBytes) + launch.dynamicSharedBytes;
+}
+
+Block::Block(Launch &launch, Workspace &workspace)
+    : launch(launch), threadCount(threadsOf(launch)),
+      sharedSize(sharedBytesOf(launch)),
+      sharedMemory(workspace.take(sharedSize)) {
   for (uint32_t first = 0; first < threadCount; first += warpSize) {
     warps.push_back(std::make_unique<Warp>(
-        *this, first / warpSize, std::min(warpSize, threadCount - first)));
-    warps.back()->shared = shared;
+        *this, first / warpSize, std::min(warpSize, threadCount - first),
+        workspace));
+    warps.back()->shared = sharedMemory;
     warps.back()->sharedBytes = sharedSize;
   }
+}
+
+size_t Block::bytesFor(const Launch &launch) {
+  const Program &program = launch.program;
+  size_t warps = (threadsOf(launch) + warpSize - 1) / warpSize;
+  return Workspace::sizeOf({sharedBytesOf(launch)}) +
+         warps * Workspace::sizeOf({program.registerBytes,
+                                    size_t(program.localBytes) * warpSize,
+                                    size_t(program.callBytes) * warpSize});
 }
 
 /// Each has its turn. With a seed the order and the length of turns vary, so
@@ -83,8 +123,7 @@ void Block::begin(uint64_t number) {
   index = {static_cast<uint32_t>(number % launch.blocks[0]),
            static_cast<uint32_t>(number / launch.blocks[0] % launch.blocks[1]),
            static_cast<uint32_t>(number / launch.blocks[0] / launch.blocks[1])};
-  std::memset(sharedMemory.data(), unwritten,
-              sharedMemory.size() * sizeof(uint64_t));
+  std::memset(sharedMemory, unwritten, sharedSize);
   for (auto &warp : warps)
     warp->reset();
   random.seed(launch.seed + number);
@@ -243,9 +282,12 @@ void piko::ptx::run(Launch &launch) {
   }
   std::vector<std::unique_ptr<Block>> blocks;
   std::vector<Block *> running;
-  for (uint64_t i = 0; i < (launch.cooperative ? count : 1); ++i)
+  const uint64_t together = launch.cooperative ? count : 1;
+  static thread_local Workspace workspace;
+  workspace.reset(together * Block::bytesFor(launch));
+  for (uint64_t i = 0; i < together; ++i)
     running.push_back(
-        blocks.emplace_back(std::make_unique<Block>(launch)).get());
+        blocks.emplace_back(std::make_unique<Block>(launch, workspace)).get());
   for (uint64_t i = 0; i < count; i += running.size()) {
     for (size_t j = 0; j < running.size(); ++j)
       running[j]->begin(launch.seed ? order[i + j] : i + j);

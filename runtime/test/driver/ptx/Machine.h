@@ -7,6 +7,7 @@
 #include "ptx/Footprint.h"
 #include "ptx/Warp.h"
 
+#include <initializer_list>
 #include <memory>
 #include <random>
 
@@ -55,10 +56,30 @@ struct Launch {
   uint64_t longestWarp = 0;
 };
 
+/// Memory of the blocks that run: registers, local and shared memory. Kept from
+/// one launch to the next, because to map and clear pages anew takes longer
+/// than most kernels.
+class Workspace {
+public:
+  /// The bytes that parts of these sizes take.
+  static size_t sizeOf(std::initializer_list<size_t> parts);
+  /// Room for so many bytes; what was taken is invalid.
+  void reset(size_t bytes);
+  /// The next part, at a multiple of 64 bytes. Its content is unspecified.
+  uint8_t *take(size_t bytes);
+
+private:
+  std::unique_ptr<uint8_t[]> memory;
+  size_t capacity = 0;
+  uint8_t *next = nullptr;
+};
+
 /// A block and its warps.
 class Block {
 public:
-  explicit Block(Launch &launch);
+  Block(Launch &launch, Workspace &workspace);
+  /// The memory that a block takes of a workspace.
+  static size_t bytesFor(const Launch &launch);
   void begin(uint64_t number);
   enum class Turn : uint8_t { Ended, Over, Asleep };
   /// Wakes what sleeps, and runs until nothing is awake or the turn is over.
@@ -86,7 +107,7 @@ private:
 
   bool arrived = false;
   std::mt19937_64 random;
-  std::vector<uint64_t> sharedMemory;
+  uint8_t *sharedMemory;
   std::vector<std::unique_ptr<Warp>> warps;
 };
 

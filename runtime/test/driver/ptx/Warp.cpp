@@ -8,22 +8,15 @@
 
 using namespace piko::ptx;
 
-static constexpr size_t alignment = 64;
-
-Warp::Warp(Block &block, uint32_t number, uint32_t threads)
+Warp::Warp(Block &block, uint32_t number, uint32_t threads,
+           Workspace &workspace)
     : program(&block.launch.program), block(block), number(number),
       first(number * warpSize), threads(threads) {
-  registers = std::make_unique_for_overwrite<uint64_t[]>( // reset() fills it
-      (program->registerBytes + alignment) / sizeof(uint64_t) + 1);
-  auto start = reinterpret_cast<uintptr_t>(registers.get());
-  bank[0] =
-      reinterpret_cast<uint8_t *>((start + alignment - 1) & ~(alignment - 1));
+  bank[0] = workspace.take(program->registerBytes);
   // Written by no instruction.
   bank[1] = const_cast<uint8_t *>(program->constants.data());
-  localMemory.resize(size_t(program->localBytes) * warpSize);
-  callMemory.resize(size_t(program->callBytes) * warpSize);
-  local = localMemory.data();
-  calls = callMemory.data();
+  local = workspace.take(size_t(program->localBytes) * warpSize);
+  calls = workspace.take(size_t(program->callBytes) * warpSize);
   parameters = block.launch.parameters.data();
 }
 
@@ -75,8 +68,8 @@ static uint32_t valueOf(Special special, const Block &block, uint32_t thread) {
 
 void Warp::reset() {
   std::memset(bank[0], unwritten, program->registerBytes);
-  std::fill(localMemory.begin(), localMemory.end(), unwritten);
-  std::fill(callMemory.begin(), callMemory.end(), unwritten);
+  std::memset(local, unwritten, size_t(program->localBytes) * warpSize);
+  std::memset(calls, unwritten, size_t(program->callBytes) * warpSize);
   for (const SpecialRegister &it : program->specials)
     for (uint32_t lane = 0; lane < warpSize; ++lane) {
       uint32_t value = valueOf(it.special, block, first + lane);

@@ -16,12 +16,12 @@
 #include "ptx/Program.h"
 
 #include <bit>
-#include <memory>
 #include <span>
 
 namespace piko::ptx {
 
 class Block;
+class Workspace;
 
 enum class FaultKind : uint8_t {
   IllegalAddress,
@@ -68,7 +68,7 @@ struct Group {
 
 class Warp {
 public:
-  Warp(Block &block, uint32_t number, uint32_t threads);
+  Warp(Block &block, uint32_t number, uint32_t threads, Workspace &workspace);
 
   /// Begins the kernel anew.
   void reset();
@@ -157,8 +157,6 @@ private:
   bool reselect = false;  ///< The current group is not what runs next.
   bool exhausted = false; ///< It has had its turn.
   uint32_t threads;
-  std::unique_ptr<uint64_t[]> registers; ///< Room for alignment in front.
-  std::vector<uint8_t> localMemory, callMemory;
 };
 
 } // namespace piko::ptx
