@@ -199,6 +199,10 @@ void piko::addVectorSequence(OpPassManager &passes,
     passes.nest<PipelineOp>().addPass(createTabulateInvariants());
     addCleanUp(passes);
   }
+  if (options.has("unroll-and-jam")) {
+    passes.nest<PipelineOp>().addPass(createUnrollAndJam());
+    addCleanUp(passes);
+  }
   if (options.count == Counting::Lanes)
     passes.nest<PipelineOp>().addPass(createCountLanes());
   passes.nest<PipelineOp>().addPass(createConvertPikoToOpenMP());

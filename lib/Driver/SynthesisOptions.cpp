@@ -19,7 +19,7 @@ const std::vector<std::string> &SynthesisOptions::getOptional() {
       "defer-shading", "form-tiles", "prefetch", "vectorize", "prove-bounds",
       "hoist-loads", "hoist-bounds", "merge-bounds", "thread-jumps",
       "narrow-integers", "merge-gathers", "pair-gathers", "tabulate-invariants",
-      "if-convert", "uplift-pixel-loops", "privatize",
+      "unroll-and-jam", "if-convert", "uplift-pixel-loops", "privatize",
       // of LLVM
       "loop-vectorize", "slp-vectorizer"};
   return names;

@@ -14,16 +14,33 @@ using Predicate = arith::CmpIPredicate;
 // Counts
 //===----------------------------------------------------------------------===//
 
+/// Whether a loop that counts up by one goes on while it is less than a number
+/// that it does not change.
+static bool isLess(arith::CmpIOp compare, Value first) {
+  if (compare.getPredicate() == Predicate::slt)
+    return true;
+  // From a number that is known to one that is not below it, as signed ones.
+  APInt least, greatest;
+  if (!matchPattern(first, m_ConstantInt(&least)) ||
+      !matchPattern(compare.getRhs(), m_ConstantInt(&greatest)) ||
+      least.sgt(greatest))
+    return false;
+  return compare.getPredicate() == Predicate::ne ||
+         (compare.getPredicate() == Predicate::ult && least.isNonNegative());
+}
+
 static std::optional<LoopCount> findLoopCount(scf::WhileOp loop) {
   auto compare =
       loop.getConditionOp().getCondition().getDefiningOp<arith::CmpIOp>();
-  if (!compare || compare.getPredicate() != Predicate::slt ||
+  if (!compare ||
       loop->isAncestor(compare.getRhs().getParentBlock()->getParentOp()))
     return {};
   auto before = dyn_cast<BlockArgument>(compare.getLhs());
   if (!before || before.getOwner() != loop.getBeforeBody())
     return {};
   unsigned i = before.getArgNumber();
+  if (!isLess(compare, loop.getInits()[i]))
+    return {};
   auto step = loop.getYieldOp().getResults()[i].getDefiningOp<arith::AddIOp>();
   if (!step || !matchPattern(step.getRhs(), m_One()))
     return {};
@@ -181,7 +198,7 @@ std::optional<IndexRanges::Range> IndexRanges::findOfOperation(Operation *op) {
     return yes && no ? getUnion(*yes, *no) : std::optional<Range>();
   }
   if (!isa<arith::AddIOp, arith::SubIOp, arith::MulIOp, arith::MinSIOp,
-           arith::MaxSIOp>(op))
+           arith::MaxSIOp, arith::OrIOp>(op))
     return {};
   std::optional<Range> a = get(op->getOperand(0)), b = get(op->getOperand(1));
   if (!a || !b)
@@ -191,6 +208,12 @@ std::optional<IndexRanges::Range> IndexRanges::findOfOperation(Operation *op) {
   if (isa<arith::AddIOp>(op))
     return Range{create<arith::AddIOp>(a->least, b->least),
                  create<arith::AddIOp>(a->greatest, b->greatest)};
+  if (isa<arith::OrIOp>(op)) { // of bits that differ, as a rule: a sum
+    expect(Predicate::sge, a->least, constant(0));
+    expect(Predicate::sge, b->least, constant(0));
+    return Range{create<arith::MaxSIOp>(a->least, b->least),
+                 create<arith::AddIOp>(a->greatest, b->greatest)};
+  }
   if (isa<arith::SubIOp>(op))
     return Range{create<arith::SubIOp>(a->least, b->greatest),
                  create<arith::SubIOp>(a->greatest, b->least)};

@@ -12,5 +12,6 @@ include "Piko/Transforms/AuthoredPasses.td"
 include "Piko/Transforms/KernelPasses.td"
 include "Piko/Transforms/MachinePasses.td"
 include "Piko/Transforms/CPUPasses.td"
+include "Piko/Transforms/VectorPasses.td"
 
 #endif // PIKO_TRANSFORMS_PASSES_TD

@@ -168,6 +168,33 @@ TEST_F(WarpTest, LanesWaitForEachOtherInDifferentGroups) {
     EXPECT_EQ(out[thread], (thread ^ 1) + (thread & 1 ? 200 : 100));
 }
 
+TEST_F(WarpTest, LanesThatWaitKeepRegistersOfTheirBlock) {
+  // Other lanes run blocks whose registers share places with theirs.
+  auto out = run(R"(
+    and.b32 %r5, %r1, 1;
+    setp.eq.b32 %p1, %r5, 0;
+    @%p1 bra EVEN;
+    add.s32 %r6, %r1, 100;
+    setp.gt.u32 %p2, %r1, 15;
+    barrier.sync 0;
+    selp.b32 %r7, %r6, 0, %p2;
+    add.s32 %r8, %r7, %r6;
+    bra.uni STORE;
+  EVEN:
+    mul.lo.u32 %r9, %r1, 3;
+    setp.lt.u32 %p3, %r9, 1000;
+    selp.b32 %r10, 7, %r9, %p3;
+    add.s32 %r8, %r10, 1;
+    barrier.sync 0;
+  STORE:
+    cvt.u64.u32 %rd6, %r8;
+    st.global.b64 [%rd4], %rd6;)");
+  for (uint32_t thread = 0; thread < 32; ++thread)
+    EXPECT_EQ(out[thread], !(thread & 1) ? 8
+                           : thread > 15 ? 2 * (thread + 100)
+                                         : thread + 100);
+}
+
 TEST_F(WarpTest, CallsKeepTheCallersLanes) {
   auto out = run(R"(
     setp.lt.u32 %p1, %r1, 5;
