@@ -4,7 +4,6 @@
 #include "llvm/Analysis/LoopInfo.h"
 #include "llvm/Analysis/MemorySSA.h"
 #include "llvm/Analysis/MemorySSAUpdater.h"
-#include "llvm/CodeGen/TargetSubtargetInfo.h"
 #include "llvm/IR/IRBuilder.h"
 #include "llvm/IR/InstIterator.h"
 #include "llvm/IR/PatternMatch.h"
@@ -180,25 +179,17 @@ bool BroadcastLoads::repeat(const Broadcast &broadcast) {
   return true;
 }
 
-PreservedAnalyses
-piko::BroadcastLoadsPass::run(Function &function,
-                              FunctionAnalysisManager &analyses) {
-  const TargetSubtargetInfo &processor = *machine->getSubtargetImpl(function);
-  if (!processor.checkFeatures("+avx"))
-    return PreservedAnalyses::all();
+bool piko::BroadcastLoadsPass::change(Function &function,
+                                      FunctionAnalysisManager &analyses) {
   SmallVector<Broadcast> broadcasts;
   for (Instruction &instruction : instructions(function))
     if (std::optional<Broadcast> found = findBroadcast(instruction))
       broadcasts.push_back(*found);
   if (broadcasts.empty())
-    return PreservedAnalyses::all();
+    return false;
   BroadcastLoads loads(function, analyses);
   bool isChanged = false;
   for (const Broadcast &broadcast : broadcasts)
     isChanged |= loads.repeat(broadcast);
-  if (!isChanged)
-    return PreservedAnalyses::all();
-  PreservedAnalyses preserved;
-  preserved.preserveSet<CFGAnalyses>();
-  return preserved;
+  return isChanged;
 }

@@ -19,8 +19,9 @@ namespace piko {
 /// MemorySSA knows of nothing in between that may write there.
 struct BroadcastLoadsPass : ProcessorPass<BroadcastLoadsPass> {
   using ProcessorPass::ProcessorPass;
-  llvm::PreservedAnalyses run(llvm::Function &function,
-                              llvm::FunctionAnalysisManager &analyses);
+  static constexpr char features[] = "+avx";
+  bool change(llvm::Function &function,
+              llvm::FunctionAnalysisManager &analyses);
 };
 
 } // namespace piko

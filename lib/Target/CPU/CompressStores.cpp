@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #include "CompressStores.h"
 
-#include "llvm/CodeGen/TargetSubtargetInfo.h"
 #include "llvm/IR/IRBuilder.h"
 #include "llvm/IR/InstIterator.h"
 #include "llvm/IR/IntrinsicInst.h"
@@ -50,11 +49,8 @@ static void expand(IntrinsicInst *store) {
   store->eraseFromParent();
 }
 
-PreservedAnalyses piko::CompressStoresPass::run(Function &function,
-                                                FunctionAnalysisManager &) {
-  const TargetSubtargetInfo &processor = *machine->getSubtargetImpl(function);
-  if (!processor.checkFeatures("+avx512vl"))
-    return PreservedAnalyses::all();
+bool piko::CompressStoresPass::change(Function &function,
+                                      FunctionAnalysisManager &) {
   // An instruction is one of 32 or 64 bits for each lane.
   SmallVector<IntrinsicInst *> stores;
   for (Instruction &instruction : instructions(function)) {
@@ -67,9 +63,5 @@ PreservedAnalyses piko::CompressStoresPass::run(Function &function,
   }
   for (IntrinsicInst *store : stores)
     expand(store);
-  if (stores.empty())
-    return PreservedAnalyses::all();
-  PreservedAnalyses preserved;
-  preserved.preserveSet<CFGAnalyses>();
-  return preserved;
+  return !stores.empty();
 }

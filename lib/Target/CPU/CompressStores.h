@@ -14,8 +14,9 @@ namespace piko {
 /// lanes as there are, where the function's processor has AVX-512.
 struct CompressStoresPass : ProcessorPass<CompressStoresPass> {
   using ProcessorPass::ProcessorPass;
-  llvm::PreservedAnalyses run(llvm::Function &function,
-                              llvm::FunctionAnalysisManager &);
+  static constexpr char features[] = "+avx512vl";
+  bool change(llvm::Function &function,
+              llvm::FunctionAnalysisManager &analyses);
 };
 
 } // namespace piko

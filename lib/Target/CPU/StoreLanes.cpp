@@ -53,10 +53,8 @@ static void replace(Value *vector, const Stores &stores) {
   }
 }
 
-PreservedAnalyses piko::StoreLanesPass::run(Function &function,
-                                            FunctionAnalysisManager &) {
-  if (!machine->getTargetTriple().isX86())
-    return PreservedAnalyses::all();
+bool piko::StoreLanesPass::change(Function &function,
+                                  FunctionAnalysisManager &) {
   constexpr size_t least = 8;
   bool isChanged = false;
   for (BasicBlock &block : function) {
@@ -71,9 +69,5 @@ PreservedAnalyses piko::StoreLanesPass::run(Function &function,
         isChanged = true;
       }
   }
-  if (!isChanged)
-    return PreservedAnalyses::all();
-  PreservedAnalyses preserved;
-  preserved.preserveSet<CFGAnalyses>();
-  return preserved;
+  return isChanged;
 }

@@ -15,8 +15,9 @@ namespace piko {
 /// To run behind the optimizer, which would join what is shifted again.
 struct StoreLanesPass : ProcessorPass<StoreLanesPass> {
   using ProcessorPass::ProcessorPass;
-  llvm::PreservedAnalyses run(llvm::Function &function,
-                              llvm::FunctionAnalysisManager &analyses);
+  static constexpr char features[] = "";
+  bool change(llvm::Function &function,
+              llvm::FunctionAnalysisManager &analyses);
 };
 
 } // namespace piko

@@ -3,7 +3,6 @@
 
 #include "llvm/ADT/STLExtras.h"
 #include "llvm/ADT/Sequence.h"
-#include "llvm/CodeGen/TargetSubtargetInfo.h"
 #include "llvm/IR/IRBuilder.h"
 #include "llvm/IR/IntrinsicInst.h"
 #include "llvm/IR/Operator.h"
@@ -263,20 +262,11 @@ static bool transposeGroup(const Group &group) {
   return isChanged;
 }
 
-PreservedAnalyses piko::TransposeGathersPass::run(Function &function,
-                                                  FunctionAnalysisManager &) {
-  const TargetSubtargetInfo &processor = *machine->getSubtargetImpl(function);
-  if (!machine->getTargetTriple().isX86() ||
-      !processor.checkFeatures("+avx2") ||
-      function.hasFnAttribute(Attribute::SanitizeAddress))
-    return PreservedAnalyses::all();
+bool piko::TransposeGathersPass::change(Function &function,
+                                        FunctionAnalysisManager &) {
   bool isChanged = false;
   for (BasicBlock &block : function)
     for (const Group &group : findGroups(block))
       isChanged |= transposeGroup(group);
-  if (!isChanged)
-    return PreservedAnalyses::all();
-  PreservedAnalyses preserved;
-  preserved.preserveSet<CFGAnalyses>();
-  return preserved;
+  return isChanged;
 }

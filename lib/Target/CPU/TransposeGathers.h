@@ -16,8 +16,10 @@ namespace piko {
 /// the optimizer.
 struct TransposeGathersPass : ProcessorPass<TransposeGathersPass> {
   using ProcessorPass::ProcessorPass;
-  llvm::PreservedAnalyses run(llvm::Function &function,
-                              llvm::FunctionAnalysisManager &analyses);
+  static constexpr char features[] = "+avx2";
+  static constexpr bool readsBeyond = true;
+  bool change(llvm::Function &function,
+              llvm::FunctionAnalysisManager &analyses);
 };
 
 } // namespace piko

@@ -2,7 +2,6 @@
 #include "UniformGathers.h"
 
 #include "llvm/Analysis/VectorUtils.h"
-#include "llvm/CodeGen/TargetSubtargetInfo.h"
 #include "llvm/IR/IRBuilder.h"
 #include "llvm/IR/InstIterator.h"
 #include "llvm/IR/IntrinsicInst.h"
@@ -58,11 +57,8 @@ static void replace(IntrinsicInst *gather, Value *place, FirstLanes &lanes) {
   gather->eraseFromParent();
 }
 
-PreservedAnalyses piko::UniformGathersPass::run(Function &function,
-                                                FunctionAnalysisManager &) {
-  const TargetSubtargetInfo &processor = *machine->getSubtargetImpl(function);
-  if (!processor.checkFeatures("+avx"))
-    return PreservedAnalyses::all();
+bool piko::UniformGathersPass::change(Function &function,
+                                      FunctionAnalysisManager &) {
   SmallVector<std::pair<IntrinsicInst *, Value *>> gathers;
   for (Instruction &instruction : instructions(function)) {
     auto *gather = dyn_cast<IntrinsicInst>(&instruction);
@@ -75,9 +71,5 @@ PreservedAnalyses piko::UniformGathersPass::run(Function &function,
   FirstLanes lanes;
   for (auto [gather, place] : gathers)
     replace(gather, place, lanes);
-  if (gathers.empty())
-    return PreservedAnalyses::all();
-  PreservedAnalyses preserved;
-  preserved.preserveSet<CFGAnalyses>();
-  return preserved;
+  return !gathers.empty();
 }

@@ -15,8 +15,9 @@ namespace piko {
 /// For processors with AVX. To run behind the optimizer.
 struct UniformGathersPass : ProcessorPass<UniformGathersPass> {
   using ProcessorPass::ProcessorPass;
-  llvm::PreservedAnalyses run(llvm::Function &function,
-                              llvm::FunctionAnalysisManager &analyses);
+  static constexpr char features[] = "+avx";
+  bool change(llvm::Function &function,
+              llvm::FunctionAnalysisManager &analyses);
 };
 
 } // namespace piko

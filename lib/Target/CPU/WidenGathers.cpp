@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #include "WidenGathers.h"
 
-#include "llvm/CodeGen/TargetSubtargetInfo.h"
 #include "llvm/IR/IRBuilder.h"
 #include "llvm/IR/InstIterator.h"
 #include "llvm/IR/IntrinsicInst.h"
@@ -50,13 +49,8 @@ static void widen(IntrinsicInst *gather) {
   gather->eraseFromParent();
 }
 
-PreservedAnalyses piko::WidenGathersPass::run(Function &function,
-                                              FunctionAnalysisManager &) {
-  const TargetSubtargetInfo &processor = *machine->getSubtargetImpl(function);
-  if (!machine->getTargetTriple().isX86() ||
-      !processor.checkFeatures("+avx2") ||
-      function.hasFnAttribute(Attribute::SanitizeAddress))
-    return PreservedAnalyses::all();
+bool piko::WidenGathersPass::change(Function &function,
+                                    FunctionAnalysisManager &) {
   SmallVector<IntrinsicInst *> gathers;
   for (Instruction &instruction : instructions(function))
     if (auto *call = dyn_cast<IntrinsicInst>(&instruction);
@@ -65,9 +59,5 @@ PreservedAnalyses piko::WidenGathersPass::run(Function &function,
       gathers.push_back(call);
   for (IntrinsicInst *gather : gathers)
     widen(gather);
-  if (gathers.empty())
-    return PreservedAnalyses::all();
-  PreservedAnalyses preserved;
-  preserved.preserveSet<CFGAnalyses>();
-  return preserved;
+  return !gathers.empty();
 }

@@ -17,8 +17,10 @@ namespace piko {
 /// stay as they are.
 struct WidenGathersPass : ProcessorPass<WidenGathersPass> {
   using ProcessorPass::ProcessorPass;
-  llvm::PreservedAnalyses run(llvm::Function &function,
-                              llvm::FunctionAnalysisManager &);
+  static constexpr char features[] = "+avx2";
+  static constexpr bool readsBeyond = true;
+  bool change(llvm::Function &function,
+              llvm::FunctionAnalysisManager &analyses);
 };
 
 } // namespace piko

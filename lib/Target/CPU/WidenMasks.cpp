@@ -2,7 +2,6 @@
 #include "WidenMasks.h"
 
 #include "llvm/ADT/MapVector.h"
-#include "llvm/CodeGen/TargetSubtargetInfo.h"
 #include "llvm/IR/IRBuilder.h"
 #include "llvm/IR/InstIterator.h"
 
@@ -58,11 +57,8 @@ static void widen(PHINode *phi) {
   spread(mask, wide);
 }
 
-PreservedAnalyses piko::WidenMasksPass::run(Function &function,
-                                            FunctionAnalysisManager &) {
-  const TargetSubtargetInfo &processor = *machine->getSubtargetImpl(function);
-  if (!processor.checkFeatures("+avx2,-avx512vl"))
-    return PreservedAnalyses::all();
+bool piko::WidenMasksPass::change(Function &function,
+                                  FunctionAnalysisManager &) {
   SmallVector<PHINode *> phis;
   SmallVector<Instruction *> masks;
   for (Instruction &instruction : instructions(function)) {
@@ -81,9 +77,5 @@ PreservedAnalyses piko::WidenMasksPass::run(Function &function,
   }
   for (PHINode *phi : phis)
     widen(phi);
-  if (masks.empty() && phis.empty())
-    return PreservedAnalyses::all();
-  PreservedAnalyses preserved;
-  preserved.preserveSet<CFGAnalyses>();
-  return preserved;
+  return !masks.empty() || !phis.empty();
 }

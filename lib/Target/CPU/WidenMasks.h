@@ -16,8 +16,9 @@ namespace piko {
 /// would undo it.
 struct WidenMasksPass : ProcessorPass<WidenMasksPass> {
   using ProcessorPass::ProcessorPass;
-  llvm::PreservedAnalyses run(llvm::Function &function,
-                              llvm::FunctionAnalysisManager &);
+  static constexpr char features[] = "+avx2,-avx512vl";
+  bool change(llvm::Function &function,
+              llvm::FunctionAnalysisManager &analyses);
 };
 
 } // namespace piko
