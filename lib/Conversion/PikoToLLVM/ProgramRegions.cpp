@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+#include "ProgramRegions.h"
+
+using namespace mlir;
+using namespace piko;
+
+llvm::SmallSetVector<int32_t, 8>
+piko::findStages(Operation *region, const PipelineNumbers &numbers) {
+  llvm::SmallSetVector<int32_t, 8> stages;
+  region->walk([&](LaunchOp launch) {
+    for (StageOp stage : getStages(launch.getKernelOp()))
+      stages.insert(numbers.stages.lookup(stage.getSymNameAttr()));
+  });
+  return stages;
+}
+
+int32_t piko::getNumber(Operation *region, bool asCycle) {
+  auto isCounted = [&](Operation *op) {
+    if (asCycle)
+      return isa<WavesOp, RoundsOp>(op) && !op->getParentOfType<RoundsOp>();
+    return op->getName() == region->getName();
+  };
+  int32_t number = 0;
+  region->getParentOfType<ProgramOp>().walk<WalkOrder::PreOrder>(
+      [&](Operation *op) {
+        if (op == region)
+          return WalkResult::interrupt();
+        number += isCounted(op);
+        return WalkResult::advance();
+      });
+  return number;
+}
