@@ -88,13 +88,14 @@ TEST_F(CooperativeTest, ABlockThatDoesNotComeIsATimeout) {
   loseContext();
 }
 
-TEST_F(CooperativeTest, OtherLaunchesRunBlockAfterBlock) {
+TEST_F(CooperativeTest, BlocksOfOtherLaunchesDoNotWait) {
   expectsLeaks = true;
   CUfunction function = load(barriers());
   EXPECT_EQ(launch(function, 1, 64, {memory, 1}), CUDA_SUCCESS);
+  std::memset(reinterpret_cast<void *>(memory), 0, 4);
   EXPECT_EQ(launch(function, 4, 64, {memory, 4}), CUDA_ERROR_LAUNCH_TIMEOUT);
   const std::string text = pikoTestDriverError();
-  EXPECT_NE(text.find("; 3 blocks have not begun: the launch is not "
+  EXPECT_NE(text.find("; 3 blocks have not ended: the launch is not "
                       "cooperative"),
             text.npos)
       << text;

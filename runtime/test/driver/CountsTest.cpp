@@ -4,6 +4,8 @@
 #include "Counts.h"
 #include "DriverFixture.h"
 
+#include <algorithm>
+
 using namespace piko::testdriver;
 
 namespace {
@@ -103,6 +105,33 @@ TEST_F(CountsTest, LongestWarp) {
   EXPECT_EQ(counts().warps, 2u);
   // Both have what is in front of the loop and behind it.
   EXPECT_EQ(2 * counts().longestWarps, counts().warpInstructions + 1 + 3 * 10);
+}
+
+// Each block takes one number after the other; what is done for the first takes
+// as long as for all others. Where it is run, nothing else is taken.
+TEST_F(CountsTest, BlocksTakeWorkInTheOrderInWhichTheyAsk) {
+  constexpr uint64_t units = 25, blocks = 4, turns = 1000;
+  std::vector<uint64_t> taken = run(R"(
+    mov.b64 %rd7, 0;
+  NEXT:
+    atom.global.add.u64 %rd5, [counter], 1;
+    setp.ge.u64 %p1, %rd5, 25;
+    @%p1 bra DONE;
+    add.s64 %rd7, %rd7, 1;
+    setp.eq.u64 %p2, %rd5, 0;
+    selp.b32 %r6, 24000, 1000, %p2;
+  LOOP:
+    sub.s32 %r6, %r6, 1;
+    setp.gt.s32 %p3, %r6, 0;
+    @%p3 bra LOOP;
+    bra.uni NEXT;
+  DONE:
+    st.global.b64 [%rd4], %rd7;)",
+                                    {}, 1, blocks, ".global .u64 counter = 0;");
+  std::sort(taken.begin(), taken.end());
+  EXPECT_EQ(taken, (std::vector<uint64_t>{1, 8, 8, 8}));
+  EXPECT_LT(counts().longestWarps, 3 * units * turns);
+  EXPECT_EQ(counts().atomic, units + blocks);
 }
 
 TEST_F(CountsTest, AsJSON) {

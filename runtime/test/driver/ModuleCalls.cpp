@@ -297,12 +297,14 @@ CUresult piko::cuda::cuFuncGetAttribute(int *value,
 }
 
 int piko::testdriver::residentBlocks(const ptx::Program &program, int threads,
-                                     size_t dynamicSharedBytes) {
+                                     size_t dynamicSharedBytes,
+                                     int mostRegisters) {
+  const int registers = std::min(registersOf(program), mostRegisters);
   const int warps = (threads + 31) / 32;
   const size_t shared = program.sharedBytes + dynamicSharedBytes;
   int blocks =
       std::min({mostBlocksOfProcessor, mostThreadsOfProcessor / (32 * warps),
-                registersOfProcessor / (32 * warps * registersOf(program))});
+                registersOfProcessor / (32 * warps * registers)});
   if (shared)
     blocks = std::min(blocks, static_cast<int>(sharedOfProcessor / shared));
   return blocks;

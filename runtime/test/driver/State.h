@@ -90,9 +90,10 @@ struct Module : ptx::Symbols {
   }
 };
 
-/// Blocks that run at the same time on a multiprocessor.
+/// Blocks that run at the same time on a multiprocessor, if a thread has at
+/// most so many registers. A program declares more than it needs.
 int residentBlocks(const ptx::Program &program, int threads,
-                   size_t dynamicSharedBytes);
+                   size_t dynamicSharedBytes, int mostRegisters = 255);
 
 /// Of a stream whose work becomes nodes.
 struct Capture {

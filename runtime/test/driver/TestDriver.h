@@ -17,7 +17,12 @@
 // of a graph follow each other; one beside another is not supported.
 //
 // The blocks of a cooperative launch run in turns, which end at nanosleep or
-// after some thousand instructions; those of others run one after the other.
+// after some thousand instructions. Those of others take turns, too, as many as
+// find room: one ends in front of an atomic addition to global memory whose
+// result is used, if others are some hundred instructions behind, and the next
+// one is that of the block that has run the fewest. So blocks that take work
+// from a counter get it in the order in which they ask. None of them can wait
+// for another one.
 // Where all blocks that run sleep again and again and no memory changes, the
 // launch has timed out. A loop that does not sleep is not found out.
 //

@@ -4,6 +4,7 @@
 #include "Counts.h"
 #include "State.h"
 
+#include <algorithm>
 #include <cstdio>
 #include <cstring>
 #include <utility>
@@ -40,6 +41,13 @@ void runKernel(const Call &call, const Kernel &kernel,
       kernel.blocks,     kernel.threads,     kernel.sharedBytes,
       kernel.parameters, kernel.cooperative, state().seed,
       conditions};
+  const auto &threads = kernel.threads;
+  launch.resident = static_cast<uint64_t>(
+      state().multiprocessors *
+      std::max(1, residentBlocks(
+                      function.program,
+                      static_cast<int>(threads[0] * threads[1] * threads[2]),
+                      kernel.sharedBytes, /*mostRegisters=*/64)));
   try {
     ptx::run(launch);
   } catch (const ptx::Fault &fault) {

@@ -65,6 +65,8 @@ template <Space space, typename T>
 void change(Warp &warp, const Instruction &it) {
   Sectors sectors;
   const auto operation = static_cast<Operation>(it.variant);
+  if (space == Space::Global && operation == Add && !it.negated && warp.yield())
+    return;
   const T *b = warp.lanes<T>(it.b), *c = warp.lanes<T>(it.c);
   auto one = [&](uint32_t lane) {
     const uint64_t address = addressOf(warp, it, lane);

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cstring>
 #include <numeric>
+#include <queue>
+#include <tuple>
 #include <utility>
 
 using namespace piko::ptx;
@@ -16,6 +18,9 @@ static constexpr uint32_t turn = 4096, roundsOfBlock = 16;
 /// Rounds of the blocks in which all are asleep and find that nothing has
 /// changed, until a launch is given up.
 static constexpr uint32_t patience = 10000;
+/// How many instructions a block may be ahead of others: each change of the
+/// block fills caches anew.
+static constexpr uint64_t slack = 512;
 
 static std::string text(const std::array<uint32_t, 3> &index) {
   return "(" + std::to_string(index[0]) + ", " + std::to_string(index[1]) +
@@ -127,23 +132,32 @@ void Block::begin(uint64_t number) {
   for (auto &warp : warps)
     warp->reset();
   random.seed(launch.seed + number);
-  arrived = false;
+  arrived = yielded = false;
+}
+
+uint64_t Block::ran() const {
+  uint64_t most = 0;
+  for (const auto &warp : warps)
+    most = std::max(most, warp->ran);
+  return most;
 }
 
 Block::Turn Block::run() {
   for (auto &warp : warps)
     warp->wake();
+  yielded = false;
   for (uint32_t round = 0; round < roundsOfBlock; ++round) {
-    bool ran = runWarps();
+    bool any = runWarps();
     if (arrived)
-      ran |= releaseBarriers();
+      any |= releaseBarriers();
     if (!liveThreads()) {
-      for (const auto &warp : warps)
-        launch.longestWarp = std::max(launch.longestWarp, warp->ran);
+      launch.longestWarp = std::max(launch.longestWarp, ran());
       return Turn::Ended;
     }
-    if (ran)
+    if (any)
       continue;
+    if (yielded)
+      return Turn::Over;
     if (hasSleepers())
       return Turn::Asleep;
     if (!separate())
@@ -240,9 +254,9 @@ void Block::reportEndlessSleep(const std::string &others) const {
   reportDeadlock();
 }
 
-/// Runs blocks in turns until they have ended; \p waiting have not begun.
+/// Runs blocks that wait for each other in turns until they have ended.
 static void runTogether(std::vector<Block *> blocks, std::mt19937_64 &random,
-                        bool shuffled, uint64_t waiting) {
+                        bool shuffled) {
   for (uint32_t idle = 0; !blocks.empty();) {
     if (shuffled)
       std::shuffle(blocks.begin(), blocks.end(), random);
@@ -262,17 +276,108 @@ static void runTogether(std::vector<Block *> blocks, std::mt19937_64 &random,
     for (Block *block : blocks)
       separated |= block->separate();
     if (!separated)
-      blocks[0]->reportEndlessSleep(
-          waiting ? std::to_string(waiting) +
-                        " blocks have not begun: the launch is not cooperative"
-                  : std::to_string(blocks.size()) + " blocks sleep");
+      blocks[0]->reportEndlessSleep(std::to_string(blocks.size()) +
+                                    " blocks sleep");
+  }
+}
+
+namespace {
+
+/// Runs blocks that are independent of each other, as a device does that has
+/// room for some of them: each as far as the others. One that has not begun
+/// needs no memory.
+class BlockQueue {
+public:
+  BlockQueue(Launch &launch, std::vector<uint64_t> order, Workspace &workspace)
+      : launch(launch), order(std::move(order)), workspace(workspace) {}
+  void run();
+
+private:
+  struct Place {
+    uint64_t clock; ///< Instructions that have been run there.
+    uint64_t start; ///< When its block began.
+    uint64_t number;
+    Block *block; ///< Null: it has not begun.
+    /// Whether the other one goes first.
+    bool operator<(const Place &other) const {
+      return std::tie(clock, number) > std::tie(other.clock, other.number);
+    }
+  };
+  void begin(Place &place);
+  Block::Turn runTurn(Block &block) const;
+
+  Launch &launch;
+  std::vector<uint64_t> order; ///< Of the blocks; empty: as numbered.
+  Workspace &workspace;
+  uint64_t ended = 0;
+  std::vector<std::unique_ptr<Block>> blocks;
+  std::vector<Block *> free;
+};
+
+} // namespace
+
+static uint64_t countBlocks(const Launch &launch) {
+  return uint64_t(launch.blocks[0]) * launch.blocks[1] * launch.blocks[2];
+}
+
+void BlockQueue::begin(Place &place) {
+  if (free.empty())
+    free.push_back(
+        blocks.emplace_back(std::make_unique<Block>(launch, workspace)).get());
+  place.block = free.back();
+  free.pop_back();
+  place.block->begin(order.empty() ? place.number : order[place.number]);
+}
+
+/// A block that sleeps waits for what no other one does meanwhile.
+Block::Turn BlockQueue::runTurn(Block &block) const {
+  for (uint32_t idle = 0;;) {
+    Block::Turn turn = block.run();
+    if (turn != Block::Turn::Asleep)
+      return turn;
+    idle = block.takeChange() ? 0 : idle + 1;
+    if (idle < patience)
+      continue;
+    idle = 0;
+    if (!block.separate())
+      block.reportEndlessSleep(std::to_string(countBlocks(launch) - ended - 1) +
+                               " blocks have not ended: the launch is not "
+                               "cooperative");
+  }
+}
+
+void BlockQueue::run() {
+  const uint64_t count = countBlocks(launch);
+  uint64_t next = 0;
+  std::priority_queue<Place> places;
+  for (; next < std::min(count, launch.resident); ++next)
+    places.push({0, 0, next, nullptr});
+  while (!places.empty()) {
+    Place place = places.top();
+    places.pop();
+    if (!place.block)
+      begin(place);
+    place.block->turnEnd =
+        places.empty()
+            ? ~uint64_t(0)
+            : std::max(places.top().clock + slack, place.start) - place.start;
+    Block::Turn turn = runTurn(*place.block);
+    place.clock = place.start + place.block->ran();
+    if (turn == Block::Turn::Ended) {
+      ++ended;
+      free.push_back(std::exchange(place.block, nullptr));
+      if (next == count)
+        continue;
+      place.start = place.clock;
+      place.number = next++;
+    }
+    places.push(place);
   }
 }
 
 void piko::ptx::run(Launch &launch) {
   launch.sites.assign(launch.program.code.size(), Site());
-  const uint64_t count =
-      uint64_t(launch.blocks[0]) * launch.blocks[1] * launch.blocks[2];
+  const uint64_t count = countBlocks(launch);
   std::mt19937_64 random(launch.seed);
   std::vector<uint64_t> order;
   if (launch.seed) {
@@ -280,17 +385,18 @@ void piko::ptx::run(Launch &launch) {
     std::iota(order.begin(), order.end(), uint64_t(0));
     std::shuffle(order.begin(), order.end(), random);
   }
+  static thread_local Workspace workspace;
+  workspace.reset(
+      std::min(count, launch.cooperative ? count : launch.resident) *
+      Block::bytesFor(launch));
+  if (!launch.cooperative)
+    return BlockQueue(launch, std::move(order), workspace).run();
   std::vector<std::unique_ptr<Block>> blocks;
   std::vector<Block *> running;
-  const uint64_t together = launch.cooperative ? count : 1;
-  static thread_local Workspace workspace;
-  workspace.reset(together * Block::bytesFor(launch));
-  for (uint64_t i = 0; i < together; ++i)
+  for (uint64_t i = 0; i < count; ++i) {
     running.push_back(
         blocks.emplace_back(std::make_unique<Block>(launch, workspace)).get());
-  for (uint64_t i = 0; i < count; i += running.size()) {
-    for (size_t j = 0; j < running.size(); ++j)
-      running[j]->begin(launch.seed ? order[i + j] : i + j);
-    runTogether(running, random, launch.seed != 0, count - i - running.size());
+    running.back()->begin(launch.seed ? order[i] : i);
   }
+  runTogether(running, random, launch.seed != 0);
 }

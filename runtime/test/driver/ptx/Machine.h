@@ -44,12 +44,13 @@ struct Launch {
   uint32_t dynamicSharedBytes = 0;
   std::vector<uint8_t> parameters;
   /// All blocks make progress: each runs until it sleeps or has had its turn.
-  /// Without it one runs after the other.
+  /// Without it a block that sleeps lets no other one run.
   bool cooperative = false;
   /// Of the order of blocks, of warps, and of lanes in atomic operations; 0: as
   /// they are numbered.
   uint64_t seed = 0;
   Conditions *conditions = nullptr; ///< Of the graph that launches it.
+  uint64_t resident = 1; ///< How many blocks find room at the same time.
   std::vector<Site> sites{};
   Footprint footprint{};
   /// The most that one warp ran.
@@ -92,6 +93,17 @@ public:
   [[noreturn]] void reportEndlessSleep(const std::string &others) const;
   /// A group of a warp has come to a barrier.
   void arrive() { arrived = true; }
+  bool takesTurns() const { return !launch.cooperative && launch.resident > 1; }
+  /// Of blocks that take turns: instructions up to which this one may go on.
+  uint64_t turnEnd = 0;
+  /// Whether the turn is over for a warp that has run so many, and asks for
+  /// what others may take before it.
+  bool endTurn(uint64_t ran) {
+    yielded |= ran > turnEnd;
+    return ran > turnEnd;
+  }
+  /// The instructions that its longest warp has run.
+  uint64_t ran() const;
 
   Launch &launch;
   std::array<uint32_t, 3> index{};
@@ -105,7 +117,7 @@ private:
   uint32_t liveThreads() const;
   [[noreturn]] void reportDeadlock() const;
 
-  bool arrived = false;
+  bool arrived = false, yielded = false;
   std::mt19937_64 random;
   uint8_t *sharedMemory;
   std::vector<std::unique_ptr<Warp>> warps;

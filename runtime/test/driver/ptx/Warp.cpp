@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <utility>
 
 using namespace piko::ptx;
 
@@ -91,6 +92,7 @@ bool Warp::run(uint32_t steps) {
   bool any = false;
   while (steps && select()) {
     uint32_t taken = runGroup(steps);
+    endYield();
     steps -= std::min(steps, taken);
     any = true;
   }
@@ -363,6 +365,26 @@ void Warp::sleep() {
   groups[current].state = Group::Sleeping;
   groups[current].pc = next;
   reselect = true;
+}
+
+bool Warp::yield() {
+  Group &group = groups[current];
+  if (!block.takesTurns() || std::exchange(group.yielded, false))
+    return false;
+  group.yielded = true;
+  next = pc; // which has not been run
+  --site->warps;
+  site->lanes -= static_cast<uint64_t>(std::popcount(active));
+  --ran;
+  sleep();
+  return true;
+}
+
+/// A group has asked for its turn: it is its turn now, or it sleeps.
+void Warp::endYield() {
+  Group &group = groups[current];
+  if (group.state == Group::Sleeping && group.yielded && !block.endTurn(ran))
+    group.state = Group::Ready;
 }
 
 void Warp::wake() {

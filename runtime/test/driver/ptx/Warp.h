@@ -62,6 +62,7 @@ struct Group {
   uint32_t reconverge = nowhere; ///< Where it ends.
   uint32_t wanted = 0;           ///< Lanes, of Gathering.
   uint32_t barrier = 0;          ///< Of AtBarrier.
+  bool yielded = false;          ///< In front of the instruction at pc.
   bool aligned = false;          ///< Lanes of a warp must come to it together.
   uint32_t arrivals = 0; ///< Threads that the barrier waits for; 0: all.
 };
@@ -105,6 +106,9 @@ public:
   void waitAtBarrier(uint32_t barrier, uint32_t arrivals, bool aligned);
   /// Until the block's next turn.
   void sleep();
+  /// The same, in front of the current instruction, which changes memory that
+  /// other blocks ask for, too; false if it is this block's turn to do so.
+  bool yield();
   /// Whether all lanes of \p members that live are here; `active` is them,
   /// then.
   bool gather(uint32_t members);
@@ -148,6 +152,7 @@ public:
 private:
   void reduce(const Group &group, uint32_t arrived, uint32_t holding);
   uint32_t runGroup(uint32_t steps);
+  void endYield();
   bool select();
   int32_t add(const Group &group);
   void finish(int32_t group);
