@@ -98,7 +98,7 @@ static std::string makeRequest(const ObjectOptions &options,
                      int(options.target.sanitizer), int(options.remarks),
                      int(options.allPipelines), int(source.gpu.target),
                      int(source.synthesis.count), int(source.gpu.seed),
-                     int(source.gpu.threads)})
+                     int(source.gpu.blocks), int(source.gpu.threads)})
     key.add(std::to_string(number));
   key.add(source.gpu.chip).add(options.nameSpace).add(getRuntimeIncludeDir());
   for (const std::string &chip : source.gpu.cubins)

@@ -251,6 +251,7 @@ void piko::addLaunchSequence(OpPassManager &passes, const GPUOptions &options) {
   } else {
     ConvertGPUToEmulatorOptions emulation;
     emulation.seed = options.seed;
+    emulation.blocks = options.blocks;
     passes.addPass(createConvertGPUToEmulator(emulation));
   }
   addCleanUp(passes);

@@ -38,7 +38,8 @@ def gpu_options(seed, target):
     kind."""
     r = random.Random(seed)
     threads = ["--gpu-threads", str(r.choice([1, 32, 64, 128]))]
-    order = ["--gpu-seed", str(r.randrange(1000))]
+    order = ["--gpu-seed", str(r.randrange(1000)),
+             "--gpu-blocks", str(r.choice([0, 1, 3, 7]))]
     if target == "any":
         target = r.choice(["cuda", "gpu-on-cpu"])
     return ["--target", target, *threads, *(order if target != "cuda" else [])]

@@ -39,6 +39,8 @@ it, and says how long a frame took.
                          later ones, and a cubin for each where ptxas is found
                          (PTX for sm_70)
   --gpu-seed N           for gpu-on-cpu: permutes the blocks (in order)
+  --gpu-blocks N         for gpu-on-cpu: most blocks of a grid (one for each unit
+                         of work)
   --no-cache             compile even if nothing changed since the last time
   --cache-dir FOLDER     where compiled code is kept ($PIKO_CACHE_DIR,
                          $XDG_CACHE_HOME/piko or ~/.cache/piko)
@@ -125,6 +127,8 @@ private:
         {"--gpu-chip", [&] { parseChips(value(name)); }},
         {"--gpu-seed",
          [&] { options.load.gpu.seed = integer(name, 0, maxInt); }},
+        {"--gpu-blocks",
+         [&] { options.load.gpu.blocks = integer(name, 1, maxInt); }},
         {"--width", [&] { options.view.width = integer(name, 1, 65536); }},
         {"--height", [&] { options.view.height = integer(name, 1, 65536); }},
         {"--lights", [&] { options.lights = integer(name, 0, 1'000'000); }},

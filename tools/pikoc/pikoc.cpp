@@ -111,6 +111,11 @@ struct CommandLine {
                      "later ones (default: sm_70), and, where ptxas is found, "
                      "a cubin for each that is named"),
       llvm::cl::cat(category)};
+  llvm::cl::opt<int64_t> gpuBlocks{
+      "gpu-blocks", llvm::cl::value_desc("count"), llvm::cl::init(0),
+      llvm::cl::desc("most blocks of a grid of --target gpu-on-cpu (default: "
+                     "one for each unit of work)"),
+      llvm::cl::cat(category)};
   llvm::cl::opt<int64_t> gpuSeed{
       "gpu-seed", llvm::cl::value_desc("number"), llvm::cl::init(0),
       llvm::cl::desc("permutes the blocks of --target gpu-on-cpu (default: in "
@@ -234,7 +239,10 @@ struct CommandLine {
     return options;
   }
   CompileOptions getUntuned() const {
-    GPUOptions gpu{.threads = gpuThreads, .target = target, .seed = gpuSeed};
+    GPUOptions gpu{.threads = gpuThreads,
+                   .target = target,
+                   .seed = gpuSeed,
+                   .blocks = gpuBlocks};
     if (gpuChip.getNumOccurrences())
       (void)gpu.setChips(gpuChip.getValue());
     return {
@@ -305,6 +313,8 @@ static std::string checkOptions(const CommandLine &line) {
     return "--target auto belongs to an object, which has code for both";
   if (line.gpuSeed.getNumOccurrences() && !line.isEmulated())
     return "--gpu-seed belongs to --target gpu-on-cpu";
+  if (line.gpuBlocks.getNumOccurrences() && !line.isEmulated())
+    return "--gpu-blocks belongs to --target gpu-on-cpu";
   if (line.sanitizer.getNumOccurrences() &&
       (line.getEmit() < Emit::Assembly || isGPU))
     return "--sanitize belongs to an object or assembly";

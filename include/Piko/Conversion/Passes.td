@@ -243,7 +243,9 @@ def ConvertGPUToEmulator : Pass<"convert-gpu-to-emulator", "::mlir::ModuleOp"> {
   }];
   let options = [
     Option<"seed", "seed", "int64_t", "0",
-           "Permutes the blocks of a grid; 0 runs them in order">];
+           "Permutes the blocks of a grid; 0 runs them in order">,
+    Option<"blocks", "blocks", "int64_t", "0",
+           "Most blocks of a grid (default: one for each unit of work)">];
   let dependentDialects = ["::mlir::arith::ArithDialect",
                            "::mlir::LLVM::LLVMDialect"];
 }

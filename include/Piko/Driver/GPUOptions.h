@@ -56,6 +56,8 @@ struct GPUOptions {
   GPUTarget target = GPUTarget::None;
   /// Permutes the blocks of the emulator; 0 = in order.
   int64_t seed = 0;
+  /// Most blocks of the emulator's grids; 0 = one for each unit of work.
+  int64_t blocks = 0;
   /// Of CUDA: the oldest chip that the PTX is for.
   std::string chip = "sm_70";
   /// Chips that the program brings a cubin for, too, where ptxas is found.

@@ -37,11 +37,16 @@ LogicalResult ConvertGPUToEmulatorPass::convert(gpu::LaunchFuncOp launch) {
   declareFunction(getOperation(), thread, {pointer});
   auto callee = declareFunction(getOperation(), "pikoir_grid_launch",
                                 {pointer, pointer, i64, i64, pointer, i64});
+  Value grid = call->blocks;
+  if (blocks > 0)
+    grid = arith::MinSIOp::create(
+        builder, loc, grid,
+        arith::ConstantIntOp::create(builder, loc, blocks, 64));
   LLVM::CallOp::create(
       builder, loc, callee,
       ValueRange{call->pipeline,
-                 LLVM::AddressOfOp::create(builder, loc, pointer, thread),
-                 call->blocks, call->threads, call->arguments,
+                 LLVM::AddressOfOp::create(builder, loc, pointer, thread), grid,
+                 call->threads, call->arguments,
                  LLVM::ConstantOp::create(builder, loc,
                                           builder.getI64IntegerAttr(seed))});
   return success();

@@ -1,4 +1,5 @@
 // RUN: piko-opt %s --piko-gpu-to-nvvm --convert-gpu-to-emulator=seed=9 --split-input-file | FileCheck %s
+// RUN: piko-opt %s --piko-gpu-to-nvvm --convert-gpu-to-emulator=blocks=3 --split-input-file | FileCheck %s --check-prefix=FEW
 
 // Arguments go through memory, eight bytes each; the function of a thread is
 // made when the module is translated.
@@ -14,6 +15,11 @@
 // CHECK-DAG:     %[[SEED:.*]] = llvm.mlir.constant(9 : i64)
 // CHECK:         llvm.call @pikoir_grid_launch(%[[FRAME]], %[[THREAD]], %[[BLOCKS]], %{{.*}}, %[[ARGUMENTS]], %[[SEED]])
 // CHECK-NOT:     gpu.launch_func
+// A grid of fewer blocks, which take one unit after the other.
+// FEW-DAG:       %[[ALL:.*]] = arith.index_cast
+// FEW-DAG:       %[[MOST:.*]] = arith.constant 3 : i64
+// FEW:           %[[BLOCKS:.*]] = arith.minsi %[[ALL]], %[[MOST]]
+// FEW:           llvm.call @pikoir_grid_launch(%{{.*}}, %{{.*}}, %[[BLOCKS]],
 // CHECK:       gpu.module @m
 // CHECK:         llvm.func @k(
 module attributes {gpu.container_module} {

@@ -95,6 +95,8 @@ Options parseOptions(int argc, char **argv) {
         throw std::runtime_error("expected --gpu-chip sm_90,..");
     } else if (name == "--gpu-seed")
       options.gpu.seed = toNumbers<int64_t>(words.takeValues(name, false))[0];
+    else if (name == "--gpu-blocks")
+      options.gpu.blocks = toNumbers<int64_t>(words.takeValues(name, false))[0];
     else if (name == "--threads")
       options.threads = toNumbers<int>(words.takeValues(name, true));
     else if (name == "--runs")

@@ -57,7 +57,7 @@ struct Options {
   piko::CheckOptions check;
   piko::SynthesisOptions synthesis;
   /// --target gpu-on-cpu, --gpu-threads N (0 = as the stage says), --gpu-seed N,
-  /// --gpu-chip NAME,..
+  /// --gpu-blocks N (0 = as many as there are units), --gpu-chip NAME,..
   piko::GPUOptions gpu;
   /// Of the reference executor's code; --no-cache.
   piko::CacheOptions cache;

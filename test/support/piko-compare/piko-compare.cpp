@@ -9,7 +9,7 @@
 //                [--timeout SECONDS] [--strip N] [--budget BYTES]
 //                [--check[=nan:RECORD.FIELD,..]]
 //                [--target gpu-on-cpu] [--gpu-threads N] [--gpu-seed N]
-//                [--gpu-chip NAME,..] [--tolerance X] [--cpu NAME]
+//                [--gpu-blocks N] [--gpu-chip NAME,..] [--tolerance X] [--cpu NAME]
 //                [--no-cache]
 //
 // Options.h says what the options mean, Run.h what the input is. With --cases
