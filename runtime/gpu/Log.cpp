@@ -48,6 +48,7 @@ struct GridLog;
 struct Head : pikoir_log {
   GridLog *log;
 };
+static_assert(sizeof(Head) <= headRoom);
 
 struct GridLog {
   GridLog(pikort_pipeline &p, Kernel &kernel, int32_t number, bool isSource);
@@ -97,7 +98,7 @@ GridLog::GridLog(pikort_pipeline &p, Kernel &kernel, int32_t number,
       room(p.accelerator ? p.accelerator->logSpace() : mapRoom()) {
   if (room.empty())
     throw OutOfMemory{static_cast<int64_t>(leastRoom)};
-  head = new (room.data()) Head;
+  head = new (room.data()) Head{};
   auto begin = reinterpret_cast<int64_t>(room.data());
   head->spare = begin + headRoom;
   head->units = head->spare + spareRoom; // zero, as all behind the spare room

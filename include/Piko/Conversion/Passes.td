@@ -96,7 +96,10 @@ def ConvertPikoToGPU : Pass<"convert-piko-to-gpu", "::piko::PipelineOp"> {
 
     **Does**: turns the work of each kernel into a `gpu.launch`: a block runs a unit
     of the stored bins, which is a bin, several, or a share of the primitives of
-    one. What its threads do is one of three:
+    one, and then another one. Of a stage that is scheduled by `load_balance` or `all`
+    it takes the next ones from a counter of the launch (`piko.gpu.take_units`), by its
+    first thread, where there are fewer blocks than units; of any other, block `b` of
+    `n` has the units `b`, `b + n`, ... What a block's threads do is one of three:
 
     - Of a kernel whose effects are updates of pixels, its threads share out the
       pixels of a bin: a pixel is that thread's whose place in a tile of `threads`

@@ -28,17 +28,19 @@ using namespace piko;
 
 using Predicate = arith::CmpIPredicate;
 
-/// Each use of a number in a loop gets a load of its own.
-static void loadForUses(Value number, Operation *loop, Value memory) {
+void piko::loadForUses(Value number, Operation *loop, Value memory,
+                       bool again) {
   llvm::MapVector<Operation *, SmallVector<OpOperand *>> places;
   for (OpOperand &use : number.getUses())
     if (loop->isProperAncestor(use.getOwner()))
       places[findLoadPlace(use.getOwner(), loop)].push_back(&use);
   for (auto &[place, uses] : places) {
     Emitter b(loop->getLoc(), place);
-    Value number = b.loadAgain(memory);
+    Value loaded = again ? b.loadAgain(memory) : b.load(memory, b.index(0));
+    if (loaded.getType() != number.getType())
+      loaded = arith::IndexCastUIOp::create(b, number.getType(), loaded);
     for (OpOperand *use : uses)
-      use->set(number);
+      use->set(loaded);
   }
 }
 
@@ -81,7 +83,7 @@ void piko::countInBlock(scf::ForOp loop, gpu::LaunchOp launch,
   loop.erase();
 }
 
-void piko::countWorkInBlock(scf::ForOp units, gpu::LaunchOp launch) {
+void piko::countCellsInBlock(scf::ForOp units, gpu::LaunchOp launch) {
   SmallVector<scf::ForOp> cells;
   for (auto loop : units.getBody()->getOps<scf::ForOp>())
     if (loop.getUpperBound().getDefiningOp<UnitCellsOp>())
@@ -92,6 +94,9 @@ void piko::countWorkInBlock(scf::ForOp units, gpu::LaunchOp launch) {
       return cast<UnitCellsOp>(builder.clone(*of)).getEnd();
     });
   }
+}
+
+void piko::countUnitsInBlock(scf::ForOp units, gpu::LaunchOp launch) {
   auto count = units.getUpperBound().getDefiningOp<UnitCountOp>();
   countInBlock(units, launch, [&](OpBuilder &builder) {
     return cast<UnitCountOp>(builder.clone(*count)).getResult();

@@ -49,8 +49,23 @@ mlir::scf::ForOp repeatForUnits(mlir::gpu::LaunchOp launch, mlir::Value bins,
 void countInBlock(mlir::scf::ForOp loop, mlir::gpu::LaunchOp launch,
                   llvm::function_ref<mlir::Value(mlir::OpBuilder &)> createEnd);
 
-/// Does so for the loops over units and cells.
-void countWorkInBlock(mlir::scf::ForOp units, mlir::gpu::LaunchOp launch);
+/// Does so for the loops over the cells of units.
+void countCellsInBlock(mlir::scf::ForOp units, mlir::gpu::LaunchOp launch);
+/// Does so for the loop over units.
+void countUnitsInBlock(mlir::scf::ForOp units, mlir::gpu::LaunchOp launch);
+
+/// Each use of a number in a loop gets a load of its own, of the block's
+/// memory.
+void loadForUses(mlir::Value number, mlir::Operation *loop, mlir::Value memory,
+                 bool again = true);
+
+/// Lets the block take the units that a loop goes over from a counter of the
+/// log, whoever runs them. `inBlock`: the number of the one that it runs is
+/// kept in the block's memory.
+void takeUnits(mlir::scf::ForOp units, mlir::gpu::LaunchOp launch,
+               mlir::Value log, bool inBlock);
+/// Lets it do so from the counter of a kernel's second launch.
+void takeUnitsForRest(mlir::gpu::LaunchOp launch);
 
 } // namespace piko
 

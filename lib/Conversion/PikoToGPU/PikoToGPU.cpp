@@ -2,7 +2,8 @@
 //
 // convert-piko-to-gpu: for each kernel,
 //   1. make a launch with a block for each unit of the stored bins, and in it
-//      loops over its cells and their primitives (GridFormer);
+//      loops over its cells and their primitives (GridFormer); where there are
+//      fewer blocks, say which runs which unit (UnitCounter.cpp);
 //   2. if all that others see of it are pixels, share these among the block's
 //      threads, and take primitives in groups, whose setup the threads share
 //      (CollapsedPixels.cpp and RareLaunch.cpp, or PixelSharing.cpp and
@@ -20,6 +21,7 @@
 #include "../../Transforms/LoopSplitter.h"
 #include "../../Transforms/ParallelLoops.h"
 
+#include "Piko/Conversion/UnitOrder.h"
 #include "Piko/Dialect/Piko/IR/Marks.h"
 #include "Piko/Dialect/Piko/IR/PikoGPU.h"
 
@@ -46,7 +48,8 @@ namespace {
 class GridBuilder {
 public:
   GridBuilder(KernelOp kernel, StageOp stage, int64_t threads)
-      : kernel(kernel), stage(stage), threads(threads), loc(kernel.getLoc()) {}
+      : kernel(kernel), stage(stage), threads(threads), loc(kernel.getLoc()),
+        order(*getUnitOrder(kernel)) {}
 
   /// Threads share the pixels of a bin, of one primitive after the other or of
   /// many; fails where they cannot.
@@ -60,7 +63,7 @@ private:
   void createMemory();
   void convertLocal(LocalBinOp local);
   LogicalResult finish(GridMemory &memory, MappingCounts &counts);
-  scf::ForOp finishGrid(GridMemory &memory);
+  void finishGrid(GridMemory &memory, bool countsInBlock);
   LogicalResult findItems();
   void hoistPrivateArrays();
   void upliftLoops();
@@ -74,6 +77,7 @@ private:
   StageOp stage;
   int64_t threads;
   Location loc;
+  UnitOrder order;
   scf::ForOp items;
   Value bins;
   gpu::LaunchOp launch;
@@ -184,8 +188,9 @@ void GridBuilder::convertLocal(LocalBinOp local) {
 }
 
 /// Threads begin with empty outboxes, and leave what is in them at the end of
-/// each unit.
-scf::ForOp GridBuilder::finishGrid(GridMemory &memory) {
+/// each unit. `countsInBlock`: the numbers of the unit and the cell take no
+/// registers.
+void GridBuilder::finishGrid(GridMemory &memory, bool countsInBlock) {
   auto opened = *memory.outboxes.getUsers().begin();
   for (Operation *user : memory.outboxes.getUsers())
     if (isa<OutboxesOp>(user))
@@ -203,7 +208,13 @@ scf::ForOp GridBuilder::finishGrid(GridMemory &memory) {
   }
   builder.setInsertionPoint(opened->getBlock()->getTerminator());
   memory.flush(builder);
-  return repeatForUnits(memory.launch, bins, opened);
+  scf::ForOp units = repeatForUnits(memory.launch, bins, opened);
+  if (countsInBlock)
+    countCellsInBlock(units, memory.launch);
+  if (order == UnitOrder::Taken)
+    takeUnits(units, memory.launch, memory.log, countsInBlock);
+  else if (countsInBlock)
+    countUnitsInBlock(units, memory.launch);
 }
 
 /// An alloca in a loop would take more memory each time around.
@@ -282,11 +293,9 @@ LogicalResult GridBuilder::sharePixelsOfBins(bool collapses,
   }
   if (failed(convertAccess()))
     return failure();
-  scf::ForOp units = finishGrid(memory);
-  if (succeeded(rare)) {
-    countWorkInBlock(units, launch);
+  finishGrid(memory, /*countsInBlock=*/succeeded(rare));
+  if (succeeded(rare))
     leaveRareToSecondLaunch(*rare, launch);
-  }
   return success();
 }
 
@@ -399,11 +408,11 @@ LogicalResult GridBuilder::finish(GridMemory &memory, MappingCounts &counts) {
   beginQueues(memory);
   if (memory.rare)
     finishRareRounds(memory);
-  scf::ForOp units = finishGrid(memory);
-  if (counts.rare) {
+  finishGrid(memory, /*countsInBlock=*/counts.rare);
+  if (memory.rare && !memory.rare->found)
+    takeUnitsForRest(memory.launch);
+  if (counts.rare)
     memory.keepOutboxesInBlock(threads);
-    countWorkInBlock(units, memory.launch);
-  }
   return success();
 }
 

@@ -13,6 +13,7 @@
 #include "CollapsedPixels.h"
 
 #include "Emitter.h"
+#include "GridFormer.h"
 
 using namespace mlir;
 using namespace piko;
@@ -49,6 +50,7 @@ void piko::leaveRareToSecondLaunch(RareSite site, gpu::LaunchOp second) {
   auto first = cast<gpu::LaunchOp>(builder.clone(*second, copies));
   leaveUnits(site, first, copies);
   keepInBlock(site.groups, second);
+  takeUnitsForRest(second);
   StringRef name = second.getFunctionAttr().getLeafReference();
   second.setFunctionAttr(
       FlatSymbolRefAttr::get(builder.getContext(), (name + "_rest").str()));

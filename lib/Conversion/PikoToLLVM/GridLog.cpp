@@ -369,6 +369,25 @@ struct LeaveRestLowering : ContextPattern<LeaveRestOp> {
   }
 };
 
+struct TakeUnitsLowering : ContextPattern<TakeUnitsOp> {
+  using ContextPattern::ContextPattern;
+  LogicalResult
+  matchAndRewrite(TakeUnitsOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    Location loc = op.getLoc();
+    int64_t launch = op.getRest() ? 1 : 0;
+    Value taken =
+        createOffset(rewriter, loc, adaptor.getLog(),
+                     offsetof(pikoir_log, taken) + launch * sizeof(int64_t));
+    Value first =
+        LLVM::AtomicRMWOp::create(rewriter, loc, LLVM::AtomicBinOp::add, taken,
+                                  toI64(rewriter, loc, adaptor.getCount()),
+                                  LLVM::AtomicOrdering::monotonic);
+    rewriter.replaceOp(op, toIndex(rewriter, loc, first));
+    return success();
+  }
+};
+
 struct AllocateLowering : ContextPattern<AllocateOp> {
   using ContextPattern::ContextPattern;
   LogicalResult
@@ -414,7 +433,7 @@ void piko::populateGridToLLVMPatterns(const TypeConverter &converter,
                                       LoweringContext &context) {
   patterns.add<OpenLogLowering, BlockCountLowering, CloseLogLowering,
                LogOfLowering, OutboxesLowering, RestLowering, LeaveRestLowering,
-               AllocateLowering, BytesAtLowering>(
+               TakeUnitsLowering, AllocateLowering, BytesAtLowering>(
       converter, patterns.getContext(), context);
   populateBlockOutputPatterns(converter, patterns, context);
 }

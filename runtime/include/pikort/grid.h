@@ -5,8 +5,8 @@
  *   blocks = pikoir_blocks(p, stage, 0, threads); // none: nothing to do
  *   pikoir_log *log = pikoir_log_open(p, stage, 0);
  *   pikoir_log_place(p, log, i, ...); // for each place that can fail
- *   ... launch: block b of n runs the units b, b + n, ..; blocks take memory of
- *   the log ...
+ *   ... launch: block b of n runs the units b, b + n, .., or those that it
+ *   takes from a counter of the log; blocks take memory of the log ...
  *   pikoir_log_close(p, log);
  *
  * Memory is taken by adding to `cursor`, in pieces that begin with their
@@ -96,6 +96,9 @@ typedef struct pikoir_log {
   int64_t spare;
   int64_t units;  ///< The address of a pikoir_unit_log for each unit.
   int64_t errors; ///< Not 0: there are entries that are errors.
+  /// How many units blocks have taken, by the kernel's first launch and by its
+  /// second one; may be more than there are.
+  int64_t taken[2];
 } pikoir_log;
 
 /// How many blocks of so many threads run the units of a stage's kernel, or,

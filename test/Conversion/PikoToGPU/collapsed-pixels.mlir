@@ -47,8 +47,13 @@ piko.record @Pixel {"n" : i32 at 0} size 4 align 4
 // The counters of loops over units and cells are in the block's memory, and what
 // groups need of the cell, which each use loads.
 // CHECK:           scf.while
-// CHECK-NEXT:        %[[UNIT:.*]] = memref.load %[[COUNTER:.*]][%c0] {nontemporal = true}
-// CHECK:             arith.cmpi slt, %[[UNIT]]
+// CHECK:             piko.gpu.take_units %[[LOG]][%{{.*}}] for rest
+// CHECK:             memref.store
+// CHECK:             memref.store %{{.*}}, %[[COUNTER:.*]][%c0]
+// CHECK-NEXT:      }
+// CHECK-NEXT:      gpu.barrier
+// CHECK-NEXT:      %[[UNIT:.*]] = memref.load %[[COUNTER]][%c0] {nontemporal = true}
+// CHECK:             arith.cmpi ne, %[[UNIT]]
 // CHECK:             scf.while
 // CHECK:               %[[REST:.*]] = piko.gpu.rest %[[LOG]][%{{.*}}]
 // CHECK:               %[[LEFT:.*]] = arith.cmpi ne, %[[REST]], %c0
@@ -64,7 +69,6 @@ piko.record @Pixel {"n" : i32 at 0} size 4 align 4
 // CHECK:             } {{{.*}}piko.rare}
 // CHECK:             gpu.barrier
 // CHECK:           gpu.barrier
-// CHECK:           memref.store %{{.*}}, %[[COUNTER]][%c0]
 
 // A mask of 16 bits needs no other word to say that it is not empty.
 // FEW-LABEL: piko.kernel @kernel_draw

@@ -8,7 +8,7 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 // CHECK-LABEL: piko.kernel @kernel_copy
 // CHECK:         %[[LOG:.*]] = piko.gpu.open_log
 // CHECK:         gpu.launch blocks(%[[UNIT:[a-z0-9]+]], {{.*}}threads(%[[T:[a-z0-9]+]],
-// CHECK-SAME:        workgroup(%[[CELLS:.*]] : memref<33xi64, #gpu.address_space<workgroup>>)
+// CHECK-SAME:        workgroup(%[[CELLS:[a-z0-9]*]] : memref<33xi64, #gpu.address_space<workgroup>>
 // CHECK:           %[[BOX:.*]] = memref.alloca() : memref<7xi64>
 // CHECK-COUNT-6:   memref.store %c0_i64, %[[BOX]]
 // CHECK:           piko.gpu.outboxes %[[LOG]] in %[[BOX]]
@@ -58,9 +58,10 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 // CHECK-LABEL: piko.kernel @kernel_sum
 // CHECK:         gpu.launch
 // CHECK-SAME:        threads(%[[T:[a-z0-9]+]],
-// CHECK-SAME:        workgroup({{.*}}, %[[CELL:.*]] : memref<1xi32, #gpu.address_space<workgroup>>, %[[ARRAY:.*]] : memref<16xi32, #gpu.address_space<workgroup>>)
-// CHECK:           gpu.barrier
+// CHECK-SAME:        workgroup({{.*}}, %[[CELL:.*]] : memref<1xi32, #gpu.address_space<workgroup>>, %[[ARRAY:.*]] : memref<16xi32, #gpu.address_space<workgroup>>
 // CHECK:           %[[IS_FIRST:.*]] = arith.cmpi eq, %[[T]], %c0
+// CHECK:           piko.storage.unit_cells
+// CHECK:           gpu.barrier
 // CHECK:           scf.if %[[IS_FIRST]] {
 // CHECK:             %[[OLD:.*]] = scf.if %{{.*}} -> (i32) {
 // CHECK-NEXT:          piko.atomic

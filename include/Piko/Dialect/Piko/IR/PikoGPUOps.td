@@ -164,6 +164,23 @@ def Piko_LeaveRestOp : Piko_GPUOp<"leave_rest"> {
   let assemblyFormat = "$log `[` $unit `]` `from` $position attr-dict";
 }
 
+def Piko_TakeUnitsOp : Piko_GPUOp<"take_units"> {
+  let summary = "takes the next units of work for a block";
+  let description = [{
+    So many, by one thread of a block: the number of the first one, which may be
+    behind the last unit. Each is given once to all blocks of a launch. `for rest`
+    counts those of the kernel's second launch.
+
+    ```mlir
+    %first = piko.gpu.take_units %log[%n]
+    %again = piko.gpu.take_units %log[%n] for rest
+    ```
+  }];
+  let arguments = (ins Piko_WriterType:$log, Index:$count, UnitAttr:$rest);
+  let results = (outs Index:$first);
+  let assemblyFormat = "$log `[` $count `]` (`for` `rest` $rest^)? attr-dict";
+}
+
 def Piko_BytesAtOp : Piko_GPUOp<"bytes_at", [Pure]> {
   let summary = "so many bytes from an address on";
   let description = [{

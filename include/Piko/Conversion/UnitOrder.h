@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Which block of a grid runs which unit of work.
+
+#ifndef PIKO_CONVERSION_UNITORDER_H
+#define PIKO_CONVERSION_UNITORDER_H
+
+#include "Piko/Dialect/Piko/IR/Piko.h"
+
+#include <optional>
+
+namespace piko {
+
+/// How the blocks of a grid come to the units that they run.
+enum class UnitOrder {
+  Fixed, ///< Block b of n runs the units b, b + n, ...: `direct_map`, and
+         ///< `serialize`, of which there is one.
+  Taken  ///< A block takes the next ones when it has ended its own.
+};
+
+/// Of a kernel at the machine level, by its stage's schedule; nothing for one
+/// that has no units.
+std::optional<UnitOrder> getUnitOrder(KernelOp kernel);
+
+} // namespace piko
+
+#endif // PIKO_CONVERSION_UNITORDER_H
