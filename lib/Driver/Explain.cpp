@@ -513,11 +513,15 @@ piko::explainPipeline(ModuleOp module, const CheckOptions &check,
   OwningOpRef<ModuleOp> kernels = module.clone();
   // What is below has remarks alone.
   std::vector<KernelTraffic> traffic;
+  std::vector<KernelUnits> units;
   if (isCUDA) {
     if (failed(run(Level::Kernels, Level::Machine)))
       return failure();
-    for (auto kernel : getOnlyPipeline(module).getOps<KernelOp>())
+    for (auto kernel : getOnlyPipeline(module).getOps<KernelOp>()) {
       traffic.push_back(findKernelTraffic(kernel));
+      if (std::optional<UnitOrder> order = getUnitOrder(kernel))
+        units.push_back({kernel.getSymName().str(), *order});
+    }
   }
   if (failed(run(isCUDA ? Level::Machine : Level::Kernels, Level::Target)))
     return failure();
@@ -526,6 +530,7 @@ piko::explainPipeline(ModuleOp module, const CheckOptions &check,
   PipelineOp pipeline = getOnlyPipeline(*kernels);
   Report(trace, pipeline, out).write();
   if (isCUDA) {
+    explainUnits(units, out);
     if (failed(explainResources(module, pipeline.getSymName(), gpu, optLevel,
                                 out)))
       return failure();

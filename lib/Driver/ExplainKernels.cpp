@@ -15,6 +15,19 @@ using namespace mlir;
 using namespace piko;
 
 //===----------------------------------------------------------------------===//
+// Units of work
+//===----------------------------------------------------------------------===//
+
+void piko::explainUnits(ArrayRef<KernelUnits> kernels, raw_ostream &out) {
+  out << "\nUnits of work, of n blocks that fill the device:\n";
+  for (const auto &[kernel, order] : kernels)
+    out << "  " << kernel
+        << (order == UnitOrder::Taken
+                ? ": a block takes the next one when it has ended one\n"
+                : ": block b takes the units b, b + n, ..\n");
+}
+
+//===----------------------------------------------------------------------===//
 // Resources
 //===----------------------------------------------------------------------===//
 

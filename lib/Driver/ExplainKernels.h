@@ -6,6 +6,7 @@
 #define PIKO_LIB_DRIVER_EXPLAINKERNELS_H
 
 #include "Piko/Analysis/KernelTraffic.h"
+#include "Piko/Conversion/UnitOrder.h"
 #include "Piko/Driver/Options.h"
 
 namespace piko {
@@ -15,6 +16,13 @@ llvm::LogicalResult explainResources(mlir::ModuleOp module,
                                      llvm::StringRef pipeline,
                                      const GPUOptions &gpu, int optLevel,
                                      llvm::raw_ostream &out);
+
+/// How the blocks of a kernel's grid come to their units.
+struct KernelUnits {
+  std::string kernel;
+  UnitOrder order;
+};
+void explainUnits(llvm::ArrayRef<KernelUnits> kernels, llvm::raw_ostream &out);
 
 /// Writes what kernels read and write.
 void explainTraffic(llvm::ArrayRef<KernelTraffic> kernels,

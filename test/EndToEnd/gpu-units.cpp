@@ -22,6 +22,10 @@
 // RUN: piko-compare %S/gpu-rare-rounds.cpp --pipe Ordered --count 900 --runs 1 --target gpu-on-cpu --gpu-threads 32 --gpu-blocks 2 | FileCheck %s
 // RUN: piko-compare %S/gpu.cpp --pipe Boxes --count 600 --runs 1 --target gpu-on-cpu --gpu-threads 32 --gpu-blocks 2 | FileCheck %s
 // CHECK: {{^equal$}}
+// RUN: pikoc %s --pipe Mapped --explain --target cuda | FileCheck %s --check-prefix=EXPLAIN
+// EXPLAIN: Units of work, of n blocks that fill the device:
+// EXPLAIN-NEXT: source_0_stage: block b takes the units b, b + n, ..
+// EXPLAIN-NEXT: kernel_stage: block b takes the units b, b + n, ..
 #include <piko.h>
 
 struct Item {
