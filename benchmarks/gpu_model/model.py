@@ -7,9 +7,9 @@ Two figures for each kernel:
   caches hold what they can. No kernel can be faster.
 * `most`: the same with caches that hold nothing for long, and with warps each of
   whose instructions waits for the one before it, a load for the L2 cache: what
-  hides that are only other warps of the same multiprocessor. Kernels may be still
-  slower: banks of shared memory, atomics on one address, and blocks that end
-  late are not in it.
+  hides that are only other warps of the same multiprocessor; and with blocks that
+  end late because of what they do alone. Kernels may be still slower: banks of
+  shared memory and atomics on one address are not in it.
 
 What the host does is in neither.
 """
@@ -100,16 +100,19 @@ def find_memory(counts, chip, units):
 
 def find_latency(counts, chip, resources):
     """Milliseconds, if nothing but other warps hides what an instruction waits
-    for: all of them, or the longest warp alone."""
+    for: all of them, the longest warp alone, or what runs until the last block
+    ends."""
     slots = count_slots(counts)
     loads = sum(counts[kind] for kind in LOADS)
     cycles = ((slots - loads) * chip.arithmetic_cycles + loads * chip.l2_cycles)
     resident = chip.multiprocessors * count_warps(resources, chip)
     of_launch = counts["warps"] / max(counts["launches"], 1)
     longest = counts["longestWarps"] / max(counts["warpInstructions"], 1)
+    last = counts["lastBlocks"] / max(counts["warpInstructions"], 1)
     return {
         "latency": chip.milliseconds(cycles / max(min(resident, of_launch), 1)),
         "longest warp": chip.milliseconds(cycles * longest),
+        "last block": chip.milliseconds(cycles * last),
     }
 
 

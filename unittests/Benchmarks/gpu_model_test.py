@@ -35,6 +35,7 @@ def count(**kinds):
     counts.setdefault("warpInstructions", total)
     counts.setdefault("laneInstructions", 32 * total)
     counts.setdefault("longestWarps", total / 10)
+    counts.setdefault("lastBlocks", counts["longestWarps"])
     return counts
 
 
@@ -65,6 +66,13 @@ class Limits(unittest.TestCase):
         self.assertEqual(it.limit, "longest warp")
         self.assertAlmostEqual(it.least_ms, 1.0)
         self.assertAlmostEqual(it.most["longest warp"], 4.0)
+
+    def test_a_block_that_ends_late(self):
+        it = model.estimate_kernel(
+            count(float32=1e6, longestWarps=1e5, lastBlocks=5e5), CHIP)
+        self.assertEqual(it.most_limit, "last block")
+        self.assertAlmostEqual(it.most["last block"], 2.0)
+        self.assertNotIn("last block", it.least)
 
     def test_memory(self):
         # 64 MB, which the cache cannot hold, and 32 KB, which it can.

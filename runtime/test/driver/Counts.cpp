@@ -29,6 +29,7 @@ static constexpr Member members[] = {
     {"warpInstructions", &Counts::warpInstructions},
     {"laneInstructions", &Counts::laneInstructions},
     {"longestWarps", &Counts::longestWarps},
+    {"lastBlocks", &Counts::lastBlocks},
     {"integer", &Counts::integer},
     {"integer64", &Counts::integer64},
     {"float32", &Counts::float32},
@@ -118,6 +119,7 @@ void piko::testdriver::addCounts(const ptx::Launch &launch, Counts &counts) {
   counts.threads += blockCount * ofBlock;
   counts.warps += blockCount * ((ofBlock + ptx::warpSize - 1) / ptx::warpSize);
   counts.longestWarps += launch.longestWarp;
+  counts.lastBlocks += launch.lastBlock;
   counts.distinctSectors += launch.footprint.sectors();
   for (size_t pc = 0; pc < launch.sites.size(); ++pc) {
     const ptx::Site &site = launch.sites[pc];

@@ -131,7 +131,20 @@ TEST_F(CountsTest, BlocksTakeWorkInTheOrderInWhichTheyAsk) {
   std::sort(taken.begin(), taken.end());
   EXPECT_EQ(taken, (std::vector<uint64_t>{1, 8, 8, 8}));
   EXPECT_LT(counts().longestWarps, 3 * units * turns);
+  EXPECT_EQ(counts().lastBlocks, counts().longestWarps);
   EXPECT_EQ(counts().atomic, units + blocks);
+}
+
+// 1 KB of registers a thread: a multiprocessor has room for few blocks.
+TEST_F(CountsTest, BlocksThatFindNoRoomBeginLater) {
+  run(R"(
+    mov.b32 %r5, 0;
+  LOOP:
+    add.s32 %r5, %r5, 1;
+    setp.lt.u32 %p2, %r5, 100;
+    @%p2 bra LOOP;)",
+      {}, 1024, 16);
+  EXPECT_EQ(counts().lastBlocks, 4 * counts().longestWarps);
 }
 
 TEST_F(CountsTest, AsJSON) {

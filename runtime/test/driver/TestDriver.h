@@ -85,6 +85,9 @@ struct PikoTestDriverCounts {
   uint64_t warpInstructions, laneInstructions;
   /// Of each launch, the most that one of its warps ran; summed.
   uint64_t longestWarps;
+  /// Of each launch, the instructions that go by until its last block ends:
+  /// each warp runs one at a time, and blocks wait for room; summed.
+  uint64_t lastBlocks;
   // Warp instructions by class. Divisions are those that GPUs do by a sequence
   // of instructions, as are remainders and correctly rounded roots.
   uint64_t integer, integer64, float32, float64, special;

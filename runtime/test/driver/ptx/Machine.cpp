@@ -365,6 +365,7 @@ void BlockQueue::run() {
     place.clock = place.start + place.block->ran();
     if (turn == Block::Turn::Ended) {
       ++ended;
+      launch.lastBlock = std::max(launch.lastBlock, place.clock);
       free.push_back(std::exchange(place.block, nullptr));
       if (next == count)
         continue;
@@ -399,4 +400,5 @@ void piko::ptx::run(Launch &launch) {
     running.back()->begin(launch.seed ? order[i] : i);
   }
   runTogether(running, random, launch.seed != 0);
+  launch.lastBlock = launch.longestWarp;
 }

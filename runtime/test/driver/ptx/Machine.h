@@ -55,6 +55,8 @@ struct Launch {
   Footprint footprint{};
   /// The most that one warp ran.
   uint64_t longestWarp = 0;
+  /// What went by until the last block ended.
+  uint64_t lastBlock = 0;
 };
 
 /// Memory of the blocks that run: registers, local and shared memory. Kept from
