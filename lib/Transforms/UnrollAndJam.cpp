@@ -337,9 +337,9 @@ bool Nest::hasReuse() {
 Forwarding::Place Forwarding::getPlace(const Access &access,
                                        const IRMapping &mapping) {
   Place place;
-  for (Value operand : access.op->getOperands())
-    if (operand != access.stored)
-      place.push_back(mapping.lookupOrDefault(operand).getAsOpaquePointer());
+  // What is stored is the first operand.
+  for (Value operand : access.op->getOperands().drop_front(!!access.stored))
+    place.push_back(mapping.lookupOrDefault(operand).getAsOpaquePointer());
   if (auto load = dyn_cast<LoadOp>(access.op))
     place.push_back(load.getFieldAttr().getAsOpaquePointer());
   if (auto store = dyn_cast<StoreOp>(access.op))
@@ -443,9 +443,11 @@ void Nest::jam() {
     for (Operation *op : front)
       builder.clone(*op, mapping);
   }
-  auto turns =
-      scf::ForOp::create(builder, innerLoc, inner.count.first, inner.count.end,
-                         constant(inner.count.first.getType(), 1));
+  // What is computed in front of it in each turn alike is any turn's.
+  auto turns = scf::ForOp::create(
+      builder, innerLoc, mappings[0].lookupOrDefault(inner.count.first),
+      mappings[0].lookupOrDefault(inner.count.end),
+      constant(inner.count.first.getType(), 1));
   for (IRMapping &mapping : mappings)
     mapping.map(inner.count.value, turns.getInductionVar());
   builder.setInsertionPointToStart(turns.getBody());

@@ -74,6 +74,29 @@ piko.pipeline @P rank 1 {
     }
   }
 
+  // The inner loop's end is computed in the outer one, from what does not change.
+  // REMARK: [[@LINE+11]]:5: remark: 4 turns of this loop share those of the loop inside of it
+  // CHECK-LABEL: piko.kernel @end
+  // CHECK:         scf.for %{{.*}} step %c4 {
+  // CHECK:           %[[M:.*]] = arith.addi %{{.*}}, %c7
+  // CHECK:           scf.for %[[J:.*]] = %c0 to %[[M]] step %c1 {
+  // CHECK:             piko.store %{{.*}}, checked @c[%[[J]] : index] "v"
+  piko.kernel @end {
+    %c0 = arith.constant 0 : index
+    %c1 = arith.constant 1 : index
+    %c7 = arith.constant 7 : index
+    %n = piko.extent @a[0]
+    scf.for %k = %c0 to %n step %c1 {
+      %m = arith.addi %n, %c7 : index
+      scf.for %j = %c0 to %m step %c1 {
+        %a = piko.load checked @a[%k : index] "v" : f32
+        %v = piko.load checked @c[%j : index] "v" : f32
+        %x = arith.addf %v, %a : f32
+        piko.store %x, checked @c[%j : index] "v" : f32
+      }
+    }
+  }
+
   // The turn before changes another element.
   // REMARK: [[@LINE+8]]:5: remark: turns of this loop do not share those of the loop inside of it (unroll-and-jam)
   // REMARK: [[@LINE+11]]:14: note: it may use an element here that another turn of the inner loop changes

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// What NAME.setup and NAME.run call the regions of a program.
+// What the writers of NAME.setup and NAME.run share: how they call the regions
+// of a program.
 
 #ifndef PIKO_LIB_CONVERSION_PIKOTOLLVM_PROGRAMREGIONS_H
 #define PIKO_LIB_CONVERSION_PIKOTOLLVM_PROGRAMREGIONS_H
