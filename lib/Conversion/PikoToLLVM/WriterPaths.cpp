@@ -131,13 +131,12 @@ void piko::createLocalPlace(OpBuilder &builder, Location loc,
                             LoweringContext &context, Value writer,
                             int64_t port, Value cell) {
   MemberBuilder out = openPort(builder, loc, context, writer, port);
-  Value zero = createI64(builder, loc, 0);
   Value last = out.load(layout::lastCell);
-  Value isSlow =
-      out.either(out.either(out.compare(MemberBuilder::P::ne, cell, zero),
-                            out.compare(MemberBuilder::P::ne, last,
-                                        createI64(builder, loc, -1))),
-                 out.any(layout::portFlags, ~PIKOIR_PORT_LOCAL));
+  Value isSlow = out.either(
+      out.either(
+          out.compare(MemberBuilder::P::uge, cell, out.load(layout::cells)),
+          out.compare(MemberBuilder::P::ne, last, createI64(builder, loc, -1))),
+      out.any(layout::portFlags, ~PIKOIR_PORT_LOCAL));
   OpBuilder::InsertionGuard guard(builder);
   callPlaceIf(isSlow, builder, loc, context, writer, port, cell);
   Value cursor = out.load(layout::cursor);
@@ -296,9 +295,7 @@ void piko::createPlaceLanes(OpBuilder &builder, Location loc,
                             LoweringContext &context, Value writer,
                             const LaneEmissions &emissions, bool isLocal) {
   MemberBuilder out = openPort(builder, loc, context, writer, emissions.port);
-  Value isSlow = createIsOutside(out, emissions,
-                                 isLocal ? createI64(builder, loc, 1)
-                                         : out.load(layout::cells));
+  Value isSlow = createIsOutside(out, emissions, out.load(layout::cells));
   if (!isLocal) {
     auto bytes = int64_t(sizeof(uint32_t)) * emissions.lanes *
                  int64_t(emissions.bits.size());

@@ -593,7 +593,7 @@ static inline void pikoir_place_inline(pikoir_writer *writer, int32_t port,
 static inline void pikoir_place_local_inline(pikoir_writer *writer,
                                              int32_t port, int64_t cell) {
   pikoir_port *out = &writer->ports[port];
-  if (cell != 0 || out->last_cell != -1 ||
+  if ((uint64_t)cell >= (uint64_t)out->cells || out->last_cell != -1 ||
       (out->flags & ~PIKOIR_PORT_LOCAL) != 0) {
     pikoir_place(writer, port, cell);
     return;

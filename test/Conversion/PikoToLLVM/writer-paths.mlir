@@ -108,3 +108,51 @@ piko.pipeline @Q rank 1 {
     }
   }
 }
+
+// Behind a local edge nothing is noted: a record that comes to any one cell of
+// the consumer needs no call.
+// CHECK-LABEL: func.func private @R.kernel_a
+// CHECK:         %[[W:.*]] = llvm.call @pikoir_open(
+// CHECK:           llvm.store %c-1_i64,
+// CHECK:           scf.yield
+// CHECK:         %[[LAST_AT:.*]] = llvm.getelementptr inbounds %[[PORT:.*]][56]
+// CHECK-NEXT:    %[[LAST:.*]] = llvm.load %[[LAST_AT]]
+// CHECK-NEXT:    %[[CELLS_AT:.*]] = llvm.getelementptr inbounds %[[PORT]][64]
+// CHECK-NEXT:    %[[CELLS:.*]] = llvm.load %[[CELLS_AT]]
+// CHECK-NEXT:    %[[OUTSIDE:.*]] = arith.cmpi uge, %[[CELL:.*]], %[[CELLS]] : i64
+// CHECK-NEXT:    %[[AGAIN:.*]] = arith.cmpi ne, %[[LAST]], %c-1_i64
+// CHECK-NEXT:    %[[BAD:.*]] = arith.ori %[[OUTSIDE]], %[[AGAIN]]
+// CHECK:         %[[SLOW:.*]] = arith.ori %[[BAD]], %{{.*}} : i1
+// CHECK-NEXT:    scf.if %[[SLOW]] {
+// CHECK-NEXT:      llvm.call @pikoir_place(%[[W]], %c0_i32, %[[CELL]])
+// CHECK-NEXT:    } else {
+// CHECK-NOT:       llvm.call
+// CHECK:           llvm.store %[[CELL]], %[[LAST_AT]]
+piko.pipeline @R rank 1 {
+  piko.source @a
+  piko.edge @a[0] -> @b
+  piko.stage @a bins [8] threads 1 : @F -> [@F] {
+    piko.schedule direct_map lanes one
+  }
+  piko.stage @b bins [8] threads 1 : @F -> [] {
+    piko.schedule direct_map end_bin
+  }
+  piko.kernel @kernel_a {
+    piko.process of @a {
+    ^bb0(%f: !piko.prim<@F>):
+      %x = piko.get %f "x" : !piko.prim<@F> -> i32
+      piko.emit 0 (%x) : i32
+      piko.return
+    }
+    piko.assign of @b port 0 {
+    ^bb0(%f: !piko.prim<@F>):
+      piko.assign_previous
+      piko.return
+    }
+    piko.local_barrier @a[0] -> @b
+    piko.process of @b {
+    ^bb0(%f: !piko.prim<@F>):
+      piko.return
+    }
+  }
+}
