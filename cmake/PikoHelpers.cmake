@@ -82,11 +82,19 @@ function(piko_add_library name)
   endif()
 endfunction()
 
+# Compilers spend much of their time in malloc. Sanitizers have their own.
+find_library(PIKO_MALLOC mimalloc DOC "Allocator of the tools, if any")
+if(PIKO_MALLOC AND NOT PIKO_SANITIZE)
+  set(PIKO_MALLOC_FLAGS
+    -Wl,--push-state,--no-as-needed ${PIKO_MALLOC} -Wl,--pop-state)
+endif()
+
 # piko_add_tool(name SOURCES... [LINK libraries])
 function(piko_add_tool name)
   cmake_parse_arguments(ARG "" "" "LINK" ${ARGN})
   add_executable(${name} ${ARG_UNPARSED_ARGUMENTS})
-  target_link_libraries(${name} PRIVATE piko_options ${ARG_LINK})
+  target_link_libraries(${name} PRIVATE
+    ${PIKO_MALLOC_FLAGS} piko_options ${ARG_LINK})
   piko_add_sanitizer_options(${name})
 endfunction()
 

@@ -15,6 +15,7 @@
 #include "mlir/Dialect/LLVMIR/LLVMDialect.h"
 #include "mlir/Dialect/LLVMIR/NVVMDialect.h"
 #include "mlir/Dialect/OpenMP/OpenMPDialect.h"
+#include "mlir/IR/Verifier.h"
 #include "mlir/Interfaces/FunctionInterfaces.h"
 #include "mlir/Parser/Parser.h"
 #include "mlir/Target/LLVMIR/Export.h"
@@ -287,6 +288,14 @@ static LogicalResult checkStart(ModuleOp module, Level from, Level to,
   return success();
 }
 
+/// Verifies what comes out. Debug builds and piko-opt do so behind each pass.
+static LogicalResult run(PassManager &passes, ModuleOp module) {
+#ifdef NDEBUG
+  passes.enableVerifier(false);
+#endif
+  return success(succeeded(passes.run(module)) && succeeded(verify(module)));
+}
+
 LogicalResult piko::lowerPipeline(ModuleOp module, Level level,
                                   const CheckOptions &check,
                                   const SynthesisOptions &synthesis,
@@ -299,7 +308,7 @@ LogicalResult piko::lowerPipeline(ModuleOp module, Level level,
   if (hasLaunches(module))
     addLaunchSequence(passes, gpu);
   addPasses(passes, from, level, check, synthesis, gpu, cpu);
-  return passes.run(module);
+  return run(passes, module);
 }
 
 SmallVector<OwningOpRef<ModuleOp>>
@@ -317,7 +326,7 @@ piko::lowerForEach(ArrayRef<CPUOptions> cpus, ModuleOp module,
     PassManager passes(module.getContext());
     addPasses(passes, from, Level::Machine, check, synthesis);
     addScalarSequence(passes, chosen);
-    return passes.run(module);
+    return run(passes, module);
   };
   if (failed(lowerCommon()))
     return {};
@@ -329,7 +338,7 @@ piko::lowerForEach(ArrayRef<CPUOptions> cpus, ModuleOp module,
       addVectorSequence(passes, chosen, cpu);
       addLLVMSequence(passes);
     }
-    if (failed(passes.run(*lowered.back())))
+    if (failed(run(passes, *lowered.back())))
       return {};
   }
   return lowered;
@@ -349,7 +358,7 @@ LogicalResult piko::lowerToGPU(ModuleOp module, const CheckOptions &check,
   PassManager passes(module.getContext());
   addPasses(passes, from, Level::Machine, check, synthesis);
   addGPUSequence(passes, gpu);
-  if (failed(passes.run(module)))
+  if (failed(run(passes, module)))
     return failure();
   if (hasGPUKernels(module))
     return success();
@@ -369,7 +378,7 @@ std::unique_ptr<llvm::Module>
 piko::translateKernels(ModuleOp module, llvm::LLVMContext &context) {
   PassManager passes(module.getContext());
   addNVVMSequence(passes);
-  if (failed(passes.run(module)))
+  if (failed(run(passes, module)))
     return nullptr;
   for (auto kernels : module.getOps<gpu::GPUModuleOp>())
     return translateForPTX(kernels, context);

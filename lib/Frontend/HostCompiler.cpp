@@ -41,6 +41,7 @@ piko::compileForHost(llvm::StringRef text, llvm::StringRef userFile,
     return nullptr;
   // Whoever makes code of it runs the optimizer, and once is enough.
   invocation->getCodeGenOpts().DisableLLVMPasses = true;
+  invocation->getCodeGenOpts().DiscardValueNames = true;
   std::string mainText;
   if (std::unique_ptr<llvm::MemoryBuffer> header = getPrecompiledHeader(
           userFile, options, flags, files, invoke, headerPath)) {

@@ -58,6 +58,8 @@ Expected<std::string> piko::emitCode(Module &module, TargetMachine &machine,
                                      const piko::OptimizerOptions &options,
                                      CodeGenFileType type,
                                      ModulePassManager last) {
+  // Nobody reads what it calls its values.
+  module.getContext().setDiscardValueNames(true);
   module.setTargetTriple(machine.getTargetTriple());
   module.setDataLayout(machine.createDataLayout());
   optimize(module, machine, options, std::move(last));
