@@ -90,7 +90,8 @@ private:
     std::optional<MemoryAccess> access =
         resolveAccess(*layout, address, memory.data.getTypeStoreSize(type));
     if (!access || type->isPointerTy()) {
-      fail(instruction, "access to a record that is not to one of its fields");
+      fail(instruction, "access to a record that is not to one of its fields; "
+                        "choose between values, as in c ? p.a : p.b");
       return nullptr;
     }
     bool isElement = marker->kind == MarkerKind::element;

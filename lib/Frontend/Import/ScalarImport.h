@@ -53,6 +53,8 @@ private:
   mlir::Value makeFunnelShift(llvm::IntrinsicInst *call, bool left);
   mlir::Value makeClassTest(llvm::IntrinsicInst *call);
   mlir::Value makeClassTestByBits(mlir::Value value, llvm::FPClassTest classes);
+  mlir::Value makeSaturating(llvm::IntrinsicInst *call);
+  mlir::Value makeReversal(mlir::Value value, unsigned from);
   mlir::Value makeThreeWay(llvm::IntrinsicInst *call, bool isSigned);
   mlir::Value convertToInteger(mlir::Value value, mlir::Type type,
                                bool isSigned);
