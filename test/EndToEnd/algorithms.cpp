@@ -36,6 +36,7 @@ struct Algorithm : piko::Stage<0, 0, 64, Numbers>, piko::Uses<State> {
     search(p, out);
     change(p, out);
     capture(p, out);
+    equal(p, out);
   }
 
   static void search(const Numbers &p, int64_t *out) {
@@ -134,6 +135,24 @@ struct Algorithm : piko::Stage<0, 0, 64, Numbers>, piko::Uses<State> {
     };
     Counter counter = std::for_each(p.values, p.values + 7, Counter());
     out[21] = counter.total.sum - counter.total.count;
+  }
+
+  /// The library calls memcmp for these.
+  static void equal(const Numbers &p, int64_t *out) {
+    std::array<int, 3> a{p.values[0] & 3, p.values[1] & 1, 2}, b = a;
+    b[p.x & 1] ^= p.y & 1;
+    std::array<uint8_t, 5> small, other;
+    for (int i = 0; i < 5; ++i) {
+      small[i] = uint8_t(p.values[i] & 1 ? 200 : 100);
+      other[i] = uint8_t(p.values[(i + p.x) & 3] & 1 ? 200 : 100);
+    }
+    bool isLess = std::lexicographical_compare(small.begin(), small.end(),
+                                               other.begin(), other.end());
+    out[22] = (a == b) + 2 * std::equal(p.values, p.values + 2, a.begin()) +
+              4 * (small == other) + 8 * isLess + 16 * (a < b);
+    int64_t wide[3] = {p.x & 1, p.y & 1, 1};
+    out[23] = std::equal(wide, wide + 1 + (p.x & 1), wide + (p.y & 1)) +
+              2 * std::ranges::equal(a, std::array{1, 1, 2});
   }
 };
 

@@ -366,6 +366,7 @@ bool piko::cleanUp(ParsedUnit &unit, MemoryMap &memory,
       }
   std::vector<llvm::Function *> roots = wrappers;
   llvm::append_range(roots, mathFunctions);
+  expandComparisons(module);
   if (!checkCalls(roots, unit, context))
     return false;
 

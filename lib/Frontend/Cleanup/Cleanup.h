@@ -4,6 +4,7 @@
 // The steps, in order, each a file:
 //
 //   1. checkCalls      what a phase cannot call is an error
+//      (first expandComparisons: those that the standard library calls)
 //   2. always-inline   the wrappers become one function each
 //   3. expandMarkers   markers take and give numbers, not pointers to records
 //      labelLoops      what belongs to the iterations of a parallelFor
@@ -37,6 +38,9 @@ namespace piko {
 
 /// Does all of the above; false after an error.
 bool cleanUp(ParsedUnit &unit, MemoryMap &memory, mlir::MLIRContext &context);
+
+/// Comparisons of arrays whose elements are known become loops.
+void expandComparisons(llvm::Module &module);
 
 /// Marks all that the functions call to be inlined; false after an error.
 bool checkCalls(llvm::ArrayRef<llvm::Function *> functions, ParsedUnit &unit,
