@@ -546,6 +546,16 @@ bool IterationLanes::isRow(Operation *op) const {
   };
   if (auto load = dyn_cast<LoadOp>(op))
     return isOfRow(load.getIndices());
+  if (auto atomic = dyn_cast<AtomicOp>(op))
+    return isOfRow(atomic.getIndices());
   auto store = dyn_cast<StoreOp>(op);
   return store && isOfRow(store.getIndices());
+}
+
+bool IterationLanes::isPrivateRow(Operation *op) const {
+  auto atomic = dyn_cast<AtomicOp>(op);
+  return atomic && atomic.getCopy() && !atomic.getOld() &&
+         loop.isDefinedOutsideOfLoop(atomic.getCopy()) && isRow(op) &&
+         llvm::none_of(atomic.getElements(),
+                       [&](Value element) { return isVarying(element); });
 }

@@ -133,6 +133,8 @@ public:
   bool isStoredByVectors(AppendOp append) const;
   /// Whether lanes access one element behind the other.
   bool isRow(mlir::Operation *op) const;
+  /// Whether an operation changes elements side by side of a private copy.
+  bool isPrivateRow(mlir::Operation *op) const;
   /// Of a read that is mostly of a row, as its index is linear but for limits,
   /// what must be linear when it runs; else null.
   mlir::Value findLimited(mlir::Operation *op) const;

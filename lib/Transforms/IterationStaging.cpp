@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// Atomic operations on private copies of state, staged: what few lanes of many
-// vectors change is compressed into a list, and a scalar loop goes through it
-// when it is full. So misses of the cache overlap, and no branch depends on the
-// lanes of one vector. Such operations commute, and nothing else in the kernel
-// uses the state.
+// Atomic operations on private copies of state, which nobody else changes. Such
+// operations commute, and nothing else in the kernel uses the state.
+//
+//   rows    lanes whose elements stand side by side change them at once;
+//   staged  what few lanes of many vectors change is compressed into a list,
+//           and a scalar loop goes through it when it is full. So misses of the
+//           cache overlap, and no branch depends on the lanes of one vector.
 
 #include "IterationWriter.h"
 
@@ -16,6 +18,16 @@ using namespace piko;
 
 /// How many changes a list holds before it is gone through.
 static constexpr int64_t mostStaged = 256;
+
+void IterationWriter::writePrivateRow(AtomicOp atomic) {
+  SmallVector<Value> elements;
+  for (Value element : atomic.getElements())
+    elements.push_back(getUniform(element));
+  ReduceRowOp::create(builder, loc, atomic.getKind(), get(atomic.getValue()),
+                      atomic.getState(), getPlaces(atomic.getIndices()),
+                      atomic.getField(), elements, active,
+                      getUniform(atomic.getCopy()));
+}
 
 bool IterationWriter::canStage(Operation *op) {
   // Fewer lanes have no instruction that compresses.

@@ -119,6 +119,8 @@ void IterationWriter::writeOperation(Operation *op) {
     return;
   case LaneForm::Serial:
   case LaneForm::Ordered:
+    if (!paired && lanes.isPrivateRow(op))
+      return writePrivateRow(cast<AtomicOp>(op));
     if (canStage(op))
       return writeStaged(cast<AtomicOp>(op));
     writeSerial(op, op);

@@ -150,6 +150,7 @@ private:
     mlir::Value count;                                ///< an array of one
     llvm::MapVector<mlir::Value, mlir::Value> values; ///< arrays
   };
+  void writePrivateRow(AtomicOp atomic);
   bool canStage(mlir::Operation *op);
   Staged &getStaged(AtomicOp atomic);
   void writeStaged(AtomicOp atomic);

@@ -418,6 +418,9 @@ double CostModel::getScalar(Operation *op) const {
   constexpr double bookkeeping = 12; // operations
   if (auto append = dyn_cast<AppendOp>(op))
     return cycles.scalar * (double(append.getValues().size()) + bookkeeping);
+  constexpr double accesses = 4; // to the element and to the note of it
+  if (lanes.isPrivateRow(op))
+    return accesses * cycles.scalarAccess;
   return isDivision(op) ? cycles.scalarDivision
          : lanes.getForm(op) == LaneForm::Access
              ? cycles.scalarAccess / getInRow(op)
@@ -477,7 +480,9 @@ void CostModel::addOperation(Operation *op, Frequency times, bool laneByLane) {
   bool isRemainder = isIntegerDivision(op) && !isDividedAsFloats(op) &&
                      !matchPattern(op->getOperand(1), m_Constant());
   double serial = times.serial * getScalar(op) / along;
-  bool isTurns = form == LaneForm::Serial || form == LaneForm::Ordered;
+  bool isReduced = lanes.isPrivateRow(op);
+  bool isTurns =
+      (form == LaneForm::Serial || form == LaneForm::Ordered) && !isReduced;
   Value limited = lanes.findLimited(op);
   bool isGather = isAccess && ((!lanes.isRow(op) && !limited) || isStrided(op));
   double lines = isGather ? getOwnLines(op) : 0;
@@ -486,6 +491,7 @@ void CostModel::addOperation(Operation *op, Frequency times, bool laneByLane) {
   double vectors = times.vectors * (isGather    ? gather
                                     : limited   ? row + cycles.vector * rowTest
                                     : isAccess  ? row
+                                    : isReduced ? cycles.reducedRow
                                     : isDivided ? getDivision(op)
                                                 : cycles.vector);
   if (laneByLane || isTurns || isRemainder) {

@@ -17,6 +17,8 @@ struct Cycles {
   double vector, row, gather, division;
   /// A row of numbers below 32 bits, whose lanes may have no masks.
   double narrowRow;
+  /// A row that is changed in a private copy, which notes that it was.
+  double reducedRow;
   /// A quotient of integers by way of floats, and one of a divisor that all
   /// lanes share.
   double quotient, sharedQuotient;

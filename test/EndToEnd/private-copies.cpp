@@ -4,15 +4,19 @@
 // state is what atomic operations would have made of it.
 // RUN: sed -n 's|^// CASE: ||p' %s > %t.cases
 // RUN: piko-compare %s --cases %t.cases --threads 1 2 4 7 | FileCheck %s
-// CHECK-COUNT-5: {{^equal$}}
+// CHECK-COUNT-7: {{^equal$}}
 // CASE: --pipe Nearest --count 30000 --domain 67 35
 // CASE: --pipe Nearest --count 3 --domain 670 350
+// CASE: --pipe Boxes --count 4000 --domain 67 35
+// CASE: --pipe Boxes --count 3 --domain 670 350
 // CASE: --pipe Counts --count 50000
 // CASE: --pipe Lists --count 20000 --domain 67 35
 // CASE: --pipe Rounds --count 5000 --domain 67 35
 // RUN: piko-compare %s --pipe Nearest --count 30000 --domain 67 35 --without vectorize | FileCheck %s --check-prefix=SCALAR
 // RUN: piko-compare %s --pipe Counts --count 30000 --without vectorize | FileCheck %s --check-prefix=SCALAR
 // SCALAR: equal
+// RUN: %if x86_64 %{ piko-compare %s --pipe Boxes --count 4000 --runs 1 --domain 67 35 --threads 1 2 12 --cpu x86-64 | FileCheck %s --check-prefix=SCALAR %}
+// RUN: %if x86_64 %{ piko-compare %s --pipe Boxes --count 4000 --runs 1 --domain 67 35 --threads 2 --cpu x86-64-v3 | FileCheck %s --check-prefix=SCALAR %}
 // RUN: pikoc %s --pipe Counts --explain | FileCheck %s --check-prefix=COUNTS
 // COUNTS: piko-privatize
 // COUNTS: changes private copies of 'counts'
@@ -68,6 +72,42 @@ struct Nearest : piko::Pipe<State> {
     source(draw);
     source(read);
   }
+};
+
+/// Rows of pixels, some of them, in records of one number and of several.
+struct Hits {
+  unsigned count = 0;
+};
+struct Seen {
+  int16_t kind = 7;
+  int64_t first = 1 << 20;
+  unsigned bits = 0;
+  int marks[3] = {};
+};
+struct Pixels {
+  piko::Image<Hits> hits;
+  piko::Image<Seen> seen;
+};
+struct Box : piko::Stage<0, 0, 64, Point>, piko::Uses<Pixels> {
+  void process(const Point &p) {
+    glm::ivec2 lo(p.x - p.tag % 9, p.y - p.tag % 5);
+    glm::ivec2 hi = glm::min(glm::ivec2(p.x, p.y) + p.tag % 40, domain() - 1);
+    parallelForPixels(glm::max(lo, 0), hi, [&](glm::ivec2 q) {
+      piko::atomicAdd(state().hits(q).count, unsigned(p.tag + q.x));
+      if ((q.x + q.y) % 3 != p.tag % 3)
+        piko::atomicMin(state().seen(q).first, int64_t(p.tag) - q.x);
+      piko::atomicOr(state().seen(q).bits, 1u << ((p.tag + q.y) & 31));
+      piko::atomicXor(state().seen(q).marks[p.tag & 1], q.x * p.tag);
+    });
+    for (int y = lo.y; y < hi.y; ++y)
+      for (int x = lo.x - 20; x < hi.x; ++x) // some lanes are outside
+        if (x >= 0 && y >= 0)
+          piko::atomicAdd(state().hits({x, y}).count, 3u);
+  }
+};
+struct Boxes : piko::Pipe<Pixels> {
+  Box box;
+  Boxes() { source(box); }
 };
 
 struct Count : piko::Stage<0, 0, 64, Point>, piko::Uses<State> {

@@ -3,6 +3,7 @@
 // Access to state and to primitives by the lanes of a vector.
 
 #include "KernelLowering.h"
+#include "LaneAddresses.h"
 #include "LaneIndices.h"
 #include "RecordPieces.h"
 #include "RecordRows.h"
@@ -19,50 +20,11 @@ using namespace piko;
 
 namespace {
 
-/// Where lanes read or write: one address, from which on they lie one behind
-/// the other, or one for each.
-struct LaneAddresses {
-  Value first, each;
-};
-
 /// The word of its records that an access to a row of them is to.
 struct RowWord {
   Value first; ///< the address of the first record
   int64_t size, number;
 };
-
-/// How far elements are from the first one, in bytes: a vector if indices are,
-/// null if there are none.
-Value computeOffset(OpBuilder &builder, Location loc, StateView &view,
-                    ValueRange indices, int64_t size, int64_t lanes) {
-  auto words = VectorType::get({lanes}, builder.getI64Type());
-  auto isVector = [](Value index) { return isa<VectorType>(index.getType()); };
-  auto widen = [&](Value number) {
-    return vector::BroadcastOp::create(builder, loc, words, number).getResult();
-  };
-  // What is the same for all lanes stays scalar.
-  Value offset;
-  auto combine = [&](auto tag, Value a, Value b) -> Value {
-    using Op = decltype(tag);
-    if (isVector(a) != isVector(b))
-      (isVector(a) ? b : a) = widen(isVector(a) ? b : a);
-    return Op::create(builder, loc, a, b);
-  };
-  for (int64_t dim = indices.size() - 1; dim >= 0; --dim) {
-    Value index = indices[dim];
-    index = arith::IndexCastOp::create(
-        builder, loc,
-        isVector(index) ? Type(words) : Type(builder.getI64Type()), index);
-    offset = offset
-                 ? combine(arith::AddIOp(),
-                           combine(arith::MulIOp(), offset, view.extents[dim]),
-                           index)
-                 : index;
-  }
-  return offset
-             ? combine(arith::MulIOp(), offset, createI64(builder, loc, size))
-             : offset;
-}
 
 template <typename OpT> struct LaneLowering : ContextPattern<OpT> {
   using ContextPattern<OpT>::ContextPattern;
@@ -81,8 +43,8 @@ protected:
       return std::nullopt;
     StateView &view = context.view(builder, op, op.getState());
     Value start =
-        computeOffset(builder, op.getLoc(), view, adaptor.getIndices(),
-                      record.getSize(), lanes.getNumElements());
+        computeLaneOffset(builder, op.getLoc(), view, adaptor.getIndices(),
+                          record.getSize(), lanes.getNumElements());
     return RowWord{createOffset(builder, op.getLoc(), view.data, start),
                    record.getSize(), offset / wordSize};
   }
@@ -94,36 +56,13 @@ protected:
     RecordOp record =
         context.record(getStateRecord(context.state(op, op.getState())));
     FieldAttr field = record.getField(op.getField());
-    Value offset = computeOffset(builder, loc, view, adaptor.getIndices(),
-                                 record.getSize(), lanes.getNumElements());
-    bool isEach = offset && isa<VectorType>(offset.getType());
-    auto words = VectorType::get(lanes.getShape(), builder.getI64Type());
-    Value base = createFieldAddress(builder, loc, view.data, field,
-                                    adaptor.getElements());
-    Type pointers =
-        LLVM::getVectorType(view.data.getType(), lanes.getNumElements());
-    auto addressEach = [&](Value from, Value offsets) {
-      return LaneAddresses{
-          {},
-          LLVM::GEPOp::create(builder, loc, pointers, builder.getI8Type(), from,
-                              ArrayRef<LLVM::GEPArg>{offsets})};
-    };
-    if (isEach)
-      return addressEach(base, offset);
-    Value first = offset ? LLVM::GEPOp::create(builder, loc, base.getType(),
-                                               builder.getI8Type(), base,
-                                               ArrayRef<LLVM::GEPArg>{offset})
-                               .getResult()
-                         : base;
-    int64_t stride = op.getConsecutive() ? record.getSize() : 0;
-    if (stride == lanes.getElementTypeBitWidth() / 8)
-      return {first, {}};
-    SmallVector<int64_t> steps;
-    for (int64_t lane = 0; lane < lanes.getNumElements(); ++lane)
-      steps.push_back(lane * stride);
-    return addressEach(
-        first, arith::ConstantOp::create(
-                   builder, loc, DenseIntElementsAttr::get(words, steps)));
+    Value offset = computeLaneOffset(builder, loc, view, adaptor.getIndices(),
+                                     record.getSize(), lanes.getNumElements());
+    return createLaneAddresses(
+        builder, loc,
+        createFieldAddress(builder, loc, view.data, field,
+                           adaptor.getElements()),
+        offset, op.getConsecutive() ? record.getSize() : 0, lanes);
   }
 };
 
@@ -410,8 +349,8 @@ struct LaneElementsLowering : Lowering<LaneElementsOp> {
                  : vector::BroadcastOp::create(rewriter, loc, words, number)
                        .getResult();
     };
-    Value offset = computeOffset(rewriter, loc, view, adaptor.getIndices(),
-                                 record.getSize(), type.getNumElements());
+    Value offset = computeLaneOffset(rewriter, loc, view, adaptor.getIndices(),
+                                     record.getSize(), type.getNumElements());
     if (op.getConsecutive()) {
       SmallVector<int64_t> steps;
       for (int64_t lane = 0; lane < type.getNumElements(); ++lane)

@@ -182,7 +182,9 @@ mlir::Value createBytes(mlir::OpBuilder &builder, mlir::Location loc,
 void declareReductions(mlir::OpBuilder &builder, mlir::Value frame,
                        const PipelineNumbers &numbers,
                        LoweringContext &context);
-/// What an atomic operation on an integer makes of the number that was there.
+mlir::LLVM::AtomicBinOp toAtomicBinOp(AtomicKind kind);
+/// What an atomic operation on integers, or on vectors of them, makes of what
+/// was there.
 mlir::Value createChange(mlir::OpBuilder &builder, mlir::Location loc,
                          AtomicKind kind, mlir::Value old, mlir::Value value);
 /// A private copy keeps one note of whether it has been changed for 1 << so
@@ -223,6 +225,9 @@ void populateChecksToLLVMPatterns(const mlir::TypeConverter &converter,
 void populateApproximationsToLLVMPatterns(const mlir::TypeConverter &converter,
                                           mlir::RewritePatternSet &patterns,
                                           LoweringContext &context);
+void populateRowReductionsToLLVMPatterns(const mlir::TypeConverter &converter,
+                                         mlir::RewritePatternSet &patterns,
+                                         LoweringContext &context);
 void populateReductionsToLLVMPatterns(const mlir::TypeConverter &converter,
                                       mlir::RewritePatternSet &patterns,
                                       LoweringContext &context);

@@ -186,6 +186,7 @@ LogicalResult ConvertPikoToLLVMPass::convert(PipelineOp pipeline,
   populateChecksToLLVMPatterns(converter, patterns, context);
   populateCountsToLLVMPatterns(converter, patterns, context);
   populateApproximationsToLLVMPatterns(converter, patterns, context);
+  populateRowReductionsToLLVMPatterns(converter, patterns, context);
   populateReductionsToLLVMPatterns(converter, patterns, context);
   populateGridToLLVMPatterns(converter, patterns, context);
   FrozenRewritePatternSet frozen(std::move(patterns));

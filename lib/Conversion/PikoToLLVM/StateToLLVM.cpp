@@ -38,6 +38,30 @@ static Value createElementOffset(OpBuilder &builder, Location loc,
                 : Value();
 }
 
+LLVM::AtomicBinOp piko::toAtomicBinOp(AtomicKind kind) {
+  switch (kind) {
+  case AtomicKind::Add:
+    return LLVM::AtomicBinOp::add;
+  case AtomicKind::MinS:
+    return LLVM::AtomicBinOp::min;
+  case AtomicKind::MaxS:
+    return LLVM::AtomicBinOp::max;
+  case AtomicKind::MinU:
+    return LLVM::AtomicBinOp::umin;
+  case AtomicKind::MaxU:
+    return LLVM::AtomicBinOp::umax;
+  case AtomicKind::And:
+    return LLVM::AtomicBinOp::_and;
+  case AtomicKind::Or:
+    return LLVM::AtomicBinOp::_or;
+  case AtomicKind::Xor:
+    return LLVM::AtomicBinOp::_xor;
+  case AtomicKind::AddF:
+    return LLVM::AtomicBinOp::fadd;
+  }
+  llvm_unreachable("all kinds are handled");
+}
+
 namespace {
 
 template <typename OpT> struct StateLowering : ContextPattern<OpT> {
@@ -94,30 +118,6 @@ struct StoreLowering : StateLowering<StoreOp> {
   }
 };
 
-LLVM::AtomicBinOp toLLVM(AtomicKind kind) {
-  switch (kind) {
-  case AtomicKind::Add:
-    return LLVM::AtomicBinOp::add;
-  case AtomicKind::MinS:
-    return LLVM::AtomicBinOp::min;
-  case AtomicKind::MaxS:
-    return LLVM::AtomicBinOp::max;
-  case AtomicKind::MinU:
-    return LLVM::AtomicBinOp::umin;
-  case AtomicKind::MaxU:
-    return LLVM::AtomicBinOp::umax;
-  case AtomicKind::And:
-    return LLVM::AtomicBinOp::_and;
-  case AtomicKind::Or:
-    return LLVM::AtomicBinOp::_or;
-  case AtomicKind::Xor:
-    return LLVM::AtomicBinOp::_xor;
-  case AtomicKind::AddF:
-    return LLVM::AtomicBinOp::fadd;
-  }
-  llvm_unreachable("all kinds are handled");
-}
-
 struct AtomicLowering : StateLowering<AtomicOp> {
   using StateLowering::StateLowering;
   LogicalResult
@@ -142,7 +142,7 @@ private:
     // The value says nothing of what others have written: monotonic is enough,
     // and the end of the kernel orders it before those that follow.
     auto old = LLVM::AtomicRMWOp::create(
-        builder, op.getLoc(), toLLVM(op.getKind()),
+        builder, op.getLoc(), toAtomicBinOp(op.getKind()),
         address(builder, op, adaptor), adaptor.getValue(),
         LLVM::AtomicOrdering::monotonic);
     old.setTbaaAttr(tag(op));

@@ -131,3 +131,41 @@ piko.pipeline @P rank 1 {
     %c = piko.cpu.private_copy add @b "n" of %w
   }
 }
+
+// -----
+
+piko.record @F {"n" : i32 at 0} size 4 align 4
+piko.pipeline @P rank 1 {
+  piko.buffer @b : @F
+  piko.source @a
+  piko.stage @a bins [0] threads 1 : @F -> [] {}
+  piko.kernel @k {
+    %zero = arith.constant 0 : index
+    %ones = arith.constant dense<1> : vector<8xi32>
+    %mask = arith.constant dense<true> : vector<8xi1>
+    %bins = piko.storage.open_bins @a : !piko.bins<@F>
+    %w = piko.cpu.open_writer %bins[%zero] : !piko.bins<@F>
+    %c = piko.cpu.private_copy xor @b "n" of %w
+    // expected-error @below {{expected a private copy for 'add' of @b "n", but got one for 'xor' of @b "n"}}
+    piko.cpu.reduce_row add %ones, @b[%zero] "n" mask %mask in %c : vector<8xi1>, vector<8xi32>
+  }
+}
+
+// -----
+
+piko.record @F {"n" : i32 at 0} size 4 align 4
+piko.pipeline @P rank 1 {
+  piko.buffer @b : @F
+  piko.source @a
+  piko.stage @a bins [0] threads 1 : @F -> [] {}
+  piko.kernel @k {
+    %zero = arith.constant 0 : index
+    %ones = arith.constant dense<1> : vector<8xi32>
+    %mask = arith.constant dense<true> : vector<4xi1>
+    %bins = piko.storage.open_bins @a : !piko.bins<@F>
+    %w = piko.cpu.open_writer %bins[%zero] : !piko.bins<@F>
+    %c = piko.cpu.private_copy add @b "n" of %w
+    // expected-error @below {{expected a mask of 8 lanes, but got 'vector<4xi1>'}}
+    piko.cpu.reduce_row add %ones, @b[%zero] "n" mask %mask in %c : vector<4xi1>, vector<8xi32>
+  }
+}

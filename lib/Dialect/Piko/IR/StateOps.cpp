@@ -74,12 +74,9 @@ LogicalResult StoreOp::verifySymbolUses(SymbolTableCollection &) {
   return verifyWrite(*this, getValue().getType());
 }
 
-/// Whether an atomic operation is what its private copy is for.
-static LogicalResult verifyCopy(AtomicOp op) {
-  if (op.getOld())
-    return op.emitOpError("expected no result, because a private copy does not "
-                          "hold what others have changed");
-  auto made = op.getCopy().getDefiningOp<PrivateCopyOp>();
+/// Whether an operation is what its private copy is for.
+template <typename AccessOp> static LogicalResult verifyCopy(AccessOp op) {
+  auto made = op.getCopy().template getDefiningOp<PrivateCopyOp>();
   if (made && made.getStateAttr() == op.getStateAttr() &&
       made.getField() == op.getField() && made.getKind() == op.getKind())
     return success();
@@ -114,7 +111,12 @@ LogicalResult AtomicOp::verifySymbolUses(SymbolTableCollection &) {
   }
   if (failed(verifyWrite(*this, getValue().getType())))
     return failure();
-  return getCopy() ? verifyCopy(*this) : success();
+  if (!getCopy())
+    return success();
+  if (getOld())
+    return emitOpError("expected no result, because a private copy does not "
+                       "hold what others have changed");
+  return verifyCopy(*this);
 }
 
 LogicalResult PrefetchOp::verifySymbolUses(SymbolTableCollection &) {
@@ -254,6 +256,12 @@ LogicalResult ScatterOp::verifySymbolUses(SymbolTableCollection &) {
   return verifyLanes(*this, cast<VectorType>(getValue().getType()));
 }
 
+LogicalResult ReduceRowOp::verifySymbolUses(SymbolTableCollection &) {
+  return success(
+      succeeded(verifyLanes(*this, cast<VectorType>(getValue().getType()))) &&
+      succeeded(verifyCopy(*this)));
+}
+
 LogicalResult LaneElementsOp::verifySymbolUses(SymbolTableCollection &) {
   auto lanes = cast<VectorType>(getAddresses().getType());
   if (failed(verifyLaneIndices(*this, lanes.getNumElements())))
@@ -273,6 +281,9 @@ int GatherRunOp::getAccessKinds() { return StateAccess::reads; }
 
 FlatSymbolRefAttr ScatterOp::getAccessedState() { return getStateAttr(); }
 int ScatterOp::getAccessKinds() { return StateAccess::stores; }
+
+FlatSymbolRefAttr ReduceRowOp::getAccessedState() { return getStateAttr(); }
+int ReduceRowOp::getAccessKinds() { return StateAccess::changesAtomically; }
 
 FlatSymbolRefAttr LoadOp::getAccessedState() { return getStateAttr(); }
 int LoadOp::getAccessKinds() { return StateAccess::reads; }

@@ -95,6 +95,34 @@ def Piko_ScatterOp : Piko_LaneAccessOp<"scatter", [MemoryEffects<[MemWrite]>]> {
   }];
 }
 
+def Piko_ReduceRowOp
+    : Piko_LaneAccessOp<"reduce_row", [MemoryEffects<[MemRead, MemWrite]>]> {
+  let summary = "changes elements of a private copy that stand side by side";
+  let description = [{
+    A `piko.atomic` for each lane in the mask. The indices are those of the first
+    lane, and each further lane has the next x, so that no two lanes change one
+    element. Those of lanes in the mask are inside of the state. Where the
+    runtime has given no copy, each lane changes the state indivisibly.
+
+    ```mlir
+    %c = piko.cpu.private_copy add @hits "count" of %writer
+    piko.cpu.reduce_row add %ones, @hits[%x, %y] "count" mask %mask in %c
+      : vector<16xi1>, vector<16xi32>
+    ```
+  }];
+  let arguments = (ins Piko_AtomicKind:$kind, Piko_Lanes:$value,
+                       FlatSymbolRefAttr:$state, Variadic<Index>:$indices,
+                       StrAttr:$field, Variadic<Index>:$elements,
+                       Piko_LaneMask:$mask, Piko_PrivateCopyType:$copy);
+  let assemblyFormat = [{
+    $kind $value `,` $state `[` $indices `]` $field (`[` $elements^ `]`)?
+    `mask` $mask `in` $copy attr-dict `:` type($mask) `,` type($value)
+  }];
+  let extraClassDeclaration = [{
+    bool getConsecutive() { return true; }
+  }];
+}
+
 def Piko_Addresses : VectorOfRankAndType<[1], [Index]>;
 
 def Piko_LaneItemsOp : Piko_CPUOp<"items", [MemoryEffects<[MemRead]>]> {
