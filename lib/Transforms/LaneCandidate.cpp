@@ -117,7 +117,10 @@ bool LaneCandidate::isRefused(const IterationLanes &lanes,
     InFlightDiagnostic remark = refuse();
     remark << lanes.getLaneCount() << " at once are expected to take "
            << std::llround(cost.vectors) << " cycles, and one after the other "
-           << std::llround(cost.serial) << otherwise;
+           << std::llround(cost.serial);
+    if (cost.vectors < cost.serial)
+      remark << ", which is not surely more";
+    remark << otherwise;
     addObstacles(remark, lanes, cost, /*isRefused=*/true);
     return true;
   }

@@ -121,7 +121,8 @@ static LogicalResult verifyEmissionPlace(EmissionOpInterface emission) {
       !emission->getParentOfType<BinsOp>())
     return emission->emitOpError("expected to be inside a process phase");
   if (emission->getParentOfType<UpdateOp>())
-    return emission->emitOpError("expected to be outside an update");
+    return emission->emitOpError("expected to be outside an update, which may "
+                                 "return what decides about it");
   if (wouldOpBeTriviallyDead(emission))
     return emission->emitOpError(
         "expected an effect, because it emits, but it says that it has none");
