@@ -22,20 +22,11 @@ bool Frame::isPossible() const {
       p_.executor->reportsInOrder() || p_.unitReport || p_.memory.limit() > 0 ||
       p_.memory.budget() > 0)
     return false;
-  for (const Stage &stage : p_.stages)
-    if (stage.clears.size() > mostJoinClears ||
-        stage.inputs.size() + stage.sources.size() > mostJoinInputs)
-      return false;
-  for (size_t s = 0; s < p_.stages.size(); ++s)
-    if ((p_.stages[s].cycle >= 0 || p_.stages[s].stripGroup >= 0) &&
-        edgesOf(static_cast<int32_t>(s)).size() > mostQueuePorts)
-      return false;
   for (const Edge &edge : p_.edges)
     if (edge.keyed() && p_.stages[edge.producer].host >= 0)
       return false;
-  auto isOne = [&](const auto &shape) { return isPossible(shape); };
-  return std::all_of(p_.loops.begin(), p_.loops.end(), isOne) &&
-         std::all_of(p_.cycles.begin(), p_.cycles.end(), isOne);
+  return std::all_of(p_.loops.begin(), p_.loops.end(),
+                     [&](const LoopShape &loop) { return isPossible(loop); });
 }
 
 template <class T> static void makeZero(const Array<T> &array) {
@@ -53,18 +44,14 @@ bool Frame::begin() {
   makeZero(places_);
   makeZero(queues_);
   makeZero(loops_);
-
+  makeZero(received_);
   for (LoopState &loop : std::span(loops_.data(), p_.loops.size()))
     loop.again = 1;
-  cycleStates_.reset();
+  arguments_.reset();
   cycles_.clear();
   for (size_t c = 0; c < p_.cycles.size(); ++c)
     cycles_.push_back(&takeCycle());
   strips_.assign(p_.stripGroups.size(), {});
-  joins_.reset();
-  queuings_.reset();
-  ends_.reset();
-  leaves_.reset();
   steps_.clear();
   joined_ = nullptr;
   members_.assign(p_.loops.size(), 0);
@@ -94,8 +81,20 @@ void Frame::takeMemory() {
                          Use::State);
   queues_ = Array<QueueState>(p_.memory, countOf(p_.edges) + 1, Use::State);
   loops_ = Array<LoopState>(p_.memory, countOf(p_.loops) + 1, Use::State);
-
+  received_ = Array<uint64_t>(
+      p_.memory, countOf(p_.edges) + countOf(p_.sources) + 1, Use::State);
   hasMemory_ = true;
+}
+
+uint8_t *Frame::Arguments::takeRoom(Memory &memory, int64_t bytes) {
+  constexpr int64_t together = int64_t(16) << 10;
+  if (block_ < blocks_.size() && used_ + bytes > blocks_[block_].size())
+    ++block_, used_ = 0;
+  if (block_ == blocks_.size() || bytes > blocks_[block_].size())
+    blocks_.emplace(blocks_.begin() + static_cast<ptrdiff_t>(block_), memory,
+                    std::max(together, bytes), Use::State);
+  used_ += bytes;
+  return blocks_[block_].data() + used_ - bytes;
 }
 
 size_t Frame::placeOf(int32_t number, bool isSource) const {
@@ -105,15 +104,17 @@ size_t Frame::placeOf(int32_t number, bool isSource) const {
 
 // --- What joins are told ----------------------------------------------------
 
-void Frame::describeSource(JoinArgs &args, int32_t source) const {
+JoinArgs &Frame::describeSource(int32_t source) {
   const Stage &stage = p_.stages[p_.sources[source].stage];
+  std::vector<JoinInput> inputs{describeSourceInput(stage, source)};
+  inputs[0].producer = nullptr;
+  auto &args = arguments_.take<JoinArgs>(p_.memory, inputs);
   args.inputCount = 1;
-  args.inputs[0] = describeSourceInput(stage, source);
-  args.inputs[0].producer = nullptr;
   args.shape = {p_.records[stage.record].size, 1, 0, 0};
   args.tiles = 1;
   args.splits = true;
   args.unitsAtOnce = device_.residentThreads() / 64;
+  return args;
 }
 
 JoinInput Frame::describeSourceInput(const Stage &stage, int32_t source) const {
@@ -127,10 +128,12 @@ JoinInput Frame::describeSourceInput(const Stage &stage, int32_t source) const {
   input.stage = -1;
   if (stage.placed())
     input.producer = &find(source, true).state;
+  input.received = &received_[static_cast<int64_t>(p_.edges.size()) + source];
   return input;
 }
 
-JoinInput Frame::describeEdge(const Edge &edge) const {
+JoinInput Frame::describeEdge(int32_t number) const {
+  const Edge &edge = p_.edges[number];
   const Stage &from = p_.stages[edge.producer];
   bool isHosted = from.host >= 0;
   JoinInput input{};
@@ -141,28 +144,26 @@ JoinInput Frame::describeEdge(const Edge &edge) const {
   input.permute = edge.gather == PIKOIR_PERMUTE && !isHosted;
   input.collects = from.collects();
   input.root = static_cast<uint32_t>(from.root);
+  input.received = &received_[number];
   return input;
 }
 
-void Frame::describeInputs(JoinArgs &args, const Stage &stage) const {
-  auto add = [&](JoinInput input) {
-    input.number = args.inputCount;
-    args.inputs[args.inputCount++] = input;
-  };
+std::vector<JoinInput> Frame::describeInputs(const Stage &stage) const {
+  std::vector<JoinInput> inputs;
   for (int32_t source : stage.sources)
-    add(describeSourceInput(stage, source));
+    inputs.push_back(describeSourceInput(stage, source));
   for (int32_t e : stage.inputs) {
     const Edge &edge = p_.edges[e];
     if (edge.local)
       continue;
-    JoinInput input = describeEdge(edge);
+    JoinInput &input = inputs.emplace_back(describeEdge(e));
     if (hasQueue(edge)) {
       input.producer = nullptr;
       input.queue = &queues_[e];
       input.isInLoop = edge.insideLoop;
     }
-    add(input);
   }
+  return inputs;
 }
 
 Shape Frame::describeShape(const Stage &stage) const {
@@ -172,20 +173,27 @@ Shape Frame::describeShape(const Stage &stage) const {
   return {p_.records[stage.record].size, stage.cells, stage.placed(), keyWidth};
 }
 
-void Frame::describeClears(JoinArgs &args, const Stage &stage) {
+std::vector<JoinClear> Frame::describeClears(const Stage &stage) {
+  std::vector<JoinClear> clears;
   for (int32_t id : stage.clears) {
     const State &state = p_.states[id];
-    args.clears[args.clearCount++] = {state.owned.data(), clearRecord(state),
-                                      p_.records[state.record].size};
+    clears.push_back({state.owned.data(), clearRecord(state),
+                      p_.records[state.record].size});
   }
+  return clears;
 }
 
 const uint8_t *Frame::clearRecord(const State &state) {
   return clearRecords_.data() + clearOffsets_[&state];
 }
 
-void Frame::describeStage(JoinArgs &args, int32_t number) {
+JoinArgs &Frame::describeStage(int32_t number) {
   const Stage &stage = p_.stages[number];
+  std::vector<JoinInput> inputs = describeInputs(stage);
+  std::vector<JoinClear> clears = describeClears(stage);
+  auto &args = arguments_.take<JoinArgs>(p_.memory, inputs, clears);
+  args.inputCount = static_cast<int32_t>(inputs.size());
+  args.clearCount = static_cast<int32_t>(clears.size());
   if (stage.loop >= 0)
     args.loop = &loops_[stage.loop];
   if (stage.cycle >= 0)
@@ -203,9 +211,8 @@ void Frame::describeStage(JoinArgs &args, int32_t number) {
     args.binSize[d] = stage.binSize[d];
     args.grid[d] = stage.grid[d];
   }
-  describeInputs(args, stage);
-  describeClears(args, stage);
   describeSchedule(args, stage);
+  return args;
 }
 
 void Frame::describeSchedule(JoinArgs &args, const Stage &stage) const {
@@ -276,17 +283,14 @@ int32_t Frame::kernelOf(int32_t number, bool isSource) const {
 
 const pikoir_input *Frame::join(int32_t number, bool isSource) {
   Place &place = find(number, isSource);
-  JoinArgs &args = joins_.take(p_.memory);
   const Stage &stage = p_.stages[isSource ? p_.sources[number].stage : number];
   bool repeats = stage.stripGroup >= 0 || (!isSource && stage.cycle >= 0);
   if (stage.binSchedules || (place.args && !repeats) ||
       nextNumber() > mostSteps)
     needsHost_ = true;
-  args.strip = findStrip(stage);
-  if (isSource)
-    describeSource(args, number);
-  else
-    describeStage(args, number);
+  int64_t strip = findStrip(stage);
+  JoinArgs &args = isSource ? describeSource(number) : describeStage(number);
+  args.strip = strip;
   args.frame = frame_.data();
   args.kernel = &place.state;
   args.number = nextNumber();
@@ -314,7 +318,7 @@ pikoir_log *Frame::log(int32_t number, bool isSource) {
 int64_t Frame::mostItems(const JoinArgs &args) const {
   int64_t most = 0;
   for (const JoinInput &input :
-       std::span(args.inputs, static_cast<size_t>(args.inputCount))) {
+       std::span(args.inputs(), static_cast<size_t>(args.inputCount))) {
     if (input.producer || input.queue)
       return -1;
     most += input.count;
@@ -412,12 +416,8 @@ void Frame::noteStatistics() {
     const Place &place = find(static_cast<int32_t>(s), false);
     p_.stageStats[s].in += place.state.in;
     p_.stageStats[s].placed += place.state.placed;
-    size_t i = p_.stages[s].sources.size();
-    for (int32_t e : p_.stages[s].inputs) {
-      if (p_.edges[e].local)
-        continue;
-      p_.stageStats[p_.edges[e].producer].out +=
-          static_cast<int64_t>(place.state.received[i++] + queues_[e].emitted);
-    }
   }
+  for (size_t e = 0; e < p_.edges.size(); ++e)
+    p_.stageStats[p_.edges[e].producer].out +=
+        static_cast<int64_t>(received_[static_cast<int64_t>(e)]);
 }

@@ -17,7 +17,9 @@
 
 #include <algorithm>
 #include <map>
+#include <new>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 namespace piko::cuda {
@@ -75,24 +77,35 @@ private:
     JoinArgs *args; ///< Of its latest join.
     int32_t stage;  ///< -1: of a source.
   };
-  /// Elements that the device reads, which a frame takes one by one.
-  template <class T> class Pool {
+  /// What grids are told: memory that the device reads, which a frame takes
+  /// piece by piece. The same requests get the same pieces.
+  class Arguments {
   public:
-    void reset() { used_ = 0; }
-    /// The next one, zero; it stays where it is. Throws OutOfMemory.
-    T &take(rt::Memory &memory) {
-      auto piece = static_cast<size_t>(used_ / together);
-      if (piece == pieces_.size())
-        pieces_.emplace_back(memory, together, rt::Use::State);
-      T &element = pieces_[piece][used_++ % together];
-      element = {};
-      return element;
+    void reset() { block_ = 0, used_ = 0; }
+    /// A new one, zero, and behind it copies of elements. Throws OutOfMemory.
+    template <class T, class... Elements>
+    T &take(rt::Memory &memory, const std::vector<Elements> &...elements) {
+      size_t bytes =
+          sizeof(T) + (size_t(0) + ... + (elements.size() * sizeof(Elements)));
+      uint8_t *room = takeRoom(memory, static_cast<int64_t>(bytes));
+      T &taken = *new (room) T{};
+      room += sizeof(T);
+      (..., put(room, elements));
+      return taken;
     }
 
   private:
-    static constexpr int64_t together = 32;
-    std::vector<rt::Array<T>> pieces_;
-    int64_t used_ = 0;
+    uint8_t *takeRoom(rt::Memory &memory, int64_t bytes);
+    template <class T>
+    static void put(uint8_t *&room, const std::vector<T> &elements) {
+      static_assert(alignof(T) == 8 && std::is_trivially_copyable_v<T>);
+      std::copy(elements.begin(), elements.end(), reinterpret_cast<T *>(room));
+      room += elements.size() * sizeof(T);
+    }
+
+    std::vector<rt::Array<uint8_t>> blocks_;
+    size_t block_ = 0;
+    int64_t used_ = 0; ///< Of that block.
   };
   /// What is known of the strips of a source while a frame is recorded.
   struct StripRecord {
@@ -101,7 +114,6 @@ private:
   };
 
   bool isPossible(const rt::LoopShape &loop) const;
-  bool isPossible(const rt::CycleShape &cycle) const;
   /// Whether the producer's kernel may run several times before the consumer's.
   bool hasQueue(const rt::Edge &edge) const {
     const rt::Stage &from = p_.stages[edge.producer];
@@ -123,14 +135,14 @@ private:
   /// As pikort_get_kernel_stats counts them.
   int32_t kernelOf(int32_t number, bool isSource) const;
   int64_t nextNumber() const { return static_cast<int64_t>(steps_.size()); }
-  void describeSource(JoinArgs &args, int32_t source) const;
-  void describeStage(JoinArgs &args, int32_t number);
-  void describeInputs(JoinArgs &args, const rt::Stage &stage) const;
+  JoinArgs &describeSource(int32_t source);
+  JoinArgs &describeStage(int32_t number);
+  std::vector<JoinInput> describeInputs(const rt::Stage &stage) const;
   void describeSchedule(JoinArgs &args, const rt::Stage &stage) const;
   JoinInput describeSourceInput(const rt::Stage &stage, int32_t source) const;
-  JoinInput describeEdge(const rt::Edge &edge) const;
+  JoinInput describeEdge(int32_t number) const;
   Shape describeShape(const rt::Stage &stage) const;
-  void describeClears(JoinArgs &args, const rt::Stage &stage);
+  std::vector<JoinClear> describeClears(const rt::Stage &stage);
   /// How many primitives come in, or -1 where only the device knows.
   int64_t mostItems(const JoinArgs &args) const;
   const uint8_t *clearRecord(const rt::State &state);
@@ -146,7 +158,8 @@ private:
   void endRound(int32_t cycle);
   CycleState &takeCycle();
   template <class Wanted>
-  void describeWaiting(StepArgs &args, const Wanted &wanted) const;
+  std::vector<QueueState *> describeWaiting(const Wanted &wanted) const;
+  StepArgs &takeStep(const std::vector<QueueState *> &waiting);
 
   void noteStatistics();
   /// Makes the log zero again, as the host's way needs it.
@@ -172,11 +185,8 @@ private:
   rt::Array<Place> places_;
   rt::Array<QueueState> queues_; ///< Of each edge.
   rt::Array<LoopState> loops_;
-  Pool<CycleState> cycleStates_;
-  Pool<JoinArgs> joins_;
-  Pool<QueueArgs> queuings_;
-  Pool<StepArgs> ends_;
-  Pool<LeaveArgs> leaves_;
+  rt::Array<uint64_t> received_; ///< Of each edge, then of each source.
+  Arguments arguments_;
   rt::Array<uint8_t> clearRecords_;
   std::map<const rt::State *, int64_t> clearOffsets_;
   std::span<uint8_t> used_; ///< Of the log, by the run before.

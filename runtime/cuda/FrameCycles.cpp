@@ -23,25 +23,14 @@ using namespace piko::cuda;
 using namespace piko::rt;
 
 bool Frame::isPossible(const LoopShape &loop) const {
-  size_t entries = 0, inside = 0;
+  size_t entries = 0;
   for (int32_t s : loop.stages) {
-    bool isEntry = !p_.stages[s].sources.empty();
-    for (int32_t e : p_.stages[s].inputs) {
-      inside += p_.edges[e].insideLoop;
-      isEntry |= !p_.edges[e].insideLoop;
-    }
-    entries += isEntry;
+    const Stage &stage = p_.stages[s];
+    entries += !stage.sources.empty() ||
+               std::any_of(stage.inputs.begin(), stage.inputs.end(),
+                           [&](int32_t e) { return !p_.edges[e].insideLoop; });
   }
-  return !loop.ordered && entries == 1 && inside <= mostStepQueues &&
-         exitsOf(loop).size() <= mostQueuePorts;
-}
-
-bool Frame::isPossible(const CycleShape &cycle) const {
-  size_t waiting = 0;
-  for (int32_t s : cycle.stages)
-    if (p_.stages[s].collects())
-      waiting += p_.stages[s].inputs.size();
-  return waiting <= mostStepQueues;
+  return !loop.ordered && entries == 1;
 }
 
 /// For each stage that gets what leaves a loop, the first edge to it.
@@ -80,24 +69,22 @@ std::vector<int32_t> Frame::collectorsOf(int32_t cycle) const {
 }
 
 void Frame::queue(const Place &place) {
-  QueueArgs *args = nullptr;
+  std::vector<QueuePort> ports;
   for (int32_t e : edgesOf(place.stage)) {
     const Edge &edge = p_.edges[e];
-    if (!hasQueue(edge))
-      continue;
-    if (!args)
-      args = &queuings_.take(p_.memory);
-    args->ports[args->portCount++] = {describeEdge(edge),
-                                      describeShape(p_.stages[edge.consumer]),
-                                      &queues_[e], groupOf(edge)};
+    if (hasQueue(edge))
+      ports.push_back({describeEdge(e), describeShape(p_.stages[edge.consumer]),
+                       &queues_[e], groupOf(edge)});
   }
-  if (!args)
+  if (ports.empty())
     return;
-  args->frame = frame_.data();
-  args->kernel = place.args->kernel;
-  args->loop = place.args->loop;
-  args->number = nextNumber();
-  launchOwn("piko_queue", args, timed_);
+  auto &args = arguments_.take<QueueArgs>(p_.memory, ports);
+  args.portCount = static_cast<int32_t>(ports.size());
+  args.frame = frame_.data();
+  args.kernel = place.args->kernel;
+  args.loop = place.args->loop;
+  args.number = nextNumber();
+  launchOwn("piko_queue", &args, timed_);
 }
 
 // --- Loops ------------------------------------------------------------------
@@ -127,34 +114,43 @@ int32_t Frame::stepLoop(int32_t loop) {
 
 /// The queues of edges that are wanted.
 template <class Wanted>
-void Frame::describeWaiting(StepArgs &args, const Wanted &wanted) const {
+std::vector<QueueState *> Frame::describeWaiting(const Wanted &wanted) const {
+  std::vector<QueueState *> queues;
   for (size_t e = 0; e < p_.edges.size(); ++e)
-    if (args.queueCount < mostStepQueues && wanted(p_.edges[e]))
-      args.queues[args.queueCount++] = &queues_[static_cast<int64_t>(e)];
+    if (wanted(p_.edges[e]))
+      queues.push_back(&queues_[static_cast<int64_t>(e)]);
+  return queues;
+}
+
+StepArgs &Frame::takeStep(const std::vector<QueueState *> &waiting) {
+  auto &args = arguments_.take<StepArgs>(p_.memory, waiting);
+  args.queueCount = static_cast<int32_t>(waiting.size());
+  args.frame = frame_.data();
+  args.number = nextNumber();
+  args.limit = p_.loopLimit;
+  return args;
 }
 
 void Frame::endWave(int32_t loop) {
-  StepArgs &args = ends_.take(p_.memory);
-  args.frame = frame_.data();
-  args.loop = &loops_[loop];
-  args.number = nextNumber();
-  args.limit = p_.loopLimit;
-  describeWaiting(args, [&](const Edge &edge) {
+  StepArgs &args = takeStep(describeWaiting([&](const Edge &edge) {
     return edge.insideLoop && p_.stages[edge.producer].loop == loop;
-  });
+  }));
+  args.loop = &loops_[loop];
   launchOwn("piko_wave", &args);
 }
 
 void Frame::endLoop(int32_t loop) {
-  LeaveArgs &args = leaves_.take(p_.memory);
+  std::vector<ExitGroup> groups;
+  for (int32_t e : exitsOf(p_.loops[loop]))
+    groups.push_back({&queues_[e],
+                      describeShape(p_.stages[p_.edges[e].consumer]),
+                      p_.edges[e].keyWidth});
+  auto &args = arguments_.take<LeaveArgs>(p_.memory, groups);
+  args.groupCount = static_cast<int32_t>(groups.size());
   args.frame = frame_.data();
   args.loop = &loops_[loop];
   args.number = nextNumber();
   args.keyWidth = p_.loops[loop].keyWidth;
-  for (int32_t e : exitsOf(p_.loops[loop]))
-    args.groups[args.groupCount++] = {
-        &queues_[e], describeShape(p_.stages[p_.edges[e].consumer]),
-        p_.edges[e].keyWidth};
   launchOwn("piko_leave", &args);
 }
 
@@ -178,20 +174,16 @@ int32_t Frame::nextTurn(int32_t cycle) {
 }
 
 CycleState &Frame::takeCycle() {
-  CycleState &state = cycleStates_.take(p_.memory);
+  auto &state = arguments_.take<CycleState>(p_.memory);
   state.again = 1;
   return state;
 }
 
 void Frame::endRound(int32_t cycle) {
-  StepArgs &args = ends_.take(p_.memory);
-  args.frame = frame_.data();
-  args.cycle = cycles_[static_cast<size_t>(cycle)];
-  args.number = nextNumber();
-  args.limit = p_.loopLimit;
-  describeWaiting(args, [&](const Edge &edge) {
+  StepArgs &args = takeStep(describeWaiting([&](const Edge &edge) {
     const Stage &to = p_.stages[edge.consumer];
     return hasQueue(edge) && to.cycle == cycle && to.collects();
-  });
+  }));
+  args.cycle = cycles_[static_cast<size_t>(cycle)];
   launchOwn("piko_round", &args);
 }

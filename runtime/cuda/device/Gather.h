@@ -19,13 +19,12 @@ namespace piko::cuda {
 
 class Gather {
 public:
-  /// What `input` has among `spans`; `received` counts it. Within a loop,
-  /// `siblings` knows what else its parents have emitted.
+  /// What `input` has among `spans`. Within a loop, `siblings` knows what else
+  /// its parents have emitted.
   Gather(Grid &grid, const Shape &shape, const JoinInput &input,
-         const Spans &spans, uint64_t &received,
-         const Siblings *siblings = nullptr)
+         const Spans &spans, const Siblings *siblings = nullptr)
       : grid_(grid), shape_(shape), input_(input), spans_(spans),
-        from_(spans.kernel()), received_(received), siblings_(siblings),
+        from_(spans.kernel()), siblings_(siblings),
         keyWidth_(input.keyWidth == 0 || siblings ? 0
                   : input.collects                ? 2
                                                   : from_.keys.width + 1),
@@ -57,7 +56,6 @@ private:
   const JoinInput &input_;
   const Spans &spans_;
   const KernelState &from_;
-  uint64_t &received_;
   const Siblings *siblings_;
   int32_t keyWidth_;
   bool byPosition_;
@@ -200,7 +198,7 @@ inline void Gather::countSpans() {
                   failed |= counter.failed;
                 });
   if (received > 0)
-    __atomic_fetch_add(&received_, received, __ATOMIC_RELAXED);
+    __atomic_fetch_add(input_.received, received, __ATOMIC_RELAXED);
   if (failed)
     grid_.failFrame();
   recordCount_ = totals[0];

@@ -63,7 +63,7 @@ private:
       pixels *= args.domain[d];
     work += pixels;
     for (int32_t i = 0; i < args.inputCount; ++i) {
-      const JoinInput &input = args.inputs[i];
+      const JoinInput &input = args.inputs()[i];
       if (input.queue)
         work += input.queue->items;
       if (input.producer)
@@ -79,18 +79,31 @@ private:
   void gather(Stream &stream) {
     if (isInLaterWave())
       return gatherWave(stream);
-    Stream streams[mostJoinInputs];
+    Stream streams[mostMerged];
     int32_t filled = 0;
     for (int32_t i = 0; i < args_.inputCount && !grid_.hasFailed(); ++i) {
+      if (filled == mostMerged)
+        filled = mergeFirst(streams);
       Stream &next = streams[filled];
       next = {};
-      gatherInput(args_.inputs[i], next);
+      gatherInput(args_.inputs()[i], next);
       filled += next.count > 0;
     }
     if (filled == 1)
       stream = streams[0];
     if (filled > 1 && !grid_.hasFailed())
-      Merge(grid_, args_.shape, streams, filled).run(stream);
+      Merge(grid_, args_.shape, streams, filled, args_.shape.keyWidth > 0)
+          .run(stream);
+  }
+
+  /// Makes one stream of as many as there is room for, which others are still
+  /// to be merged with; returns how many there are then.
+  int32_t mergeFirst(Stream (&streams)[mostMerged]) {
+    Stream merged{};
+    Merge(grid_, args_.shape, streams, mostMerged, /*keepsKeys=*/true)
+        .run(merged);
+    streams[0] = merged;
+    return 1;
   }
 
   void gatherInput(const JoinInput &input, Stream &stream) {
@@ -115,9 +128,7 @@ private:
       return;
     Spans spans(grid_, *input.producer);
     spans.find();
-    Gather(grid_, args_.shape, input, spans,
-           args_.kernel->received[input.number])
-        .run(stream);
+    Gather(grid_, args_.shape, input, spans).run(stream);
   }
 
   /// The order of a wave's primitives is free: their places tell it.
@@ -125,8 +136,9 @@ private:
     Concatenation all(grid_, args_.shape, /*keyWidth=*/0, /*isInLoop=*/true);
     all.run([&](auto &&body) {
       for (int32_t i = 0; i < args_.inputCount; ++i)
-        if (args_.inputs[i].isInLoop)
-          forChunks(*args_.inputs[i].queue, args_.inputs[i].queue->ready, body);
+        if (args_.inputs()[i].isInLoop)
+          forChunks(*args_.inputs()[i].queue, args_.inputs()[i].queue->ready,
+                    body);
     });
     stream = all.stream;
     lineage_ = all.lineage;
@@ -159,8 +171,8 @@ private:
   /// What has been taken no longer waits; by the first thread.
   void endInputs(const Stream &stream, uint32_t *childCounts) {
     for (int32_t i = 0; i < args_.inputCount; ++i)
-      if (args_.inputs[i].queue)
-        drop(*args_.inputs[i].queue, args_.inputs[i].isInLoop);
+      if (args_.inputs()[i].queue)
+        drop(*args_.inputs()[i].queue, args_.inputs()[i].isInLoop);
     if (!childCounts)
       return;
     args_.loop->places = stream.count;
@@ -187,7 +199,7 @@ private:
       if (!whole && runs(binOf(pixel), bins))
         return;
       for (int32_t c = 0; c < args_.clearCount; ++c) {
-        const JoinClear &image = args_.clears[c];
+        const JoinClear &image = args_.clears()[c];
         copyRecord(image.pixels + pixel * image.size, image.record, image.size);
       }
     });

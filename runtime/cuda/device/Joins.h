@@ -19,13 +19,15 @@ namespace piko::cuda {
 
 constexpr int32_t joinThreads = 256;
 constexpr int32_t mostJoinBlocks = 1024;
-constexpr int32_t mostJoinInputs = 8;
-constexpr int32_t mostJoinClears = 8;
-constexpr int32_t mostQueuePorts = 8;
-constexpr int32_t mostStepQueues = 16;
-constexpr int32_t mostScans = 4; ///< At a time.
+constexpr int32_t mostMerged = 8; ///< Streams, at a time.
+constexpr int32_t mostScans = 4;  ///< At a time.
 
 struct KernelState;
+
+/// Elements that lie behind what a grid is told: as many as it says.
+template <class T, class Args> const T *behind(const Args *args) {
+  return reinterpret_cast<const T *>(args + 1);
+}
 
 /// What all grids of a frame share.
 struct FrameState {
@@ -79,9 +81,8 @@ struct Chunk {
 struct QueueState {
   Chunk *chunks; ///< In the order in which they came, which is lineage's.
   int64_t count, capacity;
-  int64_t items;    ///< In all chunks.
-  int64_t ready;    ///< Within a loop: chunks of the wave before.
-  uint64_t emitted; ///< For the host's statistics.
+  int64_t items; ///< In all chunks.
+  int64_t ready; ///< Within a loop: chunks of the wave before.
 };
 
 /// A primitive that has left a loop.
@@ -125,13 +126,11 @@ struct KernelState {
   KeyWords keys; ///< Of items.
   const uint32_t *pairStarts;
   int64_t items;
-  Lineage lineage; ///< Of items, within a loop.
-  uint64_t launch; ///< Of a stage that collects, in its cycle or by strips.
-  int64_t strip;   ///< The latest.
-  int64_t runs;    ///< Before this one.
-  // Counted for the host's statistics.
-  int64_t in, placed;
-  uint64_t received[mostJoinInputs]; ///< With what was placed nowhere.
+  Lineage lineage;    ///< Of items, within a loop.
+  uint64_t launch;    ///< Of a stage that collects, in its cycle or by strips.
+  int64_t strip;      ///< The latest.
+  int64_t runs;       ///< Before this one.
+  int64_t in, placed; ///< Counted for the host's statistics.
 };
 
 /// What streams of a stage's primitives have in common.
@@ -150,12 +149,14 @@ struct JoinInput {
   QueueState *queue; ///< What comes through one has nothing else said here.
   int32_t isSource;
   int32_t isInLoop;    ///< Of a queue: both ends are in one loop.
-  int32_t number;      ///< Among the stage's inputs.
   int32_t stage, port; ///< Those of the log's entries.
   int32_t keyWidth;    ///< 64-bit words of its primitives' keys; 0: none.
   int32_t permute;     ///< Emission order may differ from that of positions.
   int32_t collects;    ///< The producer takes lists or all of a bin.
   uint32_t root;       ///< Of the lineage that the producer starts then.
+  /// Counts its primitives, with what was placed nowhere: for the host's
+  /// statistics.
+  uint64_t *received;
 };
 
 struct JoinClear {
@@ -172,8 +173,6 @@ struct JoinArgs {
   int64_t number;    ///< Of the join, in the order of launches.
   int64_t strip;     ///< Of the stage's source; -1: all at a time.
   int32_t inputCount, clearCount;
-  JoinInput inputs[mostJoinInputs];
-  JoinClear clears[mostJoinClears];
   Shape shape;
   int64_t tiles;
   int32_t takesList, collects, splits, visitsAll, everyBin, serialize;
@@ -183,6 +182,11 @@ struct JoinArgs {
   int64_t unitsAtOnce; ///< Blocks that fill the device.
   int32_t rank;        ///< Of the domain; four entries each, unused = 1 or 0.
   int64_t domain[4], binSize[4], grid[4];
+
+  const JoinInput *inputs() const { return behind<JoinInput>(this); }
+  const JoinClear *clears() const {
+    return reinterpret_cast<const JoinClear *>(inputs() + inputCount);
+  }
 };
 
 /// A port of a kernel whose primitives go through a queue.
@@ -200,7 +204,8 @@ struct QueueArgs {
   LoopState *loop; ///< The kernel's, or null.
   int64_t number;
   int32_t portCount;
-  QueuePort ports[mostQueuePorts];
+
+  const QueuePort *ports() const { return behind<QueuePort>(this); }
 };
 
 /// Behind each wave of a loop, or each round of a cycle.
@@ -211,7 +216,9 @@ struct StepArgs {
   int64_t number;
   int64_t limit; ///< Of waves or rounds behind the first.
   int32_t queueCount;
-  QueueState *queues[mostStepQueues]; ///< What waits for the next one.
+
+  /// What waits for the next one.
+  QueueState *const *queues() const { return behind<QueueState *>(this); }
 };
 
 /// All that has left a loop to one stage.
@@ -228,7 +235,8 @@ struct LeaveArgs {
   int64_t number;
   int32_t keyWidth; ///< Of what comes in.
   int32_t groupCount;
-  ExitGroup groups[mostQueuePorts];
+
+  const ExitGroup *groups() const { return behind<ExitGroup>(this); }
 };
 
 } // namespace piko::cuda

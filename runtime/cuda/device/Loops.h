@@ -28,7 +28,7 @@ public:
     int64_t places = 0;
     bool goesOn = FrameTask::run([&] {
       for (int32_t i = 0; i < args_.queueCount; ++i)
-        waiting += args_.queues[i]->items;
+        waiting += args_.queues()[i]->items;
       bool isEndless = waiting > 0 && loop_.hops >= args_.limit;
       if (waiting + loop_.exitCount > 0 && !isEndless)
         places = placeAll();
@@ -39,7 +39,7 @@ public:
     if (!Grid::isFirst())
       return;
     for (int32_t i = 0; i < args_.queueCount; ++i)
-      args_.queues[i]->ready = args_.queues[i]->count;
+      args_.queues()[i]->ready = args_.queues()[i]->count;
     loop_.again = goesOn && waiting > 0;
     ++loop_.hops;
     loop_.places = places;
@@ -51,7 +51,7 @@ private:
   static int64_t workOf(const StepArgs &args) {
     int64_t work = args.loop->places + args.loop->exitCount;
     for (int32_t i = 0; i < args.queueCount; ++i)
-      work += args.queues[i]->items;
+      work += args.queues()[i]->items;
     return work;
   }
 
@@ -66,8 +66,8 @@ private:
       exit.child = 0;
     });
     for (int32_t q = 0; q < args_.queueCount; ++q)
-      for (int64_t c = 0; c < args_.queues[q]->count; ++c) {
-        const Chunk &chunk = args_.queues[q]->chunks[c];
+      for (int64_t c = 0; c < args_.queues()[q]->count; ++c) {
+        const Chunk &chunk = args_.queues()[q]->chunks[c];
         const Lineage &lineage = chunk.lineage;
         grid_.forEach(chunk.stream.count, [&](int64_t i) {
           lineage.places[i] = starts[lineage.places[i]] + lineage.children[i];
@@ -91,7 +91,7 @@ public:
     int64_t waiting = 0;
     bool goesOn = FrameTask::run([&] {
       for (int32_t i = 0; i < args_.queueCount; ++i)
-        waiting += args_.queues[i]->items;
+        waiting += args_.queues()[i]->items;
       if (waiting > 0 && cycle.rounds >= args_.limit)
         grid_.fail();
     });
@@ -117,7 +117,7 @@ public:
     FrameTask::run([&] {
       for (int32_t g = 0; g < args_.groupCount && !grid_.hasFailed(); ++g)
         if (loop_.exitCount > 0)
-          leave(static_cast<uint32_t>(g), args_.groups[g]);
+          leave(static_cast<uint32_t>(g), args_.groups()[g]);
     });
     if (Grid::isFirst()) {
       loop_ = {};

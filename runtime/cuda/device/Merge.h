@@ -15,8 +15,11 @@ namespace piko::cuda {
 
 class Merge {
 public:
-  Merge(Grid &grid, const Shape &shape, const Stream *streams, int32_t count)
-      : grid_(grid), shape_(shape), streams_(streams), count_(count) {}
+  /// Whether what comes out has keys.
+  Merge(Grid &grid, const Shape &shape, const Stream *streams, int32_t count,
+        bool keepsKeys)
+      : grid_(grid), shape_(shape), streams_(streams), count_(count),
+        keepsKeys_(keepsKeys) {}
 
   /// Between two barriers; `out` is uniform.
   void run(Stream &out) {
@@ -43,7 +46,7 @@ public:
 private:
   void takeRoom(Stream &out) {
     out.items = items_ = grid_.take<uint8_t>(out.count * shape_.recordSize);
-    if (shape_.keyWidth > 0) {
+    if (keepsKeys_) {
       keys_ = grid_.take<uint64_t>(out.count * width_);
       out.keys = {keys_, 0, width_};
     }
@@ -110,10 +113,11 @@ private:
   const Shape &shape_;
   const Stream *streams_;
   int32_t count_, width_ = 0;
+  bool keepsKeys_;
   uint8_t *items_ = nullptr;
   uint64_t *keys_ = nullptr;
   uint32_t *pairs_ = nullptr, *pairStarts_ = nullptr;
-  uint32_t *places_[mostJoinInputs] = {};
+  uint32_t *places_[mostMerged] = {};
 };
 
 } // namespace piko::cuda

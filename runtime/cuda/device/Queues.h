@@ -199,12 +199,12 @@ private:
   void queueAll() {
     Spans spans(grid_, *args_.kernel);
     spans.find();
-    Siblings siblings(grid_, spans, args_.ports[0]);
+    Siblings siblings(grid_, spans, args_.ports()[0]);
     if (args_.loop && !grid_.hasFailed())
       siblings.run(*args_.loop);
     for (int32_t i = 0; i < args_.portCount && !grid_.hasFailed(); ++i) {
-      const QueuePort &port = args_.ports[i];
-      Gather gather(grid_, port.shape, port.input, spans, port.queue->emitted,
+      const QueuePort &port = args_.ports()[i];
+      Gather gather(grid_, port.shape, port.input, spans,
                     args_.loop ? &siblings : nullptr);
       Chunk chunk{};
       gather.run(chunk.stream);
