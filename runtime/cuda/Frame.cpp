@@ -25,8 +25,8 @@ bool Frame::isPossible() const {
   for (const Edge &edge : p_.edges)
     if (edge.keyed() && p_.stages[edge.producer].host >= 0)
       return false;
-  return std::all_of(p_.loops.begin(), p_.loops.end(),
-                     [&](const LoopShape &loop) { return isPossible(loop); });
+  return std::none_of(p_.loops.begin(), p_.loops.end(),
+                      [](const LoopShape &loop) { return loop.ordered; });
 }
 
 template <class T> static void makeZero(const Array<T> &array) {
@@ -79,7 +79,8 @@ void Frame::takeMemory() {
   };
   places_ = Array<Place>(p_.memory, countOf(p_.stages) + countOf(p_.sources),
                          Use::State);
-  queues_ = Array<QueueState>(p_.memory, countOf(p_.edges) + 1, Use::State);
+  queues_ = Array<QueueState>(p_.memory, countOf(p_.edges) + countOf(p_.stages),
+                              Use::State);
   loops_ = Array<LoopState>(p_.memory, countOf(p_.loops) + 1, Use::State);
   received_ = Array<uint64_t>(
       p_.memory, countOf(p_.edges) + countOf(p_.sources) + 1, Use::State);
@@ -189,7 +190,9 @@ const uint8_t *Frame::clearRecord(const State &state) {
 
 JoinArgs &Frame::describeStage(int32_t number) {
   const Stage &stage = p_.stages[number];
-  std::vector<JoinInput> inputs = describeInputs(stage);
+  bool isEntered = stage.loop >= 0 && hasEntries(p_.loops[stage.loop]);
+  std::vector<JoinInput> inputs =
+      isEntered ? describeWave(number) : describeInputs(stage);
   std::vector<JoinClear> clears = describeClears(stage);
   auto &args = arguments_.take<JoinArgs>(p_.memory, inputs, clears);
   args.inputCount = static_cast<int32_t>(inputs.size());
@@ -361,6 +364,7 @@ bool Frame::submit() {
     return false;
   }
   auto begin = reinterpret_cast<int64_t>(room.data());
+  logBegin_ = room.data() + headRoom + spareRoom;
   FrameState &frame = frame_[0];
   frame = {};
   frame.progress = device_.progress();
@@ -379,9 +383,9 @@ Frame::Outcome Frame::await() {
   const FrameState &frame = frame_[0];
   const KernelState *last = frame.latest;
   int64_t end = last ? last->log.cursor : frame.log.cursor;
-  used_ = {
-      reinterpret_cast<uint8_t *>(frame.log.cursor),
-      static_cast<size_t>(std::min(end, frame.log.limit) - frame.log.cursor)};
+  auto begin = reinterpret_cast<int64_t>(logBegin_);
+  used_ = {logBegin_,
+           static_cast<size_t>(std::min(end, frame.log.limit) - begin)};
   p_.memory.noteOthers(static_cast<int64_t>(used_.size()));
   bool failed = frame.failed != 0 || end > frame.log.limit ||
                 (last && last->log.errors != 0);

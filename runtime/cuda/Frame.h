@@ -113,7 +113,9 @@ private:
     bool isDivided = false;
   };
 
-  bool isPossible(const rt::LoopShape &loop) const;
+  bool comesFromOutside(const rt::Stage &stage) const;
+  /// Whether primitives come into a loop at several stages.
+  bool hasEntries(const rt::LoopShape &loop) const;
   /// Whether the producer's kernel may run several times before the consumer's.
   bool hasQueue(const rt::Edge &edge) const {
     const rt::Stage &from = p_.stages[edge.producer];
@@ -138,6 +140,7 @@ private:
   JoinArgs &describeSource(int32_t source);
   JoinArgs &describeStage(int32_t number);
   std::vector<JoinInput> describeInputs(const rt::Stage &stage) const;
+  std::vector<JoinInput> describeWave(int32_t number) const;
   void describeSchedule(JoinArgs &args, const rt::Stage &stage) const;
   JoinInput describeSourceInput(const rt::Stage &stage, int32_t source) const;
   JoinInput describeEdge(int32_t number) const;
@@ -153,6 +156,10 @@ private:
   std::vector<int32_t> collectorsOf(int32_t cycle) const;
   void repeat(const int32_t &again);
   void endRepeat(const int32_t &again);
+  QueueState &entriesOf(int32_t stage) const {
+    return queues_[static_cast<int64_t>(p_.edges.size()) + stage];
+  }
+  void enter(int32_t loop);
   void endWave(int32_t loop);
   void endLoop(int32_t loop);
   void endRound(int32_t cycle);
@@ -183,13 +190,15 @@ private:
   bool hasMemory_ = false; ///< All of what follows.
   rt::Array<FrameState> frame_;
   rt::Array<Place> places_;
-  rt::Array<QueueState> queues_; ///< Of each edge.
+  /// Of each edge, then, of what comes into a loop, of each stage.
+  rt::Array<QueueState> queues_;
   rt::Array<LoopState> loops_;
   rt::Array<uint64_t> received_; ///< Of each edge, then of each source.
   Arguments arguments_;
   rt::Array<uint8_t> clearRecords_;
   std::map<const rt::State *, int64_t> clearOffsets_;
-  std::span<uint8_t> used_; ///< Of the log, by the run before.
+  uint8_t *logBegin_ = nullptr; ///< Where grids begin to take memory.
+  std::span<uint8_t> used_;     ///< Of the log, by the run before.
 };
 
 } // namespace piko::cuda

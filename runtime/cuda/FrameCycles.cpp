@@ -5,6 +5,7 @@
 //
 //   repeat { for each stage: join, kernel, piko_queue; piko_wave } piko_leave
 //
+// behind piko_enter, if primitives come into it at several stages;
 // and a cycle whose stages a, b collect, with what does not behind each:
 //
 //   loops and stages  repeat { a  loops and stages  b  loops and stages
@@ -22,15 +23,16 @@
 using namespace piko::cuda;
 using namespace piko::rt;
 
-bool Frame::isPossible(const LoopShape &loop) const {
-  size_t entries = 0;
-  for (int32_t s : loop.stages) {
-    const Stage &stage = p_.stages[s];
-    entries += !stage.sources.empty() ||
-               std::any_of(stage.inputs.begin(), stage.inputs.end(),
-                           [&](int32_t e) { return !p_.edges[e].insideLoop; });
-  }
-  return !loop.ordered && entries == 1;
+bool Frame::comesFromOutside(const Stage &stage) const {
+  return !stage.sources.empty() ||
+         std::any_of(stage.inputs.begin(), stage.inputs.end(),
+                     [&](int32_t e) { return !p_.edges[e].insideLoop; });
+}
+
+bool Frame::hasEntries(const LoopShape &loop) const {
+  return std::count_if(loop.stages.begin(), loop.stages.end(), [&](int32_t s) {
+           return comesFromOutside(p_.stages[s]);
+         }) > 1;
 }
 
 /// For each stage that gets what leaves a loop, the first edge to it.
@@ -101,8 +103,11 @@ int32_t Frame::stepLoop(int32_t loop) {
   const std::vector<int32_t> &stages = p_.loops[loop].stages;
   size_t &member = members_[static_cast<size_t>(loop)];
   const int32_t &again = loops_[loop].again;
-  if (member == 0)
+  if (member == 0) {
+    if (hasEntries(p_.loops[loop]))
+      enter(loop);
     repeat(again);
+  }
   if (member < stages.size())
     return stages[member++];
   endWave(loop);
@@ -131,11 +136,50 @@ StepArgs &Frame::takeStep(const std::vector<QueueState *> &waiting) {
   return args;
 }
 
+/// What a stage takes of such a loop.
+std::vector<JoinInput> Frame::describeWave(int32_t number) const {
+  const Stage &stage = p_.stages[number];
+  std::vector<JoinInput> inputs = describeInputs(stage);
+  std::erase_if(inputs, [](const JoinInput &input) { return !input.isInLoop; });
+  if (comesFromOutside(stage)) {
+    JoinInput &entries = inputs.emplace_back();
+    entries.queue = &entriesOf(number);
+    entries.isInLoop = true;
+  }
+  return inputs;
+}
+
+void Frame::enter(int32_t loop) {
+  std::vector<LoopEntry> entries;
+  std::vector<JoinInput> inputs;
+  for (int32_t s : p_.loops[loop].stages) {
+    const Stage &stage = p_.stages[s];
+    if (!comesFromOutside(stage))
+      continue;
+    std::vector<JoinInput> ofStage = describeInputs(stage);
+    entries.push_back({&find(s, false).state, &entriesOf(s),
+                       describeShape(stage), findStrip(stage),
+                       static_cast<int32_t>(inputs.size()),
+                       static_cast<int32_t>(ofStage.size())});
+    inputs.insert(inputs.end(), ofStage.begin(), ofStage.end());
+  }
+  auto &args = arguments_.take<EnterArgs>(p_.memory, entries, inputs);
+  args.frame = frame_.data();
+  args.loop = &loops_[loop];
+  args.number = nextNumber();
+  args.keyWidth = p_.loops[loop].keyWidth;
+  args.entryCount = static_cast<int32_t>(entries.size());
+  args.inputCount = static_cast<int32_t>(inputs.size());
+  launchOwn("piko_enter", &args);
+}
+
 void Frame::endWave(int32_t loop) {
   StepArgs &args = takeStep(describeWaiting([&](const Edge &edge) {
     return edge.insideLoop && p_.stages[edge.producer].loop == loop;
   }));
   args.loop = &loops_[loop];
+  if (hasEntries(p_.loops[loop]) && args.limit < INT64_MAX)
+    ++args.limit;
   launchOwn("piko_wave", &args);
 }
 

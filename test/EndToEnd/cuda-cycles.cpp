@@ -27,13 +27,6 @@
 // OLD-DAG: {{^equal$}}
 // OLD-DAG: host: {{[0-9]+}} launches of kernels, 0 of graphs with 0 kernels, {{[0-9]+}} copies, 0 fills, {{[1-9][0-9]}} waits
 //
-// What needs the host between its kernels: entries at two stages of a loop, and
-// an order across hops that shows.
-// RUN: env PIKO_CUDA_DRIVER=%test_driver %{compare} --pipe TwoEntries 2>&1 | FileCheck %s --check-prefix=HOST
-// RUN: env PIKO_CUDA_DRIVER=%test_driver %{compare} --pipe Ordered 2>&1 | FileCheck %s --check-prefix=HOST
-// HOST-DAG: {{^equal$}}
-// HOST-DAG: host: {{[0-9]+}} launches of kernels, 0 of graphs with 0 kernels
-//
 // A loop without an end is the error that a CPU reports.
 // RUN: env PIKO_CUDA_DRIVER=%test_driver not %{compare} --pipe Numbers --loop-limit 5 2>&1 | FileCheck %s --check-prefix=HOPS
 // RUN: env PIKO_CUDA_DRIVER=%test_driver not %{compare} --pipe Lists --loop-limit 1 2>&1 | FileCheck %s --check-prefix=ROUNDS
@@ -53,31 +46,7 @@
 // FAILS-NOT: alive at the end
 // FAILS: got: CUDA device 0 (Piko test device): {{.*}}a frame: CUDA_ERROR_UNKNOWN
 // FAILS-NOT: alive at the end
-#include "Inputs/ports.h"
-
-struct Pixel {
-  float sum = 0;
-  int count = 0;
-};
-struct State {
-  piko::Image<Pixel> image;
-};
-
-struct Blend : piko::Stage<8, 8, 64, Point>, piko::Uses<State> {
-  void assignBin(const Point &p) {
-    assignToBoundingBox(p, glm::ivec2(p.x, p.y), glm::ivec2(p.x, p.y));
-  }
-  void process(const Point &p) {
-    update(state().image, glm::ivec2(p.x, p.y), [&](Pixel &pixel) {
-      pixel.sum = pixel.sum * 0.75f + p.value;
-      ++pixel.count;
-    });
-  }
-};
-
-inline Point moved(const Point &p, int dx, int dy, float value, int tag) {
-  return {(p.x + dx) % 64, (p.y + dy) % 48, value, tag};
-}
+#include "Inputs/hops.h"
 
 // Many hops, one child each, no bins.
 struct Collatz : piko::Stage<0, 0, 64, Point, Point, Point> {
@@ -129,36 +98,6 @@ struct Tree : piko::Pipe<State> {
   }
 };
 
-// Two stages play ping-pong; both let some out, to two stages.
-struct Ping : piko::Stage<8, 8, 64, Point, Point, Point, Point> {
-  void assignBin(const Point &p) {
-    assignToBoundingBox(p, glm::ivec2(p.x, p.y), glm::ivec2(p.x + 3, p.y));
-  }
-  void process(const Point &p) {
-    if (p.tag > 2)
-      emit(moved(p, 2, 2, p.value * 0.5f, p.tag - 3), 0);
-    if (p.tag % 2 == 0)
-      emit(p, 1);
-    else
-      emit(p, 2);
-  }
-};
-struct Pong : piko::Stage<0, 0, 64, Point, Point, Point, Point> {
-  void process(const Point &p) {
-    Point next = moved(p, 7, 0, p.value + 2, p.tag);
-    if (p.tag % 3 == 0)
-      emit(next, 0);
-    else if (p.tag % 3 == 1)
-      emit(next, 1);
-    else
-      emit(next, 2);
-    if (p.tag % 4 == 0)
-      emit(moved(p, 0, 7, p.value - 2, p.tag / 2), 0);
-  }
-};
-struct Shift : piko::Stage<0, 0, 64, Point, Point> {
-  void process(const Point &p) { emit(moved(p, 1, 1, p.value, p.tag)); }
-};
 struct PingPong : piko::Pipe<State> {
   Ping ping;
   Pong pong;
@@ -225,20 +164,6 @@ struct Lists : piko::Pipe<State> {
 };
 
 // Two stages collect in turn; between them, a loop and a stage that is none.
-struct Merge : piko::Stage<32, 32, 64, Point, Point, Point> {
-  void assignBin(const Point &p) {
-    assignToBoundingBox(p, glm::ivec2(p.x, p.y), glm::ivec2(p.x, p.y));
-  }
-  void process(const piko::List<Point> &list) {
-    for (int i = 0; i < int(list.size()); ++i) {
-      const Point &p = list[i];
-      if (p.tag > 6)
-        emit(moved(p, 1, i % 4, p.value + i, p.tag / 2), 0);
-      else
-        emit(p, 1);
-    }
-  }
-};
 struct Turns : piko::Pipe<State> {
   Gather gather;
   Merge merge;
@@ -256,42 +181,6 @@ struct Turns : piko::Pipe<State> {
     connect(shift, 0, merge);
     connect(merge, 0, gather);
     connect(merge, 1, blend);
-  }
-};
-
-struct TwoEntries : piko::Pipe<State> {
-  Ping ping;
-  Pong pong;
-  Blend blend;
-  TwoEntries() {
-    source(ping);
-    source(pong);
-    connect(ping, 0, pong);
-    connect(pong, 0, ping);
-    connect(ping, 1, blend);
-    connect(pong, 1, blend);
-    connect(ping, 2, blend);
-    connect(pong, 2, blend);
-  }
-};
-
-// Each hop changes a pixel in its order.
-struct Draw : piko::Stage<8, 8, 64, Point, Point>, piko::Uses<State> {
-  void assignBin(const Point &p) {
-    assignToBoundingBox(p, glm::ivec2(p.x, p.y), glm::ivec2(p.x, p.y));
-  }
-  void process(const Point &p) {
-    update(state().image, glm::ivec2(p.x, p.y),
-           [&](Pixel &pixel) { pixel.sum = pixel.sum * 0.5f + p.value; });
-    if (p.tag > 1)
-      emit(moved(p, p.tag % 2, 0, p.value, p.tag / 2));
-  }
-};
-struct Ordered : piko::Pipe<State> {
-  Draw draw;
-  Ordered() {
-    source(draw);
-    connect(draw, 0, draw);
   }
 };
 

@@ -93,6 +93,26 @@ TEST(Order, CyclesWhoseHopsAreSeen) {
   testWalk(conformance_Stacks_program, true);
 }
 
+TEST(Order, CyclesThatAreEnteredAtTwoStages) {
+  Pipeline pipe = makeTraced(conformance_Meetings_program);
+  for (size_t first : {size_t(0), size_t(2), size_t(65)})
+    for (size_t second : {size_t(0), size_t(1), size_t(40)}) {
+      Walkers walkers = makeWalkers(first, 5, 3),
+              others = makeWalkers(second, 6, 7);
+      ASSERT_TRUE(pipe.source(0, walkers));
+      ASSERT_TRUE(pipe.source(1, others));
+      Walkers all = walkers; // they do the same wherever they are
+      all.insert(all.end(), others.begin(), others.end());
+      SCOPED_TRACE(testing::Message() << first << " and " << second);
+      Traces expected = expectWalk(width, height, bias, all);
+      for (int32_t threads : {1, 4}) {
+        ASSERT_TRUE(pipe.threads(threads));
+        EXPECT_RUNS(pipe);
+        EXPECT_TRUE(isSame(read<Trace>(pipe, "trace"), expected));
+      }
+    }
+}
+
 TEST(Order, CyclesInRounds) {
   Pipeline pipe = makeTraced(conformance_Rounds_program);
   for (size_t count : counts) {

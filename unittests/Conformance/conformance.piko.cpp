@@ -134,6 +134,20 @@ template <bool IsOrdered> struct WalkPipe : piko::Pipe<Traced> {
 struct Waves : WalkPipe<false> {};
 struct Stacks : WalkPipe<true> {};
 
+/// Walkers come in at both stages of a loop.
+struct Meetings : piko::Pipe<Traced> {
+  Walk<false> walk, back;
+  Mark mark;
+  Meetings() {
+    source(walk);
+    source(back);
+    connect(walk, 0, back);
+    connect(back, 0, walk);
+    connect(walk, 1, mark);
+    connect(back, 1, mark);
+  }
+};
+
 //===----------------------------------------------------------------------===//
 // Rounds: a cycle through a stage that collects
 //===----------------------------------------------------------------------===//

@@ -6,8 +6,8 @@
 //
 //===----------------------------------------------------------------------===//
 
+#include "cuda/device/Enter.h"
 #include "cuda/device/Loops.h"
-#include "cuda/device/Merge.h"
 #include "cuda/device/Units.h"
 
 using namespace piko::cuda;
@@ -62,15 +62,9 @@ private:
     for (int32_t d = 0; d < args.rank; ++d)
       pixels *= args.domain[d];
     work += pixels;
-    for (int32_t i = 0; i < args.inputCount; ++i) {
-      const JoinInput &input = args.inputs()[i];
-      if (input.queue)
-        work += input.queue->items;
-      if (input.producer)
-        work += piko::cuda::workOf(*input.producer);
-      work += args.shape.placed || args.inputCount > 1 ? input.count
-                                                       : input.count / 256;
-    }
+    for (int32_t i = 0; i < args.inputCount; ++i)
+      work += piko::cuda::workOf(args.inputs()[i],
+                                 args.shape.placed || args.inputCount > 1);
     return work;
   }
 
@@ -79,56 +73,8 @@ private:
   void gather(Stream &stream) {
     if (isInLaterWave())
       return gatherWave(stream);
-    Stream streams[mostMerged];
-    int32_t filled = 0;
-    for (int32_t i = 0; i < args_.inputCount && !grid_.hasFailed(); ++i) {
-      if (filled == mostMerged)
-        filled = mergeFirst(streams);
-      Stream &next = streams[filled];
-      next = {};
-      gatherInput(args_.inputs()[i], next);
-      filled += next.count > 0;
-    }
-    if (filled == 1)
-      stream = streams[0];
-    if (filled > 1 && !grid_.hasFailed())
-      Merge(grid_, args_.shape, streams, filled, args_.shape.keyWidth > 0)
-          .run(stream);
-  }
-
-  /// Makes one stream of as many as there is room for, which others are still
-  /// to be merged with; returns how many there are then.
-  int32_t mergeFirst(Stream (&streams)[mostMerged]) {
-    Stream merged{};
-    Merge(grid_, args_.shape, streams, mostMerged, /*keepsKeys=*/true)
-        .run(merged);
-    streams[0] = merged;
-    return 1;
-  }
-
-  void gatherInput(const JoinInput &input, Stream &stream) {
-    if (input.isInLoop) // of this wave, for the next one
-      return;
-    if (input.queue) {
-      Concatenation all(grid_, args_.shape, input.keyWidth, /*isInLoop=*/false);
-      all.run([&](auto &&body) {
-        forChunks(*input.queue, input.queue->count, body);
-      });
-      stream = all.stream;
-      return;
-    }
-    if (!isFirstRun_) // the first one has taken it
-      return;
-    if (input.isSource) {
-      stream.items = input.items;
-      stream.count = input.count;
-      stream.keys = {nullptr, input.keyBase, 1};
-    }
-    if (!input.producer)
-      return;
-    Spans spans(grid_, *input.producer);
-    spans.find();
-    Gather(grid_, args_.shape, input, spans).run(stream);
+    Inputs(grid_, args_.shape, args_.inputs(), args_.inputCount, isFirstRun_)
+        .gather(stream, args_.shape.keyWidth > 0);
   }
 
   /// The order of a wave's primitives is free: their places tell it.
@@ -142,24 +88,6 @@ private:
     });
     stream = all.stream;
     lineage_ = all.lineage;
-  }
-
-  template <class Body>
-  static void forChunks(const QueueState &queue, int64_t count,
-                        const Body &body) {
-    for (int64_t c = 0; c < count; ++c)
-      body(queue.chunks[c]);
-  }
-
-  /// Drops what has been taken of a queue.
-  static void drop(QueueState &queue, bool isInLoop) {
-    int64_t taken = isInLoop ? queue.ready : queue.count;
-    for (int64_t c = 0; c < taken; ++c)
-      queue.items -= queue.chunks[c].stream.count;
-    for (int64_t c = taken; c < queue.count; ++c)
-      queue.chunks[c - taken] = queue.chunks[c];
-    queue.count -= taken;
-    queue.ready = 0;
   }
 
   /// Of what comes into a loop.
@@ -304,6 +232,10 @@ extern "C" [[clang::nvptx_kernel]] void piko_join(const JoinArgs *args) {
 /// and what follows, is launched as a join is.
 extern "C" [[clang::nvptx_kernel]] void piko_queue(const QueueArgs *args) {
   Queuer(*args).run();
+}
+
+extern "C" [[clang::nvptx_kernel]] void piko_enter(const EnterArgs *args) {
+  Enter(*args).run();
 }
 
 extern "C" [[clang::nvptx_kernel]] void piko_wave(const StepArgs *args) {

@@ -31,7 +31,9 @@ template <class T, class Args> const T *behind(const Args *args) {
 
 /// What all grids of a frame share.
 struct FrameState {
-  pikoir_log log; ///< Memory is taken in address order, and never given back.
+  /// Memory is taken in address order, and never given back; until there is a
+  /// latest kernel, from this cursor on.
+  pikoir_log log;
   int64_t mostAlone;   ///< Up to how much work one block does by itself.
   KernelState *latest; ///< The kernel that ran last; null before the first.
   /// The host's: the grid that runs, as a number in the order of launches.
@@ -98,7 +100,7 @@ struct Exit {
 /// has left it and of the primitives of this wave, in lineage order.
 struct LoopState {
   int32_t again; ///< Whether another wave follows.
-  int64_t hops;  ///< Waves before this one.
+  int64_t hops;  ///< Waves before this one; EnterArgs begin with 1.
   int64_t places;
   uint32_t *childCounts; ///< Of each place, in this wave.
   KeyWords entryKeys;
@@ -186,6 +188,29 @@ struct JoinArgs {
   const JoinInput *inputs() const { return behind<JoinInput>(this); }
   const JoinClear *clears() const {
     return reinterpret_cast<const JoinClear *>(inputs() + inputCount);
+  }
+};
+
+/// A stage at which primitives come into a loop, where there are several.
+struct LoopEntry {
+  const KernelState *kernel; ///< The stage's.
+  QueueState *queue;         ///< Where they wait for it.
+  Shape shape;
+  int64_t strip; ///< As in JoinArgs.
+  int32_t firstInput, inputCount;
+};
+
+/// In front of such a loop.
+struct EnterArgs {
+  FrameState *frame;
+  LoopState *loop;
+  int64_t number;
+  int32_t keyWidth; ///< Of what comes in.
+  int32_t entryCount, inputCount;
+
+  const LoopEntry *entries() const { return behind<LoopEntry>(this); }
+  const JoinInput *inputs() const {
+    return reinterpret_cast<const JoinInput *>(entries() + entryCount);
   }
 };
 

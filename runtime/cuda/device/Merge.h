@@ -13,20 +13,65 @@
 
 namespace piko::cuda {
 
+/// The lineage order of streams, each of which is in it.
+class KeyOrder {
+public:
+  KeyOrder(const Stream *streams, int32_t count)
+      : streams_(streams), count_(count) {
+    for (int32_t s = 0; s < count; ++s)
+      width_ = larger(width_, streams[s].keys.width);
+  }
+
+  /// Of the longest key.
+  int32_t width() const { return width_; }
+
+  /// Among all, of item i of stream s.
+  int64_t placeOf(int32_t s, int64_t i) const {
+    int64_t place = i;
+    for (int32_t other = 0; other < count_; ++other) {
+      if (other == s)
+        continue;
+      int64_t low = 0, high = streams_[other].count;
+      while (low < high) {
+        int64_t middle = (low + high) / 2;
+        if (before(other, middle, s, i))
+          low = middle + 1;
+        else
+          high = middle;
+      }
+      place += low;
+    }
+    return place;
+  }
+
+private:
+  /// True if item i of stream a comes before item j of stream b.
+  bool before(int32_t a, int64_t i, int32_t b, int64_t j) const {
+    for (int32_t w = 0; w < width_; ++w) {
+      uint64_t u = streams_[a].keys.word(i, w), v = streams_[b].keys.word(j, w);
+      if (u != v)
+        return u < v;
+    }
+    return a < b;
+  }
+
+  const Stream *streams_;
+  int32_t count_, width_ = 0;
+};
+
 class Merge {
 public:
   /// Whether what comes out has keys.
   Merge(Grid &grid, const Shape &shape, const Stream *streams, int32_t count,
         bool keepsKeys)
       : grid_(grid), shape_(shape), streams_(streams), count_(count),
-        keepsKeys_(keepsKeys) {}
+        keepsKeys_(keepsKeys), keyOrder_(streams, count) {}
 
   /// Between two barriers; `out` is uniform.
   void run(Stream &out) {
     for (int32_t s = 0; s < count_; ++s) {
       out.count += streams_[s].count;
       out.pairCount += streams_[s].pairCount;
-      width_ = larger(width_, streams_[s].keys.width);
     }
     if (out.count > UINT32_MAX || out.pairCount > UINT32_MAX)
       return grid_.fail();
@@ -47,8 +92,8 @@ private:
   void takeRoom(Stream &out) {
     out.items = items_ = grid_.take<uint8_t>(out.count * shape_.recordSize);
     if (keepsKeys_) {
-      keys_ = grid_.take<uint64_t>(out.count * width_);
-      out.keys = {keys_, 0, width_};
+      keys_ = grid_.take<uint64_t>(out.count * keyOrder_.width());
+      out.keys = {keys_, 0, keyOrder_.width()};
     }
     if (!shape_.placed)
       return;
@@ -60,42 +105,15 @@ private:
       pairStarts_[out.count] = 0;
   }
 
-  /// True if item i of stream a comes before item j of stream b.
-  bool before(int32_t a, int64_t i, int32_t b, int64_t j) const {
-    for (int32_t w = 0; w < width_; ++w) {
-      uint64_t u = streams_[a].keys.word(i, w), v = streams_[b].keys.word(j, w);
-      if (u != v)
-        return u < v;
-    }
-    return a < b;
-  }
-
-  int64_t placeOf(int32_t s, int64_t i) const {
-    int64_t place = i;
-    for (int32_t other = 0; other < count_; ++other) {
-      if (other == s)
-        continue;
-      int64_t low = 0, high = streams_[other].count;
-      while (low < high) {
-        int64_t middle = (low + high) / 2;
-        if (before(other, middle, s, i))
-          low = middle + 1;
-        else
-          high = middle;
-      }
-      place += low;
-    }
-    return place;
-  }
-
   void move(int32_t s, int64_t i) {
     const Stream &from = streams_[s];
-    int64_t to = placeOf(s, i);
+    int64_t to = keyOrder_.placeOf(s, i);
+    int32_t width = keyOrder_.width();
     copyRecord(items_ + to * shape_.recordSize,
                from.items + i * shape_.recordSize, shape_.recordSize);
     if (keys_)
-      for (int32_t w = 0; w < width_; ++w)
-        keys_[to * width_ + w] = from.keys.word(i, w);
+      for (int32_t w = 0; w < width; ++w)
+        keys_[to * width + w] = from.keys.word(i, w);
     if (!pairs_)
       return;
     places_[s][i] = static_cast<uint32_t>(to);
@@ -112,8 +130,9 @@ private:
   Grid &grid_;
   const Shape &shape_;
   const Stream *streams_;
-  int32_t count_, width_ = 0;
+  int32_t count_;
   bool keepsKeys_;
+  KeyOrder keyOrder_;
   uint8_t *items_ = nullptr;
   uint64_t *keys_ = nullptr;
   uint32_t *pairs_ = nullptr, *pairStarts_ = nullptr;

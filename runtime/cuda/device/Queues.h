@@ -167,8 +167,8 @@ public:
       return goesOn;
     if (!goesOn)
       frame_.failed = 1;
-    else if (frame_.latest)
-      frame_.latest->log.cursor = grid_.top();
+    else
+      (frame_.latest ? frame_.latest->log : frame_.log).cursor = grid_.top();
     *frame_.progress = number_ + 1;
     return goesOn;
   }

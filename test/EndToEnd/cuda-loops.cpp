@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Loops in which primitives come in at several stages, in one submission, in the
+// lineage order that the reference executor has.
+// DEFINE: %{compare} = piko-compare %s --count 70 --domain 64 48 --runs 1 --threads 2 --target cuda --gpu-threads 64
+// RUN: export PIKO_TEST_DRIVER_COUNTS=1
+// RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_SEED=3 %{compare} --pipe TwoEntries 2>&1 | FileCheck %s
+// RUN: env PIKO_CUDA_DRIVER=%test_driver %{compare} --pipe TwoEntries --count 0 31 2>&1 | FileCheck %s
+// RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_CUDA_ALONE=0 %{compare} --pipe Entries --count 40 2>&1 | FileCheck %s
+// RUN: env PIKO_CUDA_DRIVER=%test_driver %{compare} --pipe FlatEntries 2>&1 | FileCheck %s
+// RUN: env PIKO_CUDA_DRIVER=%test_driver %{compare} --pipe StripEntries --strip 13 2>&1 | FileCheck %s
+// RUN: env PIKO_CUDA_DRIVER=%test_driver %{compare} --pipe RoundEntries --count 30 2>&1 | FileCheck %s
+// CHECK-DAG: {{^equal$}}
+// CHECK-DAG: host: 0 launches of kernels, 1 of graphs with {{[0-9]+}} kernels, {{[0-9]+}} copies, 0 fills, 1 waits
+// CHECK-DAG: piko_enter: {{[1-9]}}
+//
+// RUN: env PIKO_CUDA_DRIVER=%test_driver_11 %{compare} --pipe Entries --count 20 2>&1 | FileCheck %s --check-prefix=OLD
+// OLD-DAG: {{^equal$}}
+// OLD-DAG: host: {{[0-9]+}} launches of kernels, 0 of graphs with 0 kernels, {{[0-9]+}} copies, 0 fills, {{[1-9][0-9]}} waits
+//
+// An order across hops that shows needs the host between kernels.
+// RUN: env PIKO_CUDA_DRIVER=%test_driver %{compare} --pipe Ordered 2>&1 | FileCheck %s --check-prefix=HOST
+// HOST-DAG: {{^equal$}}
+// HOST-DAG: host: {{[0-9]+}} launches of kernels, 0 of graphs with 0 kernels
+//
+// One hop too many is one hop too many.
+// RUN: env PIKO_CUDA_DRIVER=%test_driver not %{compare} --pipe TwoEntries --loop-limit 5 2>&1 | FileCheck %s --check-prefix=HOPS
+// HOPS: got: stage '{{ping|pong}}', bin {{[0-9]+}}: a loop did not end within 5 hops
+#include "Inputs/hops.h"
+
+struct TwoEntries : piko::Pipe<State> {
+  Ping ping;
+  Pong pong;
+  Blend blend;
+  TwoEntries() {
+    source(ping);
+    source(pong);
+    connect(ping, 0, pong);
+    connect(pong, 0, ping);
+    connect(ping, 1, blend);
+    connect(pong, 1, blend);
+    connect(ping, 2, blend);
+    connect(pong, 2, blend);
+  }
+};
+
+// To both, or to either.
+struct Deal : piko::Stage<32, 8, 64, Point, Point, Point> {
+  void assignBin(const Point &p) {
+    assignToBoundingBox(p, glm::ivec2(p.x - 3, p.y), glm::ivec2(p.x, p.y));
+  }
+  void process(const Point &p) {
+    if (p.tag % 3 != 0)
+      emit(moved(p, 3, 5, p.value, p.tag), 0);
+    if (p.tag % 3 != 1)
+      emit(moved(p, 5, 3, p.value, p.tag), 1);
+  }
+};
+
+// At each of the two by a source and an edge; what leaves is merged with others.
+struct Entries : piko::Pipe<State> {
+  Ping ping;
+  Pong pong;
+  Deal deal;
+  Shift shift;
+  Blend blend;
+  Entries() {
+    source(pong);
+    source(shift);
+    source(ping);
+    source(deal);
+    connect(deal, 0, pong);
+    connect(deal, 1, ping);
+    connect(ping, 0, pong);
+    connect(pong, 0, ping);
+    connect(ping, 1, shift);
+    connect(pong, 1, shift);
+    connect(ping, 2, blend);
+    connect(pong, 2, blend);
+    connect(shift, 0, blend);
+  }
+};
+
+// No kernel is in front of the loop.
+struct Halve : piko::Stage<0, 0, 64, Point, Point, Point> {
+  void process(const Point &p) {
+    emit(moved(p, 1, 0, p.value, p.tag), 1);
+    if (p.tag > 1)
+      emit(moved(p, 0, 1, p.value + 1, p.tag / 2), 0);
+  }
+};
+struct Thirds : piko::Stage<0, 0, 64, Point, Point> {
+  void process(const Point &p) {
+    if (p.tag % 2 == 0)
+      emit(moved(p, 2, 1, p.value, p.tag / 3));
+    emit(moved(p, 0, 3, -p.value, p.tag / 3));
+  }
+};
+struct FlatEntries : piko::Pipe<State> {
+  Halve halve;
+  Thirds thirds;
+  Blend blend;
+  FlatEntries() {
+    source(thirds);
+    source(halve);
+    connect(halve, 0, thirds);
+    connect(thirds, 0, halve);
+    connect(halve, 1, blend);
+  }
+};
+
+struct StripEntries : piko::Pipe<State> {
+  Ping ping;
+  Pong pong;
+  Deal deal;
+  Blend blend;
+  StripEntries() {
+    source(deal);
+    source(blend);
+    connect(deal, 0, pong);
+    connect(deal, 1, ping);
+    connect(ping, 0, pong);
+    connect(pong, 0, ping);
+    connect(ping, 1, blend);
+    connect(pong, 1, blend);
+    connect(ping, 2, blend);
+    connect(pong, 2, blend);
+  }
+};
+
+// In each round what a stage has collected comes in again, at both.
+struct RoundEntries : piko::Pipe<State> {
+  Merge merge;
+  Ping ping;
+  Pong pong;
+  Deal deal;
+  Blend blend;
+  RoundEntries() {
+    source(merge);
+    source(pong);
+    connect(merge, 0, deal);
+    connect(deal, 0, pong);
+    connect(deal, 1, ping);
+    connect(ping, 0, pong);
+    connect(pong, 0, ping);
+    connect(ping, 1, merge);
+    connect(pong, 1, blend);
+    connect(ping, 2, blend);
+    connect(pong, 2, merge);
+    connect(merge, 1, blend);
+  }
+};
+
+// Each hop changes a pixel in its order.
+struct Draw : piko::Stage<8, 8, 64, Point, Point>, piko::Uses<State> {
+  void assignBin(const Point &p) {
+    assignToBoundingBox(p, glm::ivec2(p.x, p.y), glm::ivec2(p.x, p.y));
+  }
+  void process(const Point &p) {
+    update(state().image, glm::ivec2(p.x, p.y),
+           [&](Pixel &pixel) { pixel.sum = pixel.sum * 0.5f + p.value; });
+    if (p.tag > 1)
+      emit(moved(p, p.tag % 2, 0, p.value, p.tag / 2));
+  }
+};
+struct Ordered : piko::Pipe<State> {
+  Draw draw;
+  Ordered() {
+    source(draw);
+    connect(draw, 0, draw);
+  }
+};
