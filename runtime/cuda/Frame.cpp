@@ -25,8 +25,9 @@ bool Frame::isPossible() const {
   for (const Edge &edge : p_.edges)
     if (edge.keyed() && p_.stages[edge.producer].host >= 0)
       return false;
-  return std::none_of(p_.loops.begin(), p_.loops.end(),
-                      [](const LoopShape &loop) { return loop.ordered; });
+  return std::none_of(
+      p_.stages.begin(), p_.stages.end(),
+      [&](const Stage &stage) { return isStacked(stage) && stage.hosts; });
 }
 
 template <class T> static void makeZero(const Array<T> &array) {
@@ -55,6 +56,7 @@ bool Frame::begin() {
   steps_.clear();
   joined_ = nullptr;
   members_.assign(p_.loops.size(), 0);
+  stacks_.assign(p_.loops.size(), nullptr);
   turns_.assign(p_.cycles.size(), 0);
   isCleared_.assign(p_.states.size(), false);
   isRecording_ = true;
@@ -82,6 +84,8 @@ void Frame::takeMemory() {
   queues_ = Array<QueueState>(p_.memory, countOf(p_.edges) + countOf(p_.stages),
                               Use::State);
   loops_ = Array<LoopState>(p_.memory, countOf(p_.loops) + 1, Use::State);
+  stackStates_ =
+      Array<StackState>(p_.memory, countOf(p_.loops) + 1, Use::State);
   received_ = Array<uint64_t>(
       p_.memory, countOf(p_.edges) + countOf(p_.sources) + 1, Use::State);
   hasMemory_ = true;
@@ -257,10 +261,13 @@ int64_t Frame::findStrip(const Stage &stage) {
 
 // --- What the program asks for ----------------------------------------------
 
-void Frame::launchOwn(const char *kernel, const void *args, int32_t timed) {
+int64_t Frame::manyBlocks() const { return device_.joinBlocks(); }
+
+void Frame::launchOwn(const char *kernel, const void *args, int32_t timed,
+                      int64_t blocks) {
   steps_.push_back({Step::Kind::Grid,
                     {kernel,
-                     device_.joinBlocks(),
+                     blocks,
                      joinThreads,
                      {reinterpret_cast<int64_t>(args)},
                      /*isJoin=*/true},
@@ -286,11 +293,16 @@ int32_t Frame::kernelOf(int32_t number, bool isSource) const {
 
 const pikoir_input *Frame::join(int32_t number, bool isSource) {
   Place &place = find(number, isSource);
+  place.stage = isSource ? -1 : number;
+  joined_ = &place;
+  timed_ = kernelOf(number, isSource);
   const Stage &stage = p_.stages[isSource ? p_.sources[number].stage : number];
   bool repeats = stage.stripGroup >= 0 || (!isSource && stage.cycle >= 0);
   if (stage.binSchedules || (place.args && !repeats) ||
       nextNumber() > mostSteps)
     needsHost_ = true;
+  if (!isSource && isStacked(stage))
+    return &place.state.input;
   int64_t strip = findStrip(stage);
   JoinArgs &args = isSource ? describeSource(number) : describeStage(number);
   args.strip = strip;
@@ -298,9 +310,6 @@ const pikoir_input *Frame::join(int32_t number, bool isSource) {
   args.kernel = &place.state;
   args.number = nextNumber();
   place.args = &args;
-  place.stage = isSource ? -1 : number;
-  joined_ = &place;
-  timed_ = kernelOf(number, isSource);
   launchOwn("piko_join", &args, timed_);
   if (!isSource)
     for (int32_t id : p_.stages[number].clears)
@@ -310,7 +319,7 @@ const pikoir_input *Frame::join(int32_t number, bool isSource) {
 
 void Frame::launch(GridLaunch grid) {
   steps_.push_back({Step::Kind::Grid, std::move(grid), nullptr, timed_});
-  if (joined_ && joined_->stage >= 0)
+  if (joined_ && joined_->stage >= 0 && !isStacked(p_.stages[joined_->stage]))
     queue(*joined_);
 }
 
@@ -330,6 +339,8 @@ int64_t Frame::mostItems(const JoinArgs &args) const {
 }
 
 int64_t Frame::blocks(int32_t number, bool isSource, int64_t threads) const {
+  if (!isSource && isStacked(p_.stages[number]))
+    return 1;
   const JoinArgs &args = *find(number, isSource).args;
   int64_t blocks = device_.residentThreads() / threads;
   int64_t most = mostItems(args);

@@ -133,7 +133,12 @@ private:
     return places_[static_cast<int64_t>(placeOf(number, isSource))];
   }
   /// Notes a grid of the runtime's own kernels, for one of the pipeline's.
-  void launchOwn(const char *kernel, const void *args, int32_t timed = -1);
+  void launchOwn(const char *kernel, const void *args, int32_t timed = -1) {
+    launchOwn(kernel, args, timed, manyBlocks());
+  }
+  void launchOwn(const char *kernel, const void *args, int32_t timed,
+                 int64_t blocks);
+  int64_t manyBlocks() const;
   /// As pikort_get_kernel_stats counts them.
   int32_t kernelOf(int32_t number, bool isSource) const;
   int64_t nextNumber() const { return static_cast<int64_t>(steps_.size()); }
@@ -159,7 +164,15 @@ private:
   QueueState &entriesOf(int32_t stage) const {
     return queues_[static_cast<int64_t>(p_.edges.size()) + stage];
   }
+  /// Whether it runs one position at a time.
+  bool isStacked(const rt::Stage &stage) const {
+    return stage.loop >= 0 && p_.loops[stage.loop].ordered;
+  }
+  int32_t memberOf(const rt::Edge &edge) const;
+  std::vector<QueuePort> describePorts(int32_t kernel) const;
+  StackArgs &describeStack(int32_t loop);
   void enter(int32_t loop);
+  void endPosition(int32_t loop);
   void endWave(int32_t loop);
   void endLoop(int32_t loop);
   void endRound(int32_t cycle);
@@ -185,6 +198,7 @@ private:
   std::vector<size_t> members_;      ///< Of each loop, those led through.
   std::vector<size_t> turns_;        ///< Of each cycle, those taken.
   std::vector<CycleState *> cycles_; ///< Of each, the state of its next run.
+  std::vector<StackArgs *> stacks_;  ///< Of each loop that has one.
   std::vector<StripRecord> strips_;  ///< Of each group.
   // From run to run, where the device sees it:
   bool hasMemory_ = false; ///< All of what follows.
@@ -193,7 +207,8 @@ private:
   /// Of each edge, then, of what comes into a loop, of each stage.
   rt::Array<QueueState> queues_;
   rt::Array<LoopState> loops_;
-  rt::Array<uint64_t> received_; ///< Of each edge, then of each source.
+  rt::Array<StackState> stackStates_; ///< Of each loop.
+  rt::Array<uint64_t> received_;      ///< Of each edge, then of each source.
   Arguments arguments_;
   rt::Array<uint8_t> clearRecords_;
   std::map<const rt::State *, int64_t> clearOffsets_;

@@ -5,7 +5,11 @@
 //
 //   repeat { for each stage: join, kernel, piko_queue; piko_wave } piko_leave
 //
-// behind piko_enter, if primitives come into it at several stages;
+// behind piko_enter, if primitives come into it at several stages; or, if the
+// order of its hops can be seen, which runs one position at a time,
+//
+//   piko_enter repeat { for each stage: kernel; piko_step } piko_leave
+//
 // and a cycle whose stages a, b collect, with what does not behind each:
 //
 //   loops and stages  repeat { a  loops and stages  b  loops and stages
@@ -70,14 +74,29 @@ std::vector<int32_t> Frame::collectorsOf(int32_t cycle) const {
   return collectors;
 }
 
-void Frame::queue(const Place &place) {
+/// The stage of its loop that an edge leads to, or -1.
+int32_t Frame::memberOf(const Edge &edge) const {
+  if (!edge.insideLoop)
+    return -1;
+  const std::vector<int32_t> &stages =
+      p_.loops[p_.stages[edge.producer].loop].stages;
+  return static_cast<int32_t>(
+      std::find(stages.begin(), stages.end(), edge.consumer) - stages.begin());
+}
+
+std::vector<QueuePort> Frame::describePorts(int32_t kernel) const {
   std::vector<QueuePort> ports;
-  for (int32_t e : edgesOf(place.stage)) {
+  for (int32_t e : edgesOf(kernel)) {
     const Edge &edge = p_.edges[e];
     if (hasQueue(edge))
       ports.push_back({describeEdge(e), describeShape(p_.stages[edge.consumer]),
-                       &queues_[e], groupOf(edge)});
+                       &queues_[e], groupOf(edge), memberOf(edge)});
   }
+  return ports;
+}
+
+void Frame::queue(const Place &place) {
+  std::vector<QueuePort> ports = describePorts(place.stage);
   if (ports.empty())
     return;
   auto &args = arguments_.take<QueueArgs>(p_.memory, ports);
@@ -103,14 +122,18 @@ int32_t Frame::stepLoop(int32_t loop) {
   const std::vector<int32_t> &stages = p_.loops[loop].stages;
   size_t &member = members_[static_cast<size_t>(loop)];
   const int32_t &again = loops_[loop].again;
+  bool hasStack = p_.loops[loop].ordered;
   if (member == 0) {
-    if (hasEntries(p_.loops[loop]))
+    if (hasStack || hasEntries(p_.loops[loop]))
       enter(loop);
     repeat(again);
   }
   if (member < stages.size())
     return stages[member++];
-  endWave(loop);
+  if (hasStack)
+    endPosition(loop);
+  else
+    endWave(loop);
   endRepeat(again);
   endLoop(loop);
   member = 0;
@@ -152,15 +175,17 @@ std::vector<JoinInput> Frame::describeWave(int32_t number) const {
 void Frame::enter(int32_t loop) {
   std::vector<LoopEntry> entries;
   std::vector<JoinInput> inputs;
-  for (int32_t s : p_.loops[loop].stages) {
+  const std::vector<int32_t> &stages = p_.loops[loop].stages;
+  for (size_t m = 0; m < stages.size(); ++m) {
+    int32_t s = stages[m];
     const Stage &stage = p_.stages[s];
     if (!comesFromOutside(stage))
       continue;
     std::vector<JoinInput> ofStage = describeInputs(stage);
-    entries.push_back({&find(s, false).state, &entriesOf(s),
-                       describeShape(stage), findStrip(stage),
-                       static_cast<int32_t>(inputs.size()),
-                       static_cast<int32_t>(ofStage.size())});
+    entries.push_back(
+        {&find(s, false).state, &entriesOf(s), describeShape(stage),
+         findStrip(stage), static_cast<int32_t>(inputs.size()),
+         static_cast<int32_t>(ofStage.size()), static_cast<int32_t>(m)});
     inputs.insert(inputs.end(), ofStage.begin(), ofStage.end());
   }
   auto &args = arguments_.take<EnterArgs>(p_.memory, entries, inputs);
@@ -170,7 +195,35 @@ void Frame::enter(int32_t loop) {
   args.keyWidth = p_.loops[loop].keyWidth;
   args.entryCount = static_cast<int32_t>(entries.size());
   args.inputCount = static_cast<int32_t>(inputs.size());
+  if (p_.loops[loop].ordered)
+    args.stack = stacks_[static_cast<size_t>(loop)] = &describeStack(loop);
   launchOwn("piko_enter", &args);
+}
+
+StackArgs &Frame::describeStack(int32_t loop) {
+  std::vector<StackMember> members;
+  std::vector<QueuePort> ports;
+  for (int32_t s : p_.loops[loop].stages) {
+    std::vector<QueuePort> ofStage = describePorts(s);
+    members.push_back({&find(s, false).state, describeShape(p_.stages[s]),
+                       p_.stages[s].tiles, static_cast<int32_t>(ports.size()),
+                       static_cast<int32_t>(ofStage.size())});
+    ports.insert(ports.end(), ofStage.begin(), ofStage.end());
+  }
+  auto &args = arguments_.take<StackArgs>(p_.memory, members, ports);
+  args.frame = frame_.data();
+  args.loop = &loops_[loop];
+  args.stack = &stackStates_[loop];
+  args.limit = p_.loopLimit;
+  args.memberCount = static_cast<int32_t>(members.size());
+  args.portCount = static_cast<int32_t>(ports.size());
+  return args;
+}
+
+void Frame::endPosition(int32_t loop) {
+  StackArgs &args = *stacks_[static_cast<size_t>(loop)];
+  args.number = nextNumber();
+  launchOwn("piko_step", &args, /*timed=*/-1, /*blocks=*/1);
 }
 
 void Frame::endWave(int32_t loop) {

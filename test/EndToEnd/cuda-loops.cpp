@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// Loops in which primitives come in at several stages, in one submission, in the
-// lineage order that the reference executor has.
+// Loops in which primitives come in at several stages, and those whose order
+// across hops shows, in one submission, in the lineage order that the reference
+// executor has.
 // DEFINE: %{compare} = piko-compare %s --count 70 --domain 64 48 --runs 1 --threads 2 --target cuda --gpu-threads 64
 // RUN: export PIKO_TEST_DRIVER_COUNTS=1
 // RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_SEED=3 %{compare} --pipe TwoEntries 2>&1 | FileCheck %s
@@ -18,14 +19,20 @@
 // OLD-DAG: {{^equal$}}
 // OLD-DAG: host: {{[0-9]+}} launches of kernels, 0 of graphs with 0 kernels, {{[0-9]+}} copies, 0 fills, {{[1-9][0-9]}} waits
 //
-// An order across hops that shows needs the host between kernels.
-// RUN: env PIKO_CUDA_DRIVER=%test_driver %{compare} --pipe Ordered 2>&1 | FileCheck %s --check-prefix=HOST
-// HOST-DAG: {{^equal$}}
-// HOST-DAG: host: {{[0-9]+}} launches of kernels, 0 of graphs with 0 kernels
+// Where the order across hops shows, one position runs at a time.
+// RUN: env PIKO_CUDA_DRIVER=%test_driver %{compare} --pipe Ordered 2>&1 | FileCheck %s --check-prefixes=CHECK,STACK
+// RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_SEED=3 %{compare} --pipe Strokes --count 20 2>&1 | FileCheck %s --check-prefixes=CHECK,STACK
+// RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_CUDA_ALONE=0 %{compare} --pipe Both --count 9 2>&1 | FileCheck %s --check-prefixes=CHECK,STACK
+// RUN: env PIKO_CUDA_DRIVER=%test_driver %{compare} --pipe Both --count 3 0 0 2>&1 | FileCheck %s --check-prefixes=CHECK,STACK
+// RUN: env PIKO_CUDA_DRIVER=%test_driver %{compare} --pipe StripStrokes --count 18 --strip 7 2>&1 | FileCheck %s --check-prefixes=CHECK,STACK
+// RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_CUDA_ALONE=0 %{compare} --pipe RoundStrokes --count 9 2>&1 | FileCheck %s --check-prefixes=CHECK,STACK
+// RUN: env PIKO_CUDA_DRIVER=%test_driver_11 %{compare} --pipe Both --count 5 2>&1 | FileCheck %s --check-prefix=OLD
+// STACK-DAG: piko_step: {{[1-9]}}
 //
 // One hop too many is one hop too many.
 // RUN: env PIKO_CUDA_DRIVER=%test_driver not %{compare} --pipe TwoEntries --loop-limit 5 2>&1 | FileCheck %s --check-prefix=HOPS
-// HOPS: got: stage '{{ping|pong}}', bin {{[0-9]+}}: a loop did not end within 5 hops
+// RUN: env PIKO_CUDA_DRIVER=%test_driver not %{compare} --pipe Ordered --loop-limit 3 2>&1 | FileCheck %s --check-prefix=HOPS
+// HOPS: got: stage '{{ping|pong|draw}}', bin {{[0-9]+}}: a loop did not end within {{5|3}} hops
 #include "Inputs/hops.h"
 
 struct TwoEntries : piko::Pipe<State> {
@@ -157,7 +164,7 @@ struct Draw : piko::Stage<8, 8, 64, Point, Point>, piko::Uses<State> {
     assignToBoundingBox(p, glm::ivec2(p.x, p.y), glm::ivec2(p.x, p.y));
   }
   void process(const Point &p) {
-    update(state().image, glm::ivec2(p.x, p.y),
+    update(state().drawn, glm::ivec2(p.x, p.y),
            [&](Pixel &pixel) { pixel.sum = pixel.sum * 0.5f + p.value; });
     if (p.tag > 1)
       emit(moved(p, p.tag % 2, 0, p.value, p.tag / 2));
@@ -168,5 +175,106 @@ struct Ordered : piko::Pipe<State> {
   Ordered() {
     source(draw);
     connect(draw, 0, draw);
+  }
+};
+
+// A tree whose nodes lie in several bins, each of which emits for it.
+struct Stroke : piko::Stage<16, 16, 64, Point, Point, Point, Point>,
+                piko::Uses<State> {
+  void assignBin(const Point &p) {
+    assignToBoundingBox(p, glm::ivec2(p.x, p.y),
+                        glm::ivec2(p.x + p.tag % 7, p.y + 2));
+  }
+  void process(const Point &p) {
+    parallelForPixels(glm::ivec2(p.x, p.y),
+                      glm::ivec2(p.x + p.tag % 7, p.y + 2),
+                      [&](const glm::ivec2 &at) {
+                        update(state().drawn, at, [&](Pixel &pixel) {
+                          pixel.sum = pixel.sum * 0.5f + p.value;
+                          ++pixel.count;
+                        });
+                      });
+    if (p.tag % 3 == 0)
+      emit(moved(p, 3, 1, -p.value, p.tag), 1);
+    for (int i = 0; i < p.tag % 3; ++i)
+      if (p.tag > 4)
+        emit(moved(p, 5 * i, i, p.value + float(i), p.tag / 3), 0);
+      else
+        emit(moved(p, i, 60 * i, p.value - float(i), p.tag), 1);
+    if (p.tag % 5 == 1)
+      emit(p, 2);
+  }
+};
+struct Strokes : piko::Pipe<State> {
+  Stroke stroke;
+  Shift shift;
+  Blend blend;
+  Strokes() {
+    source(stroke);
+    source(shift);
+    connect(stroke, 0, stroke);
+    connect(stroke, 1, shift);
+    connect(stroke, 2, blend);
+    connect(shift, 0, blend);
+  }
+};
+
+// Entries at both stages of such a loop, by sources and edges.
+struct Both : piko::Pipe<State> {
+  Stroke stroke;
+  Pong pong;
+  Deal deal;
+  Shift shift;
+  Blend blend;
+  Both() {
+    source(pong);
+    source(deal);
+    source(stroke);
+    connect(deal, 0, pong);
+    connect(deal, 1, stroke);
+    connect(stroke, 0, pong);
+    connect(pong, 0, stroke);
+    connect(stroke, 1, shift);
+    connect(pong, 1, shift);
+    connect(stroke, 2, blend);
+    connect(pong, 2, blend);
+    connect(shift, 0, blend);
+  }
+};
+
+struct StripStrokes : piko::Pipe<State> {
+  Stroke stroke;
+  Pong pong;
+  Deal deal;
+  Merge merge;
+  Blend blend;
+  StripStrokes() {
+    source(deal);
+    source(blend);
+    connect(deal, 0, pong);
+    connect(deal, 1, stroke);
+    connect(stroke, 0, pong);
+    connect(pong, 0, stroke);
+    connect(pong, 1, merge);
+    connect(pong, 2, blend);
+    connect(stroke, 1, merge);
+    connect(stroke, 2, blend);
+    connect(merge, 0, merge);
+    connect(merge, 1, blend);
+  }
+};
+
+struct RoundStrokes : piko::Pipe<State> {
+  Merge merge;
+  Stroke stroke;
+  Blend blend;
+  RoundStrokes() {
+    source(stroke);
+    source(merge);
+    connect(merge, 0, stroke);
+    connect(stroke, 0, stroke);
+    connect(stroke, 1, merge);
+    connect(stroke, 2, merge);
+    connect(merge, 1, blend);
   }
 };

@@ -61,15 +61,18 @@ Traces expectJoins(int width, int height, int bias, const Dots &split,
   return traces;
 }
 
-static void walk(Traces &traces, int sign, int bias, const Walker &w) {
-  traces.at(w.x, w.y).add(sign * w.value);
+/// Every hop, or every `stride`th one, from number `hops` on.
+static void walk(Traces &traces, int sign, int bias, const Walker &w,
+                 int stride = 1, int hops = 0) {
+  if (hops % stride == 0)
+    traces.at(w.x, w.y).add(sign * w.value);
   if (w.left == 0)
     return;
   Walker next = hop(w, traces.width, traces.height);
-  walk(traces, sign, bias, next);
+  walk(traces, sign, bias, next, stride, hops + 1);
   if (w.value % 3 == 0 && w.left > 1)
-    walk(traces, sign, bias,
-         {next.x, next.y, next.value + bias, next.left - 1});
+    walk(traces, sign, bias, {next.x, next.y, next.value + bias, next.left - 1},
+         stride, hops + 1);
 }
 
 Traces expectWalk(int width, int height, int bias, const Walkers &walkers) {
@@ -83,6 +86,16 @@ Traces expectPassed(int width, int height, int bias, const Walkers &walkers) {
   Traces traces(width, height);
   for (const Walker &w : walkers)
     walk(traces, -1, bias, w);
+  return traces;
+}
+
+Traces expectCrossed(int width, int height, int bias, const Walkers &walkers,
+                     const Walkers &others) {
+  Traces traces(width, height);
+  for (const Walker &w : walkers)
+    walk(traces, -1, bias, w, 2);
+  for (const Walker &w : others)
+    walk(traces, -1, bias, w, 2, 1);
   return traces;
 }
 

@@ -40,6 +40,10 @@ Traces expectJoins(int width, int height, int bias, const Dots &split,
 /// What `trace` has; what Stacks has in `passed` is the same of other values.
 Traces expectWalk(int width, int height, int bias, const Walkers &walkers);
 Traces expectPassed(int width, int height, int bias, const Walkers &walkers);
+/// The same of Crossings, where every other hop is seen: from the first one on
+/// of `walkers`, and of `others` from the second one on.
+Traces expectCrossed(int width, int height, int bias, const Walkers &walkers,
+                     const Walkers &others);
 Traces expectRounds(int width, int height, const Walkers &walkers);
 Traces expectSchedules(int width, int height, const Dots &dots);
 Traces expectPolicies(int width, int height, const Dots &dots);

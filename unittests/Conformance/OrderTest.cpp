@@ -93,10 +93,10 @@ TEST(Order, CyclesWhoseHopsAreSeen) {
   testWalk(conformance_Stacks_program, true);
 }
 
-TEST(Order, CyclesThatAreEnteredAtTwoStages) {
-  Pipeline pipe = makeTraced(conformance_Meetings_program);
-  for (size_t first : {size_t(0), size_t(2), size_t(65)})
-    for (size_t second : {size_t(0), size_t(1), size_t(40)}) {
+void testMeetings(const pikort_program &program, bool isOrdered) {
+  Pipeline pipe = makeTraced(program);
+  for (size_t first : {0, 2, isOrdered ? 7 : 65})
+    for (size_t second : {0, 1, isOrdered ? 5 : 40}) {
       Walkers walkers = makeWalkers(first, 5, 3),
               others = makeWalkers(second, 6, 7);
       ASSERT_TRUE(pipe.source(0, walkers));
@@ -104,13 +104,25 @@ TEST(Order, CyclesThatAreEnteredAtTwoStages) {
       Walkers all = walkers; // they do the same wherever they are
       all.insert(all.end(), others.begin(), others.end());
       SCOPED_TRACE(testing::Message() << first << " and " << second);
-      Traces expected = expectWalk(width, height, bias, all);
+      Traces expected = expectWalk(width, height, bias, all),
+             passed(width, height);
+      if (isOrdered)
+        passed = expectCrossed(width, height, bias, walkers, others);
       for (int32_t threads : {1, 4}) {
         ASSERT_TRUE(pipe.threads(threads));
         EXPECT_RUNS(pipe);
         EXPECT_TRUE(isSame(read<Trace>(pipe, "trace"), expected));
+        EXPECT_TRUE(isSame(read<Trace>(pipe, "passed"), passed));
       }
     }
+}
+
+TEST(Order, CyclesThatAreEnteredAtTwoStages) {
+  testMeetings(conformance_Meetings_program, false);
+}
+
+TEST(Order, CyclesWhoseHopsAreSeenAtOneOfTwoStages) {
+  testMeetings(conformance_Crossings_program, true);
 }
 
 TEST(Order, CyclesInRounds) {

@@ -135,10 +135,11 @@ struct Waves : WalkPipe<false> {};
 struct Stacks : WalkPipe<true> {};
 
 /// Walkers come in at both stages of a loop.
-struct Meetings : piko::Pipe<Traced> {
-  Walk<false> walk, back;
+template <bool IsOrdered> struct MeetPipe : piko::Pipe<Traced> {
+  Walk<IsOrdered> walk;
+  Walk<false> back;
   Mark mark;
-  Meetings() {
+  MeetPipe() {
     source(walk);
     source(back);
     connect(walk, 0, back);
@@ -147,6 +148,9 @@ struct Meetings : piko::Pipe<Traced> {
     connect(back, 1, mark);
   }
 };
+
+struct Meetings : MeetPipe<false> {};
+struct Crossings : MeetPipe<true> {};
 
 //===----------------------------------------------------------------------===//
 // Rounds: a cycle through a stage that collects

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
-//===- Enter.h - What comes into a loop at several stages -----------------===//
+//===- Enter.h - What comes into a loop -----------------------------------===//
 //
-// Each stage gets its own. The places of the loop are those of all of it, in
-// the order of its keys; so it waits for the first wave like what a wave before
-// has emitted.
+// Each stage gets its own. Its places among all of it follow from its keys. It
+// waits for the first wave like what a wave before has emitted, or is what a
+// stack begins with.
 //
 //===----------------------------------------------------------------------===//
 
@@ -11,42 +11,21 @@
 #define PIKO_RUNTIME_CUDA_DEVICE_ENTER_H
 
 #include "cuda/device/Inputs.h"
+#include "cuda/device/Stack.h"
 
 namespace piko::cuda {
 
-/// In front of a loop.
+/// In front of a loop that is entered at several stages, or has a stack.
 class Enter : FrameTask {
 public:
   explicit Enter(const EnterArgs &args)
       : FrameTask(*args.frame, args.number, workOf(args)), args_(args) {}
 
   void run() {
-    uint32_t *childCounts = nullptr;
-    KeyWords keys{};
-    int64_t count = 0;
-    bool goesOn = FrameTask::run([&] {
-      auto *streams = grid_.take<Stream>(args_.entryCount);
-      for (int32_t e = 0; e < args_.entryCount && !grid_.hasFailed(); ++e)
-        count += gather(args_.entries()[e], streams[e]);
-      if (count > UINT32_MAX)
-        grid_.fail();
-      childCounts = grid_.takeZeros(count);
-      int32_t width = args_.keyWidth;
-      auto *words = width > 0 ? grid_.take<uint64_t>(count * width) : nullptr;
-      keys = {words, 0, width};
-      if (!grid_.hasFailed())
-        placeAll(streams, words);
-    });
-    if (!goesOn || !Grid::isFirst())
-      return;
-    for (int32_t i = 0; i < args_.inputCount; ++i)
-      if (args_.inputs()[i].queue && !args_.inputs()[i].isInLoop)
-        drop(*args_.inputs()[i].queue, /*isInLoop=*/false);
-    LoopState &loop = *args_.loop;
-    loop.hops = 1; // as far as joins see
-    loop.places = count;
-    loop.childCounts = childCounts;
-    loop.entryKeys = keys;
+    if (args_.stack)
+      runStack();
+    else
+      runWaves();
   }
 
 private:
@@ -57,45 +36,132 @@ private:
     return work;
   }
 
-  /// Lets what comes in at a stage wait there; returns how much it is.
-  int64_t gather(const LoopEntry &entry, Stream &out) {
-    const KernelState &kernel = *entry.kernel;
-    bool isFirstRun = kernel.runs == 0 || kernel.strip != entry.strip;
-    Chunk chunk{};
-    Stream &stream = chunk.stream;
-    Inputs(grid_, entry.shape, args_.inputs() + entry.firstInput,
-           entry.inputCount, isFirstRun)
-        .gather(stream, /*keepsKeys=*/true);
-    chunk.lineage = {grid_.take<uint32_t>(stream.count), nullptr,
-                     grid_.take<uint32_t>(stream.count)};
-    if (grid_.hasFailed())
-      return 0;
-    push(grid_, *entry.queue, chunk);
-    if (Grid::isFirst()) {
-      entry.queue->ready = entry.queue->count;
-      out = stream;
-    }
-    grid_.sync();
-    return stream.count;
+  void runWaves() {
+    uint32_t *childCounts = nullptr;
+    bool goesOn = FrameTask::run([&] {
+      const Stream *streams = gatherAll();
+      for (int32_t e = 0; e < args_.entryCount && !grid_.hasFailed(); ++e)
+        pushChunk(*args_.entries()[e].queue, streams[e]);
+      childCounts = grid_.takeZeros(count_);
+      if (!grid_.hasFailed())
+        placeAll(streams, [&](int32_t e, int64_t i, uint32_t place) {
+          const QueueState &queue = *args_.entries()[e].queue;
+          const Lineage &lineage = queue.chunks[queue.count - 1].lineage;
+          lineage.places[i] = lineage.entries[i] = place;
+        });
+    });
+    if (!goesOn || !Grid::isFirst())
+      return;
+    endInputs();
+    args_.loop->hops = 1; // as far as joins see
+    args_.loop->places = count_;
+    args_.loop->childCounts = childCounts;
   }
 
-  void placeAll(const Stream *streams, uint64_t *words) {
+  void runStack() {
+    Stack stack(grid_, *args_.stack);
+    bool goesOn = FrameTask::run([&] {
+      const Stream *streams = gatherAll();
+      auto *waiting = grid_.take<Waiting>(count_);
+      stack.begin(waiting, count_);
+      if (grid_.hasFailed())
+        return;
+      placeAll(streams, [&](int32_t e, int64_t i, uint32_t place) {
+        waiting[place] = describe(args_.entries()[e], streams[e], i, place);
+      });
+      stack.next();
+    });
+    if (!Grid::isFirst())
+      return;
+    args_.loop->again = 0;
+    if (!goesOn)
+      return;
+    endInputs();
+    stack.publish(*args_.frame);
+  }
+
+  /// What comes in at each stage.
+  const Stream *gatherAll() {
+    auto *streams = grid_.take<Stream>(args_.entryCount);
+    for (int32_t e = 0; e < args_.entryCount && !grid_.hasFailed(); ++e) {
+      const LoopEntry &entry = args_.entries()[e];
+      const KernelState &kernel = *entry.kernel;
+      bool isFirstRun = kernel.runs == 0 || kernel.strip != entry.strip;
+      Stream stream{};
+      Inputs(grid_, entry.shape, args_.inputs() + entry.firstInput,
+             entry.inputCount, isFirstRun)
+          .gather(stream, /*keepsKeys=*/true);
+      count_ += stream.count;
+      if (Grid::isFirst() && !grid_.hasFailed())
+        streams[e] = stream;
+    }
+    if (count_ > UINT32_MAX)
+      grid_.fail();
+    grid_.sync();
+    return streams;
+  }
+
+  /// Calls put(stage, item, place) for all that comes in. Between two barriers.
+  template <class Put> void placeAll(const Stream *streams, const Put &put) {
     KeyOrder order(streams, args_.entryCount);
     int32_t width = args_.keyWidth;
-    for (int32_t e = 0; e < args_.entryCount; ++e) {
-      const QueueState &queue = *args_.entries()[e].queue;
-      const Lineage &lineage = queue.chunks[queue.count - 1].lineage;
+    auto *words = width > 0 ? grid_.take<uint64_t>(count_ * width) : nullptr;
+    keys_ = {words, 0, width};
+    if (grid_.hasFailed())
+      return;
+    for (int32_t e = 0; e < args_.entryCount; ++e)
       grid_.forEach(streams[e].count, [&](int64_t i) {
         int64_t place = order.placeOf(e, i);
-        lineage.places[i] = lineage.entries[i] = static_cast<uint32_t>(place);
         for (int32_t w = 0; w < width; ++w)
           words[place * width + w] = streams[e].keys.word(i, w);
+        put(e, i, static_cast<uint32_t>(place));
       });
-    }
     grid_.sync();
+  }
+
+  void pushChunk(QueueState &queue, const Stream &stream) {
+    Chunk chunk{stream,
+                {grid_.take<uint32_t>(stream.count), nullptr,
+                 grid_.take<uint32_t>(stream.count)}};
+    if (grid_.hasFailed())
+      return;
+    push(grid_, queue, chunk);
+    if (Grid::isFirst())
+      queue.ready = queue.count;
+  }
+
+  /// On the stack; what is in no cell goes nowhere.
+  static Waiting describe(const LoopEntry &entry, const Stream &stream,
+                          int64_t i, uint32_t place) {
+    uint32_t begin = stream.pairs ? stream.pairStarts[i] : 0,
+             cells = stream.pairs ? stream.pairStarts[i + 1] - begin : 0;
+    bool isPlaced =
+        !entry.shape.placed || (cells > 0 && stream.pairs[begin] != noCell);
+    return {stream.items + i * entry.shape.recordSize,
+            stream.pairs + begin,
+            cells,
+            place,
+            isPlaced ? entry.member : -1,
+            /*group=*/-1,
+            /*hops=*/0};
+  }
+
+  /// What has been taken no longer waits; by the first thread.
+  void endInputs() {
+    for (int32_t i = 0; i < args_.inputCount; ++i)
+      if (args_.inputs()[i].queue && !args_.inputs()[i].isInLoop)
+        drop(*args_.inputs()[i].queue, /*isInLoop=*/false);
+    for (int32_t e = 0; e < args_.entryCount; ++e) {
+      const LoopEntry &entry = args_.entries()[e];
+      entry.kernel->strip = entry.strip;
+      ++entry.kernel->runs;
+    }
+    args_.loop->entryKeys = keys_;
   }
 
   const EnterArgs &args_;
+  int64_t count_ = 0; ///< Of all that comes in.
+  KeyWords keys_{};   ///< By place.
 };
 
 } // namespace piko::cuda

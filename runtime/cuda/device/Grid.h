@@ -31,7 +31,7 @@ public:
   /// runs; uniform.
   Grid(FrameState &frame, int64_t cursor, int64_t work)
       : frame_(frame), top_(cursor), limit_(frame.log.limit),
-        isAlone_(work <= frame.mostAlone) {}
+        isAlone_(work <= frame.mostAlone || isOneBlock()) {}
 
   /// True in blocks that are to end at once, as the first one works alone.
   bool isIdle() {
@@ -70,7 +70,12 @@ public:
   }
   /// Once, before the first thread changes what says how much work there is:
   /// idle blocks have seen it.
-  void settle() { meet(); }
+  void settle() {
+    if (isOneBlock())
+      __syncthreads();
+    else
+      meet();
+  }
 
   /// Memory that all threads see, not initialised; uniform. Null, and
   /// hasFailed, where there is none.
@@ -137,6 +142,7 @@ private:
     __syncthreads();
   }
 
+  static bool isOneBlock() { return __nvvm_read_ptx_sreg_nctaid_x() == 1; }
   static int64_t firstBlock() { return __nvvm_read_ptx_sreg_ctaid_x(); }
   /// The sum over the block's threads, in all of them.
   static uint64_t sumOfBlock(uint64_t mine);

@@ -109,6 +109,33 @@ struct LoopState {
   int64_t exitsBefore; ///< This wave.
 };
 
+/// On the stack of a loop.
+struct Waiting {
+  const uint8_t *item;
+  const uint32_t *pairs; ///< Of the cells that it has still to go to.
+  uint32_t pairCount;
+  uint32_t entry; ///< What came in that it comes from.
+  int32_t member; ///< Of the loop, that takes it; -1: it leaves, ...
+  int32_t group;  ///< ... to this stage; -1: to none.
+  int64_t hops;
+};
+
+/// Of a loop that runs one position at a time.
+struct StackState {
+  Waiting *waiting; ///< The last one is next, and then `entries`.
+  int64_t count, capacity;
+  const Waiting *entries;
+  int64_t entryCount, nextEntry;
+  int32_t running; ///< The member whose kernel has a position; -1: none.
+  uint32_t entry;  ///< Of that, ...
+  int64_t hops;    ///< ... and these.
+  pikoir_unit unit;
+  pikoir_unit_log unitLog;
+  uint32_t *numbers; ///< Room for those of a step.
+  int64_t found, foundLeft;
+  uint32_t children;
+};
+
 /// Rounds of a cycle whose stages collect.
 struct CycleState {
   int32_t again; ///< Whether another round follows.
@@ -191,19 +218,23 @@ struct JoinArgs {
   }
 };
 
-/// A stage at which primitives come into a loop, where there are several.
+/// A stage at which primitives come into a loop.
 struct LoopEntry {
-  const KernelState *kernel; ///< The stage's.
-  QueueState *queue;         ///< Where they wait for it.
+  KernelState *kernel; ///< The stage's.
+  QueueState *queue;   ///< Where they wait for it.
   Shape shape;
   int64_t strip; ///< As in JoinArgs.
   int32_t firstInput, inputCount;
+  int32_t member; ///< Among the loop's stages.
 };
 
-/// In front of such a loop.
+struct StackArgs;
+
+/// In front of a loop that is entered at several stages, or has a stack.
 struct EnterArgs {
   FrameState *frame;
   LoopState *loop;
+  const StackArgs *stack; ///< Null: it runs in waves.
   int64_t number;
   int32_t keyWidth; ///< Of what comes in.
   int32_t entryCount, inputCount;
@@ -219,7 +250,31 @@ struct QueuePort {
   JoinInput input; ///< Whose producer is the kernel.
   Shape shape;     ///< Of the consumer's primitives.
   QueueState *queue;
-  int32_t group; ///< Of what leaves a loop; -1: nothing does.
+  int32_t group;  ///< Of what leaves a loop; -1: nothing does.
+  int32_t member; ///< Of the loop, that it leads to; -1: none.
+};
+
+/// A stage of a loop that runs one position at a time.
+struct StackMember {
+  KernelState *kernel;
+  Shape shape;
+  int64_t tiles;
+  int32_t firstPort, portCount;
+};
+
+/// Behind each position of such a loop.
+struct StackArgs {
+  FrameState *frame;
+  LoopState *loop;
+  StackState *stack;
+  int64_t number;
+  int64_t limit; ///< Of hops.
+  int32_t memberCount, portCount;
+
+  const StackMember *members() const { return behind<StackMember>(this); }
+  const QueuePort *ports() const {
+    return reinterpret_cast<const QueuePort *>(members() + memberCount);
+  }
 };
 
 /// Behind a kernel that may run several times: what it has emitted is to wait.

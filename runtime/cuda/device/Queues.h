@@ -201,7 +201,7 @@ private:
     spans.find();
     Siblings siblings(grid_, spans, args_.ports()[0]);
     if (args_.loop && !grid_.hasFailed())
-      siblings.run(*args_.loop);
+      siblings.run(args_.loop->childCounts);
     for (int32_t i = 0; i < args_.portCount && !grid_.hasFailed(); ++i) {
       const QueuePort &port = args_.ports()[i];
       Gather gather(grid_, port.shape, port.input, spans,

@@ -19,8 +19,9 @@ public:
   Siblings(Grid &grid, const Spans &spans, const QueuePort &port)
       : grid_(grid), spans_(spans), from_(spans.kernel()), port_(port) {}
 
-  /// Sets the loop's counts of the kernel's primitives. Between two barriers.
-  void run(LoopState &loop);
+  /// Sets the counts at the places of the kernel's primitives. Between two
+  /// barriers.
+  void run(uint32_t *childCounts);
 
   /// Records in front of each span, and the slot in which it begins.
   const uint32_t *before() const { return before_; }
@@ -81,7 +82,7 @@ private:
   Spans::Places places_{};
 };
 
-inline void Siblings::run(LoopState &loop) {
+inline void Siblings::run(uint32_t *childCounts) {
   before_ = grid_.take<uint32_t>(spans_.count);
   uint32_t *ends = grid_.take<uint32_t>(spans_.count);
   if (grid_.hasFailed())
@@ -108,8 +109,8 @@ inline void Siblings::run(LoopState &loop) {
   if (grid_.hasFailed())
     return;
   grid_.forEach(from_.items, [&](int64_t item) {
-    loop.childCounts[placeOf(item)] = places_.starts[firstRankOf(item + 1)] -
-                                      places_.starts[firstRankOf(item)];
+    childCounts[placeOf(item)] = places_.starts[firstRankOf(item + 1)] -
+                                 places_.starts[firstRankOf(item)];
   });
   grid_.sync();
 }

@@ -8,7 +8,7 @@ struct Pixel {
   int count = 0;
 };
 struct State {
-  piko::Image<Pixel> image;
+  piko::Image<Pixel> image, drawn;
 };
 
 struct Blend : piko::Stage<8, 8, 64, Point>, piko::Uses<State> {
