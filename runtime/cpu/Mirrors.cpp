@@ -78,6 +78,14 @@ void piko::rt::beginMirrors(pikort_pipeline &p, bool isFrame) {
     p.accelerator->finishStream();
 }
 
+// An upload that is still on its way brings the same.
+void piko::rt::showConstants(const pikort_pipeline &p) {
+  for (const State &state : p.states)
+    if (state.kind == PIKORT_CONSTANT && state.hosts)
+      std::memcpy(state.mirror.data(), state.hosts,
+                  static_cast<size_t>(bytesOf(p, state)));
+}
+
 void piko::rt::refillMirrors(pikort_pipeline &p) {
   for (State &state : p.states)
     if (state.hosts && state.written)

@@ -25,6 +25,9 @@ void shareHeader(pikort_pipeline &p, Kernel &kernel);
 void shareUnits(pikort_pipeline &p, Kernel &kernel);
 void shareInput(pikort_pipeline &p, Kernel &kernel, const Items &from);
 
+/// While a frame of a device is recorded: lets the host read constants.
+void showConstants(const pikort_pipeline &p);
+
 } // namespace piko::rt
 
 #endif // PIKO_RUNTIME_CPU_MIRRORS_H

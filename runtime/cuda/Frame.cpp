@@ -57,6 +57,7 @@ bool Frame::begin() {
   joined_ = nullptr;
   members_.assign(p_.loops.size(), 0);
   stacks_.assign(p_.loops.size(), nullptr);
+  cuts_.clear();
   turns_.assign(p_.cycles.size(), 0);
   isCleared_.assign(p_.states.size(), false);
   isRecording_ = true;
@@ -222,18 +223,47 @@ JoinArgs &Frame::describeStage(int32_t number) {
   return args;
 }
 
-void Frame::describeSchedule(JoinArgs &args, const Stage &stage) const {
-  const BinSchedule &schedule = stage.schedule;
-  bool sharesBins = schedule.kind != PIKOIR_DIRECT_MAP || stage.bins() == 1;
+static BinCut describeBin(const Stage &stage, const BinSchedule &schedule) {
+  bool sharesBin = schedule.kind != PIKOIR_DIRECT_MAP || stage.bins() == 1;
+  return {stage.splits() && (stage.takesList() || sharesBin), schedule.everyBin,
+          stage.sharesTile ? 0 : schedule.tileSplit, schedule.batch};
+}
+
+/// The same for all strips and waves. A bin that is to be the first core's is a
+/// unit, as no result depends on who runs it.
+const BinCut *Frame::describeBins(const Stage &stage) {
+  const BinCut *&cuts = cuts_[&stage];
+  if (cuts)
+    return cuts;
+  std::vector<BinCut> all;
+  for (int64_t bin = 0; bin < stage.bins(); ++bin) {
+    const BinSchedule &schedule = stage.binSchedules[bin];
+    BinCut &cut = all.emplace_back(describeBin(stage, schedule));
+    if (schedule.kind == PIKOIR_SERIALIZE && !stage.takesList())
+      cut.splits = false;
+  }
+  return cuts = arguments_.copy(p_.memory, all);
+}
+
+void Frame::describeSchedule(JoinArgs &args, const Stage &stage) {
   args.takesList = stage.takesList();
   args.collects = stage.collects();
-  args.splits = stage.splits() && (stage.takesList() || sharesBins);
   args.visitsAll = stage.visitsAll;
-  args.everyBin = schedule.everyBin;
-  args.serialize = schedule.kind == PIKOIR_SERIALIZE;
-  args.tileSplit = stage.sharesTile ? 0 : schedule.tileSplit;
-  args.batch = schedule.batch;
   args.unitsAtOnce = device_.residentThreads() / 64;
+  BinCut cut = describeBin(stage, stage.schedule);
+  args.splits = cut.splits;
+  args.everyBin = cut.everyBin;
+  args.tileSplit = cut.tileSplit;
+  args.batch = cut.batch;
+  args.cutting = stage.schedule.kind == PIKOIR_SERIALIZE ? CutNone : CutCells;
+  if (!stage.binSchedules)
+    return;
+  args.cutting = CutBins;
+  args.cuts = describeBins(stage);
+  args.splits = stage.splits() && stage.takesList();
+  args.everyBin =
+      std::any_of(args.cuts, args.cuts + stage.bins(),
+                  [](const BinCut &bin) { return bin.everyBin != 0; });
 }
 
 std::vector<int32_t> Frame::edgesOf(int32_t kernel) const {
@@ -298,8 +328,7 @@ const pikoir_input *Frame::join(int32_t number, bool isSource) {
   timed_ = kernelOf(number, isSource);
   const Stage &stage = p_.stages[isSource ? p_.sources[number].stage : number];
   bool repeats = stage.stripGroup >= 0 || (!isSource && stage.cycle >= 0);
-  if (stage.binSchedules || (place.args && !repeats) ||
-      nextNumber() > mostSteps)
+  if ((place.args && !repeats) || nextNumber() > mostSteps)
     needsHost_ = true;
   if (!isSource && isStacked(stage))
     return &place.state.input;

@@ -93,6 +93,14 @@ private:
       (..., put(room, elements));
       return taken;
     }
+    /// Copies alone.
+    template <class T>
+    const T *copy(rt::Memory &memory, const std::vector<T> &elements) {
+      auto bytes = static_cast<int64_t>(elements.size() * sizeof(T));
+      uint8_t *room = takeRoom(memory, bytes), *first = room;
+      put(room, elements);
+      return reinterpret_cast<const T *>(first);
+    }
 
   private:
     uint8_t *takeRoom(rt::Memory &memory, int64_t bytes);
@@ -146,7 +154,8 @@ private:
   JoinArgs &describeStage(int32_t number);
   std::vector<JoinInput> describeInputs(const rt::Stage &stage) const;
   std::vector<JoinInput> describeWave(int32_t number) const;
-  void describeSchedule(JoinArgs &args, const rt::Stage &stage) const;
+  void describeSchedule(JoinArgs &args, const rt::Stage &stage);
+  const BinCut *describeBins(const rt::Stage &stage);
   JoinInput describeSourceInput(const rt::Stage &stage, int32_t source) const;
   JoinInput describeEdge(int32_t number) const;
   Shape describeShape(const rt::Stage &stage) const;
@@ -199,7 +208,9 @@ private:
   std::vector<size_t> turns_;        ///< Of each cycle, those taken.
   std::vector<CycleState *> cycles_; ///< Of each, the state of its next run.
   std::vector<StackArgs *> stacks_;  ///< Of each loop that has one.
-  std::vector<StripRecord> strips_;  ///< Of each group.
+  /// Of each stage whose schedule depends on the bin.
+  std::map<const rt::Stage *, const BinCut *> cuts_;
+  std::vector<StripRecord> strips_; ///< Of each group.
   // From run to run, where the device sees it:
   bool hasMemory_ = false; ///< All of what follows.
   rt::Array<FrameState> frame_;

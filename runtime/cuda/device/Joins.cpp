@@ -146,7 +146,9 @@ private:
   }
 
   bool runs(int64_t bin, const Binning &bins) const {
-    return (args_.takesList && args_.everyBin) ||
+    bool everyBin =
+        args_.cutting == CutBins ? args_.cuts[bin].everyBin : args_.everyBin;
+    return (args_.takesList && everyBin) ||
            bins.offsets[bin] < bins.offsets[bin + 1];
   }
 

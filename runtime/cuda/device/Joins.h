@@ -194,6 +194,19 @@ struct JoinClear {
   int64_t size; ///< Of the record.
 };
 
+/// How the positions of a stage become units.
+enum Cutting : int32_t {
+  CutCells, ///< Each cell by itself, ...
+  CutBins,  ///< ... as its bin says.
+  CutNone   ///< All are one unit.
+};
+
+/// What a schedule says of a bin.
+struct BinCut {
+  int32_t splits, everyBin;
+  int64_t tileSplit, batch;
+};
+
 struct JoinArgs {
   FrameState *frame;
   KernelState *kernel;
@@ -204,10 +217,12 @@ struct JoinArgs {
   int32_t inputCount, clearCount;
   Shape shape;
   int64_t tiles;
-  int32_t takesList, collects, splits, visitsAll, everyBin, serialize;
+  int32_t takesList, collects, splits, visitsAll, everyBin;
+  Cutting cutting;
   int32_t ranked;      ///< Some edge needs the order of emission.
   int64_t tileSplit;   ///< Positions of a unit; 0: as the device likes.
   int64_t batch;       ///< Positions of a call; 0: all of the bin.
+  const BinCut *cuts;  ///< Of each bin, in place of these two and of `splits`.
   int64_t unitsAtOnce; ///< Blocks that fill the device.
   int32_t rank;        ///< Of the domain; four entries each, unused = 1 or 0.
   int64_t domain[4], binSize[4], grid[4];

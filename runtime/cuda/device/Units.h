@@ -29,25 +29,18 @@ public:
   void run() {
     if (args_.takesList)
       return cutCalls();
-    if (args_.serialize)
+    switch (args_.cutting) {
+    case CutNone:
       return addWhole(cells_, bins_.positions > 0 || args_.visitsAll);
-    int64_t chunk = unitSize();
-    Pieces all = cut(
-        [&](int64_t cell) {
-          int64_t count = countOf(cell), least = args_.visitsAll ? 1 : 0;
-          return larger(least, args_.splits ? ceilDivide(count, chunk)
-                                            : smaller<int64_t>(count, 1));
-        },
-        args_.visitsAll);
-    addUnits(all.count, [&](int64_t u) -> pikoir_unit {
-      int64_t cell = all.cellOf(u), begin = bins_.beginOf(cell),
-              end = bins_.beginOf(cell + 1);
-      if (args_.splits) {
-        begin += (u - all.startOf(cell)) * chunk;
-        end = smaller(end, begin + chunk);
-      }
-      return {cell, cell + 1, begin, end, -1};
-    });
+    case CutBins:
+      return cutCells([&](int64_t cell) {
+        const BinCut &cut = args_.cuts[cell / args_.tiles];
+        return cut.splits ? unitSize(cut.tileSplit) : 0;
+      });
+    case CutCells:
+      int64_t size = args_.splits ? unitSize(args_.tileSplit) : 0;
+      return cutCells([&](int64_t) { return size; });
+    }
   }
 
 private:
@@ -86,9 +79,30 @@ private:
     return bins_.beginOf(cell + 1) - bins_.beginOf(cell);
   }
 
-  int64_t unitSize() const {
-    if (args_.tileSplit > 0)
-      return args_.tileSplit;
+  /// Units have as many positions as sizeOf(cell), or, if that is 0, all.
+  template <class Size> void cutCells(const Size &sizeOf) {
+    Pieces all = cut(
+        [&](int64_t cell) {
+          int64_t count = countOf(cell), size = sizeOf(cell),
+                  least = args_.visitsAll ? 1 : 0;
+          return larger(least, size > 0 ? ceilDivide(count, size)
+                                        : smaller<int64_t>(count, 1));
+        },
+        args_.visitsAll);
+    addUnits(all.count, [&](int64_t u) -> pikoir_unit {
+      int64_t cell = all.cellOf(u), begin = bins_.beginOf(cell),
+              end = bins_.beginOf(cell + 1), size = sizeOf(cell);
+      if (size > 0) {
+        begin += (u - all.startOf(cell)) * size;
+        end = smaller(end, begin + size);
+      }
+      return {cell, cell + 1, begin, end, -1};
+    });
+  }
+
+  int64_t unitSize(int64_t tileSplit) const {
+    if (tileSplit > 0)
+      return tileSplit;
     int64_t share = ceilDivide(bins_.positions / args_.unitsAtOnce, 64) * 64;
     return smaller<int64_t>(larger<int64_t>(share, 64), 1024);
   }
@@ -107,20 +121,27 @@ private:
     });
   }
 
-  int64_t batchOf(int64_t count) const {
-    int64_t batch = args_.batch > 0 ? args_.batch : count;
+  bool isCutByBin() const { return args_.cutting == CutBins; }
+  /// Calls of a bin that has nothing.
+  int64_t leastCallsOf(int64_t bin) const {
+    return everyBin_ && (!isCutByBin() || args_.cuts[bin].everyBin);
+  }
+  int64_t batchOf(int64_t bin, int64_t count) const {
+    int64_t batch = isCutByBin() ? args_.cuts[bin].batch : args_.batch;
+    batch = batch > 0 ? batch : count;
     return smaller<int64_t>(larger<int64_t>(batch, 1), UINT32_MAX);
   }
 
   void cutCalls() {
     Pieces all = cut(
         [&](int64_t bin) {
-          int64_t count = countOf(bin), least = everyBin_ ? 1 : 0;
-          return larger(least, ceilDivide(count, batchOf(count)));
+          int64_t count = countOf(bin);
+          return larger(leastCallsOf(bin),
+                        ceilDivide(count, batchOf(bin, count)));
         },
         everyBin_);
     auto callAt = [&](int64_t c) -> pikoir_call {
-      int64_t bin = all.cellOf(c), batch = batchOf(countOf(bin)),
+      int64_t bin = all.cellOf(c), batch = batchOf(bin, countOf(bin)),
               begin = bins_.beginOf(bin) + (c - all.startOf(bin)) * batch;
       return {bin, begin, smaller(bins_.beginOf(bin + 1), begin + batch)};
     };
@@ -132,7 +153,7 @@ private:
     auto unitOf = [&](int64_t first, int64_t end) -> pikoir_unit {
       return {first, end, callAt(first).begin, callAt(end - 1).end, -1};
     };
-    if (args_.serialize)
+    if (args_.cutting == CutNone)
       return addWhole(callCount, callCount > 0);
     if (args_.splits)
       return addUnits(callCount, [&](int64_t u) { return unitOf(u, u + 1); });
