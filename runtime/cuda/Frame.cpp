@@ -22,9 +22,6 @@ bool Frame::isPossible() const {
       p_.executor->reportsInOrder() || p_.unitReport || p_.memory.limit() > 0 ||
       p_.memory.budget() > 0)
     return false;
-  for (const Edge &edge : p_.edges)
-    if (edge.keyed() && p_.stages[edge.producer].host >= 0)
-      return false;
   return std::none_of(
       p_.stages.begin(), p_.stages.end(),
       [&](const Stage &stage) { return isStacked(stage) && stage.hosts; });

@@ -28,7 +28,7 @@ public:
         keyWidth_(input.keyWidth == 0 || siblings ? 0
                   : input.collects                ? 2
                                                   : from_.keys.width + 1),
-        byPosition_(!input.isSource && !siblings &&
+        byPosition_(!input.isSource && !siblings && !isHosted() &&
                     (keyWidth_ > 0 || (input.permute && from_.rank))) {}
 
   /// Between two barriers; `stream` is uniform.
@@ -48,6 +48,9 @@ private:
   template <class Sink> void read(Sink &sink, int64_t span) const {
     SpanReader<Sink>(input_, shape_, sink).read(spans_.list[span]);
   }
+  /// Whether it is of a stage behind a local edge: what that emits is in the
+  /// order of bins.
+  bool isHosted() const { return input_.stage >= 0; }
   /// The cell of a position.
   int64_t cellOf(int64_t position) const;
 
@@ -152,6 +155,12 @@ struct Gather::Placer {
 
   void putKey(uint64_t *to) const {
     const KernelState &from = gather.from_;
+    if (gather.isHosted()) { // a new lineage, of all that it emits
+      uint64_t launch = static_cast<uint64_t>(larger<int64_t>(from.strip, 0));
+      to[0] = static_cast<uint64_t>(gather.input_.root) << 32 | launch;
+      to[1] = ordinal;
+      return;
+    }
     if (gather.input_.collects) { // a new lineage
       to[0] = static_cast<uint64_t>(gather.input_.root) << 32 | from.launch;
       to[1] = static_cast<uint64_t>(gather.spans_.rankOf(slot)) << 32 | ordinal;
