@@ -148,6 +148,11 @@ private:
   static uint64_t sumOfBlock(uint64_t mine);
   /// The sum over the block's threads before this one, and of all.
   static uint32_t scanBlock(uint32_t mine, uint32_t &total);
+  static uint64_t scanBlock(uint64_t mine, uint64_t &total);
+  /// As scan, by one block that has a thread for each element.
+  template <int32_t Count, class NumbersOf>
+  void scanFew(int64_t n, uint32_t *const (&sums)[Count],
+               int64_t (&totals)[Count], const NumbersOf &numbersOf);
 
   FrameState &frame_;
   int64_t top_, limit_;
@@ -188,6 +193,49 @@ inline uint32_t Grid::scanBlock(uint32_t mine, uint32_t &total) {
   return before + sum - mine;
 }
 
+inline uint64_t Grid::scanBlock(uint64_t mine, uint64_t &total) {
+  uint64_t sum = mine;
+  for (int32_t distance = 1; distance < warpSize; distance *= 2) {
+    uint64_t other = 0;
+    for (int32_t shift = 0; shift < 64; shift += 32)
+      other |=
+          static_cast<uint64_t>(static_cast<uint32_t>(__nvvm_shfl_sync_up_i32(
+              ~0u, static_cast<int32_t>(sum >> shift), distance, 0)))
+          << shift;
+    if (lane() >= distance)
+      sum += other;
+  }
+  int32_t warp = thread() / warpSize;
+  __syncthreads();
+  if (lane() == warpSize - 1)
+    blockWords[warp] = sum;
+  __syncthreads();
+  uint64_t before = 0;
+  total = 0;
+  for (int32_t w = 0; w < warpsOfBlock; ++w) {
+    before += w < warp ? blockWords[w] : 0;
+    total += blockWords[w];
+  }
+  return before + sum - mine;
+}
+
+template <int32_t Count, class NumbersOf>
+void Grid::scanFew(int64_t n, uint32_t *const (&sums)[Count],
+                   int64_t (&totals)[Count], const NumbersOf &numbersOf) {
+  uint32_t numbers[Count] = {};
+  if (thread() < n)
+    numbersOf(thread(), numbers);
+  for (int32_t c = 0; c < Count; ++c) {
+    uint64_t total, sum = scanBlock(uint64_t(numbers[c]), total);
+    if (sums[c] && thread() < n)
+      sums[c][thread()] = static_cast<uint32_t>(sum);
+    totals[c] = static_cast<int64_t>(total);
+    if (total > UINT32_MAX)
+      fail();
+  }
+  __syncthreads();
+}
+
 template <int32_t Count, class NumbersOf>
 void Grid::scan(int64_t n, uint32_t *const (&sums)[Count],
                 int64_t (&totals)[Count], const NumbersOf &numbersOf) {
@@ -196,6 +244,8 @@ void Grid::scan(int64_t n, uint32_t *const (&sums)[Count],
     total = 0;
   if (failed_)
     return;
+  if (isAlone_ && n <= joinThreads)
+    return scanFew<Count>(n, sums, totals, numbersOf);
   int64_t chunk =
       ceilDivide(ceilDivide(n, blocks()), joinThreads) * joinThreads;
   int64_t begin = smaller(block() * chunk, n), end = smaller(begin + chunk, n);
