@@ -16,6 +16,8 @@ using piko::rt::Failure;
 
 static const pikoir_cuda_image joinImages[] = {{0, 0, piko::cuda::joinKernels},
                                                {0, 0, nullptr}};
+static const pikoir_cuda_image stepImages[] = {{0, 0, piko::cuda::stepKernels},
+                                               {0, 0, nullptr}};
 static const pikoir_cuda_image conditionImages[] = {
     {0, 0, piko::cuda::conditionKernels}, {0, 0, nullptr}};
 
@@ -38,7 +40,8 @@ static int64_t findMostAlone() {
 
 Accelerator::Accelerator(pikort_pipeline &p, const pikoir_cuda_image *images)
     : p_(p), device_(Device::open(p.device)), module_(*device_, images),
-      joins_(*device_, joinImages), conditions_(*device_, conditionImages) {
+      joins_(*device_, joinImages), steps_(*device_, stepImages),
+      conditions_(*device_, conditionImages) {
   device_->check(device_->enter(), "entering its context");
   int processors = device_->attribute(CU_DEVICE_ATTRIBUTE_MULTIPROCESSOR_COUNT);
   residentThreads_ = int64_t(device_->attribute(
@@ -58,7 +61,7 @@ Accelerator::~Accelerator() {
   if (!log_.empty())
     unmap(log_.data());
   submission_.end();
-  for (Module *module : {&module_, &joins_, &conditions_})
+  for (Module *module : {&module_, &joins_, &steps_, &conditions_})
     module->unload();
   if (done_)
     device_->driver.cuEventDestroy(done_);
@@ -194,6 +197,7 @@ std::unique_ptr<piko::rt::DeviceFrame> Accelerator::makeFrame() {
 
 Module &Accelerator::moduleOf(const std::string &kernel) {
   return kernel == conditionKernel     ? conditions_
+         : kernel == stepKernel        ? steps_
          : kernel.starts_with("piko_") ? joins_
                                        : module_;
 }

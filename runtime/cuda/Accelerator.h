@@ -85,7 +85,7 @@ private:
   pikort_pipeline &p_;
   std::shared_ptr<Device> device_;
   /// The program's kernels, and the runtime's.
-  Module module_, joins_, conditions_;
+  Module module_, joins_, steps_, conditions_;
   CUstream own_ = nullptr;
   CUstream stream_ = nullptr; ///< Of the run; the host's, or our own.
   CUevent done_ = nullptr;    ///< Behind a frame that is not waited for.

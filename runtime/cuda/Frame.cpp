@@ -288,18 +288,24 @@ int64_t Frame::findStrip(const Stage &stage) {
 
 // --- What the program asks for ----------------------------------------------
 
-int64_t Frame::manyBlocks() const { return device_.joinBlocks(); }
-
-void Frame::launchOwn(const char *kernel, const void *args, int32_t timed,
-                      int64_t blocks) {
+void Frame::launchOwn(const char *kernel, const void *args, int32_t timed) {
   steps_.push_back({Step::Kind::Grid,
                     {kernel,
-                     blocks,
+                     device_.joinBlocks(),
                      joinThreads,
                      {reinterpret_cast<int64_t>(args)},
                      /*isJoin=*/true},
                     /*again=*/nullptr,
                     timed});
+}
+
+void Frame::launchWarp(const char *kernel, const void *args) {
+  steps_.push_back({Step::Kind::Grid,
+                    {kernel,
+                     /*blocks=*/1,
+                     /*threads=*/32,
+                     {reinterpret_cast<int64_t>(args)},
+                     /*isJoin=*/false}});
 }
 
 int32_t Frame::kernelOf(int32_t number, bool isSource) const {

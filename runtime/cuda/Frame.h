@@ -26,6 +26,9 @@ namespace piko::cuda {
 
 class Accelerator;
 
+/// Between the positions of a loop that has a stack (device/Step.cpp).
+inline constexpr const char *stepKernel = "piko_step";
+
 /// A grid to launch; `arguments` are words of eight bytes.
 struct GridLaunch {
   std::string kernel;
@@ -141,12 +144,8 @@ private:
     return places_[static_cast<int64_t>(placeOf(number, isSource))];
   }
   /// Notes a grid of the runtime's own kernels, for one of the pipeline's.
-  void launchOwn(const char *kernel, const void *args, int32_t timed = -1) {
-    launchOwn(kernel, args, timed, manyBlocks());
-  }
-  void launchOwn(const char *kernel, const void *args, int32_t timed,
-                 int64_t blocks);
-  int64_t manyBlocks() const;
+  void launchOwn(const char *kernel, const void *args, int32_t timed = -1);
+  void launchWarp(const char *kernel, const void *args);
   /// As pikort_get_kernel_stats counts them.
   int32_t kernelOf(int32_t number, bool isSource) const;
   int64_t nextNumber() const { return static_cast<int64_t>(steps_.size()); }

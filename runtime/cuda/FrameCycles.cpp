@@ -223,7 +223,7 @@ StackArgs &Frame::describeStack(int32_t loop) {
 void Frame::endPosition(int32_t loop) {
   StackArgs &args = *stacks_[static_cast<size_t>(loop)];
   args.number = nextNumber();
-  launchOwn("piko_step", &args, /*timed=*/-1, /*blocks=*/1);
+  launchWarp(stepKernel, &args);
 }
 
 void Frame::endWave(int32_t loop) {

@@ -8,6 +8,7 @@ namespace piko::cuda {
 
 // Each ends with a zero byte.
 extern const char *const joinKernels;      ///< device/Joins.cpp
+extern const char *const stepKernels;      ///< device/Step.cpp
 extern const char *const conditionKernels; ///< device/Condition.cpp
 
 } // namespace piko::cuda

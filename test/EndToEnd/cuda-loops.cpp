@@ -203,6 +203,15 @@ struct Stroke : piko::Stage<16, 16, 64, Point, Point, Point, Point>,
         emit(moved(p, i, 60 * i, p.value - float(i), p.tag), 1);
     if (p.tag % 5 == 1)
       emit(p, 2);
+    if (p.tag % 8 == 7) // more than one thread pushes
+      parallelFor(40, [&](int i) {
+        if (i % 3 == 1)
+          emit(moved(p, i, 2, float(i), 2), 1);
+        else if (i % 3 == 2)
+          emit(moved(p, i, 2, float(i), 2), 2);
+        else if (i % 9 == 0)
+          emit(moved(p, i, 2, float(i), 1), 0);
+      });
   }
 };
 struct Strokes : piko::Pipe<State> {

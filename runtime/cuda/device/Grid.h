@@ -20,9 +20,17 @@ template <class T> T smaller(T a, T b) { return b < a ? b : a; }
 template <class T> T larger(T a, T b) { return a < b ? b : a; }
 inline int64_t ceilDivide(int64_t a, int64_t b) { return (a + b - 1) / b; }
 
-constexpr int32_t warpSize = 32, warpsOfBlock = joinThreads / warpSize;
+constexpr int32_t warpSize = 32;
+/// Of a block. What is of one warp alone is compiled by itself (Step.cpp).
+#ifdef PIKO_ONE_WARP
+constexpr int32_t gridThreads = warpSize;
+#else
+constexpr int32_t gridThreads = joinThreads;
+#endif
+constexpr int32_t warpsOfBlock = gridThreads / warpSize;
+constexpr bool isOneWarp = warpsOfBlock == 1;
 
-inline PIKO_BLOCK_MEMORY uint64_t blockWords[joinThreads];
+inline PIKO_BLOCK_MEMORY uint64_t blockWords[gridThreads];
 inline PIKO_BLOCK_MEMORY uint32_t warpWords[warpsOfBlock];
 
 class Grid {
@@ -31,7 +39,7 @@ public:
   /// runs; uniform.
   Grid(FrameState &frame, int64_t cursor, int64_t work)
       : frame_(frame), top_(cursor), limit_(frame.log.limit),
-        isAlone_(work <= frame.mostAlone || isOneBlock()) {}
+        isAlone_(isOneWarp || work <= frame.mostAlone) {}
 
   /// True in blocks that are to end at once, as the first one works alone.
   bool isIdle() {
@@ -51,8 +59,8 @@ public:
   }
   static int32_t lane() { return thread() % warpSize; }
   static bool isFirst() { return firstBlock() == 0 && thread() == 0; }
-  int64_t index() const { return block() * joinThreads + thread(); }
-  int64_t size() const { return blocks() * joinThreads; }
+  int64_t index() const { return block() * gridThreads + thread(); }
+  int64_t size() const { return blocks() * gridThreads; }
 
   /// Calls body(i) for numbers below n, which is uniform.
   template <class Body> void forEach(int64_t n, const Body &body) const {
@@ -71,7 +79,7 @@ public:
   /// Once, before the first thread changes what says how much work there is:
   /// idle blocks have seen it.
   void settle() {
-    if (isOneBlock())
+    if constexpr (isOneWarp)
       __syncthreads();
     else
       meet();
@@ -142,7 +150,6 @@ private:
     __syncthreads();
   }
 
-  static bool isOneBlock() { return __nvvm_read_ptx_sreg_nctaid_x() == 1; }
   static int64_t firstBlock() { return __nvvm_read_ptx_sreg_ctaid_x(); }
   /// The sum over the block's threads, in all of them.
   static uint64_t sumOfBlock(uint64_t mine);
@@ -162,7 +169,7 @@ private:
 inline uint64_t Grid::sumOfBlock(uint64_t mine) {
   __syncthreads();
   blockWords[thread()] = mine;
-  for (int32_t half = joinThreads / 2; half > 0; half /= 2) {
+  for (int32_t half = gridThreads / 2; half > 0; half /= 2) {
     __syncthreads();
     if (thread() < half)
       blockWords[thread()] += blockWords[thread() + half];
@@ -244,13 +251,13 @@ void Grid::scan(int64_t n, uint32_t *const (&sums)[Count],
     total = 0;
   if (failed_)
     return;
-  if (isAlone_ && n <= joinThreads)
+  if (isAlone_ && n <= gridThreads)
     return scanFew<Count>(n, sums, totals, numbersOf);
   int64_t chunk =
-      ceilDivide(ceilDivide(n, blocks()), joinThreads) * joinThreads;
+      ceilDivide(ceilDivide(n, blocks()), gridThreads) * gridThreads;
   int64_t begin = smaller(block() * chunk, n), end = smaller(begin + chunk, n);
   uint64_t mine[Count] = {};
-  for (int64_t i = begin + thread(); i < end; i += joinThreads) {
+  for (int64_t i = begin + thread(); i < end; i += gridThreads) {
     uint32_t numbers[Count];
     numbersOf(i, numbers);
     for (int32_t c = 0; c < Count; ++c) {
@@ -267,14 +274,14 @@ void Grid::scan(int64_t n, uint32_t *const (&sums)[Count],
   sync();
   for (int32_t c = 0; c < Count; ++c) {
     uint64_t before = 0, all = 0;
-    for (int64_t b = thread(); b < blocks(); b += joinThreads) {
+    for (int64_t b = thread(); b < blocks(); b += gridThreads) {
       uint64_t sum = frame_.blockSums[c][b];
       before += b < block() ? sum : 0;
       all += sum;
     }
     auto base = static_cast<uint32_t>(sumOfBlock(before));
     all = sumOfBlock(all);
-    for (int64_t i = begin; i < end && sums[c]; i += joinThreads) {
+    for (int64_t i = begin; i < end && sums[c]; i += gridThreads) {
       int64_t at = i + thread();
       uint32_t total;
       uint32_t sum = scanBlock(at < end ? sums[c][at] : 0, total);

@@ -240,11 +240,6 @@ extern "C" [[clang::nvptx_kernel]] void piko_enter(const EnterArgs *args) {
   Enter(*args).run();
 }
 
-/// Of one block.
-extern "C" [[clang::nvptx_kernel]] void piko_step(const StackArgs *args) {
-  Step(*args).run();
-}
-
 extern "C" [[clang::nvptx_kernel]] void piko_wave(const StepArgs *args) {
   Wave(*args).run();
 }

@@ -133,7 +133,7 @@ struct StackState {
   pikoir_unit_log unitLog;
   uint32_t *numbers; ///< Room for those of a step.
   int64_t found, foundLeft;
-  uint32_t children;
+  uint32_t children, cells;
 };
 
 /// Rounds of a cycle whose stages collect.

@@ -50,6 +50,11 @@ public:
 
 private:
   static constexpr int64_t mostAtOnce = 4096;
+  /// Up to how much one thread does by itself: records, and bytes of entries.
+  static constexpr uint32_t fewRecords = 8;
+  static constexpr uint64_t fewBytes = 1024;
+
+  static constexpr Waiting nobody{nullptr, nullptr, 0, 0, -1, -1, 0};
 
   /// What has left the loop.
   struct Exits {
@@ -57,6 +62,13 @@ private:
     int64_t count, capacity;
   };
 
+  struct Few;
+  struct Counter;
+  struct Pusher;
+
+  bool pushFew(const StackMember &member);
+  void countFew(const StackMember &member, const Few &few);
+  void writeFew(const StackMember &member, const Few &few, uint32_t *cells);
   void makeRoom(int64_t more);
   void makeRoomForExits(int64_t more);
   void pushPort(const QueuePort &port, const Spans &spans,
@@ -111,13 +123,134 @@ inline void Stack::makeRoomForExits(int64_t more) {
   exits_.list = room;
 }
 
+// --- What one thread pushes --------------------------------------------------
+
+/// The spans of a position whose entries are few.
+struct Stack::Few {
+  const pikoir_span *list = nullptr;
+  int64_t count = 0;
+  bool isTrue = true;
+
+  explicit Few(const KernelState &kernel) {
+    int64_t at =
+        reinterpret_cast<const pikoir_unit_log *>(kernel.log.units)->first;
+    if (at == 0)
+      return;
+    const auto *piece = reinterpret_cast<const pikoir_piece *>(at);
+    list = reinterpret_cast<const pikoir_span *>(piece + 1);
+    count = piece->spans;
+    isTrue = piece->next == 0 && count <= fewRecords;
+    for (int64_t s = 0; s < count && isTrue; ++s)
+      isTrue = static_cast<uint64_t>(list[s].end - list[s].begin) <= fewBytes;
+  }
+
+  template <class Sink> void read(const QueuePort &port, Sink &sink) const {
+    for (int64_t s = 0; s < count; ++s)
+      SpanReader<Sink>(port.input, port.shape, sink).read(list[s]);
+  }
+};
+
+struct Stack::Counter {
+  uint32_t records = 0, cells = 0;
+  void emit(bool) { ++records; }
+  void keep(const pikoir_entry *) {}
+  void place(uint32_t) { ++cells; }
+  void insert(uint32_t) { ++cells; }
+  void next() {}
+  void fail() {}
+};
+
+struct Stack::Pusher {
+  const Stack &stack;
+  const QueuePort &port;
+  Waiting *end;    ///< Behind the first one's place.
+  uint32_t *cells; ///< Room for more.
+  uint32_t ordinal = 0, received = 0;
+  Waiting *last = nullptr;
+
+  void emit(bool isMine) {
+    ++ordinal;
+    received += isMine;
+  }
+  void keep(const pikoir_entry *entry) {
+    last = end - ordinal;
+    *last = {payload(entry),     cells,       0,
+             stack.now_.entry,   port.member, port.group,
+             stack.now_.hops + 1};
+  }
+  void place(uint32_t cell) {
+    *cells++ = last->pairCount++ == 0 ? cell | PIKOIR_FIRST_CELL : cell;
+  }
+  void insert(uint32_t cell) {
+    uint32_t *at = cells++, *first = at - last->pairCount++;
+    *first &= ~PIKOIR_FIRST_CELL;
+    for (; at != first && at[-1] > cell; --at)
+      *at = at[-1];
+    *at = cell;
+    *first |= PIKOIR_FIRST_CELL;
+  }
+  void next() {}
+  void fail() { stack.grid_.failFrame(); }
+};
+
+/// False if it is too much.
+inline bool Stack::pushFew(const StackMember &member) {
+  Few few(*member.kernel);
+  if (!few.isTrue)
+    return false;
+  if (Grid::isFirst())
+    countFew(member, few);
+  grid_.sync();
+  int64_t records = state_.children, count = state_.cells;
+  if (records > fewRecords)
+    return false;
+  makeRoom(records);
+  auto *cells = grid_.take<uint32_t>(count);
+  if (grid_.hasFailed())
+    return true;
+  if (Grid::isFirst())
+    writeFew(member, few, cells);
+  now_.count += records;
+  grid_.sync();
+  return true;
+}
+
+inline void Stack::countFew(const StackMember &member, const Few &few) {
+  state_.children = state_.cells = 0;
+  for (int32_t p = 0; p < member.portCount; ++p) {
+    Counter counter;
+    few.read(args_.ports()[member.firstPort + p], counter);
+    state_.children = counter.records; // of all ports
+    state_.cells += counter.cells;
+  }
+}
+
+inline void Stack::writeFew(const StackMember &member, const Few &few,
+                            uint32_t *cells) {
+  uint32_t records = state_.children;
+  Waiting *begin = now_.waiting + now_.count;
+  for (uint32_t i = 0; i < records; ++i)
+    begin[i] = nobody;
+  for (int32_t p = 0; p < member.portCount; ++p) {
+    const QueuePort &port = args_.ports()[member.firstPort + p];
+    Pusher pusher{*this, port, begin + records, cells};
+    few.read(port, pusher);
+    *port.input.received += pusher.received;
+    cells = pusher.cells;
+  }
+}
+
+// --- What all threads push ---------------------------------------------------
+
 inline void Stack::push() {
   if (now_.running < 0)
     return;
   const StackMember &member = args_.members()[now_.running];
+  if (member.portCount == 0 || pushFew(member))
+    return;
   Spans spans(grid_, *member.kernel);
   spans.find();
-  if (spans.count == 0 || member.portCount == 0 || grid_.hasFailed())
+  if (spans.count == 0 || grid_.hasFailed())
     return;
   const QueuePort *ports = args_.ports() + member.firstPort;
   Siblings siblings(grid_, spans, ports[0]);
@@ -129,9 +262,8 @@ inline void Stack::push() {
   if (grid_.hasFailed())
     return;
   // Some may go to no port, or to no cell.
-  grid_.forEach(count, [&](int64_t i) {
-    now_.waiting[now_.count + i] = {nullptr, nullptr, 0, 0, -1, -1, 0};
-  });
+  grid_.forEach(count,
+                [&](int64_t i) { now_.waiting[now_.count + i] = nobody; });
   grid_.sync();
   for (int32_t p = 0; p < member.portCount && !grid_.hasFailed(); ++p)
     pushPort(ports[p], spans, siblings, now_.count + count);
@@ -160,6 +292,8 @@ inline void Stack::pushPort(const QueuePort &port, const Spans &spans,
                                            now_.hops + 1};
   });
 }
+
+// --- What is next ------------------------------------------------------------
 
 inline void Stack::next() {
   while (!grid_.hasFailed() && !findTop() && now_.nextEntry < now_.entryCount) {
@@ -250,30 +384,6 @@ inline void Stack::publish(FrameState &frame) {
   }
   state_ = now_;
 }
-
-/// Behind a position.
-class Step : FrameTask {
-public:
-  explicit Step(const StackArgs &args)
-      : FrameTask(*args.frame, args.number, /*work=*/0), args_(args),
-        stack_(grid_, args) {}
-
-  void run() {
-    bool goesOn = FrameTask::run([&] {
-      stack_.push();
-      stack_.next();
-    });
-    if (!Grid::isFirst())
-      return;
-    args_.loop->again = 0;
-    if (goesOn)
-      stack_.publish(*args_.frame);
-  }
-
-private:
-  const StackArgs &args_;
-  Stack stack_;
-};
 
 } // namespace piko::cuda
 
