@@ -86,10 +86,16 @@ class Graphs(Chains):
                     to = fresh[0]
                 fed.add(to)
                 pipe.edges.append(Edge(i, port, to))
+        if self.on("many-inputs") and self.on("joins") and self.on("several-ports") and \
+                n > 1 and r.random() < 0.05:
+            self.add_many_edges(pipe)
         if self.on("cycles") and r.random() < 0.25:
             self.add_back_edges(pipe)
-        pipe.sources = [i for i in range(n) if i not in {e.consumer for e in pipe.edges
-                                                         if e.producer < e.consumer}]
+            if self.on("joins") and r.random() < 0.6:  # come in at other stages, too
+                pipe.sources = [i for i in range(n) if i in self.reachable(pipe, i)
+                                and r.random() < 0.5]
+        pipe.sources += [i for i in range(n) if i not in {e.consumer for e in pipe.edges
+                                                          if e.producer < e.consumer}]
         if r.random() < 0.2 and self.on("joins"):
             pipe.sources.append(r.randrange(n))
         r.shuffle(pipe.sources)
@@ -97,6 +103,16 @@ class Graphs(Chains):
             pipe.stages[edge.producer].outputs[edge.port] = \
                 pipe.stages[edge.consumer].input
         r.shuffle(pipe.edges)
+
+    def add_many_edges(self, pipe):
+        """More than are merged at a time, from any stages to one behind them."""
+        r = self.random
+        self.use("many-inputs")
+        to = r.randrange(1, len(pipe.stages))
+        for _ in range(r.choice([9, 10, 17])):
+            outputs = pipe.stages[i := r.randrange(to)].outputs
+            pipe.edges.append(Edge(i, len(outputs), to))
+            outputs.append(None)
 
     def add_back_edges(self, pipe):
         r = self.random

@@ -28,7 +28,7 @@ FEATURES = [
     "collectives", "gather", "cycles", "unordered", "fetch-atomics", "float-atomics",
     "updates", "atomics", "stores", "maths", "bit-tricks", "float-specials",
     "dynamic-elements", "loop-jumps", "early-returns", "switches", "lambdas",
-    "helpers", "template-stages", "local-arrays", "twin-stages", "chains",
+    "helpers", "template-stages", "local-arrays", "twin-stages", "chains", "many-inputs",
 ]
 #: What the dialect's printer does not write: C++ that the front end removes.
 CPP_ONLY = {"maths", "loop-jumps", "early-returns", "switches", "lambdas", "helpers",
@@ -236,6 +236,15 @@ class Generator(Phases):
         pipe.input_seed = r.randrange(1 << 30)
         self.count_shapes(pipe)
 
+    def count_entries(self, pipe):
+        """At how many stages of one cycle primitives come in."""
+        ways = [self.reachable(pipe, i) for i in range(len(pipe.stages))]
+        cycles = {frozenset(j for j in ways[i] if i in ways[j])
+                  for i in range(len(pipe.stages)) if i in ways[i]}
+        return max([0] + [sum(i in pipe.sources or any(
+            e.consumer == i and e.producer not in cycle for e in pipe.edges)
+            for i in cycle) for cycle in cycles])
+
     def count_shapes(self, pipe):
         """Counts what the graph and its grids look like."""
         self.use("one-source" if len(pipe.sources) == 1 else "several-sources")
@@ -248,6 +257,8 @@ class Generator(Phases):
             self.use("source-and-edge")
         if any(len(s.outputs) > 1 for s in pipe.stages):
             self.use("several-ports")
+        if self.count_entries(pipe) > 1:
+            self.use("several-entries")
         for s in pipe.stages:
             if s.is_list and any(e.consumer == pipe.stages.index(s) and
                                  s in [pipe.stages[j] for j in self.reachable(
