@@ -33,6 +33,12 @@
 // RUN: env PIKO_CUDA_DRIVER=%test_driver not %{compare} --pipe TwoEntries --loop-limit 5 2>&1 | FileCheck %s --check-prefix=HOPS
 // RUN: env PIKO_CUDA_DRIVER=%test_driver not %{compare} --pipe Ordered --loop-limit 3 2>&1 | FileCheck %s --check-prefix=HOPS
 // HOPS: got: stage '{{ping|pong|draw}}', bin {{[0-9]+}}: a loop did not end within {{5|3}} hops
+//
+// So is what a hop does wrong, of the primitive that a CPU names.
+// RUN: not piko-compare %s --pipe Strays --count 70 --domain 64 48 --runs 1 --threads 2 2>&1 | grep got: > %t.cpu
+// RUN: env PIKO_CUDA_DRIVER=%test_driver not %{compare} --pipe Strays 2>&1 | grep got: > %t.cuda
+// RUN: cmp %t.cpu %t.cuda && FileCheck %s --check-prefix=STRAY --input-file %t.cuda
+// STRAY: got: stage 'stray': expected a bin id in [0, 48), but got 10{{[0-9]+}}
 #include "Inputs/hops.h"
 
 struct TwoEntries : piko::Pipe<State> {
@@ -285,5 +291,28 @@ struct RoundStrokes : piko::Pipe<State> {
     connect(stroke, 1, merge);
     connect(stroke, 2, merge);
     connect(merge, 1, blend);
+  }
+};
+
+struct Stray : piko::Stage<8, 8, 64, Point, Point>, piko::Uses<State> {
+  void assignBin(const Point &p) {
+    if (p.tag == 1016) // no source has that
+      assignToBin(p, piko::BinId{1000 + p.x});
+    else
+      assignToBin(p, binFromPosition(glm::ivec2(p.x % 64, p.y % 48)));
+  }
+  void process(const Point &p) {
+    update(state().drawn, glm::ivec2(p.x, p.y),
+           [&](Pixel &pixel) { pixel.sum = pixel.sum * 0.5f + p.value; });
+    int next = p.tag % 1000 * 3 % 17;
+    if (next > 0)
+      emit(moved(p, p.tag % 2, 0, p.value, 1000 + next));
+  }
+};
+struct Strays : piko::Pipe<State> {
+  Stray stray;
+  Strays() {
+    source(stray);
+    connect(stray, 0, stray);
   }
 };
