@@ -8,6 +8,9 @@
 
 using namespace piko::rt;
 
+/// Who runs all units.
+static constexpr int64_t thread = 0;
+
 // --- Few pairs in many cells ------------------------------------------------
 
 void PairOrder::read(const Items &input) {
@@ -59,7 +62,7 @@ void piko::rt::cutRuns(const std::vector<uint64_t> &entries, int64_t *offsets,
     int64_t cell = PairOrder::cellOf(entries[static_cast<size_t>(i)]);
     int64_t end = runs.empty() ? -near : runs.back().cell_end;
     if (cell >= end + near)
-      runs.push_back({cell, cell, i, i});
+      runs.push_back({cell, cell, i, i, thread});
     pikoir_unit &run = runs.back();
     for (; run.cell_end <= cell; ++run.cell_end)
       offsets[run.cell_end] = i;
@@ -109,7 +112,7 @@ void Serial::begin(const Items &input) {
     offsets_[0] = 0;
     offsets_[1] = input.count;
     if (input.count > 0)
-      kernel_.units.push_back({0, 1, 0, input.count});
+      kernel_.units.push_back({0, 1, 0, input.count, thread});
   }
   if (stage_.takesList())
     makeCalls();
@@ -129,7 +132,9 @@ void Serial::begin(const Items &input) {
                    static_cast<int64_t>(kernel_.units.size()),
                    stage_.tiles,
                    stage_.takesList() ? calls_.data() : nullptr,
-                   static_cast<int64_t>(calls_.size())};
+                   static_cast<int64_t>(calls_.size()),
+                   /*clears=*/0,
+                   /*cursors=*/nullptr};
   shareInput(p_, kernel_, input);
 }
 
@@ -150,7 +155,7 @@ void Serial::binPairs(const Items &input) {
     return;
   }
   countPairs();
-  kernel_.units.push_back({0, stage_.cells, 0, count});
+  kernel_.units.push_back({0, stage_.cells, 0, count, thread});
 }
 
 /// The order of many pairs in few cells.
@@ -173,7 +178,7 @@ void Serial::binPair(int64_t cell) {
   kernel_.positions = 1;
   offsets_[cell] = 0;
   offsets_[cell + 1] = 1;
-  kernel_.units.push_back({cell, cell + 1, 0, 1});
+  kernel_.units.push_back({cell, cell + 1, 0, 1, thread});
 }
 
 /// One unit of all calls takes the place of runs of cells.
@@ -191,7 +196,7 @@ void Serial::makeCalls() {
   kernel_.units.clear();
   if (!calls_.empty())
     kernel_.units.push_back(
-        {0, static_cast<int64_t>(calls_.size()), 0, kernel_.positions});
+        {0, static_cast<int64_t>(calls_.size()), 0, kernel_.positions, thread});
 }
 
 int64_t Serial::slots() const {
