@@ -113,8 +113,10 @@ def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
     is neither 0 nor -1, no dividend is tested. Where an index
     grows by one from lane to lane but for limits, as one that is clamped to an
     image, or wraps around in it, a test finds whether it does so here, and a load
-    of a row is the other side of the gather. What has no vector form runs lane by
-    lane inside.
+    of a row is the other side of the gather. A row of a private copy
+    (`piko-privatize`), as of pixels that are counted, is changed by all lanes at
+    once (`piko.cpu.reduce_row`); where lanes may meet in an element they take
+    turns. What has no vector form runs lane by lane inside.
 
     Loops inside, or two of which one is all that the other does, are collapsed
     where their turns differ between lanes but hand on nothing, and change state
@@ -122,7 +124,7 @@ def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
     vectors with pairs of a lane and a turn, so that the pixels of small boxes
     leave few lanes idle. (Where a lane makes more than 1,024 turns of one loop,
     loops run in step, as others do.) What pairs change in private copies
-    (`piko-privatize`) is staged: 16 lanes compress it into a list, through which a
+    is staged: 16 lanes compress it into a list, through which a
     scalar loop goes when it is full, so that misses of the cache overlap.
 
     Where an iteration has a loop inside of another one, whose turns differ
