@@ -105,8 +105,8 @@ def Piko_ReduceRowOp
     runtime has given no copy, each lane changes the state indivisibly.
 
     ```mlir
-    %c = piko.cpu.private_copy add @hits "count" of %writer
-    piko.cpu.reduce_row add %ones, @hits[%x, %y] "count" mask %mask in %c
+    %c = piko.cpu.private_copy add @histogram "value" of %writer
+    piko.cpu.reduce_row add %lanes, @histogram[%i] "value" mask %mask in %c
       : vector<16xi1>, vector<16xi32>
     ```
   }];
