@@ -158,10 +158,13 @@ private:
           Value bytes = arith::MulIOp::create(
               inside, loc, number,
               createI64(inside, loc, getRecord(op).getSize()));
+          // Not inbounds: the first lane may be outside.
+          Value at = LLVM::GEPOp::create(inside, loc, first.getType(),
+                                         inside.getI8Type(), first,
+                                         ArrayRef<LLVM::GEPArg>{bytes});
           // The value says nothing of what others have written.
           LLVM::AtomicRMWOp::create(
-              inside, loc, toAtomicBinOp(op.getKind()),
-              createOffset(inside, loc, first, bytes),
+              inside, loc, toAtomicBinOp(op.getKind()), at,
               vector::ExtractOp::create(inside, loc, adaptor.getValue(), lane),
               LLVM::AtomicOrdering::monotonic);
           scf::YieldOp::create(each, loc);
