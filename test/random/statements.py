@@ -197,8 +197,11 @@ class Statements(Expressions):
         if hops:
             left = lit(0)
             if counted:
+                # Once if a call does it many times: each of three hops would
+                # make as many of each.
+                many = is_back and scope.multiplicity > 8
                 left = op("&", Get("i32", counted[0][0], counted[0][1].leaf("hops"),
-                                   solid=True), lit(3))
+                                   solid=True), lit(1 if many else 3))
             value = op("-", left, lit(1)) if is_back else left
             out.append(Put(name, hops, value, solid=True))
             if is_back:
