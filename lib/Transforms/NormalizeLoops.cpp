@@ -154,6 +154,41 @@ bool isFlag(Value number) {
   return matchPattern(number, m_ConstantInt(&constant)) && constant.ule(1);
 }
 
+/// scf.index_switch of a truth value  =>  scf.if
+struct TestFlags : OpRewritePattern<scf::IndexSwitchOp> {
+  using OpRewritePattern::OpRewritePattern;
+  LogicalResult matchAndRewrite(scf::IndexSwitchOp choice,
+                                PatternRewriter &rewriter) const override {
+    Value flag = getFlag(rewriter, choice.getArg());
+    Region *yes = &choice.getDefaultRegion(), *no = yes;
+    for (auto [value, region] :
+         llvm::zip(choice.getCases(), choice.getCaseRegions()))
+      if (value == 0 || value == 1)
+        (value ? yes : no) = &region;
+    if (!flag || yes == no)
+      return failure();
+    auto test = scf::IfOp::create(rewriter, choice.getLoc(),
+                                  choice.getResultTypes(), flag,
+                                  /*addThenBlock=*/false,
+                                  /*addElseBlock=*/false);
+    rewriter.inlineRegionBefore(*yes, test.getThenRegion(),
+                                test.getThenRegion().end());
+    rewriter.inlineRegionBefore(*no, test.getElseRegion(),
+                                test.getElseRegion().end());
+    rewriter.replaceOp(choice, test);
+    return success();
+  }
+
+  /// The truth value that an index is, or null.
+  static Value getFlag(OpBuilder &builder, Value index) {
+    auto cast = index.getDefiningOp<arith::IndexCastUIOp>();
+    if (!cast)
+      return {};
+    return cast.getIn().getType().isInteger(1) ? cast.getIn()
+                                               : asFlag(builder, cast.getIn());
+  }
+};
+
 struct NarrowFlags : OpRewritePattern<scf::IfOp> {
   using OpRewritePattern::OpRewritePattern;
   LogicalResult matchAndRewrite(scf::IfOp choice,
@@ -322,8 +357,9 @@ struct MoveWorkBehind : OpRewritePattern<scf::WhileOp> {
 
 void NormalizeLoopsPass::runOnOperation() {
   RewritePatternSet patterns(&getContext());
-  patterns.add<JoinConditions, InvertComparisons, ExchangeArms, NarrowFlags,
-               HoistConjunction, MergeNested, MoveWorkBehind>(&getContext());
+  patterns.add<JoinConditions, InvertComparisons, ExchangeArms, TestFlags,
+               NarrowFlags, HoistConjunction, MergeNested, MoveWorkBehind>(
+      &getContext());
   scf::IfOp::getCanonicalizationPatterns(patterns, &getContext());
   scf::WhileOp::getCanonicalizationPatterns(patterns, &getContext());
   arith::ExtUIOp::getCanonicalizationPatterns(patterns, &getContext());

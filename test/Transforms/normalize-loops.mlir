@@ -166,3 +166,46 @@ piko.pipeline @Guarded rank 1 {
     }
   }
 }
+
+// A switch of a truth value, whatever its cases.
+// CHECK-LABEL: func.func @flags
+// CHECK-NOT:     scf.index_switch
+// CHECK:         %[[A:.*]] = arith.cmpi slt
+// CHECK:         arith.select %[[A]], %c1_i32, %c2_i32
+// CHECK:         scf.if %[[A]] {
+// CHECK-NEXT:      func.call @work(%c1_i32)
+// CHECK-NEXT:    } else {
+// CHECK-NEXT:      func.call @work(%c2_i32)
+// CHECK:         scf.index_switch %{{.*}}
+func.func @flags(%x: i32, %y: i32, %z: index) -> i32 {
+  %one = arith.constant 1 : i32
+  %two = arith.constant 2 : i32
+  %less = arith.cmpi slt, %x, %y : i32
+  %index = arith.index_castui %less : i1 to index
+  %first = scf.index_switch %index -> i32
+  case 0 {
+    scf.yield %two : i32
+  }
+  default {
+    scf.yield %one : i32
+  }
+  %number = arith.extui %less : i1 to i32
+  %same = arith.index_castui %number : i32 to index
+  scf.index_switch %same
+  case 1 {
+    func.call @work(%one) : (i32) -> ()
+    scf.yield
+  }
+  default {
+    func.call @work(%two) : (i32) -> ()
+    scf.yield
+  }
+  scf.index_switch %z
+  case 0 {
+    func.call @work(%one) : (i32) -> ()
+    scf.yield
+  }
+  default {
+  }
+  return %first : i32
+}

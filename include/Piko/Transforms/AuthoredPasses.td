@@ -59,8 +59,8 @@ def NormalizeLoops : Pass<"piko-normalize-loops"> {
   let description = [{
     **Requires** nothing in particular; it works on `scf` in any operation.
 
-    **Does**: exchanges the arms of an `scf.if` whose first does nothing; makes
-    truth values of the flags that arms yield as numbers, and conjunctions of
+    **Does**: exchanges the arms of an `scf.if` whose first does nothing; makes an
+    `scf.if` of an `scf.index_switch` of a truth value; makes truth values of the flags that arms yield as numbers, and conjunctions of
     those that an arm yields where the other yields false, if they can be
     computed in front; moves what stands in an `scf.if` with the loop's own
     condition, in front of that condition, behind it.
