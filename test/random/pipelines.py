@@ -29,6 +29,7 @@ FEATURES = [
     "updates", "atomics", "stores", "maths", "bit-tricks", "float-specials",
     "dynamic-elements", "loop-jumps", "early-returns", "switches", "lambdas",
     "helpers", "template-stages", "local-arrays", "twin-stages", "chains", "many-inputs",
+    "selections",
 ]
 #: What the dialect's printer does not write: C++ that the front end removes.
 CPP_ONLY = {"maths", "loop-jumps", "early-returns", "switches", "lambdas", "helpers",
@@ -48,6 +49,7 @@ class Generator(Phases):
         self.features, self.used = features, set()
         self.names, self.name = 0, name
         self.operations = {}
+        self.selections = {}
         self.nonempty = set()
         self.links = {}  # of stages in a chain
 

@@ -230,7 +230,38 @@ class Statements(Expressions):
         at = self.own_pixel(scope) or self.own_cell(scope)
         return self.update(self.random.choice(images), at, scope)
 
+    def select(self, image, at, scope):
+        """Keeps what is first by a key: all updates of an image have one, and set
+        the same numbers. Null if it has none."""
+        r = self.random
+        if image.name not in self.selections:
+            places = [l for l in image.record.leaves
+                      if l.kind in ("i32", "u32", "i64", "u64", "f32", "f64")]
+            chosen = self.on("selections") and places and r.random() < 0.5
+            self.selections[image.name] = chosen and (
+                r.choice(places), r.choice(["<", "<=", ">", ">="]),
+                [l for l in image.record.leaves if r.random() < 0.6])
+        if not self.selections[image.name]:
+            return None
+        self.use("selections")
+        leaf, comparison, others = self.selections[image.name]
+        key, px = self.fresh("v"), self.fresh("px")
+        before = [Let(key, leaf.kind, self.expr(leaf.kind, scope))]
+        index = Lit("i32", 0) if leaf.count else None
+        body = [Put(px, leaf, Var(leaf.kind, key), index)]
+        for other in others:
+            if other.path != leaf.path:
+                body.append(Put(px, other, self.expr(wide(other.kind), scope, 2),
+                                Lit("i32", 0) if other.count else None))
+        scope.variables.append((key, leaf.kind))
+        old = Get(leaf.kind, px, leaf, index)
+        test = Op("b1", comparison, [Var(leaf.kind, key), old])
+        return before + [Update(image, at, [If(test, body)])]
+
     def update(self, image, at, scope):
+        selects = self.select(image, at, scope)
+        if selects:
+            return selects
         self.use("updates")
         r = self.random
         px = self.fresh("px")
