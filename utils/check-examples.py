@@ -66,6 +66,7 @@ piko.pipeline @Example rank 2 {
   piko.buffer @histogram : @Count
   piko.buffer @next : @Count
   piko.image @depth : @Depth rank 2 clear [1.0 : f32]
+  piko.image @depth.unit : @Count rank 2 internal
   piko.source @rasterize
   piko.source @blend
   piko.edge @rasterize[0] -> @shade

@@ -167,6 +167,10 @@ void piko::addScalarSequence(OpPassManager &passes,
     passes.nest<PipelineOp>().addPass(createFormTiles());
   // The widest vectors that there are: others are made of two or four.
   ::addUnitSequence(passes, options.has("vectorize") ? 16 : 0);
+  if (options.has("reduce-updates")) {
+    passes.addPass(createReduceUpdates());
+    addCleanUp(passes);
+  }
   if (options.has("privatize"))
     passes.nest<PipelineOp>().addPass(createPrivatize());
   addUnitsToLoops(passes, options);

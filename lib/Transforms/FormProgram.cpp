@@ -401,7 +401,8 @@ void ProgramWriter::clearState() {
   SmallVector<Attribute> states;
   for (Operation &op : *pipeline.getBodyBlock()) {
     auto buffer = dyn_cast<BufferOp>(op);
-    if (isa<ImageOp>(op) || (buffer && buffer.getPerSource()))
+    auto image = dyn_cast<ImageOp>(op);
+    if ((image && !image.getInternal()) || (buffer && buffer.getPerSource()))
       states.push_back(FlatSymbolRefAttr::get(SymbolTable::getSymbolName(&op)));
   }
   if (!states.empty())

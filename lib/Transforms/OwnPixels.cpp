@@ -102,7 +102,7 @@ void OwnPixelsPass::runOnStage(StageOp stage) {
   auto refuse = [&](Operation *at, const Twine &why) {
     InFlightDiagnostic remark = first.emitRemark()
                                 << "stage '" << getCppName(stage)
-                                << "' runs each bin on one thread";
+                                << "' shares no bin by its pixels";
     remark.attachNote(at->getLoc()) << why;
     ++refused;
   };

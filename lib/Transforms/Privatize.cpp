@@ -3,11 +3,11 @@
 // piko-privatize: what a kernel only reduces to, each thread reduces to a copy
 // of its own.
 
+#include "UnitWork.h"
+
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
-#include "Piko/Dialect/Piko/IR/PikoCPU.h"
 #include "Piko/Transforms/Passes.h"
 
-#include "mlir/Dialect/SCF/IR/SCF.h"
 #include "llvm/ADT/MapVector.h"
 #include "llvm/ADT/TypeSwitch.h"
 
@@ -36,18 +36,6 @@ struct PrivatizePass : piko::impl::PrivatizeBase<PrivatizePass> {
 };
 
 } // namespace
-
-/// The writer of what a kernel's stage emits, in the loop over its units, or
-/// null: a source's kernel changes no state.
-static OpenWriterOp findWriter(KernelOp kernel) {
-  for (auto units : kernel.getOps<scf::ForallOp>())
-    for (auto open : units.getOps<OpenWriterOp>()) {
-      auto bins = open.getBins().getDefiningOp<OpenBinsOp>();
-      if (!open.getStageAttr() && bins && !bins.getSource())
-        return open;
-    }
-  return {};
-}
 
 /// The field that an access reads or changes; null if it may be any.
 static StringAttr getField(Operation *op) {
@@ -93,17 +81,6 @@ static Obstacle findOtherUse(KernelOp kernel, const Target &target) {
   return {};
 }
 
-/// Whether a primitive, or a call that takes a list, does it in a loop of its
-/// own: around it are the loops over units, over cells or calls, and over
-/// primitives.
-static bool isRepeated(AtomicOp atomic) {
-  int64_t depth = 0;
-  for (Operation *at = atomic->getParentOp(); !isa<scf::ForallOp>(at);
-       at = at->getParentOp())
-    depth += isa<LoopLikeOpInterface>(at);
-  return depth > 2;
-}
-
 void PrivatizePass::runOnUnits(KernelOp kernel, OpenWriterOp writer) {
   llvm::MapVector<Target, SmallVector<AtomicOp>> targets;
   kernel.walk([&](AtomicOp atomic) {
@@ -132,7 +109,7 @@ void PrivatizePass::runOnUnits(KernelOp kernel, OpenWriterOp writer) {
     builder.setInsertionPointAfter(writer);
     auto copy = PrivateCopyOp::create(builder, first.getLoc(), first.getKind(),
                                       first.getState(), target.second, writer,
-                                      llvm::any_of(atomics, isRepeated));
+                                      llvm::any_of(atomics, isRepeatedInWork));
     for (AtomicOp atomic : atomics)
       atomic.getCopyMutable().assign(copy);
     first.emitRemark("stage '")
@@ -144,6 +121,6 @@ void PrivatizePass::runOnUnits(KernelOp kernel, OpenWriterOp writer) {
 
 void PrivatizePass::runOnOperation() {
   for (auto kernel : getOperation().getOps<KernelOp>())
-    if (OpenWriterOp writer = findWriter(kernel))
+    if (OpenWriterOp writer = findUnitWriter(kernel))
       runOnUnits(kernel, writer);
 }

@@ -12,14 +12,6 @@ using namespace piko;
 
 namespace {
 
-/// How an update chooses a number: another value where the condition has that
-/// outcome, or else the old one.
-struct Choice {
-  Value condition;
-  bool outcome;
-  Value value;
-};
-
 class UpdateSplitter {
 public:
   explicit UpdateSplitter(UpdateOp update)
@@ -50,8 +42,7 @@ private:
 
 } // namespace
 
-/// The choice whose value is `value`, one of whose sides is `old`.
-static std::optional<Choice> getChoice(Value value, Value old) {
+std::optional<Choice> piko::getChoice(Value value, Value old) {
   if (auto select = value.getDefiningOp<arith::SelectOp>()) {
     if (select.getFalseValue() == old)
       return Choice{select.getCondition(), true, select.getTrueValue()};

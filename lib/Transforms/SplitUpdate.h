@@ -10,6 +10,16 @@
 
 namespace piko {
 
+/// How an update chooses a number: another value where the condition has that
+/// outcome, or else the old one.
+struct Choice {
+  mlir::Value condition;
+  bool outcome;
+  mlir::Value value;
+};
+/// The choice whose result is `value`, one of whose sides is `old`.
+std::optional<Choice> getChoice(mlir::Value value, mlir::Value old);
+
 /// Takes an update that gives some numbers of a pixel other values on one
 /// condition, values that have nothing to do with what the pixel was, and
 /// makes of it one update that leaves these numbers, and, where the condition

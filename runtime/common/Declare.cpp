@@ -297,6 +297,28 @@ void pikoir_declare_private(pikort_pipeline *p, int32_t stage, int32_t copy,
   });
 }
 
+void pikoir_declare_selection(pikort_pipeline *p, int32_t stage,
+                              int32_t selection, const int32_t *images,
+                              int32_t count, int32_t often,
+                              pikoir_select select) {
+  guarded(p, "setup", [&] {
+    Selection &declared = declare(entry(p->stages, stage, "stage").selections,
+                                  selection, "selection");
+    std::string who = "selection " + std::to_string(selection) + ": ";
+    expect(images && count > 0 && select,
+           who + "expected images and a function");
+    for (int32_t state : std::vector(images, images + count))
+      expect(state >= 0 && state < static_cast<int32_t>(p->states.size()) &&
+                 p->states[state].declared &&
+                 p->states[state].kind == PIKORT_IMAGE,
+             who + "expected a declared image, but got state " +
+                 std::to_string(state));
+    declared.images.assign(images, images + count);
+    declared.often = often != 0;
+    declared.select = select;
+  });
+}
+
 void pikoir_declare_strips(pikort_pipeline *p, int32_t id, int32_t source,
                            int64_t chunk, const int32_t *stages,
                            int32_t count) {

@@ -150,6 +150,14 @@ struct Reduction {
   pikoir_combine combine = nullptr;
 };
 
+/// What a kernel selects pixels of: see PrivateImages.h.
+struct Selection {
+  bool declared = false;
+  std::vector<int32_t> images; ///< States; the first one has the key.
+  bool often = false;
+  pikoir_select select = nullptr;
+};
+
 struct Stage {
   bool declared = false;
   std::string name;
@@ -160,6 +168,7 @@ struct Stage {
   int32_t root = 0;     ///< Of the lineage that it starts.
   int32_t keyWidth = 0; ///< 64-bit words of its items' keys, 0 = none.
   std::vector<Reduction> reductions; ///< Of its kernel, by private copy.
+  std::vector<Selection> selections; ///< Of its kernel.
   // Completed by finish():
   std::vector<int32_t> sources; ///< That feed it, ascending.
   std::vector<int32_t> inputs;  ///< Edges that end here, as declared.
@@ -186,7 +195,9 @@ struct Stage {
   bool collects() const { return flags & (PIKOIR_COLLECTS | PIKOIR_LIST); }
   bool ordered() const { return flags & PIKOIR_ORDERED && !unordered(); }
   /// Positions of a cell may be in several units.
-  bool splits() const { return flags & PIKOIR_SPLIT && !ordered(); }
+  bool splits() const {
+    return flags & PIKOIR_SPLIT && (!ordered() || !selections.empty());
+  }
   bool placed() const { return flags & PIKOIR_PLACED; }
   bool writes() const { return flags & PIKOIR_WRITES; }
   bool unordered() const { return flags & PIKOIR_UNORDERED; }

@@ -112,6 +112,7 @@ struct alignas(64) Lane : pikoir_writer {
   std::unique_ptr<Deferred> deferred;   ///< If there were any.
   std::vector<pikoir_private> privates; ///< For each reduction of the stage.
   bool reduces = false;                 ///< Some unit of this launch asked.
+  bool selects = false;                 ///< The same, of private images.
 
   /// Frees what a run holds.
   void clear();
@@ -200,6 +201,7 @@ private:
 
 class Serial;         // Serial.h
 struct PrivateCopies; // PrivateCopies.h
+struct PrivateImages; // PrivateImages.h
 
 struct Kernel {
   Kernel();
@@ -238,6 +240,9 @@ struct Kernel {
   size_t activeLanes = 0; ///< The first ones, which threads of this run take.
   /// Of each reduction of the stage; they stay from run to run.
   std::vector<std::unique_ptr<PrivateCopies>> copies;
+  /// Of each selection of the stage; they stay from run to run.
+  std::vector<std::unique_ptr<PrivateImages>> images;
+  int32_t mostThreads = INT32_MAX; ///< That may run this launch.
 
   // On a cycle.
   bool firstRound = true;

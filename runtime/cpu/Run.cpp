@@ -5,6 +5,7 @@
 #include "cpu/Cycle.h"
 #include "cpu/Mirrors.h"
 #include "cpu/PrivateCopies.h"
+#include "cpu/PrivateImages.h"
 #include "cpu/Strips.h"
 
 #include <algorithm>
@@ -173,14 +174,16 @@ static const pikoir_input *begin(pikort_pipeline &p, Kernel &kernel) {
     if (kernel.source < 0) {
       beginClears(p, kernel);
       beginReductions(p, kernel);
+      beginSelections(p, kernel);
     }
     kernel.open = true;
     kernel.cursors.reset(kernel.units, p.threads);
     kernel.input.cursors = &kernel.cursors;
+    int64_t threads = std::min(kernel.mostThreads, p.threads);
     cpuOf(p).activeThreads = kernel.runsSerially
                                  ? 1
                                  : static_cast<int32_t>(std::clamp<int64_t>(
-                                       kernel.input.unit_count, 1, p.threads));
+                                       kernel.input.unit_count, 1, threads));
   });
   if (code == PIKORT_OK && kernel.runsSerially &&
       kernel.positions <= Serial::fewest)
@@ -256,6 +259,7 @@ static int32_t end(pikort_pipeline &p, Kernel &kernel) {
   } else {
     kernel.ended = p.profile.enter(Part::Join);
     endReductions(p, kernel);
+    endSelections(p, kernel);
     endThreads(p, kernel, status);
   }
   cpuOf(p).activeThreads = p.threads;

@@ -146,10 +146,13 @@ public:
   }
 
 private:
-  static int64_t ownerOf(const BinSchedule &schedule) {
-    return schedule.kind == PIKOIR_SERIALIZE    ? firstCore
-           : schedule.kind == PIKOIR_DIRECT_MAP ? unmapped
-                                                : nobody;
+  int64_t ownerOf(const BinSchedule &schedule) const {
+    if (schedule.kind == PIKOIR_SERIALIZE)
+      return firstCore;
+    // A thread that selects takes ascending units, and so none of another's.
+    return schedule.kind == PIKOIR_DIRECT_MAP && stage_.selections.empty()
+               ? unmapped
+               : nobody;
   }
   /// Whether threads may share one of its bins.
   bool splits(const BinSchedule &schedule) const {

@@ -20,7 +20,7 @@ piko.pipeline @P rank 1 {
     piko.process {
     ^bb0(%f: !piko.prim<@F>):
       %x = piko.get %f "x" : !piko.prim<@F> -> i32
-      // expected-remark@+1 {{stage 'a' runs each bin on one thread}}
+      // expected-remark@+1 {{stage 'a' shares no bin by its pixels}}
       piko.update @image[%x : i32] {
       ^bb0(%old: i32):
         piko.yield [%x : i32]

@@ -9,7 +9,7 @@ piko.pipeline @TwoPixels rank 2 {
     ^bb0(%f: !piko.prim<@F>):
       %x = piko.get %f "x" : !piko.prim<@F> -> i32
       %y = piko.get %f "y" : !piko.prim<@F> -> i32
-      // expected-remark @below {{stage 'test' runs each bin on one thread}}
+      // expected-remark @below {{stage 'test' shares no bin by its pixels}}
       piko.update @depth[%x, %y : i32, i32] {
       ^bb0(%a: i32, %b: i32):
         piko.yield [%b, %a : i32, i32]
@@ -38,7 +38,7 @@ piko.pipeline @MovingPixel rank 2 {
       %four = arith.constant 4 : index
       // expected-note @below {{the pixel depends on this, not only on the primitive's fields and on constants}}
       scf.for %i = %zero to %four step %one {
-        // expected-remark @below {{stage 'test' runs each bin on one thread}}
+        // expected-remark @below {{stage 'test' shares no bin by its pixels}}
         piko.update @depth[%i, %i : index, index] {
         ^bb0(%a: i32, %b: i32):
           piko.yield [%b, %a : i32, i32]
@@ -60,7 +60,7 @@ piko.pipeline @List rank 1 {
     piko.process {
     ^bb0(%l: !piko.list<@F>):
       %zero = arith.constant 0 : index
-      // expected-remark @below {{stage 'test' runs each bin on one thread}}
+      // expected-remark @below {{stage 'test' shares no bin by its pixels}}
       piko.update @depth[%zero : index] {
       ^bb0(%a: i32):
         piko.yield [%a : i32]
@@ -84,7 +84,7 @@ piko.pipeline @Iterations rank 1 {
       // expected-note @below {{the pixel depends on this}}
       piko.parallel_for %n {
       ^bb0(%i: index):
-        // expected-remark @below {{stage 'test' runs each bin on one thread}}
+        // expected-remark @below {{stage 'test' shares no bin by its pixels}}
         piko.update @depth[%i : index] {
         ^bb0(%a: i32):
           piko.yield [%a : i32]

@@ -396,6 +396,80 @@ def UnrollAndJam : Pass<"piko-unroll-and-jam", "::piko::PipelineOp"> {
                            "::mlir::scf::SCFDialect"];
 }
 
+def ReduceUpdates : Pass<"piko-reduce-updates", "::mlir::ModuleOp"> {
+  let summary = "Let threads share a bin where updates are reductions";
+  let description = [{
+    **Requires** loops over units (`piko-form-units`).
+
+    **Does**: updates of a pixel run in order of lineage, so that one thread runs a
+    bin that is the whole domain, unless each primitive updates one pixel that is
+    known before (`piko-own-pixels`). Where all that the kernel's updates do is an
+    arg-min reduction, threads share the bin. Each gets images of its own
+    (`piko.cpu.private_images`), and notes in one more, an internal one, by which
+    unit of work a pixel was changed last. When the kernel ends, the runtime
+    selects for each pixel what is first by the key, and among equal keys by the
+    unit, in parallel, by a function that `convert-piko-to-llvm` makes. The first
+    thread has the state itself.
+
+    An update selects if it gives numbers of the pixel other values on one
+    condition, which compares new numbers with those that they replace: `<`, `<=`,
+    `>` and `>=`, and what is compared where they are equal, if that is an integer.
+    What it overwrites without any condition keeps the last. Other images may be
+    overwritten, at the same pixel, where the update says that it has changed
+    something; what is computed there must not fail, and must not leave anything
+    else behind, as it may be done for what another thread's primitives replace.
+
+    Images whose numbers are all changed by one integer operation that commutes and
+    associates, such as a sum, are changed by `piko.atomic` instead, which
+    `piko-privatize` may give private copies.
+
+    **Guarantees** the same bits and the same errors: of what is equal by the key
+    the first in order of lineage is kept, or the last, on any number of threads.
+
+    Before:
+    ```
+    %writer = piko.cpu.open_writer %bins[%unit] : !piko.bins<@Dot>
+    ...
+      %closer = piko.update @depth[%x, %y : i32, i32] in %bin {
+      ^bb0(%old: f32):
+        %less = arith.cmpf olt, %z, %old : f32
+        %new = arith.select %less, %z, %old : f32
+        piko.yield [%new : f32] results [%less : i1]
+      } -> i1
+    ```
+    After:
+    ```
+    %writer = piko.cpu.open_writer %bins[%unit] : !piko.bins<@Dot>
+    %shared = piko.cpu.private_images @depth by [0] ["olt"] carries []
+      keeps [array<i64: 0>] unit @depth.unit of %writer
+    ...
+      %closer = piko.update @depth[%x, %y : i32, i32] in %bin {
+        ...
+      } -> i1
+      scf.if %closer {
+        scf.if %shared {
+          piko.update @depth.unit[%x, %y : i32, i32] in %bin {
+          ^bb0(%old: i32):
+            piko.yield [%u : i32]
+          }
+        }
+      }
+    ```
+
+    **Limits**: phases that take lists, stages that host others, and schedules that
+    serialize stay on one thread. Whether sharing is worth the memory, and the time
+    to combine, is known when the pipeline runs: under a limit of memory, and where
+    few primitives come for a large domain, one thread runs the bin. Remarks say
+    what is selected, and what is in the way.
+  }];
+  let statistics = [
+    Statistic<"reduced", "reduced", "selections that threads share">,
+    Statistic<"atomics", "atomics", "updates that became atomic operations">,
+    Statistic<"refused", "refused", "stages whose only bin one thread runs">];
+  let dependentDialects = ["::mlir::arith::ArithDialect",
+                           "::mlir::scf::SCFDialect"];
+}
+
 def Privatize : Pass<"piko-privatize", "::piko::PipelineOp"> {
   let summary = "Reduce to private copies of state, without locks";
   let description = [{

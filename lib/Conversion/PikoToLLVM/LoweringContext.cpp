@@ -35,7 +35,8 @@ PipelineNumbers::PipelineNumbers(PipelineOp pipeline) : pipeline(pipeline) {
   for (auto record : pipeline->getParentOfType<ModuleOp>().getOps<RecordOp>())
     records[record.getSymNameAttr()] = records.size();
   for (Operation &op : *pipeline.getBodyBlock())
-    if (getStateRecord(&op))
+    if (auto image = dyn_cast<ImageOp>(op);
+        getStateRecord(&op) && !(image && image.getInternal()))
       states[SymbolTable::getSymbolName(&op)] = states.size();
   pipeline.walk([&](StateAccessOpInterface access) {
     FlatSymbolRefAttr state = access.getAccessedState();
@@ -55,6 +56,13 @@ PipelineNumbers::PipelineNumbers(PipelineOp pipeline) : pipeline(pipeline) {
     if (!findReduction(reduction.stage, reduction.state, reduction.field))
       reductions.push_back(reduction);
   });
+  pipeline.walk([&](PrivateImagesOp op) {
+    if (StageOp stage = getKernelStage(op))
+      selections.push_back({stage.getSymNameAttr(),
+                            op.getUnitImageAttr().getAttr(), op.getImages(),
+                            op.getNumbersAttr(), op.getComparisonsAttr(),
+                            op.getKeptAttr(), op.getLast(), op.getOften()});
+  });
 }
 
 std::optional<int32_t> PipelineNumbers::findReduction(StringAttr stage,
@@ -65,6 +73,19 @@ std::optional<int32_t> PipelineNumbers::findReduction(StringAttr stage,
     if (reduction.stage != stage)
       continue;
     if (reduction.state == state && reduction.field == field)
+      return number;
+    ++number;
+  }
+  return std::nullopt;
+}
+
+std::optional<int32_t>
+PipelineNumbers::findSelection(StringAttr stage, StringAttr unitImage) const {
+  int32_t number = 0;
+  for (const ImageSelection &selection : selections) {
+    if (selection.stage != stage)
+      continue;
+    if (selection.unitImage == unitImage)
       return number;
     ++number;
   }
@@ -156,6 +177,13 @@ StateView &LoweringContext::view(OpBuilder &builder, Operation *op,
         builder, loc, builder.getI64Type(),
         createOffset(builder, loc, view, extent + 8 * dim)));
   return it->second;
+}
+
+void LoweringContext::setData(OpBuilder &builder, Operation *op,
+                              StringRef image, StringRef like, Value data) {
+  StateView other = view(builder, op, like);
+  other.data = data;
+  views[op->getParentOfType<func::FuncOp>()][image] = other;
 }
 
 Value LoweringContext::query(OpBuilder &builder, Operation *op,

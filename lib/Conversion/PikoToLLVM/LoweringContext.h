@@ -25,6 +25,15 @@ struct Reduction {
   bool often;
 };
 
+/// What a kernel selects pixels of; see PrivateImagesOp.
+struct ImageSelection {
+  mlir::StringAttr stage, unitImage;
+  llvm::SmallVector<mlir::StringAttr> images;
+  mlir::DenseI64ArrayAttr numbers;
+  mlir::ArrayAttr comparisons, kept;
+  bool last, often;
+};
+
 /// What the runtime calls a pipeline's parts.
 struct PipelineNumbers {
   PipelineOp pipeline;
@@ -34,15 +43,20 @@ struct PipelineNumbers {
   /// Buffers that no kernel uses.
   llvm::DenseSet<mlir::StringAttr> unusedBuffers;
   llvm::SmallVector<Reduction> reductions;
+  llvm::SmallVector<ImageSelection> selections;
 
   explicit PipelineNumbers(PipelineOp pipeline);
   /// The number of a reduction among those of its stage.
   std::optional<int32_t> findReduction(mlir::StringAttr stage,
                                        mlir::StringAttr state,
                                        mlir::StringRef field) const;
+  /// The number of a selection among those of its stage.
+  std::optional<int32_t> findSelection(mlir::StringAttr stage,
+                                       mlir::StringAttr unitImage) const;
 };
 
-/// Data and extent of a piece of state, loaded when a kernel starts.
+/// Data and extent of a piece of state, loaded when a kernel starts; of private
+/// images the data is loaded when a unit starts.
 struct StateView {
   mlir::Value data;
   llvm::SmallVector<mlir::Value> extents; // i64
@@ -82,6 +96,10 @@ public:
   mlir::Value frame(mlir::Operation *op) const;
   StateView &view(mlir::OpBuilder &builder, mlir::Operation *op,
                   mlir::StringRef state);
+  /// Lets all access to an image in the function around an operation go to
+  /// other data; an internal one is as large as `like`.
+  void setData(mlir::OpBuilder &builder, mlir::Operation *op,
+               mlir::StringRef image, mlir::StringRef like, mlir::Value data);
   /// Entry `dim` (i64) of what one of the runtime's queries (the domain, or the
   /// grid of a stage) points to.
   mlir::Value query(mlir::OpBuilder &builder, mlir::Operation *op,
@@ -182,6 +200,10 @@ mlir::Value createBytes(mlir::OpBuilder &builder, mlir::Location loc,
 void declareReductions(mlir::OpBuilder &builder, mlir::Value frame,
                        const PipelineNumbers &numbers,
                        LoweringContext &context);
+/// The same of what kernels select pixels of.
+void declareSelections(mlir::OpBuilder &builder, mlir::Value frame,
+                       const PipelineNumbers &numbers,
+                       LoweringContext &context);
 mlir::LLVM::AtomicBinOp toAtomicBinOp(AtomicKind kind);
 /// What an atomic operation on integers, or on vectors of them, makes of what
 /// was there.
@@ -192,8 +214,8 @@ mlir::Value createChange(mlir::OpBuilder &builder, mlir::Location loc,
 int64_t getRunShift(RecordOp record);
 
 /// Patterns for the storage of bins, for writers, for emissions of lanes, for
-/// state, for checking mode, for approximations, for private copies, and for
-/// the logs of grids.
+/// state, for checking mode, for approximations, for private copies and images,
+/// and for the logs of grids.
 void populateKernelToLLVMPatterns(const mlir::TypeConverter &converter,
                                   mlir::RewritePatternSet &patterns,
                                   LoweringContext &context);
@@ -229,6 +251,9 @@ void populateRowReductionsToLLVMPatterns(const mlir::TypeConverter &converter,
                                          mlir::RewritePatternSet &patterns,
                                          LoweringContext &context);
 void populateReductionsToLLVMPatterns(const mlir::TypeConverter &converter,
+                                      mlir::RewritePatternSet &patterns,
+                                      LoweringContext &context);
+void populateSelectionsToLLVMPatterns(const mlir::TypeConverter &converter,
                                       mlir::RewritePatternSet &patterns,
                                       LoweringContext &context);
 void populateGridToLLVMPatterns(const mlir::TypeConverter &converter,

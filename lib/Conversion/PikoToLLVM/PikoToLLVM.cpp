@@ -188,6 +188,7 @@ LogicalResult ConvertPikoToLLVMPass::convert(PipelineOp pipeline,
   populateApproximationsToLLVMPatterns(converter, patterns, context);
   populateRowReductionsToLLVMPatterns(converter, patterns, context);
   populateReductionsToLLVMPatterns(converter, patterns, context);
+  populateSelectionsToLLVMPatterns(converter, patterns, context);
   populateGridToLLVMPatterns(converter, patterns, context);
   FrozenRewritePatternSet frozen(std::move(patterns));
   for (func::FuncOp function : functions)

@@ -356,6 +356,7 @@ void SetupWriter::run(ProgramOp program) {
   for (auto counter : pipeline.getOps<CounterOp>())
     declareCounter(counter);
   declareReductions(builder, frame, numbers, context);
+  declareSelections(builder, frame, numbers, context);
   declareRoots(program);
   program.walk<WalkOrder::PreOrder>([&](Operation *op) {
     if (auto join = dyn_cast<JoinOp>(op))

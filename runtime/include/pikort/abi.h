@@ -193,6 +193,20 @@ PIKORT_API void pikoir_declare_private(pikort_pipeline *p, int32_t stage,
                                        int32_t copy, int32_t state,
                                        const void *identity, int32_t run_shift,
                                        int32_t often, pikoir_combine combine);
+/// Selects, for pixels [begin, end), between two threads' images, of which each
+/// array has the first pixels, and behind them those of the units (int32_t, -1
+/// = none) that pixels are of: what comes first by the key, and of equal keys
+/// by the unit, or last, is in `to` then.
+typedef void (*pikoir_select)(uint8_t *const *to, uint8_t *const *from,
+                              int64_t begin, int64_t end);
+/// All that the kernel of a stage of one bin, ORDERED and SPLIT, does to so
+/// many images is to select what their pixels keep, by a key in the first one:
+/// selection number `selection` of the stage's, from 0. `often`: a primitive
+/// changes many pixels.
+PIKORT_API void pikoir_declare_selection(pikort_pipeline *p, int32_t stage,
+                                         int32_t selection,
+                                         const int32_t *images, int32_t count,
+                                         int32_t often, pikoir_select select);
 /// `stage` waits until `waits_for` is finished (endStage): for checking mode.
 PIKORT_API void pikoir_declare_wait(pikort_pipeline *p, int32_t stage,
                                     int32_t waits_for);
@@ -382,6 +396,12 @@ typedef struct pikoir_private {
 
 PIKORT_API const pikoir_private *pikoir_get_private(pikoir_writer *writer,
                                                     int32_t copy);
+
+/// The images of a selection that a unit changes in place of the state, as
+/// pikoir_select takes them. Without a place for units one thread runs the bin,
+/// and changes the state itself. Valid until pikoir_close.
+PIKORT_API uint8_t *const *pikoir_get_images(pikoir_writer *writer,
+                                             int32_t selection);
 
 /// The AssignBin kernel of a source whose consumer is PLACED. The primitives
 /// stay where the host has them. There is one pikoir_next for each.

@@ -37,6 +37,9 @@ piko.pipeline @Kernels rank 2 {
 // CHECK-LABEL: piko.pipeline @Resolved
 piko.pipeline @Resolved rank 2 {
   piko.buffer @counts : @F
+  piko.image @shown : @F rank 2
+  // CHECK: piko.image @shown.unit : @F rank 2 internal
+  piko.image @shown.unit : @F rank 2 internal
   piko.source @a
   piko.edge @a[0] -> @b
   piko.stage @a bins [8, 8] threads 64 : @F -> [@F] {}
@@ -78,6 +81,7 @@ piko.pipeline @Resolved rank 2 {
     // CHECK-NEXT: %[[COPY:.*]] = piko.cpu.private_copy add @counts "x" of %[[W]]{{$}}
     // CHECK-NEXT: piko.cpu.private_copy and @counts "x" of %[[W]] often
     // CHECK-NEXT: piko.atomic add checked @counts[%[[AT]] : index] "x", %[[X]] in %[[COPY]] : i32
+    // CHECK-NEXT: piko.cpu.private_images @shown by [0] ["slt"] last carries [] keeps [array<i64: 0>] unit @shown.unit of %[[W]] often
     %bins = piko.storage.open_bins @a : !piko.bins<@F>
     %u = piko.storage.unit_count %bins : !piko.bins<@F>
     %c0, %c1 = piko.storage.unit_cells %bins[%u] : !piko.bins<@F>
@@ -96,6 +100,7 @@ piko.pipeline @Resolved rank 2 {
     %c = piko.cpu.private_copy add @counts "x" of %w
     %d = piko.cpu.private_copy and @counts "x" of %w often
     piko.atomic add checked @counts[%i0 : index] "x", %x in %c : i32
+    %shared = piko.cpu.private_images @shown by [0] ["slt"] last carries [] keeps [array<i64: 0>] unit @shown.unit of %w often
   }
 }
 

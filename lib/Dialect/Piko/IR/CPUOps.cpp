@@ -209,6 +209,68 @@ LogicalResult PrivateCopyOp::verifySymbolUses(SymbolTableCollection &) {
   return success();
 }
 
+SmallVector<StringAttr> PrivateImagesOp::getImages() {
+  SmallVector<StringAttr> images{getImageAttr().getAttr()};
+  for (auto image : getCarried().getAsRange<FlatSymbolRefAttr>())
+    images.push_back(image.getAttr());
+  return images;
+}
+
+/// Whether a comparison is of that type, and says which of two numbers is
+/// before the other: never both, and neither of equal ones.
+static bool isBefore(StringRef comparison, Type type) {
+  if (isa<FloatType>(type))
+    return comparison == "olt" || comparison == "ogt";
+  return comparison == "slt" || comparison == "sgt" || comparison == "ult" ||
+         comparison == "ugt";
+}
+
+LogicalResult PrivateImagesOp::verifySymbolUses(SymbolTableCollection &) {
+  auto unit = lookupInPipeline<ImageOp>(*this, getUnitImageAttr());
+  RecordOp record =
+      unit ? lookupRecord(unit, unit.getRecordAttr()) : RecordOp();
+  if (!record || !unit.getInternal() ||
+      !llvm::equal(record.getElementTypes(),
+                   ArrayRef<Type>{IntegerType::get(getContext(), 32)}))
+    return emitOpError("expected an internal image of one i32, but got ")
+           << getUnitImageAttr();
+  SmallVector<StringAttr> images = getImages();
+  if (getKept().size() != images.size())
+    return emitOpError("expected the numbers kept of ")
+           << images.size() << " images, but got those of " << getKept().size();
+  SmallVector<Type> keyTypes;
+  for (auto [name, kept] :
+       llvm::zip(images, getKept().getAsRange<DenseI64ArrayAttr>())) {
+    auto symbol = FlatSymbolRefAttr::get(name);
+    auto image = lookupInPipeline<ImageOp>(*this, symbol);
+    RecordOp pixel =
+        image ? lookupRecord(image, image.getRecordAttr()) : RecordOp();
+    if (!pixel || image.getInternal())
+      return emitOpError("expected an image of the pipeline's, but got ")
+             << symbol;
+    SmallVector<Type> types = pixel.getElementTypes();
+    for (int64_t number : kept.asArrayRef())
+      if (number < 0 || number >= static_cast<int64_t>(types.size()))
+        return emitOpError("expected numbers of ")
+               << image.getRecordAttr() << ", but got " << number;
+    if (keyTypes.empty())
+      keyTypes = std::move(types);
+  }
+  if (getNumbers().size() != getComparisons().size())
+    return emitOpError("expected a comparison for each number of a key");
+  ArrayRef<int64_t> kept = cast<DenseI64ArrayAttr>(getKept()[0]).asArrayRef();
+  for (auto [number, comparison] :
+       llvm::zip(getNumbers(), getComparisons().getAsRange<StringAttr>())) {
+    if (!llvm::is_contained(kept, number))
+      return emitOpError("expected a key of numbers that are kept, but got ")
+             << number;
+    if (!isBefore(comparison, keyTypes[number]))
+      return emitOpError("expected a strict comparison of ")
+             << keyTypes[number] << ", but got " << comparison;
+  }
+  return success();
+}
+
 LogicalResult AppendOp::verifySymbolUses(SymbolTableCollection &) {
   FlatSymbolRefAttr name = getPrim().getType().getRecord();
   RecordOp record = lookupRecord(*this, name);

@@ -507,6 +507,51 @@ def Piko_PrivateCopyOp : Piko_CPUOp<"private_copy", [
   }];
 }
 
+def Piko_PrivateImagesOp : Piko_CPUOp<"private_images", [
+    DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
+  let summary = "images of which a unit of work has its thread's own";
+  let description = [{
+    All that the kernel does to the first image is to select, for each pixel, what
+    is first by a key (an arg-min reduction): an `update` keeps the new numbers
+    where they are before the old ones, and carried images are overwritten where it
+    did. Numbers of a record are counted from 0, fields in order. `by` names those
+    of the key, the most significant first, and for each the comparison by which a
+    new one is before an old one; of equal keys the first in order of lineage is
+    kept, or the `last`. `keeps` has the numbers that change, of the first image
+    and of each carried one.
+
+    Threads share the bin: each has these images for itself, and keeps in the
+    internal image `unit` the unit of what it selected there. When the kernel ends,
+    the runtime selects among them, and of equal keys by the unit. One of the
+    threads uses the state itself. All of the unit's access to these images goes to
+    its own. The result is whether threads share the bin at all: if it is false,
+    one thread runs all units, and nothing need be kept in the internal image.
+
+    `often` says that a primitive updates many pixels.
+
+    ```mlir
+    %writer = piko.cpu.open_writer %bins[%unit] : !piko.bins<@Fragment>
+    %shared = piko.cpu.private_images @depth by [0] ["olt"] carries []
+      keeps [array<i64: 0>] unit @depth.unit of %writer often
+    ```
+  }];
+  let arguments = (ins FlatSymbolRefAttr:$image, DenseI64ArrayAttr:$numbers,
+                       StrArrayAttr:$comparisons, UnitAttr:$last,
+                       FlatSymbolRefArrayAttr:$carried,
+                       TypedArrayAttrBase<DenseI64ArrayAttr, "lists of numbers">:$kept,
+                       FlatSymbolRefAttr:$unitImage, Piko_WriterType:$writer,
+                       UnitAttr:$often);
+  let results = (outs I1:$shared);
+  let assemblyFormat = [{
+    $image `by` $numbers $comparisons (`last` $last^)? `carries` $carried
+    `keeps` $kept `unit` $unitImage `of` $writer (`often` $often^)? attr-dict
+  }];
+  let extraClassDeclaration = [{
+    /// The first image, and those that are carried.
+    ::llvm::SmallVector<::mlir::StringAttr> getImages();
+  }];
+}
+
 include "Piko/Dialect/Piko/IR/PikoLaneOps.td"
 
 #endif // PIKO_DIALECT_PIKO_IR_PIKOCPUOPS_TD

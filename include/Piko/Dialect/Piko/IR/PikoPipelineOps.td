@@ -136,6 +136,8 @@ def Piko_ImageOp : Piko_StateOp<"image"> {
   let description = [{
     At the start of each run every pixel is set to the `clear` value, one
     number for each number of the record, or to zeros where there is none.
+    An `internal` image is no state of the pipeline's: threads have it for
+    themselves (`piko.cpu.private_images`).
 
     ```mlir
     piko.record @Depth {"z" : f32 at 0} size 4 align 4
@@ -146,9 +148,10 @@ def Piko_ImageOp : Piko_StateOp<"image"> {
   }];
   let arguments = (ins SymbolNameAttr:$sym_name, FlatSymbolRefAttr:$record,
                        ConfinedAttr<Piko_I64Attr, [IntMinValue<1>, IntMaxValue<4>]>:$rank,
-                       OptionalAttr<ArrayAttr>:$clear);
+                       OptionalAttr<ArrayAttr>:$clear, UnitAttr:$internal);
   let assemblyFormat = [{
-    $sym_name `:` $record `rank` $rank (`clear` $clear^)? attr-dict
+    $sym_name `:` $record `rank` $rank (`clear` $clear^)? (`internal` $internal^)?
+    attr-dict
   }];
 }
 

@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+#include "CommutingUpdates.h"
+
+#include "PixelSelection.h"
+#include "SplitUpdate.h"
+
+#include "Piko/Dialect/Piko/IR/BinArithmetic.h"
+#include "Piko/Dialect/Piko/IR/Marks.h"
+
+#include "mlir/Dialect/Arith/IR/Arith.h"
+#include "mlir/Dialect/SCF/IR/SCF.h"
+#include "mlir/IR/PatternMatch.h"
+#include "llvm/ADT/MapVector.h"
+#include "llvm/ADT/TypeSwitch.h"
+
+using namespace mlir;
+using namespace piko;
+
+using Change = CommutingUpdate::Change;
+
+/// The atomic operation that an operation on the old number is.
+static std::optional<AtomicKind> getKind(Operation *op, Value old) {
+  bool isLeft = op->getNumOperands() == 2 && op->getOperand(0) == old;
+  using Kind = std::optional<AtomicKind>;
+  return llvm::TypeSwitch<Operation *, Kind>(op)
+      .Case([](arith::AddIOp) { return AtomicKind::Add; })
+      .Case([&](arith::SubIOp) {
+        return isLeft ? Kind(AtomicKind::Add) : std::nullopt;
+      })
+      .Case([](arith::AndIOp) { return AtomicKind::And; })
+      .Case([](arith::OrIOp) { return AtomicKind::Or; })
+      .Case([](arith::XOrIOp) { return AtomicKind::Xor; })
+      .Case([](arith::MinSIOp) { return AtomicKind::MinS; })
+      .Case([](arith::MaxSIOp) { return AtomicKind::MaxS; })
+      .Case([](arith::MinUIOp) { return AtomicKind::MinU; })
+      .Case([](arith::MaxUIOp) { return AtomicKind::MaxU; })
+      .Default(std::nullopt);
+}
+
+/// How an update changes a number by an operation on it alone.
+static std::optional<Change> getChange(UpdateOp update, unsigned number) {
+  Block &body = update.getBody().front();
+  auto yield = cast<YieldOp>(body.getTerminator());
+  Value old = body.getArgument(number), value = yield.getPixel()[number];
+  Change change{number, AtomicKind::Add, nullptr, Value(), Value()};
+  if (std::optional<Choice> choice = getChoice(value, old)) {
+    value = choice->value;
+    // In a branch the operation stands where the condition holds.
+    if (choice->condition &&
+        isa<arith::SelectOp>(yield.getPixel()[number].getDefiningOp())) {
+      change.condition = choice->condition;
+      change.outcome = choice->outcome;
+    }
+  }
+  change.op = value.getDefiningOp();
+  if (!change.op || !update.getBody().isAncestor(change.op->getParentRegion()))
+    return std::nullopt;
+  std::optional<AtomicKind> kind = getKind(change.op, old);
+  if (!kind || !llvm::is_contained(change.op->getOperands(), old) ||
+      !(value.getType().isInteger(32) || value.getType().isInteger(64)))
+    return std::nullopt;
+  change.kind = *kind;
+  change.value = change.op->getOperand(change.op->getOperand(0) == old);
+  for (Value used : {change.value, change.condition})
+    if (used && dependsOnPixel(used, update))
+      return std::nullopt;
+  return change;
+}
+
+static std::optional<CommutingUpdate> readUpdate(UpdateOp update) {
+  if (!llvm::all_of(update.getResults(),
+                    [](Value result) { return result.use_empty(); }))
+    return std::nullopt;
+  CommutingUpdate commuting{update, {}};
+  Block &body = update.getBody().front();
+  auto yield = cast<YieldOp>(body.getTerminator());
+  for (auto [number, old] : llvm::enumerate(body.getArguments())) {
+    if (yield.getPixel()[number] == old)
+      continue;
+    std::optional<Change> change = getChange(update, number);
+    if (!change)
+      return std::nullopt;
+    commuting.changes.push_back(*change);
+  }
+  return commuting;
+}
+
+SmallVector<CommutingUpdate> piko::findCommutingUpdates(KernelOp kernel) {
+  llvm::MapVector<StringAttr, SmallVector<CommutingUpdate>> images;
+  llvm::DenseMap<std::pair<StringAttr, unsigned>, AtomicKind> kinds;
+  llvm::DenseSet<StringAttr> others; // images that change in other ways, too
+  kernel.walk([&](UpdateOp update) {
+    StringAttr image = update.getImageAttr().getAttr();
+    std::optional<CommutingUpdate> commuting = readUpdate(update);
+    if (!commuting) {
+      others.insert(image);
+      return;
+    }
+    for (const Change &change : commuting->changes)
+      if (kinds.try_emplace({image, change.number}, change.kind)
+              .first->second != change.kind)
+        others.insert(image);
+    images[image].push_back(*commuting);
+  });
+  SmallVector<CommutingUpdate> found;
+  for (auto &[image, updates] : images)
+    if (!others.contains(image))
+      llvm::append_range(found, updates);
+  return found;
+}
+
+//===----------------------------------------------------------------------===//
+// Rewriting
+//===----------------------------------------------------------------------===//
+
+/// The field of a record's number, and which element of it that is.
+static std::pair<FieldAttr, int64_t> findField(RecordOp record,
+                                               unsigned number) {
+  int64_t rest = number;
+  for (auto field : record.getFields().getAsRange<FieldAttr>()) {
+    if (rest < field.getElementCount())
+      return {field, rest};
+    rest -= field.getElementCount();
+  }
+  llvm_unreachable("a number of the record");
+}
+
+static void createAtomic(OpBuilder &builder, UpdateOp update, RecordOp record,
+                         ArrayRef<Value> at, const Change &change) {
+  Location loc = change.op->getLoc();
+  auto [field, element] = findField(record, change.number);
+  SmallVector<Value> elements(field.getCounts().size());
+  for (auto [index, count] :
+       llvm::reverse(llvm::zip(elements, field.getCounts()))) {
+    index = arith::ConstantIndexOp::create(builder, loc, element % count);
+    element /= count;
+  }
+  Value value = change.value;
+  if (isa<arith::SubIOp>(change.op)) {
+    Value zero = arith::ConstantOp::create(
+        builder, loc, builder.getZeroAttr(value.getType()));
+    value = arith::SubIOp::create(builder, loc, zero, value);
+  }
+  AtomicOp::create(builder, loc, Type(), change.kind, update.getImage(), at,
+                   field.getName(), elements, value, /*checked=*/true,
+                   update.getOfAttr(), /*copy=*/Value());
+}
+
+/// A region that runs where the pixel is in the bin; elsewhere the run fails.
+static scf::IfOp createTest(OpBuilder &builder, UpdateOp update,
+                            BinArithmetic &bins, ArrayRef<Value> at) {
+  Location loc = update.getLoc();
+  SmallVector<Value> lo, hi;
+  for (int64_t dim = 0, e = at.size(); dim < e; ++dim) {
+    lo.push_back(bins.lo(update.getBin(), dim));
+    hi.push_back(bins.hi(update.getBin(), dim));
+  }
+  auto test = scf::IfOp::create(builder, loc, bins.isInside(at, lo, hi),
+                                /*withElse=*/true);
+  OpBuilder otherwise = test.getElseBodyBuilder();
+  FailOp::create(otherwise, loc, getKernelStage(update).getSymName(),
+                 update.getImage(), at, /*outside_bin=*/true,
+                 findBin(otherwise, update), update.getOfAttr());
+  return test;
+}
+
+void piko::makeAtomic(CommutingUpdate &commuting) {
+  UpdateOp update = commuting.update;
+  IRRewriter builder(update);
+  Location loc = update.getLoc();
+  BinArithmetic bins(builder, loc, getKernelStage(update));
+  SmallVector<Value> at =
+      llvm::map_to_vector(update.getCoordinates(),
+                          [&](Value value) { return bins.toIndex(value); });
+  if (!update->hasAttr(marks::inside)) {
+    scf::IfOp test = createTest(builder, update, bins, at);
+    update->moveBefore(test.thenBlock()->getTerminator());
+    builder.setInsertionPoint(update);
+  }
+  auto image = lookupInPipeline<ImageOp>(update, update.getImageAttr());
+  RecordOp record = lookupRecord(image, image.getRecordAttr());
+  Block &body = update.getBody().front();
+  Operation *yield = body.getTerminator();
+  for (const Change &change : commuting.changes) {
+    if (!change.condition) {
+      builder.setInsertionPoint(change.op);
+      createAtomic(builder, update, record, at, change);
+      continue;
+    }
+    builder.setInsertionPoint(yield);
+    auto branch = scf::IfOp::create(builder, loc, change.condition,
+                                    /*withElse=*/true);
+    OpBuilder inside = change.outcome ? branch.getThenBodyBuilder()
+                                      : branch.getElseBodyBuilder();
+    createAtomic(inside, update, record, at, change);
+  }
+  // What is left of the old numbers is not used.
+  builder.setInsertionPoint(update);
+  SmallVector<Value> nothing;
+  for (Value old : body.getArguments())
+    nothing.push_back(arith::ConstantOp::create(
+        builder, loc, builder.getZeroAttr(old.getType())));
+  builder.eraseOp(yield);
+  builder.inlineBlockBefore(&body, update, nothing);
+  builder.eraseOp(update);
+}

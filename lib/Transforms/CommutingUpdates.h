@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Updates whose order does not show, as sums of integers: atomic operations.
+
+#ifndef PIKO_LIB_TRANSFORMS_COMMUTINGUPDATES_H
+#define PIKO_LIB_TRANSFORMS_COMMUTINGUPDATES_H
+
+#include "Piko/Dialect/Piko/IR/Piko.h"
+
+#include "llvm/ADT/DenseMap.h"
+
+namespace piko {
+
+/// An update that changes each number by an operation that commutes and
+/// associates, with something that has nothing to do with the pixel.
+struct CommutingUpdate {
+  struct Change {
+    unsigned number; ///< Of the record, fields in order.
+    AtomicKind kind;
+    mlir::Operation *op; ///< That changes it, in the update; or a subtraction.
+    mlir::Value value;   ///< What by.
+    mlir::Value condition; ///< On which; null = always.
+    bool outcome = true;   ///< Of the condition.
+  };
+  UpdateOp update;
+  llvm::SmallVector<Change> changes;
+};
+
+/// Of all images of a kernel that it changes by nothing but such updates, each
+/// number by one kind of operation, the updates.
+llvm::SmallVector<CommutingUpdate> findCommutingUpdates(KernelOp kernel);
+
+/// Makes an update atomic operations, behind a test of the pixel.
+void makeAtomic(CommutingUpdate &update);
+
+} // namespace piko
+
+#endif // PIKO_LIB_TRANSFORMS_COMMUTINGUPDATES_H
