@@ -60,10 +60,11 @@ def NormalizeLoops : Pass<"piko-normalize-loops"> {
     **Requires** nothing in particular; it works on `scf` in any operation.
 
     **Does**: exchanges the arms of an `scf.if` whose first does nothing; makes an
-    `scf.if` of an `scf.index_switch` of a truth value; makes truth values of the flags that arms yield as numbers, and conjunctions of
-    those that an arm yields where the other yields false, if they can be
-    computed in front; moves what stands in an `scf.if` with the loop's own
-    condition, in front of that condition, behind it.
+    `scf.if` of an `scf.index_switch` of a truth value; makes truth values of the
+    flags that arms yield as numbers, and conjunctions of those that an arm yields
+    where the other yields false, if they can be computed in front; moves what
+    stands in an `scf.if` with the loop's own condition, in front of that
+    condition, behind it.
 
     **Guarantees** the same effects in the same order. Loops that were made of
     branches, with `<=`, with `break` or `continue`, then look like those with a

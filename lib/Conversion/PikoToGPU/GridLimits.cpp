@@ -36,14 +36,9 @@ LogicalResult piko::checkGridLimits(KernelOp kernel) {
     if (auto loop = dyn_cast<ParallelLoopOpInterface>(op);
         loop && failed(checkParallelLoop(loop)))
       return WalkResult::interrupt();
-    if (hasOtherBitsInPTX(op)) {
-      InFlightDiagnostic error = op->emitError("a kernel for a GPU uses '")
-                                 << op->getName()
-                                 << "', which has other bits there";
-      if (isa<arith::RemFOp>(op))
-        error << "; in place of std::fmod, a - b * trunc(a / b) may do";
-      return WalkResult::interrupt();
-    }
+    if (hasOtherBitsInPTX(op))
+      return op->emitError("a kernel for a GPU uses '")
+             << op->getName() << "', which has other bits there";
     return WalkResult::advance();
   });
   return failure(result.wasInterrupted());

@@ -490,6 +490,7 @@ LogicalResult ConvertPikoToGPUPass::convert(KernelOp kernel) {
   }
   auto stage = lookupInPipeline<StageOp>(kernel, getStageName(work));
   int64_t count = threads ? threads : chooseThreads(stage);
+  expandRemainders(kernel);
   if (failed(checkGridLimits(kernel)))
     return failure();
   ++grids;

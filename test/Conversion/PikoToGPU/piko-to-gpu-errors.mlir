@@ -24,25 +24,6 @@ piko.pipeline @Function rank 1 {
 
 // -----
 
-piko.record @F {"x" : f32 at 0} size 4 align 4
-piko.pipeline @Remainder rank 1 {
-  piko.buffer @out : @F
-  piko.source @a
-  piko.stage @a bins [0] threads 8 : @F -> [] {
-    piko.process {
-    ^bb0(%f: !piko.prim<@F>):
-      %x = piko.get %f "x" : !piko.prim<@F> -> f32
-      // expected-error @below {{a kernel for a GPU uses 'arith.remf', which has other bits there; in place of std::fmod, a - b * trunc(a / b) may do}}
-      %r = arith.remf %x, %x : f32
-      %zero = arith.constant 0 : index
-      piko.store %r, @out[%zero : index] "x" : f32
-      piko.return
-    }
-  }
-}
-
-// -----
-
 // Only the thread of a pixel knows whether an update of it passed.
 piko.record @F {"x" : i32 at 0} size 4 align 4
 piko.pipeline @Outcome rank 1 {
