@@ -5,10 +5,10 @@
 #include "Piko/Driver/ObjectCompiler.h"
 
 #include "HeaderWriter.h"
+#include "ObjectRequest.h"
 #include "Piko/Driver/Compiler.h"
 #include "Piko/Driver/Diagnostics.h"
 #include "Piko/Frontend/HostCompiler.h"
-#include "Piko/Target/Assembler.h"
 #include "Piko/Target/Object.h"
 #include "Piko/Target/Versions.h"
 #include "SourceCache.h"
@@ -68,44 +68,6 @@ static Entry readEntry(llvm::StringRef bytes) {
   while (!reader.atEnd())
     entry.object.files.push_back(reader.next());
   return entry;
-}
-
-/// All that decides what is compiled, but for what is read from files.
-static std::string makeRequest(const ObjectOptions &options,
-                               llvm::ArrayRef<Processor> processors,
-                               llvm::vfs::FileSystem &files) {
-  KeyBuilder key;
-  addSurroundings(key);
-  addFolder(key, files);
-  const CompileOptions &source = options.source;
-  key.add(source.file).add(source.pipeName).add(source.text.value_or(""));
-  for (const auto *list :
-       {&source.includeDirs, &source.defines, &source.check.numbers,
-        &source.synthesis.without, &source.synthesis.fix,
-        &source.synthesis.directives}) {
-    key.add(std::to_string(list->size()));
-    for (const std::string &item : *list)
-      key.add(item);
-  }
-  key.add(std::to_string(source.tunables.size()));
-  for (const auto &[name, value] : source.tunables)
-    key.add(name).add(value);
-  key.add(std::to_string(processors.size()));
-  for (const Processor &processor : processors)
-    key.add(processor.name).add(processor.features);
-  for (int number : {int(source.text.has_value()), int(source.check.enabled),
-                     int(options.execution), options.target.optLevel,
-                     int(options.target.sanitizer), int(options.remarks),
-                     int(options.allPipelines), int(source.gpu.target),
-                     int(source.synthesis.count), int(source.gpu.seed),
-                     int(source.gpu.blocks), int(source.gpu.threads)})
-    key.add(std::to_string(number));
-  key.add(source.gpu.chip).add(options.nameSpace).add(getRuntimeIncludeDir());
-  for (const std::string &chip : source.gpu.cubins)
-    key.add(chip);
-  if (!source.gpu.cubins.empty())
-    key.add(getAssemblerIdentity(findAssembler()));
-  return key.finish();
 }
 
 //===----------------------------------------------------------------------===//
@@ -329,7 +291,7 @@ std::optional<CompiledObject> piko::compileObject(const ObjectOptions &given,
   SourceCache cache(options.source.cache);
   std::string request;
   if (cache.isEnabled()) {
-    request = makeRequest(options, *processors, *files);
+    request = makeObjectRequest(options, *processors, *files);
     if (std::optional<std::string> found = cache.lookUp(request, *files)) {
       Entry entry = readEntry(*found);
       diagnostics += entry.diagnostics;
