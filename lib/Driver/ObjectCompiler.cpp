@@ -34,6 +34,8 @@ namespace {
 /// An object and what was said when it was made.
 struct Entry {
   CompiledObject object;
+  /// Whether there is to be code of piko.h, which is kept apart.
+  bool needsHeader = false;
   std::string diagnostics;
 };
 
@@ -47,7 +49,7 @@ static std::string writeEntry(const Entry &entry) {
   StringWriter writer;
   const CompiledObject &object = entry.object;
   writer.add(object.symbol).add(object.code).add(object.header);
-  writer.add(entry.diagnostics);
+  writer.add(entry.diagnostics).add(entry.needsHeader ? "header" : "");
   writer.add(std::to_string(object.pipelines.size()));
   for (const auto *list : {&object.pipelines, &object.files})
     for (const std::string &item : *list)
@@ -61,6 +63,7 @@ static Entry readEntry(llvm::StringRef bytes) {
   for (std::string *part : {&entry.object.symbol, &entry.object.code,
                             &entry.object.header, &entry.diagnostics})
     *part = reader.next();
+  entry.needsHeader = !reader.next().empty();
   size_t pipelines = 0;
   llvm::to_integer(reader.next(), pipelines);
   while (!reader.atEnd() && entry.object.pipelines.size() < pipelines)
@@ -189,7 +192,8 @@ describePipelines(const ObjectOptions &options, FrontendOptions frontend,
 static std::unique_ptr<llvm::Module>
 compileReference(const ObjectOptions &options, const Files &files,
                  MLIRContext &context, llvm::LLVMContext &llvmContext,
-                 CompiledObject &object) {
+                 Entry &entry) {
+  CompiledObject &object = entry.object;
   const std::string &file = options.source.file;
   if (llvm::StringRef(file).ends_with(".mlir")) {
     emitError(FileLineColLoc::get(&context, file, 1, 1))
@@ -214,16 +218,70 @@ compileReference(const ObjectOptions &options, const Files &files,
   for (const PipelineDescription &pipeline : pipelines)
     object.pipelines.push_back(pipeline.name);
   object.symbol = referenceEntry;
-  std::unique_ptr<llvm::Module> module = compileForHost(
+  HostCode host = compileForHost(
       generateReferenceAdapter(pipelines, file), file, frontend,
       /*optimize=*/options.target.optLevel > 0, llvmContext, context);
-  // It is all of the program's text: to look up thousands of templates by name
-  // would take most of the time that loading it takes.
-  if (module)
-    llvm::internalizeModule(*module, [](const llvm::GlobalValue &value) {
-      return value.getName() == referenceEntry;
+  entry.needsHeader = host.needsHeader;
+  // No function is called from elsewhere: to look up thousands of templates by
+  // name would take most of the time that loading them takes.
+  if (host.module)
+    llvm::internalizeModule(*host.module, [&](const llvm::GlobalValue &value) {
+      return value.getName() == referenceEntry ||
+             (host.needsHeader && llvm::isa<llvm::GlobalVariable>(value));
     });
-  return module;
+  return std::move(host.module);
+}
+
+static TargetOptions getTarget(const ObjectOptions &options) {
+  TargetOptions target = options.target.leaveOut(options.source.synthesis);
+  if (options.execution == ExecutionTarget::Reference)
+    // Its code is big, and runs a few times.
+    target.optLevel = std::min(target.optLevel, 1);
+  return target;
+}
+
+/// The C++ library's own thread-local variables are out of JITCode's reach. Not
+/// to find them is an error of the file that uses them, not of piko.h.
+static void weakenThreadLocals(llvm::Module &module) {
+  for (llvm::GlobalVariable &variable : module.globals())
+    if (variable.isDeclaration() && variable.isThreadLocal())
+      variable.setLinkage(llvm::GlobalValue::ExternalWeakLinkage);
+}
+
+/// Without a section for each function, of which JITCode is slow to take
+/// thousands.
+static void joinSections(llvm::Module &module) {
+  for (llvm::Function &function : module)
+    if (!function.isDeclaration() && !function.hasLocalLinkage()) {
+      function.setComdat(nullptr);
+      function.setLinkage(llvm::GlobalValue::ExternalLinkage);
+    }
+}
+
+/// Finds or makes the code of piko.h that an entry needs; false after
+/// diagnostics.
+static bool addHeaderCode(const ObjectOptions &options,
+                          const Processor &processor, const Files &files,
+                          CompiledObject &object, std::string &diagnostics) {
+  MLIRContext context;
+  llvm::raw_string_ostream stream(diagnostics);
+  DiagnosticPrinter printer(context, stream);
+  FrontendOptions frontend = getFrontendOptions(options.source);
+  frontend.files = files;
+  auto generate = [&](llvm::Module &module) -> std::optional<std::string> {
+    weakenThreadLocals(module);
+    joinSections(module);
+    llvm::Expected<std::string> code =
+        generateCode(module, getTarget(options), CodeFormat::Object);
+    if (code)
+      return std::move(*code);
+    stream << "error: " << llvm::toString(code.takeError()) << "\n";
+    return std::nullopt;
+  };
+  std::optional<std::string> code = getHeaderCode(
+      frontend, processor.name + processor.features, generate, context);
+  object.headerCode = code.value_or("");
+  return code.has_value();
 }
 
 /// Fills an entry but for its files; false after diagnostics, which are there
@@ -242,15 +300,13 @@ static bool compile(const ObjectOptions &options,
   bool isReference = options.execution == ExecutionTarget::Reference;
   std::unique_ptr<llvm::Module> module =
       isReference
-          ? compileReference(options, files, context, llvmContext, entry.object)
+          ? compileReference(options, files, context, llvmContext, entry)
           : compilePipeline(options, processors, files, context, llvmContext,
                             entry.object);
   if (!module)
     return false;
-  TargetOptions target = options.target.leaveOut(options.source.synthesis);
-  if (isReference) // whose code is big, and runs a few times
-    target.optLevel = std::min(target.optLevel, 1);
-  else // whose functions say what they are for
+  TargetOptions target = getTarget(options);
+  if (!isReference) // whose functions say what they are for
     target.cpu = getBaseProcessor(module->getTargetTriple());
   llvm::Expected<std::string> code =
       generateCode(*module, target, CodeFormat::Object);
@@ -288,6 +344,12 @@ std::optional<CompiledObject> piko::compileObject(const ObjectOptions &given,
     return std::nullopt;
   }
   Files files = openFiles(options.source);
+  auto finish = [&](Entry &entry) -> std::optional<CompiledObject> {
+    if (entry.needsHeader && !addHeaderCode(options, processors->front(), files,
+                                            entry.object, diagnostics))
+      return std::nullopt;
+    return std::move(entry.object);
+  };
   SourceCache cache(options.source.cache);
   std::string request;
   if (cache.isEnabled()) {
@@ -295,7 +357,7 @@ std::optional<CompiledObject> piko::compileObject(const ObjectOptions &given,
     if (std::optional<std::string> found = cache.lookUp(request, *files)) {
       Entry entry = readEntry(*found);
       diagnostics += entry.diagnostics;
-      return std::move(entry.object);
+      return finish(entry);
     }
   }
   auto recorder = llvm::makeIntrusiveRefCnt<SourceRecorder>(files);
@@ -306,10 +368,10 @@ std::optional<CompiledObject> piko::compileObject(const ObjectOptions &given,
     return std::nullopt;
   entry.object.files = recorder->getFiles();
   if (!cache.isEnabled())
-    return std::move(entry.object);
+    return finish(entry);
   if (llvm::Error error = cache.keep(request, *recorder, writeEntry(entry)))
     diagnostics += "warning: cannot write to the cache '" +
                    cache.getDirectory() +
                    "': " + llvm::toString(std::move(error)) + "\n";
-  return std::move(entry.object);
+  return finish(entry);
 }

@@ -69,7 +69,7 @@ static std::unique_ptr<LoadedProgram> load(CompileOptions source,
     diagnostics += "error: " + llvm::toString(std::move(error)) + "\n";
     return nullptr;
   };
-  auto code = JITCode::load(object->code);
+  auto code = JITCode::load({object->code, object->headerCode});
   if (!code)
     return fail(code.takeError());
   auto program = findProgram(**code, object->symbol, options.target);

@@ -32,6 +32,9 @@ struct CompiledObject {
   /// address of one.
   std::string symbol;
   std::string code;
+  /// A second object that the first one needs, with functions of piko.h: of the
+  /// reference executor without optimization. Empty = none.
+  std::string headerCode;
   /// The C++ header for hosts; empty for the reference executor, and for
   /// `.mlir` below the machine level, where nothing is left to make it of.
   std::string header;

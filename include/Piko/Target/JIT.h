@@ -21,8 +21,10 @@ public:
   /// instrumented for it, too.
   static Sanitizer getSanitizer();
 
-  /// Links an object that generateCode made for this machine.
-  static llvm::Expected<std::unique_ptr<JITCode>> load(llvm::StringRef object);
+  /// Links objects that generateCode made for this machine; empty ones are
+  /// none.
+  static llvm::Expected<std::unique_ptr<JITCode>>
+  load(llvm::ArrayRef<llvm::StringRef> objects);
 
   /// The address of a function or a variable, by its name.
   template <typename T> llvm::Expected<T *> lookup(llvm::StringRef name) {

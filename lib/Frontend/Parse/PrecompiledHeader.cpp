@@ -113,7 +113,9 @@ static std::optional<std::string> makeHeader(const FrontendOptions &options,
   if (!invocation)
     return std::nullopt;
   // Or each file instantiates anew what the header itself uses.
-  invocation->getLangOpts().PCHInstantiateTemplates = true;
+  clang::LangOptions &language = invocation->getLangOpts();
+  language.PCHInstantiateTemplates = true;
+  language.BuildingPCHWithObjectFile = language.ModulesCodegen;
   std::unique_ptr<llvm::MemoryBuffer> text =
       llvm::MemoryBuffer::getMemBuffer("#include <piko.h>\n", headerName);
   invocation->getFrontendOpts().Inputs = {clang::FrontendInputFile(
@@ -127,6 +129,28 @@ static std::optional<std::string> makeHeader(const FrontendOptions &options,
     return std::nullopt;
   return action.names +
          std::string(action.buffer->Data.begin(), action.buffer->Data.end());
+}
+
+static bool isTold(llvm::StringRef define) {
+  return getMacroName(define) == "PIKO_TUNED";
+}
+
+static bool isPikos(llvm::StringRef define) {
+  return define.starts_with("PIKO_");
+}
+
+FrontendOptions piko::getHeaderOptions(const FrontendOptions &options) {
+  FrontendOptions shared = options;
+  llvm::erase_if(shared.defines, [](llvm::StringRef define) {
+    return !isPikos(define) || isTold(define);
+  });
+  return shared;
+}
+
+static std::vector<std::string> getOthers(const FrontendOptions &options) {
+  std::vector<std::string> others = options.defines;
+  llvm::erase_if(others, isPikos);
+  return others;
 }
 
 /// A header does not depend on macros whose names do not occur in it.
@@ -151,13 +175,7 @@ piko::getPrecompiledHeader(llvm::StringRef file, const FrontendOptions &options,
                            InvocationMaker invoke, llvm::StringRef name) {
   if (!options.headers || !beginsWithHeader(file, *files))
     return nullptr;
-  FrontendOptions shared = options;
-  std::vector<std::string> others;
-  shared.defines.clear();
-  for (const std::string &define : options.defines)
-    if (getMacroName(define) != "PIKO_TUNED") // told behind the header
-      (llvm::StringRef(define).starts_with("PIKO_") ? shared.defines : others)
-          .push_back(define);
+  FrontendOptions shared = getHeaderOptions(options);
   std::optional<std::string> header =
       options.headers->get(getClangArguments(flags, shared), files,
                            [&](const HeaderStore::Files &recorded) {
@@ -166,7 +184,7 @@ piko::getPrecompiledHeader(llvm::StringRef file, const FrontendOptions &options,
   if (!header)
     return nullptr;
   size_t end = header->find("\n\n") + 1;
-  if (mentions(llvm::StringRef(*header).take_front(end), others))
+  if (mentions(llvm::StringRef(*header).take_front(end), getOthers(options)))
     return nullptr;
   return llvm::MemoryBuffer::getMemBufferCopy(
       llvm::StringRef(*header).drop_front(end + 1), name);

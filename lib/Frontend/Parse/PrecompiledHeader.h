@@ -24,12 +24,16 @@ using InvocationMaker =
 /// without a store, where something comes before `#include <piko.h>` or is
 /// defined that could change what it means, or where it has errors. It holds
 /// no macros of the options but Piko's own, without PIKO_TUNED; Clang adds them
-/// where it is used.
+/// where it is used. With -fmodules-codegen among the flags, code is made of
+/// its functions where it is built with an object, and not where it is used.
 std::unique_ptr<llvm::MemoryBuffer>
 getPrecompiledHeader(llvm::StringRef file, const FrontendOptions &options,
                      llvm::ArrayRef<const char *> flags,
                      const HeaderStore::Files &files, InvocationMaker invoke,
                      llvm::StringRef name);
+
+/// The options that the header for a file with `options` is made with.
+FrontendOptions getHeaderOptions(const FrontendOptions &options);
 
 /// What to put in front of a text for which there is such a header, and which
 /// may have PIKO_TUNED.

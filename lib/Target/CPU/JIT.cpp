@@ -17,7 +17,7 @@ Sanitizer JITCode::getSanitizer() {
                                     : Sanitizer::None;
 }
 
-Expected<std::unique_ptr<JITCode>> JITCode::load(StringRef object) {
+Expected<std::unique_ptr<JITCode>> JITCode::load(ArrayRef<StringRef> objects) {
   InitializeNativeTarget();
   InitializeNativeTargetAsmPrinter();
   auto jit = orc::LLJITBuilder().create();
@@ -29,9 +29,13 @@ Expected<std::unique_ptr<JITCode>> JITCode::load(StringRef object) {
     return process.takeError();
   orc::JITDylib &library = (*jit)->getMainJITDylib();
   library.addGenerator(std::move(*process));
-  if (Error error =
-          (*jit)->addObjectFile(MemoryBuffer::getMemBufferCopy(object)))
-    return error;
+  for (StringRef object : objects) {
+    if (object.empty())
+      continue;
+    if (Error error =
+            (*jit)->addObjectFile(MemoryBuffer::getMemBufferCopy(object)))
+      return error;
+  }
   if (Error error = (*jit)->initialize(library))
     return error;
   auto code = std::make_unique<JITCode>();

@@ -112,7 +112,7 @@ static ModulePassManager makeLastPasses(const TargetMachine &machine,
 }
 
 /// ORC runs the initialisers of an object that it has not seen as IR only where
-/// they are one function of this name.
+/// they are one function of such a name.
 static void gatherInitializers(Module &module) {
   std::map<unsigned, std::vector<Function *>> initializers; // by priority
   for (orc::CtorDtorIterator::Element element : orc::getConstructors(module))
@@ -122,7 +122,8 @@ static void gatherInitializers(Module &module) {
     return;
   auto *function = Function::Create(
       FunctionType::get(Type::getVoidTy(module.getContext()), false),
-      GlobalValue::ExternalLinkage, "__orc_init_func.piko", module);
+      GlobalValue::ExternalLinkage,
+      "__orc_init_func." + module.getModuleIdentifier(), module);
   IRBuilder<> builder(
       BasicBlock::Create(module.getContext(), "entry", function));
   for (auto &[priority, group] : initializers)

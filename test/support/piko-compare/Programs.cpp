@@ -33,8 +33,8 @@ private:
   DiagnosticPrinter printer;
 };
 
-std::shared_ptr<JITCode> load(const std::string &object) {
-  auto made = JITCode::load(object);
+std::shared_ptr<JITCode> load(llvm::ArrayRef<llvm::StringRef> objects) {
+  auto made = JITCode::load(objects);
   if (!made)
     throw std::runtime_error(llvm::toString(made.takeError()));
   return std::move(*made);
@@ -121,7 +121,7 @@ void Programs::Implementation::compileReference(const std::string &file) {
     throw std::runtime_error("cannot compile " + file +
                              " for the reference executor\n" +
                              referenceDiagnostics);
-  reference = load(referenceObject->code);
+  reference = load({referenceObject->code, referenceObject->headerCode});
 }
 
 /// The module of a pipeline; null after diagnostics.
@@ -183,7 +183,7 @@ Program Programs::compile(const std::string &pipe) {
       generateCode(*llvmModule, target, CodeFormat::Object);
   if (!object)
     throw std::runtime_error(llvm::toString(object.takeError()));
-  std::shared_ptr<JITCode> code = load(*object);
+  std::shared_ptr<JITCode> code = load(llvm::StringRef(*object));
   auto name = std::make_shared<std::string>(pipe);
   Program program{{PIKORT_ABI_VERSION, name->c_str(),
                    find<void(pikort_pipeline *)>(*code, pipe + ".setup"),
