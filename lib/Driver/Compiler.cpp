@@ -4,6 +4,7 @@
 
 #include "Piko/Driver/Compiler.h"
 
+#include "AuthoredCache.h"
 #include "Piko/Conversion/KernelImage.h"
 #include "Piko/Dialect/Piko/IR/Piko.h"
 #include "Piko/Driver/Sequences.h"
@@ -175,17 +176,24 @@ static LogicalResult checkTuning(ModuleOp module,
   return success();
 }
 
+static OwningOpRef<ModuleOp>
+readCpp(const CompileOptions &options, MLIRContext &context,
+        llvm::IntrusiveRefCntPtr<llvm::vfs::FileSystem> files) {
+  FrontendOptions frontend = getFrontendOptions(options);
+  frontend.files = files;
+  if (failed(setTunables(options.file, options.tunables, frontend, context)))
+    return {};
+  return translateCppToPiko(options.file, frontend, context);
+}
+
 OwningOpRef<ModuleOp>
 piko::readPipeline(const CompileOptions &options, MLIRContext &context,
                    llvm::IntrusiveRefCntPtr<llvm::vfs::FileSystem> files) {
   context.loadAllAvailableDialects();
-  FrontendOptions frontend = getFrontendOptions(options);
-  frontend.files = files;
-  if (!isMLIR(options.file)) {
-    if (failed(setTunables(options.file, options.tunables, frontend, context)))
-      return {};
-    return translateCppToPiko(options.file, frontend, context);
-  }
+  if (!isMLIR(options.file))
+    return findAuthored(options, context, files, [&](auto chosen) {
+      return readCpp(options, context, chosen);
+    });
   OwningOpRef<ModuleOp> module = parseMLIR(options.file, context, *files);
   if (!module ||
       failed(selectPipeline(*module, options.file, options.pipeName)) ||

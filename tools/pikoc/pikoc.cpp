@@ -450,10 +450,12 @@ static std::optional<std::string> writeText(const CommandLine &line) {
   std::optional<CPUOptions> cpu = findProcessor(line);
   if (!cpu)
     return std::nullopt;
-  OwningOpRef<ModuleOp> module = readPipeline(line.getSource(), context);
-  if (!module || failed(lowerPipeline(*module, level, line.getSource().check,
-                                      line.getSource().synthesis,
-                                      line.getSource().gpu, *cpu)))
+  CompileOptions source = line.getSource();
+  // Who looks at it wants to see what the text means.
+  source.reusesAuthored = level != Level::Authored;
+  OwningOpRef<ModuleOp> module = readPipeline(source, context);
+  if (!module || failed(lowerPipeline(*module, level, source.check,
+                                      source.synthesis, source.gpu, *cpu)))
     return std::nullopt;
   if (line.getEmit() >= Emit::LLVMIR)
     return translate(line, *module);

@@ -54,6 +54,9 @@ struct CompileOptions {
   SynthesisOptions synthesis = {};
   GPUOptions gpu = {};
   CacheOptions cache = {};
+  /// Whether what C++ means may come from the cache, where the text is as it
+  /// was.
+  bool reusesAuthored = true;
 };
 
 /// Instruments code, which then runs in programs that have the sanitizer's

@@ -12,8 +12,8 @@ limit = int(os.environ["PIKO_CACHE_SIZE"])
 
 
 def compile(number):
-    options = ["--cache-dir", str(cache), "-DQUIET", f"-DNUMBER={number}"]
-    subprocess.run(command + options, check=True)
+    options = ["--cache-dir", str(cache), f"-DNUMBER={number}"]
+    subprocess.run(command + options, check=True, stderr=subprocess.DEVNULL)
     return {entry.name for entry in cache.glob("llvmcache-*")}
 
 
