@@ -2,6 +2,7 @@
 
 #include "Programs.h"
 
+#include "ObjectRequest.h"
 #include "Piko/Dialect/Piko/IR/Piko.h"
 #include "Piko/Driver/Compiler.h"
 #include "Piko/Driver/Diagnostics.h"
@@ -9,6 +10,9 @@
 #include "Piko/Target/JIT.h"
 #include "Piko/Target/Object.h"
 #include "Piko/Target/Processor.h"
+#include "SourceCache.h"
+#include "mlir/Bytecode/BytecodeWriter.h"
+#include "mlir/Parser/Parser.h"
 
 #include <stdexcept>
 
@@ -47,10 +51,17 @@ template <class F> F *find(JITCode &code, const std::string &name) {
   return *found;
 }
 
+struct CompiledPipeline {
+  std::string code;
+  bool isStrict;
+};
+
 } // namespace
 
 struct Programs::Implementation {
-  Implementation() : context(makeRegistry()), log(context) {
+  explicit Implementation(const CacheOptions &cacheOptions)
+      : context(makeRegistry()), log(context), cache(cacheOptions),
+        kept(cacheOptions) {
     context.loadAllAvailableDialects();
   }
   static DialectRegistry makeRegistry() {
@@ -60,7 +71,12 @@ struct Programs::Implementation {
   }
   void compileReference(const std::string &file);
   void readText(const std::string &file);
+  OwningOpRef<ModuleOp> parse(const std::string &pipe);
   OwningOpRef<ModuleOp> read(const std::string &pipe);
+  CompiledPipeline compile(const std::string &pipe,
+                           const ObjectOptions &options,
+                           const Processor &processor);
+  CompiledPipeline find(const std::string &pipe);
 
   MLIRContext context;
   Log log;
@@ -72,6 +88,11 @@ struct Programs::Implementation {
   SynthesisOptions synthesis;
   GPUOptions gpu;
   std::string cpu;
+  /// What was compiled before.
+  SourceCache kept;
+  /// What reading the file asks.
+  llvm::IntrusiveRefCntPtr<SourceRecorder> recorder =
+      llvm::makeIntrusiveRefCnt<SourceRecorder>(llvm::vfs::getRealFileSystem());
   /// Where the compiled file is C++, once it is needed.
   std::unique_ptr<PipelineFile> file;
   /// Where the compiled file is `.mlir`: a module for each pipeline.
@@ -104,7 +125,7 @@ void Programs::Implementation::readText(const std::string &file) {
     if (!onlyPipe.empty() && name != onlyPipe)
       continue;
     options.pipeName = name;
-    modules.emplace_back(name, readPipeline(options, context));
+    modules.emplace_back(name, readPipeline(options, context, recorder));
   }
 }
 
@@ -124,8 +145,8 @@ void Programs::Implementation::compileReference(const std::string &file) {
   reference = load({referenceObject->code, referenceObject->headerCode});
 }
 
-/// The module of a pipeline; null after diagnostics.
-OwningOpRef<ModuleOp> Programs::Implementation::read(const std::string &pipe) {
+/// The module of a pipeline as its text says it; null after diagnostics.
+OwningOpRef<ModuleOp> Programs::Implementation::parse(const std::string &pipe) {
   for (auto &[name, parsed] : modules)
     if (name == pipe)
       return std::move(parsed);
@@ -133,22 +154,45 @@ OwningOpRef<ModuleOp> Programs::Implementation::read(const std::string &pipe) {
     return nullptr;
   CompileOptions options{
       .file = sourceFile, .pipeName = onlyPipe, .check = check, .cache = cache};
-  if (!file)
-    file =
-        PipelineFile::parse(sourceFile, getFrontendOptions(options), context);
+  if (!file) {
+    FrontendOptions frontend = getFrontendOptions(options);
+    frontend.files = recorder;
+    file = PipelineFile::parse(sourceFile, frontend, context);
+  }
   for (size_t i = 0; file && i < file->size(); ++i)
     if (file->getName(i) == pipe)
       return file->translate(i);
   return nullptr;
 }
 
+/// The module of a pipeline, parsed unless that was done before; null after
+/// diagnostics.
+OwningOpRef<ModuleOp> Programs::Implementation::read(const std::string &pipe) {
+  if (!kept.isEnabled() || !modules.empty())
+    return parse(pipe);
+  ObjectOptions options{
+      .source = {.file = sourceFile, .pipeName = pipe, .check = check},
+      .nameSpace = "piko-compare authored"};
+  std::string request = makeObjectRequest(options, {}, *recorder);
+  if (std::optional<std::string> found = kept.lookUp(request, *recorder))
+    return parseSourceString<ModuleOp>(*found, &context);
+  OwningOpRef<ModuleOp> module = parse(pipe);
+  if (!module)
+    return nullptr;
+  std::string bytes;
+  llvm::raw_string_ostream stream(bytes);
+  // Where it cannot be kept it is parsed again.
+  if (succeeded(writeBytecodeToFile(*module, stream)))
+    llvm::consumeError(kept.keep(request, *recorder, bytes));
+  return module;
+}
+
 Programs::Programs(const Options &options)
-    : self(std::make_unique<Implementation>()) {
+    : self(std::make_unique<Implementation>(options.cache)) {
   self->sourceFile = options.file;
   if (options.cases.empty())
     self->onlyPipe = options.one.pipe;
   self->check = options.check;
-  self->cache = options.cache;
   self->synthesis = options.synthesis;
   self->gpu = options.gpu;
   self->cpu = options.cpu;
@@ -163,33 +207,67 @@ std::vector<std::string> Programs::names() const {
   return self->referenceObject->pipelines;
 }
 
-Program Programs::compile(const std::string &pipe) {
-  OwningOpRef<ModuleOp> module = self->read(pipe);
+CompiledPipeline Programs::Implementation::compile(const std::string &pipe,
+                                                   const ObjectOptions &options,
+                                                   const Processor &processor) {
+  OwningOpRef<ModuleOp> module = read(pipe);
   bool strict = module && isStrict(*module);
-  llvm::Expected<Processor> processor = resolveProcessor(self->cpu);
-  if (!processor)
-    throw std::runtime_error(llvm::toString(processor.takeError()));
-  TargetOptions target{self->cpu, /*optLevel=*/3, JITCode::getSanitizer()};
-  if (!module || failed(lowerPipeline(*module, Level::LLVM, self->check,
-                                      target.leaveOutUnseen(self->synthesis),
-                                      self->gpu, {.lanes = processor->lanes})))
-    self->log.fail("cannot compile " + pipe);
-  auto context = std::make_unique<llvm::LLVMContext>();
+  const SynthesisOptions &chosen = options.source.synthesis;
+  if (!module || failed(lowerPipeline(*module, Level::LLVM, check, chosen, gpu,
+                                      {.lanes = processor.lanes})))
+    log.fail("cannot compile " + pipe);
+  llvm::LLVMContext llvmContext;
   std::unique_ptr<llvm::Module> llvmModule =
-      translateToLLVMIR(*module, *context, self->gpu);
+      translateToLLVMIR(*module, llvmContext, gpu);
   if (!llvmModule)
-    self->log.fail("cannot compile " + pipe);
+    log.fail("cannot compile " + pipe);
   llvm::Expected<std::string> object =
-      generateCode(*llvmModule, target, CodeFormat::Object);
+      generateCode(*llvmModule, options.target, CodeFormat::Object);
   if (!object)
     throw std::runtime_error(llvm::toString(object.takeError()));
-  std::shared_ptr<JITCode> code = load(llvm::StringRef(*object));
+  return {std::move(*object), strict};
+}
+
+/// Compiles unless that was done before.
+CompiledPipeline Programs::Implementation::find(const std::string &pipe) {
+  llvm::Expected<Processor> processor = resolveProcessor(cpu);
+  if (!processor)
+    throw std::runtime_error(llvm::toString(processor.takeError()));
+  TargetOptions target{cpu, /*optLevel=*/3, JITCode::getSanitizer()};
+  ObjectOptions options{
+      .source = {.file = sourceFile,
+                 .pipeName = pipe,
+                 .check = check,
+                 .synthesis = target.leaveOutUnseen(synthesis),
+                 .gpu = gpu},
+      .target = target,
+      .nameSpace = "piko-compare"};
+  if (!kept.isEnabled())
+    return compile(pipe, options, *processor);
+  std::string request = makeObjectRequest(options, *processor, *recorder);
+  llvm::vfs::FileSystem &disk = *llvm::vfs::getRealFileSystem();
+  if (std::optional<std::string> found = kept.lookUp(request, disk)) {
+    StringReader reader(*found);
+    std::string code = reader.next();
+    return {std::move(code), reader.next() == "strict"};
+  }
+  CompiledPipeline made = compile(pipe, options, *processor);
+  StringWriter writer;
+  writer.add(made.code).add(made.isStrict ? "strict" : "");
+  // Where it cannot be kept it is made again.
+  llvm::consumeError(kept.keep(request, *recorder, writer.bytes));
+  return made;
+}
+
+Program Programs::compile(const std::string &pipe) {
+  CompiledPipeline compiled = self->find(pipe);
+  std::shared_ptr<JITCode> code = load(llvm::StringRef(compiled.code));
   auto name = std::make_shared<std::string>(pipe);
   Program program{{PIKORT_ABI_VERSION, name->c_str(),
                    find<void(pikort_pipeline *)>(*code, pipe + ".setup"),
                    find<int32_t(pikort_pipeline *)>(*code, pipe + ".run")},
                   nullptr,
-                  strict};
+                  compiled.isStrict};
   program.code = std::make_shared<
       std::pair<std::shared_ptr<std::string>, std::shared_ptr<JITCode>>>(name,
                                                                          code);

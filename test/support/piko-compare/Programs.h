@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // The pipelines of a file as programs: compiled one by one, as users get them,
-// and for the reference executor all at once, through the disk cache.
+// and for the reference executor all at once, both through the disk cache.
 
 #ifndef PIKO_TEST_TOOLS_PIKO_COMPARE_PROGRAMS_H
 #define PIKO_TEST_TOOLS_PIKO_COMPARE_PROGRAMS_H
