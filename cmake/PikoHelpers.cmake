@@ -4,8 +4,6 @@
 add_library(piko_options INTERFACE)
 target_compile_options(piko_options INTERFACE
   -Wall -Wextra -Wno-unused-parameter -ffp-contract=off)
-# The cache tells compilers apart by it.
-target_link_options(piko_options INTERFACE -Wl,--build-id=sha1)
 
 if(PIKO_ENABLE_COMPILER)
   # What a target that uses LLVM, MLIR or Clang needs.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// Which compiler this is, from the notes that linkers leave in its files.
+// Which compiler this is, from what its build says and from the notes that
+// linkers leave in files.
 
 #include "CompilerIdentity.h"
 
@@ -31,15 +32,6 @@ static StringRef findBuildId(StringRef notes) {
   return {};
 }
 
-static bool contains(const dl_phdr_info &module, const void *address) {
-  auto offset = reinterpret_cast<uintptr_t>(address) - module.dlpi_addr;
-  for (const auto &segment : ArrayRef(module.dlpi_phdr, module.dlpi_phnum))
-    if (segment.p_type == PT_LOAD && offset >= segment.p_vaddr &&
-        offset - segment.p_vaddr < segment.p_memsz)
-      return true;
-  return false;
-}
-
 static std::string identify(const dl_phdr_info &module) {
   for (const auto &segment : ArrayRef(module.dlpi_phdr, module.dlpi_phnum)) {
     if (segment.p_type != PT_NOTE)
@@ -51,8 +43,7 @@ static std::string identify(const dl_phdr_info &module) {
       return toHex(id);
   }
   // A linker that was told to leave no id: the whole file tells.
-  const char *path = *module.dlpi_name ? module.dlpi_name : "/proc/self/exe";
-  auto file = MemoryBuffer::getFile(path, /*IsText=*/false,
+  auto file = MemoryBuffer::getFile(module.dlpi_name, /*IsText=*/false,
                                     /*RequiresNullTerminator=*/false);
   if (!file)
     return "unknown";
@@ -61,15 +52,14 @@ static std::string identify(const dl_phdr_info &module) {
 
 static int visit(dl_phdr_info *module, size_t, void *data) {
   StringRef name(module->dlpi_name);
-  if (contains(*module, reinterpret_cast<const void *>(&getCompilerIdentity)) ||
-      name.contains("/libLLVM") || name.contains("/libMLIR") ||
+  if (name.contains("/libLLVM") || name.contains("/libMLIR") ||
       name.contains("/libclang-cpp"))
     static_cast<std::string *>(data)->append(identify(*module) + ";");
   return 0;
 }
 
 std::string piko::getCompilerIdentity() {
-  std::string identity;
+  std::string identity = compilerBuild;
   dl_iterate_phdr(visit, &identity);
   return identity;
 }

@@ -9,8 +9,13 @@
 
 namespace piko {
 
+/// A hash of the libraries that Piko's compiler consists of, whatever tool it
+/// is linked to.
+extern const char *const compilerBuild;
+
 /// Changes whenever Piko's compiler, LLVM, MLIR or Clang are built anew with
-/// other code: the build ids of the files that they were loaded from.
+/// other code: that hash, and the build ids of the files that the others were
+/// loaded from.
 std::string getCompilerIdentity();
 
 } // namespace piko
