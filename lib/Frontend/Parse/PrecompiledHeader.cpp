@@ -10,6 +10,7 @@
 #include "clang/Frontend/FrontendActions.h"
 #include "clang/Lex/Lexer.h"
 #include "clang/Serialization/ASTWriter.h"
+#include "clang/Tooling/Inclusions/StandardLibrary.h"
 #include "llvm/ADT/StringExtras.h"
 #include "llvm/Support/Path.h"
 
@@ -58,8 +59,16 @@ private:
 
 } // namespace
 
-/// The line of the first directive, if nothing but comments and `#pragma once`
-/// is before it.
+/// Whether a directive includes a header of the C++ library. These mean the
+/// same in any order.
+static bool includesStandardHeader(llvm::StringRef line) {
+  return line.consume_front("include") && (line = line.ltrim()).size() > 2 &&
+         line.ends_with(">") && !line.ends_with(".h>") &&
+         clang::tooling::stdlib::Header::named(line);
+}
+
+/// The line of the first directive, if nothing but comments, `#pragma once` and
+/// headers of the C++ library are before it.
 static llvm::StringRef getFirstDirective(llvm::StringRef text) {
   clang::LangOptions language;
   language.LineComment = true;
@@ -74,7 +83,9 @@ static llvm::StringRef getFirstDirective(llvm::StringRef text) {
       text.drop_front(lexer.getBufferLocation() - terminated.data());
   auto [line, behind] = rest.split('\n');
   line = line.trim();
-  return line == "pragma once" ? getFirstDirective(behind) : line;
+  return line == "pragma once" || includesStandardHeader(line)
+             ? getFirstDirective(behind)
+             : line;
 }
 
 /// Whether piko.h is the first that the preprocessor sees, perhaps in a header
