@@ -4,15 +4,25 @@
 
 #include "AuthoredCache.h"
 
+#include "HeaderCache.h"
 #include "Piko/Driver/Compiler.h"
-#include "SourceCache.h"
 
 #include "mlir/Bytecode/BytecodeWriter.h"
 #include "mlir/IR/Diagnostics.h"
 #include "mlir/Parser/Parser.h"
+#include "llvm/Support/Path.h"
 
 using namespace mlir;
 using namespace piko;
+
+/// Whether relative paths lead to what is read.
+static bool dependsOnFolder(const CompileOptions &options) {
+  std::vector<std::string> arguments;
+  for (const std::string &folder : options.includeDirs)
+    arguments.push_back("-I" + folder);
+  return llvm::sys::path::is_relative(options.file) ||
+         hasRelativeFolders(arguments);
+}
 
 /// All that decides what is read, but for the files.
 static std::string makeRequest(const CompileOptions &options,
@@ -20,7 +30,8 @@ static std::string makeRequest(const CompileOptions &options,
   KeyBuilder key;
   key.add("authored");
   addSurroundings(key);
-  addFolder(key, files);
+  if (dependsOnFolder(options))
+    addFolder(key, files);
   key.add(options.file).add(options.pipeName).add(getRuntimeIncludeDir());
   for (const auto *list : {&options.includeDirs, &options.defines}) {
     key.add(std::to_string(list->size()));

@@ -16,9 +16,7 @@ piko::makeHeaderStore(const CacheOptions &options) {
   return std::make_shared<HeaderCache>(options);
 }
 
-/// Whether Clang looks for headers in folders that depend on the one it runs
-/// in.
-static bool hasRelativeFolders(llvm::ArrayRef<std::string> arguments) {
+bool piko::hasRelativeFolders(llvm::ArrayRef<std::string> arguments) {
   auto isRelative = [](llvm::StringRef path) {
     return llvm::sys::path::is_relative(path);
   };

@@ -10,6 +10,10 @@
 
 namespace piko {
 
+/// Whether Clang looks for headers in folders that depend on the one it runs
+/// in.
+bool hasRelativeFolders(llvm::ArrayRef<std::string> arguments);
+
 class HeaderCache : public HeaderStore {
 public:
   explicit HeaderCache(const CacheOptions &options) : cache(options) {}
