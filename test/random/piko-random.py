@@ -64,7 +64,7 @@ def run_batch(args, first, count):
     features = features_of(args)
     pipes = [pipelines.generate(first + i, features, f"P{i}") for i in range(count)]
     passes = passes_of(args, first)
-    verdicts = runner_of(args, passes, first).run(pipes)
+    verdicts = runner_of(args, passes, first, keep=args.keep).run(pipes)
     used = Counter(f"without-{p}" for p in passes for _ in pipes)
     for pipe in pipes:
         used.update(pipe.used)
@@ -163,6 +163,9 @@ def main():
                         help="the processor to compile for (this machine's)")
     parser.add_argument("--strip", type=int, default=0,
                         help="primitives of a source in a strip (all)")
+    parser.add_argument("--keep", metavar="FOLDER",
+                        help="leave files there, where another run finds in the cache "
+                             "what it has in common with this one")
     parser.add_argument("--out", default="reduced.cpp")
     args = parser.parse_args()
     command = {"run": command_run, "show": command_show, "reduce": command_reduce}

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 """Runs piko-compare on a file of pipelines and says how each of them ended."""
 
+import contextlib
+import hashlib
 import random
 import re
 import subprocess
@@ -72,20 +74,22 @@ def kind_of(verdict):
 
 class Runner:
     """With `text` what is compiled is the text of the dialect, not the C++; the
-    `passes` are left out; `target` are options that say what it runs on."""
+    `passes` are left out; `target` are options that say what it runs on. With
+    `keep`, files stay in that folder, by what they hold."""
 
     def __init__(self, tool, text=False, passes=(), threads=(1, 2, 7), timeout=120,
-                 strip=0, target=()):
-        self.target = list(target)
+                 strip=0, target=(), keep=None):
+        self.target, self.keep = list(target), keep
         self.tool, self.text, self.passes = tool, text, passes
         self.strip = strip
         self.threads, self.timeout = threads, timeout
 
     def run(self, pipes):
         """The verdict on each pipeline, in their order."""
-        with tempfile.TemporaryDirectory() as folder:
+        text = cpp.write_file(pipes)
+        with self.folder_of(text) as folder:
             file = Path(folder) / "pipelines.cpp"
-            file.write_text(cpp.write_file(pipes))
+            file.write_text(text)
             if self.text:
                 file.with_suffix(".mlir").write_text(dialect.write_file(pipes))
             verdicts = self.compare(file, pipes)
@@ -93,6 +97,13 @@ class Runner:
             while len(verdicts) < len(pipes):
                 verdicts += self.compare(file, pipes[len(verdicts):])
             return verdicts
+
+    def folder_of(self, text):
+        if not self.keep:
+            return tempfile.TemporaryDirectory()
+        folder = Path(self.keep) / hashlib.sha256(text.encode()).hexdigest()[:16]
+        folder.mkdir(parents=True, exist_ok=True)
+        return contextlib.nullcontext(folder)
 
     def compare(self, file, pipes):
         """At least one verdict, in order; the last one may be of a crash."""
