@@ -60,7 +60,7 @@ config.environment["PIKO_CACHE_DIR"] = os.path.join(
 
 bunny = "/usr/share/glmark2/models/bunny.obj"
 include = os.path.join(config.piko_source_root, "runtime", "include")
-reference = [config.cxx, "-std=c++20", "-O1", "-ffp-contract=off", "-I", include]
+reference = [config.cxx, "-std=c++20", "-O0", "-ffp-contract=off", "-I", include]
 # Kernels of an application's own, in CUDA C++, without a toolkit.
 ptx = [os.path.join(config.llvm_tools, "clang++"), "-x cuda -std=c++20 -O2 -S"]
 ptx += ["--cuda-device-only --cuda-gpu-arch=sm_70 -nocudainc -nocudalib"]
