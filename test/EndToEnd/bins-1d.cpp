@@ -35,8 +35,7 @@ struct Add : piko::BasicStage<piko::Bins<8>, 64, Item, Item>,
       assignToBoundingBox(i, at, at);
   }
   void process(const Item &i) {
-    glm::ivec1 at(piko::toInt(i.at));
-    update(state().sums, at, [&](Sum &s) {
+    update(state().sums, {piko::toInt(i.at)}, [&](Sum &s) {
       s.total += i.value;
       s.last = i.value;
     });

@@ -7,6 +7,9 @@
 // RUN: not %cxx_reference -DCASE=3 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=MUTABLE
 // RUN: not %cxx_reference -DCASE=4 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=CONST
 // RUN: not %cxx_reference -DCASE=5 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=CONST
+// RUN: not %cxx_reference -DCASE=6 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=COPY
+// RUN: not %cxx_reference -DCASE=7 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=COPY
+// RUN: not pikoc -DCASE=6 --pipe TakePipe %s -o %t.o 2>&1 | FileCheck %s --check-prefix=COPY
 #include <piko.h>
 
 #include <vector>
@@ -19,6 +22,7 @@ struct Derived : Base {
 };
 struct State {
   piko::Buffer<int> out;
+  piko::Image<int> image;
 };
 
 // INT: error: {{.*}}expected a phase to take the primitive of its stage, but it takes another type
@@ -49,11 +53,28 @@ struct TakeAny : piko::Stage<0, 0, 4, float>, piko::Uses<State> {
 #endif
   }
 };
+// COPY: error: {{.*}}expected a function that takes the pixel by reference, as in [&](Pixel &p): it gives nothing, and what it changes is a copy
+struct TakeImage : piko::Stage<0, 0, 4, float>, piko::Uses<State> {
+  void process(float value) {
+#if CASE == 6
+    update(state().image, {0, 0}, [&](int pixel) { pixel = int(value); });
+#elif CASE == 7
+    auto add = [sum = 0](const int &pixel) mutable { sum += pixel; };
+    update(state().image, {0, 0}, add);
+#endif
+    update(state().image, {0, 0}, [&](int &pixel) { pixel = int(value); });
+    update(state().image, {0, 0}, [&](auto &pixel) { pixel = int(value); });
+    int old = update(state().image, {0, 0}, [](int pixel) { return pixel; });
+    state().out[0] = old;
+  }
+};
 struct TakePipe : piko::Pipe<State> {
+  TakeImage takeImage;
   Take take;
   TakeBase takeBase;
   TakeAny takeAny;
   TakePipe() {
+    source(takeImage);
     source(take);
     source(takeBase);
     source(takeAny);

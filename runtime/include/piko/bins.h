@@ -92,6 +92,18 @@ template <int Rank> using Position = glm::vec<Rank, float, glm::defaultp>;
 
 namespace detail {
 
+struct OnlyCell : Cells<1> {
+  OnlyCell(int x) : Cells<1>(x) {}
+  OnlyCell(const Cells<1> &at) : Cells<1>(at) {}
+};
+/// What a function takes as a cell: in one dimension a number will do.
+template <int Rank> struct CellArgument {
+  using type = Cells<Rank>;
+};
+template <> struct CellArgument<1> {
+  using type = OnlyCell;
+};
+
 /// The most cells of a domain in a dimension where positions are floats, which
 /// are exact so far, and the middles between them, too.
 inline constexpr int64_t maxFloatExtent = int64_t(1) << 23;

@@ -6,6 +6,7 @@
 #include <piko/compiled/list.h>
 #include <piko/compiled/messages.h>
 #include <piko/compiled/state.h>
+#include <piko/update.h>
 
 #pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wc++26-extensions" // computed messages
@@ -100,7 +101,9 @@ protected:
   /// Changes a pixel of the current bin: f(pixel). The calls for one pixel are
   /// in lineage order.
   template <class T, int R, class F>
-  auto update(Image<T, R> &image, const Cells<R> &at, F &&f) {
+  auto update(Image<T, R> &image,
+              const typename detail::CellArgument<R>::type &at, F &&f) {
+    PIKO_EXPECT_UPDATE(F);
     using namespace detail;
     Storage<T> pixel;
     marker::updateBegin<T>(&pixel.value, &image, coordinate<0, R>(at),

@@ -4,6 +4,7 @@
 #define PIKO_REFERENCE_STAGE_H
 
 #include <piko/reference/calls.h>
+#include <piko/update.h>
 
 #include <tuple>
 
@@ -305,8 +306,10 @@ public:
   /// Changes a pixel of the current bin: f(pixel). The calls for one pixel are
   /// in lineage order.
   template <class T, int R, class F>
-  auto update(Image<T, R> &image, const Cells<R> &at, F &&f,
+  auto update(Image<T, R> &image,
+              const typename detail::CellArgument<R>::type &at, F &&f,
               reference::Place place = reference::Place::current()) {
+    PIKO_EXPECT_UPDATE(F);
     reference::Frame &call = reference::executorAt("update", place)
                                  .expect(reference::Phase::Process, "update");
     if (call.updating)
