@@ -39,7 +39,9 @@ int64_t unitSize(const pikort_pipeline &p, const Stage &stage,
     return std::clamp<int64_t>((share + 63) / 64 * 64, 64, 1024);
   }
   int64_t share = positions / (int64_t(p.threads) * 8);
-  return std::clamp<int64_t>((share + 15) / 16 * 16, 16, 1024);
+  // One of a few primitives may have most of the domain's pixels.
+  int64_t most = stage.selections.empty() ? 1024 : 64;
+  return std::clamp<int64_t>((share + 15) / 16 * 16, 16, most);
 }
 
 /// Cells or calls in a unit, at most `most`. A block takes one after the other,
