@@ -179,6 +179,16 @@ StateView &LoweringContext::view(OpBuilder &builder, Operation *op,
   return it->second;
 }
 
+FailureOr<StringAttr> LoweringContext::kernelStage(Operation *op) const {
+  auto function = op->getParentOfType<func::FuncOp>();
+  auto number = function->getAttrOfType<IntegerAttr>(marks::number);
+  if (!number) {
+    op->emitError("expected a kernel over the bins of a stage");
+    return failure();
+  }
+  return (numbers(op).stages.begin() + number.getInt())->first;
+}
+
 void LoweringContext::setData(OpBuilder &builder, Operation *op,
                               StringRef image, StringRef like, Value data) {
   StateView other = view(builder, op, like);

@@ -89,6 +89,9 @@ public:
   const PipelineNumbers &numbers(mlir::Operation *op) const;
   int32_t stageNumber(mlir::Operation *op, mlir::StringRef stage) const;
   StageOp stage(mlir::Operation *op, mlir::FlatSymbolRefAttr name) const;
+  /// The stage over whose bins the kernel around an operation runs; an error if
+  /// there is none.
+  mlir::FailureOr<mlir::StringAttr> kernelStage(mlir::Operation *op) const;
   mlir::Operation *state(mlir::Operation *op, mlir::StringRef name) const;
   RecordOp record(mlir::FlatSymbolRefAttr name) const;
 

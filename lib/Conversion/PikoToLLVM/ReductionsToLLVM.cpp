@@ -178,14 +178,11 @@ struct PrivateCopyLowering : Lowering<PrivateCopyOp> {
                   ConversionPatternRewriter &rewriter) const override {
     Location loc = op.getLoc();
     const PipelineNumbers &numbers = context.numbers(op);
-    auto number =
-        op->getParentOfType<func::FuncOp>()->getAttrOfType<IntegerAttr>(
-            marks::number);
-    if (!number)
-      return op.emitError("expected a kernel over the bins of a stage");
-    StringAttr stage = (numbers.stages.begin() + number.getInt())->first;
+    FailureOr<StringAttr> stage = context.kernelStage(op);
+    if (failed(stage))
+      return failure();
     std::optional<int32_t> copy = numbers.findReduction(
-        stage, op.getStateAttr().getAttr(), op.getField());
+        *stage, op.getStateAttr().getAttr(), op.getField());
     assert(copy && "the pipeline's copies have numbers");
     rewriter.replaceOp(
         op,

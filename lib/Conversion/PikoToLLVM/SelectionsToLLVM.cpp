@@ -227,14 +227,11 @@ struct PrivateImagesLowering : Lowering<PrivateImagesOp> {
                   ConversionPatternRewriter &rewriter) const override {
     Location loc = op.getLoc();
     const PipelineNumbers &numbers = context.numbers(op);
-    auto number =
-        op->getParentOfType<func::FuncOp>()->getAttrOfType<IntegerAttr>(
-            marks::number);
-    if (!number)
-      return op.emitError("expected a kernel over the bins of a stage");
-    StringAttr stage = (numbers.stages.begin() + number.getInt())->first;
+    FailureOr<StringAttr> stage = context.kernelStage(op);
+    if (failed(stage))
+      return failure();
     std::optional<int32_t> selection =
-        numbers.findSelection(stage, op.getUnitImageAttr().getAttr());
+        numbers.findSelection(*stage, op.getUnitImageAttr().getAttr());
     assert(selection && "the pipeline's selections have numbers");
     Value images =
         context
