@@ -43,16 +43,13 @@ static std::optional<Change> getChange(UpdateOp update, unsigned number) {
   auto yield = cast<YieldOp>(body.getTerminator());
   Value old = body.getArgument(number), value = yield.getPixel()[number];
   Change change{number, AtomicKind::Add, nullptr, Value(), Value()};
-  if (std::optional<Choice> choice = getChoice(value, old)) {
-    value = choice->value;
-    // In a branch the operation stands where the condition holds.
-    if (choice->condition &&
-        isa<arith::SelectOp>(yield.getPixel()[number].getDefiningOp())) {
-      change.condition = choice->condition;
-      change.outcome = choice->outcome;
-    }
+  std::optional<Choice> choice = getChoice(value, old);
+  change.op = (choice ? choice->value : value).getDefiningOp();
+  // In a branch the operation stands where the condition holds.
+  if (choice && change.op && !value.getDefiningOp()->isAncestor(change.op)) {
+    change.condition = choice->condition;
+    change.outcome = choice->outcome;
   }
-  change.op = value.getDefiningOp();
   if (!change.op || !update.getBody().isAncestor(change.op->getParentRegion()))
     return std::nullopt;
   std::optional<AtomicKind> kind = getKind(change.op, old);

@@ -17,10 +17,11 @@ struct CommutingUpdate {
   struct Change {
     unsigned number; ///< Of the record, fields in order.
     AtomicKind kind;
-    mlir::Operation *op; ///< That changes it, in the update; or a subtraction.
-    mlir::Value value;   ///< What by.
-    mlir::Value condition; ///< On which; null = always.
-    bool outcome = true;   ///< Of the condition.
+    mlir::Operation *op; ///< In the update; of a sum also a subtraction.
+    mlir::Value value;   ///< What the number is changed by.
+    mlir::Value
+        condition;       ///< On which, if `op` stands in front; null = always.
+    bool outcome = true; ///< Of the condition.
   };
   UpdateOp update;
   llvm::SmallVector<Change> changes;

@@ -128,3 +128,50 @@ piko.pipeline @Counts rank 1 {
     }
   }
 }
+
+// What a branch chooses may have been computed in front of it, or in it.
+// CHECK-LABEL: piko.pipeline @Conditions
+// CHECK-NOT:     piko.update
+// CHECK:         %[[C:.*]] = arith.cmpi sgt
+// CHECK-NOT:     piko.atomic
+// CHECK:         scf.if %[[C]] {
+// CHECK:           piko.atomic or checked @depth
+// CHECK:         scf.if %[[C]] {
+// CHECK-NEXT:      piko.atomic add checked @both
+// CHECK-NOT:     piko.atomic
+piko.pipeline @Conditions rank 1 {
+  piko.image @depth : @Z rank 1
+  piko.image @both : @Z rank 1
+  piko.source @a
+  // expected-remark @below {{stage 'a' updates pixels of 'depth' in any order}}
+  // expected-remark @below {{stage 'a' updates pixels of 'both' in any order}}
+  piko.stage @a bins [0] threads 1 : @F -> [] {
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      %x = piko.get %f "x" : !piko.prim<@F> -> i32
+      %n = piko.get %f "n" : !piko.prim<@F> -> i32
+      %c = arith.cmpi sgt, %x, %n : i32
+      piko.update @depth[%x : i32] {
+      ^bb0(%old: f32, %m: i32):
+        %new = scf.if %c -> (i32) {
+          %more = arith.ori %m, %x : i32
+          scf.yield %more : i32
+        } else {
+          scf.yield %m : i32
+        }
+        piko.yield [%old, %new : f32, i32]
+      }
+      piko.update @both[%x : i32] {
+      ^bb0(%old: f32, %m: i32):
+        %more = arith.addi %m, %x : i32
+        %new = scf.if %c -> (i32) {
+          scf.yield %more : i32
+        } else {
+          scf.yield %m : i32
+        }
+        piko.yield [%old, %new : f32, i32]
+      }
+      piko.return
+    }
+  }
+}
