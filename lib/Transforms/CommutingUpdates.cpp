@@ -147,12 +147,7 @@ static void createAtomic(OpBuilder &builder, UpdateOp update, RecordOp record,
 static scf::IfOp createTest(OpBuilder &builder, UpdateOp update,
                             BinArithmetic &bins, ArrayRef<Value> at) {
   Location loc = update.getLoc();
-  SmallVector<Value> lo, hi;
-  for (int64_t dim = 0, e = at.size(); dim < e; ++dim) {
-    lo.push_back(bins.lo(update.getBin(), dim));
-    hi.push_back(bins.hi(update.getBin(), dim));
-  }
-  auto test = scf::IfOp::create(builder, loc, bins.isInside(at, lo, hi),
+  auto test = scf::IfOp::create(builder, loc, bins.isInBin(at, update.getBin()),
                                 /*withElse=*/true);
   OpBuilder otherwise = test.getElseBodyBuilder();
   FailOp::create(otherwise, loc, getKernelStage(update).getSymName(),

@@ -38,15 +38,11 @@ struct ConvertUpdate : OpRewritePattern<UpdateOp> {
       return rewriter.notifyMatchFailure(update, "not in a kernel of loops");
     Location loc = update.getLoc();
     BinArithmetic bins(rewriter, loc, stage);
-    SmallVector<Value> at = toIndices(bins, update.getCoordinates()), lo, hi;
-    for (int64_t dim = 0, e = at.size(); dim < e; ++dim) {
-      lo.push_back(bins.lo(update.getBin(), dim));
-      hi.push_back(bins.hi(update.getBin(), dim));
-    }
+    SmallVector<Value> at = toIndices(bins, update.getCoordinates());
     Value inside = update->hasAttr(marks::inside)
                        ? arith::ConstantOp::create(rewriter, loc,
                                                    rewriter.getBoolAttr(true))
-                       : bins.isInside(at, lo, hi);
+                       : bins.isInBin(at, update.getBin());
     auto ifOp = scf::IfOp::create(rewriter, loc, update.getResultTypes(),
                                   inside, /*withElseRegion=*/true);
     rewriter.setInsertionPointToStart(ifOp.elseBlock());

@@ -168,6 +168,15 @@ Value BinArithmetic::isInside(ValueRange at, ValueRange lo, ValueRange hi) {
   return inside;
 }
 
+Value BinArithmetic::isInBin(ValueRange at, Value bin) {
+  SmallVector<Value> first, end;
+  for (int64_t dim = 0, e = at.size(); dim < e; ++dim) {
+    first.push_back(lo(bin, dim));
+    end.push_back(hi(bin, dim));
+  }
+  return isInside(at, first, end);
+}
+
 Value BinArithmetic::isInState(StringRef state, ValueRange indices) {
   SmallVector<Value> at, lo, hi;
   for (auto [dim, index] : llvm::enumerate(indices)) {

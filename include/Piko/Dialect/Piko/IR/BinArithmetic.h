@@ -44,6 +44,8 @@ public:
   /// Whether all of lo <= at < hi.
   mlir::Value isInside(mlir::ValueRange at, mlir::ValueRange lo,
                        mlir::ValueRange hi);
+  /// Whether a cell is in a bin.
+  mlir::Value isInBin(mlir::ValueRange at, mlir::Value bin);
   /// Whether a buffer or image has an element with these indices.
   mlir::Value isInState(llvm::StringRef state, mlir::ValueRange indices);
 
