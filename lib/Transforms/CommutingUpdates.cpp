@@ -1,14 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #include "CommutingUpdates.h"
 
+#include "PixelAccess.h"
 #include "PixelSelection.h"
 #include "SplitUpdate.h"
 
-#include "Piko/Dialect/Piko/IR/BinArithmetic.h"
-#include "Piko/Dialect/Piko/IR/Marks.h"
-
 #include "mlir/Dialect/Arith/IR/Arith.h"
-#include "mlir/Dialect/SCF/IR/SCF.h"
 #include "mlir/IR/PatternMatch.h"
 #include "llvm/ADT/MapVector.h"
 #include "llvm/ADT/TypeSwitch.h"
@@ -110,73 +107,31 @@ SmallVector<CommutingUpdate> piko::findCommutingUpdates(KernelOp kernel) {
 // Rewriting
 //===----------------------------------------------------------------------===//
 
-/// The field of a record's number, and which element of it that is.
-static std::pair<FieldAttr, int64_t> findField(RecordOp record,
-                                               unsigned number) {
-  int64_t rest = number;
-  for (auto field : record.getFields().getAsRange<FieldAttr>()) {
-    if (rest < field.getElementCount())
-      return {field, rest};
-    rest -= field.getElementCount();
-  }
-  llvm_unreachable("a number of the record");
-}
-
-static void createAtomic(OpBuilder &builder, UpdateOp update, RecordOp record,
-                         ArrayRef<Value> at, const Change &change) {
-  Location loc = change.op->getLoc();
-  auto [field, element] = findField(record, change.number);
-  SmallVector<Value> elements(field.getCounts().size());
-  for (auto [index, count] :
-       llvm::reverse(llvm::zip(elements, field.getCounts()))) {
-    index = arith::ConstantIndexOp::create(builder, loc, element % count);
-    element /= count;
-  }
+static void createAtomic(OpBuilder &builder, const PixelAccess &pixel,
+                         const Change &change) {
   Value value = change.value;
   if (isa<arith::SubIOp>(change.op)) {
+    Location loc = change.op->getLoc();
     Value zero = arith::ConstantOp::create(
         builder, loc, builder.getZeroAttr(value.getType()));
     value = arith::SubIOp::create(builder, loc, zero, value);
   }
-  AtomicOp::create(builder, loc, Type(), change.kind, update.getImage(), at,
-                   field.getName(), elements, value, /*checked=*/true,
-                   update.getOfAttr(), /*copy=*/Value());
-}
-
-/// A region that runs where the pixel is in the bin; elsewhere the run fails.
-static scf::IfOp createTest(OpBuilder &builder, UpdateOp update,
-                            BinArithmetic &bins, ArrayRef<Value> at) {
-  Location loc = update.getLoc();
-  auto test = scf::IfOp::create(builder, loc, bins.isInBin(at, update.getBin()),
-                                /*withElse=*/true);
-  OpBuilder otherwise = test.getElseBodyBuilder();
-  FailOp::create(otherwise, loc, getKernelStage(update).getSymName(),
-                 update.getImage(), at, /*outside_bin=*/true,
-                 findBin(otherwise, update), update.getOfAttr());
-  return test;
+  pixel.change(builder, change.number, change.kind, value);
 }
 
 void piko::makeAtomic(CommutingUpdate &commuting) {
   UpdateOp update = commuting.update;
   IRRewriter builder(update);
   Location loc = update.getLoc();
-  BinArithmetic bins(builder, loc, getKernelStage(update));
-  SmallVector<Value> at =
-      llvm::map_to_vector(update.getCoordinates(),
-                          [&](Value value) { return bins.toIndex(value); });
-  if (!update->hasAttr(marks::inside)) {
-    scf::IfOp test = createTest(builder, update, bins, at);
-    update->moveBefore(test.thenBlock()->getTerminator());
-    builder.setInsertionPoint(update);
-  }
-  auto image = lookupInPipeline<ImageOp>(update, update.getImageAttr());
-  RecordOp record = lookupRecord(image, image.getRecordAttr());
+  PixelAccess pixel(update);
+  scf::IfOp test = pixel.createTest(builder, TypeRange());
+  update->moveBefore(test.thenBlock()->getTerminator());
   Block &body = update.getBody().front();
   Operation *yield = body.getTerminator();
   for (const Change &change : commuting.changes) {
     if (!change.condition) {
       builder.setInsertionPoint(change.op);
-      createAtomic(builder, update, record, at, change);
+      createAtomic(builder, pixel, change);
       continue;
     }
     builder.setInsertionPoint(yield);
@@ -184,7 +139,7 @@ void piko::makeAtomic(CommutingUpdate &commuting) {
                                     /*withElse=*/true);
     OpBuilder inside = change.outcome ? branch.getThenBodyBuilder()
                                       : branch.getElseBodyBuilder();
-    createAtomic(inside, update, record, at, change);
+    createAtomic(inside, pixel, change);
   }
   // What is left of the old numbers is not used.
   builder.setInsertionPoint(update);

@@ -5,6 +5,8 @@
 
 #include "Tiles.h"
 
+#include "../../Transforms/PixelAccess.h"
+
 #include "Piko/Conversion/Passes.h"
 #include "Piko/Dialect/Piko/IR/BinArithmetic.h"
 #include "Piko/Dialect/Piko/IR/Marks.h"
@@ -36,63 +38,30 @@ struct ConvertUpdate : OpRewritePattern<UpdateOp> {
     StageOp stage = getKernelStage(update);
     if (!stage || !update.getBin())
       return rewriter.notifyMatchFailure(update, "not in a kernel of loops");
-    Location loc = update.getLoc();
-    BinArithmetic bins(rewriter, loc, stage);
-    SmallVector<Value> at = toIndices(bins, update.getCoordinates());
-    Value inside = update->hasAttr(marks::inside)
-                       ? arith::ConstantOp::create(rewriter, loc,
-                                                   rewriter.getBoolAttr(true))
-                       : bins.isInBin(at, update.getBin());
-    auto ifOp = scf::IfOp::create(rewriter, loc, update.getResultTypes(),
-                                  inside, /*withElseRegion=*/true);
-    rewriter.setInsertionPointToStart(ifOp.elseBlock());
-    FailOp::create(rewriter, loc, stage.getSymName(), update.getImage(), at,
-                   /*outside_bin=*/true, findBin(rewriter, update),
-                   update.getOfAttr());
-    SmallVector<Value> zeros;
-    for (Type type : update.getResultTypes())
-      zeros.push_back(
-          arith::ConstantOp::create(rewriter, loc, rewriter.getZeroAttr(type)));
-    if (ifOp.getNumResults())
-      scf::YieldOp::create(rewriter, loc, zeros);
-    convertBody(update, ifOp, at, rewriter);
-    rewriter.replaceOp(update, ifOp);
+    PixelAccess pixel(update);
+    scf::IfOp test = pixel.createTest(rewriter, update.getResultTypes());
+    convertBody(update, pixel, test, rewriter);
+    rewriter.replaceOp(update, test);
     return success();
   }
 
 private:
   /// Loads of the pixel, the body, stores of what it yields.
-  static void convertBody(UpdateOp update, scf::IfOp ifOp, ArrayRef<Value> at,
-                          PatternRewriter &rewriter) {
-    Location loc = update.getLoc();
-    auto image = lookupInPipeline<ImageOp>(update, update.getImageAttr());
-    RecordOp record = lookupRecord(image, image.getRecordAttr());
+  static void convertBody(UpdateOp update, const PixelAccess &pixel,
+                          scf::IfOp test, PatternRewriter &rewriter) {
     auto yield = cast<YieldOp>(update.getBody().front().getTerminator());
-    rewriter.setInsertionPointToStart(ifOp.thenBlock());
-    SmallVector<Value> oldValues;
-    forEachElement(rewriter, loc, record, [&](FieldAttr field, ValueRange es) {
-      oldValues.push_back(LoadOp::create(rewriter, loc, field.getType(),
-                                         update.getImage(), at, field.getName(),
-                                         es, update.getTile(), /*checked=*/true,
-                                         /*of=*/nullptr));
-    });
-    Block *then = ifOp.thenBlock();
-    if (ifOp.getNumResults() == 0)
+    SmallVector<Value> oldValues = pixel.load(rewriter);
+    Block *then = test.thenBlock();
+    if (test.getNumResults() == 0)
       rewriter.setInsertionPoint(then->getTerminator());
     rewriter.inlineBlockBefore(&update.getBody().front(), then,
                                rewriter.getInsertionPoint(), oldValues);
     rewriter.setInsertionPoint(yield);
-    SmallVector<Value> newValues(yield.getPixel());
-    int64_t element = 0;
-    forEachElement(rewriter, loc, record, [&](FieldAttr field, ValueRange es) {
-      int64_t i = element++;
-      if (newValues[i] != oldValues[i])
-        StoreOp::create(rewriter, loc, newValues[i], update.getImage(), at,
-                        field.getName(), es, update.getTile(),
-                        /*checked=*/true, /*of=*/nullptr);
-    });
-    if (ifOp.getNumResults())
-      scf::YieldOp::create(rewriter, loc, yield.getResults());
+    for (auto [number, value] : llvm::enumerate(yield.getPixel()))
+      if (value != oldValues[number])
+        pixel.store(rewriter, number, value);
+    if (test.getNumResults())
+      scf::YieldOp::create(rewriter, update.getLoc(), yield.getResults());
     rewriter.eraseOp(yield);
   }
 };

@@ -8,6 +8,8 @@
 
 #include "Tiles.h"
 
+#include "../../Transforms/PixelAccess.h"
+
 #include "Piko/Dialect/Piko/IR/BinArithmetic.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
@@ -20,22 +22,6 @@
 
 using namespace mlir;
 using namespace piko;
-
-void piko::forEachElement(
-    OpBuilder &builder, Location loc, RecordOp record,
-    llvm::function_ref<void(FieldAttr, ValueRange)> body) {
-  for (auto field : record.getFields().getAsRange<FieldAttr>())
-    for (int64_t i = 0, e = field.getElementCount(); i < e; ++i) {
-      SmallVector<Value> indices(field.getCounts().size());
-      int64_t rest = i;
-      for (auto [index, count] :
-           llvm::reverse(llvm::zip(indices, field.getCounts()))) {
-        index = arith::ConstantIndexOp::create(builder, loc, rest % count);
-        rest /= count;
-      }
-      body(field, indices);
-    }
-}
 
 namespace {
 

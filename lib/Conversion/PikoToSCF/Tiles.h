@@ -9,12 +9,6 @@
 
 namespace piko {
 
-/// Calls `body` with each number of a record: its field, and its indices into
-/// an array.
-void forEachElement(mlir::OpBuilder &builder, mlir::Location loc,
-                    RecordOp record,
-                    llvm::function_ref<void(FieldAttr, mlir::ValueRange)> body);
-
 /// Makes private arrays of tiles, with loops that fill them and write them
 /// back; or leaves them where they are in their image, and clears that. Updates
 /// have become loads and stores.
