@@ -246,7 +246,7 @@ void piko::addPasses(OpPassManager &passes, Level from, Level to,
     addMachineSequence(passes);
   if (goes(Level::Target)) {
     if (gpu.target != GPUTarget::None)
-      addGPUSequence(passes, gpu);
+      addGPUSequence(passes, gpu, chosen);
     else
       addCPUSequence(passes, chosen, cpu);
   }
@@ -365,7 +365,7 @@ LogicalResult piko::lowerToGPU(ModuleOp module, const CheckOptions &check,
     loc = pipeline.getLoc();
   PassManager passes(module.getContext());
   addPasses(passes, from, Level::Machine, check, synthesis);
-  addGPUSequence(passes, gpu);
+  addGPUSequence(passes, gpu, choosePasses(check, synthesis));
   if (failed(run(passes, module)))
     return failure();
   if (hasGPUKernels(module))

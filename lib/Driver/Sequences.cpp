@@ -230,7 +230,12 @@ void piko::addLLVMSequence(OpPassManager &passes) {
   passes.addPass(createReconcileUnrealizedCastsPass());
 }
 
-void piko::addGPUSequence(OpPassManager &passes, const GPUOptions &options) {
+void piko::addGPUSequence(OpPassManager &passes, const GPUOptions &options,
+                          const SynthesisOptions &synthesis) {
+  if (synthesis.has("reduce-by-atomics")) {
+    passes.addPass(createReduceByAtomics());
+    addCleanUp(passes);
+  }
   ConvertPikoToGPUOptions grids;
   grids.threads = options.threads;
   passes.nest<PipelineOp>().addPass(createConvertPikoToGPU(grids));

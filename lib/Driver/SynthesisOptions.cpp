@@ -20,7 +20,7 @@ const std::vector<std::string> &SynthesisOptions::getOptional() {
       "hoist-loads", "hoist-bounds", "merge-bounds", "thread-jumps",
       "narrow-integers", "merge-gathers", "pair-gathers", "tabulate-invariants",
       "unroll-and-jam", "if-convert", "uplift-pixel-loops", "privatize",
-      "reduce-updates",
+      "reduce-updates", "reduce-by-atomics",
       // of LLVM
       "loop-vectorize", "slp-vectorizer"};
   return names;

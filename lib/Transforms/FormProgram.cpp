@@ -371,6 +371,8 @@ LogicalResult ProgramWriter::findKernels() {
                               "wait for each other");
   llvm::DenseSet<Operation *> found;
   for (auto kernel : pipeline.getOps<KernelOp>()) {
+    if (kernel.getPrecedes())
+      continue;
     SmallVector<StageOp> stages = getStages(kernel);
     found.insert(stages.begin(), stages.end());
     if (getAssignedSource(kernel))
@@ -474,7 +476,8 @@ LogicalResult ProgramWriter::run() {
         schedule && !schedule.getBody().empty())
       ScheduleBinsOp::create(builder, schedule.getLoc(), stage.getSymName());
   for (auto kernel : pipeline.getOps<KernelOp>())
-    createKernel(kernel);
+    if (!kernel.getPrecedes())
+      createKernel(kernel);
   return success();
 }
 

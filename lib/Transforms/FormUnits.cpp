@@ -204,6 +204,9 @@ void UnitFormer::convertItems(ItemsOp items, Value from, Value begin, Value end,
   Value prim = ItemOp::create(rewriter, at, items.getPrim().getType(), from,
                               loop.getInductionVar());
   Operation *terminator = loop.getBody()->getTerminator();
+  for (Operation *user : llvm::make_early_inc_range(items.getPrim().getUsers()))
+    if (isa<PositionOp>(user))
+      rewriter.replaceOp(user, loop.getInductionVar());
   rewriter.inlineBlockBefore(items.getBodyBlock(), terminator, prim);
   rewriter.setInsertionPoint(terminator);
   if (!items.getProducer())
@@ -252,6 +255,10 @@ void UnitFormer::convertLocal(WorkOpInterface local) {
   }
   auto range = CellRangeOp::create(rewriter, at, from, zero, zero);
   local->moveBefore(next);
+  if (auto again = local->removeDiscardableAttr(marks::again)) {
+    around->setDiscardableAttr(marks::again, again);
+    next.erase(); // it emits nothing, and the bin ends with the other
+  }
   convertItems(cast<ItemsOp>(*local), from, range.getBegin(), range.getEnd(),
                writer);
 }
@@ -288,8 +295,14 @@ void UnitFormer::convertPlaces(Value prim, Value writer, IntegerAttr port) {
 }
 
 void FormUnitsPass::runOnOperation() {
-  for (auto kernel : getOperation().getOps<KernelOp>())
+  for (auto kernel : getOperation().getOps<KernelOp>()) {
+    if (kernel.getPrecedes()) {
+      kernel.emitOpError("expected a kernel of its own: one that precedes "
+                         "another is a GPU's");
+      return signalPassFailure();
+    }
     for (Operation &op : llvm::make_early_inc_range(*kernel.getBodyBlock()))
       if (isa<BinsOp, ItemsOp>(op))
         UnitFormer(kernel, &op).run();
+  }
 }

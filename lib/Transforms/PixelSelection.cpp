@@ -424,6 +424,7 @@ bool SelectionFinder::merge(const Selection &selection) {
                     "another update selects pixels of this image by another "
                     "key, or keeps other numbers");
     llvm::append_range(known.sites, selection.sites);
+    llvm::append_range(known.carried, selection.carried);
     return true;
   }
   selections.push_back(selection);
@@ -538,6 +539,7 @@ bool SelectionFinder::findCarried(Selection &selection) {
     if (!addKept(selection, image))
       return refuse(other, "this number is updated twice");
     behind.insert(other);
+    selection.carried.push_back(other);
   }
   // The same for each site.
   llvm::sort(MutableArrayRef(selection.images).drop_front(),
@@ -572,6 +574,12 @@ bool SelectionFinder::checkOthers() {
                 return WalkResult::interrupt();
               })
               .wasInterrupted();
+}
+
+bool piko::hasOneOrderedBin(StageOp stage) {
+  return llvm::all_of(stage.getBins(),
+                      [](int64_t extent) { return extent == 0; }) &&
+         stage.getOrdered() && !stage.getTile() && !stage.getTakesList();
 }
 
 bool SelectionFinder::find() {

@@ -10,6 +10,8 @@
 
 #include "llvm/ADT/SetVector.h"
 
+#include <vector>
+
 namespace piko {
 
 /// Whether a value depends on what the pixel was that an update changes.
@@ -47,7 +49,12 @@ struct Selection {
   /// The first one has the key, the others are overwritten where it changes.
   llvm::SmallVector<Image> images;
   llvm::SmallVector<Site> sites;
+  /// What is overwritten behind them, where they have kept new numbers.
+  llvm::SmallVector<UpdateOp> carried;
 };
+
+/// Whether primitives that are in order are all in one bin.
+bool hasOneOrderedBin(StageOp stage);
 
 /// Finds whether all that a kernel does to pixels is to select them.
 class SelectionFinder {
@@ -60,7 +67,7 @@ public:
   /// False if there is a reason.
   bool find();
 
-  llvm::SmallVector<Selection> selections;
+  std::vector<Selection> selections;
   std::optional<Reason> reason;
 
 private:

@@ -5,6 +5,7 @@
 // where the order in which they change them does not show.
 
 #include "CommutingUpdates.h"
+#include "InternalImage.h"
 #include "PixelSelection.h"
 #include "UnitWork.h"
 
@@ -38,7 +39,6 @@ public:
   void privatize(const Selection &selection);
 
 private:
-  ImageOp createUnitImage(ImageOp image);
   PrivateImagesOp createImages(const Selection &selection, ImageOp unitImage);
   std::pair<UpdateOp, Value> createKept(const Selection::Site &site);
   void noteUnit(const Selection::Site &site, ImageOp unitImage, Value shared);
@@ -56,30 +56,7 @@ private:
 static bool runsOneBin(StageOp stage, OpenWriterOp writer) {
   auto units = writer->getParentOfType<scf::ForallOp>();
   auto kind = units->getAttrOfType<UnitLoopAttr>(marks::units);
-  return llvm::all_of(stage.getBins(),
-                      [](int64_t extent) { return extent == 0; }) &&
-         stage.getOrdered() && !stage.getTile() && !stage.getTakesList() &&
-         kind && kind.getValue() == UnitLoop::Shared;
-}
-
-/// An image of a number for each pixel, which is none of the pipeline's.
-ImageOp ImagePrivatizer::createUnitImage(ImageOp image) {
-  constexpr StringLiteral recordName = "piko.unit";
-  auto module = pipeline->getParentOfType<ModuleOp>();
-  Location loc = image.getLoc();
-  auto type = builder.getI32Type();
-  if (!module.lookupSymbol(recordName)) {
-    builder.setInsertionPointToStart(module.getBody());
-    auto field = FieldAttr::get(builder.getContext(), "unit", type, 0, {}, {});
-    RecordOp::create(builder, loc, recordName, builder.getArrayAttr({field}), 4,
-                     4);
-  }
-  builder.setInsertionPointAfter(image);
-  std::string stem = (image.getSymName() + ".unit").str(), name = stem;
-  for (int i = 0; SymbolTable::lookupSymbolIn(pipeline, name); ++i)
-    name = stem + std::to_string(i);
-  return ImageOp::create(builder, loc, name, recordName, image.getRank(),
-                         /*clear=*/nullptr, /*internal=*/true);
+  return hasOneOrderedBin(stage) && kind && kind.getValue() == UnitLoop::Shared;
 }
 
 PrivateImagesOp ImagePrivatizer::createImages(const Selection &selection,
@@ -178,7 +155,8 @@ void ImagePrivatizer::noteUnit(const Selection::Site &site, ImageOp unitImage,
 void ImagePrivatizer::privatize(const Selection &selection) {
   auto key = cast<ImageOp>(
       SymbolTable::lookupSymbolIn(pipeline, selection.images.front().name));
-  ImageOp unitImage = createUnitImage(key);
+  ImageOp unitImage = createInternalImage(key, "unit", builder.getI32Type(),
+                                          /*clear=*/nullptr);
   PrivateImagesOp images = createImages(selection, unitImage);
   if (!unit) {
     builder.setInsertionPointAfter(writer);

@@ -13,7 +13,7 @@ static State &findState(pikort_pipeline &p, const char *name) {
   if (!name)
     invalid("expected the name of a state, but got null");
   for (State &state : p.states)
-    if (state.name == name)
+    if (state.name == name && !state.internal)
       return state;
   throw Failure{PIKORT_NOT_FOUND,
                 "pipeline " + quoted(p.name) + " has no state " + quoted(name)};

@@ -47,11 +47,17 @@ constexpr int32_t mostKeyWords = 1 << 20;
 
 static const char *orEmpty(const char *text) { return text ? text : ""; }
 
-static State &findBuffer(pikort_pipeline *p, int32_t id) {
+static State &findState(pikort_pipeline *p, int32_t id, int32_t kind,
+                        const char *what) {
   expect(id >= 0 && id < static_cast<int32_t>(p->states.size()) &&
-             p->states[id].kind == PIKORT_BUFFER,
-         "expected the number of a buffer, but got " + std::to_string(id));
+             p->states[id].kind == kind,
+         std::string("expected the number of ") + what + ", but got " +
+             std::to_string(id));
   return p->states[id];
+}
+
+static State &findBuffer(pikort_pipeline *p, int32_t id) {
+  return findState(p, id, PIKORT_BUFFER, "a buffer");
 }
 
 extern "C" {
@@ -150,6 +156,11 @@ void pikoir_declare_fixed(pikort_pipeline *p, int32_t id, const char *field,
            "state " + quoted(state.name) + ": expected what can be fixed");
     p->fixed.push_back({id, orEmpty(field), offset, size, bits});
   });
+}
+
+void pikoir_declare_internal(pikort_pipeline *p, int32_t id) {
+  guarded(p, "setup",
+          [&] { findState(p, id, PIKORT_IMAGE, "an image").internal = true; });
 }
 
 void pikoir_declare_written(pikort_pipeline *p, int32_t id) {

@@ -21,6 +21,7 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <span>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -58,6 +59,7 @@ struct State {
   bool bound = false;
   bool written = false;       ///< A buffer that kernels change.
   bool unused = false;        ///< A buffer that no kernel uses.
+  bool internal = false;      ///< An image that the host does not see.
   bool onDevice = false;      ///< What is bound is a device's memory.
   std::vector<uint8_t> clear; ///< One record, or empty.
   std::vector<uint8_t> bytes; ///< A constant's, ...
@@ -322,6 +324,13 @@ struct pikort_pipeline {
   /// Forgets the status and the message.
   void clearStatus() noexcept;
 
+  /// Those of the states that the host sees, which come first.
+  std::span<const piko::rt::State> hostStates() const {
+    size_t count = states.size();
+    while (count > 0 && states[count - 1].internal)
+      --count;
+    return std::span(states).first(count);
+  }
   /// The number of a stage's record as the host knows it.
   int32_t hostRecord(int32_t stage) const {
     int32_t record = stages[stage].record, host = records[record].host;

@@ -33,7 +33,7 @@ int32_t pikort_record_count(const pikort_pipeline *p) {
   return p ? countOf(p->records) : 0;
 }
 int32_t pikort_state_count(const pikort_pipeline *p) {
-  return p ? countOf(p->states) : 0;
+  return p ? countOf(p->hostStates()) : 0;
 }
 int32_t pikort_stage_count(const pikort_pipeline *p) {
   return p ? countOf(p->stages) : 0;
@@ -69,7 +69,7 @@ int32_t pikort_get_state_info(pikort_pipeline *p, int32_t index,
                               pikort_state_info *info) {
   if (!p)
     return PIKORT_INVALID_ARGUMENT;
-  return describe(p, p->states, index, "state", info, [](const State &s) {
+  return describe(p, p->hostStates(), index, "state", info, [](const State &s) {
     bool bound = s.bound || s.kind == PIKORT_IMAGE || s.perSource >= 0;
     return pikort_state_info{s.name.c_str(), s.kind,      s.record,
                              s.rank,         s.perSource, bound};

@@ -21,7 +21,7 @@ PASSES = ["pre-schedule", "infer-directives", "fuse-stages", "test-early", "prun
           "form-tiles", "prefetch", "vectorize", "prove-bounds", "hoist-loads",
           "hoist-bounds", "merge-bounds", "thread-jumps", "narrow-integers",
           "merge-gathers", "pair-gathers", "if-convert", "uplift-pixel-loops",
-          "privatize", "reduce-updates"]
+          "privatize", "reduce-updates", "reduce-by-atomics"]
 
 
 def options_of(passes):

@@ -48,7 +48,8 @@ void addLLVMSequence(mlir::OpPassManager &passes);
 /// `piko-to-gpu`: from the machine level to kernels in a `gpu.module`, and
 /// functions that launch them. Where the options say so, these launch them on
 /// the emulator, and kernels are in the llvm and nvvm dialects.
-void addGPUSequence(mlir::OpPassManager &passes, const GPUOptions &options);
+void addGPUSequence(mlir::OpPassManager &passes, const GPUOptions &options,
+                    const SynthesisOptions &synthesis = {});
 
 /// From kernels in a `gpu.module` to such that the emulator or a device runs,
 /// as the options say.

@@ -374,4 +374,79 @@ def SplitLoops : Pass<"piko-split-loops", "::piko::PipelineOp"> {
                            "::mlir::scf::SCFDialect"];
 }
 
+def ReduceByAtomics : Pass<"piko-reduce-by-atomics", "::mlir::ModuleOp"> {
+  let summary = "Let blocks share a bin where updates are reductions";
+  let description = [{
+    **Requires** the machine level and a program. For a GPU, in front of
+    `convert-piko-to-gpu`; what `piko-reduce-updates` is for the CPU.
+
+    **Does**: updates of a pixel run in order of lineage, so that one block runs a
+    bin that is the whole domain. Where all that the kernel's updates do is an
+    arg-min reduction, as described there, blocks share the bin. The key of an
+    update and the position of its primitive (`piko.position`) become words of 64
+    bits, of which the least one, as unsigned, comes first; an internal image holds
+    one for each pixel. Kernels that precede the kernel find the least words by
+    atomic operations, and do nothing else; two where the key and the position
+    take two words. In the kernel itself a primitive changes those pixels whose
+    words are its own, by stores: nobody else does. What is carried is computed
+    once for each pixel, as visibility comes before shading.
+
+    Work on what comes along a local edge is one thread's for the same reason, also
+    in bins of a size. Where its updates are such a reduction, work on the same in
+    front of it finds the least words (marked `piko.again`), and threads share both.
+
+    Images whose numbers are all changed by one integer operation that commutes and
+    associates are changed by `piko.atomic` instead.
+
+    **Guarantees** the same bits and the same errors.
+
+    Before:
+    ```
+    piko.items of @draw {
+    ^bb0(%f: !piko.prim<@F>):
+      %closer = piko.update @depth[%x, %y : i32, i32] in %bin {
+      ^bb0(%old: f32):
+        %less = arith.cmpf olt, %z, %old : f32
+        %new = arith.select %less, %z, %old : f32
+        piko.yield [%new : f32] results [%less : i1]
+      } -> i1
+      scf.if %closer {
+        piko.update @color[%x, %y : i32, i32] in %bin {
+          ...
+    ```
+    After:
+    ```
+    piko.kernel @kernel_draw_first precedes @kernel_draw {
+      ...
+      %old = piko.load checked @depth[%x, %y : index, index] "z" : f32
+      %less = arith.cmpf olt, %z, %old : f32
+      ...
+      scf.if %isBefore {
+        piko.atomic min_unsigned checked @depth.first[%x, %y : index, index] "first", %word
+      }
+    }
+    piko.kernel @kernel_draw {
+      ...
+      %first = piko.load checked @depth.first[%x, %y : index, index] "first" : i64
+      %isOwn = arith.cmpi eq, %word, %first : i64
+      %closer = arith.andi %less, %isOwn : i1
+      scf.if %closer {
+        piko.store %z, checked @depth[%x, %y : index, index] "z" : f32
+      ...
+    ```
+
+    **Limits**: phases that take lists, stages that update pixels and host others,
+    kernels that are launched again and again, work that reads what the kernel
+    writes, and schedules that serialize stay in one block, or with one thread; so
+    does a key that takes more than two words. Remarks say what is
+    selected, and what is in the way.
+  }];
+  let statistics = [
+    Statistic<"reduced", "reduced", "selections that blocks share">,
+    Statistic<"atomics", "atomics", "updates that became atomic operations">,
+    Statistic<"refused", "refused", "stages whose only bin one block runs">];
+  let dependentDialects = ["::mlir::arith::ArithDialect",
+                           "::mlir::scf::SCFDialect"];
+}
+
 #endif // PIKO_TRANSFORMS_MACHINEPASSES_TD

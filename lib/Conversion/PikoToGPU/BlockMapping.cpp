@@ -345,7 +345,8 @@ LogicalResult BlockMapper::mapIterations(ParallelForOp loop) {
   return success();
 }
 
-/// The block takes what is to be read there, and forgets it at the end.
+/// The block takes what is to be read there, and forgets it at the end, if
+/// nothing else is to read it.
 LogicalResult BlockMapper::mapLocalBin(LocalBinOp local) {
   OpBuilder builder(local);
   memory.flush(builder);
@@ -353,6 +354,8 @@ LogicalResult BlockMapper::mapLocalBin(LocalBinOp local) {
     return failure();
   builder.setInsertionPointAfter(local);
   gpu::BarrierOp::create(builder, loc);
+  if (local->removeAttr(marks::again))
+    return success();
   scf::IfOp first = createFirst(builder);
   OpBuilder inside = first.getThenBodyBuilder();
   memory.setLocalCount(inside, local,

@@ -91,6 +91,41 @@ static bool needsPositions(KernelOp kernel) {
   return needs;
 }
 
+template <class OpT> static OpT findOnly(KernelOp kernel) {
+  OpT found;
+  kernel.walk([&](OpT op) { found = op; });
+  return found;
+}
+
+void piko::launchInFrontOf(KernelOp kernel, KernelOp first) {
+  auto bins = findOnly<OpenBinsOp>(kernel),
+       ownBins = findOnly<OpenBinsOp>(first);
+  auto log = findOnly<OpenLogOp>(kernel), ownLog = findOnly<OpenLogOp>(first);
+  auto blocks = findOnly<BlockCountOp>(kernel),
+       ownBlocks = findOnly<BlockCountOp>(first);
+  auto launches = cast<scf::IfOp>(ownLog->getParentOp());
+  findOnly<CloseBinsOp>(first)->erase();
+  findOnly<CloseLogOp>(first)->erase();
+  ownBins.getBins().replaceAllUsesWith(bins.getBins());
+  ownLog.getLog().replaceAllUsesWith(log.getLog());
+  ownLog->erase();
+  Block::iterator behind = std::next(log->getIterator());
+  Block &body = *launches.thenBlock();
+  log->getBlock()->getOperations().splice(behind, body.getOperations(),
+                                          body.begin(),
+                                          body.getTerminator()->getIterator());
+  launches->erase();
+  // Constants of the first may be in front of its bins.
+  Block &all = *first.getBodyBlock();
+  ownBlocks.getBlocks().replaceAllUsesWith(blocks.getBlocks());
+  ownBlocks->erase();
+  ownBins->erase();
+  kernel.getBodyBlock()->getOperations().splice(
+      std::next(blocks->getIterator()), all.getOperations(), all.begin(),
+      all.end());
+  first.erase();
+}
+
 Value GridFormer::createWriter(Location at, FlatSymbolRefAttr other) {
   rewriter.setInsertionPoint(unitEnd);
   return other ? LogOfOp::create(rewriter, at, log, other).getResult() : log;

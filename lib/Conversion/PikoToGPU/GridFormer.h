@@ -36,6 +36,10 @@ private:
   int64_t threads;
 };
 
+/// Makes the launch of a kernel that precedes another one a launch of that one,
+/// in front of those that it has.
+void launchInFrontOf(KernelOp kernel, KernelOp first);
+
 /// Positions end for those who ask where something was emitted.
 void dropEnds(KernelOp kernel, mlir::gpu::LaunchOp launch);
 

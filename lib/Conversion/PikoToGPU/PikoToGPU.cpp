@@ -12,7 +12,8 @@
 //      of atomics (DeferredWork.cpp), set rare branches apart (RareBranches.cpp
 //      and RareRounds.cpp), and map the block's work to its threads
 //      (BlockMapping.cpp);
-//   4. convert access to state, and open a log for what the grid leaves.
+//   4. convert access to state, and open a log for what the grid leaves;
+//   5. if it precedes another kernel, become a launch of that one's.
 
 #include "PikoToGPU.h"
 #include "CollapsedPixels.h"
@@ -115,7 +116,8 @@ LogicalResult GridBuilder::findItems() {
 void GridBuilder::formGrid() {
   Operation *work = findWork(kernel);
   work->walk([&](WorkOpInterface piece) {
-    if (FlatSymbolRefAttr producer = piece.getProducerAttr())
+    FlatSymbolRefAttr producer = piece.getProducerAttr();
+    if (producer && !piece->hasAttr(marks::again))
       memory.locals.push_back({producer, piece.getPortAttr().getInt()});
   });
   memory.stage = getStageName(work);
@@ -390,6 +392,9 @@ LogicalResult GridBuilder::mapWork(MappingCounts &counts) {
   for (scf::ForOp loop : shared)
     counts.deferred += deferWork(loop, memory, threads);
   std::optional<GridMemory> rest;
+  // What a launch leaves is for the kernel itself.
+  if (kernel.getPrecedes())
+    shared.clear();
   for (scf::ForOp loop : shared) {
     int64_t rare = setRareBranchesApart(loop);
     if (rare && !rest)
@@ -519,4 +524,8 @@ void ConvertPikoToGPUPass::runOnOperation() {
   for (auto kernel : llvm::to_vector(pipeline.getOps<KernelOp>()))
     if (failed(convert(kernel)))
       return signalPassFailure();
+  auto kernels = llvm::to_vector(pipeline.getOps<KernelOp>());
+  for (KernelOp kernel : llvm::reverse(kernels))
+    if (FlatSymbolRefAttr next = kernel.getPrecedesAttr())
+      launchInFrontOf(lookupInPipeline<KernelOp>(kernel, next), kernel);
 }

@@ -39,6 +39,9 @@ std::optional<UnitOrder> piko::getUnitOrder(KernelOp kernel) {
   Operation *work = findWork(kernel);
   if (!work)
     return std::nullopt;
+  // The counters are for the launches of the kernel itself.
+  if (kernel.getPrecedes())
+    return UnitOrder::Fixed;
   // A source's primitives are in no bins yet, and its units have as many each.
   if (isa<ItemsOp>(work))
     return UnitOrder::Fixed;

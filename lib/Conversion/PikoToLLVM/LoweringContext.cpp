@@ -34,10 +34,7 @@ PipelineNumbers::PipelineNumbers(PipelineOp pipeline) : pipeline(pipeline) {
     stages[stage.getSymNameAttr()] = stages.size();
   for (auto record : pipeline->getParentOfType<ModuleOp>().getOps<RecordOp>())
     records[record.getSymNameAttr()] = records.size();
-  for (Operation &op : *pipeline.getBodyBlock())
-    if (auto image = dyn_cast<ImageOp>(op);
-        getStateRecord(&op) && !(image && image.getInternal()))
-      states[SymbolTable::getSymbolName(&op)] = states.size();
+  numberStates();
   pipeline.walk([&](StateAccessOpInterface access) {
     FlatSymbolRefAttr state = access.getAccessedState();
     if (access.getAccessKinds() != StateAccess::reads &&
@@ -63,6 +60,23 @@ PipelineNumbers::PipelineNumbers(PipelineOp pipeline) : pipeline(pipeline) {
                             op.getNumbersAttr(), op.getComparisonsAttr(),
                             op.getKeptAttr(), op.getLast(), op.getOften()});
   });
+}
+
+/// What is internal comes behind what the host knows.
+void PipelineNumbers::numberStates() {
+  llvm::DenseSet<StringAttr> ofThreads;
+  pipeline.walk([&](PrivateImagesOp op) {
+    ofThreads.insert(op.getUnitImageAttr().getAttr());
+  });
+  for (bool internal : {false, true})
+    for (Operation &op : *pipeline.getBodyBlock()) {
+      auto image = dyn_cast<ImageOp>(op);
+      bool isInternal = image && image.getInternal();
+      StringAttr name = SymbolTable::getSymbolName(&op);
+      if (getStateRecord(&op) && isInternal == internal &&
+          !ofThreads.contains(name))
+        states[name] = states.size();
+    }
 }
 
 std::optional<int32_t> PipelineNumbers::findReduction(StringAttr stage,

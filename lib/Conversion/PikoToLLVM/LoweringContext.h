@@ -53,6 +53,9 @@ struct PipelineNumbers {
   /// The number of a selection among those of its stage.
   std::optional<int32_t> findSelection(mlir::StringAttr stage,
                                        mlir::StringAttr unitImage) const;
+
+private:
+  void numberStates();
 };
 
 /// Data and extent of a piece of state, loaded when a kernel starts; of private

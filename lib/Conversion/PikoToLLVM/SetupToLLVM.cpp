@@ -195,6 +195,8 @@ void SetupWriter::declareState(Operation *state, int32_t number) {
         : constant
             ? recordBytes(constant.getRecordAttr(), constant.getValueAttr())
             : null()});
+  if (image && image.getInternal())
+    call(PIKO_RUNTIME_FUNCTION(pikoir_declare_internal), {i32(number)});
   if (numbers.writtenBuffers.contains(SymbolTable::getSymbolName(state)))
     call(PIKO_RUNTIME_FUNCTION(pikoir_declare_written), {i32(number)});
   if (numbers.unusedBuffers.contains(SymbolTable::getSymbolName(state)))

@@ -120,6 +120,8 @@ PIKORT_API void pikoir_declare_state(pikort_pipeline *p, int32_t id,
                                      const char *name, int32_t kind,
                                      int32_t record, int32_t rank,
                                      int32_t per_source, const void *clear);
+/// The image is the kernels' own: the host does not see it.
+PIKORT_API void pikoir_declare_internal(pikort_pipeline *p, int32_t id);
 /// Kernels write the buffer: what the host binds to it must be apart from other
 /// buffers and sources, as generated code takes for granted.
 PIKORT_API void pikoir_declare_written(pikort_pipeline *p, int32_t id);

@@ -222,3 +222,30 @@ piko.pipeline @P rank 1 {
     %bins = piko.storage.open_bins @a source 65536 : !piko.bins<@F>
   }
 }
+
+// -----
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+piko.pipeline @P rank 1 {
+  piko.source @a
+  piko.source @b
+  piko.stage @a bins [0] threads 1 : @F -> [] {}
+  piko.stage @b bins [0] threads 1 : @F -> [] {}
+  // expected-error@+1 {{expected a 'piko.bins' of the same stage as in @kernel_b, which precedes none}}
+  piko.kernel @first precedes @kernel_b {
+    piko.bins of @a {
+    ^bb0(%bin: index):
+      piko.items of @a {
+      ^bb0(%f: !piko.prim<@F>):
+      }
+    }
+  }
+  piko.kernel @kernel_b {
+    piko.bins of @b {
+    ^bb0(%bin: index):
+      piko.items of @b {
+      ^bb0(%f: !piko.prim<@F>):
+      }
+    }
+  }
+}

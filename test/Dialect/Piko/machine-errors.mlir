@@ -225,3 +225,18 @@ piko.pipeline @P rank 1 {
     }
   }
 }
+
+// -----
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+piko.pipeline @P rank 1 {
+  piko.source @a
+  piko.stage @a bins [8] threads 1 placed : @F -> [] {}
+  piko.kernel @k {
+    piko.items of @a source 0 {
+    ^bb0(%f: !piko.prim<@F>):
+      // expected-error@+1 {{expected a primitive of 'piko.items' in 'piko.bins'}}
+      %p = piko.position %f : !piko.prim<@F>
+    }
+  }
+}

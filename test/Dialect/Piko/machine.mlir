@@ -40,3 +40,28 @@ piko.pipeline @Lanes rank 1 {
     }
   }
 }
+
+// CHECK-LABEL: piko.pipeline @Before
+piko.pipeline @Before rank 1 {
+  piko.source @a
+  piko.stage @a bins [0] threads 64 : @F -> [] {}
+  // CHECK: piko.kernel @first precedes @kernel_a {
+  piko.kernel @first precedes @kernel_a {
+    piko.bins of @a {
+    ^bb0(%bin: index):
+      piko.items of @a {
+      ^bb0(%f: !piko.prim<@F>):
+        // CHECK: piko.position %{{.*}} : !piko.prim<@F>
+        %p = piko.position %f : !piko.prim<@F>
+      }
+    }
+  }
+  piko.kernel @kernel_a {
+    piko.bins of @a {
+    ^bb0(%bin: index):
+      piko.items of @a {
+      ^bb0(%f: !piko.prim<@F>):
+      }
+    }
+  }
+}

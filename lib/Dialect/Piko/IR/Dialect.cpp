@@ -80,9 +80,9 @@ void PikoDialect::initialize() {
 /// What an attribute of that name has to be; null where there is none.
 static StringRef getExpectedKind(StringRef name) {
   return llvm::StringSwitch<StringRef>(name)
-      .Cases({marks::lanes, marks::rows, marks::shared, marks::one,
-              marks::deferred, marks::rare, marks::fails, marks::input,
-              marks::shortCircuit, marks::inside, marks::source},
+      .Cases({marks::lanes, marks::rows, marks::shared, marks::again,
+              marks::one, marks::deferred, marks::rare, marks::fails,
+              marks::input, marks::shortCircuit, marks::inside, marks::source},
              "a unit")
       .Case(marks::mapping, "what lanes are given, as #piko<lanes items>")
       .Case(marks::units, "how threads share units, as #piko<units shared>")

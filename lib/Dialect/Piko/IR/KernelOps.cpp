@@ -72,8 +72,26 @@ static LogicalResult verifyLevel(KernelOp kernel) {
   return failure(result.wasInterrupted());
 }
 
+/// Both take the bins of one stage.
+static LogicalResult verifyPrecedes(KernelOp kernel) {
+  if (!kernel.getPrecedes())
+    return success();
+  auto next = lookupInPipeline<KernelOp>(kernel, kernel.getPrecedesAttr());
+  auto getStage = [](KernelOp of) {
+    auto all = of.getOps<BinsOp>();
+    return all.empty() ? FlatSymbolRefAttr() : (*all.begin()).getStageAttr();
+  };
+  if (!next || next.getPrecedes() || !getStage(kernel) ||
+      getStage(next) != getStage(kernel))
+    return kernel.emitOpError("expected a 'piko.bins' of the same stage as in ")
+           << kernel.getPrecedesAttr() << ", which precedes none";
+  return success();
+}
+
 LogicalResult KernelOp::verifyRegions() {
   if (failed(verifyLevel(*this)))
+    return failure();
+  if (failed(verifyPrecedes(*this)))
     return failure();
   if (failed(verifyBarriers(*this)))
     return failure();

@@ -4,6 +4,8 @@
 
 #include "StageUses.h"
 
+#include "Piko/Dialect/Piko/IR/Marks.h"
+
 using namespace mlir;
 using namespace piko;
 
@@ -38,7 +40,10 @@ LogicalResult BinsOp::verifyRegions() {
     if (producer && !before.contains(producer))
       return work->emitOpError("expected work of ")
              << producer << " in front of it";
-    if (!before.insert(stage).second)
+    bool isFirst = before.insert(stage).second;
+    if (work->hasAttr(marks::again))
+      before.erase(stage); // what follows takes the same
+    if (!isFirst)
       return work->emitOpError("expected one piece of work of ") << stage;
   }
   if (before.empty())
@@ -102,6 +107,20 @@ LogicalResult ListsOp::verifyRegions() {
   return success();
 }
 
+/// The work that a primitive is the argument of, or null.
+static ItemsOp findItems(Value prim) {
+  auto argument = dyn_cast<BlockArgument>(prim);
+  return argument ? dyn_cast<ItemsOp>(argument.getOwner()->getParentOp())
+                  : ItemsOp();
+}
+
+LogicalResult PositionOp::verifySymbolUses(SymbolTableCollection &) {
+  ItemsOp items = findItems(getPrim());
+  if (items && !items.getSource())
+    return success();
+  return emitOpError("expected a primitive of 'piko.items' in 'piko.bins'");
+}
+
 LogicalResult PlaceOp::verifySymbolUses(SymbolTableCollection &) {
   if (failed(verifyStage(*this, getStageAttr())))
     return failure();
@@ -117,9 +136,7 @@ LogicalResult PlaceOp::verifySymbolUses(SymbolTableCollection &) {
   auto emission = getPrim().getDefiningOp<EmissionOpInterface>();
   if (emission && emission.getPrim() == getPrim())
     return success();
-  auto argument = dyn_cast<BlockArgument>(getPrim());
-  auto items = argument ? dyn_cast<ItemsOp>(argument.getOwner()->getParentOp())
-                        : ItemsOp();
+  ItemsOp items = findItems(getPrim());
   if (items && items.getSource())
     return success();
   return emitOpError("expected what 'piko.emit' gives, or a primitive of a "

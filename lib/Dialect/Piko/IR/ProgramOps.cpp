@@ -519,7 +519,8 @@ LogicalResult ProgramVerifier::visit(Operation *op) {
 LogicalResult ProgramVerifier::checkAll(ProgramOp program) {
   PipelineOp pipeline = getPipeline(program);
   for (auto kernel : pipeline.getOps<KernelOp>())
-    if (!launches.contains(FlatSymbolRefAttr::get(kernel.getSymNameAttr())))
+    if (!kernel.getPrecedes() &&
+        !launches.contains(FlatSymbolRefAttr::get(kernel.getSymNameAttr())))
       return program.emitOpError("expected a launch of ")
              << FlatSymbolRefAttr::get(kernel.getSymNameAttr());
   for (auto [number, source] : llvm::enumerate(pipeline.getOps<SourceOp>()))

@@ -29,6 +29,8 @@ constexpr llvm::StringLiteral advances = "piko.advances";
 constexpr llvm::StringLiteral units = "piko.units";
 /// A loop whose iterations the threads of a block share.
 constexpr llvm::StringLiteral shared = "piko.shared";
+/// Work, or a bin, on what a local edge takes: what follows takes the same.
+constexpr llvm::StringLiteral again = "piko.again";
 /// A parallel loop that one thread runs, because its work says so.
 constexpr llvm::StringLiteral one = "piko.one";
 /// A loop whose iterations have outboxes of their own.

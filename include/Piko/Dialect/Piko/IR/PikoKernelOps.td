@@ -23,6 +23,9 @@ def Piko_KernelOp : Piko_Op<"kernel", [
     or work is left. The kernel of a dynamic schedule is a loop over bins and runs
     before all others.
 
+    A kernel that `precedes` another one is a part of each launch of that one: it
+    takes the same bins first, and emits nothing. `piko-reduce-by-atomics` makes it.
+
     ```mlir
     piko.record @F {"x" : i32 at 0} size 4 align 4
     piko.pipeline @P rank 1 {
@@ -54,9 +57,16 @@ def Piko_KernelOp : Piko_Op<"kernel", [
     }
     ```
   }];
-  let arguments = (ins SymbolNameAttr:$sym_name);
+  let arguments = (ins SymbolNameAttr:$sym_name,
+                       OptionalAttr<FlatSymbolRefAttr>:$precedes);
+  let builders = [OpBuilder<(ins "::llvm::StringRef":$name), [{
+    build($_builder, $_state, name, ::mlir::FlatSymbolRefAttr());
+  }]>];
   let regions = (region SizedRegion<1>:$body);
-  let assemblyFormat = "$sym_name attr-dict-with-keyword custom<IsolatedBody>($body)";
+  let assemblyFormat = [{
+    $sym_name (`precedes` $precedes^)? attr-dict-with-keyword
+    custom<IsolatedBody>($body)
+  }];
   let hasRegionVerifier = 1;
   let extraClassDeclaration = [{
     ::mlir::Block *getBodyBlock() { return &getBody().front(); }

@@ -137,6 +137,39 @@ def Piko_ListsOp : Piko_WorkOp<"lists"> {
   }];
 }
 
+def Piko_PositionOp : Piko_Op<"position", [
+    Pure, DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
+  let summary = "where a primitive is among those of its bin";
+  let description = [{
+    A number that grows in order of lineage, of the argument of a `piko.items`
+    inside `piko.bins`. It is below 2^32.
+
+    ```mlir
+    piko.record @F {"x" : i32 at 0} size 4 align 4
+    piko.pipeline @P rank 1 {
+      piko.buffer @last : @F
+      piko.source @a
+      piko.stage @a bins [0] threads 64 split : @F -> [] {}
+      piko.kernel @kernel_a {
+        piko.bins of @a {
+        ^bb0(%bin: index):
+          piko.items of @a {
+          ^bb0(%f: !piko.prim<@F>):
+            %zero = arith.constant 0 : i32
+            %place = piko.position %f : !piko.prim<@F>
+            %number = arith.index_cast %place : index to i32
+            piko.atomic max_signed @last[%zero : i32] "x", %number : i32
+          }
+        }
+      }
+    }
+    ```
+  }];
+  let arguments = (ins Piko_PrimType:$prim);
+  let results = (outs Index:$position);
+  let assemblyFormat = "$prim attr-dict `:` qualified(type($prim))";
+}
+
 def Piko_PlaceOp : Piko_Op<"place", [
     DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
   let summary = "puts a primitive into a bin of a stage";

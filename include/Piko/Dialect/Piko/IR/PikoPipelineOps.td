@@ -136,8 +136,8 @@ def Piko_ImageOp : Piko_StateOp<"image"> {
   let description = [{
     At the start of each run every pixel is set to the `clear` value, one
     number for each number of the record, or to zeros where there is none.
-    An `internal` image is no state of the pipeline's: threads have it for
-    themselves (`piko.cpu.private_images`).
+    An `internal` image is no state of the pipeline's, and the host does not see
+    it: kernels have it for themselves, or threads (`piko.cpu.private_images`).
 
     ```mlir
     piko.record @Depth {"z" : f32 at 0} size 4 align 4
