@@ -175,6 +175,22 @@ TEST_F(MemoryAccessTest, UnwrittenMemoryIsNotZero) {
   EXPECT_EQ(out[0], 0xcdcdcdcdcdcdcdcd);
 }
 
+TEST_F(MemoryAccessTest, UnwrittenRegistersHoldNothingOfOtherBlocks) {
+  for (uint32_t last : {31, 15}) {
+    auto out = run(R"(
+    setp.gt.u32 %p1, %r1, )" +
+                   std::to_string(last) + R"(;
+    @%p1 bra STORE;
+    mov.b32 %r5, 7;
+  STORE:
+    @!%p1 mov.b32 %r6, 8;
+    mov.b64 %rd6, {%r5, %r6};
+    st.global.b64 [%rd4], %rd6;)");
+    for (uint32_t thread = 0; thread < 32; ++thread)
+      EXPECT_EQ(out[thread], thread > last ? 0xcdcdcdcdcdcdcdcd : 0x800000007);
+  }
+}
+
 TEST_F(MemoryAccessTest, Traps) {
   std::string text = runFaulty("setp.eq.s32 %p1, %r1, 9; @%p1 trap;",
                                CUDA_ERROR_LAUNCH_FAILED);

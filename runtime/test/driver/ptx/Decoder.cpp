@@ -94,7 +94,7 @@ private:
   void linkCalls();
   void checkRecursion(const std::string &function, int depth) const;
   const Type *typeOf(std::string_view name) const;
-  Operand place(uint8_t bytes);
+  Operand place(uint8_t bytes, bool isFilled = true);
   Operand placeOf(const std::string &name, uint8_t bytes);
   void freeLocals(size_t statement);
   uint64_t allocate(uint64_t &end, const Variable &variable);
@@ -113,6 +113,7 @@ private:
   const FunctionSyntax *current = nullptr;
   std::map<std::string, Register, std::less<>> registers;
   std::optional<BlockLocals> locals;
+  std::optional<WrittenFirst> writtenFirst;
   /// Places of block locals that are over. By width: lanes that wait in a block
   /// while others run elsewhere keep theirs.
   std::map<uint8_t, std::vector<Operand>> free;
@@ -174,11 +175,13 @@ ProgramDecoder::placeFunction(const FunctionSyntax &function) {
   return place;
 }
 
-Operand ProgramDecoder::place(uint8_t bytes) {
+Operand ProgramDecoder::place(uint8_t bytes, bool isFilled) {
   Operand operand;
   operand.bytes = bytes;
-  operand.offset = program.registerBytes;
-  program.registerBytes += static_cast<uint32_t>(
+  operand.bank = isFilled ? 0 : 2;
+  uint32_t &end = isFilled ? program.filledBytes : program.registerBytes;
+  operand.offset = end;
+  end += static_cast<uint32_t>(
       roundUp(bytes ? bytes * warpSize : sizeof(uint32_t), placeAlignment));
   return operand;
 }
@@ -186,7 +189,7 @@ Operand ProgramDecoder::place(uint8_t bytes) {
 Operand ProgramDecoder::placeOf(const std::string &name, uint8_t bytes) {
   std::vector<Operand> &unused = free[bytes];
   if (unused.empty() || !locals->contains(name))
-    return place(bytes);
+    return place(bytes, !writtenFirst->contains(name));
   Operand operand = unused.back();
   unused.pop_back();
   return operand;
@@ -370,6 +373,7 @@ void ProgramDecoder::decodeFunction(const FunctionSyntax &function) {
   current = &function;
   registers.clear();
   locals.emplace(function);
+  writtenFirst.emplace(function);
   free.clear();
   labels.clear();
   tables.clear();

@@ -102,7 +102,7 @@ size_t Block::bytesFor(const Launch &launch) {
   const Program &program = launch.program;
   size_t warps = (threadsOf(launch) + warpSize - 1) / warpSize;
   return Workspace::sizeOf({sharedBytesOf(launch)}) +
-         warps * Workspace::sizeOf({program.registerBytes,
+         warps * Workspace::sizeOf({program.filledBytes, program.registerBytes,
                                     size_t(program.localBytes) * warpSize,
                                     size_t(program.callBytes) * warpSize});
 }

@@ -5,7 +5,8 @@
 // calls. Registers, local memory and parameters of each lie at places of their
 // own: there is no recursion. A register is an array over the 32 lanes of a
 // warp; a predicate is a mask of lanes. Constants are registers of a second
-// bank, which all warps share and none writes.
+// bank, which all warps share and none writes. Registers that are written
+// before they are read are in a third one, which is not filled for each block.
 //
 //===----------------------------------------------------------------------===//
 
@@ -27,7 +28,7 @@ inline constexpr uint32_t nowhere = ~0u;
 /// A register: where it begins in its bank, and the bytes that a lane has.
 struct Operand {
   uint32_t offset = 0;
-  uint8_t bank = 0;  ///< 0: registers of the warp, 1: constants.
+  uint8_t bank = 0;  ///< 0, 2: registers of the warp, 1: constants.
   uint8_t bytes = 0; ///< 0 for a predicate.
 };
 
@@ -139,7 +140,8 @@ struct Program {
   std::vector<std::vector<Operand>> lists; ///< Of vectors.
   std::vector<std::vector<uint32_t>> branchTables;
   std::vector<Copies> calls;
-  uint32_t registerBytes = 0;  ///< Of a warp.
+  uint32_t filledBytes = 0;    ///< Of a warp: registers of bank 0.
+  uint32_t registerBytes = 0;  ///< Of a warp: those of bank 2.
   uint32_t localBytes = 0;     ///< Of a thread.
   uint32_t parameterBytes = 0; ///< Of the entry.
   uint32_t callBytes = 0;      ///< Of a thread: parameters of calls.

@@ -13,9 +13,10 @@ Warp::Warp(Block &block, uint32_t number, uint32_t threads,
            Workspace &workspace)
     : program(&block.launch.program), block(block), number(number),
       first(number * warpSize), threads(threads) {
-  bank[0] = workspace.take(program->registerBytes);
+  bank[0] = workspace.take(program->filledBytes);
   // Written by no instruction.
   bank[1] = const_cast<uint8_t *>(program->constants.data());
+  bank[2] = workspace.take(program->registerBytes);
   local = workspace.take(size_t(program->localBytes) * warpSize);
   calls = workspace.take(size_t(program->callBytes) * warpSize);
   parameters = block.launch.parameters.data();
@@ -68,7 +69,7 @@ static uint32_t valueOf(Special special, const Block &block, uint32_t thread) {
 }
 
 void Warp::reset() {
-  std::memset(bank[0], unwritten, program->registerBytes);
+  std::memset(bank[0], unwritten, program->filledBytes);
   std::memset(local, unwritten, size_t(program->localBytes) * warpSize);
   std::memset(calls, unwritten, size_t(program->callBytes) * warpSize);
   for (const SpecialRegister &it : program->specials)

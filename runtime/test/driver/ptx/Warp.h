@@ -133,7 +133,7 @@ public:
   bool isWhole() const { return active == groups[current].mask; }
 
   // What handlers read.
-  std::array<uint8_t *, 2> bank{};
+  std::array<uint8_t *, 3> bank{};
   uint32_t active = 0; ///< Lanes of the current instruction.
   uint32_t pc = 0, next = 0;
   uint32_t live = 0;
