@@ -6,6 +6,7 @@
 //
 //===----------------------------------------------------------------------===//
 #include "Piko/Scene/Bvh.h"
+#include "Vectors.h"
 
 #include <embree3/rtcore.h>
 
@@ -65,10 +66,6 @@ scene::Bounds emptyBounds() {
 
 void include(scene::Bounds &bounds, const scene::Bounds &other) {
   bounds = {glm::min(bounds.lo, other.lo), glm::max(bounds.hi, other.hi)};
-}
-
-bool isFinite(glm::vec3 v) {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
 /// The boxes of all triangles whose corners are finite.

@@ -5,6 +5,7 @@
 #include "GltfCheck.h"
 #include "PatchFile.h"
 #include "PlyCheck.h"
+#include "Vectors.h"
 
 #include <assimp/Importer.hpp>
 #include <assimp/ProgressHandler.hpp>
@@ -28,10 +29,6 @@ namespace fs = std::filesystem;
 namespace {
 
 glm::vec3 toVec3(const aiVector3D &v) { return {v.x, v.y, v.z}; }
-
-bool isFinite(glm::vec3 v) {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
 
 glm::vec3 normalizeOr(glm::vec3 v, glm::vec3 otherwise) {
   float length = std::sqrt(glm::dot(v, v));

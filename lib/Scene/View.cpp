@@ -6,6 +6,7 @@
 //
 //===----------------------------------------------------------------------===//
 #include "Piko/Scene/View.h"
+#include "Vectors.h"
 
 #include <algorithm>
 #include <cmath>
@@ -16,14 +17,9 @@ using namespace piko::render;
 
 namespace {
 
-constexpr float pi = std::numbers::pi_v<float>;
 constexpr float goldenAngle = 2.39996323f;
 
 glm::vec3 unit(glm::vec3 v) { return v * (1 / std::sqrt(glm::dot(v, v))); }
-
-bool isFinite(glm::vec3 v) {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
 
 /// Calls f with all positions of a scene.
 template <class F> void forEachPoint(const Mesh &mesh, F f) {
@@ -102,7 +98,7 @@ Result<scene::Camera> render::makeCamera(const ViewOptions &options,
   if (!(options.fovy > 0 && options.fovy < 180))
     return Error{"expected a field of view between 0 and 180 degrees"};
   float aspect = float(options.width) / float(options.height);
-  float tangent = std::tan(options.fovy * pi / 360);
+  float tangent = std::tan(options.fovy * std::numbers::pi_v<float> / 360);
   // The narrower of the two angles holds the sphere.
   float half = std::atan(tangent * std::min(1.0f, aspect));
 

@@ -15,7 +15,7 @@
 
 using namespace piko::rt;
 
-static constexpr int64_t firstBlock = int64_t(16) << 10;
+static constexpr int64_t leastBytes = int64_t(16) << 10;
 
 static void beginLocal(pikort_pipeline &p, const Kernel &host, int32_t stage) {
   Kernel &kernel = kernelOf(p, stage);
@@ -77,7 +77,7 @@ bool piko::rt::growLocal(Lane &lane, int32_t port, int64_t count) {
   if (log.failed)
     return false;
   int64_t used = log.blocks.empty() ? 0 : out.cursor - log.blocks[0].data();
-  int64_t bytes = std::max({2 * used, used + count * out.size, firstBlock});
+  int64_t bytes = std::max({2 * used, used + count * out.size, leastBytes});
   try {
     log.blocks.reserve(1);
     Array<uint8_t> block(lane.pipeline->memory, bytes);

@@ -12,8 +12,8 @@ using namespace piko::rt;
 
 // What images may take, and how many lanes have some: all of them are read when
 // the kernel ends.
-static constexpr int64_t mostBytes = int64_t(512) << 20;
-static constexpr size_t mostLanes = 8;
+static constexpr int64_t mostImageBytes = int64_t(512) << 20;
+static constexpr size_t mostSharers = 8;
 static constexpr int64_t chunk = int64_t(1) << 14; // pixels of a thread's turn
 
 static int64_t countPixels(const State &state) {
@@ -37,7 +37,7 @@ static bool pays(const pikort_pipeline &p, const Kernel &kernel,
     perPixel += pixelSize(p, image);
   int64_t perPrimitive = selection.often ? 64 : 4;
   return lanes > 1 && p.memory.limit() == 0 && pixels <= INT32_MAX &&
-         pixels <= mostBytes / perPixel / static_cast<int64_t>(lanes) &&
+         pixels <= mostImageBytes / perPixel / static_cast<int64_t>(lanes) &&
          kernel.positions >= pixels / perPrimitive;
 }
 
@@ -103,7 +103,7 @@ void piko::rt::beginSelections(pikort_pipeline &p, Kernel &kernel) {
   if (selections.empty())
     return;
   size_t lanes = kernel.runsSerially ? 1 : kernel.activeLanes;
-  size_t sharing = std::min(lanes, mostLanes);
+  size_t sharing = std::min(lanes, mostSharers);
   while (kernel.images.size() < selections.size())
     kernel.images.push_back(std::make_unique<PrivateImages>());
   bool shared = true;

@@ -8,7 +8,7 @@
 using namespace piko::rt;
 
 static constexpr int64_t alignment = 64; // of blocks, and so of offsets in them
-static constexpr int64_t firstBlock = int64_t(64) << 10;
+static constexpr int64_t firstScratch = int64_t(64) << 10;
 
 /// Goes on in a block with room for `bytes`.
 static void nextBlock(Lane &lane, int64_t bytes) {
@@ -18,7 +18,7 @@ static void nextBlock(Lane &lane, int64_t bytes) {
     int64_t last = next > 0 ? stack.blocks[next - 1].capacity() : 0;
     stack.blocks.resize(next); // those above are too small as well
     stack.blocks.emplace_back(lane.pipeline->memory,
-                              std::max({bytes, 2 * last, firstBlock}));
+                              std::max({bytes, 2 * last, firstScratch}));
   }
   if (next > 0)
     stack.below += stack.blocks[next - 1].capacity();

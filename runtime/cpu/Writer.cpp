@@ -16,7 +16,7 @@
 
 using namespace piko::rt;
 
-static constexpr int64_t firstBlock = int64_t(64) << 10;
+static constexpr int64_t smallestBlock = int64_t(64) << 10;
 static constexpr int64_t largestBlock = int64_t(2) << 20;
 static constexpr int64_t noRecord = INT64_MAX; // as last_cell
 
@@ -53,7 +53,7 @@ static bool grow(Lane *lane, Log &log, uint8_t *&cursor, uint8_t *&end,
                  int64_t keep, int64_t need) {
   if (log.failed)
     return false;
-  int64_t bytes = std::max(need + 2 * keep, firstBlock);
+  int64_t bytes = std::max(need + 2 * keep, smallestBlock);
   try {
     if (!log.blocks.empty())
       bytes = std::max(

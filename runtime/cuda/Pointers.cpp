@@ -18,7 +18,7 @@ using piko::rt::Failure;
 namespace {
 
 /// Of an allocation; zeros where the driver knows none.
-struct Memory {
+struct Allocation {
   uint64_t context, type, isManaged, device, begin, size;
 
   bool isHosts() const { return type != CU_MEMORYTYPE_DEVICE; }
@@ -27,8 +27,8 @@ struct Memory {
 } // namespace
 
 /// The allocation that an address lies in.
-static Memory find(const Device &device, CUdeviceptr address) {
-  Memory found{};
+static Allocation find(const Device &device, CUdeviceptr address) {
+  Allocation found{};
   CUpointer_attribute which[] = {CU_POINTER_ATTRIBUTE_CONTEXT,
                                  CU_POINTER_ATTRIBUTE_MEMORY_TYPE,
                                  CU_POINTER_ATTRIBUTE_IS_MANAGED,
@@ -59,7 +59,7 @@ void Device::checkMemory(const std::string &who, CUdeviceptr address,
   CUdeviceptr end = address + static_cast<CUdeviceptr>(bytes);
   // What is mapped piece by piece has several allocations.
   for (CUdeviceptr at = address; at < end;) {
-    Memory found = find(*this, at);
+    Allocation found = find(*this, at);
     if (at != address && found.isHosts())
       fail(std::to_string(end - at) + " of " + std::to_string(bytes) +
            " bytes from " + hex(address) + " on lie behind the allocation");
@@ -82,7 +82,7 @@ void Device::checkMemory(const std::string &who, CUdeviceptr address,
 
 void Device::checkHosts(const std::string &who, const void *data) const {
   auto address = reinterpret_cast<CUdeviceptr>(data);
-  Memory found = find(*this, address);
+  Allocation found = find(*this, address);
   if (!found.isHosts() && !found.isManaged)
     throw Failure{PIKORT_INVALID_ARGUMENT,
                   who + ": expected memory of the host, but " + hex(address) +
