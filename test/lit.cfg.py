@@ -23,6 +23,9 @@ split-file. Substitutions:
   %cxx_ptx       compiler and flags that make PTX of a file of CUDA's
   %cxx_reference compiler and flags that build a pipeline file with the
                  reference executor
+  %cxx_behind_header
+                 the same behind a precompiled piko.h, for a file that includes
+                 it first and whose options it does not depend on
 
 Features: `bunny` where that mesh is installed, `gpu` where an NVIDIA driver
 is, `ptxas` where NVIDIA's assembler is, `chromium` where that browser is, `asan` and `tsan` in builds with that
@@ -60,7 +63,10 @@ config.environment["PIKO_CACHE_DIR"] = os.path.join(
 
 bunny = "/usr/share/glmark2/models/bunny.obj"
 include = os.path.join(config.piko_source_root, "runtime", "include")
-reference = [config.cxx, "-std=c++20", "-O0", "-ffp-contract=off", "-I", include]
+reference = [config.cxx, *config.reference_flags, "-I", include]
+behind_header = reference + (
+    ["-include-pch", config.reference_header] if config.reference_header else []
+)
 # Kernels of an application's own, in CUDA C++, without a toolkit.
 ptx = [os.path.join(config.llvm_tools, "clang++"), "-x cuda -std=c++20 -O2 -S"]
 ptx += ["--cuda-device-only --cuda-gpu-arch=sm_70 -nocudainc -nocudalib"]
@@ -104,6 +110,7 @@ config.substitutions += [
     ("%cxx_host", f"{config.cxx} -std=c++20 -Wall -Wextra -Werror -I {include}"),
     ("%link_host", " ".join(link_host)),
     ("%cxx_reference", " ".join(reference)),
+    ("%cxx_behind_header", " ".join(behind_header)),
     ("%cxx_ptx", " ".join(ptx)),
     ("%cxx", config.cxx),
     ("%other_cxx", other_cxx),

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // What the C++ compiler refuses, in words of the language.
-// RUN: %cxx_reference -DCASE=0 -fsyntax-only %s
-// RUN: not %cxx_reference -DCASE=1 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=INT
-// RUN: not %cxx_reference -DCASE=2 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=ASSIGN
-// RUN: not %cxx_reference -DCASE=3 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=MUTABLE
-// RUN: not %cxx_reference -DCASE=4 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=CONST
-// RUN: not %cxx_reference -DCASE=5 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=CONST
-// RUN: not %cxx_reference -DCASE=6 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=COPY
-// RUN: not %cxx_reference -DCASE=7 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=COPY
+// RUN: %cxx_behind_header -DCASE=0 -fsyntax-only %s
+// RUN: not %cxx_behind_header -DCASE=1 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=INT
+// RUN: not %cxx_behind_header -DCASE=2 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=ASSIGN
+// RUN: not %cxx_behind_header -DCASE=3 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=MUTABLE
+// RUN: not %cxx_behind_header -DCASE=4 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=CONST
+// RUN: not %cxx_behind_header -DCASE=5 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=CONST
+// RUN: not %cxx_behind_header -DCASE=6 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=COPY
+// RUN: not %cxx_behind_header -DCASE=7 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=COPY
 // RUN: not pikoc -DCASE=6 --pipe TakePipe %s -o %t.o 2>&1 | FileCheck %s --check-prefix=COPY
 #include <piko.h>
 
