@@ -168,13 +168,13 @@ def tidy_group(files, flags, folder):
     return "".join(tidy_group(part, flags, folder) for part in parts)
 
 
-def tidy_quick(build):
+def tidy_quick(build, jobs):
     groups = {}
     for file, command in sorted(commands(build, QUICK).items()):
         key = (os.path.dirname(file), *options(file, command))
         groups.setdefault(key, []).append(file)
     with tempfile.TemporaryDirectory() as folder, \
-            concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
+            concurrent.futures.ThreadPoolExecutor(jobs) as pool:
         done = [pool.submit(tidy_group, files, flags, folder)
                 for (_, *flags), files in groups.items()]
         faults = [text for future in done if (text := future.result())]
@@ -184,7 +184,7 @@ def tidy_quick(build):
     return faults or not count
 
 
-def tidy(build):
+def tidy(build, jobs):
     files = sorted(commands(build, ("lib", "tools", "runtime")))
 
     def check(file):
@@ -193,7 +193,7 @@ def tidy(build):
 
     faults = 0
     show = sys.stderr.isatty()
-    with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
+    with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
         for done, (file, result) in enumerate(pool.map(check, files), 1):
             if show:
                 print(f"\r{done}/{len(files)}", end="", file=sys.stderr)
@@ -217,13 +217,14 @@ def main():
     parser.add_argument("--fix", action="store_true")
     parser.add_argument("--build", default="build")
     parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count())
     args = parser.parse_args()
     checks = {
         "format": lambda: format(args.fix),
         "licence": licence,
         "paths": paths,
         "layers": layers,
-        "tidy": lambda: (tidy_quick if args.quick else tidy)(args.build),
+        "tidy": lambda: (tidy_quick if args.quick else tidy)(args.build, args.jobs),
     }
     names = [args.check]
     if args.check == "all":

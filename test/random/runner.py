@@ -3,6 +3,7 @@
 
 import contextlib
 import hashlib
+import os
 import random
 import re
 import subprocess
@@ -72,6 +73,13 @@ def kind_of(verdict):
     return re.sub(r"'[^']*'|\d+", "", first)
 
 
+def write(path, text):
+    """At once: another run may read the same file in a folder that is kept."""
+    with tempfile.NamedTemporaryFile("w", dir=path.parent, delete=False) as file:
+        file.write(text)
+    os.replace(file.name, path)
+
+
 class Runner:
     """With `text` what is compiled is the text of the dialect, not the C++; the
     `passes` are left out; `target` are options that say what it runs on. With
@@ -89,9 +97,9 @@ class Runner:
         text = cpp.write_file(pipes)
         with self.folder_of(text) as folder:
             file = Path(folder) / "pipelines.cpp"
-            file.write_text(text)
+            write(file, text)
             if self.text:
-                file.with_suffix(".mlir").write_text(dialect.write_file(pipes))
+                write(file.with_suffix(".mlir"), dialect.write_file(pipes))
             verdicts = self.compare(file, pipes)
             # A crash ends the process, and the pipelines behind it wait.
             while len(verdicts) < len(pipes):
@@ -108,7 +116,7 @@ class Runner:
     def compare(self, file, pipes):
         """At least one verdict, in order; the last one may be of a crash."""
         cases = file.with_suffix(".cases")
-        cases.write_text("".join(case_of(p) + "\n" for p in pipes))
+        write(cases, "".join(case_of(p) + "\n" for p in pipes))
         try:
             done = subprocess.run(
                 [self.tool, file.with_suffix(".mlir") if self.text else file,
