@@ -46,6 +46,8 @@ def parse_options():
                         metavar="FOLDER", help="(build/charts)")
     parser.add_argument("--bin", default=f"{ROOT}/build/bin",
                         help="where the tools are")
+    parser.add_argument("--modes", nargs="+", metavar="MODE",
+                        help="failure modes (all)")
     parser.add_argument("--quick", action="store_true",
                         help="one scene of each kind, a quarter of the pixels, "
                              "fewer rounds and settings")

@@ -3,6 +3,7 @@
 
 import csv
 import os
+import sys
 
 from commands import call
 
@@ -13,7 +14,9 @@ def collect(options):
     if not os.path.exists(tool):
         return []
     folder = f"{options.out}/failures"
-    call([tool, "--charts", folder])
+    wanted = options.modes or []
+    call([tool, "--charts", folder,
+          *(word for name in wanted for word in ("--only", name))])
     modes = {}
     with open(f"{folder}/failures.csv", newline="") as file:
         for row in csv.DictReader(file):
@@ -24,6 +27,9 @@ def collect(options):
             mode["points"].append({"scene": float(row["scene"]),
                                    "naive": float(row["naive error"]),
                                    "ours": float(row["our error"])})
+    for name in wanted:
+        if name not in modes:
+            sys.exit(f"--modes: expected a failure mode, but got '{name}'")
     for mode in modes.values():
         files = {who: f"{folder}/{mode['name']}-{who}.png"
                  for who in ("naive", "ours")}
