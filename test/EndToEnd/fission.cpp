@@ -8,12 +8,12 @@
 // BEHIND: piko.schedule direct_map behind
 // BEHIND: piko.local_barrier @spread[0] -> @shade
 // BEHIND: piko.strips
-// RUN: pikoc %s --pipe Pixels --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=BEHIND-PIXELS
+// RUN: pikoc %s --pipe Pixels --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=BEHIND-PIXELS
 // BEHIND-PIXELS: remark: stage 'shade' takes what stage 'cover' emits in a loop from a list
 // BEHIND-PIXELS: remark: stage 'shade' runs bin by bin behind stage 'cover'
-// RUN: pikoc %s --pipe Further --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=INSIDE
-// RUN: pikoc %s --pipe Merged --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=INSIDE
-// RUN: pikoc %s --pipe Whole --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=INSIDE
+// RUN: pikoc %s --pipe Further --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=INSIDE
+// RUN: pikoc %s --pipe Merged --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=INSIDE
+// RUN: pikoc %s --pipe Whole --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=INSIDE
 // INSIDE: remark: stage 'shade' runs inside stage 'spread'
 //
 // RUN: piko-compare %s --pipe Chain --domain 67 35 --count 900 | FileCheck %s

@@ -3,19 +3,19 @@
 // Styles in which a stage updates the pixels of a primitive. On a GPU, threads
 // share the pixels of many primitives at once, or those of one after the other,
 // which a remark says; always in lineage order.
-// RUN: pikoc %s --pipe Boxes --target gpu-on-cpu --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=MANY --allow-empty
-// RUN: pikoc %s --pipe Points --target gpu-on-cpu --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=MANY --allow-empty
-// RUN: pikoc %s --pipe Rows --target gpu-on-cpu --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=MANY --allow-empty
-// RUN: pikoc %s --pipe Steps --target gpu-on-cpu --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=MANY --allow-empty
-// RUN: pikoc %s --pipe Discs --target gpu-on-cpu --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=MANY --allow-empty
-// RUN: pikoc %s --pipe Unclipped --target gpu-on-cpu --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=MANY --allow-empty
-// RUN: pikoc %s --pipe Rare --target gpu-on-cpu --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=MANY --allow-empty
+// RUN: pikoc %s --pipe Boxes --target gpu-on-cpu --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=MANY --allow-empty
+// RUN: pikoc %s --pipe Points --target gpu-on-cpu --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=MANY --allow-empty
+// RUN: pikoc %s --pipe Rows --target gpu-on-cpu --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=MANY --allow-empty
+// RUN: pikoc %s --pipe Steps --target gpu-on-cpu --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=MANY --allow-empty
+// RUN: pikoc %s --pipe Discs --target gpu-on-cpu --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=MANY --allow-empty
+// RUN: pikoc %s --pipe Unclipped --target gpu-on-cpu --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=MANY --allow-empty
+// RUN: pikoc %s --pipe Rare --target gpu-on-cpu --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=MANY --allow-empty
 // MANY-NOT: the threads of a block
-// RUN: pikoc %s --pipe Spans --target gpu-on-cpu --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=SPANS
+// RUN: pikoc %s --pipe Spans --target gpu-on-cpu --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=SPANS
 // SPANS: remark: the threads of a block take one primitive after the other: a row's bounds depend on the row
-// RUN: pikoc %s --pipe Frames --target gpu-on-cpu --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=FRAMES
+// RUN: pikoc %s --pipe Frames --target gpu-on-cpu --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=FRAMES
 // FRAMES: remark: the threads of a block do not share pixels: an update follows from that of another pixel
-// RUN: pikoc %s --pipe Carried --target gpu-on-cpu --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=CARRIED
+// RUN: pikoc %s --pipe Carried --target gpu-on-cpu --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=CARRIED
 // CARRIED: remark: the threads of a block do not share pixels: the outcome of an update decides about other pixels
 //
 // RUN: piko-compare %s --pipe Boxes --domain 67 35 --count 900 --target gpu-on-cpu --runs 2 | FileCheck %s

@@ -15,12 +15,12 @@
 // CASE: --pipe Eight --count 320
 // CASE: --pipe Thirteen --count 320
 // CASE: --pipe Sixteen --count 320
-// RUN: pikoc %s --pipe Thirteen --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=LANES
+// RUN: pikoc %s --pipe Thirteen --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=LANES
 // LANES: remark: these iterations are vectorized for 16 at once
 // What combines by a loop has no vector form.
 // RUN: piko-compare %s --pipe Loops --count 128 --runs 1 | FileCheck %s
 // CHECK: equal
-// RUN: pikoc %s --pipe Loops --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=CUT
+// RUN: pikoc %s --pipe Loops --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=CUT
 // CUT: remark: these iterations are not vectorized: it has no vector form
 #include "Inputs/vector-iterations.h"
 

@@ -29,20 +29,20 @@
 // RUN: not piko-compare %s --pipe Parts --count 400 --runs 1 --threads 1 | FileCheck %s --check-prefix=PARTS
 // PARTS: got: stage 'stage', bin 0: expected every iteration of parallelFor to call any() as often as iteration 0, but iteration 3 does not
 //
-// RUN: pikoc %s --pipe Nearest --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=LANES
-// RUN: pikoc %s --pipe Network --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=LANES
-// RUN: pikoc %s --pipe Newton --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=LANES
-// RUN: pikoc %s --pipe Columns --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=LANES
-// RUN: pikoc %s --pipe Kinds --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=LANES
-// RUN: pikoc %s --pipe Emits --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=LANES
-// RUN: pikoc %s --pipe Cells --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=LANES
-// RUN: pikoc %s --pipe Corners --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=LANES
-// RUN: pikoc %s --pipe Scans --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=LANES
+// RUN: pikoc %s --pipe Nearest --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=LANES
+// RUN: pikoc %s --pipe Network --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=LANES
+// RUN: pikoc %s --pipe Newton --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=LANES
+// RUN: pikoc %s --pipe Columns --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=LANES
+// RUN: pikoc %s --pipe Kinds --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=LANES
+// RUN: pikoc %s --pipe Emits --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=LANES
+// RUN: pikoc %s --pipe Cells --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=LANES
+// RUN: pikoc %s --pipe Corners --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=LANES
+// RUN: pikoc %s --pipe Scans --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=LANES
 // LANES: remark: these iterations are vectorized for 16 at once
-// RUN: pikoc %s --pipe Sums --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=FEW
+// RUN: pikoc %s --pipe Sums --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=FEW
 // FEW: remark: these iterations are vectorized for 16 at once
 // FEW: remark: these iterations are vectorized for 8 at once
-// RUN: pikoc %s --pipe EmitsBefore --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=EMITS
+// RUN: pikoc %s --pipe EmitsBefore --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=EMITS
 // EMITS: remark: these iterations are not vectorized: it keeps the order of iterations, and a barrier follows
 #include <piko.h>
 

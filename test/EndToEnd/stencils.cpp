@@ -24,11 +24,11 @@
 // CASE: --pipe Empty --count 1
 // RUN: not piko-compare %s --pipe Past --count 1 --runs 1 --threads 1 2 | FileCheck %s --check-prefix=PAST
 //
-// RUN: %if x86_64 %{ pikoc %s --pipe Clamps --cpu x86-64-v4 --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=LOOP %}
-// RUN: %if x86_64 %{ pikoc %s --pipe Wraps --cpu x86-64-v4 --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=LOOP %}
-// RUN: %if x86_64 %{ pikoc %s --pipe Mirrors --cpu x86-64-v4 --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=LOOP %}
+// RUN: %if x86_64 %{ pikoc %s --pipe Clamps --cpu x86-64-v4 --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=LOOP %}
+// RUN: %if x86_64 %{ pikoc %s --pipe Wraps --cpu x86-64-v4 --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=LOOP %}
+// RUN: %if x86_64 %{ pikoc %s --pipe Mirrors --cpu x86-64-v4 --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=LOOP %}
 // LOOP: remark: iterations of this loop do not depend on one another, and are vectorized
-// RUN: %if x86_64 %{ pikoc %s --pipe Clamps --cpu x86-64-v4 --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=INNER %}
+// RUN: %if x86_64 %{ pikoc %s --pipe Clamps --cpu x86-64-v4 --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=INNER %}
 // INNER: remark: stage 'stage': process is not vectorized: iterations of a loop in it are; specifyLanes(Items) does so all the same
 #include <piko.h>
 

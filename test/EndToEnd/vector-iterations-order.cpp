@@ -16,9 +16,9 @@
 // CASE: --pipe Lists --domain 67 35 --count 320
 // RUN: piko-compare %s --cases %t.cases --runs 1 --without vectorize | FileCheck %s --check-prefix=EQUAL
 //
-// RUN: pikoc %s --pipe EmitsInLoops --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=VECTORS
-// RUN: pikoc %s --pipe Rows --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=VECTORS
-// RUN: pikoc %s --pipe Shares --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=VECTORS
+// RUN: pikoc %s --pipe EmitsInLoops --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=VECTORS
+// RUN: pikoc %s --pipe Rows --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=VECTORS
+// RUN: pikoc %s --pipe Shares --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=VECTORS
 // VECTORS: .cpp:[[#]]:{{[0-9]+}}: remark: these iterations are vectorized for {{4|8}} at once
 #include "Inputs/vector-iterations.h"
 

@@ -18,8 +18,8 @@
 // CASE: --pipe Counts --domain 67 35 --count 320
 // RUN: piko-compare %s --cases %t.cases --runs 1 --without vectorize | FileCheck %s --check-prefix=EQUAL
 //
-// RUN: pikoc %s --pipe Escapes --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=VECTORS
-// RUN: pikoc %s --pipe Sorts --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=VECTORS
+// RUN: pikoc %s --pipe Escapes --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=VECTORS
+// RUN: pikoc %s --pipe Sorts --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=VECTORS
 // VECTORS: .cpp:[[#]]:{{[0-9]+}}: remark: these iterations are vectorized for {{4|8}} at once
 #include "Inputs/vector-iterations.h"
 
