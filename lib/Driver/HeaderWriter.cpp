@@ -39,6 +39,13 @@ std::string piko::getProgramSymbol(StringRef nameSpace, StringRef pipeline) {
   return prefix + mangle(pipeline) + "_program";
 }
 
+/// The record of state that the host has; null for all else.
+static mlir::FlatSymbolRefAttr getHostRecord(mlir::Operation *op) {
+  auto image = llvm::dyn_cast<ImageOp>(op);
+  return image && image.getInternal() ? mlir::FlatSymbolRefAttr()
+                                      : getStateRecord(op);
+}
+
 namespace {
 
 /// A stage that the host feeds: a member of the pipeline.
@@ -64,7 +71,7 @@ public:
     for (StringRef name : {"piko", "glm", "std"})
       scope.reserve(name);
     for (mlir::Operation &op : pipeline.getOps())
-      if (getStateRecord(&op))
+      if (getHostRecord(&op))
         scope.reserve(makeIdentifier(getCppName(&op)));
   }
 
@@ -162,7 +169,7 @@ private:
     CppScope names;
     names.reserve("pikoBind_");
     for (mlir::Operation &op : pipeline.getOps()) {
-      mlir::FlatSymbolRefAttr record = getStateRecord(&op);
+      mlir::FlatSymbolRefAttr record = getHostRecord(&op);
       if (!record)
         continue;
       std::string name = names.declare(makeIdentifier(getCppName(&op)));
