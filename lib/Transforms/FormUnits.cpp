@@ -294,11 +294,22 @@ void UnitFormer::convertPlaces(Value prim, Value writer, IntegerAttr port) {
   }
 }
 
+/// What takes primitives that others take, too; null if nothing does.
+static Operation *findWorkOfGPU(KernelOp kernel) {
+  if (kernel.getPrecedes())
+    return kernel;
+  for (auto bins : kernel.getOps<BinsOp>())
+    for (auto work : bins.getOps<WorkOpInterface>())
+      if (work->hasAttr(marks::again))
+        return work;
+  return nullptr;
+}
+
 void FormUnitsPass::runOnOperation() {
   for (auto kernel : getOperation().getOps<KernelOp>()) {
-    if (kernel.getPrecedes()) {
-      kernel.emitOpError("expected a kernel of its own: one that precedes "
-                         "another is a GPU's");
+    if (Operation *other = findWorkOfGPU(kernel)) {
+      other->emitOpError("expected work for a CPU: what precedes other work is "
+                         "a GPU's");
       return signalPassFailure();
     }
     for (Operation &op : llvm::make_early_inc_range(*kernel.getBodyBlock()))

@@ -169,23 +169,33 @@ void WorkSplitter::split() {
 // Which kernels
 //===----------------------------------------------------------------------===//
 
-/// The work of a kernel on primitives that updates pixels in order, if no other
-/// does.
+/// Work of a kernel on the primitives of bins that updates pixels; null if
+/// there is none.
 static ItemsOp findItems(KernelOp kernel) {
   ItemsOp found;
-  WalkResult result = kernel.walk([&](UpdateOp update) {
+  kernel.walk([&](UpdateOp update) {
     auto items = update->getParentOfType<ItemsOp>();
-    bool isOther = !items || (found && found != items);
+    if (!items || !isa<BinsOp>(items->getParentOp()))
+      return WalkResult::advance();
     found = items;
-    return isOther ? WalkResult::interrupt() : WalkResult::advance();
+    return WalkResult::interrupt();
   });
-  if (!found || result.wasInterrupted())
-    return {};
-  auto bins = dyn_cast<BinsOp>(found->getParentOp());
-  auto work = bins.getOps<WorkOpInterface>();
+  return found;
+}
+
+/// Whether it is all that changes pixels in order.
+static bool isOnly(ItemsOp items) {
   // What follows in the bin would run in the kernel that precedes this one.
-  bool isAlone = llvm::hasSingleElement(work);
-  return isAlone || found.getProducer() ? found : ItemsOp();
+  auto bins = cast<BinsOp>(items->getParentOp());
+  if (!items.getProducer() &&
+      !llvm::hasSingleElement(bins.getOps<WorkOpInterface>()))
+    return false;
+  return !bins.walk([&](UpdateOp update) {
+                return items->isProperAncestor(update)
+                           ? WalkResult::advance()
+                           : WalkResult::interrupt();
+              })
+              .wasInterrupted();
 }
 
 /// Why work of a kernel cannot be done twice.
@@ -229,8 +239,34 @@ static void refuse(StageOp stage, bool isLocal, const Reason &reason) {
   remark.attachNote(reason.at) << reason.why;
 }
 
+/// Says which images change in any order.
+static void report(StageOp stage, ArrayRef<StringAttr> images,
+                   ArrayRef<Selection> selections) {
+  for (StringAttr image : images)
+    mlir::emitRemark(stage.getLoc(), "stage '")
+        << getCppName(stage) << "' updates pixels of '" << image.getValue()
+        << "' in any order, by atomic operations";
+  for (const Selection &selection : selections) {
+    InFlightDiagnostic remark =
+        mlir::emitRemark(selection.sites.front().update->getLoc(), "stage '")
+        << getCppName(stage)
+        << "' finds out by atomic operations which primitive a pixel is of, "
+           "and then changes:";
+    for (const Selection::Image &image : selection.images)
+      remark << (&image == selection.images.begin() ? " '" : ", '")
+             << image.name.getValue() << "'";
+  }
+}
+
 void ReduceByAtomicsPass::runOnWork(KernelOp kernel, ItemsOp items,
                                     StageOp stage) {
+  if (!isOnly(items)) {
+    refuse(stage, bool(items.getProducer()),
+           {items.getLoc(), "its kernel does other work in the bin, too; give "
+                            "stages that follow it bins of another size"});
+    ++refused;
+    return;
+  }
   SmallVector<CommutingUpdate> commuting = findCommutingUpdates(kernel);
   llvm::SetVector<StringAttr> images;
   for (const CommutingUpdate &update : commuting)
@@ -256,21 +292,8 @@ void ReduceByAtomicsPass::runOnWork(KernelOp kernel, ItemsOp items,
     makeAtomic(update);
     ++atomics;
   }
-  for (StringAttr image : images)
-    mlir::emitRemark(stage.getLoc(), "stage '")
-        << getCppName(stage) << "' updates pixels of '" << image.getValue()
-        << "' in any order, by atomic operations";
-  for (const Selection &selection : finder.selections) {
-    InFlightDiagnostic remark =
-        mlir::emitRemark(selection.sites.front().update->getLoc(), "stage '")
-        << getCppName(stage)
-        << "' finds out by atomic operations which primitive a pixel is of, "
-           "and then changes:";
-    for (const Selection::Image &image : selection.images)
-      remark << (&image == selection.images.begin() ? " '" : ", '")
-             << image.name.getValue() << "'";
-    ++reduced;
-  }
+  report(stage, images.getArrayRef(), finder.selections);
+  reduced += finder.selections.size();
   if (!finder.selections.empty())
     splitter.split();
   if (items.getProducer())

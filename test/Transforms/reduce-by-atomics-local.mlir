@@ -1,4 +1,6 @@
 // RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-form-program),piko-reduce-by-atomics,canonicalize,cse)' --verify-diagnostics %s | FileCheck %s
+// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-form-program),piko-reduce-by-atomics)' %s 2>/dev/null | not piko-opt --piko-to-units 2>&1 | FileCheck %s --check-prefix=CPU
+// CPU: error: 'piko.items' op expected work for a CPU: what precedes other work is a GPU's
 
 piko.record @F {"x" : i32 at 0, "z" : f32 at 4, "n" : i32 at 8} size 12 align 4
 piko.record @Z {"z" : f32 at 0, "n" : i32 at 4} size 8 align 4
@@ -95,6 +97,47 @@ piko.pipeline @LocalBlend rank 1 {
         ^bb0(%old: f32, %m: i32):
           %new = arith.addf %old, %old : f32
           piko.yield [%new, %m : f32, i32]
+        }
+      }
+    }
+  }
+}
+
+// Two pieces of work on a bin that both change pixels.
+// CHECK-LABEL: piko.pipeline @Both
+// CHECK-NOT:     piko.again
+piko.pipeline @Both rank 1 {
+  piko.image @depth : @Z rank 1
+  piko.source @a
+  piko.edge @a[0] -> @b local
+  // expected-remark @below {{stage 'a' runs its only bin in one block}}
+  piko.stage @a bins [0] threads 1 ordered writes : @F -> [@F] {}
+  piko.stage @b bins [0] threads 1 ordered writes : @F -> [] {
+    piko.schedule load_balance end_bin
+  }
+  piko.kernel @kernel_a {
+    piko.bins of @a {
+    ^bb0(%bin: index):
+      // expected-note @below {{its kernel does other work in the bin, too; give stages that follow it bins of another size}}
+      piko.items of @a {
+      ^bb0(%f: !piko.prim<@F>):
+        %x = piko.get %f "x" : !piko.prim<@F> -> i32
+        %z = piko.get %f "z" : !piko.prim<@F> -> f32
+        piko.update @depth[%x : i32] in %bin {
+        ^bb0(%old: f32, %m: i32):
+          %less = arith.cmpf olt, %z, %old : f32
+          %new = arith.select %less, %z, %old : f32
+          piko.yield [%new, %m : f32, i32]
+        }
+        %p = piko.emit 0 (%x, %z, %x) : i32, f32, i32 -> !piko.prim<@F>
+        piko.place %p of @b in %bin : !piko.prim<@F>
+      }
+      piko.items of @b from @a[0] {
+      ^bb0(%f: !piko.prim<@F>):
+        %x = piko.get %f "x" : !piko.prim<@F> -> i32
+        piko.update @depth[%x : i32] in %bin {
+        ^bb0(%old: f32, %m: i32):
+          piko.yield [%old, %x : f32, i32]
         }
       }
     }

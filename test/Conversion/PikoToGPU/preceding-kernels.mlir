@@ -27,7 +27,7 @@
 // CHECK-NOT:     piko.kernel
 // CHECK:         piko.program
 // CHECK:           piko.launch @kernel_a
-// CPU: preceding-kernels.mlir:[[#]]:3: error: 'piko.kernel' op expected a kernel of its own: one that precedes another is a GPU's
+// CPU: preceding-kernels.mlir:[[#]]:3: error: 'piko.kernel' op expected work for a CPU: what precedes other work is a GPU's
 piko.record @F {"x" : i32 at 0} size 4 align 4
 piko.pipeline @Before rank 1 {
   piko.buffer @table : @F

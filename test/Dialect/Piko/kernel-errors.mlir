@@ -249,3 +249,34 @@ piko.pipeline @P rank 1 {
     }
   }
 }
+
+// -----
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+piko.pipeline @P rank 1 {
+  piko.image @sums : @F rank 1
+  piko.source @a
+  piko.stage @a bins [0] threads 1 : @F -> [] {}
+  // expected-error@+1 {{expected neither emissions nor updates, because it precedes another kernel}}
+  piko.kernel @first precedes @kernel_a {
+    piko.bins of @a {
+    ^bb0(%bin: index):
+      piko.items of @a {
+      ^bb0(%f: !piko.prim<@F>):
+        %x = piko.get %f "x" : !piko.prim<@F> -> i32
+        piko.update @sums[%x : i32] in %bin {
+        ^bb0(%old: i32):
+          piko.yield [%x : i32]
+        }
+      }
+    }
+  }
+  piko.kernel @kernel_a {
+    piko.bins of @a {
+    ^bb0(%bin: index):
+      piko.items of @a {
+      ^bb0(%f: !piko.prim<@F>):
+      }
+    }
+  }
+}

@@ -240,3 +240,25 @@ piko.pipeline @P rank 1 {
     }
   }
 }
+
+// -----
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+piko.pipeline @P rank 1 {
+  piko.source @a
+  piko.edge @a[0] -> @b local
+  piko.stage @a bins [8] threads 1 placed : @F -> [@F] {}
+  piko.stage @b bins [8] threads 1 : @F -> [] {}
+  piko.kernel @k {
+    piko.bins of @a {
+    ^bb0(%bin: index):
+      piko.items of @a {
+      ^bb0(%f: !piko.prim<@F>):
+      }
+      // expected-error@+1 {{expected work that takes the same behind it}}
+      piko.items of @b from @a[0] attributes {piko.again} {
+      ^bb0(%f: !piko.prim<@F>):
+      }
+    }
+  }
+}

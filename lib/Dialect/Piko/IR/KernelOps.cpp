@@ -72,7 +72,18 @@ static LogicalResult verifyLevel(KernelOp kernel) {
   return failure(result.wasInterrupted());
 }
 
-/// Both take the bins of one stage.
+/// Whether a kernel leaves something in order: it emits, or updates pixels.
+static bool leavesInOrder(KernelOp kernel) {
+  return kernel
+      ->walk([](Operation *op) {
+        return isa<EmissionOpInterface, PlaceOp, UpdateOp>(op)
+                   ? WalkResult::interrupt()
+                   : WalkResult::advance();
+      })
+      .wasInterrupted();
+}
+
+/// Both take the bins of one stage, and the first one leaves nothing in order.
 static LogicalResult verifyPrecedes(KernelOp kernel) {
   if (!kernel.getPrecedes())
     return success();
@@ -85,6 +96,9 @@ static LogicalResult verifyPrecedes(KernelOp kernel) {
       getStage(next) != getStage(kernel))
     return kernel.emitOpError("expected a 'piko.bins' of the same stage as in ")
            << kernel.getPrecedesAttr() << ", which precedes none";
+  if (leavesInOrder(kernel))
+    return kernel.emitOpError("expected neither emissions nor updates, because "
+                              "it precedes another kernel");
   return success();
 }
 

@@ -40,10 +40,15 @@ LogicalResult BinsOp::verifyRegions() {
     if (producer && !before.contains(producer))
       return work->emitOpError("expected work of ")
              << producer << " in front of it";
-    bool isFirst = before.insert(stage).second;
-    if (work->hasAttr(marks::again))
-      before.erase(stage); // what follows takes the same
-    if (!isFirst)
+    if (work->hasAttr(marks::again)) {
+      auto next = dyn_cast_or_null<WorkOpInterface>(work->getNextNode());
+      if (!producer || !next || next.getStageAttr() != stage ||
+          next.getProducerAttr() != producer ||
+          next.getPortAttr() != work.getPortAttr())
+        return work->emitOpError("expected work that takes the same behind it");
+      continue;
+    }
+    if (!before.insert(stage).second)
       return work->emitOpError("expected one piece of work of ") << stage;
   }
   if (before.empty())
