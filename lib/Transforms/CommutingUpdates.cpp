@@ -5,6 +5,8 @@
 #include "PixelSelection.h"
 #include "SplitUpdate.h"
 
+#include "Piko/Dialect/Piko/IR/CppTypes.h"
+
 #include "mlir/Dialect/Arith/IR/Arith.h"
 #include "mlir/IR/PatternMatch.h"
 #include "llvm/ADT/MapVector.h"
@@ -119,7 +121,8 @@ static void createAtomic(OpBuilder &builder, const PixelAccess &pixel,
   pixel.change(builder, change.number, change.kind, value);
 }
 
-void piko::makeAtomic(CommutingUpdate &commuting) {
+/// Behind a test of the pixel.
+static void makeAtomic(CommutingUpdate &commuting) {
   UpdateOp update = commuting.update;
   IRRewriter builder(update);
   Location loc = update.getLoc();
@@ -150,4 +153,22 @@ void piko::makeAtomic(CommutingUpdate &commuting) {
   builder.eraseOp(yield);
   builder.inlineBlockBefore(&body, update, nothing);
   builder.eraseOp(update);
+}
+
+llvm::SetVector<StringAttr> piko::getImages(ArrayRef<CommutingUpdate> updates) {
+  llvm::SetVector<StringAttr> images;
+  for (const CommutingUpdate &update : updates)
+    images.insert(UpdateOp(update.update).getImageAttr().getAttr());
+  return images;
+}
+
+int64_t piko::makeAtomic(StageOp stage,
+                         MutableArrayRef<CommutingUpdate> updates) {
+  for (StringAttr image : getImages(updates))
+    mlir::emitRemark(stage.getLoc(), "stage '")
+        << getCppName(stage) << "' updates pixels of '" << image.getValue()
+        << "' in any order, by atomic operations";
+  for (CommutingUpdate &update : updates)
+    ::makeAtomic(update);
+  return updates.size();
 }

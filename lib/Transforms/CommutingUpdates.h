@@ -8,6 +8,7 @@
 #include "Piko/Dialect/Piko/IR/Piko.h"
 
 #include "llvm/ADT/DenseMap.h"
+#include "llvm/ADT/SetVector.h"
 
 namespace piko {
 
@@ -31,8 +32,14 @@ struct CommutingUpdate {
 /// number by one kind of operation, the updates.
 llvm::SmallVector<CommutingUpdate> findCommutingUpdates(KernelOp kernel);
 
-/// Makes an update atomic operations, behind a test of the pixel.
-void makeAtomic(CommutingUpdate &update);
+/// The images of updates.
+llvm::SetVector<mlir::StringAttr>
+getImages(llvm::ArrayRef<CommutingUpdate> updates);
+
+/// Makes updates of a stage atomic operations, behind tests of their pixels,
+/// and says so; how many they are.
+int64_t makeAtomic(StageOp stage,
+                   llvm::MutableArrayRef<CommutingUpdate> updates);
 
 } // namespace piko
 

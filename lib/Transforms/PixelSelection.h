@@ -53,6 +53,9 @@ struct Selection {
   llvm::SmallVector<UpdateOp> carried;
 };
 
+/// Appends the names of its images.
+void appendImages(mlir::InFlightDiagnostic &remark, const Selection &selection);
+
 /// Whether primitives that are in order are all in one bin.
 bool hasOneOrderedBin(StageOp stage);
 

@@ -239,25 +239,6 @@ static void refuse(StageOp stage, bool isLocal, const Reason &reason) {
   remark.attachNote(reason.at) << reason.why;
 }
 
-/// Says which images change in any order.
-static void report(StageOp stage, ArrayRef<StringAttr> images,
-                   ArrayRef<Selection> selections) {
-  for (StringAttr image : images)
-    mlir::emitRemark(stage.getLoc(), "stage '")
-        << getCppName(stage) << "' updates pixels of '" << image.getValue()
-        << "' in any order, by atomic operations";
-  for (const Selection &selection : selections) {
-    InFlightDiagnostic remark =
-        mlir::emitRemark(selection.sites.front().update->getLoc(), "stage '")
-        << getCppName(stage)
-        << "' finds out by atomic operations which primitive a pixel is of, "
-           "and then changes:";
-    for (const Selection::Image &image : selection.images)
-      remark << (&image == selection.images.begin() ? " '" : ", '")
-             << image.name.getValue() << "'";
-  }
-}
-
 void ReduceByAtomicsPass::runOnWork(KernelOp kernel, ItemsOp items,
                                     StageOp stage) {
   if (!isOnly(items)) {
@@ -268,9 +249,7 @@ void ReduceByAtomicsPass::runOnWork(KernelOp kernel, ItemsOp items,
     return;
   }
   SmallVector<CommutingUpdate> commuting = findCommutingUpdates(kernel);
-  llvm::SetVector<StringAttr> images;
-  for (const CommutingUpdate &update : commuting)
-    images.insert(UpdateOp(update.update).getImageAttr().getAttr());
+  llvm::SetVector<StringAttr> images = getImages(commuting);
   SelectionFinder finder(kernel, images);
   std::optional<Reason> reason;
   if (!finder.find())
@@ -288,12 +267,16 @@ void ReduceByAtomicsPass::runOnWork(KernelOp kernel, ItemsOp items,
     ++refused;
     return;
   }
-  for (CommutingUpdate &update : commuting) {
-    makeAtomic(update);
-    ++atomics;
+  atomics += makeAtomic(stage, commuting);
+  for (const Selection &selection : finder.selections) {
+    InFlightDiagnostic remark =
+        mlir::emitRemark(selection.sites.front().update->getLoc(), "stage '")
+        << getCppName(stage)
+        << "' finds out by atomic operations which primitive a pixel is of, "
+           "and then changes:";
+    appendImages(remark, selection);
+    ++reduced;
   }
-  report(stage, images.getArrayRef(), finder.selections);
-  reduced += finder.selections.size();
   if (!finder.selections.empty())
     splitter.split();
   if (items.getProducer())

@@ -172,9 +172,7 @@ void ReduceUpdatesPass::runOnUnits(KernelOp kernel, OpenWriterOp writer) {
   if (!stage || !runsOneBin(stage, writer))
     return;
   SmallVector<CommutingUpdate> commuting = findCommutingUpdates(kernel);
-  llvm::SetVector<StringAttr> images;
-  for (const CommutingUpdate &update : commuting)
-    images.insert(UpdateOp(update.update).getImageAttr().getAttr());
+  llvm::SetVector<StringAttr> images = getImages(commuting);
   SelectionFinder finder(kernel, images);
   if (!finder.find()) {
     InFlightDiagnostic remark = mlir::emitRemark(stage.getLoc(), "stage '")
@@ -191,20 +189,11 @@ void ReduceUpdatesPass::runOnUnits(KernelOp kernel, OpenWriterOp writer) {
                                 << getCppName(stage)
                                 << "' selects pixels of private images, which "
                                    "are combined when its kernel ends:";
-    for (const Selection::Image &image : selection.images)
-      remark << (&image == selection.images.begin() ? " '" : ", '")
-             << image.name.getValue() << "'";
+    appendImages(remark, selection);
     privatizer.privatize(selection);
     ++reduced;
   }
-  for (CommutingUpdate &update : commuting) {
-    makeAtomic(update);
-    ++atomics;
-  }
-  for (StringAttr image : images)
-    mlir::emitRemark(stage.getLoc(), "stage '")
-        << getCppName(stage) << "' updates pixels of '" << image.getValue()
-        << "' in any order, by atomic operations";
+  atomics += makeAtomic(stage, commuting);
   stage.setSplit(true);
   if (finder.selections.empty())
     stage.setOrdered(false);
