@@ -109,7 +109,7 @@ SmallVector<CommutingUpdate> piko::findCommutingUpdates(KernelOp kernel) {
 // Rewriting
 //===----------------------------------------------------------------------===//
 
-static void createAtomic(OpBuilder &builder, const PixelAccess &pixel,
+static void createAtomic(OpBuilder &builder, PixelAccess &pixel,
                          const Change &change) {
   Value value = change.value;
   if (isa<arith::SubIOp>(change.op)) {

@@ -74,14 +74,14 @@ scf::IfOp PixelAccess::createTest(OpBuilder &builder, TypeRange results) {
 }
 
 Value PixelAccess::load(OpBuilder &builder, ImageOp image, FieldAttr field,
-                        ValueRange elements) const {
+                        ValueRange elements) {
   return LoadOp::create(builder, loc, field.getType(), image.getSymName(), at,
                         field.getName(), elements,
                         image == this->image ? update.getTile() : Value(),
                         /*checked=*/true, /*of=*/nullptr);
 }
 
-SmallVector<Value> PixelAccess::load(OpBuilder &builder) const {
+SmallVector<Value> PixelAccess::load(OpBuilder &builder) {
   SmallVector<Value> numbers;
   forEachElement(builder, loc, lookupRecord(image, image.getRecordAttr()),
                  [&](FieldAttr field, ValueRange elements) {
@@ -90,13 +90,12 @@ SmallVector<Value> PixelAccess::load(OpBuilder &builder) const {
   return numbers;
 }
 
-Value PixelAccess::loadFrom(OpBuilder &builder, ImageOp image) const {
+Value PixelAccess::loadFrom(OpBuilder &builder, ImageOp image) {
   RecordOp record = lookupRecord(image, image.getRecordAttr());
   return load(builder, image, findField(record, 0).first, ValueRange());
 }
 
-void PixelAccess::store(OpBuilder &builder, unsigned number,
-                        Value value) const {
+void PixelAccess::store(OpBuilder &builder, unsigned number, Value value) {
   RecordOp record = lookupRecord(image, image.getRecordAttr());
   auto [field, element] = findField(record, number);
   StoreOp::create(builder, loc, value, image.getSymName(), at, field.getName(),
@@ -105,7 +104,7 @@ void PixelAccess::store(OpBuilder &builder, unsigned number,
 }
 
 void PixelAccess::change(OpBuilder &builder, ImageOp image, unsigned number,
-                         AtomicKind kind, Value value) const {
+                         AtomicKind kind, Value value) {
   RecordOp record = lookupRecord(image, image.getRecordAttr());
   auto [field, element] = findField(record, number);
   AtomicOp::create(builder, loc, Type(), kind, image.getSymName(), at,
@@ -115,11 +114,11 @@ void PixelAccess::change(OpBuilder &builder, ImageOp image, unsigned number,
 }
 
 void PixelAccess::change(OpBuilder &builder, unsigned number, AtomicKind kind,
-                         Value value) const {
+                         Value value) {
   change(builder, image, number, kind, value);
 }
 
 void PixelAccess::changeIn(OpBuilder &builder, ImageOp image, AtomicKind kind,
-                           Value value) const {
+                           Value value) {
   change(builder, image, 0, kind, value);
 }

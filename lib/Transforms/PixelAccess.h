@@ -22,16 +22,15 @@ class PixelAccess {
 public:
   explicit PixelAccess(UpdateOp update);
 
-  llvm::SmallVector<mlir::Value> load(mlir::OpBuilder &builder) const;
-  void store(mlir::OpBuilder &builder, unsigned number,
-             mlir::Value value) const;
+  llvm::SmallVector<mlir::Value> load(mlir::OpBuilder &builder);
+  void store(mlir::OpBuilder &builder, unsigned number, mlir::Value value);
   /// Changes a number by an atomic operation.
   void change(mlir::OpBuilder &builder, unsigned number, AtomicKind kind,
-              mlir::Value value) const;
+              mlir::Value value);
   /// What an image of one number has there.
-  mlir::Value loadFrom(mlir::OpBuilder &builder, ImageOp image) const;
+  mlir::Value loadFrom(mlir::OpBuilder &builder, ImageOp image);
   void changeIn(mlir::OpBuilder &builder, ImageOp image, AtomicKind kind,
-                mlir::Value value) const;
+                mlir::Value value);
 
   /// A region, in front of the update, for what is done to the pixel if it is
   /// in the bin; elsewhere the run fails, and results are zeros.
@@ -39,12 +38,12 @@ public:
 
 private:
   void change(mlir::OpBuilder &builder, ImageOp image, unsigned number,
-              AtomicKind kind, mlir::Value value) const;
+              AtomicKind kind, mlir::Value value);
   mlir::Value load(mlir::OpBuilder &builder, ImageOp image, FieldAttr field,
-                   mlir::ValueRange elements) const;
+                   mlir::ValueRange elements);
 
-  mutable UpdateOp update;
-  mutable ImageOp image;
+  UpdateOp update;
+  ImageOp image;
   mlir::Location loc;
   llvm::SmallVector<mlir::Value> at; ///< Its coordinates, each an index.
 };

@@ -11,7 +11,7 @@
 //      first in. Nobody else does, so that no order shows.
 
 #include "CommutingUpdates.h"
-#include "SelectionPasses.h"
+#include "SelectionWords.h"
 #include "StateAccess.h"
 
 #include "Piko/Dialect/Piko/IR/CppTypes.h"

@@ -345,8 +345,7 @@ LogicalResult BlockMapper::mapIterations(ParallelForOp loop) {
   return success();
 }
 
-/// The block takes what is to be read there, and forgets it at the end, if
-/// nothing else is to read it.
+/// The block takes what is read there, and forgets it behind its last reader.
 LogicalResult BlockMapper::mapLocalBin(LocalBinOp local) {
   OpBuilder builder(local);
   memory.flush(builder);

@@ -47,8 +47,8 @@ struct ConvertUpdate : OpRewritePattern<UpdateOp> {
 
 private:
   /// Loads of the pixel, the body, stores of what it yields.
-  static void convertBody(UpdateOp update, const PixelAccess &pixel,
-                          scf::IfOp test, PatternRewriter &rewriter) {
+  static void convertBody(UpdateOp update, PixelAccess &pixel, scf::IfOp test,
+                          PatternRewriter &rewriter) {
     auto yield = cast<YieldOp>(update.getBody().front().getTerminator());
     SmallVector<Value> oldValues = pixel.load(rewriter);
     Block *then = test.thenBlock();

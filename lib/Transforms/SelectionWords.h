@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// Selections as passes over the primitives: some find out, by atomic minima of
-// words, which primitive is first for each pixel, and the last one keeps what
-// that has.
+// The key of a selection and the position of a primitive as words of 64 bits:
+// atomic minima of them say which primitive is first for each pixel, and that
+// one keeps what it has.
 
-#ifndef PIKO_LIB_TRANSFORMS_SELECTIONPASSES_H
-#define PIKO_LIB_TRANSFORMS_SELECTIONPASSES_H
+#ifndef PIKO_LIB_TRANSFORMS_SELECTIONWORDS_H
+#define PIKO_LIB_TRANSFORMS_SELECTIONWORDS_H
 
 #include "PixelSelection.h"
 
@@ -48,4 +48,4 @@ private:
 
 } // namespace piko
 
-#endif // PIKO_LIB_TRANSFORMS_SELECTIONPASSES_H
+#endif // PIKO_LIB_TRANSFORMS_SELECTIONWORDS_H

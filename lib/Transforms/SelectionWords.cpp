@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
-#include "SelectionPasses.h"
+#include "SelectionWords.h"
 
 #include "InternalImage.h"
 #include "PixelAccess.h"
 
 #include "mlir/Dialect/Arith/IR/Arith.h"
-#include "mlir/IR/Matchers.h"
 #include "mlir/IR/PatternMatch.h"
 
 using namespace mlir;
@@ -136,6 +135,11 @@ public:
     return arith::CmpIOp::create(builder, loc, predicate, word,
                                  pixel.loadFrom(builder, image));
   }
+  /// A region where that holds.
+  OpBuilder when(Value condition) {
+    return scf::IfOp::create(builder, loc, condition, /*withElse=*/false)
+        .getThenBodyBuilder();
+  }
   Value negate(Value value) {
     Value yes =
         arith::ConstantOp::create(builder, loc, builder.getBoolAttr(true));
@@ -224,9 +228,7 @@ void SelectionWords::reduce(const Selection::Site &site, int64_t pass) const {
   // Most are behind what is there already: a load is less than a change.
   isOne = rewriter.getTest(isOne,
                            rewriter.compare(images[pass], P::ult, words[pass]));
-  auto branch =
-      scf::IfOp::create(builder, rewriter.loc, isOne, /*withElse=*/false);
-  OpBuilder inside = branch.getThenBodyBuilder();
+  OpBuilder inside = rewriter.when(isOne);
   rewriter.pixel.changeIn(inside, images[pass], AtomicKind::MinU, words[pass]);
   Value none = arith::ConstantOp::create(builder, rewriter.loc,
                                          builder.getBoolAttr(false));
@@ -244,9 +246,7 @@ void SelectionWords::resolve(const Selection::Site &site) const {
   for (auto [image, word] : llvm::zip(images, words))
     isFirst = rewriter.getTest(
         isFirst, rewriter.compare(image, arith::CmpIPredicate::eq, word));
-  auto branch =
-      scf::IfOp::create(builder, rewriter.loc, isFirst, /*withElse=*/false);
-  OpBuilder inside = branch.getThenBodyBuilder();
+  OpBuilder inside = rewriter.when(isFirst);
   for (auto [number, value] : rewriter.kept)
     rewriter.pixel.store(inside, number, value);
   rewriter.close(isFirst);
