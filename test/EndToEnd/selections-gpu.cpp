@@ -21,6 +21,11 @@
 // MORE: --pipe TileSums --count 900 --domain 67 35
 // MORE: --pipe TilesGoOn --count 900 --domain 67 35
 // MORE: --pipe TilesBlend --count 900 --domain 67 35
+// With a budget the frame is the host's, which clears what the kernels have for
+// themselves in front of each launch.
+// RUN: env PIKO_CUDA_DRIVER=%test_driver piko-compare %S/selections.cpp --pipe Rounds --count 3000 --domain 67 35 --runs 2 --threads 2 --target cuda --budget 50000000 | FileCheck %s --check-prefix=HOST
+// RUN: env PIKO_CUDA_DRIVER=%test_driver piko-compare %s --pipe Tiles --count 900 --domain 67 35 --runs 2 --threads 2 --target cuda --budget 50000000 | FileCheck %s --check-prefix=HOST
+// HOST: {{^equal$}}
 // RUN: env PIKO_CUDA_DRIVER=%test_driver not piko-compare %S/selections.cpp --pipe Outside --count 4000 --runs 1 --target cuda | FileCheck %s --check-prefix=OUTSIDE
 // OUTSIDE: run 0: got: stage 'draw', bin 0: expected an update inside the stage's own bin
 // RUN: pikoc %S/selections.cpp --pipe Nearest --target cuda --remarks -o %t.o 2>&1 | FileCheck %s --check-prefix=NEAREST
