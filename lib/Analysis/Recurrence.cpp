@@ -9,27 +9,44 @@
 
 #include "Piko/Analysis/LinearFacts.h"
 
+#include "mlir/IR/Matchers.h"
+
 using namespace mlir;
 using namespace piko;
+
+/// The comparisons that all hold where a condition does.
+static void findComparisons(Value condition,
+                            SmallVectorImpl<arith::CmpIOp> &found) {
+  Operation *op = condition.getDefiningOp();
+  if (auto compare = dyn_cast_or_null<arith::CmpIOp>(op))
+    found.push_back(compare);
+  auto select = dyn_cast_or_null<arith::SelectOp>(op);
+  bool isBoth = select && matchPattern(select.getFalseValue(), m_Zero());
+  if (isBoth || isa_and_nonnull<arith::AndIOp>(op))
+    for (Value operand : op->getOperands().take_front(2))
+      findComparisons(operand, found);
+}
 
 /// Bounds that stand still and that the condition of a loop compares with: by
 /// `!=` with the argument, or in any way with what may wrap around for all that
 /// its type says.
 static SmallVector<Value> findBounds(BlockArgument argument,
                                      scf::WhileOp loop) {
-  auto compare =
-      loop.getConditionOp().getCondition().getDefiningOp<arith::CmpIOp>();
-  if (!compare || compare.getLhs().getType() != argument.getType())
-    return {};
-  bool isUnequal = compare.getPredicate() == arith::CmpIPredicate::ne;
+  SmallVector<arith::CmpIOp> comparisons;
+  findComparisons(loop.getConditionOp().getCondition(), comparisons);
   bool isWide =
       argument.getType().isIndex() || argument.getType().isInteger(64);
   SmallVector<Value> bounds;
-  for (auto [value, bound] : {std::pair(compare.getLhs(), compare.getRhs()),
-                              std::pair(compare.getRhs(), compare.getLhs())})
-    if (((isUnequal && value == argument) || isWide) &&
-        !loop->isAncestor(bound.getParentBlock()->getParentOp()))
-      bounds.push_back(bound);
+  for (arith::CmpIOp compare : comparisons) {
+    if (compare.getLhs().getType() != argument.getType())
+      continue;
+    bool isUnequal = compare.getPredicate() == arith::CmpIPredicate::ne;
+    for (auto [value, bound] : {std::pair(compare.getLhs(), compare.getRhs()),
+                                std::pair(compare.getRhs(), compare.getLhs())})
+      if (((isUnequal && value == argument) || isWide) &&
+          !loop->isAncestor(bound.getParentBlock()->getParentOp()))
+        bounds.push_back(bound);
+  }
   return bounds;
 }
 

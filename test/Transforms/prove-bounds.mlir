@@ -39,6 +39,39 @@ piko.pipeline @Proved rank 1 {
         %next = arith.addi %i, %one32 : i32
         scf.yield %next : i32
       }
+      // for (int64_t i = 0; i < n && i < 9; ++i); also as C++ has it, where the
+      // second comparison is a choice.
+      // CHECK: scf.while
+      // CHECK:   piko.load checked @lights
+      %zero64 = arith.constant 0 : i64
+      %one64 = arith.constant 1 : i64
+      %nine = arith.constant 9 : i64
+      %no = arith.constant false
+      %n64 = arith.index_cast %n : index to i64
+      %both = scf.while (%i = %zero64) : (i64) -> i64 {
+        %inside = arith.cmpi slt, %i, %n64 : i64
+        %few = arith.cmpi slt, %i, %nine : i64
+        %more = arith.andi %few, %inside : i1
+        scf.condition(%more) %i : i64
+      } do {
+      ^bb0(%i: i64):
+        %l = piko.load @lights[%i : i64] "v" : f32
+        %next = arith.addi %i, %one64 : i64
+        scf.yield %next : i64
+      }
+      // CHECK: scf.while
+      // CHECK:   piko.load checked @lights
+      %chosen = scf.while (%i = %zero64) : (i64) -> i64 {
+        %inside = arith.cmpi slt, %i, %n64 : i64
+        %few = arith.cmpi slt, %i, %nine : i64
+        %more = arith.select %inside, %few, %no : i1
+        scf.condition(%more) %i : i64
+      } do {
+      ^bb0(%i: i64):
+        %l = piko.load @lights[%i : i64] "v" : f32
+        %next = arith.addi %i, %one64 : i64
+        scf.yield %next : i64
+      }
       // CHECK: piko.parallel_for
       // CHECK:   piko.load checked @lights
       piko.parallel_for %n {
