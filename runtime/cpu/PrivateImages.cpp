@@ -10,8 +10,8 @@
 
 using namespace piko::rt;
 
-// What images may take, and how many lanes have some: all of them are read when
-// the kernel ends.
+// What images of all lanes may take, and how many have some: all of them are
+// read when the kernel ends.
 static constexpr int64_t mostImageBytes = int64_t(512) << 20;
 static constexpr size_t mostSharers = 8;
 static constexpr int64_t chunk = int64_t(1) << 14; // pixels of a thread's turn
@@ -27,18 +27,34 @@ static int64_t pixelSize(const pikort_pipeline &p, int32_t image) {
   return p.records[p.states[image].record].size;
 }
 
-/// Whether what threads save is worth images of their own, by a guess of what a
-/// primitive takes: to begin and to combine a pixel takes some nanoseconds.
-static bool pays(const pikort_pipeline &p, const Kernel &kernel,
-                 const Selection &selection, size_t lanes) {
-  int64_t pixels = countPixels(p.states[selection.images.front()]);
+/// What images of a lane's own take.
+static int64_t imageBytes(const pikort_pipeline &p,
+                          const Selection &selection) {
   int64_t perPixel = sizeof(int32_t);
   for (int32_t image : selection.images)
     perPixel += pixelSize(p, image);
-  int64_t perPrimitive = selection.often ? 64 : 4;
-  return lanes > 1 && p.memory.limit() == 0 && pixels <= INT32_MAX &&
-         pixels <= mostImageBytes / perPixel / static_cast<int64_t>(lanes) &&
-         kernel.positions >= pixels / perPrimitive;
+  return perPixel * countPixels(p.states[selection.images.front()]);
+}
+
+/// How many lanes have images of their own: none if what threads save is not
+/// worth it, by a guess of what a primitive takes. To begin and to combine a
+/// pixel takes some nanoseconds.
+static size_t countSharers(const pikort_pipeline &p, const Kernel &kernel,
+                           size_t lanes) {
+  if (p.memory.limit() > 0)
+    return 0;
+  int64_t bytes = 0;
+  for (const Selection &selection : p.stages[kernel.stage].selections) {
+    int64_t pixels = countPixels(p.states[selection.images.front()]);
+    int64_t perPrimitive = selection.often ? 64 : 4;
+    if (pixels > INT32_MAX || kernel.positions < pixels / perPrimitive)
+      return 0;
+    bytes += imageBytes(p, selection);
+  }
+  size_t most = std::min(lanes, mostSharers);
+  if (bytes > 0)
+    most = std::min(most, static_cast<size_t>(mostImageBytes / bytes));
+  return most > 1 ? most : 0;
 }
 
 /// Makes what is not there yet. False if memory is refused.
@@ -103,13 +119,12 @@ void piko::rt::beginSelections(pikort_pipeline &p, Kernel &kernel) {
   if (selections.empty())
     return;
   size_t lanes = kernel.runsSerially ? 1 : kernel.activeLanes;
-  size_t sharing = std::min(lanes, mostSharers);
+  size_t sharing = countSharers(p, kernel, lanes);
   while (kernel.images.size() < selections.size())
     kernel.images.push_back(std::make_unique<PrivateImages>());
-  bool shared = true;
+  bool shared = sharing > 0;
   for (size_t s = 0; s < selections.size(); ++s)
-    shared = shared && pays(p, kernel, selections[s], sharing) &&
-             allocate(p, selections[s], sharing, *kernel.images[s]);
+    shared = shared && allocate(p, selections[s], sharing, *kernel.images[s]);
   if (shared)
     kernel.activeLanes = lanes = sharing;
   kernel.mostThreads = shared ? static_cast<int32_t>(sharing) : 1;

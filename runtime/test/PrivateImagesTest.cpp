@@ -190,6 +190,18 @@ TEST_F(PrivateImages, ManyPixels) {
   EXPECT_EQ(countShared(2, 1'000), 2u);
 }
 
+// As many threads have some as memory suffices for: 512 MiB.
+TEST_F(PrivateImages, LargePixels) {
+  often = true;
+  piko::rt::Pipeline other({PIKORT_ABI_VERSION, "Nearest", setup, run});
+  std::swap(pipe, other);
+  constexpr int32_t width = 4096, height = 3000; // 188 MiB each
+  EXPECT_TRUE(pipe.domain({width, height}));
+  EXPECT_EQ(countShared(4, int64_t(width) * height / 64), 2u);
+  EXPECT_TRUE(pipe.domain({width, 2 * height}));
+  EXPECT_EQ(countShared(4, int64_t(width) * height / 32), 0u);
+}
+
 TEST_F(PrivateImages, Declarations) {
   auto expect = [](void (*wrong)(pikort_pipeline *), const char *message) {
     piko::rt::Pipeline other({PIKORT_ABI_VERSION, "Nearest", wrong, run});
