@@ -59,7 +59,7 @@ public:
       : kernel(kernel), bins(bins), accesses(accesses),
         pipeline(getPipeline(kernel)),
         stage(lookupInPipeline<StageOp>(bins, bins.getStageAttr())),
-        program(getProgram(pipeline)), launch(findLaunch()) {}
+        program(getProgram(pipeline)), launch(findLaunch(kernel)) {}
 
   /// Why none of the kernel's images can have tiles.
   std::optional<Reason> whyNot();
@@ -71,7 +71,6 @@ public:
   StageOp getStage() { return stage; }
 
 private:
-  LaunchOp findLaunch();
   bool mayHaveBatches();
   bool isInBin(Operation *access);
   void clear(ImageOp image);
@@ -118,16 +117,6 @@ SmallVector<ImageOp> ImageAccesses::getWritten(KernelOp kernel) const {
     if (llvm::any_of(get(kernel, image.getSymNameAttr()), writes))
       written.push_back(image);
   return written;
-}
-
-LaunchOp TileFormer::findLaunch() {
-  SmallVector<LaunchOp> launches;
-  if (program)
-    program.walk([&](LaunchOp op) {
-      if (op.getKernelOp() == kernel)
-        launches.push_back(op);
-    });
-  return launches.size() == 1 ? launches.front() : LaunchOp();
 }
 
 //===----------------------------------------------------------------------===//

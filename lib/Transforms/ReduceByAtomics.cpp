@@ -68,17 +68,6 @@ private:
 /// More would take longer than what they save.
 static constexpr int64_t mostPasses = 2;
 
-/// Where the program launches a kernel.
-static LaunchOp findLaunch(KernelOp kernel) {
-  LaunchOp found;
-  if (ProgramOp program = getProgram(getPipeline(kernel)))
-    program.walk([&](LaunchOp launch) {
-      if (launch.getKernel() == kernel.getSymName())
-        found = launch;
-    });
-  return found;
-}
-
 //===----------------------------------------------------------------------===//
 // Kernels
 //===----------------------------------------------------------------------===//

@@ -21,6 +21,16 @@ ProgramOp piko::getProgram(PipelineOp pipeline) {
   return {};
 }
 
+LaunchOp piko::findLaunch(KernelOp kernel) {
+  SmallVector<LaunchOp> launches;
+  if (ProgramOp program = getProgram(getPipeline(kernel)))
+    program.walk([&](LaunchOp launch) {
+      if (launch.getKernel() == kernel.getSymName())
+        launches.push_back(launch);
+    });
+  return launches.size() == 1 ? launches.front() : LaunchOp();
+}
+
 SmallVector<StageOp> piko::getStages(KernelOp kernel) {
   SmallVector<StageOp> stages;
   auto add = [&](FlatSymbolRefAttr name) {

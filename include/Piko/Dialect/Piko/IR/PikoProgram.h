@@ -15,6 +15,10 @@ namespace piko {
 /// The program of a pipeline, or null.
 ProgramOp getProgram(PipelineOp pipeline);
 
+/// Where the program of a kernel's pipeline launches it; null if it does not, or
+/// in several places.
+LaunchOp findLaunch(KernelOp kernel);
+
 /// The stages whose process phases run in a kernel, in order; none in that of
 /// a source or of a schedule. At the kernels level and below.
 llvm::SmallVector<StageOp> getStages(KernelOp kernel);
