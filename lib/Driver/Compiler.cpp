@@ -243,7 +243,7 @@ void piko::addPasses(OpPassManager &passes, Level from, Level to,
   if (goes(Level::Kernels))
     addSynthesisSequence(passes, chosen);
   if (goes(Level::Machine))
-    addMachineSequence(passes);
+    addMachineSequence(passes, chosen);
   if (goes(Level::Target)) {
     if (gpu.target != GPUTarget::None)
       addGPUSequence(passes, gpu, chosen);

@@ -108,12 +108,17 @@ void piko::addSynthesisSequence(OpPassManager &passes,
     pipeline.addPass(createFormStrips());
 }
 
-void piko::addMachineSequence(OpPassManager &passes) {
+void piko::addMachineSequence(OpPassManager &passes,
+                              const SynthesisOptions &options) {
   OpPassManager &pipeline = passes.nest<PipelineOp>();
   pipeline.addPass(createFormProgram()); // of what was written by hand
   pipeline.addPass(createFormWork());
   addCleanUp(passes);
   passes.nest<PipelineOp>().addPass(createForwardStores());
+  if (options.has("form-gbuffer")) {
+    passes.addPass(createFormGBuffer());
+    addCleanUp(passes);
+  }
   // Last: it counts what is left to do.
   passes.nest<PipelineOp>().addPass(createMapLanes());
 }
@@ -302,9 +307,9 @@ void piko::registerSequences() {
   PassPipelineRegistration<>(
       "piko-synthesize", "From the authored to the kernels level",
       [](OpPassManager &passes) { addSynthesisSequence(passes); });
-  PassPipelineRegistration<>("piko-to-machine",
-                             "From the kernels to the machine level",
-                             addMachineSequence);
+  PassPipelineRegistration<>(
+      "piko-to-machine", "From the kernels to the machine level",
+      [](OpPassManager &passes) { addMachineSequence(passes); });
   PassPipelineRegistration<>(
       "piko-to-units", "From the machine level to loops over units of work",
       addUnitSequence);

@@ -4,24 +4,54 @@
 using namespace mlir;
 using namespace piko;
 
+/// A record of numbers, each at a multiple of its size.
+static RecordOp createRecord(OpBuilder &builder, Location loc, StringRef name,
+                             StringRef what, ArrayRef<Type> types) {
+  SmallVector<Attribute> fields;
+  int64_t size = 0, align = 1;
+  for (auto [number, type] : llvm::enumerate(types)) {
+    int64_t bytes = type.getIntOrFloatBitWidth() / 8;
+    size = llvm::alignTo(size, bytes);
+    std::string field = what.str();
+    if (types.size() > 1)
+      field += std::to_string(number);
+    fields.push_back(
+        FieldAttr::get(builder.getContext(), field, type, size, {}, {}));
+    size += bytes;
+    align = std::max(align, bytes);
+  }
+  return RecordOp::create(builder, loc, name, builder.getArrayAttr(fields),
+                          llvm::alignTo(size, align), align);
+}
+
+/// Whether a record has these numbers and no others.
+static bool hasTypes(RecordOp record, ArrayRef<Type> types) {
+  return llvm::equal(record.getFields(), types, [](Attribute field, Type type) {
+    return cast<FieldAttr>(field).getType() == type;
+  });
+}
+
 ImageOp piko::createInternalImage(ImageOp image, StringRef what,
-                                  IntegerType type, ArrayAttr clear) {
+                                  ArrayRef<Type> types, ArrayAttr clear) {
   PipelineOp pipeline = getPipeline(image);
   auto module = pipeline->getParentOfType<ModuleOp>();
   Location loc = image.getLoc();
-  std::string recordName = ("piko." + what).str();
   OpBuilder builder(image->getContext());
-  if (!module.lookupSymbol(recordName)) {
-    builder.setInsertionPointToStart(module.getBody());
-    int64_t bytes = type.getWidth() / 8;
-    auto field = FieldAttr::get(builder.getContext(), what, type, 0, {}, {});
-    RecordOp::create(builder, loc, recordName, builder.getArrayAttr({field}),
-                     bytes, bytes);
+  builder.setInsertionPointToStart(module.getBody());
+  std::string stem = ("piko." + what).str(), record = stem;
+  for (int i = 0;; ++i) {
+    auto known = module.lookupSymbol<RecordOp>(record);
+    if (!known)
+      createRecord(builder, loc, record, what, types);
+    if (!known || hasTypes(known, types))
+      break;
+    record = stem + std::to_string(i);
   }
   builder.setInsertionPointAfter(image);
-  std::string stem = (image.getSymName() + "." + what).str(), name = stem;
+  stem = (image.getSymName() + "." + what).str();
+  std::string name = stem;
   for (int i = 0; SymbolTable::lookupSymbolIn(pipeline, name); ++i)
     name = stem + std::to_string(i);
-  return ImageOp::create(builder, loc, name, recordName, image.getRank(), clear,
+  return ImageOp::create(builder, loc, name, record, image.getRank(), clear,
                          /*internal=*/true);
 }

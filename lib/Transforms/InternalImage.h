@@ -9,11 +9,12 @@
 
 namespace piko {
 
-/// An internal image behind another one of its rank, with an integer for each
-/// pixel: a field of the record `piko.` and `what`, after which the image is
+/// An internal image behind another one of its rank, with numbers for each
+/// pixel: a record `piko.` and `what`, after which the image and its fields are
 /// called, too. `clear` is what it is cleared to, or null.
 ImageOp createInternalImage(ImageOp image, llvm::StringRef what,
-                            mlir::IntegerType type, mlir::ArrayAttr clear);
+                            llvm::ArrayRef<mlir::Type> types,
+                            mlir::ArrayAttr clear);
 
 } // namespace piko
 

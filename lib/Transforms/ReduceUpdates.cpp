@@ -155,8 +155,8 @@ void ImagePrivatizer::noteUnit(const Selection::Site &site, ImageOp unitImage,
 void ImagePrivatizer::privatize(const Selection &selection) {
   auto key = cast<ImageOp>(
       SymbolTable::lookupSymbolIn(pipeline, selection.images.front().name));
-  ImageOp unitImage = createInternalImage(key, "unit", builder.getI32Type(),
-                                          /*clear=*/nullptr);
+  ImageOp unitImage = createInternalImage(
+      key, "unit", {Type(builder.getI32Type())}, /*clear=*/nullptr);
   PrivateImagesOp images = createImages(selection, unitImage);
   if (!unit) {
     builder.setInsertionPointAfter(writer);

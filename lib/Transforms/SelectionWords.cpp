@@ -41,7 +41,7 @@ void SelectionWords::createImages(PipelineOp pipeline) {
   IntegerType type = builder.getI64Type();
   auto last = builder.getArrayAttr({builder.getIntegerAttr(type, -1)});
   for (int64_t word = 0; word < size(); ++word)
-    images.push_back(createInternalImage(image, "first", type, last));
+    images.push_back(createInternalImage(image, "first", {Type(type)}, last));
 }
 
 /// An integer as wide, which is the smaller one, as unsigned, of what comes

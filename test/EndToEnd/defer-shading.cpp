@@ -43,6 +43,11 @@
 #include <cmath>
 #include <cstdint>
 
+#ifndef WHOLE
+#define WHOLE false // gbuffer.cpp has bins that are the whole domain
+#endif
+constexpr int large = WHOLE ? 0 : 16, small = WHOLE ? 0 : 8;
+
 struct Particle {
   int x, y;
   float value;
@@ -74,7 +79,7 @@ template <class S> struct Alone : piko::Pipe<State> {
 };
 
 template <class Self = void>
-struct Discs : piko::Stage<16, 16, 64, Particle>, piko::Uses<State> {
+struct Discs : piko::Stage<large, large, 64, Particle>, piko::Uses<State> {
   static constexpr int radius = 4;
   glm::ivec2 lo(const Particle &p) { return {p.x - radius, p.y - radius}; }
   glm::ivec2 hi(const Particle &p) { return {p.x + radius, p.y + radius}; }
@@ -217,7 +222,8 @@ struct TwoWaysStage : Discs<> {
 struct TwoWays : Alone<TwoWaysStage> {};
 
 // One pixel each, many in one.
-struct PointsStage : piko::Stage<8, 8, 64, Particle>, piko::Uses<State> {
+struct PointsStage : piko::Stage<small, small, 64, Particle>,
+                     piko::Uses<State> {
   void assignBin(const Particle &p) {
     if (p.x >= 0 && p.y >= 0 && p.x < domain().x && p.y < domain().y)
       assignToBin(p, binFromPosition(glm::ivec2(p.x, p.y)));
@@ -248,7 +254,7 @@ struct Fragment {
   float z;
   int serial;
 };
-struct Splitter : piko::Stage<8, 8, 64, Particle, Fragment> {
+struct Splitter : piko::Stage<small, small, 64, Particle, Fragment> {
   void assignBin(const Particle &p) {
     if (p.x >= 0 && p.y >= 0 && p.x < domain().x && p.y < domain().y)
       assignToBin(p, binFromPosition(glm::ivec2(p.x, p.y)));
@@ -258,7 +264,7 @@ struct Splitter : piko::Stage<8, 8, 64, Particle, Fragment> {
       emit(Fragment{p.x, p.y, p.value + i % 2, p.serial + i}, 0);
   }
 };
-struct Shader : piko::Stage<8, 8, 64, Fragment>, piko::Uses<State> {
+struct Shader : piko::Stage<small, small, 64, Fragment>, piko::Uses<State> {
   void assignBin(const Fragment &f) {
     assignToBin(f, binFromPosition(glm::ivec2(f.x, f.y)));
   }
@@ -317,7 +323,7 @@ struct KindsStage : Discs<> {
   void process(const Particle &p) {
     parallelForPixels(lo(p), hi(p), [&](glm::ivec2 at) {
       double z = double(p.value) / 3 + at.x;
-      int16_t small = int16_t(p.serial * 5 - at.y);
+      int16_t narrow = int16_t(p.serial * 5 - at.y);
       int64_t wide = int64_t(p.serial) << 33 | at.x;
       bool flag = (p.serial ^ at.x) % 3 == 1;
       bool passed = false;
@@ -329,7 +335,7 @@ struct KindsStage : Discs<> {
       if (passed) {
         double sum = 0;
         for (int k = 0; k < 8; ++k) {
-          sum += flag ? z * k : double(small) / (k + 1);
+          sum += flag ? z * k : double(narrow) / (k + 1);
           sum -= double(wide >> (30 + k));
         }
         update(state().color, at, [&](Color &c) { c.r = float(sum); });
@@ -340,7 +346,7 @@ struct KindsStage : Discs<> {
 struct Kinds : Alone<KindsStage> {};
 
 // A phase that takes the bin's list.
-struct ListsStage : piko::Stage<16, 16, 64, Particle>, piko::Uses<State> {
+struct ListsStage : piko::Stage<large, large, 64, Particle>, piko::Uses<State> {
   void assignBin(const Particle &p) {
     assignToBoundingBox(p, glm::ivec2(p.x, p.y) - 3, glm::ivec2(p.x, p.y) + 3);
   }

@@ -5,7 +5,7 @@
 // Shading that stays where it is.
 // CHECK-NOT: memref.alloca
 
-// A bin without an extent.
+// A bin without an extent, which piko-form-gbuffer is for.
 
 piko.record @F {"x" : i32 at 0, "a" : f32 at 4} size 8 align 4
 piko.record @D {"z" : f32 at 0} size 4 align 4
@@ -14,7 +14,6 @@ piko.pipeline @P rank 1 {
   piko.buffer @reads : @D
   piko.image @color : @D rank 1
   piko.source @last
-  // expected-note @below {{a bin is the whole domain; give the stage bins of a size}}
   piko.stage @last bins [0] threads 1 ordered : @F -> [] {}
   piko.kernel @kernel_last {
     %zero = arith.constant 0 : index
@@ -33,7 +32,6 @@ piko.pipeline @P rank 1 {
           %after = arith.addf %before, %n : f32
           scf.yield %after : f32
         }
-        // expected-remark @below {{what is written to 'color' is computed also where it is overwritten}}
         piko.update @color[%x : i32] in %bin {
         ^bb0(%old: f32):
           piko.yield [%sum : f32]

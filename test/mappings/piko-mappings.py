@@ -34,10 +34,10 @@ THREADS = [1, 2, 7]
 STRIPS = [None, 100]
 PASSES = ["pre-schedule", "infer-directives", "fuse-stages", "test-early", "prune",
           "own-pixels", "eliminate-schedules", "fuse-kernels", "form-strips",
-          "defer-shading", "form-tiles", "prefetch", "vectorize", "prove-bounds",
-          "hoist-loads", "hoist-bounds", "merge-bounds", "thread-jumps",
-          "narrow-integers", "merge-gathers", "pair-gathers", "privatize",
-          "reduce-updates", "if-convert"]
+          "form-gbuffer", "defer-shading", "form-tiles", "prefetch", "vectorize",
+          "prove-bounds", "hoist-loads", "hoist-bounds", "merge-bounds",
+          "thread-jumps", "narrow-integers", "merge-gathers", "pair-gathers",
+          "privatize", "reduce-updates", "if-convert"]
 
 SIZE = ["--width", "131", "--height", "99", "--lights", "3"]
 

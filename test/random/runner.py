@@ -18,11 +18,12 @@ EQUAL, BLANK = "equal", "equal, but blank"
 
 #: What piko-compare may leave out of synthesis.
 PASSES = ["pre-schedule", "infer-directives", "fuse-stages", "test-early", "prune",
-          "own-pixels", "eliminate-schedules", "fuse-kernels", "defer-shading",
-          "form-tiles", "prefetch", "vectorize", "prove-bounds", "hoist-loads",
-          "hoist-bounds", "merge-bounds", "thread-jumps", "narrow-integers",
-          "merge-gathers", "pair-gathers", "if-convert", "uplift-pixel-loops",
-          "privatize", "reduce-updates", "reduce-by-atomics"]
+          "own-pixels", "eliminate-schedules", "fuse-kernels", "form-gbuffer",
+          "defer-shading", "form-tiles", "prefetch", "vectorize", "prove-bounds",
+          "hoist-loads", "hoist-bounds", "merge-bounds", "thread-jumps",
+          "narrow-integers", "merge-gathers", "pair-gathers", "if-convert",
+          "uplift-pixel-loops", "privatize", "reduce-updates",
+          "reduce-by-atomics"]
 
 
 def options_of(passes):

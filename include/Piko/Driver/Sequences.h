@@ -23,7 +23,8 @@ void addSynthesisSequence(mlir::OpPassManager &passes,
                           const SynthesisOptions &options = {});
 
 /// `piko-to-machine`: from the kernels to the machine level.
-void addMachineSequence(mlir::OpPassManager &passes);
+void addMachineSequence(mlir::OpPassManager &passes,
+                        const SynthesisOptions &options = {});
 
 /// `piko-to-units`: from there to loops over units of work, for the CPU; does
 /// nothing to what has gone through it.

@@ -48,6 +48,96 @@ def FormWork : Pass<"piko-form-work", "::piko::PipelineOp"> {
                            "::mlir::scf::SCFDialect"];
 }
 
+def FormGBuffer : Pass<"piko-form-gbuffer", "::mlir::ModuleOp"> {
+  let summary = "Shade pixels of the whole domain once, by a kernel behind";
+  let description = [{
+    **Requires** the machine level and a program.
+
+    **Does**: what `piko-defer-shading` does in a bin of a size, where a bin is the
+    whole domain. Of all that primitives write to a pixel of an image that their
+    kernel never reads, only the last is seen. In place of such an update, what it
+    is computed from is kept for the pixel, in an internal image (a G-buffer: T.
+    Saito and T. Takahashi, "Comprehensible Rendering of 3-D Shapes", 1990), and in
+    another one, that anything is. The rest is done by a kernel that the program
+    launches behind the first one, on bins of about 1024 pixels: once for each
+    pixel, in full vectors and on all threads, however the first kernel runs.
+    Where to cut is found as there. The kernel's stage has the name of the other
+    one with `_pixels` behind it; nothing comes to it, and its process phase runs
+    for each bin (`every_bin`).
+
+    What is left of the first kernel is what `piko-reduce-updates` or
+    `piko-reduce-by-atomics` then lets threads or blocks share, if it is a
+    reduction.
+
+    **Guarantees** the same images and errors.
+
+    Before:
+    ```
+    piko.kernel @kernel_a { // of @a, whose bins are [0, 0]
+      ...
+        %passed = piko.update @depth[%x, %y : i32, i32] in %bin { ... } -> i1
+        scf.if %passed {
+          %sum = scf.for ... { ... %normal ... }
+          piko.update @color[%x, %y : i32, i32] in %bin { ... piko.yield[%sum] }
+        }
+    }
+    piko.program {
+      ...
+      piko.launch @kernel_a(%bins)
+    }
+    ```
+    After:
+    ```
+    piko.kernel @kernel_a {
+      ...
+        %passed = piko.update @depth[%x, %y : i32, i32] in %bin { ... } -> i1
+        scf.if %passed {
+          piko.update @color.kept[%x, %y : i32, i32] in %bin { ... piko.yield[%normal] }
+          piko.update @color.painted[%x, %y : i32, i32] in %bin { ... piko.yield[%one] }
+        }
+    }
+    piko.kernel @kernel_a_pixels { // of @a_pixels, whose bins are [32, 32]
+      piko.bins of @a_pixels {
+      ^bb0(%bin: index):
+        piko.lists of @a_pixels {
+        ^bb0(%list: !piko.list<@F>): // empty
+          piko.parallel_pixels(%lo, ...) to (%hi, ...) {
+          ^bb0(%x: i32, %y: i32):
+            scf.if /* painted at %x, %y */ {
+              %normal = piko.load checked @color.kept[%x, %y : i32, i32] "kept" : f32
+              %sum = scf.for ... { ... %normal ... }
+              piko.update @color[%x, %y : i32, i32] in %bin { ... piko.yield[%sum] }
+            }
+          }
+        }
+      }
+    }
+    piko.program {
+      ...
+      piko.clear @color.painted
+      piko.launch @kernel_a(%bins)
+      %pixels = piko.join @a_pixels()
+      piko.launch @kernel_a_pixels(%pixels)
+    }
+    ```
+
+    **Limits**: as of `piko-defer-shading`, but that the bin is the whole domain, in
+    some dimension at least. What may fail stays in the first kernel. The kernel is
+    launched once, and not in strips or on a cycle. What is cheaper to compute than
+    to keep in memory stays, which is more than there, as what is kept of a screen
+    does not fit the first level of a cache. A remark says what is kept, or what is
+    in the way.
+  }];
+  let options = [
+    Option<"budget", "budget", "int64_t", "64",
+           "Most bytes that are kept of a pixel">];
+  let statistics = [
+    Statistic<"deferred", "deferred", "images that are written once a pixel">,
+    Statistic<"refused", "refused", "images that are written more often">];
+  let dependentDialects = ["::mlir::arith::ArithDialect",
+                           "::mlir::scf::SCFDialect"];
+}
+
 def DeferShading : Pass<"piko-defer-shading", "::piko::PipelineOp"> {
   let summary = "Shade each pixel once, when a bin's primitives are done";
   let description = [{

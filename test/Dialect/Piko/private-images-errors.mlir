@@ -66,7 +66,7 @@ piko.pipeline @P rank 1 {
     %zero = arith.constant 0 : index
     %bins = piko.storage.open_bins @a : !piko.bins<@F>
     %w = piko.cpu.open_writer %bins[%zero] : !piko.bins<@F>
-    // expected-error @below {{expected an image of the pipeline's, but got @u}}
+    // expected-error @below {{expected an image, and not that of units, but got @u}}
     %s = piko.cpu.private_images @z by [0] ["slt"] carries [@u] keeps [array<i64: 0>, array<i64: 0>] unit @u of %w
   }
 }

@@ -245,8 +245,8 @@ LogicalResult PrivateImagesOp::verifySymbolUses(SymbolTableCollection &) {
     auto image = lookupInPipeline<ImageOp>(*this, symbol);
     RecordOp pixel =
         image ? lookupRecord(image, image.getRecordAttr()) : RecordOp();
-    if (!pixel || image.getInternal())
-      return emitOpError("expected an image of the pipeline's, but got ")
+    if (!pixel || symbol == getUnitImageAttr())
+      return emitOpError("expected an image, and not that of units, but got ")
              << symbol;
     SmallVector<Type> types = pixel.getElementTypes();
     for (int64_t number : kept.asArrayRef())

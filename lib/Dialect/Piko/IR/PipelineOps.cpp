@@ -191,7 +191,14 @@ static LogicalResult verifyPorts(PipelineOp pipeline) {
   return success();
 }
 
-/// A stage that no primitive can reach is a mistake in the graph.
+/// Whether a stage has something to do without primitives, which passes make.
+static bool needsNone(StageOp stage) {
+  ScheduleOp schedule = stage.getSchedule();
+  return !stage.getProcess() && stage.getTakesList() && schedule &&
+         schedule.getEveryBin();
+}
+
+/// Any other stage that no primitive can reach is a mistake in the graph.
 static LogicalResult verifyReached(PipelineOp pipeline) {
   llvm::DenseSet<StringAttr> fed;
   for (Operation &op : *pipeline.getBodyBlock()) {
@@ -201,7 +208,7 @@ static LogicalResult verifyReached(PipelineOp pipeline) {
       fed.insert(edge.getConsumerAttr().getAttr());
   }
   for (auto stage : pipeline.getOps<StageOp>())
-    if (!fed.contains(stage.getSymNameAttr()))
+    if (!fed.contains(stage.getSymNameAttr()) && !needsNone(stage))
       return stage.emitError("stage '")
              << getCppName(stage)
              << "' has no input: expected an edge or a source that feeds it";
