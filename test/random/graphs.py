@@ -150,7 +150,7 @@ class Graphs(Chains):
             while size and -(-extent // size) > (24, 24, 5, 4, 3)[self.rank]:
                 size *= 2
             sizes.append(size)
-        if r.random() < 0.15:
+        if r.random() < (0.3 if self.on("shading") else 0.15):
             sizes = [0] * self.rank
         return sizes
 

@@ -29,7 +29,7 @@ FEATURES = [
     "updates", "atomics", "stores", "maths", "bit-tricks", "float-specials",
     "dynamic-elements", "loop-jumps", "early-returns", "switches", "lambdas",
     "helpers", "template-stages", "local-arrays", "twin-stages", "chains", "many-inputs",
-    "selections",
+    "selections", "shading",
 ]
 #: What the dialect's printer does not write: C++ that the front end removes.
 CPP_ONLY = {"maths", "loop-jumps", "early-returns", "switches", "lambdas", "helpers",

@@ -240,23 +240,51 @@ class Statements(Expressions):
             chosen = self.on("selections") and places and r.random() < 0.5
             self.selections[image.name] = chosen and (
                 r.choice(places), r.choice(["<", "<=", ">", ">="]),
-                [l for l in image.record.leaves if r.random() < 0.6])
+                [l for l in image.record.leaves if r.random() < 0.6],
+                [r.randint(1, 31) / 16 for _ in range(3)]
+                if self.on("shading") and r.random() < 0.7 else None)
         if not self.selections[image.name]:
             return None
         self.use("selections")
-        leaf, comparison, others = self.selections[image.name]
+        leaf, comparison, others, shaded = self.selections[image.name]
         key, px = self.fresh("v"), self.fresh("px")
         before = [Let(key, leaf.kind, self.expr(leaf.kind, scope))]
+        light, shading = self.shade(shaded, scope) if shaded else ("", [])
         index = Lit("i32", 0) if leaf.count else None
         body = [Put(px, leaf, Var(leaf.kind, key), index)]
         for other in others:
             if other.path != leaf.path:
-                body.append(Put(px, other, self.expr(wide(other.kind), scope, 2),
-                                Lit("i32", 0) if other.count else None))
+                value = self.of_light(light, wide(other.kind)) if shaded else \
+                    self.expr(wide(other.kind), scope, 2)
+                body.append(Put(px, other, value, Lit("i32", 0) if other.count else None))
         scope.variables.append((key, leaf.kind))
         old = Get(leaf.kind, px, leaf, index)
         test = Op("b1", comparison, [Var(leaf.kind, key), old])
-        return before + [Update(image, at, [If(test, body)])]
+        return before + shading + [Update(image, at, [If(test, body)])]
+
+    def shade(self, weights, scope):
+        """A sum that takes a loop, and that only what is seen needs; the same for
+        all updates of an image, but for what it begins with."""
+        self.use("shading")
+        light, turn = self.fresh("v"), self.fresh("k")
+        a, b, c = (Lit("f32", weight) for weight in weights)
+        real = lambda name, *operands: Op("f32", name, list(operands))
+        was = Var("f32", light)
+        wave = real("+", real("*", was, a), real("*", Op("f32", "cast", [
+            Var("i32", turn)]), b))
+        value = real("/", wave, real("+", real("*", wave, wave), c))
+        return light, [Let(light, "f32", self.expr("f32", scope, 2)),
+                       For(turn, lit(7), [Assign(light, real("+", value, a))])]
+
+    def of_light(self, light, kind):
+        """Such a sum as a number of another kind."""
+        value = Var("f32", light)
+        if kind == "b1":
+            return Op("b1", "<", [value, Lit("f32", 0.5)])
+        if kind in FLOATS:
+            return value if kind == "f32" else Op(kind, "cast", [value])
+        value = Op("i32", "toInt", [Op("f32", "*", [value, Lit("f32", 64.0)])])
+        return value if kind == "i32" else Op(kind, "cast", [value])
 
     def update(self, image, at, scope):
         selects = self.select(image, at, scope)

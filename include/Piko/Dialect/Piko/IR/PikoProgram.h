@@ -15,8 +15,8 @@ namespace piko {
 /// The program of a pipeline, or null.
 ProgramOp getProgram(PipelineOp pipeline);
 
-/// Where the program of a kernel's pipeline launches it; null if it does not, or
-/// in several places.
+/// Where the program of a kernel's pipeline launches it; null if it does not,
+/// or in several places.
 LaunchOp findLaunch(KernelOp kernel);
 
 /// The stages whose process phases run in a kernel, in order; none in that of
