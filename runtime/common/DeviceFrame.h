@@ -38,6 +38,8 @@ public:
   virtual int32_t stepLoop(int32_t loop) = 0;
   virtual bool takes(int32_t stage) = 0;
   virtual int32_t nextTurn(int32_t cycle) = 0;
+  /// The same for pikoir_strips_next, where strips are of `size` primitives.
+  virtual bool nextStrip(int32_t group, int64_t size) = 0;
   enum class Outcome {
     Done,
     Repeat, ///< Memory or a rule: the host is to take the run step by step.

@@ -28,6 +28,8 @@ public:
   /// false at the end, or on an error.
   bool next();
   bool isFinished() const { return finished_; }
+  /// How many primitives the next one has at most.
+  int64_t size() const { return size_; }
   /// Whether what leaves is in queues.
   bool isDivided() const { return divided_; }
   /// The strip's number: of two, the earlier one's primitives come first.

@@ -10,8 +10,6 @@
 using namespace piko::cuda;
 using namespace piko::rt;
 
-/// More than these, of many strips, are the host's.
-static constexpr int64_t mostSteps = 4096;
 /// In front of what grids take of the log: see gpu/Log.cpp.
 static constexpr int64_t headRoom = 64, spareRoom = int64_t(1) << 26;
 
@@ -42,13 +40,13 @@ bool Frame::begin() {
   makeZero(places_);
   makeZero(queues_);
   makeZero(loops_);
+  makeZero(cycles_);
   makeZero(received_);
   for (LoopState &loop : std::span(loops_.data(), p_.loops.size()))
     loop.again = 1;
+  for (CycleState &cycle : std::span(cycles_.data(), p_.cycles.size()))
+    cycle.again = 1;
   arguments_.reset();
-  cycles_.clear();
-  for (size_t c = 0; c < p_.cycles.size(); ++c)
-    cycles_.push_back(&takeCycle());
   strips_.assign(p_.stripGroups.size(), {});
   steps_.clear();
   joined_ = nullptr;
@@ -82,6 +80,7 @@ void Frame::takeMemory() {
   queues_ = Array<QueueState>(p_.memory, countOf(p_.edges) + countOf(p_.stages),
                               Use::State);
   loops_ = Array<LoopState>(p_.memory, countOf(p_.loops) + 1, Use::State);
+  cycles_ = Array<CycleState>(p_.memory, countOf(p_.cycles) + 1, Use::State);
   stackStates_ =
       Array<StackState>(p_.memory, countOf(p_.loops) + 1, Use::State);
   received_ = Array<uint64_t>(
@@ -123,10 +122,10 @@ JoinArgs &Frame::describeSource(int32_t source) {
 JoinInput Frame::describeSourceInput(const Stage &stage, int32_t source) const {
   const Source &from = p_.sources[source];
   JoinInput input{};
-  input.items = from.data + from.begin * p_.records[stage.record].size;
-  input.count = from.end - from.begin;
-  input.keyBase =
-      (static_cast<uint64_t>(source) << 32) + static_cast<uint64_t>(from.begin);
+  input.items = from.data;
+  input.count = from.count;
+  input.keyBase = static_cast<uint64_t>(source) << 32;
+  input.strip = stripOf(stage);
   input.isSource = true;
   input.stage = -1;
   if (stage.placed())
@@ -202,7 +201,7 @@ JoinArgs &Frame::describeStage(int32_t number) {
   if (stage.loop >= 0)
     args.loop = &loops_[stage.loop];
   if (stage.cycle >= 0)
-    args.cycle = cycles_[static_cast<size_t>(stage.cycle)];
+    args.cycle = &cycles_[stage.cycle];
   args.shape = describeShape(stage);
   args.tiles = stage.tiles;
   args.rank = p_.rank;
@@ -274,18 +273,6 @@ std::vector<int32_t> Frame::edgesOf(int32_t kernel) const {
   return edges;
 }
 
-int64_t Frame::findStrip(const Stage &stage) {
-  if (stage.stripGroup < 0)
-    return -1;
-  StripRecord &record = strips_[static_cast<size_t>(stage.stripGroup)];
-  const Source &source = p_.sources[p_.stripGroups[stage.stripGroup].source];
-  if (record.begin != source.begin)
-    ++record.number;
-  record.begin = source.begin;
-  record.isDivided |= source.begin > 0 || source.end < source.count;
-  return record.number;
-}
-
 // --- What the program asks for ----------------------------------------------
 
 void Frame::launchOwn(const char *kernel, const void *args, int32_t timed) {
@@ -330,14 +317,12 @@ const pikoir_input *Frame::join(int32_t number, bool isSource) {
   joined_ = &place;
   timed_ = kernelOf(number, isSource);
   const Stage &stage = p_.stages[isSource ? p_.sources[number].stage : number];
-  bool repeats = stage.stripGroup >= 0 || (!isSource && stage.cycle >= 0);
-  if ((place.args && !repeats) || nextNumber() > mostSteps)
+  if (place.args && (isSource || stage.cycle < 0))
     needsHost_ = true;
   if (!isSource && isStacked(stage))
     return &place.state.input;
-  int64_t strip = findStrip(stage);
   JoinArgs &args = isSource ? describeSource(number) : describeStage(number);
-  args.strip = strip;
+  args.strip = stripOf(stage);
   args.frame = frame_.data();
   args.kernel = &place.state;
   args.number = nextNumber();
@@ -365,7 +350,7 @@ int64_t Frame::mostItems(const JoinArgs &args) const {
        std::span(args.inputs(), static_cast<size_t>(args.inputCount))) {
     if (input.producer || input.queue)
       return -1;
-    most += input.count;
+    most += input.strip ? input.strip->size : input.count;
   }
   return most;
 }
@@ -425,7 +410,8 @@ Frame::Outcome Frame::await() {
   device_.await(steps_);
   const FrameState &frame = frame_[0];
   const KernelState *last = frame.latest;
-  int64_t end = last ? last->log.cursor : frame.log.cursor;
+  int64_t end =
+      std::max(last ? last->log.cursor : frame.log.cursor, frame.highest);
   auto begin = reinterpret_cast<int64_t>(logBegin_);
   used_ = {logBegin_,
            static_cast<size_t>(std::min(end, frame.log.limit) - begin)};

@@ -4,7 +4,8 @@
 // In front of each kernel of the program goes a join (device/Joins.h), which
 // finds its input and its units. Grids have as many blocks as fill the device,
 // and go over the units that they find. Memory is taken from the pipeline's log
-// space, in address order, from the first kernel to the last.
+// space, in address order, from the first kernel to the last; strips take it
+// again.
 //
 //===----------------------------------------------------------------------===//
 
@@ -66,6 +67,7 @@ public:
   int32_t stepLoop(int32_t loop) override;
   bool takes(int32_t) override { return true; }
   int32_t nextTurn(int32_t cycle) override;
+  bool nextStrip(int32_t group, int64_t size) override;
   bool submit() override;
   bool isDone() const override;
   Outcome await() override;
@@ -118,9 +120,9 @@ private:
     size_t block_ = 0;
     int64_t used_ = 0; ///< Of that block.
   };
-  /// What is known of the strips of a source while a frame is recorded.
+  /// Strips of a source while a frame is recorded.
   struct StripRecord {
-    int64_t begin = -1, number = -1;
+    StripState *state = nullptr; ///< Null before they begin.
     bool isDivided = false;
   };
 
@@ -136,8 +138,12 @@ private:
   }
   /// Edges of a kernel's stages that are not local.
   std::vector<int32_t> edgesOf(int32_t kernel) const;
-  /// Notes the strip of a source that a stage's kernel takes, or a source's.
-  int64_t findStrip(const rt::Stage &stage);
+  /// Of the source that a stage takes strip by strip, or null.
+  const StripState *stripOf(const rt::Stage &stage) const {
+    return stage.stripGroup < 0
+               ? nullptr
+               : strips_[static_cast<size_t>(stage.stripGroup)].state;
+  }
   void takeMemory();
   size_t placeOf(int32_t number, bool isSource) const;
   Place &find(int32_t number, bool isSource) const {
@@ -184,9 +190,19 @@ private:
   void endWave(int32_t loop);
   void endLoop(int32_t loop);
   void endRound(int32_t cycle);
-  CycleState &takeCycle();
+  // Strips (FrameStrips.cpp).
+  std::vector<StripQueue> describeLeaving(int32_t group) const;
+  std::vector<QueueState *> describeInside(int32_t group) const;
+  void endStrip(int32_t group);
+  /// The queues of edges that are wanted.
   template <class Wanted>
-  std::vector<QueueState *> describeWaiting(const Wanted &wanted) const;
+  std::vector<QueueState *> describeWaiting(const Wanted &wanted) const {
+    std::vector<QueueState *> queues;
+    for (size_t e = 0; e < p_.edges.size(); ++e)
+      if (wanted(p_.edges[e]))
+        queues.push_back(&queues_[static_cast<int64_t>(e)]);
+    return queues;
+  }
   StepArgs &takeStep(const std::vector<QueueState *> &waiting);
 
   void noteStatistics();
@@ -200,13 +216,12 @@ private:
   bool isRecording_ = false;
   bool needsHost_ = false; ///< Known from a run before.
   std::vector<Step> steps_;
-  std::vector<bool> isCleared_;      ///< States of this run.
-  const Place *joined_ = nullptr;    ///< The latest.
-  int32_t timed_ = -1;               ///< Its kernel.
-  std::vector<size_t> members_;      ///< Of each loop, those led through.
-  std::vector<size_t> turns_;        ///< Of each cycle, those taken.
-  std::vector<CycleState *> cycles_; ///< Of each, the state of its next run.
-  std::vector<StackArgs *> stacks_;  ///< Of each loop that has one.
+  std::vector<bool> isCleared_;     ///< States of this run.
+  const Place *joined_ = nullptr;   ///< The latest.
+  int32_t timed_ = -1;              ///< Its kernel.
+  std::vector<size_t> members_;     ///< Of each loop, those led through.
+  std::vector<size_t> turns_;       ///< Of each cycle, those taken.
+  std::vector<StackArgs *> stacks_; ///< Of each loop that has one.
   /// Of each stage whose schedule depends on the bin.
   std::map<const rt::Stage *, const BinCut *> cuts_;
   std::vector<StripRecord> strips_; ///< Of each group.
@@ -217,6 +232,7 @@ private:
   /// Of each edge, then, of what comes into a loop, of each stage.
   rt::Array<QueueState> queues_;
   rt::Array<LoopState> loops_;
+  rt::Array<CycleState> cycles_;
   rt::Array<StackState> stackStates_; ///< Of each loop.
   rt::Array<uint64_t> received_;      ///< Of each edge, then of each source.
   Arguments arguments_;

@@ -15,9 +15,6 @@
 //   loops and stages  repeat { a  loops and stages  b  loops and stages
 //                              piko_round }
 //
-// A source whose strips have a given size is taken strip by strip, each of
-// which is recorded; what leaves them waits in queues, too.
-//
 // Nothing has come for a stage: then its kernel has no units.
 //
 //===----------------------------------------------------------------------===//
@@ -140,16 +137,6 @@ int32_t Frame::stepLoop(int32_t loop) {
   return -1;
 }
 
-/// The queues of edges that are wanted.
-template <class Wanted>
-std::vector<QueueState *> Frame::describeWaiting(const Wanted &wanted) const {
-  std::vector<QueueState *> queues;
-  for (size_t e = 0; e < p_.edges.size(); ++e)
-    if (wanted(p_.edges[e]))
-      queues.push_back(&queues_[static_cast<int64_t>(e)]);
-  return queues;
-}
-
 StepArgs &Frame::takeStep(const std::vector<QueueState *> &waiting) {
   auto &args = arguments_.take<StepArgs>(p_.memory, waiting);
   args.queueCount = static_cast<int32_t>(waiting.size());
@@ -184,7 +171,7 @@ void Frame::enter(int32_t loop) {
     std::vector<JoinInput> ofStage = describeInputs(stage);
     entries.push_back(
         {&find(s, false).state, &entriesOf(s), describeShape(stage),
-         findStrip(stage), static_cast<int32_t>(inputs.size()),
+         stripOf(stage), static_cast<int32_t>(inputs.size()),
          static_cast<int32_t>(ofStage.size()), static_cast<int32_t>(m)});
     inputs.insert(inputs.end(), ofStage.begin(), ofStage.end());
   }
@@ -258,22 +245,14 @@ int32_t Frame::nextTurn(int32_t cycle) {
   size_t &turn = turns_[static_cast<size_t>(cycle)];
   if (collectors.empty())
     return -1;
-  CycleState *&state = cycles_[static_cast<size_t>(cycle)];
+  const int32_t &again = cycles_[cycle].again;
   if (turn == 0)
-    repeat(state->again);
+    repeat(again);
   if (turn < collectors.size())
     return collectors[turn++];
   endRound(cycle);
-  endRepeat(state->again);
-  turn = 0;
-  state = &takeCycle(); // of the next strip
+  endRepeat(again);
   return -1;
-}
-
-CycleState &Frame::takeCycle() {
-  auto &state = arguments_.take<CycleState>(p_.memory);
-  state.again = 1;
-  return state;
 }
 
 void Frame::endRound(int32_t cycle) {
@@ -281,6 +260,6 @@ void Frame::endRound(int32_t cycle) {
     const Stage &to = p_.stages[edge.consumer];
     return hasQueue(edge) && to.cycle == cycle && to.collects();
   }));
-  args.cycle = cycles_[static_cast<size_t>(cycle)];
+  args.cycle = &cycles_[cycle];
   launchOwn("piko_round", &args);
 }

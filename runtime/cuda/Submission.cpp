@@ -23,6 +23,17 @@ static bool repeats(std::span<const Step> steps) {
   });
 }
 
+/// How many bodies are one in another.
+static size_t depthOf(std::span<const Step> steps) {
+  size_t depth = 0, most = 0;
+  for (const Step &step : steps) {
+    depth += step.kind == Step::Kind::Repeat;
+    most = std::max(most, depth);
+    depth -= step.kind == Step::Kind::End;
+  }
+  return most;
+}
+
 bool Submission::canBeGraph(std::span<const Step> steps) const {
   const Driver &d = driver();
   bool hasGraphs = d.cuGraphInstantiateWithFlags && d.cuGraphExecUpdate;
@@ -143,8 +154,7 @@ void Submission::makeGraph(std::span<const Step> steps,
 CUgraph Submission::capture(std::span<const Step> steps,
                             std::span<uint8_t> clear) {
   CUstream stream = accelerator_.own_;
-  for (size_t depth = 1; depth <= 2 && repeats(steps); ++depth)
-    streamOf(depth); // a capture refuses to make them
+  streamOf(depthOf(steps)); // a capture refuses to make them
   // Other threads may do with the device what they like meanwhile.
   accelerator_.device_->check(driver().cuStreamBeginCapture(
                                   stream, CU_STREAM_CAPTURE_MODE_THREAD_LOCAL),

@@ -85,11 +85,9 @@ private:
     auto *streams = grid_.take<Stream>(args_.entryCount);
     for (int32_t e = 0; e < args_.entryCount && !grid_.hasFailed(); ++e) {
       const LoopEntry &entry = args_.entries()[e];
-      const KernelState &kernel = *entry.kernel;
-      bool isFirstRun = kernel.runs == 0 || kernel.strip != entry.strip;
       Stream stream{};
       Inputs(grid_, entry.shape, args_.inputs() + entry.firstInput,
-             entry.inputCount, isFirstRun)
+             entry.inputCount, isFirstRun(*entry.kernel, entry.strip))
           .gather(stream, /*keepsKeys=*/true);
       count_ += stream.count;
       if (Grid::isFirst() && !grid_.hasFailed())
@@ -153,7 +151,7 @@ private:
         drop(*args_.inputs()[i].queue, /*isInLoop=*/false);
     for (int32_t e = 0; e < args_.entryCount; ++e) {
       const LoopEntry &entry = args_.entries()[e];
-      entry.kernel->strip = entry.strip;
+      entry.kernel->strip = numberOf(entry.strip);
       ++entry.kernel->runs;
     }
     args_.loop->entryKeys = keys_;

@@ -27,12 +27,28 @@ inline void drop(QueueState &queue, bool isInLoop) {
   queue.ready = 0;
 }
 
+/// -1: it is not of a strip.
+inline int64_t numberOf(const StripState *strip) {
+  return strip ? strip->number : -1;
+}
+
+/// Whether a kernel has not run yet, or not for this strip.
+inline bool isFirstRun(const KernelState &kernel, const StripState *strip) {
+  return kernel.runs == 0 || kernel.strip != numberOf(strip);
+}
+
+/// Of a source, what is taken at a time.
+inline int64_t countOf(const JoinInput &input) {
+  return input.strip ? input.strip->count : input.count;
+}
+
 /// About how much it is to go through an input.
 inline int64_t workOf(const JoinInput &input, bool walksSource) {
   int64_t work = input.queue ? input.queue->items : 0;
   if (input.producer)
     work += workOf(*input.producer);
-  return work + (walksSource ? input.count : input.count / 256);
+  int64_t count = countOf(input);
+  return work + (walksSource ? count : count / 256);
 }
 
 /// Sources, what kernels have left, and what waits in queues, but for what is
@@ -88,9 +104,10 @@ private:
     if (!isFirstRun_) // the first one has taken it
       return;
     if (input.isSource) {
-      stream.items = input.items;
-      stream.count = input.count;
-      stream.keys = {nullptr, input.keyBase, 1};
+      int64_t begin = input.strip ? input.strip->begin : 0;
+      stream.items = input.items + begin * shape_.recordSize;
+      stream.count = countOf(input);
+      stream.keys = {nullptr, input.keyBase + static_cast<uint64_t>(begin), 1};
     }
     if (!input.producer)
       return;

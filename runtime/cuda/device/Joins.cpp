@@ -8,6 +8,7 @@
 
 #include "cuda/device/Enter.h"
 #include "cuda/device/Loops.h"
+#include "cuda/device/Strips.h"
 #include "cuda/device/Units.h"
 
 using namespace piko::cuda;
@@ -18,8 +19,7 @@ class Join {
 public:
   explicit Join(const JoinArgs &args)
       : args_(args), grid_(*args.frame, cursorOf(*args.frame), workOf(args)),
-        isFirstRun_(args.kernel->runs == 0 ||
-                    args.kernel->strip != args.strip) {}
+        isFirstRun_(isFirstRun(*args.kernel, args.strip)) {}
 
   void run() {
     if (grid_.isIdle())
@@ -184,9 +184,9 @@ private:
     kernel.lineage = lineage_;
     if (args_.cycle && args_.collects)
       kernel.launch = static_cast<uint64_t>(args_.cycle->launches++);
-    if (args_.strip >= 0 && args_.collects)
-      kernel.launch = static_cast<uint64_t>(args_.strip);
-    kernel.strip = args_.strip;
+    kernel.strip = numberOf(args_.strip);
+    if (args_.strip && args_.collects)
+      kernel.launch = static_cast<uint64_t>(kernel.strip);
     ++kernel.runs;
     kernel.in += stream.count;
     kernel.placed += bins.positions;
@@ -250,4 +250,8 @@ extern "C" [[clang::nvptx_kernel]] void piko_round(const StepArgs *args) {
 
 extern "C" [[clang::nvptx_kernel]] void piko_leave(const LeaveArgs *args) {
   Leave(*args).run();
+}
+
+extern "C" [[clang::nvptx_kernel]] void piko_strip(const StripArgs *args) {
+  Strip(*args).run();
 }

@@ -31,11 +31,13 @@ template <class T, class Args> const T *behind(const Args *args) {
 
 /// What all grids of a frame share.
 struct FrameState {
-  /// Memory is taken in address order, and never given back; until there is a
-  /// latest kernel, from this cursor on.
+  /// Memory is taken in address order, and given back between strips alone;
+  /// until there is a latest kernel, from this cursor on.
   pikoir_log log;
+  int64_t highest;     ///< Where the memory of strips ended that is free again.
   int64_t mostAlone;   ///< Up to how much work one block does by itself.
-  KernelState *latest; ///< The kernel that ran last; null before the first.
+  KernelState *latest; ///< The kernel that ran last; null before the first of
+                       ///< the frame, or of a strip.
   /// The host's: the grid that runs, as a number in the order of launches.
   volatile int64_t *progress;
   int32_t failed;   ///< Memory or a count did not suffice, or a kernel failed.
@@ -143,6 +145,16 @@ struct CycleState {
   int64_t launches; ///< Of stages that collect.
 };
 
+/// The strip that runs, of a source that a group of stages takes strip by
+/// strip.
+struct StripState {
+  int32_t again;  ///< Whether another one follows.
+  int64_t number; ///< Strips before it.
+  int64_t begin, count;
+  int64_t size, all; ///< Primitives of a strip, and of the source.
+  int64_t memory;    ///< Where that begins that strips take again.
+};
+
 /// What the device knows of a kernel, from its begin until the frame ends, or
 /// until it begins again.
 struct KernelState {
@@ -175,6 +187,7 @@ struct JoinInput {
   const uint8_t *items;  ///< Of a source: primitives and their number.
   int64_t count;
   uint64_t keyBase;
+  const StripState *strip; ///< Of a source: the part that is taken; null: all.
   QueueState *queue; ///< What comes through one has nothing else said here.
   int32_t isSource;
   int32_t isInLoop;    ///< Of a queue: both ends are in one loop.
@@ -210,10 +223,10 @@ struct BinCut {
 struct JoinArgs {
   FrameState *frame;
   KernelState *kernel;
-  LoopState *loop;   ///< The stage's, or null.
-  CycleState *cycle; ///< The stage's, or null.
-  int64_t number;    ///< Of the join, in the order of launches.
-  int64_t strip;     ///< Of the stage's source; -1: all at a time.
+  LoopState *loop;         ///< The stage's, or null.
+  CycleState *cycle;       ///< The stage's, or null.
+  const StripState *strip; ///< That the stage takes; null: all at a time.
+  int64_t number;          ///< Of the join, in the order of launches.
   int32_t inputCount, clearCount;
   Shape shape;
   int64_t tiles;
@@ -238,7 +251,7 @@ struct LoopEntry {
   KernelState *kernel; ///< The stage's.
   QueueState *queue;   ///< Where they wait for it.
   Shape shape;
-  int64_t strip; ///< As in JoinArgs.
+  const StripState *strip; ///< As in JoinArgs.
   int32_t firstInput, inputCount;
   int32_t member; ///< Among the loop's stages.
 };
@@ -332,6 +345,29 @@ struct LeaveArgs {
   int32_t groupCount;
 
   const ExitGroup *groups() const { return behind<ExitGroup>(this); }
+};
+
+/// A queue of what leaves the strips.
+struct StripQueue {
+  QueueState *queue;
+  int64_t recordSize;
+};
+
+/// Behind a strip.
+struct StripArgs {
+  FrameState *frame;
+  StripState *strip;
+  int64_t number;
+  int32_t leavingCount, insideCount, cycleCount;
+
+  const StripQueue *leaving() const { return behind<StripQueue>(this); }
+  /// Empty when a strip ends.
+  QueueState *const *inside() const {
+    return reinterpret_cast<QueueState *const *>(leaving() + leavingCount);
+  }
+  CycleState *const *cycles() const {
+    return reinterpret_cast<CycleState *const *>(inside() + insideCount);
+  }
 };
 
 } // namespace piko::cuda

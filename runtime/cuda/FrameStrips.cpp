@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//===- FrameStrips.cpp - Strips that a frame repeats on the device --------===//
+//
+// The program is led once through a strip:
+//
+//   repeat { all that the strip holds, with loops and rounds; piko_strip }
+//
+// What leaves the strips waits in queues. A source that is one strip is taken
+// as if there were none.
+//
+//===----------------------------------------------------------------------===//
+
+#include "cuda/Frame.h"
+
+using namespace piko::cuda;
+using namespace piko::rt;
+
+bool Frame::nextStrip(int32_t number, int64_t size) {
+  StripRecord &strips = strips_[static_cast<size_t>(number)];
+  bool isFirst = !strips.state;
+  if (isFirst) {
+    int64_t all = p_.sources[p_.stripGroups[number].source].count;
+    strips.state = &arguments_.take<StripState>(p_.memory);
+    *strips.state = {.again = 1,
+                     .number = 0,
+                     .begin = 0,
+                     .count = std::min(size, all),
+                     .size = std::min(size, all),
+                     .all = all,
+                     .memory = 0};
+    strips.isDivided = size < all;
+  }
+  if (!strips.isDivided)
+    return isFirst;
+  if (isFirst)
+    repeat(strips.state->again);
+  else
+    endStrip(number);
+  return isFirst;
+}
+
+std::vector<StripQueue> Frame::describeLeaving(int32_t group) const {
+  std::vector<StripQueue> queues;
+  for (size_t e = 0; e < p_.edges.size(); ++e) {
+    const Edge &edge = p_.edges[e];
+    if (edge.leavesStrips && p_.stages[edge.producer].stripGroup == group)
+      queues.push_back({&queues_[static_cast<int64_t>(e)],
+                        p_.records[p_.stages[edge.consumer].record].size});
+  }
+  return queues;
+}
+
+/// With those of what comes into loops.
+std::vector<QueueState *> Frame::describeInside(int32_t group) const {
+  std::vector<QueueState *> queues = describeWaiting([&](const Edge &edge) {
+    return hasQueue(edge) && !edge.leavesStrips &&
+           p_.stages[edge.producer].stripGroup == group;
+  });
+  for (int32_t s : p_.stripGroups[group].stages)
+    if (p_.stages[s].loop >= 0)
+      queues.push_back(&entriesOf(s));
+  return queues;
+}
+
+void Frame::endStrip(int32_t group) {
+  std::vector<StripQueue> leaving = describeLeaving(group);
+  std::vector<QueueState *> inside = describeInside(group);
+  std::vector<CycleState *> cycles;
+  for (size_t c = 0; c < p_.cycles.size(); ++c)
+    if (p_.stages[p_.cycles[c].stages.front()].stripGroup == group)
+      cycles.push_back(&cycles_[static_cast<int64_t>(c)]);
+  auto &args = arguments_.take<StripArgs>(p_.memory, leaving, inside, cycles);
+  args.frame = frame_.data();
+  args.strip = strips_[static_cast<size_t>(group)].state;
+  args.number = nextNumber();
+  args.leavingCount = static_cast<int32_t>(leaving.size());
+  args.insideCount = static_cast<int32_t>(inside.size());
+  args.cycleCount = static_cast<int32_t>(cycles.size());
+  launchOwn("piko_strip", &args);
+  endRepeat(args.strip->again);
+}
