@@ -77,6 +77,26 @@ TEST(Order, StripsThatFitABudget) {
   EXPECT_GT(all, 1 << 21) << "expected that a budget matters";
 }
 
+/// Of a run in strips of that size, or at once.
+int64_t peakBytes(Pipeline &pipe, int64_t strip) {
+  EXPECT_TRUE(pipe.threads(1)); // each has some of its own
+  EXPECT_TRUE(pipe.stripSize(strip));
+  pikort_reset_stats(pipe.get());
+  EXPECT_RUNS(pipe);
+  return pikort_peak_bytes(pipe.get());
+}
+
+TEST(Order, StripsTakeLessMemory) {
+  Dots dots = makeDots(5000, 9);
+  Pipeline all = makeTraced(conformance_Strips_program);
+  ASSERT_TRUE(all.source(0, dots));
+  EXPECT_LT(peakBytes(all, 150), peakBytes(all, 0));
+  // What is collected has left the strips.
+  Pipeline some = makeTraced(conformance_Schedules_program);
+  ASSERT_TRUE(some.source(0, dots));
+  EXPECT_LT(peakBytes(some, 150), peakBytes(some, 0));
+}
+
 void testWalk(const pikort_program &program, bool isOrdered) {
   Pipeline pipe = makeTraced(program);
   for (size_t count : counts) {
