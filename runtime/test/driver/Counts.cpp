@@ -173,5 +173,6 @@ std::string piko::testdriver::toJSON(const PikoTestDriverHostCounts &counts) {
   add("bytesToDevice", counts.bytesToDevice);
   add("bytesFromDevice", counts.bytesFromDevice);
   add("bytesOnDevice", counts.bytesOnDevice);
+  add("graphSectors", counts.graphSectors);
   return text + "}";
 }

@@ -213,7 +213,11 @@ CUresult piko::cuda::cuGraphLaunch(CUgraphExec executable, CUstream stream) {
     for (auto &[handle, condition] : at.context().conditions)
       if (condition.isAssigned && condition.graph == made.graph)
         condition.value = condition.initial;
+    ptx::Footprint footprint;
+    state().graphFootprint = &footprint;
     GraphRun(at).run(made.nodes);
+    state().graphFootprint = nullptr;
+    state().hostCounts.graphSectors += footprint.sectors();
   };
   if (state().defers)
     call.context().laterOf(stream).push_back(std::move(launch));

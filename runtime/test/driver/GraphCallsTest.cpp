@@ -270,7 +270,7 @@ TEST_F(GraphCallsTest, FailuresCountsAndLeaks) {
   EXPECT_EQ(cuMemcpyAsync(at(0), at(1), 8, stream), CUDA_SUCCESS);
   begin();
   EXPECT_EQ(add(once, 0, 1), CUDA_SUCCESS);
-  EXPECT_EQ(add(once, 0, 1), CUDA_SUCCESS);
+  EXPECT_EQ(add(once, 0, 8), CUDA_SUCCESS); // in another sector
   EXPECT_EQ(cuMemsetD8Async(at(0), 0, 8, stream), CUDA_SUCCESS);
   CUgraph graph = end();
   pikoTestDriverFail("cuGraphInstantiateWithFlags", 1,
@@ -291,6 +291,7 @@ TEST_F(GraphCallsTest, FailuresCountsAndLeaks) {
   EXPECT_EQ(counts.fills, 0u);
   EXPECT_EQ(counts.graphLaunches, 2u);
   EXPECT_EQ(counts.graphKernels, 4u);
+  EXPECT_EQ(counts.graphSectors, 2u * 2);
   EXPECT_EQ(counts.waits, 2u);
   renewContext();
   lost = true;

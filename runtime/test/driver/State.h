@@ -200,6 +200,8 @@ struct State {
   std::string error, leaks;
   std::map<std::string, PikoTestDriverCounts, std::less<>> counts;
   PikoTestDriverHostCounts hostCounts{};
+  /// Of the graph that runs, or null.
+  ptx::Footprint *graphFootprint = nullptr;
 
   template <typename Handle> Handle newHandle() {
     return reinterpret_cast<Handle>(nextHandle += 16);

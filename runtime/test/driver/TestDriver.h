@@ -117,6 +117,9 @@ struct PikoTestDriverHostCounts {
   uint64_t waits;        ///< For the context, a stream or an event.
   /// That copies had, on streams that were not captured.
   uint64_t bytesToDevice, bytesFromDevice, bytesOnDevice;
+  /// Sectors of 32 bytes of global memory that the kernels of a graph touch at
+  /// least once; summed over launches of graphs.
+  uint64_t graphSectors;
 };
 
 void pikoTestDriverHostCounts(struct PikoTestDriverHostCounts *counts);

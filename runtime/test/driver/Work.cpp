@@ -56,6 +56,8 @@ void runKernel(const Call &call, const Kernel &kernel,
   }
   const std::string &name = function.program.name;
   addCounts(launch, state().counts[name]);
+  if (state().graphFootprint)
+    state().graphFootprint->add(launch.footprint);
   if (state().countsGoTo == "launches") {
     PikoTestDriverCounts counts{};
     addCounts(launch, counts);

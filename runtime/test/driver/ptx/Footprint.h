@@ -22,6 +22,10 @@ public:
     }
     *last |= uint64_t(1) << sector % 64;
   }
+  void add(const Footprint &other) {
+    for (const auto &[group, bits] : other.groups)
+      groups[group] |= bits;
+  }
   uint64_t sectors() const {
     uint64_t sum = 0;
     for (const auto &[group, bits] : groups)
