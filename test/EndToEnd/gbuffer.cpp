@@ -8,6 +8,9 @@
 // RUN: piko-compare %s --cases %t.cases --runs 1 --threads 1 2 3 | FileCheck %s --check-prefix=EQUAL
 // RUN: piko-compare %s --cases %t.cases --runs 1 --threads 2 --without reduce-updates | FileCheck %s --check-prefix=EQUAL
 // RUN: env PIKO_CUDA_DRIVER=%test_driver piko-compare %s --cases %t.cases --runs 1 --target cuda | FileCheck %s --check-prefix=EQUAL
+// RUN: piko-compare %s --pipe Loops --domain 45 37 --count 300 --runs 1 --threads 2 --strip 7 | FileCheck %s --check-prefix=STRIPS
+// RUN: env PIKO_CUDA_DRIVER=%test_driver piko-compare %s --pipe Nearest --domain 45 37 --count 300 --runs 1 --target cuda --strip 7 | FileCheck %s --check-prefix=STRIPS
+// STRIPS: {{^equal$}}
 // EQUAL-COUNT-22: {{^equal$}}
 // MORE: --pipe Line --domain 300 --count 500
 // MORE: --pipe Box --domain 20 11 7 --count 500
