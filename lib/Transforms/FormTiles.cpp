@@ -43,7 +43,8 @@ public:
 
   /// Those to an image in a kernel.
   ArrayRef<Operation *> get(KernelOp kernel, StringAttr image) const;
-  /// The images that a kernel writes, in the order of their declaration.
+  /// The images of the pipeline that a kernel writes, in the order of their
+  /// declaration.
   SmallVector<ImageOp> getWritten(KernelOp kernel) const;
 
 private:
@@ -114,7 +115,8 @@ static bool writes(Operation *access) {
 SmallVector<ImageOp> ImageAccesses::getWritten(KernelOp kernel) const {
   SmallVector<ImageOp> written;
   for (auto image : PipelineOp(pipeline).getOps<ImageOp>())
-    if (llvm::any_of(get(kernel, image.getSymNameAttr()), writes))
+    if (!image.getInternal() &&
+        llvm::any_of(get(kernel, image.getSymNameAttr()), writes))
       written.push_back(image);
   return written;
 }
