@@ -16,11 +16,11 @@ const std::vector<std::string> &SynthesisOptions::getOptional() {
   static const std::vector<std::string> names = {
       "pre-schedule", "infer-directives", "fuse-stages", "test-early", "prune",
       "own-pixels", "eliminate-schedules", "fuse-kernels", "form-strips",
-      "form-gbuffer", "defer-shading", "form-tiles", "prefetch", "vectorize", "prove-bounds",
-      "hoist-loads", "hoist-bounds", "merge-bounds", "thread-jumps",
-      "narrow-integers", "merge-gathers", "pair-gathers", "tabulate-invariants",
-      "unroll-and-jam", "if-convert", "uplift-pixel-loops", "privatize",
-      "reduce-updates", "reduce-by-atomics",
+      "form-gbuffer", "defer-shading", "form-tiles", "prefetch", "vectorize",
+      "prove-bounds", "hoist-loads", "hoist-bounds", "merge-bounds",
+      "thread-jumps", "narrow-integers", "merge-gathers", "pair-gathers",
+      "tabulate-invariants", "unroll-and-jam", "if-convert",
+      "uplift-pixel-loops", "privatize", "reduce-updates", "reduce-by-atomics",
       // of LLVM
       "loop-vectorize", "slp-vectorizer"};
   return names;

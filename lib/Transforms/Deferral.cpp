@@ -214,8 +214,8 @@ bool Deferral::findWork() {
       return false;
   }
   hasLoops = llvm::any_of(slice.getOperations(), holdsLoop);
-  return slice.cut() &&
-         ::isWorthwhile(slice.getMoved(), slice.getKept().size(), to);
+  return slice.cut() && canStore() &&
+         isWorthwhile(slice.getMoved(), slice.getKept().size(), to);
 }
 
 llvm::DenseSet<StringAttr> Deferral::getImages() const {
@@ -237,12 +237,24 @@ llvm::DenseSet<StringAttr> Deferral::getReadState() const {
 //===----------------------------------------------------------------------===//
 
 /// In what a number is stored: truth values take a word, as vectors of bits
-/// have no masked stores, and indices have a size.
+/// have no masked stores, and indices have a size; null if it is too wide.
 static Type getStoredType(Type type) {
   MLIRContext *context = type.getContext();
   if (type.isInteger(1))
     return IntegerType::get(context, 32);
-  return type.isIndex() ? IntegerType::get(context, 64) : type;
+  if (type.isIndex())
+    return IntegerType::get(context, 64);
+  if (auto integer = dyn_cast<IntegerType>(type)) {
+    unsigned width = llvm::PowerOf2Ceil(std::max(8u, integer.getWidth()));
+    return width > 64 ? Type() : Type(IntegerType::get(context, width));
+  }
+  return type.isF32() || type.isF64() ? type : Type();
+}
+
+bool Deferral::canStore() const {
+  return llvm::all_of(slice.getKept(), [](const Counterparts &values) {
+    return bool(getStoredType(values.front().getType()));
+  });
 }
 
 SmallVector<Type> Deferral::getStoredTypes() const {
@@ -274,7 +286,7 @@ SmallVector<Value> Deferral::store(OpBuilder &builder, size_t site) const {
   return stored;
 }
 
-/// A coordinate at which the pixel is known later, or what the bin was.
+/// A coordinate at which the pixel is known later, or the bin that it is in.
 Value Deferral::getKnown(OpBuilder &builder, const Counterparts &values,
                          ValueRange pixel) const {
   Value known = values.front();
@@ -292,7 +304,7 @@ Value Deferral::getKnown(OpBuilder &builder, const Counterparts &values,
   }
   if (to == To::Bin)
     return known;
-  return arith::ConstantIndexOp::create(builder, known.getLoc(), 0);
+  return BinArithmetic(builder, known.getLoc(), stage).binAt(pixel);
 }
 
 /// Does the rest for a pixel.

@@ -70,6 +70,7 @@ private:
   bool isMovable(mlir::Operation *op) const;
   bool isOfItem(LoadOp load) const;
   bool isShared(mlir::Operation *op) const;
+  bool canStore() const;
   void rebuild(mlir::OpBuilder &builder, mlir::ValueRange pixel,
                Load load) const;
   mlir::Value getKnown(mlir::OpBuilder &builder, const Counterparts &values,

@@ -139,7 +139,7 @@ std::string GBuffer::getUnusedName(const Twine &name) {
   return unused;
 }
 
-/// The side of a bin of about 1024 pixels.
+/// The side of a bin of at most 1024 pixels.
 static int64_t getSide(size_t rank) {
   constexpr int64_t logPixels = 10;
   return int64_t(1) << (logPixels / rank);
@@ -149,8 +149,11 @@ static int64_t getSide(size_t rank) {
 StageOp GBuffer::createStage() {
   StageOp of = what.getStage();
   Location loc = what.getWork()->getLoc();
-  SmallVector<StageOp> stages(pipeline.getOps<StageOp>());
-  builder.setInsertionPointAfter(stages.back());
+  int64_t lineage = 0;
+  for (auto stage : pipeline.getOps<StageOp>()) {
+    lineage = std::max(lineage, stage.getLineage().value_or(0) + 1);
+    builder.setInsertionPointAfter(stage);
+  }
   size_t rank = of.getBins().size();
   auto yes = builder.getUnitAttr();
   constexpr int64_t threads = 64;
@@ -159,7 +162,7 @@ StageOp GBuffer::createStage() {
       builder.getStringAttr(getUnusedName(of.getSymName() + "_pixels")),
       builder.getDenseI64ArrayAttr(SmallVector<int64_t>(rank, getSide(rank))),
       builder.getI64IntegerAttr(threads), of.getInputAttr(),
-      builder.getArrayAttr({}), builder.getI64IntegerAttr(stages.size()),
+      builder.getArrayAttr({}), builder.getI64IntegerAttr(lineage),
       /*tile=*/nullptr, /*split=*/nullptr, /*ordered=*/yes, /*placed=*/nullptr,
       /*writes=*/yes, /*takesList=*/yes, /*fused=*/nullptr);
   builder.createBlock(&stage.getBody());

@@ -40,10 +40,11 @@ ImageOp piko::createInternalImage(ImageOp image, StringRef what,
   builder.setInsertionPointToStart(module.getBody());
   std::string stem = ("piko." + what).str(), record = stem;
   for (int i = 0;; ++i) {
-    auto known = module.lookupSymbol<RecordOp>(record);
+    Operation *known = module.lookupSymbol(record);
     if (!known)
       createRecord(builder, loc, record, what, types);
-    if (!known || hasTypes(known, types))
+    if (auto alike = dyn_cast_or_null<RecordOp>(known);
+        !known || (alike && hasTypes(alike, types)))
       break;
     record = stem + std::to_string(i);
   }

@@ -16,6 +16,21 @@
 using namespace mlir;
 using namespace piko;
 
+/// What an array of an update holds depends on all that is stored in it, and on
+/// what decides whether it is, where that does not decide about the load, too.
+static void addStored(memref::LoadOp load, UpdateOp update,
+                      llvm::SetVector<Value> &reached) {
+  for (Operation *user : load.getMemRef().getUsers()) {
+    if (!isa<memref::StoreOp>(user))
+      continue;
+    for (Operation *at = user; !at->isAncestor(load) && at != update;
+         at = at->getParentOp()) {
+      getUsedValuesDefinedAbove(at->getRegions(), reached);
+      reached.insert(at->operand_begin(), at->operand_end());
+    }
+  }
+}
+
 bool piko::dependsOnPixel(Value value, UpdateOp update) {
   llvm::SetVector<Value> reached;
   reached.insert(value);
@@ -26,6 +41,8 @@ bool piko::dependsOnPixel(Value value, UpdateOp update) {
     Operation *op = used.getDefiningOp();
     if (!op) // of the update, or of a loop in it
       return true;
+    if (auto load = dyn_cast<memref::LoadOp>(op))
+      addStored(load, update, reached);
     getUsedValuesDefinedAbove(op->getRegions(), reached);
     reached.insert(op->operand_begin(), op->operand_end());
   }

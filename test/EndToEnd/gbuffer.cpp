@@ -91,13 +91,13 @@ struct BandsStage : piko::Stage<0, 8, 64, Particle>, piko::Uses<State> {
     assignToBoundingBox(p, glm::ivec2(p.x, p.y) - 3, glm::ivec2(p.x, p.y) + 3);
   }
   void process(const Particle &p) {
-    parallelForPixels(glm::ivec2(p.x, p.y) - 3, glm::ivec2(p.x, p.y) + 3,
-                      [&](glm::ivec2 at) {
-                        float sum = p.value;
-                        for (int k = 0; k < at.x + 3; ++k)
-                          sum = std::sqrt(sum * sum + float(p.serial)) / 3;
-                        update(state().color, at, [&](Color &c) { c.b = sum; });
-                      });
+    parallelForPixels(
+        glm::ivec2(p.x, p.y) - 3, glm::ivec2(p.x, p.y) + 3, [&](glm::ivec2 at) {
+          float sum = p.value + float(binLo().y + bin().index);
+          for (int k = 0; k < at.x + 3; ++k)
+            sum = std::sqrt(sum * sum + float(p.serial + binHi().y)) / 3;
+          update(state().color, at, [&](Color &c) { c.b = sum; });
+        });
   }
 };
 struct Bands : Alone<BandsStage> {};

@@ -4,7 +4,9 @@
 // whole domain, and a remark says why.
 // RUN: sed -n 's|^// CASE: ||p' %s > %t.cases
 // RUN: piko-compare %s --cases %t.cases --threads 1 2 7 | FileCheck %s
-// CHECK-COUNT-11: {{^equal$}}
+// CHECK-COUNT-12: {{^equal$}}
+// RUN: env PIKO_CUDA_DRIVER=%test_driver piko-compare %s --pipe Element --count 3000 --domain 67 35 --runs 1 --target cuda | FileCheck %s --check-prefix=GPU
+// GPU: {{^equal$}}
 // CASE: --pipe Blended --count 3000 --domain 67 35
 // CASE: --pipe Negated --count 3000 --domain 67 35
 // CASE: --pipe Other --count 3000 --domain 67 35
@@ -16,6 +18,7 @@
 // CASE: --pipe Uneven --count 3000 --domain 67 35
 // CASE: --pipe Second --count 3000 --domain 67 35
 // CASE: --pipe Sometimes --count 3000 --domain 67 35
+// CASE: --pipe Element --count 3000 --domain 67 35
 // RUN: rm -f %t.txt
 // RUN: echo pipe Blended >> %t.txt; pikoc %s --pipe Blended --remarks -o %t.o 2>> %t.txt
 // RUN: echo pipe Negated >> %t.txt; pikoc %s --pipe Negated --remarks -o %t.o 2>> %t.txt
@@ -28,6 +31,7 @@
 // RUN: echo pipe Uneven >> %t.txt; pikoc %s --pipe Uneven --remarks -o %t.o 2>> %t.txt
 // RUN: echo pipe Second >> %t.txt; pikoc %s --pipe Second --remarks -o %t.o 2>> %t.txt
 // RUN: echo pipe Sometimes >> %t.txt; pikoc %s --pipe Sometimes --remarks -o %t.o 2>> %t.txt
+// RUN: echo pipe Element >> %t.txt; pikoc %s --pipe Element --remarks -o %t.o 2>> %t.txt
 // RUN: FileCheck %s --check-prefix=WHY --input-file %t.txt
 #include "Inputs/ports.h"
 
@@ -41,10 +45,14 @@ struct Two {
   float z = 30, w = 30;
   float previous = 0;
 };
+struct Four {
+  float of[4] = {1, 2, 3, 4};
+};
 struct State {
   piko::Image<Depth> depth;
   piko::Image<Color> color;
   piko::Image<Two> two;
+  piko::Image<Four> four;
   piko::Buffer<int> hits;
   piko::Buffer<float> table;
 };
@@ -261,3 +269,15 @@ struct DrawSometimes : Boxes {
 struct Sometimes : Pipe<DrawSometimes> {};
 // WHY-LABEL: pipe Sometimes
 // WHY: note: {{whether this pixel changes depends on more than on the first test|this depends on what was first so far}}
+
+// An element that is chosen when it runs: the others stay what they were.
+struct DrawElement : Boxes {
+  void process(const Point &p) {
+    forBox(p, [&](glm::ivec2 q, float z) {
+      update(state().four, q, [&](Four &four) { four.of[p.tag & 3] = z; });
+    });
+  }
+};
+struct Element : Pipe<DrawElement> {};
+// WHY-LABEL: pipe Element
+// WHY: note: the pixel becomes something that depends on what it was

@@ -1,4 +1,5 @@
 // RUN: piko-opt --piko-form-gbuffer --split-input-file %s 2>/dev/null | FileCheck %s
+// RUN: piko-opt --piko-form-gbuffer --split-input-file %s 2>/dev/null | piko-opt --split-input-file | FileCheck %s
 // RUN: piko-opt --piko-form-gbuffer --split-input-file --verify-diagnostics -o /dev/null %s
 
 // A loop moves to a kernel of its own. The sum in front of it is kept, and that

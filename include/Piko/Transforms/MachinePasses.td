@@ -59,7 +59,7 @@ def FormGBuffer : Pass<"piko-form-gbuffer", "::mlir::ModuleOp"> {
     is computed from is kept for the pixel, in an internal image (a G-buffer: T.
     Saito and T. Takahashi, "Comprehensible Rendering of 3-D Shapes", 1990), and in
     another one, that anything is. The rest is done by a kernel that the program
-    launches behind the first one, on bins of about 1024 pixels: once for each
+    launches behind the first one, on bins of 1024 pixels or fewer: once for each
     pixel, in full vectors and on all threads, however the first kernel runs.
     Where to cut is found as there. The kernel's stage has the name of the other
     one with `_pixels` behind it; nothing comes to it, and its process phase runs
@@ -122,10 +122,11 @@ def FormGBuffer : Pass<"piko-form-gbuffer", "::mlir::ModuleOp"> {
     ```
 
     **Limits**: as of `piko-defer-shading`, but that the bin is the whole domain, in
-    some dimension at least. What may fail stays in the first kernel. The kernel is
-    launched once, and not in strips or on a cycle. What is cheaper to compute than
-    to keep in memory stays, which is more than there, as what is kept of a screen
-    does not fit the first level of a cache. A remark says what is kept, or what is
+    some dimension at least. What may fail stays in the first kernel. Where that runs
+    in strips or on a cycle, the other one runs behind the last of them, so that no
+    other kernel there may use the images, or write what is read later. What is
+    cheaper to compute than to keep in memory stays, which is more than there, as
+    what is kept of a screen does not fit the first level of a cache. A remark says what is kept, or what is
     in the way.
   }];
   let options = [

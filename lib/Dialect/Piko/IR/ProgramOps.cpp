@@ -185,7 +185,7 @@ static void printSymbols(OpAsmPrinter &printer, Operation *, ArrayAttr names) {
   llvm::interleaveComma(names, printer);
 }
 
-// concatenate %a keys 1, permute %b
+// (concatenate %a keys 1, permute %b)
 static ParseResult
 parseGathers(OpAsmParser &parser,
              SmallVectorImpl<OpAsmParser::UnresolvedOperand> &edges,
@@ -204,7 +204,7 @@ parseGathers(OpAsmParser &parser,
       return parser.parseInteger(widths.back());
     return success();
   };
-  if (parser.parseCommaSeparatedList(parseEdge))
+  if (parser.parseCommaSeparatedList(AsmParser::Delimiter::Paren, parseEdge))
     return failure();
   permutes = parser.getBuilder().getDenseBoolArrayAttr(permuted);
   keys = parser.getBuilder().getDenseI64ArrayAttr(widths);
@@ -213,12 +213,14 @@ parseGathers(OpAsmParser &parser,
 
 static void printGathers(OpAsmPrinter &printer, Operation *, ValueRange edges,
                          DenseBoolArrayAttr permutes, DenseI64ArrayAttr keys) {
+  printer << "(";
   llvm::interleaveComma(
       llvm::seq<size_t>(0, edges.size()), printer, [&](size_t i) {
         printer << (permutes[i] ? "permute " : "concatenate ") << edges[i];
         if (keys[i] != 0)
           printer << " keys " << keys[i];
       });
+  printer << ")";
 }
 
 #define GET_OP_CLASSES

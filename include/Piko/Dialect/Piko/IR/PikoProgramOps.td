@@ -145,7 +145,8 @@ def Piko_JoinOp : Piko_ProgramStatement<"join"> {
     lineage: what comes along several edges is merged (`merge`) by key, or, if the
     stage's results do not depend on its order, one edge follows the other. `keeps`
     is how many of these words go on with a primitive through the stage, because
-    what it emits needs keys as well.
+    what it emits needs keys as well. Without edges bins are empty: of a stage that
+    takes lists, whose process phase runs for each bin all the same (`every_bin`).
 
     ```mlir
     %bins = piko.join @shade(permute %fragments)
@@ -161,8 +162,8 @@ def Piko_JoinOp : Piko_ProgramStatement<"join"> {
                        OptionalAttr<ConfinedAttr<Piko_I64Attr, [IntPositive]>>:$keeps);
   let results = (outs Piko_BinsType:$bins);
   let assemblyFormat = [{
-    $stage (`merge` $merge^)? `` `(` custom<Gathers>($edges, $permutes, $keys)
-    `)` (`keeps` $keeps^)? attr-dict `:` functional-type($edges, $bins)
+    $stage (`merge` $merge^)? `` custom<Gathers>($edges, $permutes, $keys)
+    (`keeps` $keeps^)? attr-dict `:` functional-type($edges, $bins)
   }];
   let hasVerifier = 1;
   let extraClassDeclaration = [{
