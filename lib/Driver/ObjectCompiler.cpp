@@ -170,7 +170,9 @@ compilePipeline(const ObjectOptions &options, std::vector<Processor> processors,
 /// What the reference executor shall run; empty after diagnostics.
 static std::vector<PipelineDescription>
 describePipelines(const ObjectOptions &options, FrontendOptions frontend,
-                  MLIRContext &context) {
+                  MLIRContext &context, std::string &diagnostics) {
+  if (options.allPipelines && options.describeAll)
+    return options.describeAll(diagnostics);
   const std::string &name = options.source.file;
   std::vector<PipelineDescription> pipelines;
   auto add = [&](FailureOr<PipelineDescription> pipeline) {
@@ -212,7 +214,7 @@ compileReference(const ObjectOptions &options, const Files &files,
   if (failed(setTunables(file, options.source.tunables, frontend, context)))
     return nullptr;
   std::vector<PipelineDescription> pipelines =
-      describePipelines(options, frontend, context);
+      describePipelines(options, frontend, context, entry.diagnostics);
   if (pipelines.empty())
     return nullptr;
   for (const PipelineDescription &pipeline : pipelines)

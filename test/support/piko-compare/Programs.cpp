@@ -71,6 +71,11 @@ struct Programs::Implementation {
   }
   void compileReference(const std::string &file);
   void readText(const std::string &file);
+  std::vector<PipelineDescription> describeAll(std::string &diagnostics);
+  void translateAll();
+  CompileOptions getSource(const std::string &pipe) const;
+  std::string makeAuthoredRequest(const std::string &pipe) const;
+  void keepAuthored(const std::string &pipe, ModuleOp module);
   OwningOpRef<ModuleOp> parse(const std::string &pipe);
   OwningOpRef<ModuleOp> read(const std::string &pipe);
   CompiledPipeline compile(const std::string &pipe,
@@ -129,6 +134,58 @@ void Programs::Implementation::readText(const std::string &file) {
   }
 }
 
+CompileOptions
+Programs::Implementation::getSource(const std::string &pipe) const {
+  return {.file = sourceFile, .pipeName = pipe, .check = check, .cache = cache};
+}
+
+/// What leads to a pipeline as it is written.
+std::string
+Programs::Implementation::makeAuthoredRequest(const std::string &pipe) const {
+  return makeObjectRequest(
+      {.source = getSource(pipe), .nameSpace = "piko-compare authored"}, {},
+      *recorder);
+}
+
+void Programs::Implementation::keepAuthored(const std::string &pipe,
+                                            ModuleOp module) {
+  std::string bytes;
+  llvm::raw_string_ostream stream(bytes);
+  // Where it cannot be kept it is parsed again.
+  if (succeeded(writeBytecodeToFile(module, stream)))
+    llvm::consumeError(kept.keep(makeAuthoredRequest(pipe), *recorder, bytes));
+}
+
+/// Parses the file for its reference executor and for what is compiled of it, now
+/// and by the next ones to ask.
+std::vector<PipelineDescription>
+Programs::Implementation::describeAll(std::string &diagnostics) {
+  llvm::raw_string_ostream stream(diagnostics);
+  DiagnosticPrinter printer(context, stream);
+  FrontendOptions frontend = getFrontendOptions(getSource(""));
+  frontend.files = recorder;
+  file = PipelineFile::parse(sourceFile, frontend, context);
+  std::vector<PipelineDescription> pipelines;
+  for (size_t i = 0; file && i < file->size(); ++i)
+    if (FailureOr<PipelineDescription> pipeline = file->describe(i);
+        succeeded(pipeline))
+      pipelines.push_back(std::move(*pipeline));
+  if (file && kept.isEnabled())
+    translateAll();
+  return pipelines;
+}
+
+/// Keeps all pipelines of the file as they are written.
+void Programs::Implementation::translateAll() {
+  // Who asks for a pipeline with errors reads it again, and shows them.
+  ScopedDiagnosticHandler handler(&context,
+                                  [](Diagnostic &) { return success(); });
+  for (size_t i = 0; i < file->size(); ++i)
+    if (OwningOpRef<ModuleOp> module = file->translate(i))
+      keepAuthored(file->getName(i).str(), *module);
+  file.reset();
+}
+
 /// All pipelines of the file, which then need to be compiled only once however
 /// often they are compared. That code is big and runs only once.
 void Programs::Implementation::compileReference(const std::string &file) {
@@ -137,6 +194,10 @@ void Programs::Implementation::compileReference(const std::string &file) {
       .execution = ExecutionTarget::Reference,
       .target = {"native", /*optLevel=*/0, Sanitizer::None},
       .allPipelines = true};
+  if (file == sourceFile)
+    options.describeAll = [this](std::string &diagnostics) {
+      return describeAll(diagnostics);
+    };
   referenceObject = compileObject(options, referenceDiagnostics);
   if (!referenceObject)
     throw std::runtime_error("cannot compile " + file +
@@ -152,10 +213,8 @@ OwningOpRef<ModuleOp> Programs::Implementation::parse(const std::string &pipe) {
       return std::move(parsed);
   if (!modules.empty())
     return nullptr;
-  CompileOptions options{
-      .file = sourceFile, .pipeName = onlyPipe, .check = check, .cache = cache};
   if (!file) {
-    FrontendOptions frontend = getFrontendOptions(options);
+    FrontendOptions frontend = getFrontendOptions(getSource(onlyPipe));
     frontend.files = recorder;
     file = PipelineFile::parse(sourceFile, frontend, context);
   }
@@ -170,20 +229,12 @@ OwningOpRef<ModuleOp> Programs::Implementation::parse(const std::string &pipe) {
 OwningOpRef<ModuleOp> Programs::Implementation::read(const std::string &pipe) {
   if (!kept.isEnabled() || !modules.empty())
     return parse(pipe);
-  ObjectOptions options{
-      .source = {.file = sourceFile, .pipeName = pipe, .check = check},
-      .nameSpace = "piko-compare authored"};
-  std::string request = makeObjectRequest(options, {}, *recorder);
-  if (std::optional<std::string> found = kept.lookUp(request, *recorder))
+  if (std::optional<std::string> found =
+          kept.lookUp(makeAuthoredRequest(pipe), *recorder))
     return parseSourceString<ModuleOp>(*found, &context);
   OwningOpRef<ModuleOp> module = parse(pipe);
-  if (!module)
-    return nullptr;
-  std::string bytes;
-  llvm::raw_string_ostream stream(bytes);
-  // Where it cannot be kept it is parsed again.
-  if (succeeded(writeBytecodeToFile(*module, stream)))
-    llvm::consumeError(kept.keep(request, *recorder, bytes));
+  if (module)
+    keepAuthored(pipe, *module);
   return module;
 }
 
