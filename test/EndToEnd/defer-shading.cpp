@@ -6,7 +6,7 @@
 // RUN: piko-compare %s --cases %t.cases --runs 2 | FileCheck %s --check-prefix=EQUAL
 // RUN: %if x86_64 %{ piko-compare %s --cases %t.cases --runs 1 --cpu x86-64 | FileCheck %s --check-prefix=EQUAL %}
 // RUN: %if x86_64 %{ piko-compare %s --cases %t.cases --runs 1 --cpu x86-64-v3 | FileCheck %s --check-prefix=EQUAL %}
-// RUN: piko-compare %s --cases %t.cases --runs 1 --without vectorize | FileCheck %s --check-prefix=EQUAL
+// RUN: piko-compare %s --cases %t.cases --runs 1 --without vectorize -O0 | FileCheck %s --check-prefix=EQUAL
 // EQUAL-COUNT-13: {{^equal$}}
 // CASE: --pipe Nearest --domain 45 37 --count 300
 // CASE: --pipe Nearest --domain 45 37 --count 0

@@ -4,7 +4,7 @@
 // optimizer makes operations with overflow.
 // RUN: sed -n 's|^// CASE: ||p' %s > %t.cases
 // RUN: piko-compare %s --cases %t.cases --runs 1 | FileCheck %s
-// RUN: piko-compare %s --cases %t.cases --runs 1 --without vectorize | FileCheck %s
+// RUN: piko-compare %s --cases %t.cases --runs 1 --without vectorize -O0 | FileCheck %s
 // RUN: piko-compare %s --cases %t.cases --runs 1 --target gpu-on-cpu --gpu-threads 32 | FileCheck %s
 // CHECK-COUNT-2: {{^equal$}}
 // CASE: --pipe Narrow --count 640 --wide

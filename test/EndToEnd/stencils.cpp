@@ -6,7 +6,7 @@
 // RUN: sed -n 's|^// CASE: ||p' %s > %t.cases
 // RUN: piko-compare %s --cases %t.cases --runs 1 | FileCheck %s --check-prefix=EQUAL
 // RUN: piko-compare %s --cases %t.cases --runs 1 --without hoist-bounds | FileCheck %s --check-prefix=EQUAL
-// RUN: piko-compare %s --cases %t.cases --runs 1 --without vectorize | FileCheck %s --check-prefix=EQUAL
+// RUN: piko-compare %s --cases %t.cases --runs 1 --without vectorize -O0 | FileCheck %s --check-prefix=EQUAL
 // RUN: %if x86_64 %{ piko-compare %s --cases %t.cases --runs 1 --cpu x86-64 | FileCheck %s --check-prefix=EQUAL %}
 // RUN: %if x86_64 %{ piko-compare %s --cases %t.cases --runs 1 --cpu x86-64-v3 | FileCheck %s --check-prefix=EQUAL %}
 // EQUAL-COUNT-12: {{^equal$}}

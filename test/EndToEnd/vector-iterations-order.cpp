@@ -14,7 +14,7 @@
 // CASE: --pipe Meets --domain 67 35 --count 320
 // CASE: --pipe Nests --domain 67 35 --count 320
 // CASE: --pipe Lists --domain 67 35 --count 320
-// RUN: piko-compare %s --cases %t.cases --runs 1 --without vectorize | FileCheck %s --check-prefix=EQUAL
+// RUN: piko-compare %s --cases %t.cases --runs 1 --without vectorize -O0 | FileCheck %s --check-prefix=EQUAL
 //
 // RUN: pikoc %s --pipe EmitsInLoops --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=VECTORS
 // RUN: pikoc %s --pipe Rows --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=VECTORS

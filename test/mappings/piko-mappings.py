@@ -6,9 +6,10 @@
   piko-mappings.py --render build/bin/piko-render --only raster=117
 
 A combination is a mapping of an example's stages (bin size, schedules, split),
-passes of the compiler that are left out, a number of threads, and strips. What
-the schedules, bins and passes can be is walked in one order that mixes them, so
-that any number of combinations holds all sizes and passes about equally often.
+passes of the compiler that are left out, a number of threads, and strips; LLVM
+optimizes those with vectors. What the schedules, bins and passes can be is walked in
+one order that mixes them, so that any number of combinations holds all sizes and
+passes about equally often.
 Each picture must equal, bit for bit, what the reference executor draws of the
 example with one whole-screen bin. Prints each difference with the command that
 shows it again; the exit status is 1 if there is any.
@@ -165,6 +166,8 @@ def check(render, folder, example, number, picked):
     names = [name for name, out in zip(PASSES, left_out) if out]
     if names:
         rest += ["--without", ",".join(names)]
+    if "vectorize" in names:
+        rest += ["-O0"]
     if strip:
         rest += ["--strip", str(strip)]
     return example, number, texts, *draw(render, folder, file, example,

@@ -19,8 +19,7 @@ public:
   /// The values that follow an option.
   std::vector<std::string> takeValues(const std::string &option, bool several) {
     std::vector<std::string> values;
-    while (!atEnd() && words[next].rfind("--", 0) != 0 &&
-           (several || values.empty()))
+    while (!atEnd() && !isOption(words[next]) && (several || values.empty()))
       values.push_back(take());
     if (values.empty())
       throw std::runtime_error(option + " lacks its value");
@@ -28,6 +27,10 @@ public:
   }
 
 private:
+  static bool isOption(const std::string &word) {
+    return word.rfind("--", 0) == 0 || word.rfind("-O", 0) == 0;
+  }
+
   std::vector<std::string> words;
   size_t next = 0;
 };
@@ -65,7 +68,10 @@ Options parseOptions(int argc, char **argv) {
   Words words({argv + 1, argv + argc});
   while (!words.atEnd()) {
     std::string name = words.take();
-    if (name.rfind("--", 0) != 0)
+    if (name.size() == 3 && name.rfind("-O", 0) == 0 && name[2] >= '0' &&
+        name[2] <= '3')
+      options.optLevel = name[2] - '0';
+    else if (name.rfind("--", 0) != 0)
       options.file = name;
     else if (name == "--check" || name.rfind("--check=", 0) == 0) {
       auto check = piko::parseCheckOptions(name.substr(7));

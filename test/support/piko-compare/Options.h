@@ -51,6 +51,13 @@ struct Options {
   std::optional<double> tolerance;
   /// The processor that the compiled pipelines are for, as pikoc has it.
   std::string cpu = "native";
+  /// How much LLVM optimizes its code: -O0 to -O3. What runs beside a GPU, or plays
+  /// one, is not optimized unless asked for: it is the passes that divide kernels
+  /// among threads which are tested there, and the kernels' PTX is optimized.
+  std::optional<int> optLevel;
+  int getOptLevel() const {
+    return optLevel.value_or(gpu.target == piko::GPUTarget::None ? 3 : 0);
+  }
   /// Says which threads ran which bins.
   bool owners = false;
   /// Checking mode, on both sides.

@@ -93,6 +93,7 @@ struct Programs::Implementation {
   SynthesisOptions synthesis;
   GPUOptions gpu;
   std::string cpu;
+  int optLevel = 3;
   /// What was compiled before.
   SourceCache kept;
   /// What reading the file asks.
@@ -247,6 +248,7 @@ Programs::Programs(const Options &options)
   self->synthesis = options.synthesis;
   self->gpu = options.gpu;
   self->cpu = options.cpu;
+  self->optLevel = options.getOptLevel();
   self->compileReference(options.reference);
   if (options.file != options.reference)
     self->readText(options.file);
@@ -284,7 +286,7 @@ CompiledPipeline Programs::Implementation::find(const std::string &pipe) {
   llvm::Expected<Processor> processor = resolveProcessor(cpu);
   if (!processor)
     throw std::runtime_error(llvm::toString(processor.takeError()));
-  TargetOptions target{cpu, /*optLevel=*/3, JITCode::getSanitizer()};
+  TargetOptions target{cpu, optLevel, JITCode::getSanitizer()};
   ObjectOptions options{
       .source = {.file = sourceFile,
                  .pipeName = pipe,

@@ -10,7 +10,7 @@
 //                [--check[=nan:RECORD.FIELD,..]]
 //                [--target gpu-on-cpu] [--gpu-threads N] [--gpu-seed N]
 //                [--gpu-blocks N] [--gpu-chip NAME,..] [--tolerance X] [--cpu NAME]
-//                [--no-cache]
+//                [-O0] [--no-cache]
 //
 // Options.h says what the options mean, Run.h what the input is. With --cases
 // each line of that file is a case, with the options --pipe to --loop-limit; a
