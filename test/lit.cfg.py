@@ -9,6 +9,7 @@ split-file. Substitutions:
   %benchmarks    folder of the benchmarks
   %bunny         a mesh of 69,666 triangles that a Debian package installs
   %python        the Python interpreter
+  %cache         the cache that tests share, for one that has its own
   %utils, %docs  folders of the developer scripts and of the documents
   %readme        the README
   %cmake         the CMake that configured this build
@@ -36,6 +37,7 @@ import glob
 import os
 import platform
 import shutil
+import sys
 
 import lit.formats
 
@@ -92,7 +94,9 @@ config.substitutions += [
     ("%examples", os.path.join(config.piko_source_root, "examples")),
     ("%benchmarks", os.path.join(config.piko_source_root, "benchmarks")),
     ("%bunny", bunny),
-    ("%python", config.python),
+    # A version manager would look for the right one each time.
+    ("%python", sys.executable),
+    ("%cache", config.environment["PIKO_CACHE_DIR"]),
     ("%qt_include", "".join(glob.glob("/usr/include/*/qt5")[:1])),
     ("%utils", os.path.join(config.piko_source_root, "utils")),
     (
