@@ -23,7 +23,7 @@ def start(name):
 for wave in range(2):
     names = [f"{wave}-{number}.o" for number in range(6)]
     processes = [start(name) for name in names]
-    time.sleep(0.3)
+    time.sleep(0.02)
     processes[0].kill()
     assert [process.wait() for process in processes][1:] == [0] * 5
     for name in names[1:]:

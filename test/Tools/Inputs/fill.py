@@ -12,7 +12,7 @@ limit = int(os.environ["PIKO_CACHE_SIZE"])
 
 
 def compile(number):
-    options = ["--cache-dir", str(cache), f"-DNUMBER={number}"]
+    options = ["--cache-dir", str(cache), f"--namespace=n{number}"]
     subprocess.run(command + options, check=True, stderr=subprocess.DEVNULL)
     return {entry.name for entry in cache.glob("llvmcache-*")}
 
