@@ -110,6 +110,7 @@ TEST_F(Loader, EachThreadHasItsThreadLocalVariables) {
                     "#define FACTOR factor++\n"
                     "#endif\n");
   options.target = ExecutionTarget::Reference;
+  options.optLevel = 0;
   auto program = loadText(text);
   ASSERT_TRUE(program) << diagnostics;
   for (int i = 0; i < 2; ++i)
