@@ -17,6 +17,8 @@ split-file. Substitutions:
   %cxx           the C++ compiler of this build
   %other_cxx     another C++ compiler, where one can use this build's runtime
   %cxx_host      compiler and flags that build a host of compiled pipelines
+  %cxx_quick_host
+                 the same behind the precompiled header that such a host includes
   %link_host     what such a host links
   %qt_include    folder of Qt's headers
   %test_driver   the driver for tests, in place of NVIDIA's
@@ -69,6 +71,8 @@ reference = [config.cxx, *config.reference_flags, "-I", include]
 behind_header = reference + (
     ["-include-pch", config.reference_header] if config.reference_header else []
 )
+host = [config.cxx, *config.host_flags, "-Wall -Wextra -Werror -I", include]
+quick_host = host + (["-include-pch", config.host_header] if config.host_header else [])
 # Kernels of an application's own, in CUDA C++, without a toolkit.
 ptx = [os.path.join(config.llvm_tools, "clang++"), "-x cuda -std=c++20 -O2 -S"]
 ptx += ["--cuda-device-only --cuda-gpu-arch=sm_70 -nocudainc -nocudalib"]
@@ -111,7 +115,8 @@ config.substitutions += [
     ("%docs", os.path.join(config.piko_source_root, "docs")),
     ("%cmake", config.cmake),
     ("%piko", config.piko_binary_root),
-    ("%cxx_host", f"{config.cxx} -std=c++20 -Wall -Wextra -Werror -I {include}"),
+    ("%cxx_host", " ".join(host)),
+    ("%cxx_quick_host", " ".join(quick_host)),
     ("%link_host", " ".join(link_host)),
     ("%cxx_reference", " ".join(reference)),
     ("%cxx_behind_header", " ".join(behind_header)),

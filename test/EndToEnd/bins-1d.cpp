@@ -9,7 +9,7 @@
 //
 // The host of a compiled one does the same.
 // RUN: rm -rf %t.dir && mkdir %t.dir && pikoc %s -o %t.dir/p.o --header %t.dir/p.h
-// RUN: %cxx_host -DHOST -I %t.dir %s %t.dir/p.o %link_host -o %t.host && %t.host | FileCheck %s --check-prefix=REFERENCE
+// RUN: %cxx_quick_host -DHOST -I %t.dir %s %t.dir/p.o %link_host -o %t.host && %t.host | FileCheck %s --check-prefix=REFERENCE
 #ifdef HOST
 #include "p.h"
 #else
