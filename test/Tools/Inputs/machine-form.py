@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
-"""Walks every second pipeline of all examples, as they come in pairs of mappings:
-their machine form prints, parses and verifies, holds nothing that is the CPU's, and
-is what code is made of."""
+"""Walks all pipelines of all examples: their machine form prints, parses and
+verifies, holds nothing that is the CPU's, and is what code is made of."""
 
 import multiprocessing.pool
 import pathlib
@@ -38,7 +37,7 @@ examples = sorted(pathlib.Path(sys.argv[1]).glob("*/*.piko.cpp"))
 pairs = [
     (example, pipe)
     for example in examples
-    for pipe in run("pikoc", str(example), "--list-pipes").split()[::2]
+    for pipe in run("pikoc", str(example), "--list-pipes").split()
 ]
 with multiprocessing.pool.ThreadPool(2) as pool:
     counts = pool.starmap(walk, pairs)
