@@ -57,19 +57,6 @@ struct TwoEntries : piko::Pipe<State> {
   }
 };
 
-// To both, or to either.
-struct Deal : piko::Stage<32, 8, 64, Point, Point, Point> {
-  void assignBin(const Point &p) {
-    assignToBoundingBox(p, glm::ivec2(p.x - 3, p.y), glm::ivec2(p.x, p.y));
-  }
-  void process(const Point &p) {
-    if (p.tag % 3 != 0)
-      emit(moved(p, 3, 5, p.value, p.tag), 0);
-    if (p.tag % 3 != 1)
-      emit(moved(p, 5, 3, p.value, p.tag), 1);
-  }
-};
-
 // At each of the two by a source and an edge; what leaves is merged with others.
 struct Entries : piko::Pipe<State> {
   Ping ping;

@@ -53,19 +53,6 @@
 // FAILS-NOT: alive at the end
 #include "Inputs/hops.h"
 
-// To both, or to either.
-struct Deal : piko::Stage<32, 8, 64, Point, Point, Point> {
-  void assignBin(const Point &p) {
-    assignToBoundingBox(p, glm::ivec2(p.x - 3, p.y), glm::ivec2(p.x, p.y));
-  }
-  void process(const Point &p) {
-    if (p.tag % 3 != 0)
-      emit(moved(p, 3, 5, p.value, p.tag), 0);
-    if (p.tag % 3 != 1)
-      emit(moved(p, 5, 3, p.value, p.tag), 1);
-  }
-};
-
 // A loop.
 struct Split : piko::Stage<16, 16, 64, Point, Point, Point> {
   void assignBin(const Point &p) {

@@ -54,6 +54,18 @@ struct Pong : piko::Stage<0, 0, 64, Point, Point, Point, Point> {
       emit(moved(p, 0, 7, p.value - 2, p.tag / 2), 0);
   }
 };
+// To both, or to either.
+struct Deal : piko::Stage<32, 8, 64, Point, Point, Point> {
+  void assignBin(const Point &p) {
+    assignToBoundingBox(p, glm::ivec2(p.x - 3, p.y), glm::ivec2(p.x, p.y));
+  }
+  void process(const Point &p) {
+    if (p.tag % 3 != 0)
+      emit(moved(p, 3, 5, p.value, p.tag), 0);
+    if (p.tag % 3 != 1)
+      emit(moved(p, 5, 3, p.value, p.tag), 1);
+  }
+};
 struct Shift : piko::Stage<0, 0, 64, Point, Point> {
   void process(const Point &p) { emit(moved(p, 1, 1, p.value, p.tag)); }
 };
