@@ -8,6 +8,7 @@
 #include "Deferral.h"
 #include "InternalImage.h"
 #include "StateAccess.h"
+#include "UnusedName.h"
 
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "Piko/Dialect/Piko/IR/Marks.h"
@@ -52,7 +53,6 @@ private:
   StageOp createStage();
   KernelOp createKernel(StageOp stage);
   void addToProgram(StageOp stage, KernelOp kernel);
-  std::string getUnusedName(const Twine &name);
 
   LaunchOp launch;            ///< Of the kernel whose work is deferred.
   Operation *around = launch; ///< In which it is launched, maybe repeatedly.
@@ -132,13 +132,6 @@ void GBuffer::keepAt(size_t site) {
 // The kernel behind
 //===----------------------------------------------------------------------===//
 
-std::string GBuffer::getUnusedName(const Twine &name) {
-  std::string stem = name.str(), unused = stem;
-  for (int i = 1; SymbolTable::lookupSymbolIn(pipeline, unused); ++i)
-    unused = stem + std::to_string(i);
-  return unused;
-}
-
 /// The side of a bin of at most 1024 pixels.
 static int64_t getSide(size_t rank) {
   constexpr int64_t logPixels = 10;
@@ -159,7 +152,8 @@ StageOp GBuffer::createStage() {
   constexpr int64_t threads = 64;
   auto stage = StageOp::create(
       builder, loc,
-      builder.getStringAttr(getUnusedName(of.getSymName() + "_pixels")),
+      builder.getStringAttr(
+          getUnusedName(pipeline, of.getSymName() + "_pixels")),
       builder.getDenseI64ArrayAttr(SmallVector<int64_t>(rank, getSide(rank))),
       builder.getI64IntegerAttr(threads), of.getInputAttr(),
       builder.getArrayAttr({}), builder.getI64IntegerAttr(lineage),
@@ -177,8 +171,8 @@ StageOp GBuffer::createStage() {
 KernelOp GBuffer::createKernel(StageOp stage) {
   Location loc = what.getWork()->getLoc();
   builder.setInsertionPointAfter(launch.getKernelOp());
-  auto kernel = KernelOp::create(builder, loc,
-                                 getUnusedName("kernel_" + stage.getSymName()));
+  auto kernel = KernelOp::create(
+      builder, loc, getUnusedName(pipeline, "kernel_" + stage.getSymName()));
   builder.createBlock(&kernel.getBody());
   auto name = FlatSymbolRefAttr::get(stage.getSymNameAttr());
   auto bins = BinsOp::create(builder, loc, name);

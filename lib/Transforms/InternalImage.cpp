@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #include "InternalImage.h"
 
+#include "UnusedName.h"
+
 using namespace mlir;
 using namespace piko;
 
@@ -49,10 +51,7 @@ ImageOp piko::createInternalImage(ImageOp image, StringRef what,
     record = stem + std::to_string(i);
   }
   builder.setInsertionPointAfter(image);
-  stem = (image.getSymName() + "." + what).str();
-  std::string name = stem;
-  for (int i = 0; SymbolTable::lookupSymbolIn(pipeline, name); ++i)
-    name = stem + std::to_string(i);
-  return ImageOp::create(builder, loc, name, record, image.getRank(), clear,
-                         /*internal=*/true);
+  return ImageOp::create(
+      builder, loc, getUnusedName(pipeline, image.getSymName() + "." + what),
+      record, image.getRank(), clear, /*internal=*/true);
 }

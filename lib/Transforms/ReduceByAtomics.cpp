@@ -6,13 +6,13 @@
 // primitives:
 //   1. for each word of the key, one that finds out by an atomic minimum what
 //      comes first in each pixel; it does nothing else;
-//   2. the kernel itself, in which a primitive changes the pixels that it is
-//   the
-//      first in. Nobody else does, so that no order shows.
+//   2. the kernel itself, in which a primitive changes the pixels that are its.
+//      Nobody else does, so that no order shows.
 
 #include "CommutingUpdates.h"
 #include "SelectionWords.h"
 #include "StateAccess.h"
+#include "UnusedName.h"
 
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "Piko/Dialect/Piko/IR/Marks.h"
@@ -94,11 +94,8 @@ static void removeEffects(Operation *work,
 
 /// As one that precedes the other.
 void WorkSplitter::nameKernel(KernelOp copy) {
-  std::string stem = (kernel.getSymName() + "_first").str(), name = stem;
-  PipelineOp pipeline = getPipeline(kernel);
-  for (int64_t i = 1; SymbolTable::lookupSymbolIn(pipeline, name); ++i)
-    name = stem + std::to_string(i);
-  copy.setSymName(name);
+  copy.setSymName(
+      getUnusedName(getPipeline(kernel), kernel.getSymName() + "_first"));
   copy.setPrecedesAttr(FlatSymbolRefAttr::get(kernel.getSymNameAttr()));
 }
 

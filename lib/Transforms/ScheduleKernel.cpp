@@ -4,6 +4,7 @@
 // said last about a bin is kept in private memory until the body has ended.
 
 #include "FormWork.h"
+#include "UnusedName.h"
 
 #include "Piko/Dialect/Piko/IR/PikoProgram.h"
 
@@ -82,10 +83,9 @@ static KernelOp createKernel(StageOp stage) {
   for (auto kernel : pipeline.getOps<KernelOp>())
     if (!kernel.getOps<BeginScheduleOp>().empty())
       builder.setInsertionPointAfter(kernel);
-  std::string stem = ("schedule_" + stage.getSymName()).str(), name = stem;
-  for (int i = 0; SymbolTable::lookupSymbolIn(pipeline, name); ++i)
-    name = stem + "_" + std::to_string(i);
-  auto kernel = KernelOp::create(builder, stage.getLoc(), name);
+  auto kernel = KernelOp::create(
+      builder, stage.getLoc(),
+      getUnusedName(pipeline, "schedule_" + stage.getSymName()));
   kernel.getBody().emplaceBlock();
   return kernel;
 }

@@ -9,7 +9,7 @@ piko.record @F {"x" : i32 at 0, "a" : f32 at 4, "b" : f32 at 8} size 12 align 4
 piko.record @D {"z" : f32 at 0} size 4 align 4
 piko.pipeline @P rank 1 {
   piko.image @color : @D rank 1
-  // CHECK: piko.image @color.kept0 : @piko.kept0 rank 1 internal
+  // CHECK: piko.image @color.kept1 : @piko.kept0 rank 1 internal
   piko.image @color.kept : @D rank 1
   piko.source @last
   piko.source @last_pixels

@@ -76,7 +76,7 @@ piko.pipeline @Nearest rank 1 {
 // Two numbers are a word, the position is another one: the kernels that find the
 // least run in this order. The last one among equals has the least.
 // CHECK-LABEL: piko.pipeline @Keys
-// CHECK:         piko.image @depth.first0
+// CHECK:         piko.image @depth.first1
 // CHECK:         piko.image @depth.first :
 // CHECK:         piko.kernel @kernel_a_first precedes @kernel_a {
 // CHECK:           piko.atomic min_unsigned checked @depth.first[
@@ -84,13 +84,13 @@ piko.pipeline @Nearest rank 1 {
 // CHECK-DAG:         arith.xori %{{.*}}, %c4294967295_i64
 // CHECK-DAG:         %[[WORD:.*]] = piko.load checked @depth.first[
 // CHECK-DAG:         arith.cmpi eq, %{{.*}}, %[[WORD]]
-// CHECK:             piko.atomic min_unsigned checked @depth.first0[
+// CHECK:             piko.atomic min_unsigned checked @depth.first1[
 // CHECK:         piko.kernel @kernel_a {
 // CHECK-DAG:         piko.load checked @depth.first[
-// CHECK-DAG:         piko.load checked @depth.first0[
+// CHECK-DAG:         piko.load checked @depth.first1[
 // CHECK:             piko.store %{{.*}}, checked @depth[%{{.*}} : index] "z"
 // CHECK-NEXT:        piko.store %{{.*}}, checked @depth[%{{.*}} : index] "n"
-// CHECK:         piko.clear @depth.first, @depth.first0
+// CHECK:         piko.clear @depth.first, @depth.first1
 piko.pipeline @Keys rank 1 {
   piko.image @depth : @Z rank 1
   piko.source @a
