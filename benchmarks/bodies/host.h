@@ -21,6 +21,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
+#include <string_view>
 #include <time.h>
 #include <vector>
 
@@ -77,10 +78,30 @@ template <class Pipe> void runOnce(Pipe &pipe) {
     pipe.run();
 }
 
+/// Prints the loops that a pipeline holds in two versions, as lines of JSON.
+template <class Pipe> void printMappings(Pipe &pipe) {
+#ifdef PIKO_BODY_HEADER
+  for (int i = 0; i < pikort_mapping_count(pipe.get()); ++i) {
+    pikort_mapping_info info;
+    if (pikort_get_mapping(pipe.get(), i, &info) != PIKORT_OK)
+      continue;
+    auto name = [](int vectors) { return vectors ? "vectors" : "scalar"; };
+    std::printf("{\"kernel\": \"%s\", \"number\": %d, \"within\": %d, "
+                "\"loop\": \"%s\", \"runs\": \"%s\", \"expected\": "
+                "\"%s\", \"expected_ratio\": %.6g}\n",
+                info.kernel, info.number, info.within, info.loop,
+                name(info.vectors), name(info.expected), info.expected_ratio);
+  }
+#else
+  (void)pipe; // the reference has none
+#endif
+}
+
 /// Prints the hash of the first frame and the fewest milliseconds of a warm
 /// one, of those that fit in so many seconds, on so many threads; and, where
 /// the host counts them, a frame's operations on floats, as the text has them,
-/// and the bytes that it must read or write at least once.
+/// and the bytes that it must read or write at least once. With --mappings as
+/// the third argument, the pipeline's loops that are held in two versions.
 template <class Pipe, class Host> int measure(int argc, char **argv) {
   double seconds = argc > 1 ? std::atof(argv[1]) : 1;
   int threads = argc > 2 ? std::atoi(argv[2]) : 1;
@@ -103,6 +124,8 @@ template <class Pipe, class Host> int measure(int argc, char **argv) {
     if constexpr (requires { host.flops(), host.bytes(); })
       std::printf(" %.0f %.0f", host.flops(), host.bytes());
     std::printf("\n");
+    if (argc > 3 && std::string_view(argv[3]) == "--mappings")
+      printMappings(pipe);
   } catch (const std::exception &error) {
     std::fprintf(stderr, "%s\n", error.what());
     return 1;

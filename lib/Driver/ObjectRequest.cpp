@@ -32,12 +32,14 @@ std::string piko::makeObjectRequest(const ObjectOptions &options,
   key.add(std::to_string(processors.size()));
   for (const Processor &processor : processors)
     key.add(processor.name).add(processor.features);
-  for (int number : {int(source.text.has_value()), int(source.check.enabled),
-                     int(options.execution), options.target.optLevel,
-                     int(options.target.sanitizer), int(options.remarks),
-                     int(options.allPipelines), int(source.gpu.target),
-                     int(source.synthesis.count), int(source.gpu.seed),
-                     int(source.gpu.blocks), int(source.gpu.threads)})
+  for (int number :
+       {int(source.text.has_value()), int(source.check.enabled),
+        int(options.execution), options.target.optLevel,
+        int(options.target.sanitizer), int(options.remarks),
+        int(options.allPipelines), int(source.gpu.target),
+        int(source.synthesis.count),
+        int(100 * source.synthesis.mappingWindow),
+        int(source.gpu.seed), int(source.gpu.blocks), int(source.gpu.threads)})
     key.add(std::to_string(number));
   key.add(source.gpu.chip).add(options.nameSpace).add(getRuntimeIncludeDir());
   for (const std::string &chip : source.gpu.cubins)

@@ -193,6 +193,8 @@ void piko::addVectorSequence(OpPassManager &passes,
   if (options.has("vectorize")) {
     VectorizeOptions vectors;
     vectors.laneCount = cpu.lanes;
+    vectors.window = options.mappingWindow;
+    vectors.sensitivities = cpu.printsSensitivities;
     passes.nest<PipelineOp>().addPass(createVectorize(vectors));
     addCleanUp(passes);
   }
@@ -286,6 +288,14 @@ struct CPUSequenceOptions : PassPipelineOptions<CPUSequenceOptions> {
   Option<int64_t> lanes{*this, "lanes",
                         llvm::cl::desc("Lanes of a vector: 4, 8 or 16"),
                         llvm::cl::init(CPUOptions().lanes)};
+  Option<double> window{*this, "window",
+                        llvm::cl::desc("Within what factor estimates have a "
+                                       "loop held in two versions; 1: none"),
+                        llvm::cl::init(1)};
+  Option<bool> sensitivities{*this, "sensitivities",
+                             llvm::cl::desc("Print what these estimates depend "
+                                            "on, as lines of JSON"),
+                             llvm::cl::init(false)};
 };
 
 struct GPUSequenceOptions : PassPipelineOptions<GPUSequenceOptions> {
@@ -316,7 +326,9 @@ void piko::registerSequences() {
   PassPipelineRegistration<CPUSequenceOptions>(
       "piko-to-cpu", "From the machine level to upstream dialects",
       [](OpPassManager &passes, const CPUSequenceOptions &options) {
-        addCPUSequence(passes, {}, {.lanes = options.lanes});
+        addCPUSequence(passes, {.mappingWindow = options.window},
+                       {.lanes = options.lanes,
+                        .printsSensitivities = options.sensitivities});
       });
   PassPipelineRegistration<>("piko-cpu-to-llvm",
                              "From upstream dialects to llvm and omp",

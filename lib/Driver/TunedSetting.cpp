@@ -82,9 +82,14 @@ void Reader::readMember(llvm::StringRef key, const json::Value &value) {
       setting.stripSize = *size;
     else
       expect("a number of primitives", key);
+  } else if (key == "mappings") {
+    if (auto text = value.getAsString())
+      setting.mappings = text->str();
+    else
+      expect("a string", key);
   } else if (key != "measured" && problem.empty()) {
-    problem = ("expected pipeline, tunables, directives, without, strip or "
-               "measured, but got \"" +
+    problem = ("expected pipeline, tunables, directives, without, strip, "
+               "mappings or measured, but got \"" +
                key + "\"")
                   .str();
   }
@@ -228,6 +233,8 @@ std::string piko::writeTunedSetting(const TunedSetting &setting,
     writer.attribute("without", json::Array(setting.without));
     if (setting.stripSize > 0)
       writer.attribute("strip", setting.stripSize);
+    if (!setting.mappings.empty())
+      writer.attribute("mappings", setting.mappings);
     llvm::Expected<json::Value> record = json::parse(measured);
     if (record)
       writer.attribute("measured", std::move(*record));

@@ -17,6 +17,8 @@
 
 namespace piko {
 
+struct Cycles; // LaneCycles.h
+
 /// What an operation of an iteration becomes.
 enum class LaneForm {
   Uniform,   ///< the same for all lanes: stays scalar
@@ -79,6 +81,8 @@ public:
     bool isWorthwhile() const { return vectors < serial; }
   };
   Cost getCost() const;
+  /// The same by other constants.
+  Cost getCost(const Cycles &cycles) const;
   /// How many turns each lane makes of a loop that lanes leave at different
   /// times, as far as is known.
   double getOwnTurns(mlir::Operation *inner) const;

@@ -2,29 +2,47 @@
 
 #include "LaneCandidate.h"
 
+#include "LaneCycles.h"
 #include "LaneLatency.h"
 #include "Lanes.h"
 #include "SequentialLoops.h"
 
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
+#include "llvm/Support/FormatVariadic.h"
+
 #include <cmath>
 
 using namespace mlir;
 using namespace piko;
 
-LaneCandidate::LaneCandidate(scf::ForOp loop)
-    : loop(loop), ofPrimitives(isOverPrimitives(loop)) {
+/// Whether lanes of a loop over primitives could be given something else than
+/// piko-map-lanes has said, which has only estimated.
+static bool isOpen(scf::ForOp loop) {
+  StageOp stage = getKernelStage(loop);
+  ScheduleOp schedule = stage ? stage.getSchedule() : ScheduleOp();
+  return getLaneMapping(loop) != LaneMapping::One &&
+         !(schedule && schedule.getLanes());
+}
+
+LaneCandidate::LaneCandidate(scf::ForOp loop, double window)
+    : loop(loop), ofPrimitives(isOverPrimitives(loop)), window(window) {
   using Lanes = LaneMapping;
   Lanes lanes = ofPrimitives ? Lanes::Items : Lanes::Iterations;
   if (ofPrimitives) {
-    chosen = getLaneMapping(loop).value_or(lanes) == lanes;
+    preferred = getLaneMapping(loop).value_or(lanes) == lanes;
+    chosen = preferred || (window > 1 && isOpen(loop));
   } else {
+    std::optional<Lanes> given; // of the primitives around it
     chosen = true;
     for (Operation *at = loop->getParentOp(); at; at = at->getParentOp())
       if (auto outer = dyn_cast<scf::ForOp>(at))
-        if (std::optional<Lanes> given = getLaneMapping(outer))
-          chosen &= *given == lanes || *given == Lanes::Collapsed;
+        if (std::optional<Lanes> its = getLaneMapping(outer)) {
+          given = its;
+          chosen &= *its == lanes || *its == Lanes::Collapsed;
+        }
+    if (!given) // a call that takes a list
+      chosen = !hasSpecifiedLanes(loop, Lanes::One) || findBarrier(loop);
   }
   said =
       findBarrier(loop) || (hasSpecifiedLanes(loop, lanes) &&
@@ -76,8 +94,8 @@ bool piko::isSurelyFaster(const IterationLanes::Cost &cost, int64_t laneCount) {
 
 /// Only loops that turn as often for all primitives count, as those over the
 /// rows of an image: others may be short.
-bool LaneCandidate::isFasterInside(const IterationLanes &lanes,
-                                   const IterationLanes::Cost &cost) {
+double LaneCandidate::getCostInside(const IterationLanes &lanes,
+                                    const IterationLanes::Cost &cost) {
   double inside = cost.serial;
   scf::ForOp root = lanes.getLoop();
   root->walk<WalkOrder::PreOrder>([&](scf::ForOp inner) {
@@ -93,20 +111,37 @@ bool LaneCandidate::isFasterInside(const IterationLanes &lanes,
     inside -= cost.loops.lookup(inner) * (1 - part.vectors / part.serial);
     return WalkResult::skip();
   });
-  constexpr double gain = 0.98; // Or primitives are simpler.
-  return inside < gain * cost.vectors;
+  return inside;
 }
 
-bool LaneCandidate::isRefused(const IterationLanes &lanes,
-                              const FlatLoop &flat) {
+double LaneCandidate::getScalarCost(const IterationLanes &lanes,
+                                    const IterationLanes::Cost &cost,
+                                    const Cycles &cycles) {
+  if (ofPrimitives)
+    return getCostInside(lanes, cost);
+  return (isOverBox(loop) ? cycles.boxRow : 1) * cost.serial;
+}
+
+LaneCandidate::Versions LaneCandidate::estimate(const IterationLanes &lanes,
+                                                const FlatLoop &flat,
+                                                const Cycles &cycles) {
+  IterationLanes::Cost cost = lanes.getCost(cycles);
+  double vectors = flat.loop ? IterationLanes(flat.loop, lanes.getLaneCount())
+                                   .getCost(cycles)
+                                   .vectors
+                             : cost.vectors;
+  return {vectors, getScalarCost(lanes, cost, cycles), /*expected=*/false};
+}
+
+LaneCandidate::Refusal LaneCandidate::findRefusal(const IterationLanes &lanes,
+                                                  const FlatLoop &flat) {
   IterationLanes::Cost cost = lanes.getCost();
-  std::string otherwise = "; specifyLanes(";
-  otherwise += ofPrimitives ? "Items" : "Iterations";
-  otherwise += ") does so all the same";
-  if (!ofPrimitives && isOverBox(loop)) {
-    refuse() << "a box may have few pixels" << otherwise;
-    return true;
-  }
+  if (!preferred)
+    return {"lanes are expected to do more with iterations of a loop in it"};
+  if (!ofPrimitives && isOverBox(loop) &&
+      cost.vectors >
+          getScalarCost(lanes, cost, getCycles(lanes.getLaneCount())))
+    return {"a row of a box may have few pixels"};
   bool isFaster = ofPrimitives ? isSurelyFaster(cost, lanes.getLaneCount())
                                : cost.isWorthwhile();
   // Flattened nests make up for little else that was not foreseen.
@@ -114,19 +149,32 @@ bool LaneCandidate::isRefused(const IterationLanes &lanes,
   bool isFasterFlat = flat.loop && cost.isWorthwhile() &&
                       flat.cost.vectors < half * cost.serial;
   if (!isFaster && !isFasterFlat) {
-    InFlightDiagnostic remark = refuse();
-    remark << lanes.getLaneCount() << " at once are expected to take "
-           << std::llround(cost.vectors) << " cycles, and one after the other "
-           << std::llround(cost.serial);
+    std::string text =
+        llvm::formatv("{0} at once are expected to take {1:f0} "
+                      "cycles, and one after the other {2:f0}",
+                      lanes.getLaneCount(), cost.vectors, cost.serial);
     if (cost.vectors < cost.serial)
-      remark << ", which is not surely more";
-    remark << otherwise;
-    addObstacles(remark, lanes, cost, /*isRefused=*/true);
-    return true;
+      text += ", which is not surely more";
+    return {text, /*byCycles=*/true};
   }
-  if (!ofPrimitives || !isFasterInside(lanes, cost))
+  constexpr double gain = 0.98; // Or primitives are simpler.
+  bool isFasterInside =
+      ofPrimitives && getCostInside(lanes, cost) < gain * cost.vectors;
+  return {isFasterInside ? "iterations of a loop in it are" : ""};
+}
+
+bool LaneCandidate::isDoubtful(const IterationLanes &lanes,
+                               const FlatLoop &flat, bool isRefused) {
+  Versions found = estimate(lanes, flat, getCycles(lanes.getLaneCount()));
+  // What is known of boxes is already in the estimate: few of them are large.
+  constexpr double boxWindow = 1.25;
+  double above =
+      !ofPrimitives && isOverBox(loop) ? std::min(window, boxWindow) : window;
+  if (found.vectors > above * found.scalar ||
+      (!isRefused && window * found.vectors < found.scalar))
     return false;
-  refuse() << "iterations of a loop in it are" << otherwise;
+  found.expected = !isRefused;
+  versions = found;
   return true;
 }
 
@@ -157,6 +205,11 @@ void LaneCandidate::remarkVectors(const IterationLanes &lanes,
   for (Location nest : flat.ordered)
     remark.attachNote(nest) << "lanes take turns to go through this loop, "
                                "because an order shows of what it does";
+  if (versions)
+    remark << ", and held one after the other as well, to measure which is "
+              "faster: "
+           << std::llround(versions->vectors) << " cycles are expected, and "
+           << std::llround(versions->scalar);
   addObstacles(remark, lanes, lanes.getCost(), /*isRefused=*/false);
 }
 
@@ -172,8 +225,18 @@ bool LaneCandidate::decide(const IterationLanes &lanes, const FlatLoop &flat) {
   IterationLanes::Cost cost = lanes.getCost();
   if (!ofPrimitives && !cost.computes)
     return false; // clears or copies, which needs no plan
-  if (!said && isRefused(lanes, flat))
+  Refusal refusal = said ? Refusal() : findRefusal(lanes, flat);
+  bool mayHoldBoth = window > 1 && !said && isOpen(loop);
+  if (!(mayHoldBoth && isDoubtful(lanes, flat, !refusal.why.empty())) &&
+      !refusal.why.empty()) {
+    InFlightDiagnostic remark = refuse()
+                                << refusal.why << "; specifyLanes("
+                                << (ofPrimitives ? "Items" : "Iterations")
+                                << ") does so all the same";
+    if (refusal.byCycles)
+      addObstacles(remark, lanes, cost, /*isRefused=*/true);
     return false;
+  }
   paired = paysInPairs(lanes, flat);
   remarkVectors(lanes, flat);
   return true;

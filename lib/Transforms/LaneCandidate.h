@@ -19,31 +19,58 @@ constexpr int64_t widestLanes = 16;
 /// A loop that lanes may share.
 class LaneCandidate {
 public:
-  explicit LaneCandidate(mlir::scf::ForOp loop);
+  /// Where estimates are within the factor `window` of each other it may be
+  /// held in two versions.
+  explicit LaneCandidate(mlir::scf::ForOp loop, double window = 1);
 
   /// Whether lanes are given its turns.
   bool isChosen() const { return chosen; }
   /// Whether it becomes vectors, which a remark tells; `flat` is what lanes may
   /// do instead.
   bool decide(const IterationLanes &lanes, const FlatLoop &flat = {});
+  /// If it is to be held in two versions: what these are expected to take.
+  struct Versions {
+    double vectors, scalar; ///< In cycles.
+    bool expected;          ///< Vectors are expected to be faster.
+  };
+  const std::optional<Versions> &getVersions() const { return versions; }
+  /// The estimates by other constants than the processor's, which is not to be
+  /// decided by.
+  Versions estimate(const IterationLanes &lanes, const FlatLoop &flat,
+                    const Cycles &cycles);
   /// Whether it becomes vectors of twice as many lanes.
   bool isPaired() const { return paired; }
 
 private:
   mlir::InFlightDiagnostic refuse();
-  /// Whether it is expected to take less otherwise, which a remark tells.
-  bool isRefused(const IterationLanes &lanes, const FlatLoop &flat);
+  /// Why it is expected to take less otherwise, for a remark; or nothing.
+  struct Refusal {
+    std::string why;
+    bool byCycles = false; ///< Which are estimates.
+  };
+  Refusal findRefusal(const IterationLanes &lanes, const FlatLoop &flat);
+  /// Whether the estimates are too close to say which version is faster.
+  bool isDoubtful(const IterationLanes &lanes, const FlatLoop &flat,
+                  bool isRefused);
   /// Whether two vectors at once are expected to take much less.
   bool paysInPairs(const IterationLanes &lanes, const FlatLoop &flat) const;
   void remarkVectors(const IterationLanes &lanes, const FlatLoop &flat);
-  /// Whether it takes less to run primitives one after the other, and to give
-  /// lanes the iterations of loops in them.
-  bool isFasterInside(const IterationLanes &lanes,
-                      const IterationLanes::Cost &cost);
+  /// What it takes to run primitives one after the other, and to give lanes the
+  /// iterations of loops in them, in cycles.
+  double getCostInside(const IterationLanes &lanes,
+                       const IterationLanes::Cost &cost);
+
+  /// What the scalar version takes for as many turns as lanes have, of which
+  /// the row of a box may have fewer; in cycles.
+  double getScalarCost(const IterationLanes &lanes,
+                       const IterationLanes::Cost &cost, const Cycles &cycles);
 
   mlir::scf::ForOp loop;
   bool ofPrimitives;
   bool chosen = false;
+  bool preferred = true; ///< By piko-map-lanes, or nothing else is.
+  double window;
+  std::optional<Versions> versions;
   bool paired = false;
   bool said = false; ///< By the schedule, or by barriers, whatever it costs.
 };

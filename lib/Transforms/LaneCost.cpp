@@ -101,8 +101,10 @@ namespace {
 /// Adds up what code takes.
 class CostModel {
 public:
+  CostModel(const IterationLanes &lanes, const Cycles &cycles)
+      : lanes(lanes), cycles(cycles) {}
   explicit CostModel(const IterationLanes &lanes)
-      : lanes(lanes), cycles(getCycles(lanes.getLaneCount())) {}
+      : CostModel(lanes, getCycles(lanes.getLaneCount())) {}
   void add(Region &region, Frequency times, bool laneByLane);
 
   IterationLanes::Cost cost;
@@ -515,7 +517,11 @@ double IterationLanes::getFlatTurns(Operation *outer, Operation *inner) const {
 }
 
 IterationLanes::Cost IterationLanes::getCost() const {
-  CostModel model(*this);
+  return getCost(getCycles(laneCount));
+}
+
+IterationLanes::Cost IterationLanes::getCost(const Cycles &cycles) const {
+  CostModel model(*this, cycles);
   model.add(loop.getRegion(), {}, /*laneByLane=*/false);
   return model.cost;
 }

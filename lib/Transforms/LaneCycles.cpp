@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #include "LaneCycles.h"
 
+using namespace llvm;
 using namespace piko;
 
 const Cycles &piko::getCycles(int64_t laneCount) {
@@ -35,7 +36,8 @@ const Cycles &piko::getCycles(int64_t laneCount) {
                                .turn = 15,
                                .pairs = 60,
                                .goOn = 0.55,
-                               .goOnInside = 0.7};
+                               .goOnInside = 0.7,
+                               .boxRow = 0.25};
   static constexpr Cycles of8{.scalar = 2.5,
                               .scalarAccess = 4,
                               .scalarDivision = 32,
@@ -67,7 +69,8 @@ const Cycles &piko::getCycles(int64_t laneCount) {
                               .turn = 10,
                               .pairs = 40,
                               .goOn = 0.45,
-                              .goOnInside = 0.75};
+                              .goOnInside = 0.75,
+                              .boxRow = 0.4};
   static constexpr Cycles of4{.scalar = 1.25,
                               .scalarAccess = 2,
                               .scalarDivision = 16,
@@ -99,6 +102,48 @@ const Cycles &piko::getCycles(int64_t laneCount) {
                               .turn = 5,
                               .pairs = 40,
                               .goOn = 0.6,
-                              .goOnInside = 0.8};
+                              .goOnInside = 0.8,
+                              .boxRow = 0.6};
   return laneCount == 16 ? of16 : laneCount == 8 ? of8 : of4;
+}
+
+ArrayRef<CycleConstant> piko::getCycleConstants() {
+  static constexpr CycleConstant constants[] = {
+      {"scalar", &Cycles::scalar},
+      {"scalarAccess", &Cycles::scalarAccess},
+      {"scalarDivision", &Cycles::scalarDivision},
+      {"vector", &Cycles::vector},
+      {"row", &Cycles::row},
+      {"gather", &Cycles::gather},
+      {"division", &Cycles::division},
+      {"narrowRow", &Cycles::narrowRow},
+      {"reducedRow", &Cycles::reducedRow},
+      {"quotient", &Cycles::quotient},
+      {"sharedQuotient", &Cycles::sharedQuotient},
+      {"narrowGather", &Cycles::narrowGather},
+      {"ownLines", &Cycles::ownLines},
+      {"transposed", &Cycles::transposed},
+      {"emitted", &Cycles::emitted},
+      {"scatter", &Cycles::scatter},
+      {"narrowScatter", &Cycles::narrowScatter},
+      {"readRow", &Cycles::readRow},
+      {"writeRow", &Cycles::writeRow},
+      {"along", &Cycles::along},
+      {"apart", &Cycles::apart},
+      {"apartInOrder", &Cycles::apartInOrder},
+      {"slot", &Cycles::slot},
+      {"checks", &Cycles::checks},
+      {"branches", &Cycles::branches},
+      {"unforeseen", &Cycles::unforeseen},
+      {"exits", &Cycles::exits},
+      {"chase", &Cycles::chase},
+      {"turn", &Cycles::turn},
+      {"pairs", &Cycles::pairs},
+      {"goOn", &Cycles::goOn},
+      {"goOnInside", &Cycles::goOnInside},
+      {"boxRow", &Cycles::boxRow},
+  };
+  static_assert(sizeof constants / sizeof *constants ==
+                sizeof(Cycles) / sizeof(double));
+  return constants;
 }

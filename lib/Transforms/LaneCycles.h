@@ -6,6 +6,8 @@
 #ifndef PIKO_LIB_TRANSFORMS_LANECYCLES_H
 #define PIKO_LIB_TRANSFORMS_LANECYCLES_H
 
+#include "llvm/ADT/ArrayRef.h"
+
 #include <cstdint>
 
 namespace piko {
@@ -52,11 +54,22 @@ struct Cycles {
   /// How many of the lanes go on, of those that came to a loop whose turns
   /// differ; and to one inside of such a loop.
   double goOn, goOnInside;
+  /// How many of the lanes have a pixel of a box's row: most boxes are those of
+  /// small primitives.
+  double boxRow;
 };
 
 /// With vectors of 512 bits (Sapphire Rapids, Zen 4), of 256 bits, and of 128
 /// bits without masks: a branch for each lane stands for one.
 const Cycles &getCycles(int64_t laneCount);
+
+/// All of the numbers, by name, for whoever fits them to measurements
+/// (benchmarks/mappings.py).
+struct CycleConstant {
+  const char *name;
+  double Cycles::*member;
+};
+llvm::ArrayRef<CycleConstant> getCycleConstants();
 
 } // namespace piko
 

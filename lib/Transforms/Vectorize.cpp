@@ -5,6 +5,7 @@
 #include "IterationWriter.h"
 #include "LaneArrays.h"
 #include "LaneCandidate.h"
+#include "LaneCycles.h"
 #include "LaneLatency.h"
 #include "LaneNests.h"
 #include "LaneQuotients.h"
@@ -24,6 +25,11 @@
 #include "mlir/IR/Matchers.h"
 #include "mlir/IR/PatternMatch.h"
 #include "mlir/Transforms/LoopInvariantCodeMotionUtils.h"
+#include "llvm/Support/JSON.h"
+#include "llvm/Support/Path.h"
+#include "llvm/Support/SaveAndRestore.h"
+
+#include <cmath>
 
 namespace piko {
 #define GEN_PASS_DEF_VECTORIZE
@@ -47,11 +53,16 @@ private:
   bool vectorizeInOrder(Operation *op);
   bool vectorizeCompacted(scf::ForOp loop);
   /// Makes vectors of a loop, with what is left of `scalar`, which does the
-  /// same, for a few turns.
-  void vectorize(const IterationLanes &lanes, scf::ForOp scalar);
+  /// same, for a few turns, or unless `takesVectors`.
+  void vectorize(const IterationLanes &lanes, scf::ForOp scalar,
+                 Value takesVectors = {});
+  /// Whether a loop may be held in two versions.
+  bool mayHoldBoth(scf::ForOp loop) const;
   void vectorize(const IterationLanes &lanes) {
     vectorize(lanes, lanes.getLoop());
   }
+  bool inVectors = false;              ///< In turns that lanes take.
+  llvm::DenseSet<Operation *> meeting; ///< loops around iterations that meet
   int64_t countLanes(const LaneCandidate &candidate) const {
     return candidate.isPaired() ? 2 * laneCount : int64_t(laneCount);
   }
@@ -157,17 +168,20 @@ static int64_t getLeastTurns(int64_t laneCount) {
 }
 
 /// Loops that one lane after the other runs are made vectors, too.
-void VectorizePass::vectorize(const IterationLanes &lanes, scf::ForOp scalar) {
+void VectorizePass::vectorize(const IterationLanes &lanes, scf::ForOp scalar,
+                              Value takesVectors) {
   scf::ForOp loop = lanes.getLoop();
   Location loc = loop.getLoc();
   OpBuilder builder(loop);
   IterationWriter writer(lanes);
   auto write = [&] {
     writer.write(builder.saveInsertionPoint());
+    llvm::SaveAndRestore scope(inVectors, true);
     for (scf::WhileOp turns : writer.getTurnLoops())
       vectorizeLoops(turns);
   };
-  if (isOverPrimitives(loop) || isOneVector(loop, laneCount)) {
+  if (isOverPrimitives(loop) ||
+      (isOneVector(loop, laneCount) && !takesVectors)) {
     // A second body would take longer to compile than it saves.
     write();
     scalar.erase();
@@ -181,11 +195,154 @@ void VectorizePass::vectorize(const IterationLanes &lanes, scf::ForOp scalar) {
                                       loop.getLowerBound());
   Value isLong = arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::sge,
                                        count, least);
+  if (takesVectors)
+    isLong = arith::AndIOp::create(builder, loc, takesVectors, isLong);
   auto choice = scf::IfOp::create(builder, loc, isLong, /*withElse=*/true);
   scalar->removeAttr(marks::lanes);
   builder.setInsertionPointToStart(choice.thenBlock());
   write();
   scalar->moveBefore(choice.elseBlock(), choice.elseBlock()->begin());
+}
+
+/// The place of a loop in the user's text, for reports: no path of a machine.
+static std::string describePlace(scf::ForOp loop) {
+  std::string text;
+  loop.getLoc()->walk([&](Location inner) {
+    auto file = dyn_cast<FileLineColLoc>(inner);
+    if (!file)
+      return WalkResult::advance();
+    llvm::raw_string_ostream(text)
+        << ", " << llvm::sys::path::filename(file.getFilename().getValue())
+        << ":" << file.getLine() << ":" << file.getColumn();
+    return WalkResult::interrupt();
+  });
+  return text;
+}
+
+/// What a loop is over, and where it is.
+static std::string describeLoop(scf::ForOp loop) {
+  std::string what = isOverPrimitives(loop)
+                         ? (getLoopPhase(loop) + " of primitives").str()
+                         : "iterations";
+  return getKernelStage(loop).getSymName().str() + ", " + what +
+         describePlace(loop);
+}
+
+/// The number of the loop in whose scalar version an operation is.
+static std::optional<int64_t> findScalarVersion(Operation *op) {
+  for (; op; op = op->getParentOp()) {
+    auto choice = dyn_cast_if_present<scf::IfOp>(op->getParentOp());
+    auto takes = choice ? choice.getCondition().getDefiningOp<TakesVectorsOp>()
+                        : TakesVectorsOp();
+    if (takes && op->getParentRegion() == &choice.getElseRegion())
+      return takes.getNumber();
+  }
+  return std::nullopt;
+}
+
+/// The writer of a unit of work that a loop is in, or null.
+static OpenWriterOp findWriter(scf::ForOp loop) {
+  auto units = loop->getParentOfType<scf::ForallOp>();
+  if (!units || !units->getParentOfType<KernelOp>())
+    return {};
+  auto writers = units.getBody()->getOps<OpenWriterOp>();
+  return writers.empty() ? OpenWriterOp() : *writers.begin();
+}
+
+static int64_t countMappings(scf::ForOp loop) {
+  int64_t count = 0;
+  loop->getParentOfType<KernelOp>().walk([&](TakesVectorsOp) { ++count; });
+  return count;
+}
+
+/// A trial takes longer for each of them: of more, estimates decide.
+static constexpr int64_t mostHeld = 6;
+static_assert(mostHeld <= mostMappings);
+
+bool VectorizePass::mayHoldBoth(scf::ForOp loop) const {
+  return window > 1 && !inVectors && !meeting.contains(loop) &&
+         findWriter(loop) && countMappings(loop) < mostHeld;
+}
+
+/// Whether a unit of work runs a loop as vectors; null if only they are held.
+static Value createTakesVectors(scf::ForOp loop,
+                                const LaneCandidate &candidate) {
+  if (!candidate.getVersions())
+    return {};
+  int64_t number = countMappings(loop);
+  OpenWriterOp writer = findWriter(loop);
+  OpBuilder builder(loop->getContext());
+  builder.setInsertionPointAfter(writer);
+  const LaneCandidate::Versions &versions = *candidate.getVersions();
+  auto optional = [&](std::optional<int64_t> number) {
+    return number ? builder.getI64IntegerAttr(*number) : IntegerAttr();
+  };
+  return TakesVectorsOp::create(
+      builder, loop.getLoc(), builder.getI1Type(), writer,
+      builder.getI64IntegerAttr(number), optional(findScalarVersion(loop)),
+      versions.expected ? builder.getUnitAttr() : UnitAttr(),
+      builder.getI64IntegerAttr(std::llround(versions.vectors)),
+      builder.getI64IntegerAttr(std::llround(versions.scalar)),
+      builder.getStringAttr(describeLoop(loop)));
+}
+
+/// Prints the estimates of a loop that is held in two versions, as a line of
+/// JSON, and how they depend on the numbers of the cost model: for each of
+/// these by how many percent estimates change if it does so by one.
+static void printSensitivities(scf::ForOp loop, int64_t number,
+                               LaneCandidate &candidate,
+                               const IterationLanes &lanes,
+                               const FlatLoop &flat) {
+  const Cycles &cycles = getCycles(lanes.getLaneCount());
+  LaneCandidate::Versions at = candidate.estimate(lanes, flat, cycles);
+  llvm::json::OStream out(llvm::outs());
+  out.objectBegin();
+  out.attribute("kernel", loop->getParentOfType<KernelOp>().getSymName().str());
+  out.attribute("number", number);
+  out.attribute("loop", describeLoop(loop));
+  int64_t operations = 0;
+  loop.walk([&](Operation *) { ++operations; });
+  out.attribute("operations", operations);
+  out.attribute("expected", candidate.getVersions()->expected);
+  out.attribute("vectors", at.vectors);
+  out.attribute("scalar", at.scalar);
+  out.attributeBegin("by");
+  out.objectBegin();
+  for (const CycleConstant &constant : getCycleConstants()) {
+    constexpr double step = 0.01;
+    Cycles other = cycles;
+    other.*constant.member *= 1 + step;
+    LaneCandidate::Versions there = candidate.estimate(lanes, flat, other);
+    double vectors = (there.vectors / at.vectors - 1) / step,
+           scalar = (there.scalar / at.scalar - 1) / step;
+    if (vectors == 0 && scalar == 0)
+      continue;
+    out.attributeBegin(constant.name);
+    out.array([&] {
+      out.value(vectors);
+      out.value(scalar);
+    });
+    out.attributeEnd();
+  }
+  out.objectEnd();
+  out.attributeEnd();
+  out.objectEnd();
+  llvm::outs() << "\n";
+}
+
+/// Makes room for two versions of a loop: `loop`, whose lanes are given
+/// iterations of loops in it, is the scalar one; the others are in front.
+static void splitVersions(Value takesVectors, scf::ForOp loop,
+                          ArrayRef<scf::ForOp> vectors) {
+  OpBuilder builder(loop);
+  auto choice = scf::IfOp::create(builder, loop.getLoc(), takesVectors,
+                                  /*withElse=*/true);
+  for (scf::ForOp one : vectors)
+    if (one)
+      one->moveBefore(choice.thenBlock()->getTerminator());
+  loop->moveBefore(choice.elseBlock()->getTerminator());
+  loop->setAttr(marks::mapping, LaneMappingAttr::get(loop->getContext(),
+                                                     LaneMapping::Iterations));
 }
 
 /// Whether the iterations of a loop, which meet, are now lanes in lockstep.
@@ -290,7 +447,7 @@ WalkResult VectorizePass::visit(Operation *op) {
   auto loop = dyn_cast<scf::ForOp>(op);
   if (!loop || !loop->hasAttr(marks::lanes))
     return vectorizeInOrder(op) ? WalkResult::skip() : WalkResult::advance();
-  LaneCandidate candidate(loop);
+  LaneCandidate candidate(loop, mayHoldBoth(loop) ? double(window) : 1);
   if (!candidate.isChosen())
     return WalkResult::advance();
   // Of a copy: what stays scalar stays as it is.
@@ -303,23 +460,33 @@ WalkResult VectorizePass::visit(Operation *op) {
   if (!lanes.getRefusal().at)
     flat = flattenNests(lanes);
   bool isDone = candidate.decide(lanes, flat);
+  if (sensitivities && isDone && candidate.getVersions())
+    printSensitivities(loop, countMappings(loop), candidate, lanes, flat);
+  Value takesVectors = isDone ? createTakesVectors(loop, candidate) : Value();
+  // One body stands for short loops and for the scalar version.
+  bool isSplit = takesVectors && (isOverPrimitives(loop) ||
+                                  isOneVector(loop, countLanes(candidate)));
+  if (isSplit)
+    splitVersions(std::exchange(takesVectors, Value()), loop,
+                  {copy, flat.loop});
   if (isDone && flat.loop) {
-    countPrimitives(loop, flat.writers);
-    vectorize(IterationLanes(flat.loop, countLanes(candidate)), copy);
+    countPrimitives(copy, flat.writers);
+    vectorize(IterationLanes(flat.loop, countLanes(candidate)), copy,
+              takesVectors);
   } else if (isDone) {
     testDivisors(lanes);
     testDividends(copy);
-    vectorize(IterationLanes(copy, countLanes(candidate)), copy);
+    vectorize(IterationLanes(copy, countLanes(candidate)), copy, takesVectors);
   } else {
     copy.erase();
     ++left;
   }
   if (flat.loop)
     flat.loop.erase();
-  if (!isDone)
+  vectorized += isDone;
+  if (!isDone || isSplit)
     return WalkResult::advance();
   loop.erase();
-  ++vectorized;
   return WalkResult::skip();
 }
 
@@ -336,12 +503,16 @@ void VectorizePass::runOnOperation() {
         << int64_t(laneCount);
     return signalPassFailure();
   }
-  SmallVector<ParallelForOp> meeting;
+  SmallVector<ParallelForOp> parallels;
   getOperation().walk([&](ParallelForOp parallel) {
-    if (parallel->getParentOfType<KernelOp>())
-      meeting.push_back(parallel);
+    if (!parallel->getParentOfType<KernelOp>())
+      return;
+    parallels.push_back(parallel);
+    for (Operation *at = parallel; at; at = at->getParentOp())
+      if (isa<scf::ForOp>(at))
+        meeting.insert(at);
   });
-  for (ParallelForOp parallel : meeting) {
+  for (ParallelForOp parallel : parallels) {
     if (runInLockstep(parallel))
       ++vectorized;
     else if (failed(LoopSplitter(parallel).run()))

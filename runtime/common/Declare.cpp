@@ -9,6 +9,7 @@
 
 #include "common/Pipeline.h"
 
+#include <algorithm>
 #include <bit>
 
 using namespace piko::rt;
@@ -169,6 +170,38 @@ void pikoir_declare_written(pikort_pipeline *p, int32_t id) {
 
 void pikoir_declare_unused(pikort_pipeline *p, int32_t id) {
   guarded(p, "setup", [&] { findBuffer(p, id).unused = true; });
+}
+
+void pikoir_declare_mapping(pikort_pipeline *p, int32_t stage, int32_t source,
+                            int32_t number, const char *loop, int32_t within,
+                            int32_t expected, int64_t vectors, int64_t scalar) {
+  guarded(p, "setup", [&] {
+    auto isOwn = [&](const Mapping &other) {
+      return other.stage == stage && other.source == source;
+    };
+    auto isNext = [&] {
+      return number == 0
+                 ? std::none_of(p->mappings.begin(), p->mappings.end(), isOwn)
+                 : !p->mappings.empty() && isOwn(p->mappings.back()) &&
+                       p->mappings.back().number == number - 1;
+    };
+    expect(number >= 0 && number < PIKOIR_MOST_MAPPINGS && isNext(),
+           "expected the loops of a kernel in order, fewer than " +
+               std::to_string(PIKOIR_MOST_MAPPINGS) + ", but got " +
+               std::to_string(number));
+    expect(within >= -1 && within < number,
+           "expected the number of a loop around it, but got " +
+               std::to_string(within));
+    Mapping &mapping = p->mappings.emplace_back();
+    mapping.stage = stage;
+    mapping.source = source;
+    mapping.number = number;
+    mapping.within = within;
+    mapping.loop = orEmpty(loop);
+    mapping.expected = mapping.chosen = expected != 0;
+    mapping.vectors = vectors;
+    mapping.scalar = scalar;
+  });
 }
 
 void pikoir_declare_stage(pikort_pipeline *p, int32_t id, const char *name,

@@ -55,6 +55,7 @@ int32_t pikort_create_on(const pikort_program *program, int32_t device,
       return; // setup noted why
     p->finish();
     p->executor->prepare();
+    p->readMappingSetting();
     p->ready = true;
   });
   return p->status.load();

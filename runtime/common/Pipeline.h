@@ -205,6 +205,25 @@ struct Stage {
   bool unordered() const { return flags & PIKOIR_UNORDERED; }
 };
 
+/// What the host says of a mapping.
+enum class MappingChoice { Measured, Expected, Vectors, Scalar };
+
+/// A loop that a kernel holds in two versions.
+struct Mapping {
+  int32_t stage = 0, source = -1; ///< Whose kernel, as in pikoir_begin.
+  int32_t number = 0;             ///< Of the kernel's.
+  size_t kernel = 0;              ///< Of those that have statistics.
+  int32_t within = -1; ///< Another one of it, in whose scalar version it is.
+  std::string loop;
+  bool expected = false;           ///< Vectors are.
+  int64_t vectors = 0, scalar = 0; ///< Cycles, as estimated.
+  MappingChoice choice = MappingChoice::Measured;
+  // What the kernel's Autotuner has found:
+  int32_t state = PIKORT_MAPPING_EXPECTED;
+  bool chosen = false;
+  double ratio = 0; ///< Vectors' time over that of one at a time.
+};
+
 struct KernelStats {
   std::string name;
   double milliseconds = 0, joinMilliseconds = 0, waitMilliseconds = 0;
@@ -282,6 +301,7 @@ struct pikort_pipeline {
   void (*unitReport)(void *, const pikort_unit_run *) = nullptr;
   void *unitReportData = nullptr;
 
+  std::vector<piko::rt::Mapping> mappings; ///< By kernel and number.
   std::vector<piko::rt::Fixed> fixed;
   std::vector<std::unique_ptr<piko::rt::Counter>> counters;
   piko::rt::Profile profile{memory};
@@ -308,6 +328,8 @@ struct pikort_pipeline {
 
   /// Checks and completes the declarations; throws Failure.
   void finish();
+  /// What $PIKO_MAPPINGS says; throws Failure.
+  void readMappingSetting();
   /// Computes grids from the domain; throws Failure.
   void computeGrids();
 

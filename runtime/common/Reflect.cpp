@@ -140,6 +140,30 @@ int32_t pikort_get_kernel_stats(pikort_pipeline *p, int32_t index,
       });
 }
 
+int32_t pikort_mapping_count(const pikort_pipeline *p) {
+  return p ? countOf(p->mappings) : 0;
+}
+
+int32_t pikort_get_mapping(pikort_pipeline *p, int32_t index,
+                           pikort_mapping_info *info) {
+  if (!p)
+    return PIKORT_INVALID_ARGUMENT;
+  return describe(p, p->mappings, index, "mapping", info,
+                  [&](const Mapping &m) {
+                    return pikort_mapping_info{
+                        p->kernelStats[m.kernel].name.c_str(),
+                        m.number,
+                        m.within,
+                        m.loop.c_str(),
+                        m.chosen,
+                        m.expected,
+                        m.state,
+                        static_cast<double>(m.vectors) /
+                            static_cast<double>(std::max<int64_t>(1, m.scalar)),
+                        m.ratio};
+                  });
+}
+
 int32_t pikort_get_time_stats(pikort_pipeline *p, pikort_time_stats *stats) {
   if (!p || !stats)
     return PIKORT_INVALID_ARGUMENT;

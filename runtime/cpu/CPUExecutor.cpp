@@ -35,6 +35,16 @@ void CPUExecutor::prepare() {
     stats.name = p.stages[stage].name;
     if (source >= 0)
       stats.name += ".assign" + std::to_string(source);
+    std::vector<Mapping> &all = p.mappings;
+    auto isOwn = [&](const Mapping &mapping) {
+      return mapping.stage == stage && mapping.source == source;
+    };
+    auto first = std::find_if(all.begin(), all.end(), isOwn),
+         last = std::find_if_not(first, all.end(), isOwn);
+    for (Mapping &mapping : std::span(first, last))
+      mapping.kernel = kernel->statsIndex;
+    if (first != last)
+      kernel->tuner = std::make_unique<Autotuner>(std::span(first, last));
     p.kernelStats.push_back(std::move(stats));
     return kernel;
   };
@@ -46,6 +56,15 @@ void CPUExecutor::prepare() {
         sourceKernels[source] = make(static_cast<int32_t>(s), source);
     kernels.push_back(make(static_cast<int32_t>(s), -1));
   }
+  for (const Mapping &mapping : p.mappings)
+    if (!p.findStage(mapping.stage) ||
+        mapping.source >= static_cast<int32_t>(p.sources.size()) ||
+        (mapping.source >= 0 && !sourceKernels[mapping.source]))
+      throw Failure{PIKORT_BAD_PROGRAM,
+                    "expected a mapping of a kernel's loop, but got one of "
+                    "stage " +
+                        std::to_string(mapping.stage) + ", source " +
+                        std::to_string(mapping.source)};
 }
 
 void CPUExecutor::beginRun() {

@@ -21,6 +21,7 @@
 #ifndef PIKO_RUNTIME_CPU_KERNEL_H
 #define PIKO_RUNTIME_CPU_KERNEL_H
 
+#include "cpu/Autotuner.h"
 #include "cpu/CPUExecutor.h"
 
 #include <atomic>
@@ -111,6 +112,7 @@ struct alignas(64) Lane : pikoir_writer {
   ScratchStack scratch;
   std::unique_ptr<Deferred> deferred;   ///< If there were any.
   std::vector<pikoir_private> privates; ///< For each reduction of the stage.
+  AutotunerThread tuning;               ///< Of the open unit.
   bool reduces = false;                 ///< Some unit of this launch asked.
   bool selects = false;                 ///< The same, of private images.
 
@@ -243,6 +245,8 @@ struct Kernel {
   /// Of each selection of the stage; they stay from run to run.
   std::vector<std::unique_ptr<PrivateImages>> images;
   int32_t mostThreads = INT32_MAX; ///< That may run this launch.
+  /// If it holds loops in two versions; it stays from run to run.
+  std::unique_ptr<Autotuner> tuner;
 
   // On a cycle.
   bool firstRound = true;

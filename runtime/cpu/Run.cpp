@@ -177,6 +177,8 @@ static const pikoir_input *begin(pikort_pipeline &p, Kernel &kernel) {
       beginSelections(p, kernel);
     }
     kernel.open = true;
+    if (kernel.tuner && !kernel.runsSerially)
+      kernel.tuner->beginLaunch(kernel.units);
     kernel.cursors.reset(kernel.units, p.threads);
     kernel.input.cursors = &kernel.cursors;
     int64_t threads = std::min(kernel.mostThreads, p.threads);
@@ -209,6 +211,8 @@ static const pikoir_input *begin(pikort_pipeline &p, Kernel &kernel) {
     if (kernel.source < 0)
       p.stageStats[kernel.stage].out += lane->emitted;
   }
+  if (kernel.tuner)
+    kernel.tuner->endLaunch(busy);
   if (cpuOf(p).activeThreads > 1) {
     ++stats.parallelLaunches;
     stats.waitTicks += std::max<int64_t>(0, kernel.ended - kernel.begun -

@@ -207,6 +207,8 @@ int64_t Serial::slots() const {
 pikoir_writer *Serial::open(int64_t unit) {
   const pikoir_unit &opened = kernel_.units[static_cast<size_t>(unit)];
   lane_.unit = unit;
+  if (kernel_.tuner)
+    lane_.mappings = kernel_.tuner->getCurrent();
   lane_.slotLimit =
       slotEnds_.data() + (stage_.takesList() ? opened.cell_end : opened.end);
   for (pikoir_port &port : lane_.portStorage)

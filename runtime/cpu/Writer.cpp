@@ -287,6 +287,8 @@ static pikoir_writer *openUnit(Kernel &kernel, int64_t unit) {
     lane = takeLane(kernel);
   }
   lane->unit = unit;
+  if (kernel.tuner)
+    lane->mappings = kernel.tuner->begin(unit, lane->tuning);
   lane->opened = ticks();
   lane->ordinal = 0;
   for (int32_t i = 0; i < lane->port_count; ++i) {
@@ -371,6 +373,9 @@ void pikoir_close(pikoir_writer *writer) {
   }
   int64_t closed = ticks();
   lane->busy += closed - lane->opened;
+  if (Kernel &kernel = *lane->kernel; kernel.tuner)
+    kernel.tuner->end(kernel.units[static_cast<size_t>(lane->unit)],
+                      lane->tuning, closed - lane->opened);
   if (lane->pipeline->unitReport) [[unlikely]]
     reportUnit(*lane, closed);
   lane->taken.clear(std::memory_order_release);

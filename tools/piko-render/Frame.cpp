@@ -46,7 +46,9 @@ Result<std::string> render::createPipeline(const Options &options,
       pikort_set_domain(pipeline, 2, extent) != PIKORT_OK ||
       pikort_set_threads(pipeline, options.threads) != PIKORT_OK ||
       pikort_set_memory_budget(pipeline, options.memoryBudget) != PIKORT_OK ||
-      pikort_set_strip_size(pipeline, options.stripSize) != PIKORT_OK)
+      pikort_set_strip_size(pipeline, options.stripSize) != PIKORT_OK ||
+      (!options.mappings.empty() &&
+       pikort_set_mappings(pipeline, options.mappings.c_str()) != PIKORT_OK))
     return errorOf(pipeline);
   return bindScene(pipeline, scene);
 }

@@ -27,6 +27,13 @@ it, and says how long a frame took.
                          -O1 has it (-O3)
   -I FOLDER, -D NAME[=VALUE]   for the pipeline's preprocessor
   --without PASS,...     passes of synthesis to leave out
+  --mappings SETTING     which version runs of loops that the code holds as
+                         vectors and as scalar loops: measured (the faster),
+                         expected (by estimates), vectors or scalar; or, behind
+                         one of these, KERNEL:NUMBER=vectors, ...; all results
+                         are the same ($PIKO_MAPPINGS; measured)
+  --mapping-window F     hold both versions where estimates are within this
+                         factor of each other; 1: nowhere (2)
   --fix NAME,...         specialize the pipeline for values that the scene has:
                          CONSTANT, BUFFER.size, all (all constants but cameras,
                          and sizes of small buffers), or NAME=VALUE; may be
@@ -120,6 +127,8 @@ private:
         {"--no-cache", [&] { options.load.cache.enabled = false; }},
         {"--cache-dir", [&] { options.load.cache.directory = value(name); }},
         {"--without", [&] { parseWithout(value("--without")); }},
+        {"--mappings", [&] { options.mappings = value(name); }},
+        {"--mapping-window", [&] { parseWindow(number(name)); }},
         {"--fix", [&] { parseFix(value(name)); }},
         {"--tuned", [&] { options.tuned = value(name); }},
         {"--gpu-threads",
@@ -177,6 +186,12 @@ private:
       options.load.synthesis.without = synthesis->without;
     else
       fail(describeWrongSynthesisOptions(text));
+  }
+
+  void parseWindow(double factor) {
+    if (factor < 1 || factor > 1000)
+      fail("--mapping-window: expected a factor in [1, 1000]");
+    options.load.synthesis.mappingWindow = factor;
   }
 
   void parseFix(const std::string &text) {

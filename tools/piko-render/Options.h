@@ -26,6 +26,7 @@ struct Options {
   int warmup = 5, frames = 30;
   double seconds = 1000;
   std::vector<std::string> images; ///< to write
+  std::string mappings;  ///< as pikort_set_mappings takes it; "" = unsaid
   std::string trace;     ///< where to write which thread ran which bins
   bool counters = false; ///< count the work of one more frame
   bool explain = false;

@@ -3,6 +3,7 @@
 #include "Report.h"
 
 #include "Frame.h"
+#include "Mappings.h"
 
 #include <algorithm>
 #include <cstdio>
@@ -26,6 +27,24 @@ std::string nameDevice(pikort_pipeline *pipeline) {
   return "CUDA device " + std::to_string(number) + " (" + info.name + ")";
 }
 
+/// Which versions of its loops a kernel runs, and why.
+std::vector<JsonObject> reportMappings(pikort_pipeline *pipeline,
+                                       const std::string &kernel) {
+  std::vector<JsonObject> mappings;
+  for (const pikort_mapping_info &info : readMappings(pipeline))
+    if (kernel == info.kernel)
+      mappings.push_back(JsonObject()
+                             .add("number", info.number)
+                             .add("within", info.within)
+                             .add("loop", info.loop)
+                             .add("runs", nameVersion(info.vectors))
+                             .add("expected", nameVersion(info.expected))
+                             .add("because", explainMapping(info))
+                             .add("expected_ratio", info.expected_ratio)
+                             .add("measured_ratio", info.measured_ratio));
+  return mappings;
+}
+
 /// Where a device has all of a run it is not known what its kernels took,
 /// unless somebody has asked for it.
 std::vector<JsonObject> reportKernels(pikort_pipeline *pipeline, double runs) {
@@ -43,6 +62,8 @@ std::vector<JsonObject> reportKernels(pikort_pipeline *pipeline, double runs) {
           .add("wait_ms", stats.wait_milliseconds / runs)
           .add("launches", double(stats.launches) / runs)
           .add("parallel_launches", double(stats.parallel_launches) / runs);
+    if (auto mappings = reportMappings(pipeline, stats.name); !mappings.empty())
+      kernel.add("mappings", mappings);
   }
   return kernels;
 }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #include "Trace.h"
 
+#include "Mappings.h"
+
 #include "Piko/Scene/Json.h"
 
 #include <cstring>
@@ -50,6 +52,21 @@ Result<Done> piko::render::traceFrame(pikort_pipeline *pipeline,
     return Error{pikort_message(pipeline)};
 
   std::vector<JsonObject> events;
+  // Marks at the frame's begin: which versions of loops the units run.
+  for (const pikort_mapping_info &info : readMappings(pipeline))
+    events.push_back(
+        JsonObject()
+            .add("name", std::string(info.kernel) + ": " + info.loop)
+            .add("ph", "i")
+            .add("s", "g") // of the whole trace
+            .add("pid", 0)
+            .add("tid", 0)
+            .add("ts", 0)
+            .add("args", JsonObject()
+                             .add("runs", nameVersion(info.vectors))
+                             .add("because", explainMapping(info))
+                             .add("expected ratio", info.expected_ratio)
+                             .add("measured ratio", info.measured_ratio)));
   for (const pikort_unit_run &unit : units.list)
     events.push_back(makeEvent(unit));
   std::ofstream file(path);

@@ -6,6 +6,7 @@
 //
 //===----------------------------------------------------------------------===//
 #include "Frame.h"
+#include "Mappings.h"
 #include "Options.h"
 #include "Report.h"
 #include "Specialize.h"
@@ -122,7 +123,7 @@ Result<Done> report(const Options &options, const RunResult &result,
     if (options.counters)
       text += printWork(*work, result.pixels);
     if (options.explain)
-      text += printWastes(wastes);
+      text += printWastes(wastes) + printMappings(pipeline);
   }
   std::printf("%s", options.json ? (line.text() + "\n").c_str() : text.c_str());
   return Done{};
@@ -141,6 +142,8 @@ Result<Done> applyTuned(Options &options) {
     return Error{"--tuned: " + wrong};
   if (options.stripSize == 0)
     options.stripSize = setting->stripSize;
+  if (options.mappings.empty())
+    options.mappings = setting->mappings;
   return Done{};
 }
 

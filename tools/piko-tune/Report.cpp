@@ -167,5 +167,6 @@ std::string tune::writeSetting(const TuneResult &result) {
   TunedSetting setting = result.space.describe(result.outcome.chosen->setting);
   const auto &without = result.options.render.load.synthesis.without;
   setting.without.insert(setting.without.end(), without.begin(), without.end());
+  setting.mappings = result.mappings;
   return writeTunedSetting(setting, describeMeasurement(result).text());
 }

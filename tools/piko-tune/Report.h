@@ -17,6 +17,8 @@ struct TuneResult {
   const std::deque<Trial> &trials;
   Outcome outcome;
   std::optional<Survey> survey = {};
+  /// Which versions of loops the chosen setting runs (pikort_set_mappings).
+  std::string mappings = {};
 };
 
 /// For people, in lines.

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #include "SceneBench.h"
 
+#include "Mappings.h"
+
 #include "Piko/Scene/ImageError.h"
 #include "Piko/Scene/ImageFile.h"
 
@@ -102,6 +104,27 @@ Result<double> SceneBench::visit(const Setting &setting) {
     time = i == 0 ? taken : std::min(time, taken);
   }
   return time;
+}
+
+Result<std::string> SceneBench::findMappings(const Setting &setting) {
+  if (auto prepared = prepare(setting); !prepared)
+    return prepared.error();
+  auto instance = getInstance(setting);
+  if (!instance)
+    return instance.error();
+  pikort_pipeline *pipeline = (*instance)->owner.pipeline;
+  auto isOpen = [&] {
+    std::vector<pikort_mapping_info> mappings = render::readMappings(pipeline);
+    return std::any_of(mappings.begin(), mappings.end(),
+                       [](const pikort_mapping_info &info) {
+                         return info.state < PIKORT_MAPPING_MEASURED;
+                       });
+  };
+  constexpr int mostFrames = 20;
+  for (int i = 0; i < mostFrames && isOpen(); ++i)
+    if (pikort_run(pipeline) != PIKORT_OK)
+      return render::errorOf(pipeline);
+  return render::writeMappings(pipeline);
 }
 
 static double get(Metric metric, const render::ImageError &error) {

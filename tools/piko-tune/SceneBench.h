@@ -24,6 +24,9 @@ public:
   /// Where there is no reference image yet, the setting's image becomes it.
   render::Result<double> measureError(const Setting &setting) override;
   void release(const Setting &setting) override;
+  /// Which versions of loops are faster in a setting, as measured in the frames
+  /// that it has run and, if that is not enough, a few more.
+  render::Result<std::string> findMappings(const Setting &setting);
 
 private:
   /// A pipeline with its scene; made when it first runs.

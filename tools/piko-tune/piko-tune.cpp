@@ -78,6 +78,10 @@ Result<Done> tuneScene(const TuneOptions &options) {
       return survey.error();
     result.survey = *survey;
   }
+  auto mappings = (*bench)->findMappings(outcome->chosen->setting);
+  if (!mappings)
+    return mappings.error();
+  result.mappings = *mappings;
   std::string text = options.json ? writeJson(result) : summarize(result);
   std::fputs(text.c_str(), stdout);
   return writeFiles(result);

@@ -185,6 +185,13 @@ struct CommandLine {
                      "name[.field][[element]], and for sizes of buffers, "
                      "name.size; a run with others is an error"),
       llvm::cl::cat(category)};
+  llvm::cl::opt<double> mappingWindow{
+      "mapping-window", llvm::cl::value_desc("factor"),
+      llvm::cl::desc("hold a loop as vectors and as a scalar loop, of which the "
+                     "runtime measures which is faster, where estimates are "
+                     "within this factor of each other (default: 2; 1: none)"),
+      llvm::cl::init(SynthesisOptions().mappingWindow),
+      llvm::cl::cat(category)};
   llvm::cl::opt<bool> explain{
       "explain", llvm::cl::desc("write what synthesis makes of the pipeline"),
       llvm::cl::cat(category)};
@@ -213,8 +220,10 @@ struct CommandLine {
   std::optional<SynthesisOptions> getSynthesis() const {
     auto options =
         without.empty() ? SynthesisOptions() : parseSynthesisOptions(without);
-    if (options)
+    if (options) {
       options->fix.assign(fix.begin(), fix.end());
+      options->mappingWindow = mappingWindow;
+    }
     return options;
   }
   bool isEmulated() const { return target == GPUTarget::Emulator; }
@@ -282,6 +291,8 @@ static std::string checkOptions(const CommandLine &line) {
   CompileOptions source = line.getUntuned();
   if (std::string wrong = line.tune(source); !wrong.empty())
     return "--tuned: " + wrong;
+  if (!(line.mappingWindow >= 1 && line.mappingWindow <= 1000))
+    return "--mapping-window: expected a factor in [1, 1000]";
   if (line.optLevel > 3)
     return "expected -O0 to -O3, but got -O" + std::to_string(line.optLevel);
   if (!isObject &&

@@ -26,6 +26,10 @@ struct SynthesisOptions {
   /// piko-fix-constants takes them.
   std::vector<std::string> fix = {};
   Counting count = Counting::None;
+  /// Where estimates of a loop as vectors and as a scalar loop are within this
+  /// factor of each other, code holds both, and the runtime measures which is
+  /// faster. 1: nowhere.
+  double mappingWindow = 2;
   /// `stage:key=value`, as piko-set-directives takes them.
   std::vector<std::string> directives = {};
 

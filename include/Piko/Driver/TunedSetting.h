@@ -9,6 +9,7 @@
 //     "directives": {"rasterizer": {"schedule": "direct_map"}},
 //     "without": ["prefetch"],
 //     "strip": 4096,
+//     "mappings": "Shade:0=vectors",
 //     "measured": {"scene": "bunny.obj", ...}
 //   }
 //
@@ -37,6 +38,9 @@ struct TunedSetting {
   std::vector<std::string> without = {};
   /// Primitives of a source in a strip, which the host sets; 0 = what fits.
   int64_t stripSize = 0;
+  /// Which versions of loops were measured to be faster, as
+  /// pikort_set_mappings takes it, which the host calls; "" = not said.
+  std::string mappings = {};
 
   /// Adds what is set to options. Returns what is wrong, as where they ask for
   /// another pipeline, or nothing.

@@ -171,6 +171,13 @@ def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
     (`piko.cpu.store_records`). Loops that lanes run in their turns are looked at as
     others are.
 
+    With a `window` a loop for which the estimates are within that factor of each
+    other becomes vectors and stays as it is as well (loop multiversioning):
+    `piko.cpu.takes_vectors` says which of them a unit of work runs, as the
+    runtime has measured. Loops inside of the scalar version are candidates of
+    their own, so that primitives, iterations or neither may have lanes. What the
+    schedule specifies is not measured.
+
     A parallel loop whose iterations meet, of which `piko-split-loops` has left
     those that a vector has lanes for, on any processor, becomes lanes in lockstep:
     a barrier needs no code, a reduction is one of a vector's lanes, a scan joins
@@ -244,6 +251,13 @@ def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
   let options = [
     Option<"laneCount", "lanes", "int64_t", "16",
            "Lanes of a vector: 4, 8 or 16 (default: 16)">,
+    Option<"window", "window", "double", "1",
+           "hold a loop as vectors and as a scalar loop, of which the runtime runs "
+           "what is faster, where estimates are within this factor of each other "
+           "(default: 1, none)">,
+    Option<"sensitivities", "sensitivities", "bool", "false",
+           "print the estimates of such loops, and how they depend on the numbers "
+           "of the cost model, as lines of JSON">
   ];
   let statistics = [
     Statistic<"vectorized", "vectorized", "loops that compute in vectors">,

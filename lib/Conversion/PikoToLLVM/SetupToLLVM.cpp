@@ -5,6 +5,7 @@
 #include "ProgramRegions.h"
 
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
+#include "Piko/Dialect/Piko/IR/PikoCPU.h"
 #include "Piko/Dialect/Piko/IR/PikoCheck.h"
 #include "Piko/Dialect/Piko/IR/PikoCount.h"
 #include "Piko/Dialect/Piko/IR/PikoFixed.h"
@@ -50,6 +51,7 @@ private:
   void declareEdge(EdgeOp edge);
   void declareJoin(JoinOp join);
   void declareClears(LaunchOp launch);
+  void declareMappings(KernelOp kernel);
   void declareRoots(ProgramOp program);
   void declareRegion(Operation *region);
   Value recordBytes(FlatSymbolRefAttr record, ArrayAttr numbers);
@@ -302,6 +304,26 @@ void SetupWriter::declareRoots(ProgramOp program) {
   }
 }
 
+static_assert(mostMappings == PIKOIR_MOST_MAPPINGS);
+
+void SetupWriter::declareMappings(KernelOp kernel) {
+  SmallVector<TakesVectorsOp> loops;
+  kernel.walk([&](TakesVectorsOp op) { loops.push_back(op); });
+  if (loops.empty())
+    return;
+  llvm::sort(loops, [](TakesVectorsOp a, TakesVectorsOp b) {
+    return a.getNumber() < b.getNumber();
+  });
+  OpenBinsOp bins = *kernel.getOps<OpenBinsOp>().begin();
+  int64_t stage = numbers.stages.lookup(bins.getStageAttr().getAttr());
+  int64_t source = bins.getSource() ? int64_t(*bins.getSource()) : -1;
+  for (TakesVectorsOp op : loops)
+    call(PIKO_RUNTIME_FUNCTION(pikoir_declare_mapping),
+         {i32(stage), i32(source), i32(op.getNumber()), text(op.getLoop()),
+          i32(op.getWithin() ? int64_t(*op.getWithin()) : -1),
+          i32(op.getExpected()), i64(op.getVectors()), i64(op.getScalar())});
+}
+
 void SetupWriter::declareClears(LaunchOp launch) {
   if (!launch.getClearsAttr())
     return;
@@ -359,6 +381,8 @@ void SetupWriter::run(ProgramOp program) {
     declareCounter(counter);
   declareReductions(builder, frame, numbers, context);
   declareSelections(builder, frame, numbers, context);
+  for (auto kernel : pipeline.getOps<KernelOp>())
+    declareMappings(kernel);
   declareRoots(program);
   program.walk<WalkOrder::PreOrder>([&](Operation *op) {
     if (auto join = dyn_cast<JoinOp>(op))

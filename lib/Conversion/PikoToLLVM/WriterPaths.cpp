@@ -15,7 +15,8 @@ using namespace piko;
 // Members of pikoir_writer and pikoir_port.
 namespace layout {
 constexpr RuntimeMember writerFlags = PIKO_RUNTIME_MEMBER(pikoir_writer, flags),
-                        ports = PIKO_RUNTIME_MEMBER(pikoir_writer, ports);
+                        ports = PIKO_RUNTIME_MEMBER(pikoir_writer, ports),
+                        mappings = PIKO_RUNTIME_MEMBER(pikoir_writer, mappings);
 constexpr RuntimeMember cursor = PIKO_RUNTIME_MEMBER(pikoir_port, cursor),
                         limit = PIKO_RUNTIME_MEMBER(pikoir_port, limit),
                         size = PIKO_RUNTIME_MEMBER(pikoir_port, size),
@@ -67,6 +68,15 @@ struct MemberBuilder : CodeBuilder {
 };
 
 } // namespace
+
+Value piko::createTakesVectors(OpBuilder &builder, Location loc,
+                               LoweringContext &context, Value writer,
+                               int64_t number) {
+  MemberBuilder members(builder, loc, writer, context.tags.writer());
+  Value bit = createI64(builder, loc, int64_t(1) << number);
+  Value set = members.both(members.load(layout::mappings), bit);
+  return members.compare(MemberBuilder::P::ne, set, createI64(builder, loc, 0));
+}
 
 static MemberBuilder openPort(OpBuilder &builder, Location loc,
                               LoweringContext &context, Value writer,

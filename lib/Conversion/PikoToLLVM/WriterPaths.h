@@ -10,6 +10,10 @@
 
 namespace piko {
 
+/// Whether a unit runs a loop of its kernel as vectors, by its number.
+mlir::Value createTakesVectors(mlir::OpBuilder &builder, mlir::Location loc,
+                               LoweringContext &context, mlir::Value writer,
+                               int64_t number);
 /// The place of the next record of a port (pikoir_append).
 mlir::Value createAppend(mlir::OpBuilder &builder, mlir::Location loc,
                          LoweringContext &context, mlir::Value writer,

@@ -64,6 +64,18 @@ struct OpenWriterLowering : Lowering<OpenWriterOp> {
   }
 };
 
+struct TakesVectorsLowering : Lowering<TakesVectorsOp> {
+  using Lowering::Lowering;
+  LogicalResult
+  matchAndRewrite(TakesVectorsOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    rewriter.replaceOp(op,
+                       createTakesVectors(rewriter, op.getLoc(), context,
+                                          adaptor.getWriter(), op.getNumber()));
+    return success();
+  }
+};
+
 struct LocalBinLowering : Lowering<LocalBinOp> {
   using Lowering::Lowering;
   LogicalResult
@@ -264,7 +276,7 @@ void piko::populateWriterToLLVMPatterns(const TypeConverter &converter,
                                         RewritePatternSet &patterns,
                                         LoweringContext &context) {
   patterns
-      .add<OpenWriterLowering, LocalBinLowering,
+      .add<OpenWriterLowering, TakesVectorsLowering, LocalBinLowering,
            WriterCallLowering<CloseWriterOp, closeWriter>, NextLowering,
            IsCountedLowering, WriterCallLowering<DeferEndOp, deferEnd>,
            WriterNumberLowering<DeferBeginOp, deferBegin>,

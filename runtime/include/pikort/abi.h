@@ -167,6 +167,9 @@ typedef struct pikoir_writer {
   int32_t port_count;
   int32_t stage;
   pikoir_port *ports;
+  /// Bit n: the unit runs loop n of the kernel (pikoir_declare_mapping) as
+  /// vectors.
+  int64_t mappings;
 } pikoir_writer;
 
 /// The first entry that a record notes in its list of cells has this bit.

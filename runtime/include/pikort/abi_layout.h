@@ -66,13 +66,14 @@ PIKOIR_ASSERT_OFFSET(pikoir_port, last_cell, 56);
 PIKOIR_ASSERT_OFFSET(pikoir_port, cells, 64);
 PIKOIR_ASSERT_OFFSET(pikoir_port, run, 96);
 PIKOIR_ASSERT_OFFSET(pikoir_port, flags, 116);
-PIKOIR_ASSERT_SIZE(pikoir_writer, 32);
+PIKOIR_ASSERT_SIZE(pikoir_writer, 40);
 PIKOIR_ASSERT_OFFSET(pikoir_writer, unit, 0);
 PIKOIR_ASSERT_OFFSET(pikoir_writer, ordinal, 8);
 PIKOIR_ASSERT_OFFSET(pikoir_writer, flags, 12);
 PIKOIR_ASSERT_OFFSET(pikoir_writer, port_count, 16);
 PIKOIR_ASSERT_OFFSET(pikoir_writer, stage, 20);
 PIKOIR_ASSERT_OFFSET(pikoir_writer, ports, 24);
+PIKOIR_ASSERT_OFFSET(pikoir_writer, mappings, 32);
 
 PIKOIR_ASSERT_SIZE(pikoir_private, 16);
 PIKOIR_ASSERT_OFFSET(pikoir_private, data, 0);

@@ -140,6 +140,17 @@ PIKORT_API void pikoir_declare_cycle(pikort_pipeline *p, int32_t id,
 PIKORT_API void pikoir_declare_loop(pikort_pipeline *p, int32_t id,
                                     const int32_t *stages, int32_t count,
                                     int32_t keys);
+/// The kernel of a stage, or the AssignBin of a source, holds a loop as vectors
+/// and as a scalar loop: number `number` of the kernel's, from 0, in order.
+/// `within`: the loop, of a lower number, in whose scalar version it is; or -1.
+/// `expected`: whether vectors are expected to be faster, which are expected to
+/// take so many cycles, and the scalar loop so many. `loop` says what it is.
+#define PIKOIR_MOST_MAPPINGS 16
+PIKORT_API void pikoir_declare_mapping(pikort_pipeline *p, int32_t stage,
+                                       int32_t source, int32_t number,
+                                       const char *loop, int32_t within,
+                                       int32_t expected, int64_t vectors,
+                                       int64_t scalar);
 /// Combines a field of each of so many records with what a private copy of them
 /// holds, and leaves there what changes nothing.
 typedef void (*pikoir_combine)(uint8_t *to, uint8_t *copy, int64_t records);

@@ -77,6 +77,10 @@ public:
   CheckedStatus setStripSize(int64_t primitives) {
     return pipe.stripSize(primitives);
   }
+  /// Which versions of its loops run: see pikort_set_mappings.
+  CheckedStatus setMappings(const std::string &setting) {
+    return pipe.mappings(setting.c_str());
+  }
   CheckedStatus setLoopLimit(int64_t limit) { return pipe.loopLimit(limit); }
 
   /// The primitives of a source. Uses the caller's memory, which must outlive

@@ -29,7 +29,7 @@ extern "C" {
 #endif
 
 /// Changes whenever generated code and runtime would no longer fit together.
-#define PIKORT_ABI_VERSION 10u
+#define PIKORT_ABI_VERSION 11u
 /// The most cells that a domain may have in a dimension, so that sums of
 /// coordinates and small numbers do not wrap around.
 #define PIKORT_MAX_EXTENT 1073741824
@@ -397,6 +397,39 @@ typedef struct pikort_unit_run {
 PIKORT_API int32_t pikort_set_unit_report(
     pikort_pipeline *pipeline,
     void (*report)(void *data, const pikort_unit_run *unit), void *data);
+
+/// A loop that the code of a kernel holds in two versions: its turns as the
+/// lanes of vectors, or one after the other. Both give the same bits. The
+/// runtime measures both on the first units of work, and again for units of
+/// another size, and keeps the faster one; see pikort_set_mappings.
+typedef struct pikort_mapping_info {
+  const char *kernel;    ///< As in pikort_kernel_stats.
+  int32_t number;        ///< Of the loops of the kernel, from 0.
+  int32_t within;        ///< The one in whose scalar version it is; -1 = none.
+  const char *loop;      ///< What it is over, and its place in the text.
+  int32_t vectors;       ///< What runs now: 1 = vectors, 0 = one at a time.
+  int32_t expected;      ///< The same, of what was expected to be faster.
+  int32_t state;         ///< A pikort_mapping_state.
+  double expected_ratio; ///< Vectors' time over that of one at a time.
+  double measured_ratio; ///< The same, as measured; 0 = not yet.
+} pikort_mapping_info;
+
+enum pikort_mapping_state {
+  PIKORT_MAPPING_EXPECTED = 0, ///< Nothing has been measured.
+  PIKORT_MAPPING_TRIED = 1,    ///< Is being measured.
+  PIKORT_MAPPING_MEASURED = 2, ///< The faster one.
+  PIKORT_MAPPING_FIXED = 3     ///< As the host has said.
+};
+
+PIKORT_API int32_t pikort_mapping_count(const pikort_pipeline *pipeline);
+PIKORT_API int32_t pikort_get_mapping(pikort_pipeline *pipeline, int32_t index,
+                                      pikort_mapping_info *info);
+/// Says which version of its loops a pipeline runs: "measured" (the default),
+/// "expected", "vectors" or "scalar", for all of them or, as in
+/// "expected,Shade:0=vectors", for one loop of a kernel, by its number. Where
+/// the host says nothing, $PIKO_MAPPINGS does. The results do not depend on it.
+PIKORT_API int32_t pikort_set_mappings(pikort_pipeline *pipeline,
+                                       const char *setting);
 
 /// A stage's primitives. Sums since the latest reset.
 typedef struct pikort_stage_stats {

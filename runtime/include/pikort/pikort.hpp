@@ -105,6 +105,10 @@ public:
   Status stripSize(int64_t primitives) {
     return status(pikort_set_strip_size(handle_, primitives));
   }
+  /// Which versions of its loops run; see pikort_set_mappings.
+  Status mappings(const char *setting) {
+    return status(pikort_set_mappings(handle_, setting));
+  }
   Status loopLimit(int64_t limit) {
     return status(pikort_set_loop_limit(handle_, limit));
   }

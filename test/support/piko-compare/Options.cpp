@@ -88,7 +88,9 @@ Options parseOptions(int argc, char **argv) {
       if (!synthesis)
         throw std::runtime_error(piko::describeWrongSynthesisOptions(text));
       options.synthesis = *synthesis;
-    } else if (name == "--target") {
+    } else if (name == "--mapping-window")
+      options.mappingWindow = std::stod(words.takeValues(name, false)[0]);
+    else if (name == "--target") {
       auto target = piko::parseGPUTarget(words.takeValues(name, false)[0]);
       if (!target || *target == piko::GPUTarget::Auto)
         throw std::runtime_error("expected --target cpu, cuda or gpu-on-cpu");
@@ -124,6 +126,8 @@ Options parseOptions(int argc, char **argv) {
     else if (!readCaseOption(name, words, options.one))
       throw std::runtime_error("unknown option " + name);
   }
+  if (options.mappingWindow)
+    options.synthesis.mappingWindow = *options.mappingWindow;
   if (options.file.empty())
     throw std::runtime_error("expected a file");
   if (options.reference.empty())

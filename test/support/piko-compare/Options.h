@@ -63,6 +63,7 @@ struct Options {
   /// Checking mode, on both sides.
   piko::CheckOptions check;
   piko::SynthesisOptions synthesis;
+  std::optional<double> mappingWindow;
   /// --target gpu-on-cpu, --gpu-threads N (0 = as the stage says), --gpu-seed N,
   /// --gpu-blocks N (0 = as many as there are units), --gpu-chip NAME,..
   piko::GPUOptions gpu;

@@ -24,6 +24,30 @@ LogicalResult OpenBinsOp::verifySymbolUses(SymbolTableCollection &) {
   return verifySource(*this, getSource(), getStageAttr());
 }
 
+LogicalResult TakesVectorsOp::verifySymbolUses(SymbolTableCollection &) {
+  int64_t number = getNumber();
+  if (number < 0 || number >= mostMappings)
+    return emitOpError("expected a number in [0, ")
+           << mostMappings << "), but got " << number;
+  if (std::optional<uint64_t> within = getWithin();
+      within && (int64_t(*within) < 0 || int64_t(*within) >= number))
+    return emitOpError("expected `within` in [0, ")
+           << number << "), but got " << int64_t(*within);
+  auto kernel = getOperation()->getParentOfType<KernelOp>();
+  if (!kernel)
+    return success();
+  WalkResult other = kernel.walk([&](TakesVectorsOp op) {
+    return op != *this && op.getNumber() == getNumber()
+               ? WalkResult::interrupt()
+               : WalkResult::advance();
+  });
+  return other.wasInterrupted()
+             ? emitOpError("expected a number that no other loop of the kernel "
+                           "has, but got ")
+                   << number
+             : success();
+}
+
 /// A value and the storage that it is in are of one record.
 static LogicalResult verifyStored(Operation *op, BinsType bins,
                                   FlatSymbolRefAttr record, StringRef what) {

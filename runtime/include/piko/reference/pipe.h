@@ -476,6 +476,7 @@ public:
   Status setMemoryLimit(int64_t) { return {}; }
   Status setMemoryBudget(int64_t) { return {}; }
   Status setStripSize(int64_t) { return {}; }
+  Status setMappings(const std::string &) { return {}; }
 
   /// Clears the images and runs the pipeline on what was fed.
   Status run() {

@@ -7,6 +7,12 @@
 
 #include "Piko/Dialect/Piko/IR/Piko.h"
 
+namespace piko {
+/// How many loops of a kernel may be held in two versions
+/// (`piko.cpu.takes_vectors`), as the runtime has it.
+constexpr int64_t mostMappings = 16;
+} // namespace piko
+
 #define GET_OP_CLASSES
 #include "Piko/Dialect/Piko/IR/PikoCPUOps.h.inc"
 

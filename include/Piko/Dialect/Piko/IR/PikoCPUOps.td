@@ -221,6 +221,30 @@ def Piko_OpenWriterOp : Piko_CPUOp<"open_writer", [
   }];
 }
 
+def Piko_TakesVectorsOp : Piko_CPUOp<"takes_vectors", [
+    Pure, DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
+  let summary = "whether a unit of work runs a loop as vectors";
+  let description = [{
+    Of a loop that the kernel holds in two versions, both of which do the same:
+    the runtime measures which takes less. Loops have numbers from 0 in the
+    kernel; one that is in the scalar version of another names it, `within`.
+    `vectors` and `scalar` are the cycles that the versions are expected to take
+    for as many turns as there are lanes, and `expected` says that the vectors
+    are expected to be faster.
+
+    ```mlir
+    %0 = piko.cpu.takes_vectors %w {expected, loop = "process, raster.cpp:12",
+                                    number = 0, scalar = 140, vectors = 120}
+    ```
+  }];
+  let arguments = (ins Piko_WriterType:$writer, Piko_I64Attr:$number,
+                       OptionalAttr<Piko_I64Attr>:$within, UnitAttr:$expected,
+                       Piko_I64Attr:$vectors, Piko_I64Attr:$scalar,
+                       StrAttr:$loop);
+  let results = (outs I1:$result);
+  let assemblyFormat = "$writer attr-dict";
+}
+
 def Piko_LocalBinOp : Piko_StorageOp<"local_bin", [
     SingleBlock, NoTerminator,
     DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
