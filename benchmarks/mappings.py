@@ -105,7 +105,7 @@ class Example:
 
 
 class Body:
-    """A body; its frame is timed."""
+    """A body; its frame is timed. It has one kernel that matters."""
 
     def __init__(self, arguments, body):
         self.arguments = arguments
@@ -204,56 +204,83 @@ def measure_settings(case, settings, rounds):
             for setting, kernels in times.items()}
 
 
+class Descent:
+    """The search for the best versions of a kernel's loops: one loop after the
+    other changes, as long as that gains something."""
+
+    def __init__(self, kernel):
+        self.name = kernel["name"]
+        self.mappings = kernel["mappings"]
+        self.expected = {name_of(m): m["runs"] for m in self.mappings}
+        self.choice = dict(self.expected)
+        self.ratios = {}
+        self.isDone = False
+
+    def list_settings(self):
+        """The choice, and those that differ in one loop which it runs."""
+        settings = [(None, self.choice)]
+        for mapping in [] if self.isDone else self.mappings:
+            if is_in_play(mapping, self.choice, self.mappings):
+                name = name_of(mapping)
+                other = ("scalar" if self.choice[name] == "vectors"
+                         else "vectors")
+                settings.append((name, self.choice | {name: other}))
+        return settings
+
+    def take(self, settings, times):
+        """Goes on from the milliseconds of each of these."""
+        for (name, setting), ms in zip(settings[1:], times[1:]):
+            ratio = ms / times[0]
+            self.ratios[name] = (ratio if setting[name] == "vectors"
+                                 else 1 / ratio)
+        fastest = min(range(len(times)), key=times.__getitem__)
+        if times[fastest] > 0.98 * times[0]:
+            self.isDone = True
+        else:
+            self.choice = settings[fastest][1]
+
+
 def measure_case(arguments, case):
-    """For each kernel with a choice: its time by settings, and its loops."""
+    """For each kernel with a choice: its time by settings, and its loops.
+    Kernels change their settings in the same runs."""
+    descents = [Descent(kernel) for kernel in case.run("expected")
+                if kernel["mappings"]]
+    most = 3  # turns; loops that are inside of each other are not more
+    for _ in range(most):
+        lists = [descent.list_settings() for descent in descents]
+        runs = max(map(len, lists), default=0)
+        if runs < 2:
+            break
+        settings = []
+        for run in range(runs):
+            merged = {}
+            for list_ in lists:
+                merged |= list_[run if run < len(list_) else 0][1]
+            settings.append(write_setting(merged))
+        times = measure_settings(case, settings, arguments.rounds)
+        for descent, list_ in zip(descents, lists):
+            descent.take(list_, [times[settings[run]][descent.name]
+                                 for run in range(len(list_))])
+    best = {}
+    for descent in descents:
+        best |= descent.choice
+    names = {"choice": "expected", "best": write_setting(best),
+             "runtime": "measured"}
+    times = measure_settings(case, list(names.values()), arguments.rounds + 1)
     found = []
-    for kernel in case.run("expected"):
-        mappings = kernel["mappings"]
-        if not mappings:
-            continue
-        expected = {name_of(mapping): mapping["runs"] for mapping in mappings}
-        choice, best, ratios = dict(expected), None, {}
-        for _ in range(len(mappings) + 1):
-            neighbours = {}
-            for mapping in mappings:
-                if is_in_play(mapping, choice, mappings):
-                    other = dict(choice)
-                    name = name_of(mapping)
-                    other[name] = ("scalar" if choice[name] == "vectors"
-                                   else "vectors")
-                    neighbours[name] = other
-            settings = {"": choice} | neighbours
-            times = measure_settings(
-                case, [write_setting(s) for s in settings.values()],
-                arguments.rounds)
-            at = {name: times[write_setting(s)][kernel["name"]]
-                  for name, s in settings.items()}
-            if best is None:
-                first = at[""]
-            for name in neighbours:
-                ratio = at[name] / at[""]
-                ratios[name] = (ratio if neighbours[name][name] == "vectors"
-                                else 1 / ratio)
-            fastest = min(at, key=at.get)
-            best = at[fastest]
-            if fastest == "" or at[fastest] > 0.99 * at[""]:
-                best = at[""]
-                break
-            choice = settings[fastest]
-        final = [write_setting(expected), write_setting(choice), "measured"]
-        times = {setting: kernels[kernel["name"]] for setting, kernels in
-                 measure_settings(case, final, arguments.rounds + 2).items()}
-        best = min(times[final[0]], times[final[1]], times["measured"])
+    for descent in descents:
+        at = {key: times[setting][descent.name]
+              for key, setting in names.items()}
+        least = min(at.values())
         found.append({
-            "case": case.name, "kernel": kernel["name"], "ms": best,
-            "choice": times[final[0]] / best - 1,
-            "runtime": times["measured"] / best - 1,
+            "case": case.name, "kernel": descent.name, "ms": least,
+            "choice": at["choice"] / least - 1,
+            "runtime": at["runtime"] / least - 1,
             "loops": [{"name": name_of(m), "loop": m["loop"],
-                       "number": m["number"],
                        "expected": m["expected_ratio"],
-                       "expects": m["expected"],
-                       "measured": ratios.get(name_of(m)),
-                       "best": choice[name_of(m)]} for m in mappings]})
+                       "measured": descent.ratios.get(name_of(m)),
+                       "best": descent.choice[name_of(m)]}
+                      for m in descent.mappings]})
     return found
 
 

@@ -163,15 +163,22 @@ LaneCandidate::Refusal LaneCandidate::findRefusal(const IterationLanes &lanes,
   return {isFasterInside ? "iterations of a loop in it are" : ""};
 }
 
+double LaneCandidate::getShareOfWindow(bool isRefused) {
+  int64_t operations = 0;
+  loop.walk([&](Operation *) { ++operations; });
+  // What is held in vain takes a compiler's time: vectors more than others.
+  double many = isRefused ? 400 : 1200;
+  // What is known of boxes is in their estimates already: few are large.
+  double ofKind = !ofPrimitives && isOverBox(loop) ? 1.0 / 3 : 1;
+  return ofKind * std::min(1.0, many / double(operations));
+}
+
 bool LaneCandidate::isDoubtful(const IterationLanes &lanes,
                                const FlatLoop &flat, bool isRefused) {
   Versions found = estimate(lanes, flat, getCycles(lanes.getLaneCount()));
-  // What is known of boxes is already in the estimate: few of them are large.
-  constexpr double boxWindow = 1.25;
-  double above =
-      !ofPrimitives && isOverBox(loop) ? std::min(window, boxWindow) : window;
-  if (found.vectors > above * found.scalar ||
-      (!isRefused && window * found.vectors < found.scalar))
+  double near = std::pow(window, getShareOfWindow(isRefused));
+  if (found.vectors > near * found.scalar ||
+      (!isRefused && near * found.vectors < found.scalar))
     return false;
   found.expected = !isRefused;
   versions = found;

@@ -52,6 +52,9 @@ private:
   /// Whether the estimates are too close to say which version is faster.
   bool isDoubtful(const IterationLanes &lanes, const FlatLoop &flat,
                   bool isRefused);
+  /// How much of the window is the loop's, on a logarithmic scale: less for
+  /// large bodies.
+  double getShareOfWindow(bool isRefused);
   /// Whether two vectors at once are expected to take much less.
   bool paysInPairs(const IterationLanes &lanes, const FlatLoop &flat) const;
   void remarkVectors(const IterationLanes &lanes, const FlatLoop &flat);

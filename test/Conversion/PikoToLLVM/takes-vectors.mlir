@@ -1,9 +1,9 @@
-// RUN: piko-opt --convert-piko-to-llvm %s | FileCheck %s
+// RUN: piko-opt --piko-form-program --convert-piko-to-openmp --convert-piko-to-llvm --canonicalize %s | FileCheck %s
 
 piko.record @F {"x" : i32 at 0} size 4 align 4
 
 // A bit of the writer says which version a unit runs.
-// CHECK-LABEL: func.func private @P.kernel_k
+// CHECK-LABEL: func.func private @P.k(
 // CHECK:         %[[W:.*]] = llvm.call @pikoir_open
 // CHECK:         %[[AT:.*]] = llvm.getelementptr inbounds %[[W]][32]
 // CHECK:         %[[BITS:.*]] = llvm.load %[[AT]] {{.*}}: !llvm.ptr -> i64
@@ -27,16 +27,12 @@ piko.pipeline @P rank 1 {
     %1 = piko.cpu.takes_vectors %w {loop = "inside", number = 1, scalar = 30, vectors = 40, within = 0}
     %0 = piko.cpu.takes_vectors %w {expected, loop = "outside", number = 0, scalar = 10, vectors = 20}
     scf.if %1 {
-      piko.store %i0, @out[%c0] "x" : i32
+      piko.store %i0, @out[%c0 : index] "x" : i32
     }
     scf.if %0 {
-      piko.store %i0, @out[%c0] "x" : i32
+      piko.store %i0, @out[%c0 : index] "x" : i32
     }
     piko.cpu.close_writer %w
     piko.storage.close_bins %bins : !piko.bins<@F>
-  }
-  piko.program {
-    %f = piko.feed 0 : !piko.items<@F>
-    piko.launch @k(%f) : (!piko.items<@F>) -> ()
   }
 }
