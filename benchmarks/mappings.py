@@ -51,7 +51,8 @@ def parse_arguments():
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("names", nargs="*", metavar="NAME",
-                        help="examples and bodies (all)")
+                        help="examples, their pipelines (raster.Fused) and bodies "
+                             "(all)")
     parser.add_argument("--bin", default=f"{ROOT}/build/bin")
     parser.add_argument("--lib", default=f"{ROOT}/build/lib")
     parser.add_argument("--work", default=f"{ROOT}/build/mappings")
@@ -88,8 +89,8 @@ class Example:
             f"{self.arguments.bin}/piko-render", self.file, *self.scene,
             "--pipe", self.pipe, "--cpu", self.arguments.cpu, "--json",
             "--lights", self.arguments.lights, "--threads", "1",
-            "--warmup", "3", "--frames", str(self.arguments.frames),
-            "--seconds", "0.6",
+            "--warmup", "2", "--frames", str(self.arguments.frames),
+            "--seconds", "0.4",
             "--mapping-window", EVERYTHING, "--mappings", setting]))
         for kernel in report["kernels"]:
             for mapping in kernel.get("mappings", []):
@@ -164,11 +165,14 @@ def print_sensitivities(arguments, options):
 def find_cases(arguments):
     wanted = set(arguments.names)
     for example in EXAMPLES:
-        if wanted and example not in wanted:
+        if wanted and not any(name.split(".")[0] == example
+                              for name in wanted):
             continue
         file = f"{ROOT}/examples/{example}/{example}.piko.cpp"
         for pipe in call([f"{arguments.bin}/pikoc", "--list-pipes",
                           file]).split():
+            if wanted and not wanted & {example, f"{example}.{pipe}"}:
+                continue
             yield Example(arguments, example, pipe)
     for body in find_bodies():
         if not wanted or body in wanted:

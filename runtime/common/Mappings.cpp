@@ -95,7 +95,8 @@ static void choose(pikort_pipeline &p,
 
 void pikort_pipeline::readMappingSetting() {
   const char *text = std::getenv("PIKO_MAPPINGS");
-  if (!text || !*text)
+  // It is for all pipelines of a process: what has no choice takes no part.
+  if (!text || !*text || mappings.empty())
     return;
   SettingReader reader(*this);
   try {
