@@ -5,6 +5,7 @@
 #include "LaneCycles.h"
 #include "LaneLatency.h"
 #include "Lanes.h"
+#include "LoopStreams.h"
 #include "SequentialLoops.h"
 
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
@@ -119,7 +120,9 @@ double LaneCandidate::getScalarCost(const IterationLanes &lanes,
                                     const Cycles &cycles) {
   if (ofPrimitives)
     return getCostInside(lanes, cost);
-  return (isOverBox(loop) ? cycles.boxRow : 1) * cost.serial;
+  // LLVM makes its own vectors of straight loops, without masks.
+  double along = hasVectorsAlong(loop) ? cycles.along : 1;
+  return (isOverBox(loop) ? cycles.boxRow : 1) * cost.serial / along;
 }
 
 LaneCandidate::Versions LaneCandidate::estimate(const IterationLanes &lanes,
@@ -166,8 +169,12 @@ LaneCandidate::Refusal LaneCandidate::findRefusal(const IterationLanes &lanes,
 double LaneCandidate::getShareOfWindow(bool isRefused) {
   int64_t operations = 0;
   loop.walk([&](Operation *) { ++operations; });
-  // What is held in vain takes a compiler's time: vectors more than others.
+  // What is held in vain takes a compiler's time, vectors more than others: a
+  // rasterizer's whole body, of 1,300 operations, half of what all took.
   double many = isRefused ? 400 : 1200;
+  constexpr int64_t most = 1000;
+  if (isRefused && operations > most)
+    return 0;
   // What is known of boxes is in their estimates already: few are large.
   double ofKind = !ofPrimitives && isOverBox(loop) ? 1.0 / 3 : 1;
   return ofKind * std::min(1.0, many / double(operations));
@@ -176,7 +183,10 @@ double LaneCandidate::getShareOfWindow(bool isRefused) {
 bool LaneCandidate::isDoubtful(const IterationLanes &lanes,
                                const FlatLoop &flat, bool isRefused) {
   Versions found = estimate(lanes, flat, getCycles(lanes.getLaneCount()));
-  double near = std::pow(window, getShareOfWindow(isRefused));
+  double share = getShareOfWindow(isRefused);
+  if (share == 0)
+    return false;
+  double near = std::pow(window, share);
   if (found.vectors > near * found.scalar ||
       (!isRefused && near * found.vectors < found.scalar))
     return false;
