@@ -144,7 +144,7 @@ LaneCandidate::Refusal LaneCandidate::findRefusal(const IterationLanes &lanes,
   if (!ofPrimitives && isOverBox(loop) &&
       cost.vectors >
           getScalarCost(lanes, cost, getCycles(lanes.getLaneCount())))
-    return {"a row of a box may have few pixels"};
+    return {"a box may have few pixels"};
   bool isFaster = ofPrimitives ? isSurelyFaster(cost, lanes.getLaneCount())
                                : cost.isWorthwhile();
   // Flattened nests make up for little else that was not foreseen.
