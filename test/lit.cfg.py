@@ -76,6 +76,9 @@ quick_host = host + (["-include-pch", config.host_header] if config.host_header 
 # Kernels of an application's own, in CUDA C++, without a toolkit.
 ptx = [os.path.join(config.llvm_tools, "clang++"), "-x cuda -std=c++20 -O2 -S"]
 ptx += ["--cuda-device-only --cuda-gpu-arch=sm_70 -nocudainc -nocudalib"]
+# A toolkit that Clang finds would say which PTX; the one that there is not gives
+# every machine the same, and sm_70 takes no PTX before 6.0.
+ptx += ["--cuda-path=/nonexistent --cuda-feature=+ptx63"]
 ptx += ["-ffp-contract=off -Wno-unknown-cuda-version"]
 ptx += ["-include __clang_cuda_builtin_vars.h"]
 ptx += [f"'-D__{it}__=__attribute__(({it}))'" for it in ("global", "device", "host")]
