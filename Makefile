@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #
-# Four commands matter, and each works on a fresh Debian 12 machine:
+# Five commands matter, and each works on a fresh Debian 12 machine:
 #   make demo     render the bunny; says where the image is
 #   make check    build everything and run every test
 #   make bench    run the benchmarks, which takes twenty minutes; says where
 #                 the page is (BENCH=--quick: one minute; benchmarks/README.md)
+#   make bench-gate BASE=COMMIT   fail where something takes over 5 % longer than
+#                 it did at that commit; ten minutes and a build of it
 #   make charts   chart speed against error, which takes ten minutes; says
 #                 where the page is (CHARTS=--quick: two minutes)
 # On a machine with a card of NVIDIA's, one more:
@@ -24,8 +26,8 @@ BUNNY := /usr/share/glmark2/models/bunny.obj
 PIPE ?= Fused
 
 .DELETE_ON_ERROR:
-.PHONY: all bench build charts check clean configure demo deps docs format \
-  gpu-bench lint
+.PHONY: all bench bench-gate build charts check clean configure demo deps docs format \
+  gpu-bench lanes lint
 
 all: build
 
@@ -51,6 +53,12 @@ bench: configure
 	  --target piko-render pikoc piko-runtime-benchmark
 	@benchmarks/bench.py --bin $(BUILD)/bin --lib $(CURDIR)/$(BUILD)/lib \
 	  --out $(BUILD)/bench $(BENCH)
+
+bench-gate: configure
+	$(if $(BASE),,$(error expected BASE=COMMIT))
+	@cmake --build $(BUILD) --parallel $(JOBS) \
+	  --target piko-render pikoc pikort
+	@benchmarks/bench-gate.py $(GATE) --bin $(BUILD)/bin --out $(BUILD)/gate $(BASE)
 
 gpu-bench: configure
 	@cmake --build $(BUILD) --parallel $(JOBS) \
@@ -78,6 +86,11 @@ lint: build
 
 format:
 	@utils/lint.py format --fix
+
+# The table of what lanes are given of each kernel.
+lanes: configure
+	@cmake --build $(BUILD) --parallel $(JOBS) --target pikoc
+	@test/mappings/lanes.py --pikoc $(BUILD)/bin/pikoc --write
 
 docs: deps
 	@utils/make-reference.py

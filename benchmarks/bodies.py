@@ -23,9 +23,7 @@ from concurrent.futures import ThreadPoolExecutor
 from commands import call
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-BODIES = f"{ROOT}/benchmarks/bodies"
-CXX = ["-std=c++20", "-O2", "-ffp-contract=off", "-DPIKO_BODY", "-w",
-       f"-I{ROOT}/runtime/include", f"-I{BODIES}"]
+CXX = ["-std=c++20", "-O2", "-ffp-contract=off", "-DPIKO_BODY", "-w"]
 # Those that pikoc's code is compared with, by name.
 REFERENCES = {
     "g++ -O2": ["g++"],
@@ -64,13 +62,17 @@ def parse_arguments():
     return arguments
 
 
-def find_bodies():
+def find_bodies(root=ROOT):
     return sorted(os.path.basename(file).removesuffix(".piko.cpp")
-                  for file in glob.glob(f"{BODIES}/*.piko.cpp"))
+                  for file in glob.glob(get_source("*", root)))
 
 
-def get_source(body):
-    return f"{BODIES}/{body}.piko.cpp"
+def get_source(body, root=ROOT):
+    return f"{root}/benchmarks/bodies/{body}.piko.cpp"
+
+
+def get_includes(root=ROOT):
+    return [f"-I{root}/runtime/include", f"-I{root}/benchmarks/bodies"]
 
 
 def get_program(arguments, body, build):
@@ -96,18 +98,18 @@ def read(file):
         return stream.read()
 
 
-def build_compiled(arguments, body):
+def build_compiled(arguments, body, builds=COMPILED, root=ROOT):
     """One host, with the object of each build."""
-    source = get_source(body)
+    source = get_source(body, root)
     header, host = (f"{arguments.work}/{body}.{end}" for end in ("h", "host.o"))
     before = read(header)
-    for build, options in COMPILED.items():
+    for build, options in builds.items():
         program = get_program(arguments, body, build)
         call([f"{arguments.bin}/pikoc", source, "-o", f"{program}.o",
               "--header", header, "--cpu", arguments.cpu, *options])
         if read(header) != before or not is_newer(host, source):
-            call(["g++", *CXX, f'-DPIKO_BODY_HEADER="{header}"', "-c", source,
-                  "-o", host])
+            call(["g++", *CXX, *get_includes(root),
+                  f'-DPIKO_BODY_HEADER="{header}"', "-c", source, "-o", host])
             before = read(header)
         call(["g++", host, f"{program}.o", f"-L{arguments.lib}", "-lpikort",
               get_openmp(), f"-Wl,-rpath,{arguments.lib}", "-o", program])
@@ -118,7 +120,8 @@ def build_reference(arguments, body, build):
     source = get_source(body)
     if is_newer(program, source):
         return  # the headers that they share change too seldom to look
-    call([*REFERENCES[build], *arguments.flags, *CXX, source, "-o", program])
+    call([*REFERENCES[build], *arguments.flags, *CXX, *get_includes(),
+          source, "-o", program])
 
 
 def measure_rounds(arguments, body, builds, threads=1):

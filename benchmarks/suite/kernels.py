@@ -2,6 +2,7 @@
 """The kernels of the examples: all lanes against one."""
 
 import json
+import shlex
 
 from commands import call
 from suite.section import Rounds, Section, draw_groups
@@ -20,20 +21,27 @@ PIPELINES = {
 ONE, ALL = "one lane", "all lanes"
 
 
-def measure_once(options, example, lanes):
-    """Milliseconds in each kernel, without what joins and waiting took."""
-    pipe, more = PIPELINES[example]
+def get_source(root, example):
+    return f"{root}/examples/{example}/{example}.piko.cpp"
+
+
+def render(options, example, pipe, more=()):
+    """What piko-render says of frames on one thread."""
     scene = f"{options.root}/{KNOT}" if example == "reyes" else options.scene[0]
-    command = [f"{options.bin}/piko-render",
-               f"{options.root}/examples/{example}/{example}.piko.cpp", *scene.split(),
-               *more, "--pipe", pipe, "--threads", "1", "--json",
-               "--cpu", options.cpu, "--lights", "10"]
+    command = [f"{options.bin}/piko-render", get_source(options.root, example),
+               *shlex.split(scene), *PIPELINES[example][1], "--pipe", pipe,
+               "--threads", "1", "--json", "--cpu", options.cpu, "--lights", "10"]
     for option in ("warmup", "frames", "seconds"):
         command += [f"--{option}", str(getattr(options, option))]
-    if lanes == ONE:
-        command += ["--without", "vectorize"]
+    return json.loads(call([*command, *more]))
+
+
+def measure_once(options, example, lanes):
+    """Milliseconds in each kernel, without what joins and waiting took."""
+    report = render(options, example, PIPELINES[example][0],
+                    ["--without", "vectorize"] if lanes == ONE else [])
     return {kernel["name"]: kernel["ms"] - kernel["join_ms"] - kernel["wait_ms"]
-            for kernel in json.loads(call(command))["kernels"]}
+            for kernel in report["kernels"]}
 
 
 def measure_kernels(options, example):
