@@ -18,6 +18,8 @@ split-file. Substitutions:
   %compare_targets
                  piko-compare on all targets: the first of them runs all cases, and
                  the others take turns, but where all tests are asked for
+  %compare_checked
+                 the same on the targets that have checking mode
   %other_cxx     another C++ compiler, where one can use this build's runtime
   %cxx_host      compiler and flags that build a host of compiled pipelines
   %cxx_quick_host
@@ -102,11 +104,17 @@ targets = ["cpu", "gpu-on-cpu", "cuda"]
 if platform.machine() in ("x86_64", "AMD64"):
     targets[1:1] = ["x86-64-v3", "x86-64"]
 test_driver = os.path.join(config.piko_binary_root, "lib", "libpiko-test-driver.so")
-compare_targets = [f"env PIKO_CUDA_DRIVER={test_driver} PIKO_TEST_DRIVER_SEED=2"]
-compare_targets += ["piko-compare --targets", ",".join(targets)]
-compare_targets += [] if all_tests else ["--spread"]
+
+
+def compare_on(names):
+    command = f"env PIKO_CUDA_DRIVER={test_driver} PIKO_TEST_DRIVER_SEED=2"
+    command += f" piko-compare --gpu-threads 32 --targets {','.join(names)}"
+    return command if all_tests else command + " --spread"
+
+
 config.substitutions += [
-    ("%compare_targets", " ".join(compare_targets)),
+    ("%compare_targets", compare_on(targets)),
+    ("%compare_checked", compare_on(targets[:-1])),
     ("%piko_include", include),
     ("%examples", os.path.join(config.piko_source_root, "examples")),
     ("%benchmarks", os.path.join(config.piko_source_root, "benchmarks")),

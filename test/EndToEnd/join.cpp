@@ -2,9 +2,9 @@
 //
 // A branch that joins: primitives on both paths arrive in lineage order, which
 // the sum of each pixel shows, because it is not associative.
-// RUN: piko-compare %s --count 5000 | FileCheck %s
-// RUN: piko-compare %s --count 1000 --runs 1 --strip 7 | FileCheck %s
-// CHECK: equal
+// RUN: %compare_targets %s --cases %s
+// CASE: --count 5000
+// CASE: --count 1000 --strip 7
 #include "Inputs/ports.h"
 
 struct Pixel {

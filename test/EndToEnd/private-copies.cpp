@@ -2,9 +2,7 @@
 //
 // Threads reduce to private copies: on any number of threads, and in lanes, the
 // state is what atomic operations would have made of it.
-// RUN: sed -n 's|^// CASE: ||p' %s > %t.cases
-// RUN: piko-compare %s --cases %t.cases --threads 1 2 4 7 | FileCheck %s
-// CHECK-COUNT-7: {{^equal$}}
+// RUN: %compare_targets %s --cases %s --threads 1 2 4 7
 // CASE: --pipe Nearest --count 30000 --domain 67 35
 // CASE: --pipe Nearest --count 3 --domain 670 350
 // CASE: --pipe Boxes --count 4000 --domain 67 35

@@ -2,11 +2,7 @@
 //
 // Stages that compute for several primitives at once give the reference executor's
 // numbers, and its errors.
-// RUN: sed -n 's|^// CASE: ||p' %s > %t.cases
-// RUN: piko-compare %s --cases %t.cases --runs 1 | FileCheck %s --check-prefix=EQUAL
-// RUN: %if x86_64 %{ piko-compare %s --cases %t.cases --runs 1 --cpu x86-64 | FileCheck %s --check-prefix=EQUAL %}
-// RUN: %if x86_64 %{ piko-compare %s --cases %t.cases --runs 1 --cpu x86-64-v3 | FileCheck %s --check-prefix=EQUAL %}
-// EQUAL-COUNT-7: {{^equal$}}
+// RUN: %compare_targets %s --cases %s --runs 1
 // CASE: --pipe Averages --domain 67 35 --count 2000
 // CASE: --pipe Addresses --domain 67 35 --count 2000
 // CASE: --pipe Repeats --domain 67 35 --count 2000

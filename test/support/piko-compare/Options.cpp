@@ -164,6 +164,8 @@ Options parseOptions(int argc, char **argv) {
       one.cpu = words.takeValues(name, false)[0];
     else if (name == "--tolerance")
       options.tolerance = std::stod(words.takeValues(name, false)[0]);
+    else if (name == "--stops")
+      options.stops = true;
     else if (name == "--spread")
       options.spread = true;
     else if (name == "--owners")

@@ -68,6 +68,9 @@ struct Options {
   /// Cases take turns with the other targets, each of which runs one case in as many
   /// as there are of them, or one case.
   bool spread = false;
+  /// All cases are to stop, with a message that is the same in all runs on all
+  /// targets.
+  bool stops = false;
   /// How much LLVM optimizes its code: -O0 to -O3. What runs beside a GPU, or plays
   /// one, is not optimized unless asked for: it is the passes that divide kernels
   /// among threads which are tested there, and the kernels' PTX is optimized.

@@ -11,7 +11,7 @@
 //                [--targets NAME,.. [--spread]] [--target cpu|gpu-on-cpu|cuda] [--cpu NAME]
 //                [--gpu-threads N] [--gpu-seed N] [--gpu-blocks N]
 //                [--gpu-chip NAME,..] [--without PASS,..] [-O0] [--no-cache]
-//                [--owners]
+//                [--owners] [--stops]
 //
 // Options.h says what the options mean, Run.h what the input is. With --cases
 // each line of that file is a case, with the options --pipe to --budget; a
@@ -37,6 +37,7 @@
 
 #include <cstdio>
 #include <cstdlib>
+#include <set>
 #include <stdexcept>
 #include <unistd.h>
 
@@ -57,6 +58,8 @@ public:
   bool compare(const Case &input, Result expected, Programs &programs);
 
   bool isStrict = true;
+  /// The messages of runs that stopped, empty for those that did not.
+  std::set<std::string> errors;
 
 private:
   bool acceptMeasured(Result &expected, Run &compiled);
@@ -109,8 +112,9 @@ bool TargetRun::compare(const Case &input, Result expected,
   bool equal = isStrict || acceptMeasured(expected, compiled);
   for (int count : threads)
     for (int run = 0; run < runs; ++run) {
-      std::vector<std::string> differences =
-          compareResults(expected, compiled(count));
+      Result actual = compiled(count);
+      errors.insert(actual.error);
+      std::vector<std::string> differences = compareResults(expected, actual);
       equal &= differences.empty();
       for (const std::string &difference : differences)
         say(std::to_string(count) + " threads, run " + std::to_string(run) +
@@ -137,6 +141,15 @@ void printVerdict(const Result &expected, bool isStrict,
     std::printf("differs%s\n", names.c_str());
 }
 
+/// Whether the reference stops, and all else with one message, which may be shorter
+/// than its own.
+bool stopAlike(const Result &expected, const std::set<std::string> &errors) {
+  if (!expected.error.empty() && errors.size() == 1 && !errors.begin()->empty())
+    return true;
+  std::printf("expected all to stop with the same message\n");
+  return false;
+}
+
 /// Whether a case is one of those that a target runs. With --spread the others take
 /// turns with the cases, and where there are more of them, with each other.
 bool runs(const Options &options, size_t target, size_t place, size_t count) {
@@ -156,6 +169,7 @@ bool compare(const Options &options, const Case &input, Programs &programs,
     throw std::runtime_error("the reference executor wrote nothing");
   Report report;
   bool isStrict = true;
+  std::set<std::string> errors;
   std::vector<std::string> equal, different;
   for (const Target &target : options.targets) {
     if (!runs(options, size_t(&target - options.targets.data()), place, count))
@@ -168,12 +182,16 @@ bool compare(const Options &options, const Case &input, Programs &programs,
       if (target.name.empty())
         throw;
       report.add(target.name, "error: " + std::string(error.what()));
+      errors.insert("");
     }
     isStrict &= run.isStrict;
+    errors.merge(run.errors);
     (isEqual ? equal : different).push_back(target.name);
   }
   report.print();
   printVerdict(expected, isStrict, equal, different);
+  if (options.stops)
+    return stopAlike(expected, errors);
   return different.empty();
 }
 

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// What cycles.mlir means: a stage that feeds itself at once, and one that takes
-// lists and feeds itself in rounds.
-#include "ports.h"
+// A stage that feeds itself at once, and one that takes lists and feeds itself in
+// rounds.
+// RUN: %compare_targets %s --cases %s
+// CASE: --count 300
+// CASE: --count 300 --strip 7
+#include "Inputs/ports.h"
 
 struct Pixel {
   float sum = 0;

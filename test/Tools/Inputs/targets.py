@@ -17,6 +17,8 @@ import re
 import sys
 
 TARGETS = ["cpu", "x86-64-v3", "x86-64", "gpu-on-cpu", "cuda"]
+#: By substitutions of lit.cfg.py.
+NAMED = {"%compare_targets": TARGETS, "%compare_checked": TARGETS[:-1]}
 SUFFIXES = {".cpp", ".mlir", ".test"}
 
 
@@ -57,8 +59,15 @@ def get_values(words, option):
 def get_targets(command):
     """What a command runs pipelines on."""
     words = command.split()
-    if "%compare_targets" in words:
-        return TARGETS
+    for name, targets in NAMED.items():
+        if name in words:
+            return targets
+    if "pikoc" in words and get_values(words, "--header"):
+        # What is linked to a program.
+        return get_values(words, "--cpu") or ["x86-64-v3"]
+    if "PIKO_CUDA_DRIVER=%test_driver" in words and \
+            any(w.startswith("./") for w in words):
+        return ["cuda"]
     if any(w.endswith("compare-targets.py") for w in words):
         if "--blocks" in words:
             return ["gpu-on-cpu"]
@@ -79,8 +88,9 @@ def check(path):
     text = path.read_text()
     runs = {name_target(t) for c in read_commands(text) for t in get_targets(c)}
     explained, faults = set(), []
-    for names, reason in re.findall(r"\bHOLE: *([^:\n]*)(.*)", text):
-        if not re.match(r": +\w+ \w+", reason):
+    for names, reason in re.findall(r"^(?:// )?HOLE: *([^:\n]*)(.*)", text,
+                                    re.MULTILINE):
+        if not re.match(r": +\S+ \S+", reason):
             faults.append(f"HOLE: {names}: expected a reason")
         for name in re.split(r",\s*", names.strip()):
             if name not in TARGETS:
