@@ -2,7 +2,7 @@
 #
 # Four commands matter, and each works on a fresh Debian 12 machine:
 #   make demo     render the bunny; says where the image is
-#   make check    build everything and run every test
+#   make check    build everything and run the tests (check-all: more of them)
 #   make bench    run the benchmarks, which takes twenty minutes; says where
 #                 the page is (BENCH=--quick: one minute; benchmarks/README.md)
 #   make charts   chart speed against error, which takes ten minutes; says
@@ -24,7 +24,7 @@ BUNNY := /usr/share/glmark2/models/bunny.obj
 PIPE ?= Fused
 
 .DELETE_ON_ERROR:
-.PHONY: all bench build charts check clean configure demo deps docs format \
+.PHONY: all bench build charts check check-all clean configure demo deps docs format \
   gpu-bench lint
 
 all: build
@@ -69,6 +69,11 @@ charts: configure
 
 check: build
 	@ctest --test-dir $(BUILD) --output-on-failure --parallel $(JOBS)
+
+# What says the same of more, or takes long, too.
+check-all: build
+	@PIKO_TEST_ALL=1 ctest --test-dir $(BUILD) -C all --output-on-failure \
+	  --parallel $(JOBS)
 
 # Formatting, licence headers and paths (also part of `make check`), then
 # clang-tidy over the whole project.

@@ -16,9 +16,9 @@
 // CASE: --pipe Chain --domain 67 35 --count 2000
 // CASE: --pipe Large --domain 67 35 --count 500
 // CASE: --pipe Whole --domain 67 35 --count 500
-// RUN: piko-compare %s --pipe Chain --domain 67 35 --count 500 --without fuse-stages | FileCheck %s
-// RUN: piko-compare %s --pipe Large --domain 67 35 --count 500 --without infer-directives | FileCheck %s
-// RUN: piko-compare %s --pipe Whole --domain 67 35 --count 500 --without test-early,own-pixels | FileCheck %s
+// RUN: %if all %{ piko-compare %s --pipe Chain --domain 67 35 --count 500 --without fuse-stages | FileCheck %s %}
+// RUN: %if all %{ piko-compare %s --pipe Large --domain 67 35 --count 500 --without infer-directives | FileCheck %s %}
+// RUN: %if all %{ piko-compare %s --pipe Whole --domain 67 35 --count 500 --without test-early,own-pixels | FileCheck %s %}
 // RUN: not piko-compare %s --pipe Chain --without fusion 2>&1 | FileCheck %s --check-prefix=WRONG
 // WRONG: --without: expected passes of pre-schedule, infer-directives, {{.*}} but got 'fusion'
 // CHECK: equal

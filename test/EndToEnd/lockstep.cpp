@@ -18,7 +18,7 @@
 // CASE: --pipe Changes --count 400
 // CASE: --pipe ChangesOfAll --count 400
 // CASE: --pipe ChangesOfItems --count 400
-// RUN: piko-compare %s --pipe Nearest --count 400 --runs 1 --without vectorize -O0 | FileCheck %s
+// RUN: %if all %{ piko-compare %s --pipe Nearest --count 400 --runs 1 --without vectorize -O0 | FileCheck %s %}
 // CHECK: equal
 // RUN: not piko-compare %s --pipe Outside --count 400 --runs 1 --threads 2 | FileCheck %s --check-prefix=OUTSIDE
 // OUTSIDE: got: stage 'stage', bin 0: expected an index into 'in' in [0, 400), but got 405

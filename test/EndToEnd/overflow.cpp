@@ -3,7 +3,7 @@
 // Tests of whether a sum, a difference or a product leaves its type, of which an
 // optimizer makes operations with overflow.
 // RUN: %compare_targets %s --cases %s --runs 1
-// RUN: piko-compare %s --cases %s --runs 1 --without vectorize -O0
+// RUN: %if all %{ piko-compare %s --cases %s --runs 1 --without vectorize -O0 %}
 // CASE: --pipe Narrow --count 640 --wide
 // CASE: --pipe Wide --count 640 --wide
 #include <piko.h>

@@ -4,7 +4,7 @@
 // all styles: four turns share the inner loop where none sees it, and the others
 // keep their order.
 // RUN: %compare_targets %s --cases %s --runs 1
-// RUN: piko-compare %s --cases %s --runs 1 --without vectorize -O0
+// RUN: %if all %{ piko-compare %s --cases %s --runs 1 --without vectorize -O0 %}
 // CASE: --pipe Product --count 7
 // CASE: --pipe Whiles --count 7
 // CASE: --pipe Unsigneds --count 8

@@ -12,7 +12,7 @@
 // CASE: --pipe Meets --domain 67 35 --count 320
 // CASE: --pipe Nests --domain 67 35 --count 320
 // CASE: --pipe Lists --domain 67 35 --count 320
-// RUN: piko-compare %s --cases %s --runs 1 --without vectorize -O0
+// RUN: %if all %{ piko-compare %s --cases %s --runs 1 --without vectorize -O0 %}
 //
 // RUN: pikoc %s --pipe EmitsInLoops --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=VECTORS
 // RUN: pikoc %s --pipe Rows --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=VECTORS

@@ -10,7 +10,7 @@
 // CASE: --pipe Tests --domain 67 35 --count 2000
 // CASE: --pipe Kinds --domain 67 35 --count 2000
 // CASE: --pipe Olds --domain 67 35 --count 2000
-// RUN: piko-compare %s --pipe Tests --domain 67 35 --count 2000 --runs 1 --without vectorize -O0 | FileCheck %s
+// RUN: %if all %{ piko-compare %s --pipe Tests --domain 67 35 --count 2000 --runs 1 --without vectorize -O0 | FileCheck %s %}
 // CHECK: equal
 // RUN: not piko-compare %s --pipe Outside --domain 67 35 --count 2000 --runs 1 --threads 2 | FileCheck %s --check-prefix=OUTSIDE
 // OUTSIDE: got: stage 'stage', bin 0: expected an index into 'in' in [0, 2000), but got 2013
