@@ -2,7 +2,7 @@
 #
 # Five commands matter, and each works on a fresh Debian 12 machine:
 #   make demo     render the bunny; says where the image is
-#   make check    build everything and run every test
+#   make check    build everything and run the tests (check-all: more of them)
 #   make bench    run the benchmarks, which takes twenty minutes; says where
 #                 the page is (BENCH=--quick: one minute; benchmarks/README.md)
 #   make bench-gate BASE=COMMIT   fail where something takes over 5 % longer than
@@ -26,8 +26,8 @@ BUNNY := /usr/share/glmark2/models/bunny.obj
 PIPE ?= Fused
 
 .DELETE_ON_ERROR:
-.PHONY: all bench bench-gate build charts check clean configure demo deps docs format \
-  gpu-bench lanes lint
+.PHONY: all bench bench-gate build charts check check-all clean configure demo deps \
+  docs format gpu-bench lanes lint
 
 all: build
 
@@ -77,6 +77,11 @@ charts: configure
 
 check: build
 	@ctest --test-dir $(BUILD) --output-on-failure --parallel $(JOBS)
+
+# What says the same of more, or takes long, too.
+check-all: build
+	@PIKO_TEST_ALL=1 ctest --test-dir $(BUILD) -C all --output-on-failure \
+	  --parallel $(JOBS)
 
 # Formatting, licence headers and paths (also part of `make check`), then
 # clang-tidy over the whole project.

@@ -15,6 +15,11 @@ split-file. Substitutions:
   %cmake         the CMake that configured this build
   %piko          the build tree, which find_package(Piko) can use
   %cxx           the C++ compiler of this build
+  %compare_targets
+                 piko-compare on all targets: the first of them runs all cases, and
+                 the others take turns, but where all tests are asked for
+  %compare_checked
+                 the same on the targets that have checking mode
   %other_cxx     another C++ compiler, where one can use this build's runtime
   %cxx_host      compiler and flags that build a host of compiled pipelines
   %cxx_quick_host
@@ -30,9 +35,10 @@ split-file. Substitutions:
                  the same behind a precompiled piko.h, for a file that includes
                  it first and whose options it does not depend on
 
-Features: `bunny` where that mesh is installed, `gpu` where an NVIDIA driver
-is, `ptxas` where NVIDIA's assembler is, `chromium` where that browser is, `asan` and `tsan` in builds with that
-sanitizer.
+PIKO_TEST_ALL=1 asks for all tests, as `make check-all` does. Features: `all` where
+that is so, `bunny` where that mesh is installed, `gpu` where an NVIDIA driver
+is, `ptxas` where NVIDIA's assembler is, `chromium` where that browser is, `asan` and `tsan` in
+builds with that sanitizer.
 """
 
 import glob
@@ -96,7 +102,22 @@ if config.sanitize:
     if config.archer:
         link_host += ["-Wl,--no-as-needed", config.archer]
         link_host.append("-Wl,-rpath," + os.path.dirname(config.archer))
+all_tests = os.environ.get("PIKO_TEST_ALL", "0") != "0"
+targets = ["cpu", "gpu-on-cpu", "cuda"]
+if platform.machine() in ("x86_64", "AMD64"):
+    targets[1:1] = ["x86-64-v3", "x86-64"]
+test_driver = os.path.join(config.piko_binary_root, "lib", "libpiko-test-driver.so")
+
+
+def compare_on(names):
+    command = f"env PIKO_CUDA_DRIVER={test_driver} PIKO_TEST_DRIVER_SEED=2"
+    command += f" piko-compare --gpu-threads 32 --targets {','.join(names)}"
+    return command if all_tests else command + " --spread"
+
+
 config.substitutions += [
+    ("%compare_targets", compare_on(targets)),
+    ("%compare_checked", compare_on(targets[:-1])),
     ("%piko_include", include),
     ("%examples", os.path.join(config.piko_source_root, "examples")),
     ("%benchmarks", os.path.join(config.piko_source_root, "benchmarks")),
@@ -110,10 +131,7 @@ config.substitutions += [
         "%test_driver_11",
         os.path.join(config.piko_binary_root, "lib", "libpiko-test-driver-11.so"),
     ),
-    (
-        "%test_driver",
-        os.path.join(config.piko_binary_root, "lib", "libpiko-test-driver.so"),
-    ),
+    ("%test_driver", test_driver),
     ("%readme", os.path.join(config.piko_source_root, "README.md")),
     ("%docs", os.path.join(config.piko_source_root, "docs")),
     ("%cmake", config.cmake),
@@ -128,6 +146,8 @@ config.substitutions += [
     ("%other_cxx", other_cxx),
 ]
 
+if all_tests:
+    config.available_features.add("all")
 if os.path.exists(bunny):
     config.available_features.add("bunny")
 if os.path.exists("/dev/nvidiactl"):

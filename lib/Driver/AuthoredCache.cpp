@@ -29,7 +29,7 @@ static std::string makeRequest(const CompileOptions &options,
                                llvm::vfs::FileSystem &files) {
   KeyBuilder key;
   key.add("authored");
-  addSurroundings(key);
+  addSurroundings(key, CompilerPart::Frontend);
   if (dependsOnFolder(options))
     addFolder(key, files);
   key.add(options.file).add(options.pipeName).add(getRuntimeIncludeDir());

@@ -50,16 +50,28 @@ static std::string identify(const dl_phdr_info &module) {
   return toHex(BLAKE3::hash(arrayRefFromStringRef((*file)->getBuffer())));
 }
 
+namespace {
+struct Identity {
+  CompilerPart part;
+  std::string text;
+};
+} // namespace
+
 static int visit(dl_phdr_info *module, size_t, void *data) {
+  auto &identity = *static_cast<Identity *>(data);
   StringRef name(module->dlpi_name);
-  if (name.contains("/libLLVM") || name.contains("/libMLIR") ||
-      name.contains("/libclang-cpp"))
-    static_cast<std::string *>(data)->append(identify(*module) + ";");
+  if (name.contains("/libLLVM") || name.contains("/libclang-cpp") ||
+      (name.contains("/libMLIR") && identity.part != CompilerPart::Clang))
+    identity.text += identify(*module) + ";";
   return 0;
 }
 
-std::string piko::getCompilerIdentity() {
-  std::string identity = compilerBuild;
+std::string piko::getCompilerIdentity(CompilerPart part) {
+  Identity identity{part, clangCalls};
+  if (part == CompilerPart::Frontend)
+    identity.text += frontendBuild;
+  if (part == CompilerPart::All)
+    identity.text += compilerBuild;
   dl_iterate_phdr(visit, &identity);
-  return identity;
+  return identity.text;
 }

@@ -9,14 +9,23 @@
 
 namespace piko {
 
-/// A hash of the libraries that Piko's compiler consists of, whatever tool it
-/// is linked to.
-extern const char *const compilerBuild;
+/// How much of the compiler decides what is made.
+enum class CompilerPart {
+  Clang, ///< Clang and LLVM, how they are called, and what becomes of what
+         ///< they make without a pass of Piko's: precompiled headers, and the
+         ///< reference executor.
+  Frontend, ///< That, MLIR, and what makes the dialect of C++.
+  All
+};
 
-/// Changes whenever Piko's compiler, LLVM, MLIR or Clang are built anew with
-/// other code: that hash, and the build ids of the files that the others were
-/// loaded from.
-std::string getCompilerIdentity();
+/// Hashes of the sources that call Clang, of the frontend's libraries, and of
+/// all that Piko's compiler consists of, whatever tool it is linked to.
+extern const char *const clangCalls, *const frontendBuild, *const compilerBuild;
+
+/// Changes whenever that part of Piko's compiler, LLVM, MLIR or Clang are built
+/// anew with other code: that hash, and the build ids of the files that the
+/// others were loaded from.
+std::string getCompilerIdentity(CompilerPart part);
 
 } // namespace piko
 

@@ -47,7 +47,7 @@ HeaderCache::get(llvm::ArrayRef<std::string> arguments, const Files &files,
     return std::nullopt;
   KeyBuilder key;
   key.add("header");
-  addSurroundings(key);
+  addSurroundings(key, CompilerPart::Clang);
   // Else one header serves all folders.
   if (hasRelativeFolders(arguments))
     addFolder(key, *files);

@@ -12,9 +12,10 @@ using namespace piko;
 
 std::string piko::makeObjectRequest(const ObjectOptions &options,
                                     llvm::ArrayRef<Processor> processors,
-                                    llvm::vfs::FileSystem &files) {
+                                    llvm::vfs::FileSystem &files,
+                                    CompilerPart part) {
   KeyBuilder key;
-  addSurroundings(key);
+  addSurroundings(key, part);
   addFolder(key, files);
   const CompileOptions &source = options.source;
   key.add(source.file).add(source.pipeName).add(source.text.value_or(""));
@@ -34,11 +35,9 @@ std::string piko::makeObjectRequest(const ObjectOptions &options,
     key.add(processor.name).add(processor.features);
   for (int number :
        {int(source.text.has_value()), int(source.check.enabled),
-        int(options.execution), options.target.optLevel,
-        int(options.target.sanitizer), int(options.remarks),
-        int(options.allPipelines), int(source.gpu.target),
-        int(source.synthesis.count),
-        int(100 * source.synthesis.mappingWindow),
+        options.target.optLevel, int(options.target.sanitizer),
+        int(options.remarks), int(source.gpu.target),
+        int(source.synthesis.count), int(100 * source.synthesis.mappingWindow),
         int(source.gpu.seed), int(source.gpu.blocks), int(source.gpu.threads)})
     key.add(std::to_string(number));
   key.add(source.gpu.chip).add(options.nameSpace).add(getRuntimeIncludeDir());

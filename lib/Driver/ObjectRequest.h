@@ -5,6 +5,7 @@
 #ifndef PIKO_LIB_DRIVER_OBJECTREQUEST_H
 #define PIKO_LIB_DRIVER_OBJECTREQUEST_H
 
+#include "CompilerIdentity.h"
 #include "Piko/Driver/ObjectCompiler.h"
 #include "Piko/Target/Processor.h"
 
@@ -16,7 +17,8 @@ namespace piko {
 /// All that decides what is compiled, but for what is read from files.
 std::string makeObjectRequest(const ObjectOptions &options,
                               llvm::ArrayRef<Processor> processors,
-                              llvm::vfs::FileSystem &files);
+                              llvm::vfs::FileSystem &files,
+                              CompilerPart part = CompilerPart::All);
 
 } // namespace piko
 

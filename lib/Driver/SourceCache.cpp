@@ -4,8 +4,6 @@
 
 #include "SourceCache.h"
 
-#include "CompilerIdentity.h"
-
 #include "llvm/Support/Endian.h"
 #include "llvm/Support/Process.h"
 
@@ -29,8 +27,8 @@ std::string StringReader::next() {
   return string;
 }
 
-void piko::addSurroundings(KeyBuilder &key) {
-  key.add(getCompilerIdentity());
+void piko::addSurroundings(KeyBuilder &key, CompilerPart part) {
+  key.add(getCompilerIdentity(part));
   // What Clang looks at besides its options.
   for (const char *name : {"CPATH", "CPLUS_INCLUDE_PATH", "SOURCE_DATE_EPOCH"})
     key.add(sys::Process::GetEnv(name).value_or(""));

@@ -9,6 +9,7 @@
 #ifndef PIKO_LIB_DRIVER_SOURCECACHE_H
 #define PIKO_LIB_DRIVER_SOURCECACHE_H
 
+#include "CompilerIdentity.h"
 #include "DiskCache.h"
 #include "SourceRecorder.h"
 
@@ -33,9 +34,9 @@ private:
 };
 
 /// Adds what decides, besides its options, the files that it reads and the
-/// folder that it runs in, what the compiler makes: which compiler it is, and
-/// its environment.
-void addSurroundings(KeyBuilder &key);
+/// folder that it runs in, what a part of the compiler makes: which one it is,
+/// and its environment.
+void addSurroundings(KeyBuilder &key, CompilerPart part);
 /// Adds the folder from which relative paths begin.
 void addFolder(KeyBuilder &key, llvm::vfs::FileSystem &files);
 

@@ -123,6 +123,11 @@ private:
 
 } // namespace
 
+std::vector<std::string> piko::getHostArguments(const FrontendOptions &options,
+                                                bool optimize) {
+  return getClangArguments(getFlags(optimize), options);
+}
+
 HostCode piko::compileForHost(llvm::StringRef text, llvm::StringRef userFile,
                               const FrontendOptions &options, bool optimize,
                               llvm::LLVMContext &llvmContext,
@@ -141,7 +146,7 @@ std::optional<std::string> piko::getHeaderCode(
     mlir::MLIRContext &context) {
   FrontendOptions shared = getHeaderOptions(options);
   std::vector<std::string> request =
-      getClangArguments(getFlags(/*optimize=*/false), shared);
+      getHostArguments(shared, /*optimize=*/false);
   request.push_back(("code for " + target).str());
   auto make = [&](const Files &recorded) -> std::optional<std::string> {
     FrontendOptions chosen = shared;

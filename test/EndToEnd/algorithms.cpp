@@ -3,7 +3,7 @@
 // The standard library's algorithms on local arrays: pointers that are halved,
 // moved towards each other, swapped between two arrays, compared and
 // subtracted, and functions that change what they have captured.
-// RUN: timeout 240 piko-compare %s --count 3000 --wide | FileCheck %s
+// RUN: %compare_targets %s --count 3000 --wide | FileCheck %s
 // CHECK: equal
 #include <piko.h>
 

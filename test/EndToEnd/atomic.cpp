@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // Integer atomics of all kinds, in a bin that all threads share.
-// RUN: piko-compare %s --count 50000 | FileCheck %s
+// RUN: %compare_targets %s --count 50000 | FileCheck %s
 // CHECK: equal
 #include "Inputs/ports.h"
 

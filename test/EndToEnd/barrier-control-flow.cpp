@@ -2,8 +2,9 @@
 //
 // Barriers in every kind of control flow: in the test of a loop, in a switch, in
 // branches, and in a loop that iterations count from different numbers.
-// RUN: piko-compare %s --pipe Barriers --count 400 | FileCheck %s
-// RUN: piko-compare %s --pipe Barriers --count 20 --seed 5 | FileCheck %s
+// RUN: %compare_targets %s --cases %s
+// CASE: --pipe Barriers --count 400
+// CASE: --pipe Barriers --count 20 --seed 5
 // On a GPU an iteration is a thread where there are enough; otherwise the loop
 // is cut.
 // RUN: piko-compare %s --pipe Barriers --count 200 --runs 1 --threads 2 --target gpu-on-cpu --gpu-threads 32 --gpu-seed 2 | FileCheck %s

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // Bins of rank 3 over a volume whose edge bins are partial.
-// RUN: piko-compare %s --domain 33 18 7 --count 3000 | FileCheck %s
+// RUN: %compare_targets %s --domain 33 18 7 --count 3000 | FileCheck %s
 // CHECK: equal
 #include <piko.h>
 

@@ -3,8 +3,8 @@
 // Bits and bounds as people write them, of which LLVM makes intrinsics: bytes
 // swapped and bits reversed by shifts and masks, sums that saturate, rotations,
 // counts of bits.
-// RUN: piko-compare %s --count 3000 --runs 1 --wide | FileCheck %s
-// RUN: piko-compare %s --count 500 --runs 1 --without vectorize | FileCheck %s
+// RUN: %compare_targets %s --count 3000 --runs 1 --wide | FileCheck %s
+// RUN: %if all %{ piko-compare %s --count 500 --runs 1 --without vectorize | FileCheck %s %}
 // RUN: piko-compare %s --count 300 --runs 1 --wide --threads 2 --target gpu-on-cpu --gpu-threads 32 | FileCheck %s
 // CHECK: {{^equal$}}
 //

@@ -3,7 +3,7 @@
 // Nested choices among elements of one local record, each with an index of its
 // own: instcombine makes one load of them, through a pointer chosen by a phi.
 // Atomics through references to one of several things.
-// RUN: piko-compare %s --count 3000 --wide | FileCheck %s
+// RUN: %compare_targets %s --count 3000 --wide | FileCheck %s
 // CHECK: equal
 #include <piko.h>
 

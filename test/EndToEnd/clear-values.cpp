@@ -2,7 +2,7 @@
 //
 // Images cleared to records that hold arrays of records, which C++ fills in a
 // loop.
-// RUN: piko-compare %s --domain 5 3 --count 4 | FileCheck %s
+// RUN: %compare_targets %s --domain 5 3 --count 4 | FileCheck %s
 // CHECK: equal
 #include <piko.h>
 

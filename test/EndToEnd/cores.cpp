@@ -4,13 +4,17 @@
 // bin, and whoever hands the bins out: DirectMap gives each core neighbours, which
 // others take over if it is late, Serialize takes the first core, and All shares a
 // bin among them.
-// RUN: printf -- '--pipe %%s --domain 28 --count 6000\n' Mapped Serial ByBin Lists > %t.cases
-// RUN: printf '%%s\n' '--pipe Hops --domain 28 --count 60000' '--pipe Parts --count 6000' >> %t.cases
-// RUN: piko-compare %s --cases %t.cases --threads 3 --owners > %t.resolved
+// CASE: --pipe Mapped --domain 28 --count 6000
+// CASE: --pipe Serial --domain 28 --count 6000
+// CASE: --pipe ByBin --domain 28 --count 6000
+// CASE: --pipe Lists --domain 28 --count 6000
+// CASE: --pipe Hops --domain 28 --count 60000
+// CASE: --pipe Parts --count 6000
+// RUN: piko-compare %s --cases %s --threads 3 --owners > %t.resolved
 // RUN: FileCheck %s --input-file %t.resolved
-// RUN: piko-compare %s --cases %t.cases --threads 3 --owners --without pre-schedule,eliminate-schedules > %t.queued
+// RUN: piko-compare %s --cases %s --threads 3 --owners --without pre-schedule,eliminate-schedules > %t.queued
 // RUN: FileCheck %s --input-file %t.queued
-// RUN: piko-compare %s --cases %t.cases --threads 1 2 5
+// RUN: %compare_targets %s --cases %s --threads 1 2 5
 #include <piko.h>
 
 struct Item {

@@ -3,7 +3,7 @@
 // What C++ a phase may be written in: templates, helpers, lambdas, if constexpr,
 // early returns, switches that fall through, nested loops with two exits, arrays
 // inside primitives with constant and dynamic indices, GLM.
-// RUN: piko-compare %s --count 4000 | FileCheck %s
+// RUN: %compare_targets %s --count 4000 | FileCheck %s
 // CHECK: equal
 #include "Inputs/ports.h"
 

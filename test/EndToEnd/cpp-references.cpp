@@ -4,7 +4,7 @@
 // pointers that walk through an array, a table, a vector indexed by a variable,
 // conversions out of range, comparisons with NaN, shifts and 64-bit integers,
 // unions, functions passed by pointer, and what an update returns.
-// RUN: piko-compare %s --count 3000 | FileCheck %s
+// RUN: %compare_targets %s --count 3000 | FileCheck %s
 // CHECK: equal
 #include "Inputs/ports.h"
 

@@ -3,6 +3,14 @@
 // Loops and rounds that a device repeats by itself, in the lineage order that
 // the reference executor has: updates that do not commute show it.
 // DEFINE: %{compare} = piko-compare %s --count 100 --domain 64 48 --runs 1 --threads 2 --target cuda --gpu-threads 64
+// RUN: %compare_targets %s --cases %s --count 100 --domain 64 48 --runs 1
+// CASE: --pipe Numbers
+// CASE: --pipe Tree
+// CASE: --pipe PingPong
+// CASE: --pipe Chain
+// CASE: --pipe Lists
+// CASE: --pipe Turns
+// CASE: --pipe Strips --strip 13
 // RUN: export PIKO_TEST_DRIVER_COUNTS=1
 // RUN: env PIKO_CUDA_DRIVER=%test_driver %{compare} --pipe Numbers 2>&1 | FileCheck %s
 // RUN: env PIKO_CUDA_DRIVER=%test_driver %{compare} --pipe Tree 2>&1 | FileCheck %s

@@ -7,6 +7,8 @@
 // KERNEL-DAG: piko.local_barrier @spread[0] -> @sort
 // KERNEL-DAG: piko.local_barrier @sort[0] -> @settle
 //
+// RUN: %compare_targets %s --pipe Layers --count 300 --domain 67 35 --runs 1 | FileCheck %s --check-prefix=EQUAL
+// EQUAL: {{^equal}}
 // RUN: export PIKO_TEST_DRIVER_COUNTS=1
 // RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_SEED=3 %{compare} --pipe Layers 2>&1 | FileCheck %s
 // RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_CUDA_ALONE=0 %{compare} --pipe Layers --count 900 1 40 2>&1 | FileCheck %s

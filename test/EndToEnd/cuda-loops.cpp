@@ -4,6 +4,17 @@
 // across hops shows, in one submission, in the lineage order that the reference
 // executor has.
 // DEFINE: %{compare} = piko-compare %s --count 70 --domain 64 48 --runs 1 --threads 2 --target cuda --gpu-threads 64
+// RUN: %compare_targets %s --cases %s --count 70 --domain 64 48 --runs 1
+// CASE: --pipe TwoEntries
+// CASE: --pipe Entries --count 40
+// CASE: --pipe FlatEntries
+// CASE: --pipe StripEntries --strip 13
+// CASE: --pipe RoundEntries --count 30
+// CASE: --pipe Ordered
+// CASE: --pipe Strokes --count 20
+// CASE: --pipe Both --count 9
+// CASE: --pipe StripStrokes --count 18 --strip 7
+// CASE: --pipe RoundStrokes --count 9
 // RUN: export PIKO_TEST_DRIVER_COUNTS=1
 // RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_SEED=3 %{compare} --pipe TwoEntries 2>&1 | FileCheck %s
 // RUN: env PIKO_CUDA_DRIVER=%test_driver %{compare} --pipe TwoEntries --count 0 31 2>&1 | FileCheck %s

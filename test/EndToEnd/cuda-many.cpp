@@ -3,6 +3,9 @@
 // More inputs and outputs of a stage than a join merges at a time, in one
 // submission and in the order of the reference executor.
 // DEFINE: %{compare} = piko-compare %s --count 90 --domain 40 24 --runs 1 --threads 2 --target cuda --gpu-threads 32
+// RUN: %compare_targets %s --cases %s --count 90 --domain 40 24 --runs 1
+// CASE: --pipe Inputs
+// CASE: --pipe Outputs
 // RUN: export PIKO_TEST_DRIVER_COUNTS=1
 // RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_SEED=3 %{compare} --pipe Inputs 2>&1 | FileCheck %s
 // RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_CUDA_ALONE=0 %{compare} --pipe Inputs 2>&1 | FileCheck %s

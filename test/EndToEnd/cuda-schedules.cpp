@@ -2,6 +2,10 @@
 //
 // Schedules that depend on the bin, and on constants, in one submission.
 // DEFINE: %{compare} = piko-compare %s --count 400 --domain 61 43 --runs 2 --threads 2 --target cuda --gpu-threads 32
+// RUN: %compare_targets %s --cases %s --count 400 --domain 61 43 --runs 1
+// CASE: --pipe Bins
+// CASE: --pipe Lists
+// CASE: --pipe Rounds
 // RUN: export PIKO_TEST_DRIVER_COUNTS=1
 // RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_SEED=3 %{compare} --pipe Bins 2>&1 | FileCheck %s
 // RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_CUDA_ALONE=0 %{compare} --pipe Bins --count 2000 2>&1 | FileCheck %s

@@ -5,6 +5,10 @@
 // to be merged by keys.
 // DEFINE: %{compare} = piko-compare %s --domain 64 48 --runs 1 --threads 2 --target cuda --gpu-threads 64
 // DEFINE: %{meet} = %{compare} --pipe Meet --count 60
+// RUN: %compare_targets %s --cases %s --count 60 --domain 64 48 --runs 1
+// CASE: --pipe Meet --strip 7
+// CASE: --pipe Tiles --count 100
+// CASE: --pipe Twice --count 40 30 --strip 4
 // RUN: export PIKO_TEST_DRIVER_COUNTS=1
 // RUN: env PIKO_CUDA_DRIVER=%test_driver %{compare} --pipe Meet --count 301 --strip 1 2>&1 | FileCheck %s --check-prefixes=CHECK,HUNDREDS
 // RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_SEED=3 PIKO_CUDA_ALONE=0 %{meet} --strip 7 2>&1 | FileCheck %s

@@ -3,10 +3,7 @@
 // What is kept for a pixel is the last primitive's, however lanes come to it: in
 // two branches, in loops, at neighbouring pixels, in iterations that meet; and
 // what decides whether it is read decides that still.
-// RUN: sed -n 's|^// CASE: ||p' %s > %t.cases
-// RUN: piko-compare %s --cases %t.cases --runs 1 | FileCheck %s --check-prefix=EQUAL
-// RUN: %if x86_64 %{ piko-compare %s --cases %t.cases --runs 1 --cpu x86-64-v3 | FileCheck %s --check-prefix=EQUAL %}
-// EQUAL-COUNT-9: {{^equal$}}
+// RUN: %compare_targets %s --cases %s --runs 1
 // CASE: --pipe Branches --domain 64 64 --count 3000
 // CASE: --pipe Iterations --domain 64 64 --count 2000
 // CASE: --pipe Boxes --domain 64 64 --count 3000

@@ -2,12 +2,8 @@
 //
 // What primitives overwrite is computed once for each pixel, whatever the text
 // looks like, and is what the reference executor computes.
-// RUN: sed -n 's|^// CASE: ||p' %s > %t.cases
-// RUN: piko-compare %s --cases %t.cases --runs 2 | FileCheck %s --check-prefix=EQUAL
-// RUN: %if x86_64 %{ piko-compare %s --cases %t.cases --runs 1 --cpu x86-64 | FileCheck %s --check-prefix=EQUAL %}
-// RUN: %if x86_64 %{ piko-compare %s --cases %t.cases --runs 1 --cpu x86-64-v3 | FileCheck %s --check-prefix=EQUAL %}
-// RUN: piko-compare %s --cases %t.cases --runs 1 --without vectorize -O0 | FileCheck %s --check-prefix=EQUAL
-// EQUAL-COUNT-13: {{^equal$}}
+// RUN: %compare_targets %s --cases %s --runs 2
+// RUN: %if all %{ piko-compare %s --cases %s --runs 1 --without vectorize -O0 %}
 // CASE: --pipe Nearest --domain 45 37 --count 300
 // CASE: --pipe Nearest --domain 45 37 --count 0
 // CASE: --pipe OneRecord --domain 45 37 --count 300

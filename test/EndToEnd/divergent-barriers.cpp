@@ -2,9 +2,9 @@
 //
 // Iterations that do not all come to a barrier are an error, and nothing behind
 // it runs: not what the barrier's branch guards, nor a loop that others leave.
-// RUN: not piko-compare %s --pipe Guarded --runs 1 --threads 1 2 | FileCheck %s
-// RUN: not piko-compare %s --pipe Loops --runs 1 --threads 1 2 | FileCheck %s
-// RUN: not piko-compare %s --pipe Counts --runs 1 --threads 1 2 | FileCheck %s
+// RUN: %compare_targets %s --stops --pipe Guarded --runs 1 --threads 1 2 | FileCheck %s
+// RUN: %compare_targets %s --stops --pipe Loops --runs 1 --threads 1 2 | FileCheck %s
+// RUN: %compare_targets %s --stops --pipe Counts --runs 1 --threads 1 2 | FileCheck %s
 // CHECK: got: stage 'stage', bin {{[0-9]+}}: expected every iteration of parallelFor to call {{sync|count}}() as often as iteration 0, but iteration {{[0-9]+}} does not
 #include "Inputs/ports.h"
 

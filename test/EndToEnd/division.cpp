@@ -5,7 +5,7 @@
 // checking mode; one that has a result is the same, and one that is not reached
 // does nothing.
 // RUN: sed -n 's|^// STOP: ||p' %s > %t.stops
-// RUN: not piko-compare %s --cases %t.stops --runs 1 --threads 2 > %t.out
+// RUN: %compare_targets %s --stops --cases %t.stops --runs 1 --threads 2 > %t.out
 // RUN: sed -n '/^Quotient:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=IN-BIN
 // RUN: sed -n '/^Remainder:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=IN-BIN
 // RUN: sed -n '/^Overflow:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=IN-BIN
@@ -35,10 +35,8 @@
 // KERNEL: piko.stage @pass {{.*}} fused ["last"]
 // RUN: not piko-compare %s --pipe Quotient --count 3 --runs 1 --threads 2 --check | FileCheck %s --check-prefix=PLACE
 // RUN: not piko-compare %s --pipe Assign --count 3 --runs 1 --threads 2 --check | FileCheck %s --check-prefix=ASSIGN-PLACE
-// RUN: sed -n 's|^// CASE: ||p' %s > %t
-// RUN: piko-compare %s --cases %t --runs 1 --threads 1 2 | FileCheck %s --check-prefix=EQUAL
-// RUN: piko-compare %s --cases %t --runs 1 --threads 2 --check | FileCheck %s --check-prefix=EQUAL
-// EQUAL-COUNT-3: {{^equal$}}
+// RUN: %compare_targets %s --cases %s --runs 1 --threads 1 2
+// RUN: piko-compare %s --cases %s --runs 1 --threads 2 --check
 // CASE: --pipe Guarded --count 300 --wide
 // CASE: --pipe Many --count 500
 // CASE: --pipe Constant --count 300 --wide

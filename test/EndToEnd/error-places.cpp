@@ -4,7 +4,7 @@
 // in the same words in the reference ("expected") and compiled ("got"): also
 // where a phase runs inside another stage's kernel.
 // RUN: sed -n 's|^// STOP: ||p' %s > %t.stops
-// RUN: not piko-compare %s --cases %t.stops --runs 1 --threads 2 > %t.out
+// RUN: %compare_targets %s --stops --cases %t.stops --runs 1 --threads 2 > %t.out
 // RUN: sed -n '/^Read:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=READ
 // RUN: sed -n '/^Store:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=STORE
 // RUN: sed -n '/^Update:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=UPDATE

@@ -16,16 +16,17 @@
 // RUN: pikoc %s --pipe Whole --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=INSIDE
 // INSIDE: remark: stage 'shade' runs inside stage 'spread'
 //
-// RUN: piko-compare %s --pipe Chain --domain 67 35 --count 900 | FileCheck %s
-// RUN: piko-compare %s --pipe Chain --domain 67 35 --count 900 --strip 50 --runs 2 | FileCheck %s
-// RUN: piko-compare %s --pipe Chain --domain 67 35 --count 300 --runs 1 --without fuse-kernels | FileCheck %s
-// RUN: piko-compare %s --pipe Pixels --domain 67 35 --count 300 | FileCheck %s
-// RUN: piko-compare %s --pipe Pixels --domain 67 35 --count 300 --strip 20 --runs 2 | FileCheck %s
-// RUN: piko-compare %s --pipe Further --domain 67 35 --count 900 --runs 2 | FileCheck %s
-// RUN: piko-compare %s --pipe Merged --domain 67 35 --count 900 --runs 2 | FileCheck %s
-// RUN: piko-compare %s --pipe Whole --domain 67 35 --count 300 --runs 2 | FileCheck %s
-// RUN: piko-compare %s --pipe Waits --domain 67 35 --count 300 --strip 13 --runs 1 | FileCheck %s
-// RUN: piko-compare %s --pipe Twice --domain 67 35 --count 3300 --budget 3000000 --runs 1 --threads 2 | FileCheck %s
+// RUN: %compare_targets %s --cases %s
+// CASE: --pipe Chain --domain 67 35 --count 900
+// CASE: --pipe Chain --domain 67 35 --count 900 --strip 50
+// CASE: --pipe Pixels --domain 67 35 --count 300
+// CASE: --pipe Pixels --domain 67 35 --count 300 --strip 20
+// CASE: --pipe Further --domain 67 35 --count 900
+// CASE: --pipe Merged --domain 67 35 --count 900
+// CASE: --pipe Whole --domain 67 35 --count 300
+// CASE: --pipe Waits --domain 67 35 --count 300 --strip 13
+// CASE: --pipe Twice --domain 67 35 --count 3300 --budget 3000000
+// RUN: %if all %{ piko-compare %s --pipe Chain --domain 67 35 --count 300 --runs 1 --without fuse-kernels | FileCheck %s %}
 // CHECK: equal
 #include <piko.h>
 

@@ -2,7 +2,7 @@
 //
 // Tests for any set of classes of numbers, which LLVM makes of comparisons with
 // bounds, on input with infinities, NaNs, zeros and denormals.
-// RUN: piko-compare %s --count 3000 --wide | FileCheck %s
+// RUN: %compare_targets %s --count 3000 --wide | FileCheck %s
 // CHECK: equal
 #include <piko.h>
 

@@ -10,10 +10,11 @@
 // FUSED: stage 'shade' keeps each primitive in the bin that it was emitted from
 // FUSED: stage 'shade' runs inside stage 'rasterize'
 // LIMIT: piko.pipeline @Middles rank 2 max_extent 8388608 {
-// RUN: piko-compare %s --pipe Corners --domain 67 35 --count 300 | FileCheck %s
-// RUN: piko-compare %s --pipe Middles --domain 67 35 --count 300 | FileCheck %s
+// RUN: %compare_targets %s --cases %s
+// CASE: --pipe Corners --domain 67 35 --count 300
+// CASE: --pipe Middles --domain 67 35 --count 300
 // RUN: piko-compare %s --pipe Fused --domain 67 35 --count 300 --tolerance 0 | FileCheck %s
-// RUN: piko-compare %s --pipe Middles --domain 67 35 --count 100 --without fuse-stages | FileCheck %s
+// RUN: %if all %{ piko-compare %s --pipe Middles --domain 67 35 --count 100 --without fuse-stages | FileCheck %s %}
 // CHECK: equal
 // RUN: not piko-compare %s --pipe Middles --domain 8388609 1 --count 9 --runs 1 | FileCheck %s --check-prefix=LARGE
 // LARGE: expected: {{.*}}stage 'Shade': expected at most 8388608 cells in each dimension where positions are floats, but the domain has 8388609

@@ -24,9 +24,10 @@
 // OPEN: the bins of stage 'shade' are not known to be those before
 // OPEN: note: 'pixel.x' is not proved to be at least the bin's lower bound here; if it always is, promise that by assignToPreviousBins
 //
-// RUN: piko-compare %s --pipe Lists --domain 67 35 --count 2000 | FileCheck %s
-// RUN: piko-compare %s --pipe Lists --domain 67 35 --count 2000 --without fuse-stages | FileCheck %s
-// RUN: piko-compare %s --pipe Open --domain 67 35 --count 500 | FileCheck %s
+// RUN: %compare_targets %s --cases %s
+// CASE: --pipe Lists --domain 67 35 --count 2000
+// CASE: --pipe Open --domain 67 35 --count 500
+// RUN: %if all %{ piko-compare %s --pipe Lists --domain 67 35 --count 2000 --without fuse-stages | FileCheck %s %}
 // CHECK: equal
 #include <piko.h>
 

@@ -12,12 +12,13 @@
 // REMARK-DAG: stage 'count' runs inside stage 'spread'
 // KERNEL: piko.stage @spread {{.*}} fused ["shade", "test", "count"]
 //
-// RUN: piko-compare %s --pipe Chain --domain 67 35 --count 2000 | FileCheck %s
-// RUN: piko-compare %s --pipe Large --domain 67 35 --count 500 | FileCheck %s
-// RUN: piko-compare %s --pipe Whole --domain 67 35 --count 500 | FileCheck %s
-// RUN: piko-compare %s --pipe Chain --domain 67 35 --count 500 --without fuse-stages | FileCheck %s
-// RUN: piko-compare %s --pipe Large --domain 67 35 --count 500 --without infer-directives | FileCheck %s
-// RUN: piko-compare %s --pipe Whole --domain 67 35 --count 500 --without test-early,own-pixels | FileCheck %s
+// RUN: %compare_targets %s --cases %s
+// CASE: --pipe Chain --domain 67 35 --count 2000
+// CASE: --pipe Large --domain 67 35 --count 500
+// CASE: --pipe Whole --domain 67 35 --count 500
+// RUN: %if all %{ piko-compare %s --pipe Chain --domain 67 35 --count 500 --without fuse-stages | FileCheck %s %}
+// RUN: %if all %{ piko-compare %s --pipe Large --domain 67 35 --count 500 --without infer-directives | FileCheck %s %}
+// RUN: %if all %{ piko-compare %s --pipe Whole --domain 67 35 --count 500 --without test-early,own-pixels | FileCheck %s %}
 // RUN: not piko-compare %s --pipe Chain --without fusion 2>&1 | FileCheck %s --check-prefix=WRONG
 // WRONG: --without: expected passes of pre-schedule, infer-directives, {{.*}} but got 'fusion'
 // CHECK: equal

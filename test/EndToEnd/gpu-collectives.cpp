@@ -3,9 +3,11 @@
 // On a GPU, collectives of iterations that are threads of a block: the tree of a
 // float reduction and scan is the language's, sorts are stable and put NaN last,
 // and threads without an iteration take no part.
-// RUN: piko-compare %s --pipe Collected --count 700 --runs 1 --threads 2 --target gpu-on-cpu --gpu-threads 64 | FileCheck %s
+// RUN: %compare_targets %s --cases %s --runs 1
+// CASE: --pipe Collected --count 700
+// CASE: --pipe Collected --count 30 --seed 4
 // RUN: piko-compare %s --pipe Collected --count 700 --runs 1 --threads 2 --target gpu-on-cpu --gpu-threads 128 --gpu-seed 3 | FileCheck %s
-// RUN: piko-compare %s --pipe Collected --count 30 --runs 1 --threads 2 --target gpu-on-cpu --gpu-threads 64 --seed 4 | FileCheck %s
+// RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_SEED=9 piko-compare %s --pipe Collected --count 700 --gpu-threads 128 --target cuda --runs 1 --threads 2 | FileCheck %s
 // CHECK: equal
 // RUN: pikoc %s --pipe Collected --emit=gpu --gpu-threads 64 --remarks 2>&1 | FileCheck %s --check-prefix=THREADS
 // THREADS-NOT: remark: what iterations keep across barriers is in memory

@@ -4,6 +4,13 @@
 // them off until many wait, and take those of about the same length at a time.
 // DEFINE: %{gpu} = --domain 67 35 --runs 1 --gpu-threads 64
 // RUN: export PIKO_CUDA_DRIVER=%test_driver
+// RUN: %compare_targets %s --cases %s --domain 67 35 --count 900 --runs 1
+// CASE: --pipe Boxes
+// CASE: --pipe Rows
+// CASE: --pipe Digits
+// CASE: --pipe Both
+// CASE: --pipe Binned
+// CASE: --pipe Seen
 // RUN: piko-compare %s --pipe Boxes --count 900 %{gpu} --target cuda | FileCheck %s
 // RUN: env PIKO_TEST_DRIVER_SEED=4 piko-compare %s --pipe Boxes --count 700 --strip 150 %{gpu} --target cuda | FileCheck %s
 // RUN: piko-compare %s --pipe Rows --count 900 %{gpu} --target gpu-on-cpu --gpu-seed 3 | FileCheck %s

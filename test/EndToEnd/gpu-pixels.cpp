@@ -18,19 +18,20 @@
 // RUN: pikoc %s --pipe Carried --target gpu-on-cpu --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=CARRIED
 // CARRIED: remark: the threads of a block do not share pixels: the outcome of an update decides about other pixels
 //
-// RUN: piko-compare %s --pipe Boxes --domain 67 35 --count 900 --target gpu-on-cpu --runs 2 | FileCheck %s
+// RUN: %compare_targets %s --cases %s --domain 67 35 --count 900 --runs 1
+// CASE: --pipe Boxes
 // RUN: piko-compare %s --pipe Boxes --domain 67 35 --count 900 --target gpu-on-cpu --gpu-threads 8 --gpu-seed 7 --runs 1 | FileCheck %s
-// RUN: piko-compare %s --pipe Points --domain 67 35 --count 900 --target gpu-on-cpu --runs 1 | FileCheck %s
+// CASE: --pipe Points
 // RUN: piko-compare %s --pipe Points --domain 67 35 --count 900 --target gpu-on-cpu --gpu-threads 128 --runs 1 | FileCheck %s
-// RUN: piko-compare %s --pipe Rows --domain 67 35 --count 900 --target gpu-on-cpu --runs 1 | FileCheck %s
-// RUN: piko-compare %s --pipe Steps --domain 67 35 --count 900 --target gpu-on-cpu --runs 1 | FileCheck %s
-// RUN: piko-compare %s --pipe Discs --domain 67 35 --count 900 --target gpu-on-cpu --runs 1 | FileCheck %s
-// RUN: piko-compare %s --pipe Unclipped --domain 67 35 --count 900 --target gpu-on-cpu --runs 1 | FileCheck %s
-// RUN: piko-compare %s --pipe Rare --domain 67 35 --count 900 --target gpu-on-cpu --runs 2 | FileCheck %s
+// CASE: --pipe Rows
+// CASE: --pipe Steps
+// CASE: --pipe Discs
+// CASE: --pipe Unclipped
+// CASE: --pipe Rare
 // RUN: piko-compare %s --pipe Rare --domain 67 35 --count 900 --target gpu-on-cpu --gpu-threads 2 --runs 1 | FileCheck %s
-// RUN: piko-compare %s --pipe Spans --domain 67 35 --count 900 --target gpu-on-cpu --runs 1 | FileCheck %s
-// RUN: piko-compare %s --pipe Frames --domain 67 35 --count 900 --target gpu-on-cpu --runs 1 | FileCheck %s
-// RUN: piko-compare %s --pipe Carried --domain 67 35 --count 900 --target gpu-on-cpu --runs 1 | FileCheck %s
+// CASE: --pipe Spans
+// CASE: --pipe Frames
+// CASE: --pipe Carried
 // CHECK: equal
 #include <piko.h>
 

@@ -5,6 +5,14 @@
 // are such primitives, or these call a function.
 // DEFINE: %{gpu} = --domain 67 35 --runs 2 --gpu-threads 32
 // RUN: export PIKO_CUDA_DRIVER=%test_driver
+// RUN: %compare_targets %s --cases %s --domain 67 35 --count 900 --runs 1
+// CASE: --pipe Ordered
+// CASE: --pipe Local
+// CASE: --pipe Lists --count 300
+// CASE: --pipe Counted
+// CASE: --pipe All --count 500
+// CASE: --pipe Looped --count 300
+// CASE: --pipe Chosen
 // RUN: piko-compare %s --pipe Ordered --count 900 %{gpu} --target cuda | FileCheck %s
 // RUN: env PIKO_TEST_DRIVER_SEED=4 piko-compare %s --pipe Ordered --count 700 --strip 150 %{gpu} --target cuda | FileCheck %s
 // RUN: piko-compare %s --pipe Ordered --count 900 %{gpu} --target gpu-on-cpu --gpu-seed 3 | FileCheck %s

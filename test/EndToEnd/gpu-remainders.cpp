@@ -3,11 +3,8 @@
 // The remainder of a division of floats and of doubles is exact, on a GPU as
 // anywhere: of numbers near each other and far apart, of subnormal ones, zeros of
 // both signs, infinities and NaN.
-// DEFINE: %{compare} = piko-compare %s --pipe Remainders --count 2000 --runs 1
-// RUN: %{compare} --threads 2 | FileCheck %s
-// RUN: %{compare} --target gpu-on-cpu --gpu-threads 32 | FileCheck %s
-// RUN: env PIKO_CUDA_DRIVER=%test_driver %{compare} --target cuda --gpu-threads 32 | FileCheck %s
-// CHECK: {{^equal$}}
+// RUN: %compare_targets %s --pipe Remainders --count 2000 --runs 1 | FileCheck %s
+// CHECK: {{^equal}}
 #include "Inputs/ports.h"
 
 #include <bit>

@@ -5,6 +5,10 @@
 // has the units b, b + n, .., among which here are all that take long. Results are
 // the same, and the longest of 32 blocks is shorter.
 // DEFINE: %{cuda} = --target cuda --runs 1 --threads 2 --domain 8192 --count 9000
+// RUN: %compare_targets %s --cases %s --domain 8192 --count 900 --runs 1
+// CASE: --pipe Balanced
+// CASE: --pipe Mapped
+// CASE: --pipe Emitted
 // RUN: export PIKO_CUDA_DRIVER=%test_driver
 // RUN: export PIKO_TEST_DRIVER_MULTIPROCESSORS=1
 // RUN: env PIKO_TEST_DRIVER_COUNTS=%t.balanced piko-compare %s --pipe Balanced %{cuda} | FileCheck %s

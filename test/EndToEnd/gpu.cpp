@@ -2,31 +2,29 @@
 //
 // Kernels for a GPU, run on the CPU by blocks and threads: each thread has
 // pixels of its own, and the updates of a pixel keep their order.
+// RUN: %compare_targets %s --cases %s
+// CASE: --pipe Boxes --count 600
+// CASE: --pipe Boxes --count 200 --strip 13 --domain 61 43 --wide
+// CASE: --pipe Whole --count 400
 // RUN: piko-compare %s --pipe Boxes --count 600 --target gpu-on-cpu --gpu-threads 1 --runs 1 --threads 2 | FileCheck %s
 // RUN: piko-compare %s --pipe Boxes --count 600 --target gpu-on-cpu --gpu-threads 32 --runs 1 | FileCheck %s
 // RUN: piko-compare %s --pipe Boxes --count 600 --target gpu-on-cpu --gpu-threads 256 --gpu-seed 5 --runs 1 --threads 2 | FileCheck %s
 // RUN: piko-compare %s --pipe Boxes --count 200 --target gpu-on-cpu --gpu-threads 8 --runs 1 --strip 13 --domain 61 43 --wide | FileCheck %s
 // RUN: piko-compare %s --pipe Whole --count 400 --target gpu-on-cpu --gpu-threads 4 --runs 1 --threads 2 | FileCheck %s
-// RUN: piko-compare %S/update-order.cpp --pipe Small --count 1500 --target gpu-on-cpu --gpu-threads 16 --runs 1 | FileCheck %s
-// RUN: piko-compare %S/update-order.cpp --pipe Shared --count 1500 --target gpu-on-cpu --gpu-threads 64 --runs 1 | FileCheck %s
 // CHECK: equal
+// PTX does so, too, behind the driver for tests.
+// RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_SEED=7 piko-compare %s --pipe Boxes --count 200 --gpu-threads 8 --strip 13 --domain 61 43 --wide --target cuda --runs 1 --threads 2 | FileCheck %s
+// RUN: env PIKO_CUDA_DRIVER=%test_driver piko-compare %s --pipe Whole --count 400 --gpu-threads 4 --target cuda --runs 1 --threads 2 | FileCheck %s
 // Of several errors, it is the one that a CPU reports.
 // RUN: not piko-compare %s --pipe Stops --count 500 --runs 1 --target gpu-on-cpu --gpu-threads 32 | FileCheck %s --check-prefix=STOPS
 // RUN: not piko-compare %s --pipe Stops --count 500 --runs 1 --target gpu-on-cpu --gpu-threads 64 --gpu-seed 5 | FileCheck %s --check-prefix=STOPS
+// RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_SEED=3 not piko-compare %s --pipe Stops --count 500 --runs 1 --target cuda --gpu-threads 32 | FileCheck %s --check-prefix=STOPS
 // STOPS-COUNT-3: got: stage 'draw', bin {{[0-9]+}}: expected an index into 'limits' in [0, 64), but got -2{{$}}
 // A pixel is behind a test, or loops step from one of a thread's own to the next.
 // RUN: pikoc %s --pipe Boxes --emit=gpu --gpu-threads 8 | FileCheck %s --check-prefix=GPU
 // GPU-LABEL: gpu.func @Boxes_kernel_draw
 // GPU-SAME:    workgroup({{.*}}memref<{{[0-9]+x[if][0-9]+}}, #gpu.address_space<workgroup>>
 // GPU-COUNT-2: gpu.barrier
-//
-// Each kind of kernel: emissions, lists, batches, barriers and collectives with
-// counts below and above the number of threads, waits, cycles and strips.
-// RUN: piko-compare %S/algorithms.cpp --runs 1 --threads 2 --target gpu-on-cpu --gpu-threads 32 --gpu-seed 1 | FileCheck %s
-// RUN: piko-compare %S/parallel.cpp --pipe Pipeline --count 300 --runs 1 --threads 2 --target gpu-on-cpu --gpu-threads 64 --gpu-seed 2 | FileCheck %s
-// RUN: piko-compare %S/lists.mlir --reference %S/Inputs/lists.cpp --count 300 --runs 1 --threads 2 --target gpu-on-cpu --gpu-threads 32 --gpu-seed 1 | FileCheck %s
-// RUN: piko-compare %S/cycles.mlir --reference %S/Inputs/cycles.cpp --count 100 --runs 1 --threads 2 --target gpu-on-cpu --gpu-threads 64 --gpu-seed 1 | FileCheck %s
-// RUN: piko-compare %S/strips.cpp --count 300 --strip 7 --runs 1 --threads 2 --target gpu-on-cpu --gpu-threads 32 --gpu-seed 2 | FileCheck %s
 #include "Inputs/ports.h"
 
 struct Pixel {

@@ -2,9 +2,9 @@
 //
 // Elements of arrays in primitives, read behind conditions that keep the index
 // inside: nothing reads one ahead of its condition.
-// RUN: piko-compare %s --pipe Conditions --count 2000 | FileCheck %s
-// RUN: piko-compare %s --pipe Loops --count 2000 | FileCheck %s
-// CHECK: equal
+// RUN: %compare_targets %s --cases %s
+// CASE: --pipe Conditions --count 2000
+// CASE: --pipe Loops --count 2000
 #include <piko.h>
 
 struct Item {

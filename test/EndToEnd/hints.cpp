@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // What only tells an optimizer what to expect changes nothing.
-// RUN: piko-compare %s --count 64 --runs 1 --threads 1 | FileCheck %s
+// RUN: %compare_targets %s --count 64 --runs 1 --threads 1 | FileCheck %s
 // CHECK: equal
 #include "Inputs/functions.h"
 

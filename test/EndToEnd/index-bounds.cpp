@@ -2,9 +2,7 @@
 //
 // Indices that are tested in front of a loop, or not at all, are those of the
 // reference, at the ends of buffers and past them.
-// RUN: sed -n 's|^// CASE: ||p' %s > %t.cases
-// RUN: piko-compare %s --cases %t.cases | FileCheck %s --check-prefix=EQUAL
-// EQUAL-COUNT-3: {{^equal$}}
+// RUN: %compare_targets %s --cases %s
 // CASE: --pipe Rows --count 500
 // CASE: --pipe Tiles --count 300
 // CASE: --pipe Clamped --count 200

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // Fields of all integer types and of enumerations are indices of buffers.
-// RUN: piko-compare %s --count 200 --runs 2 --threads 1,2 | FileCheck %s
+// RUN: %compare_targets %s --count 200 --runs 2 --threads 1 2 | FileCheck %s
 // CHECK: equal
 #include <piko.h>
 

@@ -2,7 +2,7 @@
 //
 // A switch in an iteration that has a case for every value: its default is never
 // reached, and so is in no loop.
-// RUN: piko-compare %s --count 500 | FileCheck %s
+// RUN: %compare_targets %s --count 500 | FileCheck %s
 // CHECK: equal
 #include <piko.h>
 

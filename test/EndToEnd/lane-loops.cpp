@@ -2,9 +2,7 @@
 //
 // Loops that lanes share though they are written in order, short arrays of each
 // lane, remainders by what lanes share, and reads of records behind conditions.
-// RUN: sed -n 's|^// CASE: ||p' %s > %t.cases
-// RUN: piko-compare %s --cases %t.cases --runs 1 | FileCheck %s
-// CHECK-COUNT-8: {{^equal$}}
+// RUN: %compare_targets %s --cases %s --runs 1
 // CASE: --pipe Neighbours --domain 40 40 --count 700
 // CASE: --pipe Neighbours --domain 33 33 --count 5000
 // CASE: --pipe Insertion --domain 8 8 --count 1003

@@ -2,13 +2,9 @@
 //
 // Loops over records with arrays, whose words LLVM gathers; loops that state
 // bounds; and blocks of bytes and of numbers of 16 bits, which lanes store.
-// RUN: sed -n 's|^// CASE: ||p' %s > %t.cases
-// RUN: piko-compare %s --cases %t.cases --runs 1 | FileCheck %s --check-prefix=EQUAL
-// RUN: piko-compare %s --cases %t.cases --runs 1 --without vectorize -O0 | FileCheck %s --check-prefix=EQUAL
-// RUN: piko-compare %s --cases %t.cases --runs 1 --without hoist-loads | FileCheck %s --check-prefix=EQUAL
-// RUN: %if x86_64 %{ piko-compare %s --cases %t.cases --runs 1 --cpu x86-64 | FileCheck %s --check-prefix=EQUAL %}
-// RUN: %if x86_64 %{ piko-compare %s --cases %t.cases --runs 1 --cpu x86-64-v3 | FileCheck %s --check-prefix=EQUAL %}
-// EQUAL-COUNT-9: {{^equal$}}
+// RUN: %compare_targets %s --cases %s --runs 1
+// RUN: %if all %{ piko-compare %s --cases %s --runs 1 --without vectorize -O0 %}
+// RUN: %if all %{ piko-compare %s --cases %s --runs 1 --without hoist-loads %}
 // CASE: --pipe Traces --count 70
 // CASE: --pipe Norms --count 1
 // CASE: --pipe Gaps --count 1

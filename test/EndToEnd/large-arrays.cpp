@@ -2,9 +2,9 @@
 //
 // Local arrays that are nearly as large as they may be, in stages of one
 // kernel, in iterations that meet, and again for each primitive.
-// RUN: piko-compare %s --pipe Chain --count 300 --runs 1 --threads 2 | FileCheck %s
-// RUN: piko-compare %s --pipe Meeting --count 9 --runs 1 --threads 2 | FileCheck %s
-// CHECK: {{^equal$}}
+// RUN: %compare_targets %s --cases %s --threads 2 --runs 1
+// CASE: --pipe Chain --count 300
+// CASE: --pipe Meeting --count 9
 #include "Inputs/ports.h"
 
 struct State {

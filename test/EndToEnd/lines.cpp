@@ -2,12 +2,13 @@
 //
 // Lines are in the bins that they touch, as the reference has it: short and
 // long ones, in any direction, through corners, of positions anywhere.
-// RUN: piko-compare %s --pipe Planar --count 3000 --domain 61 43 --runs 1 --threads 1 2 | FileCheck %s
-// RUN: piko-compare %s --pipe Planar --count 2000 --domain 64 64 --runs 1 --wide | FileCheck %s
+// RUN: %compare_targets %s --cases %s --runs 1
+// CASE: --pipe Planar --count 3000 --domain 61 43
+// CASE: --pipe Planar --count 2000 --domain 64 64 --wide
+// CASE: --pipe Linear --count 2000 --domain 100 --wide
+// CASE: --pipe Spatial --count 2000 --domain 13 18 7 --wide
+// CASE: --pipe Wide --count 2000 --domain 61 43 --wide
 // RUN: piko-compare %s --pipe Planar --count 300 --domain 61 43 --runs 1 --target gpu-on-cpu --gpu-threads 32 --wide | FileCheck %s
-// RUN: piko-compare %s --pipe Linear --count 2000 --domain 100 --runs 1 --wide | FileCheck %s
-// RUN: piko-compare %s --pipe Spatial --count 2000 --domain 13 18 7 --runs 1 --wide | FileCheck %s
-// RUN: piko-compare %s --pipe Wide --count 2000 --domain 61 43 --runs 1 --wide | FileCheck %s
 // CHECK: equal
 #include <piko.h>
 

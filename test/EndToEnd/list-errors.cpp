@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// What only a run can find of lists and barriers, on both targets.
-// RUN: not piko-compare %s --pipe Read --runs 1 --threads 1 2 | FileCheck %s --check-prefix=READ
-// RUN: not piko-compare %s --pipe Part --runs 1 --threads 1 2 | FileCheck %s --check-prefix=PART
-// RUN: not piko-compare %s --pipe Count --runs 1 --threads 1 2 | FileCheck %s --check-prefix=COUNT
+// What only a run can find of lists and barriers, on all targets.
+// RUN: %compare_targets %s --stops --pipe Read --runs 1 --threads 1 2 | FileCheck %s --check-prefix=READ
+// RUN: %compare_targets %s --stops --pipe Part --runs 1 --threads 1 2 | FileCheck %s --check-prefix=PART
+// RUN: %compare_targets %s --stops --pipe Count --runs 1 --threads 1 2 | FileCheck %s --check-prefix=COUNT
 #include "Inputs/ports.h"
 
 struct State {

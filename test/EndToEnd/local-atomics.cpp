@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // A local variable is its call's own: an atomic on it is a plain change.
-// RUN: piko-compare %s --pipe Ordered --count 8 --seed 1 | FileCheck %s
-// RUN: piko-compare %s --pipe Ordered --count 8 --seed 2 | FileCheck %s
-// RUN: piko-compare %s --pipe Fetches --count 64 | FileCheck %s
+// RUN: %compare_targets %s --cases %s
+// CASE: --pipe Ordered --count 8 --seed 1
+// CASE: --pipe Ordered --count 8 --seed 2
+// CASE: --pipe Fetches --count 64
 // RUN: pikoc %s --pipe Ordered --emit=kernels -o - | FileCheck %s --check-prefix=KERNEL
 // KERNEL-NOT: piko.atomic
-// CHECK: equal
 #include <piko.h>
 
 struct Seed {

@@ -18,13 +18,15 @@
 // KERNEL:      piko.local_barrier @pairs[0] -> @settle
 // KERNEL:      piko.kernel @kernel_join
 //
-// RUN: piko-compare %s --pipe Chain --domain 67 35 --count 2000 | FileCheck %s
-// RUN: piko-compare %s --pipe Chain --domain 67 35 --count 0 --runs 1 | FileCheck %s
-// RUN: piko-compare %s --pipe Chain --domain 67 35 --count 2000 --runs 1 --strip 7 | FileCheck %s
-// RUN: piko-compare %s --pipe Chain --domain 67 35 --count 2000 --runs 1 --without fuse-kernels | FileCheck %s
-// RUN: piko-compare %s --pipe Chain --domain 67 35 --count 2000 --runs 1 --without fuse-stages | FileCheck %s
-// RUN: piko-compare %s --pipe Lists --domain 67 35 --count 2000 | FileCheck %s
-// RUN: piko-compare %s --pipe Serial --domain 67 35 --count 500 | FileCheck %s
+// RUN: %compare_targets %s --cases %s
+// CASE: --pipe Chain --domain 67 35 --count 2000
+// CASE: --pipe Chain --domain 67 35 --count 0
+// CASE: --pipe Chain --domain 67 35 --count 2000 --strip 7
+// CASE: --pipe Lists --domain 67 35 --count 2000
+// CASE: --pipe Serial --domain 67 35 --count 500
+// CASE: --pipe Layers --domain 67 35 --count 10000 --budget 4000000
+// RUN: %if all %{ piko-compare %s --pipe Chain --domain 67 35 --count 2000 --runs 1 --without fuse-kernels | FileCheck %s %}
+// RUN: %if all %{ piko-compare %s --pipe Chain --domain 67 35 --count 2000 --runs 1 --without fuse-stages | FileCheck %s %}
 // On a GPU what lies between two stages is the block's.
 // RUN: piko-compare %s --pipe Chain --domain 67 35 --count 500 --runs 1 --threads 2 --target gpu-on-cpu --gpu-threads 64 --gpu-seed 3 | FileCheck %s
 // RUN: piko-compare %s --pipe Lists --domain 67 35 --count 300 --runs 1 --threads 2 --target gpu-on-cpu --gpu-threads 32 | FileCheck %s
@@ -36,7 +38,6 @@
 // PTX: shfl.sync.idx.b32
 //
 // What lies between two stages does not fit a budget that it fits for one bin.
-// RUN: piko-compare %s --pipe Layers --domain 67 35 --count 10000 --runs 1 --budget 4000000 | FileCheck %s
 // RUN: not piko-compare %s --pipe Layers --domain 67 35 --count 10000 --runs 1 --budget 4000000 --without fuse-kernels 2>&1 | FileCheck %s --check-prefix=SMALL
 // SMALL: out of memory
 #include "Inputs/ports.h"

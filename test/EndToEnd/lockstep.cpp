@@ -2,11 +2,7 @@
 //
 // Iterations that meet, few enough for the lanes of a vector, run in lockstep and
 // give the reference executor's numbers, and its errors.
-// RUN: sed -n 's|^// CASE: ||p' %s > %t.cases
-// RUN: piko-compare %s --cases %t.cases --runs 1 | FileCheck %s --check-prefix=EQUAL
-// RUN: %if x86_64 %{ piko-compare %s --cases %t.cases --runs 1 --cpu x86-64 | FileCheck %s --check-prefix=EQUAL %}
-// RUN: %if x86_64 %{ piko-compare %s --cases %t.cases --runs 1 --cpu x86-64-v3 | FileCheck %s --check-prefix=EQUAL %}
-// EQUAL-COUNT-15: {{^equal$}}
+// RUN: %compare_targets %s --cases %s --runs 1
 // CASE: --pipe Nearest --count 400
 // CASE: --pipe Sums --count 400
 // CASE: --pipe Network --count 400
@@ -22,7 +18,7 @@
 // CASE: --pipe Changes --count 400
 // CASE: --pipe ChangesOfAll --count 400
 // CASE: --pipe ChangesOfItems --count 400
-// RUN: piko-compare %s --pipe Nearest --count 400 --runs 1 --without vectorize -O0 | FileCheck %s
+// RUN: %if all %{ piko-compare %s --pipe Nearest --count 400 --runs 1 --without vectorize -O0 | FileCheck %s %}
 // CHECK: equal
 // RUN: not piko-compare %s --pipe Outside --count 400 --runs 1 --threads 2 | FileCheck %s --check-prefix=OUTSIDE
 // OUTSIDE: got: stage 'stage', bin 0: expected an index into 'in' in [0, 400), but got 405

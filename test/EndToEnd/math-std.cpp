@@ -3,7 +3,7 @@
 // Functions of the C++ library and of GLM on numbers. The reference takes
 // piko's in the place of those that differ between machines, as the compiler
 // does; the others have one right value.
-// RUN: piko-compare %s --count 64 --runs 1 --threads 1 2>/dev/null | FileCheck %s
+// RUN: %compare_targets %s --count 64 --runs 1 --threads 1 2>/dev/null | FileCheck %s
 // CHECK: equal
 #include "Inputs/functions.h"
 

@@ -2,9 +2,9 @@
 //
 // Functions of the standard library in a file with several pipelines, each of
 // which gets what they are compiled as.
-// RUN: piko-compare %s --pipe Parts --domain 67 35 --count 500 --runs 1 | FileCheck %s
-// RUN: piko-compare %s --pipe Rounds --domain 67 35 --count 500 --runs 1 | FileCheck %s
-// CHECK: equal
+// RUN: %compare_targets %s --cases %s --runs 1
+// CASE: --pipe Parts --domain 67 35 --count 500
+// CASE: --pipe Rounds --domain 67 35 --count 500
 #include <piko.h>
 
 #include <cmath>

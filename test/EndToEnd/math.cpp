@@ -2,7 +2,7 @@
 //
 // The functions of piko:: give the same bits as in a plain C++ build, on numbers
 // of any size, denormals, infinities and NaN.
-// RUN: piko-compare %s --count 64 --runs 1 --threads 1 | FileCheck %s
+// RUN: %compare_targets %s --count 64 --runs 1 --threads 1 | FileCheck %s
 // CHECK: equal
 #include "Inputs/functions.h"
 

@@ -2,9 +2,7 @@
 //
 // Signs of 64-bit functions of the pixel are those of the reference executor,
 // whether they fit into 32 bits or overflow 64.
-// RUN: sed -n 's|^// CASE: ||p' %s > %t.cases
-// RUN: piko-compare %s --cases %t.cases --runs 1 | FileCheck %s
-// CHECK-COUNT-9: {{^equal$}}
+// RUN: %compare_targets %s --cases %s --runs 1
 // CASE: --pipe Edges --domain 67 53 --count 600
 // CASE: --pipe Between --domain 67 53 --count 600
 // CASE: --pipe Carried --domain 67 53 --count 600

@@ -2,12 +2,8 @@
 //
 // Lanes that read elements side by side: entries of tables, clamped pixels, rows
 // of bytes, and places of both ends of a buffer, where there is no next one.
-// RUN: sed -n 's|^// CASE: ||p' %s > %t.cases
-// RUN: piko-compare %s --cases %t.cases --runs 1 | FileCheck %s --check-prefix=EQUAL
-// RUN: piko-compare %s --cases %t.cases --runs 1 --without pair-gathers | FileCheck %s --check-prefix=EQUAL
-// RUN: %if x86_64 %{ piko-compare %s --cases %t.cases --runs 1 --cpu x86-64 | FileCheck %s --check-prefix=EQUAL %}
-// RUN: %if x86_64 %{ piko-compare %s --cases %t.cases --runs 1 --cpu x86-64-v3 | FileCheck %s --check-prefix=EQUAL %}
-// EQUAL-COUNT-6: {{^equal$}}
+// RUN: %compare_targets %s --cases %s --runs 1
+// RUN: %if all %{ piko-compare %s --cases %s --runs 1 --without pair-gathers %}
 // CASE: --pipe Tables --count 200
 // CASE: --pipe Clamps --count 200
 // CASE: --pipe Blocks --count 200

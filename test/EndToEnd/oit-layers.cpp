@@ -2,9 +2,9 @@
 //
 // Hundreds of layers at a pixel, many of them at equal depths, transparent and
 // opaque ones among them, are blended with the reference executor's bits.
-// RUN: piko-compare %s --pipe Small --domain 9 3 --count 8000 | FileCheck %s
-// RUN: piko-compare %s --pipe Shared --domain 3 2 --count 3000 --wide | FileCheck %s
-// CHECK: equal
+// RUN: %compare_targets %s --cases %s
+// CASE: --pipe Small --domain 9 3 --count 8000
+// CASE: --pipe Shared --domain 3 2 --count 3000 --wide
 #include "../../examples/oit/oit.piko.cpp"
 
 struct Random {

@@ -2,11 +2,8 @@
 //
 // Tests of whether a sum, a difference or a product leaves its type, of which an
 // optimizer makes operations with overflow.
-// RUN: sed -n 's|^// CASE: ||p' %s > %t.cases
-// RUN: piko-compare %s --cases %t.cases --runs 1 | FileCheck %s
-// RUN: piko-compare %s --cases %t.cases --runs 1 --without vectorize -O0 | FileCheck %s
-// RUN: piko-compare %s --cases %t.cases --runs 1 --target gpu-on-cpu --gpu-threads 32 | FileCheck %s
-// CHECK-COUNT-2: {{^equal$}}
+// RUN: %compare_targets %s --cases %s --runs 1
+// RUN: %if all %{ piko-compare %s --cases %s --runs 1 --without vectorize -O0 %}
 // CASE: --pipe Narrow --count 640 --wide
 // CASE: --pipe Wide --count 640 --wide
 #include <piko.h>

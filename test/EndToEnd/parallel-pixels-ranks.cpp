@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // parallelForPixels(lo, hi, f) in one and in three dimensions.
-// RUN: piko-compare %s --pipe One --domain 53 --count 200 | FileCheck %s
-// RUN: piko-compare %s --pipe Three --domain 33 18 7 --count 200 | FileCheck %s
-// CHECK: equal
+// RUN: %compare_targets %s --cases %s
+// CASE: --pipe One --domain 53 --count 200
+// CASE: --pipe Three --domain 33 18 7 --count 200
 #include <piko.h>
 
 struct Seed {

@@ -7,9 +7,10 @@
 // RUN: pikoc %s --emit=kernels -o - | FileCheck %s --check-prefix=PIXELS
 // PIXELS-COUNT-7: piko.parallel_pixels
 // PIXELS-NOT: piko.parallel_pixels
-// RUN: piko-compare %s --domain 67 35 --count 400 | FileCheck %s
-// RUN: piko-compare %s --domain 1 1 --count 40 | FileCheck %s
-// RUN: piko-compare %s --domain 8 16 --count 40 --threads 1 | FileCheck %s
+// RUN: %compare_targets %s --cases %s
+// CASE: --domain 67 35 --count 400
+// CASE: --domain 1 1 --count 40
+// CASE: --domain 8 16 --count 40
 // RUN: piko-compare %s --domain 67 35 --count 60 --runs 2 --check | FileCheck %s
 // CHECK: equal
 #include <piko.h>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // Lists, iterations that meet, and what they exchange, against the reference.
-// RUN: piko-compare %s --pipe Pipeline --count 700 | FileCheck %s
+// RUN: %compare_targets %s --pipe Pipeline --count 700 | FileCheck %s
 // CHECK: equal
 #include "Inputs/ports.h"
 

@@ -7,8 +7,8 @@
 // PROVED-COUNT-9: keeps each primitive in the bin that it was emitted from
 // RUN: FileCheck %s --check-prefix=FUSED --input-file=%t.remarks
 // FUSED-COUNT-9: runs inside stage
-// RUN: piko-compare %s --domain 67 35 --count 300 | FileCheck %s
-// RUN: piko-compare %s --domain 67 35 --count 100 --without infer-directives | FileCheck %s
+// RUN: %compare_targets %s --domain 67 35 --count 300 | FileCheck %s
+// RUN: %if all %{ piko-compare %s --domain 67 35 --count 100 --without infer-directives | FileCheck %s %}
 // CHECK: equal
 #include "Inputs/emitting-loops.h"
 

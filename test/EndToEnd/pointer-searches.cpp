@@ -2,7 +2,7 @@
 //
 // Pointers that searches give, into an array behind another member and in front
 // of one, and pointers that walk through the arrays of several records.
-// RUN: timeout 240 piko-compare %s --count 64 | FileCheck %s
+// RUN: %compare_targets %s --count 64 | FileCheck %s
 // CHECK: equal
 #include <piko.h>
 

@@ -9,7 +9,7 @@
 // RUN: piko-compare %s --pipe Relaxed --count 1003 --domain 9 9 --tolerance 1e-6 > %t.relaxed
 // RUN: FileCheck %s --check-prefix=CONTRACTED --input-file %t.contracted
 // RUN: FileCheck %s --check-prefix=RELAXED --input-file %t.relaxed
-// RUN: piko-compare %s --pipe Strict --count 1003 --domain 9 9 | FileCheck %s --check-prefix=STRICT
+// RUN: %compare_targets %s --pipe Strict --count 1003 --domain 9 9 | FileCheck %s --check-prefix=STRICT
 // RUN: piko-compare %s --pipe Contracted --count 1003 --domain 9 9 --without vectorize,if-convert,fuse-stages,fuse-kernels,infer-directives | diff - %t.contracted
 // RUN: piko-compare %s --pipe Relaxed --count 1003 --domain 9 9 --without vectorize,if-convert,fuse-stages,fuse-kernels,infer-directives | diff - %t.relaxed
 // RUN: piko-compare %s --pipe Relaxed --count 1003 --domain 9 9 --check | diff - %t.relaxed

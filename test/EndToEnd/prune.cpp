@@ -4,7 +4,7 @@
 // left gives the reference executor's bits: sums that are not associative show
 // the order in which primitives on several paths arrive.
 // RUN: pikoc %s --pipe PrunePipe --emit=kernels --remarks -o %t 2>&1 | FileCheck %s --check-prefix=REMARKS
-// RUN: piko-compare %s --pipe PrunePipe --count 3000 | FileCheck %s
+// RUN: %compare_targets %s --pipe PrunePipe --count 3000 | FileCheck %s
 // CHECK: equal
 #include "Inputs/ports.h"
 

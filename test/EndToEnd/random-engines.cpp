@@ -2,7 +2,7 @@
 //
 // The engines of <random>: records whose arrays are indexed by a number of the
 // same record.
-// RUN: timeout 240 piko-compare %s --count 48 | FileCheck %s
+// RUN: %compare_targets %s --count 48 | FileCheck %s
 // CHECK: equal
 #include <piko.h>
 

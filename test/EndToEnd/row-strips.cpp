@@ -2,9 +2,7 @@
 //
 // Convex shapes in strips of columns, of which each has its own rows: the pixels
 // of the reference executor, however a text says what is inside.
-// RUN: sed -n 's|^// CASE: ||p' %s > %t.cases
-// RUN: piko-compare %s --cases %t.cases --runs 1 | FileCheck %s
-// CHECK-COUNT-13: {{^equal$}}
+// RUN: %compare_targets %s --cases %s --runs 1
 // CASE: --pipe Bits --domain 167 93 --count 400
 // CASE: --pipe Returns --domain 167 93 --count 400
 // CASE: --pipe All --domain 167 93 --count 400

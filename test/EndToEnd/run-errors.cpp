@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// Mistakes that only a run can find stop it with the stage's name, on both
+// Mistakes that only a run can find stop it with the stage's name, on all
 // targets.
-// RUN: not piko-compare %s --pipe Read --runs 1 --threads 1 2 | FileCheck %s --check-prefix=READ
-// RUN: not piko-compare %s --pipe Write --runs 1 --threads 1 2 | FileCheck %s --check-prefix=WRITE
-// RUN: not piko-compare %s --pipe Bin --runs 1 --threads 1 2 | FileCheck %s --check-prefix=BIN
-// RUN: not piko-compare %s --pipe Box --runs 1 --threads 1 2 | FileCheck %s --check-prefix=BOX
-// RUN: not piko-compare %s --pipe Line --runs 1 --threads 1 2 | FileCheck %s --check-prefix=LINE
+// RUN: %compare_targets %s --stops --pipe Read --runs 1 --threads 1 2 | FileCheck %s --check-prefix=READ
+// RUN: %compare_targets %s --stops --pipe Write --runs 1 --threads 1 2 | FileCheck %s --check-prefix=WRITE
+// RUN: %compare_targets %s --stops --pipe Bin --runs 1 --threads 1 2 | FileCheck %s --check-prefix=BIN
+// RUN: %compare_targets %s --stops --pipe Box --runs 1 --threads 1 2 | FileCheck %s --check-prefix=BOX
+// RUN: %compare_targets %s --stops --pipe Line --runs 1 --threads 1 2 | FileCheck %s --check-prefix=LINE
 #include "Inputs/ports.h"
 
 struct State {

@@ -3,24 +3,21 @@
 // Blocks of a GPU share a bin that is the whole domain where its primitives select
 // what pixels keep: the texts are those of selections.cpp, and some whose keys are
 // wide, or whose kernels do more than select.
-// RUN: sed -n 's|^// CASE: ||p' %S/selections.cpp > %t.cases
-// RUN: piko-compare %S/selections.cpp --cases %t.cases --runs 1 --threads 2 --target gpu-on-cpu --gpu-threads 32 --gpu-seed 3 | FileCheck %s
-// CHECK-COUNT-16: {{^equal$}}
-// RUN: sed -n 's|^// MORE: ||p' %s > %t.more
-// RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_SEED=5 piko-compare %s --cases %t.more --runs 2 --threads 2 --target cuda | FileCheck %s --check-prefix=DONE
-// DONE-COUNT-12: {{^equal$}}
-// MORE: --pipe Far --count 3000 --domain 67 35
-// MORE: --pipe Wider --count 3000 --domain 67 35
-// MORE: --pipe Ties --count 3000 --domain 67 35
-// MORE: --pipe Emitting --count 3000 --domain 67 35
-// MORE: --pipe Serial --count 900 --domain 67 35
-// MORE: --pipe Reading --count 900 --domain 67 35
-// MORE: --pipe Tiles --count 900 --domain 67 35
-// MORE: --pipe Tiles --count 4 --domain 670 350
-// MORE: --pipe TilesByTwo --count 900 --domain 67 35
-// MORE: --pipe TileSums --count 900 --domain 67 35
-// MORE: --pipe TilesGoOn --count 900 --domain 67 35
-// MORE: --pipe TilesBlend --count 900 --domain 67 35
+// RUN: piko-compare %S/selections.cpp --cases %S/selections.cpp --runs 1 --threads 2 --target gpu-on-cpu --gpu-threads 32 --gpu-seed 3
+// RUN: %compare_targets %s --cases %s --runs 1
+// RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_SEED=5 piko-compare %s --cases %s --runs 2 --threads 2 --target cuda
+// CASE: --pipe Far --count 3000 --domain 67 35
+// CASE: --pipe Wider --count 3000 --domain 67 35
+// CASE: --pipe Ties --count 3000 --domain 67 35
+// CASE: --pipe Emitting --count 3000 --domain 67 35
+// CASE: --pipe Serial --count 900 --domain 67 35
+// CASE: --pipe Reading --count 900 --domain 67 35
+// CASE: --pipe Tiles --count 900 --domain 67 35
+// CASE: --pipe Tiles --count 4 --domain 670 350
+// CASE: --pipe TilesByTwo --count 900 --domain 67 35
+// CASE: --pipe TileSums --count 900 --domain 67 35
+// CASE: --pipe TilesGoOn --count 900 --domain 67 35
+// CASE: --pipe TilesBlend --count 900 --domain 67 35
 // With a budget the frame is the host's, which clears what the kernels have for
 // themselves in front of each launch.
 // RUN: env PIKO_CUDA_DRIVER=%test_driver piko-compare %S/selections.cpp --pipe Rounds --count 3000 --domain 67 35 --runs 2 --threads 2 --target cuda --budget 50000000 | FileCheck %s --check-prefix=HOST

@@ -2,9 +2,7 @@
 //
 // Where the order of updates shows, or might, one thread runs a bin that is the
 // whole domain, and a remark says why.
-// RUN: sed -n 's|^// CASE: ||p' %s > %t.cases
-// RUN: piko-compare %s --cases %t.cases --threads 1 2 7 | FileCheck %s
-// CHECK-COUNT-12: {{^equal$}}
+// RUN: %compare_targets %s --cases %s --threads 1 2 7
 // RUN: env PIKO_CUDA_DRIVER=%test_driver piko-compare %s --pipe Element --count 3000 --domain 67 35 --runs 1 --target cuda | FileCheck %s --check-prefix=GPU
 // GPU: {{^equal$}}
 // CASE: --pipe Blended --count 3000 --domain 67 35

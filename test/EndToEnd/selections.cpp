@@ -3,9 +3,7 @@
 // Threads share a bin that is the whole domain where its primitives select what
 // pixels keep, in whatever way that is written, and the first in order of lineage
 // is kept among equal ones, or the last: with ties, NaN, and zeros of both signs.
-// RUN: sed -n 's|^// CASE: ||p' %s > %t.cases
-// RUN: piko-compare %s --cases %t.cases --threads 1 2 3 7 | FileCheck %s
-// CHECK-COUNT-16: {{^equal$}}
+// RUN: %compare_targets %s --cases %s --threads 1 2 3 7
 // CASE: --pipe Nearest --count 6000 --domain 67 35
 // CASE: --pipe Nearest --count 3 --domain 670 350
 // CASE: --pipe Last --count 6000 --domain 67 35
@@ -22,7 +20,7 @@
 // CASE: --pipe Counted --count 6000 --domain 67 35
 // CASE: --pipe Marked --count 6000 --domain 67 35
 // CASE: --pipe Rounds --count 3000 --domain 67 35
-// RUN: piko-compare %s --pipe Nearest --count 6000 --domain 67 35 --without vectorize -O0 | FileCheck %s --check-prefix=SCALAR
+// RUN: %if all %{ piko-compare %s --pipe Nearest --count 6000 --domain 67 35 --without vectorize -O0 | FileCheck %s --check-prefix=SCALAR %}
 // SCALAR: equal
 // RUN: not piko-compare %s --pipe Outside --count 4000 --runs 1 --threads 1 2 4 | FileCheck %s --check-prefix=OUTSIDE
 // OUTSIDE: 2 threads, run 0: got: stage 'draw', bin 0: expected an update inside the stage's own bin

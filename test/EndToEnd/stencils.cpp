@@ -3,13 +3,9 @@
 // Loops that read around an element, in all styles: nests whose indices are
 // tested in front by their ranges, rows with ends as vectors, and what is left
 // to tests in the loop.
-// RUN: sed -n 's|^// CASE: ||p' %s > %t.cases
-// RUN: piko-compare %s --cases %t.cases --runs 1 | FileCheck %s --check-prefix=EQUAL
-// RUN: piko-compare %s --cases %t.cases --runs 1 --without hoist-bounds | FileCheck %s --check-prefix=EQUAL
-// RUN: piko-compare %s --cases %t.cases --runs 1 --without vectorize -O0 | FileCheck %s --check-prefix=EQUAL
-// RUN: %if x86_64 %{ piko-compare %s --cases %t.cases --runs 1 --cpu x86-64 | FileCheck %s --check-prefix=EQUAL %}
-// RUN: %if x86_64 %{ piko-compare %s --cases %t.cases --runs 1 --cpu x86-64-v3 | FileCheck %s --check-prefix=EQUAL %}
-// EQUAL-COUNT-12: {{^equal$}}
+// RUN: %compare_targets %s --cases %s --runs 1
+// RUN: %if all %{ piko-compare %s --cases %s --runs 1 --without hoist-bounds %}
+// RUN: %if all %{ piko-compare %s --cases %s --runs 1 --without vectorize -O0 %}
 // CASE: --pipe Clamps --count 1
 // CASE: --pipe Wraps --count 1
 // CASE: --pipe Mirrors --count 1

@@ -3,11 +3,11 @@
 // A source in strips, however they are cut: by the tile of `All`, by the host,
 // by a budget. Branches meet again, two stages update pixels in lineage order, a
 // loop runs to its end in each strip, and a list gets what all of them left.
-// RUN: piko-compare %s --count 2000 --runs 1 | FileCheck %s
-// RUN: piko-compare %s --count 300 --runs 1 --strip 1 | FileCheck %s
-// RUN: piko-compare %s --count 1000 --runs 1 --strip 7 | FileCheck %s
-// RUN: piko-compare %s --count 5000 --runs 1 --budget 4000000 | FileCheck %s
-// CHECK: equal
+// RUN: %compare_targets %s --cases %s --runs 1
+// CASE: --count 2000
+// CASE: --count 300 --strip 1
+// CASE: --count 1000 --strip 7
+// CASE: --count 5000 --budget 4000000
 //
 // RUN: pikoc %s --remarks -o %t.o 2>&1 | FileCheck %s --check-prefix=REMARK
 // REMARK: strips.cpp:{{.*}}: remark: stage 'gather' does not run in strips: its process phase takes a list

@@ -10,17 +10,18 @@
 // REMARK-DAG: remark: stage 'copy' has no tiles of 'copied'
 // REMARK-DAG: note: threads share the primitives of a bin
 //
-// RUN: piko-compare %s --pipe Items --domain 67 35 --count 2000 | FileCheck %s
-// RUN: piko-compare %s --pipe Items --domain 67 35 --count 5 | FileCheck %s
-// RUN: piko-compare %s --pipe Items --domain 67 35 --count 0 --runs 2 | FileCheck %s
-// RUN: piko-compare %s --pipe Items --domain 7 3 --count 50 --runs 1 | FileCheck %s
-// RUN: piko-compare %s --pipe Items --domain 67 35 --count 200 --runs 2 --strip 7 | FileCheck %s
-// RUN: piko-compare %s --pipe Items --domain 67 35 --count 200 --runs 1 --without form-tiles | FileCheck %s
-// RUN: piko-compare %s --pipe Waits --domain 67 35 --count 500 | FileCheck %s
-// RUN: piko-compare %s --pipe Waits --domain 67 35 --count 5 --runs 2 | FileCheck %s
-// RUN: piko-compare %s --pipe Waits --domain 67 35 --count 500 --runs 1 --without form-tiles | FileCheck %s
-// RUN: piko-compare %s --pipe Every --domain 67 35 --count 5 --runs 2 | FileCheck %s
-// RUN: piko-compare %s --pipe Batches --domain 35 20 --count 300 --runs 1 | FileCheck %s
+// RUN: %compare_targets %s --cases %s
+// CASE: --pipe Items --domain 67 35 --count 2000
+// CASE: --pipe Items --domain 67 35 --count 5
+// CASE: --pipe Items --domain 67 35 --count 0
+// CASE: --pipe Items --domain 7 3 --count 50
+// CASE: --pipe Items --domain 67 35 --count 200 --strip 7
+// CASE: --pipe Waits --domain 67 35 --count 500
+// CASE: --pipe Waits --domain 67 35 --count 5
+// CASE: --pipe Every --domain 67 35 --count 5
+// CASE: --pipe Batches --domain 35 20 --count 300
+// RUN: %if all %{ piko-compare %s --pipe Items --domain 67 35 --count 200 --runs 1 --without form-tiles | FileCheck %s %}
+// RUN: %if all %{ piko-compare %s --pipe Waits --domain 67 35 --count 500 --runs 1 --without form-tiles | FileCheck %s %}
 // CHECK: equal
 #include "Inputs/ports.h"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // A stage with two ports of different types.
-// RUN: piko-compare %s --count 5000 | FileCheck %s
+// RUN: %compare_targets %s --count 5000 | FileCheck %s
 // CHECK: equal
 #include "Inputs/ports.h"
 

@@ -3,11 +3,11 @@
 // Edges on which nothing is ever emitted still say in which order stages run, and
 // what are rounds: results are those of the reference.
 //
-// RUN: piko-compare %s --pipe Rounds --count 20 | FileCheck %s
-// RUN: piko-compare %s --pipe Order --count 20 | FileCheck %s
-// RUN: piko-compare %s --pipe Row --count 20 | FileCheck %s
-// RUN: piko-compare %s --pipe Dropped --count 20 | FileCheck %s
-// CHECK: equal
+// RUN: %compare_targets %s --cases %s
+// CASE: --pipe Rounds --count 20
+// CASE: --pipe Order --count 20
+// CASE: --pipe Row --count 20
+// CASE: --pipe Dropped --count 20
 //
 // A stage that nothing can reach is dropped, with its cycle.
 // RUN: pikoc %s --pipe Dropped --emit=kernels | FileCheck %s --check-prefix=DROPPED

@@ -3,11 +3,8 @@
 // Loops around loops that change the same elements in each of their turns, in
 // all styles: four turns share the inner loop where none sees it, and the others
 // keep their order.
-// RUN: sed -n 's|^// CASE: ||p' %s > %t.cases
-// RUN: piko-compare %s --cases %t.cases --runs 1 | FileCheck %s --check-prefix=EQUAL
-// RUN: piko-compare %s --cases %t.cases --runs 1 --without vectorize -O0 | FileCheck %s --check-prefix=EQUAL
-// RUN: %if x86_64 %{ piko-compare %s --cases %t.cases --runs 1 --cpu x86-64-v3 | FileCheck %s --check-prefix=EQUAL %}
-// EQUAL-COUNT-14: {{^equal$}}
+// RUN: %compare_targets %s --cases %s --runs 1
+// RUN: %if all %{ piko-compare %s --cases %s --runs 1 --without vectorize -O0 %}
 // CASE: --pipe Product --count 7
 // CASE: --pipe Whiles --count 7
 // CASE: --pipe Unsigneds --count 8

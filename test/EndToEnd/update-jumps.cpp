@@ -2,11 +2,11 @@
 //
 // Updates are left from anywhere: from a switch, from a loop, by helpers that
 // return early, and on a path that nobody takes.
-// RUN: piko-compare %s --pipe Test --count 3000 | FileCheck %s
-// RUN: piko-compare %s --pipe Loops --count 3000 | FileCheck %s
-// RUN: piko-compare %s --pipe Never --count 3000 | FileCheck %s
-// RUN: piko-compare %s --pipe Iterations --count 1000 | FileCheck %s
-// CHECK: equal
+// RUN: %compare_targets %s --cases %s
+// CASE: --pipe Test --count 3000
+// CASE: --pipe Loops --count 3000
+// CASE: --pipe Never --count 3000
+// CASE: --pipe Iterations --count 1000
 #include "Inputs/ports.h"
 
 struct Pixel {

@@ -2,10 +2,10 @@
 //
 // The updates of a pixel run in lineage order, in a bin that threads share and
 // in small ones, behind a stage that sends a primitive through several bins.
-// RUN: piko-compare %s --pipe Shared --count 20000 | FileCheck %s
-// RUN: piko-compare %s --pipe Shared --count 2000 --runs 1 --strip 7 | FileCheck %s
-// RUN: piko-compare %s --pipe Small --count 20000 | FileCheck %s
-// CHECK: equal
+// RUN: %compare_targets %s --cases %s
+// CASE: --pipe Shared --count 20000
+// CASE: --pipe Shared --count 2000 --strip 7
+// CASE: --pipe Small --count 20000
 #include "Inputs/ports.h"
 
 struct Pixel {

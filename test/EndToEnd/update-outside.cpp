@@ -2,9 +2,9 @@
 //
 // The pixel of an update outside its bin has as many coordinates as there are
 // dimensions, in the reference and compiled.
-// RUN: not piko-compare %s --pipe One --domain 16 --runs 1 --threads 1 2 --count 1 | FileCheck %s --check-prefix=ONE
-// RUN: not piko-compare %s --pipe Three --domain 8 8 8 --runs 1 --threads 1 2 --count 1 | FileCheck %s --check-prefix=THREE
-// RUN: not piko-compare %s --pipe Four --domain 8 8 8 8 --runs 1 --threads 1 2 --count 1 | FileCheck %s --check-prefix=FOUR
+// RUN: %compare_targets %s --stops --pipe One --domain 16 --runs 1 --threads 1 2 --count 1 | FileCheck %s --check-prefix=ONE
+// RUN: %compare_targets %s --stops --pipe Three --domain 8 8 8 --runs 1 --threads 1 2 --count 1 | FileCheck %s --check-prefix=THREE
+// RUN: %compare_targets %s --stops --pipe Four --domain 8 8 8 8 --runs 1 --threads 1 2 --count 1 | FileCheck %s --check-prefix=FOUR
 // ONE: expected: {{.*}} inside the stage's own bin, but got pixel (9)
 // ONE: got: {{.*}} inside the stage's own bin, but got pixel (9)
 // THREE: expected: {{.*}} inside the stage's own bin, but got pixel (1, -2, 6)

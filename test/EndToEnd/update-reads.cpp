@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // A call that reads a pixel after its own update sees what the update wrote.
-// RUN: piko-compare %s --count 2000 | FileCheck %s
+// RUN: %compare_targets %s --count 2000 | FileCheck %s
 // CHECK: equal
 #include "Inputs/ports.h"
 

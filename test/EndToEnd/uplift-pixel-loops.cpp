@@ -7,9 +7,10 @@
 // UPLIFTED-COUNT-8: piko.parallel_pixels
 // UPLIFTED-NOT: piko.parallel_pixels
 // RUN: not grep 'stays one that counts' %t.remarks
-// RUN: piko-compare %s --domain 67 35 --count 200 | FileCheck %s
-// RUN: piko-compare %s --domain 67 35 --count 60 --without uplift-pixel-loops | FileCheck %s
-// RUN: piko-compare %s --domain 9 1 --count 40 | FileCheck %s
+// RUN: %compare_targets %s --cases %s
+// CASE: --domain 67 35 --count 200
+// CASE: --domain 9 1 --count 40
+// RUN: %if all %{ piko-compare %s --domain 67 35 --count 60 --without uplift-pixel-loops | FileCheck %s %}
 // CHECK: equal
 #include "Inputs/boxes.h"
 

@@ -3,11 +3,7 @@
 // Iterations that run as lanes of vectors give the reference executor's numbers,
 // in every style of body: loops that end at different times, arrays of an
 // iteration, integers of all sizes, divisors that are 0 elsewhere.
-// RUN: sed -n 's|^// CASE: ||p' %s > %t.cases
-// RUN: piko-compare %s --cases %t.cases --runs 1 | FileCheck %s --check-prefix=EQUAL
-// RUN: %if x86_64 %{ piko-compare %s --cases %t.cases --runs 1 --cpu x86-64 | FileCheck %s --check-prefix=EQUAL %}
-// RUN: %if x86_64 %{ piko-compare %s --cases %t.cases --runs 1 --cpu x86-64-v3 | FileCheck %s --check-prefix=EQUAL %}
-// EQUAL-COUNT-8: {{^equal$}}
+// RUN: %compare_targets %s --cases %s --runs 1
 // CASE: --pipe Escapes --domain 67 35 --count 320
 // CASE: --pipe Sorts --domain 67 35 --count 320
 // CASE: --pipe Searches --domain 67 35 --count 320
@@ -16,7 +12,7 @@
 // CASE: --pipe Doubles --domain 67 35 --count 320
 // CASE: --pipe Wraps --domain 67 35 --count 320
 // CASE: --pipe Counts --domain 67 35 --count 320
-// RUN: piko-compare %s --cases %t.cases --runs 1 --without vectorize -O0 | FileCheck %s --check-prefix=EQUAL
+// RUN: %if all %{ piko-compare %s --cases %s --runs 1 --without vectorize -O0 %}
 //
 // RUN: pikoc %s --pipe Escapes --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=VECTORS
 // RUN: pikoc %s --pipe Sorts --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=VECTORS

@@ -3,12 +3,8 @@
 // Loops whose turns differ between primitives, and hand on nothing, fill vectors
 // with pairs of a primitive and a turn: of boxes that are empty, small and large,
 // in loops of several kinds, with numbers of several widths.
-// RUN: sed -n 's|^// CASE: ||p' %s > %t.cases
-// RUN: piko-compare %s --cases %t.cases --runs 1 --threads 2 | FileCheck %s --check-prefix=EQUAL
-// RUN: %if x86_64 %{ piko-compare %s --cases %t.cases --runs 1 --threads 2 --cpu x86-64 | FileCheck %s --check-prefix=EQUAL %}
-// RUN: %if x86_64 %{ piko-compare %s --cases %t.cases --runs 1 --threads 2 --cpu x86-64-v2 | FileCheck %s --check-prefix=EQUAL %}
-// RUN: %if x86_64 %{ piko-compare %s --cases %t.cases --runs 1 --threads 2 --cpu x86-64-v3 | FileCheck %s --check-prefix=EQUAL %}
-// EQUAL-COUNT-8: {{^equal$}}
+// RUN: %compare_targets %s --cases %s --runs 1 --threads 2
+// RUN: %if x86_64 %{ piko-compare %s --cases %s --runs 1 --threads 2 --cpu x86-64-v2 %}
 // CASE: --pipe Boxes --domain 67 35 --count 2000
 // CASE: --pipe Cells --domain 67 35 --count 2000
 // CASE: --pipe Rows --domain 67 35 --count 2000

@@ -2,11 +2,7 @@
 //
 // Stages that compute for several primitives at once give the reference executor's
 // numbers, and its errors.
-// RUN: sed -n 's|^// CASE: ||p' %s > %t.cases
-// RUN: piko-compare %s --cases %t.cases --runs 1 | FileCheck %s --check-prefix=EQUAL
-// RUN: %if x86_64 %{ piko-compare %s --cases %t.cases --runs 1 --cpu x86-64 | FileCheck %s --check-prefix=EQUAL %}
-// RUN: %if x86_64 %{ piko-compare %s --cases %t.cases --runs 1 --cpu x86-64-v3 | FileCheck %s --check-prefix=EQUAL %}
-// EQUAL-COUNT-7: {{^equal$}}
+// RUN: %compare_targets %s --cases %s --runs 1
 // CASE: --pipe Averages --domain 67 35 --count 2000
 // CASE: --pipe Addresses --domain 67 35 --count 2000
 // CASE: --pipe Repeats --domain 67 35 --count 2000
@@ -14,7 +10,7 @@
 // CASE: --pipe Tests --domain 67 35 --count 2000
 // CASE: --pipe Kinds --domain 67 35 --count 2000
 // CASE: --pipe Olds --domain 67 35 --count 2000
-// RUN: piko-compare %s --pipe Tests --domain 67 35 --count 2000 --runs 1 --without vectorize -O0 | FileCheck %s
+// RUN: %if all %{ piko-compare %s --pipe Tests --domain 67 35 --count 2000 --runs 1 --without vectorize -O0 | FileCheck %s %}
 // CHECK: equal
 // RUN: not piko-compare %s --pipe Outside --domain 67 35 --count 2000 --runs 1 --threads 2 | FileCheck %s --check-prefix=OUTSIDE
 // OUTSIDE: got: stage 'stage', bin 0: expected an index into 'in' in [0, 2000), but got 2013

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // endStage<X> waits for all stages of type X; a member may have a stage's name.
-// RUN: piko-compare %s --count 2000 | FileCheck %s
-// RUN: piko-compare %s --count 2000 --runs 1 --strip 7 | FileCheck %s
-// CHECK: equal
+// RUN: %compare_targets %s --cases %s
+// CASE: --count 2000
+// CASE: --count 2000 --strip 7
 #include "Inputs/ports.h"
 
 struct State {

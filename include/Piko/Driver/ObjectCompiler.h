@@ -8,12 +8,9 @@
 
 #include "Piko/Driver/Options.h"
 
-#include <functional>
 #include <optional>
 
 namespace piko {
-
-struct PipelineDescription;
 
 struct ObjectOptions {
   CompileOptions source;
@@ -24,10 +21,6 @@ struct ObjectOptions {
   /// For the reference executor: all pipelines of the file, whichever `source`
   /// names, but those with errors, which go into the diagnostics.
   bool allPipelines = false;
-  /// These pipelines, where who asks has parsed the file for more than this; is
-  /// called if it was not compiled before. Adds to the diagnostics.
-  std::function<std::vector<PipelineDescription>(std::string &)> describeAll =
-      nullptr;
   bool remarks = false;
 };
 

@@ -24,6 +24,11 @@ struct HostCode {
   bool needsHeader = false;
 };
 
+/// The arguments of Clang for compileForHost: with these, and the text and the
+/// files as they are, it makes the same.
+std::vector<std::string> getHostArguments(const FrontendOptions &options,
+                                          bool optimize);
+
 /// Compiles C++ text that begins with what `userFile` holds, without __PIKO__,
 /// to LLVM IR for this machine; diagnostics go to `context`'s engine. With
 /// `optimize` the optimizer, which did not run yet, may work on it; without,

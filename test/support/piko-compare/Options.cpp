@@ -2,6 +2,9 @@
 
 #include "Options.h"
 
+#include "Piko/Target/Processor.h"
+
+#include <algorithm>
 #include <fstream>
 #include <sstream>
 #include <stdexcept>
@@ -54,6 +57,10 @@ bool readCaseOption(const std::string &name, Words &words, Case &into) {
     into.seed = toNumbers<unsigned>(words.takeValues(name, false))[0];
   else if (name == "--loop-limit")
     into.loopLimit = toNumbers<int64_t>(words.takeValues(name, false))[0];
+  else if (name == "--strip")
+    into.strip = toNumbers<int64_t>(words.takeValues(name, false))[0];
+  else if (name == "--budget")
+    into.budget = toNumbers<int64_t>(words.takeValues(name, false))[0];
   else if (name == "--wide")
     into.wide = true;
   else
@@ -61,10 +68,53 @@ bool readCaseOption(const std::string &name, Words &words, Case &into) {
   return true;
 }
 
+/// A name of --targets, with the options for a GPU that all of them share.
+Target readTarget(const std::string &name, const piko::GPUOptions &gpu) {
+  Target target{name, "native", gpu};
+  if (auto kind = piko::parseGPUTarget(name);
+      kind && *kind != piko::GPUTarget::Auto) {
+    target.gpu.target = *kind;
+    return target;
+  }
+  target.cpu = name;
+  llvm::Expected<piko::Processor> processor = piko::resolveProcessor(name);
+  if (name.empty() || !processor)
+    throw std::runtime_error(
+        "expected --targets with cpu, gpu-on-cpu, cuda or names of processors "
+        "between commas, but got '" +
+        name + "'" +
+        (processor ? "" : ": " + llvm::toString(processor.takeError())));
+  return target;
+}
+
+/// Those of --targets, or the one of --target and --cpu.
+std::vector<Target> readTargets(const std::optional<std::string> &names,
+                                const Target &one) {
+  if (!names)
+    return {one};
+  if (one.gpu.target != piko::GPUTarget::None || one.cpu != Target().cpu)
+    throw std::runtime_error(
+        "expected --targets, or --target and --cpu, but got both");
+  std::vector<Target> targets;
+  for (size_t begin = 0; begin <= names->size();) {
+    size_t end = std::min(names->find(',', begin), names->size());
+    std::string name = names->substr(begin, end - begin);
+    if (std::any_of(targets.begin(), targets.end(),
+                    [&](const Target &t) { return t.name == name; }))
+      throw std::runtime_error("expected each of --targets once, but got '" +
+                               name + "' twice");
+    targets.push_back(readTarget(name, one.gpu));
+    begin = end + 1;
+  }
+  return targets;
+}
+
 } // namespace
 
 Options parseOptions(int argc, char **argv) {
   Options options;
+  Target one;
+  std::optional<std::string> targets;
   Words words({argv + 1, argv + argc});
   while (!words.atEnd()) {
     std::string name = words.take();
@@ -88,37 +138,38 @@ Options parseOptions(int argc, char **argv) {
       if (!synthesis)
         throw std::runtime_error(piko::describeWrongSynthesisOptions(text));
       options.synthesis = *synthesis;
-    } else if (name == "--mapping-window")
+    } else if (name == "--targets")
+      targets = words.takeValues(name, false)[0];
+    else if (name == "--mapping-window")
       options.mappingWindow = std::stod(words.takeValues(name, false)[0]);
     else if (name == "--target") {
       auto target = piko::parseGPUTarget(words.takeValues(name, false)[0]);
       if (!target || *target == piko::GPUTarget::Auto)
         throw std::runtime_error("expected --target cpu, cuda or gpu-on-cpu");
-      options.gpu.target = *target;
+      one.gpu.target = *target;
     } else if (name == "--gpu-threads")
-      options.gpu.threads =
-          toNumbers<int64_t>(words.takeValues(name, false))[0];
+      one.gpu.threads = toNumbers<int64_t>(words.takeValues(name, false))[0];
     else if (name == "--gpu-chip") {
-      if (!options.gpu.setChips(words.takeValues(name, false)[0]))
+      if (!one.gpu.setChips(words.takeValues(name, false)[0]))
         throw std::runtime_error("expected --gpu-chip sm_90,..");
     } else if (name == "--gpu-seed")
-      options.gpu.seed = toNumbers<int64_t>(words.takeValues(name, false))[0];
+      one.gpu.seed = toNumbers<int64_t>(words.takeValues(name, false))[0];
     else if (name == "--gpu-blocks")
-      options.gpu.blocks = toNumbers<int64_t>(words.takeValues(name, false))[0];
+      one.gpu.blocks = toNumbers<int64_t>(words.takeValues(name, false))[0];
     else if (name == "--threads")
       options.threads = toNumbers<int>(words.takeValues(name, true));
     else if (name == "--runs")
       options.runs = toNumbers<int>(words.takeValues(name, false))[0];
-    else if (name == "--strip")
-      options.strip = toNumbers<int64_t>(words.takeValues(name, false))[0];
-    else if (name == "--budget")
-      options.budget = toNumbers<int64_t>(words.takeValues(name, false))[0];
     else if (name == "--timeout")
       options.timeout = toNumbers<unsigned>(words.takeValues(name, false))[0];
     else if (name == "--cpu")
-      options.cpu = words.takeValues(name, false)[0];
+      one.cpu = words.takeValues(name, false)[0];
     else if (name == "--tolerance")
       options.tolerance = std::stod(words.takeValues(name, false)[0]);
+    else if (name == "--stops")
+      options.stops = true;
+    else if (name == "--spread")
+      options.spread = true;
     else if (name == "--owners")
       options.owners = true;
     else if (name == "--no-cache")
@@ -132,21 +183,29 @@ Options parseOptions(int argc, char **argv) {
     throw std::runtime_error("expected a file");
   if (options.reference.empty())
     options.reference = options.file;
+  options.targets = readTargets(targets, one);
   return options;
 }
 
-std::vector<Case> readCases(const std::string &file) {
-  std::ifstream stream(file);
+bool hasOwnCases(const Options &options) {
+  return options.cases.ends_with(".cpp") || options.cases.ends_with(".mlir");
+}
+
+std::vector<Case> readCases(const Options &options) {
+  std::ifstream stream(options.cases);
   if (!stream)
-    throw std::runtime_error("cannot open " + file);
+    throw std::runtime_error("cannot open " + options.cases);
+  const std::string mark = hasOwnCases(options) ? "// CASE: " : "";
   std::vector<Case> cases;
   for (std::string line; std::getline(stream, line);) {
-    std::istringstream text(line);
+    if (!line.starts_with(mark))
+      continue;
+    std::istringstream text(line.substr(mark.size()));
     std::vector<std::string> list;
     for (std::string word; text >> word;)
       list.push_back(word);
     Words words(list);
-    Case read;
+    Case read = options.one;
     while (!words.atEnd()) {
       std::string name = words.take();
       if (!readCaseOption(name, words, read))
@@ -154,5 +213,7 @@ std::vector<Case> readCases(const std::string &file) {
     }
     cases.push_back(read);
   }
+  if (cases.empty())
+    throw std::runtime_error("expected a case in " + options.cases);
   return cases;
 }

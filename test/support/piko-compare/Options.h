@@ -26,10 +26,25 @@ struct Case {
   bool wide = false;
   /// Of hops and rounds; 0 = as it is.
   int64_t loopLimit = 0;
+  /// Primitives of a source in a strip, 0 = all.
+  int64_t strip = 0;
+  /// What bins may hold, in bytes; 0 = no budget.
+  int64_t budget = 0;
 
   int64_t count(size_t source) const {
     return counts[source < counts.size() ? source : counts.size() - 1];
   }
+};
+
+/// What the compiled pipelines run on.
+struct Target {
+  /// As --targets names it; empty where there is but one.
+  std::string name;
+  /// The processor, as pikoc has it.
+  std::string cpu = "native";
+  /// --target gpu-on-cpu, --gpu-threads N (0 = as the stage says), --gpu-seed N,
+  /// --gpu-blocks N (0 = as many as there are units), --gpu-chip NAME,..
+  piko::GPUOptions gpu = {};
 };
 
 struct Options {
@@ -37,26 +52,32 @@ struct Options {
   /// The C++ that the reference executor runs.
   std::string reference;
   Case one;
-  /// A file with the options of a case in each line; empty = the one case.
+  /// A file with the options of a case in each line, or of C++ in each line behind
+  /// `// CASE: `, where all cases must write something; empty = the one case. What a
+  /// case leaves out is as in `one`.
   std::string cases;
   std::vector<int> threads{1, 2, 7};
   int runs = 3;
-  /// Primitives of a source in a strip, 0 = all.
-  int64_t strip = 0;
-  /// What bins may hold, in bytes; 0 = no budget.
-  int64_t budget = 0;
   unsigned timeout = 0;
   /// The largest relative difference of a number of a pipeline that has a stage
   /// which is not strict. Without it, differences are reported, and are right.
   std::optional<double> tolerance;
-  /// The processor that the compiled pipelines are for, as pikoc has it.
-  std::string cpu = "native";
+  /// At least one. The first one runs with all threads, as often as `runs` says;
+  /// the others once, with the last number of threads.
+  std::vector<Target> targets;
+  /// Cases take turns with the other targets, each of which runs one case in as many
+  /// as there are of them, or one case.
+  bool spread = false;
+  /// All cases are to stop, with a message that is the same in all runs on all
+  /// targets.
+  bool stops = false;
   /// How much LLVM optimizes its code: -O0 to -O3. What runs beside a GPU, or plays
   /// one, is not optimized unless asked for: it is the passes that divide kernels
   /// among threads which are tested there, and the kernels' PTX is optimized.
   std::optional<int> optLevel;
-  int getOptLevel() const {
-    return optLevel.value_or(gpu.target == piko::GPUTarget::None ? 3 : 0);
+  int getOptLevel(const Target &target) const {
+    return optLevel.value_or(target.gpu.target == piko::GPUTarget::None ? 3
+                                                                        : 0);
   }
   /// Says which threads ran which bins.
   bool owners = false;
@@ -64,15 +85,13 @@ struct Options {
   piko::CheckOptions check;
   piko::SynthesisOptions synthesis;
   std::optional<double> mappingWindow;
-  /// --target gpu-on-cpu, --gpu-threads N (0 = as the stage says), --gpu-seed N,
-  /// --gpu-blocks N (0 = as many as there are units), --gpu-chip NAME,..
-  piko::GPUOptions gpu;
   /// Of the reference executor's code; --no-cache.
   piko::CacheOptions cache;
 };
 
 /// Both throw std::runtime_error.
 Options parseOptions(int argc, char **argv);
-std::vector<Case> readCases(const std::string &file);
+std::vector<Case> readCases(const Options &options);
+bool hasOwnCases(const Options &options);
 
 #endif // PIKO_TEST_TOOLS_PIKO_COMPARE_OPTIONS_H

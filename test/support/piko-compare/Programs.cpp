@@ -10,10 +10,12 @@
 #include "Piko/Target/JIT.h"
 #include "Piko/Target/Object.h"
 #include "Piko/Target/Processor.h"
+#include "ReferenceObject.h"
 #include "SourceCache.h"
 #include "mlir/Bytecode/BytecodeWriter.h"
 #include "mlir/Parser/Parser.h"
 
+#include <map>
 #include <stdexcept>
 
 using namespace mlir;
@@ -59,9 +61,9 @@ struct CompiledPipeline {
 } // namespace
 
 struct Programs::Implementation {
-  explicit Implementation(const CacheOptions &cacheOptions)
-      : context(makeRegistry()), log(context), cache(cacheOptions),
-        kept(cacheOptions) {
+  explicit Implementation(const Options &options)
+      : options(options), context(makeRegistry()), log(context),
+        kept(options.cache) {
     context.loadAllAvailableDialects();
   }
   static DialectRegistry makeRegistry() {
@@ -71,29 +73,25 @@ struct Programs::Implementation {
   }
   void compileReference(const std::string &file);
   void readText(const std::string &file);
-  std::vector<PipelineDescription> describeAll(std::string &diagnostics);
+  std::vector<PipelineDescription>
+  describeAll(const llvm::IntrusiveRefCntPtr<SourceRecorder> &files,
+              std::string &diagnostics);
   void translateAll();
   CompileOptions getSource(const std::string &pipe) const;
   std::string makeAuthoredRequest(const std::string &pipe) const;
   void keepAuthored(const std::string &pipe, ModuleOp module);
   OwningOpRef<ModuleOp> parse(const std::string &pipe);
-  OwningOpRef<ModuleOp> read(const std::string &pipe);
-  CompiledPipeline compile(const std::string &pipe,
-                           const ObjectOptions &options,
+  OwningOpRef<ModuleOp> load(const std::string &pipe);
+  ModuleOp read(const std::string &pipe);
+  CompiledPipeline compile(const std::string &pipe, const ObjectOptions &object,
                            const Processor &processor);
-  CompiledPipeline find(const std::string &pipe);
+  CompiledPipeline find(const std::string &pipe, const Target &target);
 
+  const Options &options;
   MLIRContext context;
   Log log;
-  std::string sourceFile;
   /// The only pipeline that is wanted; empty = all.
   std::string onlyPipe;
-  CheckOptions check;
-  CacheOptions cache;
-  SynthesisOptions synthesis;
-  GPUOptions gpu;
-  std::string cpu;
-  int optLevel = 3;
   /// What was compiled before.
   SourceCache kept;
   /// What reading the file asks.
@@ -103,6 +101,8 @@ struct Programs::Implementation {
   std::unique_ptr<PipelineFile> file;
   /// Where the compiled file is `.mlir`: a module for each pipeline.
   std::vector<std::pair<std::string, OwningOpRef<ModuleOp>>> modules;
+  /// What was read of the pipelines, null after diagnostics.
+  std::map<std::string, OwningOpRef<ModuleOp>> authored;
   std::optional<CompiledObject> referenceObject;
   std::string referenceDiagnostics;
   std::shared_ptr<JITCode> reference;
@@ -122,22 +122,26 @@ static bool isStrict(ModuleOp module) {
 
 /// Divides the pipelines of an `.mlir` file.
 void Programs::Implementation::readText(const std::string &file) {
-  CompileOptions options{.file = file, .pipeName = onlyPipe, .check = check};
+  CompileOptions source{
+      .file = file, .pipeName = onlyPipe, .check = options.check};
   FailureOr<std::vector<std::string>> names =
-      readPipelineNames(options, context);
+      readPipelineNames(source, context);
   if (failed(names))
     log.fail("cannot load " + file);
   for (const std::string &name : *names) {
     if (!onlyPipe.empty() && name != onlyPipe)
       continue;
-    options.pipeName = name;
-    modules.emplace_back(name, readPipeline(options, context, recorder));
+    source.pipeName = name;
+    modules.emplace_back(name, readPipeline(source, context, recorder));
   }
 }
 
 CompileOptions
 Programs::Implementation::getSource(const std::string &pipe) const {
-  return {.file = sourceFile, .pipeName = pipe, .check = check, .cache = cache};
+  return {.file = options.file,
+          .pipeName = pipe,
+          .check = options.check,
+          .cache = options.cache};
 }
 
 /// What leads to a pipeline as it is written.
@@ -145,7 +149,7 @@ std::string
 Programs::Implementation::makeAuthoredRequest(const std::string &pipe) const {
   return makeObjectRequest(
       {.source = getSource(pipe), .nameSpace = "piko-compare authored"}, {},
-      *recorder);
+      *recorder, CompilerPart::Frontend);
 }
 
 void Programs::Implementation::keepAuthored(const std::string &pipe,
@@ -159,13 +163,15 @@ void Programs::Implementation::keepAuthored(const std::string &pipe,
 
 /// Parses the file for its reference executor and for what is compiled of it, now
 /// and by the next ones to ask.
-std::vector<PipelineDescription>
-Programs::Implementation::describeAll(std::string &diagnostics) {
+std::vector<PipelineDescription> Programs::Implementation::describeAll(
+    const llvm::IntrusiveRefCntPtr<SourceRecorder> &files,
+    std::string &diagnostics) {
+  recorder = files;
   llvm::raw_string_ostream stream(diagnostics);
   DiagnosticPrinter printer(context, stream);
   FrontendOptions frontend = getFrontendOptions(getSource(""));
   frontend.files = recorder;
-  file = PipelineFile::parse(sourceFile, frontend, context);
+  file = PipelineFile::parse(options.file, frontend, context);
   std::vector<PipelineDescription> pipelines;
   for (size_t i = 0; file && i < file->size(); ++i)
     if (FailureOr<PipelineDescription> pipeline = file->describe(i);
@@ -190,21 +196,24 @@ void Programs::Implementation::translateAll() {
 /// All pipelines of the file, which then need to be compiled only once however
 /// often they are compared. That code is big and runs only once.
 void Programs::Implementation::compileReference(const std::string &file) {
-  ObjectOptions options{
-      .source = {.file = file, .check = {check.enabled, {}}, .cache = cache},
-      .execution = ExecutionTarget::Reference,
-      .target = {"native", /*optLevel=*/0, Sanitizer::None},
-      .allPipelines = true};
-  if (file == sourceFile)
-    options.describeAll = [this](std::string &diagnostics) {
-      return describeAll(diagnostics);
+  ObjectOptions object{.source = {.file = file,
+                                  .check = {options.check.enabled, {}},
+                                  .cache = options.cache},
+                       .execution = ExecutionTarget::Reference,
+                       .target = {"native", /*optLevel=*/0, Sanitizer::None},
+                       .allPipelines = true};
+  PipelineDescriber describe = nullptr;
+  if (file == options.file)
+    describe = [this](const auto &files, std::string &diagnostics) {
+      return describeAll(files, diagnostics);
     };
-  referenceObject = compileObject(options, referenceDiagnostics);
+  referenceObject =
+      compileReferenceObject(object, referenceDiagnostics, describe);
   if (!referenceObject)
     throw std::runtime_error("cannot compile " + file +
                              " for the reference executor\n" +
                              referenceDiagnostics);
-  reference = load({referenceObject->code, referenceObject->headerCode});
+  reference = ::load({referenceObject->code, referenceObject->headerCode});
 }
 
 /// The module of a pipeline as its text says it; null after diagnostics.
@@ -217,7 +226,7 @@ OwningOpRef<ModuleOp> Programs::Implementation::parse(const std::string &pipe) {
   if (!file) {
     FrontendOptions frontend = getFrontendOptions(getSource(onlyPipe));
     frontend.files = recorder;
-    file = PipelineFile::parse(sourceFile, frontend, context);
+    file = PipelineFile::parse(options.file, frontend, context);
   }
   for (size_t i = 0; file && i < file->size(); ++i)
     if (file->getName(i) == pipe)
@@ -225,9 +234,9 @@ OwningOpRef<ModuleOp> Programs::Implementation::parse(const std::string &pipe) {
   return nullptr;
 }
 
-/// The module of a pipeline, parsed unless that was done before; null after
-/// diagnostics.
-OwningOpRef<ModuleOp> Programs::Implementation::read(const std::string &pipe) {
+/// The module of a pipeline, parsed unless another process did so before; null
+/// after diagnostics.
+OwningOpRef<ModuleOp> Programs::Implementation::load(const std::string &pipe) {
   if (!kept.isEnabled() || !modules.empty())
     return parse(pipe);
   if (std::optional<std::string> found =
@@ -239,16 +248,19 @@ OwningOpRef<ModuleOp> Programs::Implementation::read(const std::string &pipe) {
   return module;
 }
 
+/// The module of a pipeline as it is written, of which each target gets a copy;
+/// null after diagnostics.
+ModuleOp Programs::Implementation::read(const std::string &pipe) {
+  auto [found, isNew] = authored.try_emplace(pipe);
+  if (isNew)
+    found->second = load(pipe);
+  return found->second ? *found->second : ModuleOp();
+}
+
 Programs::Programs(const Options &options)
-    : self(std::make_unique<Implementation>(options.cache)) {
-  self->sourceFile = options.file;
+    : self(std::make_unique<Implementation>(options)) {
   if (options.cases.empty())
     self->onlyPipe = options.one.pipe;
-  self->check = options.check;
-  self->synthesis = options.synthesis;
-  self->gpu = options.gpu;
-  self->cpu = options.cpu;
-  self->optLevel = options.getOptLevel();
   self->compileReference(options.reference);
   if (options.file != options.reference)
     self->readText(options.file);
@@ -261,12 +273,13 @@ std::vector<std::string> Programs::names() const {
 }
 
 CompiledPipeline Programs::Implementation::compile(const std::string &pipe,
-                                                   const ObjectOptions &options,
+                                                   const ObjectOptions &object,
                                                    const Processor &processor) {
-  OwningOpRef<ModuleOp> module = read(pipe);
-  bool strict = module && isStrict(*module);
-  const SynthesisOptions &chosen = options.source.synthesis;
-  if (!module || failed(lowerPipeline(*module, Level::LLVM, check, chosen, gpu,
+  ModuleOp written = read(pipe);
+  OwningOpRef<ModuleOp> module = written ? written.clone() : ModuleOp();
+  const GPUOptions &gpu = object.source.gpu;
+  if (!module || failed(lowerPipeline(*module, Level::LLVM, options.check,
+                                      object.source.synthesis, gpu,
                                       {.lanes = processor.lanes})))
     log.fail("cannot compile " + pipe);
   llvm::LLVMContext llvmContext;
@@ -274,37 +287,51 @@ CompiledPipeline Programs::Implementation::compile(const std::string &pipe,
       translateToLLVMIR(*module, llvmContext, gpu);
   if (!llvmModule)
     log.fail("cannot compile " + pipe);
-  llvm::Expected<std::string> object =
-      generateCode(*llvmModule, options.target, CodeFormat::Object);
-  if (!object)
-    throw std::runtime_error(llvm::toString(object.takeError()));
-  return {std::move(*object), strict};
+  llvm::Expected<std::string> code =
+      generateCode(*llvmModule, object.target, CodeFormat::Object);
+  if (!code)
+    throw std::runtime_error(llvm::toString(code.takeError()));
+  return {std::move(*code), isStrict(written)};
+}
+
+/// Throws if this machine cannot run code for a processor.
+static void checkMachine(const Processor &processor) {
+  llvm::Expected<Processor> machine = resolveProcessor("native");
+  if (!machine)
+    throw std::runtime_error(llvm::toString(machine.takeError()));
+  for (llvm::StringRef need : processor.needs)
+    if (!llvm::is_contained(machine->needs, need))
+      throw std::runtime_error("this machine does not run code for " +
+                               processor.name + ", which needs " + need.str());
 }
 
 /// Compiles unless that was done before.
-CompiledPipeline Programs::Implementation::find(const std::string &pipe) {
-  llvm::Expected<Processor> processor = resolveProcessor(cpu);
+CompiledPipeline Programs::Implementation::find(const std::string &pipe,
+                                                const Target &target) {
+  llvm::Expected<Processor> processor = resolveProcessor(target.cpu);
   if (!processor)
     throw std::runtime_error(llvm::toString(processor.takeError()));
-  TargetOptions target{cpu, optLevel, JITCode::getSanitizer()};
-  ObjectOptions options{
-      .source = {.file = sourceFile,
+  checkMachine(*processor);
+  TargetOptions machine{target.cpu, options.getOptLevel(target),
+                        JITCode::getSanitizer()};
+  ObjectOptions object{
+      .source = {.file = options.file,
                  .pipeName = pipe,
-                 .check = check,
-                 .synthesis = target.leaveOutUnseen(synthesis),
-                 .gpu = gpu},
-      .target = target,
+                 .check = options.check,
+                 .synthesis = machine.leaveOutUnseen(options.synthesis),
+                 .gpu = target.gpu},
+      .target = machine,
       .nameSpace = "piko-compare"};
   if (!kept.isEnabled())
-    return compile(pipe, options, *processor);
-  std::string request = makeObjectRequest(options, *processor, *recorder);
+    return compile(pipe, object, *processor);
+  std::string request = makeObjectRequest(object, *processor, *recorder);
   llvm::vfs::FileSystem &disk = *llvm::vfs::getRealFileSystem();
   if (std::optional<std::string> found = kept.lookUp(request, disk)) {
     StringReader reader(*found);
     std::string code = reader.next();
     return {std::move(code), reader.next() == "strict"};
   }
-  CompiledPipeline made = compile(pipe, options, *processor);
+  CompiledPipeline made = compile(pipe, object, *processor);
   StringWriter writer;
   writer.add(made.code).add(made.isStrict ? "strict" : "");
   // Where it cannot be kept it is made again.
@@ -312,8 +339,8 @@ CompiledPipeline Programs::Implementation::find(const std::string &pipe) {
   return made;
 }
 
-Program Programs::compile(const std::string &pipe) {
-  CompiledPipeline compiled = self->find(pipe);
+Program Programs::compile(const std::string &pipe, const Target &target) {
+  CompiledPipeline compiled = self->find(pipe, target);
   std::shared_ptr<JITCode> code = load(llvm::StringRef(compiled.code));
   auto name = std::make_shared<std::string>(pipe);
   Program program{{PIKORT_ABI_VERSION, name->c_str(),

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// The pipelines of a file as programs: compiled one by one, as users get them,
-// and for the reference executor all at once, both through the disk cache.
+// The pipelines of a file as programs: compiled one by one for each target, as
+// users get them, and for the reference executor all at once, both through the disk
+// cache. The file is read once, however many targets there are.
 
 #ifndef PIKO_TEST_TOOLS_PIKO_COMPARE_PROGRAMS_H
 #define PIKO_TEST_TOOLS_PIKO_COMPARE_PROGRAMS_H
@@ -31,7 +32,7 @@ public:
   /// The pipelines that can be read.
   std::vector<std::string> names() const;
   /// At most once for each.
-  Program compile(const std::string &pipe);
+  Program compile(const std::string &pipe, const Target &target);
   Program reference(const std::string &pipe);
 
 private:

@@ -1,115 +1,225 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// piko-compare: runs pipelines on the CPU target and on the reference executor,
+// piko-compare: runs pipelines on the reference executor and on one or more targets,
 // on the same made-up input, and compares all state bit for bit.
 //
 //   piko-compare FILE [--reference FILE] [--pipe NAME] [--domain W H ..]
 //                [--count N ..] [--seed S] [--wide] [--loop-limit N]
-//                [--cases FILE] [--threads T ..] [--runs N]
-//                [--timeout SECONDS] [--strip N] [--budget BYTES]
-//                [--check[=nan:RECORD.FIELD,..]]
-//                [--target gpu-on-cpu] [--gpu-threads N] [--gpu-seed N]
-//                [--gpu-blocks N] [--gpu-chip NAME,..] [--tolerance X] [--cpu NAME]
-//                [-O0] [--no-cache]
+//                [--strip N] [--budget BYTES] [--cases FILE]
+//                [--threads T ..] [--runs N] [--timeout SECONDS]
+//                [--check[=nan:RECORD.FIELD,..]] [--tolerance X]
+//                [--targets NAME,.. [--spread]] [--target cpu|gpu-on-cpu|cuda] [--cpu NAME]
+//                [--gpu-threads N] [--gpu-seed N] [--gpu-blocks N]
+//                [--gpu-chip NAME,..] [--without PASS,..] [-O0] [--no-cache]
+//                [--owners] [--stops]
 //
 // Options.h says what the options mean, Run.h what the input is. With --cases
-// each line of that file is a case, with the options --pipe to --loop-limit; a
+// each line of that file is a case, with the options --pipe to --budget; a
 // line of output says which case begins, and one how it ends. Exit status 0 if
 // all is equal.
 //
-// Of a pipeline with a stage that is not strict, all runs must give the same
-// bits, and how far these are from the reference executor's is reported field by
-// field. --tolerance X says how far they may be: numbers relatively by X,
+// --targets names what a case runs on: `cpu`, which is this machine's processor,
+// others by the names that LLVM has for them, `gpu-on-cpu` and `cuda`. The file is
+// read once, and the reference executor runs once. What differs is said of each
+// target by name, what several do alike once; a target that cannot compile or run a
+// case has an error, and the others go on.
+//
+// Of a pipeline with a stage that is not strict, all runs on a target must give the
+// same bits, and how far these are from the reference executor's is reported field
+// by field. --tolerance X says how far they may be: numbers relatively by X,
 // integers not at all.
 
 #include "Measure.h"
 #include "Options.h"
 #include "Programs.h"
+#include "Report.h"
 #include "Run.h"
 
 #include <cstdio>
 #include <cstdlib>
+#include <set>
 #include <stdexcept>
 #include <unistd.h>
 
 namespace {
 
-void printMeasure(const Measure &measure) {
-  for (const std::string &line : measure.lines)
-    std::printf("%s\n", line.c_str());
-}
+/// A case on one target.
+class TargetRun {
+public:
+  TargetRun(const Options &options, const Target &target, Report &report)
+      : options(options), target(target), report(report) {
+    if (&target == &options.targets.front())
+      return;
+    threads = {options.threads.back()};
+    runs = 1;
+  }
+
+  /// True if all is equal. Throws if it cannot be run.
+  bool compare(const Case &input, Result expected, Programs &programs);
+
+  bool isStrict = true;
+  /// The messages of runs that stopped, empty for those that did not.
+  std::set<std::string> errors;
+
+private:
+  bool acceptMeasured(Result &expected, Run &compiled);
+  void reportOwners(const Run &compiled);
+  void say(const std::string &line) { report.add(target.name, line); }
+
+  const Options &options;
+  const Target &target;
+  Report &report;
+  std::vector<int> threads = options.threads;
+  int runs = options.runs;
+};
 
 /// What a run should give that need not be strict: what it gives itself, if that
 /// is near enough to what the reference executor does. True if it is.
-bool acceptMeasured(const Options &options, Result &expected, Run &compiled) {
-  Result actual = compiled(options.threads[0]);
+bool TargetRun::acceptMeasured(Result &expected, Run &compiled) {
+  Result actual = compiled(threads[0]);
   if (!expected.error.empty() || !actual.error.empty())
     return true; // to be compared as they are
   Measure measure = measureResults(expected, actual);
-  printMeasure(measure);
+  for (const std::string &line : measure.lines)
+    say(line);
   expected = std::move(actual);
-  return !options.tolerance || measure.isWithin(*options.tolerance);
+  if (!options.tolerance || measure.isWithin(*options.tolerance))
+    return true;
+  char line[64];
+  std::snprintf(line, sizeof line, "expected differences of at most %g",
+                *options.tolerance);
+  say(line);
+  return false;
 }
 
-/// Runs one case; true if all is equal. Throws if it cannot be run.
-bool compare(const Options &options, const Case &input, Programs &programs) {
-  Run reference(programs.reference(input.pipe), input);
-  Result expected = reference(1);
-  Program program = programs.compile(input.pipe);
+void TargetRun::reportOwners(const Run &compiled) {
+  for (const auto &[bin, owners] : compiled.owners()) {
+    std::string line = bin.first + ", bin " + std::to_string(bin.second) + ":";
+    for (int32_t thread : owners)
+      line += " " + std::to_string(thread);
+    say(line);
+  }
+}
+
+bool TargetRun::compare(const Case &input, Result expected,
+                        Programs &programs) {
+  Program program = programs.compile(input.pipe, target);
+  isStrict = program.isStrict;
   Run compiled(program, input);
-  compiled.divide(options.strip, options.budget);
+  compiled.divide(input.strip, input.budget);
   if (options.owners)
     compiled.recordOwners();
-  if (expected.isBlank() && options.cases.empty())
-    throw std::runtime_error("the reference executor wrote nothing");
-  bool equal = true;
-  if (!program.isStrict && !acceptMeasured(options, expected, compiled)) {
-    std::printf("expected differences of at most %g\n", *options.tolerance);
-    equal = false;
-  }
-  for (int threads : options.threads)
-    for (int run = 0; run < options.runs; ++run) {
-      std::vector<std::string> differences =
-          compareResults(expected, compiled(threads));
+  bool equal = isStrict || acceptMeasured(expected, compiled);
+  for (int count : threads)
+    for (int run = 0; run < runs; ++run) {
+      Result actual = compiled(count);
+      errors.insert(actual.error);
+      std::vector<std::string> differences = compareResults(expected, actual);
       equal &= differences.empty();
       for (const std::string &difference : differences)
-        std::printf("%d threads, run %d: %s\n", threads, run,
-                    difference.c_str());
+        say(std::to_string(count) + " threads, run " + std::to_string(run) +
+            ": " + difference);
     }
-  for (const auto &[bin, threads] : compiled.owners()) {
-    std::printf("%s, bin %lld:", bin.first.c_str(),
-                static_cast<long long>(bin.second));
-    for (int32_t thread : threads)
-      std::printf(" %d", thread);
-    std::printf("\n");
-  }
+  reportOwners(compiled);
+  return equal;
+}
+
+/// The last line of a case.
+void printVerdict(const Result &expected, bool isStrict,
+                  const std::vector<std::string> &equal,
+                  const std::vector<std::string> &different) {
+  auto name = [](const std::vector<std::string> &targets) {
+    std::string names = joinNames(targets);
+    return names.empty() ? "" : " on " + names;
+  };
   if (!expected.error.empty())
     std::printf("the reference stops: %s\n", expected.error.c_str());
-  else if (equal)
-    std::printf("%s%s\n", expected.isBlank() ? "equal, but blank" : "equal",
-                program.isStrict ? "" : " in all runs");
-  return equal;
+  else if (!equal.empty())
+    std::printf("equal%s%s%s\n", expected.isBlank() ? ", but blank" : "",
+                isStrict ? "" : " in all runs", name(equal).c_str());
+  if (std::string names = name(different); !names.empty())
+    std::printf("differs%s\n", names.c_str());
+}
+
+/// Whether all runs on all targets stopped with one message. The reference executor
+/// may say more, or have a longer breath.
+bool stopAlike(const std::set<std::string> &errors) {
+  if (errors.size() == 1 && !errors.begin()->empty())
+    return true;
+  std::printf("expected all targets to stop with the same message\n");
+  return false;
+}
+
+/// Whether a case is one of those that a target runs. With --spread the others take
+/// turns with the cases, and where there are more of them, with each other.
+bool runs(const Options &options, size_t target, size_t place, size_t count) {
+  if (!options.spread || target == 0)
+    return true;
+  size_t others = options.targets.size() - 1;
+  return count < others ? (target - 1) % count == place
+                        : place % others == target - 1;
+}
+
+/// Runs one case on its targets; true if all is equal. Throws if it cannot be run.
+bool compare(const Options &options, const Case &input, Programs &programs,
+             size_t place = 0, size_t count = 1) {
+  Run reference(programs.reference(input.pipe), input);
+  Result expected = reference(1);
+  if (expected.isBlank() && (options.cases.empty() || hasOwnCases(options)))
+    throw std::runtime_error("the reference executor wrote nothing");
+  Report report;
+  bool isStrict = true;
+  std::set<std::string> errors;
+  std::vector<std::string> equal, different;
+  for (const Target &target : options.targets) {
+    if (!runs(options, size_t(&target - options.targets.data()), place, count))
+      continue;
+    TargetRun run(options, target, report);
+    bool isEqual = false;
+    try {
+      isEqual = run.compare(input, expected, programs);
+    } catch (const std::exception &error) {
+      if (target.name.empty())
+        throw;
+      report.add(target.name, "error: " + std::string(error.what()));
+      errors.insert("");
+    }
+    isStrict &= run.isStrict;
+    errors.merge(run.errors);
+    (isEqual ? equal : different).push_back(target.name);
+  }
+  report.print();
+  printVerdict(expected, isStrict, equal, different);
+  if (options.stops)
+    return stopAlike(errors);
+  return different.empty();
 }
 
 bool compareAll(const Options &options) {
   Programs programs(options);
+  auto choosePipe = [&](Case &input) {
+    std::vector<std::string> names = programs.names();
+    if (!input.pipe.empty())
+      return;
+    if (names.size() != 1)
+      throw std::runtime_error("expected the name of a pipeline");
+    input.pipe = names[0];
+  };
   if (options.cases.empty()) {
     Case one = options.one;
-    std::vector<std::string> names = programs.names();
-    if (one.pipe.empty()) {
-      if (names.size() != 1)
-        throw std::runtime_error("expected the name of a pipeline");
-      one.pipe = names[0];
-    }
+    choosePipe(one);
     return compare(options, one, programs);
   }
   bool equal = true;
-  for (const Case &input : readCases(options.cases)) {
+  std::vector<Case> cases = readCases(options);
+  for (size_t i = 0; i < cases.size(); ++i) {
+    Case &input = cases[i];
+    choosePipe(input);
     std::printf("%s:\n", input.pipe.c_str());
     std::fflush(stdout);
     alarm(options.timeout);
     try {
-      equal &= compare(options, input, programs);
+      equal &= compare(options, input, programs, i, cases.size());
     } catch (const std::exception &error) {
       std::printf("error: %s\n", error.what());
       equal = false;

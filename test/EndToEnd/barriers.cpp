@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// What barriers.mlir means: private and shared arrays across barriers,
-// collective operations, barriers in loops and branches, and emissions between.
-#include "ports.h"
+// Private and shared arrays across barriers, collective operations, barriers in
+// loops and branches, and emissions between.
+// RUN: %compare_targets %s --cases %s
+// CASE: --count 1000
+// CASE: --count 17
+#include "Inputs/ports.h"
 
 struct Pixel {
   float sum = 0;

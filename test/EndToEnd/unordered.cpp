@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// What unordered.mlir means: atomics that show their order, in sums that do not.
-#include "ports.h"
+// Atomics that show their order, in sums that do not.
+// RUN: %compare_targets %s --count 4000 | FileCheck %s
+// CHECK: equal
+#include "Inputs/ports.h"
 
 struct Sums {
   float total;
