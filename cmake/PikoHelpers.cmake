@@ -27,33 +27,61 @@ if(PIKO_ENABLE_COMPILER)
   target_link_libraries(piko_clang INTERFACE piko_llvm ${PIKO_LLVM_PREFIX}/lib/libclang-cpp.so)
 endif()
 
-# Three quarters of the time that a file of the compiler takes to compile go into
-# the headers of MLIR. Debug builds include LLVMStatistics.h first and do without.
-option(PIKO_PRECOMPILE_HEADERS "Precompile the headers of LLVM, MLIR and Clang" ON)
+# Most of the time that a file of the compiler takes to compile goes into the
+# headers of MLIR and of the dialect. Debug builds include LLVMStatistics.h first
+# and do without.
+option(PIKO_PRECOMPILE_HEADERS
+  "Precompile the headers of LLVM, MLIR, Clang and the dialect" ON)
 if(PIKO_PRECOMPILE_HEADERS AND PIKO_ENABLE_COMPILER
    AND CMAKE_CXX_COMPILER_ID STREQUAL "Clang" AND CMAKE_BUILD_TYPE STREQUAL "Release")
   set(PIKO_PRECOMPILES ON)
 endif()
 
-# piko_precompile_headers(<target> <header of this folder>)
-# They are of LLVM, MLIR and Clang alone, so that they are compiled once.
-function(piko_precompile_headers target header)
-  if(NOT PIKO_PRECOMPILES)
-    return()
-  endif()
-  set(path ${CMAKE_CURRENT_FUNCTION_LIST_DIR}/${header})
+# piko_add_precompiled(<target> <header of this folder> [libraries])
+# A target that piko_use_precompiled takes a precompiled header from. ccache has
+# none of it, which holds paths of this tree, and knows it by a checksum of what it
+# is made of.
+function(piko_add_precompiled target header)
+  add_library(${target} OBJECT ${CMAKE_CURRENT_FUNCTION_LIST_DIR}/Precompiled.cpp)
+  set_target_properties(${target} PROPERTIES CXX_COMPILER_LAUNCHER "")
+  target_link_libraries(${target} PRIVATE piko_options ${ARGN})
   target_compile_options(${target} PRIVATE "SHELL:-Xclang -fno-pch-timestamp")
-  target_precompile_headers(${target} PRIVATE ${path})
-  file(SHA256 ${path} checksum)
-  file(WRITE ${CMAKE_CURRENT_BINARY_DIR}/CMakeFiles/${target}.dir/cmake_pch.hxx.pch.sum
-    "${checksum} ${CMAKE_CXX_COMPILER_VERSION} ${CMAKE_CXX_FLAGS} ${PIKO_LLVM_VERSION}")
+  target_precompile_headers(${target} PRIVATE
+    ${CMAKE_CURRENT_FUNCTION_LIST_DIR}/${header})
+  set(dialect ${PROJECT_SOURCE_DIR}/include/Piko/Dialect/Piko/IR)
+  file(GLOB headers CONFIGURE_DEPENDS
+    ${dialect}/*.h ${dialect}/*.td ${CMAKE_CURRENT_FUNCTION_LIST_DIR}/Precompiled*.h)
+  set(sum ${CMAKE_CURRENT_BINARY_DIR}/CMakeFiles/${target}.dir/cmake_pch.hxx.pch.sum)
+  set(hash ${CMAKE_CURRENT_FUNCTION_LIST_DIR}/HashHeaders.cmake)
+  add_custom_command(OUTPUT ${sum}
+    COMMAND ${CMAKE_COMMAND} -D OUT=${sum} -D
+      "SALT=${header} ${CMAKE_CXX_COMPILER_VERSION} ${CMAKE_CXX_FLAGS} ${LLVM_PACKAGE_VERSION}"
+      -P ${hash} ${headers}
+    DEPENDS ${hash} ${headers} COMMENT "Hashing what ${header} includes" VERBATIM)
+  add_custom_target(${target}_sum DEPENDS ${sum})
+  add_dependencies(${target} PikoIncGen ${target}_sum)
+endfunction()
+
+function(piko_use_precompiled target from)
+  if(PIKO_PRECOMPILES)
+    target_compile_options(${target} PRIVATE "SHELL:-Xclang -fno-pch-timestamp")
+    target_precompile_headers(${target} REUSE_FROM ${from})
+  endif()
 endfunction()
 
 if(PIKO_PRECOMPILES)
-  add_library(piko_precompiled OBJECT ${CMAKE_CURRENT_LIST_DIR}/Precompiled.cpp)
-  target_link_libraries(piko_precompiled PRIVATE piko_options piko_llvm)
-  piko_precompile_headers(piko_precompiled PrecompiledMLIR.h)
+  piko_add_precompiled(piko_precompiled_mlir PrecompiledMLIR.h piko_llvm)
+  piko_add_precompiled(piko_precompiled_clang PrecompiledClang.h piko_clang)
 endif()
+
+# What two files include is compiled once, and so are the templates that both use.
+option(PIKO_UNITE
+  "Compile eight files of a library as one; off, a changed file is compiled alone" OFF)
+
+function(piko_unite target)
+  set_target_properties(${target} PROPERTIES
+    UNITY_BUILD ${PIKO_UNITE} UNITY_BUILD_BATCH_SIZE 8)
+endfunction()
 
 # For each program.
 function(piko_add_sanitizer_options name)
@@ -63,7 +91,7 @@ function(piko_add_sanitizer_options name)
 endfunction()
 
 # piko_add_library(PikoX SOURCES... [DEPENDS tablegen targets] [LINK libraries]
-#                  [PRECOMPILED header])
+#                  [PRECOMPILED mlir|clang])
 # A static library of the compiler.
 function(piko_add_library name)
   cmake_parse_arguments(ARG "" "PRECOMPILED" "DEPENDS;LINK" ${ARGN})
@@ -72,12 +100,11 @@ function(piko_add_library name)
   if(ARG_DEPENDS)
     add_dependencies(${name} ${ARG_DEPENDS})
   endif()
-  if(ARG_PRECOMPILED)
-    piko_precompile_headers(${name} ${ARG_PRECOMPILED})
-  elseif(PIKO_PRECOMPILES)
-    target_compile_options(${name} PRIVATE "SHELL:-Xclang -fno-pch-timestamp")
-    target_precompile_headers(${name} REUSE_FROM piko_precompiled)
+  if(NOT ARG_PRECOMPILED)
+    set(ARG_PRECOMPILED mlir)
   endif()
+  piko_use_precompiled(${name} piko_precompiled_${ARG_PRECOMPILED})
+  piko_unite(${name})
 endfunction()
 
 # Compilers spend much of their time in malloc. Sanitizers have their own.
@@ -93,6 +120,7 @@ function(piko_add_tool name)
   add_executable(${name} ${ARG_UNPARSED_ARGUMENTS})
   target_link_libraries(${name} PRIVATE
     ${PIKO_MALLOC_FLAGS} piko_options ${ARG_LINK})
+  piko_unite(${name})
   piko_add_sanitizer_options(${name})
 endfunction()
 

@@ -13,11 +13,14 @@ install(DIRECTORY runtime/include/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
 install(DIRECTORY docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR})
 install(FILES LICENSE README.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
 if(PIKO_ENABLE_COMPILER)
-  set(tools pikoc piko-diff piko-opt piko-render piko-translate piko-tune)
-  set_target_properties(${tools} PROPERTIES
+  set(tools piko-diff piko-render piko-translate piko-tune)
+  if(PIKO_ENABLE_GPU)
+    list(APPEND tools piko-opt)
+  endif()
+  set_target_properties(pikoc ${tools} PROPERTIES
     INSTALL_RPATH "$ORIGIN/../${CMAKE_INSTALL_LIBDIR};${PIKO_LLVM_PREFIX}/lib")
   install(TARGETS pikoc EXPORT PikoTargets)
-  install(TARGETS piko-diff piko-opt piko-render piko-translate piko-tune)
+  install(TARGETS ${tools})
   install(TARGETS PikoImage LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
 endif()
 

@@ -1,18 +1,20 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #
-# install-deps.sh [LIST]
+# install-deps.sh [LIST...]
 #
-# Installs the packages of a list (utils/packages.txt) on Debian 12, as root or
-# through sudo. Does nothing when all are there.
+# Installs the packages of lists (utils/packages-demo.txt and utils/packages.txt) on
+# Debian 12, as root or through sudo. Does nothing when all are there.
 set -euo pipefail
 
-list="${1:-$(dirname "$0")/packages.txt}"
+if [ $# -eq 0 ]; then
+  set -- "$(dirname "$0")/packages-demo.txt" "$(dirname "$0")/packages.txt"
+fi
 
 if ! command -v dpkg-query >/dev/null; then
   echo "install-deps: not a Debian system: install these by other means," \
     "then go on:" >&2
-  grep -v '^#' "$list" | xargs >&2
+  grep -hv '^#' "$@" | xargs >&2
   exit 0
 fi
 
@@ -21,7 +23,7 @@ while read -r package; do
   case "$package" in '' | '#'*) continue ;; esac
   status="$(dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null || true)"
   [ "$status" = installed ] || missing+=("$package")
-done <"$list"
+done < <(cat "$@")
 
 if [ "${#missing[@]}" -eq 0 ]; then
   exit 0

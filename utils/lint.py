@@ -120,17 +120,26 @@ def layers():
 QUICK = ("runtime/common", "runtime/cpu", "runtime/gpu", "runtime/cuda", "lib/Scene")
 
 
+# What CMake writes to compile several files as one.
+UNITED = re.compile(r'^#include "(.+)"$', re.M)
+
+
 def commands(build, folders):
     """The compile command of each file of these folders, as a list."""
     database = pathlib.Path(build) / "compile_commands.json"
     if not database.exists():
         sys.exit(f"lint: expected {database}; configure the build first")
     folders = tuple(str(ROOT / f) + os.sep for f in folders)
-    return {
-        entry["file"]: shlex.split(entry["command"])
-        for entry in json.loads(database.read_text())
-        if entry["file"].startswith(folders)
-    }
+    found = {}
+    for entry in json.loads(database.read_text()):
+        unit, files = pathlib.Path(entry["file"]), [entry["file"]]
+        if unit.parent.name == "Unity":
+            files = UNITED.findall(unit.read_text())
+        for file in files:
+            if file.startswith(folders):
+                command = shlex.split(entry["command"])
+                found[file] = [file if w == str(unit) else w for w in command]
+    return found
 
 
 def options(file, command):
@@ -185,11 +194,13 @@ def tidy_quick(build, jobs):
 
 
 def tidy(build, jobs):
-    files = sorted(commands(build, ("lib", "tools", "runtime")))
+    found = commands(build, ("lib", "tools", "runtime"))
+    files = sorted(found)
 
     def check(file):
-        command = [tool("clang-tidy"), "--quiet", "-p", str(build), file]
-        return file, subprocess.run(command, capture_output=True, text=True)
+        command = [tool("clang-tidy"), "--quiet", file, "--"]
+        command += options(file, found[file])
+        return file, subprocess.run(command, cwd=build, capture_output=True, text=True)
 
     faults = 0
     show = sys.stderr.isatty()

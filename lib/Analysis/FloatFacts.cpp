@@ -19,7 +19,7 @@ using llvm::DynamicAPInt;
 
 static constexpr int maxShift = 16;
 
-static DynamicAPInt power(int exponent) {
+static DynamicAPInt powerOfTwo(int exponent) {
   return DynamicAPInt(int64_t(1) << exponent);
 }
 
@@ -50,7 +50,7 @@ static std::optional<int64_t> getScaled(Value value) {
 
 std::optional<LinearFacts::Exact> LinearFacts::fitExact(Exact number,
                                                         Type type) {
-  Linear most = Linear(1) * power(std::min(getPrecision(type), 60));
+  Linear most = Linear(1) * powerOfTwo(std::min(getPrecision(type), 60));
   if (number.shift > maxShift || !isSurelyAtLeastZero(number.scaled + most) ||
       !isSurelyAtLeastZero(most - number.scaled))
     return std::nullopt;
@@ -59,7 +59,8 @@ std::optional<LinearFacts::Exact> LinearFacts::fitExact(Exact number,
 
 template <typename Exact> static Exact add(const Exact &a, const Exact &b) {
   int shift = std::max(a.shift, b.shift);
-  return {a.scaled * power(shift - a.shift) + b.scaled * power(shift - b.shift),
+  return {a.scaled * powerOfTwo(shift - a.shift) +
+              b.scaled * powerOfTwo(shift - b.shift),
           shift};
 }
 
@@ -135,7 +136,7 @@ std::optional<LinearFacts::Exact> LinearFacts::findExact(Id id) {
     std::optional<Exact> a = exactOf(0);
     if (!a || a->shift == 0)
       return a;
-    return Exact{divide(a->scaled, power(a->shift)), 0};
+    return Exact{divide(a->scaled, powerOfTwo(a->shift)), 0};
   }
   if (auto select = dyn_cast<arith::SelectOp>(op)) {
     std::optional<Exact> a = exactOf(1), b = exactOf(2);
@@ -147,7 +148,7 @@ std::optional<LinearFacts::Exact> LinearFacts::findExact(Id id) {
     for (const auto &[truth, arm] :
          {std::pair(true, *a), std::pair(false, *b)}) {
       LinearFact fact = describe(select.getCondition(), truth, frame);
-      fact.addZero(result - arm.scaled * power(shift - arm.shift));
+      fact.addZero(result - arm.scaled * powerOfTwo(shift - arm.shift));
       cases.push_back(std::move(fact));
     }
     facts->choices.push_back(std::move(cases));
@@ -191,7 +192,7 @@ Linear LinearFacts::getCell(Value coordinate, unsigned frame,
   Id id = number(coordinate, frame);
   if (std::optional<Exact> exact = getExact(id))
     return exact->shift == 0 ? exact->scaled
-                             : divide(exact->scaled, power(exact->shift));
+                             : divide(exact->scaled, powerOfTwo(exact->shift));
   Opaque opaque = getOpaque(id);
   unknown = opaque.isNaN;
   return opaque.floor;
@@ -207,14 +208,14 @@ Linear LinearFacts::expandFloatCast(Operation *op, unsigned frame, Id id) {
   Linear result = atom(id);
   Type type = valueOf(id).getType();
   unsigned width = type.isIndex() ? 64 : type.getIntOrFloatBitWidth();
-  Linear end = Linear(1) * power(std::min(width - 1, 62u));
+  Linear end = Linear(1) * powerOfTwo(std::min(width - 1, 62u));
   LinearFact below, inside, above, nan;
   Linear floor;
   bool isWhole, isExact = false;
   if (std::optional<Exact> exact = getExact(from)) {
     isExact = true;
     floor = exact->shift == 0 ? exact->scaled
-                              : divide(exact->scaled, power(exact->shift));
+                              : divide(exact->scaled, powerOfTwo(exact->shift));
     isWhole = exact->shift == 0;
     nan.addContradiction();
   } else {
@@ -372,8 +373,8 @@ std::optional<bool> LinearFacts::decide(Value condition, unsigned frame) {
       relation->first == Relation::ne)
     return std::nullopt;
   int shift = std::max(a->shift, b->shift);
-  Linear above =
-      a->scaled * power(shift - a->shift) - b->scaled * power(shift - b->shift);
+  Linear above = a->scaled * powerOfTwo(shift - a->shift) -
+                 b->scaled * powerOfTwo(shift - b->shift);
   bool isLess =
       relation->first == Relation::lt || relation->first == Relation::le;
   if (isLess)
@@ -410,8 +411,8 @@ LinearFact LinearFacts::describeFloat(arith::CmpFOp compare, bool truth,
   bool holdsOfNaN = relation->second == truth;
   if (a && b) {
     int shift = std::max(a->shift, b->shift);
-    return compareToZero(holds, a->scaled * power(shift - a->shift) -
-                                    b->scaled * power(shift - b->shift));
+    return compareToZero(holds, a->scaled * powerOfTwo(shift - a->shift) -
+                                    b->scaled * powerOfTwo(shift - b->shift));
   }
   if (a && !b) {
     std::swap(a, b);

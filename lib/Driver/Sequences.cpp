@@ -7,6 +7,7 @@
 #include "Piko/Conversion/Passes.h"
 #include "Piko/Dialect/Piko/IR/Canonicalization.h"
 #include "Piko/Transforms/Passes.h"
+#include "SequenceParts.h"
 
 #include "mlir/Conversion/MathToLLVM/MathToLLVM.h"
 #include "mlir/Conversion/OpenMPToLLVM/ConvertOpenMPToLLVM.h"
@@ -14,8 +15,6 @@
 #include "mlir/Conversion/SCFToControlFlow/SCFToControlFlow.h"
 #include "mlir/Conversion/UBToLLVM/UBToLLVM.h"
 #include "mlir/Conversion/VectorToLLVM/ConvertVectorToLLVMPass.h"
-#include "mlir/Dialect/GPU/IR/GPUDialect.h"
-#include "mlir/Dialect/GPU/Transforms/Passes.h"
 #include "mlir/Pass/PassOptions.h"
 #include "mlir/Pass/PassRegistry.h"
 #include "mlir/Transforms/Passes.h"
@@ -23,7 +22,7 @@
 using namespace mlir;
 using namespace piko;
 
-static void addCleanUp(OpPassManager &passes) {
+void piko::addCleanUp(OpPassManager &passes) {
   passes.addPass(
       createCanonicalizerPass(GreedyRewriteConfig(), getInexactPatterns()));
   passes.addPass(createCSEPass());
@@ -138,9 +137,8 @@ void piko::addUnitSequence(OpPassManager &passes) {
   ::addUnitSequence(passes, /*lockstep=*/0);
 }
 
-/// From loops over units, some of which may have become grids.
-static void addUnitsToLoops(OpPassManager &passes,
-                            const SynthesisOptions &options) {
+void piko::addUnitsToLoops(OpPassManager &passes,
+                           const SynthesisOptions &options) {
   passes.nest<PipelineOp>().addPass(createFormProgram());
   if (options.has("hoist-loads"))
     passes.nest<PipelineOp>().addPass(createHoistLoads());
@@ -235,52 +233,6 @@ void piko::addLLVMSequence(OpPassManager &passes) {
   passes.addPass(createUBToLLVMConversionPass());
   passes.addPass(createConvertOpenMPToLLVMPass());
   passes.addPass(createReconcileUnrealizedCastsPass());
-}
-
-void piko::addGPUSequence(OpPassManager &passes, const GPUOptions &options,
-                          const SynthesisOptions &synthesis) {
-  if (synthesis.has("reduce-by-atomics")) {
-    passes.addPass(createReduceByAtomics());
-    addCleanUp(passes);
-  }
-  ConvertPikoToGPUOptions grids;
-  grids.threads = options.threads;
-  passes.nest<PipelineOp>().addPass(createConvertPikoToGPU(grids));
-  addCleanUp(passes);
-  addUnitsToLoops(passes, SynthesisOptions::none());
-  // Each test that is left writes an entry of its own.
-  passes.nest<PipelineOp>().addPass(createMergeBounds());
-  addCleanUp(passes);
-  addVectorSequence(passes, SynthesisOptions::none(), {});
-  // Or constants would be arguments.
-  passes.addPass(createGpuLaunchSinkIndexComputationsPass());
-  passes.addPass(createGpuKernelOutliningPass());
-  addCleanUp(passes);
-  if (options.target != GPUTarget::None)
-    addLaunchSequence(passes, options);
-}
-
-void piko::addLaunchSequence(OpPassManager &passes, const GPUOptions &options) {
-  addNVVMSequence(passes);
-  if (options.target == GPUTarget::CUDA) {
-    passes.addPass(createConvertGPUToCUDA());
-  } else {
-    ConvertGPUToEmulatorOptions emulation;
-    emulation.seed = options.seed;
-    emulation.blocks = options.blocks;
-    passes.addPass(createConvertGPUToEmulator(emulation));
-  }
-  addCleanUp(passes);
-}
-
-void piko::addNVVMSequence(OpPassManager &passes) {
-  OpPassManager &kernels = passes.nest<gpu::GPUModuleOp>();
-  kernels.addPass(createReloadInputs());
-  kernels.addPass(createOutlineRareWork());
-  kernels.addPass(createSpillToBlock());
-  kernels.addPass(createSCFToControlFlowPass());
-  kernels.addPass(createConvertGPUToExactNVVM());
-  addCleanUp(kernels);
 }
 
 namespace {

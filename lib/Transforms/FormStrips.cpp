@@ -36,7 +36,7 @@ struct Node {
 };
 
 /// Why a node is not in a group, and what shows it.
-struct Reason {
+struct Objection {
   std::string text;
   Operation *culprit = nullptr;
 };
@@ -44,15 +44,15 @@ struct Reason {
 /// What each stage does to state.
 using Accesses = llvm::DenseMap<Operation *, llvm::MapVector<Attribute, int>>;
 
-class Group {
+class StripGroup {
 public:
-  Group(PipelineOp pipeline, const Accesses &accesses)
+  StripGroup(PipelineOp pipeline, const Accesses &accesses)
       : pipeline(pipeline), accesses(&accesses) {}
 
   /// Whether the node may be the first one, and the source that feeds it.
-  std::optional<Reason> whyNotFirst(const Node &node);
+  std::optional<Objection> whyNotFirst(const Node &node);
   /// Whether the node may come next.
-  std::optional<Reason> whyNotNext(const Node &node);
+  std::optional<Objection> whyNotNext(const Node &node);
   void add(const Node &node);
 
   bool feeds(const Node &node);
@@ -63,8 +63,8 @@ public:
   int64_t source = 0;
 
 private:
-  std::optional<Reason> whyNotAtAll(const Node &node);
-  std::optional<Reason> findConflict(StageOp stage);
+  std::optional<Objection> whyNotAtAll(const Node &node);
+  std::optional<Objection> findConflict(StageOp stage);
   SmallVector<int64_t> sourcesOf(StageOp stage);
   SmallVector<EdgeOp> edgesInto(const Node &node, StageOp stage);
 
@@ -77,8 +77,8 @@ private:
 
 struct FormStripsPass : piko::impl::FormStripsBase<FormStripsPass> {
   void runOnOperation() override;
-  void finish(const Group &group);
-  void refuse(StageOp stage, const Reason &reason);
+  void finish(const StripGroup &group);
+  void refuse(StageOp stage, const Objection &reason);
 };
 
 } // namespace
@@ -87,7 +87,7 @@ struct FormStripsPass : piko::impl::FormStripsBase<FormStripsPass> {
 // What may run in strips
 //===----------------------------------------------------------------------===//
 
-SmallVector<int64_t> Group::sourcesOf(StageOp stage) {
+SmallVector<int64_t> StripGroup::sourcesOf(StageOp stage) {
   SmallVector<int64_t> numbers;
   for (auto [number, source] : llvm::enumerate(pipeline.getOps<SourceOp>()))
     if (source.getStageAttr().getAttr() == stage.getSymNameAttr())
@@ -96,7 +96,7 @@ SmallVector<int64_t> Group::sourcesOf(StageOp stage) {
 }
 
 /// The edges into a stage but for those from its own node.
-SmallVector<EdgeOp> Group::edgesInto(const Node &node, StageOp stage) {
+SmallVector<EdgeOp> StripGroup::edgesInto(const Node &node, StageOp stage) {
   SmallVector<EdgeOp> edges;
   for (auto edge : pipeline.getOps<EdgeOp>())
     if (edge.getConsumerAttr().getAttr() == stage.getSymNameAttr() &&
@@ -106,57 +106,58 @@ SmallVector<EdgeOp> Group::edgesInto(const Node &node, StageOp stage) {
   return edges;
 }
 
-static std::string quote(StageOp stage) {
+static std::string quoteName(StageOp stage) {
   return ("'" + getCppName(stage) + "'").str();
 }
 
 /// What one stage writes and another one sees shows when they run.
-std::optional<Reason> Group::findConflict(StageOp stage) {
+std::optional<Objection> StripGroup::findConflict(StageOp stage) {
   for (auto [state, mine] : accesses->lookup(stage))
     for (StageOp other : stages) {
       int theirs = accesses->lookup(other).lookup(state), both = mine | theirs;
       if (other == stage || !theirs || both == StateAccess::reads ||
           both == StateAccess::changesAtomically)
         continue;
-      return Reason{("it and stage " + quote(other) + " both use @" +
-                     cast<FlatSymbolRefAttr>(state).getValue() +
-                     ", which one of them writes")
-                        .str(),
-                    other};
+      return Objection{("it and stage " + quoteName(other) + " both use @" +
+                        cast<FlatSymbolRefAttr>(state).getValue() +
+                        ", which one of them writes")
+                           .str(),
+                       other};
     }
   return std::nullopt;
 }
 
-std::optional<Reason> Group::whyNotAtAll(const Node &node) {
+std::optional<Objection> StripGroup::whyNotAtAll(const Node &node) {
   for (Operation *op : node.stages) {
     auto stage = cast<StageOp>(op);
     ScheduleOp schedule = stage.getSchedule();
     if (stage.getTakesList())
-      return Reason{"its process phase takes a list, which must be complete"};
+      return Objection{
+          "its process phase takes a list, which must be complete"};
     if (schedule && schedule.getEndBin())
-      return Reason{"it waits until nothing can reach its bins", schedule};
+      return Objection{"it waits until nothing can reach its bins", schedule};
     if (!stage.collects())
       continue;
     if (isOnCycle(stage))
-      return Reason{"it waits and is on a cycle, which runs in rounds",
-                    schedule};
+      return Objection{"it waits and is on a cycle, which runs in rounds",
+                       schedule};
     for (auto name :
          schedule.getEndStageAttr().getAsRange<FlatSymbolRefAttr>()) {
       auto other = lookupInPipeline<StageOp>(stage, name);
       if (llvm::is_contained(stages, other))
-        return Reason{"it waits for stage " + quote(other) +
-                          ", which runs in the same strips",
-                      schedule};
+        return Objection{"it waits for stage " + quoteName(other) +
+                             ", which runs in the same strips",
+                         schedule};
     }
     if (!stage.isWholeDomain() && !stage.getOutputs().empty())
-      return Reason{"it waits, so that what it emits is in the order of its "
-                    "bins",
-                    schedule};
+      return Objection{"it waits, so that what it emits is in the order of its "
+                       "bins",
+                       schedule};
   }
   return std::nullopt;
 }
 
-bool Group::feeds(const Node &node) {
+bool StripGroup::feeds(const Node &node) {
   return llvm::any_of(node.stages, [&](Operation *stage) {
     return llvm::any_of(
         edgesInto(node, cast<StageOp>(stage)), [&](EdgeOp edge) {
@@ -166,48 +167,49 @@ bool Group::feeds(const Node &node) {
   });
 }
 
-std::optional<Reason> Group::whyNotFirst(const Node &node) {
+std::optional<Objection> StripGroup::whyNotFirst(const Node &node) {
   SmallVector<int64_t> sources;
   for (Operation *op : node.stages) {
     auto stage = cast<StageOp>(op);
     sources.append(sourcesOf(stage));
     for (EdgeOp edge : edgesInto(node, stage))
-      return Reason{
-          "stage " +
-              quote(lookupInPipeline<StageOp>(edge, edge.getProducerAttr())) +
-              ", which feeds it, does not run in strips with it",
-          edge};
+      return Objection{"stage " +
+                           quoteName(lookupInPipeline<StageOp>(
+                               edge, edge.getProducerAttr())) +
+                           ", which feeds it, does not run in strips with it",
+                       edge};
   }
   if (sources.empty())
-    return Reason{"nothing feeds it"};
+    return Objection{"nothing feeds it"};
   if (sources.size() > 1)
-    return Reason{"several sources feed it"};
+    return Objection{"several sources feed it"};
   if (auto reason = whyNotAtAll(node))
     return reason;
   source = sources.front();
   return std::nullopt;
 }
 
-std::optional<Reason> Group::whyNotNext(const Node &node) {
+std::optional<Objection> StripGroup::whyNotNext(const Node &node) {
   SmallVector<Operation *> lineages;
   for (Operation *op : node.stages) {
     auto stage = cast<StageOp>(op);
     if (empty() || !sourcesOf(stage).empty())
-      return Reason{"a source feeds it, too"};
+      return Objection{"a source feeds it, too"};
     for (EdgeOp edge : edgesInto(node, stage)) {
       auto producer = lookupInPipeline<StageOp>(edge, edge.getProducerAttr());
       if (!llvm::is_contained(stages, producer))
-        return Reason{"stage " + quote(producer) +
-                          ", which feeds it, does not run in strips with it",
-                      edge};
+        return Objection{"stage " + quoteName(producer) +
+                             ", which feeds it, does not run in strips with it",
+                         edge};
       lineages.push_back(roots.lookup(producer));
     }
   }
   if (lineages.empty())
-    return Reason{"nothing feeds it"};
+    return Objection{"nothing feeds it"};
   if (!llvm::all_equal(lineages))
-    return Reason{"what reaches it is of several lineages, one of which comes "
-                  "after the other"};
+    return Objection{
+        "what reaches it is of several lineages, one of which comes "
+        "after the other"};
   if (auto reason = whyNotAtAll(node))
     return reason;
   for (Operation *op : node.stages)
@@ -216,7 +218,7 @@ std::optional<Reason> Group::whyNotNext(const Node &node) {
   return std::nullopt;
 }
 
-void Group::add(const Node &node) {
+void StripGroup::add(const Node &node) {
   Operation *root = nullptr;
   for (Operation *op : node.stages)
     for (EdgeOp edge : edgesInto(node, cast<StageOp>(op)))
@@ -282,7 +284,7 @@ static Accesses findAccesses(PipelineOp pipeline) {
   return accesses;
 }
 
-void FormStripsPass::refuse(StageOp stage, const Reason &reason) {
+void FormStripsPass::refuse(StageOp stage, const Objection &reason) {
   InFlightDiagnostic remark = stage.emitRemark()
                               << "stage '" << getCppName(stage)
                               << "' does not run in strips: " << reason.text;
@@ -312,7 +314,7 @@ static SmallVector<Value> findLeaving(ArrayRef<Operation *> statements) {
   return leaving;
 }
 
-void FormStripsPass::finish(const Group &group) {
+void FormStripsPass::finish(const StripGroup &group) {
   if (group.empty())
     return;
   StageOp first = group.stages.front();
@@ -345,7 +347,7 @@ void FormStripsPass::finish(const Group &group) {
 void FormStripsPass::runOnOperation() {
   PipelineOp pipeline = getOperation();
   Accesses accesses = findAccesses(pipeline);
-  Group group(pipeline, accesses);
+  StripGroup group(pipeline, accesses);
   ProgramOp program = getProgram(pipeline);
   if (!program) {
     pipeline.emitError("expected a piko.program, which piko-form-program "
@@ -353,14 +355,14 @@ void FormStripsPass::runOnOperation() {
     return signalPassFailure();
   }
   for (const Node &node : findNodes(program)) {
-    std::optional<Reason> notNext = group.whyNotNext(node);
+    std::optional<Objection> notNext = group.whyNotNext(node);
     if (!notNext) {
       group.add(node);
       continue;
     }
     bool isFedByGroup = group.feeds(node);
     finish(group);
-    group = Group(pipeline, accesses);
+    group = StripGroup(pipeline, accesses);
     if (auto notFirst = group.whyNotFirst(node))
       refuse(cast<StageOp>(node.stages.front()),
              isFedByGroup ? *notNext : *notFirst);

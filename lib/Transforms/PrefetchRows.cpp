@@ -29,7 +29,7 @@ using Guard = std::pair<Value, bool>;
 
 /// An element that a pixel reads, of a buffer, and what is known to decide
 /// whether it does.
-struct Reference {
+struct RowReference {
   LoadOp load;
   SmallVector<Guard> guards;
 
@@ -73,8 +73,8 @@ private:
   llvm::DenseMap<Value, bool> differs; ///< from pixel to pixel
   llvm::SetVector<Attribute> tested;   ///< buffers that may be empty
   llvm::SetVector<LoadOp> roots;       ///< reads at the pixel itself
-  llvm::MapVector<Stage, SmallVector<Reference>> found;
-  SmallVector<std::pair<Stage, SmallVector<Reference>>> stages;
+  llvm::MapVector<Stage, SmallVector<RowReference>> found;
+  SmallVector<std::pair<Stage, SmallVector<RowReference>>> stages;
 };
 
 } // namespace
@@ -274,7 +274,7 @@ void RowPrefetcher::writeStage(const Stage &stage, Value row, bool isFirst,
   llvm::MapVector<ArrayRef<Guard>, SmallVector<ValueRange>> places;
   for (const auto &[other, references] : stages)
     if (other == stage)
-      for (const Reference &reference : references)
+      for (const RowReference &reference : references)
         places[reference.guards].push_back(reference.getPlace());
   for (auto &[guards, refers] : places) {
     Value all =

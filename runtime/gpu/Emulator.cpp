@@ -73,10 +73,10 @@ private:
   size_t count = 0;
 };
 
-class Device {
+class EmulatedDevice {
 public:
-  Device(void (*code)(const void *), const void *arguments, int64_t blocks,
-         int64_t threads)
+  EmulatedDevice(void (*code)(const void *), const void *arguments,
+                 int64_t blocks, int64_t threads)
       : threads(static_cast<size_t>(threads)), blocks(blocks), code(code),
         arguments(arguments) {}
 
@@ -104,18 +104,18 @@ private:
   Stacks stacks;
 };
 
-thread_local Device *device = nullptr;
+thread_local EmulatedDevice *device = nullptr;
 
 } // namespace
 
 // Not inlined: a jump must not skip what a caller keeps in registers.
-[[gnu::noinline]] void Device::enter() {
+[[gnu::noinline]] void EmulatedDevice::enter() {
   device->code(device->arguments);
   device->threads[device->current].state = State::Done;
   _longjmp(device->scheduler, 1);
 }
 
-[[gnu::noinline]] void Device::resume(size_t number) {
+[[gnu::noinline]] void EmulatedDevice::resume(size_t number) {
   current = number;
   Thread &thread = threads[number];
   if (_setjmp(scheduler) != 0)
@@ -128,11 +128,11 @@ thread_local Device *device = nullptr;
   context.uc_stack.ss_sp = stacks.at(number);
   context.uc_stack.ss_size = stackSize;
   context.uc_link = nullptr;
-  makecontext(&context, &Device::enter, 0);
+  makecontext(&context, &EmulatedDevice::enter, 0);
   setcontext(&context);
 }
 
-[[gnu::noinline]] void Device::suspend(State state) {
+[[gnu::noinline]] void EmulatedDevice::suspend(State state) {
   Thread &thread = threads[current];
   thread.state = state;
   if (_setjmp(thread.self) == 0)
@@ -140,7 +140,7 @@ thread_local Device *device = nullptr;
 }
 
 /// Operations whose mask says which lanes take part.
-bool Device::resolveMasked(size_t first, size_t end) {
+bool EmulatedDevice::resolveMasked(size_t first, size_t end) {
   bool any = false;
   for (size_t i = first; i < end; ++i) {
     State state = threads[i].state;
@@ -176,7 +176,7 @@ bool Device::resolveMasked(size_t first, size_t end) {
   return any;
 }
 
-bool Device::resolveActive(size_t first, size_t end) {
+bool EmulatedDevice::resolveActive(size_t first, size_t end) {
   auto lanes = [&](auto predicate) {
     return std::any_of(threads.begin() + static_cast<ptrdiff_t>(first),
                        threads.begin() + static_cast<ptrdiff_t>(end),
@@ -200,7 +200,7 @@ bool Device::resolveActive(size_t first, size_t end) {
   return mask != 0;
 }
 
-bool Device::resolveWarps() {
+bool EmulatedDevice::resolveWarps() {
   bool any = false;
   for (size_t first = 0; first < threads.size(); first += warpSize) {
     size_t end = std::min(first + warpSize, threads.size());
@@ -209,7 +209,7 @@ bool Device::resolveWarps() {
   return any;
 }
 
-std::string Device::describe() const {
+std::string EmulatedDevice::describe() const {
   size_t waiting = 0, ended = 0, other = 0;
   for (const Thread &thread : threads)
     ++(thread.state == State::Barrier ? waiting
@@ -221,7 +221,7 @@ std::string Device::describe() const {
          " for lanes of their warps, " + std::to_string(ended) + " have ended";
 }
 
-std::string Device::runBlock(int64_t number) {
+std::string EmulatedDevice::runBlock(int64_t number) {
   block = number;
   for (Thread &thread : threads) {
     thread.state = State::Ready;
@@ -268,7 +268,7 @@ void pikoir_grid_launch(pikort_pipeline *p, void (*thread)(const void *),
     return;
   static std::mutex mutex; // the memory of blocks is the code's
   std::lock_guard<std::mutex> lock(mutex);
-  Device grid(thread, arguments, blocks, threads);
+  EmulatedDevice grid(thread, arguments, blocks, threads);
   if (!grid.reserve()) {
     pikoir_fail_text(p, PIKORT_OUT_OF_MEMORY, "no room for a block's threads");
     return;

@@ -19,8 +19,8 @@ static constexpr size_t blockSize = 6;
 static constexpr size_t mostSettings = 2000;
 /// Those that run once more with the chosen one: so many rounds each time that
 /// their pipelines are made anew.
-static constexpr size_t finalists = 6;
-static constexpr int finalRounds = 6, finalInstances = 4;
+static constexpr size_t surveyFinalists = 6;
+static constexpr int surveyRounds = 6, surveyInstances = 4;
 
 /// Ranks settings by their time relative to the text's in the same block.
 static std::vector<Trial *> rankAll(Search &search, Bench &bench,
@@ -60,8 +60,8 @@ static std::vector<Trial *> rankAll(Search &search, Bench &bench,
 static Trial *findBest(Search &search, Bench &bench,
                        std::vector<Trial *> pool) {
   std::map<size_t, double> sums; // by the number of a trial
-  for (int i = 0; i < finalInstances; ++i) {
-    search.race(pool, finalRounds);
+  for (int i = 0; i < surveyInstances; ++i) {
+    search.race(pool, surveyRounds);
     for (Trial *trial : pool) {
       sums[trial->number] += trial->score;
       bench.release(trial->setting);
@@ -101,7 +101,7 @@ Result<Survey> tune::surveyAll(const std::vector<Dimension> &dimensions,
   Trial *mine = search.getTrial(chosen);
   if (ranking.empty() || !mine)
     return Error{"no setting has so small an error"};
-  ranking.resize(std::min(ranking.size(), finalists));
+  ranking.resize(std::min(ranking.size(), surveyFinalists));
   if (std::find(ranking.begin(), ranking.end(), mine) == ranking.end())
     ranking.push_back(mine);
   Trial *best = findBest(search, bench, ranking);
@@ -109,7 +109,7 @@ Result<Survey> tune::surveyAll(const std::vector<Dimension> &dimensions,
   if (best == mine)
     return survey;
   Duel duel = search.compare(
-      best, mine, search.getRound() + 1 - finalRounds * finalInstances);
+      best, mine, search.getRound() + 1 - surveyRounds * surveyInstances);
   survey.regret = duel.ratio - 1;
   survey.leastRegret = duel.leastRatio - 1;
   survey.mostRegret = duel.mostRatio - 1;

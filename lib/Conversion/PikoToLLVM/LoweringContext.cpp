@@ -234,7 +234,7 @@ Value LoweringContext::query(OpBuilder &builder, Operation *op,
 
 /// The launch that is to load members of bins that are opened outside: where a
 /// device makes them, the host does not know them when it launches.
-static gpu::LaunchOp findLaunch(OpBuilder &builder, Value bins) {
+static gpu::LaunchOp findGridLaunch(OpBuilder &builder, Value bins) {
   Operation *parent = builder.getInsertionBlock()->getParentOp();
   auto launch = dyn_cast<gpu::LaunchOp>(parent);
   if (!launch)
@@ -245,7 +245,7 @@ static gpu::LaunchOp findLaunch(OpBuilder &builder, Value bins) {
 
 Value LoweringContext::member(OpBuilder &builder, Value bins,
                               const RuntimeMember &which) {
-  gpu::LaunchOp launch = findLaunch(builder, bins);
+  gpu::LaunchOp launch = findGridLaunch(builder, bins);
   Value &known = members[{bins, launch, which.offset}];
   if (known)
     return known;

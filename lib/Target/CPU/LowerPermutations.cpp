@@ -15,23 +15,23 @@ using namespace piko;
 namespace {
 
 /// What x86 has for so many lanes of 32 bits.
-struct Instruction {
+struct WordPermutation {
   unsigned lanes;
   StringLiteral feature;
   Intrinsic::ID id;
 };
 
-constexpr Instruction instructions[] = {
+constexpr WordPermutation wordPermutations[] = {
     {16, "+avx512f", Intrinsic::x86_avx512_permvar_si_512},
     {8, "+avx2", Intrinsic::x86_avx2_permd},
     {4, "+avx", Intrinsic::x86_avx_vpermilvar_ps},
     {4, "+ssse3", Intrinsic::x86_ssse3_pshuf_b_128}};
 
 /// Writes what stands for one permutation.
-class Writer {
+class PermutationWriter {
 public:
   /// In front of the call.
-  Writer(CallInst *call, const TargetMachine &machine);
+  PermutationWriter(CallInst *call, const TargetMachine &machine);
   Value *write() { return permute(call->getArgOperand(0)); }
 
 private:
@@ -45,28 +45,29 @@ private:
   IRBuilder<> builder;
   Value *lanes;
   unsigned count;
-  const Instruction *instruction = nullptr; ///< if there is one
+  const WordPermutation *instruction = nullptr; ///< if there is one
 };
 
 } // namespace
 
-Writer::Writer(CallInst *call, const TargetMachine &machine)
+PermutationWriter::PermutationWriter(CallInst *call,
+                                     const TargetMachine &machine)
     : call(call), builder(call), lanes(call->getArgOperand(1)),
       count(cast<FixedVectorType>(lanes->getType())->getNumElements()) {
   if (!machine.getTargetTriple().isX86())
     return;
   const TargetSubtargetInfo &processor =
       *machine.getSubtargetImpl(*call->getFunction());
-  instruction = find_if(instructions, [&](const Instruction &one) {
+  instruction = find_if(wordPermutations, [&](const WordPermutation &one) {
     return one.lanes == count && processor.checkFeatures(one.feature.str());
   });
-  if (instruction == std::end(instructions))
+  if (instruction == std::end(wordPermutations))
     instruction = nullptr;
 }
 
 /// Of 32 bits, by the instruction. All but that for bytes take a lane modulo
 /// the number of lanes.
-Value *Writer::permuteWords(Value *vector) {
+Value *PermutationWriter::permuteWords(Value *vector) {
   Type *type = vector->getType();
   if (instruction->id == Intrinsic::x86_avx_vpermilvar_ps) {
     auto *floats = FixedVectorType::get(builder.getFloatTy(), count);
@@ -97,7 +98,7 @@ Value *Writer::permuteWords(Value *vector) {
 
 /// Of 64 bits, where two registers hold the vector, of which one instruction
 /// takes what it needs.
-Value *Writer::permuteDoubleWords(Value *vector) {
+Value *PermutationWriter::permuteDoubleWords(Value *vector) {
   auto getHalf = [&](Value *whole, unsigned first) {
     return builder.CreateShuffleVector(
         whole, to_vector(seq<int>(first, first + count / 2)));
@@ -114,7 +115,7 @@ Value *Writer::permuteDoubleWords(Value *vector) {
 }
 
 /// Of 64 bits, as words, of which a vector holds as many as there are lanes.
-Value *Writer::permuteHalves(Value *vector) {
+Value *PermutationWriter::permuteHalves(Value *vector) {
   auto *words = FixedVectorType::get(builder.getInt32Ty(), 2 * count);
   Value *all = builder.CreateBitCast(vector, words);
   SmallVector<int> low, high, mix;
@@ -129,7 +130,7 @@ Value *Writer::permuteHalves(Value *vector) {
                                vector->getType());
 }
 
-Value *Writer::permuteInMemory(Value *vector) {
+Value *PermutationWriter::permuteInMemory(Value *vector) {
   auto *type = cast<FixedVectorType>(vector->getType());
   BasicBlock &entry = call->getFunction()->getEntryBlock();
   auto *slot = IRBuilder<>(&entry, entry.begin()).CreateAlloca(type);
@@ -147,7 +148,7 @@ Value *Writer::permuteInMemory(Value *vector) {
   return moved;
 }
 
-Value *Writer::permute(Value *vector) {
+Value *PermutationWriter::permute(Value *vector) {
   Type *type = vector->getType();
   if (!instruction)
     return permuteInMemory(vector);
@@ -167,7 +168,7 @@ void piko::lowerPermutations(Module &module, const TargetMachine &machine) {
       continue;
     for (User *user : make_early_inc_range(function.users())) {
       auto *call = cast<CallInst>(user);
-      call->replaceAllUsesWith(Writer(call, machine).write());
+      call->replaceAllUsesWith(PermutationWriter(call, machine).write());
       call->eraseFromParent();
     }
     function.eraseFromParent();

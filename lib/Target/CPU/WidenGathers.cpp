@@ -9,7 +9,7 @@
 
 using namespace llvm;
 
-static constexpr unsigned wordSize = 4, byteBits = 8;
+static constexpr unsigned wordBytes = 4, byteBits = 8;
 
 /// Whether no number that it gathers lies in two words.
 static bool isNarrow(IntrinsicInst *gather) {
@@ -35,12 +35,12 @@ static void widen(IntrinsicInst *gather) {
   Value *address = builder.CreatePtrToInt(pointers, addresses);
   Value *aligned = builder.CreateIntToPtr(
       builder.CreateAnd(address,
-                        ConstantInt::getSigned(addresses, -int64_t(wordSize))),
+                        ConstantInt::getSigned(addresses, -int64_t(wordBytes))),
       pointers->getType());
-  Value *word = builder.CreateMaskedGather(words, aligned, Align(wordSize),
+  Value *word = builder.CreateMaskedGather(words, aligned, Align(wordBytes),
                                            mask, Constant::getNullValue(words));
   Value *shift = builder.CreateShl(
-      builder.CreateAnd(builder.CreateTrunc(address, words), wordSize - 1), 3);
+      builder.CreateAnd(builder.CreateTrunc(address, words), wordBytes - 1), 3);
   Value *value = builder.CreateBitCast(
       builder.CreateTrunc(builder.CreateLShr(word, shift), bits), type);
   if (!match(otherwise, PatternMatch::m_Zero()) && !isa<UndefValue>(otherwise))
