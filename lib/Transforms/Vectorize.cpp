@@ -282,7 +282,6 @@ bool VectorizePass::vectorizeInOrder(Operation *op) {
     vectorize(IterationLanes(copy, (isPaired ? 2 : 1) * laneCount));
   }
   op->erase();
-  ++vectorized;
   return true;
 }
 
@@ -312,14 +311,12 @@ WalkResult VectorizePass::visit(Operation *op) {
     vectorize(IterationLanes(copy, countLanes(candidate)), copy);
   } else {
     copy.erase();
-    ++left;
   }
   if (flat.loop)
     flat.loop.erase();
   if (!isDone)
     return WalkResult::advance();
   loop.erase();
-  ++vectorized;
   return WalkResult::skip();
 }
 
@@ -341,11 +338,8 @@ void VectorizePass::runOnOperation() {
     if (parallel->getParentOfType<KernelOp>())
       meeting.push_back(parallel);
   });
-  for (ParallelForOp parallel : meeting) {
-    if (runInLockstep(parallel))
-      ++vectorized;
-    else if (failed(LoopSplitter(parallel).run()))
+  for (ParallelForOp parallel : meeting)
+    if (!runInLockstep(parallel) && failed(LoopSplitter(parallel).run()))
       return signalPassFailure();
-  }
   vectorizeLoops(getOperation());
 }
