@@ -289,7 +289,6 @@ void FormStripsPass::refuse(StageOp stage, const Reason &reason) {
   // The front end has one place for a stage and its schedule.
   if (reason.culprit && reason.culprit->getLoc() != stage.getLoc())
     remark.attachNote(reason.culprit->getLoc()) << "because of this";
-  ++refused;
 }
 
 /// The tile of `All` is what the whole machine takes at a time.
@@ -338,8 +337,6 @@ void FormStripsPass::finish(const Group &group) {
   for (Operation *statement : group.statements)
     statement->moveBefore(body, body->end());
   LeaveOp::create(builder, first.getLoc(), leaving, ValueRange());
-  ++groups;
-  kernels += group.launches;
 }
 
 void FormStripsPass::runOnOperation() {
