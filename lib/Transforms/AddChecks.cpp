@@ -46,7 +46,6 @@ public:
       : pipeline(pipeline), numbers(numbers) {}
 
   void run();
-  unsigned unwritten = 0, accesses = 0, indices = 0;
 
 private:
   FlatSymbolRefAttr withLineage(FlatSymbolRefAttr record);
@@ -136,7 +135,7 @@ static Value getLineage(OpBuilder &builder, Location loc, Value prim) {
 }
 
 void Checker::checkAssign(StageOp stage, AssignOp assign) {
-  indices += checkIndices(assign);
+  checkIndices(assign);
   checkTrips(assign);
   assign.walk([&](Operation *op) {
     auto load = dyn_cast<LoadOp>(op);
@@ -157,9 +156,9 @@ void Checker::checkAssign(StageOp stage, AssignOp assign) {
 }
 
 void Checker::checkProcess(StageOp stage, ProcessOp process) {
-  indices += checkIndices(process);
-  unwritten += checkUnwritten(
-      process, [&](FlatSymbolRefAttr record) { return hostOf(record); });
+  checkIndices(process);
+  checkUnwritten(process,
+                 [&](FlatSymbolRefAttr record) { return hostOf(record); });
   updated.clear();
   process.walk([&](UpdateOp update) { updated.insert(update.getImageAttr()); });
   checkTrips(process);
@@ -227,7 +226,6 @@ void Checker::checkBlock(Block &block, Value iteration) {
             updated.contains(access->state) ? builder.getUnitAttr()
                                             : UnitAttr(),
             access->state, access->indices));
-        ++accesses;
       }
     }
     if (auto loop = dyn_cast<ParallelLoopOpInterface>(op)) {
@@ -415,11 +413,6 @@ void AddChecksPass::runOnOperation() {
   FailureOr<NumberFields> fields = findNumbers(records);
   if (failed(fields))
     return signalPassFailure();
-  for (PipelineOp pipeline : pipelines) {
-    Checker checker(pipeline, *fields);
-    checker.run();
-    accesses += checker.accesses;
-    indices += checker.indices;
-    unwritten += checker.unwritten;
-  }
+  for (PipelineOp pipeline : pipelines)
+    Checker(pipeline, *fields).run();
 }

@@ -254,8 +254,5 @@ void ApplyPrecisionPass::runOnOperation() {
                          << counts.contracted << " additions are contracted, "
                          << counts.reciprocals << " divisions and "
                          << counts.roots << " square roots approximated";
-    contracted += counts.contracted;
-    reciprocals += counts.reciprocals;
-    roots += counts.roots;
   }
 }

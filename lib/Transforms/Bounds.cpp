@@ -14,18 +14,15 @@ using namespace mlir;
 using namespace piko;
 
 /// Checks the operands that are indices into an array of these counts.
-static unsigned checkIndices(Operation *op, MutableOperandRange indices,
-                             ArrayRef<int64_t> counts) {
-  unsigned checks = 0;
+static void checkIndices(Operation *op, MutableOperandRange indices,
+                         ArrayRef<int64_t> counts) {
   for (auto [index, count] : llvm::zip_equal(indices, counts)) {
     APInt known;
     if (matchPattern(index.get(), m_ConstantInt(&known)) && known.ult(count))
       continue;
     OpBuilder builder(op);
     index.set(CheckIndexOp::create(builder, op->getLoc(), index.get(), count));
-    ++checks;
   }
-  return checks;
 }
 
 /// The counts of the array that the field is.
@@ -38,29 +35,23 @@ template <typename AccessOp> static RecordOp getAccessedRecord(AccessOp op) {
   return lookupRecord(op, getStateRecord(state));
 }
 
-unsigned piko::checkIndices(Operation *phase) {
-  unsigned checks = 0;
+void piko::checkIndices(Operation *phase) {
   phase->walk([&](Operation *op) {
-    checks +=
-        llvm::TypeSwitch<Operation *, unsigned>(op)
-            .Case<memref::LoadOp, memref::StoreOp>([](auto access) {
-              return ::checkIndices(access, access.getIndicesMutable(),
-                                    access.getMemRefType().getShape());
-            })
-            .Case<GetOp>([](GetOp get) {
-              RecordOp record = lookupRecord(
-                  get, cast<PrimType>(get.getPrim().getType()).getRecord());
-              return ::checkIndices(get, get.getElementsMutable(),
-                                    getCounts(get, record));
-            })
-            .Case<LoadOp, StoreOp, AtomicOp>([](auto access) {
-              return ::checkIndices(
-                  access, access.getElementsMutable(),
-                  getCounts(access, getAccessedRecord(access)));
-            })
-            .Default(0u);
+    llvm::TypeSwitch<Operation *>(op)
+        .Case<memref::LoadOp, memref::StoreOp>([](auto access) {
+          ::checkIndices(access, access.getIndicesMutable(),
+                         access.getMemRefType().getShape());
+        })
+        .Case<GetOp>([](GetOp get) {
+          RecordOp record = lookupRecord(
+              get, cast<PrimType>(get.getPrim().getType()).getRecord());
+          ::checkIndices(get, get.getElementsMutable(), getCounts(get, record));
+        })
+        .Case<LoadOp, StoreOp, AtomicOp>([](auto access) {
+          ::checkIndices(access, access.getElementsMutable(),
+                         getCounts(access, getAccessedRecord(access)));
+        });
   });
-  return checks;
 }
 
 void piko::checkTrips(Operation *phase) {

@@ -11,8 +11,8 @@
 namespace piko {
 
 /// Puts each index into a local array or into an array of a field through a
-/// `piko.check_index`, unless it is known to be inside. Returns how many.
-unsigned checkIndices(mlir::Operation *phase);
+/// `piko.check_index`, unless it is known to be inside.
+void checkIndices(mlir::Operation *phase);
 
 /// Makes each `scf.while` of a phase end when a `piko.check_trip` says so.
 void checkTrips(mlir::Operation *phase);

@@ -162,13 +162,11 @@ llvm::SetVector<StringAttr> piko::getImages(ArrayRef<CommutingUpdate> updates) {
   return images;
 }
 
-int64_t piko::makeAtomic(StageOp stage,
-                         MutableArrayRef<CommutingUpdate> updates) {
+void piko::makeAtomic(StageOp stage, MutableArrayRef<CommutingUpdate> updates) {
   for (StringAttr image : getImages(updates))
     mlir::emitRemark(stage.getLoc(), "stage '")
         << getCppName(stage) << "' updates pixels of '" << image.getValue()
         << "' in any order, by atomic operations";
   for (CommutingUpdate &update : updates)
     ::makeAtomic(update);
-  return updates.size();
 }

@@ -37,9 +37,8 @@ llvm::SetVector<mlir::StringAttr>
 getImages(llvm::ArrayRef<CommutingUpdate> updates);
 
 /// Makes updates of a stage atomic operations, behind tests of their pixels,
-/// and says so; how many they are.
-int64_t makeAtomic(StageOp stage,
-                   llvm::MutableArrayRef<CommutingUpdate> updates);
+/// and says so.
+void makeAtomic(StageOp stage, llvm::MutableArrayRef<CommutingUpdate> updates);
 
 } // namespace piko
 

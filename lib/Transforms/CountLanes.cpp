@@ -250,6 +250,5 @@ void CountLanesPass::runOnOperation() {
     for (CounterKind kind : kinds)
       counters.add(kernel.getLoc(), kind, stage);
     LaneCounter(kernel, first).run();
-    ++counted;
   }
 }

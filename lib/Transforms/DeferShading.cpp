@@ -190,10 +190,9 @@ void DeferShadingPass::runOnBins(KernelOp kernel, BinsOp bins) {
         << "' is computed once for each pixel, when all primitives of the bin "
         << "are done, from " << what.getBytes() << " bytes";
     deferral.apply();
-    ++deferred;
     return std::nullopt;
   };
-  refused += forEachDeferral(kernel, bins, Deferral::To::Bin, apply);
+  forEachDeferral(kernel, bins, Deferral::To::Bin, apply);
 }
 
 void DeferShadingPass::runOnOperation() {

@@ -413,13 +413,12 @@ static void splitUpdates(BinsOp bins, Deferral::To to) {
     });
 }
 
-int64_t piko::forEachDeferral(
+void piko::forEachDeferral(
     KernelOp kernel, BinsOp bins, Deferral::To to,
     llvm::function_ref<std::optional<Reason>(Deferral &)> apply) {
   auto stage = lookupInPipeline<StageOp>(bins, bins.getStageAttr());
   if (isPossible(stage, to))
     splitUpdates(bins, to);
-  int64_t refused = 0;
   for (const SmallVector<Site> &sites : findSites(kernel)) {
     Operation *work = findPaintingWork(bins, sites);
     if (!work || (sites.size() == 1 && paintsOnce(work, sites.front())))
@@ -437,11 +436,9 @@ int64_t piko::forEachDeferral(
     }
     if (!reason)
       continue;
-    ++refused;
     InFlightDiagnostic remark = mlir::emitRemark(loc)
                                 << "what is written to '" << image
                                 << "' is computed also where it is overwritten";
     remark.attachNote(reason->at) << reason->why;
   }
-  return refused;
 }

@@ -89,10 +89,9 @@ private:
 
 /// Calls `apply` with all that is worth deferring in the bins of a kernel;
 /// where it gives a reason, or something else is in the way, a remark says so.
-/// How often that is.
-int64_t
-forEachDeferral(KernelOp kernel, BinsOp bins, Deferral::To to,
-                llvm::function_ref<std::optional<Reason>(Deferral &)> apply);
+void forEachDeferral(
+    KernelOp kernel, BinsOp bins, Deferral::To to,
+    llvm::function_ref<std::optional<Reason>(Deferral &)> apply);
 
 } // namespace piko
 

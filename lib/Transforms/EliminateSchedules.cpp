@@ -38,6 +38,5 @@ void EliminateSchedulesPass::runOnOperation() {
       schedule.setResolved(true);
     else
       schedule.erase();
-    ++eliminated;
   }
 }

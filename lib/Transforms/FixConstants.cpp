@@ -110,7 +110,6 @@ LogicalResult FixConstantsPass::fixSize(BufferOp buffer, StringRef value) {
         arith::ConstantIndexOp::create(builder, extent.getLoc(), size)
             .getResult());
     extent.erase();
-    ++replaced;
   });
   return success();
 }
@@ -180,7 +179,6 @@ LogicalResult FixConstantsPass::fixField(ConstantOp constant, StringRef path,
     load.replaceAllUsesWith(
         arith::ConstantOp::create(at, load.getLoc(), number).getResult());
     load.erase();
-    ++replaced;
   });
   return success();
 }

@@ -255,10 +255,9 @@ void FormGBufferPass::runOnBins(KernelOp kernel, BinsOp bins) {
         << " behind that of stage '" << getCppName(what.getStage())
         << "', from " << what.getBytes() << " bytes";
     buffer.form();
-    ++deferred;
     return std::nullopt;
   };
-  refused += forEachDeferral(kernel, bins, Deferral::To::Kernel, apply);
+  forEachDeferral(kernel, bins, Deferral::To::Kernel, apply);
 }
 
 void FormGBufferPass::runOnOperation() {

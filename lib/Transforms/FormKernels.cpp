@@ -36,7 +36,6 @@ KernelOp FormKernelsPass::createKernel(OpBuilder &builder, Location loc,
     unique = (name + "_" + Twine(i)).str();
   auto kernel = KernelOp::create(builder, loc, unique);
   kernel.getBody().emplaceBlock();
-  ++kernels;
   return kernel;
 }
 

@@ -42,7 +42,6 @@ public:
       : pipeline(pipeline), plan(plan), builder(pipeline.getContext()) {}
 
   LogicalResult run();
-  int64_t joins = 0, permuted = 0, merged = 0;
 
 private:
   LogicalResult findKernels();
@@ -142,7 +141,6 @@ void ProgramWriter::remark(JoinOp join, int stage) {
     from += (from.empty() ? "" : ", ") + describe(*edge);
     if (!edge->permute)
       continue;
-    ++permuted;
     StageOp producer = plan.graph.getStage(edge->producer);
     edge->op->emitRemark("what stage ")
         << quote(producer) << " emits to stage " << quote(consumer)
@@ -152,7 +150,6 @@ void ProgramWriter::remark(JoinOp join, int stage) {
   }
   if (!join.getMerge())
     return;
-  ++merged;
   int64_t width = 0;
   for (int64_t keys : join.getKeys())
     width = std::max(width, keys);
@@ -178,7 +175,6 @@ JoinOp ProgramWriter::createJoin(int stage) {
       BinsType::get(builder.getContext(), consumer.getInputAttr()),
       consumer.getSymName(), isKeyed && plan.merges(stage), takeValues(edges),
       permutes, keys, keeps ? builder.getI64IntegerAttr(keeps) : IntegerAttr());
-  ++joins;
   remark(join, stage);
   return join;
 }
@@ -488,10 +484,6 @@ void FormProgramPass::runOnOperation() {
   if (isAuthored || getProgram(pipeline))
     return markAllAnalysesPreserved();
   ProgramPlan plan(pipeline);
-  ProgramWriter writer(pipeline, plan);
-  if (failed(writer.run()))
-    return signalPassFailure();
-  joins += writer.joins;
-  permuted += writer.permuted;
-  merged += writer.merged;
+  if (failed(ProgramWriter(pipeline, plan).run()))
+    signalPassFailure();
 }

@@ -291,7 +291,6 @@ void FormStripsPass::refuse(StageOp stage, const Objection &reason) {
   // The front end has one place for a stage and its schedule.
   if (reason.culprit && reason.culprit->getLoc() != stage.getLoc())
     remark.attachNote(reason.culprit->getLoc()) << "because of this";
-  ++refused;
 }
 
 /// The tile of `All` is what the whole machine takes at a time.
@@ -340,8 +339,6 @@ void FormStripsPass::finish(const StripGroup &group) {
   for (Operation *statement : group.statements)
     statement->moveBefore(body, body->end());
   LeaveOp::create(builder, first.getLoc(), leaving, ValueRange());
-  ++groups;
-  kernels += group.launches;
 }
 
 void FormStripsPass::runOnOperation() {

@@ -256,11 +256,10 @@ void TileFormer::form(ImageOp image, bool clears) {
 // The pass
 //===----------------------------------------------------------------------===//
 
-/// Forms the tiles of a kernel; how many, and how many images are left.
-static std::pair<int64_t, int64_t> formTiles(TileFormer former,
-                                             ArrayRef<ImageOp> images,
-                                             int64_t budget, bool loads) {
-  int64_t bytes = 0, formed = 0, left = 0;
+/// Forms the tiles of a kernel.
+static void formTiles(TileFormer former, ArrayRef<ImageOp> images,
+                      int64_t budget, bool loads) {
+  int64_t bytes = 0;
   std::optional<Reason> general = former.whyNot();
   auto quote = [](StringRef name) { return ("'" + name + "'").str(); };
   std::string who = "stage " + quote(getCppName(former.getStage()));
@@ -280,17 +279,14 @@ static std::pair<int64_t, int64_t> formTiles(TileFormer former,
       InFlightDiagnostic remark = image.emitRemark()
                                   << who << " has no tiles of " << name;
       remark.attachNote(reason->at) << reason->why;
-      ++left;
       continue;
     }
     bytes += more;
-    ++formed;
     former.form(image, !dirty);
     image.emitRemark() << who << " keeps a bin's pixels of " << name << " in "
                        << more << " bytes"
                        << (dirty ? "" : ", which it clears");
   }
-  return {formed, left};
 }
 
 void FormTilesPass::runOnOperation() {
@@ -306,9 +302,7 @@ void FormTilesPass::runOnOperation() {
         kernel.walk([](TileOp) { return WalkResult::interrupt(); })
             .wasInterrupted())
       continue;
-    auto [made, left] = formTiles(TileFormer(kernel, *bins.begin(), accesses),
-                                  accesses.getWritten(kernel), budget, loads);
-    formed += made;
-    refused += left;
+    formTiles(TileFormer(kernel, *bins.begin(), accesses),
+              accesses.getWritten(kernel), budget, loads);
   }
 }

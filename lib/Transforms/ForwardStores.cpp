@@ -56,8 +56,6 @@ class Forwarder {
 public:
   void forward(Block &block);
 
-  int64_t count = 0;
-
 private:
   void forget(FlatSymbolRefAttr state) {
     llvm::erase_if(known,
@@ -113,7 +111,6 @@ void Forwarder::visit(LoadOp load) {
     if (one.place.isSame(place) && one.value.getType() == load.getType()) {
       load.getResult().replaceAllUsesWith(one.value);
       load.erase();
-      ++count;
       return;
     }
   known.push_back({place, load.getResult()});
@@ -184,9 +181,6 @@ void Forwarder::forward(Block &block) {
 void ForwardStoresPass::runOnOperation() {
   for (auto kernel : getOperation().getOps<KernelOp>())
     for (Region &region : kernel->getRegions())
-      for (Block &block : region) {
-        Forwarder forwarder;
-        forwarder.forward(block);
-        forwarded += forwarder.count;
-      }
+      for (Block &block : region)
+        Forwarder().forward(block);
 }

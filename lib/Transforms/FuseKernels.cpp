@@ -258,7 +258,6 @@ void FuseKernelsPass::fuseInto(KernelOp host) {
                                   << "' does not run bin by bin behind stage '"
                                   << getCppName(producer) << "'";
       remark.attachNote(refusal.at->getLoc()) << refusal.why;
-      ++refused;
       continue;
     }
     consumer.emitRemark() << "stage '" << getCppName(consumer)
@@ -266,7 +265,6 @@ void FuseKernelsPass::fuseInto(KernelOp host) {
                           << getCppName(producer) << "'";
     inside.insert(kernel.getProcess().getStageAttr());
     candidate.fuse();
-    ++fused;
   }
 }
 

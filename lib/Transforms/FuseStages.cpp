@@ -473,7 +473,6 @@ void FuseStagesPass::runOnOperation() {
               << getCppName(producer)
               << "' emits in a loop from a list, as its own loops fill vectors "
                  "there";
-          ++behind;
           continue;
         }
         consumer.emitRemark()
@@ -481,7 +480,6 @@ void FuseStagesPass::runOnOperation() {
             << getCppName(producer) << "'";
         gone.insert(consumer);
         Fusion(edge).run();
-        ++fused;
         changed = true;
         break;
       }
@@ -495,7 +493,6 @@ void FuseStagesPass::runOnOperation() {
                                   << "' is not fused with stage '"
                                   << getCppName(producer) << "'";
       remark.attachNote(refusal.at->getLoc()) << refusal.why;
-      ++refused;
     }
   }
 }

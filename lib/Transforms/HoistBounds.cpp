@@ -299,7 +299,7 @@ static void setNoWrap(Operation *op) {
 }
 
 /// Versions a nest by the ranges of its indices.
-static bool versionByRanges(LoopLikeOpInterface nest) {
+static void versionByRanges(LoopLikeOpInterface nest) {
   auto front = std::make_unique<Block>();
   OpBuilder builder(nest->getContext());
   builder.setInsertionPointToEnd(front.get());
@@ -318,7 +318,7 @@ static bool versionByRanges(LoopLikeOpInterface nest) {
     return WalkResult::advance();
   });
   if (result.wasInterrupted() || accesses.empty())
-    return false;
+    return;
   nest->getBlock()->getOperations().splice(nest->getIterator(),
                                            front->getOperations());
   SmallVector<Operation *> sums, divisions;
@@ -337,21 +337,17 @@ static bool versionByRanges(LoopLikeOpInterface nest) {
     IRRewriter rewriter(division);
     rewriter.replaceOp(division, division.createUnchecked(rewriter));
   }
-  return true;
 }
 
 WalkResult HoistBoundsPass::visit(LoopLikeOpInterface nest) {
   if (isInnermost(nest) && isSmall(nest, maxOperations) &&
-      LoopVersioner(nest).run()) {
-    ++versioned;
+      LoopVersioner(nest).run())
     return WalkResult::skip();
-  }
   // Where not all indices are inside, as with a guard around what reads them,
   // those of loops inside may be.
   auto loop = dyn_cast<scf::ForOp>(nest.getOperation());
-  if (!(loop && isOverPrimitives(loop)) && isSmall(nest, maxNestOperations) &&
-      versionByRanges(nest))
-    ++versioned;
+  if (!(loop && isOverPrimitives(loop)) && isSmall(nest, maxNestOperations))
+    versionByRanges(nest);
   return WalkResult::advance();
 }
 

@@ -45,7 +45,6 @@ bool HoistLoadsPass::hoist(scf::WhileOp loop,
       fixed.push_back(load);
   for (LoadOp load : fixed)
     load->moveBefore(loop);
-  hoisted += fixed.size();
   if (!fixed.empty())
     moveLoopInvariantCode(cast<LoopLikeOpInterface>(loop.getOperation()));
   return !fixed.empty();

@@ -118,7 +118,6 @@ void IfConvertPass::runOnOperation() {
   getOperation().walk([&](Operation *op) { // inner ones first
     if (!isa<scf::IfOp, scf::IndexSwitchOp>(op) || !isCheap(op))
       return;
-    ++converted;
     if (auto choice = dyn_cast<scf::IfOp>(op))
       convert(choice);
     else

@@ -45,13 +45,11 @@ void InferDirectivesPass::runOnOperation() {
                                 << "the bins of stage '" << getCppName(stage)
                                 << "' are not known to be those before";
     remark.attachNote(refusal.at->getLoc()) << refusal.why;
-    ++refused;
   }
   // Only now, because the proofs use what the phases say.
   for (AssignToOp to : proved) {
     OpBuilder builder(to);
     AssignPreviousOp::create(builder, to.getLoc(), /*inferred=*/true);
     to.erase();
-    ++inferred;
   }
 }

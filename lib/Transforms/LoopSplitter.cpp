@@ -300,7 +300,6 @@ void LoopSplitter::splitWhile(scf::WhileOp op, Piece &piece) {
 void LoopSplitter::compare(Value value, StringRef barrier) {
   if (!uniformity.isVarying(value))
     return;
-  ++checks;
   Location loc = value.getLoc();
   auto first =
       UnrealizedConversionCastOp::create(builder, loc, value.getType(), value);

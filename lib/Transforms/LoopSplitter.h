@@ -27,8 +27,6 @@ public:
 
   /// Fails after an error.
   mlir::LogicalResult run();
-  /// How many conditions are compared when the pipeline runs.
-  int64_t getChecks() const { return checks; }
 
 private:
   /// A loop over all iterations that is made when it is first needed.
@@ -89,7 +87,6 @@ private:
   /// Values that are read from slots, and copies of iteration 0's.
   llvm::SmallVector<std::pair<mlir::Operation *, mlir::Value>> placeholders;
   llvm::SmallVector<mlir::Operation *> copies;
-  int64_t checks = 0;
 };
 
 } // namespace piko

@@ -394,8 +394,6 @@ LogicalResult MapLanesPass::map(WorkOpInterface op) {
   }
   LaneMapping chosen = said.value_or(work.getBest());
   op.setLanes(chosen);
-  Statistic *counts[] = {&this->items, &iterations, &collapsed, &one};
-  ++*counts[static_cast<int>(chosen)];
   if (!isSource)
     remark(work, stage, chosen, said.has_value());
   return success();

@@ -96,7 +96,6 @@ void MergeBoundsPass::merge(ArrayRef<scf::IfOp> tests) {
     test.getResult(0).replaceAllUsesWith(result);
     test->erase();
   }
-  merged += tests.size() - 1;
 }
 
 /// Whether an operation writes a field of any element of a piece of state, or
@@ -221,7 +220,6 @@ void MergeBoundsPass::mergeWrites(Block &block) {
       for (StoreOp write : writes)
         write->moveBefore(front);
       test.erase();
-      ++merged;
     } else if (test && mayPass(&op, test, writes)) {
       continue;
     }

@@ -73,7 +73,6 @@ void MergeGathersPass::merge(ArrayRef<OpT> reads, Value addresses,
     op->getResult(0).replaceAllUsesWith(all.getResult(i));
     op->erase();
   }
-  merged += reads.size();
 }
 
 /// Whether a mask is known to hold for no lane for which another does not.
@@ -248,7 +247,6 @@ void MergeGathersPass::mergeWrites(ArrayRef<ScatterOp> writes) {
       builder.getArrayAttr(fields), last.getStateAttr(), last.getMask());
   for (ScatterOp write : writes)
     write.erase();
-  merged += writes.size();
 }
 
 /// Writes to elements of one piece of state each, and all of them done where

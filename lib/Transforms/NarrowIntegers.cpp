@@ -85,10 +85,6 @@ void NarrowIntegersPass::runOnOperation() {
         hoistLoads(rows);
       moveLoopInvariantCode(parent);
     }
-    Narrower narrower(row, laneCount);
-    narrower.narrow();
-    comparisons += narrower.comparisons();
-    values += narrower.values();
-    interchanged += narrower.areInterchanged();
+    Narrower(row, laneCount).narrow();
   }
 }

@@ -144,7 +144,6 @@ void OrderStagesPass::runOnOperation() {
   NodeOrder paper(nodes);
   SmallVector<int> distance = paper.distancesFromDrain(declared);
   Lists branches = paper.branches();
-  this->branches = branches.size();
   llvm::sort(branches, [&](ArrayRef<int> a, ArrayRef<int> b) {
     return std::pair(-distance[a.front()], a.front()) <
            std::pair(-distance[b.front()], b.front());
@@ -156,11 +155,9 @@ void OrderStagesPass::runOnOperation() {
     order = declared;
 
   int64_t place = 0;
-  for (int node : declared) {
+  for (int node : declared)
     for (int stage : nodes.nodes[node])
       graph.stages[stage].setLineage(place++);
-    cycles += nodes.cyclic[node];
-  }
   Block *body = pipeline.getBodyBlock();
   for (int node : order)
     for (int stage : nodes.nodes[node])

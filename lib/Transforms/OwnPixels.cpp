@@ -104,7 +104,6 @@ void OwnPixelsPass::runOnStage(StageOp stage) {
                                 << "stage '" << getCppName(stage)
                                 << "' shares no bin by its pixels";
     remark.attachNote(at->getLoc()) << why;
-    ++refused;
   };
   if (stage.getTakesList())
     return refuse(process, "the phase takes a list, which may be of primitives "
@@ -145,7 +144,6 @@ void OwnPixelsPass::runOnStage(StageOp stage) {
     coordinates.push_back(mapping.lookupOrDefault(coordinate));
   OwnerOp::create(builder, first.getLoc(), coordinates);
   stage.setTile(tile);
-  ++divided;
 }
 
 void OwnPixelsPass::runOnOperation() {

@@ -430,7 +430,6 @@ void PairGathersPass::loadEach(const Candidate &candidate) {
   }
   gather.getResult().replaceAllUsesWith(value);
   gather.erase();
-  ++loaded;
 }
 
 void PairGathersPass::load(ArrayRef<Candidate> candidates) {
@@ -445,7 +444,6 @@ void PairGathersPass::load(ArrayRef<Candidate> candidates) {
       run.reads.push_back(candidates[number]);
     if (found.size() > 1 && replace(run, candidates[i].whole)) {
       finder.take(found);
-      paired += found.size();
       continue;
     }
     finder.take(i);

@@ -130,7 +130,6 @@ void PreSchedulePass::runOnOperation() {
     Directives said(schedule);
     follow(schedule.getBody().front(), said);
     if (Operation *unknown = findUnknown(schedule, said)) {
-      ++kept;
       InFlightDiagnostic remark = schedule.emitRemark()
                                   << "stage '" << getCppName(stage)
                                   << "' is scheduled bin by bin";
@@ -150,6 +149,5 @@ void PreSchedulePass::runOnOperation() {
     schedule.setEveryBin(*said.everyBin.value != 0);
     schedule.getBody().getBlocks().clear();
     chooseCores(schedule);
-    ++moved;
   }
 }

@@ -162,7 +162,6 @@ void PrefetchPass::convert(scf::ForOp loop, ItemOp item) {
   SmallVector<Reference> references = findReferences(loop, item);
   if (references.empty() && !areFarApart(item))
     return;
-  ++loops;
   Location loc = item.getLoc();
   OpBuilder builder(loop);
   Value one = arith::ConstantIndexOp::create(builder, loc, 1);
@@ -185,7 +184,6 @@ void PrefetchPass::convert(scf::ForOp loop, ItemOp item) {
     for (Value index : reference.indices)
       indices.push_back(cloneIndex(index, builder, mapping));
     PrefetchOp::create(builder, loc, reference.state, indices);
-    ++elements;
   }
 }
 
@@ -224,9 +222,5 @@ void PrefetchPass::runOnOperation() {
       pixels.push_back(loop);
   });
   for (scf::ForOp loop : pixels)
-    if (int64_t count =
-            prefetchRows(cast<scf::ForOp>(loop->getParentOp()), loop)) {
-      elements += count;
-      ++loops;
-    }
+    prefetchRows(cast<scf::ForOp>(loop->getParentOp()), loop);
 }

@@ -43,7 +43,7 @@ class RowPrefetcher {
 public:
   RowPrefetcher(scf::ForOp rows, scf::ForOp pixels)
       : rows(rows), pixels(pixels), written(getWrittenState(rows)) {}
-  int64_t run();
+  void run();
 
 private:
   /// How many reads lead to a value, one after the other, or none if it cannot
@@ -301,15 +301,13 @@ void RowPrefetcher::writeStage(const Stage &stage, Value row, bool isFirst,
   }
 }
 
-int64_t RowPrefetcher::run() {
+void RowPrefetcher::run() {
   findReferences();
   for (Value bound :
        {pixels.getLowerBound(), pixels.getUpperBound(), pixels.getStep()})
     if (std::optional<int64_t> depth = getDepth(bound); !depth || *depth > 0)
-      return 0;
-  int64_t count = 0;
+      return;
   for (const auto &[stage, references] : stages) {
-    count += references.size();
     OpBuilder builder(rows);
     CodeBuilder at(builder, pixels.getLoc());
     Value worthwhile = isWorthwhile(stage, builder);
@@ -330,9 +328,8 @@ int64_t RowPrefetcher::run() {
     at.when(at.both(worthwhile, isInside),
             [&] { writeStage(stage, at.add(row, distance), false, builder); });
   }
-  return count;
 }
 
-int64_t piko::prefetchRows(scf::ForOp rows, scf::ForOp pixels) {
-  return RowPrefetcher(rows, pixels).run();
+void piko::prefetchRows(scf::ForOp rows, scf::ForOp pixels) {
+  RowPrefetcher(rows, pixels).run();
 }

@@ -10,9 +10,8 @@
 namespace piko {
 
 /// Of a loop over rows around one over pixels: asks for the elements of buffers
-/// whose places are read from memory, in stages. Gives back how many elements
-/// of a pixel it asks for.
-int64_t prefetchRows(mlir::scf::ForOp rows, mlir::scf::ForOp pixels);
+/// whose places are read from memory, in stages.
+void prefetchRows(mlir::scf::ForOp rows, mlir::scf::ForOp pixels);
 
 } // namespace piko
 

@@ -102,7 +102,6 @@ void PrivatizePass::runOnUnits(KernelOp kernel, OpenWriterOp writer) {
                                   << target.first.getValue()
                                   << "' by locked instructions";
       remark.attachNote(obstacle.op->getLoc()) << obstacle.why;
-      ++refused;
       continue;
     }
     OpBuilder builder(writer->getContext());
@@ -115,7 +114,6 @@ void PrivatizePass::runOnUnits(KernelOp kernel, OpenWriterOp writer) {
     first.emitRemark("stage '")
         << stage << "' changes private copies of '" << target.first.getValue()
         << "', which are combined when its kernel ends";
-    ++copies;
   }
 }
 

@@ -82,7 +82,6 @@ bool Prover::isInList(ListAtOp at) {
 void ProveBoundsPass::runOnOperation() {
   Prover prover;
   auto note = [&](Operation *op, bool isInside, const Twine &what) {
-    ++(isInside ? proved : left);
     if (!isInside)
       op->emitRemark() << what << " when the pipeline runs";
     return isInside;

@@ -42,9 +42,6 @@ public:
       : pipeline(pipeline), liveness(pipeline) {}
   void run();
 
-  /// What was dropped.
-  int64_t fields = 0, ports = 0, stages = 0;
-
 private:
   bool isFedBySource(StageOp stage);
   SmallVector<EdgeOp> edgesInto(StageOp stage);
@@ -188,7 +185,6 @@ void Pruner::shrinkInput(StageOp stage) {
   int64_t dropped = record.getFields().size() - layout.fields.size();
   if (dropped == 0 && layout.size >= record.getSize())
     return;
-  fields += dropped;
   for (EdgeOp edge : edges) {
     InFlightDiagnostic remark = edge.emitRemark("edge to stage '")
                                 << getCppName(stage) << "' carries "
@@ -316,7 +312,6 @@ void Pruner::removeDeadEdges() {
         outputs.push_back(record);
       } else {
         edge.erase();
-        ++ports;
       }
     }
     if (outputs.size() == newPorts.size())
@@ -338,7 +333,6 @@ void Pruner::removeDeadStages() {
     stage.emitRemark("stage '")
         << getCppName(stage) << "' is " << (isKept ? "emptied" : "removed")
         << ", because nothing it does can be observed";
-    ++stages;
     if (!isKept)
       stage.erase();
   }
@@ -372,10 +366,6 @@ void PrunePass::runOnOperation() {
       continue;
     // Numbers are taken away from emissions, and ports get other numbers.
     pipeline.walk([](EmissionOpInterface emission) { asEmit(emission); });
-    Pruner pruner(pipeline);
-    pruner.run();
-    fields += pruner.fields;
-    ports += pruner.ports;
-    stages += pruner.stages;
+    Pruner(pipeline).run();
   }
 }

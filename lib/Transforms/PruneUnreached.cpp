@@ -33,7 +33,6 @@ class ReachPruner {
 public:
   explicit ReachPruner(PipelineOp pipeline) : pipeline(pipeline) {}
   void run();
-  int64_t stages = 0, edges = 0; ///< That were dropped.
 
 private:
   StageOp getStage(FlatSymbolRefAttr name) {
@@ -152,7 +151,6 @@ void ReachPruner::removeEdges() {
       EdgeOp edge = leaving.at({stage, int64_t(port)});
       if (!isUsed(edge) && !isFormal(edge) && !makesRounds(edge)) {
         edge.erase();
-        ++edges;
         continue;
       }
       edge.setPort(outputs.size());
@@ -175,7 +173,6 @@ void ReachPruner::removeStages() {
         << getCppName(stage)
         << "' is removed, because no primitive can reach it";
     stage.erase();
-    ++stages;
   }
 }
 
@@ -191,8 +188,5 @@ void PruneUnreachedPass::runOnOperation() {
   // A run that is checked has all stages that the text has.
   if (!getOperation().getOps<CheckRecordOp>().empty())
     return;
-  ReachPruner pruner(getOperation());
-  pruner.run();
-  stages += pruner.stages;
-  edges += pruner.edges;
+  ReachPruner(getOperation()).run();
 }

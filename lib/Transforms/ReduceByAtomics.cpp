@@ -231,7 +231,6 @@ void ReduceByAtomicsPass::runOnWork(KernelOp kernel, ItemsOp items,
     refuse(stage, bool(items.getProducer()),
            {items.getLoc(), "its kernel does other work in the bin, too; give "
                             "stages that follow it bins of another size"});
-    ++refused;
     return;
   }
   SmallVector<CommutingUpdate> commuting = findCommutingUpdates(kernel);
@@ -250,10 +249,9 @@ void ReduceByAtomicsPass::runOnWork(KernelOp kernel, ItemsOp items,
                "words of 64 bits; let it have fewer or narrower numbers"};
   if (reason) {
     refuse(stage, bool(items.getProducer()), *reason);
-    ++refused;
     return;
   }
-  atomics += makeAtomic(stage, commuting);
+  makeAtomic(stage, commuting);
   for (const Selection &selection : finder.selections) {
     InFlightDiagnostic remark =
         mlir::emitRemark(selection.sites.front().update->getLoc(), "stage '")
@@ -261,7 +259,6 @@ void ReduceByAtomicsPass::runOnWork(KernelOp kernel, ItemsOp items,
         << "' finds out by atomic operations which primitive a pixel is of, "
            "and then changes:";
     appendImages(remark, selection);
-    ++reduced;
   }
   if (!finder.selections.empty())
     splitter.split();

@@ -179,7 +179,6 @@ void ReduceUpdatesPass::runOnUnits(KernelOp kernel, OpenWriterOp writer) {
                                 << getCppName(stage)
                                 << "' runs its only bin on one thread";
     remark.attachNote(finder.reason->at) << finder.reason->why;
-    ++refused;
     return;
   }
   ImagePrivatizer privatizer(getPipeline(kernel), writer);
@@ -191,9 +190,8 @@ void ReduceUpdatesPass::runOnUnits(KernelOp kernel, OpenWriterOp writer) {
                                    "are combined when its kernel ends:";
     appendImages(remark, selection);
     privatizer.privatize(selection);
-    ++reduced;
   }
-  atomics += makeAtomic(stage, commuting);
+  makeAtomic(stage, commuting);
   stage.setSplit(true);
   if (finder.selections.empty())
     stage.setOrdered(false);

@@ -184,9 +184,7 @@ LogicalResult SetDirectivesPass::apply(StringRef text,
 
 void SetDirectivesPass::runOnOperation() {
   llvm::StringSet<> known;
-  for (const std::string &text : directives) {
+  for (const std::string &text : directives)
     if (failed(apply(text, known)))
       return signalPassFailure();
-    ++numSet;
-  }
 }

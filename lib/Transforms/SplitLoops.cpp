@@ -189,7 +189,6 @@ void SplitLoopsPass::runOnOperation() {
     if (failed(checkParallelLoop(parallel)))
       return signalPassFailure();
   for (ParallelLoopOpInterface parallel : parallels) {
-    ++loops;
     if (!parallel.hasBarriers()) {
       convertLoop(parallel);
       continue;
@@ -202,7 +201,5 @@ void SplitLoopsPass::runOnOperation() {
                                  : cast<ParallelForOp>(*parallel));
     if (failed(splitter.run()))
       return signalPassFailure();
-    ++cuts;
-    checks += splitter.getChecks();
   }
 }

@@ -34,8 +34,7 @@ class Tabulator {
 public:
   Tabulator(scf::ForOp loop, const llvm::DenseSet<StringAttr> &written)
       : loop(loop), written(written) {}
-  /// How many numbers have tables now.
-  int64_t run();
+  void run();
 
 private:
   bool isOutside(Value value) const {
@@ -186,19 +185,19 @@ void Tabulator::writeTable(Value number, OpBuilder &builder, Value fits,
   });
 }
 
-int64_t Tabulator::run() {
+void Tabulator::run() {
   std::optional<APInt> turns = loop.getStaticTripCount();
   constexpr int64_t few = 16; // LLVM unrolls it
   if (!findOutermost() || !matchPattern(loop.getLowerBound(), m_Zero()) ||
       !matchPattern(loop.getStep(), m_One()) ||
       !loop.getInductionVar().getType().isIndex() ||
       (turns && turns->sle(few)) || !isKnown(loop.getUpperBound()))
-    return 0;
+    return;
   findNumbers();
   SmallVector<Value> found = llvm::filter_to_vector(
       numbers, [&](Value number) { return isWorthwhile(number); });
   if (found.empty())
-    return 0;
+    return;
   OpBuilder builder(outermost);
   CodeBuilder at(builder, loop.getLoc());
   IRMapping mapping;
@@ -220,7 +219,6 @@ int64_t Tabulator::run() {
   Value count = at.select(fits, upper, at.index(0));
   for (Value number : found)
     writeTable(number, builder, fits, count);
-  return found.size();
 }
 
 void TabulateInvariantsPass::runOnOperation() {
@@ -229,6 +227,6 @@ void TabulateInvariantsPass::runOnOperation() {
     SmallVector<scf::ForOp> loops;
     kernel.walk([&](scf::ForOp loop) { loops.push_back(loop); });
     for (scf::ForOp loop : loops)
-      numbers += Tabulator(loop, written).run();
+      Tabulator(loop, written).run();
   }
 }

@@ -97,9 +97,7 @@ int64_t Sinker::sinkIn(Block &block) {
 
 void TestEarlyPass::runOnOperation() {
   getOperation().walk([&](ProcessOp process) {
-    int64_t count = Sinker(process).run();
-    moved += count;
-    if (count)
+    if (int64_t count = Sinker(process).run())
       process.emitRemark() << count
                            << " operations run only where they are needed";
   });

@@ -250,16 +250,15 @@ static bool hasBitsAt(Value number, Operation *at, unsigned depth = 8) {
 }
 
 /// scf.if %x > 0.0 { scf.if bits(%x) != 0 { .. } }  =>  scf.if %x > 0.0 { .. }
-static bool foldKnown(scf::IfOp choice) {
+static void foldKnown(scf::IfOp choice) {
   auto compare = choice.getCondition().getDefiningOp<arith::CmpIOp>();
   if (!compare || compare.getPredicate() != arith::CmpIPredicate::ne ||
       !matchPattern(compare.getRhs(), m_Zero()) ||
       !hasBitsAt(compare.getLhs(), choice))
-    return false;
+    return;
   OpBuilder builder(choice);
   choice.getConditionMutable().assign(arith::ConstantOp::create(
       builder, choice.getLoc(), builder.getBoolAttr(true)));
-  return true;
 }
 
 void ThreadJumpsPass::runOnOperation() {
@@ -272,17 +271,11 @@ void ThreadJumpsPass::runOnOperation() {
           [&](scf::IfOp choice) { choices.push_back(choice); });
     });
     for (scf::IfOp choice : choices) {
-      if (splitConjunction(choice, minWeight)) {
-        ++split;
-        changed = true;
-      }
-      if (thread(choice)) {
-        ++threaded;
-        changed = true;
-      }
+      changed |= splitConjunction(choice, minWeight);
+      changed |= thread(choice);
     }
   }
   getOperation().walk([&](KernelOp kernel) {
-    kernel.walk([&](scf::IfOp choice) { known += foldKnown(choice); });
+    kernel.walk([&](scf::IfOp choice) { foldKnown(choice); });
   });
 }

@@ -476,7 +476,6 @@ void UnrollAndJamPass::runOnOperation() {
                          << " turns of this loop share those of the loop "
                             "inside of it (unroll-and-jam)";
       nest->jam();
-      ++nests;
     }
   }
 }

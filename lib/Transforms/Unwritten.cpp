@@ -221,12 +221,11 @@ static SmallVector<StringRef> getNumberNames(RecordOp record) {
   return names;
 }
 
-unsigned piko::checkUnwritten(
+void piko::checkUnwritten(
     ProcessOp process,
     llvm::function_ref<FlatSymbolRefAttr(FlatSymbolRefAttr)> hostOf) {
   FlagMaker flags;
   flags.findTainted(process);
-  unsigned checks = 0;
   auto check = [&](Operation *at, Value value, FlatSymbolRefAttr record,
                    StringRef field) {
     if (!flags.isTainted(value))
@@ -235,7 +234,6 @@ unsigned piko::checkUnwritten(
     OpBuilder builder(at);
     CheckValueOp::create(builder, at->getLoc(), CheckedValue::Unwritten, flag,
                          field, hostOf(record).getValue());
-    ++checks;
   };
   auto checkAll = [&](Operation *at, ValueRange values,
                       FlatSymbolRefAttr record) {
@@ -272,5 +270,4 @@ unsigned piko::checkUnwritten(
     op.getResult().replaceAllUsesWith(zero);
     op.erase();
   });
-  return checks;
 }

@@ -13,8 +13,8 @@ namespace piko {
 /// Puts a `piko.check_value unwritten` before each emission, store and end of
 /// an update for each of its numbers that may be unwritten, and makes every
 /// `piko.undefined` of the phase 0. `hostOf` gives the record that a message
-/// names. Returns how many checks there are.
-unsigned checkUnwritten(
+/// names.
+void checkUnwritten(
     ProcessOp process,
     llvm::function_ref<mlir::FlatSymbolRefAttr(mlir::FlatSymbolRefAttr)>
         hostOf);

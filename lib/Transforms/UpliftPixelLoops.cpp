@@ -228,7 +228,6 @@ bool UpliftPixelLoopsPass::runOnLoop(Operation *outer, int64_t rank) {
     ParallelPixelsOp pixels = Uplift(loops, clips).run();
     if (clips)
       dropTest(guard, pixels);
-    ++uplifted;
     return true;
   }
   report(outer, refusal);
@@ -236,7 +235,6 @@ bool UpliftPixelLoopsPass::runOnLoop(Operation *outer, int64_t rank) {
 }
 
 void UpliftPixelLoopsPass::report(Operation *loop, const Refusal &refusal) {
-  ++refused;
   reported.insert(loop);
   InFlightDiagnostic remark =
       loop->emitRemark()

@@ -439,7 +439,6 @@ bool VectorizePass::vectorizeInOrder(Operation *op) {
     vectorize(IterationLanes(copy, (isPaired ? 2 : 1) * laneCount));
   }
   op->erase();
-  ++vectorized;
   return true;
 }
 
@@ -479,7 +478,6 @@ WalkResult VectorizePass::visit(Operation *op) {
     vectorize(IterationLanes(copy, countLanes(candidate)), copy, takesVectors);
   } else {
     copy.erase();
-    ++left;
   }
   if (flat.loop)
     flat.loop.erase();
@@ -512,11 +510,8 @@ void VectorizePass::runOnOperation() {
       if (isa<scf::ForOp>(at))
         meeting.insert(at);
   });
-  for (ParallelForOp parallel : parallels) {
-    if (runInLockstep(parallel))
-      ++vectorized;
-    else if (failed(LoopSplitter(parallel).run()))
+  for (ParallelForOp parallel : parallels)
+    if (!runInLockstep(parallel) && failed(LoopSplitter(parallel).run()))
       return signalPassFailure();
-  }
   vectorizeLoops(getOperation());
 }

@@ -199,17 +199,6 @@ def ConvertPikoToGPU : Pass<"convert-piko-to-gpu", "::piko::PipelineOp"> {
            "Threads of a block, a power of two up to 1024 (default: what the "
            "stage has, rounded down to one; more where a bin has more than 16 "
            "pixels for each, up to 256)">];
-  let statistics = [
-    Statistic<"grids", "grids", "kernels that became grids">,
-    Statistic<"shared", "shared", "loops that threads share">,
-    Statistic<"barriers", "barriers", "loops whose iterations are threads">,
-    Statistic<"cut", "cut", "loops that are cut at barriers">,
-    Statistic<"strided", "strided", "loops that step over others' pixels">,
-    Statistic<"guarded", "guarded", "tests of whose a pixel is">,
-    Statistic<"deferred", "deferred", "loops of atomics that threads put off">,
-    Statistic<"rare", "rare", "branches that few threads take, set apart">,
-    Statistic<"collapsed", "collapsed",
-              "loops over primitives whose pixels are one space">];
   let dependentDialects = ["::mlir::arith::ArithDialect",
                            "::mlir::gpu::GPUDialect",
                            "::mlir::math::MathDialect",
@@ -312,7 +301,6 @@ def OutlineRareWork : Pass<"piko-outline-rare-work", "::mlir::gpu::GPUModuleOp">
     **Limits**: an array of more than 16 numbers that both sides use is passed by
     its address.
   }];
-  let statistics = [Statistic<"outlined", "outlined", "loops that became functions">];
   let dependentDialects = ["::mlir::func::FuncDialect",
                            "::mlir::memref::MemRefDialect"];
 }
@@ -361,7 +349,6 @@ def SpillToBlock : Pass<"piko-spill-to-block", "::mlir::gpu::GPUModuleOp"> {
                         "registers of 32 bits of what may be alive over a loop">,
                  Option<"maxBytes", "max-bytes", "int64_t", "192",
                         "of the block's memory for each thread">];
-  let statistics = [Statistic<"spilled", "spilled", "numbers that were spilled">];
   let dependentDialects = ["::mlir::memref::MemRefDialect"];
 }
 
@@ -396,7 +383,6 @@ def ReloadInputs : Pass<"piko-reload-inputs", "::mlir::gpu::GPUModuleOp"> {
 
     **Limits**: only of addresses at a constant distance from what a kernel is given.
   }];
-  let statistics = [Statistic<"reloaded", "reloaded", "loads that were made">];
   let dependentDialects = ["::mlir::LLVM::LLVMDialect"];
 }
 

@@ -46,10 +46,6 @@ def ApplyPrecision : Pass<"piko-apply-precision", "::piko::PipelineOp"> {
     **Limits**: a sum in a loop keeps its order, though `relaxed` permits another.
     Divisors beyond 2^126 may count as infinite, and below 2^-126 as 0.
   }];
-  let statistics = [
-    Statistic<"contracted", "contracted", "additions that became math.fma">,
-    Statistic<"reciprocals", "reciprocals", "divisions that became products">,
-    Statistic<"roots", "roots", "square roots that became products">];
   let dependentDialects = ["::mlir::arith::ArithDialect",
                            "::mlir::math::MathDialect"];
 }
@@ -148,9 +144,6 @@ def UpliftPixelLoops : Pass<"piko-uplift-pixel-loops", "::piko::PipelineOp"> {
     **Limits**: loops that count by 1 upwards, x in y. A remark says of any other
     nest of loops over pixels what is in the way.
   }];
-  let statistics = [
-    Statistic<"uplifted", "uplifted", "nests of loops uplifted">,
-    Statistic<"refused", "refused", "nests of loops over pixels that stay">];
   let dependentDialects = ["::mlir::arith::ArithDialect"];
 }
 
@@ -186,9 +179,6 @@ def OrderStages : Pass<"piko-order-stages", "::piko::PipelineOp"> {
     **Limits**: a stage that waits for itself or for one that it feeds gets an
     error, as do stages that wait for each other.
   }];
-  let statistics = [
-    Statistic<"branches", "branches", "linear branches found">,
-    Statistic<"cycles", "cycles", "cycles of edges found">];
 }
 
 def InferDirectives : Pass<"piko-infer-directives", "::piko::PipelineOp"> {
@@ -231,9 +221,6 @@ def InferDirectives : Pass<"piko-infer-directives", "::piko::PipelineOp"> {
     nothing is known, of `min(hi, end - 1) + 1` all. A remark says which
     coordinate could not be proved to be inside, where, and at which bound.
   }];
-  let statistics = [
-    Statistic<"inferred", "inferred", "assignments that are the identity">,
-    Statistic<"refused", "refused", "assign phases without a proof">];
 }
 
 def PreSchedule : Pass<"piko-pre-schedule", "::piko::PipelineOp"> {
@@ -277,9 +264,6 @@ def PreSchedule : Pass<"piko-pre-schedule", "::piko::PipelineOp"> {
     keeps its body, which runs for each bin, before the pipeline does; a remark
     says what it depends on. So does one that would end with an error.
   }];
-  let statistics = [
-    Statistic<"moved", "moved", "schedules that are the same for all bins">,
-    Statistic<"kept", "kept", "schedules that are not">];
 }
 
 def FuseStages : Pass<"piko-fuse-stages", "::piko::PipelineOp"> {
@@ -335,10 +319,6 @@ def FuseStages : Pass<"piko-fuse-stages", "::piko::PipelineOp"> {
            "To how many places a stage may be copied">,
     Option<"fission", "fission", "bool", "true",
            "Leave apart what is better run behind its producer">];
-  let statistics = [
-    Statistic<"fused", "fused", "stages that became part of another">,
-    Statistic<"behind", "behind", "stages that run behind another">,
-    Statistic<"refused", "refused", "edges that stay">];
   let dependentDialects = ["::mlir::arith::ArithDialect",
                            "::mlir::memref::MemRefDialect",
                            "::mlir::ub::UBDialect"];
@@ -378,8 +358,6 @@ def TestEarly : Pass<"piko-test-early", "::piko::PipelineOp"> {
     **Limits**: work in one stage for a test in another that is not fused with it
     stays; so does what two branches need.
   }];
-  let statistics = [
-    Statistic<"moved", "moved", "operations that moved">];
 }
 
 def ProveBounds : Pass<"piko-prove-bounds", "::piko::PipelineOp"> {
@@ -411,9 +389,6 @@ def ProveBounds : Pass<"piko-prove-bounds", "::piko::PipelineOp"> {
     domain, that it has an element at all, so that an index clamped to it, or a
     remainder, is still tested. A remark names each access that is.
   }];
-  let statistics = [
-    Statistic<"proved", "proved", "accesses that need no test">,
-    Statistic<"left", "left", "accesses that are tested">];
 }
 
 def OwnPixels : Pass<"piko-own-pixels", "::piko::PipelineOp"> {
@@ -456,9 +431,6 @@ def OwnPixels : Pass<"piko-own-pixels", "::piko::PipelineOp"> {
   let options = [
     Option<"tile", "tile", "int64_t", "32",
            "Side of a tile, in cells of the domain">];
-  let statistics = [
-    Statistic<"divided", "stages-divided", "stages whose bins can be divided">,
-    Statistic<"refused", "stages-refused", "stages whose updates move">];
 }
 
 def EliminateSchedules
@@ -493,8 +465,6 @@ def EliminateSchedules
     **Limits**: a schedule with a `dynamic` body stays with the runtime, which
     has to look at each bin.
   }];
-  let statistics = [
-    Statistic<"eliminated", "eliminated", "schedules that went">];
 }
 
 #endif // PIKO_TRANSFORMS_AUTHOREDPASSES_TD

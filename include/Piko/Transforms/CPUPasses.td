@@ -60,9 +60,6 @@ def Prefetch : Pass<"piko-prefetch", "::piko::PipelineOp"> {
     only reads of buffers are, and of state that the loop does not change, not in
     boxes nor for each primitive.
   }];
-  let statistics = [
-    Statistic<"loops", "loops", "loops that ask ahead">,
-    Statistic<"elements", "elements", "elements of state asked for">];
   let dependentDialects = ["::mlir::arith::ArithDialect"];
 }
 
@@ -113,8 +110,6 @@ def HoistBounds : Pass<"piko-hoist-bounds", "::piko::PipelineOp"> {
            "How many operations an innermost loop may have to stand there twice">,
     Option<"maxNestOperations", "max-nest-operations", "int64_t", "128",
            "The same of a nest of loops">];
-  let statistics = [
-    Statistic<"versioned", "versioned", "loops with a test in front">];
 }
 
 def HoistLoads : Pass<"piko-hoist-loads", "::piko::PipelineOp"> {
@@ -151,7 +146,6 @@ def HoistLoads : Pass<"piko-hoist-loads", "::piko::PipelineOp"> {
     **Limits**: elements of arrays and buffers stay, as their indices are tested;
     so does what is read behind a loop's condition, which LLVM moves.
   }];
-  let statistics = [Statistic<"hoisted", "hoisted", "reads in front of loops">];
 }
 
 def IfConvert : Pass<"piko-if-convert", "::piko::PipelineOp"> {
@@ -192,8 +186,6 @@ def IfConvert : Pass<"piko-if-convert", "::piko::PipelineOp"> {
            "How many cases, but for the default, a switch may have">,
     Option<"maxOperations", "max-operations", "int64_t", "8",
            "How many operations the arms may have together">];
-  let statistics = [
-    Statistic<"converted", "converted", "choices that lost their branches">];
   let dependentDialects = ["::mlir::arith::ArithDialect"];
 }
 
@@ -240,8 +232,6 @@ def MergeBounds : Pass<"piko-merge-bounds", "::piko::PipelineOp"> {
     **Limits**: reads in conditions of state that the kernel changes keep their
     tests; so do writes with another test between them.
   }];
-  let statistics = [
-    Statistic<"merged", "merged", "tests that others stand for">];
 }
 
 def ThreadJumps : Pass<"piko-thread-jumps", "::piko::PipelineOp"> {
@@ -291,12 +281,6 @@ def ThreadJumps : Pass<"piko-thread-jumps", "::piko::PipelineOp"> {
   let options = [
     Option<"minWeight", "min-weight", "int64_t", /*default=*/"4",
            "the least work, in instructions, that is worth a branch">];
-  let statistics = [
-    Statistic<"split", "split", "conjunctions of which one half is evaluated "
-              "only if the other holds">,
-    Statistic<"threaded", "threaded", "conditions that moved into a side of "
-              "another">,
-    Statistic<"known", "known", "conditions that others decide">];
 }
 
 def TabulateInvariants : Pass<"piko-tabulate-invariants", "::piko::PipelineOp"> {
@@ -338,8 +322,6 @@ def TabulateInvariants : Pass<"piko-tabulate-invariants", "::piko::PipelineOp"> 
     **Limits**: loops that count from 0 by one, up to a number that does not
     change, and of state the elements of the turns' own numbers.
   }];
-  let statistics = [
-    Statistic<"numbers", "numbers", "numbers that are read from arrays">];
   let dependentDialects = ["::mlir::arith::ArithDialect",
                            "::mlir::memref::MemRefDialect",
                            "::mlir::scf::SCFDialect"];
@@ -389,8 +371,6 @@ def UnrollAndJam : Pass<"piko-unroll-and-jam", "::piko::PipelineOp"> {
     An index of what is changed must be the inner count, or a sum of it and of
     what neither loop changes; a remark says where it is not.
   }];
-  let statistics = [
-    Statistic<"nests", "nests", "loops whose turns share an inner loop">];
   let dependentDialects = ["::mlir::arith::ArithDialect",
                            "::mlir::memref::MemRefDialect",
                            "::mlir::scf::SCFDialect"];
@@ -462,10 +442,6 @@ def ReduceUpdates : Pass<"piko-reduce-updates", "::mlir::ModuleOp"> {
     few primitives come for a large domain, one thread runs the bin. Remarks say
     what is selected, and what is in the way.
   }];
-  let statistics = [
-    Statistic<"reduced", "reduced", "selections that threads share">,
-    Statistic<"atomics", "atomics", "updates that became atomic operations">,
-    Statistic<"refused", "refused", "stages whose only bin one thread runs">];
   let dependentDialects = ["::mlir::arith::ArithDialect",
                            "::mlir::scf::SCFDialect"];
 }
@@ -510,9 +486,6 @@ def Privatize : Pass<"piko-privatize", "::piko::PipelineOp"> {
     primitives come for a large state. Remarks say what has copies and what is in
     the way of others.
   }];
-  let statistics = [
-    Statistic<"copies", "copies", "fields that have private copies">,
-    Statistic<"refused", "refused", "fields that atomics change in place">];
 }
 
 #endif // PIKO_TRANSFORMS_CPUPASSES_TD

@@ -45,10 +45,6 @@ def AddChecks : Pass<"piko-add-checks", "::mlir::ModuleOp"> {
   let options = [
     ListOption<"numbers", "numbers", "std::string",
                "Fields that must not be NaN, as Record.field">];
-  let statistics = [
-    Statistic<"accesses", "accesses", "accesses to state that are checked">,
-    Statistic<"indices", "indices", "indices of arrays that are checked">,
-    Statistic<"unwritten", "unwritten", "numbers that may be unwritten">];
   let dependentDialects = ["::mlir::arith::ArithDialect",
                            "::mlir::memref::MemRefDialect"];
 }
@@ -101,7 +97,6 @@ def CountWork : Pass<"piko-count-work", "::piko::PipelineOp"> {
     is one operation. Of a loop with a `break` the last turn counts, be it only
     its test. The assign and schedule phases are not counted.
   }];
-  let statistics = [Statistic<"counters", "counters", "counters">];
   let dependentDialects = ["::mlir::arith::ArithDialect"];
 }
 
@@ -141,7 +136,6 @@ def CountLanes : Pass<"piko-count-lanes", "::piko::PipelineOp"> {
     **Limits**: a lane whose result a select drops counts as one that does
     something. What the runtime does between kernels is not counted.
   }];
-  let statistics = [Statistic<"counted", "counted", "kernels that count">];
   let dependentDialects = ["::mlir::math::MathDialect",
                            "::mlir::memref::MemRefDialect",
                            "::mlir::vector::VectorDialect"];

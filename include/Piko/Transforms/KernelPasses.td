@@ -40,7 +40,6 @@ def FormKernels : Pass<"piko-form-kernels", "::piko::PipelineOp"> {
     when the primitives arrive is an error. What can be merged further is for
     other passes.
   }];
-  let statistics = [Statistic<"kernels", "kernels", "kernels formed">];
 }
 
 def FuseKernels : Pass<"piko-fuse-kernels", "::piko::PipelineOp"> {
@@ -91,9 +90,6 @@ def FuseKernels : Pass<"piko-fuse-kernels", "::piko::PipelineOp"> {
     is checked is left as it is. A remark gives the reason for each stage that
     stays.
   }];
-  let statistics = [
-    Statistic<"fused", "fused", "stages that run behind a local barrier">,
-    Statistic<"refused", "refused", "edges that stay a kernel break">];
 }
 
 def FormProgram : Pass<"piko-form-program", "::piko::PipelineOp"> {
@@ -134,10 +130,6 @@ def FormProgram : Pass<"piko-form-program", "::piko::PipelineOp"> {
 
     **Limits**: kernels are not moved, but for those of a cycle.
   }];
-  let statistics = [
-    Statistic<"joins", "joins", "stages that something is joined for">,
-    Statistic<"permuted", "permuted", "edges that are permuted">,
-    Statistic<"merged", "merged", "joins that merge by key">];
 }
 
 def FormStrips : Pass<"piko-form-strips", "::piko::PipelineOp"> {
@@ -186,10 +178,6 @@ def FormStrips : Pass<"piko-form-strips", "::piko::PipelineOp"> {
     takes a list, or that primitives of two sources reach. Launches that are not
     in a row are not moved.
   }];
-  let statistics = [
-    Statistic<"groups", "groups", "groups of kernels that run in strips">,
-    Statistic<"kernels", "kernels", "kernels in them">,
-    Statistic<"refused", "stages-refused", "stages that run in no strips">];
 }
 
 #endif // PIKO_TRANSFORMS_KERNELPASSES_TD

@@ -132,9 +132,6 @@ def FormGBuffer : Pass<"piko-form-gbuffer", "::mlir::ModuleOp"> {
   let options = [
     Option<"budget", "budget", "int64_t", "64",
            "Most bytes that are kept of a pixel">];
-  let statistics = [
-    Statistic<"deferred", "deferred", "images that are written once a pixel">,
-    Statistic<"refused", "refused", "images that are written more often">];
   let dependentDialects = ["::mlir::arith::ArithDialect",
                            "::mlir::scf::SCFDialect"];
 }
@@ -206,9 +203,6 @@ def DeferShading : Pass<"piko-defer-shading", "::piko::PipelineOp"> {
   let options = [
     Option<"budget", "budget", "int64_t", "262144",
            "Most bytes that are kept of a bin">];
-  let statistics = [
-    Statistic<"deferred", "deferred", "images that are written once a pixel">,
-    Statistic<"refused", "refused", "images that are written more often">];
   let dependentDialects = ["::mlir::arith::ArithDialect",
                            "::mlir::memref::MemRefDialect",
                            "::mlir::scf::SCFDialect"];
@@ -272,9 +266,6 @@ def FormTiles : Pass<"piko-form-tiles", "::piko::PipelineOp"> {
            "Most bytes that the tiles of a kernel may have together">,
     Option<"loads", "loads", "bool", "false",
            "Form tiles also where they begin with what is in the image">];
-  let statistics = [
-    Statistic<"formed", "formed", "images with tiles">,
-    Statistic<"refused", "refused", "images that one kernel updates, but without tiles">];
 }
 
 def ForwardStores : Pass<"piko-forward-stores", "::piko::PipelineOp"> {
@@ -310,8 +301,6 @@ def ForwardStores : Pass<"piko-forward-stores", "::piko::PipelineOp"> {
     it, as do barriers, parallel loops and updates; a read behind a condition that
     stores is left.
   }];
-  let statistics = [
-    Statistic<"forwarded", "forwarded", "reads that others stand for">];
 }
 
 def MapLanes : Pass<"piko-map-lanes", "::piko::PipelineOp"> {
@@ -351,11 +340,6 @@ def MapLanes : Pass<"piko-map-lanes", "::piko::PipelineOp"> {
     the bin in each dimension, as one between two random points does. Iterations
     that meet at barriers are given to lanes as iterations.
   }];
-  let statistics = [
-    Statistic<"items", "items", "work whose lanes have items">,
-    Statistic<"iterations", "iterations", "work whose lanes share an item">,
-    Statistic<"collapsed", "collapsed", "work whose lanes have pairs">,
-    Statistic<"one", "one", "work that one lane does">];
 }
 
 def FormUnits : Pass<"piko-form-units", "::piko::PipelineOp"> {
@@ -456,10 +440,6 @@ def SplitLoops : Pass<"piko-split-loops", "::piko::PipelineOp"> {
     Option<"lockstep", "lockstep", "int64_t", /*default=*/"0",
            "Most iterations of a loop with barriers that is left to vectors">
   ];
-  let statistics = [
-    Statistic<"loops", "loops", "parallel loops that became loops">,
-    Statistic<"cuts", "cuts", "parallel loops that were cut at barriers">,
-    Statistic<"checks", "checks", "conditions compared when the pipeline runs">];
   let dependentDialects = ["::mlir::arith::ArithDialect",
                            "::mlir::memref::MemRefDialect",
                            "::mlir::scf::SCFDialect"];
@@ -532,10 +512,6 @@ def ReduceByAtomics : Pass<"piko-reduce-by-atomics", "::mlir::ModuleOp"> {
     does a key that takes more than two words. Remarks say what is
     selected, and what is in the way.
   }];
-  let statistics = [
-    Statistic<"reduced", "reduced", "selections that blocks share">,
-    Statistic<"atomics", "atomics", "updates that became atomic operations">,
-    Statistic<"refused", "refused", "stages whose only bin one block runs">];
   let dependentDialects = ["::mlir::arith::ArithDialect",
                            "::mlir::scf::SCFDialect"];
 }

@@ -45,7 +45,6 @@ def FixConstants : Pass<"piko-fix-constants", "::piko::PipelineOp"> {
   let options = [
     ListOption<"values", "values", "std::string",
                "CONSTANT[.FIELD][[ELEMENT]]=VALUE or BUFFER.size=COUNT">];
-  let statistics = [Statistic<"replaced", "replaced", "loads and sizes">];
   let dependentDialects = ["::mlir::arith::ArithDialect"];
 }
 
@@ -87,8 +86,6 @@ def SetDirectives : Pass<"piko-set-directives", "::piko::PipelineOp"> {
   let options = [
     ListOption<"directives", "set", "std::string",
                "Directives to set, as stage:key=value">];
-  let statistics = [
-    Statistic<"numSet", "set", "directives that were set">];
 }
 
 def PruneUnreached : Pass<"piko-prune-unreached", "::piko::PipelineOp"> {
@@ -123,9 +120,6 @@ def PruneUnreached : Pass<"piko-prune-unreached", "::piko::PipelineOp"> {
     stage that is reached collects, because its rounds can be seen; and all that
     is fed only behind a condition which never holds, but is not constant.
   }];
-  let statistics = [
-    Statistic<"edges", "edges", "edges that were dropped">,
-    Statistic<"stages", "stages", "stages that were dropped">];
 }
 
 def Prune : Pass<"piko-prune", "::mlir::ModuleOp"> {
@@ -166,10 +160,6 @@ def Prune : Pass<"piko-prune", "::mlir::ModuleOp"> {
     state that only erased work needs is not made, so it cannot fail; a pipeline
     that is checked (`piko-add-checks`) is left as it is.
   }];
-  let statistics = [
-    Statistic<"fields", "fields", "fields that an edge no longer carries">,
-    Statistic<"ports", "ports", "ports removed with their edges">,
-    Statistic<"stages", "stages", "stages removed or emptied">];
   let dependentDialects = ["::mlir::arith::ArithDialect",
                            "::mlir::ub::UBDialect"];
 }

@@ -78,13 +78,6 @@ def NarrowIntegers : Pass<"piko-narrow-integers", "::piko::PipelineOp"> {
   let options = [
     Option<"laneCount", "lanes", "int64_t", /*default=*/"0",
            "lanes of a vector, which a strip has as columns; 0: no strips">];
-  let statistics = [
-    Statistic<"comparisons", "comparisons", "comparisons that have a form in 32 "
-              "bits">,
-    Statistic<"values", "values", "conversions to floating point that have a "
-              "form in 32 bits">,
-    Statistic<"interchanged", "interchanged", "loops over rows that are inside "
-              "of loops over strips">];
 }
 
 def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
@@ -259,10 +252,6 @@ def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
            "print the estimates of such loops, and how they depend on the numbers "
            "of the cost model, as lines of JSON">
   ];
-  let statistics = [
-    Statistic<"vectorized", "vectorized", "loops that compute in vectors">,
-    Statistic<"left", "left", "loops that stay as they are">,
-  ];
 }
 
 def MergeGathers : Pass<"piko-merge-gathers", "::piko::PipelineOp"> {
@@ -306,7 +295,6 @@ def MergeGathers : Pass<"piko-merge-gathers", "::piko::PipelineOp"> {
 
     **Limits**: fields of 32 bits that are no arrays.
   }];
-  let statistics = [Statistic<"merged", "merged", "gathers">];
 }
 
 def PairGathers : Pass<"piko-pair-gathers", "::piko::PipelineOp"> {
@@ -348,9 +336,6 @@ def PairGathers : Pass<"piko-pair-gathers", "::piko::PipelineOp"> {
     of numbers of at most 32 bits; gathers in one block, or each alone in a
     condition of it.
   }];
-  let statistics = [
-    Statistic<"paired", "paired", "gathers of elements side by side">,
-    Statistic<"loaded", "loaded", "gathers that each lane does by itself">];
 }
 
 #endif // PIKO_TRANSFORMS_VECTORPASSES_TD

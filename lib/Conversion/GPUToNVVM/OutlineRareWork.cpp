@@ -249,5 +249,4 @@ void OutlineRareWorkPass::runOnOperation() {
   });
   for (Operation *loop : loops)
     Outlining(loop, symbols).run();
-  outlined += loops.size();
 }

@@ -82,7 +82,6 @@ void ReloadInputsPass::reload(LLVM::LoadOp load) {
     Value loaded = createReload(load, place);
     for (OpOperand *use : uses)
       use->set(loaded);
-    ++reloaded;
   }
   if (load.use_empty())
     load.erase();

@@ -47,8 +47,8 @@ public:
   /// The registers of 32 bits of what is alive over the loop.
   int64_t countRegisters();
   /// If there are more than that, spills as far as there are bytes for a
-  /// thread; how many numbers that are.
-  int64_t run(int64_t mostRegisters, int64_t &bytesLeft);
+  /// thread.
+  void run(int64_t mostRegisters, int64_t &bytesLeft);
 
 private:
   void repeatCasts();
@@ -217,21 +217,18 @@ void Spiller::spill(Value value) {
   }
 }
 
-int64_t Spiller::run(int64_t mostRegisters, int64_t &bytesLeft) {
+void Spiller::run(int64_t mostRegisters, int64_t &bytesLeft) {
   if (countRegisters() <= mostRegisters)
-    return 0;
+    return;
   repeatCasts();
   collect();
-  int64_t count = 0;
   for (Value value : alive) {
     int64_t bytes = 4 * getRegisters(value.getType());
     if (isHot(value) || bytes > bytesLeft)
       continue;
     spill(value);
     bytesLeft -= bytes;
-    ++count;
   }
-  return count;
 }
 
 /// Whether registers are bounded for it: it calls a function, or loads numbers
@@ -285,6 +282,6 @@ void SpillToBlockPass::runOnOperation() {
     int64_t room = (maxBlockBytes - getBlockBytes(kernel)) / size[0],
             bytesLeft = std::min(maxBytes.getValue(), room);
     for (LoopLikeOpInterface loop : findLoops(kernel))
-      spilled += Spiller(kernel, loop, size[0]).run(maxRegisters, bytesLeft);
+      Spiller(kernel, loop, size[0]).run(maxRegisters, bytesLeft);
   }
 }

@@ -29,9 +29,9 @@ namespace {
 
 class BlockMapper {
 public:
-  BlockMapper(GridMemory &memory, MappingCounts &counts)
+  explicit BlockMapper(GridMemory &memory)
       : launch(memory.launch), log(memory.log), memory(memory),
-        loc(memory.launch.getLoc()), counts(counts) {
+        loc(memory.launch.getLoc()) {
     threads.ownArrays.insert(memory.outboxes.getDefiningOp());
   }
   LogicalResult run();
@@ -78,7 +78,6 @@ private:
   Location loc;
   llvm::DenseSet<Operation *> firsts;
   ThreadOperations threads; ///< What threads have of their own.
-  MappingCounts &counts;
   int64_t blockBytes = 0;
   /// Of the loop whose emissions are deferred: outboxes of its iterations, how
   /// many, whether there is memory for them, and where a thread's own wait.
@@ -314,7 +313,6 @@ void BlockMapper::share(scf::ForOp loop) {
   if (isPutOff(loop))
     return; // that loop's share() moves it
   loop->removeAttr(marks::shared);
-  ++counts.shared;
   OpBuilder builder(loop);
   gpu::BarrierOp::create(builder, loc);
   builder.setInsertionPointAfter(loop);
@@ -595,6 +593,6 @@ LogicalResult BlockMapper::run() {
   return placeArrays();
 }
 
-LogicalResult piko::mapBlock(GridMemory &memory, MappingCounts &counts) {
-  return BlockMapper(memory, counts).run();
+LogicalResult piko::mapBlock(GridMemory &memory) {
+  return BlockMapper(memory).run();
 }

@@ -49,10 +49,10 @@ static constexpr int64_t maxBytesOfThread = 384;
 //===----------------------------------------------------------------------===//
 
 /// Takes what is rare out of the loop, into one of its own.
-void CollapsedPixels::split(SharingCounts &counts) {
+void CollapsedPixels::split() {
   OpBuilder builder(items);
   rare = cast<scf::ForOp>(builder.clone(*items));
-  if (failed(sharePixels(rare, tile, counts))) {
+  if (failed(sharePixels(rare, tile))) {
     rare.erase();
     rare = cast<scf::ForOp>(builder.clone(*items));
     isRareForOne = true;
@@ -117,9 +117,9 @@ void CollapsedPixels::clear() {
   b.barrier();
 }
 
-FailureOr<RareSite> CollapsedPixels::run(SharingCounts &counts) {
+FailureOr<RareSite> CollapsedPixels::run() {
   clear();
-  split(counts);
+  split();
   ItemSetup setup(items, tile, memory, Extent::All);
   if (failed(checkMemory(setup.countBytes())))
     return failure();
@@ -128,7 +128,6 @@ FailureOr<RareSite> CollapsedPixels::run(SharingCounts &counts) {
     return emitError(items.getLoc(),
                      "where its pixels are depends on an array");
   items.erase();
-  ++counts.collapsed;
   return site;
 }
 
@@ -415,10 +414,9 @@ static void eraseDead(Block &block) {
 
 FailureOr<RareSite> piko::collapsePixels(scf::ForOp items, PixelNest &nest,
                                          StageOp stage, const ThreadTile &tile,
-                                         GridMemory &memory,
-                                         SharingCounts &counts) {
+                                         GridMemory &memory) {
   FailureOr<RareSite> site =
-      CollapsedPixels(items, nest, stage, tile, memory).run(counts);
+      CollapsedPixels(items, nest, stage, tile, memory).run();
   if (succeeded(site))
     eraseDead(memory.launch.getBody().front());
   return site;

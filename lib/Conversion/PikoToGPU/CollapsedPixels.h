@@ -29,8 +29,7 @@ struct RareSite {
 llvm::FailureOr<RareSite> collapsePixels(mlir::scf::ForOp items,
                                          PixelNest &nest, StageOp stage,
                                          const ThreadTile &tile,
-                                         GridMemory &memory,
-                                         SharingCounts &counts);
+                                         GridMemory &memory);
 
 /// Puts a launch in front of the kernel's that leaves each unit to that where
 /// its first rare primitive stands. So what these need, which is called, takes

@@ -54,22 +54,22 @@ public:
 
   /// Threads share the pixels of a bin, of one primitive after the other or of
   /// many; fails where they cannot.
-  LogicalResult sharePixelsOfBins(bool collapses, SharingCounts &counts);
+  LogicalResult sharePixelsOfBins(bool collapses);
   /// Threads do what SharedLoops.cpp and BlockMapping.cpp say.
-  LogicalResult mapWork(MappingCounts &counts);
+  LogicalResult mapWork();
 
 private:
   void formGrid();
   /// Opens outboxes; `work` is what the grid was made of.
   void createMemory();
   void convertLocal(LocalBinOp local);
-  LogicalResult finish(GridMemory &memory, MappingCounts &counts);
+  LogicalResult finish(GridMemory &memory, bool hasRare);
   void finishGrid(GridMemory &memory, bool countsInBlock);
   LogicalResult findItems();
   void hoistPrivateArrays();
   void upliftLoops();
   ThreadTile createTile();
-  LogicalResult mapLoop(ParallelLoopOpInterface loop, MappingCounts &counts);
+  LogicalResult mapLoop(ParallelLoopOpInterface loop);
   void obeyLanes();
   LogicalResult mapPieces(ParallelForOp loop, bool isOne);
   LogicalResult convertAccess();
@@ -266,8 +266,7 @@ LogicalResult GridBuilder::convertAccess() {
           GreedySimplifyRegionLevel::Disabled));
 }
 
-LogicalResult GridBuilder::sharePixelsOfBins(bool collapses,
-                                             SharingCounts &counts) {
+LogicalResult GridBuilder::sharePixelsOfBins(bool collapses) {
   formGrid();
   SmallVector<ParallelLoopOpInterface> loops;
   launch.walk([&](ParallelLoopOpInterface loop) { loops.push_back(loop); });
@@ -283,12 +282,12 @@ LogicalResult GridBuilder::sharePixelsOfBins(bool collapses,
     PixelNestResult found = findPixelNest(items, stage);
     if (!found.nest)
       return emitError(found.at) << found.obstacle;
-    rare = collapsePixels(items, *found.nest, stage, tile, memory, counts);
+    rare = collapsePixels(items, *found.nest, stage, tile, memory);
     if (failed(rare))
       return failure();
     hoistPrivateArrays();
   } else {
-    if (failed(sharePixels(items, tile, counts)))
+    if (failed(sharePixels(items, tile)))
       return failure();
     hoistPrivateArrays();
     shareSetup(items, tile, memory);
@@ -317,8 +316,7 @@ LogicalResult GridBuilder::mapPieces(ParallelForOp loop, bool isOne) {
   return success();
 }
 
-LogicalResult GridBuilder::mapLoop(ParallelLoopOpInterface loop,
-                                   MappingCounts &counts) {
+LogicalResult GridBuilder::mapLoop(ParallelLoopOpInterface loop) {
   ThreadMapping mapping = chooseMapping(loop, threads);
   bool isOne = loop->hasAttr(marks::one);
   if (isOne)
@@ -334,14 +332,10 @@ LogicalResult GridBuilder::mapLoop(ParallelLoopOpInterface loop,
   auto pixels = dyn_cast<ParallelPixelsOp>(*loop);
   auto numbered =
       pixels ? numberIterations(pixels) : cast<ParallelForOp>(*loop);
-  if (mapping == ThreadMapping::Pieces) {
-    ++counts.cut;
+  if (mapping == ThreadMapping::Pieces)
     return mapPieces(numbered, isOne);
-  }
-  if (mapping == ThreadMapping::Threads) {
-    ++counts.threads; // BlockMapping.cpp does the rest
-    return success();
-  }
+  if (mapping == ThreadMapping::Threads)
+    return success(); // BlockMapping.cpp does the rest
   convertLoop(numbered);
   launch.walk([&](scf::ForOp made) {
     if (made->removeAttr(marks::lanes))
@@ -375,14 +369,14 @@ void GridBuilder::obeyLanes() {
   });
 }
 
-LogicalResult GridBuilder::mapWork(MappingCounts &counts) {
+LogicalResult GridBuilder::mapWork() {
   obeyLanes();
   formGrid();
   launch.walk([](scf::ForOp loop) { loop->removeAttr(marks::lanes); });
   SmallVector<ParallelLoopOpInterface> loops; // those inside others first
   launch.walk([&](ParallelLoopOpInterface loop) { loops.push_back(loop); });
   for (ParallelLoopOpInterface loop : loops)
-    if (failed(mapLoop(loop, counts)))
+    if (failed(mapLoop(loop)))
       return failure();
   SmallVector<scf::ForOp> shared;
   launch.walk([&](scf::ForOp loop) {
@@ -390,33 +384,34 @@ LogicalResult GridBuilder::mapWork(MappingCounts &counts) {
       shared.push_back(loop);
   });
   for (scf::ForOp loop : shared)
-    counts.deferred += deferWork(loop, memory, threads);
+    deferWork(loop, memory, threads);
   std::optional<GridMemory> rest;
+  bool hasRare = false;
   // What a launch leaves is for the kernel itself.
   if (kernel.getPrecedes())
     shared.clear();
   for (scf::ForOp loop : shared) {
-    int64_t rare = setRareBranchesApart(loop);
-    if (rare && !rest)
+    bool isRare = setRareBranchesApart(loop);
+    if (isRare && !rest)
       rest = leaveRareRounds(loop, memory);
-    counts.rare += rare;
+    hasRare |= isRare;
   }
-  if (failed(convertAccess()) || failed(finish(memory, counts)))
+  if (failed(convertAccess()) || failed(finish(memory, hasRare)))
     return failure();
-  return rest ? finish(*rest, counts) : success();
+  return rest ? finish(*rest, hasRare) : success();
 }
 
 /// Maps a launch's work; what it leaves, or has to be left, is known.
-LogicalResult GridBuilder::finish(GridMemory &memory, MappingCounts &counts) {
-  if (failed(mapBlock(memory, counts)))
+LogicalResult GridBuilder::finish(GridMemory &memory, bool hasRare) {
+  if (failed(mapBlock(memory)))
     return failure();
   beginQueues(memory);
   if (memory.rare)
     finishRareRounds(memory);
-  finishGrid(memory, /*countsInBlock=*/counts.rare);
+  finishGrid(memory, /*countsInBlock=*/hasRare);
   if (memory.rare && !memory.rare->found)
     takeUnitsForRest(memory.launch);
-  if (counts.rare)
+  if (hasRare)
     memory.keepOutboxesInBlock(threads);
   return success();
 }
@@ -429,23 +424,19 @@ std::optional<Obstacle> ConvertPikoToGPUPass::tryToSharePixels(KernelOp kernel,
                                                                bool collapses) {
   OpBuilder builder(kernel);
   auto copy = cast<KernelOp>(builder.clone(*kernel));
-  SharingCounts counts;
   Obstacle obstacle{kernel.getLoc(), ""};
   LogicalResult result = [&] {
     ScopedDiagnosticHandler handler(&getContext(), [&](Diagnostic &error) {
       obstacle = {error.getLocation(), error.str()};
       return success();
     });
-    return GridBuilder(copy, stage, count).sharePixelsOfBins(collapses, counts);
+    return GridBuilder(copy, stage, count).sharePixelsOfBins(collapses);
   }();
   if (failed(result)) {
     copy.erase();
     return obstacle;
   }
   kernel.erase();
-  strided += counts.strided;
-  guarded += counts.guarded;
-  collapsed += counts.collapsed;
   return std::nullopt;
 }
 
@@ -498,18 +489,9 @@ LogicalResult ConvertPikoToGPUPass::convert(KernelOp kernel) {
   expandRemainders(kernel);
   if (failed(checkGridLimits(kernel)))
     return failure();
-  ++grids;
   if (sharePixels(kernel, stage, count))
     return success();
-  MappingCounts counts;
-  if (failed(GridBuilder(kernel, stage, count).mapWork(counts)))
-    return failure();
-  shared += counts.shared;
-  barriers += counts.threads;
-  cut += counts.cut;
-  deferred += counts.deferred;
-  rare += counts.rare;
-  return success();
+  return GridBuilder(kernel, stage, count).mapWork();
 }
 
 void ConvertPikoToGPUPass::runOnOperation() {

@@ -55,10 +55,6 @@ struct ThreadTile {
 
 struct Emitter;
 
-struct SharingCounts {
-  int64_t strided = 0, guarded = 0, collapsed = 0;
-};
-
 /// The number that a coordinate is, under casts that keep its low bits.
 mlir::Value getCoordinateRoot(mlir::Value coordinate);
 
@@ -68,8 +64,7 @@ void useClosedFormsInPixelLoops(mlir::scf::ForOp items);
 
 /// Leaves to each thread the updates of its own pixels, and what follows from
 /// them, in a loop over primitives that all threads run.
-llvm::LogicalResult sharePixels(mlir::scf::ForOp items, const ThreadTile &tile,
-                                SharingCounts &counts);
+llvm::LogicalResult sharePixels(mlir::scf::ForOp items, const ThreadTile &tile);
 
 struct GridMemory;
 /// Lets each thread of a block compute what depends on a primitive alone for
@@ -104,10 +99,6 @@ std::optional<GridMemory> leaveRareRounds(mlir::scf::ForOp loop,
                                           GridMemory &memory);
 /// Lets a launch leave units, or go on with them; behind mapBlock.
 void finishRareRounds(GridMemory &memory);
-
-struct MappingCounts {
-  int64_t shared = 0, threads = 0, cut = 0, deferred = 0, rare = 0;
-};
 
 /// What threads that share the iterations of a loop put off, in the block's
 /// memory (DeferredWork.cpp).
@@ -178,7 +169,7 @@ void beginQueues(GridMemory &memory);
 /// Maps a block's work to its threads: the first thread does what has effects,
 /// loops that are marked are shared, iterations of parallel loops are threads,
 /// and all else is done by all threads alike.
-llvm::LogicalResult mapBlock(GridMemory &memory, MappingCounts &counts);
+llvm::LogicalResult mapBlock(GridMemory &memory);
 
 /// Memory that the threads of a block share.
 mlir::Value addBlockMemory(mlir::gpu::LaunchOp launch,

@@ -28,7 +28,7 @@ public:
     for (int64_t extent : stage.getBins())
       pixels *= extent;
   }
-  mlir::FailureOr<RareSite> run(SharingCounts &counts);
+  mlir::FailureOr<RareSite> run();
 
 private:
   /// Of a primitive, for each dimension: where its loop begins, and how many
@@ -38,7 +38,7 @@ private:
   };
   using Box = llvm::SmallVector<Side, 3>;
 
-  void split(SharingCounts &counts);
+  void split();
   mlir::LogicalResult checkMemory(int64_t setupBytes);
   void clear();
   void createGroups(ItemSetup &setup);

@@ -39,10 +39,8 @@ namespace {
 
 class PixelSharing {
 public:
-  PixelSharing(scf::ForOp items, const ThreadTile &tile, int64_t dim,
-               SharingCounts &counts)
-      : items(items), tile(tile), dim(dim), mask(tile.extents[dim] - 1),
-        counts(counts) {}
+  PixelSharing(scf::ForOp items, const ThreadTile &tile, int64_t dim)
+      : items(items), tile(tile), dim(dim), mask(tile.extents[dim] - 1) {}
 
   LogicalResult run();
 
@@ -83,7 +81,6 @@ private:
   scf::ForOp items;
   const ThreadTile &tile;
   int64_t dim, mask;
-  SharingCounts &counts;
   SmallVector<Owned> owned;
 };
 
@@ -185,7 +182,6 @@ void PixelSharing::stride(scf::ForOp loop) {
       loop.getBody()->getOperations());
   loop.erase();
   owned.push_back({steps, at});
-  ++counts.strided;
 }
 
 LogicalResult
@@ -266,7 +262,6 @@ LogicalResult PixelSharing::guard(UpdateOp update, Value root) {
   for (Operation *op : ordered)
     op->moveBefore(ifOp.thenBlock()->getTerminator());
   owned.push_back({ifOp, root});
-  ++counts.guarded;
   return success();
 }
 
@@ -285,10 +280,9 @@ LogicalResult PixelSharing::checkEffects() {
   return failure(result.wasInterrupted());
 }
 
-LogicalResult piko::sharePixels(scf::ForOp items, const ThreadTile &tile,
-                                SharingCounts &counts) {
+LogicalResult piko::sharePixels(scf::ForOp items, const ThreadTile &tile) {
   for (int64_t dim = 0, e = tile.extents.size(); dim < e; ++dim)
-    if (failed(PixelSharing(items, tile, dim, counts).run()))
+    if (failed(PixelSharing(items, tile, dim).run()))
       return failure();
   return success();
 }
