@@ -6,7 +6,7 @@
 // RUN: %compare_targets %s --count 3000 --runs 1 --wide | FileCheck %s
 // RUN: %if all %{ piko-compare %s --count 500 --runs 1 --without vectorize | FileCheck %s %}
 // RUN: piko-compare %s --count 300 --runs 1 --wide --threads 2 --target gpu-on-cpu --gpu-threads 32 | FileCheck %s
-// CHECK: {{^equal$}}
+// CHECK: {{^equal}}
 //
 // They are what they were: no call, and no loop.
 // RUN: pikoc %s --emit=authored | FileCheck %s --check-prefix=IR

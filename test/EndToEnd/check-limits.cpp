@@ -26,7 +26,7 @@
 // STOP: --pipe Turns --count 1
 // STOP: --pipe Counts --count 1
 // RUN: %compare_checked %s --pipe Inside --count 40 --runs 1 --threads 2 --check | FileCheck %s --check-prefix=INSIDE
-// INSIDE: {{^equal$}}
+// INSIDE: {{^equal}}
 #include "Inputs/ports.h"
 
 #include <array>

@@ -3,7 +3,7 @@
 // A read behind a test of its index stays there, also where the condition right
 // around it is one that another read has.
 // RUN: %compare_targets %s --domain 1 1 --count 500 --runs 1 | FileCheck %s
-// CHECK: {{^equal$}}
+// CHECK: {{^equal}}
 #include <piko.h>
 
 struct Particle {

@@ -71,13 +71,16 @@ struct Options {
   /// All cases are to stop, with a message that is the same in all runs on all
   /// targets.
   bool stops = false;
-  /// How much LLVM optimizes its code: -O0 to -O3. What runs beside a GPU, or plays
-  /// one, is not optimized unless asked for: it is the passes that divide kernels
-  /// among threads which are tested there, and the kernels' PTX is optimized.
+  /// How much LLVM optimizes its code: -O0 to -O3. For other processors than the
+  /// first target's it is less unless asked for: what sets them apart is done in
+  /// front of its optimizer, and behind it from -O1 on. What runs beside a GPU, or
+  /// plays one, is not optimized: it is the passes that divide kernels among threads
+  /// which are tested there, and the kernels' PTX is optimized.
   std::optional<int> optLevel;
   int getOptLevel(const Target &target) const {
-    return optLevel.value_or(target.gpu.target == piko::GPUTarget::None ? 3
-                                                                        : 0);
+    bool isFirst = &target == &targets.front();
+    bool isGPU = target.gpu.target != piko::GPUTarget::None;
+    return optLevel.value_or(isGPU ? 0 : isFirst ? 3 : 1);
   }
   /// Says which threads ran which bins.
   bool owners = false;
