@@ -481,7 +481,6 @@ WalkResult VectorizePass::visit(Operation *op) {
   }
   if (flat.loop)
     flat.loop.erase();
-  vectorized += isDone;
   if (!isDone || isSplit)
     return WalkResult::advance();
   loop.erase();

@@ -13,7 +13,7 @@ using namespace mlir;
 using namespace piko;
 
 /// Whether work in the same kernel takes what is placed.
-static bool isLocal(PlaceOp place) {
+static bool isOfLocalEdge(PlaceOp place) {
   auto bins = place->getParentOfType<BinsOp>();
   return bins &&
          llvm::any_of(bins.getOps<WorkOpInterface>(),
@@ -26,7 +26,7 @@ static bool isLocal(PlaceOp place) {
 LogicalResult piko::checkGridLimits(KernelOp kernel) {
   WalkResult result = kernel.walk([&](Operation *op) -> WalkResult {
     auto place = dyn_cast<PlaceOp>(op);
-    if (place && isLocal(place) &&
+    if (place && isOfLocalEdge(place) &&
         place.getBin() != place->getParentOfType<BinsOp>().getBin())
       return place.emitError(
           "a kernel for a GPU places what a local edge takes in the same bin");
