@@ -24,8 +24,8 @@ struct State {
 struct Clamp : piko::Stage<0, 0, 64, Number>, piko::Uses<State> {
   void process(const Number &n) {
     state().results[n.serial] = {piko::min<float>(0, n.x),
-                                piko::max<float>(0, n.x),
-                                piko::min<float>(1, n.x)};
+                                 piko::max<float>(0, n.x),
+                                 piko::min<float>(1, n.x)};
   }
 };
 
