@@ -187,9 +187,10 @@ struct CommandLine {
       llvm::cl::cat(category)};
   llvm::cl::opt<double> mappingWindow{
       "mapping-window", llvm::cl::value_desc("factor"),
-      llvm::cl::desc("hold a loop as vectors and as a scalar loop, of which the "
-                     "runtime measures which is faster, where estimates are "
-                     "within this factor of each other (default: 2; 1: none)"),
+      llvm::cl::desc(
+          "hold a loop as vectors and as a scalar loop, of which the "
+          "runtime measures which is faster, where estimates are "
+          "within this factor of each other (default: 2; 1: none)"),
       llvm::cl::init(SynthesisOptions().mappingWindow),
       llvm::cl::cat(category)};
   llvm::cl::opt<bool> explain{
