@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #
 # Five commands matter, and each works on a fresh Debian 12 machine:
-#   make demo     render the bunny, in five minutes; says where the image is
+#   make demo     render the bunny; says where the image is
 #   make check    build everything and run the tests (check-all: more of them)
 #   make bench    run the benchmarks, which takes twenty minutes; says where
 #                 the page is (BENCH=--quick: one minute; benchmarks/README.md)
