@@ -27,7 +27,7 @@ PIPE ?= Fused
 
 .DELETE_ON_ERROR:
 .PHONY: all bench bench-gate build charts check clean configure demo deps docs format \
-  gpu-bench lint
+  gpu-bench lanes lint
 
 all: build
 
@@ -86,6 +86,11 @@ lint: build
 
 format:
 	@utils/lint.py format --fix
+
+# The table of what lanes are given of each kernel.
+lanes: configure
+	@cmake --build $(BUILD) --parallel $(JOBS) --target pikoc
+	@test/mappings/lanes.py --pikoc $(BUILD)/bin/pikoc --write
 
 docs: deps
 	@utils/make-reference.py

@@ -31,11 +31,17 @@ LaneCandidate::LaneCandidate(scf::ForOp loop)
                             (!ofPrimitives || getLoopPhase(loop) == "process"));
 }
 
-InFlightDiagnostic LaneCandidate::refuse() {
+InFlightDiagnostic piko::remarkStage(scf::ForOp loop) {
   InFlightDiagnostic remark = loop.emitRemark();
+  if (StageOp stage = getKernelStage(loop))
+    remark << "stage '" << stage.getSymName() << "': ";
+  return remark;
+}
+
+InFlightDiagnostic LaneCandidate::refuse() {
+  InFlightDiagnostic remark = remarkStage(loop);
   if (ofPrimitives)
-    remark << "stage '" << getKernelStage(loop).getSymName()
-           << "': " << getLoopPhase(loop) << " is not vectorized: ";
+    remark << getLoopPhase(loop) << " is not vectorized: ";
   else
     remark << "these iterations are not vectorized: ";
   return remark;
@@ -143,10 +149,9 @@ bool LaneCandidate::paysInPairs(const IterationLanes &lanes,
 
 void LaneCandidate::remarkVectors(const IterationLanes &lanes,
                                   const FlatLoop &flat) {
-  InFlightDiagnostic remark = loop.emitRemark();
+  InFlightDiagnostic remark = remarkStage(loop);
   if (ofPrimitives)
-    remark << "stage '" << getKernelStage(loop).getSymName()
-           << "': " << getLoopPhase(loop) << " is vectorized for "
+    remark << getLoopPhase(loop) << " is vectorized for "
            << (paired ? 2 : 1) * lanes.getLaneCount() << " primitives at once";
   else
     remark << "these iterations are vectorized for " << lanes.getLaneCount()

@@ -16,6 +16,9 @@ bool isSurelyFaster(const IterationLanes::Cost &cost, int64_t laneCount);
 /// The number of lanes of vectors that have enough registers for two of each.
 constexpr int64_t widestLanes = 16;
 
+/// Begins a remark at a loop that names its stage.
+mlir::InFlightDiagnostic remarkStage(mlir::scf::ForOp loop);
+
 /// A loop that lanes may share.
 class LaneCandidate {
 public:

@@ -227,10 +227,10 @@ static scf::ForOp copyAsCount(Operation *op) {
 }
 
 static void remarkInOrder(scf::ForOp loop, int64_t laneCount, bool isCompact) {
-  InFlightDiagnostic remark = loop.emitRemark()
-                              << "iterations of this loop do not depend on one "
-                                 "another, and are vectorized for "
-                              << laneCount << " at once";
+  InFlightDiagnostic remark = remarkStage(loop);
+  remark << "iterations of this loop do not depend on one another, and are "
+            "vectorized for "
+         << laneCount << " at once";
   if (isCompact)
     remark << ", of those that have something to do";
 }

@@ -16,12 +16,12 @@
 // CASE: --pipe Thirteen --count 320
 // CASE: --pipe Sixteen --count 320
 // RUN: pikoc %s --pipe Thirteen --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=LANES
-// LANES: remark: these iterations are vectorized for 16 at once
+// LANES: remark: stage '{{.*}}': these iterations are vectorized for 16 at once
 // What combines by a loop has no vector form.
 // RUN: piko-compare %s --pipe Loops --count 128 --runs 1 | FileCheck %s
 // CHECK: equal
 // RUN: pikoc %s --pipe Loops --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=CUT
-// CUT: remark: these iterations are not vectorized: it has no vector form
+// CUT: remark: stage '{{.*}}': these iterations are not vectorized: it has no vector form
 #include "Inputs/vector-iterations.h"
 
 #include <limits>

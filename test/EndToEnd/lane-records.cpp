@@ -21,7 +21,7 @@
 //
 // RUN: %if x86_64 %{ pikoc %s --pipe Rows --cpu x86-64-v4 --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=LOOP %}
 // RUN: %if x86_64 %{ pikoc %s --pipe Inner --cpu x86-64-v4 --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=LOOP %}
-// LOOP: remark: iterations of this loop do not depend on one another, and are vectorized
+// LOOP: remark: stage '{{.*}}': iterations of this loop do not depend on one another, and are vectorized
 #include <piko.h>
 
 struct Dot {

@@ -38,12 +38,12 @@
 // RUN: pikoc %s --pipe Cells --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=LANES
 // RUN: pikoc %s --pipe Corners --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=LANES
 // RUN: pikoc %s --pipe Scans --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=LANES
-// LANES: remark: these iterations are vectorized for 16 at once
+// LANES: remark: stage '{{.*}}': these iterations are vectorized for 16 at once
 // RUN: pikoc %s --pipe Sums --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=FEW
-// FEW: remark: these iterations are vectorized for 16 at once
-// FEW: remark: these iterations are vectorized for 8 at once
+// FEW: remark: stage '{{.*}}': these iterations are vectorized for 16 at once
+// FEW: remark: stage '{{.*}}': these iterations are vectorized for 8 at once
 // RUN: pikoc %s --pipe EmitsBefore --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=EMITS
-// EMITS: remark: these iterations are not vectorized: it keeps the order of iterations, and a barrier follows
+// EMITS: remark: stage '{{.*}}': these iterations are not vectorized: it keeps the order of iterations, and a barrier follows
 #include <piko.h>
 
 #include <climits>

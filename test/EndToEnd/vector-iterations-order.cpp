@@ -19,7 +19,7 @@
 // RUN: pikoc %s --pipe EmitsInLoops --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=VECTORS
 // RUN: pikoc %s --pipe Rows --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=VECTORS
 // RUN: pikoc %s --pipe Shares --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=VECTORS
-// VECTORS: .cpp:[[#]]:{{[0-9]+}}: remark: these iterations are vectorized for {{4|8}} at once
+// VECTORS: .cpp:[[#]]:{{[0-9]+}}: remark: stage '{{.*}}': these iterations are vectorized for {{4|8}} at once
 #include "Inputs/vector-iterations.h"
 
 struct Keeps : piko::Stage<16, 16, 64, Found>, piko::Uses<State> {
