@@ -10,6 +10,7 @@
 #include "Piko/Analysis/StageGraph.h"
 #include "Piko/Dialect/Piko/IR/PikoProgram.h"
 #include "Piko/Driver/Compiler.h"
+#include "Piko/Driver/PassReport.h"
 #include "Piko/Driver/Sequences.h"
 
 #include "mlir/Pass/Pass.h"
@@ -499,9 +500,11 @@ piko::explainPipeline(ModuleOp module, const CheckOptions &check,
            << "--explain: expected the authored level, but the file is at the "
            << getName(level) << " level";
   bool isCUDA = gpu.target == GPUTarget::CUDA;
+  PassReport changes;
   auto run = [&](Level from, Level to) {
     PassManager passes(context);
     passes.addInstrumentation(std::make_unique<Tracer>(trace));
+    changes.follow(passes);
     addPasses(passes, from, isCUDA ? std::min(to, Level::Machine) : to, check,
               synthesis, {}, cpu);
     if (isCUDA && to == Level::Target)
@@ -529,6 +532,8 @@ piko::explainPipeline(ModuleOp module, const CheckOptions &check,
   llvm::raw_string_ostream out(text);
   PipelineOp pipeline = getOnlyPipeline(*kernels);
   Report(trace, pipeline, out).write();
+  out << "\nWhat passes changed, as operations that are more or fewer:\n";
+  changes.writeText(out);
   if (isCUDA) {
     explainUnits(units, out);
     if (failed(explainResources(module, pipeline.getSymName(), gpu, optLevel,

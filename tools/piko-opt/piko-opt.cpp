@@ -2,16 +2,55 @@
 //
 // Runs passes on `.mlir` files.
 
+#include "Piko/Driver/PassReport.h"
 #include "Piko/Driver/Registration.h"
 
 #include "mlir/IR/MLIRContext.h"
+#include "mlir/Pass/PassManager.h"
+#include "mlir/Support/FileUtilities.h"
 #include "mlir/Tools/mlir-opt/MlirOptMain.h"
 #include "llvm/Support/CommandLine.h"
+#include "llvm/Support/InitLLVM.h"
+#include "llvm/Support/MemoryBuffer.h"
+#include "llvm/Support/ToolOutputFile.h"
+
+using namespace mlir;
+
+enum class ReportFormat { None, Text, JSON };
+
+/// Runs passes and says on the standard error what they changed.
+static LogicalResult runWithReport(const std::string &input,
+                                   const std::string &output,
+                                   ReportFormat format,
+                                   DialectRegistry &registry) {
+  piko::PassReport report;
+  MlirOptMainConfig config = MlirOptMainConfig::createFromCLOptions();
+  MlirOptMainConfig asAsked = config;
+  config.setPassPipelineSetupFn([&](PassManager &passes) {
+    report.follow(passes);
+    return asAsked.setupPassPipeline(passes);
+  });
+  std::string error;
+  auto from = openInputFile(input, &error);
+  auto to = from ? openOutputFile(output, &error) : nullptr;
+  if (!from || !to) {
+    llvm::errs() << error << "\n";
+    return failure();
+  }
+  if (failed(MlirOptMain(to->os(), std::move(from), registry, config)))
+    return failure();
+  to->keep();
+  if (format == ReportFormat::JSON)
+    report.writeJSON(llvm::errs());
+  else
+    report.writeText(llvm::errs());
+  return success();
+}
 
 /// Remarks point at lines: the operations that they are about would be pages.
 /// The option still prints them.
 static void leaveOutOperations() {
-  mlir::registerMLIRContextCLOptions();
+  registerMLIRContextCLOptions();
   auto &options = llvm::cl::getRegisteredOptions();
   auto *print = options.lookup("mlir-print-op-on-diagnostic");
   static_cast<llvm::cl::opt<bool> *>(print)->setInitialValue(false);
@@ -19,9 +58,23 @@ static void leaveOutOperations() {
 
 int main(int argc, char **argv) {
   leaveOutOperations();
-  mlir::DialectRegistry registry;
+  llvm::cl::opt<ReportFormat> report{
+      "report-passes",
+      llvm::cl::desc(
+          "say which passes changed anything, and how many operations "
+          "there are more or fewer"),
+      llvm::cl::init(ReportFormat::None),
+      llvm::cl::values(
+          clEnumValN(ReportFormat::Text, "text", "a line for each of them"),
+          clEnumValN(ReportFormat::JSON, "json",
+                     "all passes, and all numbers"))};
+  DialectRegistry registry;
   piko::registerPikoDialects(registry);
   piko::registerPikoPasses();
-  return mlir::asMainReturnCode(mlir::MlirOptMain(
-      argc, argv, "Piko's optimizer: passes on .mlir files\n", registry));
+  auto [input, output] = registerAndParseCLIOptions(
+      argc, argv, "Piko's optimizer: passes on .mlir files\n", registry);
+  if (report == ReportFormat::None)
+    return asMainReturnCode(MlirOptMain(argc, argv, input, output, registry));
+  llvm::InitLLVM init(argc, argv);
+  return asMainReturnCode(runWithReport(input, output, report, registry));
 }

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // What synthesis makes of a pipeline, as text for its author: the stages in
-// order, the kernels with their phases, and what each pass did or refused.
+// order, the kernels with their phases, what each pass did or refused, and what
+// it changed.
 
 #ifndef PIKO_DRIVER_EXPLAIN_H
 #define PIKO_DRIVER_EXPLAIN_H
