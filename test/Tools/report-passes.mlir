@@ -2,10 +2,10 @@
 // itself.
 // RUN: piko-opt %s --split-input-file --pass-pipeline='builtin.module(piko.pipeline(piko-form-kernels,piko-form-work,piko-map-lanes,piko-map-lanes),cse)' --report-passes=text -o %t.mlir 2>&1 | FileCheck %s
 // RUN: piko-opt %s --split-input-file --pass-pipeline='builtin.module(piko.pipeline(piko-form-kernels,piko-form-work,piko-map-lanes,piko-map-lanes),cse)' --report-passes=json -o %t.mlir 2> %t.json
-// RUN: %python -c "import json, sys; print(json.dumps(json.load(open(sys.argv[1])), indent=1))" %t.json | FileCheck %s --check-prefix=JSON
+// RUN: tail -n 1 %t.json | %python -m json.tool | FileCheck %s --check-prefix=JSON
 // RUN: FileCheck %s --check-prefix=MODULE --input-file=%t.mlir
 // A pass that fails has changed nothing that anybody gets.
-// RUN: not piko-opt %s --split-input-file --pass-pipeline='builtin.module(piko.pipeline(piko-vectorize{lane-count=3}))' --report-passes=text 2>&1 | FileCheck %s --check-prefix=FAILS
+// RUN: not piko-opt %s --split-input-file --pass-pipeline='builtin.module(piko.pipeline(piko-vectorize{lanes=3}))' --report-passes=text 2>&1 | FileCheck %s --check-prefix=FAILS
 // FAILS: error: expected 4, 8 or 16 lanes, but got 3
 // FAILS-NOT: piko-vectorize:
 

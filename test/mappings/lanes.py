@@ -6,8 +6,17 @@
   lanes.py [options] --write   writes lanes.md anew
 
 A row is a stage that has a kernel: what piko-map-lanes gives lanes, and, by
-processor, what piko-vectorize makes of its loops, in the words of `pikoc --explain`
-without places and estimates.
+processor, what piko-vectorize makes of its loops, as `pikoc --explain` says it:
+
+  16 primitives              at once
+  16 or 1 primitives, as measured   both are there, and the runtime takes the faster
+  16 iterations              of a parallel loop
+  16 iterations in order     of another loop, which do not depend on one another
+  1 primitive, WHY           one after the other
+  .., in turns               lanes take turns through a part of it
+  .., each lane by itself    goes on in an inner loop
+
+Bodies are for one processor alone, which takes half of the time.
 """
 
 import argparse
@@ -22,6 +31,7 @@ from concurrent.futures import ThreadPoolExecutor
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 TABLE = pathlib.Path(__file__).with_name("lanes.md")
 CPUS = ["x86-64-v4", "x86-64-v3", "x86-64"]
+FILES = {"examples/*/*.piko.cpp": CPUS, "benchmarks/bodies/*.piko.cpp": CPUS[:1]}
 HEAD = """# What lanes are given
 
 Of each kernel of the examples and of `benchmarks/bodies`, so that a change is seen.
@@ -29,14 +39,20 @@ Of each kernel of the examples and of `benchmarks/bodies`, so that a change is s
 """
 
 REMARK = re.compile(r"    (?:\S+?:(\d+):(\d+): )?stage '([^']+)': (.*)")
-# In the words of the table; the first one that fits.
+# In the words of the table, one after the other. Estimates are left out: they change
+# with each constant of the model.
 WORDS = [
     (r"(\w+) is vectorized for (\d+) primitives at once", r"\1: \2 primitives"),
+    (r"(\w+) is not vectorized: ", r"\1: 1 primitive, "),
     (r"these iterations are vectorized for (\d+) at once", r"\1 iterations"),
+    (r"these iterations are not vectorized: ", "1 iteration, "),
     (r"iterations of this loop do not depend on one another, and are vectorized for "
      r"(\d+) at once", r"\1 iterations in order"),
-    (r"(\w+) is not vectorized: ", r"\1: one primitive, "),
-    (r"these iterations are not vectorized: ", "one iteration, "),
+    (r"(\d+) (\w+)(.*), and held one after the other as well, to measure which is "
+     r"faster.*", r"\1 or 1 \2\3, as measured"),
+    (r"\d+ at once are expected to take .*", "by its cost"),
+    (r"; specifyLanes.*", ""),
+    (r"^process: ", ""),
 ]
 NOTES = {"lanes go on in this loop each by itself": "each lane by itself",
          "lanes take turns to go through this loop": "in turns"}
@@ -44,13 +60,7 @@ NOTES = {"lanes go on in this loop each by itself": "each lane by itself",
 
 def shorten(text):
     for pattern, words in WORDS:
-        if re.match(pattern, text):
-            text = re.sub(pattern, words, text, count=1)
-            break
-    text = text.split("; specifyLanes")[0].removeprefix("process: ")
-    # Estimates change with each constant of the model.
-    text = re.sub(r"\d+ at once are expected to take .*", "as it costs more", text)
-    text = re.sub(r": \d+ cycles are expected, and \d+", "", text)
+        text = re.sub(pattern, words, text, count=1)
     return text.replace("|", "\\|")
 
 
@@ -103,30 +113,32 @@ def list_rows(reports):
     loops = {cpu: list_loops(report) for cpu, report in reports.items()}
     for stages in loops.values():
         mappings |= {stage: "" for stage in stages if stage not in mappings}
-    return [[stage, said, *("; ".join(loops[cpu].get(stage, ["one"]))
+    return [[stage, said, *("; ".join(loops[cpu].get(stage, ["1"]))
                             for cpu in reports)]
             for stage, said in mappings.items()]
 
 
+def list_pipes(pikoc, file):
+    return subprocess.run([pikoc, file, "--list-pipes"], check=True,
+                          capture_output=True, text=True).stdout.split()
+
+
 def write_table(pikoc, jobs):
-    files = sorted(ROOT.glob("examples/*/*.piko.cpp"))
-    files += sorted(ROOT.glob("benchmarks/bodies/*.piko.cpp"))
+    files = {file: cpus for pattern, cpus in FILES.items()
+             for file in sorted(ROOT.glob(pattern))}
     with ThreadPoolExecutor(jobs) as pool:
-        # The first one of a file leaves what its C++ means to the others.
-        pipes = dict(zip(files, pool.map(
-            lambda file: subprocess.run([pikoc, file, "--list-pipes"], check=True,
-                                        capture_output=True, text=True)
-            .stdout.split(), files)))
+        pipes = dict(zip(files, pool.map(lambda file: list_pipes(pikoc, file), files)))
         reports = {(file, pipe, cpu): pool.submit(explain, pikoc, file, pipe, cpu)
-                   for file in files for pipe in pipes[file] for cpu in CPUS}
+                   for file, cpus in files.items() for pipe in pipes[file]
+                   for cpu in cpus}
         lines = [HEAD]
-        for file in files:
-            lines += [f"## {file.relative_to(ROOT)}", ""]
-            lines += ["| pipeline | stage | lanes are given | " + " | ".join(CPUS)
-                      + " |", "|---" * (3 + len(CPUS)) + "|"]
+        for file, cpus in files.items():
+            head = ["pipeline", "stage", "lanes are given", *cpus]
+            lines += [f"## {file.relative_to(ROOT)}", "", f"| {' | '.join(head)} |",
+                      "|---" * len(head) + "|"]
             for pipe in pipes[file]:
                 rows = list_rows({cpu: reports[file, pipe, cpu].result()
-                                  for cpu in CPUS})
+                                  for cpu in cpus})
                 lines += [f"| {' | '.join([pipe, *row])} |" for row in rows]
             lines.append("")
     return "\n".join(lines)

@@ -8,7 +8,6 @@ import re
 import shlex
 import subprocess
 import sys
-from concurrent.futures import ThreadPoolExecutor
 
 tests, document = map(pathlib.Path, sys.argv[1:])
 COMMAND = re.compile(r"// RUN: (piko-opt [^|>]*)")
@@ -33,11 +32,9 @@ files = sorted(file for folder in ("Transforms", "Conversion")
                for file in (tests / folder).rglob("*.mlir"))
 commands = [command for file in files for command in list_commands(file)
             if "-o" not in command]
-with ThreadPoolExecutor(2) as pool:
-    reports = list(pool.map(run, commands))
 changed = {}
-for report in reports:
-    for it in report:
+for command in commands:
+    for it in run(command):
         assert 0 <= it["changes"] <= it["runs"], it
         assert it["changes"] or not it["operations"], it
         changed[it["pass"]] = changed.get(it["pass"], 0) + it["changes"]
