@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #include "LaneCycles.h"
 
-using namespace llvm;
 using namespace piko;
 
 const Cycles &piko::getCycles(int64_t laneCount) {
@@ -107,7 +106,7 @@ const Cycles &piko::getCycles(int64_t laneCount) {
   return laneCount == 16 ? of16 : laneCount == 8 ? of8 : of4;
 }
 
-ArrayRef<CycleConstant> piko::getCycleConstants() {
+llvm::ArrayRef<CycleConstant> piko::getCycleConstants() {
   static constexpr CycleConstant constants[] = {
       {"scalar", &Cycles::scalar},
       {"scalarAccess", &Cycles::scalarAccess},

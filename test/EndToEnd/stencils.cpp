@@ -24,7 +24,7 @@
 // RUN: %if x86_64 %{ pikoc %s --pipe Wraps --cpu x86-64-v4 --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=LOOP %}
 // RUN: %if x86_64 %{ pikoc %s --pipe Mirrors --cpu x86-64-v4 --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=LOOP %}
 // LOOP: remark: stage '{{.*}}': iterations of this loop do not depend on one another, and are vectorized
-// RUN: %if x86_64 %{ pikoc %s --pipe Clamps --cpu x86-64-v4 --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=INNER %}
+// RUN: %if x86_64 %{ pikoc %s --pipe Clamps --cpu x86-64-v4 --mapping-window 1 --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=INNER %}
 // INNER: remark: stage 'stage': process is not vectorized: iterations of a loop in it are; specifyLanes(Items) does so all the same
 #include <piko.h>
 
