@@ -40,7 +40,7 @@
 // RELAXED:     {{^}}equal in all runs{{$}}
 
 // STRICT-NOT: differ
-// STRICT:     {{^}}equal{{$}}
+// STRICT:     {{^}}equal on
 
 // What is no finite number, and what is 0, is exact.
 // SPECIAL-NOT: finite in only one
