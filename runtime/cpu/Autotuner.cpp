@@ -112,8 +112,9 @@ void Autotuner::beginLaunch(std::span<const pikoir_unit> units) {
   publish(current_, isTrial_ ? PIKORT_MAPPING_TRIED : PIKORT_MAPPING_MEASURED);
 }
 
-/// Tries a choice and all that differ from it in one loop which it runs.
-void Autotuner::startRound(Class &of, int64_t mask) {
+/// Tries a choice and all that differ from it in one loop which it runs, but
+/// for the one of which it is known already.
+void Autotuner::startRound(Class &of, int64_t mask, int32_t known) {
   of.mask = mask;
   of.launches = 0;
   of.candidates.clear();
@@ -123,7 +124,8 @@ void Autotuner::startRound(Class &of, int64_t mask) {
     bool runs = true;
     for (int32_t at = mapping.within; at >= 0; at = mappings_[at].within)
       runs &= !(mask >> at & 1);
-    if (runs && mapping.choice == MappingChoice::Measured)
+    if (runs && mapping.number != known &&
+        mapping.choice == MappingChoice::Measured)
       of.candidates.push_back(
           {mask ^ int64_t(1) << mapping.number, mapping.number, {}, false});
   }
@@ -195,13 +197,14 @@ void Autotuner::finishRound(Class &of, size_t best) {
   noteRatios(of);
   ++of.rounds;
   int64_t mask = of.candidates[best].mask;
-  int32_t most = static_cast<int32_t>(mappings_.size()) + 1;
-  if (best != 0 && of.rounds < most) {
-    startRound(of, mask);
+  auto most = static_cast<int32_t>(mappings_.size()) + 1;
+  if (best != 0 && of.rounds < most)
+    startRound(of, mask, of.candidates[best].loop);
+  else
+    of.settled = true;
+  if (!of.settled)
     return;
-  }
   of.mask = mask;
-  of.settled = true;
   of.candidates.clear();
   of.rounds = 0;
   of.rate = 0;

@@ -88,7 +88,7 @@ private:
   };
 
   void note(const pikoir_unit &unit, AutotunerThread &thread, int64_t ticks);
-  void startRound(Class &of, int64_t mask);
+  void startRound(Class &of, int64_t mask, int32_t known = -1);
   /// Whether the trial has said enough; of the class, with the lock.
   void judge(Class &of);
   void finishRound(Class &of, size_t best);
