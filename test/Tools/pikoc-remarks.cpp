@@ -2,13 +2,13 @@
 //
 // What pikoc says about vectors: one verdict for each phase, at its line, with
 // what is in the way, at the user's lines. The report has the same.
-// RUN: pikoc %s --remarks --emit=target -o /dev/null 2>&1 | grep -E "(remark|note): " > %t
+// RUN: pikoc %s --mapping-window 1 --remarks --emit=target -o /dev/null 2>&1 | grep -E "(remark|note): " > %t
 // RUN: FileCheck %s --check-prefix=DIFFER < %t
 // RUN: FileCheck %s --check-prefix=WRITTEN < %t
 // RUN: FileCheck %s --check-prefix=EMITS < %t
 // RUN: FileCheck %s --check-prefix=DIVIDES < %t
 // RUN: FileCheck %s --check-prefix=SHADE < %t
-// RUN: pikoc %s --explain | FileCheck %s --check-prefix=EXPLAIN
+// RUN: pikoc %s --mapping-window 1 --explain | FileCheck %s --check-prefix=EXPLAIN
 
 // EXPLAIN: {{^}}Kernels, in order:
 // EXPLAIN: {{^  }}piko-vectorize
