@@ -23,6 +23,7 @@ class Build:
     warmup: int
     frames: int
     seconds: float
+    march: str | None = None  # of references, of which there are none
 
     def once(self):
         return replace(self, warmup=0, frames=1)
