@@ -233,7 +233,7 @@ def Piko_TakesVectorsOp : Piko_CPUOp<"takes_vectors", [
     are expected to be faster.
 
     ```mlir
-    %0 = piko.cpu.takes_vectors %w {expected, loop = "process, raster.cpp:12",
+    %0 = piko.cpu.takes_vectors %writer {expected, loop = "process, raster.cpp:12",
                                     number = 0, scalar = 140, vectors = 120}
     ```
   }];
