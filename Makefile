@@ -34,7 +34,7 @@ deps:
 	@utils/install-deps.sh
 
 configure: deps
-	@cmake --preset $(PRESET) -D BUILD_TESTING=ON -D PIKO_ENABLE_GPU=ON
+	@cmake --preset $(PRESET) -D BUILD_TESTING=ON -D PIKO_ENABLE_GPU=ON -U PIKO_UNITE
 
 build: configure
 	@cmake --build $(BUILD) --parallel $(JOBS)
@@ -46,7 +46,7 @@ demo:
 	@utils/install-deps.sh utils/packages-demo.txt
 	@echo "2 of 4: configuring"
 	@[ -e $(BUILD)/build.ninja ] || cmake --preset $(PRESET) \
-	  -D BUILD_TESTING=OFF -D PIKO_ENABLE_GPU=OFF
+	  -D BUILD_TESTING=OFF -D PIKO_ENABLE_GPU=OFF -D PIKO_UNITE=ON
 	@echo "3 of 4: building piko-render"
 	@cmake --build $(BUILD) --parallel $(JOBS) --target piko-render
 	@echo "4 of 4: rendering the bunny"
