@@ -34,7 +34,7 @@ deps:
 	@utils/install-deps.sh
 
 configure: deps
-	@cmake --preset $(PRESET) -D BUILD_TESTING=ON -D PIKO_ENABLE_GPU=ON -U PIKO_UNITE
+	@cmake --preset $(PRESET) -D BUILD_TESTING=ON -D PIKO_ENABLE_GPU=ON
 
 build: configure
 	@cmake --build $(BUILD) --parallel $(JOBS)
