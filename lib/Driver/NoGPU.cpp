@@ -2,6 +2,7 @@
 //
 // What stands for code generation for GPUs in a build without it: errors.
 
+#include "Piko/Conversion/UnitOrder.h"
 #include "Piko/Driver/Sequences.h"
 #include "Piko/Target/Assembler.h"
 #include "Piko/Target/KernelImages.h"
@@ -49,6 +50,9 @@ void piko::addLaunchSequence(OpPassManager &passes, const GPUOptions &) {
 void piko::addNVVMSequence(OpPassManager &passes) {
   passes.addPass(std::make_unique<RefusePass>());
 }
+
+/// A report has no blocks to tell of.
+std::optional<UnitOrder> piko::getUnitOrder(KernelOp) { return std::nullopt; }
 
 //===----------------------------------------------------------------------===//
 // PTX
