@@ -21,6 +21,8 @@ else
 BUILD := build-$(PRESET)
 endif
 JOBS ?= $(shell nproc)
+# Whether eight files of a library are compiled as one; see CONTRIBUTING.md.
+UNITE ?= OFF
 # Of the pipelines of examples/raster the fastest.
 PIPE ?= Fused
 
@@ -34,7 +36,8 @@ deps:
 	@utils/install-deps.sh
 
 configure: deps
-	@cmake --preset $(PRESET) -D BUILD_TESTING=ON -D PIKO_ENABLE_GPU=ON
+	@cmake --preset $(PRESET) -D BUILD_TESTING=ON -D PIKO_ENABLE_GPU=ON \
+	  -D PIKO_UNITE=$(UNITE)
 
 build: configure
 	@cmake --build $(BUILD) --parallel $(JOBS)

@@ -2,7 +2,6 @@
 //
 // What stands for code generation for GPUs in a build without it: errors.
 
-#include "Piko/Conversion/UnitOrder.h"
 #include "Piko/Driver/Sequences.h"
 #include "Piko/Target/Assembler.h"
 #include "Piko/Target/KernelImages.h"
@@ -49,11 +48,6 @@ void piko::addLaunchSequence(OpPassManager &passes, const GPUOptions &) {
 
 void piko::addNVVMSequence(OpPassManager &passes) {
   passes.addPass(std::make_unique<RefusePass>());
-}
-
-/// A report has no blocks to tell of. Weak: a test has the other one, too.
-[[gnu::weak]] std::optional<UnitOrder> piko::getUnitOrder(KernelOp) {
-  return std::nullopt;
 }
 
 //===----------------------------------------------------------------------===//

@@ -206,17 +206,12 @@ void VectorizePass::vectorize(const IterationLanes &lanes, scf::ForOp scalar,
 
 /// The place of a loop in the user's text, for reports: no path of a machine.
 static std::string describePlace(scf::ForOp loop) {
-  std::string text;
-  loop.getLoc()->walk([&](Location inner) {
-    auto file = dyn_cast<FileLineColLoc>(inner);
-    if (!file)
-      return WalkResult::advance();
-    llvm::raw_string_ostream(text)
-        << ", " << llvm::sys::path::filename(file.getFilename().getValue())
-        << ":" << file.getLine() << ":" << file.getColumn();
-    return WalkResult::interrupt();
-  });
-  return text;
+  auto at = loop.getLoc()->findInstanceOf<FileLineColLoc>();
+  if (!at)
+    return "";
+  StringRef file = llvm::sys::path::filename(at.getFilename().getValue());
+  return (", " + file + ":" + Twine(at.getLine()) + ":" + Twine(at.getColumn()))
+      .str();
 }
 
 /// What a loop is over, and where it is.
@@ -300,9 +295,6 @@ static void printSensitivities(scf::ForOp loop, int64_t number,
   out.attribute("kernel", loop->getParentOfType<KernelOp>().getSymName().str());
   out.attribute("number", number);
   out.attribute("loop", describeLoop(loop));
-  int64_t operations = 0;
-  loop.walk([&](Operation *) { ++operations; });
-  out.attribute("operations", operations);
   out.attribute("expected", candidate.getVersions()->expected);
   out.attribute("vectors", at.vectors);
   out.attribute("scalar", at.scalar);
@@ -500,6 +492,7 @@ void VectorizePass::runOnOperation() {
         << int64_t(laneCount);
     return signalPassFailure();
   }
+  meeting.clear(); // of another pipeline
   SmallVector<ParallelForOp> parallels;
   getOperation().walk([&](ParallelForOp parallel) {
     if (!parallel->getParentOfType<KernelOp>())

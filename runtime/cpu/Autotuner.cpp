@@ -16,9 +16,10 @@ static constexpr double margin = 0.98;
 /// A unit that takes longer than so many others was interrupted.
 static constexpr double interrupted = 8;
 
+/// What a unit has to do, about: primitives and cells, at least one.
 static double weightOf(const pikoir_unit &unit) {
-  return static_cast<double>(unit.end - unit.begin + unit.cell_end -
-                             unit.cell_begin);
+  return static_cast<double>(std::max<int64_t>(
+      1, unit.end - unit.begin + unit.cell_end - unit.cell_begin));
 }
 
 void Autotuner::Samples::add(double ticks, double weight) {
@@ -44,42 +45,46 @@ Autotuner::Autotuner(std::span<Mapping> mappings) : mappings_(mappings) {
   current_ = mask;
 }
 
-/// What the host has said of all loops; none if some are to be measured.
-std::optional<int64_t> Autotuner::getFixed() const {
-  int64_t mask = 0;
-  for (size_t i = 0; i < mappings_.size(); ++i) {
-    const Mapping &mapping = mappings_[i];
-    if (mapping.choice == MappingChoice::Measured)
-      return std::nullopt;
-    bool vectors = mapping.choice == MappingChoice::Expected
-                       ? mapping.expected
-                       : mapping.choice == MappingChoice::Vectors;
-    mask |= int64_t(vectors) << i;
+/// Whether a loop is to run as vectors, where the host says so.
+static std::optional<bool> findFixed(const Mapping &mapping) {
+  switch (mapping.choice) {
+  case MappingChoice::Measured:
+    return std::nullopt;
+  case MappingChoice::Expected:
+    return mapping.expected;
+  default:
+    return mapping.choice == MappingChoice::Vectors;
   }
-  return mask;
 }
 
 void Autotuner::publish(int64_t mask, int32_t state) {
   for (size_t i = 0; i < mappings_.size(); ++i) {
     Mapping &mapping = mappings_[i];
     mapping.chosen = mask >> i & 1;
-    mapping.state = mapping.choice != MappingChoice::Measured
-                        ? PIKORT_MAPPING_FIXED
-                        : state;
+    mapping.state = findFixed(mapping) ? PIKORT_MAPPING_FIXED : state;
   }
 }
 
-/// What is fixed of a mask, in it.
+/// A mask with what the host has fixed.
 static int64_t applyFixed(std::span<const Mapping> mappings, int64_t mask) {
-  for (size_t i = 0; i < mappings.size(); ++i) {
-    const Mapping &mapping = mappings[i];
-    bool vectors = mapping.choice == MappingChoice::Measured ? mask >> i & 1
-                   : mapping.choice == MappingChoice::Expected
-                       ? mapping.expected
-                       : mapping.choice == MappingChoice::Vectors;
-    mask = (mask & ~(int64_t(1) << i)) | int64_t(vectors) << i;
-  }
+  for (size_t i = 0; i < mappings.size(); ++i)
+    if (std::optional<bool> vectors = findFixed(mappings[i]))
+      mask = (mask & ~(int64_t(1) << i)) | int64_t(*vectors) << i;
   return mask;
+}
+
+/// Forgets what was measured where the host has another choice now.
+void Autotuner::followHost() {
+  auto isSame = [](MappingChoice choice, const Mapping &mapping) {
+    return choice == mapping.choice;
+  };
+  if (std::equal(choices_.begin(), choices_.end(), mappings_.begin(),
+                 mappings_.end(), isSame))
+    return;
+  choices_.clear();
+  for (const Mapping &mapping : mappings_)
+    choices_.push_back(mapping.choice);
+  classes_ = {};
 }
 
 int64_t Autotuner::getCurrent() const {
@@ -90,10 +95,10 @@ void Autotuner::beginLaunch(std::span<const pikoir_unit> units) {
   class_ = nullptr;
   weight_ = 0;
   trying_ = isTrial_ = false;
-  if (std::optional<int64_t> fixed = getFixed()) {
-    current_ = *fixed;
+  followHost();
+  current_ = getCurrent();
+  if (std::all_of(mappings_.begin(), mappings_.end(), findFixed))
     return publish(current_, PIKORT_MAPPING_FIXED);
-  }
   if (units.empty())
     return;
   for (const pikoir_unit &unit : units)
@@ -103,7 +108,7 @@ void Autotuner::beginLaunch(std::span<const pikoir_unit> units) {
   class_ = &classes_[std::min(number, classCount - 1)];
   bool isNew = !class_->settled && class_->candidates.empty();
   if (isNew)
-    startRound(*class_, applyFixed(mappings_, current_));
+    startRound(*class_, current_);
   current_ = class_->mask;
   if (!class_->settled) {
     ++class_->launches;
@@ -124,8 +129,7 @@ void Autotuner::startRound(Class &of, int64_t mask, int32_t known) {
     bool runs = true;
     for (int32_t at = mapping.within; at >= 0; at = mappings_[at].within)
       runs &= !(mask >> at & 1);
-    if (runs && mapping.number != known &&
-        mapping.choice == MappingChoice::Measured)
+    if (runs && mapping.number != known && !findFixed(mapping))
       of.candidates.push_back(
           {mask ^ int64_t(1) << mapping.number, mapping.number, {}, false});
   }

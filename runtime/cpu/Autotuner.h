@@ -94,10 +94,11 @@ private:
   void finishRound(Class &of, size_t best);
   void noteRatios(const Class &of);
   void checkDrift(Class &of, double rate);
-  std::optional<int64_t> getFixed() const;
+  void followHost();
   void publish(int64_t mask, int32_t state);
 
   std::span<Mapping> mappings_;
+  std::vector<MappingChoice> choices_; ///< That the classes are about.
   static constexpr size_t classCount = 8;
   std::array<Class, classCount> classes_;
   Class *class_ = nullptr;           ///< Of the open launch.

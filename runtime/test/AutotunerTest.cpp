@@ -185,6 +185,24 @@ TEST(AutotunerTest, RunsWhatTheHostSays) {
   EXPECT_EQ(kernel.runs, (std::map<int64_t, int64_t>{{1, 100}}));
 }
 
+TEST(AutotunerTest, FollowsAHostThatChangesItsMind) {
+  auto mappings = makeMappings({false, false});
+  Kernel kernel(mappings, [](int64_t mask) { return mask == 0 ? 1.0 : 100.0; });
+  for (int i = 0; i < 4; ++i)
+    kernel.launch(makeUnits(100, 50));
+  EXPECT_EQ(mappings[1].state, PIKORT_MAPPING_MEASURED);
+  mappings[0].choice = MappingChoice::Vectors;
+  kernel.runs.clear();
+  for (int i = 0; i < 4; ++i)
+    kernel.launch(makeUnits(100, 50));
+  for (auto [mask, count] : kernel.runs)
+    EXPECT_EQ(mask & 1, 1);
+  mappings[0].choice = MappingChoice::Measured;
+  for (int i = 0; i < 4; ++i)
+    kernel.launch(makeUnits(100, 50));
+  EXPECT_FALSE(mappings[0].chosen);
+}
+
 TEST(AutotunerTest, TakesNoLaunchWithoutUnits) {
   auto mappings = makeMappings({true});
   Kernel kernel(mappings, [](int64_t) { return 100.0; });

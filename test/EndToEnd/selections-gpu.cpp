@@ -12,7 +12,7 @@
 // CASE: --pipe Emitting --count 3000 --domain 67 35
 // CASE: --pipe Serial --count 900 --domain 67 35
 // What reads what other primitives store is in no order on the threads of a CPU.
-// RUN: env PIKO_CUDA_DRIVER=%test_driver piko-compare %s --pipe Reading --count 900 --domain 67 35 --runs 2 --threads 2 --target cuda
+// RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_SEED=5 piko-compare %s --pipe Reading --count 900 --domain 67 35 --runs 2 --threads 2 --target cuda
 // CASE: --pipe Tiles --count 900 --domain 67 35
 // CASE: --pipe Tiles --count 4 --domain 670 350
 // CASE: --pipe TilesByTwo --count 900 --domain 67 35

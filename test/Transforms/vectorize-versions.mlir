@@ -1,11 +1,13 @@
 // RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-vectorize{window=2}),canonicalize,cse)' --split-input-file --verify-diagnostics %s | FileCheck %s
 // RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-vectorize{window=1000}),canonicalize,cse)' --split-input-file %s 2>/dev/null | FileCheck %s --check-prefix=WIDE
+// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-vectorize{window=2 sensitivities=true}))' --split-input-file -o %t.mlir %s 2>/dev/null | FileCheck %s --check-prefix=NUMBERS
 
 piko.record @Row {"z" : f32[32 : 4] at 0, "k" : i32 at 128} size 132 align 4
 piko.record @D {"z" : f32 at 0} size 4 align 4
 
 // Estimates are within a factor of two of each other: both versions are held, and
 // the unit's writer says which runs.
+// NUMBERS: {"kernel":"near","number":0,"loop":"a, process of primitives, {{.*}}","expected":false,"vectors":{{[0-9.]+}},"scalar":{{[0-9.]+}},"by":{"scalar":[0,{{[0-9.]+}}]{{.*}}"gather":[{{[0-9.]+}},0]
 // CHECK-LABEL: piko.kernel @near
 // CHECK:         %[[W:.*]] = piko.cpu.open_writer
 // CHECK:         %[[TAKES:.*]] = piko.cpu.takes_vectors %[[W]] {loop = "a, process of primitives, vectorize-versions.mlir:{{[0-9]+}}:{{[0-9]+}}", number = 0 : i64, scalar = {{[0-9]+}} : i64, vectors = {{[0-9]+}} : i64}

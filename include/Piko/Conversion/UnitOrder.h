@@ -11,6 +11,12 @@
 
 namespace piko {
 
+/// The piko.bins of a kernel, or the piko.items of a source; null if it has
+/// neither.
+mlir::Operation *findWork(KernelOp kernel);
+/// Whose work that is.
+mlir::FlatSymbolRefAttr getStageName(mlir::Operation *work);
+
 /// How the blocks of a grid come to the units that they run.
 enum class UnitOrder {
   Fixed, ///< Block b of n runs the units b, b + n, ...: `direct_map`, and

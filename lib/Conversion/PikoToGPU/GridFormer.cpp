@@ -12,19 +12,6 @@
 using namespace mlir;
 using namespace piko;
 
-Operation *piko::findWork(KernelOp kernel) {
-  for (Operation &op : *kernel.getBodyBlock())
-    if (isa<BinsOp, ItemsOp>(op))
-      return &op;
-  return nullptr;
-}
-
-FlatSymbolRefAttr piko::getStageName(Operation *work) {
-  if (auto bins = dyn_cast<BinsOp>(work))
-    return bins.getStageAttr();
-  return cast<WorkOpInterface>(work).getStageAttr();
-}
-
 /// Where the first phase of the work stands.
 static Location findPhase(Operation *work) {
   Location place = work->getLoc();

@@ -7,14 +7,11 @@
 
 #include "../../Transforms/UnitFormer.h"
 
+#include "Piko/Conversion/UnitOrder.h"
+
 #include "mlir/Dialect/GPU/IR/GPUDialect.h"
 
 namespace piko {
-
-/// The piko.bins of a kernel, or the piko.items of a source.
-mlir::Operation *findWork(KernelOp kernel);
-/// Whose work that is.
-mlir::FlatSymbolRefAttr getStageName(mlir::Operation *work);
 
 /// Makes a launch of a kernel's work; a block runs a unit.
 class GridFormer : public UnitFormer {

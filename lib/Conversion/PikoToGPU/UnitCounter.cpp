@@ -35,27 +35,6 @@ static constexpr int64_t takesOfBlock = 16;
 /// The number of no unit.
 static constexpr int64_t none = -1;
 
-std::optional<UnitOrder> piko::getUnitOrder(KernelOp kernel) {
-  Operation *work = findWork(kernel);
-  if (!work)
-    return std::nullopt;
-  // The counters are for the launches of the kernel itself.
-  if (kernel.getPrecedes())
-    return UnitOrder::Fixed;
-  // A source's primitives are in no bins yet, and its units have as many each.
-  if (isa<ItemsOp>(work))
-    return UnitOrder::Fixed;
-  auto stage = lookupInPipeline<StageOp>(kernel, getStageName(work));
-  ScheduleOp schedule = stage.getSchedule();
-  // One that depends on the bin has units of all kinds.
-  if (!schedule || !schedule.getBody().empty())
-    return UnitOrder::Taken;
-  ScheduleKind kind = schedule.getKind();
-  return kind == ScheduleKind::DirectMap || kind == ScheduleKind::Serialize
-             ? UnitOrder::Fixed
-             : UnitOrder::Taken;
-}
-
 namespace {
 
 class UnitTaking {

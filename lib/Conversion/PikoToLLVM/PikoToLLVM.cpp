@@ -77,6 +77,27 @@ static LogicalResult checkSubject(KernelOp kernel) {
                             "source, or to begin one schedule");
 }
 
+/// Numbers the loops that a kernel holds in two versions without gaps, which
+/// those have left that were found to do nothing.
+static void numberMappings(KernelOp kernel) {
+  SmallVector<TakesVectorsOp> loops;
+  kernel.walk([&](TakesVectorsOp op) { loops.push_back(op); });
+  llvm::sort(loops, [](TakesVectorsOp a, TakesVectorsOp b) {
+    return a.getNumber() < b.getNumber();
+  });
+  llvm::DenseMap<int64_t, int64_t> numbers; // by the old ones
+  for (auto [number, op] : llvm::enumerate(loops)) {
+    numbers[op.getNumber()] = int64_t(number);
+    op.setNumber(number);
+    if (!op.getWithin())
+      continue;
+    if (auto outer = numbers.find(*op.getWithin()); outer != numbers.end())
+      op.setWithin(outer->second);
+    else
+      op.removeWithinAttr();
+  }
+}
+
 /// Which stage or source a kernel's function is for: the runtime is told at its
 /// end, where the bins are no longer at hand.
 static void noteSubject(func::FuncOp function, const PipelineNumbers &numbers) {
@@ -131,6 +152,8 @@ LogicalResult ConvertPikoToLLVMPass::convert(PipelineOp pipeline,
   if (!program)
     return pipeline.emitError("expected a piko.program, which "
                               "piko-form-program makes");
+  for (auto kernel : pipeline.getOps<KernelOp>())
+    numberMappings(kernel);
   PipelineNumbers numbers(pipeline);
   func::FuncOp setup = createProgram(numbers, context);
   SmallVector<func::FuncOp> functions, again;

@@ -306,7 +306,6 @@ void SetupWriter::declareRoots(ProgramOp program) {
 
 static_assert(mostMappings == PIKOIR_MOST_MAPPINGS);
 
-/// Numbers loops anew, by the way: the bits that units read are theirs.
 void SetupWriter::declareMappings(KernelOp kernel) {
   SmallVector<TakesVectorsOp> loops;
   kernel.walk([&](TakesVectorsOp op) { loops.push_back(op); });
@@ -315,19 +314,6 @@ void SetupWriter::declareMappings(KernelOp kernel) {
   llvm::sort(loops, [](TakesVectorsOp a, TakesVectorsOp b) {
     return a.getNumber() < b.getNumber();
   });
-  // Loops that were found to do nothing have left gaps.
-  llvm::DenseMap<int64_t, int64_t> places;
-  for (auto [number, op] : llvm::enumerate(loops)) {
-    places[op.getNumber()] = int64_t(number);
-    op.setNumber(number);
-    if (std::optional<uint64_t> within = op.getWithin()) {
-      auto outer = places.find(int64_t(*within));
-      if (outer == places.end())
-        op.removeWithinAttr();
-      else
-        op.setWithin(outer->second);
-    }
-  }
   OpenBinsOp bins = *kernel.getOps<OpenBinsOp>().begin();
   int64_t stage = numbers.stages.lookup(bins.getStageAttr().getAttr());
   int64_t source = bins.getSource() ? int64_t(*bins.getSource()) : -1;

@@ -11,7 +11,7 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 // CHECK:         %[[TAKES:.*]] = arith.cmpi ne, %[[BIT]], %c0_i64
 // CHECK:         scf.if %[[TAKES]]
 
-// The setup declares loops by number.
+// The setup declares loops by number; where some are gone, others move up.
 // CHECK-LABEL: func.func @P.setup
 // CHECK:         llvm.call @pikoir_declare_mapping(%{{.*}}, %c0_i32, %c-1_i32, %c0_i32, %{{.*}}, %c-1_i32, %c1_i32, %c20_i64, %c10_i64)
 // CHECK:         llvm.call @pikoir_declare_mapping(%{{.*}}, %c0_i32, %c-1_i32, %c1_i32, %{{.*}}, %c0_i32, %c0_i32, %c40_i64, %c30_i64)
@@ -24,8 +24,8 @@ piko.pipeline @P rank 1 {
     %i0 = arith.constant 0 : i32
     %bins = piko.storage.open_bins @a : !piko.bins<@F>
     %w = piko.cpu.open_writer %bins[%c0] : !piko.bins<@F>
-    %1 = piko.cpu.takes_vectors %w {loop = "inside", number = 1, scalar = 30, vectors = 40, within = 0}
-    %0 = piko.cpu.takes_vectors %w {expected, loop = "outside", number = 0, scalar = 10, vectors = 20}
+    %1 = piko.cpu.takes_vectors %w {loop = "inside", number = 5, scalar = 30, vectors = 40, within = 2}
+    %0 = piko.cpu.takes_vectors %w {expected, loop = "outside", number = 2, scalar = 10, vectors = 20}
     scf.if %1 {
       piko.store %i0, @out[%c0 : index] "x" : i32
     }

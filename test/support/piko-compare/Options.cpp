@@ -137,11 +137,12 @@ Options parseOptions(int argc, char **argv) {
       auto synthesis = piko::parseSynthesisOptions(text);
       if (!synthesis)
         throw std::runtime_error(piko::describeWrongSynthesisOptions(text));
-      options.synthesis = *synthesis;
+      options.synthesis.without = synthesis->without;
     } else if (name == "--targets")
       targets = words.takeValues(name, false)[0];
     else if (name == "--mapping-window")
-      options.mappingWindow = std::stod(words.takeValues(name, false)[0]);
+      options.synthesis.mappingWindow =
+          std::stod(words.takeValues(name, false)[0]);
     else if (name == "--target") {
       auto target = piko::parseGPUTarget(words.takeValues(name, false)[0]);
       if (!target || *target == piko::GPUTarget::Auto)
@@ -177,8 +178,6 @@ Options parseOptions(int argc, char **argv) {
     else if (!readCaseOption(name, words, options.one))
       throw std::runtime_error("unknown option " + name);
   }
-  if (options.mappingWindow)
-    options.synthesis.mappingWindow = *options.mappingWindow;
   if (options.file.empty())
     throw std::runtime_error("expected a file");
   if (options.reference.empty())

@@ -87,7 +87,6 @@ struct Options {
   /// Checking mode, on both sides.
   piko::CheckOptions check;
   piko::SynthesisOptions synthesis;
-  std::optional<double> mappingWindow;
   /// Of the reference executor's code; --no-cache.
   piko::CacheOptions cache;
 };

@@ -233,8 +233,9 @@ def Piko_TakesVectorsOp : Piko_CPUOp<"takes_vectors", [
     are expected to be faster.
 
     ```mlir
-    %0 = piko.cpu.takes_vectors %writer {expected, loop = "process, raster.cpp:12",
-                                    number = 0, scalar = 140, vectors = 120}
+    %0 = piko.cpu.takes_vectors %writer {
+      expected, loop = "process, raster.cpp:12", number = 0, scalar = 140,
+      vectors = 120}
     ```
   }];
   let arguments = (ins Piko_WriterType:$writer, Piko_I64Attr:$number,
