@@ -23,7 +23,7 @@ STAGE = """
 PIPE = """
     source connect allocateForSource state setDomain feed run tryRun
     setLoopLimit setThreads setMemoryLimit setMemoryBudget setStripSize
-    expectNumbers nameState Pipe"""
+    setMappings expectNumbers nameState Pipe"""
 NAMESPACE = """
     All BasicStage BinId Bins Buffer Cells DirectMap Error Image InLineage Lanes List
     LoadBalance NoState Order Pipe Position Precision SchedulePolicy Serialize Stage
