@@ -38,7 +38,19 @@ if [ "$(id -u)" -ne 0 ]; then
   as_root=(sudo)
 fi
 
+update() {
+  "${as_root[@]}" apt-get update -q </dev/null
+}
+
+install() {
+  "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -q -y \
+    --no-install-recommends "${missing[@]}" </dev/null
+}
+
 echo "install-deps: installing ${missing[*]}"
-"${as_root[@]}" apt-get update -q </dev/null
-"${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -q -y \
-  --no-install-recommends "${missing[@]}" </dev/null
+# Lists of the last day serve, but for what has been replaced since.
+lists="$(find /var/lib/apt/lists -name '*_Packages*' -mtime -1 2>/dev/null)"
+if [ -z "$lists" ] || ! install; then
+  update
+  install
+fi
