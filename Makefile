@@ -22,7 +22,7 @@ BUILD := build-$(PRESET)
 endif
 JOBS ?= $(shell nproc)
 # Whether eight files of a library are compiled as one; see CONTRIBUTING.md.
-UNITE ?= OFF
+UNITE ?= ON
 # Of the pipelines of examples/raster the fastest.
 PIPE ?= Fused
 

@@ -136,6 +136,9 @@ function(piko_add_unittest name)
   cmake_parse_arguments(ARG "" "" "LINK" ${ARGN})
   add_executable(${name} ${ARG_UNPARSED_ARGUMENTS})
   target_link_libraries(${name} PRIVATE piko_options ${ARG_LINK} GTest::gtest GTest::gtest_main)
+  # It runs for less long than -O3 takes.
+  target_compile_options(${name} PRIVATE $<$<CONFIG:Release>:-O1>)
+  piko_unite(${name})
   piko_add_sanitizer_options(${name})
   # Tests have more threads than cores: to wait must not cost time.
   gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60

@@ -303,9 +303,13 @@ LogicalResult GridBuilder::sharePixelsOfBins(bool collapses) {
 /// Cuts a loop whose iterations may be more than the block has threads, which
 /// share each of its pieces.
 LogicalResult GridBuilder::mapPieces(ParallelForOp loop, bool isOne) {
-  loop.emitRemark("what iterations keep across barriers is in memory: they are "
-                  "not known to be at most ")
-      << threads << ", the threads of a block";
+  if (updatesOwnPixels(loop))
+    loop.emitRemark("what iterations keep across barriers is in memory: they "
+                    "are not known to be at most ")
+        << threads << ", the threads of a block";
+  else
+    loop.emitRemark("one thread does what iterations do between barriers: two "
+                    "of them may update a pixel, in their order");
   if (failed(LoopSplitter(loop, memory.log).run()))
     return failure();
   launch.walk([&](scf::ForOp piece) {

@@ -73,6 +73,10 @@ struct GridMemory;
 void shareSetup(mlir::scf::ForOp items, const ThreadTile &tile,
                 GridMemory &memory);
 
+/// Whether no two iterations, or primitives, update a pixel: its coordinates say
+/// which iteration it is, or only one iteration does.
+bool updatesOwnPixels(mlir::Operation *loop);
+
 /// How the threads of a block take a loop over primitives or iterations.
 enum class ThreadMapping {
   One,     ///< One after the other; loops inside may be shared.

@@ -4,7 +4,7 @@
 // for the order of their emissions, which the log restores, and of their
 // updates: these must be of one pixel for each iteration. The primitives of a
 // bin are independent unless their stage updates pixels. Iterations that meet
-// at barriers are threads where there are enough of these.
+// at barriers are threads under the same condition, where there are enough.
 
 #include "PikoToGPU.h"
 
@@ -97,9 +97,50 @@ static bool determine(ArrayRef<Value> roots, Value value, int depth = 0) {
   return false;
 }
 
-/// Whether no two iterations, or primitives, update a pixel: its coordinates
-/// say which iteration it is.
-static bool updatesOwnPixels(Operation *loop) {
+/// The one iteration of `loop` that reaches an operation, or null: a test of its
+/// number stands around it.
+static Value findOnlyIteration(Operation *op, Operation *loop) {
+  if (loop->getRegion(0).getNumArguments() != 1)
+    return {};
+  Value iteration = loop->getRegion(0).getArgument(0);
+  auto isInvariant = [&](Value value) {
+    return !loop->isAncestor(value.getParentBlock()->getParentOp()) ||
+           matchPattern(value, m_Constant());
+  };
+  auto match = [&](Value condition, arith::CmpIPredicate wanted) -> Value {
+    auto test = condition.getDefiningOp<arith::CmpIOp>();
+    if (!test || test.getPredicate() != wanted)
+      return {};
+    for (auto [a, b] : {std::pair(test.getLhs(), test.getRhs()),
+                        std::pair(test.getRhs(), test.getLhs())}) {
+      while (a.getDefiningOp() && isCast(a.getDefiningOp()))
+        a = a.getDefiningOp()->getOperand(0);
+      if (a == iteration && isInvariant(b))
+        return b;
+    }
+    return {};
+  };
+  for (; op != loop; op = op->getParentOp()) {
+    auto choice = dyn_cast<scf::IfOp>(op->getParentOp());
+    if (!choice)
+      continue;
+    bool isThen = op->getParentRegion() == &choice.getThenRegion();
+    SmallVector<Value> conditions = {choice.getCondition()};
+    while (!conditions.empty()) {
+      Value condition = conditions.pop_back_val();
+      auto both = condition.getDefiningOp<arith::AndIOp>();
+      if (both && isThen) // in the other region either may be false
+        llvm::append_values(conditions, both.getLhs(), both.getRhs());
+      else if (Value only = match(condition, isThen
+                                                 ? arith::CmpIPredicate::eq
+                                                 : arith::CmpIPredicate::ne))
+        return only;
+    }
+  }
+  return {};
+}
+
+bool piko::updatesOwnPixels(Operation *loop) {
   llvm::StringMap<UpdateOp> known; // by image
   WalkResult result =
       loop->walk([&](StateAccessOpInterface access) -> WalkResult {
@@ -109,9 +150,17 @@ static bool updatesOwnPixels(Operation *loop) {
         if (!update)
           return WalkResult::interrupt(); // of a pixel that is not known
         auto [it, isFirst] = known.try_emplace(update.getImage(), update);
-        if (!isFirst)
-          return WalkResult(success(llvm::equal(it->second.getCoordinates(),
-                                                update.getCoordinates())));
+        Value only = findOnlyIteration(update, loop);
+        if (!isFirst) {
+          Value other = findOnlyIteration(it->second, loop);
+          return WalkResult(success(
+              only || other
+                  ? only && other && isSame(only, other)
+                  : llvm::equal(it->second.getCoordinates(),
+                                update.getCoordinates())));
+        }
+        if (only)
+          return WalkResult::advance();
         SmallVector<Value> roots;
         for (Value coordinate : update.getCoordinates())
           roots.push_back(getRoot(coordinate, loop));
@@ -207,7 +256,8 @@ ThreadMapping piko::chooseMapping(Operation *loop, int64_t threads) {
   bool isOne = isChecked(loop);
   if (auto parallel = dyn_cast<ParallelLoopOpInterface>(loop);
       parallel && parallel.hasBarriers())
-    return !isOne && getMostIterations(parallel) <= threads
+    return !isOne && getMostIterations(parallel) <= threads &&
+                   updatesOwnPixels(loop)
                ? ThreadMapping::Threads
                : ThreadMapping::Pieces;
   auto meets = [](Operation *inner) { return isa<BarrierOpInterface>(inner); };

@@ -132,3 +132,90 @@ piko.pipeline @Box rank 1 {
     }
   }
 }
+
+// -----
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+
+// Iterations that update a pixel of their own, or of which only one updates, are
+// threads.
+// CHECK-LABEL: piko.pipeline @OwnPixels
+// CHECK:         memref.store %{{.*}}, %{{.*}}[%c0] : memref<1xi1>
+// CHECK:         gpu.barrier
+// CHECK:         piko.update @image
+// CHECK:         piko.update @sums
+// PIECES-NOT:  remark
+piko.pipeline @OwnPixels rank 1 {
+  piko.image @image : @F rank 1
+  piko.image @sums : @F rank 1
+  piko.source @a
+  piko.stage @a bins [8] threads 64 placed : list @F -> [] {}
+  piko.kernel @kernel_a {
+    piko.bins of @a {
+    ^bb0(%bin: index):
+      piko.lists of @a {
+      ^bb0(%l: !piko.list<@F>):
+        %n = arith.constant 8 : index
+        %three = arith.constant 3 : index
+        %none = arith.constant 0 : i32
+        %size = arith.constant 8 : index
+        %lo = arith.muli %bin, %size : index
+        piko.parallel_for %n {
+        ^bb0(%i: index):
+          piko.sync
+          %at = arith.addi %lo, %i : index
+          %x = arith.index_cast %at : index to i32
+          piko.update @image[%x : i32] {
+          ^bb0(%old: i32):
+            piko.yield [%x : i32]
+          }
+          %is = arith.cmpi eq, %i, %three : index
+          scf.if %is {
+            piko.update @sums[%none : i32] {
+            ^bb0(%old: i32):
+              piko.yield [%x : i32]
+            }
+          }
+          piko.yield
+        }
+      }
+    }
+  }
+}
+
+// -----
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+
+// Of one pixel they are made in order.
+// PIECES:      remark: one thread does what iterations do between barriers: two of them may update a pixel, in their order
+// PIECES-NEXT: piko.parallel_for
+// CHECK-LABEL: piko.pipeline @OnePixel
+// CHECK:         scf.if %{{.*}} {
+// CHECK:           scf.for %{{.*}} = %c0 to %c8 step %c1 {
+// CHECK:             piko.update @image
+piko.pipeline @OnePixel rank 1 {
+  piko.image @image : @F rank 1
+  piko.source @a
+  piko.stage @a bins [8] threads 64 placed : list @F -> [] {}
+  piko.kernel @kernel_a {
+    piko.bins of @a {
+    ^bb0(%bin: index):
+      piko.lists of @a {
+      ^bb0(%l: !piko.list<@F>):
+        %n = arith.constant 8 : index
+        %none = arith.constant 0 : i32
+        piko.parallel_for %n {
+        ^bb0(%i: index):
+          piko.sync
+          %x = arith.index_cast %i : index to i32
+          piko.update @image[%none : i32] {
+          ^bb0(%old: i32):
+            piko.yield [%x : i32]
+          }
+          piko.yield
+        }
+      }
+    }
+  }
+}
