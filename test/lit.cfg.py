@@ -16,8 +16,8 @@ split-file. Substitutions:
   %piko          the build tree, which find_package(Piko) can use
   %cxx           the C++ compiler of this build
   %compare_targets
-                 piko-compare on all targets: the first of them runs all cases, and
-                 the others take turns, but where all tests are asked for
+                 piko-compare on all targets, where all tests are asked for; else a
+                 case runs on the first and on one of the others, in turn
   %compare_checked
                  the same on the targets that have checking mode
   %other_cxx     another C++ compiler, where one can use this build's runtime

@@ -65,8 +65,8 @@ struct Options {
   /// At least one. The first one runs with all threads, as often as `runs` says;
   /// the others once, with the last number of threads.
   std::vector<Target> targets;
-  /// Cases take turns with the other targets, each of which runs one case in as many
-  /// as there are of them, or one case.
+  /// A case runs on the first target and on one of the others, which take turns with
+  /// the cases; a file's name says which begins.
   bool spread = false;
   /// All cases are to stop, with a message that is the same in all runs on all
   /// targets.
