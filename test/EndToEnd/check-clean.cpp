@@ -3,6 +3,7 @@
 // What keeps the rules has no findings in checking mode, and the results that
 // it has without.
 // HOLE: cuda: what is checked is written down on the host
+// REQUIRES: all
 // RUN: %compare_checked %s --count 60 --runs 2 --threads 1 2 --check=nan:Point.value | FileCheck %s
 // CHECK: equal
 #include "Inputs/ports.h"

@@ -3,6 +3,7 @@
 // Compiled, checking mode finds indices outside of arrays and loops that do not
 // end, which plain C++ has no way to see; and it says where barriers part.
 // HOLE: cuda: what is checked is written down on the host
+// REQUIRES: all
 // RUN: sed -n 's|^// STOP: ||p' %s > %t.stops
 // RUN: %compare_checked %s --stops --cases %t.stops --runs 1 --threads 2 --check > %t.out
 // RUN: sed -n '/^Local:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=LOCAL

@@ -2,6 +2,7 @@
 //
 // Loops and rounds that a device repeats by itself, in the lineage order that
 // the reference executor has: updates that do not commute show it.
+// REQUIRES: all
 // DEFINE: %{compare} = piko-compare %s --count 100 --domain 64 48 --runs 1 --threads 2 --target cuda --gpu-threads 64
 // RUN: %compare_targets %s --cases %s --count 100 --domain 64 48 --runs 1
 // CASE: --pipe Numbers

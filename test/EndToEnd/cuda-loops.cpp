@@ -3,6 +3,7 @@
 // Loops in which primitives come in at several stages, and those whose order
 // across hops shows, in one submission, in the lineage order that the reference
 // executor has.
+// REQUIRES: all
 // DEFINE: %{compare} = piko-compare %s --count 70 --domain 64 48 --runs 1 --threads 2 --target cuda --gpu-threads 64
 // RUN: %compare_targets %s --cases %s --count 70 --domain 64 48 --runs 1
 // CASE: --pipe TwoEntries

@@ -2,6 +2,7 @@
 //
 // More inputs and outputs of a stage than a join merges at a time, in one
 // submission and in the order of the reference executor.
+// REQUIRES: all
 // DEFINE: %{compare} = piko-compare %s --count 90 --domain 40 24 --runs 1 --threads 2 --target cuda --gpu-threads 32
 // RUN: %compare_targets %s --cases %s --count 90 --domain 40 24 --runs 1
 // CASE: --pipe Inputs

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // Schedules that depend on the bin, and on constants, in one submission.
+// REQUIRES: all
 // DEFINE: %{compare} = piko-compare %s --count 400 --domain 61 43 --runs 2 --threads 2 --target cuda --gpu-threads 32
 // RUN: %compare_targets %s --cases %s --count 400 --domain 61 43 --runs 1
 // CASE: --pipe Bins

@@ -3,6 +3,7 @@
 // Strips that a device repeats by itself: updates that do not commute show the
 // lineage order that the reference executor has, also of what leaves the strips
 // to be merged by keys.
+// REQUIRES: all
 // DEFINE: %{compare} = piko-compare %s --domain 64 48 --runs 1 --threads 2 --target cuda --gpu-threads 64
 // DEFINE: %{meet} = %{compare} --pipe Meet --count 60
 // RUN: %compare_targets %s --cases %s --count 60 --domain 64 48 --runs 1

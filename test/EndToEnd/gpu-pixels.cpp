@@ -20,15 +20,15 @@
 //
 // RUN: %compare_targets %s --cases %s --domain 67 35 --count 900 --runs 1
 // CASE: --pipe Boxes
-// RUN: piko-compare %s --pipe Boxes --domain 67 35 --count 900 --target gpu-on-cpu --gpu-threads 8 --gpu-seed 7 --runs 1 | FileCheck %s
+// RUN: %if all %{ piko-compare %s --pipe Boxes --domain 67 35 --count 900 --target gpu-on-cpu --gpu-threads 8 --gpu-seed 7 --runs 1 | FileCheck %s %}
 // CASE: --pipe Points
-// RUN: piko-compare %s --pipe Points --domain 67 35 --count 900 --target gpu-on-cpu --gpu-threads 128 --runs 1 | FileCheck %s
+// RUN: %if all %{ piko-compare %s --pipe Points --domain 67 35 --count 900 --target gpu-on-cpu --gpu-threads 128 --runs 1 | FileCheck %s %}
 // CASE: --pipe Rows
 // CASE: --pipe Steps
 // CASE: --pipe Discs
 // CASE: --pipe Unclipped
 // CASE: --pipe Rare
-// RUN: piko-compare %s --pipe Rare --domain 67 35 --count 900 --target gpu-on-cpu --gpu-threads 2 --runs 1 | FileCheck %s
+// RUN: %if all %{ piko-compare %s --pipe Rare --domain 67 35 --count 900 --target gpu-on-cpu --gpu-threads 2 --runs 1 | FileCheck %s %}
 // CASE: --pipe Spans
 // CASE: --pipe Frames
 // CASE: --pipe Carried

@@ -28,9 +28,9 @@
 // RUN: %if all %{ piko-compare %s --pipe Chain --domain 67 35 --count 2000 --runs 1 --without fuse-kernels | FileCheck %s %}
 // RUN: %if all %{ piko-compare %s --pipe Chain --domain 67 35 --count 2000 --runs 1 --without fuse-stages | FileCheck %s %}
 // On a GPU what lies between two stages is the block's.
-// RUN: piko-compare %s --pipe Chain --domain 67 35 --count 500 --runs 1 --threads 2 --target gpu-on-cpu --gpu-threads 64 --gpu-seed 3 | FileCheck %s
-// RUN: piko-compare %s --pipe Lists --domain 67 35 --count 300 --runs 1 --threads 2 --target gpu-on-cpu --gpu-threads 32 | FileCheck %s
-// RUN: piko-compare %s --pipe Serial --domain 67 35 --count 200 --runs 1 --threads 2 --target gpu-on-cpu --gpu-threads 32 | FileCheck %s
+// RUN: %if all %{ piko-compare %s --pipe Chain --domain 67 35 --count 500 --runs 1 --threads 2 --target gpu-on-cpu --gpu-threads 64 --gpu-seed 3 | FileCheck %s %}
+// RUN: %if all %{ piko-compare %s --pipe Lists --domain 67 35 --count 300 --runs 1 --threads 2 --target gpu-on-cpu --gpu-threads 32 | FileCheck %s %}
+// RUN: %if all %{ piko-compare %s --pipe Serial --domain 67 35 --count 200 --runs 1 --threads 2 --target gpu-on-cpu --gpu-threads 32 | FileCheck %s %}
 // CHECK: equal
 // RUN: pikoc %s --pipe Chain --emit=ptx --cpu=sm_90 | FileCheck %s --check-prefix=PTX
 // PTX: .entry Chain_kernel_spread

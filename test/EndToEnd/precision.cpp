@@ -10,14 +10,14 @@
 // RUN: FileCheck %s --check-prefix=CONTRACTED --input-file %t.contracted
 // RUN: FileCheck %s --check-prefix=RELAXED --input-file %t.relaxed
 // RUN: %compare_targets %s --pipe Strict --count 1003 --domain 9 9 | FileCheck %s --check-prefix=STRICT
-// RUN: piko-compare %s --pipe Contracted --count 1003 --domain 9 9 --without vectorize,if-convert,fuse-stages,fuse-kernels,infer-directives | diff - %t.contracted
-// RUN: piko-compare %s --pipe Relaxed --count 1003 --domain 9 9 --without vectorize,if-convert,fuse-stages,fuse-kernels,infer-directives | diff - %t.relaxed
+// RUN: %if all %{ piko-compare %s --pipe Contracted --count 1003 --domain 9 9 --without vectorize,if-convert,fuse-stages,fuse-kernels,infer-directives | diff - %t.contracted %}
+// RUN: %if all %{ piko-compare %s --pipe Relaxed --count 1003 --domain 9 9 --without vectorize,if-convert,fuse-stages,fuse-kernels,infer-directives | diff - %t.relaxed %}
 // RUN: piko-compare %s --pipe Relaxed --count 1003 --domain 9 9 --check | diff - %t.relaxed
-// RUN: piko-compare %s --pipe Contracted --count 1003 --domain 9 9 --target gpu-on-cpu | diff - %t.contracted
-// RUN: piko-compare %s --pipe Relaxed --count 1003 --domain 9 9 --target gpu-on-cpu | diff - %t.relaxed
-// RUN: %if x86_64 %{ piko-compare %s --pipe Contracted --count 1003 --domain 9 9 --cpu x86-64 | diff - %t.contracted %}
-// RUN: %if x86_64 %{ piko-compare %s --pipe Relaxed --count 1003 --domain 9 9 --cpu x86-64-v3 --tolerance 1e-6 | FileCheck %s --check-prefix=RELAXED %}
-// RUN: %if x86_64 %{ piko-compare %s --pipe Special --count 1003 --domain 9 9 --cpu x86-64-v3 --wide --tolerance 1e-6 | FileCheck %s --check-prefix=SPECIAL %}
+// RUN: %if all %{ piko-compare %s --pipe Contracted --count 1003 --domain 9 9 --target gpu-on-cpu | diff - %t.contracted %}
+// RUN: %if all %{ piko-compare %s --pipe Relaxed --count 1003 --domain 9 9 --target gpu-on-cpu | diff - %t.relaxed %}
+// RUN: %if all %{ %if x86_64 %{ piko-compare %s --pipe Contracted --count 1003 --domain 9 9 --cpu x86-64 | diff - %t.contracted %} %}
+// RUN: %if all %{ %if x86_64 %{ piko-compare %s --pipe Relaxed --count 1003 --domain 9 9 --cpu x86-64-v3 --tolerance 1e-6 | FileCheck %s --check-prefix=RELAXED %} %}
+// RUN: %if all %{ %if x86_64 %{ piko-compare %s --pipe Special --count 1003 --domain 9 9 --cpu x86-64-v3 --wide --tolerance 1e-6 | FileCheck %s --check-prefix=SPECIAL %} %}
 // RUN: piko-compare %s --pipe Special --count 1003 --domain 9 9 --wide --tolerance 1e-6 | FileCheck %s --check-prefix=SPECIAL
 // RUN: not piko-compare %s --pipe Relaxed --count 1003 --domain 9 9 --tolerance 1e-9 | FileCheck %s --check-prefix=FAR
 #include <piko.h>
