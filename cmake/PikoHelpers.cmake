@@ -130,15 +130,18 @@ function(piko_add_tool name)
   piko_add_sanitizer_options(${name})
 endfunction()
 
-# piko_add_unittest(name SOURCES... [LINK libraries]): a GoogleTest program
-# whose cases CTest runs one by one.
+# piko_add_unittest(name SOURCES... [LINK libraries] [APART]): a GoogleTest program
+# whose cases CTest runs one by one. Its files are compiled one by one if APART,
+# because they have names in common.
 function(piko_add_unittest name)
-  cmake_parse_arguments(ARG "" "" "LINK" ${ARGN})
+  cmake_parse_arguments(ARG "APART" "" "LINK" ${ARGN})
   add_executable(${name} ${ARG_UNPARSED_ARGUMENTS})
   target_link_libraries(${name} PRIVATE piko_options ${ARG_LINK} GTest::gtest GTest::gtest_main)
   # It runs for less long than -O3 takes.
   target_compile_options(${name} PRIVATE $<$<CONFIG:Release>:-O1>)
-  piko_unite(${name})
+  if(NOT ARG_APART)
+    piko_unite(${name})
+  endif()
   piko_add_sanitizer_options(${name})
   # Tests have more threads than cores: to wait must not cost time.
   gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60

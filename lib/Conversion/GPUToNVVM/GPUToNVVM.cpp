@@ -3,6 +3,7 @@
 // convert-gpu-to-exact-nvvm: kernels to the nvvm and llvm dialects.
 
 #include "ExactFunctions.h"
+#include "Registers.h"
 
 #include "Piko/Conversion/Passes.h"
 
@@ -41,9 +42,6 @@ static bool isShared(Value pointer) {
          unsigned(NVVM::NVVMMemorySpace::Shared);
 }
 
-/// With this, half of the threads that a multiprocessor can have find room.
-static constexpr int32_t maxRegisters = 64;
-
 /// Says of access to a block's memory what memref cannot. Of a load that is not
 /// to be kept, LLVM has to know that it cannot go in front of its loop; and
 /// ptxas, how many registers that is for.
@@ -61,7 +59,7 @@ static void finishBlockMemory(Operation *op) {
   load.setVolatile_(true);
   op->getParentOfType<LLVM::LLVMFuncOp>()->setAttr(
       NVVM::NVVMDialect::getMaxnregAttrName(),
-      OpBuilder(op).getI32IntegerAttr(maxRegisters));
+      OpBuilder(op).getI32IntegerAttr(halfOccupancyRegisters));
 }
 
 void ConvertGPUToExactNVVMPass::runOnOperation() {

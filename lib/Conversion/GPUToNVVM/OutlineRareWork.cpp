@@ -11,6 +11,8 @@
 //      registers;
 //   4. forbid to inline it again, and bound the registers of both.
 
+#include "Registers.h"
+
 #include "Piko/Conversion/Passes.h"
 
 #include "Piko/Dialect/Piko/IR/Marks.h"
@@ -71,10 +73,6 @@ private:
 };
 
 } // namespace
-
-/// With these, half of the threads that a multiprocessor can have find room. It
-/// is the function that spills.
-constexpr int32_t maxRegisters = 64;
 
 /// An array of so few numbers that they can be arguments.
 static bool isSmall(memref::AllocaOp array) {
@@ -211,8 +209,9 @@ void Outlining::run() {
   auto call = func::CallOp::create(caller, loc, function, values);
   storeAll(caller, copied, call.getResults());
   loop->replaceAllUsesWith(call.getResults().take_back(loop->getNumResults()));
+  // It is the function that spills.
   kernel->setAttr(NVVM::NVVMDialect::getMaxnregAttrName(),
-                  caller.getI32IntegerAttr(maxRegisters));
+                  caller.getI32IntegerAttr(halfOccupancyRegisters));
 
   Block *body = function.addEntryBlock();
   OpBuilder builder = OpBuilder::atBlockBegin(body);

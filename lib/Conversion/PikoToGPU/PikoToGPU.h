@@ -73,8 +73,8 @@ struct GridMemory;
 void shareSetup(mlir::scf::ForOp items, const ThreadTile &tile,
                 GridMemory &memory);
 
-/// Whether no two iterations, or primitives, update a pixel: its coordinates say
-/// which iteration it is, or only one iteration does.
+/// Whether no two iterations, or primitives, update a pixel: its coordinates
+/// say which iteration it is, or only one iteration does.
 bool updatesOwnPixels(mlir::Operation *loop);
 
 /// How the threads of a block take a loop over primitives or iterations.

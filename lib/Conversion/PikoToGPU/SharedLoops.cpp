@@ -97,8 +97,8 @@ static bool determine(ArrayRef<Value> roots, Value value, int depth = 0) {
   return false;
 }
 
-/// The one iteration of `loop` that reaches an operation, or null: a test of its
-/// number stands around it.
+/// The one iteration of `loop` that reaches an operation, or null: a test of
+/// its number stands around it.
 static Value findOnlyIteration(Operation *op, Operation *loop) {
   if (loop->getRegion(0).getNumArguments() != 1)
     return {};
@@ -131,9 +131,8 @@ static Value findOnlyIteration(Operation *op, Operation *loop) {
       auto both = condition.getDefiningOp<arith::AndIOp>();
       if (both && isThen) // in the other region either may be false
         llvm::append_values(conditions, both.getLhs(), both.getRhs());
-      else if (Value only = match(condition, isThen
-                                                 ? arith::CmpIPredicate::eq
-                                                 : arith::CmpIPredicate::ne))
+      else if (Value only = match(condition, isThen ? arith::CmpIPredicate::eq
+                                                    : arith::CmpIPredicate::ne))
         return only;
     }
   }
@@ -153,11 +152,10 @@ bool piko::updatesOwnPixels(Operation *loop) {
         Value only = findOnlyIteration(update, loop);
         if (!isFirst) {
           Value other = findOnlyIteration(it->second, loop);
-          return WalkResult(success(
-              only || other
-                  ? only && other && isSame(only, other)
-                  : llvm::equal(it->second.getCoordinates(),
-                                update.getCoordinates())));
+          return WalkResult(
+              success(only || other ? only && other && isSame(only, other)
+                                    : llvm::equal(it->second.getCoordinates(),
+                                                  update.getCoordinates())));
         }
         if (only)
           return WalkResult::advance();
