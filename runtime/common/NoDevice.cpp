@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //===- NoDevice.cpp - A runtime without CUDA ------------------------------===//
 //
-// What stands for cuda/ in a build without GPUs (PIKO_ENABLE_GPU): no device.
+// What stands for devices in a build without GPUs (PIKO_ENABLE_GPU): there is none.
 //
 //===----------------------------------------------------------------------===//
 
