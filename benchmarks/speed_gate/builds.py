@@ -53,7 +53,7 @@ def build_commit(root, name, folder, jobs):
     its tree alike, relative paths are, and ccache knows what has not changed."""
     check_out(root, find_commit(root, name), folder)
     environment = {"CCACHE_BASEDIR": root, **os.environ}
-    for command in (["cmake", "--preset", "release"],
+    for command in (["cmake", "--preset", "release", "-D", "PIKO_UNITE=ON"],
                     ["cmake", "--build", "build", "--parallel", str(jobs),
                      "--target", *TARGETS]):
         done = subprocess.run(command, cwd=folder, env=environment,

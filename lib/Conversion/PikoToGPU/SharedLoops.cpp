@@ -16,9 +16,14 @@
 using namespace mlir;
 using namespace piko;
 
+/// Whether the number of an iteration, which 32 bits hold, is the same behind an
+/// operation.
 static bool isCast(Operation *op) {
   return isa<arith::IndexCastOp, arith::IndexCastUIOp, arith::TruncIOp,
-             arith::ExtSIOp, arith::ExtUIOp>(op);
+             arith::ExtSIOp, arith::ExtUIOp>(op) &&
+         !llvm::any_of(op->getResultTypes(), [](Type type) {
+           return type.isInteger() && type.getIntOrFloatBitWidth() < 32;
+         });
 }
 
 /// A number without casts and without what is added to it in each iteration

@@ -219,3 +219,41 @@ piko.pipeline @OnePixel rank 1 {
     }
   }
 }
+
+// -----
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+
+// Eight bits of its number do not say which iteration it is.
+// PIECES:      remark: one thread does what iterations do between barriers: two of them may update a pixel, in their order
+// PIECES-NEXT: piko.parallel_for
+piko.pipeline @LowBits rank 1 {
+  piko.image @image : @F rank 1
+  piko.source @a
+  piko.stage @a bins [8] threads 64 placed : list @F -> [] {}
+  piko.kernel @kernel_a {
+    piko.bins of @a {
+    ^bb0(%bin: index):
+      piko.lists of @a {
+      ^bb0(%l: !piko.list<@F>):
+        %n = arith.constant 8 : index
+        %zero = arith.constant 0 : i8
+        %none = arith.constant 0 : i32
+        piko.parallel_for %n {
+        ^bb0(%i: index):
+          piko.sync
+          %x = arith.index_cast %i : index to i32
+          %low = arith.trunci %x : i32 to i8
+          %is = arith.cmpi eq, %low, %zero : i8
+          scf.if %is {
+            piko.update @image[%none : i32] {
+            ^bb0(%old: i32):
+              piko.yield [%x : i32]
+            }
+          }
+          piko.yield
+        }
+      }
+    }
+  }
+}
