@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //===- NoDevice.cpp - A runtime without CUDA ------------------------------===//
 //
-// What stands for devices in a build without GPUs (PIKO_ENABLE_GPU): there is none.
+// What stands for devices in a build without GPUs (PIKO_ENABLE_GPU): there is
+// none.
 //
 //===----------------------------------------------------------------------===//
 

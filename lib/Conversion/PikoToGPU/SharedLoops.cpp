@@ -16,8 +16,8 @@
 using namespace mlir;
 using namespace piko;
 
-/// Whether the number of an iteration, which 32 bits hold, is the same behind an
-/// operation.
+/// Whether the number of an iteration, which 32 bits hold, is the same behind
+/// an operation.
 static bool isCast(Operation *op) {
   return isa<arith::IndexCastOp, arith::IndexCastUIOp, arith::TruncIOp,
              arith::ExtSIOp, arith::ExtUIOp>(op) &&
