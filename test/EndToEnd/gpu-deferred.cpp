@@ -10,7 +10,6 @@
 // CASE: --pipe Digits
 // CASE: --pipe Both
 // CASE: --pipe Binned
-// CASE: --pipe Seen
 // RUN: %if all %{ piko-compare %s --pipe Boxes --count 900 %{gpu} --target cuda | FileCheck %s %}
 // RUN: %if all %{ env PIKO_TEST_DRIVER_SEED=4 piko-compare %s --pipe Boxes --count 700 --strip 150 %{gpu} --target cuda | FileCheck %s %}
 // RUN: %if all %{ piko-compare %s --pipe Rows --count 900 %{gpu} --target gpu-on-cpu --gpu-seed 3 | FileCheck %s %}
@@ -18,7 +17,7 @@
 // RUN: %if all %{ env PIKO_TEST_DRIVER_SEED=5 piko-compare %s --pipe Both --count 900 %{gpu} --target cuda | FileCheck %s %}
 // RUN: %if all %{ piko-compare %s --pipe Both --count 900 %{gpu} --target gpu-on-cpu | FileCheck %s %}
 // RUN: %if all %{ piko-compare %s --pipe Binned --count 900 %{gpu} --target cuda | FileCheck %s %}
-// RUN: %if all %{ piko-compare %s --pipe Seen --count 900 %{gpu} --target gpu-on-cpu | FileCheck %s %}
+// RUN: piko-compare %s --pipe Seen --count 900 %{gpu} --target gpu-on-cpu | FileCheck %s
 // CHECK: {{^equal$}}
 //
 // The error is the processor's, though other primitives may come to one before.
@@ -111,7 +110,9 @@ struct BinnedBox : piko::Stage<16, 16, 64, Shape>, piko::Uses<State> {
   }
 };
 
-// It is seen behind the loop what that has done: not put off.
+// It is seen behind the loop what that has done: not put off. So is what other
+// primitives have done, which breaks the rules of state, and has the reference's
+// order where the CPU plays the GPU alone.
 struct See : piko::Stage<0, 0, 1, Shape>, piko::Uses<State> {
   void schedule(piko::BinId) { specifySchedule(piko::Serialize); }
   void process(const Shape &s) {
