@@ -63,15 +63,15 @@ def draw(tools, folder, file, pipe, rest):
     return command, json.loads(run(command, folder))
 
 
-def check(tools, folder, file, pipe, expected):
+def check(tools, folder, file, pipe, expected, targets):
     if file.parent.name in COMPARED:
-        for target in TARGETS:
+        for target in targets:
             compare(tools, folder, file, pipe, target)
         return
     expected = expected.result()
     if not expected["pixels"]:
         raise Failed(f"{file.name} {pipe} draws nothing")
-    for target in TARGETS:
+    for target in targets:
         command, actual = draw(tools, folder, file, pipe, target)
         if actual["image_hash"] != expected["image_hash"]:
             raise Failed(f"another picture than the CPU's: "
@@ -84,6 +84,8 @@ def main():
     parser.add_argument("--bin", default=str(ROOT / "build/bin"))
     parser.add_argument("--driver", help="in place of libcuda.so.1")
     parser.add_argument("--only", help="an example")
+    parser.add_argument("--turns", action="store_true",
+                        help="a pipeline runs on one of both, in turn")
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     arguments = parser.parse_args()
     tools = pathlib.Path(arguments.bin).resolve()
@@ -114,8 +116,11 @@ def main():
             if file.parent.name not in COMPARED:
                 expected = pool.submit(
                     lambda *what: draw(*what)[1], tools, folder, file, pipes[0], [])
-            done += [pool.submit(check, tools, folder, file, pipe, expected)
-                     for pipe in pipes]
+            for pipe in pipes:
+                turn = len(done) % len(TARGETS)
+                targets = [TARGETS[turn]] if arguments.turns else TARGETS
+                done.append(pool.submit(
+                    check, tools, folder, file, pipe, expected, targets))
         for future in concurrent.futures.as_completed(done):
             try:
                 future.result()
