@@ -278,7 +278,9 @@ void piko::registerSequences() {
   PassPipelineRegistration<CPUSequenceOptions>(
       "piko-to-cpu", "From the machine level to upstream dialects",
       [](OpPassManager &passes, const CPUSequenceOptions &options) {
-        addCPUSequence(passes, {.mappingWindow = options.window},
+        SynthesisOptions synthesis;
+        synthesis.mappingWindow = options.window;
+        addCPUSequence(passes, synthesis,
                        {.lanes = options.lanes,
                         .printsSensitivities = options.sensitivities});
       });

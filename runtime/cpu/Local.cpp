@@ -23,7 +23,7 @@ static void beginLocal(pikort_pipeline &p, const Kernel &host, int32_t stage) {
   int64_t slots = 0;
   for (const pikoir_unit &unit : host.units) {
     int64_t bins = unit.cell_end - unit.cell_begin; // or calls, which are more
-    kernel.units.push_back({0, 0, slots, slots + bins});
+    kernel.units.push_back({0, 0, slots, slots + bins, 0});
     slots += bins;
   }
   prepareOutputs(p, p.stages[stage], kernel);
@@ -136,10 +136,11 @@ const pikoir_input *pikoir_begin_local(pikoir_writer *writer, int32_t port) {
       any ? (lane.ports[port].cursor - items) / lane.ports[port].size : 0;
   bin.received += count;
   int64_t calls = to.takesList() ? makeCalls(lane, logs, count) : 0;
-  bin.unit = {0, to.takesList() ? calls : 1, 0, count};
+  bin.unit = {0, to.takesList() ? calls : 1, 0, count, 0};
   bin.offsets[1] = count;
-  bin.input = {items, count, nullptr,          bin.offsets, &bin.unit,
-               1,     1,     bin.calls.data(), calls};
+  bin.input = {items,     count, nullptr, bin.offsets,
+               &bin.unit, 1,     1,       bin.calls.data(),
+               calls,     0,     nullptr};
   return &bin.input;
 }
 

@@ -5,6 +5,7 @@
 #include "IsolatedBody.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 #include "Piko/Dialect/Piko/IR/PikoProgram.h"
+#include "StageUses.h"
 
 #include "mlir/IR/OpImplementation.h"
 
@@ -260,13 +261,6 @@ LogicalResult FeedOp::verify() {
   auto stage = lookupInPipeline<StageOp>(source, source.getStageAttr());
   return stage ? verifyRecord(*this, getEdge().getType(), stage.getInputAttr())
                : success(); // the source has an error
-}
-
-static LogicalResult verifyStage(Operation *op, FlatSymbolRefAttr name) {
-  if (lookupInPipeline<StageOp>(op, name))
-    return success();
-  return op->emitOpError("expected a stage, but got ")
-         << name << ", which is none";
 }
 
 LogicalResult WaitOp::verify() { return verifyStage(*this, getStageAttr()); }
