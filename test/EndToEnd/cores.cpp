@@ -10,6 +10,7 @@
 // CASE: --pipe Lists --domain 28 --count 6000
 // CASE: --pipe Hops --domain 28 --count 60000
 // CASE: --pipe Parts --count 6000
+// REQUIRES: all
 // RUN: piko-compare %s --cases %s --threads 3 --owners > %t.resolved
 // RUN: FileCheck %s --input-file %t.resolved
 // RUN: piko-compare %s --cases %s --threads 3 --owners --without pre-schedule,eliminate-schedules > %t.queued

@@ -3,6 +3,7 @@
 // What is kept for a pixel is the last primitive's, however lanes come to it: in
 // two branches, in loops, at neighbouring pixels, in iterations that meet; and
 // what decides whether it is read decides that still.
+// REQUIRES: all
 // RUN: %compare_targets %s --cases %s --runs 1
 // CASE: --pipe Branches --domain 64 64 --count 3000
 // CASE: --pipe Iterations --domain 64 64 --count 2000

@@ -4,6 +4,7 @@
 // cells of a grid with lists, searches that end early, rows of a sparse matrix,
 // three loops, ranges that are empty, counters that all change, and what stays
 // as it is, because its order shows.
+// REQUIRES: all
 // RUN: %compare_targets %s --cases %s --runs 1
 // CASE: --pipe Probes --domain 8 8 --count 1003
 // CASE: --pipe Cells --domain 8 8 --count 700

@@ -3,12 +3,12 @@
 // What primitives overwrite in a bin that is the whole domain is computed once for
 // each pixel, by a kernel of its own, and is what the reference executor computes:
 // the texts are those of defer-shading.cpp, and some more.
-// RUN: rm -f %t.cases
-// RUN: %if all %{ sed -n 's|^// CASE: ||p' %S/defer-shading.cpp > %t.cases %}
+// REQUIRES: all
+// RUN: sed -n 's|^// CASE: ||p' %S/defer-shading.cpp > %t.cases
 // RUN: sed -n 's|^// MORE: ||p' %s >> %t.cases
 // RUN: %compare_targets %s --cases %t.cases --runs 1 --threads 1 3 > %t.out
 // RUN: not grep blank %t.out
-// RUN: %if all %{ piko-compare %s --cases %t.cases --runs 1 --threads 2 --without reduce-updates | FileCheck %s --check-prefix=EQUAL %}
+// RUN: piko-compare %s --cases %t.cases --runs 1 --threads 2 --without reduce-updates | FileCheck %s --check-prefix=EQUAL
 // RUN: piko-compare %s --pipe Loops --domain 45 37 --count 300 --runs 1 --threads 2 --strip 7 | FileCheck %s --check-prefix=STRIPS
 // RUN: env PIKO_CUDA_DRIVER=%test_driver piko-compare %s --pipe Nearest --domain 45 37 --count 300 --runs 1 --target cuda --strip 7 | FileCheck %s --check-prefix=STRIPS
 // STRIPS: {{^equal$}}

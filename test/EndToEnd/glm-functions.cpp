@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // What shaders use of GLM gives the same bits as in a plain C++ build.
+// REQUIRES: all
 // RUN: %compare_targets %s --count 64 --runs 1 --threads 1 | FileCheck %s
 // CHECK: equal
 #include "Inputs/functions.h"

@@ -2,6 +2,7 @@
 //
 // Loops of a primitive that change state by atomics alone: on a GPU, threads put
 // them off until many wait, and take those of about the same length at a time.
+// REQUIRES: all
 // DEFINE: %{gpu} = --domain 67 35 --runs 1 --gpu-threads 64
 // RUN: export PIKO_CUDA_DRIVER=%test_driver
 // RUN: %compare_targets %s --cases %s --domain 67 35 --count 900 --runs 1
@@ -10,19 +11,19 @@
 // CASE: --pipe Digits
 // CASE: --pipe Both
 // CASE: --pipe Binned
-// RUN: %if all %{ piko-compare %s --pipe Boxes --count 900 %{gpu} --target cuda | FileCheck %s %}
-// RUN: %if all %{ env PIKO_TEST_DRIVER_SEED=4 piko-compare %s --pipe Boxes --count 700 --strip 150 %{gpu} --target cuda | FileCheck %s %}
-// RUN: %if all %{ piko-compare %s --pipe Rows --count 900 %{gpu} --target gpu-on-cpu --gpu-seed 3 | FileCheck %s %}
-// RUN: %if all %{ piko-compare %s --pipe Digits --count 900 %{gpu} --target gpu-on-cpu | FileCheck %s %}
-// RUN: %if all %{ env PIKO_TEST_DRIVER_SEED=5 piko-compare %s --pipe Both --count 900 %{gpu} --target cuda | FileCheck %s %}
-// RUN: %if all %{ piko-compare %s --pipe Both --count 900 %{gpu} --target gpu-on-cpu | FileCheck %s %}
-// RUN: %if all %{ piko-compare %s --pipe Binned --count 900 %{gpu} --target cuda | FileCheck %s %}
+// RUN: piko-compare %s --pipe Boxes --count 900 %{gpu} --target cuda | FileCheck %s
+// RUN: env PIKO_TEST_DRIVER_SEED=4 piko-compare %s --pipe Boxes --count 700 --strip 150 %{gpu} --target cuda | FileCheck %s
+// RUN: piko-compare %s --pipe Rows --count 900 %{gpu} --target gpu-on-cpu --gpu-seed 3 | FileCheck %s
+// RUN: piko-compare %s --pipe Digits --count 900 %{gpu} --target gpu-on-cpu | FileCheck %s
+// RUN: env PIKO_TEST_DRIVER_SEED=5 piko-compare %s --pipe Both --count 900 %{gpu} --target cuda | FileCheck %s
+// RUN: piko-compare %s --pipe Both --count 900 %{gpu} --target gpu-on-cpu | FileCheck %s
+// RUN: piko-compare %s --pipe Binned --count 900 %{gpu} --target cuda | FileCheck %s
 // RUN: piko-compare %s --pipe Seen --count 900 %{gpu} --target gpu-on-cpu | FileCheck %s
 // CHECK: {{^equal$}}
 //
 // The error is the processor's, though other primitives may come to one before.
-// RUN: %if all %{ not piko-compare %s --pipe Far --count 900 --domain 67 35 --runs 1 | FileCheck %s --check-prefix=FAR %}
-// RUN: %if all %{ env PIKO_TEST_DRIVER_SEED=6 not piko-compare %s --pipe Far --count 900 %{gpu} --target cuda | FileCheck %s --check-prefix=FAR %}
+// RUN: not piko-compare %s --pipe Far --count 900 --domain 67 35 --runs 1 | FileCheck %s --check-prefix=FAR
+// RUN: env PIKO_TEST_DRIVER_SEED=6 not piko-compare %s --pipe Far --count 900 %{gpu} --target cuda | FileCheck %s --check-prefix=FAR
 // FAR-COUNT-3: got: stage 'far', bin 0: expected an index into 'image' in [0, 67), but got -64{{$}}
 #include <piko.h>
 

@@ -3,6 +3,7 @@
 // Styles in which a stage updates the pixels of a primitive. On a GPU, threads
 // share the pixels of many primitives at once, or those of one after the other,
 // which a remark says; always in lineage order.
+// REQUIRES: all
 // RUN: pikoc %s --pipe Boxes --target gpu-on-cpu --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=MANY --allow-empty
 // RUN: pikoc %s --pipe Points --target gpu-on-cpu --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=MANY --allow-empty
 // RUN: pikoc %s --pipe Rows --target gpu-on-cpu --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=MANY --allow-empty
@@ -20,15 +21,15 @@
 //
 // RUN: %compare_targets %s --cases %s --domain 67 35 --count 900 --runs 1
 // CASE: --pipe Boxes
-// RUN: %if all %{ piko-compare %s --pipe Boxes --domain 67 35 --count 900 --target gpu-on-cpu --gpu-threads 8 --gpu-seed 7 --runs 1 | FileCheck %s %}
+// RUN: piko-compare %s --pipe Boxes --domain 67 35 --count 900 --target gpu-on-cpu --gpu-threads 8 --gpu-seed 7 --runs 1 | FileCheck %s
 // CASE: --pipe Points
-// RUN: %if all %{ piko-compare %s --pipe Points --domain 67 35 --count 900 --target gpu-on-cpu --gpu-threads 128 --runs 1 | FileCheck %s %}
+// RUN: piko-compare %s --pipe Points --domain 67 35 --count 900 --target gpu-on-cpu --gpu-threads 128 --runs 1 | FileCheck %s
 // CASE: --pipe Rows
 // CASE: --pipe Steps
 // CASE: --pipe Discs
 // CASE: --pipe Unclipped
 // CASE: --pipe Rare
-// RUN: %if all %{ piko-compare %s --pipe Rare --domain 67 35 --count 900 --target gpu-on-cpu --gpu-threads 2 --runs 1 | FileCheck %s %}
+// RUN: piko-compare %s --pipe Rare --domain 67 35 --count 900 --target gpu-on-cpu --gpu-threads 2 --runs 1 | FileCheck %s
 // CASE: --pipe Spans
 // CASE: --pipe Frames
 // CASE: --pipe Carried

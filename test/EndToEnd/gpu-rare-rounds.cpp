@@ -3,6 +3,7 @@
 // Threads of a block share primitives that emit, some of which take a way with
 // arrays of its own: on a GPU, a second launch goes on with units in which there
 // are such primitives, or these call a function.
+// REQUIRES: all
 // DEFINE: %{gpu} = --domain 67 35 --runs 2 --gpu-threads 32
 // RUN: export PIKO_CUDA_DRIVER=%test_driver
 // RUN: %compare_targets %s --cases %s --domain 67 35 --count 900 --runs 1
@@ -13,18 +14,18 @@
 // CASE: --pipe All --count 500
 // CASE: --pipe Looped --count 300
 // CASE: --pipe Chosen
-// RUN: %if all %{ piko-compare %s --pipe Ordered --count 900 %{gpu} --target cuda | FileCheck %s %}
-// RUN: %if all %{ env PIKO_TEST_DRIVER_SEED=4 piko-compare %s --pipe Ordered --count 700 --strip 150 %{gpu} --target cuda | FileCheck %s %}
-// RUN: %if all %{ piko-compare %s --pipe Ordered --count 900 %{gpu} --target gpu-on-cpu --gpu-seed 3 | FileCheck %s %}
+// RUN: piko-compare %s --pipe Ordered --count 900 %{gpu} --target cuda | FileCheck %s
+// RUN: env PIKO_TEST_DRIVER_SEED=4 piko-compare %s --pipe Ordered --count 700 --strip 150 %{gpu} --target cuda | FileCheck %s
+// RUN: piko-compare %s --pipe Ordered --count 900 %{gpu} --target gpu-on-cpu --gpu-seed 3 | FileCheck %s
 // RUN: piko-compare %s --pipe Local --count 900 %{gpu} --target cuda | FileCheck %s
 // RUN: piko-compare %s --pipe Local --count 900 %{gpu} --target gpu-on-cpu --gpu-seed 2 | FileCheck %s
-// RUN: %if all %{ env PIKO_TEST_DRIVER_SEED=5 piko-compare %s --pipe Lists --count 900 %{gpu} --target cuda | FileCheck %s %}
-// RUN: %if all %{ piko-compare %s --pipe Lists --count 300 %{gpu} --target gpu-on-cpu | FileCheck %s %}
-// RUN: %if all %{ piko-compare %s --pipe Counted --count 900 %{gpu} --target cuda | FileCheck %s %}
-// RUN: %if all %{ piko-compare %s --pipe Counted --count 900 %{gpu} --target gpu-on-cpu | FileCheck %s %}
-// RUN: %if all %{ piko-compare %s --pipe All --count 500 %{gpu} --target cuda | FileCheck %s %}
-// RUN: %if all %{ piko-compare %s --pipe Looped --count 300 %{gpu} --target cuda | FileCheck %s %}
-// RUN: %if all %{ piko-compare %s --pipe Chosen --count 900 %{gpu} --target cuda | FileCheck %s %}
+// RUN: env PIKO_TEST_DRIVER_SEED=5 piko-compare %s --pipe Lists --count 900 %{gpu} --target cuda | FileCheck %s
+// RUN: piko-compare %s --pipe Lists --count 300 %{gpu} --target gpu-on-cpu | FileCheck %s
+// RUN: piko-compare %s --pipe Counted --count 900 %{gpu} --target cuda | FileCheck %s
+// RUN: piko-compare %s --pipe Counted --count 900 %{gpu} --target gpu-on-cpu | FileCheck %s
+// RUN: piko-compare %s --pipe All --count 500 %{gpu} --target cuda | FileCheck %s
+// RUN: piko-compare %s --pipe Looped --count 300 %{gpu} --target cuda | FileCheck %s
+// RUN: piko-compare %s --pipe Chosen --count 900 %{gpu} --target cuda | FileCheck %s
 // CHECK: {{^equal$}}
 //
 // The error is the processor's, though the second launch finds it.

@@ -4,6 +4,7 @@
 // has ended its own, whether one at a time or several; with DirectMap block b of n
 // has the units b, b + n, .., among which here are all that take long. Results are
 // the same, and the longest of 32 blocks is shorter.
+// REQUIRES: all
 // DEFINE: %{cuda} = --target cuda --runs 1 --threads 2 --domain 8192 --count 9000
 // RUN: %compare_targets %s --cases %s --domain 8192 --count 900 --runs 1
 // CASE: --pipe Balanced
@@ -14,17 +15,17 @@
 // RUN: env PIKO_TEST_DRIVER_COUNTS=%t.balanced piko-compare %s --pipe Balanced %{cuda} | FileCheck %s
 // RUN: env PIKO_TEST_DRIVER_COUNTS=%t.mapped piko-compare %s --pipe Mapped %{cuda} | FileCheck %s
 // RUN: %python -c 'import json, sys; a, b = (json.load(open(f))["kernels"] for f in sys.argv[1:]); assert 4 * a["Balanced_kernel_stage"]["longestWarps"] < b["Mapped_kernel_stage"]["longestWarps"], (a, b)' %t.balanced %t.mapped
-// RUN: %if all %{ env PIKO_TEST_DRIVER_SEED=4 piko-compare %s --pipe Balanced %{cuda} | FileCheck %s %}
+// RUN: env PIKO_TEST_DRIVER_SEED=4 piko-compare %s --pipe Balanced %{cuda} | FileCheck %s
 // What is emitted is in the order of units, whoever runs them.
-// RUN: %if all %{ piko-compare %s --pipe Emitted %{cuda} | FileCheck %s %}
-// RUN: %if all %{ env PIKO_TEST_DRIVER_SEED=5 piko-compare %s --pipe Emitted %{cuda} --strip 1500 | FileCheck %s %}
+// RUN: piko-compare %s --pipe Emitted %{cuda} | FileCheck %s
+// RUN: env PIKO_TEST_DRIVER_SEED=5 piko-compare %s --pipe Emitted %{cuda} --strip 1500 | FileCheck %s
 // The emulator's blocks, each after the other, of a grid that has fewer than units.
-// RUN: %if all %{ piko-compare %s --pipe Balanced --domain 8192 --count 900 --runs 1 --target gpu-on-cpu --gpu-threads 32 --gpu-blocks 3 | FileCheck %s %}
-// RUN: %if all %{ piko-compare %s --pipe Emitted --domain 8192 --count 900 --runs 1 --target gpu-on-cpu --gpu-threads 32 --gpu-blocks 7 --gpu-seed 3 | FileCheck %s %}
-// RUN: %if all %{ piko-compare %s --pipe Mapped --domain 8192 --count 900 --runs 1 --target gpu-on-cpu --gpu-threads 32 --gpu-blocks 3 | FileCheck %s %}
+// RUN: piko-compare %s --pipe Balanced --domain 8192 --count 900 --runs 1 --target gpu-on-cpu --gpu-threads 32 --gpu-blocks 3 | FileCheck %s
+// RUN: piko-compare %s --pipe Emitted --domain 8192 --count 900 --runs 1 --target gpu-on-cpu --gpu-threads 32 --gpu-blocks 7 --gpu-seed 3 | FileCheck %s
+// RUN: piko-compare %s --pipe Mapped --domain 8192 --count 900 --runs 1 --target gpu-on-cpu --gpu-threads 32 --gpu-blocks 3 | FileCheck %s
 // Kernels with a second launch, which has a counter of its own.
-// RUN: %if all %{ piko-compare %S/gpu-rare-rounds.cpp --pipe Ordered --count 900 --runs 1 --target gpu-on-cpu --gpu-threads 32 --gpu-blocks 2 | FileCheck %s %}
-// RUN: %if all %{ piko-compare %S/gpu.cpp --pipe Boxes --count 600 --runs 1 --target gpu-on-cpu --gpu-threads 32 --gpu-blocks 2 | FileCheck %s %}
+// RUN: piko-compare %S/gpu-rare-rounds.cpp --pipe Ordered --count 900 --runs 1 --target gpu-on-cpu --gpu-threads 32 --gpu-blocks 2 | FileCheck %s
+// RUN: piko-compare %S/gpu.cpp --pipe Boxes --count 600 --runs 1 --target gpu-on-cpu --gpu-threads 32 --gpu-blocks 2 | FileCheck %s
 // CHECK: {{^equal$}}
 // RUN: pikoc %s --pipe Mapped --explain --target cuda | FileCheck %s --check-prefix=EXPLAIN
 // EXPLAIN: Units of work, of n blocks that fill the device:

@@ -2,8 +2,9 @@
 //
 // What lanes emit at once, or store at once and emit in turns: each pipeline's
 // last stage sees the order.
+// REQUIRES: all
 // RUN: %compare_targets %s --cases %s --runs 1
-// RUN: %if all %{ piko-compare %s --cases %s --runs 1 --cpu x86-64-v2 %}
+// RUN: piko-compare %s --cases %s --runs 1 --cpu x86-64-v2
 // CASE: --pipe OneField --domain 8 8 --count 1003
 // CASE: --pipe OneField --domain 8 8 --count 60000
 // CASE: --pipe ManyFields --domain 8 8 --count 1003

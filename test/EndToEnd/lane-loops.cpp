@@ -2,6 +2,7 @@
 //
 // Loops that lanes share though they are written in order, short arrays of each
 // lane, remainders by what lanes share, and reads of records behind conditions.
+// REQUIRES: all
 // RUN: %compare_targets %s --cases %s --runs 1
 // CASE: --pipe Neighbours --domain 40 40 --count 700
 // CASE: --pipe Neighbours --domain 33 33 --count 5000

@@ -2,9 +2,10 @@
 //
 // Loops over records with arrays, whose words LLVM gathers; loops that state
 // bounds; and blocks of bytes and of numbers of 16 bits, which lanes store.
+// REQUIRES: all
 // RUN: %compare_targets %s --cases %s --runs 1
-// RUN: %if all %{ piko-compare %s --cases %s --runs 1 --without vectorize -O0 %}
-// RUN: %if all %{ piko-compare %s --cases %s --runs 1 --without hoist-loads %}
+// RUN: piko-compare %s --cases %s --runs 1 --without vectorize -O0
+// RUN: piko-compare %s --cases %s --runs 1 --without hoist-loads
 // CASE: --pipe Traces --count 70
 // CASE: --pipe Norms --count 1
 // CASE: --pipe Gaps --count 1

@@ -4,6 +4,7 @@
 // lists, batches, empty bins, primitives behind endBin, iterations that meet. A
 // stage further on gets what two of them, and the first one, emit, in lineage
 // order.
+// REQUIRES: all
 // RUN: pikoc %s --pipe Chain --emit=kernels --remarks -o %t.mlir 2>&1 | FileCheck %s --check-prefix=REMARK
 // RUN: FileCheck %s --check-prefix=KERNEL --input-file=%t.mlir
 // REMARK-DAG: local-barrier.cpp:[[#]]:{{[0-9]+}}: remark: stage 'sort' runs bin by bin behind stage 'spread'
@@ -25,12 +26,12 @@
 // CASE: --pipe Lists --domain 67 35 --count 2000
 // CASE: --pipe Serial --domain 67 35 --count 500
 // CASE: --pipe Layers --domain 67 35 --count 10000 --budget 4000000
-// RUN: %if all %{ piko-compare %s --pipe Chain --domain 67 35 --count 2000 --runs 1 --without fuse-kernels | FileCheck %s %}
-// RUN: %if all %{ piko-compare %s --pipe Chain --domain 67 35 --count 2000 --runs 1 --without fuse-stages | FileCheck %s %}
+// RUN: piko-compare %s --pipe Chain --domain 67 35 --count 2000 --runs 1 --without fuse-kernels | FileCheck %s
+// RUN: piko-compare %s --pipe Chain --domain 67 35 --count 2000 --runs 1 --without fuse-stages | FileCheck %s
 // On a GPU what lies between two stages is the block's.
-// RUN: %if all %{ piko-compare %s --pipe Chain --domain 67 35 --count 500 --runs 1 --threads 2 --target gpu-on-cpu --gpu-threads 64 --gpu-seed 3 | FileCheck %s %}
-// RUN: %if all %{ piko-compare %s --pipe Lists --domain 67 35 --count 300 --runs 1 --threads 2 --target gpu-on-cpu --gpu-threads 32 | FileCheck %s %}
-// RUN: %if all %{ piko-compare %s --pipe Serial --domain 67 35 --count 200 --runs 1 --threads 2 --target gpu-on-cpu --gpu-threads 32 | FileCheck %s %}
+// RUN: piko-compare %s --pipe Chain --domain 67 35 --count 500 --runs 1 --threads 2 --target gpu-on-cpu --gpu-threads 64 --gpu-seed 3 | FileCheck %s
+// RUN: piko-compare %s --pipe Lists --domain 67 35 --count 300 --runs 1 --threads 2 --target gpu-on-cpu --gpu-threads 32 | FileCheck %s
+// RUN: piko-compare %s --pipe Serial --domain 67 35 --count 200 --runs 1 --threads 2 --target gpu-on-cpu --gpu-threads 32 | FileCheck %s
 // CHECK: equal
 // RUN: pikoc %s --pipe Chain --emit=ptx --cpu=sm_90 | FileCheck %s --check-prefix=PTX
 // PTX: .entry Chain_kernel_spread

@@ -21,7 +21,7 @@
 // RUN: pikoc %s --pipe Limits --emit=llvmir --cpu x86-64-v4 -o - | FileCheck %s --check-prefix=VALUE
 // VALUE: sitofp <16 x i32> %{{.*}} to <16 x float>
 // NARROW: icmp s{{lt|ge}} <16 x i32> %{{.*}}, zeroinitializer
-// REQUIRES: x86_64
+// REQUIRES: all, x86_64
 #include <piko.h>
 
 #include <bit>

@@ -2,6 +2,7 @@
 //
 // Hundreds of layers at a pixel, many of them at equal depths, transparent and
 // opaque ones among them, are blended with the reference executor's bits.
+// REQUIRES: all
 // RUN: %compare_targets %s --cases %s
 // CASE: --pipe Small --domain 9 3 --count 8000
 // CASE: --pipe Shared --domain 3 2 --count 3000 --wide

@@ -2,13 +2,14 @@
 //
 // The same with pixels that are numbered, tested, shifted or taken from Piko's own
 // loops; see pixel-loops.cpp.
+// REQUIRES: all
 // RUN: pikoc %s --remarks --emit=kernels -o /dev/null 2>%t.remarks
 // RUN: FileCheck %s --check-prefix=PROVED --input-file=%t.remarks
 // PROVED-COUNT-8: keeps each primitive in the bin that it was emitted from
 // RUN: FileCheck %s --check-prefix=FUSED --input-file=%t.remarks
 // FUSED-COUNT-8: runs inside stage
 // RUN: %compare_targets %s --domain 67 35 --count 300 | FileCheck %s
-// RUN: %if all %{ piko-compare %s --domain 67 35 --count 100 --without infer-directives | FileCheck %s %}
+// RUN: piko-compare %s --domain 67 35 --count 100 --without infer-directives | FileCheck %s
 // CHECK: equal
 #include "Inputs/emitting-loops.h"
 

@@ -2,6 +2,7 @@
 //
 // Threads reduce to private copies: on any number of threads, and in lanes, the
 // state is what atomic operations would have made of it.
+// REQUIRES: all
 // RUN: %compare_targets %s --cases %s --threads 1 2 4 7
 // CASE: --pipe Nearest --count 30000 --domain 67 35
 // CASE: --pipe Nearest --count 3 --domain 670 350
@@ -10,8 +11,8 @@
 // CASE: --pipe Counts --count 50000
 // CASE: --pipe Lists --count 20000 --domain 67 35
 // CASE: --pipe Rounds --count 5000 --domain 67 35
-// RUN: %if all %{ piko-compare %s --pipe Nearest --count 30000 --domain 67 35 --without vectorize -O0 | FileCheck %s --check-prefix=SCALAR %}
-// RUN: %if all %{ piko-compare %s --pipe Counts --count 30000 --without vectorize -O0 | FileCheck %s --check-prefix=SCALAR %}
+// RUN: piko-compare %s --pipe Nearest --count 30000 --domain 67 35 --without vectorize -O0 | FileCheck %s --check-prefix=SCALAR
+// RUN: piko-compare %s --pipe Counts --count 30000 --without vectorize -O0 | FileCheck %s --check-prefix=SCALAR
 // SCALAR: equal
 // RUN: %if x86_64 %{ piko-compare %s --pipe Boxes --count 4000 --runs 1 --domain 67 35 --threads 1 2 12 --cpu x86-64 | FileCheck %s --check-prefix=SCALAR %}
 // RUN: %if x86_64 %{ piko-compare %s --pipe Boxes --count 4000 --runs 1 --domain 67 35 --threads 2 --cpu x86-64-v3 | FileCheck %s --check-prefix=SCALAR %}

@@ -36,7 +36,7 @@
 // RUN: %{target} --pipe Counted | FileCheck %s --check-prefix=ROWS
 // RUN: %{target} --pipe Either | FileCheck %s --check-prefix=ROWS
 // ROWS-NOT: arith.fptosi %{{.*}} : {{.*}}f64{{.*}}i32
-// REQUIRES: x86_64
+// REQUIRES: all, x86_64
 #include <piko.h>
 
 struct Prim {

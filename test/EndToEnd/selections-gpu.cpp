@@ -3,16 +3,17 @@
 // Blocks of a GPU share a bin that is the whole domain where its primitives select
 // what pixels keep: the texts are those of selections.cpp, and some whose keys are
 // wide, or whose kernels do more than select.
-// RUN: %if all %{ piko-compare %S/selections.cpp --cases %S/selections.cpp --runs 1 --threads 2 --target gpu-on-cpu --gpu-threads 32 --gpu-seed 3 %}
+// REQUIRES: all
+// RUN: piko-compare %S/selections.cpp --cases %S/selections.cpp --runs 1 --threads 2 --target gpu-on-cpu --gpu-threads 32 --gpu-seed 3
 // RUN: %compare_targets %s --cases %s --runs 1
-// RUN: %if all %{ env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_SEED=5 piko-compare %s --cases %s --runs 2 --threads 2 --target cuda %}
+// RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_SEED=5 piko-compare %s --cases %s --runs 2 --threads 2 --target cuda
 // CASE: --pipe Far --count 3000 --domain 67 35
 // CASE: --pipe Wider --count 3000 --domain 67 35
 // CASE: --pipe Ties --count 3000 --domain 67 35
 // CASE: --pipe Emitting --count 3000 --domain 67 35
 // CASE: --pipe Serial --count 900 --domain 67 35
 // What reads what other primitives store is in no order on the threads of a CPU.
-// RUN: %if all %{ env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_SEED=5 piko-compare %s --pipe Reading --count 900 --domain 67 35 --runs 2 --threads 2 --target cuda %}
+// RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_SEED=5 piko-compare %s --pipe Reading --count 900 --domain 67 35 --runs 2 --threads 2 --target cuda
 // CASE: --pipe Tiles --count 900 --domain 67 35
 // CASE: --pipe Tiles --count 4 --domain 670 350
 // CASE: --pipe TilesByTwo --count 900 --domain 67 35
@@ -21,8 +22,8 @@
 // CASE: --pipe TilesBlend --count 900 --domain 67 35
 // With a budget the frame is the host's, which clears what the kernels have for
 // themselves in front of each launch.
-// RUN: %if all %{ env PIKO_CUDA_DRIVER=%test_driver piko-compare %S/selections.cpp --pipe Rounds --count 3000 --domain 67 35 --runs 2 --threads 2 --target cuda --budget 50000000 | FileCheck %s --check-prefix=HOST %}
-// RUN: %if all %{ env PIKO_CUDA_DRIVER=%test_driver piko-compare %s --pipe Tiles --count 900 --domain 67 35 --runs 2 --threads 2 --target cuda --budget 50000000 | FileCheck %s --check-prefix=HOST %}
+// RUN: env PIKO_CUDA_DRIVER=%test_driver piko-compare %S/selections.cpp --pipe Rounds --count 3000 --domain 67 35 --runs 2 --threads 2 --target cuda --budget 50000000 | FileCheck %s --check-prefix=HOST
+// RUN: env PIKO_CUDA_DRIVER=%test_driver piko-compare %s --pipe Tiles --count 900 --domain 67 35 --runs 2 --threads 2 --target cuda --budget 50000000 | FileCheck %s --check-prefix=HOST
 // HOST: {{^equal$}}
 // RUN: env PIKO_CUDA_DRIVER=%test_driver not piko-compare %S/selections.cpp --pipe Outside --count 4000 --runs 1 --target cuda | FileCheck %s --check-prefix=OUTSIDE
 // OUTSIDE: run 0: got: stage 'draw', bin 0: expected an update inside the stage's own bin

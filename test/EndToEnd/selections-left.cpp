@@ -2,6 +2,7 @@
 //
 // Where the order of updates shows, or might, one thread runs a bin that is the
 // whole domain, and a remark says why.
+// REQUIRES: all
 // RUN: %compare_targets %s --cases %s --threads 1 2 7
 // RUN: env PIKO_CUDA_DRIVER=%test_driver piko-compare %s --pipe Element --count 3000 --domain 67 35 --runs 1 --target cuda | FileCheck %s --check-prefix=GPU
 // GPU: {{^equal$}}

@@ -3,9 +3,10 @@
 // Loops that read around an element, in all styles: nests whose indices are
 // tested in front by their ranges, rows with ends as vectors, and what is left
 // to tests in the loop.
+// REQUIRES: all
 // RUN: %compare_targets %s --cases %s --runs 1
-// RUN: %if all %{ piko-compare %s --cases %s --runs 1 --without hoist-bounds %}
-// RUN: %if all %{ piko-compare %s --cases %s --runs 1 --without vectorize -O0 %}
+// RUN: piko-compare %s --cases %s --runs 1 --without hoist-bounds
+// RUN: piko-compare %s --cases %s --runs 1 --without vectorize -O0
 // CASE: --pipe Clamps --count 1
 // CASE: --pipe Wraps --count 1
 // CASE: --pipe Mirrors --count 1

@@ -3,6 +3,7 @@
 // A source in strips, however they are cut: by the tile of `All`, by the host,
 // by a budget. Branches meet again, two stages update pixels in lineage order, a
 // loop runs to its end in each strip, and a list gets what all of them left.
+// REQUIRES: all
 // RUN: %compare_targets %s --cases %s --runs 1
 // CASE: --count 2000
 // CASE: --count 300 --strip 1

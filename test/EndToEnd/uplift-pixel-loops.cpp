@@ -2,6 +2,7 @@
 //
 // Loops over pixels in plain C++ whose iterations are independent become
 // piko.parallel_pixels, and do what the reference does.
+// REQUIRES: all
 // RUN: pikoc %s --remarks --emit=kernels -o %t.mlir 2>%t.remarks
 // RUN: FileCheck %s --check-prefix=UPLIFTED --input-file=%t.mlir
 // UPLIFTED-COUNT-8: piko.parallel_pixels
@@ -10,7 +11,7 @@
 // RUN: %compare_targets %s --cases %s
 // CASE: --domain 67 35 --count 200
 // CASE: --domain 9 1 --count 40
-// RUN: %if all %{ piko-compare %s --domain 67 35 --count 60 --without uplift-pixel-loops | FileCheck %s %}
+// RUN: piko-compare %s --domain 67 35 --count 60 --without uplift-pixel-loops | FileCheck %s
 // CHECK: equal
 #include "Inputs/boxes.h"
 

@@ -2,6 +2,7 @@
 //
 // Iterations that run as lanes of vectors keep their order where it shows: they
 // emit, update pixels that they share, meet, and read the items of lists.
+// REQUIRES: all
 // RUN: %compare_targets %s --cases %s --runs 1
 // CASE: --pipe Emits --domain 67 35 --count 320
 // CASE: --pipe EmitsInLoops --domain 67 35 --count 320
@@ -12,7 +13,7 @@
 // CASE: --pipe Meets --domain 67 35 --count 320
 // CASE: --pipe Nests --domain 67 35 --count 320
 // CASE: --pipe Lists --domain 67 35 --count 320
-// RUN: %if all %{ piko-compare %s --cases %s --runs 1 --without vectorize -O0 %}
+// RUN: piko-compare %s --cases %s --runs 1 --without vectorize -O0
 //
 // RUN: pikoc %s --pipe EmitsInLoops --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=VECTORS
 // RUN: pikoc %s --pipe Rows --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=VECTORS

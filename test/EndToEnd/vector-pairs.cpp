@@ -3,6 +3,7 @@
 // Loops whose turns differ between primitives, and hand on nothing, fill vectors
 // with pairs of a primitive and a turn: of boxes that are empty, small and large,
 // in loops of several kinds, with numbers of several widths.
+// REQUIRES: all
 // RUN: %compare_targets %s --cases %s --runs 1 --threads 2
 // RUN: %if x86_64 %{ piko-compare %s --cases %s --runs 1 --threads 2 --cpu x86-64-v2 %}
 // CASE: --pipe Boxes --domain 67 35 --count 2000
