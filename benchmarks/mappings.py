@@ -33,7 +33,7 @@ import statistics
 import subprocess
 import sys
 
-from bodies import CXX, find_bodies, get_openmp, get_source
+from bodies import CXX, find_bodies, get_includes, get_openmp, get_source
 from commands import call
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
@@ -117,8 +117,8 @@ class Body:
         call([f"{arguments.bin}/pikoc", self.file, "-o", f"{self.program}.o",
               "--header", header, "--cpu", arguments.cpu,
               "--mapping-window", EVERYTHING])
-        call(["g++", *CXX, f'-DPIKO_BODY_HEADER="{header}"', "-c", self.file,
-              "-o", f"{self.program}.host.o"])
+        call(["g++", *CXX, *get_includes(), f'-DPIKO_BODY_HEADER="{header}"',
+              "-c", self.file, "-o", f"{self.program}.host.o"])
         call(["g++", f"{self.program}.host.o", f"{self.program}.o",
               f"-L{arguments.lib}", "-lpikort", get_openmp(),
               f"-Wl,-rpath,{arguments.lib}", "-o", self.program])
