@@ -56,7 +56,11 @@ def parse_options():
                         help="of one that is not decided (%(default)s)")
     parser.add_argument("--frames", type=int, default=11,
                         help="of a round, at most (%(default)s)")
-    parser.add_argument("--seconds", type=float, default=0.1,
+    parser.add_argument("--warmup", type=int, default=12,
+                        help="frames in front of them, in which the runtime "
+                             "tries versions of loops, in a quarter of --seconds "
+                             "(%(default)s)")
+    parser.add_argument("--seconds", type=float, default=0.8,
                         help="of frames in a round (%(default)s)")
     parser.add_argument("--scene", default=BUNNY, help="(%(default)s)")
     parser.add_argument("--cpu", default="native",
@@ -83,11 +87,10 @@ def parse_options():
 
 
 def get_build(options, name, root, tools):
-    """The fewest warm frames that fill the caches."""
     return Build(root=root, bin=tools, lib=f"{os.path.dirname(tools)}/lib",
                  work=f"{options.out}/{name}-bodies", cpu=options.cpu,
-                 scene=[options.scene], warmup=1, frames=options.frames,
-                 seconds=options.seconds)
+                 scene=[options.scene], warmup=options.warmup,
+                 frames=options.frames, seconds=options.seconds)
 
 
 def get_builds(options):
