@@ -3,9 +3,7 @@
 # Flags that every target of the project is built with.
 add_library(piko_options INTERFACE)
 target_compile_options(piko_options INTERFACE
-  -Wall -Wextra -Wno-unused-parameter -ffp-contract=off
-  # libstdc++ 12's std::stable_sort uses what C++17 deprecates.
-  -Wno-deprecated-declarations)
+  -Wall -Wextra -Wno-unused-parameter -ffp-contract=off)
 
 if(PIKO_ENABLE_COMPILER)
   # What a target that uses LLVM, MLIR or Clang needs.
