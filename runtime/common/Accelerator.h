@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //===- Accelerator.h - A device that kernels run on -----------------------===//
 //
-// What a pipeline needs of a device that runs its grids. Host and device share
-// addresses: what map() gives is read and written by both, never at the same
-// time, because launch() returns when the grid has ended, and nobody touches
-// what a frame uses before DeviceFrame::await.
+// What a pipeline needs of a device that runs its grids. Memory is of two
+// kinds: what allocate() gives is the device's alone, and what map() gives is
+// the host's, which kernels reach at the same address, as slowly as the bus is.
+// Host and device never use the latter at the same time, because launch()
+// returns when the grid has ended, and nobody touches what a frame uses before
+// DeviceFrame::await.
 //
 //===----------------------------------------------------------------------===//
 
@@ -17,6 +19,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 
 namespace piko::rt {
 
@@ -41,16 +44,17 @@ public:
   /// Throws Failure if the device is lost: then what map() gave may be gone.
   virtual void checkAlive() const = 0;
 
-  /// Shared memory, aligned to a page; null if refused.
+  /// Memory of the host's that kernels reach, aligned to a page; null if
+  /// refused.
   virtual uint8_t *map(size_t bytes) noexcept = 0;
   virtual void unmap(uint8_t *data) noexcept = 0;
+  /// Memory of the device; null if refused.
+  virtual uint8_t *allocate(size_t bytes) noexcept = 0;
+  virtual void release(uint8_t *data) noexcept = 0;
 
-  /// Address space for what one grid emits, the same for all, and zero: memory
-  /// is taken where it is written. Empty if refused.
+  /// Memory of the device for what grids emit, the same for all. Nobody makes
+  /// it zero. Empty if refused.
   virtual std::span<uint8_t> logSpace() noexcept = 0;
-  /// A part of it becomes zero again before the next grid; an error is the
-  /// run's.
-  virtual void clearLog(std::span<uint8_t> part) noexcept = 0;
 
   // --- what the host says is where. Errors begin with `who`.
   /// Throws Failure unless kernels may use so many bytes there.
@@ -72,6 +76,8 @@ public:
   virtual void upload(uint8_t *to, const uint8_t *from, int64_t bytes) = 0;
   virtual void copy(uint8_t *to, const uint8_t *from, int64_t bytes) = 0;
   virtual void download(uint8_t *to, const uint8_t *from, int64_t bytes) = 0;
+  /// Makes memory of the device zero.
+  virtual void clear(uint8_t *data, int64_t bytes) = 0;
 
   /// How many threads it takes to fill the device.
   virtual int64_t residentThreads() const = 0;
@@ -83,6 +89,39 @@ public:
 
   /// What records the runs of the pipeline; launches go to it meanwhile. Once.
   virtual std::unique_ptr<DeviceFrame> makeFrame() = 0;
+};
+
+/// Bytes of a device's own memory.
+class DeviceBytes {
+public:
+  DeviceBytes() = default;
+  /// Throws OutOfMemory.
+  DeviceBytes(Accelerator &from, int64_t size);
+  DeviceBytes(DeviceBytes &&other) noexcept { swap(other); }
+  DeviceBytes &operator=(DeviceBytes &&other) noexcept {
+    DeviceBytes taken(std::move(other));
+    swap(taken);
+    return *this;
+  }
+  ~DeviceBytes() {
+    if (data_)
+      from_->release(data_);
+  }
+
+  uint8_t *data() const { return data_; }
+  int64_t size() const { return size_; }
+  explicit operator bool() const { return data_ != nullptr; }
+
+private:
+  void swap(DeviceBytes &other) {
+    std::swap(from_, other.from_);
+    std::swap(data_, other.data_);
+    std::swap(size_, other.size_);
+  }
+
+  Accelerator *from_ = nullptr;
+  uint8_t *data_ = nullptr;
+  int64_t size_ = 0;
 };
 
 /// Whether that is what a program calls a kind of device.

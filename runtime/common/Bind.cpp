@@ -98,7 +98,7 @@ static void bindBuffer(pikort_pipeline *p, const char *name,
             std::to_string(state.perSource) + " and cannot be bound");
   checkArray(*p, who, state.record, bound);
   change(p, [&state, bound] {
-    state.owned = {};
+    state.own({});
     if (bound.onDevice)
       state.mirror = {};
     auto *data = static_cast<uint8_t *>(const_cast<void *>(bound.data));
@@ -122,9 +122,10 @@ static void bindSource(pikort_pipeline *p, int32_t index, const Bound &bound) {
                       std::to_string(bound.count)};
   change(p, [&source, bound] {
     if (bound.onDevice)
-      source.mirror = {};
+      source.mirror = {}, source.twin = {};
     source.data = static_cast<const uint8_t *>(bound.data);
     source.count = bound.count;
+    source.twinIsCurrent = false;
     source.onDevice = bound.onDevice;
   });
 }
@@ -180,6 +181,28 @@ static void describe(const pikort_view &from, const Record &record,
   to.type = to.channels > 0 ? record.fields.front().type : -1;
 }
 
+// --- The device's copies of our memory --------------------------------------
+
+void piko::rt::bringToHost(pikort_pipeline &p, State &state) {
+  if (state.hostIsCurrent)
+    return;
+  p.accelerator->download(state.owned.data(), state.twin.data(),
+                          state.owned.size());
+  p.accelerator->finishStream();
+  state.hostIsCurrent = true;
+}
+
+void piko::rt::bringToDevice(pikort_pipeline &p, State &state) {
+  if (state.twinIsCurrent)
+    return;
+  if (!state.twin)
+    state.twin = DeviceBytes(*p.accelerator, state.owned.size());
+  if (state.owned.size() > 0)
+    p.accelerator->upload(state.twin.data(), state.owned.data(),
+                          state.owned.size());
+  state.twinIsCurrent = true;
+}
+
 extern "C" {
 
 // --- State and sources ------------------------------------------------------
@@ -232,8 +255,8 @@ int32_t pikort_allocate_buffer(pikort_pipeline *p, const char *name,
     checkAlive(*p);
     state.onDevice = state.bound = false;
     state.mirror = {};
-    state.owned = {};
-    state.owned = Array<uint8_t>(p->memory, bytes, Use::State);
+    state.own({}); // before the new one, so that both need not fit
+    state.own(Array<uint8_t>(p->memory, bytes, Use::State));
     std::memset(state.owned.data(), 0, static_cast<size_t>(bytes));
     state.view = {state.owned.data(), {count, 1, 1, 1}};
     state.bound = true;
@@ -271,6 +294,10 @@ int32_t pikort_get_view(pikort_pipeline *p, const char *name,
       invalid("buffer " + quoted(state.name) +
               ": expected memory of the host, but what is bound is a device's, "
               "which pikort_read copies");
+    if (state.owned) {
+      bringToHost(*p, state);
+      state.twinIsCurrent = false; // the host may write there
+    }
     *view = viewOf(*p, state);
   });
 }
@@ -290,7 +317,16 @@ int32_t pikort_get_device_view(pikort_pipeline *p, const char *name,
     if (!state.owned && !state.onDevice)
       invalid("state " + quoted(state.name) +
               ": expected memory of the device, but it is the host's");
-    describe(viewOf(*p, state), p->records[state.record], *view);
+    pikort_view there = viewOf(*p, state);
+    if (state.owned) {
+      if (!state.hosts) { // no run is on its way
+        bringToDevice(*p, state);
+        p->accelerator->finishStream();
+      }
+      state.hostIsCurrent = false; // whoever has the view may write there
+      there.data = state.twin.data();
+    }
+    describe(there, p->records[state.record], *view);
     view->device = p->accelerator->number();
   });
 }
@@ -313,10 +349,14 @@ int32_t pikort_read(pikort_pipeline *p, const char *name, void *to,
                                 : "a null pointer"));
     if (count == 0)
       return;
-    if (p->accelerator && (state.owned || state.onDevice)) {
+    if (state.owned)
       checkAlive(*p);
-      p->accelerator->download(static_cast<uint8_t *>(to),
-                               static_cast<uint8_t *>(view.data),
+    const uint8_t *from = state.onDevice        ? state.view.data
+                          : state.hostIsCurrent ? nullptr
+                                                : state.twin.data();
+    if (from) {
+      checkAlive(*p);
+      p->accelerator->download(static_cast<uint8_t *>(to), from,
                                count * recordSize);
       p->accelerator->finishStream();
     } else {

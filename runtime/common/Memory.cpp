@@ -264,3 +264,13 @@ void Memory::resetPeak() {
   std::lock_guard<std::mutex> lock(mutex_);
   peak_ = binBytes_;
 }
+
+// --- Memory of a device -----------------------------------------------------
+
+DeviceBytes::DeviceBytes(Accelerator &from, int64_t size)
+    : from_(&from),
+      data_(from.allocate(static_cast<size_t>(std::max<int64_t>(size, 1)))),
+      size_(size) {
+  if (!data_)
+    throw OutOfMemory{size};
+}

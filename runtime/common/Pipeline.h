@@ -66,9 +66,26 @@ struct State {
   bool changed = true;        ///< ... since a frame of a device took them.
   Array<uint8_t> owned;       ///< An image's, or of a buffer that we allocate.
   Array<uint8_t> mirror;      ///< What a device sees of the host's own memory.
-  uint8_t *hosts = nullptr; ///< That memory, while the mirror takes its place.
+  /// What frames of a device use in place of `owned` or of the host's memory.
+  DeviceBytes twin;
+  bool twinIsCurrent = false; ///< It has what the state should have, ...
+  bool hostIsCurrent = true;  ///< ... which `owned` does, too.
+  uint8_t *hosts = nullptr;   ///< The host's memory, while another is used.
   pikoir_state view{};
+
+  /// Memory of our own, of which a device has nothing yet.
+  void own(Array<uint8_t> memory) {
+    owned = std::move(memory);
+    twin = {};
+    twinIsCurrent = false;
+    hostIsCurrent = true;
+  }
 };
+
+/// Where `owned`, or its twin, is older than the other one, makes it the same,
+/// in the order of the pipeline's stream; the first waits. Throw.
+void bringToHost(pikort_pipeline &p, State &state);
+void bringToDevice(pikort_pipeline &p, State &state);
 
 struct Edge {
   int32_t producer = 0, port = 0, consumer = 0;
@@ -137,7 +154,9 @@ struct Source {
   const uint8_t *data = nullptr;
   int64_t count = -1;    ///< -1 = not bound
   bool onDevice = false; ///< What is bound is a device's memory.
-  Array<uint8_t> mirror; ///< What a device sees of the host's own memory.
+  Array<uint8_t> mirror; ///< What a device sees of the host's own memory, ...
+  DeviceBytes twin;      ///< ... and what frames of it see, ...
+  bool twinIsCurrent = false;     ///< ... if it is what was bound.
   const uint8_t *hosts = nullptr; ///< That memory meanwhile.
   int64_t begin = 0, end = 0;     ///< The strip that runs, or all.
 };
@@ -297,7 +316,8 @@ struct pikort_pipeline {
   int64_t loopLimit = int64_t(1) << 20; ///< Of hops and of rounds.
   int64_t stripSize = 0;                ///< Of all strips; 0 = not said.
 
-  bool timesKernels = false; ///< Of frames of a device.
+  bool timesKernels = false;   ///< Of frames of a device.
+  bool hasStaticInput = false; ///< The host's memory stays from run to run.
   void (*unitReport)(void *, const pikort_unit_run *) = nullptr;
   void *unitReportData = nullptr;
 

@@ -11,14 +11,18 @@
 
 #include "common/DeviceFrame.h"
 #include "common/Pipeline.h"
+#include "pikort/grid.h"
+
+#include <map>
 
 namespace piko::rt {
 
-class Checker; // Check.h
-struct Kernel; // Kernel.h
-struct Queue;  // Queue.h
-class Cycle;   // Cycle.h
-class Strips;  // Strips.h
+class Checker;  // Check.h
+struct Kernel;  // Kernel.h
+struct Queue;   // Queue.h
+class Cycle;    // Cycle.h
+class Strips;   // Strips.h
+struct GridLog; // gpu/Log.cpp
 
 struct CPUExecutor final : Executor {
   explicit CPUExecutor(pikort_pipeline &p);
@@ -59,6 +63,8 @@ struct CPUExecutor final : Executor {
   std::vector<std::unique_ptr<Queue>> queues;
   std::vector<bool> cleared; ///< Of stages: their images are clear.
   int32_t activeThreads = 1; ///< That the open kernel has units for.
+  /// Of grids that have begun, by where their threads find them.
+  std::map<const pikoir_log *, std::shared_ptr<GridLog>> logs;
 };
 
 inline CPUExecutor &cpuOf(const pikort_pipeline &p) {

@@ -16,7 +16,7 @@ static void copy(const pikort_pipeline &p, uint8_t *to, const uint8_t *from,
 
 namespace {
 
-/// What has a mirror, kept from run to run.
+/// What a mirror is of.
 struct Original {
   const uint8_t *data;
   int64_t bytes;
@@ -27,7 +27,7 @@ struct Original {
 
 /// Makes `mirror` the same.
 static void fillMirror(pikort_pipeline &p, Array<uint8_t> &mirror,
-                       const Original &from, bool isFrame) {
+                       const Original &from) {
   if (!mirror || mirror.size() != from.bytes) {
     mirror = {};
     mirror = Array<uint8_t>(p.memory, from.bytes, Use::State);
@@ -36,94 +36,163 @@ static void fillMirror(pikort_pipeline &p, Array<uint8_t> &mirror,
     return;
   if (from.onDevice)
     p.accelerator->copy(mirror.data(), from.data, from.bytes);
-  else if (isFrame)
-    p.accelerator->upload(mirror.data(), from.data, from.bytes);
   else
     copy(p, mirror.data(), from.data, from.bytes);
+}
+
+/// Of `bytes` bytes, and current if it was so.
+static void makeTwin(pikort_pipeline &p, DeviceBytes &twin, bool &isCurrent,
+                     int64_t bytes) {
+  if (twin && twin.size() == bytes)
+    return;
+  twin = {}; // before the new one, so that both need not fit
+  twin = DeviceBytes(*p.accelerator, bytes);
+  isCurrent = false;
+}
+
+static void fillTwin(pikort_pipeline &p, DeviceBytes &twin, bool &isCurrent,
+                     const uint8_t *from) {
+  if (!isCurrent && twin.size() > 0)
+    p.accelerator->upload(twin.data(), from, twin.size());
+  isCurrent = true;
 }
 
 static int64_t bytesOf(const pikort_pipeline &p, const State &state) {
   return p.records[state.record].size * state.view.extent[0];
 }
 
-static void beginMirror(pikort_pipeline &p, State &state, bool isFrame) {
-  bool isThere = isFrame && state.kind == PIKORT_CONSTANT && state.mirror &&
-                 !state.changed;
-  if (!isThere)
-    fillMirror(p, state.mirror,
-               {state.view.data, bytesOf(p, state), state.onDevice}, isFrame);
+static Original originalOf(const pikort_pipeline &p, const State &state) {
+  return {state.view.data, bytesOf(p, state), state.onDevice};
+}
+
+// --- Frames: kernels see twins ----------------------------------------------
+
+/// The program reads constants itself: what takes their place is a mirror, and
+/// the frame gives kernels its twin.
+static void showConstant(pikort_pipeline &p, State &state) {
+  state.twinIsCurrent &= state.mirror && !state.changed;
+  if (!state.twinIsCurrent)
+    fillMirror(p, state.mirror, originalOf(p, state));
+  makeTwin(p, state.twin, state.twinIsCurrent, bytesOf(p, state));
+  fillTwin(p, state.twin, state.twinIsCurrent, state.mirror.data());
   state.changed = false;
   state.hosts = std::exchange(state.view.data, state.mirror.data());
 }
 
-static void beginMirror(pikort_pipeline &p, Source &source, bool isFrame) {
+/// What is our own the frame brings to the device, unless it clears it.
+static void showState(pikort_pipeline &p, State &state) {
+  if (state.kind == PIKORT_CONSTANT)
+    return showConstant(p, state);
+  state.twinIsCurrent &= state.owned || p.hasStaticInput;
+  makeTwin(p, state.twin, state.twinIsCurrent,
+           state.owned ? state.owned.size() : bytesOf(p, state));
+  if (!state.owned)
+    fillTwin(p, state.twin, state.twinIsCurrent, state.view.data);
+  state.hosts = std::exchange(state.view.data, state.twin.data());
+}
+
+static void showSource(pikort_pipeline &p, Source &source) {
+  source.twinIsCurrent &= p.hasStaticInput;
+  makeTwin(p, source.twin, source.twinIsCurrent,
+           source.count * p.records[p.stages[source.stage].record].size);
+  fillTwin(p, source.twin, source.twinIsCurrent, source.data);
+  source.hosts = std::exchange(source.data, source.twin.data());
+}
+
+static void beginFrame(pikort_pipeline &p) {
+  for (State &state : p.states)
+    if (state.view.data && !state.onDevice && (state.owned || !state.unused))
+      showState(p, state);
+  for (Source &source : p.sources)
+    if (source.data && !source.onDevice)
+      showSource(p, source);
+}
+
+// --- The host's way: host and kernels see mirrors ---------------------------
+
+static void beginMirror(pikort_pipeline &p, State &state) {
+  if (state.owned) {
+    bringToHost(p, state);
+    state.twinIsCurrent = false;
+    return;
+  }
+  fillMirror(p, state.mirror, originalOf(p, state));
+  state.twinIsCurrent = false; // kernels write to the mirror
+  state.hosts = std::exchange(state.view.data, state.mirror.data());
+}
+
+static void beginMirror(pikort_pipeline &p, Source &source) {
   int64_t size = p.records[p.stages[source.stage].record].size;
   fillMirror(p, source.mirror,
-             {source.data, source.count * size, source.onDevice}, isFrame);
+             {source.data, source.count * size, source.onDevice});
   source.hosts = std::exchange(source.data, source.mirror.data());
 }
 
 void piko::rt::beginMirrors(pikort_pipeline &p, bool isFrame) {
   if (!p.accelerator)
     return;
-  if (!isFrame) // what the host copies is what the stream has left there
-    p.accelerator->finishStream();
+  if (isFrame)
+    return beginFrame(p);
+  // What the host copies is what the stream has left there.
+  p.accelerator->finishStream();
   for (State &state : p.states)
-    if (!state.owned && state.view.data && !(isFrame && state.onDevice))
-      beginMirror(p, state, isFrame);
+    if (state.view.data && !state.hosts && (state.owned || !state.unused))
+      beginMirror(p, state);
   for (Source &source : p.sources)
-    if (source.data && !(isFrame && source.onDevice))
-      beginMirror(p, source, isFrame);
-  if (!isFrame)
-    p.accelerator->finishStream();
-}
-
-// An upload that is still on its way brings the same.
-void piko::rt::showConstants(const pikort_pipeline &p) {
-  for (const State &state : p.states)
-    if (state.kind == PIKORT_CONSTANT && state.hosts)
-      std::memcpy(state.mirror.data(), state.hosts,
-                  static_cast<size_t>(bytesOf(p, state)));
-}
-
-void piko::rt::refillMirrors(pikort_pipeline &p) {
-  for (State &state : p.states)
-    if (state.hosts && state.written)
-      copy(p, state.mirror.data(), state.hosts, bytesOf(p, state));
-    else if (!state.hosts && state.onDevice && state.view.data)
-      beginMirror(p, state, false);
-  for (Source &source : p.sources)
-    if (!source.hosts && source.onDevice && source.data)
-      beginMirror(p, source, false);
+    if (source.data)
+      beginMirror(p, source);
   p.accelerator->finishStream();
 }
 
-/// What kernels have written goes to where it was bound. A device that failed
-/// may have taken its memory along.
-static void takeBack(pikort_pipeline &p, State &state) {
+/// Constants stay as the frame had them: the host may have bound others since.
+void piko::rt::refillMirrors(pikort_pipeline &p) {
+  for (State &state : p.states)
+    if (state.hosts && state.kind != PIKORT_CONSTANT)
+      state.view.data = std::exchange(state.hosts, nullptr);
+  for (Source &source : p.sources)
+    if (source.hosts)
+      source.data = std::exchange(source.hosts, nullptr);
+  beginMirrors(p, /*isFrame=*/false);
+}
+
+// --- Behind a run -----------------------------------------------------------
+
+/// What kernels have written, to what was bound, goes there. A device that
+/// failed may have taken its memory along.
+static void takeBack(pikort_pipeline &p, State &state, const uint8_t *from) {
   int64_t bytes = bytesOf(p, state);
   if (!state.written || bytes == 0 || p.status == PIKORT_DEVICE_FAILED)
     return;
   guarded(&p, "run", [&] {
     if (!state.onDevice)
-      return p.accelerator->download(state.view.data, state.mirror.data(),
-                                     bytes);
-    p.accelerator->copy(state.view.data, state.mirror.data(), bytes);
+      return p.accelerator->download(state.view.data, from, bytes);
+    p.accelerator->copy(state.view.data, from, bytes);
   });
+}
+
+static void endMirror(pikort_pipeline &p, State &state) {
+  const uint8_t *from =
+      std::exchange(state.view.data, std::exchange(state.hosts, nullptr));
+  if (!state.owned)
+    return takeBack(p, state, from);
+  state.twinIsCurrent = true;
+  bool isCleared = state.kind == PIKORT_IMAGE || state.perSource >= 0;
+  if (isCleared || state.written)
+    state.hostIsCurrent = false;
 }
 
 void piko::rt::endMirrors(pikort_pipeline &p) {
   for (State &state : p.states)
-    if (state.hosts) {
-      state.view.data = std::exchange(state.hosts, nullptr);
-      takeBack(p, state);
-    }
+    if (state.hosts)
+      endMirror(p, state);
   if (p.accelerator && p.status != PIKORT_DEVICE_FAILED)
     guarded(&p, "run", [&] { p.accelerator->finishStream(); });
   for (Source &source : p.sources)
     if (source.hosts)
       source.data = std::exchange(source.hosts, nullptr);
 }
+
+// --- Input of kernels -------------------------------------------------------
 
 /// Lets `data` point to a copy of its elements.
 template <class T>

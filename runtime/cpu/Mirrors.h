@@ -8,13 +8,13 @@
 
 namespace piko::rt {
 
-/// Where kernels run on an accelerator: copies constants, bound buffers and
-/// sources to memory that it shares, which takes their place; throws. Where the
-/// host touches nothing until the run has ended, copies are in the order of its
-/// stream, and what is in the device's memory stays where it is.
+/// Where kernels run on an accelerator: puts memory that they reach in the
+/// place of constants, buffers, sources and images; throws. For a frame, of
+/// which the host touches nothing until it has ended, that is the device's own,
+/// and copies are in the order of its stream. For the host's way it is the
+/// host's, with copies of what is the device's.
 void beginMirrors(pikort_pipeline &p, bool isFrame);
-/// For a frame that the host repeats: copies again what kernels may have
-/// changed, and what was not copied; throws.
+/// For a frame that the host repeats: the same for the host's way; throws.
 void refillMirrors(pikort_pipeline &p);
 /// Puts the host's memory back, with what kernels have written.
 void endMirrors(pikort_pipeline &p);
@@ -24,9 +24,6 @@ void endMirrors(pikort_pipeline &p);
 void shareHeader(pikort_pipeline &p, Kernel &kernel);
 void shareUnits(pikort_pipeline &p, Kernel &kernel);
 void shareInput(pikort_pipeline &p, Kernel &kernel, const Items &from);
-
-/// While a frame of a device is recorded: lets the host read constants.
-void showConstants(const pikort_pipeline &p);
 
 } // namespace piko::rt
 

@@ -47,8 +47,8 @@ static void allocate(pikort_pipeline &p, State &state) {
   if (overflow)
     throw OutOfMemory{INT64_MAX};
   if (!state.owned || state.owned.size() != bytes) {
-    state.owned = {}; // before the new one, so that both need not fit
-    state.owned = Array<uint8_t>(p.memory, bytes, Use::State);
+    state.own({}); // before the new one, so that both need not fit
+    state.own(Array<uint8_t>(p.memory, bytes, Use::State));
   }
   state.view.data = state.owned.data();
 }

@@ -300,8 +300,6 @@ int64_t pikoir_begin_schedule(pikort_pipeline *p, int32_t stage) {
   if (!found)
     return 0;
   int32_t code = guarded(p, "stage " + quoted(found->name), [&] {
-    if (recordingOf(*p))
-      showConstants(*p);
     found->binSchedules = Array<BinSchedule>(p->memory, found->bins());
     for (int64_t bin = 0; bin < found->bins(); ++bin)
       found->binSchedules[bin] = found->schedule;

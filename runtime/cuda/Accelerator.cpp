@@ -59,7 +59,9 @@ Accelerator::~Accelerator() {
     return;
   device_->enter();
   if (!log_.empty())
-    unmap(log_.data());
+    release(log_.data());
+  for (uint8_t *data : std::exchange(unreleased_, {}))
+    device_->driver.cuMemFree(reinterpret_cast<CUdeviceptr>(data));
   submission_.end();
   for (Module *module : {&module_, &joins_, &steps_, &conditions_})
     module->unload();
@@ -73,12 +75,9 @@ Accelerator::~Accelerator() {
 
 // --- Memory ------------------------------------------------------------------
 
-uint8_t *Accelerator::map(size_t bytes) noexcept {
-  CUdeviceptr address = 0;
-  CUresult result = device_->enter();
-  if (result == CUDA_SUCCESS)
-    result = device_->driver.cuMemAllocManaged(&address, bytes,
-                                               CU_MEM_ATTACH_GLOBAL);
+/// Null where that was refused; another error is the pipeline's.
+uint8_t *Accelerator::allocated(CUresult result, CUdeviceptr address,
+                                size_t bytes) {
   if (result == CUDA_SUCCESS)
     return reinterpret_cast<uint8_t *>(address);
   if (result != CUDA_ERROR_OUT_OF_MEMORY)
@@ -88,36 +87,55 @@ uint8_t *Accelerator::map(size_t bytes) noexcept {
   return nullptr;
 }
 
+uint8_t *Accelerator::map(size_t bytes) noexcept {
+  void *address = nullptr;
+  CUresult result = device_->enter();
+  if (result == CUDA_SUCCESS)
+    result = device_->driver.cuMemAllocHost(&address, bytes);
+  return allocated(result, reinterpret_cast<CUdeviceptr>(address), bytes);
+}
+
 void Accelerator::unmap(uint8_t *data) noexcept {
   // After an error of a kernel the memory is gone with the context.
   if (device_->enter() == CUDA_SUCCESS)
-    device_->driver.cuMemFree(reinterpret_cast<CUdeviceptr>(data));
+    device_->driver.cuMemFreeHost(data);
 }
 
+uint8_t *Accelerator::allocate(size_t bytes) noexcept {
+  CUdeviceptr address = 0;
+  CUresult result = device_->enter();
+  if (result == CUDA_SUCCESS)
+    result = device_->driver.cuMemAlloc(&address, bytes);
+  return allocated(result, address, bytes);
+}
+
+void Accelerator::release(uint8_t *data) noexcept {
+  CUresult result = device_->enter();
+  if (result == CUDA_SUCCESS)
+    result = device_->driver.cuMemFree(reinterpret_cast<CUdeviceptr>(data));
+  if (result != CUDA_SUCCESS)
+    unreleased_.push_back(data);
+}
+
+/// A sixteenth of what is free, twice as much where that did not suffice, and
+/// less where it is refused.
 std::span<uint8_t> Accelerator::logSpace() noexcept {
-  constexpr size_t most = size_t(1) << 36, least = size_t(1) << 28;
-  for (size_t bytes = most; log_.empty() && bytes >= least; bytes /= 2)
-    if (uint8_t *data = map(bytes))
-      log_ = {data, bytes};
+  constexpr size_t least = size_t(1) << 28;
+  if (!log_.empty() && log_.size() >= wantedLog_)
+    return log_;
+  if (!log_.empty())
+    release(std::exchange(log_, {}).data());
+  size_t free = 0, all = 0;
+  if (device_->enter() == CUDA_SUCCESS)
+    device_->driver.cuMemGetInfo(&free, &all);
+  wantedLog_ = std::min(std::max({wantedLog_, free / 16, least}), free);
+  for (; log_.empty() && wantedLog_ >= least; wantedLog_ /= 2)
+    if (uint8_t *data = allocate(wantedLog_))
+      log_ = {data, wantedLog_};
     else if (p_.status != PIKORT_OK)
       break;
+  wantedLog_ = log_.size();
   return log_;
-}
-
-void Accelerator::clearLog(std::span<uint8_t> part) noexcept {
-  clearLog(part, stream_);
-}
-
-void Accelerator::clearLog(std::span<uint8_t> part, CUstream stream) noexcept {
-  if (part.empty())
-    return;
-  piko::rt::guarded(&p_, "run", [&] {
-    device_->check(device_->enter(), "entering its context");
-    device_->check(
-        device_->driver.cuMemsetD8Async(
-            reinterpret_cast<CUdeviceptr>(part.data()), 0, part.size(), stream),
-        "clearing the log");
-  });
 }
 
 // --- Streams -----------------------------------------------------------------
@@ -183,6 +201,24 @@ void Accelerator::download(uint8_t *to, const uint8_t *from, int64_t bytes) {
       "copying from its memory");
 }
 
+void Accelerator::clear(uint8_t *data, int64_t bytes) {
+  isBusy_ = true;
+  device_->check(device_->enter(), "entering its context");
+  device_->check(
+      device_->driver.cuMemsetD8Async(reinterpret_cast<CUdeviceptr>(data), 0,
+                                      static_cast<size_t>(bytes), stream_),
+      "clearing its memory");
+}
+
+int32_t Accelerator::read(const int32_t *data) {
+  auto *room = reinterpret_cast<int32_t *>(progress_ + 1);
+  download(reinterpret_cast<uint8_t *>(room),
+           reinterpret_cast<const uint8_t *>(data), sizeof(*room));
+  device_->check(device_->driver.cuStreamSynchronize(stream_),
+                 "copying from its memory");
+  return *room;
+}
+
 // --- Kernels -----------------------------------------------------------------
 
 bool Accelerator::canWaitInGrids() const {
@@ -209,7 +245,7 @@ void Accelerator::launch(const char *kernel, int64_t blocks, int64_t threads,
   if (frame_ && frame_->isRecording())
     return frame_->launch(std::move(grid));
   Step step{Step::Kind::Grid, std::move(grid)};
-  enqueue({&step, 1}, {});
+  enqueue({&step, 1});
   await({&step, 1});
 }
 
@@ -239,17 +275,41 @@ void Accelerator::launch(const GridLaunch &grid, CUstream stream) {
                    "running " + moduleOf(grid.kernel).describe(grid.kernel));
 }
 
-void Accelerator::enqueue(std::span<const Step> steps,
-                          std::span<uint8_t> clear) {
+void Accelerator::load(std::span<const Step> steps) {
   device_->check(device_->enter(), "entering its context");
-  for (const Step &step : steps) // before any of them runs
+  for (const Step &step : steps)
     if (step.kind == Step::Kind::Grid)
       moduleOf(step.grid.kernel).find(step.grid.kernel);
-  isBusy_ = true;
-  submission_.run(steps, clear);
+}
+
+void Accelerator::noteEnd() {
   if (usesEvent_)
     device_->check(device_->driver.cuEventRecord(done_, stream_),
                    "running a frame");
+}
+
+void Accelerator::enqueue(std::span<const Step> steps) {
+  load(steps);
+  isBusy_ = true;
+  submission_.run(steps);
+  noteEnd();
+}
+
+void Accelerator::enqueue(std::span<const Step> steps, const Exchange &exchange,
+                          const void *end) {
+  load(steps);
+  exchange.forAll([&](uint8_t *device, const uint8_t *host, size_t bytes) {
+    upload(device, host, static_cast<int64_t>(bytes));
+  });
+  submission_.run(steps);
+  exchange.forFirst(
+      end, [&](const uint8_t *device, uint8_t *host, size_t bytes) {
+        // May say how the grids went.
+        if (CUresult result = device_->driver.cuMemcpyDtoHAsync(
+                host, reinterpret_cast<CUdeviceptr>(device), bytes, stream_))
+          device_->check(result, "running " + describeFailed(steps));
+      });
+  noteEnd();
 }
 
 bool Accelerator::isDone() const {
@@ -291,7 +351,7 @@ int64_t *Accelerator::progress() {
   if (!progress_) {
     void *memory = nullptr;
     device_->check(device_->enter(), "entering its context");
-    device_->check(device_->driver.cuMemAllocHost(&memory, sizeof(int64_t)),
+    device_->check(device_->driver.cuMemAllocHost(&memory, 2 * sizeof(int64_t)),
                    "allocating memory of the host");
     progress_ = static_cast<int64_t *>(memory);
   }

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //===- Accelerator.h - A pipeline's part of a CUDA device -----------------===//
 //
-// Memory is managed memory: one address on both sides, and pages that move to
-// who touches them, or stay where only one does.
+// Memory of the device is allocated there, and copied to and from; memory of
+// the host that kernels reach is page-locked. None is managed: where that is
+// more than a card has, pages move in every frame, and a card can hang.
 //
 //===----------------------------------------------------------------------===//
 
@@ -30,8 +31,11 @@ public:
   void checkAlive() const override { device_->checkAlive(); }
   uint8_t *map(size_t bytes) noexcept override;
   void unmap(uint8_t *data) noexcept override;
+  uint8_t *allocate(size_t bytes) noexcept override;
+  void release(uint8_t *data) noexcept override;
   std::span<uint8_t> logSpace() noexcept override;
-  void clearLog(std::span<uint8_t> part) noexcept override;
+  /// For the next frame, which is to find more there.
+  void growLog() { wantedLog_ = 2 * log_.size(); }
   void checkMemory(const std::string &who, const void *address,
                    int64_t bytes) const override {
     device_->checkMemory(who, reinterpret_cast<CUdeviceptr>(address), bytes);
@@ -45,6 +49,7 @@ public:
   void upload(uint8_t *to, const uint8_t *from, int64_t bytes) override;
   void copy(uint8_t *to, const uint8_t *from, int64_t bytes) override;
   void download(uint8_t *to, const uint8_t *from, int64_t bytes) override;
+  void clear(uint8_t *data, int64_t bytes) override;
   int64_t residentThreads() const override { return residentThreads_; }
   void launch(const char *kernel, int64_t blocks, int64_t threads,
               const void *arguments, int64_t count) override;
@@ -56,9 +61,12 @@ public:
   int64_t joinBlocks() const { return joinBlocks_; }
   /// Up to how much work its first block does by itself (device/Grid.h).
   int64_t mostAlone() const { return mostAlone_; }
-  /// Gives the stream what the steps say, behind making a part of the log zero
-  /// again; throws.
-  void enqueue(std::span<const Step> steps, std::span<uint8_t> clear);
+  /// Gives the stream what the steps say; throws.
+  void enqueue(std::span<const Step> steps);
+  /// The same between copies of what host and device say, back to where `end`
+  /// is.
+  void enqueue(std::span<const Step> steps, const Exchange &exchange,
+               const void *end);
   /// Whether that has ended.
   bool isDone() const;
   /// Waits for it; throws.
@@ -74,8 +82,14 @@ public:
 private:
   friend class Submission;
   Module &moduleOf(const std::string &kernel);
-  void clearLog(std::span<uint8_t> part, CUstream stream) noexcept;
+  /// Throws unless they can run.
+  void load(std::span<const Step> steps);
   void launch(const GridLaunch &grid, CUstream stream);
+  /// Of a frame: what the device has there when its stream has ended; throws.
+  int32_t read(const int32_t *data);
+  /// Behind what the stream has been given.
+  void noteEnd();
+  uint8_t *allocated(CUresult result, CUdeviceptr address, size_t bytes);
   /// For all that is in the stream; throws.
   void wait(std::span<const Step> steps);
   void leaveStream();
@@ -93,7 +107,9 @@ private:
   bool isBusy_ = false;       ///< The stream may have something to do for it.
   Submission submission_{*this, *device_};
   std::span<uint8_t> log_;
-  int64_t *progress_ = nullptr;
+  size_t wantedLog_ = 0;
+  std::vector<uint8_t *> unreleased_; ///< The driver has refused to free it.
+  int64_t *progress_ = nullptr;       ///< And room for what the host reads.
   int64_t residentThreads_ = 0, joinBlocks_ = 0, mostAlone_ = 0;
   Frame *frame_ = nullptr; ///< The executor's, which ends first.
 };

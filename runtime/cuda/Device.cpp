@@ -112,9 +112,9 @@ static CUdevice findDevice(const Driver &driver, int ordinal) {
                  ": expected compute capability 7.0 or later, but it "
                  "has " +
                  std::to_string(major) + "." + std::to_string(minor));
-  if (!get(CU_DEVICE_ATTRIBUTE_CONCURRENT_MANAGED_ACCESS))
-    failNoDevice(who + ": expected managed memory that takes pages on demand, "
-                       "which it, or this operating system, does not have");
+  if (!get(CU_DEVICE_ATTRIBUTE_UNIFIED_ADDRESSING))
+    failNoDevice(who + ": expected one address space with the host, which it, "
+                       "or this operating system, does not have");
   return device;
 }
 

@@ -54,6 +54,7 @@ public:
   const int ordinal;
 
   int attribute(CUdevice_attribute which) const;
+  CUcontext context() const { return context_; }
   /// Of compute, 10 * major + minor.
   int capability() const {
     return 10 * attribute(CU_DEVICE_ATTRIBUTE_COMPUTE_CAPABILITY_MAJOR) +

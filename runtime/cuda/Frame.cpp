@@ -25,28 +25,18 @@ bool Frame::isPossible() const {
       [&](const Stage &stage) { return isStacked(stage) && stage.hosts; });
 }
 
-template <class T> static void makeZero(const Array<T> &array) {
-  std::memset(static_cast<void *>(array.data()), 0,
-              static_cast<size_t>(array.size()) * sizeof(T));
-}
+Frame::Frame(pikort_pipeline &p, Accelerator &device)
+    : p_(p), device_(device), exchange_(device) {}
 
 bool Frame::begin() {
-  if (!isPossible()) {
-    clearLog();
+  if (!isPossible())
     return false;
-  }
-  if (!hasMemory_)
-    takeMemory();
-  makeZero(places_);
-  makeZero(queues_);
-  makeZero(loops_);
-  makeZero(cycles_);
-  makeZero(received_);
-  for (LoopState &loop : std::span(loops_.data(), p_.loops.size()))
+  takeMemory();
+  for (LoopState &loop : std::span(loops_, p_.loops.size()))
     loop.again = 1;
-  for (CycleState &cycle : std::span(cycles_.data(), p_.cycles.size()))
+  for (CycleState &cycle : std::span(cycles_, p_.cycles.size()))
     cycle.again = 1;
-  arguments_.reset();
+  clearRecords_.clear();
   strips_.assign(p_.stripGroups.size(), {});
   steps_.clear();
   joined_ = nullptr;
@@ -59,44 +49,21 @@ bool Frame::begin() {
   return true;
 }
 
+/// What the device says comes first.
 void Frame::takeMemory() {
-  int64_t clearBytes = 0;
-  for (const State &state : p_.states) {
-    clearOffsets_[&state] = clearBytes;
-    clearBytes += (p_.records[state.record].size + 15) / 16 * 16;
-  }
-  frame_ = Array<FrameState>(p_.memory, 1, Use::State);
-  clearRecords_ = Array<uint8_t>(p_.memory, clearBytes + 1, Use::State);
-  std::memset(clearRecords_.data(), 0, static_cast<size_t>(clearBytes));
-  for (const State &state : p_.states)
-    if (state.kind == PIKORT_IMAGE)
-      std::copy(state.clear.begin(), state.clear.end(),
-                clearRecords_.data() + clearOffsets_[&state]);
   auto countOf = [](const auto &list) {
     return static_cast<int64_t>(list.size());
   };
-  places_ = Array<Place>(p_.memory, countOf(p_.stages) + countOf(p_.sources),
-                         Use::State);
-  queues_ = Array<QueueState>(p_.memory, countOf(p_.edges) + countOf(p_.stages),
-                              Use::State);
-  loops_ = Array<LoopState>(p_.memory, countOf(p_.loops) + 1, Use::State);
-  cycles_ = Array<CycleState>(p_.memory, countOf(p_.cycles) + 1, Use::State);
-  stackStates_ =
-      Array<StackState>(p_.memory, countOf(p_.loops) + 1, Use::State);
-  received_ = Array<uint64_t>(
-      p_.memory, countOf(p_.edges) + countOf(p_.sources) + 1, Use::State);
-  hasMemory_ = true;
-}
-
-uint8_t *Frame::Arguments::takeRoom(Memory &memory, int64_t bytes) {
-  constexpr int64_t together = int64_t(16) << 10;
-  if (block_ < blocks_.size() && used_ + bytes > blocks_[block_].size())
-    ++block_, used_ = 0;
-  if (block_ == blocks_.size() || bytes > blocks_[block_].size())
-    blocks_.emplace(blocks_.begin() + static_cast<ptrdiff_t>(block_), memory,
-                    std::max(together, bytes), Use::State);
-  used_ += bytes;
-  return blocks_[block_].data() + used_ - bytes;
+  if (!blockSums_)
+    blockSums_ = DeviceBytes(device_, sizeof(BlockSums));
+  exchange_.reset();
+  places_ = exchange_.take<Place>(countOf(p_.stages) + countOf(p_.sources));
+  received_ = exchange_.take<uint64_t>(countOf(p_.edges) + countOf(p_.sources));
+  frame_ = exchange_.take<FrameState>();
+  queues_ = exchange_.take<QueueState>(countOf(p_.edges) + countOf(p_.stages));
+  loops_ = exchange_.take<LoopState>(countOf(p_.loops));
+  cycles_ = exchange_.take<CycleState>(countOf(p_.cycles));
+  stackStates_ = exchange_.take<StackState>(countOf(p_.loops));
 }
 
 size_t Frame::placeOf(int32_t number, bool isSource) const {
@@ -110,7 +77,7 @@ JoinArgs &Frame::describeSource(int32_t source) {
   const Stage &stage = p_.stages[p_.sources[source].stage];
   std::vector<JoinInput> inputs{describeSourceInput(stage, source)};
   inputs[0].producer = nullptr;
-  auto &args = arguments_.take<JoinArgs>(p_.memory, inputs);
+  auto &args = exchange_.takeWith<JoinArgs>(inputs);
   args.inputCount = 1;
   args.shape = {p_.records[stage.record].size, 1, 0, 0};
   args.tiles = 1;
@@ -125,12 +92,13 @@ JoinInput Frame::describeSourceInput(const Stage &stage, int32_t source) const {
   input.items = from.data;
   input.count = from.count;
   input.keyBase = static_cast<uint64_t>(source) << 32;
-  input.strip = stripOf(stage);
+  input.strip = onDevice(stripOf(stage));
   input.isSource = true;
   input.stage = -1;
   if (stage.placed())
-    input.producer = &find(source, true).state;
-  input.received = &received_[static_cast<int64_t>(p_.edges.size()) + source];
+    input.producer = onDevice(&find(source, true).state);
+  input.received =
+      onDevice(&received_[p_.edges.size() + static_cast<size_t>(source)]);
   return input;
 }
 
@@ -139,14 +107,15 @@ JoinInput Frame::describeEdge(int32_t number) const {
   const Stage &from = p_.stages[edge.producer];
   bool isHosted = from.host >= 0;
   JoinInput input{};
-  input.producer = &find(isHosted ? from.host : edge.producer, false).state;
+  input.producer =
+      onDevice(&find(isHosted ? from.host : edge.producer, false).state);
   input.stage = isHosted ? edge.producer : -1;
   input.port = edge.port;
   input.keyWidth = edge.keyWidth;
   input.permute = edge.gather == PIKOIR_PERMUTE && !isHosted;
   input.collects = from.collects();
   input.root = static_cast<uint32_t>(from.root);
-  input.received = &received_[number];
+  input.received = onDevice(&received_[number]);
   return input;
 }
 
@@ -161,7 +130,7 @@ std::vector<JoinInput> Frame::describeInputs(const Stage &stage) const {
     JoinInput &input = inputs.emplace_back(describeEdge(e));
     if (hasQueue(edge)) {
       input.producer = nullptr;
-      input.queue = &queues_[e];
+      input.queue = onDevice(&queues_[e]);
       input.isInLoop = edge.insideLoop;
     }
   }
@@ -179,14 +148,21 @@ std::vector<JoinClear> Frame::describeClears(const Stage &stage) {
   std::vector<JoinClear> clears;
   for (int32_t id : stage.clears) {
     const State &state = p_.states[id];
-    clears.push_back({state.owned.data(), clearRecord(state),
-                      p_.records[state.record].size});
+    clears.push_back(
+        {state.view.data, clearRecord(state), p_.records[state.record].size});
   }
   return clears;
 }
 
 const uint8_t *Frame::clearRecord(const State &state) {
-  return clearRecords_.data() + clearOffsets_[&state];
+  const uint8_t *&record = clearRecords_[&state];
+  if (record)
+    return record;
+  int64_t size = p_.records[state.record].size;
+  uint8_t *taken = exchange_.take<uint8_t>(size);
+  if (state.kind == PIKORT_IMAGE)
+    std::copy(state.clear.begin(), state.clear.end(), taken);
+  return record = onDevice(taken);
 }
 
 JoinArgs &Frame::describeStage(int32_t number) {
@@ -195,13 +171,13 @@ JoinArgs &Frame::describeStage(int32_t number) {
   std::vector<JoinInput> inputs =
       isEntered ? describeWave(number) : describeInputs(stage);
   std::vector<JoinClear> clears = describeClears(stage);
-  auto &args = arguments_.take<JoinArgs>(p_.memory, inputs, clears);
+  auto &args = exchange_.takeWith<JoinArgs>(inputs, clears);
   args.inputCount = static_cast<int32_t>(inputs.size());
   args.clearCount = static_cast<int32_t>(clears.size());
   if (stage.loop >= 0)
-    args.loop = &loops_[stage.loop];
+    args.loop = onDevice(&loops_[stage.loop]);
   if (stage.cycle >= 0)
-    args.cycle = &cycles_[stage.cycle];
+    args.cycle = onDevice(&cycles_[stage.cycle]);
   args.shape = describeShape(stage);
   args.tiles = stage.tiles;
   args.rank = p_.rank;
@@ -238,7 +214,7 @@ const BinCut *Frame::describeBins(const Stage &stage) {
     if (schedule.kind == PIKOIR_SERIALIZE && !stage.takesList())
       cut.splits = false;
   }
-  return cuts = arguments_.copy(p_.memory, all);
+  return cuts = exchange_.copy(all);
 }
 
 void Frame::describeSchedule(JoinArgs &args, const Stage &stage) {
@@ -255,11 +231,12 @@ void Frame::describeSchedule(JoinArgs &args, const Stage &stage) {
   if (!stage.binSchedules)
     return;
   args.cutting = CutBins;
-  args.cuts = describeBins(stage);
+  const BinCut *cuts = describeBins(stage);
+  args.cuts = onDevice(cuts);
   args.splits = stage.splits() && stage.takesList();
-  args.everyBin =
-      std::any_of(args.cuts, args.cuts + stage.bins(),
-                  [](const BinCut &bin) { return bin.everyBin != 0; });
+  args.everyBin = std::any_of(cuts, cuts + stage.bins(), [](const BinCut &bin) {
+    return bin.everyBin != 0;
+  });
 }
 
 std::vector<int32_t> Frame::edgesOf(int32_t kernel) const {
@@ -280,7 +257,7 @@ void Frame::launchOwn(const char *kernel, const void *args, int32_t timed) {
                     {kernel,
                      device_.joinBlocks(),
                      joinThreads,
-                     {reinterpret_cast<int64_t>(args)},
+                     {reinterpret_cast<int64_t>(onDevice(args))},
                      /*isJoin=*/true},
                     /*again=*/nullptr,
                     timed});
@@ -291,7 +268,7 @@ void Frame::launchWarp(const char *kernel, const void *args) {
                     {kernel,
                      /*blocks=*/1,
                      /*threads=*/32,
-                     {reinterpret_cast<int64_t>(args)},
+                     {reinterpret_cast<int64_t>(onDevice(args))},
                      /*isJoin=*/false}});
 }
 
@@ -319,29 +296,39 @@ const pikoir_input *Frame::join(int32_t number, bool isSource) {
   const Stage &stage = p_.stages[isSource ? p_.sources[number].stage : number];
   if (place.args && (isSource || stage.cycle < 0))
     needsHost_ = true;
+  const pikoir_input *input = onDevice(&place.state.input);
   if (!isSource && isStacked(stage))
-    return &place.state.input;
+    return input;
   JoinArgs &args = isSource ? describeSource(number) : describeStage(number);
-  args.strip = stripOf(stage);
-  args.frame = frame_.data();
-  args.kernel = &place.state;
+  args.strip = onDevice(stripOf(stage));
+  args.frame = onDevice(frame_);
+  args.kernel = onDevice(&place.state);
   args.number = nextNumber();
   place.args = &args;
   launchOwn("piko_join", &args, timed_);
   if (!isSource)
     for (int32_t id : p_.stages[number].clears)
       isCleared_[static_cast<size_t>(id)] = true;
-  return &place.state.input;
+  return input;
+}
+
+void Frame::showConstants(GridLaunch &grid) const {
+  for (const State &state : p_.states)
+    if (state.kind == PIKORT_CONSTANT && state.hosts)
+      std::replace(grid.arguments.begin(), grid.arguments.end(),
+                   reinterpret_cast<int64_t>(state.view.data),
+                   reinterpret_cast<int64_t>(state.twin.data()));
 }
 
 void Frame::launch(GridLaunch grid) {
+  showConstants(grid);
   steps_.push_back({Step::Kind::Grid, std::move(grid), nullptr, timed_});
   if (joined_ && joined_->stage >= 0 && !isStacked(p_.stages[joined_->stage]))
     queue(*joined_);
 }
 
 pikoir_log *Frame::log(int32_t number, bool isSource) {
-  return &find(number, isSource).state.log;
+  return onDevice(&find(number, isSource).state.log);
 }
 
 int64_t Frame::mostItems(const JoinArgs &args) const {
@@ -350,7 +337,7 @@ int64_t Frame::mostItems(const JoinArgs &args) const {
        std::span(args.inputs(), static_cast<size_t>(args.inputCount))) {
     if (input.producer || input.queue)
       return -1;
-    most += input.strip ? input.strip->size : input.count;
+    most += input.strip ? exchange_.onHost(input.strip)->size : input.count;
   }
   return most;
 }
@@ -370,14 +357,14 @@ void Frame::clear(int32_t id) {
   const State &state = p_.states[id];
   int64_t size = p_.records[state.record].size;
   isCleared_[static_cast<size_t>(id)] = true;
-  steps_.push_back({Step::Kind::Grid,
-                    {"piko_fill",
-                     device_.joinBlocks(),
-                     joinThreads,
-                     {reinterpret_cast<int64_t>(state.owned.data()),
-                      state.owned.size() / size,
-                      reinterpret_cast<int64_t>(clearRecord(state)), size},
-                     /*isJoin=*/false}});
+  steps_.push_back(
+      {Step::Kind::Grid,
+       {"piko_fill",
+        device_.joinBlocks(),
+        joinThreads,
+        {reinterpret_cast<int64_t>(state.view.data), state.owned.size() / size,
+         reinterpret_cast<int64_t>(clearRecord(state)), size},
+        /*isJoin=*/false}});
 }
 
 // --- The submission ---------------------------------------------------------
@@ -387,20 +374,22 @@ bool Frame::submit() {
   std::span<uint8_t> room;
   if (!needsHost_)
     room = device_.logSpace();
-  if (room.empty()) {
-    clearLog();
+  if (room.empty())
     return false;
-  }
   auto begin = reinterpret_cast<int64_t>(room.data());
-  logBegin_ = room.data() + headRoom + spareRoom;
-  FrameState &frame = frame_[0];
-  frame = {};
-  frame.progress = device_.progress();
-  frame.mostAlone = device_.mostAlone();
-  frame.log.spare = begin + headRoom;
-  frame.log.cursor = begin + headRoom + spareRoom;
-  frame.log.limit = begin + static_cast<int64_t>(room.size());
-  device_.enqueue(steps_, used_);
+  logBegin_ = begin + headRoom + spareRoom;
+  frame_->progress = device_.progress();
+  frame_->mostAlone = device_.mostAlone();
+  frame_->blockSums =
+      reinterpret_cast<uint64_t (*)[mostJoinBlocks]>(blockSums_.data());
+  frame_->log.spare = begin + headRoom;
+  frame_->log.cursor = logBegin_;
+  frame_->log.limit = begin + static_cast<int64_t>(room.size());
+  for (size_t i = 0; i < p_.states.size(); ++i)
+    if (State &state = p_.states[i];
+        state.owned && state.hosts && !isCleared_[i])
+      bringToDevice(p_, state);
+  device_.enqueue(steps_, exchange_, frame_ + 1);
   return true;
 }
 
@@ -408,27 +397,19 @@ bool Frame::isDone() const { return device_.isDone(); }
 
 Frame::Outcome Frame::await() {
   device_.await(steps_);
-  const FrameState &frame = frame_[0];
-  const KernelState *last = frame.latest;
+  const KernelState *last = exchange_.onHost(frame_->latest);
   int64_t end =
-      std::max(last ? last->log.cursor : frame.log.cursor, frame.highest);
-  auto begin = reinterpret_cast<int64_t>(logBegin_);
-  used_ = {logBegin_,
-           static_cast<size_t>(std::min(end, frame.log.limit) - begin)};
-  p_.memory.noteOthers(static_cast<int64_t>(used_.size()));
-  bool failed = frame.failed != 0 || end > frame.log.limit ||
-                (last && last->log.errors != 0);
-  if (!failed) {
-    noteStatistics();
-    return Outcome::Done;
-  }
-  clearLog();
-  return keepsState() ? Outcome::Spoilt : Outcome::Repeat;
-}
-
-void Frame::clearLog() {
-  if (!used_.empty())
-    device_.clearLog(std::exchange(used_, {}));
+      std::max(last ? last->log.cursor : frame_->log.cursor, frame_->highest);
+  int64_t limit = frame_->log.limit;
+  p_.memory.noteOthers(std::min(end, limit) - logBegin_);
+  bool failed =
+      frame_->failed != 0 || end > limit || (last && last->log.errors != 0);
+  if (end > limit)
+    device_.growLog();
+  if (failed)
+    return keepsState() ? Outcome::Spoilt : Outcome::Repeat;
+  noteStatistics();
+  return Outcome::Done;
 }
 
 bool Frame::keepsState() const {
@@ -452,5 +433,5 @@ void Frame::noteStatistics() {
   }
   for (size_t e = 0; e < p_.edges.size(); ++e)
     p_.stageStats[p_.edges[e].producer].out +=
-        static_cast<int64_t>(received_[static_cast<int64_t>(e)]);
+        static_cast<int64_t>(received_[e]);
 }

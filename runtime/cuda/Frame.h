@@ -5,7 +5,8 @@
 // finds its input and its units. Grids have as many blocks as fill the device,
 // and go over the units that they find. Memory is taken from the pipeline's log
 // space, in address order, from the first kernel to the last; strips take it
-// again.
+// again. What host and device say to each other is in an Exchange: the frame
+// writes the host's copy of it, in which all addresses are the device's.
 //
 //===----------------------------------------------------------------------===//
 
@@ -14,13 +15,11 @@
 
 #include "common/DeviceFrame.h"
 #include "common/Pipeline.h"
+#include "cuda/Exchange.h"
 #include "cuda/device/Joins.h"
 
-#include <algorithm>
 #include <map>
-#include <new>
 #include <string>
-#include <type_traits>
 #include <vector>
 
 namespace piko::cuda {
@@ -55,7 +54,7 @@ struct Step {
 
 class Frame final : public rt::DeviceFrame {
 public:
-  Frame(pikort_pipeline &p, Accelerator &device) : p_(p), device_(device) {}
+  Frame(pikort_pipeline &p, Accelerator &device);
 
   bool isPossible() const override;
   bool begin() override;
@@ -79,46 +78,8 @@ private:
   /// A kernel of the program: a stage's, or the AssignBin of a source.
   struct Place {
     KernelState state;
-    JoinArgs *args; ///< Of its latest join.
+    JoinArgs *args; ///< Of its latest join, where the host has them.
     int32_t stage;  ///< -1: of a source.
-  };
-  /// What grids are told: memory that the device reads, which a frame takes
-  /// piece by piece. The same requests get the same pieces.
-  class Arguments {
-  public:
-    void reset() { block_ = 0, used_ = 0; }
-    /// A new one, zero, and behind it copies of elements. Throws OutOfMemory.
-    template <class T, class... Elements>
-    T &take(rt::Memory &memory, const std::vector<Elements> &...elements) {
-      size_t bytes =
-          sizeof(T) + (size_t(0) + ... + (elements.size() * sizeof(Elements)));
-      uint8_t *room = takeRoom(memory, static_cast<int64_t>(bytes));
-      T &taken = *new (room) T{};
-      room += sizeof(T);
-      (..., put(room, elements));
-      return taken;
-    }
-    /// Copies alone.
-    template <class T>
-    const T *copy(rt::Memory &memory, const std::vector<T> &elements) {
-      auto bytes = static_cast<int64_t>(elements.size() * sizeof(T));
-      uint8_t *room = takeRoom(memory, bytes), *first = room;
-      put(room, elements);
-      return reinterpret_cast<const T *>(first);
-    }
-
-  private:
-    uint8_t *takeRoom(rt::Memory &memory, int64_t bytes);
-    template <class T>
-    static void put(uint8_t *&room, const std::vector<T> &elements) {
-      static_assert(alignof(T) == 8 && std::is_trivially_copyable_v<T>);
-      std::copy(elements.begin(), elements.end(), reinterpret_cast<T *>(room));
-      room += elements.size() * sizeof(T);
-    }
-
-    std::vector<rt::Array<uint8_t>> blocks_;
-    size_t block_ = 0;
-    int64_t used_ = 0; ///< Of that block.
   };
   /// Strips of a source while a frame is recorded.
   struct StripRecord {
@@ -145,9 +106,15 @@ private:
                : strips_[static_cast<size_t>(stage.stripGroup)].state;
   }
   void takeMemory();
+  /// Where the device has what the host has.
+  template <class T> T *onDevice(T *data) const {
+    return exchange_.onDevice(data);
+  }
+  /// What kernels see of the program's pointers.
+  void showConstants(GridLaunch &grid) const;
   size_t placeOf(int32_t number, bool isSource) const;
   Place &find(int32_t number, bool isSource) const {
-    return places_[static_cast<int64_t>(placeOf(number, isSource))];
+    return places_[placeOf(number, isSource)];
   }
   /// Notes a grid of the runtime's own kernels, for one of the pipeline's.
   void launchOwn(const char *kernel, const void *args, int32_t timed = -1);
@@ -167,6 +134,7 @@ private:
   std::vector<JoinClear> describeClears(const rt::Stage &stage);
   /// How many primitives come in, or -1 where only the device knows.
   int64_t mostItems(const JoinArgs &args) const;
+  /// Where the device has the record that an image is cleared to.
   const uint8_t *clearRecord(const rt::State &state);
   // What kernels of a cycle emit waits in queues (FrameCycles.cpp).
   void queue(const Place &place);
@@ -176,7 +144,7 @@ private:
   void repeat(const int32_t &again);
   void endRepeat(const int32_t &again);
   QueueState &entriesOf(int32_t stage) const {
-    return queues_[static_cast<int64_t>(p_.edges.size()) + stage];
+    return queues_[p_.edges.size() + static_cast<size_t>(stage)];
   }
   /// Whether it runs one position at a time.
   bool isStacked(const rt::Stage &stage) const {
@@ -200,14 +168,12 @@ private:
     std::vector<QueueState *> queues;
     for (size_t e = 0; e < p_.edges.size(); ++e)
       if (wanted(p_.edges[e]))
-        queues.push_back(&queues_[static_cast<int64_t>(e)]);
+        queues.push_back(onDevice(&queues_[e]));
     return queues;
   }
   StepArgs &takeStep(const std::vector<QueueState *> &waiting);
 
   void noteStatistics();
-  /// Makes the log zero again, as the host's way needs it.
-  void clearLog();
   /// Whether the run has changed state that it did not clear.
   bool keepsState() const;
 
@@ -225,21 +191,19 @@ private:
   /// Of each stage whose schedule depends on the bin.
   std::map<const rt::Stage *, const BinCut *> cuts_;
   std::vector<StripRecord> strips_; ///< Of each group.
-  // From run to run, where the device sees it:
-  bool hasMemory_ = false; ///< All of what follows.
-  rt::Array<FrameState> frame_;
-  rt::Array<Place> places_;
+  // What host and device have of a frame:
+  Exchange exchange_;
+  Place *places_ = nullptr;
+  uint64_t *received_ = nullptr; ///< Of each edge, then of each source.
+  FrameState *frame_ = nullptr;  ///< To here the device says something.
   /// Of each edge, then, of what comes into a loop, of each stage.
-  rt::Array<QueueState> queues_;
-  rt::Array<LoopState> loops_;
-  rt::Array<CycleState> cycles_;
-  rt::Array<StackState> stackStates_; ///< Of each loop.
-  rt::Array<uint64_t> received_;      ///< Of each edge, then of each source.
-  Arguments arguments_;
-  rt::Array<uint8_t> clearRecords_;
-  std::map<const rt::State *, int64_t> clearOffsets_;
-  uint8_t *logBegin_ = nullptr; ///< Where grids begin to take memory.
-  std::span<uint8_t> used_;     ///< Of the log, by the run before.
+  QueueState *queues_ = nullptr;
+  LoopState *loops_ = nullptr;
+  CycleState *cycles_ = nullptr;
+  StackState *stackStates_ = nullptr; ///< Of each loop.
+  std::map<const rt::State *, const uint8_t *> clearRecords_;
+  rt::DeviceBytes blockSums_; ///< The device's alone.
+  int64_t logBegin_ = 0;      ///< Where grids begin to take memory.
 };
 
 } // namespace piko::cuda

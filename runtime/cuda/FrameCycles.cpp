@@ -87,7 +87,7 @@ std::vector<QueuePort> Frame::describePorts(int32_t kernel) const {
     const Edge &edge = p_.edges[e];
     if (hasQueue(edge))
       ports.push_back({describeEdge(e), describeShape(p_.stages[edge.consumer]),
-                       &queues_[e], groupOf(edge), memberOf(edge)});
+                       onDevice(&queues_[e]), groupOf(edge), memberOf(edge)});
   }
   return ports;
 }
@@ -96,9 +96,9 @@ void Frame::queue(const Place &place) {
   std::vector<QueuePort> ports = describePorts(place.stage);
   if (ports.empty())
     return;
-  auto &args = arguments_.take<QueueArgs>(p_.memory, ports);
+  auto &args = exchange_.takeWith<QueueArgs>(ports);
   args.portCount = static_cast<int32_t>(ports.size());
-  args.frame = frame_.data();
+  args.frame = onDevice(frame_);
   args.kernel = place.args->kernel;
   args.loop = place.args->loop;
   args.number = nextNumber();
@@ -108,11 +108,11 @@ void Frame::queue(const Place &place) {
 // --- Loops ------------------------------------------------------------------
 
 void Frame::repeat(const int32_t &again) {
-  steps_.push_back({Step::Kind::Repeat, {}, &again});
+  steps_.push_back({Step::Kind::Repeat, {}, onDevice(&again)});
 }
 
 void Frame::endRepeat(const int32_t &again) {
-  steps_.push_back({Step::Kind::End, {}, &again});
+  steps_.push_back({Step::Kind::End, {}, onDevice(&again)});
 }
 
 int32_t Frame::stepLoop(int32_t loop) {
@@ -138,9 +138,9 @@ int32_t Frame::stepLoop(int32_t loop) {
 }
 
 StepArgs &Frame::takeStep(const std::vector<QueueState *> &waiting) {
-  auto &args = arguments_.take<StepArgs>(p_.memory, waiting);
+  auto &args = exchange_.takeWith<StepArgs>(waiting);
   args.queueCount = static_cast<int32_t>(waiting.size());
-  args.frame = frame_.data();
+  args.frame = onDevice(frame_);
   args.number = nextNumber();
   args.limit = p_.loopLimit;
   return args;
@@ -153,7 +153,7 @@ std::vector<JoinInput> Frame::describeWave(int32_t number) const {
   std::erase_if(inputs, [](const JoinInput &input) { return !input.isInLoop; });
   if (comesFromOutside(stage)) {
     JoinInput &entries = inputs.emplace_back();
-    entries.queue = &entriesOf(number);
+    entries.queue = onDevice(&entriesOf(number));
     entries.isInLoop = true;
   }
   return inputs;
@@ -169,21 +169,25 @@ void Frame::enter(int32_t loop) {
     if (!comesFromOutside(stage))
       continue;
     std::vector<JoinInput> ofStage = describeInputs(stage);
-    entries.push_back(
-        {&find(s, false).state, &entriesOf(s), describeShape(stage),
-         stripOf(stage), static_cast<int32_t>(inputs.size()),
-         static_cast<int32_t>(ofStage.size()), static_cast<int32_t>(m)});
+    entries.push_back({onDevice(&find(s, false).state), onDevice(&entriesOf(s)),
+                       describeShape(stage), onDevice(stripOf(stage)),
+                       static_cast<int32_t>(inputs.size()),
+                       static_cast<int32_t>(ofStage.size()),
+                       static_cast<int32_t>(m)});
     inputs.insert(inputs.end(), ofStage.begin(), ofStage.end());
   }
-  auto &args = arguments_.take<EnterArgs>(p_.memory, entries, inputs);
-  args.frame = frame_.data();
-  args.loop = &loops_[loop];
+  auto &args = exchange_.takeWith<EnterArgs>(entries, inputs);
+  args.frame = onDevice(frame_);
+  args.loop = onDevice(&loops_[loop]);
   args.number = nextNumber();
   args.keyWidth = p_.loops[loop].keyWidth;
   args.entryCount = static_cast<int32_t>(entries.size());
   args.inputCount = static_cast<int32_t>(inputs.size());
-  if (p_.loops[loop].ordered)
-    args.stack = stacks_[static_cast<size_t>(loop)] = &describeStack(loop);
+  if (p_.loops[loop].ordered) {
+    StackArgs *&stack = stacks_[static_cast<size_t>(loop)];
+    stack = &describeStack(loop);
+    args.stack = onDevice(stack);
+  }
   launchOwn("piko_enter", &args);
 }
 
@@ -192,15 +196,16 @@ StackArgs &Frame::describeStack(int32_t loop) {
   std::vector<QueuePort> ports;
   for (int32_t s : p_.loops[loop].stages) {
     std::vector<QueuePort> ofStage = describePorts(s);
-    members.push_back({&find(s, false).state, describeShape(p_.stages[s]),
-                       p_.stages[s].tiles, static_cast<int32_t>(ports.size()),
+    members.push_back({onDevice(&find(s, false).state),
+                       describeShape(p_.stages[s]), p_.stages[s].tiles,
+                       static_cast<int32_t>(ports.size()),
                        static_cast<int32_t>(ofStage.size())});
     ports.insert(ports.end(), ofStage.begin(), ofStage.end());
   }
-  auto &args = arguments_.take<StackArgs>(p_.memory, members, ports);
-  args.frame = frame_.data();
-  args.loop = &loops_[loop];
-  args.stack = &stackStates_[loop];
+  auto &args = exchange_.takeWith<StackArgs>(members, ports);
+  args.frame = onDevice(frame_);
+  args.loop = onDevice(&loops_[loop]);
+  args.stack = onDevice(&stackStates_[loop]);
   args.limit = p_.loopLimit;
   args.memberCount = static_cast<int32_t>(members.size());
   args.portCount = static_cast<int32_t>(ports.size());
@@ -217,7 +222,7 @@ void Frame::endWave(int32_t loop) {
   StepArgs &args = takeStep(describeWaiting([&](const Edge &edge) {
     return edge.insideLoop && p_.stages[edge.producer].loop == loop;
   }));
-  args.loop = &loops_[loop];
+  args.loop = onDevice(&loops_[loop]);
   if (hasEntries(p_.loops[loop]) && args.limit < INT64_MAX)
     ++args.limit;
   launchOwn("piko_wave", &args);
@@ -226,13 +231,13 @@ void Frame::endWave(int32_t loop) {
 void Frame::endLoop(int32_t loop) {
   std::vector<ExitGroup> groups;
   for (int32_t e : exitsOf(p_.loops[loop]))
-    groups.push_back({&queues_[e],
+    groups.push_back({onDevice(&queues_[e]),
                       describeShape(p_.stages[p_.edges[e].consumer]),
                       p_.edges[e].keyWidth});
-  auto &args = arguments_.take<LeaveArgs>(p_.memory, groups);
+  auto &args = exchange_.takeWith<LeaveArgs>(groups);
   args.groupCount = static_cast<int32_t>(groups.size());
-  args.frame = frame_.data();
-  args.loop = &loops_[loop];
+  args.frame = onDevice(frame_);
+  args.loop = onDevice(&loops_[loop]);
   args.number = nextNumber();
   args.keyWidth = p_.loops[loop].keyWidth;
   launchOwn("piko_leave", &args);
@@ -260,6 +265,6 @@ void Frame::endRound(int32_t cycle) {
     const Stage &to = p_.stages[edge.consumer];
     return hasQueue(edge) && to.cycle == cycle && to.collects();
   }));
-  args.cycle = &cycles_[cycle];
+  args.cycle = onDevice(&cycles_[cycle]);
   launchOwn("piko_round", &args);
 }

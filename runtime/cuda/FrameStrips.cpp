@@ -20,7 +20,7 @@ bool Frame::nextStrip(int32_t number, int64_t size) {
   bool isFirst = !strips.state;
   if (isFirst) {
     int64_t all = p_.sources[p_.stripGroups[number].source].count;
-    strips.state = &arguments_.take<StripState>(p_.memory);
+    strips.state = exchange_.take<StripState>();
     *strips.state = {.again = 1,
                      .number = 0,
                      .begin = 0,
@@ -44,7 +44,7 @@ std::vector<StripQueue> Frame::describeLeaving(int32_t group) const {
   for (size_t e = 0; e < p_.edges.size(); ++e) {
     const Edge &edge = p_.edges[e];
     if (edge.leavesStrips && p_.stages[edge.producer].stripGroup == group)
-      queues.push_back({&queues_[static_cast<int64_t>(e)],
+      queues.push_back({onDevice(&queues_[e]),
                         p_.records[p_.stages[edge.consumer].record].size});
   }
   return queues;
@@ -58,7 +58,7 @@ std::vector<QueueState *> Frame::describeInside(int32_t group) const {
   });
   for (int32_t s : p_.stripGroups[group].stages)
     if (p_.stages[s].loop >= 0)
-      queues.push_back(&entriesOf(s));
+      queues.push_back(onDevice(&entriesOf(s)));
   return queues;
 }
 
@@ -68,14 +68,15 @@ void Frame::endStrip(int32_t group) {
   std::vector<CycleState *> cycles;
   for (size_t c = 0; c < p_.cycles.size(); ++c)
     if (p_.stages[p_.cycles[c].stages.front()].stripGroup == group)
-      cycles.push_back(&cycles_[static_cast<int64_t>(c)]);
-  auto &args = arguments_.take<StripArgs>(p_.memory, leaving, inside, cycles);
-  args.frame = frame_.data();
-  args.strip = strips_[static_cast<size_t>(group)].state;
+      cycles.push_back(onDevice(&cycles_[c]));
+  auto &args = exchange_.takeWith<StripArgs>(leaving, inside, cycles);
+  StripState *strip = strips_[static_cast<size_t>(group)].state;
+  args.frame = onDevice(frame_);
+  args.strip = onDevice(strip);
   args.number = nextNumber();
   args.leavingCount = static_cast<int32_t>(leaving.size());
   args.insideCount = static_cast<int32_t>(inside.size());
   args.cycleCount = static_cast<int32_t>(cycles.size());
   launchOwn("piko_strip", &args);
-  endRepeat(args.strip->again);
+  endRepeat(strip->again);
 }

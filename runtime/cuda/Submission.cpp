@@ -45,12 +45,11 @@ bool Submission::canBeGraph(std::span<const Step> steps) const {
          ((hasConditions && !refusesConditions_) || !repeats(steps));
 }
 
-bool Submission::tryGraph(std::span<const Step> steps,
-                          std::span<uint8_t> clear) {
+bool Submission::tryGraph(std::span<const Step> steps) {
   if (timesKernels_ || !canBeGraph(steps))
     return false;
   try {
-    makeGraph(steps, clear);
+    makeGraph(steps);
   } catch (const piko::rt::Failure &) {
     if (canBeGraph(steps))
       throw;
@@ -59,14 +58,13 @@ bool Submission::tryGraph(std::span<const Step> steps,
   return true;
 }
 
-void Submission::run(std::span<const Step> steps, std::span<uint8_t> clear) {
+void Submission::run(std::span<const Step> steps) {
   timesKernels_ = accelerator_.p_.timesKernels;
-  if (tryGraph(steps, clear)) {
+  if (tryGraph(steps)) {
     accelerator_.device_->check(
         driver().cuGraphLaunch(graph_, accelerator_.stream_),
         "running a frame");
   } else {
-    accelerator_.clearLog(clear);
     beginTimes();
     runOneByOne(steps);
   }
@@ -108,13 +106,12 @@ void Submission::runOneByOne(std::span<const Step> steps) {
       continue;
     }
     std::span<const Step> body = bodyOf(steps.subspan(i));
-    const volatile int32_t *again = steps[i].again;
     do {
       runOneByOne(body);
       accelerator_.wait(steps);
       addTimes();
       beginTimes();
-    } while (*again != 0);
+    } while (accelerator_.read(steps[i].again) != 0);
     i += body.size() + 1;
   }
 }
@@ -126,15 +123,12 @@ void Submission::dropGraph() noexcept {
     driver().cuGraphExecDestroy(std::exchange(graph_, nullptr));
 }
 
-void Submission::makeGraph(std::span<const Step> steps,
-                           std::span<uint8_t> clear) {
-  bool isSame = graph_ && std::ranges::equal(steps, steps_) &&
-                clear.data() == clear_.data() && clear.size() == clear_.size();
-  if (isSame)
+void Submission::makeGraph(std::span<const Step> steps) {
+  if (graph_ && std::ranges::equal(steps, steps_))
     return;
   if (repeats(steps)) // a capture refuses to load it
     accelerator_.conditions_.find(conditionKernel);
-  CUgraph graph = capture(steps, clear);
+  CUgraph graph = capture(steps);
   CUgraphExecUpdateResultInfo info{};
   // Handles of conditions are not among what can be changed.
   bool changes =
@@ -148,11 +142,9 @@ void Submission::makeGraph(std::span<const Step> steps,
   driver().cuGraphDestroy(graph);
   check(result);
   steps_.assign(steps.begin(), steps.end());
-  clear_ = clear;
 }
 
-CUgraph Submission::capture(std::span<const Step> steps,
-                            std::span<uint8_t> clear) {
+CUgraph Submission::capture(std::span<const Step> steps) {
   CUstream stream = accelerator_.own_;
   streamOf(depthOf(steps)); // a capture refuses to make them
   // Other threads may do with the device what they like meanwhile.
@@ -161,7 +153,6 @@ CUgraph Submission::capture(std::span<const Step> steps,
                               "capturing a frame");
   CUgraph graph = nullptr;
   try {
-    accelerator_.clearLog(clear, stream);
     addSteps(steps, 0);
   } catch (...) {
     for (; captured_ > 0; --captured_) // their graphs are the whole one's
@@ -231,8 +222,10 @@ void Submission::addRepeat(std::span<const Step> body, const int32_t *again,
                                           &last, &lastCount));
   };
   findGraph();
+  // That of all nodes of the body.
+  CUcontext context = accelerator_.device_->context();
   CUgraphConditionalHandle handle = 0;
-  check(driver().cuGraphConditionalHandleCreate(&handle, graph, nullptr,
+  check(driver().cuGraphConditionalHandleCreate(&handle, graph, context,
                                                 /*value=*/0, /*flags=*/0));
   setCondition(handle, again, depth);
   findGraph();
@@ -241,6 +234,7 @@ void Submission::addRepeat(std::span<const Step> body, const int32_t *again,
   parameters.conditional.handle = handle;
   parameters.conditional.type = CU_GRAPH_COND_TYPE_WHILE;
   parameters.conditional.size = 1;
+  parameters.conditional.ctx = context;
   CUgraphNode node = nullptr;
   check(driver().cuGraphAddNode(&node, graph, last, nullptr, lastCount,
                                 &parameters));

@@ -26,9 +26,9 @@ public:
   Submission(const Submission &) = delete;
   Submission &operator=(const Submission &) = delete;
 
-  /// Gives the stream of the run what the steps say, behind making a part of
-  /// the log zero. The device must be entered; throws.
-  void run(std::span<const Step> steps, std::span<uint8_t> clear);
+  /// Gives the stream of the run what the steps say. The device must be
+  /// entered; throws.
+  void run(std::span<const Step> steps);
   /// When that has ended: adds what kernels took, if that is measured; throws.
   void addTimes();
   /// Frees what it has of the device, which must be entered.
@@ -40,14 +40,14 @@ private:
   bool canBeGraph(std::span<const Step> steps) const;
   /// Makes `graph_` of the steps; false if they are to run one by one, also
   /// because the driver refuses conditions, as where MPS shares the device.
-  bool tryGraph(std::span<const Step> steps, std::span<uint8_t> clear);
+  bool tryGraph(std::span<const Step> steps);
   void runOneByOne(std::span<const Step> steps);
   /// What stands between a Repeat, the first step, and its end.
   static std::span<const Step> bodyOf(std::span<const Step> steps);
 
   /// Makes `graph_` of the steps, or changes it to them.
-  void makeGraph(std::span<const Step> steps, std::span<uint8_t> clear);
-  CUgraph capture(std::span<const Step> steps, std::span<uint8_t> clear);
+  void makeGraph(std::span<const Step> steps);
+  CUgraph capture(std::span<const Step> steps);
   CUresult endCapture(CUstream stream, CUgraph &graph) const;
   /// On a stream that is captured; bodies are captured on others.
   void addSteps(std::span<const Step> steps, size_t depth);
@@ -68,7 +68,6 @@ private:
   CUgraphExec graph_ = nullptr;
   bool refusesConditions_ = false;
   std::vector<Step> steps_; ///< Of the graph.
-  std::span<uint8_t> clear_;
 };
 
 } // namespace piko::cuda

@@ -5,8 +5,9 @@
 // is opened, told its entries one after the other, and closed, as the CPU's
 // kernel would do it.
 //
-// Room is address space: the system gives pages where they are written. It is
-// the accelerator's, or else mapped for each grid.
+// Room is the accelerator's, of which the host copies what was used, or address
+// space that is mapped for each grid: the system gives pages where they are
+// written.
 //
 //===----------------------------------------------------------------------===//
 
@@ -42,13 +43,9 @@ struct Place {
   int32_t code;
 };
 
-struct GridLog;
+} // namespace
 
-/// Begins the room, where threads find it.
-struct Head : pikoir_log {
-  GridLog *log;
-};
-static_assert(sizeof(Head) <= headRoom);
+namespace piko::rt {
 
 struct GridLog {
   GridLog(pikort_pipeline &p, Kernel &kernel, int32_t number, bool isSource);
@@ -57,15 +54,12 @@ struct GridLog {
   ~GridLog() {
     if (!pipeline.accelerator && !room.empty())
       munmap(room.data(), room.size());
-    else if (head && pipeline.status != PIKORT_DEVICE_FAILED)
-      pipeline.accelerator->clearLog(used());
   }
 
   void close();
-  std::span<uint8_t> used() const {
-    return {
-        reinterpret_cast<uint8_t *>(head->units),
-        static_cast<size_t>(std::min(head->cursor, head->limit) - head->units)};
+  /// Where threads find it.
+  pikoir_log *data() const {
+    return reinterpret_cast<pikoir_log *>(room.data());
   }
 
   pikort_pipeline &pipeline;
@@ -73,13 +67,20 @@ struct GridLog {
   bool isSource;
   int64_t units;
   std::span<uint8_t> room;
-  Head *head = nullptr;
   std::vector<Place> places;
 
 private:
   using Spans = std::vector<pikoir_span>;
 
   static std::span<uint8_t> mapRoom();
+  /// Lets threads find the head.
+  void begin();
+  /// Makes all that they have left the host's.
+  void fetch();
+  /// What is at an address of theirs.
+  template <class T> const T *at(int64_t address) const {
+    return reinterpret_cast<const T *>(address + shift);
+  }
 
   /// What a unit has.
   Spans collect(int64_t unit) const;
@@ -87,9 +88,13 @@ private:
   void replay(pikoir_writer *writer, const pikoir_entry &entry);
   void fail(const pikoir_entry &entry);
   void failAll(std::vector<const pikoir_entry *> &errors);
+
+  pikoir_log head{};
+  Array<uint8_t> copy; ///< Of an accelerator's memory.
+  int64_t shift = 0;   ///< From there to the copy.
 };
 
-} // namespace
+} // namespace piko::rt
 
 GridLog::GridLog(pikort_pipeline &p, Kernel &kernel, int32_t number,
                  bool isSource)
@@ -98,13 +103,12 @@ GridLog::GridLog(pikort_pipeline &p, Kernel &kernel, int32_t number,
       room(p.accelerator ? p.accelerator->logSpace() : mapRoom()) {
   if (room.empty())
     throw OutOfMemory{static_cast<int64_t>(leastRoom)};
-  head = new (room.data()) Head{};
-  auto begin = reinterpret_cast<int64_t>(room.data());
-  head->spare = begin + headRoom;
-  head->units = head->spare + spareRoom; // zero, as all behind the spare room
-  head->cursor = head->units + tableBytes(units);
-  head->limit = begin + static_cast<int64_t>(room.size());
-  head->log = this;
+  auto begins = reinterpret_cast<int64_t>(room.data());
+  head.spare = begins + headRoom;
+  head.units = head.spare + spareRoom;
+  head.cursor = head.units + tableBytes(units);
+  head.limit = begins + static_cast<int64_t>(room.size());
+  begin();
 }
 
 std::span<uint8_t> GridLog::mapRoom() {
@@ -117,15 +121,47 @@ std::span<uint8_t> GridLog::mapRoom() {
   return {};
 }
 
+/// The table of units is zero; what threads take they write first.
+void GridLog::begin() {
+  if (!pipeline.accelerator) {
+    *data() = head;
+    return;
+  }
+  if (head.cursor > head.limit)
+    throw OutOfMemory{head.cursor - head.limit};
+  pipeline.accelerator->upload(
+      room.data(), reinterpret_cast<const uint8_t *>(&head), sizeof(head));
+  if (units > 0)
+    pipeline.accelerator->clear(reinterpret_cast<uint8_t *>(head.units),
+                                tableBytes(units));
+}
+
+void GridLog::fetch() {
+  Accelerator *device = pipeline.accelerator.get();
+  if (!device) {
+    head = *data();
+    return;
+  }
+  device->download(reinterpret_cast<uint8_t *>(&head), room.data(),
+                   sizeof(head));
+  device->finishStream();
+  int64_t used = std::min(head.cursor, head.limit) - head.units;
+  copy = Array<uint8_t>(pipeline.memory, std::max<int64_t>(used, 1));
+  shift = reinterpret_cast<int64_t>(copy.data()) - head.units;
+  if (used == 0)
+    return;
+  device->download(copy.data(), reinterpret_cast<uint8_t *>(head.units), used);
+  device->finishStream();
+}
+
 GridLog::Spans GridLog::collect(int64_t unit) const {
   Spans found;
-  int64_t at =
-      reinterpret_cast<const pikoir_unit_log *>(head->units)[unit].first;
-  while (at != 0) {
-    const auto *piece = reinterpret_cast<const pikoir_piece *>(at);
+  int64_t next = at<pikoir_unit_log>(head.units)[unit].first;
+  while (next != 0) {
+    const auto *piece = at<pikoir_piece>(next);
     const auto *first = reinterpret_cast<const pikoir_span *>(piece + 1);
     found.insert(found.end(), first, first + piece->spans);
-    at = piece->next;
+    next = piece->next;
   }
   return found;
 }
@@ -191,10 +227,10 @@ void GridLog::replayUnit(int64_t unit, const Spans &spans) {
           pikoir_open(&pipeline, static_cast<int32_t>(s), unit));
   std::vector<const pikoir_entry *> errors;
   for (const pikoir_span &span : spans)
-    for (int64_t at = span.begin; at != span.end;) {
-      const auto *entry = reinterpret_cast<const pikoir_entry *>(at);
+    for (int64_t next = span.begin; next != span.end;) {
+      const auto *entry = at<pikoir_entry>(next);
       if (entry->kind == PIKOIR_ENTRY_LINK) {
-        std::memcpy(&at, &entry->number, sizeof(at));
+        std::memcpy(&next, &entry->number, sizeof(next));
         continue;
       }
       if (entry->kind == PIKOIR_ENTRY_ERROR)
@@ -202,7 +238,7 @@ void GridLog::replayUnit(int64_t unit, const Spans &spans) {
       for (auto [stage, writer] : writers)
         if (entry->kind != PIKOIR_ENTRY_ERROR && stage == entry->stage)
           replay(writer, *entry);
-      at += entry->bytes;
+      next += entry->bytes;
     }
   failAll(errors);
   for (auto it = writers.rbegin(); it != writers.rend(); ++it)
@@ -212,10 +248,11 @@ void GridLog::replayUnit(int64_t unit, const Spans &spans) {
 void GridLog::close() {
   if (pipeline.status != PIKORT_OK)
     return; // the grid did not end
-  if (head->cursor > head->limit)
+  fetch();
+  if (head.cursor > head.limit)
     return pipeline.report({0, PIKORT_OUT_OF_MEMORY,
                             isSource ? pipeline.sources[number].stage : number,
-                            head->cursor - head->limit, 0, 0});
+                            head.cursor - head.limit, 0, 0});
   for (int64_t unit = 0; unit < units; ++unit)
     replayUnit(unit, collect(unit));
 }
@@ -239,14 +276,17 @@ int64_t pikoir_blocks(pikort_pipeline *p, int32_t number, int32_t flags,
 }
 
 pikoir_log *pikoir_log_open(pikort_pipeline *p, int32_t number, int32_t flags) {
-  GridLog *log = nullptr;
   if (DeviceFrame *frame = recordingOf(*p))
     return frame->log(number, flags & PIKOIR_LOG_SOURCE);
+  pikoir_log *opened = nullptr;
   guarded(p, "run", [&] {
-    log = new GridLog(*p, findKernel(*p, number, flags), number,
-                      (flags & PIKOIR_LOG_SOURCE) != 0);
+    auto log =
+        std::make_shared<GridLog>(*p, findKernel(*p, number, flags), number,
+                                  (flags & PIKOIR_LOG_SOURCE) != 0);
+    opened = log->data();
+    cpuOf(*p).logs[opened] = std::move(log);
   });
-  return log ? log->head : nullptr;
+  return opened;
 }
 
 void pikoir_log_place(pikort_pipeline *p, pikoir_log *log, int32_t place,
@@ -254,7 +294,7 @@ void pikoir_log_place(pikort_pipeline *p, pikoir_log *log, int32_t place,
                       int32_t code) {
   if (!log || recordingOf(*p))
     return;
-  auto &places = static_cast<Head *>(log)->log->places;
+  auto &places = cpuOf(*p).logs.at(log)->places;
   if (places.size() <= static_cast<size_t>(place))
     places.resize(static_cast<size_t>(place) + 1);
   places[static_cast<size_t>(place)] = {function, stage, name, code};
@@ -263,9 +303,9 @@ void pikoir_log_place(pikort_pipeline *p, pikoir_log *log, int32_t place,
 void pikoir_log_close(pikort_pipeline *p, pikoir_log *log) {
   if (!log || recordingOf(*p))
     return;
-  GridLog *grid = static_cast<Head *>(log)->log;
-  guarded(&grid->pipeline, "run", [&] { grid->close(); });
-  delete grid;
+  auto found = cpuOf(*p).logs.find(log);
+  guarded(p, "run", [&] { found->second->close(); });
+  cpuOf(*p).logs.erase(found);
 }
 
 } // extern "C"

@@ -17,11 +17,58 @@ constexpr uint64_t arrayBytes = 5000 * sizeof(int32_t);
 
 class CudaMemory : public Cuda {};
 
+/// That arrays were copied so often, beside what host and device say to each
+/// other.
+void expectArrays(uint64_t bytes, uint64_t arrays) {
+  EXPECT_EQ(bytes / arrayBytes, arrays) << bytes;
+}
+
 TEST_F(CudaMemory, HostMemoryIsCopiedForEachRun) {
   ASSERT_TRUE(scale(3));
-  EXPECT_EQ(hostCounts().bytesToDevice, 3 * 2 * arrayBytes + 4);
-  EXPECT_EQ(hostCounts().bytesFromDevice, 3 * arrayBytes);
+  expectArrays(hostCounts().bytesToDevice, 3 * 2);
+  expectArrays(hostCounts().bytesFromDevice, 3);
   EXPECT_EQ(hostCounts().bytesOnDevice, 0u);
+}
+
+TEST_F(CudaMemory, StaticInputIsCopiedOnce) {
+  Pipeline pipe{program, Device{0}};
+  ASSERT_TRUE(bind(pipe));
+  ASSERT_TRUE(pipe.staticInput(true));
+  for (int32_t factor : {3, 4, 5}) {
+    ASSERT_TRUE(pipe.constant("factor", factor));
+    ASSERT_TRUE(pipe.run());
+    expectScaled(out, factor);
+  }
+  expectArrays(hostCounts().bytesToDevice, 2);
+  numbers[1] = 7; // is not seen ...
+  ASSERT_TRUE(pipe.run());
+  expectScaled(out, 5);
+  ASSERT_TRUE(pipe.source(0, numbers)); // ... until it is bound again
+  ASSERT_TRUE(pipe.run());
+  EXPECT_EQ(out[1], 7 * 5);
+  expectArrays(hostCounts().bytesToDevice, 3);
+  ASSERT_TRUE(pipe.staticInput(false));
+  numbers[1] = 8;
+  ASSERT_TRUE(pipe.run());
+  EXPECT_EQ(out[1], 8 * 5);
+}
+
+// Both write to it, and each sees what the other one has written.
+TEST_F(CudaMemory, AllocatedBuffersGoBothWays) {
+  Pipeline pipe{program, Device{0}};
+  ASSERT_TRUE(bind(pipe));
+  ASSERT_TRUE(pipe.allocate("out", 5000));
+  for (bool needsHost : {false, true, false}) {
+    ASSERT_TRUE(pipe.memoryLimit(needsHost ? int64_t(1) << 30 : 0));
+    ASSERT_TRUE(pipe.source(0, std::span<const int32_t>(numbers).first(4999)));
+    auto view = pipe.view<int32_t>("out").elements;
+    view[4999] = 77;
+    ASSERT_TRUE(pipe.run());
+    view = pipe.view<int32_t>("out").elements;
+    EXPECT_EQ(view[4998], 3 * 4998);
+    EXPECT_EQ(view[4999], 77);
+    view[4998] = 0;
+  }
 }
 
 TEST_F(CudaMemory, DeviceMemoryIsUsedInPlace) {
@@ -34,8 +81,8 @@ TEST_F(CudaMemory, DeviceMemoryIsUsedInPlace) {
   uint64_t before = hostCounts().bytesToDevice;
   for (int run = 0; run < 3; ++run)
     ASSERT_TRUE(pipe.run());
-  EXPECT_EQ(hostCounts().bytesToDevice - before, 4u); // the constant
-  EXPECT_EQ(hostCounts().bytesFromDevice, 0u);
+  expectArrays(hostCounts().bytesToDevice - before, 0);
+  expectArrays(hostCounts().bytesFromDevice, 0);
   EXPECT_EQ(hostCounts().bytesOnDevice, 0u);
   expectScaled(to.get());
   EXPECT_EQ(from.get(), numbers);
@@ -168,7 +215,7 @@ TEST_F(CudaMemory, AllocatedBuffersStayOnTheDevice) {
   ASSERT_TRUE(bind(pipe));
   ASSERT_TRUE(pipe.allocate("out", 5000));
   ASSERT_TRUE(pipe.run());
-  EXPECT_EQ(hostCounts().bytesFromDevice, 0u);
+  expectArrays(hostCounts().bytesFromDevice, 0);
   auto view = pipe.deviceView<int32_t>("out");
   EXPECT_EQ(view.width(), 5000);
   EXPECT_EQ(view.height(), 1);
@@ -178,8 +225,7 @@ TEST_F(CudaMemory, AllocatedBuffersStayOnTheDevice) {
   EXPECT_EQ(view.device, 0);
   ASSERT_TRUE(pipe.read("out", std::span(out)));
   expectScaled();
-  EXPECT_EQ(hostCounts().bytesFromDevice, arrayBytes);
-  EXPECT_EQ(pipe.view<int32_t>("out").elements.data(), view.data()); // managed
+  expectArrays(hostCounts().bytesFromDevice, 1);
 }
 
 // A limit of memory has the host between kernels.
@@ -192,7 +238,7 @@ TEST_F(CudaMemory, WhereTheHostGoesStepByStep) {
   ASSERT_TRUE(pipe.source(0, from.span()));
   ASSERT_TRUE(pipe.buffer("out", to.span()));
   ASSERT_TRUE(pipe.run());
-  EXPECT_EQ(hostCounts().bytesFromDevice, 0u);
+  expectArrays(hostCounts().bytesFromDevice, 0);
   EXPECT_EQ(hostCounts().bytesOnDevice, 3 * arrayBytes);
   expectScaled(to.get());
 }

@@ -42,10 +42,13 @@ TEST_F(Cuda, AFrameIsOneSubmission) {
   EXPECT_EQ(counts.graphLaunches, 3u);
   EXPECT_EQ(counts.graphKernels, 6u); // a join and the kernel
   EXPECT_EQ(counts.launches, 0u);
-  EXPECT_EQ(counts.copies, 10u); // two to it and one back, and the constant
-  EXPECT_EQ(counts.waits, 6u);   // for its end, and for what comes back
-  // The first one has no log to clear; the third is the second, changed.
-  EXPECT_EQ(pikoTestDriverCalls("cuGraphInstantiateWithFlags"), 2u);
+  // Two arrays to it and one back, what both say, and the constant.
+  EXPECT_EQ(counts.copies, 3 * 5 + 1);
+  EXPECT_EQ(counts.fills, 0u);
+  EXPECT_EQ(counts.waits, 6u); // for its end, and for what comes back
+  EXPECT_EQ(pikoTestDriverCalls("cuGraphInstantiateWithFlags"), 1u);
+  EXPECT_EQ(pikoTestDriverCalls("cuStreamBeginCapture"), 1u);
+  EXPECT_EQ(pikoTestDriverCalls("cuMemAllocManaged"), 0u);
 }
 
 // Of a frame that is one submission nothing is known, unless it is asked for.
@@ -165,11 +168,13 @@ TEST_F(Cuda, AccessOutsideOfSharedMemory) {
 }
 
 TEST_F(Cuda, MemoryThatRunsOut) {
-  pikoTestDriverFail("cuMemAllocManaged", 1, CUDA_ERROR_OUT_OF_MEMORY);
-  auto status = scale();
-  EXPECT_EQ(status.code(), PIKORT_OUT_OF_MEMORY) << status.message();
-  ASSERT_TRUE(scale());
-  expectScaled();
+  for (const char *call : {"cuMemAlloc", "cuMemAllocHost"}) {
+    pikoTestDriverFail(call, 1, CUDA_ERROR_OUT_OF_MEMORY);
+    auto status = scale();
+    EXPECT_EQ(status.code(), PIKORT_OUT_OF_MEMORY) << call;
+    ASSERT_TRUE(scale());
+    expectScaled();
+  }
 }
 
 /// Whether the call that failed gives something back, which is lost then.

@@ -69,12 +69,13 @@ struct Boxes : piko::Stage<0, 0, 64, Point, Point>, piko::Uses<State> {
         body(glm::ivec2(x, y), depthOf(p, x));
   }
 };
+// One call for all of them: the last one is seen.
 struct Sink : piko::Stage<0, 0, 64, Point>, piko::Uses<State> {
-  void process(const Point &p) {
-    if (p.tag >= 0)
-      state().hits[p.tag & 63] = p.x;
+  void process(const piko::List<Point> &points) {
+    for (const Point &p : points)
+      if (p.tag >= 0)
+        state().hits[p.tag & 63] = p.x;
   }
-  void schedule(piko::BinId) { specifySchedule(piko::Serialize); }
 };
 template <class Draw> struct Pipe : piko::Pipe<State> {
   Draw draw;

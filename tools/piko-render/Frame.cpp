@@ -47,6 +47,7 @@ Result<std::string> render::createPipeline(const Options &options,
       pikort_set_threads(pipeline, options.threads) != PIKORT_OK ||
       pikort_set_memory_budget(pipeline, options.memoryBudget) != PIKORT_OK ||
       pikort_set_strip_size(pipeline, options.stripSize) != PIKORT_OK ||
+      pikort_set_static_input(pipeline, 1) != PIKORT_OK ||
       (!options.mappings.empty() &&
        pikort_set_mappings(pipeline, options.mappings.c_str()) != PIKORT_OK))
     return errorOf(pipeline);

@@ -45,6 +45,7 @@ private:
   LogicalResult mapIterations(ParallelForOp loop);
   void shareInRounds(scf::ForOp loop);
   LogicalResult mapLocalBin(LocalBinOp local);
+  void clearStates(OpBuilder &builder, Value words);
   void deferIterations(DeferBeginOp begin);
   void defer(DeferIterationOp iteration, Value states, Value has);
   void endDeferral(DeferEndOp end);
@@ -385,6 +386,19 @@ void BlockMapper::copyOutboxes(OpBuilder &builder, Value from, Value fromAt,
   }
 }
 
+/// All threads of the block make the outboxes of iterations empty, as what the
+/// log gives holds what was there.
+void BlockMapper::clearStates(OpBuilder &builder, Value words) {
+  OpBuilder then =
+      scf::IfOp::create(builder, loc, hasStates).getThenBodyBuilder();
+  auto loop = scf::ForOp::create(then, loc, launch.getThreadIds().x, words,
+                                 launch.getBlockSizeX());
+  OpBuilder inside = OpBuilder::atBlockBegin(loop.getBody());
+  Value empty = arith::ConstantIntOp::create(inside, loc, 0, 64);
+  memref::StoreOp::create(inside, loc, empty, states, loop.getInductionVar());
+  gpu::BarrierOp::create(builder, loc);
+}
+
 void BlockMapper::deferIterations(DeferBeginOp begin) {
   OpBuilder builder(begin);
   iterations = begin.getIterations();
@@ -408,6 +422,7 @@ void BlockMapper::deferIterations(DeferBeginOp begin) {
   Value words = arith::MulIOp::create(builder, loc, iterations,
                                       constant(builder, memory.getWords()));
   states = memref::ViewOp::create(builder, loc, type, all, zero, words);
+  clearStates(builder, words);
   own = createOwn(MemRefType::get({memory.getWords()}, builder.getI64Type()));
   SmallVector<DeferIterationOp> deferred;
   for (Operation *op = begin; op && !isa<DeferEndOp>(op);

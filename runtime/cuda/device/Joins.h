@@ -40,10 +40,12 @@ struct FrameState {
                        ///< the frame, or of a strip.
   /// The host's: the grid that runs, as a number in the order of launches.
   volatile int64_t *progress;
+  /// Of each scan, what blocks have; nobody makes it zero.
+  uint64_t (*blockSums)[mostJoinBlocks];
   int32_t failed;   ///< Memory or a count did not suffice, or a kernel failed.
   uint32_t arrived; ///< Blocks at barriers, over all of them.
-  uint64_t blockSums[mostScans][mostJoinBlocks];
 };
+using BlockSums = uint64_t[mostScans][mostJoinBlocks];
 
 /// Lineage keys: see rt::Keys.
 struct KeyWords {

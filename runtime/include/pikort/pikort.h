@@ -197,10 +197,18 @@ typedef struct pikort_view {
 
 /// Where a constant, buffer or image lies. Images and buffers sized by a
 /// source exist after the first run and until the next. Waits for a run that is
-/// on its way. On a device reading it moves pages of managed memory to the
-/// host. A buffer that is memory of the device has no view.
+/// on its way. On a device it is a copy of what the run has left there, and the
+/// next run sees what the host has changed of it. A buffer that is memory of
+/// the device has no view.
 PIKORT_API int32_t pikort_get_view(pikort_pipeline *pipeline, const char *name,
                                    pikort_view *view);
+
+/// Whether what is bound as the host's memory, sources and buffers, stays as it
+/// is from one run to the next, until it is bound again. Then a device gets it
+/// once; otherwise each run sees what is there then, and copies it (0). Of no
+/// effect on the processor, and on runs that need the host between kernels.
+PIKORT_API int32_t pikort_set_static_input(pikort_pipeline *pipeline,
+                                           int32_t on);
 
 /// The memory of a piece of state on a device.
 typedef struct pikort_device_view {

@@ -96,6 +96,10 @@ public:
   Status threads(int32_t count) {
     return status(pikort_set_threads(handle_, count));
   }
+  /// Whether the host's memory that is bound stays as it is from run to run.
+  Status staticInput(bool on) {
+    return status(pikort_set_static_input(handle_, on));
+  }
   Status memoryLimit(int64_t bytes) {
     return status(pikort_set_memory_limit(handle_, bytes));
   }
