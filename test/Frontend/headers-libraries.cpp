@@ -2,6 +2,7 @@
 //
 // What large libraries bring along: builtins and registers of the machine,
 // exceptions, thread-local storage, atomics. Only what a phase calls is judged.
+// REQUIRES: all
 // RUN: piko-translate --cpp-to-piko -I/usr/include/eigen3 %s 2>&1 | FileCheck %s
 #include <Eigen/Dense>
 #include <Eigen/Geometry>

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // Qt beside a pipeline: its headers parse, its inline vectors compile.
+// REQUIRES: all
 // RUN: piko-translate --cpp-to-piko -DQT_NO_KEYWORDS -I%qt_include %s 2>&1 | FileCheck %s
 // RUN: not piko-translate --cpp-to-piko -I%qt_include %s 2>&1 | FileCheck %s --check-prefix=KEYWORDS
 #include <QtConcurrent/QtConcurrent>
