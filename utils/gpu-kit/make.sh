@@ -9,7 +9,7 @@
 # OUT gets run.sh, check.py, time.py and, to be unpacked by run.sh, tools.tar.xz
 # (piko-compare and piko-render, linked statically with LLVM, 50 MB) and rest.tar.xz.
 # They are unpacked to the folders that they have here, which the tools know: it is a
-# kit for machines that are thrown away. Takes three minutes.
+# kit for machines that are thrown away. Takes four minutes.
 set -euo pipefail
 
 fail() {
@@ -18,8 +18,7 @@ fail() {
 }
 
 here="$(cd "$(dirname "$0")" && pwd)"
-root="$(cd "$here/../.." && pwd)"
-build="$root/build" out="" scenes=()
+build="$(cd "$here/../.." && pwd)/build" out="" scenes=()
 while [ $# -gt 0 ]; do
   case "$1" in
     --build) build="$(cd "$2" && pwd)" && shift ;;
@@ -38,29 +37,33 @@ out="$(cd "$out" && pwd)"
 stage="$(mktemp -d)"
 trap 'rm -rf "$stage"' EXIT
 
+# Whose folders the tools know.
+root="$(sed -n 's/^CMAKE_HOME_DIRECTORY:[A-Z]*=//p' "$build/CMakeCache.txt")"
 llvm="$(sed -n 's/^PIKO_LLVM_PREFIX:[A-Z]*=//p' "$build/CMakeCache.txt")"
 [ -n "$llvm" ] || llvm=/usr/lib/llvm-22
-clang="$llvm/bin/clang++"
-
-# What libraries of LLVM refer to, and nothing here calls.
-cat >"$stage/absent.cpp" <<END
-#include <$(cd "$llvm/include" && find . -name PassPlugin.h | head -n 1)>
+# Clang asks Polly for its passes, which Debian's archives lack.
+cat >"$stage/absent.cpp" <<'END'
+#if __has_include(<llvm/Plugins/PassPlugin.h>)
+#include <llvm/Plugins/PassPlugin.h>
+#else
+#include <llvm/Passes/PassPlugin.h>
+#endif
 llvm::PassPluginLibraryInfo getPollyPluginInfo() {
-  return {LLVM_PLUGIN_API_VERSION, "", "", [](llvm::PassBuilder &) {}};
+  return {LLVM_PLUGIN_API_VERSION, "none", "0", [](llvm::PassBuilder &) {}};
 }
 END
-"$clang" -std=c++20 -fno-rtti -I "$llvm/include" -c "$stage/absent.cpp" \
-  -o "$stage/absent.o"
+"$llvm/bin/clang++" -std=c++20 -fno-rtti -I "$llvm/include" \
+  -c "$stage/absent.cpp" -o "$stage/absent.o"
 shared() { # the library of a name that programs are run with
-  ldconfig -p | awk -v name="$1" '$1 == name { print $NF; exit }'
+  ldconfig -p | awk -v name="$1" '$1 == name && !found++ { print $NF }'
 }
 list() { # libraries of a prefix, without those that are programs' or tests'
-  find "$llvm/lib" -name "$1*.a" | grep -viE "$2" | sort
+  find "$llvm/lib" -name "$1*.a" | grep -vE "$2" | sort
 }
 archives=()
 while IFS= read -r file; do archives+=("$file"); done < <(
-  list libclang 'tidy|daemon|clangd|clang_rt|Doc|Include|Apply|Change|Move|Query|Reorder|libclang\.a'
-  list libMLIR 'test|ExecutionEngine|lsp|runner|capi'
+  list libclang 'clang(d|_|Tidy|Daemon|Doc|Include|Apply|Change|Move|Query|Reorder|\.a)'
+  list libMLIR '[Tt]est|ExecutionEngine|Lsp|_runner|CAPI'
   list libLLVM 'Testing|Fuzz'
 )
 others=()
@@ -114,7 +117,7 @@ strip "$kit_lib"/*.so*
 copy "$build/lib/libpikort.so" "$build/lib/libPikoImage.so" \
   "$build/lib/libpiko-test-driver.so" "$build/bin/PikoConformance-cuda" \
   "$root/runtime/include" "$root/examples" "$root/test/EndToEnd" \
-  "$("$clang" -print-resource-dir)/include" /usr/include/glm
+  "$("$llvm/bin/clang" -print-resource-dir)/include" /usr/include/glm
 mkdir -p "$stage/root/opt/piko-kit/scenes"
 for scene in "${scenes[@]}"; do
   cp "$scene" "$stage/root/opt/piko-kit/scenes/"
