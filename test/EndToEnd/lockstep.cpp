@@ -19,6 +19,8 @@
 // CASE: --pipe ChangesOfAll --count 400
 // CASE: --pipe ChangesOfItems --count 400
 // RUN: %if all %{ piko-compare %s --pipe Nearest --count 400 --runs 1 --without vectorize -O0 | FileCheck %s %}
+// What iterations emit in strips lies where others' was.
+// RUN: env PIKO_CUDA_DRIVER=%test_driver piko-compare %s --pipe EmitsBefore --domain 64 64 --count 60 --runs 1 --threads 2 --target cuda --gpu-threads 8 --strip 7 | FileCheck %s
 // CHECK: equal
 // RUN: not piko-compare %s --pipe Outside --count 400 --runs 1 --threads 2 | FileCheck %s --check-prefix=OUTSIDE
 // OUTSIDE: got: stage 'stage', bin 0: expected an index into 'in' in [0, 400), but got 405

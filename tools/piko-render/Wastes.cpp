@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <tuple>
 
 using namespace piko;
 using namespace piko::render;
@@ -166,10 +167,9 @@ std::vector<Waste> WasteFinder::find(bool isCPU) {
       addKernel(kernel);
   addTimes();
   addStored();
-  std::stable_sort(wastes.begin(), wastes.end(),
-                   [](const Waste &a, const Waste &b) {
-                     return a.milliseconds > b.milliseconds;
-                   });
+  std::sort(wastes.begin(), wastes.end(), [](const Waste &a, const Waste &b) {
+    return std::tie(b.milliseconds, a.what) < std::tie(a.milliseconds, b.what);
+  });
   return wastes;
 }
 
