@@ -19,7 +19,6 @@
 #include <span>
 #include <string>
 #include <string_view>
-#include <utility>
 
 namespace piko::rt {
 
@@ -91,36 +90,22 @@ public:
   virtual std::unique_ptr<DeviceFrame> makeFrame() = 0;
 };
 
-/// Bytes of a device's own memory.
+/// Bytes of a device's own memory; none at first.
 class DeviceBytes {
 public:
-  DeviceBytes() = default;
-  /// Throws OutOfMemory.
-  DeviceBytes(Accelerator &from, int64_t size);
-  DeviceBytes(DeviceBytes &&other) noexcept { swap(other); }
-  DeviceBytes &operator=(DeviceBytes &&other) noexcept {
-    DeviceBytes taken(std::move(other));
-    swap(taken);
-    return *this;
-  }
-  ~DeviceBytes() {
-    if (data_)
-      from_->release(data_);
-  }
-
-  uint8_t *data() const { return data_; }
+  /// Makes them `size` bytes; true if they are other ones than before, where
+  /// both need not fit. Throws OutOfMemory.
+  bool resize(Accelerator &from, int64_t size);
+  uint8_t *data() const { return data_.get(); }
   int64_t size() const { return size_; }
   explicit operator bool() const { return data_ != nullptr; }
 
 private:
-  void swap(DeviceBytes &other) {
-    std::swap(from_, other.from_);
-    std::swap(data_, other.data_);
-    std::swap(size_, other.size_);
-  }
-
-  Accelerator *from_ = nullptr;
-  uint8_t *data_ = nullptr;
+  struct Release {
+    Accelerator *from;
+    void operator()(uint8_t *data) const { from->release(data); }
+  };
+  std::unique_ptr<uint8_t, Release> data_;
   int64_t size_ = 0;
 };
 

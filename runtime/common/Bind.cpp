@@ -100,7 +100,7 @@ static void bindBuffer(pikort_pipeline *p, const char *name,
   change(p, [&state, bound] {
     state.own({});
     if (bound.onDevice)
-      state.mirror = {};
+      state.mirror = {}, state.twin = {};
     auto *data = static_cast<uint8_t *>(const_cast<void *>(bound.data));
     state.view = {data, {bound.count, 1, 1, 1}};
     state.onDevice = bound.onDevice;
@@ -195,8 +195,7 @@ void piko::rt::bringToHost(pikort_pipeline &p, State &state) {
 void piko::rt::bringToDevice(pikort_pipeline &p, State &state) {
   if (state.twinIsCurrent)
     return;
-  if (!state.twin)
-    state.twin = DeviceBytes(*p.accelerator, state.owned.size());
+  state.twin.resize(*p.accelerator, state.owned.size());
   if (state.owned.size() > 0)
     p.accelerator->upload(state.twin.data(), state.owned.data(),
                           state.owned.size());

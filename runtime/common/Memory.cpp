@@ -267,10 +267,15 @@ void Memory::resetPeak() {
 
 // --- Memory of a device -----------------------------------------------------
 
-DeviceBytes::DeviceBytes(Accelerator &from, int64_t size)
-    : from_(&from),
-      data_(from.allocate(static_cast<size_t>(std::max<int64_t>(size, 1)))),
-      size_(size) {
-  if (!data_)
+bool DeviceBytes::resize(Accelerator &from, int64_t size) {
+  if (data_ && size_ == size)
+    return false;
+  data_.reset();
+  uint8_t *data =
+      from.allocate(static_cast<size_t>(std::max<int64_t>(size, 1)));
+  if (!data)
     throw OutOfMemory{size};
+  data_ = {data, Release{&from}};
+  size_ = size;
+  return true;
 }

@@ -73,10 +73,9 @@ struct State {
   uint8_t *hosts = nullptr;   ///< The host's memory, while another is used.
   pikoir_state view{};
 
-  /// Memory of our own, of which a device has nothing yet.
+  /// Memory of our own, or none, of which a device has nothing yet.
   void own(Array<uint8_t> memory) {
     owned = std::move(memory);
-    twin = {};
     twinIsCurrent = false;
     hostIsCurrent = true;
   }

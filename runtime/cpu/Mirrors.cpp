@@ -40,14 +40,10 @@ static void fillMirror(pikort_pipeline &p, Array<uint8_t> &mirror,
     copy(p, mirror.data(), from.data, from.bytes);
 }
 
-/// Of `bytes` bytes, and current if it was so.
+/// Current if it was so, and has as many bytes.
 static void makeTwin(pikort_pipeline &p, DeviceBytes &twin, bool &isCurrent,
                      int64_t bytes) {
-  if (twin && twin.size() == bytes)
-    return;
-  twin = {}; // before the new one, so that both need not fit
-  twin = DeviceBytes(*p.accelerator, bytes);
-  isCurrent = false;
+  isCurrent &= !twin.resize(*p.accelerator, bytes);
 }
 
 static void fillTwin(pikort_pipeline &p, DeviceBytes &twin, bool &isCurrent,

@@ -117,8 +117,8 @@ void Accelerator::release(uint8_t *data) noexcept {
     unreleased_.push_back(data);
 }
 
-/// A sixteenth of what is free, twice as much where that did not suffice, and
-/// less where it is refused.
+/// A sixteenth of what is free, twice as much where that did not suffice, but
+/// not all, and less where it is refused.
 std::span<uint8_t> Accelerator::logSpace() noexcept {
   constexpr size_t least = size_t(1) << 28;
   if (!log_.empty() && log_.size() >= wantedLog_)
@@ -128,7 +128,8 @@ std::span<uint8_t> Accelerator::logSpace() noexcept {
   size_t free = 0, all = 0;
   if (device_->enter() == CUDA_SUCCESS)
     device_->driver.cuMemGetInfo(&free, &all);
-  wantedLog_ = std::min(std::max({wantedLog_, free / 16, least}), free);
+  wantedLog_ =
+      std::min(std::max({wantedLog_, free / 16, least}), free - free / 8);
   for (; log_.empty() && wantedLog_ >= least; wantedLog_ /= 2)
     if (uint8_t *data = allocate(wantedLog_))
       log_ = {data, wantedLog_};

@@ -54,8 +54,7 @@ void Frame::takeMemory() {
   auto countOf = [](const auto &list) {
     return static_cast<int64_t>(list.size());
   };
-  if (!blockSums_)
-    blockSums_ = DeviceBytes(device_, sizeof(BlockSums));
+  blockSums_.resize(device_, sizeof(BlockSums));
   exchange_.reset();
   places_ = exchange_.take<Place>(countOf(p_.stages) + countOf(p_.sources));
   received_ = exchange_.take<uint64_t>(countOf(p_.edges) + countOf(p_.sources));

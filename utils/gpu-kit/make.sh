@@ -6,7 +6,7 @@
 #
 #   utils/gpu-kit/make.sh [--build FOLDER] [--scene FILE].. OUT
 #
-# OUT gets run.sh, check.py, time.py and, to be unpacked by run.sh, tools.tar.xz
+# OUT gets run.sh, cases.py, frames.py and, to be unpacked by run.sh, tools.tar.xz
 # (piko-compare and piko-render, linked statically with LLVM, 50 MB) and rest.tar.xz.
 # They are unpacked to the folders that they have here, which the tools know: it is a
 # kit for machines that are thrown away. Takes four minutes.
@@ -132,5 +132,5 @@ END
 tar c -C "$stage/bin" . | xz --x86 --lzma2=preset=9,dict=256MiB >"$out/tools.tar.xz" &
 tar c -C "$stage/root" . | xz -6 >"$out/rest.tar.xz"
 wait
-cp "$here"/run.sh "$here"/check.py "$here"/time.py "$out/"
+cp "$here"/run.sh "$here"/cases.py "$here"/frames.py "$out/"
 ls -l "$out"

@@ -27,8 +27,8 @@ fi
 mkdir -p "$results"
 cd /tmp || exit 1
 case "$step" in
-  check) OMP_NUM_THREADS=2 python3 "$here/check.py" "$results/check.jsonl" "$seconds" ;;
-  time) python3 "$here/time.py" "$results/time.jsonl" "$seconds" ;;
+  check) OMP_NUM_THREADS=2 python3 "$here/cases.py" "$results/check.jsonl" "$seconds" ;;
+  time) python3 "$here/frames.py" "$results/time.jsonl" "$seconds" ;;
   conformance)
     timeout "$seconds" "$PIKO_KIT_BUILD/bin/PikoConformance-cuda" --gtest_brief=1 \
       >"$results/conformance.txt" 2>&1

@@ -11,6 +11,8 @@
 // What threads emit is in their outboxes; the block takes it (a flush) behind
 // each round of a shared loop, so that it is in the order of iterations. What
 // iterations of a cut loop emit is in outboxes of their own until its end.
+//
+// One class, and so one file: all four share the block's cells and barriers.
 
 #include "PikoToGPU.h"
 

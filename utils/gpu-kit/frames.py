@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 """Draws the examples on a card and times their frames.
 
-  time.py RESULTS.jsonl SECONDS
+  frames.py RESULTS.jsonl SECONDS
 
 First all pipelines, small, whose pictures are to be those of this machine's
 processor; then frames at 1024 x 768, the most telling first: medians by the host's
@@ -99,7 +99,7 @@ def main():
     runs = Runs(sys.argv[1], float(sys.argv[2]))
     scenes = sorted(SCENES.glob("*.*"))
     if not scenes:
-        sys.exit("time.py: expected scenes in the kit: make.sh --scene FILE")
+        sys.exit("frames.py: expected scenes in the kit: make.sh --scene FILE")
     check_pictures(runs, scenes)
     frames = ["--warmup", "5", "--frames", "60", "--seconds", "0.5"]
 

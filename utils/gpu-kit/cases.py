@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 """Runs the cases of test/EndToEnd on a card, beside the reference executor.
 
-  check.py RESULTS.jsonl SECONDS [option of piko-compare..]
+  cases.py RESULTS.jsonl SECONDS [option of piko-compare..]
 
 A line of JSON for each command: what it was, its status and output. Prints those that
 did not end as the test wants it, and how many did.
