@@ -11,8 +11,9 @@ benchmarks/bodies: the base and this tree in turn, each in a process of its own,
 on one thread. A pipeline is measured again while a time of it is neither slower nor
 as fast for sure, by the sign test of benchmarks/speed_gate/judge.py, and time is
 left. Prints medians of both, the median of their ratio in a round, and by how much
-ratios differ from that in the median; writes each time to OUT/times.csv. Ends with
-an error where something is slower by more than the tolerance.
+ratios differ from that in the median; adds each time to OUT/times.csv as it is
+taken, so that --judge knows of a gate that was interrupted. Ends with an error where
+something is slower by more than the tolerance.
 """
 
 import argparse
@@ -47,11 +48,11 @@ def parse_options():
     parser.add_argument("--shortest", type=float, default=0.02, metavar="MS",
                         help="shorter kernels are measured together "
                              "(%(default)s)")
-    parser.add_argument("--minutes", type=float, default=8,
-                        help="no round begins later, once each pipeline has "
-                             "had its first ones (%(default)s)")
+    parser.add_argument("--minutes", type=float, default=9,
+                        help="no pipeline is measured again later, compiling "
+                             "included (%(default)s)")
     parser.add_argument("--rounds", type=int, default=5,
-                        help="of each pipeline (%(default)s)")
+                        help="of each pipeline, if there is time (%(default)s)")
     parser.add_argument("--most-rounds", type=int, default=30,
                         help="of one that is not decided (%(default)s)")
     parser.add_argument("--frames", type=int, default=11,
@@ -60,7 +61,7 @@ def parse_options():
                         help="frames in front of them, in which the runtime "
                              "tries versions of loops, in a quarter of --seconds "
                              "(%(default)s)")
-    parser.add_argument("--seconds", type=float, default=0.8,
+    parser.add_argument("--seconds", type=float, default=0.4,
                         help="of frames in a round (%(default)s)")
     parser.add_argument("--scene", default=BUNNY, help="(%(default)s)")
     parser.add_argument("--cpu", default="native",
@@ -119,33 +120,41 @@ class Times:
                     of_build.append({})
                 of_build[-1][row["name"]] = float(row["ms"])
 
-    def write(self, file):
-        with open(file, "w", newline="") as stream:
-            writer = csv.writer(stream, lineterminator="\n")
-            writer.writerow(COLUMNS)
-            for unit, runs in self.runs.items():
-                for build, of_build in runs.items():
-                    for turn, run in enumerate(of_build):
-                        for name, ms in run.items():
-                            writer.writerow([unit, name, build, turn, f"{ms:.6f}"])
-
-    def measure(self, unit, builds):
-        """One round. Who is first takes turns, too."""
+    def measure(self, unit, builds, stream):
+        """One round, which goes to a stream. Who is first takes turns, too."""
         runs = self.runs.setdefault(unit.name, {build: [] for build in BUILDS})
         turn = len(runs[NEW])
-        for name in BUILDS if turn % 2 == 0 else reversed(BUILDS):
-            runs[name].append(unit.measure(builds[name]))
+        for build in BUILDS if turn % 2 == 0 else reversed(BUILDS):
+            runs[build].append(unit.measure(builds[build]))
+        csv.writer(stream, lineterminator="\n").writerows(
+            [unit.name, name, build, turn, f"{ms:.6f}"]
+            for build in BUILDS for name, ms in runs[build][turn].items())
+        stream.flush()
 
     def judge(self, unit):
         return compare(unit, self.runs[unit], self.options.shortest)
 
     def is_open(self, unit):
-        return (len(self.runs[unit.name][NEW]) < self.options.most_rounds
-                and not is_decided(self.judge(unit.name), self.options.tolerance))
+        return not is_decided(self.judge(unit.name), self.options.tolerance)
 
 
 def say(text):
     print(f"bench-gate: {text}", file=sys.stderr, flush=True)
+
+
+def measure_rounds(options, units, builds, stream, end):
+    """Each unit has its first round; others begin in time."""
+    times = Times(options)
+    for turn in range(options.most_rounds):
+        left = [unit for unit in units
+                if turn < options.rounds or times.is_open(unit)]
+        for done, unit in enumerate(left):
+            if turn and time.monotonic() > end:
+                say(f"out of time in round {turn + 1}, with {len(left) - done} "
+                    "pipelines that another one might have told more of")
+                return times
+            times.measure(unit, builds, stream)
+    return times
 
 
 def measure(options):
@@ -163,21 +172,10 @@ def measure(options):
                     for build in builds.values()]:
             job.result()
     say(f"measures from {time.monotonic() - begin:.0f} s on")
-    times = Times(options)
-    for _ in range(options.rounds):
-        for unit in both:
-            times.measure(unit, builds)
-    say(f"measures again from {time.monotonic() - begin:.0f} s on")
-    end = begin + 60 * options.minutes
-    while left := [unit for unit in both if times.is_open(unit)]:
-        for unit in left:
-            if time.monotonic() > end:
-                break
-            times.measure(unit, builds)
-        if time.monotonic() > end:
-            say(f"out of time, with {len(left)} pipelines not decided")
-            break
-    times.write(f"{options.out}/times.csv")
+    with open(f"{options.out}/times.csv", "w", newline="") as stream:
+        csv.writer(stream, lineterminator="\n").writerow(COLUMNS)
+        times = measure_rounds(options, both, builds, stream,
+                               begin + 60 * options.minutes)
     say(f"took {time.monotonic() - begin:.0f} s; {options.out}/times.csv")
     return times
 
