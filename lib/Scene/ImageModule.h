@@ -2,7 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // OpenImageIO comes with 250 libraries, which take longer to load than a cached
-// pipeline; so the code that uses it is a module of its own.
+// pipeline; so the code that uses it is a module of its own, and a build may be
+// without it. Its errors say why alone; ImageFile.cpp says what of which file.
 //
 //===----------------------------------------------------------------------===//
 #ifndef PIKO_LIB_SCENE_IMAGEMODULE_H
@@ -10,14 +11,41 @@
 
 #include "Piko/Scene/ImageFile.h"
 
+#include <cctype>
+#include <filesystem>
+#include <string>
+#include <vector>
+
 namespace piko::render {
 
-/// The functions of ImageFile.h, as the module has them.
 struct ImageFunctions {
-  decltype(&render::writeImage) writeImage;
-  decltype(&render::checkImageFormat) checkImageFormat;
-  decltype(&render::readImage) readImage;
+  /// Whether there is a format of that extension (lowercase, without a dot).
+  bool (*hasFormat)(const std::string &extension);
+  /// Writes a file in the format of its extension.
+  Result<Done> (*write)(const std::string &file, int width, int height,
+                        std::span<const scene::Color> pixels);
+  Result<Image> (*read)(const std::string &path);
 };
+
+/// The extension, in lowercase and without the dot.
+inline std::string extensionOf(const std::string &path) {
+  std::string extension = std::filesystem::path(path).extension().string();
+  if (!extension.empty())
+    extension.erase(0, 1);
+  for (char &c : extension)
+    c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return extension;
+}
+
+/// 8 bits for each of r, g and b of each pixel.
+inline std::vector<uint8_t> toBytes(std::span<const scene::Color> pixels) {
+  std::vector<uint8_t> bytes;
+  bytes.reserve(pixels.size() * 3);
+  for (const scene::Color &pixel : pixels)
+    for (int channel = 0; channel < 3; ++channel)
+      bytes.push_back(toByte(pixel.rgba[channel]));
+  return bytes;
+}
 
 /// The module's one symbol, and the file it is in.
 inline constexpr const char *imageModuleSymbol = "piko_image_functions";

@@ -114,8 +114,8 @@ for file in "$kit_lib"/libicudata.so.*; do
     gcc -shared -x c - -o "$file" "-Wl,-soname,$name"
 done
 strip "$kit_lib"/*.so*
-copy "$build/lib/libpikort.so" "$build/lib/libPikoImage.so" \
-  "$build/lib/libpiko-test-driver.so" "$build/bin/PikoConformance-cuda" \
+copy "$build/lib/libpikort.so" "$build/lib/libpiko-test-driver.so" \
+  "$build/bin/PikoConformance-cuda" \
   "$root/runtime/include" "$root/examples" "$root/test/EndToEnd" \
   "$("$llvm/bin/clang" -print-resource-dir)/include" /usr/include/glm
 mkdir -p "$stage/root/opt/piko-kit/scenes"

@@ -21,8 +21,9 @@ inline uint8_t toByte(float value) {
 
 /// Writes an image of `width` pixels a row, top row first, in the format that
 /// the file's name ends in (PNG, EXR, PPM, TIFF, JPEG, ...: what OpenImageIO
-/// knows). EXR, HDR and PFM hold linear floats, EXR also alpha; all others hold
-/// 8 bits for each of r, g and b. The file appears whole or not at all.
+/// knows; a build without it knows PNG). EXR, HDR and PFM hold linear floats,
+/// EXR also alpha; all others hold 8 bits for each of r, g and b. The file
+/// appears whole or not at all.
 Result<Done> writeImage(const std::string &path, int width, int height,
                         std::span<const scene::Color> pixels);
 
