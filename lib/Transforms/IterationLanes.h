@@ -13,6 +13,7 @@
 #include "llvm/ADT/DenseSet.h"
 #include "llvm/ADT/SetVector.h"
 
+#include <cmath>
 #include <map>
 
 namespace piko {
@@ -72,6 +73,7 @@ public:
   /// Estimates for as many iterations as there are lanes, in cycles.
   struct Cost {
     double vectors = 0, serial = 0; ///< at once, and one after the other
+    double slowVectors = 0, slowSerial = 0; ///< Of these, in slow paths.
     double lines = 0;      ///< Of `vectors`, what lanes take of the cache.
     bool computes = false; ///< Or iterations clear or copy.
     /// What costs most where lanes take turns, or are in other places.
@@ -79,6 +81,10 @@ public:
     /// Of `serial`, what inner loops take.
     llvm::DenseMap<mlir::Operation *, double> loops;
     bool isWorthwhile() const { return vectors < serial; }
+    /// What to multiply `vectors` and `serial` by to have the geometric means
+    /// of what it takes where slow paths mostly run, and where they never do.
+    double weighVectors() const { return std::sqrt(1 - slowVectors / vectors); }
+    double weighSerial() const { return std::sqrt(1 - slowSerial / serial); }
   };
   Cost getCost() const;
   /// The same by other constants.

@@ -92,11 +92,11 @@ static void addObstacles(InFlightDiagnostic &remark,
   }
 }
 
-/// With half the lanes estimates matter more: measured, bodies that are
-/// expected to gain less than a fifth lose.
+/// A tie goes to the simpler code. With half the lanes estimates matter more:
+/// measured, bodies that are expected to gain less than a fifth lose.
 bool piko::isSurelyFaster(const IterationLanes::Cost &cost, int64_t laneCount) {
-  constexpr double sure = 0.8;
-  return cost.vectors < (laneCount == 8 ? sure : 1) * cost.serial;
+  constexpr double tie = 0.98, sure = 0.8;
+  return cost.vectors < (laneCount == 8 ? sure : tie) * cost.serial;
 }
 
 /// Only loops that turn as often for all primitives count, as those over the
@@ -139,14 +139,20 @@ LaneCandidate::Versions LaneCandidate::estimate(const IterationLanes &lanes,
                                    .getCost(cycles)
                                    .vectors
                              : cost.vectors;
-  return {vectors, getScalarCost(lanes, cost, cycles), /*expected=*/false};
+  return {vectors * cost.weighVectors(),
+          getScalarCost(lanes, cost, cycles) * cost.weighSerial(),
+          /*expected=*/false};
 }
 
 LaneCandidate::Refusal LaneCandidate::findRefusal(const IterationLanes &lanes,
                                                   const FlatLoop &flat) {
-  IterationLanes::Cost cost = lanes.getCost();
   if (!preferred)
     return {"lanes are expected to do more with iterations of a loop in it"};
+  IterationLanes::Cost cost = lanes.getCost();
+  double ofVectors = cost.weighVectors(), ofSerial = cost.weighSerial();
+  double inside = ofPrimitives ? getCostInside(lanes, cost) * ofSerial : 0;
+  cost.vectors *= ofVectors;
+  cost.serial *= ofSerial;
   if (!ofPrimitives && isOverBox(loop) &&
       cost.vectors >
           getScalarCost(lanes, cost, getCycles(lanes.getLaneCount())))
@@ -156,7 +162,7 @@ LaneCandidate::Refusal LaneCandidate::findRefusal(const IterationLanes &lanes,
   // Flattened nests make up for little else that was not foreseen.
   constexpr double half = 0.5;
   bool isFasterFlat = flat.loop && cost.isWorthwhile() &&
-                      flat.cost.vectors < half * cost.serial;
+                      flat.cost.vectors * ofVectors < half * cost.serial;
   if (!isFaster && !isFasterFlat) {
     std::string text =
         llvm::formatv("{0} at once are expected to take {1:f0} "
@@ -167,8 +173,7 @@ LaneCandidate::Refusal LaneCandidate::findRefusal(const IterationLanes &lanes,
     return {text, /*byCycles=*/true};
   }
   constexpr double gain = 0.98; // Or primitives are simpler.
-  bool isFasterInside =
-      ofPrimitives && getCostInside(lanes, cost) < gain * cost.vectors;
+  bool isFasterInside = ofPrimitives && inside < gain * cost.vectors;
   return {isFasterInside ? "iterations of a loop in it are" : ""};
 }
 

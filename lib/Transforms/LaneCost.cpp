@@ -60,12 +60,13 @@ static bool mayFail(Region &region) {
       .wasInterrupted();
 }
 
+static bool hasLoop(Region &region) {
+  return region
+      .walk([](LoopLikeOpInterface) { return WalkResult::interrupt(); })
+      .wasInterrupted();
+}
+
 static bool isFallbackOf(Region &side, Region &other) {
-  auto hasLoop = [](Region &region) {
-    return region
-        .walk([](LoopLikeOpInterface) { return WalkResult::interrupt(); })
-        .wasInterrupted();
-  };
   return !other.empty() && hasLoop(side) && hasLoop(other) && mayFail(side) &&
          !mayFail(other);
 }
@@ -77,6 +78,9 @@ bool piko::isFallback(Region &region) {
                                             : choice.getThenRegion());
 }
 
+/// Operations of a side that does next to nothing.
+static constexpr int64_t trivial = 16;
+
 /// How often a side of a condition runs, where lanes differ: mostly, if it
 /// stands alone; hardly ever, if it does much more than the other, which does
 /// something, too.
@@ -86,7 +90,7 @@ static Frequency getFrequency(Region &side, Region &other, int64_t laneCount) {
     return {rare, rare * double(laneCount)};
   if (!other.empty() && isFallbackOf(other, side))
     return {1, 1};
-  constexpr int64_t trivial = 16, ratio = 2;
+  constexpr int64_t ratio = 2;
   int64_t count = countOperations(side),
           countOther = other.empty() ? 0 : countOperations(other);
   if (countOther > trivial && count > ratio * countOther)
@@ -94,6 +98,28 @@ static Frequency getFrequency(Region &side, Region &other, int64_t laneCount) {
   if (countOther <= trivial || countOther > ratio * count)
     return {0.8, 1};
   return {0.5, 1};
+}
+
+/// Whether code of a loop goes on behind an operation.
+static bool goesOnBehind(Operation *op, Operation *loop) {
+  for (; op != loop; op = op->getParentOp()) {
+    int64_t behind = 0;
+    for (Operation *at = op->getNextNode(); at; at = at->getNextNode())
+      at->walk([&](Operation *) { ++behind; });
+    if (behind > trivial)
+      return true;
+  }
+  return false;
+}
+
+/// Whether a side may be a slow path, as clipping is: it has loops, in place of
+/// next to nothing, and what follows is for both. Nothing says how often it
+/// runs.
+static bool mayBeSlowPath(scf::IfOp choice, Region &side, Operation *loop) {
+  Region &other = &side == &choice.getThenRegion() ? choice.getElseRegion()
+                                                   : choice.getThenRegion();
+  return hasLoop(side) && !other.empty() && countOperations(other) <= trivial &&
+         goesOnBehind(choice, loop);
 }
 
 namespace {
@@ -151,6 +177,7 @@ private:
   double along = 1;              ///< How much faster LLVM makes it.
   llvm::DenseSet<Operation *> turns;
   llvm::DenseSet<Value> chased; ///< indices, each of one wait
+  bool inSlowPath = false;
 };
 
 } // namespace
@@ -247,10 +274,11 @@ double CostModel::getOwnTurns(Operation *loop) const {
 void CostModel::addStructure(Operation *op, Frequency times, bool laneByLane) {
   if (auto choice = dyn_cast<scf::IfOp>(op)) {
     Region &yes = choice.getThenRegion(), &no = choice.getElseRegion();
+    bool isState = op->getParentOp()->hasAttr(marks::turns);
     auto addSide = [&](Region &side, Region &other) {
       if (side.empty())
         return;
-      Frequency share = op->getParentOp()->hasAttr(marks::turns)
+      Frequency share = isState
                             ? Frequency{0.5, 1}
                             : getFrequency(side, other, lanes.getLaneCount());
       if (!lanes.isVarying(choice.getCondition()))
@@ -258,11 +286,21 @@ void CostModel::addStructure(Operation *op, Frequency times, bool laneByLane) {
       auto advances = choice->getAttrOfType<FloatAttr>(marks::advances);
       if (advances && &side == &no)
         share.vectors = advances.getValueAsDouble();
+      bool isSlow = !inSlowPath && !isState &&
+                    lanes.isVarying(choice.getCondition()) &&
+                    mayBeSlowPath(choice, side, lanes.getLoop());
+      inSlowPath |= isSlow;
+      double vectors = cost.vectors, serial = cost.serial;
       add(side, times.scaled(share.serial, share.vectors), laneByLane);
+      if (!isSlow)
+        return;
+      inSlowPath = false;
+      cost.slowVectors += cost.vectors - vectors;
+      cost.slowSerial += cost.serial - serial;
     };
     addSide(yes, no);
     addSide(no, yes);
-    if (op->getParentOp()->hasAttr(marks::turns)) // The state is chosen.
+    if (isState) // It is chosen.
       cost.vectors += times.vectors * cycles.vector * choice.getNumResults();
     bool isShort = lanes.isCheap(yes) && (no.empty() || lanes.isCheap(no));
     if (lanes.isVarying(choice.getCondition()) && !isShort)
