@@ -113,8 +113,14 @@ endfunction()
 
 # Compilers spend much of their time in malloc. Sanitizers have their own.
 find_library(PIKO_MALLOC mimalloc DOC "Allocator of the tools, if any")
-if(PIKO_MALLOC AND NOT PIKO_SANITIZE)
-  set(PIKO_MALLOC_FLAGS
+find_path(PIKO_MALLOC_INCLUDE_DIR mimalloc.h)
+if(PIKO_MALLOC AND PIKO_MALLOC_INCLUDE_DIR AND NOT PIKO_SANITIZE)
+  add_library(piko_allocator_options OBJECT
+    ${CMAKE_CURRENT_LIST_DIR}/AllocatorOptions.cpp)
+  target_include_directories(piko_allocator_options SYSTEM PRIVATE
+    ${PIKO_MALLOC_INCLUDE_DIR})
+  target_link_libraries(piko_allocator_options PRIVATE piko_options)
+  set(PIKO_MALLOC_FLAGS $<TARGET_OBJECTS:piko_allocator_options>
     -Wl,--push-state,--no-as-needed ${PIKO_MALLOC} -Wl,--pop-state)
 endif()
 
