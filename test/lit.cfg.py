@@ -17,7 +17,7 @@ split-file. Substitutions:
   %cxx           the C++ compiler of this build
   %compare_targets
                  piko-compare on all targets, where all tests are asked for; else a
-                 case runs on the first and on one of the others, in turn
+                 case runs on one of them, in turn
   %compare_checked
                  the same on the targets that have checking mode
   %other_cxx     another C++ compiler, where one can use this build's runtime

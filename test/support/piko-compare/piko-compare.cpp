@@ -152,14 +152,14 @@ bool stopAlike(const std::set<std::string> &errors) {
   return false;
 }
 
-/// Whether a case is one of those that a target runs. With --spread the others take
-/// turns, from one that the file's name says.
+/// Whether a target runs a case. With --spread one does, in turn, from one that the
+/// file's name says.
 bool runs(const Options &options, size_t target, size_t place) {
-  if (!options.spread || target == 0)
+  if (!options.spread)
     return true;
   std::string name = std::filesystem::path(options.file).stem().string();
   size_t first = std::accumulate(name.begin(), name.end(), size_t(0));
-  return (first + place) % (options.targets.size() - 1) == target - 1;
+  return (first + place) % options.targets.size() == target;
 }
 
 /// Runs one case on its targets; true if all is equal. Throws if it cannot be run.
