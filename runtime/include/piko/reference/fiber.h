@@ -12,19 +12,65 @@
 
 #include <exception>
 #include <functional>
-#include <memory>
+#include <new>
+#include <sys/mman.h>
 #include <ucontext.h>
 #include <utility>
 
 namespace piko::reference {
 
+/// Stacks of fibers. Only what is touched takes memory: they come from the
+/// system by themselves, since an allocator may have large pages. They are kept
+/// for the next fibers, each with the address of another one at its end.
+class StackPool {
+public:
+  static constexpr size_t stackSize = 1024 * 1024;
+
+  void *take() {
+    if (!kept)
+      return map();
+    void *stack = kept;
+    kept = next(stack);
+    return stack;
+  }
+  void give(void *stack) {
+    next(stack) = kept;
+    kept = stack;
+  }
+
+  StackPool() = default;
+  StackPool(const StackPool &) = delete;
+  StackPool &operator=(const StackPool &) = delete;
+  ~StackPool() {
+    while (kept)
+      munmap(take(), stackSize);
+  }
+
+private:
+  static void *map() {
+    void *stack =
+        mmap(nullptr, stackSize, PROT_READ | PROT_WRITE,
+             MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE | MAP_STACK, -1, 0);
+    if (stack == MAP_FAILED)
+      throw std::bad_alloc();
+    madvise(stack, stackSize, MADV_NOHUGEPAGE);
+    return stack;
+  }
+  /// Where stacks begin, so that it takes no page more.
+  static void *&next(void *stack) {
+    return *(static_cast<void **>(stack) + stackSize / sizeof(void *) - 1);
+  }
+
+  void *kept = nullptr;
+};
+
 class Fiber {
 public:
-  explicit Fiber(std::function<void()> body)
-      : body(std::move(body)), stack(new char[stackSize]) {
+  Fiber(StackPool &stacks, std::function<void()> body)
+      : stacks(stacks), body(std::move(body)), stack(stacks.take()) {
     getcontext(&self);
-    self.uc_stack.ss_sp = stack.get();
-    self.uc_stack.ss_size = stackSize;
+    self.uc_stack.ss_sp = stack;
+    self.uc_stack.ss_size = StackPool::stackSize;
     self.uc_link = nullptr;
     makecontext(&self, &Fiber::enter, 0);
   }
@@ -35,6 +81,7 @@ public:
       cancelled = true;
       switchTo();
     }
+    stacks.give(stack);
   }
 
   /// Runs the fiber until it suspends or ends; throws what it threw.
@@ -56,8 +103,6 @@ public:
   bool isDone() const { return done; }
 
 private:
-  /// Only what is touched takes memory.
-  static constexpr size_t stackSize = 1024 * 1024;
   struct Cancelled {};
 
   static Fiber *&starting() {
@@ -90,8 +135,9 @@ private:
     done = true;
   }
 
+  StackPool &stacks;
   std::function<void()> body;
-  std::unique_ptr<char[]> stack;
+  void *stack;
   ucontext_t self, resumer;
   std::exception_ptr error;
   bool started = false, done = false, cancelled = false;

@@ -15,6 +15,7 @@
 #define PIKO_REFERENCE_GRAPH_H
 
 #include <piko/reference/error.h>
+#include <piko/reference/fiber.h>
 #include <piko/reference/grid.h>
 
 #include <cstddef>
@@ -73,6 +74,7 @@ public:
   bool unordered = false;
   Precision precision = Precision::Strict; ///< of compiled code only
   bool collects() const { return takesList || endsBin || !waitsOn.empty(); }
+  mutable StackPool stacks; ///< of iterations that meet in a call of Process
   int loop = -1; ///< which cycle of stages that do not collect, or -1
   std::vector<std::vector<std::byte>> collected; ///< primitives of each bin
 };

@@ -15,6 +15,7 @@
 #include <piko/reference/graph.h>
 
 #include <any>
+#include <memory>
 
 namespace piko::reference {
 
@@ -91,7 +92,8 @@ private:
   void start() {
     kept.resize(size - 1);
     for (int64_t i = 1; i < size; ++i)
-      fibers.push_back(std::make_unique<Fiber>([this, i] { body(i); }));
+      fibers.push_back(
+          std::make_unique<Fiber>(node.stacks, [this, i] { body(i); }));
   }
 
   void resume(size_t fiber) {
