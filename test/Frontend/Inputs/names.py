@@ -35,7 +35,8 @@ SPACES = "piko std glm user detail marker reference"
 # What other headers declare globally as no function.
 OTHERS = """
     FPE_INTDIV FP_CONTRACT INT32_MAX INT32_MIN INT64_MAX INT64_MIN UINT32_MAX
-    SA_NODEFER SA_SIGINFO SIGFPE SIG_UNBLOCK sa_sigaction sigaction siginfo_t
+    MADV_NOHUGEPAGE MAP_ANONYMOUS MAP_FAILED MAP_NORESERVE MAP_PRIVATE MAP_STACK
+    PROT_READ PROT_WRITE SA_NODEFER SA_SIGINFO SIGFPE SIG_UNBLOCK sa_sigaction sigaction siginfo_t
     sigjmp_buf sigsetjmp ucontext_t va_list"""
 KEYWORDS = """
     __PIKO__ alignas alignof and auto bool break case catch char class concept const
