@@ -100,6 +100,18 @@ static Frequency getFrequency(Region &side, Region &other, int64_t laneCount) {
   return {0.5, 1};
 }
 
+/// Whether a condition is one more of those that all have to hold: it is all
+/// that one around it does, in place of next to nothing.
+static bool isNextGuard(scf::IfOp choice) {
+  auto outer = dyn_cast<scf::IfOp>(choice->getParentOp());
+  if (!outer || choice->getNextNode() != choice->getBlock()->getTerminator())
+    return false;
+  Region &other = choice->getParentRegion() == &outer.getThenRegion()
+                      ? outer.getElseRegion()
+                      : outer.getThenRegion();
+  return other.empty() || countOperations(other) <= trivial;
+}
+
 /// Whether code of a loop goes on behind an operation.
 static bool goesOnBehind(Operation *op, Operation *loop) {
   for (; op != loop; op = op->getParentOp()) {
@@ -281,6 +293,11 @@ void CostModel::addStructure(Operation *op, Frequency times, bool laneByLane) {
       Frequency share = isState
                             ? Frequency{0.5, 1}
                             : getFrequency(side, other, lanes.getLaneCount());
+      // Many guards, each of which mostly lets through, mostly do together.
+      if (!isState && isNextGuard(choice) &&
+          isNextGuard(cast<scf::IfOp>(choice->getParentOp())) &&
+          (other.empty() || countOperations(other) <= trivial))
+        share.serial = share.vectors;
       if (!lanes.isVarying(choice.getCondition()))
         share.vectors = share.serial;
       auto advances = choice->getAttrOfType<FloatAttr>(marks::advances);

@@ -184,7 +184,8 @@ def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
     many lanes; where they do not, a remark has the estimate, with what costs most.
     Loops on one side of a condition, in place of nothing, may be a slow path, as
     clipping is, where code goes on behind it: the estimates are geometric means of
-    those with it and without it.
+    those with it and without it. Of more than two guards in a row, each in the other,
+    no one is taken to let fewer through.
     One iteration alone waits for each load whose place a load of the turn before
     has said, as of the nodes of a tree (pointer chasing); lanes wait together.
     A loop of a phase that is written in order is vectorized as well where it stands
