@@ -6,7 +6,7 @@
 #   make bench    run the benchmarks, which takes twenty minutes; says where
 #                 the page is (BENCH=--quick: one minute; benchmarks/README.md)
 #   make bench-gate BASE=COMMIT   fail where something takes over 5 % longer than
-#                 it did at that commit; a quarter of an hour and its build
+#                 it did at that commit; nine minutes and its build
 #   make charts   chart speed against error, which takes ten minutes; says
 #                 where the page is (CHARTS=--quick: two minutes)
 # On a machine with a card of NVIDIA's, one more:

@@ -33,9 +33,7 @@ __ubsan_default_options() {
 [[gnu::visibility("default"), gnu::used]] const char *
 __lsan_default_suppressions() {
   // OpenMP's runtime keeps its threads and their memory until the process ends.
-  return "leak:libomp.so\n"
-         // A division by zero leaves a call of Process by a long jump.
-         "leak:piko::reference::Loop::start\n";
+  return "leak:libomp.so\n";
 }
 
 [[gnu::visibility("default"), gnu::used]] const char *__lsan_default_options() {

@@ -13,6 +13,7 @@
 #include "llvm/ADT/DenseSet.h"
 #include "llvm/ADT/SetVector.h"
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 
@@ -83,8 +84,11 @@ public:
     bool isWorthwhile() const { return vectors < serial; }
     /// What to multiply `vectors` and `serial` by to have the geometric means
     /// of what it takes where slow paths mostly run, and where they never do.
-    double weighVectors() const { return std::sqrt(1 - slowVectors / vectors); }
-    double weighSerial() const { return std::sqrt(1 - slowSerial / serial); }
+    double weighVectors() const { return weigh(slowVectors, vectors); }
+    double weighSerial() const { return weigh(slowSerial, serial); }
+    static double weigh(double slow, double all) {
+      return slow > 0 ? std::sqrt(std::max(0.0, 1 - slow / all)) : 1;
+    }
   };
   Cost getCost() const;
   /// The same by other constants.

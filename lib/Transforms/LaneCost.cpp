@@ -71,11 +71,14 @@ static bool isFallbackOf(Region &side, Region &other) {
          !mayFail(other);
 }
 
+static Region &getOtherSide(scf::IfOp choice, Region &side) {
+  return &side == &choice.getThenRegion() ? choice.getElseRegion()
+                                          : choice.getThenRegion();
+}
+
 bool piko::isFallback(Region &region) {
   auto choice = dyn_cast<scf::IfOp>(region.getParentOp());
-  return choice && isFallbackOf(region, &region == &choice.getThenRegion()
-                                            ? choice.getElseRegion()
-                                            : choice.getThenRegion());
+  return choice && isFallbackOf(region, getOtherSide(choice, region));
 }
 
 /// Operations of a side that does next to nothing.
@@ -106,9 +109,7 @@ static bool isNextGuard(scf::IfOp choice) {
   auto outer = dyn_cast<scf::IfOp>(choice->getParentOp());
   if (!outer || choice->getNextNode() != choice->getBlock()->getTerminator())
     return false;
-  Region &other = choice->getParentRegion() == &outer.getThenRegion()
-                      ? outer.getElseRegion()
-                      : outer.getThenRegion();
+  Region &other = getOtherSide(outer, *choice->getParentRegion());
   return other.empty() || countOperations(other) <= trivial;
 }
 
@@ -128,8 +129,7 @@ static bool goesOnBehind(Operation *op, Operation *loop) {
 /// next to nothing, and what follows is for both. Nothing says how often it
 /// runs.
 static bool mayBeSlowPath(scf::IfOp choice, Region &side, Operation *loop) {
-  Region &other = &side == &choice.getThenRegion() ? choice.getElseRegion()
-                                                   : choice.getThenRegion();
+  Region &other = getOtherSide(choice, side);
   return hasLoop(side) && !other.empty() && countOperations(other) <= trivial &&
          goesOnBehind(choice, loop);
 }

@@ -153,13 +153,15 @@ bool stopAlike(const std::set<std::string> &errors) {
 }
 
 /// Whether a target runs a case. With --spread one does, in turn, from one that the
-/// file's name says.
+/// file's name says; what is to stop alike runs on the first one as well.
 bool runs(const Options &options, size_t target, size_t place) {
   if (!options.spread)
     return true;
   std::string name = std::filesystem::path(options.file).stem().string();
   size_t first = std::accumulate(name.begin(), name.end(), size_t(0));
-  return (first + place) % options.targets.size() == target;
+  size_t fixed = options.stops ? 1 : 0;
+  return target < fixed ||
+         (first + place) % (options.targets.size() - fixed) == target - fixed;
 }
 
 /// Runs one case on its targets; true if all is equal. Throws if it cannot be run.
