@@ -134,9 +134,16 @@ function(piko_add_tool name)
   piko_add_sanitizer_options(${name})
 endfunction()
 
+# Seconds of a test. With sanitizers everything takes several times as long.
+if(PIKO_SANITIZE)
+  set(PIKO_TEST_TIMEOUT 3600)
+else()
+  set(PIKO_TEST_TIMEOUT 900)
+endif()
+
 # piko_add_unittest(name SOURCES... [LINK libraries] [APART]): a GoogleTest program
-# whose cases CTest runs one by one. Its files are compiled one by one if APART,
-# because they have names in common.
+# that is one test of CTest's: what starts takes longer than most cases. Its files are
+# compiled one by one if APART, because they have names in common.
 function(piko_add_unittest name)
   cmake_parse_arguments(ARG "APART" "" "LINK" ${ARGN})
   add_executable(${name} ${ARG_UNPARSED_ARGUMENTS})
@@ -148,10 +155,10 @@ function(piko_add_unittest name)
   endif()
   piko_add_sanitizer_options(${name})
   # Tests have more threads than cores: to wait must not cost time.
-  gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60
-    PROPERTIES ENVIRONMENT OMP_WAIT_POLICY=passive)
+  add_test(NAME ${name} COMMAND ${name})
+  set_tests_properties(${name} PROPERTIES COST 10
+    TIMEOUT ${PIKO_TEST_TIMEOUT} ENVIRONMENT OMP_WAIT_POLICY=passive)
 endfunction()
 if(BUILD_TESTING OR NOT DEFINED BUILD_TESTING)
   find_package(GTest REQUIRED)
-  include(GoogleTest)
 endif()

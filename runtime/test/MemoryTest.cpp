@@ -48,13 +48,13 @@ static Graph makeCyclicGraph() {
 
 TEST(Memory, DoesNotGrowFromFrameToFrame) {
   for (int threads : {1, 2}) {
-    Graph graph = makeGraph(20000);
+    Graph graph = makeGraph(10000);
     GraphRun run(graph);
     for (int frame = 0; frame < 5; ++frame)
       ASSERT_EQ(run.run(threads), PIKORT_OK);
     int64_t reserved = pikort_reserved_bytes(run.get());
     int64_t peak = pikort_peak_bytes(run.get());
-    for (int frame = 0; frame < 100; ++frame)
+    for (int frame = 0; frame < 40; ++frame)
       ASSERT_EQ(run.run(threads), PIKORT_OK);
     // Threads share the work differently each time, by some blocks.
     double slack = threads == 1 ? 1.0 : 1.5;
