@@ -43,7 +43,11 @@ public:
   /// Runs all iterations. `deliver` takes what iterations emitted while their
   /// emissions had to be kept.
   template <class Deliver> void run(Deliver deliver) {
-    for (iteration = 0; iteration < size && fibers.empty(); ++iteration)
+    // A division without a result jumps to the innermost guard, which must not be
+    // outside of what the fibers belong to.
+    if (size > 0)
+      DivisionTrap::guard([this] { body(0); });
+    for (iteration = 1; iteration < size && fibers.empty(); ++iteration)
       body(iteration);
     for (size_t i = 0; i < fibers.size(); ++i) {
       resume(i);
