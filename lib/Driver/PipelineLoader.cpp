@@ -4,6 +4,7 @@
 
 #include "Piko/Driver/PipelineLoader.h"
 
+#include "Piko/Driver/DeepStack.h"
 #include "Piko/Driver/ObjectCompiler.h"
 #include "Piko/Target/JIT.h"
 
@@ -41,9 +42,9 @@ findProgram(JITCode &code, const std::string &symbol, ExecutionTarget target) {
   return (*entry)(0);
 }
 
-static std::unique_ptr<LoadedProgram> load(CompileOptions source,
-                                           const LoadOptions &options,
-                                           std::string &diagnostics) {
+static std::unique_ptr<LoadedProgram> loadHere(CompileOptions source,
+                                               const LoadOptions &options,
+                                               std::string &diagnostics) {
   auto start = std::chrono::steady_clock::now();
   source.pipeName = options.pipeName;
   source.includeDirs = options.includeDirs;
@@ -79,6 +80,16 @@ static std::unique_ptr<LoadedProgram> load(CompileOptions source,
       std::chrono::steady_clock::now() - start;
   return std::make_unique<JITProgram>(std::move(*code), *program, taken.count(),
                                       llvm::xxh3_64bits(object->code));
+}
+
+/// A host's stack may be small, and a text deep.
+static std::unique_ptr<LoadedProgram> load(CompileOptions source,
+                                           const LoadOptions &options,
+                                           std::string &diagnostics) {
+  std::unique_ptr<LoadedProgram> program;
+  runOnDeepStack(
+      [&] { program = loadHere(std::move(source), options, diagnostics); });
+  return program;
 }
 
 std::unique_ptr<LoadedProgram> piko::loadPipeline(const std::string &file,

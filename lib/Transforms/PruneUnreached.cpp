@@ -9,6 +9,7 @@
 //   3. take away the others, and the edges on which nothing goes.
 
 #include "Piko/Analysis/PhaseGraph.h"
+#include "Piko/Analysis/StageGraph.h"
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "Piko/Dialect/Piko/IR/PikoCheck.h"
 #include "Piko/Transforms/Passes.h"
@@ -31,12 +32,15 @@ struct PruneUnreachedPass : piko::impl::PruneUnreachedBase<PruneUnreachedPass> {
 
 class ReachPruner {
 public:
-  explicit ReachPruner(PipelineOp pipeline) : pipeline(pipeline) {}
+  explicit ReachPruner(PipelineOp pipeline)
+      : pipeline(pipeline),
+        graph(pipeline, llvm::to_vector(pipeline.getOps<StageOp>())),
+        cycles(graph) {}
   void run();
 
 private:
   StageOp getStage(FlatSymbolRefAttr name) {
-    return lookupInPipeline<StageOp>(pipeline, name);
+    return graph.getStage(graph.getNumber(name));
   }
   void keep(StageOp stage);
   void findKept();
@@ -47,6 +51,8 @@ private:
   bool isFormal(EdgeOp edge);
 
   PipelineOp pipeline;
+  const StageGraph graph; ///< As it was before edges were removed.
+  const NodeGraph cycles;
   llvm::SetVector<Operation *> kept;
   llvm::DenseSet<Operation *> fed; ///< By a source or an edge that is used.
   /// Stages and their ports on which something is emitted.
@@ -82,26 +88,12 @@ bool ReachPruner::isUsed(EdgeOp edge) {
 /// Whether a stage that is kept collects in the rounds of a cycle that the edge
 /// is on.
 bool ReachPruner::makesRounds(EdgeOp edge) {
-  llvm::SetVector<Operation *> ahead, behind;
-  ahead.insert(getStage(edge.getConsumerAttr()));
-  behind.insert(getStage(edge.getProducerAttr()));
-  for (size_t before = 0; before != ahead.size() + behind.size();) {
-    before = ahead.size() + behind.size();
-    for (auto other : pipeline.getOps<EdgeOp>()) {
-      StageOp from = getStage(other.getProducerAttr()),
-              to = getStage(other.getConsumerAttr());
-      if (ahead.contains(from))
-        ahead.insert(to);
-      if (behind.contains(to))
-        behind.insert(from);
-    }
-  }
-  if (!ahead.contains(getStage(edge.getProducerAttr())))
-    return false;
-  return llvm::any_of(ahead, [&](Operation *op) {
-    auto stage = cast<StageOp>(op);
-    return behind.contains(op) && kept.contains(op) && stage.collects();
-  });
+  int cycle = cycles.nodeOf[graph.getNumber(edge.getProducerAttr())];
+  return cycle == cycles.nodeOf[graph.getNumber(edge.getConsumerAttr())] &&
+         llvm::any_of(cycles.nodes[cycle], [&](int member) {
+           StageOp stage = graph.getStage(member);
+           return kept.contains(stage) && stage.collects();
+         });
 }
 
 /// Nothing goes along the edge, but its consumer is kept, and needs an edge.

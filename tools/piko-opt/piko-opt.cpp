@@ -2,6 +2,7 @@
 //
 // Runs passes on `.mlir` files.
 
+#include "Piko/Driver/DeepStack.h"
 #include "Piko/Driver/PassReport.h"
 #include "Piko/Driver/Registration.h"
 
@@ -56,7 +57,8 @@ static void leaveOutOperations() {
   static_cast<llvm::cl::opt<bool> *>(print)->setInitialValue(false);
 }
 
-int main(int argc, char **argv) {
+/// Returns the exit status.
+static int optimize(int argc, char **argv) {
   leaveOutOperations();
   llvm::cl::opt<ReportFormat> report{
       "report-passes",
@@ -77,4 +79,8 @@ int main(int argc, char **argv) {
     return asMainReturnCode(MlirOptMain(argc, argv, input, output, registry));
   llvm::InitLLVM init(argc, argv);
   return asMainReturnCode(runWithReport(input, output, report, registry));
+}
+
+int main(int argc, char **argv) {
+  return piko::runMainOnDeepStack([&] { return optimize(argc, argv); });
 }

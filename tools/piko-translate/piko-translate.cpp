@@ -3,6 +3,7 @@
 // Takes pipelines in and out of MLIR: C++ in; LLVM IR and Graphviz out.
 
 #include "Piko/Driver/Compiler.h"
+#include "Piko/Driver/DeepStack.h"
 #include "Piko/Driver/Registration.h"
 #include "Piko/Frontend/Frontend.h"
 #include "Piko/Target/Graphviz.h"
@@ -31,6 +32,8 @@ int main(int argc, char **argv) {
   mlir::TranslateFromMLIRRegistration toLLVMIR(
       "mlir-to-llvmir", "translate the llvm and omp dialects to LLVM IR",
       exportLLVMIR, piko::registerPikoDialects);
-  return mlir::failed(mlir::mlirTranslateMain(
-      argc, argv, "Piko's translator: C++ in, LLVM IR and Graphviz out"));
+  return piko::runMainOnDeepStack([&]() -> int {
+    return mlir::failed(mlir::mlirTranslateMain(
+        argc, argv, "Piko's translator: C++ in, LLVM IR and Graphviz out"));
+  });
 }

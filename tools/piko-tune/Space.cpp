@@ -3,6 +3,7 @@
 #include "Space.h"
 
 #include "Piko/Driver/Compiler.h"
+#include "Piko/Driver/DeepStack.h"
 #include "Piko/Driver/Diagnostics.h"
 
 #include "llvm/ADT/STLExtras.h"
@@ -118,8 +119,8 @@ static std::vector<std::string> findPipes(const TuneOptions &options,
   return {};
 }
 
-std::optional<Space> tune::readSpace(const TuneOptions &options,
-                                     std::string &diagnostics) {
+static std::optional<Space> readSpaceHere(const TuneOptions &options,
+                                          std::string &diagnostics) {
   mlir::DialectRegistry registry;
   registerPikoDialects(registry);
   mlir::MLIRContext context(registry);
@@ -156,6 +157,14 @@ std::optional<Space> tune::readSpace(const TuneOptions &options,
   if (reader.has("strips") && options.render.stripSize == 0)
     reader.add(Axis::Strip, "strip", {"0", "4096", "32768"});
   return std::move(reader.space);
+}
+
+std::optional<Space> tune::readSpace(const TuneOptions &options,
+                                     std::string &diagnostics) {
+  std::optional<Space> space;
+  runOnDeepStack(
+      [&]() -> void { space = readSpaceHere(options, diagnostics); });
+  return space;
 }
 
 std::string tune::getProcessorName() {

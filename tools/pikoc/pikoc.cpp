@@ -7,6 +7,7 @@
 #include "OutputFiles.h"
 
 #include "Piko/Driver/Compiler.h"
+#include "Piko/Driver/DeepStack.h"
 #include "Piko/Driver/Diagnostics.h"
 #include "Piko/Driver/Explain.h"
 #include "Piko/Driver/ObjectCompiler.h"
@@ -510,8 +511,8 @@ static bool writeObject(const CommandLine &line, OutputFiles &outputs) {
   return false;
 }
 
-int main(int argc, char **argv) {
-  llvm::InitLLVM init(argc, argv);
+/// Returns the exit status.
+static int compile(int argc, char **argv) {
   CommandLine line;
   llvm::cl::HideUnrelatedOptions(line.category);
   llvm::cl::ParseCommandLineOptions(argc, argv,
@@ -534,4 +535,9 @@ int main(int argc, char **argv) {
   if (llvm::Error error = outputs.keep())
     return fail(llvm::toString(std::move(error)));
   return 0;
+}
+
+int main(int argc, char **argv) {
+  llvm::InitLLVM init(argc, argv);
+  return runMainOnDeepStack([&] { return compile(argc, argv); });
 }

@@ -35,6 +35,8 @@
 #include "Report.h"
 #include "Run.h"
 
+#include "Piko/Driver/DeepStack.h"
+
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -234,13 +236,18 @@ bool compareAll(const Options &options) {
 
 } // namespace
 
-int main(int argc, char **argv) {
-  // More threads than cores: to wait must not cost time.
-  setenv("OMP_WAIT_POLICY", "passive", /*overwrite=*/0);
+/// Returns the exit status.
+static int run(int argc, char **argv) {
   try {
     return compareAll(parseOptions(argc, argv)) ? 0 : 1;
   } catch (const std::exception &error) {
     std::fprintf(stderr, "piko-compare: %s\n", error.what());
     return 2;
   }
+}
+
+int main(int argc, char **argv) {
+  // More threads than cores: to wait must not cost time.
+  setenv("OMP_WAIT_POLICY", "passive", /*overwrite=*/0);
+  return piko::runMainOnDeepStack([&] { return run(argc, argv); });
 }

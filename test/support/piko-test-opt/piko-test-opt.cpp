@@ -3,6 +3,7 @@
 // piko-opt with a dialect of tests, whose operations stand in phases.
 
 #include "Piko/Dialect/Piko/IR/Piko.h"
+#include "Piko/Driver/DeepStack.h"
 #include "Piko/Driver/Registration.h"
 
 #include "mlir/Dialect/Arith/IR/Arith.h"
@@ -60,6 +61,8 @@ int main(int argc, char **argv) {
   registerPikoDialects(registry);
   registry.insert<TestDialect>();
   registerPikoPasses();
-  return asMainReturnCode(
-      MlirOptMain(argc, argv, "piko-opt with a dialect of tests\n", registry));
+  return runMainOnDeepStack([&] {
+    return asMainReturnCode(MlirOptMain(
+        argc, argv, "piko-opt with a dialect of tests\n", registry));
+  });
 }
