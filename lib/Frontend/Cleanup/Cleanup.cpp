@@ -334,6 +334,63 @@ static void rebaseState(llvm::Module &module, MarkerTable &markers) {
   }
 }
 
+/// The call of the pipeline's constructor in a wrapper, if it has one.
+static llvm::CallInst *findConstructorCall(llvm::Function &wrapper,
+                                           const MemoryMap &memory) {
+  const llvm::Value *object = memory.objects.lookup(&wrapper);
+  for (llvm::Instruction &instruction : wrapper.getEntryBlock())
+    if (auto *call = dyn_cast<llvm::CallInst>(&instruction))
+      if (llvm::Function *callee = call->getCalledFunction();
+          callee && !callee->isDeclaration() && object && call->arg_size() == 1)
+        return call->getArgOperand(0) == object ? call : nullptr;
+  return nullptr;
+}
+
+/// What a constructor leaves in its object, without the edges that it adds.
+static void dropWiring(llvm::Function &constructor, const MarkerTable &markers,
+                       PassRunner &runner) {
+  for (llvm::Instruction &instruction :
+       llvm::make_early_inc_range(llvm::instructions(constructor)))
+    if (auto *call = dyn_cast<llvm::CallInst>(&instruction))
+      if (const Marker *marker = getMarker(call, markers);
+          marker && (marker->kind == MarkerKind::source ||
+                     marker->kind == MarkerKind::connect ||
+                     marker->kind == MarkerKind::allocateForSource))
+        call->eraseFromParent();
+  dropHints(constructor);
+  llvm::FunctionPassManager simplify;
+  simplify.addPass(llvm::SROAPass(llvm::SROAOptions::PreserveCFG));
+  simplify.addPass(llvm::ADCEPass());
+  runner.run(simplify, constructor);
+}
+
+/// Wrappers become one function each. Each of a phase builds the pipeline: the
+/// edges, as many as stages, are for the one that is read for them.
+static void inlineCalls(llvm::ArrayRef<llvm::Function *> wrappers,
+                        llvm::Module &module, const MemoryMap &memory,
+                        const MarkerTable &markers, PassRunner &runner) {
+  std::string wireName = getWrapperName(WrapperKind::Wire, 0);
+  llvm::CallInst *wiring =
+      findConstructorCall(*module.getFunction(wireName), memory);
+  llvm::Function *constructor = wiring ? wiring->getCalledFunction() : nullptr;
+  if (constructor)
+    constructor->removeFnAttr(llvm::Attribute::AlwaysInline);
+  llvm::ModulePassManager inlining;
+  inlining.addPass(llvm::GlobalDCEPass());
+  inlining.addPass(llvm::AlwaysInlinerPass(/*InsertLifetime=*/true));
+  runner.run(inlining, module);
+  if (!constructor)
+    return;
+  llvm::InlineFunctionInfo info;
+  llvm::InlineFunction(*wiring, info);
+  dropWiring(*constructor, markers, runner);
+  for (llvm::Function *wrapper : wrappers)
+    if (llvm::CallInst *call = findConstructorCall(*wrapper, memory))
+      llvm::InlineFunction(*call, info);
+  if (constructor->use_empty())
+    constructor->eraseFromParent();
+}
+
 bool piko::cleanUp(ParsedUnit &unit, MemoryMap &memory,
                    mlir::MLIRContext &context) {
   llvm::Module &module = *unit.module;
@@ -371,10 +428,7 @@ bool piko::cleanUp(ParsedUnit &unit, MemoryMap &memory,
     return false;
 
   PassRunner runner;
-  llvm::ModulePassManager inlining;
-  inlining.addPass(llvm::GlobalDCEPass());
-  inlining.addPass(llvm::AlwaysInlinerPass(/*InsertLifetime=*/true));
-  runner.run(inlining, module);
+  inlineCalls(wrappers, module, memory, unit.markers, runner);
   for (llvm::Function *wrapper : wrappers)
     if (!cleanUpFunction(*wrapper, unit, memory, runner, context))
       return false;
