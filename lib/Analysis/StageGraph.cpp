@@ -16,16 +16,17 @@ SmallVector<StageOp> piko::getDeclaredStages(PipelineOp pipeline) {
 }
 
 bool piko::isOnCycle(StageOp stage) {
-  auto edges = getPipeline(stage).getOps<EdgeOp>();
-  llvm::SmallSetVector<StringRef, 8> reached;
-  reached.insert(stage.getSymName());
+  llvm::DenseMap<StringAttr, SmallVector<StringAttr, 2>> consumers;
+  for (auto edge : getPipeline(stage).getOps<EdgeOp>())
+    consumers[edge.getProducerAttr().getAttr()].push_back(
+        edge.getConsumerAttr().getAttr());
+  llvm::SmallSetVector<StringAttr, 8> reached;
+  reached.insert(stage.getSymNameAttr());
   for (size_t i = 0; i < reached.size(); ++i)
-    for (EdgeOp edge : edges) {
-      if (edge.getProducer() != reached[i])
-        continue;
-      if (edge.getConsumer() == stage.getSymName())
+    for (StringAttr consumer : consumers.lookup(reached[i])) {
+      if (consumer == stage.getSymNameAttr())
         return true;
-      reached.insert(edge.getConsumer());
+      reached.insert(consumer);
     }
   return false;
 }

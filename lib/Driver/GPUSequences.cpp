@@ -9,7 +9,6 @@
 #include "Piko/Transforms/Passes.h"
 #include "SequenceParts.h"
 
-#include "mlir/Conversion/SCFToControlFlow/SCFToControlFlow.h"
 #include "mlir/Dialect/GPU/IR/GPUDialect.h"
 #include "mlir/Dialect/GPU/Transforms/Passes.h"
 
@@ -57,7 +56,7 @@ void piko::addNVVMSequence(OpPassManager &passes) {
   kernels.addPass(createReloadInputs());
   kernels.addPass(createOutlineRareWork());
   kernels.addPass(createSpillToBlock());
-  kernels.addPass(createSCFToControlFlowPass());
+  addSCFToControlFlow(kernels);
   kernels.addPass(createConvertGPUToExactNVVM());
   addCleanUp(kernels);
 }

@@ -226,8 +226,16 @@ void piko::addCPUSequence(OpPassManager &passes,
   addVectorSequence(passes, options, cpu);
 }
 
+/// A rollback would be of each operation that moves to a new block, and what is
+/// behind one of many branches moves with each of them.
+void piko::addSCFToControlFlow(OpPassManager &passes) {
+  SCFToControlFlowPassOptions options;
+  options.allowPatternRollback = false;
+  passes.addPass(createSCFToControlFlowPass(options));
+}
+
 void piko::addLLVMSequence(OpPassManager &passes) {
-  passes.addPass(createSCFToControlFlowPass());
+  addSCFToControlFlow(passes);
   passes.addPass(createConvertVectorToLLVMPass());
   passes.addPass(createConvertMathToLLVMPass());
   passes.addPass(createUBToLLVMConversionPass());

@@ -50,7 +50,11 @@ private:
 
 struct FuseKernelsPass : piko::impl::FuseKernelsBase<FuseKernelsPass> {
   void runOnOperation() override;
+
+private:
   void fuseInto(KernelOp host);
+
+  llvm::DenseMap<Attribute, SmallVector<EdgeOp, 2>> edgesInto;
 };
 
 } // namespace
@@ -242,12 +246,16 @@ void FuseKernelsPass::fuseInto(KernelOp host) {
     auto kernel = dyn_cast<KernelOp>(op);
     if (!kernel || !kernel.getProcess())
       continue;
-    StageOp consumer = getPhaseStage(kernel.getProcess());
-    SmallVector<EdgeOp> edges = getEdgesInto(consumer);
-    EdgeOp *edge = llvm::find_if(edges, [&](EdgeOp edge) {
+    auto edges = edgesInto.find(kernel.getProcess().getStageAttr());
+    if (edges == edgesInto.end())
+      continue;
+    EdgeOp *edge = llvm::find_if(edges->second, [&](EdgeOp edge) {
       return inside.contains(edge.getProducerAttr());
     });
-    if (edge == edges.end() || !waitsForBin(consumer))
+    if (edge == edges->second.end())
+      continue;
+    StageOp consumer = getPhaseStage(kernel.getProcess());
+    if (!waitsForBin(consumer))
       continue;
     auto producer = lookupInPipeline<StageOp>(*edge, edge->getProducerAttr());
     Candidate candidate{*edge, producer, consumer, host, kernel};
@@ -272,6 +280,9 @@ void FuseKernelsPass::runOnOperation() {
   // The checker follows the stages as they are written.
   if (!getOperation().getOps<CheckRecordOp>().empty())
     return;
+  edgesInto.clear();
+  for (auto edge : getOperation().getOps<EdgeOp>())
+    edgesInto[edge.getConsumerAttr()].push_back(edge);
   // Those behind a kernel may become part of it.
   Block &body = *getOperation().getBodyBlock();
   for (auto op = body.begin(); op != body.end(); ++op)

@@ -276,7 +276,7 @@ LLVM::CallOp LoweringContext::call(OpBuilder &builder, Location loc,
                                    const RuntimeFunction &function,
                                    ValueRange arguments) {
   assert(arguments.size() == function.count && "as in pikort/abi.h");
-  auto callee = module.lookupSymbol<LLVM::LLVMFuncOp>(function.name);
+  LLVM::LLVMFuncOp &callee = called[function.name];
   if (!callee) {
     OpBuilder::InsertionGuard guard(builder);
     builder.setInsertionPointToStart(module.getBody());

@@ -149,6 +149,7 @@ public:
 private:
   mlir::ModuleOp module;
   llvm::StringMap<mlir::LLVM::GlobalOp> texts;
+  llvm::StringMap<mlir::LLVM::LLVMFuncOp> called; // the runtime's
   llvm::DenseMap<mlir::Operation *, const PipelineNumbers *> functions;
   llvm::DenseMap<mlir::Operation *, Grid> grids;     // by launch
   llvm::DenseMap<mlir::Operation *, int32_t> places; // by function

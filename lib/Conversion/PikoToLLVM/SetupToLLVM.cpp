@@ -57,6 +57,7 @@ private:
   Value recordBytes(FlatSymbolRefAttr record, ArrayAttr numbers);
 
   const PipelineNumbers &numbers;
+  int constants = 0; ///< That `bytes` has made.
   PipelineOp pipeline;
   LoweringContext &context;
   OpBuilder &builder;
@@ -69,11 +70,10 @@ private:
 Value SetupWriter::bytes(StringRef data) {
   auto module = pipeline->getParentOfType<ModuleOp>();
   auto type = LLVM::LLVMArrayType::get(builder.getI8Type(), data.size());
-  unsigned counter = 0;
-  SmallString<32> name = SymbolTable::generateSymbolName<32>(
-      (pipeline.getSymName() + ".data").str(),
-      [&](StringRef candidate) { return module.lookupSymbol(candidate); },
-      counter);
+  // Names of the text have no dot.
+  std::string name = (pipeline.getSymName() + ".data").str();
+  if (constants++ > 0)
+    name += "_" + std::to_string(constants - 2);
   OpBuilder atStart(module.getBodyRegion());
   auto global = LLVM::GlobalOp::create(
       atStart, loc, type, /*isConstant=*/true, LLVM::Linkage::Internal, name,

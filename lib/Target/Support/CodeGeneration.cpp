@@ -54,6 +54,30 @@ static void optimize(Module &module, TargetMachine &machine,
   passes.run(module, modules);
 }
 
+/// Functions of more instructions get code at the price of a pass over them:
+/// what splits live ranges takes time that grows with the square, a minute for
+/// three times as many.
+static constexpr unsigned hugeFunction = 15000;
+
+/// A level of code generation for as long as it lives.
+namespace {
+class LowerLevel {
+public:
+  LowerLevel(TargetMachine &machine, const Module &module)
+      : machine(machine), before(machine.getOptLevel()) {
+    if (any_of(module, [](const Function &function) {
+          return function.getInstructionCount() > hugeFunction;
+        }))
+      machine.setOptLevel(CodeGenOptLevel::None);
+  }
+  ~LowerLevel() { machine.setOptLevel(before); }
+
+private:
+  TargetMachine &machine;
+  CodeGenOptLevel before;
+};
+} // namespace
+
 Expected<std::string> piko::emitCode(Module &module, TargetMachine &machine,
                                      const piko::OptimizerOptions &options,
                                      CodeGenFileType type,
@@ -63,6 +87,7 @@ Expected<std::string> piko::emitCode(Module &module, TargetMachine &machine,
   module.setTargetTriple(machine.getTargetTriple());
   module.setDataLayout(machine.createDataLayout());
   optimize(module, machine, options, std::move(last));
+  LowerLevel level(machine, module);
   SmallString<0> code;
   raw_svector_ostream stream(code);
   legacy::PassManager passes;

@@ -43,8 +43,8 @@ public:
   /// Runs all iterations. `deliver` takes what iterations emitted while their
   /// emissions had to be kept.
   template <class Deliver> void run(Deliver deliver) {
-    // A division without a result jumps to the innermost guard, which must not be
-    // outside of what the fibers belong to.
+    // A division without a result jumps to the innermost guard, which must not
+    // be outside of what the fibers belong to.
     if (size > 0)
       DivisionTrap::guard([this] { body(0); });
     for (iteration = 1; iteration < size && fibers.empty(); ++iteration)
