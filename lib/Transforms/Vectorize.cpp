@@ -404,6 +404,8 @@ bool VectorizePass::vectorizeCompacted(scf::ForOp loop) {
 }
 
 bool VectorizePass::vectorizeInOrder(Operation *op) {
+  if (!isa<scf::ForOp, scf::WhileOp>(op)) // before what takes longer
+    return false;
   StageOp stage = getKernelStage(op);
   if (!stage || !op->getParentOfType<scf::ForallOp>() ||
       (stage.getSchedule() &&

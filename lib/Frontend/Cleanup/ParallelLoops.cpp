@@ -109,7 +109,7 @@ void piko::labelLoops(llvm::Function &function, MemoryMap &memory) {
     if (count > unsetLimit)
       continue;
     builder.SetInsertPoint(call);
-    builder.CreateStore(llvm::PoisonValue::get(type), variable);
+    builder.CreateStore(llvm::UndefValue::get(type), variable);
   }
 }
 

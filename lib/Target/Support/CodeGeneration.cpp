@@ -8,6 +8,11 @@
 #include "llvm/MC/MCSubtargetInfo.h"
 #include "llvm/MC/TargetRegistry.h"
 #include "llvm/Passes/PassBuilder.h"
+#include "llvm/Transforms/InstCombine/InstCombine.h"
+#include "llvm/Transforms/Scalar/ADCE.h"
+#include "llvm/Transforms/Scalar/EarlyCSE.h"
+#include "llvm/Transforms/Scalar/SROA.h"
+#include "llvm/Transforms/Scalar/SimplifyCFG.h"
 
 using namespace llvm;
 
@@ -24,6 +29,33 @@ bool piko::hasProcessor(const Target &target, const Triple &triple,
   std::unique_ptr<MCSubtargetInfo> info(
       target.createMCSubtargetInfo(triple, "", ""));
   return info->isCPUStringValid(processor);
+}
+
+/// What LLVM finds by looking at pairs, of blocks or of live ranges, takes time
+/// that grows with the square of a function. Of functions of more instructions
+/// than these, far more than people write, it is left out: before they are
+/// optimized, and behind that.
+static constexpr unsigned hugeText = 40000, hugeFunction = 15000;
+
+static bool hasFunctionAbove(const Module &module, unsigned instructions) {
+  return any_of(module, [&](const Function &function) {
+    return function.getInstructionCount() > instructions;
+  });
+}
+
+/// What takes time in proportion to the text.
+static ModulePassManager buildLinearPipeline(PassBuilder &builder) {
+  ModulePassManager passes =
+      builder.buildO0DefaultPipeline(OptimizationLevel::O0);
+  FunctionPassManager functions;
+  functions.addPass(SROAPass(SROAOptions::ModifyCFG));
+  functions.addPass(EarlyCSEPass());
+  functions.addPass(InstCombinePass());
+  functions.addPass(SimplifyCFGPass());
+  functions.addPass(EarlyCSEPass());
+  functions.addPass(ADCEPass());
+  passes.addPass(createModuleToFunctionPassAdaptor(std::move(functions)));
+  return passes;
 }
 
 static void optimize(Module &module, TargetMachine &machine,
@@ -49,15 +81,12 @@ static void optimize(Module &module, TargetMachine &machine,
   OptimizationLevel level = levels[options.level];
   ModulePassManager passes = options.level == 0
                                  ? builder.buildO0DefaultPipeline(level)
+                             : hasFunctionAbove(module, hugeText)
+                                 ? buildLinearPipeline(builder)
                                  : builder.buildPerModuleDefaultPipeline(level);
   passes.addPass(std::move(last));
   passes.run(module, modules);
 }
-
-/// Functions of more instructions get code at the price of a pass over them:
-/// what splits live ranges takes time that grows with the square, a minute for
-/// three times as many.
-static constexpr unsigned hugeFunction = 15000;
 
 /// A level of code generation for as long as it lives.
 namespace {
@@ -65,9 +94,7 @@ class LowerLevel {
 public:
   LowerLevel(TargetMachine &machine, const Module &module)
       : machine(machine), before(machine.getOptLevel()) {
-    if (any_of(module, [](const Function &function) {
-          return function.getInstructionCount() > hugeFunction;
-        }))
+    if (hasFunctionAbove(module, hugeFunction))
       machine.setOptLevel(CodeGenOptLevel::None);
   }
   ~LowerLevel() { machine.setOptLevel(before); }
