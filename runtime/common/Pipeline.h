@@ -151,7 +151,7 @@ struct Source {
   bool declared = false;
   int32_t stage = 0;
   const uint8_t *data = nullptr;
-  int64_t count = -1;    ///< -1 = not bound
+  int64_t count = 0;     ///< 0 until the host binds some
   bool onDevice = false; ///< What is bound is a device's memory.
   Array<uint8_t> mirror; ///< What a device sees of the host's own memory, ...
   DeviceBytes twin;      ///< ... and what frames of it see, ...

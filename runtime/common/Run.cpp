@@ -29,10 +29,6 @@ static void checkBound(const pikort_pipeline &p) {
           "pipeline " + quoted(p.name) + ": " +
               (state.kind == PIKORT_BUFFER ? "buffer " : "constant ") +
               quoted(state.name) + " is not bound"};
-  for (size_t s = 0; s < p.sources.size(); ++s)
-    if (p.sources[s].count < 0)
-      throw Failure{PIKORT_UNBOUND, "pipeline " + quoted(p.name) + ": source " +
-                                        std::to_string(s) + " is not bound"};
 }
 
 /// A number of a field's type, of which bytes are given.

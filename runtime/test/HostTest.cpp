@@ -201,12 +201,13 @@ TEST_F(Host, Unbound) {
   expectError(pipe.run(), PIKORT_UNBOUND,
               "pipeline 'Small': buffer 'lights' is not bound");
   ASSERT_TRUE(pipe.buffer("lights", points));
-  expectError(pipe.run(), PIKORT_UNBOUND,
-              "pipeline 'Small': source 0 is not bound");
   pikort_view view;
   EXPECT_EQ(pikort_get_view(pipe.get(), "depth", &view), PIKORT_UNBOUND);
   EXPECT_STREQ(pikort_message(pipe.get()),
                "state 'depth' exists only after a run");
+  // A source that is not bound has no primitives.
+  EXPECT_TRUE(pipe.run());
+  EXPECT_EQ(pipe.view<Pixel>("depth")(7, 7).z, 1.0f);
   ASSERT_EQ(pikort_get_view(pipe.get(), "scale", &view), PIKORT_OK);
   EXPECT_EQ(static_cast<const Pixel *>(view.data)->z, 0.0f);
   ASSERT_TRUE(pipe.source(0, points));

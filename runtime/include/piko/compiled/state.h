@@ -51,6 +51,25 @@ public:
   T &operator[](int64_t i) const {
     return *marker::element<T>(this, i, 0, 0, 0);
   }
+
+  /// Of the elements in order: a loop that counts.
+  class Iterator {
+  public:
+    Iterator(const Buffer &buffer, int64_t at) : buffer(buffer), at(at) {}
+    T &operator*() const { return buffer[at]; }
+    T *operator->() const { return &buffer[at]; }
+    Iterator &operator++() {
+      ++at;
+      return *this;
+    }
+    bool operator!=(const Iterator &end) const { return at < end.at; }
+
+  private:
+    const Buffer &buffer;
+    int64_t at;
+  };
+  Iterator begin() const { return {*this, 0}; }
+  Iterator end() const { return {*this, size()}; }
 };
 
 template <class T, int Rank = 2> class Image final {

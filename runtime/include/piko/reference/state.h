@@ -243,11 +243,21 @@ public:
     reference::expectHost("data()");
     return elements;
   }
-  T *begin() const {
-    reference::expectHost("begin()");
+
+  // For both: in a phase for the elements in order, `for (T &x : buffer)`.
+
+  T *begin(reference::Place at = reference::Place::current()) const {
+    if (!isBound)
+      expectBound();
+    if (reference::Checker *checker = reference::activeChecker())
+      for (int64_t i = 0; i < count; ++i)
+        checker->give(
+            checker->element(
+                this, i, [&] { return reference::Memory(elements, count); }),
+            at);
     return elements;
   }
-  T *end() const { return begin() + count; }
+  T *end() const { return elements + count; }
 
 private:
   void hold(T *data, int64_t n) {
