@@ -7,9 +7,10 @@
 //===----------------------------------------------------------------------===//
 #include "ImageModule.h"
 
+#include "Piko/Scene/OutputFile.h"
+
 #include <dlfcn.h>
 #include <png.h>
-#include <unistd.h>
 
 using namespace piko;
 using namespace piko::render;
@@ -33,28 +34,36 @@ static Result<const ImageFunctions *> getFunctions() {
   return static_cast<const ImageFunctions *>(symbol);
 }
 
-static Result<Done> writePNG(const std::string &file, int width, int height,
-                             std::span<const scene::Color> pixels) {
+// A full disk must not cut a picture, and libpng and libjpeg look at no
+// stream's end; so formats are written to memory, and files by replaceFile.
+static Result<std::string> encodePNG(int width, int height,
+                                     std::span<const scene::Color> pixels) {
   png_image image = {};
   image.version = PNG_IMAGE_VERSION;
   image.width = png_uint_32(width);
   image.height = png_uint_32(height);
   image.format = PNG_FORMAT_RGB;
-  if (!png_image_write_to_file(&image, file.c_str(), /*convert_to_8_bit=*/0,
-                               toBytes(pixels).data(), /*row_stride=*/0,
-                               /*colormap=*/nullptr))
+  std::vector<uint8_t> bytes = toBytes(pixels);
+  std::string content;
+  png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(image);
+  content.resize(size);
+  if (!png_image_write_to_memory(&image, content.data(), &size,
+                                 /*convert_to_8_bit=*/0, bytes.data(),
+                                 /*row_stride=*/0, /*colormap=*/nullptr))
     return Error{image.message};
-  return Done{};
+  content.resize(size);
+  return content;
 }
 
-static Result<Done> writeFormat(const std::string &file, int width, int height,
-                                std::span<const scene::Color> pixels) {
-  if (extensionOf(file) == "png")
-    return writePNG(file, width, height, pixels);
+static Result<std::string> encode(const std::string &extension, int width,
+                                  int height,
+                                  std::span<const scene::Color> pixels) {
+  if (extension == "png")
+    return encodePNG(width, height, pixels);
   auto functions = getFunctions();
   if (!functions)
     return functions.error();
-  return (*functions)->write(file, width, height, pixels);
+  return (*functions)->encode(extension, width, height, pixels);
 }
 
 static Result<Done> checkExtension(const std::string &extension) {
@@ -81,19 +90,6 @@ Result<Done> render::checkImageFormat(const std::string &path) {
   return Done{};
 }
 
-namespace {
-
-/// Removes a file unless it was renamed before.
-struct TemporaryFile {
-  fs::path path;
-  ~TemporaryFile() {
-    std::error_code ignored;
-    fs::remove(path, ignored);
-  }
-};
-
-} // namespace
-
 Result<Done> render::writeImage(const std::string &path, int width, int height,
                                 std::span<const scene::Color> pixels) {
   if (width < 1 || height < 1 || pixels.size() != size_t(width) * height)
@@ -104,20 +100,11 @@ Result<Done> render::writeImage(const std::string &path, int width, int height,
   if (auto ok = checkImageFormat(path); !ok)
     return ok.error();
 
-  // Beside the image, so that renaming does not copy; with its extension,
-  // which says the format.
-  fs::path target(path);
-  TemporaryFile temporary{target.parent_path() /
-                          ("." + target.stem().string() + "." +
-                           std::to_string(getpid()) + ".tmp" +
-                           target.extension().string())};
-  if (auto ok = writeFormat(temporary.path.string(), width, height, pixels);
-      !ok)
+  auto content = encode(extensionOf(path), width, height, pixels);
+  if (!content)
+    return failTo("write", path, content.error().message);
+  if (auto ok = replaceFile(path, *content); !ok)
     return failTo("write", path, ok.error().message);
-  std::error_code problem;
-  fs::rename(temporary.path, target, problem);
-  if (problem)
-    return failTo("write", path, problem.message());
   return Done{};
 }
 

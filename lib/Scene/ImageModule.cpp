@@ -2,9 +2,15 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #include "ImageModule.h"
 
+#include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 
+#include <fstream>
+#include <iterator>
 #include <string_view>
+
+#include <sys/mman.h>
+#include <unistd.h>
 
 using namespace piko;
 using namespace piko::render;
@@ -22,36 +28,80 @@ bool hasFormat(const std::string &extension) {
   return openFormat(extension) != nullptr;
 }
 
-Result<Done> write(const std::string &file, int width, int height,
-                   std::span<const scene::Color> pixels) {
-  std::string format = extensionOf(file);
-  auto output = openFormat(format);
-  if (!output)
-    return Error{"no image format has the extension '" + format + "'"};
+/// A file in memory, for formats that write to nothing but names.
+class MemoryFile {
+public:
+  MemoryFile() : descriptor(memfd_create("piko-image", MFD_CLOEXEC)) {}
+  MemoryFile(const MemoryFile &) = delete;
+  MemoryFile &operator=(const MemoryFile &) = delete;
+  ~MemoryFile() {
+    if (descriptor >= 0)
+      close(descriptor);
+  }
+  std::string name() const {
+    return "/proc/self/fd/" + std::to_string(descriptor);
+  }
+  std::string read() const {
+    std::ifstream file(name(), std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
+
+private:
+  int descriptor;
+};
+
+/// 8 bits, but for the formats that hold floats.
+OIIO::ImageSpec describe(const std::string &format, int width, int height,
+                         std::string_view writer) {
   bool isFloat = format == "exr" || format == "hdr" || format == "pfm";
-  int channels = format == "exr" ? 4 : 3;
   OIIO::TypeDesc type = isFloat ? OIIO::TypeDesc::FLOAT : OIIO::TypeDesc::UINT8;
-  OIIO::ImageSpec spec(width, height, channels, type);
+  OIIO::ImageSpec spec(width, height, format == "exr" ? 4 : 3, type);
   // These would hold the present date, and files of equal pictures differ.
-  if (std::string_view writer = output->format_name();
-      writer == "openexr" || writer == "tiff")
+  if (writer == "openexr" || writer == "tiff")
     spec.attribute("DateTime", "1970:01:01 00:00:00");
-  if (!output->open(file, spec))
-    return Error{output->geterror()};
+  return spec;
+}
+
+/// Opens, writes and closes; what went wrong first is the error.
+Result<Done> writeAll(OIIO::ImageOutput &output, const std::string &name,
+                      const OIIO::ImageSpec &spec,
+                      std::span<const scene::Color> pixels) {
+  if (!output.open(name, spec))
+    return Error{output.geterror()};
   bool ok;
-  if (isFloat)
-    ok = output->write_image(OIIO::TypeDesc::FLOAT, pixels.data(),
-                             sizeof(scene::Color));
+  if (spec.format == OIIO::TypeDesc::FLOAT)
+    ok = output.write_image(OIIO::TypeDesc::FLOAT, pixels.data(),
+                            sizeof(scene::Color));
   else
-    ok = output->write_image(OIIO::TypeDesc::UINT8, toBytes(pixels).data());
-  std::string why = ok ? "" : output->geterror();
-  if (!output->close() && ok) {
+    ok = output.write_image(OIIO::TypeDesc::UINT8, toBytes(pixels).data());
+  std::string why = ok ? "" : output.geterror();
+  if (!output.close() && ok) {
     ok = false;
-    why = output->geterror();
+    why = output.geterror();
   }
   if (!ok)
     return Error{why};
   return Done{};
+}
+
+Result<std::string> encode(const std::string &extension, int width, int height,
+                           std::span<const scene::Color> pixels) {
+  auto output = openFormat(extension);
+  if (!output)
+    return Error{"no image format has the extension '" + extension + "'"};
+  OIIO::ImageSpec spec =
+      describe(extension, width, height, output->format_name());
+  if (output->supports("ioproxy")) {
+    OIIO::Filesystem::IOVecOutput stream;
+    output->set_ioproxy(&stream);
+    if (auto ok = writeAll(*output, "image." + extension, spec, pixels); !ok)
+      return ok.error();
+    return std::string(stream.buffer().begin(), stream.buffer().end());
+  }
+  MemoryFile file;
+  if (auto ok = writeAll(*output, file.name(), spec, pixels); !ok)
+    return ok.error();
+  return file.read();
 }
 
 Result<Image> read(const std::string &path) {
@@ -83,4 +133,4 @@ Result<Image> read(const std::string &path) {
 } // namespace
 
 extern "C" __attribute__((visibility("default")))
-const ImageFunctions piko_image_functions = {hasFormat, write, read};
+const ImageFunctions piko_image_functions = {hasFormat, encode, read};

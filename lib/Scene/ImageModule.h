@@ -21,9 +21,10 @@ namespace piko::render {
 struct ImageFunctions {
   /// Whether there is a format of that extension (lowercase, without a dot).
   bool (*hasFormat)(const std::string &extension);
-  /// Writes a file in the format of its extension.
-  Result<Done> (*write)(const std::string &file, int width, int height,
-                        std::span<const scene::Color> pixels);
+  /// A file's content in the format of an extension.
+  Result<std::string> (*encode)(const std::string &extension, int width,
+                                int height,
+                                std::span<const scene::Color> pixels);
   Result<Image> (*read)(const std::string &path);
 };
 

@@ -3,6 +3,7 @@
 #include "Piko/Scene/ImageError.h"
 #include "Piko/Scene/ImageFile.h"
 #include "Piko/Scene/Json.h"
+#include "Piko/Scene/OutputFile.h"
 
 #include <algorithm>
 #include <charconv>
@@ -143,6 +144,8 @@ Result<bool> compareFiles(const Options &options) {
     if (auto ok = writeMap(options, *image, flip); !ok)
       return ok.error();
   std::printf("%s\n", describe(options, *error).c_str());
+  if (auto ok = finishOutput(); !ok)
+    return ok.error();
   return error->largest <= options.failAbove;
 }
 
@@ -159,7 +162,8 @@ int main(int argc, char **argv) {
     return fail(options.error());
   if (options->help) {
     std::fputs(usage, stdout);
-    return 0;
+    auto ok = finishOutput();
+    return ok ? 0 : fail(ok.error());
   }
   auto isNear = compareFiles(*options);
   if (!isNear)

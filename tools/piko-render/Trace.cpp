@@ -4,9 +4,8 @@
 #include "Mappings.h"
 
 #include "Piko/Scene/Json.h"
+#include "Piko/Scene/OutputFile.h"
 
-#include <cstring>
-#include <fstream>
 #include <mutex>
 #include <vector>
 
@@ -69,10 +68,5 @@ Result<Done> piko::render::traceFrame(pikort_pipeline *pipeline,
                              .add("measured ratio", info.measured_ratio)));
   for (const pikort_unit_run &unit : units.list)
     events.push_back(makeEvent(unit));
-  std::ofstream file(path);
-  file << JsonObject().add("traceEvents", events).text() << "\n";
-  file.close();
-  if (!file)
-    return Error{"cannot write '" + path + "': " + std::strerror(errno)};
-  return Done{};
+  return writeFile(path, JsonObject().add("traceEvents", events).text() + "\n");
 }

@@ -15,6 +15,7 @@
 
 #include "Piko/Driver/TunedSetting.h"
 #include "Piko/Scene/ImageFile.h"
+#include "Piko/Scene/OutputFile.h"
 #include "Piko/Scene/ProgressBar.h"
 
 #include <algorithm>
@@ -126,7 +127,7 @@ Result<Done> report(const Options &options, const RunResult &result,
       text += printWastes(wastes) + printMappings(pipeline);
   }
   std::printf("%s", options.json ? (line.text() + "\n").c_str() : text.c_str());
-  return Done{};
+  return finishOutput();
 }
 
 /// Sets what piko-tune chose, where the command line does not say otherwise.
@@ -227,7 +228,8 @@ int main(int argc, char **argv) {
     return fail(options.error());
   if (options->help) {
     std::fputs(usage, stdout);
-    return 0;
+    auto ok = finishOutput();
+    return ok ? 0 : fail(ok.error());
   }
   if (auto ok = applyTuned(*options); !ok)
     return fail(ok.error());

@@ -11,8 +11,9 @@
 #include "Report.h"
 #include "SceneBench.h"
 
+#include "Piko/Scene/OutputFile.h"
+
 #include <cstdio>
-#include <fstream>
 
 using namespace piko;
 using namespace piko::tune;
@@ -22,24 +23,14 @@ using render::Result;
 
 namespace {
 
-Result<Done> writeFile(const std::string &path, const std::string &text) {
-  if (path.empty())
-    return Done{};
-  std::ofstream file(path, std::ios::binary);
-  file << text;
-  file.close();
-  if (!file)
-    return Error{"cannot write '" + path + "'"};
-  return Done{};
-}
-
 Result<Done> writeFiles(const TuneResult &result) {
   const TuneOptions &options = result.options;
   for (const auto &[path, text] : {std::pair(options.out, writeSetting(result)),
                                    std::pair(options.chart, drawChart(result)),
                                    std::pair(options.csv, writeCSV(result))})
-    if (auto ok = writeFile(path, text); !ok)
-      return ok;
+    if (!path.empty())
+      if (auto ok = render::writeFile(path, text); !ok)
+        return ok;
   return Done{};
 }
 
@@ -84,6 +75,8 @@ Result<Done> tuneScene(const TuneOptions &options) {
   result.mappings = *mappings;
   std::string text = options.json ? writeJson(result) : summarize(result);
   std::fputs(text.c_str(), stdout);
+  if (auto ok = render::finishOutput(); !ok)
+    return ok;
   return writeFiles(result);
 }
 
@@ -101,7 +94,8 @@ int main(int argc, char **argv) {
     return fail(options.error());
   if (options->help) {
     std::fputs(usage, stdout);
-    return 0;
+    auto ok = render::finishOutput();
+    return ok ? 0 : fail(ok.error());
   }
   if (auto ok = tuneScene(*options); !ok)
     return fail(ok.error());

@@ -32,3 +32,17 @@ TEST(Json, NumbersStayNumbers) {
   EXPECT_EQ(object.text(),
             R"({"big": 5000000000, "large": 123456789.125, "inf": null})");
 }
+
+TEST(Json, BytesThatAreNotUTF8BecomeReplacementCharacters) {
+  JsonObject object;
+  object.add("\xff.obj", "\xc3\xbc \xe2\x82\xac \xf0\x9f\x98\x80")
+      .add("short", "\xe2\x82")
+      .add("long", "\xc0\xaf")
+      .add("surrogate", "\xed\xa0\x80")
+      .add("beyond", "\xf4\x90\x80\x80");
+  EXPECT_EQ(object.text(),
+            "{\"\uFFFD.obj\": \"\u00fc \u20ac \U0001F600\", "
+            "\"short\": \"\uFFFD\uFFFD\", \"long\": \"\uFFFD\uFFFD\", "
+            "\"surrogate\": \"\uFFFD\uFFFD\uFFFD\", "
+            "\"beyond\": \"\uFFFD\uFFFD\uFFFD\uFFFD\"}");
+}

@@ -12,7 +12,8 @@
 namespace piko::render {
 
 /// A JSON object whose members keep their order. Numbers that are not finite
-/// become null.
+/// become null. Bytes that are not UTF-8, as in names of files, each become
+/// U+FFFD, the replacement character. The locale makes no difference.
 class JsonObject {
 public:
   JsonObject &add(std::string_view key, std::string_view value);

@@ -1,0 +1,239 @@
+//===- OutputFile.cpp - Files and results that are written ----------------===//
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+#include "Piko/Scene/OutputFile.h"
+
+#include <cerrno>
+#include <csignal>
+#include <cstdio>
+#include <ctime>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <system_error>
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+using namespace piko;
+using namespace piko::render;
+namespace fs = std::filesystem;
+
+namespace {
+
+/// Why a system call failed; 0 when none did.
+using Errno = int;
+
+/// Holds back what would end the process between a file's first byte and its
+/// last, on this thread. Beyond a limit on sizes a write is then an error.
+class HeldSignals {
+public:
+  HeldSignals() {
+    sigset_t held;
+    sigemptyset(&held);
+    for (int number : {SIGINT, SIGTERM, SIGHUP, SIGXFSZ, SIGPIPE})
+      sigaddset(&held, number);
+    pthread_sigmask(SIG_BLOCK, &held, &before);
+    sigpending(&pendingBefore);
+  }
+  HeldSignals(const HeldSignals &) = delete;
+  HeldSignals &operator=(const HeldSignals &) = delete;
+  ~HeldSignals() {
+    drop(SIGXFSZ);
+    drop(SIGPIPE);
+    pthread_sigmask(SIG_SETMASK, &before, nullptr);
+  }
+
+private:
+  /// Takes a signal that our own write raised.
+  void drop(int number) {
+    if (sigismember(&pendingBefore, number))
+      return;
+    sigset_t one;
+    sigemptyset(&one);
+    sigaddset(&one, number);
+    timespec none = {};
+    sigtimedwait(&one, nullptr, &none);
+  }
+
+  sigset_t before;
+  sigset_t pendingBefore;
+};
+
+/// A descriptor that closes, once.
+struct OpenFile {
+  int descriptor = -1;
+  OpenFile(const std::string &path, int flags)
+      : descriptor(open(path.c_str(), flags | O_WRONLY | O_CLOEXEC, 0666)) {}
+  OpenFile(const OpenFile &) = delete;
+  OpenFile &operator=(const OpenFile &) = delete;
+  ~OpenFile() { close(); }
+
+  Errno close() {
+    int closed = descriptor < 0 ? 0 : ::close(descriptor);
+    descriptor = -1;
+    return closed == 0 ? 0 : errno;
+  }
+
+  Errno write(std::string_view content) {
+    while (!content.empty()) {
+      ssize_t count = ::write(descriptor, content.data(), content.size());
+      if (count < 0 && errno == EINTR)
+        continue;
+      if (count <= 0)
+        return count < 0 ? errno : EIO;
+      content.remove_prefix(size_t(count));
+    }
+    return 0;
+  }
+};
+
+Errno writeDirectly(const std::string &path, std::string_view content) {
+  OpenFile file(path, O_TRUNC);
+  if (file.descriptor < 0)
+    return errno;
+  Errno problem = file.write(content);
+  Errno closing = file.close();
+  return problem ? problem : closing;
+}
+
+Errno writeInPlace(const std::string &path, std::string_view content) {
+  std::ifstream old(path, std::ios::binary);
+  if (!old)
+    return EACCES; // it could not be restored
+  std::string held{std::istreambuf_iterator<char>(old), {}};
+  if (old.bad())
+    return EIO;
+  Errno problem = writeDirectly(path, content);
+  if (problem)
+    writeDirectly(path, held);
+  return problem;
+}
+
+/// As the old file's, where there is one. Who may not give files away keeps
+/// them.
+Errno setPermissions(int descriptor, const struct stat *old) {
+  if (!old)
+    return 0;
+  if (fchown(descriptor, old->st_uid, old->st_gid) != 0 && errno != EPERM)
+    return errno;
+  return fchmod(descriptor, old->st_mode & 07777) == 0 ? 0 : errno;
+}
+
+/// Short, for the target's own name may be as long as names can be.
+std::string nameBeside(const fs::path &target) {
+  static int count = 0;
+  return (target.parent_path() /
+          (".piko-" + std::to_string(getpid()) + "-" +
+           std::to_string(__atomic_fetch_add(&count, 1, __ATOMIC_RELAXED))))
+      .string();
+}
+
+/// A new file that appears at its place when it is complete.
+class NewFile {
+public:
+  explicit NewFile(const std::string &target)
+      : target(target), name(nameBeside(target)),
+        file(folderOf(target), O_TMPFILE) {}
+  NewFile(const NewFile &) = delete;
+  NewFile &operator=(const NewFile &) = delete;
+  ~NewFile() {
+    if (isNamed)
+      unlink(name.c_str());
+  }
+
+  Errno create() {
+    if (file.descriptor >= 0)
+      return 0;
+    // Not all file systems know files without names, and kernels that know
+    // none take the flag for O_DIRECTORY.
+    file.descriptor =
+        open(name.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0666);
+    isNamed = file.descriptor >= 0;
+    return isNamed ? 0 : errno;
+  }
+
+  Errno complete(std::string_view content, const struct stat *old) {
+    if (Errno problem = file.write(content))
+      return problem;
+    if (Errno problem = setPermissions(file.descriptor, old))
+      return problem;
+    if (!isNamed) {
+      std::string link = "/proc/self/fd/" + std::to_string(file.descriptor);
+      if (linkat(AT_FDCWD, link.c_str(), AT_FDCWD, name.c_str(),
+                 AT_SYMLINK_FOLLOW) != 0)
+        return errno;
+      isNamed = true;
+    }
+    if (Errno problem = file.close())
+      return problem;
+    if (rename(name.c_str(), target.c_str()) != 0)
+      return errno;
+    isNamed = false;
+    return 0;
+  }
+
+private:
+  static std::string folderOf(const fs::path &path) {
+    return path.has_parent_path() ? path.parent_path().string() : ".";
+  }
+
+  std::string target;
+  std::string name;
+  OpenFile file;
+  bool isNamed = false;
+};
+
+/// Where a chain of symbolic links ends, whether or not there is a file.
+std::string followLinks(fs::path path) {
+  constexpr int mostLinks = 40; // as Linux follows
+  std::error_code problem;
+  for (int i = 0; i < mostLinks && fs::is_symlink(path, problem); ++i)
+    path = path.parent_path() / fs::read_symlink(path, problem);
+  return path.string();
+}
+
+Errno replace(const std::string &path, std::string_view content) {
+  struct stat old;
+  bool exists = stat(path.c_str(), &old) == 0;
+  if (!exists && errno != ENOENT)
+    return errno;
+  HeldSignals held;
+  if (exists && S_ISDIR(old.st_mode))
+    return EISDIR;
+  if (exists && !S_ISREG(old.st_mode))
+    return writeDirectly(path, content);
+  std::string target = followLinks(path);
+  NewFile file(target);
+  Errno problem = file.create();
+  bool mayNot = problem == EACCES || problem == EPERM || problem == EROFS;
+  if (exists && mayNot)
+    return writeInPlace(path, content);
+  return problem ? problem : file.complete(content, exists ? &old : nullptr);
+}
+
+} // namespace
+
+Result<Done> render::replaceFile(const std::string &path,
+                                 std::string_view content) {
+  if (Errno problem = replace(path, content))
+    return Error{std::generic_category().message(problem)};
+  return Done{};
+}
+
+Result<Done> render::writeFile(const std::string &path,
+                               std::string_view content) {
+  if (auto ok = replaceFile(path, content); !ok)
+    return Error{"cannot write '" + path + "': " + ok.error().message};
+  return Done{};
+}
+
+Result<Done> render::finishOutput() {
+  errno = 0;
+  // A write that failed before left its mark, but no reason.
+  if (std::fflush(stdout) == 0 && !std::ferror(stdout))
+    return Done{};
+  return Error{
+      "cannot write the standard output" +
+      (errno ? ": " + std::generic_category().message(errno) : std::string())};
+}
