@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <csignal>
 #include <cstdio>
 
 using namespace piko;
@@ -157,6 +158,7 @@ int fail(const Error &error) {
 } // namespace
 
 int main(int argc, char **argv) {
+  std::signal(SIGXFSZ, SIG_IGN); // to write beyond a limit is an error
   auto options = parseOptions({argv + 1, argv + argc});
   if (!options)
     return fail(options.error());

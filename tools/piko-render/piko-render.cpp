@@ -20,6 +20,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <csignal>
 #include <cstddef>
 #include <cstdio>
 #include <span>
@@ -223,6 +224,7 @@ int fail(const Error &error) {
 } // namespace
 
 int main(int argc, char **argv) {
+  std::signal(SIGXFSZ, SIG_IGN); // to write beyond a limit is an error
   auto options = parseOptions({argv + 1, argv + argc});
   if (!options)
     return fail(options.error());

@@ -13,6 +13,7 @@
 
 #include "Piko/Scene/OutputFile.h"
 
+#include <csignal>
 #include <cstdio>
 
 using namespace piko;
@@ -89,6 +90,7 @@ int fail(const Error &error) {
 } // namespace
 
 int main(int argc, char **argv) {
+  std::signal(SIGXFSZ, SIG_IGN); // to write beyond a limit is an error
   auto options = parseTuneOptions({argv + 1, argv + argc});
   if (!options)
     return fail(options.error());

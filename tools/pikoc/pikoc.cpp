@@ -23,6 +23,8 @@
 #include "llvm/Support/InitLLVM.h"
 #include "llvm/Support/Path.h"
 
+#include <csignal>
+
 using namespace mlir;
 using namespace piko;
 
@@ -539,5 +541,6 @@ static int compile(int argc, char **argv) {
 
 int main(int argc, char **argv) {
   llvm::InitLLVM init(argc, argv);
+  std::signal(SIGXFSZ, SIG_IGN); // to write beyond a limit is an error
   return runMainOnDeepStack([&] { return compile(argc, argv); });
 }

@@ -333,7 +333,7 @@ typedef struct pikort_stage_info {
 typedef struct pikort_source_info {
   int32_t stage;
   int32_t record;
-  int64_t count; ///< Primitives bound, or -1.
+  int64_t count; ///< Primitives bound.
 } pikort_source_info;
 
 PIKORT_API int32_t pikort_rank(const pikort_pipeline *pipeline);
