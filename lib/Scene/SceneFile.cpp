@@ -2,10 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #include "Piko/Scene/SceneFile.h"
 
-#include "GltfCheck.h"
+#include "GltfFile.h"
+#include "MeshBuilder.h"
+#include "MeshReaders.h"
 #include "PatchFile.h"
-#include "PlyCheck.h"
-#include "Vectors.h"
 
 #include <assimp/Importer.hpp>
 #include <assimp/ProgressHandler.hpp>
@@ -13,14 +13,11 @@
 #include <assimp/scene.h>
 #include <zlib.h>
 
-#include <array>
-#include <bit>
 #include <cerrno>
-#include <cmath>
 #include <cstring>
 #include <filesystem>
-#include <limits>
-#include <unordered_map>
+#include <fstream>
+#include <iterator>
 
 using namespace piko;
 using namespace piko::render;
@@ -29,35 +26,6 @@ namespace fs = std::filesystem;
 namespace {
 
 glm::vec3 toVec3(const aiVector3D &v) { return {v.x, v.y, v.z}; }
-
-glm::vec3 normalizeOr(glm::vec3 v, glm::vec3 otherwise) {
-  float length = std::sqrt(glm::dot(v, v));
-  return length > 0 && std::isfinite(length) ? v * (1 / length) : otherwise;
-}
-
-/// Position and normal, bit by bit. Vertices without a normal have none of
-/// unit length, so they join no vertex that has one.
-using VertexKey = std::array<uint32_t, 6>;
-
-VertexKey makeKey(glm::vec3 position, glm::vec3 normal) {
-  VertexKey key;
-  for (int i = 0; i < 3; ++i) {
-    key[i] = std::bit_cast<uint32_t>(position[i] + 0.0f); // -0 is 0
-    key[i + 3] = std::bit_cast<uint32_t>(normal[i] + 0.0f);
-  }
-  return key;
-}
-
-struct HashVertexKey {
-  size_t operator()(const VertexKey &key) const {
-    uint64_t hash = 0x9e3779b97f4a7c15;
-    for (uint32_t word : key) {
-      hash = (hash ^ word) * 0xff51afd7ed558ccd;
-      hash ^= hash >> 32;
-    }
-    return hash;
-  }
-};
 
 /// For each mesh of a scene that was just imported, whether no two of its
 /// polygons share a vertex: importers of OBJ and STL give each corner its own,
@@ -82,31 +50,26 @@ Result<std::vector<bool>> findUnshared(const aiScene &imported) {
 }
 
 /// Gathers the triangles of an imported scene.
-class MeshBuilder {
+class ImportedScene {
 public:
   /// Joins equal vertices in meshes that are `toJoin`.
-  explicit MeshBuilder(std::vector<bool> toJoin) : toJoin(std::move(toJoin)) {}
+  ImportedScene(const aiScene &imported, std::vector<bool> toJoin)
+      : imported(imported), toJoin(std::move(toJoin)) {}
 
-  Result<Mesh> build(const aiScene &imported) {
+  Result<Mesh> build() {
     if (imported.mRootNode)
-      addNode(imported, *imported.mRootNode, aiMatrix4x4());
-    if (!problem.empty())
-      return Error{problem};
-    if (mesh.triangles.empty())
-      return Error{"it holds no triangles"};
-    smoothNormals();
-    return std::move(mesh);
+      addNode(*imported.mRootNode, aiMatrix4x4());
+    return builder.finish();
   }
 
 private:
-  void addNode(const aiScene &imported, const aiNode &node,
-               const aiMatrix4x4 &parent) {
+  void addNode(const aiNode &node, const aiMatrix4x4 &parent) {
     aiMatrix4x4 toWorld = parent * node.mTransformation;
     for (unsigned i = 0; i < node.mNumMeshes; ++i)
       addMesh(*imported.mMeshes[node.mMeshes[i]], toJoin[node.mMeshes[i]],
               toWorld);
     for (unsigned i = 0; i < node.mNumChildren; ++i)
-      addNode(imported, *node.mChildren[i], toWorld);
+      addNode(*node.mChildren[i], toWorld);
   }
 
   void addMesh(const aiMesh &part, bool join, const aiMatrix4x4 &toWorld) {
@@ -120,12 +83,12 @@ private:
         if (part.HasNormals())
           normal =
               normalizeOr(toVec3(normalToWorld * part.mNormals[i]), {0, 0, 1});
-        places[i] =
-            addVertex(toVec3(toWorld * part.mVertices[i]), normal, join);
+        places[i] = builder.addVertex(toVec3(toWorld * part.mVertices[i]),
+                                      normal, join);
       }
       return places[i];
     };
-    for (unsigned f = 0; f < part.mNumFaces && problem.empty(); ++f) {
+    for (unsigned f = 0; f < part.mNumFaces && !builder.hasFailed(); ++f) {
       const aiFace &face = part.mFaces[f];
       if (face.mNumIndices != 3) // a point or a line
         continue;
@@ -133,62 +96,13 @@ private:
                             place(face.mIndices[2])};
       if (isMirrored)
         std::swap(corners.y, corners.z);
-      addTriangle(corners);
+      builder.addTriangle(corners);
     }
   }
 
-  int32_t addVertex(glm::vec3 position, glm::vec3 normal, bool join) {
-    if (!isFinite(position))
-      fail("the position of a vertex is not finite");
-    size_t next = mesh.vertices.size();
-    if (next == std::numeric_limits<int32_t>::max())
-      fail("it holds more than 2^31 vertices");
-    if (join) {
-      auto [known, isNew] =
-          joined.try_emplace(makeKey(position, normal), int32_t(next));
-      if (!isNew)
-        return known->second;
-    }
-    mesh.vertices.push_back({position, normal, int32_t(next)});
-    return int32_t(next);
-  }
-
-  void addTriangle(glm::ivec3 corners) {
-    size_t next = mesh.triangles.size();
-    if (next == std::numeric_limits<int32_t>::max())
-      return fail("it holds more than 2^31 triangles");
-    mesh.triangles.push_back({corners, int32_t(next)});
-  }
-
-  /// Gives vertices without a normal the area-weighted mean of those of the
-  /// triangles around them.
-  void smoothNormals() {
-    std::vector<char> isMissing(mesh.vertices.size());
-    for (const scene::Vertex &v : mesh.vertices)
-      isMissing[v.index] = v.normal == glm::vec3(0);
-    for (const scene::Triangle &t : mesh.triangles) {
-      glm::vec3 a = mesh.vertices[t.vertex.x].position;
-      glm::vec3 b = mesh.vertices[t.vertex.y].position;
-      glm::vec3 c = mesh.vertices[t.vertex.z].position;
-      glm::vec3 n = glm::cross(b - a, c - a); // as long as twice the area
-      for (int k = 0; k < 3; ++k)
-        if (isMissing[t.vertex[k]])
-          mesh.vertices[t.vertex[k]].normal += n;
-    }
-    for (scene::Vertex &v : mesh.vertices)
-      if (isMissing[v.index])
-        v.normal = normalizeOr(v.normal, {0, 0, 1});
-  }
-
-  void fail(const std::string &message) {
-    if (problem.empty())
-      problem = message;
-  }
-
+  const aiScene &imported;
   std::vector<bool> toJoin;
-  Mesh mesh;
-  std::unordered_map<VertexKey, int32_t, HashVertexKey> joined;
-  std::string problem;
+  MeshBuilder builder;
 };
 
 /// Passes on how far assimp has got.
@@ -255,11 +169,48 @@ Result<Mesh> loadPatches(const std::string &path) {
   return mesh;
 }
 
-/// What is wrong with a file that assimp would not say; "" if nothing is.
-std::string check(const std::string &format, const std::string &content) {
-  if (format == ".ply")
-    return checkPly(content);
-  return format == ".gltf" || format == ".glb" ? checkGltf(content) : "";
+/// The content of a file as it is.
+Result<std::string> readRaw(const fs::path &path) {
+  std::ifstream stream(path, std::ios::binary);
+  std::string content;
+  if (!stream || !fs::is_regular_file(path))
+    return Error{"cannot read '" + path.string() + "'"};
+  content.assign(std::istreambuf_iterator<char>(stream), {});
+  return content;
+}
+
+/// Opens files that a glTF file names, beside it: by their names with percent
+/// codes decoded, or as they are.
+OpenFile openBeside(const std::string &path) {
+  return [folder = fs::path(path).parent_path()](const std::string &name) {
+    std::string decoded = decodePercents(name);
+    if (decoded.find('\0') != decoded.npos)
+      return Result<std::string>(Error{"a file's name holds a zero"});
+    auto content = readRaw(folder / decoded);
+    return content || decoded == name ? content : readRaw(folder / name);
+  };
+}
+
+bool isOwnFormat(const std::string &format) {
+  return format == ".ply" || format == ".obj" || format == ".stl" ||
+         format == ".gltf" || format == ".glb";
+}
+
+/// Reads a file of a format that has a reader of its own.
+Result<Mesh> loadOwn(const std::string &path, const std::string &format,
+                     const ProgressFunction &progress) {
+  auto content = readFile(path);
+  if (!content)
+    return content.error();
+  if (progress)
+    progress(0.5); // half of it is reading, as a rule
+  Result<Mesh> mesh = format == ".ply"   ? readPly(*content)
+                      : format == ".obj" ? readObj(*content)
+                      : format == ".stl" ? readStl(*content)
+                                         : readGltf(*content, openBeside(path));
+  if (progress)
+    progress(1);
+  return mesh;
 }
 
 Result<Mesh> load(const std::string &path, const ProgressFunction &progress) {
@@ -274,23 +225,18 @@ Result<Mesh> load(const std::string &path, const ProgressFunction &progress) {
   std::string format = formatOf(path);
   if (format == ".bpt")
     return loadPatches(path);
+  if (isOwnFormat(format))
+    return loadOwn(path, format, progress);
   Assimp::Importer importer;
   if (progress) // the importer owns it
     importer.SetProgressHandler(new ReportProgress(progress));
   const aiScene *imported;
-  bool isPacked = path.ends_with(".gz"), isPly = format == ".ply";
-  std::string content;
-  if (isPacked || isPly || format == ".gltf" || format == ".glb") {
-    auto read = readFile(path);
-    if (!read)
-      return read.error();
-    content = std::move(*read);
-    if (std::string problem = check(format, content); !problem.empty())
-      return Error{problem};
-  }
   // Other formats may consist of several files, which the importer finds.
-  if (isPacked || isPly) {
-    imported = importer.ReadFileFromMemory(content.data(), content.size(), 0,
+  if (path.ends_with(".gz")) {
+    auto content = readFile(path);
+    if (!content)
+      return content.error();
+    imported = importer.ReadFileFromMemory(content->data(), content->size(), 0,
                                            format.c_str() + !format.empty());
   } else {
     imported = importer.ReadFile(path, 0);
@@ -303,7 +249,7 @@ Result<Mesh> load(const std::string &path, const ProgressFunction &progress) {
   imported = importer.ApplyPostProcessing(aiProcess_Triangulate);
   if (!imported)
     return Error{messageOf(importer)};
-  return MeshBuilder(std::move(*toJoin)).build(*imported);
+  return ImportedScene(*imported, std::move(*toJoin)).build();
 }
 
 } // namespace

@@ -19,6 +19,9 @@ Result<SceneInput> render::loadScene(const Options &options) {
   auto mesh = loadMesh(options.scene, [&](double part) { bar.update(part); });
   if (!mesh)
     return mesh.error();
+  for (const std::string &warning : mesh->warnings)
+    std::fprintf(stderr, "piko-render: warning: '%s': %s\n",
+                 options.scene.c_str(), warning.c_str());
   if (options.ground)
     addGround(*mesh);
   Sphere bounds = boundingSphere(*mesh);

@@ -8,6 +8,7 @@
 #include <piko/scene.h>
 
 #include <functional>
+#include <string>
 #include <vector>
 
 namespace piko::render {
@@ -18,24 +19,27 @@ struct Mesh {
   std::vector<scene::Vertex> vertices;
   std::vector<scene::Triangle> triangles;
   std::vector<scene::Patch> patches;
+  /// What of the file is left out and may change a picture, one thing each.
+  std::vector<std::string> warnings;
 };
 
 /// Is called with the part of the work that is done, from 0 to 1.
 using ProgressFunction = std::function<void(double)>;
 
-/// Reads all triangles of a scene file, in world space: OBJ, PLY, STL, glTF,
-/// GLB and whatever else assimp knows; PLY, OBJ and STL also gzipped (".gz").
-/// Or all patches of a .bpt file, which may be gzipped, too.
+/// Reads all triangles of a scene file, in world space: OBJ, PLY, STL, glTF and
+/// GLB, by readers that check all that a file says, and whatever else assimp
+/// knows. Or all patches of a .bpt file. Any of them may be gzipped (".gz").
 ///
 /// The transforms of nodes are applied, and polygons are split. Triangles share
 /// vertices as in the file; where it shares none, those with the same position
 /// and normal are joined. Vertices without a normal get the area-weighted mean
 /// of those of the triangles around them.
 ///
-/// Errors: the file cannot be read, is no scene, holds no triangle and no
-/// patch (as point clouds and Gaussian splats do), requires a glTF extension
-/// that is not supported (as compressed and quantized meshes do), or has a
-/// position that is not finite.
+/// Errors: the file cannot be read, is cut short, contradicts itself, holds no
+/// triangle and no patch (as point clouds and Gaussian splats do), requires a
+/// glTF extension that is not supported (as compressed meshes do), or has a
+/// position that is not finite. What is left out and may change a picture is
+/// among the mesh's warnings.
 Result<Mesh> loadMesh(const std::string &path,
                       const ProgressFunction &progress = {});
 
