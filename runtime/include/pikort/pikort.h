@@ -163,8 +163,8 @@ PIKORT_API int32_t pikort_bind_buffer(pikort_pipeline *pipeline,
 /// Gives a buffer `count` zeroed records that the pipeline owns.
 PIKORT_API int32_t pikort_allocate_buffer(pikort_pipeline *pipeline,
                                           const char *name, int64_t count);
-/// Binds the primitives of a source; they are read in place. A source that is not
-/// bound has none.
+/// Binds the primitives of a source; they are read in place. A source that is
+/// not bound has none.
 PIKORT_API int32_t pikort_bind_source(pikort_pipeline *pipeline, int32_t source,
                                       const void *data, int64_t count,
                                       int64_t record_size);
