@@ -76,7 +76,7 @@ TEST_F(Division, Overflow) {
 }
 
 TEST_F(Division, InAssignBin) {
-  static volatile int quotient;
+  [[maybe_unused]] static volatile int quotient;
   Divide::assigning = [](Divide &, int i) { quotient = i / divisor; };
   EXPECT_THAT(message(), HasSubstr("Divide': expected an integer division"));
 }
