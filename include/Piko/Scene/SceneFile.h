@@ -28,7 +28,8 @@ using ProgressFunction = std::function<void(double)>;
 
 /// Reads all triangles of a scene file, in world space: OBJ, PLY, STL, glTF and
 /// GLB, by readers that check all that a file says, and whatever else assimp
-/// knows. Or all patches of a .bpt file. Any of them may be gzipped (".gz").
+/// knows, by the program piko-import. Or all patches of a .bpt file. Any of
+/// them may be gzipped (".gz").
 ///
 /// The transforms of nodes are applied, and polygons are split. Triangles share
 /// vertices as in the file; where it shares none, those with the same position

@@ -15,6 +15,7 @@ piko::getClangArguments(llvm::ArrayRef<const char *> flags,
       "clang++",
       "-std=c++20",
       "-fsyntax-only",
+      "-Wno-stack-exhausted", // there is a gibibyte
       "-xc++",
       "-ffp-contract=off",
       "-resource-dir",

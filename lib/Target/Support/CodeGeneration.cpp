@@ -88,13 +88,41 @@ static void optimize(Module &module, TargetMachine &machine,
   passes.run(module, modules);
 }
 
-/// A level of code generation for as long as it lives.
+/// Instruction selection takes time that grows with the square of a block.
+static constexpr unsigned hugeBlock = 4000, partOfBlock = 500;
+
+static bool hasBlockAbove(const Module &module, unsigned instructions) {
+  return any_of(module, [&](const Function &function) {
+    return any_of(function, [&](const BasicBlock &block) {
+      return block.size() > instructions;
+    });
+  });
+}
+
+static void divideBlock(BasicBlock *block) {
+  while (block->size() > hugeBlock / 2)
+    block = block->splitBasicBlock(
+        std::next(block->getFirstInsertionPt(), partOfBlock));
+}
+
+/// Whether a module is to get its code without optimization, for which huge
+/// blocks are divided: what merges them again does not run then.
+static bool prepareHuge(Module &module) {
+  bool hasBlocks = hasBlockAbove(module, hugeBlock);
+  if (hasBlocks)
+    for (Function &function : module)
+      for (BasicBlock &block : make_early_inc_range(function))
+        divideBlock(&block);
+  return hasBlocks || hasFunctionAbove(module, hugeFunction);
+}
+
 namespace {
+/// A level of code generation for as long as it lives.
 class LowerLevel {
 public:
-  LowerLevel(TargetMachine &machine, const Module &module)
+  LowerLevel(TargetMachine &machine, Module &module)
       : machine(machine), before(machine.getOptLevel()) {
-    if (hasFunctionAbove(module, hugeFunction))
+    if (prepareHuge(module))
       machine.setOptLevel(CodeGenOptLevel::None);
   }
   ~LowerLevel() { machine.setOptLevel(before); }

@@ -1,0 +1,21 @@
+//===- PackedFile.h - Files that may be gzipped -----------------*- C++ -*-===//
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+#ifndef PIKO_LIB_SCENE_PACKEDFILE_H
+#define PIKO_LIB_SCENE_PACKEDFILE_H
+
+#include "Piko/Scene/Result.h"
+
+#include <string>
+
+namespace piko::render {
+
+/// The content of a file, unpacked if it is gzipped. The error says why alone.
+Result<std::string> readFile(const std::string &path);
+
+/// The extension that says the format, without ".gz": lowercase and with its
+/// dot.
+std::string formatOf(const std::string &path);
+
+} // namespace piko::render
+
+#endif // PIKO_LIB_SCENE_PACKEDFILE_H
