@@ -85,6 +85,10 @@ struct StateDescription {
   /// That value, or what an image is cleared to: the bits of each number of the
   /// record.
   std::vector<uint64_t> clear = {};
+  /// Whether Clang's constant evaluation gave it, and where and why it did not.
+  bool isEvaluated = false;
+  std::optional<std::pair<mlir::Location, std::string>> whyUnknown =
+      std::nullopt;
 
   bool hasClear() const { return kind == Image || hasValue; }
 };

@@ -212,9 +212,16 @@ static void prepareFunction(llvm::Function &function, ParsedUnit &unit,
     holdDivisions(function);
 }
 
-/// Clang fills arrays of records in a loop, of which a clear value must be free
-/// to be constants.
+/// Initial values are constants, even where they are set in a loop.
 static void unrollLoops(llvm::Function &function, PassRunner &runner) {
+  llvm::LLVMContext &context = function.getContext();
+  llvm::DominatorTree dominance(function);
+  llvm::LoopInfo loops(dominance);
+  for (llvm::Loop *loop : loops.getLoopsInPreorder())
+    loop->setLoopID(llvm::makePostTransformationMetadata(
+        context, loop->getLoopID(), {"llvm.loop.unroll."},
+        {llvm::MDNode::get(
+            context, llvm::MDString::get(context, "llvm.loop.unroll.full"))}));
   llvm::FunctionPassManager unroll;
   unroll.addPass(
       llvm::createFunctionToLoopPassAdaptor(llvm::LoopFullUnrollPass(3)));
@@ -277,11 +284,11 @@ static bool cleanUpFunction(llvm::Function &function, ParsedUnit &unit,
     return false;
   shareArrays(function, memory);
   llvm::FunctionPassManager promote;
-  // Initial values are constants, even where they are set in a loop.
   if (function.getName().contains("_clear_")) {
     promote.addPass(llvm::InstCombinePass());
-    promote.addPass(llvm::createFunctionToLoopPassAdaptor(
-        llvm::LoopFullUnrollPass(/*OptLevel=*/3)));
+    runner.run(promote, function);
+    promote = llvm::FunctionPassManager();
+    unrollLoops(function, runner);
   }
   promote.addPass(llvm::SROAPass(llvm::SROAOptions::PreserveCFG));
   promote.addPass(llvm::EarlyCSEPass(/*UseMemorySSA=*/true));

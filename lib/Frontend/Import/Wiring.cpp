@@ -13,6 +13,8 @@
 #include "Support/Accessors.h"
 #include "Support/CallChain.h"
 #include "mlir/IR/Diagnostics.h"
+#include "llvm/ADT/PostOrderIterator.h"
+#include "llvm/Analysis/LoopInfo.h"
 #include "llvm/Analysis/PostDominators.h"
 #include "llvm/IR/Constants.h"
 #include "llvm/IR/InstIterator.h"
@@ -23,6 +25,24 @@ using llvm::dyn_cast;
 using mlir::InFlightDiagnostic;
 
 namespace {
+
+/// Tells which blocks run once, behind and beside loops that fill members.
+class Once {
+public:
+  explicit Once(llvm::Function &function)
+      : entry(function.getEntryBlock()), begins(function), ends(function),
+        loops(begins) {}
+
+  bool contains(const llvm::BasicBlock *block) const {
+    return ends.dominates(block, &entry) && !loops.getLoopFor(block);
+  }
+
+private:
+  llvm::BasicBlock &entry;
+  llvm::DominatorTree begins;
+  llvm::PostDominatorTree ends;
+  llvm::LoopInfo loops;
+};
 
 class WiringReader {
 public:
@@ -36,7 +56,7 @@ public:
       if (stage.hasSchedule && !readSchedule(index, stage))
         return false;
     for (auto [index, state] : llvm::enumerate(pipeline.state))
-      if (state.hasClear() && !readClear(index, state))
+      if (state.hasClear() && !state.isEvaluated && !readClear(index, state))
         return false;
     return true;
   }
@@ -77,12 +97,18 @@ private:
 
   bool readGraph() {
     llvm::Function &function = getWrapper(WrapperKind::Wire, 0);
-    for (llvm::Instruction &instruction : llvm::instructions(function)) {
-      auto *call = dyn_cast<llvm::CallInst>(&instruction);
-      const Marker *marker = call ? getMarker(call, unit.markers) : nullptr;
+    Once once(function);
+    std::vector<llvm::CallInst *> calls;
+    llvm::ReversePostOrderTraversal<llvm::Function *> order(&function);
+    for (llvm::BasicBlock *block : order)
+      for (llvm::Instruction &instruction : *block)
+        if (auto *call = dyn_cast<llvm::CallInst>(&instruction))
+          calls.push_back(call);
+    for (llvm::CallInst *call : calls) {
+      const Marker *marker = getMarker(call, unit.markers);
       if (!marker || marker->kind == MarkerKind::state)
         continue;
-      if (!call->getParent()->isEntryBlock()) {
+      if (!once.contains(call->getParent())) {
         fail(call) << "expected a pipeline's constructor to connect its stages "
                       "unconditionally";
         return false;
@@ -221,16 +247,15 @@ private:
       if (marker && !classify(call, *marker, stage, directives))
         return false;
     }
-    llvm::PostDominatorTree ends(function);
+    Once once(function);
     ScheduleDescription &schedule = stage.schedule;
     for (Directive directive : directives)
       schedule.isDynamic |=
-          mayDiffer(*directive.marker) && !isConstant(directive.call);
+          mayDiffer(*directive.marker) && !isConstant(directive.call, once);
     for (auto [call, marker] : directives) {
       if (mayDiffer(*marker) && schedule.isDynamic)
         continue; // It stays in the phase's code.
-      if (!mayDiffer(*marker) &&
-          !ends.dominates(call->getParent(), &function.getEntryBlock())) {
+      if (!mayDiffer(*marker) && !once.contains(call->getParent())) {
         fail(call) << "expected " << getDirectiveName(*marker)
                    << " for every bin, because it may not depend on the bin";
         return false;
@@ -258,8 +283,8 @@ private:
            marker.kind == MarkerKind::batch ||
            marker.kind == MarkerKind::everyBin;
   }
-  static bool isConstant(const llvm::CallInst *call) {
-    return call->getParent()->isEntryBlock() &&
+  static bool isConstant(const llvm::CallInst *call, const Once &once) {
+    return once.contains(call->getParent()) &&
            llvm::all_of(call->args(), [](const llvm::Value *argument) {
              return llvm::isa<llvm::ConstantInt>(argument);
            });
@@ -395,9 +420,12 @@ private:
         else if (llvm::isa<llvm::UndefValue>(value))
           state.clear.push_back(0);
         else {
-          mlir::emitError(state.location)
-              << "expected the initial value of '" << state.name
-              << "' to be known when the pipeline is compiled";
+          InFlightDiagnostic error = mlir::emitError(state.location);
+          error << "expected the initial value of '" << state.name
+                << "' to be known when the pipeline is compiled";
+          if (state.whyUnknown)
+            error.attachNote(state.whyUnknown->first)
+                << state.whyUnknown->second;
           return false;
         }
       }

@@ -62,6 +62,7 @@ static constexpr llvm::StringLiteral headerPath = "/<piko-header>.pch";
 static constexpr const char *clangFlags[] = {"-D__PIKO__=1",
                                              "-DNDEBUG=1",
                                              "-fignore-exceptions",
+                                             "-fconstexpr-steps=33554432",
                                              "-O1",
                                              "-fwrapv",
                                              "-fno-finite-loops",
@@ -241,7 +242,11 @@ private:
     pipeline.name = pipe.name;
     pipeline.location =
         convertLocation(pipe.location, compiler.getSourceManager(), context);
-    if (failed(made->reader.read(pipe)))
+    PipelineReader &reader = made->reader;
+    if (failed(reader.read(pipe)) ||
+        failed(evaluateInitialValues(pipeline, reader.stateType,
+                                     reader.stateMembers, compiler.getSema(),
+                                     context)))
       return false;
     pipeline.typeName =
         made->records.getName(ast.getCanonicalTagType(pipe.type));

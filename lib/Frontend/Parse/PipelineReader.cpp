@@ -251,7 +251,7 @@ LogicalResult PipelineReader::readState(QualType type) {
   if (!decl || !decl->hasDefinition())
     return emitError(pipeline.location) << "expected the state of pipeline '"
                                         << pipeline.name << "' to be a class";
-  return readMembers(decl->getDefinition(), 0);
+  return readMembers(decl->getDefinition(), 0, /*hasConstructor=*/false);
 }
 
 static int64_t findBase(const CXXRecordDecl *decl, const CXXRecordDecl *wanted,
@@ -275,7 +275,8 @@ int64_t PipelineReader::getStateOffset(QualType base) const {
 }
 
 LogicalResult PipelineReader::readMembers(const CXXRecordDecl *decl,
-                                          int64_t offset) {
+                                          int64_t offset, bool hasConstructor) {
+  hasConstructor |= decl->hasUserProvidedDefaultConstructor();
   const clang::ASTRecordLayout &layout = ast.getASTRecordLayout(decl);
   if (decl->isDynamicClass())
     return emitError(locate(decl->getLocation()))
@@ -284,17 +285,17 @@ LogicalResult PipelineReader::readMembers(const CXXRecordDecl *decl,
     const CXXRecordDecl *base =
         specifier.getType()->getAsCXXRecordDecl()->getDefinition();
     int64_t at = layout.getBaseClassOffset(base).getQuantity();
-    if (failed(readMembers(base, offset + at)))
+    if (failed(readMembers(base, offset + at, hasConstructor)))
       return failure();
   }
   for (const clang::FieldDecl *member : decl->fields())
-    if (failed(readMember(member, offset)))
+    if (failed(readMember(member, offset, hasConstructor)))
       return failure();
   return success();
 }
 
 LogicalResult PipelineReader::readMember(const clang::FieldDecl *member,
-                                         int64_t offset) {
+                                         int64_t offset, bool hasConstructor) {
   StateDescription state{
       member->getNameAsString(),    StateDescription::Constant, 0, 0, 0,
       locate(member->getLocation())};
@@ -323,7 +324,7 @@ LogicalResult PipelineReader::readMember(const clang::FieldDecl *member,
     const CXXRecordDecl *single =
         ast.getBaseElementType(element)->getAsCXXRecordDecl();
     state.hasValue =
-        member->hasInClassInitializer() ||
+        hasConstructor || member->hasInClassInitializer() ||
         (single && single->hasDefinition() &&
          single->getDefinition()->hasNonTrivialDefaultConstructor());
   }
@@ -337,6 +338,7 @@ LogicalResult PipelineReader::readMember(const clang::FieldDecl *member,
     return failure();
   state.record = *record;
   pipeline.state.push_back(std::move(state));
+  stateMembers.push_back({member, element, hasConstructor});
   return success();
 }
 

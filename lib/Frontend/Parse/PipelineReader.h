@@ -3,6 +3,7 @@
 #ifndef PIKO_LIB_FRONTEND_PARSE_PIPELINEREADER_H
 #define PIKO_LIB_FRONTEND_PARSE_PIPELINEREADER_H
 
+#include "Parse/InitialValues.h"
 #include "Parse/RecordLayout.h"
 #include "clang/AST/DeclCXX.h"
 
@@ -46,16 +47,19 @@ public:
   /// The C++ types of the stages, by number, and of the state.
   std::vector<const clang::CXXRecordDecl *> stageTypes;
   clang::QualType stateType;
+  /// Those of the state, in the order of the description.
+  std::vector<StateMember> stateMembers;
 
   /// Where a base of the state begins in it, in bytes.
   int64_t getStateOffset(clang::QualType base) const;
 
 private:
   llvm::LogicalResult readState(clang::QualType type);
+  /// Members that a constructor of the user's sets have a value, too.
   llvm::LogicalResult readMembers(const clang::CXXRecordDecl *decl,
-                                  int64_t offset);
-  llvm::LogicalResult readMember(const clang::FieldDecl *member,
-                                 int64_t offset);
+                                  int64_t offset, bool hasConstructor);
+  llvm::LogicalResult readMember(const clang::FieldDecl *member, int64_t offset,
+                                 bool hasConstructor);
   llvm::LogicalResult readStage(const clang::FieldDecl *member);
   llvm::LogicalResult
   readTemplate(const clang::ClassTemplateSpecializationDecl *base,

@@ -57,7 +57,9 @@ std::string piko::generateWrappers(const PipelineDescription &pipeline,
                call + ".schedule(::piko::BinId{::piko::marker::bin()});",
                "schedule(piko::BinId)");
   }
-  for (auto [index, state] : llvm::enumerate(pipeline.state))
+  for (auto [index, state] : llvm::enumerate(pipeline.state)) {
+    if (state.isEvaluated)
+      continue;
     if (state.hasValue)
       function(
           WrapperKind::Clear, index,
@@ -68,6 +70,7 @@ std::string piko::generateWrappers(const PipelineDescription &pipeline,
                "::piko::detail::clearImage(::piko::marker::state<__piko_state>"
                "()->" +
                    state.name + ");");
+  }
   out << "}\n";
   return text;
 }
