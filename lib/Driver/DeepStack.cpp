@@ -1,6 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #include "Piko/Driver/DeepStack.h"
 
+#include "piko/arithmetic.h"
+
+#include "llvm/Support/ErrorHandling.h"
+#include "llvm/Support/Threading.h"
+#include "llvm/Support/raw_ostream.h"
+
+#include <cerrno>
+#include <csetjmp>
+#include <mutex>
+#include <system_error>
+#include <vector>
+
 #include <pthread.h>
 #include <signal.h>
 
@@ -8,6 +20,7 @@ static constexpr size_t largestStack = size_t(1) << 30;
 static constexpr size_t smallestStack = size_t(16) << 20;
 
 static void *callOnThread(void *function) {
+  ArithmeticScope arithmetic;
   (*static_cast<llvm::function_ref<void()> *>(function))();
   return nullptr;
 }
@@ -27,21 +40,119 @@ static int createWithoutSignals(pthread_t &thread,
   return error;
 }
 
-/// Whether the system gave a thread, which has ended.
-static bool callWithStack(size_t size, llvm::function_ref<void()> function) {
+/// Why the system gave no thread; 0 if it did, which has ended.
+static int callWithStack(size_t size, llvm::function_ref<void()> function) {
   pthread_attr_t attributes;
-  if (pthread_attr_init(&attributes) != 0)
-    return false;
+  if (int error = pthread_attr_init(&attributes))
+    return error;
   pthread_t thread;
-  bool made = pthread_attr_setstacksize(&attributes, size) == 0 &&
-              createWithoutSignals(thread, attributes, function) == 0;
+  int error = pthread_attr_setstacksize(&attributes, size);
+  if (!error)
+    error = createWithoutSignals(thread, attributes, function);
   pthread_attr_destroy(&attributes);
-  return made && pthread_join(thread, nullptr) == 0;
+  return error ? error : pthread_join(thread, nullptr);
+}
+
+/// With the deepest stack that there is.
+static int callOnDeepStack(llvm::function_ref<void()> function) {
+  int error = 0;
+  for (size_t size = largestStack; size >= smallestStack; size /= 2)
+    if (error = callWithStack(size, function); !error)
+      break;
+  return error;
 }
 
 void piko::runOnDeepStack(llvm::function_ref<void()> function) {
-  for (size_t size = largestStack; size >= smallestStack; size /= 2)
-    if (callWithStack(size, function))
-      return;
-  function();
+  if (callOnDeepStack(function) != 0)
+    function();
+}
+
+// --- Fatal errors -----------------------------------------------------------
+
+namespace {
+
+/// LLVM's fatal errors, as long as some call is contained.
+class FatalErrors {
+public:
+  FatalErrors() {
+    std::lock_guard lock(mutex);
+    if (users++ == 0)
+      llvm::install_fatal_error_handler(handle);
+  }
+  FatalErrors(const FatalErrors &) = delete;
+  FatalErrors &operator=(const FatalErrors &) = delete;
+  ~FatalErrors() {
+    std::lock_guard lock(mutex);
+    if (--users == 0)
+      llvm::remove_fatal_error_handler();
+  }
+
+  /// Where `function` is left `why` says why.
+  static void contain(llvm::function_ref<void()> function,
+                      std::optional<std::string> &why) {
+    jmp_buf back;
+    reason = &why;
+    here = &back;
+    if (setjmp(back) == 0)
+      function();
+    here = nullptr;
+  }
+
+private:
+  static void handle(void *, const char *text, bool) {
+    if (!here) {
+      llvm::errs() << "LLVM ERROR: " << text << "\n";
+      return; // LLVM ends the process
+    }
+    *reason = text;
+    longjmp(*here, 1);
+  }
+
+  static std::mutex mutex;
+  static int users;
+  static thread_local std::optional<std::string> *reason;
+  static thread_local jmp_buf *here;
+};
+
+std::mutex FatalErrors::mutex;
+int FatalErrors::users = 0;
+thread_local std::optional<std::string> *FatalErrors::reason = nullptr;
+thread_local jmp_buf *FatalErrors::here = nullptr;
+
+} // namespace
+
+std::optional<std::string>
+piko::runContained(llvm::function_ref<void()> function) {
+  FatalErrors handler;
+  std::optional<std::string> why;
+  int refused = callOnDeepStack([&] { FatalErrors::contain(function, why); });
+  if (refused)
+    return "cannot make a thread to compile in: " +
+           std::generic_category().message(refused);
+  if (why)
+    why = "the compiler failed: " + *why;
+  return why;
+}
+
+// --- Threads ----------------------------------------------------------------
+
+static void *waitAtGate(void *gate) {
+  std::lock_guard lock(*static_cast<std::mutex *>(gate));
+  return nullptr;
+}
+
+bool piko::canUseThreads() {
+  unsigned wanted = llvm::hardware_concurrency().compute_thread_count();
+  std::mutex gate;
+  std::vector<pthread_t> threads;
+  {
+    std::lock_guard closed(gate);
+    for (pthread_t thread;
+         threads.size() < wanted &&
+         pthread_create(&thread, nullptr, waitAtGate, &gate) == 0;)
+      threads.push_back(thread);
+  }
+  for (pthread_t thread : threads)
+    pthread_join(thread, nullptr);
+  return threads.size() == wanted;
 }

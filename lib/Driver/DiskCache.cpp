@@ -4,13 +4,14 @@
 
 #include "DiskCache.h"
 
+#include "Piko/Support/OutputFile.h"
+
 #include "llvm/ADT/StringExtras.h"
 #include "llvm/Support/CachePruning.h"
 #include "llvm/Support/FileSystem.h"
 #include "llvm/Support/MemoryBuffer.h"
 #include "llvm/Support/Path.h"
 #include "llvm/Support/Process.h"
-#include "llvm/Support/raw_ostream.h"
 
 using namespace llvm;
 using namespace piko;
@@ -101,19 +102,13 @@ Error DiskCache::write(StringRef key, StringRef bytes) const {
     return Error::success();
   if (std::error_code code = fs::create_directories(directory))
     return errorCodeToError(code);
-  std::string path = getPath(key);
-  Expected<fs::TempFile> file = fs::TempFile::create(path + ".%%%%%%%%");
-  if (!file)
-    return file.takeError();
-  raw_fd_ostream stream(file->FD, /*shouldClose=*/false);
-  stream << magic << toStringRef(BLAKE3::hash(arrayRefFromStringRef(bytes)))
-         << bytes;
-  stream.flush();
-  if (std::error_code code = stream.error()) {
-    stream.clear_error();
-    return joinErrors(errorCodeToError(code), file->discard());
-  }
-  return file->keep(path);
+  // LLVM's temporary files would take over the signals of the host.
+  std::string content = magic.str();
+  content += toStringRef(BLAKE3::hash(arrayRefFromStringRef(bytes)));
+  content += bytes;
+  if (auto done = support::replaceFile(getPath(key), content); !done)
+    return createStringError(done.error().message);
+  return Error::success();
 }
 
 void DiskCache::prune() const {

@@ -7,6 +7,7 @@
 #include "RecordWriter.h"
 
 #include "llvm/ADT/MapVector.h"
+#include "llvm/ADT/SetVector.h"
 #include "llvm/ADT/StringExtras.h"
 #include "llvm/Support/FormatVariadic.h"
 #include "llvm/Support/Path.h"
@@ -44,6 +45,30 @@ static mlir::FlatSymbolRefAttr getHostRecord(mlir::Operation *op) {
   auto image = llvm::dyn_cast<ImageOp>(op);
   return image && image.getInternal() ? mlir::FlatSymbolRefAttr()
                                       : getStateRecord(op);
+}
+
+/// The names in a text that may be macros, each once; strings and comments have
+/// none.
+static llvm::SmallVector<StringRef, 0> findNames(StringRef text) {
+  llvm::SetVector<StringRef> names;
+  auto isPart = [](char c) { return llvm::isAlnum(c) || c == '_'; };
+  while (!text.empty()) {
+    if (text.consume_front("//")) {
+      text = text.drop_until([](char c) { return c == '\n'; });
+    } else if (text.consume_front("\"")) {
+      text = text.drop_until([](char c) { return c == '"'; }).drop_front();
+    } else if (isPart(text.front())) {
+      StringRef word = text.take_while(isPart);
+      text = text.drop_front(word.size());
+      bool isOurs = word == "std" || word == "piko" || word == "offsetof" ||
+                    word.ends_with("_t");
+      if (isCppIdentifier(word) && !isOurs)
+        names.insert(word);
+    } else {
+      text = text.drop_front();
+    }
+  }
+  return names.takeVector();
 }
 
 namespace {
@@ -85,12 +110,21 @@ public:
         << "#include <cstddef>\n#include <cstdint>\n";
     for (const std::string &include : records.getIncludes())
       out << "#include <" << include << ">\n";
+    // Those of X11, say.
+    out << "\n// Macros of the host's that are called as something here is.\n";
+    std::string all = (nameSpace + " " + body).str();
+    llvm::SmallVector<StringRef, 0> names = findNames(all);
+    for (StringRef name : names)
+      out << "#pragma push_macro(\"" << name << "\")\n#undef " << name << "\n";
     out << "\nextern \"C\" const pikort_program " << symbol << ";\n\n";
     if (!nameSpace.empty())
       out << "namespace " << nameSpace << " {\n\n";
     out << body;
     if (!nameSpace.empty())
       out << "\n} // namespace " << nameSpace << "\n";
+    out << "\n";
+    for (StringRef name : names)
+      out << "#pragma pop_macro(\"" << name << "\")\n";
     out << "\n#endif // " << guard << "\n";
     return text;
   }

@@ -167,9 +167,7 @@ compilePipeline(const ObjectOptions &options, std::vector<Processor> processors,
 static bool compile(const ObjectOptions &options,
                     llvm::ArrayRef<Processor> processors, const Files &files,
                     Entry &entry) {
-  DialectRegistry registry;
-  registerPikoDialects(registry);
-  MLIRContext context(registry);
+  PikoContext context;
   llvm::raw_string_ostream stream(entry.diagnostics);
   DiagnosticPrinter printer(context, stream, options.remarks);
   if (options.source.text)

@@ -82,13 +82,14 @@ static std::unique_ptr<LoadedProgram> loadHere(CompileOptions source,
                                       llvm::xxh3_64bits(object->code));
 }
 
-/// A host's stack may be small, and a text deep.
+/// A host's stack may be small, and a text deep; and it lives on.
 static std::unique_ptr<LoadedProgram> load(CompileOptions source,
                                            const LoadOptions &options,
                                            std::string &diagnostics) {
   std::unique_ptr<LoadedProgram> program;
-  runOnDeepStack(
-      [&] { program = loadHere(std::move(source), options, diagnostics); });
+  if (auto failed = runContained(
+          [&] { program = loadHere(std::move(source), options, diagnostics); }))
+    diagnostics += "error: " + *failed + "\n";
   return program;
 }
 

@@ -196,19 +196,13 @@ namespace {
 /// A context whose diagnostics go into a string.
 struct Reader {
   Reader(const CompileOptions &source, std::string &diagnostics, bool remarks)
-      : context(makeRegistry()), stream(diagnostics),
-        printer(context, stream, remarks) {
+      : stream(diagnostics), printer(context, stream, remarks) {
     context.loadAllAvailableDialects();
     if (source.text)
       printer.addText(source.file, *source.text);
   }
-  static DialectRegistry makeRegistry() {
-    DialectRegistry registry;
-    registerPikoDialects(registry);
-    return registry;
-  }
 
-  MLIRContext context;
+  PikoContext context;
   llvm::raw_string_ostream stream;
   DiagnosticPrinter printer;
 };
@@ -329,7 +323,7 @@ static std::optional<std::string> findHeaderCode(const ObjectOptions &options,
                                                  const Processor &processor,
                                                  const Files &files,
                                                  std::string &diagnostics) {
-  MLIRContext context;
+  PikoContext context;
   llvm::raw_string_ostream stream(diagnostics);
   DiagnosticPrinter printer(context, stream);
   FrontendOptions frontend = getFrontendOptions(options.source);

@@ -5,6 +5,7 @@
 #include "Piko/Driver/Registration.h"
 
 #include "Piko/Dialect/Piko/IR/Piko.h"
+#include "Piko/Driver/DeepStack.h"
 
 #include "mlir/Dialect/Arith/IR/Arith.h"
 #include "mlir/Dialect/ControlFlow/IR/ControlFlow.h"
@@ -40,3 +41,13 @@ void piko::registerPikoDialects(DialectRegistry &registry) {
   registerNVVMDialectTranslation(registry);
   registerOpenMPDialectTranslation(registry);
 }
+
+static DialectRegistry makeRegistry() {
+  DialectRegistry registry;
+  piko::registerPikoDialects(registry);
+  return registry;
+}
+
+piko::PikoContext::PikoContext()
+    : MLIRContext(makeRegistry(),
+                  canUseThreads() ? Threading::ENABLED : Threading::DISABLED) {}

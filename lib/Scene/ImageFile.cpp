@@ -7,7 +7,7 @@
 //===----------------------------------------------------------------------===//
 #include "ImageModule.h"
 
-#include "Piko/Scene/OutputFile.h"
+#include "Piko/Support/OutputFile.h"
 
 #include <dlfcn.h>
 #include <png.h>
@@ -103,7 +103,7 @@ Result<Done> render::writeImage(const std::string &path, int width, int height,
   auto content = encode(extensionOf(path), width, height, pixels);
   if (!content)
     return failTo("write", path, content.error().message);
-  if (auto ok = replaceFile(path, *content); !ok)
+  if (auto ok = support::replaceFile(path, *content); !ok)
     return failTo("write", path, ok.error().message);
   return Done{};
 }

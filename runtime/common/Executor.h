@@ -25,6 +25,8 @@ public:
 
   /// The number of threads where the host does not say.
   virtual int32_t defaultThreads() const = 0;
+  /// At most `wanted` of them: as many as the system gives the caller's runs.
+  virtual int32_t availableThreads(int32_t wanted) const = 0;
   /// Once, when the declarations are complete; throws.
   virtual void prepare() = 0;
   /// Before the program runs, with grids computed: makes the state that the run

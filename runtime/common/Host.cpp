@@ -8,7 +8,8 @@
 using namespace piko::rt;
 
 pikort_pipeline::pikort_pipeline()
-    : executor(makeExecutor(*this)), threads(executor->defaultThreads()) {}
+    : executor(makeExecutor(*this)), wantedThreads(executor->defaultThreads()),
+      threads(wantedThreads) {}
 pikort_pipeline::~pikort_pipeline() = default;
 
 extern "C" {
@@ -31,7 +32,7 @@ int32_t pikort_create_on(const pikort_program *program, int32_t device,
   } catch (...) {
     return PIKORT_OUT_OF_MEMORY;
   }
-  DeviceScope scope;
+  CallScope scope;
   guarded(p, "pipeline", [&] {
     p->name = program->name ? program->name : "";
     if (device < PIKORT_PROCESSOR)
@@ -62,7 +63,7 @@ int32_t pikort_create_on(const pikort_program *program, int32_t device,
 }
 
 void pikort_destroy(pikort_pipeline *pipeline) {
-  DeviceScope scope;
+  CallScope scope;
   // What a run has on its way may use what goes now.
   if (pipeline && pipeline->pending)
     pipeline->accelerator->endStream();
@@ -106,14 +107,16 @@ int32_t pikort_set_domain(pikort_pipeline *p, int32_t rank,
 
 int32_t pikort_set_threads(pikort_pipeline *p, int32_t threads) {
   return call(p, [&] {
-    if (threads < 0 || threads > 10000)
-      invalid("expected a number of threads in [0, 10000], but got " +
+    if (threads < 0 || threads > PIKORT_MAX_THREADS)
+      invalid("expected a number of threads in [0, " +
+              std::to_string(PIKORT_MAX_THREADS) + "], but got " +
               std::to_string(threads));
-    change(p, [=] {
-      p->threads = threads ? threads : p->executor->defaultThreads();
-    });
+    int32_t wanted = threads ? threads : p->executor->defaultThreads();
+    change(p, [=] { p->wantedThreads = p->threads = wanted; });
   });
 }
+
+int32_t pikort_threads(const pikort_pipeline *p) { return p ? p->threads : 0; }
 
 int32_t pikort_set_memory_limit(pikort_pipeline *p, int64_t bytes) {
   return call(p, [&] {

@@ -5,16 +5,23 @@
 #define PIKO_RUNTIME_COMMON_HOSTCALLS_H
 
 #include "common/Pipeline.h"
+#include "piko/arithmetic.h"
 
 #include <utility>
 
 namespace piko::rt {
 
+/// While a host's call lasts; then what is the thread's is as it was.
+struct CallScope {
+  ArithmeticScope arithmetic;
+  DeviceScope device;
+};
+
 /// Runs a host's call: `body` throws what is wrong with its arguments.
 template <class Body> int32_t call(pikort_pipeline *p, Body &&body) noexcept {
   if (!p)
     return PIKORT_INVALID_ARGUMENT;
-  DeviceScope scope;
+  CallScope scope;
   p->clearStatus();
   if (!p->ready)
     return p->fail(PIKORT_BAD_PROGRAM, "the pipeline was not created");
@@ -37,6 +44,11 @@ template <class Body> void change(pikort_pipeline *p, Body body) {
 /// Waits for the run that is on its way, if there is one. How it has ended is
 /// for the next call that runs or waits to say.
 void awaitRun(pikort_pipeline &p) noexcept;
+
+/// Writes what a run would take to a file; throws.
+void capture(pikort_pipeline &p, const std::string &path);
+/// The same where $PIKO_CAPTURE names a folder, once.
+void captureAsAsked(pikort_pipeline &p);
 
 /// What lies on a device that is lost may be gone.
 inline void checkAlive(const pikort_pipeline &p) {

@@ -309,7 +309,8 @@ struct pikort_pipeline {
   bool ready = false; ///< finish() succeeded.
   std::array<int64_t, 4> domain{0, 1, 1, 1};
   int64_t maxExtent = PIKORT_MAX_EXTENT; ///< of the domain in a dimension
-  int32_t threads = 1;
+  int32_t wantedThreads = 1;             ///< As the host has it.
+  int32_t threads = 1; ///< Of a run, as the system gives them.
   double ticksPerMillisecond =
       piko::rt::defaultTickRate;        ///< As the latest run had it.
   int64_t loopLimit = int64_t(1) << 20; ///< Of hops and of rounds.
@@ -327,6 +328,7 @@ struct pikort_pipeline {
   std::vector<piko::rt::KernelStats> kernelStats;
   std::vector<piko::rt::StageStats> stageStats;
   int64_t runs = 0;
+  int64_t captureRuns = 0; ///< That began while $PIKO_CAPTURE was set.
 
   std::string message;
   std::atomic<int32_t> status{0};

@@ -7,6 +7,7 @@
 //
 //===----------------------------------------------------------------------===//
 
+#include "common/CallStack.h"
 #include "common/HostCalls.h"
 
 #include <cmath>
@@ -161,13 +162,23 @@ static void checkApart(const pikort_pipeline &p) {
 
 // --- Runs -------------------------------------------------------------------
 
+/// Runs kernels where the host's stack may be a small one.
+template <class Body>
+static void guardedWithStack(pikort_pipeline &p, Body body) {
+  if (!callWithStack([&] { guarded(&p, "pipeline", body); }))
+    p.fail(PIKORT_OUT_OF_MEMORY,
+           "pipeline " + quoted(p.name) + ": out of memory for a stack");
+}
+
 /// The thread's part of a run, or all of it; throws.
 static void begin(pikort_pipeline &p, void *stream, bool waits) {
   checkAlive(p);
   checkBound(p);
   checkFixed(p);
   checkApart(p);
+  captureAsAsked(p);
   p.computeGrids();
+  p.threads = p.executor->availableThreads(p.wantedThreads);
   if (p.accelerator)
     p.accelerator->useStream(stream, waits);
   else if (stream != PIKORT_OWN_STREAM)
@@ -217,7 +228,7 @@ void piko::rt::awaitRun(pikort_pipeline &p) noexcept {
     return;
   p.clearStatus();
   p.profile.resume();
-  guarded(&p, "pipeline", [&] { awaitPending(p); });
+  guardedWithStack(p, [&] { awaitPending(p); });
   int32_t code = end(p);
   p.pending = false;
   for (const std::function<void()> &change : std::exchange(p.deferred, {}))
@@ -235,11 +246,11 @@ static void finishRunBefore(pikort_pipeline &p) {
 }
 
 static int32_t run(pikort_pipeline *p, void *stream, bool waits) {
-  DeviceScope scope;
+  CallScope scope;
   if (int32_t code = call(p, [&] { finishRunBefore(*p); }))
     return code;
   p->profile.begin();
-  guarded(p, "pipeline", [&] { begin(*p, stream, waits); });
+  guardedWithStack(*p, [&] { begin(*p, stream, waits); });
   if (!p->executor->isPending())
     return end(*p);
   p->profile.enter(Part::Program);
@@ -257,6 +268,17 @@ int32_t pikort_run_async(pikort_pipeline *p, void *stream) {
   return run(p, stream, /*waits=*/false);
 }
 
+int32_t pikort_capture(pikort_pipeline *p, const char *path) {
+  return call(p, [&] {
+    if (!path)
+      invalid("expected a file's name, but got null");
+    finishRunBefore(*p);
+    checkAlive(*p);
+    checkBound(*p);
+    capture(*p, path);
+  });
+}
+
 int32_t pikort_wait(pikort_pipeline *p) {
   return call(p, [&] { finishRunBefore(*p); });
 }
@@ -264,7 +286,7 @@ int32_t pikort_wait(pikort_pipeline *p) {
 int32_t pikort_is_done(const pikort_pipeline *p) {
   if (!p || !p->pending)
     return 1;
-  DeviceScope scope;
+  CallScope scope;
   try {
     return p->executor->isDone();
   } catch (...) {

@@ -8,7 +8,6 @@
 #include "cpu/Strips.h"
 
 #include <algorithm>
-#include <omp.h>
 
 using namespace piko::rt;
 
@@ -18,10 +17,6 @@ std::unique_ptr<Executor> piko::rt::makeExecutor(pikort_pipeline &p) {
 
 CPUExecutor::CPUExecutor(pikort_pipeline &p) : p(p) {}
 CPUExecutor::~CPUExecutor() = default;
-
-int32_t CPUExecutor::defaultThreads() const {
-  return std::max(1, omp_get_max_threads());
-}
 
 void CPUExecutor::prepare() {
   if (p.accelerator)

@@ -11,6 +11,7 @@
 
 #include "common/DeviceFrame.h"
 #include "common/Pipeline.h"
+#include "cpu/Threads.h"
 #include "pikort/grid.h"
 
 #include <map>
@@ -28,7 +29,10 @@ struct CPUExecutor final : Executor {
   explicit CPUExecutor(pikort_pipeline &p);
   ~CPUExecutor() override;
 
-  int32_t defaultThreads() const override;
+  int32_t defaultThreads() const override { return rt::defaultThreads(); }
+  int32_t availableThreads(int32_t wanted) const override {
+    return rt::availableThreads(wanted);
+  }
   void prepare() override;
   void beginRun() override;
   int32_t runProgram() override;

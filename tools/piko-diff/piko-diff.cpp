@@ -3,7 +3,7 @@
 #include "Piko/Scene/ImageError.h"
 #include "Piko/Scene/ImageFile.h"
 #include "Piko/Scene/Json.h"
-#include "Piko/Scene/OutputFile.h"
+#include "Piko/Support/OutputFile.h"
 
 #include <algorithm>
 #include <charconv>
@@ -145,7 +145,7 @@ Result<bool> compareFiles(const Options &options) {
     if (auto ok = writeMap(options, *image, flip); !ok)
       return ok.error();
   std::printf("%s\n", describe(options, *error).c_str());
-  if (auto ok = finishOutput(); !ok)
+  if (auto ok = support::finishOutput(); !ok)
     return ok.error();
   return error->largest <= options.failAbove;
 }
@@ -164,7 +164,7 @@ int main(int argc, char **argv) {
     return fail(options.error());
   if (options->help) {
     std::fputs(usage, stdout);
-    auto ok = finishOutput();
+    auto ok = support::finishOutput();
     return ok ? 0 : fail(ok.error());
   }
   auto isNear = compareFiles(*options);

@@ -4,7 +4,7 @@
 #include "Mappings.h"
 
 #include "Piko/Scene/Json.h"
-#include "Piko/Scene/OutputFile.h"
+#include "Piko/Support/OutputFile.h"
 
 #include <mutex>
 #include <vector>
@@ -68,5 +68,6 @@ Result<Done> piko::render::traceFrame(pikort_pipeline *pipeline,
                              .add("measured ratio", info.measured_ratio)));
   for (const pikort_unit_run &unit : units.list)
     events.push_back(makeEvent(unit));
-  return writeFile(path, JsonObject().add("traceEvents", events).text() + "\n");
+  return support::writeFile(
+      path, JsonObject().add("traceEvents", events).text() + "\n");
 }

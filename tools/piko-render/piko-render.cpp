@@ -15,8 +15,8 @@
 
 #include "Piko/Driver/TunedSetting.h"
 #include "Piko/Scene/ImageFile.h"
-#include "Piko/Scene/OutputFile.h"
 #include "Piko/Scene/ProgressBar.h"
+#include "Piko/Support/OutputFile.h"
 
 #include <algorithm>
 #include <chrono>
@@ -128,7 +128,7 @@ Result<Done> report(const Options &options, const RunResult &result,
       text += printWastes(wastes) + printMappings(pipeline);
   }
   std::printf("%s", options.json ? (line.text() + "\n").c_str() : text.c_str());
-  return finishOutput();
+  return support::finishOutput();
 }
 
 /// Sets what piko-tune chose, where the command line does not say otherwise.
@@ -230,7 +230,7 @@ int main(int argc, char **argv) {
     return fail(options.error());
   if (options->help) {
     std::fputs(usage, stdout);
-    auto ok = finishOutput();
+    auto ok = support::finishOutput();
     return ok ? 0 : fail(ok.error());
   }
   if (auto ok = applyTuned(*options); !ok)

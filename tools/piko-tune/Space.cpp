@@ -121,9 +121,7 @@ static std::vector<std::string> findPipes(const TuneOptions &options,
 
 static std::optional<Space> readSpaceHere(const TuneOptions &options,
                                           std::string &diagnostics) {
-  mlir::DialectRegistry registry;
-  registerPikoDialects(registry);
-  mlir::MLIRContext context(registry);
+  PikoContext context;
   llvm::raw_string_ostream stream(diagnostics);
   DiagnosticPrinter printer(context, stream, /*remarks=*/false);
   CompileOptions source{.file = options.render.pipeline,

@@ -11,16 +11,16 @@
 #include "Report.h"
 #include "SceneBench.h"
 
-#include "Piko/Scene/OutputFile.h"
+#include "Piko/Support/OutputFile.h"
 
 #include <csignal>
 #include <cstdio>
 
 using namespace piko;
 using namespace piko::tune;
-using render::Done;
-using render::Error;
-using render::Result;
+using support::Done;
+using support::Error;
+using support::Result;
 
 namespace {
 
@@ -30,7 +30,7 @@ Result<Done> writeFiles(const TuneResult &result) {
                                    std::pair(options.chart, drawChart(result)),
                                    std::pair(options.csv, writeCSV(result))})
     if (!path.empty())
-      if (auto ok = render::writeFile(path, text); !ok)
+      if (auto ok = support::writeFile(path, text); !ok)
         return ok;
   return Done{};
 }
@@ -76,7 +76,7 @@ Result<Done> tuneScene(const TuneOptions &options) {
   result.mappings = *mappings;
   std::string text = options.json ? writeJson(result) : summarize(result);
   std::fputs(text.c_str(), stdout);
-  if (auto ok = render::finishOutput(); !ok)
+  if (auto ok = support::finishOutput(); !ok)
     return ok;
   return writeFiles(result);
 }
@@ -96,7 +96,7 @@ int main(int argc, char **argv) {
     return fail(options.error());
   if (options->help) {
     std::fputs(usage, stdout);
-    auto ok = render::finishOutput();
+    auto ok = support::finishOutput();
     return ok ? 0 : fail(ok.error());
   }
   if (auto ok = tuneScene(*options); !ok)

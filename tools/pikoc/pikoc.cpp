@@ -4,7 +4,7 @@
 // .mlir and writes an object with its header, any level on the way, or a
 // report.
 
-#include "OutputFiles.h"
+#include "Dependencies.h"
 
 #include "Piko/Driver/Compiler.h"
 #include "Piko/Driver/DeepStack.h"
@@ -12,6 +12,7 @@
 #include "Piko/Driver/Explain.h"
 #include "Piko/Driver/ObjectCompiler.h"
 #include "Piko/Driver/TunedSetting.h"
+#include "Piko/Support/OutputFile.h"
 #include "Piko/Target/Object.h"
 #include "Piko/Target/PTX.h"
 #include "Piko/Target/Processor.h"
@@ -442,9 +443,7 @@ static std::optional<std::string> writeKernels(const CommandLine &line,
 /// What a level looks like, the file's pipelines, or a report; nothing after an
 /// error.
 static std::optional<std::string> writeText(const CommandLine &line) {
-  DialectRegistry registry;
-  registerPikoDialects(registry);
-  MLIRContext context(registry);
+  PikoContext context;
   DiagnosticPrinter printer(context, llvm::errs(), line.remarks);
   if (line.listPipes) {
     auto names = readPipelineNames(line.getSource(), context);
@@ -478,7 +477,8 @@ static std::optional<std::string> writeText(const CommandLine &line) {
 }
 
 /// The object and what belongs to it; false after an error.
-static bool writeObject(const CommandLine &line, OutputFiles &outputs) {
+static bool writeObject(const CommandLine &line,
+                        support::OutputFiles &outputs) {
   ObjectOptions options{.source = line.getSource(),
                         .target = line.getTarget(),
                         .nameSpace = line.nameSpace,
@@ -499,18 +499,16 @@ static bool writeObject(const CommandLine &line, OutputFiles &outputs) {
   if (!line.tuned.empty())
     object->files.push_back(line.tuned);
   std::vector<std::string> targets = {line.output};
-  llvm::Error error = outputs.add(line.output, object->code);
-  if (!error && line.header.getNumOccurrences()) {
+  auto done = outputs.add(line.output, object->code);
+  if (done && line.header.getNumOccurrences()) {
     targets.push_back(line.header);
-    error = outputs.add(line.header, object->header);
+    done = outputs.add(line.header, object->header);
   }
-  if (!error && line.depfile.getNumOccurrences())
-    error =
-        outputs.add(line.depfile, writeDependencies(targets, object->files));
-  if (!error)
-    return true;
-  fail(llvm::toString(std::move(error)));
-  return false;
+  if (done && line.depfile.getNumOccurrences())
+    done = outputs.add(line.depfile, writeDependencies(targets, object->files));
+  if (!done)
+    fail(done.error().message);
+  return bool(done);
 }
 
 /// Returns the exit status.
@@ -523,7 +521,7 @@ static int compile(int argc, char **argv) {
     return fail("--tuned: " + wrong);
   if (std::string wrong = checkOptions(line); !wrong.empty())
     return fail(wrong);
-  OutputFiles outputs;
+  support::OutputFiles outputs;
   if (line.getEmit() == Emit::Object && !line.isListing()) {
     if (!writeObject(line, outputs))
       return 1;
@@ -531,11 +529,11 @@ static int compile(int argc, char **argv) {
     std::optional<std::string> text = writeText(line);
     if (!text)
       return 1;
-    if (llvm::Error error = outputs.add(line.output, *text))
-      return fail(llvm::toString(std::move(error)));
+    if (auto done = outputs.add(line.output, *text); !done)
+      return fail(done.error().message);
   }
-  if (llvm::Error error = outputs.keep())
-    return fail(llvm::toString(std::move(error)));
+  if (auto done = outputs.keep(); !done)
+    return fail(done.error().message);
   return 0;
 }
 

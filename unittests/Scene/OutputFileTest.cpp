@@ -3,7 +3,7 @@
 #include "../Support/TemporaryFolder.h"
 
 #include "Piko/Scene/ImageFile.h"
-#include "Piko/Scene/OutputFile.h"
+#include "Piko/Support/OutputFile.h"
 
 #include <csignal>
 #include <filesystem>
@@ -18,6 +18,7 @@
 #include <sys/stat.h>
 
 using namespace piko::render;
+using namespace piko::support;
 namespace fs = std::filesystem;
 
 namespace {
@@ -135,6 +136,38 @@ TEST_F(OutputFile, PipesAreWrittenDirectly) {
   reader.join();
   EXPECT_EQ(got, "text");
   EXPECT_TRUE(fs::is_fifo(path));
+}
+
+TEST_F(OutputFile, SeveralAppearTogether) {
+  std::string a = folder / "a.txt", b = folder / "b.txt";
+  ASSERT_TRUE(writeFile(a, "old"));
+  {
+    OutputFiles files;
+    ASSERT_TRUE(files.add(a, "new"));
+    ASSERT_TRUE(files.add(b, "new"));
+    EXPECT_EQ(read(a), "old");
+    EXPECT_FALSE(fs::exists(b));
+    ASSERT_TRUE(files.keep());
+    EXPECT_EQ(read(a), "new");
+    EXPECT_EQ(read(b), "new");
+  }
+  {
+    OutputFiles files;
+    ASSERT_TRUE(files.add(a, "newer"));
+    auto ok = files.add(folder / "none/c.txt", "newer");
+    ASSERT_FALSE(ok);
+    EXPECT_EQ(ok.error().message, "cannot write '" +
+                                      (folder / "none/c.txt").string() +
+                                      "': No such file or directory");
+  }
+  {
+    OutputFiles files; // what fails at the end takes nothing along
+    ASSERT_TRUE(files.add(a, "newer"));
+    ASSERT_TRUE(files.add("/dev/full", "newer"));
+    EXPECT_FALSE(files.keep());
+  }
+  EXPECT_EQ(read(a), "new");
+  EXPECT_EQ(countFiles(), 2);
 }
 
 TEST_F(OutputFile, LeavesSignalsAsTheyAre) {

@@ -5,6 +5,8 @@
 #ifndef PIKO_DRIVER_GPUOPTIONS_H
 #define PIKO_DRIVER_GPUOPTIONS_H
 
+#include "piko/macros_begin.h"
+
 #include <algorithm>
 #include <charconv>
 #include <cstdint>
@@ -82,5 +84,7 @@ struct GPUOptions {
 };
 
 } // namespace piko
+
+#include "piko/macros_end.h"
 
 #endif // PIKO_DRIVER_GPUOPTIONS_H

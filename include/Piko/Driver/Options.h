@@ -5,6 +5,8 @@
 #ifndef PIKO_DRIVER_OPTIONS_H
 #define PIKO_DRIVER_OPTIONS_H
 
+#include "piko/macros_begin.h"
+
 #include "Piko/Driver/CPUOptions.h"
 #include "Piko/Driver/CheckOptions.h"
 #include "Piko/Driver/GPUOptions.h"
@@ -95,5 +97,7 @@ struct TargetOptions {
 };
 
 } // namespace piko
+
+#include "piko/macros_end.h"
 
 #endif // PIKO_DRIVER_OPTIONS_H

@@ -13,6 +13,8 @@
 #ifndef PIKO_DRIVER_PIPELINELOADER_H
 #define PIKO_DRIVER_PIPELINELOADER_H
 
+#include "piko/macros_begin.h"
+
 #include "Piko/Driver/Options.h"
 
 #include "pikort/pikort.h"
@@ -77,5 +79,7 @@ std::unique_ptr<LoadedProgram> loadPipelineText(const std::string &name,
                                                 std::string &diagnostics);
 
 } // namespace piko
+
+#include "piko/macros_end.h"
 
 #endif // PIKO_DRIVER_PIPELINELOADER_H

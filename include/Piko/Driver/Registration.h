@@ -7,11 +7,18 @@
 #define PIKO_DRIVER_REGISTRATION_H
 
 #include "mlir/IR/DialectRegistry.h"
+#include "mlir/IR/MLIRContext.h"
 
 namespace piko {
 
 /// All dialects that a pipeline meets on its way, and what takes them to LLVM.
 void registerPikoDialects(mlir::DialectRegistry &registry);
+
+/// A context of all of them, which has threads where the system gives some.
+class PikoContext : public mlir::MLIRContext {
+public:
+  PikoContext();
+};
 
 /// Piko's passes and its sequences of passes, and those of upstream that work
 /// between them.

@@ -6,6 +6,8 @@
 #ifndef PIKO_DRIVER_SYNTHESISOPTIONS_H
 #define PIKO_DRIVER_SYNTHESISOPTIONS_H
 
+#include "piko/macros_begin.h"
+
 #include <optional>
 #include <string>
 #include <vector>
@@ -48,5 +50,7 @@ std::optional<SynthesisOptions> parseSynthesisOptions(const std::string &text);
 std::string describeWrongSynthesisOptions(const std::string &text);
 
 } // namespace piko
+
+#include "piko/macros_end.h"
 
 #endif // PIKO_DRIVER_SYNTHESISOPTIONS_H

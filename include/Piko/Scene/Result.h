@@ -1,39 +1,15 @@
-//===- Result.h - A value or why there is none ------------------*- C++ -*-===//
+//===- Result.h - Results of what scenes and pictures need ------*- C++ -*-===//
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #ifndef PIKO_SCENE_RESULT_H
 #define PIKO_SCENE_RESULT_H
 
-#include <string>
-#include <utility>
-#include <variant>
+#include "Piko/Support/Result.h"
 
 namespace piko::render {
 
-/// Why something could not be done, as a user is told: lowercase, no final
-/// stop, naming the file.
-struct Error {
-  std::string message;
-};
-
-/// A T, or an Error.
-template <class T> class [[nodiscard]] Result {
-public:
-  Result(T value) : content(std::in_place_index<0>, std::move(value)) {}
-  Result(Error error) : content(std::in_place_index<1>, std::move(error)) {}
-
-  explicit operator bool() const { return content.index() == 0; }
-  T &operator*() { return std::get<0>(content); }
-  const T &operator*() const { return std::get<0>(content); }
-  T *operator->() { return &std::get<0>(content); }
-  const T *operator->() const { return &std::get<0>(content); }
-  const Error &error() const { return std::get<1>(content); }
-
-private:
-  std::variant<T, Error> content;
-};
-
-/// Of what has no value.
-struct Done {};
+using support::Done;
+using support::Error;
+using support::Result;
 
 } // namespace piko::render
 

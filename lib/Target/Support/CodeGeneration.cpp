@@ -4,6 +4,9 @@
 
 #include "Piko/Target/CodeGeneration.h"
 
+#include "llvm/ADT/ScopeExit.h"
+#include "llvm/IR/DiagnosticInfo.h"
+#include "llvm/IR/DiagnosticPrinter.h"
 #include "llvm/IR/LegacyPassManager.h"
 #include "llvm/MC/MCSubtargetInfo.h"
 #include "llvm/MC/TargetRegistry.h"
@@ -133,12 +136,36 @@ private:
 };
 } // namespace
 
+namespace {
+/// Keeps what a back end refuses: LLVM would print it, and end the process.
+class RefusalKeeper : public DiagnosticHandler {
+public:
+  explicit RefusalKeeper(std::string &refusal) : refusal(refusal) {}
+  bool handleDiagnostics(const DiagnosticInfo &info) override {
+    if (info.getSeverity() == DS_Error && refusal.empty()) {
+      raw_string_ostream stream(refusal);
+      DiagnosticPrinterRawOStream printer(stream);
+      info.print(printer);
+    }
+    return true;
+  }
+
+private:
+  std::string &refusal;
+};
+} // namespace
+
 Expected<std::string> piko::emitCode(Module &module, TargetMachine &machine,
                                      const piko::OptimizerOptions &options,
                                      CodeGenFileType type,
                                      ModulePassManager last) {
   // Nobody reads what it calls its values.
-  module.getContext().setDiscardValueNames(true);
+  LLVMContext &context = module.getContext();
+  context.setDiscardValueNames(true);
+  std::string refusal;
+  context.setDiagnosticHandler(std::make_unique<RefusalKeeper>(refusal));
+  auto restore =
+      make_scope_exit([&] { context.setDiagnosticHandler(nullptr); });
   module.setTargetTriple(machine.getTargetTriple());
   module.setDataLayout(machine.createDataLayout());
   optimize(module, machine, options, std::move(last));
@@ -150,5 +177,8 @@ Expected<std::string> piko::emitCode(Module &module, TargetMachine &machine,
     return createStringError("cannot make code for " +
                              machine.getTargetTriple().str());
   passes.run(module);
+  if (!refusal.empty())
+    return createStringError("cannot make code for " +
+                             machine.getTargetTriple().str() + ": " + refusal);
   return std::string(code);
 }

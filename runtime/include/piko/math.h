@@ -15,6 +15,8 @@
 #ifndef PIKO_MATH_H
 #define PIKO_MATH_H
 
+#include <piko/macros_begin.h>
+
 #include <stdint.h>
 
 #ifdef __clang__
@@ -445,5 +447,7 @@ inline float acos(float x) {
 }
 
 } // namespace piko
+
+#include <piko/macros_end.h>
 
 #endif // PIKO_MATH_H

@@ -36,6 +36,8 @@
 #ifndef PIKO_SCENE_H
 #define PIKO_SCENE_H
 
+#include <piko/macros_begin.h>
+
 #include <stdint.h>
 
 #include <glm/glm.hpp>
@@ -165,5 +167,7 @@ struct BvhTriangle {
 };
 
 } // namespace piko::scene
+
+#include <piko/macros_end.h>
 
 #endif // PIKO_SCENE_H

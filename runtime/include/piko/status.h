@@ -7,6 +7,8 @@
 #ifndef PIKO_STATUS_H
 #define PIKO_STATUS_H
 
+#include <piko/macros_begin.h>
+
 #include <cstdint>
 #include <stdexcept>
 #include <string>
@@ -65,5 +67,7 @@ inline void Status::orThrow() const {
 #endif
 
 } // namespace piko
+
+#include <piko/macros_end.h>
 
 #endif // PIKO_STATUS_H

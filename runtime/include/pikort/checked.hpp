@@ -14,6 +14,8 @@
 #ifndef PIKORT_CHECKED_HPP
 #define PIKORT_CHECKED_HPP
 
+#include <piko/macros_begin.h>
+
 #include "piko/status.h"
 
 #include <exception>
@@ -63,5 +65,7 @@ using CheckedStatus = Status;
 #endif
 
 } // namespace piko::rt
+
+#include <piko/macros_end.h>
 
 #endif // PIKORT_CHECKED_HPP

@@ -31,6 +31,8 @@
 #ifndef PIKORT_COMPILED_HPP
 #define PIKORT_COMPILED_HPP
 
+#include <piko/macros_begin.h>
+
 #include "pikort/state.hpp"
 
 namespace piko::rt {
@@ -129,6 +131,12 @@ public:
     return feed(source.number, primitives);
   }
 
+  /// Writes what a run would take to a file; see pikort_capture.
+  CheckedStatus capture(const std::string &path) {
+    if (Status status = bind(*this); !status)
+      return status;
+    return pipe.capture(path);
+  }
   /// Clears the images and runs the pipeline on what was fed.
   CheckedStatus run() { return tryRun(); }
   /// The same; nothing is thrown.
@@ -183,5 +191,7 @@ private:
 };
 
 } // namespace piko::rt
+
+#include <piko/macros_end.h>
 
 #endif // PIKORT_COMPILED_HPP

@@ -33,6 +33,8 @@ extern "C" {
 /// The most cells that a domain may have in a dimension, so that sums of
 /// coordinates and small numbers do not wrap around.
 #define PIKORT_MAX_EXTENT 1073741824
+/// The most threads that a host may ask for.
+#define PIKORT_MAX_THREADS 10000
 
 #if defined(_WIN32)
 #define PIKORT_API
@@ -65,6 +67,7 @@ enum pikort_status {
   PIKORT_DEVICE_FAILED = 11,   ///< The device, or its driver, failed.
   PIKORT_REPEATED = 12,        ///< A run was, behind what followed it in its
                                ///< stream: see pikort_run_async.
+  PIKORT_NOT_WRITTEN = 13,     ///< A file could not be written.
   PIKORT_BIN_OUTSIDE = 16,     ///< AssignBin named a bin outside the grid.
   PIKORT_UPDATE_OUTSIDE = 17,  ///< An update outside of the call's own bin.
   PIKORT_INDEX_OUTSIDE = 18,   ///< An element outside a buffer or an image.
@@ -125,10 +128,15 @@ PIKORT_API int32_t pikort_get_device(int32_t device, pikort_device_info *info);
 /// pipeline's; each extent is in [1, PIKORT_MAX_EXTENT], x first.
 PIKORT_API int32_t pikort_set_domain(pikort_pipeline *pipeline, int32_t rank,
                                      const int64_t *extent);
-/// Sets the number of threads, in [0, 10000]; 0 = all that OpenMP offers. The
-/// results do not depend on it.
+/// Sets the number of threads, in [0, PIKORT_MAX_THREADS]; 0 = what
+/// OMP_NUM_THREADS says, or else the processors that the process may use
+/// (affinity, quotas of its control groups). A run has fewer where the system
+/// refuses them. The results do not depend on it.
 PIKORT_API int32_t pikort_set_threads(pikort_pipeline *pipeline,
                                       int32_t threads);
+/// The number of threads that the latest run could use, or, before one, that
+/// were set.
+PIKORT_API int32_t pikort_threads(const pikort_pipeline *pipeline);
 /// Limits all memory of the pipeline, in bytes; 0 = no limit. A run that needs
 /// more ends with PIKORT_OUT_OF_MEMORY.
 PIKORT_API int32_t pikort_set_memory_limit(pikort_pipeline *pipeline,
@@ -276,6 +284,13 @@ PIKORT_API int32_t pikort_run_async(pikort_pipeline *pipeline, void *stream);
 PIKORT_API int32_t pikort_wait(pikort_pipeline *pipeline);
 /// 1 if pikort_wait would not wait, or has an error of the device to report.
 PIKORT_API int32_t pikort_is_done(const pikort_pipeline *pipeline);
+
+/// Writes what a run would take now to a file: the domain, the options that
+/// decide how it is divided, constants, buffers, and the sources' primitives.
+/// pikort/capture.h binds it to another pipeline, and piko-render takes it in
+/// the place of a scene. With $PIKO_CAPTURE, a folder, each pipeline's first
+/// run, or that of the number $PIKO_CAPTURE_RUN, writes FOLDER/NAME.capture.
+PIKORT_API int32_t pikort_capture(pikort_pipeline *pipeline, const char *path);
 
 // --- Reflection -------------------------------------------------------------
 

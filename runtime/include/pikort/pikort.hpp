@@ -16,6 +16,8 @@
 #ifndef PIKORT_PIKORT_HPP
 #define PIKORT_PIKORT_HPP
 
+#include <piko/macros_begin.h>
+
 #include "piko/status.h"
 #include "pikort/device.hpp"
 #include "pikort/pikort.h"
@@ -157,6 +159,10 @@ public:
                                             static_cast<int64_t>(data.size()),
                                             sizeof(T)));
   }
+  /// Writes what a run would take to a file; see pikort_capture.
+  Status capture(const std::string &path) {
+    return status(pikort_capture(handle_, path.c_str()));
+  }
   Status run() { return status(pikort_run(handle_)); }
   /// Gives a run to a stream; see pikort_run_async.
   Status runAsync(Stream stream = {}) {
@@ -205,5 +211,7 @@ private:
 };
 
 } // namespace piko::rt
+
+#include <piko/macros_end.h>
 
 #endif // PIKORT_PIKORT_HPP

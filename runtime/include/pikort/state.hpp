@@ -9,6 +9,8 @@
 #ifndef PIKORT_STATE_HPP
 #define PIKORT_STATE_HPP
 
+#include <piko/macros_begin.h>
+
 #include "pikort/checked.hpp"
 #include "pikort/layout.hpp"
 #include "pikort/pikort.hpp"
@@ -308,5 +310,7 @@ public:
 };
 
 } // namespace piko::rt
+
+#include <piko/macros_end.h>
 
 #endif // PIKORT_STATE_HPP

@@ -62,14 +62,8 @@ struct CompiledPipeline {
 
 struct Programs::Implementation {
   explicit Implementation(const Options &options)
-      : options(options), context(makeRegistry()), log(context),
-        kept(options.cache) {
+      : options(options), log(context), kept(options.cache) {
     context.loadAllAvailableDialects();
-  }
-  static DialectRegistry makeRegistry() {
-    DialectRegistry registry;
-    registerPikoDialects(registry);
-    return registry;
   }
   void compileReference(const std::string &file);
   void readText(const std::string &file);
@@ -88,7 +82,7 @@ struct Programs::Implementation {
   CompiledPipeline find(const std::string &pipe, const Target &target);
 
   const Options &options;
-  MLIRContext context;
+  PikoContext context;
   Log log;
   /// The only pipeline that is wanted; empty = all.
   std::string onlyPipe;

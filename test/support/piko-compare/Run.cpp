@@ -8,6 +8,8 @@
 #include <random>
 #include <stdexcept>
 
+using namespace piko;
+
 namespace {
 
 /// The value of one field.
@@ -92,19 +94,6 @@ Run::Run(Program made, const Case &input)
   }
 }
 
-std::vector<Field> Run::getFields(int32_t index) {
-  pikort_record_info record;
-  check(pikort_get_record(pipeline, index, &record));
-  std::vector<Field> fields;
-  for (int32_t f = 0; f < record.field_count; ++f) {
-    pikort_field_info field;
-    check(pikort_get_field(pipeline, index, f, &field));
-    fields.push_back(
-        {field.name, field.offset, field.elements, field.stride, field.type});
-  }
-  return fields;
-}
-
 std::string Run::makeRecords(int32_t index, int64_t count,
                              const std::string &who) {
   pikort_record_info record;
@@ -114,9 +103,9 @@ std::string Run::makeRecords(int32_t index, int64_t count,
   for (char c : who)
     hash = hash * 31 + unsigned(c);
   Values values(hash, input.wide);
-  std::vector<Field> fields = getFields(index);
+  std::vector<replay::Field> fields = replay::getFields(pipeline, index);
   for (int64_t i = 0; i < count; ++i)
-    for (const Field &field : fields)
+    for (const replay::Field &field : fields)
       for (int64_t e = 0; e < field.elements; ++e) {
         char *at =
             &bytes[size_t(i * record.size + field.offset + e * field.stride)];
@@ -163,28 +152,12 @@ void Run::recordOwners() {
       this));
 }
 
-Result Run::operator()(int threads) {
+replay::Outcome Run::operator()(int threads) {
   bind();
   check(pikort_set_threads(pipeline, threads));
-  Result result;
-  if (pikort_run(pipeline) != PIKORT_OK) {
-    result.error = pikort_message(pipeline);
-    return result;
-  }
-  for (int32_t i = 0; i < pikort_state_count(pipeline); ++i) {
-    pikort_state_info info;
-    check(pikort_get_state_info(pipeline, i, &info));
-    pikort_view view;
-    check(pikort_get_view(pipeline, info.name, &view));
-    int64_t bytes = view.record_size;
-    for (int64_t extent : view.extent)
-      bytes *= extent;
-    if (!bytes)
-      continue;
-    Records &records = result.state[info.name];
-    records.bytes.assign(static_cast<const char *>(view.data), size_t(bytes));
-    records.size = view.record_size;
-    records.fields = getFields(view.record);
-  }
-  return result;
+  if (pikort_run(pipeline) == PIKORT_OK)
+    return replay::readOutcome(pipeline);
+  replay::Outcome outcome;
+  outcome.error = pikort_message(pipeline);
+  return outcome;
 }

@@ -13,7 +13,8 @@
 
 #include "Options.h"
 #include "Programs.h"
-#include "Result.h"
+
+#include "Piko/Replay/Outcome.h"
 
 #include <map>
 #include <mutex>
@@ -28,7 +29,7 @@ public:
   /// Has sources run in strips of so many primitives, or within so many bytes;
   /// 0 = not said.
   void divide(int64_t strip, int64_t budget);
-  Result operator()(int threads);
+  piko::replay::Outcome operator()(int threads);
 
   /// Of each bin of each stage, the threads that ran a part of it.
   using Owners = std::map<std::pair<std::string, int64_t>, std::set<int32_t>>;
@@ -38,7 +39,6 @@ public:
 
 private:
   void check(int32_t status);
-  std::vector<Field> getFields(int32_t record);
   std::string makeRecords(int32_t record, int64_t count,
                           const std::string &who);
   void bind();

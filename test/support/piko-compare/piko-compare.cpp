@@ -29,13 +29,13 @@
 // by field. --tolerance X says how far they may be: numbers relatively by X,
 // integers not at all.
 
-#include "Measure.h"
 #include "Options.h"
 #include "Programs.h"
 #include "Report.h"
 #include "Run.h"
 
 #include "Piko/Driver/DeepStack.h"
+#include "Piko/Replay/Measure.h"
 
 #include <cstdio>
 #include <cstdlib>
@@ -44,6 +44,9 @@
 #include <set>
 #include <stdexcept>
 #include <unistd.h>
+
+using piko::replay::Measure;
+using piko::replay::Outcome;
 
 namespace {
 
@@ -59,14 +62,14 @@ public:
   }
 
   /// True if all is equal. Throws if it cannot be run.
-  bool compare(const Case &input, Result expected, Programs &programs);
+  bool compare(const Case &input, Outcome expected, Programs &programs);
 
   bool isStrict = true;
   /// The messages of runs that stopped, empty for those that did not.
   std::set<std::string> errors;
 
 private:
-  bool acceptMeasured(Result &expected, Run &compiled);
+  bool acceptMeasured(Outcome &expected, Run &compiled);
   void reportOwners(const Run &compiled);
   void say(const std::string &line) { report.add(target.name, line); }
 
@@ -79,11 +82,11 @@ private:
 
 /// What a run should give that need not be strict: what it gives itself, if that
 /// is near enough to what the reference executor does. True if it is.
-bool TargetRun::acceptMeasured(Result &expected, Run &compiled) {
-  Result actual = compiled(threads[0]);
+bool TargetRun::acceptMeasured(Outcome &expected, Run &compiled) {
+  Outcome actual = compiled(threads[0]);
   if (!expected.error.empty() || !actual.error.empty())
     return true; // to be compared as they are
-  Measure measure = measureResults(expected, actual);
+  Measure measure = measureOutcomes(expected, actual);
   for (const std::string &line : measure.lines)
     say(line);
   expected = std::move(actual);
@@ -105,7 +108,7 @@ void TargetRun::reportOwners(const Run &compiled) {
   }
 }
 
-bool TargetRun::compare(const Case &input, Result expected,
+bool TargetRun::compare(const Case &input, Outcome expected,
                         Programs &programs) {
   Program program = programs.compile(input.pipe, target);
   isStrict = program.isStrict;
@@ -116,9 +119,9 @@ bool TargetRun::compare(const Case &input, Result expected,
   bool equal = isStrict || acceptMeasured(expected, compiled);
   for (int count : threads)
     for (int run = 0; run < runs; ++run) {
-      Result actual = compiled(count);
+      Outcome actual = compiled(count);
       errors.insert(actual.error);
-      std::vector<std::string> differences = compareResults(expected, actual);
+      std::vector<std::string> differences = compareOutcomes(expected, actual);
       equal &= differences.empty();
       for (const std::string &difference : differences)
         say(std::to_string(count) + " threads, run " + std::to_string(run) +
@@ -129,7 +132,7 @@ bool TargetRun::compare(const Case &input, Result expected,
 }
 
 /// The last line of a case.
-void printVerdict(const Result &expected, bool isStrict,
+void printVerdict(const Outcome &expected, bool isStrict,
                   const std::vector<std::string> &equal,
                   const std::vector<std::string> &different) {
   auto name = [](const std::vector<std::string> &targets) {
@@ -170,7 +173,7 @@ bool runs(const Options &options, size_t target, size_t place) {
 bool compare(const Options &options, const Case &input, Programs &programs,
              size_t place = 0) {
   Run reference(programs.reference(input.pipe), input);
-  Result expected = reference(1);
+  Outcome expected = reference(1);
   if (expected.isBlank() && (options.cases.empty() || hasOwnCases(options)))
     throw std::runtime_error("the reference executor wrote nothing");
   Report report;

@@ -8,6 +8,8 @@
 #ifndef PIKO_REFERENCE_CALLS_H
 #define PIKO_REFERENCE_CALLS_H
 
+#include <piko/macros_begin.h>
+
 #include <piko/reference/atomics.h>
 #include <piko/reference/collectives.h>
 
@@ -171,12 +173,12 @@ Result collective(const char *what, const Place &at, const T &value,
   Loop &loop = running.loopForSync(what);
   bool first = loop.iteration == 0;
   if (first)
-    loop.slots = std::vector<T>(loop.size, value);
-  else if (auto *slots = std::any_cast<std::vector<T>>(&loop.slots))
-    (*slots)[loop.iteration] = value;
+    loop.handedIn = std::vector<T>(loop.size, value);
+  else if (auto *values = std::any_cast<std::vector<T>>(&loop.handedIn))
+    (*values)[loop.iteration] = value;
   running.sync({what, typeOf<Combine>()}); // fails unless all do the same
   if (first)                               // the first to go on
-    loop.result = combine(std::any_cast<std::vector<T> &>(loop.slots));
+    loop.result = combine(std::any_cast<std::vector<T> &>(loop.handedIn));
   return std::any_cast<Result &>(loop.result);
 }
 
@@ -204,5 +206,7 @@ public:
 };
 
 } // namespace piko::reference
+
+#include <piko/macros_end.h>
 
 #endif // PIKO_REFERENCE_CALLS_H

@@ -17,6 +17,8 @@
 #ifndef PIKO_REFERENCE_EXECUTOR_H
 #define PIKO_REFERENCE_EXECUTOR_H
 
+#include <piko/macros_begin.h>
+
 #include <piko/reference/checker.h>
 #include <piko/reference/loop.h>
 #include <piko/reference/numbers.h>
@@ -403,5 +405,7 @@ private:
 };
 
 } // namespace piko::reference
+
+#include <piko/macros_end.h>
 
 #endif // PIKO_REFERENCE_EXECUTOR_H

@@ -8,6 +8,8 @@
 #ifndef PIKO_REFERENCE_GRID_H
 #define PIKO_REFERENCE_GRID_H
 
+#include <piko/macros_begin.h>
+
 #include <piko/bins.h>
 
 #include <algorithm>
@@ -102,5 +104,7 @@ struct Grid {
 };
 
 } // namespace piko::reference
+
+#include <piko/macros_end.h>
 
 #endif // PIKO_REFERENCE_GRID_H

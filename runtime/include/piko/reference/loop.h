@@ -89,8 +89,8 @@ public:
   Loop *const outer;
   const int64_t size;
   int64_t iteration = 0;
-  std::any slots;  ///< what iterations hand in to a collective operation
-  std::any result; ///< and what comes out of it
+  std::any handedIn; ///< what iterations hand in to a collective operation
+  std::any result;   ///< and what comes out of it
 
 private:
   void start() {

@@ -3,6 +3,9 @@
 #ifndef PIKO_REFERENCE_PIPE_H
 #define PIKO_REFERENCE_PIPE_H
 
+#include <piko/macros_begin.h>
+
+#include <piko/arithmetic.h>
 #include <piko/reference/check.h>
 #include <piko/reference/stage.h>
 
@@ -358,6 +361,7 @@ Pipeline::stageOrder(const std::vector<Component> &components) const {
 }
 
 inline void Pipeline::run() {
+  ArithmeticScope arithmetic;
   checkArithmetic();
   checkGraph();
   struct Running {
@@ -512,5 +516,7 @@ protected:
 };
 
 } // namespace piko
+
+#include <piko/macros_end.h>
 
 #endif // PIKO_REFERENCE_PIPE_H

@@ -3,6 +3,8 @@
 #ifndef PIKO_REFERENCE_STAGE_H
 #define PIKO_REFERENCE_STAGE_H
 
+#include <piko/macros_begin.h>
+
 #include <piko/reference/calls.h>
 #include <piko/update.h>
 
@@ -467,5 +469,7 @@ template <int X, int Y, int Threads, class In, class... Out>
 using Stage = BasicStage<Bins<X, Y>, Threads, In, Out...>;
 
 } // namespace piko
+
+#include <piko/macros_end.h>
 
 #endif // PIKO_REFERENCE_STAGE_H

@@ -9,6 +9,8 @@
 #ifndef PIKO_REFERENCE_STATE_H
 #define PIKO_REFERENCE_STATE_H
 
+#include <piko/macros_begin.h>
+
 #include <piko/reference/executor.h>
 
 #include <cstring>
@@ -79,9 +81,9 @@ inline Checker *activeChecker() {
 #ifdef PIKO_CHECK
 /// An index, and the place in the user's file where it is used.
 struct Index {
-  template <class I>
-    requires std::is_convertible_v<I, int64_t>
-  Index(I value, Place at = Place::current())
+  template <class Integer>
+    requires std::is_convertible_v<Integer, int64_t>
+  Index(Integer value, Place at = Place::current())
       : value(static_cast<int64_t>(value)), at(at) {}
   operator int64_t() const { return value; }
   int64_t value;
@@ -378,5 +380,7 @@ private:
 };
 
 } // namespace piko
+
+#include <piko/macros_end.h>
 
 #endif // PIKO_REFERENCE_STATE_H

@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 
-#include "Measure.h"
+#include "Piko/Replay/Measure.h"
 
 #include "pikort/pikort.h"
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <cstring>
+
+using namespace piko;
+using namespace piko::replay;
 
 namespace {
 
@@ -100,7 +104,8 @@ void measureRecords(const std::string &name, const Records &expected,
 
 } // namespace
 
-Measure measureResults(const Result &expected, const Result &actual) {
+Measure replay::measureOutcomes(const Outcome &expected,
+                                const Outcome &actual) {
   Measure measure;
   for (const auto &[name, records] : expected.state) {
     auto found = actual.state.find(name);

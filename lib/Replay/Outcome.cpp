@@ -1,10 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 
-#include "Result.h"
+#include "Piko/Replay/Outcome.h"
 
 #include "pikort/pikort.h"
 
+#include <cstdio>
 #include <cstring>
+#include <stdexcept>
+
+using namespace piko;
+using namespace piko::replay;
 
 namespace {
 
@@ -78,15 +83,15 @@ std::string compareRecords(const Records &expected, const Records &actual) {
 
 } // namespace
 
-bool Result::isBlank() const {
+bool Outcome::isBlank() const {
   for (const auto &[name, records] : state)
     if (records.bytes.find_first_not_of('\0') != std::string::npos)
       return false;
   return error.empty();
 }
 
-std::vector<std::string> compareResults(const Result &expected,
-                                        const Result &actual) {
+std::vector<std::string> replay::compareOutcomes(const Outcome &expected,
+                                                 const Outcome &actual) {
   std::vector<std::string> differences;
   if (!expected.error.empty() || !actual.error.empty()) {
     if (expected.error == actual.error)
@@ -106,4 +111,43 @@ std::vector<std::string> compareResults(const Result &expected,
       differences.push_back("'" + name + "'" + what);
   }
   return differences;
+}
+
+static void check(pikort_pipeline *pipeline, int32_t code) {
+  if (code != PIKORT_OK)
+    throw std::runtime_error(pikort_message(pipeline));
+}
+
+std::vector<Field> replay::getFields(pikort_pipeline *pipeline,
+                                     int32_t record) {
+  pikort_record_info info;
+  check(pipeline, pikort_get_record(pipeline, record, &info));
+  std::vector<Field> fields;
+  for (int32_t i = 0; i < info.field_count; ++i) {
+    pikort_field_info field;
+    check(pipeline, pikort_get_field(pipeline, record, i, &field));
+    fields.push_back(
+        {field.name, field.offset, field.elements, field.stride, field.type});
+  }
+  return fields;
+}
+
+Outcome replay::readOutcome(pikort_pipeline *pipeline) {
+  Outcome outcome;
+  for (int32_t i = 0; i < pikort_state_count(pipeline); ++i) {
+    pikort_state_info info;
+    check(pipeline, pikort_get_state_info(pipeline, i, &info));
+    pikort_view view;
+    check(pipeline, pikort_get_view(pipeline, info.name, &view));
+    int64_t bytes = view.record_size;
+    for (int64_t extent : view.extent)
+      bytes *= extent;
+    if (!bytes)
+      continue;
+    Records &records = outcome.state[info.name];
+    records.bytes.assign(static_cast<const char *>(view.data), size_t(bytes));
+    records.size = view.record_size;
+    records.fields = getFields(pipeline, view.record);
+  }
+  return outcome;
 }

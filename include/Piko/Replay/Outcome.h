@@ -2,13 +2,17 @@
 //
 // What a run left in a pipeline's state.
 
-#ifndef PIKO_TEST_TOOLS_PIKO_COMPARE_RESULT_H
-#define PIKO_TEST_TOOLS_PIKO_COMPARE_RESULT_H
+#ifndef PIKO_REPLAY_OUTCOME_H
+#define PIKO_REPLAY_OUTCOME_H
 
 #include <cstdint>
 #include <map>
 #include <string>
 #include <vector>
+
+struct pikort_pipeline;
+
+namespace piko::replay {
 
 struct Field {
   std::string name;
@@ -23,7 +27,7 @@ struct Records {
   std::vector<Field> fields;
 };
 
-struct Result {
+struct Outcome {
   std::map<std::string, Records> state;
   std::string error; ///< of a run that stopped; then there is no state
 
@@ -32,7 +36,16 @@ struct Result {
 
 /// Compares field by field, so that padding does not matter and all NaNs are
 /// equal. Returns what differs, a line for each piece of state.
-std::vector<std::string> compareResults(const Result &expected,
-                                        const Result &actual);
+std::vector<std::string> compareOutcomes(const Outcome &expected,
+                                         const Outcome &actual);
 
-#endif // PIKO_TEST_TOOLS_PIKO_COMPARE_RESULT_H
+/// The leaves of a record. Throws std::runtime_error.
+std::vector<Field> getFields(pikort_pipeline *pipeline, int32_t record);
+
+/// What a pipeline holds behind a run: all state that is not empty. Throws
+/// std::runtime_error.
+Outcome readOutcome(pikort_pipeline *pipeline);
+
+} // namespace piko::replay
+
+#endif // PIKO_REPLAY_OUTCOME_H

@@ -3,12 +3,12 @@
 // How far what a run left is from what it should have: for pipelines with a
 // stage that need not be strict.
 
-#ifndef PIKO_TEST_TOOLS_PIKO_COMPARE_MEASURE_H
-#define PIKO_TEST_TOOLS_PIKO_COMPARE_MEASURE_H
+#ifndef PIKO_REPLAY_MEASURE_H
+#define PIKO_REPLAY_MEASURE_H
 
-#include "Result.h"
+#include "Piko/Replay/Outcome.h"
 
-#include <optional>
+namespace piko::replay {
 
 /// What two runs that did not stop left; two NaNs are equal.
 struct Measure {
@@ -23,6 +23,8 @@ struct Measure {
   }
 };
 
-Measure measureResults(const Result &expected, const Result &actual);
+Measure measureOutcomes(const Outcome &expected, const Outcome &actual);
 
-#endif // PIKO_TEST_TOOLS_PIKO_COMPARE_MEASURE_H
+} // namespace piko::replay
+
+#endif // PIKO_REPLAY_MEASURE_H

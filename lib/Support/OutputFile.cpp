@@ -1,7 +1,8 @@
 //===- OutputFile.cpp - Files and results that are written ----------------===//
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
-#include "Piko/Scene/OutputFile.h"
+#include "Piko/Support/OutputFile.h"
 
+#include <algorithm>
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
@@ -16,17 +17,15 @@
 #include <unistd.h>
 
 using namespace piko;
-using namespace piko::render;
+using namespace piko::support;
 namespace fs = std::filesystem;
-
-namespace {
 
 /// Why a system call failed; 0 when none did.
 using Errno = int;
 
 /// Holds back what would end the process between a file's first byte and its
 /// last, on this thread. Beyond a limit on sizes a write is then an error.
-class HeldSignals {
+class support::HeldSignals {
 public:
   HeldSignals() {
     sigset_t held;
@@ -59,6 +58,8 @@ private:
   sigset_t before;
   sigset_t pendingBefore;
 };
+
+namespace {
 
 /// A descriptor that closes, once.
 struct OpenFile {
@@ -153,11 +154,13 @@ public:
     return isNamed ? 0 : errno;
   }
 
-  Errno complete(std::string_view content, const struct stat *old) {
+  Errno write(std::string_view content, const struct stat *old) {
     if (Errno problem = file.write(content))
       return problem;
-    if (Errno problem = setPermissions(file.descriptor, old))
-      return problem;
+    return setPermissions(file.descriptor, old);
+  }
+
+  Errno appear() {
     if (!isNamed) {
       std::string link = "/proc/self/fd/" + std::to_string(file.descriptor);
       if (linkat(AT_FDCWD, link.c_str(), AT_FDCWD, name.c_str(),
@@ -193,42 +196,122 @@ std::string followLinks(fs::path path) {
   return path.string();
 }
 
-Errno replace(const std::string &path, std::string_view content) {
-  struct stat old;
-  bool exists = stat(path.c_str(), &old) == 0;
-  if (!exists && errno != ENOENT)
-    return errno;
-  HeldSignals held;
-  if (exists && S_ISDIR(old.st_mode))
-    return EISDIR;
-  if (exists && !S_ISREG(old.st_mode))
-    return writeDirectly(path, content);
-  std::string target = followLinks(path);
-  NewFile file(target);
-  Errno problem = file.create();
-  bool mayNot = problem == EACCES || problem == EPERM || problem == EROFS;
-  if (exists && mayNot)
-    return writeInPlace(path, content);
-  return problem ? problem : file.complete(content, exists ? &old : nullptr);
+Errno writeStandardOutput(std::string_view content) {
+  if (std::fwrite(content.data(), 1, content.size(), stdout) !=
+          content.size() ||
+      std::fflush(stdout) != 0)
+    return errno ? errno : EIO;
+  return 0;
 }
 
 } // namespace
 
-Result<Done> render::replaceFile(const std::string &path,
-                                 std::string_view content) {
-  if (Errno problem = replace(path, content))
+/// Where one of the files goes, and how.
+class support::OutputPlace {
+public:
+  explicit OutputPlace(const std::string &path) : path(path) {}
+
+  const std::string &name() const { return path; }
+  /// Whether others appear behind it, for it cannot be taken back.
+  bool isDirect() const { return !file; }
+
+  Errno write(std::string_view text) {
+    struct stat old;
+    bool exists = path != "-" && stat(path.c_str(), &old) == 0;
+    if (path != "-" && !exists && errno != ENOENT)
+      return errno;
+    if (exists && S_ISDIR(old.st_mode))
+      return EISDIR;
+    if (path == "-" || (exists && !S_ISREG(old.st_mode)))
+      return keepText(text);
+    auto made = std::make_unique<NewFile>(followLinks(path));
+    Errno problem = made->create();
+    bool mayNot = problem == EACCES || problem == EPERM || problem == EROFS;
+    if (exists && mayNot) {
+      isInPlace = true;
+      return keepText(text);
+    }
+    if (problem)
+      return problem;
+    file = std::move(made);
+    return file->write(text, exists ? &old : nullptr);
+  }
+
+  Errno appear() {
+    if (file)
+      return file->appear();
+    if (path == "-")
+      return writeStandardOutput(content);
+    return isInPlace ? writeInPlace(path, content)
+                     : writeDirectly(path, content);
+  }
+
+private:
+  Errno keepText(std::string_view text) {
+    content = text;
+    return 0;
+  }
+
+  std::string path;
+  std::unique_ptr<NewFile> file;
+  bool isInPlace = false;
+  std::string content; ///< Of what is written directly.
+};
+
+OutputFiles::OutputFiles() = default;
+OutputFiles::~OutputFiles() {
+  places.clear(); // before signals come
+}
+
+static Error cannotWrite(const std::string &path, Errno problem) {
+  return Error{"cannot write '" + path +
+               "': " + std::generic_category().message(problem)};
+}
+
+Result<Done> OutputFiles::add(const std::string &path,
+                              std::string_view content) {
+  if (!held)
+    held = std::make_unique<HeldSignals>();
+  places.push_back(std::make_unique<OutputPlace>(path));
+  if (Errno problem = places.back()->write(content))
+    return cannotWrite(path, problem);
+  return Done{};
+}
+
+Result<Done> OutputFiles::keep() {
+  std::stable_partition(places.begin(), places.end(),
+                        [](const std::unique_ptr<OutputPlace> &place) {
+                          return place->isDirect();
+                        });
+  for (const std::unique_ptr<OutputPlace> &place : places)
+    if (Errno problem = place->appear())
+      return cannotWrite(place->name(), problem);
+  places.clear();
+  held.reset();
+  return Done{};
+}
+
+Result<Done> support::writeFile(const std::string &path,
+                                std::string_view content) {
+  OutputFiles files;
+  if (auto ok = files.add(path, content); !ok)
+    return ok;
+  return files.keep();
+}
+
+Result<Done> support::replaceFile(const std::string &path,
+                                  std::string_view content) {
+  HeldSignals held;
+  OutputPlace place(path);
+  Errno problem = place.write(content);
+  if (!problem)
+    problem = place.appear();
+  if (problem)
     return Error{std::generic_category().message(problem)};
   return Done{};
 }
 
-Result<Done> render::writeFile(const std::string &path,
-                               std::string_view content) {
-  if (auto ok = replaceFile(path, content); !ok)
-    return Error{"cannot write '" + path + "': " + ok.error().message};
-  return Done{};
-}
-
-Result<Done> render::finishOutput() {
+Result<Done> support::finishOutput() {
   errno = 0;
   // A write that failed before left its mark, but no reason.
   if (std::fflush(stdout) == 0 && !std::ferror(stdout))
