@@ -119,3 +119,94 @@ Measure replay::measureOutcomes(const Outcome &expected,
   }
   return measure;
 }
+
+// --- All numbers at once ----------------------------------------------------
+
+namespace {
+
+template <class T> double readAs(const char *at) {
+  T value;
+  std::memcpy(&value, at, sizeof(T));
+  return double(value);
+}
+
+double readNumber(int32_t type, const char *at) {
+  switch (type) {
+  case PIKORT_F32:
+    return readAs<float>(at);
+  case PIKORT_F64:
+    return readAs<double>(at);
+  case PIKORT_I8:
+    return readAs<int8_t>(at);
+  case PIKORT_I16:
+    return readAs<int16_t>(at);
+  case PIKORT_I32:
+    return readAs<int32_t>(at);
+  default:
+    return readAs<int64_t>(at);
+  }
+}
+
+/// All numbers of a field.
+std::vector<double> readNumbers(const Records &records, const Field &field) {
+  std::vector<double> numbers;
+  int64_t count = int64_t(records.bytes.size()) / records.size;
+  for (int64_t i = 0; i < count; ++i)
+    for (int64_t e = 0; e < field.elements; ++e)
+      numbers.push_back(readNumber(
+          field.type, &records.bytes[size_t(i * records.size + field.offset +
+                                            e * field.stride)]));
+  return numbers;
+}
+
+double differenceOf(double a, double b, double scale) {
+  bool areEqual = a == b || (std::isnan(a) && std::isnan(b));
+  if (areEqual)
+    return 0;
+  if (!std::isfinite(a) || !std::isfinite(b))
+    return 1;
+  return std::fabs(a - b) / scale;
+}
+
+} // namespace
+
+NumberErrors replay::measureNumbers(const Outcome &expected,
+                                    const Outcome &actual) {
+  std::vector<double> differences;
+  for (const auto &[name, records] : expected.state) {
+    auto found = actual.state.find(name);
+    bool isThere = found != actual.state.end() &&
+                   found->second.bytes.size() == records.bytes.size();
+    for (const Field &field : records.fields) {
+      std::vector<double> wanted = readNumbers(records, field);
+      if (!isThere) {
+        differences.insert(differences.end(), wanted.size(), 1);
+        continue;
+      }
+      double scale = 0;
+      for (double number : wanted)
+        if (std::isfinite(number))
+          scale = std::max(scale, std::fabs(number));
+      std::vector<double> got = readNumbers(found->second, field);
+      for (size_t i = 0; i < wanted.size(); ++i)
+        differences.push_back(
+            differenceOf(wanted[i], got[i], scale > 0 ? scale : 1));
+    }
+  }
+  NumberErrors errors;
+  if (differences.empty())
+    return errors;
+  double squares = 0;
+  for (double difference : differences) {
+    errors.largest = std::max(errors.largest, difference);
+    errors.mean += difference;
+    squares += difference * difference;
+  }
+  auto count = double(differences.size());
+  errors.mean /= count;
+  errors.rms = std::sqrt(squares / count);
+  auto place = differences.begin() + int64_t(0.99 * (count - 1));
+  std::nth_element(differences.begin(), place, differences.end());
+  errors.p99 = *place;
+  return errors;
+}

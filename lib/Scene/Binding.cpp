@@ -23,6 +23,33 @@ public:
       : pipeline(pipeline), scene(scene) {}
 
   Result<std::string> bind() {
+    return scene.capture ? bindCapture() : bindTypes();
+  }
+
+private:
+  Result<std::string> bindCapture() {
+    if (std::string wrong = scene.capture->bind(pipeline); !wrong.empty())
+      return fail(wrong);
+    if (auto ok = setConstants(); !ok)
+      return ok.error();
+    int images = 0;
+    for (int32_t i = 0; i < pikort_state_count(pipeline); ++i) {
+      pikort_state_info state;
+      if (pikort_get_state_info(pipeline, i, &state) != PIKORT_OK)
+        return lastError();
+      auto record = recordOf(state.record);
+      if (!record)
+        return record.error();
+      if (state.kind == PIKORT_IMAGE && state.rank == 2 &&
+          isColor(record->name)) {
+        output = state.name;
+        ++images;
+      }
+    }
+    return images == 1 ? output : std::string();
+  }
+
+  Result<std::string> bindTypes() {
     for (int32_t i = 0; i < pikort_state_count(pipeline); ++i) {
       pikort_state_info state;
       if (pikort_get_state_info(pipeline, i, &state) != PIKORT_OK)
@@ -33,16 +60,26 @@ public:
     for (int32_t i = 0; i < pikort_source_count(pipeline); ++i)
       if (auto ok = bindSource(i); !ok)
         return ok.error();
-    for (const auto &[name, value] : scene.values)
-      if (auto ok = setConstant(name, value); !ok)
-        return ok.error();
+    if (auto ok = setConstants(); !ok)
+      return ok.error();
     if (output.empty())
       return fail("expected an image of 'piko::scene::Color' or "
                   "'piko::scene::Color8' for the result, but it has none");
     return output;
   }
 
-private:
+  Result<Done> setConstants() {
+    for (const auto &[name, value] : scene.values)
+      if (auto ok = setConstant(name, value); !ok)
+        return ok;
+    return Done{};
+  }
+
+  static bool isColor(const char *type) {
+    return !std::strcmp(type, "piko::scene::Color") ||
+           !std::strcmp(type, "piko::scene::Color8");
+  }
+
   Error fail(const std::string &message) const {
     return {"pipeline '" + std::string(pikort_name(pipeline)) +
             "': " + message};
@@ -210,8 +247,7 @@ private:
 
   Result<Done> noteImage(const pikort_state_info &state,
                          const pikort_record_info &record) {
-    if (std::strcmp(record.name, "piko::scene::Color") != 0 &&
-        std::strcmp(record.name, "piko::scene::Color8") != 0)
+    if (!isColor(record.name))
       return Done{};
     if (!output.empty())
       return fail("expected one image of colours for the result, but got '" +

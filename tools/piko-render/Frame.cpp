@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #include "Frame.h"
 
+#include "Piko/Replay/CaptureFile.h"
 #include "Piko/Scene/ProgressBar.h"
 
 #include <algorithm>
@@ -14,7 +15,26 @@ Error render::errorOf(pikort_pipeline *pipeline) {
   return {pikort_message(pipeline)};
 }
 
+/// A host's input in the place of a scene.
+static Result<SceneInput> loadCapture(const Options &options) {
+  auto fail = [&](const std::string &why) {
+    return Error{"capture '" + options.scene + "': " + why};
+  };
+  if (!options.sceneOption.empty())
+    return fail(options.sceneOption + " is an option of scenes");
+  auto capture = replay::readCapture(options.scene);
+  if (!capture)
+    return capture.error();
+  SceneInput scene{};
+  scene.size = {int(capture->domain[0]), int(capture->domain[1])};
+  scene.values = options.values;
+  scene.capture = std::move(*capture);
+  return scene;
+}
+
 Result<SceneInput> render::loadScene(const Options &options) {
+  if (replay::isCaptureFile(options.scene))
+    return loadCapture(options);
   ProgressBar bar("loading");
   auto mesh = loadMesh(options.scene, [&](double part) { bar.update(part); });
   if (!mesh)
@@ -38,6 +58,29 @@ Result<SceneInput> render::loadScene(const Options &options) {
   return scene;
 }
 
+static bool setOptions(const Options &options, pikort_pipeline *pipeline) {
+  return pikort_set_threads(pipeline, options.threads) == PIKORT_OK &&
+         pikort_set_static_input(pipeline, 1) == PIKORT_OK &&
+         (options.mappings.empty() ||
+          pikort_set_mappings(pipeline, options.mappings.c_str()) == PIKORT_OK);
+}
+
+Result<std::string> render::bindInput(const Options &options,
+                                      pikort_pipeline *pipeline,
+                                      SceneInput &scene) {
+  auto bound = bindScene(pipeline, scene);
+  if (!bound)
+    return bound;
+  bool isCapture = scene.capture.has_value();
+  if ((!isCapture || options.memoryBudget) &&
+      pikort_set_memory_budget(pipeline, options.memoryBudget) != PIKORT_OK)
+    return errorOf(pipeline);
+  if ((!isCapture || options.stripSize) &&
+      pikort_set_strip_size(pipeline, options.stripSize) != PIKORT_OK)
+    return errorOf(pipeline);
+  return bound;
+}
+
 Result<std::string> render::createPipeline(const Options &options,
                                            const pikort_program &program,
                                            SceneInput &scene,
@@ -46,15 +89,10 @@ Result<std::string> render::createPipeline(const Options &options,
   pikort_pipeline *pipeline = owner.pipeline;
   int64_t extent[] = {scene.size.x, scene.size.y};
   if (code != PIKORT_OK ||
-      pikort_set_domain(pipeline, 2, extent) != PIKORT_OK ||
-      pikort_set_threads(pipeline, options.threads) != PIKORT_OK ||
-      pikort_set_memory_budget(pipeline, options.memoryBudget) != PIKORT_OK ||
-      pikort_set_strip_size(pipeline, options.stripSize) != PIKORT_OK ||
-      pikort_set_static_input(pipeline, 1) != PIKORT_OK ||
-      (!options.mappings.empty() &&
-       pikort_set_mappings(pipeline, options.mappings.c_str()) != PIKORT_OK))
+      (!scene.capture && pikort_set_domain(pipeline, 2, extent) != PIKORT_OK) ||
+      !setOptions(options, pipeline))
     return errorOf(pipeline);
-  return bindScene(pipeline, scene);
+  return bindInput(options, pipeline, scene);
 }
 
 Result<std::vector<scene::Color>> render::readImage(pikort_pipeline *pipeline,

@@ -38,6 +38,11 @@ Error errorOf(pikort_pipeline *pipeline);
 /// Reads the scene and sets camera, lights and values as options say.
 Result<SceneInput> loadScene(const Options &options);
 
+/// Binds a scene, which must outlive the runs, and says how sources are
+/// divided, which a capture has of its host: the name of the image.
+Result<std::string> bindInput(const Options &options, pikort_pipeline *pipeline,
+                              SceneInput &scene);
+
 /// Makes a pipeline of a program and binds a scene, which must outlive it: the
 /// name of its image.
 Result<std::string> createPipeline(const Options &options,

@@ -6,15 +6,18 @@
 #include <cmath>
 #include <functional>
 #include <map>
+#include <set>
 
 using namespace piko;
 using namespace piko::render;
 
 const char *const render::usage =
     R"(usage: piko-render [options] FILE.piko.cpp SCENE
+       piko-render [options] FILE.piko.cpp CAPTURE
 
 Compiles a pipeline that uses the types of piko/scene.h, renders a scene with
-it, and says how long a frame took.
+it, and says how long a frame took. Or runs any pipeline on what an application
+has fed and bound, which pikort_capture or $PIKO_CAPTURE has written.
 
   --pipe NAME            which pipeline of the file (the only one)
   --target cpu|cuda|auto|gpu-on-cpu|reference
@@ -52,6 +55,7 @@ it, and says how long a frame took.
   --cache-dir FOLDER     where compiled code is kept ($PIKO_CACHE_DIR,
                          $XDG_CACHE_HOME/piko or ~/.cache/piko)
 
+Of scenes only:
   --width W --height H   image size in pixels (1024 768)
   --lights L             number of lights, 0 for none (1)
   --eye x y z --at x y z camera position and target (the scene fits, seen along
@@ -59,8 +63,8 @@ it, and says how long a frame took.
   --fovy DEGREES         field of view from bottom to top (45)
   --cull                 leave out back faces
   --ground               put a square under the scene
-  --set NAME=VALUE       a constant of the pipeline, if it is an int or a float
 
+  --set NAME=VALUE       a constant of the pipeline, if it is an int or a float
   --check[=nan:RECORD.FIELD,...]   check the rules of state on one thread, and
                          that these fields are never NaN
   --threads N            threads, 0 for all (0)
@@ -72,6 +76,10 @@ it, and says how long a frame took.
                          least (1000)
   --out IMAGE            write the last frame: .png, .exr, .ppm, ...; may be
                          repeated
+  --against TARGET,...   run once on each of these, too (as for --target, or a
+                         processor's name for its code), and compare all state
+                         bit for bit; exit status 1 if any differs
+  --tolerance X          relative differences that --against allows (0)
   --trace FILE           run one more frame, and write which thread ran which
                          bins when, for Perfetto or chrome://tracing
   --counters             count the work of one more frame beside the least that
@@ -154,6 +162,8 @@ private:
         {"--frames", [&] { options.frames = integer(name, 1, maxInt); }},
         {"--seconds", [&] { options.seconds = number(name); }},
         {"--out", [&] { options.images.push_back(value(name)); }},
+        {"--against", [&] { parseAgainst(value(name)); }},
+        {"--tolerance", [&] { options.tolerance = tolerance(name); }},
         {"--trace", [&] { options.trace = value(name); }},
         {"--counters", [&] { options.counters = true; }},
         {"--explain", [&] { options.explain = true; }},
@@ -162,9 +172,13 @@ private:
     };
     auto action = actions.find(name);
     if (action == actions.end())
-      fail("unknown option '" + name + "'");
-    else
-      action->second();
+      return fail("unknown option '" + name + "'");
+    static const std::set<std::string> ofScenes = {
+        "--width", "--height", "--lights", "--eye",
+        "--at",    "--fovy",   "--cull",   "--ground"};
+    if (options.sceneOption.empty() && ofScenes.contains(name))
+      options.sceneOption = name;
+    action->second();
   }
 
   void parseLevel(const std::string &word) {
@@ -194,16 +208,33 @@ private:
     options.load.synthesis.mappingWindow = factor;
   }
 
-  void parseFix(const std::string &text) {
+  /// Adds names with commas between them.
+  void parseNames(const std::string &option, const std::string &text,
+                  std::vector<std::string> &names) {
     for (size_t begin = 0; begin <= text.size();) {
       size_t end = std::min(text.find(',', begin), text.size());
       if (end == begin)
-        return fail("--fix: expected names with commas between them, but got "
-                    "'" +
+        return fail(option +
+                    ": expected names with commas between them, but got '" +
                     text + "'");
-      options.fix.push_back(text.substr(begin, end - begin));
+      names.push_back(text.substr(begin, end - begin));
       begin = end + 1;
     }
+  }
+
+  void parseFix(const std::string &text) {
+    parseNames("--fix", text, options.fix);
+  }
+
+  void parseAgainst(const std::string &text) {
+    parseNames("--against", text, options.against);
+  }
+
+  double tolerance(const std::string &name) {
+    double result = number(name);
+    if (!(result >= 0))
+      fail(name + ": expected a number of at least 0");
+    return result;
   }
 
   void parseCheck(const std::string &text) {

@@ -13,6 +13,7 @@ namespace piko::render {
 struct Options {
   bool help = false;
   std::string pipeline, scene;
+  std::string sceneOption; ///< the first one that only scenes have
   LoadOptions load;
   std::string tuned; ///< the file of a setting that piko-tune wrote
   ViewOptions view;
@@ -26,7 +27,9 @@ struct Options {
   int warmup = 5, frames = 30;
   double seconds = 1000;
   std::vector<std::string> images; ///< to write
-  std::string mappings;  ///< as pikort_set_mappings takes it; "" = unsaid
+  std::string mappings; ///< as pikort_set_mappings takes it; "" = unsaid
+  std::vector<std::string> against; ///< targets that must give the same
+  double tolerance = 0;  ///< relative, where stages need not be strict
   std::string trace;     ///< where to write which thread ran which bins
   bool counters = false; ///< count the work of one more frame
   bool explain = false;

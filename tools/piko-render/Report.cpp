@@ -158,8 +158,8 @@ JsonObject render::makeReport(const Options &options, const RunResult &result,
       .add("scene", std::filesystem::path(options.scene).filename().string())
       .add("tris", result.triangles)
       .add("verts", result.vertices)
-      .add("w", options.view.width)
-      .add("h", options.view.height)
+      .add("w", result.width)
+      .add("h", result.height)
       .add("lights", options.lights)
       .add("ms_median", result.times.median)
       .add("ms_min", result.times.min)
@@ -194,16 +194,21 @@ std::string render::summarize(const RunResult &result,
   std::string where = nameDevice(pipeline);
   if (where.empty())
     where = std::to_string(result.threads) + " threads";
+  auto [count, kind] =
+      result.primitives > 0 ? std::pair(result.primitives, "primitives")
+      : result.patches > 0  ? std::pair(result.patches, "patches")
+                            : std::pair(result.triangles, "triangles");
+  // A capture need not have an image.
+  std::string pixels = result.primitives > 0 && result.pixels == 0
+                           ? ""
+                           : std::to_string(result.pixels) + " pixels, ";
   char text[512];
   std::snprintf(text, sizeof text,
                 "%s: %.2f ms a frame (median of %d, %.2f to %.2f), "
-                "%lld %s, %lld pixels, %s, compiled in %.0f ms",
+                "%lld %s, %s%s, compiled in %.0f ms",
                 pikort_name(pipeline), result.times.median, result.times.count,
                 result.times.min, result.times.max,
-                static_cast<long long>(result.patches > 0 ? result.patches
-                                                          : result.triangles),
-                result.patches > 0 ? "patches" : "triangles",
-                static_cast<long long>(result.pixels), where.c_str(),
-                result.compileMilliseconds);
+                static_cast<long long>(count), kind, pixels.c_str(),
+                where.c_str(), result.compileMilliseconds);
   return text;
 }

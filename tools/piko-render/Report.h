@@ -22,9 +22,11 @@ struct RunResult {
   FrameTimes times;
   double compileMilliseconds, loadMilliseconds;
   int64_t triangles, vertices, patches;
+  int width, height;  ///< of the image, or the domain
+  int64_t primitives; ///< of a capture's sources
   int threads;
-  int64_t pixels; ///< that something was drawn to
-  std::string imageHash;
+  int64_t pixels;        ///< that something was drawn to
+  std::string imageHash; ///< or, without an image, of all state
   std::vector<Count> counts;
 };
 

@@ -5,6 +5,7 @@
 // piko/scene.h says.
 //
 //===----------------------------------------------------------------------===//
+#include "Against.h"
 #include "Frame.h"
 #include "Mappings.h"
 #include "Options.h"
@@ -14,6 +15,7 @@
 #include "Wastes.h"
 
 #include "Piko/Driver/TunedSetting.h"
+#include "Piko/Replay/Outcome.h"
 #include "Piko/Scene/ImageFile.h"
 #include "Piko/Scene/ProgressBar.h"
 #include "Piko/Support/OutputFile.h"
@@ -24,7 +26,7 @@
 #include <cstddef>
 #include <cstdio>
 #include <span>
-#include <thread>
+#include <stdexcept>
 
 using namespace piko;
 using namespace piko::render;
@@ -73,20 +75,62 @@ Result<FrameTimes> timeFrames(const Options &options,
                     spent / double(times.size()), int(times.size())};
 }
 
+/// What the last frame left.
+struct Picture {
+  std::vector<scene::Color> pixels; ///< none if there is no image
+  std::string hash;
+};
+
 int64_t countDrawn(std::span<const scene::Color> pixels) {
   return std::count_if(pixels.begin(), pixels.end(),
                        [](const auto &pixel) { return pixel.rgba.a != 0; });
 }
 
-/// FNV-1a over the image's bytes: equal images have equal hashes.
-std::string hashOf(std::span<const scene::Color> pixels) {
-  uint64_t hash = 0xcbf29ce484222325;
-  for (std::byte byte : std::as_bytes(pixels))
+/// FNV-1a, of bytes one after the other.
+uint64_t addToHash(uint64_t hash, std::span<const std::byte> bytes) {
+  for (std::byte byte : bytes)
     hash = (hash ^ uint64_t(byte)) * 0x100000001b3;
+  return hash;
+}
+
+std::string textOfHash(uint64_t hash) {
   char text[17];
   std::snprintf(text, sizeof text, "%016llx",
                 static_cast<unsigned long long>(hash));
   return text;
+}
+
+/// Equal images have equal hashes.
+Result<Picture> readPicture(const Frame &frame) {
+  constexpr uint64_t empty = 0xcbf29ce484222325;
+  Picture picture;
+  if (!frame.image().empty()) {
+    auto pixels = readImage(frame.pipeline(), frame.image());
+    if (!pixels)
+      return pixels.error();
+    picture.pixels = std::move(*pixels);
+    picture.hash =
+        textOfHash(addToHash(empty, std::as_bytes(std::span(picture.pixels))));
+    return picture;
+  }
+  try {
+    uint64_t hash = empty;
+    for (const auto &[name, records] :
+         replay::readOutcome(frame.pipeline()).state)
+      hash = addToHash(hash, std::as_bytes(std::span(records.bytes)));
+    picture.hash = textOfHash(hash);
+    return picture;
+  } catch (const std::runtime_error &error) {
+    return Error{error.what()};
+  }
+}
+
+int64_t countPrimitives(const SceneInput &scene) {
+  int64_t count = 0;
+  if (scene.capture)
+    for (const rt::Capture::Records &source : scene.capture->sources)
+      count += source.count;
+  return count;
 }
 
 /// Puts a frame for the values that the options name in the place of a general
@@ -106,9 +150,13 @@ Result<Done> specializeFrame(Options &options, SceneInput &scene,
 
 /// Prints what is asked for.
 Result<Done> report(const Options &options, const RunResult &result,
-                    SceneInput &scene, pikort_pipeline *pipeline) {
+                    SceneInput &scene, const std::vector<Agreement> &agreements,
+                    pikort_pipeline *pipeline) {
   JsonObject line = makeReport(options, result, pipeline);
-  std::string text = summarize(result, pipeline) + "\n";
+  std::string text =
+      summarize(result, pipeline) + "\n" + printAgreements(agreements);
+  if (!agreements.empty())
+    line.add("against", reportAgreements(agreements));
   if (options.json && isTimed(options, pipeline)) {
     auto kernels = timeKernels(options, pipeline);
     if (!kernels)
@@ -157,11 +205,9 @@ void warnOf(const std::vector<Count> &counts) {
                    count.name.c_str(), static_cast<long long>(count.sum));
 }
 
-int countThreads(const Options &options) {
-  if (options.load.target == ExecutionTarget::Reference)
-    return 1;
-  int cores = int(std::max(1u, std::thread::hardware_concurrency()));
-  return options.threads ? options.threads : cores;
+int countThreads(const Options &options, pikort_pipeline *pipeline) {
+  bool isReference = options.load.target == ExecutionTarget::Reference;
+  return isReference ? 1 : pikort_threads(pipeline);
 }
 
 /// Everything after the command line.
@@ -169,7 +215,14 @@ Result<Done> renderScene(Options options) {
   for (const std::string &image : options.images)
     if (auto ok = checkImageFormat(image); !ok)
       return ok.error();
-  auto frame = Frame::load(options);
+  std::vector<Agreement> agreements;
+  if (!options.against.empty()) {
+    auto found = runAgainst(options);
+    if (!found)
+      return found.error();
+    agreements = std::move(*found);
+  }
+  auto frame = Frame::load(options, /*wasCompiled=*/!agreements.empty());
   if (!frame)
     return frame.error();
   Stopwatch loading;
@@ -183,16 +236,20 @@ Result<Done> renderScene(Options options) {
     if (auto ok = specializeFrame(options, *scene, *frame); !ok)
       return ok.error();
   pikort_pipeline *pipeline = frame->pipeline();
+  if (!options.images.empty() && frame->image().empty())
+    return Error{"--out: expected one image of colours to write, but pipeline "
+                 "'" +
+                 std::string(pikort_name(pipeline)) + "' has none or several"};
 
   auto times = timeFrames(options, pipeline);
   if (!times)
     return times.error();
-  auto pixels = readImage(pipeline, frame->image());
-  if (!pixels)
-    return pixels.error();
+  auto picture = readPicture(*frame);
+  if (!picture)
+    return picture.error();
   for (const std::string &image : options.images)
     if (auto ok =
-            writeImage(image, options.view.width, options.view.height, *pixels);
+            writeImage(image, scene->size.x, scene->size.y, picture->pixels);
         !ok)
       return ok.error();
   auto counts = readCounters(pipeline);
@@ -206,13 +263,21 @@ Result<Done> renderScene(Options options) {
                    int64_t(scene->mesh.triangles.size()),
                    int64_t(scene->mesh.vertices.size()),
                    int64_t(scene->mesh.patches.size()),
-                   countThreads(options),
-                   countDrawn(*pixels),
-                   hashOf(*pixels),
+                   scene->size.x,
+                   scene->size.y,
+                   countPrimitives(*scene),
+                   countThreads(options, pipeline),
+                   countDrawn(picture->pixels),
+                   picture->hash,
                    std::move(*counts)};
-  if (auto ok = report(options, result, *scene, pipeline); !ok)
+  if (auto ok = report(options, result, *scene, agreements, pipeline); !ok)
     return ok.error();
-  return options.trace.empty() ? Done{} : traceFrame(pipeline, options.trace);
+  if (!options.trace.empty())
+    if (auto ok = traceFrame(pipeline, options.trace); !ok)
+      return ok.error();
+  if (!agree(agreements))
+    return Error{"not all targets agree"};
+  return Done{};
 }
 
 int fail(const Error &error) {

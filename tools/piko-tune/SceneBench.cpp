@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <ctime>
+#include <stdexcept>
 
 using namespace piko;
 using namespace piko::tune;
@@ -27,8 +28,7 @@ SceneBench::create(const TuneOptions &options, const Space &space) {
   auto image = render::readImage(options.reference);
   if (!image)
     return image.error();
-  auto [width, height] =
-      std::pair(options.render.view.width, options.render.view.height);
+  auto [width, height] = std::pair(bench->scene.size.x, bench->scene.size.y);
   if (image->width != width || image->height != height)
     return Error{"expected a reference image of " + std::to_string(width) +
                  " x " + std::to_string(height) + " pixels, but '" +
@@ -62,16 +62,24 @@ Result<uint64_t> SceneBench::prepare(const Setting &setting) {
          0x9e3779b97f4a7c15 * uint64_t(tuned.stripSize);
 }
 
+render::Options SceneBench::getOptions(const Setting &setting) const {
+  render::Options render = options.render;
+  if (int64_t strip = space.describe(setting).stripSize)
+    render.stripSize = strip;
+  return render;
+}
+
 Result<SceneBench::Instance *> SceneBench::getInstance(const Setting &setting) {
   Entry &entry = entries.at(setting);
   std::unique_ptr<Instance> &instance = entry.instance;
   if (instance)
     return instance.get();
   instance = std::make_unique<Instance>();
-  render::Options render = options.render;
-  if (int64_t strip = space.describe(setting).stripSize)
-    render.stripSize = strip;
-  auto image = render::createPipeline(render, entry.program->get(), scene,
+  render::Options render = getOptions(setting);
+  if (scene.capture)
+    instance->own = scene;
+  auto image = render::createPipeline(render, entry.program->get(),
+                                      instance->own ? *instance->own : scene,
                                       instance->owner);
   if (!image) {
     Error error = image.error();
@@ -143,12 +151,62 @@ static double get(Metric metric, const render::ImageError &error) {
   return error.flip;
 }
 
+static double get(Metric metric, const replay::NumberErrors &error) {
+  switch (metric) {
+  case Metric::Max:
+    return error.largest;
+  case Metric::Mean:
+    return error.mean;
+  case Metric::RMS:
+    return error.rms;
+  default:
+    return error.p99;
+  }
+}
+
+/// Runs once on a capture that no run has changed.
+static Result<render::Done> runAfresh(const render::Options &options,
+                                      const render::SceneInput &scene,
+                                      render::SceneInput &own,
+                                      pikort_pipeline *pipeline) {
+  own.capture = scene.capture;
+  if (auto bound = render::bindInput(options, pipeline, own); !bound)
+    return bound.error();
+  if (pikort_run(pipeline) != PIKORT_OK)
+    return render::errorOf(pipeline);
+  return render::Done{};
+}
+
+Result<double> SceneBench::measureNumbers(Instance &instance) {
+  if (!options.reference.empty() || options.metric == Metric::FLIP)
+    return Error{"expected one image of colours, which --reference and "
+                 "--metric flip are for, but pipeline '" +
+                 std::string(pikort_name(instance.owner.pipeline)) +
+                 "' has none or several"};
+  try {
+    replay::Outcome outcome = replay::readOutcome(instance.owner.pipeline);
+    if (!referenceOutcome)
+      referenceOutcome = outcome;
+    return get(options.metric,
+               replay::measureNumbers(*referenceOutcome, outcome));
+  } catch (const std::runtime_error &error) {
+    return Error{error.what()};
+  }
+}
+
 Result<double> SceneBench::measureError(const Setting &setting) {
   auto instance = getInstance(setting);
   if (!instance)
     return instance.error();
-  auto pixels =
-      render::readImage((*instance)->owner.pipeline, (*instance)->image);
+  pikort_pipeline *pipeline = (*instance)->owner.pipeline;
+  if (scene.capture)
+    if (auto ok =
+            runAfresh(getOptions(setting), scene, *(*instance)->own, pipeline);
+        !ok)
+      return ok.error();
+  if ((*instance)->image.empty())
+    return measureNumbers(**instance);
+  auto pixels = render::readImage(pipeline, (*instance)->image);
   if (!pixels)
     return pixels.error();
   render::Image image{scene.size.x, scene.size.y, std::move(*pixels)};

@@ -6,6 +6,7 @@
 #include "Frame.h"
 #include "Space.h"
 
+#include "Piko/Replay/Measure.h"
 #include "Piko/Scene/Image.h"
 
 #include <map>
@@ -31,6 +32,7 @@ public:
 private:
   /// A pipeline with its scene; made when it first runs.
   struct Instance {
+    std::optional<render::SceneInput> own; ///< a capture, which runs change
     render::PipelineOwner owner;
     std::string image;
   };
@@ -41,12 +43,16 @@ private:
 
   SceneBench(const TuneOptions &options, const Space &space)
       : options(options), space(space) {}
+  render::Options getOptions(const Setting &setting) const;
   render::Result<Instance *> getInstance(const Setting &setting);
+  /// Of all numbers, where there is no image.
+  render::Result<double> measureNumbers(Instance &instance);
 
   const TuneOptions &options;
   const Space &space;
   render::SceneInput scene;
   std::optional<render::Image> reference;
+  std::optional<replay::Outcome> referenceOutcome;
   std::map<Setting, Entry> entries;
 };
 

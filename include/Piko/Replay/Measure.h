@@ -25,6 +25,17 @@ struct Measure {
 
 Measure measureOutcomes(const Outcome &expected, const Outcome &actual);
 
+/// The differences between all numbers of two runs, each over the largest
+/// finite magnitude that its field has in the expected one. What is finite in
+/// one of them only, or missing, differs by 1.
+struct NumberErrors {
+  double largest = 0, mean = 0;
+  double rms = 0; ///< root of the mean square
+  double p99 = 0; ///< 99 % of the numbers differ by at most this
+};
+
+NumberErrors measureNumbers(const Outcome &expected, const Outcome &actual);
+
 } // namespace piko::replay
 
 #endif // PIKO_REPLAY_MEASURE_H

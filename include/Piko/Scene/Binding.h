@@ -9,7 +9,7 @@
 
 #include "Piko/Scene/Bvh.h"
 
-#include <pikort/pikort.h>
+#include <pikort/capture.h>
 
 #include <optional>
 #include <utility>
@@ -24,6 +24,8 @@ struct SceneInput {
   Mesh mesh;
   /// Names of constants that are an int or a float, and their values.
   std::vector<std::pair<std::string, std::string>> values;
+  /// In the place of all but the values: what a host's run has taken.
+  std::optional<rt::Capture> capture;
   // Made for a pipeline that asks for them.
   std::vector<scene::Pixel> pixels;
   std::optional<Bvh> bvh;
@@ -33,6 +35,10 @@ struct SceneInput {
 /// pipeline, and returns the name of its Image<Color>. Errors: something is of
 /// a type that no scene or not this one has, there is not exactly one
 /// Image<Color>, a value fits no constant, or buildBvh fails.
+///
+/// A capture is bound by name, and its domain set. Then there need not be an
+/// image of colours, and the name is empty if there is none or several. Errors:
+/// the pipeline's state, records or sources are others.
 Result<std::string> bindScene(pikort_pipeline *pipeline, SceneInput &scene);
 
 /// The sum of a Buffer<Counter> after a run.
