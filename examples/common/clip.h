@@ -1,13 +1,15 @@
 //===- clip.h - From clip space to a polygon on the screen ----------------===//
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// A triangle in clip space becomes a convex polygon of at most eight corners
-// on the screen: cut at the near plane, so that w is positive, and at a guard
-// band far outside the image, so that coverage.h's integers do not overflow.
-// Nearly all triangles need no cut.
+// A triangle in clip space becomes a convex polygon of at most nine corners on
+// the screen: cut at the near and the far plane, so that w is positive and
+// nothing is drawn beyond, and at a guard band far outside the image, so that
+// coverage.h's integers do not overflow. Nearly all triangles need no cut.
 //
 // A cut depends on nothing but the two ends of the edge that is cut, always
-// seen from the inside, so that neighbours are cut at the same point.
+// seen from the inside, so that neighbours are cut at the same point. It is
+// made in double precision: in a narrow view an edge may be 10^10 times as long
+// as the image is wide, of which floats resolve no pixel.
 //
 //===----------------------------------------------------------------------===//
 #ifndef COMMON_CLIP_H
@@ -20,7 +22,7 @@ namespace raster {
 /// The guard band reaches this many times as far as the image from its centre.
 constexpr float guardBand = 64.0f;
 /// Triangles with larger clip coordinates than this, or NaN, are dropped.
-constexpr float largestCoordinate = 1e15f;
+constexpr float largestCoordinate = 1e25f;
 
 /// A corner in clip space, and how much of the triangle's three corners it
 /// holds.
@@ -29,29 +31,41 @@ struct ClipCorner {
   glm::vec3 weight;
 };
 
-/// The planes to clip at: the near plane, then the guard band.
-constexpr int clipPlanes = 5;
+/// The same while it is cut.
+struct PreciseCorner {
+  glm::dvec4 position;
+  glm::vec3 weight;
+};
+
+/// The planes to clip at: near and far, then the guard band.
+constexpr int clipPlanes = 6;
 
 /// How far inside of a plane p is; negative outside.
-inline float distanceTo(int plane, glm::vec4 p) {
+inline double distanceTo(int plane, glm::dvec4 p) {
+  constexpr double reach = guardBand;
   switch (plane) {
   case 0:
     return p.z + p.w;
   case 1:
-    return guardBand * p.w - p.x;
+    return p.w - p.z;
   case 2:
-    return guardBand * p.w + p.x;
+    return reach * p.w - p.x;
   case 3:
-    return guardBand * p.w - p.y;
+    return reach * p.w + p.x;
+  case 4:
+    return reach * p.w - p.y;
   default:
-    return guardBand * p.w + p.y;
+    return reach * p.w + p.y;
   }
 }
 
-inline bool isInside(glm::vec4 p) {
+inline bool isInGuardBand(glm::vec4 p) {
   float reach = guardBand * p.w;
-  return p.z + p.w >= 0 && p.x <= reach && -p.x <= reach && p.y <= reach &&
-         -p.y <= reach;
+  return p.x <= reach && -p.x <= reach && p.y <= reach && -p.y <= reach;
+}
+
+inline bool isInside(glm::vec4 p) {
+  return p.z + p.w >= 0 && p.z <= p.w && isInGuardBand(p);
 }
 
 inline bool isUsable(glm::vec4 p) {
@@ -73,11 +87,11 @@ inline bool isOutOfView(glm::vec4 a, glm::vec4 b, glm::vec4 c) {
 
 /// Where the edge from a corner inside to one outside meets a plane; the
 /// arguments are their distances.
-inline ClipCorner cut(const ClipCorner &in, const ClipCorner &out, float inside,
-                      float outside) {
-  float t = inside / (inside - outside);
+inline PreciseCorner cut(const PreciseCorner &in, const PreciseCorner &out,
+                         double inside, double outside) {
+  double t = inside / (inside - outside);
   return {in.position + (out.position - in.position) * t,
-          in.weight + (out.weight - in.weight) * t};
+          in.weight + (out.weight - in.weight) * float(t)};
 }
 
 constexpr int maxCorners = 3 + clipPlanes;
@@ -85,22 +99,26 @@ constexpr int maxCorners = 3 + clipPlanes;
 /// Clips the convex polygon in the first `count` corners of `polygon` and
 /// returns its new number of corners (Sutherland and Hodgman 1974).
 inline int clipPolygon(ClipCorner (&polygon)[maxCorners], int count) {
-  ClipCorner kept[maxCorners];
+  PreciseCorner corners[maxCorners], kept[maxCorners];
+  for (int i = 0; i < count; ++i)
+    corners[i] = {polygon[i].position, polygon[i].weight};
   for (int plane = 0; plane < clipPlanes; ++plane) {
     int keptCount = 0;
     for (int i = 0; i < count; ++i) {
-      ClipCorner a = polygon[i], b = polygon[i + 1 == count ? 0 : i + 1];
-      float da = distanceTo(plane, a.position);
-      float db = distanceTo(plane, b.position);
+      PreciseCorner a = corners[i], b = corners[i + 1 == count ? 0 : i + 1];
+      double da = distanceTo(plane, a.position);
+      double db = distanceTo(plane, b.position);
       if (da >= 0 && keptCount < maxCorners)
         kept[keptCount++] = a;
       if ((da >= 0) != (db >= 0) && keptCount < maxCorners)
         kept[keptCount++] = da >= 0 ? cut(a, b, da, db) : cut(b, a, db, da);
     }
     for (int i = 0; i < keptCount; ++i)
-      polygon[i] = kept[i];
+      corners[i] = kept[i];
     count = keptCount;
   }
+  for (int i = 0; i < count; ++i)
+    polygon[i] = {glm::vec4(corners[i].position), corners[i].weight};
   return count;
 }
 

@@ -20,7 +20,8 @@ namespace raster {
 /// Sides of the view, and what keeps a vertex from being used as it is.
 enum Outside : uint32_t {
   outsideView = 63,   ///< left, right, below, above, near, far
-  outsideGuard = 64,  ///< beyond the guard band, or before the near plane
+  outsideDepth = 48,  ///< near, far
+  outsideGuard = 64,  ///< beyond the guard band, or a plane of depth
   outsideRange = 128, ///< too large, or not a number
 };
 
@@ -44,7 +45,7 @@ inline ScreenVertex toScreen(glm::vec4 clip, glm::ivec2 size) {
   v.outside = uint32_t(clip.x < -w) | uint32_t(clip.x > w) << 1 |
               uint32_t(clip.y < -w) << 2 | uint32_t(clip.y > w) << 3 |
               uint32_t(clip.z < -w) << 4 | uint32_t(clip.z > w) << 5;
-  if (!isInside(clip) || !(w > 0)) {
+  if ((v.outside & outsideDepth) || !isInGuardBand(clip) || !(w > 0)) {
     v.outside |= outsideGuard;
     return v;
   }

@@ -6,8 +6,10 @@
 // on an edge belongs to the triangle that has it as a top or a left edge. So
 // triangles that share an edge leave no hole and draw no pixel twice.
 //
-// Coordinates are below 2^27 in magnitude, which clip.h's guard band ensures
-// for images of up to 16384 pixels a side; edge functions are then below 2^57.
+// Coordinates are below 2^29 + 2^24 in magnitude, which clip.h's guard band
+// ensures for images of up to 65536 pixels a side; differences then fit into 32
+// bits, and edge functions are below 2^62. With 10 bits below a pixel, so it is
+// up to 16384 pixels a side.
 //
 //===----------------------------------------------------------------------===//
 #ifndef COMMON_COVERAGE_H

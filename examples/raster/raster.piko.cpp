@@ -47,7 +47,7 @@ struct ShadedTriangle {
 // A triangle that may cover pixels, and among which they are.
 struct BoxedTriangle {
   glm::ivec3 vertex;
-  glm::i16vec2 lo, hi;
+  glm::u16vec2 lo, hi;
 };
 
 struct Fragment {
@@ -142,7 +142,7 @@ struct Setup : piko::Stage<0, 0, 64, Triangle, BoxedTriangle>,
                          state().settings.cullBackFaces != 0);
     box = coveredPart(corner(0), corner(1), corner(2), box);
     if (!box.isEmpty())
-      emit(BoxedTriangle{t.vertex, glm::i16vec2(box.lo), glm::i16vec2(box.hi)},
+      emit(BoxedTriangle{t.vertex, glm::u16vec2(box.lo), glm::u16vec2(box.hi)},
            0);
   }
 };

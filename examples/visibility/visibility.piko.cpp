@@ -7,7 +7,7 @@
 //                   |  \--------------------------------------> Coverage
 //                   |    large                                     ^
 //                   \----------> Clipper --------------------------/
-//                     crossing the near plane or the guard band
+//                     crossing a plane of depth or the guard band
 //
 //   each bin, when all of these are done --> Shade
 //
@@ -46,7 +46,7 @@ struct ScreenTriangle {
   Point a, b, c;
   glm::vec3 nearness; // of a, b and c
   int32_t index;
-  glm::i16vec2 lo, hi;
+  glm::u16vec2 lo, hi;
 };
 
 // One of few pixels, its corners relative to pixel `lo`.
@@ -132,8 +132,8 @@ struct Setup
     }
     Point q = b.at, r = c.at;
     if (turnClockwise<int64_t>(a.at, q, r, nearness))
-      emit(ScreenTriangle{a.at, q, r, nearness, t.index, glm::i16vec2(box.lo),
-                          glm::i16vec2(box.hi)},
+      emit(ScreenTriangle{a.at, q, r, nearness, t.index, glm::u16vec2(box.lo),
+                          glm::u16vec2(box.hi)},
            1);
   }
 
@@ -193,8 +193,8 @@ struct Clipper : piko::Stage<0, 0, 64, Triangle, ScreenTriangle>,
       }
       // One of the other sign is a fold of less than 1/256 pixel.
       if (part != 0 && (part < 0) == (area < 0) && !box.isEmpty())
-        emit(ScreenTriangle{a, b, c, near, t.index, glm::i16vec2(box.lo),
-                            glm::i16vec2(box.hi)},
+        emit(ScreenTriangle{a, b, c, near, t.index, glm::u16vec2(box.lo),
+                            glm::u16vec2(box.hi)},
              0);
     }
   }

@@ -6,10 +6,12 @@
 //
 //===----------------------------------------------------------------------===//
 #include "Piko/Scene/View.h"
+#include "DepthRange.h"
 #include "Vectors.h"
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <numbers>
 
 using namespace piko;
@@ -45,6 +47,60 @@ glm::mat4 viewProjection(const scene::Camera &c) {
   m[3] = {-glm::dot(x, c.eye), -glm::dot(y, c.eye),
           -scale * glm::dot(z, c.eye) - shift, -glm::dot(z, c.eye)};
   return m;
+}
+
+/// How much farther than the scene the far plane is, so that rounding of depths
+/// does not put the scene's end beyond: the more, the nearer the near plane.
+float farMargin(float nearZ, float reach) {
+  float part = 5e-7f * reach / nearZ;
+  return 1 + std::clamp(part, 0.001f, 0.1f);
+}
+
+std::string textOf(double distance) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.6g", distance);
+  return text;
+}
+
+/// Sets the planes of depth where options do not, and the matrix.
+Result<Done> setPlanes(scene::Camera &camera, const ViewOptions &options,
+                       float nearZ, float reach) {
+  camera.nearZ = options.nearZ.value_or(nearZ);
+  if (!(camera.nearZ > 0) || !std::isfinite(camera.nearZ))
+    return Error{"expected a near plane at a distance above 0, but got " +
+                 textOf(camera.nearZ)};
+  camera.farZ = options.farZ.value_or(reach * farMargin(camera.nearZ, reach));
+  if (!options.farZ && !(camera.farZ > camera.nearZ)) // all is before it
+    camera.farZ = camera.nearZ * 2;
+  if (!(camera.farZ > camera.nearZ) || !std::isfinite(camera.farZ))
+    return Error{"expected a far plane beyond the near one, which is at " +
+                 textOf(camera.nearZ) + ", but got " + textOf(camera.farZ)};
+  if (camera.nearZ < 0.999 * leastNear * camera.farZ)
+    return Error{"expected a near plane at " + textOf(leastNear) +
+                 " of the far plane's distance, " + textOf(camera.farZ) +
+                 ", or beyond, but got " + textOf(camera.nearZ)};
+  camera.viewProjection = viewProjection(camera);
+  return Done{};
+}
+
+/// How far along `forward` a scene begins and ends.
+struct Extent {
+  float begin, end;
+
+  Extent(const scene::Camera &camera, const Sphere &scene) {
+    float distance = glm::dot(scene.center - camera.eye, camera.forward);
+    float least = 1e-3f * scene.radius;
+    begin = std::max((distance - scene.radius) * 0.999f, least);
+    end = std::max(distance + scene.radius, least);
+  }
+};
+
+std::string describeCut(const char *plane, double at, int64_t count,
+                        const char *where, double end, const char *option) {
+  return std::string("the ") + plane + " plane, at a distance of " +
+         textOf(at) + ", cuts off what is seen of triangles or patches, " +
+         std::to_string(count) + " in number, the " + where + " at " +
+         textOf(end) + "; " + option + " says where it is";
 }
 
 } // namespace
@@ -115,12 +171,38 @@ Result<scene::Camera> render::makeCamera(const ViewOptions &options,
   glm::vec3 right = unit(glm::cross(camera.forward, upwards));
   camera.right = right * (tangent * aspect);
   camera.up = glm::cross(right, camera.forward) * tangent;
+  if (!std::isnormal(glm::dot(camera.right, camera.right)) ||
+      !std::isnormal(glm::dot(camera.up, camera.up)))
+    return Error{"expected a field of view that floats resolve both ways"};
 
-  float distance = glm::dot(scene.center - camera.eye, camera.forward);
-  float least = 1e-3f * scene.radius;
-  camera.nearZ = std::max((distance - scene.radius) * 0.999f, least);
-  camera.farZ = std::max(distance + scene.radius, least) * 1.001f;
-  camera.viewProjection = viewProjection(camera);
+  Extent extent(camera, scene);
+  if (auto ok = setPlanes(camera, options, extent.begin, extent.end); !ok)
+    return ok.error();
+  return camera;
+}
+
+Result<scene::Camera> render::makeCamera(const ViewOptions &options,
+                                         const Mesh &mesh,
+                                         std::vector<std::string> &warnings) {
+  Sphere scene = boundingSphere(mesh);
+  auto camera = makeCamera(options, scene);
+  if (!camera)
+    return camera;
+  CutParts cut = findCutParts(*camera, mesh);
+  if (cut.beforeNear > 0 && !options.nearZ) {
+    Extent extent(*camera, scene);
+    double farZ = options.farZ.value_or(extent.end * 1.1f);
+    auto nearZ = float(std::max(cut.nearest * 0.999, leastNear * farZ));
+    if (auto ok = setPlanes(*camera, options, nearZ, extent.end); !ok)
+      return ok.error();
+    cut = findCutParts(*camera, mesh);
+  }
+  if (cut.beforeNear > 0)
+    warnings.push_back(describeCut("near", camera->nearZ, cut.beforeNear,
+                                   "nearest", cut.nearest, "--near"));
+  if (cut.beyondFar > 0)
+    warnings.push_back(describeCut("far", camera->farZ, cut.beyondFar,
+                                   "farthest", cut.farthest, "--far"));
   return camera;
 }
 

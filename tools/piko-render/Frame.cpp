@@ -45,9 +45,12 @@ Result<SceneInput> render::loadScene(const Options &options) {
   if (options.ground)
     addGround(*mesh);
   Sphere bounds = boundingSphere(*mesh);
-  auto camera = makeCamera(options.view, bounds);
+  std::vector<std::string> warnings;
+  auto camera = makeCamera(options.view, *mesh, warnings);
   if (!camera)
     return Error{"scene '" + options.scene + "': " + camera.error().message};
+  for (const std::string &warning : warnings)
+    std::fprintf(stderr, "piko-render: warning: %s\n", warning.c_str());
   SceneInput scene{};
   scene.size = {options.view.width, options.view.height};
   scene.camera = *camera;

@@ -61,6 +61,8 @@ Of scenes only:
   --eye x y z --at x y z camera position and target (the scene fits, seen along
                          -z)
   --fovy DEGREES         field of view from bottom to top (45)
+  --near D --far D       distances of the planes before and behind which nothing
+                         is drawn (about the scene, and before all that is seen)
   --cull                 leave out back faces
   --ground               put a square under the scene
 
@@ -152,6 +154,8 @@ private:
         {"--eye", [&] { options.view.eye = vector(name); }},
         {"--at", [&] { options.view.at = vector(name); }},
         {"--fovy", [&] { options.view.fovy = float(number(name)); }},
+        {"--near", [&] { options.view.nearZ = distance(name); }},
+        {"--far", [&] { options.view.farZ = distance(name); }},
         {"--cull", [&] { options.cull = true; }},
         {"--ground", [&] { options.ground = true; }},
         {"--set", [&] { parseSet(value(name)); }},
@@ -267,6 +271,9 @@ private:
       fail("expected a pipeline file and a scene file");
     else if (!(options.view.fovy > 0 && options.view.fovy < 180))
       fail("--fovy: expected an angle between 0 and 180 degrees");
+    else if (options.view.nearZ && options.view.farZ &&
+             !(*options.view.farZ > *options.view.nearZ))
+      fail("--far: expected a distance above that of --near");
     else if (!options.fix.empty() &&
              options.load.target == ExecutionTarget::Reference)
       fail("--fix is for pipelines that are compiled, and does nothing with "
@@ -317,6 +324,12 @@ private:
     if (result < 0)
       fail(name + ": expected a number of at least 0, but got " +
            std::to_string(result));
+    return result;
+  }
+  float distance(const std::string &name) {
+    auto result = float(number(name));
+    if (!(result > 0) || !std::isfinite(result))
+      fail(name + ": expected a distance above 0 that a float holds");
     return result;
   }
   glm::vec3 vector(const std::string &name) {

@@ -129,7 +129,8 @@ protected:
   }
 };
 
-const ImageSize sizes[] = {{1024, 768}, {3840, 2160}, {15360, 8640}};
+const ImageSize sizes[] = {
+    {1024, 768}, {3840, 2160}, {15360, 8640}, {65536, 65536}};
 const Lattice lattices[] = {{"PixelCentres", 256, 128}, {"Sixteenths", 16, 0}};
 
 std::string nameOf(const testing::TestParamInfo<Coverage::ParamType> &info) {

@@ -115,6 +115,114 @@ TEST(View, PlanesEncloseTheScene) {
   }
 }
 
+/// A square ground of 2000 a side at y = 0.
+Mesh makeGround() {
+  Mesh mesh;
+  for (glm::vec2 p : {glm::vec2(-1, -1), {1, -1}, {1, 1}, {-1, 1}})
+    mesh.vertices.push_back({{1000 * p.x, 0, 1000 * p.y},
+                             {0, 1, 0},
+                             int32_t(mesh.vertices.size())});
+  mesh.triangles = {{{0, 2, 1}, 0}, {{0, 3, 2}, 1}};
+  return mesh;
+}
+
+// The lowest ray of the view meets the ground first: at a distance of
+// height / (tan(22.5 degrees) + tan(slope)), of the axes that are turned.
+TEST(View, TheNearPlaneIsBeforeWhatIsSeen) {
+  for (float height : {0.5f, 0.05f, 10.0f}) {
+    ViewOptions options{.width = 320, .height = 240};
+    options.eye = {0, height, 0};
+    options.at = {5, 0, 0};
+    std::vector<std::string> warnings;
+    auto camera = makeCamera(options, makeGround(), warnings);
+    ASSERT_TRUE(camera);
+    EXPECT_TRUE(warnings.empty());
+    double slope = std::atan(height / 5.0), half = M_PI / 8;
+    double nearest = height / std::sin(slope + half) * std::cos(half);
+    EXPECT_LE(camera->nearZ, nearest);
+    EXPECT_GE(camera->nearZ, std::min(0.99 * nearest, 1.4));
+    EXPECT_GE(camera->farZ, 1414);
+  }
+}
+
+TEST(View, AScenesOwnPlanesStayWhereNothingIsNearer) {
+  Mesh mesh = makeGround();
+  ViewOptions options{.eye = glm::vec3(0, 900, 1), .at = glm::vec3(0)};
+  std::vector<std::string> warnings;
+  auto fitted = makeCamera(options, mesh, warnings);
+  auto whole = makeCamera(options, boundingSphere(mesh));
+  ASSERT_TRUE(fitted && whole);
+  EXPECT_EQ(fitted->nearZ, whole->nearZ);
+  EXPECT_EQ(fitted->farZ, whole->farZ);
+  EXPECT_EQ(fitted->viewProjection, whole->viewProjection);
+}
+
+TEST(View, WhatPlanesCutIsSaid) {
+  ViewOptions options{.width = 320, .height = 240};
+  options.eye = {0, 0.5f, 0};
+  options.at = {5, 0, 0};
+  options.nearZ = 2;
+  options.farZ = 500;
+  std::vector<std::string> warnings;
+  auto camera = makeCamera(options, makeGround(), warnings);
+  ASSERT_TRUE(camera);
+  EXPECT_EQ(camera->nearZ, 2);
+  EXPECT_EQ(camera->farZ, 500);
+  ASSERT_EQ(warnings.size(), 2u);
+  EXPECT_TRUE(warnings[0].starts_with("the near plane, at a distance of 2, "));
+  EXPECT_TRUE(warnings[1].starts_with("the far plane, at a distance of 500, "));
+
+  // Nearer than depths as floats allow.
+  options.nearZ = options.farZ = {};
+  options.eye = {0, 1e-3f, 0};
+  warnings.clear();
+  camera = makeCamera(options, makeGround(), warnings);
+  ASSERT_TRUE(camera);
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_TRUE(warnings[0].starts_with("the near plane, at a distance of 0.01"));
+  EXPECT_NE(warnings[0].find("the nearest at 0.0024"), std::string::npos)
+      << warnings[0];
+}
+
+TEST(View, PatchesAreSeenAsTrianglesAre) {
+  Mesh mesh;
+  mesh.patches.resize(1);
+  for (int i = 0; i < 16; ++i)
+    mesh.patches[0].points[i] = {1000 * (i % 4 - 1.5f) / 1.5f, 0,
+                                 1000 * (i / 4 - 1.5f) / 1.5f};
+  ViewOptions options{.eye = glm::vec3(0, 0.5f, 0), .at = glm::vec3(5, 0, 0)};
+  std::vector<std::string> warnings;
+  auto camera = makeCamera(options, mesh, warnings);
+  ASSERT_TRUE(camera);
+  EXPECT_TRUE(warnings.empty());
+  EXPECT_LE(camera->nearZ, 0.98f);
+}
+
+TEST(View, PlanesThatAreNone) {
+  auto planes = [](std::optional<float> nearZ, std::optional<float> farZ) {
+    ViewOptions options;
+    options.nearZ = nearZ;
+    options.farZ = farZ;
+    auto camera = makeCamera(options, sphere);
+    return camera ? std::string() : camera.error().message;
+  };
+  EXPECT_EQ(planes(1, 2), "");
+  EXPECT_EQ(planes(100, {}), ""); // beyond all of it
+  EXPECT_TRUE(planes(0, 1).starts_with("expected a near plane at a distance"));
+  EXPECT_TRUE(planes(NAN, 1).starts_with("expected a near plane at a"));
+  EXPECT_TRUE(planes(2, 2).starts_with("expected a far plane beyond the near"));
+  EXPECT_TRUE(planes({}, 1).starts_with("expected a far plane beyond the"));
+  EXPECT_TRUE(planes(1e-9f, {}).starts_with("expected a near plane at 1e-05"));
+}
+
+TEST(View, FieldsOfViewThatFloatsDoNotResolve) {
+  ViewOptions options;
+  options.fovy = 1e-7f;
+  EXPECT_TRUE(makeCamera(options, sphere));
+  options.fovy = 1e-30f;
+  EXPECT_FALSE(makeCamera(options, sphere));
+}
+
 TEST(View, LooksStraightDown) {
   auto camera =
       makeCamera({.eye = glm::vec3(1, 50, 3), .at = sphere.center}, sphere);

@@ -52,6 +52,22 @@ TEST(RenderOptions, AllOfThem) {
   EXPECT_EQ(o->values[1], (std::pair<std::string, std::string>("text", "a=b")));
 }
 
+TEST(RenderOptions, PlanesOfDepth) {
+  auto o = parseOptions({"a.piko.cpp", "b.obj", "--near", "0.5", "--far", "3"});
+  ASSERT_TRUE(o) << o.error().message;
+  EXPECT_EQ(o->view.nearZ, 0.5f);
+  EXPECT_EQ(o->view.farZ, 3.0f);
+  for (const char *wrong : {"0", "-1", "1e-60", "1e60"})
+    for (const char *name : {"--near", "--far"})
+      EXPECT_EQ(errorOf({"a.piko.cpp", "b.obj", name, wrong}),
+                name + std::string(": expected a distance above 0 that a float "
+                                   "holds"));
+  EXPECT_EQ(errorOf({"a.piko.cpp", "b.obj", "--near", "nan"}),
+            "--near: expected a finite number");
+  EXPECT_EQ(errorOf({"a.piko.cpp", "b.obj", "--near", "2", "--far", "2"}),
+            "--far: expected a distance above that of --near");
+}
+
 TEST(RenderOptions, HelpNeedsNothingElse) {
   auto o = parseOptions({"--help"});
   ASSERT_TRUE(o);
