@@ -20,7 +20,7 @@ static constexpr size_t largestStack = size_t(1) << 30;
 static constexpr size_t smallestStack = size_t(16) << 20;
 
 static void *callOnThread(void *function) {
-  ArithmeticScope arithmetic;
+  detail::ArithmeticScope arithmetic;
   (*static_cast<llvm::function_ref<void()> *>(function))();
   return nullptr;
 }

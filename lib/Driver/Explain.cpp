@@ -28,7 +28,9 @@ namespace {
 /// What a run of the passes leaves behind.
 struct Trace {
   struct Remarks {
-    std::string pass, text;
+    std::string pass;
+    std::vector<std::string> texts = {}; ///< each once
+    llvm::StringSet<> known = {};
   };
   OwningOpRef<ModuleOp> ordered; ///< as it was behind piko-order-stages
   std::vector<Remarks> remarks;  ///< of the passes that made any, in order
@@ -117,9 +119,12 @@ static std::string describe(Location location) {
 }
 
 void Trace::add(Diagnostic &remark) {
-  if (remarks.empty() || remarks.back().pass != pass)
-    remarks.push_back({pass, ""});
-  llvm::raw_string_ostream text(remarks.back().text);
+  auto found = llvm::find_if(
+      remarks, [&](const Remarks &other) { return other.pass == pass; });
+  if (found == remarks.end())
+    found = remarks.insert(remarks.end(), Remarks{pass});
+  std::string lines;
+  llvm::raw_string_ostream text(lines);
   text << "    " << describe(remark.getLocation()) << remark << "\n";
   for (Diagnostic &note : remark.getNotes()) {
     text << "      ";
@@ -127,6 +132,8 @@ void Trace::add(Diagnostic &remark) {
       text << describe(note.getLocation());
     text << note << "\n";
   }
+  if (found->known.insert(lines).second)
+    found->texts.push_back(lines);
 }
 
 //===----------------------------------------------------------------------===//
@@ -480,8 +487,17 @@ void Report::write() {
   }
   if (!trace.remarks.empty())
     out << "\nWhat the passes did or refused:\n";
-  for (const Trace::Remarks &pass : trace.remarks)
-    out << "  " << pass.pass << "\n" << pass.text;
+  auto write = [&](bool areTests) {
+    for (const Trace::Remarks &pass : trace.remarks)
+      if ((pass.pass == "piko-prove-bounds") == areTests) {
+        out << "  " << pass.pass << "\n";
+        for (const std::string &text : pass.texts)
+          out << text;
+      }
+  };
+  // There are many, and none costs much.
+  write(/*areTests=*/false);
+  write(/*areTests=*/true);
 }
 
 FailureOr<std::string>

@@ -5,6 +5,7 @@
 #include "HeaderWriter.h"
 
 #include "RecordWriter.h"
+#include "StateMembers.h"
 
 #include "llvm/ADT/MapVector.h"
 #include "llvm/ADT/SetVector.h"
@@ -199,23 +200,23 @@ private:
   }
 
   std::string writeState() {
-    std::string members, constants, initializers;
+    std::vector<StatePiece> pieces;
+    for (mlir::Operation &op : pipeline.getOps())
+      if (mlir::FlatSymbolRefAttr record = getHostRecord(&op))
+        pieces.push_back(
+            {getCppName(&op).str(),
+             "piko::rt::" + getStateType(op, lookupRecord(&op, record)),
+             llvm::isa<ConstantOp>(op)});
     CppScope names;
     names.reserve("pikoBind_");
-    for (mlir::Operation &op : pipeline.getOps()) {
-      mlir::FlatSymbolRefAttr record = getHostRecord(&op);
-      if (!record)
-        continue;
-      std::string name = names.declare(makeIdentifier(getCppName(&op)));
+    std::string members, constants, initializers;
+    for (const StateMemberText &member : makeStateMembers(pieces, names)) {
       initializers +=
-          llvm::formatv("{0}{1}(in(\"{2}\"))",
-                        initializers.empty() ? "\n        : " : ",\n          ",
-                        name, getCppName(&op));
-      members +=
-          llvm::formatv("    piko::rt::{0} {1};\n",
-                        getStateType(op, lookupRecord(&op, record)), name);
-      if (llvm::isa<ConstantOp>(op))
-        constants += (constants.empty() ? "" : ", ") + name;
+          (initializers.empty() ? "\n        : " : ",\n          ") +
+          member.name + member.initializer;
+      members += member.declaration;
+      if (member.isConstant)
+        constants += (constants.empty() ? "" : ", ") + member.name;
     }
     std::string state = "  struct State {\n    explicit State(piko::rt::Member";
     state += initializers.empty() ? ")" : " in)" + initializers;

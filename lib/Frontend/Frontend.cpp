@@ -4,6 +4,7 @@
 #include "Piko/Frontend/Frontend.h"
 
 #include "Cleanup/Cleanup.h"
+#include "Import/Conflicts.h"
 #include "Import/ModuleBuilder.h"
 #include "Import/Wiring.h"
 #include "Parse/ClangInvocation.h"
@@ -71,6 +72,7 @@ struct PipelineFile::Unit {
     canonicalize(*module);
     if (failed(mlir::verify(*module)))
       return nullptr;
+    warnAboutConflicts(*module);
     return module;
   }
 

@@ -7,6 +7,7 @@
 #include "Parse/ClangDiagnostics.h"
 #include "Parse/ClangInvocation.h"
 #include "Parse/PrecompiledHeader.h"
+#include "Support/Shifts.h"
 #include "clang/CodeGen/CodeGenAction.h"
 #include "clang/Frontend/CompilerInstance.h"
 #include "clang/Lex/PreprocessorOptions.h"
@@ -88,7 +89,13 @@ public:
     clang::EmitLLVMOnlyAction action(&llvmContext);
     bool ok = compiler.ExecuteAction(action);
     forwarder.flush();
-    return ok ? action.takeModule() : nullptr;
+    if (!ok)
+      return nullptr;
+    std::unique_ptr<llvm::Module> module = action.takeModule();
+    // As in compiled pipelines, which these are the reference of.
+    for (llvm::Function &function : *module)
+      defineShifts(function);
+    return module;
   }
 
 private:

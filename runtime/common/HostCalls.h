@@ -13,7 +13,7 @@ namespace piko::rt {
 
 /// While a host's call lasts; then what is the thread's is as it was.
 struct CallScope {
-  ArithmeticScope arithmetic;
+  detail::ArithmeticScope arithmetic;
   DeviceScope device;
 };
 

@@ -9,6 +9,8 @@
 #include "Piko/Dialect/Piko/IR/PikoGPU.h"
 #include "Piko/Dialect/Piko/IR/PikoProgram.h"
 
+#include "llvm/ADT/StringExtras.h"
+
 using namespace mlir;
 using namespace piko;
 
@@ -20,6 +22,14 @@ static Location findPhase(Operation *work) {
     return WalkResult::interrupt();
   });
   return place;
+}
+
+/// PTX has no other characters: a pipeline may be in a namespace.
+static std::string makePTXName(std::string name) {
+  for (char &c : name)
+    if (!llvm::isAlnum(c) && c != '_' && c != '$')
+      c = '_';
+  return name;
 }
 
 /// The launch has a name for who runs it: its stage, and where that stands.
@@ -37,10 +47,10 @@ void GridFormer::createUnits(StageOp stage, IntegerAttr source) {
   CloseBinsOp::create(rewriter, loc, bins);
   rewriter.setInsertionPointToStart(ifAny.thenBlock());
   auto pipeline = kernel->getParentOfType<PipelineOp>();
-  auto symbol = [&](const Twine &suffix) {
-    return FlatSymbolRefAttr::get(rewriter.getContext(),
-                                  (pipeline.getSymName() + suffix).str());
+  auto symbol = [&](const std::string &name) {
+    return FlatSymbolRefAttr::get(rewriter.getContext(), name);
   };
+  std::string name = pipeline.getSymName().str();
   log = OpenLogOp::create(rewriter, loc, WriterType::get(rewriter.getContext()),
                           bins);
   auto origin = NameLoc::get(stage.getSymNameAttr(), findPhase(work));
@@ -49,7 +59,8 @@ void GridFormer::createUnits(StageOp stage, IntegerAttr source) {
       /*dynamicSharedMemorySize=*/Value(), /*asyncTokenType=*/Type(),
       /*asyncDependencies=*/ValueRange(), /*workgroupAttributions=*/TypeRange(),
       /*privateAttributions=*/TypeRange(), Value(), Value(), Value(),
-      symbol(kernelsSuffix), symbol("_" + kernel.getSymName()));
+      symbol(name + kernelsSuffix.str()),
+      symbol(makePTXName(name + "_" + kernel.getSymName().str())));
   CloseLogOp::create(rewriter, loc, log);
   rewriter.setInsertionPointToEnd(&launch.getBody().front());
   unitEnd = gpu::TerminatorOp::create(rewriter, loc);

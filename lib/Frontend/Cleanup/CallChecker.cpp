@@ -68,6 +68,9 @@ static llvm::StringRef getRemedy(llvm::StringRef callee) {
     add("; compare the character with the first and the last of its kind",
         {"tolower", "toupper", "isalnum", "isalpha", "isblank", "isdigit",
          "islower", "isprint", "ispunct", "isspace", "isupper", "isxdigit"});
+    add("; write its real and its imaginary part, for complex numbers recover "
+        "infinities from NaNs here",
+        {"__mulsc3", "__muldc3", "__divsc3", "__divdc3"});
     add("; compute it from functions of piko::",
         {"erf", "erff", "erfc", "erfcf", "tgamma", "tgammaf", "lgamma",
          "lgammaf", "expm1f", "log1pf", "acoshf", "asinhf", "atanhf"});

@@ -14,6 +14,7 @@
 #include "Import/MathCalls.h"
 #include "Parse/Wrappers.h"
 #include "Support/CallChain.h"
+#include "Support/Shifts.h"
 #include "mlir/IR/Diagnostics.h"
 #include "llvm/Analysis/CFG.h"
 #include "llvm/Analysis/LoopInfo.h"
@@ -415,6 +416,7 @@ bool piko::cleanUp(ParsedUnit &unit, MemoryMap &memory,
       function.setLinkage(llvm::GlobalValue::InternalLinkage);
     if (!function.isDeclaration())
       function.setComdat(nullptr);
+    defineShifts(function);
   }
   if (auto *constructors = module.getNamedGlobal("llvm.global_ctors"))
     constructors->eraseFromParent();

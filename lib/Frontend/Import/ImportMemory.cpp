@@ -179,7 +179,11 @@ const StateDescription *PhaseImporter::getState(llvm::CallInst *user,
                                                 llvm::Value *handle) {
   const StateDescription *state = memory.getState(handle);
   if (!state)
-    reject(user, "a buffer or image that is not a member of the state")
+    reject(user, memory.isChosenState(handle)
+                     ? "a buffer or image of an array whose index is not known "
+                       "when the pipeline is compiled; write one access for "
+                       "each, or take one image of one more dimension"
+                     : "a buffer or image that is not a member of the state")
         .failed();
   return state;
 }

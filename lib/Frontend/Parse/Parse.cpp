@@ -194,7 +194,7 @@ public:
     if (failed(refuseHidingMacros(preprocessor, compiler.getASTContext(),
                                   context)))
       return;
-    // Stages and phases may be private.
+    // Stages may be private.
     compiler.getLangOpts().AccessControl = false;
     std::string wrappers;
     ok = read(wrappers);

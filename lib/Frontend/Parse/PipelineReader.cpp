@@ -15,6 +15,7 @@
 #include "clang/AST/RecordLayout.h"
 #include "clang/Basic/SourceManager.h"
 #include "clang/Sema/Sema.h"
+#include "llvm/ADT/StringMap.h"
 
 using namespace piko;
 using clang::CXXRecordDecl;
@@ -94,6 +95,18 @@ bool piko::isStage(const CXXRecordDecl *type) {
   return willDeriveFrom(type, "BasicStage");
 }
 
+/// With namespaces and classes, but for those without a name.
+static std::string getQualifiedName(const clang::NamedDecl *decl) {
+  std::string name = decl->getNameAsString();
+  for (const clang::DeclContext *scope = decl->getDeclContext(); scope;
+       scope = scope->getParent()) {
+    const auto *outer = dyn_cast<clang::NamedDecl>(scope);
+    if (outer && !outer->getNameAsString().empty())
+      name = outer->getNameAsString() + "::" + name;
+  }
+  return name;
+}
+
 static void collectPipes(const clang::DeclContext *scope, clang::Sema &sema,
                          std::vector<PipeCandidate> &pipes) {
   clang::ASTContext &ast = sema.getASTContext();
@@ -126,10 +139,23 @@ static void collectPipes(const clang::DeclContext *scope, clang::Sema &sema,
         continue;
       type = record;
     }
+    const auto *named = dyn_cast<clang::NamedDecl>(decl);
     if (type && findPikoBase(type, "Pipe"))
-      pipes.push_back({llvm::cast<clang::NamedDecl>(decl)->getNameAsString(),
-                       type, decl->getLocation()});
+      pipes.push_back({named->getNameAsString(), getQualifiedName(named), type,
+                       decl->getLocation()});
+    if (type && type == decl)
+      collectPipes(type, sema, pipes);
   }
+}
+
+/// Tells those apart that have one name.
+static void qualifyNames(std::vector<PipeCandidate> &pipes) {
+  llvm::StringMap<unsigned> counts;
+  for (const PipeCandidate &pipe : pipes)
+    ++counts[pipe.name];
+  for (PipeCandidate &pipe : pipes)
+    if (counts[pipe.name] > 1)
+      pipe.name = pipe.qualifiedName;
 }
 
 /// Instantiates a class and what it, its bases and its members name as template
@@ -166,6 +192,7 @@ std::vector<PipeCandidate> piko::findPipes(clang::Sema &sema) {
   std::vector<PipeCandidate> pipes;
   clang::ASTContext &ast = sema.getASTContext();
   collectPipes(ast.getTranslationUnitDecl(), sema, pipes);
+  qualifyNames(pipes);
   llvm::SmallPtrSet<const clang::Type *, 32> visited;
   for (const PipeCandidate &pipe : pipes)
     instantiate(ast.getCanonicalTagType(pipe.type), pipe.location, sema,
@@ -182,20 +209,34 @@ piko::selectPipe(const std::vector<PipeCandidate> &pipes, llvm::StringRef name,
                        "piko::Pipe), but the file defines none";
     return failure();
   }
-  for (const PipeCandidate &pipe : pipes)
-    if (pipe.name == name || (name.empty() && pipes.size() == 1))
+  if (name.empty() && pipes.size() == 1)
+    return pipes.front();
+  // A name that several have is part of what each is called.
+  std::string inner = ("::" + name).str();
+  std::vector<const PipeCandidate *> meant;
+  for (const PipeCandidate &pipe : pipes) {
+    if (pipe.qualifiedName == name)
       return pipe;
+    if (!name.empty() && llvm::StringRef(pipe.qualifiedName).ends_with(inner))
+      meant.push_back(&pipe);
+  }
+  if (meant.size() == 1)
+    return *meant.front();
 
   mlir::InFlightDiagnostic diagnostic = emitError(file);
-  if (name.empty())
+  if (meant.size() > 1)
+    diagnostic << "expected the name of one pipeline, but '" << name
+               << "' is that of " << meant.size();
+  else if (name.empty())
     diagnostic << "expected the name of one of the file's " << pipes.size()
                << " pipelines";
   else
     diagnostic << "expected the name of a pipeline, but got '" << name << "'";
   for (const PipeCandidate &pipe : pipes)
-    diagnostic.attachNote(
-        convertLocation(pipe.location, ast.getSourceManager(), context))
-        << "pipeline '" << pipe.name << "' is defined here";
+    if (meant.empty() || llvm::is_contained(meant, &pipe))
+      diagnostic.attachNote(
+          convertLocation(pipe.location, ast.getSourceManager(), context))
+          << "pipeline '" << pipe.name << "' is defined here";
   return failure();
 }
 
@@ -239,6 +280,18 @@ LogicalResult PipelineReader::read(const PipeCandidate &pipe) {
       diagnostic << "expected the bins of stage '" << stage.name << "' to have "
                  << pipeline.rank << " dimensions, but they have "
                  << stage.bins.size();
+      diagnostic.attachNote(pipeline.stages.front().location)
+          << "stage '" << pipeline.stages.front().name << "' is declared here";
+      return diagnostic;
+    }
+  for (const StateDescription &state : pipeline.state)
+    if (state.kind == StateDescription::Image && state.rank != pipeline.rank) {
+      mlir::InFlightDiagnostic diagnostic = emitError(state.location);
+      diagnostic << "expected image '" << state.name << "' to have the "
+                 << pipeline.rank
+                 << " dimensions of the domain, which those of the bins are, "
+                    "but it has "
+                 << state.rank;
       diagnostic.attachNote(pipeline.stages.front().location)
           << "stage '" << pipeline.stages.front().name << "' is declared here";
       return diagnostic;
@@ -294,11 +347,98 @@ LogicalResult PipelineReader::readMembers(const CXXRecordDecl *decl,
   return success();
 }
 
+/// Whether a type is or holds images or buffers: its parts are pieces of state
+/// of their own.
+static bool holdsElements(QualType type, clang::ASTContext &ast) {
+  const CXXRecordDecl *record =
+      ast.getBaseElementType(type)->getAsCXXRecordDecl();
+  if (!record || !record->hasDefinition())
+    return false;
+  if (asPikoTemplate(record, "Buffer") || asPikoTemplate(record, "Image"))
+    return true;
+  record = record->getDefinition();
+  return llvm::any_of(record->bases(),
+                      [&](const clang::CXXBaseSpecifier &base) {
+                        return holdsElements(base.getType(), ast);
+                      }) ||
+         llvm::any_of(record->fields(), [&](const clang::FieldDecl *field) {
+           return holdsElements(field->getType(), ast);
+         });
+}
+
 LogicalResult PipelineReader::readMember(const clang::FieldDecl *member,
                                          int64_t offset, bool hasConstructor) {
-  StateDescription state{
-      member->getNameAsString(),    StateDescription::Constant, 0, 0, 0,
-      locate(member->getLocation())};
+  const auto *parent = llvm::cast<CXXRecordDecl>(member->getParent());
+  offset +=
+      ast.getASTRecordLayout(parent).getFieldOffset(member->getFieldIndex()) /
+      8;
+  std::string name = member->getNameAsString();
+  QualType type = member->getType();
+  if (holdsElements(type, ast))
+    return readElements(member, type, name, offset);
+
+  StateDescription state{name, StateDescription::Constant,   0, 0,
+                         0,    locate(member->getLocation())};
+  const CXXRecordDecl *single =
+      ast.getBaseElementType(type)->getAsCXXRecordDecl();
+  state.hasValue = hasConstructor || member->hasInClassInitializer() ||
+                   (single && single->hasDefinition() &&
+                    single->getDefinition()->hasNonTrivialDefaultConstructor());
+  state.offset = offset;
+  return addState(std::move(state), {member, type, hasConstructor});
+}
+
+/// Reads an image, a buffer, or an array or a class of them.
+LogicalResult PipelineReader::readElements(const clang::FieldDecl *member,
+                                           QualType type,
+                                           const std::string &name,
+                                           int64_t offset) {
+  if (const auto *array = ast.getAsConstantArrayType(type)) {
+    QualType element = array->getElementType();
+    int64_t size = ast.getTypeSizeInChars(element).getQuantity();
+    for (uint64_t i = 0; i < array->getZExtSize(); ++i)
+      if (failed(readElements(member, element,
+                              name + "[" + std::to_string(i) + "]",
+                              offset + int64_t(i) * size)))
+        return failure();
+    return success();
+  }
+  const CXXRecordDecl *record = type->getAsCXXRecordDecl()->getDefinition();
+  StateDescription state{name, StateDescription::Buffer,     0, 1,
+                         0,    locate(member->getLocation())};
+  state.offset = offset;
+  if (const Specialization *buffer = asPikoTemplate(record, "Buffer"))
+    return addState(std::move(state),
+                    {member, getTypeArgument(buffer, 0), false});
+  if (const Specialization *image = asPikoTemplate(record, "Image")) {
+    state.kind = StateDescription::Image;
+    state.rank = image->getTemplateArgs()[1].getAsIntegral().getSExtValue();
+    return addState(std::move(state),
+                    {member, getTypeArgument(image, 0), false});
+  }
+  const clang::ASTRecordLayout &layout = ast.getASTRecordLayout(record);
+  if (record->isUnion() || record->getNumBases() > 0)
+    return emitError(state.location)
+           << "not supported in Piko: a union or a class with bases that holds "
+              "images or buffers, as '"
+           << name << "' is";
+  for (const clang::FieldDecl *field : record->fields()) {
+    std::string part = name + "." + field->getNameAsString();
+    if (!holdsElements(field->getType(), ast))
+      return emitError(locate(field->getLocation()))
+             << "expected a class of images or buffers to hold nothing else; "
+                "put '"
+             << part << "' into the state itself";
+    if (failed(readElements(
+            field, field->getType(), part,
+            offset + layout.getFieldOffset(field->getFieldIndex()) / 8)))
+      return failure();
+  }
+  return success();
+}
+
+LogicalResult PipelineReader::addState(StateDescription state,
+                                       const StateMember &member) {
   for (const StateDescription &other : pipeline.state)
     if (other.name == state.name) {
       mlir::InFlightDiagnostic diagnostic = emitError(state.location);
@@ -309,36 +449,13 @@ LogicalResult PipelineReader::readMember(const clang::FieldDecl *member,
       diagnostic.attachNote(other.location) << "the other one is here";
       return diagnostic;
     }
-  QualType element = member->getType();
-  const CXXRecordDecl *memberType = element->getAsCXXRecordDecl();
-  if (const Specialization *buffer = asPikoTemplate(memberType, "Buffer")) {
-    state.kind = StateDescription::Buffer;
-    state.rank = 1;
-    element = getTypeArgument(buffer, 0);
-  } else if (const Specialization *image =
-                 asPikoTemplate(memberType, "Image")) {
-    state.kind = StateDescription::Image;
-    state.rank = image->getTemplateArgs()[1].getAsIntegral().getSExtValue();
-    element = getTypeArgument(image, 0);
-  } else {
-    const CXXRecordDecl *single =
-        ast.getBaseElementType(element)->getAsCXXRecordDecl();
-    state.hasValue =
-        hasConstructor || member->hasInClassInitializer() ||
-        (single && single->hasDefinition() &&
-         single->getDefinition()->hasNonTrivialDefaultConstructor());
-  }
-  const auto *parent = llvm::cast<CXXRecordDecl>(member->getParent());
-  state.offset = offset + ast.getASTRecordLayout(parent).getFieldOffset(
-                              member->getFieldIndex()) /
-                              8;
   llvm::FailureOr<unsigned> record =
-      records.get(element, state.location, state.name);
+      records.get(member.type, state.location, state.name);
   if (failed(record))
     return failure();
   state.record = *record;
   pipeline.state.push_back(std::move(state));
-  stateMembers.push_back({member, element, hasConstructor});
+  stateMembers.push_back(member);
   return success();
 }
 
@@ -445,6 +562,19 @@ LogicalResult PipelineReader::checkParameter(const clang::NamedDecl *phase,
          << " &)";
 }
 
+/// Expects a phase that the reference executor may call, too.
+LogicalResult PipelineReader::checkAccess(const clang::NamedDecl *phase,
+                                          const StageDescription &stage) {
+  if (phase->getAccess() == clang::AS_public ||
+      phase->getAccess() == clang::AS_none)
+    return success();
+  std::string name = phase->getNameAsString();
+  return emitError(locate(phase->getLocation()))
+         << "expected phase '" << name << "' of stage '" << stage.name
+         << "' to be public, because the executor calls it; write 'public:' in "
+            "front of it";
+}
+
 LogicalResult PipelineReader::readPhases(const CXXRecordDecl *type,
                                          QualType input,
                                          StageDescription &stage) {
@@ -474,6 +604,9 @@ LogicalResult PipelineReader::readPhases(const CXXRecordDecl *type,
   if (stage.hasAssign && failed(checkParameter(assign, input)))
     return failure();
   stage.hasSchedule = declares(type, "schedule", schedule);
+  for (const clang::NamedDecl *phase : {process, assign, schedule})
+    if (phase && failed(checkAccess(phase, stage)))
+      return failure();
   if (!stage.hasAssign && !stage.isWholeDomain()) {
     mlir::InFlightDiagnostic diagnostic = emitError(where);
     diagnostic << "expected stage '" << stage.name

@@ -13,9 +13,11 @@ class Sema;
 
 namespace piko {
 
-/// A pipeline type and the name by which the user knows it.
+/// A pipeline type and the name by which the user knows it: without the
+/// namespaces and classes that it is in, unless others have the same name.
 struct PipeCandidate {
   std::string name;
+  std::string qualifiedName;
   const clang::CXXRecordDecl *type;
   clang::SourceLocation location;
 };
@@ -60,6 +62,11 @@ private:
                                   int64_t offset, bool hasConstructor);
   llvm::LogicalResult readMember(const clang::FieldDecl *member, int64_t offset,
                                  bool hasConstructor);
+  llvm::LogicalResult readElements(const clang::FieldDecl *member,
+                                   clang::QualType type,
+                                   const std::string &name, int64_t offset);
+  llvm::LogicalResult addState(StateDescription state,
+                               const StateMember &member);
   llvm::LogicalResult readStage(const clang::FieldDecl *member);
   llvm::LogicalResult
   readTemplate(const clang::ClassTemplateSpecializationDecl *base,
@@ -67,6 +74,8 @@ private:
   llvm::LogicalResult readPhases(const clang::CXXRecordDecl *type,
                                  clang::QualType input,
                                  StageDescription &stage);
+  llvm::LogicalResult checkAccess(const clang::NamedDecl *phase,
+                                  const StageDescription &stage);
   llvm::LogicalResult checkParameter(const clang::NamedDecl *phase,
                                      clang::QualType input);
   mlir::Location locate(clang::SourceLocation location) const;

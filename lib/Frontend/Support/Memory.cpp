@@ -394,6 +394,12 @@ const MemoryLayout *MemoryMap::getLayout(const llvm::Value *base) {
   }
 }
 
+bool MemoryMap::isChosenState(llvm::Value *handle) const {
+  Address address = getAddress(handle, data);
+  const Marker *marker = getBaseMarker(address.base);
+  return marker && marker->kind == MarkerKind::state && !address.terms.empty();
+}
+
 const StateDescription *MemoryMap::getState(llvm::Value *handle) const {
   Address address = getAddress(handle, data);
   const Marker *marker = getBaseMarker(address.base);

@@ -129,6 +129,8 @@ public:
 
   /// The piece of state at an address that markers give, or null.
   const StateDescription *getState(llvm::Value *handle) const;
+  /// Whether an index that is not known chooses it.
+  bool isChosenState(llvm::Value *handle) const;
   /// For leaves of the state's layout: which constant's field it is.
   std::pair<unsigned, unsigned> getConstantField(unsigned leaf) const {
     return constantFields[leaf];

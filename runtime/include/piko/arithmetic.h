@@ -5,7 +5,7 @@
 
 #include <cfenv>
 
-namespace piko {
+namespace piko::detail {
 
 /// The floating-point environment that the language assumes: round to nearest,
 /// subnormal numbers, no traps. The thread's own is as it was, its flags too,
@@ -24,6 +24,6 @@ private:
   std::fenv_t before;
 };
 
-} // namespace piko
+} // namespace piko::detail
 
 #endif // PIKO_ARITHMETIC_H

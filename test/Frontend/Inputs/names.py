@@ -37,7 +37,7 @@ OTHERS = """
     FPE_INTDIV FP_CONTRACT INT32_MAX INT32_MIN INT64_MAX INT64_MIN UINT32_MAX
     MADV_NOHUGEPAGE MAP_ANONYMOUS MAP_FAILED MAP_NORESERVE MAP_PRIVATE MAP_STACK
     PROT_READ PROT_WRITE SA_NODEFER SA_SIGINFO SIGFPE SIG_UNBLOCK sa_sigaction
-    sigaction siginfo_t sigjmp_buf sigsetjmp ucontext_t va_list"""
+    sigaction siginfo_t sigjmp_buf sigsetjmp ucontext_t va_list FE_DFL_ENV"""
 KEYWORDS = """
     __PIKO__ alignas alignof and auto bool break case catch char class concept const
     consteval constexpr const_cast continue decltype default define defined

@@ -15,6 +15,11 @@ namespace piko {
 
 namespace detail {
 
+/// What iterations may be: a call that does not fit is an error where it
+/// stands.
+template <class F, class Argument>
+concept Iteration = requires(F &f, Argument a) { f(a); };
+
 /// A function of its own: what f declares belongs to the iteration.
 template <class F> void iterate(F &f, int i) { f(i); }
 
@@ -236,18 +241,19 @@ protected:
   }
 
   /// Calls f(0), ..., f(n - 1), which are independent of one another.
-  template <class F> void parallelFor(int64_t n, F &&f) {
+  template <detail::Iteration<int> F> void parallelFor(int64_t n, F &&f) {
     for (int32_t i = marker::loopFirst(); marker::loopMore(i, n, 0);
          i = marker::loopNext(i))
       detail::iterate(f, i);
   }
   /// Calls f(cell) for each cell of the current bin, x fastest.
-  template <class F> void parallelForPixels(F &&f) {
+  template <detail::Iteration<Cells<B::rank> &> F>
+  void parallelForPixels(F &&f) {
     detail::iterateCells<B::rank>(binLo(), binHi(), f);
   }
   /// The same for the cells of the closed box from lo to hi that lie in the
   /// bin.
-  template <class F>
+  template <detail::Iteration<Cells<B::rank> &> F>
   void parallelForPixels(const Cells<B::rank> &lo, const Cells<B::rank> &hi,
                          F &&f) {
     Cells<B::rank> begin = binLo(), end = binHi();

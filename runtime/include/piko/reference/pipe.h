@@ -361,7 +361,7 @@ Pipeline::stageOrder(const std::vector<Component> &components) const {
 }
 
 inline void Pipeline::run() {
-  ArithmeticScope arithmetic;
+  detail::ArithmeticScope arithmetic;
   checkArithmetic();
   checkGraph();
   struct Running {
