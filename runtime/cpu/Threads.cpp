@@ -70,24 +70,28 @@ public:
   SoundSettings() {
     for (char **setting = environ; setting && *setting; ++setting)
       if (isSoundSetting(*setting))
-        kept->push_back(*setting);
+        kept().push_back(*setting);
       else
         hides = true;
-    kept->push_back(nullptr);
+    kept().push_back(nullptr);
     if (hides)
-      environ = kept->data();
+      environ = kept().data();
   }
   SoundSettings(const SoundSettings &) = delete;
   SoundSettings &operator=(const SoundSettings &) = delete;
   ~SoundSettings() {
-    if (hides && environ == kept->data())
+    if (hides && environ == kept().data())
       environ = before;
   }
 
 private:
-  char **before = environ;
   /// Never freed: another thread may be reading it.
-  std::vector<char *> *kept = new std::vector<char *>;
+  static std::vector<char *> &kept() {
+    static auto *settings = new std::vector<char *>;
+    return *settings;
+  }
+
+  char **before = environ;
   bool hides = false;
 };
 
