@@ -42,6 +42,9 @@ public:
   virtual int32_t number() const = 0;
   /// Throws Failure if the device is lost: then what map() gave may be gone.
   virtual void checkAlive() const = 0;
+  /// Throws Failure if the device takes the program's kernels not. Otherwise
+  /// their first launch does.
+  virtual void loadKernels() = 0;
 
   /// Memory of the host's that kernels reach, aligned to a page; null if
   /// refused.

@@ -21,45 +21,72 @@ int32_t pikort_create(const pikort_program *program,
   return pikort_create_on(program, PIKORT_ANY_DEVICE, pipeline);
 }
 
-int32_t pikort_create_on(const pikort_program *program, int32_t device,
-                         pikort_pipeline **pipeline) {
-  if (!program || !pipeline)
-    return PIKORT_INVALID_ARGUMENT;
-  *pipeline = nullptr;
+} // extern "C"
+
+/// Makes a pipeline where the host says; null if there is no memory for one.
+static pikort_pipeline *create(const pikort_program &program,
+                               int32_t device) noexcept {
   pikort_pipeline *p;
   try {
-    p = *pipeline = new pikort_pipeline;
+    p = new pikort_pipeline;
   } catch (...) {
-    return PIKORT_OUT_OF_MEMORY;
+    return nullptr;
   }
-  CallScope scope;
   guarded(p, "pipeline", [&] {
-    p->name = program->name ? program->name : "";
+    p->name = program.name ? program.name : "";
     if (device < PIKORT_PROCESSOR)
       invalid("pipeline " + quoted(p->name) +
               ": expected a device's number, but got " +
               std::to_string(device));
     p->device = device;
-    if (program->abi_version != PIKORT_ABI_VERSION)
+    if (program.abi_version != PIKORT_ABI_VERSION)
       throw Failure{PIKORT_VERSION,
                     "pipeline " + quoted(p->name) +
                         ": expected a program for runtime version " +
                         std::to_string(PIKORT_ABI_VERSION) + ", but got " +
-                        std::to_string(program->abi_version)};
-    if (!program->setup || !program->run)
+                        std::to_string(program.abi_version)};
+    if (!program.setup || !program.run)
       throw Failure{PIKORT_BAD_PROGRAM, "pipeline " + quoted(p->name) +
                                             ": expected a program with setup "
                                             "and run"};
-    p->runProgram = program->run;
-    program->setup(p);
+    p->runProgram = program.run;
+    program.setup(p);
     if (p->status != PIKORT_OK)
       return; // setup noted why
     p->finish();
     p->executor->prepare();
+    // What may be elsewhere has to know now.
+    if (p->accelerator && device == PIKORT_ANY_DEVICE)
+      p->accelerator->loadKernels();
     p->readMappingSetting();
     p->ready = true;
   });
-  return p->status.load();
+  return p;
+}
+
+extern "C" {
+
+int32_t pikort_create_on(const pikort_program *program, int32_t device,
+                         pikort_pipeline **pipeline) {
+  if (!program || !pipeline)
+    return PIKORT_INVALID_ARGUMENT;
+  CallScope scope;
+  *pipeline = create(*program, device);
+  if (!*pipeline)
+    return PIKORT_OUT_OF_MEMORY;
+  bool mayBeElsewhere = device == PIKORT_ANY_DEVICE &&
+                        (*pipeline)->status == PIKORT_DEVICE_FAILED;
+  if (!mayBeElsewhere)
+    return (*pipeline)->status;
+  // Of a program for a device alone the first error is the one to know.
+  pikort_pipeline *other = create(*program, PIKORT_PROCESSOR);
+  if (!other || other->status != PIKORT_OK) {
+    delete other;
+    return (*pipeline)->status;
+  }
+  std::swap(other->deviceRefusal, (*pipeline)->message);
+  delete std::exchange(*pipeline, other);
+  return PIKORT_OK;
 }
 
 void pikort_destroy(pikort_pipeline *pipeline) {
@@ -77,6 +104,10 @@ const char *pikort_message(const pikort_pipeline *pipeline) {
 
 const char *pikort_name(const pikort_pipeline *pipeline) {
   return pipeline ? pipeline->name.c_str() : "";
+}
+
+const char *pikort_device_refusal(const pikort_pipeline *pipeline) {
+  return pipeline ? pipeline->deviceRefusal.c_str() : "";
 }
 
 int32_t pikort_device(const pikort_pipeline *pipeline) {

@@ -330,6 +330,7 @@ struct pikort_pipeline {
   int64_t runs = 0;
   int64_t captureRuns = 0; ///< That began while $PIKO_CAPTURE was set.
 
+  std::string deviceRefusal; ///< Why it is on the processor, if that is news.
   std::string message;
   std::atomic<int32_t> status{0};
   std::atomic<int32_t> reported{0}; ///< Some error that report() noted.

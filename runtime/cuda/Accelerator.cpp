@@ -276,6 +276,11 @@ void Accelerator::launch(const GridLaunch &grid, CUstream stream) {
                    "running " + moduleOf(grid.kernel).describe(grid.kernel));
 }
 
+void Accelerator::loadKernels() {
+  device_->check(device_->enter(), "entering its context");
+  module_.require();
+}
+
 void Accelerator::load(std::span<const Step> steps) {
   device_->check(device_->enter(), "entering its context");
   for (const Step &step : steps)

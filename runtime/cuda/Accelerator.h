@@ -74,6 +74,7 @@ public:
   /// Memory of the host in which joins say how far a submission is; throws.
   int64_t *progress();
 
+  void loadKernels() override;
   /// Of a kernel, for messages.
   void name(const char *kernel, const char *stage, const char *place) {
     module_.name(kernel, stage, place);

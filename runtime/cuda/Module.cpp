@@ -83,8 +83,7 @@ void Module::loadPTX(const void *ptx) {
 }
 
 CUfunction Module::find(const std::string &kernel) {
-  if (!handle_)
-    load();
+  require();
   auto found = functions_.find(kernel);
   if (found != functions_.end())
     return found->second;

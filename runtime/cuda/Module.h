@@ -25,6 +25,11 @@ public:
   /// A kernel by its name, of the latest cubin that fits the device, or else of
   /// the PTX; throws Failure. The device must be entered.
   CUfunction find(const std::string &kernel);
+  /// Loads the kernels where they are not yet; throws.
+  void require() {
+    if (!handle_)
+      load();
+  }
   /// "kernel 'k' of stage 's' (file:line)"
   std::string describe(const std::string &kernel) const;
   /// The device must be entered.

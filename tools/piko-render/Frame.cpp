@@ -91,6 +91,9 @@ Result<std::string> render::createPipeline(const Options &options,
   int32_t code = pikort_create(&program, &owner.pipeline);
   pikort_pipeline *pipeline = owner.pipeline;
   int64_t extent[] = {scene.size.x, scene.size.y};
+  if (const char *refusal = pikort_device_refusal(pipeline); *refusal)
+    std::fprintf(stderr, "piko-render: warning: %s; runs on the processor\n",
+                 refusal);
   if (code != PIKORT_OK ||
       (!scene.capture && pikort_set_domain(pipeline, 2, extent) != PIKORT_OK) ||
       !setOptions(options, pipeline))

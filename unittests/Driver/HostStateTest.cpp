@@ -28,6 +28,7 @@
 #include <sched.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
+#include <sys/wait.h>
 #include <ucontext.h>
 #include <unistd.h>
 #if defined(__x86_64__)
@@ -426,6 +427,35 @@ TEST_F(HostState, Fibers) {
   fiber.run();
   EXPECT_TRUE(inFiber == expected);
   EXPECT_TRUE(twice == expected);
+}
+#endif
+
+// --- Processes --------------------------------------------------------------
+
+// A sanitizer's runtime has threads of its own, which a child lacks.
+#ifndef PIKO_SANITIZED
+TEST_F(HostState, Fork) {
+  auto program = load();
+  Outcome expected = runNumbers(*program);
+  std::vector<pid_t> children;
+  for (int i = 0; i < 8; ++i) {
+    pid_t child = fork();
+    ASSERT_GE(child, 0);
+    if (child == 0) {
+      bool same = runNumbers(*program) == expected;
+      options.cache.directory = folder / ("child" + std::to_string(i % 2));
+      auto again = ::load(options, diagnostics);
+      same = same && again && runNumbers(*again) == expected;
+      std::_Exit(same ? 0 : 1);
+    }
+    children.push_back(child);
+  }
+  EXPECT_TRUE(runNumbers(*program) == expected);
+  for (pid_t child : children) {
+    int status = -1;
+    waitpid(child, &status, 0);
+    EXPECT_EQ(status, 0);
+  }
 }
 #endif
 

@@ -88,7 +88,8 @@ PIKORT_API int32_t pikort_create(const pikort_program *program,
 /// from 0, or one of these.
 enum {
   PIKORT_ANY_DEVICE = -1, ///< $PIKO_CUDA_DEVICE or 0; the processor, if the
-                          ///< program has code for it and there is no device.
+                          ///< program has code for it and there is no device,
+                          ///< or that one cannot take the kernels.
   PIKORT_PROCESSOR = -2   ///< None: the program's code for the processor.
 };
 /// The same on a device. It is no error if the program has code for the
@@ -107,6 +108,11 @@ PIKORT_API const char *pikort_processor(const pikort_pipeline *pipeline);
 /// The number of the device that runs the pipeline's grids, or
 /// PIKORT_PROCESSOR.
 PIKORT_API int32_t pikort_device(const pikort_pipeline *pipeline);
+
+/// Why a pipeline that might be on any device is on the processor although there
+/// is one: what the device's driver said of the kernels, for example that their
+/// PTX is newer than it knows. "" otherwise.
+PIKORT_API const char *pikort_device_refusal(const pikort_pipeline *pipeline);
 
 // --- Devices ----------------------------------------------------------------
 
