@@ -7,6 +7,7 @@
 
 #include <fstream>
 #include <iterator>
+#include <limits>
 #include <string_view>
 
 #include <sys/mman.h>
@@ -104,8 +105,35 @@ Result<std::string> encode(const std::string &extension, int width, int height,
   return file.read();
 }
 
+/// Integers over the largest one, so that equal parts of it are equal numbers
+/// whatever their width is: the library multiplies by a rounded reciprocal.
+template <class Integer>
+bool readIntegers(OIIO::ImageInput &input, OIIO::TypeDesc type,
+                  std::vector<float> &values) {
+  std::vector<Integer> integers(values.size());
+  if (!input.read_image(0, 0, 0, input.spec().nchannels, type, integers.data()))
+    return false;
+  for (size_t i = 0; i < values.size(); ++i)
+    values[i] = float(integers[i]) / float(std::numeric_limits<Integer>::max());
+  return true;
+}
+
+bool readValues(OIIO::ImageInput &input, std::vector<float> &values) {
+  OIIO::TypeDesc type = input.spec().format;
+  if (type == OIIO::TypeDesc::UINT8)
+    return readIntegers<uint8_t>(input, type, values);
+  if (type == OIIO::TypeDesc::UINT16)
+    return readIntegers<uint16_t>(input, type, values);
+  return input.read_image(0, 0, 0, input.spec().nchannels,
+                          OIIO::TypeDesc::FLOAT, values.data());
+}
+
 Result<Image> read(const std::string &path) {
-  auto input = OIIO::ImageInput::open(path);
+  // Colours as the file has them, also beside alpha: what the library would
+  // make of them depends on its version.
+  OIIO::ImageSpec asStored;
+  asStored.attribute("oiio:UnassociatedAlpha", 1);
+  auto input = OIIO::ImageInput::open(path, &asStored);
   if (!input)
     return Error{OIIO::geterror()};
   const OIIO::ImageSpec &spec = input->spec();
@@ -115,8 +143,7 @@ Result<Image> read(const std::string &path) {
       int64_t(spec.width) * spec.height > mostPixels)
     return Error{"expected a picture of up to 2^30 pixels"};
   std::vector<float> values(size_t(spec.width) * spec.height * channels);
-  if (!input->read_image(0, 0, 0, channels, OIIO::TypeDesc::FLOAT,
-                         values.data()))
+  if (!readValues(*input, values))
     return Error{input->geterror()};
   Image image{spec.width, spec.height, {}};
   image.pixels.resize(size_t(spec.width) * spec.height);

@@ -20,7 +20,8 @@ static const char *const usage =
 Measures how far an image is from another one, in r, g and b as a display shows
 them: the largest, the mean and the root mean square absolute difference, the
 99th percentile of pixels, PSNR in dB, and the mean of FLIP, which predicts what
-an observer notices. Black to white is 1.
+an observer notices. Black to white is 1. Colours are taken as the files have
+them; alpha is not compared.
 
   --map FILE             write FLIP of each pixel, from black (equal) by red and
                          yellow to white

@@ -98,6 +98,44 @@ TEST_F(ImageFile, ExrHoldsFloatsAndAlpha) {
 }
 
 /// Seconds apart, so that a date would show.
+/// Writes pixels of r, g, b and alpha as a PNG.
+template <class Integer>
+void writePNG(const std::string &path, OIIO::TypeDesc type,
+              const std::vector<Integer> &values) {
+  auto output = OIIO::ImageOutput::create(path);
+  ASSERT_TRUE(output);
+  OIIO::ImageSpec spec(int(values.size() / 4), 1, 4, type);
+  spec.attribute("oiio:UnassociatedAlpha", 1);
+  ASSERT_TRUE(output->open(path, spec));
+  ASSERT_TRUE(output->write_image(type, values.data()));
+  ASSERT_TRUE(output->close());
+}
+
+TEST_F(ImageFile, ColoursAreReadAsStoredWhateverAlphaIs) {
+  writePNG<uint8_t>(pathOf("a.png"), OIIO::TypeDesc::UINT8,
+                    {255, 128, 0, 51, 10, 20, 30, 0});
+  auto image = readImage(pathOf("a.png"));
+  ASSERT_TRUE(image) << image.error().message;
+  EXPECT_EQ(image->pixels[0].rgba, glm::vec4(1, 128 / 255.0f, 0, 51 / 255.0f));
+  EXPECT_EQ(image->pixels[1].rgba,
+            glm::vec4(10 / 255.0f, 20 / 255.0f, 30 / 255.0f, 0));
+}
+
+TEST_F(ImageFile, EightAndSixteenBitsOfOneColourAreEqual) {
+  std::vector<uint8_t> bytes;
+  std::vector<uint16_t> words;
+  for (int i = 0; i < 1024; ++i) {
+    bytes.push_back(uint8_t(i % 4 == 3 ? 255 : i / 4));
+    words.push_back(uint16_t(bytes.back() * 257));
+  }
+  writePNG(pathOf("a.png"), OIIO::TypeDesc::UINT8, bytes);
+  writePNG(pathOf("b.png"), OIIO::TypeDesc::UINT16, words);
+  auto a = readImage(pathOf("a.png")), b = readImage(pathOf("b.png"));
+  ASSERT_TRUE(a && b);
+  for (size_t i = 0; i < a->pixels.size(); ++i)
+    EXPECT_EQ(a->pixels[i].rgba, b->pixels[i].rgba) << i;
+}
+
 TEST_F(ImageFile, EqualPicturesAreEqualFiles) {
   auto contentOf = [&](const std::string &name) {
     EXPECT_TRUE(writeImage(pathOf(name), width, height, pixels)) << name;
