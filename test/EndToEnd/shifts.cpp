@@ -36,15 +36,10 @@ struct Variable : piko::Stage<0, 0, 64, In>, piko::Uses<State> {
   void process(const In &in) {
     uint8_t byte = uint8_t(in.u);
     byte <<= in.by;
-    state().out[in.serial & 63] = {in.u << in.by,
-                                   in.u >> in.by,
-                                   in.i << in.by,
-                                   in.i >> in.by,
-                                   in.l << in.by,
-                                   in.l >> in.by,
-                                   in.v >> in.u,
-                                   byte,
-                                   glm::ivec2(in.i, in.by) << in.by};
+    state().out[in.serial & 63] = {
+        in.u << in.by, in.u >> in.by, in.i << in.by,
+        in.i >> in.by, in.l << in.by, in.l >> in.by,
+        in.v >> in.u,  byte,          glm::ivec2(in.i, in.by) << in.by};
   }
 };
 struct Shifts : piko::Pipe<State> {

@@ -17,13 +17,13 @@ struct Put : piko::Stage<8, 8, 64, int>, piko::Uses<State> {
   void process(const int &i) {
 #if WRONG == 1
     // PIXELS: errors-iterations.cpp:[[#@LINE + 1]]:5: error: no matching member function for call to 'parallelForPixels'
-    parallelForPixels([&](glm::ivec2, int) {});
+    parallelForPixels([&](glm::ivec2, int){});
 #elif WRONG == 2
     // BOX: errors-iterations.cpp:[[#@LINE + 1]]:5: error: no matching member function for call to 'parallelForPixels'
-    parallelForPixels(binLo(), binHi(), [&](glm::ivec3) {});
+    parallelForPixels(binLo(), binHi(), [&](glm::ivec3){});
 #elif WRONG == 3
     // FOR: errors-iterations.cpp:[[#@LINE + 1]]:5: error: no matching member function for call to 'parallelFor'
-    parallelFor(8, [&]() {});
+    parallelFor(8, [&](){});
 #else
     std::complex<float> z(float(i), 1);
     // COMPLEX: errors-iterations.cpp:[[#@LINE + 1]]:7: error: not supported in Piko: a call of '__mulsc3', which has no body in this file, in a call of 'std::complex::operator*='; write its real and its imaginary part, for complex numbers recover infinities from NaNs here

@@ -30,8 +30,7 @@ struct Surface {
 struct MixedState {
   Surface surface;
 };
-template <class S>
-struct Nothing : piko::Stage<0, 0, 64, int>, piko::Uses<S> {
+template <class S> struct Nothing : piko::Stage<0, 0, 64, int>, piko::Uses<S> {
   void process(const int &) {}
 };
 struct Mixed : piko::Pipe<MixedState> {

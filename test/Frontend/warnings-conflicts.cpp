@@ -51,9 +51,9 @@ struct Races : piko::Pipe<State> {
 struct One : piko::Stage<0, 0, 64, int, int>, piko::Uses<State> {
   void process(const int &i) {
     state().sum[i] = i;
-    state().sum[0] = 1;                    // the same from each
+    state().sum[0] = 1; // the same from each
     if (i == 7)
-      state().sum[1] = i;                  // one of them
+      state().sum[1] = i; // one of them
     piko::atomicAdd(state().sum[2], i);
     parallelFor(4, [&](int k) { state().last[4 * i + k] = float(k); });
     emit(i);

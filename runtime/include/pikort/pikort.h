@@ -109,9 +109,9 @@ PIKORT_API const char *pikort_processor(const pikort_pipeline *pipeline);
 /// PIKORT_PROCESSOR.
 PIKORT_API int32_t pikort_device(const pikort_pipeline *pipeline);
 
-/// Why a pipeline that might be on any device is on the processor although there
-/// is one: what the device's driver said of the kernels, for example that their
-/// PTX is newer than it knows. "" otherwise.
+/// Why a pipeline that might be on any device is on the processor although
+/// there is one: what the device's driver said of the kernels, for example that
+/// their PTX is newer than it knows. "" otherwise.
 PIKORT_API const char *pikort_device_refusal(const pikort_pipeline *pipeline);
 
 // --- Devices ----------------------------------------------------------------
