@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Stack enough for compilers, and hosts that live on where they fail.
+
 #include "Piko/Driver/DeepStack.h"
 
+#include "Piko/Support/ThreadTrial.h"
 #include "piko/arithmetic.h"
 
 #include "llvm/Support/ErrorHandling.h"
@@ -11,7 +15,6 @@
 #include <csetjmp>
 #include <mutex>
 #include <system_error>
-#include <vector>
 
 #include <pthread.h>
 #include <signal.h>
@@ -136,23 +139,7 @@ piko::runContained(llvm::function_ref<void()> function) {
 
 // --- Threads ----------------------------------------------------------------
 
-static void *waitAtGate(void *gate) {
-  std::lock_guard lock(*static_cast<std::mutex *>(gate));
-  return nullptr;
-}
-
 bool piko::canUseThreads() {
   unsigned wanted = llvm::hardware_concurrency().compute_thread_count();
-  std::mutex gate;
-  std::vector<pthread_t> threads;
-  {
-    std::lock_guard closed(gate);
-    for (pthread_t thread;
-         threads.size() < wanted &&
-         pthread_create(&thread, nullptr, waitAtGate, &gate) == 0;)
-      threads.push_back(thread);
-  }
-  for (pthread_t thread : threads)
-    pthread_join(thread, nullptr);
-  return threads.size() == wanted;
+  return support::tryThreads(wanted) == wanted;
 }

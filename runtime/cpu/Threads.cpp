@@ -3,6 +3,7 @@
 
 #include "cpu/Threads.h"
 
+#include "Piko/Support/ThreadTrial.h"
 #include "pikort/pikort.h"
 
 #include <algorithm>
@@ -13,13 +14,12 @@
 #include <limits>
 #include <mutex>
 #include <omp.h>
-#include <pthread.h>
 #include <sched.h>
-#include <semaphore.h>
 #include <string_view>
 #include <unistd.h>
 #include <vector>
 
+using namespace piko;
 using namespace piko::rt;
 
 // --- Settings ---------------------------------------------------------------
@@ -235,80 +235,71 @@ int32_t piko::rt::defaultThreads() {
 
 namespace {
 
-/// Threads that wait until as many as there can be are there.
-class Trial {
-public:
-  Trial() {
-    sem_init(&began, 0, 0);
-    gate.lock();
-  }
-  Trial(const Trial &) = delete;
-  Trial &operator=(const Trial &) = delete;
-  ~Trial() {
-    gate.unlock();
-    for (pthread_t thread : threads)
-      pthread_join(thread, nullptr);
-    sem_destroy(&began);
-  }
+/// Threads of the process in teams of the OpenMP library, which keeps those of
+/// a team that is gone for the next one.
+struct Teams {
+  std::mutex mutex;
+  int32_t taken = 0, made = 0;
+  pid_t process = getpid();
+};
 
-  int32_t begin(int32_t wanted, const pthread_attr_t &attributes) {
-    threads.reserve(static_cast<size_t>(wanted));
-    for (pthread_t thread;
-         threads.size() < static_cast<size_t>(wanted) &&
-         pthread_create(&thread, &attributes, wait, this) == 0;) {
-      threads.push_back(thread);
-      while (sem_wait(&began) != 0)
-        ; // interrupted
-    }
-    return static_cast<int32_t>(threads.size());
-  }
+/// The team of a thread that runs pipelines.
+struct Team {
+  int32_t tried = 1, given = 1;
 
-private:
-  static void *wait(void *self) {
-    auto &trial = *static_cast<Trial *>(self);
-    // The first allocation of a thread takes addresses, too, which the
-    // allocator keeps for threads that follow.
-    void *volatile memory = std::malloc(1);
-    std::free(memory);
-    sem_post(&trial.began);
-    std::lock_guard lock(trial.gate);
-    return nullptr;
-  }
-
-  sem_t began;
-  std::mutex gate;
-  std::vector<pthread_t> threads;
+  Team() = default;
+  Team(const Team &) = delete;
+  Team &operator=(const Team &) = delete;
+  ~Team();
 };
 
 } // namespace
 
-/// How many threads, up to `wanted`, there can be besides those that are.
-static int32_t tryThreads(int32_t wanted) {
+/// Never destroyed: threads may end later than the program's statics.
+static Teams &teams() {
+  static auto *all = new Teams;
+  return *all;
+}
+
+Team::~Team() {
+  std::lock_guard lock(teams().mutex);
+  teams().taken -= given - 1;
+}
+
+/// Lets a team have up to `wanted` threads, its master among them.
+static void enlarge(Team &team, int32_t wanted) {
   // What the library takes for each besides its stack.
   constexpr size_t more = size_t(256) << 10;
-  pthread_attr_t attributes;
-  if (pthread_attr_init(&attributes) != 0)
-    return 0;
-  pthread_attr_setstacksize(&attributes, stackSize() + more);
-  int32_t count = Trial().begin(wanted, attributes);
-  pthread_attr_destroy(&attributes);
-  return count;
+  Teams &all = teams();
+  std::lock_guard lock(all.mutex);
+  int32_t free = std::max(all.made - (all.taken - (team.given - 1)), 0);
+  int32_t others = wanted - 1, missing = others - free;
+  if (missing > 0) {
+    auto got = static_cast<int32_t>(
+        support::tryThreads(static_cast<size_t>(missing), stackSize() + more));
+    // Near the limit something is left for what else needs it.
+    if (got < missing)
+      others = free + std::max(got - got / 8 - 1, 0);
+  }
+  all.taken += others - (team.given - 1);
+  all.made = std::max(all.made, all.taken);
+  team.tried = wanted;
+  team.given = others + 1;
+  // The library makes them now, before anything else takes what they need.
+#pragma omp parallel num_threads(team.given)
+  {
+  }
 }
 
 int32_t piko::rt::availableThreads(int32_t wanted) {
-  // Of teams of this thread, which the library keeps.
-  static thread_local int32_t tried = 1, given = 1;
+  static thread_local Team team;
   beginOpenMP();
-  if (wanted > tried) {
-    tried = wanted;
-    int32_t others = tryThreads(wanted - 1);
-    // Near the limit something is left for what else needs it.
-    given = others == wanted - 1 ? wanted : others - others / 8;
-    given = std::max(given, 1);
-    // The library makes them now, before anything else takes what they need.
-#pragma omp parallel num_threads(given)
-    {
-    }
+  if (teams().process != getpid()) { // a fork's child, in which there are none
+    teams().taken = teams().made = 0;
+    teams().process = getpid();
+    team.tried = team.given = 1;
   }
-  return std::min(wanted, given);
+  if (wanted > team.tried)
+    enlarge(team, wanted);
+  return std::min(wanted, team.given);
 }

@@ -14,7 +14,8 @@ namespace piko::rt {
 int32_t defaultThreads();
 
 /// `wanted`, or fewer, where the system refuses this thread a team of so many:
-/// OpenMP would end the process. Tried once for a number; 1 at the least.
+/// OpenMP would end the process. Tried once for a number, and not for threads
+/// that OpenMP has left from teams that are gone; 1 at the least.
 int32_t availableThreads(int32_t wanted);
 
 /// The processors' worth of time that a process's control groups leave it,

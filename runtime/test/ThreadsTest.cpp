@@ -8,6 +8,8 @@
 #include <fstream>
 #include <gtest/gtest.h>
 #include <limits>
+#include <thread>
+#include <vector>
 
 using namespace piko::rt;
 
@@ -83,6 +85,20 @@ TEST(Threads, AreSomething) {
   EXPECT_EQ(availableThreads(1), 1);
   EXPECT_EQ(availableThreads(3), 3);
   EXPECT_EQ(availableThreads(2), 2);
+}
+
+// As of hosts that make a thread for each frame.
+TEST(Threads, OfShortLivedHosts) {
+  for (int i = 0; i < 20; ++i)
+    std::thread([] {
+      EXPECT_EQ(availableThreads(4), 4);
+      EXPECT_EQ(availableThreads(6), 6);
+    }).join();
+  std::vector<std::thread> hosts;
+  for (int i = 0; i < 4; ++i)
+    hosts.emplace_back([] { EXPECT_EQ(availableThreads(5), 5); });
+  for (std::thread &host : hosts)
+    host.join();
 }
 
 } // namespace

@@ -342,10 +342,12 @@ void limitAddresses(size_t more) {
 }
 
 TEST_F(HostStateDeathTest, ThreadsThatTheSystemRefuses) {
+  setenv("OMP_STACKSIZE", "8M", 1); // as usual, so that 64 do not fit
   for (size_t megabytes : {20, 60, 100, 200, 300, 500})
     EXPECT_EXIT(runHere(64, 1, 63, [=] { limitAddresses(megabytes << 20); }),
                 testing::ExitedWithCode(0), "")
         << megabytes;
+  unsetenv("OMP_STACKSIZE");
 }
 
 TEST_F(HostStateDeathTest, NoThreadToCompileIn) {
