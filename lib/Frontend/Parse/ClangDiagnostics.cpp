@@ -3,7 +3,7 @@
 
 #include "Parse/ClangDiagnostics.h"
 
-#include "Parse/PipelineReader.h"
+#include "Parse/PipeSearch.h"
 #include "Parse/Wrappers.h"
 #include "mlir/IR/BuiltinAttributes.h"
 #include "clang/Basic/DiagnosticIDs.h"

@@ -4,37 +4,11 @@
 #define PIKO_LIB_FRONTEND_PARSE_PIPELINEREADER_H
 
 #include "Parse/InitialValues.h"
+#include "Parse/PipeSearch.h"
 #include "Parse/RecordLayout.h"
 #include "clang/AST/DeclCXX.h"
 
-namespace clang {
-class Sema;
-} // namespace clang
-
 namespace piko {
-
-/// A pipeline type and the name by which the user knows it: without the
-/// namespaces and classes that it is in, unless others have the same name.
-struct PipeCandidate {
-  std::string name;
-  std::string qualifiedName;
-  const clang::CXXRecordDecl *type;
-  clang::SourceLocation location;
-};
-
-/// Whether a class is a stage, or, being a template's, will be one.
-bool isStage(const clang::CXXRecordDecl *type);
-
-/// The pipelines that a translation unit defines or names by an alias, in
-/// order.
-std::vector<PipeCandidate> findPipes(clang::Sema &sema);
-
-/// The pipeline that `name` asks for; reports when there is none or more than
-/// one would do.
-llvm::FailureOr<PipeCandidate>
-selectPipe(const std::vector<PipeCandidate> &pipes, llvm::StringRef name,
-           mlir::Location file, clang::ASTContext &ast,
-           mlir::MLIRContext &context);
 
 /// Reads what declarations say about a pipeline: its state, and its stages with
 /// their ports and phases. Edges are read from the constructor's code, later.
