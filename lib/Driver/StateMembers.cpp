@@ -117,12 +117,14 @@ static std::string initialize(const Part &part) {
   return "{" + list + "}";
 }
 
-/// The member that all pieces of one first name make, if they make one.
+/// The member that all pieces of one first name make, if they make one. A
+/// constant is a member of the state itself, which hands it over.
 static std::optional<Part> makePart(llvm::ArrayRef<const StatePiece *> pieces,
                                     StringRef name) {
   Part part{name.str()};
   for (const StatePiece *piece : pieces)
-    if (!insert(part, StringRef(piece->name).drop_front(name.size()), *piece))
+    if (piece->isConstant ||
+        !insert(part, StringRef(piece->name).drop_front(name.size()), *piece))
       return std::nullopt;
   return hasAlikeElements(part) ? std::optional(part) : std::nullopt;
 }

@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Files that pikort_capture has written.
+
 #include "Piko/Replay/CaptureFile.h"
 
 #include <cerrno>

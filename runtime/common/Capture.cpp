@@ -11,6 +11,7 @@
 #include "Piko/Support/OutputFile.h"
 #include "pikort/capture.h"
 
+#include <charconv>
 #include <cstdlib>
 #include <cstring>
 
@@ -137,12 +138,27 @@ static std::string fileNameOf(const std::string &name) {
   return file + ".capture";
 }
 
+/// Of the pipeline's, from 1.
+static int64_t findWantedRun(const pikort_pipeline &p) {
+  const char *text = std::getenv("PIKO_CAPTURE_RUN");
+  if (!text)
+    return 1;
+  int64_t number = 0;
+  const char *end = text + std::strlen(text);
+  auto [stop, error] = std::from_chars(text, end, number);
+  if (error != std::errc() || stop != end || number < 1)
+    throw Failure{PIKORT_INVALID_ARGUMENT,
+                  "pipeline " + quoted(p.name) +
+                      ": PIKO_CAPTURE_RUN: expected the number of a run, from "
+                      "1, but got " +
+                      quoted(text)};
+  return number;
+}
+
 void piko::rt::captureAsAsked(pikort_pipeline &p) {
   const char *folder = std::getenv("PIKO_CAPTURE");
   if (!folder || !*folder)
     return;
-  const char *run = std::getenv("PIKO_CAPTURE_RUN");
-  int64_t wanted = run ? std::strtoll(run, nullptr, 10) : 1;
-  if (++p.captureRuns == wanted)
+  if (++p.captureRuns == findWantedRun(p))
     capture(p, std::string(folder) + "/" + fileNameOf(p.name));
 }

@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// What make and ninja are told of the files that were read.
+
 #ifndef PIKO_TOOLS_PIKOC_DEPENDENCIES_H
 #define PIKO_TOOLS_PIKOC_DEPENDENCIES_H
 
