@@ -64,8 +64,8 @@ piko::findAuthored(const CompileOptions &options, MLIRContext &context,
   if (!cache.isEnabled() || !options.reusesAuthored)
     return make(files);
   std::string request = makeRequest(options, *files);
-  if (std::optional<std::string> found = cache.lookUp(request, *files))
-    return read(*found, context);
+  if (std::unique_ptr<llvm::MemoryBuffer> found = cache.lookUp(request, *files))
+    return read(found->getBuffer(), context);
   auto recorder = llvm::makeIntrusiveRefCnt<SourceRecorder>(files);
   bool isSilent = true;
   OwningOpRef<ModuleOp> module;

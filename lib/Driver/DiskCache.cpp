@@ -4,14 +4,16 @@
 
 #include "DiskCache.h"
 
+#include "Piko/Frontend/BufferTail.h"
 #include "Piko/Support/OutputFile.h"
 
 #include "llvm/ADT/StringExtras.h"
 #include "llvm/Support/CachePruning.h"
 #include "llvm/Support/FileSystem.h"
-#include "llvm/Support/MemoryBuffer.h"
 #include "llvm/Support/Path.h"
 #include "llvm/Support/Process.h"
+
+#include <sys/mman.h>
 
 using namespace llvm;
 using namespace piko;
@@ -69,32 +71,85 @@ std::string DiskCache::getPath(StringRef key) const {
   return std::string(path);
 }
 
-std::optional<std::string> DiskCache::read(StringRef key) const {
+namespace {
+
+/// A file in memory of its own: a mapped one could change, or end, while it is
+/// read. The pages are had at once, as a fault for each of a precompiled
+/// header's would take a tenth of a small pipeline's time.
+class FileCopy : public MemoryBuffer {
+public:
+  explicit FileCopy(fs::file_t file, size_t size)
+      : reserved(size + 1), // and a zero
+        memory(
+            static_cast<char *>(mmap(nullptr, reserved, PROT_READ | PROT_WRITE,
+                                     MAP_PRIVATE | MAP_ANONYMOUS, -1, 0))) {
+    if (memory == MAP_FAILED) {
+      StringRef none("");
+      init(none.begin(), none.end(), /*RequiresNullTerminator=*/true);
+      return;
+    }
+    madvise(memory, reserved, MADV_HUGEPAGE);
+    madvise(memory, reserved, MADV_POPULATE_WRITE);
+    size_t done = readWhole(file, size);
+    init(memory, memory + done, /*RequiresNullTerminator=*/true);
+  }
+  FileCopy(const FileCopy &) = delete;
+  FileCopy &operator=(const FileCopy &) = delete;
+  ~FileCopy() override {
+    if (memory != MAP_FAILED)
+      munmap(memory, reserved);
+  }
+
+  BufferKind getBufferKind() const override { return MemoryBuffer_Malloc; }
+
+private:
+  /// Up to its end, if that comes first.
+  size_t readWhole(fs::file_t file, size_t size) {
+    size_t done = 0;
+    while (done < size) {
+      Expected<size_t> read = fs::readNativeFile(
+          file, MutableArrayRef<char>(memory + done, size - done));
+      if (!read)
+        consumeError(read.takeError());
+      if (!read || *read == 0)
+        break;
+      done += *read;
+    }
+    return done;
+  }
+
+  size_t reserved;
+  char *memory;
+};
+
+} // namespace
+
+std::unique_ptr<MemoryBuffer> DiskCache::read(StringRef key) const {
   if (!isEnabled())
-    return std::nullopt;
+    return nullptr;
   Expected<fs::file_t> file = fs::openNativeFileForRead(getPath(key));
   if (!file) {
     consumeError(file.takeError());
-    return std::nullopt;
+    return nullptr;
   }
-  // A mapped file could change while it is read.
-  auto buffer = MemoryBuffer::getOpenFile(*file, key, /*FileSize=*/-1,
-                                          /*RequiresNullTerminator=*/false,
-                                          /*IsVolatile=*/true);
+  std::unique_ptr<MemoryBuffer> buffer;
+  fs::file_status status;
+  if (!fs::status(*file, status))
+    buffer = std::make_unique<FileCopy>(*file, status.getSize());
   // Where it is not ours to touch, it only seems older than it is.
   (void)fs::setLastAccessAndModificationTime(*file,
                                              std::chrono::system_clock::now());
   (void)fs::closeFile(*file);
   if (!buffer)
-    return std::nullopt;
-  StringRef bytes = (*buffer)->getBuffer();
+    return nullptr;
+  StringRef bytes = buffer->getBuffer();
   if (!bytes.consume_front(magic) || bytes.size() < 32)
-    return std::nullopt;
+    return nullptr;
   StringRef sum = bytes.take_front(32);
   bytes = bytes.drop_front(32);
   if (toStringRef(BLAKE3::hash(arrayRefFromStringRef(bytes))) != sum)
-    return std::nullopt;
-  return bytes.str();
+    return nullptr;
+  return dropFront(std::move(buffer), magic.size() + sum.size());
 }
 
 Error DiskCache::write(StringRef key, StringRef bytes) const {

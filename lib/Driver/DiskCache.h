@@ -12,8 +12,8 @@
 #include "llvm/ADT/StringRef.h"
 #include "llvm/Support/BLAKE3.h"
 #include "llvm/Support/Error.h"
+#include "llvm/Support/MemoryBuffer.h"
 
-#include <optional>
 #include <string>
 
 namespace piko {
@@ -38,8 +38,8 @@ public:
   bool isEnabled() const { return !directory.empty(); }
   const std::string &getDirectory() const { return directory; }
 
-  /// The entry, or nothing if there is none that is whole.
-  std::optional<std::string> read(llvm::StringRef key) const;
+  /// The entry, or null if there is none that is whole. A zero follows it.
+  std::unique_ptr<llvm::MemoryBuffer> read(llvm::StringRef key) const;
   llvm::Error write(llvm::StringRef key, llvm::StringRef bytes) const;
   /// Removes the entries that were not read for longest, down to the size that
   /// is allowed.

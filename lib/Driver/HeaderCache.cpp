@@ -40,11 +40,11 @@ bool piko::hasRelativeFolders(llvm::ArrayRef<std::string> arguments) {
 
 /// What the header asks of `files` is asked, too, where it is found: a recorder
 /// there then knows it.
-std::optional<std::string>
+std::unique_ptr<llvm::MemoryBuffer>
 HeaderCache::get(llvm::ArrayRef<std::string> arguments, const Files &files,
                  Maker make) {
   if (!cache.isEnabled())
-    return std::nullopt;
+    return nullptr;
   KeyBuilder key;
   key.add("header");
   addSurroundings(key, CompilerPart::Clang);
@@ -54,12 +54,13 @@ HeaderCache::get(llvm::ArrayRef<std::string> arguments, const Files &files,
   for (const std::string &argument : arguments)
     key.add(argument);
   std::string request = key.finish();
-  if (std::optional<std::string> header = cache.lookUp(request, *files))
+  if (auto header = cache.lookUp(request, *files))
     return header;
   auto recorder = llvm::makeIntrusiveRefCnt<SourceRecorder>(files);
   std::optional<std::string> header = make(recorder);
   // Where it cannot be kept it is made again.
-  if (header)
-    llvm::consumeError(cache.keep(request, *recorder, *header));
-  return header;
+  if (!header)
+    return nullptr;
+  llvm::consumeError(cache.keep(request, *recorder, *header));
+  return llvm::MemoryBuffer::getMemBufferCopy(*header);
 }

@@ -18,8 +18,9 @@ class HeaderCache : public HeaderStore {
 public:
   explicit HeaderCache(const CacheOptions &options) : cache(options) {}
 
-  std::optional<std::string> get(llvm::ArrayRef<std::string> arguments,
-                                 const Files &files, Maker make) override;
+  std::unique_ptr<llvm::MemoryBuffer> get(llvm::ArrayRef<std::string> arguments,
+                                          const Files &files,
+                                          Maker make) override;
 
 private:
   SourceCache cache;

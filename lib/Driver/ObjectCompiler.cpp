@@ -221,8 +221,9 @@ std::optional<CompiledObject> piko::compileObject(const ObjectOptions &given,
   std::string request;
   if (cache.isEnabled()) {
     request = makeObjectRequest(options, *processors, *files);
-    if (std::optional<std::string> found = cache.lookUp(request, *files)) {
-      Entry entry = readEntry(*found);
+    if (std::unique_ptr<llvm::MemoryBuffer> found =
+            cache.lookUp(request, *files)) {
+      Entry entry = readEntry(found->getBuffer());
       diagnostics += entry.diagnostics;
       return std::move(entry.object);
     }

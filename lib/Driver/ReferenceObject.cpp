@@ -106,8 +106,9 @@ static bool findOrMake(const CacheOptions &options, llvm::StringRef request,
                        F make) {
   SourceCache cache(options);
   if (cache.isEnabled())
-    if (std::optional<std::string> found = cache.lookUp(request, *files)) {
-      read(*found, made);
+    if (std::unique_ptr<llvm::MemoryBuffer> found =
+            cache.lookUp(request, *files)) {
+      read(found->getBuffer(), made);
       diagnostics += made.diagnostics;
       return true;
     }
@@ -318,11 +319,10 @@ static void joinSections(llvm::Module &module) {
     }
 }
 
-/// Finds or makes it; nothing after diagnostics.
-static std::optional<std::string> findHeaderCode(const ObjectOptions &options,
-                                                 const Processor &processor,
-                                                 const Files &files,
-                                                 std::string &diagnostics) {
+/// Finds or makes it; null after diagnostics.
+static std::unique_ptr<llvm::MemoryBuffer>
+findHeaderCode(const ObjectOptions &options, const Processor &processor,
+               const Files &files, std::string &diagnostics) {
   PikoContext context;
   llvm::raw_string_ostream stream(diagnostics);
   DiagnosticPrinter printer(context, stream);
@@ -380,10 +380,10 @@ piko::compileReferenceObject(const ObjectOptions &options,
   object.files.assign(all.begin(), all.end());
   if (!host.needsHeader)
     return object;
-  std::optional<std::string> code =
+  std::unique_ptr<llvm::MemoryBuffer> code =
       findHeaderCode(options, *processor, files, diagnostics);
   if (!code)
     return std::nullopt;
-  object.headerCode = std::move(*code);
+  object.headerCode = code->getBuffer().str();
   return object;
 }

@@ -39,14 +39,14 @@ void piko::addFolder(KeyBuilder &key, vfs::FileSystem &files) {
     key.add(*folder);
 }
 
-std::optional<std::string> SourceCache::lookUp(StringRef request,
-                                               vfs::FileSystem &files) const {
-  std::optional<std::string> questions = disk.read(request);
+std::unique_ptr<MemoryBuffer>
+SourceCache::lookUp(StringRef request, vfs::FileSystem &files) const {
+  std::unique_ptr<MemoryBuffer> questions = disk.read(request);
   if (!questions)
-    return std::nullopt;
+    return nullptr;
   KeyBuilder key;
   key.add(request);
-  for (StringReader reader(*questions); !reader.atEnd();) {
+  for (StringReader reader(questions->getBuffer()); !reader.atEnd();) {
     bool isRead = reader.next() == "read";
     SourceQuery query{reader.next(), isRead};
     key.add(query.path).add(answer(files, query));

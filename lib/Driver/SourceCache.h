@@ -47,9 +47,10 @@ public:
   bool isEnabled() const { return disk.isEnabled(); }
   const std::string &getDirectory() const { return disk.getDirectory(); }
 
-  /// What was made of a request and of files with the text that they have now.
-  std::optional<std::string> lookUp(llvm::StringRef request,
-                                    llvm::vfs::FileSystem &files) const;
+  /// What was made of a request and of files with the text that they have now;
+  /// null if nothing.
+  std::unique_ptr<llvm::MemoryBuffer>
+  lookUp(llvm::StringRef request, llvm::vfs::FileSystem &files) const;
   /// Keeps what was made while the recorder listened.
   llvm::Error keep(llvm::StringRef request, const SourceRecorder &recorder,
                    llvm::StringRef bytes) const;

@@ -60,8 +60,7 @@ public:
                userFile, options, flags, files,
                [&](const FrontendOptions &chosen, auto diagnostics) {
                  return invoke(chosen, diagnostics);
-               },
-               headerPath));
+               }));
   }
 
   bool readHeaderOf(llvm::StringRef text, llvm::StringRef name) {
@@ -147,7 +146,7 @@ HostCode piko::compileForHost(llvm::StringRef text, llvm::StringRef userFile,
           hasHeader && !optimize};
 }
 
-std::optional<std::string> piko::getHeaderCode(
+std::unique_ptr<llvm::MemoryBuffer> piko::getHeaderCode(
     const FrontendOptions &options, llvm::StringRef target,
     llvm::function_ref<std::optional<std::string>(llvm::Module &)> generate,
     mlir::MLIRContext &context) {

@@ -17,6 +17,7 @@
 #include "mlir/IR/BuiltinOps.h"
 #include "mlir/IR/OwningOpRef.h"
 #include "llvm/ADT/STLFunctionalExtras.h"
+#include "llvm/Support/MemoryBuffer.h"
 #include "llvm/Support/VirtualFileSystem.h"
 
 #include <memory>
@@ -34,9 +35,10 @@ public:
 
   virtual ~HeaderStore() = default;
   /// What `make` gives, or gave for the same arguments of Clang and the same
-  /// files; nothing if it fails.
-  virtual std::optional<std::string> get(llvm::ArrayRef<std::string> arguments,
-                                         const Files &files, Maker make) = 0;
+  /// files; null if it fails.
+  virtual std::unique_ptr<llvm::MemoryBuffer>
+  get(llvm::ArrayRef<std::string> arguments, const Files &files,
+      Maker make) = 0;
 };
 
 struct FrontendOptions {

@@ -40,8 +40,8 @@ HostCode compileForHost(llvm::StringRef text, llvm::StringRef userFile,
                         mlir::MLIRContext &context);
 
 /// The object that code without optimization needs, made by `generate` where
-/// the store of `options` has none for `target`; nothing after diagnostics.
-std::optional<std::string> getHeaderCode(
+/// the store of `options` has none for `target`; null after diagnostics.
+std::unique_ptr<llvm::MemoryBuffer> getHeaderCode(
     const FrontendOptions &options, llvm::StringRef target,
     llvm::function_ref<std::optional<std::string>(llvm::Module &)> generate,
     mlir::MLIRContext &context);

@@ -460,9 +460,8 @@ llvm::FailureOr<ParsedFile> piko::parseFile(const ParseRequest &request,
     return llvm::failure();
   invocation->getFrontendOpts().Inputs.clear();
 
-  std::unique_ptr<llvm::MemoryBuffer> header =
-      getPrecompiledHeader(request.file, request.options, clangFlags, files,
-                           makeInvocation, headerPath);
+  std::unique_ptr<llvm::MemoryBuffer> header = getPrecompiledHeader(
+      request.file, request.options, clangFlags, files, makeInvocation);
   bool hasHeader = header != nullptr;
   if (hasHeader)
     memory->addFile(headerPath, 0, std::move(header));

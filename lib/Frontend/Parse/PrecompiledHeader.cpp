@@ -4,6 +4,8 @@
 
 #include "Parse/PrecompiledHeader.h"
 
+#include "Piko/Frontend/BufferTail.h"
+
 #include "Parse/ClangInvocation.h"
 #include "clang/Basic/LangOptions.h"
 #include "clang/Frontend/CompilerInstance.h"
@@ -183,20 +185,19 @@ std::unique_ptr<llvm::MemoryBuffer>
 piko::getPrecompiledHeader(llvm::StringRef file, const FrontendOptions &options,
                            llvm::ArrayRef<const char *> flags,
                            const HeaderStore::Files &files,
-                           InvocationMaker invoke, llvm::StringRef name) {
+                           InvocationMaker invoke) {
   if (!options.headers || !beginsWithHeader(file, *files))
     return nullptr;
   FrontendOptions shared = getHeaderOptions(options);
-  std::optional<std::string> header =
+  std::unique_ptr<llvm::MemoryBuffer> header =
       options.headers->get(getClangArguments(flags, shared), files,
                            [&](const HeaderStore::Files &recorded) {
                              return makeHeader(shared, recorded, invoke);
                            });
   if (!header)
     return nullptr;
-  size_t end = header->find("\n\n") + 1;
-  if (mentions(llvm::StringRef(*header).take_front(end), getOthers(options)))
+  size_t end = header->getBuffer().find("\n\n") + 1;
+  if (mentions(header->getBuffer().take_front(end), getOthers(options)))
     return nullptr;
-  return llvm::MemoryBuffer::getMemBufferCopy(
-      llvm::StringRef(*header).drop_front(end + 1), name);
+  return dropFront(std::move(header), end + 1);
 }

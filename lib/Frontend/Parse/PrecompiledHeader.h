@@ -29,8 +29,7 @@ using InvocationMaker =
 std::unique_ptr<llvm::MemoryBuffer>
 getPrecompiledHeader(llvm::StringRef file, const FrontendOptions &options,
                      llvm::ArrayRef<const char *> flags,
-                     const HeaderStore::Files &files, InvocationMaker invoke,
-                     llvm::StringRef name);
+                     const HeaderStore::Files &files, InvocationMaker invoke);
 
 /// The options that the header for a file with `options` is made with.
 FrontendOptions getHeaderOptions(const FrontendOptions &options);

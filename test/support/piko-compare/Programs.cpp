@@ -233,9 +233,9 @@ OwningOpRef<ModuleOp> Programs::Implementation::parse(const std::string &pipe) {
 OwningOpRef<ModuleOp> Programs::Implementation::load(const std::string &pipe) {
   if (!kept.isEnabled() || !modules.empty())
     return parse(pipe);
-  if (std::optional<std::string> found =
+  if (std::unique_ptr<llvm::MemoryBuffer> found =
           kept.lookUp(makeAuthoredRequest(pipe), *recorder))
-    return parseSourceString<ModuleOp>(*found, &context);
+    return parseSourceString<ModuleOp>(found->getBuffer(), &context);
   OwningOpRef<ModuleOp> module = parse(pipe);
   if (module)
     keepAuthored(pipe, *module);
@@ -320,8 +320,8 @@ CompiledPipeline Programs::Implementation::find(const std::string &pipe,
     return compile(pipe, object, *processor);
   std::string request = makeObjectRequest(object, *processor, *recorder);
   llvm::vfs::FileSystem &disk = *llvm::vfs::getRealFileSystem();
-  if (std::optional<std::string> found = kept.lookUp(request, disk)) {
-    StringReader reader(*found);
+  if (std::unique_ptr<llvm::MemoryBuffer> found = kept.lookUp(request, disk)) {
+    StringReader reader(found->getBuffer());
     std::string code = reader.next();
     return {std::move(code), reader.next() == "strict"};
   }
