@@ -41,11 +41,14 @@ is, `ptxas` where NVIDIA's assembler is, `chromium` where that browser is, `asan
 builds with that sanitizer.
 """
 
+import atexit
 import glob
 import os
 import platform
 import shutil
+import subprocess
 import sys
+import tempfile
 
 import lit.formats
 
@@ -56,7 +59,39 @@ config.excludes = ["Inputs"]
 config.test_source_root = os.path.dirname(__file__)
 config.test_exec_root = os.path.join(config.piko_binary_root, "test")
 
+
+
+def start_fork_server(tools):
+    """Folder of stand-ins for `tools` that fork instead of beginning anew.
+
+    Loading LLVM's libraries takes most of a short run's time. The server lasts as
+    long as this process."""
+    client = os.path.join(config.test_exec_root, "support/fork-server/fork-server")
+    folder = tempfile.mkdtemp(prefix="piko-tests-")
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    for name in ("bin", "tools"):
+        os.mkdir(os.path.join(folder, name))
+    for tool in tools:
+        name = os.path.basename(tool)
+        os.symlink(tool, os.path.join(folder, "tools", name))
+        os.symlink(client, os.path.join(folder, "bin", name))
+    server = subprocess.Popen(
+        [client, "--serve", folder], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    )
+    server.stdout.readline()
+    atexit.register(server.stdin.close)  # which ends it
+    config.environment["PIKO_FORK_SERVER"] = folder
+    return os.path.join(folder, "bin")
+
+
+all_tests = os.environ.get("PIKO_TEST_ALL", "0") != "0"
 path = [config.piko_tools, config.llvm_tools, config.environment["PATH"]]
+if not all_tests and not config.sanitize:
+    kinds = "compare diff import opt render test-opt translate tune".split()
+    tools = ["pikoc"] + ["piko-" + kind for kind in kinds]
+    tools = [os.path.join(config.piko_tools, tool) for tool in tools]
+    path.insert(0, start_fork_server(tools + [config.cxx]))
+    config.cxx = os.path.join(path[0], os.path.basename(config.cxx))
 config.environment["PATH"] = os.path.pathsep.join(path)
 for name in ("OMP_NUM_THREADS", "ASAN_OPTIONS", "TSAN_OPTIONS", "HOME"):
     if name in os.environ:
@@ -102,7 +137,6 @@ if config.sanitize:
     if config.archer:
         link_host += ["-Wl,--no-as-needed", config.archer]
         link_host.append("-Wl,-rpath," + os.path.dirname(config.archer))
-all_tests = os.environ.get("PIKO_TEST_ALL", "0") != "0"
 targets = ["cpu", "gpu-on-cpu", "cuda"]
 if platform.machine() in ("x86_64", "AMD64"):
     targets[1:1] = ["x86-64-v3", "x86-64"]
