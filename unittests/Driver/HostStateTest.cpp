@@ -42,6 +42,7 @@
 #endif
 
 using namespace piko;
+using namespace std::string_literals;
 namespace fs = std::filesystem;
 
 namespace {
@@ -99,11 +100,47 @@ Outcome runNumbers(const LoadedProgram &program, int threads = 4) {
   return run;
 }
 
+/// `behind` makes a text of its own of it, which is in no cache.
 std::unique_ptr<LoadedProgram> load(const LoadOptions &options,
-                                    std::string &diagnostics) {
-  return loadPipelineText("numbers.piko.cpp", numbersText, options,
+                                    std::string &diagnostics,
+                                    const std::string &behind = "") {
+  return loadPipelineText("numbers.piko.cpp", numbersText + behind, options,
                           diagnostics);
 }
+
+/// All tests' cache, so that piko.h is precompiled once.
+class SharedCache {
+public:
+  static void make() {
+    if (const char *known = std::getenv(variable)) { // of a death test's parent
+      path = known;
+      return;
+    }
+    path = fs::path(testing::TempDir()) /
+           ("piko-host-state-" + std::to_string(getpid()));
+    setenv(variable, path.c_str(), 1);
+    isOwn = true;
+  }
+  static void remove() {
+    if (isOwn)
+      fs::remove_all(path);
+  }
+  static const fs::path &get() { return path; }
+
+private:
+  static constexpr const char *variable = "PIKO_TEST_HOST_STATE";
+  static inline fs::path path;
+  static inline bool isOwn = false;
+};
+
+class SharedCacheEnvironment : public testing::Environment {
+public:
+  void SetUp() override { SharedCache::make(); }
+  void TearDown() override { SharedCache::remove(); }
+};
+
+[[maybe_unused]] const testing::Environment *const sharedCache =
+    testing::AddGlobalTestEnvironment(new SharedCacheEnvironment);
 
 /// What a host may have set; says what it is.
 struct FloatingPoint {
@@ -132,10 +169,10 @@ class HostState : public TemporaryFolder {
 protected:
   void SetUp() override {
     TemporaryFolder::SetUp();
-    options.cache.directory = folder / "cache";
+    options.cache.directory = SharedCache::get();
   }
-  std::unique_ptr<LoadedProgram> load() {
-    auto program = ::load(options, diagnostics);
+  std::unique_ptr<LoadedProgram> load(const std::string &behind = "") {
+    auto program = ::load(options, diagnostics, behind);
     EXPECT_TRUE(program) << diagnostics;
     return program;
   }
@@ -170,12 +207,13 @@ TEST_F(HostState, FloatingPointEnvironmentWhileItCompiles) {
   uint64_t expected = load()->codeHash();
   for (const FloatingPoint &state : states) {
     SCOPED_TRACE(state.name);
-    options.cache.directory = folder / state.name;
+    if (state.set == setAll) // the header, too
+      options.cache.directory = folder / "cache";
     std::fenv_t own, before, after;
     std::fegetenv(&own);
     state.set();
     std::fegetenv(&before);
-    auto program = ::load(options, diagnostics);
+    auto program = ::load(options, diagnostics, "// "s + state.name);
     std::fegetenv(&after);
     std::fesetenv(&own);
     ASSERT_TRUE(program) << diagnostics;
@@ -200,7 +238,7 @@ TEST_F(HostState, SignalHandlersAndMask) {
   for (auto target : {ExecutionTarget::CPU, ExecutionTarget::Reference}) {
     options.target = target;
     for (int pass = 0; pass < 2; ++pass) // without a cache's entry, and with it
-      runNumbers(*load());
+      runNumbers(*load("// with handlers"));
   }
   pthread_sigmask(SIG_SETMASK, nullptr, &maskAfter);
   for (int number : signals) {
@@ -223,8 +261,7 @@ TEST_F(HostState, Locale) {
   std::string name = "de_DE.UTF-8";
   ASSERT_TRUE(std::setlocale(LC_ALL, name.c_str()));
   ASSERT_STREQ(std::localeconv()->decimal_point, ",");
-  options.cache.directory = folder / "other";
-  auto program = load();
+  auto program = load("// with commas");
   EXPECT_EQ(std::setlocale(LC_ALL, nullptr), name);
   std::setlocale(LC_ALL, "C");
   unsetenv("LOCPATH");
@@ -235,29 +272,17 @@ TEST_F(HostState, Locale) {
 
 // --- Processes of their own -------------------------------------------------
 
-/// Each starts this program again, which finds in an environment variable what
-/// folder it was.
+/// Each starts this program again.
 class HostStateDeathTest : public testing::Test {
 protected:
-  void SetUp() override {
-    GTEST_FLAG_SET(death_test_style, "threadsafe");
-    if (std::getenv(variable))
-      return;
-    folder = fs::path(testing::TempDir()) /
-             ("piko-host-state-" + std::to_string(getpid()));
-    setenv(variable, folder.c_str(), 1);
-  }
-  void TearDown() override {
-    unsetenv(variable);
-    fs::remove_all(folder);
-  }
+  void SetUp() override { GTEST_FLAG_SET(death_test_style, "threadsafe"); }
 
   /// In a process in which nobody has used OpenMP yet.
   static void runHere(
       int32_t threads, int32_t fewest, int32_t most,
       const std::function<void()> &before = [] {}) {
     LoadOptions options;
-    options.cache.directory = std::getenv(variable);
+    options.cache.directory = SharedCache::get();
     std::string diagnostics;
     auto program = ::load(options, diagnostics);
     if (!program) {
@@ -272,10 +297,6 @@ protected:
     }
     std::_Exit(runNumbers(*program, 1) == run ? 0 : 4);
   }
-
-private:
-  static constexpr const char *variable = "PIKO_HOST_STATE_CACHE";
-  fs::path folder;
 };
 
 TEST_F(HostStateDeathTest, VariablesOfOpenMP) {
@@ -388,8 +409,7 @@ TEST_F(HostState, SmallStacks) {
   Outcome expected = runNumbers(*program), small;
   runOnThread(128 << 10, [&] {
     small = runNumbers(*program);
-    options.cache.directory = folder / "other";
-    auto again = ::load(options, diagnostics);
+    auto again = ::load(options, diagnostics, "// on a small stack");
     ASSERT_TRUE(again) << diagnostics;
     EXPECT_EQ(again->codeHash(), program->codeHash());
   });
@@ -445,8 +465,8 @@ TEST_F(HostState, Fork) {
     ASSERT_GE(child, 0);
     if (child == 0) {
       bool same = runNumbers(*program) == expected;
-      options.cache.directory = folder / ("child" + std::to_string(i % 2));
-      auto again = ::load(options, diagnostics);
+      auto again = ::load(options, diagnostics,
+                          "// of a child " + std::to_string(i % 2));
       same = same && again && runNumbers(*again) == expected;
       std::_Exit(same ? 0 : 1);
     }
@@ -487,7 +507,7 @@ TEST_F(HostState, PrintsNothing) {
   wrong.replace(wrong.find("float tiny"), 5, "floot");
   {
     Redirection out(1, folder / "out"), error(2, folder / "error");
-    runNumbers(*load());
+    runNumbers(*load("// which prints nothing"));
     loadPipelineText("wrong.piko.cpp", wrong, options, diagnostics);
     options.cpu = "no-such-processor";
     ::load(options, diagnostics);
