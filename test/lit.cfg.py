@@ -79,6 +79,7 @@ def start_fork_server(tools):
         [client, "--serve", folder], stdin=subprocess.PIPE, stdout=subprocess.PIPE
     )
     server.stdout.readline()
+    atexit.register(server.wait)
     atexit.register(server.stdin.close)  # which ends it
     config.environment["PIKO_FORK_SERVER"] = folder
     return os.path.join(folder, "bin")

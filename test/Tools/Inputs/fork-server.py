@@ -27,12 +27,12 @@ def run(*arguments, **options):
 
 
 def find_waiting(pipe):
-    """The process of the tool that has the pipe open, if there is one."""
+    """The limits of the tool's process that has the pipe open, if there is one."""
     for process in pathlib.Path("/proc").glob("[0-9]*"):
         try:
             files = [os.readlink(file) for file in (process / "fd").iterdir()]
             if pipe in files and os.readlink(process / "exe").endswith("/" + tool):
-                return process
+                return (process / "limits").read_text()
         except OSError:
             pass
     return None
@@ -52,10 +52,9 @@ def interrupt(folder, number):
         [tool, "-"], stdin=reader, stdout=subprocess.PIPE, preexec_fn=prepare
     )
     os.close(reader)
-    while not (waiting := find_waiting(pipe)):
+    # It has them soon after its files.
+    while not re.search(r"Max open files +77 +77 ", find_waiting(pipe) or ""):
         time.sleep(0.01)
-    limits = (waiting / "limits").read_text()
-    assert re.search(r"Max open files +77 +77 ", limits), limits
     process.send_signal(number)
     process.wait(timeout=60)
     while find_waiting(pipe):

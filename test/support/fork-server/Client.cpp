@@ -22,6 +22,7 @@
 #include <sys/signalfd.h>
 #include <sys/stat.h>
 #include <sys/un.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 using namespace piko::forks;
@@ -103,7 +104,6 @@ static int launch(const char *folder) {
   if (size < 0)
     fail("/proc/self/exe");
   std::memcpy(library + size, ".so", 4);
-  std::signal(SIGCHLD, SIG_IGN);
   int socket = ::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0);
   sockaddr_un address = addressIn(folder);
   if (bind(socket, reinterpret_cast<sockaddr *>(&address), sizeof address) ||
@@ -122,6 +122,9 @@ static int launch(const char *folder) {
     close(client);
   }
   unlink(address.sun_path);
+  close_range(STDERR_FILENO + 1, ~0U, 0); // which ends the servers
+  while (wait(nullptr) > 0)
+    ;
   return 0;
 }
 
