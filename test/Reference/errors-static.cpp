@@ -9,6 +9,10 @@
 // RUN: not %cxx_behind_header -DCASE=5 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=CONST
 // RUN: not %cxx_behind_header -DCASE=6 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=COPY
 // RUN: not %cxx_behind_header -DCASE=7 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=COPY
+// RUN: not %cxx_behind_header -DCASE=8 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=PROCESS
+// RUN: not %cxx_behind_header -DCASE=9 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=SCHEDULE
+// RUN: not %cxx_behind_header -DCASE=10 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=BIN
+// RUN: not %cxx_behind_header -DCASE=11 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=SCHEDULE
 // RUN: not pikoc -DCASE=6 --pipe TakePipe %s -o %t.o 2>&1 | FileCheck %s --check-prefix=COPY
 #include <piko.h>
 
@@ -68,12 +72,41 @@ struct TakeImage : piko::Stage<0, 0, 4, float>, piko::Uses<State> {
     state().out[0] = old;
   }
 };
+// A phase that cannot be called is not taken for one that is not there.
+// PROCESS: error: {{.*}}a stage needs a public process(const In &) or process(const piko::List<In> &)
+// SCHEDULE: error: {{.*}}expected schedule(piko::BinId) of a stage to be public
+// BIN: error: {{.*}}expected assignBin(const In &) of a stage to be public
+class Phases : public piko::Stage<0, 0, 4, float> {
+#if CASE != 8
+public:
+#endif
+  void process(float) {}
+#if CASE == 11
+  void schedule() {}
+#else
+#if CASE == 9
+private:
+#endif
+  void schedule(piko::BinId) {}
+#endif
+#if CASE == 10
+private:
+#else
+public:
+#endif
+  void assignBin(float value) {
+    if (value > 0)
+      assignToBin(value, piko::BinId{0});
+  }
+};
 struct TakePipe : piko::Pipe<State> {
+  Phases phases;
   TakeImage takeImage;
   Take take;
   TakeBase takeBase;
   TakeAny takeAny;
   TakePipe() {
+    source(phases);
     source(takeImage);
     source(take);
     source(takeBase);

@@ -26,6 +26,27 @@ template <class Taken, class In> constexpr void expectPrimitive() {
                 "takes another type");
 }
 
+// A member of a name that two bases have is ambiguous, whether it is private in
+// one of them or not: so a phase that cannot be called is not taken for none.
+struct NamesAssignBin {
+  int assignBin;
+};
+struct NamesSchedule {
+  int schedule;
+};
+template <class S, class Names> struct BothNames : S, Names {};
+template <class S>
+concept hasAssignBin = !std::is_final_v<S> &&
+                       !requires { &BothNames<S, NamesAssignBin>::assignBin; };
+template <class S>
+concept hasSchedule = !std::is_final_v<S> &&
+                      !requires { &BothNames<S, NamesSchedule>::schedule; };
+
+template <class S, class In>
+concept canAssignBin = requires(S &s, const In &p) { s.assignBin(p); };
+template <class S>
+concept canSchedule = requires(S &s) { s.schedule(BinId{}); };
+
 /// A Node that calls the phases of the user's stage S.
 template <class S, class In> class TypedNode final : public Node {
 public:
@@ -42,13 +63,13 @@ public:
     if constexpr (requires { parameterOf(&S::assignBin); })
       expectPrimitive<std::remove_cvref_t<decltype(parameterOf(&S::assignBin))>,
                       In>();
-    if constexpr (requires(const In &p) { stage.assignBin(p); })
+    if constexpr (canAssignBin<S, In>)
       stage.assignBin(*reinterpret_cast<const In *>(primitive));
     else
       Executor::current()->assignBin(0);
   }
   void schedule(int64_t bin) override {
-    if constexpr (requires { stage.schedule(BinId{}); })
+    if constexpr (canSchedule<S>)
       stage.schedule(BinId{bin});
   }
   void process(const std::byte *primitive) override {
@@ -68,8 +89,12 @@ private:
       requires(S &s, const In &p) { s.process(p); };
   static_assert(
       takesOne || requires(S &s, const List<In> &l) { s.process(l); },
-      "a stage needs process(const In &) or "
+      "a stage needs a public process(const In &) or "
       "process(const piko::List<In> &)");
+  static_assert(!hasAssignBin<S> || canAssignBin<S, In>,
+                "expected assignBin(const In &) of a stage to be public");
+  static_assert(!hasSchedule<S> || canSchedule<S>,
+                "expected schedule(piko::BinId) of a stage to be public");
   S &stage;
 };
 
@@ -158,9 +183,8 @@ private:
   template <class State, class S, class B, int Threads, class In, class... Out>
   Node &makeNode(S &stage, BasicStage<B, Threads, In, Out...> &base,
                  State &state) {
-    static_assert(
-        B::wholeDomain || requires(const In &p) { stage.assignBin(p); },
-        "a stage with several bins needs assignBin");
+    static_assert(B::wholeDomain || hasAssignBin<S> || canAssignBin<S, In>,
+                  "a stage with several bins needs assignBin");
     std::unique_ptr<Node> node(new TypedNode<S, In>(stage));
     node->rank = B::rank;
     for (int d = 0; d < B::rank; ++d)
