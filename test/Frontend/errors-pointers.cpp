@@ -9,6 +9,7 @@
 // RUN: not piko-translate --cpp-to-piko -DCASE=5 %s 2>&1 | FileCheck %s --check-prefix=EQUAL
 // RUN: not piko-translate --cpp-to-piko -DCASE=6 %s 2>&1 | FileCheck %s --check-prefix=BYTES
 // RUN: not piko-translate --cpp-to-piko -DCASE=7 %s 2>&1 | FileCheck %s --check-prefix=BEST
+// RUN: not piko-translate --cpp-to-piko -DCASE=9 %s 2>&1 | FileCheck %s --check-prefix=CALLEE
 // RUN: piko-translate --cpp-to-piko -DCASE=8 %s | FileCheck %s --check-prefix=INSTEAD
 #include <piko.h>
 
@@ -29,6 +30,14 @@ struct Bytes {
 };
 
 struct Stage : piko::Stage<0, 0, 1, A, A> {
+#if CASE == 9
+  static float partOf(const A &a, int i) {
+    glm::vec4 v(a.x, a.y, a.z, 1);
+    const float *parts = &v.x;
+    // CALLEE: errors-pointers.cpp:[[#@LINE + 1]]:12: error: not supported in Piko: a local variable 'v' whose parts are accessed in ways that cannot be told apart, in stage 'stage'; access its members by name and its arrays by index{{$}}
+    return parts[i];
+  }
+#endif
   void process(const A &a) {
     int k[4] = {a.x, 2, a.y, 7}, l[4] = {1, a.y, 3, a.x};
     int i = a.x & 3;
@@ -52,7 +61,7 @@ struct Stage : piko::Stage<0, 0, 1, A, A> {
     // EQUAL: errors-pointers.cpp:[[#@LINE + 1]]:13: error: not supported in Piko: a call of 'memcmp', {{.*}}; write a loop over the elements{{$}}
     out.x = std::memcmp(k, l, sizeof k);
 #elif CASE == 6
-    // BYTES: errors-pointers.cpp:[[#@LINE + 1]]:11: error: not supported in Piko: a local variable 'bytes' whose parts are accessed in ways that cannot be told apart, in stage 'stage'; access its members by name and its arrays by index{{$}}
+    // BYTES: errors-pointers.cpp:[[#@LINE + 2]]:5: error: not supported in Piko: a local variable 'bytes' whose parts are accessed in ways that cannot be told apart, in stage 'stage'; access its members by name and its arrays by index{{$}}
     Bytes bytes = {{1, 2, 3, 4}, {5, 6, 7, 8}};
     bytes.c[i] = a.y;
     out.x = *(std::end(bytes.c) - i - 1) + bytes.d[i];
@@ -64,6 +73,9 @@ struct Stage : piko::Stage<0, 0, 1, A, A> {
         best = &one;
     // BEST: errors-pointers.cpp:[[#@LINE + 1]]:18: error: not supported in Piko: comparing or subtracting pointers that are not known to point into one array; compare indices{{$}}
     out.x = best == &all[1];
+#elif CASE == 9
+    // CALLEE: errors-pointers.cpp:[[#@LINE + 1]]:13: note: called from here{{$}}
+    out.z = partOf(a, i);
 #else
     // What the messages say to use.
     // INSTEAD: piko.emit

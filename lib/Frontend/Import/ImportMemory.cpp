@@ -26,19 +26,36 @@ using llvm::success;
 static constexpr int64_t localLimit = 256 * 1024;
 
 /// The first access to a variable that says where it is: a variable itself does
-/// not.
+/// not, and where it begins and ends to live is where its function is called.
 static const llvm::Instruction *findLocatedUse(const llvm::Value *pointer) {
   const llvm::Instruction *found = nullptr;
   for (const llvm::User *user : pointer->users()) {
     auto *use = dyn_cast<llvm::Instruction>(user);
     if (use && llvm::isa<llvm::GetElementPtrInst>(use) && !use->getDebugLoc())
       use = findLocatedUse(use);
-    if (use && use->getDebugLoc() &&
+    if (use && use->getDebugLoc() && !use->isLifetimeStartOrEnd() &&
         (!found ||
          use->getDebugLoc().getLine() < found->getDebugLoc().getLine()))
       found = use;
   }
   return found;
+}
+
+/// An access to a part of a variable that is known when it runs.
+static const llvm::Instruction *findComputedUse(const llvm::Value *pointer,
+                                                int depth = 0) {
+  for (const llvm::User *user : pointer->users()) {
+    const auto *use = dyn_cast<llvm::Instruction>(user);
+    if (!use || depth == 8)
+      continue;
+    const auto *part = dyn_cast<llvm::GetElementPtrInst>(use);
+    if (part && !part->hasAllConstantIndices())
+      return part->getDebugLoc() ? part : findLocatedUse(part);
+    if (part || llvm::isa<llvm::PHINode, llvm::SelectInst>(use))
+      if (const llvm::Instruction *found = findComputedUse(use, depth + 1))
+        return found;
+  }
+  return nullptr;
 }
 
 /// What keeps a variable whole, if it is a question of where it is.
@@ -61,7 +78,9 @@ static const llvm::Instruction *findPlaceUse(const llvm::Value *pointer,
 LogicalResult PhaseImporter::rejectVariable(llvm::AllocaInst *variable) {
   if (const llvm::Instruction *use = findPlaceUse(variable))
     return reject(use, comparedPlaces);
-  const llvm::Instruction *use = findLocatedUse(variable);
+  const llvm::Instruction *use = findComputedUse(variable);
+  if (!use)
+    use = findLocatedUse(variable);
   return reject(use ? use : variable,
                 "a local variable" + getVariableName(variable) +
                     " whose parts are accessed in ways that cannot be told "
