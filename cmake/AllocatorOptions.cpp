@@ -7,11 +7,31 @@
 // The environment (MIMALLOC_LARGE_OS_PAGES, ...) has the last word.
 //
 //===----------------------------------------------------------------------===//
+#include <cerrno>
 #include <mimalloc.h>
+#include <new>
 
 namespace {
 
+/// What is thrown takes memory, too, and has some apart where there is none.
+struct Throwing {
+  Throwing() { now = true; }
+  Throwing(const Throwing &) = delete;
+  Throwing &operator=(const Throwing &) = delete;
+  ~Throwing() { now = false; }
+  static inline thread_local bool now = false;
+};
+
+/// The allocator's `operator new` would abort.
+void refuse(int error, void *) {
+  if (Throwing::now || (error != ENOMEM && error != EOVERFLOW))
+    return;
+  Throwing scope;
+  throw std::bad_alloc();
+}
+
 void setOptions() {
+  mi_register_error(refuse, nullptr);
 #if MI_MALLOC_VERSION >= 210
   mi_option_set_default(mi_option_purge_delay, -1);
   mi_option_set_default(mi_option_allow_large_os_pages, 1);

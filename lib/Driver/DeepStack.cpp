@@ -14,6 +14,7 @@
 #include <cerrno>
 #include <csetjmp>
 #include <mutex>
+#include <new>
 #include <system_error>
 
 #include <pthread.h>
@@ -68,6 +69,18 @@ static int callOnDeepStack(llvm::function_ref<void()> function) {
 void piko::runOnDeepStack(llvm::function_ref<void()> function) {
   if (callOnDeepStack(function) != 0)
     function();
+}
+
+static void refuseMemory(void *, const char *, bool) {
+  if (std::new_handler handler = std::get_new_handler())
+    handler();
+}
+
+int piko::runMainOnDeepStack(llvm::function_ref<int()> main) {
+  llvm::install_bad_alloc_error_handler(refuseMemory);
+  int status = 1;
+  runOnDeepStack([&] { status = main(); });
+  return status;
 }
 
 // --- Fatal errors -----------------------------------------------------------

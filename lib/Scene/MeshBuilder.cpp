@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #include "MeshBuilder.h"
 
+#include "Piko/Support/OutOfMemory.h"
 #include "Vectors.h"
 
 #include <algorithm>
@@ -40,6 +41,17 @@ glm::vec3 render::normalizeOr(glm::vec3 v, glm::vec3 otherwise) {
   return length > 0 && std::isfinite(length) ? v * (1 / length) : otherwise;
 }
 
+template <class T> bool MeshBuilder::hasRoom(const std::vector<T> &elements) {
+  if (elements.size() < elements.capacity())
+    return true;
+  static const uint64_t memory = support::memoryOfMachine();
+  bool fits = elements.size() < memory / (2 * sizeof(T));
+  if (!fits)
+    fail("it takes more than the machine's memory of " +
+         std::to_string(memory) + " bytes");
+  return fits;
+}
+
 int32_t MeshBuilder::addVertex(glm::vec3 position, glm::vec3 normal,
                                bool toJoin) {
   if (!isFinite(position))
@@ -55,6 +67,8 @@ int32_t MeshBuilder::addVertex(glm::vec3 position, glm::vec3 normal,
     if (!isNew)
       return known->second;
   }
+  if (!hasRoom(mesh.vertices))
+    return 0;
   mesh.vertices.push_back({position, normal, int32_t(next)});
   return int32_t(next);
 }
@@ -63,7 +77,8 @@ void MeshBuilder::addTriangle(glm::ivec3 corners) {
   size_t next = mesh.triangles.size();
   if (next == std::numeric_limits<int32_t>::max())
     return fail("it holds more than 2^31 triangles");
-  mesh.triangles.push_back({corners, int32_t(next)});
+  if (hasRoom(mesh.triangles))
+    mesh.triangles.push_back({corners, int32_t(next)});
 }
 
 void MeshBuilder::addPolygon(std::span<const int32_t> corners) {

@@ -50,6 +50,8 @@ public:
 
 private:
   void smoothNormals();
+  /// Whether another one fits into the machine's memory, or a failure.
+  template <class T> bool hasRoom(const std::vector<T> &elements);
 
   Mesh mesh;
   std::unordered_map<VertexKey, int32_t, HashVertexKey> joined;

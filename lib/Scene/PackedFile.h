@@ -4,13 +4,18 @@
 #define PIKO_LIB_SCENE_PACKEDFILE_H
 
 #include "Piko/Scene/Result.h"
+#include "Piko/Support/OutOfMemory.h"
 
+#include <cstdint>
 #include <string>
 
 namespace piko::render {
 
-/// The content of a file, unpacked if it is gzipped. The error says why alone.
-Result<std::string> readFile(const std::string &path);
+/// The content of a file, unpacked if it is gzipped: a small file may unpack to
+/// a thousand times as much, which ends at `most` bytes. The error says why
+/// alone.
+Result<std::string> readFile(const std::string &path,
+                             uint64_t most = support::memoryOfMachine());
 
 /// The extension that says the format, without ".gz": lowercase and with its
 /// dot.

@@ -13,6 +13,8 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <new>
+#include <stdexcept>
 
 using namespace piko;
 using namespace piko::render;
@@ -76,7 +78,8 @@ Result<Mesh> loadOwn(const std::string &path, const std::string &format,
   return mesh;
 }
 
-Result<Mesh> load(const std::string &path, const ProgressFunction &progress) {
+Result<Mesh> loadAny(const std::string &path,
+                     const ProgressFunction &progress) {
   std::error_code ignored;
   if (fs::is_directory(path, ignored))
     return Error{"it is a folder"};
@@ -91,6 +94,15 @@ Result<Mesh> load(const std::string &path, const ProgressFunction &progress) {
   if (isOwnFormat(format))
     return loadOwn(path, format, progress);
   return importMesh(path);
+}
+
+Result<Mesh> load(const std::string &path, const ProgressFunction &progress) {
+  try {
+    return loadAny(path, progress);
+  } catch (const std::bad_alloc &) {
+  } catch (const std::length_error &) { // more than there are addresses
+  }
+  return Error{"there is not enough memory for it"};
 }
 
 } // namespace

@@ -3,6 +3,7 @@
 #include "Piko/Scene/ImageError.h"
 #include "Piko/Scene/ImageFile.h"
 #include "Piko/Scene/Json.h"
+#include "Piko/Support/OutOfMemory.h"
 #include "Piko/Support/OutputFile.h"
 
 #include <algorithm>
@@ -159,6 +160,7 @@ int fail(const Error &error) {
 } // namespace
 
 int main(int argc, char **argv) {
+  piko::support::reportOutOfMemory("piko-diff");
   std::signal(SIGXFSZ, SIG_IGN); // to write beyond a limit is an error
   auto options = parseOptions({argv + 1, argv + argc});
   if (!options)

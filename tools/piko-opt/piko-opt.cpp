@@ -5,6 +5,7 @@
 #include "Piko/Driver/DeepStack.h"
 #include "Piko/Driver/PassReport.h"
 #include "Piko/Driver/Registration.h"
+#include "Piko/Support/OutOfMemory.h"
 
 #include "mlir/IR/MLIRContext.h"
 #include "mlir/Pass/PassManager.h"
@@ -82,5 +83,6 @@ static int optimize(int argc, char **argv) {
 }
 
 int main(int argc, char **argv) {
+  piko::support::reportOutOfMemory("piko-opt");
   return piko::runMainOnDeepStack([&] { return optimize(argc, argv); });
 }

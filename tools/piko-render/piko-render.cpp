@@ -18,6 +18,7 @@
 #include "Piko/Replay/Outcome.h"
 #include "Piko/Scene/ImageFile.h"
 #include "Piko/Scene/ProgressBar.h"
+#include "Piko/Support/OutOfMemory.h"
 #include "Piko/Support/OutputFile.h"
 
 #include <algorithm>
@@ -289,6 +290,7 @@ int fail(const Error &error) {
 } // namespace
 
 int main(int argc, char **argv) {
+  piko::support::reportOutOfMemory("piko-render");
   std::signal(SIGXFSZ, SIG_IGN); // to write beyond a limit is an error
   auto options = parseOptions({argv + 1, argv + argc});
   if (!options)

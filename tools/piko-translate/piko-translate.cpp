@@ -6,6 +6,7 @@
 #include "Piko/Driver/DeepStack.h"
 #include "Piko/Driver/Registration.h"
 #include "Piko/Frontend/Frontend.h"
+#include "Piko/Support/OutOfMemory.h"
 #include "Piko/Target/Graphviz.h"
 
 #include "mlir/IR/BuiltinOps.h"
@@ -27,6 +28,7 @@ static mlir::LogicalResult exportLLVMIR(mlir::Operation *op,
 }
 
 int main(int argc, char **argv) {
+  piko::support::reportOutOfMemory("piko-translate");
   piko::registerCppToPikoTranslation(piko::makeHeaderStore({}));
   piko::registerPikoToDotTranslation();
   mlir::TranslateFromMLIRRegistration toLLVMIR(

@@ -11,6 +11,7 @@
 #include "Report.h"
 #include "SceneBench.h"
 
+#include "Piko/Support/OutOfMemory.h"
 #include "Piko/Support/OutputFile.h"
 
 #include <csignal>
@@ -90,6 +91,7 @@ int fail(const Error &error) {
 } // namespace
 
 int main(int argc, char **argv) {
+  piko::support::reportOutOfMemory("piko-tune");
   std::signal(SIGXFSZ, SIG_IGN); // to write beyond a limit is an error
   auto options = parseTuneOptions({argv + 1, argv + argc});
   if (!options)

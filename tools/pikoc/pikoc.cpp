@@ -12,6 +12,7 @@
 #include "Piko/Driver/Explain.h"
 #include "Piko/Driver/ObjectCompiler.h"
 #include "Piko/Driver/TunedSetting.h"
+#include "Piko/Support/OutOfMemory.h"
 #include "Piko/Support/OutputFile.h"
 #include "Piko/Target/Object.h"
 #include "Piko/Target/PTX.h"
@@ -539,6 +540,7 @@ static int compile(int argc, char **argv) {
 
 int main(int argc, char **argv) {
   llvm::InitLLVM init(argc, argv);
+  piko::support::reportOutOfMemory("pikoc");
   std::signal(SIGXFSZ, SIG_IGN); // to write beyond a limit is an error
   return runMainOnDeepStack([&] { return compile(argc, argv); });
 }

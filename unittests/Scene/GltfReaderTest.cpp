@@ -122,6 +122,15 @@ TEST(GltfReader, Accessors) {
                                R"("componentType":5123},"values":)"
                                R"({"bufferView":0,"byteOffset":12}})"}),
             "2 of 50%"); // corner 3 is at corner 1
+  // Every 16 bytes a corner, of which two are elsewhere.
+  EXPECT_EQ(read({.positions = R"("bufferView":1,"componentType":5126,)"
+                               R"("count":3,"sparse":{"count":2,"indices":)"
+                               R"({"bufferView":2,"byteOffset":2,)"
+                               R"("componentType":5123},"values":)"
+                               R"({"bufferView":0,"byteOffset":12}})",
+                  .view = R"("byteLength":48},{"buffer":0,"byteLength":48,)"
+                          R"("byteStride":16)"}),
+            "1 of 50%");
 }
 
 TEST(GltfReader, QuantizedMeshes) {

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #include "MeshReaders.h"
 
+#include <algorithm>
+#include <bit>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
@@ -148,6 +150,36 @@ TEST(PlyReader, FacesAndStrips) {
                          faces,
                      "7 2 0.5 1e9\n3 0 1 2\n3 3 2 1")),
             "2 of 100%");
+}
+
+/// Appends a number with its largest or its smallest byte first.
+template <class T> void append(std::string &to, T value, bool isBigEndian) {
+  std::string bytes(reinterpret_cast<const char *>(&value), sizeof value);
+  if (isBigEndian == (std::endian::native == std::endian::little))
+    std::ranges::reverse(bytes);
+  to += bytes;
+}
+
+TEST(PlyReader, BothOrdersOfBytes) {
+  for (bool isBigEndian : {false, true}) {
+    std::string data;
+    for (float corner : {0.f, 1.f, 2.f, 3.f}) {
+      append(data, corner == 1 || corner == 3 ? 1.f : 0.f, isBigEndian);
+      append(data, corner >= 2 ? 1.f : 0.f, isBigEndian);
+      append(data, 0.0, isBigEndian);
+    }
+    for (int number : {4, 0, 1, 3, 2})
+      if (number == 4)
+        append(data, uint8_t(number), isBigEndian);
+      else
+        append(data, number, isBigEndian);
+    std::string file =
+        ply("element face 1\n" + faceList, data,
+            isBigEndian ? "binary_big_endian" : "binary_little_endian");
+    EXPECT_EQ(describe(readPly(file)), "2 of 100%");
+    EXPECT_EQ(describe(readPly(file.substr(0, file.size() - 1))),
+              "it is cut short, at 'face' 0");
+  }
 }
 
 /// The first byte of the data may be one that ends lines.

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #include "../Support/TemporaryFolder.h"
 
+#include "PackedFile.h"
 #include "Piko/Scene/SceneFile.h"
 
 #include <cstring>
@@ -292,7 +293,42 @@ TEST_F(SceneFile, GltfExtensions) {
         "EXT_mesh_gpu_instancing"}) {
     auto mesh = loadMesh(write("a.gltf", makeGltf(name)));
     EXPECT_TRUE(mesh) << mesh.error().message;
+    // Its buffer is in a data URI, though there could be a chunk.
+    auto packed = loadMesh(write("a.glb", makeGlb(makeGltf(name))));
+    ASSERT_TRUE(packed) << packed.error().message;
+    EXPECT_EQ(packed->triangles.size(), 1u);
   }
+}
+
+TEST_F(SceneFile, NamesWithSpaces) {
+  std::filesystem::create_directory(folder / "my scenes (1)");
+  const float corners[9] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
+  write("my scenes (1)/cor ners #1.bin",
+        std::string(reinterpret_cast<const char *>(corners), sizeof corners));
+  std::string json = makeGltf("KHR_materials_unlit");
+  size_t begin = json.find("data:"), end = json.find('"', begin);
+  for (const char *uri : {"cor ners #1.bin", "cor%20ners%20%231.bin"}) {
+    json.replace(begin, end - begin, uri);
+    end = begin + std::strlen(uri);
+    auto mesh = loadMesh(write("my scenes (1)/a b.gltf", json));
+    ASSERT_TRUE(mesh) << mesh.error().message;
+    EXPECT_EQ(mesh->triangles.size(), 1u);
+  }
+  auto roof = loadMesh(write("my scenes (1)/a roof.obj", roofObj));
+  ASSERT_TRUE(roof) << roof.error().message;
+}
+
+TEST_F(SceneFile, GzipOfMoreThanMemory) {
+  std::string path = pathOf("zeros.obj.gz"), zeros(1000000, '\0');
+  gzFile file = gzopen(path.c_str(), "wb");
+  gzwrite(file, zeros.data(), unsigned(zeros.size()));
+  gzclose(file);
+  EXPECT_TRUE(readFile(path, zeros.size()));
+  auto content = readFile(path, zeros.size() - 1);
+  ASSERT_FALSE(content);
+  EXPECT_EQ(content.error().message,
+            "it is, or unpacks to, more than the machine's memory of 999999 "
+            "bytes");
 }
 
 TEST_F(SceneFile, BrokenGzip) {

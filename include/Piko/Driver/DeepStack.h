@@ -20,12 +20,9 @@ namespace piko {
 /// `function` must not throw.
 void runOnDeepStack(llvm::function_ref<void()> function);
 
-/// The same, for a program's whole work; returns its exit status.
-inline int runMainOnDeepStack(llvm::function_ref<int()> main) {
-  int status = 1;
-  runOnDeepStack([&] { status = main(); });
-  return status;
-}
+/// The same, for a program's whole work; returns its exit status. Where LLVM
+/// gets no memory, that is as if `operator new` had none.
+int runMainOnDeepStack(llvm::function_ref<int()> main);
 
 /// The same, for a library that must not end its host's process: where LLVM
 /// meets a fatal error, or the system refuses a thread with 16 MiB of stack,
