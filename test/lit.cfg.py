@@ -38,7 +38,7 @@ split-file. Substitutions:
 PIKO_TEST_ALL=1 asks for all tests, as `make check-all` does. Features: `all` where
 that is so, `bunny` where that mesh is installed, `gpu` where an NVIDIA driver
 is, `ptxas` where NVIDIA's assembler is, `chromium` where that browser is, `asan` and `tsan` in
-builds with that sanitizer.
+builds with that sanitizer, `fork-server` where tools fork.
 """
 
 import atexit
@@ -60,13 +60,11 @@ config.test_source_root = os.path.dirname(__file__)
 config.test_exec_root = os.path.join(config.piko_binary_root, "test")
 
 
-
 def start_fork_server(tools):
     """Folder of stand-ins for `tools` that fork instead of beginning anew.
 
     Loading LLVM's libraries takes most of a short run's time. The server lasts as
     long as this process."""
-    client = os.path.join(config.test_exec_root, "support/fork-server/fork-server")
     folder = tempfile.mkdtemp(prefix="piko-tests-")
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     for name in ("bin", "tools"):
@@ -74,9 +72,9 @@ def start_fork_server(tools):
     for tool in tools:
         name = os.path.basename(tool)
         os.symlink(tool, os.path.join(folder, "tools", name))
-        os.symlink(client, os.path.join(folder, "bin", name))
+        os.symlink(fork_server, os.path.join(folder, "bin", name))
     server = subprocess.Popen(
-        [client, "--serve", folder], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+        [fork_server, "--serve", folder], stdin=subprocess.PIPE, stdout=subprocess.PIPE
     )
     server.stdout.readline()
     atexit.register(server.wait)
@@ -87,7 +85,9 @@ def start_fork_server(tools):
 
 all_tests = os.environ.get("PIKO_TEST_ALL", "0") != "0"
 path = [config.piko_tools, config.llvm_tools, config.environment["PATH"]]
-if not all_tests and not config.sanitize:
+fork_server = os.path.join(config.test_exec_root, "support/fork-server/fork-server")
+if not all_tests and not config.sanitize and os.path.exists(fork_server):
+    config.available_features.add("fork-server")
     kinds = "compare diff import opt render test-opt translate tune".split()
     tools = ["pikoc"] + ["piko-" + kind for kind in kinds]
     tools = [os.path.join(config.piko_tools, tool) for tool in tools]

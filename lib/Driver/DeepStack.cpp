@@ -4,6 +4,7 @@
 
 #include "Piko/Driver/DeepStack.h"
 
+#include "Piko/Support/OutOfMemory.h"
 #include "Piko/Support/ThreadTrial.h"
 #include "piko/arithmetic.h"
 
@@ -14,7 +15,6 @@
 #include <cerrno>
 #include <csetjmp>
 #include <mutex>
-#include <new>
 #include <system_error>
 
 #include <pthread.h>
@@ -71,13 +71,12 @@ void piko::runOnDeepStack(llvm::function_ref<void()> function) {
     function();
 }
 
-static void refuseMemory(void *, const char *, bool) {
-  if (std::new_handler handler = std::get_new_handler())
-    handler();
+static void endOutOfMemory(void *, const char *, bool) {
+  support::endOutOfMemory();
 }
 
 int piko::runMainOnDeepStack(llvm::function_ref<int()> main) {
-  llvm::install_bad_alloc_error_handler(refuseMemory);
+  llvm::install_bad_alloc_error_handler(endOutOfMemory);
   int status = 1;
   runOnDeepStack([&] { status = main(); });
   return status;

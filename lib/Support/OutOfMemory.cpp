@@ -12,8 +12,6 @@
 static const char *toolName = "piko";
 static std::terminate_handler others = nullptr;
 
-[[noreturn]] static void refuse() { throw std::bad_alloc(); }
-
 static bool isOutOfMemory() {
   std::exception_ptr why = std::current_exception();
   if (!why)
@@ -37,17 +35,21 @@ static void print(const char *text) {
   }
 }
 
-[[noreturn]] static void end() {
-  if (!isOutOfMemory())
-    others();
+void piko::support::endOutOfMemory() {
   print(toolName);
   print(": error: out of memory\n");
   _exit(1);
 }
 
+[[noreturn]] static void end() {
+  if (!isOutOfMemory())
+    others();
+  piko::support::endOutOfMemory();
+}
+
 void piko::support::reportOutOfMemory(const char *tool) {
   toolName = tool;
-  std::set_new_handler(refuse);
+  std::set_new_handler(nullptr); // LLVM's would abort
   others = std::set_terminate(end);
 }
 

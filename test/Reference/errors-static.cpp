@@ -74,8 +74,8 @@ struct TakeImage : piko::Stage<0, 0, 4, float>, piko::Uses<State> {
 };
 // A phase that cannot be called is not taken for one that is not there.
 // PROCESS: error: {{.*}}a stage needs a public process(const In &) or process(const piko::List<In> &)
-// SCHEDULE: error: {{.*}}expected schedule(piko::BinId) of a stage to be public
-// BIN: error: {{.*}}expected assignBin(const In &) of a stage to be public
+// SCHEDULE: error: {{.*}}expected schedule of a stage to be public and to take a piko::BinId
+// BIN: error: {{.*}}expected assignBin of a stage to be public and to take its primitive
 class Phases : public piko::Stage<0, 0, 4, float> {
 #if CASE != 8
 public:

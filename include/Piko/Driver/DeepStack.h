@@ -21,7 +21,7 @@ namespace piko {
 void runOnDeepStack(llvm::function_ref<void()> function);
 
 /// The same, for a program's whole work; returns its exit status. Where LLVM
-/// gets no memory, that is as if `operator new` had none.
+/// gets no memory the process ends with a line that says so.
 int runMainOnDeepStack(llvm::function_ref<int()> main);
 
 /// The same, for a library that must not end its host's process: where LLVM

@@ -7,11 +7,12 @@
 
 namespace piko::support {
 
-/// For a program of one's own, not for a library: where there is no memory left
-/// `operator new` throws std::bad_alloc, also mimalloc's, which would abort;
-/// and where nobody catches that, the process ends with "TOOL: error: out of
-/// memory" and exit status 1.
+/// For a program of one's own, not for a library: where nobody catches
+/// std::bad_alloc the process ends as endOutOfMemory does.
 void reportOutOfMemory(const char *tool);
+
+/// Ends the process with "TOOL: error: out of memory" and exit status 1.
+[[noreturn]] void endOutOfMemory();
 
 /// What the machine has, in bytes: the system gives more than that, and ends
 /// the process when it is used.

@@ -27,15 +27,18 @@ def run(*arguments, **options):
 
 
 def find_waiting(pipe):
-    """The limits of the tool's process that has the pipe open, if there is one."""
+    """What the system says of the tool's process that has the pipe open: its limits
+    and what its parent runs; nothing without such a process."""
     for process in pathlib.Path("/proc").glob("[0-9]*"):
         try:
             files = [os.readlink(file) for file in (process / "fd").iterdir()]
             if pipe in files and os.readlink(process / "exe").endswith("/" + tool):
-                return (process / "limits").read_text()
+                parent = re.search(r"PPid:\t(\d+)", (process / "status").read_text())
+                runs = os.readlink(f"/proc/{parent[1]}/exe")
+                return (process / "limits").read_text(), runs
         except OSError:
             pass
-    return None
+    return "", ""
 
 
 def prepare():
@@ -53,14 +56,15 @@ def interrupt(folder, number):
     )
     os.close(reader)
     # It has them soon after its files.
-    while not re.search(r"Max open files +77 +77 ", find_waiting(pipe) or ""):
+    while not re.search(r"Max open files +77 +77 ", (waiting := find_waiting(pipe))[0]):
         time.sleep(0.01)
     process.send_signal(number)
     process.wait(timeout=60)
-    while find_waiting(pipe):
+    while any(find_waiting(pipe)):
         time.sleep(0.01)
     os.remove(pipe)
-    return process.returncode
+    is_forked = waiting[1].endswith("/" + tool)
+    return process.returncode, is_forked
 
 
 def main():
@@ -83,8 +87,9 @@ def main():
         assert run(f"/proc/self/fd/{file}", pass_fds=[file]).returncode == 0
         assert run(f"/proc/self/fd/{file}").returncode == 1
         for number in (signal.SIGTERM, signal.SIGINT, signal.SIGKILL):
-            assert interrupt(folder, number) == -number
-    print("as a process of its own")
+            code, is_forked = interrupt(folder, number)
+            assert code == -number
+    print("a fork" if is_forked else "a process of its own")
 
 
 if __name__ == "__main__":

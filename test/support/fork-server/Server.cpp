@@ -71,15 +71,14 @@ static Job readJob(int file) {
 /// The client's files get their numbers; nothing else is open.
 static void takeFiles(const Request &request, int *files) {
   constexpr int aside = 512;
-  int last = 2;
-  for (int32_t i = 0; i < request.files; ++i)
-    files[i] = fcntl(files[i], F_DUPFD_CLOEXEC, aside);
-  close_range(0, aside - 1, 0);
   for (int32_t i = 0; i < request.files; ++i) {
-    dup2(files[i], request.numbers[i]);
-    if (request.numbers[i] > last)
-      last = request.numbers[i];
+    files[i] = fcntl(files[i], F_DUPFD_CLOEXEC, aside);
+    if (files[i] < 0)
+      refuse();
   }
+  close_range(0, aside - 1, 0);
+  for (int32_t i = 0; i < request.files; ++i)
+    dup2(files[i], request.numbers[i]);
   close_range(aside, ~0U, 0);
 }
 

@@ -92,9 +92,11 @@ private:
       "a stage needs a public process(const In &) or "
       "process(const piko::List<In> &)");
   static_assert(!hasAssignBin<S> || canAssignBin<S, In>,
-                "expected assignBin(const In &) of a stage to be public");
+                "expected assignBin of a stage to be public and to take its "
+                "primitive");
   static_assert(!hasSchedule<S> || canSchedule<S>,
-                "expected schedule(piko::BinId) of a stage to be public");
+                "expected schedule of a stage to be public and to take a "
+                "piko::BinId");
   S &stage;
 };
 
