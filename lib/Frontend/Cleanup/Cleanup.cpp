@@ -110,19 +110,28 @@ static void dropHints(llvm::Function &function) {
 /// Inlines calls whose callee has become known; whether there were any.
 static bool inlineKnownCalls(llvm::Function &function) {
   bool changed = false;
+  // A function that was returned by one call may be called by the next.
   for (bool again = true; again;) {
     again = false;
-    for (llvm::Instruction &instruction : llvm::instructions(function)) {
-      auto *call = dyn_cast<llvm::CallInst>(&instruction);
+    llvm::SmallVector<llvm::WeakTrackingVH> calls; // the next one last
+    for (llvm::Instruction &instruction : llvm::instructions(function))
+      if (llvm::isa<llvm::CallInst>(instruction))
+        calls.push_back(&instruction);
+    std::reverse(calls.begin(), calls.end());
+    while (!calls.empty()) {
+      auto *call = llvm::dyn_cast_or_null<llvm::CallInst>(
+          static_cast<llvm::Value *>(calls.pop_back_val()));
       llvm::Function *callee = call ? call->getCalledFunction() : nullptr;
       if (!callee || callee->isDeclaration())
         continue;
       llvm::InlineFunctionInfo info;
-      again = llvm::InlineFunction(*call, info).isSuccess();
-      changed |= again;
-      if (again)
-        break;
+      if (!llvm::InlineFunction(*call, info).isSuccess())
+        continue;
+      again = true;
+      for (llvm::CallBase *inner : llvm::reverse(info.InlinedCallSites))
+        calls.push_back(inner);
     }
+    changed |= again;
   }
   return changed;
 }
