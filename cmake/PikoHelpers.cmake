@@ -14,15 +14,21 @@ if(PIKO_ENABLE_COMPILER)
   separate_arguments(PIKO_LLVM_DEFINITIONS NATIVE_COMMAND "${LLVM_DEFINITIONS}")
   target_compile_definitions(piko_llvm INTERFACE ${PIKO_LLVM_DEFINITIONS})
   if(CMAKE_BUILD_TYPE STREQUAL "Release")
-    # The dialect's generated code compiles in half of the time of -O3, and the
-    # compiler is as fast: what takes its time are LLVM's libraries.
-    target_compile_options(piko_llvm INTERFACE $<$<COMPILE_LANGUAGE:CXX>:-O1>)
+    # It compiles in half of the time of -O3, and the compiler is as fast: what
+    # takes its time are LLVM's libraries. PIKO_OPTIMIZATION: another level.
+    set(level $<TARGET_PROPERTY:PIKO_OPTIMIZATION>)
+    target_compile_options(piko_llvm INTERFACE
+      $<$<COMPILE_LANGUAGE:CXX>:-O$<IF:$<STREQUAL:${level},>,1,${level}>>)
   else()
     target_compile_options(piko_llvm INTERFACE
       $<$<COMPILE_LANGUAGE:CXX>:SHELL:-include ${CMAKE_CURRENT_LIST_DIR}/LLVMStatistics.h>)
   endif()
   if(NOT LLVM_ENABLE_RTTI)
     target_compile_options(piko_llvm INTERFACE $<$<COMPILE_LANGUAGE:CXX>:-fno-rtti>)
+  endif()
+  # As LLVM is, which no exception could leave. Tools catch those of the runtime.
+  if(NOT LLVM_ENABLE_EH)
+    set(PIKO_COMPILER_FLAGS $<$<COMPILE_LANGUAGE:CXX>:-fno-exceptions>)
   endif()
   target_link_libraries(piko_llvm INTERFACE
     ${PIKO_LLVM_PREFIX}/lib/libMLIR.so ${PIKO_LLVM_PREFIX}/lib/libLLVM.so)
@@ -49,7 +55,8 @@ function(piko_add_precompiled target header)
   add_library(${target} OBJECT ${CMAKE_CURRENT_FUNCTION_LIST_DIR}/Precompiled.cpp)
   set_target_properties(${target} PROPERTIES CXX_COMPILER_LAUNCHER "")
   target_link_libraries(${target} PRIVATE piko_options ${ARGN})
-  target_compile_options(${target} PRIVATE "SHELL:-Xclang -fno-pch-timestamp")
+  target_compile_options(${target} PRIVATE
+    ${PIKO_COMPILER_FLAGS} "SHELL:-Xclang -fno-pch-timestamp")
   target_precompile_headers(${target} PRIVATE
     ${CMAKE_CURRENT_FUNCTION_LIST_DIR}/${header})
   set(dialect ${PROJECT_SOURCE_DIR}/include/Piko/Dialect/Piko/IR)
@@ -95,19 +102,22 @@ function(piko_add_sanitizer_options name)
 endfunction()
 
 # piko_add_library(PikoX SOURCES... [DEPENDS tablegen targets] [LINK libraries]
-#                  [PRECOMPILED mlir|clang])
+#                  [PRECOMPILED mlir|clang|none])
 # A static library of the compiler.
 function(piko_add_library name)
   cmake_parse_arguments(ARG "" "PRECOMPILED" "DEPENDS;LINK" ${ARGN})
   add_library(${name} STATIC ${ARG_UNPARSED_ARGUMENTS})
   target_link_libraries(${name} PRIVATE piko_options PUBLIC piko_llvm ${ARG_LINK})
+  target_compile_options(${name} PRIVATE ${PIKO_COMPILER_FLAGS})
   if(ARG_DEPENDS)
     add_dependencies(${name} ${ARG_DEPENDS})
   endif()
   if(NOT ARG_PRECOMPILED)
     set(ARG_PRECOMPILED mlir)
   endif()
-  piko_use_precompiled(${name} piko_precompiled_${ARG_PRECOMPILED})
+  if(NOT ARG_PRECOMPILED STREQUAL "none")
+    piko_use_precompiled(${name} piko_precompiled_${ARG_PRECOMPILED})
+  endif()
   piko_unite(${name})
 endfunction()
 
