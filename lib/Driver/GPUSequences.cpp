@@ -56,7 +56,7 @@ void piko::addNVVMSequence(OpPassManager &passes) {
   kernels.addPass(createReloadInputs());
   kernels.addPass(createOutlineRareWork());
   kernels.addPass(createSpillToBlock());
-  addSCFToControlFlow(kernels);
+  kernels.addPass(createConvertSCFToControlFlowInReverse());
   kernels.addPass(createConvertGPUToExactNVVM());
   addCleanUp(kernels);
 }

@@ -17,9 +17,6 @@ void addCleanUp(mlir::OpPassManager &passes);
 void addUnitsToLoops(mlir::OpPassManager &passes,
                      const SynthesisOptions &options);
 
-/// Branches of scf become those of cf.
-void addSCFToControlFlow(mlir::OpPassManager &passes);
-
 } // namespace piko
 
 #endif // PIKO_LIB_DRIVER_SEQUENCEPARTS_H

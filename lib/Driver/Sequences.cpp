@@ -12,7 +12,6 @@
 #include "mlir/Conversion/MathToLLVM/MathToLLVM.h"
 #include "mlir/Conversion/OpenMPToLLVM/ConvertOpenMPToLLVM.h"
 #include "mlir/Conversion/ReconcileUnrealizedCasts/ReconcileUnrealizedCasts.h"
-#include "mlir/Conversion/SCFToControlFlow/SCFToControlFlow.h"
 #include "mlir/Conversion/UBToLLVM/UBToLLVM.h"
 #include "mlir/Conversion/VectorToLLVM/ConvertVectorToLLVMPass.h"
 #include "mlir/Pass/PassOptions.h"
@@ -226,16 +225,8 @@ void piko::addCPUSequence(OpPassManager &passes,
   addVectorSequence(passes, options, cpu);
 }
 
-/// A rollback would be of each operation that moves to a new block, and what is
-/// behind one of many branches moves with each of them.
-void piko::addSCFToControlFlow(OpPassManager &passes) {
-  SCFToControlFlowPassOptions options;
-  options.allowPatternRollback = false;
-  passes.addPass(createSCFToControlFlowPass(options));
-}
-
 void piko::addLLVMSequence(OpPassManager &passes) {
-  addSCFToControlFlow(passes);
+  passes.addPass(createConvertSCFToControlFlowInReverse());
   passes.addPass(createConvertVectorToLLVMPass());
   passes.addPass(createConvertMathToLLVMPass());
   passes.addPass(createUBToLLVMConversionPass());

@@ -390,7 +390,7 @@ def ConvertGPUToExactNVVM
     : Pass<"convert-gpu-to-exact-nvvm", "::mlir::gpu::GPUModuleOp"> {
   let summary = "Turn kernels into the nvvm and llvm dialects, without libdevice";
   let description = [{
-    **Requires** kernels without structured control flow (`convert-scf-to-cf`).
+    **Requires** kernels without structured control flow (`convert-scf-to-cf-in-reverse`).
 
     **Does**: what upstream's `convert-gpu-to-nvvm` does, but for functions. Those
     of `math` become LLVM's, which PTX has with the bits of a CPU: `math.sqrt` is
@@ -412,6 +412,40 @@ def ConvertGPUToExactNVVM
   }];
   let dependentDialects = ["::mlir::LLVM::LLVMDialect",
                            "::mlir::NVVM::NVVMDialect"];
+}
+
+def ConvertSCFToControlFlowInReverse
+    : Pass<"convert-scf-to-cf-in-reverse"> {
+  let summary = "Turn structured control flow into branches, the last first";
+  let description = [{
+    **Does**: what upstream's `convert-scf-to-cf` does, with its patterns, but from the
+    end of each block. A conversion splits its block, and each operation behind it
+    moves to the new one: from the front, N conditions of a block move its end N
+    times, from the end once.
+
+    **Guarantees** that no operation of `scf` with a region is left.
+
+    Before:
+    ```
+    scf.if %c {
+      "store"() : () -> ()
+    }
+    "rest"() : () -> ()
+    ```
+    After:
+    ```
+      cf.cond_br %c, ^bb1, ^bb2
+    ^bb1:
+      "store"() : () -> ()
+      cf.br ^bb2
+    ^bb2:
+      "rest"() : () -> ()
+    ```
+
+    **Limits**: one that upstream cannot convert is an error.
+  }];
+  let dependentDialects = ["::mlir::arith::ArithDialect",
+                           "::mlir::cf::ControlFlowDialect"];
 }
 
 def ConvertPikoToLLVM : Pass<"convert-piko-to-llvm", "::mlir::ModuleOp"> {

@@ -1,5 +1,5 @@
 // RUN: piko-opt %s --pass-pipeline='builtin.module(gpu.module(piko-outline-rare-work))' --split-input-file | FileCheck %s
-// RUN: piko-opt %s --pass-pipeline='builtin.module(gpu.module(piko-outline-rare-work,convert-scf-to-cf,convert-gpu-to-exact-nvvm))' --split-input-file | FileCheck %s --check-prefix=LLVM
+// RUN: piko-opt %s --pass-pipeline='builtin.module(gpu.module(piko-outline-rare-work,convert-scf-to-cf-in-reverse,convert-gpu-to-exact-nvvm))' --split-input-file | FileCheck %s --check-prefix=LLVM
 
 // What the thread's number gives is computed again; parameters go by the block's
 // memory; an array of the loop's own moves; of another one a copy comes back.

@@ -19,7 +19,7 @@ STEPS.insert(5, "piko-prune")
 STEPS += ["piko.pipeline(convert-piko-to-scf{private-tiles=true})"]
 STEPS += ["piko.pipeline(piko-vectorize)"]
 STEPS += ["piko.pipeline(convert-piko-to-openmp)", "convert-piko-to-llvm"]
-STEPS += ["convert-scf-to-cf,convert-vector-to-llvm,convert-math-to-llvm"]
+STEPS += ["convert-scf-to-cf-in-reverse,convert-vector-to-llvm,convert-math-to-llvm"]
 STEPS += ["convert-ub-to-llvm,convert-openmp-to-llvm"]
 STEPS += ["reconcile-unrealized-casts"]
 

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Structured control flow to branches, in time that grows with the text.
+
+#include "Piko/Conversion/Passes.h"
+
+#include "mlir/Conversion/SCFToControlFlow/SCFToControlFlow.h"
+#include "mlir/Dialect/ControlFlow/IR/ControlFlow.h"
+#include "mlir/Dialect/SCF/IR/SCF.h"
+#include "mlir/IR/Iterators.h"
+#include "mlir/IR/PatternMatch.h"
+#include "mlir/Rewrite/PatternApplicator.h"
+
+namespace piko {
+#define GEN_PASS_DEF_CONVERTSCFTOCONTROLFLOWINREVERSE
+#include "Piko/Conversion/Passes.h.inc"
+} // namespace piko
+
+using namespace mlir;
+using namespace piko;
+
+namespace {
+struct ConvertSCFToControlFlowInReverse
+    : piko::impl::ConvertSCFToControlFlowInReverseBase<
+          ConvertSCFToControlFlowInReverse> {
+  void runOnOperation() override {
+    RewritePatternSet patterns(&getContext());
+    populateSCFToControlFlowConversionPatterns(patterns);
+    FrozenRewritePatternSet frozen(std::move(patterns));
+    PatternApplicator applicator(frozen);
+    applicator.applyDefaultCostModel();
+    PatternRewriter rewriter(&getContext());
+    // A loop of one kind may become one of another.
+    for (llvm::SmallVector<Operation *> found = collect(); !found.empty();
+         found = collect())
+      for (Operation *op : found) {
+        rewriter.setInsertionPoint(op);
+        if (succeeded(applicator.matchAndRewrite(op, rewriter)))
+          continue;
+        op->emitOpError("has no form of branches");
+        return signalPassFailure();
+      }
+  }
+
+  /// Structured control flow, the last in a block first: what is behind it is
+  /// then no more than a branch and what follows up to the next.
+  llvm::SmallVector<Operation *> collect() {
+    llvm::SmallVector<Operation *> found;
+    getOperation()->walk<WalkOrder::PreOrder, ReverseIterator>(
+        [&](Operation *op) {
+          if (isa<scf::ExecuteRegionOp, scf::ForOp, scf::ForallOp, scf::IfOp,
+                  scf::IndexSwitchOp, scf::ParallelOp, scf::WhileOp>(op))
+            found.push_back(op);
+        });
+    return found;
+  }
+};
+} // namespace
