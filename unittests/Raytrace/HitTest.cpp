@@ -275,6 +275,34 @@ TEST(Hit, DoesNotDependOnTheTree) {
   EXPECT_GT(hits, 20000);
 }
 
+// Rays whose component is exactly 0, of either sign, that start in the plane of
+// a side of boxes, in a room and outside of it, some along an axis.
+TEST(Hit, RaysInThePlanesOfBoxes) {
+  Mesh mesh = makeCube(8);
+  Target room(mesh);
+  int hits = 0, misses = 0;
+  for (int axis = 0; axis < 3; ++axis)
+    for (int plane = -9; plane <= 9; ++plane)
+      for (int i = 0; i < 1000; ++i) {
+        int u = (axis + 1) % 3, v = (axis + 2) % 3;
+        glm::vec3 origin, direction;
+        origin[axis] = float(plane) / 8;
+        origin[u] = float(i % 10 - 5) / 4;
+        origin[v] = float(i / 10 % 10 - 5) / (i % 2 ? 4.0f : 3.0f);
+        direction[axis] = i % 4 < 2 ? 0.0f : -0.0f;
+        direction[u] = float(i / 100 % 3 - 1);
+        direction[v] = float(i / 300 % 3 - 1) * (i % 3 ? 1.0f : 0.37f);
+        if (direction[u] == 0 && direction[v] == 0)
+          continue;
+        Hit hit = room.hit(origin, direction);
+        expectEqual(hit, room.hitOfAll(origin, direction, false));
+        EXPECT_EQ(hit.triangle >= 0, room.isHit(origin, direction));
+        ++(hit.triangle >= 0 ? hits : misses);
+      }
+  EXPECT_GT(hits, 10000);
+  EXPECT_GT(misses, 10000);
+}
+
 TEST(Hit, DegenerateTrianglesAreNotMet) {
   Mesh mesh;
   int a = addVertex(mesh, {-1, -1, -2}), b = addVertex(mesh, {1, 1, -2});
