@@ -329,6 +329,8 @@ static void splitVersions(Value takesVectors, scf::ForOp loop,
   OpBuilder builder(loop);
   auto choice = scf::IfOp::create(builder, loop.getLoc(), takesVectors,
                                   /*withElse=*/true);
+  if (isOverPrimitives(loop))
+    choice->setAttr(marks::versions, builder.getUnitAttr());
   for (scf::ForOp one : vectors)
     if (one)
       one->moveBefore(choice.thenBlock()->getTerminator());

@@ -421,7 +421,8 @@ def ConvertSCFToControlFlowInReverse
     **Does**: what upstream's `convert-scf-to-cf` does, with its patterns, but from the
     end of each block. A conversion splits its block, and each operation behind it
     moves to the new one: from the front, N conditions of a block move its end N
-    times, from the end once.
+    times, from the end once. What the text says of a branch (`piko.probability`)
+    becomes its weights.
 
     **Guarantees** that no operation of `scf` with a region is left.
 
@@ -463,7 +464,11 @@ def ConvertPikoToLLVM : Pass<"convert-piko-to-llvm", "::mlir::ModuleOp"> {
     primitives each field by itself, so that LLVM keeps in registers what it
     does not.
     The units of a kernel on a cycle become calls of a function, `KERNEL.unit`,
-    without a parallel region where there is one thread for them.
+    without a parallel region where there is one thread for them. The versions of a
+    loop over primitives (`piko.versions`) become functions, too, `KERNEL.version0` and
+    so on: none spills registers for another. A scalar version that itself holds loops
+    in two is unswitched: units that run all of them as scalar loops have a function
+    with nothing else.
 
     **Guarantees** that nothing of the `piko` dialect is left.
 

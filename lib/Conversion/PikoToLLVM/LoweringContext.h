@@ -273,6 +273,12 @@ void branchInSaturatingCasts(mlir::func::FuncOp function);
 /// Lets a kernel for which there is one thread run its units without a parallel
 /// region, as calls of a function.
 void outlineUnits(mlir::func::FuncOp kernel);
+/// Makes versions of the scalar version of a loop over primitives
+/// (`piko.versions`) that holds loops in two versions itself: one for units
+/// that run all of these as scalar loops, which has nothing else in it.
+void unswitchScalarVersions(KernelOp kernel);
+/// Makes functions of the versions of loops over primitives.
+void outlineVersions(mlir::func::FuncOp kernel);
 
 /// The name of a kernel's function.
 std::string getFunctionName(KernelOp kernel);

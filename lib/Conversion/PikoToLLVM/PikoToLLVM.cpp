@@ -152,8 +152,10 @@ LogicalResult ConvertPikoToLLVMPass::convert(PipelineOp pipeline,
   if (!program)
     return pipeline.emitError("expected a piko.program, which "
                               "piko-form-program makes");
-  for (auto kernel : pipeline.getOps<KernelOp>())
+  for (auto kernel : pipeline.getOps<KernelOp>()) {
     numberMappings(kernel);
+    unswitchScalarVersions(kernel);
+  }
   PipelineNumbers numbers(pipeline);
   func::FuncOp setup = createProgram(numbers, context);
   SmallVector<func::FuncOp> functions, again;
@@ -221,6 +223,8 @@ LogicalResult ConvertPikoToLLVMPass::convert(PipelineOp pipeline,
       return failure();
   for (func::FuncOp function : functions)
     branchInSaturatingCasts(function);
+  for (func::FuncOp function : functions)
+    outlineVersions(function);
   for (func::FuncOp function : again)
     outlineUnits(function);
   for (func::FuncOp function : functions)

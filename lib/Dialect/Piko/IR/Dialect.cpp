@@ -82,12 +82,14 @@ static StringRef getExpectedKind(StringRef name) {
   return llvm::StringSwitch<StringRef>(name)
       .Cases({marks::lanes, marks::rows, marks::shared, marks::again,
               marks::one, marks::deferred, marks::rare, marks::fails,
-              marks::input, marks::shortCircuit, marks::inside, marks::source},
+              marks::input, marks::shortCircuit, marks::inside, marks::source,
+              marks::versions},
              "a unit")
       .Case(marks::mapping, "what lanes are given, as #piko<lanes items>")
       .Case(marks::units, "how threads share units, as #piko<units shared>")
       .Case(marks::number, "a 64-bit integer")
-      .Cases({marks::turns, marks::advances}, "a 64-bit float")
+      .Cases({marks::turns, marks::advances, marks::probability},
+             "a 64-bit float")
       .Cases({marks::pixels, cppNameAttr}, "a string")
       .Case(cppTypesAttr, "a dictionary")
       .Default({});
@@ -104,7 +106,8 @@ static bool hasExpectedKind(NamedAttribute attribute) {
     return isa<StringAttr>(value);
   if (name == cppTypesAttr)
     return isa<DictionaryAttr>(value);
-  if (name == marks::turns || name == marks::advances)
+  if (name == marks::turns || name == marks::advances ||
+      name == marks::probability)
     return isa<FloatAttr>(value) && cast<FloatAttr>(value).getType().isF64();
   if (auto number = dyn_cast<IntegerAttr>(value))
     return name == marks::number && number.getType().isInteger(64);

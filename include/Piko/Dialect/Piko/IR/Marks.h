@@ -18,6 +18,9 @@ constexpr llvm::StringLiteral lanes = "piko.lanes";
 constexpr llvm::StringLiteral rows = "piko.rows";
 /// What lanes are given, a `LaneMappingAttr`, of a loop over primitives.
 constexpr llvm::StringLiteral mapping = "piko.mapping";
+/// An scf.if between the versions of a loop over primitives, which become
+/// functions.
+constexpr llvm::StringLiteral versions = "piko.versions";
 /// How many turns lanes together are expected to make of a loop that was made
 /// of two, one inside of the other: a 64-bit float.
 constexpr llvm::StringLiteral turns = "piko.turns";
@@ -25,6 +28,10 @@ constexpr llvm::StringLiteral turns = "piko.turns";
 /// the first one, which does nothing for it: in how many turns it runs, a
 /// 64-bit float.
 constexpr llvm::StringLiteral advances = "piko.advances";
+/// How probable it is that an scf.if takes its first side, by what the text
+/// says with
+/// [[likely]] and its like: a 64-bit float from 0 to 1.
+constexpr llvm::StringLiteral probability = "piko.probability";
 /// How threads share the loop over units of work, a `UnitLoopAttr`.
 constexpr llvm::StringLiteral units = "piko.units";
 /// A loop whose iterations the threads of a block share.
