@@ -13,6 +13,8 @@
 #include "mlir/Dialect/MemRef/IR/MemRef.h"
 #include "mlir/IR/Matchers.h"
 
+#include <cmath>
+
 using namespace mlir;
 using namespace piko;
 
@@ -101,6 +103,15 @@ static Frequency getFrequency(Region &side, Region &other, int64_t laneCount) {
   if (countOther <= trivial || countOther > ratio * count)
     return {0.8, 1};
   return {0.5, 1};
+}
+
+/// How often a side of a condition runs, where the text says so.
+static std::optional<double> getProbability(scf::IfOp choice, Region &side) {
+  auto first = choice->getAttrOfType<FloatAttr>(marks::probability);
+  if (!first)
+    return std::nullopt;
+  double taken = first.getValueAsDouble();
+  return &side == &choice.getThenRegion() ? taken : 1 - taken;
 }
 
 /// Whether a condition is one more of those that all have to hold: it is all
@@ -290,11 +301,14 @@ void CostModel::addStructure(Operation *op, Frequency times, bool laneByLane) {
     auto addSide = [&](Region &side, Region &other) {
       if (side.empty())
         return;
-      Frequency share = isState
-                            ? Frequency{0.5, 1}
-                            : getFrequency(side, other, lanes.getLaneCount());
+      std::optional<double> known = getProbability(choice, side);
+      Frequency share =
+          isState ? Frequency{0.5, 1}
+          : known ? Frequency{*known,
+                              1 - std::pow(1 - *known, lanes.getLaneCount())}
+                  : getFrequency(side, other, lanes.getLaneCount());
       // Many guards, each of which mostly lets through, mostly do together.
-      if (!isState && isNextGuard(choice) &&
+      if (!isState && !known && isNextGuard(choice) &&
           isNextGuard(cast<scf::IfOp>(choice->getParentOp())) &&
           (other.empty() || countOperations(other) <= trivial))
         share.serial = share.vectors;
@@ -303,7 +317,7 @@ void CostModel::addStructure(Operation *op, Frequency times, bool laneByLane) {
       auto advances = choice->getAttrOfType<FloatAttr>(marks::advances);
       if (advances && &side == &no)
         share.vectors = advances.getValueAsDouble();
-      bool isSlow = !inSlowPath && !isState &&
+      bool isSlow = !inSlowPath && !isState && !known &&
                     lanes.isVarying(choice.getCondition()) &&
                     mayBeSlowPath(choice, side, lanes.getLoop());
       inSlowPath |= isSlow;

@@ -3,8 +3,8 @@
 // A thread that has a primitive of its own may come to a branch that keeps
 // arrays, which the other way does not: clipping. Such a branch is *rare* if it
 // is there for its effects; one that finds a number may be as usual as the
-// other. In line it would cost all primitives its registers, and memory of the
-// thread's own; so
+// other. One that the text calls likely is not rare. In line it would cost all
+// primitives its registers, and memory of the thread's own; so
 //   1. it becomes a region of its own, which piko-outline-rare-work makes a
 //      function of;
 //   2. loops over iterations that only it has do not count where it is decided
@@ -49,6 +49,11 @@ static Region *findRareWay(scf::IfOp branch, Operation *loop) {
     });
     if (!isOwn)
       return nullptr;
+    if (auto first = branch->getAttrOfType<FloatAttr>(marks::probability)) {
+      bool isLikely = first.getValueAsDouble() > 0.5;
+      if (isLikely == (&region == &branch.getThenRegion()))
+        return nullptr;
+    }
     ways.push_back(&region);
   }
   return ways.size() == 1 ? ways.front() : nullptr;

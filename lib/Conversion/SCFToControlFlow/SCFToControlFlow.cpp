@@ -3,13 +3,17 @@
 // Structured control flow to branches, in time that grows with the text.
 
 #include "Piko/Conversion/Passes.h"
+#include "Piko/Dialect/Piko/IR/Marks.h"
 
 #include "mlir/Conversion/SCFToControlFlow/SCFToControlFlow.h"
-#include "mlir/Dialect/ControlFlow/IR/ControlFlow.h"
+#include "mlir/Dialect/ControlFlow/IR/ControlFlowOps.h"
 #include "mlir/Dialect/SCF/IR/SCF.h"
 #include "mlir/IR/Iterators.h"
 #include "mlir/IR/PatternMatch.h"
 #include "mlir/Rewrite/PatternApplicator.h"
+
+#include <algorithm>
+#include <cmath>
 
 namespace piko {
 #define GEN_PASS_DEF_CONVERTSCFTOCONTROLFLOWINREVERSE
@@ -18,6 +22,16 @@ namespace piko {
 
 using namespace mlir;
 using namespace piko;
+
+/// Says how likely the first way of a branch is, as LLVM does.
+static void setWeights(Operation *terminator, double first) {
+  constexpr double all = 1 << 20;
+  auto weigh = [&](double part) {
+    return int32_t(std::clamp(std::round(part * all), 1.0, all));
+  };
+  if (auto branch = dyn_cast<cf::CondBranchOp>(terminator))
+    branch.setBranchWeights(ArrayRef<int32_t>{weigh(first), weigh(1 - first)});
+}
 
 namespace {
 struct ConvertSCFToControlFlowInReverse
@@ -35,8 +49,13 @@ struct ConvertSCFToControlFlowInReverse
          found = collect())
       for (Operation *op : found) {
         rewriter.setInsertionPoint(op);
-        if (succeeded(applicator.matchAndRewrite(op, rewriter)))
+        Block *block = op->getBlock();
+        auto likely = op->getAttrOfType<FloatAttr>(marks::probability);
+        if (succeeded(applicator.matchAndRewrite(op, rewriter))) {
+          if (likely)
+            setWeights(block->getTerminator(), likely.getValueAsDouble());
           continue;
+        }
         op->emitOpError("has no form of branches");
         return signalPassFailure();
       }

@@ -32,6 +32,7 @@
 #include "llvm/Transforms/Scalar/EarlyCSE.h"
 #include "llvm/Transforms/Scalar/LoopPassManager.h"
 #include "llvm/Transforms/Scalar/LoopUnrollPass.h"
+#include "llvm/Transforms/Scalar/LowerExpectIntrinsic.h"
 #include "llvm/Transforms/Scalar/SROA.h"
 #include "llvm/Transforms/Scalar/SimplifyCFG.h"
 #include "llvm/Transforms/Utils/Cloning.h"
@@ -75,7 +76,8 @@ private:
 
 } // namespace
 
-/// Calls that mean nothing here: lifetimes, and what optimizers may expect.
+/// Calls that mean nothing here: lifetimes, and what is expected of values but
+/// of branches' conditions, which have become weights.
 static void dropHints(llvm::Function &function) {
   for (llvm::Instruction &instruction :
        llvm::make_early_inc_range(llvm::instructions(function))) {
@@ -209,9 +211,13 @@ static bool checkLoops(llvm::Function &function, const ParsedUnit &unit,
 }
 
 static void prepareFunction(llvm::Function &function, ParsedUnit &unit,
-                            MemoryMap &memory, mlir::MLIRContext &context) {
+                            MemoryMap &memory, PassRunner &runner,
+                            mlir::MLIRContext &context) {
   redirectMathCalls(function, unit, context);
   inlineKnownCalls(function);
+  llvm::FunctionPassManager weigh;
+  weigh.addPass(llvm::LowerExpectIntrinsicPass());
+  runner.run(weigh, function);
   if (unit.module->getModuleFlag(checkingFlag) &&
       function.getName().contains("_process_"))
     fillVariables(function, memory);
@@ -244,7 +250,7 @@ static constexpr int roundLimit = 32;
 static bool cleanUpFunction(llvm::Function &function, ParsedUnit &unit,
                             MemoryMap &memory, PassRunner &runner,
                             mlir::MLIRContext &context) {
-  prepareFunction(function, unit, memory, context);
+  prepareFunction(function, unit, memory, runner, context);
   llvm::FunctionPassManager simplify;
   simplify.addPass(llvm::EarlyCSEPass(/*UseMemorySSA=*/false));
   simplify.addPass(llvm::DCEPass()); // a dead copy may hold an address
@@ -273,7 +279,7 @@ static bool cleanUpFunction(llvm::Function &function, ParsedUnit &unit,
       return false;
     changed |= redirectMathCalls(function, unit, context);
     if (inlineKnownCalls(function)) {
-      prepareFunction(function, unit, memory, context);
+      prepareFunction(function, unit, memory, runner, context);
       changed = true;
     }
     if (!releasePixels(function, unit, memory, context, /*all=*/!changed,

@@ -10,6 +10,7 @@
 #include "llvm/IR/CFG.h"
 #include "llvm/IR/Instructions.h"
 #include "llvm/IR/IntrinsicInst.h"
+#include "llvm/IR/ProfDataUtils.h"
 
 using namespace piko;
 using llvm::dyn_cast;
@@ -196,10 +197,14 @@ LogicalResult PhaseImporter::importTerminator(llvm::Instruction *terminator) {
       return success();
     }
     llvm::BasicBlock *second = branch->getSuccessor(1);
-    make<mlir::cf::CondBranchOp>(
+    auto made = make<mlir::cf::CondBranchOp>(
         scalars.get(branch->getCondition()), getTarget(from, first),
         getArguments(from, first), getTarget(from, second),
         getArguments(from, second));
+    if (llvm::SmallVector<uint32_t> weights;
+        llvm::extractBranchWeights(*branch, weights) && weights.size() == 2)
+      made.setBranchWeights(
+          llvm::ArrayRef<int32_t>{int32_t(weights[0]), int32_t(weights[1])});
     return success();
   }
   auto *choice = dyn_cast<llvm::SwitchInst>(terminator);

@@ -8,8 +8,10 @@
 
 #include "Import/Import.h"
 
+#include "Piko/Dialect/Piko/IR/Marks.h"
 #include "Piko/Dialect/Piko/IR/Piko.h"
 #include "mlir/Conversion/ControlFlowToSCF/ControlFlowToSCF.h"
+#include "mlir/Dialect/ControlFlow/IR/ControlFlowOps.h"
 #include "mlir/Dialect/SCF/IR/SCF.h"
 #include "mlir/Dialect/UB/IR/UBOps.h"
 #include "mlir/IR/Dominance.h"
@@ -38,6 +40,23 @@ public:
     for (mlir::Type type : wrapper.getResultTypes())
       values.push_back(mlir::ub::PoisonOp::create(builder, location, type));
     return mlir::scf::YieldOp::create(builder, location, values).getOperation();
+  }
+
+  /// Keeps how likely the text says that a branch is.
+  llvm::FailureOr<mlir::Operation *> createStructuredBranchRegionOp(
+      mlir::OpBuilder &builder, mlir::Operation *branch, mlir::TypeRange types,
+      llvm::MutableArrayRef<mlir::Region> regions) override {
+    auto made = ControlFlowToSCFTransformation::createStructuredBranchRegionOp(
+        builder, branch, types, regions);
+    auto condition = mlir::dyn_cast<mlir::cf::CondBranchOp>(branch);
+    if (llvm::failed(made) || !condition || !condition.getBranchWeights())
+      return made;
+    llvm::ArrayRef<int32_t> weights = *condition.getBranchWeights();
+    double first = weights[0], second = weights[1];
+    if (first >= 0 && second >= 0 && first + second > 0)
+      (*made)->setAttr(marks::probability,
+                       builder.getF64FloatAttr(first / (first + second)));
+    return made;
   }
 };
 

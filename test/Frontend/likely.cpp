@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// How likely the text says that a branch is goes with it, from LLVM's branch weights
+// and back to them, and lanes are chosen by it.
+// RUN: pikoc %s --pipe Likely --emit=authored | FileCheck %s --check-prefix=LIKELY
+// RUN: pikoc %s --pipe Unlikely --emit=authored | FileCheck %s --check-prefix=UNLIKELY
+// RUN: pikoc %s --pipe Tenth --emit=authored | FileCheck %s --check-prefix=TENTH
+// RUN: pikoc %s --pipe Plain --emit=authored | FileCheck %s --check-prefix=PLAIN
+// LIKELY: piko.probability = 0.99950024987506247 : f64
+// UNLIKELY: piko.probability = 4.997501249{{[0-9]*}}E-4 : f64
+// TENTH: piko.probability = 0.1{{[0-9]*}} : f64
+// PLAIN-NOT: piko.probability
+//
+// RUN: pikoc %s --pipe Unlikely --emit=llvm | FileCheck %s --check-prefix=WEIGHTS
+// WEIGHTS: llvm.cond_br %{{.*}} weights([524, 1048052]),
+//
+// RUN: pikoc %s --pipe Plain --remarks -o %t.ll 2>&1 | FileCheck %s --check-prefix=VECTORS
+// RUN: pikoc %s --pipe Likely --remarks -o %t.ll 2>&1 | FileCheck %s --check-prefix=VECTORS
+// VECTORS: stage 'work': process is vectorized for {{[0-9]+}} primitives at once{{$}}
+// RUN: pikoc %s --pipe Tenth --remarks -o %t.ll 2>&1 | FileCheck %s --check-prefix=BOTH
+// BOTH: stage 'work': process is vectorized for {{[0-9]+}} primitives at once, and held one after the other as well
+#include <piko.h>
+
+struct Item {
+  float x, y;
+  int serial;
+};
+struct State {
+  piko::Buffer<float> out;
+};
+
+enum class Kind { Plain, Likely, Unlikely, Tenth };
+
+template <Kind K> struct Work : piko::Stage<0, 0, 64, Item>, piko::Uses<State> {
+  float compute(float x, float y) {
+    for (int i = 0; i < 9; ++i)
+      x = piko::sqrt(x * x + y) / (1 + x) + piko::sqrt(x + 3);
+    return x;
+  }
+  void process(const Item &item) {
+    float x = 0;
+    if constexpr (K == Kind::Likely) {
+      if (item.x > item.y) [[likely]]
+        x = compute(item.x, item.y);
+    } else if constexpr (K == Kind::Unlikely) {
+      if (item.x > item.y) [[unlikely]]
+        x = compute(item.x, item.y);
+    } else if constexpr (K == Kind::Tenth) {
+      if (__builtin_expect_with_probability(item.x > item.y, 1, 0.1))
+        x = compute(item.x, item.y);
+    } else {
+      if (item.x > item.y)
+        x = compute(item.x, item.y);
+    }
+    this->state().out[item.serial] = x;
+  }
+};
+
+template <Kind K> struct Lone : piko::Pipe<State> {
+  Work<K> work;
+  Lone() { this->source(work); }
+};
+struct Plain : Lone<Kind::Plain> {};
+struct Likely : Lone<Kind::Likely> {};
+struct Unlikely : Lone<Kind::Unlikely> {};
+struct Tenth : Lone<Kind::Tenth> {};
