@@ -36,14 +36,21 @@ GltfFile::GltfFile(std::string_view content, const OpenFile &open)
     return;
   }
   auto asset = root.find("asset");
-  std::string version;
-  if (asset != root.end() && asset->is_object())
-    if (auto found = asset->find("version");
-        found != asset->end() && found->is_string())
-      version = found->get<std::string>();
-  if (!version.starts_with("2."))
+  auto getVersion = [&](const char *name) {
+    if (asset != root.end() && asset->is_object())
+      if (auto found = asset->find(name);
+          found != asset->end() && found->is_string())
+        return found->get<std::string>();
+    return std::string();
+  };
+  if (std::string version = getVersion("version"); !version.starts_with("2."))
     fail("expected glTF 2, but its 'asset' has the version " +
          quoteWord(version));
+  // A later one may say that a reader of this one has enough.
+  if (std::string least = getVersion("minVersion");
+      !least.empty() && least != "2.0")
+    fail("it needs a reader of glTF " + quoteWord(least) +
+         ", but this one is of 2.0");
 }
 
 /// The JSON of a GLB file; keeps the binary chunk.

@@ -65,6 +65,8 @@ std::string readLine(std::string_view line, PlyHeader &header) {
   std::string_view rest = line, word = takeWord(rest);
   if (word == "format") {
     header.format = takeWord(rest);
+    if (std::string_view version = takeWord(rest); version != "1.0")
+      return "expected version 1.0 of PLY, but got " + quoteWord(version);
     return {};
   }
   if (word == "element")

@@ -18,6 +18,8 @@
 // RUN: not piko-translate --cpp-to-piko -DCASE=15 %s 2>&1 | FileCheck %s --check-prefix=PLAIN
 // RUN: not piko-translate --cpp-to-piko -DCASE=16 %s 2>&1 | FileCheck %s --check-prefix=COUNTDOWN
 // RUN: not piko-translate --cpp-to-piko -DCASE=17 %s 2>&1 | FileCheck %s --check-prefix=BIG
+// RUN: not piko-translate --cpp-to-piko -DCASE=18 %s 2>&1 | FileCheck %s --check-prefix=LONG
+// RUN: not piko-translate --cpp-to-piko -DCASE=19 %s 2>&1 | FileCheck %s --check-prefix=OBJECT
 #include <piko.h>
 
 struct A {
@@ -37,6 +39,11 @@ struct Shape {
 };
 // VIRTUAL: errors-unsupported.cpp:[[#@LINE + 1]]:58: error: not supported in Piko: a virtual call or a call through a pointer; use a switch that calls each function by its name
 inline float getArea(const Shape *shape) { return shape->area(); }
+
+struct Square : Shape {
+  float side;
+  float area() const override { return side * side; }
+};
 
 struct Stage : piko::Stage<0, 0, 1, A, A>, piko::Uses<State> {
   int member = 0;
@@ -106,6 +113,16 @@ struct Stage : piko::Stage<0, 0, 1, A, A>, piko::Uses<State> {
       big[i] = a.x;
     }
     out.x = big[int(a.x)] + small[int(a.x)];
+#elif CASE == 18
+    // LONG: errors-unsupported.cpp:[[#@LINE + 1]]:{{[0-9]+}}: error: not supported in Piko: long double; use double
+    out.x = float((long double)a.x * a.x / 7 + 1);
+#elif CASE == 19
+    // OBJECT: error: not supported in Piko: an object of a class with virtual functions 'square'; use a switch that calls each function by its name
+    // OBJECT: errors-unsupported.cpp:[[#@LINE + 1]]:12: note: called from here
+    Square square;
+    square.side = a.x;
+    const Shape *shape = &square;
+    out.x = shape->area();
 #else
     // SYNTAX: errors-unsupported.cpp:[[#@LINE + 1]]:7: error: no member named 'q' in 'A'
     a.q = 1;

@@ -22,6 +22,13 @@ struct Add : piko::Stage<0, 0, 64, int, int>, piko::Uses<State> {
     emit(i);
   }
 };
+struct Count : piko::Stage<0, 0, 64, int, int>, piko::Uses<State> {
+  void process(const int &i) {
+    // CHECK: warnings-conflicts.cpp:[[#@LINE + 1]]:{{[0-9]+}}: warning: a data race: each primitive writes this element of 'sum'
+    state().sum[4] += 1;
+    emit(i);
+  }
+};
 struct Keep : piko::Stage<0, 0, 64, int, int>, piko::Uses<State> {
   void process(const int &i) {
     // CHECK: warnings-conflicts.cpp:[[#@LINE + 1]]:{{[0-9]+}}: warning: a data race: each primitive writes this element of 'last'
@@ -39,11 +46,13 @@ struct Iterate : piko::Stage<0, 0, 64, int>, piko::Uses<State> {
 };
 struct Races : piko::Pipe<State> {
   Add add;
+  Count count;
   Keep keep;
   Iterate iterate;
   Races() {
     source(add);
-    connect(add, 0, keep);
+    connect(add, 0, count);
+    connect(count, 0, keep);
     connect(keep, 0, iterate);
   }
 };

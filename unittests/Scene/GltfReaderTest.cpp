@@ -31,11 +31,12 @@ struct Parts {
   std::string view = R"("byteLength":48)";
   std::string root = R"("scenes":[{"nodes":[0]}])";
   std::string mesh = "";
+  std::string asset = R"("version":"2.0")";
   std::string length = "76";
 };
 
 std::string makeFile(const Parts &parts) {
-  return R"({"asset":{"version":"2.0"},)" + parts.root + R"(,"nodes":[)" +
+  return R"({"asset":{)" + parts.asset + "}," + parts.root + R"(,"nodes":[)" +
          parts.nodes + R"(],"meshes":[{)" + parts.mesh + R"("primitives":[{)" +
          parts.primitive + R"(}]}],"accessors":[{)" + parts.positions +
          R"(,"type":"VEC3"},{)" + parts.indices +
@@ -131,6 +132,17 @@ TEST(GltfReader, Accessors) {
                   .view = R"("byteLength":48},{"buffer":0,"byteLength":48,)"
                           R"("byteStride":16)"}),
             "1 of 50%");
+}
+
+TEST(GltfReader, Versions) {
+  EXPECT_EQ(read({.asset = R"("version":"2.1","minVersion":"2.0")"}),
+            "2 of 100%");
+  EXPECT_EQ(read({.asset = R"("version":"2.1","minVersion":"2.1")"}),
+            "it needs a reader of glTF '2.1', but this one is of 2.0");
+  EXPECT_EQ(read({.asset = R"("version":"1.0")"}),
+            "expected glTF 2, but its 'asset' has the version '1.0'");
+  EXPECT_EQ(read({.asset = ""}),
+            "expected glTF 2, but its 'asset' has the version ''");
 }
 
 TEST(GltfReader, QuantizedMeshes) {

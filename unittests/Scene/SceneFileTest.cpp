@@ -203,6 +203,8 @@ TEST_F(SceneFile, BrokenPly) {
   fails(start + vertices + "property huge w\nend_header\n",
         "unknown type 'huge'");
   fails("ply\nformat bcd 1.0\n" + rest, "unknown format 'bcd'");
+  fails("ply\nformat ascii 2.0\n" + rest, "version 1.0 of PLY, but got '2.0'");
+  fails("ply\nformat ascii\n" + rest, "version 1.0 of PLY, but got ''");
   fails(start + rest + "0 0 0\n1 0 0\n", "it is cut short");
   fails("ply\nformat binary_little_endian 1.0\n" + rest +
             std::string(36, '\0') + "\3\1",

@@ -464,11 +464,10 @@ def ConvertPikoToLLVM : Pass<"convert-piko-to-llvm", "::mlir::ModuleOp"> {
     primitives each field by itself, so that LLVM keeps in registers what it
     does not.
     The units of a kernel on a cycle become calls of a function, `KERNEL.unit`,
-    without a parallel region where there is one thread for them. The versions of a
-    loop over primitives (`piko.versions`) become functions, too, `KERNEL.version0` and
-    so on: none spills registers for another. A scalar version that itself holds loops
-    in two is unswitched: units that run all of them as scalar loops have a function
-    with nothing else.
+    without a parallel region where there is one thread for them. Where the scalar version
+    of a loop over primitives holds loops in two versions itself (`piko.versions`), it is
+    unswitched, for units that run all of these as scalar loops, and all versions become
+    functions, `KERNEL.version0` and so on: none spills registers for another.
 
     **Guarantees** that nothing of the `piko` dialect is left.
 

@@ -2,9 +2,10 @@
 //
 // Parts of kernels as functions of their own. A unit of work: a kernel of a
 // cycle may have next to nothing to do, and then calls it without a parallel
-// region, which takes longer. The versions of a loop over primitives: together
-// in one function they would contend for registers, and the one that runs would
-// spill for the other.
+// region, which takes longer. The versions of a loop over primitives, of which
+// the scalar one holds loops in two versions itself: together in one function
+// they would contend for registers, and the one that runs would spill for the
+// others.
 
 #include "LoweringContext.h"
 
@@ -185,8 +186,10 @@ void piko::unswitchScalarVersions(KernelOp kernel) {
     for (Value capture : captures)
       if (capture.getDefiningOp<TakesVectorsOp>())
         inner.insert(capture);
-    if (inner.empty())
+    if (inner.empty()) {
+      choice->removeAttr(marks::versions); // Two bodies may share a function.
       continue;
+    }
     Location loc = choice.getLoc();
     Block *scalar = choice.elseBlock();
     OpBuilder builder(scalar, scalar->begin());

@@ -6,8 +6,10 @@
 #include "Piko/Dialect/Piko/IR/Piko.h"
 #include "mlir/Dialect/SCF/IR/SCF.h"
 #include "mlir/IR/BuiltinOps.h"
+#include "mlir/IR/Matchers.h"
 #include "mlir/Interfaces/SideEffectInterfaces.h"
 #include "llvm/ADT/DenseMap.h"
+#include "llvm/ADT/SetVector.h"
 
 using namespace mlir;
 using namespace piko;
@@ -44,6 +46,7 @@ private:
   const Sources &findSources(Value value);
   Sources findSourcesAnew(Value value);
   bool isConflict(StoreOp store, ProcessOp process);
+  bool changesItself(StoreOp store);
   void report(StoreOp store);
 
   StageOp stage;
@@ -123,7 +126,37 @@ bool ConflictFinder::isConflict(StoreOp store, ProcessOp process) {
   // One call for a bin may be all that there is.
   const Sources &stored = findSources(store.getValue());
   bool inLoop = store->getParentOfType<ParallelLoopOpInterface>() != nullptr;
-  return (stored.item && !stage.getTakesList()) || (stored.iteration && inLoop);
+  return (stored.item && !stage.getTakesList()) ||
+         (stored.iteration && inLoop) ||
+         ((inLoop || !stage.getTakesList()) && changesItself(store));
+}
+
+static bool isSame(OperandRange a, OperandRange b) {
+  return llvm::equal(a, b, [](Value one, Value other) {
+    Attribute constant, same;
+    return one == other ||
+           (matchPattern(one, m_Constant(&constant)) &&
+            matchPattern(other, m_Constant(&same)) && constant == same);
+  });
+}
+
+/// Whether what is stored follows from what the element was before.
+bool ConflictFinder::changesItself(StoreOp store) {
+  llvm::SetVector<Value> values;
+  values.insert(store.getValue());
+  for (size_t i = 0; i < values.size(); ++i) {
+    Operation *op = values[i].getDefiningOp();
+    if (!op)
+      continue;
+    auto load = dyn_cast<LoadOp>(op);
+    if (load && load.getStateAttr() == store.getStateAttr() &&
+        load.getField() == store.getField() &&
+        isSame(load.getIndices(), store.getIndices()) &&
+        isSame(load.getElements(), store.getElements()))
+      return true;
+    values.insert(op->operand_begin(), op->operand_end());
+  }
+  return false;
 }
 
 void ConflictFinder::report(StoreOp store) {

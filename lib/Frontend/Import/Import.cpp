@@ -116,6 +116,11 @@ LogicalResult PhaseImporter::importBlock(llvm::BasicBlock *block) {
   return success();
 }
 
+/// Whether a value is of 80 bits, as no processor's lanes and no GPU have them.
+static bool isLongDouble(const llvm::Value *value) {
+  return value->getType()->isX86_FP80Ty() || value->getType()->isFP128Ty();
+}
+
 LogicalResult PhaseImporter::importInstruction(llvm::Instruction *instruction) {
   if (llvm::isa<llvm::GetElementPtrInst>(instruction))
     return success();
@@ -149,6 +154,9 @@ LogicalResult PhaseImporter::importInstruction(llvm::Instruction *instruction) {
   }
   if (isPlaceUse(instruction))
     return reject(instruction, comparedPlaces);
+  if (isLongDouble(instruction) ||
+      llvm::any_of(instruction->operand_values(), isLongDouble))
+    return reject(instruction, "long double; use double");
   return reject(instruction, llvm::Twine("the operation '") +
                                  instruction->getOpcodeName() + "'");
 }

@@ -75,7 +75,29 @@ static const llvm::Instruction *findPlaceUse(const llvm::Value *pointer,
   return nullptr;
 }
 
+/// Where an object is told which virtual functions it has.
+static const llvm::Instruction *findVirtual(const llvm::Value *pointer,
+                                            int depth = 0) {
+  for (const llvm::User *user : pointer->users()) {
+    if (auto *store = dyn_cast<llvm::StoreInst>(user)) {
+      const auto *table = dyn_cast<llvm::GlobalVariable>(
+          store->getValueOperand()->stripInBoundsConstantOffsets());
+      if (table && table->getName().starts_with("_ZTV"))
+        return store;
+    }
+    if (depth < 8 && llvm::isa<llvm::GetElementPtrInst>(user))
+      if (const llvm::Instruction *found = findVirtual(user, depth + 1))
+        return found;
+  }
+  return nullptr;
+}
+
 LogicalResult PhaseImporter::rejectVariable(llvm::AllocaInst *variable) {
+  if (const llvm::Instruction *made = findVirtual(variable))
+    return reject(made->getDebugLoc() ? made : findLocatedUse(variable),
+                  "an object of a class with virtual functions" +
+                      getVariableName(variable) +
+                      "; use a switch that calls each function by its name");
   if (const llvm::Instruction *use = findPlaceUse(variable))
     return reject(use, comparedPlaces);
   const llvm::Instruction *use = findComputedUse(variable);
