@@ -4,8 +4,10 @@
 
 #include "MeshReaders.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <nlohmann/json.hpp>
 #include <random>
 #include <vector>
 
@@ -24,6 +26,16 @@ template <class T> std::string bytesOf(std::initializer_list<T> values) {
   std::string bytes;
   for (T value : values)
     bytes.append(reinterpret_cast<const char *>(&value), sizeof(T));
+  return bytes;
+}
+
+/// The other way round: as processors of the other kind write them.
+template <class T> std::string swappedBytesOf(std::initializer_list<T> values) {
+  std::string bytes;
+  for (T value : values) {
+    std::string one = bytesOf<T>({value});
+    bytes.append(one.rbegin(), one.rend());
+  }
   return bytes;
 }
 
@@ -50,6 +62,29 @@ void addPly(std::vector<Seed> &seeds) {
                         plyVertices + "element face 2\n" + list + squareOf() +
                         "\4" + bytesOf<int32_t>({0, 1, 2, 3}) + "\3" +
                         bytesOf<int32_t>({2, 1, 0})});
+  // Faces first, and lists and elements that are passed over.
+  seeds.push_back(
+      {Format::Ply,
+       "ply\r\nformat binary_big_endian 1.0\r\ncomment a\r\n"
+       "element face 2\r\nproperty uchar red\r\n"
+       "property list ushort short vertex_index\r\n"
+       "property list uchar float texcoord\r\nelement material 1\r\n"
+       "property list uint double weights\r\nelement vertex 4\r\n"
+       "property float64 x\r\nproperty float64 y\r\nproperty float64 z\r\n"
+       "property float nx\r\nproperty float ny\r\nproperty float nz\r\n"
+       "end_header\r\n\7" +
+           swappedBytesOf<uint16_t>({4, 0, 1, 2, 3}) + "\2" +
+           swappedBytesOf<float>({0.5f, 1}) + "\7" +
+           swappedBytesOf<uint16_t>({3, 2, 1, 0}) + std::string(1, '\0') +
+           swappedBytesOf<uint32_t>({2}) + swappedBytesOf<double>({1, 2}) +
+           swappedBytesOf<double>({0, 0, 0}) +
+           swappedBytesOf<float>({0, 0, 1}) +
+           swappedBytesOf<double>({1, 0, 0}) +
+           swappedBytesOf<float>({0, 0, 1}) +
+           swappedBytesOf<double>({1, 1, 0}) +
+           swappedBytesOf<float>({0, 0, 1}) +
+           swappedBytesOf<double>({0, 1, 0}) +
+           swappedBytesOf<float>({0, 0, 1})});
 }
 
 void addTexts(std::vector<Seed> &seeds) {
@@ -110,6 +145,34 @@ void addGltf(std::vector<Seed> &seeds) {
                          std::string("BIN\0", 4) + data});
 }
 
+std::string encode(const std::string &bytes) {
+  constexpr const char *digits =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  for (size_t i = 0; i < bytes.size(); i += 3) {
+    uint32_t group = 0;
+    size_t count = std::min<size_t>(3, bytes.size() - i);
+    for (size_t k = 0; k < 3; ++k)
+      group = group << 8 | (k < count ? uint8_t(bytes[i + k]) : 0);
+    for (size_t k = 0; k < 4; ++k)
+      text += k <= count ? digits[group >> (18 - 6 * k) & 63] : '=';
+  }
+  return text;
+}
+
+/// A file that holds its buffer as a data URI, also within a GLB.
+void addDataUris(std::vector<Seed> &seeds) {
+  std::string json =
+      makeJson(",\"uri\":\"data:application/octet-stream;base64," +
+               encode(dataOfGltf()) + "\"");
+  seeds.push_back({Format::Gltf, json});
+  json.resize((json.size() + 3) / 4 * 4, ' ');
+  uint32_t size = uint32_t(json.size());
+  seeds.push_back(
+      {Format::Gltf,
+       "glTF" + bytesOf<uint32_t>({2, 20 + size, size}) + "JSON" + json});
+}
+
 class Mutator {
 public:
   explicit Mutator(uint64_t seed) : random(seed) {}
@@ -140,7 +203,69 @@ public:
     }
   }
 
+  /// Changes what a glTF file says and not how: a value becomes another one, of
+  /// the file or of another type, a member goes, an element comes again.
+  void mutateJson(std::string &text) {
+    using Json = nlohmann::json;
+    Json root = Json::parse(text, nullptr, /*allow_exceptions=*/false);
+    if (!root.is_object())
+      return mutate(text);
+    std::vector<Json *> values;
+    collect(root, values);
+    Json &value = *values[below(values.size())];
+    switch (below(4)) {
+    case 0: {
+      const Json others[] = {nullptr,
+                             true,
+                             -1,
+                             0,
+                             1,
+                             2,
+                             255,
+                             5120,
+                             4294967295u,
+                             1e300,
+                             0.5,
+                             "",
+                             Json::array(),
+                             Json::object(),
+                             Json::array({0}),
+                             Json::array({1, "a"})};
+      value = others[below(std::size(others))];
+      break;
+    }
+    case 1: {
+      Json copy = *values[below(values.size())];
+      value = std::move(copy);
+      break;
+    }
+    case 2:
+      if (value.is_structured() && !value.empty()) {
+        auto at = value.begin();
+        std::advance(at, below(value.size()));
+        value.erase(at);
+      }
+      break;
+    default:
+      if (value.is_array() && !value.empty()) {
+        Json copy = value[below(value.size())];
+        value.push_back(std::move(copy));
+      } else if (value.is_number_integer()) {
+        value = value.get<int64_t>() + (below(2) ? 1 : -1);
+      }
+    }
+    text = root.dump();
+  }
+
 private:
+  static void collect(nlohmann::json &value,
+                      std::vector<nlohmann::json *> &values) {
+    values.push_back(&value);
+    if (value.is_structured())
+      for (auto &part : value)
+        collect(part, values);
+  }
+
   /// Puts an extreme in place of a number of a text.
   void replaceNumber(std::string &text) {
     constexpr const char *extremes[] = {"0",
@@ -216,14 +341,16 @@ std::string fuzzReaders(uint64_t seed, uint64_t count) {
   addPly(seeds);
   addTexts(seeds);
   addGltf(seeds);
+  addDataUris(seeds);
   for (const Seed &whole : seeds)
     if (auto mesh = readAs(whole.format, whole.content); !mesh)
       return "of the corpus: " + mesh.error().message + "\n" + whole.content;
   for (uint64_t i = 0; i < count; ++i) {
     Mutator mutator(seed + i);
     Seed file = seeds[mutator.below(seeds.size())];
+    bool isJson = file.content.starts_with('{') && mutator.below(2);
     for (size_t k = 1 + mutator.below(4); k > 0; --k)
-      mutator.mutate(file.content);
+      isJson ? mutator.mutateJson(file.content) : mutator.mutate(file.content);
     auto mesh = readAs(file.format, file.content);
     std::string problem = mesh ? checkMesh(*mesh)
                           : mesh.error().message.empty()

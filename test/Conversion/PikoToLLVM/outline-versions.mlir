@@ -28,6 +28,15 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 // CHECK-NEXT:        func.call @P.k.version0(
 // CHECK-NEXT:      } else {
 // CHECK-NEXT:        func.call @P.k.version1(
+
+// Two bodies share the kernel's function.
+// CHECK-LABEL: func.func private @Q.two(
+// CHECK-NOT:     func.call
+// CHECK:         scf.if %{{.*}} {
+// CHECK:           llvm.store
+// CHECK:         } else {
+// CHECK:           llvm.store
+// CHECK:       }{{$}}
 piko.pipeline @P rank 1 {
   piko.buffer @out : @F
   piko.source @a
@@ -61,6 +70,27 @@ piko.pipeline @P rank 1 {
         }
         piko.store %x, @out[%i : index] "x" : i32
       }
+    } {piko.versions}
+    piko.cpu.close_writer %w
+    piko.storage.close_bins %bins : !piko.bins<@F>
+  }
+}
+
+piko.pipeline @Q rank 1 {
+  piko.buffer @out : @F
+  piko.source @a
+  piko.stage @a bins [0] threads 1 : @F -> [] {}
+  piko.kernel @two {
+    %c0 = arith.constant 0 : index
+    %i1 = arith.constant 1 : i32
+    %i2 = arith.constant 2 : i32
+    %bins = piko.storage.open_bins @a : !piko.bins<@F>
+    %w = piko.cpu.open_writer %bins[%c0] : !piko.bins<@F>
+    %outer = piko.cpu.takes_vectors %w {expected, loop = "outside", number = 0, scalar = 10, vectors = 20}
+    scf.if %outer {
+      piko.store %i1, @out[%c0 : index] "x" : i32
+    } else {
+      piko.store %i2, @out[%c0 : index] "x" : i32
     } {piko.versions}
     piko.cpu.close_writer %w
     piko.storage.close_bins %bins : !piko.bins<@F>
