@@ -20,6 +20,9 @@ static Options retarget(Options options, const std::string &target) {
   if (!gpu)
     options.load.cpu = target;
   options.load.gpu.target = gpu.value_or(GPUTarget::None);
+  // Of loops of the code for the own target; others hold others in two
+  // versions.
+  options.mappings.clear();
   return options;
 }
 

@@ -74,9 +74,11 @@ def get_targets(command):
         return get_values(words, "--cpus") or ["cpu"]
     if not {"piko-compare", "piko-render"} & set(words):
         return []
-    return get_values(words, "--targets") or \
-        [t for t in get_values(words, "--target")[:1] if t != "cpu"] or \
-        get_values(words, "--cpu")[:1] or ["cpu"]
+    against = [t for t in get_values(words, "--against") if t != "reference"]
+    return against + (
+        get_values(words, "--targets") or
+        [t for t in get_values(words, "--target")[:1] if t != "cpu"] or
+        get_values(words, "--cpu")[:1] or ["cpu"])
 
 
 def name_target(name):
