@@ -14,10 +14,10 @@
 // RUN: pikoc %s --pipe Unlikely --emit=llvm | FileCheck %s --check-prefix=WEIGHTS
 // WEIGHTS: llvm.cond_br %{{.*}} weights([524, 1048052]),
 //
-// RUN: pikoc %s --pipe Plain --remarks -o %t.ll 2>&1 | FileCheck %s --check-prefix=VECTORS
-// RUN: pikoc %s --pipe Likely --remarks -o %t.ll 2>&1 | FileCheck %s --check-prefix=VECTORS
+// RUN: pikoc %s --cpu x86-64-v3 --pipe Plain --remarks -o %t.ll 2>&1 | FileCheck %s --check-prefix=VECTORS
+// RUN: pikoc %s --cpu x86-64-v3 --pipe Likely --remarks -o %t.ll 2>&1 | FileCheck %s --check-prefix=VECTORS
 // VECTORS: stage 'work': process is vectorized for {{[0-9]+}} primitives at once{{$}}
-// RUN: pikoc %s --pipe Tenth --remarks -o %t.ll 2>&1 | FileCheck %s --check-prefix=BOTH
+// RUN: pikoc %s --cpu x86-64-v3 --pipe Tenth --remarks -o %t.ll 2>&1 | FileCheck %s --check-prefix=BOTH
 // BOTH: stage 'work': process is vectorized for {{[0-9]+}} primitives at once, and held one after the other as well
 #include <piko.h>
 

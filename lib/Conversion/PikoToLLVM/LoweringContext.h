@@ -270,6 +270,9 @@ void populateGridToLLVMPatterns(const mlir::TypeConverter &converter,
 /// Makes branches of casts from float to integer that saturate.
 void branchInSaturatingCasts(mlir::func::FuncOp function);
 
+/// Whether a function that was a part of another can have an operation of its
+/// own in place of an argument: it costs nothing, and gives the same.
+bool canBeMadeAgain(mlir::Operation *op);
 /// Lets a kernel for which there is one thread run its units without a parallel
 /// region, as calls of a function.
 void outlineUnits(mlir::func::FuncOp kernel);

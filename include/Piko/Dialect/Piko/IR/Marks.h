@@ -18,8 +18,8 @@ constexpr llvm::StringLiteral lanes = "piko.lanes";
 constexpr llvm::StringLiteral rows = "piko.rows";
 /// What lanes are given, a `LaneMappingAttr`, of a loop over primitives.
 constexpr llvm::StringLiteral mapping = "piko.mapping";
-/// An scf.if between the versions of a loop over primitives, which become
-/// functions.
+/// An scf.if between the versions of a loop over primitives; they become
+/// functions where one of them holds loops in two versions itself.
 constexpr llvm::StringLiteral versions = "piko.versions";
 /// How many turns lanes together are expected to make of a loop that was made
 /// of two, one inside of the other: a 64-bit float.
@@ -29,8 +29,7 @@ constexpr llvm::StringLiteral turns = "piko.turns";
 /// 64-bit float.
 constexpr llvm::StringLiteral advances = "piko.advances";
 /// How probable it is that an scf.if takes its first side, by what the text
-/// says with
-/// [[likely]] and its like: a 64-bit float from 0 to 1.
+/// says with [[likely]] and its like: a 64-bit float from 0 to 1.
 constexpr llvm::StringLiteral probability = "piko.probability";
 /// How threads share the loop over units of work, a `UnitLoopAttr`.
 constexpr llvm::StringLiteral units = "piko.units";
