@@ -213,6 +213,8 @@ void piko::addVectorSequence(OpPassManager &passes,
   }
   if (options.count == Counting::Lanes)
     passes.nest<PipelineOp>().addPass(createCountLanes());
+  if (options.has("unswitch-versions"))
+    passes.nest<PipelineOp>().addPass(createUnswitchVersions());
   passes.nest<PipelineOp>().addPass(createConvertPikoToOpenMP());
   passes.addPass(createConvertPikoToLLVM());
   addCleanUp(passes);

@@ -19,8 +19,9 @@ const std::vector<std::string> &SynthesisOptions::getOptional() {
       "form-gbuffer", "defer-shading", "form-tiles", "prefetch", "vectorize",
       "prove-bounds", "hoist-loads", "hoist-bounds", "merge-bounds",
       "thread-jumps", "narrow-integers", "merge-gathers", "pair-gathers",
-      "tabulate-invariants", "unroll-and-jam", "if-convert",
-      "uplift-pixel-loops", "privatize", "reduce-updates", "reduce-by-atomics",
+      "tabulate-invariants", "unroll-and-jam", "unswitch-versions",
+      "if-convert", "uplift-pixel-loops", "privatize", "reduce-updates",
+      "reduce-by-atomics",
       // of LLVM
       "loop-vectorize", "slp-vectorizer"};
   return names;

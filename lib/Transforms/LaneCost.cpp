@@ -7,6 +7,7 @@
 #include "LoadChains.h"
 #include "LoopStreams.h"
 
+#include "Piko/Analysis/BranchProbability.h"
 #include "Piko/Dialect/Piko/IR/Marks.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
@@ -103,15 +104,6 @@ static Frequency getFrequency(Region &side, Region &other, int64_t laneCount) {
   if (countOther <= trivial || countOther > ratio * count)
     return {0.8, 1};
   return {0.5, 1};
-}
-
-/// How often a side of a condition runs, where the text says so.
-static std::optional<double> getProbability(scf::IfOp choice, Region &side) {
-  auto first = choice->getAttrOfType<FloatAttr>(marks::probability);
-  if (!first)
-    return std::nullopt;
-  double taken = first.getValueAsDouble();
-  return &side == &choice.getThenRegion() ? taken : 1 - taken;
 }
 
 /// Whether a condition is one more of those that all have to hold: it is all
@@ -342,10 +334,15 @@ void CostModel::addStructure(Operation *op, Frequency times, bool laneByLane) {
     return;
   }
   if (auto choice = dyn_cast<scf::IndexSwitchOp>(op)) {
-    double share = 1.0 / choice->getNumRegions();
-    double shared = lanes.isVarying(choice.getArg()) ? 1 : share;
-    for (Region &region : choice->getRegions())
-      add(region, times.scaled(share, shared), laneByLane);
+    for (Region &region : choice->getRegions()) {
+      std::optional<double> known = getProbability(choice, region);
+      Frequency share{known.value_or(1.0 / choice->getNumRegions()), 1};
+      if (!lanes.isVarying(choice.getArg()))
+        share.vectors = share.serial;
+      else if (known)
+        share.vectors = 1 - std::pow(1 - *known, lanes.getLaneCount());
+      add(region, times.scaled(share.serial, share.vectors), laneByLane);
+    }
     return;
   }
   double going = getGoing(op);

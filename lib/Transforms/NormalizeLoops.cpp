@@ -12,6 +12,7 @@
 //   6. an scf.while whose work stands in front of its condition, in an scf.if
 //      with that condition, has it behind.
 
+#include "Piko/Analysis/BranchProbability.h"
 #include "Piko/Dialect/Piko/IR/BinArithmetic.h"
 #include "Piko/Dialect/Piko/IR/Marks.h"
 #include "Piko/Transforms/Passes.h"
@@ -171,6 +172,10 @@ struct TestFlags : OpRewritePattern<scf::IndexSwitchOp> {
                                   choice.getResultTypes(), flag,
                                   /*addThenBlock=*/false,
                                   /*addElseBlock=*/false);
+    if (auto taken = getProbability(choice, *yes))
+      if (double all = *taken + *getProbability(choice, *no); all > 0)
+        test->setAttr(marks::probability,
+                      rewriter.getF64FloatAttr(*taken / all));
     rewriter.inlineRegionBefore(*yes, test.getThenRegion(),
                                 test.getThenRegion().end());
     rewriter.inlineRegionBefore(*no, test.getElseRegion(),

@@ -11,6 +11,10 @@
 // TENTH: piko.probability = 0.1{{[0-9]*}} : f64
 // PLAIN-NOT: piko.probability
 //
+// Of a switch there is one for each way, the default first.
+// RUN: pikoc %s --pipe Cases --emit=authored | FileCheck %s --check-prefix=CASES
+// CASES: piko.probabilities = array<f64: 0.33{{[0-9]*}}, 9.31{{[0-9]*}}E-10, 0.66{{[0-9]*}}>
+//
 // RUN: pikoc %s --pipe Unlikely --emit=llvm | FileCheck %s --check-prefix=WEIGHTS
 // WEIGHTS: llvm.cond_br %{{.*}} weights([524, 1048052]),
 //
@@ -29,7 +33,7 @@ struct State {
   piko::Buffer<float> out;
 };
 
-enum class Kind { Plain, Likely, Unlikely, Tenth };
+enum class Kind { Plain, Likely, Unlikely, Tenth, Cases };
 
 template <Kind K> struct Work : piko::Stage<0, 0, 64, Item>, piko::Uses<State> {
   float compute(float x, float y) {
@@ -48,6 +52,17 @@ template <Kind K> struct Work : piko::Stage<0, 0, 64, Item>, piko::Uses<State> {
     } else if constexpr (K == Kind::Tenth) {
       if (__builtin_expect_with_probability(item.x > item.y, 1, 0.1))
         x = compute(item.x, item.y);
+    } else if constexpr (K == Kind::Cases) {
+      switch (item.serial) {
+      [[unlikely]] case 3:
+        x = compute(item.x, item.y);
+        break;
+      [[likely]] case 5:
+        x = compute(item.y, item.x + 1);
+        break;
+      default:
+        x = compute(item.y, item.y);
+      }
     } else {
       if (item.x > item.y)
         x = compute(item.x, item.y);
@@ -64,3 +79,4 @@ struct Plain : Lone<Kind::Plain> {};
 struct Likely : Lone<Kind::Likely> {};
 struct Unlikely : Lone<Kind::Unlikely> {};
 struct Tenth : Lone<Kind::Tenth> {};
+struct Cases : Lone<Kind::Cases> {};

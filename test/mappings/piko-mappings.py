@@ -38,7 +38,7 @@ PASSES = ["pre-schedule", "infer-directives", "fuse-stages", "test-early", "prun
           "form-gbuffer", "defer-shading", "form-tiles", "prefetch", "vectorize",
           "prove-bounds", "hoist-loads", "hoist-bounds", "merge-bounds",
           "thread-jumps", "narrow-integers", "merge-gathers", "pair-gathers",
-          "privatize", "reduce-updates", "if-convert"]
+          "unswitch-versions", "privatize", "reduce-updates", "if-convert"]
 
 SIZE = ["--width", "131", "--height", "99", "--lights", "3"]
 

@@ -22,6 +22,7 @@ PASSES = ["pre-schedule", "infer-directives", "fuse-stages", "test-early", "prun
           "defer-shading", "form-tiles", "prefetch", "vectorize", "prove-bounds",
           "hoist-loads", "hoist-bounds", "merge-bounds", "thread-jumps",
           "narrow-integers", "merge-gathers", "pair-gathers", "if-convert",
+          "unswitch-versions",
           "uplift-pixel-loops", "privatize", "reduce-updates",
           "reduce-by-atomics"]
 

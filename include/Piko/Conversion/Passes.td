@@ -464,10 +464,10 @@ def ConvertPikoToLLVM : Pass<"convert-piko-to-llvm", "::mlir::ModuleOp"> {
     primitives each field by itself, so that LLVM keeps in registers what it
     does not.
     The units of a kernel on a cycle become calls of a function, `KERNEL.unit`,
-    without a parallel region where there is one thread for them. Where the scalar version
-    of a loop over primitives holds loops in two versions itself (`piko.versions`), it is
-    unswitched, for units that run all of these as scalar loops, and all versions become
-    functions, `KERNEL.version0` and so on: none spills registers for another.
+    without a parallel region where there is one thread for them. The versions of a
+    loop over primitives become functions as well, `KERNEL.version0` and so on, where
+    the scalar one is one of two itself (`piko-unswitch-versions`): none spills
+    registers for another.
 
     **Guarantees** that nothing of the `piko` dialect is left.
 

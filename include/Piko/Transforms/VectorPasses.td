@@ -342,4 +342,59 @@ def PairGathers : Pass<"piko-pair-gathers", "::piko::PipelineOp"> {
   }];
 }
 
+def UnswitchVersions : Pass<"piko-unswitch-versions", "::piko::PipelineOp"> {
+  let summary = "Make a body for units that run all inner loops as scalar loops";
+  let description = [{
+    **Requires** versions (`piko-vectorize`); in front of `convert-piko-to-openmp`.
+
+    **Does**: where the scalar version of a loop over primitives holds loops in two
+    versions itself, whose choice is made once for a unit, it is unswitched: one body
+    has these choices, and another one, for units that run all inner loops as scalar
+    loops, has nothing else in it. `convert-piko-to-llvm` makes a function of each
+    version then, so that none spills registers for another.
+
+    **Guarantees** the same operations in the same order.
+
+    Before:
+    ```
+    %inner = piko.cpu.takes_vectors %w {loop = "inside", number = 1 ...}
+    scf.if %outer {
+      ... // by vectors
+    } else {
+      scf.for %i = %c0 to %count step %c1 {
+        scf.if %inner {
+          ... // by vectors
+        } else {
+          ...
+        }
+      }
+    } {piko.versions}
+    ```
+    After:
+    ```
+    %inner = piko.cpu.takes_vectors %w {loop = "inside", number = 1 ...}
+    scf.if %outer {
+      ...
+    } else {
+      scf.if %inner {
+        ... // as before
+      } else {
+        scf.for %i = %c0 to %count step %c1 {
+          scf.if %false {
+            ... // canonicalize erases it
+          } else {
+            ...
+          }
+        }
+      } {piko.versions}
+    } {piko.versions}
+    ```
+
+    **Limits**: decisions made in front of all versions. Of several inner loops
+    there are two bodies, not one for each combination.
+  }];
+  let dependentDialects = ["::mlir::arith::ArithDialect",
+                           "::mlir::scf::SCFDialect"];
+}
+
 #endif // PIKO_TRANSFORMS_VECTORPASSES_TD

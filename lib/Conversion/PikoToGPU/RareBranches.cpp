@@ -12,7 +12,7 @@
 
 #include "PikoToGPU.h"
 
-#include "Piko/Dialect/Piko/IR/Marks.h"
+#include "Piko/Analysis/BranchProbability.h"
 
 using namespace mlir;
 using namespace piko;
@@ -49,11 +49,8 @@ static Region *findRareWay(scf::IfOp branch, Operation *loop) {
     });
     if (!isOwn)
       return nullptr;
-    if (auto first = branch->getAttrOfType<FloatAttr>(marks::probability)) {
-      bool isLikely = first.getValueAsDouble() > 0.5;
-      if (isLikely == (&region == &branch.getThenRegion()))
-        return nullptr;
-    }
+    if (getProbability(branch, region).value_or(0) > 0.5)
+      return nullptr;
     ways.push_back(&region);
   }
   return ways.size() == 1 ? ways.front() : nullptr;

@@ -270,17 +270,11 @@ void populateGridToLLVMPatterns(const mlir::TypeConverter &converter,
 /// Makes branches of casts from float to integer that saturate.
 void branchInSaturatingCasts(mlir::func::FuncOp function);
 
-/// Whether a function that was a part of another can have an operation of its
-/// own in place of an argument: it costs nothing, and gives the same.
-bool canBeMadeAgain(mlir::Operation *op);
 /// Lets a kernel for which there is one thread run its units without a parallel
 /// region, as calls of a function.
 void outlineUnits(mlir::func::FuncOp kernel);
-/// Makes versions of the scalar version of a loop over primitives
-/// (`piko.versions`) that holds loops in two versions itself: one for units
-/// that run all of these as scalar loops, which has nothing else in it.
-void unswitchScalarVersions(KernelOp kernel);
-/// Makes functions of the versions of loops over primitives.
+/// Makes functions of the versions of loops over primitives (`piko.versions`)
+/// whose scalar version is one of two itself.
 void outlineVersions(mlir::func::FuncOp kernel);
 
 /// The name of a kernel's function.

@@ -152,10 +152,8 @@ LogicalResult ConvertPikoToLLVMPass::convert(PipelineOp pipeline,
   if (!program)
     return pipeline.emitError("expected a piko.program, which "
                               "piko-form-program makes");
-  for (auto kernel : pipeline.getOps<KernelOp>()) {
+  for (auto kernel : pipeline.getOps<KernelOp>())
     numberMappings(kernel);
-    unswitchScalarVersions(kernel);
-  }
   PipelineNumbers numbers(pipeline);
   func::FuncOp setup = createProgram(numbers, context);
   SmallVector<func::FuncOp> functions, again;

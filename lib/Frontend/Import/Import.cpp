@@ -5,12 +5,17 @@
 #include "Import/PhaseImporter.h"
 #include "Support/Accessors.h"
 #include "Support/CallChain.h"
+
+#include "Piko/Dialect/Piko/IR/Marks.h"
+
 #include "mlir/Dialect/ControlFlow/IR/ControlFlowOps.h"
 #include "llvm/ADT/PostOrderIterator.h"
 #include "llvm/IR/CFG.h"
 #include "llvm/IR/Instructions.h"
 #include "llvm/IR/IntrinsicInst.h"
 #include "llvm/IR/ProfDataUtils.h"
+
+#include <numeric>
 
 using namespace piko;
 using llvm::dyn_cast;
@@ -229,10 +234,21 @@ LogicalResult PhaseImporter::importTerminator(llvm::Instruction *terminator) {
   }
   llvm::SmallVector<mlir::ValueRange> ranges(arguments.begin(),
                                              arguments.end());
-  make<mlir::cf::SwitchOp>(scalars.get(choice->getCondition()),
-                           getTarget(from, choice->getDefaultDest()),
-                           getArguments(from, choice->getDefaultDest()), cases,
-                           targets, ranges);
+  auto made = make<mlir::cf::SwitchOp>(
+      scalars.get(choice->getCondition()),
+      getTarget(from, choice->getDefaultDest()),
+      getArguments(from, choice->getDefaultDest()), cases, targets, ranges);
+  if (llvm::SmallVector<uint32_t> weights;
+      llvm::extractBranchWeights(*choice, weights)) {
+    double all =
+        std::max(1.0, std::accumulate(weights.begin(), weights.end(), 0.0));
+    made->setAttr(marks::probabilities,
+                  mlir::DenseF64ArrayAttr::get(
+                      made.getContext(),
+                      llvm::map_to_vector(weights, [&](uint32_t weight) {
+                        return weight / all;
+                      })));
+  }
   return success();
 }
 

@@ -48,6 +48,9 @@ public:
       llvm::MutableArrayRef<mlir::Region> regions) override {
     auto made = ControlFlowToSCFTransformation::createStructuredBranchRegionOp(
         builder, branch, types, regions);
+    if (auto all = branch->getAttr(marks::probabilities);
+        all && llvm::succeeded(made))
+      (*made)->setAttr(marks::probabilities, all);
     auto condition = mlir::dyn_cast<mlir::cf::CondBranchOp>(branch);
     if (llvm::failed(made) || !condition || !condition.getBranchWeights())
       return made;

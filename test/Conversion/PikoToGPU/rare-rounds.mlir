@@ -101,3 +101,40 @@ piko.pipeline @Counted rank 1 {
     }
   }
 }
+
+// -----
+
+// A way that the text says is usual is not rare, whatever arrays it keeps.
+// CHECK-LABEL: piko.pipeline @Likely
+// CHECK:         gpu.launch
+// CHECK-NOT:     scf.execute_region
+// CHECK-NOT:     gpu.launch
+piko.record @F {"x" : i32 at 0} size 4 align 4
+piko.pipeline @Likely rank 1 {
+  piko.source @start
+  piko.edge @start[0] -> @last
+  piko.buffer @out : @F
+  piko.stage @start bins [0] threads 64 : @F -> [@F] {}
+  piko.stage @last bins [0] threads 64 : @F -> [] {}
+  piko.kernel @kernel_start {
+    piko.bins of @start {
+    ^bb0(%bin: index):
+      piko.items of @start {
+      ^bb0(%f: !piko.prim<@F>):
+        %array = memref.alloca() : memref<4xi32>
+        %x = piko.get %f "x" : !piko.prim<@F> -> i32
+        %zero = arith.constant 0 : i32
+        %usual = arith.cmpi sgt, %x, %zero : i32
+        %at = arith.index_cast %x : i32 to index
+        piko.atomic add @out[%at : index] "x", %x : i32
+        scf.if %usual {
+          %p = piko.emit 0 (%x) : i32 -> !piko.prim<@F>
+        } else {
+          memref.store %x, %array[%at] : memref<4xi32>
+          %y = memref.load %array[%at] : memref<4xi32>
+          %q = piko.emit 0 (%y) : i32 -> !piko.prim<@F>
+        } {piko.probability = 2.0e-01 : f64}
+      }
+    }
+  }
+}

@@ -66,3 +66,16 @@ func.func @turns(%end: index) {
   } {piko.turns = 8}
   return
 }
+
+// -----
+
+func.func @probabilities(%at: index) {
+  // expected-error@+1 {{expected 'piko.probabilities' to be an array of 64-bit floats, but got array<f32: 1.000000e+00, 0.000000e+00>}}
+  scf.index_switch %at {piko.probabilities = array<f32: 1.0, 0.0>}
+  case 1 {
+    scf.yield
+  }
+  default {
+  }
+  return
+}

@@ -90,6 +90,7 @@ static StringRef getExpectedKind(StringRef name) {
       .Case(marks::number, "a 64-bit integer")
       .Cases({marks::turns, marks::advances, marks::probability},
              "a 64-bit float")
+      .Case(marks::probabilities, "an array of 64-bit floats")
       .Cases({marks::pixels, cppNameAttr}, "a string")
       .Case(cppTypesAttr, "a dictionary")
       .Default({});
@@ -102,6 +103,8 @@ static bool hasExpectedKind(NamedAttribute attribute) {
     return isa<LaneMappingAttr>(value);
   if (name == marks::units)
     return isa<UnitLoopAttr>(value);
+  if (name == marks::probabilities)
+    return isa<DenseF64ArrayAttr>(value);
   if (name == cppNameAttr || name == marks::pixels)
     return isa<StringAttr>(value);
   if (name == cppTypesAttr)

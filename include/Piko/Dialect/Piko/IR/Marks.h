@@ -19,7 +19,7 @@ constexpr llvm::StringLiteral rows = "piko.rows";
 /// What lanes are given, a `LaneMappingAttr`, of a loop over primitives.
 constexpr llvm::StringLiteral mapping = "piko.mapping";
 /// An scf.if between the versions of a loop over primitives; they become
-/// functions where one of them holds loops in two versions itself.
+/// functions where the scalar one, its second side, is one of two itself.
 constexpr llvm::StringLiteral versions = "piko.versions";
 /// How many turns lanes together are expected to make of a loop that was made
 /// of two, one inside of the other: a 64-bit float.
@@ -31,6 +31,9 @@ constexpr llvm::StringLiteral advances = "piko.advances";
 /// How probable it is that an scf.if takes its first side, by what the text
 /// says with [[likely]] and its like: a 64-bit float from 0 to 1.
 constexpr llvm::StringLiteral probability = "piko.probability";
+/// How probable each region of an scf.index_switch is, the default one first,
+/// by what the text says: an array of 64-bit floats from 0 to 1.
+constexpr llvm::StringLiteral probabilities = "piko.probabilities";
 /// How threads share the loop over units of work, a `UnitLoopAttr`.
 constexpr llvm::StringLiteral units = "piko.units";
 /// A loop whose iterations the threads of a block share.
