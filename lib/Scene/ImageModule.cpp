@@ -5,6 +5,7 @@
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 
+#include <algorithm>
 #include <fstream>
 #include <iterator>
 #include <limits>
@@ -20,8 +21,13 @@ namespace {
 
 std::unique_ptr<OIIO::ImageOutput> openFormat(const std::string &extension) {
   auto output = OIIO::ImageOutput::create("image." + extension);
-  if (!output)
+  if (!output) {
     OIIO::geterror(); // its text speaks of plugins
+    return nullptr;
+  }
+  std::string_view format = output->format_name();
+  if (format == "null" || format == "term") // They write no file.
+    return nullptr;
   return output;
 }
 
@@ -41,6 +47,12 @@ public:
   }
   std::string name() const {
     return "/proc/self/fd/" + std::to_string(descriptor);
+  }
+  Result<Done> write(std::string_view content) const {
+    if (pwrite(descriptor, content.data(), content.size(), 0) !=
+        ssize_t(content.size()))
+      return Error{"no memory for its file"};
+    return Done{};
   }
   std::string read() const {
     std::ifstream file(name(), std::ios::binary);
@@ -85,24 +97,63 @@ Result<Done> writeAll(OIIO::ImageOutput &output, const std::string &name,
   return Done{};
 }
 
+/// The library's writers of some formats cut sizes to 16 bits; so the file is
+/// asked.
+Result<Done> checkSize(const std::string &extension, const std::string &content,
+                       int width, int height) {
+  auto input = OIIO::ImageInput::create(extension);
+  if (!input) {
+    OIIO::geterror();
+    return Done{}; // It is written alone.
+  }
+  MemoryFile file;
+  if (auto ok = file.write(content); !ok)
+    return ok;
+  OIIO::ImageSpec spec;
+  if (!input->open(file.name(), spec) || spec.width != width ||
+      spec.height != height) {
+    input->geterror();
+    return Error{"its format, as OpenImageIO writes it, does not hold " +
+                 std::to_string(width) + " x " + std::to_string(height) +
+                 " pixels"};
+  }
+  return Done{};
+}
+
+Result<std::string> encodeUnchecked(OIIO::ImageOutput &output,
+                                    const OIIO::ImageSpec &spec,
+                                    const std::string &extension,
+                                    std::span<const scene::Color> pixels) {
+  if (output.supports("ioproxy")) {
+    OIIO::Filesystem::IOVecOutput stream;
+    output.set_ioproxy(&stream);
+    if (auto ok = writeAll(output, "image." + extension, spec, pixels); !ok)
+      return ok.error();
+    return std::string(stream.buffer().begin(), stream.buffer().end());
+  }
+  MemoryFile file;
+  if (auto ok = writeAll(output, file.name(), spec, pixels); !ok)
+    return ok.error();
+  return file.read();
+}
+
 Result<std::string> encode(const std::string &extension, int width, int height,
                            std::span<const scene::Color> pixels) {
   auto output = openFormat(extension);
   if (!output)
     return Error{"no image format has the extension '" + extension + "'"};
-  OIIO::ImageSpec spec =
-      describe(extension, width, height, output->format_name());
-  if (output->supports("ioproxy")) {
-    OIIO::Filesystem::IOVecOutput stream;
-    output->set_ioproxy(&stream);
-    if (auto ok = writeAll(*output, "image." + extension, spec, pixels); !ok)
-      return ok.error();
-    return std::string(stream.buffer().begin(), stream.buffer().end());
-  }
-  MemoryFile file;
-  if (auto ok = writeAll(*output, file.name(), spec, pixels); !ok)
+  std::string_view writer = output->format_name();
+  constexpr int mostOfJPEG = 65500; // libjpeg ends the process beyond it.
+  if (writer == "jpeg" && std::max(width, height) > mostOfJPEG)
+    return Error{"JPEG holds up to " + std::to_string(mostOfJPEG) +
+                 " pixels a side"};
+  auto content = encodeUnchecked(
+      *output, describe(extension, width, height, writer), extension, pixels);
+  if (!content)
+    return content;
+  if (auto ok = checkSize(extension, *content, width, height); !ok)
     return ok.error();
-  return file.read();
+  return content;
 }
 
 /// Integers over the largest one, so that equal parts of it are equal numbers
@@ -136,6 +187,12 @@ Result<Image> read(const std::string &path) {
   auto input = OIIO::ImageInput::open(path, &asStored);
   if (!input)
     return Error{OIIO::geterror()};
+  // Their readers leave their buffers, up to OpenImageIO 2.4.12.
+  constexpr std::string_view unsound[] = {"gif", "ico", "rla"};
+  std::string_view reader = input->format_name();
+  if (std::ranges::find(unsound, reader) != std::end(unsound))
+    return Error{"images of the format '" + std::string(reader) +
+                 "' are not read"};
   const OIIO::ImageSpec &spec = input->spec();
   constexpr int64_t mostPixels = int64_t(1) << 30;
   int channels = spec.nchannels;

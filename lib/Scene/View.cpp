@@ -103,6 +103,30 @@ std::string describeCut(const char *plane, double at, int64_t count,
          textOf(end) + "; " + option + " says where it is";
 }
 
+/// How many pixels' widths, at most, rays through the middle row and column are
+/// off the pixels' centres, as floats round the rays' directions.
+double findRayError(const scene::Camera &camera, int width, int height) {
+  glm::dvec3 right = camera.right, up = camera.up, forward = camera.forward;
+  double most = 0;
+  auto trace = [&](int x, int y) {
+    float across = 2 * (x + 0.5f) / width - 1,
+          down = 1 - 2 * (y + 0.5f) / height;
+    glm::dvec3 exact = forward + right * double(across) + up * double(down);
+    glm::dvec3 error =
+        glm::dvec3(camera.forward + camera.right * across + camera.up * down) -
+        exact;
+    most = std::max(
+        {most,
+         std::fabs(glm::dot(error, right) / glm::dot(right, right)) * width / 2,
+         std::fabs(glm::dot(error, up) / glm::dot(up, up)) * height / 2});
+  };
+  for (int x = 0; x < width; ++x)
+    trace(x, height / 2);
+  for (int y = 0; y < height; ++y)
+    trace(width / 2, y);
+  return most;
+}
+
 } // namespace
 
 Sphere render::boundingSphere(const Mesh &mesh) {
@@ -203,6 +227,14 @@ Result<scene::Camera> render::makeCamera(const ViewOptions &options,
   if (cut.beyondFar > 0)
     warnings.push_back(describeCut("far", camera->farZ, cut.beyondFar,
                                    "farthest", cut.farthest, "--far"));
+  double off = findRayError(*camera, options.width, options.height);
+  if (off > 0.5)
+    warnings.push_back(
+        "the field of view is narrower than floats resolve where "
+        "the camera looks: pixels are up to " +
+        textOf(off) +
+        " of their widths off; a camera that looks "
+        "along an axis resolves more");
   return camera;
 }
 

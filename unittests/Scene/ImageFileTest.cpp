@@ -8,6 +8,7 @@
 
 #include <chrono>
 #include <limits>
+#include <sstream>
 #include <thread>
 #include <vector>
 
@@ -161,12 +162,38 @@ TEST_F(ImageFile, ReplacesAnOlderImage) {
   EXPECT_EQ(countFiles(), 1u);
 }
 
+// libjpeg would end the process, and the writers of others cut sizes.
+TEST_F(ImageFile, EveryFormatHoldsASizeOrRefusesIt) {
+  std::string formats;
+  ASSERT_TRUE(OIIO::getattribute("output_format_list", formats));
+  std::istringstream names(formats);
+  int written = 0, refused = 0;
+  for (std::string format; std::getline(names, format, ',');)
+    for (auto [w, h] : {std::pair(3, 2), {65535, 1}, {1, 65536}, {65536, 1}}) {
+      std::string path = pathOf("a." + format);
+      std::vector<Color> row(size_t(w) * h, Color{{0.25f, 0.5f, 1, 1}});
+      if (!checkImageFormat(path) || !writeImage(path, w, h, row)) {
+        refused += w == 65536;
+        continue;
+      }
+      auto image = readImage(path);
+      if (!image) // It is written alone, as 'gif' and 'ico' are.
+        continue;
+      EXPECT_EQ(image->width, w) << format;
+      EXPECT_EQ(image->height, h) << format;
+      ++written;
+    }
+  EXPECT_GT(written, 20);
+  EXPECT_GT(refused, 2); // jpeg, gif and targa at least
+}
+
 TEST_F(ImageFile, UnknownFormats) {
   EXPECT_NE(errorOf(pathOf("a.nope")).find("extension 'nope'"),
             std::string::npos);
   EXPECT_NE(errorOf(pathOf("image")).find("ends in a format"),
             std::string::npos);
-  EXPECT_FALSE(checkImageFormat(pathOf("a.nope")));
+  for (const char *format : {"nope", "null", "term"})
+    EXPECT_FALSE(checkImageFormat(pathOf(std::string("a.") + format)));
   EXPECT_TRUE(checkImageFormat(pathOf("a.png")));
   EXPECT_EQ(countFiles(), 0u);
 }

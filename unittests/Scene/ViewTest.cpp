@@ -157,6 +157,23 @@ TEST(View, AScenesOwnPlanesStayWhereNothingIsNearer) {
   EXPECT_EQ(fitted->viewProjection, whole->viewProjection);
 }
 
+TEST(View, PixelsThatFloatsDoNotResolveAreSaid) {
+  ViewOptions options{.width = 320, .height = 240, .eye = glm::vec3(0, 0, 3)};
+  auto warn = [&](float fovy, glm::vec3 at) {
+    options.fovy = fovy;
+    options.at = at;
+    std::vector<std::string> warnings;
+    EXPECT_TRUE(makeCamera(options, makeGround(), warnings));
+    std::erase_if(warnings, [](const std::string &warning) {
+      return !warning.starts_with("the field of view is narrower");
+    });
+    return warnings.size() == 1;
+  };
+  EXPECT_FALSE(warn(1e-7f, {0, 0, 0})); // along an axis
+  EXPECT_FALSE(warn(0.01f, {2, -1, 0}));
+  EXPECT_TRUE(warn(1e-4f, {2, -1, 0}));
+}
+
 TEST(View, WhatPlanesCutIsSaid) {
   ViewOptions options{.width = 320, .height = 240};
   options.eye = {0, 0.5f, 0};
