@@ -27,6 +27,7 @@ import sys
 
 from charts import COLORS, find_pyplot
 from commands import call
+from outputs import save_figure, write_csv
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 RASTER = f"{ROOT}/examples/raster/raster.piko.cpp"
@@ -130,7 +131,7 @@ def measure(arguments):
                     if row["image_hash"] != first["image_hash"]:
                         sys.exit(f"figure4: expected the image of {first}, "
                                  f"but got {row}")
-        write_rows(f"{arguments.out}.csv", rows)
+        write_csv(f"{arguments.out}.csv", rows, COLUMNS)
 
 
 class Results:
@@ -249,8 +250,8 @@ def draw(plot, results, out):
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="upper center",
                   ncols=2, frameon=False)
     figure.tight_layout(rect=(0, 0, 1, 1 - 0.02 - 0.015 * len(results.scenes)))
-    figure.savefig(f"{out}.svg", metadata={"Date": None})
-    figure.savefig(f"{out}.png", dpi=120)
+    save_figure(figure, f"{out}.svg")
+    save_figure(figure, f"{out}.png", dpi=120)
 
 
 def load_matplotlib():
@@ -267,13 +268,6 @@ def read_rows(name):
             {column: NUMBERS.get(column, str)(text) for column, text in row.items()}
             for row in csv.DictReader(file)
         ]
-
-
-def write_rows(name, rows):
-    with open(name, "w", newline="") as file:
-        writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
 
 
 def main():

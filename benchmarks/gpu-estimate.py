@@ -18,7 +18,6 @@ here is measured.
 """
 
 import argparse
-import csv
 import json
 import sys
 
@@ -26,6 +25,7 @@ from figure4 import ROOT, print_table
 from gpu_model import counting
 from gpu_model.chips import read_chips
 from gpu_model.model import estimate_frame
+from outputs import write_csv
 
 COLUMNS = ["chip", "kernel", "launches", "blocks", "warp_instructions", "lanes",
            "least_ms", "least_limit", "most_ms", "most_limit"]
@@ -147,10 +147,7 @@ def main():
                     [format_row(row) for row in own])
         rows += own
     if options.csv:
-        with open(options.csv, "w", newline="") as file:
-            writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
-            writer.writeheader()
-            writer.writerows(rows)
+        write_csv(options.csv, rows, COLUMNS)
     return 0
 
 

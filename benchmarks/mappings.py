@@ -35,6 +35,7 @@ import sys
 
 from bodies import CXX, find_bodies, get_includes, get_openmp, get_source
 from commands import call
+from outputs import write_text
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 EXAMPLES = ["raster", "visibility", "shadow", "oit", "raytrace", "reyes"]
@@ -394,8 +395,8 @@ def main():
         if arguments.fit:
             estimates[case.name] = case.estimate()
         if arguments.json:
-            with open(arguments.json, "w") as file:
-                json.dump({"kernels": kernels, "estimates": estimates}, file)
+            write_text(arguments.json, json.dumps(
+                {"kernels": kernels, "estimates": estimates}))
     if not kernels:
         sys.exit("expected a kernel with a choice, but found none")
     print_table(kernels)

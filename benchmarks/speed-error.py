@@ -13,7 +13,6 @@ that needs no network.
 """
 
 import argparse
-import csv
 import datetime
 import os
 import shlex
@@ -21,6 +20,7 @@ import statistics
 import sys
 
 from charts import find_pyplot
+from outputs import write_csv
 from speed_error import draw, failures, page, summary
 from speed_error.choices import CHOICES
 from speed_error.measure import Measurer, Scene
@@ -101,14 +101,6 @@ def describe_price(choice, points):
             f"as the fastest setting that is as near: {', '.join(prices)}.")
 
 
-def write_csv(points, file):
-    records = [point.record() for point in points]
-    with open(file, "w", newline="") as stream:
-        writer = csv.DictWriter(stream, list(records[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(records)
-
-
 def describe_machine():
     return [f"{find_processor()}, {os.cpu_count()} threads. Made on "
             f"{datetime.date.today()} by "
@@ -145,8 +137,8 @@ def main():
                        f"{options.out}/{choice.name}")
     if not measured:
         sys.exit("nothing to measure")
-    write_csv([p for _, points, _ in measured for p in points],
-              f"{options.out}/points.csv")
+    write_csv(f"{options.out}/points.csv",
+              [p.record() for _, points, _ in measured for p in points])
     modes = failures.collect(options)
     summary.write_summary(measured, modes, f"{options.out}/summary.md")
     page.write_page(f"{options.out}/index.html", measured, modes, notes)

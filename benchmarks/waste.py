@@ -9,11 +9,11 @@ something, and the largest waste. Writes Markdown; --csv writes all numbers.
 """
 
 import argparse
-import csv
 import json
 import os
 
 from commands import call
+from outputs import write_csv
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 MESHES = ["/usr/share/glmark2/models/bunny.obj",
@@ -103,10 +103,7 @@ def main():
                     f"{ROOT}/", "")
                            if waste else "-") + " |", flush=True)
     if options.csv:
-        with open(options.csv, "w", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, FIELDS)
-            writer.writeheader()
-            writer.writerows(rows)
+        write_csv(options.csv, rows, FIELDS)
 
 
 if __name__ == "__main__":

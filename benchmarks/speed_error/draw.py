@@ -2,6 +2,7 @@
 """Charts for print, by matplotlib."""
 
 from charts import COLORS
+from outputs import save_figure
 
 
 def place_zeros(values):
@@ -64,6 +65,6 @@ def draw_choice(pyplot, choice, points, metric="rms"):
 
 
 def write(pyplot, figure, stem):
-    figure.savefig(f"{stem}.svg", metadata={"Date": None})
-    figure.savefig(f"{stem}.png", dpi=110)
+    save_figure(figure, f"{stem}.svg")
+    save_figure(figure, f"{stem}.png", dpi=110)
     pyplot.close(figure)

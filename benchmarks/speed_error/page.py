@@ -7,6 +7,7 @@ import math
 import os
 from html import escape
 
+from outputs import write_text
 from speed_error.measure import METRICS
 
 FOLDER = os.path.dirname(__file__)
@@ -124,5 +125,4 @@ def write_page(file, measured, modes, notes):
 <script>{read("page.js")}</script>
 </html>
 """
-    with open(file, "w") as stream:
-        stream.write(text)
+    write_text(file, text)

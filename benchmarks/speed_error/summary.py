@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 """Which settings are on the Pareto front, and where methods fail, as tables."""
 
+from outputs import write_text
+
 
 def write_row(cells):
     return "| " + " | ".join(cells) + " |"
@@ -39,5 +41,4 @@ def write_summary(measured, modes, file):
     lines = write_fronts(measured)
     if modes:
         lines += ["", *write_failures(modes)]
-    with open(file, "w") as stream:
-        stream.write("\n".join(lines) + "\n")
+    write_text(file, "\n".join(lines) + "\n")

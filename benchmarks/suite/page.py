@@ -12,6 +12,7 @@ from html import escape
 from charts import find_pyplot
 from commands import call
 from figure4 import print_table
+from outputs import save_figure, write_csv, write_text
 
 STYLE = """
 body { font: 15px/1.45 sans-serif; max-width: 60em; margin: 2em auto; }
@@ -74,10 +75,10 @@ def write_section(section, folder):
 def write_page(sections, machine, folder):
     body = "\n".join(write_section(section, folder) for section in sections)
     notes = "\n".join(f"<p>{escape(line)}</p>" for line in machine)
-    with open(f"{folder}/index.html", "w") as file:
-        file.write(f"<!DOCTYPE html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">"
-                   f"\n<title>Piko: benchmarks</title>\n<style>{STYLE}</style>\n"
-                   f"<h1>Benchmarks</h1>\n{notes}\n{body}\n</html>\n")
+    write_text(f"{folder}/index.html",
+               f"<!DOCTYPE html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">"
+               f"\n<title>Piko: benchmarks</title>\n<style>{STYLE}</style>\n"
+               f"<h1>Benchmarks</h1>\n{notes}\n{body}\n</html>\n")
 
 
 def measure_all(names, measure, notes, folder):
@@ -91,10 +92,9 @@ def measure_all(names, measure, notes, folder):
     for name in names:
         print(f"{program}: {name}", file=sys.stderr, flush=True)
         section = measure(name)
-        section.write_csv(f"{folder}/{name}.csv")
+        write_csv(f"{folder}/{name}.csv", section.records)
         if pyplot:
-            section.draw(pyplot).savefig(f"{folder}/{name}.svg",
-                                         metadata={"Date": None})
+            save_figure(section.draw(pyplot), f"{folder}/{name}.svg")
         print(f"\n{section.title}")
         print_table(section.head, section.rows)
         sections.append(section)

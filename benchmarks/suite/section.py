@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 """What a part of the suite gives: a table, the numbers behind it, a chart."""
 
-import csv
 import statistics
 from dataclasses import dataclass, field
 from typing import Callable
@@ -21,13 +20,6 @@ class Section:
     # Columns of the CSV file that say what was measured, and those with times.
     keys: list[str] = field(default_factory=list)
     times: list[str] = field(default_factory=list)
-
-    def write_csv(self, file):
-        with open(file, "w", newline="") as stream:
-            writer = csv.DictWriter(stream, list(self.records[0]),
-                                    lineterminator="\n")
-            writer.writeheader()
-            writer.writerows(self.records)
 
 
 class Rounds:
