@@ -22,6 +22,7 @@ void *orThrow(void *memory) {
 }
 
 void setOptions() {
+  mi_option_set_default(mi_option_eager_commit_delay, 0);
 #if MI_MALLOC_VERSION >= 210
   mi_option_set_default(mi_option_purge_delay, -1);
   mi_option_set_default(mi_option_allow_large_os_pages, 1);
