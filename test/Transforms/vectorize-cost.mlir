@@ -254,3 +254,216 @@ piko.pipeline @MainPath rank 1 {
     piko.storage.close_bins %bins : !piko.bins<@Row>
   }
 }
+
+// -----
+
+piko.record @Row {"x" : f32 at 0, "k" : i32 at 4} size 8 align 4
+piko.record @D {"z" : f32 at 0} size 4 align 4
+
+// Guards, each all that the one around it does: where each mostly lets through, all
+// mostly do, however many they are.
+piko.pipeline @Guards rank 1 {
+  piko.buffer @out : @D
+  piko.source @a
+  piko.stage @a bins [0] threads 1 : @Row -> [] {}
+  piko.kernel @k {
+    %c1 = arith.constant 1 : index
+    %bins = piko.storage.open_bins @a : !piko.bins<@Row>
+    %n = piko.storage.unit_count %bins : !piko.bins<@Row>
+    scf.forall (%u) in (%n) {
+      %lo, %hi = piko.storage.cell_range %bins[%u, %u] : !piko.bins<@Row>
+      // expected-remark@+1 {{stage 'a': process is vectorized for 16 primitives at once}}
+      scf.for %i = %lo to %hi step %c1 {
+        %f = piko.storage.item %bins[%i] : !piko.bins<@Row> -> !piko.prim<@Row>
+        %k = piko.get %f "k" : !piko.prim<@Row> -> i32
+        %x0 = piko.get %f "x" : !piko.prim<@Row> -> f32
+        %x1 = arith.mulf %x0, %x0 : f32
+        %g0 = arith.cmpf olt, %x1, %x0 : f32
+        scf.if %g0 {
+          %x2 = arith.mulf %x1, %x1 : f32
+          %g1 = arith.cmpf olt, %x2, %x1 : f32
+          scf.if %g1 {
+            %x3 = arith.mulf %x2, %x2 : f32
+            %g2 = arith.cmpf olt, %x3, %x2 : f32
+            scf.if %g2 {
+              %x4 = arith.mulf %x3, %x3 : f32
+              %g3 = arith.cmpf olt, %x4, %x3 : f32
+              scf.if %g3 {
+                %x5 = arith.mulf %x4, %x4 : f32
+                %g4 = arith.cmpf olt, %x5, %x4 : f32
+                scf.if %g4 {
+                  %x6 = arith.mulf %x5, %x5 : f32
+                  %g5 = arith.cmpf olt, %x6, %x5 : f32
+                  scf.if %g5 {
+                    %x7 = arith.mulf %x6, %x6 : f32
+                    %g6 = arith.cmpf olt, %x7, %x6 : f32
+                    scf.if %g6 {
+                      %x8 = arith.mulf %x7, %x7 : f32
+                      %g7 = arith.cmpf olt, %x8, %x7 : f32
+                      scf.if %g7 {
+                        %x9 = arith.mulf %x8, %x8 : f32
+                        %g8 = arith.cmpf olt, %x9, %x8 : f32
+                        scf.if %g8 {
+                          %x10 = arith.mulf %x9, %x9 : f32
+                          %g9 = arith.cmpf olt, %x10, %x9 : f32
+                          scf.if %g9 {
+                            %x11 = arith.mulf %x10, %x10 : f32
+                            %g10 = arith.cmpf olt, %x11, %x10 : f32
+                            scf.if %g10 {
+                              %x12 = arith.mulf %x11, %x11 : f32
+                              %g11 = arith.cmpf olt, %x12, %x11 : f32
+                              scf.if %g11 {
+                                %w0 = math.sqrt %x12 : f32
+                                %w1 = math.sqrt %w0 : f32
+                                %w2 = math.sqrt %w1 : f32
+                                %w3 = math.sqrt %w2 : f32
+                                %w4 = math.sqrt %w3 : f32
+                                %w5 = math.sqrt %w4 : f32
+                                %w6 = math.sqrt %w5 : f32
+                                %w7 = math.sqrt %w6 : f32
+                                %w8 = math.sqrt %w7 : f32
+                                %w9 = math.sqrt %w8 : f32
+                                %w10 = math.sqrt %w9 : f32
+                                %w11 = math.sqrt %w10 : f32
+                                %w12 = math.sqrt %w11 : f32
+                                %w13 = math.sqrt %w12 : f32
+                                %w14 = math.sqrt %w13 : f32
+                                %w15 = math.sqrt %w14 : f32
+                                %w16 = math.sqrt %w15 : f32
+                                %w17 = math.sqrt %w16 : f32
+                                %w18 = math.sqrt %w17 : f32
+                                %w19 = math.sqrt %w18 : f32
+                                %w20 = math.sqrt %w19 : f32
+                                %w21 = math.sqrt %w20 : f32
+                                %w22 = math.sqrt %w21 : f32
+                                %w23 = math.sqrt %w22 : f32
+                                piko.store %w23, checked @out[%k : i32] "z" : f32
+                              }
+                            }
+                          }
+                        }
+                      }
+                    }
+                  }
+                }
+              }
+            }
+          }
+        }
+      } {piko.lanes, piko.mapping = #piko<lanes items>}
+    }
+    piko.storage.close_bins %bins : !piko.bins<@Row>
+  }
+}
+
+// -----
+
+piko.record @Row {"x" : f32 at 0, "k" : i32 at 4} size 8 align 4
+piko.record @D {"z" : f32 at 0} size 4 align 4
+
+// Where something follows each one, the work in the innermost is as rare as the
+// product of all says.
+piko.pipeline @GuardsWithWorkBehind rank 1 {
+  piko.buffer @out : @D
+  piko.source @a
+  piko.stage @a bins [0] threads 1 : @Row -> [] {}
+  piko.kernel @k {
+    %c1 = arith.constant 1 : index
+    %bins = piko.storage.open_bins @a : !piko.bins<@Row>
+    %n = piko.storage.unit_count %bins : !piko.bins<@Row>
+    scf.forall (%u) in (%n) {
+      %lo, %hi = piko.storage.cell_range %bins[%u, %u] : !piko.bins<@Row>
+      // expected-remark@+1 {{stage 'a': process is not vectorized: 16 at once are expected to take}}
+      scf.for %i = %lo to %hi step %c1 {
+        %f = piko.storage.item %bins[%i] : !piko.bins<@Row> -> !piko.prim<@Row>
+        %k = piko.get %f "k" : !piko.prim<@Row> -> i32
+        %x0 = piko.get %f "x" : !piko.prim<@Row> -> f32
+        %x1 = arith.mulf %x0, %x0 : f32
+        %g0 = arith.cmpf olt, %x1, %x0 : f32
+        scf.if %g0 {
+          %x2 = arith.mulf %x1, %x1 : f32
+          %g1 = arith.cmpf olt, %x2, %x1 : f32
+          scf.if %g1 {
+            %x3 = arith.mulf %x2, %x2 : f32
+            %g2 = arith.cmpf olt, %x3, %x2 : f32
+            scf.if %g2 {
+              %x4 = arith.mulf %x3, %x3 : f32
+              %g3 = arith.cmpf olt, %x4, %x3 : f32
+              scf.if %g3 {
+                %x5 = arith.mulf %x4, %x4 : f32
+                %g4 = arith.cmpf olt, %x5, %x4 : f32
+                scf.if %g4 {
+                  %x6 = arith.mulf %x5, %x5 : f32
+                  %g5 = arith.cmpf olt, %x6, %x5 : f32
+                  scf.if %g5 {
+                    %x7 = arith.mulf %x6, %x6 : f32
+                    %g6 = arith.cmpf olt, %x7, %x6 : f32
+                    scf.if %g6 {
+                      %x8 = arith.mulf %x7, %x7 : f32
+                      %g7 = arith.cmpf olt, %x8, %x7 : f32
+                      scf.if %g7 {
+                        %x9 = arith.mulf %x8, %x8 : f32
+                        %g8 = arith.cmpf olt, %x9, %x8 : f32
+                        scf.if %g8 {
+                          %x10 = arith.mulf %x9, %x9 : f32
+                          %g9 = arith.cmpf olt, %x10, %x9 : f32
+                          scf.if %g9 {
+                            %x11 = arith.mulf %x10, %x10 : f32
+                            %g10 = arith.cmpf olt, %x11, %x10 : f32
+                            scf.if %g10 {
+                              %x12 = arith.mulf %x11, %x11 : f32
+                              %g11 = arith.cmpf olt, %x12, %x11 : f32
+                              scf.if %g11 {
+                                %w0 = math.sqrt %x12 : f32
+                                %w1 = math.sqrt %w0 : f32
+                                %w2 = math.sqrt %w1 : f32
+                                %w3 = math.sqrt %w2 : f32
+                                %w4 = math.sqrt %w3 : f32
+                                %w5 = math.sqrt %w4 : f32
+                                %w6 = math.sqrt %w5 : f32
+                                %w7 = math.sqrt %w6 : f32
+                                %w8 = math.sqrt %w7 : f32
+                                %w9 = math.sqrt %w8 : f32
+                                %w10 = math.sqrt %w9 : f32
+                                %w11 = math.sqrt %w10 : f32
+                                %w12 = math.sqrt %w11 : f32
+                                %w13 = math.sqrt %w12 : f32
+                                %w14 = math.sqrt %w13 : f32
+                                %w15 = math.sqrt %w14 : f32
+                                %w16 = math.sqrt %w15 : f32
+                                %w17 = math.sqrt %w16 : f32
+                                %w18 = math.sqrt %w17 : f32
+                                %w19 = math.sqrt %w18 : f32
+                                %w20 = math.sqrt %w19 : f32
+                                %w21 = math.sqrt %w20 : f32
+                                %w22 = math.sqrt %w21 : f32
+                                %w23 = math.sqrt %w22 : f32
+                                piko.store %w23, checked @out[%k : i32] "z" : f32
+                              }
+                              piko.store %x11, checked @out[%k : i32] "z" : f32
+                            }
+                            piko.store %x10, checked @out[%k : i32] "z" : f32
+                          }
+                          piko.store %x9, checked @out[%k : i32] "z" : f32
+                        }
+                        piko.store %x8, checked @out[%k : i32] "z" : f32
+                      }
+                      piko.store %x7, checked @out[%k : i32] "z" : f32
+                    }
+                    piko.store %x6, checked @out[%k : i32] "z" : f32
+                  }
+                  piko.store %x5, checked @out[%k : i32] "z" : f32
+                }
+                piko.store %x4, checked @out[%k : i32] "z" : f32
+              }
+              piko.store %x3, checked @out[%k : i32] "z" : f32
+            }
+            piko.store %x2, checked @out[%k : i32] "z" : f32
+          }
+          piko.store %x1, checked @out[%k : i32] "z" : f32
+        }
+      } {piko.lanes, piko.mapping = #piko<lanes items>}
+    }
+    piko.storage.close_bins %bins : !piko.bins<@Row>
+  }
+}
