@@ -5,6 +5,7 @@
 #include "Piko/Driver/ObjectCompiler.h"
 
 #include "HeaderWriter.h"
+#include "KnownFiles.h"
 #include "ObjectRequest.h"
 #include "OpenFiles.h"
 #include "Piko/Driver/Compiler.h"
@@ -191,7 +192,7 @@ static bool compile(const ObjectOptions &options,
 }
 
 Files piko::openFiles(const CompileOptions &source) {
-  Files disk = llvm::vfs::getRealFileSystem();
+  Files disk = llvm::makeIntrusiveRefCnt<KnownFiles>();
   if (!source.text)
     return disk;
   auto memory = llvm::makeIntrusiveRefCnt<llvm::vfs::InMemoryFileSystem>();

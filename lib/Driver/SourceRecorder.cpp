@@ -7,10 +7,7 @@
 #include "llvm/ADT/StringExtras.h"
 #include "llvm/Support/BLAKE3.h"
 
-#include <chrono>
-#include <mutex>
 #include <set>
-#include <tuple>
 
 using namespace llvm;
 using namespace piko;
@@ -21,64 +18,15 @@ static std::string hash(StringRef text) {
   return toHex(BLAKE3::hash(arrayRefFromStringRef(text)));
 }
 
-static std::string hashFile(vfs::FileSystem &files, const std::string &path) {
-  auto file = files.openFileForRead(path);
+std::string piko::answer(vfs::FileSystem &files, const SourceQuery &query) {
+  if (!query.isRead)
+    return (files.exists(query.path) ? present : missing).str();
+  auto file = files.openFileForRead(query.path);
   if (!file)
     return missing.str();
-  auto buffer = (*file)->getBuffer(path, /*FileSize=*/-1,
+  auto buffer = (*file)->getBuffer(query.path, /*FileSize=*/-1,
                                    /*RequiresNullTerminator=*/false);
   return buffer ? hash((*buffer)->getBuffer()) : missing.str();
-}
-
-namespace {
-
-/// What files hold that the process has read before: a tool asks for the same
-/// headers with each pipeline that it compiles.
-class KnownFiles {
-public:
-  std::string answer(vfs::FileSystem &files, const std::string &path) {
-    auto status = files.status(path);
-    if (!status)
-      return missing.str();
-    Key key = {status->getUniqueID().getDevice(),
-               status->getUniqueID().getFile(), status->getSize(),
-               status->getLastModificationTime()};
-    {
-      std::lock_guard lock(mutex);
-      if (auto known = hashes.find(key); known != hashes.end())
-        return known->second;
-    }
-    std::string text = hashFile(files, path);
-    if (!mayChangeUnseen(*status)) {
-      std::lock_guard lock(mutex);
-      hashes.emplace(key, text);
-    }
-    return text;
-  }
-
-private:
-  using Key = std::tuple<uint64_t, uint64_t, uint64_t, sys::TimePoint<>>;
-
-  /// A file that was written just now may be written again without another
-  /// time; one in memory has no identity.
-  static bool mayChangeUnseen(const vfs::Status &status) {
-    constexpr std::chrono::seconds clock(2); // the coarsest, FAT's
-    return status.getUniqueID().getDevice() == ~uint64_t(0) ||
-           std::chrono::system_clock::now() <
-               status.getLastModificationTime() + clock;
-  }
-
-  std::mutex mutex;
-  std::map<Key, std::string> hashes;
-};
-
-} // namespace
-
-std::string piko::answer(vfs::FileSystem &files, const SourceQuery &query) {
-  static KnownFiles known;
-  if (query.isRead)
-    return known.answer(files, query.path);
-  return (files.exists(query.path) ? present : missing).str();
 }
 
 namespace {
