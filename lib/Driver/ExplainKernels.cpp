@@ -31,6 +31,19 @@ void piko::explainUnits(ArrayRef<KernelUnits> kernels, raw_ostream &out) {
 // Resources
 //===----------------------------------------------------------------------===//
 
+/// What a driver keeps of the device's memory, from the first launch on.
+static void writeStacks(ArrayRef<KernelResources> kernels, StringRef chip,
+                        raw_ostream &out) {
+  int64_t most = 0;
+  for (const KernelResources &kernel : kernels)
+    if (kernel.assembled)
+      most = std::max(most, kernel.assembled->stack);
+  if (auto threads = getResidentThreads(chip); threads && most > 0)
+    out << "  For the largest stack a driver keeps "
+        << llvm::divideCeil(*threads * most, 1024)
+        << " KB of memory a multiprocessor, for all threads that it may have\n";
+}
+
 static void writeResources(const KernelReport &report, StringRef chip,
                            StringRef prefix, raw_ostream &out) {
   ArrayRef<KernelResources> kernels = report.kernels;
@@ -58,6 +71,7 @@ static void writeResources(const KernelReport &report, StringRef chip,
       out << "          -";
     out << "  " << name << "\n";
   }
+  writeStacks(kernels, chip, out);
 }
 
 LogicalResult piko::explainResources(ModuleOp module, StringRef pipeline,

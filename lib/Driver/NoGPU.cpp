@@ -73,6 +73,9 @@ llvm::Expected<KernelReport> piko::measureKernels(const llvm::Module &,
   return createError();
 }
 
+std::optional<int64_t> piko::getResidentThreads(llvm::StringRef) {
+  return std::nullopt;
+}
 std::optional<double> KernelResources::getOccupancy(StringRef) const {
   return std::nullopt;
 }

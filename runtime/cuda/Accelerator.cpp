@@ -3,7 +3,7 @@
 
 #include "cuda/Accelerator.h"
 #include "common/Pipeline.h"
-#include "cuda/Kernels.h"
+#include "cuda/OwnKernels.h"
 #include "pikort/grid.h"
 
 #include <algorithm>
@@ -13,13 +13,6 @@
 
 using namespace piko::cuda;
 using piko::rt::Failure;
-
-static const pikoir_cuda_image joinImages[] = {{0, 0, piko::cuda::joinKernels},
-                                               {0, 0, nullptr}};
-static const pikoir_cuda_image stepImages[] = {{0, 0, piko::cuda::stepKernels},
-                                               {0, 0, nullptr}};
-static const pikoir_cuda_image conditionImages[] = {
-    {0, 0, piko::cuda::conditionKernels}, {0, 0, nullptr}};
 
 /// A barrier of blocks takes as long as some 20 loads, one behind the other,
 /// and a join that has to do with a few thousand things has a dozen of them.
@@ -39,15 +32,13 @@ static int64_t findMostAlone() {
 }
 
 Accelerator::Accelerator(pikort_pipeline &p, const pikoir_cuda_image *images)
-    : p_(p), device_(Device::open(p.device)), module_(*device_, images),
-      joins_(*device_, joinImages), steps_(*device_, stepImages),
-      conditions_(*device_, conditionImages) {
+    : p_(p), device_(Device::open(p.device)), module_(*device_, images) {
   device_->check(device_->enter(), "entering its context");
-  int processors = device_->attribute(CU_DEVICE_ATTRIBUTE_MULTIPROCESSOR_COUNT);
+  processors_ = device_->attribute(CU_DEVICE_ATTRIBUTE_MULTIPROCESSOR_COUNT);
   residentThreads_ = int64_t(device_->attribute(
                          CU_DEVICE_ATTRIBUTE_MAX_THREADS_PER_MULTIPROCESSOR)) *
-                     processors;
-  joinBlocks_ = std::min<int64_t>(processors, mostJoinBlocks);
+                     processors_;
+  joinBlocks_ = std::min<int64_t>(processors_, mostJoinBlocks);
   mostAlone_ = findMostAlone();
   device_->check(device_->driver.cuStreamCreate(&own_, CU_STREAM_NON_BLOCKING),
                  "creating a stream");
@@ -63,8 +54,7 @@ Accelerator::~Accelerator() {
   for (uint8_t *data : std::exchange(unreleased_, {}))
     device_->driver.cuMemFree(reinterpret_cast<CUdeviceptr>(data));
   submission_.end();
-  for (Module *module : {&module_, &joins_, &steps_, &conditions_})
-    module->unload();
+  module_.unload();
   if (done_)
     device_->driver.cuEventDestroy(done_);
   if (own_)
@@ -232,11 +222,22 @@ std::unique_ptr<piko::rt::DeviceFrame> Accelerator::makeFrame() {
   return frame;
 }
 
-Module &Accelerator::moduleOf(const std::string &kernel) {
-  return kernel == conditionKernel     ? conditions_
-         : kernel == stepKernel        ? steps_
-         : kernel.starts_with("piko_") ? joins_
-                                       : module_;
+CUfunction Accelerator::find(const std::string &kernel) {
+  return OwnKernels::has(kernel) ? device_->ownKernels().find(kernel)
+                                 : module_.find(kernel);
+}
+
+int64_t Accelerator::blocksAtOnce(const std::string &kernel, int64_t threads) {
+  auto [known, isNew] = blocksAtOnce_.try_emplace(kernel, INT32_MAX);
+  if (!isNew)
+    return known->second;
+  device_->check(device_->enter(), "entering its context");
+  int blocks = 0;
+  CUresult result = device_->driver.cuOccupancyMaxActiveBlocksPerMultiprocessor(
+      &blocks, find(kernel), static_cast<int>(threads), /*sharedBytes=*/0);
+  if (result == CUDA_SUCCESS && blocks > 0)
+    known->second = blocks * processors_;
+  return known->second;
 }
 
 void Accelerator::launch(const char *kernel, int64_t blocks, int64_t threads,
@@ -252,11 +253,11 @@ void Accelerator::launch(const char *kernel, int64_t blocks, int64_t threads,
 
 void Accelerator::launch(const GridLaunch &grid, CUstream stream) {
   if (grid.blocks > INT32_MAX)
-    throw Failure{PIKORT_TOO_MANY, moduleOf(grid.kernel).describe(grid.kernel) +
+    throw Failure{PIKORT_TOO_MANY, module_.describe(grid.kernel) +
                                        ": expected at most 2147483647 blocks, "
                                        "but got " +
                                        std::to_string(grid.blocks)};
-  CUfunction function = moduleOf(grid.kernel).find(grid.kernel);
+  CUfunction function = find(grid.kernel);
   std::vector<void *> places;
   for (const int64_t &word : grid.arguments)
     places.push_back(const_cast<int64_t *>(&word));
@@ -272,8 +273,7 @@ void Accelerator::launch(const GridLaunch &grid, CUstream stream) {
                                   /*sharedBytes=*/0, stream, places.data(),
                                   nullptr);
   if (result != CUDA_SUCCESS)
-    device_->check(result,
-                   "running " + moduleOf(grid.kernel).describe(grid.kernel));
+    device_->check(result, "running " + module_.describe(grid.kernel));
 }
 
 void Accelerator::loadKernels() {
@@ -285,7 +285,7 @@ void Accelerator::load(std::span<const Step> steps) {
   device_->check(device_->enter(), "entering its context");
   for (const Step &step : steps)
     if (step.kind == Step::Kind::Grid)
-      moduleOf(step.grid.kernel).find(step.grid.kernel);
+      find(step.grid.kernel);
 }
 
 void Accelerator::noteEnd() {
@@ -348,7 +348,7 @@ std::string Accelerator::describeFailed(std::span<const Step> steps) {
   for (; at < steps.size(); ++at)
     if (steps[at].kind == Step::Kind::Grid) {
       const std::string &kernel = steps[at].grid.kernel;
-      return moduleOf(kernel).describe(kernel);
+      return module_.describe(kernel);
     }
   return "a frame";
 }

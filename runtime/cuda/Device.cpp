@@ -3,6 +3,7 @@
 
 #include "cuda/Device.h"
 #include "common/Pipeline.h"
+#include "cuda/OwnKernels.h"
 
 #include <charconv>
 #include <cstdlib>
@@ -184,11 +185,14 @@ Device::Device(const Driver &driver, int ordinal, std::shared_ptr<Loss> loss,
     check(driver.cuDevicePrimaryCtxReset(device_), "resetting its context");
   check(driver.cuDevicePrimaryCtxRetain(&context_, device_),
         "making its context");
+  ownKernels_ = std::make_unique<OwnKernels>(*this);
 }
 
 Device::~Device() {
-  if (context_)
-    driver.cuDevicePrimaryCtxRelease(device_);
+  rt::DeviceScope scope;
+  if (enter() == CUDA_SUCCESS)
+    ownKernels_->unload();
+  driver.cuDevicePrimaryCtxRelease(device_);
 }
 
 int Device::attribute(CUdevice_attribute which) const {
@@ -253,6 +257,7 @@ static bool isLoss(CUresult result) {
   case CUDA_ERROR_DEVICE_UNAVAILABLE:
   case CUDA_ERROR_ECC_UNCORRECTABLE:
   case CUDA_ERROR_NVLINK_UNCORRECTABLE:
+  case CUDA_ERROR_CONTAINED:
   case CUDA_ERROR_ILLEGAL_ADDRESS:
   case CUDA_ERROR_LAUNCH_TIMEOUT:
   case CUDA_ERROR_CONTEXT_IS_DESTROYED:
@@ -263,6 +268,9 @@ static bool isLoss(CUresult result) {
   case CUDA_ERROR_INVALID_ADDRESS_SPACE:
   case CUDA_ERROR_INVALID_PC:
   case CUDA_ERROR_LAUNCH_FAILED:
+  case CUDA_ERROR_TENSOR_MEMORY_LEAK:
+  case CUDA_ERROR_MPS_CLIENT_TERMINATED:
+  case CUDA_ERROR_EXTERNAL_DEVICE:
     return true;
   default:
     return false;

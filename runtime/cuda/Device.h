@@ -34,6 +34,8 @@ struct Loss {
   std::string text; ///< What happened first.
 };
 
+class OwnKernels;
+
 /// A device and its primary context, shared by all pipelines of the process
 /// that are on it.
 class Device {
@@ -77,6 +79,8 @@ public:
   void checkHosts(const std::string &who, const void *data) const;
   /// Throws Failure unless work may be given to a stream of the host's.
   void checkStream(CUstream stream) const;
+  /// Those of the runtime, as its pipelines share them.
+  OwnKernels &ownKernels() const { return *ownKernels_; }
   /// "CUDA device 0 (name)"
   std::string describe() const;
 
@@ -87,6 +91,7 @@ private:
   CUdevice device_ = 0;
   CUcontext context_ = nullptr;
   std::string name_;
+  std::unique_ptr<OwnKernels> ownKernels_;
 };
 
 } // namespace piko::cuda

@@ -13,7 +13,6 @@ const Driver &Submission::driver() const {
 }
 
 void Submission::check(CUresult result) {
-  refusesConditions_ |= result == CUDA_ERROR_NOT_SUPPORTED;
   accelerator_.device_->check(result, "making a graph of a frame");
 }
 
@@ -50,9 +49,16 @@ bool Submission::tryGraph(std::span<const Step> steps) {
     return false;
   try {
     makeGraph(steps);
+    accelerator_.device_->check(
+        driver().cuGraphLaunch(graph_, accelerator_.stream_),
+        "running a frame");
   } catch (const piko::rt::Failure &) {
-    if (canBeGraph(steps))
+    // Under MPS no body has cooperative grids, and nothing says which call
+    // refuses them, nor how.
+    if (!repeats(steps) || accelerator_.device_->isLost())
       throw;
+    refusesConditions_ = true;
+    dropGraph();
     return false;
   }
   return true;
@@ -60,14 +66,10 @@ bool Submission::tryGraph(std::span<const Step> steps) {
 
 void Submission::run(std::span<const Step> steps) {
   timesKernels_ = accelerator_.p_.timesKernels;
-  if (tryGraph(steps)) {
-    accelerator_.device_->check(
-        driver().cuGraphLaunch(graph_, accelerator_.stream_),
-        "running a frame");
-  } else {
-    beginTimes();
-    runOneByOne(steps);
-  }
+  if (tryGraph(steps))
+    return;
+  beginTimes();
+  runOneByOne(steps);
 }
 
 void Submission::beginTimes() {
@@ -127,7 +129,7 @@ void Submission::makeGraph(std::span<const Step> steps) {
   if (graph_ && std::ranges::equal(steps, steps_))
     return;
   if (repeats(steps)) // a capture refuses to load it
-    accelerator_.conditions_.find(conditionKernel);
+    accelerator_.find(conditionKernel);
   CUgraph graph = capture(steps);
   CUgraphExecUpdateResultInfo info{};
   // Handles of conditions are not among what can be changed.

@@ -38,8 +38,9 @@ private:
   const Driver &driver() const;
   void check(CUresult result);
   bool canBeGraph(std::span<const Step> steps) const;
-  /// Makes `graph_` of the steps; false if they are to run one by one, also
-  /// because the driver refuses conditions, as where MPS shares the device.
+  /// Makes `graph_` of the steps, and launches it; false if they are to run one
+  /// by one, also because the driver refuses conditions, as where MPS shares
+  /// the device.
   bool tryGraph(std::span<const Step> steps);
   void runOneByOne(std::span<const Step> steps);
   /// What stands between a Repeat, the first step, and its end.

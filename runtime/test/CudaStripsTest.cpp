@@ -145,6 +145,7 @@ TEST_F(CudaStrips, AKernelThatFails) {
   expectScaled();
 }
 
+// A loop in a graph is more than a driver may take; the host can do the same.
 TEST_F(CudaStrips, EachLaunchOrNodeIsRefused) {
   for (const char *name :
        {"cuLaunchKernel", "cuLaunchCooperativeKernel", "cuGraphAddNode",
@@ -156,7 +157,8 @@ TEST_F(CudaStrips, EachLaunchOrNodeIsRefused) {
     EXPECT_GT(calls, 0u) << name;
     for (uint64_t n = 1; n <= calls; ++n) {
       pikoTestDriverFail(name, n, CUDA_ERROR_UNKNOWN);
-      EXPECT_EQ(scaleStrips(50).code(), PIKORT_DEVICE_FAILED) << name << n;
+      ASSERT_TRUE(scaleStrips(50)) << name << n;
+      expectScaled();
       EXPECT_STREQ(pikoTestDriverAlive(), "") << name << n;
     }
     ASSERT_TRUE(scaleStrips(50)) << name;

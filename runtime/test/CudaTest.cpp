@@ -120,6 +120,8 @@ TEST_F(Cuda, WrongKernels) {
 
 // The device is of 9.0.
 TEST_F(Cuda, CubinsThatFitComeFirst) {
+  ASSERT_TRUE(scale());
+  uint64_t before = pikoTestDriverCalls("cuModuleLoadDataEx");
   bring(goodPTX, {{80, 0, nullptr},
                   {86, 0, nullptr},
                   {90, 1, nullptr},
@@ -128,8 +130,23 @@ TEST_F(Cuda, CubinsThatFitComeFirst) {
                   {91, 1, nullptr}});
   ASSERT_TRUE(scale(2));
   expectScaled();
-  // With the runtime's own kernels.
-  EXPECT_EQ(pikoTestDriverCalls("cuModuleLoadDataEx"), 3u);
+  EXPECT_EQ(pikoTestDriverCalls("cuModuleLoadDataEx"), 2 * before + 1);
+}
+
+TEST_F(Cuda, PipelinesShareTheRuntimesKernels) {
+  piko::rt::Pipeline first{program};
+  ASSERT_TRUE(bind(first));
+  ASSERT_TRUE(first.run());
+  uint64_t before = pikoTestDriverCalls("cuModuleLoadDataEx");
+  for (int i = 0; i < 3; ++i) {
+    piko::rt::Pipeline other{program};
+    ASSERT_TRUE(bind(other));
+    ASSERT_TRUE(other.run());
+    expectScaled();
+  }
+  EXPECT_EQ(pikoTestDriverCalls("cuModuleLoadDataEx"), before + 3);
+  ASSERT_TRUE(first.run());
+  expectScaled();
 }
 
 TEST_F(Cuda, CubinsThatAreRefused) {

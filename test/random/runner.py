@@ -44,11 +44,13 @@ def gpu_options(seed, target):
     """How the file that begins with this pipeline runs on a GPU, or on either
     kind."""
     r = random.Random(seed)
-    threads = ["--gpu-threads", str(r.choice([1, 32, 64, 128]))]
-    order = ["--gpu-seed", str(r.randrange(1000)),
-             "--gpu-blocks", str(r.choice([0, 1, 3, 7]))]
     if target == "any":
         target = r.choice(["cuda", "gpu-on-cpu"])
+    # In PTX such large blocks may lack memory.
+    large = [] if target == "cuda" else [512, 1024]
+    threads = ["--gpu-threads", str(r.choice([1, 8, 32, 64, 128, *large]))]
+    order = ["--gpu-seed", str(r.randrange(1000)),
+             "--gpu-blocks", str(r.choice([0, 1, 3, 7]))]
     return ["--target", target, *threads, *(order if target != "cuda" else [])]
 
 

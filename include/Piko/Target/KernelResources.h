@@ -31,6 +31,10 @@ struct KernelResources {
   std::optional<double> getOccupancy(llvm::StringRef chip) const;
 };
 
+/// How many threads a multiprocessor of a chip can have at the same time; none
+/// if the chip's limits are not known.
+std::optional<int64_t> getResidentThreads(llvm::StringRef chip);
+
 struct AssembledKernels {
   std::vector<KernelResources> kernels; ///< In the order of the module.
   std::string cubin;

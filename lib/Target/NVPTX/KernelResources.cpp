@@ -43,10 +43,22 @@ static constexpr ChipLimits chips[] = {{"sm_70", 2048, 32, 96 << 10, 0},
                                        {"sm_120", 1536, 32, 100 << 10, 1024}};
 static constexpr int64_t registersOfMultiprocessor = 64 << 10;
 
-std::optional<double> KernelResources::getOccupancy(StringRef chip) const {
+static const ChipLimits *findLimits(StringRef chip) {
   const auto *limits =
       find_if(chips, [&](const ChipLimits &each) { return chip == each.chip; });
-  if (limits == std::end(chips) || !assembled || threads == 0)
+  return limits == std::end(chips) ? nullptr : limits;
+}
+
+std::optional<int64_t> piko::getResidentThreads(StringRef chip) {
+  const ChipLimits *limits = findLimits(chip);
+  if (!limits)
+    return std::nullopt;
+  return limits->threads;
+}
+
+std::optional<double> KernelResources::getOccupancy(StringRef chip) const {
+  const ChipLimits *limits = findLimits(chip);
+  if (!limits || !assembled || threads == 0)
     return std::nullopt;
   // Registers are given to warps, in pieces of 256.
   int64_t warps = divideCeil(threads, 32);

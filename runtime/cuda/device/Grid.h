@@ -131,19 +131,18 @@ public:
 
 private:
   /// Returns how many have to arrive until all are there.
-  uint32_t arrive() {
-    auto all = static_cast<uint32_t>(__nvvm_read_ptx_sreg_nctaid_x());
+  uint64_t arrive() {
+    auto all = static_cast<uint64_t>(__nvvm_read_ptx_sreg_nctaid_x());
     __nvvm_membar_gl();
-    uint32_t before = __atomic_fetch_add(&frame_.arrived, 1u, __ATOMIC_RELAXED);
+    uint64_t before =
+        __atomic_fetch_add(&frame_.arrived, uint64_t(1), __ATOMIC_RELAXED);
     return (before / all + 1) * all;
   }
   [[gnu::noinline]] void meet() {
     __syncthreads();
     if (thread() == 0) {
-      uint32_t target = arrive();
-      while (static_cast<int32_t>(
-                 __atomic_load_n(&frame_.arrived, __ATOMIC_RELAXED) - target) <
-             0)
+      uint64_t target = arrive();
+      while (__atomic_load_n(&frame_.arrived, __ATOMIC_RELAXED) < target)
         __nvvm_nanosleep(32);
       __nvvm_membar_gl();
     }

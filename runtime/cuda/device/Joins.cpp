@@ -19,7 +19,8 @@ class Join {
 public:
   explicit Join(const JoinArgs &args)
       : args_(args), grid_(*args.frame, cursorOf(*args.frame), workOf(args)),
-        isFirstRun_(isFirstRun(*args.kernel, args.strip)) {}
+        isFirstRun_(isFirstRun(*args.kernel, args.strip)),
+        clears_(args.clearCount > 0 && args.kernel->runs == 0) {}
 
   void run() {
     if (grid_.isIdle())
@@ -116,8 +117,7 @@ private:
 
   /// Sets images to their clear values where no unit will.
   void clear(const Cutter &cutter, const Binning &bins) {
-    if (args_.clearCount == 0 || args_.kernel->runs > 0 ||
-        (args_.visitsAll && !args_.takesList))
+    if (!clears_ || (args_.visitsAll && !args_.takesList))
       return;
     bool whole = cutter.unitCount == 0;
     int64_t pixels = 1;
@@ -166,12 +166,10 @@ private:
   void publish(const Stream &stream, const Binning &bins, const Cutter &cutter,
                int64_t units) {
     KernelState &kernel = *args_.kernel;
-    kernel.input = {stream.items,     bins.positions,
-                    bins.order,       bins.offsets,
-                    cutter.units,     cutter.unitCount,
-                    args_.tiles,      cutter.calls,
-                    cutter.callCount, args_.clearCount > 0 && kernel.runs == 0,
-                    nullptr};
+    kernel.input = {stream.items, bins.positions, bins.order,
+                    bins.offsets, cutter.units,   cutter.unitCount,
+                    args_.tiles,  cutter.calls,   cutter.callCount,
+                    clears_,      nullptr};
     kernel.log = args_.frame->log;
     kernel.log.cursor = kernel.logBegin = grid_.top();
     kernel.log.units = units;
@@ -196,6 +194,9 @@ private:
   const JoinArgs &args_;
   Grid grid_;
   bool isFirstRun_; ///< Of a strip.
+  /// The kernel's first run, of all strips: the first thread counts it behind
+  /// the last barrier, so that it is asked before.
+  bool clears_;
   Lineage lineage_{};
 };
 

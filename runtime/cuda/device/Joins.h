@@ -42,8 +42,10 @@ struct FrameState {
   volatile int64_t *progress;
   /// Of each scan, what blocks have; nobody makes it zero.
   uint64_t (*blockSums)[mostJoinBlocks];
-  int32_t failed;   ///< Memory or a count did not suffice, or a kernel failed.
-  uint32_t arrived; ///< Blocks at barriers, over all of them.
+  int32_t failed; ///< Memory or a count did not suffice, or a kernel failed.
+  /// Blocks at barriers, over all of them; in 32 bits a frame of many waves
+  /// would come to the end.
+  uint64_t arrived;
 };
 using BlockSums = uint64_t[mostScans][mostJoinBlocks];
 
