@@ -11,6 +11,10 @@ def replacing(path):
     """Gives the name of a new file beside `path`, of the same kind, which takes its
     place if the block ends well. If not, or if an interrupt or a full disk ends it,
     `path` is as it was, and nothing is left."""
+    if path.startswith(("/dev/", "/proc/")):  # what is open already
+        yield path
+        return
+    path = os.path.realpath(path)
     stem, suffix = os.path.splitext(path)
     new = f"{stem}.{os.getpid()}{suffix}"
     try:

@@ -22,7 +22,9 @@ void *orThrow(void *memory) {
 }
 
 void setOptions() {
+#if MI_MALLOC_VERSION < 300
   mi_option_set_default(mi_option_eager_commit_delay, 0);
+#endif
 #if MI_MALLOC_VERSION >= 210
   mi_option_set_default(mi_option_purge_delay, -1);
   mi_option_set_default(mi_option_allow_large_os_pages, 1);

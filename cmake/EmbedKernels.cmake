@@ -13,7 +13,7 @@ string(REPLACE "," ";" cubins "${CUBINS}")
 foreach(cubin IN LISTS cubins)
   string(REGEX MATCH "^([0-9]+)=(.*)$" matched "${cubin}")
   set(name ${symbol}_${CMAKE_MATCH_1})
-  string(APPEND bytes ".balign 64\\n${name}:\\n.incbin \\\"${CMAKE_MATCH_2}\\\"\\n")
+  string(APPEND bytes ".balign 64\\n.globl ${name}\\n.hidden ${name}\\n${name}:\\n.incbin \\\"${CMAKE_MATCH_2}\\\"\\n")
   string(APPEND declarations
     "extern \"C\" __attribute__((visibility(\"hidden\"))) const char ${name}[];\n")
   string(APPEND images "    {${CMAKE_MATCH_1}, 0, ${name}},\n")

@@ -22,11 +22,13 @@ struct KnownFile {
 /// Those of the process; none is ever dropped.
 class Table {
 public:
-  using Key = std::tuple<uint64_t, uint64_t, uint64_t, sys::TimePoint<>>;
+  using Key =
+      std::tuple<std::string, uint64_t, uint64_t, uint64_t, sys::TimePoint<>>;
 
-  static Key keyOf(const vfs::Status &status) {
-    return {status.getUniqueID().getDevice(), status.getUniqueID().getFile(),
-            status.getSize(), status.getLastModificationTime()};
+  static Key keyOf(const Twine &path, const vfs::Status &status) {
+    return {path.str(), status.getUniqueID().getDevice(),
+            status.getUniqueID().getFile(), status.getSize(),
+            status.getLastModificationTime()};
   }
   /// A file that was written just now may be written again without another
   /// time. There is room for some thousand headers.
@@ -42,12 +44,13 @@ public:
     auto known = files.find(key);
     return known == files.end() ? nullptr : &known->second;
   }
-  /// Null if there is no more room.
-  const KnownFile *keep(const Key &key, KnownFile file) {
+  bool hasRoom() {
     constexpr uint64_t most = 32 << 20;
     std::lock_guard lock(mutex);
-    if (bytes + file.text->getBufferSize() > most)
-      return nullptr;
+    return bytes < most;
+  }
+  const KnownFile *keep(const Key &key, KnownFile file) {
+    std::lock_guard lock(mutex);
     auto [kept, isNew] = files.try_emplace(key, std::move(file));
     if (isNew)
       bytes += kept->second.text->getBufferSize();
@@ -84,13 +87,15 @@ private:
 
 ErrorOr<std::unique_ptr<vfs::File>>
 KnownFiles::openFileForRead(const Twine &path) {
-  static Table table;
+  static Table &table = *new Table; // beyond what is destroyed at exit
   auto status = ProxyFileSystem::status(path);
   if (!status || !table.mayKeep(*status))
     return ProxyFileSystem::openFileForRead(path);
-  Table::Key key = Table::keyOf(*status);
+  Table::Key key = Table::keyOf(path, *status);
   if (const KnownFile *known = table.find(key))
     return std::make_unique<OpenedFile>(*status, *known);
+  if (!table.hasRoom())
+    return ProxyFileSystem::openFileForRead(path);
   auto opened = ProxyFileSystem::openFileForRead(path);
   if (!opened)
     return opened;
@@ -100,10 +105,9 @@ KnownFiles::openFileForRead(const Twine &path) {
   auto text = (*opened)->getBuffer(path, /*FileSize=*/-1,
                                    /*RequiresNullTerminator=*/true,
                                    /*IsVolatile=*/true);
-  if (now && realName && text && Table::keyOf(*now) == key &&
+  if (now && realName && text && Table::keyOf(path, *now) == key &&
       (*text)->getBufferSize() == status->getSize())
-    if (const KnownFile *kept =
-            table.keep(key, {std::move(*realName), std::move(*text)}))
-      return std::make_unique<OpenedFile>(*status, *kept);
+    return std::make_unique<OpenedFile>(
+        *status, *table.keep(key, {std::move(*realName), std::move(*text)}));
   return ProxyFileSystem::openFileForRead(path);
 }

@@ -34,11 +34,11 @@ static int64_t findMostAlone() {
 Accelerator::Accelerator(pikort_pipeline &p, const pikoir_cuda_image *images)
     : p_(p), device_(Device::open(p.device)), module_(*device_, images) {
   device_->check(device_->enter(), "entering its context");
-  processors_ = device_->attribute(CU_DEVICE_ATTRIBUTE_MULTIPROCESSOR_COUNT);
+  int processors = device_->attribute(CU_DEVICE_ATTRIBUTE_MULTIPROCESSOR_COUNT);
   residentThreads_ = int64_t(device_->attribute(
                          CU_DEVICE_ATTRIBUTE_MAX_THREADS_PER_MULTIPROCESSOR)) *
-                     processors_;
-  joinBlocks_ = std::min<int64_t>(processors_, mostJoinBlocks);
+                     processors;
+  joinBlocks_ = std::min<int64_t>(processors, mostJoinBlocks);
   mostAlone_ = findMostAlone();
   device_->check(device_->driver.cuStreamCreate(&own_, CU_STREAM_NON_BLOCKING),
                  "creating a stream");
@@ -223,21 +223,12 @@ std::unique_ptr<piko::rt::DeviceFrame> Accelerator::makeFrame() {
 }
 
 CUfunction Accelerator::find(const std::string &kernel) {
-  return OwnKernels::has(kernel) ? device_->ownKernels().find(kernel)
-                                 : module_.find(kernel);
-}
-
-int64_t Accelerator::blocksAtOnce(const std::string &kernel, int64_t threads) {
-  auto [known, isNew] = blocksAtOnce_.try_emplace(kernel, INT32_MAX);
-  if (!isNew)
-    return known->second;
-  device_->check(device_->enter(), "entering its context");
-  int blocks = 0;
-  CUresult result = device_->driver.cuOccupancyMaxActiveBlocksPerMultiprocessor(
-      &blocks, find(kernel), static_cast<int>(threads), /*sharedBytes=*/0);
-  if (result == CUDA_SUCCESS && blocks > 0)
-    known->second = blocks * processors_;
-  return known->second;
+  if (!OwnKernels::has(kernel))
+    return module_.find(kernel);
+  CUfunction &function = ownFunctions_[kernel];
+  if (!function)
+    function = device_->ownKernels().find(kernel);
+  return function;
 }
 
 void Accelerator::launch(const char *kernel, int64_t blocks, int64_t threads,

@@ -15,8 +15,8 @@
 #include "cuda/Module.h"
 #include "cuda/Submission.h"
 
-#include <map>
 #include <string>
+#include <unordered_map>
 
 struct pikort_pipeline;
 
@@ -58,9 +58,6 @@ public:
 
   /// Whether blocks of a grid can wait for each other, as joins do.
   bool canWaitInGrids() const;
-  /// How many blocks of a kernel of the program's can be resident; the most
-  /// that there are where the driver does not say. Throws.
-  int64_t blocksAtOnce(const std::string &kernel, int64_t threads);
   /// Blocks of a join, all of which are resident.
   int64_t joinBlocks() const { return joinBlocks_; }
   /// Up to how much work its first block does by itself (device/Grid.h).
@@ -103,8 +100,10 @@ private:
 
   pikort_pipeline &p_;
   std::shared_ptr<Device> device_;
-  Module module_;                               ///< The program's kernels.
-  std::map<std::string, int64_t> blocksAtOnce_; ///< By kernel.
+  Module module_; ///< The program's kernels.
+  /// Of the runtime's kernels those that were asked for: no lock for each
+  /// launch.
+  std::unordered_map<std::string, CUfunction> ownFunctions_;
   CUstream own_ = nullptr;
   CUstream stream_ = nullptr; ///< Of the run; the host's, or our own.
   CUevent done_ = nullptr;    ///< Behind a frame that is not waited for.
@@ -115,8 +114,7 @@ private:
   size_t wantedLog_ = 0;
   std::vector<uint8_t *> unreleased_; ///< The driver has refused to free it.
   int64_t *progress_ = nullptr;       ///< And room for what the host reads.
-  int64_t processors_ = 0, residentThreads_ = 0, joinBlocks_ = 0,
-          mostAlone_ = 0;
+  int64_t residentThreads_ = 0, joinBlocks_ = 0, mostAlone_ = 0;
   Frame *frame_ = nullptr; ///< The executor's, which ends first.
 };
 

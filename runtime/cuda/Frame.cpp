@@ -321,10 +321,6 @@ void Frame::showConstants(GridLaunch &grid) const {
 
 void Frame::launch(GridLaunch grid) {
   showConstants(grid);
-  // A part of a grid that begins when another one ends would have processors to
-  // itself.
-  grid.blocks =
-      std::min(grid.blocks, device_.blocksAtOnce(grid.kernel, grid.threads));
   steps_.push_back({Step::Kind::Grid, std::move(grid), nullptr, timed_});
   if (joined_ && joined_->stage >= 0 && !isStacked(p_.stages[joined_->stage]))
     queue(*joined_);

@@ -8,18 +8,18 @@
 using namespace piko::cuda;
 
 OwnKernels::OwnKernels(const Device &device)
-    : joins_(device, joinKernels), steps_(device, stepKernels),
-      conditions_(device, conditionKernels) {}
+    : joins_{{device, joinKernels}, {}}, steps_{{device, stepKernels}, {}},
+      conditions_{{device, conditionKernels}, {}} {}
 
 CUfunction OwnKernels::find(const std::string &kernel) {
-  std::lock_guard<std::mutex> lock(mutex_);
-  Module &module = kernel == conditionKernel ? conditions_
-                   : kernel == stepKernel    ? steps_
-                                             : joins_;
-  return module.find(kernel);
+  Part &part = kernel == conditionKernel ? conditions_
+               : kernel == stepKernel    ? steps_
+                                         : joins_;
+  std::lock_guard<std::mutex> lock(part.mutex);
+  return part.module.find(kernel);
 }
 
 void OwnKernels::unload() {
-  for (Module *module : {&joins_, &steps_, &conditions_})
-    module->unload();
+  for (Part *part : {&joins_, &steps_, &conditions_})
+    part->module.unload();
 }

@@ -31,8 +31,12 @@ public:
   void unload();
 
 private:
-  std::mutex mutex_;
-  Module joins_, steps_, conditions_;
+  /// Who waits for one is not kept from the others.
+  struct Part {
+    Module module;
+    std::mutex mutex;
+  };
+  Part joins_, steps_, conditions_;
 };
 
 } // namespace piko::cuda

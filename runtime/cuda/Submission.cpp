@@ -52,12 +52,12 @@ bool Submission::tryGraph(std::span<const Step> steps) {
     accelerator_.device_->check(
         driver().cuGraphLaunch(graph_, accelerator_.stream_),
         "running a frame");
-  } catch (const piko::rt::Failure &) {
+  } catch (const piko::rt::Failure &failure) {
     // Under MPS no body has cooperative grids, and nothing says which call
     // refuses them, nor how.
-    if (!repeats(steps) || accelerator_.device_->isLost())
+    if (!repeats(steps) || accelerator_.device_->isLost() ||
+        failure.code != PIKORT_DEVICE_FAILED)
       throw;
-    refusesConditions_ = true;
     dropGraph();
     return false;
   }
@@ -68,8 +68,10 @@ void Submission::run(std::span<const Step> steps) {
   timesKernels_ = accelerator_.p_.timesKernels;
   if (tryGraph(steps))
     return;
+  bool wasRefused = !timesKernels_ && canBeGraph(steps);
   beginTimes();
   runOneByOne(steps);
+  refusesConditions_ |= wasRefused; // which does no harm, as was seen
 }
 
 void Submission::beginTimes() {

@@ -174,8 +174,8 @@ TEST_F(LostDevice, ByACallOfTheHost) {
     pikoTestDriverFail("cuStreamSynchronize", 1, error);
     auto status = pipe.run();
     EXPECT_EQ(status.code(), PIKORT_DEVICE_FAILED);
-    expectIn(status,
-             {"running kernel 'scale' of stage 'scaler' (scale.cpp:7)"});
+    expectIn(status, {"running kernel 'scale' of stage 'scaler' "
+                      "(scale.cpp:7): CUDA_ERROR_"});
     expectIn(pipe.run(), {"CUDA device 1 (Piko test device) is lost"});
     ASSERT_TRUE(scale(1, Device{1}));
     expectScaled();

@@ -175,4 +175,23 @@ TEST_F(CudaStrips, NodesThatAreRefusedAreTheHosts) {
   EXPECT_GE(hostCounts().waits, 100u);
 }
 
+// The host does no better.
+TEST_F(CudaStrips, ALaunchThatFailsWhereLoopsAreRefused) {
+  ASSERT_TRUE(scaleStrips(50));
+  uint64_t launches = pikoTestDriverCalls("cuLaunchKernel");
+  pikoTestDriverFail("cuGraphLaunch", 1, CUDA_ERROR_UNKNOWN);
+  pikoTestDriverFail("cuLaunchKernel", launches + 2, CUDA_ERROR_UNKNOWN);
+  EXPECT_EQ(scaleStrips(50).code(), PIKORT_DEVICE_FAILED);
+  EXPECT_STREQ(pikoTestDriverAlive(), "");
+}
+
+// That may pass: it says nothing of loops.
+TEST_F(CudaStrips, MemoryThatLacksForAGraph) {
+  pikoTestDriverFail("cuGraphInstantiateWithFlags", 1,
+                     CUDA_ERROR_OUT_OF_MEMORY);
+  EXPECT_EQ(scaleStrips(50).code(), PIKORT_OUT_OF_MEMORY);
+  ASSERT_TRUE(scaleStrips(50));
+  EXPECT_EQ(hostCounts().graphLaunches, 1u);
+}
+
 } // namespace

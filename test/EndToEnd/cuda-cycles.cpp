@@ -33,6 +33,7 @@
 // So does one that refuses conditions.
 // RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_FAIL=cuGraphAddNode:1:801 %{compare} --pipe Turns 2>&1 | FileCheck %s --check-prefix=OLD
 // RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_FAIL=cuGraphInstantiateWithFlags:1:801 %{compare} --pipe Chain 2>&1 | FileCheck %s --check-prefix=OLD
+// CLEAN-NOT: alive at the end
 // OLD-DAG: {{^equal$}}
 // OLD-DAG: host: {{[0-9]+}} launches of kernels, 0 of graphs with 0 kernels, {{[0-9]+}} copies, 0 fills, {{[1-9][0-9]}} waits
 //

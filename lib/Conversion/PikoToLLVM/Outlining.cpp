@@ -161,12 +161,12 @@ static Captures findCaptures(scf::IfOp choice, Region &side) {
   return found;
 }
 
-/// The choice that is all that a version does; null if it is a body.
+/// The choice between versions that is in a version; null if it is a body.
 static scf::IfOp findInnerChoice(Region &version) {
   if (version.empty())
     return nullptr;
   for (auto choice : version.getOps<scf::IfOp>())
-    if (choice->hasAttr(marks::versions))
+    if (choice->hasAttr(marks::versions) && choice.elseBlock())
       return choice;
   return nullptr;
 }

@@ -4,6 +4,8 @@
 
 #include "Piko/Target/KernelImages.h"
 
+#include "KernelReports.h"
+
 #include "Piko/Target/Assembler.h"
 #include "Piko/Target/KernelResources.h"
 #include "Piko/Target/PTX.h"
@@ -59,6 +61,19 @@ static void defineList(Module &host, GlobalVariable *declared,
   declared->eraseFromParent();
 }
 
+/// A block's memory is declared in PTX, and 48 KB is what drivers give to that.
+static Error checkBlockMemory(const Module &module) {
+  constexpr int64_t most = 48 << 10;
+  for (const KernelResources &kernel : findKernels(module))
+    if (kernel.blockMemory > most)
+      return createStringError(
+          "kernel '" + kernel.kernel + "' needs " + Twine(kernel.blockMemory) +
+          " bytes of the memory of a block of " + Twine(kernel.threads) +
+          " threads, but a block has " + Twine(most) +
+          "; --gpu-threads with fewer takes less");
+  return Error::success();
+}
+
 Error piko::embedKernels(Module &host, Module &kernels, StringRef name,
                          const GPUOptions &gpu, int optLevel,
                          function_ref<void(const MissingCubin &)> report) {
@@ -68,6 +83,8 @@ Error piko::embedKernels(Module &host, Module &kernels, StringRef name,
   Expected<std::string> ptx = generatePTX(kernels, gpu.chip, optLevel);
   if (!ptx)
     return ptx.takeError();
+  if (Error error = checkBlockMemory(kernels))
+    return error;
   GlobalVariable *declared = host.getGlobalVariable(name);
   if (!declared)
     return createStringError("expected '" + name + "' in the host's code");

@@ -3,9 +3,6 @@
 // LLVM IR to PTX.
 
 #include "Piko/Target/PTX.h"
-
-#include "KernelReports.h"
-
 #include "Piko/Target/Approximation.h"
 #include "Piko/Target/CodeGeneration.h"
 
@@ -124,19 +121,6 @@ struct KeepZeros : PassInfoMixin<KeepZeros> {
 };
 } // namespace
 
-/// A block's memory is declared in PTX, and 48 KB is what drivers give to that.
-static Error checkBlockMemory(const Module &module) {
-  constexpr int64_t most = 48 << 10;
-  for (const KernelResources &kernel : findKernels(module))
-    if (kernel.blockMemory > most)
-      return createStringError(
-          "kernel '" + kernel.kernel + "' needs " + Twine(kernel.blockMemory) +
-          " bytes of the memory of a block of " + Twine(kernel.threads) +
-          " threads, but a block has " + Twine(most) +
-          "; --gpu-threads with fewer takes less");
-  return Error::success();
-}
-
 Expected<std::string> piko::generatePTX(Module &module, StringRef processor,
                                         int optLevel) {
   auto machine =
@@ -147,10 +131,6 @@ Expected<std::string> piko::generatePTX(Module &module, StringRef processor,
   alignBlockMemory(module);
   ModulePassManager last;
   last.addPass(createModuleToFunctionPassAdaptor(KeepZeros()));
-  auto text = emitCode(module, **machine, {.level = optLevel},
-                       CodeGenFileType::AssemblyFile, std::move(last));
-  if (text)
-    if (Error error = checkBlockMemory(module))
-      return std::move(error);
-  return text;
+  return emitCode(module, **machine, {.level = optLevel},
+                  CodeGenFileType::AssemblyFile, std::move(last));
 }

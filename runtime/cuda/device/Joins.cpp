@@ -18,9 +18,9 @@ namespace {
 class Join {
 public:
   explicit Join(const JoinArgs &args)
-      : args_(args), grid_(*args.frame, cursorOf(*args.frame), workOf(args)),
-        isFirstRun_(isFirstRun(*args.kernel, args.strip)),
-        clears_(args.clearCount > 0 && args.kernel->runs == 0) {}
+      : args_(args), clears_(args.clearCount > 0 && args.kernel->runs == 0),
+        grid_(*args.frame, cursorOf(*args.frame), workOf(args, clears_)),
+        isFirstRun_(isFirstRun(*args.kernel, args.strip)) {}
 
   void run() {
     if (grid_.isIdle())
@@ -57,9 +57,9 @@ public:
 
 private:
   /// About how much there is to do; of what comes in without bins, a unit each.
-  static int64_t workOf(const JoinArgs &args) {
+  static int64_t workOf(const JoinArgs &args, bool clears) {
     int64_t work = args.shape.placed || args.everyBin ? args.shape.cells : 0;
-    int64_t pixels = args.clearCount > 0 && args.kernel->runs == 0 ? 1 : 0;
+    int64_t pixels = clears ? 1 : 0;
     for (int32_t d = 0; d < args.rank; ++d)
       pixels *= args.domain[d];
     work += pixels;
@@ -192,11 +192,11 @@ private:
   }
 
   const JoinArgs &args_;
+  /// In the kernel's first run, of all strips: the first thread counts it
+  /// behind the last barrier, so that it is asked before.
+  bool clears_;
   Grid grid_;
   bool isFirstRun_; ///< Of a strip.
-  /// The kernel's first run, of all strips: the first thread counts it behind
-  /// the last barrier, so that it is asked before.
-  bool clears_;
   Lineage lineage_{};
 };
 

@@ -82,6 +82,14 @@ constexpr ErrorName errorNames[] = {
      "CUDA_ERROR_GRAPH_EXEC_UPDATE_FAILURE",
      "the graph update was not performed because it included changes which "
      "violated constraints specific to instantiated graph update"},
+    {CUDA_ERROR_CONTAINED, "CUDA_ERROR_CONTAINED",
+     "an error that is contained in a context"},
+    {CUDA_ERROR_TENSOR_MEMORY_LEAK, "CUDA_ERROR_TENSOR_MEMORY_LEAK",
+     "tensor memory is not completely freed"},
+    {CUDA_ERROR_MPS_CLIENT_TERMINATED, "CUDA_ERROR_MPS_CLIENT_TERMINATED",
+     "the MPS client has been ended by its server"},
+    {CUDA_ERROR_EXTERNAL_DEVICE, "CUDA_ERROR_EXTERNAL_DEVICE",
+     "an error of another device"},
     {CUDA_ERROR_UNKNOWN, "CUDA_ERROR_UNKNOWN", "unknown error"}};
 
 const ErrorName *find(CUresult error) {
