@@ -7,6 +7,7 @@
 //===----------------------------------------------------------------------===//
 #include "ImageModule.h"
 
+#include "Piko/Support/HeldSignals.h"
 #include "Piko/Support/OutputFile.h"
 
 #include <dlfcn.h>
@@ -100,6 +101,8 @@ Result<Done> render::writeImage(const std::string &path, int width, int height,
   if (auto ok = checkImageFormat(path); !ok)
     return ok.error();
 
+  // A limit on files is one on files in memory, too.
+  support::HeldSignals signals;
   auto content = encode(extensionOf(path), width, height, pixels);
   if (!content)
     return failTo("write", path, content.error().message);

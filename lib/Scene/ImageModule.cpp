@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cstring>
 #include <fstream>
 #include <iterator>
 #include <limits>
@@ -57,7 +58,7 @@ public:
       if (written < 0 && errno == EINTR)
         continue;
       if (written <= 0)
-        return Error{"no memory for its file"};
+        return Error{std::strerror(errno)};
       done += size_t(written);
     }
     return Done{};

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #include "Piko/Support/OutputFile.h"
 
+#include "Piko/Support/HeldSignals.h"
+
 #include <algorithm>
 #include <cerrno>
 #include <csignal>
@@ -23,41 +25,30 @@ namespace fs = std::filesystem;
 /// Why a system call failed; 0 when none did.
 using Errno = int;
 
-/// Holds back what would end the process between a file's first byte and its
-/// last, on this thread. Beyond a limit on sizes a write is then an error.
-class support::HeldSignals {
-public:
-  HeldSignals() {
-    sigset_t held;
-    sigemptyset(&held);
-    for (int number : {SIGINT, SIGTERM, SIGHUP, SIGXFSZ, SIGPIPE})
-      sigaddset(&held, number);
-    pthread_sigmask(SIG_BLOCK, &held, &before);
-    sigpending(&pendingBefore);
-  }
-  HeldSignals(const HeldSignals &) = delete;
-  HeldSignals &operator=(const HeldSignals &) = delete;
-  ~HeldSignals() {
-    drop(SIGXFSZ);
-    drop(SIGPIPE);
-    pthread_sigmask(SIG_SETMASK, &before, nullptr);
-  }
+HeldSignals::HeldSignals() {
+  sigset_t held;
+  sigemptyset(&held);
+  for (int number : {SIGINT, SIGTERM, SIGHUP, SIGXFSZ, SIGPIPE})
+    sigaddset(&held, number);
+  pthread_sigmask(SIG_BLOCK, &held, &before);
+  sigpending(&pendingBefore);
+}
 
-private:
-  /// Takes a signal that our own write raised.
-  void drop(int number) {
-    if (sigismember(&pendingBefore, number))
-      return;
-    sigset_t one;
-    sigemptyset(&one);
-    sigaddset(&one, number);
-    timespec none = {};
-    sigtimedwait(&one, nullptr, &none);
-  }
+HeldSignals::~HeldSignals() {
+  drop(SIGXFSZ);
+  drop(SIGPIPE);
+  pthread_sigmask(SIG_SETMASK, &before, nullptr);
+}
 
-  sigset_t before;
-  sigset_t pendingBefore;
-};
+void HeldSignals::drop(int number) {
+  if (sigismember(&pendingBefore, number))
+    return;
+  sigset_t one;
+  sigemptyset(&one);
+  sigaddset(&one, number);
+  timespec none = {};
+  sigtimedwait(&one, nullptr, &none);
+}
 
 namespace {
 
