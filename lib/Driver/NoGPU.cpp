@@ -76,6 +76,7 @@ llvm::Expected<KernelReport> piko::measureKernels(const llvm::Module &,
 std::optional<int64_t> piko::getResidentThreads(llvm::StringRef) {
   return std::nullopt;
 }
+
 std::optional<double> KernelResources::getOccupancy(StringRef) const {
   return std::nullopt;
 }

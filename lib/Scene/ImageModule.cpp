@@ -188,8 +188,9 @@ bool readValues(OIIO::ImageInput &input, std::vector<float> &values) {
                           OIIO::TypeDesc::FLOAT, values.data());
 }
 
-/// The readers of some formats leave their buffers, up to OpenImageIO 2.4.12:
-/// these of two in opening a file already, whatever its name is.
+/// The readers of some formats leave their buffers, up to OpenImageIO 2.4.12,
+/// that of GIF in opening a file already; and they are tried whatever a file's
+/// name is.
 bool hasUnsoundReader(const std::string &path) {
   std::array<char, 4> begin{};
   std::ifstream file(path, std::ios::binary);

@@ -83,6 +83,7 @@ public:
 
 private:
   friend class Submission;
+  /// A kernel of the program's or the runtime's, loaded; throws.
   CUfunction find(const std::string &kernel);
   /// Throws unless they can run.
   void load(std::span<const Step> steps);

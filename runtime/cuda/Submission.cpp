@@ -71,7 +71,8 @@ void Submission::run(std::span<const Step> steps) {
   bool wasRefused = !timesKernels_ && canBeGraph(steps);
   beginTimes();
   runOneByOne(steps);
-  refusesConditions_ |= wasRefused; // which does no harm, as was seen
+  // The same steps have gone well: it was the graph that did not.
+  refusesConditions_ |= wasRefused;
 }
 
 void Submission::beginTimes() {

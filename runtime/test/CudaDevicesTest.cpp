@@ -53,13 +53,19 @@ TEST_F(Cuda, ChoiceThatIsNoDevice) {
   expectIn(status, {"expected a device's number, but got -3"});
 }
 
-TEST_F(Cuda, TwoDevicesAtTheSameTime) {
+/// Of two pipelines, each on a thread and a device; what both are on is theirs
+/// together from the first kernel of the runtime's on.
+class CudaTogether
+    : public Cuda,
+      public testing::WithParamInterface<std::pair<int32_t, int32_t>> {};
+
+TEST_P(CudaTogether, Run) {
   constexpr int frames = 20;
   std::vector<int32_t> results[2];
   int failures[2] = {};
-  auto work = [&](int32_t number) {
+  auto work = [&](int32_t number, int32_t device) {
     results[number].resize(numbers.size());
-    piko::rt::Pipeline pipe(program, Device{number});
+    piko::rt::Pipeline pipe(program, Device{device});
     int32_t factor = 5 + number;
     bool isBound = pipe.domain({8}) && pipe.constant("factor", factor) &&
                    pipe.buffer("out", results[number]) &&
@@ -67,7 +73,8 @@ TEST_F(Cuda, TwoDevicesAtTheSameTime) {
     for (int frame = 0; frame < frames; ++frame)
       failures[number] += !isBound || !pipe.run();
   };
-  std::thread first(work, 0), second(work, 1);
+  std::thread first(work, 0, GetParam().first),
+      second(work, 1, GetParam().second);
   first.join();
   second.join();
   for (int32_t number : {0, 1}) {
@@ -76,6 +83,9 @@ TEST_F(Cuda, TwoDevicesAtTheSameTime) {
       ASSERT_EQ(results[number][i], numbers[i] * (5 + number));
   }
 }
+
+INSTANTIATE_TEST_SUITE_P(Devices, CudaTogether,
+                         testing::Values(std::pair(0, 1), std::pair(0, 0)));
 
 /// A pipeline on the first device, which its kernel has made useless.
 class LostDevice : public Cuda {
