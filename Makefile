@@ -21,7 +21,7 @@ else
 BUILD := build-$(PRESET)
 endif
 JOBS ?= $(shell nproc)
-# Whether eight files of a library are compiled as one; see CONTRIBUTING.md.
+# Whether sixteen files of a library are compiled as one; see CONTRIBUTING.md.
 UNITE ?= ON
 # Of the pipelines of examples/raster the fastest.
 PIPE ?= Fused

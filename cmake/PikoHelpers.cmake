@@ -47,16 +47,24 @@ if(PIKO_PRECOMPILE_HEADERS AND PIKO_ENABLE_COMPILER
   set(PIKO_PRECOMPILES ON)
 endif()
 
-# piko_add_precompiled(<target> <header of this folder> [libraries])
-# A target that piko_use_precompiled takes a precompiled header from. ccache has
-# none of it, which holds paths of this tree, and knows it by a checksum of what it
-# is made of.
+# piko_add_precompiled(<target> <header of this folder> [BASE target] [LINK libraries])
+# A target that piko_use_precompiled takes a precompiled header from, on top of that of
+# another such target, the base. ccache has none of it, which holds paths of this tree,
+# and knows it by a checksum of what it is made of.
 function(piko_add_precompiled target header)
+  cmake_parse_arguments(ARG "" "BASE" "LINK" ${ARGN})
   add_library(${target} OBJECT ${CMAKE_CURRENT_FUNCTION_LIST_DIR}/Precompiled.cpp)
-  set_target_properties(${target} PROPERTIES CXX_COMPILER_LAUNCHER "")
-  target_link_libraries(${target} PRIVATE piko_options ${ARGN})
+  set_target_properties(${target} PROPERTIES CXX_COMPILER_LAUNCHER "${PIKO_COMPILER_LAUNCHER}")
+  target_link_libraries(${target} PRIVATE piko_options ${ARG_LINK})
   target_compile_options(${target} PRIVATE
     ${PIKO_COMPILER_FLAGS} "SHELL:-Xclang -fno-pch-timestamp")
+  if(ARG_BASE)
+    set(folder ${CMAKE_CURRENT_BINARY_DIR}/CMakeFiles)
+    set(base ${folder}/${ARG_BASE}.dir/cmake_pch.hxx.pch)
+    target_compile_options(${target} PRIVATE "SHELL:-Xclang -include-pch -Xclang ${base}")
+    set_source_files_properties(${folder}/${target}.dir/cmake_pch.hxx.cxx
+      PROPERTIES OBJECT_DEPENDS ${base})
+  endif()
   target_precompile_headers(${target} PRIVATE
     ${CMAKE_CURRENT_FUNCTION_LIST_DIR}/${header})
   set(dialect ${PROJECT_SOURCE_DIR}/include/Piko/Dialect/Piko/IR)
@@ -81,17 +89,33 @@ function(piko_use_precompiled target from)
 endfunction()
 
 if(PIKO_PRECOMPILES)
-  piko_add_precompiled(piko_precompiled_mlir PrecompiledMLIR.h piko_llvm)
-  piko_add_precompiled(piko_precompiled_clang PrecompiledClang.h piko_clang)
+  piko_add_precompiled(piko_precompiled_mlir PrecompiledMLIR.h LINK piko_llvm)
+  piko_add_precompiled(piko_precompiled_clang PrecompiledClang.h
+    BASE piko_precompiled_mlir LINK piko_clang)
 endif()
 
 # What two files include is compiled once, and so are the templates that both use.
 option(PIKO_UNITE
-  "Compile eight files of a library as one; off, a changed file is compiled alone" OFF)
+  "Compile sixteen files of a library as one; off, a changed file is compiled alone" OFF)
 
 function(piko_unite target)
   set_target_properties(${target} PROPERTIES
-    UNITY_BUILD ${PIKO_UNITE} UNITY_BUILD_BATCH_SIZE 8)
+    UNITY_BUILD ${PIKO_UNITE} UNITY_BUILD_BATCH_SIZE 16)
+endfunction()
+
+# piko_unite_apart(<target> <source>...)
+# Compiles these sources as one, and none of the others with them.
+function(piko_unite_apart target)
+  get_target_property(sources ${target} SOURCES)
+  list(REMOVE_ITEM sources ${ARGN})
+  set_source_files_properties(${ARGN} PROPERTIES UNITY_GROUP apart)
+  set(count 0)
+  foreach(source ${sources})
+    math(EXPR batch "${count} / 16")
+    set_source_files_properties(${source} PROPERTIES UNITY_GROUP ${batch})
+    math(EXPR count "${count} + 1")
+  endforeach()
+  set_target_properties(${target} PROPERTIES UNITY_BUILD_MODE GROUP)
 endfunction()
 
 # For each program.

@@ -8,11 +8,17 @@ set(PIKO_LLVM_PREFIX /usr/lib/llvm-${PIKO_LLVM_VERSION} CACHE PATH
 list(PREPEND CMAKE_PREFIX_PATH ${PIKO_LLVM_PREFIX})
 
 find_program(PIKO_CCACHE ccache)
-if(PIKO_CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
-  set(CMAKE_C_COMPILER_LAUNCHER ${PIKO_CCACHE})
-  # What is in a precompiled header is known by a checksum beside it.
-  set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_COMMAND} -E env
-    CCACHE_SLOPPINESS=pch_defines,time_macros CCACHE_PCH_EXTSUM=true ${PIKO_CCACHE})
+if(NOT CMAKE_CXX_COMPILER_LAUNCHER)
+  # Clang takes a tenth less time where glibc asks the kernel for huge pages.
+  set(PIKO_COMPILER_LAUNCHER
+    ${CMAKE_COMMAND} -E env GLIBC_TUNABLES=glibc.malloc.hugetlb=1)
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${PIKO_COMPILER_LAUNCHER})
+  if(PIKO_CCACHE)
+    set(CMAKE_C_COMPILER_LAUNCHER ${PIKO_CCACHE})
+    # What is in a precompiled header is known by a checksum beside it.
+    list(APPEND CMAKE_CXX_COMPILER_LAUNCHER
+      CCACHE_SLOPPINESS=pch_defines,time_macros CCACHE_PCH_EXTSUM=true ${PIKO_CCACHE})
+  endif()
 endif()
 
 set(PIKO_SANITIZE "" CACHE STRING

@@ -14,8 +14,6 @@
 
 #include "mlir/Dialect/GPU/IR/GPUDialect.h"
 #include "mlir/Dialect/LLVMIR/LLVMDialect.h"
-#include "mlir/Dialect/LLVMIR/NVVMDialect.h"
-#include "mlir/Dialect/OpenMP/OpenMPDialect.h"
 #include "mlir/IR/Verifier.h"
 #include "mlir/Interfaces/FunctionInterfaces.h"
 #include "mlir/Parser/Parser.h"
@@ -104,8 +102,8 @@ Level piko::getLevel(ModuleOp module) {
   // What is left to convert is in other dialects.
   WalkResult result = module.walk([](Operation *op) {
     return isa<ModuleOp, gpu::GPUModuleOp>(op) ||
-                   isa<LLVM::LLVMDialect, NVVM::NVVMDialect,
-                       omp::OpenMPDialect>(op->getDialect())
+                   is_contained({"llvm", "nvvm", "omp"},
+                                op->getName().getDialectNamespace())
                ? WalkResult::advance()
                : WalkResult::interrupt();
   });

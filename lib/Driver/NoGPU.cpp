@@ -7,6 +7,7 @@
 #include "Piko/Target/KernelImages.h"
 #include "Piko/Target/KernelResources.h"
 #include "Piko/Target/PTX.h"
+#include "SequenceParts.h"
 
 #include "mlir/IR/BuiltinOps.h"
 #include "mlir/Pass/Pass.h"
@@ -36,6 +37,8 @@ struct RefusePass : PassWrapper<RefusePass, OperationPass<ModuleOp>> {
   }
 };
 } // namespace
+
+void piko::registerGPUDialects(DialectRegistry &) {}
 
 void piko::addGPUSequence(OpPassManager &passes, const GPUOptions &,
                           const SynthesisOptions &) {

@@ -112,7 +112,7 @@ static void addDeviceVersion(ModuleOp module, const ObjectOptions &options,
   {
     ScopedDiagnosticHandler handler(
         module.getContext(), [&](Diagnostic &diagnostic) {
-          if (diagnostic.getSeverity() != DiagnosticSeverity::Error)
+          if (diagnostic.getSeverity() != mlir::DiagnosticSeverity::Error)
             return failure();
           if (reason.empty()) {
             reason = diagnostic.str();
@@ -178,7 +178,8 @@ static bool compile(const ObjectOptions &options,
       options, processors, files, context, llvmContext, entry.object);
   if (!module)
     return false;
-  TargetOptions target = options.target.leaveOut(options.source.synthesis);
+  piko::TargetOptions target =
+      options.target.leaveOut(options.source.synthesis);
   // The functions say what they are for.
   target.cpu = getBaseProcessor(module->getTargetTriple());
   llvm::Expected<std::string> code =

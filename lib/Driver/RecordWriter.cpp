@@ -39,7 +39,7 @@ struct Layout {
 };
 
 /// A type without its place. A struct that has no name is its own text.
-struct Type {
+struct MemberType {
   std::string name;
   int64_t size, align;
   llvm::SmallVector<int64_t, 2> extents = {};
@@ -110,19 +110,23 @@ public:
   std::string run();
 
 private:
-  std::optional<Type> getNumber(const Leaf &leaf, const std::string &path);
-  std::optional<Type> getClass(ArrayRef<Leaf> leaves, const std::string &path,
-                               const CppType &type, int64_t stride,
-                               const std::string &indent);
-  std::optional<Type> getStdArray(ArrayRef<Leaf> leaves,
-                                  const std::string &path);
-  std::optional<Type> getMember(ArrayRef<Leaf> leaves, const std::string &path,
-                                const std::string &indent);
-  std::optional<Type> getElements(ArrayRef<Leaf> leaves, size_t dims,
-                                  const std::string &path, const CppType &type,
-                                  const std::string &indent);
-  bool place(Layout &layout, const Type &member, StringRef name, int64_t offset,
-             int64_t maxAlign, const std::string &indent);
+  std::optional<MemberType> getNumber(const Leaf &leaf,
+                                      const std::string &path);
+  std::optional<MemberType> getClass(ArrayRef<Leaf> leaves,
+                                     const std::string &path,
+                                     const CppType &type, int64_t stride,
+                                     const std::string &indent);
+  std::optional<MemberType> getStdArray(ArrayRef<Leaf> leaves,
+                                        const std::string &path);
+  std::optional<MemberType> getMember(ArrayRef<Leaf> leaves,
+                                      const std::string &path,
+                                      const std::string &indent);
+  std::optional<MemberType> getElements(ArrayRef<Leaf> leaves, size_t dims,
+                                        const std::string &path,
+                                        const CppType &type,
+                                        const std::string &indent);
+  bool place(Layout &layout, const MemberType &member, StringRef name,
+             int64_t offset, int64_t maxAlign, const std::string &indent);
   std::optional<Layout> layOut(ArrayRef<Leaf> leaves, const std::string &path,
                                int64_t maxAlign, const std::string &indent);
 
@@ -132,13 +136,13 @@ private:
 };
 
 /// A number or an array of numbers.
-std::optional<Type> RecordWriter::Layouter::getNumber(const Leaf &leaf,
-                                                      const std::string &path) {
+std::optional<MemberType>
+RecordWriter::Layouter::getNumber(const Leaf &leaf, const std::string &path) {
   int64_t size = leaf.getElementSize();
   if (!isDense(leaf.counts, leaf.strides, size))
     return std::nullopt;
-  Type number{getStorageType(leaf.type).str(),
-              size * llvm::product_of(leaf.counts), size, leaf.counts};
+  MemberType number{getStorageType(leaf.type).str(),
+                    size * llvm::product_of(leaf.counts), size, leaf.counts};
   std::optional<CppType> type = lookupCppType(record, path);
   if (!type)
     return number;
@@ -151,14 +155,14 @@ std::optional<Type> RecordWriter::Layouter::getNumber(const Leaf &leaf,
 }
 
 /// What lies in a std::array is an array, its one member.
-std::optional<Type>
+std::optional<MemberType>
 RecordWriter::Layouter::getStdArray(ArrayRef<Leaf> leaves,
                                     const std::string &path) {
   StringRef name = leaves[0].path[0];
   for (const Leaf &leaf : leaves)
     if (leaf.path[0] != name)
       return std::nullopt;
-  std::optional<Type> inner =
+  std::optional<MemberType> inner =
       getMember(leaves, joinPath(path, name), structIndent);
   if (!inner || inner->extents.empty() || inner->name.back() == '}')
     return std::nullopt;
@@ -173,7 +177,7 @@ RecordWriter::Layouter::getStdArray(ArrayRef<Leaf> leaves,
 
 /// A class; its size may be enlarged to the stride of an array, if there is
 /// one.
-std::optional<Type>
+std::optional<MemberType>
 RecordWriter::Layouter::getClass(ArrayRef<Leaf> leaves, const std::string &path,
                                  const CppType &type, int64_t stride,
                                  const std::string &indent) {
@@ -193,25 +197,25 @@ RecordWriter::Layouter::getClass(ArrayRef<Leaf> leaves, const std::string &path,
     if (!type.size && size != wanted)
       return std::nullopt;
     writer.useGlm(type.name, *glm, wanted, layout->members);
-    return Type{type.name.str(), wanted, align};
+    return MemberType{type.name.str(), wanted, align};
   }
   if (size < wanted)
     pad(*layout, wanted, inner);
   if (isNamed)
-    return Type{writer.defineStruct(type.name, use, layout->text, wanted, align,
-                                    layout->members),
-                wanted,
-                align,
-                {},
-                "struct"};
+    return MemberType{writer.defineStruct(type.name, use, layout->text, wanted,
+                                          align, layout->members),
+                      wanted,
+                      align,
+                      {},
+                      "struct"};
   std::string head = align > layout->align
                          ? llvm::formatv("struct alignas({0}) {{\n", align)
                          : std::string("struct {\n");
-  return Type{head + layout->text + indent + "}", wanted, align};
+  return MemberType{head + layout->text + indent + "}", wanted, align};
 }
 
 /// A class or, over its leaves' first `dims` dimensions, an array of them.
-std::optional<Type> RecordWriter::Layouter::getElements(
+std::optional<MemberType> RecordWriter::Layouter::getElements(
     ArrayRef<Leaf> leaves, size_t dims, const std::string &path,
     const CppType &type, const std::string &indent) {
   const Leaf &first = leaves.front();
@@ -228,7 +232,8 @@ std::optional<Type> RecordWriter::Layouter::getElements(
     leaf.strides.erase(leaf.strides.begin(), leaf.strides.begin() + dims);
   }
   int64_t stride = dims ? strides.back() : 0;
-  std::optional<Type> element = getClass(inner, path, type, stride, indent);
+  std::optional<MemberType> element =
+      getClass(inner, path, type, stride, indent);
   if (!element || !isDense(counts, strides, element->size))
     return std::nullopt;
   element->extents.assign(counts.begin(), counts.end());
@@ -236,7 +241,7 @@ std::optional<Type> RecordWriter::Layouter::getElements(
   return element;
 }
 
-std::optional<Type> RecordWriter::Layouter::getMember(
+std::optional<MemberType> RecordWriter::Layouter::getMember(
     ArrayRef<Leaf> leaves, const std::string &path, const std::string &indent) {
   if (leaves.size() == 1 && leaves[0].path.size() == 1)
     return getNumber(leaves[0], path);
@@ -250,7 +255,7 @@ std::optional<Type> RecordWriter::Layouter::getMember(
 }
 
 /// Puts a member at its offset; behind a number of the same type, on its line.
-bool RecordWriter::Layouter::place(Layout &layout, const Type &member,
+bool RecordWriter::Layouter::place(Layout &layout, const MemberType &member,
                                    StringRef name, int64_t offset,
                                    int64_t maxAlign,
                                    const std::string &indent) {
@@ -295,7 +300,7 @@ RecordWriter::Layouter::layOut(ArrayRef<Leaf> leaves, const std::string &path,
     auto together = leaves.take_while(
         [&](const Leaf &leaf) { return leaf.path[0] == name; });
     leaves = leaves.drop_front(together.size());
-    std::optional<Type> member =
+    std::optional<MemberType> member =
         getMember(together, joinPath(path, name), indent);
     bool isKnown = llvm::any_of(
         layout.members, [&](const auto &other) { return other.first == name; });

@@ -239,8 +239,9 @@ static bool makeAdapter(const ObjectOptions &options, const Recorder &recorder,
 //===----------------------------------------------------------------------===//
 
 /// Its code is big, and runs a few times.
-static TargetOptions getTarget(const ObjectOptions &options) {
-  TargetOptions target = options.target.leaveOut(options.source.synthesis);
+static piko::TargetOptions getTarget(const ObjectOptions &options) {
+  piko::TargetOptions target =
+      options.target.leaveOut(options.source.synthesis);
   target.optLevel = std::min(target.optLevel, 1);
   return target;
 }
@@ -248,7 +249,7 @@ static TargetOptions getTarget(const ObjectOptions &options) {
 /// All that decides what Clang makes of the adapter, but for the files.
 static std::string makeHostRequest(const Adapter &adapter,
                                    const FrontendOptions &frontend,
-                                   const TargetOptions &target,
+                                   const piko::TargetOptions &target,
                                    const Processor &processor,
                                    llvm::vfs::FileSystem &files) {
   KeyBuilder key;
@@ -269,7 +270,8 @@ static std::string makeHostRequest(const Adapter &adapter,
 
 /// False after diagnostics.
 static bool makeObject(const ObjectOptions &options, const Adapter &adapter,
-                       FrontendOptions frontend, const TargetOptions &target,
+                       FrontendOptions frontend,
+                       const piko::TargetOptions &target,
                        const Recorder &recorder, HostObject &object) {
   const CompileOptions &source = options.source;
   Reader reader(source, object.diagnostics, options.remarks);

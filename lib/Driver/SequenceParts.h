@@ -17,6 +17,9 @@ void addCleanUp(mlir::OpPassManager &passes);
 void addUnitsToLoops(mlir::OpPassManager &passes,
                      const SynthesisOptions &options);
 
+/// What kernels for a GPU are in; nothing in a build without such.
+void registerGPUDialects(mlir::DialectRegistry &registry);
+
 } // namespace piko
 
 #endif // PIKO_LIB_DRIVER_SEQUENCEPARTS_H

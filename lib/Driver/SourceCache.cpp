@@ -12,7 +12,7 @@ using namespace piko;
 
 StringWriter &StringWriter::add(StringRef string) {
   char length[8];
-  support::endian::write64le(length, string.size());
+  llvm::support::endian::write64le(length, string.size());
   bytes.append(length, 8).append(string.data(), string.size());
   return *this;
 }
@@ -20,7 +20,7 @@ StringWriter &StringWriter::add(StringRef string) {
 std::string StringReader::next() {
   if (bytes.size() < 8)
     return "";
-  uint64_t length = support::endian::read64le(bytes.data());
+  uint64_t length = llvm::support::endian::read64le(bytes.data());
   bytes = bytes.drop_front(8);
   std::string string = bytes.take_front(length).str();
   bytes = bytes.drop_front(string.size());

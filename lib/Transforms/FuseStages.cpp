@@ -80,7 +80,7 @@ private:
 //===----------------------------------------------------------------------===//
 
 /// The schedule kind that a stage's text asks for, if it asks for one.
-static std::optional<ScheduleKind> getKind(StageOp stage) {
+static std::optional<ScheduleKind> getAskedKind(StageOp stage) {
   ScheduleOp schedule = stage.getSchedule();
   return schedule ? std::optional(schedule.getKind()) : std::nullopt;
 }
@@ -106,10 +106,11 @@ static LogicalResult checkSchedules(StageOp producer, StageOp consumer,
   if (second && second.getLanes())
     return refuse(consumer, "the lanes of stage '" + getCppName(consumer) +
                                 "' are specified");
-  std::optional<ScheduleKind> kind = getKind(consumer);
+  std::optional<ScheduleKind> kind = getAskedKind(consumer);
   if (!kind)
     return success(); // wherever its primitives are
-  ScheduleKind before = getKind(producer).value_or(ScheduleKind::LoadBalance);
+  ScheduleKind before =
+      getAskedKind(producer).value_or(ScheduleKind::LoadBalance);
   if (*kind == ScheduleKind::LoadBalance)
     return refuse(consumer, "load_balance lets any core take the bin");
   if (*kind != before)
@@ -279,7 +280,7 @@ static void runBehind(StageOp stage, StageOp producer) {
     ScheduleOp before = producer.getSchedule();
     auto kind = ScheduleKindAttr::get(
         builder.getContext(),
-        getKind(producer).value_or(ScheduleKind::LoadBalance));
+        getAskedKind(producer).value_or(ScheduleKind::LoadBalance));
     schedule = ScheduleOp::create(
         builder, stage.getLoc(), kind, /*tileSplit=*/nullptr,
         /*endStage=*/nullptr, /*endBin=*/nullptr, /*behind=*/nullptr,

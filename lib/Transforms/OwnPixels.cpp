@@ -30,9 +30,9 @@ struct OwnPixelsPass : piko::impl::OwnPixelsBase<OwnPixelsPass> {
 
 /// Adds to `slice` what `value` is computed from, operands first; fails at an
 /// operation that cannot be repeated, and says which.
-static LogicalResult collectSlice(Value value, Value prim,
-                                  llvm::SetVector<Operation *> &slice,
-                                  Operation *&culprit) {
+static LogicalResult collectCoordinateSlice(Value value, Value prim,
+                                            llvm::SetVector<Operation *> &slice,
+                                            Operation *&culprit) {
   if (value == prim)
     return success();
   Operation *op = value.getDefiningOp();
@@ -47,7 +47,7 @@ static LogicalResult collectSlice(Value value, Value prim,
     return failure();
   }
   for (Value operand : op->getOperands())
-    if (failed(collectSlice(operand, prim, slice, culprit)))
+    if (failed(collectCoordinateSlice(operand, prim, slice, culprit)))
       return failure();
   slice.insert(op);
   return success();
@@ -126,8 +126,8 @@ void OwnPixelsPass::runOnStage(StageOp stage) {
   llvm::SetVector<Operation *> slice;
   Operation *culprit = nullptr;
   for (Value coordinate : first.getCoordinates())
-    if (failed(collectSlice(coordinate, process.getBody().getArgument(0), slice,
-                            culprit)))
+    if (failed(collectCoordinateSlice(
+            coordinate, process.getBody().getArgument(0), slice, culprit)))
       return refuse(culprit, "the pixel depends on this, not only on the "
                              "primitive's fields and on constants");
 

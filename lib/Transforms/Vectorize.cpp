@@ -74,7 +74,7 @@ namespace {
 
 /// How a loop counts by one: which of its variables, below which bound, and
 /// whether it takes the bound as well.
-struct Counting {
+struct CountedWhile {
   unsigned variable = 0;
   Value bound;
   bool isClosed = false;
@@ -82,7 +82,7 @@ struct Counting {
 
 } // namespace
 
-static std::optional<Counting> findCounting(scf::WhileOp loop) {
+static std::optional<CountedWhile> findCountedWhile(scf::WhileOp loop) {
   Block &before = *loop.getBeforeBody(), &after = *loop.getAfterBody();
   scf::ConditionOp condition = loop.getConditionOp();
   auto compare = dyn_cast<arith::CmpIOp>(before.front());
@@ -95,8 +95,8 @@ static std::optional<Counting> findCounting(scf::WhileOp loop) {
   if (!variable || variable.getOwner() != &before)
     return {};
   using P = arith::CmpIPredicate;
-  Counting counting{variable.getArgNumber(), compare.getRhs(),
-                    compare.getPredicate() == P::sle};
+  CountedWhile counting{variable.getArgNumber(), compare.getRhs(),
+                        compare.getPredicate() == P::sle};
   // Up to a number, from 0: one below it would take 2^63 turns.
   bool isUntil = compare.getPredicate() == P::ne &&
                  counting.bound.getType().isInteger(64) &&
@@ -110,10 +110,10 @@ static std::optional<Counting> findCounting(scf::WhileOp loop) {
       (counting.isClosed || isUntil || compare.getPredicate() == P::slt);
   // The bound may be the largest number, where 64 bits have no next one.
   bool fits = !counting.isClosed || counting.bound.getType().isInteger(32);
-  return isCounted && fits ? counting : std::optional<Counting>();
+  return isCounted && fits ? counting : std::optional<CountedWhile>();
 }
 
-static scf::ForOp countLoop(scf::WhileOp loop, const Counting &counting) {
+static scf::ForOp countLoop(scf::WhileOp loop, const CountedWhile &counting) {
   IRRewriter builder(loop->getContext());
   builder.setInsertionPoint(loop);
   Location loc = loop.getLoc();
@@ -157,7 +157,7 @@ static void countLoops(scf::ForOp root) {
   SmallVector<scf::WhileOp> loops;
   root.walk([&](scf::WhileOp loop) { loops.push_back(loop); });
   for (scf::WhileOp loop : loops)
-    if (std::optional<Counting> counting = findCounting(loop))
+    if (std::optional<CountedWhile> counting = findCountedWhile(loop))
       countLoop(loop, *counting);
 }
 
@@ -371,10 +371,10 @@ static scf::ForOp copyAsCount(Operation *op) {
                                      : scf::ForOp();
   auto loop = dyn_cast<scf::WhileOp>(op);
   if (!loop || loop.getInits().size() != 1 || !loop->use_empty() ||
-      !findCounting(loop))
+      !findCountedWhile(loop))
     return {};
   auto copy = cast<scf::WhileOp>(builder.clone(*loop));
-  return countLoop(copy, *findCounting(copy));
+  return countLoop(copy, *findCountedWhile(copy));
 }
 
 static void remarkInOrder(scf::ForOp loop, int64_t laneCount, bool isCompact) {

@@ -244,7 +244,7 @@ static bool isBounded(gpu::GPUFuncOp kernel) {
 }
 
 /// With more, a multiprocessor has few blocks.
-static constexpr int64_t maxBlockBytes = 24 << 10;
+static constexpr int64_t maxSpillBytes = 24 << 10;
 
 static int64_t getBlockBytes(gpu::GPUFuncOp kernel) {
   int64_t bytes = 0;
@@ -279,7 +279,7 @@ void SpillToBlockPass::runOnOperation() {
     DenseI32ArrayAttr size = kernel.getKnownBlockSizeAttr();
     if (!kernel.isKernel() || !size || !isBounded(kernel))
       continue;
-    int64_t room = (maxBlockBytes - getBlockBytes(kernel)) / size[0],
+    int64_t room = (maxSpillBytes - getBlockBytes(kernel)) / size[0],
             bytesLeft = std::min(maxBytes.getValue(), room);
     for (LoopLikeOpInterface loop : findLoops(kernel))
       Spiller(kernel, loop, size[0]).run(maxRegisters, bytesLeft);

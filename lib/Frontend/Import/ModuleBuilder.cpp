@@ -14,9 +14,9 @@ using llvm::failed;
 
 namespace {
 
-class Builder {
+class ModuleBuilder {
 public:
-  Builder(ParsedUnit &unit, MemoryMap &memory, mlir::MLIRContext &context)
+  ModuleBuilder(ParsedUnit &unit, MemoryMap &memory, mlir::MLIRContext &context)
       : unit(unit), pipeline(unit.pipeline), memory(memory), context(context),
         builder(&context) {}
 
@@ -251,5 +251,5 @@ private:
 mlir::OwningOpRef<mlir::ModuleOp>
 piko::buildModule(ParsedUnit &unit, MemoryMap &memory,
                   mlir::MLIRContext &context) {
-  return Builder(unit, memory, context).run();
+  return ModuleBuilder(unit, memory, context).run();
 }

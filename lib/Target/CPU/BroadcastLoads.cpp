@@ -15,12 +15,12 @@ using namespace llvm::PatternMatch;
 namespace {
 
 /// A number in memory.
-struct Place {
+struct LoadPlace {
   Value *base;
   int64_t offset; ///< in bytes
   Align alignment;
 
-  bool operator==(const Place &other) const {
+  bool operator==(const LoadPlace &other) const {
     return base == other.base && offset == other.offset;
   }
 };
@@ -29,7 +29,7 @@ struct Place {
 struct Broadcast {
   Instruction *splat = nullptr;
   SmallVector<LoadInst *, 2> loads; ///< of the ways that lead there
-  Place place;
+  LoadPlace place;
   bool isNegated = false;
 };
 
@@ -56,7 +56,7 @@ private:
 static bool isBroadcastWidth(unsigned bits) { return bits == 32 || bits == 64; }
 
 /// Where an element of what is loaded stands; of a scalar the first one.
-static std::optional<Place> getPlace(LoadInst *load, unsigned element) {
+static std::optional<LoadPlace> getPlace(LoadInst *load, unsigned element) {
   auto *vector = dyn_cast<FixedVectorType>(load->getType());
   if (!load->isSimple() || (vector && element >= vector->getNumElements()))
     return std::nullopt;
@@ -67,8 +67,8 @@ static std::optional<Place> getPlace(LoadInst *load, unsigned element) {
       data, offset, /*AllowNonInbounds=*/true);
   int64_t within =
       element * data.getTypeStoreSize(load->getType()->getScalarType());
-  return Place{base, offset.getSExtValue() + within,
-               commonAlignment(load->getAlign(), within)};
+  return LoadPlace{base, offset.getSExtValue() + within,
+                   commonAlignment(load->getAlign(), within)};
 }
 
 /// The loads of a number, if it is the same on all ways.
@@ -78,7 +78,7 @@ static bool findLoads(Value *number, unsigned element, Broadcast &broadcast) {
     sources.assign(phi->op_begin(), phi->op_end());
   for (Value *source : sources) {
     auto *load = dyn_cast<LoadInst>(source);
-    std::optional<Place> place;
+    std::optional<LoadPlace> place;
     if (load)
       place = getPlace(load, element);
     if (!place || (!broadcast.loads.empty() && !(*place == broadcast.place)))

@@ -38,10 +38,10 @@ constexpr VectorInstruction instructions12[] = {
     {8, Intrinsic::x86_avx_rcp_ps_256, Intrinsic::x86_avx_rsqrt_ps_256, false}};
 
 /// Writes instructions for what approximates a number, or each one of a vector.
-class Writer {
+class ApproximationWriter {
 public:
-  Writer(IRBuilderBase &builder, bool isReciprocal,
-         ArrayRef<VectorInstruction> instructions)
+  ApproximationWriter(IRBuilderBase &builder, bool isReciprocal,
+                      ArrayRef<VectorInstruction> instructions)
       : builder(builder), isReciprocal(isReciprocal),
         instructions(instructions) {}
   Value *write(Value *x);
@@ -58,7 +58,8 @@ private:
 
 } // namespace
 
-Value *Writer::apply(const VectorInstruction &instruction, Value *vector) {
+Value *ApproximationWriter::apply(const VectorInstruction &instruction,
+                                  Value *vector) {
   SmallVector<Value *> arguments{vector};
   if (instruction.isMasked) {
     arguments.push_back(Constant::getNullValue(vector->getType()));
@@ -69,7 +70,7 @@ Value *Writer::apply(const VectorInstruction &instruction, Value *vector) {
       isReciprocal ? instruction.reciprocal : instruction.rsqrt, arguments);
 }
 
-Value *Writer::writeScalar(Value *x) {
+Value *ApproximationWriter::writeScalar(Value *x) {
   const VectorInstruction &narrowest = instructions.front();
   Value *vector =
       PoisonValue::get(FixedVectorType::get(x->getType(), narrowest.lanes));
@@ -78,7 +79,7 @@ Value *Writer::writeScalar(Value *x) {
 }
 
 /// Cuts a vector into those that instructions take, and fills up the last one.
-Value *Writer::write(Value *x) {
+Value *ApproximationWriter::write(Value *x) {
   auto *type = dyn_cast<FixedVectorType>(x->getType());
   if (!type)
     return writeScalar(x);
@@ -172,7 +173,8 @@ PreservedAnalyses LowerArithmeticPass::run(Module &module,
             getInstructions(*machine, *builder.GetInsertBlock()->getParent());
         if (instructions.empty())
           return computeExactly(builder, kind, x);
-        Writer writer(builder, kind == Approximation::Reciprocal, instructions);
+        ApproximationWriter writer(builder, kind == Approximation::Reciprocal,
+                                   instructions);
         return refine(builder, kind, x, writer.write(x));
       });
   return PreservedAnalyses::none();

@@ -42,9 +42,9 @@ struct Group {
 };
 
 /// Writes what stands for a group of gathers.
-class Writer {
+class TransposeWriter {
 public:
-  explicit Writer(const Group &group)
+  explicit TransposeWriter(const Group &group)
       : group(group), type(cast<FixedVectorType>(group.first->getType())),
         lanes(type->getNumElements()) {}
   /// Whether words `begin` and the three behind it take fewer cycles so.
@@ -142,7 +142,7 @@ static SmallVector<Group> findGroups(BasicBlock &block) {
 
 /// A piece takes two shuffles for each word of eight lanes, and what joins the
 /// loads; lanes load the first and the last of its words, and so all four.
-bool Writer::paysAt(int64_t begin) const {
+bool TransposeWriter::paysAt(int64_t begin) const {
   constexpr int64_t last = (pieceWords - 1) * wordSize;
   if (!group.words.count(begin) || !group.words.count(begin + last))
     return false;
@@ -152,7 +152,8 @@ bool Writer::paysAt(int64_t begin) const {
   return fresh >= (lanes > 8 ? 2 : 3);
 }
 
-SmallVector<Value *> Writer::load(IRBuilder<> &builder, int64_t begin) {
+SmallVector<Value *> TransposeWriter::load(IRBuilder<> &builder,
+                                           int64_t begin) {
   if (pointers.empty()) {
     IRBuilder<> first(group.first);
     for (unsigned lane = 0; lane < lanes; ++lane)
@@ -180,7 +181,7 @@ SmallVector<Value *> Writer::load(IRBuilder<> &builder, int64_t begin) {
   return parts;
 }
 
-Value *Writer::join(IRBuilder<> &builder, ArrayRef<Value *> parts) {
+Value *TransposeWriter::join(IRBuilder<> &builder, ArrayRef<Value *> parts) {
   if (parts.size() == 1)
     return parts.front();
   Value *a = join(builder, parts.take_front(parts.size() / 2)),
@@ -209,7 +210,7 @@ transpose(IRBuilder<> &builder, const std::array<Value *, pieceWords> &rows) {
           mix(high01, high23, {0, 1, 4, 5}), mix(high01, high23, {2, 3, 6, 7})};
 }
 
-void Writer::write(int64_t begin) {
+void TransposeWriter::write(int64_t begin) {
   IntrinsicInst *earliest = nullptr;
   for (int64_t i = 0; i < pieceWords; ++i)
     if (auto found = group.words.find(begin + i * wordSize);
@@ -240,7 +241,7 @@ void Writer::write(int64_t begin) {
 /// Whether it has changed anything.
 static bool transposeGroup(const Group &group) {
   constexpr int64_t last = (pieceWords - 1) * wordSize;
-  Writer writer(group);
+  TransposeWriter writer(group);
   for (const auto &[word, gathers] : group.words) {
     if (writer.isDone(word))
       continue;
