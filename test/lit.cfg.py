@@ -125,7 +125,7 @@ ptx += ["-ffp-contract=off -Wno-unknown-cuda-version"]
 ptx += ["-include __clang_cuda_builtin_vars.h"]
 ptx += [f"'-D__{it}__=__attribute__(({it}))'" for it in ("global", "device", "host")]
 library_dir = os.path.join(config.piko_binary_root, "lib")
-link_host = [f"-L{library_dir}", f"-Wl,-rpath,{library_dir}", "-lpikort"]
+link_host = ["-fuse-ld=lld", f"-L{library_dir}", f"-Wl,-rpath,{library_dir}", "-lpikort"]
 link_host.append(config.openmp_runtime)
 other_cxx = "g++"
 if config.sanitize:

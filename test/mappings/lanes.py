@@ -3,7 +3,7 @@
 """What lanes are given of each kernel of the examples and of benchmarks/bodies.
 
   lanes.py [options]           fails where lanes.md says something else
-  lanes.py [options] --quick   looks at the first processor alone
+  lanes.py [options] --quick   looks at the examples and the first processor alone
   lanes.py [options] --write   writes lanes.md anew
 
 A row is a stage that has a kernel: what piko-map-lanes gives lanes, and, by
@@ -124,17 +124,19 @@ def list_pipes(pikoc, file):
                           capture_output=True, text=True).stdout.split()
 
 
-def cut_columns(text):
-    """The table with the first processor alone, without stages that have no lanes
-    there, of which some are in the table for another one's sake."""
+def cut(text):
+    """The table of the examples with the first processor alone, without stages that
+    have no lanes there, of which some are in the table for another one's sake."""
+    text = text.split("## benchmarks/")[0].rstrip()
     lines = [re.split(r"(?<!\\) \| ", line.removesuffix(" |"))[:4]
              if line.startswith("| ") else [line.replace("|---" * 6, "|---" * 4)]
              for line in text.splitlines()]
     return "\n".join(" | ".join(line) for line in lines if line[3:] != ["1"]) + "\n"
 
 
-def write_table(pikoc, jobs, count):
-    files = {file: cpus[:count] for pattern, cpus in FILES.items()
+def write_table(pikoc, jobs, is_quick):
+    patterns = dict([*FILES.items()][:1]) if is_quick else FILES
+    files = {file: cpus[:1] if is_quick else cpus for pattern, cpus in patterns.items()
              for file in sorted(ROOT.glob(pattern))}
     with ThreadPoolExecutor(jobs) as pool:
         pipes = dict(zip(files, pool.map(lambda file: list_pipes(pikoc, file), files)))
@@ -163,13 +165,13 @@ def main():
     choice.add_argument("--quick", action="store_true")
     choice.add_argument("--write", action="store_true")
     options = parser.parse_args()
-    text = write_table(options.pikoc, options.jobs, 1 if options.quick else len(CPUS))
+    text = write_table(options.pikoc, options.jobs, options.quick)
     if options.write:
         TABLE.write_text(text)
         return
     known = TABLE.read_text()
     if options.quick:
-        text, known = cut_columns(text), cut_columns(known)
+        text, known = cut(text), cut(known)
     if text != known:
         sys.stdout.writelines(difflib.unified_diff(
             known.splitlines(True), text.splitlines(True), "lanes.md", "now", n=0))
