@@ -203,7 +203,9 @@ void MergeGathersPass::mergePrimitives(KernelOp kernel) {
   });
   for (auto &[primitive, reads] : primitives) {
     FlatSymbolRefAttr record = reads.front().getRecordAttr();
-    if (areWorthPieces<LaneGetOp>(reads, lookupRecord(reads.front(), record))) {
+    // Those at consecutive positions may be read as rows, one field as well.
+    if (primitive.getDefiningOp<LaneItemsOp>() ||
+        areWorthPieces<LaneGetOp>(reads, lookupRecord(reads.front(), record))) {
       OpBuilder builder(reads.front());
       merge<LaneGetOp>(reads, primitive, record, builder);
     }

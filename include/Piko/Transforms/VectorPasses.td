@@ -275,7 +275,8 @@ def MergeGathers : Pass<"piko-merge-gathers", "::piko::PipelineOp"> {
     as well, where the last one is: words are transposed, and each lane stores
     pieces of up to 16 bytes, if all lanes write. Of 16 lanes, consecutive elements
     of up to eight words are loaded and stored as vectors of their words, which are
-    de-interleaved and interleaved.
+    de-interleaved and interleaved; so are primitives at consecutive positions
+    loaded, even one field alone, where bins have no order of their own.
 
     **Guarantees** the same reads: of state that the kernel changes, only words that
     nothing in between writes; and the same writes.

@@ -256,23 +256,70 @@ struct LaneGetFieldsLowering : Lowering<LaneGetFieldsOp> {
       rewriter.replaceOp(op, readRow(rewriter, op, *row, fields));
       return success();
     }
+    auto read = [&](OpBuilder &builder) {
+      return readEach(builder, op, addresses, mask, fields, areWords,
+                      record.getSize());
+    };
+    auto items = op.getAddresses().getDefiningOp<LaneItemsOp>();
+    if (items && areWords && items->getBlock() == op->getBlock() &&
+        !isa<VectorType>(items.getPosition().getType()) &&
+        (record.getSize() == wordSize ||
+         isRecordRow(laneCount, record.getSize(), fields.size())))
+      rewriter.replaceOp(op, readItems(rewriter, op, items, mask, fields,
+                                       record.getSize(), read));
+    else
+      rewriter.replaceOp(op, read(rewriter));
+    return success();
+  }
+
+  /// The fields of records that lie anywhere.
+  SmallVector<Value> readEach(OpBuilder &builder, LaneGetFieldsOp op,
+                              Value addresses, Value mask,
+                              ArrayRef<FieldAttr> fields, bool areWords,
+                              int64_t size) const {
+    Location loc = op.getLoc();
+    int64_t laneCount = cast<VectorType>(addresses.getType()).getNumElements();
     std::optional<int64_t> pair = areWords ? findPair(fields) : std::nullopt;
     SmallVector<int64_t> pieces;
     if (areWords && !pair && laneCount % pieceWords == 0)
-      pieces = planPieces(fields, record.getSize());
-    if (pieces.empty() && !pair) {
-      rewriter.replaceOp(op, RecordReader(rewriter, loc, addresses, mask,
-                                          fields, op.getResultTypes())
-                                 .gather());
-      return success();
-    }
-    RecordReader reader(
-        rewriter, loc,
-        chooseReadable(rewriter, loc, addresses, mask, record.getSize()), mask,
-        fields, op.getResultTypes());
-    rewriter.replaceOp(op, pair ? reader.readPair(*pair)
-                                : reader.readPieces(pieces));
-    return success();
+      pieces = planPieces(fields, size);
+    if (pieces.empty() && !pair)
+      return RecordReader(builder, loc, addresses, mask, fields,
+                          op.getResultTypes())
+          .gather();
+    RecordReader reader(builder, loc,
+                        chooseReadable(builder, loc, addresses, mask, size),
+                        mask, fields, op.getResultTypes());
+    return pair ? reader.readPair(*pair) : reader.readPieces(pieces);
+  }
+
+  /// Those of primitives at consecutive positions, which lie side by side where
+  /// the bins have no order of their own.
+  SmallVector<Value> readItems(
+      ConversionPatternRewriter &rewriter, LaneGetFieldsOp op,
+      LaneItemsOp items, Value mask, ArrayRef<FieldAttr> fields, int64_t size,
+      llvm::function_ref<SmallVector<Value>(OpBuilder &)> readEach) const {
+    Value bins = rewriter.getRemappedValue(items.getBins()),
+          position = rewriter.getRemappedValue(items.getPosition());
+    Value order = context.member(rewriter, bins, layout::order),
+          first = context.member(rewriter, bins, layout::items);
+    Value isOrdered = LLVM::ICmpOp::create(
+        rewriter, op.getLoc(), LLVM::ICmpPredicate::ne, order,
+        LLVM::ZeroOp::create(rewriter, op.getLoc(), pointer(rewriter)));
+    return llvm::to_vector_of<Value>(
+        scf::IfOp::create(
+            rewriter, op.getLoc(), isOrdered,
+            [&](OpBuilder &builder, Location loc) {
+              scf::YieldOp::create(builder, loc, readEach(builder));
+            },
+            [&](OpBuilder &builder, Location loc) {
+              RecordRow row(builder, loc,
+                            entry(builder, loc, first, position, size), size,
+                            mask, /*areMostlyAll=*/true);
+              scf::YieldOp::create(builder, loc,
+                                   readRow(builder, op, row, fields));
+            })
+            .getResults());
   }
 
   static SmallVector<Value> readRow(OpBuilder &builder, LaneGetFieldsOp op,
