@@ -98,9 +98,11 @@ endif()
 option(PIKO_UNITE
   "Compile sixteen files of a library as one; off, a changed file is compiled alone" OFF)
 
+set(PIKO_UNITE_FILES 16)
+
 function(piko_unite target)
   set_target_properties(${target} PROPERTIES
-    UNITY_BUILD ${PIKO_UNITE} UNITY_BUILD_BATCH_SIZE 16)
+    UNITY_BUILD ${PIKO_UNITE} UNITY_BUILD_BATCH_SIZE ${PIKO_UNITE_FILES})
 endfunction()
 
 # piko_unite_apart(<target> <source>...)
@@ -111,7 +113,7 @@ function(piko_unite_apart target)
   set_source_files_properties(${ARGN} PROPERTIES UNITY_GROUP apart)
   set(count 0)
   foreach(source ${sources})
-    math(EXPR batch "${count} / 16")
+    math(EXPR batch "${count} / ${PIKO_UNITE_FILES}")
     set_source_files_properties(${source} PROPERTIES UNITY_GROUP ${batch})
     math(EXPR count "${count} + 1")
   endforeach()

@@ -79,7 +79,23 @@ piko.pipeline @P rank 1 {
     }
     piko.storage.close_bins %bins : !piko.bins<@V>
   }
-  // So is a field of an element, whose record is as short as a line.
+  // Of primitives at consecutive positions one field alone is read so as well,
+  // because it may become a row.
+  // CHECK-LABEL: piko.kernel @alone
+  // CHECK:         %[[P:.*]] = piko.cpu.items
+  // CHECK-NEXT:    piko.cpu.get_fields %[[P]] ["n"] of @V
+  // CHECK-NOT:     piko.cpu.get %
+  piko.kernel @alone {
+    %c0 = arith.constant 0 : index
+    %bins = piko.storage.open_bins @a : !piko.bins<@V>
+    %is = vector.step : vector<16xindex>
+    %m = arith.constant dense<true> : vector<16xi1>
+    %p = piko.cpu.items %bins[%c0 : index] mask %m : !piko.bins<@V>, vector<16xi1>, vector<16xindex>
+    %n = piko.cpu.get %p "n" of @V mask %m : vector<16xindex>, vector<16xi1>, vector<16xi32>
+    piko.cpu.scatter %n, @out[%is : vector<16xindex>] "n" mask %m : vector<16xi1>, vector<16xi32>
+    piko.storage.close_bins %bins : !piko.bins<@V>
+  }
+  // So is a field of an element behind a condition, whose record is as short as a line.
   // CHECK-LABEL: piko.kernel @conditions
   // CHECK:         piko.cpu.get_fields %{{.*}} ["x", "y", "z"] of @V
   // CHECK-NOT:     piko.cpu.gather

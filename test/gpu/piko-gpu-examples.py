@@ -84,8 +84,8 @@ def main():
     parser.add_argument("--bin", default=str(ROOT / "build/bin"))
     parser.add_argument("--driver", help="in place of libcuda.so.1")
     parser.add_argument("--only", help="an example")
-    parser.add_argument("--turns", type=int, metavar="N",
-                        help="of N pipelines one runs on the one, and one on the other")
+    parser.add_argument("--half", action="store_true",
+                        help="every second pipeline of an example, in turn on one of both")
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     arguments = parser.parse_args()
     tools = pathlib.Path(arguments.bin).resolve()
@@ -110,20 +110,17 @@ def main():
     with tempfile.TemporaryDirectory() as folder, \
             concurrent.futures.ThreadPoolExecutor(arguments.jobs) as pool:
         write_torus(pathlib.Path(folder) / "torus.ply", rings=14, sides=8)
-        done, turn = [], 0
+        done = []
         for file, pipes in tasks:
             expected = None
-            for pipe in pipes:
-                targets = TARGETS
-                if arguments.turns:
-                    targets = TARGETS[turn:][:1]
-                    turn = (turn + 1) % arguments.turns
-                if targets and not expected and file.parent.name not in COMPARED:
-                    expected = pool.submit(
-                        lambda *what: draw(*what)[1], tools, folder, file, pipes[0], [])
-                if targets:
-                    done.append(pool.submit(
-                        check, tools, folder, file, pipe, expected, targets))
+            if file.parent.name not in COMPARED:
+                expected = pool.submit(
+                    lambda *what: draw(*what)[1], tools, folder, file, pipes[0], [])
+            for pipe in pipes[::2] if arguments.half else pipes:
+                turn = len(done) % len(TARGETS)
+                targets = [TARGETS[turn]] if arguments.half else TARGETS
+                done.append(pool.submit(
+                    check, tools, folder, file, pipe, expected, targets))
         for future in concurrent.futures.as_completed(done):
             try:
                 future.result()

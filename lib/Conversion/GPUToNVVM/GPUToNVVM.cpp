@@ -37,7 +37,7 @@ struct ConvertGPUToExactNVVMPass
 };
 } // namespace
 
-static bool isInShared(Value pointer) {
+static bool isInSharedMemory(Value pointer) {
   return cast<LLVM::LLVMPointerType>(pointer.getType()).getAddressSpace() ==
          unsigned(NVVM::NVVMMemorySpace::Shared);
 }
@@ -47,13 +47,13 @@ static bool isInShared(Value pointer) {
 /// ptxas, how many registers that is for.
 static void finishBlockMemory(Operation *op) {
   if (auto atomic = dyn_cast<LLVM::AtomicRMWOp>(op);
-      atomic && isInShared(atomic.getPtr())) {
+      atomic && isInSharedMemory(atomic.getPtr())) {
     // Barriers order what a block's threads see; an atomic has no need to.
     atomic.setOrdering(LLVM::AtomicOrdering::monotonic);
     atomic.setSyncscope("block");
   }
   auto load = dyn_cast<LLVM::LoadOp>(op);
-  if (!load || !load.getNontemporal() || !isInShared(load.getAddr()))
+  if (!load || !load.getNontemporal() || !isInSharedMemory(load.getAddr()))
     return;
   load.setNontemporal(false);
   load.setVolatile_(true);

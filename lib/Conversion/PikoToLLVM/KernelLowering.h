@@ -32,6 +32,13 @@ template <typename OpT> struct Lowering : ContextPattern<OpT> {
                       createOffset(builder, loc, base, member.offset + behind),
                       context.tags.input());
   }
+  /// Whether positions lead to records by numbers.
+  static mlir::Value isOrdered(mlir::OpBuilder &builder, mlir::Location loc,
+                               mlir::Value order) {
+    return mlir::LLVM::ICmpOp::create(
+        builder, loc, mlir::LLVM::ICmpPredicate::ne, order,
+        mlir::LLVM::ZeroOp::create(builder, loc, order.getType()));
+  }
   /// The address of entry `index` of an array.
   static mlir::Value entry(mlir::OpBuilder &builder, mlir::Location loc,
                            mlir::Value array, mlir::Value index, int64_t size) {

@@ -223,13 +223,6 @@ struct CallBinLowering : Lowering<CallBinOp> {
   }
 };
 
-/// Whether positions lead to records by numbers.
-static Value isOrdered(OpBuilder &builder, Location loc, Value order) {
-  return LLVM::ICmpOp::create(
-      builder, loc, LLVM::ICmpPredicate::ne, order,
-      LLVM::ZeroOp::create(builder, loc, order.getType()));
-}
-
 /// The number of the record at a position.
 static Value readOrder(OpBuilder &builder, Location loc,
                        LoweringContext &context, Value order, Value position) {

@@ -273,13 +273,10 @@ struct LaneItemsLowering : Lowering<LaneItemsOp> {
         VectorType::get(cast<VectorType>(op.getResult().getType()).getShape(),
                         rewriter.getI64Type());
     Value order = context.member(rewriter, bins, layout::order);
-    Value isOrdered = LLVM::ICmpOp::create(
-        rewriter, loc, LLVM::ICmpPredicate::ne, order,
-        LLVM::ZeroOp::create(rewriter, loc, pointer(rewriter)));
     RecordOp record = context.record(op.getBins().getType().getRecord());
     Value items = context.member(rewriter, bins, layout::items);
     auto numbers = scf::IfOp::create(
-        rewriter, loc, isOrdered,
+        rewriter, loc, isOrdered(rewriter, loc, order),
         [&](OpBuilder &builder, Location loc) {
           scf::YieldOp::create(builder, loc,
                                readOrder({builder, loc}, order, position,

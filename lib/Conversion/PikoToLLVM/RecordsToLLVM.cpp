@@ -303,12 +303,9 @@ struct LaneGetFieldsLowering : Lowering<LaneGetFieldsOp> {
           position = rewriter.getRemappedValue(items.getPosition());
     Value order = context.member(rewriter, bins, layout::order),
           first = context.member(rewriter, bins, layout::items);
-    Value isOrdered = LLVM::ICmpOp::create(
-        rewriter, op.getLoc(), LLVM::ICmpPredicate::ne, order,
-        LLVM::ZeroOp::create(rewriter, op.getLoc(), pointer(rewriter)));
     return llvm::to_vector_of<Value>(
         scf::IfOp::create(
-            rewriter, op.getLoc(), isOrdered,
+            rewriter, op.getLoc(), isOrdered(rewriter, op.getLoc(), order),
             [&](OpBuilder &builder, Location loc) {
               scf::YieldOp::create(builder, loc, readEach(builder));
             },
