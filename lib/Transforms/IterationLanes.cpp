@@ -176,7 +176,7 @@ bool IterationLanes::readsFixed(Operation *op) const {
 }
 
 /// What is cast to an integer of another width.
-static Value stripCasts(Value value) {
+static Value stripSignedCasts(Value value) {
   while (isa_and_nonnull<arith::IndexCastOp, arith::ExtSIOp>(
       value.getDefiningOp()))
     value = value.getDefiningOp()->getOperand(0);
@@ -184,12 +184,12 @@ static Value stripCasts(Value value) {
 }
 
 bool IterationLanes::isLinear(Value value) const {
-  return isSum(stripCasts(value));
+  return isSum(stripSignedCasts(value));
 }
 
 /// Sums are of one width: a narrower one may wrap, and go on from elsewhere.
 bool IterationLanes::isSum(Value value) const {
-  if (stripCasts(value) == loop.getInductionVar())
+  if (stripSignedCasts(value) == loop.getInductionVar())
     return true;
   Operation *op = value.getDefiningOp();
   if (isa_and_nonnull<arith::SubIOp>(op))

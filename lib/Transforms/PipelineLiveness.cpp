@@ -33,7 +33,7 @@ static bool hasEffect(Operation *op) {
   return !wouldOpBeTriviallyDead(op);
 }
 
-static Value stripCasts(Value value) {
+static Value stripIndexCasts(Value value) {
   while (auto cast = value.getDefiningOp<arith::IndexCastOp>())
     value = cast.getIn();
   return value;
@@ -44,7 +44,7 @@ static Value stripCasts(Value value) {
 static bool tellsInside(arith::CmpIOp test, Value bin, bool truth) {
   using P = arith::CmpIPredicate;
   APInt constant;
-  if (stripCasts(test.getLhs()) != bin ||
+  if (stripIndexCasts(test.getLhs()) != bin ||
       !matchPattern(test.getRhs(), m_ConstantInt(&constant)))
     return false;
   P predicate =
@@ -59,7 +59,7 @@ static bool tellsInside(arith::CmpIOp test, Value bin, bool truth) {
 static bool isSurelyInside(AssignToOp assign) {
   if (matchPattern(assign.getBin(), m_Zero()))
     return true;
-  Value bin = stripCasts(assign.getBin());
+  Value bin = stripIndexCasts(assign.getBin());
   if (!bin.getDefiningOp<BinAtOp>())
     return false;
   for (Operation *op = assign; auto test = op->getParentOfType<scf::IfOp>();

@@ -13,7 +13,7 @@
 using namespace mlir;
 using namespace piko;
 
-Value piko::stripCasts(Value value) {
+Value piko::stripWidening(Value value) {
   auto isNarrow = [](Type type) {
     return type.isInteger() && type.getIntOrFloatBitWidth() < 32;
   };
@@ -257,7 +257,7 @@ bool PixelLoops::isOwnPixel(ValueRange coordinates) const {
   if (coordinates.size() != loops.size())
     return false;
   for (auto [coordinate, loop] : llvm::zip(coordinates, loops))
-    if (stripCasts(coordinate) != loop.counter)
+    if (stripWidening(coordinate) != loop.counter)
       return false;
   return true;
 }

@@ -30,7 +30,7 @@ struct CountedLoop {
 };
 
 /// The number that is made one of at least 32 bits by sign.
-mlir::Value stripCasts(mlir::Value value);
+mlir::Value stripWidening(mlir::Value value);
 /// The coordinates of an access to an image; none of any other operation.
 mlir::ValueRange getPixel(mlir::Operation *op);
 

@@ -39,10 +39,10 @@ private:
 
 /// What is said about a bin. The schedule's own directives hold where its body
 /// says nothing.
-struct Directives {
+struct DirectiveCells {
   Cell kind, tileSplit, batch, everyBin;
 
-  Directives(OpBuilder &builder, Location loc, ScheduleOp schedule)
+  DirectiveCells(OpBuilder &builder, Location loc, ScheduleOp schedule)
       : kind(builder, loc,
              builder.getI32IntegerAttr(int32_t(schedule.getKind()))),
         tileSplit(
@@ -112,7 +112,7 @@ void piko::formScheduleKernel(ScheduleOp schedule) {
   launch(kernel, stage);
   OpBuilder builder = OpBuilder::atBlockEnd(kernel.getBodyBlock());
   Value bins = BeginScheduleOp::create(builder, loc, stage.getSymName());
-  Directives directives(builder, loc, schedule);
+  DirectiveCells directives(builder, loc, schedule);
   Value zero = arith::ConstantIndexOp::create(builder, loc, 0);
   Value one = arith::ConstantIndexOp::create(builder, loc, 1);
   auto loop = scf::ForOp::create(builder, loc, zero, bins, one);

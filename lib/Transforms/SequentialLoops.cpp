@@ -106,7 +106,7 @@ static bool isShort(scf::ForOp loop, int64_t laneCount) {
 }
 
 /// What is cast to another width or kind.
-static Value stripCasts(Value value) {
+static Value stripAllCasts(Value value) {
   while (Operation *op = value.getDefiningOp()) {
     if (!isa<CastOpInterface>(op))
       break;
@@ -124,7 +124,7 @@ static bool computes(Operation *op) {
     return false;
   auto isRead = [](Value operand) {
     return isa_and_nonnull<LoadOp, memref::LoadOp>(
-        stripCasts(operand).getDefiningOp());
+        stripAllCasts(operand).getDefiningOp());
   };
   return op->getResult(0).getType().isFloat() ||
          llvm::any_of(op->getOperands(), isRead);

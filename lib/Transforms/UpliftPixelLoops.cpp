@@ -188,7 +188,7 @@ static void dropTest(scf::IfOp guard, ParallelPixelsOp pixels) {
   auto compare = guard.getCondition().getDefiningOp<arith::CmpIOp>();
   if (!compare || compare.getPredicate() != arith::CmpIPredicate::eq)
     return;
-  Value a = stripCasts(compare.getLhs()), b = stripCasts(compare.getRhs());
+  Value a = stripWidening(compare.getLhs()), b = stripWidening(compare.getRhs());
   if (a.getDefiningOp<BinOp>())
     std::swap(a, b);
   auto cell = a.getDefiningOp<BinAtOp>();
@@ -249,7 +249,7 @@ void UpliftPixelLoopsPass::reportOthers(ProcessOp process, int64_t rank) {
   process.walk([&](Operation *op) {
     llvm::SetVector<Operation *> owners;
     for (Value coordinate : getPixel(op))
-      if (auto argument = dyn_cast<BlockArgument>(stripCasts(coordinate)))
+      if (auto argument = dyn_cast<BlockArgument>(stripWidening(coordinate)))
         if (Operation *loop = argument.getOwner()->getParentOp();
             isa<scf::WhileOp, scf::ForOp>(loop))
           owners.insert(loop);
