@@ -166,7 +166,7 @@ void piko::addScalarSequence(OpPassManager &passes,
     addCleanUp(passes);
   }
   if (options.has("form-tiles"))
-    passes.nest<PipelineOp>().addPass(createFormTiles());
+    passes.nest<PipelineOp>().addPass(createFormTiles({.loads = true}));
   // The widest vectors that there are: others are made of two or four.
   ::addUnitSequence(passes, options.has("vectorize") ? 16 : 0);
   if (options.has("reduce-updates")) {

@@ -65,6 +65,8 @@ public:
   /// Why none of the kernel's images can have tiles.
   std::optional<Reason> whyNot();
   std::optional<Reason> whyNot(ImageOp image);
+  /// Why another kernel may have written the pixels of an image before.
+  std::optional<Reason> whyWritten(ImageOp image);
   /// Why the tiles of an image cannot begin with its clear value.
   std::optional<Reason> whyNotClear(ImageOp image);
   int64_t getBytes(ImageOp image);
@@ -156,7 +158,7 @@ bool TileFormer::isInBin(Operation *access) {
   return isa<LoadOp, StoreOp>(access) && access->hasAttr(marks::inside);
 }
 
-std::optional<Reason> TileFormer::whyNot(ImageOp image) {
+std::optional<Reason> TileFormer::whyWritten(ImageOp image) {
   StringAttr name = image.getSymNameAttr();
   for (auto other : pipeline.getOps<KernelOp>())
     for (Operation *access : accesses.get(other, name))
@@ -165,6 +167,11 @@ std::optional<Reason> TileFormer::whyNot(ImageOp image) {
             access->getLoc(),
             "another kernel writes it, too; let one stage do that, or "
             "stages with the same bins that become one kernel"};
+  return std::nullopt;
+}
+
+std::optional<Reason> TileFormer::whyNot(ImageOp image) {
+  StringAttr name = image.getSymNameAttr();
   for (Operation *access : accesses.get(kernel, name)) {
     if (isa<AtomicOp>(access))
       return Reason{access->getLoc(),
@@ -265,9 +272,14 @@ static void formTiles(TileFormer former, ArrayRef<ImageOp> images,
   std::string who = "stage " + quote(getCppName(former.getStage()));
   for (ImageOp image : images) {
     std::string name = quote(image.getSymName());
-    std::optional<Reason> reason = general ? general : former.whyNot(image);
-    std::optional<Reason> dirty;
-    if (!reason && (dirty = former.whyNotClear(image)) && !loads)
+    std::optional<Reason> reason = general, dirty = former.whyWritten(image);
+    if (!reason && !loads)
+      reason = dirty;
+    if (!reason)
+      reason = former.whyNot(image);
+    if (!dirty)
+      dirty = former.whyNotClear(image);
+    if (!reason && !loads)
       reason = dirty;
     int64_t more = reason ? 0 : former.getBytes(image);
     if (!reason && bytes + more > budget)

@@ -93,6 +93,15 @@ struct ScratchStack {
   int64_t used = 0;  ///< In it.
 };
 
+/// A copy of a bin's pixels, which a kernel changes in place of the image.
+struct PixelTile : pikoir_tile {
+  Array<uint8_t> memory;
+  int32_t image = -1;
+  bool isCopy = false;
+  int64_t first = 0;           ///< Bytes from the image's pixel 0 to the bin's.
+  int64_t rows = 0, bytes = 0; ///< Of a row.
+};
+
 /// A writer and its logs: used by one thread at a time, for many units. No two
 /// share a line of the cache.
 struct alignas(64) Lane : pikoir_writer {
@@ -110,6 +119,7 @@ struct alignas(64) Lane : pikoir_writer {
   /// of the next slot, and behind the unit's last.
   uint32_t *slotEnd = nullptr, *slotLimit = nullptr;
   ScratchStack scratch;
+  std::vector<PixelTile> tiles; ///< Of the images of which it has had any.
   std::unique_ptr<Deferred> deferred;   ///< If there were any.
   std::vector<pikoir_private> privates; ///< For each reduction of the stage.
   AutotunerThread tuning;               ///< Of the open unit.

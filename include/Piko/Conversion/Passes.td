@@ -19,8 +19,10 @@ def ConvertPikoToSCF : Pass<"convert-piko-to-scf", "::piko::PipelineOp"> {
     read gives 0. Reads of a list become reads of positions, behind a test
     unless the index is that of a loop over the list. A `piko.tile` stays where
     it is in the image: in the launch that clears it, its rows get the clear value
-    where the bin begins. With `private-tiles` it becomes arrays of the thread's,
-    which are filled there and written to the image where the bin ends.
+    where the bin begins; the runtime may copy it where rows of the image compete
+    for the cache (`piko.cpu.open_tile`). With `private-tiles` it becomes arrays of
+    the thread's, which are filled there and written to the image where the bin
+    ends.
 
     **Guarantees** that no kernel touches memory outside a buffer, an image, or,
     in an update, the bin.

@@ -218,7 +218,8 @@ def FormTiles : Pass<"piko-form-tiles", "::piko::PipelineOp"> {
     the kernel that is written to the image once, at the bin's end. Where nothing
     reads the image before, the tile begins with the clear value, and so does what
     lies in bins without primitives; then the program does not clear the image
-    any more.
+    any more. With `loads`, which the CPU has, other tiles begin with what is in the
+    image, which other kernels may write, too.
 
     **Guarantees** that images are the same when the run ends.
 

@@ -27,11 +27,11 @@ Value piko::computeLaneOffset(OpBuilder &builder, Location loc,
     index = arith::IndexCastOp::create(
         builder, loc,
         isVector(index) ? Type(words) : Type(builder.getI64Type()), index);
-    offset = offset
-                 ? combine(arith::AddIOp(),
-                           combine(arith::MulIOp(), offset, view.extents[dim]),
-                           index)
-                 : index;
+    offset =
+        offset ? combine(arith::AddIOp(),
+                         combine(arith::MulIOp(), offset, view.getFactor(dim)),
+                         index)
+               : index;
   }
   return offset
              ? combine(arith::MulIOp(), offset, createI64(builder, loc, size))

@@ -190,6 +190,7 @@ StateView &LoweringContext::view(OpBuilder &builder, Operation *op,
     it->second.extents.push_back(LLVM::LoadOp::create(
         builder, loc, builder.getI64Type(),
         createOffset(builder, loc, view, extent + 8 * dim)));
+  it->second.pitch = it->second.extents.front();
   return it->second;
 }
 
@@ -208,6 +209,21 @@ void LoweringContext::setData(OpBuilder &builder, Operation *op,
   StateView other = view(builder, op, like);
   other.data = data;
   views[op->getParentOfType<func::FuncOp>()][image] = other;
+}
+
+const StateView &LoweringContext::whole(OpBuilder &builder, Operation *op,
+                                        StringRef image) {
+  const StateView &first = view(builder, op, image);
+  return wholes[op->getParentOfType<func::FuncOp>()]
+      .try_emplace(image, first)
+      .first->second;
+}
+
+void LoweringContext::setTile(Operation *op, StringRef image, Value data,
+                              Value pitch) {
+  StateView &view = views[op->getParentOfType<func::FuncOp>()][image];
+  view.data = data;
+  view.pitch = pitch;
 }
 
 Value LoweringContext::query(OpBuilder &builder, Operation *op,

@@ -59,10 +59,17 @@ private:
 };
 
 /// Data and extent of a piece of state, loaded when a kernel starts; of private
-/// images the data is loaded when a unit starts.
+/// images the data is loaded when a unit starts, and of tiles data and pitch
+/// when a bin does.
 struct StateView {
   mlir::Value data;
   llvm::SmallVector<mlir::Value> extents; // i64
+  mlir::Value pitch; ///< Elements from one row to the next: i64.
+
+  /// Elements from one index of a dimension to the next one.
+  mlir::Value getFactor(size_t dim) const {
+    return dim == 0 ? pitch : extents[dim];
+  }
 };
 
 /// What the threads of a grid leave their emissions in.
@@ -106,6 +113,12 @@ public:
   /// other data; an internal one is as large as `like`.
   void setData(mlir::OpBuilder &builder, mlir::Operation *op,
                mlir::StringRef image, mlir::StringRef like, mlir::Value data);
+  /// Lets it go to a bin's pixels, with another pitch.
+  void setTile(mlir::Operation *op, mlir::StringRef image, mlir::Value data,
+               mlir::Value pitch);
+  /// The image itself, of which bins in front may have had tiles.
+  const StateView &whole(mlir::OpBuilder &builder, mlir::Operation *op,
+                         mlir::StringRef image);
   /// Entry `dim` (i64) of what one of the runtime's queries (the domain, or the
   /// grid of a stage) points to.
   mlir::Value query(mlir::OpBuilder &builder, mlir::Operation *op,
@@ -154,7 +167,7 @@ private:
   llvm::DenseMap<mlir::Operation *, Grid> grids;     // by launch
   llvm::DenseMap<mlir::Operation *, int32_t> places; // by function
   /// By function and name.
-  llvm::DenseMap<mlir::Operation *, llvm::StringMap<StateView>> views;
+  llvm::DenseMap<mlir::Operation *, llvm::StringMap<StateView>> views, wholes;
   llvm::DenseMap<mlir::Operation *, llvm::StringMap<mlir::Value>> queries;
   llvm::DenseMap<std::tuple<mlir::Value, mlir::Operation *, int64_t>,
                  mlir::Value>
@@ -260,6 +273,9 @@ void populateRowReductionsToLLVMPatterns(const mlir::TypeConverter &converter,
 void populateReductionsToLLVMPatterns(const mlir::TypeConverter &converter,
                                       mlir::RewritePatternSet &patterns,
                                       LoweringContext &context);
+void populateTilesToLLVMPatterns(const mlir::TypeConverter &converter,
+                                 mlir::RewritePatternSet &patterns,
+                                 LoweringContext &context);
 void populateSelectionsToLLVMPatterns(const mlir::TypeConverter &converter,
                                       mlir::RewritePatternSet &patterns,
                                       LoweringContext &context);

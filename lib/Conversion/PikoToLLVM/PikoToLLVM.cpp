@@ -212,6 +212,7 @@ LogicalResult ConvertPikoToLLVMPass::convert(PipelineOp pipeline,
   populateRowReductionsToLLVMPatterns(converter, patterns, context);
   populateReductionsToLLVMPatterns(converter, patterns, context);
   populateSelectionsToLLVMPatterns(converter, patterns, context);
+  populateTilesToLLVMPatterns(converter, patterns, context);
   populateGridToLLVMPatterns(converter, patterns, context);
   FrozenRewritePatternSet frozen(std::move(patterns));
   for (func::FuncOp function : functions)

@@ -19,11 +19,12 @@ static Value createElementNumber(OpBuilder &builder, Location loc,
   for (int64_t dim = indices.size() - 1; dim >= 0; --dim) {
     Value at = toI64(builder, loc, indices[dim]);
     index =
-        index ? arith::AddIOp::create(builder, loc,
-                                      arith::MulIOp::create(builder, loc, index,
-                                                            view.extents[dim]),
-                                      at)
-              : at;
+        index
+            ? arith::AddIOp::create(builder, loc,
+                                    arith::MulIOp::create(builder, loc, index,
+                                                          view.getFactor(dim)),
+                                    at)
+            : at;
   }
   return index;
 }

@@ -32,6 +32,7 @@ public:
   void leaveInImage();
 
 private:
+  void mayCopy();
   ArrayRef<int64_t> getExtents() {
     return tile.getTile().getType().getExtents();
   }
@@ -278,7 +279,51 @@ void TileLowering::makePrivate() {
   tile.erase();
 }
 
+/// Few rows are in the cache together, however far apart they are.
+static bool mayCompete(ArrayRef<int64_t> extents) {
+  constexpr int64_t few = 8;
+  return extents.size() == 2 && extents[1] > few;
+}
+
+/// The primitives of the bin at whose start an operation stands.
+static CellRangeOp findRange(Operation *op) {
+  for (; op && !isa<scf::ForallOp>(op); op = op->getParentOp())
+    for (auto range : op->getBlock()->getOps<CellRangeOp>())
+      if (range->isBeforeInBlock(op))
+        return range;
+  return {};
+}
+
+/// Lets the runtime copy the pixels of a bin that has many primitives.
+void TileLowering::mayCopy() {
+  auto units = tile->getParentOfType<scf::ForallOp>();
+  CellRangeOp range = findRange(tile);
+  if (!mayCompete(getExtents()) || !range)
+    return;
+  auto writers = units.getBody()->getOps<OpenWriterOp>();
+  if (writers.empty())
+    return;
+  Value writer = *writers.begin();
+  OpBuilder::InsertionGuard guard(builder);
+  Value count =
+      arith::SubIOp::create(builder, loc, range.getEnd(), range.getBegin());
+  Value clears =
+      tile.getClear()
+          ? ClearsOp::create(builder, loc, range.getBins()).getResult()
+          : arith::ConstantOp::create(builder, loc, builder.getBoolAttr(false))
+                .getResult();
+  Value copied =
+      OpenTileOp::create(builder, loc, builder.getI1Type(), tile.getImageAttr(),
+                         tile.getBin(), writer, count, clears);
+  for (Operation *user : tile->getUsers())
+    if (isa<WriteTileOp>(user)) {
+      builder.setInsertionPoint(user);
+      CloseTileOp::create(builder, loc, tile.getImageAttr(), writer, copied);
+    }
+}
+
 void TileLowering::leaveInImage() {
+  mayCopy();
   if (tile.getClear()) {
     findBin();
     createChoice(/*withElse=*/false);

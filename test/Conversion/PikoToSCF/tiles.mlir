@@ -2,7 +2,7 @@
 //
 // A tile stays in the image, and its rows are cleared when the bin begins; or it
 // is an array for each type of numbers.
-// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-form-units,convert-piko-to-scf),canonicalize,cse)' %s | FileCheck %s
+// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-form-units,convert-piko-to-scf),canonicalize,cse)' %s | FileCheck %s --check-prefixes=CHECK,COPY
 // RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-form-units,convert-piko-to-scf{private-tiles=true}),canonicalize,cse)' %s | FileCheck %s --check-prefix=PRIVATE
 // RUN: piko-opt --piko-to-cpu %s | FileCheck %s --check-prefix=LLVM
 
@@ -71,6 +71,56 @@ piko.pipeline @P rank 2 {
         }
       }
       piko.write_tile %t to @image in %bin : !piko.tile<@Pixel, [8, 4]>
+    }
+  }
+  piko.program {
+    %in = piko.feed 0 : !piko.edge<@F>
+    %bins = piko.join @a(concatenate %in) : (!piko.edge<@F>) -> !piko.bins<@F>
+    piko.launch @k(%bins) clears @image : (!piko.bins<@F>) -> ()
+  }
+}
+
+// Of a tile with more than eight rows the runtime may make a copy, which begins
+// with what is in the image, or with the clear value in the launch that clears.
+// COPY-LABEL:  piko.pipeline @Copies
+// COPY:          %[[W:.*]] = piko.cpu.open_writer
+// COPY:          %[[BEGIN:.*]], %[[END:.*]] = piko.storage.cell_range
+// COPY:          scf.if
+// COPY-DAG:        %[[COUNT:.*]] = arith.subi %[[END]], %[[BEGIN]]
+// COPY-DAG:        %[[CLEARS:.*]] = piko.storage.clears
+// COPY:            %[[FIRST:.*]] = piko.cpu.open_tile @image[%{{.*}}] of %[[W]] for %[[COUNT]] clears %[[CLEARS]]
+// COPY:            scf.if %[[CLEARS]] {
+// COPY:              piko.store
+// COPY:            %[[SECOND:.*]] = piko.cpu.open_tile @kept[%{{.*}}] of %[[W]] for %[[COUNT]] clears %false
+// COPY:            scf.for
+// COPY:            piko.cpu.close_tile @image of %[[W]] if %[[FIRST]]
+// COPY:            piko.cpu.close_tile @kept of %[[W]] if %[[SECOND]]
+piko.pipeline @Copies rank 2 {
+  piko.image @image : @Pixel rank 2 clear [1.0 : f32, 2 : i32, 3 : i32]
+  piko.image @kept : @F rank 2
+  piko.source @a
+  piko.stage @a bins [8, 16] threads 1 ordered : @F -> [] {}
+  piko.kernel @k {
+    piko.bins of @a {
+    ^bb0(%bin: index):
+      %t = piko.tile @image clear in %bin : !piko.tile<@Pixel, [8, 16]>
+      %s = piko.tile @kept in %bin : !piko.tile<@F, [8, 16]>
+      piko.items of @a {
+      ^bb0(%f: !piko.prim<@F>):
+        %x = piko.get %f "x" : !piko.prim<@F> -> i32
+        %y = piko.get %f "y" : !piko.prim<@F> -> i32
+        piko.update @image[%x, %y : i32, i32] in %bin tile(%t : !piko.tile<@Pixel, [8, 16]>) {
+        ^bb0(%z: f32, %n: i32, %m: i32):
+          %twice = arith.addf %z, %z : f32
+          piko.yield [%twice, %n, %m : f32, i32, i32]
+        }
+        piko.update @kept[%x, %y : i32, i32] in %bin tile(%s : !piko.tile<@F, [8, 16]>) {
+        ^bb0(%n: i32, %m: i32):
+          piko.yield [%x, %m : i32, i32]
+        }
+      }
+      piko.write_tile %t to @image in %bin : !piko.tile<@Pixel, [8, 16]>
+      piko.write_tile %s to @kept in %bin : !piko.tile<@F, [8, 16]>
     }
   }
   piko.program {

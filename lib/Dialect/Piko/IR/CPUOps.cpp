@@ -233,6 +233,30 @@ LogicalResult PrivateCopyOp::verifySymbolUses(SymbolTableCollection &) {
   return success();
 }
 
+static LogicalResult verifyImage(Operation *op, FlatSymbolRefAttr image) {
+  if (!lookupInPipeline<ImageOp>(op, image))
+    return op->emitOpError("expected an image, but got ")
+           << image << ", which is none";
+  return success();
+}
+
+LogicalResult CloseTileOp::verifySymbolUses(SymbolTableCollection &) {
+  return verifyImage(*this, getImageAttr());
+}
+
+LogicalResult OpenTileOp::verifySymbolUses(SymbolTableCollection &) {
+  if (failed(verifyImage(*this, getImageAttr())))
+    return failure();
+  bool isClosed = llvm::any_of(
+      (*this)->getBlock()->getOps<CloseTileOp>(), [&](CloseTileOp close) {
+        return close.getImageAttr() == getImageAttr() &&
+               (*this)->isBeforeInBlock(close);
+      });
+  if (!isClosed)
+    return emitOpError("expected it to be closed in its block");
+  return success();
+}
+
 SmallVector<StringAttr> PrivateImagesOp::getImages() {
   SmallVector<StringAttr> images{getImageAttr().getAttr()};
   for (auto image : getCarried().getAsRange<FlatSymbolRefAttr>())

@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Copies of a bin's pixels: the same code changes them and the image, as it
+// finds either by an address and a pitch.
+
+#include "KernelLowering.h"
+
+#include "mlir/Dialect/SCF/IR/SCF.h"
+
+using namespace mlir;
+using namespace piko;
+
+namespace {
+
+struct OpenTileLowering : Lowering<OpenTileOp> {
+  using Lowering::Lowering;
+  LogicalResult
+  matchAndRewrite(OpenTileOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    Location loc = op.getLoc();
+    FailureOr<StringAttr> stage = context.kernelStage(op);
+    if (failed(stage))
+      return failure();
+    const PipelineNumbers &numbers = context.numbers(op);
+    Value image = createI32(rewriter, loc,
+                            numbers.states.lookup(op.getImageAttr().getAttr()));
+    StateView whole = context.whole(rewriter, op, op.getImage());
+    Value pays = arith::CmpIOp::create(
+        rewriter, loc, arith::CmpIPredicate::sge,
+        toI64(rewriter, loc, adaptor.getCount()),
+        createLeast(rewriter, op, numbers.stages.lookup(*stage)));
+    auto choice = scf::IfOp::create(
+        rewriter, loc, TypeRange{pointer(rewriter), rewriter.getI64Type()},
+        pays, /*withElseRegion=*/true);
+    {
+      OpBuilder::InsertionGuard guard(rewriter);
+      rewriter.setInsertionPointToStart(choice.thenBlock());
+      Value clears = arith::ExtUIOp::create(
+          rewriter, loc, rewriter.getI32Type(), adaptor.getClears());
+      Value tile =
+          context
+              .call(rewriter, loc, PIKO_RUNTIME_FUNCTION(pikoir_open_tile),
+                    {adaptor.getWriter(), image,
+                     toI64(rewriter, loc, adaptor.getBin()), clears})
+              .getResult();
+      Value data =
+          load(rewriter, loc, tile, PIKO_RUNTIME_MEMBER(pikoir_tile, data));
+      Value pitch =
+          load(rewriter, loc, tile, PIKO_RUNTIME_MEMBER(pikoir_tile, pitch));
+      scf::YieldOp::create(rewriter, loc, ValueRange{data, pitch});
+      rewriter.setInsertionPointToStart(choice.elseBlock());
+      scf::YieldOp::create(rewriter, loc, ValueRange{whole.data, whole.pitch});
+    }
+    context.setTile(op, op.getImage(), choice.getResult(0),
+                    choice.getResult(1));
+    rewriter.replaceOp(op, pays);
+    return success();
+  }
+
+private:
+  /// Asked once, where the kernel begins.
+  Value createLeast(OpBuilder &builder, OpenTileOp op, int32_t stage) const {
+    auto function = op->getParentOfType<func::FuncOp>();
+    OpBuilder::InsertionGuard guard(builder);
+    builder.setInsertionPointToStart(&function.getBody().front());
+    Location loc = op.getLoc();
+    int32_t image =
+        context.numbers(op).states.lookup(op.getImageAttr().getAttr());
+    return context
+        .call(builder, loc, PIKO_RUNTIME_FUNCTION(pikoir_tile_least),
+              {context.frame(op), createI32(builder, loc, stage),
+               createI32(builder, loc, image)})
+        .getResult();
+  }
+};
+
+struct CloseTileLowering : Lowering<CloseTileOp> {
+  using Lowering::Lowering;
+  LogicalResult
+  matchAndRewrite(CloseTileOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    Location loc = op.getLoc();
+    int32_t image =
+        context.numbers(op).states.lookup(op.getImageAttr().getAttr());
+    auto choice = scf::IfOp::create(rewriter, loc, adaptor.getCopied());
+    OpBuilder::InsertionGuard guard(rewriter);
+    rewriter.setInsertionPointToStart(choice.thenBlock());
+    context.call(rewriter, loc, PIKO_RUNTIME_FUNCTION(pikoir_close_tile),
+                 {adaptor.getWriter(), createI32(rewriter, loc, image)});
+    rewriter.eraseOp(op);
+    return success();
+  }
+};
+
+} // namespace
+
+void piko::populateTilesToLLVMPatterns(const TypeConverter &converter,
+                                       RewritePatternSet &patterns,
+                                       LoweringContext &context) {
+  patterns.add<OpenTileLowering, CloseTileLowering>(
+      converter, patterns.getContext(), context);
+}
