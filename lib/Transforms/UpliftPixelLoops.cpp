@@ -188,7 +188,8 @@ static void dropTest(scf::IfOp guard, ParallelPixelsOp pixels) {
   auto compare = guard.getCondition().getDefiningOp<arith::CmpIOp>();
   if (!compare || compare.getPredicate() != arith::CmpIPredicate::eq)
     return;
-  Value a = stripWidening(compare.getLhs()), b = stripWidening(compare.getRhs());
+  Value a = stripWidening(compare.getLhs()),
+        b = stripWidening(compare.getRhs());
   if (a.getDefiningOp<BinOp>())
     std::swap(a, b);
   auto cell = a.getDefiningOp<BinAtOp>();

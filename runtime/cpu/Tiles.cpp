@@ -65,7 +65,7 @@ int64_t pikoir_tile_least(pikort_pipeline *p, int32_t stage, int32_t image) {
 }
 
 const pikoir_tile *pikoir_open_tile(pikoir_writer *writer, int32_t image,
-                                    int64_t bin, int32_t clears) {
+                                    int64_t bin) {
   Lane &lane = *static_cast<Lane *>(writer);
   const pikort_pipeline &p = *lane.pipeline;
   const Stage &stage = p.stages[lane.kernel->stage];
@@ -90,9 +90,8 @@ const pikoir_tile *pikoir_open_tile(pikoir_writer *writer, int32_t image,
   tile.data = state.view.data;
   if (!tile.isCopy)
     return &tile;
-  if (!clears)
-    copyRows(tile.memory.data(), tile.pitch * size, tile.data + tile.first,
-             p.domain[0] * size, tile.rows, tile.bytes);
+  copyRows(tile.memory.data(), tile.pitch * size, tile.data + tile.first,
+           p.domain[0] * size, tile.rows, tile.bytes);
   tile.data = tile.memory.data() - (y * tile.pitch + x) * size;
   return &tile;
 }

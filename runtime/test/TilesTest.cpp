@@ -100,7 +100,7 @@ TEST_F(Tiles, CopyABin) {
     for (int64_t i = 0; i < 100 * 70; ++i)
       pixels[i].value = i;
     // The last bin is cut: 36 x 6 pixels.
-    const pikoir_tile *tile = pikoir_open_tile(w, 0, 3, 0);
+    const pikoir_tile *tile = pikoir_open_tile(w, 0, 3);
     EXPECT_EQ(tile->pitch, 64);
     for (int64_t y = 64; y < 70; ++y)
       for (int64_t x = 64; x < 100; ++x) {
@@ -119,11 +119,11 @@ TEST_F(Tiles, CopyABin) {
   draw(100, 70);
 }
 
-// What is cleared is not read, and a second tile takes the memory of the first.
-TEST_F(Tiles, BeginWithoutTheImage) {
+// A second tile takes the memory of the first.
+TEST_F(Tiles, TakeTurns) {
   act = [](pikort_pipeline *p, pikoir_writer *w) {
     auto *pixels = reinterpret_cast<Pixel *>(pikoir_get_state(p, 0)->data);
-    const pikoir_tile *tile = pikoir_open_tile(w, 0, 0, 1);
+    const pikoir_tile *tile = pikoir_open_tile(w, 0, 0);
     uint8_t *memory = tile->data;
     auto *first = reinterpret_cast<Pixel *>(memory);
     for (int64_t y = 0; y < 64; ++y)
@@ -132,7 +132,7 @@ TEST_F(Tiles, BeginWithoutTheImage) {
     pikoir_close_tile(w, 0);
     EXPECT_EQ(pixels[128 + 63].value, 63);
     EXPECT_EQ(pixels[128 + 64].value, 5);
-    tile = pikoir_open_tile(w, 0, 1, 0);
+    tile = pikoir_open_tile(w, 0, 1);
     EXPECT_EQ(tile->data, memory - 64 * int64_t(sizeof(Pixel)));
     EXPECT_EQ(first[0].value, 5);
     pikoir_close_tile(w, 0);

@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // Where rows of an image are a multiple of 4096 bytes apart, bins with many
-// primitives are drawn in copies of their pixels: with and without what another
-// stage has left there, with bins at the edges of the domain that are cut, and
-// with such that have few primitives. What is in the images is the reference
-// executor's, and the same as in an image whose rows are elsewhere.
-// RUN: pikoc %s --pipe Keys --emit=target --cpu x86-64-v3 -o - | FileCheck %s --check-prefix=COPIES
+// primitives are drawn in copies of their pixels, on what another stage has left
+// there: with bins at the edges of the domain that are cut, and with such that
+// have few primitives. What is in the images is the reference executor's.
+// RUN: pikoc %s --pipe Keys,Blends,WidePipe --emit=target --cpu x86-64-v3 -o - | FileCheck %s --check-prefix=COPIES
 // COPIES: llvm.call @pikoir_open_tile
 // COPIES: llvm.call @pikoir_close_tile
+// COPIES: {{^}}// -----
+// COPIES: llvm.call @pikoir_open_tile
+// COPIES: {{^}}// -----
+// COPIES: llvm.call @pikoir_open_tile
 //
 // RUN: %compare_targets %s --cases %s
 // CASE: --pipe Keys --domain 512 100 --count 900
@@ -85,27 +88,47 @@ struct Keys : piko::Pipe<State> {
   }
 };
 
-struct Blend : Draw<Blend, 32> {
-  void draw(const Box &b, glm::ivec2 p) {
-    float value = float(b.key & 255) * (1 / 255.0f);
-    update(state().gray, p,
-           [&](Gray &g) { g.value = g.value * 0.75f + value * 0.25f; });
+// What is in the image before is another stage's, with bins of its own.
+template <class Second>
+struct First : piko::Stage<16, 16, 64, Box, Box>, piko::Uses<State> {
+  void assignBin(const Box &b) {
+    assignToBin(b, binFromPosition(firstOf(b, domain())));
+  }
+  void process(const Box &b) {
+    Second::change(*this, b, firstOf(b, domain()));
+    emit(b);
   }
 };
-struct Blends : piko::Pipe<State> {
-  Blend blend;
-  Blends() { source(blend); }
+template <class Self> struct Again : Draw<Self, 32> {
+  void schedule(piko::BinId) { this->template endStage<First<Self>>(); }
+  void draw(const Box &b, glm::ivec2 p) { Self::change(*this, b, p); }
+};
+template <class Second> struct Twice : piko::Pipe<State> {
+  First<Second> first;
+  Second second;
+  Twice() {
+    this->source(first);
+    this->connect(first, 0, second);
+  }
 };
 
-struct DrawWide : Draw<DrawWide, 32> {
-  void draw(const Box &b, glm::ivec2 p) {
-    update(state().wide, p, [&](Wide &w) {
+struct Blend : Again<Blend> {
+  template <class Stage>
+  static void change(Stage &stage, const Box &b, glm::ivec2 p) {
+    float value = float(b.key & 255) * (1 / 255.0f);
+    stage.update(stage.state().gray, p,
+                 [&](Gray &g) { g.value = g.value * 0.75f + value * 0.25f; });
+  }
+};
+struct Blends : Twice<Blend> {};
+
+struct DrawWide : Again<DrawWide> {
+  template <class Stage>
+  static void change(Stage &stage, const Box &b, glm::ivec2 p) {
+    stage.update(stage.state().wide, p, [&](Wide &w) {
       w.last[w.count++ & 3] = uint16_t(b.key);
       w.sum += float(b.key % 1000);
     });
   }
 };
-struct WidePipe : piko::Pipe<State> {
-  DrawWide draw;
-  WidePipe() { source(draw); }
-};
+struct WidePipe : Twice<DrawWide> {};

@@ -35,13 +35,11 @@ struct OpenTileLowering : Lowering<OpenTileOp> {
     {
       OpBuilder::InsertionGuard guard(rewriter);
       rewriter.setInsertionPointToStart(choice.thenBlock());
-      Value clears = arith::ExtUIOp::create(
-          rewriter, loc, rewriter.getI32Type(), adaptor.getClears());
       Value tile =
           context
               .call(rewriter, loc, PIKO_RUNTIME_FUNCTION(pikoir_open_tile),
                     {adaptor.getWriter(), image,
-                     toI64(rewriter, loc, adaptor.getBin()), clears})
+                     toI64(rewriter, loc, adaptor.getBin())})
               .getResult();
       Value data =
           load(rewriter, loc, tile, PIKO_RUNTIME_MEMBER(pikoir_tile, data));

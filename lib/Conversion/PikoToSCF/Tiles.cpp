@@ -294,7 +294,8 @@ static CellRangeOp findRange(Operation *op) {
   return {};
 }
 
-/// Lets the runtime copy the pixels of a bin that has many primitives.
+/// Lets the runtime copy the pixels of a bin that has many primitives. What is
+/// cleared first is in the cache from then on: it was measured to gain nothing.
 void TileLowering::mayCopy() {
   auto units = tile->getParentOfType<scf::ForallOp>();
   CellRangeOp range = findRange(tile);
@@ -307,14 +308,9 @@ void TileLowering::mayCopy() {
   OpBuilder::InsertionGuard guard(builder);
   Value count =
       arith::SubIOp::create(builder, loc, range.getEnd(), range.getBegin());
-  Value clears =
-      tile.getClear()
-          ? ClearsOp::create(builder, loc, range.getBins()).getResult()
-          : arith::ConstantOp::create(builder, loc, builder.getBoolAttr(false))
-                .getResult();
   Value copied =
       OpenTileOp::create(builder, loc, builder.getI1Type(), tile.getImageAttr(),
-                         tile.getBin(), writer, count, clears);
+                         tile.getBin(), writer, count);
   for (Operation *user : tile->getUsers())
     if (isa<WriteTileOp>(user)) {
       builder.setInsertionPoint(user);
@@ -323,7 +319,8 @@ void TileLowering::mayCopy() {
 }
 
 void TileLowering::leaveInImage() {
-  mayCopy();
+  if (!tile.getClear())
+    mayCopy();
   if (tile.getClear()) {
     findBin();
     createChoice(/*withElse=*/false);

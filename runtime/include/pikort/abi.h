@@ -253,18 +253,16 @@ typedef struct pikoir_tile {
   int64_t pitch; ///< Pixels from one row to the next.
 } pikoir_tile;
 
-/// How many primitives a bin of a stage must have that copies of its pixels pay;
-/// INT64_MAX: none pay, as the rows of a bin do not compete for the same sets of
-/// the cache.
+/// How many primitives a bin of a stage must have that copies of its pixels
+/// pay; INT64_MAX: none pay, as the rows of a bin do not compete for the same
+/// sets of the cache.
 PIKORT_API int64_t pikoir_tile_least(pikort_pipeline *p, int32_t stage,
                                      int32_t image);
-/// Copies the pixels of a bin to memory of the thread's, unless `clears` says
-/// that all of them are written before they are read. Until it is closed, the
-/// unit has no other access to them, nor has any other thread. If memory is
+/// Copies the pixels of a bin to memory of the thread's. Until it is closed,
+/// the unit has no other access to them, nor has any other thread. If memory is
 /// refused it is the image itself.
 PIKORT_API const pikoir_tile *pikoir_open_tile(pikoir_writer *writer,
-                                               int32_t image, int64_t bin,
-                                               int32_t clears);
+                                               int32_t image, int64_t bin);
 /// Writes them back.
 PIKORT_API void pikoir_close_tile(pikoir_writer *writer, int32_t image);
 

@@ -16,7 +16,7 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 // CHECK:         %[[W:.*]] = llvm.call @pikoir_open
 // CHECK:         %[[PAYS:.*]] = arith.cmpi sge, %{{.*}}, %[[LEAST]] : i64
 // CHECK:         %[[VIEW:.*]]:2 = scf.if %[[PAYS]] -> (!llvm.ptr, i64) {
-// CHECK:           %[[TILE:.*]] = llvm.call @pikoir_open_tile(%[[W]], %c1_i32, %c3_i64, %c1_i32)
+// CHECK:           %[[TILE:.*]] = llvm.call @pikoir_open_tile(%[[W]], %c1_i32, %c3_i64)
 // CHECK:           %[[COPY:.*]] = llvm.load %[[TILE]]
 // CHECK:           %[[AT:.*]] = llvm.getelementptr inbounds %[[TILE]][8]
 // CHECK:           %[[PITCH:.*]] = llvm.load %[[AT]]
@@ -38,12 +38,11 @@ piko.pipeline @P rank 2 {
   piko.kernel @k {
     %c0 = arith.constant 0 : index
     %c3 = arith.constant 3 : index
-    %true = arith.constant true
     %bins = piko.storage.open_bins @a : !piko.bins<@F>
     %w = piko.cpu.open_writer %bins[%c0] : !piko.bins<@F>
     %begin, %end = piko.storage.cell_range %bins[%c0, %c3] : !piko.bins<@F>
     %n = arith.subi %end, %begin : index
-    %copied = piko.cpu.open_tile @seen[%c3] of %w for %n clears %true
+    %copied = piko.cpu.open_tile @seen[%c3] of %w for %n
     %x = arith.index_cast %begin : index to i32
     piko.store %x, checked @seen[%begin, %end : index, index] "x" : i32
     %width = piko.extent @seen[0]

@@ -80,21 +80,18 @@ piko.pipeline @P rank 2 {
   }
 }
 
-// Of a tile with more than eight rows the runtime may make a copy, which begins
-// with what is in the image, or with the clear value in the launch that clears.
+// Of a tile with more than eight rows the runtime may make a copy, if it begins
+// with what is in the image.
 // COPY-LABEL:  piko.pipeline @Copies
 // COPY:          %[[W:.*]] = piko.cpu.open_writer
 // COPY:          %[[BEGIN:.*]], %[[END:.*]] = piko.storage.cell_range
 // COPY:          scf.if
-// COPY-DAG:        %[[COUNT:.*]] = arith.subi %[[END]], %[[BEGIN]]
-// COPY-DAG:        %[[CLEARS:.*]] = piko.storage.clears
-// COPY:            %[[FIRST:.*]] = piko.cpu.open_tile @image[%{{.*}}] of %[[W]] for %[[COUNT]] clears %[[CLEARS]]
-// COPY:            scf.if %[[CLEARS]] {
-// COPY:              piko.store
-// COPY:            %[[SECOND:.*]] = piko.cpu.open_tile @kept[%{{.*}}] of %[[W]] for %[[COUNT]] clears %false
+// COPY:            %[[COUNT:.*]] = arith.subi %[[END]], %[[BEGIN]]
+// COPY-NOT:        piko.cpu.open_tile @image
+// COPY:            %[[COPIED:.*]] = piko.cpu.open_tile @kept[%{{.*}}] of %[[W]] for %[[COUNT]]
 // COPY:            scf.for
-// COPY:            piko.cpu.close_tile @image of %[[W]] if %[[FIRST]]
-// COPY:            piko.cpu.close_tile @kept of %[[W]] if %[[SECOND]]
+// COPY-NOT:        piko.cpu.close_tile @image
+// COPY:            piko.cpu.close_tile @kept of %[[W]] if %[[COPIED]]
 piko.pipeline @Copies rank 2 {
   piko.image @image : @Pixel rank 2 clear [1.0 : f32, 2 : i32, 3 : i32]
   piko.image @kept : @F rank 2

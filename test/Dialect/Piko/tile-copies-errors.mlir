@@ -12,7 +12,7 @@ piko.pipeline @P rank 2 {
     %bins = piko.storage.open_bins @a : !piko.bins<@F>
     %w = piko.cpu.open_writer %bins[%c0] : !piko.bins<@F>
     // expected-error @+1 {{'piko.cpu.open_tile' op expected an image, but got @numbers, which is none}}
-    %copied = piko.cpu.open_tile @numbers[%c0] of %w for %c0 clears %false
+    %copied = piko.cpu.open_tile @numbers[%c0] of %w for %c0
     piko.cpu.close_tile @numbers of %w if %copied
     piko.cpu.close_writer %w
     piko.storage.close_bins %bins : !piko.bins<@F>
@@ -33,7 +33,7 @@ piko.pipeline @P rank 2 {
     %bins = piko.storage.open_bins @a : !piko.bins<@F>
     %w = piko.cpu.open_writer %bins[%c0] : !piko.bins<@F>
     // expected-error @+1 {{'piko.cpu.open_tile' op expected it to be closed in its block}}
-    %copied = piko.cpu.open_tile @seen[%c0] of %w for %c0 clears %false
+    %copied = piko.cpu.open_tile @seen[%c0] of %w for %c0
     piko.cpu.close_writer %w
     piko.storage.close_bins %bins : !piko.bins<@F>
   }

@@ -584,22 +584,18 @@ def Piko_OpenTileOp : Piko_CPUOp<"open_tile", [
     From here to where it is closed, in the same block, all of the kernel's access
     to the image is to pixels of the bin, and goes to a copy of these in memory of
     the thread's, if the runtime says that for so many primitives a copy pays: where
-    rows of the image compete for the same sets of the cache. A copy does not begin
-    with what is in the image where `clears` says that all of it is cleared first.
-    The result is whether there is a copy.
+    rows of the image compete for the same sets of the cache. The result is whether
+    there is a copy.
 
     ```mlir
-    %copied = piko.cpu.open_tile @visible[%bin] of %writer for %n clears %false
-    ...
-    piko.cpu.close_tile @visible of %writer if %copied
+    %copied = piko.cpu.open_tile @depth[%bin] of %writer for %n
+    piko.cpu.close_tile @depth of %writer if %copied
     ```
   }];
   let arguments = (ins FlatSymbolRefAttr:$image, Index:$bin,
-                       Piko_WriterType:$writer, Index:$count, I1:$clears);
+                       Piko_WriterType:$writer, Index:$count);
   let results = (outs I1:$copied);
-  let assemblyFormat = [{
-    $image `[` $bin `]` `of` $writer `for` $count `clears` $clears attr-dict
-  }];
+  let assemblyFormat = "$image `[` $bin `]` `of` $writer `for` $count attr-dict";
 }
 
 def Piko_CloseTileOp : Piko_CPUOp<"close_tile", [
