@@ -195,6 +195,14 @@ void piko::addVectorSequence(OpPassManager &passes,
     passes.nest<PipelineOp>().addPass(createVectorize(vectors));
     addCleanUp(passes);
   }
+  if (options.has("vectorize") && options.has("distribute-loops")) {
+    passes.nest<PipelineOp>().addPass(createDistributeLoops({cpu.lanes}));
+    addCleanUp(passes);
+  }
+  if (options.has("vectorize") && options.has("reduce-strength")) {
+    passes.nest<PipelineOp>().addPass(createReduceStrength({cpu.lanes}));
+    addCleanUp(passes);
+  }
   if (options.has("merge-gathers")) {
     passes.nest<PipelineOp>().addPass(createMergeGathers());
     addCleanUp(passes);

@@ -18,10 +18,10 @@ const std::vector<std::string> &SynthesisOptions::getOptional() {
       "own-pixels", "eliminate-schedules", "fuse-kernels", "form-strips",
       "form-gbuffer", "defer-shading", "form-tiles", "prefetch", "vectorize",
       "prove-bounds", "hoist-loads", "hoist-bounds", "merge-bounds",
-      "thread-jumps", "narrow-integers", "merge-gathers", "pair-gathers",
-      "tabulate-invariants", "unroll-and-jam", "unswitch-versions",
-      "if-convert", "uplift-pixel-loops", "privatize", "reduce-updates",
-      "reduce-by-atomics",
+      "thread-jumps", "narrow-integers", "distribute-loops", "reduce-strength",
+      "merge-gathers", "pair-gathers", "tabulate-invariants", "unroll-and-jam",
+      "unswitch-versions", "if-convert", "uplift-pixel-loops", "privatize",
+      "reduce-updates", "reduce-by-atomics",
       // of LLVM
       "loop-vectorize", "slp-vectorizer"};
   return names;

@@ -52,8 +52,7 @@ bool piko::isStructure(Operation *op) {
   return isa<scf::IfOp, scf::ForOp, scf::WhileOp, scf::IndexSwitchOp>(op);
 }
 
-/// Functions that are exact, or the same for a vector as for a number.
-static bool hasVectorForm(Operation *op) {
+bool piko::hasVectorForm(Operation *op) {
   if (!OpTrait::hasElementwiseMappableTraits(op))
     return false;
   if (op->getDialect() == op->getContext()->getLoadedDialect("math"))

@@ -235,6 +235,9 @@ bool isOneVector(mlir::scf::ForOp loop, int64_t laneCount);
 /// null.
 mlir::Attribute getPixels(mlir::memref::StoreOp store);
 
+/// Whether vectors have the operation: functions are exact, or the same for a
+/// vector as for a number.
+bool hasVectorForm(mlir::Operation *op);
 /// Whether it may trap, or takes as long for one lane as for all.
 bool isDivision(mlir::Operation *op);
 /// Whether it is one of 32 bits for which floats of 64 bits are divided.

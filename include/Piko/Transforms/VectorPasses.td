@@ -258,6 +258,107 @@ def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
   ];
 }
 
+def DistributeLoops : Pass<"piko-distribute-loops", "::piko::PipelineOp"> {
+  let summary = "Compute what loops of a primitive start from for all lanes";
+  let description = [{
+    **Requires** loops over units, behind `piko-vectorize`: of loops over primitives
+    it takes those whose lanes are given iterations, or none.
+
+    **Does**: loop distribution (fission) with scalar expansion. Of as many
+    primitives as there are lanes, a first loop computes what follows from each
+    alone, such as the edges of a triangle and the rows that these leave of its
+    box, and writes what is still needed into arrays; a second loop reads it, and
+    runs what is left of each turn, primitive by primitive. The first loop is
+    vectorized, for primitives as lanes. What conditions guard is computed for all
+    primitives, if it can be where they do not hold. Of less than a quarter of the
+    lanes the first loop stays scalar.
+
+    **Guarantees** the same bits: what moves changes nothing, and reads nothing that
+    the kernel changes. Effects keep their order.
+
+    Before:
+    ```
+    scf.for %i = %begin to %end step %one {
+      %t = piko.storage.item %bins[%i]
+      %x = piko.get %t "x"
+      %y = piko.get %t "y"
+      %area = arith.muli %x, %y : i32
+      scf.for %p = %lo to %hi step %one {
+        ... %area ...
+      }
+    }
+    ```
+    After, where the second line stands for vectors of lanes:
+    ```
+    scf.for %block = %begin to %end step %lanes {
+      scf.for %i = %block to %behind step %one {
+        ...
+        memref.store %area, %areas[%lane] : memref<16xi32>
+      }
+      scf.for %i = %block to %behind step %one {
+        %area = memref.load %areas[%lane] : memref<16xi32>
+        scf.for %p = %lo to %hi step %one {
+          ... %area ...
+    ```
+
+    **Limits**: loops of which this is expected to take less, by the cost model of
+    `piko-vectorize`; what is read of state behind a condition stays there, and
+    what the text says is seldom (`[[unlikely]]`).
+  }];
+  let dependentDialects = ["::mlir::arith::ArithDialect",
+                           "::mlir::math::MathDialect",
+                           "::mlir::memref::MemRefDialect",
+                           "::mlir::scf::SCFDialect",
+                           "::mlir::vector::VectorDialect"];
+  let options = [Option<"laneCount", "lanes", "int64_t", "16",
+                        "Lanes of a vector: 4, 8 or 16 (default: 16)">];
+}
+
+def ReduceStrength : Pass<"piko-reduce-strength", "::piko::PipelineOp"> {
+  let summary = "Make vectors that grow from turn to turn induction variables";
+  let description = [{
+    **Requires** lanes (`piko-vectorize`).
+
+    **Does**: strength reduction. In a loop without another one inside, such as one
+    over the rows of a strip of pixels, a vector of integers that grows by the same
+    from turn to turn, as the value of an edge does, is handed on from turn to turn
+    and added to, where it took two operations or more: a broadcast of what all
+    lanes share, shifts, and sums. So many are that fit into registers.
+
+    **Guarantees** the same bits: integers wrap around.
+
+    Before:
+    ```
+    %r = scf.for %y = %lo to %hi step %one iter_args(%e = %first) -> (i32) : i32 {
+      %all = vector.broadcast %e : i32 to vector<16xi32>
+      %edge = arith.addi %all, %lanes : vector<16xi32>
+      ... %edge ...
+      %next = arith.addi %e, %slope : i32
+      scf.yield %next : i32
+    }
+    ```
+    After:
+    ```
+    %all = vector.broadcast %first : i32 to vector<16xi32>
+    %sum = arith.addi %all, %lanes : vector<16xi32>
+    %step = vector.broadcast %slope : i32 to vector<16xi32>
+    %r = scf.for %y = %lo to %hi step %one iter_args(%edge = %sum)
+        -> (vector<16xi32>) : i32 {
+      ... %edge ...
+      %next = arith.addi %edge, %step : vector<16xi32>
+      scf.yield %next : vector<16xi32>
+    }
+    ```
+
+    **Limits**: sums, differences, products with what does not change, shifts to the
+    left and broadcasts; up to 12 registers of 16 lanes, and five of fewer.
+  }];
+  let dependentDialects = ["::mlir::arith::ArithDialect",
+                           "::mlir::vector::VectorDialect"];
+  let options = [Option<"laneCount", "lanes", "int64_t", "16",
+                        "Lanes of a vector: 4, 8 or 16 (default: 16)">];
+}
+
 def MergeGathers : Pass<"piko-merge-gathers", "::piko::PipelineOp"> {
   let summary = "Read fields of a record for all lanes at once";
   let description = [{

@@ -1,0 +1,379 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// piko-distribute-loops: loop distribution of what a phase computes of a
+// primitive in front of its own loops, which becomes vectors of primitives.
+
+#include "IterationWriter.h"
+#include "LaneCandidate.h"
+#include "LaneCycles.h"
+#include "StateAccess.h"
+
+#include "Piko/Analysis/BranchProbability.h"
+#include "Piko/Dialect/Piko/IR/CodeBuilder.h"
+#include "Piko/Dialect/Piko/IR/Marks.h"
+#include "Piko/Dialect/Piko/IR/PikoCPU.h"
+#include "Piko/Transforms/Passes.h"
+
+#include "mlir/Dialect/Math/IR/Math.h"
+#include "mlir/Dialect/Vector/IR/VectorOps.h"
+#include "mlir/IR/PatternMatch.h"
+#include "mlir/Interfaces/SideEffectInterfaces.h"
+#include "mlir/Transforms/LoopInvariantCodeMotionUtils.h"
+
+namespace piko {
+#define GEN_PASS_DEF_DISTRIBUTELOOPS
+#include "Piko/Transforms/Passes.h.inc"
+} // namespace piko
+
+using namespace mlir;
+using namespace piko;
+
+namespace {
+
+struct DistributeLoopsPass
+    : piko::impl::DistributeLoopsBase<DistributeLoopsPass> {
+  using DistributeLoopsBase::DistributeLoopsBase;
+  void runOnOperation() override;
+};
+
+/// Looks at one loop over primitives.
+class Distributor {
+public:
+  Distributor(scf::ForOp loop, int64_t laneCount,
+              const llvm::DenseSet<StringAttr> &written)
+      : loop(loop), laneCount(laneCount), written(written), builder(loop),
+        at(builder, loop.getLoc()) {}
+  void run();
+
+private:
+  void findMoved(Block &block, bool isSure);
+  bool mayMove(Operation *op, bool isSure);
+  /// Whether it is as quickly read again.
+  bool isCopied(Value value) const;
+  void findResults();
+  /// The operations of the first loop, in their order.
+  SmallVector<Operation *> findSlice() const;
+  void createTables();
+  /// The first loop, in front of the original one.
+  scf::ForOp writeFirst(Value lower, Value upper);
+  bool isWorthwhile(const IterationLanes &lanes) const;
+  void writeVectors(scf::ForOp first, Value lower, Value upper);
+  /// Lets the original loop, which is now the second one, read the tables.
+  void readTables(Value lower);
+  void eraseMoved();
+
+  scf::ForOp loop;
+  const int64_t laneCount;
+  const llvm::DenseSet<StringAttr> &written;
+  OpBuilder builder;
+  CodeBuilder at;
+  llvm::SetVector<Operation *> moved;
+  SmallVector<Value> results; ///< which the second loop takes
+  /// Where they are kept: a row of one of few arrays, which a processor reads
+  /// by one register.
+  struct Table {
+    Value array;
+    int64_t begin;
+  };
+  SmallVector<Table> tables;
+  SmallVector<Value> arrays;
+};
+
+} // namespace
+
+//===----------------------------------------------------------------------===//
+// What the first loop computes
+//===----------------------------------------------------------------------===//
+
+/// What a lane of a vector may be.
+static bool isNumber(Value value) {
+  Type type = value.getType();
+  return type.isIndex() ||
+         (type.isIntOrFloat() && type.getIntOrFloatBitWidth() <= 64);
+}
+
+/// Whether lanes need not compute it one by one.
+static bool isForLanes(Operation *op) {
+  return hasVectorForm(op) && (!isIntegerDivision(op) || isDividedAsFloats(op));
+}
+
+/// `isSure`: the primitive's turn comes there.
+bool Distributor::mayMove(Operation *op, bool isSure) {
+  bool isKnown = llvm::all_of(op->getOperands(), [&](Value operand) {
+    return loop.isDefinedOutsideOfLoop(operand) ||
+           operand == loop.getInductionVar() ||
+           moved.contains(operand.getDefiningOp());
+  });
+  if (!isKnown || op->getNumRegions() > 0 || op->getNumResults() == 0)
+    return false;
+  if (isa<ItemOp>(op))
+    return true;
+  if (!llvm::all_of(op->getResults(), isNumber))
+    return false;
+  if (auto get = dyn_cast<GetOp>(op))
+    return get.getElements().empty() && !get.getType().isInteger(1);
+  if (auto load = dyn_cast<LoadOp>(op))
+    return isSure && load.getChecked() && !load.getTile() &&
+           load.getElements().empty() && !load.getType().isInteger(1) &&
+           !written.contains(load.getStateAttr().getAttr());
+  return isForLanes(op) && (isSure ? isMemoryEffectFree(op) : isPure(op));
+}
+
+/// Sides that are seldom taken are left where they are.
+static bool isSeldom(Operation *op, Region &region) {
+  constexpr double least = 0.1;
+  std::optional<double> probability;
+  if (auto choice = dyn_cast<scf::IfOp>(op))
+    probability = getProbability(choice, region);
+  else if (auto choice = dyn_cast<scf::IndexSwitchOp>(op))
+    probability = getProbability(choice, region);
+  return probability && *probability < least;
+}
+
+void Distributor::findMoved(Block &block, bool isSure) {
+  for (Operation &op : block.without_terminator()) {
+    if (mayMove(&op, isSure))
+      moved.insert(&op);
+    else if (isa<scf::IfOp, scf::IndexSwitchOp>(op))
+      for (Region &region : op.getRegions())
+        if (!region.empty() && !isSeldom(&op, region))
+          findMoved(region.front(), /*isSure=*/false);
+  }
+}
+
+bool Distributor::isCopied(Value value) const {
+  Operation *op = value.getDefiningOp();
+  if (isa<ItemOp, GetOp>(op))
+    return true;
+  bool isCast =
+      isa<arith::ExtSIOp, arith::ExtUIOp, arith::TruncIOp, arith::IndexCastOp,
+          arith::IndexCastUIOp, arith::BitcastOp>(op);
+  return isCast && moved.contains(op->getOperand(0).getDefiningOp()) &&
+         isCopied(op->getOperand(0));
+}
+
+void Distributor::findResults() {
+  for (Operation *op : moved)
+    for (Value result : op->getResults())
+      if (!isCopied(result) &&
+          llvm::any_of(result.getUsers(),
+                       [&](Operation *user) { return !moved.contains(user); }))
+        results.push_back(result);
+}
+
+SmallVector<Operation *> Distributor::findSlice() const {
+  llvm::DenseSet<Operation *> needed;
+  SmallVector<Value> work(results);
+  while (!work.empty()) {
+    Operation *op = work.pop_back_val().getDefiningOp();
+    if (op && moved.contains(op) && needed.insert(op).second)
+      llvm::append_range(work, op->getOperands());
+  }
+  return llvm::filter_to_vector(
+      moved, [&](Operation *op) { return needed.contains(op); });
+}
+
+//===----------------------------------------------------------------------===//
+// Two loops
+//===----------------------------------------------------------------------===//
+
+/// Lanes store no truth values, and narrow numbers one by one.
+static Type getTableType(Type type) {
+  bool isNarrow = type.isInteger() && type.getIntOrFloatBitWidth() < 32;
+  return isNarrow ? IntegerType::get(type.getContext(), 32) : type;
+}
+
+void Distributor::createTables() {
+  llvm::MapVector<Type, int64_t> counts;
+  for (Value result : results)
+    tables.push_back(
+        {Value(), laneCount * counts[getTableType(result.getType())]++});
+  constexpr int64_t lineSize = 64;
+  llvm::DenseMap<Type, Value> made;
+  for (auto [type, count] : counts) {
+    arrays.push_back(memref::AllocaOp::create(
+        builder, at.loc, MemRefType::get({laneCount * count}, type),
+        builder.getI64IntegerAttr(lineSize)));
+    made[type] = arrays.back();
+  }
+  for (auto [result, table] : llvm::zip(results, tables))
+    table.array = made[getTableType(result.getType())];
+}
+
+scf::ForOp Distributor::writeFirst(Value lower, Value upper) {
+  auto first = scf::ForOp::create(builder, at.loc, lower, upper, at.index(1));
+  OpBuilder::InsertionGuard guard(builder);
+  builder.setInsertionPointToStart(first.getBody());
+  Value place = at.sub(first.getInductionVar(), lower);
+  IRMapping mapping;
+  mapping.map(loop.getInductionVar(), first.getInductionVar());
+  for (Operation *op : findSlice()) {
+    Operation *copy = builder.clone(*op, mapping);
+    for (auto [result, made] :
+         llvm::zip(op->getResults(), copy->getResults())) {
+      auto *found = llvm::find(results, result);
+      if (found == results.end())
+        continue;
+      Type type = getTableType(made.getType());
+      Value value = made;
+      if (type != made.getType())
+        value = arith::ExtUIOp::create(builder, at.loc, type, value);
+      const Table &table = tables[found - results.begin()];
+      at.store(value, table.array, at.add(place, at.index(table.begin)));
+    }
+  }
+  return first;
+}
+
+bool Distributor::isWorthwhile(const IterationLanes &lanes) const {
+  if (lanes.getRefusal().at)
+    return false;
+  // Estimates may be wrong, and a bin's last primitives fill no vector.
+  constexpr double share = 0.6;
+  IterationLanes::Cost cost = lanes.getCost();
+  const Cycles &cycles = getCycles(laneCount);
+  double tabled = double(results.size()) * cycles.scalarAccess;
+  return cost.vectors + tabled < share * (cost.serial - tabled);
+}
+
+/// A table has a place for each lane: those that have no primitive write, too.
+static void storeAllLanes(Operation *root, ArrayRef<Value> arrays) {
+  root->walk([&](vector::MaskedStoreOp store) {
+    if (!llvm::is_contained(arrays, store.getBase()))
+      return;
+    OpBuilder builder(store);
+    vector::StoreOp::create(builder, store.getLoc(), store.getValueToStore(),
+                            store.getBase(), store.getIndices());
+    store.erase();
+  });
+}
+
+/// Few primitives take less one by one.
+void Distributor::writeVectors(scf::ForOp first, Value lower, Value upper) {
+  IterationLanes lanes(first, laneCount);
+  OpBuilder::InsertionGuard guard(builder);
+  builder.setInsertionPoint(first);
+  int64_t few = std::max<int64_t>(laneCount / 4, 2);
+  Value isMany =
+      at.compare(CodeBuilder::P::sge, at.sub(upper, lower), at.index(few));
+  auto choice = scf::IfOp::create(builder, at.loc, isMany, /*withElse=*/true);
+  builder.setInsertionPointToStart(choice.thenBlock());
+  IterationWriter(lanes).write(builder.saveInsertionPoint());
+  storeAllLanes(choice, arrays);
+  first->moveBefore(choice.elseBlock(), choice.elseBlock()->begin());
+}
+
+/// The innermost block around all uses that is in no loop inside of `block`.
+static Block *findUses(Value value, Block *block) {
+  while (true) {
+    Operation *around = nullptr;
+    Region *region = nullptr;
+    for (Operation *user : value.getUsers()) {
+      Operation *here = block->findAncestorOpInBlock(*user);
+      if (!here || here == user || (around && here != around) ||
+          !isa<scf::IfOp, scf::IndexSwitchOp>(here))
+        return block;
+      Region *side = user->getParentRegion();
+      while (side->getParentOp() != here)
+        side = side->getParentOp()->getParentRegion();
+      if (region && side != region)
+        return block;
+      around = here;
+      region = side;
+    }
+    block = &region->front();
+  }
+}
+
+static Operation *findFirstUse(Value value, Block *block) {
+  Operation *first = nullptr;
+  for (Operation *user : value.getUsers()) {
+    Operation *here = block->findAncestorOpInBlock(*user);
+    if (!first || here->isBeforeInBlock(first))
+      first = here;
+  }
+  return first;
+}
+
+void Distributor::readTables(Value lower) {
+  // What moved, and is not read again, has no uses from now on.
+  SmallVector<Value> values;
+  for (Value result : results) {
+    // All uses by one value, whose place is then found.
+    auto stub = UnrealizedConversionCastOp::create(
+        builder, at.loc, result.getType(), ValueRange());
+    result.replaceUsesWithIf(stub.getResult(0), [&](OpOperand &use) {
+      return !moved.contains(use.getOwner()) &&
+             loop->isAncestor(use.getOwner());
+    });
+    values.push_back(stub.getResult(0));
+  }
+  eraseMoved();
+  for (auto [value, table] : llvm::zip(values, tables)) {
+    Operation *stub = value.getDefiningOp();
+    if (!value.use_empty()) {
+      builder.setInsertionPoint(
+          findFirstUse(value, findUses(value, loop.getBody())));
+      Value place = at.sub(loop.getInductionVar(), lower);
+      Value read = at.load(table.array, at.add(place, at.index(table.begin)));
+      if (read.getType() != value.getType())
+        read = arith::TruncIOp::create(builder, at.loc, value.getType(), read);
+      value.replaceAllUsesWith(read);
+    }
+    stub->erase();
+  }
+}
+
+void Distributor::eraseMoved() {
+  for (Operation *op : llvm::reverse(moved))
+    if (op->use_empty())
+      op->erase();
+}
+
+void Distributor::run() {
+  moveLoopInvariantCode(loop);
+  findMoved(*loop.getBody(), /*isSure=*/true);
+  findResults();
+  if (results.empty())
+    return;
+  builder.setInsertionPoint(loop);
+  Value begin = loop.getLowerBound(), end = loop.getUpperBound();
+  createTables();
+  auto blocks =
+      scf::ForOp::create(builder, at.loc, begin, end, at.index(laneCount));
+  builder.setInsertionPointToStart(blocks.getBody());
+  Value lower = blocks.getInductionVar();
+  Value behind =
+      arith::AddIOp::create(builder, at.loc, lower, at.index(laneCount),
+                            arith::IntegerOverflowFlags::nsw);
+  Value upper = at.min(behind, end);
+  scf::ForOp first = writeFirst(lower, upper);
+  if (!isWorthwhile(IterationLanes(first, laneCount))) {
+    blocks.erase();
+    for (Value array : arrays)
+      array.getDefiningOp()->erase();
+    return;
+  }
+  writeVectors(first, lower, upper);
+  loop->moveBefore(blocks.getBody()->getTerminator());
+  loop.setLowerBound(lower);
+  loop.setUpperBound(upper);
+  builder.setInsertionPoint(loop);
+  readTables(lower);
+  remarkStage(loop) << "what follows from a primitive in front of the loops of "
+                       "its turn is computed for "
+                    << laneCount << " primitives at once";
+}
+
+void DistributeLoopsPass::runOnOperation() {
+  for (auto kernel : getOperation().getOps<KernelOp>()) {
+    llvm::DenseSet<StringAttr> written = getWrittenState(kernel);
+    SmallVector<scf::ForOp> loops;
+    kernel.walk([&](scf::ForOp loop) {
+      if (isOverPrimitives(loop) && !hasSpecifiedLanes(loop, LaneMapping::One))
+        loops.push_back(loop);
+    });
+    for (scf::ForOp loop : loops)
+      Distributor(loop, laneCount, written).run();
+  }
+}
