@@ -15,11 +15,8 @@
 // CASE: --pipe Bytes --domain 40 40 --count 300
 // CASE: --pipe Large --domain 40 40 --count 300
 //
-// RUN: pikoc %s --pipe Boxes --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=ONCE
-// RUN: pikoc %s --pipe Neighbours --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=ONCE
-// RUN: pikoc %s --pipe Loops --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=ONCE
-// RUN: pikoc %s --pipe Bytes --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=ONCE
-// ONCE: remark: what is written to 'color' is computed once for each pixel
+// RUN: pikoc %s --pipe Boxes,Neighbours,Loops,Bytes --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=ONCE
+// ONCE-COUNT-4: remark: what is written to 'color' is computed once for each pixel
 #include <piko.h>
 
 #include <cmath>

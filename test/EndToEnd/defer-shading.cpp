@@ -20,18 +20,8 @@
 // RUN: piko-compare %s --pipe Nearest --domain 45 37 --count 300 --runs 1 --strip 7 | FileCheck %s
 // CHECK: equal
 //
-// RUN: pikoc %s --pipe Nearest --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=ONCE
-// RUN: pikoc %s --pipe OneRecord --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=ONCE
-// RUN: pikoc %s --pipe Returns --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=ONCE
-// RUN: pikoc %s --pipe LastWins --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=ONCE
-// RUN: pikoc %s --pipe TwoImages --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=ONCE
-// RUN: pikoc %s --pipe TwoWays --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=ONCE
-// RUN: pikoc %s --pipe Points --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=ONCE
-// RUN: pikoc %s --pipe Behind --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=ONCE
-// RUN: pikoc %s --pipe Picture --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=ONCE
-// RUN: pikoc %s --pipe Kinds --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=ONCE
-// RUN: pikoc %s --pipe Lists --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=ONCE
-// ONCE: remark: what is written to '{{color|image}}' is computed once for each pixel
+// RUN: pikoc %s --pipe Nearest,OneRecord,Returns,LastWins,TwoImages,TwoWays,Points,Behind,Picture,Kinds,Lists --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=ONCE
+// ONCE-COUNT-11: remark: what is written to '{{color|image}}' is computed once for each pixel
 // RUN: pikoc %s --pipe Counts --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=OFTEN
 // OFTEN-NOT: is computed once for each pixel
 #include <piko.h>

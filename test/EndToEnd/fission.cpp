@@ -11,10 +11,8 @@
 // RUN: pikoc %s --pipe Pixels --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=BEHIND-PIXELS
 // BEHIND-PIXELS: remark: stage 'shade' takes what stage 'cover' emits in a loop from a list
 // BEHIND-PIXELS: remark: stage 'shade' runs bin by bin behind stage 'cover'
-// RUN: pikoc %s --pipe Further --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=INSIDE
-// RUN: pikoc %s --pipe Merged --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=INSIDE
-// RUN: pikoc %s --pipe Whole --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=INSIDE
-// INSIDE: remark: stage 'shade' runs inside stage 'spread'
+// RUN: pikoc %s --pipe Further,Merged,Whole --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=INSIDE
+// INSIDE-COUNT-3: remark: stage 'shade' runs inside stage 'spread'
 //
 // RUN: %compare_targets %s --cases %s
 // CASE: --pipe Chain --domain 67 35 --count 900

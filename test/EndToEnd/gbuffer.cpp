@@ -28,15 +28,8 @@
 // FAILS: 1 threads, run 0: got: stage 'stage', bin 0: expected an index into 'lights' in [0, 300), but got 300
 // FAILS: 2 threads, run 0: got: stage 'stage', bin 0: expected an index into 'lights' in [0, 300), but got 300
 //
-// RUN: pikoc %s --pipe Nearest --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=ONCE
-// RUN: pikoc %s --pipe OneRecord --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=ONCE
-// RUN: pikoc %s --pipe TwoWays --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=ONCE
-// RUN: pikoc %s --pipe Kinds --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=ONCE
-// RUN: pikoc %s --pipe Line --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=ONCE
-// RUN: pikoc %s --pipe Bands --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=ONCE
-// RUN: pikoc %s --pipe Loops --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=ONCE
-// RUN: pikoc %s --pipe Splats --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=ONCE
-// ONCE: remark: what is written to '{{color|image|line}}' is computed once for each pixel, by a kernel behind that of stage
+// RUN: pikoc %s --pipe Nearest,OneRecord,TwoWays,Kinds,Line,Bands,Loops,Splats --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=ONCE
+// ONCE-COUNT-8: remark: what is written to '{{color|image|line}}' is computed once for each pixel, by a kernel behind that of stage
 // RUN: pikoc %s --pipe Picture --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=READ
 // READ: remark: what is written to 'color' is computed also where it is overwritten
 // READ: note: the index of this read is not proved to be inside, and would not be tested where it is overwritten

@@ -4,13 +4,7 @@
 // share the pixels of many primitives at once, or those of one after the other,
 // which a remark says; always in lineage order.
 // REQUIRES: all
-// RUN: pikoc %s --pipe Boxes --target gpu-on-cpu --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=MANY --allow-empty
-// RUN: pikoc %s --pipe Points --target gpu-on-cpu --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=MANY --allow-empty
-// RUN: pikoc %s --pipe Rows --target gpu-on-cpu --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=MANY --allow-empty
-// RUN: pikoc %s --pipe Steps --target gpu-on-cpu --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=MANY --allow-empty
-// RUN: pikoc %s --pipe Discs --target gpu-on-cpu --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=MANY --allow-empty
-// RUN: pikoc %s --pipe Unclipped --target gpu-on-cpu --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=MANY --allow-empty
-// RUN: pikoc %s --pipe Rare --target gpu-on-cpu --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=MANY --allow-empty
+// RUN: pikoc %s --pipe Boxes,Points,Rows,Steps,Discs,Unclipped,Rare --target gpu-on-cpu --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=MANY --allow-empty
 // MANY-NOT: the threads of a block
 // RUN: pikoc %s --pipe Spans --target gpu-on-cpu --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=SPANS
 // SPANS: remark: the threads of a block take one primitive after the other: a row's bounds depend on the row

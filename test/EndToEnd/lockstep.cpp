@@ -27,16 +27,8 @@
 // RUN: not piko-compare %s --pipe Parts --count 400 --runs 1 --threads 1 | FileCheck %s --check-prefix=PARTS
 // PARTS: got: stage 'stage', bin 0: expected every iteration of parallelFor to call any() as often as iteration 0, but iteration 3 does not
 //
-// RUN: pikoc %s --pipe Nearest --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=LANES
-// RUN: pikoc %s --pipe Network --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=LANES
-// RUN: pikoc %s --pipe Newton --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=LANES
-// RUN: pikoc %s --pipe Columns --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=LANES
-// RUN: pikoc %s --pipe Kinds --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=LANES
-// RUN: pikoc %s --pipe Emits --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=LANES
-// RUN: pikoc %s --pipe Cells --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=LANES
-// RUN: pikoc %s --pipe Corners --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=LANES
-// RUN: pikoc %s --pipe Scans --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=LANES
-// LANES: remark: stage '{{.*}}': these iterations are vectorized for 16 at once
+// RUN: pikoc %s --pipe Nearest,Network,Newton,Columns,Kinds,Emits,Cells,Corners,Scans --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=LANES
+// LANES-COUNT-9: remark: stage '{{.*}}': these iterations are vectorized for 16 at once
 // RUN: pikoc %s --pipe Sums --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=FEW
 // FEW: remark: stage '{{.*}}': these iterations are vectorized for 16 at once
 // FEW: remark: stage '{{.*}}': these iterations are vectorized for 8 at once

@@ -15,10 +15,8 @@
 // CASE: --pipe Lists --domain 67 35 --count 320
 // RUN: piko-compare %s --cases %s --runs 1 --without vectorize -O0
 //
-// RUN: pikoc %s --pipe EmitsInLoops --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=VECTORS
-// RUN: pikoc %s --pipe Rows --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=VECTORS
-// RUN: pikoc %s --pipe Shares --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=VECTORS
-// VECTORS: .cpp:[[#]]:{{[0-9]+}}: remark: stage '{{.*}}': these iterations are vectorized for {{4|8}} at once
+// RUN: pikoc %s --pipe EmitsInLoops,Rows,Shares --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=VECTORS
+// VECTORS-COUNT-3: .cpp:[[#]]:{{[0-9]+}}: remark: stage '{{.*}}': these iterations are vectorized for {{4|8}} at once
 #include "Inputs/vector-iterations.h"
 
 struct Keeps : piko::Stage<16, 16, 64, Found>, piko::Uses<State> {

@@ -15,15 +15,8 @@
 // RUN: not piko-compare %s --pipe Outside --domain 67 35 --count 2000 --runs 1 --threads 2 | FileCheck %s --check-prefix=OUTSIDE
 // OUTSIDE: got: stage 'stage', bin 0: expected an index into 'in' in [0, 2000), but got 2013
 //
-// RUN: pikoc %s --pipe Averages --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=VECTORS
-// RUN: pikoc %s --pipe Addresses --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=VECTORS
-// RUN: pikoc %s --pipe Repeats --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=VECTORS
-// RUN: pikoc %s --pipe Guards --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=VECTORS
-// RUN: pikoc %s --pipe Tests --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=VECTORS
-// RUN: pikoc %s --pipe Kinds --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=VECTORS
-// RUN: pikoc %s --pipe Olds --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=VECTORS
-// RUN: pikoc %s --pipe Outside --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=VECTORS
-// VECTORS: remark: stage 'stage': process is vectorized for {{4|8}} primitives at once
+// RUN: pikoc %s --pipe Averages,Addresses,Repeats,Guards,Tests,Kinds,Olds,Outside --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=VECTORS
+// VECTORS-COUNT-8: remark: stage 'stage': process is vectorized for {{4|8}} primitives at once
 #include <piko.h>
 
 struct Particle {

@@ -6,6 +6,12 @@
 // RUN: not pikoc %s 2>&1 | FileCheck %s --check-prefix=WHICH
 // RUN: not pikoc %s --pipe None 2>&1 | FileCheck %s --check-prefix=UNKNOWN
 // Pipelines are chosen by name; -D and -I reach the C++.
+// RUN: pikoc %s --pipe Large,Small --emit=authored -o %t.both
+// RUN: FileCheck %s --check-prefix=BOTH --input-file %t.both
+// RUN: piko-opt --split-input-file %t.both | FileCheck %s --check-prefix=BOTH
+// RUN: not pikoc %s --pipe Small,None -o %t.ll 2>&1 | FileCheck %s --check-prefix=UNKNOWN
+// RUN: not pikoc %s --pipe Small,Large -o %t.o 2>&1 | FileCheck %s --check-prefix=ONE
+// What is written of several is a text, one behind the other.
 
 #include <piko.h>
 
@@ -46,7 +52,12 @@ struct Large : piko::Pipe<> {
   Large() { source(drop); }
 };
 
+// BOTH: piko.pipeline @Large
+// BOTH: // -----
+// BOTH: piko.pipeline @Small
+// ONE: error: --pipe: expected one pipeline, because only text is written of several, but got 'Small,Large'
+
 // WHICH: pikoc-cpp.cpp:1:1: error: expected the name of one of the file's 2
-// WHICH: pikoc-cpp.cpp:[[#@LINE-13]]:8: note: pipeline 'Small' is defined here
-// WHICH: pikoc-cpp.cpp:[[#@LINE-7]]:8: note: pipeline 'Large' is defined here
+// WHICH: pikoc-cpp.cpp:[[#@LINE-18]]:8: note: pipeline 'Small' is defined here
+// WHICH: pikoc-cpp.cpp:[[#@LINE-12]]:8: note: pipeline 'Large' is defined here
 // UNKNOWN: pikoc-cpp.cpp:1:1: error: {{.*}}'None'

@@ -51,8 +51,9 @@ struct CommandLine {
                                   llvm::cl::desc("FILE.cpp|FILE.mlir|-"),
                                   llvm::cl::cat(category)};
   llvm::cl::opt<std::string> pipe{
-      "pipe", llvm::cl::value_desc("name"),
-      llvm::cl::desc("the pipeline to compile, where a file has several"),
+      "pipe", llvm::cl::value_desc("name,..."),
+      llvm::cl::desc("the pipeline to compile, where a file has several; of "
+                     "several what is written stands one behind the other"),
       llvm::cl::cat(category)};
   llvm::cl::opt<Emit> emit{
       "emit",
@@ -253,6 +254,7 @@ struct CommandLine {
     (void)tune(options);
     return options;
   }
+  std::string pipeName; ///< The one of `pipe` that is compiled.
   CompileOptions getUntuned() const {
     GPUOptions gpu{.threads = gpuThreads,
                    .target = target,
@@ -262,7 +264,7 @@ struct CommandLine {
       (void)gpu.setChips(gpuChip.getValue());
     return {
         .file = file,
-        .pipeName = pipe,
+        .pipeName = pipeName,
         .includeDirs = {includeDirs.begin(), includeDirs.end()},
         .defines = {defines.begin(), defines.end()},
         .check = *getCheck(),
@@ -286,6 +288,20 @@ static int fail(const llvm::Twine &message) {
   return 1;
 }
 
+/// The names between commas; one with arguments of a template may have its own.
+static std::vector<std::string> splitNames(llvm::StringRef text) {
+  std::vector<std::string> names(1);
+  int depth = 0;
+  for (char c : text) {
+    depth += (c == '<') - (c == '>');
+    if (c == ',' && depth == 0)
+      names.emplace_back();
+    else
+      names.back() += c;
+  }
+  return names;
+}
+
 /// What is wrong with options that are fine one by one; empty if nothing.
 static std::string checkOptions(const CommandLine &line) {
   bool isObject = line.getEmit() == Emit::Object && !line.isListing();
@@ -305,6 +321,11 @@ static std::string checkOptions(const CommandLine &line) {
       (line.header.getNumOccurrences() || line.depfile.getNumOccurrences()))
     return "--header and --depfile belong to an object, which --emit=object or "
            "an -o that ends in .o asks for";
+  if (splitNames(line.pipe).size() > 1 &&
+      (isObject || line.listPipes || line.listTunables))
+    return "--pipe: expected one pipeline, because only text is written of "
+           "several, but got '" +
+           line.pipe + "'";
   if (!isObject && llvm::StringRef(line.cpu).contains(','))
     return "--cpu: expected one processor, because only an object has code for "
            "several, but got '" +
@@ -477,6 +498,23 @@ static std::optional<std::string> writeText(const CommandLine &line) {
   return print(*module);
 }
 
+/// The texts of all pipelines that are named; nothing after an error.
+static std::optional<std::string> writeTexts(CommandLine &line) {
+  bool isMLIR = !line.explain && line.getEmit() != Emit::LLVMIR &&
+                line.getEmit() != Emit::Assembly && line.getEmit() != Emit::PTX;
+  std::string texts;
+  for (const std::string &name : splitNames(line.pipe)) {
+    line.pipeName = name;
+    std::optional<std::string> text = writeText(line);
+    if (!text)
+      return std::nullopt;
+    if (!texts.empty())
+      texts += isMLIR ? "\n// -----\n\n" : "\n";
+    texts += *text;
+  }
+  return texts;
+}
+
 /// The object and what belongs to it; false after an error.
 static bool writeObject(const CommandLine &line,
                         support::OutputFiles &outputs) {
@@ -518,6 +556,7 @@ static int compile(int argc, char **argv) {
   llvm::cl::HideUnrelatedOptions(line.category);
   llvm::cl::ParseCommandLineOptions(argc, argv,
                                     "Piko's compiler for pipelines\n");
+  line.pipeName = line.pipe;
   if (std::string wrong = line.readTuned(); !wrong.empty())
     return fail("--tuned: " + wrong);
   if (std::string wrong = checkOptions(line); !wrong.empty())
@@ -527,7 +566,7 @@ static int compile(int argc, char **argv) {
     if (!writeObject(line, outputs))
       return 1;
   } else {
-    std::optional<std::string> text = writeText(line);
+    std::optional<std::string> text = writeTexts(line);
     if (!text)
       return 1;
     if (auto done = outputs.add(line.output, *text); !done)
