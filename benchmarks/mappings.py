@@ -15,8 +15,9 @@ one after the other. Runs take turns. Prints a table in Markdown, a loop a row:
              of the body's frame, over that with the best versions of all its loops
   runtime    the regret of what the runtime chooses
 
-and how many choices are within 5 % and within 15 % of the best. What takes less
-than --least milliseconds is left out, and counted.
+and how many choices are within 5 % and within 15 % of the best. Ways of choosing
+that come to the same versions have the same time: it is the same code. What takes
+less than --least milliseconds is left out, and counted.
 
 With --fit the numbers of the cost model (lib/Transforms/LaneCycles.cpp) are fitted
 to the ratios that were measured, by damped Gauss-Newton steps on the logarithms of
@@ -198,17 +199,43 @@ def is_in_play(mapping, choice, mappings):
             and is_in_play(outer, choice, mappings))
 
 
-def measure_settings(case, settings, rounds):
-    """The median milliseconds of each kernel under each setting, in turn."""
-    times = {setting: {} for setting in settings}
+def run_in_turn(case, settings, rounds):
+    """What kernels report under each setting, by their names: a list each."""
+    reports = {setting: {} for setting in settings}
     for _ in range(rounds):
         for setting in settings:
             for kernel in case.run(setting):
-                times[setting].setdefault(kernel["name"], []).append(
-                    kernel["ms"])
-    return {setting: {name: statistics.median(list_)
+                reports[setting].setdefault(kernel["name"], []).append(kernel)
+    return reports
+
+
+def measure_settings(case, settings, rounds):
+    """The median milliseconds of each kernel under each setting, in turn."""
+    return {setting: {name: statistics.median(one["ms"] for one in list_)
                       for name, list_ in kernels.items()}
-            for setting, kernels in times.items()}
+            for setting, kernels in run_in_turn(case, settings, rounds).items()}
+
+
+def find_versions(kernel):
+    """Which versions of its loops a kernel ran: what is the same code."""
+    choice = {name_of(m): m["runs"] for m in kernel["mappings"]}
+    return frozenset((name_of(m), m["runs"]) for m in kernel["mappings"]
+                     if is_in_play(m, choice, kernel["mappings"]))
+
+
+def find_regrets(reports):
+    """How much longer each way of choosing takes than the best one, of reports by
+    ways, and the least milliseconds. Runs of the same versions are one sample."""
+    samples = {}
+    for kernels in reports.values():
+        for kernel in kernels:
+            samples.setdefault(find_versions(kernel), []).append(kernel["ms"])
+    medians = {versions: statistics.median(times)
+               for versions, times in samples.items()}
+    least = min(medians.values())
+    return {way: statistics.median(medians[find_versions(kernel)]
+                                   for kernel in kernels) / least - 1
+            for way, kernels in reports.items()}, least
 
 
 class Descent:
@@ -273,16 +300,14 @@ def measure_case(arguments, case):
         best |= descent.choice
     names = {"choice": "expected", "best": write_setting(best),
              "runtime": "measured"}
-    times = measure_settings(case, list(names.values()), arguments.rounds + 1)
+    reports = run_in_turn(case, list(names.values()), arguments.rounds + 1)
     found = []
     for descent in descents:
-        at = {key: times[setting][descent.name]
-              for key, setting in names.items()}
-        least = min(at.values())
+        regrets, least = find_regrets({key: reports[setting][descent.name]
+                                       for key, setting in names.items()})
         found.append({
             "case": case.name, "kernel": descent.name, "ms": least,
-            "choice": at["choice"] / least - 1,
-            "runtime": at["runtime"] / least - 1,
+            "choice": regrets["choice"], "runtime": regrets["runtime"],
             "loops": [{"name": name_of(m), "loop": m["loop"],
                        "expected": m["expected_ratio"],
                        "measured": descent.ratios.get(name_of(m)),
