@@ -48,7 +48,7 @@ public:
 private:
   void findMoved(Block &block, bool isSure);
   bool mayMove(Operation *op, bool isSure);
-  /// Whether it is as quickly read again.
+  /// Whether it is as quickly made, or read, again.
   bool isCopied(Value value) const;
   void findResults();
   /// The operations of the first loop, in their order.
@@ -68,7 +68,8 @@ private:
   OpBuilder builder;
   CodeBuilder at;
   llvm::SetVector<Operation *> moved;
-  SmallVector<Value> results; ///< which the second loop takes
+  llvm::DenseSet<Operation *> ofPrimitive; ///< Not of its position alone.
+  SmallVector<Value> results;              ///< which the second loop takes
   /// Where they are kept: a row of one of few arrays, which a processor reads
   /// by one register.
   struct Table {
@@ -106,8 +107,9 @@ bool Distributor::mayMove(Operation *op, bool isSure) {
   });
   if (!isKnown || op->getNumRegions() > 0 || op->getNumResults() == 0)
     return false;
-  if (isa<ItemOp>(op))
-    return true;
+  // A condition may say whether another position is one.
+  if (auto item = dyn_cast<ItemOp>(op))
+    return isSure || item.getPosition() == loop.getInductionVar();
   if (!llvm::all_of(op->getResults(), isNumber))
     return false;
   if (auto get = dyn_cast<GetOp>(op))
@@ -132,9 +134,14 @@ static bool isSeldom(Operation *op, Region &region) {
 
 void Distributor::findMoved(Block &block, bool isSure) {
   for (Operation &op : block.without_terminator()) {
-    if (mayMove(&op, isSure))
+    if (mayMove(&op, isSure)) {
       moved.insert(&op);
-    else if (isa<scf::IfOp, scf::IndexSwitchOp>(op))
+      if (isa<ItemOp>(op) || llvm::any_of(op.getOperands(), [&](Value part) {
+            return ofPrimitive.contains(part.getDefiningOp());
+          }))
+        ofPrimitive.insert(&op);
+    }
+    if (isa<scf::IfOp, scf::IndexSwitchOp>(op))
       for (Region &region : op.getRegions())
         if (!region.empty() && !isSeldom(&op, region))
           findMoved(region.front(), /*isSure=*/false);
@@ -143,7 +150,7 @@ void Distributor::findMoved(Block &block, bool isSure) {
 
 bool Distributor::isCopied(Value value) const {
   Operation *op = value.getDefiningOp();
-  if (isa<ItemOp, GetOp>(op))
+  if (isa<ItemOp, GetOp>(op) || !ofPrimitive.contains(op))
     return true;
   bool isCast =
       isa<arith::ExtSIOp, arith::ExtUIOp, arith::TruncIOp, arith::IndexCastOp,

@@ -10,7 +10,8 @@ piko.pipeline @P rank 2 {
 
   // What follows from a box is computed for eight of them, and written to tables;
   // of one or none they are as they were. What the loop takes is read in front of
-  // it, behind the condition; what the record has is read there as it was.
+  // it, behind the condition; what the record has is read there as it was. The
+  // condition says that there is one beside it, which stays where it is.
   // CHECK-LABEL: piko.kernel @k
   // CHECK:         %[[SEEN:.*]] = memref.alloca() {alignment = 64 : i64} : memref<8xi32>
   // CHECK:         %[[SLOPES:.*]] = memref.alloca() {alignment = 64 : i64} : memref<8xf32>
@@ -25,6 +26,7 @@ piko.pipeline @P rank 2 {
   // CHECK:             vector.store %{{.*}}, %[[SEEN]][%{{.*}}]
   // CHECK:             arith.divf {{.*}} : vector<8xf32>
   // CHECK:             vector.store %{{.*}}, %[[SLOPES]][%{{.*}}]
+  // CHECK-NOT:         piko.cpu.items
   // CHECK:           } else {
   // CHECK:             scf.for %[[I:.*]] = %[[LOWER]] to %[[UPPER]] step %c1 {
   // CHECK:               piko.storage.item
@@ -36,9 +38,12 @@ piko.pipeline @P rank 2 {
   // CHECK:             %[[WORD:.*]] = memref.load %[[SEEN]]
   // CHECK:             %[[IF:.*]] = arith.trunci %[[WORD]] : i32 to i1
   // CHECK:             scf.if %[[IF]] {
-  // CHECK-NEXT:          %[[SLOPE:.*]] = memref.load %[[SLOPES]]
-  // CHECK-NEXT:          scf.for
-  // CHECK:                 arith.mulf %{{.*}}, %[[SLOPE]]
+  // CHECK:               %[[BESIDE:.*]] = piko.storage.item
+  // CHECK:               %[[X:.*]] = piko.get %[[BESIDE]] "x"
+  // CHECK:               %[[SLOPE:.*]] = memref.load %[[SLOPES]]
+  // CHECK:               %[[PRODUCT:.*]] = arith.mulf %[[X]], %[[SLOPE]]
+  // CHECK:               scf.for
+  // CHECK:                 arith.mulf %{{.*}}, %[[PRODUCT]]
   piko.kernel @k {
     %c0 = arith.constant 0 : index
     %c1 = arith.constant 1 : index
@@ -69,9 +74,13 @@ piko.pipeline @P rank 2 {
         %seen = arith.cmpf ogt, %area, %zero : f32
         scf.if %seen {
           %slope = arith.divf %one, %area : f32
+          %i1 = arith.addi %i, %c1 : index
+          %q = piko.storage.item %bins[%i1] : !piko.bins<@Box> -> !piko.prim<@Box>
+          %qx = piko.get %q "x" : !piko.prim<@Box> -> f32
+          %product = arith.mulf %qx, %slope : f32
           scf.for %j = %lo to %hi step %c1 {
             %old = piko.load checked @color[%j : index] "v" : f32
-            %new = arith.mulf %old, %slope : f32
+            %new = arith.mulf %old, %product : f32
             piko.store %new, checked @color[%j : index] "v" : f32
           }
         }
