@@ -48,6 +48,7 @@ public:
 private:
   void findMoved(Block &block, bool isSure);
   bool mayMove(Operation *op, bool isSure);
+  bool varies(Operation *op);
   /// Whether it is as quickly made, or read, again.
   bool isCopied(Value value) const;
   void findResults();
@@ -56,7 +57,7 @@ private:
   void createTables();
   /// The first loop, in front of the original one.
   scf::ForOp writeFirst(Value lower, Value upper);
-  bool isWorthwhile(const IterationLanes &lanes) const;
+  bool isWorthwhile(const IterationLanes &lanes);
   void writeVectors(scf::ForOp first, Value lower, Value upper);
   /// Lets the original loop, which is now the second one, read the tables.
   void readTables(Value lower);
@@ -68,7 +69,8 @@ private:
   OpBuilder builder;
   CodeBuilder at;
   llvm::SetVector<Operation *> moved;
-  llvm::DenseSet<Operation *> ofPrimitive; ///< Not of its position alone.
+  llvm::DenseSet<Operation *> varying;     ///< From turn to turn.
+  llvm::DenseSet<Operation *> ofPrimitive; ///< Not by its position alone.
   SmallVector<Value> results;              ///< which the second loop takes
   /// Where they are kept: a row of one of few arrays, which a processor reads
   /// by one register.
@@ -118,12 +120,20 @@ bool Distributor::mayMove(Operation *op, bool isSure) {
     return isSure && load.getChecked() && !load.getTile() &&
            load.getElements().empty() && !load.getType().isInteger(1) &&
            !written.contains(load.getStateAttr().getAttr());
-  return isForLanes(op) && (isSure ? isMemoryEffectFree(op) : isPure(op));
+  return (!varies(op) || isForLanes(op)) &&
+         (isSure ? isMemoryEffectFree(op) : isPure(op));
 }
 
 /// Sides that are seldom taken are left where they are.
 static bool isSeldom(Operation *op, Region &region) {
   constexpr double least = 0.1;
+  if (region
+          .walk([](Operation *inner) {
+            return inner->hasTrait<Failure>() ? WalkResult::interrupt()
+                                              : WalkResult::advance();
+          })
+          .wasInterrupted())
+    return true; // as a fallback is
   std::optional<double> probability;
   if (auto choice = dyn_cast<scf::IfOp>(op))
     probability = getProbability(choice, region);
@@ -132,10 +142,19 @@ static bool isSeldom(Operation *op, Region &region) {
   return probability && *probability < least;
 }
 
+bool Distributor::varies(Operation *op) {
+  return llvm::any_of(op->getOperands(), [&](Value part) {
+    return part == loop.getInductionVar() ||
+           varying.contains(part.getDefiningOp());
+  });
+}
+
 void Distributor::findMoved(Block &block, bool isSure) {
   for (Operation &op : block.without_terminator()) {
     if (mayMove(&op, isSure)) {
       moved.insert(&op);
+      if (varies(&op))
+        varying.insert(&op);
       if (isa<ItemOp>(op) || llvm::any_of(op.getOperands(), [&](Value part) {
             return ofPrimitive.contains(part.getDefiningOp());
           }))
@@ -232,7 +251,7 @@ scf::ForOp Distributor::writeFirst(Value lower, Value upper) {
   return first;
 }
 
-bool Distributor::isWorthwhile(const IterationLanes &lanes) const {
+bool Distributor::isWorthwhile(const IterationLanes &lanes) {
   if (lanes.getRefusal().at)
     return false;
   // Estimates may be wrong, and a bin's last primitives fill no vector.
@@ -240,7 +259,13 @@ bool Distributor::isWorthwhile(const IterationLanes &lanes) const {
   IterationLanes::Cost cost = lanes.getCost();
   const Cycles &cycles = getCycles(laneCount);
   double tabled = double(results.size()) * cycles.scalarAccess;
-  return cost.vectors + tabled < share * (cost.serial - tabled);
+  // Every second primitive comes to what a condition guards.
+  SmallVector<Operation *> slice = findSlice();
+  auto guarded = double(llvm::count_if(slice, [&](Operation *op) {
+    return op->getParentOp() != loop.getOperation();
+  }));
+  double taken = 1 - 0.5 * guarded / double(slice.size());
+  return cost.vectors + tabled < share * taken * (cost.serial - tabled);
 }
 
 /// A table has a place for each lane: those that have no primitive write, too.
@@ -338,6 +363,8 @@ void Distributor::eraseMoved() {
 }
 
 void Distributor::run() {
+  if (!loop.getInductionVar().getType().isIndex() || loop.getUnsignedCmp())
+    return;
   moveLoopInvariantCode(loop);
   findMoved(*loop.getBody(), /*isSure=*/true);
   findResults();
@@ -373,6 +400,11 @@ void Distributor::run() {
 }
 
 void DistributeLoopsPass::runOnOperation() {
+  if (!llvm::is_contained({4, 8, 16}, laneCount)) {
+    getOperation().emitError("expected 4, 8 or 16 lanes, but got ")
+        << int64_t(laneCount);
+    return signalPassFailure();
+  }
   for (auto kernel : getOperation().getOps<KernelOp>()) {
     llvm::DenseSet<StringAttr> written = getWrittenState(kernel);
     SmallVector<scf::ForOp> loops;

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // piko-form-tiles, for each image that a kernel over bins writes:
-//   1. find whether the kernel alone writes it, and only in the bin that one
-//      thread runs;
+//   1. find whether it writes the image only in the bin that one thread runs;
 //   2. find whether the kernel can begin with the clear value: nothing reads
 //   the
 //      image before, and the kernel is sure to run;
@@ -67,6 +66,9 @@ public:
   std::optional<Reason> whyNot(ImageOp image);
   /// Why another kernel may have written the pixels of an image before.
   std::optional<Reason> whyWritten(ImageOp image);
+  bool isDirty(ImageOp image) {
+    return whyWritten(image) || whyNotClear(image);
+  }
   /// Why the tiles of an image cannot begin with its clear value.
   std::optional<Reason> whyNotClear(ImageOp image);
   int64_t getBytes(ImageOp image);
@@ -270,7 +272,12 @@ static void formTiles(TileFormer former, ArrayRef<ImageOp> images,
   std::optional<Reason> general = former.whyNot();
   auto quote = [](StringRef name) { return ("'" + name + "'").str(); };
   std::string who = "stage " + quote(getCppName(former.getStage()));
-  for (ImageOp image : images) {
+  // Those that begin with the clear value first: they save more.
+  SmallVector<ImageOp> order, others;
+  for (ImageOp image : images)
+    (former.isDirty(image) ? others : order).push_back(image);
+  llvm::append_range(order, others);
+  for (ImageOp image : order) {
     std::string name = quote(image.getSymName());
     std::optional<Reason> reason = general, dirty = former.whyWritten(image);
     if (!reason && !loads)

@@ -98,7 +98,9 @@ static SmallVector<Reference> findReferences(scf::ForOp loop, ItemOp item) {
   SmallVector<Reference> references;
   llvm::DenseSet<Attribute> known;
   loop.walk([&](LoadOp load) {
-    if (load.getTile())
+    auto tile =
+        load.getTile() ? load.getTile().getDefiningOp<TileOp>() : TileOp();
+    if (tile && tile.getClear())
       return; // at hand
     Reference reference{load.getStateAttr(), {}};
     SmallVector<Attribute> names{load.getStateAttr()};

@@ -3,7 +3,7 @@
 // piko-reduce-strength: vectors that grow by the same from turn to turn become
 // induction variables.
 
-#include "Piko/Dialect/Piko/IR/Piko.h"
+#include "Piko/Dialect/Piko/IR/PikoCPU.h"
 #include "Piko/Transforms/Passes.h"
 
 #include "mlir/Dialect/Arith/IR/Arith.h"
@@ -104,7 +104,9 @@ Growth Reducer::findGrowth(Value value) {
   if (auto argument = dyn_cast<BlockArgument>(value))
     return findGrowth(argument);
   Operation *op = value.getDefiningOp();
-  if (op->getNumRegions() > 0 || op->getNumResults() != 1 || !isPure(op))
+  // A condition may say whether a primitive is there.
+  if (op->getNumRegions() > 0 || op->getNumResults() != 1 || !isPure(op) ||
+      isa<ItemOp, GetOp>(op))
     return Growth::Other;
   SmallVector<Growth> parts = llvm::map_to_vector(
       op->getOperands(), [&](Value part) { return getGrowth(part); });
@@ -256,8 +258,10 @@ void Reducer::run() {
   llvm::DenseSet<Operation *> seen;
   for (Value root : findRoots()) {
     int64_t needed = countRegisters(root);
-    if (needed > registers || countOperations(root, seen) < least)
+    llvm::DenseSet<Operation *> with = seen;
+    if (needed > registers || countOperations(root, with) < least)
       continue;
+    seen = std::move(with);
     registers -= needed;
     roots.push_back(root);
   }
@@ -292,6 +296,11 @@ static bool hasLoops(scf::ForOp loop) {
 }
 
 void ReduceStrengthPass::runOnOperation() {
+  if (!llvm::is_contained({4, 8, 16}, laneCount)) {
+    getOperation().emitError("expected 4, 8 or 16 lanes, but got ")
+        << int64_t(laneCount);
+    return signalPassFailure();
+  }
   for (auto kernel : getOperation().getOps<KernelOp>()) {
     SmallVector<scf::ForOp> loops;
     kernel.walk([&](scf::ForOp loop) {

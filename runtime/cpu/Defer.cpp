@@ -58,6 +58,7 @@ void Lane::clear() {
     log.clear();
   emitted = busy = 0;
   scratch = {};
+  tiles.clear();
   deferred.reset();
 }
 

@@ -25,6 +25,7 @@
 #include "cpu/CPUExecutor.h"
 
 #include <atomic>
+#include <deque>
 
 namespace piko::rt {
 
@@ -97,7 +98,7 @@ struct ScratchStack {
 struct PixelTile : pikoir_tile {
   Array<uint8_t> memory;
   int32_t image = -1;
-  bool isCopy = false;
+  bool isOpen = false;
   int64_t first = 0;           ///< Bytes from the image's pixel 0 to the bin's.
   int64_t rows = 0, bytes = 0; ///< Of a row.
 };
@@ -119,8 +120,9 @@ struct alignas(64) Lane : pikoir_writer {
   /// of the next slot, and behind the unit's last.
   uint32_t *slotEnd = nullptr, *slotLimit = nullptr;
   ScratchStack scratch;
-  std::vector<PixelTile> tiles; ///< Of the images of which it has had any.
-  std::unique_ptr<Deferred> deferred;   ///< If there were any.
+  std::deque<PixelTile> tiles;        ///< Of the images of which a run has any.
+  pikoir_tile untiled{};              ///< The image, if memory is refused.
+  std::unique_ptr<Deferred> deferred; ///< If there were any.
   std::vector<pikoir_private> privates; ///< For each reduction of the stage.
   AutotunerThread tuning;               ///< Of the open unit.
   bool reduces = false;                 ///< Some unit of this launch asked.

@@ -31,12 +31,28 @@ static bool compete(int64_t rows, int64_t rowBytes, int64_t pitch) {
   return places * rowBytes < setBytes && rows > ways * places;
 }
 
-static PixelTile &findTile(Lane &lane, int32_t image) {
+/// The lane's tile of an image, or null.
+static PixelTile *findTile(Lane &lane, int32_t image) {
   for (PixelTile &tile : lane.tiles)
     if (tile.image == image)
-      return tile;
-  lane.tiles.emplace_back().image = image;
-  return lane.tiles.back();
+      return &tile;
+  return nullptr;
+}
+
+/// Room for `bytes`; null if memory is refused.
+static PixelTile *makeTile(Lane &lane, int32_t image, int64_t bytes) {
+  try {
+    PixelTile *tile = findTile(lane, image);
+    if (!tile) {
+      tile = &lane.tiles.emplace_back();
+      tile->image = image;
+    }
+    if (tile->memory.size() < bytes)
+      tile->memory = Array<uint8_t>(lane.pipeline->memory, bytes, Use::State);
+    return tile;
+  } catch (...) {
+    return nullptr;
+  }
 }
 
 static void copyRows(uint8_t *to, int64_t toPitch, const uint8_t *from,
@@ -45,9 +61,6 @@ static void copyRows(uint8_t *to, int64_t toPitch, const uint8_t *from,
     std::memcpy(to + y * toPitch, from + y * fromPitch,
                 static_cast<size_t>(bytes));
 }
-
-/// Behind a row what lanes load that have no pixel.
-static constexpr int64_t padding = 64;
 
 extern "C" {
 
@@ -73,38 +86,35 @@ const pikoir_tile *pikoir_open_tile(pikoir_writer *writer, int32_t image,
   int64_t size = p.records[state.record].size;
   int64_t x = bin % stage.grid[0] * stage.binSize[0],
           y = bin / stage.grid[0] * stage.binSize[1];
-  PixelTile &tile = findTile(lane, image);
-  tile.rows = std::min(stage.binSize[1], p.domain[1] - y);
-  tile.bytes = std::min(stage.binSize[0], p.domain[0] - x) * size;
-  tile.first = (y * p.domain[0] + x) * size;
-  tile.isCopy = true;
-  int64_t needed = stage.binSize[0] * stage.binSize[1] * size + padding;
-  if (tile.memory.size() < needed) {
-    try {
-      tile.memory = Array<uint8_t>(lane.pipeline->memory, needed, Use::State);
-    } catch (...) {
-      tile.isCopy = false;
-    }
+  PixelTile *tile =
+      makeTile(lane, image, stage.binSize[0] * stage.binSize[1] * size);
+  if (!tile) {
+    lane.untiled = {state.view.data, p.domain[0]};
+    return &lane.untiled;
   }
-  tile.pitch = tile.isCopy ? stage.binSize[0] : p.domain[0];
-  tile.data = state.view.data;
-  if (!tile.isCopy)
-    return &tile;
-  copyRows(tile.memory.data(), tile.pitch * size, tile.data + tile.first,
-           p.domain[0] * size, tile.rows, tile.bytes);
-  tile.data = tile.memory.data() - (y * tile.pitch + x) * size;
-  return &tile;
+  tile->rows = std::min(stage.binSize[1], p.domain[1] - y);
+  tile->bytes = std::min(stage.binSize[0], p.domain[0] - x) * size;
+  tile->first = (y * p.domain[0] + x) * size;
+  tile->pitch = stage.binSize[0];
+  tile->isOpen = true;
+  copyRows(tile->memory.data(), tile->pitch * size,
+           state.view.data + tile->first, p.domain[0] * size, tile->rows,
+           tile->bytes);
+  tile->data = tile->memory.data() - (y * tile->pitch + x) * size;
+  return tile;
 }
 
 void pikoir_close_tile(pikoir_writer *writer, int32_t image) {
   Lane &lane = *static_cast<Lane *>(writer);
   const pikort_pipeline &p = *lane.pipeline;
-  PixelTile &tile = findTile(lane, image);
+  PixelTile *tile = findTile(lane, image);
+  if (!tile || !tile->isOpen)
+    return;
+  tile->isOpen = false;
   const State &state = p.states[image];
   int64_t size = p.records[state.record].size;
-  if (tile.isCopy)
-    copyRows(state.view.data + tile.first, p.domain[0] * size,
-             tile.memory.data(), tile.pitch * size, tile.rows, tile.bytes);
+  copyRows(state.view.data + tile->first, p.domain[0] * size,
+           tile->memory.data(), tile->pitch * size, tile->rows, tile->bytes);
 }
 
 } // extern "C"

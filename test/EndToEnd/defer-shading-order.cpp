@@ -17,6 +17,7 @@
 //
 // RUN: pikoc %s --pipe Boxes,Neighbours,Loops,Bytes --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=ONCE
 // ONCE-COUNT-4: remark: what is written to 'color' is computed once for each pixel
+// ONCE-NOT: remark: what is written to 'color' is computed once for each pixel
 #include <piko.h>
 
 #include <cmath>

@@ -22,6 +22,7 @@
 //
 // RUN: pikoc %s --pipe Nearest,OneRecord,Returns,LastWins,TwoImages,TwoWays,Points,Behind,Picture,Kinds,Lists --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=ONCE
 // ONCE-COUNT-11: remark: what is written to '{{color|image}}' is computed once for each pixel
+// ONCE-NOT: remark: what is written to '{{color|image}}' is computed once for each pixel
 // RUN: pikoc %s --pipe Counts --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=OFTEN
 // OFTEN-NOT: is computed once for each pixel
 #include <piko.h>

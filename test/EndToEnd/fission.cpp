@@ -13,6 +13,7 @@
 // BEHIND-PIXELS: remark: stage 'shade' runs bin by bin behind stage 'cover'
 // RUN: pikoc %s --pipe Further,Merged,Whole --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=INSIDE
 // INSIDE-COUNT-3: remark: stage 'shade' runs inside stage 'spread'
+// INSIDE-NOT: remark: stage 'shade' runs inside stage 'spread'
 //
 // RUN: %compare_targets %s --cases %s
 // CASE: --pipe Chain --domain 67 35 --count 900

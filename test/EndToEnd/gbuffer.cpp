@@ -30,6 +30,7 @@
 //
 // RUN: pikoc %s --pipe Nearest,OneRecord,TwoWays,Kinds,Line,Bands,Loops,Splats --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=ONCE
 // ONCE-COUNT-8: remark: what is written to '{{color|image|line}}' is computed once for each pixel, by a kernel behind that of stage
+// ONCE-NOT: remark: what is written to '{{color|image|line}}' is computed once for each pixel, by a kernel behind that of stage
 // RUN: pikoc %s --pipe Picture --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=READ
 // READ: remark: what is written to 'color' is computed also where it is overwritten
 // READ: note: the index of this read is not proved to be inside, and would not be tested where it is overwritten

@@ -29,6 +29,7 @@
 //
 // RUN: pikoc %s --pipe Nearest,Network,Newton,Columns,Kinds,Emits,Cells,Corners,Scans --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=LANES
 // LANES-COUNT-9: remark: stage '{{.*}}': these iterations are vectorized for 16 at once
+// LANES-NOT: remark: stage '{{.*}}': these iterations are vectorized for 16 at once
 // RUN: pikoc %s --pipe Sums --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=FEW
 // FEW: remark: stage '{{.*}}': these iterations are vectorized for 16 at once
 // FEW: remark: stage '{{.*}}': these iterations are vectorized for 8 at once

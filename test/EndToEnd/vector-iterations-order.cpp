@@ -17,6 +17,7 @@
 //
 // RUN: pikoc %s --pipe EmitsInLoops,Rows,Shares --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=VECTORS
 // VECTORS-COUNT-3: .cpp:[[#]]:{{[0-9]+}}: remark: stage '{{.*}}': these iterations are vectorized for {{4|8}} at once
+// VECTORS-NOT: .cpp:[[#]]:{{[0-9]+}}: remark: stage '{{.*}}': these iterations are vectorized for {{4|8}} at once
 #include "Inputs/vector-iterations.h"
 
 struct Keeps : piko::Stage<16, 16, 64, Found>, piko::Uses<State> {

@@ -17,6 +17,7 @@
 //
 // RUN: pikoc %s --pipe Averages,Addresses,Repeats,Guards,Tests,Kinds,Olds,Outside --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=VECTORS
 // VECTORS-COUNT-8: remark: stage 'stage': process is vectorized for {{4|8}} primitives at once
+// VECTORS-NOT: remark: stage 'stage': process is vectorized for {{4|8}} primitives at once
 #include <piko.h>
 
 struct Particle {

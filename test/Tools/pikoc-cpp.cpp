@@ -55,7 +55,7 @@ struct Large : piko::Pipe<> {
 // BOTH: piko.pipeline @Large
 // BOTH: // -----
 // BOTH: piko.pipeline @Small
-// ONE: error: --pipe: expected one pipeline, because only text is written of several, but got 'Small,Large'
+// ONE: error: --pipe: expected one pipeline, because only text is written of several in a file, but got 'Small,Large'
 
 // WHICH: pikoc-cpp.cpp:1:1: error: expected the name of one of the file's 2
 // WHICH: pikoc-cpp.cpp:[[#@LINE-18]]:8: note: pipeline 'Small' is defined here

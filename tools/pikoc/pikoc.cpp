@@ -322,9 +322,9 @@ static std::string checkOptions(const CommandLine &line) {
     return "--header and --depfile belong to an object, which --emit=object or "
            "an -o that ends in .o asks for";
   if (splitNames(line.pipe).size() > 1 &&
-      (isObject || line.listPipes || line.listTunables))
+      (isObject || line.listPipes || line.listTunables || line.file == "-"))
     return "--pipe: expected one pipeline, because only text is written of "
-           "several, but got '" +
+           "several in a file, but got '" +
            line.pipe + "'";
   if (!isObject && llvm::StringRef(line.cpu).contains(','))
     return "--cpu: expected one processor, because only an object has code for "

@@ -213,9 +213,9 @@ def FormTiles : Pass<"piko-form-tiles", "::piko::PipelineOp"> {
   let description = [{
     **Requires** the machine level (`piko-form-work`, with a `piko.program`).
 
-    **Does**: takes images that one kernel alone writes in the whole run, and only
-    at pixels of the bin: the bin's pixels become a tile (`piko.tile`), a value of
-    the kernel that is written to the image once, at the bin's end. Where nothing
+    **Does**: takes images that a kernel writes only at pixels of the bin, and that
+    it alone writes in the whole run: the bin's pixels become a tile (`piko.tile`), a
+    value of the kernel that is written to the image once, at the bin's end. Where nothing
     reads the image before, the tile begins with the clear value, and so does what
     lies in bins without primitives; then the program does not clear the image
     any more. With `loads`, which the CPU has, other tiles begin with what is in the

@@ -85,6 +85,9 @@ struct CloseTileLowering : Lowering<CloseTileOp> {
     rewriter.setInsertionPointToStart(choice.thenBlock());
     context.call(rewriter, loc, PIKO_RUNTIME_FUNCTION(pikoir_close_tile),
                  {adaptor.getWriter(), createI32(rewriter, loc, image)});
+    // What follows finds the image again.
+    StateView whole = context.whole(rewriter, op, op.getImage());
+    context.setTile(op, op.getImage(), whole.data, whole.pitch);
     rewriter.eraseOp(op);
     return success();
   }

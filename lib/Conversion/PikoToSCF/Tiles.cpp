@@ -4,7 +4,7 @@
 // behind row. A pixel's numbers lie together, as LLVM forms vectors of what is
 // computed for them where they are stored in a row. Or the tile stays where it
 // is in the image, whose rows are cleared when the bin begins: they are in the
-// cache from then on, and nothing has to be copied.
+// cache from then on. Of one that is not cleared the runtime may make a copy.
 
 #include "Tiles.h"
 
@@ -32,7 +32,7 @@ public:
   void leaveInImage();
 
 private:
-  void mayCopy();
+  void offerCopy();
   ArrayRef<int64_t> getExtents() {
     return tile.getTile().getType().getExtents();
   }
@@ -296,10 +296,10 @@ static CellRangeOp findRange(Operation *op) {
 
 /// Lets the runtime copy the pixels of a bin that has many primitives. What is
 /// cleared first is in the cache from then on: it was measured to gain nothing.
-void TileLowering::mayCopy() {
+void TileLowering::offerCopy() {
   auto units = tile->getParentOfType<scf::ForallOp>();
   CellRangeOp range = findRange(tile);
-  if (!mayCompete(getExtents()) || !range)
+  if (!units || !mayCompete(getExtents()) || !range)
     return;
   auto writers = units.getBody()->getOps<OpenWriterOp>();
   if (writers.empty())
@@ -319,12 +319,12 @@ void TileLowering::mayCopy() {
 }
 
 void TileLowering::leaveInImage() {
-  if (!tile.getClear())
-    mayCopy();
   if (tile.getClear()) {
     findBin();
     createChoice(/*withElse=*/false);
     clearImage();
+  } else {
+    offerCopy();
   }
   for (Operation *user : llvm::make_early_inc_range(tile->getUsers()))
     llvm::TypeSwitch<Operation *>(user)
