@@ -57,3 +57,25 @@ piko.pipeline @P rank 2 {
     piko.storage.close_bins %bins : !piko.bins<@F>
   }
 }
+
+// -----
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+
+piko.pipeline @P rank 2 {
+  piko.image @seen : @F rank 2
+  piko.image @other : @F rank 2
+  piko.source @a
+  piko.stage @a bins [16, 16] threads 1 : @F -> [] {}
+  piko.kernel @k {
+    %c0 = arith.constant 0 : index
+    %bins = piko.storage.open_bins @a : !piko.bins<@F>
+    %w = piko.cpu.open_writer %bins[%c0] : !piko.bins<@F>
+    %copied = piko.cpu.open_tile @seen[%c0] of %w for %c0
+    piko.cpu.close_tile @seen of %w if %copied
+    // expected-error @+1 {{'piko.cpu.close_tile' op expected what an open_tile of @other and this writer says}}
+    piko.cpu.close_tile @other of %w if %copied
+    piko.cpu.close_writer %w
+    piko.storage.close_bins %bins : !piko.bins<@F>
+  }
+}

@@ -241,17 +241,22 @@ static LogicalResult verifyImage(Operation *op, FlatSymbolRefAttr image) {
 }
 
 LogicalResult CloseTileOp::verifySymbolUses(SymbolTableCollection &) {
-  return verifyImage(*this, getImageAttr());
+  if (failed(verifyImage(*this, getImageAttr())))
+    return failure();
+  auto open = getCopied().getDefiningOp<OpenTileOp>();
+  if (!open || open.getImageAttr() != getImageAttr() ||
+      open.getWriter() != getWriter())
+    return emitOpError("expected what an open_tile of ")
+           << getImageAttr() << " and this writer says";
+  return success();
 }
 
 LogicalResult OpenTileOp::verifySymbolUses(SymbolTableCollection &) {
   if (failed(verifyImage(*this, getImageAttr())))
     return failure();
-  bool isClosed = llvm::any_of(
-      (*this)->getBlock()->getOps<CloseTileOp>(), [&](CloseTileOp close) {
-        return close.getImageAttr() == getImageAttr() &&
-               (*this)->isBeforeInBlock(close);
-      });
+  bool isClosed = llvm::any_of(getCopied().getUsers(), [&](Operation *user) {
+    return isa<CloseTileOp>(user) && user->getBlock() == (*this)->getBlock();
+  });
   if (!isClosed)
     return emitOpError("expected it to be closed in its block");
   return success();
