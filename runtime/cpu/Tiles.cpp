@@ -86,16 +86,17 @@ const pikoir_tile *pikoir_open_tile(pikoir_writer *writer, int32_t image,
   int64_t size = p.records[state.record].size;
   int64_t x = bin % stage.grid[0] * stage.binSize[0],
           y = bin / stage.grid[0] * stage.binSize[1];
-  PixelTile *tile =
-      makeTile(lane, image, stage.binSize[0] * stage.binSize[1] * size);
+  int64_t width = std::min(stage.binSize[0], p.domain[0]),
+          rows = std::min(stage.binSize[1], p.domain[1] - y);
+  PixelTile *tile = makeTile(lane, image, width * rows * size);
   if (!tile) {
     lane.untiled = {state.view.data, p.domain[0]};
     return &lane.untiled;
   }
-  tile->rows = std::min(stage.binSize[1], p.domain[1] - y);
-  tile->bytes = std::min(stage.binSize[0], p.domain[0] - x) * size;
+  tile->rows = rows;
+  tile->bytes = std::min(width, p.domain[0] - x) * size;
   tile->first = (y * p.domain[0] + x) * size;
-  tile->pitch = stage.binSize[0];
+  tile->pitch = width;
   tile->isOpen = true;
   copyRows(tile->memory.data(), tile->pitch * size,
            state.view.data + tile->first, p.domain[0] * size, tile->rows,

@@ -29,25 +29,15 @@ void setup(pikort_pipeline *p) {
   pikoir_declare_state(p, 0, "pixels", PIKORT_IMAGE, 1, 2, -1, &clear);
   int64_t bins[] = {64, 64};
   pikoir_declare_stage(p, 0, "draw", 0, bins, PIKOIR_DIRECT_MAP, 0,
-                       PIKOIR_PLACED | PIKOIR_WRITES, 0);
+                       PIKOIR_WRITES, 0);
+  pikoir_declare_state(p, 1, "others", PIKORT_IMAGE, 1, 2, -1, &clear);
   pikoir_declare_source(p, 0, 0);
 }
 
 int32_t run(pikort_pipeline *p) {
   pikoir_clear(p, 0);
-  const pikoir_input *in = pikoir_begin_source(p, 0);
-  if (!in)
-    return pikoir_status(p);
-  for (int64_t u = 0; u < in->unit_count; ++u) {
-    pikoir_writer *w = pikoir_open_source(p, 0, u);
-    for (int64_t i = in->units[u].begin; i < in->units[u].end; ++i) {
-      pikoir_place_source(w, 0);
-      pikoir_next(w);
-    }
-    pikoir_close(w);
-  }
-  pikoir_end_source(p, 0);
-  in = pikoir_begin(p, 0);
+  pikoir_clear(p, 1);
+  const pikoir_input *in = pikoir_begin(p, 0);
   if (!in)
     return pikoir_status(p);
   for (int64_t u = 0; u < in->unit_count; ++u) {
@@ -138,6 +128,43 @@ TEST_F(Tiles, TakeTurns) {
     pikoir_close_tile(w, 0);
   };
   draw(128, 64);
+}
+
+// Two images at a time, and what no tile is closed of is left alone.
+TEST_F(Tiles, OfTwoImages) {
+  act = [](pikort_pipeline *p, pikoir_writer *w) {
+    pikoir_close_tile(w, 0);
+    const pikoir_tile *first = pikoir_open_tile(w, 0, 0);
+    const pikoir_tile *second = pikoir_open_tile(w, 1, 0);
+    reinterpret_cast<Pixel *>(first->data)[3].value = 6;
+    reinterpret_cast<Pixel *>(second->data)[3].value = 7;
+    pikoir_close_tile(w, 0);
+    pikoir_close_tile(w, 1);
+    for (int32_t image : {0, 1})
+      EXPECT_EQ(
+          reinterpret_cast<Pixel *>(pikoir_get_state(p, image)->data)[3].value,
+          6 + image);
+  };
+  draw(128, 64);
+}
+
+// Where memory is refused it is the image that is changed.
+TEST_F(Tiles, WithoutMemory) {
+  int64_t before = -1, pitch = 0;
+  act = [&](pikort_pipeline *p, pikoir_writer *w) {
+    const pikoir_state *image = pikoir_get_state(p, 0);
+    pikort_set_memory_limit(p, 1);
+    const pikoir_tile *tile = pikoir_open_tile(w, 0, 1);
+    before = tile->data - image->data;
+    pitch = tile->pitch;
+    reinterpret_cast<Pixel *>(tile->data)[64].value = 9;
+    pikoir_close_tile(w, 0);
+    pikort_set_memory_limit(p, 0);
+    EXPECT_EQ(reinterpret_cast<Pixel *>(image->data)[64].value, 9);
+  };
+  draw(128, 64);
+  EXPECT_EQ(before, 0);
+  EXPECT_EQ(pitch, 128);
 }
 
 } // namespace

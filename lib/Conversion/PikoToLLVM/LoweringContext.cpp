@@ -226,6 +226,24 @@ void LoweringContext::setTile(Operation *op, StringRef image, Value data,
   view.pitch = pitch;
 }
 
+Value LoweringContext::tileLeast(OpBuilder &builder, Operation *op,
+                                 int32_t stage, int32_t image) {
+  auto parent = op->getParentOfType<func::FuncOp>();
+  constexpr RuntimeFunction function = PIKO_RUNTIME_FUNCTION(pikoir_tile_least);
+  Value &known =
+      queries[parent]
+             [(function.name + "/" + Twine(stage) + "/" + Twine(image)).str()];
+  if (known)
+    return known;
+  OpBuilder::InsertionGuard guard(builder);
+  builder.setInsertionPointToStart(&parent.getBody().front());
+  Location loc = parent.getLoc();
+  return known = call(builder, loc, function,
+                      {frame(op), createI32(builder, loc, stage),
+                       createI32(builder, loc, image)})
+                     .getResult();
+}
+
 Value LoweringContext::query(OpBuilder &builder, Operation *op,
                              const RuntimeFunction &function,
                              std::optional<int32_t> stage, int64_t dim) {

@@ -119,6 +119,10 @@ public:
   /// The image itself, of which bins in front may have had tiles.
   const StateView &whole(mlir::OpBuilder &builder, mlir::Operation *op,
                          mlir::StringRef image);
+  /// How many primitives a bin must have that a copy of its pixels pays (i64):
+  /// asked once, where the kernel around an operation begins.
+  mlir::Value tileLeast(mlir::OpBuilder &builder, mlir::Operation *op,
+                        int32_t stage, int32_t image);
   /// Entry `dim` (i64) of what one of the runtime's queries (the domain, or the
   /// grid of a stage) points to.
   mlir::Value query(mlir::OpBuilder &builder, mlir::Operation *op,

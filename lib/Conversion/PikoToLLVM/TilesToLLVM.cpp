@@ -22,13 +22,12 @@ struct OpenTileLowering : Lowering<OpenTileOp> {
     if (failed(stage))
       return failure();
     const PipelineNumbers &numbers = context.numbers(op);
-    Value image = createI32(rewriter, loc,
-                            numbers.states.lookup(op.getImageAttr().getAttr()));
+    int32_t number = numbers.states.lookup(op.getImageAttr().getAttr());
     StateView whole = context.whole(rewriter, op, op.getImage());
     Value pays = arith::CmpIOp::create(
         rewriter, loc, arith::CmpIPredicate::sge,
         toI64(rewriter, loc, adaptor.getCount()),
-        createLeast(rewriter, op, numbers.stages.lookup(*stage)));
+        context.tileLeast(rewriter, op, numbers.stages.lookup(*stage), number));
     auto choice = scf::IfOp::create(
         rewriter, loc, TypeRange{pointer(rewriter), rewriter.getI64Type()},
         pays, /*withElseRegion=*/true);
@@ -38,7 +37,7 @@ struct OpenTileLowering : Lowering<OpenTileOp> {
       Value tile =
           context
               .call(rewriter, loc, PIKO_RUNTIME_FUNCTION(pikoir_open_tile),
-                    {adaptor.getWriter(), image,
+                    {adaptor.getWriter(), createI32(rewriter, loc, number),
                      toI64(rewriter, loc, adaptor.getBin())})
               .getResult();
       Value data =
@@ -53,22 +52,6 @@ struct OpenTileLowering : Lowering<OpenTileOp> {
                     choice.getResult(1));
     rewriter.replaceOp(op, pays);
     return success();
-  }
-
-private:
-  /// Asked once, where the kernel begins.
-  Value createLeast(OpBuilder &builder, OpenTileOp op, int32_t stage) const {
-    auto function = op->getParentOfType<func::FuncOp>();
-    OpBuilder::InsertionGuard guard(builder);
-    builder.setInsertionPointToStart(&function.getBody().front());
-    Location loc = op.getLoc();
-    int32_t image =
-        context.numbers(op).states.lookup(op.getImageAttr().getAttr());
-    return context
-        .call(builder, loc, PIKO_RUNTIME_FUNCTION(pikoir_tile_least),
-              {context.frame(op), createI32(builder, loc, stage),
-               createI32(builder, loc, image)})
-        .getResult();
   }
 };
 
