@@ -232,7 +232,9 @@ def find_regrets(reports):
             samples.setdefault(find_versions(kernel), []).append(kernel["ms"])
     medians = {versions: statistics.median(times)
                for versions, times in samples.items()}
-    least = min(medians.values())
+    # What the runtime tried in one run alone is no sample.
+    least = min(medians[versions] for versions, times in samples.items()
+                if len(times) > 1)
     return {way: statistics.median(medians[find_versions(kernel)]
                                    for kernel in kernels) / least - 1
             for way, kernels in reports.items()}, least

@@ -16,7 +16,7 @@
 
 #include "mlir/Dialect/Math/IR/Math.h"
 #include "mlir/Dialect/Vector/IR/VectorOps.h"
-#include "mlir/IR/PatternMatch.h"
+#include "mlir/IR/Matchers.h"
 #include "mlir/Interfaces/SideEffectInterfaces.h"
 #include "mlir/Transforms/LoopInvariantCodeMotionUtils.h"
 
@@ -58,7 +58,7 @@ private:
   /// The first loop, in front of the original one.
   scf::ForOp writeFirst(Value lower, Value upper);
   bool isWorthwhile(const IterationLanes &lanes);
-  void writeVectors(scf::ForOp first, Value lower, Value upper);
+  void writeVectors(const IterationLanes &lanes, Value lower, Value upper);
   /// Lets the original loop, which is now the second one, read the tables.
   void readTables(Value lower);
   void eraseMoved();
@@ -71,14 +71,12 @@ private:
   llvm::SetVector<Operation *> moved;
   llvm::DenseSet<Operation *> varying;     ///< From turn to turn.
   llvm::DenseSet<Operation *> ofPrimitive; ///< Not by its position alone.
-  SmallVector<Value> results;              ///< which the second loop takes
-  /// Where they are kept: a row of one of few arrays, which a processor reads
-  /// by one register.
+  /// A row of one of few arrays, which a processor reads by one register.
   struct Table {
     Value array;
-    int64_t begin;
+    int64_t begin = 0;
   };
-  SmallVector<Table> tables;
+  llvm::MapVector<Value, Table> results; ///< which the second loop takes
   SmallVector<Value> arrays;
 };
 
@@ -97,7 +95,9 @@ static bool isNumber(Value value) {
 
 /// Whether lanes need not compute it one by one.
 static bool isForLanes(Operation *op) {
-  return hasVectorForm(op) && (!isIntegerDivision(op) || isDividedAsFloats(op));
+  return hasVectorForm(op) &&
+         (!isIntegerDivision(op) || isDividedAsFloats(op) ||
+          matchPattern(op->getOperand(1), m_Constant()));
 }
 
 /// `isSure`: the primitive's turn comes there.
@@ -184,12 +184,12 @@ void Distributor::findResults() {
       if (!isCopied(result) &&
           llvm::any_of(result.getUsers(),
                        [&](Operation *user) { return !moved.contains(user); }))
-        results.push_back(result);
+        results[result];
 }
 
 SmallVector<Operation *> Distributor::findSlice() const {
   llvm::DenseSet<Operation *> needed;
-  SmallVector<Value> work(results);
+  SmallVector<Value> work = llvm::to_vector(llvm::make_first_range(results));
   while (!work.empty()) {
     Operation *op = work.pop_back_val().getDefiningOp();
     if (op && moved.contains(op) && needed.insert(op).second)
@@ -210,20 +210,18 @@ static Type getTableType(Type type) {
 }
 
 void Distributor::createTables() {
-  llvm::MapVector<Type, int64_t> counts;
-  for (Value result : results)
-    tables.push_back(
-        {Value(), laneCount * counts[getTableType(result.getType())]++});
+  llvm::MapVector<Type, SmallVector<Value>> ofType;
+  for (Value result : llvm::make_first_range(results))
+    ofType[getTableType(result.getType())].push_back(result);
   constexpr int64_t lineSize = 64;
-  llvm::DenseMap<Type, Value> made;
-  for (auto [type, count] : counts) {
+  for (auto &[type, values] : ofType) {
+    auto count = static_cast<int64_t>(values.size());
     arrays.push_back(memref::AllocaOp::create(
         builder, at.loc, MemRefType::get({laneCount * count}, type),
         builder.getI64IntegerAttr(lineSize)));
-    made[type] = arrays.back();
+    for (auto [number, value] : llvm::enumerate(values))
+      results[value] = {arrays.back(), laneCount * int64_t(number)};
   }
-  for (auto [result, table] : llvm::zip(results, tables))
-    table.array = made[getTableType(result.getType())];
 }
 
 scf::ForOp Distributor::writeFirst(Value lower, Value upper) {
@@ -237,14 +235,14 @@ scf::ForOp Distributor::writeFirst(Value lower, Value upper) {
     Operation *copy = builder.clone(*op, mapping);
     for (auto [result, made] :
          llvm::zip(op->getResults(), copy->getResults())) {
-      auto *found = llvm::find(results, result);
+      auto *found = results.find(result);
       if (found == results.end())
         continue;
       Type type = getTableType(made.getType());
       Value value = made;
       if (type != made.getType())
         value = arith::ExtUIOp::create(builder, at.loc, type, value);
-      const Table &table = tables[found - results.begin()];
+      const Table &table = found->second;
       at.store(value, table.array, at.add(place, at.index(table.begin)));
     }
   }
@@ -281,8 +279,9 @@ static void storeAllLanes(Operation *root, ArrayRef<Value> arrays) {
 }
 
 /// Few primitives take less one by one.
-void Distributor::writeVectors(scf::ForOp first, Value lower, Value upper) {
-  IterationLanes lanes(first, laneCount);
+void Distributor::writeVectors(const IterationLanes &lanes, Value lower,
+                               Value upper) {
+  scf::ForOp first = lanes.getLoop();
   OpBuilder::InsertionGuard guard(builder);
   builder.setInsertionPoint(first);
   int64_t few = std::max<int64_t>(laneCount / 4, 2);
@@ -329,19 +328,19 @@ static Operation *findFirstUse(Value value, Block *block) {
 
 void Distributor::readTables(Value lower) {
   // What moved, and is not read again, has no uses from now on.
-  SmallVector<Value> values;
-  for (Value result : results) {
+  SmallVector<std::pair<Value, Table>> values;
+  for (auto [result, table] : results) {
     // All uses by one value, whose place is then found.
     auto stub = UnrealizedConversionCastOp::create(
         builder, at.loc, result.getType(), ValueRange());
-    result.replaceUsesWithIf(stub.getResult(0), [&](OpOperand &use) {
+    Value(result).replaceUsesWithIf(stub.getResult(0), [&](OpOperand &use) {
       return !moved.contains(use.getOwner()) &&
              loop->isAncestor(use.getOwner());
     });
-    values.push_back(stub.getResult(0));
+    values.emplace_back(stub.getResult(0), table);
   }
   eraseMoved();
-  for (auto [value, table] : llvm::zip(values, tables)) {
+  for (auto [value, table] : values) {
     Operation *stub = value.getDefiningOp();
     if (!value.use_empty()) {
       builder.setInsertionPoint(
@@ -382,13 +381,14 @@ void Distributor::run() {
                             arith::IntegerOverflowFlags::nsw);
   Value upper = at.min(behind, end);
   scf::ForOp first = writeFirst(lower, upper);
-  if (!isWorthwhile(IterationLanes(first, laneCount))) {
+  IterationLanes lanes(first, laneCount);
+  if (!isWorthwhile(lanes)) {
     blocks.erase();
     for (Value array : arrays)
       array.getDefiningOp()->erase();
     return;
   }
-  writeVectors(first, lower, upper);
+  writeVectors(lanes, lower, upper);
   loop->moveBefore(blocks.getBody()->getTerminator());
   loop.setLowerBound(lower);
   loop.setUpperBound(upper);

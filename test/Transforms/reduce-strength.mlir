@@ -55,6 +55,47 @@ piko.pipeline @P rank 2 {
     }
   }
 
+  // A difference from what does not grow falls, a product grows by the factor's
+  // multiple, also behind a condition; a primitive that the condition says is
+  // there is not read in front of the loop.
+  // CHECK-LABEL: piko.kernel @kinds
+  // CHECK:         %[[STEP:.*]] = arith.constant dense<-3> : vector<8xi32>
+  // CHECK:         scf.forall
+  // CHECK-NOT:       piko.storage.item
+  // CHECK:           scf.for {{.*}} iter_args(%[[FALLS:.*]] = %{{.*}}) -> (vector<8xi32>)
+  // CHECK:             scf.if
+  // CHECK-NEXT:          piko.storage.item
+  // CHECK:               arith.addi %[[FALLS]], %
+  // CHECK:             arith.addi %[[FALLS]], %[[STEP]] : vector<8xi32>
+  piko.kernel @kinds {
+    %c0 = arith.constant 0 : index
+    %i0 = arith.constant 0 : i32
+    %i1 = arith.constant 1 : i32
+    %i3 = arith.constant 3 : i32
+    %i16 = arith.constant 16 : i32
+    %all = arith.constant dense<true> : vector<8xi1>
+    %lanes = arith.constant dense<[0, 1, 2, 3, 4, 5, 6, 7]> : vector<8xi32>
+    %bins = piko.storage.open_bins @a : !piko.bins<@Box>
+    %units = piko.storage.unit_count %bins : !piko.bins<@Box>
+    scf.forall (%u) in (%units) {
+      %begin, %end = piko.storage.cell_range %bins[%u, %u] : !piko.bins<@Box>
+      %any = arith.cmpi slt, %begin, %end : index
+      scf.for %row = %i0 to %i16 step %i1 : i32 {
+        scf.if %any {
+          %p = piko.storage.item %bins[%begin] : !piko.bins<@Box> -> !piko.prim<@Box>
+          %x = piko.get %p "x" : !piko.prim<@Box> -> i32
+          %xs = vector.broadcast %x : i32 to vector<8xi32>
+          %three = arith.muli %row, %i3 : i32
+          %shared = vector.broadcast %three : i32 to vector<8xi32>
+          %falls = arith.subi %lanes, %shared : vector<8xi32>
+          %sum = arith.addi %falls, %xs : vector<8xi32>
+          %at = arith.index_cast %row : i32 to index
+          piko.cpu.scatter %sum, consecutive @seen[%c0, %at : index, index] "k" mask %all : vector<8xi1>, vector<8xi32>
+        }
+      }
+    }
+  }
+
   // A broadcast alone is one operation, as is a sum; and loops around others stay.
   // CHECK-LABEL: piko.kernel @left
   // CHECK:         scf.for %{{.*}} = %{{.*}} to %{{.*}} step %c1_i32 : i32 {

@@ -302,8 +302,9 @@ def DistributeLoops : Pass<"piko-distribute-loops", "::piko::PipelineOp"> {
     ```
 
     **Limits**: loops of which this is expected to take less, by the cost model of
-    `piko-vectorize`; what is read of state behind a condition stays there, and
-    what the text says is seldom (`[[unlikely]]`).
+    `piko-vectorize`, if every second primitive comes to what conditions guard. What
+    is read of state behind a condition stays there, and so do sides that the text
+    says are seldom taken (`[[unlikely]]`), or that test what may fail.
   }];
   let dependentDialects = ["::mlir::arith::ArithDialect",
                            "::mlir::math::MathDialect",
