@@ -105,7 +105,7 @@ def Piko_CloseTileOp : Piko_CPUOp<"close_tile", [
     DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
   let summary = "writes a copy of a bin's pixels to the image";
   let description = [{
-    Of the `piko.cpu.open_tile` whose result it takes; see there.
+    See `piko.cpu.open_tile`, whose result it takes.
   }];
   let arguments = (ins FlatSymbolRefAttr:$image, Piko_WriterType:$writer,
                        I1:$copied);
