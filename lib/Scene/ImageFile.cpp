@@ -6,11 +6,11 @@
 //
 //===----------------------------------------------------------------------===//
 #include "ImageModule.h"
+#include "LoadedModule.h"
 
 #include "Piko/Support/HeldSignals.h"
 #include "Piko/Support/OutputFile.h"
 
-#include <dlfcn.h>
 #include <png.h>
 
 using namespace piko;
@@ -26,13 +26,13 @@ static Error failTo(const char *what, const std::string &path,
 
 /// Loads the module at the first call.
 static Result<const ImageFunctions *> getFunctions() {
-  static void *module = dlopen(imageModuleFile, RTLD_NOW | RTLD_LOCAL);
-  void *symbol = module ? dlsym(module, imageModuleSymbol) : nullptr;
-  if (!symbol)
+  const auto *functions =
+      findInModule<ImageFunctions>(imageModuleFile, imageModuleSymbol);
+  if (!functions)
     return Error{std::string("without ") + imageModuleFile +
                  " Piko writes PNG alone and reads no image; `make build` "
                  "builds it, with OpenImageIO"};
-  return static_cast<const ImageFunctions *>(symbol);
+  return functions;
 }
 
 // A full disk must not cut a picture, and libpng and libjpeg look at no

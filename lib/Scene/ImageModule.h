@@ -1,9 +1,7 @@
 //===- ImageModule.h - OpenImageIO, loaded when needed ----------*- C++ -*-===//
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// OpenImageIO comes with 250 libraries, which take longer to load than a cached
-// pipeline; so the code that uses it is a module of its own, and a build may be
-// without it. Its errors say why alone; ImageFile.cpp says what of which file.
+// Its errors say why alone; ImageFile.cpp says what of which file.
 //
 //===----------------------------------------------------------------------===//
 #ifndef PIKO_LIB_SCENE_IMAGEMODULE_H
