@@ -4,6 +4,7 @@
 
 #include "HeaderWriter.h"
 
+#include "ProgramSymbol.h"
 #include "RecordWriter.h"
 #include "StateMembers.h"
 
@@ -16,30 +17,6 @@
 
 using namespace piko;
 using llvm::StringRef;
-
-/// Letters, digits and '_' stay; "::" and all else become '_', with the code of
-/// what is rare.
-static std::string mangle(StringRef name) {
-  std::string result;
-  while (!name.empty()) {
-    if (name.consume_front("::")) {
-      result += '_';
-      continue;
-    }
-    char c = name.front();
-    name = name.drop_front();
-    if (llvm::isAlnum(c) || c == '_')
-      result += c;
-    else
-      result += "_" + llvm::utohexstr(static_cast<unsigned char>(c)) + "_";
-  }
-  return result;
-}
-
-std::string piko::getProgramSymbol(StringRef nameSpace, StringRef pipeline) {
-  std::string prefix = nameSpace.empty() ? "" : mangle(nameSpace) + "_";
-  return prefix + mangle(pipeline) + "_program";
-}
 
 /// The record of state that the host has; null for all else.
 static mlir::FlatSymbolRefAttr getHostRecord(mlir::Operation *op) {

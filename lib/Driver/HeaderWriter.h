@@ -11,10 +11,6 @@
 
 namespace piko {
 
-/// The symbol of a pipeline's pikort_program.
-std::string getProgramSymbol(llvm::StringRef nameSpace,
-                             llvm::StringRef pipeline);
-
 /// The text of the header for a pipeline of the authored level: a class in the
 /// namespace, with the records, state and sources that the host sees.
 std::string writeHostHeader(PipelineOp pipeline, llvm::StringRef file,

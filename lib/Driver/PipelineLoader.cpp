@@ -2,7 +2,7 @@
 //
 // From a pipeline's text to a program in memory.
 
-#include "Piko/Driver/PipelineLoader.h"
+#include "LibraryLoader.h"
 
 #include "Piko/Driver/DeepStack.h"
 #include "Piko/Driver/ObjectCompiler.h"
@@ -96,6 +96,8 @@ static std::unique_ptr<LoadedProgram> load(CompileOptions source,
 std::unique_ptr<LoadedProgram> piko::loadPipeline(const std::string &file,
                                                   const LoadOptions &options,
                                                   std::string &diagnostics) {
+  if (isPipelineLibrary(file))
+    return loadFromLibrary(file, options, diagnostics);
   return load({.file = file}, options, diagnostics);
 }
 

@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <cstring>
 #include <stdexcept>
+#include <string_view>
 
 using namespace piko;
 using namespace piko::replay;
@@ -111,6 +112,50 @@ std::vector<std::string> replay::compareOutcomes(const Outcome &expected,
       differences.push_back("'" + name + "'" + what);
   }
   return differences;
+}
+
+namespace {
+
+/// FNV-1a, of bytes one after the other.
+class Hash {
+public:
+  void add(std::string_view bytes) {
+    for (char byte : bytes)
+      value = (value ^ static_cast<unsigned char>(byte)) * 0x100000001b3;
+  }
+  void addNumber(int32_t type, const char *at) {
+    if (type == PIKORT_F32)
+      return addFloat<float>(at);
+    if (type == PIKORT_F64)
+      return addFloat<double>(at);
+    add({at, size_t(1) << (type - PIKORT_I8)});
+  }
+
+  uint64_t value = 0xcbf29ce484222325;
+
+private:
+  template <class T> void addFloat(const char *at) {
+    auto number = read<T>(at);
+    add(number != number ? std::string_view("nan")
+                         : std::string_view(at, sizeof(T)));
+  }
+};
+
+} // namespace
+
+uint64_t replay::hashOutcome(const Outcome &outcome) {
+  Hash hash;
+  hash.add(outcome.error);
+  for (const auto &[name, records] : outcome.state) {
+    hash.add(name);
+    for (int64_t i = 0; i < int64_t(records.bytes.size()) / records.size; ++i)
+      for (const Field &field : records.fields)
+        for (int64_t e = 0; e < field.elements; ++e)
+          hash.addNumber(field.type,
+                         &records.bytes[size_t(i * records.size + field.offset +
+                                               e * field.stride)]);
+  }
+  return hash.value;
 }
 
 static void check(pikort_pipeline *pipeline, int32_t code) {

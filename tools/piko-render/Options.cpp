@@ -17,7 +17,9 @@ const char *const render::usage =
 
 Compiles a pipeline that uses the types of piko/scene.h, renders a scene with
 it, and says how long a frame took. Or runs any pipeline on what an application
-has fed and bound, which pikort_capture or $PIKO_CAPTURE has written.
+has fed and bound, which pikort_capture or $PIKO_CAPTURE has written. In place
+of the text there may be what was compiled ahead of time: FILE.so, a shared
+library of pikoc's objects.
 
   --pipe NAME            which pipeline of the file (the only one)
   --target cpu|cuda|auto|gpu-on-cpu|reference
@@ -76,6 +78,8 @@ Of scenes only:
   --warmup N --frames N  untimed and timed frames (5 30)
   --seconds S            stop early after so long, but with 3 timed frames at
                          least (1000)
+  --reruns N             run so many frames more, each of which must leave the
+                         same (0)
   --out IMAGE            write the last frame: .png, .exr, .ppm, ...; may be
                          repeated
   --against TARGET,...   run once on each of these, too (as for --target, or a
@@ -164,6 +168,7 @@ private:
         {"--strip", [&] { options.stripSize = size(name); }},
         {"--warmup", [&] { options.warmup = integer(name, 0, maxInt); }},
         {"--frames", [&] { options.frames = integer(name, 1, maxInt); }},
+        {"--reruns", [&] { options.reruns = integer(name, 0, maxInt); }},
         {"--seconds", [&] { options.seconds = number(name); }},
         {"--out", [&] { options.images.push_back(value(name)); }},
         {"--against", [&] { parseAgainst(value(name)); }},

@@ -25,6 +25,7 @@ struct Options {
   int threads = 0;
   int64_t memoryBudget = 0, stripSize = 0;
   int warmup = 5, frames = 30;
+  int reruns = 0; ///< more frames, whose pictures must be that of the last
   double seconds = 1000;
   std::vector<std::string> images; ///< to write
   std::string mappings; ///< as pikort_set_mappings takes it; "" = unsaid

@@ -123,8 +123,8 @@ const char *nameTarget(const Options &options, pikort_pipeline *pipeline) {
   case GPUTarget::Auto:
     return pikort_processor(pipeline) == std::string_view("cuda") ? "cuda"
                                                                   : "cpu";
-  default:
-    return "cpu";
+  default: // a library has code for what it was made for
+    return isOnDevice(pipeline) ? "cuda" : "cpu";
   }
 }
 

@@ -115,15 +115,29 @@ Result<Picture> readPicture(const Frame &frame) {
     return picture;
   }
   try {
-    uint64_t hash = empty;
-    for (const auto &[name, records] :
-         replay::readOutcome(frame.pipeline()).state)
-      hash = addToHash(hash, std::as_bytes(std::span(records.bytes)));
-    picture.hash = textOfHash(hash);
+    picture.hash =
+        textOfHash(replay::hashOutcome(replay::readOutcome(frame.pipeline())));
     return picture;
   } catch (const std::runtime_error &error) {
     return Error{error.what()};
   }
+}
+
+/// Each frame more leaves the same.
+Result<Done> rerun(const Options &options, const Frame &frame,
+                   const std::string &hash) {
+  for (int i = 1; i <= options.reruns; ++i) {
+    if (pikort_run(frame.pipeline()) != PIKORT_OK)
+      return errorOf(frame.pipeline());
+    auto picture = readPicture(frame);
+    if (!picture)
+      return picture.error();
+    if (picture->hash != hash)
+      return Error{"--reruns: expected frame " + std::to_string(i) +
+                   " of them to leave what the one before left, " + hash +
+                   ", but it left " + picture->hash};
+  }
+  return Done{};
 }
 
 int64_t countPrimitives(const SceneInput &scene) {
@@ -257,6 +271,8 @@ Result<Done> renderScene(Options options) {
   if (!counts)
     return counts.error();
   warnOf(*counts);
+  if (auto ok = rerun(options, *frame, picture->hash); !ok)
+    return ok.error();
 
   RunResult result{*times,
                    frame->compileMilliseconds(),

@@ -82,7 +82,8 @@ struct CommandLine {
       llvm::cl::desc("write a C++ header for who links the object"),
       llvm::cl::cat(category)};
   llvm::cl::opt<std::string> nameSpace{
-      "namespace", llvm::cl::value_desc("name"), llvm::cl::init("pipelines"),
+      "namespace", llvm::cl::value_desc("name"),
+      llvm::cl::init(defaultNamespace),
       llvm::cl::desc("of the class in the header, and a part of the object's "
                      "symbol (default: pipelines)"),
       llvm::cl::cat(category)};

@@ -17,7 +17,7 @@ struct ObjectOptions {
   ExecutionTarget execution = ExecutionTarget::CPU;
   TargetOptions target = {};
   /// The C++ namespace of the generated class; a part of the object's symbol.
-  std::string nameSpace = "pipelines";
+  std::string nameSpace = defaultNamespace;
   /// For the reference executor: all pipelines of the file, whichever `source`
   /// names, but those with errors, which go into the diagnostics.
   bool allPipelines = false;

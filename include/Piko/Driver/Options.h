@@ -38,6 +38,9 @@ struct CacheOptions {
   uint64_t maxBytes = 0;
 };
 
+/// The namespace of an object's symbol and header where none is asked for.
+inline constexpr const char *defaultNamespace = "pipelines";
+
 /// The names of tunables of a text, each with one of the values that it lists.
 using TunableSettings = std::vector<std::pair<std::string, std::string>>;
 

@@ -65,8 +65,11 @@ protected:
 
 /// Compiles a pipeline's file, C++ or `.mlir` (which the reference executor
 /// does not read), for this machine, or finds its code in the cache, and loads
-/// it. On an error the result is null and `diagnostics` holds what to show,
-/// with file and line where there is one; warnings are put there too.
+/// it. A file whose name ends in `.so` is a shared library of objects that
+/// pikoc has made, in its standard namespace, of which one is loaded as it is:
+/// what options say of its text is an error. On an error the result is null and
+/// `diagnostics` holds what to show, with file and line where there is one;
+/// warnings are put there too.
 std::unique_ptr<LoadedProgram> loadPipeline(const std::string &file,
                                             const LoadOptions &options,
                                             std::string &diagnostics);

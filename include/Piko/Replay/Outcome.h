@@ -39,6 +39,9 @@ struct Outcome {
 std::vector<std::string> compareOutcomes(const Outcome &expected,
                                          const Outcome &actual);
 
+/// Equal outcomes, as compareOutcomes has it, have equal hashes.
+uint64_t hashOutcome(const Outcome &outcome);
+
 /// The leaves of a record. Throws std::runtime_error.
 std::vector<Field> getFields(pikort_pipeline *pipeline, int32_t record);
 
