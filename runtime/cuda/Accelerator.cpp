@@ -34,11 +34,11 @@ static int64_t findMostAlone() {
 Accelerator::Accelerator(pikort_pipeline &p, const pikoir_cuda_image *images)
     : p_(p), device_(Device::open(p.device)), module_(*device_, images) {
   device_->check(device_->enter(), "entering its context");
-  int processors = device_->attribute(CU_DEVICE_ATTRIBUTE_MULTIPROCESSOR_COUNT);
+  processors_ = device_->attribute(CU_DEVICE_ATTRIBUTE_MULTIPROCESSOR_COUNT);
   residentThreads_ = int64_t(device_->attribute(
                          CU_DEVICE_ATTRIBUTE_MAX_THREADS_PER_MULTIPROCESSOR)) *
-                     processors;
-  joinBlocks_ = std::min<int64_t>(processors, mostJoinBlocks);
+                     processors_;
+  joinBlocks_ = std::min<int64_t>(processors_, mostJoinBlocks);
   mostAlone_ = findMostAlone();
   device_->check(device_->driver.cuStreamCreate(&own_, CU_STREAM_NON_BLOCKING),
                  "creating a stream");
@@ -229,6 +229,20 @@ CUfunction Accelerator::find(const std::string &kernel) {
   if (!function)
     function = device_->ownKernels().find(kernel);
   return function;
+}
+
+int64_t Accelerator::residentBlocks(const std::string &kernel,
+                                    int64_t threads) {
+  auto found = residentBlocks_.find(kernel);
+  if (found != residentBlocks_.end())
+    return found->second;
+  device_->check(device_->enter(), "entering its context");
+  int blocks = 0;
+  device_->check(
+      device_->driver.cuOccupancyMaxActiveBlocksPerMultiprocessor(
+          &blocks, find(kernel), static_cast<int>(threads), /*sharedBytes=*/0),
+      "asking how many blocks are resident of " + module_.describe(kernel));
+  return residentBlocks_[kernel] = std::max(blocks, 1) * processors_;
 }
 
 void Accelerator::launch(const char *kernel, int64_t blocks, int64_t threads,

@@ -320,6 +320,9 @@ void Frame::showConstants(GridLaunch &grid) const {
 }
 
 void Frame::launch(GridLaunch grid) {
+  // More would be a second wave, which is seldom full, and find less to do.
+  grid.blocks =
+      std::min(grid.blocks, device_.residentBlocks(grid.kernel, grid.threads));
   showConstants(grid);
   steps_.push_back({Step::Kind::Grid, std::move(grid), nullptr, timed_});
   if (joined_ && joined_->stage >= 0 && !isStacked(p_.stages[joined_->stage]))

@@ -146,7 +146,9 @@ void GridLog::fetch() {
                    sizeof(head));
   device->finishStream();
   int64_t used = std::min(head.cursor, head.limit) - head.units;
-  copy = Array<uint8_t>(pipeline.memory, std::max<int64_t>(used, 1));
+  // Neither bins nor queues: those are what it is read for.
+  copy =
+      Array<uint8_t>(pipeline.memory, std::max<int64_t>(used, 1), Use::State);
   shift = reinterpret_cast<int64_t>(copy.data()) - head.units;
   if (used == 0)
     return;

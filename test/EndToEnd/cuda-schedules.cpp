@@ -16,7 +16,7 @@
 // RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_CUDA_ALONE=0 %{compare} --pipe Lists --count 7 2>&1 | FileCheck %s
 // RUN: env PIKO_CUDA_DRIVER=%test_driver %{compare} --pipe Rounds 2>&1 | FileCheck %s
 // CHECK-DAG: {{^equal$}}
-// CHECK-DAG: host: 0 launches of kernels, 2 of graphs with {{[0-9]+}} kernels, {{[0-9]+}} copies, {{[0-9]+}} fills, 4 waits
+// CHECK-DAG: host: 0 launches of kernels, 2 of graphs with {{[0-9]+}} kernels, {{[0-9]+}} copies, {{[0-9]+}} fills, 6 waits
 //
 // What a schedule says is checked as on a CPU.
 // RUN: env PIKO_CUDA_DRIVER=%test_driver not %{compare} --pipe Wrong 2>&1 | FileCheck %s --check-prefix=WRONG

@@ -47,10 +47,13 @@ TEST(EnvironmentTest, IsRead) {
   EXPECT_EQ(total, 1000u);
 
   EXPECT_EQ(cuMemFree(address), CUDA_SUCCESS);
-  EXPECT_EQ(cuMemFree(other), CUDA_ERROR_ILLEGAL_ADDRESS);
+  EXPECT_EQ(cuMemFree(other), CUDA_ERROR_INVALID_VALUE);
   EXPECT_EQ(cuMemFree(other), CUDA_SUCCESS);
   EXPECT_EQ(cuCtxSynchronize(), CUDA_ERROR_UNKNOWN);
   EXPECT_EQ(cuCtxSynchronize(), CUDA_SUCCESS);
+  // As a kernel's, it stays.
+  EXPECT_EQ(cuCtxSynchronize(), CUDA_ERROR_ILLEGAL_ADDRESS);
+  EXPECT_EQ(cuCtxSynchronize(), CUDA_ERROR_ILLEGAL_ADDRESS);
   EXPECT_EQ(cuDevicePrimaryCtxRelease(1), CUDA_SUCCESS);
   EXPECT_STREQ(pikoTestDriverLeaks(), "");
 }

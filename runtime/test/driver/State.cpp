@@ -195,9 +195,20 @@ CUresult Call::injected() {
   return found;
 }
 
+/// Errors of kernels, behind which a context is of no use.
+static bool isSticky(CUresult error) {
+  return error == CUDA_ERROR_ILLEGAL_ADDRESS ||
+         error == CUDA_ERROR_LAUNCH_TIMEOUT ||
+         (error >= CUDA_ERROR_HARDWARE_STACK_ERROR &&
+          error <= CUDA_ERROR_LAUNCH_FAILED);
+}
+
 CUresult Call::begin(Needs needs) {
-  if (CUresult failure = injected())
+  if (CUresult failure = injected()) {
+    if (Context *of = contextOf(currentContext()); of && isSticky(failure))
+      of->failed = failure;
     return fail(failure, "made to fail");
+  }
   if (needs == Needs::Nothing)
     return CUDA_SUCCESS;
   if (!state().initialized)
