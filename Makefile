@@ -12,6 +12,8 @@
 # On a machine with a card of NVIDIA's, one more:
 #   make gpu-bench   compare with cudaraster's and the paper's figures; without a
 #                    card, by estimates (GPU_BENCH=--quick; docs/GPU.md)
+# And for a machine with a card that has nothing else:
+#   make gpu-kit     packs BUILD/gpu-kit.tar.zst, which takes ten minutes
 # The rest is a thin layer over the presets of CMakePresets.json.
 
 PRESET ?= release
@@ -28,7 +30,7 @@ PIPE ?= Fused
 
 .DELETE_ON_ERROR:
 .PHONY: all bench bench-gate build charts check check-all clean configure demo deps \
-  docs format gpu-bench lanes lint
+  docs format gpu-bench gpu-kit lanes lint
 
 all: build
 
@@ -76,6 +78,12 @@ gpu-bench: configure
 	@benchmarks/gpu-bench.py --bin $(BUILD)/bin \
 	  --driver $(BUILD)/lib/libpiko-test-driver.so --out $(BUILD)/gpu-bench \
 	  $(GPU_BENCH)
+
+# What proves and times pipelines on a machine that has a card and no LLVM.
+gpu-kit: configure
+	@cmake --build $(BUILD) --parallel $(JOBS) --target \
+	  pikoc piko-compare piko-render piko-render-library PikoConformance-cuda
+	@utils/gpu-kit/make.py --build $(BUILD) $(GPU_KIT)
 
 # Debian's python3-matplotlib is for its own python3.
 charts: configure

@@ -5,6 +5,7 @@ CPU; and asks pikoc what the kernels take."""
 import json
 import os
 import pathlib
+import re
 import shlex
 import subprocess
 import sys
@@ -53,6 +54,8 @@ def read_explained(text):
     --explain --target cuda writes."""
     head, *lines = text.partition("\nOn ")[2].split("\n\n")[0].splitlines()[1:]
     for line in lines:
+        if not re.match(r" *\d", line):  # what it adds in words
+            continue
         *numbers, kernel = line.replace(" %", "%").split()
         yield kernel, dict(zip(COLUMNS, numbers))
 

@@ -168,7 +168,7 @@ class Data(unittest.TestCase):
         text = ("Pipeline P\n\nOn sm_80, as ptxas says:\n  threads  block memory  "
                 "registers  stack  spilled  occupancy  kernel\n"
                 "       64           264         48      0       12       62 %  "
-                "kernel_a\n\nMore:\n  a b c\n")
+                "kernel_a\n  For the largest stack a driver keeps 1664 KB of memory\n\nMore:\n  a b c\n")
         self.assertEqual(list(counting.read_explained(text)), [
             ("kernel_a", {"threads": "64", "block memory": "264",
                           "registers": "48", "stack": "0", "spilled": "12",

@@ -1,0 +1,324 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+"""Proves and times pipelines on a card.
+
+  run.sh [options]
+
+Each thing is a process of its own, with a limit of time, and the next goes on where one
+fails. A line of JSON for each is added to RESULTS as soon as it is done: that file is
+what to bring back, and what benchmarks/gpu-results.py makes tables of. Steps:
+
+  smoke        the device, its driver, a kernel, a join, loops, nested ones, a barrier
+               of a grid, each for itself, with what its first frame took
+  conformance  what every target must do alike
+  examples     all pictures of the examples are the processor's
+  time         frames of all examples, by the device's events and by the wall clock,
+               with 1 to 1000 lights: what figures 4 and 5 and table 4 of the Piko
+               paper have
+  rerun        a hundred runs of six pipelines leave one picture
+  random       random pipelines leave what the reference executor does
+  peer         with --peer: the same scenes by another renderer
+  sanitize     compute-sanitizer, where it is, finds nothing in small cases
+"""
+
+import argparse
+import concurrent.futures
+import json
+import os
+import pathlib
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import threading
+import time
+
+from scenes import camera_of
+
+KIT = pathlib.Path(__file__).resolve().parent
+RENDER = KIT / "bin/piko-render-library"
+CONFORMANCE = KIT / "bin/PikoConformance-cuda"
+STEPS = ["smoke", "conformance", "examples", "time", "rerun", "random", "peer",
+         "sanitize"]
+# Of eight minutes; a step takes what earlier ones left.
+SHARES = {"smoke": 60, "conformance": 60, "examples": 80, "time": 130, "rerun": 30,
+          "random": 60, "peer": 30, "sanitize": 30}
+# What each stands for, and which conformance test has it by itself.
+SMOKE = [("a kernel and its clears", "Frame.ImagesAreClearedAndBuffersStay", {}),
+         ("a join by one block", "Order.BranchesAndSourcesJoin", {}),
+         ("a join by a grid with barriers", "Order.BranchesAndSourcesJoin",
+          {"PIKO_CUDA_ALONE": "0"}),
+         ("a conditional node", "Order.CyclesWhoseHopsAreSeen", {}),
+         ("nested conditional nodes", "Order.CyclesInRounds", {}),
+         ("strips", "Order.StripsThatFitABudget", {}),
+         ("an error of a kernel", "Error.IndexOutsideIsThatOfTheFirstPrimitive", {}),
+         ("modules loaded eagerly", "Order.SchedulesInAChain",
+          {"CUDA_MODULE_LOADING": "EAGER"})]
+RERUN = [("visibility", "Visibility"), ("raster", "Tiled"), ("raster", "Baseline"),
+         ("shadow", "Bins16"), ("oit", "Bins16"), ("reyes", "Reyes")]
+LIGHTS = [1, 10, 100, 1000]
+
+
+def parse_arguments():
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False)
+    parser.add_argument("--results", default="results.jsonl", type=pathlib.Path,
+                        help="(results.jsonl)")
+    parser.add_argument("--seconds", default=480, type=float,
+                        help="for all steps (480)")
+    parser.add_argument("--from", dest="first", choices=STEPS, default=STEPS[0],
+                        metavar="STEP", help="leave out what is in front of it")
+    parser.add_argument("--only", choices=STEPS, metavar="STEP", help="nothing else")
+    parser.add_argument("--jobs", default=4, type=int,
+                        help="processes at a time where nothing is timed (4)")
+    parser.add_argument("--peer", metavar="COMMAND",
+                        help="prints a line of JSON with ms_median, and ms_device if "
+                             "it has device events; {scene}, {width} and {height} "
+                             "stand for what is drawn")
+    return parser.parse_args()
+
+
+class Run:
+    """What has been asked for, the time that is left, and the results."""
+
+    def __init__(self, arguments):
+        self.arguments = arguments
+        self.manifest = json.loads((KIT / "manifest.json").read_text())
+        self.chosen = ([arguments.only] if arguments.only
+                       else STEPS[STEPS.index(arguments.first):])
+        self.end = time.monotonic() + arguments.seconds
+        self.step, self.step_end, self.counts = "", self.end, {}
+        self.log = open(arguments.results, "a", encoding="utf-8")
+        self.lock = threading.Lock()
+        self.environment = {**os.environ, "LD_LIBRARY_PATH": str(KIT / "lib")}
+
+    def begin(self, step):
+        self.step = step
+        self.counts = {"ok": 0, "failed": 0, "left": 0}
+        share = self.arguments.seconds / sum(SHARES[it] for it in self.chosen)
+        self.step_end = min(self.end, time.monotonic() + SHARES[step] * share)
+
+    def note(self, name, status, **more):
+        """status: ok, failed, or left (for want of time)."""
+        with self.lock:
+            self.counts[status] += 1
+            self.log.write(json.dumps({"step": self.step, "name": name,
+                                       "status": status, **more}) + "\n")
+            self.log.flush()
+            os.fsync(self.log.fileno())
+        if status == "failed":
+            print(f"  {name}: {more.get('text', '').strip()[:400]}", flush=True)
+
+    def call(self, name, words, judge=None, limit=60, **environment):
+        """Runs a command and notes how it went; what it printed, or None. `judge`
+        takes that, and returns what is wrong and what else to note."""
+        left = self.step_end - time.monotonic()
+        if left < 1:
+            self.note(name, "left")
+            return None
+        start = time.monotonic()
+        try:
+            done = subprocess.run(
+                [str(word) for word in words], capture_output=True, text=True,
+                errors="replace", check=False, timeout=min(limit, left), cwd=KIT,
+                env={**self.environment, **environment})
+            code, out, text = done.returncode, done.stdout, done.stdout + done.stderr
+        except subprocess.TimeoutExpired as error:
+            if left < limit:
+                self.note(name, "left", seconds=round(left, 3))
+                return None
+            code, out, text = -1, "", str(error)
+        except OSError as error:
+            code, out, text = -1, "", str(error)
+        seconds = round(time.monotonic() - start, 3)
+        wrong, more = ("", {})
+        if code == 0 and judge:
+            wrong, more = judge(out)
+        ok = code == 0 and not wrong
+        self.note(name, "ok" if ok else "failed", seconds=seconds, code=code,
+                  **({"environment": environment} if environment else {}), **more,
+                  **({} if ok else {"text": (wrong + "\n" + text)[-3000:]}))
+        return out if ok else None
+
+    def call_all(self, tasks):
+        """Several at a time; a task is the arguments of call()."""
+        with concurrent.futures.ThreadPoolExecutor(self.arguments.jobs) as pool:
+            for future in [pool.submit(self.call, *words, **named)
+                           for words, named in tasks]:
+                future.result()
+
+
+def render(library, pipe, scene, *options):
+    return [RENDER, KIT / library, "--pipe", pipe, KIT / scene, "--target", "cuda",
+            "--json", *options]
+
+
+def judge_render(expected=None):
+    """It ran on a device, and left what is expected."""
+    def judge(out):
+        told = json.loads(out)
+        if "device" not in told:
+            return "it ran on the processor", {}
+        if expected and told["image_hash"] != expected:
+            return f"expected {expected}, but got {told['image_hash']}", {}
+        kept = ["ms_median", "ms_min", "ms_max", "frames", "tris", "lights", "w", "h",
+                "compile_ms", "image_hash", "time", "device", "kernels"]
+        return "", {"told": {key: told[key] for key in kept if key in told}}
+    return judge
+
+
+def judge_tests(out):
+    passed = re.search(r"\[  PASSED  \] (\d+) tests?", out)
+    return ("" if passed and int(passed[1]) else "no test ran",
+            {"tests": int(passed[1]) if passed else 0})
+
+
+# --- Steps ---------------------------------------------------------------------
+
+def describe_device():
+    try:
+        return subprocess.run(
+            ["nvidia-smi", "--query-gpu=name,driver_version,memory.total,compute_cap",
+             "--format=csv,noheader"], capture_output=True, text=True, check=True,
+            timeout=20).stdout.strip()
+    except (OSError, subprocess.SubprocessError):
+        return "a device that nvidia-smi does not tell of"
+
+
+def smoke(run):
+    run.note("kit", "ok", device=describe_device(), commit=run.manifest["commit"])
+    for name, test, environment in SMOKE:
+        run.call(name, [CONFORMANCE, f"--gtest_filter={test}"], judge_tests, 40,
+                 **environment)
+
+
+def conformance(run):
+    run.call("conformance", [CONFORMANCE], judge_tests, 120)
+    run.call("conformance, joins by grids", [CONFORMANCE], judge_tests, 120,
+             PIKO_CUDA_ALONE="0")
+
+
+def name_of(picture):
+    return " ".join([picture["pipe"], pathlib.Path(picture["scene"]).name,
+                     *picture["options"]])
+
+
+def examples(run):
+    run.call_all([((name_of(it), render(it["library"], it["pipe"], it["scene"],
+                                        *it["options"], "--frames", "1", "--warmup",
+                                        "0", "--threads", "2"),
+                    judge_render(it["hash"])), {}) for it in run.manifest["pictures"]])
+
+
+def make_scenes(run):
+    if not (KIT / "scenes/mixed.ply").exists():
+        run.call("scenes", [sys.executable, KIT / "scenes.py", KIT / "scenes"])
+
+
+def time_frames(run):
+    make_scenes(run)
+    frames = ["--warmup", "5", "--frames", "60", "--seconds", "0.5"]
+    pipes = list(dict.fromkeys((it["library"], it["pipe"])
+                               for it in run.manifest["pictures"]))
+    own = {(it["library"], it["pipe"]): it for it in run.manifest["pictures"]}
+    meshes = sorted(it for it in (KIT / "scenes").iterdir()
+                    if it.suffix != ".bpt" and it.name != "torus.ply")
+    if not meshes:
+        meshes = [KIT / "scenes/torus.ply"]
+
+    def measure(pipe, scene, lights, *more):
+        options = [] if scene.suffix == ".capture" else [
+            *camera_of(scene), "--lights", str(lights)]
+        run.call(" ".join([pipe[1], scene.name, str(lights), *(["kernels"] if more else [])]),
+                 render(*pipe, scene.relative_to(KIT), *options, *frames, *more),
+                 judge_render())
+
+    # The most telling first; then each pipeline once; then all with all lights.
+    telling = [it for it in pipes if it[1] in ("Visibility", "Fused", "Tiled")]
+    for scene in meshes:
+        for pipe in telling[:2]:
+            measure(pipe, scene, 1)
+            measure(pipe, scene, 1, "--kernel-times")
+    for pipe in pipes:
+        if pipe not in telling[:2]:
+            picture = own[pipe]
+            is_mesh = pathlib.Path(picture["scene"]).suffix not in (".bpt", ".capture")
+            measure(pipe, meshes[0] if is_mesh else KIT / picture["scene"], 1)
+    variants = [it for it in pipes if "raster.so" in it[0] or "visibility.so" in it[0]]
+    for lights in LIGHTS:
+        for scene in meshes:
+            for pipe in variants:
+                if lights != 1 or pipe not in telling[:2]:
+                    measure(pipe, scene, lights)
+
+
+def rerun(run):
+    for library, pipe in RERUN:
+        found = [it for it in run.manifest["pictures"]
+                 if it["pipe"] == pipe and f"/{library}.so" in it["library"]]
+        if found:
+            it = found[-1]
+            run.call(f"{name_of(it)}, 100 times",
+                     render(it["library"], pipe, it["scene"], *it["options"],
+                            "--frames", "1", "--warmup", "0", "--reruns", "99"),
+                     judge_render(it["hash"]))
+
+
+def random(run):
+    run.call_all([((it["pipe"], render(it["library"], it["pipe"], it["scene"],
+                                       "--frames", "1", "--warmup", "0", "--threads",
+                                       "2"), judge_render(it["hash"])),
+                   {"PIKO_CUDA_ALONE": "0"} if int(it["pipe"][1:]) % 2 else {})
+                  for it in run.manifest["random"]])
+
+
+def peer(run):
+    if not run.arguments.peer:
+        return
+    make_scenes(run)
+
+    def judge(out):
+        told = json.loads(out.splitlines()[-1])
+        return "" if "ms_median" in told else "no ms_median", {"told": told}
+
+    for scene in sorted((KIT / "scenes").iterdir()):
+        words = [word.format(scene=scene, width=1024, height=768)
+                 for word in shlex.split(run.arguments.peer)]
+        run.call(f"peer {scene.name}", words, judge)
+
+
+def sanitize(run):
+    tool = shutil.which("compute-sanitizer") or "/usr/local/cuda/bin/compute-sanitizer"
+    if not os.access(tool, os.X_OK):
+        return
+    for kind in ["memcheck", "initcheck", "racecheck"]:
+        run.call(kind, [tool, "--tool", kind, "--error-exitcode", "9", CONFORMANCE,
+                        "--gtest_filter=Order.*Join:Frame.Feeds*"], judge_tests)
+
+
+def main():
+    arguments = parse_arguments()
+    run = Run(arguments)
+    steps = {"smoke": smoke, "conformance": conformance, "examples": examples,
+             "time": time_frames, "rerun": rerun, "random": random, "peer": peer,
+             "sanitize": sanitize}
+    failed, left = 0, []
+    for step in run.chosen:
+        run.begin(step)
+        print(step, flush=True)
+        steps[step](run)
+        print("  " + ", ".join(f"{count} {what}" for what, count in run.counts.items()),
+              flush=True)
+        failed += run.counts["failed"]
+        left += [step] if run.counts["left"] else []
+    if left:
+        print(f"time was up: run.sh --from {left[0]} goes on; left in: "
+              + ", ".join(left))
+    print(f"{arguments.results} is what to bring back")
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
