@@ -84,8 +84,8 @@ def main():
     parser.add_argument("--bin", default=str(ROOT / "build/bin"))
     parser.add_argument("--driver", help="in place of libcuda.so.1")
     parser.add_argument("--only", help="an example")
-    parser.add_argument("--half", action="store_true",
-                        help="every second pipeline of an example, in turn on one of both")
+    parser.add_argument("--few", action="store_true",
+                        help="every fourth pipeline of an example, in turn on one of both")
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     arguments = parser.parse_args()
     tools = pathlib.Path(arguments.bin).resolve()
@@ -116,9 +116,9 @@ def main():
             if file.parent.name not in COMPARED:
                 expected = pool.submit(
                     lambda *what: draw(*what)[1], tools, folder, file, pipes[0], [])
-            for pipe in pipes[::2] if arguments.half else pipes:
+            for pipe in pipes[::4] if arguments.few else pipes:
                 turn = len(done) % len(TARGETS)
-                targets = [TARGETS[turn]] if arguments.half else TARGETS
+                targets = [TARGETS[turn]] if arguments.few else TARGETS
                 done.append(pool.submit(
                     check, tools, folder, file, pipe, expected, targets))
         for future in concurrent.futures.as_completed(done):

@@ -317,9 +317,14 @@ TEST_F(HostStateDeathTest, VariablesOfOpenMP) {
                             std::_Exit(5);
                         }),
                 testing::ExitedWithCode(0), "");
-    EXPECT_EXIT(runHere(1, 1, 1), testing::ExitedWithCode(0), "");
     unsetenv(name.c_str());
   }
+}
+
+TEST_F(HostStateDeathTest, VariablesOfOpenMPWithOneThread) {
+  setenv("OMP_NUM_THREADS", "abc", 1);
+  EXPECT_EXIT(runHere(1, 1, 1), testing::ExitedWithCode(0), "");
+  unsetenv("OMP_NUM_THREADS");
 }
 
 TEST_F(HostStateDeathTest, NumberOfThreads) {
