@@ -91,6 +91,11 @@ CUfunction Module::find(const std::string &kernel) {
   device_.check(
       device_.driver.cuModuleGetFunction(&function, handle_, kernel.c_str()),
       "finding " + describe(kernel));
+  // Drivers load it when it is asked for, which a capture may refuse.
+  int registers = 0;
+  device_.check(device_.driver.cuFuncGetAttribute(
+                    &registers, CU_FUNC_ATTRIBUTE_NUM_REGS, function),
+                "loading " + describe(kernel));
   functions_.emplace(kernel, function);
   return function;
 }

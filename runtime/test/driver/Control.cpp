@@ -76,6 +76,11 @@ pikoTestDriverHostCounts(struct PikoTestDriverHostCounts *counts) {
   state().defers = on != 0;
 }
 
+[[gnu::visibility("default")]] int pikoTestDriverModes(const char *names) {
+  Lock lock(state().lock);
+  return !parseModes(names, state().modes).empty();
+}
+
 [[gnu::visibility("default")]] const char *pikoTestDriverKernels(void) {
   thread_local std::string text;
   Lock lock(state().lock);

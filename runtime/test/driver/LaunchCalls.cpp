@@ -79,9 +79,23 @@ CUresult prepare(const Call &call, Kernel &kernel, void **parameters) {
   return CUDA_SUCCESS;
 }
 
+/// A function may be loaded by its first launch, which a capture forbids.
+CUresult load(const Call &call, CUfunction handle, CUstream stream) {
+  Function &function = call.context().functions.find(handle)->second;
+  if (state().modes.lazy && !function.loaded &&
+      call.context().captureOf(stream))
+    return call.fail(CUDA_ERROR_STREAM_CAPTURE_UNSUPPORTED,
+                     "'" + function.program.name +
+                         "' would be loaded, and its stream is captured");
+  function.loaded = true;
+  return CUDA_SUCCESS;
+}
+
 CUresult launchKernel(const Call &call, Kernel kernel, CUstream stream,
                       void **parameters) {
   CUresult error = prepare(call, kernel, parameters);
+  if (!error)
+    error = load(call, kernel.function, stream);
   return error ? error : submit(call, stream, std::move(kernel));
 }
 

@@ -266,6 +266,7 @@ CUresult piko::cuda::cuFuncGetAttribute(int *value,
     return call.fail(CUDA_ERROR_INVALID_HANDLE, "no function of a module");
   if (!value)
     return call.fail(CUDA_ERROR_INVALID_VALUE, "null");
+  found->second.loaded = true;
   const ptx::Program &program = found->second.program;
   const Module &module = *found->second.module;
   switch (attribute) {
@@ -318,6 +319,7 @@ CUresult piko::cuda::cuOccupancyMaxActiveBlocksPerMultiprocessor(
   auto found = call.context().functions.find(handle);
   if (found == call.context().functions.end())
     return call.fail(CUDA_ERROR_INVALID_HANDLE, "no function of a module");
+  found->second.loaded = true;
   const ptx::Program &program = found->second.program;
   if (!blocks || threads <= 0 || threads > threadsOf(program))
     return call.fail(CUDA_ERROR_INVALID_VALUE,

@@ -41,6 +41,21 @@ static std::vector<Failure> parseFailures(const char *text) {
   return failures;
 }
 
+std::string piko::testdriver::parseModes(std::string_view names, Modes &modes) {
+  modes = {};
+  while (!names.empty()) {
+    std::string_view name = names.substr(0, names.find(','));
+    names.remove_prefix(std::min(names.size(), name.size() + 1));
+    if (name != "apart" && name != "buffered" && name != "lazy")
+      return "expected apart, buffered or lazy, but got '" + std::string(name) +
+             "'";
+    (name == "apart"      ? modes.apart
+     : name == "buffered" ? modes.buffered
+                          : modes.lazy) = true;
+  }
+  return {};
+}
+
 State::State() {
   uint64_t count = numberFrom("PIKO_TEST_DRIVER_DEVICES", 1);
   for (uint64_t device = 0; device < count; ++device)
@@ -54,6 +69,11 @@ State::State() {
     countsGoTo = counts == std::string_view("0") ? "" : counts;
   printsErrors = numberFrom("PIKO_TEST_DRIVER_ERRORS", 0) != 0;
   defers = numberFrom("PIKO_TEST_DRIVER_DEFER", 0) != 0;
+  if (const char *names = std::getenv("PIKO_TEST_DRIVER_MODES"))
+    if (std::string wrong = parseModes(names, modes); !wrong.empty()) {
+      std::fprintf(stderr, "PIKO_TEST_DRIVER_MODES: %s\n", wrong.c_str());
+      std::exit(1);
+    }
   failures = parseFailures(std::getenv("PIKO_TEST_DRIVER_FAIL"));
 }
 

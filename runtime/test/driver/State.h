@@ -75,6 +75,7 @@ struct Module;
 struct Function {
   Module *module = nullptr;
   ptx::Program program;
+  bool loaded = false; ///< By what asked for more than its handle.
 };
 
 struct Module : ptx::Symbols {
@@ -178,6 +179,14 @@ struct Failure {
   CUresult error;
 };
 
+/// In what a device may differ from what is usual.
+struct Modes {
+  bool apart = false, buffered = false, lazy = false;
+};
+
+/// Reads names with commas between them; what is wrong, or nothing.
+std::string parseModes(std::string_view names, Modes &modes);
+
 struct State {
   State();
   State(const State &) = delete;
@@ -190,6 +199,8 @@ struct State {
   int multiprocessors = 4; ///< That a device says to have.
   uint64_t memoryLimit = uint64_t(16) << 30;
   uint64_t seed = 0;
+  uint64_t launches = 0; ///< Of which each has a seed of its own.
+  Modes modes;
   std::string countsGoTo; ///< As the environment says; empty: nowhere.
   bool printsErrors = false;
   bool defers =

@@ -34,10 +34,12 @@
 //                              that a device says to have; 4
 //   PIKO_TEST_DRIVER_MEMORY    bytes that cuMemAlloc has; 16 GiB
 //   PIKO_TEST_DRIVER_SEED      order of blocks, of warps and their turns, and
-//                              of lanes in atomic operations; 0: as numbered
+//                              of lanes in atomic operations, another one for
+//                              each launch; 0: as numbered
 //   PIKO_TEST_DRIVER_FAIL      function:n:error, as pikoTestDriverFail; more
 //                              than one with commas
 //   PIKO_TEST_DRIVER_DEFER     1: as pikoTestDriverDefer
+//   PIKO_TEST_DRIVER_MODES     as pikoTestDriverModes
 //   PIKO_TEST_DRIVER_ERRORS    1: texts of errors to stderr as they come
 //   PIKO_TEST_DRIVER_COUNTS    1: counts of all kernels, and what the host has
 //                              asked for, to stderr at the end; launches: each
@@ -129,6 +131,18 @@ void pikoTestDriverHostCounts(struct PikoTestDriverHostCounts *counts);
 /// for is so late as it may be on a GPU. Streams that were not made as
 /// CU_STREAM_NON_BLOCKING count as one.
 void pikoTestDriverDefer(int on);
+
+/// In what the device is less kind from here on than it need not be, as names
+/// with commas between them; returns 1 if one is unknown:
+///
+///   apart     lanes of a warp that have parted may stay apart until a warp
+///             operation or a barrier, and run in any order, by the seed
+///   buffered  what a block stores to global memory other blocks see at its
+///             next fence for the device, and when it ends; what an atomic
+///             operation or a strong store changes, at once
+///   lazy      a function whose handle alone is known is loaded by its first
+///             launch, which is an error while the stream is captured
+int pikoTestDriverModes(const char *names);
 
 /// The names of kernels that were launched, a line each, sorted.
 const char *pikoTestDriverKernels(void);

@@ -32,6 +32,12 @@ CUresult errorOf(FaultKind kind) {
   return CUDA_ERROR_LAUNCH_FAILED;
 }
 
+/// Another one each time: on a device no frame is like the one before.
+uint64_t seedOfLaunch() {
+  uint64_t launch = state().launches++;
+  return state().seed ? state().seed + launch * 0x9e3779b97f4a7c15 : 0;
+}
+
 void runKernel(const Call &call, const Kernel &kernel,
                ptx::Conditions *conditions) {
   Context &context = call.context();
@@ -39,8 +45,10 @@ void runKernel(const Call &call, const Kernel &kernel,
   ptx::Launch launch{
       function.program,  context.memory,     function.module->source,
       kernel.blocks,     kernel.threads,     kernel.sharedBytes,
-      kernel.parameters, kernel.cooperative, state().seed,
-      conditions};
+      kernel.parameters, kernel.cooperative, seedOfLaunch()};
+  launch.apart = state().modes.apart;
+  launch.buffered = state().modes.buffered;
+  launch.conditions = conditions;
   const auto &threads = kernel.threads;
   launch.resident = static_cast<uint64_t>(
       state().multiprocessors *

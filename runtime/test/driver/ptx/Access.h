@@ -5,6 +5,7 @@
 #define PIKO_TEST_DRIVER_PTX_ACCESS_H
 
 #include "ptx/Lanes.h"
+#include "ptx/StoreBuffer.h"
 
 #include <cstring>
 
@@ -105,10 +106,34 @@ inline uint8_t *locate(const Warp &warp, const Instruction &it, uint32_t lane,
   }
 }
 
+template <Space space> inline bool isGlobal(uint64_t address) {
+  if constexpr (space != Space::Generic)
+    return space == Space::Global;
+  uint64_t window = address & windowMask;
+  return window != sharedWindow && window != localWindow &&
+         window != parameterWindow;
+}
+
+/// Reads from where `locate` says, as this block sees it.
+template <Space space>
+inline void read(const Warp &warp, const uint8_t *place, uint64_t address,
+                 void *value, uint32_t bytes) {
+  std::memcpy(value, place, bytes);
+  if (warp.buffer && isGlobal<space>(address))
+    warp.buffer->overlay(place, value, bytes);
+}
+
 /// Writes to where `locate` says, and notes whether others may see a change.
 template <Space space>
 inline void write(Warp &warp, uint8_t *place, uint64_t address,
-                  const void *value, uint32_t bytes) {
+                  const void *value, uint32_t bytes,
+                  Order order = Order::Strong) {
+  if (warp.buffer && isGlobal<space>(address)) {
+    if (order == Order::Weak)
+      return warp.buffer->put(place, value, bytes);
+    warp.changed |= order == Order::Release ? warp.buffer->flush()
+                                            : warp.buffer->flush(place);
+  }
   const bool isOwn =
       space == Space::Local || space == Space::Param ||
       (space == Space::Generic && (address & windowMask) == localWindow);

@@ -72,12 +72,12 @@ void change(Warp &warp, const Instruction &it) {
     const uint64_t address = addressOf(warp, it, lane);
     uint8_t *place = locate<space>(warp, it, lane, address, sizeof(T), sectors);
     T old;
-    std::memcpy(&old, place, sizeof(T));
+    read<space>(warp, place, address, &old, sizeof(T));
     T value = changed(operation, old, b[lane], c[lane]);
     if constexpr (std::is_same_v<T, float>)
       if (value != value)
         value = std::bit_cast<float>(0x7fffffffu);
-    write<space>(warp, place, address, &value, sizeof(T));
+    write<space>(warp, place, address, &value, sizeof(T), it.order);
     if (!it.negated)
       warp.lanes<T>(it.result)[lane] = old;
   };
@@ -124,7 +124,10 @@ Operation takeOperation(Decoding &d) {
 bool decodeChange(Decoding &d) {
   const bool hasResult = d.base() == "atom";
   Space space = d.takeSpace().value_or(Space::Generic);
-  d.takeOneOf({"relaxed", "acquire", "release", "acq_rel"});
+  std::string_view order =
+      d.takeOneOf({"relaxed", "acquire", "release", "acq_rel"});
+  d.it.order =
+      order == "release" || order == "acq_rel" ? Order::Release : Order::Strong;
   d.takeOneOf({"cta", "cluster", "gpu", "sys"});
   const Operation operation = takeOperation(d);
   Type type = d.takeType();
@@ -152,11 +155,16 @@ bool decodeChange(Decoding &d) {
   return true;
 }
 
-void fence(Warp &, const Instruction &) {}
+/// it.variant: whether it is for other blocks.
+void fence(Warp &warp, const Instruction &it) {
+  if (warp.buffer && it.variant)
+    warp.changed |= warp.buffer->flush();
+}
 
 bool decodeFence(Decoding &d) {
   d.takeOneOf({"sc", "acq_rel", "acquire", "release"});
-  d.takeOneOf({"cta", "cluster", "gl", "gpu", "sys"});
+  std::string_view scope = d.takeOneOf({"cta", "cluster", "gl", "gpu", "sys"});
+  d.it.variant = scope == "gl" || scope == "gpu" || scope == "sys";
   d.finish(0);
   d.it.counted = Class::Barrier;
   d.it.run = fence;

@@ -95,6 +95,7 @@ Block::Block(Launch &launch, Workspace &workspace)
         workspace));
     warps.back()->shared = sharedMemory;
     warps.back()->sharedBytes = sharedSize;
+    warps.back()->buffer = launch.buffered ? &stores : nullptr;
   }
 }
 
@@ -151,6 +152,7 @@ Block::Turn Block::run() {
     if (arrived)
       any |= releaseBarriers();
     if (!liveThreads()) {
+      warps.front()->changed |= stores.flush();
       launch.longestWarp = std::max(launch.longestWarp, ran());
       return Turn::Ended;
     }

@@ -5,6 +5,7 @@
 #define PIKO_TEST_DRIVER_PTX_MACHINE_H
 
 #include "ptx/Footprint.h"
+#include "ptx/StoreBuffer.h"
 #include "ptx/Warp.h"
 
 #include <initializer_list>
@@ -49,6 +50,10 @@ struct Launch {
   /// Of the order of blocks, of warps, and of lanes in atomic operations; 0: as
   /// they are numbered.
   uint64_t seed = 0;
+  /// Lanes that have parted may stay apart, and run in any order.
+  bool apart = false;
+  /// What a block stores others see at its fences, and when it ends.
+  bool buffered = false;
   Conditions *conditions = nullptr; ///< Of the graph that launches it.
   uint64_t resident = 1; ///< How many blocks find room at the same time.
   std::vector<Site> sites{};
@@ -104,6 +109,8 @@ public:
     yielded |= ran > turnEnd;
     return ran > turnEnd;
   }
+  /// A number below \p count.
+  uint64_t pick(uint64_t count) { return random() % count; }
   /// The instructions that its longest warp has run.
   uint64_t ran() const;
 
@@ -121,6 +128,7 @@ private:
 
   bool arrived = false, yielded = false;
   std::mt19937_64 random;
+  StoreBuffer stores;
   uint8_t *sharedMemory;
   std::vector<std::unique_ptr<Warp>> warps;
 };

@@ -64,10 +64,10 @@ void load(Warp &warp, const Instruction &it) {
   R *result = warp.lanes<R>(it.result);
   forEachLane(warp.active, [&](uint32_t lane) {
     M value;
-    std::memcpy(&value,
-                locate<space>(warp, it, lane, addressOf(warp, it, lane),
-                              sizeof(M), sectors),
-                sizeof(M));
+    const uint64_t address = addressOf(warp, it, lane);
+    read<space>(warp,
+                locate<space>(warp, it, lane, address, sizeof(M), sectors),
+                address, &value, sizeof(M));
     result[lane] = static_cast<R>(value);
   });
   count(warp, it, sectors);
@@ -81,7 +81,7 @@ void store(Warp &warp, const Instruction &it) {
     const auto value = static_cast<M>(from[lane]);
     const uint64_t address = addressOf(warp, it, lane);
     uint8_t *to = locate<space>(warp, it, lane, address, sizeof(M), sectors);
-    write<space>(warp, to, address, &value, sizeof(M));
+    write<space>(warp, to, address, &value, sizeof(M), it.order);
   });
   count(warp, it, sectors);
 }
@@ -91,13 +91,13 @@ template <Space space> void loadVector(Warp &warp, const Instruction &it) {
   Sectors sectors;
   const std::vector<Operand> &list = warp.program->lists[it.extra];
   forEachLane(warp.active, [&](uint32_t lane) {
-    const uint8_t *from =
-        locate<space>(warp, it, lane, addressOf(warp, it, lane),
-                      uint32_t(it.element) * it.count, sectors);
+    const uint64_t address = addressOf(warp, it, lane);
+    const uint8_t *from = locate<space>(
+        warp, it, lane, address, uint32_t(it.element) * it.count, sectors);
     // Registers that are written may be those of the address.
     std::array<uint64_t, 8> values{};
     for (uint32_t i = 0; i < it.count; ++i) {
-      std::memcpy(&values[i], from + i * it.element, it.element);
+      read<space>(warp, from + i * it.element, address, &values[i], it.element);
       uint32_t unused = 64 - 8 * it.element;
       if (it.variant)
         values[i] = static_cast<uint64_t>(
@@ -118,7 +118,8 @@ template <Space space> void storeVector(Warp &warp, const Instruction &it) {
                                 uint32_t(it.element) * it.count, sectors);
     for (uint32_t i = 0; i < it.count; ++i) {
       uint64_t value = readLane(warp, list[i], lane);
-      write<space>(warp, to + i * it.element, address, &value, it.element);
+      write<space>(warp, to + i * it.element, address, &value, it.element,
+                   it.order);
     }
   });
   count(warp, it, sectors);
@@ -204,9 +205,13 @@ Class classOf(Space space, bool isStore) {
   }
 }
 
-/// One thread runs at a time: all accesses are ordered.
+/// Loads are all ordered: one thread runs at a time.
 void takeOrder(Decoding &d) {
-  d.takeOneOf({"weak", "volatile", "relaxed", "acquire", "release"});
+  std::string_view order =
+      d.takeOneOf({"weak", "volatile", "relaxed", "acquire", "release"});
+  d.it.order = order.empty() || order == "weak" ? Order::Weak
+               : order == "release"             ? Order::Release
+                                                : Order::Strong;
   d.takeOneOf({"cta", "cluster", "gpu", "sys"});
   d.takeOneOf({"ca", "cg", "cs", "lu", "cv", "wb", "wt"});
   d.take("nc");

@@ -68,6 +68,13 @@ using Handler = void (*)(Warp &, const Instruction &);
 /// What threads get of a barrier: Instruction::extra.
 enum class Reduction : uint8_t { None, Count, All, Any };
 
+/// How soon others see a store.
+enum class Order : uint8_t {
+  Weak,   ///< At a fence.
+  Strong, ///< At once.
+  Release ///< At once, with all that was stored before.
+};
+
 struct Instruction {
   Handler run = nullptr;
   Operand result, second; ///< second: the other of a pair of results.
@@ -77,9 +84,10 @@ struct Instruction {
   Class counted = Class::Move;
   Space space = Space::Generic;
   Flow flow = Flow::On;
-  uint8_t element = 0; ///< Bytes, of an access to memory.
-  uint8_t count = 0;   ///< Elements, of an access or a vector.
-  uint8_t variant = 0; ///< Of a handler that has several.
+  Order order = Order::Weak; ///< Of a store or an atomic operation.
+  uint8_t element = 0;       ///< Bytes, of an access to memory.
+  uint8_t count = 0;         ///< Elements, of an access or a vector.
+  uint8_t variant = 0;       ///< Of a handler that has several.
   uint32_t line = 0;
   uint32_t target = nowhere;     ///< Of a branch or call.
   uint32_t reconverge = nowhere; ///< Where lanes of a branch meet again.

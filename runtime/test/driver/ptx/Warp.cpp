@@ -104,7 +104,10 @@ bool Warp::run(uint32_t steps) {
 /// that may wait for others in a loop lets them have their turn.
 bool Warp::select() {
   const auto count = static_cast<int32_t>(groups.size());
-  const int32_t start = exhausted ? current : count;
+  const int32_t start = block.launch.apart
+                            ? static_cast<int32_t>(block.pick(groups.size()))
+                        : exhausted ? current
+                                    : count;
   for (int32_t i = 1; i <= count; ++i) {
     int32_t group = (start - i + count) % count;
     if (groups[group].state == Group::Ready) {
@@ -198,6 +201,8 @@ void Warp::part(std::span<const Part> parts, uint32_t reconverge) {
     return;
   }
   reselect = true;
+  if (block.launch.apart && block.pick(4) == 0)
+    reconverge = groups[current].reconverge;
   Group child;
   child.state = Group::Ready;
   child.reconverge = reconverge;

@@ -8,6 +8,10 @@
 // a warp operation, lets other leaves run, as hardware with independent thread
 // scheduling does. One that sleeps runs again in the block's next turn.
 //
+// On request what has parted may stay so, as hardware may have it, too, until
+// the group that parted meets, and leaves run in any order: then only warp
+// operations and barriers bring lanes together.
+//
 //===----------------------------------------------------------------------===//
 
 #ifndef PIKO_TEST_DRIVER_PTX_WARP_H
@@ -21,6 +25,7 @@
 namespace piko::ptx {
 
 class Block;
+class StoreBuffer;
 class Workspace;
 
 enum class FaultKind : uint8_t {
@@ -145,6 +150,7 @@ public:
   uint8_t *shared = nullptr, *local = nullptr, *calls = nullptr;
   const uint8_t *parameters = nullptr;
   const Program *program = nullptr;
+  StoreBuffer *buffer = nullptr; ///< The block's, if others see stores late.
   Block &block;
   const uint32_t number, first; ///< In the block: of the warp, its thread 0.
   std::vector<Group> groups;
