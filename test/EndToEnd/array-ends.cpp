@@ -2,6 +2,7 @@
 //
 // An index that counts from the end of an array, where the next member begins,
 // beside one from the beginning of that member.
+// REQUIRES: all
 // RUN: %compare_targets %s --count 64 | FileCheck %s
 // CHECK: equal
 #include <piko.h>

@@ -2,6 +2,7 @@
 //
 // Bins in one dimension: cells are a glm::ivec1 and positions a glm::vec1, in the
 // reference executor and compiled.
+// REQUIRES: all
 // RUN: %compare_targets %s --domain 53 --count 500 --runs 1 | FileCheck %s
 // CHECK: equal
 // RUN: %cxx_behind_header -Wall -Wextra -Werror -DMAIN %s -o %t && %t | FileCheck %s --check-prefix=REFERENCE

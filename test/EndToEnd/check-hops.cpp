@@ -2,6 +2,7 @@
 //
 // In checking mode an endless loop names the whole way of a primitive that stays
 // in it, whichever thread's memory that one lies in.
+// REQUIRES: all
 // HOLE: cuda: what is checked is written down on the host
 // RUN: %compare_checked %s --stops --count 40000 --domain 67 35 --loop-limit 6 --runs 1 --threads 3 --check | FileCheck %s
 // CHECK: got: stage 'travel', bin 11: a loop did not end within 6 hops

@@ -2,6 +2,7 @@
 //
 // What stages behind local edges emit, and the one in front of them, is merged
 // with others by its lineage, in one submission.
+// REQUIRES: all
 // DEFINE: %{compare} = piko-compare %s --count 300 --domain 67 35 --runs 2 --threads 2 --target cuda --gpu-threads 64
 // RUN: pikoc %s --pipe Layers --emit=kernels | FileCheck %s --check-prefix=KERNEL
 // KERNEL-DAG: piko.local_barrier @spread[0] -> @sort

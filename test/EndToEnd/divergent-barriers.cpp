@@ -2,6 +2,7 @@
 //
 // Iterations that do not all come to a barrier are an error, and nothing behind
 // it runs: not what the barrier's branch guards, nor a loop that others leave.
+// REQUIRES: all
 // RUN: %compare_targets %s --stops --pipe Guarded --runs 1 --threads 1 2 | FileCheck %s
 // RUN: %compare_targets %s --stops --pipe Loops --runs 1 --threads 1 2 | FileCheck %s
 // RUN: %compare_targets %s --stops --pipe Counts --runs 1 --threads 1 2 | FileCheck %s

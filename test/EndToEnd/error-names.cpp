@@ -3,6 +3,7 @@
 // Messages call stages, state and collectives what the user calls them: a stage
 // may have the name of a piece of state, and run inside another one. Of
 // collectives that not all iterations call, the message names the first.
+// REQUIRES: all
 // RUN: sed -n 's|^// STOP: ||p' %s > %t.stops
 // RUN: not piko-compare %s --cases %t.stops --runs 1 --threads 1 > %t.out
 // HOLE: x86-64-v3, x86-64, gpu-on-cpu, cuda: names in messages come from the frontend

@@ -3,6 +3,7 @@
 // An error of a run names the stage, and the bin if it is in a call of Process,
 // in the same words in the reference ("expected") and compiled ("got"): also
 // where a phase runs inside another stage's kernel.
+// REQUIRES: all
 // RUN: sed -n 's|^// STOP: ||p' %s > %t.stops
 // RUN: %compare_targets %s --stops --cases %t.stops --runs 1 --threads 2 > %t.out
 // RUN: sed -n '/^Read:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=READ

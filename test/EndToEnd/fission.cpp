@@ -3,6 +3,7 @@
 // A stage with a loop, fed from a loop, runs behind the stage that feeds it, from
 // a list of the bin, also where primitives come in strips; and runs inside it
 // where the order of what it emits would show, or where it only changes pixels.
+// REQUIRES: all
 // RUN: pikoc %s --pipe Chain --remarks --emit=kernels -o - 2>&1 | FileCheck %s --check-prefix=BEHIND
 // BEHIND: remark: stage 'shade' takes what stage 'spread' emits in a loop from a list, as its own loops fill vectors there
 // BEHIND: piko.schedule direct_map behind

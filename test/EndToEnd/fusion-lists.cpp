@@ -3,6 +3,7 @@
 // Stages that become one where a list hands its items on, by index, by iterator
 // and between the iterations of a parallel loop, and where a truth value says
 // that a pixel is in the bin: a local one, and a field of what is emitted.
+// REQUIRES: all
 // RUN: pikoc %s --pipe Lists --emit=kernels --remarks -o %t.mlir 2>&1 | FileCheck %s --check-prefix=REMARK
 // RUN: FileCheck %s --check-prefix=KERNEL --input-file=%t.mlir
 // REMARK-DAG: stage 'shade' keeps each primitive in the bin

@@ -3,6 +3,7 @@
 // On a GPU, collectives of iterations that are threads of a block: the tree of a
 // float reduction and scan is the language's, sorts are stable and put NaN last,
 // and threads without an iteration take no part.
+// REQUIRES: all
 // RUN: %compare_targets %s --cases %s --runs 1
 // CASE: --pipe Collected --count 700
 // CASE: --pipe Collected --count 30 --seed 4

@@ -2,6 +2,7 @@
 //
 // Indices that are tested in front of a loop, or not at all, are those of the
 // reference, at the ends of buffers and past them.
+// REQUIRES: all
 // RUN: %compare_targets %s --cases %s
 // CASE: --pipe Rows --count 500
 // CASE: --pipe Tiles --count 300

@@ -2,6 +2,7 @@
 //
 // Lines are in the bins that they touch, as the reference has it: short and
 // long ones, in any direction, through corners, of positions anywhere.
+// REQUIRES: all
 // RUN: %compare_targets %s --cases %s --runs 1
 // CASE: --pipe Planar --count 3000 --domain 61 43
 // CASE: --pipe Planar --count 2000 --domain 64 64 --wide

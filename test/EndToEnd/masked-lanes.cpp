@@ -3,6 +3,7 @@
 // Lanes that are masked off divide by zero, INT_MIN by -1, read out of range and
 // leave loops early: no trap, no error, and the reference's values, whatever lanes
 // are given.
+// REQUIRES: all
 // RUN: %compare_targets %s --cases %s --runs 1
 // CASE: --pipe Items --domain 32 32 --count 1003 --wide
 // CASE: --pipe Iterations --domain 32 32 --count 203 --wide

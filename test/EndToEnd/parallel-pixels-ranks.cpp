@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // parallelForPixels(lo, hi, f) in one and in three dimensions.
+// REQUIRES: all
 // RUN: %compare_targets %s --cases %s
 // CASE: --pipe One --domain 53 --count 200
 // CASE: --pipe Three --domain 33 18 7 --count 200

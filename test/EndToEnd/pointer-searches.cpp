@@ -2,6 +2,7 @@
 //
 // Pointers that searches give, into an array behind another member and in front
 // of one, and pointers that walk through the arrays of several records.
+// REQUIRES: all
 // RUN: %compare_targets %s --count 64 | FileCheck %s
 // CHECK: equal
 #include <piko.h>

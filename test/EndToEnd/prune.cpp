@@ -3,6 +3,7 @@
 // Fields, ports and stages that nothing depends on are dropped, and what is
 // left gives the reference executor's bits: sums that are not associative show
 // the order in which primitives on several paths arrive.
+// REQUIRES: all
 // RUN: pikoc %s --pipe PrunePipe --emit=kernels --remarks -o %t 2>&1 | FileCheck %s --check-prefix=REMARKS
 // RUN: %compare_targets %s --pipe PrunePipe --count 3000 | FileCheck %s
 // CHECK: equal

@@ -4,6 +4,7 @@
 // bins in which nothing is, in strips, behind a wait for the bin, in a list that
 // runs for every bin. What is in the images is the reference executor's, from run
 // to run.
+// REQUIRES: all
 // RUN: pikoc %s --pipe Waits --emit=target --remarks -o %t.mlir 2>&1 | FileCheck %s --check-prefix=REMARK
 // REMARK-DAG: remark: stage 'count' keeps a bin's pixels of 'image' in 5120 bytes, which it clears
 // REMARK-DAG: remark: stage 'count' keeps a bin's pixels of 'last' in 1024 bytes, which it clears

@@ -2,6 +2,7 @@
 //
 // An integer of 64 bits that becomes a float by way of a double is rounded
 // twice: here first to a tie between two floats, which then goes to the even one.
+// REQUIRES: all
 // RUN: %compare_targets %s --count 1 --runs 1 --threads 1 | FileCheck %s
 // CHECK: equal
 // RUN: pikoc %s --emit=authored -o - | FileCheck %s --check-prefix=AUTHORED

@@ -3,6 +3,7 @@
 // Edges on which nothing is ever emitted still say in which order stages run, and
 // what are rounds: results are those of the reference.
 //
+// REQUIRES: all
 // RUN: %compare_targets %s --cases %s
 // CASE: --pipe Rounds --count 20
 // CASE: --pipe Order --count 20

@@ -3,6 +3,7 @@
 // Loops around loops that change the same elements in each of their turns, in
 // all styles: four turns share the inner loop where none sees it, and the others
 // keep their order.
+// REQUIRES: all
 // RUN: %compare_targets %s --cases %s --runs 1
 // RUN: %if all %{ piko-compare %s --cases %s --runs 1 --without vectorize -O0 %}
 // CASE: --pipe Product --count 7

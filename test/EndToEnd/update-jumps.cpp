@@ -2,6 +2,7 @@
 //
 // Updates are left from anywhere: from a switch, from a loop, by helpers that
 // return early, and on a path that nobody takes.
+// REQUIRES: all
 // RUN: %compare_targets %s --cases %s
 // CASE: --pipe Test --count 3000
 // CASE: --pipe Loops --count 3000

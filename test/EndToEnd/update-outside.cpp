@@ -2,6 +2,7 @@
 //
 // The pixel of an update outside its bin has as many coordinates as there are
 // dimensions, in the reference and compiled.
+// REQUIRES: all
 // RUN: %compare_targets %s --stops --pipe One --domain 16 --runs 1 --threads 1 2 --count 1 | FileCheck %s --check-prefix=ONE
 // RUN: %compare_targets %s --stops --pipe Three --domain 8 8 8 --runs 1 --threads 1 2 --count 1 | FileCheck %s --check-prefix=THREE
 // RUN: %compare_targets %s --stops --pipe Four --domain 8 8 8 8 --runs 1 --threads 1 2 --count 1 | FileCheck %s --check-prefix=FOUR

@@ -3,6 +3,7 @@
 // Copies and fills of a number of elements that varies: in an array and between
 // two, forwards and backwards where they overlap, of numbers and of records, in
 // local variables, primitives and state.
+// REQUIRES: all
 // RUN: %compare_targets %s --count 64 | FileCheck %s
 // CHECK: equal
 #include <piko.h>

@@ -3,6 +3,7 @@
 // Iterations that run as lanes of vectors give the reference executor's numbers,
 // in every style of body: loops that end at different times, arrays of an
 // iteration, integers of all sizes, divisors that are 0 elsewhere.
+// REQUIRES: all
 // RUN: %compare_targets %s --cases %s --runs 1
 // CASE: --pipe Escapes --domain 67 35 --count 320
 // CASE: --pipe Sorts --domain 67 35 --count 320
