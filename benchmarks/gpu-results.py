@@ -48,7 +48,8 @@ def summarize(results):
         counts = [sum(told["status"] == status for told in of_step)
                   for status in ("ok", "failed", "left")]
         rows.append([step, *counts, f"{sum(it.get('seconds', 0) for it in of_step):.0f}"])
-    return table(["step", "ok", "failed", "left for want of time", "seconds"], rows)
+    return table(["step", "ok", "failed", "left for want of time",
+                  "seconds of its processes"], rows)
 
 
 def list_failures(results):
@@ -68,9 +69,11 @@ def list_smoke(results):
 def frames_of(results):
     """{(scene, lights): {pipe: told}} of frames, and the same of kernels by themselves."""
     frames, kernels = {}, {}
-    for (step, name), told in results.items():
+    for (step, _), told in results.items():
         if step == "time" and told["status"] == "ok" and "told" in told:
-            pipe, scene, lights = name.split()[:3]
+            pipe, scene, lights = (told[key] for key in ("pipe", "scene", "lights"))
+            if told["example"] not in ("raster", "visibility"):
+                pipe = f"{told['example']} {pipe}"
             into = kernels if "kernels" in told["told"] and any(
                 "ms" in it for it in told["told"]["kernels"]) else frames
             into.setdefault((scene, int(lights)), {})[pipe] = told["told"]

@@ -32,10 +32,6 @@ private:
 
 } // namespace
 
-bool piko::isPipelineLibrary(const std::string &file) {
-  return file.ends_with(".so");
-}
-
 static uint64_t hashFile(const std::string &file) {
   std::ifstream stream(file, std::ios::binary);
   return rt::captureSum(
@@ -55,6 +51,15 @@ static std::string findMeaningless(const LoadOptions &options) {
   if (!synthesis.without.empty() || !synthesis.fix.empty() ||
       !synthesis.directives.empty())
     return "passes, constants and directives are of";
+  const GPUOptions &gpu = options.gpu;
+  if (gpu.target == GPUTarget::Emulator || gpu.threads || gpu.blocks ||
+      gpu.seed)
+    return "blocks and threads are made of";
+  const LoadOptions usual;
+  if (options.cpu != usual.cpu || options.optLevel != usual.optLevel ||
+      synthesis.mappingWindow != usual.synthesis.mappingWindow ||
+      !gpu.cubins.empty())
+    return "code for a processor or a chip is made of";
   return "";
 }
 

@@ -10,9 +10,6 @@
 
 namespace piko {
 
-/// Whether a file is such a library, by its name: it ends in ".so".
-bool isPipelineLibrary(const std::string &file);
-
 /// As loadPipeline, of a library.
 std::unique_ptr<LoadedProgram> loadFromLibrary(const std::string &file,
                                                const LoadOptions &options,

@@ -123,6 +123,11 @@ public:
     for (char byte : bytes)
       value = (value ^ static_cast<unsigned char>(byte)) * 0x100000001b3;
   }
+  /// With its length, so that nothing runs into what follows.
+  void addText(std::string_view text) {
+    add(std::to_string(text.size()) + ":");
+    add(text);
+  }
   void addNumber(int32_t type, const char *at) {
     if (type == PIKORT_F32)
       return addFloat<float>(at);
@@ -145,9 +150,10 @@ private:
 
 uint64_t replay::hashOutcome(const Outcome &outcome) {
   Hash hash;
-  hash.add(outcome.error);
+  hash.addText(outcome.error);
   for (const auto &[name, records] : outcome.state) {
-    hash.add(name);
+    hash.addText(name);
+    hash.addText(std::to_string(records.bytes.size()));
     for (int64_t i = 0; i < int64_t(records.bytes.size()) / records.size; ++i)
       for (const Field &field : records.fields)
         for (int64_t e = 0; e < field.elements; ++e)

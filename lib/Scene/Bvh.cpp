@@ -1,4 +1,4 @@
-//===- Bvh.cpp - A tree of boxes about a mesh -----------------------------===//
+//===- Bvh.cpp - Bounding volume hierarchies ------------------------------===//
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #include "BvhModule.h"
 #include "LoadedModule.h"
@@ -10,7 +10,8 @@ Result<Bvh> render::buildBvh(const Mesh &mesh) {
   const auto *functions =
       findInModule<BvhFunctions>(bvhModuleFile, bvhModuleSymbol);
   if (!functions)
-    return Error{std::string("cannot build a tree: there is no ") +
+    return Error{std::string("cannot build a bounding volume hierarchy "
+                             "without ") +
                  bvhModuleFile + ", which uses Embree"};
   return functions->build(mesh);
 }

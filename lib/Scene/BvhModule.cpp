@@ -1,4 +1,4 @@
-//===- BvhModule.cpp - A tree of boxes about a mesh, with Embree ----------===//
+//===- BvhModule.cpp - Bounding volume hierarchies, by Embree -------------===//
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // Embree builds a tree of pointers in its own memory, on all cores, which is

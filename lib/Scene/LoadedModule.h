@@ -13,9 +13,10 @@
 
 namespace piko::render {
 
-/// The one symbol of a module, which stays loaded; null where there is none.
+/// The one symbol of a module, which is looked for at the first call and stays
+/// loaded; null where there is none. Each T is of one module.
 template <class T> const T *findInModule(const char *file, const char *symbol) {
-  void *module = dlopen(file, RTLD_NOW | RTLD_LOCAL);
+  static void *module = dlopen(file, RTLD_NOW | RTLD_LOCAL);
   return static_cast<const T *>(module ? dlsym(module, symbol) : nullptr);
 }
 

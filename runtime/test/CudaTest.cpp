@@ -51,6 +51,24 @@ TEST_F(Cuda, AFrameIsOneSubmission) {
   EXPECT_EQ(pikoTestDriverCalls("cuMemAllocManaged"), 0u);
 }
 
+// Those that find no room would be a second wave. 5,000 items are 79 blocks' at
+// most.
+TEST_F(Cuda, AsManyBlocksAsAreResident) {
+  PikoTestDriverCounts counts;
+  ASSERT_TRUE(scale());
+  ASSERT_EQ(pikoTestDriverCounts("scale", &counts), 0);
+  EXPECT_EQ(counts.blocks, 79u);
+  pikoTestDriverReset();
+  std::string large = goodPTX;
+  large.insert(large.find("  .reg .pred"),
+               "  .shared .align 4 .b8 room[40960];\n");
+  bring(large.c_str());
+  ASSERT_TRUE(scale());
+  expectScaled();
+  ASSERT_EQ(pikoTestDriverCounts("scale", &counts), 0);
+  EXPECT_EQ(counts.blocks, 4u * 2u); // of four multiprocessors of 100 KB
+}
+
 // Of a frame that is one submission nothing is known, unless it is asked for.
 TEST_F(Cuda, TimesOfKernels) {
   piko::rt::Pipeline pipe{program};

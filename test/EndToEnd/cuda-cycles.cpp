@@ -33,7 +33,6 @@
 // So does one that refuses conditions.
 // RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_FAIL=cuGraphAddNode:1:801 %{compare} --pipe Turns 2>&1 | FileCheck %s --check-prefix=OLD
 // RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_FAIL=cuGraphInstantiateWithFlags:1:801 %{compare} --pipe Chain 2>&1 | FileCheck %s --check-prefix=OLD
-// CLEAN-NOT: alive at the end
 // OLD-DAG: {{^equal$}}
 // OLD-DAG: host: {{[0-9]+}} launches of kernels, 0 of graphs with 0 kernels, {{[0-9]+}} copies, 0 fills, {{[1-9][0-9]+}} waits
 //
@@ -47,14 +46,13 @@
 // ALONE: PIKO_CUDA_ALONE: expected a number of at least 0, but got 'much'
 //
 // Any call may be what refuses them, and with any error but the loss of the device.
-// RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_FAIL=cuGraphConditionalHandleCreate:1:999 %{compare} --pipe Chain 2>&1 | FileCheck %s --check-prefixes=OLD,CLEAN
-// RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_FAIL=cuStreamGetCaptureInfo:2:999 %{compare} --pipe Chain 2>&1 | FileCheck %s --check-prefixes=OLD,CLEAN
-// RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_FAIL=cuGraphAddNode:2:999 %{compare} --pipe Chain 2>&1 | FileCheck %s --check-prefixes=OLD,CLEAN
-// RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_FAIL=cuStreamUpdateCaptureDependencies:1:999 %{compare} --pipe Turns 2>&1 | FileCheck %s --check-prefixes=OLD,CLEAN
-// RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_FAIL=cuStreamBeginCaptureToGraph:2:999 %{compare} --pipe Turns 2>&1 | FileCheck %s --check-prefixes=OLD,CLEAN
-// RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_FAIL=cuStreamEndCapture:2:999 %{compare} --pipe Turns 2>&1 | FileCheck %s --check-prefixes=OLD,CLEAN
-// RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_FAIL=cuGraphLaunch:1:999 %{compare} --pipe Chain 2>&1 | FileCheck %s --check-prefixes=OLD,CLEAN
-// CLEAN-NOT: alive at the end
+// RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_FAIL=cuGraphConditionalHandleCreate:1:999 %{compare} --pipe Chain 2>&1 | FileCheck %s --check-prefix=OLD --implicit-check-not="alive at the end"
+// RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_FAIL=cuStreamGetCaptureInfo:2:999 %{compare} --pipe Chain 2>&1 | FileCheck %s --check-prefix=OLD --implicit-check-not="alive at the end"
+// RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_FAIL=cuGraphAddNode:2:999 %{compare} --pipe Chain 2>&1 | FileCheck %s --check-prefix=OLD --implicit-check-not="alive at the end"
+// RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_FAIL=cuStreamUpdateCaptureDependencies:1:999 %{compare} --pipe Turns 2>&1 | FileCheck %s --check-prefix=OLD --implicit-check-not="alive at the end"
+// RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_FAIL=cuStreamBeginCaptureToGraph:2:999 %{compare} --pipe Turns 2>&1 | FileCheck %s --check-prefix=OLD --implicit-check-not="alive at the end"
+// RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_FAIL=cuStreamEndCapture:2:999 %{compare} --pipe Turns 2>&1 | FileCheck %s --check-prefix=OLD --implicit-check-not="alive at the end"
+// RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_FAIL=cuGraphLaunch:1:999 %{compare} --pipe Chain 2>&1 | FileCheck %s --check-prefix=OLD --implicit-check-not="alive at the end"
 // RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_FAIL=cuStreamEndCapture:2:719 not %{compare} --pipe Turns 2>&1 | FileCheck %s --check-prefix=FAILS
 // FAILS-NOT: alive at the end
 // FAILS: got: CUDA device 0 (Piko test device): {{.*}}a frame: CUDA_ERROR_LAUNCH_FAILED

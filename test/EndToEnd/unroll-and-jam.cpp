@@ -5,7 +5,7 @@
 // keep their order.
 // REQUIRES: all
 // RUN: %compare_targets %s --cases %s --runs 1
-// RUN: %if all %{ piko-compare %s --cases %s --runs 1 --without vectorize -O0 %}
+// RUN: piko-compare %s --cases %s --runs 1 --without vectorize -O0
 // CASE: --pipe Product --count 7
 // CASE: --pipe Whiles --count 7
 // CASE: --pipe Unsigneds --count 8

@@ -91,9 +91,17 @@ Result<std::string> render::createPipeline(const Options &options,
   int32_t code = pikort_create(&program, &owner.pipeline);
   pikort_pipeline *pipeline = owner.pipeline;
   int64_t extent[] = {scene.size.x, scene.size.y};
-  if (const char *refusal = pikort_device_refusal(pipeline); *refusal)
+  const char *refusal = pikort_device_refusal(pipeline);
+  if (*refusal && options.load.gpu.target != GPUTarget::CUDA)
     std::fprintf(stderr, "piko-render: warning: %s; runs on the processor\n",
                  refusal);
+  if (code == PIKORT_OK && options.load.gpu.target == GPUTarget::CUDA &&
+      pikort_device(pipeline) == PIKORT_PROCESSOR) {
+    return Error{"--target cuda: " +
+                 (*refusal ? std::string(refusal)
+                           : "'" + options.pipeline +
+                                 "' has code for the processor alone")};
+  }
   if (code != PIKORT_OK ||
       (!scene.capture && pikort_set_domain(pipeline, 2, extent) != PIKORT_OK) ||
       !setOptions(options, pipeline))

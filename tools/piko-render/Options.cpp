@@ -279,6 +279,9 @@ private:
     else if (options.view.nearZ && options.view.farZ &&
              !(*options.view.farZ > *options.view.nearZ))
       fail("--far: expected a distance above that of --near");
+    else if (!options.against.empty() && isPipelineLibrary(options.pipeline))
+      fail("--against: expected the text of a pipeline, but '" +
+           options.pipeline + "' is a library");
     else if (!options.fix.empty() &&
              options.load.target == ExecutionTarget::Reference)
       fail("--fix is for pipelines that are compiled, and does nothing with "

@@ -123,19 +123,23 @@ Result<Picture> readPicture(const Frame &frame) {
   }
 }
 
-/// Each frame more leaves the same.
-Result<Done> rerun(const Options &options, const Frame &frame,
-                   const std::string &hash) {
-  for (int i = 1; i <= options.reruns; ++i) {
-    if (pikort_run(frame.pipeline()) != PIKORT_OK)
-      return errorOf(frame.pipeline());
-    auto picture = readPicture(frame);
-    if (!picture)
-      return picture.error();
-    if (picture->hash != hash)
-      return Error{"--reruns: expected frame " + std::to_string(i) +
-                   " of them to leave what the one before left, " + hash +
-                   ", but it left " + picture->hash};
+/// Each frame more leaves the same in all state.
+Result<Done> rerun(const Options &options, pikort_pipeline *pipeline) {
+  if (options.reruns == 0)
+    return Done{};
+  try {
+    replay::Outcome first = replay::readOutcome(pipeline);
+    for (int i = 1; i <= options.reruns; ++i) {
+      if (pikort_run(pipeline) != PIKORT_OK)
+        return errorOf(pipeline);
+      auto differences =
+          replay::compareOutcomes(first, replay::readOutcome(pipeline));
+      if (!differences.empty())
+        return Error{"--reruns: frame " + std::to_string(i) +
+                     " of them leaves something else: " + differences[0]};
+    }
+  } catch (const std::runtime_error &error) {
+    return Error{error.what()};
   }
   return Done{};
 }
@@ -271,7 +275,7 @@ Result<Done> renderScene(Options options) {
   if (!counts)
     return counts.error();
   warnOf(*counts);
-  if (auto ok = rerun(options, *frame, picture->hash); !ok)
+  if (auto ok = rerun(options, pipeline); !ok)
     return ok.error();
 
   RunResult result{*times,

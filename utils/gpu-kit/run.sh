@@ -6,7 +6,7 @@
 #   ./run.sh                      all steps, in at most eight minutes
 #   ./run.sh --seconds 100        those that fit, the most valuable first
 #   ./run.sh --from time          what is left from there on
-#   ./run.sh --peer FOLDER        beside another renderer; ./run.sh --help says more
+#   ./run.sh --peer COMMAND       beside another renderer; ./run.sh --help says more
 #
 # Results come into results.jsonl, a line of JSON for each thing done: that file is
 # what to bring back.

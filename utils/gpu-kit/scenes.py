@@ -99,8 +99,9 @@ def write_mixed(path, count=173_000):
 
 def main():
     folder = pathlib.Path(sys.argv[1])
-    write_sphere(folder / "sphere1m.ply")
-    write_mixed(folder / "mixed.ply")
+    for name, write in [("sphere1m.ply", write_sphere), ("mixed.ply", write_mixed)]:
+        write(folder / "unfinished")
+        (folder / "unfinished").rename(folder / name)
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ fails. A line of JSON for each is added to RESULTS as soon as it is done: that f
 what to bring back, and what benchmarks/gpu-results.py makes tables of. Steps:
 
   smoke        the device, its driver, a kernel, a join, loops, nested ones, a barrier
-               of a grid, each for itself, with what its first frame took
+               of a grid, each in a process of its own, with the time of that
   conformance  what every target must do alike
   examples     all pictures of the examples are the processor's
   time         frames of all examples, by the device's events and by the wall clock,
@@ -29,8 +29,10 @@ import pathlib
 import re
 import shlex
 import shutil
+import signal
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 
@@ -41,7 +43,7 @@ RENDER = KIT / "bin/piko-render-library"
 CONFORMANCE = KIT / "bin/PikoConformance-cuda"
 STEPS = ["smoke", "conformance", "examples", "time", "rerun", "random", "peer",
          "sanitize"]
-# Of eight minutes; a step takes what earlier ones left.
+# Of eight minutes; later steps share what a step leaves.
 SHARES = {"smoke": 60, "conformance": 60, "examples": 80, "time": 130, "rerun": 30,
           "random": 60, "peer": 30, "sanitize": 30}
 # What each stands for, and which conformance test has it by itself.
@@ -51,7 +53,7 @@ SMOKE = [("a kernel and its clears", "Frame.ImagesAreClearedAndBuffersStay", {})
           {"PIKO_CUDA_ALONE": "0"}),
          ("a conditional node", "Order.CyclesWhoseHopsAreSeen", {}),
          ("nested conditional nodes", "Order.CyclesInRounds", {}),
-         ("strips", "Order.StripsThatFitABudget", {}),
+         ("strips", "Order.StripsTakeLessMemory", {}),
          ("an error of a kernel", "Error.IndexOutsideIsThatOfTheFirstPrimitive", {}),
          ("modules loaded eagerly", "Order.SchedulesInAChain",
           {"CUDA_MODULE_LOADING": "EAGER"})]
@@ -73,11 +75,24 @@ def parse_arguments():
     parser.add_argument("--only", choices=STEPS, metavar="STEP", help="nothing else")
     parser.add_argument("--jobs", default=4, type=int,
                         help="processes at a time where nothing is timed (4)")
+    parser.add_argument("--slow", default=1, type=float, metavar="FACTOR",
+                        help="on limits of time, but for --seconds (1)")
     parser.add_argument("--peer", metavar="COMMAND",
-                        help="prints a line of JSON with ms_median, and ms_device if "
-                             "it has device events; {scene}, {width} and {height} "
-                             "stand for what is drawn")
-    return parser.parse_args()
+                        help="prints as its last line JSON with ms_median; {scene}, "
+                             "{lights}, {width} and {height} stand for what is drawn, "
+                             "and the scene's camera is added in piko-render's words")
+    arguments = parser.parse_args()
+    try:
+        fill_in(arguments.peer or "", "", 1)
+    except (KeyError, IndexError, ValueError) as error:
+        parser.error(f"--peer: expected {{scene}}, {{lights}}, {{width}} or {{height}}, "
+                     f"but got {error}")
+    return arguments
+
+
+def fill_in(command, scene, lights):
+    return [word.format(scene=scene, lights=lights, width=1024, height=768)
+            for word in shlex.split(command)]
 
 
 class Run:
@@ -92,13 +107,16 @@ class Run:
         self.step, self.step_end, self.counts = "", self.end, {}
         self.log = open(arguments.results, "a", encoding="utf-8")
         self.lock = threading.Lock()
-        self.environment = {**os.environ, "LD_LIBRARY_PATH": str(KIT / "lib")}
+        paths = [str(KIT / "lib"), os.environ.get("LD_LIBRARY_PATH", "")]
+        self.own = {"LD_LIBRARY_PATH": ":".join(filter(None, paths))}
 
     def begin(self, step):
         self.step = step
         self.counts = {"ok": 0, "failed": 0, "left": 0}
-        share = self.arguments.seconds / sum(SHARES[it] for it in self.chosen)
-        self.step_end = min(self.end, time.monotonic() + SHARES[step] * share)
+        now = time.monotonic()
+        to_come = self.chosen[self.chosen.index(step):]
+        self.step_end = now + ((self.end - now) * SHARES[step]
+                               / sum(SHARES[it] for it in to_come))
 
     def note(self, name, status, **more):
         """status: ok, failed, or left (for want of time)."""
@@ -119,27 +137,21 @@ class Run:
             self.note(name, "left")
             return None
         start = time.monotonic()
-        try:
-            done = subprocess.run(
-                [str(word) for word in words], capture_output=True, text=True,
-                errors="replace", check=False, timeout=min(limit, left), cwd=KIT,
-                env={**self.environment, **environment})
-            code, out, text = done.returncode, done.stdout, done.stdout + done.stderr
-        except subprocess.TimeoutExpired as error:
-            if left < limit:
-                self.note(name, "left", seconds=round(left, 3))
-                return None
-            code, out, text = -1, "", str(error)
-        except OSError as error:
-            code, out, text = -1, "", str(error)
+        code, out, text = run_limited(
+            [str(word) for word in words], min(limit * self.arguments.slow, left),
+            {**os.environ, **(self.own if words[0] in (RENDER, CONFORMANCE) else {}),
+             **environment})
         seconds = round(time.monotonic() - start, 3)
         wrong, more = ("", {})
         if code == 0 and judge:
-            wrong, more = judge(out)
+            try:
+                wrong, more = judge(out)
+            except (ValueError, LookupError, TypeError) as error:
+                wrong = f"expected a line of JSON, but {error}"
         ok = code == 0 and not wrong
         self.note(name, "ok" if ok else "failed", seconds=seconds, code=code,
                   **({"environment": environment} if environment else {}), **more,
-                  **({} if ok else {"text": (wrong + "\n" + text)[-3000:]}))
+                  **({} if ok else {"text": (wrong + "\n" + text[-3000:]).strip()}))
         return out if ok else None
 
     def call_all(self, tasks):
@@ -150,13 +162,39 @@ class Run:
                 future.result()
 
 
+def run_limited(words, limit, environment):
+    """Status, standard output, and all output. What is late is killed with all that it
+    has started, and not waited for: a card that hangs may hold it."""
+    with tempfile.TemporaryFile("w+", errors="replace") as out, \
+            tempfile.TemporaryFile("w+", errors="replace") as said:
+        try:
+            process = subprocess.Popen(words, stdout=out, stderr=said, cwd=KIT,
+                                       env=environment, start_new_session=True)
+        except OSError as error:
+            return -1, "", str(error)
+        late = ""
+        try:
+            code = process.wait(limit)
+        except subprocess.TimeoutExpired:
+            code, late = -1, f"it took more than {limit:.0f} s\n"
+            os.killpg(process.pid, signal.SIGKILL)
+            try:
+                process.wait(5)
+            except subprocess.TimeoutExpired:
+                late += "and was not to be killed\n"
+        out.seek(0)
+        said.seek(0)
+        text = out.read()
+        return code, text, late + text + said.read()
+
+
 def render(library, pipe, scene, *options):
     return [RENDER, KIT / library, "--pipe", pipe, KIT / scene, "--target", "cuda",
             "--json", *options]
 
 
-def judge_render(expected=None):
-    """It ran on a device, and left what is expected."""
+def judge_render(expected=None, **more):
+    """It ran on a device, and left what is expected; `more` is noted, too."""
     def judge(out):
         told = json.loads(out)
         if "device" not in told:
@@ -165,7 +203,7 @@ def judge_render(expected=None):
             return f"expected {expected}, but got {told['image_hash']}", {}
         kept = ["ms_median", "ms_min", "ms_max", "frames", "tris", "lights", "w", "h",
                 "compile_ms", "image_hash", "time", "device", "kernels"]
-        return "", {"told": {key: told[key] for key in kept if key in told}}
+        return "", {**more, "told": {key: told[key] for key in kept if key in told}}
     return judge
 
 
@@ -200,8 +238,12 @@ def conformance(run):
              PIKO_CUDA_ALONE="0")
 
 
+def example_of(library):
+    return pathlib.Path(library).stem
+
+
 def name_of(picture):
-    return " ".join([picture["pipe"], pathlib.Path(picture["scene"]).name,
+    return " ".join([example_of(picture["library"]), picture["pipe"], pathlib.Path(picture["scene"]).name,
                      *picture["options"]])
 
 
@@ -224,16 +266,18 @@ def time_frames(run):
                                for it in run.manifest["pictures"]))
     own = {(it["library"], it["pipe"]): it for it in run.manifest["pictures"]}
     meshes = sorted(it for it in (KIT / "scenes").iterdir()
-                    if it.suffix != ".bpt" and it.name != "torus.ply")
+                    if it.suffix not in ("", ".bpt") and it.name != "torus.ply")
     if not meshes:
         meshes = [KIT / "scenes/torus.ply"]
 
     def measure(pipe, scene, lights, *more):
         options = [] if scene.suffix == ".capture" else [
             *camera_of(scene), "--lights", str(lights)]
-        run.call(" ".join([pipe[1], scene.name, str(lights), *(["kernels"] if more else [])]),
+        run.call(" ".join([example_of(pipe[0]), pipe[1], scene.name, str(lights),
+                           *(["kernels"] if more else [])]),
                  render(*pipe, scene.relative_to(KIT), *options, *frames, *more),
-                 judge_render())
+                 judge_render(example=example_of(pipe[0]), pipe=pipe[1],
+                              scene=scene.name, lights=lights))
 
     # The most telling first; then each pipeline once; then all with all lights.
     telling = [it for it in pipes if it[1] in ("Visibility", "Fused", "Tiled")]
@@ -281,12 +325,12 @@ def peer(run):
 
     def judge(out):
         told = json.loads(out.splitlines()[-1])
-        return "" if "ms_median" in told else "no ms_median", {"told": told}
+        return ("" if "ms_median" in told else "expected ms_median"), {"told": told}
 
     for scene in sorted((KIT / "scenes").iterdir()):
-        words = [word.format(scene=scene, width=1024, height=768)
-                 for word in shlex.split(run.arguments.peer)]
-        run.call(f"peer {scene.name}", words, judge)
+        if scene.suffix not in ("", ".bpt"):
+            run.call(f"peer {scene.name}",
+                     fill_in(run.arguments.peer, scene, 1) + camera_of(scene), judge)
 
 
 def sanitize(run):
@@ -317,7 +361,7 @@ def main():
         print(f"time was up: run.sh --from {left[0]} goes on; left in: "
               + ", ".join(left))
     print(f"{arguments.results} is what to bring back")
-    return 1 if failed else 0
+    return 1 if failed or left else 0
 
 
 if __name__ == "__main__":

@@ -63,6 +63,11 @@ protected:
   uint64_t hash = 0;
 };
 
+/// Whether a file holds what was compiled ahead of time, by its name.
+inline bool isPipelineLibrary(const std::string &file) {
+  return file.ends_with(".so");
+}
+
 /// Compiles a pipeline's file, C++ or `.mlir` (which the reference executor
 /// does not read), for this machine, or finds its code in the cache, and loads
 /// it. A file whose name ends in `.so` is a shared library of objects that

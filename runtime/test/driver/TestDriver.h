@@ -132,16 +132,18 @@ void pikoTestDriverHostCounts(struct PikoTestDriverHostCounts *counts);
 /// CU_STREAM_NON_BLOCKING count as one.
 void pikoTestDriverDefer(int on);
 
-/// In what the device is less kind from here on than it need not be, as names
-/// with commas between them; returns 1 if one is unknown:
+/// What the device does from here on that devices may do and most do seldom, as
+/// names with commas between them; returns 1 if one is unknown:
 ///
-///   apart     lanes of a warp that have parted may stay apart until a warp
-///             operation or a barrier, and run in any order, by the seed
-///   buffered  what a block stores to global memory other blocks see at its
-///             next fence for the device, and when it ends; what an atomic
-///             operation or a strong store changes, at once
-///   lazy      a function whose handle alone is known is loaded by its first
-///             launch, which is an error while the stream is captured
+///   apart     independent thread scheduling: diverged lanes need not
+///             reconverge until a warp operation or a barrier, and run in any
+///             order, by the seed
+///   buffered  store buffering: what a block stores to global memory other
+///             blocks see at its next fence of the device's scope, and when it
+///             ends; what an atomic operation or a strong store changes, at
+///             once
+///   lazy      lazy loading: a function whose handle alone is known is loaded
+///             by its first launch, an error while the stream is captured
 int pikoTestDriverModes(const char *names);
 
 /// The names of kernels that were launched, a line each, sorted.
