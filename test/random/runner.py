@@ -136,7 +136,7 @@ class Runner:
             output, errors, status = "", "", -14
         verdicts = []
         for line in output.splitlines():
-            if re.fullmatch(r"[A-Z]\d+:", line):
+            if re.fullmatch(r"(P|Random)\d+:", line):
                 verdicts.append("")
             elif verdicts:
                 verdicts[-1] += line + "\n"

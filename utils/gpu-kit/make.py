@@ -179,7 +179,7 @@ class Maker:
         leave the reference executor's bits. Ends where one does not."""
         cpp, pipelines, runner = (importlib.import_module(name)
                                   for name in ("cpp", "pipelines", "runner"))
-        pipes = [pipelines.generate(seed, set(pipelines.FEATURES), f"R{seed}")
+        pipes = [pipelines.generate(seed, set(pipelines.FEATURES), f"Random{seed}")
                  for seed in range(first, first + count)]
         file = self.work / f"random{first}.cpp"
         file.write_text(cpp.write_file(pipes))
@@ -190,7 +190,7 @@ class Maker:
                 names.append(pipe.name)
             elif verdict != runner.BLANK and not verdict.startswith(
                     "the reference stops"):
-                sys.exit(f"make.py: random pipeline {pipe.name[1:]}: {verdict[:2000]}")
+                sys.exit(f"make.py: pipeline {pipe.name}: {verdict[:2000]}")
         return file, names
 
     def make_random(self, first, count):
@@ -200,8 +200,8 @@ class Maker:
             if not (self.kit / f"captures/{name}.capture").exists():
                 continue
             objects[name] = self.compile(file, name, "auto")
-        for capture in (self.kit / "captures").glob("R[0-9]*.capture"):
-            seed = int(capture.stem[1:])
+        for capture in (self.kit / "captures").glob("Random*.capture"):
+            seed = int(capture.stem.removeprefix("Random"))
             if first <= seed < first + count and capture.stem not in objects:
                 capture.unlink()
         if objects:

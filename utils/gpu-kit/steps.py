@@ -314,7 +314,7 @@ def random(run):
     run.call_all([((it["pipe"], render(it["library"], it["pipe"], it["scene"],
                                        "--frames", "1", "--warmup", "0", "--threads",
                                        "2"), judge_render(it["hash"])),
-                   {"PIKO_CUDA_ALONE": "0"} if int(it["pipe"][1:]) % 2 else {})
+                   {"PIKO_CUDA_ALONE": "0"} if int(it["pipe"].removeprefix("Random")) % 2 else {})
                   for it in run.manifest["random"]])
 
 
