@@ -47,6 +47,8 @@ def parse_arguments():
                         help="a mesh to draw and time as well; may be repeated")
     parser.add_argument("--chips", default="sm_80,sm_90,sm_100",
                         help="for which there are cubins (sm_80,sm_90,sm_100)")
+    parser.add_argument("--random-chips", default="sm_90", metavar="CHIPS",
+                        help="the same of random pipelines; others translate (sm_90)")
     parser.add_argument("--random", default=500, type=int, metavar="N",
                         help="random pipelines (500)")
     parser.add_argument("--examples", nargs="+", choices=EXAMPLES, default=EXAMPLES)
@@ -102,11 +104,11 @@ class Maker:
         for file in [*(self.kit / "bin").iterdir(), *(self.kit / "lib").iterdir()]:
             call(["strip", file])
 
-    def compile(self, file, pipe, target):
-        """An object of one pipeline."""
+    def compile(self, file, pipe, chips):
+        """An object of one pipeline, for a processor and a device."""
         out = self.work / f"{file.name.split('.')[0]}-{pipe}.o"
-        call([self.tools / "pikoc", file, "--pipe", pipe, "-o", out, f"--target={target}",
-              f"--gpu-chip={self.arguments.chips}"])
+        call([self.tools / "pikoc", file, "--pipe", pipe, "-o", out, "--target=auto",
+              f"--gpu-chip={chips}"])
         return out
 
     def link(self, name, objects):
@@ -129,7 +131,7 @@ class Maker:
                  for name in self.arguments.examples}
         pipes = {name: call([self.tools / "pikoc", file, "--list-pipes"]).split()
                  for name, file in files.items()}
-        objects = {name: [self.pool.submit(self.compile, files[name], pipe, "auto")
+        objects = {name: [self.pool.submit(self.compile, files[name], pipe, self.arguments.chips)
                           for pipe in found] for name, found in pipes.items()}
         for name, futures in objects.items():
             self.link(name, [future.result() for future in futures])
@@ -199,7 +201,7 @@ class Maker:
         for name in names:
             if not (self.kit / f"captures/{name}.capture").exists():
                 continue
-            objects[name] = self.compile(file, name, "auto")
+            objects[name] = self.compile(file, name, self.arguments.random_chips)
         for capture in (self.kit / "captures").glob("Random*.capture"):
             seed = int(capture.stem.removeprefix("Random"))
             if first <= seed < first + count and capture.stem not in objects:
@@ -232,9 +234,11 @@ class Maker:
         for name in ["run.sh", "steps.py", "scenes.py"]:
             shutil.copy(here / name, self.kit)
         (self.kit / "manifest.json").write_text(json.dumps(self.manifest, indent=0))
-        # What is much the same in all objects is far apart.
-        call(["tar", "-C", self.work, "-I", "zstd -19 --long=27 -T0", "-cf",
-              self.arguments.out, "gpu-kit"])
+        # They are ten times as large as compressed; steps.py takes them out.
+        [*self.pool.map(lambda file: call(["zstd", "-q", "-19", "--rm", file]),
+                        (self.kit / "pipelines").glob("*.so"))]
+        call(["tar", "-C", self.work, "-I", "zstd -12 -T0", "-cf", self.arguments.out,
+              "gpu-kit"])
         unpacked = sum(it.stat().st_size for it in self.kit.rglob("*") if it.is_file())
         print(f"{self.arguments.out}: {self.arguments.out.stat().st_size / 1e6:.1f} MB, "
               f"{unpacked / 1e6:.1f} MB unpacked, {len(self.manifest['pictures'])} "

@@ -136,6 +136,8 @@ class Run:
         if left < 1:
             self.note(name, "left")
             return None
+        if words[0] == RENDER:
+            unpack(words[1])
         start = time.monotonic()
         code, out, text = run_limited(
             [str(word) for word in words], min(limit * self.arguments.slow, left),
@@ -160,6 +162,19 @@ class Run:
             for future in [pool.submit(self.call, *words, **named)
                            for words, named in tasks]:
                 future.result()
+
+
+UNPACKING = threading.Lock()
+
+
+def unpack(library):
+    """Takes a library out where that was not done."""
+    path = KIT / library
+    with UNPACKING:
+        if not path.exists():
+            subprocess.run(["zstd", "-q", "-d", "-f", f"{path}.zst", "-o",
+                            f"{path}.new"], check=True)
+            pathlib.Path(f"{path}.new").rename(path)
 
 
 def run_limited(words, limit, environment):
@@ -311,11 +326,21 @@ def rerun(run):
 
 
 def random(run):
+    """A library at a time: all of them are large."""
+    libraries = {}
+    for it in run.manifest["random"]:
+        libraries.setdefault(it["library"], []).append(it)
+    for library, pipes in libraries.items():
+        compare_random(run, pipes)
+        (KIT / library).unlink(missing_ok=True)
+
+
+def compare_random(run, pipes):
     run.call_all([((it["pipe"], render(it["library"], it["pipe"], it["scene"],
                                        "--frames", "1", "--warmup", "0", "--threads",
                                        "2"), judge_render(it["hash"])),
                    {"PIKO_CUDA_ALONE": "0"} if int(it["pipe"].removeprefix("Random")) % 2 else {})
-                  for it in run.manifest["random"]])
+                  for it in pipes])
 
 
 def peer(run):
