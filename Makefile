@@ -7,7 +7,7 @@
 #                 the page is (BENCH=--quick: one minute; benchmarks/README.md)
 #   make bench-gate BASE=COMMIT   fail where something takes over 5 % longer than
 #                 it did at that commit; nine minutes and its build
-#   make charts   chart speed against error, which takes ten minutes; says
+#   make charts   chart speed against error, which takes a quarter of an hour; says
 #                 where the page is (CHARTS=--quick: two minutes)
 # On a machine with a card of NVIDIA's, one more:
 #   make gpu-bench   compare with cudaraster's and the paper's figures; without a

@@ -7,7 +7,6 @@
 #include <cstdio>
 #include <cstring>
 #include <stdexcept>
-#include <string_view>
 
 using namespace piko;
 using namespace piko::replay;
@@ -147,6 +146,12 @@ private:
 };
 
 } // namespace
+
+uint64_t replay::hashBytes(std::string_view bytes) {
+  Hash hash;
+  hash.add(bytes);
+  return hash.value;
+}
 
 uint64_t replay::hashOutcome(const Outcome &outcome) {
   Hash hash;

@@ -13,7 +13,7 @@
 // CASE: --pipe Doubles --domain 67 35 --count 320
 // CASE: --pipe Wraps --domain 67 35 --count 320
 // CASE: --pipe Counts --domain 67 35 --count 320
-// RUN: %if all %{ piko-compare %s --cases %s --runs 1 --without vectorize -O0 %}
+// RUN: piko-compare %s --cases %s --runs 1 --without vectorize -O0
 //
 // RUN: pikoc %s --pipe Escapes --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=VECTORS
 // RUN: pikoc %s --pipe Sorts --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=VECTORS

@@ -19,7 +19,7 @@ Compiles a pipeline that uses the types of piko/scene.h, renders a scene with
 it, and says how long a frame took. Or runs any pipeline on what an application
 has fed and bound, which pikort_capture or $PIKO_CAPTURE has written. In place
 of the text there may be what was compiled ahead of time: FILE.so, a shared
-library of pikoc's objects.
+library of pikoc's objects, each of which runs on what it was made for.
 
   --pipe NAME            which pipeline of the file (the only one)
   --target cpu|cuda|auto|gpu-on-cpu|reference

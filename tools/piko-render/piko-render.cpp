@@ -87,13 +87,6 @@ int64_t countDrawn(std::span<const scene::Color> pixels) {
                        [](const auto &pixel) { return pixel.rgba.a != 0; });
 }
 
-/// FNV-1a, of bytes one after the other.
-uint64_t addToHash(uint64_t hash, std::span<const std::byte> bytes) {
-  for (std::byte byte : bytes)
-    hash = (hash ^ uint64_t(byte)) * 0x100000001b3;
-  return hash;
-}
-
 std::string textOfHash(uint64_t hash) {
   char text[17];
   std::snprintf(text, sizeof text, "%016llx",
@@ -103,15 +96,15 @@ std::string textOfHash(uint64_t hash) {
 
 /// Equal images have equal hashes.
 Result<Picture> readPicture(const Frame &frame) {
-  constexpr uint64_t empty = 0xcbf29ce484222325;
   Picture picture;
   if (!frame.image().empty()) {
     auto pixels = readImage(frame.pipeline(), frame.image());
     if (!pixels)
       return pixels.error();
     picture.pixels = std::move(*pixels);
-    picture.hash =
-        textOfHash(addToHash(empty, std::as_bytes(std::span(picture.pixels))));
+    picture.hash = textOfHash(replay::hashBytes(
+        {reinterpret_cast<const char *>(picture.pixels.data()),
+         picture.pixels.size() * sizeof(scene::Color)}));
     return picture;
   }
   try {

@@ -68,14 +68,21 @@ def call(words, **options):
     return done.stdout
 
 
+def describe_commit():
+    try:
+        return subprocess.run(["git", "-C", ROOT, "describe", "--always", "--dirty"],
+                              capture_output=True, text=True, check=True).stdout.strip()
+    except (OSError, subprocess.CalledProcessError):
+        return "unknown"
+
+
 class Maker:
     def __init__(self, arguments, work):
         self.arguments, self.work = arguments, work
         self.kit = work / "gpu-kit"
         self.tools = arguments.build / "bin"
         self.pool = concurrent.futures.ThreadPoolExecutor(arguments.jobs)
-        self.manifest = {"commit": call(["git", "-C", ROOT, "describe", "--always",
-                                         "--dirty"]).strip(),
+        self.manifest = {"commit": describe_commit(),
                          "chips": arguments.chips, "pictures": [], "random": []}
         for folder in ["bin", "lib", "pipelines", "scenes", "captures"]:
             (self.kit / folder).mkdir(parents=True)

@@ -136,8 +136,12 @@ class Run:
         if left < 1:
             self.note(name, "left")
             return None
-        if words[0] == RENDER:
-            unpack(words[1])
+        try:
+            if words[0] == RENDER:
+                unpack(words[1])
+        except (OSError, subprocess.CalledProcessError) as error:
+            self.note(name, "failed", text=f"taking its library out: {error}")
+            return None
         start = time.monotonic()
         code, out, text = run_limited(
             [str(word) for word in words], min(limit * self.arguments.slow, left),
@@ -258,8 +262,8 @@ def example_of(library):
 
 
 def name_of(picture):
-    return " ".join([example_of(picture["library"]), picture["pipe"], pathlib.Path(picture["scene"]).name,
-                     *picture["options"]])
+    return " ".join([example_of(picture["library"]), picture["pipe"],
+                     pathlib.Path(picture["scene"]).name, *picture["options"]])
 
 
 def examples(run):
@@ -336,11 +340,12 @@ def random(run):
 
 
 def compare_random(run, pipes):
+    # Of every second one all joins are grids'.
+    grids = [{"PIKO_CUDA_ALONE": "0"}, {}]
     run.call_all([((it["pipe"], render(it["library"], it["pipe"], it["scene"],
                                        "--frames", "1", "--warmup", "0", "--threads",
                                        "2"), judge_render(it["hash"])),
-                   {"PIKO_CUDA_ALONE": "0"} if int(it["pipe"].removeprefix("Random")) % 2 else {})
-                  for it in pipes])
+                   grids[i % 2]) for i, it in enumerate(pipes)])
 
 
 def peer(run):

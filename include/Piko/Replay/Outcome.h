@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <map>
 #include <string>
+#include <string_view>
 #include <vector>
 
 struct pikort_pipeline;
@@ -38,6 +39,9 @@ struct Outcome {
 /// equal. Returns what differs, a line for each piece of state.
 std::vector<std::string> compareOutcomes(const Outcome &expected,
                                          const Outcome &actual);
+
+/// FNV-1a of 64 bits, of bytes one after the other.
+uint64_t hashBytes(std::string_view bytes);
 
 /// Equal outcomes, as compareOutcomes has it, have equal hashes.
 uint64_t hashOutcome(const Outcome &outcome);
