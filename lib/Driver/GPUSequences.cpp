@@ -28,9 +28,10 @@ void piko::addGPUSequence(OpPassManager &passes, const GPUOptions &options,
     passes.addPass(createReduceByAtomics());
     addCleanUp(passes);
   }
-  ConvertPikoToGPUOptions grids;
-  grids.threads = options.threads;
-  passes.nest<PipelineOp>().addPass(createConvertPikoToGPU(grids));
+  MapThreadsOptions mapping;
+  mapping.threads = options.threads;
+  passes.nest<PipelineOp>().addPass(createMapThreads(mapping));
+  passes.nest<PipelineOp>().addPass(createConvertPikoToGPU());
   addCleanUp(passes);
   addUnitsToLoops(passes, SynthesisOptions::none());
   // Each test that is left writes an entry of its own.

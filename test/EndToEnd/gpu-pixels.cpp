@@ -12,6 +12,10 @@
 // FRAMES: remark: the threads of a block do not share pixels: an update follows from that of another pixel
 // RUN: pikoc %s --pipe Carried --target gpu-on-cpu --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=CARRIED
 // CARRIED: remark: the threads of a block do not share pixels: the outcome of an update decides about other pixels
+// RUN: pikoc %s --pipe Tables,Columns --target gpu-on-cpu --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=TABLES
+// TABLES-COUNT-2: remark: the threads of a block take one primitive after the other: its pixel is not what its loops count to
+// RUN: pikoc %s --pipe Diagonals --target gpu-on-cpu --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=DIAGONALS
+// DIAGONALS: remark: the threads of a block take one primitive after the other: a loop counts to two coordinates
 //
 // RUN: %compare_targets %s --cases %s --domain 67 35 --count 900 --runs 1
 // CASE: --pipe Boxes
@@ -27,6 +31,10 @@
 // CASE: --pipe Spans
 // CASE: --pipe Frames
 // CASE: --pipe Carried
+// CASE: --pipe Tables
+// CASE: --pipe TablesOfPoints
+// CASE: --pipe Diagonals
+// CASE: --pipe Columns
 // CHECK: equal
 #include <piko.h>
 
@@ -228,6 +236,52 @@ struct Carry : Drawing {
   }
 };
 
+// Where its pixels are, a table of its own says.
+struct Table : Drawing {
+  void process(const Shape &s) {
+    Area a = clipped(s);
+    int begins[4] = {a.lo.x, a.lo.x + 1, a.lo.x + 2, a.lo.x};
+    int lo = begins[s.width & 3];
+    for (int y = a.lo.y; y < a.hi.y; ++y)
+      for (int x = lo; x < a.hi.x; ++x)
+        this->update(this->state().image, {x, y},
+                     [&](Pixel &o) { blend(o, s.value); });
+  }
+};
+struct TableOfPoints : Drawing {
+  void process(const Shape &s) {
+    Area a = clipped(s);
+    int places[4] = {a.lo.x, a.hi.x - 1, (a.lo.x + a.hi.x) / 2, a.lo.x};
+    if (a.lo.x >= a.hi.x || a.lo.y >= a.hi.y)
+      return;
+    this->update(this->state().image, {places[s.height & 3], a.lo.y},
+                 [&](Pixel &o) { blend(o, s.value); });
+  }
+};
+
+// One loop counts both coordinates.
+struct Diagonal : Drawing {
+  void process(const Shape &s) {
+    Area a = clipped(s);
+    int lo = glm::max(a.lo.x, a.lo.y), hi = glm::min(a.hi.x, a.hi.y);
+    for (int i = lo; i < hi; ++i)
+      this->update(this->state().image, {i, i},
+                   [&](Pixel &o) { blend(o, s.value - i); });
+  }
+};
+
+// Iterations of a loop in a loop.
+struct Column : Drawing {
+  void process(const Shape &s) {
+    Area a = clipped(s);
+    for (int x = a.lo.x; x < a.hi.x; ++x)
+      this->parallelFor(a.hi.y - a.lo.y, [&](int i) {
+        this->update(this->state().image, {x, a.lo.y + i},
+                     [&](Pixel &o) { blend(o, s.value + i); });
+      });
+  }
+};
+
 template <class S> struct Pipe : piko::Pipe<State> {
   S draw;
   Pipe() { this->source(draw); }
@@ -242,3 +296,7 @@ struct Rare : Pipe<Clipping> {};
 struct Spans : Pipe<Span> {};
 struct Frames : Pipe<Frame> {};
 struct Carried : Pipe<Carry> {};
+struct Tables : Pipe<Table> {};
+struct TablesOfPoints : Pipe<TableOfPoints> {};
+struct Diagonals : Pipe<Diagonal> {};
+struct Columns : Pipe<Column> {};

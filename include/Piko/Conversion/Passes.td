@@ -91,54 +91,102 @@ def ConvertPikoToOpenMP : Pass<"convert-piko-to-openmp", "::piko::PipelineOp"> {
                            "::mlir::scf::SCFDialect"];
 }
 
+def MapThreads : Pass<"piko-map-threads", "::piko::PipelineOp"> {
+  let summary = "Say how the threads of a block share a kernel's work";
+  let description = [{
+    **Requires** the machine level (`piko-form-work`), and what `piko-map-lanes` says,
+    if it has run.
+
+    **Does**: chooses how many threads a block has (`piko.block_size`), and says of
+    each piece of work and each parallel loop who takes what (`piko.threads`), for
+    `convert-piko-to-gpu`, which obeys. Of work on primitives:
+
+    - `collapsed`: threads take the pixels of many primitives as one space. All that
+      others see of the kernel is updates of pixels; a primitive has one nest of loops
+      over the pixels of a box, or one pixel, which its setup finds; and the block
+      needs at most 384 bytes a thread.
+    - `pixels`: threads share the pixels of one primitive after the other, where all
+      that has an effect follows from the update of a pixel.
+    - `shared`: each takes some of the primitives, no two of which update a pixel.
+    - `one`: one primitive after the other; loops inside may be shared.
+
+    Of a parallel loop: `shared`, where no two iterations update a pixel; `lockstep`,
+    where they meet at barriers and are at most as many as the threads; `pieces`,
+    where it has to be cut at barriers, `pieces_of_one` if one thread runs those; or
+    `one`. Before it looks for pixels, loops that count become `scf.for`, numbers that
+    loops over pixels step become closed forms, and what pixels have in common moves
+    out of their loops. A remark says why threads do not share pixels, or take one
+    primitive after the other.
+
+    Before:
+    ```
+    piko.items of @draw {
+    ^bb0(%f: !piko.prim<@F>):
+      ...
+    }
+    ```
+    After:
+    ```
+    piko.items of @draw attributes {piko.threads = #piko<threads collapsed>} {
+    ^bb0(%f: !piko.prim<@F>):
+      ...
+    }
+    ```
+
+    **Limits**: in checking mode one thread does all.
+  }];
+  let options = [
+    Option<"threads", "threads", "int64_t", "0",
+           "Threads of a block, a power of two up to 1024 (default: what the "
+           "stage has, rounded down to one; more where a bin has more than 16 "
+           "pixels for each, up to 256)">];
+  let dependentDialects = ["::mlir::arith::ArithDialect",
+                           "::mlir::scf::SCFDialect"];
+}
+
 def ConvertPikoToGPU : Pass<"convert-piko-to-gpu", "::piko::PipelineOp"> {
   let summary = "Turn kernels into grids of blocks and threads";
   let description = [{
-    **Requires** the machine level (`piko-form-work`).
+    **Requires** the machine level (`piko-form-work`), and a mapping to threads
+    (`piko-map-threads`).
 
     **Does**: turns the work of each kernel into a `gpu.launch`: a block runs a unit
     of the stored bins, which is a bin, several, or a share of the primitives of
     one, and then another one. Of a stage that is scheduled by `load_balance` or `all`
     it takes the next ones from a counter of the launch (`piko.gpu.take_units`), by its
     first thread, where there are fewer blocks than units; of any other, block `b` of
-    `n` has the units `b`, `b + n`, ... What a block's threads do is one of three:
+    `n` has the units `b`, `b + n`, ... What a block's threads do is as mapped:
 
-    - Of a kernel whose effects are updates of pixels, its threads share out the
-      pixels of a bin: a pixel is that thread's whose place in a tile of `threads`
-      pixels it has. All threads take all the primitives of the bin in order, so
-      that the updates of a pixel keep their lineage order; what belongs to other
-      threads' pixels is behind a test of the pixel, or, where a loop counts
-      through pixels, stepped over. What depends on a primitive alone, its setup,
-      is split off (loop fission): each thread does it for one of as many
-      primitives as the block has threads, and leaves what the pixels need of it
-      in the block's memory, between two `gpu.barrier`s. What is in a loop with
-      work on pixels, or uses an array, all threads still do alike; and where the
-      block's memory has no room for all of it, only fields are shared. An error
-      notes which primitive it is about, by which the runtime puts them in order.
-    - Where, moreover, a primitive has one nest of loops over the pixels of a box, or
-      one pixel, and differs from others in them, and the block needs at most 384
-      bytes a thread, threads take the pixels of a whole
-      group of at most 64 primitives as one space (collapsed loops). A thread tests
-      the pixels of a part of that space, and sets the primitive's bit in a mask that
-      each pixel of the bin has in the block's memory; behind a barrier, threads take
-      pixels with bits, and update each for bit after bit, so in lineage order. A
-      primitive that leaves the bin, or takes the way of a condition that uses arrays
-      of the phase, ends its group in front of it and is done alone, in a loop that is
-      marked with `piko.rare`, of a launch of its own (`kernel_draw_rest`): the one in
-      front of it has no such loop, and leaves a unit where its first rare primitive
-      stands (`piko.gpu.leave_rest`). What these launches count, and need of a cell,
-      is in the block's memory. A remark says why threads take one primitive after the
-      other.
-    - Of any other kernel, threads share the primitives of a bin, or the iterations
-      of parallel loops, where no two of these update a pixel. Where iterations
-      meet at barriers and are at most as many as the block has threads, each is a
-      thread, barriers are the block's, and what lives across them is in
-      registers; all threads go the way of iteration 0, and collectives take as
-      many steps as the number of threads has binary digits. Where there may be
-      more iterations, the loop is cut at its barriers, as on a CPU, and threads
-      share the pieces. What lies between such loops and has effects is done by
-      the first thread, between two barriers; all else by all threads alike.
-      Arrays that several threads see are in the block's memory.
+    - `pixels`: its threads share out the pixels of a bin: a pixel is that thread's
+      whose place in a tile of `threads` pixels it has. All threads take all the
+      primitives of the bin in order, so that the updates of a pixel keep their lineage
+      order; what belongs to other threads' pixels is behind a test of the pixel, or,
+      where a loop counts through pixels, stepped over. What depends on a primitive
+      alone, its setup, is split off (loop fission): each thread does it for one of as
+      many primitives as the block has threads, and leaves what the pixels need of it
+      in the block's memory, between two `gpu.barrier`s. What is in a loop with work on
+      pixels, or uses an array, all threads still do alike; and where the block's
+      memory has no room for all of it, only fields are shared. An error notes which
+      primitive it is about, by which the runtime puts them in order.
+    - `collapsed`: threads take the pixels of a whole group of at most 64 primitives as
+      one space (collapsed loops). A thread tests the pixels of a part of that space,
+      and sets the primitive's bit in a mask that each pixel of the bin has in the
+      block's memory; behind a barrier, threads take pixels with bits, and update each
+      for bit after bit, so in lineage order. A primitive that leaves the bin, or takes
+      the way of a condition that uses arrays of the phase, ends its group in front of
+      it and is done alone, in a loop that is marked with `piko.rare`, of a launch of
+      its own (`kernel_draw_rest`): the one in front of it has no such loop, and leaves
+      a unit where its first rare primitive stands (`piko.gpu.leave_rest`). What these
+      launches count, and need of a cell, is in the block's memory.
+    - Of any other kernel, threads share the primitives of a bin, or the iterations of
+      parallel loops. Of a loop in `lockstep` each iteration is a thread, barriers are
+      the block's, and what lives across them is in registers; all threads go the way
+      of iteration 0, and collectives take as many steps as the number of threads has
+      binary digits. A loop in `pieces` is cut at its barriers, as on a CPU, and threads
+      share those pieces in which no two iterations update a pixel. What lies between
+      such loops and has effects is done by the first thread, between two barriers; all
+      else by all threads alike. Arrays that several threads see are in the block's
+      memory.
 
       Where a primitive has a loop that changes state by atomics alone, whose order
       nobody sees, and nobody reads what they change, threads put it off, with the
@@ -149,8 +197,7 @@ def ConvertPikoToGPU : Pass<"convert-piko-to-gpu", "::piko::PipelineOp"> {
 
       Where a primitive has two ways with effects, and one of them keeps arrays that
       nothing else uses, that way is rare: it becomes a region that is marked with
-      `piko.rare`, for `piko-outline-rare-work`, and parallel loops in it alone do not
-      keep threads from sharing primitives. What threads have of outboxes, and the
+      `piko.rare`, for `piko-outline-rare-work`. What threads have of outboxes, and the
       counters of units and cells, are in the block's memory then. If all that the
       usual way does is to emit, there are two launches: the first one has no such
       region; it drops what a round with a rare primitive has emitted, and leaves the
@@ -193,14 +240,9 @@ def ConvertPikoToGPU : Pass<"convert-piko-to-gpu", "::piko::PipelineOp"> {
     ```
 
     **Limits**: functions that have no form with the same bits on a GPU, and local
-    barriers (`piko-fuse-kernels`), are errors. In checking mode the first thread
-    does all.
+    barriers (`piko-fuse-kernels`), are errors, and so is a mapping that does not hold
+    for the work that has it.
   }];
-  let options = [
-    Option<"threads", "threads", "int64_t", "0",
-           "Threads of a block, a power of two up to 1024 (default: what the "
-           "stage has, rounded down to one; more where a bin has more than 16 "
-           "pixels for each, up to 256)">];
   let dependentDialects = ["::mlir::arith::ArithDialect",
                            "::mlir::gpu::GPUDialect",
                            "::mlir::math::MathDialect",

@@ -36,27 +36,19 @@ using namespace piko;
 
 using Predicate = arith::CmpIPredicate;
 
-static constexpr int64_t pixelBits = 24;
-
-/// Of a block's memory: with more, a multiprocessor has few of its threads at
-/// work. A bin that has so many pixels for a thread has primitives for which
-/// masks cost more than threads that idle: a large triangle has many, and its
-/// test is cheap beside an atomic.
-static constexpr int64_t maxBytesOfThread = 384;
+static constexpr int64_t pixelBits = PixelGroup::pixelBits;
 
 //===----------------------------------------------------------------------===//
 // The two loops
 //===----------------------------------------------------------------------===//
 
 /// Takes what is rare out of the loop, into one of its own.
-void CollapsedPixels::split() {
+LogicalResult CollapsedPixels::split() {
   OpBuilder builder(items);
   rare = cast<scf::ForOp>(builder.clone(*items));
-  if (failed(sharePixels(rare, tile))) {
-    rare.erase();
-    rare = cast<scf::ForOp>(builder.clone(*items));
-    isRareForOne = true;
-  }
+  isRareForOne = findObstacleToSharing(rare, tile).has_value();
+  if (!isRareForOne && failed(sharePixels(rare, tile)))
+    return failure();
   for (Block *block : nest.rare) {
     while (Operation *op = block->getTerminator()->getPrevNode())
       op->erase();
@@ -66,21 +58,7 @@ void CollapsedPixels::split() {
   nest.work->walk([&](UpdateOp update) {
     update->setAttr(marks::inside, builder.getUnitAttr());
   });
-}
-
-/// Whether the block has room for it, and the multiprocessor for such blocks.
-LogicalResult CollapsedPixels::checkMemory(int64_t setupBytes) {
-  int64_t bytes = setupBytes + 8 * PIKOIR_FLUSH_CELLS + 12 + 8 * group +
-                  4 * words * pixels + llvm::divideCeil(pixels, 32) * 4 +
-                  2 * pixels;
-  int64_t most = std::min(
-      maxBlockBytes, maxBytesOfThread * std::max<int64_t>(threads, warpSize));
-  if (pixels < (1 << 16) && group * pixels < (1 << pixelBits) && bytes <= most)
-    return success();
-  return emitError(items.getLoc(),
-                   "masks for the pixels of a bin take too much memory "
-                   "for a block of ")
-         << threads << " threads";
+  return success();
 }
 
 /// What is to be zero when a group begins is so from the start; each group
@@ -119,10 +97,9 @@ void CollapsedPixels::clear() {
 
 FailureOr<RareSite> CollapsedPixels::run() {
   clear();
-  split();
-  ItemSetup setup(items, tile, memory, Extent::All);
-  if (failed(checkMemory(setup.countBytes())))
+  if (failed(split()))
     return failure();
+  ItemSetup setup(items, tile, memory, Extent::All);
   createGroups(setup);
   if (!hasNest)
     return emitError(items.getLoc(),
@@ -148,8 +125,7 @@ void CollapsedPixels::createGroups(ItemSetup &setup) {
   Emitter b(items.getLoc(), items);
   BinArithmetic bins(b, b.getLoc(), stage);
   for (int64_t dim = 0, e = nest.getRank(); dim < e; ++dim) {
-    scf::ForOp loop = nest.getLoop(dim);
-    Value number = loop ? loop.getInductionVar() : nest.getCoordinate(dim);
+    Value number = nest.getNumber(dim);
     binLo.push_back(
         b.cast(bins.lo(nest.update.getBin(), dim), number.getType()));
     binHi.push_back(
@@ -211,15 +187,14 @@ void CollapsedPixels::note(Operation *op, OpBuilder &at,
   hasNest = true;
   Value some = b.truth(true), inBin = b.truth(true), size = b.number(1);
   for (int64_t dim = 0, e = nest.getRank(); dim < e; ++dim) {
-    scf::ForOp loop = nest.getLoop(dim);
-    Value lo = mapping.lookupOrDefault(loop ? loop.getLowerBound()
-                                            : nest.getCoordinate(dim));
+    const PixelLoop *loop = nest.getLoop(dim);
+    Value lo = mapping.lookupOrDefault(nest.getFirst(dim));
     inBin = b.both(inBin, b.is(lo, Predicate::sge, binLo[dim]));
     if (!loop) {
       inBin = b.both(inBin, b.is(lo, Predicate::slt, binHi[dim]));
       continue;
     }
-    Value hi = mapping.lookupOrDefault(loop.getUpperBound());
+    Value hi = mapping.lookupOrDefault(loop->getEnd());
     some = b.both(some, b.is(lo, Predicate::slt, hi));
     inBin = b.both(inBin, b.is(hi, Predicate::sle, binHi[dim]));
     size = b.mul(size, b.toNumber(b.sub(hi, lo)));
@@ -278,13 +253,11 @@ CollapsedPixels::Box CollapsedPixels::cloneBox(Emitter &b, IRMapping &mapping) {
     cloneUntil(b, nest.work, nest.anchor, mapping);
   Box box;
   for (int64_t dim = 0, e = nest.getRank(); dim < e; ++dim) {
-    scf::ForOp loop = nest.getLoop(dim);
-    Value lo = mapping.lookupOrDefault(loop ? loop.getLowerBound()
-                                            : nest.getCoordinate(dim));
+    const PixelLoop *loop = nest.getLoop(dim);
+    Value lo = mapping.lookupOrDefault(nest.getFirst(dim));
     Value extent = b.number(1);
     if (loop)
-      extent =
-          b.toNumber(b.sub(mapping.lookupOrDefault(loop.getUpperBound()), lo));
+      extent = b.toNumber(b.sub(mapping.lookupOrDefault(loop->getEnd()), lo));
     box.push_back({lo, extent});
   }
   return box;
@@ -293,8 +266,8 @@ CollapsedPixels::Box CollapsedPixels::cloneBox(Emitter &b, IRMapping &mapping) {
 /// Lets counters be the pixel.
 void CollapsedPixels::mapCounters(IRMapping &mapping, ArrayRef<Value> cell) {
   for (int64_t dim = 0, e = nest.getRank(); dim < e; ++dim)
-    if (scf::ForOp loop = nest.getLoop(dim))
-      mapping.map(loop.getInductionVar(), cell[dim]);
+    if (const PixelLoop *loop = nest.getLoop(dim))
+      mapping.map(loop->getCounter(), cell[dim]);
 }
 
 /// Each thread has a part of the pixels of all boxes that is in one piece.

@@ -11,11 +11,8 @@
 //       my pixels, from the block's memory
 //     barrier
 //
-// An operation is left to the pixels if it has an effect, knows the thread or
-// an array, is in a loop with such an operation, or needs the result of one.
-// Where one is in an scf.if that is the same for all threads, both loops have
-// that scf.if. Errors keep the order of primitives, because each notes which
-// one it is about.
+// What is left to the pixels, SetupSplit.h says. Errors keep the order of
+// primitives, because each notes which one it is about.
 
 #include "ItemSetup.h"
 
@@ -31,133 +28,10 @@ using namespace piko;
 
 ItemSetup::ItemSetup(scf::ForOp items, const ThreadTile &tile,
                      GridMemory &memory, Extent extent)
-    : items(items), memory(memory), extent(extent), threads(1),
-      own(tile.place.begin(), tile.place.end()) {
+    : items(items), memory(memory), threads(1),
+      split(items, extent, tile.place) {
   for (int64_t side : tile.extents)
     threads *= side;
-  findPixelWork();
-  findShared();
-}
-
-//===----------------------------------------------------------------------===//
-// What is left to the pixels
-//===----------------------------------------------------------------------===//
-
-/// Whether an operation cannot be done for another primitive at the same time.
-bool ItemSetup::mustKeep(Operation *op) const {
-  if (extent == Extent::Fields && !isa<GetOp, ItemOp>(op))
-    return true;
-  if (auto access = dyn_cast<StateAccessOpInterface>(op))
-    if (access.getAccessKinds() != StateAccess::reads)
-      return true;
-  if (!op->hasTrait<OpTrait::HasRecursiveMemoryEffects>() &&
-      !isMemoryEffectFree(op) && !hasSingleEffect<MemoryEffects::Read>(op))
-    return true;
-  return llvm::any_of(op->getOperands(), [&](Value operand) {
-    Operation *from = operand.getDefiningOp();
-    return isa<MemRefType>(operand.getType()) || own.contains(operand) ||
-           (from && pixels.contains(from));
-  });
-}
-
-/// Whether all threads take the same way through an scf.if that has work for
-/// pixels in it.
-bool ItemSetup::isCommonIf(Operation *op) const {
-  return op == items ||
-         (isa<scf::IfOp>(op) && !mustKeep(op) && isCommonIf(op->getParentOp()));
-}
-
-void ItemSetup::findPixelWork() {
-  // Again and again, because in a loop a use comes first.
-  for (bool changed = true; changed;) {
-    changed = false;
-    items.getBody()->walk([&](Operation *op) {
-      if (op->hasTrait<OpTrait::IsTerminator>() || pixels.contains(op))
-        return;
-      Operation *parent = op->getParentOp();
-      bool keep = mustKeep(op) || (parent != items && pixels.contains(parent) &&
-                                   !isCommonIf(parent));
-      for (Region &region : op->getRegions())
-        for (Operation &inner : region.getOps())
-          keep |= pixels.contains(&inner);
-      if (!keep)
-        return;
-      changed = true;
-      pixels.insert(op);
-      for (Region &region : op->getRegions())
-        for (Block &block : region)
-          own.insert(block.args_begin(), block.args_end());
-    });
-  }
-}
-
-//===----------------------------------------------------------------------===//
-// What they need of the setup
-//===----------------------------------------------------------------------===//
-
-bool ItemSetup::isInSetup(Value value) const {
-  Operation *op = value.getDefiningOp();
-  return op && items->isProperAncestor(op) && !pixels.contains(op);
-}
-
-void ItemSetup::findShared() {
-  SmallVector<Value> todo;
-  items.getBody()->walk([&](Operation *op) {
-    bool ends = op->hasTrait<OpTrait::IsTerminator>();
-    if (pixels.contains(ends ? op->getParentOp() : op))
-      llvm::append_range(todo, op->getOperands());
-  });
-  while (!todo.empty()) {
-    Value value = todo.pop_back_val();
-    if (!isInSetup(value))
-      continue;
-    Operation *op = value.getDefiningOp();
-    bool isNumber = value.getType().isIntOrIndexOrFloat();
-    if (!isNumber || op->hasTrait<OpTrait::ConstantLike>() ||
-        isa<arith::IndexCastOp, arith::IndexCastUIOp, arith::ExtSIOp,
-            arith::ExtUIOp, arith::TruncIOp>(op)) {
-      if (both.insert(op).second)
-        llvm::append_range(todo, op->getOperands());
-    } else {
-      shared.try_emplace(value);
-    }
-  }
-  computeAgain();
-}
-
-/// One operation on what is there anyway is no more than a load.
-void ItemSetup::computeAgain() {
-  auto isConstant = [](Value value) {
-    return value.getDefiningOp() &&
-           value.getDefiningOp()->hasTrait<OpTrait::ConstantLike>();
-  };
-  auto isThere = [&](Value value) {
-    return !isInSetup(value) || isConstant(value) || shared.contains(value) ||
-           both.contains(value.getDefiningOp());
-  };
-  for (Value value : llvm::to_vector(llvm::make_first_range(shared))) {
-    Operation *op = value.getDefiningOp();
-    if (op->getNumRegions() || !isMemoryEffectFree(op) || isa<GetOp>(op) ||
-        op->getNumResults() != 1 || !llvm::all_of(op->getOperands(), isThere))
-      continue;
-    both.insert(op);
-    shared.erase(value);
-    for (Value operand : op->getOperands())
-      if (isInSetup(operand) && isConstant(operand))
-        both.insert(operand.getDefiningOp());
-  }
-}
-
-int64_t ItemSetup::countBytes() const {
-  int64_t bytes = 0;
-  for (auto &[value, place] : shared) {
-    Type type = getStorage(value.getType());
-    bytes +=
-        threads * (type.isIndex()
-                       ? 8
-                       : llvm::divideCeil(type.getIntOrFloatBitWidth(), 8));
-  }
-  return bytes;
 }
 
 //===----------------------------------------------------------------------===//
@@ -167,16 +41,16 @@ int64_t ItemSetup::countBytes() const {
 /// Values of one type are in one array, so that an address is found once.
 void ItemSetup::placeShared() {
   llvm::MapVector<Type, int64_t> sizes;
-  for (auto &[value, place] : shared) {
-    int64_t &size = sizes[getStorage(value.getType())];
-    place.first = size;
+  for (Value value : split.shared) {
+    int64_t &size = sizes[SetupSplit::getStorage(value.getType())];
+    places[value].first = size;
     size += threads;
   }
   llvm::DenseMap<Type, Value> arrays;
   for (auto [type, size] : sizes)
     arrays[type] = addBlockMemory(memory.launch, size, type);
-  for (auto &[value, place] : shared)
-    place.memory = arrays.lookup(getStorage(value.getType()));
+  for (auto &[value, place] : places)
+    place.memory = arrays.lookup(SetupSplit::getStorage(value.getType()));
 }
 
 static Value createPlace(OpBuilder &builder, Location loc, Value number,
@@ -190,11 +64,11 @@ static Value createPlace(OpBuilder &builder, Location loc, Value number,
 void ItemSetup::cloneSetup(Block &from, OpBuilder &to, IRMapping &mapping,
                            PixelHook atPixels) {
   for (Operation &op : from.without_terminator()) {
-    if (pixels.contains(&op)) {
+    if (split.isForPixels(&op)) {
       auto ifOp = dyn_cast<scf::IfOp>(&op);
       if (atPixels)
         atPixels(&op, to, mapping);
-      if (!ifOp || mustKeep(ifOp))
+      if (!ifOp || split.mustKeep(ifOp))
         continue;
       auto copy = scf::IfOp::create(
           to, op.getLoc(), mapping.lookupOrDefault(ifOp.getCondition()),
@@ -210,11 +84,11 @@ void ItemSetup::cloneSetup(Block &from, OpBuilder &to, IRMapping &mapping,
     Operation *copy = to.clone(op, mapping);
     for (auto [result, value] :
          llvm::zip_equal(op.getResults(), copy->getResults())) {
-      auto found = shared.find(result);
-      if (found == shared.end())
+      auto found = places.find(result);
+      if (found == places.end())
         continue;
       Location loc = op.getLoc();
-      Type type = getStorage(result.getType());
+      Type type = SetupSplit::getStorage(result.getType());
       Value stored = value;
       if (type != result.getType())
         stored = arith::ExtUIOp::create(to, loc, type, stored);
@@ -236,7 +110,7 @@ void ItemSetup::createSetup(OpBuilder &builder, Value position,
 }
 
 void ItemSetup::replaceInPixels() {
-  for (auto &[value, place] : shared) {
+  for (auto &[value, place] : places) {
     OpBuilder builder(value.getDefiningOp());
     Location loc = value.getLoc();
     Value at = createPlace(builder, loc, items.getInductionVar(), place.first);
@@ -274,7 +148,7 @@ void ItemSetup::sinkLoads() {
 /// What has no use any more; the loads have some.
 void ItemSetup::eraseSetup(Block &block) {
   for (Operation &op : llvm::make_early_inc_range(llvm::reverse(block))) {
-    if (pixels.contains(&op)) {
+    if (split.isForPixels(&op)) {
       for (Region &region : op.getRegions())
         for (Block &inner : region)
           eraseSetup(inner);

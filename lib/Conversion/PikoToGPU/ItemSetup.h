@@ -5,6 +5,7 @@
 #ifndef PIKO_LIB_CONVERSION_PIKOTOGPU_ITEMSETUP_H
 #define PIKO_LIB_CONVERSION_PIKOTOGPU_ITEMSETUP_H
 
+#include "Mapping/SetupSplit.h"
 #include "PikoToGPU.h"
 
 #include "mlir/IR/IRMapping.h"
@@ -12,16 +13,13 @@
 
 namespace piko {
 
-/// How much of the setup is taken out of the loop over pixels.
-enum class Extent { All, Fields };
-
 class ItemSetup {
 public:
   ItemSetup(mlir::scf::ForOp items, const ThreadTile &tile, GridMemory &memory,
             Extent extent);
 
-  bool isEmpty() const { return shared.empty(); }
-  int64_t countBytes() const;
+  bool isEmpty() const { return split.shared.empty(); }
+  int64_t countBytes() const { return threads * split.countBytes(); }
   /// In front of the loop over the primitives of a group: the setup of the
   /// thread's own, which is the one at `position`. `atPixels` gets, in the
   /// setup, what is left to the pixels where it stood, with the setup's values.
@@ -37,36 +35,21 @@ public:
   void sinkLoads();
 
 private:
-  void findPixelWork();
-  bool mustKeep(mlir::Operation *op) const;
-  bool isCommonIf(mlir::Operation *op) const;
-  bool isInSetup(mlir::Value value) const;
-  void findShared();
-  void computeAgain();
   void cloneSetup(mlir::Block &from, mlir::OpBuilder &to,
                   mlir::IRMapping &mapping, PixelHook atPixels);
   void eraseSetup(mlir::Block &block);
   void placeShared();
 
-  /// As it is in memory: an i1 has no size of its own there.
-  static mlir::Type getStorage(mlir::Type type) {
-    return type.isInteger(1) ? mlir::IntegerType::get(type.getContext(), 8)
-                             : type;
-  }
-
   mlir::scf::ForOp items;
   GridMemory &memory;
-  Extent extent;
   int64_t threads;
-  llvm::DenseSet<mlir::Value> own;          ///< What differs between threads.
-  llvm::DenseSet<mlir::Operation *> pixels; ///< Left to the loop over pixels.
-  llvm::DenseSet<mlir::Operation *> both;   ///< As cheap as a load.
+  SetupSplit split;
   /// Where a value is in memory: the thread's number behind `first`.
   struct Place {
     mlir::Value memory;
     int64_t first = 0;
   };
-  llvm::MapVector<mlir::Value, Place> shared;
+  llvm::MapVector<mlir::Value, Place> places;    ///< What pixels need.
   llvm::SmallVector<mlir::memref::LoadOp> loads; ///< What pixels take of it.
 };
 

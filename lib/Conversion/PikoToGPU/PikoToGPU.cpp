@@ -1,17 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// convert-piko-to-gpu: for each kernel,
+// convert-piko-to-gpu: for each kernel, as piko-map-threads says,
 //   1. make a launch with a block for each unit of the stored bins, and in it
 //      loops over its cells and their primitives (GridFormer); where there are
 //      fewer blocks, say which runs which unit (UnitCounter.cpp);
-//   2. if all that others see of it are pixels, share these among the block's
-//      threads, and take primitives in groups, whose setup the threads share
-//      (CollapsedPixels.cpp and RareLaunch.cpp, or PixelSharing.cpp and
+//   2. where threads share pixels, take primitives in groups, whose setup they
+//      share (CollapsedPixels.cpp and RareLaunch.cpp, or PixelSharing.cpp and
 //      ItemSetup.cpp);
-//   3. otherwise choose who takes which loop (SharedLoops.cpp), put off those
-//      of atomics (DeferredWork.cpp), set rare branches apart (RareBranches.cpp
-//      and RareRounds.cpp), and map the block's work to its threads
-//      (BlockMapping.cpp);
+//   3. otherwise convert loops as they are mapped (BarrierLoops.cpp), put off
+//      those of atomics (DeferredWork.cpp), set rare branches apart
+//      (RareBranches.cpp and RareRounds.cpp), and map the block's work to its
+//      threads (BlockMapping.cpp);
 //   4. convert access to state, and open a log for what the grid leaves;
 //   5. if it precedes another kernel, become a launch of that one's.
 
@@ -29,12 +28,8 @@
 #include "pikort/grid.h"
 
 #include "mlir/Dialect/Math/IR/Math.h"
-#include "mlir/Dialect/SCF/Transforms/Transforms.h"
-#include "mlir/Dialect/UB/IR/UBOps.h"
-#include "mlir/IR/PatternMatch.h"
 #include "mlir/Transforms/GreedyPatternRewriteDriver.h"
 #include "llvm/ADT/MapVector.h"
-#include "llvm/Support/MathExtras.h"
 
 namespace piko {
 #define GEN_PASS_DEF_CONVERTPIKOTOGPU
@@ -53,9 +48,9 @@ public:
         order(*getUnitOrder(kernel)) {}
 
   /// Threads share the pixels of a bin, of one primitive after the other or of
-  /// many; fails where they cannot.
-  LogicalResult sharePixelsOfBins(bool collapses);
-  /// Threads do what SharedLoops.cpp and BlockMapping.cpp say.
+  /// many.
+  LogicalResult sharePixelsOfBins(ThreadMapping mapping);
+  /// Threads share primitives and iterations.
   LogicalResult mapWork();
 
 private:
@@ -65,13 +60,11 @@ private:
   void convertLocal(LocalBinOp local);
   LogicalResult finish(GridMemory &memory, bool hasRare);
   void finishGrid(GridMemory &memory, bool countsInBlock);
-  LogicalResult findItems();
+  SmallVector<scf::ForOp> takeMapping(ThreadMapping mapping);
   void hoistPrivateArrays();
-  void upliftLoops();
   ThreadTile createTile();
   LogicalResult mapLoop(ParallelLoopOpInterface loop);
-  void obeyLanes();
-  LogicalResult mapPieces(ParallelForOp loop, bool isOne);
+  LogicalResult mapPieces(ParallelForOp loop, bool isShared);
   LogicalResult convertAccess();
 
   KernelOp kernel;
@@ -79,16 +72,9 @@ private:
   int64_t threads;
   Location loc;
   UnitOrder order;
-  scf::ForOp items;
   Value bins;
   gpu::LaunchOp launch;
   GridMemory memory;
-};
-
-/// Why threads cannot do something, if it is known.
-struct Obstacle {
-  Location at;
-  std::string text;
 };
 
 struct ConvertPikoToGPUPass
@@ -96,22 +82,9 @@ struct ConvertPikoToGPUPass
   using ConvertPikoToGPUBase::ConvertPikoToGPUBase;
   void runOnOperation() override;
   LogicalResult convert(KernelOp kernel);
-  bool sharePixels(KernelOp kernel, StageOp stage, int64_t count);
-  std::optional<Obstacle> tryToSharePixels(KernelOp kernel, StageOp stage,
-                                           int64_t count, bool collapses);
 };
 
 } // namespace
-
-LogicalResult GridBuilder::findItems() {
-  launch.walk([&](scf::ForOp loop) {
-    if (loop->hasAttr(marks::lanes) && loop->getParentOfType<scf::ForOp>() &&
-        !loop->getParentOfType<scf::ForOp>()->getParentOfType<scf::ForOp>())
-      items = loop;
-  });
-  return success(items && !items.getNumResults() &&
-                 !items.getBody()->getOps<ItemOp>().empty());
-}
 
 void GridBuilder::formGrid() {
   Operation *work = findWork(kernel);
@@ -228,23 +201,6 @@ void GridBuilder::hoistPrivateArrays() {
     array->moveBefore(&body, body.begin());
 }
 
-/// Makes loops that count of those that C++ has. A number that is never used
-/// becomes 0: it would be an argument of the kernel.
-void GridBuilder::upliftLoops() {
-  IRRewriter rewriter(kernel.getContext());
-  SmallVector<scf::WhileOp> loops;
-  launch.walk([&](scf::WhileOp loop) { loops.push_back(loop); });
-  for (scf::WhileOp loop : loops) {
-    rewriter.setInsertionPoint(loop);
-    (void)scf::upliftWhileToForLoop(rewriter, loop);
-  }
-  for (auto poison : llvm::to_vector(kernel.getOps<ub::PoisonOp>())) {
-    rewriter.setInsertionPoint(poison);
-    if (TypedAttr zero = rewriter.getZeroAttr(poison.getType()))
-      rewriter.replaceOpWithNewOp<arith::ConstantOp>(poison, zero);
-  }
-}
-
 ThreadTile GridBuilder::createTile() {
   ThreadTile tile(threads, stage.getBins().size());
   OpBuilder builder = OpBuilder::atBlockBegin(&launch.getBody().front());
@@ -266,22 +222,20 @@ LogicalResult GridBuilder::convertAccess() {
           GreedySimplifyRegionLevel::Disabled));
 }
 
-LogicalResult GridBuilder::sharePixelsOfBins(bool collapses) {
+LogicalResult GridBuilder::sharePixelsOfBins(ThreadMapping mapping) {
   formGrid();
   SmallVector<ParallelLoopOpInterface> loops;
   launch.walk([&](ParallelLoopOpInterface loop) { loops.push_back(loop); });
   for (ParallelLoopOpInterface loop : loops)
     convertLoop(loop);
-  if (failed(findItems()))
-    return failure();
-  upliftLoops();
-  useClosedFormsInPixelLoops(items);
+  scf::ForOp items = takeMapping(mapping).front();
+  hoistOutOfPixelLoops(items);
   ThreadTile tile = createTile();
   FailureOr<RareSite> rare = failure();
-  if (collapses) {
+  if (mapping == ThreadMapping::Collapsed) {
     PixelNestResult found = findPixelNest(items, stage);
     if (!found.nest)
-      return emitError(found.at) << found.obstacle;
+      return emitError(found.obstacle.at) << found.obstacle.text;
     rare = collapsePixels(items, *found.nest, stage, tile, memory);
     if (failed(rare))
       return failure();
@@ -300,35 +254,39 @@ LogicalResult GridBuilder::sharePixelsOfBins(bool collapses) {
   return success();
 }
 
-/// Cuts a loop whose iterations may be more than the block has threads, which
-/// share each of its pieces.
-LogicalResult GridBuilder::mapPieces(ParallelForOp loop, bool isOne) {
-  if (updatesOwnPixels(loop))
-    loop.emitRemark("what iterations keep across barriers is in memory: they "
-                    "are not known to be at most ")
-        << threads << ", the threads of a block";
-  else
-    loop.emitRemark("one thread does what iterations do between barriers: two "
-                    "of them may update a pixel, in their order");
+/// The loops over primitives that are mapped so.
+SmallVector<scf::ForOp> GridBuilder::takeMapping(ThreadMapping mapping) {
+  SmallVector<scf::ForOp> found;
+  launch.walk([&](scf::ForOp loop) {
+    auto mark = loop->getAttrOfType<ThreadMappingAttr>(marks::threads);
+    if (mark && mark.getValue() == mapping)
+      found.push_back(loop);
+    loop->removeAttr(marks::threads);
+    loop->removeAttr(marks::lanes);
+  });
+  return found;
+}
+
+/// Cuts a loop at its barriers; threads share each of its pieces that allows
+/// it.
+LogicalResult GridBuilder::mapPieces(ParallelForOp loop, bool isShared) {
   if (failed(LoopSplitter(loop, memory.log).run()))
     return failure();
   launch.walk([&](scf::ForOp piece) {
-    if (piece->removeAttr(marks::lanes) && !isOne &&
-        chooseMapping(piece, threads) == ThreadMapping::Shared)
+    if (piece->removeAttr(marks::lanes) && isShared && isIndependent(piece))
       piece->setAttr(marks::shared, UnitAttr::get(kernel.getContext()));
   });
   return success();
 }
 
 LogicalResult GridBuilder::mapLoop(ParallelLoopOpInterface loop) {
-  ThreadMapping mapping = chooseMapping(loop, threads);
-  bool isOne = loop->hasAttr(marks::one);
-  if (isOne)
-    mapping = mapping == ThreadMapping::Shared ? ThreadMapping::One
-                                               : ThreadMapping::Pieces;
-  bool isNested =
-      loop->getParentOfType<ParallelLoopOpInterface>() || hasSharedParent(loop);
-  if (isNested || mapping == ThreadMapping::One) {
+  auto mark = loop->getAttrOfType<ThreadMappingAttr>(marks::threads);
+  if (!mark)
+    return loop->emitOpError("expected a mapping to threads, as "
+                             "piko-map-threads makes it");
+  loop->removeAttr(marks::threads);
+  ThreadMapping mapping = mark.getValue();
+  if (mapping == ThreadMapping::One) {
     convertLoop(loop);
     launch.walk([](scf::ForOp made) { made->removeAttr(marks::lanes); });
     return success();
@@ -336,47 +294,30 @@ LogicalResult GridBuilder::mapLoop(ParallelLoopOpInterface loop) {
   auto pixels = dyn_cast<ParallelPixelsOp>(*loop);
   auto numbered =
       pixels ? numberIterations(pixels) : cast<ParallelForOp>(*loop);
-  if (mapping == ThreadMapping::Pieces)
-    return mapPieces(numbered, isOne);
-  if (mapping == ThreadMapping::Threads)
+  switch (mapping) {
+  case ThreadMapping::Pieces:
+  case ThreadMapping::PiecesOfOne:
+    return mapPieces(numbered, mapping == ThreadMapping::Pieces);
+  case ThreadMapping::Lockstep:
     return success(); // BlockMapping.cpp does the rest
-  convertLoop(numbered);
-  launch.walk([&](scf::ForOp made) {
-    if (made->removeAttr(marks::lanes))
-      made->setAttr(marks::shared, UnitAttr::get(kernel.getContext()));
-  });
-  return success();
-}
-
-/// Does what piko-map-lanes says. Where lanes would have items whose updates
-/// have to be put in order, they share the iterations of one, if others than
-/// rare primitives have any; where they would have pairs, they have items if
-/// these need no order.
-void GridBuilder::obeyLanes() {
-  auto yes = UnitAttr::get(kernel.getContext());
-  auto keepToOne = [&](Operation *work) {
-    work->walk(
-        [&](ParallelLoopOpInterface loop) { loop->setAttr(marks::one, yes); });
-  };
-  kernel.walk([&](ItemsOp work) {
-    LaneMapping lanes = work.getLanes().value_or(LaneMapping::Items);
-    if (lanes == LaneMapping::One)
-      keepToOne(work);
-    else if ((lanes != LaneMapping::Iterations ||
-              hasRareIterationsOnly(work)) &&
-             chooseMapping(work, threads) == ThreadMapping::Shared)
-      work->setAttr(marks::shared, yes);
-  });
-  kernel.walk([&](ListsOp work) {
-    if (work.getLanes() == LaneMapping::One)
-      keepToOne(work);
-  });
+  case ThreadMapping::Shared:
+    convertLoop(numbered);
+    launch.walk([&](scf::ForOp made) {
+      if (made->removeAttr(marks::lanes))
+        made->setAttr(marks::shared, UnitAttr::get(kernel.getContext()));
+    });
+    return success();
+  default:
+    return numbered.emitOpError("expected a mapping of a loop over iterations "
+                                "to threads, but got ")
+           << mark;
+  }
 }
 
 LogicalResult GridBuilder::mapWork() {
-  obeyLanes();
   formGrid();
-  launch.walk([](scf::ForOp loop) { loop->removeAttr(marks::lanes); });
+  for (scf::ForOp loop : takeMapping(ThreadMapping::Shared))
+    loop->setAttr(marks::shared, UnitAttr::get(kernel.getContext()));
   SmallVector<ParallelLoopOpInterface> loops; // those inside others first
   launch.walk([&](ParallelLoopOpInterface loop) { loops.push_back(loop); });
   for (ParallelLoopOpInterface loop : loops)
@@ -420,64 +361,27 @@ LogicalResult GridBuilder::finish(GridMemory &memory, bool hasRare) {
   return success();
 }
 
-/// On a copy, which takes the kernel's place where it comes out; otherwise says
-/// why not.
-std::optional<Obstacle> ConvertPikoToGPUPass::tryToSharePixels(KernelOp kernel,
-                                                               StageOp stage,
-                                                               int64_t count,
-                                                               bool collapses) {
-  OpBuilder builder(kernel);
-  auto copy = cast<KernelOp>(builder.clone(*kernel));
-  Obstacle obstacle{kernel.getLoc(), ""};
-  LogicalResult result = [&] {
-    ScopedDiagnosticHandler handler(&getContext(), [&](Diagnostic &error) {
-      obstacle = {error.getLocation(), error.str()};
-      return success();
-    });
-    return GridBuilder(copy, stage, count).sharePixelsOfBins(collapses);
-  }();
-  if (failed(result)) {
-    copy.erase();
-    return obstacle;
-  }
-  kernel.erase();
-  return std::nullopt;
-}
-
-/// Threads share the pixels of many primitives, or else of one after the other.
-bool ConvertPikoToGPUPass::sharePixels(KernelOp kernel, StageOp stage,
-                                       int64_t count) {
-  bool isOne = contains(kernel, [](Operation *op) {
-    auto items = dyn_cast<ItemsOp>(op);
-    return items && items.getLanes() == LaneMapping::One;
+/// Fails, with an error, at a mapping that does not hold.
+static LogicalResult checkMapping(KernelOp kernel, int64_t threads) {
+  WalkResult result = kernel.walk([&](Operation *op) -> WalkResult {
+    auto mark = op->getAttrOfType<ThreadMappingAttr>(marks::threads);
+    if (!mark || isLegal(op, mark.getValue(), threads))
+      return WalkResult::advance();
+    return op->emitOpError("cannot be shared by threads as ") << mark;
   });
-  if (isOne || !canSharePixels(kernel))
-    return false;
-  std::optional<Obstacle> few = Obstacle{kernel.getLoc(), ""};
-  if (count > 1)
-    few = tryToSharePixels(kernel, stage, count, /*collapses=*/true);
-  if (!few)
-    return true;
-  auto none = tryToSharePixels(kernel, stage, count, /*collapses=*/false);
-  if (none && !none->text.empty())
-    emitRemark(none->at, "the threads of a block do not share pixels: ")
-        << none->text;
-  else if (!none && !few->text.empty())
-    emitRemark(few->at, "the threads of a block take one primitive after the "
-                        "other: ")
-        << few->text;
-  return !none;
+  return failure(result.wasInterrupted());
 }
 
-/// As many as the stage has, but not much fewer than a bin has pixels: a device
-/// has few blocks then, and each of them takes long.
-static int64_t chooseThreads(StageOp stage) {
-  constexpr uint64_t pixelsOfThread = 16, most = 256;
-  uint64_t pixels = 1, threads = stage.getThreads();
-  for (int64_t size : stage.getBins())
-    pixels = llvm::SaturatingMultiply<uint64_t>(pixels, size);
-  threads = std::max(threads, std::min(pixels / pixelsOfThread, most));
-  return std::min<int64_t>(maxThreads, llvm::bit_floor(threads));
+/// How threads share the pixels of a bin, if they do.
+static std::optional<ThreadMapping> findPixelMapping(KernelOp kernel) {
+  std::optional<ThreadMapping> found;
+  kernel.walk([&](ItemsOp items) {
+    auto mark = items->getAttrOfType<ThreadMappingAttr>(marks::threads);
+    if (mark && (mark.getValue() == ThreadMapping::Pixels ||
+                 mark.getValue() == ThreadMapping::Collapsed))
+      found = mark.getValue();
+  });
+  return found;
 }
 
 LogicalResult ConvertPikoToGPUPass::convert(KernelOp kernel) {
@@ -488,25 +392,23 @@ LogicalResult ConvertPikoToGPUPass::convert(KernelOp kernel) {
           "expected work on bins, as piko-form-work makes it");
     return success();
   }
-  auto stage = lookupInPipeline<StageOp>(kernel, getStageName(work));
-  int64_t count = threads ? threads : chooseThreads(stage);
+  auto size = kernel->getAttrOfType<IntegerAttr>(marks::blockSize);
+  if (!size)
+    return kernel.emitOpError("expected a mapping to threads, as "
+                              "piko-map-threads makes it");
+  kernel->removeAttr(marks::blockSize);
   expandRemainders(kernel);
-  if (failed(checkGridLimits(kernel)))
+  if (failed(checkGridLimits(kernel)) ||
+      failed(checkMapping(kernel, size.getInt())))
     return failure();
-  if (sharePixels(kernel, stage, count))
-    return success();
-  return GridBuilder(kernel, stage, count).mapWork();
+  auto stage = lookupInPipeline<StageOp>(kernel, getStageName(work));
+  GridBuilder builder(kernel, stage, size.getInt());
+  std::optional<ThreadMapping> pixels = findPixelMapping(kernel);
+  return pixels ? builder.sharePixelsOfBins(*pixels) : builder.mapWork();
 }
 
 void ConvertPikoToGPUPass::runOnOperation() {
   PipelineOp pipeline = getOperation();
-  if (threads < 0 || threads > maxThreads ||
-      (threads && !llvm::isPowerOf2_64(threads))) {
-    pipeline.emitError("expected a power of two up to ")
-        << maxThreads << " for the threads of a block, but got "
-        << threads.getValue();
-    return signalPassFailure();
-  }
   for (auto kernel : llvm::to_vector(pipeline.getOps<KernelOp>()))
     if (failed(convert(kernel)))
       return signalPassFailure();

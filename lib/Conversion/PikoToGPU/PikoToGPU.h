@@ -5,6 +5,8 @@
 #ifndef PIKO_LIB_CONVERSION_PIKOTOGPU_PIKOTOGPU_H
 #define PIKO_LIB_CONVERSION_PIKOTOGPU_PIKOTOGPU_H
 
+#include "Mapping/WorkLegality.h"
+
 #include "Piko/Conversion/Passes.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
@@ -35,10 +37,6 @@ bool contains(mlir::Operation *op, Predicate predicate) {
       .wasInterrupted();
 }
 
-/// Whether the threads of a block can share the pixels of a bin: the kernel
-/// updates some and does nothing else that other primitives see.
-bool canSharePixels(KernelOp kernel);
-
 /// How the threads of a block share the pixels of a bin: a tile of as many
 /// pixels as there are threads is laid over the domain again and again.
 struct ThreadTile {
@@ -55,15 +53,13 @@ struct ThreadTile {
 
 struct Emitter;
 
-/// The number that a coordinate is, under casts that keep its low bits.
-mlir::Value getCoordinateRoot(mlir::Value coordinate);
-
 /// Lets no integer go from pixel to pixel that is another function of the
 /// pixel.
-void useClosedFormsInPixelLoops(mlir::scf::ForOp items);
+void useClosedFormsInPixelLoops(mlir::Operation *items);
 
 /// Leaves to each thread the updates of its own pixels, and what follows from
-/// them, in a loop over primitives that all threads run.
+/// them, in a loop over primitives that all threads run. An error where
+/// findObstacleToSharing finds one.
 llvm::LogicalResult sharePixels(mlir::scf::ForOp items, const ThreadTile &tile);
 
 struct GridMemory;
@@ -72,23 +68,6 @@ struct GridMemory;
 /// pixels they share.
 void shareSetup(mlir::scf::ForOp items, const ThreadTile &tile,
                 GridMemory &memory);
-
-/// Whether no two iterations, or primitives, update a pixel: its coordinates
-/// say which iteration it is, or only one iteration does.
-bool updatesOwnPixels(mlir::Operation *loop);
-
-/// How the threads of a block take a loop over primitives or iterations.
-enum class ThreadMapping {
-  One,     ///< One after the other; loops inside may be shared.
-  Shared,  ///< Each thread takes some, in any order.
-  Threads, ///< An iteration is a thread, and meets others at barriers.
-  Pieces,  ///< It is cut at barriers, and threads share the pieces.
-};
-/// Chooses for `piko.items`, a parallel loop, or a loop of its iterations.
-ThreadMapping chooseMapping(mlir::Operation *loop, int64_t threads);
-
-/// Whether an operation is in a loop that is shared.
-bool hasSharedParent(mlir::Operation *op);
 
 /// Whether the parallel loops of a loop over primitives are all in branches
 /// that are rare (RareBranches.cpp), and there are such branches.

@@ -10,6 +10,7 @@
 #include "CollapsedPixels.h"
 #include "Emitter.h"
 #include "ItemSetup.h"
+#include "Mapping/PixelOwners.h"
 
 #include "llvm/Support/MathExtras.h"
 
@@ -20,13 +21,13 @@ public:
   CollapsedPixels(mlir::scf::ForOp items, PixelNest &nest, StageOp stage,
                   const ThreadTile &tile, GridMemory &memory)
       : items(items), nest(nest), stage(stage), tile(tile), memory(memory),
-        launch(memory.launch), threads(1) {
+        launch(memory.launch) {
+    int64_t size = 1;
     for (int64_t side : tile.extents)
-      threads *= side;
-    group = std::min<int64_t>(threads, 64);
-    words = llvm::divideCeil(group, 32);
-    for (int64_t extent : stage.getBins())
-      pixels *= extent;
+      size *= side;
+    PixelGroup space(size, stage);
+    threads = size, group = space.size;
+    words = space.words, pixels = space.pixels;
   }
   mlir::FailureOr<RareSite> run();
 
@@ -38,8 +39,7 @@ private:
   };
   using Box = llvm::SmallVector<Side, 3>;
 
-  void split();
-  mlir::LogicalResult checkMemory(int64_t setupBytes);
+  mlir::LogicalResult split();
   void clear();
   void createGroups(ItemSetup &setup);
   void note(mlir::Operation *op, mlir::OpBuilder &at,
@@ -65,7 +65,7 @@ private:
   const ThreadTile &tile;
   GridMemory &memory;
   mlir::gpu::LaunchOp launch;
-  int64_t threads, group, words, pixels = 1;
+  int64_t threads, group, words, pixels; ///< As PixelGroup has them.
   bool hasNest = false;
   bool isRareForOne = false; ///< Its pixels cannot be shared.
   /// By dimension, as its loop counts.

@@ -1,4 +1,4 @@
-// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(convert-piko-to-gpu{threads=32}),canonicalize,cse)' | FileCheck %s --implicit-check-not=piko.cpu.
+// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-map-threads{threads=32},convert-piko-to-gpu),canonicalize,cse)' | FileCheck %s --implicit-check-not=piko.cpu.
 // What a stage emits into its own bin is read there, behind a flush: in batches of
 // three, by the first thread of each; then the block forgets it.
 

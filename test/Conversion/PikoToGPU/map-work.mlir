@@ -1,4 +1,4 @@
-// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,convert-piko-to-gpu{threads=32}),canonicalize,cse)' --split-input-file | FileCheck %s --implicit-check-not=piko.cpu.
+// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,piko-map-threads{threads=32},convert-piko-to-gpu),canonicalize,cse)' --split-input-file | FileCheck %s --implicit-check-not=piko.cpu.
 // What a block's threads do where they do not share the pixels of a bin.
 
 piko.record @F {"x" : i32 at 0} size 4 align 4

@@ -1,4 +1,4 @@
-// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,convert-piko-to-gpu))' --split-input-file --verify-diagnostics %s
+// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,piko-map-threads,convert-piko-to-gpu))' --split-input-file --verify-diagnostics %s
 // What a kernel on a GPU cannot do, and why threads do not share the pixels of a
 // bin.
 
@@ -7,6 +7,7 @@ piko.pipeline @Function rank 1 {
   piko.image @image : @F rank 1
   piko.source @a
   piko.stage @a bins [0] threads 8 : @F -> [] {
+    // expected-remark @below {{the threads of a block take one primitive after the other: a bin is the whole domain}}
     piko.process {
     ^bb0(%f: !piko.prim<@F>):
       %x = piko.get %f "x" : !piko.prim<@F> -> f32

@@ -1,4 +1,4 @@
-// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(convert-piko-to-gpu{threads=32}),canonicalize,cse)' --split-input-file | FileCheck %s
+// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-map-threads{threads=32},convert-piko-to-gpu),canonicalize,cse)' --split-input-file | FileCheck %s
 
 // A way that keeps an array is rare. The first launch drops what the threads have
 // emitted in a round with such a primitive, and leaves the unit there; the second

@@ -1,4 +1,4 @@
-// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,convert-piko-to-gpu{threads=32}),canonicalize,cse)' | FileCheck %s
+// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,piko-map-threads{threads=32},convert-piko-to-gpu),canonicalize,cse)' | FileCheck %s
 // Which block of a grid runs which unit, by the stage's schedule.
 
 piko.record @F {"x" : i32 at 0} size 4 align 4

@@ -81,13 +81,14 @@ void PikoDialect::initialize() {
 static StringRef getExpectedKind(StringRef name) {
   return llvm::StringSwitch<StringRef>(name)
       .Cases({marks::lanes, marks::rows, marks::shared, marks::again,
-              marks::one, marks::deferred, marks::rare, marks::fails,
-              marks::input, marks::shortCircuit, marks::inside, marks::source,
+              marks::deferred, marks::rare, marks::fails, marks::input,
+              marks::shortCircuit, marks::inside, marks::source,
               marks::versions},
              "a unit")
       .Case(marks::mapping, "what lanes are given, as #piko<lanes items>")
       .Case(marks::units, "how threads share units, as #piko<units shared>")
-      .Case(marks::number, "a 64-bit integer")
+      .Case(marks::threads, "how threads share work, as #piko<threads shared>")
+      .Cases({marks::number, marks::blockSize}, "a 64-bit integer")
       .Cases({marks::turns, marks::advances, marks::probability},
              "a 64-bit float")
       .Case(marks::probabilities, "an array of 64-bit floats")
@@ -103,6 +104,8 @@ static bool hasExpectedKind(NamedAttribute attribute) {
     return isa<LaneMappingAttr>(value);
   if (name == marks::units)
     return isa<UnitLoopAttr>(value);
+  if (name == marks::threads)
+    return isa<ThreadMappingAttr>(value);
   if (name == marks::probabilities)
     return isa<DenseF64ArrayAttr>(value);
   if (name == cppNameAttr || name == marks::pixels)
@@ -112,9 +115,10 @@ static bool hasExpectedKind(NamedAttribute attribute) {
   if (name == marks::turns || name == marks::advances ||
       name == marks::probability)
     return isa<FloatAttr>(value) && cast<FloatAttr>(value).getType().isF64();
-  if (auto number = dyn_cast<IntegerAttr>(value))
-    return name == marks::number && number.getType().isInteger(64);
-  return name != marks::number && isa<UnitAttr>(value);
+  if (name == marks::number || name == marks::blockSize)
+    return isa<IntegerAttr>(value) &&
+           cast<IntegerAttr>(value).getType().isInteger(64);
+  return isa<UnitAttr>(value);
 }
 
 LogicalResult PikoDialect::verifyOperationAttribute(Operation *op,

@@ -40,8 +40,11 @@ constexpr llvm::StringLiteral units = "piko.units";
 constexpr llvm::StringLiteral shared = "piko.shared";
 /// Work, or a bin, on what a local edge takes: what follows takes the same.
 constexpr llvm::StringLiteral again = "piko.again";
-/// A parallel loop that one thread runs, because its work says so.
-constexpr llvm::StringLiteral one = "piko.one";
+/// How the threads of a block share work on primitives, or a parallel loop: a
+/// `ThreadMappingAttr`.
+constexpr llvm::StringLiteral threads = "piko.threads";
+/// How many threads a block of a kernel has: a 64-bit integer.
+constexpr llvm::StringLiteral blockSize = "piko.block_size";
 /// A loop whose iterations have outboxes of their own.
 constexpr llvm::StringLiteral deferred = "piko.deferred";
 /// A loop of a kernel that is to be a function of its own: few primitives need

@@ -60,6 +60,22 @@ def Piko_LaneMapping : I32EnumAttr<"LaneMapping", "what lanes are given", [
 }
 def Piko_LaneMappingAttr : EnumAttr<Piko_Dialect, Piko_LaneMapping, "lanes">;
 
+/// The `piko.threads` of work, or of a parallel loop.
+def Piko_ThreadMapping
+    : I32EnumAttr<"ThreadMapping", "how the threads of a block share work", [
+  I32EnumAttrCase<"One", 0, "one">,           // loops inside may be shared
+  I32EnumAttrCase<"Shared", 1, "shared">,     // each takes some, in any order
+  I32EnumAttrCase<"Lockstep", 2, "lockstep">, // an iteration is a thread
+  I32EnumAttrCase<"Pieces", 3, "pieces">,     // shared, between barriers
+  I32EnumAttrCase<"PiecesOfOne", 4, "pieces_of_one">,
+  I32EnumAttrCase<"Pixels", 5, "pixels">,     // of one primitive after the other
+  I32EnumAttrCase<"Collapsed", 6, "collapsed">]> { // pixels of many primitives
+  let cppNamespace = "::piko";
+  let genSpecializedAttr = 0;
+}
+def Piko_ThreadMappingAttr
+    : EnumAttr<Piko_Dialect, Piko_ThreadMapping, "threads">;
+
 def Piko_Precision : I32EnumAttr<"Precision", "how exactly numbers are computed", [
   I32EnumAttrCase<"Strict", 0, "strict">,
   I32EnumAttrCase<"Contracted", 1, "contracted">,

@@ -10,7 +10,7 @@
 // with the same bits, because integers wrap; and threads can take iterations in
 // any order.
 
-#include "PikoToGPU.h"
+#include "../PikoToGPU.h"
 
 #include "mlir/Dialect/Utils/StaticValueUtils.h"
 #include "llvm/ADT/BitVector.h"
@@ -129,9 +129,9 @@ static void useClosedForms(scf::ForOp loop) {
     dropIterArgs(loop, dropped);
 }
 
-void piko::useClosedFormsInPixelLoops(scf::ForOp items) {
+void piko::useClosedFormsInPixelLoops(Operation *items) {
   SmallVector<scf::ForOp> loops;
-  items.getBody()->walk<WalkOrder::PreOrder>([&](scf::ForOp loop) {
+  items->getRegion(0).walk<WalkOrder::PreOrder>([&](scf::ForOp loop) {
     if (contains(loop, [](Operation *op) { return isa<UpdateOp>(op); }))
       loops.push_back(loop);
   });

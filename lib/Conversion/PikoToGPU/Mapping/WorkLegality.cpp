@@ -1,17 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// Who takes which loop. The iterations of a parallel loop are independent but
-// for the order of their emissions, which the log restores, and of their
-// updates: these must be of one pixel for each iteration. The primitives of a
-// bin are independent unless their stage updates pixels. Iterations that meet
-// at barriers are threads under the same condition, where there are enough.
+// What the threads of a block may share. The iterations of a parallel loop are
+// independent but for the order of their emissions, which the log restores, and
+// of their updates: these must be of one pixel for each iteration. The
+// primitives of a bin are independent unless their stage updates pixels.
+// Iterations that meet at barriers are threads under the same condition.
 
-#include "PikoToGPU.h"
+#include "WorkLegality.h"
 
-#include "Piko/Dialect/Piko/IR/Marks.h"
+#include "../PikoToGPU.h"
 
 #include "mlir/IR/Matchers.h"
 #include "llvm/ADT/StringMap.h"
+#include "llvm/ADT/StringSet.h"
 
 using namespace mlir;
 using namespace piko;
@@ -245,7 +246,7 @@ static int64_t getMostIterations(ParallelLoopOpInterface loop) {
 }
 
 //===----------------------------------------------------------------------===//
-// The choice
+// Loops
 //===----------------------------------------------------------------------===//
 
 /// What is checked is reported in the order of the reference.
@@ -255,23 +256,82 @@ static bool isChecked(Operation *op) {
   });
 }
 
-ThreadMapping piko::chooseMapping(Operation *loop, int64_t threads) {
-  bool isOne = isChecked(loop);
-  if (auto parallel = dyn_cast<ParallelLoopOpInterface>(loop);
-      parallel && parallel.hasBarriers())
-    return !isOne && getMostIterations(parallel) <= threads &&
-                   updatesOwnPixels(loop)
-               ? ThreadMapping::Threads
-               : ThreadMapping::Pieces;
+bool piko::isIndependent(Operation *loop) {
   auto meets = [](Operation *inner) { return isa<BarrierOpInterface>(inner); };
-  return isOne || contains(loop, meets) || !updatesOwnPixels(loop)
-             ? ThreadMapping::One
-             : ThreadMapping::Shared;
+  return !isChecked(loop) && !contains(loop, meets) && updatesOwnPixels(loop);
 }
 
-bool piko::hasSharedParent(Operation *op) {
-  for (; op; op = op->getParentOp())
-    if (op->hasAttr(marks::shared))
-      return true;
-  return false;
+bool piko::canRunInLockstep(ParallelLoopOpInterface loop, int64_t threads) {
+  return !isChecked(loop) && updatesOwnPixels(loop) &&
+         getMostIterations(loop) <= threads;
+}
+
+bool piko::isLegal(Operation *op, ThreadMapping mapping, int64_t threads) {
+  auto loop = dyn_cast<ParallelLoopOpInterface>(op);
+  switch (mapping) {
+  case ThreadMapping::One:
+    return !loop || !loop.hasBarriers();
+  case ThreadMapping::Shared:
+    return isIndependent(op);
+  case ThreadMapping::Lockstep:
+    return loop && canRunInLockstep(loop, threads);
+  case ThreadMapping::Pieces:
+  case ThreadMapping::PiecesOfOne:
+    return loop != nullptr;
+  case ThreadMapping::Pixels:
+  case ThreadMapping::Collapsed:
+    return isa<ItemsOp>(op) &&
+           updatesPixelsAlone(op->getParentOfType<KernelOp>());
+  }
+  llvm_unreachable("no other mapping");
+}
+
+//===----------------------------------------------------------------------===//
+// Kernels that update pixels alone
+//===----------------------------------------------------------------------===//
+
+/// What pixels cannot be shared with.
+static bool isObstacle(Operation *op) {
+  if (isa<EmissionOpInterface, PlaceOp, BarrierOpInterface>(op) ||
+      op->hasTrait<CheckingMode>())
+    return true;
+  if (auto work = dyn_cast<WorkOpInterface>(op))
+    return work.takesList() || work.getProducerAttr();
+  if (auto access = dyn_cast<StateAccessOpInterface>(op)) {
+    auto atomic = dyn_cast<AtomicOp>(op);
+    bool isKnown = isa<LoadOp, StoreOp, UpdateOp>(op);
+    return atomic ? bool(atomic.getOld()) : !isKnown;
+  }
+  auto array = dyn_cast<memref::AllocaOp>(op);
+  return array && !array.getType().hasStaticShape();
+}
+
+bool piko::updatesPixelsAlone(KernelOp kernel) {
+  llvm::StringSet<> written;
+  bool updates = false;
+  kernel.walk([&](StateAccessOpInterface access) {
+    if (access.getAccessKinds() != StateAccess::reads)
+      written.insert(access.getAccessedState().getValue());
+    updates |= isa<UpdateOp>(*access);
+  });
+  return updates &&
+         !kernel
+              .walk([&](Operation *op) {
+                auto access = dyn_cast<StateAccessOpInterface>(op);
+                bool readsOwn =
+                    access && access.getAccessKinds() == StateAccess::reads &&
+                    written.contains(access.getAccessedState().getValue());
+                return readsOwn || isObstacle(op) ? WalkResult::interrupt()
+                                                  : WalkResult::advance();
+              })
+              .wasInterrupted();
+}
+
+Value piko::getCoordinateRoot(Value coordinate) {
+  while (Operation *op = coordinate.getDefiningOp()) {
+    if (!isa<arith::IndexCastOp, arith::ExtSIOp, arith::TruncIOp>(op))
+      break;
+    coordinate = op->getOperand(0);
+  }
+  return coordinate;
 }

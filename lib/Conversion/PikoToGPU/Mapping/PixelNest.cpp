@@ -10,6 +10,8 @@
 
 #include "PixelNest.h"
 
+#include "../PikoToGPU.h"
+
 #include "mlir/Dialect/Utils/StaticValueUtils.h"
 #include "mlir/Interfaces/LoopLikeInterface.h"
 #include "mlir/Interfaces/SideEffectInterfaces.h"
@@ -22,8 +24,9 @@ namespace {
 
 class NestFinder {
 public:
-  NestFinder(scf::ForOp items, StageOp stage)
-      : items(items), rank(stage.getBins().size()), at(items.getLoc()) {
+  NestFinder(Operation *items, StageOp stage)
+      : items(items), rank(stage.getBins().size()),
+        obstacle{items->getLoc(), ""} {
     for (int64_t extent : stage.getBins())
       if (extent == 0)
         refuse(items, "a bin is the whole domain");
@@ -34,7 +37,7 @@ private:
   /// Whether it is done; the next block otherwise.
   bool descend(Block *block);
   bool enter(Block *block, scf::IfOp branch);
-  bool enter(Block *block, scf::ForOp loop);
+  bool enter(Block *block, Operation *loop);
   bool usesArraysOutside(Operation *op, Region &region) const;
   bool isCheapTest(Block *block, scf::IfOp test) const;
   bool checkWork();
@@ -42,18 +45,15 @@ private:
   bool checkBounds();
   bool isOfPrimitive(Value value);
   bool refuse(Operation *op, const Twine &why) {
-    if (obstacle.empty()) {
-      at = op->getLoc();
-      obstacle = why.str();
-    }
+    if (obstacle.text.empty())
+      obstacle = {op->getLoc(), why.str()};
     return false;
   }
 
-  scf::ForOp items;
+  Operation *items;
   int64_t rank;
   PixelNest nest;
-  Location at;
-  std::string obstacle;
+  Obstacle obstacle;
 };
 
 } // namespace
@@ -64,8 +64,8 @@ static bool hasEffect(Operation *op) {
     if (auto access = dyn_cast<StateAccessOpInterface>(inner))
       return access.getAccessKinds() != StateAccess::reads;
     return isa<memref::StoreOp>(inner) ||
-           (!inner->hasTrait<OpTrait::HasRecursiveMemoryEffects>() &&
-            !isa<memref::AllocaOp>(inner) && !isMemoryEffectFree(inner) &&
+           (!isStructure(inner) && !isa<memref::AllocaOp>(inner) &&
+            !isMemoryEffectFree(inner) &&
             !hasSingleEffect<MemoryEffects::Read>(inner));
   });
 }
@@ -94,8 +94,9 @@ bool NestFinder::isCheapTest(Block *block, scf::IfOp test) const {
   if (test.getNumResults() ||
       (test.elseBlock() && hasEffect(test.getElseRegion())))
     return false;
+  // A remainder of floats becomes a loop.
   return llvm::all_of(*block, [&](Operation &op) {
-    return &op == test || !op.getNumRegions();
+    return &op == test || (!op.getNumRegions() && !isa<arith::RemFOp>(op));
   });
 }
 
@@ -114,26 +115,56 @@ bool NestFinder::enter(Block *block, scf::IfOp branch) {
   return descend(isRareThen ? &otherwise.front() : &then.front());
 }
 
-bool NestFinder::enter(Block *block, scf::ForOp loop) {
-  if (!isConstantIntValue(loop.getStep(), 1) || loop.getUnsignedCmp())
-    return refuse(loop, "a loop over pixels does not count by one");
-  if (loop.getNumResults())
-    return refuse(loop, "a value goes from one pixel to the next; compute it "
-                        "from the pixel");
-  nest.levels.push_back({block, loop});
-  nest.loops.push_back(loop);
-  for (Value bound : {loop.getLowerBound(), loop.getUpperBound()})
-    if (!nest.loops.front().isDefinedOutsideOfLoop(bound))
-      return refuse(loop, "a row's bounds depend on the row");
-  return descend(loop.getBody());
+SmallVector<PixelLoop, 3> piko::getPixelLoops(Operation *op) {
+  SmallVector<PixelLoop, 3> loops;
+  if (isa<scf::ForOp, ParallelForOp>(op))
+    loops.push_back({op});
+  if (auto pixels = dyn_cast<ParallelPixelsOp>(op))
+    for (unsigned dim = 0, e = pixels.getCell().size(); dim < e; ++dim)
+      loops.push_back({op, dim});
+  return loops;
+}
+
+Value PixelLoop::getFirst() const {
+  if (auto loop = dyn_cast<scf::ForOp>(op))
+    return loop.getLowerBound();
+  auto pixels = dyn_cast<ParallelPixelsOp>(op);
+  return pixels ? pixels.getLo()[dim] : Value();
+}
+
+Value PixelLoop::getEnd() const {
+  if (auto loop = dyn_cast<scf::ForOp>(op))
+    return loop.getUpperBound();
+  if (auto pixels = dyn_cast<ParallelPixelsOp>(op))
+    return pixels.getHi()[dim];
+  return cast<ParallelForOp>(op).getCount();
+}
+
+bool NestFinder::enter(Block *block, Operation *op) {
+  if (auto loop = dyn_cast<scf::ForOp>(op)) {
+    if (!isConstantIntValue(loop.getStep(), 1) || loop.getUnsignedCmp())
+      return refuse(loop, "a loop over pixels does not count by one");
+    if (loop.getNumResults())
+      return refuse(loop, "a value goes from one pixel to the next; compute it "
+                          "from the pixel");
+  }
+  nest.levels.push_back({block, op});
+  for (const PixelLoop &loop : getPixelLoops(op)) {
+    nest.loops.push_back(loop);
+    for (Value bound : {loop.getFirst(), loop.getEnd()})
+      if (bound && nest.loops.front().op->isAncestor(
+                       bound.getParentBlock()->getParentOp()))
+        return refuse(op, "a row's bounds depend on the row");
+  }
+  return descend(&op->getRegion(0).front());
 }
 
 /// Whether a loop counts to a coordinate of an update.
-static bool countsPixels(scf::ForOp loop) {
-  return contains(loop, [&](Operation *op) {
+static bool countsPixels(const PixelLoop &loop) {
+  return contains(loop.op, [&](Operation *op) {
     auto update = dyn_cast<UpdateOp>(op);
     return update && llvm::any_of(update.getCoordinates(), [&](Value value) {
-             return getCoordinateRoot(value) == loop.getInductionVar();
+             return getCoordinateRoot(value) == loop.getCounter();
            });
   });
 }
@@ -146,9 +177,9 @@ bool NestFinder::descend(Block *block) {
   if (effects.empty())
     return refuse(items, "it updates no pixel");
   if (effects.size() == 1) {
-    if (auto loop = dyn_cast<scf::ForOp>(effects.front());
-        loop && countsPixels(loop))
-      return enter(block, loop);
+    auto loops = getPixelLoops(effects.front());
+    if (!loops.empty() && llvm::all_of(loops, countsPixels))
+      return enter(block, effects.front());
     auto branch = dyn_cast<scf::IfOp>(effects.front());
     if (branch && nest.loops.empty() && !branch.getNumResults())
       return enter(block, branch);
@@ -158,15 +189,15 @@ bool NestFinder::descend(Block *block) {
     }
   }
   nest.work = block;
-  nest.anchor = nest.loops.empty() ? effects.front() : nest.loops.front();
+  nest.anchor = nest.loops.empty() ? effects.front() : nest.loops.front().op;
   return checkWork();
 }
 
 /// Whether a coordinate is the loop's, or else the primitive's.
 bool NestFinder::checkCoordinate(Value coordinate) {
   Value root = getCoordinateRoot(coordinate);
-  for (scf::ForOp loop : nest.loops)
-    if (root == loop.getInductionVar())
+  for (const PixelLoop &loop : nest.loops)
+    if (root == loop.getCounter())
       return true;
   if (!items->isAncestor(coordinate.getParentBlock()->getParentOp()))
     return true;
@@ -179,6 +210,21 @@ bool NestFinder::checkCoordinate(Value coordinate) {
   if (made->getBlock() == nest.anchor->getBlock())
     return made->isBeforeInBlock(nest.anchor);
   return level != nest.levels.end() && !nest.isInside(made);
+}
+
+/// Whether a coordinate of the domain fits.
+static bool isWide(Type type) {
+  return type.isIndex() || type.getIntOrFloatBitWidth() >= 32;
+}
+
+/// Whether a coordinate is its root, and not some bits of it.
+static bool isExact(Value coordinate) {
+  Value root = getCoordinateRoot(coordinate);
+  for (; coordinate != root;
+       coordinate = coordinate.getDefiningOp()->getOperand(0))
+    if (!isWide(coordinate.getType()))
+      return false;
+  return isWide(root.getType());
 }
 
 /// All updates are of the same pixel, which the loops count to.
@@ -196,23 +242,22 @@ bool NestFinder::checkWork() {
         refuse(update, "its pixel is not what its loops count to");
         return WalkResult::interrupt();
       }
+    if (!llvm::all_of(update.getCoordinates(), isExact)) {
+      refuse(update, "a coordinate has less than 32 bits");
+      return WalkResult::interrupt();
+    }
     return WalkResult::advance();
   });
   if (result.wasInterrupted())
     return false;
   if (!nest.update || !nest.update.getBin())
     return refuse(items, "it updates no pixel");
-  for (scf::ForOp loop : nest.loops)
+  for (const PixelLoop &loop : nest.loops)
     if (!countsPixels(loop))
-      return refuse(loop, "its pixel is not what its loops count to");
+      return refuse(loop.op, "its pixel is not what its loops count to");
   if (usesArraysOutside(nest.anchor, *nest.work->getParent()))
     return refuse(nest.anchor, "its work on pixels uses an array of the phase");
   return checkBounds();
-}
-
-/// Whether a coordinate of the domain fits.
-static bool isWide(Type type) {
-  return type.isIndex() || type.getIntOrFloatBitWidth() >= 32;
 }
 
 /// Whether a value may differ between primitives.
@@ -229,39 +274,55 @@ bool NestFinder::isOfPrimitive(Value value) {
 bool NestFinder::checkBounds() {
   bool differs = false;
   for (int64_t dim = 0; dim < rank; ++dim) {
-    scf::ForOp loop = nest.getLoop(dim);
-    Value number = loop ? loop.getInductionVar() : nest.getCoordinate(dim);
-    if (!isWide(number.getType()))
-      return refuse(nest.update, "a coordinate has less than 32 bits");
-    differs |= loop ? isOfPrimitive(loop.getLowerBound()) ||
-                          isOfPrimitive(loop.getUpperBound())
-                    : isOfPrimitive(number);
+    const PixelLoop *loop = nest.getLoop(dim);
+    for (int64_t other = 0; loop && other < dim; ++other)
+      if (nest.getLoop(other) == loop)
+        return refuse(loop->op, "a loop counts to two coordinates");
+    if (Value first = nest.getFirst(dim))
+      differs |= isOfPrimitive(first);
+    differs |= loop && isOfPrimitive(loop->getEnd());
   }
   return differs || refuse(nest.anchor, "all primitives have the same pixels");
 }
 
-scf::ForOp PixelNest::getLoop(int64_t dim) {
+const PixelLoop *PixelNest::getLoop(int64_t dim) {
   Value root = getCoordinateRoot(getCoordinate(dim));
-  for (scf::ForOp loop : loops)
-    if (root == loop.getInductionVar())
-      return loop;
-  return {};
+  for (const PixelLoop &loop : loops)
+    if (loop.getCounter() == root)
+      return &loop;
+  return nullptr;
 }
 
 PixelNestResult NestFinder::run() {
-  // What does not differ between pixels is the primitive's.
-  SmallVector<LoopLikeOpInterface> loops; // those inside others first
-  items.getBody()->walk([&](LoopLikeOpInterface loop) {
-    if (contains(loop, [](Operation *op) { return isa<UpdateOp>(op); }))
-      loops.push_back(loop);
-  });
-  for (LoopLikeOpInterface loop : loops)
-    moveLoopInvariantCode(loop);
-  if (obstacle.empty() && descend(items.getBody()))
-    return {nest, at, ""};
-  return {std::nullopt, at, obstacle};
+  if (obstacle.text.empty() && descend(&items->getRegion(0).front()))
+    return {nest, obstacle};
+  return {std::nullopt, obstacle};
 }
 
-PixelNestResult piko::findPixelNest(scf::ForOp items, StageOp stage) {
+PixelNestResult piko::findPixelNest(Operation *items, StageOp stage) {
   return NestFinder(items, stage).run();
+}
+
+void piko::hoistOutOfPixelLoops(Operation *items) {
+  SmallVector<Operation *> loops; // those inside others first
+  items->getRegion(0).walk([&](Operation *op) {
+    if (isa<LoopLikeOpInterface, ParallelLoopOpInterface>(op) &&
+        contains(op, [](Operation *inner) { return isa<UpdateOp>(inner); }))
+      loops.push_back(op);
+  });
+  for (Operation *op : loops) {
+    if (auto loop = dyn_cast<LoopLikeOpInterface>(op)) {
+      moveLoopInvariantCode(loop);
+      continue;
+    }
+    moveLoopInvariantCode(
+        {&op->getRegion(0)},
+        [&](Value value, Region *region) {
+          return !region->isAncestor(value.getParentRegion());
+        },
+        [&](Operation *inner, Region *) {
+          return isMemoryEffectFree(inner) && isSpeculatable(inner);
+        },
+        [&](Operation *inner, Region *) { inner->moveBefore(op); });
+  }
 }

@@ -1,0 +1,221 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// piko-map-threads: for each kernel,
+//   1. choose how many threads a block has;
+//   2. where all that others see of it are pixels, let threads take the pixels
+//      of many primitives (PixelNest.h), or else of one after the other
+//      (PixelOwners.h);
+//   3. otherwise say of each piece of work and each parallel loop who takes its
+//      items or iterations (WorkLegality.h).
+
+#include "PixelOwners.h"
+#include "SetupSplit.h"
+
+#include "Piko/Conversion/UnitOrder.h"
+#include "Piko/Dialect/Piko/IR/Marks.h"
+
+#include "mlir/Dialect/SCF/Transforms/Transforms.h"
+#include "mlir/Dialect/UB/IR/UBOps.h"
+#include "mlir/IR/PatternMatch.h"
+#include "llvm/Support/MathExtras.h"
+
+namespace piko {
+#define GEN_PASS_DEF_MAPTHREADS
+#include "Piko/Conversion/Passes.h.inc"
+} // namespace piko
+
+using namespace mlir;
+using namespace piko;
+
+namespace {
+
+class ThreadMapper {
+public:
+  ThreadMapper(KernelOp kernel, StageOp stage, int64_t threads)
+      : kernel(kernel), stage(stage), threads(threads) {}
+  void run();
+
+private:
+  bool mapPixels();
+  std::optional<Obstacle> findObstacleToCollapsing(ItemsOp items);
+  void mapWork(WorkOpInterface work);
+  ThreadMapping chooseForItems(ItemsOp work);
+  ThreadMapping chooseForLoop(ParallelLoopOpInterface loop);
+  void mark(Operation *op, ThreadMapping mapping) {
+    op->setAttr(marks::threads,
+                ThreadMappingAttr::get(kernel.getContext(), mapping));
+  }
+
+  KernelOp kernel;
+  StageOp stage;
+  int64_t threads;
+};
+
+struct MapThreadsPass : piko::impl::MapThreadsBase<MapThreadsPass> {
+  using MapThreadsBase::MapThreadsBase;
+  void runOnOperation() override;
+};
+
+} // namespace
+
+//===----------------------------------------------------------------------===//
+// Pixels
+//===----------------------------------------------------------------------===//
+
+/// The kernel's only work, if that is on the primitives of a bin.
+static ItemsOp findOnlyItems(KernelOp kernel) {
+  SmallVector<WorkOpInterface> works;
+  kernel.walk([&](WorkOpInterface work) { works.push_back(work); });
+  auto items = works.size() == 1 ? dyn_cast<ItemsOp>(*works.front()) : nullptr;
+  return items && isa<BinsOp>(items->getParentOp()) ? items : nullptr;
+}
+
+/// Makes loops that count of those that C++ has. A number that is never used
+/// becomes 0: it would be an argument of the kernel.
+static void upliftLoops(KernelOp kernel) {
+  IRRewriter rewriter(kernel.getContext());
+  SmallVector<scf::WhileOp> loops;
+  kernel.walk([&](scf::WhileOp loop) { loops.push_back(loop); });
+  for (scf::WhileOp loop : loops) {
+    rewriter.setInsertionPoint(loop);
+    (void)scf::upliftWhileToForLoop(rewriter, loop);
+  }
+  SmallVector<ub::PoisonOp> unused;
+  kernel.walk([&](ub::PoisonOp poison) { unused.push_back(poison); });
+  for (ub::PoisonOp poison : unused) {
+    rewriter.setInsertionPoint(poison);
+    if (TypedAttr zero = rewriter.getZeroAttr(poison.getType()))
+      rewriter.replaceOpWithNewOp<arith::ConstantOp>(poison, zero);
+  }
+}
+
+std::optional<Obstacle> ThreadMapper::findObstacleToCollapsing(ItemsOp items) {
+  if (threads == 1)
+    return Obstacle{items.getLoc(), ""};
+  PixelNestResult found = findPixelNest(items, stage);
+  if (!found.nest)
+    return found.obstacle;
+  SetupSplit split(items, Extent::All, /*own=*/{}, found.nest->rare);
+  if (!PixelGroup(threads, stage).fits(split.countBytes()))
+    return Obstacle{items.getLoc(),
+                    "masks for the pixels of a bin take too much memory for a "
+                    "block of " +
+                        std::to_string(threads) + " threads"};
+  if (!isNestInSetup(split, *found.nest))
+    return Obstacle{items.getLoc(), "where its pixels are depends on an array"};
+  return std::nullopt;
+}
+
+/// Whether threads share the pixels of many primitives, or else of one after
+/// the other.
+bool ThreadMapper::mapPixels() {
+  ItemsOp items = findOnlyItems(kernel);
+  if (!items || items.getLanes() == LaneMapping::One ||
+      !updatesPixelsAlone(kernel))
+    return false;
+  upliftLoops(kernel);
+  useClosedFormsInPixelLoops(items);
+  hoistOutOfPixelLoops(items);
+  std::optional<Obstacle> many = findObstacleToCollapsing(items);
+  if (!many) {
+    mark(items, ThreadMapping::Collapsed);
+    return true;
+  }
+  ThreadTile tile(threads, stage.getBins().size());
+  if (auto each = findObstacleToSharing(items, tile)) {
+    emitRemark(each->at, "the threads of a block do not share pixels: ")
+        << each->text;
+    return false;
+  }
+  if (!many->text.empty())
+    emitRemark(many->at, "the threads of a block take one primitive after the "
+                         "other: ")
+        << many->text;
+  mark(items, ThreadMapping::Pixels);
+  return true;
+}
+
+//===----------------------------------------------------------------------===//
+// Primitives and iterations
+//===----------------------------------------------------------------------===//
+
+/// Where lanes would have items whose updates have to be put in order, they
+/// share the iterations of one, if others than rare primitives have any; where
+/// they would have pairs, they have items if these need no order.
+ThreadMapping ThreadMapper::chooseForItems(ItemsOp work) {
+  LaneMapping lanes = work.getLanes().value_or(LaneMapping::Items);
+  if (lanes == LaneMapping::One ||
+      (lanes == LaneMapping::Iterations && !hasRareIterationsOnly(work)))
+    return ThreadMapping::One;
+  return isIndependent(work) ? ThreadMapping::Shared : ThreadMapping::One;
+}
+
+ThreadMapping ThreadMapper::chooseForLoop(ParallelLoopOpInterface loop) {
+  if (!loop.hasBarriers())
+    return isIndependent(loop) ? ThreadMapping::Shared : ThreadMapping::One;
+  if (canRunInLockstep(loop, threads))
+    return ThreadMapping::Lockstep;
+  if (!updatesOwnPixels(loop))
+    loop.emitRemark("one thread does what iterations do between barriers: two "
+                    "of them may update a pixel, in their order");
+  else
+    loop.emitRemark("what iterations keep across barriers is in memory: they "
+                    "are not known to be at most ")
+        << threads << ", the threads of a block";
+  return ThreadMapping::Pieces;
+}
+
+void ThreadMapper::mapWork(WorkOpInterface work) {
+  auto items = dyn_cast<ItemsOp>(*work);
+  ThreadMapping mapping = items ? chooseForItems(items) : ThreadMapping::One;
+  mark(work, mapping);
+  bool isOne = work.getLanes() == LaneMapping::One;
+  work->walk([&](ParallelLoopOpInterface loop) {
+    if (mapping == ThreadMapping::Shared ||
+        loop->getParentOfType<ParallelLoopOpInterface>() ||
+        (isOne && !loop.hasBarriers()))
+      mark(loop, ThreadMapping::One);
+    else
+      mark(loop, isOne ? ThreadMapping::PiecesOfOne : chooseForLoop(loop));
+  });
+}
+
+void ThreadMapper::run() {
+  kernel->setAttr(marks::blockSize,
+                  Builder(kernel.getContext()).getI64IntegerAttr(threads));
+  if (!mapPixels())
+    kernel.walk([&](WorkOpInterface work) { mapWork(work); });
+}
+
+//===----------------------------------------------------------------------===//
+// The pass
+//===----------------------------------------------------------------------===//
+
+/// As many as the stage has, but not much fewer than a bin has pixels: a device
+/// has few blocks then, and each of them takes long.
+static int64_t chooseThreads(StageOp stage) {
+  constexpr uint64_t pixelsOfThread = 16, most = 256;
+  uint64_t pixels = 1, threads = stage.getThreads();
+  for (int64_t size : stage.getBins())
+    pixels = llvm::SaturatingMultiply<uint64_t>(pixels, size);
+  threads = std::max(threads, std::min(pixels / pixelsOfThread, most));
+  return std::min<int64_t>(maxThreads, llvm::bit_floor(threads));
+}
+
+void MapThreadsPass::runOnOperation() {
+  PipelineOp pipeline = getOperation();
+  if (threads < 0 || threads > maxThreads ||
+      (threads && !llvm::isPowerOf2_64(threads))) {
+    pipeline.emitError("expected a power of two up to ")
+        << maxThreads << " for the threads of a block, but got "
+        << threads.getValue();
+    return signalPassFailure();
+  }
+  for (auto kernel : pipeline.getOps<KernelOp>()) {
+    Operation *work = findWork(kernel);
+    if (!work)
+      continue;
+    auto stage = lookupInPipeline<StageOp>(kernel, getStageName(work));
+    ThreadMapper(kernel, stage, threads ? threads : chooseThreads(stage)).run();
+  }
+}

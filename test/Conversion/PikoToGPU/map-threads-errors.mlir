@@ -1,0 +1,133 @@
+// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(convert-piko-to-gpu))' --split-input-file --verify-diagnostics
+// RUN: not piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-map-threads{threads=48}))' --split-input-file 2>&1 | FileCheck %s --check-prefix=THREADS
+// RUN: not piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-map-threads{threads=2048}))' --split-input-file 2>&1 | FileCheck %s --check-prefix=THREADS
+// THREADS: error: expected a power of two up to 1024 for the threads of a block, but got {{48|2048}}
+
+// A grid is what a mapping says, or an error.
+piko.record @F {"x" : i32 at 0} size 4 align 4
+piko.pipeline @Unmapped rank 1 {
+  piko.source @a
+  piko.stage @a bins [8] threads 64 placed : @F -> [] {}
+  // expected-error @below {{expected a mapping to threads, as piko-map-threads makes it}}
+  piko.kernel @kernel_a {
+    piko.bins of @a {
+    ^bb0(%bin: index):
+      piko.items of @a {
+      ^bb0(%f: !piko.prim<@F>):
+      }
+    }
+  }
+}
+
+// -----
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+piko.pipeline @UnmappedLoop rank 1 {
+  piko.source @a
+  piko.stage @a bins [8] threads 64 placed : @F -> [] {}
+  piko.kernel @kernel_a attributes {piko.block_size = 32 : i64} {
+    piko.bins of @a {
+    ^bb0(%bin: index):
+      piko.items of @a {
+      ^bb0(%f: !piko.prim<@F>):
+        %n = arith.constant 8 : index
+        // expected-error @below {{expected a mapping to threads, as piko-map-threads makes it}}
+        piko.parallel_for %n {
+        ^bb0(%i: index):
+          piko.yield
+        }
+      }
+    }
+  }
+}
+
+// -----
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+piko.pipeline @Ordered rank 1 {
+  piko.image @image : @F rank 1
+  piko.source @a
+  piko.stage @a bins [8] threads 64 placed : @F -> [] {}
+  piko.kernel @kernel_a attributes {piko.block_size = 32 : i64} {
+    piko.bins of @a {
+    ^bb0(%bin: index):
+      // expected-error @below {{cannot be shared by threads as #piko<threads shared>}}
+      piko.items of @a attributes {piko.threads = #piko<threads shared>} {
+      ^bb0(%f: !piko.prim<@F>):
+        %x = piko.get %f "x" : !piko.prim<@F> -> i32
+        piko.update @image[%x : i32] in %bin {
+        ^bb0(%old: i32):
+          piko.yield [%x : i32]
+        }
+      }
+    }
+  }
+}
+
+// -----
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+piko.pipeline @TooMany rank 1 {
+  piko.source @a
+  piko.stage @a bins [8] threads 64 placed : @F -> [] {}
+  piko.kernel @kernel_a attributes {piko.block_size = 4 : i64} {
+    piko.bins of @a {
+    ^bb0(%bin: index):
+      piko.items of @a attributes {piko.threads = #piko<threads one>} {
+      ^bb0(%f: !piko.prim<@F>):
+        %n = arith.constant 8 : index
+        // expected-error @below {{cannot be shared by threads as #piko<threads lockstep>}}
+        piko.parallel_for %n attributes {piko.threads = #piko<threads lockstep>} {
+        ^bb0(%i: index):
+          piko.sync
+          piko.yield
+        }
+      }
+    }
+  }
+}
+
+// -----
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+piko.pipeline @NoPixels rank 1 {
+  piko.buffer @out : @F
+  piko.source @a
+  piko.stage @a bins [8] threads 64 placed : @F -> [] {}
+  piko.kernel @kernel_a attributes {piko.block_size = 4 : i64} {
+    piko.bins of @a {
+    ^bb0(%bin: index):
+      // expected-error @below {{cannot be shared by threads as #piko<threads collapsed>}}
+      piko.items of @a attributes {piko.threads = #piko<threads collapsed>} {
+      ^bb0(%f: !piko.prim<@F>):
+        %n = arith.constant 8 : index
+        %x = piko.get %f "x" : !piko.prim<@F> -> i32
+        piko.atomic add @out[%n : index] "x", %x : i32
+      }
+    }
+  }
+}
+
+// -----
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+piko.pipeline @Pixels rank 1 {
+  piko.image @image : @F rank 1
+  piko.source @a
+  piko.stage @a bins [8] threads 64 placed : @F -> [] {}
+  piko.kernel @kernel_a attributes {piko.block_size = 4 : i64} {
+    piko.bins of @a {
+    ^bb0(%bin: index):
+      piko.items of @a attributes {piko.threads = #piko<threads collapsed>} {
+      ^bb0(%f: !piko.prim<@F>):
+        %zero = arith.constant 0 : index
+        %x = piko.get %f "x" : !piko.prim<@F> -> i32
+        // expected-error @below {{all primitives have the same pixels}}
+        piko.update @image[%zero : index] in %bin {
+        ^bb0(%old: i32):
+          piko.yield [%x : i32]
+        }
+      }
+    }
+  }
+}
