@@ -5,6 +5,7 @@
 #include "Collectives.h"
 
 #include "Piko/Dialect/Piko/IR/CodeBuilder.h"
+#include "Piko/Dialect/Piko/IR/Marks.h"
 
 #include "mlir/IR/IRMapping.h"
 #include "mlir/IR/TypeUtilities.h"
@@ -161,6 +162,131 @@ void piko::createSort(OpBuilder &builder, Location loc, Value count, Value keys,
         return SmallVector<Value>{halves[1], halves[0]};
       });
   w.forEach(zero, count, one, [&](Value i) {
+    w.store(w.load(room, w.add(halves[0], i)), ranks, i);
+  });
+}
+
+//===----------------------------------------------------------------------===//
+// With loops that lanes share
+//===----------------------------------------------------------------------===//
+
+static void forEachShared(Writer &w, Value from, Value to,
+                          llvm::function_ref<void(Value)> body) {
+  scf::ForOp loop = w.forEach(from, to, w.index(1), body);
+  loop->setAttr(marks::lanes, w.builder.getUnitAttr());
+}
+
+/// The pairs (i, i + s) of a distance s below `count`, from the k-th on.
+static void forEachSharedPair(Writer &w, Value count, Value s, int64_t first,
+                              llvm::function_ref<void(Value i, Value j)> body) {
+  Value both = w.add(s, s);
+  Value pairs =
+      arith::CeilDivUIOp::create(w.builder, w.loc, w.sub(count, s), both);
+  forEachShared(w, w.index(first), pairs, [&](Value k) {
+    Value i = w.mul(k, both);
+    body(i, w.add(i, s));
+  });
+}
+
+void piko::createSharedReduction(OpBuilder &builder, Location loc, Value count,
+                                 ValueRange slots, Block &combine) {
+  Writer w(builder, loc);
+  w.forEachPower(count, {}, [&](Value s, ValueRange) {
+    forEachSharedPair(w, count, s, 0, [&](Value i, Value j) {
+      w.store(w.combine(combine, w.load(slots, i), w.load(slots, j)), slots, i);
+    });
+    return SmallVector<Value>();
+  });
+}
+
+// What stands before a slot is known once it is for all numbers of which more
+// low bits are zero; so distances fall again.
+void piko::createSharedScan(OpBuilder &builder, Location loc, Value count,
+                            ValueRange slots, Block &combine) {
+  Writer w(builder, loc);
+  Value zero = w.index(0), one = w.index(1);
+  Value last = w.forEachPower(count, zero, [&](Value s, ValueRange) {
+    forEachSharedPair(w, count, s, 0, [&](Value i, Value j) {
+      SmallVector<Value> left = w.load(slots, i), right = w.load(slots, j);
+      w.store(w.combine(combine, left, right), slots, i);
+      w.store(left, slots, j);
+    });
+    return SmallVector<Value>{s};
+  })[0];
+  scf::WhileOp::create(
+      builder, loc, TypeRange{last.getType()}, ValueRange{last},
+      [&](OpBuilder &, Location, ValueRange now) {
+        Value more = w.compare(Writer::P::sgt, now[0], zero);
+        scf::ConditionOp::create(builder, loc, more, now);
+      },
+      [&](OpBuilder &, Location, ValueRange now) {
+        Value s = now[0];
+        forEachSharedPair(w, count, s, 1, [&](Value i, Value j) {
+          w.store(w.combine(combine, w.load(slots, i), w.load(slots, j)), slots,
+                  j);
+        });
+        Value next = arith::ShRUIOp::create(builder, loc, s, one);
+        scf::YieldOp::create(builder, loc, next);
+      });
+}
+
+/// How many elements of the sorted run [lo, hi) come before a key, or before it
+/// and its equals, which `isRight` says: by bisection.
+static Value countBefore(Writer &w, Value keys, bool isUnsigned, Value room,
+                         Value from, Value lo, Value hi, Value key,
+                         Value isRight) {
+  OpBuilder &builder = w.builder;
+  Location loc = w.loc;
+  auto loop = scf::WhileOp::create(
+      builder, loc, TypeRange{lo.getType(), lo.getType()}, ValueRange{lo, hi},
+      [&](OpBuilder &, Location, ValueRange now) {
+        Value more = w.compare(Writer::P::slt, now[0], now[1]);
+        scf::ConditionOp::create(builder, loc, more, now);
+      },
+      [&](OpBuilder &, Location, ValueRange now) {
+        Value sum = w.add(now[0], now[1]), one = w.index(1);
+        Value middle = arith::ShRUIOp::create(builder, loc, sum, one);
+        Value other = w.load(keys, w.load(room, w.add(from, middle)));
+        Value isBefore = w.isLess(other, key, isUnsigned);
+        Value isAfter = w.isLess(key, other, isUnsigned);
+        Value notAfter = w.compare(Writer::P::eq, isAfter, w.boolean(false));
+        Value isIn = w.select(isRight, notAfter, isBefore);
+        scf::YieldOp::create(
+            builder, loc,
+            ValueRange{w.select(isIn, w.add(middle, one), now[0]),
+                       w.select(isIn, now[1], middle)});
+      });
+  return w.sub(loop.getResult(0), lo);
+}
+
+// A stable merge sort in which each element finds its place in the merged run:
+// as many as stand before it in its own, and as come before it in the other.
+void piko::createSharedSort(OpBuilder &builder, Location loc, Value count,
+                            Value keys, bool isUnsigned, Value room,
+                            Value ranks) {
+  Writer w(builder, loc);
+  Value zero = w.index(0);
+  forEachShared(w, zero, count, [&](Value i) { w.store(i, room, i); });
+  SmallVector<Value> halves =
+      w.forEachPower(count, {zero, count}, [&](Value width, ValueRange halves) {
+        Value from = halves[0], to = halves[1];
+        Value low = w.sub(zero, w.add(width, width));
+        forEachShared(w, zero, count, [&](Value i) {
+          Value element = w.load(room, w.add(from, i));
+          Value lo = w.both(i, low), mid = w.min(w.add(lo, width), count);
+          Value hi = w.min(w.add(mid, width), count);
+          Value isRight = w.compare(Writer::P::sge, i, mid);
+          Value others = w.select(isRight, lo, mid);
+          Value end = w.select(isRight, mid, hi);
+          Value before = countBefore(w, keys, isUnsigned, room, from, others,
+                                     end, w.load(keys, element), isRight);
+          Value own = w.sub(i, w.select(isRight, mid, lo));
+          Value place = w.add(w.add(lo, own), before);
+          w.store(element, room, w.add(to, place));
+        });
+        return SmallVector<Value>{to, from};
+      });
+  forEachShared(w, zero, count, [&](Value i) {
     w.store(w.load(room, w.add(halves[0], i)), ranks, i);
   });
 }

@@ -25,6 +25,18 @@ void createSort(mlir::OpBuilder &builder, mlir::Location loc, mlir::Value count,
                 mlir::Value keys, bool isUnsigned, mlir::Value room,
                 mlir::Value ranks);
 
+/// The same, with the same bits, where lanes share the loops inside: these are
+/// marked, count by one, and have independent turns.
+void createSharedReduction(mlir::OpBuilder &builder, mlir::Location loc,
+                           mlir::Value count, mlir::ValueRange slots,
+                           mlir::Block &combine);
+void createSharedScan(mlir::OpBuilder &builder, mlir::Location loc,
+                      mlir::Value count, mlir::ValueRange slots,
+                      mlir::Block &combine);
+void createSharedSort(mlir::OpBuilder &builder, mlir::Location loc,
+                      mlir::Value count, mlir::Value keys, bool isUnsigned,
+                      mlir::Value room, mlir::Value ranks);
+
 /// What the body of a reduction or a scan gives for two values.
 llvm::SmallVector<mlir::Value> createCombination(mlir::OpBuilder &builder,
                                                  mlir::Location loc,

@@ -47,9 +47,9 @@ static Value findWriter(Operation *op) {
   return {};
 }
 
-LoopSplitter::LoopSplitter(ParallelForOp parallel, Value writer)
-    : parallel(parallel), loc(parallel.getLoc()), builder(parallel),
-      count(parallel.getCount()), writer(writer),
+LoopSplitter::LoopSplitter(ParallelForOp parallel, Value writer, bool isShared)
+    : parallel(parallel), isShared(isShared), loc(parallel.getLoc()),
+      builder(parallel), count(parallel.getCount()), writer(writer),
       uniformity(hoistInvariants(parallel)) {}
 
 LogicalResult LoopSplitter::run() {
@@ -155,7 +155,8 @@ void LoopSplitter::split(Operation *op, Piece &piece) {
 void LoopSplitter::splitReduce(ReduceOp op, Piece &piece) {
   SmallVector<Value> arrays = addSlots(op.getValues().getTypes());
   store(piece, op.getValues(), arrays);
-  createReduction(builder, op.getLoc(), count, arrays, op.getBody().front());
+  auto create = isShared ? createSharedReduction : createReduction;
+  create(builder, op.getLoc(), count, arrays, op.getBody().front());
   for (auto [result, array] : llvm::zip(op.getResults(), arrays))
     result.replaceAllUsesWith(
         memref::LoadOp::create(builder, op.getLoc(), array, zero));
@@ -164,7 +165,8 @@ void LoopSplitter::splitReduce(ReduceOp op, Piece &piece) {
 void LoopSplitter::splitScan(ScanOp op, Piece &piece) {
   SmallVector<Value> arrays = addSlots(op.getValues().getTypes());
   store(piece, op.getValues(), arrays);
-  createScan(builder, op.getLoc(), count, arrays, op.getBody().front());
+  auto create = isShared ? createSharedScan : createScan;
+  create(builder, op.getLoc(), count, arrays, op.getBody().front());
   for (auto [empty, array] : llvm::zip(op.getEmpty(), arrays))
     Slots::store(builder, op.getLoc(), empty, array, zero);
   readFrom(op.getResults(), arrays);
@@ -175,8 +177,9 @@ void LoopSplitter::splitSort(SortOp op, Piece &piece) {
   SmallVector<Value> keys = addSlots(op.getKey().getType());
   store(piece, op.getKey(), keys);
   Value room = slots->add(index, /*elements=*/2), ranks = slots->add(index);
-  createSort(builder, op.getLoc(), count, keys.front(), op.getIsUnsigned(),
-             room, ranks);
+  auto create = isShared ? createSharedSort : createSort;
+  create(builder, op.getLoc(), count, keys.front(), op.getIsUnsigned(), room,
+         ranks);
   readFrom(op.getIndex(), ranks);
 }
 

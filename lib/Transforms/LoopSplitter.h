@@ -22,8 +22,10 @@ ParallelForOp hoistInvariants(ParallelForOp parallel);
 class LoopSplitter {
 public:
   /// `writer` takes what the loop emits and has its slots; without one it is
-  /// that of the unit around.
-  explicit LoopSplitter(ParallelForOp parallel, mlir::Value writer = {});
+  /// that of the unit around. Where lanes share pieces, they share the loops of
+  /// reductions, scans and sorts, too.
+  explicit LoopSplitter(ParallelForOp parallel, mlir::Value writer = {},
+                        bool isShared = false);
 
   /// Fails after an error.
   mlir::LogicalResult run();
@@ -74,6 +76,7 @@ private:
   void stopAtDisagreement();
 
   ParallelForOp parallel;
+  bool isShared;
   mlir::Location loc;
   mlir::OpBuilder builder; ///< Stands where the next piece goes.
   mlir::Value count, writer, zero, one;

@@ -15,10 +15,11 @@ using namespace piko::cuda;
 using piko::rt::Failure;
 
 /// A barrier of blocks takes as long as some 20 loads, one behind the other,
-/// and a join that has to do with a few thousand things has a dozen of them.
+/// and a join has a dozen of them; 2,000 things are eight for a thread of one
+/// block.
 static int64_t findMostAlone() {
   const char *text = std::getenv("PIKO_CUDA_ALONE");
-  int64_t most = 6144;
+  int64_t most = 2048;
   if (!text || !*text)
     return most;
   const char *end = text + std::strlen(text);
@@ -38,7 +39,6 @@ Accelerator::Accelerator(pikort_pipeline &p, const pikoir_cuda_image *images)
   residentThreads_ = int64_t(device_->attribute(
                          CU_DEVICE_ATTRIBUTE_MAX_THREADS_PER_MULTIPROCESSOR)) *
                      processors_;
-  joinBlocks_ = std::min<int64_t>(processors_, mostJoinBlocks);
   mostAlone_ = findMostAlone();
   device_->check(device_->driver.cuStreamCreate(&own_, CU_STREAM_NON_BLOCKING),
                  "creating a stream");
@@ -243,6 +243,13 @@ int64_t Accelerator::residentBlocks(const std::string &kernel,
           &blocks, find(kernel), static_cast<int>(threads), /*sharedBytes=*/0),
       "asking how many blocks are resident of " + module_.describe(kernel));
   return residentBlocks_[kernel] = std::max(blocks, 1) * processors_;
+}
+
+/// Joins wait for memory: two blocks to a multiprocessor, where it has the
+/// registers, ask for twice as much of it at a time.
+int64_t Accelerator::joinBlocks(const std::string &kernel) {
+  return std::min({residentBlocks(kernel, joinThreads), 2 * processors_,
+                   int64_t(mostJoinBlocks)});
 }
 
 void Accelerator::launch(const char *kernel, int64_t blocks, int64_t threads,

@@ -62,7 +62,7 @@ public:
   /// time; at least 1.
   int64_t residentBlocks(const std::string &kernel, int64_t threads);
   /// Blocks of a join, all of which are resident.
-  int64_t joinBlocks() const { return joinBlocks_; }
+  int64_t joinBlocks(const std::string &kernel);
   /// Up to how much work its first block does by itself (device/Grid.h).
   int64_t mostAlone() const { return mostAlone_; }
   /// Gives the stream what the steps say; throws.
@@ -118,8 +118,7 @@ private:
   size_t wantedLog_ = 0;
   std::vector<uint8_t *> unreleased_; ///< The driver has refused to free it.
   int64_t *progress_ = nullptr;       ///< And room for what the host reads.
-  int64_t processors_ = 0, residentThreads_ = 0, joinBlocks_ = 0,
-          mostAlone_ = 0;
+  int64_t processors_ = 0, residentThreads_ = 0, mostAlone_ = 0;
   std::unordered_map<std::string, int64_t> residentBlocks_; ///< By kernel.
   Frame *frame_ = nullptr; ///< The executor's, which ends first.
 };

@@ -254,7 +254,7 @@ std::vector<int32_t> Frame::edgesOf(int32_t kernel) const {
 void Frame::launchOwn(const char *kernel, const void *args, int32_t timed) {
   steps_.push_back({Step::Kind::Grid,
                     {kernel,
-                     device_.joinBlocks(),
+                     device_.joinBlocks(kernel),
                      joinThreads,
                      {reinterpret_cast<int64_t>(onDevice(args))},
                      /*isJoin=*/true},
@@ -362,7 +362,7 @@ void Frame::clear(int32_t id) {
   steps_.push_back(
       {Step::Kind::Grid,
        {"piko_fill",
-        device_.joinBlocks(),
+        device_.joinBlocks("piko_fill"),
         joinThreads,
         {reinterpret_cast<int64_t>(state.view.data), state.owned.size() / size,
          reinterpret_cast<int64_t>(clearRecord(state)), size},

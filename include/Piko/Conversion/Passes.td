@@ -183,7 +183,8 @@ def ConvertPikoToGPU : Pass<"convert-piko-to-gpu", "::piko::PipelineOp"> {
       the block's, and what lives across them is in registers; all threads go the way
       of iteration 0, and collectives take as many steps as the number of threads has
       binary digits. A loop in `pieces` is cut at its barriers, as on a CPU, and threads
-      share those pieces in which no two iterations update a pixel. What lies between
+      share those pieces in which no two iterations update a pixel, and the steps of
+      its sorts, scans and reductions. What lies between
       such loops and has effects is done by the first thread, between two barriers; all
       else by all threads alike. Arrays that several threads see are in the block's
       memory.

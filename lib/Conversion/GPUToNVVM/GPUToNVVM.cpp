@@ -62,6 +62,22 @@ static void finishBlockMemory(Operation *op) {
       OpBuilder(op).getI32IntegerAttr(halfOccupancyRegisters));
 }
 
+/// What memory has pointers to, records and state, is global memory: nothing
+/// stores the address of a thread's memory, or a block's. A load of an address
+/// with its space needs no test of it, and LLVM sees more.
+static void loadInGlobalSpace(LLVM::LoadOp load) {
+  auto generic = dyn_cast<LLVM::LLVMPointerType>(load.getType());
+  if (!generic || generic.getAddressSpace() != 0)
+    return;
+  OpBuilder builder(load->getContext());
+  builder.setInsertionPointAfter(load);
+  load.getResult().setType(LLVM::LLVMPointerType::get(
+      load->getContext(), unsigned(NVVM::NVVMMemorySpace::Global)));
+  auto cast = LLVM::AddrSpaceCastOp::create(builder, load.getLoc(), generic,
+                                            load.getResult());
+  load.getResult().replaceAllUsesExcept(cast, cast);
+}
+
 void ConvertGPUToExactNVVMPass::runOnOperation() {
   gpu::GPUModuleOp module = getOperation();
   WalkResult result = module.walk([](Operation *op) -> WalkResult {
@@ -89,4 +105,5 @@ void ConvertGPUToExactNVVMPass::runOnOperation() {
   if (failed(applyFullConversion(module, target, std::move(patterns))))
     return signalPassFailure();
   module.walk([](Operation *op) { finishBlockMemory(op); });
+  module.walk(loadInGlobalSpace);
 }

@@ -155,8 +155,14 @@ void Outlining::takeParameters(OpBuilder &builder, Value memory,
   for (auto [i, parameter] : llvm::enumerate(parameters)) {
     Value at = arith::ConstantIndexOp::create(builder, loc, i);
     Value word = memref::LoadOp::create(builder, loc, memory, at);
-    if (!parameter.getType().isInteger())
-      word = LLVM::IntToPtrOp::create(builder, loc, parameter.getType(), word);
+    if (!parameter.getType().isInteger()) {
+      // As a kernel's own parameters do, it points to global memory.
+      auto global = LLVM::LLVMPointerType::get(
+          builder.getContext(), unsigned(NVVM::NVVMMemorySpace::Global));
+      word = LLVM::IntToPtrOp::create(builder, loc, global, word);
+      word = LLVM::AddrSpaceCastOp::create(builder, loc, parameter.getType(),
+                                           word);
+    }
     mapping.map(parameter, word);
   }
 }

@@ -270,7 +270,7 @@ SmallVector<scf::ForOp> GridBuilder::takeMapping(ThreadMapping mapping) {
 /// Cuts a loop at its barriers; threads share each of its pieces that allows
 /// it.
 LogicalResult GridBuilder::mapPieces(ParallelForOp loop, bool isShared) {
-  if (failed(LoopSplitter(loop, memory.log).run()))
+  if (failed(LoopSplitter(loop, memory.log, isShared).run()))
     return failure();
   launch.walk([&](scf::ForOp piece) {
     if (piece->removeAttr(marks::lanes) && isShared && isIndependent(piece))

@@ -22,10 +22,15 @@ struct GridCode : CodeBuilder {
   mlir::Type i32() { return builder.getI32Type(); }
   mlir::Type i64() { return builder.getI64Type(); }
   mlir::Value constant(int64_t value) { return createI64(builder, loc, value); }
+  /// What is in a log is in global memory.
   mlir::Value at(mlir::Value address) {
-    return mlir::LLVM::IntToPtrOp::create(
-        builder, loc, mlir::LLVM::LLVMPointerType::get(builder.getContext()),
-        address);
+    using mlir::LLVM::LLVMPointerType;
+    constexpr unsigned global = 1;
+    auto *context = builder.getContext();
+    mlir::Value pointer = mlir::LLVM::IntToPtrOp::create(
+        builder, loc, LLVMPointerType::get(context, global), address);
+    return mlir::LLVM::AddrSpaceCastOp::create(
+        builder, loc, LLVMPointerType::get(context), pointer);
   }
   mlir::Value load(mlir::Type type, mlir::Value address) {
     return mlir::LLVM::LoadOp::create(builder, loc, type, at(address));

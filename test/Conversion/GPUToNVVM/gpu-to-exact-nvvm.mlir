@@ -26,6 +26,23 @@ gpu.module @kernels {
 
 // -----
 
+// What a pointer in memory points to is global.
+// CHECK-LABEL: llvm.func @pointers(
+// CHECK:         %[[GLOBAL:.*]] = llvm.load %{{.*}} : !llvm.ptr -> !llvm.ptr<1>
+// CHECK:         %[[POINTER:.*]] = llvm.addrspacecast %[[GLOBAL]] : !llvm.ptr<1> to !llvm.ptr
+// CHECK:         llvm.load %[[POINTER]] : !llvm.ptr -> f32
+gpu.module @kernels {
+  gpu.func @pointers(%input: !llvm.ptr, %memory: memref<?xf32>) kernel {
+    %t = gpu.thread_id x
+    %p = llvm.load %input : !llvm.ptr -> !llvm.ptr
+    %v = llvm.load %p : !llvm.ptr -> f32
+    memref.store %v, %memory[%t] : memref<?xf32>
+    gpu.return
+  }
+}
+
+// -----
+
 gpu.module @kernels {
   gpu.func @k(%memory: memref<?xf32>) kernel {
     %t = gpu.thread_id x

@@ -34,7 +34,8 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 // CHECK:             llvm.store %[[FIRST]], %{{.*}} : i64
 // The record stands behind the header.
 // CHECK:           %[[AT:.*]] = arith.addi %[[ENTRY]], %c16_i64
-// CHECK:           %[[RECORD:.*]] = llvm.inttoptr %[[AT]]
+// CHECK:           %[[GLOBAL:.*]] = llvm.inttoptr %[[AT]] : i64 to !llvm.ptr<1>
+// CHECK:           %[[RECORD:.*]] = llvm.addrspacecast %[[GLOBAL]] : !llvm.ptr<1> to !llvm.ptr
 // CHECK:           llvm.store %{{.*}}, %[[RECORD]] {{.*}}: i32
 // CHECK:           scf.for
 //

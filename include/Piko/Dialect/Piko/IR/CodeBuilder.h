@@ -76,12 +76,13 @@ struct CodeBuilder {
     return ifOp;
   }
   /// for (i = from; i < to; i += step) body(i), for indices
-  void forEach(mlir::Value from, mlir::Value to, mlir::Value step,
-               llvm::function_ref<void(mlir::Value)> body) {
+  mlir::scf::ForOp forEach(mlir::Value from, mlir::Value to, mlir::Value step,
+                           llvm::function_ref<void(mlir::Value)> body) {
     auto loop = mlir::scf::ForOp::create(builder, loc, from, to, step);
     mlir::OpBuilder::InsertionGuard guard(builder);
     builder.setInsertionPointToStart(loop.getBody());
     body(loop.getInductionVar());
+    return loop;
   }
 
   mlir::OpBuilder &builder;

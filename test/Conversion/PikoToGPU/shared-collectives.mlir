@@ -1,0 +1,80 @@
+// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-form-work,piko-map-threads{threads=16},convert-piko-to-gpu),canonicalize,cse)' --split-input-file 2>/dev/null | FileCheck %s
+// Where a loop of more iterations than threads is cut, threads share the steps of its
+// sorts, scans and reductions: those of one distance are independent.
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+// An element finds its place in the merged run by bisection.
+// CHECK-LABEL: piko.pipeline @Sort
+// CHECK:         scf.while
+// CHECK:           gpu.barrier
+// CHECK:           scf.for %{{.*}} = %{{.*}} to %c100 step %c16 {
+// CHECK:             scf.while
+// CHECK:               arith.shrui
+// CHECK:             memref.store
+// CHECK:           }
+// CHECK-NEXT:      gpu.barrier
+piko.pipeline @Sort rank 1 {
+  piko.buffer @out : @F
+  piko.source @a
+  piko.stage @a bins [8] threads 64 placed : list @F -> [] {}
+  piko.kernel @kernel_a {
+    piko.bins of @a {
+    ^bb0(%bin: index):
+      piko.lists of @a {
+      ^bb0(%l: !piko.list<@F>):
+        %n = arith.constant 100 : index
+        piko.parallel_for %n {
+        ^bb0(%i: index):
+          %key = arith.index_cast %i : index to i32
+          %rank = piko.sort %key : i32
+          %at = arith.index_cast %rank : index to i32
+          piko.store %at, @out[%i : index] "x" : i32
+          piko.yield
+        }
+      }
+    }
+  }
+}
+
+// -----
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+// Distances grow, and for a scan they fall again.
+// CHECK-LABEL: piko.pipeline @Scan
+// CHECK:         %[[LAST:.*]]:2 = scf.while
+// CHECK:           gpu.barrier
+// CHECK:           scf.for %{{.*}} step %c16 {
+// CHECK:             arith.addi {{.*}} : i32
+// CHECK:           gpu.barrier
+// CHECK:         scf.while (%{{.*}} = %[[LAST]]#1)
+// CHECK:           gpu.barrier
+// CHECK:           scf.for %{{.*}} step %c16 {
+// CHECK:             arith.addi {{.*}} : i32
+// CHECK:           gpu.barrier
+// CHECK:           arith.shrui
+piko.pipeline @Scan rank 1 {
+  piko.buffer @out : @F
+  piko.source @a
+  piko.stage @a bins [8] threads 64 placed : list @F -> [] {}
+  piko.kernel @kernel_a {
+    piko.bins of @a {
+    ^bb0(%bin: index):
+      piko.lists of @a {
+      ^bb0(%l: !piko.list<@F>):
+        %n = arith.constant 100 : index
+        %none = arith.constant 0 : i32
+        piko.parallel_for %n {
+        ^bb0(%i: index):
+          %v = arith.index_cast %i : index to i32
+          %before = piko.scan %v empty %none : i32 {
+          ^bb0(%x: i32, %y: i32):
+            %sum = arith.addi %x, %y : i32
+            piko.yield results [%sum : i32]
+          }
+          piko.store %before, @out[%i : index] "x" : i32
+          piko.yield
+        }
+      }
+    }
+  }
+}
