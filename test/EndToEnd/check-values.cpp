@@ -4,6 +4,7 @@
 // times, in the reference ("expected") and compiled ("got"); none are found
 // where they are mended.
 // HOLE: cuda: what is checked is written down on the host
+// REQUIRES: all
 // RUN: %compare_checked %s --stops --pipe Number --count 8 --runs 1 --threads 2 --check=nan:Point.value | FileCheck %s --check-prefix=NUMBER
 // RUN: %compare_checked %s --stops --pipe NumberMended --count 80 --wide --runs 1 --threads 2 --check=nan:Point.value | FileCheck %s --check-prefix=FED
 // RUN: %compare_checked %s --stops --pipe Unwritten --count 8 --runs 1 --threads 2 --check | FileCheck %s --check-prefix=UNWRITTEN

@@ -2,6 +2,7 @@
 //
 // What primitives overwrite is computed once for each pixel, whatever the text
 // looks like, and is what the reference executor computes.
+// REQUIRES: all
 // RUN: %compare_targets %s --cases %s --runs 2
 // RUN: %if all %{ piko-compare %s --cases %s --runs 1 --without vectorize -O0 %}
 // CASE: --pipe Nearest --domain 45 37 --count 300

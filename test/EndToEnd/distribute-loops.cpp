@@ -4,6 +4,7 @@
 // ways: the pixels of the reference executor, whether it is computed for many
 // primitives at once or for one. What is behind a condition is computed for all,
 // but for what the condition says can be read.
+// REQUIRES: all
 // RUN: %compare_targets %s --cases %s --runs 1
 // CASE: --pipe Discs --domain 167 93 --count 400
 // CASE: --pipe Returns --domain 167 93 --count 400

@@ -4,6 +4,7 @@
 // reference ("expected") and compiled ("got"), in every phase, with the line in
 // checking mode; one that has a result is the same, and one that is not reached
 // does nothing.
+// REQUIRES: all
 // RUN: sed -n 's|^// STOP: ||p' %s > %t.stops
 // RUN: %compare_targets %s --stops --cases %t.stops --runs 1 --threads 2 > %t.out
 // RUN: sed -n '/^Quotient:/,/^[A-Za-z]*:$/p' %t.out | FileCheck %s --check-prefix=IN-BIN

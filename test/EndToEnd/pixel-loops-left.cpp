@@ -3,6 +3,7 @@
 // Loops over pixels whose iterations depend on one another, or that are no loop
 // over a box, stay as they are: a remark says why, and they do what the reference
 // does.
+// REQUIRES: all
 // RUN: pikoc %s --remarks --emit=kernels -o %t.mlir 2>%t.remarks
 // RUN: not grep parallel_pixels %t.mlir
 // RUN: FileCheck %s --check-prefix=STAYS --implicit-check-not='stays one that counts' --input-file=%t.remarks

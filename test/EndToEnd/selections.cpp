@@ -3,6 +3,7 @@
 // Threads share a bin that is the whole domain where its primitives select what
 // pixels keep, in whatever way that is written, and the first in order of lineage
 // is kept among equal ones, or the last: with ties, NaN, and zeros of both signs.
+// REQUIRES: all
 // RUN: %compare_targets %s --cases %s --threads 1 2 3 7
 // CASE: --pipe Nearest --count 6000 --domain 67 35
 // CASE: --pipe Nearest --count 3 --domain 670 350
