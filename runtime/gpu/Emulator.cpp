@@ -4,7 +4,8 @@
 // Blocks run one after the other. The threads of a block take turns, each on a
 // stack of its own, and change at barriers and at operations of warps:
 //
-//   barrier     goes on when all threads of the block have come to it;
+//   barrier     goes on when all threads of the block have come to it, and may
+//               say whether a condition holds for one of them;
 //   with mask   (shuffle, ballot) when all lanes of the mask have;
 //   activemask  when no lane of the warp can go on: those that have come to the
 //               same place are active together.
@@ -26,6 +27,7 @@
 #include <string>
 #include <sys/mman.h>
 #include <ucontext.h>
+#include <utility>
 
 static constexpr int64_t warpSize = 32;
 /// Only what is touched takes memory.
@@ -39,10 +41,11 @@ struct Thread {
   State state = State::Ready;
   bool started = false;
   jmp_buf self;
-  uint32_t mask = 0;    ///< Of a Ballot or a Shuffle.
-  int32_t value = 0;    ///< What it gives, then what it gets.
-  int32_t lane = 0;     ///< That a Shuffle asks.
-  void *site = nullptr; ///< Of an Active.
+  uint32_t mask = 0;      ///< Of a Ballot or a Shuffle.
+  int32_t value = 0;      ///< What it gives, then what it gets.
+  int32_t lane = 0;       ///< That a Shuffle asks.
+  void *site = nullptr;   ///< Of an Active.
+  bool condition = false; ///< That it brings to a Barrier.
 };
 
 /// Stacks of threads, kept from block to block.
@@ -89,10 +92,12 @@ public:
   std::vector<Thread> threads;
   int64_t blocks, block = 0;
   size_t current = 0;
+  bool agreed = false; ///< At the last barrier: the condition of some thread.
 
 private:
   static void enter();
   void resume(size_t thread);
+  void passBarrier();
   bool resolveWarps();
   bool resolveMasked(size_t first, size_t end);
   bool resolveActive(size_t first, size_t end);
@@ -200,6 +205,14 @@ bool EmulatedDevice::resolveActive(size_t first, size_t end) {
   return mask != 0;
 }
 
+void EmulatedDevice::passBarrier() {
+  agreed = false;
+  for (Thread &thread : threads) {
+    agreed |= std::exchange(thread.condition, false);
+    thread.state = State::Ready;
+  }
+}
+
 bool EmulatedDevice::resolveWarps() {
   bool any = false;
   for (size_t first = 0; first < threads.size(); first += warpSize) {
@@ -238,8 +251,7 @@ std::string EmulatedDevice::runBlock(int64_t number) {
     if (ended == threads.size())
       return "";
     if (waiting == threads.size())
-      for (Thread &thread : threads)
-        thread.state = State::Ready;
+      passBarrier();
     else if (!resolveWarps())
       return describe();
   }
@@ -295,6 +307,13 @@ int32_t pikoir_gpu_lanes_below() {
 }
 
 void pikoir_gpu_barrier() { device->suspend(State::Barrier); }
+
+bool pikoir_gpu_barrier_or(int32_t, bool condition) {
+  Thread &thread = device->threads[device->current];
+  thread.condition = condition;
+  device->suspend(State::Barrier);
+  return device->agreed;
+}
 
 int32_t pikoir_gpu_activemask() {
   Thread &thread = device->threads[device->current];

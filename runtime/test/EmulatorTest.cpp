@@ -83,6 +83,26 @@ TEST(Emulator, Barrier) {
   }
 }
 
+// All threads get to know of one whose condition holds, in that round alone.
+TEST(Emulator, BarrierOfConditions) {
+  Shared state;
+  EXPECT_EQ(launch(state, 1, 40, 0,
+                   [] {
+                     int i = pikoir_gpu_thread();
+                     for (int round = 0; round < 4; ++round)
+                       if (pikoir_gpu_barrier_or(0, i == 38 && round % 2 == 1))
+                         shared->seen[i] += 1 << round;
+                     pikoir_gpu_barrier();
+                     shared->values[i] = pikoir_gpu_barrier_or(0, i >= 0) +
+                                         2 * pikoir_gpu_barrier_or(0, i < 0);
+                   }),
+            "");
+  for (int i = 0; i < 40; ++i) {
+    EXPECT_EQ(state.seen[i], 2 + 8) << i;
+    EXPECT_EQ(state.values[i], 1) << i;
+  }
+}
+
 TEST(Emulator, BarrierThatAThreadNeverReaches) {
   Shared state;
   EXPECT_EQ(launch(state, 4, 32, 0,

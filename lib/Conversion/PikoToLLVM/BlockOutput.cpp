@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // What a block does with the outboxes of its threads. A round:
-//   1. threads that have something vote, and a sum over warps gives each its
-//      place: the order is that of threads;
+//   1. threads meet, and go on if one has something; those that have vote, and
+//   a
+//      sum over warps gives each its place: the order is that of threads;
 //   2. one thread takes room for the directory, in which each says what it has;
 //   3. records of a local edge are copied behind those that the block has;
 //   where
@@ -32,6 +33,8 @@ public:
   void keep(int64_t outbox, int64_t recordBytes);
 
 private:
+  void publish(Value has, Value begin, Value cursor);
+  void keepRecords(Value mine, int64_t outbox, int64_t size);
   using P = GridCode::P;
 
   Value lanesOfWarp() {
@@ -42,6 +45,7 @@ private:
   Value countBelow(Value has, Value &total);
   Value sumBelow(Value number, Value &total);
   /// The sum of the warps' numbers below; each warp's is of its first lane.
+  /// Behind a barrier: what was said in the last round has been read.
   Value sumOfWarps(Value ofWarp, Value isWriter, Value &total);
   void when(Value condition, llvm::function_ref<void()> body) {
     code.when(condition, body);
@@ -81,7 +85,6 @@ Value BlockOutput::sumOfWarps(Value ofWarp, Value isWriter, Value &total) {
   Value warp = arith::DivUIOp::create(builder, loc, narrowThread(),
                                       createI32(builder, loc, warpSize));
   Value place = toIndex(builder, loc, warp);
-  code.barrier(); // what was said in the last round is read
   when(isWriter,
        [&] { memref::StoreOp::create(builder, loc, ofWarp, cells, place); });
   code.barrier();
@@ -179,13 +182,17 @@ Value BlockOutput::getWord(int64_t which) {
 }
 
 void BlockOutput::publish() {
-  constexpr int64_t header = sizeof(pikoir_piece), span = sizeof(pikoir_span);
   Value begin = getWord(PIKOIR_OUTBOX_BEGIN);
   Value cursor = getWord(PIKOIR_OUTBOX_CURSOR);
-  Value has = code.compare(P::ne, begin, cursor), total;
+  Value has = code.compare(P::ne, begin, cursor);
+  when(code.meetAny(has), [&] { publish(has, begin, cursor); });
+}
+
+void BlockOutput::publish(Value has, Value begin, Value cursor) {
+  constexpr int64_t header = sizeof(pikoir_piece), span = sizeof(pikoir_span);
+  Value total;
   Value place = countBelow(has, total);
-  Value any = code.compare(P::ne, total, code.constant(0));
-  when(code.both(any, isFirst()), [&] {
+  when(isFirst(), [&] {
     Value bytes = code.mul(total, code.constant(span));
     bytes = code.both(code.add(bytes, code.constant(2 * header - 1)),
                       code.constant(-header));
@@ -312,33 +319,37 @@ void BlockOutput::reserveRecords(Value kept, Value most, int64_t base,
   });
 }
 
-void BlockOutput::keep(int64_t outbox, int64_t size) {
+void BlockOutput::keepRecords(Value mine, int64_t outbox, int64_t size) {
   int64_t words = outbox * PIKOIR_OUTBOX_WORDS;
   int64_t base = (outbox - 1) * PIKOIR_LOCAL_WORDS;
-  Value kept = grid.kept;
-  Value mine = code.get(grid.outboxes, words + PIKOIR_OUTBOX_KEPT), total;
+  Value kept = grid.kept, total;
   Value below = sumBelow(mine, total);
   Value count = code.get(kept, base + PIKOIR_LOCAL_COUNT);
   Value most = code.add(count, total);
-  when(code.compare(P::ne, total, code.constant(0)), [&] {
-    reserveRecords(kept, most, base, size);
-    Value has = code.compare(P::ne, code.get(cells, told), code.constant(0));
-    when(has, [&] {
-      Value to =
-          code.add(code.get(kept, base + PIKOIR_LOCAL_RECORDS),
-                   code.mul(code.add(count, below), code.constant(size)));
-      copyRecords(code.get(grid.outboxes, words + PIKOIR_OUTBOX_BEGIN),
-                  code.get(grid.outboxes, words + PIKOIR_OUTBOX_CURSOR), to,
-                  size);
-    });
-    code.barrier();
-    when(code.both(has, isFirst()),
-         [&] { code.set(most, kept, base + PIKOIR_LOCAL_COUNT); });
-    code.barrier();
+  reserveRecords(kept, most, base, size);
+  Value has = code.compare(P::ne, code.get(cells, told), code.constant(0));
+  when(has, [&] {
+    Value to = code.add(code.get(kept, base + PIKOIR_LOCAL_RECORDS),
+                        code.mul(code.add(count, below), code.constant(size)));
+    copyRecords(code.get(grid.outboxes, words + PIKOIR_OUTBOX_BEGIN),
+                code.get(grid.outboxes, words + PIKOIR_OUTBOX_CURSOR), to,
+                size);
   });
+  code.barrier();
+  when(code.both(has, isFirst()),
+       [&] { code.set(most, kept, base + PIKOIR_LOCAL_COUNT); });
+  code.barrier();
+}
+
+void BlockOutput::keep(int64_t outbox, int64_t size) {
+  int64_t words = outbox * PIKOIR_OUTBOX_WORDS;
+  Value zero = code.constant(0);
+  Value mine = code.get(grid.outboxes, words + PIKOIR_OUTBOX_KEPT);
+  when(code.meetAny(code.compare(P::ne, mine, zero)),
+       [&] { keepRecords(mine, outbox, size); });
   code.set(code.get(grid.outboxes, words + PIKOIR_OUTBOX_CURSOR), grid.outboxes,
            words + PIKOIR_OUTBOX_BEGIN);
-  code.set(code.constant(0), grid.outboxes, words + PIKOIR_OUTBOX_KEPT);
+  code.set(zero, grid.outboxes, words + PIKOIR_OUTBOX_KEPT);
 }
 
 void piko::createKeep(OpBuilder &builder, Location loc, const Grid &grid,

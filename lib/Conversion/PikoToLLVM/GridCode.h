@@ -54,12 +54,20 @@ struct GridCode : CodeBuilder {
   mlir::Value extend(mlir::Value a) {
     return mlir::arith::ExtUIOp::create(builder, loc, i64(), a);
   }
-  mlir::Value intrinsic(mlir::StringRef name, mlir::ValueRange arguments = {}) {
+  mlir::Value intrinsic(mlir::StringRef name, mlir::ValueRange arguments = {},
+                        mlir::Type type = {}) {
     return mlir::LLVM::CallIntrinsicOp::create(
-               builder, loc, i32(), builder.getStringAttr(name), arguments)
+               builder, loc, type ? type : i32(), builder.getStringAttr(name),
+               arguments)
         .getResults();
   }
   void barrier() { mlir::gpu::BarrierOp::create(builder, loc); }
+  /// A barrier that says whether the condition holds for a thread of the block.
+  mlir::Value meetAny(mlir::Value condition) {
+    return intrinsic("llvm.nvvm.barrier.cta.red.or.aligned.all",
+                     {createI32(builder, loc, 0), condition},
+                     builder.getI1Type());
+  }
 
   /// condition ? body() : otherwise()
   mlir::Value choose(mlir::Value condition,
@@ -78,6 +86,9 @@ struct GridCode : CodeBuilder {
   /// Takes so many bytes, a multiple of 64, of a log (a pointer): the address
   /// of a piece of this kind, or 0.
   mlir::Value take(mlir::Value log, mlir::Value bytes, int64_t kind);
+  /// The same of memory, so many bytes for each of the lanes of a warp that
+  /// come here together: where those of this one begin, or 0.
+  mlir::Value takeForLanes(mlir::Value log, int64_t bytes);
 };
 
 /// The memory of a log that nothing is kept in.

@@ -53,43 +53,92 @@ Value GridCode::take(Value log, Value bytes, int64_t kind) {
       [&] { return constant(0); });
 }
 
+/// Of 64 bits.
+static Value shuffle(GridCode &code, Value mask, Value value, Value lane) {
+  Location loc = code.loc;
+  OpBuilder &builder = code.builder;
+  auto half = [&](Value number) {
+    Value word = arith::TruncIOp::create(builder, loc, code.i32(), number);
+    return code.extend(code.intrinsic(
+        "llvm.nvvm.shfl.sync.idx.i32",
+        {mask, word, lane, createI32(builder, loc, /*clamp=*/31)}));
+  };
+  Value by = code.constant(32);
+  Value low = half(value);
+  Value high = half(arith::ShRUIOp::create(builder, loc, value, by));
+  return code.either(low, arith::ShLIOp::create(builder, loc, high, by));
+}
+
+Value GridCode::takeForLanes(Value log, int64_t bytes) {
+  Value mask = intrinsic("llvm.nvvm.activemask");
+  Value below = both(mask, intrinsic("llvm.nvvm.read.ptx.sreg.lanemask.lt"));
+  Value rank = extend(math::CtPopOp::create(builder, loc, below));
+  Value first = math::CountTrailingZerosOp::create(builder, loc, mask);
+  Value zero = constant(0);
+  Value piece = choose(
+      compare(P::eq, rank, zero),
+      [&] {
+        Value lanes = extend(math::CtPopOp::create(builder, loc, mask));
+        Value all = add(mul(lanes, constant(bytes)),
+                        constant(layout::pieceHeader + 63));
+        return take(log, both(all, constant(-64)), PIKOIR_PIECE_MEMORY);
+      },
+      [&] { return zero; });
+  piece = shuffle(*this, mask, piece, first);
+  Value mine = add(add(piece, constant(layout::pieceHeader)),
+                   mul(rank, constant(bytes)));
+  return select(compare(P::ne, piece, zero), mine, zero);
+}
+
 /// Bytes and kind, or number and stage, as eight bytes.
 static Value pack(GridCode &code, int64_t low, int64_t high) {
   return code.constant(
       int64_t(uint64_t(uint32_t(low)) | (uint64_t(high) << 32)));
 }
 
-/// Another piece of memory for an outbox, with an entry of `size` bytes at its
-/// front: the entry's address, or that of memory that nobody reads.
+/// More memory for an outbox, with an entry of `size` bytes at its front: the
+/// entry's address, or that of memory that nobody reads. What comes first is
+/// for a record and where it goes, as most threads have no more, and taken by
+/// all lanes of a warp together: an atomic each would make them wait for each
+/// other.
 static Value extendOutbox(GridCode &code, Value log, Value words, int64_t base,
                           int64_t size) {
   using P = GridCode::P;
-  constexpr int64_t least = 512;
+  constexpr int64_t least = 512, others = 6 * layout::header;
+  int64_t single = size + others + layout::header;
+  Value zero = code.constant(0), header = code.constant(layout::header);
+  Value cursor = code.get(words, base + PIKOIR_OUTBOX_CURSOR);
+  Value isNew = code.compare(P::eq, cursor, zero);
   int64_t need = llvm::alignTo(
       std::max(least, layout::pieceHeader + size + layout::header), 64);
   Value before = code.get(words, base + PIKOIR_OUTBOX_BYTES);
-  Value bytes = arith::MaxUIOp::create(
+  Value more = arith::MaxUIOp::create(
       code.builder, code.loc, code.add(before, before), code.constant(need));
-  Value piece = code.take(log, bytes, PIKOIR_PIECE_MEMORY);
-  return code.choose(
-      code.compare(P::ne, piece, code.constant(0)),
+  Value pieceHeader = code.constant(layout::pieceHeader);
+  Value first = code.choose(
+      isNew, [&] { return code.takeForLanes(log, single); },
       [&] {
-        Value first = code.add(piece, code.constant(layout::pieceHeader));
-        Value cursor = code.get(words, base + PIKOIR_OUTBOX_CURSOR);
-        Value isNew = code.compare(P::eq, cursor, code.constant(0));
+        Value piece = code.take(log, more, PIKOIR_PIECE_MEMORY);
+        return code.select(code.compare(P::ne, piece, zero),
+                           code.add(piece, pieceHeader), zero);
+      });
+  return code.choose(
+      code.compare(P::ne, first, zero),
+      [&] {
         code.when(isNew,
                   [&] { code.set(first, words, base + PIKOIR_OUTBOX_BEGIN); });
-        Value goesOn = code.compare(P::ne, cursor, code.constant(0));
-        code.when(goesOn, [&] {
+        code.when(code.compare(P::ne, cursor, zero), [&] {
           code.store(pack(code, layout::header, PIKOIR_ENTRY_LINK), cursor);
           code.store(first, cursor, layout::number);
         });
         code.set(code.add(first, code.constant(size)), words,
                  base + PIKOIR_OUTBOX_CURSOR);
-        Value end = code.add(piece, bytes);
-        code.set(code.sub(end, code.constant(layout::header)), words,
+        Value room = code.select(isNew, code.constant(single),
+                                 code.sub(more, pieceHeader));
+        code.set(code.sub(code.add(first, room), header), words,
                  base + PIKOIR_OUTBOX_LIMIT);
-        code.set(bytes, words, base + PIKOIR_OUTBOX_BYTES);
+        code.set(code.select(isNew, code.constant(single), more), words,
+                 base + PIKOIR_OUTBOX_BYTES);
         return first;
       },
       [&] { return getSpare(code, log); });

@@ -27,6 +27,7 @@ static StringRef getEmulation(StringRef intrinsic) {
       {"llvm.nvvm.read.ptx.sreg.lanemask.lt", "pikoir_gpu_lanes_below"},
       {"llvm.nvvm.barrier0", "pikoir_gpu_barrier"},
       {"llvm.nvvm.barrier.cta.sync.aligned.all", "pikoir_gpu_barrier"},
+      {"llvm.nvvm.barrier.cta.red.or.aligned.all", "pikoir_gpu_barrier_or"},
       {"llvm.nvvm.activemask", "pikoir_gpu_activemask"},
       {"llvm.nvvm.vote.ballot.sync", "pikoir_gpu_ballot"},
       {"llvm.nvvm.shfl.sync.idx.i32", "pikoir_gpu_shuffle"}};

@@ -38,6 +38,14 @@ Error piko::checkChip(StringRef chip) {
   return findTarget(Triple(nvptx), chip).takeError();
 }
 
+/// What asks which lanes are active came with PTX 6.2; every driver that knows
+/// CUDA 10 takes 6.3. LLVM has less for chips in front of sm_75.
+static StringRef getFeatures(StringRef processor) {
+  unsigned chip = 0;
+  processor.consume_front("sm_");
+  return !processor.consumeInteger(10, chip) && chip < 75 ? "+ptx63" : "";
+}
+
 static Expected<std::unique_ptr<TargetMachine>>
 createMachine(StringRef processor, int optLevel) {
   Triple triple(nvptx);
@@ -48,8 +56,9 @@ createMachine(StringRef processor, int optLevel) {
   // Contraction would give bits that a CPU does not.
   flags.AllowFPOpFusion = FPOpFusion::Strict;
   auto level = optLevel == 0 ? CodeGenOptLevel::None : CodeGenOptLevel::Default;
-  return std::unique_ptr<TargetMachine>((*target)->createTargetMachine(
-      triple, processor, "", flags, std::nullopt, std::nullopt, level));
+  return std::unique_ptr<TargetMachine>(
+      (*target)->createTargetMachine(triple, processor, getFeatures(processor),
+                                     flags, std::nullopt, std::nullopt, level));
 }
 
 /// By instructions; kernels have no vectors of floats.

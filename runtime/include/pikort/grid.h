@@ -162,6 +162,8 @@ PIKORT_API int32_t pikoir_gpu_blocks(void);
 PIKORT_API int32_t pikoir_gpu_lane(void);
 PIKORT_API int32_t pikoir_gpu_lanes_below(void);
 PIKORT_API void pikoir_gpu_barrier(void);
+/// A barrier that says whether the condition holds for a thread of the block.
+PIKORT_API bool pikoir_gpu_barrier_or(int32_t barrier, bool condition);
 PIKORT_API int32_t pikoir_gpu_activemask(void);
 PIKORT_API int32_t pikoir_gpu_ballot(int32_t mask, bool vote);
 PIKORT_API int32_t pikoir_gpu_shuffle(int32_t mask, int32_t value, int32_t lane,

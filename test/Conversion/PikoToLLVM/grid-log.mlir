@@ -24,12 +24,21 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 // CHECK-NEXT:        memref.store %[[END]], %[[BOX]][%c1]
 // CHECK-NEXT:        scf.yield %[[CURSOR]]
 // CHECK:           } else {
-// Twice as much as before, and a link to it from where the last one ends.
+// Twice as much as before, and a link to it from where the last one ends. What comes
+// first, the lanes of a warp that are active take by one atomic of the lowest.
+// CHECK:             %[[NEW:.*]] = arith.cmpi eq, %{{.*}}, %c0_i64
 // CHECK:             %[[BEFORE:.*]] = memref.load %[[BOX]][%c3]
 // CHECK:             %[[TWICE:.*]] = arith.addi %[[BEFORE]], %[[BEFORE]]
 // CHECK:             %[[BYTES:.*]] = arith.maxui %[[TWICE]], %c512_i64
-// CHECK:             %[[PIECE:.*]] = llvm.atomicrmw add %{{.*}}, %[[BYTES]] monotonic
-// CHECK:             %[[FIRST:.*]] = arith.addi %{{.*}}, %c64_i64
+// CHECK:             %[[FIRST:.*]] = scf.if %[[NEW]] -> (i64) {
+// CHECK:               %[[ACTIVE:.*]] = llvm.call_intrinsic "llvm.nvvm.activemask"
+// CHECK:               %[[LANE:.*]] = math.cttz %[[ACTIVE]]
+// CHECK:               scf.if
+// CHECK:                 %[[LANES:.*]] = math.ctpop %[[ACTIVE]]
+// CHECK:                 llvm.atomicrmw add
+// CHECK-COUNT-2:       llvm.call_intrinsic "llvm.nvvm.shfl.sync.idx.i32"(%[[ACTIVE]], %{{.*}}, %[[LANE]], %c31_i32)
+// CHECK:             } else {
+// CHECK:               llvm.atomicrmw add %{{.*}}, %[[BYTES]] monotonic
 // CHECK:             memref.store %[[FIRST]], %[[BOX]][%c0]
 // CHECK:             llvm.store %[[FIRST]], %{{.*}} : i64
 // The record stands behind the header.
@@ -44,6 +53,8 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 // CHECK:           %[[BEGIN:.*]] = memref.load %[[BOX]][%c0]
 // CHECK:           %[[NOW:.*]] = memref.load %[[BOX]][%c1]
 // CHECK:           %[[HAS:.*]] = arith.cmpi ne, %[[BEGIN]], %[[NOW]]
+// CHECK:           %[[ANY:.*]] = llvm.call_intrinsic "llvm.nvvm.barrier.cta.red.or.aligned.all"(%c0_i32, %[[HAS]])
+// CHECK:           scf.if %[[ANY]] {
 // CHECK:           %[[VOTES:.*]] = llvm.call_intrinsic "llvm.nvvm.vote.ballot.sync"(%c-1_i32, %[[HAS]])
 // CHECK:           %[[BELOW:.*]] = llvm.call_intrinsic "llvm.nvvm.read.ptx.sreg.lanemask.lt"
 // CHECK:           %[[MASKED:.*]] = arith.andi %[[VOTES]], %[[BELOW]]
