@@ -9,6 +9,9 @@
 // CASE: --pipe Collected --count 30 --seed 4
 // RUN: piko-compare %s --pipe Collected --count 700 --runs 1 --threads 2 --target gpu-on-cpu --gpu-threads 128 --gpu-seed 3 | FileCheck %s
 // RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_SEED=9 piko-compare %s --pipe Collected --count 700 --gpu-threads 128 --target cuda --runs 1 --threads 2 | FileCheck %s
+// With fewer threads the loop is cut, and they share the steps of each collective.
+// RUN: piko-compare %s --pipe Collected --count 700 --runs 1 --threads 2 --target gpu-on-cpu --gpu-threads 8 --gpu-seed 5 | FileCheck %s
+// RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_SEED=3 piko-compare %s --pipe Collected --count 700 --gpu-threads 16 --target cuda --runs 1 --threads 2 | FileCheck %s
 // CHECK: equal
 // RUN: pikoc %s --pipe Collected --emit=gpu --gpu-threads 64 --remarks 2>&1 | FileCheck %s --check-prefix=THREADS
 // THREADS-NOT: remark: what iterations keep across barriers is in memory

@@ -3,7 +3,8 @@
 // Units of very unlike work: with LoadBalance a block takes the next one when it
 // has ended its own, whether one at a time or several; with DirectMap block b of n
 // has the units b, b + n, .., among which here are all that take long. Results are
-// the same, and the longest of the four blocks that a multiprocessor holds is shorter.
+// the same, and the longest of the blocks is shorter. There are as many as are
+// resident, on one multiprocessor four.
 // REQUIRES: all
 // DEFINE: %{cuda} = --target cuda --runs 1 --threads 2 --domain 8192 --count 9000
 // RUN: %compare_targets %s --cases %s --domain 8192 --count 900 --runs 1

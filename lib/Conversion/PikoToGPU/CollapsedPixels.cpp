@@ -101,9 +101,6 @@ FailureOr<RareSite> CollapsedPixels::run() {
     return failure();
   ItemSetup setup(items, tile, memory, Extent::All);
   createGroups(setup);
-  if (!hasNest)
-    return emitError(items.getLoc(),
-                     "where its pixels are depends on an array");
   items.erase();
   return site;
 }
@@ -184,7 +181,6 @@ void CollapsedPixels::note(Operation *op, OpBuilder &at,
   }
   if (op != nest.anchor)
     return;
-  hasNest = true;
   Value some = b.truth(true), inBin = b.truth(true), size = b.number(1);
   for (int64_t dim = 0, e = nest.getRank(); dim < e; ++dim) {
     const PixelLoop *loop = nest.getLoop(dim);

@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// What kernels on a GPU cannot do, and which of them can share pixels.
+// What kernels on a GPU cannot do.
 
 #include "PikoToGPU.h"
 
 #include "../../Transforms/ParallelLoops.h"
 #include "../GPUToNVVM/ExactFunctions.h"
-
-#include "llvm/ADT/StringSet.h"
 
 using namespace mlir;
 using namespace piko;

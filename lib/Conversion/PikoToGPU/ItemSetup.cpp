@@ -11,7 +11,7 @@
 //       my pixels, from the block's memory
 //     barrier
 //
-// What is left to the pixels, SetupSplit.h says. Errors keep the order of
+// What is left to the pixels, SetupSplit.cpp says. Errors keep the order of
 // primitives, because each notes which one it is about.
 
 #include "ItemSetup.h"
@@ -21,7 +21,6 @@
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
 #include "mlir/Interfaces/LoopLikeInterface.h"
-#include "mlir/Interfaces/SideEffectInterfaces.h"
 
 using namespace mlir;
 using namespace piko;

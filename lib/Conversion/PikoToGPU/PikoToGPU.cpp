@@ -17,6 +17,7 @@
 #include "PikoToGPU.h"
 #include "CollapsedPixels.h"
 #include "GridFormer.h"
+#include "Mapping/SetupSplit.h"
 
 #include "../../Transforms/LoopSplitter.h"
 #include "../../Transforms/ParallelLoops.h"
@@ -29,7 +30,6 @@
 
 #include "mlir/Dialect/Math/IR/Math.h"
 #include "mlir/Transforms/GreedyPatternRewriteDriver.h"
-#include "llvm/ADT/MapVector.h"
 
 namespace piko {
 #define GEN_PASS_DEF_CONVERTPIKOTOGPU
@@ -236,6 +236,10 @@ LogicalResult GridBuilder::sharePixelsOfBins(ThreadMapping mapping) {
     PixelNestResult found = findPixelNest(items, stage);
     if (!found.nest)
       return emitError(found.obstacle.at) << found.obstacle.text;
+    SetupSplit split(items, Extent::All, /*own=*/{}, found.nest->rare);
+    if (auto obstacle = findObstacleToGroups(items, split, *found.nest,
+                                             PixelGroup(threads, stage)))
+      return emitError(obstacle->at) << obstacle->text;
     rare = collapsePixels(items, *found.nest, stage, tile, memory);
     if (failed(rare))
       return failure();
@@ -308,9 +312,7 @@ LogicalResult GridBuilder::mapLoop(ParallelLoopOpInterface loop) {
     });
     return success();
   default:
-    return numbered.emitOpError("expected a mapping of a loop over iterations "
-                                "to threads, but got ")
-           << mark;
+    llvm_unreachable("checkMapping refuses others");
   }
 }
 
@@ -396,6 +398,11 @@ LogicalResult ConvertPikoToGPUPass::convert(KernelOp kernel) {
   if (!size)
     return kernel.emitOpError("expected a mapping to threads, as "
                               "piko-map-threads makes it");
+  if (size.getInt() < 1 || size.getInt() > maxThreads ||
+      !llvm::isPowerOf2_64(size.getInt()))
+    return kernel.emitOpError("expected a power of two up to ")
+           << maxThreads << " for the threads of a block, but got "
+           << size.getInt();
   kernel->removeAttr(marks::blockSize);
   expandRemainders(kernel);
   if (failed(checkGridLimits(kernel)) ||

@@ -66,8 +66,7 @@ private:
   GridMemory &memory;
   mlir::gpu::LaunchOp launch;
   int64_t threads, group, words, pixels; ///< As PixelGroup has them.
-  bool hasNest = false;
-  bool isRareForOne = false; ///< Its pixels cannot be shared.
+  bool isRareForOne = false;             ///< Its pixels cannot be shared.
   /// By dimension, as its loop counts.
   llvm::SmallVector<mlir::Value> binLo, binHi;
   mlir::Value thread, base; ///< base: the group's first primitive.

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // What a block does with the outboxes of its threads. A round:
-//   1. threads meet, and go on if one has something; those that have vote, and
-//   a
-//      sum over warps gives each its place: the order is that of threads;
-//   2. one thread takes room for the directory, in which each says what it has;
-//   3. records of a local edge are copied behind those that the block has;
+//   1. threads meet, and go on if one of them has something;
+//   2. they vote whether they have, and a sum over warps gives each its place:
+//      the order is that of threads;
+//   3. one thread takes room for the directory, in which each says what it has;
+//   4. records of a local edge are copied behind those that the block has;
 //   where
 //      they come to follows from a sum of their numbers.
 
@@ -44,7 +44,7 @@ private:
   /// How many of the threads below are meant; `has` is a number of 1 bit.
   Value countBelow(Value has, Value &total);
   Value sumBelow(Value number, Value &total);
-  /// The sum of the warps' numbers below; each warp's is of its first lane.
+  /// The sum of the warps' numbers below; of each warp one lane is the writer.
   /// Behind a barrier: what was said in the last round has been read.
   Value sumOfWarps(Value ofWarp, Value isWriter, Value &total);
   void when(Value condition, llvm::function_ref<void()> body) {

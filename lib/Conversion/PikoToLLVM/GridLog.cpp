@@ -137,8 +137,10 @@ static Value extendOutbox(GridCode &code, Value log, Value words, int64_t base,
                                  code.sub(more, pieceHeader));
         code.set(code.sub(code.add(first, room), header), words,
                  base + PIKOIR_OUTBOX_LIMIT);
-        code.set(code.select(isNew, code.constant(single), more), words,
-                 base + PIKOIR_OUTBOX_BYTES);
+        // Twice as much is a multiple of 64.
+        code.set(
+            code.select(isNew, code.constant(llvm::alignTo(single, 32)), more),
+            words, base + PIKOIR_OUTBOX_BYTES);
         return first;
       },
       [&] { return getSpare(code, log); });
@@ -465,9 +467,8 @@ struct BytesAtLowering : ContextPattern<BytesAtOp> {
   matchAndRewrite(BytesAtOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
     Location loc = op.getLoc();
-    auto pointer = LLVM::LLVMPointerType::get(rewriter.getContext());
-    Value memory = LLVM::IntToPtrOp::create(
-        rewriter, loc, pointer, toI64(rewriter, loc, adaptor.getAddress()));
+    GridCode code(rewriter, loc);
+    Value memory = code.at(toI64(rewriter, loc, adaptor.getAddress()));
     rewriter.replaceOp(op, createBytes(rewriter, loc, memory,
                                        toI64(rewriter, loc, adaptor.getSize()),
                                        op.getBytes().getType()));

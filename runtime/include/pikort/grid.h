@@ -70,7 +70,7 @@ enum {
   PIKOIR_OUTBOX_BEGIN = 0, ///< Addresses; where it has none yet, 0.
   PIKOIR_OUTBOX_CURSOR = 1,
   PIKOIR_OUTBOX_LIMIT = 2, ///< Behind it there is room for a link.
-  PIKOIR_OUTBOX_BYTES = 3, ///< Of the piece that it is in.
+  PIKOIR_OUTBOX_BYTES = 3, ///< Half of what it takes next, if that is 512.
   PIKOIR_OUTBOX_LAST = 4,  ///< The last record.
   PIKOIR_OUTBOX_KEPT = 5,  ///< How many were placed.
   /// Of the primitive that errors are about, where a thread does not take them

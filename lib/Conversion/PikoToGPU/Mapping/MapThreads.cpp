@@ -96,14 +96,13 @@ std::optional<Obstacle> ThreadMapper::findObstacleToCollapsing(ItemsOp items) {
   if (!found.nest)
     return found.obstacle;
   SetupSplit split(items, Extent::All, /*own=*/{}, found.nest->rare);
-  if (!PixelGroup(threads, stage).fits(split.countBytes()))
+  PixelGroup group(threads, stage);
+  if (!group.fits(split.countBytes()))
     return Obstacle{items.getLoc(),
                     "masks for the pixels of a bin take too much memory for a "
                     "block of " +
                         std::to_string(threads) + " threads"};
-  if (!isNestInSetup(split, *found.nest))
-    return Obstacle{items.getLoc(), "where its pixels are depends on an array"};
-  return std::nullopt;
+  return findObstacleToGroups(items, split, *found.nest, group);
 }
 
 /// Whether threads share the pixels of many primitives, or else of one after

@@ -64,7 +64,7 @@ static bool hasEffect(Operation *op) {
     if (auto access = dyn_cast<StateAccessOpInterface>(inner))
       return access.getAccessKinds() != StateAccess::reads;
     return isa<memref::StoreOp>(inner) ||
-           (!isStructure(inner) && !isa<memref::AllocaOp>(inner) &&
+           (!hasEffectsOfRegions(inner) && !isa<memref::AllocaOp>(inner) &&
             !isMemoryEffectFree(inner) &&
             !hasSingleEffect<MemoryEffects::Read>(inner));
   });

@@ -14,6 +14,7 @@
 
 #include "mlir/Dialect/Utils/StaticValueUtils.h"
 #include "mlir/Interfaces/SideEffectInterfaces.h"
+#include "llvm/ADT/SetVector.h"
 
 using namespace mlir;
 using namespace piko;
@@ -100,8 +101,8 @@ bool OwnerFinder::canStride(const PixelLoop &loop) const {
       return rootOf(update) == loop.getCounter();
     if (auto array = getWrittenArray(op))
       return loop.op->isProperAncestor(array);
-    return isa<StoreOp, AtomicOp, memref::AllocaOp>(op) || isStructure(op) ||
-           isFreeOfEffects(op);
+    return isa<StoreOp, AtomicOp, memref::AllocaOp>(op) ||
+           hasEffectsOfRegions(op) || isFreeOfEffects(op);
   };
   WalkResult result = loop.op->getRegion(0).walk([&](Operation *op) {
     return isOfPixel(op) ? WalkResult::advance() : WalkResult::interrupt();

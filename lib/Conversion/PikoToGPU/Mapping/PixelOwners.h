@@ -8,8 +8,6 @@
 
 #include "../PikoToGPU.h"
 
-#include "llvm/ADT/SetVector.h"
-
 namespace piko {
 
 /// What a thread does where a coordinate, the root, is one of its own.

@@ -32,7 +32,7 @@ bool SetupSplit::mustKeep(Operation *op) const {
   if (auto access = dyn_cast<StateAccessOpInterface>(op))
     if (access.getAccessKinds() != StateAccess::reads)
       return true;
-  if (!isStructure(op) && !isMemoryEffectFree(op) &&
+  if (!hasEffectsOfRegions(op) && !isMemoryEffectFree(op) &&
       !hasSingleEffect<MemoryEffects::Read>(op))
     return true;
   return llvm::any_of(op->getOperands(), [&](Value operand) {
@@ -137,8 +137,9 @@ void SetupSplit::computeAgain() {
   };
   for (Value value : llvm::to_vector(shared)) {
     Operation *op = value.getDefiningOp();
-    if (op->getNumRegions() || !isMemoryEffectFree(op) || isa<GetOp>(op) ||
-        op->getNumResults() != 1 || !llvm::all_of(op->getOperands(), isThere))
+    if (op->getNumRegions() || !isMemoryEffectFree(op) ||
+        isa<GetOp, arith::RemFOp>(op) || op->getNumResults() != 1 ||
+        !llvm::all_of(op->getOperands(), isThere))
       continue;
     both.insert(op);
     shared.remove(value);
@@ -162,7 +163,8 @@ int64_t SetupSplit::countBytes() const {
 // Groups of primitives
 //===----------------------------------------------------------------------===//
 
-bool piko::isNestInSetup(const SetupSplit &split, PixelNest &nest) {
+/// Whether setups find where the pixels of the nest are.
+static bool isNestInSetup(const SetupSplit &split, PixelNest &nest) {
   for (auto [block, next] : nest.levels) {
     if (next == nest.anchor)
       break;
@@ -200,6 +202,17 @@ bool PixelGroup::fits(int64_t setupBytes) const {
                   llvm::divideCeil(pixels, 32) * 4 + 2 * pixels;
   int64_t most = std::min(
       maxBlockBytes, maxBytesOfThread * std::max<int64_t>(threads, warpSize));
-  return pixels < (1 << 16) && size * pixels < (1 << pixelBits) &&
-         bytes <= most;
+  return canCount() && bytes <= most;
+}
+
+std::optional<Obstacle> piko::findObstacleToGroups(Operation *items,
+                                                   const SetupSplit &split,
+                                                   PixelNest &nest,
+                                                   const PixelGroup &group) {
+  if (!group.canCount())
+    return Obstacle{items->getLoc(), "a bin has too many pixels for masks"};
+  if (!isNestInSetup(split, nest))
+    return Obstacle{items->getLoc(),
+                    "where its pixels are depends on an array"};
+  return std::nullopt;
 }

@@ -55,9 +55,6 @@ private:
   llvm::DenseSet<mlir::Operation *> both; ///< As cheap as a load.
 };
 
-/// Whether setups find where the pixels of the nest are.
-bool isNestInSetup(const SetupSplit &split, PixelNest &nest);
-
 /// The pixels of a group of primitives as one space, in the block's memory.
 struct PixelGroup {
   PixelGroup(int64_t threads, StageOp stage);
@@ -67,6 +64,10 @@ struct PixelGroup {
   int64_t words;      ///< Of 32 bits, in the mask of a pixel.
   int64_t pixels = 1; ///< Of a bin.
 
+  /// Whether its numbers have the bits for all pixels.
+  bool canCount() const {
+    return pixels < (1 << 16) && size * pixels < (1 << pixelBits);
+  }
   /// Whether the block has room for it, and the multiprocessor for such blocks,
   /// where the setup of a primitive leaves so much.
   bool fits(int64_t setupBytes) const;
@@ -74,6 +75,13 @@ struct PixelGroup {
   /// Bits of a number of pixels, in the word that has that of primitives, too.
   static constexpr int64_t pixelBits = 24;
 };
+
+/// Why threads cannot take the pixels of a nest by groups, however much memory
+/// that takes, if they cannot: `split` is without what is rare.
+std::optional<Obstacle> findObstacleToGroups(mlir::Operation *items,
+                                             const SetupSplit &split,
+                                             PixelNest &nest,
+                                             const PixelGroup &group);
 
 } // namespace piko
 

@@ -10,6 +10,8 @@
 
 #include "../PikoToGPU.h"
 
+#include "Piko/Dialect/Piko/IR/Marks.h"
+
 #include "mlir/IR/Matchers.h"
 #include "llvm/ADT/StringMap.h"
 #include "llvm/ADT/StringSet.h"
@@ -236,9 +238,11 @@ static int64_t getBound(Value lo, Value hi) {
 }
 
 static int64_t getMostIterations(ParallelLoopOpInterface loop) {
+  if (auto counted = dyn_cast<ParallelForOp>(*loop))
+    return getBound(counted.getCount());
   auto pixels = dyn_cast<ParallelPixelsOp>(*loop);
   if (!pixels)
-    return getBound(cast<ParallelForOp>(*loop).getCount());
+    return unbounded; // another dialect's, which the conversion refuses
   int64_t product = 1;
   for (auto [lo, hi] : llvm::zip(pixels.getLo(), pixels.getHi()))
     product = std::min(product * getBound(lo, hi), unbounded);
@@ -266,8 +270,20 @@ bool piko::canRunInLockstep(ParallelLoopOpInterface loop, int64_t threads) {
          getMostIterations(loop) <= threads;
 }
 
+/// Whether a thread has a primitive, or an iteration, to itself already.
+static bool isInSharedWork(Operation *op) {
+  if (op->getParentOfType<ParallelLoopOpInterface>())
+    return true;
+  auto work = op->getParentOfType<WorkOpInterface>();
+  auto mark = work ? work->getAttrOfType<ThreadMappingAttr>(marks::threads)
+                   : ThreadMappingAttr();
+  return mark && mark.getValue() != ThreadMapping::One;
+}
+
 bool piko::isLegal(Operation *op, ThreadMapping mapping, int64_t threads) {
   auto loop = dyn_cast<ParallelLoopOpInterface>(op);
+  if (loop && mapping != ThreadMapping::One && isInSharedWork(op))
+    return false;
   switch (mapping) {
   case ThreadMapping::One:
     return !loop || !loop.hasBarriers();

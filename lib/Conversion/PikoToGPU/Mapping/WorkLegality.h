@@ -21,7 +21,7 @@ struct Obstacle {
 };
 
 /// Whether what an operation does is what its regions do.
-inline bool isStructure(mlir::Operation *op) {
+inline bool hasEffectsOfRegions(mlir::Operation *op) {
   return op->hasTrait<mlir::OpTrait::HasRecursiveMemoryEffects>() ||
          llvm::isa<ParallelLoopOpInterface>(op);
 }
