@@ -5,7 +5,8 @@
 format    every C++ file is formatted as .clang-format says (--fix: make it so)
 licence   every source file has the licence line at its top
 paths     no file holds an absolute path of somebody's machine
-layers    the runtime's common part knows nothing of the targets' parts
+layers    the runtime's common part knows nothing of the targets' parts, nor the
+          CPU's of CUDA's
 tidy      clang-tidy over the compile commands of a build (--build DIR), or over
           the files without headers of LLVM, a folder at a time (--quick)
 all       all but the last
@@ -96,12 +97,21 @@ def paths():
 
 def layers():
     """runtime/common includes none of runtime/cpu, runtime/gpu and runtime/cuda,
-    and declares none of the first two's types itself."""
+    and declares none of the first two's types itself; those two include nothing
+    of runtime/cuda."""
     runtime = ROOT / "runtime"
     foreign = set()
     for header in [*runtime.glob("cpu/*.h"), *runtime.glob("gpu/*.h")]:
         foreign |= set(re.findall(r"^(?:class|struct) (\w+)", header.read_text(), re.M))
     faults = 0
+    for path in sorted([*runtime.glob("cpu/*"), *runtime.glob("gpu/*")]):
+        for number, line in enumerate(path.read_text().splitlines(), 1):
+            if re.match(r'#include "cuda/', line):
+                print(
+                    f"{path.relative_to(ROOT)}:{number}: expected nothing of"
+                    " runtime/cuda in what runs without it"
+                )
+                faults += 1
     for path in sorted(runtime.glob("common/*")):
         for number, line in enumerate(path.read_text().splitlines(), 1):
             part = re.search(r"\b(cpu|gpu|cuda)/", line)

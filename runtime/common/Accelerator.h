@@ -6,7 +6,7 @@
 // the host's, which kernels reach at the same address, as slowly as the bus is.
 // Host and device never use the latter at the same time, because launch()
 // returns when the grid has ended, and nobody touches what a frame uses before
-// DeviceFrame::await.
+// it has been waited for.
 //
 //===----------------------------------------------------------------------===//
 
@@ -21,8 +21,6 @@
 #include <string_view>
 
 namespace piko::rt {
-
-class DeviceFrame;
 
 /// While a host's call lasts: at the end of the outermost one the thread has
 /// the device (the context, in CUDA) that it had before.
@@ -88,9 +86,6 @@ public:
   /// `arguments` are `count` words of eight bytes.
   virtual void launch(const char *kernel, int64_t blocks, int64_t threads,
                       const void *arguments, int64_t count) = 0;
-
-  /// What records the runs of the pipeline; launches go to it meanwhile. Once.
-  virtual std::unique_ptr<DeviceFrame> makeFrame() = 0;
 };
 
 /// Bytes of a device's own memory; none at first.

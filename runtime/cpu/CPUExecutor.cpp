@@ -19,8 +19,6 @@ CPUExecutor::CPUExecutor(pikort_pipeline &p) : p(p) {}
 CPUExecutor::~CPUExecutor() = default;
 
 void CPUExecutor::prepare() {
-  if (p.accelerator)
-    frame = p.accelerator->makeFrame();
   auto make = [&](int32_t stage, int32_t source) {
     auto kernel = std::make_unique<Kernel>();
     kernel->stage = stage;
@@ -64,8 +62,7 @@ void CPUExecutor::prepare() {
 
 void CPUExecutor::beginRun() {
   prepareState(p);
-  repeated = false;
-  beginMirrors(p, frame && frame->isPossible());
+  beginMirrors(p, takesWhole());
   startCounters(p);
   p.profile.enter(Part::Program);
   if (checker)
@@ -77,71 +74,23 @@ void CPUExecutor::beginRun() {
   startStrips(p);
 }
 
-int32_t CPUExecutor::runProgram() {
-  if (!frame || !frame->begin())
-    return p.runProgram(&p);
-  guarded(&p, "run", [&] {
-    int32_t status = p.runProgram(&p);
-    if (status == PIKORT_OK && p.settle() == PIKORT_OK)
-      pending = frame->submit();
-  });
-  frame->end();
-  return pending || p.status != PIKORT_OK
-             ? p.status.load()
-             : repeatProgram(DeviceFrame::Outcome::Repeat);
-}
+int32_t CPUExecutor::runProgram() { return p.runProgram(&p); }
 
-int32_t CPUExecutor::awaitProgram() {
-  pending = false;
-  p.profile.enter(Part::Device);
-  DeviceFrame::Outcome outcome = frame->await();
-  p.profile.enter(Part::Program);
-  if (outcome == DeviceFrame::Outcome::Done)
-    return p.status;
-  repeated = true;
-  return repeatProgram(outcome);
-}
-
-int32_t CPUExecutor::repeatProgram(DeviceFrame::Outcome outcome) {
-  restartRun();
-  int32_t status = p.runProgram(&p);
-  if (status == PIKORT_OK && p.settle() == PIKORT_OK &&
-      outcome == DeviceFrame::Outcome::Spoilt)
-    throw Failure{PIKORT_OUT_OF_MEMORY,
-                  "pipeline " + quoted(p.name) +
-                      ": out of memory on the device, and what the run changes "
-                      "in place is lost"};
-  return status;
-}
-
-void CPUExecutor::restartRun() {
+void CPUExecutor::clearKernels() {
   for (auto *list : {&kernels, &sourceKernels})
     for (std::unique_ptr<Kernel> &kernel : *list)
       if (kernel)
         kernel->clear();
-  endStrips(p);
-  endCycles(p);
-  cleared.assign(p.stages.size(), false);
-  p.accelerator->finishStream();
-  refillMirrors(p);
-  startCycles(p);
-  startStrips(p);
 }
 
 void CPUExecutor::endRun() {
-  pending = false;
-  if (p.accelerator)
-    p.accelerator->endStream();
   endClears(p);
   endMirrors(p);
   endStrips(p);
   endCycles(p);
   if (checker)
     checker->endRun();
-  for (auto *list : {&kernels, &sourceKernels})
-    for (std::unique_ptr<Kernel> &kernel : *list)
-      if (kernel)
-        kernel->clear();
+  clearKernels();
 }
 
 void CPUExecutor::noteError() {

@@ -9,7 +9,6 @@
 #ifndef PIKO_RUNTIME_CPU_CPUEXECUTOR_H
 #define PIKO_RUNTIME_CPU_CPUEXECUTOR_H
 
-#include "common/DeviceFrame.h"
 #include "common/Pipeline.h"
 #include "cpu/Threads.h"
 #include "pikort/grid.h"
@@ -25,7 +24,7 @@ class Cycle;    // Cycle.h
 class Strips;   // Strips.h
 struct GridLog; // gpu/Log.cpp
 
-struct CPUExecutor final : Executor {
+struct CPUExecutor : Executor {
   explicit CPUExecutor(pikort_pipeline &p);
   ~CPUExecutor() override;
 
@@ -36,15 +35,11 @@ struct CPUExecutor final : Executor {
   void prepare() override;
   void beginRun() override;
   int32_t runProgram() override;
-  bool isPending() const override { return pending; }
-  bool isDone() const override { return frame->isDone(); }
-  int32_t awaitProgram() override;
-  bool wasRepeated() const override { return repeated; }
   void endRun() override;
-  /// Runs the program step by step, for a frame that could not.
-  int32_t repeatProgram(DeviceFrame::Outcome outcome);
-  /// Begins the run anew, on what it began with.
-  void restartRun();
+  /// Whether a device takes the run as a whole, as far as is known.
+  virtual bool takesWhole() const { return false; }
+  /// Drops what kernels hold of a run.
+  void clearKernels();
   bool reportsInOrder() const override { return checker != nullptr; }
   void noteError() override;
   std::string describe(int32_t code, const std::string &plain) const override;
@@ -54,10 +49,7 @@ struct CPUExecutor final : Executor {
   std::vector<std::unique_ptr<Kernel>> kernels; ///< Of stages.
   /// Of sources; null where the consumer is not placed.
   std::vector<std::unique_ptr<Kernel>> sourceKernels;
-  std::unique_ptr<Checker> checker;   ///< In checking mode.
-  std::unique_ptr<DeviceFrame> frame; ///< With an accelerator.
-  bool pending = false;               ///< It has been submitted.
-  bool repeated = false;              ///< The run had to be, behind it.
+  std::unique_ptr<Checker> checker; ///< In checking mode.
 
   // Of a run:
   std::vector<std::unique_ptr<Cycle>> cycles;
@@ -99,12 +91,6 @@ inline Strips *stripsOf(const pikort_pipeline &p, const Stage &stage) {
 }
 
 /// In checking mode, what checks; else null.
-/// What records the run, if the device takes it as a whole.
-inline DeviceFrame *recordingOf(const pikort_pipeline &p) {
-  DeviceFrame *frame = cpuOf(p).frame.get();
-  return frame && frame->isRecording() ? frame : nullptr;
-}
-
 inline Checker *checkerOf(const pikort_pipeline &p) {
   return cpuOf(p).checker.get();
 }

@@ -316,15 +316,6 @@ static int32_t ask(pikort_pipeline *p, int32_t number, auto &&question) {
   return next;
 }
 
-/// The same where a device repeats the cycle: what its recording is to be led
-/// through next.
-static int32_t record(pikort_pipeline *p, auto &&question) {
-  int32_t next = -1;
-  if (p->status == PIKORT_OK)
-    guarded(p, "cycle", [&] { next = question(*recordingOf(*p)); });
-  return next;
-}
-
 static int32_t failNumber(pikort_pipeline *p, const char *what,
                           int32_t number) {
   guarded(p, "cycle", [&] {
@@ -340,8 +331,6 @@ extern "C" {
 int32_t pikoir_loop_step(pikort_pipeline *p, int32_t loop) {
   if (static_cast<size_t>(loop) >= p->loops.size())
     return failNumber(p, "the number of a loop", loop);
-  if (recordingOf(*p))
-    return record(p, [&](DeviceFrame &frame) { return frame.stepLoop(loop); });
   return ask(p, p->loops[loop].cycle,
              [&](Cycle &cycle) { return cycle.stepLoop(loop); });
 }
@@ -350,10 +339,6 @@ int32_t pikoir_cycle_takes(pikort_pipeline *p, int32_t stage) {
   const Stage *found = p->findStage(stage);
   if (!found || found->cycle < 0 || found->loop >= 0 || found->collects())
     return failNumber(p, "a stage between the loops of a cycle", stage) > 0;
-  if (recordingOf(*p))
-    return record(p, [&](DeviceFrame &frame) {
-             return frame.takes(stage) ? 1 : -1;
-           }) > 0;
   return ask(p, found->cycle,
              [&](Cycle &cycle) { return cycle.takes(stage) ? 1 : -1; }) > 0;
 }
@@ -361,8 +346,6 @@ int32_t pikoir_cycle_takes(pikort_pipeline *p, int32_t stage) {
 int32_t pikoir_cycle_turn(pikort_pipeline *p, int32_t cycle) {
   if (static_cast<size_t>(cycle) >= p->cycles.size())
     return failNumber(p, "the number of a cycle", cycle);
-  if (recordingOf(*p))
-    return record(p, [&](DeviceFrame &frame) { return frame.nextTurn(cycle); });
   return ask(p, cycle, [](Cycle &cycle) { return cycle.nextTurn(); });
 }
 

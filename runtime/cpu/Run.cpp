@@ -304,24 +304,9 @@ static void fail(pikort_pipeline &p, KernelError found) {
   p.report(found);
 }
 
-/// The input of a kernel that the device begins itself.
-static const pikoir_input *record(pikort_pipeline &p, int32_t number,
-                                  bool isSource) {
-  const pikoir_input *input = nullptr;
-  if (p.status == PIKORT_OK)
-    guarded(&p, "run", [&] {
-      input = cpuOf(p).frame->join(number, isSource);
-      if (!isSource)
-        cpuOf(p).cleared[static_cast<size_t>(number)] = true;
-    });
-  return input;
-}
-
 extern "C" {
 
 const pikoir_input *pikoir_begin(pikort_pipeline *p, int32_t stage) {
-  if (recordingOf(*p))
-    return record(*p, stage, /*isSource=*/false);
   Kernel *kernel = find(p, cpuOf(*p).kernels, stage, "stage");
   if (Checker *checker = checkerOf(*p); kernel && checker)
     checker->beginStage(stage);
@@ -329,8 +314,6 @@ const pikoir_input *pikoir_begin(pikort_pipeline *p, int32_t stage) {
 }
 
 int32_t pikoir_end(pikort_pipeline *p, int32_t stage) {
-  if (recordingOf(*p))
-    return p->status.load();
   Kernel *kernel = find(p, cpuOf(*p).kernels, stage, "stage");
   if (Checker *checker = checkerOf(*p))
     checker->endStage();
@@ -338,15 +321,11 @@ int32_t pikoir_end(pikort_pipeline *p, int32_t stage) {
 }
 
 const pikoir_input *pikoir_begin_source(pikort_pipeline *p, int32_t source) {
-  if (recordingOf(*p))
-    return record(*p, source, /*isSource=*/true);
   Kernel *kernel = find(p, cpuOf(*p).sourceKernels, source, "placed source");
   return kernel ? begin(*p, *kernel) : nullptr;
 }
 
 int32_t pikoir_end_source(pikort_pipeline *p, int32_t source) {
-  if (recordingOf(*p))
-    return p->status.load();
   Kernel *kernel = find(p, cpuOf(*p).sourceKernels, source, "placed source");
   return kernel ? end(*p, *kernel) : p->status.load();
 }

@@ -187,8 +187,6 @@ void pikoir_clear(pikort_pipeline *p, int32_t id) {
                     "expected an image, or a buffer that is sized by a source, "
                     "to clear, but got state " +
                         std::to_string(id)};
-    if (DeviceFrame *frame = recordingOf(*p))
-      return frame->clear(id);
     Part before = p->profile.part();
     p->profile.enter(Part::State);
     fill(*p, *state);

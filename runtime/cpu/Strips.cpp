@@ -188,11 +188,7 @@ int32_t pikoir_strips_next(pikort_pipeline *p, int32_t id) {
       throw Failure{PIKORT_BAD_PROGRAM,
                     "expected the number of a group of stages, but got " +
                         std::to_string(id)};
-    Strips &strips = *cpuOf(*p).strips[id];
-    if (DeviceFrame *frame = recordingOf(*p))
-      more = p->status == PIKORT_OK && frame->nextStrip(id, strips.size());
-    else
-      more = strips.next();
+    more = cpuOf(*p).strips[id]->next();
   });
   return more;
 }

@@ -3,6 +3,7 @@
 
 #include "cuda/Accelerator.h"
 #include "common/Pipeline.h"
+#include "cuda/CudaExecutor.h"
 #include "cuda/OwnKernels.h"
 #include "pikort/grid.h"
 
@@ -12,7 +13,7 @@
 #include <cstring>
 
 using namespace piko::cuda;
-using piko::rt::Failure;
+using piko::rt::Failure, piko::rt::quoted;
 
 /// A barrier of blocks takes as long as some 20 loads, one behind the other,
 /// and a join has a dozen of them; 2,000 things are eight for a thread of one
@@ -216,12 +217,6 @@ bool Accelerator::canWaitInGrids() const {
   return device_->attribute(CU_DEVICE_ATTRIBUTE_COOPERATIVE_LAUNCH) != 0;
 }
 
-std::unique_ptr<piko::rt::DeviceFrame> Accelerator::makeFrame() {
-  auto frame = std::make_unique<Frame>(p_, *this);
-  frame_ = frame.get();
-  return frame;
-}
-
 CUfunction Accelerator::find(const std::string &kernel) {
   if (!OwnKernels::has(kernel))
     return module_.find(kernel);
@@ -255,10 +250,8 @@ int64_t Accelerator::joinBlocks(const std::string &kernel) {
 void Accelerator::launch(const char *kernel, int64_t blocks, int64_t threads,
                          const void *arguments, int64_t count) {
   const auto *words = static_cast<const int64_t *>(arguments);
-  GridLaunch grid{kernel, blocks, threads, {words, words + count}, false};
-  if (frame_ && frame_->isRecording())
-    return frame_->launch(std::move(grid));
-  Step step{Step::Kind::Grid, std::move(grid)};
+  Step step{Step::Kind::Grid,
+            {kernel, blocks, threads, {words, words + count}, false}};
   enqueue({&step, 1});
   await({&step, 1});
 }
@@ -383,7 +376,23 @@ extern "C" {
 
 void pikoir_cuda_module(pikort_pipeline *p, const pikoir_cuda_image *images) {
   piko::rt::guarded(p, "pipeline", [&] {
-    p->useAccelerator(std::make_unique<Accelerator>(*p, images));
+    auto device = std::make_unique<Accelerator>(*p, images);
+    auto executor = std::make_unique<CudaExecutor>(*p, *device);
+    p->useAccelerator(std::move(device));
+    p->executor = std::move(executor);
+  });
+}
+
+void pikoir_cuda_program(pikort_pipeline *p, const pikoir_cuda_step *steps,
+                         int64_t count) {
+  piko::rt::guarded(p, "pipeline", [&] {
+    auto *executor = dynamic_cast<CudaExecutor *>(p->executor.get());
+    if (!executor || count < 0)
+      throw Failure{PIKORT_BAD_PROGRAM,
+                    "pipeline " + quoted(p->name) +
+                        ": expected pikoir_cuda_module in front of "
+                        "pikoir_cuda_program, and at least 0 steps"};
+    executor->setProgram({steps, static_cast<size_t>(count)});
   });
 }
 

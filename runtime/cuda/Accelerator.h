@@ -54,7 +54,6 @@ public:
   int64_t residentThreads() const override { return residentThreads_; }
   void launch(const char *kernel, int64_t blocks, int64_t threads,
               const void *arguments, int64_t count) override;
-  std::unique_ptr<rt::DeviceFrame> makeFrame() override;
 
   /// Whether blocks of a grid can wait for each other, as joins do.
   bool canWaitInGrids() const;
@@ -120,7 +119,6 @@ private:
   int64_t *progress_ = nullptr;       ///< And room for what the host reads.
   int64_t processors_ = 0, residentThreads_ = 0, mostAlone_ = 0;
   std::unordered_map<std::string, int64_t> residentBlocks_; ///< By kernel.
-  Frame *frame_ = nullptr; ///< The executor's, which ends first.
 };
 
 } // namespace piko::cuda

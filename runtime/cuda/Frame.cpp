@@ -28,9 +28,7 @@ bool Frame::isPossible() const {
 Frame::Frame(pikort_pipeline &p, Accelerator &device)
     : p_(p), device_(device), exchange_(device) {}
 
-bool Frame::begin() {
-  if (!isPossible())
-    return false;
+void Frame::reset() {
   takeMemory();
   for (LoopState &loop : std::span(loops_, p_.loops.size()))
     loop.again = 1;
@@ -39,14 +37,10 @@ bool Frame::begin() {
   clearRecords_.clear();
   strips_.assign(p_.stripGroups.size(), {});
   steps_.clear();
-  joined_ = nullptr;
-  members_.assign(p_.loops.size(), 0);
-  stacks_.assign(p_.loops.size(), nullptr);
+  loop_ = {};
+  stack_ = nullptr;
   cuts_.clear();
-  turns_.assign(p_.cycles.size(), 0);
   isCleared_.assign(p_.states.size(), false);
-  isRecording_ = true;
-  return true;
 }
 
 /// What the device says comes first.
@@ -166,9 +160,8 @@ const uint8_t *Frame::clearRecord(const State &state) {
 
 JoinArgs &Frame::describeStage(int32_t number) {
   const Stage &stage = p_.stages[number];
-  bool isEntered = stage.loop >= 0 && hasEntries(p_.loops[stage.loop]);
   std::vector<JoinInput> inputs =
-      isEntered ? describeWave(number) : describeInputs(stage);
+      loop_.entries.empty() ? describeInputs(stage) : describeWave(number);
   std::vector<JoinClear> clears = describeClears(stage);
   auto &args = exchange_.takeWith<JoinArgs>(inputs, clears);
   args.inputCount = static_cast<int32_t>(inputs.size());
@@ -238,18 +231,7 @@ void Frame::describeSchedule(JoinArgs &args, const Stage &stage) {
   });
 }
 
-std::vector<int32_t> Frame::edgesOf(int32_t kernel) const {
-  std::vector<int32_t> edges;
-  for (size_t e = 0; e < p_.edges.size(); ++e) {
-    const Edge &edge = p_.edges[e];
-    if (!edge.local &&
-        (edge.producer == kernel || p_.stages[edge.producer].host == kernel))
-      edges.push_back(static_cast<int32_t>(e));
-  }
-  return edges;
-}
-
-// --- What the program asks for ----------------------------------------------
+// --- What a program does ----------------------------------------------------
 
 void Frame::launchOwn(const char *kernel, const void *args, int32_t timed) {
   steps_.push_back({Step::Kind::Grid,
@@ -287,17 +269,70 @@ int32_t Frame::kernelOf(int32_t number, bool isSource) const {
   return -1;
 }
 
-const pikoir_input *Frame::join(int32_t number, bool isSource) {
+void Frame::record(Steps program, std::span<const int64_t> stripSizes) {
+  reset();
+  program_ = program;
+  for (size_t at = 0; at < program.size() && p_.status == PIKORT_OK; ++at)
+    recordStep(at, stripSizes);
+}
+
+void Frame::recordStep(size_t at, std::span<const int64_t> stripSizes) {
+  const pikoir_cuda_step &step = program_[at];
+  int32_t number = step.number;
+  switch (step.kind) {
+  case PIKOIR_STEP_CLEAR:
+    return clear(number);
+  case PIKOIR_STEP_SOURCE:
+  case PIKOIR_STEP_STAGE:
+    return recordKernel(step, queuesBehind(at));
+  case PIKOIR_STEP_HOST:
+    step.host(&p_); // which notes its errors
+    return;
+  case PIKOIR_STEP_STRIPS:
+    return beginStrips(number, stripSizes[static_cast<size_t>(number)]);
+  case PIKOIR_STEP_END_STRIPS:
+    return endStrips(number);
+  case PIKOIR_STEP_WAVES:
+    loop_ = loopAt(at);
+    return beginLoop();
+  case PIKOIR_STEP_END_WAVES:
+    endLoop();
+    loop_ = {};
+    return;
+  case PIKOIR_STEP_ROUNDS:
+    return repeat(cycles_[number].again);
+  case PIKOIR_STEP_END_ROUNDS:
+    return endRounds(number);
+  default: // of a kernel or a loop, which has read it
+    return;
+  }
+}
+
+Steps Frame::queuesBehind(size_t at) const {
+  size_t end = ++at;
+  while (end < program_.size() && program_[end].kind == PIKOIR_STEP_QUEUE)
+    ++end;
+  return program_.subspan(at, end - at);
+}
+
+void Frame::recordKernel(const pikoir_cuda_step &step, Steps queues) {
+  bool isSource = step.kind == PIKOIR_STEP_SOURCE;
+  Place &place = join(step.number, isSource);
+  for (const pikoir_cuda_grid *grid = step.grids; grid->kernel; ++grid)
+    launch(*grid, place, step.number);
+  if (!isSource && !isStacked(p_.stages[step.number]))
+    queue(place, queues);
+}
+
+Frame::Place &Frame::join(int32_t number, bool isSource) {
   Place &place = find(number, isSource);
   place.stage = isSource ? -1 : number;
-  joined_ = &place;
   timed_ = kernelOf(number, isSource);
   const Stage &stage = p_.stages[isSource ? p_.sources[number].stage : number];
   if (place.args && (isSource || stage.cycle < 0))
     needsHost_ = true;
-  const pikoir_input *input = onDevice(&place.state.input);
   if (!isSource && isStacked(stage))
-    return input;
+    return place;
   JoinArgs &args = isSource ? describeSource(number) : describeStage(number);
   args.strip = onDevice(stripOf(stage));
   args.frame = onDevice(frame_);
@@ -308,7 +343,7 @@ const pikoir_input *Frame::join(int32_t number, bool isSource) {
   if (!isSource)
     for (int32_t id : p_.stages[number].clears)
       isCleared_[static_cast<size_t>(id)] = true;
-  return input;
+  return place;
 }
 
 void Frame::showConstants(GridLaunch &grid) const {
@@ -319,18 +354,16 @@ void Frame::showConstants(GridLaunch &grid) const {
                    reinterpret_cast<int64_t>(state.twin.data()));
 }
 
-void Frame::launch(GridLaunch grid) {
+void Frame::launch(const pikoir_cuda_grid &grid, Place &place, int32_t number) {
+  std::vector<int64_t> words(static_cast<size_t>(grid.count));
+  grid.arguments(&p_, onDevice(&place.state.input), onDevice(&place.state.log),
+                 words.data());
   // More would be a second wave, which is seldom full, and find less to do.
-  grid.blocks =
-      std::min(grid.blocks, device_.residentBlocks(grid.kernel, grid.threads));
-  showConstants(grid);
-  steps_.push_back({Step::Kind::Grid, std::move(grid), nullptr, timed_});
-  if (joined_ && joined_->stage >= 0 && !isStacked(p_.stages[joined_->stage]))
-    queue(*joined_);
-}
-
-pikoir_log *Frame::log(int32_t number, bool isSource) {
-  return onDevice(&find(number, isSource).state.log);
+  int64_t count = std::min(blocks(number, place.stage < 0, grid.threads),
+                           device_.residentBlocks(grid.kernel, grid.threads));
+  GridLaunch launch{grid.kernel, count, grid.threads, std::move(words), false};
+  showConstants(launch);
+  steps_.push_back({Step::Kind::Grid, std::move(launch), nullptr, timed_});
 }
 
 int64_t Frame::mostItems(const JoinArgs &args) const {
@@ -372,7 +405,6 @@ void Frame::clear(int32_t id) {
 // --- The submission ---------------------------------------------------------
 
 bool Frame::submit() {
-  isRecording_ = false;
   std::span<uint8_t> room;
   if (!needsHost_)
     room = device_.logSpace();
@@ -424,8 +456,6 @@ bool Frame::keepsState() const {
   }
   return false;
 }
-
-void Frame::end() noexcept { isRecording_ = false; }
 
 void Frame::noteStatistics() {
   for (size_t s = 0; s < p_.stages.size(); ++s) {

@@ -1,24 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //===- Frame.h - A pipeline's frame as one submission ---------------------===//
 //
-// In front of each kernel of the program goes a join (device/Joins.h), which
-// finds its input and its units. Grids have as many blocks as fill the device,
-// and go over the units that they find. Memory is taken from the pipeline's log
-// space, in address order, from the first kernel to the last; strips take it
-// again. What host and device say to each other is in an Exchange: the frame
-// writes the host's copy of it, in which all addresses are the device's.
+// What a program does is a table of steps (pikort/grid.h), of which a frame
+// makes what is submitted. In front of each kernel goes a join
+// (device/Joins.h), which finds its input and its units. Grids have as many
+// blocks as fill the device, and go over the units that they find. Memory is
+// taken from the pipeline's log space, in address order, from the first kernel
+// to the last; strips take it again. What host and device say to each other is
+// in an Exchange: the frame writes the host's copy of it, in which all
+// addresses are the device's.
 //
 //===----------------------------------------------------------------------===//
 
 #ifndef PIKO_RUNTIME_CUDA_FRAME_H
 #define PIKO_RUNTIME_CUDA_FRAME_H
 
-#include "common/DeviceFrame.h"
 #include "common/Pipeline.h"
 #include "cuda/Exchange.h"
 #include "cuda/device/Joins.h"
+#include "pikort/grid.h"
 
 #include <map>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -52,27 +55,32 @@ struct Step {
   bool operator==(const Step &) const = default;
 };
 
-class Frame final : public rt::DeviceFrame {
+/// Steps of a program, one behind the other.
+using Steps = std::span<const pikoir_cuda_step>;
+
+class Frame {
 public:
   Frame(pikort_pipeline &p, Accelerator &device);
 
-  bool isPossible() const override;
-  bool begin() override;
-  bool isRecording() const override { return isRecording_; }
-  const pikoir_input *join(int32_t number, bool isSource) override;
-  int64_t blocks(int32_t number, bool isSource, int64_t threads) const override;
-  pikoir_log *log(int32_t number, bool isSource) override;
-  void clear(int32_t state) override;
-  int32_t stepLoop(int32_t loop) override;
-  bool takes(int32_t) override { return true; }
-  int32_t nextTurn(int32_t cycle) override;
-  bool nextStrip(int32_t group, int64_t size) override;
-  bool submit() override;
-  bool isDone() const override;
-  Outcome await() override;
-  void end() noexcept override;
-
-  void launch(GridLaunch grid);
+  /// Whether the device can run all of it, as far as is known: the pipeline, or
+  /// this run of it, may need the host between its kernels.
+  bool isPossible() const;
+  /// Makes of a program what is to be submitted, with strips of these sizes, in
+  /// primitives, by number of their groups. Nothing runs yet. Throws, or sets
+  /// the pipeline's status.
+  void record(Steps program, std::span<const int64_t> stripSizes);
+  enum class Outcome {
+    Done,
+    Repeat, ///< Memory or a rule: the host is to take the run step by step.
+    Spoilt  ///< The same, but state that was to stay has changed.
+  };
+  /// Submits what was recorded; false, and nothing runs, if the host is to take
+  /// the run step by step. Throws.
+  bool submit();
+  /// Whether it has ended; throws.
+  bool isDone() const;
+  /// Waits for it; throws.
+  Outcome await();
 
 private:
   /// A kernel of the program: a stage's, or the AssignBin of a source.
@@ -81,15 +89,27 @@ private:
     JoinArgs *args; ///< Of its latest join, where the host has them.
     int32_t stage;  ///< -1: of a source.
   };
+  /// A loop of the program, with what stands in the table of it.
+  struct LoopSteps {
+    int32_t number = -1;
+    std::vector<const pikoir_cuda_step *> entries, exits;
+    struct Member {
+      int32_t stage;
+      Steps queues;
+    };
+    std::vector<Member> members;
+  };
   /// Strips of a source while a frame is recorded.
   struct StripRecord {
     StripState *state = nullptr; ///< Null before they begin.
     bool isDivided = false;
   };
 
-  bool comesFromOutside(const rt::Stage &stage) const;
-  /// Whether primitives come into a loop at several stages.
-  bool hasEntries(const rt::LoopShape &loop) const;
+  /// The queues of what the kernel at a place of the program emits.
+  Steps queuesBehind(size_t at) const;
+  LoopSteps loopAt(size_t at) const;
+  void recordStep(size_t at, std::span<const int64_t> stripSizes);
+  void recordKernel(const pikoir_cuda_step &step, Steps queues);
   /// Whether the producer's kernel may run several times before the consumer's.
   bool hasQueue(const rt::Edge &edge) const {
     const rt::Stage &from = p_.stages[edge.producer];
@@ -97,14 +117,13 @@ private:
            (edge.leavesStrips &&
             strips_[static_cast<size_t>(from.stripGroup)].isDivided);
   }
-  /// Edges of a kernel's stages that are not local.
-  std::vector<int32_t> edgesOf(int32_t kernel) const;
   /// Of the source that a stage takes strip by strip, or null.
   const StripState *stripOf(const rt::Stage &stage) const {
     return stage.stripGroup < 0
                ? nullptr
                : strips_[static_cast<size_t>(stage.stripGroup)].state;
   }
+  void reset();
   void takeMemory();
   /// Where the device has what the host has.
   template <class T> T *onDevice(T *data) const {
@@ -112,6 +131,12 @@ private:
   }
   /// What kernels see of the program's pointers.
   void showConstants(GridLaunch &grid) const;
+  /// Finds the input and the units of a kernel.
+  Place &join(int32_t number, bool isSource);
+  void launch(const pikoir_cuda_grid &grid, Place &place, int32_t number);
+  int64_t blocks(int32_t number, bool isSource, int64_t threads) const;
+  /// Sets an image, or a buffer that is sized by a source, to its clear value.
+  void clear(int32_t state);
   size_t placeOf(int32_t number, bool isSource) const;
   Place &find(int32_t number, bool isSource) const {
     return places_[placeOf(number, isSource)];
@@ -137,10 +162,7 @@ private:
   /// Where the device has the record that an image is cleared to.
   const uint8_t *clearRecord(const rt::State &state);
   // What kernels of a cycle emit waits in queues (FrameCycles.cpp).
-  void queue(const Place &place);
-  std::vector<int32_t> exitsOf(const rt::LoopShape &loop) const;
-  int32_t groupOf(const rt::Edge &edge) const;
-  std::vector<int32_t> collectorsOf(int32_t cycle) const;
+  void queue(const Place &place, Steps queues);
   void repeat(const int32_t &again);
   void endRepeat(const int32_t &again);
   QueueState &entriesOf(int32_t stage) const {
@@ -150,18 +172,22 @@ private:
   bool isStacked(const rt::Stage &stage) const {
     return stage.loop >= 0 && p_.loops[stage.loop].ordered;
   }
-  int32_t memberOf(const rt::Edge &edge) const;
-  std::vector<QueuePort> describePorts(int32_t kernel) const;
-  StackArgs &describeStack(int32_t loop);
-  void enter(int32_t loop);
-  void endPosition(int32_t loop);
-  void endWave(int32_t loop);
-  void endLoop(int32_t loop);
-  void endRound(int32_t cycle);
+  /// Where the loop that is being recorded is entered; null elsewhere.
+  const pikoir_cuda_step *entryOf(int32_t stage) const;
+  std::vector<QueuePort> describePorts(Steps queues) const;
+  StackArgs &describeStack();
+  void beginLoop();
+  void endLoop();
+  void enter();
+  void endPosition();
+  void endWave();
+  void leave();
+  void endRounds(int32_t cycle);
   // Strips (FrameStrips.cpp).
+  void beginStrips(int32_t group, int64_t size);
+  void endStrips(int32_t group);
   std::vector<StripQueue> describeLeaving(int32_t group) const;
   std::vector<QueueState *> describeInside(int32_t group) const;
-  void endStrip(int32_t group);
   /// The queues of edges that are wanted.
   template <class Wanted>
   std::vector<QueueState *> describeWaiting(const Wanted &wanted) const {
@@ -179,15 +205,13 @@ private:
 
   pikort_pipeline &p_;
   Accelerator &device_;
-  bool isRecording_ = false;
   bool needsHost_ = false; ///< Known from a run before.
   std::vector<Step> steps_;
-  std::vector<bool> isCleared_;     ///< States of this run.
-  const Place *joined_ = nullptr;   ///< The latest.
-  int32_t timed_ = -1;              ///< Its kernel.
-  std::vector<size_t> members_;     ///< Of each loop, those led through.
-  std::vector<size_t> turns_;       ///< Of each cycle, those taken.
-  std::vector<StackArgs *> stacks_; ///< Of each loop that has one.
+  std::vector<bool> isCleared_; ///< States of this run.
+  Steps program_;
+  int32_t timed_ = -1;         ///< The kernel that is recorded.
+  LoopSteps loop_;             ///< The loop that is.
+  StackArgs *stack_ = nullptr; ///< If that has one.
   /// Of each stage whose schedule depends on the bin.
   std::map<const rt::Stage *, const BinCut *> cuts_;
   std::vector<StripRecord> strips_; ///< Of each group.

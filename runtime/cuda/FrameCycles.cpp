@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //===- FrameCycles.cpp - What a frame repeats on the device ---------------===//
 //
-// The program is led once through each loop and each round. A loop becomes
+// A loop becomes
 //
 //   repeat { for each stage: join, kernel, piko_queue; piko_wave } piko_leave
 //
@@ -21,79 +21,47 @@
 
 #include "cuda/Frame.h"
 
+#include <algorithm>
+
 using namespace piko::cuda;
 using namespace piko::rt;
 
-bool Frame::comesFromOutside(const Stage &stage) const {
-  return !stage.sources.empty() ||
-         std::any_of(stage.inputs.begin(), stage.inputs.end(),
-                     [&](int32_t e) { return !p_.edges[e].insideLoop; });
-}
-
-bool Frame::hasEntries(const LoopShape &loop) const {
-  return std::count_if(loop.stages.begin(), loop.stages.end(), [&](int32_t s) {
-           return comesFromOutside(p_.stages[s]);
-         }) > 1;
-}
-
-/// For each stage that gets what leaves a loop, the first edge to it.
-std::vector<int32_t> Frame::exitsOf(const LoopShape &loop) const {
-  std::vector<int32_t> exits;
-  for (int32_t s : loop.stages)
-    for (int32_t e : p_.stages[s].outputs)
-      if (e >= 0 && !p_.edges[e].insideLoop &&
-          std::none_of(exits.begin(), exits.end(), [&](int32_t other) {
-            return p_.edges[other].consumer == p_.edges[e].consumer;
-          }))
-        exits.push_back(e);
-  return exits;
-}
-
-/// Among these, or -1 if the edge does not leave a loop.
-int32_t Frame::groupOf(const Edge &edge) const {
-  int32_t loop = p_.stages[edge.producer].loop;
-  if (loop < 0 || edge.insideLoop)
-    return -1;
-  int32_t group = 0;
-  for (int32_t e : exitsOf(p_.loops[loop])) {
-    if (p_.edges[e].consumer == edge.consumer)
-      break;
-    ++group;
+Frame::LoopSteps Frame::loopAt(size_t at) const {
+  LoopSteps loop;
+  for (loop.number = program_[at].number;
+       program_[at].kind != PIKOIR_STEP_END_WAVES; ++at) {
+    const pikoir_cuda_step &step = program_[at];
+    if (step.kind == PIKOIR_STEP_ENTRY)
+      loop.entries.push_back(&step);
+    else if (step.kind == PIKOIR_STEP_EXIT)
+      loop.exits.push_back(&step);
+    else if (step.kind == PIKOIR_STEP_STAGE)
+      loop.members.push_back({step.number, queuesBehind(at)});
   }
-  return group;
+  return loop;
 }
 
-std::vector<int32_t> Frame::collectorsOf(int32_t cycle) const {
-  std::vector<int32_t> collectors;
-  for (int32_t s : p_.cycles[cycle].stages)
-    if (p_.stages[s].collects())
-      collectors.push_back(s);
-  return collectors;
+const pikoir_cuda_step *Frame::entryOf(int32_t stage) const {
+  auto found = std::find_if(
+      loop_.entries.begin(), loop_.entries.end(),
+      [&](const pikoir_cuda_step *entry) { return entry->number == stage; });
+  return found == loop_.entries.end() ? nullptr : *found;
 }
 
-/// The stage of its loop that an edge leads to, or -1.
-int32_t Frame::memberOf(const Edge &edge) const {
-  if (!edge.insideLoop)
-    return -1;
-  const std::vector<int32_t> &stages =
-      p_.loops[p_.stages[edge.producer].loop].stages;
-  return static_cast<int32_t>(
-      std::find(stages.begin(), stages.end(), edge.consumer) - stages.begin());
-}
-
-std::vector<QueuePort> Frame::describePorts(int32_t kernel) const {
+std::vector<QueuePort> Frame::describePorts(Steps queues) const {
   std::vector<QueuePort> ports;
-  for (int32_t e : edgesOf(kernel)) {
-    const Edge &edge = p_.edges[e];
+  for (const pikoir_cuda_step &step : queues) {
+    const Edge &edge = p_.edges[step.number];
     if (hasQueue(edge))
-      ports.push_back({describeEdge(e), describeShape(p_.stages[edge.consumer]),
-                       onDevice(&queues_[e]), groupOf(edge), memberOf(edge)});
+      ports.push_back(
+          {describeEdge(step.number), describeShape(p_.stages[edge.consumer]),
+           onDevice(&queues_[step.number]), step.exit, step.member});
   }
   return ports;
 }
 
-void Frame::queue(const Place &place) {
-  std::vector<QueuePort> ports = describePorts(place.stage);
+void Frame::queue(const Place &place, Steps queues) {
+  std::vector<QueuePort> ports = describePorts(queues);
   if (ports.empty())
     return;
   auto &args = exchange_.takeWith<QueueArgs>(ports);
@@ -115,26 +83,20 @@ void Frame::endRepeat(const int32_t &again) {
   steps_.push_back({Step::Kind::End, {}, onDevice(&again)});
 }
 
-int32_t Frame::stepLoop(int32_t loop) {
-  const std::vector<int32_t> &stages = p_.loops[loop].stages;
-  size_t &member = members_[static_cast<size_t>(loop)];
-  const int32_t &again = loops_[loop].again;
-  bool hasStack = p_.loops[loop].ordered;
-  if (member == 0) {
-    if (hasStack || hasEntries(p_.loops[loop]))
-      enter(loop);
-    repeat(again);
-  }
-  if (member < stages.size())
-    return stages[member++];
-  if (hasStack)
-    endPosition(loop);
+void Frame::beginLoop() {
+  if (!loop_.entries.empty())
+    enter();
+  repeat(loops_[loop_.number].again);
+}
+
+void Frame::endLoop() {
+  if (stack_)
+    endPosition();
   else
-    endWave(loop);
-  endRepeat(again);
-  endLoop(loop);
-  member = 0;
-  return -1;
+    endWave();
+  endRepeat(loops_[loop_.number].again);
+  leave();
+  stack_ = nullptr;
 }
 
 StepArgs &Frame::takeStep(const std::vector<QueueState *> &waiting) {
@@ -151,7 +113,7 @@ std::vector<JoinInput> Frame::describeWave(int32_t number) const {
   const Stage &stage = p_.stages[number];
   std::vector<JoinInput> inputs = describeInputs(stage);
   std::erase_if(inputs, [](const JoinInput &input) { return !input.isInLoop; });
-  if (comesFromOutside(stage)) {
+  if (entryOf(number)) {
     JoinInput &entries = inputs.emplace_back();
     entries.queue = onDevice(&entriesOf(number));
     entries.isInLoop = true;
@@ -159,112 +121,94 @@ std::vector<JoinInput> Frame::describeWave(int32_t number) const {
   return inputs;
 }
 
-void Frame::enter(int32_t loop) {
+void Frame::enter() {
   std::vector<LoopEntry> entries;
   std::vector<JoinInput> inputs;
-  const std::vector<int32_t> &stages = p_.loops[loop].stages;
-  for (size_t m = 0; m < stages.size(); ++m) {
-    int32_t s = stages[m];
+  for (const pikoir_cuda_step *entry : loop_.entries) {
+    int32_t s = entry->number;
     const Stage &stage = p_.stages[s];
-    if (!comesFromOutside(stage))
-      continue;
     std::vector<JoinInput> ofStage = describeInputs(stage);
     entries.push_back({onDevice(&find(s, false).state), onDevice(&entriesOf(s)),
                        describeShape(stage), onDevice(stripOf(stage)),
                        static_cast<int32_t>(inputs.size()),
-                       static_cast<int32_t>(ofStage.size()),
-                       static_cast<int32_t>(m)});
+                       static_cast<int32_t>(ofStage.size()), entry->member});
     inputs.insert(inputs.end(), ofStage.begin(), ofStage.end());
   }
   auto &args = exchange_.takeWith<EnterArgs>(entries, inputs);
   args.frame = onDevice(frame_);
-  args.loop = onDevice(&loops_[loop]);
+  args.loop = onDevice(&loops_[loop_.number]);
   args.number = nextNumber();
-  args.keyWidth = p_.loops[loop].keyWidth;
+  args.keyWidth = p_.loops[loop_.number].keyWidth;
   args.entryCount = static_cast<int32_t>(entries.size());
   args.inputCount = static_cast<int32_t>(inputs.size());
-  if (p_.loops[loop].ordered) {
-    StackArgs *&stack = stacks_[static_cast<size_t>(loop)];
-    stack = &describeStack(loop);
-    args.stack = onDevice(stack);
+  if (p_.loops[loop_.number].ordered) {
+    stack_ = &describeStack();
+    args.stack = onDevice(stack_);
   }
   launchOwn("piko_enter", &args);
 }
 
-StackArgs &Frame::describeStack(int32_t loop) {
+StackArgs &Frame::describeStack() {
   std::vector<StackMember> members;
   std::vector<QueuePort> ports;
-  for (int32_t s : p_.loops[loop].stages) {
-    std::vector<QueuePort> ofStage = describePorts(s);
-    members.push_back({onDevice(&find(s, false).state),
-                       describeShape(p_.stages[s]), p_.stages[s].tiles,
+  for (const LoopSteps::Member &member : loop_.members) {
+    std::vector<QueuePort> ofStage = describePorts(member.queues);
+    const Stage &stage = p_.stages[member.stage];
+    members.push_back({onDevice(&find(member.stage, false).state),
+                       describeShape(stage), stage.tiles,
                        static_cast<int32_t>(ports.size()),
                        static_cast<int32_t>(ofStage.size())});
     ports.insert(ports.end(), ofStage.begin(), ofStage.end());
   }
   auto &args = exchange_.takeWith<StackArgs>(members, ports);
   args.frame = onDevice(frame_);
-  args.loop = onDevice(&loops_[loop]);
-  args.stack = onDevice(&stackStates_[loop]);
+  args.loop = onDevice(&loops_[loop_.number]);
+  args.stack = onDevice(&stackStates_[loop_.number]);
   args.limit = p_.loopLimit;
   args.memberCount = static_cast<int32_t>(members.size());
   args.portCount = static_cast<int32_t>(ports.size());
   return args;
 }
 
-void Frame::endPosition(int32_t loop) {
-  StackArgs &args = *stacks_[static_cast<size_t>(loop)];
-  args.number = nextNumber();
-  launchWarp(stepKernel, &args);
+void Frame::endPosition() {
+  stack_->number = nextNumber();
+  launchWarp(stepKernel, stack_);
 }
 
-void Frame::endWave(int32_t loop) {
+void Frame::endWave() {
   StepArgs &args = takeStep(describeWaiting([&](const Edge &edge) {
-    return edge.insideLoop && p_.stages[edge.producer].loop == loop;
+    return edge.insideLoop && p_.stages[edge.producer].loop == loop_.number;
   }));
-  args.loop = onDevice(&loops_[loop]);
-  if (hasEntries(p_.loops[loop]) && args.limit < INT64_MAX)
+  args.loop = onDevice(&loops_[loop_.number]);
+  if (!loop_.entries.empty() && args.limit < INT64_MAX)
     ++args.limit;
   launchOwn("piko_wave", &args);
 }
 
-void Frame::endLoop(int32_t loop) {
+void Frame::leave() {
   std::vector<ExitGroup> groups;
-  for (int32_t e : exitsOf(p_.loops[loop]))
-    groups.push_back({onDevice(&queues_[e]),
-                      describeShape(p_.stages[p_.edges[e].consumer]),
-                      p_.edges[e].keyWidth});
+  for (const pikoir_cuda_step *exit : loop_.exits) {
+    const Edge &edge = p_.edges[exit->number];
+    groups.push_back({onDevice(&queues_[exit->number]),
+                      describeShape(p_.stages[edge.consumer]), edge.keyWidth});
+  }
   auto &args = exchange_.takeWith<LeaveArgs>(groups);
   args.groupCount = static_cast<int32_t>(groups.size());
   args.frame = onDevice(frame_);
-  args.loop = onDevice(&loops_[loop]);
+  args.loop = onDevice(&loops_[loop_.number]);
   args.number = nextNumber();
-  args.keyWidth = p_.loops[loop].keyWidth;
+  args.keyWidth = p_.loops[loop_.number].keyWidth;
   launchOwn("piko_leave", &args);
 }
 
 // --- Rounds -----------------------------------------------------------------
 
-int32_t Frame::nextTurn(int32_t cycle) {
-  std::vector<int32_t> collectors = collectorsOf(cycle);
-  size_t &turn = turns_[static_cast<size_t>(cycle)];
-  if (collectors.empty())
-    return -1;
-  const int32_t &again = cycles_[cycle].again;
-  if (turn == 0)
-    repeat(again);
-  if (turn < collectors.size())
-    return collectors[turn++];
-  endRound(cycle);
-  endRepeat(again);
-  return -1;
-}
-
-void Frame::endRound(int32_t cycle) {
+void Frame::endRounds(int32_t cycle) {
   StepArgs &args = takeStep(describeWaiting([&](const Edge &edge) {
     const Stage &to = p_.stages[edge.consumer];
     return hasQueue(edge) && to.cycle == cycle && to.collects();
   }));
   args.cycle = onDevice(&cycles_[cycle]);
   launchOwn("piko_round", &args);
+  endRepeat(cycles_[cycle].again);
 }

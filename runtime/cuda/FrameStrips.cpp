@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //===- FrameStrips.cpp - Strips that a frame repeats on the device --------===//
 //
-// The program is led once through a strip:
-//
 //   repeat { all that the strip holds, with loops and rounds; piko_strip }
 //
 // What leaves the strips waits in queues. A source that is one strip is taken
@@ -15,28 +13,20 @@
 using namespace piko::cuda;
 using namespace piko::rt;
 
-bool Frame::nextStrip(int32_t number, int64_t size) {
-  StripRecord &strips = strips_[static_cast<size_t>(number)];
-  bool isFirst = !strips.state;
-  if (isFirst) {
-    int64_t all = p_.sources[p_.stripGroups[number].source].count;
-    strips.state = exchange_.take<StripState>();
-    *strips.state = {.again = 1,
-                     .number = 0,
-                     .begin = 0,
-                     .count = std::min(size, all),
-                     .size = std::min(size, all),
-                     .all = all,
-                     .memory = 0};
-    strips.isDivided = size < all;
-  }
-  if (!strips.isDivided)
-    return isFirst;
-  if (isFirst)
+void Frame::beginStrips(int32_t group, int64_t size) {
+  StripRecord &strips = strips_[static_cast<size_t>(group)];
+  int64_t all = p_.sources[p_.stripGroups[group].source].count;
+  strips.state = exchange_.take<StripState>();
+  *strips.state = {.again = 1,
+                   .number = 0,
+                   .begin = 0,
+                   .count = std::min(size, all),
+                   .size = std::min(size, all),
+                   .all = all,
+                   .memory = 0};
+  strips.isDivided = size < all;
+  if (strips.isDivided)
     repeat(strips.state->again);
-  else
-    endStrip(number);
-  return isFirst;
 }
 
 std::vector<StripQueue> Frame::describeLeaving(int32_t group) const {
@@ -62,7 +52,9 @@ std::vector<QueueState *> Frame::describeInside(int32_t group) const {
   return queues;
 }
 
-void Frame::endStrip(int32_t group) {
+void Frame::endStrips(int32_t group) {
+  if (!strips_[static_cast<size_t>(group)].isDivided)
+    return;
   std::vector<StripQueue> leaving = describeLeaving(group);
   std::vector<QueueState *> inside = describeInside(group);
   std::vector<CycleState *> cycles;

@@ -272,14 +272,10 @@ int64_t pikoir_blocks(pikort_pipeline *p, int32_t number, int32_t flags,
                       int64_t threads) {
   if (p->status != PIKORT_OK)
     return 0;
-  if (DeviceFrame *frame = recordingOf(*p))
-    return frame->blocks(number, flags & PIKOIR_LOG_SOURCE, threads);
   return findKernel(*p, number, flags).input.unit_count;
 }
 
 pikoir_log *pikoir_log_open(pikort_pipeline *p, int32_t number, int32_t flags) {
-  if (DeviceFrame *frame = recordingOf(*p))
-    return frame->log(number, flags & PIKOIR_LOG_SOURCE);
   pikoir_log *opened = nullptr;
   guarded(p, "run", [&] {
     auto log =
@@ -294,7 +290,7 @@ pikoir_log *pikoir_log_open(pikort_pipeline *p, int32_t number, int32_t flags) {
 void pikoir_log_place(pikort_pipeline *p, pikoir_log *log, int32_t place,
                       int32_t function, int32_t stage, const char *name,
                       int32_t code) {
-  if (!log || recordingOf(*p))
+  if (!log)
     return;
   auto &places = cpuOf(*p).logs.at(log)->places;
   if (places.size() <= static_cast<size_t>(place))
@@ -303,7 +299,7 @@ void pikoir_log_place(pikort_pipeline *p, pikoir_log *log, int32_t place,
 }
 
 void pikoir_log_close(pikort_pipeline *p, pikoir_log *log) {
-  if (!log || recordingOf(*p))
+  if (!log)
     return;
   auto found = cpuOf(*p).logs.find(log);
   guarded(p, "run", [&] { found->second->close(); });

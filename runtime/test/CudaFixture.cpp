@@ -99,8 +99,27 @@ void ScaleProgram::bring(const char *ptx,
   images.push_back({0, 0, nullptr});
 }
 
+void ScaleProgram::writeArguments(pikort_pipeline *p, const pikoir_input *input,
+                                  pikoir_log *log, int64_t *words) {
+  static int32_t local[64];
+  const void *arguments[] = {input,
+                             strayPointer ? reinterpret_cast<uint8_t *>(local)
+                                          : pikoir_get_state(p, 1)->data,
+                             pikoir_get_state(p, 0)->data, log};
+  std::memcpy(words, arguments, sizeof(arguments));
+}
+
+void ScaleProgram::declareSteps(pikort_pipeline *p) {
+  static pikoir_cuda_grid grids[2];
+  grids[0] = {kernel, 32, 4, writeArguments};
+  static const pikoir_cuda_step steps[] = {
+      {PIKOIR_STEP_STAGE, 0, -1, -1, grids, nullptr}};
+  pikoir_cuda_program(p, steps, 1);
+}
+
 static void setup(pikort_pipeline *p) {
   pikoir_cuda_module(p, ScaleProgram::images.data());
+  ScaleProgram::declareSteps(p);
   pikoir_cuda_kernel(p, "scale", "scaler", "scale.cpp:7");
   pikoir_declare_pipeline(p, "Scale", 1);
   pikoir_declare_record(p, 0, "int", 4, 4);
@@ -120,12 +139,8 @@ static int32_t run(pikort_pipeline *p) {
     return pikoir_status(p);
   int64_t blocks = pikoir_blocks(p, 0, 0, 32);
   pikoir_log *log = pikoir_log_open(p, 0, 0);
-  int32_t local[64] = {};
-  const void *arguments[] = {in,
-                             ScaleProgram::strayPointer
-                                 ? reinterpret_cast<uint8_t *>(local)
-                                 : pikoir_get_state(p, 1)->data,
-                             pikoir_get_state(p, 0)->data, log};
+  int64_t arguments[4];
+  ScaleProgram::writeArguments(p, in, log, arguments);
   pikoir_cuda_launch(p, ScaleProgram::kernel, blocks, 32, arguments, 4);
   pikoir_log_close(p, log);
   return pikoir_end(p, 0);

@@ -30,6 +30,10 @@ struct ScaleProgram {
   /// PTX.
   static void bring(const char *ptx,
                     std::vector<pikoir_cuda_image> cubins = {});
+  static void writeArguments(pikort_pipeline *p, const pikoir_input *input,
+                             pikoir_log *log, int64_t *words);
+  /// What a device does by itself.
+  static void declareSteps(pikort_pipeline *p);
   static const pikort_program program;
 };
 

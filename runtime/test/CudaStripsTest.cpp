@@ -4,6 +4,7 @@
 #include "CudaFixture.h"
 
 #include <algorithm>
+#include <cstring>
 
 using namespace piko::cuda;
 using piko::rt::Pipeline;
@@ -64,23 +65,36 @@ private:
     ScaleProgram::program.setup(p);
     int32_t stages[] = {0};
     pikoir_declare_strips(p, 0, 0, 0, stages, 1);
+    static pikoir_cuda_grid grids[2];
+    grids[0] = {kernel, 32, 4, writeArguments};
+    static const pikoir_cuda_step steps[] = {
+        {PIKOIR_STEP_STRIPS, 0, -1, -1, nullptr, nullptr},
+        {PIKOIR_STEP_STAGE, 0, -1, -1, grids, nullptr},
+        {PIKOIR_STEP_END_STRIPS, 0, -1, -1, nullptr, nullptr}};
+    pikoir_cuda_program(p, steps, 3);
+  }
+  static void writeArguments(pikort_pipeline *p, const pikoir_input *input,
+                             pikoir_log *log, int64_t *words) {
+    static int32_t local[64];
+    int64_t count = 0;
+    auto *source =
+        static_cast<const uint8_t *>(pikoir_get_source(p, 0, &count));
+    auto *to = strayPointer ? reinterpret_cast<uint8_t *>(local)
+                            : pikoir_get_state(p, 1)->data;
+    const void *arguments[] = {input,
+                               reinterpret_cast<const void *>(to - source),
+                               pikoir_get_state(p, 0)->data, log};
+    std::memcpy(words, arguments, sizeof(arguments));
   }
   static int32_t run(pikort_pipeline *p) {
-    int64_t count = 0;
     while (pikoir_strips_next(p, 0)) {
       const pikoir_input *in = pikoir_begin(p, 0);
       if (!in)
         continue;
-      auto *source =
-          static_cast<const uint8_t *>(pikoir_get_source(p, 0, &count));
       int64_t blocks = pikoir_blocks(p, 0, 0, 32);
       pikoir_log *log = pikoir_log_open(p, 0, 0);
-      int32_t local[64] = {};
-      auto *to = strayPointer ? reinterpret_cast<uint8_t *>(local)
-                              : pikoir_get_state(p, 1)->data;
-      const void *arguments[] = {in,
-                                 reinterpret_cast<const void *>(to - source),
-                                 pikoir_get_state(p, 0)->data, log};
+      int64_t arguments[4];
+      writeArguments(p, in, log, arguments);
       pikoir_cuda_launch(p, kernel, blocks, 32, arguments, 4);
       pikoir_log_close(p, log);
       pikoir_end(p, 0);

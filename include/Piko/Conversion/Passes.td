@@ -299,7 +299,10 @@ def ConvertGPUToCUDA : Pass<"convert-gpu-to-cuda", "::mlir::ModuleOp"> {
     the list of images, which are made of the kernels' LLVM IR, as PTX and
     cubins, when the module is translated. It tells the runtime the stage and
     the line of each kernel, where its location has them: `loc("stage"("file"
-    :line:column))`.
+    :line:column))`. Of `piko.steps` it makes a constant table, `P.steps`, which the
+    setup gives to the runtime: it names for each kernel its grids, each with a
+    function that computes its arguments from the pipeline's state, an input and a
+    log.
 
     **Guarantees** that the host's code is for a CPU alone.
 
@@ -315,7 +318,8 @@ def ConvertGPUToCUDA : Pass<"convert-gpu-to-cuda", "::mlir::ModuleOp"> {
     llvm.call @pikoir_cuda_launch(%frame, %k, %n, %t, %arguments, %count)
     ```
 
-    **Limits**: grids and blocks have one dimension.
+    **Limits**: grids and blocks have one dimension; with `piko.steps`, blocks a
+    constant size, and arguments no branches.
   }];
   let dependentDialects = ["::mlir::arith::ArithDialect",
                            "::mlir::LLVM::LLVMDialect"];
@@ -503,7 +507,9 @@ def ConvertPikoToLLVM : Pass<"convert-piko-to-llvm", "::mlir::ModuleOp"> {
     **Does**: makes of each kernel a function that takes the runtime's pipeline
     and gives back a status, of each program two more, `NAME.setup` that declares
     the pipeline and its joins to the runtime and `NAME.run` that clears state and
-    calls the kernels in order, with a loop of branches for each region; turns primitives, bins and writers into pointers, and operations on
+    calls the kernels in order, with a loop of branches for each region. Where kernels
+    launch grids, the setup has `piko.steps`, by which a device can run the program
+    by itself. It turns primitives, bins and writers into pointers, and operations on
     them into loads, stores and calls of the runtime's `pikoir_*` functions. Each
     load, store and call says in TBAA what it touches, of state and of
     primitives each field by itself, so that LLVM keeps in registers what it
@@ -514,7 +520,7 @@ def ConvertPikoToLLVM : Pass<"convert-piko-to-llvm", "::mlir::ModuleOp"> {
     the scalar one is one of two itself (`piko-unswitch-versions`): none spills
     registers for another.
 
-    **Guarantees** that nothing of the `piko` dialect is left.
+    **Guarantees** that nothing of the `piko` dialect is left but `piko.steps`.
 
     Before:
     ```

@@ -2,7 +2,7 @@
 //
 // convert-gpu-to-cuda: launches as calls of the runtime's part for CUDA.
 
-#include "LaunchCall.h"
+#include "StepTable.h"
 
 #include "Piko/Conversion/KernelImage.h"
 #include "Piko/Conversion/Passes.h"
@@ -26,6 +26,7 @@ private:
   LogicalResult declareImages(gpu::GPUModuleOp kernels);
   void nameKernels(OpBuilder &setup, Value pipeline, gpu::GPUModuleOp kernels);
   LogicalResult convert(gpu::LaunchFuncOp launch);
+  Value createName(OpBuilder &builder, gpu::LaunchFuncOp launch);
   /// The address of a constant, which ends with a zero byte.
   Value createText(OpBuilder &builder, Location loc, std::string symbol,
                    StringRef text);
@@ -58,7 +59,10 @@ LogicalResult ConvertGPUToCUDAPass::declareImages(gpu::GPUModuleOp kernels) {
       ValueRange{setup.getArgument(0),
                  LLVM::AddressOfOp::create(builder, loc, pointer, images)});
   nameKernels(builder, setup.getArgument(0), kernels);
-  return success();
+  return createStepTable(setup, builder,
+                         [&](OpBuilder &at, gpu::LaunchFuncOp launch) {
+                           return createName(at, launch);
+                         });
 }
 
 /// The stage of a kernel, as convert-piko-to-gpu has left it; null if nothing
@@ -121,6 +125,12 @@ Value ConvertGPUToCUDAPass::createText(OpBuilder &builder, Location loc,
   return LLVM::AddressOfOp::create(builder, loc, pointer, name);
 }
 
+Value ConvertGPUToCUDAPass::createName(OpBuilder &builder,
+                                       gpu::LaunchFuncOp launch) {
+  StringRef name = launch.getKernelName().getValue();
+  return createText(builder, launch.getLoc(), (name + ".name").str(), name);
+}
+
 LogicalResult ConvertGPUToCUDAPass::convert(gpu::LaunchFuncOp launch) {
   FailureOr<LaunchCall> call = createLaunchCall(launch);
   if (failed(call))
@@ -131,8 +141,7 @@ LogicalResult ConvertGPUToCUDAPass::convert(gpu::LaunchFuncOp launch) {
   Type i64 = builder.getI64Type();
   auto callee = declareFunction(getOperation(), "pikoir_cuda_launch",
                                 {pointer, pointer, i64, i64, pointer, i64});
-  StringRef name = launch.getKernelName().getValue();
-  Value kernel = createText(builder, loc, (name + ".name").str(), name);
+  Value kernel = createName(builder, launch);
   LLVM::CallOp::create(
       builder, loc, callee,
       ValueRange{call->pipeline, kernel, call->blocks, call->threads,

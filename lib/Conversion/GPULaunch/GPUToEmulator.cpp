@@ -6,6 +6,7 @@
 
 #include "Piko/Conversion/Emulation.h"
 #include "Piko/Conversion/Passes.h"
+#include "Piko/Dialect/Piko/IR/Marks.h"
 
 namespace piko {
 #define GEN_PASS_DEF_CONVERTGPUTOEMULATOR
@@ -53,6 +54,9 @@ LogicalResult ConvertGPUToEmulatorPass::convert(gpu::LaunchFuncOp launch) {
 }
 
 void ConvertGPUToEmulatorPass::runOnOperation() {
+  // It runs a grid when the host launches it.
+  for (Operation &op : *getOperation().getBody())
+    op.removeAttr(marks::steps);
   if (failed(convertLaunches(getOperation(), [&](gpu::LaunchFuncOp launch) {
         return convert(launch);
       })))

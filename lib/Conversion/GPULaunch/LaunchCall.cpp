@@ -18,6 +18,27 @@ LLVM::LLVMFuncOp piko::declareFunction(ModuleOp module, StringRef name,
                                   arguments));
 }
 
+LogicalResult piko::storeArguments(OpBuilder &builder, gpu::LaunchFuncOp launch,
+                                   ValueRange arguments, Value words) {
+  Location loc = launch.getLoc();
+  Type pointer = LLVM::LLVMPointerType::get(launch.getContext());
+  Type i64 = builder.getI64Type();
+  for (auto [i, argument] : llvm::enumerate(arguments)) {
+    Value stored = argument;
+    if (stored.getType().isIndex())
+      stored = arith::IndexCastOp::create(builder, loc, i64, stored);
+    if (!isa<LLVM::LLVMPointerType>(stored.getType()) &&
+        !stored.getType().isIntOrFloat())
+      return launch.emitError("expected arguments that are numbers or "
+                              "pointers, but got type ")
+             << stored.getType();
+    Value place = LLVM::GEPOp::create(builder, loc, pointer, i64, words,
+                                      ArrayRef<LLVM::GEPArg>{int32_t(i)});
+    LLVM::StoreOp::create(builder, loc, stored, place);
+  }
+  return success();
+}
+
 FailureOr<LaunchCall> piko::createLaunchCall(gpu::LaunchFuncOp launch) {
   for (Value extent : {launch.getGridSizeY(), launch.getGridSizeZ(),
                        launch.getBlockSizeY(), launch.getBlockSizeZ()})
@@ -35,19 +56,9 @@ FailureOr<LaunchCall> piko::createLaunchCall(gpu::LaunchFuncOp launch) {
   call.pipeline = function.getArgument(0);
   call.count = launch.getNumKernelOperands();
   call.arguments = LLVM::AllocaOp::create(entry, loc, pointer, i64, room);
-  for (auto [i, argument] : llvm::enumerate(launch.getKernelOperands())) {
-    if (argument.getType().isIndex())
-      argument = arith::IndexCastOp::create(builder, loc, i64, argument);
-    if (!isa<LLVM::LLVMPointerType>(argument.getType()) &&
-        !argument.getType().isIntOrFloat())
-      return launch.emitError("expected arguments that are numbers or "
-                              "pointers, but got type ")
-             << argument.getType();
-    Value place =
-        LLVM::GEPOp::create(builder, loc, pointer, i64, call.arguments,
-                            ArrayRef<LLVM::GEPArg>{int32_t(i)});
-    LLVM::StoreOp::create(builder, loc, argument, place);
-  }
+  if (failed(storeArguments(builder, launch, launch.getKernelOperands(),
+                            call.arguments)))
+    return failure();
   auto toI64 = [&](Value index) {
     return arith::IndexCastOp::create(builder, loc, i64, index).getResult();
   };

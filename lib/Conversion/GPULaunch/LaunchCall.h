@@ -20,6 +20,13 @@ struct LaunchCall {
   int64_t count;               ///< Of arguments.
 };
 
+/// Stores arguments of a launch where `builder` is, as words of eight bytes;
+/// fails with an error for one that is not a number.
+llvm::LogicalResult storeArguments(mlir::OpBuilder &builder,
+                                   mlir::gpu::LaunchFuncOp launch,
+                                   mlir::ValueRange arguments,
+                                   mlir::Value words);
+
 /// Writes the arguments to memory in front of the launch; fails with an error
 /// for a grid of several dimensions or an argument that is not a number.
 llvm::FailureOr<LaunchCall> createLaunchCall(mlir::gpu::LaunchFuncOp launch);

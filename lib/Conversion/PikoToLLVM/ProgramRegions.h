@@ -28,6 +28,10 @@ mlir::func::FuncOp createSetup(ProgramOp program,
                                LoweringContext &context,
                                mlir::OpBuilder &builder);
 
+/// The steps of a program, StepAttrs, for a device that runs it by itself.
+mlir::ArrayAttr describeSteps(ProgramOp program,
+                              const PipelineNumbers &numbers);
+
 } // namespace piko
 
 #endif // PIKO_LIB_CONVERSION_PIKOTOLLVM_PROGRAMREGIONS_H

@@ -4,6 +4,9 @@
 
 #include "ProgramRegions.h"
 
+#include "Piko/Dialect/Piko/IR/Marks.h"
+#include "Piko/Dialect/Piko/IR/PikoGPU.h"
+
 #include "mlir/Dialect/ControlFlow/IR/ControlFlowOps.h"
 
 using namespace mlir;
@@ -216,5 +219,9 @@ func::FuncOp piko::createProgram(const PipelineNumbers &numbers,
   OpBuilder builder = OpBuilder::atBlockEnd(module.getBody());
   func::FuncOp setup = createSetup(program, numbers, context, builder);
   RunWriter(numbers, context, builder).run(program);
+  WalkResult grids =
+      pipeline.walk([](BlockCountOp) { return WalkResult::interrupt(); });
+  if (grids.wasInterrupted())
+    setup->setAttr(marks::steps, describeSteps(program, numbers));
   return setup;
 }

@@ -148,6 +148,55 @@ PIKORT_API void pikoir_cuda_module(pikort_pipeline *p,
 /// "file:line" or "".
 PIKORT_API void pikoir_cuda_kernel(pikort_pipeline *p, const char *kernel,
                                    const char *stage, const char *place);
+/// A grid of a kernel, for a device that runs the program by itself.
+typedef struct pikoir_cuda_grid {
+  const char *kernel; ///< Null behind the last one of a kernel of the pipeline.
+  int64_t threads;    ///< Of a block.
+  int64_t count;      ///< Of arguments, words of eight bytes.
+  /// Writes them, for an input and a log that only the device reads.
+  void (*arguments)(pikort_pipeline *p, const pikoir_input *input,
+                    pikoir_log *log, int64_t *words);
+} pikoir_cuda_grid;
+
+/// The steps of a program: what NAME.run does, led once through all that it
+/// repeats.
+enum {
+  PIKOIR_STEP_CLEAR = 0,  ///< State `number` is set to its clear value.
+  PIKOIR_STEP_SOURCE = 1, ///< The AssignBin of source `number` runs,
+  PIKOIR_STEP_STAGE = 2,  ///< or the kernel of stage `number`, by `grids`.
+  /// Then what it has emitted on edge `number` waits in a queue. It leads to
+  /// stage number `member` of its loop, or leaves it by exit `exit`; or -1.
+  PIKOIR_STEP_QUEUE = 3,
+  PIKOIR_STEP_STRIPS = 4, ///< What group `number` of strips repeats.
+  PIKOIR_STEP_END_STRIPS = 5,
+  /// What loop `number` repeats while primitives are on their way: the kernels
+  /// of its stages. Behind it, before them: where primitives come in, if that
+  /// is at several stages or one at a time, and where they leave.
+  PIKOIR_STEP_WAVES = 6,
+  PIKOIR_STEP_ENTRY = 7, ///< At stage `number`, which is number `member`.
+  PIKOIR_STEP_EXIT = 8,  ///< By exit `exit`, which edge `number` describes.
+  PIKOIR_STEP_END_WAVES = 9,
+  /// What cycle `number` repeats while its collecting stages have primitives.
+  PIKOIR_STEP_ROUNDS = 10,
+  PIKOIR_STEP_END_ROUNDS = 11,
+  /// Before the device begins, the host calls `host`, which decides how the
+  /// bins of a stage run; not 0: the run fails. `number` is 0.
+  PIKOIR_STEP_HOST = 12
+};
+typedef struct pikoir_cuda_step {
+  int32_t kind;
+  int32_t number;
+  int32_t member, exit;
+  const pikoir_cuda_grid *grids;
+  int32_t (*host)(pikort_pipeline *p);
+} pikoir_cuda_step;
+
+/// In a program's setup: what a device can run of it at once. Without, the host
+/// waits for each grid. Lives as long as the program.
+PIKORT_API void pikoir_cuda_program(pikort_pipeline *p,
+                                    const pikoir_cuda_step *steps,
+                                    int64_t count);
+
 /// Runs a grid there and waits for it; `arguments` are `count` words of eight
 /// bytes.
 PIKORT_API void pikoir_cuda_launch(pikort_pipeline *p, const char *kernel,

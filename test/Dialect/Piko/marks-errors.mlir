@@ -79,3 +79,10 @@ func.func @probabilities(%at: index) {
   }
   return
 }
+
+// -----
+
+// expected-error@+1 {{expected 'piko.steps' to be an array of steps, such as #piko.step<clear 0>, but got [0]}}
+func.func @steps() attributes {piko.steps = [0]} {
+  return
+}

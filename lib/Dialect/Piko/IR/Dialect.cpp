@@ -88,6 +88,7 @@ static StringRef getExpectedKind(StringRef name) {
       .Case(marks::mapping, "what lanes are given, as #piko<lanes items>")
       .Case(marks::units, "how threads share units, as #piko<units shared>")
       .Case(marks::threads, "how threads share work, as #piko<threads shared>")
+      .Case(marks::steps, "an array of steps, such as #piko.step<clear 0>")
       .Cases({marks::number, marks::blockSize}, "a 64-bit integer")
       .Cases({marks::turns, marks::advances, marks::probability},
              "a 64-bit float")
@@ -106,6 +107,8 @@ static bool hasExpectedKind(NamedAttribute attribute) {
     return isa<UnitLoopAttr>(value);
   if (name == marks::threads)
     return isa<ThreadMappingAttr>(value);
+  if (auto steps = dyn_cast<ArrayAttr>(value); name == marks::steps)
+    return steps && llvm::all_of(steps, llvm::IsaPred<StepAttr>);
   if (name == marks::probabilities)
     return isa<DenseF64ArrayAttr>(value);
   if (name == cppNameAttr || name == marks::pixels)

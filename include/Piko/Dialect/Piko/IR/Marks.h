@@ -68,6 +68,9 @@ constexpr llvm::StringLiteral pixels = "piko.pixels";
 constexpr llvm::StringLiteral number = "piko.number";
 /// A kernel's function whose number is that of a source.
 constexpr llvm::StringLiteral source = "piko.source";
+/// Of the setup of a pipeline whose kernels launch grids: what its program
+/// does, an array of `StepAttr`.
+constexpr llvm::StringLiteral steps = "piko.steps";
 
 } // namespace piko::marks
 

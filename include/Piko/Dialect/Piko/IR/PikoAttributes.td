@@ -85,6 +85,45 @@ def Piko_Precision : I32EnumAttr<"Precision", "how exactly numbers are computed"
 }
 def Piko_PrecisionAttr : EnumAttr<Piko_Dialect, Piko_Precision, "precision">;
 
+def Piko_StepKind : I32EnumAttr<"StepKind", "what a program does next", [
+  I32EnumAttrCase<"Clear", 0, "clear">,
+  I32EnumAttrCase<"Source", 1, "source">,
+  I32EnumAttrCase<"Stage", 2, "stage">,
+  I32EnumAttrCase<"Queue", 3, "queue">,
+  I32EnumAttrCase<"Strips", 4, "strips">,
+  I32EnumAttrCase<"EndStrips", 5, "end_strips">,
+  I32EnumAttrCase<"Waves", 6, "waves">,
+  I32EnumAttrCase<"Entry", 7, "entry">,
+  I32EnumAttrCase<"Exit", 8, "exit">,
+  I32EnumAttrCase<"EndWaves", 9, "end_waves">,
+  I32EnumAttrCase<"Rounds", 10, "rounds">,
+  I32EnumAttrCase<"EndRounds", 11, "end_rounds">,
+  I32EnumAttrCase<"Host", 12, "host">]> {
+  let cppNamespace = "::piko";
+  let genSpecializedAttr = 0;
+}
+
+def Piko_StepAttr : AttrDef<Piko_Dialect, "Step"> {
+  let mnemonic = "step";
+  let summary = "a step of a program that a device runs by itself";
+  let description = [{
+    Of a `piko.steps`. The number is that of the state, source, stage, edge, group
+    of strips, loop or cycle, as the setup declares them; `kernel` the function that
+    launches the grids of a source or stage, or, of `host`, that the host calls. `#piko.step<stage 3 by @"P.kernel_s">`
+    runs the kernel of stage 3, `#piko.step<queue 2 member 1>` puts what it has
+    emitted on edge 2 in a queue of the second stage of its loop. `pikort/grid.h` has
+    the kinds.
+  }];
+  let parameters = (ins
+    EnumParameter<Piko_StepKind>:$kind, "int32_t":$number,
+    DefaultValuedParameter<"int32_t", "-1">:$member,
+    DefaultValuedParameter<"int32_t", "-1">:$exit,
+    OptionalParameter<"::mlir::FlatSymbolRefAttr">:$kernel);
+  let assemblyFormat = [{
+    `<` $kind $number (`member` $member^)? (`exit` $exit^)? (`by` $kernel^)? `>`
+  }];
+}
+
 def Piko_DivisionKind : I32EnumAttr<"DivisionKind", "integer division", [
   I32EnumAttrCase<"QuotientS", 0, "quotient_signed">,
   I32EnumAttrCase<"QuotientU", 1, "quotient_unsigned">,
