@@ -37,18 +37,11 @@ static size_t countOf(const pikort_pipeline &p, int32_t kind) {
   }
 }
 
-/// The step that ends what a step begins; -1 for others.
-static int32_t endOf(int32_t kind) {
-  bool begins = kind == PIKOIR_STEP_STRIPS || kind == PIKOIR_STEP_ROUNDS;
-  return begins                      ? kind + 1
-         : kind == PIKOIR_STEP_WAVES ? PIKOIR_STEP_END_WAVES
-                                     : -1;
-}
-
-static bool isEnd(int32_t kind) {
-  return kind == PIKOIR_STEP_END_STRIPS || kind == PIKOIR_STEP_END_WAVES ||
-         kind == PIKOIR_STEP_END_ROUNDS;
-}
+/// The steps that begin and end what is repeated.
+static constexpr int32_t repeated[][2] = {
+    {PIKOIR_STEP_STRIPS, PIKOIR_STEP_END_STRIPS},
+    {PIKOIR_STEP_WAVES, PIKOIR_STEP_END_WAVES},
+    {PIKOIR_STEP_ROUNDS, PIKOIR_STEP_END_ROUNDS}};
 
 /// Throws Failure unless all that is repeated ends, in the order of nesting,
 /// and numbers are of what has been declared.
@@ -61,14 +54,16 @@ static void check(const pikort_pipeline &p, Steps program) {
         hasGrids != (step.grids != nullptr) ||
         (step.kind == PIKOIR_STEP_HOST) != (step.host != nullptr))
       return true;
-    if (endOf(step.kind) >= 0)
-      open.push_back(&step);
-    if (!isEnd(step.kind))
-      return false;
-    if (open.empty() || endOf(open.back()->kind) != step.kind ||
-        open.back()->number != step.number)
-      return true;
-    open.pop_back();
+    for (auto [begin, end] : repeated) {
+      if (step.kind == begin)
+        open.push_back(&step);
+      if (step.kind != end)
+        continue;
+      if (open.empty() || open.back()->kind != begin ||
+          open.back()->number != step.number)
+        return true;
+      open.pop_back();
+    }
     return false;
   };
   for (const pikoir_cuda_step &step : program)

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// What the writers of NAME.setup and NAME.run share: how they call the regions
-// of a program.
+// What the writers of NAME.setup, NAME.run and a program's steps share: how
+// they call its regions.
 
 #ifndef PIKO_LIB_CONVERSION_PIKOTOLLVM_PROGRAMREGIONS_H
 #define PIKO_LIB_CONVERSION_PIKOTOLLVM_PROGRAMREGIONS_H
@@ -28,7 +28,7 @@ mlir::func::FuncOp createSetup(ProgramOp program,
                                LoweringContext &context,
                                mlir::OpBuilder &builder);
 
-/// The steps of a program, StepAttrs, for a device that runs it by itself.
+/// The steps of a program, an array of StepAttr (ProgramSteps.cpp).
 mlir::ArrayAttr describeSteps(ProgramOp program,
                               const PipelineNumbers &numbers);
 

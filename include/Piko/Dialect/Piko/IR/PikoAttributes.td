@@ -108,11 +108,11 @@ def Piko_StepAttr : AttrDef<Piko_Dialect, "Step"> {
   let summary = "a step of a program that a device runs by itself";
   let description = [{
     Of a `piko.steps`. The number is that of the state, source, stage, edge, group
-    of strips, loop or cycle, as the setup declares them; `kernel` the function that
-    launches the grids of a source or stage, or, of `host`, that the host calls. `#piko.step<stage 3 by @"P.kernel_s">`
-    runs the kernel of stage 3, `#piko.step<queue 2 member 1>` puts what it has
-    emitted on edge 2 in a queue of the second stage of its loop. `pikort/grid.h` has
-    the kinds.
+    of strips, loop or cycle, as the setup declares them; `kernel` is the function
+    that launches the grids of a source or stage, or, of `host`, that the host calls.
+    `#piko.step<stage 3 by @P.kernel_s>` runs the kernel of stage 3, and
+    `#piko.step<queue 2 member 1>` puts what it has emitted on edge 2 in a queue of
+    the second stage of its loop. `pikort/grid.h` has the kinds.
   }];
   let parameters = (ins
     EnumParameter<Piko_StepKind>:$kind, "int32_t":$number,
