@@ -4,6 +4,7 @@
 
 #include "Piko/Driver/Sequences.h"
 
+#include "Piko/Analysis/BranchProbability.h"
 #include "Piko/Conversion/Passes.h"
 #include "Piko/Dialect/Piko/IR/Canonicalization.h"
 #include "Piko/Transforms/Passes.h"
@@ -22,8 +23,9 @@ using namespace mlir;
 using namespace piko;
 
 void piko::addCleanUp(OpPassManager &passes) {
-  passes.addPass(
-      createCanonicalizerPass(GreedyRewriteConfig(), getInexactPatterns()));
+  passes.addPass(createCanonicalizerPass(
+      GreedyRewriteConfig().setListener(getProbabilityKeeper()),
+      getInexactPatterns()));
   passes.addPass(createCSEPass());
 }
 

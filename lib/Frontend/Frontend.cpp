@@ -8,6 +8,7 @@
 #include "Import/ModuleBuilder.h"
 #include "Import/Wiring.h"
 #include "Parse/ClangInvocation.h"
+#include "Piko/Analysis/BranchProbability.h"
 #include "Piko/Dialect/Piko/IR/Canonicalization.h"
 #include "Piko/Dialect/Piko/IR/Piko.h"
 #include "mlir/Dialect/Arith/IR/Arith.h"
@@ -46,7 +47,8 @@ static void canonicalize(mlir::ModuleOp module) {
     op.getCanonicalizationPatterns(patterns, context);
   (void)mlir::applyPatternsGreedily(
       module,
-      mlir::FrozenRewritePatternSet(std::move(patterns), getInexactPatterns()));
+      mlir::FrozenRewritePatternSet(std::move(patterns), getInexactPatterns()),
+      mlir::GreedyRewriteConfig().setListener(getProbabilityKeeper()));
   mlir::IRRewriter rewriter(context);
   mlir::DominanceInfo dominance(module);
   mlir::eliminateCommonSubExpressions(rewriter, dominance, module);

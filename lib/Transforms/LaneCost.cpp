@@ -251,6 +251,8 @@ std::optional<int64_t> piko::getConstantTurns(scf::ForOp loop) {
 double CostModel::getTurns(Operation *loop) const {
   if (auto turns = loop->getAttrOfType<FloatAttr>(marks::turns))
     return turns.getValueAsDouble();
+  if (std::optional<double> turns = getProbableTurns(loop))
+    return *turns / getGoing(loop);
   if (auto counted = dyn_cast<scf::ForOp>(loop))
     if (std::optional<int64_t> count = getConstantTurns(counted))
       return double(*count);
@@ -368,8 +370,16 @@ void CostModel::addStructure(Operation *op, Frequency times, bool laneByLane) {
     along = hasVectorsAlong(loop) ? cycles.along : 1;
   }
   double before = cost.serial;
-  for (Region &region : op->getRegions())
-    add(region, times.scaled(turns * going, turns), laneByLane);
+  Frequency each{turns * going, turns};
+  std::optional<double> again = getTurnProbability(op);
+  if (again) // One lane is enough.
+    each.vectors =
+        std::max(turns, 1 - std::pow(1 - *again, lanes.getLaneCount()));
+  for (Region &region : op->getRegions()) {
+    bool isTest = again && isa<scf::WhileOp>(op) && !region.getRegionNumber();
+    add(region, times.scaled(each.serial + isTest, each.vectors + isTest),
+        laneByLane);
+  }
   cost.loops[op] += cost.serial - before;
   along = around;
   if (loop)

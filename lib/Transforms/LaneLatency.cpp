@@ -7,6 +7,7 @@
 
 #include "LaneLatency.h"
 
+#include "Piko/Analysis/BranchProbability.h"
 #include "Piko/Dialect/Piko/IR/PikoApproximation.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
@@ -74,7 +75,8 @@ static double countTurns(Operation *loop) {
   auto counted = dyn_cast<scf::ForOp>(loop);
   std::optional<int64_t> turns =
       counted ? getConstantTurns(counted) : std::nullopt;
-  return turns ? double(*turns) : likely;
+  return turns ? double(*turns)
+               : std::max(1.0, getProbableTurns(loop).value_or(likely));
 }
 
 /// Whether a number is only where rows begin, of which the first lane's is kept

@@ -124,6 +124,7 @@ struct ExchangeArms : OpRewritePattern<scf::IfOp> {
     Value opposite = invert(rewriter, choice.getCondition());
     rewriter.modifyOpInPlace(choice, [&] {
       choice.getConditionMutable().assign(opposite);
+      setProbability(choice, getProbability(choice, choice.getElseRegion()));
       Block *first = choice.thenBlock(), *second = choice.elseBlock();
       choice.getThenRegion().getBlocks().splice(
           choice.getThenRegion().end(), choice.getElseRegion().getBlocks(),
@@ -174,8 +175,7 @@ struct TestFlags : OpRewritePattern<scf::IndexSwitchOp> {
                                   /*addElseBlock=*/false);
     if (auto taken = getProbability(choice, *yes))
       if (double all = *taken + *getProbability(choice, *no); all > 0)
-        test->setAttr(marks::probability,
-                      rewriter.getF64FloatAttr(*taken / all));
+        setProbability(test, *taken / all);
     rewriter.inlineRegionBefore(*yes, test.getThenRegion(),
                                 test.getThenRegion().end());
     rewriter.inlineRegionBefore(*no, test.getElseRegion(),
@@ -323,8 +323,13 @@ struct MergeNested : OpRewritePattern<scf::IfOp> {
     rewriter.setInsertionPoint(outer);
     Value both = arith::AndIOp::create(
         rewriter, inner.getLoc(), outer.getCondition(), inner.getCondition());
-    rewriter.modifyOpInPlace(outer,
-                             [&] { outer.getConditionMutable().assign(both); });
+    auto first = getProbability(outer, outer.getThenRegion());
+    auto second = getProbability(inner, inner.getThenRegion());
+    rewriter.modifyOpInPlace(outer, [&] {
+      outer.getConditionMutable().assign(both);
+      setProbability(outer, first && second ? std::optional(*first * *second)
+                                            : std::nullopt);
+    });
     rewriter.modifyOpInPlace(outer.thenYield(),
                              [&] { outer.thenYield()->setOperands(values); });
     rewriter.eraseOp(inner.thenYield());
@@ -370,5 +375,7 @@ void NormalizeLoopsPass::runOnOperation() {
   arith::ExtUIOp::getCanonicalizationPatterns(patterns, &getContext());
   arith::TruncIOp::getCanonicalizationPatterns(patterns, &getContext());
   // What is left undone is no worse than before.
-  (void)applyPatternsGreedily(getOperation(), std::move(patterns));
+  (void)applyPatternsGreedily(
+      getOperation(), std::move(patterns),
+      GreedyRewriteConfig().setListener(getProbabilityKeeper()));
 }

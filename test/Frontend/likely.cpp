@@ -15,6 +15,27 @@
 // RUN: pikoc %s --pipe Cases --emit=authored | FileCheck %s --check-prefix=CASES
 // CASES: piko.probabilities = array<f64: 0.33{{[0-9]*}}, 9.31{{[0-9]*}}E-10, 0.66{{[0-9]*}}>
 //
+// Of a loop it is how probable another turn is, by all that ends it; the inner one, of
+// which nothing is said, has none.
+// RUN: pikoc %s --pipe Loops --emit=machine | FileCheck %s --check-prefix=LOOPS
+// LOOPS: scf.while
+// LOOPS: attributes {piko.probability = 0.9995{{[0-9]*}} : f64}
+// LOOPS: scf.while
+// LOOPS: attributes {piko.probability = 4.9975{{[0-9]*}}E-4 : f64}
+// LOOPS: scf.while
+// LOOPS: attributes {piko.probability = 0.7{{[45][0-9]*}} : f64}
+// LOOPS: scf.while
+// LOOPS: scf.while
+// LOOPS-NOT: attributes {piko.probability
+// LOOPS: scf.yield
+// LOOPS: {piko.probability = 0.98999{{[0-9]*}} : f64}
+// LOOPS: attributes {piko.probability = 0.98950{{[0-9]*}} : f64}
+// RUN: pikoc %s --pipe Loops --emit=llvm | FileCheck %s --check-prefix=TURNS
+// TURNS: weights([1048052, 524])
+// TURNS: weights([524, 1048052])
+// TURNS: weights([786432, 262144])
+// TURNS: weights([103{{[0-9]*}}, 1{{[0-9]*}}])
+//
 // RUN: pikoc %s --pipe Unlikely --emit=llvm | FileCheck %s --check-prefix=WEIGHTS
 // WEIGHTS: llvm.cond_br %{{.*}} weights([524, 1048052]),
 //
@@ -31,9 +52,24 @@ struct Item {
 };
 struct State {
   piko::Buffer<float> out;
+  piko::Buffer<int> next;
 };
 
-enum class Kind { Plain, Likely, Unlikely, Tenth, Cases };
+//
+// A chain that is seldom followed does not count.
+// RUN: pikoc %s --cpu x86-64-v3 --pipe Chains --remarks -o %t.ll 2>&1 | FileCheck %s --check-prefix=BOTH
+// RUN: pikoc %s --cpu x86-64-v3 --pipe FewChains --remarks -o %t.ll 2>&1 | FileCheck %s --check-prefix=VECTORS
+
+enum class Kind {
+  Plain,
+  Likely,
+  Unlikely,
+  Tenth,
+  Cases,
+  Loops,
+  Chains,
+  FewChains
+};
 
 template <Kind K> struct Work : piko::Stage<0, 0, 64, Item>, piko::Uses<State> {
   float compute(float x, float y) {
@@ -63,6 +99,29 @@ template <Kind K> struct Work : piko::Stage<0, 0, 64, Item>, piko::Uses<State> {
       default:
         x = compute(item.y, item.y);
       }
+    } else if constexpr (K == Kind::Loops) {
+      int n = item.serial;
+      for (x = item.x; x > item.y; x = x * 0.9f + 1 / (x + 3))
+        [[likely]];
+      for (int k = 0; k < n; ++k) [[unlikely]]
+        x += piko::sqrt(x);
+      do
+        x = x * x + 1;
+      while (__builtin_expect_with_probability(x < 100, 1, 0.75));
+      while (__builtin_expect_with_probability(n > 7, 1, 0.99)) {
+        for (int k = n; k > 3; k /= 2)
+          x += 1 / x;
+        n = n % 2 ? n * 3 : n / 2;
+        if (n == 9) [[unlikely]]
+          break;
+      }
+    } else if constexpr (K == Kind::Chains || K == Kind::FewChains) {
+      auto go = [](bool more) {
+        return K == Kind::Chains ? more : bool(__builtin_expect(more, 0));
+      };
+      x = item.x * item.y;
+      for (int at = this->state().next[item.serial]; go(at > 0);)
+        x += float(at = this->state().next[at] / at);
     } else {
       if (item.x > item.y)
         x = compute(item.x, item.y);
@@ -80,3 +139,6 @@ struct Likely : Lone<Kind::Likely> {};
 struct Unlikely : Lone<Kind::Unlikely> {};
 struct Tenth : Lone<Kind::Tenth> {};
 struct Cases : Lone<Kind::Cases> {};
+struct Loops : Lone<Kind::Loops> {};
+struct Chains : Lone<Kind::Chains> {};
+struct FewChains : Lone<Kind::FewChains> {};

@@ -2,9 +2,9 @@
 #ifndef PIKO_ANALYSIS_BRANCHPROBABILITY_H
 #define PIKO_ANALYSIS_BRANCHPROBABILITY_H
 
-#include "Piko/Dialect/Piko/IR/Marks.h"
-
+#include "mlir/Dialect/ControlFlow/IR/ControlFlowOps.h"
 #include "mlir/Dialect/SCF/IR/SCF.h"
+#include "mlir/IR/PatternMatch.h"
 
 #include <optional>
 
@@ -12,23 +12,32 @@ namespace piko {
 
 /// How probable it is that a branch goes into one of its regions, from 0 to 1,
 /// where the text says so.
-inline std::optional<double> getProbability(mlir::scf::IfOp branch,
-                                            mlir::Region &region) {
-  auto first = branch->getAttrOfType<mlir::FloatAttr>(marks::probability);
-  if (!first)
-    return std::nullopt;
-  double taken = first.getValueAsDouble();
-  return &region == &branch.getThenRegion() ? taken : 1 - taken;
-}
+std::optional<double> getProbability(mlir::scf::IfOp branch,
+                                     mlir::Region &region);
+std::optional<double> getProbability(mlir::scf::IndexSwitchOp choice,
+                                     mlir::Region &region);
+/// The same of a branch that goes to its first block.
+std::optional<double> getProbability(mlir::cf::CondBranchOp branch);
 
-inline std::optional<double> getProbability(mlir::scf::IndexSwitchOp choice,
-                                            mlir::Region &region) {
-  auto all =
-      choice->getAttrOfType<mlir::DenseF64ArrayAttr>(marks::probabilities);
-  if (!all || all.size() != choice->getNumRegions())
-    return std::nullopt;
-  return all[region.getRegionNumber()];
-}
+/// How probable it is that a loop goes on for another turn.
+std::optional<double> getTurnProbability(mlir::Operation *loop);
+/// How often a loop turns that goes on as probably as the text says, each time
+/// alike: a geometric distribution.
+std::optional<double> getProbableTurns(mlir::Operation *loop);
+
+/// Sets how probable it is that an scf.if takes its first side, or that a loop
+/// goes on; forgets it where that is not known.
+void setProbability(mlir::Operation *op, std::optional<double> probability);
+
+/// How probable it is that the blocks of a loop's body, from the first one,
+/// come to the last one with a 1 for `again`, which is an argument of that.
+/// Nothing where a branch decides it of which nothing is said.
+std::optional<double> computeTurnProbability(mlir::Block *first,
+                                             mlir::BlockArgument again);
+
+/// Keeps what is known of a branch or a loop that a pattern writes anew. It has
+/// no state: all rewriters may share it.
+mlir::RewriterBase::Listener *getProbabilityKeeper();
 
 } // namespace piko
 

@@ -33,6 +33,15 @@ static void setWeights(Operation *terminator, double first) {
     branch.setBranchWeights(ArrayRef<int32_t>{weigh(first), weigh(1 - first)});
 }
 
+/// The block at whose end is the branch that is made of an operation.
+static Block *getDecidingBlock(Operation *op) {
+  if (auto loop = dyn_cast<scf::WhileOp>(op))
+    return &loop.getBefore().back();
+  if (auto loop = dyn_cast<scf::ForOp>(op))
+    return loop.getBody();
+  return op->getBlock();
+}
+
 namespace {
 struct ConvertSCFToControlFlowInReverse
     : piko::impl::ConvertSCFToControlFlowInReverseBase<
@@ -49,11 +58,11 @@ struct ConvertSCFToControlFlowInReverse
          found = collect())
       for (Operation *op : found) {
         rewriter.setInsertionPoint(op);
-        Block *block = op->getBlock();
+        Block *deciding = getDecidingBlock(op);
         auto likely = op->getAttrOfType<FloatAttr>(marks::probability);
         if (succeeded(applicator.matchAndRewrite(op, rewriter))) {
           if (likely)
-            setWeights(block->getTerminator(), likely.getValueAsDouble());
+            setWeights(deciding->getTerminator(), likely.getValueAsDouble());
           continue;
         }
         op->emitOpError("has no form of branches");

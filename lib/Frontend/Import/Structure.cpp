@@ -8,6 +8,7 @@
 
 #include "Import/Import.h"
 
+#include "Piko/Analysis/BranchProbability.h"
 #include "Piko/Dialect/Piko/IR/Marks.h"
 #include "Piko/Dialect/Piko/IR/Piko.h"
 #include "mlir/Conversion/ControlFlowToSCF/ControlFlowToSCF.h"
@@ -51,14 +52,23 @@ public:
     if (auto all = branch->getAttr(marks::probabilities);
         all && llvm::succeeded(made))
       (*made)->setAttr(marks::probabilities, all);
-    auto condition = mlir::dyn_cast<mlir::cf::CondBranchOp>(branch);
-    if (llvm::failed(made) || !condition || !condition.getBranchWeights())
-      return made;
-    llvm::ArrayRef<int32_t> weights = *condition.getBranchWeights();
-    double first = weights[0], second = weights[1];
-    if (first >= 0 && second >= 0 && first + second > 0)
-      (*made)->setAttr(marks::probability,
-                       builder.getF64FloatAttr(first / (first + second)));
+    if (auto condition = mlir::dyn_cast<mlir::cf::CondBranchOp>(branch);
+        condition && llvm::succeeded(made))
+      setProbability(*made, getProbability(condition));
+    return made;
+  }
+
+  /// Keeps how likely the text says that a loop goes on.
+  llvm::FailureOr<mlir::Operation *> createStructuredDoWhileLoopOp(
+      mlir::OpBuilder &builder, mlir::Operation *branch, mlir::ValueRange inits,
+      mlir::Value again, mlir::ValueRange next, mlir::Region &&body) override {
+    std::optional<double> known;
+    if (auto flag = mlir::dyn_cast<mlir::BlockArgument>(again))
+      known = computeTurnProbability(&body.front(), flag);
+    auto made = ControlFlowToSCFTransformation::createStructuredDoWhileLoopOp(
+        builder, branch, inits, again, next, std::move(body));
+    if (llvm::succeeded(made))
+      setProbability(*made, known);
     return made;
   }
 };

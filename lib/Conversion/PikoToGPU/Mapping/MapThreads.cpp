@@ -78,7 +78,10 @@ static void upliftLoops(KernelOp kernel) {
   kernel.walk([&](scf::WhileOp loop) { loops.push_back(loop); });
   for (scf::WhileOp loop : loops) {
     rewriter.setInsertionPoint(loop);
-    (void)scf::upliftWhileToForLoop(rewriter, loop);
+    auto again = loop->getAttr(marks::probability);
+    auto counted = scf::upliftWhileToForLoop(rewriter, loop);
+    if (succeeded(counted) && again)
+      (*counted)->setAttr(marks::probability, again);
   }
   SmallVector<ub::PoisonOp> unused;
   kernel.walk([&](ub::PoisonOp poison) { unused.push_back(poison); });

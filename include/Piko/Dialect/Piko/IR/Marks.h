@@ -28,8 +28,9 @@ constexpr llvm::StringLiteral turns = "piko.turns";
 /// the first one, which does nothing for it: in how many turns it runs, a
 /// 64-bit float.
 constexpr llvm::StringLiteral advances = "piko.advances";
-/// How probable it is that an scf.if takes its first side, by what the text
-/// says with [[likely]] and its like: a 64-bit float from 0 to 1.
+/// How probable it is that an scf.if takes its first side, or that a loop goes
+/// on for another turn, by what the text says with [[likely]] and its like: a
+/// 64-bit float from 0 to 1.
 constexpr llvm::StringLiteral probability = "piko.probability";
 /// How probable each region of an scf.index_switch is, the default one first,
 /// by what the text says: an array of 64-bit floats from 0 to 1.
