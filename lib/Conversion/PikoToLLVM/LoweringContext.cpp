@@ -380,6 +380,18 @@ Value LoweringContext::place(OpBuilder &builder, Operation *op) {
                               LLVM::LLVMPointerType::get(builder.getContext()));
 }
 
+Value LoweringContext::array(OpBuilder &builder, Location loc,
+                             ArrayRef<int32_t> numbers) {
+  OpBuilder atStart(module.getBodyRegion());
+  auto global = LLVM::GlobalOp::create(
+      atStart, module.getLoc(),
+      LLVM::LLVMArrayType::get(builder.getI32Type(), numbers.size()),
+      /*isConstant=*/true, LLVM::Linkage::Internal,
+      "piko.array." + std::to_string(arrayCount++),
+      builder.getI32TensorAttr(numbers));
+  return LLVM::AddressOfOp::create(builder, loc, global);
+}
+
 Value LoweringContext::text(OpBuilder &builder, Location loc, StringRef text) {
   LLVM::GlobalOp &global = texts[text];
   if (!global) {

@@ -148,6 +148,9 @@ public:
   /// The name of a constant of at least so many zero bytes.
   mlir::StringRef zeros(int64_t bytes);
 
+  /// The address of constant numbers.
+  mlir::Value array(mlir::OpBuilder &builder, mlir::Location loc,
+                    llvm::ArrayRef<int32_t> numbers);
   /// The address of a constant text.
   mlir::Value text(mlir::OpBuilder &builder, mlir::Location loc,
                    mlir::StringRef text);
@@ -166,6 +169,7 @@ public:
 private:
   mlir::ModuleOp module;
   llvm::StringMap<mlir::LLVM::GlobalOp> texts;
+  int64_t arrayCount = 0;
   llvm::StringMap<mlir::LLVM::LLVMFuncOp> called; // the runtime's
   llvm::DenseMap<mlir::Operation *, const PipelineNumbers *> functions;
   llvm::DenseMap<mlir::Operation *, Grid> grids;     // by launch

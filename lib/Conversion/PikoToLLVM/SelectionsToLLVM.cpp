@@ -202,17 +202,14 @@ void piko::declareSelections(OpBuilder &builder, Value frame,
   for (const ImageSelection &selection : numbers.selections) {
     LLVM::LLVMFuncOp select =
         SelectWriter(pipeline, selection, context).write();
-    std::string states;
-    for (StringAttr image : selection.images) {
-      auto number = static_cast<uint32_t>(numbers.states.lookup(image));
-      for (int byte = 0; byte < 4; ++byte)
-        states += char(number >> (8 * byte));
-    }
+    auto states = llvm::map_to_vector(selection.images, [&](StringAttr image) {
+      return static_cast<int32_t>(numbers.states.lookup(image));
+    });
     context.call(
         builder, loc, PIKO_RUNTIME_FUNCTION(pikoir_declare_selection),
         {frame, i32(numbers.stages.lookup(selection.stage)),
          i32(*numbers.findSelection(selection.stage, selection.unitImage)),
-         context.text(builder, loc, states), i32(selection.images.size()),
+         context.array(builder, loc, states), i32(selection.images.size()),
          i32(selection.often),
          LLVM::AddressOfOp::create(builder, loc, select)});
   }
