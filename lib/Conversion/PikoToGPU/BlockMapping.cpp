@@ -5,12 +5,14 @@
 //   1. what lies between shared loops and has effects is the first thread's,
 //      between two barriers; numbers from there that others need go through the
 //      block's memory;
-//   2. a shared loop steps by the number of threads, between two barriers;
+//   2. a shared loop steps by the number of threads, between two barriers; one
+//      over primitives that the first thread does in order is cut into rounds;
 //   3. iterations that meet at barriers are threads (BarrierLoops.cpp);
 //   4. arrays that more than one thread sees are in the block's memory.
 // What threads emit is in their outboxes; the block takes it (a flush) behind
-// each round of a shared loop, so that it is in the order of iterations. What
-// iterations of a cut loop emit is in outboxes of their own until its end.
+// each round of a loop, so that it is in the order of iterations, and no join
+// has to follow more than a round's by one thread. What iterations of a cut
+// loop emit is in outboxes of their own until its end.
 //
 // One class, and so one file: all four share the block's cells and barriers.
 
@@ -46,6 +48,8 @@ private:
   bool isPutOff(scf::ForOp loop) const;
   LogicalResult mapIterations(ParallelForOp loop);
   void shareInRounds(scf::ForOp loop);
+  bool isCut(Operation *op) const;
+  void doInRounds(scf::ForOp loop);
   LogicalResult mapLocalBin(LocalBinOp local);
   void clearStates(OpBuilder &builder, Value words);
   void deferIterations(DeferBeginOp begin);
@@ -214,7 +218,9 @@ LogicalResult BlockMapper::mapBlock(Block &block) {
   SmallVector<Operation *> run;
   for (Operation &op : llvm::make_early_inc_range(block)) {
     bool isEnd = &op == &block.back() && block.mightHaveTerminator();
-    if (!isEnd && !contains(&op, isShared)) {
+    bool isForAll = contains(
+        &op, [&](Operation *inner) { return isShared(inner) || isCut(inner); });
+    if (!isEnd && !isForAll) {
       run.push_back(&op);
       continue;
     }
@@ -231,6 +237,10 @@ LogicalResult BlockMapper::mapOperation(Operation *op) {
   OpBuilder builder(op);
   if (op->hasAttr(marks::shared)) {
     share(cast<scf::ForOp>(op));
+    return success();
+  }
+  if (isCut(op)) {
+    doInRounds(cast<scf::ForOp>(op));
     return success();
   }
   if (auto loop = dyn_cast<ParallelForOp>(op))
@@ -303,6 +313,42 @@ void BlockMapper::shareInRounds(scf::ForOp loop) {
     threads.ofOne.insert(queue.work);
   }
   loop.erase();
+}
+
+/// Whether the first thread does a loop in rounds: what it uses of those before
+/// can go through the block's memory.
+bool BlockMapper::isCut(Operation *op) const {
+  if (!memory.ordered.contains(op) || op->getNumResults() > 0 ||
+      !contains(op, isEmission) || contains(op, isShared))
+    return false;
+  llvm::SetVector<Value> used;
+  getUsedValuesDefinedAbove(op->getRegions(), used);
+  return llvm::all_of(used, [&](Value value) {
+    Operation *made = value.getDefiningOp();
+    return value.getType().isIntOrIndexOrFloat() ||
+           isa<PrimType>(value.getType()) || !made ||
+           !launch->isAncestor(made) || isLocalArray(made) ||
+           isMemoryEffectFree(made);
+  });
+}
+
+void BlockMapper::doInRounds(scf::ForOp loop) {
+  constexpr int64_t iterations = 32;
+  OpBuilder builder(loop);
+  Type type = loop.getInductionVar().getType();
+  Value size = arith::MulIOp::create(
+      builder, loc, loop.getStep(),
+      castTo(builder, constant(builder, iterations), type));
+  auto rounds = scf::ForOp::create(builder, loc, loop.getLowerBound(),
+                                   loop.getUpperBound(), size);
+  builder.setInsertionPointToStart(rounds.getBody());
+  Value begin = rounds.getInductionVar();
+  Value end = arith::AddIOp::create(builder, loc, begin, size);
+  end = arith::MinSIOp::create(builder, loc, end, loop.getUpperBound());
+  loop->moveBefore(createFirst(builder).thenBlock()->getTerminator());
+  loop.setLowerBound(begin);
+  loop.setUpperBound(end);
+  memory.flush(builder);
 }
 
 /// Whether it is what iterations of another loop have put off.

@@ -318,6 +318,11 @@ LogicalResult GridBuilder::mapLoop(ParallelLoopOpInterface loop) {
 
 LogicalResult GridBuilder::mapWork() {
   formGrid();
+  launch.walk([&](scf::ForOp loop) {
+    auto mark = loop->getAttrOfType<ThreadMappingAttr>(marks::threads);
+    if (mark && mark.getValue() == ThreadMapping::One)
+      memory.ordered.insert(loop);
+  });
   for (scf::ForOp loop : takeMapping(ThreadMapping::Shared))
     loop->setAttr(marks::shared, UnitAttr::get(kernel.getContext()));
   SmallVector<ParallelLoopOpInterface> loops; // those inside others first

@@ -126,6 +126,8 @@ struct GridMemory {
   /// What iterations of loops that threads share put off.
   llvm::MapVector<mlir::Operation *, WorkQueue> queues;
   std::optional<RareRounds> rare;
+  /// Loops over primitives that the first thread does in order, and emits in.
+  llvm::DenseSet<mlir::Operation *> ordered;
 
   int64_t getWords();
   /// Where the words of a local edge begin.

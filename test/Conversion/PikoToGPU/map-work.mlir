@@ -205,3 +205,55 @@ piko.pipeline @Pixels rank 2 {
     }
   }
 }
+
+// -----
+
+// What primitives do in order, and emit in, is the first thread's: 32 of them, behind
+// which the block takes what they have emitted, so that no join has to follow all of it
+// by one thread.
+// CHECK-LABEL: piko.kernel @kernel_test
+// CHECK:         %[[LOG:.*]] = piko.gpu.open_log
+// CHECK:         gpu.launch blocks({{.*}}threads(%[[T:[a-z0-9]+]],
+// CHECK:           %[[FIRST:.*]] = arith.cmpi eq, %[[T]], %c0 : index
+// CHECK:           %[[BEGIN:.*]], %[[END:.*]] = piko.storage.cell_range
+// CHECK-NEXT:      scf.for %[[ROUND:.*]] = %[[BEGIN]] to %[[END]] step %c32 {
+// CHECK-NEXT:        %[[NEXT:.*]] = arith.addi %[[ROUND]], %c32
+// CHECK-NEXT:        %[[STOP:.*]] = arith.minsi %[[NEXT]], %[[END]]
+// CHECK-NEXT:        scf.if %[[FIRST]] {
+// CHECK-NEXT:          scf.for %{{.*}} = %[[ROUND]] to %[[STOP]] step %c1 {
+// CHECK:                 piko.storage.append %[[LOG]][0]
+// CHECK-NEXT:            piko.storage.next %[[LOG]]
+// CHECK-NEXT:          }
+// CHECK-NEXT:        }
+// CHECK:             piko.gpu.flush %[[LOG]]
+// CHECK-NEXT:      }
+piko.record @F {"x" : i32 at 0} size 4 align 4
+piko.pipeline @Ordered rank 1 {
+  piko.image @image : @F rank 1
+  piko.source @test
+  piko.edge @test[0] -> @last
+  piko.stage @test bins [8] threads 64 : @F -> [@F] {
+    piko.assign {
+    ^bb0(%f: !piko.prim<@F>):
+      piko.assign_all
+      piko.return
+    }
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      %x = piko.get %f "x" : !piko.prim<@F> -> i32
+      %before = piko.update @image[%x : i32] {
+      ^bb0(%old: i32):
+        %sum = arith.addi %old, %x : i32
+        piko.yield [%sum : i32] results [%old : i32]
+      } -> i32
+      piko.emit 0 (%before) : i32
+      piko.return
+    }
+  }
+  piko.stage @last bins [0] threads 64 : @F -> [] {
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      piko.return
+    }
+  }
+}
