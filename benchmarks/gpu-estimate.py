@@ -7,20 +7,19 @@
 
 PIPELINE is a file or the name of an example; SCENE a file and, in the same word,
 what options of piko-render it needs. The frame runs behind the driver for tests,
-which interprets PTX, once for each number of multiprocessors: seconds to minutes.
+which interprets PTX, once for each number of multiprocessors: seconds to minutes each.
 
 For each kernel and chip: the least milliseconds that the chip's published limits
 (gpu_model/chips.json) allow for what was counted, what limits it, and how many they
-may be where nothing but other warps hides latency. gpu_model/model.py says what is
-in it. What the host does is not, nor how long blocks take to meet. Loops in which
-blocks wait for each other run longer there than on a card, and are counted. Nothing
-here is measured.
+may be: work, and behind it the span. gpu_model/model.py says what is in it. What the
+host does is not. Nothing here is measured.
 """
 
 import argparse
 import json
 import sys
 
+from commands import call
 from figure4 import ROOT, print_table
 from gpu_model import counting
 from gpu_model.chips import read_chips
@@ -45,8 +44,8 @@ def parse_options():
     parser.add_argument("--height", type=int, default=768)
     parser.add_argument("--lights", type=int, default=1)
     parser.add_argument("--counts", metavar="FILE",
-                        help="what PIKO_TEST_DRIVER_COUNTS=FILE has written; "
-                             "occupancy is taken as full")
+                        help="what PIKO_TEST_DRIVER_COUNTS=FILE has written, with "
+                             "the chip's PIKO_TEST_DRIVER_LATENCIES")
     parser.add_argument("--csv", metavar="FILE", help="all estimates, too")
     parser.add_argument("--bin", default=f"{ROOT}/build/bin",
                         help="where piko-render and pikoc are")
@@ -80,24 +79,21 @@ def list_chips(chips, sources):
 
 
 def count(options, chips):
-    """By chip: what was counted on as many multiprocessors, and the resources."""
+    """By chip: what was counted on one like it."""
     if options.counts:
         with open(options.counts) as file:
             report = json.load(file)
-        return {chip.name: (report, {}) for chip in chips}
+        return {chip.name: report for chip in chips}
     file = counting.find_pipeline(ROOT, options.pipeline)
-    pipe = options.pipe or counting.call(
+    pipe = options.pipe or call(
         [f"{options.bin}/pikoc", str(file), "--list-pipes"]).split()[-1]
-    by_units, by_assembled, counted = {}, {}, {}
+    alike, counted = {}, {}
     for chip in chips:
-        units = chip.multiprocessors
-        if units not in by_units:
-            _, by_units[units] = counting.count_frame(
-                options, file, pipe, options.scene, units, options.lights)
-        if chip.assembled_for not in by_assembled:
-            by_assembled[chip.assembled_for] = counting.read_resources(
-                options, file, pipe, chip)
-        counted[chip.name] = by_units[units], by_assembled[chip.assembled_for]
+        kind = chip.multiprocessors, chip.latencies
+        if kind not in alike:
+            _, alike[kind] = counting.count_frame(
+                options, file, pipe, options.scene, chip, options.lights)
+        counted[chip.name] = alike[kind]
     return counted
 
 
@@ -107,9 +103,9 @@ def describe(kernel, counts):
             "blocks": counts["blocks"], "warp_instructions": counts["warpInstructions"], "lanes": lanes}
 
 
-def list_estimates(chip, report, resources):
+def list_estimates(chip, report):
     """A row for each kernel, and one for the frame."""
-    frame = estimate_frame(report, chip, resources)
+    frame = estimate_frame(report, chip)
     rows = [{"chip": chip.name, **describe(name, report["kernels"][name]),
              "least_ms": it.least_ms, "least_limit": it.limit,
              "most_ms": it.most_ms, "most_limit": it.most_limit}
@@ -138,9 +134,9 @@ def main():
     if options.list_chips:
         return list_chips(chips, sources)
     rows = []
-    for name, (report, resources) in count(options, chips).items():
+    for name, report in count(options, chips).items():
         chip = next(c for c in chips if c.name == name)
-        own = list_estimates(chip, report, resources)
+        own = list_estimates(chip, report)
         print(f"\n{name}, estimated from what was counted, and not measured:")
         print_table(["kernel", "launches", "blocks", "M warp instructions", "lanes",
                      "estimated ms, at least", "limit", "at most", "limit"],

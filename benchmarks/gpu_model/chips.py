@@ -13,27 +13,28 @@ class Chip:
     """Counts are of a multiprocessor, unless their name says otherwise."""
     name: str
     compute_capability: str
-    assembled_for: str  # the chip that ptxas assembles for in its place
     multiprocessors: int
     gigahertz: float
     issue: int  # warp instructions a cycle
     lanes: dict  # a cycle, by the kind of instruction
-    threads: int
-    blocks: int
-    registers: int
-    block_memory: int  # bytes
-    block_reserved: int  # of the memory of each block, by the system
     l1_bytes_per_clock: int
     l2_bytes_per_clock: int | None  # of the chip; None if not published
     l2_megabytes: float
     dram_gb_per_s: float
     arithmetic_cycles: int
+    shared_cycles: int
+    l1_cycles: int
     l2_cycles: int
-    dram_cycles: int
     launch_us: float  # of a kernel behind another in a stream
     graph_us: float  # in a graph
     wait_us: float  # of the host for the device, and the launch behind it
     sources: tuple
+
+    @property
+    def latencies(self):
+        """As PIKO_TEST_DRIVER_LATENCIES takes them."""
+        return (f"{self.arithmetic_cycles},{self.shared_cycles},{self.l1_cycles},"
+                f"{self.l2_cycles}")
 
     def milliseconds(self, cycles):
         return cycles / (self.gigahertz * 1e6)

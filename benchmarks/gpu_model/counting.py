@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 """Counts a frame: piko-render behind the driver for tests, which runs PTX on the
-CPU; and asks pikoc what the kernels take."""
+CPU; and reads what pikoc says of what kernels take."""
 
 import json
 import os
@@ -11,18 +11,15 @@ import subprocess
 import sys
 import tempfile
 
-from commands import call
-
-from .model import Resources
-
 COLUMNS = ["threads", "block memory", "registers", "stack", "spilled", "occupancy"]
 
 
-def run_counted(command, driver, multiprocessors, file):
+def run_counted(command, driver, chip, file):
     """Runs a program behind the driver; what it printed and what was counted."""
     environment = {**os.environ, "PIKO_CUDA_DRIVER": str(driver),
                    "PIKO_TEST_DRIVER_COUNTS": str(file),
-                   "PIKO_TEST_DRIVER_MULTIPROCESSORS": str(multiprocessors)}
+                   "PIKO_TEST_DRIVER_LATENCIES": chip.latencies,
+                   "PIKO_TEST_DRIVER_MULTIPROCESSORS": str(chip.multiprocessors)}
     done = subprocess.run(command, capture_output=True, text=True, env=environment)
     if done.returncode:
         sys.exit(f"{shlex.join(command)}\n{done.stderr}")
@@ -30,7 +27,7 @@ def run_counted(command, driver, multiprocessors, file):
         return done.stdout, json.load(stream)
 
 
-def count_frame(options, file, pipe, scene, multiprocessors, lights=1):
+def count_frame(options, file, pipe, scene, chip, lights=1):
     """One frame: what piko-render says of it, and its counts, whose kernels are
     named as in the program."""
     command = [f"{options.bin}/piko-render", str(file), *shlex.split(scene),
@@ -38,7 +35,7 @@ def count_frame(options, file, pipe, scene, multiprocessors, lights=1):
                "--width", str(options.width), "--height", str(options.height),
                "--lights", str(lights), "--json"]
     with tempfile.TemporaryDirectory() as folder:
-        output, report = run_counted(command, options.driver, multiprocessors,
+        output, report = run_counted(command, options.driver, chip,
                                      f"{folder}/counts.json")
     report["kernels"] = {strip(name, pipe): counts
                          for name, counts in report["kernels"].items()}
@@ -58,16 +55,6 @@ def read_explained(text):
             continue
         *numbers, kernel = line.replace(" %", "%").split()
         yield kernel, dict(zip(COLUMNS, numbers))
-
-
-def read_resources(options, file, pipe, chip):
-    """By kernel; registers are None where no ptxas says them."""
-    text = call([f"{options.bin}/pikoc", str(file), "--pipe", pipe, "--explain",
-                 "--target", "cuda", "--gpu-chip", chip.assembled_for])
-    return {strip(kernel, pipe): Resources(
-                int(numbers["threads"]), int(numbers["block memory"]),
-                int(numbers["registers"]) if "registers" in numbers else None)
-            for kernel, numbers in read_explained(text)}
 
 
 def find_pipeline(root, name):

@@ -1,15 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 """A roofline of kernels: from counted instructions and bytes to milliseconds.
 
-Two figures for each kernel:
+Two figures for each kernel, in the terms of work and span (Brent, The Parallel
+Evaluation of General Arithmetic Expressions, JACM 21(2), 1974):
 
-* `least`: what one of the chip's limits takes, if it is all that costs time and
-  caches hold what they can. No kernel can be faster.
-* `most`: the same with caches that hold nothing for long, and with warps each of
-  whose instructions waits for the one before it, a load for the L2 cache: what
-  hides that are only other warps of the same multiprocessor; and with blocks that
-  end late because of what they do alone. Kernels may be still slower: banks of
-  shared memory and atomics on one address are not in it.
+* `least`: the greatest of what the chip's limits take for all of the work, and of
+  the span: how long the last warp runs that has a multiprocessor for itself, whose
+  instructions wait for what they read. Caches hold what they can. No kernel can be
+  faster.
+* `most`: the work and behind it the span, as a device does that always runs
+  something when it can, with caches that hold nothing for long: loads find what they
+  read in the L2 cache. Kernels may be still slower: banks of shared memory and
+  atomics on one address are not in it.
 
 What the host does is in neither.
 """
@@ -47,33 +49,8 @@ UNITS = {
                "loadGeneric": 1, "storeGeneric": 1, "atomic": 1,
                "warpOperation": 1},
 }
-LOADS = ("loadGlobal", "loadGeneric", "atomic")
 LOCAL = ("loadLocal", "storeLocal")
 LOCAL_SECTORS = 4  # of a warp that reads or writes 4 bytes a lane
-
-
-@dataclass
-class Resources:
-    """What ptxas says of a kernel, and its block."""
-    threads: int
-    block_memory: int
-    registers: int | None
-
-
-def count_warps(resources, chip):
-    """Warps of a kernel that a multiprocessor has at the same time; as many as it
-    can have where registers are not known."""
-    if not resources or resources.registers is None or resources.threads < 1:
-        return chip.threads // WARP
-    warps = math.ceil(resources.threads / WARP)
-    # Registers are given to warps, in pieces of 256.
-    of_warp = math.ceil(max(resources.registers, 1) * WARP / 256) * 256
-    memory = resources.block_memory + chip.block_reserved
-    blocks = min(chip.blocks, chip.threads // (warps * WARP),
-                 chip.registers // (of_warp * warps))
-    if memory:
-        blocks = min(blocks, chip.block_memory // memory)
-    return max(blocks, 1) * warps
 
 
 def count_slots(counts):
@@ -98,28 +75,11 @@ def find_memory(counts, chip, units):
     return least, most
 
 
-def find_latency(counts, chip, resources):
-    """Milliseconds, if nothing but other warps hides what an instruction waits
-    for: all of them, the longest warp alone, or what runs until the last block
-    ends."""
-    slots = count_slots(counts)
-    loads = sum(counts[kind] for kind in LOADS)
-    cycles = ((slots - loads) * chip.arithmetic_cycles + loads * chip.l2_cycles)
-    resident = chip.multiprocessors * count_warps(resources, chip)
-    of_launch = counts["warps"] / max(counts["launches"], 1)
-    longest = counts["longestWarps"] / max(counts["warpInstructions"], 1)
-    last = counts["lastBlocks"] / max(counts["warpInstructions"], 1)
-    return {
-        "latency": chip.milliseconds(cycles / max(min(resident, of_launch), 1)),
-        "longest warp": chip.milliseconds(cycles * longest),
-        "last block": chip.milliseconds(cycles * last),
-    }
-
-
 @dataclass
 class Estimate:
     least: dict  # milliseconds by limit
-    most: dict
+    work: dict  # the same, with caches that hold nothing for long
+    span_ms: float  # with such caches
 
     @property
     def least_ms(self):
@@ -127,7 +87,7 @@ class Estimate:
 
     @property
     def most_ms(self):
-        return max(self.most.values())
+        return max(self.work.values()) + self.span_ms
 
     @property
     def limit(self):
@@ -135,10 +95,12 @@ class Estimate:
 
     @property
     def most_limit(self):
-        return max(self.most, key=self.most.get)
+        """What takes more of it."""
+        limit = max(self.work, key=self.work.get)
+        return limit if self.work[limit] > self.span_ms else "span"
 
 
-def estimate_kernel(counts, chip, resources=None, launch_us=None):
+def estimate_kernel(counts, chip, launch_us=None):
     """Of all launches of a kernel together, which are counted so."""
     slots = count_slots(counts)
     # No more than there are blocks have work.
@@ -148,13 +110,12 @@ def estimate_kernel(counts, chip, resources=None, launch_us=None):
     for unit, kinds in UNITS.items():
         lanes = WARP * sum(counts[kind] * n for kind, n in kinds.items())
         busy[unit] = chip.milliseconds(lanes / (chip.lanes[unit] * units))
-    longest = counts["longestWarps"] / max(counts["warpInstructions"], 1)
-    busy["longest warp"] = chip.milliseconds(slots * longest)
     busy["launch"] = 1e-3 * counts["launches"] * (
         chip.launch_us if launch_us is None else launch_us)
     least, most = find_memory(counts, chip, units)
-    return Estimate({**busy, **least},
-                    {**busy, **most, **find_latency(counts, chip, resources)})
+    span = {"span": chip.milliseconds(counts["leastSpan"])}
+    return Estimate({**busy, **least, **span}, {**busy, **most},
+                    chip.milliseconds(counts["mostSpan"]))
 
 
 @dataclass
@@ -173,10 +134,10 @@ def find_launch(report, chip):
     return part * chip.graph_us + (1 - part) * chip.launch_us
 
 
-def estimate_frame(report, chip, resources):
-    """`report` is what the driver for tests wrote; `resources` by kernel."""
+def estimate_frame(report, chip):
+    """`report` is what the driver for tests wrote."""
     launch_us = find_launch(report, chip)
-    kernels = {name: estimate_kernel(counts, chip, resources.get(name), launch_us)
+    kernels = {name: estimate_kernel(counts, chip, launch_us)
                for name, counts in report["kernels"].items()}
     waits = report.get("host", {}).get("waits", 0)
     return Frame(kernels, sum(k.least_ms for k in kernels.values()),

@@ -105,13 +105,6 @@ class Estimate:
     def __init__(self, options, chip):
         self.options, self.chip = options, chip
         self.described = f"estimated for {chip.name}, and not measured"
-        self.resources = {}
-
-    def find_resources(self, example, pipe):
-        if (example, pipe) not in self.resources:
-            self.resources[example, pipe] = counting.read_resources(
-                self.options, source_of(example), pipe, self.chip)
-        return self.resources[example, pipe]
 
     def time_all(self, cases, scene, lights, others=None):
         """As of a card; others are measured all the same."""
@@ -121,9 +114,8 @@ class Estimate:
 
     def time(self, example, pipe, scene, lights):
         run, report = counting.count_frame(
-            self.options, source_of(example), pipe, scene,
-            self.chip.multiprocessors, lights)
-        frame = estimate_frame(report, self.chip, self.find_resources(example, pipe))
+            self.options, source_of(example), pipe, scene, self.chip, lights)
+        frame = estimate_frame(report, self.chip)
         return Timing(math.sqrt(frame.least_ms * frame.most_ms),
                       {name: math.sqrt(it.least_ms * it.most_ms)
                        for name, it in frame.kernels.items()},
@@ -135,7 +127,7 @@ class Estimate:
         os.environ["PIKO_TEST_DRIVER_SEED"] = str(turn)
         try:
             run, _ = counting.count_frame(self.options, source_of(example), pipe,
-                                          scene, self.chip.multiprocessors)
+                                          scene, self.chip)
         finally:
             del os.environ["PIKO_TEST_DRIVER_SEED"]
         return run["image_hash"]

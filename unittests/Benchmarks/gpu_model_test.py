@@ -20,8 +20,7 @@ CHIP = dataclasses.replace(
     CHIPS["A100"], name="test", multiprocessors=10, gigahertz=1.0, issue=4,
     lanes={unit: 32 for unit in CHIPS["A100"].lanes}, l1_bytes_per_clock=128,
     l2_bytes_per_clock=1000, l2_megabytes=1, dram_gb_per_s=100, launch_us=0,
-    arithmetic_cycles=4, l2_cycles=200, threads=2048, blocks=32, registers=65536,
-    block_memory=100000, block_reserved=0)
+    arithmetic_cycles=4, l2_cycles=200)
 
 
 def count(**kinds):
@@ -34,8 +33,8 @@ def count(**kinds):
     total = sum(counts[kind] for kind in model.SLOTS)
     counts.setdefault("warpInstructions", total)
     counts.setdefault("laneInstructions", 32 * total)
-    counts.setdefault("longestWarps", total / 10)
-    counts.setdefault("lastBlocks", counts["longestWarps"])
+    counts.setdefault("leastSpan", 0)
+    counts.setdefault("mostSpan", counts["leastSpan"])
     return counts
 
 
@@ -46,7 +45,7 @@ class Limits(unittest.TestCase):
         self.assertAlmostEqual(it.least["issue"], 1.0)
 
     def test_units(self):
-        it = model.estimate_kernel(count(float64=10e6, longestWarps=0), CHIP)
+        it = model.estimate_kernel(count(float64=10e6), CHIP)
         self.assertEqual(it.limit, "float64")
         self.assertAlmostEqual(it.least_ms, 1.0)
 
@@ -61,18 +60,18 @@ class Limits(unittest.TestCase):
         one = model.estimate_kernel(count(float32=1e6, blocks=1), CHIP)
         self.assertAlmostEqual(one.least["float32"], 10 * many.least["float32"])
 
-    def test_a_long_warp(self):
-        it = model.estimate_kernel(count(float32=1e6, longestWarps=1e6), CHIP)
-        self.assertEqual(it.limit, "longest warp")
-        self.assertAlmostEqual(it.least_ms, 1.0)
-        self.assertAlmostEqual(it.most["longest warp"], 4.0)
-
-    def test_a_block_that_ends_late(self):
+    def test_span(self):
         it = model.estimate_kernel(
-            count(float32=1e6, longestWarps=1e5, lastBlocks=5e5), CHIP)
-        self.assertEqual(it.most_limit, "last block")
-        self.assertAlmostEqual(it.most["last block"], 2.0)
-        self.assertNotIn("last block", it.least)
+            count(float32=1e6, leastSpan=2e6, mostSpan=5e6), CHIP)
+        self.assertEqual((it.limit, it.most_limit), ("span", "span"))
+        self.assertAlmostEqual(it.least_ms, 2.0)
+        self.assertAlmostEqual(it.most_ms, it.work["float32"] + 5.0)
+
+    def test_work(self):
+        it = model.estimate_kernel(count(float32=1e9, leastSpan=2e6), CHIP)
+        self.assertEqual((it.limit, it.most_limit), ("float32", "float32"))
+        self.assertAlmostEqual(it.least_ms, 100)
+        self.assertAlmostEqual(it.most_ms, 102)
 
     def test_memory(self):
         # 64 MB, which the cache cannot hold, and 32 KB, which it can.
@@ -84,9 +83,9 @@ class Limits(unittest.TestCase):
             count(globalSectors=2e6, distinctSectors=1e3), CHIP)
         self.assertEqual(small.least["DRAM"], 0)
         self.assertAlmostEqual(small.least["L2"], 32e-6)
-        self.assertAlmostEqual(small.most["L2"], 0.064)
+        self.assertAlmostEqual(small.work["L2"], 0.064)
         unknown = dataclasses.replace(CHIP, l2_bytes_per_clock=None)
-        self.assertNotIn("L2", model.estimate_kernel(count(), unknown).most)
+        self.assertNotIn("L2", model.estimate_kernel(count(), unknown).work)
 
     def test_least_is_never_more_than_most(self):
         for chip in CHIPS.values():
@@ -99,38 +98,18 @@ class Limits(unittest.TestCase):
         chip = dataclasses.replace(CHIP, launch_us=1.0, graph_us=0.5, wait_us=5.0)
         report = {"kernels": {"k": count(launches=3)},
                   "host": {"launches": 3, "graphKernels": 0, "waits": 2}}
-        frame = model.estimate_frame(report, chip, {})
+        frame = model.estimate_frame(report, chip)
         self.assertEqual(frame.kernels["k"].limit, "launch")
         self.assertAlmostEqual(frame.least_ms, 0.003)
         self.assertAlmostEqual(frame.most_ms, 0.013)
         report["host"] = {"launches": 0, "graphKernels": 3, "waits": 1}
-        frame = model.estimate_frame(report, chip, {})
+        frame = model.estimate_frame(report, chip)
         self.assertAlmostEqual(frame.least_ms, 0.0015)
         self.assertAlmostEqual(frame.most_ms, 0.0065)
 
     def test_a_kernel_that_ran_nothing(self):
         it = model.estimate_kernel(count(blocks=0, warps=0, launches=0), CHIP)
         self.assertEqual(it.most_ms, 0)
-
-
-class Occupancy(unittest.TestCase):
-    def test_limits(self):
-        def warps(**changes):
-            return model.count_warps(model.Resources(**{
-                "threads": 64, "block_memory": 0, "registers": 32, **changes}), CHIP)
-
-        self.assertEqual(warps(), 64)
-        self.assertEqual(warps(registers=64), 32)
-        self.assertEqual(warps(registers=65), 28)
-        self.assertEqual(warps(block_memory=10000), 20)
-        self.assertEqual(warps(threads=1024, registers=100), 32)
-        self.assertEqual(model.count_warps(None, CHIP), 64)
-
-    def test_latency_needs_warps(self):
-        counts = count(loadGlobal=1e6, warps=10000, longestWarps=0)
-        full = model.estimate_kernel(counts, CHIP)
-        half = model.estimate_kernel(counts, CHIP, model.Resources(64, 0, 64))
-        self.assertAlmostEqual(half.most["latency"] / full.most["latency"], 2)
 
 
 class Data(unittest.TestCase):

@@ -76,6 +76,11 @@ pikoTestDriverHostCounts(struct PikoTestDriverHostCounts *counts) {
   state().defers = on != 0;
 }
 
+[[gnu::visibility("default")]] int pikoTestDriverLatencies(const char *cycles) {
+  Lock lock(state().lock);
+  return parseLatencies(cycles ? cycles : "", state().latencies) ? 0 : 1;
+}
+
 [[gnu::visibility("default")]] int pikoTestDriverModes(const char *names) {
   Lock lock(state().lock);
   return !parseModes(names, state().modes).empty();

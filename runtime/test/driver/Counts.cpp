@@ -30,6 +30,8 @@ static constexpr Member members[] = {
     {"laneInstructions", &Counts::laneInstructions},
     {"longestWarps", &Counts::longestWarps},
     {"lastBlocks", &Counts::lastBlocks},
+    {"leastSpan", &Counts::leastSpan},
+    {"mostSpan", &Counts::mostSpan},
     {"integer", &Counts::integer},
     {"integer64", &Counts::integer64},
     {"float32", &Counts::float32},
@@ -120,6 +122,8 @@ void piko::testdriver::addCounts(const ptx::Launch &launch, Counts &counts) {
   counts.warps += blockCount * ((ofBlock + ptx::warpSize - 1) / ptx::warpSize);
   counts.longestWarps += launch.longestWarp;
   counts.lastBlocks += launch.lastBlock;
+  counts.leastSpan += static_cast<uint64_t>(launch.span.least);
+  counts.mostSpan += static_cast<uint64_t>(launch.span.most);
   counts.distinctSectors += launch.footprint.sectors();
   for (size_t pc = 0; pc < launch.sites.size(); ++pc) {
     const ptx::Site &site = launch.sites[pc];
@@ -147,7 +151,11 @@ std::string piko::testdriver::describeCounts(const Counts &counts) {
          std::to_string(counts.warpInstructions) + " warp instructions, " +
          part + " % of lanes, " + std::to_string(counts.globalBytes) +
          " bytes of global memory in " + std::to_string(counts.globalSectors) +
-         " sectors";
+         " sectors" +
+         (counts.mostSpan
+              ? ", a span of " + std::to_string(counts.leastSpan) + " to " +
+                    std::to_string(counts.mostSpan) + " cycles"
+              : "");
 }
 
 std::string piko::testdriver::toJSON(const Counts &counts) {

@@ -147,6 +147,88 @@ TEST_F(CountsTest, BlocksThatFindNoRoomBeginLater) {
   EXPECT_EQ(counts().lastBlocks, 4 * counts().longestWarps);
 }
 
+class SpanTest : public CountsTest {
+protected:
+  void SetUp() override {
+    CountsTest::SetUp();
+    ASSERT_EQ(pikoTestDriverLatencies("4,20,30,200"), 0);
+  }
+  void TearDown() override {
+    pikoTestDriverLatencies("");
+    CountsTest::TearDown();
+  }
+  /// Cycles that a text takes more than none.
+  std::pair<int64_t, int64_t>
+  spansOf(const std::string &text, uint32_t threads = 32, uint32_t blocks = 1) {
+    auto measure = [&](const std::string &body) {
+      pikoTestDriverReset();
+      run(body, {}, threads, blocks);
+      return counts();
+    };
+    const PikoTestDriverCounts none = measure(""), some = measure(text);
+    return {int64_t(some.leastSpan - none.leastSpan),
+            int64_t(some.mostSpan - none.mostSpan)};
+  }
+  using Spans = std::pair<int64_t, int64_t>;
+};
+
+TEST_F(SpanTest, WaitsForWhatIsRead) {
+  // One a cycle, and each 4 behind the one that it reads.
+  EXPECT_EQ(spansOf("add.s32 %r5, %r1, 1; add.s32 %r6, %r1, 2;"
+                    "add.s32 %r7, %r1, 3;"),
+            Spans(3, 3));
+  EXPECT_EQ(spansOf("add.s32 %r5, %r1, 1; add.s32 %r6, %r5, 2;"
+                    "add.s32 %r7, %r6, 3;"),
+            Spans(9, 9));
+  // A branch waits for its predicate.
+  EXPECT_EQ(spansOf("setp.lt.u32 %p1, %r1, 0; @%p1 add.s32 %r5, %r1, 1;"),
+            Spans(5, 5));
+}
+
+// The address is computed just before: 4 cycles.
+TEST_F(SpanTest, LoadsTakeAsLongAsTheirMemory) {
+  EXPECT_EQ(spansOf("ld.global.b64 %rd6, [%rd3]; add.s64 %rd7, %rd6, 1;"),
+            Spans(206, 206));
+  // Both on their way; the second one finds what the first one has asked for.
+  EXPECT_EQ(spansOf("ld.global.b64 %rd6, [%rd3]; ld.global.b64 %rd7, [%rd3];"
+                    "add.s64 %rd7, %rd6, %rd7;"),
+            Spans(206, 206));
+  EXPECT_EQ(spansOf("ld.global.b64 %rd6, [%rd3];"), Spans(5, 5));
+  // One behind the other. A fence empties the block's cache.
+  const std::string twice =
+                        "ld.global.b64 %rd6, [%rd3]; add.s64 %rd7, %rd6, 0;",
+                    again =
+                        "ld.global.b64 %rd6, [%rd3]; add.s64 %rd7, %rd6, 1;";
+  EXPECT_EQ(spansOf(twice + again), Spans(238, 238));
+  EXPECT_EQ(spansOf(twice + "membar.gl;" + again), Spans(239, 409));
+}
+
+// The first of two warps comes 100 iterations later.
+TEST_F(SpanTest, BarriersWaitForTheLast) {
+  const std::string loop = R"(
+    setp.ge.u32 %p1, %r1, 32;
+    @%p1 bra DONE;
+    mov.b32 %r5, 0;
+  LOOP:
+    add.s32 %r5, %r5, 1;
+    setp.lt.u32 %p2, %r5, 100;
+    @%p2 bra LOOP;
+  DONE:)";
+  const std::string chain = "mul.lo.s32 %r6, %r1, 3; mul.lo.s32 %r6, %r6, 3;"
+                            "mul.lo.s32 %r6, %r6, 3; mul.lo.s32 %r6, %r6, 3;";
+  const Spans one = spansOf(loop, 64),
+              both = spansOf(loop + "bar.sync 0;" + chain, 64);
+  EXPECT_GT(one.first, 900);
+  EXPECT_EQ(both.first - one.first, 1 + 3 * 4 + 1);
+}
+
+TEST_F(SpanTest, LatenciesThatAreNone) {
+  for (const char *text : {"4,20,30", "4,20,30,200,1", "4,20,30,x", "4,20,,200",
+                           "4,20,30,-1", " 4,20,30,200", "0,1,1,1", ","})
+    EXPECT_EQ(pikoTestDriverLatencies(text), 1) << text;
+  EXPECT_EQ(pikoTestDriverLatencies("4.5,20,30,200"), 0);
+}
+
 TEST_F(CountsTest, AsJSON) {
   PikoTestDriverCounts counts{};
   counts.launches = 3;

@@ -245,7 +245,12 @@ CUresult piko::cuda::cuModuleGetFunction(CUfunction *function, CUmodule module,
 
 static int registersOf(const piko::ptx::Program &program) {
   // What a compiler would need is less than what is declared.
-  return std::clamp(static_cast<int>(program.registers), 16, mostRegisters);
+  const int most =
+      program.maxRegisters
+          ? std::min(static_cast<int>(program.maxRegisters), mostRegisters)
+          : mostRegisters;
+  return std::clamp(static_cast<int>(program.registers), std::min(16, most),
+                    most);
 }
 
 static int threadsOf(const piko::ptx::Program &program) {

@@ -6,6 +6,7 @@
 #include "Counts.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cstdio>
 #include <cstdlib>
 #include <utility>
@@ -56,6 +57,33 @@ std::string piko::testdriver::parseModes(std::string_view names, Modes &modes) {
   return {};
 }
 
+bool piko::testdriver::parseLatencies(
+    std::string_view text, std::optional<ptx::Latencies> &latencies) {
+  latencies.reset();
+  if (text.empty())
+    return true;
+  ptx::Latencies read;
+  const char *at = text.data(), *end = at + text.size();
+  for (double *cycles :
+       {&read.arithmetic, &read.shared, &read.hit, &read.miss}) {
+    if (cycles != &read.arithmetic && (at == end || *at++ != ','))
+      return false;
+    auto [next, error] = std::from_chars(at, end, *cycles);
+    if (error != std::errc() || !(*cycles > 0))
+      return false;
+    at = next;
+  }
+  if (at == end)
+    latencies = read;
+  return at == end;
+}
+
+/// What the environment says cannot be taken: a test would not be what it says.
+[[noreturn]] static void refuse(const char *variable, const std::string &why) {
+  std::fprintf(stderr, "%s: %s\n", variable, why.c_str());
+  std::exit(1);
+}
+
 State::State() {
   uint64_t count = numberFrom("PIKO_TEST_DRIVER_DEVICES", 1);
   for (uint64_t device = 0; device < count; ++device)
@@ -70,10 +98,14 @@ State::State() {
   printsErrors = numberFrom("PIKO_TEST_DRIVER_ERRORS", 0) != 0;
   defers = numberFrom("PIKO_TEST_DRIVER_DEFER", 0) != 0;
   if (const char *names = std::getenv("PIKO_TEST_DRIVER_MODES"))
-    if (std::string wrong = parseModes(names, modes); !wrong.empty()) {
-      std::fprintf(stderr, "PIKO_TEST_DRIVER_MODES: %s\n", wrong.c_str());
-      std::exit(1);
-    }
+    if (std::string wrong = parseModes(names, modes); !wrong.empty())
+      refuse("PIKO_TEST_DRIVER_MODES", wrong);
+  if (const char *cycles = std::getenv("PIKO_TEST_DRIVER_LATENCIES"))
+    if (!parseLatencies(cycles, latencies))
+      refuse("PIKO_TEST_DRIVER_LATENCIES",
+             "expected four numbers of cycles with commas between them, but "
+             "got '" +
+                 std::string(cycles) + "'");
   failures = parseFailures(std::getenv("PIKO_TEST_DRIVER_FAIL"));
 }
 

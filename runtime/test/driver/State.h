@@ -184,6 +184,9 @@ struct Modes {
   bool apart = false, buffered = false, lazy = false;
 };
 
+/// Sets latencies as the text says; false if it is none.
+bool parseLatencies(std::string_view text,
+                    std::optional<ptx::Latencies> &latencies);
 /// Reads names with commas between them; what is wrong, or nothing.
 std::string parseModes(std::string_view names, Modes &modes);
 
@@ -201,6 +204,7 @@ struct State {
   uint64_t seed = 0;
   uint64_t launches = 0; ///< Of which each has a seed of its own.
   Modes modes;
+  std::optional<ptx::Latencies> latencies; ///< Where spans are counted.
   std::string countsGoTo; ///< As the environment says; empty: nowhere.
   bool printsErrors = false;
   bool defers =

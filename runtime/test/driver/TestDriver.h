@@ -40,6 +40,7 @@
 //                              than one with commas
 //   PIKO_TEST_DRIVER_DEFER     1: as pikoTestDriverDefer
 //   PIKO_TEST_DRIVER_MODES     as pikoTestDriverModes
+//   PIKO_TEST_DRIVER_LATENCIES as pikoTestDriverLatencies
 //   PIKO_TEST_DRIVER_ERRORS    1: texts of errors to stderr as they come
 //   PIKO_TEST_DRIVER_COUNTS    1: counts of all kernels, and what the host has
 //                              asked for, to stderr at the end; launches: each
@@ -90,6 +91,13 @@ struct PikoTestDriverCounts {
   /// Of each launch, the instructions that go by until its last block ends:
   /// each warp runs one at a time, and blocks wait for room; summed.
   uint64_t lastBlocks;
+  /// The span of each launch, in cycles, summed; 0 without
+  /// PIKO_TEST_DRIVER_LATENCIES. Each warp issues its instructions in order,
+  /// one a cycle, as if it were alone, and waits for what they read; blocks
+  /// wait for room. Loads of global memory find it in the first-level cache
+  /// where the launch has touched it before; or where their block has, unless
+  /// what has the same place in 8 KB came between, or a fence.
+  uint64_t leastSpan, mostSpan;
   // Warp instructions by class. Divisions are those that GPUs do by a sequence
   // of instructions, as are remainders and correctly rounded roots.
   uint64_t integer, integer64, float32, float64, special;
@@ -145,6 +153,12 @@ void pikoTestDriverDefer(int on);
 ///   lazy      lazy loading: a function whose handle alone is known is loaded
 ///             by its first launch, an error while the stream is captured
 int pikoTestDriverModes(const char *names);
+
+/// Lets spans be counted. Cycles from issue until a result is there, as
+/// "arithmetic,shared,hit,miss": of an arithmetic instruction and of loads from
+/// shared memory, from the first-level cache and from the second one; empty:
+/// counts none. Returns 1 where that is no text of four positive numbers.
+int pikoTestDriverLatencies(const char *cycles);
 
 /// The names of kernels that were launched, a line each, sorted.
 const char *pikoTestDriverKernels(void);

@@ -49,6 +49,8 @@ void runKernel(const Call &call, const Kernel &kernel,
   launch.apart = state().modes.apart;
   launch.buffered = state().modes.buffered;
   launch.conditions = conditions;
+  if (state().latencies)
+    launch.latencies = &*state().latencies;
   const auto &threads = kernel.threads;
   launch.resident = static_cast<uint64_t>(
       state().multiprocessors *

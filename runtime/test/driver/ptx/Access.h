@@ -46,7 +46,7 @@ private:
 
 /// Counts an access of the active lanes, each of so many bytes, to global
 /// memory.
-void countAccess(const Warp &warp, uint64_t bytes, const Sectors &sectors);
+void countAccess(Warp &warp, uint64_t bytes, const Sectors &sectors);
 
 inline uint8_t *inRegion(const Warp &warp, Space space, uint32_t lane,
                          uint64_t address, uint32_t bytes, uint8_t *region,

@@ -7,6 +7,7 @@
 
 #include "ptx/Access.h"
 #include "ptx/Decoder.h"
+#include "ptx/Machine.h"
 
 #include <algorithm>
 #include <cstring>
@@ -78,6 +79,9 @@ void change(Warp &warp, const Instruction &it) {
       if (value != value)
         value = std::bit_cast<float>(0x7fffffffu);
     write<space>(warp, place, address, &value, sizeof(T), it.order);
+    if constexpr (std::is_unsigned_v<T> && space != Space::Shared)
+      if (isGlobal<space>(address))
+        warp.noteChange(address, value);
     if (!it.negated)
       warp.lanes<T>(it.result)[lane] = old;
   };
@@ -136,6 +140,7 @@ bool decodeChange(Decoding &d) {
   const size_t first = hasResult ? 1 : 0;
   d.finish(first + (operation == CompareAndSwap ? 3 : 2));
   d.it.counted = Class::Atomic;
+  d.it.space = space;
   d.it.variant = operation;
   d.it.negated = !hasResult;
   if (hasResult)
@@ -159,6 +164,8 @@ bool decodeChange(Decoding &d) {
 void fence(Warp &warp, const Instruction &it) {
   if (warp.buffer && it.variant)
     warp.changed |= warp.buffer->flush();
+  if (it.variant)
+    warp.block.cache.clear();
 }
 
 bool decodeFence(Decoding &d) {

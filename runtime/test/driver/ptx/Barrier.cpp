@@ -39,7 +39,7 @@ void synchronize(Warp &warp, const Instruction &it) {
 }
 
 /// However long: what is waited for may be another block's.
-void sleep(Warp &warp, const Instruction &) { warp.sleep(); }
+void sleep(Warp &warp, const Instruction &) { warp.sleepInLoop(); }
 
 bool decodeSleep(Decoding &d) {
   constexpr Type nanoseconds{Kind::Unsigned, 32};

@@ -98,6 +98,9 @@ private:
   Operand placeOf(const std::string &name, uint8_t bytes);
   void freeLocals(size_t statement);
   uint64_t allocate(uint64_t &end, const Variable &variable);
+  void append(const Instruction &instruction,
+              const std::vector<Operand> &read = {},
+              const std::vector<Operand> &written = {});
 
   const ModuleSyntax &module;
   const Symbols &symbols;
@@ -107,6 +110,8 @@ private:
   std::map<std::string, std::vector<std::string>> callGraph;
   std::vector<const FunctionSyntax *> pending;
   std::map<std::pair<uint64_t, uint8_t>, Operand> constants;
+  /// Of registers, by bank and offset.
+  std::map<std::pair<uint8_t, uint32_t>, uint32_t> numbers;
   uint64_t sharedEnd = sharedStart, localEnd = localStart, callEnd = callStart;
 
   // Of the function that is decoded.
@@ -339,9 +344,26 @@ void ProgramDecoder::decodeStatement(const Statement &statement) {
     tables[pc] = decoding.branchTable;
   if (!decoding.callee.empty())
     callees[pc] = decoding.callee;
-  program.code.push_back(decoding.it);
+  append(decoding.it, decoding.read, decoding.written);
   if (decoding.behind.run)
-    program.code.push_back(decoding.behind);
+    append(decoding.behind);
+}
+
+void ProgramDecoder::append(const Instruction &instruction,
+                            const std::vector<Operand> &read,
+                            const std::vector<Operand> &written) {
+  program.dependences.push_back(
+      {static_cast<uint32_t>(program.dependenceNumbers.size()),
+       static_cast<uint16_t>(read.size()),
+       static_cast<uint16_t>(written.size())});
+  for (const auto *operands : {&read, &written})
+    for (const Operand &it : *operands) {
+      auto [found, isNew] =
+          numbers.try_emplace({it.bank, it.offset}, program.registerCount);
+      program.registerCount += isNew;
+      program.dependenceNumbers.push_back(found->second);
+    }
+  program.code.push_back(instruction);
 }
 
 void ProgramDecoder::linkLabels(const FunctionSyntax &function,
@@ -386,9 +408,9 @@ void ProgramDecoder::decodeFunction(const FunctionSyntax &function) {
     freeLocals(i);
   }
   starts.push_back(static_cast<uint32_t>(program.code.size()));
-  program.code.push_back(implicitReturn(function.statements.empty()
-                                            ? function.line
-                                            : function.statements.back().line));
+  append(implicitReturn(function.statements.empty()
+                            ? function.line
+                            : function.statements.back().line));
   linkLabels(function, starts);
   findReconvergence(program, first);
 }
@@ -415,6 +437,7 @@ Program ProgramDecoder::decode(std::string_view name) {
   if (entry == module.functions.end())
     throw ParseError(1, "expected an entry '" + std::string(name) + "'");
   program.name = entry->name;
+  program.maxRegisters = entry->maxRegisters;
   program.maxThreads = entry->maxThreads;
   program.requiredThreads = entry->requiredThreads;
   placeModuleVariables();

@@ -79,6 +79,7 @@ public:
   std::string branchTable; ///< As well, and it.extra.
   /// Behind a call: copies its results. None if its handler is null.
   Instruction behind;
+  std::vector<Operand> read, written; ///< Registers.
 
 private:
   Operand named(const Argument &argument, Type type, bool exact);

@@ -128,12 +128,12 @@ Operand Decoding::result(const Argument &argument, Type type) {
         type.isPredicate() ? 0 : static_cast<uint8_t>(type.bytes()));
   if (argument.kind != Argument::Register)
     fail("expected a register for the result");
-  return named(argument, type, true);
+  return written.emplace_back(named(argument, type, true));
 }
 
 Operand Decoding::value(const Argument &argument, Type type) {
   if (argument.kind == Argument::Register)
-    return named(argument, type, true);
+    return read.emplace_back(named(argument, type, true));
   return constantOf(argument, type);
 }
 
@@ -142,12 +142,12 @@ Operand Decoding::wideResult(const Argument &argument, Type type) {
     return scope.scratch(8);
   if (argument.kind != Argument::Register)
     fail("expected a register for the result");
-  return named(argument, type, false);
+  return written.emplace_back(named(argument, type, false));
 }
 
 Operand Decoding::wideValue(const Argument &argument, Type type) {
   if (argument.kind == Argument::Register)
-    return named(argument, type, false);
+    return read.emplace_back(named(argument, type, false));
   return constantOf(argument, type);
 }
 
@@ -160,7 +160,7 @@ Operand Decoding::predicate(const Argument &argument, bool *negated) {
     return scope.constant(argument.value ? ~uint64_t(0) : 0, 0);
   if (argument.kind != Argument::Register)
     fail("expected a predicate");
-  return named(argument, Type{Kind::Predicate, 1}, true);
+  return read.emplace_back(named(argument, Type{Kind::Predicate, 1}, true));
 }
 
 Operand Decoding::result(size_t number, Type type) {
@@ -181,7 +181,7 @@ void Decoding::address(size_t number) {
   it.offset = given.value;
   if (base.kind == Argument::Register) {
     Type type;
-    it.a = scope.registerOf(base.name, &type);
+    it.a = read.emplace_back(scope.registerOf(base.name, &type));
     if (type.bits < 32)
       fail("expected an address of 32 or 64 bits");
     return;

@@ -14,13 +14,17 @@ namespace piko::ptx {
 /// move, however large its caches are. A bit for each, by groups of 64.
 class Footprint {
 public:
-  void add(uint64_t sector) {
+  /// Returns whether it is a new one.
+  bool add(uint64_t sector) {
     uint64_t group = sector / 64;
     if (!last || group != lastGroup) {
       last = &groups[group];
       lastGroup = group;
     }
-    *last |= uint64_t(1) << sector % 64;
+    const uint64_t bit = uint64_t(1) << sector % 64;
+    const bool isNew = !(*last & bit);
+    *last |= bit;
+    return isNew;
   }
   void add(const Footprint &other) {
     for (const auto &[group, bits] : other.groups)

@@ -133,6 +133,7 @@ void Block::begin(uint64_t number) {
   for (auto &warp : warps)
     warp->reset();
   random.seed(launch.seed + number);
+  cache.clear();
   arrived = yielded = false;
 }
 
@@ -141,6 +142,13 @@ uint64_t Block::ran() const {
   for (const auto &warp : warps)
     most = std::max(most, warp->ran);
   return most;
+}
+
+Time Block::time() const {
+  Time last;
+  for (const auto &warp : warps)
+    last.wait(warp->scoreboard.now);
+  return last;
 }
 
 Block::Turn Block::run() {
@@ -154,6 +162,7 @@ Block::Turn Block::run() {
     if (!liveThreads()) {
       warps.front()->changed |= stores.flush();
       launch.longestWarp = std::max(launch.longestWarp, ran());
+      launch.span.wait(time());
       return Turn::Ended;
     }
     if (any)
@@ -209,11 +218,18 @@ bool Block::releaseBarriers() {
     if (waiting[barrier] && waiting[barrier] >= wanted[barrier]) {
       released = true;
       int holding = 0;
-      for (const auto &warp : warps)
+      Time last;
+      for (const auto &warp : warps) {
         holding += std::popcount(warp->lanesThatHold(barrier));
-      for (auto &warp : warps)
+        if (warp->isAt(barrier))
+          last.wait(warp->scoreboard.now);
+      }
+      for (auto &warp : warps) {
+        if (warp->isAt(barrier))
+          warp->scoreboard.now.wait(last);
         warp->release(barrier, waiting[barrier],
                       static_cast<uint32_t>(holding));
+      }
     }
   return released;
 }
@@ -298,6 +314,7 @@ private:
   struct Place {
     uint64_t clock; ///< Instructions that have been run there.
     uint64_t start; ///< When its block began.
+    Time startTime; ///< The same in cycles.
     uint64_t number;
     Block *block; ///< Null: it has not begun.
     /// Whether the other one goes first.
@@ -353,7 +370,7 @@ void BlockQueue::run() {
   uint64_t next = 0;
   std::priority_queue<Place> places;
   for (; next < std::min(count, launch.resident); ++next)
-    places.push({0, 0, next, nullptr});
+    places.push({0, 0, {}, next, nullptr});
   while (!places.empty()) {
     Place place = places.top();
     places.pop();
@@ -368,6 +385,8 @@ void BlockQueue::run() {
     if (turn == Block::Turn::Ended) {
       ++ended;
       launch.lastBlock = std::max(launch.lastBlock, place.clock);
+      place.startTime = place.startTime.after(place.block->time());
+      launch.span.wait(place.startTime);
       free.push_back(std::exchange(place.block, nullptr));
       if (next == count)
         continue;

@@ -56,12 +56,23 @@ struct Launch {
   bool buffered = false;
   Conditions *conditions = nullptr; ///< Of the graph that launches it.
   uint64_t resident = 1; ///< How many blocks find room at the same time.
+  const Latencies *latencies = nullptr; ///< Null: nobody asks for times.
   std::vector<Site> sites{};
   Footprint footprint{};
   /// The most that one warp ran.
   uint64_t longestWarp = 0;
   /// What went by until the last block ended.
   uint64_t lastBlock = 0;
+  /// The same in cycles, of warps of which each has a multiprocessor for
+  /// itself.
+  Time span{};
+  /// By address, of a cooperative launch with latencies: what atomic operations
+  /// made of it, and when.
+  struct Change {
+    uint64_t value;
+    Time at;
+  };
+  std::unordered_map<uint64_t, std::vector<Change>> changes{};
 };
 
 /// Memory of the blocks that run: registers, local and shared memory. Kept from
@@ -113,8 +124,11 @@ public:
   uint64_t pick(uint64_t count) { return random() % count; }
   /// The instructions that its longest warp has run.
   uint64_t ran() const;
+  /// When its last warp is where it is.
+  Time time() const;
 
   Launch &launch;
+  SectorCache cache; ///< Where the launch has latencies.
   std::array<uint32_t, 3> index{};
   uint32_t threadCount;
   uint64_t sharedSize;

@@ -41,19 +41,29 @@ void piko::ptx::findRange(const Warp &warp, const Instruction &it,
   warp.site->distance = range.distance;
 }
 
-void piko::ptx::countAccess(const Warp &warp, uint64_t bytes,
+void piko::ptx::countAccess(Warp &warp, uint64_t bytes,
                             const Sectors &sectors) {
   if (!sectors.size())
     return;
   warp.site->sectors += sectors.size();
   warp.site->bytes += bytes * static_cast<uint32_t>(std::popcount(warp.active));
-  for (uint64_t sector : sectors)
-    warp.block.launch.footprint.add(sector);
+  Launch &launch = warp.block.launch;
+  bool isInAll = true, isInLittle = true;
+  for (uint64_t sector : sectors) {
+    isInAll &= !launch.footprint.add(sector);
+    if (launch.latencies)
+      isInLittle &= warp.block.cache.access(sector);
+  }
+  const Instruction &it = warp.program->code[warp.pc];
+  if (launch.latencies && it.counted != Class::Atomic &&
+      it.order == Order::Weak)
+    warp.scoreboard.load(*warp.program, warp.pc, *launch.latencies, isInAll,
+                         isInLittle);
 }
 
 namespace {
 
-void count(const Warp &warp, const Instruction &it, const Sectors &sectors) {
+void count(Warp &warp, const Instruction &it, const Sectors &sectors) {
   countAccess(warp, uint64_t(it.element) * it.count, sectors);
 }
 
@@ -68,6 +78,9 @@ void load(Warp &warp, const Instruction &it) {
     read<space>(warp,
                 locate<space>(warp, it, lane, address, sizeof(M), sectors),
                 address, &value, sizeof(M));
+    if (it.order == Order::Strong && warp.block.launch.latencies &&
+        isGlobal<space>(address))
+      value = static_cast<M>(warp.see(address, static_cast<uint64_t>(value)));
     result[lane] = static_cast<R>(value);
   });
   count(warp, it, sectors);

@@ -250,8 +250,12 @@ bool Parser::parseAttribute(FunctionSyntax &function) {
     function.requiredThreads = parseExtent();
     return true;
   }
-  // They limit registers, of which there are enough here.
-  if (lexer.accept(".minnctapersm") || lexer.accept(".maxnreg")) {
+  if (lexer.accept(".maxnreg")) {
+    function.maxRegisters =
+        static_cast<uint32_t>(lexer.expectCount("a number of registers"));
+    return true;
+  }
+  if (lexer.accept(".minnctapersm")) {
     lexer.expectCount("a number");
     return true;
   }

@@ -15,6 +15,8 @@
 
 #include "ptx/Syntax.h"
 
+#include <span>
+
 namespace piko::ptx {
 
 class Warp;
@@ -139,7 +141,21 @@ struct Copies {
   std::vector<Copy> list;
 };
 
+/// Where the numbers of the registers are that an instruction reads, and
+/// behind them of those that it writes.
+struct Dependences {
+  uint32_t first = 0;
+  uint16_t read = 0, written = 0;
+};
+
 struct Program {
+  std::span<const uint32_t> readBy(const Dependences &on) const {
+    return std::span(dependenceNumbers).subspan(on.first, on.read);
+  }
+  std::span<const uint32_t> writtenBy(const Dependences &on) const {
+    return std::span(dependenceNumbers).subspan(on.first + on.read, on.written);
+  }
+
   std::string name;
   std::vector<Instruction> code;
   std::vector<uint8_t> constants;
@@ -148,6 +164,9 @@ struct Program {
   std::vector<std::vector<Operand>> lists; ///< Of vectors.
   std::vector<std::vector<uint32_t>> branchTables;
   std::vector<Copies> calls;
+  std::vector<Dependences> dependences; ///< By instruction.
+  std::vector<uint32_t> dependenceNumbers;
+  uint32_t registerCount = 0;  ///< That dependences number.
   uint32_t filledBytes = 0;    ///< Of a warp: registers of bank 0.
   uint32_t registerBytes = 0;  ///< Of a warp: those of bank 2.
   uint32_t localBytes = 0;     ///< Of a thread.
@@ -155,6 +174,7 @@ struct Program {
   uint32_t callBytes = 0;      ///< Of a thread: parameters of calls.
   uint32_t sharedBytes = 0;    ///< Of a block, without dynamic ones.
   uint32_t registers = 0;      ///< As declared, in units of 32 bits.
+  uint32_t maxRegisters = 0;   ///< Of a thread; 0: not given.
   std::array<uint32_t, 3> maxThreads{}, requiredThreads{}; ///< 0: not given.
 };
 

@@ -83,6 +83,7 @@ struct FunctionSyntax {
   std::map<std::string, std::vector<std::string>, std::less<>> branchTargets;
   /// Of .maxntid and .reqntid, each 0 where not given.
   std::array<uint32_t, 3> maxThreads{}, requiredThreads{};
+  uint32_t maxRegisters = 0;
 };
 
 struct ModuleSyntax {

@@ -81,6 +81,9 @@ void Warp::reset() {
         lanes<uint32_t>(it.place)[lane] = value;
     }
   ran = 0;
+  seen.clear();
+  if (block.launch.latencies)
+    scoreboard.reset(*program);
   live = threads == warpSize ? allLanes : (1u << threads) - 1;
   groups.assign(1, Group());
   groups[0].state = Group::Ready;
@@ -118,10 +121,35 @@ bool Warp::select() {
   return false;
 }
 
+void Warp::noteChange(uint64_t address, uint64_t value) {
+  Launch &launch = block.launch;
+  if (!launch.latencies || !launch.cooperative)
+    return;
+  std::vector<Launch::Change> &changes = launch.changes[address];
+  changes.push_back({value, scoreboard.now.after({launch.latencies->miss,
+                                                  launch.latencies->miss})});
+  seen[address] = changes.size();
+  scoreboard.endLoop();
+}
+
+uint64_t Warp::see(uint64_t address, uint64_t value) {
+  Launch &launch = block.launch;
+  auto found = launch.changes.find(address);
+  if (found == launch.changes.end() || found->second.back().value != value)
+    return value;
+  size_t &next = seen[address];
+  if (next == found->second.size())
+    return value;
+  const Launch::Change &change = found->second[next++];
+  scoreboard.now.wait(change.at);
+  return change.value;
+}
+
 uint32_t Warp::runGroup(uint32_t steps) {
   Group &group = groups[current];
   const Instruction *code = program->code.data();
   Site *sites = block.launch.sites.data();
+  const Latencies *latencies = block.launch.latencies;
   const uint32_t mask = group.mask, end = group.reconverge;
   const auto count = static_cast<uint32_t>(std::popcount(mask));
   reselect = exhausted = false;
@@ -138,6 +166,8 @@ uint32_t Warp::runGroup(uint32_t steps) {
     const Instruction &instruction = code[pc];
     site = sites + pc;
     ++site->warps;
+    if (latencies)
+      scoreboard.issue(*program, pc, *latencies);
     if (!instruction.guarded) {
       active = mask;
       site->lanes += count;
@@ -320,6 +350,12 @@ void Warp::waitAtBarrier(uint32_t barrier, uint32_t arrivals, bool aligned) {
   block.arrive();
 }
 
+bool Warp::isAt(uint32_t barrier) const {
+  return std::any_of(groups.begin(), groups.end(), [&](const Group &group) {
+    return group.state == Group::AtBarrier && group.barrier == barrier;
+  });
+}
+
 uint32_t Warp::lanesThatHold(uint32_t barrier) const {
   uint32_t lanes = 0;
   for (const Group &group : groups) {
@@ -373,6 +409,11 @@ void Warp::sleep() {
   reselect = true;
 }
 
+void Warp::sleepInLoop() {
+  scoreboard.sleep(pc);
+  sleep();
+}
+
 bool Warp::yield() {
   Group &group = groups[current];
   if (!block.takesTurns() || std::exchange(group.yielded, false))
@@ -382,6 +423,7 @@ bool Warp::yield() {
   --site->warps;
   site->lanes -= static_cast<uint64_t>(std::popcount(active));
   --ran;
+  scoreboard.takeBack();
   sleep();
   return true;
 }

@@ -17,10 +17,11 @@
 #ifndef PIKO_TEST_DRIVER_PTX_WARP_H
 #define PIKO_TEST_DRIVER_PTX_WARP_H
 
-#include "ptx/Program.h"
+#include "ptx/Scoreboard.h"
 
 #include <bit>
 #include <span>
+#include <unordered_map>
 
 namespace piko::ptx {
 
@@ -111,9 +112,18 @@ public:
   void waitAtBarrier(uint32_t barrier, uint32_t arrivals, bool aligned);
   /// Until the block's next turn.
   void sleep();
+  /// The same, in a loop that waits for memory to change.
+  void sleepInLoop();
   /// The same, in front of the current instruction, which changes memory that
   /// other blocks ask for, too; false if it is this block's turn to do so.
   bool yield();
+  /// Where times are asked for and blocks wait for each other: an atomic
+  /// operation has changed memory that they share; others see it later.
+  void noteChange(uint64_t address, uint64_t value);
+  /// What a strong load gets where \p value is: of an address that atomic
+  /// operations change one value after the other, at the time of its change, so
+  /// that a loop that waits ends when it would have.
+  uint64_t see(uint64_t address, uint64_t value);
   /// Whether all lanes of \p members that live are here; `active` is them,
   /// then.
   bool gather(uint32_t members);
@@ -121,7 +131,9 @@ public:
   /// Where nothing else can run, lanes that wait for others to reconverge go on
   /// without them; returns whether there are any.
   bool separate();
-  /// Lanes that wait at a barrier and bring it a predicate that holds.
+  /// Whether lanes wait at a barrier.
+  bool isAt(uint32_t barrier) const;
+  /// Those that bring it a predicate that holds.
   uint32_t lanesThatHold(uint32_t barrier) const;
   /// Lets groups go on that wait at a barrier of \p arrived threads, for
   /// \p holding of which the predicate that they brought holds.
@@ -144,6 +156,7 @@ public:
   uint32_t live = 0;
   bool changed = false;   ///< Wrote what others may read, and it was new.
   uint64_t ran = 0;       ///< Instructions of this block.
+  Scoreboard scoreboard;  ///< Where the launch has latencies.
   Site *site = nullptr;   ///< Of the current instruction.
   uint32_t firstLane = 0; ///< Of atomic operations; others follow in a circle.
   uint64_t sharedBytes = 0;
@@ -164,6 +177,7 @@ private:
   void finish(int32_t group);
   void removeLanes(uint32_t mask, bool fromCallers);
 
+  std::unordered_map<uint64_t, size_t> seen; ///< Changes, by address.
   int32_t current = -1;
   bool reselect = false;  ///< The current group is not what runs next.
   bool exhausted = false; ///< It has had its turn.
