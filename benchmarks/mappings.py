@@ -19,10 +19,10 @@ and how many choices are within 5 % and within 15 % of the best. Ways of choosin
 that come to the same versions have the same time: it is the same code. What takes
 less than --least milliseconds is left out, and counted.
 
-With --fit the numbers of the cost model (lib/Transforms/LaneCycles.cpp) are fitted
-to the ratios that were measured, by damped Gauss-Newton steps on the logarithms of
-the ratios of expected to measured time with a prior that holds each number where it
-is, and printed as they belong into that file.
+With --fit the numbers of the cost model (Vectorize/Cost/LaneCycles.cpp of
+lib/Transforms) are fitted to the ratios that were measured, by damped Gauss-Newton
+steps on the logarithms of the ratios of expected to measured time with a prior that
+holds each number where it is, and printed as they belong into that file.
 """
 
 import argparse

@@ -16,7 +16,10 @@ extern "C" {
   return "allow_user_poisoning=0"
          // A std::vector that libLLVM has filled has stale annotations.
          ":detect_container_overflow=0"
-         ":detect_stack_use_after_return=1";
+         ":detect_stack_use_after_return=1"
+         // LLVM gives threads signal stacks of its own, which would be unmapped
+         // in place of the sanitizer's when they end.
+         ":use_sigaltstack=0";
 }
 
 [[gnu::visibility("default"), gnu::used]] const char *

@@ -6,7 +6,8 @@ format    every C++ file is formatted as .clang-format says (--fix: make it so)
 licence   every source file has the licence line at its top
 paths     no file holds an absolute path of somebody's machine
 layers    the runtime's common part knows nothing of the targets' parts, nor the
-          CPU's of CUDA's
+          CPU's of CUDA's; no library includes a file of another one by its path
+folders   none of those by level has more files than a reader looks through
 tidy      clang-tidy over the compile commands of a build (--build DIR), or over
           the files without headers of LLVM, a folder at a time (--quick)
 all       all but the last
@@ -98,12 +99,22 @@ def paths():
 def layers():
     """runtime/common includes none of runtime/cpu, runtime/gpu and runtime/cuda,
     and declares none of the first two's types itself; those two include nothing
-    of runtime/cuda."""
+    of runtime/cuda. No library includes a file of another one by its path."""
     runtime = ROOT / "runtime"
     foreign = set()
     for header in [*runtime.glob("cpu/*.h"), *runtime.glob("gpu/*.h")]:
         foreign |= set(re.findall(r"^(?:class|struct) (\w+)", header.read_text(), re.M))
     faults = 0
+    for name in sources():
+        if not re.match(r"(lib|include|tools)/.*\.(h|cpp)$", name):
+            continue
+        for number, line in enumerate((ROOT / name).read_text().splitlines(), 1):
+            if re.match(r'#include "\.\./\.\./', line):
+                print(
+                    f"{name}:{number}: expected a header of its own library, or of"
+                    " include"
+                )
+                faults += 1
     for path in sorted([*runtime.glob("cpu/*"), *runtime.glob("gpu/*")]):
         for number, line in enumerate(path.read_text().splitlines(), 1):
             if re.match(r'#include "cuda/', line):
@@ -123,6 +134,25 @@ def layers():
                     f" target in runtime/common, but got '{name}'"
                 )
                 faults += 1
+    return faults
+
+
+# Whose folders are those of the levels, and how many files one has at most.
+BY_LEVEL = ("lib/Transforms", "include/Piko/Transforms", "test/Transforms")
+MOST_FILES = 25
+
+
+def folders():
+    """A folder by level has MOST_FILES files, without those of its own folders."""
+    counts = {}
+    for name in sources():
+        folder = os.path.dirname(name)
+        counts[folder] = counts.get(folder, 0) + 1
+    faults = 0
+    for folder, count in sorted(counts.items()):
+        if count > MOST_FILES and folder.startswith(BY_LEVEL):
+            print(f"{folder}: expected at most {MOST_FILES} files, but it has {count}")
+            faults += 1
     return faults
 
 
@@ -233,7 +263,7 @@ def main():
     )
     parser.add_argument(
         "check",
-        choices=["format", "licence", "paths", "layers", "tidy", "all"],
+        choices=["format", "licence", "paths", "layers", "folders", "tidy", "all"],
     )
     parser.add_argument("--fix", action="store_true")
     parser.add_argument("--build", default="build")
@@ -245,6 +275,7 @@ def main():
         "licence": licence,
         "paths": paths,
         "layers": layers,
+        "folders": folders,
         "tidy": lambda: (tidy_quick if args.quick else tidy)(args.build, args.jobs),
     }
     names = [args.check]

@@ -12,9 +12,9 @@
 
 #include "PikoToGPU.h"
 
-#include "../../Transforms/Collectives.h"
-#include "../../Transforms/LoopSplitter.h"
-#include "../../Transforms/ParallelLoops.h"
+#include "Piko/Transforms/Storage/Collectives.h"
+#include "Piko/Transforms/Storage/LoopSplitter.h"
+#include "Piko/Transforms/Storage/ParallelLoops.h"
 
 #include "Piko/Dialect/Piko/IR/BinArithmetic.h"
 #include "Piko/Dialect/Piko/IR/CodeBuilder.h"

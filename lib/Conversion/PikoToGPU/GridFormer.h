@@ -5,7 +5,7 @@
 #ifndef PIKO_LIB_CONVERSION_PIKOTOGPU_GRIDFORMER_H
 #define PIKO_LIB_CONVERSION_PIKOTOGPU_GRIDFORMER_H
 
-#include "../../Transforms/UnitFormer.h"
+#include "Piko/Transforms/Storage/UnitFormer.h"
 
 #include "Piko/Conversion/UnitOrder.h"
 

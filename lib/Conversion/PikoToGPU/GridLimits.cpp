@@ -4,8 +4,8 @@
 
 #include "PikoToGPU.h"
 
-#include "../../Transforms/ParallelLoops.h"
 #include "../GPUToNVVM/ExactFunctions.h"
+#include "Piko/Transforms/Storage/ParallelLoops.h"
 
 using namespace mlir;
 using namespace piko;

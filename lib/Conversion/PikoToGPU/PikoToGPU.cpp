@@ -19,8 +19,8 @@
 #include "GridFormer.h"
 #include "Mapping/SetupSplit.h"
 
-#include "../../Transforms/LoopSplitter.h"
-#include "../../Transforms/ParallelLoops.h"
+#include "Piko/Transforms/Storage/LoopSplitter.h"
+#include "Piko/Transforms/Storage/ParallelLoops.h"
 
 #include "Piko/Conversion/UnitOrder.h"
 #include "Piko/Dialect/Piko/IR/Marks.h"

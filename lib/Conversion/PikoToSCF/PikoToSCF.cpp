@@ -5,7 +5,7 @@
 
 #include "Tiles.h"
 
-#include "../../Transforms/PixelAccess.h"
+#include "Piko/Transforms/Storage/PixelAccess.h"
 
 #include "Piko/Conversion/Passes.h"
 #include "Piko/Dialect/Piko/IR/BinArithmetic.h"

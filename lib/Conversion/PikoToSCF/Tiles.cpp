@@ -8,7 +8,7 @@
 
 #include "Tiles.h"
 
-#include "../../Transforms/PixelAccess.h"
+#include "Piko/Transforms/Storage/PixelAccess.h"
 
 #include "Piko/Dialect/Piko/IR/BinArithmetic.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"

@@ -20,7 +20,7 @@ constexpr uint32_t newestMajor = 8, newestMinor = 8;
 constexpr uint32_t mostShared = 48 << 10;
 constexpr int mostThreads = 1024, mostThreadsOfProcessor = 2048,
               mostBlocksOfProcessor = 32, mostRegisters = 255,
-              registersOfProcessor = 65536, sharedOfProcessor = 100 << 10;
+              registersOfProcessor = 65536;
 
 /// Puts texts into the buffers of cuModuleLoadDataEx's options.
 class Log {
@@ -302,17 +302,28 @@ CUresult piko::cuda::cuFuncGetAttribute(int *value,
                    "attribute " + std::to_string(attribute));
 }
 
+/// Bytes of shared memory that a multiprocessor has.
+static size_t sharedOfProcessor() {
+  const int capability = state().capability;
+  const size_t kilobytes = capability >= 90 && capability < 120   ? 228
+                           : capability == 80 || capability == 87 ? 164
+                                                                  : 100;
+  return kilobytes << 10;
+}
+
 int piko::testdriver::residentBlocks(const ptx::Program &program, int threads,
-                                     size_t dynamicSharedBytes,
-                                     int mostRegisters) {
-  const int registers = std::min(registersOf(program), mostRegisters);
+                                     size_t dynamicSharedBytes) {
+  constexpr int usual = 64;
+  const int registers = program.maxRegisters
+                            ? registersOf(program)
+                            : std::min(registersOf(program), usual);
   const int warps = (threads + 31) / 32;
   const size_t shared = program.sharedBytes + dynamicSharedBytes;
   int blocks =
       std::min({mostBlocksOfProcessor, mostThreadsOfProcessor / (32 * warps),
                 registersOfProcessor / (32 * warps * registers)});
   if (shared)
-    blocks = std::min(blocks, static_cast<int>(sharedOfProcessor / shared));
+    blocks = std::min(blocks, static_cast<int>(sharedOfProcessor() / shared));
   return blocks;
 }
 

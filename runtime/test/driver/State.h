@@ -91,10 +91,10 @@ struct Module : ptx::Symbols {
   }
 };
 
-/// Blocks that run at the same time on a multiprocessor, if a thread has at
-/// most so many registers. A program declares more than it needs.
+/// Blocks that run at the same time on a multiprocessor. A program declares
+/// more registers than it needs: a thread has 64, if it does not say how many.
 int residentBlocks(const ptx::Program &program, int threads,
-                   size_t dynamicSharedBytes, int mostRegisters = 255);
+                   size_t dynamicSharedBytes);
 
 /// Of a stream whose work becomes nodes.
 struct Capture {

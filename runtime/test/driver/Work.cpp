@@ -57,7 +57,7 @@ void runKernel(const Call &call, const Kernel &kernel,
       std::max(1, residentBlocks(
                       function.program,
                       static_cast<int>(threads[0] * threads[1] * threads[2]),
-                      kernel.sharedBytes, /*mostRegisters=*/64)));
+                      kernel.sharedBytes)));
   try {
     ptx::run(launch);
   } catch (const ptx::Fault &fault) {

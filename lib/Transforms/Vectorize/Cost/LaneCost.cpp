@@ -1,0 +1,603 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// What turns of a loop cost as lanes, and one after the other.
+
+#include "Vectorize/Analysis/IterationLanes.h"
+#include "Vectorize/Analysis/LoadChains.h"
+#include "Vectorize/Analysis/LoopStreams.h"
+#include "Vectorize/Cost/LaneCycles.h"
+
+#include "Piko/Analysis/BranchProbability.h"
+#include "Piko/Dialect/Piko/IR/Marks.h"
+#include "Piko/Dialect/Piko/IR/PikoCPU.h"
+
+#include "mlir/Dialect/MemRef/IR/MemRef.h"
+#include "mlir/IR/Matchers.h"
+
+#include <cmath>
+
+using namespace mlir;
+using namespace piko;
+
+/// How many operations test whether an index is linear.
+static constexpr double rowTest = 5;
+
+/// How often a loop turns.
+static constexpr double loopTurns = 8, turnsThatDiffer = 4;
+
+/// How many lanes are at work in a loop that each goes through by itself.
+static constexpr double fullness = 0.85;
+
+namespace {
+
+/// How often code runs, for each time that the loop's lanes do.
+struct Frequency {
+  double serial = 1, vectors = 1;
+
+  Frequency scaled(double bySerial, double byVectors) const {
+    return {serial * bySerial, vectors * byVectors};
+  }
+};
+
+} // namespace
+
+static int64_t countOperations(Region &region) {
+  int64_t count = 0;
+  region.walk([&](Operation *) { ++count; });
+  return count;
+}
+
+/// Whether a program that is right does not come here.
+static bool fails(Region &region) {
+  return !region.empty() && llvm::any_of(region.front(), [](Operation &op) {
+    return op.hasTrait<Failure>();
+  });
+}
+
+static bool mayFail(Region &region) {
+  return region
+      .walk([](Operation *op) {
+        return op->hasTrait<Failure>() ? WalkResult::interrupt()
+                                       : WalkResult::advance();
+      })
+      .wasInterrupted();
+}
+
+static bool hasLoop(Region &region) {
+  return region
+      .walk([](LoopLikeOpInterface) { return WalkResult::interrupt(); })
+      .wasInterrupted();
+}
+
+static bool isFallbackOf(Region &side, Region &other) {
+  return !other.empty() && hasLoop(side) && hasLoop(other) && mayFail(side) &&
+         !mayFail(other);
+}
+
+static Region &getOtherSide(scf::IfOp choice, Region &side) {
+  return &side == &choice.getThenRegion() ? choice.getElseRegion()
+                                          : choice.getThenRegion();
+}
+
+bool piko::isFallback(Region &region) {
+  auto choice = dyn_cast<scf::IfOp>(region.getParentOp());
+  return choice && isFallbackOf(region, getOtherSide(choice, region));
+}
+
+/// Operations of a side that does next to nothing.
+static constexpr int64_t trivial = 16;
+
+/// How often a side of a condition runs, where lanes differ: mostly, if it
+/// stands alone; hardly ever, if it does much more than the other, which does
+/// something, too.
+static Frequency getFrequency(Region &side, Region &other, int64_t laneCount) {
+  constexpr double rare = 0.001;
+  if (isFallbackOf(side, other))
+    return {rare, rare * double(laneCount)};
+  if (!other.empty() && isFallbackOf(other, side))
+    return {1, 1};
+  constexpr int64_t ratio = 2;
+  int64_t count = countOperations(side),
+          countOther = other.empty() ? 0 : countOperations(other);
+  if (countOther > trivial && count > ratio * countOther)
+    return {rare, rare * double(laneCount)};
+  if (countOther <= trivial || countOther > ratio * count)
+    return {0.8, 1};
+  return {0.5, 1};
+}
+
+/// Whether a condition is one more of those that all have to hold: it is all
+/// that one around it does, in place of next to nothing.
+static bool isNextGuard(scf::IfOp choice) {
+  auto outer = dyn_cast<scf::IfOp>(choice->getParentOp());
+  if (!outer || choice->getNextNode() != choice->getBlock()->getTerminator())
+    return false;
+  Region &other = getOtherSide(outer, *choice->getParentRegion());
+  return other.empty() || countOperations(other) <= trivial;
+}
+
+/// Whether code of a loop goes on behind an operation.
+static bool goesOnBehind(Operation *op, Operation *loop) {
+  for (; op != loop; op = op->getParentOp()) {
+    int64_t behind = 0;
+    for (Operation *at = op->getNextNode(); at; at = at->getNextNode())
+      at->walk([&](Operation *) { ++behind; });
+    if (behind > trivial)
+      return true;
+  }
+  return false;
+}
+
+/// Whether a side may be a slow path, as clipping is: it has loops, in place of
+/// next to nothing, and what follows is for both. Nothing says how often it
+/// runs.
+static bool mayBeSlowPath(scf::IfOp choice, Region &side, Operation *loop) {
+  Region &other = getOtherSide(choice, side);
+  return hasLoop(side) && !other.empty() && countOperations(other) <= trivial &&
+         goesOnBehind(choice, loop);
+}
+
+namespace {
+
+/// Adds up what code takes.
+class CostModel {
+public:
+  CostModel(const IterationLanes &lanes, const Cycles &cycles)
+      : lanes(lanes), cycles(cycles) {}
+  explicit CostModel(const IterationLanes &lanes)
+      : CostModel(lanes, getCycles(lanes.getLaneCount())) {}
+  void add(Region &region, Frequency times, bool laneByLane);
+
+  IterationLanes::Cost cost;
+
+  double getFlatTurns(Operation *outer, Operation *inner) const;
+  /// How many turns a lane makes of a loop.
+  double getOwnTurns(Operation *loop) const;
+
+private:
+  void addOperation(Operation *op, Frequency times, bool laneByLane);
+  void addBranches(double part, bool laneByLane) {
+    cost.serial += part;
+    cost.vectors += laneByLane ? part : 0;
+  }
+  void addStructure(Operation *op, Frequency times, bool laneByLane);
+  double getTurns(Operation *loop) const;
+  /// How many of the lanes make a turn of a loop.
+  double getGoing(Operation *loop) const;
+  void addEmission(Operation *op, Frequency times);
+  /// What iterations wait for where turns say where the next ones load.
+  void addChase(LoadOp load, Frequency times, bool laneByLane);
+
+  /// What it takes to bring lanes apart, with what they have.
+  void addTurns(const OrderedGroup &group, Frequency times);
+
+  double getApart(Operation *access) const;
+  bool takesTurns(scf::IfOp choice) const {
+    return choice
+        ->walk([&](Operation *op) {
+          LaneForm form = lanes.getForm(op);
+          bool inTurns = form == LaneForm::Serial || form == LaneForm::Ordered;
+          return inTurns ? WalkResult::interrupt() : WalkResult::advance();
+        })
+        .wasInterrupted();
+  }
+  double getDivision(Operation *op) const;
+  double getScalar(Operation *op) const;
+  bool isTransposed(LoadOp load) const;
+  double getOwnLines(Operation *access) const;
+
+  const IterationLanes &lanes;
+  const Cycles &cycles;
+  SmallVector<scf::ForOp> inner; ///< loops around the code, in that of lanes
+  double along = 1;              ///< How much faster LLVM makes it.
+  llvm::DenseSet<Operation *> turns;
+  llvm::DenseSet<Value> chased; ///< indices, each of one wait
+  bool inSlowPath = false;
+};
+
+} // namespace
+
+void CostModel::add(Region &region, Frequency times, bool laneByLane) {
+  for (Operation &op : region.front().without_terminator()) {
+    if (isa<NextOp>(op))
+      continue; // mostly has nothing to do
+    const OrderedGroup *group = laneByLane ? nullptr : lanes.findGroup(&op);
+    if (group && group->first == &op)
+      addTurns(*group, times);
+    bool isApart = laneByLane || turns.contains(&op);
+    if (isStructure(&op))
+      addStructure(&op, times, isApart);
+    else
+      addOperation(&op, times, isApart);
+  }
+}
+
+void CostModel::addTurns(const OrderedGroup &group, Frequency times) {
+  llvm::SetVector<Operation *> ops = lanes.findTurns(group);
+  ops.remove_if([&](Operation *op) { return lanes.isEmission(op); });
+  if (llvm::all_of(ops, llvm::IsaPred<NextOp>))
+    return; // mostly has nothing to do
+  turns.insert(ops.begin(), ops.end());
+  llvm::DenseSet<Value> inputs;
+  for (Operation *op : ops)
+    op->walk([&](Operation *inner) {
+      for (Value operand : inner->getOperands())
+        if (isLaneType(operand.getType()) && lanes.isVarying(operand) &&
+            (!operand.getDefiningOp() ||
+             !ops.contains(group.first->getBlock()->findAncestorOpInBlock(
+                 *operand.getDefiningOp()))))
+          inputs.insert(operand);
+    });
+  cost.vectors += cycles.apartInOrder * times.vectors +
+                  cycles.slot * times.serial * inputs.size();
+}
+
+std::optional<int64_t> piko::getConstantTurns(scf::ForOp loop) {
+  if (std::optional<APInt> count = loop.getStaticTripCount())
+    return count->getLimitedValue();
+  auto strip = [](Value value) {
+    while (auto cast = value.getDefiningOp<arith::IndexCastOp>())
+      value = cast.getIn();
+    return value;
+  };
+  auto sum = strip(loop.getUpperBound()).getDefiningOp<arith::AddIOp>();
+  if (!sum || !matchPattern(loop.getStep(), m_One()) ||
+      strip(sum.getLhs()) != strip(loop.getLowerBound()))
+    return std::nullopt;
+  return getConstantIntValue(sum.getRhs());
+}
+
+/// How often a loop turns, as far as is known.
+double CostModel::getTurns(Operation *loop) const {
+  if (auto turns = loop->getAttrOfType<FloatAttr>(marks::turns))
+    return turns.getValueAsDouble();
+  if (std::optional<double> turns = getProbableTurns(loop))
+    return *turns / getGoing(loop);
+  if (auto counted = dyn_cast<scf::ForOp>(loop))
+    if (std::optional<int64_t> count = getConstantTurns(counted))
+      return double(*count);
+  return lanes.isSharedLoop(loop) ? loopTurns : turnsThatDiffer;
+}
+
+double CostModel::getGoing(Operation *loop) const {
+  if (lanes.isSharedLoop(loop))
+    return 1;
+  if (loop->hasAttr(marks::turns))
+    return fullness;
+  if (auto counted = dyn_cast<scf::ForOp>(loop);
+      counted && getConstantTurns(counted))
+    return 1;
+  for (Operation *at = loop->getParentOp(); at != lanes.getLoop();
+       at = at->getParentOp())
+    if (isa<scf::ForOp, scf::WhileOp>(at) && !lanes.isSharedLoop(at))
+      return cycles.goOnInside;
+  // Ranges differ less than what else ends loops.
+  constexpr double goOnInRange = 0.75;
+  return isa<scf::ForOp>(loop) ? goOnInRange : cycles.goOn;
+}
+
+/// Each lane makes the turns of its own inner loops, and waits in the end.
+double CostModel::getFlatTurns(Operation *outer, Operation *inner) const {
+  // Measured, of lists and of searches.
+  constexpr double goOnInNest = 0.35;
+  return getTurns(outer) * std::max(1.0, getTurns(inner) * goOnInNest) /
+         fullness;
+}
+
+double CostModel::getOwnTurns(Operation *loop) const {
+  return std::max(1.0, getTurns(loop) * cycles.goOn);
+}
+
+void CostModel::addStructure(Operation *op, Frequency times, bool laneByLane) {
+  if (auto choice = dyn_cast<scf::IfOp>(op)) {
+    Region &yes = choice.getThenRegion(), &no = choice.getElseRegion();
+    bool isState = op->getParentOp()->hasAttr(marks::turns);
+    auto addSide = [&](Region &side, Region &other) {
+      if (side.empty())
+        return;
+      std::optional<double> known = getProbability(choice, side);
+      Frequency share =
+          isState ? Frequency{0.5, 1}
+          : known ? Frequency{*known,
+                              1 - std::pow(1 - *known, lanes.getLaneCount())}
+                  : getFrequency(side, other, lanes.getLaneCount());
+      // Many guards, each of which mostly lets through, mostly do together.
+      if (!isState && !known && isNextGuard(choice) &&
+          isNextGuard(cast<scf::IfOp>(choice->getParentOp())) &&
+          (other.empty() || countOperations(other) <= trivial))
+        share.serial = share.vectors;
+      if (!lanes.isVarying(choice.getCondition()))
+        share.vectors = share.serial;
+      auto advances = choice->getAttrOfType<FloatAttr>(marks::advances);
+      if (advances && &side == &no)
+        share.vectors = advances.getValueAsDouble();
+      bool isSlow = !inSlowPath && !isState && !known &&
+                    lanes.isVarying(choice.getCondition()) &&
+                    mayBeSlowPath(choice, side, lanes.getLoop());
+      inSlowPath |= isSlow;
+      double vectors = cost.vectors, serial = cost.serial;
+      add(side, times.scaled(share.serial, share.vectors), laneByLane);
+      if (!isSlow)
+        return;
+      inSlowPath = false;
+      cost.slowVectors += cost.vectors - vectors;
+      cost.slowSerial += cost.serial - serial;
+    };
+    addSide(yes, no);
+    addSide(no, yes);
+    if (isState) // It is chosen.
+      cost.vectors += times.vectors * cycles.vector * choice.getNumResults();
+    bool isShort = lanes.isCheap(yes) && (no.empty() || lanes.isCheap(no));
+    if (lanes.isVarying(choice.getCondition()) && !isShort)
+      addBranches(times.serial * (fails(yes) || fails(no) ? cycles.checks
+                                  : takesTurns(choice)    ? cycles.branches
+                                                          : cycles.unforeseen),
+                  laneByLane);
+    return;
+  }
+  if (auto choice = dyn_cast<scf::IndexSwitchOp>(op)) {
+    for (Region &region : choice->getRegions()) {
+      std::optional<double> known = getProbability(choice, region);
+      Frequency share{known.value_or(1.0 / choice->getNumRegions()), 1};
+      if (!lanes.isVarying(choice.getArg()))
+        share.vectors = share.serial;
+      else if (known)
+        share.vectors = 1 - std::pow(1 - *known, lanes.getLaneCount());
+      add(region, times.scaled(share.serial, share.vectors), laneByLane);
+    }
+    return;
+  }
+  double going = getGoing(op);
+  if (!lanes.isSharedLoop(op))
+    addBranches(cycles.exits * times.serial, laneByLane);
+  auto loop = dyn_cast<scf::ForOp>(op);
+  if (!laneByLane && loop && !lanes.getNest(loop).empty()) {
+    Frequency full;
+    for (size_t i = 0, e = lanes.getNest(loop).size(); i < e; ++i)
+      full.serial *=
+          turnsThatDiffer * (i == 0 ? cycles.goOn : cycles.goOnInside);
+    cost.vectors += cycles.pairs * times.vectors * full.serial;
+    add(lanes.getNest(loop).back().getRegion(),
+        times.scaled(full.serial, full.serial), laneByLane);
+    return;
+  }
+  double turns = getTurns(op);
+  if (!lanes.isSharedLoop(op) && !laneByLane)
+    cost.vectors += cycles.turn * times.vectors * turns;
+  double around = along;
+  if (loop) {
+    inner.push_back(loop);
+    along = hasVectorsAlong(loop) ? cycles.along : 1;
+  }
+  double before = cost.serial;
+  Frequency each{turns * going, turns};
+  std::optional<double> again = getTurnProbability(op);
+  if (again) // One lane is enough.
+    each.vectors =
+        std::max(turns, 1 - std::pow(1 - *again, lanes.getLaneCount()));
+  for (Region &region : op->getRegions()) {
+    bool isTest = again && isa<scf::WhileOp>(op) && !region.getRegionNumber();
+    add(region, times.scaled(each.serial + isTest, each.vectors + isTest),
+        laneByLane);
+  }
+  cost.loops[op] += cost.serial - before;
+  along = around;
+  if (loop)
+    inner.pop_back();
+}
+
+/// Whether an access is to numbers of fewer than 32 bits.
+static bool isNarrow(Operation *access) {
+  Type type = access->getNumResults() != 0 ? access->getResult(0).getType()
+                                           : access->getOperand(0).getType();
+  return type.isIntOrFloat() && type.getIntOrFloatBitWidth() < 32;
+}
+
+/// Whether elements one behind the other are more than the number of each that
+/// is accessed.
+static bool isStrided(Operation *access) {
+  auto load = dyn_cast<LoadOp>(access);
+  auto store = dyn_cast<StoreOp>(access);
+  if (!load && !store)
+    return false;
+  Operation *state = lookupInPipeline<Operation *>(
+      access, load ? load.getStateAttr() : store.getStateAttr());
+  Type type = load ? load.getType() : store.getValue().getType();
+  constexpr int64_t byteBits = 8;
+  return lookupRecord(access, getStateRecord(state)).getSize() !=
+         int64_t(type.getIntOrFloatBitWidth()) / byteBits;
+}
+
+/// Whether lanes read three words or more of an element, which are loaded and
+/// transposed.
+bool CostModel::isTransposed(LoadOp load) const {
+  auto isAlike = [&](Operation *user) {
+    auto other = dyn_cast<LoadOp>(user);
+    return other && other.getStateAttr() == load.getStateAttr() &&
+           other.getType().getIntOrFloatBitWidth() == 32;
+  };
+  constexpr int64_t least = 3;
+  return !load.getIndices().empty() && load.getElements().empty() &&
+         llvm::count_if(load.getIndices().front().getUsers(), isAlike) >= least;
+}
+
+/// What lanes take that stream through memory, each on its own, where loops
+/// around the stream do not read the same again.
+double CostModel::getOwnLines(Operation *access) const {
+  auto stream = llvm::find_if(
+      inner, [&](scf::ForOp loop) { return isStream(access, loop); });
+  if (stream == inner.end())
+    return 0;
+  double own = cycles.ownLines;
+  for (scf::ForOp loop : llvm::make_range(inner.begin(), stream))
+    if (isRepeated(access, loop))
+      own /= std::max(1.0, getTurns(loop));
+  return own;
+}
+
+/// Whether an element is read that is then stored.
+static bool isReadBefore(memref::StoreOp store) {
+  return llvm::any_of(store.getMemRef().getUsers(), [&](Operation *user) {
+    auto load = dyn_cast<memref::LoadOp>(user);
+    return load && load.getIndices() == store.getIndices();
+  });
+}
+
+/// What an access in different places takes.
+double CostModel::getApart(Operation *access) const {
+  auto load = dyn_cast<memref::LoadOp>(access);
+  auto store = dyn_cast<memref::StoreOp>(access);
+  Value array = load ? load.getMemRef() : store ? store.getMemRef() : Value();
+  if (array && lanes.isPrivate(array) && lanes.isShort(array)) {
+    auto rows = double(cast<MemRefType>(array.getType()).getNumElements());
+    return rows * (store ? cycles.writeRow : cycles.readRow);
+  }
+  if (auto read = dyn_cast<LoadOp>(access);
+      read && isStrided(access) && isTransposed(read))
+    return cycles.transposed;
+  bool writes = store || isa<StoreOp>(access);
+  double apart =
+      writes ? (isNarrow(access) ? cycles.narrowScatter : cycles.scatter)
+             : (isNarrow(access) ? cycles.narrowGather : cycles.gather);
+  // What a scatter wrote is not forwarded to what reads it next, which a turn
+  // that changes what is there soon does.
+  constexpr double waits = 2, waitsAtOnce = 8;
+  if (store && lanes.isPrivate(array))
+    apart *= isReadBefore(store) ? waitsAtOnce : waits;
+  return apart;
+}
+
+/// How many numbers of an array in a record one lane loads at once, where their
+/// places are constant: LLVM makes vectors of them.
+static double getInRow(Operation *access) {
+  ValueRange elements;
+  if (auto load = dyn_cast<LoadOp>(access))
+    elements = load.getElements();
+  else if (auto get = dyn_cast<GetOp>(access))
+    elements = get.getElements();
+  constexpr double width = 4;
+  bool areConstant =
+      !elements.empty() && llvm::all_of(elements, [](Value element) {
+        return matchPattern(element, m_Constant());
+      });
+  return areConstant ? width : 1;
+}
+
+double CostModel::getDivision(Operation *op) const {
+  if (!isDividedAsFloats(op))
+    return cycles.division;
+  return lanes.isVarying(op->getOperand(1)) ? cycles.quotient
+                                            : cycles.sharedQuotient;
+}
+
+/// What an operation of one iteration takes, for as many as there are lanes;
+/// what emits stores its numbers, and keeps count.
+double CostModel::getScalar(Operation *op) const {
+  constexpr double bookkeeping = 12; // operations
+  if (auto append = dyn_cast<AppendOp>(op))
+    return cycles.scalar * (double(append.getValues().size()) + bookkeeping);
+  constexpr double accesses = 4; // to the element and to the note of it
+  if (lanes.isPrivateRow(op))
+    return accesses * cycles.scalarAccess;
+  return isDivision(op) ? cycles.scalarDivision
+         : lanes.getForm(op) == LaneForm::Access
+             ? cycles.scalarAccess / getInRow(op)
+             : cycles.scalar;
+}
+
+/// What vectors emit: a transposition, and the stores of all lanes' records.
+void CostModel::addEmission(Operation *op, Frequency times) {
+  auto append = dyn_cast<AppendOp>(op);
+  if (!append)
+    return;
+  constexpr double wordSize = 4;
+  RecordOp record =
+      lookupRecord(append, append.getPrim().getType().getRecord());
+  cost.serial += times.serial * getScalar(append);
+  cost.vectors +=
+      times.vectors * (cycles.apartInOrder +
+                       cycles.emitted * double(record.getSize()) / wordSize);
+}
+
+void CostModel::addChase(LoadOp load, Frequency times, bool laneByLane) {
+  // A nest that is flattened chooses where its turns read; it was looked at
+  // before.
+  Operation *chase = findChase(load);
+  if (!chase || !lanes.getLoop()->isProperAncestor(chase) ||
+      chase->hasAttr(marks::turns) ||
+      !chased.insert(load.getIndices().front()).second)
+    return;
+  // Loops inside begin with a wait.
+  for (Operation *at = load->getParentOp(); at != chase; at = at->getParentOp())
+    if (isa<scf::ForOp, scf::WhileOp>(at))
+      times = times.scaled(1 / (getTurns(at) * getGoing(at)), 1 / getTurns(at));
+  double one = cycles.chase / double(lanes.getLaneCount());
+  cost.serial += times.serial * cycles.chase;
+  cost.vectors +=
+      laneByLane ? times.serial * cycles.chase : times.vectors * one;
+}
+
+void CostModel::addOperation(Operation *op, Frequency times, bool laneByLane) {
+  if (isPrefetch(op) || isa<FailOp, FailListOp, FailDivideOp>(op))
+    return; // free, or rare
+  if (!laneByLane && lanes.isEmission(op))
+    return addEmission(op, times);
+  LaneForm form = lanes.getForm(op);
+  if (form == LaneForm::Barrier) {
+    cost.computes |= op->getNumResults() != 0;
+    return; // What else would be done is cut there, which costs more.
+  }
+  if (form == LaneForm::Uniform || form == LaneForm::Private ||
+      form == LaneForm::Lazy)
+    return; // as much for one as for all, or nothing
+  if (auto load = dyn_cast<LoadOp>(op); load && !load.getIndices().empty())
+    addChase(load, times, laneByLane);
+  bool isAccess = form == LaneForm::Access;
+  bool isDivided = isDivision(op);
+  // There are no instructions for vectors of it.
+  bool isRemainder = isIntegerDivision(op) && !isDividedAsFloats(op) &&
+                     !matchPattern(op->getOperand(1), m_Constant());
+  double serial = times.serial * getScalar(op) / along;
+  bool isReduced = lanes.isPrivateRow(op);
+  bool isTurns =
+      (form == LaneForm::Serial || form == LaneForm::Ordered) && !isReduced;
+  Value limited = lanes.findLimited(op);
+  bool isGather = isAccess && ((!lanes.isRow(op) && !limited) || isStrided(op));
+  double lines = isGather ? getOwnLines(op) : 0;
+  double gather = isGather ? getApart(op) + lines : 0;
+  double row = isAccess && isNarrow(op) ? cycles.narrowRow : cycles.row;
+  double vectors = times.vectors * (isGather    ? gather
+                                    : limited   ? row + cycles.vector * rowTest
+                                    : isAccess  ? row
+                                    : isReduced ? cycles.reducedRow
+                                    : isDivided ? getDivision(op)
+                                                : cycles.vector);
+  if (laneByLane || isTurns || isRemainder) {
+    vectors = serial + (laneByLane ? 0 : times.vectors * cycles.apart);
+  } else {
+    cost.computes |= !isAccess;
+    cost.lines += times.vectors * lines;
+  }
+  cost.serial += serial;
+  cost.vectors += vectors;
+  if (isTurns || isGather)
+    cost.obstacles.emplace(vectors, op);
+}
+
+double IterationLanes::getOwnTurns(Operation *inner) const {
+  return CostModel(*this).getOwnTurns(inner);
+}
+
+double IterationLanes::getFlatTurns(Operation *outer, Operation *inner) const {
+  return CostModel(*this).getFlatTurns(outer, inner);
+}
+
+IterationLanes::Cost IterationLanes::getCost() const {
+  return getCost(getCycles(laneCount));
+}
+
+IterationLanes::Cost IterationLanes::getCost(const Cycles &cycles) const {
+  CostModel model(*this, cycles);
+  model.add(loop.getRegion(), {}, /*laneByLane=*/false);
+  return model.cost;
+}

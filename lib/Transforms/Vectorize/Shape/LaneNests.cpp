@@ -1,0 +1,253 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+
+#include "Vectorize/Shape/LaneNests.h"
+
+#include "Vectorize/Shape/FlattenLoops.h"
+
+#include "Piko/Dialect/Piko/IR/Marks.h"
+#include "Piko/Dialect/Piko/IR/PikoCPU.h"
+
+#include "mlir/Dialect/Arith/IR/Arith.h"
+#include "mlir/Dialect/MemRef/IR/MemRef.h"
+#include "mlir/Interfaces/SideEffectInterfaces.h"
+#include "mlir/Transforms/LoopInvariantCodeMotionUtils.h"
+
+using namespace mlir;
+using namespace piko;
+
+static bool holds(Operation *loop, llvm::function_ref<bool(Operation *)> isIt) {
+  return loop
+      ->walk([&](Operation *op) {
+        return isIt(op) ? WalkResult::interrupt() : WalkResult::advance();
+      })
+      .wasInterrupted();
+}
+
+/// Whether a loop does anything that lanes do in an order that shows.
+static bool isOrdered(Operation *loop, const IterationLanes &lanes) {
+  return holds(loop, [&](Operation *op) { return lanes.findGroup(op); });
+}
+
+/// Whether all that a loop does is each lane's own, at any time.
+static bool isFree(Operation *loop, const IterationLanes &lanes) {
+  return !isOrdered(loop, lanes) && !holds(loop, [&](Operation *op) {
+    auto counted = dyn_cast<scf::ForOp>(op);
+    return isBarrier(op) || isa<memref::AllocaOp>(op) ||
+           (counted && !lanes.getNest(counted).empty());
+  });
+}
+
+/// Whether lanes may leave a loop at different times.
+static bool isDivergent(Operation *loop, const IterationLanes &lanes) {
+  auto counted = dyn_cast<scf::ForOp>(loop);
+  return !lanes.isSharedLoop(loop) && !(counted && getConstantTurns(counted));
+}
+
+/// The nests of an iteration whose inner loop lanes leave at different times,
+/// from the innermost; all but the first `skipped`.
+static FlatNest findNest(const IterationLanes &lanes, size_t skipped) {
+  FlatNest found;
+  scf::ForOp root = lanes.getLoop();
+  root.walk([&](Operation *op) {
+    FlatNest nest = op != root ? findFlatNest(op) : FlatNest();
+    if (!nest || !isDivergent(nest.inner, lanes) || !isFree(op, lanes))
+      return WalkResult::advance();
+    if (skipped > 0) {
+      --skipped;
+      return WalkResult::advance();
+    }
+    found = nest;
+    return WalkResult::interrupt();
+  });
+  return found;
+}
+
+/// What is the same in all turns is no part of their state.
+static void hoistFromNest(Operation *loop, const IterationLanes &lanes) {
+  for (Region &region : loop->getRegions())
+    for (LoadOp load : llvm::make_early_inc_range(region.getOps<LoadOp>()))
+      if (load.getIndices().empty() && load.getElements().empty() &&
+          lanes.readsFixed(load))
+        load->moveBefore(loop);
+  moveLoopInvariantCode(cast<LoopLikeOpInterface>(loop));
+}
+
+/// Nests that lanes go through one after the other, because an order shows.
+static SmallVector<Location> findOrdered(const IterationLanes &lanes) {
+  SmallVector<Location> found;
+  scf::ForOp root = lanes.getLoop();
+  root.walk([&](Operation *op) {
+    FlatNest nest = op != root ? findFlatNest(op) : FlatNest();
+    if (nest && isDivergent(nest.inner, lanes) && isOrdered(op, lanes))
+      found.push_back(op->getLoc());
+  });
+  return found;
+}
+
+/// Takes a loop instead of the best one, if it is expected to take less;
+/// otherwise erases it.
+static bool tryLoop(FlatLoop &best, scf::ForOp loop, int64_t laneCount,
+                    Location nest) {
+  constexpr double gain = 0.8; // Turns are estimated.
+  IterationLanes lanes(loop, laneCount);
+  IterationLanes::Cost cost = lanes.getCost();
+  // A loop that is made of two is not known to stream.
+  double lines = std::max(cost.lines, best.cost.lines);
+  cost.vectors += lines - cost.lines;
+  cost.lines = lines;
+  if (lanes.getRefusal().at || cost.vectors > gain * best.cost.vectors) {
+    loop.erase();
+    return false;
+  }
+  if (best.loop)
+    best.loop.erase();
+  cost.serial = best.cost.serial;
+  best.loop = loop;
+  best.cost = std::move(cost);
+  best.nests.push_back(nest);
+  return true;
+}
+
+static void setTurns(scf::WhileOp loop, double turns) {
+  loop->setAttr(marks::turns, Builder(loop).getF64FloatAttr(turns));
+}
+
+static scf::ForOp clone(scf::ForOp loop) {
+  return cast<scf::ForOp>(OpBuilder(loop).clone(*loop));
+}
+
+//===----------------------------------------------------------------------===//
+// Iterations
+//===----------------------------------------------------------------------===//
+
+/// The only loop that stands in an iteration by itself, if lanes leave it at
+/// different times, and no order shows of what they do: primitives may be
+/// counted by themselves.
+static Operation *findOwnLoop(const IterationLanes &lanes) {
+  scf::ForOp root = lanes.getLoop();
+  Operation *own = nullptr;
+  for (Operation &op : root.getBody()->without_terminator())
+    if (isa<scf::ForOp, scf::WhileOp>(op)) {
+      if (own)
+        return nullptr;
+      own = &op;
+    }
+  bool isBound = holds(root, [&](Operation *op) {
+    auto counted = dyn_cast<scf::ForOp>(op);
+    return (op != root && !isa<NextOp>(op) && lanes.findGroup(op)) ||
+           isBarrier(op) || isPrefetch(op) ||
+           (isa<NextOp>(op) && op->getParentOp() != root) ||
+           (counted && op != root && !lanes.getNest(counted).empty());
+  });
+  return own && !isBound && isDivergent(own, lanes) ? own : nullptr;
+}
+
+/// Makes a loop over the lanes, around one over the iterations of each, as many
+/// apart as there are lanes.
+static scf::ForOp stripMine(scf::ForOp loop, int64_t laneCount) {
+  OpBuilder builder(loop);
+  Location loc = loop.getLoc();
+  Value lower = loop.getLowerBound(), upper = loop.getUpperBound();
+  Value width = arith::ConstantOp::create(
+      builder, loc, builder.getIntegerAttr(lower.getType(), laneCount));
+  Value behind = arith::AddIOp::create(builder, loc, lower, width,
+                                       arith::IntegerOverflowFlags::nsw);
+  Value end = arith::MinSIOp::create(builder, loc, behind, upper);
+  auto ofLanes = scf::ForOp::create(builder, loc, lower, end, loop.getStep());
+  ofLanes->setAttrs(loop->getAttrs());
+  builder.setInsertionPointToStart(ofLanes.getBody());
+  Value first = ofLanes.getInductionVar();
+  auto own = scf::ForOp::create(builder, loc, first, upper, width);
+  loop.getInductionVar().replaceAllUsesWith(own.getInductionVar());
+  auto &body = own.getBody()->getOperations();
+  body.splice(body.begin(), loop.getBody()->getOperations(),
+              loop.getBody()->begin(), std::prev(loop.getBody()->end()));
+  // Arrays of one iteration after the other take the same place.
+  for (auto array : llvm::to_vector(own.getBody()->getOps<memref::AllocaOp>()))
+    array->moveBefore(own);
+  loop.erase();
+  return ofLanes;
+}
+
+/// Reads what is used behind a loop in front of it.
+static void readAhead(Operation *loop) {
+  for (Operation *op = loop->getNextNode(), *next; op; op = next) {
+    next = op->getNextNode();
+    auto get = dyn_cast<GetOp>(op);
+    if (get && get.getElements().empty() &&
+        get.getPrim().getParentBlock() == loop->getBlock() &&
+        get.getPrim().getDefiningOp()->isBeforeInBlock(loop))
+      get->moveBefore(loop);
+  }
+}
+
+/// Lanes take iterations that are as many apart as there are lanes, and each
+/// goes on to its next one by itself.
+static void flattenIterations(FlatLoop &best, const IterationLanes &lanes) {
+  int64_t laneCount = lanes.getLaneCount();
+  scf::ForOp loop = clone(best.loop ? best.loop : lanes.getLoop());
+  IterationLanes before(loop, laneCount);
+  Operation *inner = findOwnLoop(before);
+  if (!inner || !loop.getLowerBound().getType().isIndex()) {
+    loop.erase();
+    return;
+  }
+  constexpr double fullness = 0.85, atOnce = 3.0 / 8;
+  double turns = before.getOwnTurns(inner);
+  Location loc = loop.getLoc();
+  SmallVector<Value> writers;
+  for (NextOp next :
+       llvm::make_early_inc_range(loop.getBody()->getOps<NextOp>())) {
+    writers.push_back(next.getWriter());
+    next.erase();
+  }
+  loop = stripMine(loop, laneCount);
+  readAhead(inner);
+  hoistFromNest(inner->getParentOp(), before);
+  FlatNest nest = findFlatNest(inner->getParentOp());
+  if (!nest) {
+    loop.erase();
+    return;
+  }
+  nest.advances = std::min(1.0, 1 / (turns * atOnce));
+  setTurns(flatten(nest), turns / fullness);
+  if (tryLoop(best, loop, laneCount, loc))
+    best.writers = writers;
+}
+
+void piko::countPrimitives(scf::ForOp loop, ValueRange writers) {
+  OpBuilder builder(loop);
+  Location loc = loop.getLoc();
+  for (Value writer : writers) {
+    Value isCounted = IsCountedOp::create(builder, loc, writer);
+    auto choice =
+        scf::IfOp::create(builder, loc, isCounted, /*withElseRegion=*/false);
+    OpBuilder::InsertionGuard guard(builder);
+    builder.setInsertionPointToStart(choice.thenBlock());
+    auto made = scf::ForOp::create(builder, loc, loop.getLowerBound(),
+                                   loop.getUpperBound(), loop.getStep());
+    builder.setInsertionPointToStart(made.getBody());
+    NextOp::create(builder, loc, writer);
+  }
+}
+
+FlatLoop piko::flattenNests(const IterationLanes &lanes) {
+  constexpr size_t most = 3;
+  FlatLoop best{{}, lanes.getCost(), {}, findOrdered(lanes)};
+  for (size_t skipped = 0; skipped < most;) {
+    scf::ForOp loop = clone(best.loop ? best.loop : lanes.getLoop());
+    IterationLanes before(loop, lanes.getLaneCount());
+    FlatNest nest = findNest(before, skipped);
+    if (!nest) {
+      loop.erase();
+      break;
+    }
+    Location loc = nest.outer->getLoc();
+    double turns = before.getFlatTurns(nest.outer, nest.inner);
+    hoistFromNest(nest.outer, before);
+    setTurns(flatten(findFlatNest(nest.outer)), turns);
+    skipped += !tryLoop(best, loop, lanes.getLaneCount(), loc);
+  }
+  flattenIterations(best, lanes);
+  return best;
+}

@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Reads of rows with ends: where an index is clamped to an image, or wraps
+// around in it, most vectors are in its middle, and read one element behind the
+// other.
+
+#include "Vectorize/Write/IterationWriter.h"
+
+#include "Piko/Dialect/Piko/IR/PikoCPU.h"
+
+#include "mlir/Dialect/Vector/IR/VectorOps.h"
+
+using namespace mlir;
+using namespace piko;
+
+/// Whether a value grows by one from lane to lane but where it is limited: by
+/// a clamp, a remainder or a choice.
+bool IterationLanes::isLimited(Value value) const {
+  if (!isVarying(value) || isLinear(value))
+    return isVarying(value);
+  Operation *op = value.getDefiningOp();
+  if (!op)
+    return false;
+  auto isPart = [&](Value part) { return !isVarying(part) || isLimited(part); };
+  if (isa<arith::IndexCastOp, arith::ExtSIOp, arith::ExtUIOp>(op))
+    return isLimited(op->getOperand(0));
+  if (isa<arith::AddIOp, arith::MinSIOp, arith::MaxSIOp, arith::MinUIOp,
+          arith::MaxUIOp>(op))
+    return isVarying(op->getOperand(0)) != isVarying(op->getOperand(1)) &&
+           llvm::all_of(op->getOperands(), isPart);
+  if (isa<arith::SubIOp, arith::RemSIOp, arith::RemUIOp>(op))
+    return isLimited(op->getOperand(0)) && !isVarying(op->getOperand(1));
+  if (auto choice = dyn_cast<arith::SelectOp>(op))
+    return isPart(choice.getTrueValue()) && isPart(choice.getFalseValue());
+  return false;
+}
+
+Value IterationLanes::findLimited(Operation *op) const {
+  auto load = dyn_cast<LoadOp>(op);
+  if (!load || load.getIndices().empty() || isRow(op) ||
+      llvm::any_of(load.getIndices().drop_front(),
+                   [&](Value index) { return isVarying(index); }))
+    return {};
+  Value index = load.getIndices().front();
+  if (!isLimited(index))
+    return {};
+  // What is the same for all lanes changes nothing, but for the test.
+  while (auto cast = index.getDefiningOp<arith::IndexCastOp>())
+    index = cast.getIn();
+  while (auto sum = index.getDefiningOp<arith::AddIOp>())
+    index = sum.getOperand(isVarying(sum.getLhs()) ? 0 : 1);
+  return index;
+}
+
+/// Sums wrap around alike in the test and in the index: no lane that is active
+/// has an index out of bounds.
+void IterationWriter::writeLimited(LoadOp load, Value limited) {
+  Value number = get(limited);
+  auto type = cast<VectorType>(number.getType());
+  Value steps = vector::StepOp::create(builder, loc,
+                                       getVectorType(builder.getIndexType()));
+  if (!type.getElementType().isIndex())
+    steps = arith::IndexCastOp::create(builder, loc, type, steps);
+  Value first = vector::ExtractOp::create(builder, loc, number, 0);
+  Value row = arith::AddIOp::create(builder, loc, splat(first), steps);
+  Value differ = arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::ne,
+                                       number, row);
+  auto choice =
+      scf::IfOp::create(builder, loc, getVectorType(load.getType()),
+                        any(both(active, differ)), /*withElseRegion=*/true);
+  OpBuilder::InsertionGuard guard(builder);
+  auto read = [&](Block *block, bool isRow) {
+    builder.setInsertionPointToStart(block);
+    SmallVector<Value> places = getPlaces(load.getIndices()), elements;
+    if (isRow)
+      for (Value &place : places)
+        if (isa<VectorType>(place.getType()))
+          place = vector::ExtractOp::create(builder, loc, place, 0);
+    for (Value element : load.getElements())
+      elements.push_back(getUniform(element));
+    Value values = GatherOp::create(builder, loc, getVectorType(load.getType()),
+                                    load.getStateAttr(), places,
+                                    load.getFieldAttr(), elements, active,
+                                    isRow ? builder.getUnitAttr() : UnitAttr());
+    scf::YieldOp::create(builder, loc, values);
+  };
+  read(choice.thenBlock(), /*isRow=*/false);
+  read(choice.elseBlock(), /*isRow=*/true);
+  vectors.map(load.getResult(), choice.getResult(0));
+}
