@@ -244,7 +244,7 @@ TEST_F(DriverCallsTest, LaunchesThatCannotBe) {
   EXPECT_EQ(
       cuOccupancyMaxActiveBlocksPerMultiprocessor(&value, function, 64, 0),
       CUDA_SUCCESS);
-  EXPECT_EQ(value, 2);
+  EXPECT_EQ(value, 5);
   auto run = [&](unsigned blocks, unsigned threads, unsigned shared) {
     int parameter = 0;
     void *parameters[] = {&parameter};
