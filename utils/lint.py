@@ -138,7 +138,8 @@ def layers():
 
 
 # Whose folders are those of the levels, and how many files one has at most.
-BY_LEVEL = ("lib/Transforms", "include/Piko/Transforms", "test/Transforms")
+BY_LEVEL = ("lib/Conversion", "lib/Transforms", "include/Piko/Transforms",
+            "test/Transforms")
 MOST_FILES = 25
 
 

@@ -2,7 +2,7 @@
 //
 // convert-gpu-to-cuda: launches as calls of the runtime's part for CUDA.
 
-#include "StepTable.h"
+#include "GPULaunch/StepTable.h"
 
 #include "Piko/Conversion/KernelImage.h"
 #include "Piko/Conversion/Passes.h"

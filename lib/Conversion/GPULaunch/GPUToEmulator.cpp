@@ -2,7 +2,7 @@
 //
 // convert-gpu-to-emulator: launches as calls of the emulator.
 
-#include "LaunchCall.h"
+#include "GPULaunch/LaunchCall.h"
 
 #include "Piko/Conversion/Emulation.h"
 #include "Piko/Conversion/Passes.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 
-#include "LaunchCall.h"
+#include "GPULaunch/LaunchCall.h"
 
 #include "mlir/Dialect/Arith/IR/Arith.h"
 

@@ -4,7 +4,7 @@
 // without a name. The function of a grid computes its arguments as the kernel's
 // own does, from what a call gives it for input and log.
 
-#include "StepTable.h"
+#include "GPULaunch/StepTable.h"
 
 #include "Piko/Dialect/Piko/IR/Marks.h"
 #include "Piko/Dialect/Piko/IR/Piko.h"

@@ -5,7 +5,7 @@
 #ifndef PIKO_LIB_CONVERSION_GPULAUNCH_STEPTABLE_H
 #define PIKO_LIB_CONVERSION_GPULAUNCH_STEPTABLE_H
 
-#include "LaunchCall.h"
+#include "GPULaunch/LaunchCall.h"
 
 #include "mlir/Interfaces/FunctionInterfaces.h"
 

@@ -2,8 +2,8 @@
 //
 // convert-gpu-to-exact-nvvm: kernels to the nvvm and llvm dialects.
 
-#include "ExactFunctions.h"
-#include "Registers.h"
+#include "GPUToNVVM/ExactFunctions.h"
+#include "GPUToNVVM/Registers.h"
 
 #include "Piko/Conversion/Passes.h"
 

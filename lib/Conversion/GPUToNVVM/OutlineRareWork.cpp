@@ -11,7 +11,7 @@
 //      registers;
 //   4. forbid to inline it again, and bound the registers of both.
 
-#include "Registers.h"
+#include "GPUToNVVM/Registers.h"
 
 #include "Piko/Conversion/Passes.h"
 

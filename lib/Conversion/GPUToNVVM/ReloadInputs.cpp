@@ -10,7 +10,7 @@
 //   be
 //      the same, or it would put the load back.
 
-#include "../LoadPlace.h"
+#include "LoadPlace.h"
 
 #include "Piko/Conversion/Passes.h"
 

@@ -10,7 +10,7 @@
 //      where it may differ;
 //   4. reductions, scans and sorts are done by all, in the block's memory.
 
-#include "PikoToGPU.h"
+#include "PikoToGPU/PikoToGPU.h"
 
 #include "Piko/Transforms/Storage/Collectives.h"
 #include "Piko/Transforms/Storage/LoopSplitter.h"

@@ -11,13 +11,13 @@
 // So is what a loop over groups of primitives needs of the cell: each thread
 // writes it, the same as others, and reads what it has written.
 
-#include "CollapsedPixels.h"
-#include "GridFormer.h"
+#include "PikoToGPU/CollapsedPixels.h"
+#include "PikoToGPU/GridFormer.h"
 
-#include "Emitter.h"
-#include "PikoToGPU.h"
+#include "PikoToGPU/Emitter.h"
+#include "PikoToGPU/PikoToGPU.h"
 
-#include "../LoadPlace.h"
+#include "LoadPlace.h"
 
 #include "mlir/Dialect/Utils/StaticValueUtils.h"
 #include "mlir/Transforms/RegionUtils.h"

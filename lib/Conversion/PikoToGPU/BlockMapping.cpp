@@ -16,7 +16,7 @@
 //
 // One class, and so one file: all four share the block's cells and barriers.
 
-#include "PikoToGPU.h"
+#include "PikoToGPU/PikoToGPU.h"
 
 #include "Piko/Dialect/Piko/IR/Marks.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"

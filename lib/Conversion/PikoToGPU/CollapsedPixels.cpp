@@ -24,7 +24,7 @@
 // its unit to a launch of its own (RareLaunch.cpp), so that it decides about no
 // register of the others.
 
-#include "PixelGroups.h"
+#include "PikoToGPU/PixelGroups.h"
 
 #include "Piko/Dialect/Piko/IR/BinArithmetic.h"
 #include "Piko/Dialect/Piko/IR/Marks.h"

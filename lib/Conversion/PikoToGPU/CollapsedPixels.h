@@ -5,7 +5,7 @@
 #ifndef PIKO_LIB_CONVERSION_PIKOTOGPU_COLLAPSEDPIXELS_H
 #define PIKO_LIB_CONVERSION_PIKOTOGPU_COLLAPSEDPIXELS_H
 
-#include "Mapping/PixelNest.h"
+#include "PikoToGPU/Mapping/PixelNest.h"
 
 #include "Piko/Dialect/Piko/IR/PikoGPU.h"
 

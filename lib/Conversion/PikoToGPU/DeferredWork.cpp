@@ -18,10 +18,10 @@
 // about as long (a counting sort). Two loops that are nested become one, which
 // has the length of both.
 
-#include "PikoToGPU.h"
+#include "PikoToGPU/PikoToGPU.h"
 
-#include "Emitter.h"
-#include "LoopNest.h"
+#include "PikoToGPU/Emitter.h"
+#include "PikoToGPU/LoopNest.h"
 
 #include "Piko/Dialect/Piko/IR/Marks.h"
 

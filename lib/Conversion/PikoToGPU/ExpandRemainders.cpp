@@ -4,7 +4,7 @@
 // the significands, as many bits at a time as an integer has room for. Each
 // step is exact, as is what C's fmod gives.
 
-#include "PikoToGPU.h"
+#include "PikoToGPU/PikoToGPU.h"
 
 #include "mlir/Dialect/Arith/IR/Arith.h"
 #include "mlir/Dialect/Math/IR/Math.h"

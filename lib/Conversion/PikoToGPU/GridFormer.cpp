@@ -3,7 +3,7 @@
 // Makes a launch of a kernel's work: a block runs one unit of it after the
 // other.
 
-#include "GridFormer.h"
+#include "PikoToGPU/GridFormer.h"
 
 #include "Piko/Conversion/KernelImage.h"
 #include "Piko/Dialect/Piko/IR/PikoGPU.h"

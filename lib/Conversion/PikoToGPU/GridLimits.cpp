@@ -2,9 +2,9 @@
 //
 // What kernels on a GPU cannot do.
 
-#include "PikoToGPU.h"
+#include "PikoToGPU/PikoToGPU.h"
 
-#include "../GPUToNVVM/ExactFunctions.h"
+#include "GPUToNVVM/ExactFunctions.h"
 #include "Piko/Transforms/Storage/ParallelLoops.h"
 
 using namespace mlir;

@@ -3,7 +3,7 @@
 // What a grid has for what its threads emit. The numbers of an outbox and of a
 // local edge are those of pikort/grid.h.
 
-#include "PikoToGPU.h"
+#include "PikoToGPU/PikoToGPU.h"
 
 #include "Piko/Dialect/Piko/IR/PikoGPU.h"
 

@@ -14,9 +14,9 @@
 // What is left to the pixels, SetupSplit.cpp says. Errors keep the order of
 // primitives, because each notes which one it is about.
 
-#include "ItemSetup.h"
+#include "PikoToGPU/ItemSetup.h"
 
-#include "../LoadPlace.h"
+#include "LoadPlace.h"
 
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 

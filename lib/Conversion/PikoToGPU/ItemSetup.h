@@ -5,8 +5,8 @@
 #ifndef PIKO_LIB_CONVERSION_PIKOTOGPU_ITEMSETUP_H
 #define PIKO_LIB_CONVERSION_PIKOTOGPU_ITEMSETUP_H
 
-#include "Mapping/SetupSplit.h"
-#include "PikoToGPU.h"
+#include "PikoToGPU/Mapping/SetupSplit.h"
+#include "PikoToGPU/PikoToGPU.h"
 
 #include "mlir/IR/IRMapping.h"
 #include "llvm/ADT/MapVector.h"

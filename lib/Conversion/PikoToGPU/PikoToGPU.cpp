@@ -14,10 +14,10 @@
 //   4. convert access to state, and open a log for what the grid leaves;
 //   5. if it precedes another kernel, become a launch of that one's.
 
-#include "PikoToGPU.h"
-#include "CollapsedPixels.h"
-#include "GridFormer.h"
-#include "Mapping/SetupSplit.h"
+#include "PikoToGPU/PikoToGPU.h"
+#include "PikoToGPU/CollapsedPixels.h"
+#include "PikoToGPU/GridFormer.h"
+#include "PikoToGPU/Mapping/SetupSplit.h"
 
 #include "Piko/Transforms/Storage/LoopSplitter.h"
 #include "Piko/Transforms/Storage/ParallelLoops.h"

@@ -5,7 +5,7 @@
 #ifndef PIKO_LIB_CONVERSION_PIKOTOGPU_PIKOTOGPU_H
 #define PIKO_LIB_CONVERSION_PIKOTOGPU_PIKOTOGPU_H
 
-#include "Mapping/WorkLegality.h"
+#include "PikoToGPU/Mapping/WorkLegality.h"
 
 #include "Piko/Conversion/Passes.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"

@@ -7,10 +7,10 @@
 #ifndef PIKO_LIB_CONVERSION_PIKOTOGPU_PIXELGROUPS_H
 #define PIKO_LIB_CONVERSION_PIKOTOGPU_PIXELGROUPS_H
 
-#include "CollapsedPixels.h"
-#include "Emitter.h"
-#include "ItemSetup.h"
-#include "Mapping/PixelOwners.h"
+#include "PikoToGPU/CollapsedPixels.h"
+#include "PikoToGPU/Emitter.h"
+#include "PikoToGPU/ItemSetup.h"
+#include "PikoToGPU/Mapping/PixelOwners.h"
 
 #include "llvm/Support/MathExtras.h"
 

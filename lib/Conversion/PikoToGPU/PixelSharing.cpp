@@ -5,7 +5,7 @@
 //      one of the thread's own pixels to the next;
 //   2. other updates, and what depends on their outcomes, are behind a test.
 
-#include "Mapping/PixelOwners.h"
+#include "PikoToGPU/Mapping/PixelOwners.h"
 
 #include "llvm/Support/MathExtras.h"
 

@@ -4,7 +4,7 @@
 // with the rare primitive behind them. Which pixels those are,
 // CollapsedPixels.cpp finds.
 
-#include "PixelGroups.h"
+#include "PikoToGPU/PixelGroups.h"
 
 #include "Piko/Dialect/Piko/IR/Marks.h"
 

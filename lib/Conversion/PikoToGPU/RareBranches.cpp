@@ -10,7 +10,7 @@
 //   2. loops over iterations that only it has do not count where it is decided
 //      who takes what: they are the thread's.
 
-#include "PikoToGPU.h"
+#include "PikoToGPU/PikoToGPU.h"
 
 #include "Piko/Analysis/BranchProbability.h"
 

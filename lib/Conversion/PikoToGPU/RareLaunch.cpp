@@ -10,10 +10,10 @@
 // Updates of a pixel keep their order: it is in one bin, which is in one unit,
 // and the second launch begins where the first one ends.
 
-#include "CollapsedPixels.h"
+#include "PikoToGPU/CollapsedPixels.h"
 
-#include "Emitter.h"
-#include "GridFormer.h"
+#include "PikoToGPU/Emitter.h"
+#include "PikoToGPU/GridFormer.h"
 
 using namespace mlir;
 using namespace piko;

@@ -10,9 +10,9 @@
 // of the first. Where work in the same bin takes what is emitted, the unit is
 // left where that bin begins, and what was kept of it is forgotten.
 
-#include "PikoToGPU.h"
+#include "PikoToGPU/PikoToGPU.h"
 
-#include "Emitter.h"
+#include "PikoToGPU/Emitter.h"
 
 #include "Piko/Dialect/Piko/IR/Marks.h"
 #include "Piko/Dialect/Piko/IR/PikoGPU.h"

@@ -16,9 +16,9 @@
 
 #include "Piko/Conversion/UnitOrder.h"
 
-#include "Emitter.h"
-#include "GridFormer.h"
-#include "PikoToGPU.h"
+#include "PikoToGPU/Emitter.h"
+#include "PikoToGPU/GridFormer.h"
+#include "PikoToGPU/PikoToGPU.h"
 
 #include "Piko/Dialect/Piko/IR/PikoGPU.h"
 

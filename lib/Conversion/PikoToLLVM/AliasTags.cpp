@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 
-#include "AliasTags.h"
+#include "PikoToLLVM/AliasTags.h"
 
-#include "RuntimeABI.h"
+#include "PikoToLLVM/RuntimeABI.h"
 
 using namespace mlir;
 using namespace piko;

@@ -3,7 +3,7 @@
 // Approximations become calls of functions that the target has instructions
 // for.
 
-#include "LoweringContext.h"
+#include "PikoToLLVM/LoweringContext.h"
 
 #include "Piko/Conversion/Approximations.h"
 #include "Piko/Dialect/Piko/IR/PikoApproximation.h"

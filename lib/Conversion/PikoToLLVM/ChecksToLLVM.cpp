@@ -2,7 +2,7 @@
 //
 // What checking mode tells the runtime, as calls.
 
-#include "LoweringContext.h"
+#include "PikoToLLVM/LoweringContext.h"
 
 #include "Piko/Dialect/Piko/IR/PikoCheck.h"
 

@@ -2,7 +2,7 @@
 //
 // What is counted, as calls of the runtime.
 
-#include "LoweringContext.h"
+#include "PikoToLLVM/LoweringContext.h"
 
 #include "Piko/Dialect/Piko/IR/PikoCount.h"
 

@@ -2,7 +2,7 @@
 //
 // Bins and primitives, on the runtime's structs (pikort/abi.h).
 
-#include "KernelLowering.h"
+#include "PikoToLLVM/KernelLowering.h"
 
 #include "Piko/Dialect/Piko/IR/Marks.h"
 

@@ -2,7 +2,7 @@
 //
 // What the patterns of convert-piko-to-llvm share.
 
-#include "LoweringContext.h"
+#include "PikoToLLVM/LoweringContext.h"
 
 #include "Piko/Analysis/StageGraph.h"
 #include "Piko/Dialect/Piko/IR/Marks.h"

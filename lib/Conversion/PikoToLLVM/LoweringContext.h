@@ -7,8 +7,8 @@
 #ifndef PIKO_LIB_CONVERSION_PIKOTOLLVM_LOWERINGCONTEXT_H
 #define PIKO_LIB_CONVERSION_PIKOTOLLVM_LOWERINGCONTEXT_H
 
-#include "AliasTags.h"
-#include "RuntimeABI.h"
+#include "PikoToLLVM/AliasTags.h"
+#include "PikoToLLVM/RuntimeABI.h"
 
 #include "Piko/Conversion/Passes.h"
 

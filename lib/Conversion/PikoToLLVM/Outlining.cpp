@@ -7,7 +7,7 @@
 //      two itself (piko-unswitch-versions): together in one function they would
 //      contend for registers, and the one that runs would spill for the others.
 
-#include "LoweringContext.h"
+#include "PikoToLLVM/LoweringContext.h"
 
 #include "Piko/Dialect/Piko/IR/Marks.h"
 

@@ -5,7 +5,7 @@
 //   2. make a function of each kernel;
 //   3. convert the operations in them, and drop the pipeline.
 
-#include "LoweringContext.h"
+#include "PikoToLLVM/LoweringContext.h"
 
 #include "Piko/Dialect/Piko/IR/Marks.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"

@@ -3,7 +3,7 @@
 // Casts from float to integer that saturate, where the number nearly always
 // fits: one comparison and a branch, instead of three comparisons and choices.
 
-#include "LoweringContext.h"
+#include "PikoToLLVM/LoweringContext.h"
 
 #include "mlir/Dialect/GPU/IR/GPUDialect.h"
 #include "mlir/Dialect/Math/IR/Math.h"

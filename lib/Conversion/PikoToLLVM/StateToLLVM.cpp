@@ -2,7 +2,7 @@
 //
 // Constants, buffers and images, as memory that the runtime holds.
 
-#include "GridLog.h"
+#include "PikoToLLVM/GPU/GridLog.h"
 
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
 

@@ -3,7 +3,7 @@
 // Copies of a bin's pixels: the same code changes them and the image, as it
 // finds either by an address and a pitch.
 
-#include "KernelLowering.h"
+#include "PikoToLLVM/KernelLowering.h"
 
 #include "mlir/Dialect/SCF/IR/SCF.h"
 

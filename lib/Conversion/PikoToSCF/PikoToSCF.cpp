@@ -3,7 +3,7 @@
 // convert-piko-to-scf: updates and other access to state, behind tests of where
 // they go.
 
-#include "Tiles.h"
+#include "PikoToSCF/Tiles.h"
 
 #include "Piko/Transforms/Storage/PixelAccess.h"
 

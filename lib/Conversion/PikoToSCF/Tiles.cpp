@@ -6,7 +6,7 @@
 // is in the image, whose rows are cleared when the bin begins: they are in the
 // cache from then on. Of one that is not cleared the runtime may make a copy.
 
-#include "Tiles.h"
+#include "PikoToSCF/Tiles.h"
 
 #include "Piko/Transforms/Storage/PixelAccess.h"
 

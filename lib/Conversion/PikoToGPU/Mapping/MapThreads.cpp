@@ -8,8 +8,8 @@
 //   3. otherwise say of each piece of work and each parallel loop who takes its
 //      items or iterations (WorkLegality.h).
 
-#include "PixelOwners.h"
-#include "SetupSplit.h"
+#include "PikoToGPU/Mapping/PixelOwners.h"
+#include "PikoToGPU/Mapping/SetupSplit.h"
 
 #include "Piko/Conversion/UnitOrder.h"
 #include "Piko/Dialect/Piko/IR/Marks.h"

@@ -8,9 +8,9 @@
 //      coordinate of all updates is the counter of one, or the primitive's;
 //   4. below them, tests that are cheap enough to be done twice.
 
-#include "PixelNest.h"
+#include "PikoToGPU/Mapping/PixelNest.h"
 
-#include "../PikoToGPU.h"
+#include "PikoToGPU/PikoToGPU.h"
 
 #include "mlir/Dialect/Utils/StaticValueUtils.h"
 #include "mlir/Interfaces/LoopLikeInterface.h"

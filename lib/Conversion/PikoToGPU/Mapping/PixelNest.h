@@ -6,7 +6,7 @@
 #ifndef PIKO_LIB_CONVERSION_PIKOTOGPU_MAPPING_PIXELNEST_H
 #define PIKO_LIB_CONVERSION_PIKOTOGPU_MAPPING_PIXELNEST_H
 
-#include "WorkLegality.h"
+#include "PikoToGPU/Mapping/WorkLegality.h"
 
 namespace piko {
 

@@ -8,9 +8,9 @@
 // What has no effect is computed by all threads alike, so that each of them
 // finds for its own pixels what a single one would find.
 
-#include "PixelOwners.h"
+#include "PikoToGPU/Mapping/PixelOwners.h"
 
-#include "PixelNest.h"
+#include "PikoToGPU/Mapping/PixelNest.h"
 
 #include "mlir/Dialect/Utils/StaticValueUtils.h"
 #include "mlir/Interfaces/SideEffectInterfaces.h"

@@ -6,7 +6,7 @@
 #ifndef PIKO_LIB_CONVERSION_PIKOTOGPU_MAPPING_PIXELOWNERS_H
 #define PIKO_LIB_CONVERSION_PIKOTOGPU_MAPPING_PIXELOWNERS_H
 
-#include "../PikoToGPU.h"
+#include "PikoToGPU/PikoToGPU.h"
 
 namespace piko {
 

@@ -5,9 +5,9 @@
 // or needs the result of one; all else is the setup. Where one is in an scf.if
 // that is the same for all threads, both have that scf.if.
 
-#include "SetupSplit.h"
+#include "PikoToGPU/Mapping/SetupSplit.h"
 
-#include "../PikoToGPU.h"
+#include "PikoToGPU/PikoToGPU.h"
 
 #include "mlir/Interfaces/SideEffectInterfaces.h"
 

@@ -5,7 +5,7 @@
 #ifndef PIKO_LIB_CONVERSION_PIKOTOGPU_MAPPING_SETUPSPLIT_H
 #define PIKO_LIB_CONVERSION_PIKOTOGPU_MAPPING_SETUPSPLIT_H
 
-#include "PixelNest.h"
+#include "PikoToGPU/Mapping/PixelNest.h"
 
 #include "llvm/ADT/SetVector.h"
 

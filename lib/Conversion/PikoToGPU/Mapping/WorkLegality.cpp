@@ -6,9 +6,9 @@
 // primitives of a bin are independent unless their stage updates pixels.
 // Iterations that meet at barriers are threads under the same condition.
 
-#include "WorkLegality.h"
+#include "PikoToGPU/Mapping/WorkLegality.h"
 
-#include "../PikoToGPU.h"
+#include "PikoToGPU/PikoToGPU.h"
 
 #include "Piko/Dialect/Piko/IR/Marks.h"
 

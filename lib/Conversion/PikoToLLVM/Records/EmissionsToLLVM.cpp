@@ -5,10 +5,10 @@
 // stores that emits nothing, the next one writes over: no branch tells them
 // apart.
 
-#include "KernelLowering.h"
-#include "LaneBits.h"
-#include "RecordPieces.h"
-#include "WriterPaths.h"
+#include "PikoToLLVM/KernelLowering.h"
+#include "PikoToLLVM/Lanes/LaneBits.h"
+#include "PikoToLLVM/Records/RecordPieces.h"
+#include "PikoToLLVM/Records/WriterPaths.h"
 
 #include "Piko/Dialect/Piko/IR/CodeBuilder.h"
 

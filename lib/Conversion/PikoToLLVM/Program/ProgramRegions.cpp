@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
-#include "ProgramRegions.h"
+#include "PikoToLLVM/Program/ProgramRegions.h"
 
 using namespace mlir;
 using namespace piko;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 
-#include "WriterPaths.h"
+#include "PikoToLLVM/Records/WriterPaths.h"
 
-#include "LaneBits.h"
+#include "PikoToLLVM/Lanes/LaneBits.h"
 
 #include "Piko/Dialect/Piko/IR/CodeBuilder.h"
 

@@ -5,7 +5,7 @@
 #ifndef PIKO_LIB_CONVERSION_PIKOTOLLVM_GRIDCODE_H
 #define PIKO_LIB_CONVERSION_PIKOTOLLVM_GRIDCODE_H
 
-#include "LoweringContext.h"
+#include "PikoToLLVM/LoweringContext.h"
 
 #include "Piko/Dialect/Piko/IR/CodeBuilder.h"
 #include "pikort/grid.h"

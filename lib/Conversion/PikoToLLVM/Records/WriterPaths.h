@@ -6,7 +6,7 @@
 #ifndef PIKO_LIB_CONVERSION_PIKOTOLLVM_WRITERPATHS_H
 #define PIKO_LIB_CONVERSION_PIKOTOLLVM_WRITERPATHS_H
 
-#include "LoweringContext.h"
+#include "PikoToLLVM/LoweringContext.h"
 
 namespace piko {
 

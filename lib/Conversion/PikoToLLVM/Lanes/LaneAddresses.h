@@ -5,7 +5,7 @@
 #ifndef PIKO_LIB_CONVERSION_PIKOTOLLVM_LANEADDRESSES_H
 #define PIKO_LIB_CONVERSION_PIKOTOLLVM_LANEADDRESSES_H
 
-#include "LoweringContext.h"
+#include "PikoToLLVM/LoweringContext.h"
 
 namespace piko {
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
-#include "LaneIndices.h"
+#include "PikoToLLVM/Lanes/LaneIndices.h"
 
-#include "LoweringContext.h"
+#include "PikoToLLVM/LoweringContext.h"
 
 #include "mlir/Dialect/Vector/IR/VectorOps.h"
 

@@ -3,7 +3,7 @@
 // Images that threads have for themselves: declared to the runtime, with a
 // function for each selection that combines those of two threads.
 
-#include "KernelLowering.h"
+#include "PikoToLLVM/KernelLowering.h"
 
 #include "Piko/Dialect/Piko/IR/Marks.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
-#include "LaneAddresses.h"
+#include "PikoToLLVM/Lanes/LaneAddresses.h"
 
 #include "mlir/Dialect/Vector/IR/VectorOps.h"
 

@@ -2,9 +2,9 @@
 //
 // Rows of elements that lanes reduce to a private copy.
 
-#include "KernelLowering.h"
-#include "LaneAddresses.h"
-#include "LaneBits.h"
+#include "PikoToLLVM/KernelLowering.h"
+#include "PikoToLLVM/Lanes/LaneAddresses.h"
+#include "PikoToLLVM/Lanes/LaneBits.h"
 
 #include "mlir/Dialect/Math/IR/Math.h"
 #include "mlir/Dialect/SCF/IR/SCF.h"

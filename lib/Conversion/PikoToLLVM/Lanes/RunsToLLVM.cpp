@@ -3,8 +3,8 @@
 // Lanes that read elements side by side: one load of all for each lane, which
 // are brought apart. A gather would load each one alone.
 
-#include "KernelLowering.h"
-#include "LaneIndices.h"
+#include "PikoToLLVM/KernelLowering.h"
+#include "PikoToLLVM/Lanes/LaneIndices.h"
 
 #include "mlir/Dialect/Vector/IR/VectorOps.h"
 

@@ -2,7 +2,7 @@
 //
 // NAME.run: a piko.program as branches between calls of kernels.
 
-#include "ProgramRegions.h"
+#include "PikoToLLVM/Program/ProgramRegions.h"
 
 #include "Piko/Dialect/Piko/IR/Marks.h"
 #include "Piko/Dialect/Piko/IR/PikoGPU.h"

@@ -5,9 +5,9 @@
 // mask, as they mostly are, nothing has to find which words are those of which
 // lane.
 
-#include "RecordRows.h"
+#include "PikoToLLVM/Records/RecordRows.h"
 
-#include "RecordPieces.h"
+#include "PikoToLLVM/Records/RecordPieces.h"
 
 #include "mlir/Dialect/SCF/IR/SCF.h"
 #include "mlir/Dialect/Vector/IR/VectorOps.h"

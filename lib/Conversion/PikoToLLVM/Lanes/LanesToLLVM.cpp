@@ -2,11 +2,11 @@
 //
 // Access to state and to primitives by the lanes of a vector.
 
-#include "KernelLowering.h"
-#include "LaneAddresses.h"
-#include "LaneIndices.h"
-#include "RecordPieces.h"
-#include "RecordRows.h"
+#include "PikoToLLVM/KernelLowering.h"
+#include "PikoToLLVM/Lanes/LaneAddresses.h"
+#include "PikoToLLVM/Lanes/LaneIndices.h"
+#include "PikoToLLVM/Records/RecordPieces.h"
+#include "PikoToLLVM/Records/RecordRows.h"
 
 #include "Piko/Conversion/Permutations.h"
 #include "Piko/Dialect/Piko/IR/CodeBuilder.h"

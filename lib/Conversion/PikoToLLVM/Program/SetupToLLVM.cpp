@@ -2,7 +2,7 @@
 //
 // NAME.setup, which declares a pipeline to the runtime.
 
-#include "ProgramRegions.h"
+#include "PikoToLLVM/Program/ProgramRegions.h"
 
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"

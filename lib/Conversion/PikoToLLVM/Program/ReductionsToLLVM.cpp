@@ -3,7 +3,7 @@
 // What kernels reduce to private copies of: declared to the runtime, with a
 // function for each that combines a copy with the state.
 
-#include "KernelLowering.h"
+#include "PikoToLLVM/KernelLowering.h"
 
 #include "Piko/Dialect/Piko/IR/Marks.h"
 

@@ -9,8 +9,8 @@
 //   where
 //      they come to follows from a sum of their numbers.
 
-#include "GridCode.h"
-#include "GridLog.h"
+#include "PikoToLLVM/GPU/GridCode.h"
+#include "PikoToLLVM/GPU/GridLog.h"
 
 #include "Piko/Dialect/Piko/IR/PikoGPU.h"
 

@@ -4,9 +4,9 @@
 // entries into its outbox, which is one of its own; where that is full it takes
 // another piece of memory. BlockOutput.cpp is about what the block does.
 
-#include "GridLog.h"
+#include "PikoToLLVM/GPU/GridLog.h"
 
-#include "GridCode.h"
+#include "PikoToLLVM/GPU/GridCode.h"
 
 #include "Piko/Dialect/Piko/IR/Marks.h"
 #include "Piko/Dialect/Piko/IR/PikoCheck.h"

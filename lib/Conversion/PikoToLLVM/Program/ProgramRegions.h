@@ -6,7 +6,7 @@
 #ifndef PIKO_LIB_CONVERSION_PIKOTOLLVM_PROGRAMREGIONS_H
 #define PIKO_LIB_CONVERSION_PIKOTOLLVM_PROGRAMREGIONS_H
 
-#include "LoweringContext.h"
+#include "PikoToLLVM/LoweringContext.h"
 
 #include "Piko/Dialect/Piko/IR/PikoProgram.h"
 

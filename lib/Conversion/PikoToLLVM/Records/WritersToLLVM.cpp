@@ -3,9 +3,9 @@
 // Writers, what is emitted to them, and scratch memory, on the runtime's
 // structs (pikort/abi.h).
 
-#include "GridLog.h"
-#include "KernelLowering.h"
-#include "WriterPaths.h"
+#include "PikoToLLVM/GPU/GridLog.h"
+#include "PikoToLLVM/KernelLowering.h"
+#include "PikoToLLVM/Records/WriterPaths.h"
 
 #include "Piko/Dialect/Piko/IR/Marks.h"
 

@@ -3,7 +3,7 @@
 // A piko.program as the steps of a device that runs it by itself: what is
 // repeated stands there once, between its begin and its end (pikort/grid.h).
 
-#include "ProgramRegions.h"
+#include "PikoToLLVM/Program/ProgramRegions.h"
 
 #include "pikort/grid.h"
 

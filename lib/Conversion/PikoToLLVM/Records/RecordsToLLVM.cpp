@@ -4,9 +4,9 @@
 // of 16 bytes, of one lane each, whose words are transposed. A gather loads
 // each word alone.
 
-#include "KernelLowering.h"
-#include "RecordPieces.h"
-#include "RecordRows.h"
+#include "PikoToLLVM/KernelLowering.h"
+#include "PikoToLLVM/Records/RecordPieces.h"
+#include "PikoToLLVM/Records/RecordRows.h"
 
 #include "mlir/Dialect/SCF/IR/SCF.h"
 #include "mlir/Dialect/Vector/IR/VectorOps.h"
