@@ -54,6 +54,8 @@ def parse_options():
     options = parser.parse_args()
     if not options.list_chips and bool(options.counts) == bool(options.scene):
         parser.error("expected a pipeline and a scene, or --counts")
+    if options.counts and len(options.chip or []) != 1:
+        parser.error("--counts: expected the --chip whose latencies were counted")
     return parser, options
 
 
@@ -83,6 +85,10 @@ def count(options, chips):
     if options.counts:
         with open(options.counts) as file:
             report = json.load(file)
+        if not all(counts.get("mostSpan") for counts in report["kernels"].values()
+                   if counts["warpInstructions"]):
+            sys.exit(f"{options.counts}: expected spans, which are counted with "
+                     f"PIKO_TEST_DRIVER_LATENCIES={chips[0].latencies}")
         return {chip.name: report for chip in chips}
     file = counting.find_pipeline(ROOT, options.pipeline)
     pipe = options.pipe or call(

@@ -109,7 +109,10 @@ def layers():
         if not re.match(r"(lib|include|tools)/.*\.(h|cpp)$", name):
             continue
         for number, line in enumerate((ROOT / name).read_text().splitlines(), 1):
-            if re.match(r'#include "\.\./\.\./', line):
+            included = re.match(r'#include "(\.\./[^"]+)', line)
+            if included and not os.path.normpath(
+                os.path.join(os.path.dirname(name), included[1])
+            ).startswith("/".join(name.split("/")[:2]) + "/"):
                 print(
                     f"{name}:{number}: expected a header of its own library, or of"
                     " include"

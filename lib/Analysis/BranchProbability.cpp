@@ -44,7 +44,10 @@ std::optional<double> piko::getProbability(cf::CondBranchOp branch) {
 }
 
 std::optional<double> piko::getTurnProbability(Operation *loop) {
-  return getMark(loop);
+  // As branch weights have it, none is impossible.
+  constexpr double least = 1.0 / (1 << 20);
+  std::optional<double> again = getMark(loop);
+  return again ? std::optional(std::max(*again, least)) : std::nullopt;
 }
 
 std::optional<double> piko::getProbableTurns(Operation *loop) {
@@ -72,23 +75,34 @@ namespace {
 class Turn {
 public:
   explicit Turn(BlockArgument again) : again(again) {}
-  /// How probable another turn is at the begin of a block; `returns` where all
-  /// ways lead back to a block that was passed.
-  std::optional<double> at(Block *block);
 
-  static constexpr double returns = -1;
+  /// What is known where a block begins: how probable another turn is, unless
+  /// all ways return to a block that was entered before; and the first one of
+  /// these that any of them returns to.
+  struct Answer {
+    std::optional<double> probability;
+    bool returns = false;
+    size_t back = none;
+  };
+  Answer at(Block *block);
 
 private:
-  std::optional<double> find(Block *block);
-  std::optional<double> along(Operation *branch, unsigned successor);
+  static constexpr size_t none = ~size_t(0);
 
+  Answer find(Block *block, size_t number);
+  Answer along(Operation *branch, unsigned successor);
+
+  struct Entered {
+    size_t number;
+    std::optional<Answer> answer; ///< None on the way to a block.
+  };
   BlockArgument again;
-  llvm::DenseMap<Block *, std::optional<double>> known;
+  llvm::DenseMap<Block *, Entered> known;
 };
 
 } // namespace
 
-std::optional<double> Turn::along(Operation *branch, unsigned successor) {
+Turn::Answer Turn::along(Operation *branch, unsigned successor) {
   Block *to = branch->getSuccessor(successor);
   if (to != again.getOwner())
     return at(to);
@@ -96,43 +110,56 @@ std::optional<double> Turn::along(Operation *branch, unsigned successor) {
       successor)[again.getArgNumber()];
   APInt flag;
   if (!value || !matchPattern(value, m_ConstantInt(&flag)))
-    return std::nullopt;
-  return flag.isZero() ? 0 : 1;
+    return {};
+  return {flag.isZero() ? 0.0 : 1.0};
 }
 
-std::optional<double> Turn::find(Block *block) {
+Turn::Answer Turn::find(Block *block, size_t number) {
   Operation *branch = block->getTerminator();
-  SmallVector<std::optional<double>> ways;
   if (!isa<BranchOpInterface>(branch))
-    return std::nullopt;
-  for (unsigned i = 0; i < branch->getNumSuccessors(); ++i)
-    if (std::optional<double> way = along(branch, i); way != returns)
-      ways.push_back(way);
-  if (ways.empty())
-    return returns;
-  if (llvm::all_equal(ways))
-    return ways.front();
+    return {};
+  Answer all;
+  SmallVector<std::optional<double>> ways;
+  for (unsigned i = 0; i < branch->getNumSuccessors(); ++i) {
+    Answer way = along(branch, i);
+    all.back = std::min(all.back, way.back);
+    if (!way.returns)
+      ways.push_back(way.probability);
+  }
+  // Who returns here comes back until one of the other ways is taken.
+  const bool returns = all.back != none;
+  if (all.back >= number)
+    all.back = none;
+  all.returns = ways.empty();
+  if (ways.empty() || llvm::all_equal(ways)) {
+    all.probability = ways.empty() ? std::nullopt : ways.front();
+    return all;
+  }
   auto choice = dyn_cast<cf::CondBranchOp>(branch);
   std::optional<double> first = choice ? getProbability(choice) : std::nullopt;
-  if (!first || ways.size() != 2 || !ways[0] || !ways[1])
-    return std::nullopt;
-  return *first * *ways[0] + (1 - *first) * *ways[1];
+  // How often it came back decides, too.
+  if (returns || !first || ways.size() != 2 || !ways[0] || !ways[1])
+    return all;
+  all.probability = *first * *ways[0] + (1 - *first) * *ways[1];
+  return all;
 }
 
-std::optional<double> Turn::at(Block *block) {
-  // A block that was entered and has no answer yet is in front of itself.
-  auto [found, isNew] = known.try_emplace(block, returns);
-  if (!isNew)
-    return found->second;
-  std::optional<double> probability = find(block);
-  known[block] = probability;
-  return probability;
+Turn::Answer Turn::at(Block *block) {
+  const size_t number = known.size();
+  auto [found, isNew] = known.try_emplace(block, Entered{number, {}});
+  if (!isNew) {
+    if (found->second.answer)
+      return *found->second.answer;
+    return {std::nullopt, true, found->second.number};
+  }
+  Answer answer = find(block, number);
+  known[block].answer = answer;
+  return answer;
 }
 
 std::optional<double> piko::computeTurnProbability(Block *first,
                                                    BlockArgument again) {
-  std::optional<double> probability = Turn(again).at(first);
-  return probability == Turn::returns ? std::nullopt : probability;
+  return Turn(again).at(first).probability;
 }
 
 //===----------------------------------------------------------------------===//
@@ -144,28 +171,28 @@ namespace {
 struct Keeper : RewriterBase::Listener {
   void notifyOperationReplaced(Operation *op, ValueRange values) override {
     std::optional<double> known = getMark(op);
-    Operation *made = known ? findMade(op, values) : nullptr;
-    if (made && !getMark(made) && decidesAlike(op, made))
+    if (Operation *made = known ? findMade(op, values) : nullptr)
       setProbability(made, known);
   }
   void notifyOperationReplaced(Operation *op, Operation *made) override {
     notifyOperationReplaced(op, ValueRange(made->getResults()));
   }
 
-  /// The operation that is in place of another one, whose name it has.
+  /// The operation that is in place of another one, whose body it took.
   static Operation *findMade(Operation *op, ValueRange values) {
+    if (op->getNumRegions() == 0 || !op->getRegion(0).empty())
+      return nullptr;
     for (Value value : values)
       if (Operation *made = value ? value.getDefiningOp() : nullptr;
-          made && made != op && made->getName() == op->getName())
+          made && isLike(op, made))
         return made;
-    // It took the body of one that has no results.
     Operation *before = op->getPrevNode();
-    bool isMoved = op->getNumRegions() > 0 && op->getRegion(0).empty();
-    return isMoved && before && before->getName() == op->getName() ? before
-                                                                   : nullptr;
+    return values.empty() && before && isLike(op, before) ? before : nullptr;
   }
 
-  static bool decidesAlike(Operation *op, Operation *made) {
+  static bool isLike(Operation *op, Operation *made) {
+    if (made == op || made->getName() != op->getName() || getMark(made))
+      return false;
     auto branch = dyn_cast<scf::IfOp>(op);
     return !branch ||
            branch.getCondition() == cast<scf::IfOp>(made).getCondition();

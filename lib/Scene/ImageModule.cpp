@@ -91,11 +91,17 @@ Result<Done> writeAll(OIIO::ImageOutput &output, const std::string &name,
   if (!output.open(name, spec))
     return Error{output.geterror()};
   bool ok;
-  if (spec.format == OIIO::TypeDesc::FLOAT)
+  if (spec.format == OIIO::TypeDesc::FLOAT) {
     ok = output.write_image(OIIO::TypeDesc::FLOAT, pixels.data(),
                             sizeof(scene::Color));
-  else
-    ok = output.write_image(OIIO::TypeDesc::UINT8, toBytes(pixels).data());
+  } else {
+    // HEIF's writer reads rows as long as libheif's, whose pixels are a
+    // multiple of 64: the last one beyond the picture's end.
+    constexpr size_t pixelsOfRow = 64;
+    auto bytes = toBytes(pixels);
+    bytes.resize(bytes.size() + pixelsOfRow * size_t(spec.nchannels));
+    ok = output.write_image(OIIO::TypeDesc::UINT8, bytes.data());
+  }
   std::string why = ok ? "" : output.geterror();
   if (!output.close() && ok) {
     ok = false;

@@ -36,6 +36,11 @@
 // TURNS: weights([786432, 262144])
 // TURNS: weights([103{{[0-9]*}}, 1{{[0-9]*}}])
 //
+// An inner loop that may leave both, of which nothing is said.
+// RUN: pikoc %s --pipe Leaves --emit=machine | FileCheck %s --check-prefix=LEAVES
+// LEAVES: scf.while
+// LEAVES-NOT: attributes {piko.probability
+//
 // RUN: pikoc %s --pipe Unlikely --emit=llvm | FileCheck %s --check-prefix=WEIGHTS
 // WEIGHTS: llvm.cond_br %{{.*}} weights([524, 1048052]),
 //
@@ -67,6 +72,7 @@ enum class Kind {
   Tenth,
   Cases,
   Loops,
+  Leaves,
   Chains,
   FewChains
 };
@@ -115,6 +121,19 @@ template <Kind K> struct Work : piko::Stage<0, 0, 64, Item>, piko::Uses<State> {
         if (n == 9) [[unlikely]]
           break;
       }
+    } else if constexpr (K == Kind::Leaves) {
+      int n = item.serial;
+      auto search = [&] {
+        while (n > 7) [[likely]] {
+          for (int k = n; k > 3; k /= 2) [[likely]] {
+            x += 1 / (x + 2);
+            if (x > item.y)
+              return;
+          }
+          n = n % 2 ? n * 3 : n / 2;
+        }
+      };
+      search();
     } else if constexpr (K == Kind::Chains || K == Kind::FewChains) {
       auto go = [](bool more) {
         return K == Kind::Chains ? more : bool(__builtin_expect(more, 0));
@@ -140,5 +159,6 @@ struct Unlikely : Lone<Kind::Unlikely> {};
 struct Tenth : Lone<Kind::Tenth> {};
 struct Cases : Lone<Kind::Cases> {};
 struct Loops : Lone<Kind::Loops> {};
+struct Leaves : Lone<Kind::Leaves> {};
 struct Chains : Lone<Kind::Chains> {};
 struct FewChains : Lone<Kind::FewChains> {};

@@ -320,7 +320,9 @@ LogicalResult GridBuilder::mapWork() {
   formGrid();
   launch.walk([&](scf::ForOp loop) {
     auto mark = loop->getAttrOfType<ThreadMappingAttr>(marks::threads);
-    if (mark && mark.getValue() == ThreadMapping::One)
+    bool emits = contains(
+        loop, [](Operation *op) { return isa<AppendOp, AppendBinOp>(op); });
+    if (mark && mark.getValue() == ThreadMapping::One && emits)
       memory.ordered.insert(loop);
   });
   for (scf::ForOp loop : takeMapping(ThreadMapping::Shared))

@@ -223,8 +223,9 @@ TEST_F(SpanTest, BarriersWaitForTheLast) {
 }
 
 TEST_F(SpanTest, LatenciesThatAreNone) {
-  for (const char *text : {"4,20,30", "4,20,30,200,1", "4,20,30,x", "4,20,,200",
-                           "4,20,30,-1", " 4,20,30,200", "0,1,1,1", ","})
+  for (const char *text :
+       {"4,20,30", "4,20,30,200,1", "4,20,30,x", "4,20,,200", "4,20,30,-1",
+        " 4,20,30,200", "0,1,1,1", "inf,1,1,1", ","})
     EXPECT_EQ(pikoTestDriverLatencies(text), 1) << text;
   EXPECT_EQ(pikoTestDriverLatencies("4.5,20,30,200"), 0);
 }

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <utility>
@@ -69,7 +70,7 @@ bool piko::testdriver::parseLatencies(
     if (cycles != &read.arithmetic && (at == end || *at++ != ','))
       return false;
     auto [next, error] = std::from_chars(at, end, *cycles);
-    if (error != std::errc() || !(*cycles > 0))
+    if (error != std::errc() || !(*cycles > 0) || std::isinf(*cycles))
       return false;
     at = next;
   }

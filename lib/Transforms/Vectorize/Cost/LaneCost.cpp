@@ -161,6 +161,8 @@ private:
     cost.vectors += laneByLane ? part : 0;
   }
   void addStructure(Operation *op, Frequency times, bool laneByLane);
+  /// How often a region of a loop runs for each time that the loop does.
+  Frequency getFrequencyInside(Operation *loop, Region &region) const;
   double getTurns(Operation *loop) const;
   /// How many of the lanes make a turn of a loop.
   double getGoing(Operation *loop) const;
@@ -288,6 +290,19 @@ double CostModel::getOwnTurns(Operation *loop) const {
   return std::max(1.0, getTurns(loop) * cycles.goOn);
 }
 
+Frequency CostModel::getFrequencyInside(Operation *loop, Region &region) const {
+  double turns = getTurns(loop);
+  Frequency each{turns * getGoing(loop), turns};
+  std::optional<double> again = getTurnProbability(loop);
+  if (!again)
+    return each;
+  // One lane is enough; and what tests is tested once more.
+  each.vectors =
+      std::max(turns, 1 - std::pow(1 - *again, lanes.getLaneCount()));
+  bool isTest = isa<scf::WhileOp>(loop) && region.getRegionNumber() == 0;
+  return {each.serial + isTest, each.vectors + isTest};
+}
+
 void CostModel::addStructure(Operation *op, Frequency times, bool laneByLane) {
   if (auto choice = dyn_cast<scf::IfOp>(op)) {
     Region &yes = choice.getThenRegion(), &no = choice.getElseRegion();
@@ -347,7 +362,6 @@ void CostModel::addStructure(Operation *op, Frequency times, bool laneByLane) {
     }
     return;
   }
-  double going = getGoing(op);
   if (!lanes.isSharedLoop(op))
     addBranches(cycles.exits * times.serial, laneByLane);
   auto loop = dyn_cast<scf::ForOp>(op);
@@ -370,15 +384,9 @@ void CostModel::addStructure(Operation *op, Frequency times, bool laneByLane) {
     along = hasVectorsAlong(loop) ? cycles.along : 1;
   }
   double before = cost.serial;
-  Frequency each{turns * going, turns};
-  std::optional<double> again = getTurnProbability(op);
-  if (again) // One lane is enough.
-    each.vectors =
-        std::max(turns, 1 - std::pow(1 - *again, lanes.getLaneCount()));
   for (Region &region : op->getRegions()) {
-    bool isTest = again && isa<scf::WhileOp>(op) && !region.getRegionNumber();
-    add(region, times.scaled(each.serial + isTest, each.vectors + isTest),
-        laneByLane);
+    Frequency each = getFrequencyInside(op, region);
+    add(region, times.scaled(each.serial, each.vectors), laneByLane);
   }
   cost.loops[op] += cost.serial - before;
   along = around;
@@ -528,9 +536,12 @@ void CostModel::addChase(LoadOp load, Frequency times, bool laneByLane) {
       !chased.insert(load.getIndices().front()).second)
     return;
   // Loops inside begin with a wait.
-  for (Operation *at = load->getParentOp(); at != chase; at = at->getParentOp())
-    if (isa<scf::ForOp, scf::WhileOp>(at))
-      times = times.scaled(1 / (getTurns(at) * getGoing(at)), 1 / getTurns(at));
+  for (Region *in = load->getParentRegion(); in->getParentOp() != chase;
+       in = in->getParentRegion())
+    if (Operation *at = in->getParentOp(); isa<scf::ForOp, scf::WhileOp>(at)) {
+      Frequency each = getFrequencyInside(at, *in);
+      times = times.scaled(1 / each.serial, 1 / each.vectors);
+    }
   double one = cycles.chase / double(lanes.getLaneCount());
   cost.serial += times.serial * cycles.chase;
   cost.vectors +=

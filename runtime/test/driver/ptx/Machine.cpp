@@ -225,8 +225,10 @@ bool Block::releaseBarriers() {
           last.wait(warp->scoreboard.now);
       }
       for (auto &warp : warps) {
-        if (warp->isAt(barrier))
+        if (warp->isAt(barrier)) {
           warp->scoreboard.now.wait(last);
+          warp->scoreboard.endLoop();
+        }
         warp->release(barrier, waiting[barrier],
                       static_cast<uint32_t>(holding));
       }

@@ -79,7 +79,7 @@ void load(Warp &warp, const Instruction &it) {
                 locate<space>(warp, it, lane, address, sizeof(M), sectors),
                 address, &value, sizeof(M));
     if (it.order == Order::Strong && warp.block.launch.latencies &&
-        isGlobal<space>(address))
+        std::has_single_bit(warp.active) && isGlobal<space>(address))
       value = static_cast<M>(warp.see(address, static_cast<uint64_t>(value)));
     result[lane] = static_cast<R>(value);
   });
