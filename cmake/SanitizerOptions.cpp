@@ -35,8 +35,11 @@ __ubsan_default_options() {
 
 [[gnu::visibility("default"), gnu::used]] const char *
 __lsan_default_suppressions() {
-  // OpenMP's runtime keeps its threads and their memory until the process ends.
-  return "leak:libomp.so\n";
+  // OpenMP's runtime keeps its threads and their memory until the process ends;
+  // OpenJPEG and x265 that of pictures that they have refused.
+  return "leak:libomp.so\n"
+         "leak:libopenjp2.so\n"
+         "leak:libx265.so\n";
 }
 
 [[gnu::visibility("default"), gnu::used]] const char *__lsan_default_options() {
