@@ -66,7 +66,7 @@ TEST_F(Cuda, AsManyBlocksAsAreResident) {
   ASSERT_TRUE(scale());
   expectScaled();
   ASSERT_EQ(pikoTestDriverCounts("scale", &counts), 0);
-  EXPECT_EQ(counts.blocks, 4u * 2u); // of four multiprocessors of 100 KB
+  EXPECT_EQ(counts.blocks, 4u * 5u); // of four multiprocessors of 228 KB
 }
 
 // Of a frame that is one submission nothing is known, unless it is asked for.
