@@ -8,6 +8,8 @@ piko.record @U {"unit" : i32 at 0} size 4 align 4
 
 // All access of the unit goes to its own images; the internal one is no state of
 // the pipeline's.
+// Numbers, and not bytes: they are aligned.
+// CHECK: llvm.mlir.global internal constant @[[ARRAY:piko.array.[0-9]+]](dense<[0, 1]> : tensor<2xi32>)
 // CHECK-LABEL: func.func private @P.kernel_a(
 // CHECK:         llvm.call @pikoir_get_state
 // CHECK-NOT:     llvm.call @pikoir_get_state
@@ -26,9 +28,10 @@ piko.record @U {"unit" : i32 at 0} size 4 align 4
 
 // CHECK-LABEL: func.func @P.setup(
 // CHECK:         %[[SELECT:.*]] = llvm.mlir.addressof @P.select.a.u
+// CHECK:         %[[STATES:.*]] = llvm.mlir.addressof @[[ARRAY]]
 // CHECK-COUNT-2: llvm.call @pikoir_declare_state
 // CHECK-NOT:     llvm.call @pikoir_declare_state
-// CHECK:         llvm.call @pikoir_declare_selection(%{{.*}}, %c0_i32, %c0_i32, %{{.*}}, %c2_i32, %c1_i32, %[[SELECT]])
+// CHECK:         llvm.call @pikoir_declare_selection(%{{.*}}, %c0_i32, %c0_i32, %[[STATES]], %c2_i32, %c1_i32, %[[SELECT]])
 
 // CHECK-LABEL: llvm.func internal @P.select.a.u(
 // CHECK:         scf.for

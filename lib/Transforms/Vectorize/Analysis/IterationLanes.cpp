@@ -558,3 +558,18 @@ bool IterationLanes::isPrivateRow(Operation *op) const {
          llvm::none_of(atomic.getElements(),
                        [&](Value element) { return isVarying(element); });
 }
+
+std::optional<int64_t> piko::getConstantTurns(scf::ForOp loop) {
+  if (std::optional<APInt> count = loop.getStaticTripCount())
+    return count->getLimitedValue();
+  auto strip = [](Value value) {
+    while (auto cast = value.getDefiningOp<arith::IndexCastOp>())
+      value = cast.getIn();
+    return value;
+  };
+  auto sum = strip(loop.getUpperBound()).getDefiningOp<arith::AddIOp>();
+  if (!sum || !matchPattern(loop.getStep(), m_One()) ||
+      strip(sum.getLhs()) != strip(loop.getLowerBound()))
+    return std::nullopt;
+  return getConstantIntValue(sum.getRhs());
+}

@@ -234,21 +234,6 @@ void CostModel::addTurns(const OrderedGroup &group, Frequency times) {
                   cycles.slot * times.serial * inputs.size();
 }
 
-std::optional<int64_t> piko::getConstantTurns(scf::ForOp loop) {
-  if (std::optional<APInt> count = loop.getStaticTripCount())
-    return count->getLimitedValue();
-  auto strip = [](Value value) {
-    while (auto cast = value.getDefiningOp<arith::IndexCastOp>())
-      value = cast.getIn();
-    return value;
-  };
-  auto sum = strip(loop.getUpperBound()).getDefiningOp<arith::AddIOp>();
-  if (!sum || !matchPattern(loop.getStep(), m_One()) ||
-      strip(sum.getLhs()) != strip(loop.getLowerBound()))
-    return std::nullopt;
-  return getConstantIntValue(sum.getRhs());
-}
-
 /// How often a loop turns, as far as is known.
 double CostModel::getTurns(Operation *loop) const {
   if (auto turns = loop->getAttrOfType<FloatAttr>(marks::turns))
