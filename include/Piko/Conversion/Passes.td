@@ -109,14 +109,17 @@ def MapThreads : Pass<"piko-map-threads", "::piko::PipelineOp"> {
       that has an effect follows from the update of a pixel.
     - `shared`: each takes some of the primitives, no two of which update a pixel.
     - `one`: one primitive after the other; loops inside may be shared.
+    - `by_count`: `shared` where a bin has at least `piko.fewest` primitives, else
+      `one`; chosen when the grid runs.
 
     Of a parallel loop: `shared`, where no two iterations update a pixel; `lockstep`,
     where they meet at barriers and are at most as many as the threads; `pieces`,
     where it has to be cut at barriers, `pieces_of_one` if one thread runs those; or
-    `one`. Before it looks for pixels, loops that count become `scf.for`, numbers that
+    `one`. An update whose pixel follows from data becomes a `piko.grouped`, which is
+    such a barrier. Before it looks for pixels, loops that count become `scf.for`, numbers that
     loops over pixels step become closed forms, and what pixels have in common moves
     out of their loops. A remark says why threads do not share pixels, or take one
-    primitive after the other.
+    primitive or iteration after the other.
 
     Before:
     ```

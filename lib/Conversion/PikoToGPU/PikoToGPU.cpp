@@ -277,7 +277,9 @@ LogicalResult GridBuilder::mapPieces(ParallelForOp loop, bool isShared) {
   if (failed(LoopSplitter(loop, memory.log, isShared).run()))
     return failure();
   launch.walk([&](scf::ForOp piece) {
-    if (piece->removeAttr(marks::lanes) && isShared && isIndependent(piece))
+    bool isApart = bool(piece->removeAttr(marks::disjoint));
+    if (piece->removeAttr(marks::lanes) && isShared &&
+        (isApart || isIndependent(piece)))
       piece->setAttr(marks::shared, UnitAttr::get(kernel.getContext()));
   });
   return success();
@@ -316,8 +318,38 @@ LogicalResult GridBuilder::mapLoop(ParallelLoopOpInterface loop) {
   }
 }
 
+/// Where there are as many primitives as it takes, threads have some each;
+/// otherwise they share the iterations of one after the other.
+static void createVersions(scf::ForOp loop) {
+  MLIRContext *context = loop.getContext();
+  OpBuilder builder(loop);
+  Location loc = loop.getLoc();
+  int64_t fewest = cast<IntegerAttr>(loop->removeAttr(marks::fewest)).getInt();
+  Value count = arith::SubIOp::create(builder, loc, loop.getUpperBound(),
+                                      loop.getLowerBound());
+  Value many = arith::CmpIOp::create(
+      builder, loc, arith::CmpIPredicate::sge, count,
+      arith::ConstantIndexOp::create(builder, loc, fewest));
+  auto choice = scf::IfOp::create(builder, loc, many, /*withElseRegion=*/true);
+  OpBuilder otherwise = choice.getElseBodyBuilder();
+  auto mark = [&](Operation *op, ThreadMapping mapping) {
+    op->setAttr(marks::threads, ThreadMappingAttr::get(context, mapping));
+  };
+  mark(otherwise.clone(*loop), ThreadMapping::One);
+  loop->moveBefore(choice.thenBlock()->getTerminator());
+  mark(loop, ThreadMapping::Shared);
+  loop->walk(
+      [&](ParallelLoopOpInterface inner) { mark(inner, ThreadMapping::One); });
+}
+
 LogicalResult GridBuilder::mapWork() {
   formGrid();
+  SmallVector<scf::ForOp> byCount;
+  launch.walk([&](scf::ForOp loop) {
+    if (loop->hasAttr(marks::fewest))
+      byCount.push_back(loop);
+  });
+  llvm::for_each(byCount, createVersions);
   launch.walk([&](scf::ForOp loop) {
     auto mark = loop->getAttrOfType<ThreadMappingAttr>(marks::threads);
     bool emits = contains(

@@ -4,8 +4,10 @@
 
 #include "Piko/Transforms/Storage/Collectives.h"
 #include "Piko/Transforms/Storage/ParallelLoops.h"
+#include "Piko/Transforms/Storage/PixelAccess.h"
 
 #include "Piko/Dialect/Piko/IR/BinArithmetic.h"
+#include "Piko/Dialect/Piko/IR/CodeBuilder.h"
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "Piko/Dialect/Piko/IR/Marks.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
@@ -86,9 +88,9 @@ LogicalResult LoopSplitter::checkControlFlow() {
   WalkResult result = parallel.walk([&](Operation *op) {
     if (!isBarrier(op))
       return WalkResult::advance();
-    if (!isa<SyncOp, ReduceOp, ScanOp, SortOp>(op)) {
-      op->emitError("expected piko.sync, piko.reduce, piko.scan or piko.sort, "
-                    "which loops can be cut at, but got '")
+    if (!isa<SyncOp, ReduceOp, ScanOp, SortOp, GroupedOp>(op)) {
+      op->emitError("expected piko.sync, piko.reduce, piko.scan, piko.sort or "
+                    "piko.grouped, which loops can be cut at, but got '")
           << op->getName() << "'";
       return WalkResult::interrupt();
     }
@@ -142,6 +144,8 @@ void LoopSplitter::split(Operation *op, Piece &piece) {
     return splitScan(scan, piece);
   if (auto sort = dyn_cast<SortOp>(op))
     return splitSort(sort, piece);
+  if (auto grouped = dyn_cast<GroupedOp>(op))
+    return splitGrouped(grouped, piece);
   if (auto ifOp = dyn_cast<scf::IfOp>(op))
     return splitIf(ifOp, piece);
   if (auto switchOp = dyn_cast<scf::IndexSwitchOp>(op))
@@ -181,6 +185,125 @@ void LoopSplitter::splitSort(SortOp op, Piece &piece) {
   create(builder, op.getLoc(), count, keys.front(), op.getIsUnsigned(), room,
          ranks);
   readFrom(op.getIndex(), ranks);
+}
+
+/// A number for the key of a cell, the same for no two cells.
+static Value createGroupNumber(OpBuilder &builder, Location loc,
+                               ValueRange key) {
+  Type i64 = builder.getI64Type();
+  int64_t bits = 64 / std::max<size_t>(2, key.size());
+  Value number;
+  for (auto [dim, coordinate] : llvm::enumerate(key)) {
+    Value part = arith::IndexCastOp::create(builder, loc, i64, coordinate);
+    if (dim > 0)
+      part = arith::ShLIOp::create(
+          builder, loc, part,
+          arith::ConstantIntOp::create(builder, loc, dim * bits, 64));
+    number =
+        number ? arith::OrIOp::create(builder, loc, number, part) : Value(part);
+  }
+  return number;
+}
+
+/// The number of an iteration's group, -1 where it is in none. That updates are
+/// in their bin is tested here, so that what is outside is reported in the
+/// order of iterations.
+static Value createGroup(OpBuilder &builder, GroupedOp op, ValueRange key) {
+  Location loc = op.getLoc();
+  auto choice =
+      scf::IfOp::create(builder, loc, builder.getI1Type(), op.getCondition(),
+                        /*withElseRegion=*/true);
+  OpBuilder then = choice.getThenBodyBuilder();
+  CodeBuilder code(then, loc);
+  Value isInside = code.boolean(true);
+  op.walk([&](UpdateOp update) {
+    auto test = createInsideTest(then, update, key, then.getI1Type());
+    scf::YieldOp::create(then, loc, code.boolean(true));
+    then.setInsertionPointAfter(test);
+    isInside = code.both(isInside, test.getResult(0));
+    update->setAttr(marks::inside, builder.getUnitAttr());
+  });
+  scf::YieldOp::create(then, loc, isInside);
+  OpBuilder otherwise = choice.getElseBodyBuilder();
+  scf::YieldOp::create(otherwise, loc,
+                       CodeBuilder(otherwise, loc).boolean(false));
+  Value none = arith::ConstantIntOp::create(builder, loc, -1, 64);
+  return arith::SelectOp::create(builder, loc, choice.getResult(0),
+                                 createGroupNumber(builder, loc, key), none);
+}
+
+/// Sorts iterations by group, and runs each group where its first one stands.
+void LoopSplitter::splitGrouped(GroupedOp op, Piece &piece) {
+  Location loc = op.getLoc();
+  Type index = builder.getIndexType();
+  OpBuilder inPiece = piece.atEnd();
+  BinArithmetic bins(inPiece, loc, stage);
+  Value group = createGroup(
+      inPiece, op, llvm::map_to_vector(op.getKey(), [&](Value coordinate) {
+        return bins.toIndex(coordinate);
+      }));
+  SmallVector<Value> groups = addSlots(group.getType()),
+                     values = addSlots(op.getBody().getArgumentTypes()),
+                     results = addSlots(op.getResultTypes());
+  store(piece, group, groups);
+  store(piece, op->getOperands().drop_front(), values);
+  for (auto [result, array] : llvm::zip(op.getResults(), results)) {
+    inPiece = piece.atEnd();
+    Value zero = arith::ConstantOp::create(
+        inPiece, loc, inPiece.getZeroAttr(result.getType()));
+    store(piece, zero, array);
+  }
+  Value room = slots->add(index, /*elements=*/2), ranks = slots->add(index);
+  auto create = isShared ? createSharedSort : createSort;
+  create(builder, loc, count, groups.front(), /*isUnsigned=*/true, room, ranks);
+  CodeBuilder code(builder, loc);
+  scf::ForOp loop = code.forEach(zero, count, one, [&](Value rank) {
+    runGroup(op, rank, groups.front(), ranks, values, results);
+  });
+  loop->setAttr(marks::lanes, builder.getUnitAttr());
+  loop->setAttr(marks::disjoint, builder.getUnitAttr());
+  readFrom(op.getResults(), results);
+}
+
+void LoopSplitter::runGroup(GroupedOp op, Value first, Value groups,
+                            Value ranks, ValueRange values,
+                            ValueRange results) {
+  CodeBuilder b(builder, op.getLoc());
+  using P = CodeBuilder::P;
+  auto groupAt = [&](Value rank) {
+    return b.load(groups, b.load(ranks, rank));
+  };
+  Value group = groupAt(first), isFirst = b.compare(P::eq, first, zero);
+  Value before = b.select(isFirst, zero, b.sub(first, one));
+  Value begins = b.either(isFirst, b.compare(P::ne, groupAt(before), group));
+  Value none = arith::ConstantIntOp::create(builder, b.loc, -1, 64);
+  b.when(b.both(begins, b.compare(P::ne, group, none)), [&] {
+    scf::WhileOp::create(
+        builder, b.loc, TypeRange{first.getType()}, first,
+        [&](OpBuilder &, Location, ValueRange now) {
+          Value iteration = b.load(ranks, now[0]);
+          IRMapping mapping;
+          for (auto [argument, array] :
+               llvm::zip(op.getBody().getArguments(), values))
+            mapping.map(argument,
+                        Slots::load(builder, b.loc, argument.getType(), array,
+                                    iteration));
+          Block &body = op.getBody().front();
+          for (Operation &inner : body.without_terminator())
+            builder.clone(inner, mapping);
+          for (auto [result, array] : llvm::zip(
+                   cast<YieldOp>(body.getTerminator()).getResults(), results))
+            Slots::store(builder, b.loc, mapping.lookupOrDefault(result), array,
+                         iteration);
+          Value next = b.add(now[0], one), last = b.sub(count, one);
+          Value isSame = b.compare(P::eq, groupAt(b.min(next, last)), group);
+          Value goesOn = b.both(b.compare(P::sle, next, last), isSame);
+          scf::ConditionOp::create(builder, b.loc, goesOn, next);
+        },
+        [&](OpBuilder &, Location, ValueRange now) {
+          scf::YieldOp::create(builder, b.loc, now);
+        });
+  });
 }
 
 void LoopSplitter::splitIf(scf::IfOp op, Piece &piece) {

@@ -46,23 +46,24 @@ PixelAccess::PixelAccess(UpdateOp update)
       image(lookupInPipeline<ImageOp>(update, update.getImageAttr())),
       loc(update.getLoc()) {}
 
-scf::IfOp PixelAccess::createTest(OpBuilder &builder, TypeRange results) {
-  builder.setInsertionPoint(update);
+scf::IfOp piko::createInsideTest(OpBuilder &builder, UpdateOp update,
+                                 ValueRange at, TypeRange results) {
+  Location loc = update.getLoc();
   StageOp stage = getKernelStage(update);
-  BinArithmetic bins(builder, loc, stage);
-  at = llvm::map_to_vector(update.getCoordinates(),
-                           [&](Value value) { return bins.toIndex(value); });
-  Value inside =
-      update->hasAttr(marks::inside)
-          ? arith::ConstantOp::create(builder, loc, builder.getBoolAttr(true))
-          : bins.isInBin(at, update.getBin());
+  bool isKnown = update->hasAttr(marks::inside);
+  Value inside = isKnown ? arith::ConstantOp::create(builder, loc,
+                                                     builder.getBoolAttr(true))
+                         : BinArithmetic(builder, loc, stage)
+                               .isInBin(llvm::to_vector(at), update.getBin());
   auto test =
       scf::IfOp::create(builder, loc, results, inside, /*withElseRegion=*/true);
   builder.setInsertionPointToStart(test.elseBlock());
-  Value bin = findBin(builder, update);
-  FailOp::create(builder, loc, stage.getSymName(), update.getImage(), at,
-                 /*outside_bin=*/true, bin ? bin : update.getBin(),
-                 update.getOfAttr());
+  if (!isKnown) {
+    Value bin = findBin(builder, update);
+    FailOp::create(builder, loc, stage.getSymName(), update.getImage(), at,
+                   /*outside_bin=*/true, bin ? bin : update.getBin(),
+                   update.getOfAttr());
+  }
   SmallVector<Value> zeros;
   for (Type type : results)
     zeros.push_back(
@@ -71,6 +72,14 @@ scf::IfOp PixelAccess::createTest(OpBuilder &builder, TypeRange results) {
     scf::YieldOp::create(builder, loc, zeros);
   builder.setInsertionPointToStart(test.thenBlock());
   return test;
+}
+
+scf::IfOp PixelAccess::createTest(OpBuilder &builder, TypeRange results) {
+  builder.setInsertionPoint(update);
+  BinArithmetic bins(builder, loc, getKernelStage(update));
+  at = llvm::map_to_vector(update.getCoordinates(),
+                           [&](Value value) { return bins.toIndex(value); });
+  return createInsideTest(builder, update, at, results);
 }
 
 Value PixelAccess::load(OpBuilder &builder, ImageOp image, FieldAttr field,

@@ -169,7 +169,8 @@ static void writeCounts(const State &at) {
     for (const auto &[kernel, counts] : at.counts)
       std::fprintf(stderr, "%s: %s\n", kernel.c_str(),
                    describeCounts(counts).c_str());
-  } else if (!at.countsGoTo.empty() && at.countsGoTo != "launches") {
+  } else if (!at.countsGoTo.empty() && at.countsGoTo != "launches" &&
+             at.countsGoTo != "lines") {
     writeCounts(at);
   }
 }

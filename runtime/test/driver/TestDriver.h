@@ -44,9 +44,10 @@
 //   PIKO_TEST_DRIVER_ERRORS    1: texts of errors to stderr as they come
 //   PIKO_TEST_DRIVER_COUNTS    1: counts of all kernels, and what the host has
 //                              asked for, to stderr at the end; launches: each
-//                              launch to stderr as it ends; else the name of a
-//                              file to write them to, and the numbers of calls,
-//                              as JSON
+//                              launch to stderr as it ends; lines: also the
+//                              lines of PTX that it has spent most in, by warp
+//                              instructions; else the name of a file to write
+//                              counts to, and the numbers of calls, as JSON
 //
 // The functions here may be called at any time, from any thread. Texts that
 // they return live until the calling thread's next call of the same function.

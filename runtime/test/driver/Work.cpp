@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <cstring>
+#include <map>
 #include <utility>
 
 using namespace piko::testdriver;
@@ -36,6 +37,39 @@ CUresult errorOf(FaultKind kind) {
 uint64_t seedOfLaunch() {
   uint64_t launch = state().launches++;
   return state().seed ? state().seed + launch * 0x9e3779b97f4a7c15 : 0;
+}
+
+/// The lines of PTX that a launch has spent most in, with the warp instructions
+/// of each, and how many lanes have been active, in the order of the text.
+std::string describeLines(const ptx::Launch &launch) {
+  constexpr size_t most = 40;
+  struct Spent {
+    uint64_t warps = 0, lanes = 0;
+  };
+  std::map<uint32_t, Spent> spent; // by line
+  for (size_t pc = 0; pc < launch.sites.size(); ++pc) {
+    Spent &line = spent[launch.program.code[pc].line];
+    line.warps += launch.sites[pc].warps;
+    line.lanes += launch.sites[pc].lanes;
+  }
+  std::vector<uint64_t> sorted;
+  for (const auto &[line, it] : spent)
+    sorted.push_back(it.warps);
+  std::sort(sorted.rbegin(), sorted.rend());
+  uint64_t least = most < sorted.size() ? sorted[most] + 1 : 1;
+  std::string text;
+  for (const auto &[line, it] : spent) {
+    if (it.warps < least)
+      continue;
+    char numbers[64];
+    std::snprintf(numbers, sizeof(numbers), "  %12llu %4.0f%% %6u: ",
+                  static_cast<unsigned long long>(it.warps),
+                  100.0 * static_cast<double>(it.lanes) /
+                      (ptx::warpSize * static_cast<double>(it.warps)),
+                  line);
+    text += numbers + std::string(ptx::lineOf(launch.source, line)) + '\n';
+  }
+  return text;
 }
 
 void runKernel(const Call &call, const Kernel &kernel,
@@ -68,11 +102,13 @@ void runKernel(const Call &call, const Kernel &kernel,
   addCounts(launch, state().counts[name]);
   if (state().graphFootprint)
     state().graphFootprint->add(launch.footprint);
-  if (state().countsGoTo == "launches") {
+  bool withLines = state().countsGoTo == "lines";
+  if (withLines || state().countsGoTo == "launches") {
     PikoTestDriverCounts counts{};
     addCounts(launch, counts);
-    std::fprintf(stderr, "%s: %s\n", name.c_str(),
-                 describeCounts(counts).c_str());
+    std::fprintf(stderr, "%s: %s\n%s", name.c_str(),
+                 describeCounts(counts).c_str(),
+                 withLines ? describeLines(launch).c_str() : "");
   }
 }
 

@@ -187,13 +187,11 @@ piko.pipeline @OwnPixels rank 1 {
 
 piko.record @F {"x" : i32 at 0} size 4 align 4
 
-// Of one pixel they are made in order.
-// PIECES:      remark: one thread does what iterations do between barriers: two of them may update a pixel, in their order
-// PIECES-NEXT: piko.parallel_for
+// Of one pixel they are made in order, by the thread that has the group.
 // CHECK-LABEL: piko.pipeline @OnePixel
-// CHECK:         scf.if %{{.*}} {
-// CHECK:           scf.for %{{.*}} = %c0 to %c8 step %c1 {
-// CHECK:             piko.update @image
+// CHECK:         scf.for %{{.*}} to %c8 step %c32 {
+// CHECK:           scf.while
+// CHECK:               piko.store %{{.*}} checked @image[
 piko.pipeline @OnePixel rank 1 {
   piko.image @image : @F rank 1
   piko.source @a
@@ -209,7 +207,7 @@ piko.pipeline @OnePixel rank 1 {
         ^bb0(%i: index):
           piko.sync
           %x = arith.index_cast %i : index to i32
-          piko.update @image[%none : i32] {
+          piko.update @image[%none : i32] in %bin {
           ^bb0(%old: i32):
             piko.yield [%x : i32]
           }
@@ -225,8 +223,10 @@ piko.pipeline @OnePixel rank 1 {
 piko.record @F {"x" : i32 at 0} size 4 align 4
 
 // Eight bits of its number do not say which iteration it is.
-// PIECES:      remark: one thread does what iterations do between barriers: two of them may update a pixel, in their order
-// PIECES-NEXT: piko.parallel_for
+// CHECK-LABEL: piko.pipeline @LowBits
+// CHECK:         scf.for %{{.*}} to %c8 step %c32 {
+// CHECK:           scf.while
+// CHECK:               piko.store %{{.*}} checked @image[
 piko.pipeline @LowBits rank 1 {
   piko.image @image : @F rank 1
   piko.source @a
@@ -246,7 +246,47 @@ piko.pipeline @LowBits rank 1 {
           %low = arith.trunci %x : i32 to i8
           %is = arith.cmpi eq, %low, %zero : i8
           scf.if %is {
-            piko.update @image[%none : i32] {
+            piko.update @image[%none : i32] in %bin {
+            ^bb0(%old: i32):
+              piko.yield [%x : i32]
+            }
+          }
+          piko.yield
+        }
+      }
+    }
+  }
+}
+
+// -----
+
+piko.record @F {"x" : i32 at 0} size 4 align 4
+
+// What one thread does, a remark tells.
+// PIECES:      remark: one thread does what iterations do that may update a pixel of another one: an iteration updates pixels in a loop of its own; a parallel loop over all of its pixels would be shared
+// PIECES-NEXT: piko.update
+// CHECK-LABEL: piko.pipeline @Strokes
+// CHECK:         scf.for %{{.*}} = %c0 to %c8 step %c1 {
+// CHECK:           scf.for
+// CHECK:             piko.store %{{.*}} checked @image[
+piko.pipeline @Strokes rank 1 {
+  piko.image @image : @F rank 1
+  piko.source @a
+  piko.stage @a bins [8] threads 64 placed : list @F -> [] {}
+  piko.kernel @kernel_a {
+    piko.bins of @a {
+    ^bb0(%bin: index):
+      piko.lists of @a {
+      ^bb0(%l: !piko.list<@F>):
+        %n = arith.constant 8 : index
+        %zero = arith.constant 0 : index
+        %one = arith.constant 1 : index
+        piko.parallel_for %n {
+        ^bb0(%i: index):
+          piko.sync
+          scf.for %k = %zero to %i step %one {
+            %x = arith.index_cast %i : index to i32
+            piko.update @image[%k : index] in %bin {
             ^bb0(%old: i32):
               piko.yield [%x : i32]
             }

@@ -153,7 +153,7 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 // CHECK-LABEL: piko.pipeline @Shared
 // CHECK:         piko.items of @a attributes {piko.threads = #piko<threads shared>} {
 // CHECK:           piko.parallel_for %{{.*}} attributes {piko.threads = #piko<threads one>} {
-// CHECK:         piko.items of @b lanes iterations attributes {piko.threads = #piko<threads one>} {
+// CHECK:         piko.items of @b lanes iterations attributes {piko.fewest = 2 : i64, piko.threads = #piko<threads by_count>} {
 // CHECK:           piko.parallel_for %{{.*}} attributes {piko.threads = #piko<threads shared>} {
 // CHECK:             piko.parallel_for %{{.*}} attributes {piko.threads = #piko<threads one>} {
 // CHECK:         piko.items of @c lanes one attributes {piko.threads = #piko<threads one>} {
@@ -225,6 +225,8 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 // CHECK:           piko.parallel_for %{{.*}} attributes {piko.threads = #piko<threads lockstep>} {
 // CHECK:           piko.parallel_for %{{.*}} attributes {piko.threads = #piko<threads pieces>} {
 // CHECK:           piko.parallel_for %{{.*}} attributes {piko.threads = #piko<threads pieces>} {
+// CHECK:             piko.sync
+// CHECK:             piko.grouped where %true{{.*}} by
 // CHECK:         piko.lists of @b lanes one attributes {piko.threads = #piko<threads one>} {
 // CHECK:           piko.parallel_for %{{.*}} attributes {piko.threads = #piko<threads pieces_of_one>} {
 piko.pipeline @Barriers rank 1 {
@@ -257,11 +259,10 @@ piko.pipeline @Barriers rank 1 {
           piko.sync
           piko.yield
         }
-        // expected-remark @below {{one thread does what iterations do between barriers: two of them may update a pixel, in their order}}
         piko.parallel_for %few {
         ^bb0(%i: index):
           piko.sync
-          piko.update @image[%zero : index] {
+          piko.update @image[%zero : index] in %bin {
           ^bb0(%old: i32):
             piko.yield [%none : i32]
           }
@@ -279,6 +280,137 @@ piko.pipeline @Barriers rank 1 {
         piko.parallel_for %few {
         ^bb0(%i: index):
           piko.sync
+          piko.yield
+        }
+      }
+    }
+  }
+}
+
+// -----
+
+piko.record @F {"x" : i32 at 0, "z" : f32 at 4} size 8 align 4
+piko.record @Pixel {"n" : f32 at 0} size 4 align 4
+// An update in a branch: what precedes it there yields the pixel and what it uses, what
+// follows it has the branch to itself.
+// CHECK-LABEL: piko.pipeline @Grouped
+// CHECK:         piko.parallel_for %{{.*}} attributes {piko.threads = #piko<threads pieces>} {
+// CHECK:           %[[IS:.*]] = arith.cmpi
+// CHECK:           %[[LEFT:.*]]:3 = scf.if %[[IS]] -> (f32, i1, i32) {
+// CHECK:             %[[AT:.*]] = arith.addi
+// CHECK:             %[[VALUE:.*]] = arith.mulf
+// CHECK:             scf.yield %[[VALUE]], %true{{.*}}, %[[AT]] : f32, i1, i32
+// CHECK:             scf.yield %{{.*}}, %false{{.*}}, %{{.*}} : f32, i1, i32
+// CHECK:           %[[PASSED:.*]] = piko.grouped where %[[LEFT]]#1 by %[[LEFT]]#2 : i32 with %[[LEFT]]#0 : f32 {
+// CHECK:           ^bb0(%[[X:.*]]: i32, %[[V:.*]]: f32):
+// CHECK:             %[[OLD:.*]] = piko.update @image[%[[X]] : i32] in %{{.*}} {
+// CHECK:               arith.addf %{{.*}}, %[[V]]
+// CHECK:             piko.yield results[%[[OLD]] : f32]
+// CHECK:           scf.if %[[IS]] {
+// CHECK-NEXT:        arith.subf %[[PASSED]], %[[LEFT]]#0
+// CHECK:             piko.store
+// CHECK:           } else {
+// CHECK-NEXT:        piko.store
+piko.pipeline @Grouped rank 1 {
+  piko.image @image : @Pixel rank 1
+  piko.buffer @out : @Pixel
+  piko.source @a
+  piko.stage @a bins [8] threads 64 placed : list @F -> [] {}
+  piko.kernel @kernel_a {
+    piko.bins of @a {
+    ^bb0(%bin: index):
+      piko.lists of @a {
+      ^bb0(%l: !piko.list<@F>):
+        %n = piko.list_size %l : !piko.list<@F>
+        piko.parallel_for %n {
+        ^bb0(%i: index):
+          %f = piko.list_at %l[%i] : !piko.list<@F> -> !piko.prim<@F>
+          %x = piko.get %f "x" : !piko.prim<@F> -> i32
+          %z = piko.get %f "z" : !piko.prim<@F> -> f32
+          %four = arith.constant 4 : i32
+          %is = arith.cmpi slt, %x, %four : i32
+          scf.if %is {
+            %at = arith.addi %x, %four : i32
+            %value = arith.mulf %z, %z : f32
+            %passed = piko.update @image[%at : i32] in %bin {
+            ^bb0(%old: f32):
+              %sum = arith.addf %old, %value : f32
+              piko.yield [%sum : f32] results [%old : f32]
+            } -> f32
+            %rest = arith.subf %passed, %value : f32
+            piko.store %rest, @out[%i : index] "n" : f32
+          } else {
+            piko.store %z, @out[%i : index] "n" : f32
+          }
+          piko.yield
+        }
+      }
+    }
+  }
+}
+
+// -----
+
+piko.record @F {"x" : i32 at 0, "n" : i32 at 4} size 8 align 4
+piko.record @Pixel {"n" : i32 at 0} size 4 align 4
+// CHECK-LABEL: piko.pipeline @NotGrouped
+// CHECK-NOT:     piko.grouped
+// CHECK:         piko.parallel_for %{{.*}} attributes {piko.threads = #piko<threads one>} {
+// CHECK-NOT:     piko.grouped
+// CHECK:         piko.parallel_for %{{.*}} attributes {piko.threads = #piko<threads one>} {
+// CHECK-NOT:     piko.grouped
+// CHECK:         piko.parallel_for %{{.*}} attributes {piko.threads = #piko<threads one>} {
+piko.pipeline @NotGrouped rank 1 {
+  piko.image @image : @Pixel rank 1
+  piko.image @other : @Pixel rank 1
+  piko.source @a
+  piko.stage @a bins [8] threads 64 placed : list @F -> [] {}
+  piko.kernel @kernel_a {
+    piko.bins of @a {
+    ^bb0(%bin: index):
+      piko.lists of @a {
+      ^bb0(%l: !piko.list<@F>):
+        %n = piko.list_size %l : !piko.list<@F>
+        %zero = arith.constant 0 : index
+        %one = arith.constant 1 : index
+        piko.parallel_for %n {
+        ^bb0(%i: index):
+          %f = piko.list_at %l[%i] : !piko.list<@F> -> !piko.prim<@F>
+          %x = piko.get %f "x" : !piko.prim<@F> -> i32
+          scf.for %k = %zero to %i step %one {
+            // expected-remark @below {{one thread does what iterations do that may update a pixel of another one: an iteration updates pixels in a loop of its own; a parallel loop over all of its pixels would be shared}}
+            piko.update @image[%x : i32] in %bin {
+            ^bb0(%old: i32):
+              piko.yield [%x : i32]
+            }
+          }
+          piko.yield
+        }
+        piko.parallel_for %n {
+        ^bb0(%i: index):
+          %f = piko.list_at %l[%i] : !piko.list<@F> -> !piko.prim<@F>
+          %x = piko.get %f "x" : !piko.prim<@F> -> i32
+          piko.update @image[%x : i32] in %bin {
+          ^bb0(%old: i32):
+            piko.yield [%x : i32]
+          }
+          // expected-remark @below {{an iteration has two updates of one image; one update would be shared}}
+          piko.update @image[%i : index] in %bin {
+          ^bb0(%old: i32):
+            piko.yield [%x : i32]
+          }
+          piko.yield
+        }
+        piko.parallel_for %n {
+        ^bb0(%i: index):
+          %f = piko.list_at %l[%i] : !piko.list<@F> -> !piko.prim<@F>
+          %x = piko.get %f "x" : !piko.prim<@F> -> i32
+          // expected-remark @below {{iterations update this image, and access it in other ways, too}}
+          %now = piko.load @image[%i : index] "n" : i32
+          piko.update @image[%x : i32] in %bin {
+          ^bb0(%old: i32):
+            piko.yield [%now : i32]
+          }
           piko.yield
         }
       }

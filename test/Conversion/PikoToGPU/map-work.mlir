@@ -160,13 +160,13 @@ piko.pipeline @Cuts rank 1 {
 piko.record @F {"x" : i32 at 0} size 4 align 4
 
 // Iterations that each have a pixel are shared; those that may have the same one
-// are the first thread's.
+// are grouped by it.
 // CHECK-LABEL: piko.kernel @kernel_paint
 // CHECK:         scf.for %{{.*}} = %{{.*}} to %{{.*}} step %c32
 // CHECK:           piko.store %{{.*}} checked @image[
 // CHECK:         gpu.barrier
-// CHECK:         scf.if
-// CHECK:           scf.for %{{.*}} = %c0 to %{{.*}} step %c1
+// CHECK:         scf.for %{{.*}} = %{{.*}} to %{{.*}} step %c32
+// CHECK:           scf.while
 // CHECK:             piko.store %{{.*}} checked @image[
 piko.pipeline @Pixels rank 2 {
   piko.image @image : @F rank 2

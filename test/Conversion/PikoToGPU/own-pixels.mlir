@@ -35,10 +35,11 @@ piko.pipeline @Shifted rank 1 {
 // -----
 
 piko.record @F {"x" : i32 at 0} size 4 align 4
-// Iterations 0 and 256 have the same eight bits: in order.
+// Iterations 0 and 256 have the same eight bits: in order, by one thread.
 // CHECK-LABEL: piko.pipeline @LowBits
-// CHECK:         scf.for %{{.*}} = %c0 to %c300 step %c1 {
-// CHECK:           piko.update @image
+// CHECK:         scf.for %{{.*}} to %c300 step %c32 {
+// CHECK:           scf.while
+// CHECK:               piko.store %{{.*}} checked @image[
 piko.pipeline @LowBits rank 1 {
   piko.image @image : @F rank 1
   piko.source @a
@@ -54,7 +55,7 @@ piko.pipeline @LowBits rank 1 {
           %x = arith.index_cast %i : index to i32
           %low = arith.trunci %x : i32 to i8
           %at = arith.extui %low : i8 to i32
-          piko.update @image[%at : i32] {
+          piko.update @image[%at : i32] in %bin {
           ^bb0(%old: i32):
             piko.yield [%x : i32]
           }

@@ -78,3 +78,60 @@ piko.pipeline @Scan rank 1 {
     }
   }
 }
+
+// -----
+
+piko.record @F {"x" : i32 at 0, "z" : f32 at 4} size 8 align 4
+piko.record @Pixel {"n" : f32 at 0} size 4 align 4
+// Iterations leave their pixel, threads sort them by it, and run the groups.
+// CHECK-LABEL: piko.pipeline @Grouped
+// CHECK:         scf.for %{{.*}} step %c16 {
+// CHECK:           %[[INSIDE:.*]] = arith.cmpi ult
+// CHECK-NEXT:      scf.if %[[INSIDE]] {
+// CHECK-NEXT:      } else {
+// CHECK-NEXT:        piko.fail @a
+// CHECK:           %[[GROUP:.*]] = arith.select %[[INSIDE]], %{{.*}}, %c-1_i64
+// CHECK-NEXT:      memref.store %[[GROUP]], %[[GROUPS:.*]][
+// CHECK:           piko.gpu.flush
+// CHECK:         gpu.barrier
+// CHECK:         scf.while
+// CHECK:           arith.shrui
+// CHECK:         gpu.barrier
+// CHECK:         scf.for %[[RANK:.*]] = %{{.*}} to %{{.*}} step %c16 {
+// CHECK-NOT:       piko.gpu.flush
+// CHECK:           %[[FIRST:.*]] = memref.load %[[RANKS:.*]][%[[RANK]]]
+// CHECK-NEXT:      %[[KEY:.*]] = memref.load %[[GROUPS]][%[[FIRST]]]
+// CHECK:           arith.cmpi ne, %[[KEY]], %c-1_i64
+// CHECK:           scf.if
+// CHECK-NEXT:        scf.while (%[[AT:.*]] = %[[RANK]])
+// CHECK-NEXT:          memref.load %[[RANKS]][%[[AT]]]
+// CHECK:               piko.load checked @image
+// CHECK:               piko.store %{{.*}}, checked @image
+// CHECK:               arith.cmpi eq, %{{.*}}, %[[KEY]]
+// CHECK:               scf.condition
+piko.pipeline @Grouped rank 1 {
+  piko.image @image : @Pixel rank 1
+  piko.source @a
+  piko.stage @a bins [8] threads 64 placed : list @F -> [] {}
+  piko.kernel @kernel_a {
+    piko.bins of @a {
+    ^bb0(%bin: index):
+      piko.lists of @a {
+      ^bb0(%l: !piko.list<@F>):
+        %n = piko.list_size %l : !piko.list<@F>
+        piko.parallel_for %n {
+        ^bb0(%i: index):
+          %f = piko.list_at %l[%i] : !piko.list<@F> -> !piko.prim<@F>
+          %x = piko.get %f "x" : !piko.prim<@F> -> i32
+          %z = piko.get %f "z" : !piko.prim<@F> -> f32
+          piko.update @image[%x : i32] in %bin {
+          ^bb0(%old: f32):
+            %new = arith.mulf %old, %z : f32
+            piko.yield [%new : f32]
+          }
+          piko.yield
+        }
+      }
+    }
+  }
+}

@@ -256,3 +256,101 @@ func.func @no_pipeline(%n: i32) {
   }
   return
 }
+
+// -----
+
+piko.pipeline @P rank 1 {
+  piko.kernel @k {
+    %n = arith.constant 8 : index
+    %yes = arith.constant true
+    piko.parallel_for %n {
+    ^bb0(%i: index):
+      // expected-error@+1 {{expected block arguments of types ('index', 'i1'), but got ('index')}}
+      piko.grouped where %yes by %i : index with %yes : i1 {
+      ^bb0(%key: index):
+        piko.yield
+      }
+      piko.yield
+    }
+  }
+}
+
+// -----
+
+piko.pipeline @P rank 1 {
+  piko.kernel @k {
+    %n = arith.constant 8 : index
+    %yes = arith.constant true
+    piko.parallel_for %n {
+    ^bb0(%i: index):
+      // expected-error@+1 {{expected its body to yield results of types ('i1')}}
+      %r = piko.grouped where %yes by %i : index {
+      ^bb0(%key: index):
+        piko.yield results [%key : index]
+      } -> i1
+      piko.yield
+    }
+  }
+}
+
+// -----
+
+piko.pipeline @P rank 1 {
+  piko.kernel @k {
+    %n = arith.constant 8 : index
+    %yes = arith.constant true
+    // expected-error@+1 {{expected to be inside a parallel_for or a parallel_pixels}}
+    piko.grouped where %yes by %n : index {
+    ^bb0(%key: index):
+      piko.yield
+    }
+  }
+}
+
+// -----
+
+piko.record @Pixel {"n" : i32 at 0} size 4 align 4
+piko.pipeline @P rank 1 {
+  piko.image @image : @Pixel rank 1
+  piko.kernel @k {
+    %n = arith.constant 8 : index
+    %yes = arith.constant true
+    piko.parallel_for %n {
+    ^bb0(%i: index):
+      piko.grouped where %yes by %i : index {
+      ^bb0(%key: index):
+        // expected-error@+1 {{expected to be of the pixel that is the key}}
+        piko.update @image[%n : index] in %n {
+        ^bb0(%old: i32):
+          piko.yield [%old : i32]
+        }
+        piko.yield
+      }
+      piko.yield
+    }
+  }
+}
+
+// -----
+
+piko.record @Pixel {"n" : i32 at 0} size 4 align 4
+piko.pipeline @P rank 1 {
+  piko.image @image : @Pixel rank 1
+  piko.kernel @k {
+    %n = arith.constant 8 : index
+    %yes = arith.constant true
+    piko.parallel_for %n {
+    ^bb0(%i: index):
+      piko.grouped where %yes by %i : index {
+      ^bb0(%key: index):
+        // expected-error@+1 {{expected to name the bin that its pixel must be in}}
+        piko.update @image[%key : index] {
+        ^bb0(%old: i32):
+          piko.yield [%old : i32]
+        }
+        piko.yield
+      }
+      piko.yield
+    }
+  }
+}

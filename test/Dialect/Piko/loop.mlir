@@ -48,9 +48,24 @@ piko.pipeline @Loops rank 1 {
         }
         // CHECK: %{{.*}} = piko.sort %[[Z]] : f32
         // CHECK-NEXT: %[[AT:.*]] = piko.sort unsigned %[[ID]] : i32
+        // CHECK-NEXT: arith.cmpi
         %t = piko.sort %z : f32
         %u = piko.sort unsigned %id : i32
-        // CHECK-NEXT: piko.parallel_for %[[AT]] {
+        // CHECK-NEXT: %{{.*}} = piko.grouped where %[[IS:.*]] by %[[ID]] : i32 with %[[Z]] : f32 {
+        // CHECK-NEXT: ^bb0(%{{.*}}: i32, %[[V:.*]]: f32):
+        // CHECK-NEXT: piko.yield results[%[[V]] : f32]
+        // CHECK-NEXT: } -> f32
+        %is = arith.cmpi slt, %id, %r#1 : i32
+        %g = piko.grouped where %is by %id : i32 with %z : f32 {
+        ^bb0(%key: i32, %value: f32):
+          piko.yield results [%value : f32]
+        } -> f32
+        // CHECK-NEXT: piko.grouped where %[[IS]] by %[[ID]] : i32 {
+        piko.grouped where %is by %id : i32 {
+        ^bb0(%key: i32):
+          piko.yield
+        }
+        // CHECK: piko.parallel_for %[[AT]] {
         piko.parallel_for %u {
         ^bb0(%j: index):
           piko.yield

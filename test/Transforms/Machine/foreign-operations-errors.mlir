@@ -46,7 +46,7 @@ piko.pipeline @P rank 1 {
       ^bb0(%i: index):
         %i32 = arith.index_cast %i : index to i32
         piko.store %i32, @counts[%i : index] "x" : i32
-        // expected-error@+1 {{expected piko.sync, piko.reduce, piko.scan or piko.sort, which loops can be cut at, but got 'piko_test.meet'}}
+        // expected-error@+1 {{expected piko.sync, piko.reduce, piko.scan, piko.sort or piko.grouped, which loops can be cut at, but got 'piko_test.meet'}}
         piko_test.meet
         piko.yield
       }

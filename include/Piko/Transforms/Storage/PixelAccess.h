@@ -17,6 +17,12 @@ void forEachElement(mlir::OpBuilder &builder, mlir::Location loc,
                     RecordOp record,
                     llvm::function_ref<void(FieldAttr, mlir::ValueRange)> body);
 
+/// A region, where `builder` stands, for what is done to the pixel of an update
+/// if the indices `at` of it are in the bin; elsewhere the run fails, and
+/// results are zeros.
+mlir::scf::IfOp createInsideTest(mlir::OpBuilder &builder, UpdateOp update,
+                                 mlir::ValueRange at, mlir::TypeRange results);
+
 /// The pixel of an update, which is known to be in the image.
 class PixelAccess {
 public:
@@ -32,8 +38,7 @@ public:
   void changeIn(mlir::OpBuilder &builder, ImageOp image, AtomicKind kind,
                 mlir::Value value);
 
-  /// A region, in front of the update, for what is done to the pixel if it is
-  /// in the bin; elsewhere the run fails, and results are zeros.
+  /// `createInsideTest` in front of the update.
   mlir::scf::IfOp createTest(mlir::OpBuilder &builder, mlir::TypeRange results);
 
 private:

@@ -6,8 +6,10 @@
 //      of many primitives (PixelNest.h), or else of one after the other
 //      (PixelOwners.h);
 //   3. otherwise say of each piece of work and each parallel loop who takes its
-//      items or iterations (WorkLegality.h).
+//      items or iterations (WorkLegality.h), and group updates whose pixels
+//      follow from data (GroupUpdates.h).
 
+#include "PikoToGPU/Mapping/GroupUpdates.h"
 #include "PikoToGPU/Mapping/PixelOwners.h"
 #include "PikoToGPU/Mapping/SetupSplit.h"
 
@@ -39,8 +41,10 @@ private:
   bool mapPixels();
   std::optional<Obstacle> findObstacleToCollapsing(ItemsOp items);
   void mapWork(WorkOpInterface work);
+  int64_t countFewest(ItemsOp work);
   ThreadMapping chooseForItems(ItemsOp work);
   ThreadMapping chooseForLoop(ParallelLoopOpInterface loop);
+  void orderUpdates(ParallelLoopOpInterface loop);
   void mark(Operation *op, ThreadMapping mapping) {
     op->setAttr(marks::threads,
                 ThreadMappingAttr::get(kernel.getContext(), mapping));
@@ -141,26 +145,61 @@ bool ThreadMapper::mapPixels() {
 // Primitives and iterations
 //===----------------------------------------------------------------------===//
 
-/// Where lanes would have items whose updates have to be put in order, they
-/// share the iterations of one, if others than rare primitives have any; where
-/// they would have pairs, they have items if these need no order.
+/// From how many primitives on a block is done sooner if each of its threads
+/// has some, be one of them as large as any: by operations.
+int64_t ThreadMapper::countFewest(ItemsOp work) {
+  constexpr int64_t likely = 256, barriers = 200;
+  int64_t around = 0, each = 0, most = 1;
+  work->walk([&](Operation *op) {
+    (op->getParentOfType<ParallelLoopOpInterface>() ? each : around) += 1;
+    if (auto loop = dyn_cast<ParallelLoopOpInterface>(op))
+      most = std::max(most, std::min(likely, getMostIterations(loop)));
+  });
+  int64_t alone = around + each * most;
+  int64_t shared =
+      around + each * llvm::divideCeil(most, uint64_t(threads)) + barriers;
+  return std::clamp<int64_t>(llvm::divideCeil(alone, uint64_t(shared)), 2,
+                             threads);
+}
+
+/// Where lanes would share the iterations of one item, which others than rare
+/// primitives have, threads have items where there are many; where lanes would
+/// have pairs, threads have items if these need no order.
 ThreadMapping ThreadMapper::chooseForItems(ItemsOp work) {
   LaneMapping lanes = work.getLanes().value_or(LaneMapping::Items);
-  if (lanes == LaneMapping::One ||
-      (lanes == LaneMapping::Iterations && !hasRareIterationsOnly(work)))
+  if (lanes == LaneMapping::One || threads == 1)
     return ThreadMapping::One;
+  if (lanes == LaneMapping::Iterations && !hasRareIterationsOnly(work)) {
+    if (!canShareByCount(work))
+      return ThreadMapping::One;
+    work->setAttr(marks::fewest,
+                  Builder(work).getI64IntegerAttr(countFewest(work)));
+    return ThreadMapping::ByCount;
+  }
   return isIndependent(work) ? ThreadMapping::Shared : ThreadMapping::One;
 }
 
+/// Where two iterations may update one pixel.
+void ThreadMapper::orderUpdates(ParallelLoopOpInterface loop) {
+  if (threads == 1 || isChecked(loop) || updatesOwnPixels(loop))
+    return;
+  std::optional<Obstacle> obstacle = findObstacleToGrouping(loop);
+  if (!obstacle)
+    groupUpdates(loop);
+  else if (!obstacle->text.empty())
+    emitRemark(obstacle->at,
+               "one thread does what iterations do that may update "
+               "a pixel of another one: ")
+        << obstacle->text;
+}
+
 ThreadMapping ThreadMapper::chooseForLoop(ParallelLoopOpInterface loop) {
+  orderUpdates(loop);
   if (!loop.hasBarriers())
     return isIndependent(loop) ? ThreadMapping::Shared : ThreadMapping::One;
   if (canRunInLockstep(loop, threads))
     return ThreadMapping::Lockstep;
-  if (!updatesOwnPixels(loop))
-    loop.emitRemark("one thread does what iterations do between barriers: two "
-                    "of them may update a pixel, in their order");
-  else
+  if (updatesOwnPixels(loop))
     loop.emitRemark("what iterations keep across barriers is in memory: they "
                     "are not known to be at most ")
         << threads << ", the threads of a block";

@@ -237,7 +237,7 @@ static int64_t getBound(Value lo, Value hi) {
   return bound;
 }
 
-static int64_t getMostIterations(ParallelLoopOpInterface loop) {
+int64_t piko::getMostIterations(ParallelLoopOpInterface loop) {
   if (auto counted = dyn_cast<ParallelForOp>(*loop))
     return getBound(counted.getCount());
   auto pixels = dyn_cast<ParallelPixelsOp>(*loop);
@@ -253,8 +253,7 @@ static int64_t getMostIterations(ParallelLoopOpInterface loop) {
 // Loops
 //===----------------------------------------------------------------------===//
 
-/// What is checked is reported in the order of the reference.
-static bool isChecked(Operation *op) {
+bool piko::isChecked(Operation *op) {
   return contains(op->getParentOfType<KernelOp>(), [](Operation *inner) {
     return inner->hasTrait<CheckingMode>();
   });
@@ -263,6 +262,15 @@ static bool isChecked(Operation *op) {
 bool piko::isIndependent(Operation *loop) {
   auto meets = [](Operation *inner) { return isa<BarrierOpInterface>(inner); };
   return !isChecked(loop) && !contains(loop, meets) && updatesOwnPixels(loop);
+}
+
+bool piko::canShareByCount(ItemsOp items) {
+  bool hasLoop = false, updates = false;
+  items->walk([&](Operation *op) {
+    hasLoop |= isa<ParallelLoopOpInterface>(op);
+    updates |= isa<UpdateOp>(op); // own of a primitive, not of an iteration
+  });
+  return hasLoop && !updates && isIndependent(items);
 }
 
 bool piko::canRunInLockstep(ParallelLoopOpInterface loop, int64_t threads) {
@@ -277,7 +285,8 @@ static bool isInSharedWork(Operation *op) {
   auto work = op->getParentOfType<WorkOpInterface>();
   auto mark = work ? work->getAttrOfType<ThreadMappingAttr>(marks::threads)
                    : ThreadMappingAttr();
-  return mark && mark.getValue() != ThreadMapping::One;
+  return mark && mark.getValue() != ThreadMapping::One &&
+         mark.getValue() != ThreadMapping::ByCount;
 }
 
 bool piko::isLegal(Operation *op, ThreadMapping mapping, int64_t threads) {
@@ -294,6 +303,9 @@ bool piko::isLegal(Operation *op, ThreadMapping mapping, int64_t threads) {
   case ThreadMapping::Pieces:
   case ThreadMapping::PiecesOfOne:
     return loop != nullptr;
+  case ThreadMapping::ByCount:
+    return isa<ItemsOp>(op) && canShareByCount(cast<ItemsOp>(op)) &&
+           op->hasAttr(marks::fewest);
   case ThreadMapping::Pixels:
   case ThreadMapping::Collapsed:
     return isa<ItemsOp>(op) &&

@@ -34,11 +34,23 @@ bool updatesPixelsAlone(KernelOp kernel);
 /// say which iteration it is, or only one iteration does.
 bool updatesOwnPixels(mlir::Operation *loop);
 
+/// Whether the kernel around is in checking mode: what is wrong is reported in
+/// the order of the reference.
+bool isChecked(mlir::Operation *op);
+
 /// Whether threads may take the items, or iterations, of a loop in any order.
 bool isIndependent(mlir::Operation *loop);
 
 /// Whether iterations that meet at barriers can each be one of the threads.
 bool canRunInLockstep(ParallelLoopOpInterface loop, int64_t threads);
+
+/// How many iterations a loop has at most; the largest number where that is not
+/// known.
+int64_t getMostIterations(ParallelLoopOpInterface loop);
+
+/// Whether threads may have primitives where a bin has many, and take one after
+/// the other where it has few, whose iterations they share.
+bool canShareByCount(ItemsOp items);
 
 /// Whether a mapping holds for work, or a parallel loop. Where threads share
 /// pixels, findPixelNest and findObstacleToSharing say more.

@@ -80,16 +80,17 @@ void PikoDialect::initialize() {
 /// What an attribute of that name has to be; null where there is none.
 static StringRef getExpectedKind(StringRef name) {
   return llvm::StringSwitch<StringRef>(name)
-      .Cases({marks::lanes, marks::rows, marks::shared, marks::again,
-              marks::deferred, marks::rare, marks::fails, marks::input,
-              marks::shortCircuit, marks::inside, marks::source,
+      .Cases({marks::lanes, marks::rows, marks::shared, marks::disjoint,
+              marks::again, marks::deferred, marks::rare, marks::fails,
+              marks::input, marks::shortCircuit, marks::inside, marks::source,
               marks::versions},
              "a unit")
       .Case(marks::mapping, "what lanes are given, as #piko<lanes items>")
       .Case(marks::units, "how threads share units, as #piko<units shared>")
       .Case(marks::threads, "how threads share work, as #piko<threads shared>")
       .Case(marks::steps, "an array of steps, such as #piko.step<clear 0>")
-      .Cases({marks::number, marks::blockSize}, "a 64-bit integer")
+      .Cases({marks::number, marks::blockSize, marks::fewest},
+             "a 64-bit integer")
       .Cases({marks::turns, marks::advances, marks::probability},
              "a 64-bit float")
       .Case(marks::probabilities, "an array of 64-bit floats")
@@ -118,7 +119,8 @@ static bool hasExpectedKind(NamedAttribute attribute) {
   if (name == marks::turns || name == marks::advances ||
       name == marks::probability)
     return isa<FloatAttr>(value) && cast<FloatAttr>(value).getType().isF64();
-  if (name == marks::number || name == marks::blockSize)
+  if (name == marks::number || name == marks::blockSize ||
+      name == marks::fewest)
     return isa<IntegerAttr>(value) &&
            cast<IntegerAttr>(value).getType().isInteger(64);
   return isa<UnitAttr>(value);

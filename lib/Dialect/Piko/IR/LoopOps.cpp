@@ -121,6 +121,7 @@ LogicalResult SyncOp::verify() { return verifyBarrier(*this); }
 LogicalResult ReduceOp::verify() { return verifyBarrier(*this); }
 LogicalResult ScanOp::verify() { return verifyBarrier(*this); }
 LogicalResult SortOp::verify() { return verifyBarrier(*this); }
+LogicalResult GroupedOp::verify() { return verifyBarrier(*this); }
 
 /// The body of a reduction or a scan takes two values and yields one.
 static LogicalResult verifyCombine(Operation *op, TypeRange types) {
@@ -155,4 +156,29 @@ LogicalResult ReduceOp::verifyRegions() {
 }
 LogicalResult ScanOp::verifyRegions() {
   return verifyCombine(*this, getValues().getTypes());
+}
+
+LogicalResult GroupedOp::verifyRegions() {
+  Block &body = getBody().front();
+  SmallVector<Type> types(getKey().getTypes());
+  llvm::append_range(types, getValues().getTypes());
+  if (body.getArgumentTypes() != TypeRange(types))
+    return emitOpError("expected block arguments of types (")
+           << types << "), but got (" << body.getArgumentTypes() << ")";
+  auto yield = dyn_cast<YieldOp>(body.getTerminator());
+  if (!yield || !yield.getPixel().empty() ||
+      yield.getResults().getTypes() != getResultTypes())
+    return emitOpError("expected its body to yield results of types (")
+           << getResultTypes() << ")";
+  ValueRange key = ValueRange(body.getArguments()).take_front(getKey().size());
+  WalkResult updates = walk([&](UpdateOp update) {
+    if (!llvm::equal(key, update.getCoordinates()))
+      update.emitOpError("expected to be of the pixel that is the key");
+    else if (!update.getBin())
+      update.emitOpError("expected to name the bin that its pixel must be in");
+    else
+      return WalkResult::advance();
+    return WalkResult::interrupt();
+  });
+  return failure(updates.wasInterrupted());
 }

@@ -27,7 +27,7 @@ static std::string text(const std::array<uint32_t, 3> &index) {
          ", " + std::to_string(index[2]) + ")";
 }
 
-static std::string_view lineOf(std::string_view source, uint32_t line) {
+std::string_view piko::ptx::lineOf(std::string_view source, uint32_t line) {
   while (--line) {
     size_t end = source.find('\n');
     if (end == source.npos)

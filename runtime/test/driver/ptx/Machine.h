@@ -147,6 +147,9 @@ private:
   std::vector<std::unique_ptr<Warp>> warps;
 };
 
+/// A line of a text, from 1 on, without the space that it begins with.
+std::string_view lineOf(std::string_view source, uint32_t line);
+
 /// Runs all blocks. Throws Fault.
 void run(Launch &launch);
 

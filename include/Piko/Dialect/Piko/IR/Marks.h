@@ -39,11 +39,16 @@ constexpr llvm::StringLiteral probabilities = "piko.probabilities";
 constexpr llvm::StringLiteral units = "piko.units";
 /// A loop whose iterations the threads of a block share.
 constexpr llvm::StringLiteral shared = "piko.shared";
+/// A loop no two iterations of which update one pixel.
+constexpr llvm::StringLiteral disjoint = "piko.disjoint";
 /// Work, or a bin, on what a local edge takes: what follows takes the same.
 constexpr llvm::StringLiteral again = "piko.again";
 /// How the threads of a block share work on primitives, or a parallel loop: a
 /// `ThreadMappingAttr`.
 constexpr llvm::StringLiteral threads = "piko.threads";
+/// Of work that threads share by its count: from how many primitives on, a
+/// 64-bit integer.
+constexpr llvm::StringLiteral fewest = "piko.fewest";
 /// How many threads a block of a kernel has: a 64-bit integer.
 constexpr llvm::StringLiteral blockSize = "piko.block_size";
 /// A loop whose iterations have outboxes of their own.

@@ -69,7 +69,8 @@ def Piko_ThreadMapping
   I32EnumAttrCase<"Pieces", 3, "pieces">,     // shared, between barriers
   I32EnumAttrCase<"PiecesOfOne", 4, "pieces_of_one">,
   I32EnumAttrCase<"Pixels", 5, "pixels">,     // of one primitive after the other
-  I32EnumAttrCase<"Collapsed", 6, "collapsed">]> { // pixels of many primitives
+  I32EnumAttrCase<"Collapsed", 6, "collapsed">, // pixels of many primitives
+  I32EnumAttrCase<"ByCount", 7, "by_count">]> { // shared where there are many
   let cppNamespace = "::piko";
   let genSpecializedAttr = 0;
 }

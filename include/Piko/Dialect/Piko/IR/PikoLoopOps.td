@@ -163,4 +163,40 @@ def Piko_SortOp : Piko_BarrierOp<"sort"> {
   let assemblyFormat = "(`unsigned` $isUnsigned^)? $key attr-dict `:` type($key)";
 }
 
+def Piko_GroupedOp : Piko_BarrierOp<"grouped", [
+    SingleBlock, AttrSizedOperandSegments]> {
+  let summary = "runs what iterations of equal keys do one after the other";
+  let description = [{
+    A barrier, legal where `piko.sync` is. Runs the body once for each iteration
+    whose condition holds: iterations of equal keys in order of index, others in
+    any order, so that threads share groups. The body gets the coordinates of the
+    key, and then the iteration's values. An iteration whose condition does not
+    hold gets zeros for results.
+
+    ```mlir
+    piko.grouped where %covered by %x, %y : i32, i32 with %alpha : f32 {
+    ^bb0(%u: i32, %v: i32, %a: f32):
+      piko.update @color[%u, %v : i32, i32] in %bin {
+      ^bb0(%old: f32):
+        %new = arith.mulf %old, %a : f32
+        piko.yield [%new : f32]
+      }
+      piko.yield
+    }
+    ```
+
+    `piko-map-threads` makes it of updates whose pixels follow from data.
+  }];
+  let arguments = (ins I1:$condition, Variadic<Piko_Coordinate>:$key,
+                       Variadic<AnyType>:$values);
+  let results = (outs Variadic<Piko_Scalar>:$results);
+  let regions = (region SizedRegion<1>:$body);
+  let assemblyFormat = [{
+    `where` $condition `by` $key `:` type($key)
+    (`with` $values^ `:` type($values))? attr-dict-with-keyword $body
+    (`->` type($results)^)?
+  }];
+  let hasRegionVerifier = 1;
+}
+
 #endif // PIKO_DIALECT_PIKO_IR_PIKOLOOPOPS_TD

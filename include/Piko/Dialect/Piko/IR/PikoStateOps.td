@@ -176,7 +176,7 @@ def Piko_UpdateOp : Piko_Op<"update", [
 def Piko_YieldOp : Piko_Op<"yield", [
     Pure, Terminator, AttrSizedOperandSegments,
     ParentOneOf<["UpdateOp", "ParallelForOp", "ParallelPixelsOp", "ReduceOp",
-                 "ScanOp"]>]> {
+                 "ScanOp", "GroupedOp"]>]> {
   let summary = "ends the body of an operation";
   let description = [{
     See `piko.update`, `piko.parallel_for`, `piko.parallel_pixels` and
